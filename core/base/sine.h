@@ -13,7 +13,9 @@
 #error "-ffast-math and -Ofast break the argument reduction"
 #endif
 
-enum { PW_SINE_LANES = 2 };
+#ifndef PW_SINE_LANES
+#define PW_SINE_LANES 2
+#endif
 #define PW_SINE_LIMIT 1e6
 
 /* GNU C's vectors: operations work on all lanes. */

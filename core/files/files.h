@@ -48,6 +48,8 @@ int pw_compile_file (const char *path, const char *page, pw_object_user *use, vo
 int pw_compile_scene (const char *path, const char *object, const char *log, pw_error *error);
 /* A further option for generated code: gcc 12.2 fuses operations when it vectorises straight code, see the Makefile. */
 #define PW_SCENE_FLAG "-fno-tree-slp-vectorize"
+/* The option for this processor's instructions, without those that fuse: results have the same bits. */
+const char *pw_scene_level (void);
 
 /* The command of the C compiler: CC in the environment, else "cc". */
 const char *pw_compiler (void);

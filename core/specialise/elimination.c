@@ -51,24 +51,25 @@ static void elimination_place (pw_elimination *x, int p, int partner) {
 static void elimination_guard_row (pw_emitter *e, pw_term pivot, pw_term diagonal) {
   char a[24], b[24];
   int constant = pivot.type != PW_TERM_VARIABLE && diagonal.type != PW_TERM_VARIABLE;
-  fprintf (constant ? e->prepare : e->code, "  if (!(%s > " ELIMINATION_ROW " * %s)) return 1;\n",
-           pw_term_text (pivot, a), pw_term_text (diagonal, b));
+  if (!constant && strcmp (pivot.name, diagonal.name) == 0) return; /* a sum of squares: if 0, a is not finite */
+  fprintf (constant ? e->prepare : e->code, "  GUARD (%s > " ELIMINATION_ROW " * %s);\n", pw_term_text (pivot, a),
+           pw_term_text (diagonal, b));
 }
 
 /* p: the pivot of column c, against all entries of that column. */
-static void elimination_guard_column (const pw_elimination *x, pw_emitter *e, int c, pw_term p, const pw_term *first) {
+static void elimination_guard_column (const pw_elimination *x, pw_emitter *e, int c, pw_term p) {
   if (p.type != PW_TERM_VARIABLE) return;
-  fprintf (e->code, "  if (!(%s * %s > " ELIMINATION_COLUMN " * (", p.name, p.name);
+  fprintf (e->code, "  GUARD (%s * %s > " ELIMINATION_COLUMN " * (", p.name, p.name);
   const char *plus = "";
   for (int i = x->coordinates; i < x->n; i++) {
-    pw_term now = AT (i, c), was = first[(size_t)i * (size_t)x->n + (size_t)c];
+    pw_term now = AT (i, c), was = x->first[(size_t)i * (size_t)x->n + (size_t)c];
     for (int k = 0; k < 2; k++, now = was) {
       if (elimination_is_zero (now) || (k == 1 && strcmp (AT (i, c).name, was.name) == 0)) continue;
       fprintf (e->code, "%s%s * %s", plus, now.name, now.name);
       plus = " + ";
     }
   }
-  fprintf (e->code, "))) return 1;\n");
+  fprintf (e->code, "));\n");
 }
 
 /* ---- Factorisation ---- */
@@ -79,6 +80,24 @@ static void elimination_update (pw_elimination *x, pw_emitter *e, int i, int j, 
   AT (j, i) = AT (i, j);
 }
 
+/* The first velocity p of a body: subtracts the terms of both velocities, of the same mass, from the diagonal entry of an
+ * equation in which their entries are the components of a vector of constant length.  Returns 1 if done, and for the second
+ * velocity. */
+static int elimination_lengths (pw_elimination *x, pw_emitter *e, int i, int p) {
+  if (i < x->coordinates || p >= 3 * x->s->bodies || p % 3 == 2) return 0;
+  int first = p - p % 3;
+  pw_term a = x->first[(size_t)i * (size_t)x->n + (size_t)first],
+          b = x->first[(size_t)i * (size_t)x->n + (size_t)first + 1];
+  if (!x->length[(size_t)(i - x->coordinates) * (size_t)x->s->bodies + (size_t)(p / 3)]) return 0;
+  if (a.type != PW_TERM_VARIABLE || b.type != PW_TERM_VARIABLE) return 0;
+  if (strcmp (a.name, AT (i, first).name) != 0 || strcmp (b.name, AT (i, first + 1).name) != 0) return 0;
+  if (p > first) return 1;
+  a.type = b.type = PW_TERM_CONSTANT;
+  pw_term square = pw_emit_difference (e, pw_emit_product (e, a, a), pw_term_negative (b), b);
+  AT (i, i) = pw_emit_difference (e, AT (i, i), square, x->inverse[p]);
+  return 1;
+}
+
 static void elimination_pivot (pw_elimination *x, pw_emitter *e, int p, pw_term inverse) {
   elimination_comment (x, e, p, -1);
   elimination_place (x, p, -1);
@@ -87,7 +106,8 @@ static void elimination_pivot (pw_elimination *x, pw_emitter *e, int p, pw_term 
     if (elimination_couples (x, i, p)) FACTOR (i, p) = pw_emit_product (e, AT (i, p), x->inverse[p]);
   for (int i = 0; i < x->n; i++)
     for (int j = 0; j <= i && elimination_couples (x, i, p); j++)
-      if (elimination_couples (x, j, p)) elimination_update (x, e, i, j, FACTOR (i, p), AT (j, p));
+      if (elimination_couples (x, j, p) && !(i == j && elimination_lengths (x, e, i, p)))
+        elimination_update (x, e, i, j, FACTOR (i, p), AT (j, p));
 }
 
 /* The pivot [ 0 p ; p 0 ] of a massless coordinate c and an equation r. */
@@ -143,7 +163,7 @@ static int elimination_rows (pw_elimination *x, pw_emitter *e) {
   if (first == NULL) return PW_RESOURCE;
   for (int i = 0; i < x->n; i++) first[i] = AT (i, i);
   int status = PW_OK, p = -1;
-  for (int q; (q = elimination_next_row (x)) >= 0; p = p < 0 ? q : -1) {
+  for (int q; (q = elimination_next_row (x)) >= 0; p = p < 0 && AT (q, q).type == PW_TERM_VARIABLE ? q : -1) {
     pw_term b = p < 0 ? pw_term_zero () : AT (q, p);
     if (elimination_is_zero (AT (q, q))) {
       status = PW_RETRY;
@@ -204,13 +224,13 @@ static int elimination_allocate (pw_elimination *x, const pw_term *K) {
   return PW_OK;
 }
 
-int pw_elimination_open (pw_elimination *x, const pw_system *s, const pw_term *K, const unsigned char *takes_part,
-                         pw_emitter *e) {
-  *x = (pw_elimination){ .s = s, .coordinates = s->coords, .n = s->coords + s->rows };
+int pw_elimination_open (pw_elimination *x, const pw_system *s, const pw_term *K, const unsigned char *length,
+                         const unsigned char *takes_part, pw_emitter *e) {
+  *x = (pw_elimination){ .s = s, .first = K, .length = length, .coordinates = s->coords, .n = s->coords + s->rows };
   if (elimination_allocate (x, K) != PW_OK) return PW_RESOURCE;
   for (int i = 0; i < x->n; i++) x->step[i] = i < s->coords || takes_part[i - s->coords] ? x->n : x->n + 1;
   for (int c, r; elimination_next_pair (x, s->mass, &c, &r);) {
-    elimination_guard_column (x, e, c, AT (r, c), K);
+    elimination_guard_column (x, e, c, AT (r, c));
     elimination_pair (x, e, c, r);
   }
   for (int j = 0; j < s->coords; j++) {

@@ -15,14 +15,16 @@ typedef struct {
   int *order, *partner; /* n: unknowns in their order; partner of a 2 x 2 pivot, or -1 */
   int *step;            /* n: position in the order; n + 1: takes no part */
   int pivots, factors;  /* unknowns in the order; entries of F */
-  void *memory;
+  const pw_term *first; /* n x n: before the elimination */
+  const unsigned char *length;
 } pw_elimination;
 
-/* K: n x n terms of the lower triangle and their mirror image, n = coordinates + rows; takes_part[i] = 0 for an
- * equation that is ignored.  Writes the statements of the factorisation, which end with what the solution needs in F.
+/* K: n x n terms of the lower triangle and their mirror image, n = coordinates + rows; length[i, b] = 1 if the
+ * entries of equation i for the velocities vx, vy of body b form a vector of constant length; takes_part[i] = 0 for an equation
+ * that is ignored.  Writes the statements of the factorisation, which end with what the solution needs in F.
  * PW_RETRY if a massless coordinate is determined by no equation, or an equation has no pivot.  Errors: PW_RESOURCE. */
-int pw_elimination_open (pw_elimination *x, const pw_system *s, const pw_term *K, const unsigned char *takes_part,
-                         pw_emitter *e);
+int pw_elimination_open (pw_elimination *x, const pw_system *s, const pw_term *K, const unsigned char *length,
+                         const unsigned char *takes_part, pw_emitter *e);
 void pw_elimination_close (pw_elimination *x);
 
 /* Writes the statements that solve it; right: n terms, replaced by those of the solution. */

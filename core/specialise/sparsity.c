@@ -1,4 +1,5 @@
 /* Sparsity of element types; see sparsity.h. */
+#include <math.h>
 #include <string.h>
 #include "random_scene.h"
 #include "sparsity.h"
@@ -32,6 +33,11 @@ static void sparsity_state (const pw_element_batch *k, int e, int fresh, int kno
     if (fresh) first[i] = value;
     out->J[i] = known ? sparsity_merge (out->J[i], value, first[i]) : sparsity_first (value);
   }
+  for (int i = 0; i < k->kind->rows * k->kind->bodies; i++) {
+    int at = i / k->kind->bodies * k->b.cols + i % k->kind->bodies * 3;
+    const double *J = k->J + e * n + at;
+    if (fabs (hypot (J[0], J[1]) - hypot (first[at], first[at + 1])) > 1e-12) out->length[i] = 0;
+  }
   for (int c = 0; k->kind->force && c < k->b.cols; c++)
     if (k->block[e * k->b.cols + c] != 0) out->force[c] = PW_ENTRY_VARIABLE;
 }
@@ -63,12 +69,13 @@ int pw_sparsity_find (const pw_kind *kind, pw_sparsity *out) {
   pw_random random = { 7 };
   int known = 0, status = PW_OK;
   memset (out, 0, sizeof *out);
+  memset (out->length, 1, sizeof out->length);
   for (int n = 0; n < SPARSITY_SCENES && status == PW_OK; n++) {
     pw_error why = { 0 };
     pw_system *s = pw_random_scene (kind, &random, &why);
     status = s ? sparsity_scene (s, &random, &known, out) : why.status == PW_RESOURCE ? PW_RESOURCE : PW_OK;
     pw_system_free (s);
   }
-  if (!known) memset (out, PW_ENTRY_VARIABLE, sizeof *out);
+  if (!known) *out = (pw_sparsity){ .length = { 0 } }, memset (out, PW_ENTRY_VARIABLE, offsetof (pw_sparsity, length));
   return status;
 }

@@ -36,7 +36,9 @@ static void specialise_sources (const pw_specialise_scene *x) {
   const pw_source_text *done[SPECIALISE_SOURCES];
   char name[80], file[90];
   int count = 0;
-  fputs ("#include <math.h>\n#include <string.h>\n#include \"pinwheel.h\"\n", x->out);
+  fputs ("#ifdef __AVX2__\n#define PW_SINE_LANES 4\n#endif\n#include <math.h>\n#include <string.h>\n#include "
+         "\"pinwheel.h\"\n",
+         x->out);
   specialise_source (x->out, "specialised.h", done, &count);
   specialise_source (x->out, "sine.h", done, &count);
   for (int k = 0; k < x->s->batches; k++) {
@@ -55,7 +57,8 @@ static void specialise_constants (const pw_specialise_scene *x) {
            "  ENTRIES = %d, REDUNDANT = %d, LEDGER = %d, RHEONOMIC = %d, READERS = %d };\n",
            s->bodies, s->coords, s->rows, s->holonomic, s->coords - 3 * s->bodies, x->entries, x->independent != NULL,
            s->entries, s->rheonomic > 0, s->state_dependent > 0);
-  fprintf (x->out, "\n#define INLINE static inline%s\n\n",
+  fputs ("\n#define GUARD(condition) \\\n  if (!(condition)) return 1\n", x->out);
+  fprintf (x->out, "#define INLINE static inline%s\n\n",
            s->rows <= SPECIALISE_INLINE ? " __attribute__ ((always_inline))" : "");
   for (int b = 0; b < s->bodies; b++) {
     fprintf (x->out, "/* body %d: ", b);

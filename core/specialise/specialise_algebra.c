@@ -30,13 +30,30 @@ static pw_term *specialise_matrix (const pw_specialise_scene *x) {
   if (K == NULL) return NULL;
   for (size_t i = 0; i < n * n; i++) K[i] = pw_term_zero ();
   for (int j = 0; j < s->coords; j++)
-    if (s->mass[j] > 0) K[(size_t)j * n + (size_t)j] = pw_term_named (PW_TERM_CONSTANT, "M", j, s->mass[j]);
+    if (s->mass[j] > 0) /* one mass for vx and vy */
+      K[(size_t)j * n + (size_t)j] =
+          pw_term_named (PW_TERM_CONSTANT, "M", j - (j < 3 * s->bodies && j % 3 == 1), s->mass[j]);
   EACH_ENTRY (k, e, r, c) {
     size_t i = (size_t)(s->coords + s->batch[k].row + e * s->batch[k].kind->rows + r);
     size_t j = (size_t)pw_global (&s->batch[k], e, c);
     K[i * n + j] = K[j * n + i] = specialise_entry (x, k, e, r, c);
   }
   return K;
+}
+
+/* 1 for each equation and body where pw_sparsity says so; malloced. */
+static unsigned char *specialise_lengths (const pw_specialise_scene *x) {
+  unsigned char *length = calloc ((size_t)(x->s->rows * x->s->bodies) + 1, 1);
+  for (int k = 0; length && k < x->s->constraints; k++) {
+    const pw_element_batch *b = &x->s->batch[k];
+    const int bodies = b->kind->bodies;
+    for (int i = 0; i < b->b.count * b->kind->rows * bodies; i++) {
+      int element = i / (b->kind->rows * bodies), of_element = i % (b->kind->rows * bodies);
+      int body = b->b.body[element * bodies + i % bodies];
+      if (body < x->s->bodies) length[(b->row + i / bodies) * x->s->bodies + body] = x->sparsity[k].length[of_element];
+    }
+  }
+  return length;
 }
 
 enum { SPECIALISE_ACCELERATE, SPECIALISE_VELOCITY, SPECIALISE_POSITION };
@@ -51,7 +68,7 @@ static int specialise_solve (const pw_specialise_scene *x, const pw_elimination 
   for (int i = 0; i < m->n; i++) {
     int row = i - s->coords, force = row < 0 && what == SPECIALISE_ACCELERATE;
     right[i] = row >= 0 ? pw_term_named (PW_TERM_VARIABLE, "g", row, 1) : pw_term_zero ();
-    if (force) right[i] = pw_term_named (PW_TERM_VARIABLE, "f", i, 1);
+    if (force && pw_specialise_force (x, i)) right[i] = pw_term_named (PW_TERM_VARIABLE, "f", i, 1);
     if (row >= 0 && !pw_specialise_is_independent (x, row)) right[i] = pw_term_zero ();
     if (what == SPECIALISE_POSITION && row >= s->holonomic) right[i] = pw_term_zero ();
   }
@@ -70,13 +87,13 @@ static int specialise_solve (const pw_specialise_scene *x, const pw_elimination 
 }
 
 static int specialise_factor (const pw_specialise_scene *x, pw_elimination *m, pw_emitter *e, const pw_term *K,
-                              const char *name, int rows) {
+                              const unsigned char *length, const char *name, int rows) {
   unsigned char takes_part[SPECIALISE_ROWS + 1];
   for (int i = 0; i < x->s->rows; i++) takes_part[i] = i < rows && pw_specialise_is_independent (x, i);
   char *text = NULL;
   size_t size = 0;
   FILE *out = e->code = open_memstream (&text, &size);
-  int status = out ? pw_elimination_open (m, x->s, K, takes_part, e) : PW_RESOURCE;
+  int status = out ? pw_elimination_open (m, x->s, K, length, takes_part, e) : PW_RESOURCE;
   if (out && fclose (out) != 0) status = PW_RESOURCE;
   e->code = x->out;
   if (status == PW_OK)
@@ -127,15 +144,16 @@ static void specialise_product (const pw_specialise_scene *x) {
 int pw_specialise_algebra (pw_specialise_scene *x) {
   const pw_system *s = x->s;
   pw_elimination all = { 0 }, position = { 0 };
-  pw_emitter e = { .prepare = open_memstream (&x->prepare, &x->prepared), .code = x->out };
+  pw_emitter e = { .prepare = open_memstream (&x->prepare, &x->prepared), .prepared = &x->prepare, .code = x->out };
   specialise_product (x);
   pw_term *K = specialise_matrix (x);
-  int status = K && e.prepare ? specialise_factor (x, &all, &e, K, "factor", s->rows) : PW_RESOURCE;
+  unsigned char *length = specialise_lengths (x);
+  int status = K && length && e.prepare ? specialise_factor (x, &all, &e, K, length, "factor", s->rows) : PW_RESOURCE;
   if (status == PW_OK) status = specialise_solve (x, &all, &e, SPECIALISE_ACCELERATE);
   if (status == PW_OK) status = specialise_solve (x, &all, &e, SPECIALISE_VELOCITY);
   x->holonomic_only = 1;
   if (status == PW_OK) {
-    status = specialise_factor (x, &position, &e, K, "factor_position", s->holonomic);
+    status = specialise_factor (x, &position, &e, K, length, "factor_position", s->holonomic);
     if (status == PW_RETRY) {
       x->holonomic_only = 0;
       status = specialise_solve (x, &all, &e, SPECIALISE_POSITION);
@@ -149,5 +167,6 @@ int pw_specialise_algebra (pw_specialise_scene *x) {
   pw_elimination_close (&all);
   pw_elimination_close (&position);
   free (K);
+  free (length);
   return status;
 }

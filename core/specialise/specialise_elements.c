@@ -86,11 +86,24 @@ static void specialise_jacobian (const pw_specialise_scene *x) {
   fputs ("}\n", x->out);
 }
 
+int pw_specialise_force (const pw_specialise_scene *x, int j) {
+  int has = 0;
+  for (int k = 0; k < x->s->batches; k++) {
+    const pw_element_batch *b = &x->s->batch[k];
+    for (int i = 0; b->kind->force && i < b->b.count * b->b.cols; i++)
+      if (x->sparsity[k].force[i % b->b.cols] != PW_ENTRY_ZERO && pw_global (b, i / b->b.cols, i % b->b.cols) == j)
+        has |= b->kind->constant ? SPECIALISE_CONSTANT : SPECIALISE_CHANGING;
+  }
+  return has;
+}
+
 static void specialise_forces (const pw_specialise_scene *x) {
   const pw_system *s = x->s;
-  fprintf (x->out,
-           "\nINLINE void forces (" ARGUMENTS ") {\n" UNUSED "  for (int j = 0; j < %d; j++) out[j] = s->force[j];\n",
-           s->coords);
+  fprintf (x->out, "\nINLINE void forces (" ARGUMENTS ") {\n" UNUSED);
+  for (int j = 0; j < s->coords; j++)
+    fprintf (x->out,
+             pw_specialise_force (x, j) & SPECIALISE_CONSTANT ? "  out[%d] = s->force[%d];\n" : "  out[%d] = 0;\n", j,
+             j);
   for (int k = 0; k < s->batches; k++) {
     const pw_element_batch *b = &s->batch[k];
     for (int e = 0; b->kind->force && !b->kind->constant && e < b->b.count; e++) {

@@ -34,6 +34,10 @@ static inline int pw_specialise_is_independent (const pw_specialise_scene *x, in
   return x->independent == NULL || x->independent[row];
 }
 
+/* Which forces act on a coordinate. */
+enum { SPECIALISE_CONSTANT = 1, SPECIALISE_CHANGING = 2 };
+int pw_specialise_force (const pw_specialise_scene *x, int j);
+
 /* Write the functions of elements: Jacobian, right-hand sides, forces, ledger; and that of the signals. */
 void pw_specialise_elements (const pw_specialise_scene *x);
 void pw_specialise_signals (const pw_specialise_scene *x);

@@ -5,7 +5,7 @@
 
 #include "pinwheel.h"
 
-#define PW_SCENE_ABI 1
+#define PW_SCENE_ABI 2
 #define PW_SCENE_PIVOT 4e-4 /* least pivot of a constraint equation relative to its diagonal entry: a squared sine */
 
 /* A run's data for specialised code.  Arrays over coordinates have `coordinates` entries, those over constraint
@@ -37,8 +37,8 @@ typedef struct pw_specialised {
   unsigned long shape;              /* pw_system_shape of the system */
   const unsigned char *independent; /* rows: 0 for redundant equations, which have the multiplier 0 */
   int (*prepare) (pw_scene *s);     /* 1: a constant pivot is too small */
-  /* Accelerations and multipliers at a state; c (bodies + 1), J (entries of all elements), and the ledger's rates are
-   * stored unless NULL. */
+  /* Accelerations and multipliers at a state; c (bodies + 1, with the ground), J (entries of all elements), and the ledger's
+   * rates, unless NULL. */
   int (*evaluate) (pw_scene *s, double t, const double *q, const double *v, double *a, double *lambda, double *rate,
                    pw_configuration *c, double *J);
   /* Projects a state onto the constraints in the metric of M, then as evaluate. */

@@ -15,15 +15,32 @@ const char *pw_term_text (pw_term a, char buffer[24]) {
   return buffer;
 }
 
-/* A new constant or variable; returns the stream that its statement, begun here, continues on. */
-static FILE *emit_begin (pw_emitter *e, int constant, int sign, double value, pw_term *out) {
-  *out = (pw_term){ constant ? PW_TERM_CONSTANT : PW_TERM_VARIABLE, sign, "", value };
-  if (constant)
-    *out = pw_term_named (PW_TERM_CONSTANT, "C", e->constants++, value), out->sign = sign;
-  else
-    snprintf (out->name, sizeof out->name, "x%d", e->variables++);
-  fprintf (constant ? e->prepare : e->code, constant ? "  %s = " : "  const double %s = ", out->name);
-  return constant ? e->prepare : e->code;
+/* The number of the constant with this statement's right-hand side, or -1. */
+static int emit_find (const pw_emitter *e, const char *text) {
+  int i = -1;
+  fflush (e->prepare);
+  const char *at = strstr (*e->prepared, text);
+  while (at && at > *e->prepared && at[-1] != '[') at--;
+  if (at) sscanf (at, "%d", &i);
+  return i;
+}
+
+/* A new constant or variable, or a constant that exists already, equal to `a op b`. */
+static pw_term emit_define (pw_emitter *e, int constant, int sign, double value, const char *a, char op,
+                            const char *b) {
+  pw_term out = { PW_TERM_VARIABLE, sign, "", value };
+  char text[80];
+  snprintf (text, sizeof text, " = %s %c %s;\n", a, op, b);
+  if (!constant) {
+    snprintf (out.name, sizeof out.name, "x%d", e->variables++);
+    fprintf (e->code, "  const double %s%s", out.name, text);
+    return out;
+  }
+  int known = emit_find (e, text);
+  out = pw_term_named (PW_TERM_CONSTANT, "C", known < 0 ? e->constants++ : known, value);
+  out.sign = sign;
+  if (known < 0) fprintf (e->prepare, "  %s%s", out.name, text);
+  return out;
 }
 
 static int emit_is_constant (pw_term a) {
@@ -31,17 +48,14 @@ static int emit_is_constant (pw_term a) {
 }
 
 pw_term pw_emit_product (pw_emitter *e, pw_term a, pw_term b) {
-  pw_term out;
   if (a.type == PW_TERM_ZERO || b.type == PW_TERM_ZERO) return pw_term_zero ();
   if (a.type == PW_TERM_ONE) return a.sign < 0 ? pw_term_negative (b) : b;
   if (b.type == PW_TERM_ONE) return b.sign < 0 ? pw_term_negative (a) : a;
-  FILE *to = emit_begin (e, emit_is_constant (a) && emit_is_constant (b), a.sign * b.sign, a.value * b.value, &out);
-  fprintf (to, "%s * %s;\n", a.name, b.name);
-  return out;
+  return emit_define (e, emit_is_constant (a) && emit_is_constant (b), a.sign * b.sign, a.value * b.value, a.name, '*',
+                      b.name);
 }
 
 pw_term pw_emit_difference (pw_emitter *e, pw_term a, pw_term b, pw_term c) {
-  pw_term out;
   char text[60];
   if (b.type == PW_TERM_ZERO || c.type == PW_TERM_ZERO) return a;
   if (a.type == PW_TERM_ZERO) return pw_term_negative (pw_emit_product (e, b, c));
@@ -54,17 +68,14 @@ pw_term pw_emit_difference (pw_emitter *e, pw_term a, pw_term b, pw_term c) {
     snprintf (text, sizeof text, "%s", b.type == PW_TERM_ONE ? (c.type == PW_TERM_ONE ? "1" : c.name) : b.name);
   else
     snprintf (text, sizeof text, "%s * %s", b.name, c.name);
-  FILE *to = emit_begin (e, constant, a.sign, a.value - b.value * c.value, &out);
-  fprintf (to, "%s %c %s;\n", a.type == PW_TERM_ONE ? "1" : a.name, b.sign * c.sign * a.sign > 0 ? '-' : '+', text);
-  return out;
+  return emit_define (e, constant, a.sign, a.value - b.value * c.value, a.name,
+                      b.sign * c.sign * a.sign > 0 ? '-' : '+', text);
 }
 
 pw_term pw_emit_quotient (pw_emitter *e, pw_term a, pw_term b) {
-  pw_term out;
   if (b.type == PW_TERM_ONE) return b.sign < 0 ? pw_term_negative (a) : a;
-  FILE *to = emit_begin (e, emit_is_constant (a) && emit_is_constant (b), a.sign * b.sign, a.value / b.value, &out);
-  fprintf (to, "%s / %s;\n", a.type == PW_TERM_ONE ? "1" : a.name, b.name);
-  return out;
+  return emit_define (e, emit_is_constant (a) && emit_is_constant (b), a.sign * b.sign, a.value / b.value, a.name, '/',
+                      b.name);
 }
 
 void pw_emit_name (FILE *out, const char *name) {

@@ -17,6 +17,7 @@ typedef struct {
 /* Where statements go: those of constants into `prepare`, the others into the function being written. */
 typedef struct {
   FILE *prepare, *code;
+  char *const *prepared; /* text of the former */
   int constants, variables;
 } pw_emitter;
 

@@ -66,7 +66,7 @@ static int specialised_is_unsuitable (pw_run *r) {
 }
 
 static void specialised_evaluated (pw_run *r, const double *q, const double *v) {
-  pw_point_to_internal (r->w, q, v);
+  if (r->s->coords > 3 * r->s->bodies) pw_point_to_internal (r->w, q, v);
   pw_saddle_postpone (r->saddle, PW_SCENE_PIVOT);
   r->statistics.rhs++;
   r->statistics.specialised++;
@@ -76,14 +76,7 @@ static void specialised_evaluated (pw_run *r, const double *q, const double *v) 
 int pw_specialised_evaluate (pw_run *r, double t, const double *q, const double *v, double *a, double *lambda,
                              double *rate) {
   if (specialised_is_unsuitable (r)) return 0;
-  if (rate) {
-    if (r->specialised->evaluate (r->scene, t, q, v, a, lambda, rate, NULL, NULL)) return 0;
-    r->statistics.rhs++;
-    r->statistics.specialised++;
-    r->statistics.factorisations++;
-    return 1;
-  }
-  if (r->specialised->evaluate (r->scene, t, q, v, a, lambda, NULL, r->w->configuration, r->w->J)) return 0;
+  if (r->specialised->evaluate (r->scene, t, q, v, a, lambda, rate, r->w->configuration, r->w->J)) return 0;
   specialised_evaluated (r, q, v);
   return 1;
 }

@@ -155,10 +155,11 @@ static void test_guard (void **state) {
   (void)state;
   both_open (&x, scene_named ("slider-crank", NULL, 0), "rk4+projection", NULL);
   const pw_specialised *code = pw_scene_code_table (x.code);
-  assert_int_equal (code->evaluate (x.special->scene, 0, q, v, a, lambda, NULL, NULL, NULL), 1);
-  assert_int_equal (code->project (x.special->scene, 0, q, v, a, lambda, NULL, NULL), 1);
+  pw_workspace *w = x.special->w;
+  assert_int_equal (code->evaluate (x.special->scene, 0, q, v, a, lambda, NULL, w->configuration, w->J), 1);
+  assert_int_equal (code->project (x.special->scene, 0, q, v, a, lambda, w->configuration, w->J), 1);
   q[2] = 1, q[5] = -1, q[0] = 0.5 * cos (1), q[3] = 1.5 * cos (1), q[1] = q[4] = 0.5 * sin (1), q[6] = 2 * cos (1);
-  assert_int_equal (code->evaluate (x.special->scene, 0, q, v, a, lambda, NULL, NULL, NULL), 0);
+  assert_int_equal (code->evaluate (x.special->scene, 0, q, v, a, lambda, NULL, w->configuration, w->J), 0);
   both_close (&x);
 }
 

@@ -118,6 +118,13 @@ static int build_include (const char *path, char **include, pw_error *error) {
                   path);
 }
 
+const char *pw_scene_level (void) {
+#ifdef __x86_64__
+  if (__builtin_cpu_supports ("avx2")) return "-mavx2";
+#endif
+  return "-O2";
+}
+
 static int build_shared (const char *path, const char *object, const char *log, const sigset_t *before,
                          pw_error *error) {
   char *include = NULL;
@@ -132,6 +139,7 @@ static int build_shared (const char *path, const char *object, const char *log, 
                                   "-fPIC",
                                   "-shared",
                                   log ? PW_SCENE_FLAG : "-Wall",
+                                  log ? pw_scene_level () : "-O2",
                                   "-I",
                                   include,
                                   "-o",

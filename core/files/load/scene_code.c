@@ -86,6 +86,7 @@ static int code_identify (code_job *x, pw_error *error) {
   char *include, *header = NULL, *text = NULL, sum[40] = "";
   size_t size;
   code_add (x, "pinwheel " PW_VERSION " -std=c11 -O2 -ffp-contract=off " PW_SCENE_FLAG);
+  code_add (x, pw_scene_level ());
   if (code_add_compiler (x) != PW_OK) return pw_fail (error, PW_RESOURCE, "out of memory, or CC is too long");
   int status = pw_search_include (&include, error);
   if (include) header = pw_path_join (include, "pinwheel.h", "");
