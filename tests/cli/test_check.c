@@ -134,6 +134,10 @@ static void test_broken_kind (void **state) {
     cli_bad (command, 2, message);
   }
   cli_shell ("pinwheel run @/broken.c --method rk4 --t-end 0.1");
+  cli_bad (
+      "pinwheel sensitivity @/broken.c --of ball.x --by ball.vx -t 0.1", 2,
+      "model broken: force_q of element type well is left out, but it is not zero, and derivatives need it: add it, or "
+      "PW_BY_DIFFERENCES in its place");
 }
 
 /* The derivatives of a signal that reads states: the function's own, wrong by a factor. */

@@ -101,6 +101,30 @@ static void test_failing (void **state) {
       strstr (cli_out, "runs failed and count as infeasible, the first of them: p.x + 0*sqrt(0.3 - p.x) is"));
 }
 
+/* Runs that fail are worse than others, for each of the algorithms: the optimum is near the edge. */
+static void test_edge (void **state) {
+  static const char *const options[] = { "", "--free b=-1:1", "--subject-to 'p.y<=1'",
+                                         "--free b=-1:1 --subject-to 'p.y<=1'" };
+  char command[500];
+  (void)state;
+  for (size_t i = 0; i < sizeof options / sizeof *options; i++) {
+    snprintf (command, sizeof command,
+              "pinwheel optimise @/point.yaml --minimise '(p.x - 0.25)^2 + p.y^2 + 0*sqrt(0.3 - p.x)' --free a=-2:2 %s "
+              "--starts 1 --set b=0.1 --json @/o.json",
+              options[i]);
+    cli_shell (command);
+    check_close ("a", optimise_value (cli_file ("o.json"), "a"), 0.25, 1e-3, "square root of 1e-6");
+  }
+}
+
+/* Four maxima, of which starts in all of the range find the highest. */
+static void test_starts (void **state) {
+  (void)state;
+  cli_shell ("pinwheel optimise @/point.yaml --maximise 'cos(9*p.x) - 0.05*(p.x - 1.4)^2' --free a=-1.5:2 --starts 12 "
+             "--json @/o.json");
+  check_close ("a", optimise_value (cli_file ("o.json"), "a"), 1.3963, 1e-3, "2 pi 2/9, displaced by 1e-6");
+}
+
 /* No point of a sweep is better, and the nearest ones are worse by the curvature alone. */
 static void test_sweep (void **state) {
   (void)state;
@@ -188,6 +212,7 @@ int main (void) {
   const struct CMUnitTest tests[] = { cmocka_unit_test (test_valley),     cmocka_unit_test (test_derivatives),
                                       cmocka_unit_test (test_constraint), cmocka_unit_test (test_bound),
                                       cmocka_unit_test (test_failing),    cmocka_unit_test (test_sweep),
+                                      cmocka_unit_test (test_edge),       cmocka_unit_test (test_starts),
                                       cmocka_unit_test (test_jobs),       cmocka_unit_test (test_interrupt),
                                       cmocka_unit_test (test_bad) };
   return cmocka_run_group_tests (tests, optimise_setup, cli_teardown);

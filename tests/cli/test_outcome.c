@@ -5,17 +5,20 @@
 #include "outcome.h"
 
 /* A wheel turned by cos (w t): phi = (1 - cos (w t)) / w^2, omega = sin (w t) / w.  A slider on which a force acts that
- * grows and drops: the reaction is -t until t = 0.7, then 0. */
+ * grows and drops: (t, t + 1) until t = 0.7, then (0, 1.699), a small drop.  Another one shaken faster than steps follow. */
 static const char model[] = "pinwheel: 1\n"
                             "about: functionals with closed forms\n"
                             "parameters: [{name: w, value: 3}]\n"
-                            "bodies: [{name: wheel, mass: 1, inertia: 1}, {name: block-a, mass: 1, inertia: 1}]\n"
+                            "bodies: [{name: wheel, mass: 1, inertia: 1}, {name: block-a, mass: 1, inertia: 1},\n"
+                            "         {name: block-b, mass: 1, inertia: 1}]\n"
                             "elements:\n"
                             "  - {pin: P, body: [wheel, ground], at: [[0, 0], [0, 0]]}\n"
                             "  - {pin: Q, body: [block-a, ground], at: [[0, 0], [0, 0]]}\n"
                             "  - {torque: motor-1, body: [wheel, ground], value: {expression: cos(w*t)}}\n"
                             "  - {force: push, body: block-a, at: [0, 0],\n"
-                            "     fx: {expression: 't < 0.7 ? t : 0'}}\n";
+                            "     fx: {expression: 't < 0.7 ? t : 0'}, fy: {expression: 't < 0.7 ? t + 1 : 1.699'}}\n"
+                            "  - {pin: R, body: [block-b, ground], at: [[0, 0], [0, 0]]}\n"
+                            "  - {force: shake, body: block-b, at: [0, 0], fx: {expression: 'sin(40*t)'}}\n";
 
 static pw_file *file;
 static pw_model *built;
@@ -98,9 +101,22 @@ static void test_jump (void **state) {
   (void)state;
   static const char *const method[] = { "rk4", "erk8", "radau" };
   for (int i = 0; i < 3; i++) {
-    check_close ("least reaction", outcome_run ("min:Q.Fx", method[i], 0.03, 1e-9, 2), -0.7, 1e-9, "1e-12 of a step");
+    check_close ("least reaction", outcome_run ("min:Q.Fx", method[i], 0.03, 1e-9, 2), -0.7, 1e-9, "1e-8 of a step, refined");
     check_close ("mean reaction", outcome_run ("mean:Q.Fx", method[i], 0.03, 1e-9, 2), -0.7 * 0.35 / 2, 1e-9, "exact");
   }
+}
+
+/* A drop so small that the ends of a step and its middle lie nearly on a line. */
+static void test_small_jump (void **state) {
+  (void)state;
+  check_close ("least reaction", outcome_run ("min:Q.Fy", "rk4", 0.03, 0, 2), -1.7, 1e-9, "1e-8 of a step, refined");
+}
+
+/* Steps of 0.2 s and more contain more than a period of sin (40 t). */
+static void test_fast (void **state) {
+  (void)state;
+  check_close ("rms", outcome_run ("rms:R.Fx", "erk8", 0, 1e-6, 4), sqrt ((2 - sin (320.) / 160) / 4), 1e-8,
+               "divided until two formulas agree to 1e-3, which makes one of them accurate to 3e-11 of a part");
 }
 
 /* The weights give the integral of another column. */
@@ -118,11 +134,21 @@ static void test_nodes (void **state) {
   check_close ("derivative", gradient[0], 2, 0, "exact");
   check_close ("derivative", gradient[1], 1, 0, "exact");
   const pw_functional *f = x.functional;
-  double sum = 0;
+  double sum = 0, mean = 0, rms = 0;
   for (int i = 0; i < f->nodes; i++) sum += f->node[i].weight * sin (f->node[i].t);
   check_close ("weights", sum, 1 - cos (2), 1e-11, "formula of degree 9");
   assert_int_equal (f[1].nodes, 1);
   check_close ("time of the maximum", f[1].node[0].t, PW_PI / 3, 1e-7, "sqrt (eps) and the error of the run");
+  pw_outcomes_close (&x);
+  text = "mean:wheel.phi + rms:wheel.omega";
+  check_ok (pw_outcomes_open (&x, s, "--of", &text, 1, &error), &error);
+  x.record = 1;
+  check_ok (pw_outcomes_run (&x, "erk8", &(pw_settings){ .rtol = 1e-10, .span = 2 }, 2, &error), &error);
+  for (int i = 0; i < x.functional[0].nodes; i++) mean += x.functional[0].node[i].weight;
+  for (int i = 0; i < x.functional[1].nodes; i++)
+    rms += x.functional[1].node[i].weight * sin (3 * x.functional[1].node[i].t) / 3;
+  check_close ("weights of a mean", mean, 1, 1e-14, "exact");
+  check_close ("weights of a root mean square", rms, x.functional[1].value, 1e-9, "homogeneous of degree 1");
   pw_outcomes_close (&x);
 }
 
@@ -151,6 +177,7 @@ static void test_bad (void **state) {
 
 int main (void) {
   const struct CMUnitTest tests[] = { cmocka_unit_test (test_functionals), cmocka_unit_test (test_jump),
-                                      cmocka_unit_test (test_nodes), cmocka_unit_test (test_bad) };
+                                      cmocka_unit_test (test_nodes),       cmocka_unit_test (test_bad),
+                                      cmocka_unit_test (test_small_jump),  cmocka_unit_test (test_fast) };
   return cmocka_run_group_tests (tests, outcome_setup, outcome_teardown);
 }

@@ -22,6 +22,15 @@ static int sensitivity_last (double *value) {
   return count;
 }
 
+/* Numbers under a key of sensitivity.json, in order. */
+static int sensitivity_json (const char *key, double *value) {
+  int count = 0;
+  for (const char *at = cli_file ("sens/sensitivity.json");
+       (at = strstr (at, key)) != NULL && count < SENSITIVITY_MOST;)
+    value[count++] = strtod (at += strlen (key), NULL);
+  return count;
+}
+
 /* ---- Closed forms ---- */
 
 /* theta = (k/a) (gd (s t + c) - gd (c)), k^2 = I/m + a^2, A^2 = u0^2 + k^2 w0^2, s = a A/k^2, c = artanh (u0/A), at t = 20,
@@ -70,15 +79,6 @@ static const char sensitivity_outputs[] = " --of frame.x --of rider.work --of A.
                                           "--of max:frame.omega --of max:C.N --of min:frame.y --of mean:kinetic "
                                           "--of rms:frame.vx --of integral:frame.x --of 'frame.x / max:rider.work' ";
 
-/* Numbers under a key of sensitivity.json, in order. */
-static int sensitivity_json (const char *key, double *value) {
-  int count = 0;
-  for (const char *at = cli_file ("sens/sensitivity.json");
-       (at = strstr (at, key)) != NULL && count < SENSITIVITY_MOST;)
-    value[count++] = strtod (at += strlen (key), NULL);
-  return count;
-}
-
 static void sensitivity_values (const char *name, double value, double *out) {
   char command[800];
   snprintf (command, sizeof command, "pinwheel sensitivity ezyroller -t 3%s--by b --%s=%.17g -o @/sens",
@@ -109,6 +109,27 @@ static void test_outputs (void **state) {
   sensitivity_compare ("a", "set=a", 0.5, 1e-3);
   sensitivity_compare ("M0", "set=M0", 0.1, 1e-4);
   sensitivity_compare ("frame.phi", "start=frame.phi", 0, 1e-3);
+}
+
+/* phi = exp (s - 40 + z) t^2 / 2: differences are extrapolated, on both sides of s, and on one side of z = 0, the end of its
+ * domain.  A drive along cos t does the work I sin^2 (t) / 2: by the derivative of its multiplier. */
+static void test_parameters (void **state) {
+  double x[SENSITIVITY_MOST], error[SENSITIVITY_MOST];
+  (void)state;
+  cli_write (
+      "wheels.yaml",
+      "pinwheel: 1\nparameters:\n  - {name: s, value: 40}\n  - {name: z, value: 0, domain: nonnegative}\n"
+      "  - {name: I, value: 3, unit: kg m^2}\n"
+      "bodies:\n  - {name: free, mass: 1, inertia: 1}\n  - {name: driven, mass: 1, inertia: I, start: {phi: 1}}\n"
+      "elements:\n  - {torque: T, body: [free, ground], value: exp(s - 40 + z)}\n"
+      "  - {drive: D, body: [driven, ground], what: angle, value: {harmonic: {amplitude: 1, omega: 1}}}\n");
+  cli_good ("pinwheel sensitivity @/wheels.yaml --of free.phi --of D.work --by s --by z --by I -t 2 -o @/sens");
+  assert_int_equal (sensitivity_json ("\"derivative\": ", x), 6);
+  assert_int_equal (sensitivity_json ("\"error\": ", error), 6);
+  check_close ("dphi/ds", x[0], 2, 1e-10, "h^4/30, h = 1e-5 s, and round-off of 1e-16/h");
+  check_close ("error", error[0], 4e-4 * 4e-4 / 6 * 2, 1e-8, "the error of differences, h^2/6");
+  check_close ("dphi/dz", x[1], 2, 1e-9, "h^3, h = 1e-5, and round-off of 1e-16/h, times 10");
+  check_close ("dwork/dI", x[5], pow (sin (2), 2) / 2, 1e-9, "steps of 1e-9");
 }
 
 /* A breakpoint that moves: the accelerations before it and after it differ, whatever the times of rows. */
@@ -169,9 +190,9 @@ static void test_refusals (void **state) {
 
 int main (void) {
   const struct CMUnitTest tests[] = {
-    cmocka_unit_test (test_sleigh),   cmocka_unit_test (test_pendulum), cmocka_unit_test (test_incline),
-    cmocka_unit_test (test_outputs),  cmocka_unit_test (test_pulse),    cmocka_unit_test (test_files),
-    cmocka_unit_test (test_refusals),
+    cmocka_unit_test (test_sleigh),   cmocka_unit_test (test_pendulum),   cmocka_unit_test (test_incline),
+    cmocka_unit_test (test_outputs),  cmocka_unit_test (test_pulse),      cmocka_unit_test (test_files),
+    cmocka_unit_test (test_refusals), cmocka_unit_test (test_parameters),
   };
   return cmocka_run_group_tests (tests, cli_setup, cli_teardown);
 }

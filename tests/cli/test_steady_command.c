@@ -66,6 +66,60 @@ static void test_vary_held (void **state) {
   check_close ("omega", cli_number (json, "motions", "state", "tractor.omega", NULL), 0.2, 1e-9, "speed / radius");
 }
 
+/* Equilibria on the circle x^2 + p^2 = 1, which reaches neither end of the range: followed once around. */
+static void test_closed_branch (void **state) {
+  int points = 0, folds = 0;
+  double beyond[2] = { 0 };
+  (void)state;
+  cli_write ("circle.yaml", "pinwheel: 1\nparameters: [{name: p, value: 0.5}]\n"
+                            "bodies: [{name: b, mass: 1, inertia: 1, start: {x: -0.8}}]\nelements:\n"
+                            "  - {slider: rail, body: [b, ground], at: [[0, 0], [0, 0]]}\n"
+                            "  - {force: f, body: b, at: [0, 0], fx: {expression: \"b.x^2 + p^2 - 1 - 0.5*b.vx\"}}\n");
+  cli_good ("pinwheel steady @/circle.yaml --vary p=-2:2 --starts 0 -o @/circle");
+  steady_shows ("circle: 1 branch of steady motions, p from -2 to 2, 0 symmetries\n");
+  for (const char *line = strchr (cli_file ("circle/steady.csv"), '\n') + 1; *line; line = strchr (line, '\n') + 1) {
+    double p = table_number (line, 2), x = table_number (line, 5);
+    check_close ("x^2 + p^2", x * x + p * p, 1, 1e-9, "Newton's tolerance");
+    if (strncmp (line, "1,fold,", 7) == 0) {
+      check_close ("fold", fabs (p), 1, 1e-9, "quadratic in the distance along the branch");
+      folds++;
+    } else
+      assert_int_equal ((int)table_number (line, 3), x > 0);
+    beyond[0] = fmin (beyond[0], x), beyond[1] = fmax (beyond[1], x);
+    points++;
+  }
+  assert_int_equal (folds, 2);
+  assert_in_range (points, 50, 400);
+  check_close ("far side", beyond[1] - beyond[0], 2, 0.02, "points at 1/50 of the range");
+}
+
+/* The ends of branches are those of the range to the last bit; the motion is found once, whatever angle it is found at. */
+static void test_ends (void **state) {
+  (void)state;
+  cli_good ("pinwheel steady pendulum --vary l=0.7:1.3 --starts 0 -o @/ends");
+  const char *line = strchr (cli_file ("ends/steady.csv"), '\n') + 1;
+  assert_true (table_number (line, 2) == 0.7);
+  for (const char *next; *(next = strchr (line, '\n') + 1);) line = next;
+  assert_true (table_number (line, 2) == 1.3);
+  cli_good ("pinwheel steady @/circle.yaml --vary p=0.5:2 --starts 0 -o @/ends");
+  line = strchr (cli_file ("ends/steady.csv"), '\n') + 1;
+  for (const char *next; *(next = strchr (line, '\n') + 1);) line = next;
+  assert_true (table_number (line, 2) == 0.5);
+  cli_good ("pinwheel steady pendulum --starts 60");
+  steady_shows ("pendulum: 2 steady motions, apart from 0 symmetries, ");
+}
+
+/* At rest the resistance and its derivative are 0: the velocity is exactly 0 as well. */
+static void test_rest (void **state) {
+  (void)state;
+  cli_write ("rest.yaml", "pinwheel: 1\nbodies: [{name: b, mass: 1, inertia: 1, rate: {vx: 1}}]\nelements:\n"
+                          "  - {slider: rail, body: [b, ground], at: [[0, 0], [0, 0]]}\n"
+                          "  - {drag: air, body: b, quadratic: 1}\n");
+  cli_good ("pinwheel steady @/rest.yaml --starts 5 -o @/rest");
+  steady_shows ("rest: 1 steady motion, apart from 1 symmetries, ");
+  check_close ("speed", cli_number (cli_file ("rest/steady.json"), "motions", "state", "b.vx", NULL), 0, 0, "exact");
+}
+
 /* Straight ahead the hinges decay at u / L; the motion of the model is a turn. */
 static void test_linearise (void **state) {
   (void)state;
@@ -118,8 +172,9 @@ static void test_bad (void **state) {
 
 int main (void) {
   const struct CMUnitTest tests[] = {
-    cmocka_unit_test (test_motion),    cmocka_unit_test (test_branch), cmocka_unit_test (test_vary_held),
-    cmocka_unit_test (test_linearise), cmocka_unit_test (test_limit),  cmocka_unit_test (test_bad),
+    cmocka_unit_test (test_motion),        cmocka_unit_test (test_branch), cmocka_unit_test (test_vary_held),
+    cmocka_unit_test (test_linearise),     cmocka_unit_test (test_limit),  cmocka_unit_test (test_bad),
+    cmocka_unit_test (test_closed_branch), cmocka_unit_test (test_ends),   cmocka_unit_test (test_rest),
   };
   return cmocka_run_group_tests (tests, cli_setup, cli_teardown);
 }

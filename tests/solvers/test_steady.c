@@ -5,6 +5,7 @@
 #include "gallery.h"
 #include "runs.h"
 #include "scene.h"
+#include "steady_parts.h"
 
 typedef struct {
   pw_system *s;
@@ -136,6 +137,30 @@ static void test_family (void **state) {
   steady_close (&t);
 }
 
+/* Derivatives of what is held: by the state against central differences, and by its value. */
+static void test_held (void **state) {
+  static const char *const names[] = { "trailer1.speed", "trailer1.radius", "trailer1.curvature", "trailer1.vx" };
+  const double step = 1e-6;
+  double q[9], v[9], dq[9], dv[9], r[2];
+  (void)state;
+  pw_system *s = gallery_open ("n-trailer", NULL);
+  for (int j = 0; j < 9; j++) q[j] = sin (j), v[j] = cos (2 * j), dq[j] = cos (3 * j), dv[j] = sin (4 * j + 1);
+  for (size_t k = 0; k < sizeof names / sizeof *names; k++) {
+    pw_initial_value hold = { held (s, names[k]), 0.7 };
+    for (int side = 0; side < 2; side++) {
+      double h = side ? step : -step, at[9], rate[9];
+      for (int j = 0; j < 9; j++) at[j] = q[j] + h * dq[j], rate[j] = v[j] + h * dv[j];
+      r[side] = pw_hold_residual (s, &hold, at, rate);
+    }
+    check_close (names[k], pw_hold_change (s, &hold, q, v, dq, dv), (r[1] - r[0]) / (2 * step), 1e-9, "differences");
+    r[0] = pw_hold_residual (s, &hold, q, v);
+    hold.value += 0.5;
+    check_close (names[k], pw_hold_slope (s, &hold, q, v), (pw_hold_residual (s, &hold, q, v) - r[0]) / 0.5, 1e-14,
+                 "linear");
+  }
+  pw_system_free (s);
+}
+
 /* Mirrored turns differ; displaced ones do not. */
 static void test_same (void **state) {
   double q[9], v[9], other[9], turned[9], c = cos (1.2), s = sin (1.2);
@@ -148,6 +173,8 @@ static void test_same (void **state) {
     other[j] = 5 + c * q[j] - s * q[j + 1], other[j + 1] = -3 + s * q[j] + c * q[j + 1], other[j + 2] = q[j + 2] + 1.2;
     turned[j] = c * v[j] - s * v[j + 1], turned[j + 1] = s * v[j] + c * v[j + 1], turned[j + 2] = v[j + 2];
   }
+  assert_true (pw_steady_same (t.x, q, v, other, turned));
+  other[8] -= 2 * PW_PI;
   assert_true (pw_steady_same (t.x, q, v, other, turned));
   other[8] += 1e-3;
   assert_false (pw_steady_same (t.x, q, v, other, turned));
@@ -562,7 +589,7 @@ int main (void) {
     cmocka_unit_test (test_shimmy),         cmocka_unit_test (test_shimmy_runs),
     cmocka_unit_test (test_refused),        cmocka_unit_test (test_bodies),
     cmocka_unit_test (test_concentric),     cmocka_unit_test (test_missing),
-    cmocka_unit_test (test_two_changes),
+    cmocka_unit_test (test_held),           cmocka_unit_test (test_two_changes),
   };
   return cmocka_run_group_tests (tests, NULL, NULL);
 }

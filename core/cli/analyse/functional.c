@@ -21,7 +21,6 @@
 #define FUNCTIONAL_LINEAR 0.2
 #define FUNCTIONAL_AGREE 1e-3
 #define FUNCTIONAL_BEFORE 1e-6 /* of a step, to see whether an extremum is before its end */
-#define FUNCTIONAL_LEFT 1e-12  /* of a step: the limit from the left at a jump */
 #define FUNCTIONAL_WIDTH 1e-8  /* of the interval that contains an extremum, relative to the first one */
 enum {
   FUNCTIONAL_NODES = 5,
@@ -203,11 +202,11 @@ int pw_outcomes_start (pw_outcomes *x, pw_run *r, pw_error *error) {
 }
 
 /* Times in a step: the ends, times just inside them, the nodes. */
-static void functional_times (const functional_step *p, int jumps, double t[FUNCTIONAL_TIMES]) {
+static void functional_times (const functional_step *p, double t[FUNCTIONAL_TIMES]) {
   const double h = p->t1 - p->t0;
   t[0] = p->t0, t[1] = p->t0 + FUNCTIONAL_BEFORE * h;
   for (int i = 0; i < FUNCTIONAL_NODES; i++) t[2 + i] = functional_time (p->t0, p->t1, i);
-  t[FUNCTIONAL_TIMES - 2] = p->t1 - (jumps ? FUNCTIONAL_LEFT : FUNCTIONAL_BEFORE) * h, t[FUNCTIONAL_TIMES - 1] = p->t1;
+  t[FUNCTIONAL_TIMES - 2] = p->t1 - FUNCTIONAL_BEFORE * h, t[FUNCTIONAL_TIMES - 1] = p->t1;
 }
 
 static void functional_take (functional_step *p, double t, int i) {
@@ -240,12 +239,12 @@ static void functional_simpson (functional_step *p, pw_functional *f) {
 int pw_outcomes_step (pw_outcomes *x, pw_run *r, pw_error *error) {
   functional_step p = { x, r, x->t, pw_run_time (r), PW_OK, error };
   double t[FUNCTIONAL_TIMES];
-  int any = 0, jumps = pw_system_jumps (x->system, p.t1), nodes = jumps;
+  int any = 0, nodes = pw_system_jumps (x->system, p.t1);
   pw_functional *const end = x->functional + x->functionals;
   for (const pw_functional *f = x->functional; f < end; f++) any |= f->type != PW_FINAL;
   x->t = p.t1;
   if (!any) return PW_OK;
-  functional_times (&p, jumps, t);
+  functional_times (&p, t);
   functional_take (&p, t[FUNCTIONAL_MIDDLE], FUNCTIONAL_MIDDLE);
   functional_take (&p, p.t1, FUNCTIONAL_TIMES - 1);
   for (const pw_functional *f = x->functional; f < end; f++) nodes |= functional_needs_nodes (f);

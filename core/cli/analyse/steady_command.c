@@ -276,6 +276,23 @@ static int steady_complete (pw_steady_cli *x, pw_error *error) {
   return x->steady ? PW_OK : error->status;
 }
 
+/* The value in the model, or in its initial state. */
+static double steady_own (const pw_steady_cli *x) {
+  const pw_system *s = x->m.system;
+  if (x->set.vary < 0) return pw_model_parameter (x->m.model, steady_parameter (x));
+  return pw_system_held_value (s, x->hold[x->set.vary].state, pw_system_initial_q (s), pw_system_initial_v (s));
+}
+
+/* Branches that begin at the ends of the range, or if there are none, one at the value of the model. */
+static int steady_branches (pw_steady_cli *x, pw_error *error) {
+  int status = steady_complete (x, error);
+  double own = steady_own (x), part = (own - x->set.first) / (x->set.last - x->set.first);
+  if (status == PW_OK) status = steady_from (x, x->set.first, 1, error);
+  if (status == PW_OK && !x->stopped) status = steady_from (x, x->set.last, -1, error);
+  if (status == PW_OK && !x->stopped && x->points == 0 && part > 0 && part < 1) status = steady_from (x, own, 1, error);
+  return status;
+}
+
 /* ---- The command ---- */
 
 static int steady_compute (pw_steady_cli *x, pw_error *error) {
@@ -284,13 +301,7 @@ static int steady_compute (pw_steady_cli *x, pw_error *error) {
   x->steady = pw_steady_open (x->m.system, &x->set, error);
   if (x->steady == NULL) return error->status;
   pw_stop_catch ();
-  int status = PW_OK;
-  if (pw_steady_varies (x)) {
-    status = steady_complete (x, error);
-    if (status == PW_OK) status = steady_from (x, x->set.first, 1, error);
-    if (status == PW_OK && !x->stopped) status = steady_from (x, x->set.last, -1, error);
-  } else
-    status = steady_search (x, 0, error);
+  int status = pw_steady_varies (x) ? steady_branches (x, error) : steady_search (x, 0, error);
   x->interrupted = pw_stop > 0;
   pw_stop_release ();
   if (status == PW_OK && x->points == 0 && !x->stopped) status = steady_fail (x, error);
