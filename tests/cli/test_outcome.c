@@ -101,7 +101,8 @@ static void test_jump (void **state) {
   (void)state;
   static const char *const method[] = { "rk4", "erk8", "radau" };
   for (int i = 0; i < 3; i++) {
-    check_close ("least reaction", outcome_run ("min:Q.Fx", method[i], 0.03, 1e-9, 2), -0.7, 1e-9, "1e-8 of a step, refined");
+    check_close ("least reaction", outcome_run ("min:Q.Fx", method[i], 0.03, 1e-9, 2), -0.7, 1e-9,
+                 "1e-8 of a step, refined");
     check_close ("mean reaction", outcome_run ("mean:Q.Fx", method[i], 0.03, 1e-9, 2), -0.7 * 0.35 / 2, 1e-9, "exact");
   }
 }
