@@ -116,7 +116,8 @@ static int variation_changes (const pw_variation *x, pw_direction_copy *d) {
 static int variation_start (pw_variation *x, pw_direction_copy *d, const pw_direction *given, pw_error *error) {
   int n = x->n;
   d->given = *given;
-  d->columns = given->initial ? 1 : 2;
+  d->columns = given->initial || given->no_error ? 1 : 2;
+  if (given->no_error) d->column[0].which = 2;
   int status = variation_changes (x, d);
   if (status == PW_INPUT)
     return pw_fail (error, PW_INPUT, "direction %d: the elements change", (int)(d - x->direction) + 1);
@@ -126,7 +127,7 @@ static int variation_start (pw_variation *x, pw_direction_copy *d, const pw_dire
     if (given->initial) memcpy (Y, given->initial, 2 * (size_t)n * sizeof *Y);
     for (int i = 0; i < PW_VARIATION_NEAR && given->initial == NULL; i++) {
       const pw_run *r = given->neighbour[i];
-      double weight = pw_variation_weight (given, c, i);
+      double weight = pw_variation_weight (given, d->column[c].which, i);
       for (int j = 0; j < n; j++) Y[j] += weight * (r->q[j] - x->r->q[j]), Y[n + j] += weight * (r->v[j] - x->r->v[j]);
     }
   }
@@ -255,10 +256,11 @@ static int variation_combine (pw_variation *x, const pw_direction_copy *d, const
   memset (out, 0, (size_t)(3 * n + x->m + x->entries) * sizeof *out);
   *sample = (pw_sample){ .t = x->t, .q = out, .v = out + n, .a = out + 2 * n, .lambda = out + 3 * n, .ledger = ledger };
   for (const pw_variation_column *c = d->column; c < d->column + d->columns; c++) {
+    const double part = weight[pw_variation_index (c)];
     if (pw_variation_outputs (x, c, c->Y, x->output) != PW_OK) return PW_METHOD;
-    variation_fill (x, out, x->output, c, weight[c->which]);
-    sample->kinetic += weight[c->which] * x->output[0];
-    sample->potential += weight[c->which] * x->output[1];
+    variation_fill (x, out, x->output, c, part);
+    sample->kinetic += part * x->output[0];
+    sample->potential += part * x->output[1];
   }
   for (int i = 0; i < x->entries; i++)
     *(x->r->s->entry[i].type == PW_WORK ? &sample->work : &sample->loss) += ledger[i];

@@ -33,8 +33,8 @@ static int breakpoint_smooth (const pw_direction_copy *d, double next) {
 
 int pw_variation_look_ahead (pw_variation *x, pw_direction_copy *d, double next, pw_error *error) {
   int infinite = 0;
-  d->first = d->last = d->columns > 1 ? d->breakpoint[0] : -INFINITY;
-  for (int i = 0; i < PW_VARIATION_NEAR && d->columns > 1; i++) {
+  d->first = d->last = d->given.initial ? -INFINITY : d->breakpoint[0];
+  for (int i = 0; i < PW_VARIATION_NEAR && d->given.initial == NULL; i++) {
     pw_run *r = d->given.neighbour[i];
     d->first = fmax (d->first, d->breakpoint[i]);
     d->breakpoint[i] = pw_next_breakpoint (r->w, r->method->order > 2, d->breakpoint[i]);
@@ -42,8 +42,8 @@ int pw_variation_look_ahead (pw_variation *x, pw_direction_copy *d, double next,
     infinite += isinf (d->breakpoint[i]) != 0;
   }
   d->last = INFINITY;
-  for (int i = 0; i < PW_VARIATION_NEAR && d->columns > 1; i++) d->last = fmin (d->last, d->breakpoint[i]);
-  if (d->columns == 1 || (infinite == PW_VARIATION_NEAR && isinf (next))) return PW_OK;
+  for (int i = 0; i < PW_VARIATION_NEAR && d->given.initial == NULL; i++) d->last = fmin (d->last, d->breakpoint[i]);
+  if (d->given.initial || (infinite == PW_VARIATION_NEAR && isinf (next))) return PW_OK;
   if (infinite == 0 && isfinite (next) && breakpoint_smooth (d, next)) return PW_OK;
   return pw_fail (error, PW_METHOD,
                   "t = %.6g s: the order of breakpoints changes with the parameter of direction %d: the motion is not "
@@ -64,7 +64,7 @@ int pw_variation_pass (pw_variation *x, pw_error *error) {
   double *before = x->values, next;
   memcpy (before, x->linear.a, (size_t)n * sizeof *before);
   next = pw_next_breakpoint (x->r->w, x->r->method->order > 2, x->t);
-  PW_EACH_COLUMN (c, x) c->slope = d->columns > 1 ? breakpoint_derivative (d, c->which) : 0;
+  PW_EACH_COLUMN (c, x) c->slope = d->given.initial ? 0 : breakpoint_derivative (d, c->which);
   for (int i = 0; i < x->count && status == PW_OK; i++) {
     pw_direction_copy *d = &x->direction[i];
     status = pw_variation_look_ahead (x, d, next, error);
@@ -84,6 +84,6 @@ int pw_variation_pass (pw_variation *x, pw_error *error) {
 double pw_variation_breakpoint (const pw_variation *x, int i, double *slope) {
   const pw_direction_copy *d = &x->direction[i];
   double next = pw_next_breakpoint (x->r->w, x->r->method->order > 2, x->t);
-  *slope = d->columns > 1 && isfinite (d->breakpoint[0]) ? breakpoint_derivative (d, 0) : 0;
+  *slope = d->given.initial == NULL && isfinite (d->breakpoint[0]) ? breakpoint_derivative (d, 0) : 0;
   return next;
 }

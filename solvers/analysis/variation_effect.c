@@ -8,7 +8,8 @@
 double pw_variation_weight (const pw_direction *d, int which, int i) {
   static const double central[2][PW_VARIATION_NEAR] = { { 0, -0.5, 0.5, 0 }, { -0.25, 0, 0, 0.25 } };
   static const double one_sided[2][PW_VARIATION_NEAR] = { { -1.5, 2, -0.5, 0 }, { -0.75, 0, 1, -0.25 } };
-  return (d->one_sided ? one_sided : central)[which][i] / d->step;
+  const double (*weight)[PW_VARIATION_NEAR] = d->one_sided ? one_sided : central;
+  return (which == 2 ? (4 * weight[0][i] - weight[1][i]) / 3 : weight[which][i]) / d->step;
 }
 
 /* ---- Effects of parameters ---- */
@@ -73,8 +74,8 @@ static int effect_neighbour (pw_variation *x, pw_direction_copy *d, int i, doubl
   memcpy (w->configuration, x->r->w->configuration, (size_t)w->s->bodies * sizeof *w->configuration);
   pw_point_to_internal (w, x->q, x->v);
   int status = d->signals ? pw_update_signals (w, t, x->q, x->v) : PW_OK;
-  for (int c = 0; c < 2 && status == PW_OK; c++) {
-    double weight = pw_variation_weight (&d->given, c, i);
+  for (int c = 0; c < d->columns && status == PW_OK; c++) {
+    double weight = pw_variation_weight (&d->given, d->column[c].which, i);
     if (weight != 0) effect_add_to (x, d, w, c, weight);
   }
   return status;
@@ -91,7 +92,7 @@ static int effect_direction (pw_variation *x, pw_direction_copy *d, double t) {
     memset (d->effect[c], 0, (size_t)length * sizeof (double));
     memset (d->row[c], 0, (size_t)rows * sizeof (double));
   }
-  for (int i = 0; i < PW_VARIATION_NEAR && status == PW_OK && d->columns > 1; i++)
+  for (int i = 0; i < PW_VARIATION_NEAR && status == PW_OK && d->given.initial == NULL; i++)
     status = effect_neighbour (x, d, i, effect_time (d, t));
   return status;
 }
@@ -125,7 +126,7 @@ static int effect_values (pw_run *r, double t, const double *q, const double *v,
 /* By the state: central differences over about 1e-5 of the scene, or twice that for column 1. */
 static int effect_by_state (pw_variation *x, const pw_variation_column *c, const double *Y, double *out) {
   int n = x->n, m = x->m, status = PW_OK;
-  double step = (1 + c->which) * 1e-5 / (c->largest > 0 ? c->largest : 1);
+  double step = (1 + pw_variation_index (c)) * 1e-5 / (c->largest > 0 ? c->largest : 1);
   double *q = x->values + 2 + x->entries + m, *v = q + n + 3, *lambda = v + n + 3;
   for (int side = -1; side <= 1 && status == PW_OK; side += 2) {
     for (int j = 0; j < n; j++) q[j] = x->q[j] + side * step * Y[j], v[j] = x->v[j] + side * step * Y[n + j];
@@ -140,7 +141,7 @@ int pw_variation_outputs (pw_variation *x, const pw_variation_column *c, const d
   const pw_direction_copy *d = c->direction;
   int length = 2 + x->entries + x->m, status = PW_OK;
   memset (out, 0, (size_t)length * sizeof *out);
-  for (int i = 0; i < PW_VARIATION_NEAR && status == PW_OK && d->columns > 1; i++) {
+  for (int i = 0; i < PW_VARIATION_NEAR && status == PW_OK && d->given.initial == NULL; i++) {
     double weight = pw_variation_weight (&d->given, c->which, i);
     if (weight == 0) continue;
     status = effect_values (d->given.neighbour[i], effect_time (d, x->at), x->q, x->v, x->linear.lambda, x->values);
@@ -156,7 +157,7 @@ int pw_variation_outputs (pw_variation *x, const pw_variation_column *c, const d
 /* d a and d lambda of a column with the derivatives Y of the state. */
 static void effect_accelerations (pw_variation *x, const pw_variation_column *c, double *da) {
   pw_linearisation *l = &x->linear;
-  const double *effect = c->direction->effect[c->which];
+  const double *effect = c->direction->effect[pw_variation_index (c)];
   memcpy (l->x, c->trial, 2 * (size_t)x->n * sizeof *l->x);
   pw_linear_multiply (l);
   for (int j = 0; j < x->n; j++) l->da[j] = effect[j] - l->y[j];
@@ -186,7 +187,7 @@ void pw_variation_project (pw_variation *x) {
   pw_linearisation *l = &x->linear;
   int n = x->n, m = x->m, holonomic = x->r->s->holonomic;
   PW_EACH_COLUMN (c, x) {
-    const double *row = c->direction->row[c->which];
+    const double *row = c->direction->row[pw_variation_index (c)];
     pw_mul_J (x->r->w, c->trial, l->z);
     for (int i = 0; i < m; i++) l->z[i] = i < holonomic ? -l->z[i] - row[i] : 0;
     pw_saddle_solve (x->r->saddle, NULL, l->z, l->da, l->z);

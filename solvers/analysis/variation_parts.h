@@ -14,7 +14,7 @@ enum {
 /* One derivative: along a direction, with neighbours at `step` or at twice that. */
 typedef struct {
   const struct pw_direction_copy *direction;
-  int which;                     /* 0, 1 */
+  int which;                     /* differences with: 0, `step`; 1, twice that; 2, both, extrapolated */
   double *Y;                     /* size: dq, dv, d ledger, the latter only with `ledger` */
   double *K[PW_VARIATION_RATES]; /* size: time derivatives of Y at the stages */
   double *lambda;                /* m: d lambda at the state last evaluated */
@@ -26,13 +26,14 @@ typedef struct {
 
 typedef struct pw_direction_copy {
   pw_direction given;
-  int columns; /* 2, or 1 with `initial` */
+  int columns; /* 2, or 1 with `initial` or `no_error` */
   pw_variation_column column[2];
   double breakpoint[PW_VARIATION_NEAR]; /* of the neighbours: the next one */
   double first, last;                   /* times between which no neighbour has a breakpoint */
-  double *effect[2];                    /* n + m: derivatives of f - M a - J^T lambda, gamma - J a by the parameter */
-  double *row[2];                       /* 2 m: of g, J v - eta */
-  int signals;                          /* 1: some of the batches that differ have signals */
+  /* of each column: */
+  double *effect[2];      /* n + m: derivatives of f - M a - J^T lambda, gamma - J a by the parameter */
+  double *row[2];         /* 2 m: of g, J v - eta */
+  int signals;            /* 1: some of the batches that differ have signals */
   unsigned char *changes; /* of batches: 1 if it differs in the neighbours; then 1 for masses and constant forces */
   char *memory;
 } pw_direction_copy;
@@ -96,7 +97,12 @@ int pw_variation_step (pw_variation *x, double t1, pw_error *error);
 
 /* ---- variation_breakpoint.c ---- */
 
-/* Weight of neighbour i in the derivative by differences with `step` (which = 0) or twice that (1). */
+/* Index of a column in its direction. */
+static inline int pw_variation_index (const pw_variation_column *c) {
+  return (int)(c - c->direction->column);
+}
+
+/* Weight of neighbour i in the derivative by differences. */
 double pw_variation_weight (const pw_direction *d, int which, int i);
 /* Finds the neighbours' breakpoints that correspond to the next one of the run. */
 int pw_variation_look_ahead (pw_variation *x, pw_direction_copy *d, double next, pw_error *error);

@@ -81,33 +81,35 @@ static int path_append (pw_variation *x, double t, pw_error *error) {
   return t < x->r->breakpoint ? PW_OK : path_accelerations (x, &s, p->x + 2 * n, error);
 }
 
-/* 1 if interpolation between the last two points gives the state x to a tenth of the run's tolerance. */
-static int path_good (const pw_variation *x, const double *at, double t) {
+/* 1 if interpolation between points i and i + 1 gives the last point to a tenth of the run's tolerance. */
+static int path_good (const pw_variation *x, int i) {
+  const pw_variation_point *at = x->point + x->points - 1;
   double *guess = x->scratch;
-  path_interpolate (x, x->point + x->points - 2, t, guess);
+  path_interpolate (x, x->point + i, at->t, guess);
   for (int j = 0; j < x->n; j++)
-    if (fabs (guess[j] - at[j]) > 0.1 * pw_tolerance (x->r, j, at[j]) ||
-        fabs (guess[x->n + j] - at[x->n + j]) > 0.1 * pw_tolerance_velocity (x->r, j, at[x->n + j]))
+    if (fabs (guess[j] - at->x[j]) > 0.1 * pw_tolerance (x->r, j, at->x[j]) ||
+        fabs (guess[x->n + j] - at->x[x->n + j]) > 0.1 * pw_tolerance_velocity (x->r, j, at->x[x->n + j]))
       return 0;
   return 1;
 }
 
-/* Appends the states up to t1 after the last point, at t0 and known; between them until interpolation is good. */
-static int path_refine (pw_variation *x, double t1, int depth, pw_error *error) {
-  double t0 = x->point[x->points - 1].t, middle = t0 + (t1 - t0) / 2;
-  if (pw_fixed_steps (x->r) || depth == 0 || !(t0 < middle && middle < t1)) return path_append (x, t1, error);
-  int status = path_append (x, t1, error), first = x->points - 2;
-  if (status == PW_OK) status = path_append (x, middle, error);
+/* Inserts states between points i and i + 1 until interpolation is good; the point at the middle, which tells, is kept. */
+static int path_refine (pw_variation *x, int i, int depth, pw_error *error) {
+  double t0 = x->point[i].t, t1 = x->point[i + 1].t, middle = t0 + (t1 - t0) / 2;
+  if (pw_fixed_steps (x->r) || depth == 0 || !(t0 < middle && middle < t1)) return PW_OK;
+  int status = path_append (x, middle, error);
   if (status != PW_OK) return status;
-  pw_variation_point kept = x->point[first + 2];
-  x->points -= 1; /* the point at the middle is compared, and found again if it is needed */
-  if (path_good (x, kept.x, middle)) return PW_OK;
-  x->points -= 1;
-  status = path_refine (x, middle, depth - 1, error);
-  return status == PW_OK ? path_refine (x, t1, depth - 1, error) : status;
+  int good = path_good (x, i);
+  pw_variation_point kept = x->point[x->points - 1];
+  memmove (x->point + i + 2, x->point + i + 1, (size_t)(x->points - i - 2) * sizeof kept);
+  x->point[i + 1] = kept;
+  if (good) return PW_OK;
+  status = path_refine (x, i + 1, depth - 1, error);
+  return status == PW_OK ? path_refine (x, i, depth - 1, error) : status;
 }
 
 int pw_variation_record (pw_variation *x, double t0, pw_error *error) {
-  if (x->points == 0) return path_append (x, t0, error);
-  return path_refine (x, x->r->t, PATH_DEPTH, error);
+  int first = x->points == 0;
+  int status = path_append (x, first ? t0 : x->r->t, error);
+  return status == PW_OK && !first ? path_refine (x, x->points - 2, PATH_DEPTH, error) : status;
 }

@@ -67,7 +67,7 @@ static double step_error (pw_variation *x, double h) {
   double most = 0;
   PW_EACH_COLUMN (c, x) {
     double *e = x->values, size = fmax (c->largest, step_norm (x, c->trial));
-    if (c->direction->columns > 1) size = fmax (size, STEP_LEAST * 1e-5 / fabs (c->direction->given.step));
+    if (c->direction->given.initial == NULL) size = fmax (size, STEP_LEAST * 1e-5 / fabs (c->direction->given.step));
     memset (e, 0, (size_t)x->size * sizeof *e);
     step_combine (x, c, pw_erk5_tableau.e, PW_VARIATION_RATES, h, e);
     if (size > 0) most = pw_largest (most, step_norm (x, e) / size);

@@ -24,6 +24,7 @@ typedef struct {
   pw_outcomes outcomes;     /* of the run */
   pw_workspace **workspace; /* 5 of each unknown: of the run's system and of the neighbours', for contact points */
   /* Of all functionals F of the outputs and unknowns P at the time last evaluated, and of the run. */
+  int no_error;          /* 1: derivatives without errors */
   double *value;         /* F */
   double *slope, *error; /* F x P: derivatives, and their errors */
   double *end_slope, *end_error;

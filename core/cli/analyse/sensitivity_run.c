@@ -219,6 +219,7 @@ static int sensitivity_along (pw_sensitivity *x, sensitivity_event *list, pw_pro
 static int sensitivity_integrate (pw_sensitivity *x, pw_progress *progress, pw_error *error) {
   sensitivity_event *list = malloc (((size_t)x->outcomes.functionals + SENSITIVITY_NODES) * sizeof *list);
   if (list == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
+  for (int p = 0; p < x->unknowns; p++) x->direction[p].no_error = x->no_error;
   x->variation = pw_variation_open (x->base.run, x->direction, x->unknowns, x->outcomes.ledger, error);
   int status = x->variation ? sensitivity_along (x, list, progress, error) : error->status;
   free (list);

@@ -122,6 +122,7 @@ static int jacobian_open (jacobian_exact *e, const pw_fit *x, const double *at, 
   if (status == PW_OK)
     status = pw_unknown_directions (e->direction, e->near, u->line, u->m->file, e->unknown, (int)n, u->method,
                                     &e->settings, error);
+  for (size_t i = 0; i < n; i++) e->direction[i].no_error = 1;
   if (status == PW_OK) e->variation = pw_variation_open (e->base.run, e->direction, (int)n, e->columns.ledger, error);
   return status == PW_OK && e->variation == NULL ? error->status : status;
 }

@@ -64,6 +64,7 @@ static int search_differentiate (search *p, pw_error *error) {
   pw_progress silent = { 0 };
   pw_sensitivity s = { .line = *u->line, .of = p->x->text, .m = *u->m, .method = u->method, .settings = u->settings };
   s.t_end = u->t_end;
+  s.no_error = 1;
   s.limit.most = u->limit;
   s.settings.stop = pw_limit_over;
   s.settings.stop_context = &s.limit;
