@@ -38,7 +38,11 @@ typedef struct {
 /* Prepares derivatives by a number of unknowns, which the caller then sets; x has line, of, m, method, settings and t_end.
  * table: with one.  Close it in every case. */
 int pw_sensitivity_open (pw_sensitivity *x, int unknowns, int table, pw_error *error);
-/* Runs and differentiates.  A status. */
+/* Begins a run with derivatives; then advances to a time, and sets value, slope and error of all columns there.  A
+ * status. */
+int pw_sensitivity_start (pw_sensitivity *x, pw_error *error);
+int pw_sensitivity_at (pw_sensitivity *x, double t, pw_error *error);
+/* All of it, with extrema, integrals and the table.  A status. */
 int pw_sensitivity_compute (pw_sensitivity *x, pw_progress *progress, pw_error *error);
 void pw_sensitivity_close (pw_sensitivity *x);
 /* 1 if an output is a function of columns at one time, so that it has columns in the table. */

@@ -85,8 +85,7 @@ static int sensitivity_values (pw_sensitivity *x, const pw_sample *s, pw_error *
   return status;
 }
 
-/* Advances to a time and evaluates all columns there. */
-static int sensitivity_at (pw_sensitivity *x, double t, pw_error *error) {
+int pw_sensitivity_at (pw_sensitivity *x, double t, pw_error *error) {
   pw_sample s, d, e;
   int status = pw_variation_advance (x->variation, t, x->t_end, error), P = x->unknowns;
   if (status == PW_OK) status = pw_run_sample (x->base.run, t, &s, error);
@@ -185,19 +184,19 @@ static int sensitivity_interval (pw_sensitivity *x, double t0, double t1, sensit
   int count = sensitivity_events (x, t0, t1, list), status = PW_OK;
   for (int i = 0; i < count && status == PW_OK; i++) {
     double t = list[i].t;
-    status = sensitivity_at (x, t, error);
+    status = pw_sensitivity_at (x, t, error);
     if (status != PW_OK) break;
     if (list[i].extremum < 0)
       sensitivity_add (x, list[i].weight);
     else
       sensitivity_keep (x, list[i].extremum, fabs (t - breakpoint) < 1e-9 * (1 + fabs (t)));
   }
-  return status == PW_OK ? sensitivity_at (x, t1, error) : status;
+  return status == PW_OK ? pw_sensitivity_at (x, t1, error) : status;
 }
 
 static int sensitivity_along (pw_sensitivity *x, sensitivity_event *list, pw_progress *progress, pw_error *error) {
   double t = 0, slope;
-  int status = sensitivity_at (x, 0, error);
+  int status = pw_sensitivity_at (x, 0, error);
   if (status == PW_OK) status = sensitivity_row (x, 0, error);
   for (int i = 0; i < x->outcomes.functionals && status == PW_OK; i++)
     if (sensitivity_is_extremum (&x->outcomes.functional[i])) sensitivity_keep (x, i, 0);
@@ -219,9 +218,7 @@ static int sensitivity_along (pw_sensitivity *x, sensitivity_event *list, pw_pro
 static int sensitivity_integrate (pw_sensitivity *x, pw_progress *progress, pw_error *error) {
   sensitivity_event *list = malloc (((size_t)x->outcomes.functionals + SENSITIVITY_NODES) * sizeof *list);
   if (list == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
-  for (int p = 0; p < x->unknowns; p++) x->direction[p].no_error = x->no_error;
-  x->variation = pw_variation_open (x->base.run, x->direction, x->unknowns, x->outcomes.ledger, error);
-  int status = x->variation ? sensitivity_along (x, list, progress, error) : error->status;
+  int status = sensitivity_along (x, list, progress, error);
   free (list);
   x->stopped = status == PW_STOPPED;
   return x->stopped ? PW_OK : status;
@@ -281,7 +278,7 @@ static int sensitivity_functionals (pw_sensitivity *x, pw_error *error) {
   return PW_OK;
 }
 
-int pw_sensitivity_compute (pw_sensitivity *x, pw_progress *progress, pw_error *error) {
+int pw_sensitivity_start (pw_sensitivity *x, pw_error *error) {
   int count = 0;
   while (x->of[count]) count++;
   pw_settings plain = x->settings;
@@ -296,6 +293,14 @@ int pw_sensitivity_compute (pw_sensitivity *x, pw_progress *progress, pw_error *
                                     &plain, error);
   if (status == PW_OK) status = sensitivity_workspaces (x, error);
   pw_limit_start (&x->limit);
+  if (status != PW_OK) return status;
+  for (int p = 0; p < x->unknowns; p++) x->direction[p].no_error = x->no_error;
+  x->variation = pw_variation_open (x->base.run, x->direction, x->unknowns, x->outcomes.ledger, error);
+  return x->variation ? PW_OK : error->status;
+}
+
+int pw_sensitivity_compute (pw_sensitivity *x, pw_progress *progress, pw_error *error) {
+  int status = pw_sensitivity_start (x, error);
   if (status == PW_OK) status = sensitivity_functionals (x, error);
   return status == PW_OK ? sensitivity_integrate (x, progress, error) : status;
 }

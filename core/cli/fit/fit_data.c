@@ -16,7 +16,7 @@ static int data_names (pw_fit *x, pw_error *error) {
   int count = 1;
   for (const char *c = x->columns_text; *c; c++) count += *c == ',';
   x->names = strdup (x->columns_text);
-  x->name = calloc ((size_t)count, sizeof *x->name);
+  x->name = calloc ((size_t)count + 1, sizeof *x->name);
   if (x->names == NULL || x->name == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
   for (char *at = x->names; at;) {
     char *comma = strchr (at, ',');

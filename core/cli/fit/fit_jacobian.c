@@ -6,7 +6,6 @@
 #include <string.h>
 #include "fit_parts.h"
 #include "parallel.h"
-#include "sensitivity_direction.h"
 
 #define JACOBIAN_EXACT 1e-8 /* relative error of derivatives by the variational equations */
 
@@ -91,79 +90,31 @@ static int jacobian_by_differences (pw_fit *x, const double *at, const double *m
 
 /* ---- Variational equations ---- */
 
-typedef struct {
-  pw_unknown *unknown;
-  pw_direction *direction;
-  pw_unknown_run base, *near; /* 4 of each unknown */
-  pw_outcomes columns;        /* of the model of the command line, whose structure is that of all */
-  pw_settings settings;
-  pw_limit limit;
-  pw_variation *variation;
-} jacobian_exact;
-
-static int jacobian_open (jacobian_exact *e, const pw_fit *x, const double *at, pw_error *error) {
-  const pw_unknowns *u = &x->unknowns;
-  size_t n = (size_t)u->count;
-  e->unknown = calloc (n, sizeof *e->unknown);
-  e->direction = calloc (n, sizeof *e->direction);
-  e->near = calloc (4 * n, sizeof *e->near);
-  if (e->unknown == NULL || e->direction == NULL || e->near == NULL)
-    return pw_fail (error, PW_RESOURCE, "out of memory");
-  pw_unknowns_at (u, at, e->unknown);
-  int status = pw_outcomes_open (&e->columns, x->m.system, "--columns", x->name, x->columns, error);
-  e->settings = u->settings;
-  e->settings.ledger = e->columns.ledger;
-  e->limit = (pw_limit){ .most = u->limit };
-  e->settings.stop = pw_limit_over;
-  e->settings.stop_context = &e->limit;
-  pw_limit_start (&e->limit);
-  if (status == PW_OK)
-    status = pw_unknown_open (&e->base, u->line, u->m->file, e->unknown, (int)n, -1, 0, u->method, &e->settings, error);
-  if (status == PW_OK)
-    status = pw_unknown_directions (e->direction, e->near, u->line, u->m->file, e->unknown, (int)n, u->method,
-                                    &e->settings, error);
-  for (size_t i = 0; i < n; i++) e->direction[i].no_error = 1;
-  if (status == PW_OK) e->variation = pw_variation_open (e->base.run, e->direction, (int)n, e->columns.ledger, error);
-  return status == PW_OK && e->variation == NULL ? error->status : status;
-}
-
-static void jacobian_close (jacobian_exact *e, int n) {
-  if (e->variation) pw_variation_close (e->variation);
-  for (int i = 0; e->near && i < 4 * n; i++) pw_unknown_close (e->near + i);
-  pw_unknown_close (&e->base);
-  pw_outcomes_close (&e->columns);
-  free (e->unknown);
-  free (e->direction);
-  free (e->near);
-}
-
 /* Derivatives at the time of a row. */
-static int jacobian_row (jacobian_exact *e, const pw_fit *x, int row, double *jacobian, pw_error *error) {
-  size_t cells = (size_t)x->columns * (size_t)x->rows;
-  pw_sample d;
-  int status = pw_variation_advance (e->variation, x->t[row], x->unknowns.t_end, error);
-  for (int j = 0; j < x->unknowns.count && status == PW_OK; j++) {
-    status = pw_variation_sample (e->variation, j, &d, NULL, error);
-    d.t = 0;
-    for (int i = 0; i < x->columns && status == PW_OK; i++) {
-      double value = pw_column_value (e->base.system, e->columns.functional[i].column, &d);
-      if (!isfinite (value)) return pw_fail (error, PW_METHOD, "%s has no derivative", x->name[i]);
-      jacobian[(size_t)j * cells + (size_t)i * (size_t)x->rows + (size_t)row] = value;
+static int jacobian_row (pw_sensitivity *s, const pw_fit *x, int row, double *jacobian, pw_error *error) {
+  const int n = x->unknowns.count;
+  int status = pw_sensitivity_at (s, x->t[row], error);
+  for (int i = 0; i < x->columns && status == PW_OK; i++) {
+    const double *slope = s->slope + s->outcomes.outcome[i].term[0] * n;
+    for (int j = 0; j < n; j++) {
+      if (!isfinite (slope[j])) return pw_fail (error, PW_METHOD, "%s has no derivative", x->name[i]);
+      jacobian[((size_t)j * (size_t)x->columns + (size_t)i) * (size_t)x->rows + (size_t)row] = slope[j];
     }
   }
   return status;
 }
 
 static int jacobian_by_variation (const pw_fit *x, const double *at, double *jacobian, pw_error *error) {
-  jacobian_exact e = { .unknown = NULL };
-  int status = jacobian_open (&e, x, at, error);
-  for (int row = 0; row < x->rows && status == PW_OK; row++) status = jacobian_row (&e, x, row, jacobian, error);
-  if (status == PW_STOPPED) status = pw_limit_fail (&e.limit, pw_run_time (e.base.run), error);
-  jacobian_close (&e, x->unknowns.count);
+  pw_sensitivity s;
+  int status = pw_unknowns_differentiate (&x->unknowns, at, x->name, &s, error);
+  if (status == PW_OK) status = pw_sensitivity_start (&s, error);
+  for (int row = 0; row < x->rows && status == PW_OK; row++) status = jacobian_row (&s, x, row, jacobian, error);
+  if (status == PW_STOPPED) status = pw_limit_fail (&s.limit, pw_run_time (s.base.run), error);
+  pw_sensitivity_close (&s);
   return status;
 }
 
-/* Motions that are not differentiable, and contact points, have differences from then on. */
+/* Motions that are not differentiable have differences from then on. */
 int pw_fit_jacobian (pw_fit *x, const double *at, const double *model, double *jacobian, pw_error *error) {
   pw_error own = { 0 };
   int status = x->by_differences ? PW_METHOD : jacobian_by_variation (x, at, jacobian, &own);

@@ -5,7 +5,6 @@
 #include <stdlib.h>
 #include <string.h>
 #include "optimise_parts.h"
-#include "sensitivity.h"
 
 #define SEARCH_FIRST 0.1    /* first steps, relative to the scales of the unknowns */
 #define SEARCH_ROUGH 1e-3   /* last ones */
@@ -62,17 +61,9 @@ static int search_run (const search *p, pw_error *error) {
 static int search_differentiate (search *p, pw_error *error) {
   const pw_unknowns *u = &p->x->unknowns;
   pw_progress silent = { 0 };
-  pw_sensitivity s = { .line = *u->line, .of = p->x->text, .m = *u->m, .method = u->method, .settings = u->settings };
-  s.t_end = u->t_end;
-  s.no_error = 1;
-  s.limit.most = u->limit;
-  s.settings.stop = pw_limit_over;
-  s.settings.stop_context = &s.limit;
-  int status = pw_sensitivity_open (&s, u->count, 0, error);
-  if (status == PW_OK) {
-    pw_unknowns_at (u, p->at, s.unknown);
-    status = pw_sensitivity_compute (&s, &silent, error);
-  }
+  pw_sensitivity s;
+  int status = pw_unknowns_differentiate (u, p->at, p->x->text, &s, error);
+  if (status == PW_OK) status = pw_sensitivity_compute (&s, &silent, error);
   if (status == PW_OK && s.stopped) status = pw_limit_fail (&s.limit, pw_run_time (s.base.run), error);
   for (int i = 0; i < p->x->outputs && status == PW_OK; i++) {
     p->value[i] = pw_outcome_value (&s.outcomes, i, NULL);

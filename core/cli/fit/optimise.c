@@ -104,13 +104,11 @@ static int optimise_texts (pw_optimise *x, pw_error *error) {
   return status;
 }
 
-/* Reads outputs as every run will; extrema have kinks, contact points no derivatives. */
+/* Reads outputs as every run will; extrema have kinks. */
 static int optimise_outputs (pw_optimise *x, int from, int count, const char *option, pw_error *error) {
   pw_outcomes o;
   int status = pw_outcomes_open (&o, x->m.system, option, x->text + from, count, error);
-  for (int i = 0; i < o.functionals; i++)
-    x->smooth &= o.functional[i].type != PW_MAX && o.functional[i].type != PW_MIN &&
-                 o.functional[i].column.type != PW_COLUMN_CONTACT;
+  for (int i = 0; i < o.functionals; i++) x->smooth &= o.functional[i].type != PW_MAX && o.functional[i].type != PW_MIN;
   pw_outcomes_close (&o);
   return status;
 }

@@ -127,14 +127,23 @@ int pw_unknowns_system (const pw_unknowns *u, const double *x, pw_cli_model *m, 
   return PW_OK;
 }
 
-void pw_unknowns_at (const pw_unknowns *u, const double *x, pw_unknown *list) {
+int pw_unknowns_differentiate (const pw_unknowns *u, const double *x, const char **outputs, pw_sensitivity *s,
+                               pw_error *error) {
   pw_error none = { 0 };
-  for (int i = 0; i < u->count; i++) {
+  *s = (pw_sensitivity){ .line = *u->line, .of = outputs, .m = *u->m, .method = u->method, .settings = u->settings };
+  s->t_end = u->t_end;
+  s->no_error = 1;
+  s->limit.most = u->limit;
+  s->settings.stop = pw_limit_over;
+  s->settings.stop_context = &s->limit;
+  int status = pw_sensitivity_open (s, u->count, 0, error);
+  for (int i = 0; i < u->count && status == PW_OK; i++) {
     const pw_free_number *f = u->at + i;
-    list[i] = (pw_unknown){ .name = f->name, .parameter = f->parameter, .state = -1, .value = x[i] };
-    snprintf (list[i].unit, sizeof list[i].unit, "%s", f->unit);
-    if (f->parameter == NULL) list[i].state = pw_system_find_state (u->m->system, f->name, &none);
+    s->unknown[i] = (pw_unknown){ .name = f->name, .parameter = f->parameter, .state = -1, .value = x[i] };
+    snprintf (s->unknown[i].unit, sizeof s->unknown[i].unit, "%s", f->unit);
+    if (f->parameter == NULL) s->unknown[i].state = pw_system_find_state (u->m->system, f->name, &none);
   }
+  return status;
 }
 
 /* In a range of length 1. */

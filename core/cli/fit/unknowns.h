@@ -2,7 +2,7 @@
 #ifndef PW_UNKNOWNS_H
 #define PW_UNKNOWNS_H
 
-#include "sensitivity_direction.h"
+#include "sensitivity.h"
 
 typedef struct {
   char *name;
@@ -40,8 +40,10 @@ void pw_unknowns_close (pw_unknowns *u);
 int pw_unknowns_system (const pw_unknowns *u, const double *x, pw_cli_model *m, pw_settings *settings, pw_limit *limit,
                         pw_error *error);
 
-/* The same values, to differentiate by: `list` has room for all. */
-void pw_unknowns_at (const pw_unknowns *u, const double *x, pw_unknown *list);
+/* Prepares derivatives by all unknowns at these values, without their errors; outputs end with NULL.  Close it in every
+ * case. */
+int pw_unknowns_differentiate (const pw_unknowns *u, const double *x, const char **outputs, pw_sensitivity *s,
+                               pw_error *error);
 
 /* Points where searches begin, `count` x unknowns: the values at the beginning, then Sobol's sequence between the user's
  * bounds, otherwise within a scale of the values, displaced by the seed.  Several
