@@ -120,36 +120,19 @@ static void test_fast (void **state) {
                "divided until two formulas agree to 1e-3, which makes one of them accurate to 3e-11 of a part");
 }
 
-/* The weights give the integral of another column. */
-static void test_nodes (void **state) {
+static void test_gradient (void **state) {
   (void)state;
   const char *text = "integral:wheel.phi * 2 + max:wheel.phi";
   pw_outcomes x;
   pw_error error = { 0 };
   double gradient[2];
   check_ok (pw_outcomes_open (&x, s, "--of", &text, 1, &error), &error);
-  x.record = 1;
   check_ok (pw_outcomes_run (&x, "erk8", &(pw_settings){ .rtol = 1e-10, .span = 2 }, 2, &error), &error);
   assert_int_equal (x.functionals, 2);
   pw_outcome_value (&x, 0, gradient);
   check_close ("derivative", gradient[0], 2, 0, "exact");
   check_close ("derivative", gradient[1], 1, 0, "exact");
-  const pw_functional *f = x.functional;
-  double sum = 0, mean = 0, rms = 0;
-  for (int i = 0; i < f->nodes; i++) sum += f->node[i].weight * sin (f->node[i].t);
-  check_close ("weights", sum, 1 - cos (2), 1e-11, "formula of degree 9");
-  assert_int_equal (f[1].nodes, 1);
-  check_close ("time of the maximum", f[1].node[0].t, PW_PI / 3, 1e-7, "sqrt (eps) and the error of the run");
-  pw_outcomes_close (&x);
-  text = "mean:wheel.phi + rms:wheel.omega";
-  check_ok (pw_outcomes_open (&x, s, "--of", &text, 1, &error), &error);
-  x.record = 1;
-  check_ok (pw_outcomes_run (&x, "erk8", &(pw_settings){ .rtol = 1e-10, .span = 2 }, 2, &error), &error);
-  for (int i = 0; i < x.functional[0].nodes; i++) mean += x.functional[0].node[i].weight;
-  for (int i = 0; i < x.functional[1].nodes; i++)
-    rms += x.functional[1].node[i].weight * sin (3 * x.functional[1].node[i].t) / 3;
-  check_close ("weights of a mean", mean, 1, 1e-14, "exact");
-  check_close ("weights of a root mean square", rms, x.functional[1].value, 1e-9, "homogeneous of degree 1");
+  check_close ("time of the maximum", x.functional[1].t, PW_PI / 3, 1e-7, "sqrt (eps) and the error of the run");
   pw_outcomes_close (&x);
 }
 
@@ -178,7 +161,7 @@ static void test_bad (void **state) {
 
 int main (void) {
   const struct CMUnitTest tests[] = { cmocka_unit_test (test_functionals), cmocka_unit_test (test_jump),
-                                      cmocka_unit_test (test_nodes),       cmocka_unit_test (test_bad),
+                                      cmocka_unit_test (test_gradient),    cmocka_unit_test (test_bad),
                                       cmocka_unit_test (test_small_jump),  cmocka_unit_test (test_fast) };
   return cmocka_run_group_tests (tests, outcome_setup, outcome_teardown);
 }

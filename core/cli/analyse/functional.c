@@ -23,7 +23,6 @@
 #define FUNCTIONAL_BEFORE 1e-6 /* of a step, to see whether an extremum is before its end */
 #define FUNCTIONAL_WIDTH 1e-8  /* of the interval that contains an extremum, relative to the first one */
 enum {
-  FUNCTIONAL_NODES = 5,
   FUNCTIONAL_TIMES = PW_FUNCTIONAL_TIMES,
   FUNCTIONAL_MIDDLE = 4,
   FUNCTIONAL_DEPTH = 4,
@@ -31,11 +30,10 @@ enum {
 };
 
 /* Abramowitz and Stegun, table 25.4; the weights of the second formula are 1 / (3 x^2) and 2 - 2 / (3 x^2). */
-static const double functional_x[] = { -0.90617984593866399, -0.53846931010568309, 0, 0.53846931010568309,
-                                       0.90617984593866399 },
-                    functional_w[] = { 0.23692688505618909, 0.47862867049936647, 0.56888888888888889,
-                                       0.47862867049936647, 0.23692688505618909 },
-                    functional_rough[] = { 0.40592924385869443, 0, 1.18814151228261114, 0, 0.40592924385869443 };
+const double pw_gauss_x[] = { -0.90617984593866399, -0.53846931010568309, 0, 0.53846931010568309, 0.90617984593866399 },
+             pw_gauss_w[] = { 0.23692688505618909, 0.47862867049936647, 0.56888888888888889, 0.47862867049936647,
+                              0.23692688505618909 };
+static const double functional_rough[] = { 0.40592924385869443, 0, 1.18814151228261114, 0, 0.40592924385869443 };
 
 /* A step of a run. */
 typedef struct {
@@ -72,62 +70,37 @@ static double functional_at (functional_step *p, const pw_functional *f, double 
   return functional_sample (p, t, &s) ? functional_read (p->x, f, &s) : NAN;
 }
 
-static int functional_node (pw_functional *f, double t, double weight, pw_error *error) {
-  if (f->nodes == f->room) {
-    int room = f->room ? 2 * f->room : 64;
-    struct pw_node *more = realloc (f->node, (size_t)room * sizeof *more);
-    if (more == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
-    f->node = more;
-    f->room = room;
-  }
-  f->node[f->nodes++] = (struct pw_node){ t, weight };
-  return PW_OK;
-}
-
 /* ---- Integrals ---- */
 
-static int functional_is_integral (const pw_functional *f) {
-  return f->type == PW_MEAN || f->type == PW_INTEGRAL || f->type == PW_RMS;
-}
-
-static int functional_is_extremum (const pw_functional *f) {
-  return f->type == PW_MAX || f->type == PW_MIN;
-}
-
 static double functional_time (double t0, double t1, int node) {
-  return (t0 + t1) / 2 + functional_x[node] * (t1 - t0) / 2;
+  return (t0 + t1) / 2 + pw_gauss_x[node] * (t1 - t0) / 2;
 }
 
 /* Adds the integral of the column, or of its square, over [t0, t1] with values at the nodes; divides it if necessary. */
 static void functional_integrate (functional_step *p, pw_functional *f, double t0, double t1, const double *value,
                                   int depth) {
   double fine = 0, rough = 0, largest = 0, h = (t1 - t0) / 2;
-  for (int i = 0; i < FUNCTIONAL_NODES; i++) {
+  for (int i = 0; i < PW_GAUSS_NODES; i++) {
     double y = f->type == PW_RMS ? value[i] * value[i] : value[i];
-    fine += functional_w[i] * y;
+    fine += pw_gauss_w[i] * y;
     rough += functional_rough[i] * y;
     largest = fmax (largest, fabs (y));
   }
   if (fabs (fine - rough) > FUNCTIONAL_AGREE * 2 * largest && depth < FUNCTIONAL_DEPTH) {
     for (int half = 0; half < 2 && p->status == PW_OK; half++) {
-      double from = half ? t0 + h : t0, to = half ? t1 : t0 + h, again[FUNCTIONAL_NODES];
-      for (int i = 0; i < FUNCTIONAL_NODES; i++) again[i] = functional_at (p, f, functional_time (from, to, i));
+      double from = half ? t0 + h : t0, to = half ? t1 : t0 + h, again[PW_GAUSS_NODES];
+      for (int i = 0; i < PW_GAUSS_NODES; i++) again[i] = functional_at (p, f, functional_time (from, to, i));
       functional_integrate (p, f, from, to, again, depth + 1);
     }
     return;
   }
   f->value += h * fine;
-  for (int i = 0; p->x->record && i < FUNCTIONAL_NODES && p->status == PW_OK; i++)
-    p->status = functional_node (f, functional_time (t0, t1, i),
-                                 h * functional_w[i] * (f->type == PW_RMS ? value[i] : 1), p->error);
 }
 
 /* Mean and root mean square of a run of length `span`. */
 static void functional_average (pw_functional *f, double span) {
-  double scale = 1;
-  if (f->type == PW_MEAN) f->value *= scale = 1 / span;
-  if (f->type == PW_RMS) f->value = sqrt (f->value / span), scale = f->value > 0 ? 1 / (span * f->value) : 0;
-  for (int i = 0; i < f->nodes; i++) f->node[i].weight *= scale;
+  if (f->type == PW_MEAN) f->value /= span;
+  if (f->type == PW_RMS) f->value = sqrt (f->value / span);
 }
 
 /* ---- Extrema ---- */
@@ -194,9 +167,8 @@ int pw_outcomes_start (pw_outcomes *x, pw_run *r, pw_error *error) {
   if (status == PW_OK) status = functional_prepare (x, &s, error);
   for (pw_functional *f = x->functional; f < x->functional + x->functionals && status == PW_OK; f++) {
     f->at[0] = functional_read (x, f, &s);
-    f->value = functional_is_integral (f) ? 0 : f->at[0];
+    f->value = pw_is_integral (f->type) ? 0 : f->at[0];
     f->t = x->t;
-    f->nodes = 0;
   }
   return status;
 }
@@ -205,7 +177,7 @@ int pw_outcomes_start (pw_outcomes *x, pw_run *r, pw_error *error) {
 static void functional_times (const functional_step *p, double t[FUNCTIONAL_TIMES]) {
   const double h = p->t1 - p->t0;
   t[0] = p->t0, t[1] = p->t0 + FUNCTIONAL_BEFORE * h;
-  for (int i = 0; i < FUNCTIONAL_NODES; i++) t[2 + i] = functional_time (p->t0, p->t1, i);
+  for (int i = 0; i < PW_GAUSS_NODES; i++) t[2 + i] = functional_time (p->t0, p->t1, i);
   t[FUNCTIONAL_TIMES - 2] = p->t1 - FUNCTIONAL_BEFORE * h, t[FUNCTIONAL_TIMES - 1] = p->t1;
 }
 
@@ -220,9 +192,9 @@ static void functional_take (functional_step *p, double t, int i) {
 static int functional_needs_nodes (const pw_functional *f) {
   double x0 = f->at[0], xm = f->at[FUNCTIONAL_MIDDLE], x1 = f->at[FUNCTIONAL_TIMES - 1], bend = fabs (x0 - 2 * xm + x1),
          largest = fmax (fabs (x0), fmax (fabs (xm), fabs (x1)));
-  if (functional_is_integral (f)) return bend > FUNCTIONAL_PARABOLA * largest;
+  if (pw_is_integral (f->type)) return bend > FUNCTIONAL_PARABOLA * largest;
   double lead = f->type == PW_MAX ? fmax (x0, fmax (xm, x1)) - f->value : f->value - fmin (x0, fmin (xm, x1));
-  return functional_is_extremum (f) && bend > FUNCTIONAL_LINEAR * fabs (x1 - x0) && lead + bend + fabs (x1 - x0) > 0;
+  return pw_is_extremum (f->type) && bend > FUNCTIONAL_LINEAR * fabs (x1 - x0) && lead + bend + fabs (x1 - x0) > 0;
 }
 
 /* Simpson's formula. */
@@ -230,9 +202,8 @@ static void functional_simpson (functional_step *p, pw_functional *f) {
   static const int at[] = { 0, FUNCTIONAL_MIDDLE, FUNCTIONAL_TIMES - 1 };
   const double h = p->t1 - p->t0;
   for (int i = 0; i < 3; i++) {
-    double value = f->at[at[i]], weight = (i == 1 ? 4 : 1) * h / 6 * (f->type == PW_RMS ? value : 1);
-    f->value += weight * (f->type == PW_RMS ? value : f->at[at[i]]);
-    if (p->x->record && p->status == PW_OK) p->status = functional_node (f, p->t0 + i * h / 2, weight, p->error);
+    double value = f->at[at[i]];
+    f->value += (i == 1 ? 4 : 1) * h / 6 * (f->type == PW_RMS ? value * value : value);
   }
 }
 
@@ -251,10 +222,10 @@ int pw_outcomes_step (pw_outcomes *x, pw_run *r, pw_error *error) {
   for (int i = 1; nodes && i < FUNCTIONAL_TIMES - 1; i++)
     if (i != FUNCTIONAL_MIDDLE) functional_take (&p, t[i], i);
   for (pw_functional *f = x->functional; f < end && p.status == PW_OK; f++) {
-    if (functional_is_integral (f) && nodes) functional_integrate (&p, f, p.t0, p.t1, f->at + 2, 0);
-    if (functional_is_integral (f) && !nodes) functional_simpson (&p, f);
-    if (functional_is_extremum (f) && nodes) functional_extremum (&p, f, t, f->at);
-    if (functional_is_extremum (f) && !nodes) functional_better (f, p.t1, f->at[FUNCTIONAL_TIMES - 1]);
+    if (pw_is_integral (f->type) && nodes) functional_integrate (&p, f, p.t0, p.t1, f->at + 2, 0);
+    if (pw_is_integral (f->type) && !nodes) functional_simpson (&p, f);
+    if (pw_is_extremum (f->type) && nodes) functional_extremum (&p, f, t, f->at);
+    if (pw_is_extremum (f->type) && !nodes) functional_better (f, p.t1, f->at[FUNCTIONAL_TIMES - 1]);
     f->at[0] = f->at[FUNCTIONAL_TIMES - 1];
   }
   return p.status;
@@ -263,9 +234,8 @@ int pw_outcomes_step (pw_outcomes *x, pw_run *r, pw_error *error) {
 int pw_outcomes_end (pw_outcomes *x, pw_run *r, pw_error *error) {
   functional_step p = { x, r, x->t, pw_run_time (r), PW_OK, error };
   for (pw_functional *f = x->functional; f < x->functional + x->functionals && p.status == PW_OK; f++) {
-    if (functional_is_integral (f)) functional_average (f, x->t - x->t0);
+    if (pw_is_integral (f->type)) functional_average (f, x->t - x->t0);
     if (f->type == PW_FINAL) f->value = functional_at (&p, f, f->t = p.t1);
-    if (!functional_is_integral (f) && p.status == PW_OK) p.status = functional_node (f, f->t, 1, error);
   }
   return p.status;
 }

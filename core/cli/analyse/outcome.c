@@ -233,7 +233,6 @@ int pw_outcomes_open (pw_outcomes *x, const pw_system *s, const char *option, co
 
 void pw_outcomes_close (pw_outcomes *x) {
   for (int i = 0; i < x->outcomes; i++) pw_formula_close (x->outcome[i].formula);
-  for (int i = 0; i < x->functionals; i++) free (x->functional[i].node);
   free (x->outcome);
   free (x->functional);
   free (x->contact);

@@ -45,16 +45,23 @@ typedef enum { PW_FINAL, PW_MAX, PW_MIN, PW_MEAN, PW_INTEGRAL, PW_RMS } pw_funct
 
 #define PW_FUNCTIONAL_TIMES 9
 
-/* A functional of a column.  Its derivative is the sum of weight x derivative of the column at the nodes. */
+static inline int pw_is_integral (pw_functional_type type) {
+  return type == PW_MEAN || type == PW_INTEGRAL || type == PW_RMS;
+}
+static inline int pw_is_extremum (pw_functional_type type) {
+  return type == PW_MAX || type == PW_MIN;
+}
+
+/* Gauss' formula of order 10 on [-1, 1]. */
+enum { PW_GAUSS_NODES = 5 };
+extern const double pw_gauss_x[PW_GAUSS_NODES], pw_gauss_w[PW_GAUSS_NODES];
+
+/* A functional of a column. */
 typedef struct {
   pw_functional_type type;
   pw_column column;
-  double value; /* so far; after pw_outcomes_end that of the run */
-  double t;     /* time of the extremum, or of the end [s] */
-  int nodes, room;
-  struct pw_node {
-    double t, weight;
-  } * node;                       /* in the order of time; integrals only with `record` */
+  double value;                   /* so far; after pw_outcomes_end that of the run */
+  double t;                       /* time of the extremum, or of the end [s] */
   double at[PW_FUNCTIONAL_TIMES]; /* private: the column in the last step; [0] at its beginning */
 } pw_functional;
 
@@ -71,7 +78,6 @@ typedef struct {
   pw_functional *functional; /* each once */
   int functionals;
   int ledger; /* 1: runs need pw_settings.ledger */
-  int record; /* set by the caller: keep the nodes of integrals */
   /* private */
   double t0, t;
   pw_workspace *workspace; /* for contact points */

@@ -9,20 +9,7 @@
 #include "sensitivity.h"
 
 /* Rows of the table, between which integrals are computed; without both, times of the progress. */
-enum { SENSITIVITY_NODES = 5, SENSITIVITY_ROWS = 200, SENSITIVITY_PARTS = 20 };
-/* Abramowitz and Stegun, table 25.4. */
-static const double sensitivity_x[] = { -0.90617984593866399, -0.53846931010568309, 0, 0.53846931010568309,
-                                        0.90617984593866399 },
-                    sensitivity_w[] = { 0.23692688505618909, 0.47862867049936647, 0.56888888888888889,
-                                        0.47862867049936647, 0.23692688505618909 };
-
-static int sensitivity_is_integral (const pw_functional *f) {
-  return f->type == PW_INTEGRAL || f->type == PW_MEAN || f->type == PW_RMS;
-}
-
-static int sensitivity_is_extremum (const pw_functional *f) {
-  return f->type == PW_MAX || f->type == PW_MIN;
-}
+enum { SENSITIVITY_ROWS = 200, SENSITIVITY_PARTS = 20 };
 
 int pw_sensitivity_runs_along (const pw_sensitivity *x, int output) {
   const pw_outcome *o = &x->outcomes.outcome[output];
@@ -111,7 +98,7 @@ static void sensitivity_add (pw_sensitivity *x, double weight) {
   for (int i = 0; i < x->outcomes.functionals; i++) {
     const pw_functional *f = &x->outcomes.functional[i];
     double factor = f->type == PW_INTEGRAL ? weight : weight / x->t_end;
-    if (!sensitivity_is_integral (f)) continue;
+    if (!pw_is_integral (f->type)) continue;
     if (f->type == PW_RMS) factor *= f->value > 0 ? x->value[i] / f->value : 0;
     for (int p = i * x->unknowns; p < (i + 1) * x->unknowns; p++) {
       x->end_slope[p] += factor * x->slope[p];
@@ -168,12 +155,12 @@ static int sensitivity_events (const pw_sensitivity *x, double t0, double t1, se
   int count = 0, integrals = 0;
   for (int i = 0; i < x->outcomes.functionals; i++) {
     const pw_functional *f = &x->outcomes.functional[i];
-    integrals |= sensitivity_is_integral (f);
-    if (sensitivity_is_extremum (f) && f->t > t0 && f->t <= t1) list[count++] = (sensitivity_event){ f->t, 0, i };
+    integrals |= pw_is_integral (f->type);
+    if (pw_is_extremum (f->type) && f->t > t0 && f->t <= t1) list[count++] = (sensitivity_event){ f->t, 0, i };
   }
-  for (int k = 0; k < SENSITIVITY_NODES && integrals; k++)
+  for (int k = 0; k < PW_GAUSS_NODES && integrals; k++)
     list[count++] =
-        (sensitivity_event){ (t0 + t1) / 2 + sensitivity_x[k] * (t1 - t0) / 2, sensitivity_w[k] * (t1 - t0) / 2, -1 };
+        (sensitivity_event){ (t0 + t1) / 2 + pw_gauss_x[k] * (t1 - t0) / 2, pw_gauss_w[k] * (t1 - t0) / 2, -1 };
   qsort (list, (size_t)count, sizeof *list, sensitivity_earlier);
   return count;
 }
@@ -199,7 +186,7 @@ static int sensitivity_along (pw_sensitivity *x, sensitivity_event *list, pw_pro
   int status = pw_sensitivity_at (x, 0, error);
   if (status == PW_OK) status = sensitivity_row (x, 0, error);
   for (int i = 0; i < x->outcomes.functionals && status == PW_OK; i++)
-    if (sensitivity_is_extremum (&x->outcomes.functional[i])) sensitivity_keep (x, i, 0);
+    if (pw_is_extremum (x->outcomes.functional[i].type)) sensitivity_keep (x, i, 0);
   for (long k = 1; t < x->t_end && status == PW_OK; k++) {
     double to = (double)k * x->dt < x->t_end * (1 - 1e-12) ? (double)k * x->dt : x->t_end;
     while (t < to && status == PW_OK) {
@@ -216,7 +203,7 @@ static int sensitivity_along (pw_sensitivity *x, sensitivity_event *list, pw_pro
 }
 
 static int sensitivity_integrate (pw_sensitivity *x, pw_progress *progress, pw_error *error) {
-  sensitivity_event *list = malloc (((size_t)x->outcomes.functionals + SENSITIVITY_NODES) * sizeof *list);
+  sensitivity_event *list = malloc (((size_t)x->outcomes.functionals + PW_GAUSS_NODES) * sizeof *list);
   if (list == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
   int status = sensitivity_along (x, list, progress, error);
   free (list);

@@ -108,7 +108,7 @@ static int optimise_texts (pw_optimise *x, pw_error *error) {
 static int optimise_outputs (pw_optimise *x, int from, int count, const char *option, pw_error *error) {
   pw_outcomes o;
   int status = pw_outcomes_open (&o, x->m.system, option, x->text + from, count, error);
-  for (int i = 0; i < o.functionals; i++) x->smooth &= o.functional[i].type != PW_MAX && o.functional[i].type != PW_MIN;
+  for (int i = 0; i < o.functionals; i++) x->smooth &= !pw_is_extremum (o.functional[i].type);
   pw_outcomes_close (&o);
   return status;
 }
