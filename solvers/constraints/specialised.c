@@ -60,9 +60,11 @@ void pw_specialised_close (pw_run *r) {
   free (r->scene_memory);
 }
 
-/* 1 where the general engine has more to do than to evaluate. */
+/* 1 where the general engine has more to do than to evaluate: with fixed steps it watches the sine of every stage; adaptive
+ * methods ask for it only below the pivots that the specialised code accepts. */
 static int specialised_is_unsuitable (pw_run *r) {
-  return r->specialised == NULL || r->least_norm || (r->geometry.alert && r->geometry.saddle) || r->near || r->w->hold;
+  const pw_geometry *g = &r->geometry;
+  return r->specialised == NULL || r->least_norm || (g->alert && g->saddle && g->fixed) || r->near || r->w->hold;
 }
 
 static void specialised_evaluated (pw_run *r, const double *q, const double *v) {

@@ -1,5 +1,6 @@
 /* The driver of methods with an implicit step; see implicit.h. */
 #include "implicit.h"
+#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -62,13 +63,31 @@ static int implicit_fail (pw_run *r, int status, double h, pw_error *error) {
                   status == PW_INPUT ? "the Newton matrix is singular" : "the iteration does not converge", h);
 }
 
+/* A whole step whose end lands on a singular configuration, where Newton's matrix is singular, is made longer, up to
+ * `stop`.  Makes the step of size h to *t1, which it changes. */
+static int implicit_step_around (pw_run *r, pw_implicit_step *step, double h, double stop, double *t1) {
+  static const double longer[] = { 1.38, 1.76, 2.62 };
+  int status = step (r, h, *t1);
+  for (size_t i = 0; i < sizeof longer / sizeof *longer; i++) {
+    double later = r->t + longer[i] * h;
+    if ((status != PW_RETRY && status != PW_INPUT) || !(later <= stop)) break;
+    if (!r->near && !pw_watchdog_near_state (r)) break;
+    r->statistics.rejected++;
+    status = step (r, later - r->t, later);
+    if (status == PW_OK) *t1 = later;
+  }
+  return status;
+}
+
 int pw_implicit_advance (pw_run *r, double t_end, pw_implicit_step *step, void (*accept) (pw_run *r), pw_error *error) {
   pw_implicit *x = implicit_of (r);
   int whole;
-  double t1 = pw_step_end (r, x->base, x->count, t_end, &whole), h = whole ? r->settings.step : t1 - r->t;
+  const double end = pw_step_end (r, x->base, x->count, t_end, &whole);
+  double h = whole ? r->settings.step : end - r->t, t1 = end;
   size_t n = (size_t)r->s->coords * sizeof (double);
   r->near = 0;
-  int status = step (r, h, t1);
+  int status = whole ? implicit_step_around (r, step, h, fmin (t_end, r->breakpoint), &t1) : step (r, h, t1);
+  if (t1 > end) h = t1 - r->t, whole = 0;
   if (status != PW_OK) return implicit_fail (r, status, h, error);
   pw_dense_output_keep (&x->last, r);
   memcpy (r->q, x->q1, n);

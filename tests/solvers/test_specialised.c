@@ -103,6 +103,43 @@ static void test_gallery (void **state) {
     }
 }
 
+/* Steps of adaptive methods so long that a singular configuration may be within one, though none is: specialised code evaluates
+ * them. */
+static void test_long_steps (void **state) {
+  static const struct {
+    const char *model, *method;
+    double t;
+  } run[] = { { "ezyroller", "erk8+projection", 20 },
+              { "ezyroller", "erk5+none", 20 },
+              { "snakeboard", "erk8+projection", 5 },
+              { "snakeboard", "bdf+projection", 5 },
+              { "n-trailer", "adams+none", 10 } };
+  (void)state;
+  for (size_t i = 0; i < sizeof run / sizeof *run; i++) {
+    both x;
+    both_open (&x, scene_named (run[i].model, NULL, 0), run[i].method,
+               &(pw_settings){ .rtol = 1e-4, .span = run[i].t });
+    runs_to (x.special, run[i].t);
+    const pw_statistics *count = pw_run_statistics (x.special);
+    check_below ("evaluations of the general engine", (double)(count->rhs - count->specialised),
+                 0.05 * (double)count->rhs, "those of the first steps and of Jacobians");
+    both_close (&x);
+  }
+}
+
+/* Adaptive methods pass singular configurations with either engine. */
+static void test_adaptive_singular (void **state) {
+  both x;
+  (void)state;
+  both_open (&x, scene_named ("n-four-bar", NULL, 0), "erk8+projection", &(pw_settings){ .rtol = 1e-9, .span = 10 });
+  pw_sample a = runs_to (x.general, 10), b = runs_to (x.special, 10);
+  const double x0 = 0.3284581115408153787, y0 = 0.9445185381786009622;
+  check_close ("general", hypot (cos (a.q[2]) - x0, sin (a.q[2]) - y0), 0, 1e-6, "published digits");
+  check_close ("specialised", hypot (cos (b.q[2]) - x0, sin (b.q[2]) - y0), 0, 1e-6, "published digits");
+  assert_true (both_specialised (&x) > pw_run_statistics (x.special)->rhs / 2);
+  both_close (&x);
+}
+
 /* Residuals and counts that a projection reports are those of the general engine. */
 static void test_report (void **state) {
   both x;
@@ -218,9 +255,10 @@ static void test_refused (void **state) {
 
 int main (void) {
   const struct CMUnitTest tests[] = {
-    cmocka_unit_test (test_gallery),  cmocka_unit_test (test_report),      cmocka_unit_test (test_angles),
-    cmocka_unit_test (test_singular), cmocka_unit_test (test_another),     cmocka_unit_test (test_refused),
-    cmocka_unit_test (test_guard),    cmocka_unit_test (test_independent),
+    cmocka_unit_test (test_gallery),     cmocka_unit_test (test_long_steps), cmocka_unit_test (test_adaptive_singular),
+    cmocka_unit_test (test_report),      cmocka_unit_test (test_angles),     cmocka_unit_test (test_singular),
+    cmocka_unit_test (test_another),     cmocka_unit_test (test_refused),    cmocka_unit_test (test_guard),
+    cmocka_unit_test (test_independent),
   };
   return cmocka_run_group_tests (tests, NULL, NULL);
 }
