@@ -98,7 +98,7 @@ help:
 	@echo 'make gallery          pages that simulate the models in a browser, in $(BUILD)/site/'
 	@echo 'make figures          all figures of README and docs, into docs/figures/'
 	@echo 'make test             the tests; test-all: the slow ones too'
-	@echo 'make bench            everything that is measured, about seven minutes; goes on where it was stopped'
+	@echo 'make bench            everything that is measured, and docs/benchmarks.md; goes on where it was stopped'
 	@echo 'make bench-quick      what a run costs on this machine'
 	@echo 'make bench-engine     an evaluation, a step against programs written by hand; growth with size'
 	@echo 'make bench-effects    instructions of an evaluation, with one effect more at a time; what is not used costs none'
@@ -161,7 +161,7 @@ $(BUILD)/obj/tests/%.o:      INCLUDE := $(call layer,tests/support tests/faults 
 $(BUILD)/obj/tests/cli/test_outcome.o: INCLUDE := $(call layer,tests/support $(ALL_LAYERS) core/cli/analyse)
 $(BUILD)/obj/tests/fuzz/%.o: INCLUDE := $(call layer,tests/fuzz $(ALL_LAYERS) $(CLI_LAYERS))
 $(BUILD)/obj/benchmarks/%.o: INCLUDE := -I$(BUILD)/include
-$(BUILD)/obj/benchmarks/engine.o $(addprefix $(BUILD)/obj/benchmarks/,eighth.o effects.o peers.o) $(BUILD)/obj/benchmarks/engine/%.o $(BUILD)/obj/benchmarks/baseline/%.o: INCLUDE := $(call layer,$(ALL_LAYERS) benchmarks) $(SYSTEM)
+$(BUILD)/obj/benchmarks/engine.o $(addprefix $(BUILD)/obj/benchmarks/,effects.o peers.o) $(BUILD)/obj/benchmarks/engine/%.o $(BUILD)/obj/benchmarks/baseline/%.o: INCLUDE := $(call layer,$(ALL_LAYERS) benchmarks) $(SYSTEM)
 $(BUILD)/obj/benchmarks/hard/%.o: INCLUDE := -I$(BUILD)/include
 $(BUILD)/obj/docs/%.o:       INCLUDE := -I$(BUILD)/include
 $(BUILD)/models/%.so:        INCLUDE := -I$(BUILD)/include
@@ -277,7 +277,7 @@ $(PROGRAM): $(CLI_OBJ) $(BASE_OBJ) $(LIB) $(FILES_LIB)
 
 # Benchmarks that look inside have the libraries whole, as tests do.
 WHOLE := -Wl,--whole-archive $(FILES_LIB:.so=.a) $(LIB:.so=.a) -Wl,--no-whole-archive $(FILES_LIBS) $(SOLVER_LIBS)
-INSIDE := $(addprefix $(BUILD)/benchmarks/,engine eighth peers)
+INSIDE := $(addprefix $(BUILD)/benchmarks/,engine peers)
 $(INSIDE): HOUSE_LIBS = -rdynamic $(WHOLE)
 $(INSIDE): $(FILES_LIB:.so=.a) $(LIB:.so=.a)
 
@@ -288,7 +288,6 @@ $(PROGRAMS): $(BUILD)/%: $(BUILD)/obj/%.o $(LIB) $(FILES_LIB)
 
 $(BUILD)/benchmarks/engine: $(call obj,$(ENGINE))
 $(BUILD)/benchmarks/engine $(BUILD)/benchmarks/peers: EXTRA_LIBS := $(SOLVER_LIBS) -lsundials_sunlinsoldense -lsundials_sunmatrixdense
-$(BUILD)/benchmarks/eighth: $(call obj,$(addprefix benchmarks/,baseline/ezyroller.c baseline/runge_kutta.c engine/scenes.c engine/ladder.c))
 $(BUILD)/benchmarks/peers: $(call obj,$(wildcard benchmarks/baseline/*.c) $(addprefix benchmarks/engine/,scenes.c count.c ladder.c by_hand.c))
 $(BUILD)/benchmarks/peers: EXTRA_LIBS := $(SOLVER_LIBS) -lsundials_sunlinsoldense -lsundials_sunmatrixdense
 $(BUILD)/benchmarks/effects: $(call obj,benchmarks/engine/count.c)
@@ -355,14 +354,14 @@ figures: all
 gallery: all
 	@sh core/cli/page/gallery.sh $(PROGRAM) models $(BUILD)/site
 
-bench: all basic $(addprefix $(BUILD)/benchmarks/,eighth peers engine effects)
+bench: all basic $(addprefix $(BUILD)/benchmarks/,peers engine effects)
 	@sh benchmarks/suite.sh $(BUILD)
 
 bench-quick: all $(BUILD)/benchmarks/quick
 	@$(BUILD)/benchmarks/quick
 
 bench-engine: all $(BUILD)/benchmarks/engine
-	@$(BUILD)/benchmarks/engine
+	@$(BUILD)/benchmarks/engine && sh benchmarks/report.sh
 
 bench-effects: all basic $(BUILD)/benchmarks/effects
 	@$(BUILD)/benchmarks/effects $(BASIC)

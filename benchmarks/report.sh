@@ -1,18 +1,20 @@
 #!/bin/sh
 # Tables and figures of docs/benchmarks.md from the results of `make bench`, or of its parts.
 #
-#   report.sh MACHINE       reads benchmarks/results/*-MACHINE.csv; PAGE: instead of docs/benchmarks.md
+#   report.sh [MACHINE]     reads benchmarks/results/*-MACHINE.csv (the newest); PAGE: instead of docs/benchmarks.md
 #
 # Replaces what stands between the lines <!-- PART --> and <!-- end --> of the page, for each part that has a result, and
 # draws the figures as SVG and PNG, if there is a gnuplot.
 set -eu
-machine=$1 results=benchmarks/results page=${PAGE:-docs/benchmarks.md} figures=docs/figures
+results=benchmarks/results page=${PAGE:-docs/benchmarks.md} figures=docs/figures
 export LC_ALL=C
+newest=$(ls -t "$results"/work-precision-*.csv | head -1)
+machine=${1:-$(basename "$newest" .csv | sed 's/work-precision-//')}
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
 
 # Methods that are shown; the CSV has all of them.
-shown='rk4+projection erk5+projection erk8+projection adams+none bdf+projection ida+baumgarte ida+ggl galpha+index3'
+shown='rk4+projection erk5+projection erk8+projection adams+none bdf+projection ida+baumgarte ida+ggl radau+ggl galpha+index3'
 
 # section PART: puts standard input into the page.
 section () {
@@ -44,10 +46,12 @@ style () {
   erk8+*) echo "lc rgb '#c49a00' pt 9 dt 1" ;;
   adams+*) echo "lc rgb '#117755' pt 6 dt (8,4)" ;;
   bdf+*) echo "lc rgb '#44aadd' pt 13 dt (8,4)" ;;
+  radau+*) echo "lc rgb '#884411' pt 2 dt (14,3,3,3)" ;;
   ida+ggl) echo "lc rgb '#000000' pt 12 dt (10,4,3,4)" ;;
   ida+*) echo "lc rgb '#777777' pt 5 dt (3,3)" ;;
   *) echo "lc rgb '#8844aa' pt 11 dt (10,4)" ;;
   esac
 }
 
+[ ! -f "$results/machine-$machine.txt" ] || section machine <"$results/machine-$machine.txt"
 for part in work parts engine; do . "benchmarks/report/$part.sh"; done

@@ -84,5 +84,5 @@ fi
 if [ -z "$only" ]; then
   echo benchmarks
   cp docs/benchmarks.md "$work/page.md"
-  PAGE=$work/page.md sh benchmarks/report.sh amd-epyc
+  PAGE=$work/page.md sh benchmarks/report.sh
 fi

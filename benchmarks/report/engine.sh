@@ -11,15 +11,19 @@ split () {
 engine_tables () {
   split | awk -F '\t' '
     function short(x) { return x == "" ? "" : sprintf(x >= 1000 ? "%.0f" : "%.4g", x) }
-    BEGIN { print "| what | per | by hand [ns] | Pinwheel [ns] | ratio | instructions by hand | Pinwheel | target | |"
-            print "|---|---|---|---|---|---|---|---|---|" }
-    $2 !~ /^(ratio|slope|B|s)$/ && $1 !~ /ns per body$/ {
-      printf "| %s | %s | %s | %s | %s | %s | %s | %s | %s |\n", $1, $2, short($3), short($4), short($5), short($6), short($7), $8, $9 }'
+    BEGIN { OFS = FS; print "| what | by hand or general [ns] | Pinwheel [ns] | ratio | instructions | Pinwheel | ratio |"
+            print "|---|---|---|---|---|---|---|" }
+    /massless/ || /no target/ || /ida/ || /ns per body/ { next }
+    $1 ~ /specialised .right. against general/ { scene = $1; sub(/,.*/, "", scene) }
+    $1 == "one step of rk4+projection" { $1 = scene ", " $1 ", specialised (right) against general" }
+    $2 ~ /^(evaluation|step|body)$/ {
+      sub(/, one evaluation, per body$/, "", $1)
+      printf "| %s | %s | %s | %s | %s | %s | %s |\n", $1 ($2 == "body" ? ", one evaluation, per body" : ""), short($3), short($4), short($5), short($6), short($7), ($6 > 0 ? sprintf("%.2f", $7 / $6) : "") }'
   echo
-  echo '| growth and memory | | target | |'
-  echo '|---|---|---|---|'
-  split | awk -F '\t' '$2 ~ /^(ratio|slope|s)$/ {
-    value = $5 != "" ? $5 : $4; printf "| %s | %s | %s | %s |\n", $1, value, $8, $9 }'
+  echo '| growth with the number of bodies N | measured |'
+  echo '|---|---|'
+  split | awk -F '\t' '$2 == "slope" || $2 == "s" || $1 == "memory per body, all of it" {
+    printf "| %s%s | %s |\n", $1, ($2 ~ /\// ? " [" $2 "]" : ""), ($5 != "" ? $5 : $4) }'
 }
 
 engine_figure () {

@@ -1,63 +1,112 @@
 # The part of report.sh about work and precision.
 
 csv=$results/work-precision-$machine.csv
-present () {
-  for m in $shown; do cut -d, -f2 "$csv" | grep -qxF "$m" && echo "$m"; done
-  return 0
+
+# Costs of the methods shown with the general engine: group, scene, engine, method, unit, times.
+costs () {
+  awk -f benchmarks/report/costs.awk "$csv" >"$work/costs"
+  for m in $shown; do awk -F '\t' -v m="$m" '$3 == "general" && $4 == m' "$work/costs"; done >"$work/shown"
 }
 
-# The least processor time of a level whose largest error is no more than the target, in ms.
+# Costs relative to the cheapest method of a scene: group, method, scene, digits, ratio.
+relative () {
+  awk -F '\t' '
+    { for (k = 1; k <= 3; k++) if ($(5 + k) != "-" && (!(($2, k) in least) || $(5 + k) < least[$2, k])) least[$2, k] = $(5 + k) }
+    { line[NR] = $0 }
+    END { for (n = 1; n <= NR; n++) { split(line[n], c, "\t")
+        for (k = 1; k <= 3; k++) if ((c[2], k) in least)
+          print c[1] "\t" c[4] "\t" c[2] "\t" 3 * k "\t" (c[5 + k] == "-" ? "-" : c[5 + k] / least[c[2], k]) } }' "$work/shown" >"$work/relative"
+}
+
+# The median and the largest of these costs in each group of scenes.
+summary_table () {
+  awk -F '\t' -v methods="$shown" '
+    function cell(g, m, k,  n, i, j, t, v) {
+      n = split(value[g, m, k], v, " ")
+      for (i = 2; i <= n; i++) for (j = i; j > 1 && v[j] + 0 < v[j - 1] + 0; j--) { t = v[j]; v[j] = v[j - 1]; v[j - 1] = t }
+      if (n == 0) return "-"
+      t = n % 2 ? v[(n + 1) / 2] : sqrt(v[n / 2] * v[n / 2 + 1])
+      return sprintf("%s%s (%s)%s", t < 1.05 ? "**" : "", round(t) (t < 1.05 ? "**" : ""), round(v[n]), n < all[g, m, k] ? " " n "/" all[g, m, k] : "")
+    }
+    function round(x) { return sprintf(x < 9.95 ? "%.1f" : "%.0f", x) }
+    { all[$1, $2, $4]++; if ($5 != "-") value[$1, $2, $4] = value[$1, $2, $4] " " $5 }
+    END { split("smooth stiff singular", group, " "); n = split(methods, m, " ")
+      print "| method | smooth, 1e-3 | 1e-6 | 1e-9 | stiff, 1e-3 | 1e-6 | 1e-9 | change points, 1e-6 |"; print "|---|---|---|---|---|---|---|---|"
+      for (i = 1; i <= n; i++) { printf "| `%s` |", m[i]
+        for (g = 1; g <= 2; g++) for (k = 3; k <= 9; k += 3) printf " %s |", cell(group[g], m[i], k)
+        print " " cell("singular", m[i], 6) " |" } }' "$work/relative"
+}
+
+# Relative costs at 1e-6: a line for each method, a mark for each scene.
+summary_figure () {
+  n=0 labels=
+  for m in $shown; do
+    n=$((n + 1)) labels="$labels${labels:+, }'$m' -$n"
+    for g in smooth stiff; do
+      awk -F '\t' -v g=$g -v m="$m" -v n=$n '$1 == g && $2 == m && $4 == 6 && $5 != "-" { print $5, -n }' "$work/relative" >>"$work/strip-$g"
+    done
+  done
+  draw bench-methods 480 'Processor time for an error of 10^{-6}, relative to the cheapest method' <<G
+set logscale x; set format x '10^{%T}'; unset key; set grid; set xrange [0.8:*]; set yrange [-$n.5:-0.5]
+set xlabel 'processor time / that of the cheapest method'
+set ytics ($labels)
+eval panel(left + 62, 0.5*width + 24, 44, height - bottom)
+set title 'smooth motions' offset 0,-0.7
+plot '$work/strip-smooth' with points pt 6 ps 0.7 lw 1 lc rgb '#004488'
+set ytics ('' -1); set format y ''
+eval panel(0.5*width + left - 10, width - right, 44, height - bottom)
+set title 'stiff scenes' offset 0,-0.7
+plot '$work/strip-stiff' with points pt 6 ps 0.7 lw 1 lc rgb '#cc6677'
+G
+}
+
+# Processor times for 1e-6 of every scene, and what the reference is known to.
 work_table () {
-  methods=$(present | paste -sd' ' -)
-  awk -F, -v methods="$methods" '
-    function milli(x) { return x < 0 ? "-" : sprintf (x < 1e-3 ? "%.2f" : x < 1e-2 ? "%.1f" : "%.0f", 1e3 * x) }
-    BEGIN { m = split (methods, method, " "); target[1] = 1e-3; target[2] = 1e-6; target[3] = 1e-9
-      printf "| scene |"; for (i = 1; i <= m; i++) printf " `%s` |", method[i]; print ""
-      printf "|---|"; for (i = 1; i <= m; i++) printf "---|"; print "" }
-    NR == 1 || $1 == "original" { next }
-    !($1 in seen) { seen[$1] = ++scenes; scene[scenes] = $1 }
-    { error = $9 == "nan" ? $10 : $9; if ($9 == "nan" && $10 != "nan") angles[$1] = 1 }
-    $5 == "ok" && error != "nan" {
-      for (k = 1; k <= 3; k++) if (error + 0 <= target[k]) {
-        key = $1 SUBSEP $2 SUBSEP k
-        if (!(key in best) || $21 < best[key]) best[key] = $21 } }
-    END { for (s = 1; s <= scenes; s++) {
-        printf "| %s%s |", scene[s], scene[s] in angles ? " (rad)" : ""
-        for (k = 1; k <= 3; k++) { least[k] = -1
-          for (i = 1; i <= m; i++) { key = scene[s] SUBSEP method[i] SUBSEP k
-            if (key in best && (least[k] < 0 || best[key] < least[k])) least[k] = best[key] } }
-        for (i = 1; i <= m; i++) { text = ""
-          for (k = 1; k <= 3; k++) { key = scene[s] SUBSEP method[i] SUBSEP k
-            value = key in best ? best[key] : -1
-            cell = milli(value); if (value >= 0 && value == least[k]) cell = "**" cell "**"
-            text = text (k > 1 ? " / " : "") cell }
-          printf " %s |", text }
-        print "" } }' "$csv"
+  awk -F '\t' -v methods="$shown" -v file="$results/reference-$machine.csv" '
+    BEGIN { m = split(methods, method, " ")
+      while ((getline line < file) > 0) { split(line, q, "\""); split(q[1], a, ","); split(q[3], b, ","); known[a[1]] = b[3] > 0 ? b[3] : b[4] }
+      printf "| scene | reference |"; for (i = 1; i <= m; i++) printf " `%s` |", method[i]; print ""
+      printf "|---|---|"; for (i = 1; i <= m; i++) printf "---|"; print "" }
+    !($2 in seen) { seen[$2] = ++scenes; scene[scenes] = $2; unit[$2] = $5 }
+    { time[$2, $4] = $7; if ($7 != "-" && (!($2 in least) || $7 + 0 < least[$2])) least[$2] = $7 + 0 }
+    END { for (s = 1; s <= scenes; s++) { printf "| %s | %.0e %s |", scene[s], known[scene[s]], unit[scene[s]]
+        for (i = 1; i <= m; i++) { t = time[scene[s], method[i]]
+          cell = t == "-" || t == "" ? "-" : sprintf(t < 1 ? "%.2f" : t < 10 ? "%.1f" : "%.0f", t)
+          if (t != "-" && t + 0 == least[scene[s]]) cell = "**" cell "**"
+          printf " %s |", cell }
+        print "" } }' "$work/shown"
 }
 
-# Methods none of whose levels has reached the end, and those some of whose have failed.
+# Runs that do not reach the end, by method, with the scenes; methods without any are left out.
 failure_table () {
-  echo '| scene | method | levels that reach the end | why the others do not (the first of them) |'
-  echo '|---|---|---|---|'
+  echo '| method | runs that fail | scenes |'
+  echo '|---|---|---|'
   awk -F, '
-    NR == 1 || $1 == "original" { next }
-    { key = $1 SUBSEP $2; if (!(key in all)) { order[++n] = key }; all[key]++
-      if ($5 == "ok") good[key]++
-      else if (($5 == "failed" || $5 == "refused") && !(key in why)) { why[key] = $0; for (i = 1; i < 23; i++) sub (/^[^,]*,/, "", why[key]) } }
-    END { for (i = 1; i <= n; i++) { key = order[i]; if (!(key in why)) continue
-        split (key, part, SUBSEP); gsub (/^"|"$/, "", why[key]); gsub (/\|/, "/", why[key])
-        printf "| %s | `%s` | %d of %d | %s |\n", part[1], part[2], good[key], all[key], why[key] } }' "$csv"
+    NR == 1 { for (i = 1; i <= NF; i++) at[$i] = i; next }
+    $at["group"] == "original" || $at["engine"] != "general" { next }
+    { m = $at["method"]; if (!(m in all)) order[++n] = m; all[m]++ }
+    $at["status"] == "failed" || $at["status"] == "refused" { bad[m]++; name = $at["scene"]; if (!((m, name) in count)) list[m] = list[m] " " name; count[m, name]++ }
+    END { for (i = 1; i <= n; i++) { m = order[i]; if (!bad[m]) continue
+        k = split(list[m], s, " "); text = ""
+        for (j = 1; j <= k; j++) text = text (j > 1 ? ", " : "") s[j] (count[m, s[j]] > 1 ? " " count[m, s[j]] : "")
+        printf "| `%s` | %d of %d | %s |\n", m, bad[m], all[m], text } }' "$csv"
 }
 
-truth_table () {
-  echo '| scene | errors are against | which is known to [m] | [rad] |'
-  echo '|---|---|---|---|'
-  awk -F'"' 'NR > 1 { split ($1, a, ","); split ($3, b, ","); printf "| %s | %s | %s | %s |\n", a[1], $2, (b[3] > 0 ? b[3] : "not compared"), (b[4] > 0 ? b[4] : "not compared") }' "$results/truth-$machine.csv"
+# The same methods with both engines: processor times for 1e-6.
+engines_table () {
+  echo '| scene | `erk8+projection`, general [ms] | specialised | ratio | `bdf+projection`, general [ms] | specialised | ratio |'
+  echo '|---|---|---|---|---|---|---|'
+  awk -F '\t' '
+    $3 == "general" { general[$2, $4] = $7; next }
+    $4 == "erk8+projection" { line[++n] = $2; e[$2] = $7 }
+    $4 == "bdf+projection" { b[$2] = $7 }
+    END { for (i = 1; i <= n; i++) printf "| %s | %s | %s |\n", line[i], cell(general[line[i], "erk8+projection"], e[line[i]]), cell(general[line[i], "bdf+projection"], b[line[i]]) }
+    function cell(g, x) { return g == "-" || x == "-" || g == "" || x == "" ? "- | - | -" : sprintf("%.3g | %.3g | %.2f", g, x, x / g) }' "$work/costs"
 }
 
-# One panel per scene, four rows of three.
+# One panel per scene, in rows of three.
 work_figure () {
-  scenes=$(awk -F, 'NR > 1 && $1 != "original" && !($1 in seen) { seen[$1] = 1; print $1 }' "$csv")
+  scenes=$(awk -F '\t' '!seen[$2]++ { print $2 }' "$work/shown")
   n=$(echo "$scenes" | wc -l) rows=$(((n + 2) / 3)) i=0
   height=$((140 + 240 * rows))
   {
@@ -66,13 +115,17 @@ work_figure () {
       column=$((i % 3)) row=$((i / 3)) i=$((i + 1)) last=$((n - i < 3))
       echo "set lmargin at screen $(awk "BEGIN { print 0.085 + 0.318 * $column }"); set rmargin at screen $(awk "BEGIN { print 0.345 + 0.318 * $column }")"
       echo "set tmargin at screen $(awk "BEGIN { print 1 - (112 + 240 * $row) / $height }"); set bmargin at screen $(awk "BEGIN { print 1 - (112 + 178 + 240 * $row) / $height }")"
-      unit=$(awk -F, -v s="$scene" '$1 == s && $5 == "ok" { print $9 == "nan" ? " [rad]" : " [m]"; exit }' "$csv")
-      echo "set title '$scene$unit' offset 0,-0.7"
+      unit=$(awk -F '\t' -v s="$scene" '$2 == s { print $5; exit }' "$work/shown")
+      echo "set title '$scene [$unit]' offset 0,-0.7"
       [ $column = 0 ] && echo "set ylabel 'largest error' offset 0.8,0" || echo 'unset ylabel'
       [ $last = 1 ] && echo "set xlabel 'processor time [s]' offset 0,0.4" || echo 'unset xlabel'
       plot=
-      for m in $(present); do
-        awk -F, -v s="$scene" -v m="$m" '{ e = $9 == "nan" ? $10 : $9 } $1 == s && $2 == m && $5 == "ok" && e > 0 && e < 10 { print $21, e }' "$csv" >"$work/$scene $m"
+      for m in $shown; do
+        awk -F, -v s="$scene" -v m="$m" '
+          NR == 1 { for (i = 1; i <= NF; i++) at[$i] = i; next }
+          { e = $at["largest_length"] == "nan" ? $at["largest_angle"] : $at["largest_length"] }
+          $at["scene"] == s && $at["engine"] == "general" && $at["method"] == m && $at["status"] == "ok" && e > 0 && e < 10 { print $at["cpu"], e }' \
+          "$csv" >"$work/$scene $m"
         [ -s "$work/$scene $m" ] && plot="$plot${plot:+, }'$work/$scene $m' with linespoints lw 0.8 ps 0.4 $(style "$m")"
       done
       awk '{ if (!n++) { a = b = $1; c = d = $2 } if ($1 < a) a = $1; if ($1 > b) b = $1; if ($2 < c) c = $2; if ($2 > d) d = $2 }
@@ -81,16 +134,20 @@ work_figure () {
     done
     echo "unset title; unset xlabel; unset ylabel; set border 0; unset tics; unset grid"
     echo "set lmargin at screen 0.05; set rmargin at screen 0.95; set tmargin at screen $(awk "BEGIN { print 1 - 34 / $height }"); set bmargin at screen $(awk "BEGIN { print 1 - 82 / $height }")"
-    echo "set key center center horizontal maxcols 4 samplen 4; set xrange [1:2]; set yrange [1:2]"
+    echo "set key center center horizontal maxcols 5 samplen 4; set xrange [1:2]; set yrange [1:2]"
     plot=
-    for m in $(present); do plot="$plot${plot:+, }NaN with linespoints lw 0.8 ps 0.5 $(style "$m") title '$m'"; done
+    for m in $shown; do plot="$plot${plot:+, }NaN with linespoints lw 0.8 ps 0.5 $(style "$m") title '$m'"; done
     echo "plot $plot"
   } | draw bench-work-precision "$height" 'What accuracy costs, scene by scene'
 }
 
 if [ -f "$csv" ]; then
+  costs
+  relative
+  summary_table | section summary
+  summary_figure
   work_table | section work-precision
   failure_table | section failures
-  truth_table | section truth
+  engines_table | section engines
   work_figure
 fi
