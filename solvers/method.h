@@ -56,10 +56,11 @@ struct pw_run {
   double *q_at, *v_at, *a_at, *lambda_at, *ledger_at; /* same layout */
   double projected_at;
 
-  int stopped;           /* 1: settings.stop requested it */
-  int interrupted;       /* 1: inside a step of SUNDIALS, which must be restarted */
-  double marked, mark;   /* elapsed time of the last speed record, doubled each time [s]; the largest speed there */
-  double earlier, speed; /* the same for the previous record */
+  int stopped;     /* 1: settings.stop requested it */
+  int interrupted; /* 1: inside a step of SUNDIALS, which must be restarted */
+  double mark_time,
+      mark_speed; /* elapsed time [s] of the last record of the largest speed, doubled each time; that speed */
+  double before_time, before_speed; /* the same of the record before */
 
   double energy0, potential0; /* initial kinetic + potential energy; initial potential energy */
   double exchanged;           /* the largest kinetic energy or change of potential energy so far (ledger.c) */
@@ -196,8 +197,8 @@ static inline int pw_evaluate_J_at (pw_workspace *w, double t, const double *q, 
   return status;
 }
 
-/* The larger of two values; NaN if either is NaN. */
-static inline double pw_largest (double most, double x) {
+/* The larger of two values; NaN if either is NaN, unlike pw_larger. */
+static inline double pw_larger_or_nan (double most, double x) {
   return x > most || isnan (x) ? x : most;
 }
 

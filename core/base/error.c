@@ -1,8 +1,6 @@
 /* Recording of errors. */
 #include <stdarg.h>
 #include <stdio.h>
-#include <string.h>
-#include <math.h>
 #include "util.h"
 
 int pw_fail (pw_error *error, int status, const char *format, ...) {

@@ -3,30 +3,22 @@
 #define PW_UNROLL_H
 
 /* Before a loop whose length, at most 8, is constant after inlining.  Clang unrolls it without a pragma. */
-#if defined(__GNUC__) && !defined(__clang__)
+#ifndef __clang__
 #define PW_UNROLL _Pragma ("GCC unroll 8")
 #else
 #define PW_UNROLL
 #endif
 
 /* Replaces `static` of such a function. */
-#if defined(__GNUC__)
 #define PW_INLINE static inline __attribute__ ((always_inline))
-#else
-#define PW_INLINE static inline
-#endif
 
 /* Replaces `static` of a rarely called function, so that the frequent path of its caller need not save its
  * registers. */
-#if defined(__GNUC__)
 #define PW_NOINLINE static __attribute__ ((noinline))
-#else
-#define PW_NOINLINE static
-#endif
 
 /* At the top of a file that reads pairs of numbers shortly after storing them one by one: a vector load would stall
  * until both stores are complete. */
-#if defined(__GNUC__) && !defined(__clang__)
+#ifndef __clang__
 #define PW_ONE_BY_ONE _Pragma ("GCC optimize (\"no-tree-slp-vectorize\")")
 #else
 #define PW_ONE_BY_ONE

@@ -209,16 +209,10 @@ int pw_cli_uses (const pw_cli_line *l, const pw_file *file, pw_use *use, int cou
 
 /* ---- Messages ---- */
 
-#ifdef __GNUC__
-#define PW_PRINTS(n) __attribute__ ((format (printf, n, n + 1)))
-#else
-#define PW_PRINTS(n)
-#endif
-
 /* Print to standard error, and to a stream; on a terminal control characters are escaped, since names may contain
  * them. */
-void pw_cli_say (const char *format, ...) PW_PRINTS (1);
-void pw_cli_print (FILE *f, const char *format, ...) PW_PRINTS (2);
+void pw_cli_say (const char *format, ...) PW_PRINTF (1, 2);
+void pw_cli_print (FILE *f, const char *format, ...) PW_PRINTF (2, 3);
 
 /* Prints text broken into lines of `width` characters; the first line continues at column `indent`. */
 void pw_cli_wrap (const char *text, int indent, int width);

@@ -232,7 +232,7 @@ void pw_csv_close (pw_csv *c);
 /* ---- JSON ---- */
 
 /* Writes JSON to a stream: numbers with 17 digits, null for what is not finite.  Begin with { .f = stream } and open
- * one container.  A key is NULL in lists and for the outermost container. */
+ * one container.  A key is NULL in lists and for the outermost container.  A NULL pw_json writes nothing. */
 typedef struct {
   FILE *f;
   int lines;        /* levels whose items have separate lines */

@@ -1,5 +1,4 @@
 /* Second-order blocks of a scene that are computed by differences, and non-zero ones that are NULL in the table. */
-#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include "random_scene.h"

@@ -1,5 +1,4 @@
 /* The self-test of an element type: each check compares one function of its table with differences of another. */
-#include <float.h>
 #include <math.h>
 #include <stdio.h>
 #include <string.h>

@@ -125,7 +125,7 @@ static int eigen_split (pw_linearisation *x, int k, double *B) {
   LAPACKE_dormqr_work (LAPACK_COL_MAJOR, 'L', 'T', n, n, k, x->S, n, tau, B, n, work, n);
   LAPACKE_dormqr_work (LAPACK_COL_MAJOR, 'R', 'N', n, n, k, x->S, n, tau, B, n, work, n);
   for (int i = k; i < n; i++)
-    for (int c = 0; c < k; c++) off = pw_largest (off, fabs (B[i * n + c]));
+    for (int c = 0; c < k; c++) off = pw_larger_or_nan (off, fabs (B[i * n + c]));
   return off <= PW_LINEAR_SYMMETRIC * size;
 }
 

@@ -31,11 +31,11 @@ static double linear_residual (const pw_linearisation *x, const pw_linear_frame 
   for (int j = 0; j < 3 * x->r->s->bodies; j += 3) {
     double dx = v[j] - f->twist[0] + w * (q[j + 1] - f->origin[1]);
     double dy = v[j + 1] - f->twist[1] - w * (q[j] - f->origin[0]);
-    most = pw_largest (most, hypot (a[j] + w * v[j + 1], a[j + 1] - w * v[j]));
-    most = pw_largest (most, fabs (w) * hypot (dx, dy));
-    most = pw_largest (most, fabs (a[j + 2]) * x->r->s->scale.length);
+    most = pw_larger_or_nan (most, hypot (a[j] + w * v[j + 1], a[j + 1] - w * v[j]));
+    most = pw_larger_or_nan (most, fabs (w) * hypot (dx, dy));
+    most = pw_larger_or_nan (most, fabs (a[j + 2]) * x->r->s->scale.length);
   }
-  for (int j = 3 * x->r->s->bodies; j < x->n; j++) most = pw_largest (most, fabs (a[j]) * x->r->s->scale.length);
+  for (int j = 3 * x->r->s->bodies; j < x->n; j++) most = pw_larger_or_nan (most, fabs (a[j]) * x->r->s->scale.length);
   return most;
 }
 
@@ -104,7 +104,7 @@ static void linear_change (pw_linearisation *x, int k, double *out) {
 static double linear_tolerance (const pw_linearisation *x) {
   double most = 0, T = x->r->w->scale.time;
   for (int i = x->positions; i < x->size; i++)
-    for (int k = 0; k < x->size; k++) most = pw_largest (most, fabs (x->A[i * x->size + k]) * T);
+    for (int k = 0; k < x->size; k++) most = pw_larger_or_nan (most, fabs (x->A[i * x->size + k]) * T);
   return PW_LINEAR_SYMMETRIC + 1e-4 * PW_LINEAR_SYMMETRIC * most;
 }
 
@@ -158,7 +158,7 @@ static int linear_agree (const pw_linearisation *x, const double *a, const doubl
   double off = 0, most = linear_unit (x);
   for (int j = 0; j < x->n; j++) {
     double unit = pw_rank_unit (x->r->s, j);
-    off = pw_largest (off, fabs (a[j] - b[j]) * unit);
+    off = pw_larger_or_nan (off, fabs (a[j] - b[j]) * unit);
     most = fmax (most, fabs (b[j]) * unit);
   }
   return off <= LINEAR_STEADY * most;

@@ -45,7 +45,7 @@ static double group_size (pw_steady *x) {
     l->x[c] = pw_unit (x->s, c);
     pw_linear_vary (l);
     for (int j = 0; j < x->n; j++)
-      most = pw_largest (most, fabs (l->da[j]) * pw_rank_unit (x->s, j) * x->T * x->T / x->L);
+      most = pw_larger_or_nan (most, fabs (l->da[j]) * pw_rank_unit (x->s, j) * x->T * x->T / x->L);
   }
   return most;
 }

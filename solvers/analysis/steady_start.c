@@ -34,7 +34,7 @@ static double start_accelerate (pw_steady *x, double *a) {
   if (pw_run_accelerate (x->at[0].r, x->set.t, x->q, x->v, l->a, l->lambda) != PW_OK) return NAN;
   memcpy (a, l->a, (size_t)x->n * sizeof *a);
   pw_linear_turn (l, -x->rates[2], x->v, a);
-  for (int j = 0; j < x->n; j++) most = pw_largest (most, fabs (a[j]) / pw_unit (x->s, j));
+  for (int j = 0; j < x->n; j++) most = pw_larger_or_nan (most, fabs (a[j]) / pw_unit (x->s, j));
   return most;
 }
 

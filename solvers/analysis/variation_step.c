@@ -24,14 +24,14 @@ static double step_norm (const pw_variation *x, const double *Y) {
   const pw_system *s = x->r->s;
   double most = 0;
   for (int j = 0; j < x->n; j++)
-    most = pw_largest (most, pw_largest (fabs (Y[j]), fabs (Y[x->n + j]) * x->r->w->scale.time) / pw_unit (s, j));
+    most = pw_larger_or_nan (most, pw_larger_or_nan (fabs (Y[j]), fabs (Y[x->n + j]) * x->r->w->scale.time) / pw_unit (s, j));
   return most;
 }
 
 /* Largest derivative of work and losses. */
 static double step_energy (const pw_variation *x, const double *Y) {
   double most = 0;
-  for (int i = 2 * x->n; i < x->size; i++) most = pw_largest (most, fabs (Y[i]));
+  for (int i = 2 * x->n; i < x->size; i++) most = pw_larger_or_nan (most, fabs (Y[i]));
   return most;
 }
 
@@ -70,10 +70,10 @@ static double step_error (pw_variation *x, double h) {
     if (c->direction->given.initial == NULL) size = fmax (size, STEP_LEAST * 1e-5 / fabs (c->direction->given.step));
     memset (e, 0, (size_t)x->size * sizeof *e);
     step_combine (x, c, pw_erk5_tableau.e, PW_VARIATION_RATES, h, e);
-    if (size > 0) most = pw_largest (most, step_norm (x, e) / size);
+    if (size > 0) most = pw_larger_or_nan (most, step_norm (x, e) / size);
     double energy = fmax (c->energy, step_energy (x, c->trial));
     energy = fmax (energy, 0.01 * STEP_LEAST * fmax (x->r->exchanged, x->r->energy_scene) * size);
-    if (energy > 0) most = pw_largest (most, step_energy (x, e) / energy);
+    if (energy > 0) most = pw_larger_or_nan (most, step_energy (x, e) / energy);
   }
   return most;
 }

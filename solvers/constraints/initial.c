@@ -162,8 +162,7 @@ static int initial_ranked (pw_run *r, const unsigned char *prescribed, initial_f
       for (size_t j = 0; j < n; j++) at[j] = r->q[j], from[j] = prescribed && prescribed[j] ? from[j] : r->q[j];
       rank = s->rows;
     }
-    if (status != PW_RETRY || pw_update_kinematics (r->w, r->t, at, r->v_given) != PW_OK) continue;
-    pw_evaluate_J (r->w);
+    if (status != PW_RETRY || pw_evaluate_J_at (r->w, r->t, at, r->v_given) != PW_OK) continue;
     int now = pw_rank_select (r->w, tolerance[i % TOLERANCES], active);
     if (now < 0) status = pw_fail_memory (s, error);
     if (now < 0 || now == rank) continue;
@@ -275,9 +274,8 @@ int pw_run_make_consistent (pw_run *r, const unsigned char *prescribed, pw_error
   int released = 0;
   memcpy (r->q_given, r->q, bytes);
   memcpy (r->v_given, r->v, bytes);
-  int status = pw_update_kinematics (r->w, r->t, r->q, r->v);
+  int status = pw_evaluate_J_at (r->w, r->t, r->q, r->v);
   if (status != PW_OK) return pw_fail_signal (r->t, error);
-  pw_evaluate_J (r->w);
   pw_evaluate_residuals (r->w, NULL, &before);
   if (!(before.position <= 8 * DBL_EPSILON && before.velocity <= 8 * DBL_EPSILON))
     status = initial_try (r, prescribed, &failure, &released, error);

@@ -80,7 +80,7 @@ double pw_rank_conditioning (pw_run *r) {
   }
   redundancy_solve (r, f, c);
   for (int row = 0; row < r->s->rows; row++)
-    if (r->active[row]) most = pw_largest (most, fabs (c[row]) * redundancy_length (r->w, row));
+    if (r->active[row]) most = pw_larger_or_nan (most, fabs (c[row]) * redundancy_length (r->w, row));
   return isnan (most) ? 0 : 1 / most;
 }
 

@@ -1,8 +1,6 @@
 /* The watchdog's thresholds, and the distance of the constraints from singular configurations; see watchdog.h. */
-#include <float.h>
 #include <math.h>
 #include <stdlib.h>
-#include <string.h>
 #include "method.h"
 #include "rank.h"
 

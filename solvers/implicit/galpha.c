@@ -41,7 +41,7 @@ static int galpha_open (pw_run *r, pw_error *error) {
   galpha *d = r->data = calloc (1, sizeof *d);
   const pw_system *s = r->s;
   size_t n = (size_t)s->coords + 3, rows = (size_t)s->rows, size = 2 * (n + rows);
-  if (d == NULL) return pw_fail (error, PW_RESOURCE, "model %s: out of memory", s->model);
+  if (d == NULL) return pw_fail_memory (s, error);
   const pw_array array[] = { { &d->v, n },      { &d->a, n },       { &d->w, n },      { &d->work.q1, n },
                              { &d->a1, n },     { &d->work.v1, n }, { &d->w1, n },     { &d->lambda1, rows },
                              { &d->mu1, rows }, { &d->z, size },    { &d->row, size }, { &d->column, size },
@@ -102,9 +102,8 @@ static int galpha_displace (pw_run *r, double h, const double *jerk) {
   galpha *d = r->data;
   const pw_system *s = r->s;
   double C = 1. / 6 - d->beta - 0.5 * (d->alpha_m - d->alpha_f), *dv = d->work.v1;
-  int status = pw_update_kinematics (r->w, r->t, r->q, d->v);
+  int status = pw_evaluate_J_at (r->w, r->t, r->q, d->v);
   if (status != PW_OK) return status;
-  pw_evaluate_J (r->w);
   pw_mul_J (r->w, jerk, d->jv);
   for (int i = 0; i < s->rows; i++) d->jv[i] *= i < s->holonomic ? C * h * h : 0;
   status = pw_saddle_factor (r->saddle);
@@ -121,8 +120,7 @@ static int galpha_begin (pw_run *r, double h) {
   int status = PW_OK;
   memcpy (d->v, r->v, (size_t)d->n * sizeof *d->v);
   if (!d->ggl && d->work.h > 0) { /* velocities include the error of the previous step size */
-    status = pw_update_kinematics (r->w, r->t, r->q, d->v);
-    if (status == PW_OK) pw_evaluate_J (r->w);
+    status = pw_evaluate_J_at (r->w, r->t, r->q, d->v);
     if (status == PW_OK) status = pw_project_velocities (&d->work.last.projector, r, d->v);
   }
   if (status == PW_OK) status = pw_run_accelerate (r, r->t, r->q, d->v, d->a, d->eta);
@@ -147,10 +145,7 @@ static void galpha_accept (pw_run *r) {
   memcpy (d->v, r->v, n);
   memcpy (d->a, d->a1, n);
   memcpy (d->w, d->w1, n);
-  for (int i = 0; i < r->s->rows; i++) {
-    int used = d->work.tangent.map ? d->work.tangent.map[i] : i;
-    r->lambda[i] = used < 0 ? 0 : d->lambda1[used];
-  }
+  pw_tangent_store (&d->work.tangent, d->lambda1, r->lambda);
 }
 
 static int galpha_advance (pw_run *r, double t_end, pw_error *error) {

@@ -10,23 +10,11 @@
  * for every h. */
 #include <float.h>
 #include <math.h>
-#include <stdlib.h>
 #include <string.h>
 #include "galpha_state.h"
 
 static int galpha_update (pw_run *r, double t1) {
-  galpha *d = r->data;
-  int status = pw_update_kinematics (r->w, pw_before_breakpoint (r, t1), d->work.q1, d->work.v1);
-  if (status == PW_OK) pw_evaluate_J (r->w);
-  return status;
-}
-
-static const double *galpha_lambda (galpha *d) {
-  return pw_tangent_expand (&d->work.tangent, d->lambda1, d->rows, d->work.tangent.lambda);
-}
-
-static const double *galpha_mu (galpha *d) {
-  return d->ggl ? pw_tangent_expand (&d->work.tangent, d->mu1, d->positions, d->work.tangent.mu) : NULL;
+  return pw_evaluate_J_at (r->w, pw_before_breakpoint (r, t1), r->data->work.q1, r->data->work.v1);
 }
 
 /* ---- Residual ---- */
@@ -34,9 +22,7 @@ static const double *galpha_mu (galpha *d) {
 static void galpha_kinematics (pw_run *r, double h, double *out) {
   galpha *d = r->data;
   double c = d->gamma / (h * d->beta);
-  const double *mu = galpha_mu (d);
-  memset (d->pull, 0, (size_t)d->n * sizeof *d->pull);
-  if (mu) pw_add_JT (r->w, mu, d->pull);
+  pw_tangent_pull (&d->work.tangent, d->mu1, d->positions, d->pull);
   for (int j = 0; j < d->n; j++) {
     double dq = h * (d->v[j] + h * ((0.5 - d->beta) * d->w[j] + d->beta * d->w1[j]));
     out[j] = c * (d->work.q1[j] - r->q[j] - dq) + d->D[j] * d->pull[j];
@@ -45,8 +31,7 @@ static void galpha_kinematics (pw_run *r, double h, double *out) {
 
 static void galpha_momentum (pw_run *r, double *out) {
   galpha *d = r->data;
-  memset (d->pull, 0, (size_t)d->n * sizeof *d->pull);
-  pw_add_JT (r->w, galpha_lambda (d), d->pull);
+  pw_tangent_pull (&d->work.tangent, d->lambda1, d->rows, d->pull);
   pw_evaluate_force (r->w, d->f);
   for (int j = 0; j < d->n; j++) out[j] = r->s->mass[j] * d->a1[j] + d->pull[j] - d->f[j];
 }
@@ -91,8 +76,8 @@ static void galpha_fill (pw_run *r, double h) {
                                  .of_q = d->gamma / (h * d->beta),
                                  .of_a = (1 - d->alpha_m) / ((1 - d->alpha_f) * h * d->gamma),
                                  .of_lambda = 1 };
-  pw_tangent_kinematics (&d->work.tangent, &to, galpha_mu (d), d->D);
-  pw_tangent_momentum (&d->work.tangent, &to, galpha_lambda (d));
+  pw_tangent_kinematics (&d->work.tangent, &to, pw_tangent_mu (&d->work.tangent, d->mu1, d->positions), d->D);
+  pw_tangent_momentum (&d->work.tangent, &to, pw_tangent_lambda (&d->work.tangent, d->lambda1));
   pw_tangent_velocities (&d->work.tangent, &to, d->work.v1, d->ggl);
   pw_tangent_positions (&d->work.tangent, &to, d->ggl ? 2 * n + d->rows : 2 * n);
 }
@@ -102,22 +87,6 @@ int pw_galpha_open_matrix (pw_run *r) {
   pw_scatter_record (&d->work.tangent.scatter);
   galpha_fill (r, 1);
   return pw_implicit_lay_out (&d->work, d->size);
-}
-
-/* Scales of the rows and columns for a step of size h. */
-static void galpha_scale (const pw_run *r, double h) {
-  galpha *d = r->data;
-  int n = d->n, holonomic = d->ggl ? 0 : d->work.tangent.holonomic;
-  double c = d->gamma / (h * d->beta), e = (1 - d->alpha_m) / ((1 - d->alpha_f) * h * d->gamma), mass = 0;
-  for (int j = 0; j < n; j++) mass = fmax (mass, r->s->mass[j]);
-  if (mass == 0) mass = 1;
-  for (int j = 0; j < n; j++) {
-    d->row[j] = 1 / c, d->column[j] = 1;
-    d->row[n + j] = 1 / (c * e * mass), d->column[n + j] = c;
-  }
-  for (int i = 2 * n; i < 2 * n + d->rows; i++)
-    d->row[i] = i - 2 * n < holonomic ? 1 : 1 / c, d->column[i] = c * e * mass;
-  for (int i = 2 * n + d->rows; i < d->size; i++) d->row[i] = 1, d->column[i] = c;
 }
 
 static int galpha_factor (pw_run *r, double h) {
@@ -158,8 +127,8 @@ static int galpha_correct (pw_run *r, double h, double *most, double *floor) {
   if (pw_sparse_solve (&d->work.sparse, d->z) != PW_OK) return PW_RESOURCE;
   *most = 0;
   for (int j = 0; j < n; j++) {
-    double unit = pw_unit (r->s, j), size = pw_largest (fabs (d->z[j]), fabs (d->z[n + j])) / unit;
-    *most = pw_largest (*most, size);
+    double unit = pw_unit (r->s, j), size = pw_larger_or_nan (fabs (d->z[j]), fabs (d->z[n + j])) / unit;
+    *most = pw_larger_or_nan (*most, size);
     d->z[n + j] *= d->column[n + j];
     d->work.q1[j] += d->z[j];
     d->w1[j] += d->z[n + j] / (h * d->gamma);
@@ -180,7 +149,9 @@ int pw_galpha_solve (pw_run *r, double h, double t1) {
   const int most = 20;
   galpha *d = r->data;
   double before = INFINITY, size, floor, good = fmin (1e-9, 1e-3 * pow (h / r->w->scale.time, 4)), rate = 1;
-  if (h != d->work.h) galpha_scale (r, h);
+  if (h != d->work.h)
+    pw_implicit_scale (&d->work.tangent, d->positions, d->ggl ? 0 : d->work.tangent.holonomic, d->gamma / (h * d->beta),
+                       (1 - d->alpha_m) / ((1 - d->alpha_f) * h * d->gamma), d->row, d->column);
   galpha_predict (r, h);
   for (int i = 0, fresh = 1; i < most; i++) {
     int status = galpha_residual (r, h, t1);

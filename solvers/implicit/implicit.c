@@ -23,7 +23,7 @@ int pw_implicit_lay_out (pw_implicit *x, int size) {
 }
 
 int pw_implicit_opened (pw_run *r, int status, int velocities, pw_error *error) {
-  if (status != PW_OK) return pw_fail (error, PW_RESOURCE, "model %s: out of memory", r->s->model);
+  if (status != PW_OK) return pw_fail_memory (r->s, error);
   status = pw_dense_output_open (&implicit_of (r)->last, r, velocities, error);
   return status == PW_OK ? pw_implicit_restart (r, error) : status;
 }
@@ -47,6 +47,20 @@ int pw_implicit_restart (pw_run *r, pw_error *error) {
   return PW_OK;
 }
 
+void pw_implicit_scale (const pw_tangent *x, int mus, int third, double c, double e, double *row, double *column) {
+  const pw_system *s = x->run->s;
+  int n = s->coords;
+  double mass = 0;
+  for (int j = 0; j < n; j++) mass = fmax (mass, s->mass[j]);
+  if (mass == 0) mass = 1;
+  for (int j = 0; j < n; j++) {
+    row[j] = 1 / c, column[j] = 1;
+    row[n + j] = 1 / (c * e * mass), column[n + j] = c;
+  }
+  for (int i = 0; i < x->rows; i++) row[2 * n + i] = i < third ? 1 : 1 / c, column[2 * n + i] = c * e * mass;
+  for (int i = 2 * n + x->rows; i < 2 * n + x->rows + mus; i++) row[i] = 1, column[i] = c;
+}
+
 /* ---- Advancing ---- */
 
 void pw_implicit_fill (pw_implicit *x, int size) {
@@ -56,7 +70,7 @@ void pw_implicit_fill (pw_implicit *x, int size) {
 
 /* Reports a failed step; the reason may be a singular configuration at its beginning. */
 static int implicit_fail (pw_run *r, int status, double h, pw_error *error) {
-  if (status == PW_METHOD) return pw_fail (error, PW_METHOD, "t = %.6g s: a signal failed", r->t);
+  if (status == PW_METHOD) return pw_fail_signal (r->t, error);
   if (status == PW_RESOURCE) return pw_fail (error, PW_RESOURCE, "t = %.6g s: out of memory in KLU", r->t);
   if (r->near || pw_watchdog_near_state (r)) return pw_fail_singular (r, r->t, error);
   return pw_fail (error, PW_METHOD, "t = %.6g s: %s; the step of %.6g s may be too large", r->t,

@@ -29,6 +29,11 @@ int pw_implicit_lay_out (pw_implicit *x, int size);
 /* Completes the opening if `status` is PW_OK; velocities: 1 if the method enforces J v = eta. */
 int pw_implicit_opened (pw_run *r, int status, int velocities, pw_error *error);
 
+/* Scales of the rows and columns of a Newton matrix of q, v, lambda and `mus` multipliers mu, whose derivatives by q' and a
+ * have the coefficients c and e, so that all entries are of the same size for every step; `third`: holonomic equations that
+ * enforce positions in the rows of lambda. */
+void pw_implicit_scale (const pw_tangent *x, int mus, int third, double c, double e, double *row, double *column);
+
 /* Sets the matrix to 0 and begins to fill it. */
 void pw_implicit_fill (pw_implicit *x, int size);
 

@@ -75,12 +75,6 @@ static int leapfrog_converged (leapfrog_progress *p) {
  *
  * The first line is linear: it holds for the initial u = v + h/2 a, L = 0, and after every correction. */
 
-static int leapfrog_update (pw_run *r, double t, const double *q, const double *v) {
-  int status = pw_update_kinematics (r->w, t, q, v);
-  if (status == PW_OK) pw_evaluate_J (r->w);
-  return status;
-}
-
 static void drift_positions (pw_run *r, double h) {
   leapfrog *d = r->data;
   for (int j = 0; j < r->s->coords; j++) {
@@ -132,13 +126,13 @@ static int drift_factor (pw_run *r, double h, double t1) {
   leapfrog *d = r->data;
   pw_tangent *x = &d->work.tangent;
   pw_implicit_fill (&d->work, r->s->coords + x->rows);
-  int status = leapfrog_update (r, r->t, r->q, r->v);
+  int status = pw_evaluate_J_at (r->w, r->t, r->q, r->v);
   if (status != PW_OK) return status;
   drift_put_momentum (r);
-  status = leapfrog_update (r, r->t + 0.5 * h, d->middle, d->u);
+  status = pw_evaluate_J_at (r->w, r->t + 0.5 * h, d->middle, d->u);
   if (status != PW_OK) return status;
   drift_put_middle (r, h);
-  status = leapfrog_update (r, pw_before_breakpoint (r, t1), d->work.q1, d->u);
+  status = pw_evaluate_J_at (r->w, pw_before_breakpoint (r, t1), d->work.q1, d->u);
   if (status != PW_OK) return status;
   drift_put_end (r);
   r->statistics.jacobians++;
@@ -154,7 +148,7 @@ static int drift_residual (pw_run *r, double h, double t1) {
   const pw_system *s = r->s;
   int status = PW_OK;
   if (s->rows > s->holonomic) {
-    status = leapfrog_update (r, r->t + 0.5 * h, d->middle, d->u);
+    status = pw_evaluate_J_at (r->w, r->t + 0.5 * h, d->middle, d->u);
     if (status != PW_OK) return status;
     pw_mul_J (r->w, d->u, d->off);
     pw_evaluate_eta (r->w, d->eta);
@@ -208,7 +202,7 @@ static int drift_solve (pw_run *r, double h, double t1) {
 
 /* Kinematics and factors of the saddle-point matrix at (t, q, v); sets r->near in a singular configuration. */
 static int leapfrog_factor (pw_run *r, double t, const double *q, const double *v) {
-  int status = leapfrog_update (r, t, q, v);
+  int status = pw_evaluate_J_at (r->w, t, q, v);
   if (status != PW_OK) return status;
   r->statistics.factorisations++;
   status = pw_saddle_factor (r->saddle);
@@ -262,7 +256,7 @@ static int leapfrog_finish (pw_run *r, double h, double t1) {
 static int leapfrog_open (pw_run *r, pw_error *error) {
   leapfrog *d = r->data = calloc (1, sizeof *d);
   size_t n = (size_t)r->s->coords + 3, rows = (size_t)r->s->rows;
-  if (d == NULL) return pw_fail (error, PW_RESOURCE, "model %s: out of memory", r->s->model);
+  if (d == NULL) return pw_fail_memory (r->s, error);
   const pw_array array[] = { { &d->u, n },      { &d->work.q1, n }, { &d->work.v1, n }, { &d->middle, n },
                              { &d->dv, n },     { &d->f, n },       { &d->off, rows },  { &d->mu, rows },
                              { &d->eta, rows }, { &d->z, n + rows } };

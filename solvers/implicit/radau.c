@@ -128,7 +128,7 @@ static int radau_open (pw_run *r, pw_error *error) {
     status = radau_allocate (r);
   }
   if (status == PW_OK) status = pw_radau_open_matrices (r);
-  if (status != PW_OK) return pw_fail (error, PW_RESOURCE, "model %s: out of memory", r->s->model);
+  if (status != PW_OK) return pw_fail_memory (r->s, error);
   radau_constants (r);
   status = pw_projector_open (&d->projector, r, NULL, NULL, error);
   return status == PW_OK ? radau_restart (r, error) : status;
@@ -150,7 +150,7 @@ static void radau_close (pw_run *r) {
 /* ---- Advancing ---- */
 
 static int radau_fail (pw_run *r, int status, double h, pw_error *error) {
-  if (status == PW_METHOD) return pw_fail (error, PW_METHOD, "t = %.6g s: a signal failed", r->t);
+  if (status == PW_METHOD) return pw_fail_signal (r->t, error);
   if (status == PW_RESOURCE) return pw_fail (error, PW_RESOURCE, "t = %.6g s: out of memory in KLU", r->t);
   if (r->near || pw_watchdog_near_state (r)) return pw_fail_singular (r, r->t, error);
   if (status == PW_INPUT) return pw_fail (error, PW_METHOD, "t = %.6g s: the Newton matrix is singular", r->t);
@@ -173,10 +173,7 @@ static void radau_finish (pw_run *r, double h) {
   else
     for (int j = 0, i = d->n; j < d->n; j++, i++)
       r->a[j] = (radau_end[0] * Z[0][i] + radau_end[1] * Z[1][i] + radau_end[2] * Z[2][i]) / h;
-  if (status != PW_OK) {
-    memset (r->lambda, 0, (size_t)r->s->rows * sizeof (double));
-    for (int i = 0; i < d->rows; i++) r->lambda[d->tangent.map ? d->tangent.row[i] : i] = end[i];
-  }
+  if (status != PW_OK) pw_tangent_store (&d->tangent, end, r->lambda);
   pw_tangent_compress (&d->tangent, r->lambda, d->rows, end);
   memcpy (d->a1, r->a, (size_t)d->n * sizeof *d->a1);
   pw_bound_tolerances (r);
@@ -189,9 +186,8 @@ static int radau_accept (pw_run *r, double h, double t1) {
   size_t n = (size_t)d->n * sizeof (double), entries = (size_t)r->s->entries;
   radau_step done = d->now;
   pw_radau_stage (d, STAGES - 1);
-  int status = pw_update_kinematics (r->w, pw_before_breakpoint (r, t1), d->Y, d->Y + d->n);
+  int status = pw_evaluate_J_at (r->w, pw_before_breakpoint (r, t1), d->Y, d->Y + d->n);
   if (status != PW_OK) return status;
-  pw_evaluate_J (r->w);
   done.t = r->t, done.h = h;
   memcpy (done.a, r->a, n);
   memcpy (done.ledger, r->ledger, entries * sizeof (double));
@@ -323,8 +319,7 @@ static void radau_interpolate (pw_run *r, double x) {
     y[i] = p->y[i] + weight[0] * p->Z[0][i] + weight[1] * p->Z[1][i] + weight[2] * p->Z[2][i];
   memcpy (r->q_at, y, (size_t)n * sizeof *y);
   memcpy (r->v_at, y + n, (size_t)n * sizeof *y);
-  memset (r->lambda_at, 0, (size_t)r->s->rows * sizeof *y);
-  for (int i = 0; i < d->rows; i++) r->lambda_at[d->tangent.map ? d->tangent.row[i] : i] = y[2 * n + i];
+  pw_tangent_store (&d->tangent, y + 2 * n, r->lambda_at);
   for (int j = 0; j < n; j++) r->a_at[j] = (1 - x) * p->a[j] + x * d->a1[j];
   for (int e = 0; e < r->s->entries; e++)
     r->ledger_at[e] = p->ledger[e] + weight[0] * p->w[0][e] + weight[1] * p->w[1][e] + weight[2] * p->w[2][e];
@@ -342,8 +337,8 @@ static int radau_inside (pw_run *r, double t) {
   radau_interpolate (r, (t - d->last.t) / d->last.h);
   if (d->mus > 0 || !d->velocities)
     status = pw_project_positions (&d->projector, r, t, r->q_at, r->v_at, &row, &worst);
-  else if ((status = pw_update_kinematics (r->w, t, r->q_at, r->v_at)) == PW_OK)
-    pw_evaluate_J (r->w);
+  else
+    status = pw_evaluate_J_at (r->w, t, r->q_at, r->v_at);
   if (status == PW_OK && d->velocities) status = pw_project_velocities (&d->projector, r, r->v_at);
   if (status == PW_OK && pw_saddle_factor (r->saddle) == PW_OK)
     pw_run_accelerate_updated (r, r->v_at, r->a_at, r->lambda_at);
@@ -362,7 +357,7 @@ static int radau_at (pw_run *r, double t, pw_error *error) {
   r->statistics = keep;
   r->projected_at = r->projected;
   if (status == PW_OK) return PW_OK;
-  if (status == PW_METHOD) return pw_fail (error, PW_METHOD, "t = %.6g s: a signal failed", t);
+  if (status == PW_METHOD) return pw_fail_signal (t, error);
   if (r->near) return pw_fail_singular (r, t, error);
   return pw_fail (error, PW_METHOD, "t = %.6g s: no state near the one between steps meets the constraints", t);
 }

@@ -34,15 +34,12 @@ static const double radau_e[STAGES] = { -10.04880939982741556, 1.382142733160748
 static int radau_evaluate (pw_run *r, double t, const double *y, double *F) {
   radau *d = r->data;
   int n = d->n;
-  int status = pw_update_kinematics (r->w, pw_before_breakpoint (r, t), y, y + n);
+  int status = pw_evaluate_J_at (r->w, pw_before_breakpoint (r, t), y, y + n);
   if (status != PW_OK) return status;
-  pw_evaluate_J (r->w);
   r->statistics.rhs++;
-  memset (d->pull, 0, (size_t)n * sizeof *d->pull);
-  if (d->mus) pw_add_JT (r->w, pw_tangent_expand (&d->tangent, y + 2 * n + d->rows, d->mus, d->tangent.mu), d->pull);
+  pw_tangent_pull (&d->tangent, y + 2 * n + d->rows, d->mus, d->pull);
   for (int j = 0; j < n; j++) F[j] = y[n + j] - d->D[j] * d->pull[j];
-  memset (d->pull, 0, (size_t)n * sizeof *d->pull);
-  pw_add_JT (r->w, pw_tangent_expand (&d->tangent, y + 2 * n, d->rows, d->tangent.lambda), d->pull);
+  pw_tangent_pull (&d->tangent, y + 2 * n, d->rows, d->pull);
   pw_evaluate_force (r->w, d->f);
   for (int j = 0; j < n; j++) F[n + j] = d->f[j] - d->pull[j];
   pw_mul_J (r->w, y + n, d->jv);
@@ -66,9 +63,8 @@ static void radau_fill (radau *d) {
   const pw_tangent_update to = {
     .momentum = n, .constraint = 2 * n, .v = n, .a = n, .lambda = 2 * n, .mu = mu, .of_lambda = 1
   };
-  const double *mus = d->mus ? pw_tangent_expand (&d->tangent, y + mu, d->mus, d->tangent.mu) : NULL;
-  pw_tangent_kinematics (&d->tangent, &to, mus, d->D);
-  pw_tangent_momentum (&d->tangent, &to, pw_tangent_expand (&d->tangent, y + 2 * n, d->rows, d->tangent.lambda));
+  pw_tangent_kinematics (&d->tangent, &to, pw_tangent_mu (&d->tangent, y + mu, d->mus), d->D);
+  pw_tangent_momentum (&d->tangent, &to, pw_tangent_lambda (&d->tangent, y + 2 * n));
   pw_tangent_velocities (&d->tangent, &to, y + n, d->velocities);
   if (d->mus || !d->velocities) pw_tangent_positions (&d->tangent, &to, d->velocities ? mu : 2 * n);
 }
@@ -94,9 +90,8 @@ int pw_radau_open_matrices (pw_run *r) {
 static int radau_linearise (pw_run *r) {
   radau *d = r->data;
   const double *y = d->now.y;
-  int status = pw_update_kinematics (r->w, r->t, y, y + d->n);
+  int status = pw_evaluate_J_at (r->w, r->t, y, y + d->n);
   if (status != PW_OK) return status;
-  pw_evaluate_J (r->w);
   memset (d->matrix, 0, (size_t)d->tangent.colptr[d->size] * sizeof *d->matrix);
   pw_scatter_begin (&d->tangent.scatter, d->matrix);
   radau_fill (d);
@@ -106,21 +101,6 @@ static int radau_linearise (pw_run *r) {
   d->outdated = 0;
   d->factored = 0;
   return PW_OK;
-}
-
-/* Scales of rows and columns for a step of size h, as in galpha. */
-static void radau_scale (const pw_run *r, double h) {
-  radau *d = r->data;
-  int n = d->n, third = d->velocities ? 0 : d->tangent.holonomic;
-  double c = radau_gamma / h, mass = 0;
-  for (int j = 0; j < n; j++) mass = fmax (mass, r->s->mass[j]);
-  if (mass == 0) mass = 1;
-  for (int j = 0; j < n; j++) {
-    d->row[j] = 1 / c, d->column[j] = 1;
-    d->row[n + j] = 1 / (c * c * mass), d->column[n + j] = c;
-  }
-  for (int i = 0; i < d->rows; i++) d->row[2 * n + i] = i < third ? 1 : 1 / c, d->column[2 * n + i] = c * c * mass;
-  for (int i = 2 * n + d->rows; i < d->size; i++) d->row[i] = 1, d->column[i] = c;
 }
 
 /* Stores -F_y + re B in every stride-th value, scaled, and im B in the value after it. */
@@ -140,7 +120,8 @@ static int radau_factor (pw_run *r, double h) {
   d->factored = 0;
   if (d->forget) pw_sparse_forget (&d->real), pw_sparse_forget (&d->complex);
   d->forget = 0;
-  radau_scale (r, h);
+  pw_implicit_scale (&d->tangent, d->mus, d->velocities ? 0 : d->tangent.holonomic, radau_gamma / h, radau_gamma / h,
+                     d->row, d->column);
   radau_shift (d, 1, radau_gamma / h, 0);
   int status = pw_sparse_factor (&d->real, d->value);
   radau_shift (d, 2, radau_alpha / h, radau_beta / h);
@@ -255,9 +236,9 @@ static int radau_correct (pw_run *r, double h, double t1, double *size, double *
   if (radau_solve_real (d, F[0]) != PW_OK || radau_solve_complex (d, F[1], F[2]) != PW_OK) return PW_RESOURCE;
   *size = *rough = 0;
   for (int i = 0; i < 2 * d->n; i++) {
-    double most = pw_largest (pw_largest (fabs (F[0][i]), fabs (F[1][i])), fabs (F[2][i]));
-    *size = pw_largest (*size, most / d->enough[i]);
-    *rough = pw_largest (*rough, most / d->floor[i]);
+    double most = pw_larger_or_nan (pw_larger_or_nan (fabs (F[0][i]), fabs (F[1][i])), fabs (F[2][i]));
+    *size = pw_larger_or_nan (*size, most / d->enough[i]);
+    *rough = pw_larger_or_nan (*rough, most / d->floor[i]);
   }
   for (int k = 0; k < STAGES; k++)
     for (int i = 0; i < d->size; i++) W[k][i] += F[k][i];
@@ -356,10 +337,9 @@ int pw_radau_work (pw_run *r, double h, double t1, double *error) {
   for (int k = 0; k < STAGES; k++) {
     pw_radau_stage (d, k);
     double t = pw_before_breakpoint (r, radau_time (r, k, h, t1));
-    int status = pw_update_kinematics (r->w, t, d->Y, d->Y + d->n);
+    int status = pw_evaluate_J_at (r->w, t, d->Y, d->Y + d->n);
     if (status != PW_OK) return status;
-    pw_evaluate_J (r->w);
-    const double *lambda = pw_tangent_expand (&d->tangent, d->Y + 2 * d->n, d->rows, d->tangent.lambda);
+    const double *lambda = pw_tangent_lambda (&d->tangent, d->Y + 2 * d->n);
     if (again && pw_saddle_factor (r->saddle) == PW_OK) {
       pw_run_accelerate_updated (r, d->Y + d->n, r->a_at, r->lambda_at);
       lambda = r->lambda_at;

@@ -2,9 +2,7 @@
 #ifndef PW_RADAU_STATE_H
 #define PW_RADAU_STATE_H
 
-#include "method.h"
-#include "sparse.h"
-#include "tangent.h"
+#include "implicit.h"
 
 enum { PW_RADAU_STAGES = 3 };
 

@@ -1,5 +1,6 @@
 /* Derivatives of the equations of motion; see tangent.h. */
 #include <stdlib.h>
+#include <string.h>
 #include "tangent.h"
 
 static int tangent_number_rows (pw_tangent *x) {
@@ -41,10 +42,29 @@ void pw_tangent_close (pw_tangent *x) {
   free (x->rowind);
 }
 
-const double *pw_tangent_expand (const pw_tangent *x, const double *used, int count, double *all) {
+/* Values of all equations from those of the first `count` active ones; `all` is scratch for the result. */
+static const double *tangent_expand (const pw_tangent *x, const double *used, int count, double *all) {
   if (x->map == NULL && count == x->rows) return used;
   for (int i = 0; i < count; i++) all[x->map ? x->row[i] : i] = used[i];
   return all;
+}
+
+const double *pw_tangent_lambda (const pw_tangent *x, const double *used) {
+  return tangent_expand (x, used, x->rows, x->lambda);
+}
+
+const double *pw_tangent_mu (const pw_tangent *x, const double *used, int count) {
+  return count > 0 ? tangent_expand (x, used, count, x->mu) : NULL;
+}
+
+void pw_tangent_store (const pw_tangent *x, const double *used, double *all) {
+  memset (all, 0, (size_t)x->run->s->rows * sizeof *all);
+  for (int i = 0; i < x->rows; i++) all[x->map ? x->row[i] : i] = used[i];
+}
+
+void pw_tangent_pull (const pw_tangent *x, const double *used, int count, double *out) {
+  memset (out, 0, (size_t)x->run->s->coords * sizeof *out);
+  if (count > 0) pw_add_JT (x->run->w, tangent_expand (x, used, count, count == x->rows ? x->lambda : x->mu), out);
 }
 
 void pw_tangent_compress (const pw_tangent *x, const double *all, int count, double *used) {

@@ -25,8 +25,14 @@ typedef struct {
 int pw_tangent_open (pw_tangent *x, pw_run *r); /* PW_OK or PW_RESOURCE */
 void pw_tangent_close (pw_tangent *x);
 
-/* Values of all equations from those of the first `count` active ones; `all` is scratch for the result. */
-const double *pw_tangent_expand (const pw_tangent *x, const double *used, int count, double *all);
+/* Multipliers of all equations from those of the active ones, valid until the next call: lambda; the first `count` of mu,
+ * NULL if there are none. */
+const double *pw_tangent_lambda (const pw_tangent *x, const double *used);
+const double *pw_tangent_mu (const pw_tangent *x, const double *used, int count);
+/* The same lambda in an array of all equations. */
+void pw_tangent_store (const pw_tangent *x, const double *used, double *all);
+/* out (coords + 3) = J^T times the multipliers of the first `count` active equations, with the J last evaluated. */
+void pw_tangent_pull (const pw_tangent *x, const double *used, int count, double *out);
 /* Values of the first `count` active equations from those of all. */
 void pw_tangent_compress (const pw_tangent *x, const double *all, int count, double *used);
 

@@ -135,7 +135,7 @@ static int nullspace_eliminate_pivoted (pw_nullspace *b) {
   double *K = b->K;
   for (int i = 0; i < m; i++) {
     double most = 0;
-    for (int j = 0; j < m; j++) most = pw_largest (most, fabs (K[i * m + j]));
+    for (int j = 0; j < m; j++) most = pw_larger_or_nan (most, fabs (K[i * m + j]));
     if (!(most > 0 && isfinite (most))) return PW_RETRY;
     for (int j = 0; j < m; j++) K[i * m + j] /= most;
     b->mu[i] /= most;

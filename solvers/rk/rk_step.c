@@ -153,7 +153,7 @@ double pw_rk_distance (const pw_run *r) {
   double most = 0;
   for (int j = 0; j < s->coords; j++) {
     double q = fabs (d->q[j] - r->q_at[j]), v = r->w->scale.time * fabs (d->v[j] - r->v_at[j]);
-    most = pw_largest (most, pw_largest (q, v) / pw_unit (s, j));
+    most = pw_larger_or_nan (most, pw_larger_or_nan (q, v) / pw_unit (s, j));
   }
   return most;
 }

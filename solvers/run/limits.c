@@ -32,7 +32,7 @@ static double limits_speed (const pw_run *r, int *state) {
 
 double pw_run_growth (const pw_run *r, int *state, double *power) {
   double now = limits_speed (r, state), span = r->t - r->settings.t;
-  *power = r->earlier > 0 && r->speed > 0 ? log (now / r->speed) / log (span / r->earlier) : 0;
+  *power = r->before_time > 0 && r->before_speed > 0 ? log (now / r->before_speed) / log (span / r->before_time) : 0;
   return now > LIMITS_FAST && *power > LIMITS_GROWTH ? now : 0;
 }
 
@@ -40,9 +40,9 @@ double pw_run_growth (const pw_run *r, int *state, double *power) {
 static int limits_mark (pw_run *r) {
   int state;
   double span = r->t - r->settings.t;
-  if (span < 2 * r->marked) return 0;
-  r->earlier = r->marked, r->speed = r->mark;
-  r->marked = span, r->mark = limits_speed (r, &state);
+  if (span < 2 * r->mark_time) return 0;
+  r->before_time = r->mark_time, r->before_speed = r->mark_speed;
+  r->mark_time = span, r->mark_speed = limits_speed (r, &state);
   return 1;
 }
 

@@ -12,7 +12,7 @@
 #include "quadrature.h"
 #include "util.h"
 
-int pw_quadrature_open (pw_quadrature *x, pw_run *r, pw_velocities_at *rates) {
+int pw_quadrature_open (pw_quadrature *x, pw_run *r, pw_rates_at *rates) {
   size_t entries = (size_t)r->s->entries;
   pw_array array[PW_QUADRATURE_POINTS + 4] = {
     { &x->ledger0, entries }, { &x->sum, entries }, { &x->finer, entries }, { &x->node, entries }

@@ -8,10 +8,10 @@ enum { PW_QUADRATURE_POINTS = 7 }; /* at most; beyond, the polynomial costs more
 
 /* The rates of the ledger's entries at a time inside the last step, by the method's interpolation; changes only the
  * run's sample arrays and the kinematics.  Returns as pw_update_kinematics. */
-typedef int pw_velocities_at (pw_run *r, double t, double *rate);
+typedef int pw_rates_at (pw_run *r, double t, double *rate);
 
 typedef struct {
-  pw_velocities_at *rates;
+  pw_rates_at *rates;
   int points, order;                  /* since the last restart; of the last step */
   int refined;                        /* 1: the last step was integrated by nodes inside it */
   double t[PW_QUADRATURE_POINTS];     /* newest first */
@@ -23,7 +23,7 @@ typedef struct {
 } pw_quadrature;
 
 /* PW_OK or PW_RESOURCE. */
-int pw_quadrature_open (pw_quadrature *x, pw_run *r, pw_velocities_at *rates);
+int pw_quadrature_open (pw_quadrature *x, pw_run *r, pw_rates_at *rates);
 void pw_quadrature_close (pw_quadrature *x);
 
 /* Restarts at the state reached; kinematics, the ledger and its rates must be up to date. */

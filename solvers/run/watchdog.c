@@ -12,11 +12,11 @@ double pw_run_acceleration_norm (const pw_run *r) {
   const double *a = r->a, *internal = a + 3 * s->bodies;
   double linear = 0, angular = 0, per = r->w->scale.time * r->w->scale.time;
   for (; a < internal; a += 3) {
-    linear = pw_largest (pw_largest (linear, fabs (a[0])), fabs (a[1]));
-    angular = pw_largest (angular, fabs (a[2]));
+    linear = pw_larger_or_nan (pw_larger_or_nan (linear, fabs (a[0])), fabs (a[1]));
+    angular = pw_larger_or_nan (angular, fabs (a[2]));
   }
-  for (; a < r->a + s->coords; a++) angular = pw_largest (angular, fabs (*a));
-  return pw_largest (linear * (per / s->scale.length), angular * per);
+  for (; a < r->a + s->coords; a++) angular = pw_larger_or_nan (angular, fabs (*a));
+  return pw_larger_or_nan (linear * (per / s->scale.length), angular * per);
 }
 
 /* The largest change of a body's coordinate in the last step, scaled. */

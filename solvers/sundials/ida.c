@@ -77,9 +77,7 @@ static void ida_read (const ida_data *d, double *q, double *v, double *a, double
   memcpy (q, y, n * sizeof *q);
   memcpy (v, y + n, n * sizeof *v);
   memcpy (a, yp + n, n * sizeof *a);
-  memset (lambda, 0, (size_t)d->sun.run->s->rows * sizeof *lambda);
-  const double *used = pw_ida_lambda (d, y, yp);
-  for (int i = 0; i < d->rows; i++) lambda[d->tangent.map ? d->tangent.row[i] : i] = used[i];
+  pw_tangent_store (&d->tangent, pw_ida_lambda (d, y, yp), lambda);
 }
 
 /* Interpolates the state at t into the sample arrays and updates kinematics.  Accelerations and multipliers are
@@ -277,7 +275,7 @@ static int ida_at (pw_run *r, double t, pw_error *error) {
   if (t <= r->t && r->s->entries > 0) pw_quadrature_at (&d->sun.quadrature, r, t);
   int flag = ida_interpolate (d, t);
   if (flag == IDA_BAD_T) return pw_fail_outside (r, NAN, t, error);
-  if (flag == IDA_RES_FAIL) return pw_sun_fail_signal (t, error);
+  if (flag == IDA_RES_FAIL) return pw_fail_signal (t, error);
   return flag == IDA_SUCCESS ? PW_OK : ida_fail (d, flag, error);
 }
 

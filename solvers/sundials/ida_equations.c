@@ -7,22 +7,11 @@
  *
  * with D = 1 for lengths and 1/L^2 for angles, so that mu has one unit (Baumgarte 1972; Gear, Gupta & Leimkuhler 1985;
  * Gear 1988).  In si1 the unknowns lambda and mu are the integrals of the multipliers. */
-#include <string.h>
 #include "ida_equations.h"
 
 int pw_ida_update (ida_data *d, double t, const double *y) {
-  int status = pw_update_kinematics (d->sun.run->w, pw_before_breakpoint (d->sun.run, t), y, y + d->n);
-  if (status == PW_OK) pw_evaluate_J (d->sun.run->w);
+  int status = pw_evaluate_J_at (d->sun.run->w, pw_before_breakpoint (d->sun.run, t), y, y + d->n);
   return status == PW_OK ? 0 : -1;
-}
-
-/* Multipliers of all equations, from the unknowns or their derivatives. */
-static const double *ida_lambda (ida_data *d, const double *y, const double *yp) {
-  return pw_tangent_expand (&d->tangent, pw_ida_lambda (d, y, yp), d->rows, d->tangent.lambda);
-}
-
-static const double *ida_mu (ida_data *d, const double *y, const double *yp) {
-  return pw_tangent_expand (&d->tangent, pw_ida_lambda (d, y, yp) + d->rows, d->mus, d->tangent.mu);
 }
 
 /* ---- Residual ---- */
@@ -33,8 +22,7 @@ static void ida_kinematics (ida_data *d, const double *y, const double *yp, doub
   for (int j = 0; j < n; j++) out[j] = yp[j] - y[n + j];
   if (!d->positions) return;
   double *pull = d->given;
-  memset (pull, 0, (size_t)n * sizeof *pull);
-  pw_add_JT (d->sun.run->w, ida_mu (d, y, yp), pull);
+  pw_tangent_pull (&d->tangent, pw_ida_lambda (d, y, yp) + d->rows, d->mus, pull);
   for (int j = 0; j < n; j++) out[j] += d->scale[j] * pull[j];
 }
 
@@ -43,8 +31,7 @@ static void ida_momentum (ida_data *d, const double *y, const double *yp, double
   const pw_system *s = d->sun.run->s;
   int n = d->n;
   double *pull = d->given, *f = pull + n + 3;
-  memset (pull, 0, (size_t)n * sizeof *pull);
-  pw_add_JT (d->sun.run->w, ida_lambda (d, y, yp), pull);
+  pw_tangent_pull (&d->tangent, pw_ida_lambda (d, y, yp), d->rows, pull);
   pw_evaluate_force (d->sun.run->w, f);
   for (int j = 0; j < n; j++) out[j] = s->mass[j] * yp[n + j] + pull[j] - f[j];
 }
@@ -102,8 +89,9 @@ static void ida_matrix_fill (ida_data *d, const double *y, const double *yp, dou
                                  .of_q = c,
                                  .of_a = c,
                                  .of_lambda = d->impulses ? c : 1 };
-  pw_tangent_kinematics (&d->tangent, &to, d->positions ? ida_mu (d, y, yp) : NULL, d->scale);
-  pw_tangent_momentum (&d->tangent, &to, ida_lambda (d, y, yp));
+  const double *lambda = pw_ida_lambda (d, y, yp);
+  pw_tangent_kinematics (&d->tangent, &to, pw_tangent_mu (&d->tangent, lambda + d->rows, d->mus), d->scale);
+  pw_tangent_momentum (&d->tangent, &to, pw_tangent_lambda (&d->tangent, lambda));
   if (d->velocities)
     pw_tangent_velocities (&d->tangent, &to, y + n, 1);
   else

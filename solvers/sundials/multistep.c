@@ -227,9 +227,7 @@ static int multistep_work (multistep_data *d) {
   pw_ledger_rates (r, r->lambda, r->rate);
   CVodeGetLastOrder (d->cvode, &order);
   if (!pw_quadrature_step (&d->sun.quadrature, r, order)) return PW_OK;
-  int status = pw_update_kinematics (r->w, pw_before_breakpoint (r, r->t), r->q, r->v);
-  pw_evaluate_J (r->w);
-  return status;
+  return pw_evaluate_J_at (r->w, pw_before_breakpoint (r, r->t), r->q, r->v);
 }
 
 /* Reads the current state from y and updates the ledger.  Its accelerations are those of the last iterate until
@@ -244,9 +242,8 @@ static int multistep_reach (multistep_data *d, double t, pw_error *error) {
   r->t = t;
   pw_forget_residuals (r);
   d->evaluated = 0;
-  if (pw_update_kinematics (r->w, pw_before_breakpoint (r, t), r->q, r->v) != PW_OK)
+  if (pw_evaluate_J_at (r->w, pw_before_breakpoint (r, t), r->q, r->v) != PW_OK)
     return multistep_fail (d, CV_RHSFUNC_FAIL, error);
-  pw_evaluate_J (r->w);
   pw_bound_tolerances (r);
   if (r->s->entries > 0 && multistep_work (d) != PW_OK) return multistep_fail (d, CV_RHSFUNC_FAIL, error);
   return PW_OK;
@@ -294,7 +291,7 @@ static int multistep_at (pw_run *r, double t, pw_error *error) {
     status = multistep_complete (d, t);
   }
   if (status > 0) return pw_fail_singular (r, t, error);
-  return status == PW_OK ? PW_OK : pw_sun_fail_signal (t, error);
+  return status == PW_OK ? PW_OK : pw_fail_signal (t, error);
 }
 
 static int multistep_restart (pw_run *r, pw_error *error) {

@@ -133,10 +133,6 @@ int pw_sun_no_memory (const pw_run *r, pw_error *error) {
   return pw_fail (error, PW_RESOURCE, "model %s: out of memory in %s", r->s->model, r->method->name);
 }
 
-int pw_sun_fail_signal (double t, pw_error *error) {
-  return pw_fail (error, PW_METHOD, "t = %.6g s: a signal failed", t);
-}
-
 int pw_sun_fail_restart (pw_sun *x, int flag, pw_error *error) {
   return pw_fail (error, PW_METHOD, "t = %.6g s: restart: %s", x->run->t, sun_reason (x, flag));
 }
@@ -146,7 +142,7 @@ int pw_sun_fail (pw_sun *x, int flag, int singular, const char *why, pw_error *e
   if (r->stopped) return r->interrupted = 1, PW_STOPPED;
   if (flag == CV_LSETUP_FAIL && SUNLinSol_KLUGetCommon (x->klu)->status == KLU_OUT_OF_MEMORY)
     return pw_sun_no_memory (r, error);
-  if (flag == CV_RHSFUNC_FAIL) return pw_sun_fail_signal (r->t, error);
+  if (flag == CV_RHSFUNC_FAIL) return pw_fail_signal (r->t, error);
   if (singular || pw_watchdog_near_state (r)) return pw_fail_singular (r, r->t, error);
   if (why == NULL)
     why = flag == CV_ERR_FAILURE    ? "the error test fails however small the step"

@@ -76,6 +76,5 @@ void pw_sun_message (int code, const char *module, const char *function, char *t
 int pw_sun_fail (pw_sun *x, int flag, int singular, const char *why, pw_error *error);
 int pw_sun_fail_restart (pw_sun *x, int flag, pw_error *error);
 int pw_sun_no_memory (const pw_run *r, pw_error *error);
-int pw_sun_fail_signal (double t, pw_error *error);
 
 #endif

@@ -9,9 +9,7 @@
 
 enum { CHECK_SEEDS = 5 };
 
-static void check_add (pw_check_list *l, const char *format, ...) PW_PRINTS (2);
-
-static void check_add (pw_check_list *l, const char *format, ...) {
+PW_PRINTF (2, 3) static void check_add (pw_check_list *l, const char *format, ...) {
   va_list list;
   va_start (list, format);
   if (l->count++ < (int)(sizeof l->text / sizeof *l->text))

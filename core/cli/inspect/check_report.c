@@ -8,22 +8,6 @@ enum { REPORT_LISTED = 8, REPORT_EIGENVALUES = 60 };
 
 /* ---- Entries: in JSON, or in the text if j is NULL ---- */
 
-static void report_open (pw_json *j, const char *key, char bracket) {
-  if (j) pw_json_open (j, key, bracket);
-}
-
-static void report_close (pw_json *j, char bracket) {
-  if (j) pw_json_close (j, bracket);
-}
-
-static void report_number (pw_json *j, const char *key, double value) {
-  if (j) pw_json_number (j, key, value);
-}
-
-static void report_text (pw_json *j, const char *key, const char *text) {
-  if (j) pw_json_text (j, key, text);
-}
-
 /* Begins a line for the next item. */
 static void report_line (pw_json *j) {
   if (j) j->line = 1;
@@ -32,13 +16,11 @@ static void report_line (pw_json *j) {
 static void report_section (pw_json *j, const char *key, char bracket, const char *title) {
   if (j == NULL && title) printf ("\n%s\n", title);
   report_line (j);
-  report_open (j, key, bracket);
+  pw_json_open (j, key, bracket);
 }
 
 /* Prints in the text only. */
-static void report_say (pw_json *j, const char *format, ...) PW_PRINTS (2);
-
-static void report_say (pw_json *j, const char *format, ...) {
+PW_PRINTF (2, 3) static void report_say (pw_json *j, const char *format, ...) {
   va_list list;
   va_start (list, format);
   if (j == NULL) vprintf (format, list);
@@ -46,12 +28,10 @@ static void report_say (pw_json *j, const char *format, ...) {
 }
 
 /* A number in JSON, unless the key is NULL; a line in the text, unless the label is NULL. */
-static void report_entry (pw_json *j, const char *key, double value, const char *label, const char *format, ...)
-    PW_PRINTS (5);
-
+PW_PRINTF (5, 6)
 static void report_entry (pw_json *j, const char *key, double value, const char *label, const char *format, ...) {
   va_list list;
-  if (key) report_number (j, key, value);
+  if (key) pw_json_number (j, key, value);
   if (j || label == NULL) return;
   printf ("  %-34s ", label);
   va_start (list, format);
@@ -62,12 +42,12 @@ static void report_entry (pw_json *j, const char *key, double value, const char 
 
 /* An item of a list, of which the text shows the first few; `shown` counts them. */
 static void report_item (pw_json *j, int *listed, const char *text, const char *line) {
-  if (text) report_text (j, NULL, text);
+  if (text) pw_json_text (j, NULL, text);
   if ((*listed)++ < REPORT_LISTED) report_say (j, "    %s\n", line);
 }
 
 static void report_end_list (pw_json *j, int listed) {
-  report_close (j, ']');
+  pw_json_close (j, ']');
   if (listed > REPORT_LISTED) report_say (j, "    and %d more\n", listed - REPORT_LISTED);
 }
 
@@ -85,7 +65,7 @@ static void report_singular_value (pw_json *j, const pw_check *x) {
     report_entry (j, "least_singular_value", x->r ? l->least : NAN, label,
                   "%s, rows of length 1, angles in units of L = %s m", pw_format (value, l->least, CHECK_DIGITS),
                   pw_format (unit, length, CHECK_DIGITS));
-  report_number (j, "length_scale", length);
+  pw_json_number (j, "length_scale", length);
 }
 
 static void report_mobility (pw_json *j, const pw_check *x) {
@@ -94,11 +74,11 @@ static void report_mobility (pw_json *j, const pw_check *x) {
   int coordinates = pw_system_coordinates (s), rows = pw_system_rows (s), holonomic = pw_system_holonomic (s),
       listed = 0;
   report_section (j, "mobility", '{', "Mobility");
-  report_number (j, "bodies", pw_system_bodies (s));
+  pw_json_number (j, "bodies", pw_system_bodies (s));
   report_entry (j, "coordinates", coordinates, "coordinates", "%d", coordinates);
   report_entry (j, "rows", rows, "constraint equations", "%d (%d on positions, %d on velocities)", rows, holonomic,
                 rows - holonomic);
-  report_number (j, "holonomic_rows", holonomic);
+  pw_json_number (j, "holonomic_rows", holonomic);
   const struct {
     const char *key, *label;
     int value;
@@ -109,7 +89,7 @@ static void report_mobility (pw_json *j, const pw_check *x) {
     report_entry (j, count[i].key, x->r ? (double)count[i].value : NAN, x->r ? count[i].label : NULL, "%d",
                   count[i].value);
   report_singular_value (j, x);
-  report_close (j, '}');
+  pw_json_close (j, '}');
   report_section (j, "redundant", '[', NULL);
   if (x->r) report_entry (j, NULL, 0, "redundant constraint equations", "%d", pw_run_redundant (x->r));
   for (const char *const *r = x->redundant; r && *r; r++) report_item (j, &listed, *r, *r);
@@ -137,7 +117,7 @@ static void report_mass (pw_json *j, const pw_check *x) {
   report_entry (j, NULL, 0, "saddle-point matrix", "%s%s", matrix ? matrix : "not known",
                 matrix && x->r == NULL ? "; see below" : "");
   report_line (j);
-  report_text (j, "saddle_point", matrix);
+  pw_json_text (j, "saddle_point", matrix);
 }
 
 /* ---- Initial conditions ---- */
@@ -146,11 +126,11 @@ static void report_change (pw_json *j, const pw_check *x, int i, int *listed) {
   char name[PW_STATE_NAME], line[500], a[32], b[32], c[32];
   double from, to;
   pw_report_state (x->m.system, pw_run_initial (x->r), i, name, &from, &to);
-  report_open (j, NULL, '{');
-  report_text (j, "state", name);
-  report_number (j, "from", from);
-  report_number (j, "to", to);
-  report_close (j, '}');
+  pw_json_open (j, NULL, '{');
+  pw_json_text (j, "state", name);
+  pw_json_number (j, "from", from);
+  pw_json_number (j, "to", to);
+  pw_json_close (j, '}');
   snprintf (line, sizeof line, "%-20s from %s to %s, by %s %s", name, pw_format (a, from, 10), pw_format (b, to, 10),
             pw_format (c, to - from, 3), pw_system_state_unit (x->m.system, i));
   report_item (j, listed, NULL, line);
@@ -161,15 +141,15 @@ static void report_initial (pw_json *j, const pw_check *x) {
   int listed = 0, n = pw_system_coordinates (x->m.system);
   if (x->r == NULL) {
     report_line (j);
-    report_text (j, "start", NULL);
+    pw_json_text (j, "start", NULL);
     report_say (j, "\n%s\n  FAILED: %s\n", title, x->failure.text);
     return;
   }
   const pw_initial_report *initial = pw_run_initial (x->r);
   report_section (j, "start", '{', title);
-  report_number (j, "moved", initial->moved);
-  if (j) pw_json_flag (j, "freed", initial->released);
-  report_open (j, "changes", '[');
+  pw_json_number (j, "moved", initial->moved);
+  pw_json_flag (j, "freed", initial->released);
+  pw_json_open (j, "changes", '[');
   if (initial->moved == 0)
     report_say (j, "  consistent as described\n");
   else
@@ -178,7 +158,7 @@ static void report_initial (pw_json *j, const pw_check *x) {
   for (int i = 0; i < 2 * n; i++)
     if (pw_initial_moved (x->m.system, initial, i)) report_change (j, x, i, &listed);
   report_end_list (j, listed);
-  report_close (j, '}');
+  pw_json_close (j, '}');
   if (x->known)
     report_say (j, "  compared with the reference solution of the model in %d state%s\n", x->known,
                 x->known == 1 ? "" : "s");
@@ -192,33 +172,33 @@ static void report_failures (pw_json *j, const pw_selftest_report *r, const char
     if (!c->failed) continue;
     report_say (j, "    %s: %s does not hold: off by %s, the bound is %s\n      %s\n", label, c->about,
                 pw_format (error, c->error, 2), pw_format (bound, c->bound, 2), c->where);
-    report_open (j, NULL, '{');
-    report_text (j, "check", c->name);
-    report_text (j, "in", where);
-    report_text (j, "expected", c->about);
-    report_number (j, "error", c->error);
-    report_number (j, "bound", c->bound);
-    report_text (j, "where", c->where);
-    report_close (j, '}');
+    pw_json_open (j, NULL, '{');
+    pw_json_text (j, "check", c->name);
+    pw_json_text (j, "in", where);
+    pw_json_text (j, "expected", c->about);
+    pw_json_number (j, "error", c->error);
+    pw_json_number (j, "bound", c->bound);
+    pw_json_text (j, "where", c->where);
+    pw_json_close (j, '}');
   }
 }
 
 static void report_kind (pw_json *j, const pw_checked_kind *k) {
   char name[100];
   report_line (j);
-  report_open (j, NULL, '{');
-  report_text (j, "kind", k->kind->name);
-  report_number (j, "elements", k->count);
-  report_number (j, "checks", k->alone.checks + k->inside.checks);
-  report_open (j, "failed", '[');
+  pw_json_open (j, NULL, '{');
+  pw_json_text (j, "kind", k->kind->name);
+  pw_json_number (j, "elements", k->count);
+  pw_json_number (j, "checks", k->alone.checks + k->inside.checks);
+  pw_json_open (j, "failed", '[');
   snprintf (name, sizeof name, "%s (%d element%s)", k->kind->name, k->count, k->count == 1 ? "" : "s");
   report_entry (j, NULL, 0, name, "%s: %d checks at random, %d in this model",
                 k->alone.failed + k->inside.failed ? "FAILED" : "good", k->alone.checks, k->inside.checks);
   if (*k->untested) report_say (j, "    not tested at random: %s\n", k->untested);
   report_failures (j, &k->alone, "random scenes", "at random");
   report_failures (j, &k->inside, "this model", "in this model");
-  report_close (j, ']');
-  report_close (j, '}');
+  pw_json_close (j, ']');
+  pw_json_close (j, '}');
 }
 
 /* ---- Linearisation ---- */
@@ -258,7 +238,7 @@ static void report_eigenvalues (const pw_linear *l) {
 static void report_motion (pw_json *j, const pw_linear *l) {
   static const char *const steady[] = { "steady", "accelerated", "changing" };
   char a[32], w[32];
-  report_text (j, "motion", steady[l->steady]);
+  pw_json_text (j, "motion", steady[l->steady]);
   report_entry (j, "acceleration", l->acceleration, l->steady == PW_ACCELERATED ? "motion" : NULL,
                 "not steady: accelerations of %s m/s^2 in the co-moving frame", pw_format (a, l->acceleration, 3));
   if (l->steady == PW_CHANGING)
@@ -266,7 +246,7 @@ static void report_motion (pw_json *j, const pw_linear *l) {
   if (l->steady != PW_STEADY) report_entry (j, NULL, 0, "", "the eigenvalues are not stability exponents");
   report_entry (j, "turn_rate", l->twist[2], l->twist[2] != 0 ? "co-moving frame" : NULL, "turns at %s rad/s",
                 pw_format (w, l->twist[2], CHECK_DIGITS));
-  report_number (j, "symmetries", l->symmetries);
+  pw_json_number (j, "symmetries", l->symmetries);
 }
 
 static void report_stability (pw_json *j, const pw_check *x) {
@@ -311,7 +291,7 @@ static void report_fastest (pw_json *j, const pw_check *x) {
 
 static void report_linear (pw_json *j, const pw_check *x) {
   const pw_linear *l = &x->linear;
-  if (l->A == NULL) report_line (j), report_text (j, "linearisation", NULL);
+  if (l->A == NULL) report_line (j), pw_json_text (j, "linearisation", NULL);
   if (x->r == NULL || (j && l->A == NULL)) return;
   report_section (j, "linearisation", '{', "Linearised at the initial state");
   report_entry (j, "unknowns", l->unknowns, "unknowns", "%d", l->unknowns);
@@ -329,13 +309,13 @@ static void report_linear (pw_json *j, const pw_check *x) {
   report_fastest (j, x);
   report_section (j, "eigenvalues", '[', NULL);
   for (int i = 0; i < l->unknowns; i++) {
-    report_open (j, NULL, '[');
-    report_number (j, NULL, l->re[i]);
-    report_number (j, NULL, l->im[i]);
-    report_close (j, ']');
+    pw_json_open (j, NULL, '[');
+    pw_json_number (j, NULL, l->re[i]);
+    pw_json_number (j, NULL, l->im[i]);
+    pw_json_close (j, ']');
   }
-  report_close (j, ']');
-  report_close (j, '}');
+  pw_json_close (j, ']');
+  pw_json_close (j, '}');
 }
 
 /* ---- The report ---- */
@@ -345,10 +325,10 @@ static void report_list (pw_json *j, const char *key, const char *one, const pw_
   if (l->count > 0) report_say (j, "\n%d %s\n", l->count, l->count == 1 ? one : key);
   report_section (j, key, '[', NULL);
   for (int i = 0; i < l->count && i < most; i++) {
-    report_text (j, NULL, l->text[i]);
+    pw_json_text (j, NULL, l->text[i]);
     report_say (j, "  %s\n", l->text[i]);
   }
-  report_close (j, ']');
+  pw_json_close (j, ']');
 }
 
 static void report_lists (pw_json *j, const pw_check *x) {
@@ -358,10 +338,10 @@ static void report_lists (pw_json *j, const pw_check *x) {
 
 void pw_check_report (const pw_check *x, pw_json *j) {
   const char *about = pw_file_table (x->m.file)->about;
-  report_open (j, NULL, '{');
-  report_number (j, "schema", 1);
-  report_text (j, "model", pw_file_name (x->m.file));
-  report_text (j, "status", x->problem.count ? "failed" : "ok");
+  pw_json_open (j, NULL, '{');
+  pw_json_number (j, "schema", 1);
+  pw_json_text (j, "model", pw_file_name (x->m.file));
+  pw_json_text (j, "status", x->problem.count ? "failed" : "ok");
   if (j) report_lists (j, x);
   report_say (j, "%s: %s\n", pw_file_name (x->m.file), about ? about : "");
   report_mobility (j, x);
@@ -370,10 +350,10 @@ void pw_check_report (const pw_check *x, pw_json *j) {
   report_section (j, "kinds", '[',
                   "Self-test of the element types in use: each function against differences of others");
   for (const pw_checked_kind *k = x->kind; k < x->kind + x->kinds; k++) report_kind (j, k);
-  report_close (j, ']');
+  pw_json_close (j, ']');
   report_linear (j, x);
   report_line (j);
-  report_close (j, '}');
+  pw_json_close (j, '}');
   if (x->problem.count + x->finding.count == 0) report_say (j, "\nNo problems found\n");
   if (j == NULL) report_lists (j, x);
 }

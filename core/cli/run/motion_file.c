@@ -3,7 +3,6 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/types.h>
 #include "motion.h"
 
 #define FILE_SAME 1e-9 /* relative to the end: smaller differences of times are ignored */

@@ -1,6 +1,5 @@
 /* Time of a run by element types and by stages: two tables. */
 #include <math.h>
-#include <stdlib.h>
 #include "print_table.h"
 #include "profile.h"
 

@@ -7,7 +7,6 @@
  * (Moore, Kearfott & Cloud 2009, Introduction to Interval Analysis, chapter 8).
  * Changes that cancel within this width, and changes by round-off only, are ignored.  While two compared numbers stay
  * equal, the width grows. */
-#include <float.h>
 #include <math.h>
 #include "expression_parts.h"
 #include "pinwheel.h"

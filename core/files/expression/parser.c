@@ -8,7 +8,6 @@
  * Parts without variables are evaluated immediately.  Errors are reported at their position. */
 #include <stdarg.h>
 #include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
 #include "expression_parts.h"
 #include "pinwheel.h"
@@ -60,11 +59,7 @@ typedef struct {
 static const parser_part parser_nothing = { 0 };
 
 /* Only the first error is kept. */
-#ifdef __GNUC__
-__attribute__ ((format (printf, 3, 4)))
-#endif
-static parser_part
-parser_fail (parser *p, size_t at, const char *format, ...) {
+PW_PRINTF (3, 4) static parser_part parser_fail (parser *p, size_t at, const char *format, ...) {
   if (p->status != PW_OK) return parser_nothing;
   p->status = PW_INPUT;
   p->error->at = at;

@@ -41,6 +41,7 @@ static void json_item (pw_json *j, const char *key) {
 }
 
 void pw_json_open (pw_json *j, const char *key, char bracket) {
+  if (j == NULL) return;
   json_item (j, key);
   fputc (bracket, j->f);
   j->depth++;
@@ -48,6 +49,7 @@ void pw_json_open (pw_json *j, const char *key, char bracket) {
 }
 
 void pw_json_close (pw_json *j, char bracket) {
+  if (j == NULL) return;
   if (j->items > 0 || j->line) json_separator (j, j->depth - 1, "");
   fputc (bracket, j->f);
   if (--j->depth == 0) fputc ('\n', j->f);
@@ -55,17 +57,20 @@ void pw_json_close (pw_json *j, char bracket) {
 }
 
 void pw_json_text (pw_json *j, const char *key, const char *text) {
+  if (j == NULL) return;
   json_item (j, key);
   text ? json_string (j->f, text) : (void)fputs ("null", j->f);
 }
 
 void pw_json_number (pw_json *j, const char *key, double value) {
   char text[32];
+  if (j == NULL) return;
   json_item (j, key);
   fputs (isfinite (value) ? pw_format (text, value, 17) : "null", j->f);
 }
 
 void pw_json_flag (pw_json *j, const char *key, int value) {
+  if (j == NULL) return;
   json_item (j, key);
   fputs (value ? "true" : "false", j->f);
 }

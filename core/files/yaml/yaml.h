@@ -79,11 +79,7 @@ enum { PW_YAML_MAX_ITEMS = 1000000, PW_YAML_MAX_POINTS = 20000000, PW_YAML_MAX_O
 int pw_yaml_read_source (pw_yaml *y, const char *path, size_t largest, pw_error *error);
 
 /* Fails with "PATH:LINE:COLUMN: error: TEXT", the line of the source at an offset, and a caret below. */
-int pw_yaml_fail (const pw_reader *r, size_t at, const char *format, ...)
-#ifdef __GNUC__
-    __attribute__ ((format (printf, 3, 4)))
-#endif
-    ;
+int pw_yaml_fail (const pw_reader *r, size_t at, const char *format, ...) PW_PRINTF (3, 4);
 
 int pw_yaml_no_memory (const pw_reader *r);
 

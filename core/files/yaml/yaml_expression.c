@@ -30,11 +30,7 @@ typedef struct {
 } reading;
 
 /* Reports an error at an offset of the expression. */
-#ifdef __GNUC__
-__attribute__ ((format (printf, 3, 4)))
-#endif
-static int
-reading_fail (const reading *x, size_t at, const char *format, ...) {
+PW_PRINTF (3, 4) static int reading_fail (const reading *x, size_t at, const char *format, ...) {
   char text[300];
   va_list arguments;
   va_start (arguments, format);

@@ -6,7 +6,6 @@
  *   gamma = u' + w (sin(theta) vx - cos(theta) vy)                so that S a = gamma
  *
  * The force on the body at P, along e, is F = -lambda; its power is F u. */
-#include <math.h>
 #include "contact.h"
 
 PREPARE (speed_prepare, pw_speed, contact) {

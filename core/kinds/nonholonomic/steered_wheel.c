@@ -7,7 +7,6 @@
  * (Neimark & Fufaev 1972, Dynamics of Nonholonomic Systems, chapter I.) The lateral force on the body, along n, is N
  * = -lambda.  It acts at the steering pivot, so steering needs no moment and does no work. */
 #include <math.h>
-#include <string.h>
 #include "contact.h"
 
 typedef struct {

@@ -5,7 +5,6 @@
  *   gamma = w (cos(theta) vx + sin(theta) vy)                     so that S a = gamma
  *
  * The lateral force on the body, along n, is N = -lambda. */
-#include <math.h>
 #include "contact.h"
 
 PREPARE (wheel_prepare, pw_wheel, contact) {
