@@ -53,8 +53,8 @@ void pw_nearest_try (pw_nearest *n, const char *candidate) {
   size_t a = strlen (n->sought), b = strlen (candidate), length = a > b ? a : b;
   size_t distance = nearest_equal (n->sought, candidate) ? 0 : nearest_distance (n->sought, candidate);
   nearest_append (n, candidate);
-  if (n->best && distance * n->length >= n->distance * length) return;
-  n->best = candidate;
+  if (*n->best && distance * n->length >= n->distance * length) return;
+  snprintf (n->best, sizeof n->best, "%s", candidate);
   n->distance = distance;
   n->length = length;
   n->near = nearest_is_near (n->sought, a, candidate, b, distance);
@@ -62,11 +62,28 @@ void pw_nearest_try (pw_nearest *n, const char *candidate) {
 
 char *pw_nearest_text (const pw_nearest *n, char *buffer, size_t size) {
   buffer[0] = 0;
-  if (n->best && n->near)
+  if (*n->best && n->near)
     snprintf (buffer, size, "; did you mean \"%s\"?", n->best);
-  else if (n->best && !n->overflow)
+  else if (*n->best && !n->overflow)
     snprintf (buffer, size, "; valid %s %s", strchr (n->all, ',') ? "are" : "is", n->all);
   return buffer;
+}
+
+int pw_find_name (const void *table, size_t entry, const char *name, char hint[PW_HINT]) {
+  pw_nearest near = { .sought = name };
+  const char *known;
+  for (int i = 0; table && (known = *(const char *const *)(const void *)((const char *)table + (size_t)i * entry));
+       i++) {
+    if (strcmp (known, name) == 0) return i;
+    pw_nearest_try (&near, known);
+  }
+  pw_nearest_text (&near, hint, PW_HINT);
+  return -1;
+}
+
+const char *pw_domain_text (pw_domain domain) {
+  static const char *const text[] = { "", ">= 0", "> 0", "1, 2, ...", "0 to 1" };
+  return text[domain];
 }
 
 const char *pw_domain_check (pw_domain domain, double value) {

@@ -14,7 +14,7 @@ static inline int pw_require (const void *object, const char *what, pw_error *er
  * Start with { .sought = name }. */
 typedef struct {
   const char *sought;
-  const char *best;
+  char best[120];          /* "" before the first candidate */
   size_t distance, length; /* distance of best from sought; length of the longer of the two */
   int near;                /* 1: best is near enough to suggest */
   int overflow;            /* 1: `all` is too small for the valid names */
@@ -24,6 +24,13 @@ void pw_nearest_try (pw_nearest *n, const char *candidate);
 /* Writes the hint to the buffer and returns it: "; did you mean \"steer\"?"; "; valid are x, y, z" if no name is
  * near and all fit; else "". */
 char *pw_nearest_text (const pw_nearest *n, char *buffer, size_t size);
+
+/* The index of a name in a table whose entries, of this size, begin with a name and whose last name is NULL; -1, with the hint
+ * of pw_nearest_text, if it is not there.  The table may be NULL: it has no entries. */
+enum { PW_HINT = 130 };
+int pw_find_name (const void *table, size_t entry, const char *name, char hint[PW_HINT]);
+/* "", ">= 0", "> 0", "1, 2, ...", "0 to 1" */
+const char *pw_domain_text (pw_domain domain);
 
 /* ---- Zero-terminated texts (characters.c) ---- */
 

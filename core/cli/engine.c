@@ -16,16 +16,12 @@ double pw_cli_steps (const char *method, const pw_settings *s, const pw_run_defa
 }
 
 int pw_cli_specialise (const char *text, pw_specialise *when, pw_error *error) {
-  static const char *const name[] = { "auto", "always", "never" };
-  char hint[100];
-  pw_nearest near = { .sought = text };
-  *when = PW_SPECIALISE_AUTO;
-  for (int i = 0; i < 3; i++) {
-    if (text == NULL || strcmp (text, name[i]) == 0) return *when = text ? (pw_specialise)i : *when, PW_OK;
-    pw_nearest_try (&near, name[i]);
-  }
-  return pw_fail (error, PW_INPUT, "--specialise \"%.60s\": expected auto, always or never%s", text,
-                  pw_nearest_text (&near, hint, sizeof hint));
+  static const char *const name[] = { "auto", "always", "never", NULL };
+  char hint[PW_HINT];
+  int i = text ? pw_find_name (name, sizeof *name, text, hint) : PW_SPECIALISE_AUTO;
+  if (i < 0) return pw_fail (error, PW_INPUT, "--specialise \"%.60s\": expected auto, always or never%s", text, hint);
+  *when = (pw_specialise)i;
+  return PW_OK;
 }
 
 /* A short reason for the general engine. */

@@ -53,24 +53,18 @@ void pw_model_free (pw_model *m) {
 int pw_model_set (pw_model *m, const char *parameter, double value, pw_error *error) {
   if (pw_require (m, "a model", error) != PW_OK) return PW_INPUT;
   if (parameter == NULL) return pw_fail (error, PW_INPUT, "model %s: the name of a parameter is missing", m->name);
-  pw_nearest near = { .sought = parameter };
-  for (const pw_parameter *p = m->table->parameters; p && p->name; p++) {
-    if (strcmp (p->name, parameter) == 0) {
-      const char *expected = pw_domain_check (p->domain, value);
-      if (*expected)
-        return pw_fail (error, PW_INPUT, "model %s: parameter %s = %.17g: expected %s", m->name, parameter, value,
-                        expected);
-      if (m->built)
-        return pw_fail (error, PW_INPUT, "model %s: parameter %s: pw_model_set after pw_model_build", m->name,
-                        parameter);
-      memcpy (m->parameters + p->offset, &value, sizeof value);
-      return PW_OK;
-    }
-    pw_nearest_try (&near, p->name);
-  }
-  char hint[100];
-  return pw_fail (error, PW_INPUT, "model %s has no parameter \"%s\"%s", m->name, parameter,
-                  pw_nearest_text (&near, hint, sizeof hint));
+  char hint[PW_HINT];
+  int i = pw_find_name (m->table->parameters, sizeof (pw_parameter), parameter, hint);
+  if (i < 0) return pw_fail (error, PW_INPUT, "model %s has no parameter \"%s\"%s", m->name, parameter, hint);
+  const pw_parameter *p = &m->table->parameters[i];
+  const char *expected = pw_domain_check (p->domain, value);
+  if (*expected)
+    return pw_fail (error, PW_INPUT, "model %s: parameter %s = %.17g: expected %s", m->name, parameter, value,
+                    expected);
+  if (m->built)
+    return pw_fail (error, PW_INPUT, "model %s: parameter %s: pw_model_set after pw_model_build", m->name, parameter);
+  memcpy (m->parameters + p->offset, &value, sizeof value);
+  return PW_OK;
 }
 
 int pw_model_build (pw_model *m, pw_error *error) {
@@ -90,7 +84,7 @@ int pw_model_refuse (pw_model *m, const char *format, ...) {
   return pw_fail (&m->error, PW_INPUT, "model %s: %s", m->name, text);
 }
 
-/* Enlarges an array, if necessary, for one more entry of an array. */
+/* Makes room for one more entry of an array. */
 static int model_grow (pw_model *m, void *array, int count, int *capacity, size_t size) {
   if (count < *capacity) return PW_OK;
   int more = *capacity ? 2 * *capacity : 8;

@@ -3,9 +3,7 @@
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
-#include "model.h"
 #include "system.h"
-#include "util.h"
 
 static const char *const query_names[] = { "x", "y", "phi", "vx", "vy", "omega" };
 static const char *const query_units[] = { "m", "m", "rad", "m/s", "m/s", "rad/s" };
@@ -97,8 +95,8 @@ const char *pw_system_state_unit (const pw_system *s, int state) {
   return strcmp (k->kind->coordinate[n].unit, "m") == 0 ? "m/s" : "rad/s";
 }
 
-/* Index of the state "body.x", or -1; *near: the nearest name if the body exists. */
-static int query_body_state (const pw_system *s, const char *name, pw_nearest *near, char *best, size_t size) {
+/* Index of the state "body.x", or -1; near->best: the nearest name if the body exists. */
+static int query_body_state (const pw_system *s, const char *name, pw_nearest *near) {
   const char *dot = strrchr (name, '.');
   if (dot == NULL) return -1;
   int b = 0;
@@ -110,30 +108,36 @@ static int query_body_state (const pw_system *s, const char *name, pw_nearest *n
     if (strcmp (dot + 1, query_names[i]) == 0) return i < 3 ? 3 * b + i : s->coords + 3 * b + i - 3;
     pw_nearest_try (&what, query_names[i]);
   }
-  snprintf (best, size, "%s.%s", s->body_name[b], what.best);
+  what.sought = name;
   *near = what;
-  near->best = best;
+  snprintf (near->best, sizeof near->best, "%s.%.10s", s->body_name[b], what.best);
   return -1;
 }
 
+typedef char *query_name (const pw_system *s, int i, char *buffer, size_t size);
+
+/* Fails with the nearest of `count` names, unless it is known already. */
+static int query_missing (const pw_system *s, const char *what, int count, query_name *name, pw_nearest *near,
+                          pw_error *error) {
+  char text[120], hint[160];
+  for (int i = 0, search = *near->best == 0; search && i < count; i++)
+    pw_nearest_try (near, name (s, i, text, sizeof text));
+  return pw_fail (error, PW_INPUT, "model %s has no %s \"%s\"%s", s->model, what, near->sought,
+                  pw_nearest_text (near, hint, sizeof hint));
+}
+
 int pw_system_find_state (const pw_system *s, const char *name, pw_error *error) {
-  char best[120], text[120], hint[160];
+  char text[120];
   if (pw_require (s, "a system", error) != PW_OK) return PW_INPUT;
   if (name == NULL) return pw_fail (error, PW_INPUT, "model %s: the name of a state is missing", s->model);
   pw_nearest near = { .sought = name };
-  int state = query_body_state (s, name, &near, best, sizeof best);
+  int state = query_body_state (s, name, &near);
   if (state >= 0) return state;
   for (int j = 3 * s->bodies; j < s->coords; j++)
     for (int velocity = 0; velocity < 2; velocity++)
       if (strcmp (pw_system_state_name (s, j + velocity * s->coords, text, sizeof text), name) == 0)
         return j + velocity * s->coords;
-  int search = near.best == NULL;
-  for (int i = 0; search && i < 2 * s->coords; i++) {
-    pw_nearest_try (&near, pw_system_state_name (s, i, text, sizeof text));
-    if (near.best == text) near.best = strcpy (best, text);
-  }
-  return pw_fail (error, PW_INPUT, "model %s has no state \"%s\"%s", s->model, name,
-                  pw_nearest_text (&near, hint, sizeof hint));
+  return query_missing (s, "state", 2 * s->coords, pw_system_state_name, &near, error);
 }
 
 /* The batch of a constraint equation, its element, and the number of the equation in the element. */
@@ -161,16 +165,10 @@ const char *pw_system_reaction_unit (const pw_system *s, int row) {
 
 int pw_system_find_reaction (const pw_system *s, const char *name, pw_error *error) {
   if (name == NULL) return pw_fail (error, PW_INPUT, "model %s: the name of a reaction is missing", s->model);
-  char best[120], text[120], hint[160];
-  pw_nearest near = { .sought = name };
+  char text[120];
   for (int i = 0; i < s->rows; i++)
     if (strcmp (pw_system_reaction_name (s, i, text, sizeof text), name) == 0) return i;
-  for (int i = 0; i < s->rows; i++) {
-    pw_nearest_try (&near, pw_system_reaction_name (s, i, text, sizeof text));
-    if (near.best == text) near.best = strcpy (best, text);
-  }
-  return pw_fail (error, PW_INPUT, "model %s has no reaction \"%s\"%s", s->model, name,
-                  pw_nearest_text (&near, hint, sizeof hint));
+  return query_missing (s, "reaction", s->rows, pw_system_reaction_name, &(pw_nearest){ .sought = name }, error);
 }
 
 char *pw_system_row_name (const pw_system *s, int row, char *buffer, size_t size) {
@@ -233,16 +231,9 @@ static int query_is_signal (const pw_system *s, int signal, const char *name) {
 
 int pw_system_find_signal (const pw_system *s, const char *name, pw_error *error) {
   if (name == NULL) return pw_fail (error, PW_INPUT, "model %s: the name of a signal is missing", s->model);
-  char best[120], text[120], hint[160];
-  pw_nearest near = { .sought = name };
   for (int i = 0; i < s->sources; i++)
     if (query_is_signal (s, i, name)) return i;
-  for (int i = 0; i < s->sources; i++) {
-    pw_nearest_try (&near, pw_system_signal_name (s, i, text, sizeof text));
-    if (near.best == text) near.best = strcpy (best, text);
-  }
-  return pw_fail (error, PW_INPUT, "model %s has no signal \"%s\"%s", s->model, name,
-                  pw_nearest_text (&near, hint, sizeof hint));
+  return query_missing (s, "signal", s->sources, pw_system_signal_name, &(pw_nearest){ .sought = name }, error);
 }
 
 char *pw_failed_signal (const pw_workspace *w, char *buffer, size_t size) {

@@ -54,34 +54,19 @@ static int methods_integrator (const char *name, const pw_method *const *own, co
 }
 
 static int methods_stabilisation (const pw_method *method, const char *name, int *stabilisation, pw_error *error) {
-  pw_nearest near = { .sought = name };
-  char hint[100];
-  for (const pw_stabilisation *s = method->refused; s && s->name; s++)
-    if (strcmp (s->name, name) == 0)
-      return pw_fail (error, PW_INPUT, "integrator %s has no %s: %s", method->name, name, s->about);
-  for (int i = 0; method->stabilisations[i].name; i++) {
-    pw_nearest_try (&near, method->stabilisations[i].name);
-    if (strcmp (method->stabilisations[i].name, name) == 0) {
-      *stabilisation = i;
-      return PW_OK;
-    }
-  }
-  return pw_fail (error, PW_INPUT, "integrator %s has no stabilisation \"%s\"%s", method->name, name,
-                  pw_nearest_text (&near, hint, sizeof hint));
+  char hint[PW_HINT];
+  int refused = pw_find_name (method->refused, sizeof *method->refused, name, hint);
+  if (refused >= 0)
+    return pw_fail (error, PW_INPUT, "integrator %s has no %s: %s", method->name, name, method->refused[refused].about);
+  *stabilisation = pw_find_name (method->stabilisations, sizeof *method->stabilisations, name, hint);
+  if (*stabilisation >= 0) return PW_OK;
+  return pw_fail (error, PW_INPUT, "integrator %s has no stabilisation \"%s\"%s", method->name, name, hint);
 }
 
 static int methods_choice (const pw_option *o, const char *text, double *value, pw_error *error) {
-  pw_nearest near = { .sought = text };
-  char hint[100];
-  for (int i = 0; o->choices[i]; i++) {
-    pw_nearest_try (&near, o->choices[i]);
-    if (strcmp (o->choices[i], text) == 0) {
-      *value = i;
-      return PW_OK;
-    }
-  }
-  return pw_fail (error, PW_INPUT, "method option %s cannot be \"%s\"%s", o->name, text,
-                  pw_nearest_text (&near, hint, sizeof hint));
+  char hint[PW_HINT];
+  *value = pw_find_name (o->choices, sizeof *o->choices, text, hint);
+  return *value < 0 ? pw_fail (error, PW_INPUT, "method option %s cannot be \"%s\"%s", o->name, text, hint) : PW_OK;
 }
 
 /* Decimal numbers, independent of the locale: digits, point, exponent. */

@@ -95,6 +95,28 @@ static void reports_write_gap (void) {
              "PW_MODEL (.about = \"fails\", .parameters = list, .parameters_size = sizeof (gap), .build = build);\n");
 }
 
+/* Every domain of a parameter has a text. */
+static void test_domains (void **state) {
+  (void)state;
+  cli_write ("domains.c",
+             "#include \"pinwheel.h\"\n"
+             "typedef struct { double r, n, p, c, f; } all;\n"
+             "static const pw_parameter list[] = { { PW_AT (all, r), 1, \"m\", \"any\", PW_REAL },\n"
+             "  { PW_AT (all, n), 1, \"m\", \"not below 0\", PW_NONNEGATIVE },\n"
+             "  { PW_AT (all, p), 1, \"m\", \"above 0\", PW_POSITIVE },\n"
+             "  { PW_AT (all, c), 1, \"\", \"number\", PW_COUNT },\n"
+             "  { PW_AT (all, f), 1, \"\", \"part\", PW_FRACTION }, { .name = NULL } };\n"
+             "static void build (pw_model *m, const void *p) {\n"
+             "  (void)p;\n  pw_add_body (m, &(pw_body){ .name = \"a\", .mass = 1, .inertia = 1 });\n}\n"
+             "PW_MODEL (.about = \"domains\", .parameters = list, .parameters_size = sizeof (all), .build = build);\n");
+  cli_good ("pinwheel show @/domains.c");
+  reports_shows ("  r  1  m             any\n");
+  reports_shows ("  n  1  m  >= 0       not below 0\n");
+  reports_shows ("  p  1  m  > 0        above 0\n");
+  reports_shows ("  c  1     1, 2, ...  number\n");
+  reports_shows ("  f  1     0 to 1     part\n");
+}
+
 /* A run that ends before its first step has nothing to draw, and leaves nothing. */
 static void test_nothing (void **state) {
   (void)state;
@@ -214,11 +236,11 @@ static void test_ladder (void **state) {
 
 int main (void) {
   const struct CMUnitTest tests[] = {
-    cmocka_unit_test (test_roller),   cmocka_unit_test (test_reactions),      cmocka_unit_test (test_signals),
-    cmocka_unit_test (test_unbound),  cmocka_unit_test (test_literals),       cmocka_unit_test (test_nothing),
-    cmocka_unit_test (test_failures), cmocka_unit_test (test_sorted),         cmocka_unit_test (test_figures_resumed),
-    cmocka_unit_test (test_ladder),   cmocka_unit_test (test_many_redundant), cmocka_unit_test (test_contradiction),
-    cmocka_unit_test (test_alone),    cmocka_unit_test (test_columns),
+    cmocka_unit_test (test_roller),        cmocka_unit_test (test_reactions), cmocka_unit_test (test_signals),
+    cmocka_unit_test (test_unbound),       cmocka_unit_test (test_literals),  cmocka_unit_test (test_nothing),
+    cmocka_unit_test (test_failures),      cmocka_unit_test (test_sorted),    cmocka_unit_test (test_figures_resumed),
+    cmocka_unit_test (test_domains),       cmocka_unit_test (test_ladder),    cmocka_unit_test (test_many_redundant),
+    cmocka_unit_test (test_contradiction), cmocka_unit_test (test_alone),     cmocka_unit_test (test_columns),
   };
   return cmocka_run_group_tests (tests, cli_setup, cli_teardown);
 }

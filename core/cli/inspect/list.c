@@ -21,9 +21,9 @@ static void list_row (pw_table *t, const char *name, const char *type, const cha
 /* "required" or the default; the domain of a number; the alternatives of a choice. */
 static void list_given (const pw_field *f, char *text, size_t size) {
   static const char *const zero[] = { "0", "[0, 0]", "[0, 0]", "", "0", "" };
-  static const char *const domain[] = { "", " (>= 0)", " (> 0)", " (1, 2, ...)" };
-  snprintf (text, size, "%s%s", f->required || f->type == PW_BODY ? "required" : zero[f->type],
-            f->type == PW_NUMBER ? domain[f->domain] : "");
+  const char *domain = f->type == PW_NUMBER ? pw_domain_text (f->domain) : "";
+  snprintf (text, size, *domain ? "%s (%s)" : "%s", f->required || f->type == PW_BODY ? "required" : zero[f->type],
+            domain);
   for (int i = 0; f->type == PW_CHOICE && f->choices[i]; i++) {
     size_t used = strlen (text);
     snprintf (text + used, size - used, "%s%s", i ? " | " : f->required ? ": " : "", f->choices[i]);
@@ -276,21 +276,17 @@ static int list_command (void *options, pw_error *error) {
   } part[] = { { "models", list_models, 0 },
                { "methods", list_methods, 1 },
                { "kinds", list_kinds, 1 },
-               { "signals", list_signals, 0 } };
+               { "signals", list_signals, 0 },
+               { .name = NULL } };
   const pw_cli_line *l = options;
   if (l->arguments == 0) return list_overview (error);
   const char *const sought = l->argument[0];
-  pw_nearest near = { .sought = sought };
-  for (size_t i = 0; i < sizeof part / sizeof *part; i++) {
-    if (strcmp (sought, part[i].name) == 0) {
-      if (l->arguments > 1 && !part[i].named)
-        return pw_fail (error, PW_INPUT, "unexpected argument \"%s\"; usage: pinwheel list %s", l->argument[1], sought);
-      return part[i].list (l->argument + 1, error);
-    }
-    pw_nearest_try (&near, part[i].name);
-  }
-  char hint[100];
-  return pw_fail (error, PW_INPUT, "there is no list of \"%s\"%s", sought, pw_nearest_text (&near, hint, sizeof hint));
+  char hint[PW_HINT];
+  int i = pw_find_name (part, sizeof *part, sought, hint);
+  if (i < 0) return pw_fail (error, PW_INPUT, "there is no list of \"%s\"%s", sought, hint);
+  if (l->arguments > 1 && !part[i].named)
+    return pw_fail (error, PW_INPUT, "unexpected argument \"%s\"; usage: pinwheel list %s", l->argument[1], sought);
+  return part[i].list (l->argument + 1, error);
 }
 
 const pw_command pw_cli_list = {

@@ -4,6 +4,7 @@
 #include <stdlib.h>
 #include "print_table.h"
 #include "show.h"
+#include "util.h"
 
 enum { SHOW_DIGITS = 6 };
 
@@ -44,7 +45,6 @@ static void show_differences (const pw_system *s) {
 }
 
 static void show_parameters (const pw_model *m) {
-  static const char *const domain[] = { "", ">= 0", "> 0", "1, 2, ..." };
   const pw_parameter *parameters = pw_model_table (m)->parameters;
   if (parameters == NULL || parameters->name == NULL) return;
   puts ("\nParameters, changed with --set NAME=VALUE");
@@ -55,7 +55,7 @@ static void show_parameters (const pw_model *m) {
       pw_cell (&t, -1, p->name);
       pw_cell_number (&t, 1, value, SHOW_DIGITS);
       pw_cell (&t, -1, p->unit ? p->unit : "");
-      pw_cell (&t, -1, domain[p->domain]);
+      pw_cell (&t, -1, pw_domain_text (p->domain));
       pw_cell (&t, -1, p->about ? p->about : "");
       if (value != p->value)
         snprintf (original, sizeof original, "default %s", pw_format (text, p->value, SHOW_DIGITS));

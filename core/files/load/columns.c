@@ -75,7 +75,7 @@ static int columns_names (const columns *c, const char *line) {
 
 /* Finds a column from its name in the first line, with or without its unit, or from its number. */
 static int columns_find (const columns *c, const char *first, int named, const char *name, int *index) {
-  char cell[100], unit[100], best[100] = "", hint[200], *end;
+  char cell[100], unit[100], hint[200], *end;
   pw_nearest near = { .sought = name };
   long number = strtol (name, &end, 10);
   if (*end == 0 && number >= 1 && number <= c->cells) return *index = (int)number - 1, PW_OK;
@@ -88,7 +88,6 @@ static int columns_find (const columns *c, const char *first, int named, const c
     cell[pw_unit_split (cell, unit, sizeof unit)] = 0;
     matches |= strcmp (cell, name) == 0;
     pw_nearest_try (&near, cell);
-    if (near.best == cell) near.best = strcpy (best, cell);
     if (matches && *index >= 0)
       return columns_fail (c, "columns %d and %d are both named \"%.60s\"", *index + 1, i + 1, name);
     if (matches) *index = i;

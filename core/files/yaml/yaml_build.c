@@ -142,7 +142,8 @@ static const pw_kind *build_kind (const pw_reader *r, const pw_node *node) {
   const char *kind = build_later_type (first);
   if (kind) pw_yaml_fail (r, first->at, "an element begins with its type: write {%s: NAME, ...}", kind);
   for (const pw_kind *const *k = pw_kinds; *k && !near.near; k++) /* "revolute", "hinge" */
-    if (build_contains_word ((*k)->about, first->text)) near.best = (*k)->name, near.near = 1;
+    if (build_contains_word ((*k)->about, first->text))
+      snprintf (near.best, sizeof near.best, "%s", (*k)->name), near.near = 1;
   pw_yaml_fail (r, first->at, "an element begins with its type, and there is no type \"%.60s\"%s", first->text,
                 near.near ? pw_nearest_text (&near, hint, sizeof hint) : ": see pinwheel list kinds");
   return NULL;

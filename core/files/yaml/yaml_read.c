@@ -116,16 +116,13 @@ int pw_yaml_pair (const pw_reader *r, const pw_node *node, const char *what, dou
 }
 
 int pw_yaml_choice (const pw_reader *r, const pw_node *node, const char *what, const char *const *choices, int *value) {
-  char hint[100];
-  const char *text;
+  char hint[PW_HINT];
+  const char *text = "";
   if (node == NULL || pw_yaml_text (r, node, what, &text) != PW_OK) return r->error->status;
-  pw_nearest near = { .sought = text };
-  for (int i = 0; choices[i]; i++) {
-    pw_nearest_try (&near, choices[i]);
-    if (strcmp (choices[i], text) == 0) return *value = i, PW_OK;
-  }
-  return pw_yaml_fail (r, node->at, "%s: there is no choice \"%.60s\"%s", what, text,
-                       pw_nearest_text (&near, hint, sizeof hint));
+  int i = pw_find_name (choices, sizeof *choices, text, hint);
+  if (i < 0) return pw_yaml_fail (r, node->at, "%s: there is no choice \"%.60s\"%s", what, text, hint);
+  *value = i;
+  return PW_OK;
 }
 
 void pw_yaml_suggest_bodies (const pw_reader *r, pw_nearest *near) {
