@@ -10,6 +10,8 @@
 
 enum { PW_MAX_OPTIONS = 12 };
 
+struct pw_scene_step;
+
 struct pw_run {
   const pw_system *s;
   pw_workspace *w;
@@ -318,12 +320,12 @@ void pw_specialised_close (pw_run *r);
 /* Uses it if it has the run's independent equations. */
 void pw_specialised_select (pw_run *r);
 
-/* As pw_run_accelerate and pw_project_state, if specialised code can do it: 1; 0 if not.  With `rate`, which receives
- * the ledger's rates, the workspace keeps its state; otherwise kinematics and J are those of the new one. */
-int pw_specialised_evaluate (pw_run *r, double t, const double *q, const double *v, double *a, double *lambda,
-                             double *rate);
+/* As pw_run_accelerate and pw_project_state, if specialised code can do it: 1; 0 if not. */
+int pw_specialised_evaluate (pw_run *r, double t, const double *q, const double *v, double *a, double *lambda);
 int pw_specialised_project (const pw_projector *p, pw_run *r, double t, double *q, double *v, double *a,
                             double *lambda);
+/* The stages of a step, if specialised code can evaluate all of them: 1; 0 if not.  Kinematics and J are not updated. */
+int pw_specialised_stages (pw_run *r, const struct pw_scene_step *x);
 
 /* ---- Initial conditions ---- */
 

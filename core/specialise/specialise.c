@@ -50,6 +50,14 @@ static void specialise_sources (const pw_specialise_scene *x) {
 
 /* ---- The whole ---- */
 
+/* #define EACH_name(X) X (0) X (1) ..., or, by pairs, X (0, pair) X (2, pair) X (4, one): loops without a counter, so that arrays
+ * stay in registers. */
+static void specialise_list (FILE *out, const char *name, int n, int by) {
+  fprintf (out, "#define EACH_%s(X)", name);
+  for (int i = 0; i < n; i += by) fprintf (out, by == 1 ? " X (%d)" : i + 1 < n ? " X (%d, pair)" : " X (%d, one)", i);
+  fputc ('\n', out);
+}
+
 static void specialise_constants (const pw_specialise_scene *x) {
   const pw_system *s = x->s;
   fprintf (x->out,
@@ -58,8 +66,12 @@ static void specialise_constants (const pw_specialise_scene *x) {
            s->bodies, s->coords, s->rows, s->holonomic, s->coords - 3 * s->bodies, x->entries, x->independent != NULL,
            s->entries, s->rheonomic > 0, s->state_dependent > 0);
   fputs ("\n#define GUARD(condition) \\\n  if (!(condition)) return 1\n", x->out);
-  fprintf (x->out, "#define INLINE static inline%s\n\n",
+  fprintf (x->out, "#define INLINE static inline%s\n",
            s->rows <= SPECIALISE_INLINE ? " __attribute__ ((always_inline))" : "");
+  specialise_list (x->out, "BODY", s->bodies, 1);
+  specialise_list (x->out, "ROW", s->rows, 1);
+  specialise_list (x->out, "HOLONOMIC", s->holonomic, 1);
+  specialise_list (x->out, "COORDINATES", s->coords, 2);
   for (int b = 0; b < s->bodies; b++) {
     fprintf (x->out, "/* body %d: ", b);
     pw_emit_name (x->out, s->body_name[b]);
@@ -84,9 +96,9 @@ static int specialise_write (pw_specialise_scene *x) {
   fputs ("\".  Compile with: cc -std=c11 -O2 -ffp-contract=off -fPIC -shared */\n", x->out);
   specialise_sources (x);
   specialise_constants (x);
+  specialise_source (x->out, "scene_head.inc", done, &count);
   pw_specialise_elements (x);
   int status = pw_specialise_algebra (x);
-  specialise_source (x->out, "scene_head.inc", done, &count);
   pw_specialise_signals (x);
   specialise_source (x->out, "scene_tail.inc", done, &count);
 
@@ -163,7 +175,7 @@ char *pw_system_source (const pw_system *s, const unsigned char *independent, pw
   if (status == PW_OK) {
     fprintf (x.out,
              "\nPW_EXPORT const pw_specialised pw_specialised_scene = {\n"
-             "  PW_SCENE_ABI, %d, %luu, independent, prepare, evaluate, project\n};\n",
+             "  PW_SCENE_ABI, %d, %luu, independent, prepare, evaluate, project, stages\n};\n",
              x.constants + 1, pw_system_shape (s));
   }
   if (x.out && fclose (x.out) != 0) status = PW_RESOURCE;

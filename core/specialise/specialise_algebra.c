@@ -62,7 +62,7 @@ enum { SPECIALISE_ACCELERATE, SPECIALISE_VELOCITY, SPECIALISE_POSITION };
 static int specialise_solve (const pw_specialise_scene *x, const pw_elimination *m, pw_emitter *e, int what) {
   static const char *const name[] = { "solve", "solve_velocity", "solve_position" };
   const pw_system *s = x->s;
-  char text[24];
+  char text[24], next[24];
   pw_term *right = malloc ((size_t)m->n * sizeof *right + 1);
   if (right == NULL) return PW_RESOURCE;
   for (int i = 0; i < m->n; i++) {
@@ -78,7 +78,10 @@ static int specialise_solve (const pw_specialise_scene *x, const pw_elimination 
            name[what], what == SPECIALISE_ACCELERATE ? "const double *f, " : "",
            what == SPECIALISE_ACCELERATE ? ", double *lambda" : "");
   pw_elimination_solve (m, e, right);
-  for (int j = 0; j < s->coords; j++) fprintf (x->out, "  a[%d] = %s;\n", j, pw_term_text (right[j], text));
+  for (int j = 0; j + 1 < s->coords; j += 2)
+    fprintf (x->out, "  store_pair (a + %d, (pw_pair){ %s, %s });\n", j, pw_term_text (right[j], text),
+             pw_term_text (right[j + 1], next));
+  if (s->coords % 2) fprintf (x->out, "  a[%d] = %s;\n", s->coords - 1, pw_term_text (right[s->coords - 1], text));
   for (int i = 0; i < s->rows && what == SPECIALISE_ACCELERATE; i++)
     fprintf (x->out, "  lambda[%d] = %s;\n", i, pw_term_text (right[s->coords + i], text));
   fputs ("}\n", x->out);

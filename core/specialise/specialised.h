@@ -5,7 +5,7 @@
 
 #include "pinwheel.h"
 
-#define PW_SCENE_ABI 2
+#define PW_SCENE_ABI 3
 #define PW_SCENE_PIVOT 4e-4 /* least pivot of a constraint equation relative to its diagonal entry: a squared sine */
 
 /* A run's data for specialised code.  Arrays over coordinates have `coordinates` entries, those over constraint
@@ -30,6 +30,24 @@ typedef struct pw_scene {
   double position, g, velocity, jv;
 } pw_scene;
 
+/* The nonzero weights of a row of a Runge-Kutta tableau. */
+typedef struct {
+  int count, stage[16];
+  double weight[16];
+} pw_rk_row;
+
+/* The stages of a step of size h.  Arrays over coordinates have room for three more entries. */
+typedef struct pw_scene_step {
+  int stages;           /* stage 0 is the beginning of the step, V[0] and A[0] its velocities and accelerations */
+  const pw_rk_row *row; /* [i] stage i > 0; [0] the new state */
+  double h;
+  const double *t;             /* stages: times */
+  const double *q0;            /* positions at the beginning */
+  double *const *V, *const *A; /* stages: velocities, accelerations */
+  double *const *R;            /* stages: the ledger's rates */
+  double *q, *v, *lambda;      /* q, v: the new state; multipliers of a stage */
+} pw_scene_step;
+
 /* Functions return 0, or 1 if the general engine has to do the work: an angle beyond the range of the own sine, a small
  * pivot, values that are not finite, a signal that failed.  Nothing but c, J and u is modified then. */
 typedef struct pw_specialised {
@@ -37,13 +55,14 @@ typedef struct pw_specialised {
   unsigned long shape;              /* pw_system_shape of the system */
   const unsigned char *independent; /* rows: 0 for redundant equations, which have the multiplier 0 */
   int (*prepare) (pw_scene *s);     /* 1: a constant pivot is too small */
-  /* Accelerations and multipliers at a state; c (bodies + 1, with the ground), J (entries of all elements), and the ledger's
-   * rates, unless NULL. */
-  int (*evaluate) (pw_scene *s, double t, const double *q, const double *v, double *a, double *lambda, double *rate,
+  /* Accelerations and multipliers at a state; c (bodies + 1, with the ground), J (entries of all elements). */
+  int (*evaluate) (pw_scene *s, double t, const double *q, const double *v, double *a, double *lambda,
                    pw_configuration *c, double *J);
   /* Projects a state onto the constraints in the metric of M, then as evaluate. */
   int (*project) (pw_scene *s, double t, double *q, double *v, double *a, double *lambda, pw_configuration *c,
                   double *J);
+  /* Evaluates stages 1, 2, ... of a step and combines them to the new state, which is not evaluated. */
+  int (*stages) (pw_scene *s, const pw_scene_step *x);
 } pw_specialised;
 
 /* Hash of what the generated text depends on besides the library's version. */

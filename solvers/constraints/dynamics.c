@@ -76,7 +76,7 @@ int pw_run_accelerate_evaluated (pw_run *r, const double *v, double *a, double *
 }
 
 int pw_run_accelerate (pw_run *r, double t, const double *q, const double *v, double *a, double *lambda) {
-  if (pw_specialised_evaluate (r, t, q, v, a, lambda, NULL)) return PW_OK;
+  if (pw_specialised_evaluate (r, t, q, v, a, lambda)) return PW_OK;
   int near, status = pw_evaluate_J_at (r->w, t, q, v);
   if (status != PW_OK) return status;
   pw_evaluate_gamma (r->w, lambda);

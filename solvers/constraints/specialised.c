@@ -75,11 +75,18 @@ static void specialised_evaluated (pw_run *r, const double *q, const double *v) 
   r->statistics.factorisations++;
 }
 
-int pw_specialised_evaluate (pw_run *r, double t, const double *q, const double *v, double *a, double *lambda,
-                             double *rate) {
+int pw_specialised_evaluate (pw_run *r, double t, const double *q, const double *v, double *a, double *lambda) {
   if (specialised_is_unsuitable (r)) return 0;
-  if (r->specialised->evaluate (r->scene, t, q, v, a, lambda, rate, r->w->configuration, r->w->J)) return 0;
+  if (r->specialised->evaluate (r->scene, t, q, v, a, lambda, r->w->configuration, r->w->J)) return 0;
   specialised_evaluated (r, q, v);
+  return 1;
+}
+
+int pw_specialised_stages (pw_run *r, const pw_scene_step *x) {
+  if (specialised_is_unsuitable (r) || r->specialised->stages (r->scene, x)) return 0;
+  r->statistics.rhs += x->stages - 1;
+  r->statistics.specialised += x->stages - 1;
+  r->statistics.factorisations += x->stages - 1;
   return 1;
 }
 

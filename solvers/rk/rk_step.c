@@ -64,7 +64,6 @@ static inline int rk_stage (pw_run *r, double t, double *v, double *a, double *r
     status = pw_nullspace_velocities (&d->nullspace, r, t, d->q, v);
     if (status == PW_OK) status = pw_nullspace_accelerate (r, v, a, d->lambda);
   } else {
-    if (pw_specialised_evaluate (r, t, d->q, v, a, d->lambda, rate)) return PW_OK;
     status = pw_run_accelerate (r, t, d->q, v, a, d->lambda);
   }
   if (status == PW_OK) pw_ledger_rates (r, d->lambda, rate);
@@ -79,11 +78,29 @@ static int rk_hold (pw_run *r) {
   return status;
 }
 
-/* Evaluates stages 1, 2, ...; stage 0 is the current state.  Returns as pw_run_accelerate. */
+/* 1 if the squares of all entries are finite. */
+static int rk_finite (const pw_run *r, const double *q, const double *v) {
+  double sum = 0;
+  for (int j = 0; j < r->s->coords; j++) sum += q[j] * q[j] + v[j] * v[j];
+  return sum < 1e300;
+}
+
+/* The same as rk_stages, by specialised code: 1; 0 if there is none, or it refuses a stage. */
+static int rk_stages_specialised (pw_run *r, double h) {
+  struct pw_method_data *d = r->data;
+  double t[PW_RK_STAGES];
+  if (r->specialised == NULL || d->held || d->null_space) return 0;
+  for (int i = 1; i < d->tableau->stages; i++) t[i] = pw_before_breakpoint (r, r->t + d->tableau->c[i] * h);
+  return pw_specialised_stages (
+      r, &(pw_scene_step){ d->tableau->stages, d->row, h, t, r->q, d->V, d->A, d->R, d->q, d->v, d->lambda });
+}
+
+/* Evaluates stages 1, 2, ...; stage 0 is the current state.  Their sum is the new state.  Returns as pw_run_accelerate. */
 static int rk_stages (pw_run *r, double h) {
   struct pw_method_data *d = r->data;
   const pw_tableau *b = d->tableau;
   d->V[0] = r->v, d->A[0] = r->a, d->R[0] = r->rate;
+  if (rk_stages_specialised (r, h)) return PW_OK;
   int status = d->held ? rk_hold (r) : PW_OK;
   for (int i = 1; i < b->stages && status == PW_OK; i++) {
     rk_combine (r, d->q, d->V[i], &d->row[i], h);
@@ -91,7 +108,9 @@ static int rk_stages (pw_run *r, double h) {
     status = rk_stage (r, t, d->V[i], d->A[i], d->R[i]);
   }
   if (d->held) pw_hold_signals (r->w, 0);
-  return status;
+  if (status != PW_OK) return status;
+  rk_combine (r, d->q, d->v, &d->row[0], h);
+  return rk_finite (r, d->q, d->v) ? PW_OK : PW_RETRY;
 }
 
 /* Projects the new state and evaluates its accelerations; *added grows by the energy this adds. */
@@ -109,21 +128,12 @@ static int rk_project (pw_run *r, double t, double *added) {
   return status;
 }
 
-/* 1 if the squares of all entries are finite. */
-static int rk_finite (const pw_run *r, const double *q, const double *v) {
-  double sum = 0;
-  for (int j = 0; j < r->s->coords; j++) sum += q[j] * q[j] + v[j] * v[j];
-  return sum < 1e300;
-}
-
 /* From the state reached to its successor at t1 = t + h, in d->q, d->v, d->a, d->lambda. */
 int pw_rk_step (pw_run *r, double h, double t1, int project, double *added) {
   struct pw_method_data *d = r->data;
   int status = d->null_space ? pw_nullspace_begin (&d->nullspace, r) : PW_OK;
   if (status == PW_OK) status = rk_stages (r, h);
   if (status != PW_OK) return status;
-  rk_combine (r, d->q, d->v, &d->row[0], h);
-  if (!rk_finite (r, d->q, d->v)) return PW_RETRY;
   if (project) return rk_project (r, t1, added);
   if (!d->null_space) return pw_run_accelerate (r, t1, d->q, d->v, d->a, d->lambda);
   status =

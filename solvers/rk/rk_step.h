@@ -5,12 +5,7 @@
 
 #include "nullspace.h"
 #include "rk.h"
-
-/* The nonzero weights of a row of the tableau. */
-typedef struct {
-  int count, stage[PW_RK_STAGES];
-  double weight[PW_RK_STAGES];
-} pw_rk_row;
+#include "specialised.h"
 
 struct pw_method_data {
   const pw_tableau *tableau;

@@ -156,6 +156,74 @@ static void test_report (void **state) {
   both_close (&x);
 }
 
+/* The EzyRoller driven by pulses of torque. */
+static pw_system *pulsed (void) {
+  const pw_signal pulse = { .type = PW_PULSE,
+                            .pulse = { .height = 0.2, .start = 0.1234, .width = 0.3, .period = 0.7 } };
+  pw_error error = { 0 };
+  pw_model *m = scene_model (&scene_ezyroller, "m2", 0.1, "I2", 0.01, NULL);
+  pw_model_set_signal (m, "rider", "value", &pulse, &error);
+  check_ok (error.status, &error);
+  return scene_compile (m);
+}
+
+/* Runs to samples inside steps that both reach; the same bits throughout. */
+static void same_runs (pw_run *a, pw_run *b, double span) {
+  pw_sample x, y;
+  for (int k = 1; k <= 7; k++) {
+    const double t = k * span / 7;
+    check_ok (pw_run_advance_to (a, t, span, NULL), NULL);
+    check_ok (pw_run_advance_to (b, t, span, NULL), NULL);
+    check_ok (pw_run_sample (a, t, &x, NULL), NULL);
+    check_ok (pw_run_sample (b, t, &y, NULL), NULL);
+    check_bits ("state, accelerations and multipliers", x.q, y.q, (int)pw_state_length (a->s));
+    check_bits ("work", &x.work, &y.work, 1);
+    check_bits ("loss", &x.loss, &y.loss, 1);
+  }
+  check_bits ("ledger", a->ledger, b->ledger, a->s->entries);
+  assert_memory_equal (&a->statistics, &b->statistics, sizeof a->statistics);
+}
+
+static int refuse_stages (pw_scene *s, const pw_scene_step *x) {
+  (void)s, (void)x;
+  return 1;
+}
+
+/* The stages of a step at once have the bits of single evaluations, between steps too, at breakpoints, and where guards leave
+ * some of them to the general engine. */
+static void test_stages (void **state) {
+  static const struct {
+    const char *model, *method; /* NULL: pulsed */
+    double step, span;
+  } all[] = {
+    { NULL, "rk4+projection", 1e-2, 3 },
+    { NULL, "erk5", 0, 3 },
+    { NULL, "erk8+projection", 0, 3 },
+    { "chaplygin-sleigh", "rk4", 1e-2, 1 },
+    { "snakeboard", "erk5+projection", 0, 2 },
+    { "differential-drive", "erk8+projection", 0, 4 },
+    { "car-tyres", "erk8", 0, 1 },
+    { "wheeled-snake", "erk5:inputs=held", 0, 1 },
+    { "roller-racer", "rk4+baumgarte", 1e-2, 1 },
+    { "n-four-bar", "rk4+projection", 1e-3, 3 },
+    { "hatchet-planimeter", "erk5+nullspace", 0, 1 },
+    { "redundant-parallelogram", "erk5", 0, 1 },
+  };
+  (void)state;
+  for (size_t i = 0; i < sizeof all / sizeof *all; i++) {
+    both x;
+    pw_settings set = { .step = all[i].step, .span = all[i].span };
+    both_open (&x, all[i].model ? scene_named (all[i].model, NULL, 0) : pulsed (), all[i].method, &set);
+    pw_specialised single = *pw_scene_code_table (x.code);
+    single.stages = refuse_stages;
+    set.specialised = &single;
+    pw_run *r = runs_open (x.s, all[i].method, &set);
+    same_runs (x.special, r, all[i].span);
+    pw_run_close (r);
+    both_close (&x);
+  }
+}
+
 /* Angles beyond the range of the own sine are evaluated by the general engine: the same bits. */
 static void test_angles (void **state) {
   both x;
@@ -193,10 +261,10 @@ static void test_guard (void **state) {
   both_open (&x, scene_named ("slider-crank", NULL, 0), "rk4+projection", NULL);
   const pw_specialised *code = pw_scene_code_table (x.code);
   pw_workspace *w = x.special->w;
-  assert_int_equal (code->evaluate (x.special->scene, 0, q, v, a, lambda, NULL, w->configuration, w->J), 1);
+  assert_int_equal (code->evaluate (x.special->scene, 0, q, v, a, lambda, w->configuration, w->J), 1);
   assert_int_equal (code->project (x.special->scene, 0, q, v, a, lambda, w->configuration, w->J), 1);
   q[2] = 1, q[5] = -1, q[0] = 0.5 * cos (1), q[3] = 1.5 * cos (1), q[1] = q[4] = 0.5 * sin (1), q[6] = 2 * cos (1);
-  assert_int_equal (code->evaluate (x.special->scene, 0, q, v, a, lambda, NULL, w->configuration, w->J), 0);
+  assert_int_equal (code->evaluate (x.special->scene, 0, q, v, a, lambda, w->configuration, w->J), 0);
   both_close (&x);
 }
 
@@ -258,7 +326,7 @@ int main (void) {
     cmocka_unit_test (test_gallery),     cmocka_unit_test (test_long_steps), cmocka_unit_test (test_adaptive_singular),
     cmocka_unit_test (test_report),      cmocka_unit_test (test_angles),     cmocka_unit_test (test_singular),
     cmocka_unit_test (test_another),     cmocka_unit_test (test_refused),    cmocka_unit_test (test_guard),
-    cmocka_unit_test (test_independent),
+    cmocka_unit_test (test_independent), cmocka_unit_test (test_stages),
   };
   return cmocka_run_group_tests (tests, NULL, NULL);
 }
