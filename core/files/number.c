@@ -1,5 +1,6 @@
 /* Numbers as text, the same in every locale. */
 #define _POSIX_C_SOURCE 200809L
+#define __STDC_WANT_IEC_60559_BFP_EXT__ 1 /* strfromd */
 #include <ctype.h>
 #include <locale.h>
 #include <math.h>
@@ -7,6 +8,11 @@
 #include <stdlib.h>
 #include <string.h>
 #include "pinwheel-files.h"
+
+/* printf takes a slower path once LAPACK has loaded libquadmath. */
+#ifndef __GLIBC__
+#define strfromd snprintf
+#endif
 
 /* Replaces the locale's decimal point, which may be several bytes long. */
 static void number_point (char *text) {
@@ -18,9 +24,11 @@ static void number_point (char *text) {
 }
 
 char *pw_format (char buffer[32], double value, int digits) {
+  static const char format[][8] = { "%.1g",  "%.2g",  "%.3g",  "%.4g",  "%.5g",  "%.6g",  "%.7g",  "%.8g", "%.9g",
+                                    "%.10g", "%.11g", "%.12g", "%.13g", "%.14g", "%.15g", "%.16g", "%.17g" };
   if (isnan (value)) return strcpy (buffer, "nan");
   if (isinf (value)) return strcpy (buffer, value > 0 ? "inf" : "-inf");
-  snprintf (buffer, 32, "%.*g", digits < 1 ? 1 : digits > 17 ? 17 : digits, value);
+  strfromd (buffer, 32, format[digits < 1 ? 0 : digits > 17 ? 16 : digits - 1], value);
   number_point (buffer);
   return buffer;
 }
