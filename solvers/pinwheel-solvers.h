@@ -194,6 +194,9 @@ typedef struct {
 } pw_member;
 extern const pw_member pw_members[];
 
+/* The libraries that the methods use, with their versions: "SUNDIALS 6.4.1, KLU 1.3.9, LAPACK 3.11.0". */
+char *pw_library_versions (char *buffer, size_t size);
+
 /* pw_system_source with the redundant constraint equations of the run. */
 char *pw_run_source (const pw_run *r, pw_error *error);
 

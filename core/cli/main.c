@@ -1,6 +1,8 @@
 /* The program `pinwheel`: finds the command and runs it. */
 #define _POSIX_C_SOURCE 200809L
 #include <errno.h>
+#include <gsl/gsl_version.h>
+#include <nlopt.h>
 #include <signal.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -19,9 +21,18 @@ static int main_usage (void) {
         "(./mine.yaml) is read; a model in C (./mine.c) is compiled on the fly.  The folders in the environment "
         "variable\n"
         "PINWHEEL_MODELS, separated by \":\", are searched as well.\n\n"
-        "`pinwheel COMMAND --help` describes a command and its options; `pinwheel --version` prints the version.\n"
+        "`pinwheel COMMAND --help` describes a command and its options; `pinwheel --version` prints versions.\n"
         "Exit status: 0 success, 1 resource error, 2 invalid input, 3 inconsistent initial conditions, 4 the method\n"
         "failed, 130 interrupted, 141 output closed.");
+  return 0;
+}
+
+static int main_version (void) {
+  char libraries[200];
+  int v[3];
+  nlopt_version (v, v + 1, v + 2);
+  printf ("pinwheel %s (plug-in ABI %d)\n%s, GSL %s, NLopt %d.%d.%d\n", PW_VERSION, PW_ABI,
+          pw_library_versions (libraries, sizeof libraries), gsl_version, v[0], v[1], v[2]);
   return 0;
 }
 
@@ -55,8 +66,7 @@ static int main_dispatch (int argc, const char **argv) {
   if (is_help && argc > 2) return main_command (2, (const char *[]){ argv[2], "--help", NULL });
   if (is_help) return main_usage ();
   if (strcmp (word, "--version") != 0) return main_command (argc - 1, argv + 1);
-  printf ("pinwheel %s (plug-in ABI %d)\n", PW_VERSION, PW_ABI);
-  return 0;
+  return main_version ();
 }
 
 int main (int argc, char **argv) {

@@ -150,6 +150,8 @@ int pw_output_check (pw_output *o, pw_error *error);
 
 /* Whether the output continues a file that is not empty. */
 int pw_output_continued (const pw_output *o);
+/* 1 if its path has this ending. */
+int pw_output_named (const pw_output *o, const char *ending);
 
 /* Continues the FNV-1a hash (Fowler, Noll, Vo) with more bytes; begin with PW_CHECK. */
 #define PW_CHECK 14695981039346656037u

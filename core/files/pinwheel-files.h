@@ -219,15 +219,32 @@ typedef struct {
 int pw_checkpoint_read (const char *path, pw_checkpoint *c, pw_error *error);
 void pw_checkpoint_free (pw_checkpoint *c);
 
+/* ---- NumPy archives ---- */
+
+/* Begin with { .f = stream }, add arrays, then end. */
+typedef struct {
+  FILE *f;
+  int count, room, failed;
+  struct pw_npz_entry *entry;
+  unsigned long at; /* bytes written */
+} pw_npz;
+
+/* Adds rows x columns numbers, by rows, each of `parts` doubles: 1, or 2 for complex ones; with 0 columns a vector.  The
+ * name has at most 300 bytes. */
+void pw_npz_add (pw_npz *z, const char *name, long rows, long columns, int parts, const double *value);
+/* Completes the archive, and frees what it needs in every case; errors of the stream stay there.  PW_RESOURCE. */
+int pw_npz_end (pw_npz *z, pw_error *error);
+
 /* ---- Tables ---- */
 
-/* A CSV of samples: one header line "t [s],frame.x [m],...", then a line per sample with 17 digits: states, contact
- * points, reactions (-lambda), scaled residuals, and energies if the run keeps a ledger.  Non-finite is nan.  Writing
- * updates the kinematics to the sample's state.  Errors: PW_RESOURCE; PW_METHOD if a signal of the model fails. */
+/* A table of samples: states, contact points, reactions (-lambda), scaled residuals, and energies if the run keeps a
+ * ledger.  As CSV it has a header line "t [s],frame.x [m],...", then a line per sample with 17 digits; non-finite is nan.
+ * If the output is named .npz, it is a NumPy archive with a vector per column, named without unit, which is written when the
+ * table is closed.  Errors: PW_RESOURCE; PW_METHOD if a signal of the model fails. */
 typedef struct pw_csv pw_csv;
 pw_csv *pw_csv_open (const pw_system *s, int ledger, pw_output *o, pw_error *error);
 int pw_csv_write (pw_csv *c, const pw_system *s, const pw_sample *sample, pw_error *error);
-void pw_csv_close (pw_csv *c);
+int pw_csv_close (pw_csv *c, pw_error *error); /* c may be NULL */
 
 /* ---- JSON ---- */
 

@@ -2,10 +2,12 @@
 #include <assert.h>
 #include <cvodes/cvodes.h>
 #include <idas/idas.h>
+#include <lapacke.h>
 #include <math.h>
 #include <stdint.h>
 #include <stdio.h>
 #include <string.h>
+#include <sundials/sundials_version.h>
 #include "sundials.h"
 #include "util.h"
 
@@ -151,4 +153,14 @@ int pw_sun_fail (pw_sun *x, int flag, int singular, const char *why, pw_error *e
           : flag == CV_TOO_MUCH_ACC ? "the tolerance is beyond the accuracy of the machine"
                                     : sun_reason (x, flag);
   return pw_fail (error, PW_METHOD, "t = %.6g s: %s (rtol %.3g)", r->t, why, r->settings.rtol);
+}
+
+char *pw_library_versions (char *buffer, size_t size) {
+  char sundials[30];
+  lapack_int v[3];
+  SUNDIALSGetVersion (sundials, sizeof sundials);
+  LAPACKE_ilaver (v, v + 1, v + 2);
+  snprintf (buffer, size, "SUNDIALS %s, KLU %d.%d.%d, LAPACK %d.%d.%d", sundials, KLU_MAIN_VERSION, KLU_SUB_VERSION,
+            KLU_SUBSUB_VERSION, (int)v[0], (int)v[1], (int)v[2]);
+  return buffer;
 }

@@ -386,6 +386,13 @@ static void test_help (void **state) {
   cli_good ("pinwheel --help");
   cli_good ("pinwheel --version");
   assert_int_equal (strncmp (cli_out, "pinwheel ", 9), 0);
+  for (int i = 0; i < 5; i++) {
+    const char *library = (const char *[]){ "\nSUNDIALS ", " KLU ", " LAPACK ", " GSL ", " NLopt " }[i],
+               *at = strstr (cli_out, library);
+    double major = 0;
+    assert_non_null (at);
+    assert_true (sscanf (at + strlen (library), "%lf", &major) == 1 && major > 0);
+  }
   for (int i = 0; i < 4; i++) {
     char line[60];
     snprintf (line, sizeof line, "pinwheel %s --help", command[i]);

@@ -30,7 +30,7 @@ static void locale_write (const char *model, const char *name) {
     check_ok (pw_run_sample (r, 0.05 * i, &sample, &error), &error);
     check_ok (pw_csv_write (csv, s, &sample, &error), &error);
   }
-  pw_csv_close (csv);
+  check_ok (pw_csv_close (csv, &error), &error);
   check_ok (pw_output_finish (o, &error), &error);
   snprintf (path, sizeof path, "%s/%s.json", cli_folder, name);
   o = pw_output_open (path, &error);

@@ -143,7 +143,10 @@ static int alloc_files (const char *path, pw_error *error) {
   pw_csv *csv = table ? pw_csv_open (s, 1, table, error) : NULL;
   status = csv ? pw_run_sample (r, 0, &sample, error) : error->status;
   if (status == PW_OK) status = pw_csv_write (csv, s, &sample, error);
-  pw_csv_close (csv);
+  if (status == PW_OK)
+    status = pw_csv_close (csv, error);
+  else
+    pw_csv_close (csv, &(pw_error){ 0 });
   if (table && status == PW_OK)
     status = pw_output_finish (table, error);
   else if (table)
@@ -190,16 +193,20 @@ static void test_verify (void **state) {
   alloc_each (alloc_verify, "verifier");
 }
 
+/* A table as text and as an archive. */
 static void test_files (void **state) {
   (void)state;
-  char path[] = "/tmp/pinwheel-alloc-XXXXXX", part[sizeof path + 10];
+  char path[] = "/tmp/pinwheel-alloc-XXXXXX", file[sizeof path + 10], part[sizeof path + 20];
   int fd = mkstemp (path);
   assert_true (fd >= 0);
   close (fd);
-  alloc_each (alloc_files, path);
-  snprintf (part, sizeof part, "%s.part", path);
-  unlink (path);
-  unlink (part);
+  for (int i = 0; i < 2; i++) {
+    snprintf (file, sizeof file, "%s%s", path, i ? ".npz" : "");
+    snprintf (part, sizeof part, "%s.part", file);
+    alloc_each (alloc_files, file);
+    unlink (file);
+    unlink (part);
+  }
 }
 
 static void test_texts (void **state) {

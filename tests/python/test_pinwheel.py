@@ -101,6 +101,16 @@ def test_same_bits_as_the_program(model, method, tmp_path):
         assert np.array_equal(r[name], expected[name]), name
 
 
+def test_archives_have_the_numbers_of_tables(tmp_path):
+    for name in "t.csv", "t.npz":
+        program("run", "ezyroller", "--t-end", "2", "--every", "0.25", "--energy", "-o", str(tmp_path / name))
+    expected = table(tmp_path / "t.csv")
+    with np.load(tmp_path / "t.npz") as archive:
+        assert archive.files == list(expected)
+        for name in archive.files:
+            assert np.array_equal(archive[name], expected[name]), name
+
+
 def test_units_are_those_of_the_program(tmp_path):
     program("run", "ezyroller", "--t-end", "0.1", "-o", str(tmp_path / "t.csv"))
     header = next(csv.reader(open(tmp_path / "t.csv", encoding="utf-8")))

@@ -62,7 +62,7 @@ if command -v pkg-config >/dev/null; then
     -Wl,-rpath,\"$(pkg-config --variable=libdir pinwheel)\"" && ./analyse ./car-trailer.yaml >analysis) >"$work/log" 2>&1 &&
     [ -s "$work/expected" ] && diff "$work/expected" "$work/analysis" >"$work/log"
   report 'a program that analyses, with the results in analysis.md' $?
-  [ "$(pkg-config --modversion pinwheel)" = "$("$top/bin/pinwheel" --version | cut -d' ' -f2)" ] &&
+  [ "$(pkg-config --modversion pinwheel)" = "$("$top/bin/pinwheel" --version | sed -n '1s/^pinwheel \([^ ]*\).*/\1/p')" ] &&
     grep -q "^version: $(pkg-config --modversion pinwheel)\$" docs/CITATION.cff
   report 'one version everywhere' $?
 else

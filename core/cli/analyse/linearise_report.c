@@ -2,7 +2,6 @@
 #include <math.h>
 #include <stdlib.h>
 #include "linearise.h"
-#include "npz.h"
 #include "print_table.h"
 #include "text.h"
 
@@ -258,7 +257,6 @@ int pw_linearise_npz (const pw_linearise *x, FILE *f, pw_error *error) {
   }
   for (int i = 0; i < n; i++) value[2 * i] = l->re[i], value[2 * i + 1] = l->im[i];
   pw_npz_add (&z, "eigenvalues", n, 1, 2, value);
-  pw_npz_end (&z);
   free (value);
-  return PW_OK;
+  return pw_npz_end (&z, error);
 }

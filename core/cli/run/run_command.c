@@ -44,6 +44,10 @@ static int run_open_output (run *x, int which, const char **path, pw_error *erro
 /* Opens the output files before anything is computed.  A table that is continued is opened once the checkpoint is
  * verified. */
 static int run_open_outputs (run *x, pw_error *error) {
+  const char *ending = x->csv_path ? strrchr (x->csv_path, '.') : NULL;
+  if (ending && strcmp (ending, ".npz") == 0 && (x->check.path || x->check.resume))
+    return pw_fail (error, PW_INPUT, "-o %s: an .npz archive cannot be continued after a checkpoint: write a .csv",
+                    x->csv_path);
   int status = x->animate_path ? pw_animation_check (x->animate_path, error) : PW_OK;
   if (status == PW_OK) status = run_uses (x, error);
   if (status == PW_OK) status = run_open_output (x, PW_RUN_SUMMARY, &x->json_path, error);
@@ -216,7 +220,8 @@ static int run_integrate (run *x, pw_error *error) {
 /* Completes the table, or keeps its rows as NAME.part; a run without steps leaves no file. */
 static void run_close_table (run *x, int good, pw_error *error) {
   pw_output **o = &x->output[PW_RUN_TABLE];
-  pw_csv_close (x->csv);
+  pw_error own = { 0 };
+  good &= pw_csv_close (x->csv, good ? error : &own) == PW_OK;
   int is_file = *o ? pw_output_is_file (*o) : x->csv_path != NULL;
   if (*o && good && pw_output_ready (*o, error) == PW_OK) return;
   x->lost = is_file && error->status == PW_RESOURCE;
@@ -342,7 +347,8 @@ static int run_command (void *options, pw_error *error) {
 static const struct poptOption run_options[] = {
   PW_METHOD_OPTIONS,
   PW_OPTION_GROUP ("Output"),
-  PW_TEXT_OPTION (run, csv_path, "output", 'o', "FILE.csv", "Write a table of samples; - is standard output"),
+  PW_TEXT_OPTION (run, csv_path, "output", 'o', "FILE.csv",
+                  "Write a table of samples, FILE.npz for NumPy; - is standard output"),
   PW_TEXT_OPTION (run, every_text, "every", 0, "DT", "Time between rows of the table [s] (default: a row per step)"),
   PW_TEXT_OPTION (run, json_path, "json", 0, "FILE", "Write a summary as JSON; - is standard output"),
   PW_TEXT_OPTION (run, plots_path, "plots", 0, "DIR", "Draw figures into a folder"),

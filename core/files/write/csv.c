@@ -1,4 +1,4 @@
-/* Tables of samples, one line each, readable by Octave, Python and gnuplot.
+/* Tables of samples, one line each, readable by Octave, Python and gnuplot, or as a NumPy archive.
  *
  *   t [s] | states of each body, of each internal coordinate | contact points | reactions | residuals | energies */
 #include <errno.h>
@@ -6,29 +6,96 @@
 #include <stdlib.h>
 #include "files.h"
 
+/* A table that becomes a NumPy archive. */
+typedef struct {
+  char (*name)[300];
+  double *value; /* rows x columns */
+  size_t columns, count, room;
+} csv_archive;
+
 struct pw_csv {
   pw_output *output;
   FILE *f;
+  csv_archive *archive;    /* NULL: lines of text */
   int cells;               /* written in the current line */
+  int failed;              /* 1: memory was exhausted */
   pw_workspace *workspace; /* for contact points; NULL if the system has none */
   int ledger;
   double (*contact)[3]; /* contact points of the system */
 };
 
+/* ---- Archives ---- */
+
+static int archive_reserve (csv_archive *a) {
+  size_t room = 2 * a->room + 1024;
+  double *more = a->count < a->room ? a->value : realloc (a->value, room * sizeof *more);
+  if (more == NULL) return PW_RESOURCE;
+  if (a->count == a->room) a->value = more, a->room = room;
+  return PW_OK;
+}
+
+static void archive_number (pw_csv *c, double value) {
+  if (!c->failed && archive_reserve (c->archive) != PW_OK) c->failed = 1;
+  if (!c->failed) c->archive->value[c->archive->count++] = value;
+}
+
+static void archive_name (pw_csv *c, const char *name) {
+  csv_archive *a = c->archive;
+  char (*more)[300] = c->failed ? NULL : realloc (a->name, (a->columns + 1) * sizeof *more);
+  c->failed |= more == NULL;
+  if (more == NULL) return;
+  a->name = more;
+  snprintf (a->name[a->columns++], sizeof *a->name, "%s", name);
+}
+
+static int archive_write (pw_csv *c, pw_error *error) {
+  const csv_archive *a = c->archive;
+  pw_npz z = { .f = c->f };
+  long rows = a->columns ? (long)(a->count / a->columns) : 0;
+  double *column = malloc (((size_t)rows + 1) * sizeof *column);
+  c->failed |= column == NULL;
+  for (size_t i = 0; i < a->columns && !c->failed; i++) {
+    for (long row = 0; row < rows; row++) column[row] = a->value[(size_t)row * a->columns + i];
+    pw_npz_add (&z, a->name[i], rows, 0, 1, column);
+  }
+  free (column);
+  int status = pw_npz_end (&z, error);
+  return c->failed ? pw_fail (error, PW_RESOURCE, "out of memory while writing a table") : status;
+}
+
+static void archive_free (csv_archive *a) {
+  if (a == NULL) return;
+  free (a->name);
+  free (a->value);
+  free (a);
+}
+
+/* ---- Cells ---- */
+
 static void csv_number (pw_csv *c, double value) {
   char text[32];
+  if (c->archive) {
+    archive_number (c, value);
+    return;
+  }
   if (c->cells++) fputc (',', c->f);
   fputs (isfinite (value) ? pw_format (text, value, 17) : "nan", c->f);
 }
 
 static void csv_name (pw_csv *c, const char *name, const char *unit) {
   int has_unit = unit && *unit;
+  if (c->archive) {
+    archive_name (c, name);
+    return;
+  }
   fprintf (c->f, "%s%s%s%s%s", c->cells++ ? "," : "", name, has_unit ? " [" : "", has_unit ? unit : "",
            has_unit ? "]" : "");
 }
 
 static int csv_end (pw_csv *c, pw_error *error) {
   c->cells = 0;
+  if (c->failed) return pw_fail (error, PW_RESOURCE, "out of memory while writing a table");
+  if (c->archive) return PW_OK;
   fputc ('\n', c->f);
   return pw_output_check (c->output, error);
 }
@@ -84,25 +151,34 @@ static int csv_header (pw_csv *c, const pw_system *s, pw_error *error) {
   return csv_end (c, error);
 }
 
+static void csv_free (pw_csv *c) {
+  if (c == NULL) return;
+  pw_workspace_free (c->workspace);
+  archive_free (c->archive);
+  free (c->contact);
+  free (c);
+}
+
 pw_csv *pw_csv_open (const pw_system *s, int ledger, pw_output *o, pw_error *error) {
   pw_csv *c = calloc (1, sizeof *c);
+  int archive = pw_output_named (o, ".npz");
   if (c) c->contact = calloc ((size_t)pw_system_contacts (s) + 1, sizeof *c->contact);
-  if (c && c->contact) {
+  if (c && archive) c->archive = calloc (1, sizeof *c->archive);
+  if (c && c->contact && (c->archive || !archive)) {
     c->output = o, c->f = pw_output_stream (o), c->ledger = ledger;
     if (pw_system_contacts (s) > 0) c->workspace = pw_workspace_new (s, error);
     if ((c->workspace || pw_system_contacts (s) == 0) && (pw_output_continued (o) || csv_header (c, s, error) == PW_OK))
       return c;
   }
   pw_fail (error, PW_RESOURCE, "out of memory while writing a table");
-  pw_csv_close (c);
+  csv_free (c);
   return NULL;
 }
 
-void pw_csv_close (pw_csv *c) {
-  if (c == NULL) return;
-  pw_workspace_free (c->workspace);
-  free (c->contact);
-  free (c);
+int pw_csv_close (pw_csv *c, pw_error *error) {
+  int status = c && c->archive ? archive_write (c, error) : PW_OK;
+  csv_free (c);
+  return status;
 }
 
 /* ---- Samples ---- */

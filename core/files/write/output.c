@@ -294,6 +294,11 @@ static int output_check (int file, pw_mark *mark) {
   return PW_OK;
 }
 
+int pw_output_named (const pw_output *o, const char *ending) {
+  size_t length = strlen (o->path), end = strlen (ending);
+  return length > end && strcmp (o->path + length - end, ending) == 0;
+}
+
 int pw_output_continued (const pw_output *o) {
   return o->continued;
 }

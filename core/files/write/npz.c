@@ -1,0 +1,118 @@
+/* NumPy archives (.npz): a zip file without compression, of one .npy file for each array (numpy.lib.format, version 1.0;
+ * PKWARE's APPNOTE). */
+#include <stdlib.h>
+#include <string.h>
+#include "files.h"
+
+enum {
+  NPZ_HEAD = 128,
+  NPZ_MOST = 65535
+}; /* bytes before the data of a .npy file, a multiple of 64; files of an archive */
+
+struct pw_npz_entry {
+  char name[312];
+  unsigned long check, size, offset;
+};
+
+/* CRC-32 of zip files, continued from `check`, four bits at a time; begins with 0. */
+static unsigned long npz_check (unsigned long check, const void *data, size_t size) {
+  static const unsigned long part[16] = { 0x00000000, 0x1db71064, 0x3b6e20c8, 0x26d930ac, 0x76dc4190, 0x6b6b51f4,
+                                          0x4db26158, 0x5005713c, 0xedb88320, 0xf00f9344, 0xd6d6a3e8, 0xcb61b38c,
+                                          0x9b64c2b0, 0x86d3d2d4, 0xa00ae278, 0xbdbdf21c };
+  check ^= 0xffffffff;
+  for (const unsigned char *c = data, *end = c + size; c < end; c++) {
+    check ^= *c;
+    for (int half = 0; half < 2; half++) check = check >> 4 ^ part[check & 15];
+  }
+  return check ^ 0xffffffff;
+}
+
+static void npz_bytes (pw_npz *z, const void *data, size_t size) {
+  fwrite (data, 1, size, z->f);
+  z->at += size;
+}
+
+/* A number of `bytes` bytes, the lowest first. */
+static void npz_number (pw_npz *z, unsigned long value, int bytes) {
+  for (; bytes > 0; bytes--, value >>= 8) npz_bytes (z, &(unsigned char){ (unsigned char)value }, 1);
+}
+
+/* What the header of a file and its entry in the directory have in common: version 2.0, no flags, stored, 1 January
+ * 1980, checksum, compressed and original size, lengths of the name and of extra fields. */
+static void npz_describe (pw_npz *z, const struct pw_npz_entry *e) {
+  npz_number (z, 20, 2);
+  npz_number (z, 0, 4);
+  npz_number (z, 0x00210000, 4);
+  npz_number (z, e->check, 4);
+  npz_number (z, e->size, 4);
+  npz_number (z, e->size, 4);
+  npz_number (z, strlen (e->name), 2);
+  npz_number (z, 0, 2);
+}
+
+static struct pw_npz_entry *npz_entry (pw_npz *z) {
+  if (z->count == z->room) {
+    int room = 2 * z->room + 8;
+    struct pw_npz_entry *more = realloc (z->entry, (size_t)room * sizeof *more);
+    if (more == NULL) return NULL;
+    z->entry = more;
+    z->room = room;
+  }
+  return z->entry + z->count++;
+}
+
+void pw_npz_add (pw_npz *z, const char *name, long rows, long columns, int parts, const double *value) {
+  char head[NPZ_HEAD + 1] = "\x93NUMPY\x01", shape[60];
+  size_t size = (size_t)rows * (size_t)(columns ? columns : 1) * (size_t)parts * sizeof *value;
+  struct pw_npz_entry *e = z->failed ? NULL : npz_entry (z);
+  if (e == NULL) {
+    z->failed = 1;
+    return;
+  }
+  snprintf (shape, sizeof shape, columns ? "%ld, %ld" : "%ld,", rows, columns);
+  head[8] = NPZ_HEAD - 10;
+  sprintf (head + 10, "{'descr': '%c%s', 'fortran_order': False, 'shape': (%s), }",
+           *(const char *)&(int){ 1 } ? '<' : '>', parts == 2 ? "c16" : "f8", shape);
+  memset (strchr (head + 10, 0), ' ', (size_t)(head + NPZ_HEAD - strchr (head + 10, 0)));
+  head[NPZ_HEAD - 1] = '\n';
+  snprintf (e->name, sizeof e->name, "%.300s.npy", name);
+  e->check = npz_check (npz_check (0, head, NPZ_HEAD), value, size);
+  e->size = NPZ_HEAD + size;
+  e->offset = z->at;
+  npz_number (z, 0x04034b50, 4);
+  npz_describe (z, e);
+  npz_bytes (z, e->name, strlen (e->name));
+  npz_bytes (z, head, NPZ_HEAD);
+  npz_bytes (z, value, size);
+}
+
+/* The directory, and the end record: disk 0, entries, size and offset of the directory, no comment. */
+static void npz_directory (pw_npz *z) {
+  unsigned long start = z->at;
+  for (const struct pw_npz_entry *e = z->entry; e < z->entry + z->count; e++) {
+    npz_number (z, 0x02014b50, 4);
+    npz_number (z, 20, 2);
+    npz_describe (z, e);
+    npz_number (z, 0, 6); /* comment, disk, internal attributes */
+    npz_number (z, 0, 4);
+    npz_number (z, e->offset, 4);
+    npz_bytes (z, e->name, strlen (e->name));
+  }
+  unsigned long size = z->at - start;
+  npz_number (z, 0x06054b50, 4);
+  npz_number (z, 0, 4);
+  npz_number (z, (unsigned long)z->count, 2);
+  npz_number (z, (unsigned long)z->count, 2);
+  npz_number (z, size, 4);
+  npz_number (z, start, 4);
+  npz_number (z, 0, 2);
+}
+
+int pw_npz_end (pw_npz *z, pw_error *error) {
+  npz_directory (z);
+  free (z->entry);
+  z->entry = NULL;
+  if (z->failed) return pw_fail (error, PW_RESOURCE, "out of memory");
+  if (z->at <= 0xffffffff && z->count <= NPZ_MOST) return PW_OK;
+  return pw_fail (error, PW_RESOURCE, "an .npz archive has at most 4 GB and %d arrays; write a .csv", NPZ_MOST);
+}
