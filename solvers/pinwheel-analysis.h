@@ -175,6 +175,74 @@ int pw_steady_suggest (pw_steady *x, pw_initial_value *hold, int most);
 int pw_steady_follow (pw_steady *x, const double *q, const double *v, double parameter, int direction, pw_error *error);
 int pw_steady_next (pw_steady *x, pw_steady_motion *out, pw_error *error);
 
+/* ---- Periodic motions (periodic.c) ---- */
+
+/* The period of all signals of which it is known, harmonic ones and repeated pulses [s]; 0: there are none; NaN: they have
+ * none in common. */
+double pw_system_period (const pw_system *s);
+
+typedef struct {
+  const char *method;          /* default "erk8+projection" */
+  double rtol;                 /* default 1e-12 */
+  long max_steps;              /* as in pw_settings, per period */
+  int (*stop) (void *context); /* as in pw_settings; or NULL */
+  void *stop_context;
+  double t;           /* initial time [s] */
+  double period;      /* [s]; 0: that of the signals at each value of the parameter; with `free` the first guess */
+  int periods;        /* of the signals; default 1 */
+  int free;           /* 1: the period is sought; signals must not change with time */
+  double first, last; /* range of the parameter */
+  pw_system *(*compile) (void *context, double value, pw_error *error); /* as in pw_steady_settings */
+  void *context;
+  int points; /* in the range, at least; default 20 */
+} pw_periodic_settings;
+
+typedef enum {
+  PW_PERIODIC_POINT,
+  PW_PERIODIC_FOLD,  /* the parameter has an extremum */
+  PW_PERIODIC_REAL,  /* a multiplier passes 1 elsewhere: branches cross */
+  PW_PERIODIC_FLIP,  /* a multiplier passes -1: period doubling */
+  PW_PERIODIC_TORUS, /* a conjugate pair crosses the unit circle (Neimark-Sacker) */
+  PW_PERIODIC_END    /* the end of the range, of a closed branch, or where Newton's method fails at the least step */
+} pw_periodic_event;
+
+/* A relative periodic motion: after one period the state is the initial one, displaced by symmetries of the system: the
+ * whole in the plane, and angles on which nothing depends.  Arrays are valid until the next call. */
+typedef struct {
+  double parameter, period;
+  const double *q, *v; /* initial state: pw_system_coordinates */
+  const double *end;   /* state after one period: 2 x coordinates */
+  double rotation;     /* of the whole in one period, without spins [rad] */
+  double residual;     /* the largest, in units of the scene: L, L/T */
+  int iterations;
+  int multipliers; /* Floquet multipliers: those that are not trivial, the largest first, then `trivial` ones */
+  int trivial;     /* of symmetries and, with a free period, of a shift in time */
+  const double *re, *im;
+  int unstable; /* number of those above 1 in absolute value, by more than 1e-6 */
+  pw_periodic_event event;
+} pw_periodic_orbit;
+
+typedef struct pw_periodic pw_periodic;
+
+/* Opens a search.  The system must outlive it.  Errors: as pw_run_open; PW_INPUT with the first signal that does not
+ * have the period, or with a free period changes with time.  Close it in every case. */
+pw_periodic *pw_periodic_open (const pw_system *s, const pw_periodic_settings *settings, pw_error *error);
+void pw_periodic_close (pw_periodic *x);
+
+/* Newton's method at a value of the parameter, from the state after `settle` >= 0 of the periods, with corrections of least
+ * norm.  A free period that is not given is that of the first return of the motion then.  PW_RETRY, without an error, if it
+ * does not converge: the residual is that where it ended. */
+int pw_periodic_solve (pw_periodic *x, int settle, double parameter, pw_periodic_orbit *out, pw_error *error);
+/* Why the last motion could not be computed, or "". */
+const char *pw_periodic_reason (const pw_periodic *x);
+/* Number of symmetries, as pw_steady_symmetries. */
+int pw_periodic_symmetries (const pw_periodic *x);
+
+/* Follows the branch of the motion last found towards the end of the range (direction 1) or its begin (-1); then returns
+ * its points, the first one included, and events in between, until PW_PERIODIC_END (then perhaps with a reason). */
+int pw_periodic_follow (pw_periodic *x, int direction, pw_error *error);
+int pw_periodic_next (pw_periodic *x, pw_periodic_orbit *out, pw_error *error);
+
 PW_END
 
 #endif

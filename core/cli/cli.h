@@ -44,11 +44,13 @@ int pw_limit_fail (const pw_limit *l, double t, pw_error *error);
 /* ---- Commands ---- */
 
 /* All commands, in the order of `pinwheel --help`; the table of `list` is pw_cli_list. */
-#define PW_COMMANDS(X) \
-  X (list)             \
-  X (show)             \
-  X (check)            \
-  X (linearise) X (steady) X (run) X (sensitivity) X (sweep) X (fit) X (optimise) X (compare) X (drift) X (page) X (new)
+#define PW_COMMANDS(X)                                                                                          \
+  X (list)                                                                                                      \
+  X (show)                                                                                                      \
+  X (check)                                                                                                     \
+  X (linearise)                                                                                                 \
+  X (steady) X (periodic) X (run) X (sensitivity) X (sweep) X (fit) X (optimise) X (compare) X (drift) X (page) \
+      X (new)
 
 /* A command line: its arguments and the options shared by several commands, NULL if not given.  The structure of
  * options of every command begins with one. */
@@ -162,6 +164,23 @@ void pw_cli_close_model (pw_cli_model *m);
  * ("--set") is for messages. */
 int pw_cli_apply (pw_model *m, const char *option, const char **list,
                   int (*set) (pw_model *m, const char *name, double value, pw_error *error), pw_error *error);
+
+/* A parameter that varies continuously, of --vary NAME=FIRST:LAST (vary.c).  Line and model are set by the caller. */
+typedef struct {
+  const pw_cli_line *line;
+  const pw_cli_model *m;
+  const char *text; /* of the option */
+  char name[200];
+  double first, last;
+} pw_cli_vary;
+
+/* Reads the option; the name need not be that of a parameter. */
+int pw_cli_vary_read (pw_cli_vary *v, const char *text, pw_error *error);
+const pw_parameter *pw_cli_vary_parameter (const pw_cli_vary *v); /* of the model; NULL: it has none of that name */
+/* PW_INPUT if that parameter cannot vary in the range, or is also set. */
+int pw_cli_vary_check (const pw_cli_vary *v, pw_error *error);
+/* The system at a value of the parameter; for pw_steady_settings.compile. */
+pw_system *pw_cli_vary_compile (void *vary, double value, pw_error *error);
 
 /* A path, relative to the current directory if that contains it; the result may be in `buffer`. */
 const char *pw_cli_short_path (const char *path, char *buffer, size_t size);

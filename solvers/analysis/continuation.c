@@ -8,17 +8,19 @@
 /* NEWTON_MOST: iterations of a solution, of a point of a branch.  BRANCH_TURN: cosine of the largest angle between the
  * tangents of successive points; BRANCH_APART: largest correction of a predictor, relative to the step. */
 enum { NEWTON_MOST = 60, BRANCH_MOST = 8, NEWTON_HALVINGS = 10, LOCATE_MOST = 60 };
-static const double BRANCH_TURN = 0.96, BRANCH_APART = 0.3, BRANCH_GROW = 1.5, NEWTON_DAMPING = 0.1;
+static const double BRANCH_TURN = 0.96, BRANCH_APART = 0.3, BRANCH_GROW = 1.5, NEWTON_DAMPING = 0.1, BRANCH_END = 1e-9;
 
 int pw_branch_open (pw_branch *b, const pw_branch_equations *of, pw_error *error) {
   size_t n = (size_t)of->unknowns + 1, m = (size_t)of->equations + n, large = n > m ? n : m;
   *b = (pw_branch){ .of = *of, .room = (int)(8 * large + 200) };
   if (!(b->of.rank > 0)) b->of.rank = 1e-9;
-  const pw_array array[] = {
-    { &b->at.u, n },   { &b->at.tangent, n },   { &b->before.u, n },  { &b->before.tangent, n },
-    { &b->next.u, n }, { &b->next.tangent, n }, { &b->F, large },     { &b->J, m * n },
-    { &b->du, large }, { &b->trial, n },        { &b->condition, n }, { &b->work, (size_t)b->room + 34 * large }
-  };
+  const pw_array array[] = { { &b->at.u, n },        { &b->at.tangent, n },
+                             { &b->before.u, n },    { &b->before.tangent, n },
+                             { &b->next.u, n },      { &b->next.tangent, n },
+                             { &b->F, large },       { &b->J, m * n },
+                             { &b->du, large },      { &b->trial, n },
+                             { &b->condition, n },   { &b->end.u, n },
+                             { &b->end.tangent, n }, { &b->work, (size_t)b->room + 34 * large } };
   b->room += (int)(34 * large);
   b->memory = pw_alloc_arrays (array, sizeof array / sizeof *array);
   b->pivot = malloc (n * sizeof *b->pivot);
@@ -231,4 +233,40 @@ int pw_branch_locate (pw_branch *b,
     s[side] = middle, f[side] = value, last = side;
   }
   return PW_OK;
+}
+
+/* ---- Ends ---- */
+
+static int branch_beyond (void *context, const pw_branch_point *point, double *value, pw_error *error) {
+  const pw_branch *b = context;
+  (void)error;
+  *value = point->u[b->of.unknowns] - b->limit;
+  return PW_OK;
+}
+
+int pw_branch_at_end (pw_branch *b, int *ended, pw_error *error) {
+  int p = b->of.unknowns;
+  size_t bytes = ((size_t)p + 1) * sizeof *b->at.u;
+  if (b->at.u[p] <= 1 && b->at.u[p] >= 0) return PW_OK;
+  *ended = 1;
+  b->limit = b->at.u[p] > 1;
+  int status = pw_branch_locate (b, branch_beyond, b, BRANCH_END, &b->end, error);
+  if (status != PW_OK) return status;
+  b->end.u[p] = b->limit;
+  status = pw_branch_solve (b, b->end.u, error);
+  memcpy (b->at.u, b->end.u, bytes);
+  memcpy (b->at.tangent, b->end.tangent, bytes);
+  b->folded = b->before.tangent[p] * b->at.tangent[p] < 0;
+  return status;
+}
+
+int pw_branch_closed (const pw_branch *b, const pw_branch_point *first) {
+  double step = 0, off = 0, before = 0, now = 0;
+  for (int j = 0; j <= b->of.unknowns; j++) {
+    step += pow (b->at.u[j] - b->before.u[j], 2);
+    off += pow (b->at.u[j] - first->u[j], 2);
+    before += (b->before.u[j] - first->u[j]) * first->tangent[j];
+    now += (b->at.u[j] - first->u[j]) * first->tangent[j];
+  }
+  return off < 1.2 * step && before < 0 && now >= 0;
 }

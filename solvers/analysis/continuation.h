@@ -40,7 +40,8 @@ typedef struct {
   int rank;                   /* of dF/dx (or of dF with the arclength condition) there */
   int folded;                 /* 1: p has an extremum between the last two points */
   /* private */
-  pw_branch_point next;
+  pw_branch_point next, end;
+  double limit; /* of p, sought */
   double *F, *J, *du, *trial, *work, *condition;
   int *pivot, room;
   char *memory;
@@ -71,6 +72,11 @@ int pw_branch_between (pw_branch *b, double s, pw_branch_point *point, pw_error 
 int pw_branch_locate (pw_branch *b,
                       int (*test) (void *context, const pw_branch_point *point, double *value, pw_error *error),
                       void *context, double accuracy, pw_branch_point *point, pw_error *error);
+
+/* If the point reached is beyond the range 0 to 1 of p: moves it back to its end, and sets *ended. */
+int pw_branch_at_end (pw_branch *b, int *ended, pw_error *error);
+/* 1 if the last step has passed the point `first`, in the same direction: the branch is closed. */
+int pw_branch_closed (const pw_branch *b, const pw_branch_point *first);
 
 /* For pw_branch_locate: the last entry of the tangent. */
 int pw_branch_fold (void *context, const pw_branch_point *point, double *value, pw_error *error);

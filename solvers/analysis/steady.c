@@ -6,9 +6,9 @@
 #include "util.h"
 
 /* STEADY_EXACT: residual of a solution, in units of the scene;
- * STEADY_SLOW: rates that may be round-off at a double root. */
-enum { STEADY_POINTS = 50, STEADY_TIMES = 7 };
-static const double STEADY_EXACT = 1e-9, STEADY_SLOW = 1e-4;
+ * STEADY_SLOW: rates that may be round-off at a double root; SIGNAL_SAME: a difference of signals that counts as 0. */
+enum { STEADY_POINTS = 50, STEADY_TIMES = 16 };
+static const double STEADY_EXACT = 1e-9, STEADY_SLOW = 1e-4, SIGNAL_SAME = 1e-8;
 
 /* ---- Opening ---- */
 
@@ -49,25 +49,39 @@ static int steady_arrays (pw_steady *x) {
   return PW_OK;
 }
 
+int pw_signals_change (pw_run *r, double t, double period, double span, int *changed, pw_error *error) {
+  pw_workspace *w = r->w;
+  int count = 3 * r->s->sources, status = PW_OK;
+  double *before = calloc (3 * (size_t)count + 1, sizeof *before), *largest = before + count, *off = largest + count;
+  if (before == NULL) return pw_fail_memory (r->s, error);
+  for (int k = 1; status == PW_OK && k <= STEADY_TIMES; k++) {
+    double at = period > 0 ? t + span * fmod (0.618034 * k, 1) : t, part = k / (double)STEADY_TIMES;
+    status = pw_update_kinematics (w, at, r->q, r->v);
+    if (status == PW_OK && count) memcpy (before, w->u, (size_t)count * sizeof *before);
+    if (status == PW_OK)
+      status = pw_update_kinematics (w, period > 0 ? at + period : t + span * part * part, r->q, r->v);
+    for (int i = 0; status == PW_OK && i < count; i++) {
+      off[i] = pw_largest (off[i], fabs (w->u[i] - before[i]));
+      largest[i] = fmax (largest[i], fmax (fabs (before[i]), fabs (w->u[i])));
+    }
+  }
+  *changed = -1;
+  for (int i = count; i-- > 0;)
+    if (!(off[i] <= SIGNAL_SAME * largest[i])) *changed = i / 3;
+  free (before);
+  return status == PW_OK ? PW_OK : pw_fail_signal (t, error);
+}
+
 /* PW_INPUT with the first signal that changes with time, in the initial state, within the span. */
 static int steady_constant (pw_steady *x, pw_error *error) {
-  pw_run *r = x->at[0].r;
-  pw_workspace *w = r->w;
-  double *before = calloc (3 * (size_t)x->s->sources + 1, sizeof *before), from = x->set.t;
-  int changed = -1, status = before ? pw_update_kinematics (w, from, r->q, r->v) : PW_RESOURCE;
-  for (int i = 0; status == PW_OK && i < 3 * x->s->sources; i++) before[i] = w->u[i];
-  for (int k = 1; status == PW_OK && changed < 0 && k <= STEADY_TIMES; k++) {
-    status = pw_update_kinematics (w, from + x->set.span * pow (k / (double)STEADY_TIMES, 2), r->q, r->v);
-    for (int i = 0; status == PW_OK && changed < 0 && i < 3 * x->s->sources; i++)
-      if (!(fabs (w->u[i] - before[i]) <= 1e-9 * fabs (before[i]))) changed = i / 3;
-  }
-  free (before);
-  if (status == PW_RESOURCE) return pw_fail_memory (x->s, error);
-  if (status != PW_OK) return pw_fail_signal (from, error);
   char name[200];
-  if (changed < 0) return PW_OK;
-  return pw_fail (error, PW_INPUT, "model %s: signal %s changes with time, so that there are no steady motions",
-                  x->s->model, pw_system_signal_name (x->s, changed, name, sizeof name));
+  int changed, status = pw_signals_change (x->at[0].r, x->set.t, 0, x->set.span, &changed, error);
+  if (status != PW_OK || changed < 0) return status;
+  return pw_fail (
+      error, PW_INPUT,
+      "model %s: signal %s changes with time, so that there are no steady motions; `pinwheel periodic` finds "
+      "periodic ones",
+      x->s->model, pw_system_signal_name (x->s, changed, name, sizeof name));
 }
 
 /* Scales and symmetries at the initial state. */
@@ -78,7 +92,7 @@ static int steady_begin (pw_steady *x, pw_error *error) {
   memcpy (x->start, r->q, (size_t)x->n * sizeof *r->q);
   memcpy (x->start + x->n, r->v, (size_t)x->n * sizeof *r->v);
   if (x->s->bodies) memcpy (x->origin, r->q, sizeof x->origin);
-  int status = steady_constant (x, error);
+  int status = x->forced ? PW_OK : steady_constant (x, error);
   if (status != PW_OK) return status;
   status = pw_steady_find_group (x);
   if (status == PW_RESOURCE) return pw_fail_memory (x->s, error);
@@ -87,11 +101,10 @@ static int steady_begin (pw_steady *x, pw_error *error) {
   return PW_OK;
 }
 
-pw_steady *pw_steady_open (const pw_system *s, const pw_steady_settings *settings, pw_error *error) {
-  if (pw_require (s, "a system", error) != PW_OK || pw_require (settings, "settings", error) != PW_OK) return NULL;
+static pw_steady *steady_open (const pw_system *s, const pw_steady_settings *settings, int forced, pw_error *error) {
   pw_steady *x = calloc (1, sizeof *x);
   if (x == NULL) return pw_fail_memory (s, error), NULL;
-  x->s = s, x->set = *settings;
+  x->s = s, x->set = *settings, x->forced = forced;
   x->n = s->coords, x->m = s->rows, x->holonomic = s->holonomic;
   x->vary = settings->vary;
   if (x->set.points <= 0) x->set.points = STEADY_POINTS;
@@ -111,6 +124,15 @@ pw_steady *pw_steady_open (const pw_system *s, const pw_steady_settings *setting
   if (status == PW_OK) return x;
   pw_steady_close (x);
   return NULL;
+}
+
+pw_steady *pw_steady_open (const pw_system *s, const pw_steady_settings *settings, pw_error *error) {
+  if (pw_require (s, "a system", error) != PW_OK || pw_require (settings, "settings", error) != PW_OK) return NULL;
+  return steady_open (s, settings, 0, error);
+}
+
+pw_steady *pw_steady_open_scene (const pw_system *s, double t, double span, pw_error *error) {
+  return steady_open (s, &(pw_steady_settings){ .t = t, .span = span, .vary = -1 }, 1, error);
 }
 
 void pw_steady_close (pw_steady *x) {

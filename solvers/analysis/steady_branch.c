@@ -133,50 +133,7 @@ static int branch_events (pw_steady *x, pw_error *error) {
   return status;
 }
 
-/* ---- Ends ---- */
-
-typedef struct {
-  int parameter;
-  double limit;
-} branch_limit;
-
-static int branch_beyond (void *context, const pw_branch_point *point, double *value, pw_error *error) {
-  const branch_limit *limit = context;
-  (void)error;
-  *value = point->u[limit->parameter] - limit->limit;
-  return PW_OK;
-}
-
-/* Moves the point reached back to the end of the range, if it is beyond. */
-static int branch_at_end (pw_steady *x, pw_error *error) {
-  pw_branch *b = &x->branch;
-  int p = b->of.unknowns;
-  branch_limit limit = { p, b->at.u[p] > 1 };
-  if (b->at.u[p] <= 1 && b->at.u[p] >= 0) return PW_OK;
-  x->ended = 1;
-  int status = pw_branch_locate (b, branch_beyond, &limit, BRANCH_ACCURACY, &x->queue[0].point, error);
-  if (status != PW_OK) return status;
-  x->queue[0].point.u[p] = limit.limit;
-  status = pw_branch_solve (b, x->queue[0].point.u, error);
-  memcpy (b->at.u, x->queue[0].point.u, ((size_t)p + 1) * sizeof *b->at.u);
-  memcpy (b->at.tangent, x->queue[0].point.tangent, ((size_t)p + 1) * sizeof *b->at.u);
-  b->folded = b->before.tangent[p] * b->at.tangent[p] < 0;
-  return status;
-}
-
-/* 1 if the last step has passed the start, in the same direction. */
-static int branch_closed (const pw_steady *x) {
-  const pw_branch *b = &x->branch;
-  const double *u = x->first.u, *tangent = x->first.tangent;
-  double step = 0, off = 0, before = 0, now = 0;
-  for (int j = 0; j <= b->of.unknowns; j++) {
-    step += pow (b->at.u[j] - b->before.u[j], 2);
-    off += pow (b->at.u[j] - u[j], 2);
-    before += (b->before.u[j] - u[j]) * tangent[j];
-    now += (b->at.u[j] - u[j]) * tangent[j];
-  }
-  return x->steps > 2 && off < 1.2 * step && before < 0 && now >= 0;
-}
+/* ---- Steps ---- */
 
 static int branch_advance (pw_steady *x, pw_error *error) {
   x->why = (pw_error){ 0 };
@@ -185,10 +142,10 @@ static int branch_advance (pw_steady *x, pw_error *error) {
   int status = pw_branch_step (&x->branch, error);
   if (status == PW_RETRY && !*x->why.text) pw_fail (&x->why, PW_METHOD, "Newton's method fails at the smallest step");
   if (status == PW_OK) x->why = (pw_error){ 0 };
-  if (status == PW_OK) status = branch_at_end (x, error);
+  if (status == PW_OK) status = pw_branch_at_end (&x->branch, &x->ended, error);
   if (status == PW_OK) status = branch_events (x, error);
   if (status == PW_OK) branch_queue (x, x->branch.at, PW_STEADY_POINT, 1);
-  x->ended |= branch_closed (x);
+  x->ended |= x->steps > 2 && pw_branch_closed (&x->branch, &x->first);
   return status;
 }
 

@@ -195,8 +195,8 @@ static double group_angle (const pw_steady *x, const double centre[2], const dou
   return atan2 (q[last + 1] - centre[1], q[last] - centre[0]);
 }
 
-/* Displaces a state by symmetries to one that equivalent states share; spins first. */
-static void group_canonical (const pw_steady *x, double *q, double *v) {
+/* Spins first. */
+void pw_steady_canonical (const pw_steady *x, double *q, double *v) {
   int rates = pw_steady_rates (x->s);
   for (int k = 0; k < x->group; k++) {
     const double *axis = x->axis + k * rates;
@@ -238,8 +238,8 @@ int pw_steady_same (pw_steady *x, const double *q1, const double *v1, const doub
   size_t bytes = (size_t)x->n * sizeof *q1;
   double *a = x->q0, *va = x->v0, *b = x->dq, *vb = x->dv;
   memcpy (a, q1, bytes), memcpy (va, v1, bytes), memcpy (b, q2, bytes), memcpy (vb, v2, bytes);
-  group_canonical (x, a, va);
-  group_canonical (x, b, vb);
+  pw_steady_canonical (x, a, va);
+  pw_steady_canonical (x, b, vb);
   for (int j = 0; j < x->n; j++) {
     double unit = pw_unit (x->s, j), off = (a[j] - b[j]) / unit, most = fmax (1, fabs (b[j] / unit));
     if (j < 3 * x->s->bodies && j % 3 == 2) off = remainder (off, 2 * PW_PI), most = 1;

@@ -13,6 +13,7 @@ struct pw_steady {
   pw_steady_settings set;
   pw_initial_value *hold; /* those of the settings */
   int n, m, holonomic, group, vary;
+  int forced;              /* 1: signals may change with time */
   double L, T;             /* scales at the initial state */
   double origin[2], *axis; /* group x pw_steady_rates: symmetries as rates (steady_group.c) */
   unsigned char *cyclic;   /* n: 1 for angles on which nothing depends */
@@ -67,6 +68,8 @@ int pw_steady_null (int rows, int n, double *M, double tolerance, double *out);
 int pw_steady_find_group (pw_steady *x);
 /* Finds those that what is held leaves free, at the state u. */
 int pw_steady_find_gauge (pw_steady *x);
+/* Displaces a state by symmetries to one that equivalent states share. */
+void pw_steady_canonical (const pw_steady *x, double *q, double *v);
 /* Displaces a state so that the first body is where it was initially, if the whole can be displaced freely. */
 void pw_steady_home (const pw_steady *x, double *q, double *v);
 
@@ -112,6 +115,13 @@ double pw_hold_slope (const pw_system *s, const pw_initial_value *hold, const do
 int pw_steady_start (pw_steady *x, int k, double *u);
 
 /* ---- steady.c ---- */
+
+/* *changed: the first signal that differs, in the run's state, between times t and t + part of the span; with a period,
+ * between times in the span after t and one period later.  -1: none.  A status. */
+int pw_signals_change (pw_run *r, double t, double period, double span, int *changed, pw_error *error);
+
+/* Scales and symmetries at time t of a system whose signals may change with time; for other searches. */
+pw_steady *pw_steady_open_scene (const pw_system *s, double t, double span, pw_error *error);
 
 /* The motion of the unknowns u, a solution, with its linearisation. */
 int pw_steady_motion_at (pw_steady *x, const double *u, pw_steady_motion *out, pw_error *error);

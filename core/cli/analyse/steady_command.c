@@ -14,60 +14,21 @@ enum { STEADY_STARTS = 30 };
 
 /* ---- What is held and varied ---- */
 
-static const pw_parameter *steady_parameter (const pw_steady_cli *x) {
-  const pw_parameter *p = pw_model_table (x->m.model)->parameters;
-  while (p && p->name && strcmp (p->name, x->parameter) != 0) p++;
-  return p && p->name ? p : NULL;
-}
-
-/* The system at a value of the parameter of the model. */
-static pw_system *steady_compile (void *context, double value, pw_error *error) {
-  pw_steady_cli *x = context;
-  pw_model *m = pw_file_model (x->m.file, error);
-  pw_system *s = NULL;
-  if (m && pw_cli_apply (m, "--set", x->line.sets, pw_model_set, error) == PW_OK &&
-      pw_model_set (m, x->parameter, value, error) == PW_OK &&
-      pw_cli_apply (m, "--start", x->line.starts, pw_model_set_initial, error) == PW_OK &&
-      pw_model_build (m, error) == PW_OK)
-    s = pw_system_compile (m, error);
-  pw_model_free (m);
-  return s;
-}
-
-static int steady_check_parameter (pw_steady_cli *x, const pw_parameter *p, pw_error *error) {
-  const double end[] = { x->set.first, x->set.last };
-  if (p->domain == PW_COUNT)
-    return pw_fail (error, PW_INPUT,
-                    "--vary %s: %s counts something and cannot vary continuously; use `pinwheel sweep`", x->vary_text,
-                    p->name);
-  for (int i = 0; i < 2; i++)
-    if (*pw_domain_check (p->domain, end[i]))
-      return pw_fail (error, PW_INPUT, "--vary %s: expected %s", x->vary_text, pw_domain_check (p->domain, end[i]));
-  for (const char **set = x->line.sets; set && *set; set++)
-    if (strncmp (*set, p->name, strlen (p->name)) == 0 && (*set)[strlen (p->name)] == '=')
-      return pw_fail (error, PW_INPUT, "%s is given by --vary and by --set", p->name);
-  x->unit = p->unit;
-  x->set.compile = steady_compile;
-  x->set.context = x;
-  return PW_OK;
-}
-
 /* NAME=FIRST:LAST, a parameter of the model or something held. */
 static int steady_vary (pw_steady_cli *x, pw_error *error) {
-  const char *equals = strchr (x->vary_text, '='), *colon = equals ? strchr (equals, ':') : NULL;
-  char first[100], hold[400];
-  if (colon == NULL || equals == x->vary_text || (size_t)(equals - x->vary_text) >= sizeof x->parameter ||
-      (size_t)(colon - equals) > sizeof first)
-    return pw_fail (error, PW_INPUT, "--vary %s: expected NAME=FIRST:LAST", x->vary_text);
-  snprintf (x->parameter, sizeof x->parameter, "%.*s", (int)(equals - x->vary_text), x->vary_text);
-  snprintf (first, sizeof first, "%.*s", (int)(colon - equals - 1), equals + 1);
-  if (pw_read_expression (first, &x->set.first) != PW_OK || pw_read_expression (colon + 1, &x->set.last) != PW_OK ||
-      !isfinite (x->set.last - x->set.first) || x->set.first == x->set.last)
-    return pw_fail (error, PW_INPUT, "--vary %s: expected two different numbers FIRST:LAST", x->vary_text);
-  const pw_parameter *p = steady_parameter (x);
-  if (p) return steady_check_parameter (x, p, error);
-  if (strchr (x->parameter, '.') == NULL) return pw_model_set (x->m.model, x->parameter, x->set.first, error);
-  snprintf (hold, sizeof hold, "%s=%s", x->parameter, first);
+  char hold[400], value[32];
+  x->vary.line = &x->line, x->vary.m = &x->m;
+  if (pw_cli_vary_read (&x->vary, x->vary_text, error) != PW_OK) return PW_INPUT;
+  x->set.first = x->vary.first, x->set.last = x->vary.last;
+  const pw_parameter *p = pw_cli_vary_parameter (&x->vary);
+  if (p) {
+    x->unit = p->unit;
+    x->set.compile = pw_cli_vary_compile;
+    x->set.context = &x->vary;
+    return pw_cli_vary_check (&x->vary, error);
+  }
+  if (strchr (x->vary.name, '.') == NULL) return pw_model_set (x->m.model, x->vary.name, x->set.first, error);
+  snprintf (hold, sizeof hold, "%s=%s", x->vary.name, pw_format (value, x->set.first, 17));
   x->set.vary = x->set.holds;
   int status = pw_hold_read (x->m.system, "--vary", hold, x->hold, &x->set.holds, error);
   if (status == PW_OK) x->unit = pw_system_held_unit (x->m.system, x->hold[x->set.vary].state);

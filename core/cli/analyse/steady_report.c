@@ -95,7 +95,7 @@ static void steady_branches (const pw_steady_cli *x) {
   for (pw_table t = { 0 }; pw_table_pass (&t);) {
     pw_cell (&t, 6, "branch");
     pw_cell (&t, -15, "event");
-    *x->unit ? pw_cell_unit (&t, 12, x->parameter, x->unit) : pw_cell (&t, 12, x->parameter);
+    *x->unit ? pw_cell_unit (&t, 12, x->vary.name, x->unit) : pw_cell (&t, 12, x->vary.name);
     events = 0;
     for (int k = 0; k < 3; k++) pw_cell (&t, 7, (const char *[]){ "growing", "rightmost [1/s]", "frequency [Hz]" }[k]);
     pw_row_end (&t);
@@ -121,7 +121,7 @@ void pw_steady_print (const pw_steady_cli *x) {
   const char *model = pw_file_name (x->m.file);
   if (pw_steady_varies (x)) {
     printf ("%s: %d %s of steady motions, %s from %s to %s, %d symmetries\n\n", model, x->branches,
-            x->branches == 1 ? "branch" : "branches", x->parameter, pw_format (first, x->set.first, 9),
+            x->branches == 1 ? "branch" : "branches", x->vary.name, pw_format (first, x->set.first, 9),
             pw_format (last, x->set.last, 9), pw_steady_symmetries (x->steady));
     steady_branches (x);
     return;
@@ -179,7 +179,7 @@ static void steady_json (const pw_steady_cli *x, pw_json *j) {
   pw_json_open (j, NULL, '{');
   pw_json_number (j, "schema", 1);
   pw_json_text (j, "model", pw_file_name (x->m.file));
-  pw_json_text (j, "parameter", pw_steady_varies (x) ? x->parameter : NULL);
+  pw_json_text (j, "parameter", pw_steady_varies (x) ? x->vary.name : NULL);
   pw_json_text (j, "unit", x->unit);
   pw_json_open (j, "held", '{');
   for (int i = 0; i < x->set.holds; i++)
@@ -207,7 +207,7 @@ static int steady_csv (const pw_steady_cli *x, FILE *f, pw_error *error) {
   pw_text t = { .at = NULL };
   char name[300];
   pw_text_cell (&t, "branch,event");
-  pw_text_name (&t, pw_steady_varies (x) ? x->parameter : "parameter", x->unit);
+  pw_text_name (&t, pw_steady_varies (x) ? x->vary.name : "parameter", x->unit);
   pw_text_cell (&t, "growing,residual");
   for (int i = 0; i < states; i++)
     pw_text_name (&t, pw_system_state_name (s, i, name, sizeof name), pw_system_state_unit (s, i));
@@ -267,7 +267,7 @@ static void steady_line (FILE *f, const pw_steady_point *first, int count, int k
 static void steady_data (const pw_steady_cli *x, FILE *f) {
   char text[3][32];
   fprintf (f, "# %s, real part [1/s], frequency [Hz]: stable parts; unstable ones; events; eigenvalues [1/s]\n",
-           x->parameter);
+           x->vary.name);
   for (int stable = 1; stable >= 0; stable--) {
     for (int i = 0, count; i < x->points; i += count) {
       for (count = 1; i + count < x->points && x->point[i + count].branch == x->point[i].branch;) count++;
@@ -297,7 +297,7 @@ static int steady_figure (const pw_steady_cli *x, pw_error *error) {
   int status = pw_output_finish (data, error);
   pw_output *o = status == PW_OK ? pw_figure_begin (&figures, "steady", error) : NULL;
   if (o == NULL) return PW_RESOURCE;
-  snprintf (label, sizeof label, *x->unit ? "%s [%s]" : "%s", x->parameter, x->unit);
+  snprintf (label, sizeof label, *x->unit ? "%s [%s]" : "%s", x->vary.name, x->unit);
   pw_figure_text (pw_output_stream (o), "label_of_x", label);
   fprintf (pw_output_stream (o), "first = %.10g\nlast = %.10g\n", fmin (x->set.first, x->set.last),
            fmax (x->set.first, x->set.last));

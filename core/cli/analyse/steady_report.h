@@ -32,7 +32,7 @@ typedef struct {
   pw_steady_settings set;
   pw_initial_value *hold; /* set.holds, with room */
   int given;              /* of these, by the user; others follow */
-  char parameter[200];    /* name of what --vary varies */
+  pw_cli_vary vary;       /* what --vary varies */
   const char *unit;
   int attempts; /* random ones at each end */
   pw_steady *steady;

@@ -87,6 +87,7 @@ static const struct {
   { "drift", { figure_look, figure_methods, figure_drift } },
   { "sensitivity", { figure_look, figure_sensitivity } },
   { "steady", { figure_look, figure_steady } },
+  { "periodic", { figure_look, figure_periodic } },
 };
 
 /* The title for gnuplot's enhanced text: a capital first, special characters escaped. */

@@ -1,0 +1,352 @@
+/* The reports of `pinwheel periodic`. */
+#include "periodic_report.h"
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+#include "figure.h"
+#include "print_table.h"
+#include "text.h"
+
+enum { PERIODIC_SHOWN = 12, PERIODIC_BODIES = 20, PERIODIC_SAMPLES = 400, PERIODIC_CURVES = 3 };
+static const double PERIODIC_SMALL = 1e-9; /* displacements shown as 0 */
+
+static const char *const periodic_events[] = { "point", "fold", "branch point", "period doubling", "Neimark-Sacker" };
+
+/* ---- Quantities ---- */
+
+/* Displacement of the first body: along and across its initial direction, and its length [m]. */
+static void periodic_displacement (const pw_periodic_orbit *o, double d[3]) {
+  double x = o->end[0] - o->q[0], y = o->end[1] - o->q[1], c = cos (o->q[2]), s = sin (o->q[2]);
+  d[0] = c * x + s * y, d[1] = c * y - s * x, d[2] = hypot (x, y);
+}
+
+static double periodic_largest (const pw_periodic_orbit *o) {
+  return o->multipliers > o->trivial ? hypot (o->re[0], o->im[0]) : NAN;
+}
+
+/* ---- Text ---- */
+
+static double periodic_round (double value) {
+  return fabs (value) < PERIODIC_SMALL ? 0 : value;
+}
+
+static void periodic_multipliers (const pw_periodic_orbit *o, int symmetries) {
+  int own = o->multipliers - o->trivial, shown = 0;
+  printf ("  Floquet multipliers          ");
+  for (int i = 0; i < own && shown < PERIODIC_SHOWN; i++) {
+    if (o->im[i] < 0) continue;
+    if (shown++) printf ("\n                               ");
+    printf (o->im[i] > 0 ? "%.6g +- %.6g i, modulus %.6g" : "%.6g", o->re[i], o->im[i], hypot (o->re[i], o->im[i]));
+  }
+  puts (own == 0 ? "none" : own > PERIODIC_SHOWN ? " ..." : "");
+  printf ("  trivial multipliers          %d%s%s\n", o->trivial, symmetries ? ", of symmetries" : "",
+          o->trivial > symmetries ? ", of a shift in time" : "");
+}
+
+static const char *periodic_verdict (const pw_periodic_orbit *o, char *text, size_t size) {
+  double most = periodic_largest (o);
+  if (o->multipliers == o->trivial) return "no perturbations but shifts along symmetries";
+  if (o->unstable)
+    snprintf (text, size, "unstable: %d growing, the fastest by a factor of %.6g per period", o->unstable, most);
+  else if (most > 1 - 1e-6)
+    snprintf (text, size, "neutral: not all perturbations decay");
+  else
+    snprintf (text, size, "stable: perturbations shrink to %.6g or less per period", most);
+  return text;
+}
+
+static void periodic_state (const pw_periodic_cli *x, const pw_periodic_orbit *o) {
+  const pw_system *s = x->m.system;
+  int bodies = pw_system_bodies (s);
+  puts ("\nInitial state");
+  for (pw_table t = { 0 }; pw_table_pass (&t);) {
+    static const char *const head[] = { "", "x [m]", "y [m]", "phi [rad]", "vx [m/s]", "vy [m/s]", "omega [rad/s]" };
+    for (int k = 0; k < 7; k++) pw_cell (&t, k ? 12 : -12, head[k]);
+    pw_row_end (&t);
+    for (int b = 0; b < bodies && b < PERIODIC_BODIES; b++) {
+      pw_cell (&t, -12, pw_system_body_name (s, b));
+      for (int k = 0; k < 6; k++) pw_cell_number (&t, 12, periodic_round ((k < 3 ? o->q : o->v - 3)[3 * b + k]), 8);
+      pw_row_end (&t);
+    }
+  }
+  if (bodies > PERIODIC_BODIES) printf ("  and %d more bodies\n", bodies - PERIODIC_BODIES);
+}
+
+static void periodic_one (const pw_periodic_cli *x, const pw_periodic_orbit *o) {
+  double d[3];
+  char text[200];
+  periodic_displacement (o, d);
+  printf ("%s: a periodic motion, apart from %d symmetries\n\n", pw_file_name (x->m.file),
+          pw_periodic_symmetries (x->search));
+  printf ("  period                       %.9g s, %s\n", o->period, x->source);
+  printf ("  displacement per period      %.6g m", periodic_round (d[2]));
+  printf (periodic_round (d[2]) > 0 ? ": %.6g m along %s, %.6g m to its left\n" : "\n", periodic_round (d[0]),
+          pw_system_body_name (x->m.system, 0), periodic_round (d[1]));
+  printf ("  rotation per period          %.6g rad\n", periodic_round (o->rotation));
+  printf ("  mean speed                   %.6g m/s\n", periodic_round (d[2] / o->period));
+  periodic_multipliers (o, pw_periodic_symmetries (x->search));
+  printf ("  stability                    %s\n", periodic_verdict (o, text, sizeof text));
+  printf ("  residual                     %.1e after %d iterations\n", o->residual, o->iterations);
+  periodic_state (x, o);
+}
+
+static void periodic_branch (const pw_periodic_cli *x) {
+  printf ("%s: a branch of periodic motions, %s from %.9g to %.9g, %d symmetries, %d points\n\n",
+          pw_file_name (x->m.file), x->vary.name, x->set.first, x->set.last, pw_periodic_symmetries (x->search),
+          x->points);
+  for (pw_table t = { 0 }; pw_table_pass (&t);) {
+    pw_cell (&t, -15, "event");
+    *x->unit ? pw_cell_unit (&t, 12, x->vary.name, x->unit) : pw_cell (&t, 12, x->vary.name);
+    for (int k = 0; k < 5; k++)
+      pw_cell (
+          &t, 12,
+          (const char *[]){ "period [s]", "displacement [m]", "rotation [rad]", "growing", "largest multiplier" }[k]);
+    pw_row_end (&t);
+    for (int i = 0; i < x->points; i++) {
+      const pw_periodic_orbit *o = &x->point[i].orbit;
+      int stride = x->points / PERIODIC_SHOWN + 1;
+      double d[3];
+      if (o->event == PW_PERIODIC_POINT && i % stride && i + 1 < x->points) continue;
+      periodic_displacement (o, d);
+      pw_cell (&t, -15,
+               o->event != PW_PERIODIC_POINT ? periodic_events[o->event]
+               : i == 0                      ? "begins"
+               : i + 1 < x->points           ? ""
+                                             : "ends");
+      pw_cell_number (&t, 12, o->parameter, 9);
+      pw_cell_number (&t, 12, o->period, 7);
+      pw_cell_number (&t, 12, periodic_round (d[2]), 6);
+      pw_cell_number (&t, 12, periodic_round (o->rotation), 6);
+      pw_cell_number (&t, 7, o->unstable, 3);
+      pw_cell_number (&t, 12, periodic_largest (o), 6);
+      pw_row_end (&t);
+    }
+  }
+  double last = x->point[x->points - 1].orbit.parameter;
+  if (!x->stopped && *pw_periodic_reason (x->search))
+    printf ("\nThe branch ends at %s = %.9g%s%s\n", x->vary.name, last, *pw_periodic_reason (x->search) ? ": " : "",
+            pw_periodic_reason (x->search));
+}
+
+void pw_periodic_print (const pw_periodic_cli *x) {
+  if (x->vary_text)
+    periodic_branch (x);
+  else
+    periodic_one (x, &x->point->orbit);
+}
+
+/* ---- JSON ---- */
+
+static void periodic_states_json (const pw_periodic_cli *x, const char *key, const double *q, const double *v,
+                                  pw_json *j) {
+  int n = pw_system_coordinates (x->m.system);
+  char name[300];
+  pw_json_open (j, key, '{');
+  for (int i = 0; i < 2 * n; i++)
+    pw_json_number (j, pw_system_state_name (x->m.system, i, name, sizeof name), i < n ? q[i] : v[i - n]);
+  pw_json_close (j, '}');
+}
+
+static void periodic_point_json (const pw_periodic_cli *x, const pw_periodic_orbit *o, pw_json *j) {
+  int n = pw_system_coordinates (x->m.system);
+  double d[3];
+  periodic_displacement (o, d);
+  j->line = 1;
+  pw_json_open (j, NULL, '{');
+  if (x->vary_text) pw_json_number (j, "parameter", o->parameter);
+  if (x->vary_text) pw_json_text (j, "event", periodic_events[o->event]);
+  pw_json_number (j, "period", o->period);
+  pw_json_number (j, "displacement", d[2]);
+  pw_json_number (j, "along", d[0]);
+  pw_json_number (j, "left", d[1]);
+  pw_json_number (j, "rotation", o->rotation);
+  pw_json_number (j, "residual", o->residual);
+  pw_json_number (j, "iterations", o->iterations);
+  pw_json_number (j, "growing", o->unstable);
+  periodic_states_json (x, "start", o->q, o->v, j);
+  periodic_states_json (x, "end", o->end, o->end + n, j);
+  pw_json_open (j, "multipliers", '[');
+  for (int i = 0; i < o->multipliers; i++) {
+    pw_json_open (j, NULL, '{');
+    pw_json_number (j, "re", o->re[i]);
+    pw_json_number (j, "im", o->im[i]);
+    pw_json_flag (j, "trivial", i >= o->multipliers - o->trivial);
+    pw_json_close (j, '}');
+  }
+  pw_json_close (j, ']');
+  pw_json_close (j, '}');
+}
+
+static void periodic_json (const pw_periodic_cli *x, pw_json *j) {
+  pw_json_open (j, NULL, '{');
+  pw_json_number (j, "schema", 1);
+  pw_json_text (j, "model", pw_file_name (x->m.file));
+  pw_json_text (j, "parameter", x->vary_text ? x->vary.name : NULL);
+  pw_json_text (j, "unit", x->unit);
+  pw_json_text (j, "method", x->set.method);
+  pw_json_number (j, "symmetries", pw_periodic_symmetries (x->search));
+  pw_json_flag (j, "complete", !x->stopped);
+  j->line = 1;
+  pw_json_open (j, "motions", '[');
+  for (int i = 0; i < x->points; i++) periodic_point_json (x, &x->point[i].orbit, j);
+  pw_json_close (j, ']');
+  pw_json_close (j, '}');
+}
+
+/* ---- The table ---- */
+
+static int periodic_csv (const pw_periodic_cli *x, FILE *f, pw_error *error) {
+  const pw_system *s = x->m.system;
+  int states = 2 * pw_system_coordinates (s), most = x->point->orbit.multipliers;
+  pw_text t = { .at = NULL };
+  char name[300];
+  pw_text_name (&t, x->vary_text ? x->vary.name : "parameter", x->unit);
+  pw_text_cell (&t, "event,period [s],displacement [m],rotation [rad],growing,residual");
+  for (int i = 0; i < states; i++)
+    pw_text_name (&t, pw_system_state_name (s, i, name, sizeof name), pw_system_state_unit (s, i));
+  for (int i = 1; i <= most; i++)
+    for (int k = 0; k < 2; k++) snprintf (name, sizeof name, "%s%d", k ? "im" : "re", i), pw_text_cell (&t, name);
+  int status = pw_text_line (&t, f, x->folder, error);
+  for (const pw_periodic_point *p = x->point; status == PW_OK && p < x->point + x->points; p++) {
+    const pw_periodic_orbit *o = &p->orbit;
+    double d[3];
+    periodic_displacement (o, d);
+    pw_text_number (&t, x->vary_text ? o->parameter : NAN);
+    pw_text_cell (&t, periodic_events[o->event]);
+    const double number[] = { o->period, d[2], o->rotation, o->unstable, o->residual };
+    for (int k = 0; k < 5; k++) pw_text_number (&t, number[k]);
+    for (int i = 0; i < states; i++) pw_text_number (&t, p->state[i]);
+    for (int i = 0; i < most; i++)
+      for (int k = 0; k < 2; k++) pw_text_number (&t, i < o->multipliers ? (k ? o->im : o->re)[i] : NAN);
+    status = pw_text_line (&t, f, x->folder, error);
+  }
+  return status;
+}
+
+/* ---- The figure: paths and angular velocities, or curves over the parameter; multipliers and the unit circle ---- */
+
+/* t / T, then x, y, phi, omega of the bodies, over one period. */
+static int periodic_motion (const pw_periodic_cli *x, const pw_periodic_orbit *o, FILE *f, pw_error *error) {
+  const pw_settings settings = { .span = o->period, .rtol = 1e-9 };
+  int bodies = pw_system_bodies (x->m.system), status = PW_OK;
+  pw_run *r = pw_run_open (x->m.system, x->set.method, &settings, error);
+  if (r) status = pw_run_restart (r, o->q, o->v, error);
+  for (int i = 0; r && i <= PERIODIC_SAMPLES && status == PW_OK; i++) {
+    double t = o->period * i / PERIODIC_SAMPLES;
+    pw_sample sample;
+    status = pw_run_advance_to (r, t, o->period, error);
+    if (status == PW_OK) status = pw_run_sample (r, t, &sample, error);
+    if (status != PW_OK) break;
+    fprintf (f, "%.9g", (double)i / PERIODIC_SAMPLES);
+    for (int b = 0; b < bodies && b < PERIODIC_BODIES; b++)
+      fprintf (f, " %.9g %.9g %.9g %.9g", sample.q[3 * b], sample.q[3 * b + 1], sample.q[3 * b + 2],
+               sample.v[3 * b + 2]);
+    fputs ("\n", f);
+  }
+  if (r == NULL) return error->status;
+  pw_run_close (r);
+  return status;
+}
+
+/* What is drawn over the parameter. */
+static double periodic_curve (const pw_periodic_orbit *o, int k) {
+  double d[3];
+  periodic_displacement (o, d);
+  return k == 0 ? periodic_round (d[2]) : k == 1 ? periodic_largest (o) : o->period;
+}
+
+/* Lines of the branch that are stable or not; points belong to the piece after them, and end the one before. */
+static void periodic_line (const pw_periodic_cli *x, FILE *f, int stable) {
+  int drawing = 0;
+  for (const pw_periodic_point *p = x->point; p < x->point + x->points; p++) {
+    int last = p + 1 == x->point + x->points;
+    int here = !last && (p[p->orbit.event != PW_PERIODIC_POINT].orbit.unstable == 0) == stable;
+    if (here || drawing) {
+      fprintf (f, "%.10g", p->orbit.parameter);
+      for (int k = 0; k < PERIODIC_CURVES; k++) fprintf (f, " %.9g", periodic_curve (&p->orbit, k));
+      fputs ("\n", f);
+    }
+    if (drawing && !here) fputs ("\n", f);
+    drawing = here;
+  }
+  fputs ("nan nan nan nan\n\n\n", f);
+}
+
+static void periodic_multipliers_data (const pw_periodic_cli *x, FILE *f, int trivial) {
+  for (const pw_periodic_point *p = x->point; p < x->point + x->points; p++)
+    for (int i = 0; i < p->orbit.multipliers; i++)
+      if ((i >= p->orbit.multipliers - p->orbit.trivial) == trivial)
+        fprintf (f, "%.9g %.9g %.10g\n", p->orbit.re[i], p->orbit.im[i], p->orbit.parameter);
+  fputs ("nan nan nan\n\n\n", f);
+}
+
+static int periodic_data (const pw_periodic_cli *x, FILE *f, pw_error *error) {
+  int status = PW_OK;
+  if (x->vary_text) {
+    fputs ("# parameter, displacement [m], largest multiplier, period [s]: stable parts; unstable ones; events; "
+           "multipliers; "
+           "trivial ones\n",
+           f);
+    for (int stable = 1; stable >= 0; stable--) periodic_line (x, f, stable);
+    for (const pw_periodic_point *p = x->point; p < x->point + x->points; p++)
+      if (p->orbit.event != PW_PERIODIC_POINT) fprintf (f, "%.10g %d\n", p->orbit.parameter, p->orbit.event);
+    fputs ("nan nan\n\n\n", f);
+  } else {
+    fputs ("# t / T, then x [m], y [m], phi [rad], omega [rad/s] of each body; multipliers; trivial ones\n", f);
+    status = periodic_motion (x, &x->point->orbit, f, error);
+    fputs ("\n\n", f);
+  }
+  for (int trivial = 0; trivial < 2; trivial++) periodic_multipliers_data (x, f, trivial);
+  return status;
+}
+
+static void periodic_variables (const pw_periodic_cli *x, FILE *f) {
+  char label[300];
+  int bodies = pw_system_bodies (x->m.system);
+  if (bodies > PERIODIC_BODIES) bodies = PERIODIC_BODIES;
+  snprintf (label, sizeof label, *x->unit ? "%s [%s]" : "%s", x->vary.name, x->unit);
+  pw_figure_text (f, "label_of_x", label);
+  fprintf (f, "branch = %d\nfirst = %.10g\nlast = %.10g\nbodies = %d\narray body[%d]\n", x->vary_text != NULL,
+           fmin (x->set.first, x->set.last), fmax (x->set.first, x->set.last), bodies, bodies ? bodies : 1);
+  fputs ("array low[3]\narray high[3]\n", f);
+  for (int k = 0; k < PERIODIC_CURVES; k++) {
+    double low = INFINITY, high = -INFINITY;
+    for (int i = 0; i < x->points; i++) {
+      low = fmin (low, periodic_curve (&x->point[i].orbit, k));
+      high = fmax (high, periodic_curve (&x->point[i].orbit, k));
+    }
+    fprintf (f, "low[%d] = %.9g\nhigh[%d] = %.9g\n", k + 1, isfinite (low) ? low : 0, k + 1, isfinite (high) ? high : 0);
+  }
+  for (int b = 0; b < bodies; b++) pw_figure_element (f, "body", b + 1, pw_system_body_name (x->m.system, b));
+}
+
+static int periodic_figure (const pw_periodic_cli *x, pw_error *error) {
+  pw_figures figures = { .folder = x->folder,
+                         .model = pw_file_name (x->m.file),
+                         .about = pw_file_table (x->m.file)->about };
+  if (pw_figure_width (x->line.width, &figures.width, error) != PW_OK) return error->status;
+  pw_output *data = pw_figure_data (&figures, "periodic.dat", error);
+  if (data == NULL) return PW_RESOURCE;
+  int status = periodic_data (x, pw_output_stream (data), error);
+  if (status != PW_OK) return pw_output_discard (data), status;
+  status = pw_output_finish (data, error);
+  pw_output *o = status == PW_OK ? pw_figure_begin (&figures, "periodic", error) : NULL;
+  if (o == NULL) return error->status;
+  periodic_variables (x, pw_output_stream (o));
+  status = pw_figure_end (o, "periodic", error);
+  return status == PW_OK ? pw_figure_draw (x->folder, (const char *[]){ "periodic", NULL }, error) : status;
+}
+
+int pw_periodic_write (const pw_periodic_cli *x, pw_error *error) {
+  pw_output *json = pw_figure_open (x->folder, "periodic.json", error), *csv = NULL;
+  if (json) csv = pw_figure_open (x->folder, "periodic.csv", error);
+  int status = csv ? periodic_csv (x, pw_output_stream (csv), error) : PW_RESOURCE;
+  if (status != PW_OK) {
+    if (json) pw_output_discard (json);
+    if (csv) pw_output_discard (csv);
+    return status;
+  }
+  periodic_json (x, &(pw_json){ .f = pw_output_stream (json), .lines = 1 });
+  status = pw_output_finish_all ((pw_output *[]){ csv, json }, 2, error);
+  return status == PW_OK ? periodic_figure (x, error) : status;
+}

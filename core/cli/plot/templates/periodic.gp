@@ -1,0 +1,100 @@
+
+# ---- A periodic motion: paths and angular velocities over a period; or a branch over the parameter; multipliers ----
+
+data = name.'.dat'
+title = branch ? 'periodic motions' : 'periodic motion over one period, Floquet multipliers'
+longest = 12
+items = branch ? 4 : bodies
+do for [i = 1:(branch ? 0 : bodies)] { longest = max(longest, strlen(short(body[i]))) }
+eval lines(max(4, bodies))
+per_row = columns(longest)
+above = top
+top = top + rows(items, per_row)
+full = width - left - right
+side = narrow ? full : (full - 46)/2 # of the square of multipliers
+stats data index (branch ? 3 : 1) using (sqrt($1**2 + $2**2)) name 'm' nooutput
+reach = 1.12*max(1, m_max)
+square(x, y) = sprintf('set xrange [%g:%g]; set yrange [%g:%g]; ', -reach, reach, -reach, reach).panel(x, x + side, y, y + side)
+unset offsets
+if (branch) {
+  part = narrow ? 84.0 : 104.0
+  panels = 0
+  do for [k = 1:3] { panels = panels + (high[k] - low[k] > 1e-9*abs(high[k])) }
+  tall = panels*(part + 10) - 10
+} else {
+  x_min = 1e300
+  x_max = -1e300
+  y_min = 1e300
+  y_max = -1e300
+  do for [i = 1:bodies] {
+    stats data index 0 using (column(4*i - 2)) name 'a' nooutput
+    x_min = min(x_min, a_min)
+    x_max = max(x_max, a_max)
+    stats data index 0 using (column(4*i - 1)) name 'a' nooutput
+    y_min = min(y_min, a_min)
+    y_max = max(y_max, a_max)
+  }
+  edge = 0.05*max(x_max - x_min, y_max - y_min)
+  if (edge < 1e-9) { edge = 0.1 }
+  tall = full*min(max((y_max - y_min + 2*edge)/(x_max - x_min + 2*edge), 0.2), 0.6)
+  across = max(x_max - x_min + 2*edge, (y_max - y_min + 2*edge)*full/tall)
+}
+lower = top + tall + bottom + 16
+height = lower + side*(narrow && !branch ? 2 : 1) + bottom + (narrow && !branch ? bottom + 16 : 0)
+do for [form in forms] {
+  eval page(form)
+  eval key(above, per_row)
+  if (branch) {
+    set xrange [first:last]
+    y = top
+    do for [k = 1:3] { if (high[k] - low[k] > 1e-9*abs(high[k])) {
+      set yrange [low[k] - 0.05*(high[k] - low[k]):high[k] + 0.05*(high[k] - low[k])]
+      set format x (y + part < top + tall - 1 ? '' : '%g')
+      set xlabel (y + part < top + tall - 1 ? '' : label_of_x) noenhanced
+      set ylabel k == 1 ? 'displacement [m]' : k == 2 ? 'largest modulus' : 'period [s]'
+      eval panel(left, width - right, y, y + part)
+      plot data index 0 using 1:1 + k with lines lw 1.1 dt 1 lc rgb '#004488' title (y == top ? 'stable' : ''), \
+        data index 1 using 1:1 + k with lines lw 1.1 dt (8,5) lc rgb '#cc6677' title (y == top ? 'unstable' : '')
+      y = y + part + 10
+    }}
+  } else {
+    set xrange [0.5*(x_min + x_max - across):0.5*(x_min + x_max + across)]
+    set yrange [0.5*(y_min + y_max - across*tall/full):0.5*(y_min + y_max + across*tall/full)]
+    set xlabel 'x [m]'
+    set ylabel 'y [m]'
+    eval panel(left, width - right, top, top + tall)
+    plot for [i = 1:bodies] data index 0 using (column(4*i - 2)):(column(4*i - 1)) with lines lt i title short(body[i]), \
+      for [i = 1:bodies] '' index 0 using (column(4*i - 2)):(column(4*i - 1)) every 400 with points pt 7 ps 0.5 \
+        lc rgb colour(i) notitle
+    unset key
+    set autoscale
+    set offsets graph 0.05,graph 0.05,graph 0.05,graph 0.05
+    set xlabel 'φ [rad]'
+    set ylabel 'ω [rad/s]'
+    eval panel(left, left + side, lower, lower + side)
+    plot for [i = 1:bodies] data index 0 using (column(4*i)):(column(4*i + 1)) with lines lt i notitle
+    unset offsets
+  }
+  unset key
+  set format x '%g'
+  set xlabel 'real part'
+  set ylabel 'imaginary part'
+  set parametric
+  set trange [0:2*pi]
+  set cbrange [first:last]
+  set cblabel label_of_x offset 1.5,0 noenhanced
+  eval square(narrow ? left : branch ? left + 0.5*(full - side) : width - right - side, \
+              narrow && !branch ? lower + side + bottom + 16 : lower)
+  if (branch) {
+    plot cos(t), sin(t) with lines lw 0.8 lc rgb '#777777' notitle, \
+      data index 4 using 1:2 with points pt 6 ps 0.9 lw 0.8 lc rgb '#777777' notitle, \
+      data index 3 using 1:2:3 with points pt 7 ps 0.4 lc palette notitle
+  } else {
+    plot cos(t), sin(t) with lines lw 0.8 lc rgb '#777777' notitle, \
+      data index 2 using 1:2 with points pt 6 ps 0.9 lw 0.8 lc rgb '#777777' notitle, \
+      data index 1 using 1:2 with points pt 7 ps 0.6 lc rgb '#cc6677' notitle
+  }
+  unset parametric
+  unset multiplot
+  unset output
+}

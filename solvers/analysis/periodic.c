@@ -1,0 +1,243 @@
+/* The search for relative periodic motions, and their branches; equations in periodic_flow.c. */
+#include "periodic.h"
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+#include "util.h"
+
+/* PERIODIC_MOST: coordinates, since the cost is cubic; PERIODIC_LIMIT: points of a branch at most, as a multiple of those
+ * asked for.  PERIODIC_EXACT: residual of a solution, in units of the scene; PERIODIC_RANK: of derivatives; PERIODIC_CIRCLE:
+ * distance from the unit circle that is not round-off; PERIODIC_LEAST: smallest step, relative to the range of the parameter;
+ * PERIODIC_EVENT: accuracy of events, relative to the step. */
+enum { PERIODIC_MOST = 100, PERIODIC_POINTS = 20, PERIODIC_LIMIT = 50 };
+static const double PERIODIC_EXACT = 1e-9, PERIODIC_RANK = 1e-7, PERIODIC_CIRCLE = 1e-6, PERIODIC_LEAST = 1e-5,
+                    PERIODIC_EVENT = 1e-7;
+
+/* ---- Opening ---- */
+
+static int periodic_arrays (pw_periodic *x) {
+  size_t n = (size_t)x->n, states = 2 * n, most = states + (size_t)x->group + 2;
+  const pw_array array[] = {
+    { &x->u, most },
+    { &x->y0, states },
+    { &x->y1, states },
+    { &x->a0, n },
+    { &x->a1, n },
+    { &x->moved, states },
+    { &x->change, states },
+    { &x->Phi, states * states },
+    { &x->basis, states * states },
+    { &x->dual, states * states },
+    { &x->M, 2 * states * states + 40 * states },
+    { &x->re, states },
+    { &x->im, states },
+    { &x->work, (size_t)pw_steady_rates (x->s) + most },
+    { &x->there, most + 2 * states },
+    { &x->first.u, most },
+    { &x->first.tangent, most },
+    { &x->queue[0].point.u, most },
+    { &x->queue[0].point.tangent, most },
+    { &x->queue[1].point.u, most },
+    { &x->queue[1].point.tangent, most },
+    { &x->queue[2].point.u, most },
+    { &x->queue[2].point.tangent, most },
+  };
+  x->memory = pw_alloc_arrays (array, sizeof array / sizeof *array);
+  return x->memory ? PW_OK : PW_RESOURCE;
+}
+
+static int periodic_open (pw_periodic *x, pw_error *error) {
+  const pw_system *s = x->s;
+  if (x->n > PERIODIC_MOST)
+    return pw_fail (error, PW_INPUT, "model %s has %d coordinates; periodic motions are sought with at most %d",
+                    s->model, x->n, PERIODIC_MOST);
+  /* Symmetries at a time that is not special. */
+  double signals = pw_system_period (s), period = x->set.period > 0 ? x->set.period : signals;
+  if (!(period >= 0)) period = 0;
+  x->scene = pw_steady_open_scene (s, x->set.t + 0.317 * period, period > 0 ? period : 1, error);
+  if (x->scene == NULL) return error->status;
+  x->group = x->scene->gauge = x->scene->group, x->L = x->scene->L, x->T = x->scene->T;
+  const pw_branch_equations of = { .unknowns = pw_periodic_unknowns (x),
+                                   .equations = pw_periodic_unknowns (x) + 2 * x->n,
+                                   .tolerance = PERIODIC_EXACT,
+                                   .rank = PERIODIC_RANK,
+                                   .evaluate = pw_periodic_evaluate,
+                                   .context = x };
+  if (periodic_arrays (x) != PW_OK) return pw_fail_memory (s, error);
+  int status = pw_branch_open (&x->branch, &of, error);
+  if (status != PW_OK) return status;
+  pw_run *r = pw_periodic_run (x, 0, x->set.first, 0, NULL); /* verifies the signals */
+  if (r == NULL) return *error = x->why, error->status;
+  pw_run_close (r);
+  return PW_OK;
+}
+
+pw_periodic *pw_periodic_open (const pw_system *s, const pw_periodic_settings *settings, pw_error *error) {
+  pw_periodic *x = pw_require (s, "a system", error) == PW_OK ? calloc (1, sizeof *x) : NULL;
+  if (x == NULL) return s ? (pw_fail_memory (s, error), NULL) : NULL;
+  x->s = s, x->set = *settings, x->n = s->coords;
+  if (x->set.method == NULL) x->set.method = "erk8+projection";
+  if (x->set.rtol <= 0) x->set.rtol = 1e-12;
+  if (x->set.points <= 0) x->set.points = PERIODIC_POINTS;
+  if (x->set.periods <= 0) x->set.periods = 1;
+  if (periodic_open (x, error) == PW_OK) return x;
+  pw_periodic_close (x);
+  return NULL;
+}
+
+void pw_periodic_close (pw_periodic *x) {
+  if (x == NULL) return;
+  for (int k = 0; k < 2; k++) pw_system_free (x->at[k].own);
+  pw_branch_close (&x->branch);
+  pw_steady_close (x->scene);
+  free (x->memory);
+  free (x);
+}
+
+const char *pw_periodic_reason (const pw_periodic *x) {
+  return x->why.text;
+}
+
+int pw_periodic_symmetries (const pw_periodic *x) {
+  return x->group;
+}
+
+/* ---- Motions ---- */
+
+/* The motion of u, with its multipliers. */
+static int periodic_orbit (pw_periodic *x, const double *u, pw_periodic_orbit *out, pw_error *error) {
+  int status = pw_periodic_flow (x, u, PW_FLOW_MULTIPLIERS, 0, error);
+  if (status == PW_OK) status = pw_periodic_multipliers (x, u, &out->trivial);
+  if (status == PW_METHOD) return pw_fail (error, status, "model %s: no multipliers: LAPACK failed", x->s->model);
+  out->rotation = x->work[2];
+  if (status == PW_OK) status = pw_periodic_flow (x, u, PW_FLOW, 0, error);
+  if (status != PW_OK) return status;
+  out->parameter = pw_periodic_parameter (x, u);
+  out->period = x->about = pw_periodic_period (x, u);
+  out->q = x->y0, out->v = x->y0 + x->n, out->end = x->y1;
+  out->multipliers = x->size;
+  out->re = x->re, out->im = x->im;
+  out->unstable = 0;
+  for (int i = 0; i < x->size - out->trivial; i++) out->unstable += hypot (x->re[i], x->im[i]) > 1 + PERIODIC_CIRCLE;
+  return PW_OK;
+}
+
+/* The unknowns at the state of x->moved. */
+static void periodic_unknowns (pw_periodic *x, double parameter) {
+  int unknowns = pw_periodic_unknowns (x);
+  memset (x->u, 0, ((size_t)unknowns + 1) * sizeof *x->u);
+  for (int j = 0; j < 2 * x->n; j++) x->u[j] = x->moved[j] / pw_periodic_unit (x, j);
+  if (x->set.free) x->u[unknowns - 1] = x->about / x->T;
+  if (x->set.last != x->set.first) x->u[unknowns] = (parameter - x->set.first) / (x->set.last - x->set.first);
+}
+
+int pw_periodic_solve (pw_periodic *x, int settle, double parameter, pw_periodic_orbit *out, pw_error *error) {
+  *out = (pw_periodic_orbit){ .residual = INFINITY };
+  if (x->set.free) x->about = x->set.period > 0 ? x->set.period : 2 * PW_PI * x->T;
+  int status = pw_periodic_settle (x, parameter, settle);
+  if (status == PW_RESOURCE || status == PW_INPUT) return *error = x->why, status;
+  if (status != PW_OK) return status;
+  periodic_unknowns (x, parameter);
+  status = pw_branch_solve (&x->branch, x->u, error);
+  if (status == PW_OK) status = periodic_orbit (x, x->u, out, error);
+  out->residual = x->branch.residual;
+  out->iterations = x->branch.iterations;
+  return status;
+}
+
+/* ---- Branches ---- */
+
+static void periodic_queue (pw_periodic *x, const double *u, pw_periodic_event event) {
+  size_t bytes = ((size_t)x->branch.of.unknowns + 1) * sizeof *u;
+  x->queue[x->queued].event = event;
+  if (u != x->queue[x->queued].point.u) memcpy (x->queue[x->queued].point.u, u, bytes);
+  x->queued++;
+}
+
+int pw_periodic_follow (pw_periodic *x, int direction, pw_error *error) {
+  size_t bytes = ((size_t)x->branch.of.unknowns + 1) * sizeof *x->u;
+  pw_branch *b = &x->branch;
+  x->steps = x->ended = x->queued = x->returned = 0;
+  b->most = 1.0 / x->set.points, b->step = b->most / 4, b->least = PERIODIC_LEAST;
+  x->unstable = -1;
+  int status = pw_branch_start (b, x->u, direction, error);
+  if (status == PW_RETRY) return pw_fail (error, PW_METHOD, "the branch cannot be followed from here");
+  if (status != PW_OK) return status;
+  memcpy (x->first.u, b->at.u, bytes);
+  memcpy (x->first.tangent, b->at.tangent, bytes);
+  periodic_queue (x, b->at.u, PW_PERIODIC_POINT);
+  return PW_OK;
+}
+
+/* For pw_branch_locate: how far multiplier number `sought` is from the unit circle. */
+static int periodic_test (void *periodic, const pw_branch_point *point, double *value, pw_error *error) {
+  pw_periodic *x = periodic;
+  pw_periodic_orbit o;
+  int status = periodic_orbit (x, point->u, &o, error);
+  *value = hypot (x->re[x->sought], x->im[x->sought]) - 1;
+  return status;
+}
+
+/* Locates the multiplier that crosses the unit circle between the last two points. */
+static int periodic_crossing (pw_periodic *x, int before, int now, pw_error *error) {
+  pw_branch_point *point = &x->queue[x->queued].point;
+  x->sought = (before > now ? before : now) - 1;
+  int status = pw_branch_locate (&x->branch, periodic_test, x, PERIODIC_EVENT, point, error);
+  if (status != PW_OK) return status;
+  double value, re, im;
+  status = periodic_test (x, point, &value, error);
+  re = x->re[x->sought], im = x->im[x->sought];
+  if (status == PW_OK)
+    periodic_queue (x, point->u, fabs (im) > 1e-4 ? PW_PERIODIC_TORUS : re > 0 ? PW_PERIODIC_REAL : PW_PERIODIC_FLIP);
+  return status;
+}
+
+/* Queues the events between the last two points.  At a fold a multiplier passes 1. */
+static int periodic_events (pw_periodic *x, pw_error *error) {
+  pw_branch *b = &x->branch;
+  pw_periodic_orbit o;
+  int before = x->unstable, status = periodic_orbit (x, b->at.u, &o, error);
+  if (status != PW_OK) return status;
+  x->unstable = o.unstable;
+  if (b->folded) {
+    pw_branch_point *point = &x->queue[x->queued].point;
+    status = pw_branch_locate (b, pw_branch_fold, b, PERIODIC_EVENT, point, error);
+    if (status == PW_OK) periodic_queue (x, point->u, PW_PERIODIC_FOLD);
+  }
+  int change = before > o.unstable ? before - o.unstable : o.unstable - before;
+  if (status == PW_OK && before >= 0 && change > b->folded) status = periodic_crossing (x, before, o.unstable, error);
+  return status;
+}
+
+static int periodic_advance (pw_periodic *x, pw_error *error) {
+  x->queued = x->returned = 0;
+  x->why = (pw_error){ 0 };
+  if (x->steps++ > PERIODIC_LIMIT * x->set.points)
+    return pw_fail (&x->why, PW_METHOD, "the branch has more than %d points", PERIODIC_LIMIT * x->set.points), PW_RETRY;
+  int status = pw_branch_step (&x->branch, error);
+  if (status == PW_RETRY && !*x->why.text) pw_fail (&x->why, PW_METHOD, "Newton's method fails at the smallest step");
+  if (status == PW_OK) status = pw_branch_at_end (&x->branch, &x->ended, error);
+  if (status == PW_OK) status = periodic_events (x, error);
+  if (status == PW_OK) periodic_queue (x, x->branch.at.u, PW_PERIODIC_POINT);
+  x->ended |= x->steps > 2 && pw_branch_closed (&x->branch, &x->first);
+  return status;
+}
+
+int pw_periodic_next (pw_periodic *x, pw_periodic_orbit *out, pw_error *error) {
+  int status = PW_OK;
+  *out = (pw_periodic_orbit){ .event = PW_PERIODIC_END };
+  if (x->returned == x->queued) {
+    if (x->ended) return PW_OK;
+    status = periodic_advance (x, error);
+    if (status == PW_RETRY) return x->ended = 1, PW_OK;
+    if (status != PW_OK) return status;
+  }
+  int i = x->returned++;
+  status = periodic_orbit (x, x->queue[i].point.u, out, error);
+  if (status != PW_OK) return status;
+  if (x->unstable < 0) x->unstable = out->unstable;
+  out->event = x->queue[i].event;
+  out->iterations = x->branch.iterations;
+  out->residual = x->branch.residual;
+  return status;
+}

@@ -1,0 +1,221 @@
+/* The motion over one period, with its derivatives by the initial state; signals and their period. */
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+#include "periodic.h"
+#include "util.h"
+
+/* FLOW_MULTIPLES: of one signal's period that are tried for a common one.  FLOW_FAR: ratio of a free period to the last
+ * one known.  RETURN_SAMPLES: of a run that seeks a return, RETURN_STEPS per scale of time; RETURN_NEAR: distance of a
+ * return, relative to the largest on the way. */
+enum { FLOW_MULTIPLES = 24, FLOW_FAR = 4, RETURN_SAMPLES = 20000, RETURN_STEPS = 20 };
+static const double RETURN_NEAR = 0.2, RETURN_LEAST = 1e-6;
+
+/* Derivatives need fewer digits than states: Newton's method converges all the same. */
+static const double flow_rtol[] = { [PW_FLOW] = 0, [PW_FLOW_DERIVATIVES] = 1e-6, [PW_FLOW_MULTIPLIERS] = 1e-8 };
+
+/* ---- The period of signals ---- */
+
+static double flow_of_signal (const pw_signal *s) {
+  if (s->type == PW_HARMONIC && s->harmonic.amplitude != 0 && s->harmonic.omega != 0)
+    return 2 * PW_PI / fabs (s->harmonic.omega);
+  return s->type == PW_PULSE && s->pulse.period > 0 && s->pulse.height != 0 ? s->pulse.period : 0;
+}
+
+/* The least multiple of a that is one of b. */
+static double flow_common (double a, double b) {
+  if (a == 0 || b == 0 || isnan (a)) return a + b;
+  for (int i = 1; i <= FLOW_MULTIPLES; i++)
+    if (i * a > b / 2 && fabs (i * a / b - round (i * a / b)) < 1e-9 * i) return i * a;
+  return NAN;
+}
+
+double pw_system_period (const pw_system *s) {
+  double period = 0;
+  for (int k = 0; k < s->batches; k++)
+    for (int i = 0; i < s->batch[k].b.count * s->batch[k].kind->signals; i++)
+      period = flow_common (period, flow_of_signal (&s->batch[k].source[i].signal));
+  return period;
+}
+
+/* Verifies that the signals have the period, or none if it is free. */
+static int flow_signals (pw_periodic *x, int which, pw_run *r) {
+  double signals = pw_system_period (r->s), period = x->set.period;
+  char name[200];
+  int changed, status;
+  if (!x->set.free && period <= 0) period = x->set.periods * signals;
+  if (!x->set.free && !(period > 0))
+    return pw_fail (&x->why, PW_INPUT,
+                    isnan (signals) ? "model %s: the periods of its signals have no common multiple: a period is needed"
+                                    : "model %s: no signal has a known period: a period is needed",
+                    x->s->model);
+  status = x->set.free ? pw_signals_change (r, x->set.t, 0, 20 * x->T, &changed, &x->why)
+                       : pw_signals_change (r, x->set.t, period, 3 * period, &changed, &x->why);
+  if (status != PW_OK) return status;
+  x->at[which].period = period;
+  if (changed < 0) return PW_OK;
+  pw_system_signal_name (r->s, changed, name, sizeof name);
+  if (x->set.free)
+    return pw_fail (&x->why, PW_INPUT, "model %s: signal %s changes with time, so that the period is not free",
+                    x->s->model, name);
+  return pw_fail (&x->why, PW_INPUT, "model %s: signal %s does not repeat after %.12g s", x->s->model, name, period);
+}
+
+/* ---- Runs ---- */
+
+/* The system at a value of the parameter. */
+static const pw_system *flow_system (pw_periodic *x, int k, double value) {
+  if (x->set.compile == NULL) return x->s;
+  if (x->at[k].own && x->at[k].value == value) return x->at[k].own;
+  pw_system_free (x->at[k].own);
+  x->at[k].value = value, x->at[k].period = 0;
+  x->at[k].own = x->set.compile (x->set.context, value, &x->why);
+  const pw_system *s = x->at[k].own;
+  if (s == NULL || (s->coords == x->n && s->rows == x->s->rows && s->bodies == x->s->bodies)) return s;
+  pw_fail (&x->why, PW_INPUT, "model %s: the parameter changes the number of bodies or constraint equations", s->model);
+  return NULL;
+}
+
+pw_run *pw_periodic_run (pw_periodic *x, int which, double value, double rtol, const double *y) {
+  const pw_settings settings = { .t = x->set.t,
+                                 .span = x->set.period > 0 ? x->set.period : x->T,
+                                 .rtol = rtol,
+                                 .max_steps = x->set.max_steps,
+                                 .stop = x->set.stop,
+                                 .stop_context = x->set.stop_context };
+  x->why = (pw_error){ 0 };
+  const pw_system *s = flow_system (x, which, value);
+  pw_run *r = s ? pw_run_open (s, x->set.method, &settings, &x->why) : NULL;
+  int status = r ? PW_OK : x->why.status;
+  if (status == PW_OK && x->at[which].period <= 0) status = flow_signals (x, which, r);
+  if (status == PW_OK && y) status = pw_run_restart (r, y, y + x->n, &x->why);
+  if (status == PW_OK) return r;
+  if (r) pw_run_close (r);
+  return NULL;
+}
+
+/* ---- The flow ---- */
+
+/* Bases at the initial state of the run, for perturbations on the constraints and their minimal coordinates. */
+static int flow_basis (pw_periodic *x, pw_run *r) {
+  pw_linearisation l;
+  int n = x->n, status = pw_linear_open (&l, r, 0, n);
+  if (status == PW_OK) status = pw_linear_evaluate (&l, r->t, r->q, r->v);
+  if (status == PW_OK) pw_linear_bases (&l);
+  x->size = l.size;
+  for (int c = 0; status == PW_OK && c < l.size; c++) {
+    pw_linear_tangent (&l, c);
+    memcpy (x->basis + 2 * n * c, l.x, 2 * (size_t)n * sizeof *l.x);
+  }
+  for (int j = 0; status == PW_OK && j < 2 * n; j++) {
+    memset (x->change, 0, 2 * (size_t)n * sizeof *x->change);
+    x->change[j] = pw_periodic_unit (x, j);
+    pw_linear_coordinates (&l, x->change, x->change + n, 1, x->dual + j * l.size);
+  }
+  pw_linear_close (&l);
+  return status;
+}
+
+static int flow_vary (pw_periodic *x, pw_run *r, double end) {
+  int size = x->size, n = x->n;
+  pw_direction *d = calloc ((size_t)size + 1, sizeof *d);
+  pw_sample sample;
+  if (d == NULL) return pw_fail_memory (x->s, &x->why);
+  for (int c = 0; c < size; c++) d[c].initial = x->basis + 2 * n * c;
+  pw_variation *variation = pw_variation_open (r, d, size, 0, &x->why);
+  int status = variation ? pw_variation_advance (variation, end, end, &x->why) : x->why.status;
+  for (int c = 0; c < size && status == PW_OK; c++) {
+    status = pw_variation_sample (variation, c, &sample, NULL, &x->why);
+    if (status != PW_OK) break;
+    memcpy (x->Phi + 2 * n * c, sample.q, (size_t)n * sizeof *sample.q);
+    memcpy (x->Phi + 2 * n * c + n, sample.v, (size_t)n * sizeof *sample.v);
+  }
+  pw_variation_close (variation);
+  free (d);
+  return status;
+}
+
+/* Advances a run, at its initial state, by one period. */
+static int flow_run (pw_periodic *x, pw_run *r, double period, int derivatives) {
+  size_t n = (size_t)x->n, bytes = n * sizeof *r->q;
+  double end = x->set.t + period;
+  pw_sample sample;
+  int status = derivatives ? flow_basis (x, r) : PW_OK;
+  if (status != PW_OK) return status == PW_RETRY ? pw_fail_singular (r, r->t, &x->why) : status;
+  status = pw_run_sample (r, r->t, &sample, &x->why);
+  if (status != PW_OK) return status;
+  memcpy (x->y0, sample.q, bytes), memcpy (x->y0 + n, sample.v, bytes), memcpy (x->a0, sample.a, bytes);
+  if (derivatives) return flow_vary (x, r, end);
+  while (status == PW_OK && pw_run_time (r) < end) status = pw_run_advance (r, end, &x->why);
+  if (status == PW_OK) status = pw_run_sample (r, end, &sample, &x->why);
+  if (status != PW_OK) return status;
+  memcpy (x->y1, sample.q, bytes), memcpy (x->y1 + n, sample.v, bytes), memcpy (x->a1, sample.a, bytes);
+  return PW_OK;
+}
+
+int pw_periodic_flow (pw_periodic *x, const double *u, pw_flow_accuracy accuracy, int which, pw_error *error) {
+  double value = pw_periodic_parameter (x, u), rtol = fmax (x->set.rtol, flow_rtol[accuracy]);
+  double period = x->set.free ? u[pw_periodic_unknowns (x) - 1] * x->T : 1;
+  x->why = (pw_error){ 0 };
+  if (x->set.free && !(period * FLOW_FAR > x->about && period < FLOW_FAR * x->about)) return PW_RETRY;
+  for (int j = 0; j < 2 * x->n; j++) x->moved[j] = u[j] * pw_periodic_unit (x, j);
+  pw_run *r = pw_periodic_run (x, which, value, rtol, x->moved);
+  int status = r ? flow_run (x, r, x->set.free ? period : x->at[which].period, accuracy != PW_FLOW) : x->why.status;
+  if (r) pw_run_close (r);
+  if (status == PW_OK) return PW_OK;
+  if (status == PW_RESOURCE || (status == PW_INPUT && r == NULL)) return *error = x->why, status;
+  return PW_RETRY;
+}
+
+/* ---- Where the search begins ---- */
+
+/* The distance of a run's state from that of x->y0, both up to symmetries, in units of the scene. */
+static int flow_distance (pw_periodic *x, pw_run *r, double t, double *y, double *distance) {
+  pw_sample sample;
+  int n = x->n, status = pw_run_sample (r, t, &sample, &x->why);
+  if (status != PW_OK) return status;
+  memcpy (y, sample.q, (size_t)n * sizeof *y);
+  memcpy (y + n, sample.v, (size_t)n * sizeof *y);
+  pw_steady_canonical (x->scene, y, y + n);
+  *distance = 0;
+  for (int j = 0; j < 2 * n; j++) *distance = hypot (*distance, (y[j] - x->y0[j]) / pw_periodic_unit (x, j));
+  return PW_OK;
+}
+
+/* The time of the first return to the state of the run, into x->about. */
+static int flow_return (pw_periodic *x, pw_run *r) {
+  double t0 = pw_run_time (r), step = x->T / RETURN_STEPS, d[3] = { 0, 0, 0 }, far = 0;
+  int status = flow_distance (x, r, t0, x->y0, d);
+  for (int i = 1; status == PW_OK && i <= RETURN_SAMPLES; i++) {
+    double t = t0 + i * step;
+    d[0] = d[1], d[1] = d[2];
+    status = pw_run_advance_to (r, t, t0 + RETURN_SAMPLES * step, &x->why);
+    if (status == PW_OK && pw_run_asked (r)) return PW_STOPPED;
+    if (status == PW_OK) status = flow_distance (x, r, t, x->y1, &d[2]);
+    far = fmax (far, d[2]);
+    if (i > 2 && far > RETURN_LEAST && d[1] < RETURN_NEAR * far && d[1] < d[0] && d[1] <= d[2])
+      return x->about = t - step - t0, PW_OK;
+  }
+  if (status == PW_OK)
+    pw_fail (&x->why, PW_METHOD, "the motion does not return to a state: a guess of the period is needed");
+  return PW_RETRY;
+}
+
+int pw_periodic_settle (pw_periodic *x, double value, int periods) {
+  pw_sample sample;
+  int n = x->n;
+  pw_run *r = pw_periodic_run (x, 0, value, 1e-9, NULL);
+  if (r == NULL) return x->why.status;
+  double end = r->t + periods * (x->set.free ? x->about : x->at[0].period);
+  int status = pw_run_advance_to (r, end, end, &x->why);
+  if (status == PW_OK && pw_run_asked (r)) status = PW_STOPPED;
+  if (status == PW_OK) status = pw_run_sample (r, pw_run_time (r), &sample, &x->why);
+  if (status == PW_OK) {
+    memcpy (x->moved, sample.q, (size_t)n * sizeof *x->moved);
+    memcpy (x->moved + n, sample.v, (size_t)n * sizeof *x->moved);
+    pw_steady_home (x->scene, x->moved, x->moved + n);
+  }
+  if (status == PW_OK && x->set.free && x->set.period <= 0) status = flow_return (x, r);
+  pw_run_close (r);
+  return status == PW_OK || status == PW_RESOURCE ? status : PW_RETRY;
+}
