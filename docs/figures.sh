@@ -73,6 +73,11 @@ if wanted fit-car-trailer; then
   awk -F, 'NR == 1 { print $1 "," $7 "," $19 } NR > 1 { printf "%s,%.3f,%.3f\n", $1, $7, $19 }' "$work/run.csv" >"$work/measured.csv"
 fi
 draw fit-car-trailer fit fit "$car" --set steer=0.02 --data "$work/measured.csv" --columns car.omega,trailer.omega --free ahead --free grip --plots
+if wanted periodic-racer || wanted periodic-swing; then
+  awk '/^```yaml/ { n++; next } /^```/ { if (n == 2) exit } n == 2' docs/analysis.md >"$work/racer.yaml"
+fi
+draw periodic-racer periodic periodic "$work/racer.yaml" -o
+draw periodic-swing periodic periodic "$work/racer.yaml" --vary swing=0.2:1 -o
 
 # ---- Pages, benchmarks ----
 

@@ -44,13 +44,16 @@ int pw_limit_fail (const pw_limit *l, double t, pw_error *error);
 /* ---- Commands ---- */
 
 /* All commands, in the order of `pinwheel --help`; the table of `list` is pw_cli_list. */
-#define PW_COMMANDS(X)                                                                                          \
-  X (list)                                                                                                      \
-  X (show)                                                                                                      \
-  X (check)                                                                                                     \
-  X (linearise)                                                                                                 \
-  X (steady) X (periodic) X (run) X (sensitivity) X (sweep) X (fit) X (optimise) X (compare) X (drift) X (page) \
-      X (new)
+#define PW_COMMANDS(X) \
+  X (list)             \
+  X (show)             \
+  X (check)            \
+  X (linearise)        \
+  X (steady)           \
+  X (periodic)         \
+  X (run)              \
+  X (sensitivity)      \
+  X (sweep) X (fit) X (optimise) X (compare) X (drift) X (page) X (new)
 
 /* A command line: its arguments and the options shared by several commands, NULL if not given.  The structure of
  * options of every command begins with one. */

@@ -8,10 +8,11 @@
 /* PERIODIC_MOST: coordinates, since the cost is cubic; PERIODIC_LIMIT: points of a branch at most, as a multiple of those
  * asked for.  PERIODIC_EXACT: residual of a solution, in units of the scene; PERIODIC_RANK: of derivatives; PERIODIC_CIRCLE:
  * distance from the unit circle that is not round-off; PERIODIC_LEAST: smallest step, relative to the range of the parameter;
- * PERIODIC_EVENT: accuracy of events, relative to the step. */
+ * PERIODIC_EVENT: accuracy of events, relative to the step; PERIODIC_REAL: imaginary part, after location, of a pair that is
+ * about to become real. */
 enum { PERIODIC_MOST = 100, PERIODIC_POINTS = 20, PERIODIC_LIMIT = 50 };
 static const double PERIODIC_EXACT = 1e-9, PERIODIC_RANK = 1e-7, PERIODIC_CIRCLE = 1e-6, PERIODIC_LEAST = 1e-5,
-                    PERIODIC_EVENT = 1e-7;
+                    PERIODIC_EVENT = 1e-7, PERIODIC_REAL = 1e-3;
 
 /* ---- Opening ---- */
 
@@ -169,26 +170,32 @@ int pw_periodic_follow (pw_periodic *x, int direction, pw_error *error) {
   return PW_OK;
 }
 
-/* For pw_branch_locate: how far multiplier number `sought` is from the unit circle. */
+/* For pw_branch_locate: how far multiplier number `sought` is outside the unit circle. */
 static int periodic_test (void *periodic, const pw_branch_point *point, double *value, pw_error *error) {
   pw_periodic *x = periodic;
   pw_periodic_orbit o;
   int status = periodic_orbit (x, point->u, &o, error);
   *value = hypot (x->re[x->sought], x->im[x->sought]) - 1;
+  if (x->along) *value = *value > PERIODIC_CIRCLE ? 1 : -1;
   return status;
 }
 
 /* Locates the multiplier that crosses the unit circle between the last two points. */
 static int periodic_crossing (pw_periodic *x, int before, int now, pw_error *error) {
   pw_branch_point *point = &x->queue[x->queued].point;
-  x->sought = (before > now ? before : now) - 1;
-  int status = pw_branch_locate (&x->branch, periodic_test, x, PERIODIC_EVENT, point, error);
-  if (status != PW_OK) return status;
   double value, re, im;
-  status = periodic_test (x, point, &value, error);
+  x->sought = (before > now ? before : now) - 1;
+  x->along = 0;
+  int status = periodic_test (x, before > now ? &x->branch.at : &x->branch.before, &value, error);
+  x->along = fabs (value) < PERIODIC_CIRCLE;
+  if (status == PW_OK) status = pw_branch_locate (&x->branch, periodic_test, x, PERIODIC_EVENT, point, error);
+  if (status == PW_OK) status = periodic_test (x, point, &value, error);
   re = x->re[x->sought], im = x->im[x->sought];
   if (status == PW_OK)
-    periodic_queue (x, point->u, fabs (im) > 1e-4 ? PW_PERIODIC_TORUS : re > 0 ? PW_PERIODIC_REAL : PW_PERIODIC_FLIP);
+    periodic_queue (x, point->u,
+                    fabs (im) > PERIODIC_REAL ? PW_PERIODIC_TORUS
+                    : re > 0                  ? PW_PERIODIC_REAL
+                                              : PW_PERIODIC_FLIP);
   return status;
 }
 

@@ -41,6 +41,7 @@ struct pw_periodic {
   int queued, returned;
   pw_branch_point first;
   int steps, ended, unstable, sought;
+  int along; /* 1: the multiplier sought moves along the unit circle before it leaves it */
   char *memory;
 };
 

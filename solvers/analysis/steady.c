@@ -61,7 +61,7 @@ int pw_signals_change (pw_run *r, double t, double period, double span, int *cha
     if (status == PW_OK)
       status = pw_update_kinematics (w, period > 0 ? at + period : t + span * part * part, r->q, r->v);
     for (int i = 0; status == PW_OK && i < count; i++) {
-      off[i] = pw_largest (off[i], fabs (w->u[i] - before[i]));
+      off[i] = pw_larger_or_nan (off[i], fabs (w->u[i] - before[i]));
       largest[i] = fmax (largest[i], fmax (fabs (before[i]), fabs (w->u[i])));
     }
   }

@@ -484,7 +484,8 @@ static void test_refused (void **state) {
   const pw_steady_settings set = { .vary = -1, .span = 10 };
   assert_null (pw_steady_open (s, &set, &error));
   check_error (&error, PW_INPUT,
-               "model snakeboard: signal swing.value changes with time, so that there are no steady motions");
+               "model snakeboard: signal swing.value changes with time, so that there are no steady motions; "
+               "`pinwheel periodic` finds periodic ones");
   pw_system_free (s);
   error = (pw_error){ 0 };
   steady t = { .s = gallery_open ("theo-jansen", NULL), .set.vary = -1 };

@@ -109,12 +109,13 @@ static int periodic_fail (const pw_periodic_cli *x, pw_error *error) {
     snprintf (tried + used, sizeof tried - used, isfinite (x->nearest[k]) ? "%s%d (%.2g)" : "%s%d (not begun)",
               k ? ", " : "", periodic_settle[k], x->nearest[k]);
   }
-  return pw_fail (error, PW_METHOD,
-                  "%s: no periodic motion with %s found by Newton's method from the states after this many periods (where it "
-                  "ends at a residual in units of the scene, L and L/T): %s%s%s; begin nearer to one (--start)%s",
-                  pw_file_name (x->m.file), period, tried, *reason ? "; " : "", reason,
-                  x->set.free ? ", or give --guess"
-                              : ", or add losses if the motion grows in every period, as that of a vehicle without any");
+  return pw_fail (
+      error, PW_METHOD,
+      "%s: no periodic motion with %s found by Newton's method from the states after this many periods (where it "
+      "ends at a residual in units of the scene, L and L/T): %s%s%s; begin nearer to one (--start)%s",
+      pw_file_name (x->m.file), period, tried, *reason ? "; " : "", reason,
+      x->set.free ? ", or give --guess"
+                  : ", or add losses if the motion grows in every period, as that of a vehicle without any");
 }
 
 /* Follows the branch to the end of the range. */

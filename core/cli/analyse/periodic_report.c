@@ -315,7 +315,8 @@ static void periodic_variables (const pw_periodic_cli *x, FILE *f) {
       low = fmin (low, periodic_curve (&x->point[i].orbit, k));
       high = fmax (high, periodic_curve (&x->point[i].orbit, k));
     }
-    fprintf (f, "low[%d] = %.9g\nhigh[%d] = %.9g\n", k + 1, isfinite (low) ? low : 0, k + 1, isfinite (high) ? high : 0);
+    fprintf (f, "low[%d] = %.9g\nhigh[%d] = %.9g\n", k + 1, isfinite (low) ? low : 0, k + 1,
+             isfinite (high) ? high : 0);
   }
   for (int b = 0; b < bodies; b++) pw_figure_element (f, "body", b + 1, pw_system_body_name (x->m.system, b));
 }

@@ -240,7 +240,7 @@ static int steady_complete (pw_steady_cli *x, pw_error *error) {
 /* The value in the model, or in its initial state. */
 static double steady_own (const pw_steady_cli *x) {
   const pw_system *s = x->m.system;
-  if (x->set.vary < 0) return pw_model_parameter (x->m.model, steady_parameter (x));
+  if (x->set.vary < 0) return pw_model_parameter (x->m.model, pw_cli_vary_parameter (&x->vary));
   return pw_system_held_value (s, x->hold[x->set.vary].state, pw_system_initial_q (s), pw_system_initial_v (s));
 }
 

@@ -1,0 +1,133 @@
+/* `pinwheel periodic`: text, files, bad input. */
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include "check.h"
+#include "cli.h"
+
+static const char oscillator[] =
+    "pinwheel: 1\n"
+    "parameters:\n"
+    "  - {name: A, value: 0.2}\n"
+    "  - {name: w, value: 0.8}\n"
+    "  - {name: mu, value: 0}\n"
+    "  - {name: n, value: 1, domain: count}\n"
+    "bodies:\n"
+    "  - {name: rod, mass: 1, inertia: 1}\n"
+    "elements:\n"
+    "  - {pin: O, body: [ground, rod], at: [[0, 0], [0, 0]]}\n"
+    "  - {torque: drive, body: [rod, ground], value: {harmonic: {amplitude: A, omega: w}}}\n"
+    "  - torque: law\n"
+    "    body: [rod, ground]\n"
+    "    value: \"mu > 0 ? mu*(1 - rod.phi^2)*rod.omega - rod.phi : -sin(rod.phi) - 0.1*rod.omega\"\n";
+
+static void periodic_shows (const char *text) {
+  if (strstr (cli_out, text) == NULL) fail_msg ("\"%s\" is not in\n%s", text, cli_out);
+}
+
+static void test_motion (void **state) {
+  (void)state;
+  cli_write ("oscillator.yaml", oscillator);
+  cli_good ("pinwheel periodic @/oscillator.yaml -o @/one");
+  periodic_shows ("oscillator: a periodic motion, apart from 0 symmetries\n");
+  periodic_shows ("  period                       7.85398163 s, of the signals\n");
+  periodic_shows ("  Floquet multipliers          0.265099 +- 0.621016 i, modulus 0.675232\n");
+  periodic_shows ("stable: perturbations shrink to 0.675232 or less per period\n");
+  const char *json = cli_file ("one/periodic.json");
+  assert_true (cli_says (json, "model", "oscillator"));
+  check_close ("phi", cli_number (json, "motions", "start", "rod.phi", NULL), 0.5982763426814, 1e-11, "run at 1e-12");
+  check_close ("re", cli_number (json, "motions", "multipliers", "re", NULL), 0.265099104796, 2e-8,
+               "steps of the derivatives: 1e-9 each");
+  assert_non_null (cli_file ("one/periodic.dat"));
+  assert_non_null (strstr (cli_file ("one/periodic.gp"), "branch = 0\n"));
+}
+
+/* Twice the period: the multipliers are squared. */
+static void test_periods (void **state) {
+  (void)state;
+  cli_good ("pinwheel periodic @/oscillator.yaml --periods 2 -o @/two");
+  const char *json = cli_file ("two/periodic.json");
+  check_close ("re", cli_number (json, "motions", "multipliers", "re", NULL),
+               0.265099104796 * 0.265099104796 - 0.621015774681 * 0.621015774681, 4e-8,
+               "steps of the derivatives: 1e-9 each");
+}
+
+static void test_free_period (void **state) {
+  (void)state;
+  cli_good ("pinwheel periodic @/oscillator.yaml --set A=0 --set mu=1 --start rod.phi=2 --period free");
+  periodic_shows ("  period                       6.66328686 s, found\n");
+  periodic_shows ("  trivial multipliers          1, of a shift in time\n");
+  cli_good ("pinwheel periodic @/oscillator.yaml --set A=0 --set mu=1 --start rod.phi=2 --period free --guess 6.7");
+  periodic_shows ("  period                       6.66328686 s, found\n");
+}
+
+/* The branch through both folds, and one row of the table for each point. */
+static void test_branch (void **state) {
+  int rows = 0, folds = 0;
+  (void)state;
+  cli_good ("pinwheel periodic @/oscillator.yaml --vary A=0.1:0.35 -o @/branch");
+  periodic_shows ("  fold              0.255190316 ");
+  periodic_shows ("  fold              0.146046589 ");
+  const char *csv = cli_file ("branch/periodic.csv");
+  assert_int_equal (strncmp (csv, "A,event,period [s],displacement [m],rotation [rad],growing,residual,rod.x [m],", 76),
+                    0);
+  for (const char *line = strchr (csv, '\n') + 1; *line; line = strchr (line, '\n') + 1, rows++)
+    folds += strncmp (strchr (line, ','), ",fold,", 6) == 0;
+  assert_true (rows > 20);
+  assert_int_equal (folds, 2);
+  assert_non_null (strstr (cli_file ("branch/periodic.gp"), "label_of_x = 'A'"));
+}
+
+static void test_limit (void **state) {
+  (void)state;
+  cli_bad ("pinwheel periodic snakeboard --limit 1e-9 -o @/limit", 4, "--limit 1e-9: stopped; results are incomplete");
+}
+
+static void test_bad (void **state) {
+  static const cli_wrong each[] = {
+    { "snakeboard --period 1.9", "model snakeboard: signal swing.value does not repeat after 1.9 s" },
+    { "snakeboard --period free",
+      "model snakeboard: signal swing.value changes with time, so that the period is not free" },
+    { "snakeboard --period fast", "--period: \"fast\" is not a number" },
+    { "snakeboard --period -1", "--period -1: expected a number > 0" },
+    { "snakeboard --periods 0", "--periods 0: expected a whole number >= 1" },
+    { "snakeboard --periods 2 --period 4", "--periods 2: not together with --period" },
+    { "snakeboard --guess 2", "--guess 2: only with --period free" },
+    { "pendulum",
+      "pendulum: no signal has a known period, which those of expressions and tables have not: give --period T, or "
+      "--period free if no signal changes with time" },
+    { "snakeboard --vary m=1", "--vary m=1: expected NAME=FIRST:LAST" },
+    { "snakeboard --vary m=0:1", "--vary m=0:1: expected a number > 0" },
+    { "snakeboard --vary mm=1:3", "model snakeboard has no parameter \"mm\"; did you mean \"m\"?" },
+    { "chain --set n=200 --period 1", "model chain has 600 coordinates; periodic motions are sought with at most 100" },
+  };
+  (void)state;
+  cli_bad_each ("periodic", each, sizeof each / sizeof *each);
+  cli_bad ("pinwheel periodic @/oscillator.yaml --vary n=1:3", 2,
+           "--vary n=1:3: n counts something and cannot vary continuously; use `pinwheel sweep`");
+  cli_bad ("pinwheel periodic @/oscillator.yaml --period 2.5*pi --vary w=0.8:1", 2,
+           "model oscillator: signal drive.value does not repeat after 7.85398163397 s");
+}
+
+/* Without losses the snakeboard is faster after each period; a pendulum at rest stays there. */
+static void test_none (void **state) {
+  (void)state;
+  assert_int_equal (cli_run ("pinwheel periodic snakeboard -o @/none"), 4);
+  assert_non_null (strstr (cli_err,
+                           "snakeboard: no periodic motion with period 2 s found by Newton's method from the "
+                           "states after this many periods (where it ends at a residual in units of the scene, "
+                           "L and L/T): 0 ("));
+  assert_non_null (strstr (cli_err, "add losses if the motion grows in every period"));
+  assert_null (cli_file ("none/periodic.json"));
+  assert_int_equal (cli_run ("pinwheel periodic @/oscillator.yaml --set A=0 --period free --guess 6"), 4);
+  assert_non_null (strstr (cli_err, "Newton's method leads to a steady motion or an equilibrium"));
+}
+
+int main (void) {
+  const struct CMUnitTest tests[] = {
+    cmocka_unit_test (test_motion), cmocka_unit_test (test_periods), cmocka_unit_test (test_free_period),
+    cmocka_unit_test (test_branch), cmocka_unit_test (test_limit),   cmocka_unit_test (test_bad),
+    cmocka_unit_test (test_none),
+  };
+  return cmocka_run_group_tests (tests, cli_setup, cli_teardown);
+}

@@ -1,0 +1,379 @@
+/* Periodic motions: reference digits, closed forms of multipliers, branches, free periods, gaits against long runs. */
+#include <math.h>
+#include <string.h>
+#include "check.h"
+#include "gallery.h"
+#include "runs.h"
+#include "scene.h"
+
+static pw_periodic *periodic_open (const pw_system *s, const pw_periodic_settings *set) {
+  pw_error error = { 0 };
+  pw_periodic *x = pw_periodic_open (s, set, &error);
+  check_ok (x ? PW_OK : error.status, &error);
+  return x;
+}
+
+static pw_periodic_orbit periodic_solve (pw_periodic *x, int settle, double parameter) {
+  pw_error error = { 0 };
+  pw_periodic_orbit o;
+  check_ok (pw_periodic_solve (x, settle, parameter, &o, &error), &error);
+  check_below ("residual", o.residual, 1e-10, "Newton to round-off, times the growth over a period");
+  return o;
+}
+
+/* Multiplier i of those that are not trivial. */
+static void periodic_expect (const pw_periodic_orbit *o, int i, double re, double im) {
+  assert_true (i < o->multipliers - o->trivial);
+  check_close ("multiplier", o->re[i], re, 2e-8, "steps of the derivatives: 1e-9 each");
+  check_close ("multiplier", o->im[i], im, 2e-8, "steps of the derivatives: 1e-9 each");
+}
+
+/* Events of a branch, at most 8 of each type, with the parameter; the points that are stable and those that are not. */
+typedef struct {
+  int count[PW_PERIODIC_END], points, unstable;
+  double at[PW_PERIODIC_END][8], last;
+} branch_events;
+
+static branch_events periodic_follow (pw_periodic *x) {
+  pw_error error = { 0 };
+  pw_periodic_orbit o;
+  branch_events e = { .points = 0 };
+  check_ok (pw_periodic_follow (x, 1, &error), &error);
+  for (;;) {
+    check_ok (pw_periodic_next (x, &o, &error), &error);
+    if (o.event == PW_PERIODIC_END) return e;
+    e.at[o.event][e.count[o.event]++ % 8] = e.last = o.parameter;
+    e.points++;
+    e.unstable += o.unstable > 0;
+  }
+}
+
+/* ---- A driven pendulum: th'' = -sin th - 0.1 th' + A cos 0.8 t ---- */
+
+typedef struct {
+  double A, th, om;
+} pendulum;
+
+static const pw_parameter pendulum_parameters[] = { { PW_AT (pendulum, A), 0.2, "N m", "", PW_REAL },
+                                                    { PW_AT (pendulum, th), 0, "rad", "", PW_REAL },
+                                                    { PW_AT (pendulum, om), 0, "rad/s", "", PW_REAL },
+                                                    { .name = NULL } };
+
+static void pendulum_build (pw_model *m, const void *parameters) {
+  const pendulum *p = parameters;
+  double s = sin (p->th), c = cos (p->th);
+  const pw_signal torque = { PW_HARMONIC, .harmonic = { .amplitude = p->A, .omega = 0.8 } };
+  pw_add_body (
+      m, &(pw_body){ .name = "bob", .mass = 1, .start = { s, -c, p->th }, .rate = { c * p->om, s * p->om, p->om } });
+  pw_add_pin (m, &(pw_pin){ .name = "pivot", .body = { "bob", "ground" }, .at = { { 0, 1 }, { 0, 0 } } });
+  pw_add_gravity (m, &(pw_gravity){ .name = "gravity", .acceleration = { 0, -1 } });
+  pw_add_friction (m, &(pw_friction){ .name = "air", .body = { "bob", "ground" }, .viscous = 0.1 });
+  pw_add_torque (m, &(pw_torque){ .name = "drive", .body = { "bob", "ground" }, .value = torque });
+}
+
+static const pw_plugin_table pendulum_table = { .abi = PW_ABI,
+                                                .size = sizeof (pw_plugin_table),
+                                                .parameters = pendulum_parameters,
+                                                .parameters_size = sizeof (pendulum),
+                                                .build = pendulum_build };
+
+static pw_system *pendulum_at (void *context, double A, pw_error *error) {
+  (void)context, (void)error;
+  return scene_system (&pendulum_table, "A", A, NULL);
+}
+
+/* Three orbits at A = 0.2: shooting with 30 digits (Taylor series), confirmed by AUTO-07p. */
+static void test_pendulum (void **state) {
+  static const struct {
+    double th, om, re[2], im;
+  } orbit[] = { { 0.5982763426814, 0.1196106484219, { 0.265099104796, 0.265099104796 }, 0.621015774681 },
+                { 1.2066430427563, 0.6718812719357, { 1.79476852725, 0.254037287173 }, 0 },
+                { -1.2305856526574, 1.2572101436741, { 0.205346676608, 0.205346676608 }, 0.643250239154 } };
+  (void)state;
+  for (int i = 0; i < 3; i++) {
+    double th = round (100 * orbit[i].th) / 100, om = round (100 * orbit[i].om) / 100;
+    pw_system *s = scene_system (&pendulum_table, "th", th, "om", om, NULL);
+    pw_periodic *x = periodic_open (s, &(pw_periodic_settings){ .period = 0 });
+    pw_periodic_orbit o = periodic_solve (x, 0, 0);
+    assert_int_equal (pw_periodic_symmetries (x), 0);
+    assert_int_equal (o.multipliers, 2);
+    assert_int_equal (o.unstable, i == 1);
+    check_close ("period", o.period, 2.5 * PW_PI, 1e-14, "of the signal");
+    check_close ("theta", o.q[2], orbit[i].th, 1e-11, "13 digits, run at 1e-12");
+    check_close ("omega", o.v[2], orbit[i].om, 1e-11, "13 digits, run at 1e-12");
+    for (int k = 0; k < 2; k++) periodic_expect (&o, k, orbit[i].re[k], k ? -orbit[i].im : orbit[i].im);
+    pw_periodic_close (x);
+    pw_system_free (s);
+  }
+}
+
+/* The folds of the same two sources. */
+static void test_folds (void **state) {
+  (void)state;
+  pw_system *s = pendulum_at (NULL, 0.1, NULL);
+  pw_periodic *x = periodic_open (s, &(pw_periodic_settings){ .compile = pendulum_at, .first = 0.1, .last = 0.35 });
+  periodic_solve (x, 0, 0.1);
+  branch_events e = periodic_follow (x);
+  assert_int_equal (e.count[PW_PERIODIC_FOLD], 2);
+  assert_int_equal (e.count[PW_PERIODIC_REAL] + e.count[PW_PERIODIC_FLIP] + e.count[PW_PERIODIC_TORUS], 0);
+  assert_true (e.points > 20 && e.unstable > 5);
+  check_close ("fold", e.at[PW_PERIODIC_FOLD][0], 0.2551903155158, 1e-10, "quadratic in the distance along the branch");
+  check_close ("fold", e.at[PW_PERIODIC_FOLD][1], 0.1460465894553, 1e-10, "quadratic in the distance along the branch");
+  check_close ("end", e.last, 0.35, 0, "the end of the range");
+  pw_periodic_close (x);
+  pw_system_free (s);
+}
+
+/* ---- An oscillator: x'' = -(a - 2 q cos 2 t) x + (p - c x^2) x' ---- */
+
+typedef struct {
+  double a, q, p, c, x;
+} oscillator;
+
+static const pw_parameter oscillator_parameters[] = {
+  { PW_AT (oscillator, a), 1, "", "", PW_REAL }, { PW_AT (oscillator, q), 0, "", "", PW_REAL },
+  { PW_AT (oscillator, p), 0, "", "", PW_REAL }, { PW_AT (oscillator, c), 0, "", "", PW_REAL },
+  { PW_AT (oscillator, x), 0, "", "", PW_REAL }, { .name = NULL }
+};
+
+static int oscillator_torque (void *context, double t, const double *x, double value[3], double *gradient) {
+  const oscillator *o = context;
+  double stiffness = o->a - 2 * o->q * cos (2 * t);
+  value[0] = -stiffness * x[0] + (o->p - o->c * x[0] * x[0]) * x[1];
+  if (gradient) gradient[0] = -stiffness - 2 * o->c * x[0] * x[1], gradient[1] = o->p - o->c * x[0] * x[0];
+  return 0;
+}
+
+/* The parameters of a system outlive it: more than exist at a time. */
+static void oscillator_build (pw_model *m, const void *parameters) {
+  static const char *const reads[] = { "disc.phi", "disc.omega", NULL };
+  static oscillator kept[16];
+  static int next;
+  oscillator *o = &kept[next++ % 16];
+  *o = *(const oscillator *)parameters;
+  const pw_signal torque = { PW_FUNCTION, .function = { .eval = oscillator_torque, .context = o, .reads = reads } };
+  pw_add_body (m, &(pw_body){ .name = "disc", .mass = 1, .inertia = 1, .start = { 0, 0, o->x } });
+  pw_add_pin (m, &(pw_pin){ .name = "axle", .body = { "disc", "ground" } });
+  pw_add_torque (m, &(pw_torque){ .name = "torque", .body = { "disc", "ground" }, .value = torque });
+}
+
+static const pw_plugin_table oscillator_table = { .abi = PW_ABI,
+                                                  .size = sizeof (pw_plugin_table),
+                                                  .parameters = oscillator_parameters,
+                                                  .parameters_size = sizeof (oscillator),
+                                                  .build = oscillator_build };
+
+static pw_system *mathieu_at (void *context, double a, pw_error *error) {
+  (void)context, (void)error;
+  return scene_system (&oscillator_table, "a", a, "q", 1., NULL);
+}
+
+/* Mathieu's equation: characteristic values (DLMF 28.2), where the multipliers are -1, -1 or 1, 1, and between them. */
+static void test_mathieu (void **state) {
+  static const struct {
+    double a, re[2], im, accuracy;
+  } row[] = { { 1.8591080725143634, { -1, -1 }, 0, 1e-4 },
+              { -0.11024881699209521, { -1, -1 }, 0, 1e-4 },
+              { 4.371300982735086, { 1, 1 }, 0, 1e-4 },
+              { 3.917024772998471, { 1, 1 }, 0, 1e-4 },
+              { 2.5, { -0.0483762, -0.0483762 }, 0.998829, 1e-6 },
+              { 1, { -4.15605494, -0.2406128 }, 0, 6e-8 } };
+  (void)state;
+  for (int i = 0; i < 6; i++) {
+    pw_system *s = mathieu_at (NULL, row[i].a, NULL);
+    pw_periodic *x = periodic_open (s, &(pw_periodic_settings){ .period = PW_PI });
+    pw_periodic_orbit o = periodic_solve (x, 0, 0);
+    assert_int_equal (o.multipliers, 2);
+    for (int k = 0; k < 2; k++) {
+      const char *why = "digits given; the root of 1e-9 at a double one";
+      check_close ("multiplier", o.re[k], row[i].re[k], row[i].accuracy, why);
+      check_close ("multiplier", o.im[k], k ? -row[i].im : row[i].im, row[i].accuracy, why);
+    }
+    check_close ("determinant", o.re[0] * o.re[1] - o.im[0] * o.im[1], 1, 1e-7, "no damping (Liouville)");
+    pw_periodic_close (x);
+    pw_system_free (s);
+  }
+}
+
+/* At the boundaries period doubles, or branches with the period of the forcing begin. */
+static void test_boundaries (void **state) {
+  (void)state;
+  pw_system *s = mathieu_at (NULL, 3, NULL);
+  const double end[] = { -0.3, 4.2 },
+               exact[][2] = { { 1.8591080725143634, -0.11024881699209521 }, { 3.917024772998471 } };
+  for (int i = 0; i < 2; i++) {
+    pw_periodic_event event = i ? PW_PERIODIC_REAL : PW_PERIODIC_FLIP;
+    pw_periodic_settings set = { .period = PW_PI, .compile = mathieu_at, .first = 3, .last = end[i] };
+    pw_periodic *x = periodic_open (s, &set);
+    periodic_solve (x, 0, 3);
+    branch_events e = periodic_follow (x);
+    assert_int_equal (e.count[event], 2 - i);
+    for (int k = 0; k < 2 - i; k++)
+      check_close ("boundary", e.at[event][k], exact[i][k], 1e-6, "1e-7 of a step; a double root");
+    pw_periodic_close (x);
+  }
+  pw_system_free (s);
+}
+
+static pw_system *growing_at (void *context, double p, pw_error *error) {
+  (void)context, (void)error;
+  return scene_system (&oscillator_table, "p", p, "c", 1., NULL);
+}
+
+/* Rest of the undriven oscillator, seen with any period: multipliers exp ((p / 2 +- i w) T). */
+static void test_torus (void **state) {
+  (void)state;
+  pw_system *s = growing_at (NULL, -0.5, NULL);
+  pw_periodic_settings set = { .period = 2, .compile = growing_at, .first = -0.5, .last = 0.5 };
+  pw_periodic *x = periodic_open (s, &set);
+  pw_periodic_orbit o = periodic_solve (x, 0, -0.5);
+  double w = sqrt (1 - 1 / 16.);
+  periodic_expect (&o, 0, exp (-0.5) * cos (2 * w), exp (-0.5) * sin (2 * w));
+  branch_events e = periodic_follow (x);
+  assert_int_equal (e.count[PW_PERIODIC_TORUS], 1);
+  check_close ("crossing", e.at[PW_PERIODIC_TORUS][0], 0, 1e-7, "1e-7 of a step");
+  pw_periodic_close (x);
+  pw_system_free (s);
+}
+
+/* Van der Pol's oscillator: the period by other authors' digits, the multiplier by Liouville's formula. */
+static void test_van_der_pol (void **state) {
+  enum { SAMPLES = 800 };
+  pw_error error = { 0 };
+  pw_periodic_orbit o;
+  double sum = 0;
+  (void)state;
+  pw_system *s = scene_system (&oscillator_table, "p", 1., "c", 1., "x", 2., NULL);
+  for (int given = 0; given < 2; given++) {
+    pw_periodic *x = periodic_open (s, &(pw_periodic_settings){ .free = 1, .period = given * 6 });
+    o = periodic_solve (x, given ? 10 : 0, 0);
+    check_close ("period", o.period, 6.66328686, 1e-8, "the digits given");
+    assert_int_equal (o.trivial, 1);
+    check_close ("trivial multiplier", o.re[1], 1, 1e-7, "steps of the derivatives");
+    pw_run *r = runs_open (s, "erk8+projection", &(pw_settings){ .rtol = 1e-11 });
+    check_ok (pw_run_restart (r, o.q, o.v, &error), &error);
+    sum = 0;
+    for (int i = 0; i < SAMPLES; i++) {
+      double angle = runs_to (r, i * o.period / SAMPLES).q[2];
+      sum += (1 - angle * angle) * o.period / SAMPLES;
+    }
+    periodic_expect (&o, 0, exp (sum), 0);
+    pw_run_close (r);
+    pw_periodic_close (x);
+  }
+  pw_system_free (s);
+  s = scene_system (&oscillator_table, "p", -1., "c", 1., "x", 0.1, NULL); /* decays */
+  pw_periodic *x = periodic_open (s, &(pw_periodic_settings){ .free = 1, .period = 6 });
+  assert_int_equal (pw_periodic_solve (x, 10, 0, &o, &error), PW_RETRY);
+  assert_int_equal (error.status, PW_OK);
+  assert_string_equal (pw_periodic_reason (x), "Newton's method leads to a steady motion or an equilibrium");
+  pw_periodic_close (x);
+  pw_system_free (s);
+}
+
+/* ---- A gait: the EzyRoller in air, with a constant torque that makes it turn ---- */
+
+static pw_system *gait_open (double bias, double omega) {
+  pw_model *m = scene_model (&scene_ezyroller, "omega", omega, NULL);
+  pw_add_drag (m, &(pw_drag){ .name = "air", .body = "frame", .linear = 0.2 });
+  if (bias != 0) {
+    const pw_signal torque = { .constant = bias };
+    pw_add_torque (m, &(pw_torque){ .name = "bias", .body = { "frame", "steer" }, .value = torque });
+  }
+  return scene_compile (m);
+}
+
+static pw_system *gait_at (void *context, double omega, pw_error *error) {
+  (void)context, (void)error;
+  return gait_open (0, omega);
+}
+
+/* A run from rest ends in the gait: displacement and rotation in one period, and the factor by which the distance from
+ * the gait shrinks in one period, the largest multiplier. */
+static void gait_compare (double bias, int settled) {
+  pw_system *s = gait_open (bias, PW_PI);
+  pw_periodic *x = periodic_open (s, &(pw_periodic_settings){ .period = 0 });
+  pw_periodic_orbit o = periodic_solve (x, 10, 0);
+  assert_int_equal (pw_periodic_symmetries (x), 3);
+  assert_int_equal (o.trivial, 3);
+  double length = hypot (o.end[0] - o.q[0], o.end[1] - o.q[1]), q[3] = { 0 }, off[2] = { 0 };
+  pw_run *r = runs_open (s, "erk8+projection", &(pw_settings){ .rtol = 1e-12 });
+  for (int k = settled / 2 - 1; k <= settled / 2 + 1; k++) {
+    pw_sample now = runs_to (r, k * o.period);
+    off[0] = off[1], off[1] = hypot (now.q[0] - q[0], now.q[1] - q[1]) - length;
+    memcpy (q, now.q, sizeof q);
+  }
+  check_close ("decay in a period", off[1] / off[0], o.re[0], 1e-3, "the next multiplier has died out");
+  memcpy (q, runs_to (r, settled * o.period).q, sizeof q);
+  pw_sample last = runs_to (r, (settled + 1) * o.period);
+  check_close ("displacement", hypot (last.q[0] - q[0], last.q[1] - q[1]), length, 1e-9, "both run at 1e-12");
+  check_close ("rotation", last.q[2] - q[2], o.rotation, 1e-9, "both run at 1e-12");
+  assert_true (bias == 0 || fabs (o.rotation) > 0.01);
+  pw_run_close (r);
+  pw_periodic_close (x);
+  pw_system_free (s);
+}
+
+static void test_gait (void **state) {
+  (void)state;
+  gait_compare (0, 110);
+}
+
+static void test_turning_gait (void **state) {
+  (void)state;
+  gait_compare (0.002, 110);
+}
+
+/* The period follows the frequency. */
+static void test_frequency (void **state) {
+  (void)state;
+  pw_error error = { 0 };
+  pw_system *s = gait_open (0, 3);
+  pw_periodic *x = periodic_open (s, &(pw_periodic_settings){ .compile = gait_at, .first = 3, .last = 4, .points = 4 });
+  periodic_solve (x, 10, 3);
+  pw_periodic_orbit o;
+  check_ok (pw_periodic_follow (x, 1, &error), &error);
+  for (int i = 0;; i++) {
+    check_ok (pw_periodic_next (x, &o, &error), &error);
+    if (o.event == PW_PERIODIC_END) break;
+    check_close ("period", o.period, 2 * PW_PI / o.parameter, 1e-13, "of the signal");
+    assert_true (i < 40);
+  }
+  pw_periodic_close (x);
+  x = periodic_open (s, &(pw_periodic_settings){ .period = 2 * PW_PI / 3, .compile = gait_at, .first = 3, .last = 4 });
+  assert_int_equal (pw_periodic_solve (x, 10, 3, &o, &error), PW_INPUT); /* the derivative needs a neighbour */
+  assert_non_null (strstr (error.text, "signal rider.value does not repeat after 2.09439510239 s"));
+  pw_periodic_close (x);
+  pw_system_free (s);
+}
+
+/* ---- Periods and refusals ---- */
+
+static void test_refused (void **state) {
+  pw_error error = { 0 };
+  (void)state;
+  pw_system *s = gallery_open ("snakeboard", NULL);
+  check_close ("period", pw_system_period (s), 2, 1e-14, "2 pi / omega");
+  assert_null (pw_periodic_open (s, &(pw_periodic_settings){ .period = 1.9 }, &error));
+  check_error (&error, PW_INPUT, "model snakeboard: signal swing.value does not repeat after 1.9 s");
+  assert_null (pw_periodic_open (s, &(pw_periodic_settings){ .free = 1 }, &error));
+  check_error (&error, PW_INPUT,
+               "model snakeboard: signal swing.value changes with time, so that the period is not free");
+  pw_periodic_close (periodic_open (s, &(pw_periodic_settings){ .period = 4 }));
+  pw_system_free (s);
+  s = mathieu_at (NULL, 1, NULL);
+  check_close ("period", pw_system_period (s), 0, 0, "a function has none that is known");
+  assert_null (pw_periodic_open (s, &(pw_periodic_settings){ .period = 0 }, &error));
+  check_error (&error, PW_INPUT, "model scene: no signal has a known period: a period is needed");
+  pw_system_free (s);
+}
+
+int main (void) {
+  const struct CMUnitTest tests[] = {
+    cmocka_unit_test (test_pendulum),   cmocka_unit_test (test_folds),        cmocka_unit_test (test_mathieu),
+    cmocka_unit_test (test_boundaries), cmocka_unit_test (test_torus),        cmocka_unit_test (test_van_der_pol),
+    cmocka_unit_test (test_gait),       cmocka_unit_test (test_turning_gait), cmocka_unit_test (test_frequency),
+    cmocka_unit_test (test_refused),
+  };
+  return cmocka_run_group_tests (tests, NULL, NULL);
+}
