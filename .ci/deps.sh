@@ -20,7 +20,7 @@ for word; do
   browser) needs="$needs chromium" ;;
   slurm) needs="$needs slurmctld munged" ;;
   reference) needs="$needs python3-numpy python3-scipy" ;;
-  python) needs="$needs python3-numpy python3-pytest python3-matplotlib" ;;
+  python) needs="$needs python3-numpy python3-pytest python3-matplotlib python3-jsonschema" ;;
   page) needs="$needs clang wasm-ld wasi-libc wasi-builtins" ;;
   *) echo "deps.sh: unknown word \"$word\"" >&2; exit 2 ;;
   esac

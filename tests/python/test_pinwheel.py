@@ -101,6 +101,21 @@ def test_same_bits_as_the_program(model, method, tmp_path):
         assert np.array_equal(r[name], expected[name]), name
 
 
+def test_summaries_follow_their_schema(tmp_path):
+    jsonschema = pytest.importorskip("jsonschema")
+    schema = json.loads((TOP / "docs/summary.schema.json").read_text())
+    jsonschema.Draft202012Validator.check_schema(schema)
+    validator = jsonschema.Draft202012Validator(schema)
+    runs = [(name, "--energy") for name in pw.models()]
+    runs += [("elliptic-wire",), ("nothing",), ("theo-jansen", "--method", "rk4", "--step", "0.05", "--t-end", "20")]
+    for words in runs:
+        file = tmp_path / "summary.json"
+        file.unlink(missing_ok=True)
+        time = () if "--t-end" in words else ("--t-end", "0.1")
+        subprocess.run([lib.program(), "run", *words, *time, "--json", str(file)], capture_output=True)
+        validator.validate(json.loads(file.read_text()))
+
+
 def test_archives_have_the_numbers_of_tables(tmp_path):
     for name in "t.csv", "t.npz":
         program("run", "ezyroller", "--t-end", "2", "--every", "0.25", "--energy", "-o", str(tmp_path / name))
