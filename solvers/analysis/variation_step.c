@@ -24,7 +24,8 @@ static double step_norm (const pw_variation *x, const double *Y) {
   const pw_system *s = x->r->s;
   double most = 0;
   for (int j = 0; j < x->n; j++)
-    most = pw_larger_or_nan (most, pw_larger_or_nan (fabs (Y[j]), fabs (Y[x->n + j]) * x->r->w->scale.time) / pw_unit (s, j));
+    most = pw_larger_or_nan (most,
+                             pw_larger_or_nan (fabs (Y[j]), fabs (Y[x->n + j]) * x->r->w->scale.time) / pw_unit (s, j));
   return most;
 }
 

@@ -5,7 +5,7 @@
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
-#include "checkpoints.h"
+#include "run_command.h"
 #include "fingerprint.h"
 
 static const char checkpoints_key[] = "checkpoint-every", checkpoints_engine[] = "engine";

@@ -5,7 +5,7 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
-#include "checkpoints.h"
+#include "run_command.h"
 #include "figure.h"
 #include "profile.h"
 #include "report.h"

@@ -1,6 +1,6 @@
 /* A run as the command `pinwheel run` makes it, and its checkpoints. */
-#ifndef PW_CHECKPOINTS_H
-#define PW_CHECKPOINTS_H
+#ifndef PW_RUN_COMMAND_H
+#define PW_RUN_COMMAND_H
 
 #include "cli.h"
 #include "comparison.h"
