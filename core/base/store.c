@@ -1,14 +1,21 @@
 /* Tables of names, arenas, and arrays in one allocation. */
-#include <stdint.h>
 #include <stdlib.h>
 #include <string.h>
 #include "util.h"
 
-/* FNV-1a (Fowler, Noll, Vo). */
-static uint64_t store_hash (const char *name) {
-  uint64_t h = 14695981039346656037u;
-  while (*name) h = (h ^ (unsigned char)*name++) * 1099511628211u;
-  return h;
+unsigned long long pw_check_sum (unsigned long long sum, const void *bytes, size_t count) {
+  for (const unsigned char *p = bytes, *end = p + count; p < end; p++) sum = (sum ^ *p) * 1099511628211u;
+  return sum;
+}
+
+int pw_grow (void *array, size_t count, size_t *room, size_t size) {
+  if (count < *room) return PW_OK;
+  size_t more = *room ? 2 * *room : 8;
+  void *p = realloc (*(void **)array, more * size);
+  if (p == NULL) return PW_RESOURCE;
+  *(void **)array = p;
+  *room = more;
+  return PW_OK;
 }
 
 int pw_names_open (pw_names *n, size_t entries) {
@@ -24,7 +31,7 @@ void pw_names_close (pw_names *n) {
 }
 
 static struct pw_name *store_slot (const pw_names *n, const char *name) {
-  size_t i = (size_t)store_hash (name) & (n->size - 1);
+  size_t i = (size_t)pw_check_sum (PW_CHECK, name, strlen (name)) & (n->size - 1);
   while (n->slot[i].name && strcmp (n->slot[i].name, name) != 0) i = (i + 1) & (n->size - 1);
   return &n->slot[i];
 }

@@ -43,6 +43,10 @@ int pw_is_text (const char *text);
 /* Replaces control characters and invalid bytes by question marks. */
 void pw_text_sanitise (char *text);
 
+/* Continues the FNV-1a hash (Fowler, Noll, Vo) with more bytes; begin with PW_CHECK. */
+#define PW_CHECK 14695981039346656037u
+unsigned long long pw_check_sum (unsigned long long sum, const void *bytes, size_t count);
+
 /* Open-addressing table from names to numbers >= 0; it stores pointers to the names, not copies. */
 typedef struct {
   size_t size; /* a power of two */
@@ -55,6 +59,9 @@ int pw_names_open (pw_names *n, size_t entries); /* PW_OK or PW_RESOURCE */
 void pw_names_close (pw_names *n);
 int pw_names_add (pw_names *n, const char *name, int value); /* -1, or the value the name already has */
 int pw_names_find (const pw_names *n, const char *name);     /* -1 if absent */
+
+/* Makes room for one more entry of an array, *(void **)array, of which `count` are in use.  PW_OK or PW_RESOURCE. */
+int pw_grow (void *array, size_t count, size_t *room, size_t size);
 
 /* Memory that grows and is released as a whole. */
 typedef struct {

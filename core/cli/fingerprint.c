@@ -5,6 +5,7 @@
 #include <stdio.h>
 #include <string.h>
 #include "fingerprint.h"
+#include "util.h"
 
 /* ---- Writing ---- */
 
@@ -21,21 +22,13 @@ void pw_print_number (pw_text *t, const char *key, const char *of, double value)
   pw_print_line (t, key, of, pw_format (number, value, 17));
 }
 
-/* FNV-1a (Fowler, Noll, Vo). */
-static uint64_t print_hash (uint64_t h, const void *bytes, size_t n) {
-  for (const unsigned char *c = bytes; n-- > 0; c++) h = (h ^ *c) * 1099511628211u;
-  return h;
-}
-
-static const uint64_t print_empty = 14695981039346656037u;
-
 int pw_print_file (pw_text *t, const char *key, const char *name, const char *path, pw_error *error) {
   char text[200], block[4096];
-  uint64_t h = print_empty;
+  uint64_t h = PW_CHECK;
   const char *reason;
   FILE *f = pw_open_input (path, &reason);
   if (f == NULL) return pw_fail (error, errno ? PW_RESOURCE : PW_INPUT, "cannot read %s: %s", path, reason);
-  for (size_t n; (n = fread (block, 1, sizeof block, f)) > 0;) h = print_hash (h, block, n);
+  for (size_t n; (n = fread (block, 1, sizeof block, f)) > 0;) h = pw_check_sum (h, block, n);
   int why = ferror (f) ? errno : 0;
   fclose (f);
   if (why) return pw_fail (error, PW_RESOURCE, "cannot read %s: %s", path, strerror (why));
@@ -61,9 +54,9 @@ uint64_t pw_check_tables (uint64_t sum, const pw_model *m) {
       const pw_signal *s = pw_field_at (e->kind, e->definition, PW_SIGNAL, i);
       if (s->type != PW_TABLE) continue;
       size_t bytes = (size_t)s->table.count * sizeof (double);
-      sum = print_hash (print_hash (sum ? sum : print_empty, s->table.t, bytes), s->table.value, bytes);
+      sum = pw_check_sum (pw_check_sum (sum ? sum : PW_CHECK, s->table.t, bytes), s->table.value, bytes);
       const double line[2] = { s->table.scale, s->table.offset };
-      if (line[0] != 0 || line[1] != 0) sum = print_hash (sum, line, sizeof line);
+      if (line[0] != 0 || line[1] != 0) sum = pw_check_sum (sum, line, sizeof line);
     }
   return sum;
 }

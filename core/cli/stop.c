@@ -6,12 +6,6 @@
 #include "cli.h"
 #include "progress.h"
 
-#ifdef CLOCK_MONOTONIC_COARSE
-#define STOP_CHEAP CLOCK_MONOTONIC_COARSE
-#else
-#define STOP_CHEAP CLOCK_MONOTONIC
-#endif
-
 volatile sig_atomic_t pw_stop;
 
 static void stop_on_signal (int number) {
@@ -51,7 +45,7 @@ int pw_limit_over (void *limit) {
   pw_limit *l = limit;
   if (pw_stop) return 1;
   if (isinf (l->most)) return 0;
-  double now = pw_seconds (STOP_CHEAP);
+  double now = pw_seconds (CLOCK_MONOTONIC_COARSE);
   if (now == l->read) return 0;
   l->read = now;
   return pw_seconds (CLOCK_THREAD_CPUTIME_ID) - l->start > l->most;

@@ -17,7 +17,8 @@ typedef struct {
 typedef struct {
   pw_arena arena;
   pw_found *found;
-  int count, capacity;
+  int count;
+  size_t room;       /* entries allocated */
   char folders[400]; /* the existing folders, "/first:/second", for messages */
 } pw_search;
 
@@ -25,9 +26,9 @@ typedef struct {
 int pw_search_open (pw_search *s, pw_error *error);
 void pw_search_close (pw_search *s);
 
-/* The folder that belongs to this library and contains pinwheel.h, or this file of the engine of pages, malloced; NULL
- * if there is none.  PW_OK or PW_RESOURCE. */
-int pw_search_include (char **include, pw_error *error);
+/* The folder of pinwheel.h that belongs to this library, malloced; NULL if there is none.  PW_OK or PW_RESOURCE. */
+int pw_search_include (char **folder, pw_error *error);
+/* The same for the path of a file of the engine of pages. */
 int pw_search_page (const char *file, char **path, pw_error *error);
 
 /* Whether a name ends in ".so" or the like, with at least one character before it. */
@@ -59,8 +60,8 @@ char *pw_temporary_folder (pw_error *error);
 
 /* ---- The cache (cache.c) ---- */
 
-/* Creates the cache's folder if it does not exist, and returns its path, malloced; NULL if there is none, with a notice in the buffer if one
- * exists but others could have written to it, or it cannot be used. */
+/* Creates the cache's folder if it does not exist, and returns its path, malloced; NULL if there is none, with a notice in
+ * the buffer if one exists but others could have written to it, or it cannot be used. */
 char *pw_cache_folder (char *notice, size_t size);
 /* Deletes the least recently used files until the rest is within the limit. */
 void pw_cache_trim (const char *folder);
@@ -85,8 +86,8 @@ const pw_yaml *pw_file_yaml (const pw_file *f);
 /* ---- Tables of numbers (columns.c) ---- */
 
 /* Reads `width` columns of a CSV file into arrays of the arena.  `column` names them, or numbers them from 1; the first
- * column must be increasing; with `gaps`, empty cells and nan in others become NaN.  `unit` is the requested unit of each (NULL: any), to which it is converted if the header
- * names another.
+ * column must be increasing; with `gaps`, empty cells and nan in others become NaN.  `unit` is the requested unit of each
+ * (NULL: any), to which it is converted if the header names another.
  * PW_INPUT with "SHOWN:LINE: REASON", PW_RESOURCE. */
 int pw_columns_read (FILE *f, const char *shown, const char *const *column, const char *const *unit, int width,
                      int gaps, pw_arena *arena, double **value, int *count, pw_error *error);
@@ -152,9 +153,5 @@ int pw_output_check (pw_output *o, pw_error *error);
 int pw_output_continued (const pw_output *o);
 /* 1 if its path has this ending. */
 int pw_output_named (const pw_output *o, const char *ending);
-
-/* Continues the FNV-1a hash (Fowler, Noll, Vo) with more bytes; begin with PW_CHECK. */
-#define PW_CHECK 14695981039346656037u
-unsigned long long pw_check_sum (unsigned long long sum, const void *bytes, size_t count);
 
 #endif

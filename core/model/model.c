@@ -84,15 +84,8 @@ int pw_model_refuse (pw_model *m, const char *format, ...) {
   return pw_fail (&m->error, PW_INPUT, "model %s: %s", m->name, text);
 }
 
-/* Makes room for one more entry of an array. */
-static int model_grow (pw_model *m, void *array, int count, int *capacity, size_t size) {
-  if (count < *capacity) return PW_OK;
-  int more = *capacity ? 2 * *capacity : 8;
-  void *p = realloc (*(void **)array, (size_t)more * size);
-  if (p == NULL) return model_no_memory (m);
-  *(void **)array = p;
-  *capacity = more;
-  return PW_OK;
+static int model_grow (pw_model *m, void *array, int count, size_t *room, size_t size) {
+  return pw_grow (array, (size_t)count, room, size) == PW_OK ? PW_OK : model_no_memory (m);
 }
 
 static const char *model_copy_text (pw_model *m, const char *text) {
@@ -104,7 +97,7 @@ static const char *model_copy_text (pw_model *m, const char *text) {
 
 int pw_add_body (pw_model *m, const pw_body *body) {
   if (body == NULL) return pw_model_refuse (m, "pw_add_body without a body");
-  if (m->error.status != PW_OK || model_grow (m, &m->body, m->bodies, &m->body_capacity, sizeof *m->body) != PW_OK)
+  if (m->error.status != PW_OK || model_grow (m, &m->body, m->bodies, &m->body_room, sizeof *m->body) != PW_OK)
     return m->error.status;
   pw_body *b = &m->body[m->bodies++];
   *b = *body;
@@ -140,7 +133,7 @@ static int model_check_kind (pw_model *m, const pw_kind *kind) {
 
 int pw_add (pw_model *m, const pw_kind *kind, const void *definition) {
   if (m->error.status != PW_OK || model_check_kind (m, kind) != PW_OK ||
-      model_grow (m, &m->element, m->elements, &m->element_capacity, sizeof *m->element) != PW_OK)
+      model_grow (m, &m->element, m->elements, &m->element_room, sizeof *m->element) != PW_OK)
     return m->error.status;
   if (definition == NULL) return pw_model_refuse (m, "pw_add of element type %s without a definition", kind->name);
   void *copy = pw_arena_alloc (&m->arena, kind->definition);
@@ -247,7 +240,7 @@ int pw_model_set_initial (pw_model *m, const char *state, double value, pw_error
   const char *expected = pw_domain_check (PW_REAL, value);
   if (*expected)
     return pw_fail (error, PW_INPUT, "model %s: start %s = %g: expected %s", m->name, state, value, expected);
-  if (model_grow (m, &m->initial, m->initials, &m->initial_capacity, sizeof *m->initial) == PW_OK) {
+  if (model_grow (m, &m->initial, m->initials, &m->initial_room, sizeof *m->initial) == PW_OK) {
     m->initial[m->initials] = (pw_initial_setting){ model_copy_text (m, state), value };
     if (m->initial[m->initials].state) m->initials++;
   }

@@ -24,11 +24,12 @@ struct pw_model {
   char *parameters; /* table->parameters_size bytes */
   pw_arena arena;   /* strings and definitions */
   pw_body *body;
-  int bodies, body_capacity;
+  int bodies;
   pw_element *element;
-  int elements, element_capacity;
+  int elements;
   pw_initial_setting *initial;
-  int initials, initial_capacity;
+  int initials;
+  size_t body_room, element_room, initial_room; /* entries allocated */
   const pw_reference_text *reference;
   struct pw_kept *kept; /* released with the model */
   int built;

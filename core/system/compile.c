@@ -134,8 +134,7 @@ static int compile_arrays (const compilation *c) {
 
 /* ---- Bodies and elements ---- */
 
-/* Origin of the initial value of a body's state (0 to 5); `zero` for a 0 in a body without
- * `specified`. */
+/* Origin of the initial value of a body's state (0 to 5); `zero` if the value is 0 in a body without `specified`. */
 static unsigned char compile_origin (const pw_body *b, double value, int state, unsigned char zero) {
   if (b->specified) return b->specified >> state & 1 ? PW_SPECIFIED : 0;
   return value != 0 ? PW_SPECIFIED : zero;
@@ -368,7 +367,7 @@ static void compile_metric (pw_system *s) {
     s->metric[j] = s->mass[j] > 0 ? s->mass[j] : weight * (pw_is_angle (s, j) ? L2 : 1);
 }
 
-/* Numbers of batches by property, and the constant forces. */
+/* Counts the batches that have a property, and evaluates the constant forces. */
 static int compile_totals (const compilation *c) {
   pw_system *s = c->s;
   int constant = 0;

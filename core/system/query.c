@@ -50,9 +50,9 @@ const double *pw_system_initial_v (const pw_system *s) {
 
 int pw_system_jumps (const pw_system *s, double t) {
   double near = 8 * DBL_EPSILON * fabs (t);
-  for (const pw_source *i = s->source, *end = i + s->sources; i < end; i++)
-    if (!i->of_force || i->signal.type == PW_PULSE || i->signal.type == PW_FUNCTION)
-      if (pw_signal_breakpoint (&i->signal, 0, t - near) <= t + near) return 1;
+  for (const pw_source *x = s->source, *end = x + s->sources; x < end; x++)
+    if (!x->of_force || x->signal.type == PW_PULSE || x->signal.type == PW_FUNCTION)
+      if (pw_signal_breakpoint (&x->signal, 0, t - near) <= t + near) return 1;
   return 0;
 }
 

@@ -160,7 +160,7 @@ void pw_worst_position (const pw_system *s, const double *g, const double *size,
                         pw_residuals *r);
 
 /* First discontinuity of any signal after t, or INFINITY; with `knots` also kinks in second derivatives of signals of
- * constraints.  NaN if a signal fails (it returned neither). */
+ * constraints.  NaN if the breakpoint function of a signal returned a time that is not later. */
 double pw_next_breakpoint (pw_workspace *w, int knots, double t);
 
 /* 1 if the force, J or gamma of an element is not finite at the current state; writes "force of attraction sun" to the

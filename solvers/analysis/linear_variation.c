@@ -43,13 +43,13 @@ static void linear_put (pw_linearisation *x, const double *v) {
                { PW_JW_Q, of_J, 0, 1, v },    { PW_ETA_Q, of_J, 0, -1, NULL } };
   for (size_t i = 0; i < sizeof part / sizeof *part; i++)
     pw_newton_block (&x->newton, x->r->w, &x->scatter, part[i].block,
-                     &(pw_put){ .row = part[i].row,
-                                .col = part[i].col,
-                                .rows = x->m,
-                                .factor = part[i].factor,
-                                .factor_nonholonomic = part[i].factor,
-                                .w = part[i].w,
-                                .lambda = x->lambda });
+                     &(pw_placement){ .row = part[i].row,
+                                      .col = part[i].col,
+                                      .rows = x->m,
+                                      .factor = part[i].factor,
+                                      .factor_nonholonomic = part[i].factor,
+                                      .w = part[i].w,
+                                      .lambda = x->lambda });
   pw_newton_signals (&x->newton, x->r->w, &x->scatter, 0, 0, n);
 }
 

@@ -64,10 +64,10 @@ void pw_projector_close (pw_projector *p) {
 #define PROJECT_GOOD (4 * DBL_EPSILON)
 #define PROJECT_ENOUGH (64 * DBL_EPSILON)
 
-/* Redundant equations follow from the others to round-off; one that does not contradicts them, and its number goes to
- * *row. */
-static int project_others (pw_projector *p, const pw_system *s, double follows, const double *g, const double *size,
-                           int *row) {
+/* Redundant equations follow from the others to round-off; PW_RETRY if one does not: it contradicts them, and its number goes
+ * to *row. */
+static int project_check_redundant (pw_projector *p, const pw_system *s, double follows, const double *g,
+                                    const double *size, int *row) {
   double most = follows;
   p->against = -1;
   if (p->active == NULL || p->alone) return PW_OK;
@@ -108,7 +108,7 @@ static int project_positions (pw_projector *p, pw_run *r, double t, double *q, c
     for (int j = 0; j < s->coords; j++) q[j] += dq[j];
   }
   if (p->active == NULL) r->residuals.position = now.position, r->residuals.g = now.g;
-  return project_others (p, s, r->limits.follows, g, size, row);
+  return project_check_redundant (p, s, r->limits.follows, g, size, row);
 }
 
 int pw_project_positions (pw_projector *p, pw_run *r, double t, double *q, const double *v, int *row, double *worst) {

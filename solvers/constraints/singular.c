@@ -45,7 +45,7 @@ const pw_watchdog pw_watchdog_limits = {
   .drift_any = 0.1,
 
   /* Nonholonomic rows: accelerations do not grow when the motion passes a singular configuration; in a jump they reach
-   * 1 / near^1 times and more. */
+   * 1 / near times and more. */
   .jump = 100,
 
   /* The direction of a row of length 1 turns by at most an angle of 1 per rad, that of the others too; step sizes of

@@ -45,8 +45,7 @@ static int galpha_open (pw_run *r, pw_error *error) {
   const pw_array array[] = { { &d->v, n },      { &d->a, n },       { &d->w, n },      { &d->work.q1, n },
                              { &d->a1, n },     { &d->work.v1, n }, { &d->w1, n },     { &d->lambda1, rows },
                              { &d->mu1, rows }, { &d->z, size },    { &d->row, size }, { &d->column, size },
-                             { &d->pull, n },   { &d->f, n },       { &d->jv, rows },  { &d->eta, rows },
-                             { &d->D, n } };
+                             { &d->pull, n },   { &d->f, n },       { &d->jv, rows },  { &d->eta, rows } };
   int status = pw_implicit_open (&d->work, r, array, sizeof array / sizeof *array);
   d->ggl = pw_stabilised_by (r, PW_GGL);
   galpha_coefficients (d, pw_run_option (r, "rho"));
@@ -54,10 +53,8 @@ static int galpha_open (pw_run *r, pw_error *error) {
   d->rows = d->work.tangent.rows;
   d->positions = d->ggl ? d->work.tangent.holonomic : 0;
   d->size = 2 * d->n + d->rows + d->positions;
-  for (int j = 0; status == PW_OK && j < d->n; j++)
-    d->D[j] = pw_is_angle (s, j) ? 1 / (s->scale.length * s->scale.length) : 1;
   if (status == PW_OK) status = pw_galpha_open_matrix (r);
-  return pw_implicit_opened (r, status, d->ggl, error);
+  return pw_implicit_complete (r, status, d->ggl, error);
 }
 
 /* ---- Initialisation ---- */

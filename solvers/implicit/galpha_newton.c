@@ -25,7 +25,7 @@ static void galpha_kinematics (pw_run *r, double h, double *out) {
   pw_tangent_pull (&d->work.tangent, d->mu1, d->positions, d->pull);
   for (int j = 0; j < d->n; j++) {
     double dq = h * (d->v[j] + h * ((0.5 - d->beta) * d->w[j] + d->beta * d->w1[j]));
-    out[j] = c * (d->work.q1[j] - r->q[j] - dq) + d->D[j] * d->pull[j];
+    out[j] = c * (d->work.q1[j] - r->q[j] - dq) + d->work.tangent.D[j] * d->pull[j];
   }
 }
 
@@ -67,7 +67,7 @@ static int galpha_residual (pw_run *r, double h, double t1) {
 static void galpha_fill (pw_run *r, double h) {
   galpha *d = r->data;
   int n = d->n;
-  const pw_tangent_update to = { .momentum = n,
+  const pw_tangent_layout to = { .momentum = n,
                                  .constraint = 2 * n,
                                  .v = n,
                                  .a = n,
@@ -76,7 +76,7 @@ static void galpha_fill (pw_run *r, double h) {
                                  .of_q = d->gamma / (h * d->beta),
                                  .of_a = (1 - d->alpha_m) / ((1 - d->alpha_f) * h * d->gamma),
                                  .of_lambda = 1 };
-  pw_tangent_kinematics (&d->work.tangent, &to, pw_tangent_mu (&d->work.tangent, d->mu1, d->positions), d->D);
+  pw_tangent_kinematics (&d->work.tangent, &to, pw_tangent_mu (&d->work.tangent, d->mu1, d->positions));
   pw_tangent_momentum (&d->work.tangent, &to, pw_tangent_lambda (&d->work.tangent, d->lambda1));
   pw_tangent_velocities (&d->work.tangent, &to, d->work.v1, d->ggl);
   pw_tangent_positions (&d->work.tangent, &to, d->ggl ? 2 * n + d->rows : 2 * n);

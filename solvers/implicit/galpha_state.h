@@ -10,7 +10,6 @@ struct pw_method_data {
   int ggl;                      /* stabilised index 2, else index 3 */
   int n, rows, positions, size; /* coordinates, independent equations, those with mu, unknowns */
   double alpha_m, alpha_f, beta, gamma;
-  double *D;                       /* coords: 1 for lengths, 1/L^2 for angles */
   double *v, *a, *w;               /* velocities, accelerations and w at the beginning of the next step */
   double *a1, *w1, *lambda1, *mu1; /* the new state; lambda, mu: independent equations */
   double *z, *row, *column;        /* size: residual, then correction; scales of the matrix */

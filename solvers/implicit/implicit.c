@@ -22,7 +22,7 @@ int pw_implicit_lay_out (pw_implicit *x, int size) {
   return x->value ? pw_sparse_open (&x->sparse, size, t->colptr, t->rowind) : PW_RESOURCE;
 }
 
-int pw_implicit_opened (pw_run *r, int status, int velocities, pw_error *error) {
+int pw_implicit_complete (pw_run *r, int status, int velocities, pw_error *error) {
   if (status != PW_OK) return pw_fail_memory (r->s, error);
   status = pw_dense_output_open (&implicit_of (r)->last, r, velocities, error);
   return status == PW_OK ? pw_implicit_restart (r, error) : status;

@@ -90,15 +90,18 @@ static void drift_put_momentum (pw_run *r) {
   pw_tangent *x = &r->data->work.tangent;
   const pw_system *s = r->s;
   for (int j = 0; j < s->coords; j++) pw_scatter_add (&x->scatter, j, j, s->mass[j]);
-  pw_newton_JT (r->w, &x->scatter,
-                &(pw_put){ .col = s->coords, .rows = s->rows, .factor = 1, .factor_nonholonomic = 1, .map = x->map });
+  pw_newton_JT (
+      r->w, &x->scatter,
+      &(pw_placement){ .col = s->coords, .rows = s->rows, .factor = 1, .factor_nonholonomic = 1, .map = x->map });
 }
 
 /* S + h/2 ((S u)_q - b_q) at the middle; kinematics must be those of the middle. */
 static void drift_put_middle (pw_run *r, double h) {
   pw_tangent *x = &r->data->work.tangent;
   const pw_system *s = r->s;
-  pw_put put = { .row = s->coords, .rows = s->rows, .factor_nonholonomic = 0.5 * h, .map = x->map, .w = r->data->u };
+  pw_placement put = {
+    .row = s->coords, .rows = s->rows, .factor_nonholonomic = 0.5 * h, .map = x->map, .w = r->data->u
+  };
   pw_newton_block (&x->newton, r->w, &x->scatter, PW_JW_Q, &put);
   put.factor_nonholonomic = -0.5 * h;
   pw_newton_block (&x->newton, r->w, &x->scatter, PW_ETA_Q, &put);
@@ -110,7 +113,7 @@ static void drift_put_middle (pw_run *r, double h) {
 static void drift_put_end (pw_run *r) {
   pw_tangent *x = &r->data->work.tangent;
   pw_newton_J (r->w, &x->scatter,
-               &(pw_put){ .row = r->s->coords, .rows = r->s->holonomic, .factor = 1, .map = x->map });
+               &(pw_placement){ .row = r->s->coords, .rows = r->s->holonomic, .factor = 1, .map = x->map });
 }
 
 static int drift_open_matrix (pw_run *r) {
@@ -262,7 +265,7 @@ static int leapfrog_open (pw_run *r, pw_error *error) {
                              { &d->eta, rows }, { &d->z, n + rows } };
   int status = pw_implicit_open (&d->work, r, array, sizeof array / sizeof *array);
   if (status == PW_OK) status = drift_open_matrix (r);
-  return pw_implicit_opened (r, status, 1, error);
+  return pw_implicit_complete (r, status, 1, error);
 }
 
 static void leapfrog_serialise (pw_run *r, pw_archive *a) {

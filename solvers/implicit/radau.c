@@ -64,7 +64,6 @@ static int radau_allocate (pw_run *r) {
   radau *d = r->data;
   size_t n = (size_t)d->n + 3, rows = (size_t)r->s->rows, size = (size_t)d->size, entries = (size_t)r->s->entries;
   pw_array array[64] = {
-    { &d->D, n },
     { &d->B, 2 * n },
     { &d->unit, size },
     { &d->tolerance, size },
@@ -87,7 +86,7 @@ static int radau_allocate (pw_run *r) {
     { &d->now.ledger, entries },
     { &d->last.ledger, entries },
   };
-  size_t count = 22;
+  size_t count = 21;
   for (int k = 0; k < STAGES; k++) {
     array[count++] = (pw_array){ &d->now.Z[k], size };
     array[count++] = (pw_array){ &d->last.Z[k], size };
@@ -100,18 +99,16 @@ static int radau_allocate (pw_run *r) {
   return d->memory ? PW_OK : PW_RESOURCE;
 }
 
-/* The diagonals of D and B, and the units of the unknowns. */
+/* The diagonal of B, and the units of the unknowns. */
 static void radau_constants (pw_run *r) {
   radau *d = r->data;
   const pw_system *s = r->s;
   int n = d->n;
-  double L = s->scale.length, T = r->w->scale.time;
   for (int j = 0; j < n; j++) {
-    d->D[j] = pw_is_angle (s, j) ? 1 / (L * L) : 1;
     d->B[j] = 1;
     d->B[n + j] = s->mass[j];
     d->unit[j] = pw_unit (s, j);
-    d->unit[n + j] = d->unit[j] / T;
+    d->unit[n + j] = d->unit[j] / r->w->scale.time;
   }
 }
 

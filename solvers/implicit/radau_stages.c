@@ -38,7 +38,7 @@ static int radau_evaluate (pw_run *r, double t, const double *y, double *F) {
   if (status != PW_OK) return status;
   r->statistics.rhs++;
   pw_tangent_pull (&d->tangent, y + 2 * n + d->rows, d->mus, d->pull);
-  for (int j = 0; j < n; j++) F[j] = y[n + j] - d->D[j] * d->pull[j];
+  for (int j = 0; j < n; j++) F[j] = y[n + j] - d->tangent.D[j] * d->pull[j];
   pw_tangent_pull (&d->tangent, y + 2 * n, d->rows, d->pull);
   pw_evaluate_force (r->w, d->f);
   for (int j = 0; j < n; j++) F[n + j] = d->f[j] - d->pull[j];
@@ -60,10 +60,10 @@ static int radau_evaluate (pw_run *r, double t, const double *y, double *F) {
 static void radau_fill (radau *d) {
   int n = d->n, mu = 2 * n + d->rows;
   const double *y = d->now.y;
-  const pw_tangent_update to = {
+  const pw_tangent_layout to = {
     .momentum = n, .constraint = 2 * n, .v = n, .a = n, .lambda = 2 * n, .mu = mu, .of_lambda = 1
   };
-  pw_tangent_kinematics (&d->tangent, &to, pw_tangent_mu (&d->tangent, y + mu, d->mus), d->D);
+  pw_tangent_kinematics (&d->tangent, &to, pw_tangent_mu (&d->tangent, y + mu, d->mus));
   pw_tangent_momentum (&d->tangent, &to, pw_tangent_lambda (&d->tangent, y + 2 * n));
   pw_tangent_velocities (&d->tangent, &to, y + n, d->velocities);
   if (d->mus || !d->velocities) pw_tangent_positions (&d->tangent, &to, d->velocities ? mu : 2 * n);

@@ -23,7 +23,7 @@ struct pw_method_data {
   double *matrix;                                          /* -F_y */
   double *value;                                           /* of the real matrix; of the complex one, in pairs */
   int64_t *diagonal;                                       /* 2 n: where B is added */
-  double *D, *B;                                           /* coords; 2 n: diagonal of B */
+  double *B;                                               /* 2 n: diagonal of B */
   double *unit;                                            /* 2 n: units of the states */
   double *tolerance, *enough, *floor;                      /* 2 n: of the error test, of corrections; round-off */
   double *row, *column;                                    /* scales of the matrices */

@@ -33,7 +33,7 @@ static void newton_gather (const pw_system *s, const pw_element_batch *k, const 
 }
 
 /* Row of the matrix for a constraint equation. */
-static inline int newton_row (const pw_put *put, int row) {
+static inline int newton_row (const pw_placement *put, int row) {
   return put->map ? put->map[row] : row;
 }
 
@@ -46,7 +46,7 @@ static inline int newton_is_length (const pw_kind *kind, int c) {
   return c < 3 * kind->bodies && c % 3 != 2;
 }
 
-void pw_newton_block (pw_newton *n, pw_workspace *w, pw_scatter_map *t, pw_block block, const pw_put *put) {
+void pw_newton_block (pw_newton *n, pw_workspace *w, pw_scatter_map *t, pw_block block, const pw_placement *put) {
   const pw_system *s = w->s;
   for (pw_element_batch *k = w->batch; k < w->batch + s->batches; k++) {
     int rows = pw_block_rows (k->kind, block), cols = k->b.cols;
@@ -80,7 +80,7 @@ void pw_newton_block (pw_newton *n, pw_workspace *w, pw_scatter_map *t, pw_block
 }
 
 /* Adds all entries of J, or of its transpose. */
-static void newton_J (const pw_workspace *w, pw_scatter_map *t, const pw_put *put, int transposed) {
+static void newton_J (const pw_workspace *w, pw_scatter_map *t, const pw_placement *put, int transposed) {
   const pw_system *s = w->s;
   for (const pw_element_batch *k = w->batch; k < w->batch + s->batches && k->kind->rows > 0 && k->row < put->rows;
        k++) {
@@ -102,11 +102,11 @@ static void newton_J (const pw_workspace *w, pw_scatter_map *t, const pw_put *pu
   }
 }
 
-void pw_newton_J (const pw_workspace *w, pw_scatter_map *t, const pw_put *put) {
+void pw_newton_J (const pw_workspace *w, pw_scatter_map *t, const pw_placement *put) {
   newton_J (w, t, put, 0);
 }
 
-void pw_newton_JT (const pw_workspace *w, pw_scatter_map *t, const pw_put *put) {
+void pw_newton_JT (const pw_workspace *w, pw_scatter_map *t, const pw_placement *put) {
   newton_J (w, t, put, 1);
 }
 

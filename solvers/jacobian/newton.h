@@ -15,7 +15,7 @@ typedef struct {
 int pw_newton_open (pw_newton *n, const pw_system *s); /* PW_OK or PW_RESOURCE */
 void pw_newton_close (pw_newton *n);
 
-/* Where and how a block is added: factor x block of every batch, rows from `row` on (constraint equations or
+/* Where a block is added, and how: factor x block of every batch, rows from `row` on (constraint equations or
  * coordinates; row_scale, if given, multiplies each), columns from `col` on.  w: direction of jw_q (coords); lambda:
  * multipliers of jtl_q (rows); `rows`: number of constraint equations included. */
 typedef struct {
@@ -25,12 +25,12 @@ typedef struct {
   const double *row_scale;
   const int *map; /* rows: index of each constraint row in the matrix, or -1: omitted; NULL: unchanged indices */
   const double *w, *lambda;
-} pw_put;
-void pw_newton_block (pw_newton *n, pw_workspace *w, pw_scatter_map *t, pw_block block, const pw_put *put);
+} pw_placement;
+void pw_newton_block (pw_newton *n, pw_workspace *w, pw_scatter_map *t, pw_block block, const pw_placement *put);
 
 /* Adds factor x J, or its transpose, with the J last evaluated. */
-void pw_newton_J (const pw_workspace *w, pw_scatter_map *t, const pw_put *put);
-void pw_newton_JT (const pw_workspace *w, pw_scatter_map *t, const pw_put *put);
+void pw_newton_J (const pw_workspace *w, pw_scatter_map *t, const pw_placement *put);
+void pw_newton_JT (const pw_workspace *w, pw_scatter_map *t, const pw_placement *put);
 
 /* Adds -(derivative of the force by signals) x (derivative of signals by states): rows from `row` on, q in columns from
  * `col` on, v in columns from `col_v` on. */

@@ -2,37 +2,30 @@
 #include <stdlib.h>
 #include <string.h>
 #include "scatter.h"
+#include "util.h"
 
 void pw_scatter_record (pw_scatter_map *t) {
   *t = (pw_scatter_map){ .recording = 1 };
 }
 
 void pw_scatter_note (pw_scatter_map *t, int row, int col) {
-  if (t->failed) return;
-  if (t->count == t->room) {
-    size_t room = t->room ? 2 * t->room : 256;
-    int *rows = realloc (t->row, room * sizeof *rows);
-    if (rows) t->row = rows;
-    int *cols = rows ? realloc (t->col, room * sizeof *cols) : NULL;
-    if (cols == NULL) {
-      t->failed = 1;
-      return;
-    }
-    t->col = cols;
-    t->room = room;
-  }
-  t->row[t->count] = row;
-  t->col[t->count++] = col;
+  t->failed |= pw_grow (&t->entry, t->count, &t->room, sizeof *t->entry) != PW_OK;
+  if (!t->failed) t->entry[t->count++] = (struct pw_scatter_entry){ row, col };
 }
 
-/* Sorts contributions by a key in [0, n), stably; `order`: their indices, `start` (n + 1): the range of each key. */
-static void scatter_sort (const int *key, const size_t *from, size_t count, int n, size_t *start, size_t *order) {
+static int scatter_key (const struct pw_scatter_entry *e, int by_column) {
+  return by_column ? e->col : e->row;
+}
+
+/* Sorts contributions by row or column, in [0, n), stably; `order`: their indices, `start` (n + 1): the range of each. */
+static void scatter_sort (const pw_scatter_map *t, int by_column, const size_t *from, int n, size_t *start,
+                          size_t *order) {
   memset (start, 0, ((size_t)n + 2) * sizeof *start);
-  for (size_t i = 0; i < count; i++) start[key[i] + 2]++;
+  for (size_t i = 0; i < t->count; i++) start[scatter_key (&t->entry[i], by_column) + 2]++;
   for (int k = 0; k < n; k++) start[k + 2] += start[k + 1];
-  for (size_t i = 0; i < count; i++) {
+  for (size_t i = 0; i < t->count; i++) {
     size_t c = from ? from[i] : i;
-    order[start[key[c] + 1]++] = c;
+    order[start[scatter_key (&t->entry[c], by_column) + 1]++] = c;
   }
 }
 
@@ -44,14 +37,15 @@ int pw_scatter_lay_out (pw_scatter_map *t, int n, int64_t **colptr, int64_t **ro
   *rowind = malloc ((t->count + 1) * sizeof **rowind);
   int status = !t->failed && by_row && order && start && t->place && *colptr && *rowind ? PW_OK : PW_RESOURCE;
   if (status == PW_OK) {
-    scatter_sort (t->row, NULL, t->count, n, start, by_row);
-    scatter_sort (t->col, by_row, t->count, n, start, order);
+    scatter_sort (t, 0, NULL, n, start, by_row);
+    scatter_sort (t, 1, by_row, n, start, order);
     int64_t nonzeros = 0;
     size_t i = 0;
     for (int c = 0; c < n; c++) {
       (*colptr)[c] = nonzeros;
-      for (int last = -1; i < t->count && t->col[order[i]] == c; i++) {
-        if (t->row[order[i]] != last) (*rowind)[nonzeros++] = last = t->row[order[i]];
+      for (int last = -1; i < t->count && t->entry[order[i]].col == c; i++) {
+        int row = t->entry[order[i]].row;
+        if (row != last) (*rowind)[nonzeros++] = last = row;
         t->place[order[i]] = (size_t)nonzeros - 1;
       }
     }
@@ -61,9 +55,8 @@ int pw_scatter_lay_out (pw_scatter_map *t, int n, int64_t **colptr, int64_t **ro
   free (by_row);
   free (order);
   free (start);
-  free (t->row);
-  free (t->col);
-  t->row = t->col = NULL;
+  free (t->entry);
+  t->entry = NULL;
   if (status == PW_OK) return PW_OK;
   free (*colptr);
   free (*rowind);
@@ -72,8 +65,7 @@ int pw_scatter_lay_out (pw_scatter_map *t, int n, int64_t **colptr, int64_t **ro
 }
 
 void pw_scatter_close (pw_scatter_map *t) {
-  free (t->row);
-  free (t->col);
+  free (t->entry);
   free (t->place);
   *t = (pw_scatter_map){ 0 };
 }

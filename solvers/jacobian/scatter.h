@@ -9,11 +9,13 @@
 typedef struct {
   int recording;
   size_t count, room; /* number of contributions; allocated number while recording */
-  int *row, *col;     /* while recording */
-  size_t *place;      /* index in `value` of each contribution */
-  size_t next;        /* number of the next contribution */
-  double *value;      /* while filling */
-  int failed;         /* out of memory while recording */
+  struct pw_scatter_entry {
+    int row, col;
+  } * entry;     /* while recording */
+  size_t *place; /* index in `value` of each contribution */
+  size_t next;   /* number of the next contribution */
+  double *value; /* while filling */
+  int failed;    /* out of memory while recording */
 } pw_scatter_map;
 
 void pw_scatter_record (pw_scatter_map *t);

@@ -26,9 +26,11 @@ static int tangent_number_rows (pw_tangent *x) {
 int pw_tangent_open (pw_tangent *x, pw_run *r) {
   *x = (pw_tangent){ .run = r };
   r->differentiates = 1;
-  x->lambda = calloc ((size_t)(2 * r->s->rows) + 1, sizeof *x->lambda);
+  const pw_system *s = r->s;
+  x->lambda = calloc ((size_t)(2 * s->rows + s->coords), sizeof *x->lambda);
   if (x->lambda == NULL) return PW_RESOURCE;
-  x->mu = x->lambda + r->s->rows;
+  x->mu = x->lambda + s->rows, x->D = x->mu + s->rows;
+  for (int j = 0; j < s->coords; j++) x->D[j] = pw_is_angle (s, j) ? 1 / (s->scale.length * s->scale.length) : 1;
   int status = tangent_number_rows (x);
   return status == PW_OK ? pw_newton_open (&x->newton, r->s) : status;
 }
@@ -72,26 +74,26 @@ void pw_tangent_compress (const pw_tangent *x, const double *all, int count, dou
 }
 
 /* Contributions of the active equations, at this row and column. */
-static pw_put tangent_put (const pw_tangent *x, int row, int col, double factor) {
-  return (pw_put){
+static pw_placement tangent_put (const pw_tangent *x, int row, int col, double factor) {
+  return (pw_placement){
     .row = row, .col = col, .rows = x->run->s->rows, .factor = factor, .factor_nonholonomic = factor, .map = x->map
   };
 }
 
-static void tangent_block (pw_tangent *x, pw_block block, const pw_put *put) {
+static void tangent_block (pw_tangent *x, pw_block block, const pw_placement *put) {
   pw_newton_block (&x->newton, x->run->w, &x->scatter, block, put);
 }
 
 /* of_q I + D (G^T mu)_q, -I, D G^T */
-void pw_tangent_kinematics (pw_tangent *x, const pw_tangent_update *to, const double *mu, const double *D) {
+void pw_tangent_kinematics (pw_tangent *x, const pw_tangent_layout *to, const double *mu) {
   const pw_system *s = x->run->s;
   for (int j = 0; j < s->coords; j++) {
     pw_scatter_add (&x->scatter, j, to->q + j, to->of_q);
     pw_scatter_add (&x->scatter, j, to->v + j, -1);
   }
   if (mu == NULL) return;
-  pw_put put = tangent_put (x, 0, to->q, 1);
-  put.rows = s->holonomic, put.row_scale = D, put.lambda = mu;
+  pw_placement put = tangent_put (x, 0, to->q, 1);
+  put.rows = s->holonomic, put.row_scale = x->D, put.lambda = mu;
   tangent_block (x, PW_JTL_Q, &put);
   put.col = to->mu;
   put.factor = to->of_lambda;
@@ -99,8 +101,8 @@ void pw_tangent_kinematics (pw_tangent *x, const pw_tangent_update *to, const do
 }
 
 /* (J v)_q - eta_q, J */
-void pw_tangent_velocities (pw_tangent *x, const pw_tangent_update *to, const double *v, double of_holonomic) {
-  pw_put put = tangent_put (x, to->constraint, to->q, 1);
+void pw_tangent_velocities (pw_tangent *x, const pw_tangent_layout *to, const double *v, double of_holonomic) {
+  pw_placement put = tangent_put (x, to->constraint, to->q, 1);
   put.w = v, put.factor = of_holonomic;
   tangent_block (x, PW_JW_Q, &put);
   put.factor = -of_holonomic, put.factor_nonholonomic = -1;
@@ -111,16 +113,16 @@ void pw_tangent_velocities (pw_tangent *x, const pw_tangent_update *to, const do
 }
 
 /* G */
-void pw_tangent_positions (pw_tangent *x, const pw_tangent_update *to, int row) {
-  pw_put put = tangent_put (x, row, to->q, 1);
+void pw_tangent_positions (pw_tangent *x, const pw_tangent_layout *to, int row) {
+  pw_placement put = tangent_put (x, row, to->q, 1);
   put.rows = x->run->s->holonomic;
   pw_newton_J (x->run->w, &x->scatter, &put);
 }
 
 /* (J^T lambda)_q - f_q, -f_v, M, J^T */
-void pw_tangent_momentum (pw_tangent *x, const pw_tangent_update *to, const double *lambda) {
+void pw_tangent_momentum (pw_tangent *x, const pw_tangent_layout *to, const double *lambda) {
   const pw_system *s = x->run->s;
-  pw_put put = tangent_put (x, to->momentum, to->q, 1);
+  pw_placement put = tangent_put (x, to->momentum, to->q, 1);
   put.lambda = lambda;
   tangent_block (x, PW_JTL_Q, &put);
   put.factor = -1;
@@ -135,11 +137,11 @@ void pw_tangent_momentum (pw_tangent *x, const pw_tangent_update *to, const doub
 }
 
 /* (J a)_q - gamma_q + 2 alpha ((J v)_q - eta_q) + beta^2 G, 2 alpha J - gamma_v, J */
-void pw_tangent_accelerations (pw_tangent *x, const pw_tangent_update *to, const double *v, const double *a) {
+void pw_tangent_accelerations (pw_tangent *x, const pw_tangent_layout *to, const double *v, const double *a) {
   pw_run *r = x->run;
   const pw_system *s = r->s;
   double alpha = r->alpha, with_v = to->a == to->v ? to->of_a : 0;
-  pw_put put = tangent_put (x, to->constraint, to->q, 1);
+  pw_placement put = tangent_put (x, to->constraint, to->q, 1);
   put.w = a;
   tangent_block (x, PW_JW_Q, &put);
   put.w = v;

@@ -17,6 +17,7 @@ typedef struct {
   int *map;            /* all equations: index among the active ones, or -1; NULL: all are active */
   const int *row;      /* rows: index among all equations */
   double *lambda, *mu; /* all equations: values of the unknowns last expanded */
+  double *D;           /* coords: 1 for lengths, 1/L^2 for angles, so that mu has one unit */
   pw_newton newton;
   pw_scatter_map scatter;
   int64_t *colptr, *rowind; /* the pattern, in compressed columns */
@@ -42,15 +43,15 @@ typedef struct {
   int momentum, constraint; /* first row of each; that of the kinematics is 0 */
   int q, v, a, lambda, mu;  /* first column of each */
   double of_q, of_a, of_lambda;
-} pw_tangent_update;
+} pw_tangent_layout;
 
 /* Adds these rows at the current configuration with J evaluated; lambda and mu (NULL: there are none): all equations,
- * D, v and a: coords. */
-void pw_tangent_momentum (pw_tangent *x, const pw_tangent_update *to, const double *lambda);
-void pw_tangent_kinematics (pw_tangent *x, const pw_tangent_update *to, const double *mu, const double *D);
-void pw_tangent_accelerations (pw_tangent *x, const pw_tangent_update *to, const double *v, const double *a);
+ * v and a: coords. */
+void pw_tangent_momentum (pw_tangent *x, const pw_tangent_layout *to, const double *lambda);
+void pw_tangent_kinematics (pw_tangent *x, const pw_tangent_layout *to, const double *mu);
+void pw_tangent_accelerations (pw_tangent *x, const pw_tangent_layout *to, const double *v, const double *a);
 /* Holonomic rows are multiplied by a factor: 0 leaves their rows to pw_tangent_positions, which starts at `row`. */
-void pw_tangent_velocities (pw_tangent *x, const pw_tangent_update *to, const double *v, double of_holonomic);
-void pw_tangent_positions (pw_tangent *x, const pw_tangent_update *to, int row);
+void pw_tangent_velocities (pw_tangent *x, const pw_tangent_layout *to, const double *v, double of_holonomic);
+void pw_tangent_positions (pw_tangent *x, const pw_tangent_layout *to, int row);
 
 #endif

@@ -29,7 +29,10 @@
 
 #include "pinwheel.h"
 
-enum { PW_BLOCK_NODE = 2, PW_BLOCK_RANKS = 3 }; /* most unknowns in a node; ranks */
+enum {
+  PW_BLOCK_NODE = 2, /* most unknowns in a node */
+  PW_BLOCK_RANKS = 3 /* ranks of nodes: nodes of a lower rank are eliminated first */
+};
 
 /* A node, in the order of elimination.  Its values follow one another: the lower triangle of the diagonal block by
  * rows, the diagonal entries before elimination, then the blocks below, each by rows. */
@@ -98,7 +101,7 @@ enum { PW_PLAN_SCHUR = -1, PW_PLAN_UNCONDENSED = -2 };
 typedef struct {
   int size;               /* unknowns */
   int row;                /* the first global one, or PW_PLAN_SCHUR, PW_PLAN_UNCONDENSED */
-  int rank;               /* higher ones are eliminated later */
+  int rank;               /* 0 to PW_BLOCK_RANKS - 1 */
   int y;                  /* their position in the right-hand side */
   double *gamma, *lambda; /* of a Schur row */
 } pw_plan_node;

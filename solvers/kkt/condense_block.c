@@ -1,4 +1,4 @@
-/* Planning of the sparse path: the pattern of S, body blocks, uncondensed bodies; see condense.h and block_ldl.h. */
+/* Planning of the block L D L^T: the pattern of S, body blocks, uncondensed bodies; see condense.h and block_ldl.h. */
 #include <stdlib.h>
 #include <string.h>
 #include "condense.h"

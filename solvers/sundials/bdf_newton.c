@@ -24,7 +24,7 @@ int pw_multistep_accelerate (multistep_data *d, double t, const double *y) {
 /* Columns of T: q, v, a, lambda. */
 static void newton_fill (multistep_data *d) {
   int n = d->n;
-  const pw_tangent_update to = {
+  const pw_tangent_layout to = {
     .momentum = 0, .constraint = n, .q = 0, .v = n, .a = 2 * n, .lambda = 3 * n, .of_a = 1, .of_lambda = 1
   };
   pw_tangent_momentum (&d->newton.tangent, &to, d->lambda);

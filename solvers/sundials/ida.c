@@ -135,13 +135,11 @@ static int ida_open_vectors (ida_data *d, pw_run *r) {
   if (pw_sun_open (&d->sun, r, d->size) != PW_OK) return PW_RESOURCE;
   d->yp = pw_sun_vector (d->size, d->sun.context);
   d->id = pw_sun_vector (d->size, d->sun.context);
-  d->scale = calloc ((size_t)(3 * d->n + 6 + 3 * s->rows), sizeof *d->scale);
-  if (!d->yp || !d->id || !d->scale) return PW_RESOURCE;
-  d->given = d->scale + d->n;
+  d->given = calloc ((size_t)(2 * d->n + 6 + 3 * s->rows), sizeof *d->given);
+  if (!d->yp || !d->id || !d->given) return PW_RESOURCE;
   d->unit = d->given + 2 * d->n + 6 + 2 * s->rows;
   for (int i = 0; i < d->rows; i++)
     d->unit[i] = pw_rank_multiplier_unit (d->sun.run->w, d->tangent.map ? d->tangent.row[i] : i);
-  for (int j = 0; j < d->n; j++) d->scale[j] = pw_is_angle (s, j) ? 1 / (s->scale.length * s->scale.length) : 1;
   for (int i = 0; i < d->size; i++) N_VGetArrayPointer (d->id)[i] = i < 2 * d->n || d->impulses;
   ida_fill_vectors (d);
   return PW_OK;
@@ -193,7 +191,7 @@ static void ida_close (pw_run *r) {
   if (d->id) N_VDestroy (d->id);
   pw_sun_close (&d->sun);
   pw_tangent_close (&d->tangent);
-  free (d->scale);
+  free (d->given);
   free (d);
 }
 

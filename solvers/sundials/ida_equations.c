@@ -23,7 +23,7 @@ static void ida_kinematics (ida_data *d, const double *y, const double *yp, doub
   if (!d->positions) return;
   double *pull = d->given;
   pw_tangent_pull (&d->tangent, pw_ida_lambda (d, y, yp) + d->rows, d->mus, pull);
-  for (int j = 0; j < n; j++) out[j] += d->scale[j] * pull[j];
+  for (int j = 0; j < n; j++) out[j] += d->tangent.D[j] * pull[j];
 }
 
 /* M v' + J^T lambda - f */
@@ -79,7 +79,7 @@ int pw_ida_residual (pw_real t, N_Vector vy, N_Vector vyp, N_Vector out, void *d
 
 static void ida_matrix_fill (ida_data *d, const double *y, const double *yp, double c) {
   int n = d->n;
-  const pw_tangent_update to = { .momentum = n,
+  const pw_tangent_layout to = { .momentum = n,
                                  .constraint = 2 * n,
                                  .q = 0,
                                  .v = n,
@@ -90,7 +90,7 @@ static void ida_matrix_fill (ida_data *d, const double *y, const double *yp, dou
                                  .of_a = c,
                                  .of_lambda = d->impulses ? c : 1 };
   const double *lambda = pw_ida_lambda (d, y, yp);
-  pw_tangent_kinematics (&d->tangent, &to, pw_tangent_mu (&d->tangent, lambda + d->rows, d->mus), d->scale);
+  pw_tangent_kinematics (&d->tangent, &to, pw_tangent_mu (&d->tangent, lambda + d->rows, d->mus));
   pw_tangent_momentum (&d->tangent, &to, pw_tangent_lambda (&d->tangent, lambda));
   if (d->velocities)
     pw_tangent_velocities (&d->tangent, &to, y + n, 1);

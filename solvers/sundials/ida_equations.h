@@ -15,7 +15,6 @@ struct pw_method_data {
   pw_tangent tangent;
   int n, rows, mus, size; /* coordinates, independent equations, multipliers mu, unknowns */
   N_Vector yp, id;
-  double *scale; /* D: coords */
   double *given; /* scratch: 2 (coords + 3) + 2 rows */
   double *unit;  /* rows: 1 for a force, L for a moment */
 };

@@ -132,10 +132,6 @@ static int build_shared (const char *path, const char *object, const char *log, 
   const char *const options[] = { "-std=c11",
                                   "-O2",
                                   "-ffp-contract=off",
-#ifdef __APPLE__
-                                  "-undefined",
-                                  "dynamic_lookup", /* the plug-in links to no library */
-#endif
                                   "-fPIC",
                                   "-shared",
                                   log ? PW_SCENE_FLAG : "-Wall",

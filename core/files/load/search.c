@@ -71,13 +71,7 @@ static int search_add_file (pw_search *s, const char *name, size_t length, const
     if (strcmp (s->found[i].path, path) == 0 && strncmp (s->found[i].name, name, length) == 0 &&
         s->found[i].name[length] == 0)
       return PW_OK;
-  if (s->count == s->capacity) {
-    int capacity = s->capacity ? 2 * s->capacity : 32;
-    pw_found *more = realloc (s->found, (size_t)capacity * sizeof *more);
-    if (more == NULL) return search_no_memory (error);
-    s->found = more;
-    s->capacity = capacity;
-  }
+  if (pw_grow (&s->found, (size_t)s->count, &s->room, sizeof *s->found) != PW_OK) return search_no_memory (error);
   pw_found *f = &s->found[s->count];
   f->path = pw_arena_copy (&s->arena, path);
   f->name = pw_arena_copy (&s->arena, name);

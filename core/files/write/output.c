@@ -273,12 +273,6 @@ int pw_output_finish (pw_output *o, pw_error *error) {
 
 /* ---- Continuation of an interrupted run ---- */
 
-unsigned long long pw_check_sum (unsigned long long sum, const void *bytes, size_t count) {
-  const unsigned char *c = bytes;
-  for (size_t i = 0; i < count; i++) sum = ((sum ^ c[i]) * 1099511628211u) & 0xffffffffffffffffu;
-  return sum;
-}
-
 /* Checksum of the last 64 kB before `length`; PW_RETRY if the file is shorter. */
 static int output_check (int file, pw_mark *mark) {
   char bytes[4096];

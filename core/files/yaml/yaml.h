@@ -61,10 +61,10 @@ typedef struct {
   pw_names bodies;              /* names of bodies, to their index */
   pw_names all;                 /* names of bodies and elements, to the index in nodes */
   pw_names elements;     /* once an expression asks for them: names of all elements, to the index of their types */
-  const pw_node **node;  /* where each is named */
+  const pw_node **node;  /* where each is named; */
+  int named;             /* their number so far */
   const pw_field *field; /* the current one, and its definition with all preceding fields */
   char *definition;
-  int named;
   double points; /* of tables, so far */
   double codes;  /* operations of all expressions so far */
 } pw_reader;
