@@ -184,7 +184,6 @@ double pw_system_period (const pw_system *s);
 typedef struct {
   const char *method;          /* default "erk8+projection" */
   double rtol;                 /* default 1e-12 */
-  long max_steps;              /* as in pw_settings, per period */
   int (*stop) (void *context); /* as in pw_settings; or NULL */
   void *stop_context;
   double t;           /* initial time [s] */
@@ -207,7 +206,8 @@ typedef enum {
 } pw_periodic_event;
 
 /* A relative periodic motion: after one period the state is the initial one, displaced by symmetries of the system: the
- * whole in the plane, and angles on which nothing depends.  Arrays are valid until the next call. */
+ * whole in the plane, and angles on which nothing depends; but for whole turns of bodies, on whose number nothing depends.
+ * Arrays are valid until the next call. */
 typedef struct {
   double parameter, period;
   const double *q, *v; /* initial state: pw_system_coordinates */

@@ -105,6 +105,21 @@ int pw_periodic_symmetries (const pw_periodic *x) {
 
 /* ---- Motions ---- */
 
+/* PW_RETRY if forces depend on the whole turns of a body in a period: then the accelerations do not repeat. */
+static int periodic_turns (pw_periodic *x) {
+  double off = 0, most = 0;
+  int turns = 0;
+  for (int j = 0; j < x->n; j++) {
+    double unit = pw_unit (x->s, j);
+    if (fabs (pw_periodic_off (x, j, x->y1[j], x->y0[j]) - (x->y1[j] - x->y0[j])) > PW_PI) turns = 1;
+    off = fmax (off, fabs (x->a1[j] - x->a0[j]) / unit);
+    most = fmax (most, fabs (x->a1[j]) / unit);
+  }
+  if (turns == 0 || off <= PERIODIC_CIRCLE * fmax (most, 1 / (x->T * x->T))) return PW_OK;
+  pw_fail (&x->why, PW_METHOD, "bodies make whole turns in a period, on whose number forces depend");
+  return PW_RETRY;
+}
+
 /* The motion of u, with its multipliers. */
 static int periodic_orbit (pw_periodic *x, const double *u, pw_periodic_orbit *out, pw_error *error) {
   int status = pw_periodic_flow (x, u, PW_FLOW_MULTIPLIERS, 0, error);
@@ -112,6 +127,7 @@ static int periodic_orbit (pw_periodic *x, const double *u, pw_periodic_orbit *o
   if (status == PW_METHOD) return pw_fail (error, status, "model %s: no multipliers: LAPACK failed", x->s->model);
   out->rotation = x->work[2];
   if (status == PW_OK) status = pw_periodic_flow (x, u, PW_FLOW, 0, error);
+  if (status == PW_OK) status = periodic_turns (x);
   if (status != PW_OK) return status;
   out->parameter = pw_periodic_parameter (x, u);
   out->period = x->about = pw_periodic_period (x, u);

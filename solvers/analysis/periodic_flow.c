@@ -80,7 +80,6 @@ pw_run *pw_periodic_run (pw_periodic *x, int which, double value, double rtol, c
   const pw_settings settings = { .t = x->set.t,
                                  .span = x->set.period > 0 ? x->set.period : x->T,
                                  .rtol = rtol,
-                                 .max_steps = x->set.max_steps,
                                  .stop = x->set.stop,
                                  .stop_context = x->set.stop_context };
   x->why = (pw_error){ 0 };
@@ -169,6 +168,13 @@ int pw_periodic_flow (pw_periodic *x, const double *u, pw_flow_accuracy accuracy
 
 /* ---- Where the search begins ---- */
 
+double pw_periodic_off (const pw_periodic *x, int j, double a, double b) {
+  int rates = pw_steady_rates (x->s), changes = j >= 3 * x->s->bodies || j % 3 != 2;
+  for (int k = 0; k < x->group && !changes; k++)
+    changes = x->scene->axis[k * rates + 2] != 0 || x->scene->axis[k * rates + 3 + j / 3] != 0;
+  return changes ? a - b : remainder (a - b, 2 * PW_PI);
+}
+
 /* The distance of a run's state from that of x->y0, both up to symmetries, in units of the scene. */
 static int flow_distance (pw_periodic *x, pw_run *r, double t, double *y, double *distance) {
   pw_sample sample;
@@ -178,7 +184,8 @@ static int flow_distance (pw_periodic *x, pw_run *r, double t, double *y, double
   memcpy (y + n, sample.v, (size_t)n * sizeof *y);
   pw_steady_canonical (x->scene, y, y + n);
   *distance = 0;
-  for (int j = 0; j < 2 * n; j++) *distance = hypot (*distance, (y[j] - x->y0[j]) / pw_periodic_unit (x, j));
+  for (int j = 0; j < 2 * n; j++)
+    *distance = hypot (*distance, pw_periodic_off (x, j, y[j], x->y0[j]) / pw_periodic_unit (x, j));
   return PW_OK;
 }
 

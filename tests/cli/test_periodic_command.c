@@ -1,4 +1,5 @@
 /* `pinwheel periodic`: text, files, bad input. */
+#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -59,6 +60,32 @@ static void test_free_period (void **state) {
   periodic_shows ("  trivial multipliers          1, of a shift in time\n");
   cli_good ("pinwheel periodic @/oscillator.yaml --set A=0 --set mu=1 --start rod.phi=2 --period free --guess 6.7");
   periodic_shows ("  period                       6.66328686 s, found\n");
+}
+
+/* A pendulum that runs round: its multiplier is exp (-0.1 T) (Liouville).  A spring counts the turns. */
+static void test_turns (void **state) {
+  (void)state;
+  cli_write ("running.yaml", "pinwheel: 1\n"
+                             "parameters: [{name: k, value: 0}]\n"
+                             "bodies:\n"
+                             "  - {name: bob, mass: 1, start: {x: 0, y: -1}, rate: {vx: 5, omega: 5}}\n"
+                             "elements:\n"
+                             "  - {pin: pivot, body: [bob, ground], at: [[0, 1], [0, 0]]}\n"
+                             "  - {gravity: gravity, acceleration: [0, -1]}\n"
+                             "  - {friction: air, body: [bob, ground], viscous: 0.1}\n"
+                             "  - {torque: drive, body: [bob, ground], value: 0.5}\n"
+                             "  - {rotational-spring: spring, body: [ground, bob], stiffness: k}\n");
+  cli_good ("pinwheel periodic @/running.yaml --period free -o @/running");
+  const char *json = cli_file ("running/periodic.json");
+  double T = cli_number (json, "motions", "period", NULL);
+  check_close ("multiplier", cli_number (json, "motions", "multipliers", "re", NULL), exp (-0.1 * T), 2e-8,
+               "steps of the derivatives: 1e-9 each");
+  check_close ("turn",
+               cli_number (json, "motions", "end", "bob.phi", NULL) -
+                   cli_number (json, "motions", "start", "bob.phi", NULL),
+               2 * PW_PI, 1e-9, "Newton to round-off");
+  assert_int_equal (cli_run ("pinwheel periodic @/running.yaml --set k=1e-3 --period free"), 4);
+  assert_non_null (strstr (cli_err, "bodies make whole turns in a period, on whose number forces depend"));
 }
 
 /* The branch through both folds, and one row of the table for each point. */
@@ -126,8 +153,8 @@ static void test_none (void **state) {
 int main (void) {
   const struct CMUnitTest tests[] = {
     cmocka_unit_test (test_motion), cmocka_unit_test (test_periods), cmocka_unit_test (test_free_period),
-    cmocka_unit_test (test_branch), cmocka_unit_test (test_limit),   cmocka_unit_test (test_bad),
-    cmocka_unit_test (test_none),
+    cmocka_unit_test (test_branch), cmocka_unit_test (test_turns),   cmocka_unit_test (test_limit),
+    cmocka_unit_test (test_bad),    cmocka_unit_test (test_none),
   };
   return cmocka_run_group_tests (tests, cli_setup, cli_teardown);
 }

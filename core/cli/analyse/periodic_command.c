@@ -42,7 +42,6 @@ static int periodic_options (pw_periodic_cli *x, pw_error *error) {
   int status = pw_cli_settings (&x->line, &d, &t_end, &settings, &x->limit, error);
   x->set.method = x->line.method ? x->line.method : "erk8+projection";
   x->set.rtol = settings.rtol;
-  x->set.max_steps = settings.max_steps;
   x->unit = "";
   x->set.stop = pw_limit_over, x->set.stop_context = &x->limit;
   if (status == PW_OK) status = periodic_period (x, error);
@@ -87,12 +86,14 @@ static int periodic_add (pw_periodic_cli *x, const pw_periodic_orbit *o, pw_erro
 
 static int periodic_find (pw_periodic_cli *x, pw_periodic_orbit *o, pw_error *error) {
   pw_progress progress;
+  double best = INFINITY;
   int status = PW_RETRY;
   pw_progress_count (&progress, pw_file_name (x->m.file), "attempts", 0, PW_PERIODIC_ATTEMPTS);
   for (int k = 0; status == PW_RETRY && k < PW_PERIODIC_ATTEMPTS && !periodic_stop (x); k++) {
     status = pw_periodic_solve (x->search, periodic_settle[k], x->set.first, o, error);
     x->nearest[k] = o->residual;
-    x->attempts = k + 1;
+    if (o->residual <= best) snprintf (x->reason, sizeof x->reason, "%s", pw_periodic_reason (x->search));
+    best = fmin (best, o->residual);
     pw_progress_at (&progress, k + 1);
   }
   pw_progress_end (&progress);
@@ -100,7 +101,6 @@ static int periodic_find (pw_periodic_cli *x, pw_periodic_orbit *o, pw_error *er
 }
 
 static int periodic_fail (const pw_periodic_cli *x, pw_error *error) {
-  const char *reason = pw_periodic_reason (x->search);
   char period[60] = "a free period", tried[200] = "", number[32];
   double T = x->set.period > 0 ? x->set.period : x->set.periods * pw_system_period (x->m.system);
   if (!x->set.free) snprintf (period, sizeof period, "period %s s", pw_format (number, T, 9));
@@ -113,7 +113,7 @@ static int periodic_fail (const pw_periodic_cli *x, pw_error *error) {
       error, PW_METHOD,
       "%s: no periodic motion with %s found by Newton's method from the states after this many periods (where it "
       "ends at a residual in units of the scene, L and L/T): %s%s%s; begin nearer to one (--start)%s",
-      pw_file_name (x->m.file), period, tried, *reason ? "; " : "", reason,
+      pw_file_name (x->m.file), period, tried, *x->reason ? "; " : "", x->reason,
       x->set.free ? ", or give --guess"
                   : ", or add losses if the motion grows in every period, as that of a vehicle without any");
 }
@@ -131,6 +131,7 @@ static int periodic_branch (pw_periodic_cli *x, pw_error *error) {
     pw_progress_at (&progress, (o.parameter - x->set.first) / (x->set.last - x->set.first));
   }
   pw_progress_end (&progress);
+  periodic_stop (x);
   return status;
 }
 
@@ -141,7 +142,7 @@ static int periodic_compute (pw_periodic_cli *x, pw_error *error) {
   if (x->search == NULL) return error->status;
   pw_stop_catch ();
   int status = periodic_find (x, &o, error);
-  if (status == PW_RETRY && !x->stopped) status = periodic_fail (x, error);
+  if (status == PW_RETRY && !periodic_stop (x)) status = periodic_fail (x, error);
   if (status == PW_OK) status = x->vary_text ? periodic_branch (x, error) : periodic_add (x, &o, error);
   x->interrupted = pw_stop > 0;
   pw_stop_release ();
@@ -193,8 +194,10 @@ static const struct poptOption periodic_options_table[] = {
   PW_TEXT_OPTION (pw_periodic_cli, folder, "output", 'o', "DIR",
                   "Write periodic.csv, periodic.json and a figure into a folder"),
   PW_WIDTH_OPTION,
+  PW_TEXT_OPTION (pw_cli_line, method, "method", 'm', "METHOD", "Adaptive integrator (default erk8+projection)"),
+  PW_TEXT_OPTION (pw_cli_line, rtol, "rtol", 0, "R", "Relative tolerance (default 1e-12)"),
+  PW_TEXT_OPTION (pw_cli_line, limit, "limit", 0, "SECONDS", "Stop after this much processor time (default unlimited)"),
   PW_MODEL_OPTIONS,
-  PW_METHOD_OPTIONS,
   POPT_TABLEEND
 };
 

@@ -26,7 +26,8 @@ typedef struct {
   pw_periodic_point *point;
   int points, room;
   double nearest[PW_PERIODIC_ATTEMPTS]; /* residuals at the end of the attempts without solution */
-  int attempts, stopped, interrupted;
+  char reason[300];                     /* why, of the nearest one */
+  int stopped, interrupted;
 } pw_periodic_cli;
 
 void pw_periodic_print (const pw_periodic_cli *x);
