@@ -1,5 +1,5 @@
 /* The search for relative periodic motions, and their branches; equations in periodic_flow.c. */
-#include "periodic.h"
+#include "periodic_parts.h"
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>

@@ -14,7 +14,7 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
-#include "periodic.h"
+#include "periodic_parts.h"
 #include "util.h"
 
 /* Speed along the orbit, after removal of symmetries, below which a motion is steady, in units of the scene. */

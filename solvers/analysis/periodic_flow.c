@@ -2,7 +2,7 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
-#include "periodic.h"
+#include "periodic_parts.h"
 #include "util.h"
 
 /* FLOW_MULTIPLES: of one signal's period that are tried for a common one.  FLOW_FAR: ratio of a free period to the last

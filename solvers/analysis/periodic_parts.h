@@ -1,6 +1,6 @@
 /* The search for relative periodic motions; for periodic*.c only. */
-#ifndef PW_PERIODIC_H
-#define PW_PERIODIC_H
+#ifndef PW_PERIODIC_PARTS_H
+#define PW_PERIODIC_PARTS_H
 
 #include "continuation.h"
 #include "steady_parts.h"
