@@ -208,12 +208,25 @@ static void test_bad (void **state) {
            "no run from 2 starts satisfies --subject-to");
 }
 
+/* Outputs without a largest value: linear in an unknown without bounds. */
+static void test_unbounded (void **state) {
+  static const char *const without[] = { "--free a --maximise p.x", "--free a --free b=-1:1 --maximise 'p.x - p.y^2'" };
+  char command[200];
+  (void)state;
+  for (int i = 0; i < 2; i++) {
+    snprintf (command, sizeof command, "pinwheel optimise @/point.yaml %s --starts 2 --json @/o.json", without[i]);
+    assert_int_equal (cli_run (command), 4);
+    assert_non_null (strstr (cli_err, "perhaps there is no optimum without bounds, such as --free a=LOW:HIGH"));
+    assert_true (cli_says (cli_file ("o.json"), "status", "method"));
+  }
+}
+
 int main (void) {
   const struct CMUnitTest tests[] = { cmocka_unit_test (test_valley),     cmocka_unit_test (test_derivatives),
                                       cmocka_unit_test (test_constraint), cmocka_unit_test (test_bound),
                                       cmocka_unit_test (test_failing),    cmocka_unit_test (test_sweep),
                                       cmocka_unit_test (test_edge),       cmocka_unit_test (test_starts),
                                       cmocka_unit_test (test_jobs),       cmocka_unit_test (test_interrupt),
-                                      cmocka_unit_test (test_bad) };
+                                      cmocka_unit_test (test_bad),        cmocka_unit_test (test_unbounded) };
   return cmocka_run_group_tests (tests, optimise_setup, cli_teardown);
 }

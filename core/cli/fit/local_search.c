@@ -233,7 +233,9 @@ static void search_point (const pw_unknowns *k, const double *x, double *u) {
 static int search_repeat (search *p, double *u) {
   for (int left = p->slope ? SEARCH_REPEATS : 1; left > 0 && !p->failed && !p->refused && !pw_stop; left--) {
     double before = p->s->found ? p->s->value[0] : NAN, value;
-    if (nlopt_optimize (p->opt, u, &value) == NLOPT_OUT_OF_MEMORY) return PW_RESOURCE;
+    nlopt_result result = nlopt_optimize (p->opt, u, &value);
+    if (result == NLOPT_OUT_OF_MEMORY) return PW_RESOURCE;
+    p->s->converged = result != NLOPT_MAXEVAL_REACHED;
     if (!p->s->found || fabs (p->s->value[0] - before) <= SEARCH_GAIN * fabs (before)) break;
     search_point (&p->x->unknowns, p->s->best, u);
   }

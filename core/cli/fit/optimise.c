@@ -13,7 +13,8 @@
 #include "figure.h"
 #include "parallel.h"
 
-enum { OPTIMISE_POLISHED = 3 }; /* results that continue */
+enum { OPTIMISE_POLISHED = 3 };         /* results that continue */
+static const double OPTIMISE_FAR = 1e6; /* in units of its scale: an unknown without bounds has no optimum */
 
 /* ---- Starts ---- */
 
@@ -172,18 +173,39 @@ static int optimise_nothing (const pw_optimise *x, pw_error *error) {
   return pw_fail (error, PW_METHOD, "no run from %d starts satisfies --subject-to", x->starts);
 }
 
+/* PW_METHOD if the search that found the best result did not converge: it ended at its limit of runs, or far away. */
+static int optimise_converged (const pw_optimise *x, pw_error *error) {
+  const pw_search_start *s = x->start + x->best;
+  const pw_free_number *far = NULL;
+  double most = 0;
+  for (int i = 0; i < x->unknowns.count; i++) {
+    const pw_free_number *k = x->unknowns.at + i;
+    if (!k->given && fabs (s->best[i]) >= most * k->scale) far = k, most = fabs (s->best[i]) / k->scale;
+  }
+  if (s->converged && most < OPTIMISE_FAR) return PW_OK;
+  if (far == NULL) return pw_fail (error, PW_METHOD, "the search did not converge in %ld runs", s->runs);
+  return pw_fail (error, PW_METHOD,
+                  "the search did not converge in %ld runs; perhaps there is no optimum without bounds, "
+                  "such as --free %s=LOW:HIGH",
+                  s->runs, far->name);
+}
+
 static int optimise_finish (pw_optimise *x, pw_output *file[2], pw_error *error) {
   int interrupted = pw_stop != 0;
   if (x->best < 0 && interrupted) fputs ("pinwheel: interrupted before the first run was done\n", stderr);
   if (x->best < 0) return interrupted ? PW_INTERRUPTED : optimise_nothing (x, error);
+  pw_error why = { 0 };
+  int converged = optimise_converged (x, &why) == PW_OK;
   pw_optimise_print (x);
   if (file[0]) pw_optimise_yaml (x, pw_output_stream (file[0]));
-  if (file[1]) pw_optimise_json (x, interrupted ? "interrupted" : "ok", pw_output_stream (file[1]));
+  if (file[1])
+    pw_optimise_json (x, interrupted ? "interrupted" : converged ? "ok" : "method", pw_output_stream (file[1]));
   int status = pw_output_finish_all (file, 2, error);
   file[0] = file[1] = NULL;
   if (status == PW_OK && x->plots_path) status = pw_optimise_draw (x, error);
   if (interrupted) pw_cli_say ("pinwheel: interrupted; this is the best result until then\n");
-  return status == PW_OK && interrupted ? PW_INTERRUPTED : status;
+  if (status == PW_OK && interrupted) return PW_INTERRUPTED;
+  return status == PW_OK && !converged ? pw_fail (error, why.status, "%s", why.text) : status;
 }
 
 static void optimise_close (pw_optimise *x) {

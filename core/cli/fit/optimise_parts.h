@@ -12,6 +12,7 @@ typedef struct {
   double *first, *best; /* unknowns */
   double *value;        /* outputs at the best */
   int found;            /* 1: the best satisfies the constraints */
+  int converged;        /* 0: the search ended at its limit of runs */
   long runs, failed, derivatives, room;
   double *trial;  /* runs x (unknowns, outputs); outputs of failed runs are NaN */
   pw_error error; /* of the first failed run */
