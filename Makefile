@@ -201,7 +201,7 @@ WASM_FLAGS := --target=wasm32-wasi -std=c11 -O2 -ffp-contract=off -ffunction-sec
   $(call layer,$(CORE_LAYERS) core/kinds $(SOLVER_LAYERS) $(FILE_LAYERS) core/cli core/cli/plot $(BUILD)/obj/core/cli/plot) $(SYSTEM)
 WASM       := $(filter-out solvers/jacobian/sparse.c solvers/analysis/% solvers/linear/% solvers/variation/% solvers/run/timing.c solvers/implicit/% solvers/sundials/% core/specialise/specialise_%,$(CORE) $(SOLVERS)) \
   $(filter-out core/files/yaml/yaml_tree.c,$(wildcard core/files/expression/*.c core/files/yaml/*.c)) \
-  $(addprefix core/files/,number.c load/columns.c load/units.c load/read.c) $(addprefix core/cli/plot/,plot_samples.c plot_shapes.c plot_symbols.c plot_figures.c animate.c) \
+  $(addprefix core/files/,number.c load/columns.c load/units.c load/read.c) $(addprefix core/cli/plot/,plot_samples.c plot_shapes.c plot_size.c plot_symbols.c plot_figures.c animate.c) \
   $(wildcard core/cli/page/engine/*.c)
 WASM_OBJ   := $(WASM:%.c=$(BUILD)/wasm/%.o)
 
@@ -216,8 +216,9 @@ $(BUILD)/page/pinwheel-page.objects: $(WASM_OBJ)
 	@mkdir -p $(@D)
 	@rm -f $@
 	$(Q)$(AR) rcs $@ $^
-$(BUILD)/page/pinwheel.wasm: $(BUILD)/page/pinwheel-page.objects
-	$(Q)$(WASM_CC) $(WASM_FLAGS) -mexec-model=reactor -Wl,--gc-sections,--allow-undefined,--strip-all,-z,stack-size=1048576,--whole-archive $< -Wl,--no-whole-archive -o $@
+# Functions that pages do not reach are in undefined.txt; any other that is missing is an error here.
+$(BUILD)/page/pinwheel.wasm: $(BUILD)/page/pinwheel-page.objects core/cli/page/engine/undefined.txt
+	$(Q)$(WASM_CC) $(WASM_FLAGS) -mexec-model=reactor -Wl,--gc-sections,--allow-undefined-file=core/cli/page/engine/undefined.txt,--strip-all,-z,stack-size=1048576,--whole-archive $< -Wl,--no-whole-archive -o $@
 
 # Texts of the sources that specialised scenes contain.
 SPECIALISED := core/specialise/specialised.h core/base/sine.h $(wildcard core/specialise/*.inc core/kinds/*.h core/kinds/*/*.c)

@@ -70,7 +70,7 @@
     expect("says what it shows", said.includes("t = ") && run.bodies.every((body, b) => b > 7 || said.includes(body.name)));
     expect("says what the curves show", document.getElementById("curves").getAttribute("aria-label").includes(families[0].curves[0].name));
     expect("shows what the model is", document.getElementById("about").textContent.length > 10);
-    expect("shows its parameters", document.getElementById("parameters").children.length === run.parameters.length);
+    expect("shows its parameters", document.getElementById("given").children.length === run.parameters.length);
     press("i");
     for (let i = 0; i < 100 && !root.image; i++) await wait(20);
     expect("saves a picture", Number((root.image || "").split(" ").pop()) > 5000);

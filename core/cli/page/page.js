@@ -71,7 +71,7 @@ class Engine {
     const { ms, reason } = this.integrate(s, limit, 1), samples = this.wasm.samples();
     if (samples < 2) throw new Error(reason || "the run has no samples");
     const scene = this.scene();
-    return { ...scene, ...this.arrays(samples, scene), model: this.page.name, method: s.method, reason, cost: this.cost(ms) };
+    return { ...scene, ...this.arrays(samples, scene), model: this.page.name, about: this.page.about, method: s.method, reason, cost: this.cost(ms) };
   }
 
   scene () {
