@@ -26,8 +26,8 @@ li { margin: .4rem 0; }
 <p>Each page simulates a vehicle or a linkage in the browser: move a slider and see the motion, its error and its cost change.</p>
 <ul>
 H
-  for m in "$models"/*.c "$models"/*.yaml; do
-    name=${m##*/} name=${name%.*}
+  (cd "$models" && LC_ALL=C ls *.c *.yaml) | while read -r m; do
+    name=${m%.*} m=$models/$m
     "$program" page "$m" -o "$site/$name.html" >&2
     about=$("$program" show "$m" | head -n 1 | escape)
     echo "<li><a href=\"$name.html\">$name</a>: ${about#*: }</li>"
