@@ -13,9 +13,7 @@
 #error "-ffast-math and -Ofast break the argument reduction"
 #endif
 
-#ifndef PW_SINE_LANES
-#define PW_SINE_LANES 2
-#endif
+enum { PW_SINE_LANES = 2 };
 #define PW_SINE_LIMIT 1e6
 
 /* GNU C's vectors: operations work on all lanes. */

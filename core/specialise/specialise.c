@@ -36,7 +36,7 @@ static void specialise_sources (const pw_specialise_scene *x) {
   const pw_source_text *done[SPECIALISE_SOURCES];
   char name[80], file[90];
   int count = 0;
-  fputs ("#ifdef __AVX2__\n#define PW_SINE_LANES 4\n#endif\n#include <math.h>\n#include <string.h>\n#include "
+  fputs ("#include <math.h>\n#include <string.h>\n#include "
          "\"pinwheel.h\"\n",
          x->out);
   specialise_source (x->out, "specialised.h", done, &count);
