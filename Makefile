@@ -464,7 +464,7 @@ format-check:
 # Paths may contain spaces: they are quoted everywhere, and never elements of a list.
 D    := $(DESTDIR)$(PREFIX)
 MAN  := docs/pinwheel.1 docs/pinwheel-model.5
-DOCS := README.md $(wildcard docs/*.md) docs/CITATION.cff docs/summary.schema.json
+DOCS := README.md $(filter-out $(MAN) docs/figures.sh,$(wildcard docs/*.*)) # pages have links to the other files
 FIGURES  := $(wildcard docs/figures/*)
 EXAMPLES := $(EMBED) $(wildcard models/*.c) core/kinds/forces/torque.c \
             $(addprefix core/kinds/,batch.h contact.h holonomic/gear.c nonholonomic/rolling_wheel.c)

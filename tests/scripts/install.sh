@@ -93,6 +93,15 @@ EOF
   report 'and one in C++, which compiles a model, too' $?
 fi
 
+# Links of the pages to files beside them lead somewhere.
+for page in "$top/share/doc/pinwheel/"*.md "$top/share/doc/pinwheel/docs/"*.md; do
+  grep -o '](\([^)#: ]*\)' "$page" | sed 's/^](//' | while read -r link; do
+    [ -z "$link" ] || [ -e "$(dirname "$page")/$link" ] || echo "${page##*/}: $link"
+  done
+done >"$work/log"
+[ ! -s "$work/log" ]
+report 'links of the installed pages' $?
+
 # Every option of run, every command and every key of a model stands in its page.
 missing=
 for word in $("$top/bin/pinwheel" run --help | sed -n 's/^ .*--\([a-z-]*\).*/\1/p'); do
