@@ -1,4 +1,4 @@
-/* The data in an animation's page: the run's own, and harmless whatever things are called. */
+/* The data in the page of an animation: those of the run, and harmless whatever the names contain. */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>

@@ -1,4 +1,4 @@
-/* The benchmark suite from outside: its stiff scenes are what they are said to be, and its scripts can be read. */
+/* The benchmark suite: its stiff scenes are as stiff as stated, and its scripts are valid. */
 #include <stdio.h>
 #include "check.h"
 #include "cli.h"

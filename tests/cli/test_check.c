@@ -1,4 +1,4 @@
-/* pinwheel check: what it says of models whose mobility, vibrations and faults are known. */
+/* pinwheel check: its report on models whose mobility, vibrations and faults are known. */
 #include <math.h>
 #include <stdio.h>
 #include <string.h>

@@ -1,4 +1,4 @@
-/* The program from outside: runs, tables, summaries, lists. */
+/* Command lines of the program: runs, tables, summaries, lists. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>

@@ -1,4 +1,4 @@
-/* The program from outside: what it says about what is wrong, and with which status it ends. */
+/* Command lines with errors: messages and exit statuses. */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>

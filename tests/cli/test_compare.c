@@ -1,4 +1,4 @@
-/* Comparisons from outside: rows and ladders, orders, references made and read, limits, failures, files, bad input. */
+/* pinwheel compare: rows and ladders, orders, references made and read, limits, failures, files, bad input. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>

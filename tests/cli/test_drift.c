@@ -1,4 +1,4 @@
-/* Drift from outside: what stabilisations leave of the constraints, how options matter, files, failures, bad input. */
+/* pinwheel drift: residuals of stabilisations, effects of their options, files, failures, bad input. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>

@@ -1,4 +1,4 @@
-/* What ends a run that would not end: max_steps, the caller's stop function inside steps and samples, states beyond what
+/* Limits that end a run: max_steps, the caller's stop function inside steps and samples, states beyond what
  * numbers resolve; and motions that grow without bound, which are reported. */
 #include <math.h>
 #include <string.h>

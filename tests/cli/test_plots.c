@@ -1,4 +1,4 @@
-/* Figures: what is drawn of which model, with gnuplot and without. */
+/* Figures: contents for several models, with gnuplot and without. */
 #include <stdio.h>
 #include <string.h>
 #include "check.h"

@@ -1,4 +1,4 @@
-/* pinwheel run --profile: the tables it prints, and that a run does not notice it. */
+/* pinwheel run --profile: its tables; results of the run stay the same. */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>

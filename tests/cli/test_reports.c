@@ -1,4 +1,4 @@
-/* What the program reports about unusual models: with internal coordinates, without constraints, with any signal, with
+/* Reports on unusual models: with internal coordinates, without constraints, with any signal, with
  * names and texts that JSON and YAML would take for something else; and about runs that hardly begin. */
 #include <stdio.h>
 #include <string.h>

@@ -1,4 +1,4 @@
-/* --specialise: compiled code of scenes, its cache, and what happens without one or without a compiler. */
+/* --specialise: compiled code of scenes, with and without a cache and a compiler. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>

@@ -1,4 +1,4 @@
-/* Sweeps from outside: the grid, rows and runs, failures, bad input. */
+/* pinwheel sweep: the grid, rows and runs, failures, bad input. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>

@@ -1,4 +1,4 @@
-/* At a terminal: the bar of a long run, and Ctrl-C, once and until it helps. */
+/* On a terminal: the progress bar of a long run; Ctrl-C once, and repeatedly. */
 #define _XOPEN_SOURCE 700
 #include <fcntl.h>
 #include <signal.h>

@@ -1,4 +1,4 @@
-/* Every kind passes the self-test; and the self-test notices whatever is broken in a kind. */
+/* Every element type passes the self-test, and the self-test detects every fault in an element type. */
 #include <math.h>
 #include <stdio.h>
 #include <string.h>

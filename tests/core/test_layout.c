@@ -1,4 +1,4 @@
-/* The layout of what a plug-in and Pinwheel hand to each other, written down for one number of the ABI: who changes it
+/* The layout of structures that plug-ins and Pinwheel exchange, for one number of the ABI: who changes it
  * raises PW_ABI (once 0.1.0 is out) and writes down the new one here, so that a plug-in compiled before is refused. */
 #include <assert.h>
 #include <stdio.h>

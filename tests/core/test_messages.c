@@ -1,4 +1,4 @@
-/* What a description may not say, and what it is told then: every message of the core about bodies, elements, fields,
+/* Invalid descriptions: every message of the core about bodies, elements, fields,
  * signals and kinds. */
 #include <math.h>
 #include <string.h>

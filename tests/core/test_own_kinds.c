@@ -1,4 +1,4 @@
-/* Kinds of a plug-in's own, as models/elliptic-wire.c has them: its reference, every method, the program, the self-test. */
+/* Element types of a plug-in, as in models/elliptic-wire.c: its reference, every method, the program, the self-test. */
 #include <math.h>
 #include <stdio.h>
 #include <string.h>

@@ -1,4 +1,4 @@
-/* What a program learns from a model and a compiled system: bodies and elements, contact points, forces, equations. */
+/* Queries of models and compiled systems: bodies and elements, contact points, forces, equations. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>

@@ -1,4 +1,4 @@
-/* Texts from outside that are none: they reach neither the terminal nor a summary as they are. */
+/* External texts that are not valid UTF-8 or contain control characters: they reach neither the terminal nor a summary. */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>

@@ -1,4 +1,4 @@
-/* When the machine fails: files that cannot be written or grow no more, pipes nobody reads, Ctrl-C at any moment, programs
+/* Failures of the system: files that cannot be written or extended, closed pipes, Ctrl-C at any moment, programs
  * that are missing, names with blanks and umlauts.  What is left is whole, or carries another name. */
 #include <stdio.h>
 #include <stdlib.h>

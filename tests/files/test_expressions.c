@@ -1,4 +1,4 @@
-/* Signals by expressions in runs: they do what built-in signals do, steps end where they jump, derivatives are exact. */
+/* Signals given by expressions: they agree with built-in signals, steps end where they jump, derivatives are exact. */
 #define _GNU_SOURCE /* mkstemps */
 #include <math.h>
 #include <stdio.h>

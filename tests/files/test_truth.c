@@ -1,4 +1,4 @@
-/* What models know about their motion: in C, in text, in tables; what run, compare, show and check make of it. */
+/* Reference solutions of models, in C, as text, in tables; their use by run, compare, show and check. */
 #include <math.h>
 #include <stdio.h>
 #include <string.h>

@@ -1,4 +1,4 @@
-/* Text models do what models in C do, to the bit: the EzyRoller both ways, parameters, what `let` defines, signals. */
+/* Text models give the same bits as models in C: the EzyRoller both ways, parameters, what `let` defines, signals. */
 #define _GNU_SOURCE /* mkstemps */
 #include <math.h>
 #include <stdio.h>

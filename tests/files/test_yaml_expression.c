@@ -1,4 +1,4 @@
-/* Expressions: their values, exact derivatives and breakpoints, and what is said of those that are none. */
+/* Expressions: values, exact derivatives, breakpoints, and messages for invalid ones. */
 #include <math.h>
 #include <stdio.h>
 #include <string.h>

@@ -1,4 +1,4 @@
-/* Tables of text models that lie in files: what is read, in which forms, and from where. */
+/* Tables of text models in files: their formats, and the folders in which they may be. */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -23,7 +23,7 @@ static void table_write (const char *name, const char *text, size_t size) {
   assert_int_equal (fclose (f), 0);
 }
 
-/* Builds a model in the subfolder "model" whose torque is this table; what it becomes goes to *table. */
+/* Builds a model in the subfolder "model" whose torque is this table; the signal goes to *signal, its first points to `point`. */
 static pw_error table_build (const char *table, pw_signal *signal, double point[2][3]) {
   char text[400];
   pw_error error = { 0 };

@@ -1,4 +1,4 @@
-/* drive: a pendulum whose pivot is shaken, a bead moved along a turning rod, a flywheel, starts. */
+/* drive: a pendulum with a shaken pivot, a bead moved along a turning rod, a flywheel, initial conditions. */
 #include <math.h>
 #include <string.h>
 #include "check.h"

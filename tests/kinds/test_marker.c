@@ -1,4 +1,4 @@
-/* marker: a point that is followed in tables and pictures, and changes nothing. */
+/* marker: a point that appears in tables and figures, without effect on the motion. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>

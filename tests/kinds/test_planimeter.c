@@ -1,4 +1,4 @@
-/* The hatchet planimeter of the gallery: what a knife edge behind a point makes of the point's way round a circle. */
+/* The hatchet planimeter of the gallery: the turn of a knife edge whose point is led round a circle. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>

@@ -1,4 +1,4 @@
-/* A method of the caller's own, made of pinwheel-method.h: symplectic Euler, with and without projection, with Baumgarte's
+/* A method defined by the caller with pinwheel-method.h: symplectic Euler, with and without projection, with Baumgarte's
  * terms.  Its order in accuracy is in docs/method.c for another one. */
 #include <math.h>
 #include <string.h>

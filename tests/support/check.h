@@ -1,4 +1,4 @@
-/* What the tests check with: a number against a reference, within a bound that has a reason.
+/* Checks of tests: a number is compared with a reference, within a bound that has a reason.
  *
  * With PW_TOL_SCALE in the environment every bound is multiplied by it; 0 prints every residual and fails none. */
 #ifndef CHECK_H
@@ -20,7 +20,7 @@
 #define check_below(what, value, bound, reason) check_below_at (what, value, bound, reason, __FILE__, __LINE__)
 /* Two arrays agree to the bit. */
 #define check_bits(what, a, b, n) check_bits_at (what, a, b, n, __FILE__, __LINE__)
-/* An error is what it should be, word by word. */
+/* An error has this status and exactly this text. */
 #define check_error(error, status, text) check_error_at (error, status, text, __FILE__, __LINE__)
 /* A status is PW_OK; otherwise prints the error. */
 #define check_ok(status, error) check_ok_at (status, error, __FILE__, __LINE__)

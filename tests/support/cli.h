@@ -1,4 +1,4 @@
-/* Runs the program and reads what it writes, for the tests.
+/* Runs the program and reads its output, for the tests.
  *
  * PINWHEEL in the environment names the program, build/pinwheel otherwise; run from the top folder. */
 #ifndef CLI_H
@@ -6,8 +6,8 @@
 
 #include <stddef.h>
 
-extern char cli_folder[];                    /* for whatever a test writes; @ in a command stands for it */
-extern char cli_out[200000], cli_err[20000]; /* what the last command wrote */
+extern char cli_folder[];                    /* files of a test; @ in a command stands for it */
+extern char cli_out[200000], cli_err[20000]; /* output of the last command */
 
 /* Makes and removes the folder. */
 int cli_setup (void **state);
@@ -16,10 +16,10 @@ int cli_teardown (void **state);
 /* Runs a shell command in which `pinwheel` is the program and @ the folder; returns its exit status. */
 int cli_run (const char *command);
 
-/* Runs a command that should succeed and say nothing on standard error. */
+/* Runs a command that should succeed and write nothing to standard error. */
 void cli_good (const char *command);
 
-/* Runs a command that should succeed, whatever it says. */
+/* Runs a command that should succeed, with any messages. */
 void cli_shell (const char *command);
 
 /* Runs a command that should end with a status and one line on standard error: "pinwheel: MESSAGE". */
@@ -40,7 +40,7 @@ void cli_write (const char *name, const char *text);
 /* The text of a file in the folder, until the next call; NULL if there is none. */
 const char *cli_file (const char *name);
 
-/* The number behind the keys of a summary, in order: cli_number (json, "bodies", "frame", "x", NULL). */
+/* The number under the keys of a summary, in order: cli_number (json, "bodies", "frame", "x", NULL). */
 double cli_number (const char *json, ...);
 
 /* 1 if the summary has this text under the key. */

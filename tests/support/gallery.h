@@ -1,4 +1,4 @@
-/* What the tests of the gallery share: its models opened, run and held against what each of them keeps. */
+/* Shared by the tests of the gallery: opens and runs its models, and checks their invariants. */
 #ifndef GALLERY_H
 #define GALLERY_H
 
@@ -14,8 +14,8 @@ pw_run *gallery_run (pw_system *s, double step, double t);
 
 void gallery_close (pw_run *r, pw_system *s);
 
-/* What goes in is what is there; undriven, energy is kept.  The bound is h^4 times a power of the fastest rate: nothing
- * turns fast on a snakeboard, a chain whips at 10 / s, and motors settle light parts at some 30 / s. */
+/* Checks that energy is work less losses, and constant if the scene is not driven.  The bound is h^4 times a power of the
+ * fastest rate of the motion: about 1/s for a snakeboard, 10/s for a chain, 30/s for light parts with motors. */
 void gallery_energy (pw_system *s, double step, double t, double bound, int driven);
 
 /* A point of a body in the world. */

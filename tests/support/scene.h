@@ -1,4 +1,4 @@
-/* Scenes the tests share. */
+/* Scenes that several tests use. */
 #ifndef SCENE_H
 #define SCENE_H
 

@@ -1,4 +1,4 @@
-/* Kinds of the tests' own: they use what the built-in ones do not, and are what a plug-in's kind looks like. */
+/* Element types of the tests, as a plug-in would define them: they use features that the built-in ones do not use. */
 #ifndef TOYS_H
 #define TOYS_H
 

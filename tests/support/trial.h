@@ -1,4 +1,4 @@
-/* Trials of element kinds: what every one has to stand in a scene. */
+/* Trials of element types: checks that each of them must pass in a scene. */
 #ifndef TRIAL_H
 #define TRIAL_H
 
