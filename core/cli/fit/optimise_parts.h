@@ -13,9 +13,11 @@ typedef struct {
   double *value;        /* outputs at the best */
   int found;            /* 1: the best satisfies the constraints */
   int converged;        /* 0: the search ended at its limit of runs */
-  long runs, failed, derivatives, room;
-  double *trial;  /* runs x (unknowns, outputs); outputs of failed runs are NaN */
-  pw_error error; /* of the first failed run */
+  long runs, failed;
+  long derivatives; /* points at which derivatives were computed */
+  double *trial;    /* runs x (unknowns, outputs); outputs of failed runs are NaN */
+  long room;        /* rows allocated of `trial` */
+  pw_error error;   /* of the first failed run */
 } pw_search_start;
 
 typedef struct {
@@ -29,11 +31,12 @@ typedef struct {
   const char **text; /* outputs: the objective, then constraints */
   double *bound;     /* outputs: of the constraint */
   double *sign;      /* outputs: sign x (value - bound) <= 0; of the objective: sign x value is minimised */
-  int outputs, starts, polished, jobs;
-  int smooth; /* 1: outputs have derivatives, except where a motion has none */
+  int outputs, starts, jobs;
+  int polished; /* results from which searches continue with a tight tolerance */
+  int smooth;   /* 1: outputs have derivatives, except where a motion has none */
   double seed;
-  pw_search_start *start; /* starts, then those that continue from the best of them */
-  int best;               /* index of the start with the best result; -1: none */
+  pw_search_start *start; /* starts, then polished */
+  int best;               /* index of the search with the best result; -1: none */
   pthread_mutex_t lock;   /* of what follows */
   pw_progress progress;
   int done;
