@@ -10,6 +10,7 @@
 #include <signal.h>
 #include "pinwheel-files.h"
 #include "pinwheel-solvers.h"
+#include "progress.h"
 
 enum {
   PW_INTERRUPTED = 130,
@@ -182,6 +183,8 @@ int pw_cli_vary_read (pw_cli_vary *v, const char *text, pw_error *error);
 const pw_parameter *pw_cli_vary_parameter (const pw_cli_vary *v); /* of the model; NULL: it has none of that name */
 /* PW_INPUT if that parameter cannot vary in the range, or is also set. */
 int pw_cli_vary_check (const pw_cli_vary *v, pw_error *error);
+/* Shows the progress of a branch; the first call, with a progress of zeros, starts it. */
+void pw_cli_vary_progress (const pw_cli_vary *v, pw_progress *p, double from, double value, double to);
 /* The system at a value of the parameter; for pw_steady_settings.compile. */
 pw_system *pw_cli_vary_compile (void *vary, double value, pw_error *error);
 

@@ -68,9 +68,11 @@ void pw_progress_at (pw_progress *p, double t) {
     fprintf (stderr, "pinwheel: %s: ", p->what);
   else
     fprintf (stderr, "\r%.16s [%s] ", p->what, bar);
-  fprintf (stderr, "%*.0f %%  %s%.*g of %.*g %s  %s to go%s%s%s", p->lines ? 0 : 3, floor (100 * part),
-           timed ? "t = " : "", timed ? 4 : 9, timed ? t : floor (t), timed ? 4 : 9, p->t_end, p->unit, left,
-           *p->note ? "  " : "", p->note, p->lines ? "\n" : "\033[K");
+  fprintf (stderr, "%*.0f %%  ", p->lines ? 0 : 3, floor (100 * part));
+  if (*p->unit)
+    fprintf (stderr, "%s%.*g of %.*g %s  ", timed ? "t = " : "", timed ? 4 : 9, timed ? t : floor (t), timed ? 4 : 9,
+             p->t_end, p->unit);
+  fprintf (stderr, "%s to go%s%s%s", left, *p->note ? "  " : "", p->note, p->lines ? "\n" : "\033[K");
   fflush (stderr);
   p->shown = !p->lines;
 }

@@ -6,7 +6,7 @@
 
 typedef struct {
   const char *what; /* shown in front */
-  const char *unit; /* "s" for time; else what is counted */
+  const char *unit; /* "s" for time; else what is counted; "": t is a part of 1 */
   double from;      /* initial value; not 0 if a run or sweep is resumed */
   double t_end;     /* final value: time [s] or count */
   double start;     /* clock when it started [s] */

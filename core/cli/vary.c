@@ -41,6 +41,13 @@ int pw_cli_vary_check (const pw_cli_vary *v, pw_error *error) {
   return PW_OK;
 }
 
+void pw_cli_vary_progress (const pw_cli_vary *v, pw_progress *p, double from, double value, double to) {
+  char number[32];
+  if (p->t_end == 0) pw_progress_count (p, pw_file_name (v->m->file), "", 0, 1);
+  snprintf (p->note, sizeof p->note, "%.20s = %s", v->name, pw_format (number, value, 4));
+  pw_progress_at (p, (value - from) / (to - from));
+}
+
 pw_system *pw_cli_vary_compile (void *vary, double value, pw_error *error) {
   const pw_cli_vary *v = vary;
   pw_model *m = pw_file_model (v->m->file, error);

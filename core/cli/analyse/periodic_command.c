@@ -121,14 +121,14 @@ static int periodic_fail (const pw_periodic_cli *x, pw_error *error) {
 /* Follows the branch to the end of the range. */
 static int periodic_branch (pw_periodic_cli *x, pw_error *error) {
   pw_periodic_orbit o;
-  pw_progress progress;
-  pw_progress_count (&progress, pw_file_name (x->m.file), "points", 0, 1);
+  pw_progress progress = { .t_end = 0 };
+  pw_cli_vary_progress (&x->vary, &progress, x->set.first, x->set.first, x->set.last);
   int status = pw_periodic_follow (x->search, 1, error);
   while (status == PW_OK && !periodic_stop (x)) {
     status = pw_periodic_next (x->search, &o, error);
     if (status != PW_OK || o.event == PW_PERIODIC_END) break;
     status = periodic_add (x, &o, error);
-    pw_progress_at (&progress, (o.parameter - x->set.first) / (x->set.last - x->set.first));
+    pw_cli_vary_progress (&x->vary, &progress, x->set.first, o.parameter, x->set.last);
   }
   pw_progress_end (&progress);
   periodic_stop (x);

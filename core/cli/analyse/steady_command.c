@@ -172,6 +172,7 @@ static int steady_branch (pw_steady_cli *x, const pw_steady_point *from, int dir
   if (more) x->end = more;
   if (state == NULL || more == NULL) return free (state), pw_fail (error, PW_RESOURCE, "out of memory");
   pw_steady_motion m = { 0 };
+  pw_progress progress = { .t_end = 0 };
   int attempt = from->attempt;
   memcpy (state, from->state, 2 * (size_t)n * sizeof *state);
   *x->end[x->branches++].reason = 0;
@@ -180,7 +181,10 @@ static int steady_branch (pw_steady_cli *x, const pw_steady_point *from, int dir
     status = pw_steady_next (x->steady, &m, error);
     if (status != PW_OK || m.event == PW_STEADY_END) break;
     if (steady_add (x, &m, attempt, error) == NULL) status = PW_RESOURCE;
+    pw_cli_vary_progress (&x->vary, &progress, from->parameter, m.parameter,
+                          direction > 0 ? x->set.last : x->set.first);
   }
+  pw_progress_end (&progress);
   free (state);
   if (status == PW_METHOD) {
     snprintf (x->end[x->branches - 1].reason, sizeof x->end->reason, "%.199s", error->text);
