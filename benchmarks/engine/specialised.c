@@ -5,6 +5,7 @@
 #include "pinwheel-files.h"
 
 enum { SPECIALISED_POOL = 64, SPECIALISED_SPACING = 40 };
+enum { SPECIALISED_STEPS = 1000 }; /* after which a run begins again: a motion may become faster */
 
 /* The general engine and specialised code, with states of a motion to evaluate. */
 typedef struct {
@@ -19,6 +20,7 @@ typedef struct {
 typedef struct {
   specialised_data *d;
   int side;
+  long steps;
 } specialised_side;
 
 pw_scene_code *engine_specialise (const pw_system *s) {
@@ -30,11 +32,13 @@ pw_scene_code *engine_specialise (const pw_system *s) {
   return code;
 }
 
-static pw_system *specialised_system (const char *name) {
+/* And the default step. */
+static pw_system *specialised_system (const char *name, double *step) {
   pw_error error = { 0 };
   pw_file *file = pw_file_open (name, &error);
   pw_model *m = pw_file_model (file, &error);
   pw_model_build (m, &error);
+  if (file) *step = pw_file_table (file)->run.step;
   pw_system *s = pw_system_compile (m, &error);
   if (s == NULL) engine_die (name, error.text);
   pw_model_free (m);
@@ -67,7 +71,10 @@ static long specialised_evaluate (void *context, long n) {
 static long specialised_step (void *context, long n) {
   specialised_side *x = context;
   pw_error error = { 0 };
-  for (long i = 0; i < n; i++) pw_run_advance (x->d->run[x->side], 1e9, &error);
+  for (long i = 0; i < n; i++) {
+    if (++x->steps % SPECIALISED_STEPS == 0) pw_run_restart (x->d->run[x->side], x->d->q, x->d->v, &error);
+    pw_run_advance (x->d->run[x->side], 1e9, &error);
+  }
   if (error.status != PW_OK) engine_die (x->d->system->model, error.text);
   return n;
 }
@@ -76,16 +83,17 @@ static void specialised_open (engine_case *c, const char *method) {
   static specialised_side side[2];
   specialised_data *d = c->data = calloc (1, sizeof *d);
   if (d == NULL) engine_die (c->key, "out of memory");
-  d->system = specialised_system (c->model);
+  double step = 0;
+  d->system = specialised_system (c->model, &step);
   d->code = engine_specialise (d->system);
   d->n = pw_system_coordinates (d->system), d->rows = pw_system_rows (d->system);
   d->q = calloc ((size_t)(2 * SPECIALISED_POOL * d->n + d->n + d->rows) + 4, sizeof (double));
   if (d->q == NULL) engine_die (c->key, "out of memory");
   d->v = d->q + SPECIALISED_POOL * d->n, d->a = d->v + SPECIALISED_POOL * d->n, d->lambda = d->a + d->n + 3;
   for (int i = 0; i < 2; i++) {
-    pw_settings set = { .step = 1e-4, .span = 100, .specialised = i ? pw_scene_code_table (d->code) : NULL };
+    pw_settings set = { .step = step, .span = 100, .specialised = i ? pw_scene_code_table (d->code) : NULL };
     d->run[i] = engine_open (d->system, method, &set);
-    side[i] = (specialised_side){ d, i };
+    side[i] = (specialised_side){ d, i, 0 };
   }
   specialised_pool (d);
   c->base.context = &side[0], c->ours.context = &side[1];
