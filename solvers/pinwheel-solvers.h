@@ -187,6 +187,9 @@ int pw_run_record (pw_run *r, double t_end, const double *times, long count, lon
 /* pw_function.eval of a signal whose value is the double at `context`; after changing it call pw_run_restart. */
 int pw_input_signal (void *context, double t, const double *x, double value[3], double *gradient);
 
+/* PW_VERSION of the library, which may differ from that of the header. */
+extern const char pw_version[];
+
 /* Sizes of structures ("pw_error") and offsets and sizes of their members ("pw_error.text"); ends with a NULL name. */
 typedef struct {
   const char *name;

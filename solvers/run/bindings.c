@@ -52,7 +52,9 @@ int pw_input_signal (void *context, double t, const double *x, double value[3], 
   return 0;
 }
 
-/* ---- Layouts ---- */
+/* ---- Version and layouts ---- */
+
+const char pw_version[] = PW_VERSION;
 
 #define LAYOUT(type) \
   { #type, 0, sizeof(type) }
@@ -90,6 +92,25 @@ const pw_member pw_members[] = { LAYOUT (pw_error),
                                  MEMBER (pw_parameter, value),
                                  MEMBER (pw_parameter, unit),
                                  MEMBER (pw_parameter, about),
+                                 LAYOUT (pw_field),
+                                 MEMBER (pw_field, name),
+                                 MEMBER (pw_field, type),
+                                 MEMBER (pw_field, count),
+                                 MEMBER (pw_field, unit),
+                                 MEMBER (pw_field, required),
+                                 MEMBER (pw_field, domain),
+                                 MEMBER (pw_field, choices),
+                                 MEMBER (pw_field, about),
+                                 LAYOUT (pw_quantity),
+                                 MEMBER (pw_quantity, name),
+                                 MEMBER (pw_quantity, unit),
+                                 MEMBER (pw_quantity, about),
+                                 LAYOUT (pw_kind),
+                                 MEMBER (pw_kind, name),
+                                 MEMBER (pw_kind, about),
+                                 MEMBER (pw_kind, fields),
+                                 MEMBER (pw_kind, rows),
+                                 MEMBER (pw_kind, reaction),
                                  LAYOUT (pw_plugin_table),
                                  MEMBER (pw_plugin_table, about),
                                  MEMBER (pw_plugin_table, parameters),

@@ -1,16 +1,28 @@
 """Planar multibody systems with pin joints and knife-edge wheels.
 
+Element types are classes made from the library's tables: see ``help(pw.Pin)`` and ``pw.elements.KINDS``.
+
 >>> import pinwheel as pw
 >>> r = pw.Model("snakeboard", swing=0.6).run(method="erk8+projection", t_end=10, rtol=1e-9)
 >>> r["board.x"][-1], r.units["board.x"]
 """
 
+from typing import TYPE_CHECKING, Any
+
+from . import elements
+from ._library import VERSION as __version__
 from ._library import Error, InitialError, InputError, MethodError, ResourceError
+from .elements import Body, Element
 from .model import Linear, Model, describe, models
 from .results import Result
-from .simulation import Simulation
-from .studies import command, sweep
+from .simulation import Inputs, Simulation
+from .studies import command, help_of, sweep
 
-__all__ = ["Error", "InitialError", "InputError", "Linear", "MethodError", "Model", "ResourceError", "Result", "Simulation",
-           "command", "describe", "models", "sweep"]
-__version__ = "0.1.0"
+__all__ = ["Body", "Element", "Error", "InitialError", "InputError", "Inputs", "Linear", "MethodError", "Model", "ResourceError",
+           "Result", "Simulation", "command", "describe", "elements", "help_of", "models", "sweep", "__version__"]
+
+if TYPE_CHECKING:
+    def __getattr__(name: str) -> Any: ...
+else:
+    globals().update(elements.KINDS)
+    __all__ += elements.KINDS

@@ -1,6 +1,7 @@
 """The C library through ctypes: functions, structures, errors.
 
-Structures take their sizes and offsets from the library itself (``pw_members``), so they always match the one loaded.
+Structures take their sizes and offsets from the library itself (``pw_members``), so they always match the one loaded;
+tests compare functions, members and constants with the public headers.
 """
 
 from __future__ import annotations
@@ -10,7 +11,11 @@ import ctypes.util
 import os
 import pathlib
 
-OK, RETRY, STOPPED, RESOURCE, INPUT, INITIAL, METHOD = 0, 1, 2, -1, -2, -3, -4
+VERSION = "0.1.0"
+PW_OK, PW_RETRY, PW_STOPPED, PW_RESOURCE, PW_INPUT, PW_INITIAL, PW_METHOD = 0, 1, 2, -1, -2, -3, -4
+PW_FUNCTION = 2
+PW_NUMBER, PW_POINT, PW_VECTOR, PW_BODY, PW_SIGNAL, PW_CHOICE = range(6)
+DOMAINS = ("", ">= 0", "> 0", "1, 2, 3, ...", "from 0 to 1")  # by pw_domain
 
 
 class Error(Exception):
@@ -33,7 +38,7 @@ class ResourceError(Error, OSError):
     """Out of memory, or a file cannot be read or written."""
 
 
-_EXCEPTIONS = {RESOURCE: ResourceError, INPUT: InputError, INITIAL: InitialError, METHOD: MethodError}
+_EXCEPTIONS = {PW_RESOURCE: ResourceError, PW_INPUT: InputError, PW_INITIAL: InitialError, PW_METHOD: MethodError}
 
 
 # ---- Loading ----
@@ -47,22 +52,34 @@ def _folders():
         yield parent / "lib"
 
 
-def _load(name):
+def _load(name, folders):
     file = f"lib{name}.so"
-    named = os.environ.get("PINWHEEL_LIBRARY")
-    folders = [pathlib.Path(named)] if named else list(_folders())
     for folder in folders:
         for path in sorted(folder.glob(file + "*")):
             return c.CDLL(str(path), mode=c.RTLD_GLOBAL), path
-    system = None if named else ctypes.util.find_library(name)
+    system = None if "PINWHEEL_LIBRARY" in os.environ else ctypes.util.find_library(name)
     if system is None:
         raise ImportError(f"{file} was not found in {', '.join(map(str, folders[:2]))} ...: build Pinwheel with `make`, "
                           "install it, or name the folder of the library in PINWHEEL_LIBRARY")
     return c.CDLL(system, mode=c.RTLD_GLOBAL), pathlib.Path(system)
 
 
-core, library_path = _load("pinwheel")
-files, _ = _load("pinwheel-files")
+def _check_version(library, path):
+    """A library of another version may have other functions and structures."""
+    try:
+        found = c.c_char.in_dll(library, "pw_version")
+    except ValueError:
+        raise ImportError(f"{path} is not a library of Pinwheel {VERSION}, to which this package belongs") from None
+    found = c.string_at(c.addressof(found)).decode()
+    if found != VERSION:
+        raise ImportError(f"{path} is Pinwheel {found}, this package belongs to {VERSION}: install both from one source, "
+                          "or name the folder of the other library in PINWHEEL_LIBRARY")
+
+
+_named = os.environ.get("PINWHEEL_LIBRARY")
+core, library_path = _load("pinwheel", [pathlib.Path(_named)] if _named else list(_folders()))
+_check_version(core, library_path)
+files, _ = _load("pinwheel-files", [library_path.parent] if library_path.parent.name else [])
 
 
 def program() -> str:
@@ -110,6 +127,13 @@ def _structure(name, /, **types):
     return made
 
 
+def listed(structure, address):
+    """The structures from an address on, up to the one without a name."""
+    while address and (entry := structure.from_address(address)).name:
+        yield entry
+        address += c.sizeof(structure)
+
+
 _double_p = c.POINTER(c.c_double)
 pw_error = _structure("pw_error", status=c.c_int, text=c.c_char * 500)
 pw_initial_value = _structure("pw_initial_value", state=c.c_int, value=c.c_double)
@@ -120,6 +144,12 @@ pw_statistics = _structure(
     "pw_statistics", steps=c.c_long, rejected=c.c_long, rhs=c.c_long, jacobians=c.c_long, factorisations=c.c_long,
     position=c.c_double, velocity=c.c_double, g=c.c_double, jv=c.c_double)
 pw_parameter = _structure("pw_parameter", name=c.c_char_p, value=c.c_double, unit=c.c_char_p, about=c.c_char_p)
+pw_field = _structure(
+    "pw_field", name=c.c_char_p, type=c.c_int, count=c.c_int, unit=c.c_char_p, required=c.c_int, domain=c.c_int,
+    choices=c.POINTER(c.c_char_p), about=c.c_char_p)
+pw_quantity = _structure("pw_quantity", name=c.c_char_p, unit=c.c_char_p, about=c.c_char_p)
+pw_kind = _structure(
+    "pw_kind", name=c.c_char_p, about=c.c_char_p, fields=c.c_void_p, rows=c.c_int, reaction=c.c_void_p)
 pw_plugin_table = _structure(
     "pw_plugin_table", about=c.c_char_p, parameters=c.c_void_p, run__t_end=c.c_double, run__step=c.c_double,
     run__rtol=c.c_double, run__method=c.c_char_p)
@@ -129,14 +159,16 @@ pw_linear = _structure(
     "pw_linear", positions=c.c_int, velocities=c.c_int, unknowns=c.c_int, A=_double_p, re=_double_p, im=_double_p,
     steady=c.c_int, twist=c.c_double * 3, B=_double_p, basis=_double_p)
 eval_function = c.CFUNCTYPE(c.c_int, c.c_void_p, c.c_double, _double_p, _double_p, _double_p)
-PW_FUNCTION = 2
 
 
 # ---- Functions ----
 
+SIGNATURES = {}  # functions by name
+
+
 def _declare(library, result, *names_and_arguments):
     for name, *arguments in names_and_arguments:
-        function = getattr(library, name)
+        function = SIGNATURES[name] = getattr(library, name)
         function.restype, function.argtypes = result, arguments
 
 
@@ -145,7 +177,7 @@ _declare(files, _p, ("pw_file_open", _s, _e), ("pw_file_model", _p, _e))
 _declare(files, _s, ("pw_file_name", _p), ("pw_file_path", _p))
 _declare(files, c.POINTER(pw_plugin_table), ("pw_file_table", _p))
 _declare(files, None, ("pw_file_close", _p))
-_declare(files, _i, ("pw_file_list", c.CFUNCTYPE(_i, _p, _s, _s), _p, _e))
+_declare(files, _i, ("pw_read_expression", _s, _double_p), ("pw_file_list", c.CFUNCTYPE(_i, _p, _s, _s), _p, _e))
 _declare(core, None, ("pw_model_free", _p), ("pw_system_free", _p), ("pw_run_close", _p), ("pw_linear_free", c.POINTER(pw_linear)))
 _declare(core, _i, ("pw_model_set", _p, _s, _d, _e), ("pw_model_build", _p, _e), ("pw_model_set_initial", _p, _s, _d, _e),
          ("pw_model_set_signal", _p, _s, _s, c.POINTER(pw_signal), _e))
@@ -163,14 +195,43 @@ _declare(core, _d, ("pw_run_time", _p))
 _declare(core, c.POINTER(pw_statistics), ("pw_run_statistics", _p))
 
 
-def check(error: pw_error):
+def check(error) -> None:
     """Raises the exception of a library error, if there is one."""
     if error.status < 0:
         raise _EXCEPTIONS.get(error.status, Error)(error.text.decode(errors="replace"))
 
 
-def text(value) -> str:
+def text(value: bytes | None) -> str:
     return value.decode(errors="replace") if value else ""
+
+
+def encode(value, what: str) -> bytes:
+    """A text as the library takes it."""
+    if not isinstance(value, str) or "\0" in value:
+        raise InputError(f"{what}: expected a text, found {value!r:.60}")
+    return value.encode(errors="replace")
+
+
+def number(value, what: str, above: float | None = None) -> float:
+    """A number, or an expression of numbers ("30*deg"), perhaps only a finite one above a bound."""
+    result = c.c_double()
+    try:
+        if not isinstance(value, str):
+            result.value = float(value)
+        elif files.pw_read_expression(encode(value, what), c.byref(result)) != PW_OK:
+            raise ValueError
+    except (TypeError, ValueError, OverflowError):
+        raise InputError(f"{what} = {value!r:.60}: expected a number") from None
+    if above is not None and not above < result.value < float("inf"):
+        raise InputError(f"{what} = {result.value!r}: expected a number > {above:g}")
+    return result.value
+
+
+def numbers(values, what: str) -> dict:
+    """Numbers by name."""
+    if not hasattr(values, "items"):
+        raise InputError(f"{what}: expected a dict of numbers by name, found {values!r:.60}")
+    return {encode(name, what).decode(): number(value, str(name)) for name, value in values.items()}
 
 
 def name_of(function, *arguments) -> str:

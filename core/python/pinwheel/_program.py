@@ -11,7 +11,7 @@ from . import _library as lib
 
 def options(model):
     """A model, or its name, as arguments."""
-    given = [str(getattr(model, "source", model))]
+    given = [lib.encode(str(getattr(model, "source", model)), "model").decode()]
     if hasattr(model, "signals"):
         if model.signals:
             raise lib.InputError("the program cannot evaluate functions in Python: describe the signal by an expression")
@@ -21,7 +21,12 @@ def options(model):
 
 
 def run(arguments):
-    done = subprocess.run([lib.program(), *arguments], capture_output=True, text=True, check=False)
+    try:
+        done = subprocess.run([lib.program(), *arguments], capture_output=True, text=True, check=False)
+    except ValueError as failure:
+        raise lib.InputError(f"an argument of pinwheel {arguments[0]}: {failure}") from None
+    except OSError as failure:
+        raise lib.ResourceError(f"{lib.program()} cannot be run: {failure}; install it, or name it in PINWHEEL") from None
     if done.returncode not in (0, 130):
         lines = done.stderr.strip().removeprefix("pinwheel: ")
         raise lib._EXCEPTIONS.get(-done.returncode, lib.Error)(lines or f"pinwheel ended with status {done.returncode}")

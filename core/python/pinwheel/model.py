@@ -4,13 +4,18 @@ from __future__ import annotations
 
 import ctypes as c
 import json
+import math
 import pathlib
 import tempfile
+import threading
+from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from . import _library as lib
+from . import studies
 from .results import Result, _nearest
 from .simulation import Simulation
 
@@ -18,12 +23,43 @@ from .simulation import Simulation
 class _System:
     """A compiled system; simulations share it."""
 
-    def __init__(self, pointer, keep):
-        self.pointer, self._keep = pointer, keep
+    def __init__(self, pointer, keep, raised):
+        self.pointer, self._keep, self._raised = pointer, keep, raised
 
     def __del__(self):
         if self.pointer:
             lib.core.pw_system_free(self.pointer)
+
+    def check(self, error) -> None:
+        """Raises the exception of a library error; what a function in Python has raised is its cause."""
+        raised = self._raised.pop(threading.get_ident(), None)
+        if error.status < 0 and isinstance(raised, Exception):
+            error.text += f": {type(raised).__name__}: {raised}".encode()[:499 - len(error.text)]
+        elif error.status < 0 and raised is not None:
+            raise raised
+        try:
+            lib.check(error)
+        except lib.Error as failure:
+            raise failure from raised
+
+
+class _Described:
+    """The text of a model described in Python, as a file that lives as long as this object; it can be pickled."""
+
+    def __init__(self, name: str, text: str):
+        if not isinstance(name, str) or not name or len(name) > 50 or set(name) & set("/\\\0"):
+            raise lib.InputError(f"describe: name = {name!r:.60}: expected at most 50 characters, without / and \\")
+        self._name, self._text = name, text
+        self._folder = tempfile.TemporaryDirectory(prefix="pinwheel-")
+        path = pathlib.Path(self._folder.name) / f"{name}.yaml"
+        path.write_text(text, encoding="utf-8")
+        self._path = str(path)
+
+    def __str__(self):
+        return self._path
+
+    def __reduce__(self):
+        return _Described, (self._name, self._text)
 
 
 class _Handle:
@@ -46,11 +82,13 @@ class Linear:
     A : ndarray, shape (n, n)
         [1/s]
     B : ndarray, shape (n, inputs)
-        Columns of signals of constraints are NaN.
+        Per unit of each input, in its column; columns of signals of constraints are NaN.
     eigenvalues : ndarray of complex, shape (n,)
         [1/s], the fastest growing first.
     basis : ndarray, shape (states, n)
         Perturbation of the states per m of x.
+    inputs, states : list of str
+        Names of the signals and of the states.
     steady : bool
         Whether the eigenvalues are growth rates of perturbations.
     twist : ndarray, shape (3,)
@@ -87,14 +125,14 @@ class Model:
     Parameters
     ----------
     model : str or path
-        A name ("snakeboard"), or the path of a .yaml, .c or .so file.
+        A name ("snakeboard"), or the path of a .yaml, .c or .so file.  Models in C are programs: open only what you trust.
     start : dict, optional
-        Initial values of states, such as ``{"frame.vx": 1}``.
+        Initial values of states [m, rad, m/s, rad/s], such as ``{"frame.vx": 1}``.
     signals : dict, optional
-        Functions of the time that replace signals: ``{"rider": lambda t: 0.1 * math.cos(t)}``; of a constraint they return
-        the value, its rate and its acceleration.
-    **parameters : float
-        Values of the model's parameters.
+        Functions of the time [s] that replace signals: ``{"rider": lambda t: 0.1 * math.cos(t)}``; of a constraint they
+        return the value, its rate and its acceleration.  The name is that of the element, or ELEMENT.FIELD.
+    **parameters : float or str
+        Values of the model's parameters, in the units of :attr:`units`, or expressions such as ``"30*deg"``.
 
     Raises
     ------
@@ -104,32 +142,32 @@ class Model:
     Attributes
     ----------
     name, about : str
-    parameters : dict
-        Values of all parameters.
+    parameters, units : dict
+        Values and units of all parameters.
     defaults : dict
         Method, t_end, step, rtol of the model.
     """
 
-    def __init__(self, model, *, start=None, signals=None, **parameters):
-        self.source, self.start, self.signals = str(model), dict(start or {}), dict(signals or {})
+    def __init__(self, model, *, start: dict | None = None, signals: dict[str, Callable] | None = None, **parameters):
+        self._origin = model if isinstance(model, _Described) else str(model)
+        self.source = str(model)
+        self.start, self.signals = lib.numbers(start or {}, "start"), _functions(signals or {})
         error = lib.pw_error()
-        pointer = lib.files.pw_file_open(self.source.encode(), c.byref(error))
+        pointer = lib.files.pw_file_open(lib.encode(self.source, "model"), c.byref(error))
         lib.check(error)
         self._file = _Handle(pointer, lib.files.pw_file_close)
         table = lib.files.pw_file_table(pointer).contents
         self.name, self.about = lib.text(lib.files.pw_file_name(pointer)), lib.text(table.about)
-        self.defaults = {"method": lib.text(table.run__method) or "rk4+projection", "t_end": table.run__t_end or 10.0,
+        self.defaults: dict[str, Any] = {"method": lib.text(table.run__method) or "rk4+projection", "t_end": table.run__t_end or 10.0,
                          "step": table.run__step or 1e-3, "rtol": table.run__rtol or 1e-6}
-        self.parameters, self.units = {}, {}
-        size, at = c.sizeof(lib.pw_parameter), table.parameters
-        while at and (p := lib.pw_parameter.from_address(at)).name:
-            self.parameters[p.name.decode()], self.units[p.name.decode()] = p.value, lib.text(p.unit)
-            at += size
+        listed = list(lib.listed(lib.pw_parameter, table.parameters))
+        self.parameters = {p.name.decode(): p.value for p in listed}
+        self.units = {p.name.decode(): lib.text(p.unit) for p in listed}
+        self._given = {}
         for name, value in parameters.items():
             if name not in self.parameters:
                 raise lib.InputError(f"model {self.name} has no parameter {name!r}{_nearest(name, self.parameters)}")
-            self.parameters[name] = float(value)
-        self._given = parameters
+            self.parameters[name] = self._given[name] = lib.number(value, name)
         self._compiled = None
 
     def __repr__(self):
@@ -139,18 +177,33 @@ class Model:
     def __reduce__(self):
         if self.signals:
             raise TypeError("a model with functions as signals cannot be sent to other processes")
-        return _restore, (self.source, self.start, self._given)
+        return _restore, (self._origin, self.start, self._given)
 
-    def replace(self, *, start=None, **parameters) -> Model:
-        """The same model with other parameters or initial values."""
-        return Model(self.source, start={**self.start, **(start or {})}, signals=self.signals, **{**self._given, **parameters})
+    def __copy__(self) -> Model:
+        return self.replace()
+
+    def __deepcopy__(self, _) -> Model:
+        return self.replace()
+
+    def replace(self, *, start: dict | None = None, **parameters) -> Model:
+        """The same model with other parameters or initial values.
+
+        Parameters
+        ----------
+        start : dict, optional
+            Initial values of states [m, rad, m/s, rad/s]; the others stay.
+        **parameters : float or str
+            Values of parameters; the others stay.
+        """
+        start = {**self.start, **lib.numbers(start or {}, "start")}
+        return Model(self._origin, start=start, signals=self.signals, **{**self._given, **parameters})
 
     # ---- Compiling ----
 
     def _compile(self, inputs=()):
         if not inputs and self._compiled:
             return self._compiled
-        error, keep = lib.pw_error(), [self._file]
+        error, keep, raised = lib.pw_error(), [self._file], {}
         model = _Handle(lib.files.pw_file_model(self._file.pointer, c.byref(error)), lib.core.pw_model_free)
         lib.check(error)
         for name, value in self._given.items():
@@ -162,14 +215,14 @@ class Model:
             lib.core.pw_model_set_initial(model.pointer, state.encode(), value, c.byref(error))
         lib.check(error)
         for name, function in self.signals.items():
-            self._set_signal(model, name, _callback(function), None, keep)
-        cells = {name: c.c_double(inputs[name]) for name in inputs}
+            self._set_signal(model, name, _callback(function, raised), None, keep)
+        cells = {name: c.c_double(value) for name, value in lib.numbers(inputs, "inputs").items()}
         own = c.cast(lib.core.pw_input_signal, c.c_void_p).value
         for name, cell in cells.items():
             self._set_signal(model, name, own, c.addressof(cell), keep)
         pointer = lib.core.pw_system_compile(model.pointer, c.byref(error))
         lib.check(error)
-        system = _System(pointer, (keep, model, cells))
+        system = _System(pointer, (keep, model, cells), raised)
         if not inputs:
             self._compiled = system, cells
         return system, cells
@@ -187,8 +240,9 @@ class Model:
 
     # ---- Running ----
 
-    def open(self, method=None, *, t_end=None, step=None, rtol=None, atol=None, max_steps=None, energy=False,
-             inputs=None) -> Simulation:
+    def open(self, method: str | None = None, *, t_end: float | None = None, step: float | None = None,
+             rtol: float | None = None, atol: float | None = None, max_steps: int | None = None, energy: bool = False,
+             inputs: dict[str, float] | None = None) -> Simulation:
         """Opens a run that the caller advances.
 
         Parameters
@@ -197,27 +251,43 @@ class Model:
             Integrator and stabilisation, "erk8+projection"; default: the model's.
         t_end : float, optional
             Expected final time [s]: only for the scale of a scene at rest.
-        step, rtol, atol, max_steps : float, optional
-            Step size [s] of fixed-step methods; tolerances of adaptive ones; largest number of steps.
+        step : float, optional
+            Step size of fixed-step methods [s]; default: the model's.
+        rtol, atol : float, optional
+            Relative tolerance of adaptive methods (default: the model's), absolute tolerance of every state (default: rtol
+            times its scale).
+        max_steps : int, optional
+            Largest number of attempted steps of adaptive methods, 1e7 by default.
         energy : bool
             Whether samples contain work and losses by element.
         inputs : dict, optional
             Signals that the caller sets between steps, and their initial values: ``{"rider": 0.0}``.
 
+        Returns
+        -------
+        Simulation
+
         Raises
         ------
         InputError, InitialError, MethodError
         """
-        system, cells = self._compile(inputs or {})
-        given = {"span": t_end or self.defaults["t_end"], "step": step or self.defaults["step"],
-                 "rtol": rtol or self.defaults["rtol"], "atol": atol or 0.0, "max_steps": int(max_steps or 0),
-                 "ledger": int(energy)}
         settings = lib.pw_settings()
-        for name, value in given.items():
-            setattr(settings, name, value)
-        return Simulation(self, system, cells, method or self.defaults["method"], settings, energy)
+        for name, value in {"span": t_end, "step": step, "rtol": rtol, "atol": atol, "max_steps": max_steps}.items():
+            setattr(settings, name, self._setting(name, value))
+        settings.ledger = bool(energy)
+        system, cells = self._compile(inputs or {})
+        return Simulation(self, system, cells, self.defaults["method"] if method is None else method, settings, bool(energy))
 
-    def run(self, method=None, *, t_end=None, every=None, times=None, start=None, progress=None, **settings) -> Result:
+    def _setting(self, name, value):
+        if value is None:
+            return self.defaults.get("t_end" if name == "span" else name, 0)
+        value = lib.number(value, "t_end" if name == "span" else name, above=0)
+        if name == "max_steps" and (value != int(value) or value > 2**53):
+            raise lib.InputError(f"max_steps = {value:g}: expected a whole number from 1 to 2^53")
+        return int(value) if name == "max_steps" else value
+
+    def run(self, method: str | None = None, *, t_end: float | None = None, every: float | None = None, times=None,
+            start: dict | None = None, progress: Callable[[float], object] | bool | None = None, **settings) -> Result:
         """Integrates and returns the samples.
 
         Parameters
@@ -229,37 +299,65 @@ class Model:
         every : float, optional
             Time between samples [s]; default: a sample after every step.
         times : array_like, shape (n,), optional
-            Increasing times of samples [s].
+            Increasing times of samples [s], at most t_end.
         start : dict, optional
-            Initial values of states.
-        progress : callable, optional
-            Called with the fraction done.
+            Initial values of states [m, rad, m/s, rad/s].
+        progress : callable or bool, optional
+            Called now and then with the fraction done; True: a progress bar, False: none; default: a bar in notebooks.
         **settings
             step, rtol, atol, max_steps, energy: see :meth:`open`.
 
         Returns
         -------
         Result
+
+        Raises
+        ------
+        InputError, InitialError, MethodError
         """
         model = self.replace(start=start) if start else self
-        end = float(t_end if t_end is not None else self.defaults["t_end"])
-        with model.open(method, t_end=end, **settings) as simulation:
+        end = self.defaults["t_end"] if t_end is None else lib.number(t_end, "t_end")
+        with model.open(method, t_end=end or None, **settings) as simulation:
             result = simulation.record(end, every, times, progress)
         result.settings.update(settings)
         return result
 
-    def linearise(self, at=0.0, most=200) -> Linear:
-        """Linearises at time ``at`` [s] of a run with the model's method; at most ``most`` coordinates."""
+    # ---- Analyses ----
+
+    def linearise(self, at: float = 0.0, most: int = 200) -> Linear:
+        """Linearises the equations of motion in the frame that moves with the motion.
+
+        Parameters
+        ----------
+        at : float
+            Time of a run with the model's method [s].
+        most : int
+            Refuse models with more minimal coordinates.
+
+        Returns
+        -------
+        Linear
+
+        Raises
+        ------
+        InputError, InitialError, MethodError
+        """
+        at, most = lib.number(at, "at"), int(lib.number(most, "most", above=0))
         with self.open(t_end=at or None) as simulation:
             if at:
                 simulation.advance(at)
             linear, error = lib.pw_linear(), lib.pw_error()
-            lib.core.pw_run_linear_modes(simulation._run, most, c.byref(linear), c.byref(error))
+            with simulation._used() as run:
+                lib.core.pw_run_linear_modes(run, min(most, 2**31 - 1), c.byref(linear), c.byref(error))
             try:
                 lib.check(error)
                 return self._linear(linear, simulation._system.pointer)
             finally:
                 lib.core.pw_linear_free(c.byref(linear))
+
+    sweep = studies.sweep
+    check, compare, drift, steady, periodic, sensitivity, fit, optimise = map(
+        studies.analysis, ("check", "compare", "drift", "steady", "periodic", "sensitivity", "fit", "optimise"))
 
     @staticmethod
     def _linear(l, s):
@@ -276,60 +374,104 @@ class Model:
                       [lib.name_of(lib.core.pw_system_state_name, s, i) for i in range(states)], l.steady == 0, np.array(l.twist))
 
 
-def _restore(source, start, parameters):
-    return Model(source, start=start, **parameters)
+def _restore(origin, start, parameters):
+    return Model(origin, start=start, **parameters)
 
 
-def _callback(function):
-    """A function of the time as the library calls it; an exception stops the run."""
+def _functions(signals):
+    if not hasattr(signals, "items"):
+        raise lib.InputError(f"signals: expected a dict of functions by name, found {signals!r:.60}")
+    for name, function in signals.items():
+        lib.encode(name, "signals")
+        if not callable(function):
+            raise lib.InputError(f"signal {name}: expected a function of the time, found {function!r:.60}")
+    return dict(signals)
+
+
+def _callback(function, raised):
+    """A function of the time as the library calls it; what it raises stops the run, and goes to `raised`, by thread."""
 
     @lib.eval_function
     def evaluate(_context, t, _x, value, _gradient):
         try:
             result = function(t)
-            for i, x in enumerate(result if isinstance(result, (tuple, list)) else (result, float("nan"), float("nan"))):
-                value[i] = x
+            if not hasattr(result, "__len__"):
+                value[0], value[1], value[2] = float(result), math.nan, math.nan
+            elif len(result) in (1, 3):
+                value[0], value[1], value[2] = map(float, result if len(result) == 3 else (result[0], math.nan, math.nan))
+            else:
+                raise ValueError(f"expected a number, or value, rate and acceleration, found {len(result)}")
             return 0
-        except Exception:  # noqa: BLE001: nothing may pass through C
-            import traceback
-            traceback.print_exc()
+        except BaseException as failure:  # noqa: BLE001: nothing may pass through C
+            raised[threading.get_ident()] = failure
             return 1
 
     return evaluate
 
 
-def describe(name="model", *, about="", bodies=(), elements=(), parameters=(), let=None, run=None, **model) -> Model:
+def describe(name: str = "model", *, about: str = "", bodies=(), elements=(), parameters=(), let: dict | None = None,
+             run: dict | None = None, **model) -> Model:
     """A model described in Python, with the words of text models.
 
     Parameters
     ----------
     name : str
-    bodies, elements, parameters : list of dict
-        As in a text model: ``{"name": "sleigh", "mass": 1, "inertia": 0.5}``, ``{"wheel": "edge", "body": "sleigh",
-        "at": [-0.25, 0]}``.  Numbers may be expressions; a signal may be a Python function of the time.
+        Name of the model, at most 50 characters.
+    about : str
+        One line: what the model is.
+    bodies : list of Body or dict
+        ``{"name": "sleigh", "mass": 1, "inertia": 0.5}``; see :class:`Body`.  Numbers may be expressions of parameters.
+    elements : list of Element or dict
+        ``pw.Wheel("edge", body="sleigh", at=[-0.25, 0])`` or ``{"wheel": "edge", "body": "sleigh", "at": [-0.25, 0]}``.  A
+        signal may be a Python function of the time.
+    parameters : list of dict
+        ``{"name": "a", "value": 0.25, "unit": "m"}``.
     let, run : dict, optional
         Definitions and default run settings, as in a text model.
     **model
         Parameters and keywords of :class:`Model`.
 
+    Returns
+    -------
+    Model
+
+    Raises
+    ------
+    InputError
+        With the line of the text model that is wrong.
+
     Examples
     --------
-    >>> sleigh = pw.describe(bodies=[{"name": "sleigh", "mass": 1, "inertia": 0.5}],
-    ...                      elements=[{"wheel": "edge", "body": "sleigh", "at": [-0.25, 0]},
-    ...                                {"torque": "motor", "body": ["sleigh", "ground"], "value": lambda t: math.sin(t)}])
+    >>> sleigh = pw.describe(bodies=[pw.Body("sleigh", mass=1, inertia=0.5)],
+    ...                      elements=[pw.Wheel("edge", body="sleigh", at=[-0.25, 0]),
+    ...                                pw.Torque("motor", body=["sleigh", "ground"], value=lambda t: math.sin(t))])
     """
     signals, plain = dict(model.pop("signals", None) or {}), []
-    for element in elements:
+    for element in _entries(elements, "elements"):
         kind = next(iter(element))
         signals.update({f"{element[kind]}.{field}": value for field, value in element.items() if callable(value)})
         plain.append({field: 0 if callable(value) else value for field, value in element.items()})
-    head = {"pinwheel": 1, "about": about, "run": run, "parameters": list(parameters), "let": let}
-    lines = [f"{key}: {json.dumps(value)}" for key, value in head.items() if value]
-    for key, entries in (("bodies", bodies), ("elements", plain)):
-        lines += [f"{key}:"] + [f"  - {json.dumps(entry, default=float)}" for entry in entries] if entries else []
-    folder = tempfile.TemporaryDirectory(prefix="pinwheel-")
-    path = pathlib.Path(folder.name) / f"{name}.yaml"
-    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
-    made = Model(path, signals=signals, **model)
-    made._folder = folder
-    return made
+    head = {"about": about, "run": run, "parameters": _entries(parameters, "parameters"), "let": let}
+    lines = ["pinwheel: 1"] + [f"{key}: {_json(value)}" for key, value in head.items() if value]
+    for key, entries in (("bodies", _entries(bodies, "bodies")), ("elements", plain)):
+        lines += [f"{key}:"] + [f"  - {_json(entry)}" for entry in entries] if entries else []
+    return Model(_Described(name, "\n".join(lines) + "\n"), signals=signals, **model)
+
+
+def _entries(given, what):
+    entries = [given] if isinstance(given, (str, dict)) else list(given) if np.iterable(given) else [given]
+    for entry in entries:
+        if not isinstance(entry, dict) or not entry:
+            raise lib.InputError(f"{what}: expected a list of dicts, found {entry!r:.60}")
+    return entries
+
+
+def _json(value):
+    def convert(x):
+        if isinstance(x, np.ndarray):
+            return x.tolist()
+        return lib.number(x, "a value of the description")
+    try:
+        return json.dumps(value, default=convert)
+    except (TypeError, ValueError, RecursionError) as failure:
+        raise lib.InputError(f"the description cannot be written as text: {failure}") from None

@@ -23,7 +23,19 @@ class Result:
         Why the run ended early, or "".
     statistics : dict
         Steps, evaluations, largest constraint residuals.
+    cause : Exception or None
+        What a function in Python raised, if that ended the run.
+    model : Model
+    settings : dict
+        Method, t_end and the settings that were given.
+
+    Notes
+    -----
+    The columns are the time, residuals of the constraints, energies, then coordinates and velocities (``states``),
+    accelerations (the velocity's name and '), reactions and, with ``energy``, the ledger.
     """
+
+    cause: BaseException | None = None
 
     def __init__(self, rows, groups, units, status="ok", reason="", statistics=None, model=None, settings=None):
         self.rows = rows
@@ -36,10 +48,9 @@ class Result:
 
     def __getitem__(self, name: str) -> np.ndarray:
         """The column of this name, shape (samples,), without copying."""
-        try:
-            return self.rows[:, self._column[name]]
-        except KeyError:
-            raise KeyError(f"no column {name!r}{_nearest(name, self._column)}") from None
+        if not isinstance(name, str) or name not in self._column:
+            raise KeyError(f"no column {name!r:.60}{_nearest(name, self._column)}")
+        return self.rows[:, self._column[name]]
 
     def __contains__(self, name):
         return name in self._column
@@ -60,7 +71,7 @@ class Result:
 
     def to_dataframe(self):
         """A pandas DataFrame, indexed by time."""
-        import pandas
+        import pandas  # type: ignore[import]
         return pandas.DataFrame(self.rows[:, 1:], columns=list(self._column)[1:], index=pandas.Index(self.t, name="t"))
 
     def to_xarray(self):
@@ -71,7 +82,8 @@ class Result:
 
     def __repr__(self):
         end = f", {self.reason}" if self.reason else ""
-        return f"<{self.settings.get('method', 'run')}: {len(self)} samples to t = {self.t[-1]:.6g} s, {self.status}{end}>"
+        reached = f" to t = {self.t[-1]:.6g} s" if len(self) else ""
+        return f"<{self.settings.get('method', 'run')}: {len(self)} samples{reached}, {self.status}{end}>"
 
     def _repr_html_(self):
         """In notebooks: the animation."""
@@ -85,5 +97,5 @@ class Result:
 
 def _nearest(name, names):
     import difflib
-    near = difflib.get_close_matches(name, list(names), 1, 0.5)
+    near = difflib.get_close_matches(str(name), list(names), 1, 0.5)
     return f"; did you mean {near[0]!r}?" if near else ""

@@ -1,81 +1,168 @@
-"""A run that the caller advances."""
+"""Open runs: samples of a whole run, or steps that the caller requests."""
 
 from __future__ import annotations
 
+import contextlib
 import ctypes as c
+import threading
+import time
+from collections.abc import Callable, Iterator, MutableMapping
 
 import numpy as np
 
 from . import _library as lib
+from ._progress import watched
 from .results import Result, _nearest
 
-_SLICE = 20000  # steps between two looks at Ctrl-C
 _HEAD = {"t": "s", "position_residual": "", "velocity_residual": "", "kinetic": "J", "potential": "J", "work": "J", "loss": "J",
          "projection": "J", "balance": "J"}
 
 
-class Inputs(dict):
-    """Values of the signals that a simulation's user sets."""
+class Inputs(MutableMapping):
+    """Values of the signals that a simulation's user sets, by name; the names cannot change."""
 
-    def __init__(self, cells, changed):
-        super().__init__({name: cell.value for name, cell in cells.items()})
+    def __init__(self, cells: dict, changed: Callable[[], None]):
         self._cells, self._changed = cells, changed
 
-    def __setitem__(self, name, value):
+    def __getitem__(self, name: str) -> float:
+        return self._cell(name).value
+
+    def __setitem__(self, name: str, value: float) -> None:
+        self._cell(name).value = _finite(value, f"input {name}")
+        self._changed()
+
+    def __delitem__(self, name):
+        raise TypeError("inputs cannot be removed")
+
+    def __iter__(self):
+        return iter(self._cells)
+
+    def __len__(self):
+        return len(self._cells)
+
+    def __repr__(self):
+        return repr(dict(self))
+
+    def _cell(self, name):
         if name not in self._cells:
             raise KeyError(f"no input {name!r}{_nearest(name, self._cells)}; inputs are named when the simulation is opened")
-        self._cells[name].value = value
-        super().__setitem__(name, value)
-        self._changed()
+        return self._cells[name]
+
+
+def _finite(value, what):
+    value = lib.number(value, what)
+    if not np.isfinite(value):
+        raise lib.InputError(f"{what} = {value}: expected a finite number")
+    return value
+
+
+class _Rows:
+    """An array that grows: its capacity follows the fraction of the run that is done, so that little is copied."""
+
+    def __init__(self, width: int, capacity: int):
+        self.count, self._rows = 0, self._allocate(capacity, width)
+
+    @staticmethod
+    def _allocate(capacity, width):
+        try:
+            return np.empty((capacity, width))
+        except (MemoryError, ValueError):
+            raise lib.ResourceError(f"{capacity} samples of {width} numbers: out of memory") from None
+
+    def room(self, done: float) -> np.ndarray:
+        """The rows that are not used yet, at least one; done: fraction of the run."""
+        if self.count == len(self._rows):
+            expected = self.count * min(64, max(1.1 / done, 1.2)) if done > 0 else 64 * self.count
+            larger = self._allocate(int(expected) + 16, self._rows.shape[1])
+            larger[:self.count] = self._rows
+            self._rows = larger
+        return self._rows[self.count:]
+
+    @property
+    def used(self) -> np.ndarray:
+        return self._rows[:self.count]
 
 
 class Simulation:
     """An open run of a model, advanced by its caller: for controllers, or to look at every step.
 
-    Open it with :meth:`Model.open`; use it as a context manager.
+    Open it with :meth:`Model.open`; use it as a context manager.  One thread at a time may use it.
 
     Attributes
     ----------
-    inputs : dict
-        Inputs that may be set between steps.
+    model : Model
+    method : str
+    inputs : Inputs
+        Inputs that may be set between steps, by name; after a change the method restarts from the state reached.
+
+    Examples
+    --------
+    >>> with pw.Model("ezyroller").open("erk5+projection", inputs={"rider": 0.0}) as simulation:
+    ...     simulation.inputs["rider"] = -0.5 * simulation.sample()["steer.phi"]
+    ...     simulation.advance(0.01)
     """
+
+    _run = None
 
     def __init__(self, model, system, cells, method, settings, ledger):
         self.model, self._system, self._settings = model, system, settings
         self.method, self._ledger, self._restart = method, ledger, False
+        self._lock, self._steps = threading.Lock(), 16
         error = lib.pw_error()
-        self._run = lib.core.pw_run_open(system.pointer, method.encode(), c.byref(settings), c.byref(error))
-        lib.check(error)
+        self._run = lib.core.pw_run_open(system.pointer, lib.encode(method, "method"), c.byref(settings), c.byref(error))
+        system.check(error)
         self.inputs = Inputs(cells, self._changed)
 
     def _changed(self):
         self._restart = True
 
-    def __enter__(self):
+    def __enter__(self) -> Simulation:
         return self
 
     def __exit__(self, *_):
         self.close()
 
-    def close(self):
-        """Frees the run."""
-        if self._run:
-            lib.core.pw_run_close(self._run)
-        self._run = None
+    def __reduce_ex__(self, _):
+        raise TypeError("an open run cannot be copied or sent to other processes")
 
-    __del__ = close
+    @contextlib.contextmanager
+    def _used(self) -> Iterator[int]:
+        """The run, for one user at a time."""
+        if self._run is None:
+            raise lib.Error("the run is closed")
+        if not self._lock.acquire(blocking=False):
+            raise lib.Error("the run is in use, by another thread or by the function that called this one")
+        try:
+            if self._run is None:
+                raise lib.Error("the run is closed")
+            yield self._run
+        finally:
+            self._lock.release()
+
+    def close(self) -> None:
+        """Frees the run; a closed one can be closed again."""
+        if self._run is not None:
+            with self._used() as run:
+                self._run = None
+                lib.core.pw_run_close(run)
+
+    def __del__(self):
+        if self._run is not None:
+            lib.core.pw_run_close(self._run)
 
     @property
     def t(self) -> float:
         """The time reached [s]."""
-        return lib.core.pw_run_time(self._run)
+        with self._used() as run:
+            return lib.core.pw_run_time(run)
 
     @property
     def statistics(self) -> dict:
         """Steps, evaluations, largest constraint residuals so far."""
-        s = lib.core.pw_run_statistics(self._run).contents
-        return {name: getattr(s, name) for name in ("steps", "rejected", "rhs", "jacobians", "factorisations", "position",
-                                                    "velocity", "g", "jv")}
+        with self._used() as run:
+            s = lib.core.pw_run_statistics(run).contents
+            return {name: getattr(s, name) for name in ("steps", "rejected", "rhs", "jacobians", "factorisations", "position",
+                                                        "velocity", "g", "jv")}
 
     def _columns(self):
         s, n, core = self._system.pointer, lib.core.pw_system_coordinates(self._system.pointer), lib.core
@@ -94,26 +181,40 @@ class Simulation:
         units.update(dict.fromkeys(groups["ledger"], "J"))
         return units, groups
 
-    def _restart_if_changed(self):
-        if self._restart:
-            error = lib.pw_error()
-            lib.core.pw_run_restart(self._run, None, None, c.byref(error))
-            lib.check(error)
-            self._restart = False
+    # ---- Steps of the caller ----
 
     def advance(self, t: float) -> None:
-        """Advances to the time t [s], which must not be earlier than the time reached."""
-        self._restart_if_changed()
-        if not t >= self.t:
-            raise lib.InputError(f"advance({t}): the run has reached t = {self.t}")
-        self._rows([t], t)
+        """Advances to the time t.
+
+        Parameters
+        ----------
+        t : float
+            [s], not earlier than the time reached.
+
+        Raises
+        ------
+        InputError, MethodError
+        """
+        with self._used() as run:
+            self._record(run, np.array([self._later(run, t, "advance")]), t)
 
     def sample(self) -> dict:
-        """The state reached, by name."""
-        units, _ = self._columns()
-        return dict(zip(units, self._rows([self.t], self.t)[0].tolist()))
+        """The state reached, with reactions and energies: numbers by name."""
+        with self._used() as run:
+            units, _ = self._columns()
+            t = lib.core.pw_run_time(run)
+            return dict(zip(units, self._record(run, np.array([t]), t).used[0].tolist()))
 
-    def record(self, t_end: float, every=None, times=None, progress=None) -> Result:
+    def _later(self, run, t, what):
+        reached, t = lib.core.pw_run_time(run), _finite(t, what)
+        if not t >= reached:
+            raise lib.InputError(f"{what}({t}): the run has reached t = {reached}")
+        return t
+
+    # ---- Tables ----
+
+    def record(self, t_end: float, every: float | None = None, times=None,
+               progress: Callable[[float], object] | bool | None = None) -> Result:
         """Advances to t_end and returns the samples.
 
         Parameters
@@ -124,71 +225,89 @@ class Simulation:
             Time between samples [s]; default: a sample after every step.
         times : array_like, shape (n,), optional
             Increasing times of samples [s], in place of ``every``.
-        progress : callable, optional
-            Called with the fraction done now and then.
+        progress : callable or bool, optional
+            Called now and then with the fraction done; True: a progress bar, False: none; default: a bar in notebooks.
 
         Returns
         -------
         Result
             Ctrl-C and failing methods end it early: see ``status`` and ``reason``.
+
+        Raises
+        ------
+        InputError, MethodError
+            MethodError only if the run fails before the first sample.
         """
-        self._restart_if_changed()
-        start = self.t
-        if every is not None and times is None:
-            if not every > 0:
-                raise lib.InputError(f"every = {every}: expected a positive time")
-            count = int(np.floor((t_end - start) / every * (1 + 1e-12)))
-            times = start + every * np.arange(count + 1)
-            times = np.append(times[:-1], t_end) if abs(times[-1] - t_end) < 1e-9 * every else np.append(times, t_end)
-        if times is not None:
-            times = np.ascontiguousarray(times, float)
-            if times.ndim != 1 or (np.diff(times) <= 0).any() or (times < start).any() or (times > t_end).any():
-                raise lib.InputError(f"times: expected an array of shape (n,) of increasing times from {start} to {t_end}, "
-                                     f"found shape {times.shape}")
-        status, reason, blocks = "ok", "", []
-        try:
-            for block in self._blocks(t_end, times, start):
-                blocks.append(block)
-                if progress:
-                    progress(min(1.0, (self.t - start) / (t_end - start)) if t_end > start else 1.0)
-        except KeyboardInterrupt:
-            status, reason = "stopped", f"interrupted at t = {self.t:.6g} s"
-        except lib.Error as failure:
-            if not blocks:
-                raise
-            status, reason = "failed", str(failure)
-        units, groups = self._columns()
-        rows = blocks[0].base if times is not None and status == "ok" else np.concatenate(blocks)
-        return Result(rows, groups, units, status, reason, self.statistics, self.model,
-                      {"method": self.method, "t_end": t_end})
+        with self._used() as run:
+            t_end = self._later(run, t_end, "t_end")
+            times = self._times(lib.core.pw_run_time(run), t_end, every, times)
+            status, reason, rows = "ok", "", _Rows(self._width(run), 4096 if times is None else len(times))
+            cause: BaseException | None = None
+            try:
+                self._record(run, times, t_end, rows, progress)
+            except KeyboardInterrupt:
+                status, reason = "stopped", f"interrupted at t = {lib.core.pw_run_time(run):.6g} s"
+            except lib.MethodError as failure:
+                if rows.count == 0:
+                    raise
+                status, reason, cause = "failed", str(failure), failure.__cause__
+            units, groups = self._columns()
+        result = Result(rows.used, groups, units, status, reason, self.statistics, self.model,
+                        {"method": self.method, "t_end": t_end})
+        result.cause = cause
+        return result
 
-    def _blocks(self, t_end, times, start):
-        """Rows in parts, so that Ctrl-C is noticed; those at given times are parts of one array."""
-        width = lib.core.pw_run_record_width(self._run)
+    @staticmethod
+    def _width(run):
+        return lib.core.pw_run_record_width(run)
+
+    @staticmethod
+    def _times(start, t_end, every, times):
+        """The times of samples; None: every step."""
+        if times is None and every is None:
+            return None
         if times is None:
-            yield self._rows([start], start)
-            while self.t < t_end:
-                yield from self._fill(np.empty((4096, width)), t_end, None)
-        else:
-            rows, done = np.empty((len(times), width)), 0
-            while done < len(times):
-                for part in self._fill(rows[done:], t_end, times[done:]):
-                    done += len(part)
-                    yield part
+            every = lib.number(every, "every", above=0)
+            count = np.floor((t_end - start) / every * (1 + 1e-12))
+            if not count < 1e12:
+                raise lib.ResourceError(f"every = {every}: {count:g} samples do not fit in memory")
+            times = start + every * np.arange(count + 1)
+            return np.append(times[:-1], t_end) if abs(times[-1] - t_end) < 1e-9 * every else np.append(times, t_end)
+        try:
+            times = np.ascontiguousarray(times, float)
+        except (TypeError, ValueError):
+            raise lib.InputError(f"times: expected an array of shape (n,) of times, found {times!r:.60}") from None
+        if times.ndim != 1 or times.size == 0 or not ((np.diff(times) > 0).all() and times[0] >= start and times[-1] <= t_end):
+            raise lib.InputError(f"times: expected an array of shape (n,) of increasing times from {start} to {t_end}, "
+                                 f"found shape {times.shape}")
+        return times
 
-    def _fill(self, rows, t_end, times):
-        """Yields what one call records, then raises its error."""
-        recorded, error = c.c_long(), lib.pw_error()
-        lib.core.pw_run_record(self._run, t_end, None if times is None else times.ctypes.data, len(rows), _SLICE,
-                               rows.ctypes.data, c.byref(recorded), c.byref(error))
-        if recorded.value:
-            yield rows[:recorded.value]
-        lib.check(error)
-
-    def _rows(self, times, t_end):
-        """Samples at a few times, without looking at Ctrl-C."""
-        times = np.array(times, float)
-        rows, done = np.empty((len(times), lib.core.pw_run_record_width(self._run))), 0
-        while done < len(times):
-            done += sum(map(len, self._fill(rows[done:], t_end, times[done:])))
+    def _record(self, run, times, t_end, rows=None, progress=False):
+        """Adds the samples at these times, or after every step (None), to the rows."""
+        rows = rows or _Rows(self._width(run), len(times))
+        start, now, error = lib.core.pw_run_time(run), lib.core.pw_run_time, lib.pw_error()
+        if self._restart:
+            lib.core.pw_run_restart(run, None, None, c.byref(error))
+            self._system.check(error)
+            self._restart = False
+        if times is None:
+            self._call(run, np.array([start]), start, rows, 1.0)
+        with watched(progress) as report:
+            while (rows.count < len(times)) if times is not None else now(run) < t_end:
+                done = (now(run) - start) / (t_end - start) if t_end > start else 1.0
+                self._call(run, None if times is None else times[rows.count:], t_end, rows, done)
+                report(min(1.0, done))
+            report(1.0)
         return rows
+
+    def _call(self, run, times, t_end, rows, done):
+        """One call of the library, of some 50 ms, between which Python notices Ctrl-C."""
+        recorded, error, room, began = c.c_long(), lib.pw_error(), rows.room(done), time.perf_counter()
+        try:
+            lib.core.pw_run_record(run, t_end, None if times is None else times.ctypes.data, len(room), self._steps,
+                                   room.ctypes.data, c.byref(recorded), c.byref(error))
+        finally:
+            rows.count += recorded.value
+        seconds = time.perf_counter() - began
+        self._steps = min(10**7, 2 * self._steps) if seconds < 0.04 else max(1, self._steps // 2) if seconds > 0.1 else self._steps
+        self._system.check(error)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import concurrent.futures
+import csv
 import itertools
 import json
 import os
@@ -13,24 +14,37 @@ import numpy as np
 
 from . import _library as lib
 from . import _program
-from .model import Model
-
+from ._progress import watched
 
 # ---- Sweeps ----
 
 def _final(model, parameters, start, method, t_end, settings):
-    """The last sample of one run; NaN if it fails.  Not nested, so that other processes can call it."""
+    """The last sample of one run, its units, or why it fails.  Not nested, so that other processes can call it."""
     varied = model.replace(start=start, **parameters)
-    end = t_end if t_end is not None else varied.defaults["t_end"]
-    with varied.open(method, t_end=end, **settings) as simulation:
-        try:
+    end = varied.defaults["t_end"] if t_end is None else t_end
+    try:
+        with varied.open(method, t_end=end or None, **settings) as simulation:
             simulation.advance(end)
-        except lib.Error as failure:
-            return {}, str(failure)
-        return simulation.sample(), ""
+            return simulation.sample(), simulation._columns()[0], ""
+    except (lib.InitialError, lib.MethodError) as failure:
+        return {}, {}, str(failure)
 
 
-def sweep(model, vary, *, method=None, t_end=None, executor=None, **settings):
+def _points(vary):
+    """Names, their values, and all combinations."""
+    if not hasattr(vary, "items"):
+        raise lib.InputError(f"vary: expected a dict of values by name, found {vary!r:.60}")
+    names, values = [lib.encode(name, "vary").decode() for name in vary], []
+    for name, given in vary.items():
+        each = [lib.number(x, name) for x in np.atleast_1d(np.asarray(given)).tolist()] if np.ndim(given) < 2 else []
+        if not each:
+            raise lib.InputError(f"vary {name}: expected a number or an array of shape (n,), found shape {np.shape(given)}")
+        values.append(np.array(each))
+    return names, values, [dict(zip(names, map(float, point))) for point in itertools.product(*values)]
+
+
+def sweep(model, vary: dict, *, method: str | None = None, t_end: float | None = None,
+          executor: concurrent.futures.Executor | None = None, progress=None, **settings):
     """Runs a model for all combinations of values; the last one varies fastest.
 
     Parameters
@@ -42,67 +56,199 @@ def sweep(model, vary, *, method=None, t_end=None, executor=None, **settings):
         As in :meth:`Model.run`.
     executor : concurrent.futures.Executor, optional
         Threads on all processors by default; process pools, Dask clients' and mpi4py's executors work too.
+    progress : callable or bool, optional
+        As in :meth:`Model.run`.
 
     Returns
     -------
     xarray.Dataset or dict of ndarray
-        Final values by name, shape (len of each varied name); "failed" contains the reason of a run that failed, or "".
+        Final values by name, with units, shape (len of each varied name); "failed" contains the reason of a run that
+        failed, or "".
+
+    Raises
+    ------
+    InputError
+        For a value that the model refuses; runs that fail only leave NaN.
     """
+    from .model import Model
     model = model if isinstance(model, Model) else Model(model)
-    names, values = list(vary), [np.atleast_1d(np.asarray(v, float)) for v in vary.values()]
-    points = [dict(zip(names, map(float, point))) for point in itertools.product(*values)]
-    own = executor is None
-    pool = concurrent.futures.ThreadPoolExecutor(os.cpu_count()) if own else executor
+    names, values, points = _points(vary)
+    t_end = None if t_end is None else lib.number(t_end, "t_end")
+    pool = executor or concurrent.futures.ThreadPoolExecutor(os.cpu_count())
+    if not hasattr(pool, "submit"):
+        raise lib.InputError(f"executor: expected a concurrent.futures.Executor, found {executor!r:.60}")
     try:
         pending = [pool.submit(_final, model, {n: x for n, x in p.items() if n in model.parameters},
                                {n: x for n, x in p.items() if n not in model.parameters}, method, t_end, settings) for p in points]
-        rows = [future.result() for future in pending]
+        with watched(progress) as report:
+            rows = [(future.result(), report((i + 1) / len(pending)))[0] for i, future in enumerate(pending)]
     finally:
-        if own:
+        if executor is None:
             pool.shutdown(cancel_futures=True)
-    shape = [len(v) for v in values]
-    columns = next((row for row, _ in rows if row), {})
-    table = {name: np.array([row.get(name, np.nan) for row, _ in rows]).reshape(shape) for name in columns}
-    table["failed"] = np.array([why for _, why in rows], dtype=object).reshape(shape)
+    return _table(dict(zip(names, values)), rows, model.units)
+
+
+def _table(values, rows, units):
+    shape = [len(v) for v in values.values()]
+    columns = next((of for row, of, _ in rows if row), {})
+    table = {name: np.array([row.get(name, np.nan) for row, _, _ in rows]).reshape(shape) for name in columns}
+    table["failed"] = np.array([why for _, _, why in rows], dtype=object).reshape(shape)
     try:
         import xarray
     except ImportError:
-        return {**dict(zip(names, values)), **table}
-    return xarray.Dataset({name: (names, column) for name, column in table.items() if name not in names},
-                          coords=dict(zip(names, values)))
+        return {**table, **values}
+    data = xarray.Dataset({name: (list(values), column) for name, column in table.items() if name not in values}, coords=values)
+    for name, unit in {**columns, **units}.items():
+        if name in data.variables:
+            data[name].attrs["units"] = unit
+    return data
 
 
 # ---- The program ----
 
-def command(name, model, *arguments, **options):
+def command(name: str, model, *arguments, **options):
     """Runs a command of the program and returns what it writes.
 
     Parameters
     ----------
     name : str
-        "check", "compare", "drift", "steady", ...; see ``pinwheel --help``.
+        "check", "linearise", "steady", "periodic", ...; see ``pinwheel --help``.
     model : Model or str
     *arguments, **options
-        Further arguments; ``t_end=10`` stands for ``--t-end=10``, ``energy=True`` for ``--energy``, a list repeats the option.
+        Further arguments and options of the command, see :func:`help_of`: ``t_end=10`` stands for ``--t-end=10``,
+        ``energy=True`` for ``--energy``; a list repeats the option, and so does a dict: ``hold={"frame.vx": 1}`` stands for
+        ``--hold=frame.vx=1``, ``free={"m": (0, 2)}`` for ``--free=m=0:2``.  ``data`` may be a dict of arrays or a DataFrame.
 
     Returns
     -------
     dict or str
-        The JSON of commands that have ``--json``, otherwise the text that the command prints.
+        The JSON of commands that have one, otherwise the text that the command prints.
+
+    Raises
+    ------
+    InputError, InitialError, MethodError, ResourceError
+        With the program's message.
 
     Examples
     --------
-    >>> pw.command("check", "n-trailer")["..."]
+    >>> pw.command("check", "n-trailer")["mobility"]
     >>> print(pw.command("compare", "ezyroller", t_end=10, methods="rk4+projection,ida+ggl"))
     """
-    words = [name, *_program.options(model), *map(str, arguments)]
-    for key, value in options.items():
-        option = "--" + key.replace("_", "-")
-        for item in value if isinstance(value, (list, tuple)) else [value]:
-            words.append(option if item is True else f"{option}={item}")
-    if "--json" in _program.run([name, "--help"]).stdout:
-        with tempfile.TemporaryDirectory() as folder:
-            path = pathlib.Path(folder) / "report.json"
-            _program.run([*words, f"--json={path}"])
-            return json.loads(path.read_text(encoding="utf-8"))
-    return _program.run(words).stdout
+    return _report(name, model, arguments, options, tables=False)
+
+
+def help_of(name: str) -> str:
+    """The options of a command of the program, as ``pinwheel NAME --help`` prints them."""
+    return _program.run([lib.encode(name, "command").decode(), "--help"]).stdout
+
+
+def analysis(name):
+    """The method of models that runs a command."""
+
+    def method(self, *arguments, **options):
+        return _report(name, self, arguments, options, tables=True)
+
+    summary = next(line for line in _SUMMARIES if line.startswith(name + " ")).split(" ", 1)[1]
+    method.__name__, method.__qualname__, method.__module__ = name, f"Model.{name}", "pinwheel"
+    method.__doc__ = f"""{summary}
+
+        Runs ``pinwheel {name}`` with this model, its parameters and initial values.
+
+        Parameters
+        ----------
+        *arguments, **options
+            Options of the command, see ``print(pw.help_of("{name}"))``; for their form see :func:`command`.
+
+        Returns
+        -------
+        dict
+            {_RETURNS.get(name, "The command's JSON.")}
+
+        Raises
+        ------
+        InputError, InitialError, MethodError, ResourceError
+            With the program's message.
+        """
+    return method
+
+
+_SUMMARIES = """\
+check Checks mobility, redundancy, initial conditions, derivatives and stability.
+compare Compares the accuracy and cost of methods against a reference solution.
+drift Compares the drift of constraints and energy in long runs, by stabilisation.
+steady Finds steady motions, and follows them over a parameter.
+periodic Finds periodic motions, and follows them over a parameter.
+sensitivity Differentiates outputs of a run by parameters and initial values.
+fit Fits parameters and initial values to measured data.
+optimise Finds the parameters for which an output is largest or smallest.""".splitlines()
+_RETURNS = dict.fromkeys(("compare", "drift"), "Columns of the table, ndarray of shape (rows,), with units in their names.")
+
+
+def _report(name, model, arguments, options, tables):
+    """What a command writes: its JSON; its table, if requested; or the text that it prints."""
+    described = help_of(name)
+    with tempfile.TemporaryDirectory() as made:
+        folder = pathlib.Path(made)
+        words = [name, *_program.options(model), *map(str, arguments)]
+        words += [word for key, value in options.items() for word in _words(key, value, folder)]
+        wanted = _output(name, described, folder, tables)
+        if wanted and not any(word.split("=")[0] in ("-o", wanted.split("=")[0]) for word in words):
+            words.append(wanted)
+        text = _program.run(words).stdout
+        report, table = folder / f"{name}.json", folder / f"{name}.csv"
+        if report.exists():
+            return json.loads(report.read_text(encoding="utf-8"))
+        return _columns(table) if tables and table.exists() else text
+
+
+def _output(name, described, folder, tables):
+    """The option that makes a command write to the folder."""
+    if "--json" in described:
+        return f"--json={folder / name}.json"
+    if "-o, --name=NAME" in described:
+        return f"--name={folder / name}"
+    if "-o, --output=DIR" in described and (tables or f"{name}.json" in described):
+        return f"--output={folder}"
+    return None
+
+
+def _words(key, value, folder):
+    """An option as arguments."""
+    option = "--" + key.replace("_", "-")
+    if key == "data" and not isinstance(value, (str, os.PathLike)):
+        value = _write_columns(folder / "data.csv", value)
+    if value is None or value is False:
+        return []
+    if hasattr(value, "items"):
+        return [f"{option}={name}={_value(x)}" for name, x in value.items()]
+    return [option if item is True else f"{option}={item}" for item in (value if isinstance(value, (list, tuple)) else [value])]
+
+
+def _value(x):
+    return ":".join(map(str, x)) if isinstance(x, (list, tuple)) else str(x)
+
+
+def _write_columns(path, columns):
+    try:
+        names = list(columns)
+        rows = np.column_stack([np.asarray(columns[name], float) for name in names])
+    except (TypeError, ValueError, KeyError, IndexError) as failure:
+        raise lib.InputError(f"data: expected the path of a table or a dict of arrays of one length: {failure}") from None
+    with path.open("w", encoding="utf-8", newline="") as file:
+        writer = csv.writer(file)
+        writer.writerow(names)
+        writer.writerows([["" if np.isnan(x) else repr(x) for x in row] for row in rows.tolist()])
+    return path
+
+
+def _columns(path):
+    with path.open(encoding="utf-8", newline="") as file:
+        rows = list(csv.reader(line for line in file if not line.startswith("#")))
+    return {name: _array([row[i] for row in rows[1:]]) for i, name in enumerate(rows[0])}
+
+
+def _array(cells):
+    try:
+        return np.array([cell or "nan" for cell in cells], float)
+    except ValueError:
+        return np.array(cells)
