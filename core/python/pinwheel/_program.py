@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import html
 import pathlib
 import subprocess
 import tempfile
@@ -34,15 +35,30 @@ def run(arguments):
 
 
 def animation(result) -> str | None:
-    """The animation of a result's model and settings, as a page."""
+    """The animation of a result's model and settings, as a page; None if the program cannot make it."""
+    given = {"step": "step", "rtol": "rtol", "atol": "atol"}
+    words = [f"--method={result.settings['method']}", f"--t-end={result.settings['t_end']!r}"]
+    words += [f"--{o}={result.settings[k]!r}" for k, o in given.items() if result.settings.get(k)]
+    return _page("run", result.model, "--animate", words)
+
+
+def interactive(model) -> str | None:
+    """The page that simulates a model in the browser; None if the program cannot make it."""
+    return _page("page", model, "--output", [])
+
+
+def _page(command, model, option, words):
     with tempfile.TemporaryDirectory() as folder:
-        path = pathlib.Path(folder) / "animation.html"
-        given = {"step": "step", "rtol": "rtol", "atol": "atol"}
-        words = ["run", *options(result.model), f"--animate={path}", f"--method={result.settings['method']}",
-                 f"--t-end={result.settings['t_end']!r}"]
-        words += [f"--{o}={result.settings[k]!r}" for k, o in given.items() if result.settings.get(k)]
+        path = pathlib.Path(folder) / "page.html"
         try:
-            run(words)
+            run([command, *options(model), f"{option}={path}", *words])
             return path.read_text(encoding="utf-8")
-        except lib.Error:
+        except (lib.Error, OSError):
             return None
+
+
+def framed(page: str | None, otherwise: str) -> str:
+    """A page as a part of another; a text in its place if there is none."""
+    if page is None:
+        return html.escape(otherwise)
+    return f'<iframe srcdoc="{html.escape(page)}" style="width: 100%; height: 40em; border: 0"></iframe>'

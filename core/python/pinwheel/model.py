@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from . import _library as lib
-from . import studies
+from . import _program, studies
 from .results import Result, _nearest
 from .simulation import Simulation
 
@@ -173,6 +173,10 @@ class Model:
     def __repr__(self):
         changed = "".join(f", {name}={value:g}" for name, value in self._given.items())
         return f"<Model {self.name}{changed}: {self.about}>"
+
+    def _repr_html_(self) -> str:
+        """In notebooks: the page that simulates the model."""
+        return _program.framed(_program.interactive(self), repr(self))
 
     def __reduce__(self):
         if self.signals:

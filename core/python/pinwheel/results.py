@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from . import _program
+
 
 class Result:
     """Samples of a run: a table whose columns have names and units.
@@ -62,6 +64,7 @@ class Result:
         return len(self.rows)
 
     def keys(self):
+        """The names of the columns."""
         return self._column.keys()
 
     @property
@@ -85,14 +88,10 @@ class Result:
         reached = f" to t = {self.t[-1]:.6g} s" if len(self) else ""
         return f"<{self.settings.get('method', 'run')}: {len(self)} samples{reached}, {self.status}{end}>"
 
-    def _repr_html_(self):
+    def _repr_html_(self) -> str:
         """In notebooks: the animation."""
-        from html import escape
-        from ._program import animation
-        page = animation(self) if self.model is not None and self.model.source else None
-        if page is None:
-            return escape(repr(self))
-        return f'<iframe srcdoc="{escape(page)}" style="width: 100%; height: 32em; border: 0"></iframe>'
+        page = _program.animation(self) if self.model is not None and self.model.source else None
+        return _program.framed(page, repr(self))
 
 
 def _nearest(name, names):

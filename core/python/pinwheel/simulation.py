@@ -303,6 +303,7 @@ class Simulation:
     def _call(self, run, times, t_end, rows, done):
         """One call of the library, of some 50 ms, between which Python notices Ctrl-C."""
         recorded, error, room, began = c.c_long(), lib.pw_error(), rows.room(done), time.perf_counter()
+        room = room if times is None else room[:len(times)]
         try:
             lib.core.pw_run_record(run, t_end, None if times is None else times.ctypes.data, len(room), self._steps,
                                    room.ctypes.data, c.byref(recorded), c.byref(error))
