@@ -6,7 +6,10 @@ Needs nothing but Python, so that ``pip install core/python`` works without a ne
 import base64
 import hashlib
 import pathlib
+import shutil
+import subprocess
 import sysconfig
+import tempfile
 import zipfile
 
 _HERE = pathlib.Path(__file__).resolve().parent
@@ -26,12 +29,22 @@ def _contents():
             yield f"pinwheel/lib/{folder}/{path.name}", path
 
 
+def _read(path):
+    """The bytes of a file; those of libraries and programs without debugging information, which names the source tree."""
+    if not path.read_bytes().startswith(b"\x7fELF") or shutil.which("strip") is None:
+        return path.read_bytes()
+    with tempfile.TemporaryDirectory() as folder:
+        stripped = pathlib.Path(folder) / path.name
+        subprocess.run(["strip", "--strip-debug", "-o", stripped, path], check=True)
+        return stripped.read_bytes()
+
+
 def _tag(native):
     return f"py3-none-{sysconfig.get_platform().replace('-', '_').replace('.', '_')}" if native else "py3-none-any"
 
 
 def build_wheel(directory, config_settings=None, metadata_directory=None):
-    contents = [(name, path.read_bytes(), path.stat().st_mode) for name, path in _contents()]
+    contents = [(name, _read(path), path.stat().st_mode) for name, path in _contents()]
     tag = _tag(any("/lib/" in name for name, _, _ in contents))
     info = f"{_NAME}-{_VERSION}.dist-info"
     metadata = f"Metadata-Version: 2.1\nName: {_NAME}\nVersion: {_VERSION}\nRequires-Dist: numpy\nRequires-Python: >=3.9\n"

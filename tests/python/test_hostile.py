@@ -218,6 +218,7 @@ def test_models_with_functions_are_copied_but_not_pickled():
 
 
 def test_any_order_of_deletion():
+    gc.freeze()  # what the other tests have left takes long to look at
     for order in itertools.permutations(range(4)):
         model = signals(lambda t: 0.1)
         simulation = model.open()
@@ -227,6 +228,7 @@ def test_any_order_of_deletion():
         for i in order:
             held[i] = None
             gc.collect()
+    gc.unfreeze()
 
 
 def test_objects_without_init_do_not_crash():
