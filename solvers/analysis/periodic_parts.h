@@ -16,11 +16,12 @@ struct pw_periodic {
   pw_steady *scene; /* scales and symmetries */
   int n, group;     /* coordinates; symmetries */
   double L, T;      /* scales */
+  /* Systems at two values of the parameter: of the motion, and for differences. */
   struct {
-    double value; /* of the parameter */
-    pw_system *own;
-    double period; /* of its signals, verified; 0: not yet */
-  } at[2];         /* [1]: for differences */
+    double value;   /* of the parameter */
+    pw_system *own; /* NULL: s serves */
+    double period;  /* of its signals, verified; 0: not yet */
+  } at[2];
   pw_branch branch;
   double *u;    /* 2 n, group, 1: state and displacement in units of the scene, period [T]; then the parameter */
   double about; /* the last free period known */
@@ -29,19 +30,21 @@ struct pw_periodic {
   double *moved, *change;    /* 2 n: scratch */
   double *Phi, *basis;       /* 2 n x size, by columns: derivative at the end, at the begin */
   double *dual;              /* size x 2 n, by columns: minimal coordinates of changes of the state */
-  int size;
-  double *M, *re, *im; /* size x size; eigenvalues */
-  double *work, *there;
-  pw_error why; /* the last reason why a motion could not be computed */
+  int size;                  /* minimal coordinates of changes of the state */
+  double *M, *re, *im;       /* size x size: derivative of the return map; its eigenvalues */
+  double *work, *there;      /* scratch: rates; unknowns and residuals beside a point */
+  pw_error why;              /* the last reason why a motion could not be computed */
   /* Points of a branch not yet returned; those before the last one are events. */
   struct {
     pw_branch_point point; /* arrays of its own */
     pw_periodic_event event;
   } queue[PW_PERIODIC_QUEUE];
-  int queued, returned;
-  pw_branch_point first;
-  int steps, ended, unstable, sought;
-  int along; /* 1: the multiplier sought moves along the unit circle before it leaves it */
+  int queued, returned;  /* points put into the queue, and taken from it */
+  pw_branch_point first; /* of the branch */
+  int steps, ended;      /* of the branch; 1: it has ended */
+  int unstable;          /* multipliers outside the unit circle at the last point; -1: not known */
+  int sought;            /* index of the multiplier whose crossing of the unit circle is located */
+  int along;             /* 1: it moves along the circle before it leaves it */
   char *memory;
 };
 

@@ -80,7 +80,7 @@ static int implicit_fail (pw_run *r, int status, double h, pw_error *error) {
 /* A whole step whose end lands on a singular configuration, where Newton's matrix is singular, is made longer, up to
  * `stop`.  Makes the step of size h to *t1, which it changes. */
 static int implicit_step_around (pw_run *r, pw_implicit_step *step, double h, double stop, double *t1) {
-  static const double longer[] = { 1.38, 1.76, 2.62 };
+  static const double longer[] = { 1.38, 1.76, 2.62 }; /* no multiples of each other, since configurations may recur */
   int status = step (r, h, *t1);
   for (size_t i = 0; i < sizeof longer / sizeof *longer; i++) {
     double later = r->t + longer[i] * h;
