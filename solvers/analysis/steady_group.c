@@ -9,8 +9,11 @@
 #include "steady_parts.h"
 #include "util.h"
 
-/* GROUP_APART: distance of that state from the initial one, in units of the scene; GROUP_ROUND: round-off of derivatives. */
-static const double GROUP_APART = 0.02, GROUP_ROUND = 1e-12;
+/* GROUP_APART: distance of that state from the initial one, in units of the scene, in directions without a pattern: by
+ * the sine of multiples of GROUP_GOLDEN, the golden angle.  GROUP_ROUND: round-off of derivatives.  GROUP_PIVOT, GROUP_ZERO:
+ * smallest pivots and entries of rates. */
+static const double GROUP_APART = 0.02, GROUP_GOLDEN = 2.39996, GROUP_ROUND = 1e-12, GROUP_PIVOT = 1e-6,
+                    GROUP_ZERO = 1e-7;
 
 void pw_steady_field (const pw_steady *x, const double *rates, const double *q, double *v) {
   int bodies = 3 * x->s->bodies;
@@ -58,7 +61,7 @@ static void group_reduce (int rows, int n, double *row) {
     for (int k = i; k < rows; k++)
       if (fabs (row[k * n + c]) > fabs (row[best * n + c])) best = k;
     double pivot = row[best * n + c];
-    if (fabs (pivot) < 1e-6) continue;
+    if (fabs (pivot) < GROUP_PIVOT) continue;
     for (int j = 0; j < n; j++) {
       double kept = row[best * n + j];
       row[best * n + j] = row[i * n + j];
@@ -71,7 +74,7 @@ static void group_reduce (int rows, int n, double *row) {
     i++;
   }
   for (int k = 0; k < rows * n; k++)
-    if (fabs (row[k]) < 1e-7) row[k] = 0;
+    if (fabs (row[k]) < GROUP_ZERO) row[k] = 0;
 }
 
 int pw_steady_null (int rows, int n, double *M, double tolerance, double *out) {
@@ -98,8 +101,8 @@ static int group_place (pw_steady *x, double apart) {
   double worst;
   int row;
   for (int j = 0; j < x->n; j++) {
-    x->q[j] = r->q[j] + apart * pw_unit (x->s, j) * pw_sin (1.7 + 2.39996 * (j + 1));
-    x->v[j] = r->v[j] + apart * pw_unit (x->s, j) / x->T * pw_sin (2.9 + 2.39996 * (j + 1));
+    x->q[j] = r->q[j] + apart * pw_unit (x->s, j) * pw_sin (1.7 + GROUP_GOLDEN * (j + 1));
+    x->v[j] = r->v[j] + apart * pw_unit (x->s, j) / x->T * pw_sin (2.9 + GROUP_GOLDEN * (j + 1));
   }
   if (pw_projector_open (&p, r, x->s->metric, x->s->metric, &x->why) != PW_OK) return PW_RESOURCE;
   int status = pw_project_positions (&p, r, x->set.t, x->q, x->v, &row, &worst);
