@@ -1,3 +1,4 @@
+/* What is held in a steady motion, as options; see held.h. */
 #include "held.h"
 #include <math.h>
 #include <string.h>
