@@ -505,6 +505,8 @@ install: all
 	printf '#compdef pinwheel\nautoload -U +X bashcompinit && bashcompinit\nsource %s\n' \
 	  "$(PREFIX)/share/bash-completion/completions/pinwheel" >"$(D)/share/zsh/site-functions/_pinwheel"
 	for m in $(MAN); do install -m 644 $$m "$(D)/share/man/man$${m##*.}" || exit 1; done
+	for c in $$($(PROGRAM) --help | sed -n '/^Commands:/,/^$$/s/^  \([a-z]*\) .*/\1/p'); do \
+	  sh core/cli/man.sh $(PROGRAM) $$c >"$(D)/share/man/man1/pinwheel-$$c.1" || exit 1; done
 	echo "$$PKGCONFIG" >"$(D)/lib/pkgconfig/pinwheel.pc"
 	install -m 644 README.md "$(D)/$(share)"
 	install -m 644 $(filter docs/%,$(DOCS)) "$(D)/$(share)/docs"
@@ -526,7 +528,7 @@ uninstall:
 	[ ! -d "$(D)" ] || { cd "$(D)" && rm -rf $(PYTHON_SITE)/pinwheel && rm -f bin/pinwheel share/bash-completion/completions/pinwheel share/zsh/site-functions/_pinwheel \
 	  lib/libpinwheel.* lib/libpinwheel-files.* lib/pkgconfig/pinwheel.pc \
 	  $(addprefix include/pinwheel/,$(notdir $(HEADERS))) $(addprefix lib/pinwheel/models/,$(notdir $(PLUGINS))) $(addprefix lib/pinwheel/page/,$(notdir $(PAGE))) \
-	  $(foreach m,$(MAN),share/man/man$(subst .,,$(suffix $(m)))/$(notdir $(m))) \
+	  share/man/man1/pinwheel-*.1 $(foreach m,$(MAN),share/man/man$(subst .,,$(suffix $(m)))/$(notdir $(m))) \
 	  $(addprefix $(share)/,$(DOCS) $(FIGURES)) $(addprefix $(share)/examples/,$(notdir $(EXAMPLES))) && \
 	  { rmdir include/pinwheel lib/pinwheel/models lib/pinwheel/page lib/pinwheel $(share)/docs/figures $(share)/docs $(share)/examples \
 	    $(share) 2>/dev/null || true; }; }

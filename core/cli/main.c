@@ -16,7 +16,7 @@ static const pw_command *const main_commands[] = { PW_COMMANDS (MAIN_ENTRY) NULL
 static int main_usage (void) {
   puts ("Usage: pinwheel COMMAND [ARGUMENT...] [OPTION...]\n"
         "Simulate planar multibody systems with pin joints and knife-edge wheels.\n\nCommands:");
-  for (const pw_command *const *c = main_commands; *c; c++) printf ("  %-9s %s\n", (*c)->name, (*c)->summary);
+  for (const pw_command *const *c = main_commands; *c; c++) printf ("  %-11s %s\n", (*c)->name, (*c)->summary);
   puts ("\nMost commands take a MODEL: a name from `pinwheel list models`, or the path of a model file.  A text model\n"
         "(./mine.yaml) is read; a model in C (./mine.c) is compiled on the fly.  The folders in the environment "
         "variable\n"
