@@ -20,7 +20,9 @@ for word; do
   browser) needs="$needs chromium" ;;
   slurm) needs="$needs slurmctld munged" ;;
   reference) needs="$needs python3-numpy python3-scipy" ;;
-  python) needs="$needs python3-numpy python3-pytest python3-matplotlib python3-jsonschema" ;;
+  python)
+    needs="$needs python3-numpy python3-pytest python3-matplotlib python3-jsonschema python3-pycparser python3-pandas python3-xarray"
+    needs="$needs python3-distributed python3-mpi4py" ;;
   page) needs="$needs clang wasm-ld wasi-libc wasi-builtins" ;;
   *) echo "deps.sh: unknown word \"$word\"" >&2; exit 2 ;;
   esac

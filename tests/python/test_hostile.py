@@ -162,6 +162,24 @@ def test_interrupts_are_noticed_between_few_steps():
     assert r.status == "stopped" and len(r) < 100
 
 
+def test_interrupts_end_sweeps(model):
+    """Runs of hours in threads end, too."""
+    timer = threading.Timer(0.3, lambda: os.kill(os.getpid(), signal.SIGINT))
+    timer.start()
+    with pytest.raises(KeyboardInterrupt):
+        pw.sweep(model, {"a": [0.5, 0.51, 0.52]}, t_end=1e8)
+
+
+def test_tables_larger_than_the_memory_are_refused(model, monkeypatch):
+    """Those whose size is not known in advance keep what fits."""
+    monkeypatch.setattr(pw.simulation, "_MEMORY", 8 * 31 * 20000)
+    with pytest.raises(pw.ResourceError, match="out of memory"):
+        model.run(t_end=100, every=1e-3)
+    r = model.run("rk4+projection", t_end=100, step=1e-3)
+    assert r.status == "failed" and "out of memory" in r.reason and len(r) == 20000
+    assert len(model.run("rk4+projection", t_end=15, step=1e-3)) == 15001
+
+
 def test_exceptions_of_progress_pass_and_the_run_goes_on(model):
     with model.open() as simulation:
         with pytest.raises(ZeroDivisionError):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import ctypes as c
+import os
 import threading
 import time
 from collections.abc import Callable, Iterator, MutableMapping
@@ -16,6 +17,9 @@ from .results import Result, _nearest
 
 _HEAD = {"t": "s", "position_residual": "", "velocity_residual": "", "kinetic": "J", "potential": "J", "work": "J", "loss": "J",
          "projection": "J", "balance": "J"}
+
+
+_MEMORY = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")  # bytes
 
 
 class Inputs(MutableMapping):
@@ -65,6 +69,8 @@ class _Rows:
     @staticmethod
     def _allocate(capacity, width):
         try:
+            if capacity * width * 8 > _MEMORY:  # the system may promise it, and end the process later
+                raise MemoryError
             return np.empty((capacity, width))
         except (MemoryError, ValueError):
             raise lib.ResourceError(f"{capacity} samples of {width} numbers: out of memory") from None
@@ -73,7 +79,8 @@ class _Rows:
         """The rows that are not used yet, at least one; done: fraction of the run."""
         if self.count == len(self._rows):
             expected = self.count * min(64, max(1.1 / done, 1.2)) if done > 0 else 64 * self.count
-            larger = self._allocate(int(expected) + 16, self._rows.shape[1])
+            most = max(_MEMORY // (8 * self._rows.shape[1]), self.count + 1)
+            larger = self._allocate(min(int(expected) + 16, most), self._rows.shape[1])
             larger[:self.count] = self._rows
             self._rows = larger
         return self._rows[self.count:]
@@ -103,6 +110,7 @@ class Simulation:
     """
 
     _run = None
+    _cancelled = staticmethod(lambda: False)
 
     def __init__(self, model, system, cells, method, settings, ledger):
         self.model, self._system, self._settings = model, system, settings
@@ -235,8 +243,8 @@ class Simulation:
 
         Raises
         ------
-        InputError, MethodError
-            MethodError only if the run fails before the first sample.
+        InputError, MethodError, ResourceError
+            The last two only if the run fails before the first sample.
         """
         with self._used() as run:
             t_end = self._later(run, t_end, "t_end")
@@ -247,7 +255,7 @@ class Simulation:
                 self._record(run, times, t_end, rows, progress)
             except KeyboardInterrupt:
                 status, reason = "stopped", f"interrupted at t = {lib.core.pw_run_time(run):.6g} s"
-            except lib.MethodError as failure:
+            except (lib.MethodError, lib.ResourceError) as failure:
                 if rows.count == 0:
                     raise
                 status, reason, cause = "failed", str(failure), failure.__cause__
@@ -297,6 +305,8 @@ class Simulation:
                 done = (now(run) - start) / (t_end - start) if t_end > start else 1.0
                 self._call(run, None if times is None else times[rows.count:], t_end, rows, done)
                 report(min(1.0, done))
+                if self._cancelled():
+                    raise KeyboardInterrupt
             report(1.0)
         return rows
 

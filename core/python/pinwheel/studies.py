@@ -9,6 +9,7 @@ import json
 import os
 import pathlib
 import tempfile
+import threading
 
 import numpy as np
 
@@ -18,12 +19,13 @@ from ._progress import watched
 
 # ---- Sweeps ----
 
-def _final(model, parameters, start, method, t_end, settings):
+def _final(model, parameters, start, method, t_end, settings, cancelled=None):
     """The last sample of one run, its units, or why it fails.  Not nested, so that other processes can call it."""
     varied = model.replace(start=start, **parameters)
     end = varied.defaults["t_end"] if t_end is None else t_end
     try:
         with varied.open(method, t_end=end or None, **settings) as simulation:
+            simulation._cancelled = cancelled or simulation._cancelled
             simulation.advance(end)
             return simulation.sample(), simulation._columns()[0], ""
     except (lib.InitialError, lib.MethodError) as failure:
@@ -74,15 +76,18 @@ def sweep(model, vary: dict, *, method: str | None = None, t_end: float | None =
     model = model if isinstance(model, Model) else Model(model)
     names, values, points = _points(vary)
     t_end = None if t_end is None else lib.number(t_end, "t_end")
-    pool = executor or concurrent.futures.ThreadPoolExecutor(os.cpu_count())
+    pool, cancelled = executor or concurrent.futures.ThreadPoolExecutor(os.cpu_count()), threading.Event()
+    own = [cancelled.is_set] if executor is None else []
     if not hasattr(pool, "submit"):
         raise lib.InputError(f"executor: expected a concurrent.futures.Executor, found {executor!r:.60}")
     try:
         pending = [pool.submit(_final, model, {n: x for n, x in p.items() if n in model.parameters},
-                               {n: x for n, x in p.items() if n not in model.parameters}, method, t_end, settings) for p in points]
+                               {n: x for n, x in p.items() if n not in model.parameters}, method, t_end, settings, *own)
+                   for p in points]
         with watched(progress) as report:
             rows = [(future.result(), report((i + 1) / len(pending)))[0] for i, future in enumerate(pending)]
     finally:
+        cancelled.set()
         if executor is None:
             pool.shutdown(cancel_futures=True)
     return _table(dict(zip(names, values)), rows, model.units)
