@@ -76,6 +76,14 @@ pw_run *pw_run_open (const pw_system *s, const char *method, const pw_settings *
 /* Checks a method's name and options without a system; returns the integrator and the index of the stabilisation. */
 int pw_method_parse (const char *method, const pw_method **integrator, int *stabilisation, pw_error *error);
 
+/* 1 if a method controls its step size; 0 if steps are fixed, by the integrator or by the option steps=fixed. */
+int pw_method_adaptive (const pw_method *integrator, const char *method);
+
+/* Estimated number of steps of a run of a model with this default step; 0 for an unknown method.  From
+ * PW_SPECIALISE_STEPS on, compiling specialised code saves time. */
+enum { PW_SPECIALISE_STEPS = 1000000 };
+double pw_method_steps (const char *method, const pw_settings *s, double step, double t_end);
+
 /* One accepted step that does not pass t_end.  PW_STOPPED, without an error, if settings.stop requested it: the run
  * stays where it was, and the next call continues.  Errors: PW_METHOD with the time reached and the reason, such as
  * max_steps. */

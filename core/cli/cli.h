@@ -144,9 +144,6 @@ int pw_cli_number (const char *option, const char *text, pw_domain domain, doubl
 int pw_cli_settings (const pw_cli_line *l, const pw_run_defaults *model, double *t_end, pw_settings *settings,
                      pw_limit *limit, pw_error *error);
 
-/* 1 if a method controls its step size; 0 if steps are fixed, by the integrator or by the option steps=fixed. */
-int pw_cli_adaptive (const pw_method *integrator, const char *method);
-
 /* ---- Models ---- */
 
 /* A model opened, built and compiled. */
@@ -207,11 +204,6 @@ typedef struct {
 
 /* Reads the value of --specialise, NULL if it is not given. */
 int pw_cli_specialise (const char *text, pw_specialise *when, pw_error *error);
-
-#define PW_ENGINE_LONG 1e6 /* number of steps from which compilation saves time */
-
-/* Estimated number of steps of a run. */
-double pw_cli_steps (const char *method, const pw_settings *s, const pw_run_defaults *model, double t_end);
 
 /* The text of specialised code, without the constraint equations that are redundant at the initial state.  NULL and the
  * error if there is none.  Free it. */

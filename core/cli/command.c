@@ -160,10 +160,6 @@ int pw_cli_number (const char *option, const char *text, pw_domain domain, doubl
   return PW_OK;
 }
 
-int pw_cli_adaptive (const pw_method *integrator, const char *method) {
-  return integrator->adaptive && strstr (method, ":steps=fixed") == NULL;
-}
-
 int pw_cli_settings (const pw_cli_line *l, const pw_run_defaults *model, double *t_end, pw_settings *settings,
                      pw_limit *limit, pw_error *error) {
   double most = PW_MAX_STEPS;

@@ -1,19 +1,8 @@
 /* Choice of the engine of runs: general, or code compiled for the scene. */
-#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 #include "cli.h"
 #include "util.h"
-
-#define ENGINE_ADAPTIVE 20. /* typical ratio of an adaptive step at rtol 1e-6 to the model's fixed step */
-
-double pw_cli_steps (const char *method, const pw_settings *s, const pw_run_defaults *model, double t_end) {
-  const pw_method *integrator;
-  int stabilisation;
-  if (pw_method_parse (method, &integrator, &stabilisation, NULL) != PW_OK) return 0;
-  if (!pw_cli_adaptive (integrator, method)) return t_end / (s->step > 0 ? s->step : model->step);
-  return t_end / (ENGINE_ADAPTIVE * model->step) * pow (1e-6 / (s->rtol > 0 ? s->rtol : 1e-6), 1. / 6);
-}
 
 int pw_cli_specialise (const char *text, pw_specialise *when, pw_error *error) {
   static const char *const name[] = { "auto", "always", "never", NULL };
@@ -60,7 +49,7 @@ void pw_cli_engine_open (pw_cli_engine *e, const pw_system *s, pw_specialise whe
   *e = (pw_cli_engine){ .when = when };
   if (when == PW_SPECIALISE_NEVER)
     strcpy (e->why, "--specialise never");
-  else if (when == PW_SPECIALISE_AUTO && !(steps >= PW_ENGINE_LONG))
+  else if (when == PW_SPECIALISE_AUTO && !(steps >= PW_SPECIALISE_STEPS))
     strcpy (e->why, "short run"); /* independent of the cache: the same command has the same result */
   else
     engine_load (e, s, when);

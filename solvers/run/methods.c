@@ -1,4 +1,5 @@
 /* The table of integrators, and method names: integrator[+stabilisation][:option=value]... */
+#include <math.h>
 #include <string.h>
 #include "method.h"
 #include "methods.h"
@@ -167,4 +168,18 @@ void pw_read_baumgarte (pw_run *r) {
   if (!pw_stabilised_by (r, PW_BAUMGARTE)) return;
   r->alpha = pw_run_option (r, "alpha");
   r->beta = pw_run_option (r, "beta");
+}
+
+#define METHODS_STEP_RATIO 20. /* typical ratio of an adaptive step at rtol 1e-6 to the model's fixed step */
+
+int pw_method_adaptive (const pw_method *integrator, const char *method) {
+  return integrator->adaptive && strstr (method, ":steps=fixed") == NULL;
+}
+
+double pw_method_steps (const char *method, const pw_settings *s, double step, double t_end) {
+  const pw_method *integrator;
+  int stabilisation;
+  if (pw_method_parse (method, &integrator, &stabilisation, NULL) != PW_OK) return 0;
+  if (!pw_method_adaptive (integrator, method)) return t_end / (s->step > 0 ? s->step : step);
+  return t_end / (METHODS_STEP_RATIO * step) * pow (1e-6 / (s->rtol > 0 ? s->rtol : 1e-6), 1. / 6);
 }

@@ -36,7 +36,7 @@ REFUSED = {
         ("pw.command(None, m)", "expected a text"), ("pw.command('', m)", "no command"), ("pw.command('nothing', m)", "no command"),
         ("pw.command('run', m, nonsense=3)", "--nonsense"), ("pw.command('check', m, 'a\\0b')", "null"),
         ("m.run(3)", "method: expected a text, found 3"), ("m.run('')", "integrator"), ("m.run('rk4\\0')", "expected a text"),
-        ("m.run(b'rk4')", "expected a text"), ("m.run('rk4+')", "stabilisation"), ("m.run('rk4:' * 1000)", "option"),
+        ("m.run(specialise='yes')", "specialise"), ("m.run(b'rk4')", "expected a text"), ("m.run('rk4+')", "stabilisation"), ("m.run('rk4:' * 1000)", "option"),
         ("m.run('\u00e9' * 1000)", "too long"), ("m.run(start={3: 1})", "start: expected a text"), ("m.run(start={'': 1})", "state"),
         ("m.open(inputs={None: 0})", "inputs: expected a text"), ("m.open(inputs={'ride': 0})", "rider"),
         ("m.open(inputs={'frame': 0})", "frame"), ("pw.Pin('p', bdy=1)", "did you mean 'body'"), ("pw.Pin('p')", "needs 'body'")],

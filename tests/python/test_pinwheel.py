@@ -102,6 +102,35 @@ def test_same_bits_as_the_program(model, method, tmp_path):
         assert np.array_equal(r[name], expected[name]), name
 
 
+@pytest.mark.parametrize("model, method, settings", [
+    ("ezyroller", "rk4+projection", {"t_end": 20.0, "step": 1e-5, "every": 2.0}),
+    ("redundant-parallelogram", "rk4+projection", {"t_end": 1.0, "every": 0.25, "specialise": "always"}),
+    ("snakeboard", "erk8+projection", {"t_end": 2.0, "every": 0.25, "specialise": "always"})])
+def test_same_bits_as_the_program_with_specialised_code(model, method, settings, tmp_path, monkeypatch):
+    """Also where both decide for it because the run is long."""
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    words = [f"--{name.replace('_', '-')}={value}" for name, value in settings.items()]
+    program("run", model, "--method", method, *words, "-o", str(tmp_path / "t.csv"))
+    expected = table(tmp_path / "t.csv")
+    r = pw.Model(model).run(method, **settings)
+    assert r.statistics["specialised"] > 0.9 * r.statistics["rhs"]
+    for name in expected:
+        if name in r:
+            assert np.array_equal(r[name], expected[name]), name
+
+
+def test_functions_with_specialised_code():
+    model = pw.Model("ezyroller", signals={"rider": lambda t: 0.1})
+    r, general = (model.run(t_end=0.1, specialise=when) for when in ("always", "never"))
+    assert r.statistics["specialised"] > 0 and general.statistics["specialised"] == 0
+    assert np.allclose(r["frame.x"], general["frame.x"], rtol=0, atol=1e-13)
+
+
+def test_models_without_specialised_code_run():
+    r = pw.Model("chain", n=200).run(t_end=0.01, specialise="always")
+    assert r.status == "ok" and r.statistics["specialised"] == 0
+
+
 def test_summaries_follow_their_schema(tmp_path):
     jsonschema = pytest.importorskip("jsonschema")
     schema = json.loads((TOP / "docs/summary.schema.json").read_text())
@@ -220,7 +249,7 @@ def test_notebook_shows_the_interactive_page():
 
 def test_sweep_has_the_values_of_the_program(tmp_path):
     program("sweep", "snakeboard", "--vary", "swing=0.3,0.6", "--vary", "board.vx=0,0.1,0.2", "--t-end", "1", "--method",
-            "rk4+projection", "--step", "1e-3", "--specialise=never", "-o", str(tmp_path / "s.csv"))
+            "rk4+projection", "--step", "1e-3", "-o", str(tmp_path / "s.csv"))
     expected = table_of_sweep(tmp_path / "s.csv")
     data = pw.sweep("snakeboard", {"swing": [0.3, 0.6], "board.vx": [0, 0.1, 0.2]}, t_end=1, method="rk4+projection", step=1e-3)
     for name in ("board.x", "board.phi", "rotor.omega"):

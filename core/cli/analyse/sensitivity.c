@@ -15,7 +15,7 @@ static int sensitivity_settings (pw_sensitivity *x, pw_error *error) {
   int status = pw_cli_settings (&x->line, &d, &x->t_end, &x->settings, &x->limit, error);
   if (status == PW_OK) status = pw_cli_specialise (x->line.specialise, &when, error);
   if (status != PW_OK) return status;
-  pw_cli_engine_open (&x->engine, x->m.system, when, pw_cli_steps (x->method, &x->settings, &d, x->t_end));
+  pw_cli_engine_open (&x->engine, x->m.system, when, pw_method_steps (x->method, &x->settings, d.step, x->t_end));
   x->settings.specialised = pw_cli_engine_code (&x->engine);
   return PW_OK;
 }

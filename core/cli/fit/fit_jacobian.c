@@ -16,7 +16,7 @@ static double jacobian_smooth (const pw_fit *x) {
   const pw_method *method;
   int stabilisation;
   if (pw_method_parse (x->unknowns.method, &method, &stabilisation, NULL) != PW_OK ||
-      !pw_cli_adaptive (method, x->unknowns.method))
+      !pw_method_adaptive (method, x->unknowns.method))
     return DBL_EPSILON;
   return x->unknowns.settings.rtol > 0 ? x->unknowns.settings.rtol : 1e-6;
 }

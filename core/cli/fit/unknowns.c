@@ -94,7 +94,8 @@ int pw_unknowns_open (pw_unknowns *u, const pw_cli_line *line, const pw_cli_mode
   for (int i = 0; i < count && status == PW_OK; i++) status = unknowns_add (u, list[i], error);
   if (status == PW_OK) status = pw_cli_specialise (line->specialise, &when, error);
   if (status == PW_OK)
-    pw_cli_engine_open (&u->engine, m->system, when, runs * pw_cli_steps (u->method, &u->settings, &d, u->t_end));
+    pw_cli_engine_open (&u->engine, m->system, when,
+                        runs * pw_method_steps (u->method, &u->settings, d.step, u->t_end));
   return status;
 }
 

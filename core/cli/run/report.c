@@ -51,7 +51,7 @@ void pw_report_settings (pw_run *r, const pw_system *s, const char *method, cons
   const pw_method *integrator;
   int stabilisation;
   if (pw_method_parse (method, &integrator, &stabilisation, &(pw_error){ 0 }) != PW_OK) return;
-  int adaptive = pw_cli_adaptive (integrator, method);
+  int adaptive = pw_method_adaptive (integrator, method);
   report_unused (method, adaptive, l);
   if (adaptive)
     report_atol (r, s, settings->atol);

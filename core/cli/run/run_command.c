@@ -97,7 +97,7 @@ static int run_engine (run *x, pw_error *error) {
   if (status == PW_OK) status = pw_checkpoints_open (x, &when, error);
   if (status != PW_OK) return status;
   if (x->profile && when == PW_SPECIALISE_AUTO) when = PW_SPECIALISE_NEVER; /* stages are those of the general engine */
-  pw_cli_engine_open (&x->engine, x->m.system, when, pw_cli_steps (x->method, &x->settings, &d, x->t_end));
+  pw_cli_engine_open (&x->engine, x->m.system, when, pw_method_steps (x->method, &x->settings, d.step, x->t_end));
   if (x->profile && when == PW_SPECIALISE_NEVER) strcpy (x->engine.why, "--profile");
   x->settings.specialised = pw_cli_engine_code (&x->engine);
   return PW_OK;

@@ -127,7 +127,7 @@ static int compare_plan_rows (pw_study *x, const ladder of[2], pw_error *error) 
   int stabilisation;
   for (int i = 0; i < x->methods; i++) {
     int adaptive = pw_method_parse (x->method[i], &integrator, &stabilisation, NULL) == PW_OK &&
-                   pw_cli_adaptive (integrator, x->method[i]);
+                   pw_method_adaptive (integrator, x->method[i]);
     double level;
     for (int k = 0; (level = ladder_level (of[adaptive], adaptive, k)) > 0; k++) {
       pw_row *r = pw_study_add (x, 0, i, x->method[i], 1, error);

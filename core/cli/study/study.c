@@ -218,7 +218,7 @@ static double study_work (const pw_study *x) {
   for (const pw_row *r = x->row; r < x->row + x->rows; r++) {
     pw_settings s = x->settings;
     if (r->level > 0) s.step = s.rtol = r->level;
-    steps += x->type->runs * pw_cli_steps (r->method, &s, &d, x->t_end);
+    steps += x->type->runs * pw_method_steps (r->method, &s, d.step, x->t_end);
   }
   return steps;
 }

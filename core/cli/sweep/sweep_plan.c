@@ -138,7 +138,7 @@ typedef struct {
 /* The engine depends on the whole sweep, not on its part. */
 static void plan_engine (pw_plan *p, const pw_system *s) {
   pw_run_defaults d = pw_cli_defaults (pw_file_table (p->file));
-  double steps = (double)p->grid.rows * pw_cli_steps (p->method, &p->settings, &d, p->t_end);
+  double steps = (double)p->grid.rows * pw_method_steps (p->method, &p->settings, d.step, p->t_end);
   pw_cli_engine_open (&p->engine, s, p->specialise, steps);
 }
 

@@ -13,7 +13,7 @@ import pathlib
 
 VERSION = "0.1.0"
 PW_OK, PW_RETRY, PW_STOPPED, PW_RESOURCE, PW_INPUT, PW_INITIAL, PW_METHOD = 0, 1, 2, -1, -2, -3, -4
-PW_FUNCTION = 2
+PW_FUNCTION, PW_SPECIALISE_STEPS = 2, 1000000
 PW_NUMBER, PW_POINT, PW_VECTOR, PW_BODY, PW_SIGNAL, PW_CHOICE = range(6)
 DOMAINS = ("", ">= 0", "> 0", "1, 2, 3, ...", "from 0 to 1")  # by pw_domain
 
@@ -139,10 +139,10 @@ pw_error = _structure("pw_error", status=c.c_int, text=c.c_char * 500)
 pw_initial_value = _structure("pw_initial_value", state=c.c_int, value=c.c_double)
 pw_settings = _structure(
     "pw_settings", t=c.c_double, span=c.c_double, step=c.c_double, rtol=c.c_double, atol=c.c_double, ledger=c.c_int,
-    max_steps=c.c_long, initial=c.c_void_p, initials=c.c_int)
+    max_steps=c.c_long, initial=c.c_void_p, initials=c.c_int, specialised=c.c_void_p)
 pw_statistics = _structure(
     "pw_statistics", steps=c.c_long, rejected=c.c_long, rhs=c.c_long, jacobians=c.c_long, factorisations=c.c_long,
-    position=c.c_double, velocity=c.c_double, g=c.c_double, jv=c.c_double)
+    specialised=c.c_long, position=c.c_double, velocity=c.c_double, g=c.c_double, jv=c.c_double)
 pw_parameter = _structure("pw_parameter", name=c.c_char_p, value=c.c_double, unit=c.c_char_p, about=c.c_char_p)
 pw_field = _structure(
     "pw_field", name=c.c_char_p, type=c.c_int, count=c.c_int, unit=c.c_char_p, required=c.c_int, domain=c.c_int,
@@ -181,7 +181,10 @@ _declare(files, _i, ("pw_read_expression", _s, _double_p), ("pw_file_list", c.CF
 _declare(core, None, ("pw_model_free", _p), ("pw_system_free", _p), ("pw_run_close", _p), ("pw_linear_free", c.POINTER(pw_linear)))
 _declare(core, _i, ("pw_model_set", _p, _s, _d, _e), ("pw_model_build", _p, _e), ("pw_model_set_initial", _p, _s, _d, _e),
          ("pw_model_set_signal", _p, _s, _s, c.POINTER(pw_signal), _e))
-_declare(core, _d, ("pw_model_parameter", _p, _p))
+_declare(core, _d, ("pw_model_parameter", _p, _p), ("pw_method_steps", _s, c.POINTER(pw_settings), _d, _d))
+_declare(core, _p, ("pw_system_source", _p, _p, _e), ("pw_run_source", _p, _e))
+_declare(files, _p, ("pw_scene_code_open", _p, _p, _e), ("pw_scene_code_table", _p))
+_declare(files, None, ("pw_scene_code_close", _p))
 _declare(core, _p, ("pw_system_compile", _p, _e), ("pw_run_open", _p, _s, c.POINTER(pw_settings), _e))
 _declare(core, _i, ("pw_system_coordinates", _p), ("pw_system_rows", _p), ("pw_system_bodies", _p), ("pw_system_signals", _p),
          ("pw_system_ledger_entries", _p), ("pw_system_find_state", _p, _s, _e))
@@ -232,6 +235,10 @@ def numbers(values, what: str) -> dict:
     if not hasattr(values, "items"):
         raise InputError(f"{what}: expected a dict of numbers by name, found {values!r:.60}")
     return {encode(name, what).decode(): number(value, str(name)) for name, value in values.items()}
+
+
+free = c.CDLL(None).free
+free.restype, free.argtypes = None, [c.c_void_p]
 
 
 def name_of(function, *arguments) -> str:

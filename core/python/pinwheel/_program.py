@@ -39,6 +39,7 @@ def animation(result) -> str | None:
     given = {"step": "step", "rtol": "rtol", "atol": "atol"}
     words = [f"--method={result.settings['method']}", f"--t-end={result.settings['t_end']!r}"]
     words += [f"--{o}={result.settings[k]!r}" for k, o in given.items() if result.settings.get(k)]
+    words += [f"--specialise={result.settings.get('specialise', 'auto')}"]
     return _page("run", result.model, "--animate", words)
 
 

@@ -23,12 +23,35 @@ from .simulation import Simulation
 class _System:
     """A compiled system; simulations share it."""
 
+    _compiling = threading.Lock()
+
     def __init__(self, pointer, keep, raised):
         self.pointer, self._keep, self._raised = pointer, keep, raised
+        self._code = _Handle(None, lib.files.pw_scene_code_close)
+        self._has_code = False
 
     def __del__(self):
         if self.pointer:
             lib.core.pw_system_free(self.pointer)
+
+    def code(self) -> int | None:
+        """Specialised code, compiled or from the cache; None if there cannot be any."""
+        with self._compiling:
+            if not self._has_code:
+                text = self._source()
+                if text:
+                    self._code.pointer = lib.files.pw_scene_code_open(text, self.pointer, None)
+                    lib.free(text)
+                self._has_code = True
+        return lib.files.pw_scene_code_table(self._code.pointer)
+
+    def _source(self):
+        run = lib.core.pw_run_open(self.pointer, b"rk4+none", None, None)
+        if run is None:
+            return lib.core.pw_system_source(self.pointer, None, None)
+        text = lib.core.pw_run_source(run, None)
+        lib.core.pw_run_close(run)
+        return text
 
     def check(self, error) -> None:
         """Raises the exception of a library error; what a function in Python has raised is its cause."""
@@ -246,7 +269,7 @@ class Model:
 
     def open(self, method: str | None = None, *, t_end: float | None = None, step: float | None = None,
              rtol: float | None = None, atol: float | None = None, max_steps: int | None = None, energy: bool = False,
-             inputs: dict[str, float] | None = None) -> Simulation:
+             inputs: dict[str, float] | None = None, specialise: str = "auto") -> Simulation:
         """Opens a run that the caller advances.
 
         Parameters
@@ -266,6 +289,9 @@ class Model:
             Whether samples contain work and losses by element.
         inputs : dict, optional
             Signals that the caller sets between steps, and their initial values: ``{"rider": 0.0}``.
+        specialise : {"auto", "always", "never"}
+            Use code compiled for this model alone, if that is possible: from some 1e6 steps on, as the program does; always;
+            never.  ``statistics["specialised"]`` counts its evaluations.
 
         Returns
         -------
@@ -279,8 +305,12 @@ class Model:
         for name, value in {"span": t_end, "step": step, "rtol": rtol, "atol": atol, "max_steps": max_steps}.items():
             setattr(settings, name, self._setting(name, value))
         settings.ledger = bool(energy)
+        method = self.defaults["method"] if method is None else method
+        steps = lib.core.pw_method_steps(lib.encode(method, "method"), c.byref(settings), self.defaults["step"], settings.span)
         system, cells = self._compile(inputs or {})
-        return Simulation(self, system, cells, self.defaults["method"] if method is None else method, settings, bool(energy))
+        if specialised(specialise, steps):
+            settings.specialised = system.code()
+        return Simulation(self, system, cells, method, settings, bool(energy))
 
     def _setting(self, name, value):
         if value is None:
@@ -309,7 +339,7 @@ class Model:
         progress : callable or bool, optional
             Called now and then with the fraction done; True: a progress bar, False: none; default: a bar in notebooks.
         **settings
-            step, rtol, atol, max_steps, energy: see :meth:`open`.
+            step, rtol, atol, max_steps, energy, specialise: see :meth:`open`.
 
         Returns
         -------
@@ -376,6 +406,13 @@ class Model:
         return Linear(matrix(l.A, n, n), matrix(l.B, n, len(inputs)),
                       np.array([complex(l.re[i], l.im[i]) for i in range(n)]), matrix(l.basis, states, n), inputs,
                       [lib.name_of(lib.core.pw_system_state_name, s, i) for i in range(states)], l.steady == 0, np.array(l.twist))
+
+
+def specialised(when: str, steps: float) -> bool:
+    """Whether runs with this number of steps use compiled code."""
+    if when not in ("auto", "always", "never"):
+        raise lib.InputError(f"specialise = {when!r:.60}: expected auto, always or never")
+    return when == "always" or (when == "auto" and steps >= lib.PW_SPECIALISE_STEPS)
 
 
 def _restore(origin, start, parameters):

@@ -24,7 +24,7 @@ class Result:
     reason : str
         Why the run ended early, or "".
     statistics : dict
-        Steps, evaluations, largest constraint residuals.
+        Steps, evaluations (how many by specialised code), largest constraint residuals.
     cause : Exception or None
         What a function in Python raised, if that ended the run.
     model : Model

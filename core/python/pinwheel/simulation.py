@@ -166,11 +166,11 @@ class Simulation:
 
     @property
     def statistics(self) -> dict:
-        """Steps, evaluations, largest constraint residuals so far."""
+        """Steps, evaluations (how many by specialised code), largest constraint residuals so far."""
         with self._used() as run:
             s = lib.core.pw_run_statistics(run).contents
-            return {name: getattr(s, name) for name in ("steps", "rejected", "rhs", "jacobians", "factorisations", "position",
-                                                        "velocity", "g", "jv")}
+            return {name: getattr(s, name) for name in ("steps", "rejected", "rhs", "jacobians", "factorisations", "specialised",
+                                                        "position", "velocity", "g", "jv")}
 
     def _columns(self):
         s, n, core = self._system.pointer, lib.core.pw_system_coordinates(self._system.pointer), lib.core

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import concurrent.futures
 import csv
+import ctypes as c
 import itertools
 import json
 import os
@@ -45,6 +46,18 @@ def _points(vary):
     return names, values, [dict(zip(names, map(float, point))) for point in itertools.product(*values)]
 
 
+def _engine(model, runs, method, t_end, settings):
+    """The engine depends on the whole sweep, as in the program."""
+    from .model import specialised
+    when, given = settings.pop("specialise", "auto"), lib.pw_settings()
+    for name in ("step", "rtol"):
+        setattr(given, name, model._setting(name, settings.get(name)))
+    method = lib.encode(model.defaults["method"] if method is None else method, "method")
+    end = model.defaults["t_end"] if t_end is None else t_end
+    steps = runs * lib.core.pw_method_steps(method, c.byref(given), model.defaults["step"], end)
+    return "always" if specialised(when, steps) else "never"
+
+
 def sweep(model, vary: dict, *, method: str | None = None, t_end: float | None = None,
           executor: concurrent.futures.Executor | None = None, progress=None, **settings):
     """Runs a model for all combinations of values; the last one varies fastest.
@@ -76,6 +89,7 @@ def sweep(model, vary: dict, *, method: str | None = None, t_end: float | None =
     model = model if isinstance(model, Model) else Model(model)
     names, values, points = _points(vary)
     t_end = None if t_end is None else lib.number(t_end, "t_end")
+    settings["specialise"] = _engine(model, len(points), method, t_end, dict(settings))
     pool, cancelled = executor or concurrent.futures.ThreadPoolExecutor(os.cpu_count()), threading.Event()
     own = [cancelled.is_set] if executor is None else []
     if not hasattr(pool, "submit"):
