@@ -121,7 +121,7 @@ static void test_bad (void **state) {
     { "snakeboard --periods 2 --period 4", "--periods 2: not together with --period" },
     { "snakeboard --guess 2", "--guess 2: only with --period free" },
     { "pendulum",
-      "pendulum: no signal has a known period, which those of expressions and tables have not: give --period T, or "
+      "pendulum: no signal has a known period (those of expressions and tables are not known): give --period T, or "
       "--period free if no signal changes with time" },
     { "snakeboard --vary m=1", "--vary m=1: expected NAME=FIRST:LAST" },
     { "snakeboard --vary m=0:1", "--vary m=0:1: expected a number > 0" },

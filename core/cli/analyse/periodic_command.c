@@ -29,7 +29,7 @@ static int periodic_period (pw_periodic_cli *x, pw_error *error) {
   if (status != PW_OK || x->period_text || pw_system_period (x->m.system) > 0) return status;
   return pw_fail (
       error, PW_INPUT,
-      "%s: no signal has a known period, which those of expressions and tables have not: give --period T, or "
+      "%s: no signal has a known period (those of expressions and tables are not known): give --period T, or "
       "--period free if no signal changes with time",
       pw_file_name (x->m.file));
 }
