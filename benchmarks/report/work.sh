@@ -53,7 +53,7 @@ set ytics ($labels)
 eval panel(left + 62, 0.5*width + 24, 44, height - bottom)
 set title 'smooth motions' offset 0,-0.7
 plot '$work/strip-smooth' with points pt 6 ps 0.7 lw 1 lc rgb '#004488'
-set ytics ('' -1); set format y ''
+set ytics -$n,1,-1; set format y ''
 eval panel(0.5*width + left - 10, width - right, 44, height - bottom)
 set title 'stiff scenes' offset 0,-0.7
 plot '$work/strip-stiff' with points pt 6 ps 0.7 lw 1 lc rgb '#cc6677'
@@ -113,7 +113,7 @@ work_figure () {
     echo "set logscale xy; set format '10^{%T}'; unset key; set xtics 10; set ytics 100"
     for scene in $scenes; do
       column=$((i % 3)) row=$((i / 3)) i=$((i + 1)) last=$((n - i < 3))
-      echo "set lmargin at screen $(awk "BEGIN { print 0.085 + 0.318 * $column }"); set rmargin at screen $(awk "BEGIN { print 0.345 + 0.318 * $column }")"
+      echo "set lmargin at screen $(awk "BEGIN { print 0.085 + 0.318 * $column }"); set rmargin at screen $(awk "BEGIN { print 0.332 + 0.318 * $column }")"
       echo "set tmargin at screen $(awk "BEGIN { print 1 - (112 + 240 * $row) / $height }"); set bmargin at screen $(awk "BEGIN { print 1 - (112 + 178 + 240 * $row) / $height }")"
       unit=$(awk -F '\t' -v s="$scene" '$2 == s { print $5; exit }' "$work/shown")
       echo "set title '$scene [$unit]' offset 0,-0.7"

@@ -169,6 +169,30 @@ static void test_style (void **state) {
   cli_bad ("pinwheel compare ezyroller -o @/style --width xmm", 2, "--width: \"x\" is not a number");
 }
 
+/* In a narrow figure the legend of eleven methods, whose last one is galpha+ggl, ends above the frame of the first panel. */
+static void test_legend (void **state) {
+  (void)state;
+  static const char *const width[] = { "85mm", "120mm", "170mm" };
+  char command[200];
+  for (int i = 0; i < 3; i++) {
+    double last = 0, frame = 0;
+    snprintf (command, sizeof command,
+              "pinwheel drift pendulum --t-end 1 --step 0.01 --only-methods --width %s -o @/legend%d", width[i], i);
+    cli_good (command);
+    snprintf (command, sizeof command, "legend%d/drift.svg", i);
+    for (const char *at = cli_file (command); (at = strpbrk (at + 1, "<'")) != NULL;) {
+      double x, y;
+      if (sscanf (at, "<g transform=\"translate(%*f,%lf)\"", &y) == 1 && y > last && strstr (at, "<text>") &&
+          strncmp (strstr (at, "<text>"), "<text>galpha+ggl<", 17) == 0)
+        last = y;
+      if (sscanf (at, "'M%lf,%lf L", &x, &y) == 2 && strstr (at, "Z ") && strchr (at, '\n') > strstr (at, "Z ") &&
+          (frame == 0 || y < frame))
+        frame = y;
+    }
+    assert_true (last > 0 && last < frame);
+  }
+}
+
 static void test_refusals (void **state) {
   (void)state;
   cli_write ("file", "in the way");
@@ -182,7 +206,7 @@ int main (void) {
     cmocka_unit_test (test_drawn),         cmocka_unit_test (test_written),  cmocka_unit_test (test_data),
     cmocka_unit_test (test_ground),        cmocka_unit_test (test_layouts),  cmocka_unit_test (test_outline),
     cmocka_unit_test (test_gnuplot_fails), cmocka_unit_test (test_refusals), cmocka_unit_test (test_symbols),
-    cmocka_unit_test (test_style),
+    cmocka_unit_test (test_style),         cmocka_unit_test (test_legend),
   };
   return cmocka_run_group_tests (tests, cli_setup, cli_teardown);
 }

@@ -1,5 +1,5 @@
 
-# ---- Drift: residuals and energy balance, a panel each ----
+# ---- Drift: residuals and energy defect, a panel each ----
 
 data = name.'.dat'
 logarithmic = name ne 'drift'
@@ -8,7 +8,7 @@ title = name eq 'drift' ? 'drift of the constraints and the energy' : name eq 'd
 label_of_x = name eq 'drift' ? 't [s]' : name eq 'drift-baumgarte' ? 'α [1/s]' : 'steps per projection (every)'
 high = narrow ? 90.0 : 112.0
 height = top + words(quantities)*(high + 10) - 10 + bottom
-array label_of_y[3] = ['position residual', 'velocity residual', 'energy balance [J]']
+array label_of_y[3] = ['position residual', 'velocity residual', 'energy defect [J]']
 array least[3]
 array most[3]
 stats data using 1 name 'x' nooutput

@@ -29,7 +29,7 @@ set palette defined (0 '#0d0887', 1 '#6a00a8', 2 '#b12a90', 3 '#e16462', 4 '#f6a
 # ---- Page ----
 
 forms = 'svg png pdf'
-letter = 4.4 # width of a letter, about
+letter = 4.8 # width of a letter in a legend
 left = 44.0
 right = 12.0
 bottom = 32.0
@@ -55,7 +55,7 @@ panel(x0, x1, y0, y1) = sprintf('set lmargin at screen %.6f; set rmargin at scre
   sprintf('set tmargin at screen %.6f; set bmargin at screen %.6f', 1 - y0/height, 1 - y1/height)
 key(y, columns) = sprintf('set key noenhanced at screen 0.5,screen %.6f center top horizontal maxcols %d samplen 3 spacing %g', \
                           1 - (y - lift)/height, columns, pitch)
-columns(longest) = max(1, int((width - left - right)/(28 + letter*longest)))
+columns(longest) = max(1, int((width - left - right)/(32 + letter*longest))) # no more than gnuplot would set in a row
 rows(n, columns) = 3 + 9.6*((n + columns - 1)/columns)
 short(s) = strlen(s) > 24 ? s[1:24].'…' : s
 

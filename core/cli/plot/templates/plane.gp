@@ -71,7 +71,7 @@ if (panels == 1) {
   py1[2] = py1[1]
 }}
 # The legend is as wide as the first panel.
-per_row = max(1, int((px1[1] - px0[1])/(28 + letter*longest)))
+per_row = max(1, int((px1[1] - px0[1])/(32 + letter*longest)))
 shift = items ? rows(items, per_row) - (top - above) : 0
 do for [i = 1:panels] {
   py0[i] = py0[i] + shift

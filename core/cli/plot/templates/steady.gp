@@ -4,7 +4,7 @@
 data = name.'.dat'
 title = 'eigenvalues of steady motions'
 above = top
-top = top + rows(4, narrow ? 2 : 4)
+top = top + rows(4, 2)
 part = narrow ? 92.0 : 118.0
 height = top + 3*part + 10 + bottom + 6 + bottom
 stats data index 3 using 2 name 'y' nooutput
@@ -16,7 +16,7 @@ unset offsets
 margin(a, b) = 0.04*max(b - a, 1e-3)
 do for [form in forms] {
   eval page(form)
-  eval key(above, 4)
+  eval key(above, 2)
   set xrange [first:last]
   set format x ''
   set xlabel ''
