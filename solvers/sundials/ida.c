@@ -282,7 +282,7 @@ static const pw_stabilisation ida_stabilisations[] = {
   { "baumgarte", "feedback of the residuals into the accelerations (Baumgarte 1972)", PW_BAUMGARTE },
   { "index2", "velocities enforced, positions drift", PW_INDEX2 },
   { "ggl", "stabilised index 2: positions and velocities both enforced (Gear, Gupta & Leimkuhler 1985)", PW_GGL },
-  { "si1", "stabilised index 1: the same, with the multipliers as rates of states in the error test (Gear 1988)",
+  { "si1", "stabilised index 1: the same, with the multipliers as derivatives of states, in the error test (Gear 1988)",
     PW_SI1 },
   { .name = NULL },
 };

@@ -51,16 +51,18 @@ static double conclusion_level (int k) {
 static cost conclusion_cost (const conclusion *x, int line, double level) {
   cost least = { NAN, 0 };
   double before = NAN;
+  int coarser = 0; /* 1: a run before is less accurate */
   const pw_study *s = x->study;
   for (const pw_row *r = s->row; r < s->row + s->rows; r++) {
     if (r->line != line) continue;
     double here = r->state == ROW_DONE ? conclusion_error (x->reference, r->value + x->column) : NAN;
-    cost c = { here <= level ? r->cpu : NAN, 1 };
+    cost c = { here <= level ? r->cpu : NAN, !coarser };
     if (here <= level && before > level) {
       double cpu = r[-1].cpu * pow (r->cpu / r[-1].cpu, log (level / before) / log (here / before));
       c = (cost){ fmin (cpu, r->cpu), here <= x->uncertainty };
     }
     if (c.cpu > 0 && !(least.cpu <= c.cpu)) least = c;
+    coarser |= here > level;
     before = here;
   }
   return least;
@@ -87,13 +89,12 @@ static void conclusion_heading (const conclusion *x) {
   const pw_reference *t = x->reference;
   const char *between = "";
   char text[32];
-  printf (
-      "Processor time for 3, 6 and 9 correct digits, interpolated between measured levels, relative to the cheapest\n"
-      "method. Digits: the largest error of a coordinate at %d times up to %s s,\n",
-      t->motion.samples, pw_format (text, x->study->t_end, 6));
+  printf ("Processor time for 3, 6 and 9 correct digits, relative to the cheapest method.\n"
+          "Digits: the largest error of a coordinate at %d times up to %s s, relative to\n",
+          t->motion.samples, pw_format (text, x->study->t_end, 6));
   for (int i = MOTION_LENGTH; i <= MOTION_ANGLE; i++)
     if (t->uncertainty[MOTION_MOST + i] > 0) {
-      printf ("%s%s relative to %s %s", between, name[i], pw_format (text, conclusion_scale (t, i), 3), unit[i]);
+      printf ("%s%s %s (%s)", between, pw_format (text, conclusion_scale (t, i), 3), unit[i], name[i]);
       between = ", ";
     }
   printf (". The reference has %.1f digits%s.\n\n", -log10 (x->uncertainty),
@@ -135,7 +136,7 @@ static void conclusion_table (const conclusion *x) {
       uncertain |= *text == 'u';
     }
   }
-  puts (most ? "\n<: at most; the least accurate run has more digits; a ladder can begin earlier" : "");
+  puts (most ? "\n<: at most: already the least accurate run of the method has that many digits" : "");
   if (uncertain) puts ("uncertain: the reference is not accurate enough to distinguish methods");
 }
 

@@ -1,4 +1,4 @@
-/* pinwheel drift: how constraint residuals and the energy balance grow in a long run, by method and stabilisation, and
+/* pinwheel drift: how constraint residuals and the energy defect grow in a long run, by method and stabilisation, and
  * how that depends on Baumgarte's alpha and beta and on the metric and frequency of projections. */
 #include <math.h>
 #include <string.h>
@@ -273,7 +273,7 @@ static int drift_figures (pw_study *x, pw_error *error) {
       if (pw_study_positive (x, group, i)) sprintf (strchr (variables, 0), "%d ", i);
     if (variables[strlen (variables) - 1] == '\'') continue;
     strcat (variables, "'\n");
-    snprintf (heading, sizeof heading, "%s, largest scaled residuals of position and velocity, energy balance [J]",
+    snprintf (heading, sizeof heading, "%s, largest scaled residuals of position and velocity, energy defect [J]",
               axis[group]);
     status = pw_study_write_data (x, group, name[group], heading, 1 + DRIFT_QUANTITIES, error);
     if (status == PW_OK) status = pw_study_write_script (x, group, name[group], "drift", variables, error);
@@ -293,7 +293,7 @@ static int drift_command (void *options, pw_error *error) {
   static const pw_study_type type = { .tables = { "drift.csv", "drift-time.csv" },
                                       .unit = "runs",
                                       .group = group,
-                                      .above = "  residual of position     residual of velocity     energy balance [J]",
+                                      .above = "  residual of position     residual of velocity      energy defect [J]",
                                       .column = drift_columns,
                                       .runs = 1,
                                       .time = COLUMN_T,
