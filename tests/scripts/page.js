@@ -24,7 +24,21 @@
     document.dispatchEvent(new KeyboardEvent("keydown", { key: "End", bubbles: true }));
     $$("#values").open = true;
     await until("the table of values", () => $$("#page-values tr"));
-    text = [...document.querySelectorAll("#page-values tr")].map(row => row.cells[0].textContent + " " + row.cells[1].textContent).join("\n");
+    const exact = table().trim().split("\n").pop().split(",").slice(1).filter((x, k) => k % 6 < 3);
+    text = [...document.querySelectorAll("#page-values tr")]
+      .map((row, k) => row.cells[0].textContent + " " + row.cells[1].textContent + " " + exact[k]).join("\n");
+    const shown = location.hash;
+    location.hash = "#method=%3C/script%3E&accuracy=-1&t_end=0&start.x=1&__proto__=1&" + wanted.name + "=1e999";
+    await until("the reading of a senseless address", () => root.simulated === "yes" && location.hash !== shown && !location.hash.includes("e999"));
+    if (location.hash.length > 1) throw new Error("a senseless address has an effect: " + location.hash);
+    location.hash = shown;
+    await until("the settings of an address", () => root.simulated === "yes" && $$("#page-method").value === "erk5+projection");
+    if (Number($$('#parameters input[type=number][data-name="' + wanted.name + '"]').value) !== wanted.value) throw new Error("the address is not read");
+    await until("ends of sliders that work", () => root.narrowed);
+    for (const end of ["min", "max"]) {
+      const slider = '#parameters input[type=range][data-name="' + wanted.name + '"]';
+      await change(slider, $$(slider)[end], "input");
+    }
     $$("#page-reset").click();
     await until("the reset", () => root.simulated === "yes" && $$("#page-method").value !== "erk5+projection");
   } catch (error) {

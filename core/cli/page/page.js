@@ -68,6 +68,8 @@ class Engine {
 
   /* A run for load(), with its cost. */
   run (s, limit) {
+    const many = this.page.parameters.find((p, i) => p.domain === "count" && s.parameters[i] > 200);
+    if (many) throw new Error(many.name + " is too large for a page, which takes at most 200; use the program");
     const { ms, reason } = this.integrate(s, limit, 1), samples = this.wasm.samples();
     if (samples < 2) throw new Error(reason || "the run has no samples");
     const scene = this.scene();
@@ -108,23 +110,23 @@ const byName = name => page.methods.find(m => m.name === name);
 const clone = () => ({ method: page.method, accuracy: null, end: page.t_end,
   parameters: page.parameters.map(p => p.value), initial: new Map() });
 
-/* Fixed steps: step size; adaptive: tolerance.  The slider is its decimal logarithm. */
+/* Fixed steps: step size; initial values belong to the page's own numbers of bodies; adaptive: tolerance.  The slider is its decimal logarithm. */
 function accuracy (s) {
   return s.accuracy ?? (byName(s.method).adaptive ? page.rtol : page.step);
 }
 function engineSettings (s) {
-  return { ...s, initial: [...s.initial], step: accuracy(s), rtol: accuracy(s) };
+  const counts = page.parameters.some((p, i) => p.domain === "count" && s.parameters[i] !== p.value);
+  return { ...s, initial: counts ? [] : [...s.initial], step: accuracy(s), rtol: accuracy(s) };
 }
 
 /* A label with a slider and a number; `change` gets the number. */
 function control (parent, name, unit, about, value, low, high, step, change) {
   const label = document.createElement("label"), text = document.createElement("span");
   const slider = document.createElement("input"), number = document.createElement("input");
-  text.textContent = name + (unit ? " [" + unit + "]" : "");
-  label.title = about;
+  text.textContent = name + (unit ? " [" + unit.replace(/\^(\d)/g, (all, n) => raised(n)) + "]" : "");
   slider.type = "range";
   number.type = "number";
-  slider.setAttribute("aria-label", text.textContent + " " + about);
+  slider.setAttribute("aria-label", text.textContent + (about ? ": " + about : ""));
   number.setAttribute("aria-label", text.textContent);
   slider.min = low; slider.max = high; slider.step = step || (high - low) / 1000;
   number.step = step || "any";
@@ -141,7 +143,38 @@ function control (parent, name, unit, about, value, low, high, step, change) {
   });
   show(value);
   label.append(text, slider, number);
+  if (about) label.append(Object.assign(document.createElement("small"), { textContent: about }));
   parent.append(label);
+  return { slider, number };
+}
+
+/* Ends of sliders that are to be tried, each with the change that it makes to the page's own settings. */
+let untried = [];
+
+/* Moves the ends of the next slider towards its first value until a run can begin there and lasts for 40 ms of computation. */
+async function narrow () {
+  const next = untried.shift();
+  if (!next) { document.documentElement.dataset.narrowed = true; return; }
+  const { slider, number, value, set } = next, whole = slider.step === "1" ? Math.round : x => x;
+  for (const end of ["min", "max"]) {
+    let x = Number(slider[end]);
+    for (let k = 0; x !== value && !await runsWith(set, x); k++) x = k < 6 ? whole(value + (x - value) / 2) : value;
+    slider[end] = Math[end](x, Number(number.value));
+  }
+  slider.disabled = slider.min === slider.max;
+  if (slider.disabled) slider.title = "the model does not run with other values near this one";
+  setTimeout(narrow, 0);
+}
+
+async function runsWith (set, x) {
+  const s = clone();
+  set(s, x);
+  try {
+    return /^(stopped at.*)?$/.test(engine.integrate(engineSettings(s), 40, 0).reason);
+  } catch (error) {
+    await engine.restart();
+    return false;
+  }
 }
 
 /* From a tenth to three times a positive default; around other values as far as they are from zero. */
@@ -159,13 +192,13 @@ function fillPanel () {
   $("page-method").value = settings.method;
   $("page-end").value = settings.end;
   for (const id of ["parameters", "states"]) while ($(id).querySelector("label")) $(id).querySelector("label").remove();
-  page.parameters.forEach((p, i) => control($("parameters"), p.name, p.unit, p.about, settings.parameters[i], ...rangeOf(p.value, p.domain),
-    x => { settings.parameters[i] = x; later(); }));
-  page.states.forEach((state, i) => {
-    const value = settings.initial.get(i) ?? state.value;
-    control($("states"), state.name, state.unit, "initial value", value, ...rangeOf(value, "real"),
-      x => { settings.initial.set(i, x); later(); });
-  });
+  const add = (parent, item, about, value, first, domain, set) => untried.push({ set, value: first,
+    ...control(parent, item.name, item.unit, about, value, ...rangeOf(first, domain), x => { set(settings, x); later(); }) });
+  untried = [];
+  page.parameters.forEach((p, i) => add($("parameters"), p, p.about, settings.parameters[i], p.value, p.domain,
+    (s, x) => { s.parameters[i] = x; }));
+  page.states.forEach((state, i) => add($("states"), state, "", settings.initial.get(i) ?? state.value, state.value, "real",
+    (s, x) => s.initial.set(i, x)));
   $("parameters").hidden = page.parameters.length === 0;
   fillAccuracy();
 }
@@ -173,11 +206,12 @@ function fillPanel () {
 function fillAccuracy () {
   const adaptive = byName(settings.method).adaptive;
   $("page-accuracy-name").textContent = adaptive ? "Tolerance" : "Step size [s]";
-  $("page-accuracy").min = adaptive ? -12 : -5;
-  $("page-accuracy").max = adaptive ? -2 : -1;
+  const power = x => Math.floor(Math.log10(x));
+  $("page-accuracy").min = adaptive ? -12 : Math.min(-5, power(page.step) - 1);
+  $("page-accuracy").max = adaptive ? -2 : Math.min(-1, power(page.t_end) - 1);
   $("page-accuracy").step = adaptive ? 0.5 : 0.25;
   $("page-accuracy").value = Math.log10(accuracy(settings));
-  $("page-accuracy-value").textContent = accuracy(settings).toPrecision(2);
+  $("page-accuracy-value").textContent = rounded(accuracy(settings));
 }
 
 /* ---- Runs ---- */
@@ -204,7 +238,7 @@ function simulate () {
     result = engine.run(engineSettings(settings), 4000);
   } catch (error) {
     engine.restart();
-    $("reason").textContent = error.message;
+    $("reason").textContent = error.message + (run ? ". The run before it is still shown." : "");
     document.documentElement.dataset.simulated = "error";
     return;
   }
@@ -240,18 +274,16 @@ function rows (id, list) {
     return row;
   }));
 }
-const superscript = n => [...String(n)].map(c => c === "-" ? "\u207b" : "\u2070\u00b9\u00b2\u00b3\u2074\u2075\u2076\u2077\u2078\u2079"[c]).join("");
-function scientific (x) {
-  const [digits, power] = x.toExponential(1).split("e");
-  return x === 0 ? "0" : digits + "\u00b710" + superscript(Number(power));
-}
+/* Two digits. */
+function rounded (x) { return isFinite(x) ? number(x, Math.abs(x) / 10) : "unknown"; }
 
 function showCost (result, error) {
   const c = result.cost;
-  rows("page-results", [["error at the end [m, rad]", error === null ? "\u2026" : scientific(error)],
-    ["computing time", (c.ms < 10 ? c.ms.toFixed(2) : c.ms.toFixed(0)) + " ms"], ["steps, rejected", c.steps + ", " + c.rejected],
-    ["evaluations", String(c.evaluations)], ["largest |g|", scientific(c.g)], ["largest |J v|", scientific(c.jv)],
-    ["relative energy defect", scientific(c.energy)]]);
+  rows("page-results", [["error at the end [m, rad]", error === null ? "\u2026" : rounded(error)],
+    ["computing time", (c.ms < 10 ? c.ms.toFixed(2) : c.ms.toFixed(0)) + " ms"], ["steps (rejected)", c.steps + " (" + c.rejected + ")"],
+    ["evaluations of accelerations", String(c.evaluations)], ["largest position residual |g|", rounded(c.g)],
+    ["largest velocity residual |J v|", rounded(c.jv)],
+    ["relative energy defect", rounded(c.energy)]]);
   plotRuns();
 }
 
@@ -275,7 +307,7 @@ function plotRuns () {
   g.fillStyle = colours.faint;
   g.beginPath();
   g.textAlign = "center";
-  const power = n => "10" + superscript(n);
+  const power = n => "10" + raised(n);
   for (let x = x0; x <= x1; x++) { g.moveTo(X(x), Y(y0)); g.lineTo(X(x), Y(y1)); g.fillText(power(x), X(x), s.height - 14); }
   const stride = Math.ceil((y1 - y0) / 7);
   g.textAlign = "right";
@@ -308,14 +340,14 @@ function link () {
 }
 
 function readLink () {
-  const list = new URLSearchParams(location.hash.slice(1)), number = (key, otherwise) => {
-    const x = Number(list.get(key));
-    return list.has(key) && isFinite(x) ? x : otherwise;
+  const list = new URLSearchParams(location.hash.slice(1)), number = (key, otherwise, low = -Infinity) => {
+    const text = (list.get(key) || "").trim(), x = Number(text);
+    return text && isFinite(x) && x > low ? x : otherwise;
   };
   settings = clone();
   if (byName(list.get("method"))) settings.method = list.get("method");
-  settings.accuracy = number("accuracy", null);
-  settings.end = number("t_end", page.t_end);
+  settings.accuracy = number("accuracy", null, 0);
+  settings.end = number("t_end", page.t_end, 0);
   page.parameters.forEach((p, i) => { settings.parameters[i] = number(p.name, p.value); });
   page.states.forEach((state, i) => { const x = number("start." + state.name, null); if (x !== null) settings.initial.set(i, x); });
 }
@@ -339,21 +371,29 @@ function connect () {
   $("page-method").addEventListener("change", e => { settings.method = e.target.value; settings.accuracy = null; fillAccuracy(); later(); });
   $("page-accuracy").addEventListener("input", e => {
     settings.accuracy = Number(Math.pow(10, Number(e.target.value)).toPrecision(3));
-    $("page-accuracy-value").textContent = settings.accuracy.toPrecision(2);
+    $("page-accuracy-value").textContent = rounded(settings.accuracy);
     later();
   });
   $("page-end").addEventListener("change", e => { if (Number(e.target.value) > 0) { settings.end = Number(e.target.value); later(); } });
-  $("page-reset").addEventListener("click", () => { settings = clone(); runs = []; fillPanel(); simulate(); });
+  $("page-reset").addEventListener("click", () => { settings = clone(); runs = []; fillPanel(); simulate(); narrow(); });
   $("page-csv").addEventListener("click", () => save(page.name + ".csv", new Blob([table()], { type: "text/csv" })));
-  $("page-link").addEventListener("click", () => navigator.clipboard.writeText(location.href));
+  $("page-link").addEventListener("click", async () => {
+    try {
+      await navigator.clipboard.writeText(location.href);
+      $("page-copied").textContent = "copied";
+    } catch (error) {
+      $("page-copied").textContent = "copy the address of this page";
+    }
+  });
   $("values").addEventListener("toggle", showValues);
   $("scrub").addEventListener("input", showValues);
   window.addEventListener("resize", plotRuns);
-  window.addEventListener("hashchange", () => { if (location.hash.slice(1) !== link()) { readLink(); fillPanel(); simulate(); } });
+  window.addEventListener("hashchange", () => { if (location.hash.slice(1) !== link()) { readLink(); fillPanel(); simulate(); narrow(); } });
 }
 
 async function start_page (data) {
   page = data;
+  for (const what of ["name", "about"]) $(what === "name" ? "model" : what).textContent = page[what];
   readLink();
   fillPanel();
   connect();
@@ -364,6 +404,7 @@ async function start_page (data) {
   try {
     engine = await Engine.open(page);
     simulate();
+    narrow();
   } catch (error) {
     $("reason").textContent = error.message;
   }

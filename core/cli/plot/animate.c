@@ -65,20 +65,42 @@ static void page_bodies (FILE *f, const pw_plots *p) {
   fputs ("],\n", f);
 }
 
+/* A stroke of a symbol: 1 if it is closed + 2 if it is upright, then its vertices. */
+static void page_stroke (void *context, const pw_plot_stroke *s) {
+  FILE *f = context;
+  fprintf (f, "[%d", s->closed + 2 * s->upright);
+  for (int k = 0; k < s->count; k++) {
+    fputs (",[", f);
+    page_numbers (f, s->at[k], 4, 5);
+    fputc (']', f);
+  }
+  fputs ("],", f);
+}
+
+static void page_symbol (FILE *f, const pw_plots *p, const pw_plot_link *link) {
+  double heading = pw_plot_heading (link);
+  fprintf (f, ",\"contact\":%d,\"line\":%d,\"heading\":", link->contact, pw_plot_line (link));
+  page_numbers (f, &heading, 1, 9);
+  fputs (",\"strokes\":[", f);
+  if (link->kind->symbol) pw_plot_strokes (p, 0, link, p->samples, page_stroke, f);
+  fputs ("0]", f);
+}
+
 static void page_links (FILE *f, const pw_plots *p) {
   fputs ("\"links\":[", f);
   for (int i = 0; i < p->links; i++) {
     const pw_plot_link *link = &p->link[i];
     const pw_element_info e = pw_system_element (p->s, link->element);
     page_text (f, i ? ",\n{\"name\":" : "\n{\"name\":", e.name);
-    page_text (f, ",\"kind\":", e.kind->name);
     fprintf (f, ",\"force\":%d,\"ends\":[", link->force);
     for (int n = 0; n < link->ends; n++) {
       fprintf (f, "%s{\"body\":%d,\"at\":[", n ? "," : "", link->end[n].body);
       page_numbers (f, link->end[n].at, 2, 9);
       fputs ("]}", f);
     }
-    fputs ("]}", f);
+    fputc (']', f);
+    page_symbol (f, p, link);
+    fputc ('}', f);
   }
   fputs ("],\n", f);
 }
@@ -96,9 +118,11 @@ static void page_array (FILE *f, const pw_plots *p, const char *key, int offset,
 }
 
 void pw_animation_scene (FILE *f, const pw_plots *p) {
-  const double size = pw_plot_size (p);
+  const double size = pw_plot_size (p), symbol = pw_plot_unit (p);
   fputs ("\"size\":", f);
   page_numbers (f, &size, 1, 9);
+  fputs (",\"symbol\":", f);
+  page_numbers (f, &symbol, 1, 9);
   fputs (",\n", f);
   page_bodies (f, p);
   page_links (f, p);

@@ -94,9 +94,10 @@ typedef struct {
   int force, column; /* end, and the first column of its body; -1: at a joint of other elements, without its force */
 } pw_plot_link;
 
-/* A line of a symbol: vertices a, x, y, b; the point p1 + a (p2 - p1) + b times that turned to the left + u (x e + y n). */
+/* A line of a symbol: vertices a, x, y, b; the point p1 + a (p2 - p1) + b times that turned to the left + u (x e + y n).
+ * `upright`: e is the x axis, and p1 = p2 if the first body is the ground. */
 typedef struct {
-  int count, closed;
+  int count, closed, upright;
   double at[PLOT_VERTICES][4];
 } pw_plot_stroke;
 
@@ -165,6 +166,12 @@ void pw_plot_point (const double *motion, const double *at, double out[2]);
 
 /* The next stroke of a symbol, without vertices if its condition does not hold; 0 after the last one. */
 int pw_plot_symbol (const pw_plot_link *link, const char **text, pw_plot_stroke *s);
+/* Passes the strokes of a symbol and of the ground at it, rails as long as the travel from sample i during `samples`. */
+typedef void pw_plot_stroke_function (void *context, const pw_plot_stroke *s);
+void pw_plot_strokes (const pw_plots *p, int i, const pw_plot_link *link, int samples, pw_plot_stroke_function *out,
+                      void *context);
+/* The field `heading` of an element [rad]; 0 if it has none. */
+double pw_plot_heading (const pw_plot_link *link);
 /* Passes the lines of a symbol at sample i, rails as long as the travel during `samples`. */
 void pw_plot_draw_symbol (const pw_plots *p, int i, const pw_plot_link *link, int samples, pw_plot_line_function *out,
                           void *context);

@@ -24,6 +24,10 @@ static double symbol_field (const pw_plot_link *link, const char *name, size_t l
   return f->type == PW_NUMBER ? *(const double *)at : f->type == PW_CHOICE ? *(const int *)at : 0;
 }
 
+double pw_plot_heading (const pw_plot_link *link) {
+  return symbol_field (link, "heading", 7);
+}
+
 /* Reads a condition; 0 if it does not hold. */
 static int symbol_condition (const pw_plot_link *link, const char **text) {
   const char *name = *text, *colon = name + strcspn (name, ":;");
@@ -108,7 +112,7 @@ static symbol_frame symbol_place (const pw_plots *p, int i, const pw_plot_link *
   if (link->contact >= 0)
     angle = pw_plot_track (p, i, &p->wheels, link->contact)[2];
   else if (line)
-    angle += symbol_field (link, "heading", 7);
+    angle += pw_plot_heading (link);
   else if (hypot (f.d[0], f.d[1]) > 1e-9 * f.unit)
     angle = atan2 (f.d[1], f.d[0]);
   f.e[0] = cos (angle), f.e[1] = sin (angle);
@@ -127,50 +131,70 @@ static symbol_frame symbol_travel (const pw_plots *p, int sample, const pw_plot_
   return f;
 }
 
-static void symbol_vertex (const symbol_frame *f, const double *v, double out[2]) {
-  double x = isinf (v[1]) ? (v[1] > 0 ? f->high : f->low) : f->unit * v[1], y = f->unit * v[2];
-  out[0] = f->p[0] + v[0] * f->d[0] - v[3] * f->d[1] + x * f->e[0] - y * f->e[1];
-  out[1] = f->p[1] + v[0] * f->d[1] + v[3] * f->d[0] + x * f->e[1] + y * f->e[0];
-}
-
-static void symbol_stroke (const symbol_frame *f, const pw_plot_stroke *s, pw_plot_line_function *out, void *context) {
-  double at[PLOT_VERTICES][2];
-  for (int k = 0; k < s->count; k++) symbol_vertex (f, s->at[k], at[k]);
-  if (s->count) out (context, at, s->count, s->closed);
-}
-
-/* Hatching from x0 to x1 of a line below `at`. */
-static void symbol_hatch (symbol_frame f, double x0, double x1, double y, pw_plot_line_function *out, void *context) {
-  pw_plot_stroke s = { .count = 2 };
-  f.low = x0, f.high = x1;
-  int strokes = (int)fmin (60, ceil ((x1 - x0) / (0.6 * f.unit)));
+/* Hatching from x0 to x1 of a line below the last point. */
+static void symbol_hatch (double x0, double x1, double y, int upright, pw_plot_stroke_function *out, void *context) {
+  pw_plot_stroke s = { .count = 2, .upright = upright };
+  int strokes = (int)fmin (60, ceil ((x1 - x0) / 0.6));
   for (int k = 0; k < strokes; k++) {
-    double x = (x0 + (x1 - x0) * (k + 0.5) / strokes) / f.unit;
+    double x = x0 + (x1 - x0) * (k + 0.5) / strokes;
     memcpy (s.at[0], (const double[]){ 1, x + 0.25, y, 0 }, sizeof *s.at);
     memcpy (s.at[1], (const double[]){ 1, x - 0.25, y - 0.5, 0 }, sizeof *s.at);
-    symbol_stroke (&f, &s, out, context);
+    out (context, &s);
   }
 }
 
 /* A rail on the ground, or a support of a joint on the ground. */
-static void symbol_ground (symbol_frame f, const pw_plot_link *link, pw_plot_line_function *out, void *context) {
+static void symbol_ground (double low, double high, const pw_plot_link *link, pw_plot_stroke_function *out,
+                           void *context) {
   static const pw_plot_stroke support = {
-    6, 0, { { 1, 1.1, -1.5 }, { 1, .8, -1.5 }, { 1, 0, 0 }, { 1, -.8, -1.5 }, { 1, -1.1, -1.5 }, { 1, 1.1, -1.5 } }
+    6, 0, 1, { { 1, 1.1, -1.5 }, { 1, .8, -1.5 }, { 1, 0, 0 }, { 1, -.8, -1.5 }, { 1, -1.1, -1.5 }, { 1, 1.1, -1.5 } }
   };
   if (pw_plot_line (link)) {
-    symbol_hatch (f, f.low, f.high, strstr (link->kind->symbol, "1 -inf -") ? -.4 : 0, out, context);
+    symbol_hatch (low, high, strstr (link->kind->symbol, "1 -inf -") ? -.4 : 0, 0, out, context);
     return;
   }
-  if (link->end[0].body < 0) f.d[0] = f.d[1] = 0;
-  f.e[0] = 1, f.e[1] = 0;
-  symbol_stroke (&f, &support, out, context);
-  symbol_hatch (f, -1.1 * f.unit, 1.1 * f.unit, -1.5, out, context);
+  out (context, &support);
+  symbol_hatch (-1.1, 1.1, -1.5, 1, out, context);
+}
+
+void pw_plot_strokes (const pw_plots *p, int i, const pw_plot_link *link, int samples, pw_plot_stroke_function *out,
+                      void *context) {
+  const symbol_frame f = symbol_travel (p, i, link, samples);
+  const double low = f.low / f.unit, high = f.high / f.unit;
+  pw_plot_stroke s = { .upright = 0 };
+  if (link->end[link->ends - 1].body < 0 || link->end[0].body < 0) symbol_ground (low, high, link, out, context);
+  for (const char *text = link->kind->symbol; pw_plot_symbol (link, &text, &s);) {
+    for (int k = 0; k < s.count; k++)
+      if (isinf (s.at[k][1])) s.at[k][1] = s.at[k][1] > 0 ? high : low;
+    if (s.count) out (context, &s);
+  }
+}
+
+/* ---- Lines ---- */
+
+typedef struct {
+  symbol_frame along, upright; /* of the element; of its support */
+  pw_plot_line_function *out;
+  void *context;
+} symbol_lines;
+
+static void symbol_line (void *context, const pw_plot_stroke *s) {
+  const symbol_lines *x = context;
+  const symbol_frame *f = s->upright ? &x->upright : &x->along;
+  double at[PLOT_VERTICES][2];
+  for (int k = 0; k < s->count; k++) {
+    const double *v = s->at[k];
+    at[k][0] = f->p[0] + v[0] * f->d[0] - v[3] * f->d[1] + f->unit * (v[1] * f->e[0] - v[2] * f->e[1]);
+    at[k][1] = f->p[1] + v[0] * f->d[1] + v[3] * f->d[0] + f->unit * (v[1] * f->e[1] + v[2] * f->e[0]);
+  }
+  x->out (x->context, at, s->count, s->closed);
 }
 
 void pw_plot_draw_symbol (const pw_plots *p, int i, const pw_plot_link *link, int samples, pw_plot_line_function *out,
                           void *context) {
-  const symbol_frame f = symbol_travel (p, i, link, samples);
-  pw_plot_stroke s;
-  if (link->end[link->ends - 1].body < 0 || link->end[0].body < 0) symbol_ground (f, link, out, context);
-  for (const char *text = link->kind->symbol; pw_plot_symbol (link, &text, &s);) symbol_stroke (&f, &s, out, context);
+  const symbol_frame f = symbol_place (p, i, link);
+  symbol_lines x = { f, f, out, context };
+  if (link->end[0].body < 0) x.upright.d[0] = x.upright.d[1] = 0;
+  x.upright.e[0] = 1, x.upright.e[1] = 0;
+  pw_plot_strokes (p, i, link, samples, symbol_line, &x);
 }

@@ -175,8 +175,9 @@ int page_run (const char *method, double step, double rtol, double t_end, double
   pw_run *r = page_error.status == PW_OK ? pw_run_open (page_system, method, &settings, &page_error) : NULL;
   int status = r ? page_integrate (r, t_end) : page_error.status;
   if (status == PW_STOPPED)
-    status = pw_fail (&page_error, PW_METHOD, "stopped at t = %.4g s, after %g s of computation", pw_run_time (r),
-                      limit / 1000);
+    status = pw_fail (&page_error, PW_METHOD,
+                      "stopped at t = %.4g s, after %g s of computation; a larger step or tolerance is faster",
+                      pw_run_time (r), limit / 1000);
   pw_run_close (r);
   return status;
 }
