@@ -114,8 +114,9 @@ static int watchdog_fail_lost (pw_run *r, pw_error *error) {
                                 : "; a smaller tolerance or a stabilisation reduces it";
   else if (pw_fixed_steps (r))
     snprintf (cause, sizeof cause, "the step of %.6g s is too large", r->settings.step);
-  return pw_fail (error, PW_METHOD, "t = %.6g s: %s: %s is violated by %.3g in position and %.3g in rate (scaled)%s",
-                  r->t, cause, element, now.position, now.velocity, advice);
+  return pw_fail (error, PW_METHOD,
+                  "t = %.6g s: %s: %s is violated by %.3g in position and %.3g in velocity (scaled)%s", r->t, cause,
+                  element, now.position, now.velocity, advice);
 }
 
 static int watchdog_exceeds (double position, double velocity, double limit) {
