@@ -34,32 +34,26 @@ def run(arguments):
     return done
 
 
-def animation(result) -> str | None:
-    """The animation of a result's model and settings, as a page; None if the program cannot make it."""
+def animation(result) -> str:
+    """The animation of a result's model and settings, in a frame; a text with the reason if there is none."""
     given = {"step": "step", "rtol": "rtol", "atol": "atol"}
     words = [f"--method={result.settings['method']}", f"--t-end={result.settings['t_end']!r}"]
     words += [f"--{o}={result.settings[k]!r}" for k, o in given.items() if result.settings.get(k)]
     words += [f"--specialise={result.settings.get('specialise', 'auto')}"]
-    return _page("run", result.model, "--animate", words)
+    return _page("run", result.model, "--animate", words, repr(result))
 
 
-def interactive(model) -> str | None:
-    """The page that simulates a model in the browser; None if the program cannot make it."""
-    return _page("page", model, "--output", [])
+def interactive(model) -> str:
+    """The page that simulates a model in the browser, likewise."""
+    return _page("page", model, "--output", [], repr(model))
 
 
-def _page(command, model, option, words):
+def _page(command, model, option, words, otherwise):
     with tempfile.TemporaryDirectory() as folder:
         path = pathlib.Path(folder) / "page.html"
         try:
             run([command, *options(model), f"{option}={path}", *words])
-            return path.read_text(encoding="utf-8")
-        except (lib.Error, OSError):
-            return None
-
-
-def framed(page: str | None, otherwise: str) -> str:
-    """A page as a part of another; a text in its place if there is none."""
-    if page is None:
-        return html.escape(otherwise)
+            page = path.read_text(encoding="utf-8")
+        except (lib.Error, OSError) as failure:
+            return html.escape(f"{otherwise}, not shown: {failure}")
     return f'<iframe srcdoc="{html.escape(page)}" style="width: 100%; height: 40em; border: 0"></iframe>'

@@ -199,7 +199,7 @@ class Model:
 
     def _repr_html_(self) -> str:
         """In notebooks: the page that simulates the model."""
-        return _program.framed(_program.interactive(self), repr(self))
+        return _program.interactive(self)
 
     def __reduce__(self):
         if self.signals:

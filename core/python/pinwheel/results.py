@@ -90,8 +90,7 @@ class Result:
 
     def _repr_html_(self) -> str:
         """In notebooks: the animation."""
-        page = _program.animation(self) if self.model is not None and self.model.source else None
-        return _program.framed(page, repr(self))
+        return _program.animation(self)
 
 
 def _nearest(name, names):
