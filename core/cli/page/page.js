@@ -130,7 +130,7 @@ function control (parent, name, unit, about, value, low, high, step, change) {
   number.setAttribute("aria-label", text.textContent);
   slider.min = low; slider.max = high; slider.step = step || (high - low) / 1000;
   number.step = step || "any";
-  const short = x => Number(x.toPrecision(8));
+  const short = x => Number(x.toPrecision(7));
   slider.dataset.name = number.dataset.name = name;
   const show = x => { slider.value = x; number.value = short(x); };
   slider.addEventListener("input", () => { number.value = Number(Number(slider.value).toPrecision(4)); change(Number(number.value)); });
