@@ -44,7 +44,7 @@ static void reverse (variant *speed, pw_error *e) {
   pw_linear_free (&linear), pw_run_close (run), pw_system_free (system);
 }
 
-/* Steers for 5 s and differentiates the angle of the trailer by the steering angle. */
+/* Steers for 5 s and differentiates the angle of the trailer with respect to the steering angle. */
 static void steering (variant *steer, pw_error *e) {
   static const double angle = 0.02, step = 1e-6;
   pw_direction direction = { .step = step };

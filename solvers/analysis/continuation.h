@@ -18,8 +18,8 @@ typedef struct {
   int unknowns, equations; /* entries of x and of F */
   double tolerance;        /* solutions have |F_i| <= tolerance */
   double rank;             /* smaller singular values, relative to the largest one, count as 0; default 1e-9 */
-  /* Evaluates F (equations) and, unless dF is NULL, its derivatives by u by columns: equations x (unknowns + 1); both
-   * are 0 before.  A status; PW_RETRY, with or without an error: F cannot be evaluated there. */
+  /* Evaluates F (equations) and, unless dF is NULL, its derivatives with respect to u by columns: equations x
+   * (unknowns + 1); both are 0 before.  A status; PW_RETRY, with or without an error: F cannot be evaluated there. */
   int (*evaluate) (void *context, const double *u, double *F, double *dF, pw_error *error);
   void *context;
 } pw_branch_equations;

@@ -1,4 +1,4 @@
-/* The motion over one period, with its derivatives by the initial state; signals and their period. */
+/* The motion over one period, with its derivatives with respect to the initial state; signals and their period. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>

@@ -105,7 +105,7 @@ double pw_hold_unit (const pw_steady *x, const pw_initial_value *hold);
 double pw_hold_residual (const pw_system *s, const pw_initial_value *hold, const double *q, const double *v);
 double pw_hold_change (const pw_system *s, const pw_initial_value *hold, const double *q, const double *v,
                        const double *dq, const double *dv);
-/* The derivative of the residual by its value. */
+/* The derivative of the residual with respect to its value. */
 double pw_hold_slope (const pw_system *s, const pw_initial_value *hold, const double *q, const double *v);
 
 /* ---- steady_start.c ---- */

@@ -175,7 +175,7 @@ static int change_fail (pw_run *r, int row, double least, const char *what, doub
   if (row >= 0) pw_system_row_name (r->s, row, element, sizeof element);
   return pw_fail (error, PW_METHOD,
                   "t = %.6g s: change point at %s: %s; branches come within %.2g of each other, the step is "
-                  "%.2g long (scaled); take a smaller %s",
+                  "%.2g long (scaled); use a smaller %s",
                   r->t, element, what, least, length, pw_fixed_steps (r) ? "step" : "tolerance");
 }
 

@@ -356,7 +356,7 @@ static int radau_at (pw_run *r, double t, pw_error *error) {
   if (status == PW_OK) return PW_OK;
   if (status == PW_METHOD) return pw_fail_signal (t, error);
   if (r->near) return pw_fail_singular (r, t, error);
-  return pw_fail (error, PW_METHOD, "t = %.6g s: no state near the one between steps meets the constraints", t);
+  return pw_fail (error, PW_METHOD, "t = %.6g s: no state near the interpolated one satisfies the constraints", t);
 }
 
 static const pw_stabilisation radau_stabilisations[] = {

@@ -37,8 +37,8 @@ void pw_tangent_pull (const pw_tangent *x, const double *used, int count, double
 /* Values of the first `count` active equations from those of all. */
 void pw_tangent_compress (const pw_tangent *x, const double *all, int count, double *used);
 
-/* Positions of the parts in the matrix. a may share its columns with v: derivatives by a are multiplied by `of_a`,
- * those by q' by `of_q` in the columns of q, those by lambda and mu by `of_lambda`. */
+/* Positions of the parts in the matrix. a may share its columns with v: derivatives with respect to a are multiplied by
+ * `of_a`, those by q' by `of_q` in the columns of q, those by lambda and mu by `of_lambda`. */
 typedef struct {
   int momentum, constraint; /* first row of each; that of the kinematics is 0 */
   int q, v, a, lambda, mu;  /* first column of each */

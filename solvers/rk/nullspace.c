@@ -53,7 +53,7 @@ int pw_nullspace_open (pw_nullspace *b, pw_run *r, pw_error *error) {
   if (b->rows > PW_NULLSPACE_MOST)
     return pw_fail (error, PW_INPUT,
                     "model %s: stabilisation nullspace works with dense matrices, for up to %d constraint rows, and "
-                    "this scene has %d; take %s+projection",
+                    "this scene has %d; use %s+projection",
                     s->model, PW_NULLSPACE_MOST, b->rows, r->method->name);
   if (nullspace_allocate (b, s) != PW_OK) return pw_fail (error, PW_RESOURCE, "model %s: out of memory", s->model);
   for (int i = 0, n = 0; i < s->rows; i++) b->place[i] = r->active && !r->active[i] ? -1 : n++;

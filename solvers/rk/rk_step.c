@@ -178,11 +178,11 @@ int pw_rk_fail (pw_run *r, int status, double h, pw_error *error) {
                     pw_system_row_name (r->s, against, element, sizeof element));
   if (finite && pw_watchdog_near_state (r)) return pw_fail_singular (r, r->t, error);
   if (!finite && h < 1e-12 * fabs (r->t))
-    return pw_fail (error, PW_METHOD, "t = %.6g s: the state is not finite behind it, however small the step", r->t);
+    return pw_fail (error, PW_METHOD, "t = %.6g s: the next state is not finite, however small the step", r->t);
   return pw_fail (error, PW_METHOD, "t = %.6g s: the step of %.6g s is too large: %s", r->t, h,
                   r->data->split        ? "near a singular configuration no two divisions of it agree"
                   : !finite             ? "the state is no longer finite"
-                  : r->data->null_space ? "the velocities' basis does not last"
+                  : r->data->null_space ? "the basis of the velocities does not stay valid"
                   : r->data->projects   ? "the projection does not converge"
                                         : "a stage of it lands in a singular configuration");
 }

@@ -76,7 +76,7 @@ int pw_dense_output_at (pw_dense_output *b, pw_run *r, double t, pw_error *error
   if (status == PW_METHOD) return pw_fail_signal (t, error);
   if (r->near) return pw_fail_singular (r, t, error);
   return pw_fail (error, PW_METHOD,
-                  "t = %.6g s: no state near the one between steps meets the constraints; "
+                  "t = %.6g s: no state near the interpolated one satisfies the constraints; "
                   "the step of %.6g s may be too large",
                   t, r->t - b->t0);
 }

@@ -22,7 +22,7 @@ static int run_settings (pw_settings *to, const pw_settings *from, const pw_meth
     return pw_fail (error, PW_INPUT, "setting rtol = %g: round-off allows no less than %.2g", from->rtol,
                     RUN_LEAST_RTOL);
   if (method->adaptive && from->rtol >= 1)
-    return pw_fail (error, PW_INPUT, "setting rtol = %g: expected a part of each state, less than 1", from->rtol);
+    return pw_fail (error, PW_INPUT, "setting rtol = %g: expected a number less than 1", from->rtol);
   if (!isfinite (from->t)) return pw_fail (error, PW_INPUT, "setting t = %g: expected a finite number", from->t);
   if (from->max_steps < 0)
     return pw_fail (error, PW_INPUT, "setting max_steps = %ld: expected a number > 0", from->max_steps);

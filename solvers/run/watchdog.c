@@ -159,14 +159,15 @@ static int watchdog_check_turn (pw_run *r, double now, pw_error *error) {
   double off = watchdog_residual (r), before = fmax (r->previous_norm, limit->least_turn);
   if (!(now <= limit->turn * before) && watchdog_unresolved (r, off, limit->drift_turn))
     return pw_fail (error, PW_METHOD,
-                    "t = %.6g s: lost at a singular configuration: constraints off by %.2g (scaled) may lead to "
-                    "another branch, with %.3g times the accelerations of before; methods with projection pass",
+                    "t = %.6g s: lost at a singular configuration: constraint residuals of %.2g (scaled) may lead to "
+                    "another branch, with accelerations %.3g times those before; methods with projection pass",
                     r->t, r->residuals.position, now / before);
   if (!(off <= limit->drift_far) && watchdog_unresolved (r, off, limit->drift_any))
-    return pw_fail (error, PW_METHOD,
-                    "t = %.6g s: lost at a singular configuration: constraints off by %.2g (scaled) tell no branch "
-                    "from another; methods with projection pass",
-                    r->t, r->residuals.position);
+    return pw_fail (
+        error, PW_METHOD,
+        "t = %.6g s: lost at a singular configuration: constraint residuals of %.2g (scaled) do not tell one branch "
+        "from another; methods with projection pass",
+        r->t, r->residuals.position);
   return PW_OK;
 }
 

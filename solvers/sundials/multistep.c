@@ -328,7 +328,7 @@ static const pw_stabilisation adams_stabilisations[] = { PW_ACCELERATION_STABILI
 static const pw_stabilisation adams_refused[] = {
   { .name = "projection",
     .about = "CVODES projects with bdf only, and restarts after each projection would leave order 1; "
-             "take bdf+projection or erk8+projection" },
+             "use bdf+projection or erk8+projection" },
   { .name = NULL },
 };
 

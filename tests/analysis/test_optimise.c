@@ -170,7 +170,7 @@ static void test_interrupt (void **state) {
       program ? program : "build/pinwheel");
   assert_int_equal (cli_run (command), 130);
   assert_true (cli_says (cli_file ("o.json"), "status", "interrupted"));
-  assert_non_null (strstr (cli_err, "this is the best result until then"));
+  assert_non_null (strstr (cli_err, "this is the best result so far"));
 }
 
 /* ---- Wrong input ---- */

@@ -180,7 +180,7 @@ static void test_refusals (void **state) {
     { "pendulum --of bob.x --by l --by l", "--by l is given twice" },
     { "chain --of link1.x --by n", "n is a count (10): derivatives need a number that varies continuously" },
     { "slider-crank --of crank.phi --by g",
-      "g changes the number of bodies or elements: it cannot be differentiated by" },
+      "g changes the number of bodies or elements: derivatives with respect to it do not exist" },
     { "pendulum --of bob.x --by l --method rk4:inputs=held",
       "derivatives need inputs=stage: held inputs depend on the steps" },
   };

@@ -13,7 +13,7 @@ static void test_max_steps (void **state) {
   (void)state;
   assert_int_equal (cli_run ("pinwheel run ezyroller --method erk5 --max-steps 50 -o @/m.csv --json @/m.json"), 4);
   assert_non_null (strstr (cli_err, "s: the limit max-steps is reached: 50 attempted steps"));
-  assert_non_null (strstr (cli_err, "the table until then is kept in "));
+  assert_non_null (strstr (cli_err, "the table so far is kept in "));
   assert_true (cli_says (cli_file ("m.json"), "status", "method"));
   double steps = cli_number (cli_file ("m.json"), "statistics", "steps", NULL);
   assert_int_equal (cli_run ("wc -l <@/m.csv.part"), 0);
@@ -33,7 +33,7 @@ static void test_limit (void **state) {
               method[i]);
     assert_int_equal (cli_run (command), 4);
     assert_non_null (strstr (cli_err, "s: the limit of 0.02 s of processor time is reached (--limit)"));
-    assert_non_null (strstr (cli_err, "the table until then is kept in "));
+    assert_non_null (strstr (cli_err, "the table so far is kept in "));
   }
 }
 

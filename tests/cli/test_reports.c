@@ -147,7 +147,7 @@ static void test_sorted (void **state) {
   char text[200];
   snprintf (text, sizeof text, "mkdir @/sorted.csv.sorted; %s", sweep);
   assert_int_equal (cli_run (text), 1);
-  assert_non_null (strstr (cli_err, "so the same command has only to sort them\n"));
+  assert_non_null (strstr (cli_err, "so the same command only has to sort them\n"));
   assert_null (cli_file ("sorted.csv"));
   assert_non_null (cli_file ("sorted.csv.part"));
   snprintf (text, sizeof text, "rmdir @/sorted.csv.sorted; %s; wc -l <@/sorted.csv", sweep);

@@ -171,7 +171,7 @@ static void test_bad_input (void **state) {
     { "--vary omega", "--vary omega: expected NAME=lin:FIRST:LAST:COUNT, log:..., or a list v1,v2,..." },
     { "--vary omega=lin:1:2:2e8", "--vary omega=lin:1:2:2e8: too many values: at most 1e8 rows" },
     { "--vary omega=lin:1:2:20000 --vary M0=lin:1:2:30000",
-      "the grid has 600000000 rows: at most 1e8; take coarser ranges, or several sweeps" },
+      "the grid has 600000000 rows: at most 1e8; use coarser ranges, or several sweeps" },
     { "--vary m1=lin:1:-1:3", "model ezyroller: parameter m1 = 0: expected a number > 0" },
     { "--vary omega=1,2 --vary omega=3,4", "--vary omega is given twice" },
     { "--vary omega=1,2 --set omega=3", "omega is given by --vary and by --set" },

@@ -95,7 +95,7 @@ static void test_journal_of_another (void **state) {
 #undef OTHER
   cli_write ("mine.csv.part", "t [s],x [m]\n0,1\n");
   cli_bad ("pinwheel sweep ezyroller " GRID " -o @/mine.csv", 2,
-           "@/mine.csv.part is there already and is no journal of a sweep: remove it if it is not needed");
+           "@/mine.csv.part exists and is not the journal of a sweep: remove it if it is not needed");
   assert_string_equal (cli_file ("mine.csv.part"), "t [s],x [m]\n0,1\n");
 }
 
@@ -142,7 +142,7 @@ static void test_bad_parts (void **state) {
   cli_bad ("pinwheel sweep --merge @/p1.csv @/none.csv -o @/m.csv", 2,
            "cannot open the part @/none.csv: No such file or directory");
   cli_bad ("pinwheel sweep --merge Makefile -o @/m.csv", 2,
-           "Makefile is no part of a sweep: parts are written by --part I/N");
+           "Makefile is not a part of a sweep: parts are written by --part I/N");
   cli_bad ("pinwheel sweep --merge @/p1.csv @/p2.csv @/p3.csv -o @/p2.csv", 2,
            "-o @/p2.csv would overwrite the part, @/p2.csv");
   cli_bad ("pinwheel sweep --merge @/p1.csv -o @/m.csv --jobs 2", 2,

@@ -167,8 +167,8 @@ static void test_states (void **state) {
   assert_int_equal (f->eval (own, 0, (double[]){ 1.5, -2 }, value, gradient), 0);
   check_close ("value", value[0], -2 * 1.5 + 0.1 * 2 * 1.5 * 1.5, 8 * CHECK_EPS, "round-off");
   double bound = 100 * pow (CHECK_EPS, 2.0 / 3); /* central differences */
-  check_close ("derivative by phi", gradient[0], -2 + 2 * 0.1 * 2 * 1.5, bound, "differences");
-  check_close ("derivative by omega", gradient[1], -0.1 * 1.5 * 1.5, bound, "differences");
+  check_close ("derivative with respect to phi", gradient[0], -2 + 2 * 0.1 * 2 * 1.5, bound, "differences");
+  check_close ("derivative with respect to omega", gradient[1], -0.1 * 1.5 * 1.5, bound, "differences");
   f->close (own);
   text_close (&x);
 }

@@ -87,7 +87,7 @@ static void test_refused (void **state) {
                    "method option positions cannot be \"project\"; did you mean \"projected\"?");
   methods_refused ("adams+projection",
                    "integrator adams has no projection: CVODES projects with bdf only, and restarts after each "
-                   "projection would leave order 1; take bdf+projection or erk8+projection");
+                   "projection would leave order 1; use bdf+projection or erk8+projection");
   methods_refused ("adams+projektion", "integrator adams has no stabilisation \"projektion\"; valid are none, ...");
   methods_refused ("galpha+index2", "integrator galpha has no stabilisation \"index2\"; did you mean \"index3\"?");
   methods_refused ("galpha+ggl:ro=1", "method galpha+ggl has no option \"ro\"; did you mean \"rho\"?");

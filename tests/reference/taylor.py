@@ -1,4 +1,4 @@
-"""Taylor arithmetic: quantities along a motion, their first two derivatives by time, and their gradients.
+"""Taylor arithmetic: quantities along a motion, their first two time derivatives, and their gradients.
 
 A vector of the plane is a complex number, so that a turn by phi is a product with exp (i phi).  The motion is q (t) with
 the velocities v and zero accelerations; what accelerations add to a second derivative is the gradient times them."""

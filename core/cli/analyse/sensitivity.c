@@ -1,4 +1,4 @@
-/* pinwheel sensitivity: derivatives of outputs of a run by parameters and initial values. */
+/* pinwheel sensitivity: derivatives of outputs of a run with respect to parameters and initial values. */
 #define _POSIX_C_SOURCE 200809L
 #include <math.h>
 #include <stdlib.h>
@@ -103,10 +103,10 @@ static const struct poptOption sensitivity_options[] = {
 const pw_command pw_cli_sensitivity = {
   .name = "sensitivity",
   .synopsis = "MODEL --of OUTPUT --by NAME [OPTION...]",
-  .summary = "differentiate outputs of a run by parameters and initial values",
-  .help = "Differentiate outputs of a run by parameters and initial values, at the end and along the run, by the "
-          "variational equations: exact in the states, by differences of compiled models in the parameters, with the "
-          "error of these.",
+  .summary = "differentiate outputs of a run with respect to parameters and initial values",
+  .help = "Differentiate outputs of a run with respect to parameters and initial values, at the end and along the run, "
+          "by the variational equations: exact in the states, by differences of compiled models in the parameters, "
+          "with the error of these.",
   .least = 1,
   .most = 1,
   .size = sizeof (pw_sensitivity),

@@ -35,8 +35,8 @@ typedef struct {
   int stopped; /* 1: stopped before t_end */
 } pw_sensitivity;
 
-/* Prepares derivatives by a number of unknowns, which the caller then sets; x has line, of, m, method, settings and t_end.
- * table: with one.  Close it in every case. */
+/* Prepares derivatives with respect to a number of unknowns, which the caller then sets; x has line, of, m, method,
+ * settings and t_end.  table: with one.  Close it in every case. */
 int pw_sensitivity_open (pw_sensitivity *x, int unknowns, int table, pw_error *error);
 /* Begins a run with derivatives; then advances to a time, and sets value, slope and error of all columns there.  A
  * status. */

@@ -104,7 +104,8 @@ int pw_unknown_directions (pw_direction *d, pw_unknown_run *x, const pw_cli_line
       status = pw_unknown_open (&x[4 * i + k], l, file, list, count, i, by, method, settings, error);
       if (status == PW_OK && !unknown_same (middle.system, x[4 * i + k].system))
         status = pw_fail (error, PW_INPUT,
-                          "%s changes the number of bodies or elements: it cannot be differentiated by", list[i].name);
+                          "%s changes the number of bodies or elements: derivatives with respect to it do not exist",
+                          list[i].name);
       d[i].neighbour[k] = x[4 * i + k].run;
     }
   }

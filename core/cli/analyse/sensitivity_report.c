@@ -124,10 +124,9 @@ static void sensitivity_label (const pw_sensitivity *x, int o, int p, char *labe
   char unit[SENSITIVITY_UNIT];
   const char *name = x->unknown[p].name;
   if (x->unknown[p].value != 0)
-    snprintf (label, size, "%.100s × derivative by %.100s [%s]", name, name,
-              pw_outcome_unit (&x->outcomes, o, unit, sizeof unit));
+    snprintf (label, size, "%.100s × ∂/∂%.100s [%s]", name, name, pw_outcome_unit (&x->outcomes, o, unit, sizeof unit));
   else
-    snprintf (label, size, "derivative by %.100s [%s]", name, sensitivity_unit (x, o, p, unit));
+    snprintf (label, size, "∂/∂%.100s [%s]", name, sensitivity_unit (x, o, p, unit));
 }
 
 /* A block of data for each derivative, and its label. */

@@ -21,7 +21,7 @@ typedef struct {
   pw_search_start *s;
   nlopt_opt opt;
   double *u, *at, *value; /* the last run: scaled unknowns, unknowns, outputs */
-  double *slope;          /* outputs x unknowns: derivatives by scaled unknowns; NULL: without */
+  double *slope;          /* outputs x unknowns: derivatives with respect to scaled unknowns; NULL: without */
   int known, sloped, failed;
   int refused;        /* 1: derivatives could not be computed */
   double least, most; /* objectives of the runs that succeeded */

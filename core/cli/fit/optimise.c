@@ -203,7 +203,7 @@ static int optimise_finish (pw_optimise *x, pw_output *file[2], pw_error *error)
   int status = pw_output_finish_all (file, 2, error);
   file[0] = file[1] = NULL;
   if (status == PW_OK && x->plots_path) status = pw_optimise_draw (x, error);
-  if (interrupted) pw_cli_say ("pinwheel: interrupted; this is the best result until then\n");
+  if (interrupted) pw_cli_say ("pinwheel: interrupted; this is the best result so far\n");
   if (status == PW_OK && interrupted) return PW_INTERRUPTED;
   return status == PW_OK && !converged ? pw_fail (error, why.status, "%s", why.text) : status;
 }

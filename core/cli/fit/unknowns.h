@@ -40,8 +40,8 @@ void pw_unknowns_close (pw_unknowns *u);
 int pw_unknowns_system (const pw_unknowns *u, const double *x, pw_cli_model *m, pw_settings *settings, pw_limit *limit,
                         pw_error *error);
 
-/* Prepares derivatives by all unknowns at these values, without their errors; outputs end with NULL.  Close it in every
- * case. */
+/* Prepares derivatives with respect to all unknowns at these values, without their errors; outputs end with NULL.
+ * Close it in every case. */
 int pw_unknowns_differentiate (const pw_unknowns *u, const double *x, const char **outputs, pw_sensitivity *s,
                                pw_error *error);
 

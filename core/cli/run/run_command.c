@@ -319,7 +319,7 @@ static int run_finish (run *x, pw_error *error) {
   if (interrupted) pw_cli_say ("pinwheel: %s\n", reason);
   int status = pw_cli_end (error);
   error->status = PW_OK;
-  if (*x->part[PW_RUN_TABLE]) pw_cli_say ("pinwheel: the table until then is kept in %s\n", x->part[PW_RUN_TABLE]);
+  if (*x->part[PW_RUN_TABLE]) pw_cli_say ("pinwheel: the table so far is kept in %s\n", x->part[PW_RUN_TABLE]);
   if (*x->part[PW_RUN_SUMMARY]) pw_cli_say ("pinwheel: the summary is kept in %s\n", x->part[PW_RUN_SUMMARY]);
   if (x->check.saved > 0 && (interrupted || x->limited || status == -PW_RESOURCE))
     pw_cli_say ("pinwheel: --resume %s continues from t = %s s\n", x->check.path, pw_format (t, x->check.saved, 6));

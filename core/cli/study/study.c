@@ -192,7 +192,7 @@ int pw_study_outcome (const pw_study *x, pw_row *r, int status, const pw_error *
   if (pw_stop) return PW_RETRY;
   r->state = status == PW_INPUT ? ROW_REFUSED : ROW_FAILED;
   snprintf (r->reason, sizeof r->reason, "%s",
-            run_error->status ? run_error->text : "the method failed without a reason");
+            run_error->status ? run_error->text : "the method failed without giving a reason");
   return PW_OK;
 }
 

@@ -122,7 +122,7 @@ static int grid_count (pw_grid *g, pw_error *error) {
   double rows = 1;
   for (int i = 0; i < g->axes; i++) rows *= (double)g->axis[i].count;
   if (rows > PW_GRID_ROWS)
-    return pw_fail (error, PW_INPUT, "the grid has %.15g rows: at most 1e8; take coarser ranges, or several sweeps",
+    return pw_fail (error, PW_INPUT, "the grid has %.15g rows: at most 1e8; use coarser ranges, or several sweeps",
                     rows);
   g->rows = 1;
   for (int i = g->axes - 1; i >= 0; i--) {

@@ -126,7 +126,7 @@ static int journal_read (pw_journal *j, const pw_plan *p, const journal_map *map
   j->size = 0;
   if (rows == NULL) { /* with an incomplete fingerprint there are no rows */
     if (memcmp (map->at, PW_SWEEP_MAGIC, size < magic ? size : magic) == 0) return PW_OK;
-    return pw_fail (error, PW_INPUT, "%s is there already and is no journal of a sweep: remove it if it is not needed",
+    return pw_fail (error, PW_INPUT, "%s exists and is not the journal of a sweep: remove it if it is not needed",
                     j->part);
   }
   if (pw_fingerprint_differ (map->at, rows, own, own + p->fingerprint.used, 1, words, what, sizeof what))
@@ -240,7 +240,7 @@ int pw_table_finish (pw_journal *j, const pw_plan *p, pw_tally *tally, pw_error 
   if (o) table_close (o, &own);
   journal_map_close (&map);
   if (own.status != PW_OK)
-    return pw_fail (error, own.status, "%.300s; all rows are in %.150s, so the same command has only to sort them",
+    return pw_fail (error, own.status, "%.300s; all rows are in %.150s, so the same command only has to sort them",
                     own.text, j->part);
   if (unlink (j->part) == 0) return PW_OK;
   return pw_fail (error, PW_RESOURCE, "%s is complete, but %s cannot be removed: %s", j->path, j->part,
@@ -270,7 +270,7 @@ static int table_open_part (table_part *x, const char *path, pw_error *error) {
   const char *part = x->rows ? pw_fingerprint_value (x->map.at, x->rows, "part", &size) : NULL;
   if (part == NULL || sscanf (part, "%9d/%9d", &x->part, &x->parts) != 2 || x->parts < 1 || x->part < 1 ||
       x->part > x->parts)
-    return pw_fail (error, PW_INPUT, "%s is no part of a sweep: parts are written by --part I/N", path);
+    return pw_fail (error, PW_INPUT, "%s is not a part of a sweep: parts are written by --part I/N", path);
   return PW_OK;
 }
 

@@ -232,7 +232,7 @@ void pw_output_discard (pw_output *o) {
 /* The new name is safe once the folder is on the disk; file systems that refuse this do not need it. */
 static int output_sync_folder (const pw_output *o, pw_error *error) {
   if (o->folder < 0 || fsync (o->folder) == 0 || errno == EINVAL || errno == EROFS || errno == ENOTSUP) return PW_OK;
-  return pw_fail (error, PW_RESOURCE, "%s is written, but its folder cannot be brought to the disk: %s", o->path,
+  return pw_fail (error, PW_RESOURCE, "%s is written, but its folder cannot be written to disk: %s", o->path,
                   strerror (errno));
 }
 

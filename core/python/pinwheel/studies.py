@@ -197,7 +197,7 @@ compare Compares the accuracy and cost of methods against a reference solution.
 drift Compares the drift of constraints and energy in long runs, by stabilisation.
 steady Finds steady motions, and follows them over a parameter.
 periodic Finds periodic motions, and follows them over a parameter.
-sensitivity Differentiates outputs of a run by parameters and initial values.
+sensitivity Differentiates outputs of a run with respect to parameters and initial values.
 fit Fits parameters and initial values to measured data.
 optimise Finds the parameters for which an output is largest or smallest.""".splitlines()
 _RETURNS = dict.fromkeys(("compare", "drift"), "Columns of the table, ndarray of shape (rows,), with units in their names.")
