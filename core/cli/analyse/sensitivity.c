@@ -90,7 +90,7 @@ static const struct poptOption sensitivity_options[] = {
   PW_LIST_OPTION (pw_sensitivity, by, "by", 0, "NAME",
                   "A parameter, or the initial value of a state, such as body.vx; repeatable"),
   PW_TEXT_OPTION (pw_sensitivity, every, "every", 0, "DT",
-                  "Time between rows of the table [s] (default a two-hundredth of the final time)"),
+                  "Time between rows of the table [s] (default a thousandth of the final time)"),
   PW_TEXT_OPTION (pw_sensitivity, folder, "output", 'o', "DIR",
                   "Write sensitivity.csv (outputs and derivatives along the run), sensitivity.json and a figure into a "
                   "folder"),

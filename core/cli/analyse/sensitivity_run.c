@@ -8,8 +8,8 @@
 #include <string.h>
 #include "sensitivity.h"
 
-/* Rows of the table, between which integrals are computed; without both, times of the progress. */
-enum { SENSITIVITY_ROWS = 200, SENSITIVITY_PARTS = 20 };
+/* Rows of the table; intervals of integrals without a table; times of the progress without either. */
+enum { SENSITIVITY_ROWS = 1000, SENSITIVITY_INTERVALS = 200, SENSITIVITY_PARTS = 20 };
 
 int pw_sensitivity_runs_along (const pw_sensitivity *x, int output) {
   const pw_outcome *o = &x->outcomes.outcome[output];
@@ -227,7 +227,7 @@ int pw_sensitivity_open (pw_sensitivity *x, int unknowns, int table, pw_error *e
   int integrates = 0;
   for (const char **of = x->of; *of; of++)
     integrates |= strstr (*of, "integral:") || strstr (*of, "mean:") || strstr (*of, "rms:");
-  x->dt = x->t_end / (table || integrates ? SENSITIVITY_ROWS : SENSITIVITY_PARTS);
+  x->dt = x->t_end / (table ? SENSITIVITY_ROWS : integrates ? SENSITIVITY_INTERVALS : SENSITIVITY_PARTS);
   x->unknown = calloc (P, sizeof *x->unknown);
   x->near = calloc (4 * P, sizeof *x->near);
   x->direction = calloc (P, sizeof *x->direction);
