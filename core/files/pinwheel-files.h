@@ -125,8 +125,11 @@ double *pw_read_columns (const char *path, const char *const *column, const char
                          pw_error *error);
 
 /* Opens a regular file for reading, without waiting (a FIFO is refused).  NULL, with the reason in *why, if that fails
- * or it is another type of file; errno is ENOMEM if there was no memory. */
+ * or it is another type of file. */
 FILE *pw_open_input (const char *path, const char **why);
+
+/* After pw_open_input has failed: PW_RESOURCE if memory or file descriptors did not suffice, else PW_INPUT. */
+int pw_open_input_status (void);
 
 /* ---- What a command reads and writes ---- */
 

@@ -219,8 +219,8 @@ static int search_open (search *p, search_constraint *c, double first, double la
     c[i] = (search_constraint){ p, i };
     status &= nlopt_add_inequality_constraint (p->opt, search_excess, c + i, SEARCH_ALLOWED / 10) > 0;
   }
-  nlopt_set_xtol_abs1 (p->opt, last);
-  nlopt_set_initial_step1 (p->opt, first);
+  status &= nlopt_set_xtol_abs1 (p->opt, last) > 0;
+  status &= nlopt_set_initial_step1 (p->opt, first) > 0;
   nlopt_set_maxeval (p->opt, 200 + 100 * n);
   return status ? PW_OK : PW_RESOURCE;
 }
@@ -259,6 +259,7 @@ static int search_from (search *p, int slopes, double first, double last) {
     if (status == PW_OK) status = search_repeat (p, u);
   }
   nlopt_destroy (p->opt);
+  p->opt = NULL;
   free (memory);
   free (c);
   return status;

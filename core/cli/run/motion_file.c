@@ -213,8 +213,7 @@ static int file_failed (const file_reader *in, pw_error *error) {
 int pw_motion_read (pw_motion *m, const pw_system *s, const char *path, double *t_end, int whole, pw_error *error) {
   const char *why;
   file_reader in = { .path = path, .f = pw_open_input (path, &why) };
-  if (in.f == NULL && errno == ENOMEM) return pw_fail (error, PW_RESOURCE, "--reference %s: out of memory", path);
-  if (in.f == NULL) return pw_fail (error, PW_INPUT, "--reference %s: cannot be read: %s", path, why);
+  if (in.f == NULL) return pw_fail (error, pw_open_input_status (), "--reference %s: cannot be read: %s", path, why);
   pw_error own = { 0 };
   file_read (&in, m, s, t_end, whole, &own);
   if (in.failed) own = (pw_error){ 0 }; /* after a read error the file is not reported as empty or incomplete */

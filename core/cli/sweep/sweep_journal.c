@@ -262,7 +262,7 @@ static int table_open_part (table_part *x, const char *path, pw_error *error) {
   size_t size;
   FILE *f = pw_open_input (path, &reason);
   x->path = path;
-  if (f == NULL) return pw_fail (error, PW_INPUT, "cannot open the part %s: %s", path, reason);
+  if (f == NULL) return pw_fail (error, pw_open_input_status (), "cannot open the part %s: %s", path, reason);
   int status = journal_map_open (&x->map, fileno (f)), why = errno;
   fclose (f);
   if (status != PW_OK) return pw_fail (error, PW_INPUT, "cannot read the part %s: %s", path, strerror (why));

@@ -173,11 +173,11 @@ int pw_columns_read (FILE *f, const char *shown, const char *const *column, cons
 double *pw_read_columns (const char *path, const char *const *column, const char *const *unit, int width, int *rows,
                          pw_error *error) {
   const char *why;
-  FILE *f = pw_open_input (path, &why);
   pw_arena arena = { NULL };
   double **value = calloc ((size_t)width, sizeof *value), *all = NULL;
   int status = PW_OK;
-  if (f == NULL) status = pw_fail (error, PW_INPUT, "%s: cannot be read: %s", path, why);
+  FILE *f = pw_open_input (path, &why);
+  if (f == NULL) status = pw_fail (error, pw_open_input_status (), "%s: cannot be read: %s", path, why);
   if (f && value) status = pw_columns_read (f, path, column, unit, width, 1, &arena, value, rows, error);
   if (f) fclose (f);
   if (status == PW_OK && value) all = malloc (((size_t)*rows * (size_t)width + 1) * sizeof *all);

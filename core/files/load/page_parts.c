@@ -24,7 +24,7 @@ static int page_read (pw_page *p, const char *name, const char *path, pw_error *
   char *bytes = NULL;
   size_t size;
   FILE *f = pw_open_input (path, &why);
-  if (f == NULL) return pw_fail (error, PW_INPUT, "cannot read %s: %s", path, why);
+  if (f == NULL) return pw_fail (error, pw_open_input_status (), "cannot read %s: %s", path, why);
   int status = pw_read_rest (f, PAGE_MAX_BYTES, path, "the limit for a part of a page", &bytes, &size, error);
   fclose (f);
   if (status == PW_OK) return page_add (p, name, bytes, size, error);

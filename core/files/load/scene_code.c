@@ -76,7 +76,7 @@ static int code_read (const char *path, char **text, size_t *size, pw_error *err
   const char *why;
   FILE *f = pw_open_input (path, &why);
   *text = NULL;
-  if (f == NULL) return pw_fail (error, errno == ENOENT ? PW_RETRY : PW_INPUT, "%s", why);
+  if (f == NULL) return pw_fail (error, errno == ENOENT ? PW_RETRY : pw_open_input_status (), "%s", why);
   int status = pw_read_rest (f, CODE_MAX_BYTES, path, "the limit for an object", text, size, error);
   fclose (f);
   return status;

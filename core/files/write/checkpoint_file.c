@@ -1,5 +1,4 @@
 /* Checkpoints as files. */
-#include <errno.h>
 #include <stdint.h>
 #include <stdlib.h>
 #include <string.h>
@@ -36,8 +35,7 @@ int pw_checkpoint_write (const char *path, const char *head, const pw_archive *s
 static int checkpoint_load (const char *path, char **text, size_t *size, pw_error *error) {
   const char *why;
   FILE *f = pw_open_input (path, &why);
-  if (f == NULL && errno == ENOMEM) return pw_fail (error, PW_RESOURCE, "%s: out of memory", path);
-  if (f == NULL) return pw_fail (error, PW_INPUT, "cannot read the checkpoint %s: %s", path, why);
+  if (f == NULL) return pw_fail (error, pw_open_input_status (), "cannot read the checkpoint %s: %s", path, why);
   int status = pw_read_rest (f, SIZE_MAX / 4, path, "the limit for a checkpoint", text, size, error);
   fclose (f);
   return status;

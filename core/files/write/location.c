@@ -18,6 +18,10 @@ FILE *pw_open_input (const char *path, const char **why) {
   return NULL;
 }
 
+int pw_open_input_status (void) {
+  return errno == ENOMEM || errno == EMFILE || errno == ENFILE ? PW_RESOURCE : PW_INPUT;
+}
+
 enum { LOCATION_LINKS = 40 }; /* a longer chain counts as a cycle */
 
 const char *pw_not_regular (mode_t mode) {

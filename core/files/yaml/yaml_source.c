@@ -2,7 +2,6 @@
  *
  * libfyaml 0.7.12 does not terminate on some lines that begin with %.  So the text is checked
  * first: size, UTF-8, no control characters, no such line. */
-#include <errno.h>
 #include <stdarg.h>
 #include <string.h>
 #include "yaml.h"
@@ -92,8 +91,7 @@ static int source_check (const pw_reader *r) {
 int pw_yaml_read_source (pw_yaml *y, const char *path, size_t largest, pw_error *error) {
   const char *why;
   FILE *f = pw_open_input (path, &why);
-  if (f == NULL)
-    return pw_fail (error, errno == ENOMEM ? PW_RESOURCE : PW_INPUT, "cannot open the model file %s: %s", y->path, why);
+  if (f == NULL) return pw_fail (error, pw_open_input_status (), "cannot open the model file %s: %s", y->path, why);
   int status = pw_read_rest (f, largest, y->path, "the limit for a model unless --max-file raises it", &y->source,
                              &y->size, error);
   fclose (f);

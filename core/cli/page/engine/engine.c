@@ -47,6 +47,10 @@ FILE *pw_open_input (const char *path, const char **why) {
   return i < page_files ? fmemopen ((void *)page_file[i].bytes, page_file[i].size, "r") : NULL;
 }
 
+int pw_open_input_status (void) {
+  return PW_INPUT;
+}
+
 char *realpath (const char *path, char *resolved) {
   return resolved ? strcpy (resolved, path) : strdup (path);
 }
