@@ -64,7 +64,7 @@ LIB       := $(BUILD)/libpinwheel.so
 FILES_LIB := $(BUILD)/libpinwheel-files.so
 LIB_OBJ   := $(call obj,$(CORE) $(SOLVERS))
 # Utilities that are no interface: the program and each library have their own.
-BASE_OBJ  := $(call obj,$(addprefix core/base/,characters.c nearest.c store.c))
+BASE_OBJ  := $(call obj,$(addprefix core/base/,characters.c nearest.c store.c stream.c))
 FILES_OBJ := $(call obj,$(FILES))
 CLI_OBJ   := $(call obj,$(CLI))
 PLUGINS   := $(MODELS:%.c=$(BUILD)/%.so) $(patsubst %,$(BUILD)/%,$(wildcard models/*.yaml))

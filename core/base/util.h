@@ -1,8 +1,9 @@
-/* Utilities: nearest names, texts, name tables, arenas, layouts. */
+/* Utilities: nearest names, texts, streams into memory, name tables, arenas, layouts. */
 #ifndef PW_UTIL_H
 #define PW_UTIL_H
 
 #include <stddef.h>
+#include <stdio.h>
 #include "pinwheel.h"
 
 /* PW_INPUT if object is NULL, the result of an earlier call that failed; what: "a system". */
@@ -42,6 +43,16 @@ int pw_control (const char *text);
 int pw_is_text (const char *text);
 /* Replaces control characters and invalid bytes by question marks. */
 void pw_text_sanitise (char *text);
+
+/* ---- Streams into memory (stream.c) ---- */
+
+typedef struct {
+  char *text; /* zero-terminated; up to date after fflush */
+  size_t size, room;
+} pw_stream;
+FILE *pw_stream_open (pw_stream *t); /* NULL if out of memory */
+/* Closes f, which may be NULL.  PW_RESOURCE if any part of the text is missing: t->text is NULL then.  Free it. */
+int pw_stream_close (FILE *f, pw_stream *t);
 
 /* Continues the FNV-1a hash (Fowler, Noll, Vo) with more bytes; begin with PW_CHECK. */
 #define PW_CHECK 14695981039346656037u

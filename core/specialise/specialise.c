@@ -106,7 +106,7 @@ static int specialise_write (pw_specialise_scene *x) {
            "\nstatic int prepare (pw_scene *s) {\n  const double *const M = s->mass;\n  double *const C = s->constant, "
            "J[ENTRIES + 1];\n"
            "  reference_jacobian (s, J);\n  (void)M, (void)C, (void)J;\n%s  return 0;\n}\n",
-           x->prepare ? x->prepare : "");
+           x->prepare.text ? x->prepare.text : "");
   return status;
 }
 
@@ -161,15 +161,14 @@ int pw_specialised_fits (const pw_specialised *code, const pw_system *s) {
 }
 
 char *pw_system_source (const pw_system *s, const unsigned char *independent, pw_error *error) {
-  char *text = NULL;
-  size_t size = 0;
+  pw_stream text;
   if (pw_require (s, "a system", error) != PW_OK) return NULL;
   if (s->rows > SPECIALISE_ROWS) {
     pw_fail (error, PW_INPUT, "model %s: %d constraint equations: specialised code has at most %d", s->model, s->rows,
              SPECIALISE_ROWS);
     return NULL;
   }
-  pw_specialise_scene x = { .s = s, .independent = independent, .out = open_memstream (&text, &size) };
+  pw_specialise_scene x = { .s = s, .independent = independent, .out = pw_stream_open (&text) };
   int status = x.out ? specialise_open (&x) : PW_RESOURCE;
   if (status == PW_OK) status = specialise_write (&x);
   if (status == PW_OK) {
@@ -178,13 +177,13 @@ char *pw_system_source (const pw_system *s, const unsigned char *independent, pw
              "  PW_SCENE_ABI, %d, %luu, independent, prepare, evaluate, project, stages\n};\n",
              x.constants + 1, pw_system_shape (s));
   }
-  if (x.out && fclose (x.out) != 0) status = PW_RESOURCE;
+  if (pw_stream_close (x.out, &text) != PW_OK) status = PW_RESOURCE;
   pw_workspace_free (x.w);
   free (x.sparsity);
   free (x.J);
-  free (x.prepare);
-  if (status == PW_OK) return text;
-  free (text);
+  free (x.prepare.text);
+  if (status == PW_OK) return text.text;
+  free (text.text);
   if (status == PW_RETRY)
     pw_fail (error, PW_INPUT, "model %s: no fixed order of elimination: redundant constraints, or a massless body",
              s->model);

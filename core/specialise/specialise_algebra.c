@@ -93,18 +93,17 @@ static int specialise_factor (const pw_specialise_scene *x, pw_elimination *m, p
                               const unsigned char *length, const char *name, int rows) {
   unsigned char takes_part[SPECIALISE_ROWS + 1];
   for (int i = 0; i < x->s->rows; i++) takes_part[i] = i < rows && pw_specialise_is_independent (x, i);
-  char *text = NULL;
-  size_t size = 0;
-  FILE *out = e->code = open_memstream (&text, &size);
+  pw_stream text;
+  FILE *out = e->code = pw_stream_open (&text);
   int status = out ? pw_elimination_open (m, x->s, K, length, takes_part, e) : PW_RESOURCE;
-  if (out && fclose (out) != 0) status = PW_RESOURCE;
+  if (pw_stream_close (out, &text) != PW_OK) status = PW_RESOURCE;
   e->code = x->out;
   if (status == PW_OK)
     fprintf (x->out,
              "\nINLINE int %s (const double *M, const double *C, const double *J, double *F) {\n"
              "  (void)M, (void)C, (void)J, (void)F;\n%s  return 0;\n}\n",
-             name, text);
-  free (text);
+             name, text.text);
+  free (text.text);
   return status;
 }
 
@@ -147,7 +146,7 @@ static void specialise_product (const pw_specialise_scene *x) {
 int pw_specialise_algebra (pw_specialise_scene *x) {
   const pw_system *s = x->s;
   pw_elimination all = { 0 }, position = { 0 };
-  pw_emitter e = { .prepare = open_memstream (&x->prepare, &x->prepared), .prepared = &x->prepare, .code = x->out };
+  pw_emitter e = { .prepare = pw_stream_open (&x->prepare), .prepared = &x->prepare.text, .code = x->out };
   specialise_product (x);
   pw_term *K = specialise_matrix (x);
   unsigned char *length = specialise_lengths (x);
@@ -166,7 +165,7 @@ int pw_specialise_algebra (pw_specialise_scene *x) {
   x->constants = e.constants;
   fprintf (x->out, "\nenum { FACTORS = %d };\n", 1 + (all.factors > position.factors ? all.factors : position.factors));
   if (!x->holonomic_only) fputs ("#define factor_position factor\n", x->out);
-  if (e.prepare && fclose (e.prepare) != 0) status = PW_RESOURCE;
+  if (pw_stream_close (e.prepare, &x->prepare) != PW_OK) status = PW_RESOURCE;
   pw_elimination_close (&all);
   pw_elimination_close (&position);
   free (K);

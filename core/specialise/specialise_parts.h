@@ -22,8 +22,7 @@ typedef struct {
   int *u;                /* batches: first signal */
   int entries;           /* of J */
   int holonomic_only;    /* 1: positions are projected by the holonomic equations alone */
-  char *prepare;         /* text of prepare's statements */
-  size_t prepared;
+  pw_stream prepare;     /* prepare's statements */
   int constants;
 } pw_specialise_scene;
 

@@ -34,7 +34,7 @@
 #endif
 #endif
 
-enum { MEMORY_FRAMES = 40, MEMORY_SAID = 20000 };
+enum { MEMORY_FRAMES = 40, MEMORY_SAID = 40000 };
 
 /* What the process of an attempt and the one that watches it both see. */
 static struct memory_state {
@@ -204,8 +204,11 @@ static void test_reading (void **state) {
   memory_each (1, "list kinds");
   memory_each (1, "show tests/models/arm.yaml");
   memory_each (1, "show --yaml pendulum");
+  memory_each (1, "show --c pendulum");
   memory_each (1, "check pendulum --json @/o/a.json");
   memory_each (1, "linearise n-trailer --at 0.1 -o @/o/a");
+  memory_each (1, "linearise car-tyres --animate @/o/a.html");
+  memory_each (1, "page pendulum -o @/o/a.html");
   memory_each (1, "sensitivity pendulum --of bob.x --of max:bob.y --by l --by bob.phi --t-end 0.02");
   memory_each (1, "new @/o/mine.yaml");
 }
@@ -223,6 +226,7 @@ static void test_studies (void **state) {
   memory_each (0, "sweep ezyroller --vary a=0.5,0.6 --t-end 0.01 --step 0.01 --jobs 1 -o @/o/a.csv");
   memory_each (0, "drift ezyroller --t-end 0.1 --methods rk4+none --only-methods -o @/o");
   memory_each (0, "steady n-trailer --starts 0 -o @/o");
+  memory_each (0, "periodic pendulum --period free -o @/o");
   memory_each (0, "compare pendulum --t-end 0.01 --methods rk4 --step-ladder 0.01:0.005 -o @/o");
 }
 

@@ -242,14 +242,14 @@ static int list_signal_names (FILE *f, pw_error *error) {
 }
 
 static int list_words (const char *heading, int (*write) (FILE *f, pw_error *error), pw_error *error) {
-  char *words = NULL;
-  size_t size;
-  FILE *f = open_memstream (&words, &size);
+  pw_stream words;
+  FILE *f = pw_stream_open (&words);
   int status = f ? write (f, error) : PW_RESOURCE;
-  if ((f == NULL || fclose (f) != 0) && error->status == PW_OK) status = pw_fail (error, PW_RESOURCE, "out of memory");
+  if (pw_stream_close (f, &words) != PW_OK && error->status == PW_OK)
+    status = pw_fail (error, PW_RESOURCE, "out of memory");
   printf ("%-15s", heading);
-  if (status == PW_OK) pw_cli_wrap (words, 15, 100);
-  free (words);
+  if (status == PW_OK) pw_cli_wrap (words.text, 15, 100);
+  free (words.text);
   return status;
 }
 

@@ -126,17 +126,13 @@ static void page_insert (FILE *f, pw_page_part part, const void *context) {
 }
 
 static int page_write (const page *x, const pw_initial_report *initial, pw_output *o, pw_error *error) {
-  char *data = NULL;
-  size_t size;
-  FILE *f = open_memstream (&data, &size);
-  int status = f ? page_data (x, initial, f) : PW_RESOURCE;
-  if (f && fclose (f) != 0) status = PW_RESOURCE;
-  if (status == PW_OK)
-    pw_animation_page (pw_output_stream (o), page_insert, data);
-  else
-    pw_fail (error, PW_RESOURCE, "out of memory");
-  free (data);
-  return status;
+  pw_stream data;
+  FILE *f = pw_stream_open (&data);
+  int whole = f && page_data (x, initial, f) == PW_OK;
+  whole &= pw_stream_close (f, &data) == PW_OK;
+  if (whole) pw_animation_page (pw_output_stream (o), page_insert, data.text);
+  free (data.text);
+  return whole ? PW_OK : pw_fail (error, PW_RESOURCE, "out of memory");
 }
 
 /* ---- The command ---- */

@@ -55,15 +55,11 @@ static int page_engine (pw_page *p, const char *source, pw_error *error) {
 /* ---- Text models ---- */
 
 static int page_tree (pw_page *p, const pw_yaml *y, pw_error *error) {
-  char *bytes = NULL;
-  size_t size = 0;
-  FILE *f = open_memstream (&bytes, &size);
+  pw_stream tree;
+  FILE *f = pw_stream_open (&tree);
   if (f) pw_yaml_write_tree (y, f);
-  if (f == NULL || fclose (f) != 0) {
-    free (bytes);
-    return pw_fail (error, PW_RESOURCE, "out of memory");
-  }
-  return page_add (p, "tree", bytes, size, error);
+  pw_stream_close (f, &tree);
+  return page_add (p, "tree", tree.text, tree.size, error);
 }
 
 typedef struct {

@@ -203,13 +203,11 @@ PAGE_EXPORT (result) const double *page_results (void) {
 
 /* The scene's shapes as JSON; free it by `release`. */
 PAGE_EXPORT (scene) char *page_scene (void) {
-  char *text = NULL;
-  size_t size;
-  FILE *f = open_memstream (&text, &size);
-  if (f == NULL) return NULL;
-  pw_animation_scene (f, page_plots);
-  fclose (f);
-  return text;
+  pw_stream scene;
+  FILE *f = pw_stream_open (&scene);
+  if (f) pw_animation_scene (f, page_plots);
+  pw_stream_close (f, &scene);
+  return scene.text;
 }
 PAGE_EXPORT (release) void page_release (void *p) {
   free (p);

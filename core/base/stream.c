@@ -1,0 +1,33 @@
+/* Streams into memory.  Those of open_memstream lose what does not fit into memory without setting the error indicator
+ * (glibc 2.36), so a text could lack a part. */
+#define _GNU_SOURCE /* fopencookie */
+#include <stdlib.h>
+#include <string.h>
+#include "util.h"
+
+static ssize_t stream_write (void *cookie, const char *bytes, size_t count) {
+  pw_stream *t = cookie;
+  if (count >= t->room - t->size) {
+    size_t room = 2 * t->room + count;
+    char *more = realloc (t->text, room);
+    if (more == NULL) return 0;
+    t->text = more;
+    t->room = room;
+  }
+  memcpy (t->text + t->size, bytes, count);
+  t->size += count;
+  t->text[t->size] = 0;
+  return (ssize_t)count;
+}
+
+FILE *pw_stream_open (pw_stream *t) {
+  *t = (pw_stream){ .text = calloc (1, 1), .room = 1 };
+  return t->text ? fopencookie (t, "w", (cookie_io_functions_t){ .write = stream_write }) : NULL;
+}
+
+int pw_stream_close (FILE *f, pw_stream *t) {
+  if (f && !((ferror (f) != 0) | (fclose (f) != 0))) return PW_OK;
+  free (t->text);
+  *t = (pw_stream){ NULL };
+  return PW_RESOURCE;
+}
