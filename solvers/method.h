@@ -140,7 +140,7 @@ static inline int pw_stabilised_by (const pw_run *r, pw_stabilisation_kind kind)
   }
 void pw_read_baumgarte (pw_run *r);
 
-/* Options of the projection; pw_projector_open_asked reads all but `every`. */
+/* Options of the projection; pw_projector_open_by_options reads all but `every`. */
 #define PW_PROJECTION_OPTIONS                                                                         \
   { .name = "metric",                                                                                 \
     .with = "projection",                                                                             \
@@ -213,7 +213,7 @@ int pw_run_watchdog (pw_run *r, pw_error *error);
 /* ---- Limits (limits.c) ---- */
 
 /* 1 if the caller requests a stop. */
-static inline int pw_run_asked (pw_run *r) {
+static inline int pw_run_stop_requested (pw_run *r) {
   if (r->settings.stop && r->settings.stop (r->settings.stop_context)) r->stopped = 1;
   return r->stopped;
 }
@@ -293,7 +293,7 @@ typedef struct {
  * configuration. */
 int pw_projector_open (pw_projector *p, pw_run *r, const double *weight_q, const double *weight_v, pw_error *error);
 /* The same with the metric of the method's options. */
-int pw_projector_open_asked (pw_projector *p, pw_run *r, pw_error *error);
+int pw_projector_open_by_options (pw_projector *p, pw_run *r, pw_error *error);
 void pw_projector_close (pw_projector *p);
 
 /* Gauss-Newton iteration on g(q) = 0 to round-off, minimal changes in the metric.  Leaves kinematics and J evaluated at

@@ -72,7 +72,7 @@ int pw_step_restart (pw_run *r, pw_error *error);
 void pw_step_close (pw_run *r);
 void pw_step_serialise (pw_run *r, pw_archive *a);
 #define PW_STEP_FUNCTIONS \
-  .at = pw_step_at, .restart = pw_step_restart, .close = pw_step_close, .carry = pw_step_serialise
+  .at = pw_step_at, .restart = pw_step_restart, .close = pw_step_close, .serialise = pw_step_serialise
 
 PW_END
 

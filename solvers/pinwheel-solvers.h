@@ -59,9 +59,9 @@ struct pw_method {
   int (*at) (pw_run *r, double t, pw_error *error); /* leaves the state in the run's sample arrays */
   int (*restart) (pw_run *r, pw_error *error);
   void (*close) (pw_run *r);
-  void (*carry) (pw_run *r,
-                 pw_archive *a); /* serialises what steps after a checkpoint need beyond the state: step size,
-                                               counts; NULL: the method restarts at checkpoints */
+  /* Saves or loads what steps after a checkpoint need beyond the state: step size, counts.  NULL: the method restarts
+   * at checkpoints. */
+  void (*serialise) (pw_run *r, pw_archive *a);
 };
 
 /* All integrators, ended by NULL. */

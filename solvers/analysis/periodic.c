@@ -111,7 +111,7 @@ static int periodic_turns (pw_periodic *x) {
   int turns = 0;
   for (int j = 0; j < x->n; j++) {
     double unit = pw_unit (x->s, j);
-    if (fabs (pw_periodic_off (x, j, x->y1[j], x->y0[j]) - (x->y1[j] - x->y0[j])) > PW_PI) turns = 1;
+    if (fabs (pw_periodic_difference (x, j, x->y1[j], x->y0[j]) - (x->y1[j] - x->y0[j])) > PW_PI) turns = 1;
     off = fmax (off, fabs (x->a1[j] - x->a0[j]) / unit);
     most = fmax (most, fabs (x->a1[j]) / unit);
   }

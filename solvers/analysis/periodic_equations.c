@@ -65,7 +65,7 @@ static void equations_residual (pw_periodic *x, const double *u, double *F) {
   equations_rates (x, u + states, x->work);
   equations_displace (x, x->work, x->y0, x->moved);
   for (int j = 0; j < states; j++) {
-    F[j] = pw_periodic_off (x, j, x->y1[j], x->moved[j]) / pw_periodic_unit (x, j);
+    F[j] = pw_periodic_difference (x, j, x->y1[j], x->moved[j]) / pw_periodic_unit (x, j);
     F[states + j] = u[j] - x->y0[j] / pw_periodic_unit (x, j);
   }
 }

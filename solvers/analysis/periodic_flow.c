@@ -168,7 +168,7 @@ int pw_periodic_flow (pw_periodic *x, const double *u, pw_flow_accuracy accuracy
 
 /* ---- Where the search begins ---- */
 
-double pw_periodic_off (const pw_periodic *x, int j, double a, double b) {
+double pw_periodic_difference (const pw_periodic *x, int j, double a, double b) {
   int rates = pw_steady_rates (x->s), changes = j >= 3 * x->s->bodies || j % 3 != 2;
   for (int k = 0; k < x->group && !changes; k++)
     changes = x->scene->axis[k * rates + 2] != 0 || x->scene->axis[k * rates + 3 + j / 3] != 0;
@@ -185,7 +185,7 @@ static int flow_distance (pw_periodic *x, pw_run *r, double t, double *y, double
   pw_steady_canonical (x->scene, y, y + n);
   *distance = 0;
   for (int j = 0; j < 2 * n; j++)
-    *distance = hypot (*distance, pw_periodic_off (x, j, y[j], x->y0[j]) / pw_periodic_unit (x, j));
+    *distance = hypot (*distance, pw_periodic_difference (x, j, y[j], x->y0[j]) / pw_periodic_unit (x, j));
   return PW_OK;
 }
 
@@ -197,7 +197,7 @@ static int flow_return (pw_periodic *x, pw_run *r) {
     double t = t0 + i * step;
     d[0] = d[1], d[1] = d[2];
     status = pw_run_advance_to (r, t, t0 + RETURN_SAMPLES * step, &x->why);
-    if (status == PW_OK && pw_run_asked (r)) return PW_STOPPED;
+    if (status == PW_OK && pw_run_stop_requested (r)) return PW_STOPPED;
     if (status == PW_OK) status = flow_distance (x, r, t, x->y1, &d[2]);
     far = fmax (far, d[2]);
     if (i > 2 && far > RETURN_LEAST && d[1] < RETURN_NEAR * far && d[1] < d[0] && d[1] <= d[2])
@@ -215,7 +215,7 @@ int pw_periodic_settle (pw_periodic *x, double value, int periods) {
   if (r == NULL) return x->why.status;
   double end = r->t + periods * (x->set.free ? x->about : x->at[0].period);
   int status = pw_run_advance_to (r, end, end, &x->why);
-  if (status == PW_OK && pw_run_asked (r)) status = PW_STOPPED;
+  if (status == PW_OK && pw_run_stop_requested (r)) status = PW_STOPPED;
   if (status == PW_OK) status = pw_run_sample (r, pw_run_time (r), &sample, &x->why);
   if (status == PW_OK) {
     memcpy (x->moved, sample.q, (size_t)n * sizeof *x->moved);

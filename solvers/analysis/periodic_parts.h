@@ -56,7 +56,7 @@ static inline double pw_periodic_unit (const pw_periodic *x, int j) {
   return j < x->n ? pw_unit (x->s, j) : pw_unit (x->s, j - x->n) / x->T;
 }
 /* The difference of entry j of two states; without whole turns, if it is an angle that no symmetry changes. */
-double pw_periodic_off (const pw_periodic *x, int j, double a, double b);
+double pw_periodic_difference (const pw_periodic *x, int j, double a, double b);
 static inline double pw_periodic_parameter (const pw_periodic *x, const double *u) {
   return x->set.first + u[pw_periodic_unknowns (x)] * (x->set.last - x->set.first);
 }

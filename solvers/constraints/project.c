@@ -42,7 +42,7 @@ int pw_projector_open (pw_projector *p, pw_run *r, const double *weight_q, const
 const char *const pw_metrics[] = { "mass", "identity", NULL };
 
 /* The identity metric weights metres and radians equally, as the plain pseudo-inverse does. */
-int pw_projector_open_asked (pw_projector *p, pw_run *r, pw_error *error) {
+int pw_projector_open_by_options (pw_projector *p, pw_run *r, pw_error *error) {
   const pw_system *s = r->s;
   if (pw_run_option (r, "metric") == 0) return pw_projector_open (p, r, NULL, NULL, error);
   double *one = malloc ((size_t)s->coords * sizeof *one);

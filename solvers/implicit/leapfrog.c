@@ -308,5 +308,5 @@ const pw_method pw_method_leapfrog = {
   .at = pw_implicit_at,
   .restart = pw_implicit_restart,
   .close = pw_implicit_close,
-  .carry = leapfrog_serialise,
+  .serialise = leapfrog_serialise,
 };

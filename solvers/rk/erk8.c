@@ -80,5 +80,5 @@ const pw_method pw_method_erk8 = {
   .at = pw_rk_at,
   .restart = pw_rk_restart,
   .close = pw_rk_close,
-  .carry = pw_rk_serialise,
+  .serialise = pw_rk_serialise,
 };

@@ -21,5 +21,5 @@ const pw_method pw_method_rk4 = {
   .at = pw_rk_at,
   .restart = pw_rk_restart,
   .close = pw_rk_close,
-  .carry = pw_rk_serialise,
+  .serialise = pw_rk_serialise,
 };

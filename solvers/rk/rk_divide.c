@@ -52,7 +52,7 @@ static int divide (pw_run *r, const divide_begin *from, int status, double t1, i
   for (size_t i = 0; i < sizeof part / sizeof *part && closest > best; i++) {
     double t = from->t + part[i] * (t1 - from->t);
     if (t <= least) continue;
-    if (is_step && pw_run_asked (r)) return PW_STOPPED;
+    if (is_step && pw_run_stop_requested (r)) return PW_STOPPED;
     status = divide_two_parts (r, from, t, t1, project);
     r->statistics.rejected++;
     if (status < 0) return status;

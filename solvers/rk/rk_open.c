@@ -95,7 +95,7 @@ int pw_rk_open (pw_run *r, const pw_tableau *tableau, pw_error *error) {
   d->projects_positions = d->null_space && pw_run_option (r, "positions") == 0;
   d->every = (int)pw_run_option (r, "every");
   if (rk_allocate (d, r->s) != PW_OK) return pw_fail (error, PW_RESOURCE, "model %s: out of memory", r->s->model);
-  int status = d->projects || d->projects_positions ? pw_projector_open_asked (&d->projector, r, error) : PW_OK;
+  int status = d->projects || d->projects_positions ? pw_projector_open_by_options (&d->projector, r, error) : PW_OK;
   if (status == PW_OK && d->null_space) status = pw_nullspace_open (&d->nullspace, r, error);
   return status == PW_OK ? pw_rk_restart (r, error) : status;
 }

@@ -62,7 +62,7 @@ static int limits_fail_steps (const pw_run *r, pw_error *error) {
 }
 
 int pw_run_attempt (pw_run *r, pw_error *error) {
-  if (pw_run_asked (r)) return PW_STOPPED;
+  if (pw_run_stop_requested (r)) return PW_STOPPED;
   if (r->statistics.steps + r->statistics.rejected < r->settings.max_steps || pw_fixed_steps (r)) return PW_OK;
   return limits_fail_steps (r, error);
 }

@@ -191,7 +191,7 @@ int pw_run_sample (pw_run *r, double t, pw_sample *sample, pw_error *error) {
   if (run_has_no_method (r, error)) return PW_RESOURCE;
   if (isnan (t)) return pw_fail (error, PW_INPUT, "t = nan: expected a time inside the last step");
   r->stopped = 0;
-  if (t < r->t && pw_run_asked (r)) return PW_STOPPED;
+  if (t < r->t && pw_run_stop_requested (r)) return PW_STOPPED;
   r->t_at = t;
   int status = r->method->at (r, t, error);
   if (status != PW_OK) return status;

@@ -2,7 +2,7 @@
  *
  * Data that depend on the history of a run, such as pivot choices and earlier values of a multistep formula, are not
  * saved: the saved run and the loaded one both rebuild them from the state reached, and so continue alike.  A
- * method's `carry` serialises the rest: step size, counts. */
+ * method's `serialise` adds the rest: step size, counts. */
 #include <math.h>
 #include "method.h"
 #include "rank.h"
@@ -55,9 +55,9 @@ static int checkpoint_plausible (const pw_run *r) {
 static int checkpoint_continue (pw_run *r, pw_archive *a, pw_error *error) {
   if (pw_evaluate_J_at (r->w, r->t, r->q, r->v) != PW_OK) return pw_fail_signal (r->t, error);
   r->near = 0;
-  if (r->method->carry == NULL) r->statistics.restarts++;
+  if (r->method->serialise == NULL) r->statistics.restarts++;
   int status = pw_run_renew (r, 0, error);
-  if (status == PW_OK && r->method->carry) r->method->carry (r, a);
+  if (status == PW_OK && r->method->serialise) r->method->serialise (r, a);
   if (status == PW_OK && a->failed) return pw_fail (error, PW_INPUT, "the saved state is not of this run");
   return status;
 }
@@ -70,7 +70,7 @@ int pw_run_save (pw_run *r, pw_archive *a, pw_error *error) {
   checkpoint_sizes (r, a);
   checkpoint_state (r, a);
   pw_archive own = { .used = a->used, .loading = 1 };
-  if (r->method->carry) r->method->carry (r, a);
+  if (r->method->serialise) r->method->serialise (r, a);
   if (a->failed) return pw_fail_memory (r->s, error);
   own.at = a->at;
   own.size = a->used;

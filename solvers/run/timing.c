@@ -212,7 +212,7 @@ static int profile_open (profile *p, pw_error *error) {
   (void)pw_evaluate_J_at (p->r->w, p->t, p->q, p->v);
   p->saddle = pw_saddle_open (p->r->w, p->s->mass, p->s->rows, p->r->active, error);
   if (p->saddle == NULL) return PW_RESOURCE;
-  return pw_stabilised_by (p->r, PW_PROJECTION) ? pw_projector_open_asked (&p->projector, p->r, error) : PW_OK;
+  return pw_stabilised_by (p->r, PW_PROJECTION) ? pw_projector_open_by_options (&p->projector, p->r, error) : PW_OK;
 }
 
 int pw_run_profile (pw_run *r, pw_profile *x, pw_error *error) {

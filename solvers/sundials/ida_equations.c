@@ -68,7 +68,7 @@ int pw_ida_residual (pw_real t, N_Vector vy, N_Vector vyp, N_Vector out, void *d
   ida_data *d = data;
   const double *y = N_VGetArrayPointer (vy), *yp = N_VGetArrayPointer (vyp);
   double *f = N_VGetArrayPointer (out);
-  if (pw_run_asked (d->sun.run) || pw_ida_update (d, t, y) != 0) return -1;
+  if (pw_run_stop_requested (d->sun.run) || pw_ida_update (d, t, y) != 0) return -1;
   ida_kinematics (d, y, yp, f);
   ida_momentum (d, y, yp, f + d->n);
   ida_constraints (d, y, yp, f + 2 * d->n);

@@ -27,7 +27,7 @@ static int multistep_derivative (pw_real t, N_Vector vy, N_Vector derivative, vo
   const double *y = N_VGetArrayPointer (vy);
   double *out = N_VGetArrayPointer (derivative);
   size_t bytes = (size_t)d->n * sizeof *out;
-  if (pw_run_asked (d->sun.run)) return -1;
+  if (pw_run_stop_requested (d->sun.run)) return -1;
   int flag = pw_multistep_accelerate (d, t, y);
   memcpy (out, y + d->n, bytes);
   memcpy (out + d->n, d->a, bytes);
@@ -160,7 +160,7 @@ static int multistep_open (pw_run *r, int formula, pw_error *error) {
   if (d == NULL) return pw_sun_no_memory (r, error);
   d->n = r->s->coords;
   d->projects = pw_stabilised_by (r, PW_PROJECTION);
-  int status = d->projects ? pw_projector_open_asked (&d->projector, r, error) : PW_OK;
+  int status = d->projects ? pw_projector_open_by_options (&d->projector, r, error) : PW_OK;
   if (status != PW_OK) return status;
   if (multistep_open_arrays (d, r) == PW_OK && multistep_open_solver (d, formula) == PW_OK &&
       pw_quadrature_open (&d->sun.quadrature, r, multistep_power) == PW_OK)

@@ -230,7 +230,7 @@ int pw_variation_advance (pw_variation *x, double t, double t_end, pw_error *err
       if (status == PW_OK) status = pw_variation_begin (x, error);
     }
     if (status == PW_OK) status = variation_lead (x, t, t_end, error);
-    if (status == PW_OK && pw_run_asked (r)) return PW_STOPPED;
+    if (status == PW_OK && pw_run_stop_requested (r)) return PW_STOPPED;
     if (status == PW_OK) status = pw_variation_step (x, fmin (t, r->t), error);
     pw_variation_forget (x);
   }

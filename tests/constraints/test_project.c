@@ -23,7 +23,7 @@ static void project_try (const char *model, const char *parameter, double value,
   assert_true (n + 3 <= PROJECT_MOST && rows <= PROJECT_MOST);
   memcpy (q, x.q, (size_t)n * sizeof *q);
   memcpy (v, x.v, (size_t)n * sizeof *v);
-  check_ok (pw_projector_open_asked (&p, r, &error), &error);
+  check_ok (pw_projector_open_by_options (&p, r, &error), &error);
   v[1] += off;
   assert_int_equal (pw_project_state (&p, r, x.t, q, v, a, lambda), PW_OK);
   pw_evaluate_residuals (r->w, NULL, &now);
@@ -70,7 +70,7 @@ static double project_length (const char *method) {
   int n = pw_system_coordinates (s);
   memcpy (q, x.q, (size_t)n * sizeof *q);
   memcpy (v, x.v, (size_t)n * sizeof *v);
-  check_ok (pw_projector_open_asked (&p, r, &error), &error);
+  check_ok (pw_projector_open_by_options (&p, r, &error), &error);
   v[1] += 1e-3;
   memcpy (before, v, (size_t)n * sizeof *v);
   assert_int_equal (pw_project_state (&p, r, x.t, q, v, a, lambda), PW_OK);

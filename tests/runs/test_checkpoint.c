@@ -97,7 +97,7 @@ static void saved_finish (pw_run *r, pw_system *s, int scene, pw_archive *archiv
 /* A method whose step size and counts are saved takes the same steps as without saving. */
 static void saved_undisturbed (int scene, const char *method, const pw_method *integrator, const pw_statistics *n) {
   double t_end = saved_scenes[scene].t_end;
-  if (integrator->carry == NULL) return;
+  if (integrator->serialise == NULL) return;
   pw_error error = { 0 };
   pw_system *s = saved_system (scene);
   pw_run *r = saved_open (s, scene, method);
@@ -122,7 +122,7 @@ static void saved_compare (int scene, const char *method) {
   const pw_method *integrator;
   int stabilisation;
   check_ok (pw_method_parse (method, &integrator, &stabilisation, &error), &error);
-  if (integrator->carry == NULL) assert_int_equal (pw_run_statistics (r)->restarts, SAVED_MOMENTS);
+  if (integrator->serialise == NULL) assert_int_equal (pw_run_statistics (r)->restarts, SAVED_MOMENTS);
   saved_undisturbed (scene, method, integrator, pw_run_statistics (r));
   pw_run_close (r);
   for (int moment = 0; moment < SAVED_MOMENTS; moment++) {

@@ -242,7 +242,7 @@ static int steady_complete (pw_steady_cli *x, pw_error *error) {
 }
 
 /* The value in the model, or in its initial state. */
-static double steady_own (const pw_steady_cli *x) {
+static double steady_model_value (const pw_steady_cli *x) {
   const pw_system *s = x->m.system;
   if (x->set.vary < 0) return pw_model_parameter (x->m.model, pw_cli_vary_parameter (&x->vary));
   return pw_system_held_value (s, x->hold[x->set.vary].state, pw_system_initial_q (s), pw_system_initial_v (s));
@@ -251,7 +251,7 @@ static double steady_own (const pw_steady_cli *x) {
 /* Branches that begin at the ends of the range, or if there are none, one at the value of the model. */
 static int steady_branches (pw_steady_cli *x, pw_error *error) {
   int status = steady_complete (x, error);
-  double own = steady_own (x), part = (own - x->set.first) / (x->set.last - x->set.first);
+  double own = steady_model_value (x), part = (own - x->set.first) / (x->set.last - x->set.first);
   if (status == PW_OK) status = steady_from (x, x->set.first, 1, error);
   if (status == PW_OK && !x->stopped) status = steady_from (x, x->set.last, -1, error);
   if (status == PW_OK && !x->stopped && x->points == 0 && part > 0 && part < 1) status = steady_from (x, own, 1, error);

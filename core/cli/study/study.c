@@ -266,7 +266,7 @@ static int study_method (pw_study *x, void *context, int line, pw_error *error) 
 }
 
 /* Writes the rows that are done after one that an interruption has stopped. */
-static int study_kept (pw_study *x, pw_error *error) {
+static int study_write_kept (pw_study *x, pw_error *error) {
   for (const pw_row *r = x->row + x->done; r < x->row + x->rows; r++)
     if (r->measured && pw_table_row (x, r, error) != PW_OK)
       return error->status;
@@ -283,7 +283,7 @@ static int study_rows (pw_study *x, pw_error *error) {
   pw_study_show (x, pw_file_name (x->m.file), x->type->unit, x->rows);
   if (status == PW_OK && x->type->timed) status = pw_study_concurrently (x, x->methods, study_method, NULL, error);
   if (status == PW_OK && !x->type->timed) status = pw_study_concurrently (x, x->rows, study_row, NULL, error);
-  if (status == PW_RETRY && pw_stop) status = study_kept (x, error);
+  if (status == PW_RETRY && pw_stop) status = study_write_kept (x, error);
   if (status == PW_OK && x->type->conclude) x->type->conclude (x);
   pw_stop_release ();
   return status;
