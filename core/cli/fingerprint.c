@@ -9,7 +9,7 @@
 
 /* ---- Writing ---- */
 
-void pw_print_line (pw_text *t, const char *key, const char *of, const char *value) {
+void pw_fingerprint_line (pw_text *t, const char *key, const char *of, const char *value) {
   pw_text_add (t, key);
   if (of) pw_text_add (t, " "), pw_text_add (t, of);
   pw_text_add (t, " = ");
@@ -17,12 +17,12 @@ void pw_print_line (pw_text *t, const char *key, const char *of, const char *val
   pw_text_add (t, "\n");
 }
 
-void pw_print_number (pw_text *t, const char *key, const char *of, double value) {
+void pw_fingerprint_number (pw_text *t, const char *key, const char *of, double value) {
   char number[32];
-  pw_print_line (t, key, of, pw_format (number, value, 17));
+  pw_fingerprint_line (t, key, of, pw_format (number, value, 17));
 }
 
-int pw_print_file (pw_text *t, const char *key, const char *name, const char *path, pw_error *error) {
+int pw_fingerprint_file (pw_text *t, const char *key, const char *name, const char *path, pw_error *error) {
   char text[200], block[4096];
   uint64_t h = PW_CHECK;
   const char *reason;
@@ -33,16 +33,16 @@ int pw_print_file (pw_text *t, const char *key, const char *name, const char *pa
   fclose (f);
   if (why) return pw_fail (error, PW_RESOURCE, "cannot read %s: %s", path, strerror (why));
   snprintf (text, sizeof text, "%.150s, contents %016llx", name, (unsigned long long)h);
-  pw_print_line (t, key, NULL, text);
+  pw_fingerprint_line (t, key, NULL, text);
   return PW_OK;
 }
 
-int pw_print_model (pw_text *t, const pw_file *file, uint64_t tables, pw_error *error) {
+int pw_fingerprint_model (pw_text *t, const pw_file *file, uint64_t tables, pw_error *error) {
   char text[200];
-  int status = pw_print_file (t, "model", pw_file_name (file), pw_file_path (file), error);
+  int status = pw_fingerprint_file (t, "model", pw_file_name (file), pw_file_path (file), error);
   if (status != PW_OK || tables == 0) return status;
   snprintf (text, sizeof text, "contents %016llx", (unsigned long long)tables);
-  pw_print_line (t, "tables", NULL, text);
+  pw_fingerprint_line (t, "tables", NULL, text);
   return PW_OK;
 }
 
@@ -61,11 +61,11 @@ uint64_t pw_check_tables (uint64_t sum, const pw_model *m) {
   return sum;
 }
 
-void pw_print_initial (pw_text *t, const char **starts) {
+void pw_fingerprint_initial (pw_text *t, const char **starts) {
   for (; starts && *starts; starts++) {
     char name[200];
     snprintf (name, sizeof name, "%.*s", (int)strcspn (*starts, "="), *starts);
-    pw_print_line (t, "start", name, *starts + strcspn (*starts, "=") + 1);
+    pw_fingerprint_line (t, "start", name, *starts + strcspn (*starts, "=") + 1);
   }
 }
 

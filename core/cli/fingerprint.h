@@ -9,16 +9,16 @@
 /* ---- Writing: a first line that names the format, these lines, and a line "end" ---- */
 
 /* "KEY OF = VALUE"; OF may be NULL. */
-void pw_print_line (pw_text *t, const char *key, const char *of, const char *value);
-void pw_print_number (pw_text *t, const char *key, const char *of, double value);
+void pw_fingerprint_line (pw_text *t, const char *key, const char *of, const char *value);
+void pw_fingerprint_number (pw_text *t, const char *key, const char *of, double value);
 /* A file's name and a checksum of its contents.  PW_RESOURCE if it cannot be read. */
-int pw_print_file (pw_text *t, const char *key, const char *name, const char *path, pw_error *error);
+int pw_fingerprint_file (pw_text *t, const char *key, const char *name, const char *path, pw_error *error);
 /* The model's name and checksums of its file and, if not 0, of its tables.  PW_RESOURCE if the file cannot be read. */
-int pw_print_model (pw_text *t, const pw_file *file, uint64_t tables, pw_error *error);
+int pw_fingerprint_model (pw_text *t, const pw_file *file, uint64_t tables, pw_error *error);
 /* A checksum of the tables in a model's signals that continues `sum`; 0 at first. */
 uint64_t pw_check_tables (uint64_t sum, const pw_model *m);
 /* "STATE=VALUE" as on the command line; NULL-terminated, or NULL. */
-void pw_print_initial (pw_text *t, const char **starts);
+void pw_fingerprint_initial (pw_text *t, const char **starts);
 
 /* ---- Reading ---- */
 

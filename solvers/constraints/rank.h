@@ -14,7 +14,7 @@ struct pw_run;
  * NULL): their former lengths; empty rows stay 0. */
 void pw_rank_rows (const pw_workspace *w, double *rows, double *norm);
 
-/* Unit of coordinate j in these rows, which are derivatives by q[j] times this unit. */
+/* Unit of coordinate j in these rows, which are derivatives with respect to q[j], times this unit. */
 double pw_rank_unit (const pw_system *s, int j);
 
 /* Orthogonalises a row of length n against the `rank` kept ones, of length 1; returns its norm afterwards. */

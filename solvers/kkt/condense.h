@@ -17,8 +17,8 @@ typedef struct {
 struct pw_saddle {
   const pw_system *s;
   const pw_workspace *w; /* contains J */
-  int rows;
-  double postponed; /* > 0: J has been evaluated but not factorised; lower bound of its pivots */
+  int rows;              /* of J: all, or the holonomic ones */
+  double postponed;      /* > 0: J has been evaluated but not factorised; lower bound of its pivots */
   pw_massless massless;
   double *inverse; /* coords + 3: 1 / weight; 0 for prescribed ones and those without weight; the ground's 0 */
   double *force;   /* coords: forces changed by `massless` */

@@ -6,7 +6,7 @@
 #include "util.h"
 
 /* Column c of A: the effect of a variation along minimal coordinate c. */
-static void linear_unknown (pw_linearisation *x, int c) {
+static void linear_column_of_A (pw_linearisation *x, int c) {
   double *dq = x->x, *dv = x->x + x->n, w = x->frame.twist[2];
   pw_linear_tangent (x, c);
   pw_linear_vary (x);
@@ -94,7 +94,7 @@ static int linear_compute (pw_linearisation *x, pw_linear *l, pw_error *error) {
     return status > 0 ? pw_fail_singular (r, r->t, error) : pw_fail (error, PW_METHOD, "a signal failed");
   l->least = pw_linear_bases (x);
   pw_linear_choose_frame (x);
-  for (int c = 0; c < x->size; c++) linear_unknown (x, c);
+  for (int c = 0; c < x->size; c++) linear_column_of_A (x, c);
   if (x->modes && pw_linear_matrices (x, l) != PW_OK) return PW_RESOURCE;
   l->symmetries = pw_linear_symmetries (x);
   if (linear_results (x, l) != PW_OK) return PW_RESOURCE;

@@ -100,8 +100,8 @@ static int step_fail (pw_run *r, int status, double h, pw_error *error) {
 int pw_step_accept (pw_run *r, int status, double h, double *q, double *v, pw_error *error) {
   struct pw_method_data *d = r->data;
   size_t n = (size_t)r->s->coords * sizeof *q;
-  int asked = fabs (r->t + h - d->end) <= 1e-9 * h; /* 0: the caller chose another size */
-  double t1 = asked ? d->end : r->t + h;
+  int requested = fabs (r->t + h - d->end) <= 1e-9 * h; /* 0: the caller chose another size */
+  double t1 = requested ? d->end : r->t + h;
   if (status == PW_OK) status = step_evaluate (r, t1, q, v);
   if (status != PW_OK) return step_fail (r, status, h, error);
   pw_dense_output_keep (&d->last, r);
@@ -113,7 +113,7 @@ int pw_step_accept (pw_run *r, int status, double h, double *q, double *v, pw_er
   pw_dense_output_count (&d->last, r);
   r->statistics.steps++;
   d->count++;
-  if (!asked || !d->whole) d->base = t1, d->count = 0;
+  if (!requested || !d->whole) d->base = t1, d->count = 0;
   return PW_OK;
 }
 

@@ -93,7 +93,7 @@ static int path_good (const pw_variation *x, int i) {
   return 1;
 }
 
-/* Inserts states between points i and i + 1 until interpolation is good; the point at the middle, which tells, is kept. */
+/* Inserts states between points i and i + 1 until interpolation is good, which is tested at the midpoint; that is kept. */
 static int path_refine (pw_variation *x, int i, int depth, pw_error *error) {
   double t0 = x->point[i].t, t1 = x->point[i + 1].t, middle = t0 + (t1 - t0) / 2;
   if (pw_fixed_steps (x->r) || depth == 0 || !(t0 < middle && middle < t1)) return PW_OK;

@@ -124,8 +124,7 @@ static void periodic_branch (const pw_periodic_cli *x) {
   }
   double last = x->point[x->points - 1].orbit.parameter;
   if (!x->stopped && *pw_periodic_reason (x->search))
-    printf ("\nThe branch ends at %s = %.9g%s%s\n", x->vary.name, last, *pw_periodic_reason (x->search) ? ": " : "",
-            pw_periodic_reason (x->search));
+    printf ("\nThe branch ends at %s = %.9g: %s\n", x->vary.name, last, pw_periodic_reason (x->search));
 }
 
 void pw_periodic_print (const pw_periodic_cli *x) {

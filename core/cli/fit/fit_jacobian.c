@@ -34,7 +34,7 @@ typedef struct {
   pw_error *error;    /* 2 unknowns */
 } jacobian_differences;
 
-/* The step balances the truncation error, of its square, and noise over the step. */
+/* The step balances the truncation error, proportional to its square, and the noise, divided by the step. */
 static void jacobian_side (void *context, int task) {
   jacobian_differences *d = context;
   const pw_fit *x = d->x;

@@ -22,9 +22,10 @@ typedef struct {
   nlopt_opt opt;
   double *u, *at, *value; /* the last run: scaled unknowns, unknowns, outputs */
   double *slope;          /* outputs x unknowns: derivatives with respect to scaled unknowns; NULL: without */
-  int known, sloped, failed;
-  int refused;        /* 1: derivatives could not be computed */
-  double least, most; /* objectives of the runs that succeeded */
+  int known, sloped;      /* 1: there was a run; with derivatives */
+  int failed;             /* 1: the last run failed */
+  int refused;            /* 1: derivatives could not be computed, though the run succeeded */
+  double least, most;     /* objectives of the runs that succeeded */
 } search;
 
 double pw_search_unknown (const pw_free_number *k, double u) {
@@ -122,7 +123,7 @@ static void search_keep (search *p) {
   pthread_mutex_unlock (&x->lock);
 }
 
-/* Runs with the unknowns, or differentiates; a run without derivatives, which itself succeeds, ends the search. */
+/* Runs with the unknowns, or differentiates.  If only the derivatives fail, the search ends. */
 static int search_try (search *p, int slopes, pw_error *error) {
   pw_error own = { 0 };
   int status = slopes ? search_differentiate (p, &own) : PW_METHOD;
@@ -136,7 +137,7 @@ static int search_try (search *p, int slopes, pw_error *error) {
   return status;
 }
 
-/* The run at scaled unknowns, with slopes: with derivatives, unless it is the last one. */
+/* Runs with these scaled unknowns (slopes 1: with derivatives), unless the last run did. */
 static void search_evaluate (search *p, const double *u, int slopes) {
   pw_optimise *x = p->x;
   int n = x->unknowns.count;
@@ -169,6 +170,7 @@ static void search_gradient (const search *p, int output, double factor, double 
   for (int j = 0; gradient && j < n; j++) gradient[j] = p->failed || p->refused ? 0 : factor * p->slope[output * n + j];
 }
 
+/* A run that failed counts as worse than all others. */
 static double search_objective (unsigned n, const double *u, double *gradient, void *context) {
   search *p = context;
   (void)n;

@@ -61,30 +61,30 @@ static int checkpoints_head (pw_run_command *x, pw_error *error) {
   pw_text *t = &x->check.head;
   const pw_model *m = x->m.model;
   pw_text_add (t, PW_CHECKPOINT_MAGIC);
-  pw_print_line (t, "version", NULL, PW_VERSION);
-  if (pw_print_model (t, x->m.file, pw_check_tables (0, m), error) != PW_OK) return error->status;
-  pw_print_line (t, "method", NULL, x->method);
-  pw_print_number (t, "t-end", NULL, x->t_end);
-  pw_print_number (t, "step", NULL, x->settings.step);
-  pw_print_number (t, "rtol", NULL, x->settings.rtol);
-  pw_print_number (t, "atol", NULL, x->settings.atol);
-  if (x->engine.code) pw_print_line (t, checkpoints_engine, NULL, pw_cli_engine_name (&x->engine));
+  pw_fingerprint_line (t, "version", NULL, PW_VERSION);
+  if (pw_fingerprint_model (t, x->m.file, pw_check_tables (0, m), error) != PW_OK) return error->status;
+  pw_fingerprint_line (t, "method", NULL, x->method);
+  pw_fingerprint_number (t, "t-end", NULL, x->t_end);
+  pw_fingerprint_number (t, "step", NULL, x->settings.step);
+  pw_fingerprint_number (t, "rtol", NULL, x->settings.rtol);
+  pw_fingerprint_number (t, "atol", NULL, x->settings.atol);
+  if (x->engine.code) pw_fingerprint_line (t, checkpoints_engine, NULL, pw_cli_engine_name (&x->engine));
   for (const pw_parameter *q = pw_model_table (m)->parameters; q && q->name; q++)
-    pw_print_number (t, "parameter", q->name, pw_model_parameter (m, q));
-  pw_print_initial (t, x->line.starts);
-  pw_print_line (t, "table", NULL, x->csv_path ? "written" : "not written");
-  pw_print_number (t, "every", NULL, x->every);
-  pw_print_line (t, "energy", NULL, x->energy ? "kept" : "not kept");
-  pw_print_line (t, "plots", NULL, x->plots_path ? "drawn" : "not drawn");
-  pw_print_line (t, "animation", NULL, x->animate_path ? "written" : "not written");
+    pw_fingerprint_number (t, "parameter", q->name, pw_model_parameter (m, q));
+  pw_fingerprint_initial (t, x->line.starts);
+  pw_fingerprint_line (t, "table", NULL, x->csv_path ? "written" : "not written");
+  pw_fingerprint_number (t, "every", NULL, x->every);
+  pw_fingerprint_line (t, "energy", NULL, x->energy ? "kept" : "not kept");
+  pw_fingerprint_line (t, "plots", NULL, x->plots_path ? "drawn" : "not drawn");
+  pw_fingerprint_line (t, "animation", NULL, x->animate_path ? "written" : "not written");
   if (x->reference_path == NULL)
-    pw_print_line (t, "reference", NULL, "the model's");
-  else if (pw_print_file (t, "reference", x->reference_path, x->reference_path, error) != PW_OK)
+    pw_fingerprint_line (t, "reference", NULL, "the model's");
+  else if (pw_fingerprint_file (t, "reference", x->reference_path, x->reference_path, error) != PW_OK)
     return error->status;
-  pw_print_number (t, checkpoints_key, NULL, x->check.every);
+  pw_fingerprint_number (t, checkpoints_key, NULL, x->check.every);
   snprintf (numbers, sizeof numbers, "%s endian, %zu bytes", *(const unsigned char *)&order ? "little" : "big",
             sizeof (long));
-  pw_print_line (t, "numbers", NULL, numbers);
+  pw_fingerprint_line (t, "numbers", NULL, numbers);
   pw_text_add (t, "end\n");
   return t->failed ? pw_fail (error, PW_RESOURCE, "out of memory") : PW_OK;
 }

@@ -4,10 +4,8 @@
 #include <string.h>
 #include "files.h"
 
-enum {
-  NPZ_HEAD = 128,
-  NPZ_MOST = 65535
-}; /* bytes before the data of a .npy file, a multiple of 64; files of an archive */
+enum { NPZ_HEAD = 128 };   /* bytes before the data of a .npy file, a multiple of 64 */
+enum { NPZ_MOST = 65535 }; /* files of an archive */
 
 struct pw_npz_entry {
   char name[312];
