@@ -110,8 +110,8 @@ static int plugin_find_name (pw_file *f, const char *name, pw_error *error) {
   pw_search s;
   int status = pw_search_open (&s, error), first = 0;
   while (first < s.count && strcmp (s.found[first].name, name) != 0) first++;
-  const pw_found *found = s.found + first;
-  if (status == PW_OK && first == s.count)
+  const pw_found *found = first < s.count ? &s.found[first] : NULL;
+  if (status == PW_OK && found == NULL)
     status = plugin_unknown (&s, name, error);
   else if (status == PW_OK && first + 1 < s.count && strcmp (found[1].name, name) == 0)
     status = pw_fail (error, PW_INPUT, "two files match the model \"%s\": %s and %s; name one of them by its path",
