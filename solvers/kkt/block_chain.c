@@ -1,4 +1,6 @@
-/* Chains, from the first pin to the last and back; see block_ldl.h. */
+/* Chains; see block_ldl.h.  Each elimination waits for the one before it.  A chain from whose both ends it can proceed
+ * is therefore swept in the two lanes of vector registers, from either end to the middle; any other chain in both lanes
+ * alike, from the first pin to the last. */
 #include <stddef.h>
 #include "block_parts.h"
 #include "unroll.h"
@@ -7,92 +9,252 @@ PW_ONE_BY_ONE
 
 enum { CHAIN_BLOCK = 5 }; /* values of a diagonal block of 2 unknowns */
 
+/* GNU C's vectors: operations work on both lanes. */
+typedef double chain_lanes __attribute__ ((vector_size (2 * sizeof (double))));
+
+/* A body: J at the pin that is eliminated and at the next one, factors of the former. */
+typedef struct {
+  const double *from, *to;
+  double *keep;
+  ptrdiff_t j, y; /* first coordinate; of the pin eliminated in the right-hand side */
+} chain_lane;
+
+typedef struct {
+  chain_lane a, b;
+  ptrdiff_t next_J, next_j, next_y, step; /* those of b are the same times `sign`, an argument */
+} chain_sweep;
+
 /* Two rows of a body: the unit matrix times s, then the angle's column. */
 typedef struct {
-  double s, x, y;
+  chain_lanes s, x, y;
 } chain_arm;
 
-static inline chain_arm chain_read (const double *J, ptrdiff_t step) {
-  return (chain_arm){ J[0], J[2], J[step + 2] };
+typedef struct {
+  chain_lanes x, y;
+} chain_point;
+
+typedef struct {
+  chain_lanes xx, xy, yx, yy;
+} chain_square;
+
+/* ---- Lanes ---- */
+
+PW_INLINE void chain_advance (chain_lane *x, const chain_sweep *s, ptrdiff_t bodies) {
+  x->from += bodies * s->next_J, x->to += bodies * s->next_J, x->keep += 3 * bodies;
+  x->j += bodies * s->next_j, x->y += bodies * s->next_y;
 }
 
-/* m 1 + i a a^T */
-static inline block_square chain_diagonal (chain_arm a, double m, double i) {
-  const double x = i * a.x, y = i * a.y;
-  return (block_square){ m + x * a.x, x * a.y, x * a.y, m + y * a.y };
+/* sign: 1, both lanes from the first pin; -1, the second one from the last. */
+static chain_sweep chain_begin (const pw_block_ldl *l, const pw_chain *c, int sign) {
+  chain_sweep s = { .next_J = c->next_J, .next_j = c->next_j, .next_y = c->next_y, .step = c->step };
+  s.a = s.b = (chain_lane){ c->A, c->B, l->chain_factor + c->factor, c->j, c->y };
+  if (sign > 0) return s;
+  chain_advance (&s.b, &s, c->bodies - 1);
+  const double *B = s.b.from;
+  s.b.from = s.b.to, s.b.to = B;
+  s.b.keep += 3, s.b.y += s.next_y;
+  return s;
 }
 
-/* K, rows of the second pin b, columns of the first a. */
-static inline block_square chain_coupling (chain_arm a, chain_arm b, double m, double i) {
-  const double mass = m * a.s * b.s, x = i * b.x, y = i * b.y;
-  return (block_square){ mass + x * a.x, x * a.y, y * a.x, mass + y * a.y };
+PW_INLINE void chain_move (chain_sweep *s, ptrdiff_t bodies, int sign) {
+  chain_advance (&s->a, s, bodies);
+  chain_advance (&s->b, s, sign * bodies);
+}
+
+/* Entries of arrays. */
+PW_INLINE chain_lanes chain_load (const double *a, const double *b, ptrdiff_t i) {
+  return (chain_lanes){ a[i], b[i] };
+}
+
+PW_INLINE void chain_store (double *a, double *b, ptrdiff_t i, chain_lanes value) {
+  a[i] = value[0], b[i] = value[1];
+}
+
+PW_INLINE chain_arm chain_read (const double *a, const double *b, ptrdiff_t step) {
+  return (chain_arm){ chain_load (a, b, 0), chain_load (a, b, 2), chain_load (a, b, step + 2) };
+}
+
+/* K, rows of the pin b, columns of the pin a. */
+PW_INLINE chain_square chain_coupling (chain_arm a, chain_arm b, chain_lanes m, chain_lanes i) {
+  const chain_lanes mass = m * a.s * b.s, x = i * b.x, y = i * b.y;
+  return (chain_square){ mass + x * a.x, x * a.y, y * a.x, mass + y * a.y };
+}
+
+/* (x, y) divided by a factorised block. */
+PW_INLINE chain_point chain_divide (chain_lanes d, chain_lanes e, chain_lanes f, chain_lanes x, chain_lanes y) {
+  const chain_lanes z = (y - e * x) * f;
+  return (chain_point){ x * d - e * z, z };
+}
+
+PW_INLINE chain_point chain_divide_kept (const chain_sweep *s, chain_lanes x, chain_lanes y) {
+  const double *a = s->a.keep, *b = s->b.keep;
+  return chain_divide (chain_load (a, b, 0), chain_load (a, b, 1), chain_load (a, b, 2), x, y);
+}
+
+/* ---- Factorisation ---- */
+
+/* As block_pivot; the smallest pivot changes rarely. */
+PW_INLINE void chain_pivot (chain_lanes *D, pw_block_ldl *l, const chain_sweep *s) {
+  const chain_lanes a = D[0], minor = a * D[2] - D[1] * D[1], least = { l->pivot, l->pivot };
+  const chain_lanes first = least * D[3], second = least * a * D[4];
+  const int good = a[0] > first[0] && a[1] > first[1] && minor[0] > second[0] && minor[1] > second[1];
+  for (int k = 0; k < 2 && !good; k++) {
+    const int y = (int)(k ? s->b.y : s->a.y);
+    block_track_pivot (l, a[k], D[3][k], y);
+    block_track_pivot (l, minor[k], fabs (a[k]) * D[4][k], y + 1);
+  }
+  D[0] = 1 / a;
+  D[1] = D[1] * D[0], D[2] = a / minor;
+}
+
+/* Eliminates the pins with the diagonal blocks D, which become those of the next ones. */
+PW_INLINE void chain_eliminate (pw_block_ldl *l, chain_sweep *s, int sign, chain_lanes *D) {
+  const chain_arm a = chain_read (s->a.from, s->b.from, s->step), b = chain_read (s->a.to, s->b.to, s->step);
+  const double *one = l->inverse + s->a.j, *other = l->inverse + s->b.j;
+  const chain_lanes m = chain_load (one, other, 0), i = chain_load (one, other, 2);
+  const chain_square K = chain_coupling (a, b, m, i);
+  const chain_lanes x = i * a.x, y = i * a.y, xx = m + x * a.x, yy = m + y * a.y;
+  D[0] += xx, D[1] += x * a.y, D[2] += yy, D[3] += xx, D[4] += yy;
+  chain_pivot (D, l, s);
+  for (int n = 0; n < 3; n++) chain_store (s->a.keep, s->b.keep, n, D[n]);
+  const chain_point p = chain_divide (D[0], D[1], D[2], K.xx, K.xy), q = chain_divide (D[0], D[1], D[2], K.yx, K.yy);
+  const chain_lanes u = i * b.x, v = i * b.y;
+  D[3] = m + u * b.x, D[4] = m + v * b.y;
+  D[0] = D[3] - (p.x * K.xx + p.y * K.xy);
+  D[1] = u * b.y - (q.x * K.xx + q.y * K.xy);
+  D[2] = D[4] - (q.x * K.yx + q.y * K.yy);
+  chain_move (s, 1, sign);
+}
+
+/* From the first pin to the next column. */
+static void chain_factor_along (pw_block_ldl *l, const pw_chain *c, const double *before, double *after) {
+  chain_sweep s = chain_begin (l, c, 1);
+  chain_lanes D[CHAIN_BLOCK];
+  for (int n = 0; n < CHAIN_BLOCK; n++) D[n] = (chain_lanes){ before[n], before[n] };
+  for (int n = 0; n < c->bodies; n++) {
+    chain_eliminate (l, &s, 1, D);
+    if (!(l->pivot > 0)) return;
+  }
+  for (int n = 0; n < CHAIN_BLOCK; n++) after[n] += D[n][0];
+}
+
+/* From both ends to the pin in the middle; of an odd number of bodies, that after the body in the middle. */
+static void chain_factor_whole (pw_block_ldl *l, const pw_chain *c, const double *first, const double *last) {
+  chain_sweep s = chain_begin (l, c, -1);
+  chain_lanes D[CHAIN_BLOCK], E[CHAIN_BLOCK];
+  for (int n = 0; n < CHAIN_BLOCK; n++) D[n] = (chain_lanes){ first[n], last[n] };
+  for (int n = 0; n < c->bodies / 2; n++) {
+    chain_eliminate (l, &s, -1, D);
+    if (!(l->pivot > 0)) return;
+  }
+  for (int n = 0; n < CHAIN_BLOCK; n++) E[n] = (chain_lanes){ D[n][0], D[n][0] };
+  s.b = s.a;
+  if (c->bodies % 2) chain_eliminate (l, &s, 1, E);
+  for (int n = 0; n < CHAIN_BLOCK; n++) E[n] += D[n][1];
+  chain_pivot (E, l, &s);
+  for (int n = 0; n < 3; n++) s.a.keep[n] = E[n][0];
 }
 
 void pw_chain_factor (pw_block_ldl *l, const pw_chain *c) {
-  const ptrdiff_t next_J = c->next_J, next_j = c->next_j, step = c->step;
-  const double *A = c->A, *B = c->B, *w = l->inverse + c->j;
-  const double *before = l->value + l->column[c->column].at;
-  double *after = l->value + l->column[c->column + c->bodies].at, *keep = l->chain_factor + c->factor;
-  double D[CHAIN_BLOCK];
-  for (int n = 0; n < CHAIN_BLOCK; n++) D[n] = before[n];
-  for (int n = 0, row = c->y; n < c->bodies; n++, A += next_J, B += next_J, w += next_j, row += c->next_y, keep += 3) {
-    const chain_arm a = chain_read (A, step), b = chain_read (B, step);
-    const double m = w[0], i = w[2];
-    const block_square coupling = chain_coupling (a, b, m, i);
-    const double K[] = { coupling.xx, coupling.xy, coupling.yx, coupling.yy };
-    const block_square P = chain_diagonal (a, m, i), Q = chain_diagonal (b, m, i);
-    D[0] += P.xx, D[1] += P.xy, D[2] += P.yy, D[3] += P.xx, D[4] += P.yy;
-    block_pivot (2, D, l, row);
-    keep[0] = D[0], keep[1] = D[1], keep[2] = D[2];
-    const block_square L = block_scale (2, 2, K, D);
-    D[0] = D[3] = Q.xx, D[1] = Q.xy, D[2] = D[4] = Q.yy;
-    block_subtract_diagonal (2, D, L, K, 2);
-    if (!(l->pivot > 0)) return;
-  }
-  for (int n = 0; n < CHAIN_BLOCK; n++) after[n] += D[n];
+  double *first = l->value + l->column[c->column].at, *last = l->value + l->column[c->column + c->bodies].at;
+  if (c->whole)
+    chain_factor_whole (l, c, first, last);
+  else
+    chain_factor_along (l, c, first, last);
 }
 
-/* y_(c+1) -= K D^-1 y_c */
+/* ---- Solution ---- */
+
+/* y_(c+1) -= K D^-1 y_c; at: y of the pins that are eliminated, then of the next ones. */
+PW_INLINE chain_point chain_forward (const pw_block_ldl *l, chain_sweep *s, int sign, const double *f, double *y,
+                                     chain_point at) {
+  const chain_arm a = chain_read (s->a.from, s->b.from, s->step), b = chain_read (s->a.to, s->b.to, s->step);
+  const double *one = l->inverse + s->a.j, *other = l->inverse + s->b.j;
+  const chain_lanes m = chain_load (one, other, 0), i = chain_load (one, other, 2), mass = m * a.s * b.s;
+  double *p = y + s->a.y, *q = y + s->b.y;
+  const double *next_p = p + s->next_y, *next_q = q + sign * s->next_y;
+  chain_point to = { chain_load (next_p, next_q, 0), chain_load (next_p, next_q, 1) };
+  if (f) {
+    const double *g = f + s->a.j, *h = f + s->b.j;
+    const chain_lanes X = m * chain_load (g, h, 0), Y = m * chain_load (g, h, 1), T = i * chain_load (g, h, 2);
+    at.x -= a.s * X + a.x * T, at.y -= a.s * Y + a.y * T;
+    to.x -= b.s * X + b.x * T, to.y -= b.s * Y + b.y * T;
+  }
+  chain_store (p, q, 0, at.x);
+  chain_store (p, q, 1, at.y);
+  const chain_point z = chain_divide_kept (s, at.x, at.y);
+  const chain_lanes turn = i * (a.x * z.x + a.y * z.y);
+  to.x -= mass * z.x + turn * b.x;
+  to.y -= mass * z.y + turn * b.y;
+  chain_move (s, 1, sign);
+  return to;
+}
+
+PW_INLINE chain_point chain_point_at (const chain_sweep *s, const double *y) {
+  return (chain_point){ chain_load (y + s->a.y, y + s->b.y, 0), chain_load (y + s->a.y, y + s->b.y, 1) };
+}
+
 void pw_chain_forward (const pw_block_ldl *l, const pw_chain *c, const double *f, double *y) {
-  const ptrdiff_t next_J = c->next_J, next_y = c->next_y, step = c->step;
-  const double *A = c->A, *B = c->B, *keep = l->chain_factor + c->factor;
-  double *from = y + c->y;
-  for (ptrdiff_t n = 0, j = c->j; n < c->bodies; n++, j += c->next_j, A += next_J, B += next_J, keep += 3) {
-    const chain_arm a = chain_read (A, step), b = chain_read (B, step);
-    const double m = l->inverse[j], i = l->inverse[j + 2], mass = m * a.s * b.s;
-    double *to = from + next_y;
-    if (f) {
-      const double X = m * f[j], Y = m * f[j + 1], T = i * f[j + 2];
-      from[0] -= a.s * X + a.x * T, from[1] -= a.s * Y + a.y * T;
-      to[0] -= b.s * X + b.x * T, to[1] -= b.s * Y + b.y * T;
-    }
-    const block_pair z = block_divide (2, keep, from[0], from[1]);
-    const double turn = i * (a.x * z.x + a.y * z.y);
-    to[0] -= mass * z.x + turn * b.x;
-    to[1] -= mass * z.y + turn * b.y;
-    from = to;
+  chain_sweep s = chain_begin (l, c, c->whole ? -1 : 1);
+  chain_point at = chain_point_at (&s, y);
+  double x = 0, z = 0; /* changes by the second lane */
+  if (c->whole) {
+    for (int n = 0; n < c->bodies / 2; n++) at = chain_forward (l, &s, -1, f, y, at);
+    x = at.x[1] - y[s.b.y], z = at.y[1] - y[s.b.y + 1];
+    s.b = s.a;
+    at.x[1] = at.x[0], at.y[1] = at.y[0];
   }
+  for (int n = c->whole ? c->bodies % 2 : c->bodies; n > 0; n--) at = chain_forward (l, &s, 1, f, y, at);
+  y[s.a.y] = at.x[0] + x;
+  y[s.a.y + 1] = at.y[0] + z;
 }
 
-/* From the last pin to the first, each with the body after it. */
-void pw_chain_backward (const pw_block_ldl *l, const pw_chain *c, const double *f, double *y, double *a) {
-  const ptrdiff_t next_J = c->next_J, next_j = c->next_j, next_y = c->next_y, step = c->step;
-  const double *last = y + c->y + c->bodies * next_y;
-  double x = last[0], z = last[1]; /* y of the pin after */
-  for (ptrdiff_t n = c->bodies; n-- > 0;) {
-    const ptrdiff_t j = c->j + n * next_j;
-    const chain_arm u = chain_read (c->A + n * next_J, step), v = chain_read (c->B + n * next_J, step);
-    const double m = l->inverse[j], i = l->inverse[j + 2], *keep = l->chain_factor + c->factor + 3 * n;
-    const block_square K = chain_coupling (u, v, m, i);
-    double *own = y + c->y + n * next_y, X = v.s * x, Y = v.s * z, T = v.x * x + v.y * z;
-    const double right = own[0] + (K.xx * x + K.yx * z), up = own[1] + (K.xy * x + K.yy * z);
-    const block_pair own_z = block_divide (2, keep, right, up);
-    own[0] = x = -own_z.x;
-    own[1] = z = -own_z.y;
-    X += u.s * x, Y += u.s * z, T += u.x * x + u.y * z;
-    if (f)
-      a[j] = m * (f[j] - X), a[j + 1] = m * (f[j + 1] - Y), a[j + 2] = i * (f[j + 2] - T);
-    else
-      a[j] = -m * X, a[j + 1] = -m * Y, a[j + 2] = -i * T;
+/* lambda of the pins before, from `at` of the next ones, and the accelerations of the bodies between them. */
+PW_INLINE chain_point chain_backward (const pw_block_ldl *l, chain_sweep *s, int sign, const double *f, double *y,
+                                      double *a, chain_point at) {
+  chain_move (s, -1, sign);
+  const chain_arm u = chain_read (s->a.from, s->b.from, s->step), v = chain_read (s->a.to, s->b.to, s->step);
+  const double *one = l->inverse + s->a.j, *other = l->inverse + s->b.j;
+  const chain_lanes m = chain_load (one, other, 0), i = chain_load (one, other, 2);
+  const chain_square K = chain_coupling (u, v, m, i);
+  const chain_point own = chain_point_at (s, y);
+  chain_lanes X = v.s * at.x, Y = v.s * at.y, T = v.x * at.x + v.y * at.y;
+  const chain_point z = chain_divide_kept (s, own.x + (K.xx * at.x + K.yx * at.y), own.y + (K.xy * at.x + K.yy * at.y));
+  at = (chain_point){ -z.x, -z.y };
+  chain_store (y + s->a.y, y + s->b.y, 0, at.x);
+  chain_store (y + s->a.y, y + s->b.y, 1, at.y);
+  X += u.s * at.x, Y += u.s * at.y, T += u.x * at.x + u.y * at.y;
+  const double *g = f ? f + s->a.j : NULL, *h = f ? f + s->b.j : NULL;
+  chain_store (a + s->a.j, a + s->b.j, 0, m * (f ? chain_load (g, h, 0) - X : -X));
+  chain_store (a + s->a.j, a + s->b.j, 1, m * (f ? chain_load (g, h, 1) - Y : -Y));
+  chain_store (a + s->a.j, a + s->b.j, 2, i * (f ? chain_load (g, h, 2) - T : -T));
+  return at;
+}
+
+static void chain_backward_whole (const pw_block_ldl *l, const pw_chain *c, const double *f, double *y, double *a) {
+  chain_sweep s = chain_begin (l, c, -1);
+  chain_move (&s, c->bodies / 2, -1);
+  chain_sweep middle = s;
+  middle.b = middle.a;
+  chain_move (&middle, c->bodies % 2, 1);
+  chain_point at = chain_point_at (&middle, y);
+  const chain_point z = chain_divide_kept (&middle, at.x, at.y);
+  at = (chain_point){ -z.x, -z.y };
+  y[middle.a.y] = at.x[0], y[middle.a.y + 1] = at.y[0];
+  if (c->bodies % 2) {
+    const chain_point before = chain_backward (l, &middle, 1, f, y, a, at);
+    at.x[0] = before.x[0], at.y[0] = before.y[0];
   }
+  for (int n = 0; n < c->bodies / 2; n++) at = chain_backward (l, &s, -1, f, y, a, at);
+}
+
+void pw_chain_backward (const pw_block_ldl *l, const pw_chain *c, const double *f, double *y, double *a) {
+  if (c->whole) {
+    chain_backward_whole (l, c, f, y, a);
+    return;
+  }
+  chain_sweep s = chain_begin (l, c, 1);
+  chain_move (&s, c->bodies, 1);
+  chain_point at = chain_point_at (&s, y);
+  for (int n = 0; n < c->bodies; n++) at = chain_backward (l, &s, 1, f, y, a, at);
 }

@@ -116,7 +116,8 @@ void pw_block_factor (pw_block_ldl *l) {
   for (int j = 0; j < l->nodes && (j == 0 || l->pivot > l->least);)
     if (chain->column == j) {
       pw_chain_factor (l, chain);
-      j += chain++->bodies;
+      j += chain->bodies + chain->whole;
+      chain++;
     } else {
       const pw_column *c = &l->column[j++];
       target = BLOCK_SIZE (c->size, block_eliminate, l, c, target);

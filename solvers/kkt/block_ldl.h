@@ -63,14 +63,16 @@ typedef struct {
 
 /* Positions are those of the first body; the others follow at equal strides. */
 typedef struct {
-  int column;                 /* its first pin's; those of the others follow */
-  int bodies;                 /* also the number of columns eliminated here; the next one receives their last update */
-  const double *A, *B;        /* J of the first and of the second pin in the body's columns */
-  int step;                   /* from row to row of J */
-  int y;                      /* of the first pin in the right-hand side */
-  int j;                      /* first coordinate */
+  int column;          /* its first pin's; those of the others follow */
+  int bodies;          /* also the number of columns eliminated here, without `whole`; the next one receives their
+                               * last update */
+  const double *A, *B; /* J of the first and of the second pin in the body's columns */
+  int step;            /* from row to row of J */
+  int y;               /* of the first pin in the right-hand side */
+  int j;               /* first coordinate */
   int next_J, next_y, next_j; /* from body to body */
   int factor;                 /* the factors of its D; 3 from column to column */
+  int whole;                  /* 1: nothing is below the last pin: it is eliminated here, too, from both ends */
 } pw_chain;
 
 typedef struct {

@@ -107,13 +107,14 @@ void pw_block_solve (const pw_block_ldl *l, const double *f, double *y, double *
   for (int j = 0; j < l->nodes;)
     if (chain->column == j) {
       pw_chain_forward (l, chain, f, y);
-      j += chain++->bodies;
+      j += chain->bodies + chain->whole;
+      chain++;
     } else {
       BLOCK_SIZE (c[j].size, block_forward_column, l, c + j, y);
       j++;
     }
   for (int j = l->nodes; j > 0;)
-    if (chain > l->chain && chain[-1].column + chain[-1].bodies == j) {
+    if (chain > l->chain && chain[-1].column + chain[-1].bodies + chain[-1].whole == j) {
       pw_chain_backward (l, --chain, f, y, a);
       j = chain->column;
     } else {

@@ -90,7 +90,7 @@ static void condense_take_block (const pw_plan *c, pw_layout *lay, pw_block_ldl 
       pw_layout_alloc (lay, (size_t)(c->contributions - 2 * c->linked + 2 * c->uncondenseds), sizeof *l->contribution);
   l->coupling = pw_layout_alloc (lay, (size_t)(c->pairs - c->linked), sizeof *l->coupling);
   l->chain = pw_layout_alloc (lay, (size_t)c->chains + 1, sizeof *l->chain);
-  l->chain_factor = pw_layout_alloc (lay, 3 * (size_t)c->linked, sizeof *l->chain_factor);
+  l->chain_factor = pw_layout_alloc (lay, 3 * (size_t)(c->linked + c->chains), sizeof *l->chain_factor);
 }
 
 /* 0 for a body of a chain, and for a group without mass, whose accelerations massless.c computes. */

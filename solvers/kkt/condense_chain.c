@@ -2,6 +2,8 @@
 #include <stdlib.h>
 #include "condense.h"
 
+enum { CHAIN_WHOLE = 16 }; /* fewest bodies of a chain that is eliminated from both ends */
+
 /* The block of a column and the next one: the number of bodies and eliminated columns that add to it, and the body, if
  * it can be in a chain. */
 typedef struct {
@@ -48,7 +50,7 @@ static void chain_join (pw_plan *c, pw_block_ldl *l, const chain_between *betwee
     if (b->sources != 1 || b->link.bodies == 0) continue;
     pw_chain *chain = &c->chain[c->chains++];
     *chain = b->link;
-    chain->factor = 3 * c->linked;
+    chain->factor = 3 * (c->linked + c->chains - 1);
     c->is_linked[b->link.j / 3] = 1;
     for (; p < l->nodes && between[p].sources == 1 && meet[p] == 2; p++) {
       if (between[p].link.bodies == 0) break;
@@ -56,6 +58,8 @@ static void chain_join (pw_plan *c, pw_block_ldl *l, const chain_between *betwee
       c->is_linked[between[p].link.j / 3] = 1;
       l->column[p].in_chain = 1;
     }
+    const pw_column *last = &l->column[chain->column + chain->bodies];
+    chain->whole = chain->bodies >= CHAIN_WHOLE && last[1].first == last->first;
     c->linked += chain->bodies;
   }
 }

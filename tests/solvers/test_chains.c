@@ -7,7 +7,8 @@
 #include "scene.h"
 #include "trial.h"
 
-enum { CHAINS_LINKS = 14 };
+/* Numbers of bars; the longer chains are eliminated from both ends. */
+static const int chains_bars[] = { 14, 20, 21 };
 
 /* A zigzag of bars that hangs from the ground: in different descriptions, then with a further element. */
 enum {
@@ -25,7 +26,7 @@ enum {
 };
 
 typedef struct {
-  double variant;
+  double variant, bars;
 } chains_parameters;
 
 static double chains_angle (int bar) {
@@ -59,35 +60,44 @@ static void chains_pin (pw_model *m, const char *chain, int i, const char *from,
   pw_add_pin (m, &pin);
 }
 
-static void chains_add_element (pw_model *m, int variant) {
-  const int n = CHAINS_LINKS;
-  const double x = n / 2 * (cos (chains_angle (0)) + cos (chains_angle (1)));
-  const double y = n / 2 * (sin (chains_angle (0)) + sin (chains_angle (1)));
-  if (variant == CHAINS_BRIDGE)
-    pw_add_pin (m, &(pw_pin){ .name = "end", .body = { "bar13", "ground" }, .at = { { 0.5, 0 }, { x, y } } });
+/* The right end of bar i. */
+static void chains_end (int i, double at[2]) {
+  at[0] = at[1] = 0;
+  for (int k = 0; k <= i; k++) at[0] += cos (chains_angle (k)), at[1] += sin (chains_angle (k));
+}
+
+static void chains_add_element (pw_model *m, int variant, int n) {
+  char bar[20];
+  double at[2];
+  if (variant == CHAINS_BRIDGE) {
+    snprintf (bar, sizeof bar, "bar%d", n - 1);
+    chains_end (n - 1, at);
+    pw_add_pin (m, &(pw_pin){ .name = "end", .body = { bar, "ground" }, .at = { { 0.5, 0 }, { at[0], at[1] } } });
+  }
   if (variant == CHAINS_WHEEL) pw_add_wheel (m, &(pw_wheel){ .name = "wheel", .body = "bar7", .at = { 0.1, 0 } });
   if (variant != CHAINS_BRANCH) return;
-  double from = (n / 2 - 1) / 2 * (cos (chains_angle (0)) + cos (chains_angle (1)));
-  double up = (n / 2 - 1) / 2 * (sin (chains_angle (0)) + sin (chains_angle (1)));
-  from += 0.5 * cos (chains_angle (0)), up += 0.5 * sin (chains_angle (0)); /* the middle of bar 6 */
-  for (int i = 0; i < n / 2; i++) chains_bar (m, "twig", i, from, up, 0);
-  for (int i = 0; i < n / 2; i++) chains_pin (m, "twig", i, "bar6", 0, 0);
+  snprintf (bar, sizeof bar, "bar%d", n - 4);
+  chains_end (n - 4, at);
+  for (int i = 0; i < n / 2; i++) chains_bar (m, "twig", i, at[0], at[1], 0);
+  for (int i = 0; i < n / 2; i++) chains_pin (m, "twig", i, bar, 0.5, 0);
 }
 
 static void chains_build (pw_model *m, const void *parameters) {
-  const int variant = (int)((const chains_parameters *)parameters)->variant, n = CHAINS_LINKS;
+  const chains_parameters *p = parameters;
+  const int variant = (int)p->variant, n = (int)p->bars;
   pw_add_gravity (m, &(pw_gravity){ .name = "g", .acceleration = { 0, -9.81 } });
   for (int i = 0; i < n; i++)
     chains_bar (m, "bar", variant == CHAINS_BARS_BACK ? n - 1 - i : i, 0, 0, variant == CHAINS_LIGHT && i == 7);
   for (int i = 0; i < n; i++) {
-    int pin = variant == CHAINS_PINS_BACK ? n - 1 - i : variant == CHAINS_SHUFFLED ? 5 * i % n : i;
+    int pin = variant == CHAINS_PINS_BACK ? n - 1 - i : variant == CHAINS_SHUFFLED ? 11 * i % n : i;
     chains_pin (m, "bar", pin, "ground", 0, variant == CHAINS_TURNED && i % 3 == 0);
   }
-  chains_add_element (m, variant);
+  chains_add_element (m, variant, n);
 }
 
 static const pw_parameter chains_list[] = {
   { PW_AT (chains_parameters, variant), .domain = PW_NONNEGATIVE, .about = "number of the scene" },
+  { PW_AT (chains_parameters, bars), .value = 14, .domain = PW_COUNT, .about = "number of bars" },
   { .name = NULL },
 };
 
@@ -100,9 +110,9 @@ static const pw_plugin_table chains_table = { .abi = PW_ABI,
 /* ---- Tests ---- */
 
 /* Verifies a short run; returns final states of some bars, and the force in a pin. */
-static void chains_run (int variant, double end[8]) {
+static void chains_run (int variant, int bars, double end[8]) {
   static const char *const name[] = { "bar0.phi", "bar6.x", "bar6.omega", "bar7.phi", "bar13.x", "bar13.vy" };
-  pw_system *s = scene_system (&chains_table, "variant", (double)variant, NULL);
+  pw_system *s = scene_system (&chains_table, "variant", (double)variant, "bars", (double)bars, NULL);
   pw_run *r = runs_open (s, "rk4+projection", &(pw_settings){ .step = 0.01, .span = 0.2 });
   pw_sample x = runs_to (r, 0.2);
   trial_verify (s, r, &x, 1e4 * CHECK_EPS, "round-off of a projected state");
@@ -116,19 +126,22 @@ static void chains_run (int variant, double end[8]) {
 static void test_same (void **state) {
   double first[8], other[8];
   (void)state;
-  chains_run (CHAINS_PLAIN, first);
-  assert_true (fabs (first[5]) > 0.1); /* it moves */
-  for (int variant = CHAINS_PLAIN + 1; variant < CHAINS_OTHERS; variant++) {
-    chains_run (variant, other);
-    for (int i = 0; i < 8; i++)
-      check_close ("end", other[i], first[i], 1e-10 * (1 + fabs (first[i])), "1e6 eps, over 20 steps");
+  for (size_t k = 0; k < sizeof chains_bars / sizeof *chains_bars; k++) {
+    chains_run (CHAINS_PLAIN, chains_bars[k], first);
+    assert_true (fabs (first[5]) > 0.1); /* it moves */
+    for (int variant = CHAINS_PLAIN + 1; variant < CHAINS_OTHERS; variant++) {
+      chains_run (variant, chains_bars[k], other);
+      for (int i = 0; i < 8; i++)
+        check_close ("end", other[i], first[i], 1e-10 * (1 + fabs (first[i])), "1e6 eps, over 20 steps");
+    }
   }
 }
 
 static void test_others (void **state) {
   double end[8];
   (void)state;
-  for (int variant = CHAINS_OTHERS; variant < CHAINS_ALL; variant++) chains_run (variant, end);
+  for (size_t k = 0; k < sizeof chains_bars / sizeof *chains_bars; k++)
+    for (int variant = CHAINS_OTHERS; variant < CHAINS_ALL; variant++) chains_run (variant, chains_bars[k], end);
 }
 
 int main (void) {
