@@ -23,7 +23,8 @@
  *   L = K D_c^-1,   D_(c+1) = K_(c+1)(c+1) - L K^T,   y_(c+1) -= L y_c
  *   backwards:   y_c = D_c^-1 (y_c - K^T y_(c+1)),   K^T y = +-m y + i (b . y) a
  *
- * where D and y are passed from pin to pin, and only the factors of D are stored. */
+ * where D and y are passed from pin to pin, and only the factors of D are stored.  If nothing is below the last pin, the
+ * elimination proceeds from both ends to the middle. */
 #ifndef PW_BLOCK_LDL_H
 #define PW_BLOCK_LDL_H
 
@@ -72,7 +73,7 @@ typedef struct {
   int j;               /* first coordinate */
   int next_J, next_y, next_j; /* from body to body */
   int factor;                 /* the factors of its D; 3 from column to column */
-  int whole;                  /* 1: nothing is below the last pin: it is eliminated here, too, from both ends */
+  int whole;                  /* 1: nothing is below the last pin, which is eliminated here, too */
 } pw_chain;
 
 typedef struct {

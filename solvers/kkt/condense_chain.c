@@ -2,8 +2,6 @@
 #include <stdlib.h>
 #include "condense.h"
 
-enum { CHAIN_WHOLE = 16 }; /* fewest bodies of a chain that is eliminated from both ends */
-
 /* The block of a column and the next one: the number of bodies and eliminated columns that add to it, and the body, if
  * it can be in a chain. */
 typedef struct {
@@ -59,7 +57,7 @@ static void chain_join (pw_plan *c, pw_block_ldl *l, const chain_between *betwee
       l->column[p].in_chain = 1;
     }
     const pw_column *last = &l->column[chain->column + chain->bodies];
-    chain->whole = chain->bodies >= CHAIN_WHOLE && last[1].first == last->first;
+    chain->whole = last[1].first == last->first;
     c->linked += chain->bodies;
   }
 }

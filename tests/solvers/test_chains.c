@@ -7,7 +7,7 @@
 #include "scene.h"
 #include "trial.h"
 
-/* Numbers of bars; the longer chains are eliminated from both ends. */
+/* Numbers of bars: those that are eliminated from both ends have a body in the middle, or none. */
 static const int chains_bars[] = { 14, 20, 21 };
 
 /* A zigzag of bars that hangs from the ground: in different descriptions, then with a further element. */

@@ -107,7 +107,7 @@ static void test_refused (void **state) {
   check_error (
       &error, PW_INPUT,
       "model scene: stabilisation nullspace works with dense matrices, for up to 256 constraint rows, and this "
-      "scene has 258; take erk5+projection");
+      "scene has 258; use erk5+projection");
   pw_system_free (s);
 }
 

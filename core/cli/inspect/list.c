@@ -224,9 +224,7 @@ static int list_model_name (void *context, const char *name, const char *path) {
 }
 
 static int list_model_names (FILE *f, pw_error *error) {
-  int status = pw_file_list (list_model_name, f, error);
-  if (status == PW_OK && ftell (f) == 0) fputs (list_none, f);
-  return status;
+  return pw_file_list (list_model_name, f, error);
 }
 
 static int list_kind_names (FILE *f, pw_error *error) {
@@ -248,7 +246,7 @@ static int list_words (const char *heading, int (*write) (FILE *f, pw_error *err
   if (pw_stream_close (f, &words) != PW_OK && error->status == PW_OK)
     status = pw_fail (error, PW_RESOURCE, "out of memory");
   printf ("%-15s", heading);
-  if (status == PW_OK) pw_cli_wrap (words.text, 15, 100);
+  if (status == PW_OK) pw_cli_wrap (words.size > 0 ? words.text : list_none, 15, 100);
   free (words.text);
   return status;
 }
