@@ -26,8 +26,10 @@ FILE *pw_stream_open (pw_stream *t) {
 }
 
 int pw_stream_close (FILE *f, pw_stream *t) {
-  if (f && !((ferror (f) != 0) | (fclose (f) != 0))) return PW_OK;
+  int failed = f == NULL || ferror (f);
+  if (f && fclose (f) != 0) failed = 1;
+  if (!failed) return PW_OK;
   free (t->text);
-  *t = (pw_stream){ NULL };
+  *t = (pw_stream){ .text = NULL };
   return PW_RESOURCE;
 }
