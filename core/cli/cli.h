@@ -166,7 +166,7 @@ void pw_cli_close_model (pw_cli_model *m);
 int pw_cli_apply (pw_model *m, const char *option, const char **list,
                   int (*set) (pw_model *m, const char *name, double value, pw_error *error), pw_error *error);
 
-/* A parameter that varies continuously, of --vary NAME=FIRST:LAST (vary.c).  Line and model are set by the caller. */
+/* A parameter that varies continuously, of --vary NAME=FIRST:LAST (vary.c). */
 typedef struct {
   const pw_cli_line *line;
   const pw_cli_model *m;
@@ -176,7 +176,7 @@ typedef struct {
 } pw_cli_vary;
 
 /* Reads the option; the name need not be that of a parameter. */
-int pw_cli_vary_read (pw_cli_vary *v, const char *text, pw_error *error);
+int pw_cli_vary_read (pw_cli_vary *v, const pw_cli_line *l, const pw_cli_model *m, const char *text, pw_error *error);
 const pw_parameter *pw_cli_vary_parameter (const pw_cli_vary *v); /* of the model; NULL: it has none of that name */
 /* PW_INPUT if that parameter cannot vary in the range, or is also set. */
 int pw_cli_vary_check (const pw_cli_vary *v, pw_error *error);

@@ -4,10 +4,10 @@
 #include "cli.h"
 #include "util.h"
 
-int pw_cli_vary_read (pw_cli_vary *v, const char *text, pw_error *error) {
+int pw_cli_vary_read (pw_cli_vary *v, const pw_cli_line *l, const pw_cli_model *m, const char *text, pw_error *error) {
   const char *equals = strchr (text, '='), *colon = equals ? strchr (equals, ':') : NULL;
   char first[100];
-  v->text = text;
+  v->line = l, v->m = m, v->text = text;
   if (colon == NULL || equals == text || (size_t)(equals - text) >= sizeof v->name ||
       (size_t)(colon - equals) > sizeof first)
     return pw_fail (error, PW_INPUT, "--vary %s: expected NAME=FIRST:LAST", text);

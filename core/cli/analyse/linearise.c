@@ -2,11 +2,11 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
-#include "held.h"
 #include "linearise.h"
 #include "plot.h"
 #include "progress.h"
 #include "report.h"
+#include "states.h"
 
 enum { LINEARISE_MOST = 400 }; /* coordinates: the cost is cubic */
 

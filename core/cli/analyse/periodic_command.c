@@ -46,8 +46,7 @@ static int periodic_options (pw_periodic_cli *x, pw_error *error) {
   x->set.stop = pw_limit_over, x->set.stop_context = &x->limit;
   if (status == PW_OK) status = periodic_period (x, error);
   if (status != PW_OK || x->vary_text == NULL) return status;
-  x->vary.line = &x->line, x->vary.m = &x->m;
-  if (pw_cli_vary_read (&x->vary, x->vary_text, error) != PW_OK) return PW_INPUT;
+  if (pw_cli_vary_read (&x->vary, &x->line, &x->m, x->vary_text, error) != PW_OK) return PW_INPUT;
   x->set.first = x->vary.first, x->set.last = x->vary.last;
   const pw_parameter *p = pw_cli_vary_parameter (&x->vary);
   if (p == NULL) return pw_model_set (x->m.model, x->vary.name, x->set.first, error);
@@ -151,21 +150,11 @@ static int periodic_compute (pw_periodic_cli *x, pw_error *error) {
 
 /* ---- The command ---- */
 
-static int periodic_folder (const pw_periodic_cli *x, int *lock, pw_error *error) {
-  static const char *const names[] = { "periodic.csv", "periodic.json", "periodic.dat", "periodic.gp",
-                                       "periodic.svg", "periodic.png",  "periodic.pdf", NULL };
-  pw_use use[] = { PW_CLI_MODEL_USE, { "-o", x->folder, PW_WRITES_INTO, names } };
-  if (x->folder == NULL) return PW_OK;
-  if (pw_cli_uses (&x->line, x->m.file, use, 2, error) != PW_OK) return error->status;
-  *lock = pw_figure_folder (x->folder, error);
-  return *lock < 0 ? error->status : PW_OK;
-}
-
 static int periodic_command (void *options, pw_error *error) {
   pw_periodic_cli *x = options;
   int lock = -1, status = pw_cli_open (&x->m, &x->line, error);
   if (status == PW_OK) status = periodic_options (x, error);
-  if (status == PW_OK) status = periodic_folder (x, &lock, error);
+  if (status == PW_OK) status = pw_figure_results (&x->line, &x->m, x->folder, "periodic", &lock, error);
   if (status == PW_OK) pw_report_model (x->m.model);
   if (status == PW_OK) status = periodic_compute (x, error);
   if (status == PW_OK && x->points) pw_periodic_print (x);

@@ -5,6 +5,7 @@
 #include <string.h>
 #include "figure.h"
 #include "print_table.h"
+#include "states.h"
 #include "text.h"
 
 enum { PERIODIC_SHOWN = 12, PERIODIC_BODIES = 20, PERIODIC_SAMPLES = 400, PERIODIC_CURVES = 3 };
@@ -55,23 +56,6 @@ static const char *periodic_verdict (const pw_periodic_orbit *o, char *text, siz
   return text;
 }
 
-static void periodic_state (const pw_periodic_cli *x, const pw_periodic_orbit *o) {
-  const pw_system *s = x->m.system;
-  int bodies = pw_system_bodies (s);
-  puts ("\nInitial state");
-  for (pw_table t = { 0 }; pw_table_pass (&t);) {
-    static const char *const head[] = { "", "x [m]", "y [m]", "phi [rad]", "vx [m/s]", "vy [m/s]", "omega [rad/s]" };
-    for (int k = 0; k < 7; k++) pw_cell (&t, k ? 12 : -12, head[k]);
-    pw_row_end (&t);
-    for (int b = 0; b < bodies && b < PERIODIC_BODIES; b++) {
-      pw_cell (&t, -12, pw_system_body_name (s, b));
-      for (int k = 0; k < 6; k++) pw_cell_number (&t, 12, periodic_round ((k < 3 ? o->q : o->v - 3)[3 * b + k]), 8);
-      pw_row_end (&t);
-    }
-  }
-  if (bodies > PERIODIC_BODIES) printf ("  and %d more bodies\n", bodies - PERIODIC_BODIES);
-}
-
 static void periodic_one (const pw_periodic_cli *x, const pw_periodic_orbit *o) {
   double d[3];
   char text[200];
@@ -87,7 +71,8 @@ static void periodic_one (const pw_periodic_cli *x, const pw_periodic_orbit *o) 
   periodic_multipliers (o, pw_periodic_symmetries (x->search));
   printf ("  stability                    %s\n", periodic_verdict (o, text, sizeof text));
   printf ("  residual                     %.1e after %d iterations\n", o->residual, o->iterations);
-  periodic_state (x, o);
+  puts ("\nInitial state");
+  pw_states_print (x->m.system, o->q, o->v, 8, PERIODIC_SMALL);
 }
 
 static void periodic_branch (const pw_periodic_cli *x) {
@@ -136,16 +121,6 @@ void pw_periodic_print (const pw_periodic_cli *x) {
 
 /* ---- JSON ---- */
 
-static void periodic_states_json (const pw_periodic_cli *x, const char *key, const double *q, const double *v,
-                                  pw_json *j) {
-  int n = pw_system_coordinates (x->m.system);
-  char name[300];
-  pw_json_open (j, key, '{');
-  for (int i = 0; i < 2 * n; i++)
-    pw_json_number (j, pw_system_state_name (x->m.system, i, name, sizeof name), i < n ? q[i] : v[i - n]);
-  pw_json_close (j, '}');
-}
-
 static void periodic_point_json (const pw_periodic_cli *x, const pw_periodic_orbit *o, pw_json *j) {
   int n = pw_system_coordinates (x->m.system);
   double d[3];
@@ -162,8 +137,8 @@ static void periodic_point_json (const pw_periodic_cli *x, const pw_periodic_orb
   pw_json_number (j, "residual", o->residual);
   pw_json_number (j, "iterations", o->iterations);
   pw_json_number (j, "growing", o->unstable);
-  periodic_states_json (x, "start", o->q, o->v, j);
-  periodic_states_json (x, "end", o->end, o->end + n, j);
+  pw_states_json (x->m.system, o->q, o->v, "start", j);
+  pw_states_json (x->m.system, o->end, o->end + n, "end", j);
   pw_json_open (j, "multipliers", '[');
   for (int i = 0; i < o->multipliers; i++) {
     pw_json_open (j, NULL, '{');
@@ -176,7 +151,8 @@ static void periodic_point_json (const pw_periodic_cli *x, const pw_periodic_orb
   pw_json_close (j, '}');
 }
 
-static void periodic_json (const pw_periodic_cli *x, pw_json *j) {
+static void periodic_json (const void *context, pw_json *j) {
+  const pw_periodic_cli *x = context;
   pw_json_open (j, NULL, '{');
   pw_json_number (j, "schema", 1);
   pw_json_text (j, "model", pw_file_name (x->m.file));
@@ -194,15 +170,15 @@ static void periodic_json (const pw_periodic_cli *x, pw_json *j) {
 
 /* ---- The table ---- */
 
-static int periodic_csv (const pw_periodic_cli *x, FILE *f, pw_error *error) {
+static int periodic_csv (const void *context, FILE *f, pw_error *error) {
+  const pw_periodic_cli *x = context;
   const pw_system *s = x->m.system;
   int states = 2 * pw_system_coordinates (s), most = x->point->orbit.multipliers;
   pw_text t = { .at = NULL };
   char name[300];
   pw_text_name (&t, x->vary_text ? x->vary.name : "parameter", x->unit);
   pw_text_cell (&t, "event,period [s],displacement [m],rotation [rad],growing,residual");
-  for (int i = 0; i < states; i++)
-    pw_text_name (&t, pw_system_state_name (s, i, name, sizeof name), pw_system_state_unit (s, i));
+  pw_states_head (s, &t);
   for (int i = 1; i <= most; i++)
     for (int k = 0; k < 2; k++) snprintf (name, sizeof name, "%s%d", k ? "im" : "re", i), pw_text_cell (&t, name);
   int status = pw_text_line (&t, f, x->folder, error);
@@ -279,7 +255,8 @@ static void periodic_multipliers_data (const pw_periodic_cli *x, FILE *f, int tr
   fputs ("nan nan nan\n\n\n", f);
 }
 
-static int periodic_data (const pw_periodic_cli *x, FILE *f, pw_error *error) {
+static int periodic_data (const void *context, FILE *f, pw_error *error) {
+  const pw_periodic_cli *x = context;
   int status = PW_OK;
   if (x->vary_text) {
     fputs ("# parameter, displacement [m], largest multiplier, period [s]: stable parts; unstable ones; events; "
@@ -299,12 +276,11 @@ static int periodic_data (const pw_periodic_cli *x, FILE *f, pw_error *error) {
   return status;
 }
 
-static void periodic_variables (const pw_periodic_cli *x, FILE *f) {
-  char label[300];
+static void periodic_variables (const void *context, FILE *f) {
+  const pw_periodic_cli *x = context;
   int bodies = pw_system_bodies (x->m.system);
   if (bodies > PERIODIC_BODIES) bodies = PERIODIC_BODIES;
-  snprintf (label, sizeof label, *x->unit ? "%s [%s]" : "%s", x->vary.name, x->unit);
-  pw_figure_text (f, "label_of_x", label);
+  pw_figure_label (f, "label_of_x", x->vary.name, x->unit);
   fprintf (f, "branch = %d\nfirst = %.10g\nlast = %.10g\nbodies = %d\narray body[%d]\n", x->vary_text != NULL,
            fmin (x->set.first, x->set.last), fmax (x->set.first, x->set.last), bodies, bodies ? bodies : 1);
   fputs ("array low[3]\narray high[3]\n", f);
@@ -320,33 +296,8 @@ static void periodic_variables (const pw_periodic_cli *x, FILE *f) {
   for (int b = 0; b < bodies; b++) pw_figure_element (f, "body", b + 1, pw_system_body_name (x->m.system, b));
 }
 
-static int periodic_figure (const pw_periodic_cli *x, pw_error *error) {
-  pw_figures figures = { .folder = x->folder,
-                         .model = pw_file_name (x->m.file),
-                         .about = pw_file_table (x->m.file)->about };
-  if (pw_figure_width (x->line.width, &figures.width, error) != PW_OK) return error->status;
-  pw_output *data = pw_figure_data (&figures, "periodic.dat", error);
-  if (data == NULL) return PW_RESOURCE;
-  int status = periodic_data (x, pw_output_stream (data), error);
-  if (status != PW_OK) return pw_output_discard (data), status;
-  status = pw_output_finish (data, error);
-  pw_output *o = status == PW_OK ? pw_figure_begin (&figures, "periodic", error) : NULL;
-  if (o == NULL) return error->status;
-  periodic_variables (x, pw_output_stream (o));
-  status = pw_figure_end (o, "periodic", error);
-  return status == PW_OK ? pw_figure_draw (x->folder, (const char *[]){ "periodic", NULL }, error) : status;
-}
-
 int pw_periodic_write (const pw_periodic_cli *x, pw_error *error) {
-  pw_output *json = pw_figure_open (x->folder, "periodic.json", error), *csv = NULL;
-  if (json) csv = pw_figure_open (x->folder, "periodic.csv", error);
-  int status = csv ? periodic_csv (x, pw_output_stream (csv), error) : PW_RESOURCE;
-  if (status != PW_OK) {
-    if (json) pw_output_discard (json);
-    if (csv) pw_output_discard (csv);
-    return status;
-  }
-  periodic_json (x, &(pw_json){ .f = pw_output_stream (json), .lines = 1 });
-  status = pw_output_finish_all ((pw_output *[]){ csv, json }, 2, error);
-  return status == PW_OK ? periodic_figure (x, error) : status;
+  int status = pw_figure_tables (x->folder, "periodic", 1, x, periodic_csv, periodic_json, error);
+  if (status != PW_OK) return status;
+  return pw_figure_write (&x->line, &x->m, x->folder, "periodic", x, periodic_data, periodic_variables, error);
 }

@@ -40,16 +40,6 @@ static int sensitivity_unknowns (pw_sensitivity *x, pw_error *error) {
   return status;
 }
 
-static int sensitivity_folder (const pw_sensitivity *x, int *lock, pw_error *error) {
-  static const char *const names[] = { "sensitivity.csv", "sensitivity.json", "sensitivity.dat", "sensitivity.gp",
-                                       "sensitivity.svg", "sensitivity.png",  "sensitivity.pdf", NULL };
-  pw_use use[] = { PW_CLI_MODEL_USE, { "-o", x->folder, PW_WRITES_INTO, names } };
-  if (x->folder == NULL) return PW_OK;
-  if (pw_cli_uses (&x->line, x->m.file, use, 2, error) != PW_OK) return error->status;
-  *lock = pw_figure_folder (x->folder, error);
-  return *lock < 0 ? error->status : PW_OK;
-}
-
 static int sensitivity_compute (pw_sensitivity *x, pw_error *error) {
   pw_progress progress;
   double begun = pw_cpu_clock ();
@@ -67,7 +57,7 @@ static int sensitivity_command (void *options, pw_error *error) {
   int lock = -1, status = pw_cli_open (&x->m, &x->line, error);
   if (status == PW_OK) status = sensitivity_settings (x, error);
   if (status == PW_OK) status = sensitivity_unknowns (x, error);
-  if (status == PW_OK) status = sensitivity_folder (x, &lock, error);
+  if (status == PW_OK) status = pw_figure_results (&x->line, &x->m, x->folder, "sensitivity", &lock, error);
   if (status == PW_OK) pw_report_model (x->m.model);
   if (status == PW_OK) status = sensitivity_compute (x, error);
   if (status == PW_OK) pw_sensitivity_print (x);

@@ -54,7 +54,8 @@ void pw_sensitivity_print (const pw_sensitivity *x) {
 
 /* ---- Files ---- */
 
-static void sensitivity_json (const pw_sensitivity *x, pw_json *j) {
+static void sensitivity_json (const void *context, pw_json *j) {
+  const pw_sensitivity *x = context;
   char unit[SENSITIVITY_UNIT];
   pw_json_open (j, NULL, '{');
   pw_json_text (j, "model", pw_file_name (x->m.file));
@@ -95,7 +96,8 @@ static void sensitivity_cell (pw_text *t, const char *name, const char *unit) {
   (strchr (name, ',') ? pw_text_quoted : pw_text_cell) (t, text);
 }
 
-static int sensitivity_csv (const pw_sensitivity *x, FILE *f, pw_error *error) {
+static int sensitivity_csv (const void *context, FILE *f, pw_error *error) {
+  const pw_sensitivity *x = context;
   char unit[SENSITIVITY_UNIT], name[300];
   pw_text t = { 0 };
   pw_text_cell (&t, "t [s]");
@@ -129,17 +131,12 @@ static void sensitivity_label (const pw_sensitivity *x, int o, int p, char *labe
     snprintf (label, size, "∂/∂%.100s [%s]", name, sensitivity_unit (x, o, p, unit));
 }
 
-/* A block of data for each derivative, and its label. */
-static int sensitivity_figure (const pw_sensitivity *x, pw_error *error) {
-  pw_figures figures = { .folder = x->folder,
-                         .model = pw_file_name (x->m.file),
-                         .about = pw_file_table (x->m.file)->about };
-  if (pw_figure_width (x->line.width, &figures.width, error) != PW_OK) return error->status;
-  pw_output *o = pw_figure_data (&figures, "sensitivity.dat", error);
-  if (o == NULL) return PW_RESOURCE;
-  FILE *f = pw_output_stream (o);
+/* A block for each derivative. */
+static int sensitivity_data (const void *context, FILE *f, pw_error *error) {
+  const pw_sensitivity *x = context;
   const double *row = x->row;
   size_t columns = (size_t)x->columns;
+  (void)error;
   for (int c = 1; c < x->columns; c++) {
     if ((c - 1) % (1 + x->unknowns) == 0) continue;
     for (int k = 0; k < x->rows; k++)
@@ -147,9 +144,11 @@ static int sensitivity_figure (const pw_sensitivity *x, pw_error *error) {
                row[(size_t)k * columns + (size_t)c] * sensitivity_factor (x, (c - 1) % (1 + x->unknowns) - 1));
     fputs ("\n\n", f);
   }
-  if (pw_output_finish (o, error) != PW_OK || (o = pw_figure_begin (&figures, "sensitivity", error)) == NULL)
-    return PW_RESOURCE;
-  f = pw_output_stream (o);
+  return PW_OK;
+}
+
+static void sensitivity_variables (const void *context, FILE *f) {
+  const pw_sensitivity *x = context;
   int panels = 0;
   fprintf (f, "unknowns = %d\nt_end = %.10g\n", x->unknowns, x->t_end);
   for (int i = 0; i < x->outcomes.outcomes; i++) panels += pw_sensitivity_runs_along (x, i);
@@ -163,19 +162,10 @@ static int sensitivity_figure (const pw_sensitivity *x, pw_error *error) {
       pw_figure_element (f, "label", (k - 1) * x->unknowns + p + 1, label);
     }
   }
-  int status = pw_figure_end (o, "sensitivity", error);
-  return status == PW_OK ? pw_figure_draw (x->folder, (const char *[]){ "sensitivity", NULL }, error) : status;
 }
 
 int pw_sensitivity_write (const pw_sensitivity *x, pw_error *error) {
-  pw_output *csv = pw_figure_open (x->folder, "sensitivity.csv", error), *json = NULL;
-  if (csv) json = pw_figure_open (x->folder, "sensitivity.json", error);
-  if (json == NULL) {
-    if (csv) pw_output_discard (csv);
-    return PW_RESOURCE;
-  }
-  int status = sensitivity_csv (x, pw_output_stream (csv), error);
-  sensitivity_json (x, &(pw_json){ .f = pw_output_stream (json), .lines = 5 });
-  if (status == PW_OK) status = pw_output_finish_all ((pw_output *[]){ csv, json }, 2, error);
-  return status == PW_OK && x->columns > 1 && x->rows > 1 ? sensitivity_figure (x, error) : status;
+  int status = pw_figure_tables (x->folder, "sensitivity", 5, x, sensitivity_csv, sensitivity_json, error);
+  if (status != PW_OK || x->columns < 2 || x->rows < 2) return status;
+  return pw_figure_write (&x->line, &x->m, x->folder, "sensitivity", x, sensitivity_data, sensitivity_variables, error);
 }

@@ -5,9 +5,9 @@
 #include <string.h>
 #include <unistd.h>
 #include "figure.h"
-#include "held.h"
 #include "progress.h"
 #include "report.h"
+#include "states.h"
 #include "util.h"
 
 enum { STEADY_STARTS = 30 };
@@ -17,8 +17,7 @@ enum { STEADY_STARTS = 30 };
 /* NAME=FIRST:LAST, a parameter of the model or something held. */
 static int steady_vary (pw_steady_cli *x, pw_error *error) {
   char hold[400], value[32];
-  x->vary.line = &x->line, x->vary.m = &x->m;
-  if (pw_cli_vary_read (&x->vary, x->vary_text, error) != PW_OK) return PW_INPUT;
+  if (pw_cli_vary_read (&x->vary, &x->line, &x->m, x->vary_text, error) != PW_OK) return PW_INPUT;
   x->set.first = x->vary.first, x->set.last = x->vary.last;
   const pw_parameter *p = pw_cli_vary_parameter (&x->vary);
   if (p) {
@@ -273,16 +272,6 @@ static int steady_compute (pw_steady_cli *x, pw_error *error) {
   return status;
 }
 
-static int steady_folder (const pw_steady_cli *x, int *lock, pw_error *error) {
-  static const char *const names[] = { "steady.csv", "steady.json", "steady.dat", "steady.gp",
-                                       "steady.svg", "steady.png",  "steady.pdf", NULL };
-  pw_use use[] = { PW_CLI_MODEL_USE, { "-o", x->folder, PW_WRITES_INTO, names } };
-  if (x->folder == NULL) return PW_OK;
-  if (pw_cli_uses (&x->line, x->m.file, use, 2, error) != PW_OK) return error->status;
-  *lock = pw_figure_folder (x->folder, error);
-  return *lock < 0 ? error->status : PW_OK;
-}
-
 static void steady_close (pw_steady_cli *x, int lock) {
   if (lock >= 0) close (lock);
   for (int i = 0; i < x->points; i++) free (x->point[i].state);
@@ -297,7 +286,7 @@ static int steady_command (void *options, pw_error *error) {
   pw_steady_cli *x = options;
   int lock = -1, status = pw_cli_open (&x->m, &x->line, error);
   if (status == PW_OK) status = steady_options (x, error);
-  if (status == PW_OK) status = steady_folder (x, &lock, error);
+  if (status == PW_OK) status = pw_figure_results (&x->line, &x->m, x->folder, "steady", &lock, error);
   if (status == PW_OK) pw_report_model (x->m.model);
   if (status == PW_OK) status = steady_compute (x, error);
   if (status == PW_OK && x->points) pw_steady_print (x);

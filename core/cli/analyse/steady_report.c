@@ -5,9 +5,10 @@
 #include <string.h>
 #include "figure.h"
 #include "print_table.h"
+#include "states.h"
 #include "text.h"
 
-enum { STEADY_DIGITS = 6, STEADY_SHOWN = 12, STEADY_CONFIGURATIONS = 3, STEADY_BODIES = 20, STEADY_EVENTS = 40 };
+enum { STEADY_DIGITS = 6, STEADY_SHOWN = 12, STEADY_CONFIGURATIONS = 3, STEADY_EVENTS = 40 };
 static const double STEADY_SMALL = 1e-12; /* shown as 0 */
 
 const char *const pw_steady_events[] = { "point", "fold", "zero eigenvalue", "Hopf" };
@@ -74,19 +75,8 @@ static void steady_motions (const pw_steady_cli *x) {
 static void steady_configuration (const pw_steady_cli *x, int i) {
   const pw_system *s = x->m.system;
   const double *state = x->point[i].state;
-  int bodies = pw_system_bodies (s), n = pw_system_coordinates (s);
   printf ("\nMotion %d, found from %s\n", i + 1, x->point[i].attempt > 1 ? "a random state" : "the initial state");
-  for (pw_table t = { 0 }; pw_table_pass (&t);) {
-    static const char *const head[] = { "", "x [m]", "y [m]", "phi [rad]", "vx [m/s]", "vy [m/s]", "omega [rad/s]" };
-    for (int k = 0; k < 7; k++) pw_cell (&t, k ? 12 : -12, head[k]);
-    pw_row_end (&t);
-    for (int b = 0; b < bodies && b < STEADY_BODIES; b++) {
-      pw_cell (&t, -12, pw_system_body_name (s, b));
-      for (int k = 0; k < 6; k++) steady_number (&t, state[k / 3 * n + 3 * b + k % 3]);
-      pw_row_end (&t);
-    }
-  }
-  if (bodies > STEADY_BODIES) printf ("  and %d more bodies\n", bodies - STEADY_BODIES);
+  pw_states_print (s, state, state + pw_system_coordinates (s), STEADY_DIGITS, STEADY_SMALL);
 }
 
 /* A row for the ends of each branch and each event, of which only the first ones are shown. */
@@ -153,7 +143,6 @@ static void steady_eigenvalues_json (const pw_steady_point *p, pw_json *j) {
 
 static void steady_point_json (const pw_steady_cli *x, const pw_steady_point *p, pw_json *j) {
   const pw_system *s = x->m.system;
-  char name[300];
   j->line = 1;
   pw_json_open (j, NULL, '{');
   pw_json_number (j, "branch", p->branch);
@@ -166,15 +155,13 @@ static void steady_point_json (const pw_steady_cli *x, const pw_steady_point *p,
   pw_json_open (j, "twist", '[');
   for (int i = 0; i < 3; i++) pw_json_number (j, NULL, p->twist[i]);
   pw_json_close (j, ']');
-  pw_json_open (j, "state", '{');
-  for (int i = 0; i < 2 * pw_system_coordinates (s); i++)
-    pw_json_number (j, pw_system_state_name (s, i, name, sizeof name), p->state[i]);
-  pw_json_close (j, '}');
+  pw_states_json (s, p->state, p->state + pw_system_coordinates (s), "state", j);
   steady_eigenvalues_json (p, j);
   pw_json_close (j, '}');
 }
 
-static void steady_json (const pw_steady_cli *x, pw_json *j) {
+static void steady_json (const void *context, pw_json *j) {
+  const pw_steady_cli *x = context;
   char name[300];
   pw_json_open (j, NULL, '{');
   pw_json_number (j, "schema", 1);
@@ -201,7 +188,8 @@ static void steady_json (const pw_steady_cli *x, pw_json *j) {
 
 /* ---- The table ---- */
 
-static int steady_csv (const pw_steady_cli *x, FILE *f, pw_error *error) {
+static int steady_csv (const void *context, FILE *f, pw_error *error) {
+  const pw_steady_cli *x = context;
   const pw_system *s = x->m.system;
   int states = 2 * pw_system_coordinates (s);
   pw_text t = { .at = NULL };
@@ -209,8 +197,7 @@ static int steady_csv (const pw_steady_cli *x, FILE *f, pw_error *error) {
   pw_text_cell (&t, "branch,event");
   pw_text_name (&t, pw_steady_varies (x) ? x->vary.name : "parameter", x->unit);
   pw_text_cell (&t, "growing,residual");
-  for (int i = 0; i < states; i++)
-    pw_text_name (&t, pw_system_state_name (s, i, name, sizeof name), pw_system_state_unit (s, i));
+  pw_states_head (s, &t);
   for (int i = 1; i <= x->point->unknowns; i++)
     for (int k = 0; k < 2; k++)
       snprintf (name, sizeof name, "%s%d", k ? "im" : "re", i), pw_text_name (&t, name, "1/s");
@@ -264,7 +251,8 @@ static void steady_line (FILE *f, const pw_steady_point *first, int count, int k
   }
 }
 
-static void steady_data (const pw_steady_cli *x, FILE *f) {
+static int steady_data (const void *context, FILE *f, pw_error *error) {
+  const pw_steady_cli *x = context;
   char text[3][32];
   fprintf (f, "# %s, real part [1/s], frequency [Hz]: stable parts; unstable ones; events; eigenvalues [1/s]\n",
            x->vary.name);
@@ -283,38 +271,18 @@ static void steady_data (const pw_steady_cli *x, FILE *f) {
       if (!p->rigid[i])
         fprintf (f, "%s %s %s\n", pw_format (text[0], p->parameter, 10), pw_format (text[1], p->re[i], 10),
                  pw_format (text[2], p->im[i], 10));
+  (void)error;
+  return PW_OK;
 }
 
-static int steady_figure (const pw_steady_cli *x, pw_error *error) {
-  pw_figures figures = { .folder = x->folder,
-                         .model = pw_file_name (x->m.file),
-                         .about = pw_file_table (x->m.file)->about };
-  char label[300];
-  if (pw_figure_width (x->line.width, &figures.width, error) != PW_OK) return error->status;
-  pw_output *data = pw_figure_data (&figures, "steady.dat", error);
-  if (data == NULL) return PW_RESOURCE;
-  steady_data (x, pw_output_stream (data));
-  int status = pw_output_finish (data, error);
-  pw_output *o = status == PW_OK ? pw_figure_begin (&figures, "steady", error) : NULL;
-  if (o == NULL) return PW_RESOURCE;
-  snprintf (label, sizeof label, *x->unit ? "%s [%s]" : "%s", x->vary.name, x->unit);
-  pw_figure_text (pw_output_stream (o), "label_of_x", label);
-  fprintf (pw_output_stream (o), "first = %.10g\nlast = %.10g\n", fmin (x->set.first, x->set.last),
-           fmax (x->set.first, x->set.last));
-  status = pw_figure_end (o, "steady", error);
-  return status == PW_OK ? pw_figure_draw (x->folder, (const char *[]){ "steady", NULL }, error) : status;
+static void steady_variables (const void *context, FILE *f) {
+  const pw_steady_cli *x = context;
+  pw_figure_label (f, "label_of_x", x->vary.name, x->unit);
+  fprintf (f, "first = %.10g\nlast = %.10g\n", fmin (x->set.first, x->set.last), fmax (x->set.first, x->set.last));
 }
 
 int pw_steady_write (const pw_steady_cli *x, pw_error *error) {
-  pw_output *json = pw_figure_open (x->folder, "steady.json", error), *csv = NULL;
-  if (json) csv = pw_figure_open (x->folder, "steady.csv", error);
-  int status = csv ? steady_csv (x, pw_output_stream (csv), error) : PW_RESOURCE;
-  if (status != PW_OK) {
-    if (json) pw_output_discard (json);
-    if (csv) pw_output_discard (csv);
-    return status;
-  }
-  steady_json (x, &(pw_json){ .f = pw_output_stream (json), .lines = 1 });
-  status = pw_output_finish_all ((pw_output *[]){ csv, json }, 2, error);
-  return status == PW_OK && pw_steady_varies (x) ? steady_figure (x, error) : status;
+  int status = pw_figure_tables (x->folder, "steady", 1, x, steady_csv, steady_json, error);
+  if (status != PW_OK || !pw_steady_varies (x)) return status;
+  return pw_figure_write (&x->line, &x->m, x->folder, "steady", x, steady_data, steady_variables, error);
 }

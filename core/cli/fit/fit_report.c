@@ -294,11 +294,10 @@ int pw_fit_table (const pw_fit *x, FILE *f, pw_error *error) {
 /* ---- Figures ---- */
 
 /* A block per column: t, data, standard deviation, model. */
-static int report_data (const pw_fit *x, pw_figures *figures, pw_error *error) {
+static int report_data (const void *context, FILE *f, pw_error *error) {
+  const pw_fit *x = context;
   char number[32];
-  pw_output *o = pw_figure_data (figures, "fit.dat", error);
-  if (o == NULL) return error->status;
-  FILE *f = pw_output_stream (o);
+  (void)error;
   fputs ("# t [s], data, standard deviation, model; a block per column\n", f);
   for (int i = 0; i < x->columns; i++) {
     for (int k = 0; k < x->rows; k++) {
@@ -309,25 +308,20 @@ static int report_data (const pw_fit *x, pw_figures *figures, pw_error *error) {
     }
     fputs ("\n\n", f);
   }
-  return pw_output_finish (o, error);
+  return PW_OK;
+}
+
+static void report_variables (const void *context, FILE *f) {
+  const pw_fit *x = context;
+  int panels = x->columns < REPORT_PANELS ? x->columns : REPORT_PANELS;
+  char variable[20];
+  fprintf (f, "panels = %d\nweighted = %d\narray label[%d]\n", panels, x->weighted, panels);
+  for (int i = 0; i < panels; i++) {
+    snprintf (variable, sizeof variable, "label[%d]", i + 1);
+    pw_figure_label (f, variable, x->name[i], report_unit (x, i));
+  }
 }
 
 int pw_fit_draw (const pw_fit *x, pw_error *error) {
-  static const char *const names[] = { "fit", NULL };
-  pw_figures figures = { x->plots_path, pw_file_name (x->m.file), "", pw_file_table (x->m.file)->about, 0 };
-  char label[300];
-  if (pw_figure_width (x->line.width, &figures.width, error) != PW_OK) return error->status;
-  if (report_data (x, &figures, error) != PW_OK) return error->status;
-  pw_output *o = pw_figure_begin (&figures, names[0], error);
-  if (o == NULL) return error->status;
-  FILE *f = pw_output_stream (o);
-  int panels = x->columns < REPORT_PANELS ? x->columns : REPORT_PANELS;
-  fprintf (f, "panels = %d\nweighted = %d\narray label[%d]\n", panels, x->weighted, panels);
-  for (int i = 0; i < panels; i++) {
-    const char *unit = report_unit (x, i);
-    snprintf (label, sizeof label, "%s%s%s%s", x->name[i], *unit ? " [" : "", unit, *unit ? "]" : "");
-    pw_figure_element (f, "label", i + 1, label);
-  }
-  int status = pw_figure_end (o, "fit", error);
-  return status == PW_OK ? pw_figure_draw (x->plots_path, names, error) : status;
+  return pw_figure_write (&x->line, &x->m, x->plots_path, "fit", x, report_data, report_variables, error);
 }

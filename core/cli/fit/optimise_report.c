@@ -225,12 +225,11 @@ void pw_optimise_yaml (const pw_optimise *x, FILE *f) {
 /* ---- Figures ---- */
 
 /* A row per run: number of the start, unknowns, output, whether it satisfies the constraints. */
-static int report_data (const pw_optimise *x, pw_figures *figures, pw_error *error) {
+static int report_data (const void *context, FILE *f, pw_error *error) {
+  const pw_optimise *x = context;
   int n = x->unknowns.count, width = n + x->outputs;
   char number[32];
-  pw_output *o = pw_figure_data (figures, "optimise.dat", error);
-  if (o == NULL) return error->status;
-  FILE *f = pw_output_stream (o);
+  (void)error;
   fputs ("# start", f);
   for (int i = 0; i < n; i++) fprintf (f, ", %s [%s]", x->unknowns.at[i].name, x->unknowns.at[i].unit);
   fprintf (f, ", %s, 1 if the constraints are satisfied\n", x->objective);
@@ -239,35 +238,26 @@ static int report_data (const pw_optimise *x, pw_figures *figures, pw_error *err
       fprintf (f, "%d", i + 1);
       const double *row = x->start[i].trial + k * width;
       for (int c = 0; c <= n; c++) fprintf (f, " %s", pw_format (number, row[c], 12));
-      fprintf (f, " %d", pw_search_feasible (x, row + n));
-      fputc ('\n', f);
+      fprintf (f, " %d\n", pw_search_feasible (x, row + n));
     }
-  return pw_output_finish (o, error);
+  return PW_OK;
+}
+
+static void report_variables (const void *context, FILE *f) {
+  const pw_optimise *x = context;
+  int panels = x->unknowns.count < REPORT_PANELS ? x->unknowns.count : REPORT_PANELS;
+  char variable[20], unit[80], number[32];
+  fprintf (f, "constraints = %d\npanels = %d\nunknowns = %d\narray label[%d]\narray best[%d]\n", x->outputs - 1, panels,
+           x->unknowns.count, panels, panels);
+  for (int i = 0; i < panels; i++) {
+    snprintf (variable, sizeof variable, "label[%d]", i + 1);
+    pw_figure_label (f, variable, x->unknowns.at[i].name, x->unknowns.at[i].unit);
+    fprintf (f, "best[%d] = %s\n", i + 1, pw_format (number, x->start[x->best].best[i], 12));
+  }
+  pw_figure_label (f, "objective", x->objective, report_unit (x, 0, unit, sizeof unit));
+  fprintf (f, "value = %s\n", pw_format (number, x->start[x->best].value[0], 12));
 }
 
 int pw_optimise_draw (const pw_optimise *x, pw_error *error) {
-  static const char *const names[] = { "optimise", NULL };
-  pw_figures figures = { x->plots_path, pw_file_name (x->m.file), "", pw_file_table (x->m.file)->about, 0 };
-  char label[300], unit[80], number[32];
-  if (pw_figure_width (x->line.width, &figures.width, error) != PW_OK) return error->status;
-  if (report_data (x, &figures, error) != PW_OK) return error->status;
-  pw_output *o = pw_figure_begin (&figures, names[0], error);
-  if (o == NULL) return error->status;
-  FILE *f = pw_output_stream (o);
-  int panels = x->unknowns.count < REPORT_PANELS ? x->unknowns.count : REPORT_PANELS;
-  fprintf (f, "constraints = %d\n", x->outputs - 1);
-  fprintf (f, "panels = %d\nunknowns = %d\narray label[%d]\narray best[%d]\n", panels, x->unknowns.count, panels,
-           panels);
-  for (int i = 0; i < panels; i++) {
-    const pw_free_number *u = x->unknowns.at + i;
-    snprintf (label, sizeof label, "%s%s%s%s", u->name, *u->unit ? " [" : "", u->unit, *u->unit ? "]" : "");
-    pw_figure_element (f, "label", i + 1, label);
-    fprintf (f, "best[%d] = %s\n", i + 1, pw_format (number, x->start[x->best].best[i], 12));
-  }
-  report_unit (x, 0, unit, sizeof unit);
-  snprintf (label, sizeof label, "%s%s%s%s", x->objective, *unit ? " [" : "", unit, *unit ? "]" : "");
-  pw_figure_text (f, "objective", label);
-  fprintf (f, "value = %s\n", pw_format (number, x->start[x->best].value[0], 12));
-  int status = pw_figure_end (o, "optimise", error);
-  return status == PW_OK ? pw_figure_draw (x->plots_path, names, error) : status;
+  return pw_figure_write (&x->line, &x->m, x->plots_path, "optimise", x, report_data, report_variables, error);
 }

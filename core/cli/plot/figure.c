@@ -31,6 +31,11 @@ int pw_figure_width (const char *text, double *width, pw_error *error) {
   return status;
 }
 
+int pw_figures_of (pw_figures *f, const pw_cli_line *l, const pw_cli_model *m, const char *folder, pw_error *error) {
+  *f = (pw_figures){ .folder = folder, .model = pw_file_name (m->file), .about = pw_file_table (m->file)->about };
+  return pw_figure_width (l->width, &f->width, error);
+}
+
 /* ---- The folder ---- */
 
 static int figure_make_folder (const char *folder, pw_error *error) {
@@ -64,6 +69,39 @@ pw_output *pw_figure_data (const pw_figures *f, const char *name, pw_error *erro
   pw_output *o = pw_figure_open (f->folder, name, error);
   if (o && *f->incomplete) fprintf (pw_output_stream (o), "# %s\n", f->incomplete + 2);
   return o;
+}
+
+int pw_figure_results (const pw_cli_line *l, const pw_cli_model *m, const char *folder, const char *name, int *lock,
+                       pw_error *error) {
+  static const char *const ending[] = { ".csv", ".json", ".dat", ".gp", ".svg", ".png", ".pdf" };
+  enum { ENDINGS = sizeof ending / sizeof *ending };
+  char text[ENDINGS][40];
+  const char *names[ENDINGS + 1] = { NULL };
+  for (int i = 0; i < ENDINGS; i++) snprintf (text[i], sizeof text[i], "%s%s", name, ending[i]), names[i] = text[i];
+  pw_use use[] = { PW_CLI_MODEL_USE, { "-o", folder, PW_WRITES_INTO, names } };
+  if (folder == NULL) return PW_OK;
+  if (pw_cli_uses (l, m->file, use, 2, error) != PW_OK) return error->status;
+  *lock = pw_figure_folder (folder, error);
+  return *lock < 0 ? error->status : PW_OK;
+}
+
+int pw_figure_tables (const char *folder, const char *name, int lines, const void *x,
+                      int (*csv) (const void *x, FILE *f, pw_error *error), void (*json) (const void *x, pw_json *j),
+                      pw_error *error) {
+  char path[60];
+  pw_output *file[2] = { NULL };
+  for (int i = 0; i < 2; i++) {
+    snprintf (path, sizeof path, "%s.%s", name, i ? "json" : "csv");
+    file[i] = i == 0 || file[0] ? pw_figure_open (folder, path, error) : NULL;
+  }
+  int status = file[1] ? csv (x, pw_output_stream (file[0]), error) : PW_RESOURCE;
+  if (status == PW_OK) {
+    json (x, &(pw_json){ .f = pw_output_stream (file[1]), .lines = lines });
+    return pw_output_finish_all (file, 2, error);
+  }
+  for (int i = 0; i < 2; i++)
+    if (file[i]) pw_output_discard (file[i]);
+  return status;
 }
 
 /* ---- Scripts ---- */
@@ -134,6 +172,12 @@ void pw_figure_element (FILE *f, const char *name, int i, const char *value) {
   char variable[60];
   snprintf (variable, sizeof variable, "%s[%d]", name, i);
   pw_figure_text (f, variable, value);
+}
+
+void pw_figure_label (FILE *f, const char *variable, const char *name, const char *unit) {
+  char label[300];
+  snprintf (label, sizeof label, *unit ? "%s [%s]" : "%s", name, unit);
+  pw_figure_text (f, variable, label);
 }
 
 int pw_figure_end (pw_output *o, const char *template_name, pw_error *error) {
@@ -215,4 +259,22 @@ int pw_figure_draw (const char *folder, const char *const *names, pw_error *erro
   return pw_fail (error, PW_RESOURCE, "gnuplot %s %d; its message is above, data and scripts are in %s",
                   ended ? "was ended by signal" : "failed with exit status",
                   ended ? WTERMSIG (status) : WEXITSTATUS (status), folder);
+}
+
+int pw_figure_write (const pw_cli_line *l, const pw_cli_model *m, const char *folder, const char *name, const void *x,
+                     int (*data) (const void *x, FILE *f, pw_error *error), void (*variables) (const void *x, FILE *f),
+                     pw_error *error) {
+  pw_figures figures;
+  char file[40];
+  snprintf (file, sizeof file, "%s.dat", name);
+  if (pw_figures_of (&figures, l, m, folder, error) != PW_OK) return error->status;
+  pw_output *o = pw_figure_data (&figures, file, error);
+  if (o == NULL) return error->status;
+  int status = data (x, pw_output_stream (o), error);
+  if (status != PW_OK) return pw_output_discard (o), status;
+  if (pw_output_finish (o, error) != PW_OK || (o = pw_figure_begin (&figures, name, error)) == NULL)
+    return error->status;
+  variables (x, pw_output_stream (o));
+  status = pw_figure_end (o, name, error);
+  return status == PW_OK ? pw_figure_draw (folder, (const char *[]){ name, NULL }, error) : status;
 }

@@ -1,9 +1,10 @@
-/* What is held in a steady motion, as options. */
-#ifndef PW_HELD_H
-#define PW_HELD_H
+/* States in options and reports of analyses. */
+#ifndef PW_STATES_H
+#define PW_STATES_H
 
 #include "cli.h"
 #include "pinwheel-analysis.h"
+#include "text.h"
 
 enum { PW_HOLDS = 40 };
 
@@ -14,5 +15,11 @@ enum { PW_HOLDS = 40 };
 /* Adds "NAME=VALUE" to the list, which has room for PW_HOLDS; `option` is for messages.  PW_INPUT. */
 int pw_hold_read (const pw_system *s, const char *option, const char *text, pw_initial_value *hold, int *holds,
                   pw_error *error);
+
+/* Prints a row for each body; numbers below `small` as 0. */
+void pw_states_print (const pw_system *s, const double *q, const double *v, int digits, double small);
+/* Writes an object; adds cells with the names. */
+void pw_states_json (const pw_system *s, const double *q, const double *v, const char *key, pw_json *j);
+void pw_states_head (const pw_system *s, pw_text *t);
 
 #endif
