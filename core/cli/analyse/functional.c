@@ -159,7 +159,7 @@ static void functional_extremum (functional_step *p, pw_functional *f, const dou
 
 /* ---- Along the run ---- */
 
-int pw_outcomes_start (pw_outcomes *x, pw_run *r, pw_error *error) {
+static int functional_begin (pw_outcomes *x, pw_run *r, pw_error *error) {
   pw_sample s;
   gsl_set_error_handler_off (); /* the default handler ends the program */
   x->t0 = x->t = pw_run_time (r);
@@ -207,7 +207,7 @@ static void functional_simpson (functional_step *p, pw_functional *f) {
   }
 }
 
-int pw_outcomes_step (pw_outcomes *x, pw_run *r, pw_error *error) {
+static int functional_advance (pw_outcomes *x, pw_run *r, pw_error *error) {
   functional_step p = { x, r, x->t, pw_run_time (r), PW_OK, error };
   double t[FUNCTIONAL_TIMES];
   int any = 0, nodes = pw_system_jumps (x->system, p.t1);
@@ -231,7 +231,7 @@ int pw_outcomes_step (pw_outcomes *x, pw_run *r, pw_error *error) {
   return p.status;
 }
 
-int pw_outcomes_end (pw_outcomes *x, pw_run *r, pw_error *error) {
+static int functional_end (pw_outcomes *x, pw_run *r, pw_error *error) {
   functional_step p = { x, r, x->t, pw_run_time (r), PW_OK, error };
   for (pw_functional *f = x->functional; f < x->functional + x->functionals && p.status == PW_OK; f++) {
     if (pw_is_integral (f->type)) functional_average (f, x->t - x->t0);
@@ -251,12 +251,12 @@ int pw_outcomes_sample (pw_outcomes *x, pw_run *r, double t, double *value, pw_e
 int pw_outcomes_run (pw_outcomes *x, const char *method, const pw_settings *settings, double t_end, pw_error *error) {
   pw_run *r = pw_run_open (x->system, method, settings, error);
   if (r == NULL) return error->status;
-  int status = pw_outcomes_start (x, r, error);
+  int status = functional_begin (x, r, error);
   while (status == PW_OK && pw_run_time (r) < t_end) {
     status = pw_run_advance (r, t_end, error);
-    if (status == PW_OK) status = pw_outcomes_step (x, r, error);
+    if (status == PW_OK) status = functional_advance (x, r, error);
   }
-  if (status == PW_OK) status = pw_outcomes_end (x, r, error);
+  if (status == PW_OK) status = functional_end (x, r, error);
   if (status == PW_STOPPED) status = pw_limit_fail (settings->stop_context, pw_run_time (r), error);
   pw_run_close (r);
   return status;

@@ -60,7 +60,7 @@ extern const double pw_gauss_x[PW_GAUSS_NODES], pw_gauss_w[PW_GAUSS_NODES];
 typedef struct {
   pw_functional_type type;
   pw_column column;
-  double value;                   /* so far; after pw_outcomes_end that of the run */
+  double value;                   /* so far; after pw_outcomes_run that of the run */
   double t;                       /* time of the extremum, or of the end [s] */
   double at[PW_FUNCTIONAL_TIMES]; /* private: the column in the last step; [0] at its beginning */
 } pw_functional;
@@ -90,13 +90,9 @@ int pw_outcomes_open (pw_outcomes *x, const pw_system *s, const char *option, co
                       pw_error *error);
 void pw_outcomes_close (pw_outcomes *x);
 
-/* Call them after opening a run, after each step, and at the end.  Statuses of pw_run_sample. */
-int pw_outcomes_start (pw_outcomes *x, pw_run *r, pw_error *error);
-int pw_outcomes_step (pw_outcomes *x, pw_run *r, pw_error *error);
-int pw_outcomes_end (pw_outcomes *x, pw_run *r, pw_error *error);
 /* The columns of all functionals at a time in the last step. */
 int pw_outcomes_sample (pw_outcomes *x, pw_run *r, double t, double *value, pw_error *error);
-/* All of it: a run to t_end.  A run that was stopped fails as pw_limit_fail says; settings.stop_context is a pw_limit. */
+/* Evaluates them along a run to t_end.  A run that was stopped fails as pw_limit_fail says; settings.stop_context is a pw_limit. */
 int pw_outcomes_run (pw_outcomes *x, const char *method, const pw_settings *settings, double t_end, pw_error *error);
 
 /* The value after the end.  gradient, unless NULL, receives its derivatives with respect to all functionals. */

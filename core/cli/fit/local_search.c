@@ -28,7 +28,8 @@ typedef struct {
   double least, most;     /* objectives of the runs that succeeded */
 } search;
 
-double pw_search_unknown (const pw_free_number *k, double u) {
+/* The value of an unknown: u is from 0 to 1 between the user's bounds, otherwise in units of its scale. */
+static double search_unknown (const pw_free_number *k, double u) {
   return fmin (fmax (k->given ? k->low + u * k->scale : u * k->scale, k->low), k->high);
 }
 
@@ -144,7 +145,7 @@ static void search_evaluate (search *p, const double *u, int slopes) {
   pw_error own = { 0 };
   if (p->known && (p->sloped || !slopes) && memcmp (p->u, u, (size_t)n * sizeof *u) == 0) return;
   memcpy (p->u, u, (size_t)n * sizeof *u);
-  for (int i = 0; i < n; i++) p->at[i] = pw_search_unknown (x->unknowns.at + i, u[i]);
+  for (int i = 0; i < n; i++) p->at[i] = search_unknown (x->unknowns.at + i, u[i]);
   int status = search_try (p, slopes, &own);
   if (status == PW_RETRY || pw_stop) {
     nlopt_force_stop (p->opt);

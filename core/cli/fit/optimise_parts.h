@@ -48,9 +48,6 @@ typedef struct {
 
 #define PW_SEARCH_FINE 1e-7 /* last steps of the results that continue, relative to the scales of the unknowns */
 
-/* The value of an unknown: u is from 0 to 1 between the user's bounds, otherwise in units of its scale. */
-double pw_search_unknown (const pw_free_number *k, double u);
-
 /* 1 if outputs satisfy the constraints, with an allowance for the last digits of a solution on the boundary. */
 int pw_search_feasible (const pw_optimise *x, const double *value);
 
@@ -63,9 +60,6 @@ void pw_search_fine (void *optimise, int i);
 
 /* 1 if the results of two starts are the same optimum. */
 int pw_optimise_same (const pw_optimise *x, const pw_search_start *a, const pw_search_start *b);
-
-/* 1 if a value x of unknown i is at a bound: -1 the lower one. */
-int pw_optimise_at_bound (const pw_optimise *x, int i, double value);
 
 /* Prints the result; writes it as JSON and YAML; draws figures of the runs into the folder. */
 void pw_optimise_print (const pw_optimise *x);

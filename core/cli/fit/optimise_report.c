@@ -15,12 +15,6 @@ int pw_optimise_same (const pw_optimise *x, const pw_search_start *a, const pw_s
   return same;
 }
 
-int pw_optimise_at_bound (const pw_optimise *x, int i, double value) {
-  const pw_free_number *u = x->unknowns.at + i;
-  double near = 10 * PW_SEARCH_FINE * u->scale;
-  return value - u->low <= near ? -1 : u->high - value <= near;
-}
-
 enum { REPORT_DIGITS = 9, REPORT_PANELS = 6, REPORT_OPTIONS = 4000 };
 
 /* Starts whose results are at the best one. */
@@ -53,9 +47,11 @@ static double report_initial (const pw_optimise *x) {
   return x->start[0].runs > 0 ? x->start[0].trial[x->unknowns.count] : NAN;
 }
 
-static const char *report_bound (const pw_optimise *x, int i) {
-  int side = pw_optimise_at_bound (x, i, x->start[x->best].best[i]);
-  return side < 0 ? "at its lower bound" : side > 0 ? "at its upper bound" : "";
+/* Whether the best value of unknown i is at its lower (-1) or upper bound. */
+static int report_side (const pw_optimise *x, int i) {
+  const pw_free_number *u = x->unknowns.at + i;
+  double near = 10 * PW_SEARCH_FINE * u->scale, value = x->start[x->best].best[i];
+  return value - u->low <= near ? -1 : u->high - value <= near;
 }
 
 static const char *report_unit (const pw_optimise *x, int output, char *buffer, size_t size) {
@@ -79,7 +75,7 @@ static void report_unknowns (const pw_optimise *x) {
       pw_cell_number (&t, 12, x->start[x->best].best[i], REPORT_DIGITS);
       pw_cell_number (&t, 12, isfinite (u->low) ? u->low : NAN, REPORT_DIGITS);
       pw_cell_number (&t, 12, isfinite (u->high) ? u->high : NAN, REPORT_DIGITS);
-      pw_cell (&t, -1, report_bound (x, i));
+      pw_cell (&t, -1, (const char *[]){ "at its lower bound", "", "at its upper bound" }[1 + report_side (x, i)]);
       pw_row_end (&t);
     }
   }
@@ -134,7 +130,7 @@ static void report_json_unknown (const pw_optimise *x, pw_json *j, int i) {
   pw_json_number (j, "low", u->low);
   pw_json_number (j, "high", u->high);
   pw_json_text (j, "bound",
-                (const char *[]){ "low", NULL, "high" }[1 + pw_optimise_at_bound (x, i, x->start[x->best].best[i])]);
+                (const char *[]){ "low", NULL, "high" }[1 + report_side (x, i)]);
   pw_json_close (j, '}');
 }
 

@@ -164,8 +164,6 @@ double pw_plot_unit (const pw_plots *p);
 /* A point of a body in the inertial frame [m]; motion: x, y, phi. */
 void pw_plot_point (const double *motion, const double *at, double out[2]);
 
-/* The next stroke of a symbol, without vertices if its condition does not hold; 0 after the last one. */
-int pw_plot_symbol (const pw_plot_link *link, const char **text, pw_plot_stroke *s);
 /* Passes the strokes of a symbol and of the ground at it, rails as long as the travel from sample i during `samples`. */
 typedef void pw_plot_stroke_function (void *context, const pw_plot_stroke *s);
 void pw_plot_strokes (const pw_plots *p, int i, const pw_plot_link *link, int samples, pw_plot_stroke_function *out,

@@ -65,7 +65,8 @@ static int symbol_numbers (const char **text, double *out, int most) {
   return n;
 }
 
-int pw_plot_symbol (const pw_plot_link *link, const char **text, pw_plot_stroke *s) {
+/* The next stroke of a symbol, without vertices if its condition does not hold; 0 after the last one. */
+static int symbol_next (const pw_plot_link *link, const char **text, pw_plot_stroke *s) {
   double x[4];
   s->count = 0;
   while (isspace ((unsigned char)**text) || **text == ';') ++*text;
@@ -163,7 +164,7 @@ void pw_plot_strokes (const pw_plots *p, int i, const pw_plot_link *link, int sa
   const double low = f.low / f.unit, high = f.high / f.unit;
   pw_plot_stroke s = { .upright = 0 };
   if (link->end[link->ends - 1].body < 0 || link->end[0].body < 0) symbol_ground (low, high, link, out, context);
-  for (const char *text = link->kind->symbol; pw_plot_symbol (link, &text, &s);) {
+  for (const char *text = link->kind->symbol; symbol_next (link, &text, &s);) {
     for (int k = 0; k < s.count; k++)
       if (isinf (s.at[k][1])) s.at[k][1] = s.at[k][1] > 0 ? high : low;
     if (s.count) out (context, &s);
