@@ -1,8 +1,15 @@
-/* Runs of a fit at the times of the data, and its statistics. */
+/* Runs of a fit at the times of the data; derivatives of its model values, by the variational equations, or if these cannot be
+ * used by differences; its statistics. */
+#define _POSIX_C_SOURCE 200809L
+#include <float.h>
 #include <gsl/gsl_cdf.h>
 #include <math.h>
 #include <stdlib.h>
+#include <string.h>
 #include "fit_parts.h"
+#include "parallel.h"
+
+#define JACOBIAN_EXACT 1e-8 /* relative error of derivatives by the variational equations */
 
 /* ---- Runs ---- */
 
@@ -47,4 +54,121 @@ int pw_fit_freedom (const pw_fit *x) {
 double pw_fit_quantile (const pw_fit *x) {
   double tail = (1 - x->confidence) / 2;
   return x->weighted ? gsl_cdf_gaussian_Qinv (tail, 1) : gsl_cdf_tdist_Qinv (tail, fmax (pw_fit_freedom (x), 1));
+}
+
+/* ---- Differences ---- */
+
+/* Values of an adaptive method are smooth up to its tolerance, those of fixed steps up to round-off. */
+static double jacobian_smooth (const pw_fit *x) {
+  const pw_method *method;
+  int stabilisation;
+  if (pw_method_parse (x->unknowns.method, &method, &stabilisation, NULL) != PW_OK ||
+      !pw_method_adaptive (method, x->unknowns.method))
+    return DBL_EPSILON;
+  return x->unknowns.settings.rtol > 0 ? x->unknowns.settings.rtol : 1e-6;
+}
+
+double pw_fit_noise (const pw_fit *x) {
+  double smooth = jacobian_smooth (x);
+  return x->by_differences ? pow (smooth, 2. / 3) : fmax (smooth, JACOBIAN_EXACT);
+}
+
+/* Runs on both sides of each unknown. */
+typedef struct {
+  const pw_fit *x;
+  const double *at;
+  double *run, *step; /* 2 unknowns arrays; distances from `at` */
+  pw_error *error;    /* 2 unknowns */
+} jacobian_differences;
+
+/* The step balances the truncation error, proportional to its square, and the noise, divided by the step. */
+static void jacobian_side (void *context, int task) {
+  jacobian_differences *d = context;
+  const pw_fit *x = d->x;
+  const pw_free_number *u = x->unknowns.at + task / 2;
+  int n = x->unknowns.count;
+  double *at = malloc ((size_t)n * sizeof *at), size = fmax (fabs (d->at[task / 2]), 1e-2 * u->scale);
+  if (at == NULL) {
+    pw_fail (d->error + task, PW_RESOURCE, "out of memory");
+    return;
+  }
+  memcpy (at, d->at, (size_t)n * sizeof *at);
+  at[task / 2] = fmin (fmax (at[task / 2] + (task % 2 ? 1 : -1) * size * cbrt (jacobian_smooth (x)), u->low), u->high);
+  d->step[task] = at[task / 2] - d->at[task / 2];
+  int status = pw_fit_run (x, at, d->run + (size_t)task * (size_t)x->columns * (size_t)x->rows, d->error + task);
+  d->error[task].status = status;
+  free (at);
+}
+
+/* One side is enough, if the other one fails. */
+static int jacobian_column (const jacobian_differences *d, int j, const double *model, double *out, pw_error *error) {
+  size_t cells = (size_t)d->x->columns * (size_t)d->x->rows;
+  const double *side[2];
+  double step[2];
+  for (int k = 0; k < 2; k++) {
+    int failed = d->error[2 * j + k].status != PW_OK;
+    if (failed && (d->error[2 * j + k].status == PW_RETRY || d->error[2 * j + k].status == PW_RESOURCE ||
+                   d->error[2 * j + !k].status != PW_OK))
+      return *error = d->error[2 * j + k], error->status;
+    side[k] = failed ? model : d->run + (size_t)(2 * j + k) * cells;
+    step[k] = failed ? 0 : d->step[2 * j + k];
+  }
+  for (size_t i = 0; i < cells; i++) out[i] = (side[1][i] - side[0][i]) / (step[1] - step[0]);
+  return PW_OK;
+}
+
+static int jacobian_by_differences (pw_fit *x, const double *at, const double *model, double *jacobian,
+                                    pw_error *error) {
+  size_t n = (size_t)x->unknowns.count, cells = (size_t)x->columns * (size_t)x->rows;
+  jacobian_differences d = { x, at, malloc ((2 * n * cells + 2 * n) * sizeof *d.run), NULL,
+                             calloc (2 * n, sizeof *d.error) };
+  int status = d.run && d.error ? PW_OK : pw_fail (error, PW_RESOURCE, "out of memory");
+  if (status == PW_OK) {
+    d.step = d.run + 2 * n * cells;
+    status = pw_parallel (x->jobs, (int)(2 * n), jacobian_side, &d, error);
+    x->runs += 2 * (long)n;
+  }
+  for (int j = 0; j < x->unknowns.count && status == PW_OK; j++)
+    status = jacobian_column (&d, j, model, jacobian + (size_t)j * cells, error);
+  free (d.run);
+  free (d.error);
+  return status;
+}
+
+/* ---- Variational equations ---- */
+
+/* Derivatives at the time of a row. */
+static int jacobian_row (pw_sensitivity *s, const pw_fit *x, int row, double *jacobian, pw_error *error) {
+  const int n = x->unknowns.count;
+  int status = pw_sensitivity_at (s, x->t[row], error);
+  for (int i = 0; i < x->columns && status == PW_OK; i++) {
+    const double *slope = s->slope + s->outcomes.outcome[i].term[0] * n;
+    for (int j = 0; j < n; j++) {
+      if (!isfinite (slope[j])) return pw_fail (error, PW_METHOD, "%s has no derivative", x->name[i]);
+      jacobian[((size_t)j * (size_t)x->columns + (size_t)i) * (size_t)x->rows + (size_t)row] = slope[j];
+    }
+  }
+  return status;
+}
+
+static int jacobian_by_variation (const pw_fit *x, const double *at, double *jacobian, pw_error *error) {
+  pw_sensitivity s;
+  int status = pw_unknowns_differentiate (&x->unknowns, at, x->name, &s, error);
+  if (status == PW_OK) status = pw_sensitivity_start (&s, error);
+  for (int row = 0; row < x->rows && status == PW_OK; row++) status = jacobian_row (&s, x, row, jacobian, error);
+  if (status == PW_STOPPED) status = pw_limit_fail (&s.limit, pw_run_time (s.base.run), error);
+  pw_sensitivity_close (&s);
+  return status;
+}
+
+/* Motions that are not differentiable have differences from then on. */
+int pw_fit_jacobian (pw_fit *x, const double *at, const double *model, double *jacobian, pw_error *error) {
+  pw_error own = { 0 };
+  int status = x->by_differences ? PW_METHOD : jacobian_by_variation (x, at, jacobian, &own);
+  if (status == PW_OK || status == PW_RETRY || status == PW_RESOURCE) {
+    if (status == PW_RESOURCE) *error = own;
+    return status;
+  }
+  x->by_differences = 1;
+  return jacobian_by_differences (x, at, model, jacobian, error);
 }

@@ -1,7 +1,7 @@
 /* Time of a run by element types and by stages: two tables. */
 #include <math.h>
 #include "print_table.h"
-#include "profile.h"
+#include "report.h"
 
 /* One decimal below 100; empty if there is no value. */
 static void profile_cell (pw_table *t, int there, double value) {

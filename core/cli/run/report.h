@@ -35,4 +35,10 @@ const char **pw_report_redundancies (pw_run *r);
 void pw_report_end (const pw_summary *summary, const pw_system *s, const pw_sample *last, int energy,
                     const pw_statistics *statistics);
 
+/* ---- The tables of --profile (profile.c) ---- */
+
+/* Measures a finished run (pw_run_profile) and prints the cost of each element type and of each stage of an evaluation.
+ * cpu: processor time of the run [s].  Errors: PW_RESOURCE. */
+int pw_print_profile (const pw_system *s, pw_run *r, double cpu, FILE *out, pw_error *error);
+
 #endif

@@ -3,7 +3,7 @@
 #define PW_RUN_COMMAND_H
 
 #include "cli.h"
-#include "comparison.h"
+#include "motion.h"
 #include "plot.h"
 #include "progress.h"
 #include "text.h"

@@ -3,7 +3,7 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
-#include "conclusion.h"
+#include "reference.h"
 
 enum { COMPARE_REPEATS = 99 };
 #define COMPARE_FEW 3      /* smallest number of timed runs within the limit */

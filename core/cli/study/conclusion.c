@@ -2,7 +2,7 @@
  * work-precision curve and relative to the cheapest method; then failures. */
 #include <math.h>
 #include <string.h>
-#include "conclusion.h"
+#include "reference.h"
 
 enum { CONCLUSION_LEVELS = 3, CONCLUSION_WIDTH = 14, CONCLUSION_REASON = 70 };
 static const int conclusion_digits[CONCLUSION_LEVELS] = { 3, 6, 9 };

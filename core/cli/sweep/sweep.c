@@ -10,7 +10,6 @@
 #include "parallel.h"
 #include "progress.h"
 #include "sweep_journal.h"
-#include "sweep_row.h"
 
 /* A compiled system that several threads use. */
 typedef struct shared_system {

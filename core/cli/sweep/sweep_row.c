@@ -3,7 +3,7 @@
 #include <math.h>
 #include <stdlib.h>
 #include "progress.h"
-#include "sweep_row.h"
+#include "sweep_plan.h"
 
 /* The result of a run; NaN if unknown. */
 typedef struct {
