@@ -56,13 +56,8 @@ static void chain_join (pw_plan *c, pw_block_ldl *l, const chain_between *betwee
       c->is_linked[between[p].link.j / 3] = 1;
       l->column[p].in_chain = 1;
     }
-    if (chain->bodies == 1) { /* costs more than the general elimination */
-      c->is_linked[b->link.j / 3] = 0;
-      c->chains--;
-      continue;
-    }
     const pw_column *last = &l->column[chain->column + chain->bodies];
-    chain->whole = last[1].first == last->first;
+    chain->whole = chain->bodies > 1 && last[1].first == last->first;
     c->linked += chain->bodies;
   }
 }
