@@ -166,6 +166,9 @@ void pw_cli_close_model (pw_cli_model *m);
 int pw_cli_apply (pw_model *m, const char *option, const char **list,
                   int (*set) (pw_model *m, const char *name, double value, pw_error *error), pw_error *error);
 
+/* The parameter of a model of this name; NULL: there is none. */
+const pw_parameter *pw_cli_parameter (const pw_model *m, const char *name);
+
 /* A parameter that varies continuously, of --vary NAME=FIRST:LAST (vary.c). */
 typedef struct {
   const pw_cli_line *line;
@@ -177,7 +180,6 @@ typedef struct {
 
 /* Reads the option; the name need not be that of a parameter. */
 int pw_cli_vary_read (pw_cli_vary *v, const pw_cli_line *l, const pw_cli_model *m, const char *text, pw_error *error);
-const pw_parameter *pw_cli_vary_parameter (const pw_cli_vary *v); /* of the model; NULL: it has none of that name */
 /* PW_INPUT if that parameter cannot vary in the range, or is also set. */
 int pw_cli_vary_check (const pw_cli_vary *v, pw_error *error);
 /* Shows the progress of a branch; the first call, with a progress of zeros, starts it. */

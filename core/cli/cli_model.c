@@ -22,6 +22,12 @@ int pw_cli_apply (pw_model *m, const char *option, const char **list,
   return PW_OK;
 }
 
+const pw_parameter *pw_cli_parameter (const pw_model *m, const char *name) {
+  const pw_parameter *p = pw_model_table (m)->parameters;
+  while (p && p->name && strcmp (p->name, name) != 0) p++;
+  return p && p->name ? p : NULL;
+}
+
 pw_file *pw_cli_file (const pw_cli_line *l, pw_error *error) {
   const double most = PW_FILE_MAX_BYTES >> 20;
   double size = PW_FILE_DEFAULT_BYTES >> 20;

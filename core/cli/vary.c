@@ -19,14 +19,8 @@ int pw_cli_vary_read (pw_cli_vary *v, const pw_cli_line *l, const pw_cli_model *
   return pw_fail (error, PW_INPUT, "--vary %s: expected two different numbers FIRST:LAST", text);
 }
 
-const pw_parameter *pw_cli_vary_parameter (const pw_cli_vary *v) {
-  const pw_parameter *p = pw_model_table (v->m->model)->parameters;
-  while (p && p->name && strcmp (p->name, v->name) != 0) p++;
-  return p && p->name ? p : NULL;
-}
-
 int pw_cli_vary_check (const pw_cli_vary *v, pw_error *error) {
-  const pw_parameter *p = pw_cli_vary_parameter (v);
+  const pw_parameter *p = pw_cli_parameter (v->m->model, v->name);
   const double end[] = { v->first, v->last };
   if (p->domain == PW_COUNT)
     return pw_fail (error, PW_INPUT,

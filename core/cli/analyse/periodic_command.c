@@ -48,7 +48,7 @@ static int periodic_options (pw_periodic_cli *x, pw_error *error) {
   if (status != PW_OK || x->vary_text == NULL) return status;
   if (pw_cli_vary_read (&x->vary, &x->line, &x->m, x->vary_text, error) != PW_OK) return PW_INPUT;
   x->set.first = x->vary.first, x->set.last = x->vary.last;
-  const pw_parameter *p = pw_cli_vary_parameter (&x->vary);
+  const pw_parameter *p = pw_cli_parameter (x->m.model, x->vary.name);
   if (p == NULL) return pw_model_set (x->m.model, x->vary.name, x->set.first, error);
   x->unit = p->unit;
   x->set.compile = pw_cli_vary_compile;

@@ -12,9 +12,7 @@ static int unknown_parameter (pw_unknown *u, const pw_cli_model *m, pw_error *er
 }
 
 int pw_unknown_find (pw_unknown *u, const pw_cli_model *m, const pw_run *r, const char *name, pw_error *error) {
-  const pw_parameter *p = pw_file_table (m->file)->parameters;
-  while (p && p->name && strcmp (p->name, name) != 0) p++;
-  *u = (pw_unknown){ .name = name, .parameter = p && p->name ? p : NULL, .state = -1 };
+  *u = (pw_unknown){ .name = name, .parameter = pw_cli_parameter (m->model, name), .state = -1 };
   if (u->parameter) return unknown_parameter (u, m, error);
   if (strchr (name, '.') == NULL) { /* fails with the nearest name */
     pw_model *other = pw_file_model (m->file, error);

@@ -19,7 +19,7 @@ static int steady_vary (pw_steady_cli *x, pw_error *error) {
   char hold[400], value[32];
   if (pw_cli_vary_read (&x->vary, &x->line, &x->m, x->vary_text, error) != PW_OK) return PW_INPUT;
   x->set.first = x->vary.first, x->set.last = x->vary.last;
-  const pw_parameter *p = pw_cli_vary_parameter (&x->vary);
+  const pw_parameter *p = pw_cli_parameter (x->m.model, x->vary.name);
   if (p) {
     x->unit = p->unit;
     x->set.compile = pw_cli_vary_compile;
@@ -243,7 +243,7 @@ static int steady_complete (pw_steady_cli *x, pw_error *error) {
 /* The value in the model, or in its initial state. */
 static double steady_model_value (const pw_steady_cli *x) {
   const pw_system *s = x->m.system;
-  if (x->set.vary < 0) return pw_model_parameter (x->m.model, pw_cli_vary_parameter (&x->vary));
+  if (x->set.vary < 0) return pw_model_parameter (x->m.model, pw_cli_parameter (x->m.model, x->vary.name));
   return pw_system_held_value (s, x->hold[x->set.vary].state, pw_system_initial_q (s), pw_system_initial_v (s));
 }
 

@@ -8,15 +8,9 @@
 #include <string.h>
 #include "util.h"
 
-static const pw_parameter *unknowns_parameter (const pw_model *m, const char *name) {
-  const pw_parameter *q = pw_model_table (m)->parameters;
-  while (q && q->name && strcmp (q->name, name) != 0) q++;
-  return q && q->name ? q : NULL;
-}
-
 /* An unknown name is reported as --set or --start would. */
 static int unknowns_find (pw_free_number *u, const pw_cli_model *m, pw_error *error) {
-  u->parameter = unknowns_parameter (m->model, u->name);
+  u->parameter = pw_cli_parameter (m->model, u->name);
   if (u->parameter) {
     u->unit = u->parameter->unit;
     u->value = pw_model_parameter (m->model, u->parameter);

@@ -205,7 +205,7 @@ static int study_open_folder (pw_study *x, pw_error *error) {
                    { "--reference", x->reference_path, PW_READS, NULL },
                    { "-o", x->folder, PW_WRITES_INTO, names } };
   if (x->folder == NULL) return PW_OK;
-  if (pw_figure_width (x->line.width, &x->width, error) != PW_OK) return error->status;
+  if (pw_figures_of (&x->figures, &x->line, &x->m, x->folder, error) != PW_OK) return error->status;
   if (pw_cli_uses (&x->line, x->m.file, use, sizeof use / sizeof *use, error) != PW_OK) return error->status;
   x->lock = pw_figure_folder (x->folder, error);
   return x->lock < 0 ? error->status : pw_table_open (x, error);

@@ -93,7 +93,7 @@ struct pw_study {
   pw_limit limit; /* of a run */
   double t_end;   /* [s] */
   double cpu_end; /* CPU time of a run after which it is stopped between steps [s] */
-  double width;   /* of figures [mm]; 0: default */
+  pw_figures figures;
   /* progress */
   int lock;  /* of the folder; -1: none */
   int quiet; /* 1: rows are not printed */

@@ -153,10 +153,7 @@ static int table_labels (const pw_study *x, int group, FILE *f) {
 
 int pw_study_write_script (pw_study *x, int group, const char *name, const char *template_name, const char *variables,
                            pw_error *error) {
-  const pw_figures figures = {
-    .folder = x->folder, .model = pw_file_name (x->m.file), .about = pw_file_table (x->m.file)->about, .width = x->width
-  };
-  pw_output *o = pw_figure_begin (&figures, name, error);
+  pw_output *o = pw_figure_begin (&x->figures, name, error);
   int drawn = 0, lines = table_labels (x, group, NULL);
   if (o == NULL) return PW_RESOURCE;
   FILE *f = pw_output_stream (o);

@@ -67,9 +67,8 @@ static int plan_named (const char **list, const char *name) {
 
 /* Every value of a parameter must lie in its domain; other names with a dot are states. */
 static int plan_axis (const pw_plan *p, pw_axis *a, pw_model *m, pw_error *error) {
-  const pw_parameter *q = pw_model_table (m)->parameters;
-  while (q && q->name && strcmp (q->name, a->name) != 0) q++;
-  if (q && q->name) a->parameter = q, a->unit = q->unit;
+  const pw_parameter *q = a->parameter = pw_cli_parameter (m, a->name);
+  if (q) a->unit = q->unit;
   const char *option = a->parameter ? "--set" : "--start";
   if (plan_named (a->parameter ? p->sets : p->starts, a->name))
     return pw_fail (error, PW_INPUT, "%s is given by --vary and by %s", a->name, option);
