@@ -117,11 +117,6 @@ static int sensitivity_csv (const void *context, FILE *f, pw_error *error) {
   return status;
 }
 
-/* What a derivative is multiplied by in the figure, so that unknowns can be compared: their value, unless it is 0. */
-static double sensitivity_factor (const pw_sensitivity *x, int p) {
-  return x->unknown[p].value != 0 ? x->unknown[p].value : 1;
-}
-
 static void sensitivity_label (const pw_sensitivity *x, int o, int p, char *label, size_t size) {
   char unit[SENSITIVITY_UNIT];
   const char *name = x->unknown[p].name;
@@ -138,10 +133,11 @@ static int sensitivity_data (const void *context, FILE *f, pw_error *error) {
   size_t columns = (size_t)x->columns;
   (void)error;
   for (int c = 1; c < x->columns; c++) {
-    if ((c - 1) % (1 + x->unknowns) == 0) continue;
+    int p = (c - 1) % (1 + x->unknowns) - 1;
+    if (p < 0) continue;
+    double factor = x->unknown[p].value != 0 ? x->unknown[p].value : 1; /* so that unknowns can be compared */
     for (int k = 0; k < x->rows; k++)
-      fprintf (f, "%.9g %.9g\n", row[(size_t)k * columns],
-               row[(size_t)k * columns + (size_t)c] * sensitivity_factor (x, (c - 1) % (1 + x->unknowns) - 1));
+      fprintf (f, "%.9g %.9g\n", row[(size_t)k * columns], row[(size_t)k * columns + (size_t)c] * factor);
     fputs ("\n\n", f);
   }
   return PW_OK;

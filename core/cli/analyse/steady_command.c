@@ -68,7 +68,6 @@ static pw_steady_point *steady_add (pw_steady_cli *x, const pw_steady_motion *m,
   pw_steady_point *p = x->point + x->points;
   *p = (pw_steady_point){ .branch = x->branches,
                           .attempt = attempt,
-                          .iterations = m->iterations,
                           .family = m->family,
                           .unstable = m->unstable,
                           .event = m->event,
@@ -121,7 +120,7 @@ static int steady_found (pw_steady_cli *x, const pw_steady_motion *m, int attemp
     if (m->family > 0 && p->family == m->family && p->unstable == m->unstable) return PW_OK;
     if (steady_same (x, p, m)) return PW_OK;
   }
-  if (!pw_steady_varies (x)) x->branches++;
+  if (!x->vary_text) x->branches++;
   pw_steady_point *p = steady_add (x, m, attempt, error);
   return p ? steady_advise (x, p, error) : PW_RESOURCE;
 }
@@ -167,14 +166,14 @@ static int steady_fail (pw_steady_cli *x, pw_error *error) {
 static int steady_branch (pw_steady_cli *x, const pw_steady_point *from, int direction, pw_error *error) {
   int n = pw_system_coordinates (x->m.system), status;
   double *state = malloc (2 * (size_t)n * sizeof *state);
-  pw_steady_end *more = realloc (x->end, ((size_t)x->branches + 1) * sizeof *more);
+  char (*more)[PW_STEADY_REASON] = realloc (x->end, ((size_t)x->branches + 1) * sizeof *more);
   if (more) x->end = more;
   if (state == NULL || more == NULL) return free (state), pw_fail (error, PW_RESOURCE, "out of memory");
   pw_steady_motion m = { 0 };
   pw_progress progress = { .t_end = 0 };
   int attempt = from->attempt;
   memcpy (state, from->state, 2 * (size_t)n * sizeof *state);
-  *x->end[x->branches++].reason = 0;
+  *x->end[x->branches++] = 0;
   status = pw_steady_follow (x->steady, state, state + n, from->parameter, direction, error);
   while (status == PW_OK && !steady_stop (x)) {
     status = pw_steady_next (x->steady, &m, error);
@@ -186,11 +185,11 @@ static int steady_branch (pw_steady_cli *x, const pw_steady_point *from, int dir
   pw_progress_end (&progress);
   free (state);
   if (status == PW_METHOD) {
-    snprintf (x->end[x->branches - 1].reason, sizeof x->end->reason, "%.199s", error->text);
+    snprintf (x->end[x->branches - 1], sizeof *x->end, "%.199s", error->text);
     *error = (pw_error){ 0 };
     return PW_OK;
   }
-  snprintf (x->end[x->branches - 1].reason, sizeof x->end->reason, "%.199s", pw_steady_reason (x->steady));
+  snprintf (x->end[x->branches - 1], sizeof *x->end, "%.199s", pw_steady_reason (x->steady));
   return status;
 }
 
@@ -265,7 +264,7 @@ static int steady_compute (pw_steady_cli *x, pw_error *error) {
   x->steady = pw_steady_open (x->m.system, &x->set, error);
   if (x->steady == NULL) return error->status;
   pw_stop_catch ();
-  int status = pw_steady_varies (x) ? steady_branches (x, error) : steady_search (x, 0, error);
+  int status = x->vary_text ? steady_branches (x, error) : steady_search (x, 0, error);
   x->interrupted = pw_stop > 0;
   pw_stop_release ();
   if (status == PW_OK && x->points == 0 && !x->stopped) status = steady_fail (x, error);

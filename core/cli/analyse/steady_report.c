@@ -11,7 +11,7 @@
 enum { STEADY_DIGITS = 6, STEADY_SHOWN = 12, STEADY_CONFIGURATIONS = 3, STEADY_EVENTS = 40 };
 static const double STEADY_SMALL = 1e-12; /* shown as 0 */
 
-const char *const pw_steady_events[] = { "point", "fold", "zero eigenvalue", "Hopf" };
+static const char *const steady_events[] = { "point", "fold", "zero eigenvalue", "Hopf" };
 
 /* ---- Text ---- */
 
@@ -72,13 +72,6 @@ static void steady_motions (const pw_steady_cli *x) {
   if (x->points > STEADY_SHOWN) printf ("  and %d more, see -o DIR\n", x->points - STEADY_SHOWN);
 }
 
-static void steady_configuration (const pw_steady_cli *x, int i) {
-  const pw_system *s = x->m.system;
-  const double *state = x->point[i].state;
-  printf ("\nMotion %d, found from %s\n", i + 1, x->point[i].attempt > 1 ? "a random state" : "the initial state");
-  pw_states_print (s, state, state + pw_system_coordinates (s), STEADY_DIGITS, STEADY_SMALL);
-}
-
 /* A row for the ends of each branch and each event, of which only the first ones are shown. */
 static void steady_branches (const pw_steady_cli *x) {
   int events = 0;
@@ -94,7 +87,7 @@ static void steady_branches (const pw_steady_cli *x) {
           last = p == x->point + x->points - 1 || p[1].branch != p->branch;
       if (!first && !last && (p->event == PW_STEADY_POINT || ++events > STEADY_EVENTS)) continue;
       pw_cell_number (&t, 6, p->branch, 6);
-      pw_cell (&t, -15, first ? "begins" : p->event != PW_STEADY_POINT ? pw_steady_events[p->event] : "ends");
+      pw_cell (&t, -15, first ? "begins" : p->event != PW_STEADY_POINT ? steady_events[p->event] : "ends");
       pw_cell_number (&t, 12, p->parameter, 9);
       pw_cell_number (&t, 7, p->unstable, 6);
       steady_rightmost (&t, p);
@@ -103,13 +96,13 @@ static void steady_branches (const pw_steady_cli *x) {
   }
   if (events > STEADY_EVENTS) printf ("and %d more events, see -o DIR\n", events - STEADY_EVENTS);
   for (int i = 0; i < x->branches; i++)
-    if (*x->end[i].reason) printf ("Branch %d ends: %s\n", i + 1, x->end[i].reason);
+    if (*x->end[i]) printf ("Branch %d ends: %s\n", i + 1, x->end[i]);
 }
 
 void pw_steady_print (const pw_steady_cli *x) {
   char first[32], last[32];
   const char *model = pw_file_name (x->m.file);
-  if (pw_steady_varies (x)) {
+  if (x->vary_text) {
     printf ("%s: %d %s of steady motions, %s from %s to %s, %d symmetries\n\n", model, x->branches,
             x->branches == 1 ? "branch" : "branches", x->vary.name, pw_format (first, x->set.first, 9),
             pw_format (last, x->set.last, 9), pw_steady_symmetries (x->steady));
@@ -119,7 +112,11 @@ void pw_steady_print (const pw_steady_cli *x) {
   printf ("%s: %d steady %s, apart from %d symmetries, from the initial state and %d random ones\n\n", model, x->points,
           x->points == 1 ? "motion" : "motions", pw_steady_symmetries (x->steady), x->attempts);
   steady_motions (x);
-  for (int i = 0; i < x->points && i < STEADY_CONFIGURATIONS; i++) steady_configuration (x, i);
+  for (int i = 0; i < x->points && i < STEADY_CONFIGURATIONS; i++) {
+    const double *state = x->point[i].state;
+    printf ("\nMotion %d, found from %s\n", i + 1, x->point[i].attempt > 1 ? "a random state" : "the initial state");
+    pw_states_print (x->m.system, state, state + pw_system_coordinates (x->m.system), STEADY_DIGITS, STEADY_SMALL);
+  }
   for (int i = 0; i < x->points && i < STEADY_SHOWN; i++)
     if (*x->point[i].advice)
       printf ("\nMotion %d is one of a family of dimension %d; to select one:%s\n", i + 1, x->point[i].family,
@@ -146,11 +143,11 @@ static void steady_point_json (const pw_steady_cli *x, const pw_steady_point *p,
   j->line = 1;
   pw_json_open (j, NULL, '{');
   pw_json_number (j, "branch", p->branch);
-  if (pw_steady_varies (x)) pw_json_text (j, "event", pw_steady_events[p->event]);
-  if (pw_steady_varies (x)) pw_json_number (j, "parameter", p->parameter);
+  if (x->vary_text) pw_json_text (j, "event", steady_events[p->event]);
+  if (x->vary_text) pw_json_number (j, "parameter", p->parameter);
   pw_json_number (j, "attempt", p->attempt);
   pw_json_number (j, "residual", p->residual);
-  if (!pw_steady_varies (x)) pw_json_number (j, "family", p->family);
+  if (!x->vary_text) pw_json_number (j, "family", p->family);
   pw_json_number (j, "growing", p->unstable);
   pw_json_open (j, "twist", '[');
   for (int i = 0; i < 3; i++) pw_json_number (j, NULL, p->twist[i]);
@@ -166,7 +163,7 @@ static void steady_json (const void *context, pw_json *j) {
   pw_json_open (j, NULL, '{');
   pw_json_number (j, "schema", 1);
   pw_json_text (j, "model", pw_file_name (x->m.file));
-  pw_json_text (j, "parameter", pw_steady_varies (x) ? x->vary.name : NULL);
+  pw_json_text (j, "parameter", x->vary_text ? x->vary.name : NULL);
   pw_json_text (j, "unit", x->unit);
   pw_json_open (j, "held", '{');
   for (int i = 0; i < x->set.holds; i++)
@@ -177,7 +174,7 @@ static void steady_json (const void *context, pw_json *j) {
   pw_json_number (j, "attempts", x->attempts + 2);
   pw_json_flag (j, "complete", !x->stopped);
   pw_json_open (j, "ends", '[');
-  for (int i = 0; pw_steady_varies (x) && i < x->branches; i++) pw_json_text (j, NULL, x->end[i].reason);
+  for (int i = 0; x->vary_text && i < x->branches; i++) pw_json_text (j, NULL, x->end[i]);
   pw_json_close (j, ']');
   j->line = 1;
   pw_json_open (j, "motions", '[');
@@ -195,7 +192,7 @@ static int steady_csv (const void *context, FILE *f, pw_error *error) {
   pw_text t = { .at = NULL };
   char name[300];
   pw_text_cell (&t, "branch,event");
-  pw_text_name (&t, pw_steady_varies (x) ? x->vary.name : "parameter", x->unit);
+  pw_text_name (&t, x->vary_text ? x->vary.name : "parameter", x->unit);
   pw_text_cell (&t, "growing,residual");
   pw_states_head (s, &t);
   for (int i = 1; i <= x->point->unknowns; i++)
@@ -204,7 +201,7 @@ static int steady_csv (const void *context, FILE *f, pw_error *error) {
   int status = pw_text_line (&t, f, x->folder, error);
   for (const pw_steady_point *p = x->point; status == PW_OK && p < x->point + x->points; p++) {
     pw_text_number (&t, p->branch);
-    pw_text_cell (&t, pw_steady_events[p->event]);
+    pw_text_cell (&t, steady_events[p->event]);
     pw_text_number (&t, p->parameter);
     pw_text_number (&t, p->unstable);
     pw_text_number (&t, p->residual);
@@ -283,6 +280,6 @@ static void steady_variables (const void *context, FILE *f) {
 
 int pw_steady_write (const pw_steady_cli *x, pw_error *error) {
   int status = pw_figure_tables (x->folder, "steady", 1, x, steady_csv, steady_json, error);
-  if (status != PW_OK || !pw_steady_varies (x)) return status;
+  if (status != PW_OK || !x->vary_text) return status;
   return pw_figure_write (&x->line, &x->m, x->folder, "steady", x, steady_data, steady_variables, error);
 }

@@ -9,7 +9,7 @@
 typedef struct {
   int branch;  /* from 1; without --vary its number */
   int attempt; /* 0: the initial state, else a random one */
-  int iterations, family, unstable;
+  int family, unstable;
   pw_steady_event event;
   double parameter, residual, twist[3];
   double *state;        /* 2 coordinates */
@@ -19,10 +19,7 @@ typedef struct {
   char advice[200]; /* options that select it within its family, " --hold NAME=VALUE..." */
 } pw_steady_point;
 
-/* How a branch ended: "" at the end of the range. */
-typedef struct {
-  char reason[200];
-} pw_steady_end;
+enum { PW_STEADY_REASON = 200 };
 
 typedef struct {
   pw_cli_line line;
@@ -38,19 +35,12 @@ typedef struct {
   pw_steady *steady;
   pw_steady_point *point;
   int points, room;
-  pw_steady_end *end; /* branches */
+  char (*end)[PW_STEADY_REASON]; /* branches: why it ended; "" at the end of the range */
   int branches;
   double nearest[2];     /* smallest residual without solution: from the initial state, from random ones */
   int changing, stopped; /* motions of equations that change; 1: by Ctrl-C or --limit */
   int interrupted;
 } pw_steady_cli;
-
-static inline int pw_steady_varies (const pw_steady_cli *x) {
-  return x->vary_text != NULL;
-}
-
-/* "point", "fold", ... */
-extern const char *const pw_steady_events[];
 
 void pw_steady_print (const pw_steady_cli *x);
 /* Writes everything as JSON, as a table, and with --vary as a figure, into the folder.  A status. */

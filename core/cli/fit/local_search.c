@@ -199,17 +199,12 @@ static double search_excess (unsigned n, const double *u, double *gradient, void
 
 /* ---- Searches ---- */
 
-/* BOBYQA needs two unknowns and has no constraints. */
-static nlopt_algorithm search_algorithm (const search *p) {
-  if (p->slope) return NLOPT_LD_SLSQP;
-  return p->x->outputs > 1 ? NLOPT_LN_COBYLA : p->x->unknowns.count == 1 ? NLOPT_LN_SBPLX : NLOPT_LN_BOBYQA;
-}
-
 /* Bounds and tolerances. */
 static int search_open (search *p, search_constraint *c, double first, double last) {
   const pw_unknowns *k = &p->x->unknowns;
   int n = k->count, status = 1;
-  p->opt = nlopt_create (search_algorithm (p), (unsigned)n);
+  nlopt_algorithm simple = n == 1 ? NLOPT_LN_SBPLX : NLOPT_LN_BOBYQA; /* BOBYQA needs two unknowns and no constraints */
+  p->opt = nlopt_create (p->slope ? NLOPT_LD_SLSQP : p->x->outputs > 1 ? NLOPT_LN_COBYLA : simple, (unsigned)n);
   if (p->opt == NULL) return PW_RESOURCE;
   nlopt_set_min_objective (p->opt, search_objective, p);
   for (int i = 0; i < n; i++) {

@@ -114,12 +114,6 @@ static int optimise_outputs (pw_optimise *x, int from, int count, const char *op
   return status;
 }
 
-static int optimise_check (pw_optimise *x, pw_error *error) {
-  x->smooth = 1;
-  int status = optimise_outputs (x, 0, 1, x->maximise ? "--maximise" : "--minimise", error);
-  return status == PW_OK ? optimise_outputs (x, 1, x->outputs - 1, "--subject-to", error) : status;
-}
-
 static int optimise_read (pw_optimise *x, pw_error *error) {
   double starts = 10;
   x->objective = x->maximise ? x->maximise : x->minimise;
@@ -144,7 +138,9 @@ static int optimise_open (pw_optimise *x, pw_output *file[2], int *folder, pw_er
                    { "--json", x->json_path, PW_WRITES, NULL },
                    { "--plots", x->plots_path, PW_WRITES_INTO, figures } };
   int status = pw_cli_open (&x->m, &x->line, error);
-  if (status == PW_OK) status = optimise_check (x, error);
+  x->smooth = 1;
+  if (status == PW_OK) status = optimise_outputs (x, 0, 1, x->maximise ? "--maximise" : "--minimise", error);
+  if (status == PW_OK) status = optimise_outputs (x, 1, x->outputs - 1, "--subject-to", error);
   if (status == PW_OK) status = pw_unknowns_open (&x->unknowns, &x->line, &x->m, x->free, 20. * x->starts, error);
   if (status == PW_OK && x->unknowns.count > PW_UNKNOWNS_STARTED)
     status = pw_fail (error, PW_INPUT, "--free: at most %d unknowns", PW_UNKNOWNS_STARTED);

@@ -17,13 +17,6 @@ int pw_optimise_same (const pw_optimise *x, const pw_search_start *a, const pw_s
 
 enum { REPORT_DIGITS = 9, REPORT_PANELS = 6, REPORT_OPTIONS = 4000 };
 
-/* Starts whose results are at the best one. */
-static int report_same (const pw_optimise *x) {
-  int same = 0;
-  for (int i = 0; i < x->starts; i++) same += pw_optimise_same (x, x->start + i, x->start + x->best);
-  return same;
-}
-
 static long report_derivatives (const pw_optimise *x) {
   long derivatives = 0;
   for (int i = 0; i < x->starts + x->polished; i++) derivatives += x->start[i].derivatives;
@@ -106,9 +99,11 @@ void pw_optimise_print (const pw_optimise *x) {
   char options[REPORT_OPTIONS];
   const pw_error *first = NULL;
   long failed, runs = report_runs (x, &failed, &first);
+  int same = 0;
+  for (int i = 0; i < x->starts; i++) same += pw_optimise_same (x, x->start + i, x->start + x->best);
   report_unknowns (x);
   report_outputs (x);
-  printf ("\n%ld runs from %d starts, %d of which end at this optimum\n", runs, x->starts, report_same (x));
+  printf ("\n%ld runs from %d starts, %d of which end at this optimum\n", runs, x->starts, same);
   if (report_derivatives (x))
     printf ("with derivatives at %ld points of the searches that continue (SLSQP), without in the others\n",
             report_derivatives (x));
@@ -129,8 +124,7 @@ static void report_json_unknown (const pw_optimise *x, pw_json *j, int i) {
   pw_json_number (j, "value", x->start[x->best].best[i]);
   pw_json_number (j, "low", u->low);
   pw_json_number (j, "high", u->high);
-  pw_json_text (j, "bound",
-                (const char *[]){ "low", NULL, "high" }[1 + report_side (x, i)]);
+  pw_json_text (j, "bound", (const char *[]){ "low", NULL, "high" }[1 + report_side (x, i)]);
   pw_json_close (j, '}');
 }
 

@@ -168,13 +168,6 @@ static int check_model (pw_check *x, int started, pw_error *error) {
   return status == PW_OK ? check_kinds (x, error) : status;
 }
 
-/* The exit status is that of a failed initialisation, otherwise that of bad input. */
-static void check_verdict (const pw_check *x, pw_error *error) {
-  if (x->problem.count == 0) return;
-  pw_fail (error, x->failure.status ? x->failure.status : PW_INPUT, "%s%s", x->problem.text[0],
-           x->problem.count > 1 ? "; and more, see above" : "");
-}
-
 static void check_close (pw_check *x) {
   pw_linear_free (&x->linear);
   if (x->r) pw_run_close (x->r);
@@ -201,7 +194,9 @@ static int check_command (void *options, pw_error *error) {
     if (o) pw_check_report (x, &(pw_json){ .f = pw_output_stream (o) });
     if (o) pw_output_finish (o, error);
     o = NULL;
-    check_verdict (x, error);
+    if (x->problem.count) /* the exit status is that of a failed initialisation, otherwise that of bad input */
+      pw_fail (error, x->failure.status ? x->failure.status : PW_INPUT, "%s%s", x->problem.text[0],
+               x->problem.count > 1 ? "; and more, see above" : "");
   }
   if (o) pw_output_discard (o);
   check_close (x);

@@ -99,14 +99,11 @@ static void symbol_end (const pw_plots *p, int i, const pw_plot_link *link, int 
   pw_plot_point (body < 0 ? ground : pw_plot_track (p, i, &p->bodies, body), link->end[n].at, out);
 }
 
-static double symbol_angle (const pw_plots *p, int i, int body) {
-  return body < 0 ? 0 : pw_plot_track (p, i, &p->bodies, body)[2];
-}
-
 static symbol_frame symbol_place (const pw_plots *p, int i, const pw_plot_link *link) {
   symbol_frame f = { .unit = pw_plot_unit (p) };
   int last = link->ends - 1, line = pw_plot_line (link);
-  double p2[2], angle = symbol_angle (p, i, link->end[line ? last : 0].body);
+  int body = link->end[line ? last : 0].body;
+  double p2[2], angle = body < 0 ? 0 : pw_plot_track (p, i, &p->bodies, body)[2];
   symbol_end (p, i, link, 0, f.p);
   symbol_end (p, i, link, last, p2);
   f.d[0] = p2[0] - f.p[0], f.d[1] = p2[1] - f.p[1];

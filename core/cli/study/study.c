@@ -223,15 +223,8 @@ static double study_work (const pw_study *x) {
   return steps;
 }
 
-/* All runs use the same engine, since their times are compared. */
-static int study_engine (pw_study *x, pw_error *error) {
-  pw_specialise when;
-  int status = pw_cli_specialise (x->line.specialise, &when, error);
-  if (status == PW_OK) pw_cli_engine_open (&x->engine, x->m.system, when, study_work (x));
-  return status;
-}
-
 static int study_open (pw_study *x, pw_error *error) {
+  pw_specialise when;
   x->lock = -1;
   x->share = 1;
   x->cpu_end = INFINITY;
@@ -239,8 +232,10 @@ static int study_open (pw_study *x, pw_error *error) {
   int status = pw_cli_open (&x->m, &x->line, error);
   if (status == PW_OK) status = pw_parallel_jobs (x->jobs_text, &x->jobs, error);
   if (status == PW_OK) status = x->type->plan (x, error);
-  if (status == PW_OK) status = study_engine (x, error);
-  return status == PW_OK ? study_open_folder (x, error) : status;
+  if (status == PW_OK) status = pw_cli_specialise (x->line.specialise, &when, error);
+  if (status != PW_OK) return status;
+  pw_cli_engine_open (&x->engine, x->m.system, when, study_work (x)); /* of all runs, since their times are compared */
+  return study_open_folder (x, error);
 }
 
 /* Measures a row, then writes all rows that are done before the first one that is not: in their order. */

@@ -80,13 +80,6 @@ static int plan_axis (const pw_plan *p, pw_axis *a, pw_model *m, pw_error *error
   return PW_OK;
 }
 
-/* Finds the axes in a model that is not built, which has the parameters the command line sets. */
-static int plan_axes (pw_plan *p, pw_model *m, pw_error *error) {
-  int status = pw_cli_apply (m, "--set", p->sets, pw_model_set, error);
-  for (int i = 0; i < p->grid.axes && status == PW_OK; i++) status = plan_axis (p, p->grid.axis + i, m, error);
-  return status;
-}
-
 /* ---- Columns ---- */
 
 /* The i-th state in the order of the table: six of each body, then internal coordinates and their velocities. */
@@ -243,7 +236,8 @@ int pw_plan_open (pw_plan *p, const char **ranges, pw_error *error) {
   if (status != PW_OK) return status;
   pw_model *m = pw_file_model (p->file, error);
   if (m == NULL) return error->status;
-  status = plan_axes (p, m, error);
+  status = pw_cli_apply (m, "--set", p->sets, pw_model_set, error);
+  for (int i = 0; i < p->grid.axes && status == PW_OK; i++) status = plan_axis (p, p->grid.axis + i, m, error);
   if (status == PW_OK) status = plan_columns (p, error);
   if (status == PW_OK) plan_head (p);
   if (status == PW_OK) status = plan_fingerprint (p, m, error);
