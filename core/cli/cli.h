@@ -169,7 +169,7 @@ int pw_cli_apply (pw_model *m, const char *option, const char **list,
 /* The parameter of a model of this name; NULL: there is none. */
 const pw_parameter *pw_cli_parameter (const pw_model *m, const char *name);
 
-/* A parameter that varies continuously, of --vary NAME=FIRST:LAST (vary.c). */
+/* A parameter that varies continuously, of --vary NAME=FIRST:LAST. */
 typedef struct {
   const pw_cli_line *line;
   const pw_cli_model *m;

@@ -5,8 +5,174 @@
 #include <string.h>
 #include <unistd.h>
 #include "figure.h"
+#include "print_table.h"
 #include "report.h"
 #include "sensitivity.h"
+#include "text.h"
+
+/* ---- The terminal ---- */
+
+enum { SENSITIVITY_DIGITS = 9, SENSITIVITY_UNIT = 64 };
+
+/* "m per kg"; "" if both are unknown or numbers. */
+static const char *sensitivity_unit (const pw_sensitivity *x, int o, int p, char unit[SENSITIVITY_UNIT]) {
+  char of[SENSITIVITY_UNIT / 2];
+  const char *by = x->unknown[p].unit;
+  pw_outcome_unit (&x->outcomes, o, of, sizeof of);
+  snprintf (unit, SENSITIVITY_UNIT, *by ? "%s per %s" : "%s", *of || *by == 0 ? of : "1", by);
+  return unit;
+}
+
+/* The derivative of an output, its error, and the relative change for a relative change of the unknown. */
+static void sensitivity_result (const pw_sensitivity *x, int o, int p, double result[3]) {
+  double value = pw_outcome_value (&x->outcomes, o, NULL);
+  result[0] = pw_sensitivity_derivative (x, o, p, x->end_slope);
+  result[1] = fabs (pw_sensitivity_derivative (x, o, p, x->end_error));
+  result[2] = value != 0 && x->unknown[p].value != 0 ? result[0] * x->unknown[p].value / value : NAN;
+}
+
+static void sensitivity_print (const pw_sensitivity *x) {
+  char t[32], value[32], unit[SENSITIVITY_UNIT], digits[32];
+  static const char *const head[] = { "value", "derivative", "unit", "error", "elasticity", NULL };
+  printf ("%s by %s to t = %s s\n", pw_file_name (x->m.file), x->method, pw_format (t, pw_run_time (x->base.run), 9));
+  for (int o = 0; o < x->outcomes.outcomes && !x->stopped; o++) {
+    pw_outcome_unit (&x->outcomes, o, unit, sizeof unit);
+    pw_cli_print (stdout, "\n%s = %s %s\n", x->of[o], pw_format (value, pw_outcome_value (&x->outcomes, o, NULL), 12),
+                  unit);
+    for (pw_table table = { 0 }; pw_table_pass (&table);) {
+      pw_cell (&table, -14, "by");
+      for (const char *const *h = head; *h; h++) pw_cell (&table, *h == head[2] ? -8 : 12, *h);
+      pw_row_end (&table);
+      for (int p = 0; p < x->unknowns; p++) {
+        double result[3];
+        sensitivity_result (x, o, p, result);
+        pw_cell_unit (&table, -14, x->unknown[p].name, x->unknown[p].unit);
+        pw_cell_number (&table, 12, x->unknown[p].value, SENSITIVITY_DIGITS);
+        pw_cell (&table, 12, isnan (result[0]) ? "none" : pw_format (digits, result[0], SENSITIVITY_DIGITS));
+        pw_cell (&table, -8, sensitivity_unit (x, o, p, unit));
+        pw_cell_number (&table, 12, result[1], 2);
+        pw_cell_number (&table, 12, result[2], 5);
+        pw_row_end (&table);
+      }
+    }
+  }
+}
+
+/* ---- Files ---- */
+
+static void sensitivity_json (const void *context, pw_json *j) {
+  const pw_sensitivity *x = context;
+  char unit[SENSITIVITY_UNIT];
+  pw_json_open (j, NULL, '{');
+  pw_json_text (j, "model", pw_file_name (x->m.file));
+  pw_json_text (j, "method", x->method);
+  pw_json_number (j, "t_end", pw_run_time (x->base.run));
+  pw_json_flag (j, "complete", !x->stopped);
+  pw_json_number (j, "cpu_seconds", x->cpu);
+  pw_json_open (j, "outputs", '[');
+  for (int o = 0; o < x->outcomes.outcomes && !x->stopped; o++) {
+    pw_json_open (j, NULL, '{');
+    pw_json_text (j, "output", x->of[o]);
+    pw_json_text (j, "unit", pw_outcome_unit (&x->outcomes, o, unit, sizeof unit));
+    pw_json_number (j, "value", pw_outcome_value (&x->outcomes, o, NULL));
+    pw_json_open (j, "derivatives", '[');
+    for (int p = 0; p < x->unknowns; p++) {
+      double result[3];
+      sensitivity_result (x, o, p, result);
+      pw_json_open (j, NULL, '{');
+      pw_json_text (j, "by", x->unknown[p].name);
+      pw_json_number (j, "value", x->unknown[p].value);
+      pw_json_text (j, "unit", sensitivity_unit (x, o, p, unit));
+      pw_json_number (j, "derivative", result[0]);
+      pw_json_number (j, "error", result[1]);
+      pw_json_number (j, "elasticity", result[2]);
+      pw_json_close (j, '}');
+    }
+    pw_json_close (j, ']');
+    pw_json_close (j, '}');
+  }
+  pw_json_close (j, ']');
+  pw_json_close (j, '}');
+}
+
+/* A header's cell, in quotes if the output contains a comma. */
+static void sensitivity_cell (pw_text *t, const char *name, const char *unit) {
+  char text[400];
+  snprintf (text, sizeof text, *unit ? "%s [%s]" : "%s", name, unit);
+  (strchr (name, ',') ? pw_text_quoted : pw_text_cell) (t, text);
+}
+
+static int sensitivity_csv (const void *context, FILE *f, pw_error *error) {
+  const pw_sensitivity *x = context;
+  char unit[SENSITIVITY_UNIT], name[300];
+  pw_text t = { 0 };
+  pw_text_cell (&t, "t [s]");
+  for (int o = 0; o < x->outcomes.outcomes; o++) {
+    if (!pw_sensitivity_runs_along (x, o)) continue;
+    sensitivity_cell (&t, x->of[o], pw_outcome_unit (&x->outcomes, o, unit, sizeof unit));
+    for (int p = 0; p < x->unknowns; p++) {
+      snprintf (name, sizeof name, "d(%.140s)/d(%.140s)", x->of[o], x->unknown[p].name);
+      sensitivity_cell (&t, name, sensitivity_unit (x, o, p, unit));
+    }
+  }
+  int status = pw_text_line (&t, f, x->folder, error);
+  for (int i = 0; i < x->rows && status == PW_OK; i++) {
+    for (int k = 0; k < x->columns; k++) pw_text_number (&t, x->row[(size_t)i * (size_t)x->columns + (size_t)k]);
+    status = pw_text_line (&t, f, x->folder, error);
+  }
+  return status;
+}
+
+static void sensitivity_label (const pw_sensitivity *x, int o, int p, char *label, size_t size) {
+  char unit[SENSITIVITY_UNIT];
+  const char *name = x->unknown[p].name;
+  if (x->unknown[p].value != 0)
+    snprintf (label, size, "%.100s × ∂/∂%.100s [%s]", name, name, pw_outcome_unit (&x->outcomes, o, unit, sizeof unit));
+  else
+    snprintf (label, size, "∂/∂%.100s [%s]", name, sensitivity_unit (x, o, p, unit));
+}
+
+/* A block for each derivative. */
+static int sensitivity_data (const void *context, FILE *f, pw_error *error) {
+  const pw_sensitivity *x = context;
+  const double *row = x->row;
+  size_t columns = (size_t)x->columns;
+  (void)error;
+  for (int c = 1; c < x->columns; c++) {
+    int p = (c - 1) % (1 + x->unknowns) - 1;
+    if (p < 0) continue;
+    double factor = x->unknown[p].value != 0 ? x->unknown[p].value : 1; /* so that unknowns can be compared */
+    for (int k = 0; k < x->rows; k++)
+      fprintf (f, "%.9g %.9g\n", row[(size_t)k * columns], row[(size_t)k * columns + (size_t)c] * factor);
+    fputs ("\n\n", f);
+  }
+  return PW_OK;
+}
+
+static void sensitivity_variables (const void *context, FILE *f) {
+  const pw_sensitivity *x = context;
+  int panels = 0;
+  fprintf (f, "unknowns = %d\nt_end = %.10g\n", x->unknowns, x->t_end);
+  for (int i = 0; i < x->outcomes.outcomes; i++) panels += pw_sensitivity_runs_along (x, i);
+  fprintf (f, "panels = %d\narray output[%d]\narray label[%d]\n", panels, panels, panels * x->unknowns);
+  for (int i = 0, k = 0; i < x->outcomes.outcomes; i++) {
+    char label[300];
+    if (!pw_sensitivity_runs_along (x, i)) continue;
+    pw_figure_element (f, "output", ++k, x->of[i]);
+    for (int p = 0; p < x->unknowns; p++) {
+      sensitivity_label (x, i, p, label, sizeof label);
+      pw_figure_element (f, "label", (k - 1) * x->unknowns + p + 1, label);
+    }
+  }
+}
+
+static int sensitivity_write (const pw_sensitivity *x, pw_error *error) {
+  int status = pw_figure_tables (x->folder, "sensitivity", 5, x, sensitivity_csv, sensitivity_json, error);
+  if (status != PW_OK || x->columns < 2 || x->rows < 2) return status;
+  return pw_figure_write (&x->line, &x->m, x->folder, "sensitivity", x, sensitivity_data, sensitivity_variables, error);
+}
+
+/* ---- The command ---- */
 
 static int sensitivity_settings (pw_sensitivity *x, pw_error *error) {
   pw_run_defaults d = pw_cli_defaults (pw_file_table (x->m.file));
@@ -60,8 +226,8 @@ static int sensitivity_command (void *options, pw_error *error) {
   if (status == PW_OK) status = pw_figure_results (&x->line, &x->m, x->folder, "sensitivity", &lock, error);
   if (status == PW_OK) pw_report_model (x->m.model);
   if (status == PW_OK) status = sensitivity_compute (x, error);
-  if (status == PW_OK) pw_sensitivity_print (x);
-  if (status == PW_OK && x->folder) status = pw_sensitivity_write (x, error);
+  if (status == PW_OK) sensitivity_print (x);
+  if (status == PW_OK && x->folder) status = sensitivity_write (x, error);
   int stopped = status == PW_OK && x->stopped;
   if (stopped) status = pw_limit_fail (&x->limit, pw_run_time (x->base.run), error);
   if (lock >= 0) close (lock);

@@ -50,8 +50,4 @@ int pw_sensitivity_runs_along (const pw_sensitivity *x, int output);
 /* The derivative of an output by an unknown from those of the functionals, and its error. */
 double pw_sensitivity_derivative (const pw_sensitivity *x, int output, int unknown, const double *slope);
 
-void pw_sensitivity_print (const pw_sensitivity *x);
-/* Writes sensitivity.csv, sensitivity.json and the figure.  A status. */
-int pw_sensitivity_write (const pw_sensitivity *x, pw_error *error);
-
 #endif

@@ -52,9 +52,6 @@ double pw_fit_noise (const pw_fit *x);
 /* Minimises the sum of squares from the initial values.  A status; x->converged. */
 int pw_fit_solve (pw_fit *x, pw_error *error);
 
-/* Reads the data: names, columns, standard deviations. */
-int pw_fit_read (pw_fit *x, pw_error *error);
-
 /* Degrees of freedom; the factor of confidence intervals: of the normal distribution, or Student's. */
 int pw_fit_freedom (const pw_fit *x);
 double pw_fit_quantile (const pw_fit *x);

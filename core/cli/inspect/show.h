@@ -4,10 +4,6 @@
 
 #include "cli.h"
 
-/* Shows M, J, gamma and the quantities of each coordinate and constraint equation at time t of a run with the model's
- * default method. */
-int pw_show_matrices (const pw_cli_model *m, double t, pw_error *error);
-
 /* Prints the values of a field as in a text model, with this number of digits.  With fewer than 17, tables are
  * abridged. */
 void pw_show_field (const pw_field *f, const void *at, int digits);

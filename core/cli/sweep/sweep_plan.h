@@ -60,7 +60,7 @@ typedef struct {
 int pw_sweep_system_open (pw_sweep_system *x, const pw_plan *p, long row, pw_error *error);
 void pw_sweep_system_close (pw_sweep_system *x);
 
-/* ---- One run (sweep_row.c) ---- */
+/* ---- One run ---- */
 
 /* Performs a run with the system of its parameters and appends its cells, without the end of the line.  `error` has the
  * reason if the system could not be opened.  Returns the status of the run, which has a row even if it failed; PW_RETRY
