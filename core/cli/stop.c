@@ -4,7 +4,6 @@
 #include <string.h>
 #include <time.h>
 #include "cli.h"
-#include "progress.h"
 
 volatile sig_atomic_t pw_stop;
 

@@ -7,6 +7,7 @@
 #include "periodic_report.h"
 #include "progress.h"
 #include "report.h"
+#include "util.h"
 
 /* Periods of a run before each attempt. */
 static const int periodic_settle[PW_PERIODIC_ATTEMPTS] = { 0, 10, 100 };
@@ -64,13 +65,8 @@ static int periodic_stop (pw_periodic_cli *x) {
 
 static int periodic_add (pw_periodic_cli *x, const pw_periodic_orbit *o, pw_error *error) {
   size_t n = (size_t)pw_system_coordinates (x->m.system), k = (size_t)o->multipliers;
-  if (x->points == x->room) {
-    int room = 2 * x->room + 64;
-    pw_periodic_point *more = realloc (x->point, (size_t)room * sizeof *more);
-    if (more == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
-    x->point = more, x->room = room;
-  }
-  double *a = malloc ((4 * n + 2 * k + 1) * sizeof *a);
+  int status = pw_grow (&x->point, (size_t)x->points, &x->room, sizeof *x->point);
+  double *a = status == PW_OK ? malloc ((4 * n + 2 * k + 1) * sizeof *a) : NULL;
   if (a == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
   pw_periodic_point *p = x->point + x->points++;
   *p = (pw_periodic_point){ .orbit = *o, .state = a };

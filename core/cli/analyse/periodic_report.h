@@ -24,7 +24,8 @@ typedef struct {
   pw_cli_vary vary;
   pw_periodic *search;
   pw_periodic_point *point;
-  int points, room;
+  int points;
+  size_t room;
   double nearest[PW_PERIODIC_ATTEMPTS]; /* residuals at the end of the attempts without solution */
   char reason[300];                     /* why, of the nearest one */
   int stopped, interrupted;

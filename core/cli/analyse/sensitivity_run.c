@@ -7,6 +7,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include "sensitivity.h"
+#include "util.h"
 
 /* Rows of the table; intervals of integrals without a table; times of the progress without either. */
 enum { SENSITIVITY_ROWS = 1000, SENSITIVITY_INTERVALS = 200, SENSITIVITY_PARTS = 20 };
@@ -120,12 +121,8 @@ static void sensitivity_keep (pw_sensitivity *x, int i, int moves) {
 
 /* Row of the table: time, then each output that has columns, with its derivatives. */
 static int sensitivity_row (pw_sensitivity *x, double t, pw_error *error) {
-  if (x->rows == x->room) {
-    int room = 2 * x->room + 64;
-    double *more = realloc (x->row, (size_t)room * (size_t)x->columns * sizeof *more);
-    if (more == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
-    x->row = more, x->room = room;
-  }
+  if (pw_grow (&x->row, (size_t)x->rows, &x->room, (size_t)x->columns * sizeof *x->row) != PW_OK)
+    return pw_fail (error, PW_RESOURCE, "out of memory");
   double *out = x->row + (size_t)x->rows++ * (size_t)x->columns;
   *out++ = t;
   for (int i = 0; i < x->outcomes.functionals; i++)

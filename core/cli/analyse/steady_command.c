@@ -59,12 +59,8 @@ static int steady_options (pw_steady_cli *x, pw_error *error) {
 
 static pw_steady_point *steady_add (pw_steady_cli *x, const pw_steady_motion *m, int attempt, pw_error *error) {
   size_t states = 2 * (size_t)pw_system_coordinates (x->m.system), n = (size_t)m->linear->unknowns;
-  if (x->points == x->room) {
-    int room = 2 * x->room + 64;
-    pw_steady_point *more = realloc (x->point, (size_t)room * sizeof *more);
-    if (more == NULL) return pw_fail (error, PW_RESOURCE, "out of memory"), NULL;
-    x->point = more, x->room = room;
-  }
+  if (pw_grow (&x->point, (size_t)x->points, &x->room, sizeof *x->point) != PW_OK)
+    return pw_fail (error, PW_RESOURCE, "out of memory"), NULL;
   pw_steady_point *p = x->point + x->points;
   *p = (pw_steady_point){ .branch = x->branches,
                           .attempt = attempt,

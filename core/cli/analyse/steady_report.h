@@ -34,7 +34,8 @@ typedef struct {
   int attempts; /* random ones at each end */
   pw_steady *steady;
   pw_steady_point *point;
-  int points, room;
+  int points;
+  size_t room;
   char (*end)[PW_STEADY_REASON]; /* branches: why it ended; "" at the end of the range */
   int branches;
   double nearest[2];     /* smallest residual without solution: from the initial state, from random ones */

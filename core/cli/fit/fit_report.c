@@ -3,7 +3,6 @@
 #include <gsl/gsl_cdf.h>
 #include <math.h>
 #include <stdlib.h>
-#include <string.h>
 #include "figure.h"
 #include "print_table.h"
 #include "text.h"

@@ -5,6 +5,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include "optimise_parts.h"
+#include "util.h"
 
 #define SEARCH_FIRST 0.1    /* first steps, relative to the scales of the unknowns */
 #define SEARCH_ROUGH 1e-3   /* last ones */
@@ -90,13 +91,7 @@ int pw_search_feasible (const pw_optimise *x, const double *value) {
 static int search_store (search *p) {
   pw_search_start *s = p->s;
   int n = p->x->unknowns.count, width = n + p->x->outputs;
-  if (s->runs == s->room) {
-    long room = s->room ? 2 * s->room : 64;
-    double *more = realloc (s->trial, (size_t)room * (size_t)width * sizeof *more);
-    if (more == NULL) return PW_RESOURCE;
-    s->trial = more;
-    s->room = room;
-  }
+  if (pw_grow (&s->trial, (size_t)s->runs, &s->room, (size_t)width * sizeof *s->trial) != PW_OK) return PW_RESOURCE;
   double *row = s->trial + s->runs++ * width;
   memcpy (row, p->at, (size_t)n * sizeof *row);
   for (int i = 0; i < p->x->outputs; i++) row[n + i] = p->failed ? NAN : p->value[i];

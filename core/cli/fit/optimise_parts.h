@@ -16,7 +16,7 @@ typedef struct {
   long runs, failed;
   long derivatives; /* points at which derivatives were computed */
   double *trial;    /* runs x (unknowns, outputs); outputs of failed runs are NaN */
-  long room;        /* rows allocated of `trial` */
+  size_t room;      /* rows allocated of `trial` */
   pw_error error;   /* of the first failed run */
 } pw_search_start;
 

@@ -2,7 +2,6 @@
 #include "optimise_parts.h"
 #include <math.h>
 #include <stdlib.h>
-#include <string.h>
 #include "figure.h"
 #include "print_table.h"
 

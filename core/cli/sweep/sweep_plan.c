@@ -4,7 +4,6 @@
 #include <stdlib.h>
 #include <string.h>
 #include "fingerprint.h"
-#include "progress.h"
 #include "sweep_plan.h"
 
 enum { PLAN_TRIES = 1000 }; /* number of failed models after which the grid is refused */
@@ -93,14 +92,10 @@ static int plan_state (const pw_system *s, int i) {
 
 /* The hash table of names must not be full. */
 static int plan_grow (pw_plan *p) {
-  if (p->columns < p->room) return PW_OK;
-  int room = p->room ? 2 * p->room : 64;
-  struct pw_column *more = realloc (p->column, (size_t)room * sizeof *more);
-  if (more == NULL) return PW_RESOURCE;
-  p->column = more;
-  p->room = room;
+  if ((size_t)p->columns < p->room) return PW_OK;
+  if (pw_grow (&p->column, (size_t)p->columns, &p->room, sizeof *p->column) != PW_OK) return PW_RESOURCE;
   pw_names_close (&p->index);
-  if (pw_names_open (&p->index, (size_t)room) != PW_OK) return PW_RESOURCE;
+  if (pw_names_open (&p->index, p->room) != PW_OK) return PW_RESOURCE;
   for (int i = 0; i < p->columns; i++) pw_names_add (&p->index, p->column[i].name, i);
   return PW_OK;
 }

@@ -29,7 +29,8 @@ typedef struct {
   struct pw_column {
     const char *name, *unit;
   } * column; /* columns: the states of all bodies and elements */
-  int columns, room;
+  int columns;
+  size_t room;
   pw_names index;      /* from a state's name to its column */
   pw_arena arena;      /* names */
   uint64_t tables;     /* a hash of the points of all tables of models built so far; 0: there are none */

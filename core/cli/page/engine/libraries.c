@@ -4,7 +4,6 @@
 #include <lapacke.h>
 #include <math.h>
 #include <stdlib.h>
-#include <string.h>
 
 enum { LIBRARIES_MOST = 4000 }; /* nodes: a byte for each pair */
 
