@@ -22,8 +22,6 @@ typedef struct {
   int inputs, outputs;
 } pw_linearise;
 
-/* 1 if mode i is shown: it moves, and of a conjugate pair it is the first. */
-int pw_linearise_shows (const pw_linear *l, int i);
 /* Writes an HTML page in which modes are animated.  A status. */
 int pw_linearise_page (const pw_linearise *x, FILE *f, pw_error *error);
 /* Prints eigenvalues and mode shapes. */

@@ -280,7 +280,7 @@ static void periodic_variables (const void *context, FILE *f) {
   const pw_periodic_cli *x = context;
   int bodies = pw_system_bodies (x->m.system);
   if (bodies > PERIODIC_BODIES) bodies = PERIODIC_BODIES;
-  pw_figure_label (f, "label_of_x", x->vary.name, x->unit);
+  pw_figure_label (f, "label_of_x", 0, x->vary.name, x->unit);
   fprintf (f, "branch = %d\nfirst = %.10g\nlast = %.10g\nbodies = %d\narray body[%d]\n", x->vary_text != NULL,
            fmin (x->set.first, x->set.last), fmax (x->set.first, x->set.last), bodies, bodies ? bodies : 1);
   fputs ("array low[3]\narray high[3]\n", f);

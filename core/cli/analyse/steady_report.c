@@ -273,7 +273,7 @@ static int steady_data (const void *context, FILE *f, pw_error *error) {
 
 static void steady_variables (const void *context, FILE *f) {
   const pw_steady_cli *x = context;
-  pw_figure_label (f, "label_of_x", x->vary.name, x->unit);
+  pw_figure_label (f, "label_of_x", 0, x->vary.name, x->unit);
   fprintf (f, "first = %.10g\nlast = %.10g\n", fmin (x->set.first, x->set.last), fmax (x->set.first, x->set.last));
 }
 

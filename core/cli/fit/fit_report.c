@@ -313,12 +313,8 @@ static int report_data (const void *context, FILE *f, pw_error *error) {
 static void report_variables (const void *context, FILE *f) {
   const pw_fit *x = context;
   int panels = x->columns < REPORT_PANELS ? x->columns : REPORT_PANELS;
-  char variable[20];
   fprintf (f, "panels = %d\nweighted = %d\narray label[%d]\n", panels, x->weighted, panels);
-  for (int i = 0; i < panels; i++) {
-    snprintf (variable, sizeof variable, "label[%d]", i + 1);
-    pw_figure_label (f, variable, x->name[i], report_unit (x, i));
-  }
+  for (int i = 0; i < panels; i++) pw_figure_label (f, "label", i + 1, x->name[i], report_unit (x, i));
 }
 
 int pw_fit_draw (const pw_fit *x, pw_error *error) {

@@ -235,15 +235,14 @@ static int report_data (const void *context, FILE *f, pw_error *error) {
 static void report_variables (const void *context, FILE *f) {
   const pw_optimise *x = context;
   int panels = x->unknowns.count < REPORT_PANELS ? x->unknowns.count : REPORT_PANELS;
-  char variable[20], unit[80], number[32];
+  char unit[80], number[32];
   fprintf (f, "constraints = %d\npanels = %d\nunknowns = %d\narray label[%d]\narray best[%d]\n", x->outputs - 1, panels,
            x->unknowns.count, panels, panels);
   for (int i = 0; i < panels; i++) {
-    snprintf (variable, sizeof variable, "label[%d]", i + 1);
-    pw_figure_label (f, variable, x->unknowns.at[i].name, x->unknowns.at[i].unit);
+    pw_figure_label (f, "label", i + 1, x->unknowns.at[i].name, x->unknowns.at[i].unit);
     fprintf (f, "best[%d] = %s\n", i + 1, pw_format (number, x->start[x->best].best[i], 12));
   }
-  pw_figure_label (f, "objective", x->objective, report_unit (x, 0, unit, sizeof unit));
+  pw_figure_label (f, "objective", 0, x->objective, report_unit (x, 0, unit, sizeof unit));
   fprintf (f, "value = %s\n", pw_format (number, x->start[x->best].value[0], 12));
 }
 

@@ -174,10 +174,10 @@ void pw_figure_element (FILE *f, const char *name, int i, const char *value) {
   pw_figure_text (f, variable, value);
 }
 
-void pw_figure_label (FILE *f, const char *variable, const char *name, const char *unit) {
+void pw_figure_label (FILE *f, const char *variable, int i, const char *name, const char *unit) {
   char label[300];
   snprintf (label, sizeof label, *unit ? "%s [%s]" : "%s", name, unit);
-  pw_figure_text (f, variable, label);
+  i ? pw_figure_element (f, variable, i, label) : pw_figure_text (f, variable, label);
 }
 
 int pw_figure_end (pw_output *o, const char *template_name, pw_error *error) {

@@ -52,8 +52,8 @@ pw_output *pw_figure_begin (const pw_figures *f, const char *name, pw_error *err
 void pw_figure_text (FILE *f, const char *variable, const char *value);
 /* The variable "NAME[1]" .... */
 void pw_figure_element (FILE *f, const char *name, int i, const char *value);
-/* The same with the label "NAME [UNIT]"; no unit if it is "". */
-void pw_figure_label (FILE *f, const char *variable, const char *name, const char *unit);
+/* The same, or with i = 0 the variable "VARIABLE", with the label "NAME [UNIT]"; no unit if it is "". */
+void pw_figure_label (FILE *f, const char *variable, int i, const char *name, const char *unit);
 int pw_figure_end (pw_output *o, const char *template_name, pw_error *error);
 /* All of it for a command with one figure, NAME: `data` writes NAME.dat, `variables` those of the template of this
  * name; then it is drawn.  A status. */
