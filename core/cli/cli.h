@@ -199,7 +199,6 @@ pw_run_defaults pw_cli_defaults (const pw_plugin_table *table);
 typedef enum { PW_SPECIALISE_AUTO, PW_SPECIALISE_ALWAYS, PW_SPECIALISE_NEVER } pw_specialise;
 
 typedef struct {
-  pw_specialise when;
   pw_scene_code *code; /* NULL: the general engine */
   char why[200];       /* reason for the general engine */
 } pw_cli_engine;

@@ -46,7 +46,7 @@ static void engine_load (pw_cli_engine *e, const pw_system *s, pw_specialise whe
 }
 
 void pw_cli_engine_open (pw_cli_engine *e, const pw_system *s, pw_specialise when, double steps) {
-  *e = (pw_cli_engine){ .when = when };
+  *e = (pw_cli_engine){ .code = NULL };
   if (when == PW_SPECIALISE_NEVER)
     strcpy (e->why, "--specialise never");
   else if (when == PW_SPECIALISE_AUTO && !(steps >= PW_SPECIALISE_STEPS))
