@@ -326,6 +326,15 @@ int pw_specialised_project (const pw_projector *p, pw_run *r, double t, double *
                             double *lambda);
 /* The stages of a step, if specialised code can evaluate all of them: 1; 0 if not.  Kinematics and J are not updated. */
 int pw_specialised_stages (pw_run *r, const struct pw_scene_step *x);
+/* Residuals of the state reached, unless they are known or the general engine has to evaluate them. */
+void pw_specialised_residuals (pw_run *r);
+
+/* 1 if specialised code may do the run's next evaluation. */
+int pw_specialised_suits (const pw_run *r);
+/* Passes the scales of residuals to specialised code. */
+void pw_specialised_scale (pw_run *r);
+/* Adds to the statistics: evaluations, and iterations of projections, of specialised code. */
+void pw_specialised_count (pw_run *r, long evaluations, long iterations);
 
 /* ---- Initial conditions ---- */
 

@@ -89,6 +89,10 @@ double pw_method_steps (const char *method, const pw_settings *s, double step, d
  * max_steps. */
 int pw_run_advance (pw_run *r, double t_end, pw_error *error);
 
+/* One step, or several of a fixed size if specialised code is in use, which end where single steps would, none of them
+ * beyond the first that reaches t.  Returns as pw_run_advance. */
+int pw_run_advance_towards (pw_run *r, double t, double t_end, pw_error *error);
+
 /* Steps until t is reached or lies inside the last step, where pw_run_sample can evaluate it, or t_end is reached.
  * Returns as pw_run_advance. */
 int pw_run_advance_to (pw_run *r, double t, double t_end, pw_error *error);

@@ -71,6 +71,7 @@ static void specialise_constants (const pw_specialise_scene *x) {
   specialise_list (x->out, "BODY", s->bodies, 1);
   specialise_list (x->out, "ROW", s->rows, 1);
   specialise_list (x->out, "HOLONOMIC", s->holonomic, 1);
+  specialise_list (x->out, "INTERNAL", s->coords - 3 * s->bodies, 1);
   specialise_list (x->out, "COORDINATES", s->coords, 2);
   for (int b = 0; b < s->bodies; b++) {
     fprintf (x->out, "/* body %d: ", b);
@@ -174,7 +175,7 @@ char *pw_system_source (const pw_system *s, const unsigned char *independent, pw
   if (status == PW_OK) {
     fprintf (x.out,
              "\nPW_EXPORT const pw_specialised pw_specialised_scene = {\n"
-             "  PW_SCENE_ABI, %d, %luu, independent, prepare, evaluate, project, stages\n};\n",
+             "  PW_SCENE_ABI, %d, %luu, independent, prepare, evaluate, project, stages, residuals, steps\n};\n",
              x.constants + 1, pw_system_shape (s));
   }
   if (pw_stream_close (x.out, &text) != PW_OK) status = PW_RESOURCE;

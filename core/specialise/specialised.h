@@ -5,7 +5,7 @@
 
 #include "pinwheel.h"
 
-#define PW_SCENE_ABI 3
+#define PW_SCENE_ABI 4
 #define PW_SCENE_PIVOT 4e-4 /* least pivot of a constraint equation relative to its diagonal entry: a squared sine */
 
 /* A run's data for specialised code.  Arrays over coordinates have `coordinates` entries, those over constraint
@@ -25,7 +25,7 @@ typedef struct pw_scene {
   double alpha, beta;   /* Baumgarte's [1/s]; 0: none */
   double follows;       /* largest scaled residual of redundant equations */
 
-  /* Results of `project`: iterations; scaled and absolute residuals of positions and velocities. */
+  /* Results of `project` and `residuals`: iterations; scaled and absolute residuals of positions and velocities. */
   int iterations;
   double position, g, velocity, jv;
 } pw_scene;
@@ -48,6 +48,38 @@ typedef struct pw_scene_step {
   double *q, *v, *lambda;      /* q, v: the new state; multipliers of a stage */
 } pw_scene_step;
 
+/* Consecutive steps of size h of a method with this tableau, projected or not, with what the run does after each of them:
+ * energies, residuals, and the watchdog's checks (watchdog.c).  Arrays are the run's. */
+typedef struct pw_scene_steps {
+  int count, done; /* steps to take; taken */
+  int project;     /* 1: onto the constraints after each step */
+  int stages;
+  const pw_rk_row *row; /* as in pw_scene_step */
+  const double *c;      /* stages: abscissae */
+  double h, base;       /* the i-th step ends at base + (number + i) h, i > 0 */
+  long number;
+  double t, t0; /* the state reached, and the one before: times */
+  double *state,
+      *state0; /* positions, velocities, accelerations (state: and multipliers), with three entries more each */
+  double *ledger, *ledger0;    /* work and losses */
+  double *rate, *rate0;        /* powers */
+  double *const *V, *const *A; /* stages: scratch */
+  double *const *R;
+  pw_configuration *configuration; /* of the state reached */
+  double *J;
+
+  /* The watchdog: steps that exceed a limit are left to the general engine. */
+  double lost;                           /* largest scaled residuals */
+  double sine, reach, near_sine, growth; /* sine - reach (moved + growth x motion of the step) > near_sine */
+  double rank, regular, drift,
+      no_branch; /* the sines that belong to a residual; residual below which they need no check */
+  double length, per_length, per_angle; /* scale of lengths; units of accelerations */
+  double moved, step;                   /* motion since the sine was computed, and of the last step */
+  double norm, reference;               /* accelerations: of the state reached, largest so far */
+  double position, g, velocity, jv;     /* largest residuals so far */
+  long iterations;                      /* of all projections */
+} pw_scene_steps;
+
 /* Functions return 0, or 1 if the general engine has to do the work: an angle beyond the range of the own sine, a small
  * pivot, values that are not finite, a signal that failed.  Nothing but c, J and u is modified then. */
 typedef struct pw_specialised {
@@ -63,6 +95,9 @@ typedef struct pw_specialised {
                   double *J);
   /* Evaluates stages 1, 2, ... of a step and combines them to the new state, which is not evaluated. */
   int (*stages) (pw_scene *s, const pw_scene_step *x);
+  /* Residuals of an evaluated state. */
+  void (*residuals) (pw_scene *s, const double *q, const double *v, const pw_configuration *c, const double *J);
+  void (*steps) (pw_scene *s, pw_scene_steps *x);
 } pw_specialised;
 
 /* Hash of what the generated text depends on besides the library's version. */

@@ -95,6 +95,7 @@ void pw_show_reached (pw_run *r) {
 void pw_note_residuals (pw_run *r) {
   pw_residuals *now = &r->residuals;
   pw_statistics *s = &r->statistics;
+  pw_specialised_residuals (r);
   if (isnan (now->position)) pw_evaluate_position_residual (r->w, NULL, now);
   if (isnan (now->velocity)) pw_evaluate_velocity_residual (r->w, NULL, now);
   s->position = pw_larger (s->position, now->position);

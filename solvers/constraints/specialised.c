@@ -60,48 +60,66 @@ void pw_specialised_close (pw_run *r) {
   free (r->scene_memory);
 }
 
-/* 1 where the general engine has more to do than to evaluate: with fixed steps it watches the sine of every stage; adaptive
+/* 0 where the general engine has more to do than to evaluate: with fixed steps it watches the sine of every stage; adaptive
  * methods ask for it only below the pivots that the specialised code accepts. */
-static int specialised_is_unsuitable (pw_run *r) {
+int pw_specialised_suits (const pw_run *r) {
   const pw_geometry *g = &r->geometry;
-  return r->specialised == NULL || r->least_norm || (g->alert && g->saddle && g->fixed) || r->near || r->w->hold;
+  return r->specialised && !r->least_norm && !(g->alert && g->saddle && g->fixed) && !r->near && !r->w->hold;
 }
 
-static void specialised_evaluated (pw_run *r, const double *q, const double *v) {
+void pw_specialised_scale (pw_run *r) {
+  r->scene->length = r->w->scale.length;
+  r->scene->speed = r->scene->length / r->w->scale.time;
+}
+
+void pw_specialised_count (pw_run *r, long evaluations, long iterations) {
+  r->statistics.rhs += evaluations;
+  r->statistics.specialised += evaluations;
+  r->statistics.factorisations += evaluations + iterations;
+}
+
+static void specialised_evaluated (pw_run *r, const double *q, const double *v, long iterations) {
   if (r->s->coords > 3 * r->s->bodies) pw_point_to_internal (r->w, q, v);
   pw_saddle_postpone (r->saddle, PW_SCENE_PIVOT);
-  r->statistics.rhs++;
-  r->statistics.specialised++;
-  r->statistics.factorisations++;
+  pw_specialised_count (r, 1, iterations);
 }
 
 int pw_specialised_evaluate (pw_run *r, double t, const double *q, const double *v, double *a, double *lambda) {
-  if (specialised_is_unsuitable (r)) return 0;
+  if (!pw_specialised_suits (r)) return 0;
   if (r->specialised->evaluate (r->scene, t, q, v, a, lambda, r->w->configuration, r->w->J)) return 0;
-  specialised_evaluated (r, q, v);
+  specialised_evaluated (r, q, v, 0);
   return 1;
 }
 
 int pw_specialised_stages (pw_run *r, const pw_scene_step *x) {
-  if (specialised_is_unsuitable (r) || r->specialised->stages (r->scene, x)) return 0;
-  r->statistics.rhs += x->stages - 1;
-  r->statistics.specialised += x->stages - 1;
-  r->statistics.factorisations += x->stages - 1;
+  if (!pw_specialised_suits (r) || r->specialised->stages (r->scene, x)) return 0;
+  pw_specialised_count (r, x->stages - 1, 0);
   return 1;
+}
+
+static void specialised_note (pw_run *r) {
+  const pw_scene *s = r->scene;
+  r->residuals = (pw_residuals){ .position = s->position, .g = s->g, .velocity = s->velocity, .jv = s->jv };
 }
 
 int pw_specialised_project (const pw_projector *p, pw_run *r, double t, double *q, double *v, double *a,
                             double *lambda) {
   pw_scene *s = r->scene;
-  if (!p->by_mass || p->alone || specialised_is_unsuitable (r)) return 0;
-  s->length = r->w->scale.length;
-  s->speed = s->length / r->w->scale.time;
+  if (!p->by_mass || p->alone || !pw_specialised_suits (r)) return 0;
+  pw_specialised_scale (r);
   if (r->specialised->project (s, t, q, v, a, lambda, r->w->configuration, r->w->J)) return 0;
-  specialised_evaluated (r, q, v);
-  r->statistics.factorisations += s->iterations;
+  specialised_evaluated (r, q, v, s->iterations);
   if (r->active)
     pw_forget_residuals (r);
   else
-    r->residuals = (pw_residuals){ .position = s->position, .g = s->g, .velocity = s->velocity, .jv = s->jv };
+    specialised_note (r);
   return 1;
+}
+
+void pw_specialised_residuals (pw_run *r) {
+  if (!pw_specialised_suits (r) || r->active || !isnan (r->residuals.position) || !isnan (r->residuals.velocity))
+    return;
+  pw_specialised_scale (r);
+  r->specialised->residuals (r->scene, r->q, r->v, r->w->configuration, r->w->J);
+  specialised_note (r);
 }

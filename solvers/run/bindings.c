@@ -35,7 +35,7 @@ int pw_run_record (pw_run *r, double t_end, const double *times, long count, lon
       if (status == PW_OK) record_row (r, &sample, rows + *recorded * pw_run_record_width (r)), ++*recorded;
     }
     if (status != PW_OK || step == steps || r->t >= t_end) break;
-    status = pw_run_advance (r, t_end, error);
+    status = times ? pw_run_advance_towards (r, times[*recorded], t_end, error) : pw_run_advance (r, t_end, error);
     if (status != PW_OK || times) continue;
     status = pw_run_sample (r, r->t, &sample, error);
     if (status == PW_OK) record_row (r, &sample, rows + *recorded * pw_run_record_width (r)), ++*recorded;

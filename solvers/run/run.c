@@ -161,15 +161,6 @@ int pw_run_advance (pw_run *r, double t_end, pw_error *error) {
   return PW_OK;
 }
 
-int pw_run_advance_to (pw_run *r, double t, double t_end, pw_error *error) {
-  if (pw_require (r, "a run", error) != PW_OK) return PW_INPUT;
-  while (r->t < t && r->t < t_end) {
-    int status = pw_run_advance (r, t_end, error);
-    if (status != PW_OK) return status;
-  }
-  return PW_OK;
-}
-
 double pw_run_time (const pw_run *r) {
   return r->t;
 }

@@ -179,7 +179,7 @@ static int run_batch (run *x, pw_error *error) {
   int status;
   long n = 0;
   do {
-    status = pw_run_advance (x->r, x->t_end, error);
+    status = pw_run_advance_towards (x->r, due, x->t_end, error);
   } while (status == PW_OK && ++n < x->batch && pw_run_time (x->r) < due && !pw_stop);
   double used = pw_cpu_clock () - start;
   x->cpu += used;

@@ -113,7 +113,7 @@ static int study_steps (pw_study *x, pw_row *r, pw_run *run, const pw_limit *lim
     double start = pw_seconds (CLOCK_THREAD_CPUTIME_ID);
     long n = 0;
     do {
-      status = pw_run_advance (run, x->t_end, error);
+      status = pw_run_advance_towards (run, v ? v->due : x->t_end, x->t_end, error);
       if (status == PW_OK && v && pw_run_time (run) >= v->due) status = v->visit (v, run, error);
     } while (status == PW_OK && ++n < batch && pw_run_time (run) < x->t_end);
     double used = pw_seconds (CLOCK_THREAD_CPUTIME_ID) - start;

@@ -281,7 +281,7 @@ static int row_run (const pw_plan *p, const pw_sweep_system *s, const pw_setting
                     pw_error *error) {
   pw_run *r = pw_run_open (s->m.system, p->method, settings, error);
   int status = r ? PW_OK : error->status;
-  while (status == PW_OK && pw_run_time (r) < p->t_end) status = pw_run_advance (r, p->t_end, error);
+  while (status == PW_OK && pw_run_time (r) < p->t_end) status = pw_run_advance_towards (r, p->t_end, p->t_end, error);
   if (status == PW_STOPPED) status = pw_limit_fail (settings->stop_context, pw_run_time (r), error);
   if (r == NULL) return status;
   int read = row_read (s, r, x, status == PW_OK ? error : &(pw_error){ 0 });
