@@ -8,6 +8,7 @@
 #define PW_SINE_H
 
 #include <stdint.h>
+#include <string.h>
 
 #ifdef __FAST_MATH__
 #error "-ffast-math and -Ofast break the argument reduction"
@@ -16,9 +17,25 @@
 enum { PW_SINE_LANES = 2 };
 #define PW_SINE_LIMIT 1e6
 
-/* GNU C's vectors: operations work on all lanes. */
+#ifndef PW_LANES /* GNU C's vectors: operations work on all lanes */
 typedef double pw_lanes __attribute__ ((vector_size (8 * PW_SINE_LANES)));
 typedef uint64_t pw_lane_bits __attribute__ ((vector_size (8 * PW_SINE_LANES)));
+#else /* part of a loop over runs that the compiler vectorises */
+typedef double pw_lanes;
+typedef uint64_t pw_lane_bits;
+#endif
+
+static inline pw_lane_bits pw_sine_bits (pw_lanes x) {
+  pw_lane_bits bits;
+  memcpy (&bits, &x, sizeof bits);
+  return bits;
+}
+
+static inline pw_lanes pw_sine_value (pw_lane_bits bits) {
+  pw_lanes x;
+  memcpy (&x, &bits, sizeof x);
+  return x;
+}
 
 static inline pw_lanes pw_sine_polynomial (pw_lanes y, pw_lanes lo) {
   pw_lanes z = y * y, v = z * y;
@@ -47,11 +64,11 @@ static inline void pw_sin_cos_lanes (pw_lanes x, pw_lanes *sine, pw_lanes *cosin
   pw_lanes a = x - n * 1.57079632673412561417e+00, b = n * 6.07710050630396597660e-11,
            c = n * 2.02226624871116645580e-21;
   pw_lanes d = a - b, y = d - c, lo = (((a - d) - b) + ((d - y) - c)) - n * 8.47842766036889956997e-32;
-  pw_lane_bits quadrant = (pw_lane_bits)shifted, odd = 0 - (quadrant & 1);
-  pw_lane_bits s = (pw_lane_bits)pw_sine_polynomial (y, lo), k = (pw_lane_bits)pw_cosine_polynomial (y, lo),
+  pw_lane_bits quadrant = pw_sine_bits (shifted), odd = 0 - (quadrant & 1);
+  pw_lane_bits s = pw_sine_bits (pw_sine_polynomial (y, lo)), k = pw_sine_bits (pw_cosine_polynomial (y, lo)),
                swap = (s ^ k) & odd;
-  *sine = (pw_lanes)(s ^ swap ^ (quadrant >> 1 << 63));
-  *cosine = (pw_lanes)(k ^ swap ^ ((quadrant + 1) >> 1 << 63));
+  *sine = pw_sine_value (s ^ swap ^ (quadrant >> 1 << 63));
+  *cosine = pw_sine_value (k ^ swap ^ ((quadrant + 1) >> 1 << 63));
 }
 
 #endif

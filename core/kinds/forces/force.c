@@ -10,7 +10,7 @@
 
 typedef struct {
   double at[2]; /* in the body's frame [m] */
-  int turns;    /* 1: components along the body's axes */
+  double turns; /* 1: components along the body's axes */
 } force;
 
 /* A force in the current state: cosine and sine of the angle of its axes, arm, world components, moment. */
@@ -24,7 +24,7 @@ static inline force_state force_at (const pw_batch *b, int e) {
   const force *k = (const force *)b->element + e;
   const pw_configuration *A = &b->configuration[b->body[e]];
   const double *u = b->u + 6 * e;
-  force_state x = { k, A, .cos = k->turns ? A->cos : 1, .sin = k->turns ? A->sin : 0 };
+  force_state x = { k, A, .cos = k->turns > 0 ? A->cos : 1, .sin = k->turns > 0 ? A->sin : 0 };
   x.X = A->cos * k->at[0] - A->sin * k->at[1], x.Y = A->sin * k->at[0] + A->cos * k->at[1];
   x.Fx = x.cos * u[0] - x.sin * u[3], x.Fy = x.sin * u[0] + x.cos * u[3];
   x.M = x.X * x.Fy - x.Y * x.Fx;
@@ -48,7 +48,7 @@ PER_ELEMENT (force_force_u, force, 6) {
 /* A force that turns with the body has a constant moment. */
 PER_ELEMENT (force_force_q, force, 9) {
   memset (out, 0, 9 * sizeof *out);
-  if (x.k->turns)
+  if (x.k->turns > 0)
     out[2] = -x.Fy, out[5] = x.Fx;
   else
     out[8] = -x.X * x.Fx - x.Y * x.Fy;

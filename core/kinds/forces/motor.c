@@ -28,9 +28,8 @@ static inline motor_state motor_at (const pw_batch *b, int e) {
   const pw_configuration *A = &b->configuration[b->body[2 * e]], *B = &b->configuration[b->body[2 * e + 1]];
   const double *u = b->u + 6 * e;
   double y = k->k * (u[0] - A->phi + B->phi) + k->c * (u[3] - A->omega + B->omega);
-  if (k->limit == 0) return (motor_state){ k, A, B, y, 1, y };
-  double tanh_y = tanh (y / k->limit);
-  return (motor_state){ k, A, B, k->limit * tanh_y, 1 - tanh_y * tanh_y, y };
+  double tanh_y = WHERE (k->limit > 0, tanh (y / k->limit));
+  return (motor_state){ k, A, B, k->limit > 0 ? k->limit * tanh_y : y, k->limit > 0 ? 1 - tanh_y * tanh_y : 1, y };
 }
 
 PREPARE (motor_prepare, pw_motor, motor) {

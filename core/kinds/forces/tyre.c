@@ -38,11 +38,9 @@ static inline tyre_state tyre_at (const pw_batch *b, int e) {
   x.vn = x.c * A->vy - x.s * A->vx + k->along * A->omega;
   double R = sqrt (x.ve * x.ve + k->speed * k->speed), sigma = x.vn / R, slope = -k->stiffness;
   x.F = slope * sigma;
-  if (k->limit > 0) {
-    double y = tanh (x.F / k->limit);
-    x.F = k->limit * y;
-    slope *= 1 - y * y;
-  }
+  double y = WHERE (k->limit > 0, tanh (x.F / k->limit));
+  x.F = k->limit > 0 ? k->limit * y : x.F;
+  slope *= k->limit > 0 ? 1 - y * y : 1;
   x.F_vn = slope / R;
   x.F_ve = -slope * sigma * x.ve / (R * R);
   return x;
