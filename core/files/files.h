@@ -45,12 +45,12 @@ typedef int pw_object_user (void *context, const char *object, pw_error *error);
 int pw_compile_file (const char *path, const char *page, pw_object_user *use, void *context, pw_error *error);
 #define PW_PAGE_TOOLS "clang, lld, wasi-libc and libclang-rt-14-dev-wasm32 (make deps TOOLS=page)"
 
-/* Compiles generated code with all messages in a log.  PW_INPUT: no compiler; PW_METHOD: it does not compile; PW_RESOURCE. */
-int pw_compile_scene (const char *path, const char *object, const char *log, pw_error *error);
-/* A further option for generated code: gcc 12.2 fuses operations when it vectorises straight code, see the Makefile. */
-#define PW_SCENE_FLAG "-fno-tree-slp-vectorize"
-/* The option for this processor's instructions, without those that fuse: results have the same bits. */
-const char *pw_scene_level (void);
+/* Compiles generated code with all messages in a log; lanes > 0: for that many runs at once.  PW_INPUT: no compiler;
+ * PW_METHOD: it does not compile; PW_RESOURCE. */
+int pw_compile_scene (const char *path, const char *object, const char *log, int lanes, pw_error *error);
+/* The compiler's options for generated code, ending with NULL: those for this processor's instructions, without fused
+ * operations, so that results have the same bits. */
+const char *const *pw_scene_options (int lanes);
 
 /* The command of the C compiler: CC in the environment, else "cc". */
 const char *pw_compiler (void);

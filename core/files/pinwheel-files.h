@@ -75,6 +75,11 @@ typedef struct pw_scene_code pw_scene_code;
  * NULL and PW_INPUT if there is no compiler; PW_METHOD if
  * the text does not compile, with the path at which it is kept; PW_RESOURCE. */
 pw_scene_code *pw_scene_code_open (const char *text, const pw_system *s, pw_error *error);
+/* The same for as many runs at once (pw_runs_advance): 2, 4 or 8. */
+pw_scene_code *pw_scene_lanes_open (const char *text, const pw_system *s, int lanes, pw_error *error);
+const pw_specialised_lanes *pw_scene_code_lanes (const pw_scene_code *c); /* NULL: none, or not for this compiler */
+/* The number of runs whose lanes fill a vector register of this processor; 1 if lanes do not pay. */
+int pw_processor_lanes (void);
 /* For pw_settings.specialised; NULL of NULL. */
 const pw_specialised *pw_scene_code_table (const pw_scene_code *c);
 /* A line about a cache that was ignored, or ""; lives as long as the code. */

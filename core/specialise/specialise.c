@@ -50,11 +50,18 @@ static void specialise_sources (const pw_specialise_scene *x) {
 
 /* ---- The whole ---- */
 
-/* #define EACH_name(X) X (0) X (1) ..., or, by pairs, X (0, pair) X (2, pair) X (4, one): loops without a counter, so that arrays
- * stay in registers. */
-static void specialise_list (FILE *out, const char *name, int n, int by) {
+void pw_specialise_list (FILE *out, const char *name, int n) {
   fprintf (out, "#define EACH_%s(X)", name);
-  for (int i = 0; i < n; i += by) fprintf (out, by == 1 ? " X (%d)" : i + 1 < n ? " X (%d, pair)" : " X (%d, one)", i);
+  for (int i = 0; i < n; i++) fprintf (out, " X (%d)", i);
+  fputc ('\n', out);
+}
+
+/* Coordinates by pairs, X (0, pair) X (2, pair) X (4, one), and one by one. */
+static void specialise_coordinates (FILE *out, int n) {
+  fputs ("#define EACH_COORDINATES(X)", out);
+  for (int i = 0; i < n; i += 2) fprintf (out, i + 1 < n ? " X (%d, pair)" : " X (%d, one)", i);
+  fputs ("\n#define EACH_ONE(X)", out);
+  for (int i = 0; i < n; i++) fprintf (out, " X (%d, one)", i);
   fputc ('\n', out);
 }
 
@@ -65,14 +72,13 @@ static void specialise_constants (const pw_specialise_scene *x) {
            "  ENTRIES = %d, REDUNDANT = %d, LEDGER = %d, RHEONOMIC = %d, READERS = %d };\n",
            s->bodies, s->coords, s->rows, s->holonomic, s->coords - 3 * s->bodies, x->entries, x->independent != NULL,
            s->entries, s->rheonomic > 0, s->state_dependent > 0);
-  fputs ("\n#define GUARD(condition) \\\n  if (!(condition)) return 1\n", x->out);
   fprintf (x->out, "#define INLINE static inline%s\n",
            s->rows <= SPECIALISE_INLINE ? " __attribute__ ((always_inline))" : "");
-  specialise_list (x->out, "BODY", s->bodies, 1);
-  specialise_list (x->out, "ROW", s->rows, 1);
-  specialise_list (x->out, "HOLONOMIC", s->holonomic, 1);
-  specialise_list (x->out, "INTERNAL", s->coords - 3 * s->bodies, 1);
-  specialise_list (x->out, "COORDINATES", s->coords, 2);
+  pw_specialise_list (x->out, "BODY", s->bodies);
+  pw_specialise_list (x->out, "ROW", s->rows);
+  pw_specialise_list (x->out, "HOLONOMIC", s->holonomic);
+  pw_specialise_list (x->out, "INTERNAL", s->coords - 3 * s->bodies);
+  specialise_coordinates (x->out, s->coords);
   for (int b = 0; b < s->bodies; b++) {
     fprintf (x->out, "/* body %d: ", b);
     pw_emit_name (x->out, s->body_name[b]);
@@ -100,7 +106,15 @@ static int specialise_write (pw_specialise_scene *x) {
   specialise_source (x->out, "scene_head.inc", done, &count);
   pw_specialise_elements (x);
   int status = pw_specialise_algebra (x);
+  pw_specialise_data (x);
   pw_specialise_signals (x);
+  specialise_source (x->out, "scene_both.inc", done, &count);
+  fputs ("\n#ifdef PW_LANES\n", x->out);
+  specialise_source (x->out, "scene_lanes.inc", done, &count);
+  fprintf (x->out,
+           "\nPW_EXPORT const pw_specialised_lanes pw_specialised_scene_lanes = {\n"
+           "  PW_SCENE_ABI, LANES_SERVED, %luu, sizeof (run_lanes), lanes_steps\n};\n#else\n",
+           pw_system_shape (x->s));
   specialise_source (x->out, "scene_tail.inc", done, &count);
 
   fprintf (x->out,
@@ -161,6 +175,18 @@ int pw_specialised_fits (const pw_specialised *code, const pw_system *s) {
   return code->abi == PW_SCENE_ABI && code->shape == pw_system_shape (s);
 }
 
+int pw_specialised_lanes_fit (const pw_specialised_lanes *code, const pw_system *s) {
+  return code->abi == PW_SCENE_ABI && code->shape == pw_system_shape (s);
+}
+
+int pw_specialised_lanes_count (const pw_specialised_lanes *code) {
+  return code->lanes;
+}
+
+void *pw_specialised_lanes_memory (const pw_specialised_lanes *code) {
+  return aligned_alloc (64, (code->size + 63) / 64 * 64);
+}
+
 char *pw_system_source (const pw_system *s, const unsigned char *independent, pw_error *error) {
   pw_stream text;
   if (pw_require (s, "a system", error) != PW_OK) return NULL;
@@ -173,10 +199,11 @@ char *pw_system_source (const pw_system *s, const unsigned char *independent, pw
   int status = x.out ? specialise_open (&x) : PW_RESOURCE;
   if (status == PW_OK) status = specialise_write (&x);
   if (status == PW_OK) {
-    fprintf (x.out,
-             "\nPW_EXPORT const pw_specialised pw_specialised_scene = {\n"
-             "  PW_SCENE_ABI, %d, %luu, independent, prepare, evaluate, project, stages, residuals, steps\n};\n",
-             x.constants + 1, pw_system_shape (s));
+    fprintf (
+        x.out,
+        "\nPW_EXPORT const pw_specialised pw_specialised_scene = {\n"
+        "  PW_SCENE_ABI, %d, %luu, independent, prepare, evaluate, project, stages, residuals, steps\n};\n#endif\n",
+        x.constants + 1, pw_system_shape (s));
   }
   if (pw_stream_close (x.out, &text) != PW_OK) status = PW_RESOURCE;
   pw_workspace_free (x.w);

@@ -79,7 +79,7 @@ static int specialise_solve (const pw_specialise_scene *x, const pw_elimination 
            what == SPECIALISE_ACCELERATE ? ", double *lambda" : "");
   pw_elimination_solve (m, e, right);
   for (int j = 0; j + 1 < s->coords; j += 2)
-    fprintf (x->out, "  store_pair (a + %d, (pw_pair){ %s, %s });\n", j, pw_term_text (right[j], text),
+    fprintf (x->out, "  STORE_PAIR (a + %d, %s, %s);\n", j, pw_term_text (right[j], text),
              pw_term_text (right[j + 1], next));
   if (s->coords % 2) fprintf (x->out, "  a[%d] = %s;\n", s->coords - 1, pw_term_text (right[s->coords - 1], text));
   for (int i = 0; i < s->rows && what == SPECIALISE_ACCELERATE; i++)
@@ -100,8 +100,8 @@ static int specialise_factor (const pw_specialise_scene *x, pw_elimination *m, p
   e->code = x->out;
   if (status == PW_OK)
     fprintf (x->out,
-             "\nINLINE int %s (const double *M, const double *C, const double *J, double *F) {\n"
-             "  (void)M, (void)C, (void)J, (void)F;\n%s  return 0;\n}\n",
+             "\nGUARDED %s (const double *M, const double *C, const double *J, double *F) {\n  GUARDS;\n"
+             "  (void)M, (void)C, (void)J, (void)F;\n%s  GUARDS_HOLD;\n}\n",
              name, text.text);
   free (text.text);
   return status;

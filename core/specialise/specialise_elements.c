@@ -154,28 +154,61 @@ void pw_specialise_elements (const pw_specialise_scene *x) {
 
 /* ---- Signals ---- */
 
+static int specialise_is_simple (const pw_system *s) {
+  for (int i = 0; i < s->sources; i++)
+    if (s->source[i].signal.type != PW_CONSTANT && s->source[i].signal.type != PW_HARMONIC) return 0;
+  return 1;
+}
+
+/* In lanes, signals of other forms have been evaluated before. */
 void pw_specialise_signals (const pw_specialise_scene *x) {
   const pw_system *s = x->s;
-  int simple = 1, reads = s->state_dependent;
-  for (int i = 0; i < s->sources; i++)
-    simple &= s->source[i].signal.type == PW_CONSTANT || s->source[i].signal.type == PW_HARMONIC;
-  fputs ("\nINLINE int signals (pw_scene *s, double t, const double *q, const double *v) {\n  (void)q, (void)v;\n",
+  const int simple = specialise_is_simple (s);
+  fputs ("\nGUARDED signals (pw_scene *s, double t, const double *q, const double *v) {\n  GUARDS;\n"
+         "  (void)s, (void)t, (void)q, (void)v;\n",
          x->out);
-  if (s->sources && !simple)
-    fprintf (x->out, "  %sreturn s->update (s->workspace, t, q, v);\n%s", reads ? "" : "if (t != *s->t_signal) ",
-             reads ? "" : "  return 0;\n");
-  else if (s->sources) {
-    fputs ("  if (t == *s->t_signal) return 0;\n", x->out);
-    for (int i = 0; i < s->sources; i++) {
-      if (s->source[i].signal.type == PW_CONSTANT) {
-        fprintf (x->out, "  s->u[%d] = s->signal[%d]->constant;\n", 3 * i, i);
-        if (!s->source[i].of_force) fprintf (x->out, "  s->u[%d] = s->u[%d] = 0;\n", 3 * i + 1, 3 * i + 2);
-      } else
-        fprintf (x->out, "  if (harmonic (&s->signal[%d]->harmonic, t, %d, s->u + %d)) return 1;\n", i,
-                 !s->source[i].of_force, 3 * i);
-    }
-    fputs ("  *s->t_signal = t;\n  return 0;\n", x->out);
-  } else
-    fputs ("  *s->t_signal = t;\n  return 0;\n", x->out);
-  fputs ("}\n", x->out);
+  if (!simple)
+    fprintf (x->out, "#ifndef PW_LANES\n  %sreturn s->update (s->workspace, t, q, v);\n#endif\n",
+             s->state_dependent ? "" : "if (t != *s->t_signal) ");
+  for (int i = 0; i < s->sources && simple; i++) {
+    if (i == 0) fputs ("  SIGNALS_BEGIN (t);\n", x->out);
+    if (s->source[i].signal.type == PW_CONSTANT) {
+      fprintf (x->out, "  s->u[%d] = CONSTANT (%d);\n", 3 * i, i);
+      if (!s->source[i].of_force) fprintf (x->out, "  s->u[%d] = s->u[%d] = 0;\n", 3 * i + 1, 3 * i + 2);
+    } else
+      fprintf (x->out, "  GUARD_CALL (harmonic (HARMONIC (%d), t, %d, s->u + %d));\n", i, !s->source[i].of_force,
+               3 * i);
+  }
+  if (simple) fputs ("  SIGNALS_END (t);\n", x->out);
+  fputs ("  GUARDS_HOLD;\n}\n", x->out);
+}
+
+/* ---- Lanes ---- */
+
+int pw_system_has_lanes (const pw_system *s) {
+  for (int k = 0; k < s->batches; k++)
+    if (!pw_specialise_is_built_in (s->batch[k].kind)) return 0;
+  return s->rows <= SPECIALISE_ROWS && s->state_dependent == 0;
+}
+
+/* The prepared elements of all batches, then four numbers of each signal, one after the other. */
+void pw_specialise_data (const pw_specialise_scene *x) {
+  const pw_system *s = x->s;
+  int data = 0;
+  fputs ("\nstatic const int datum[] = { ", x->out);
+  for (int k = 0; k < s->batches; k++) {
+    fprintf (x->out, "%d, ", data);
+    data += s->batch[k].b.count * (int)(s->batch[k].kind->element / sizeof (double));
+  }
+  fprintf (x->out, "%d };\nenum { BATCHES = %d, SIGNALS = %d, SIMPLE = %d, DATA = %d, FIXED = %d };\n", data,
+           s->batches, s->sources, specialise_is_simple (s), data + 4 * s->sources, x->constants);
+  fputs ("static const unsigned char is_harmonic[] = { ", x->out);
+  for (int i = 0; i < s->sources; i++) fprintf (x->out, "%d, ", s->source[i].signal.type == PW_HARMONIC);
+  fputs ("0 };\n", x->out);
+  pw_specialise_list (x->out, "DATUM", data + 4 * s->sources);
+  pw_specialise_list (x->out, "SIGNAL", 3 * s->sources);
+  pw_specialise_list (x->out, "ENTRY", x->entries);
+  pw_specialise_list (x->out, "FIXED", x->constants);
+  pw_specialise_list (x->out, "LEDGER", s->entries);
+  pw_specialise_list (x->out, "BATCH", s->batches + 1);
 }

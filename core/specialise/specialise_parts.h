@@ -41,6 +41,12 @@ int pw_specialise_force (const pw_specialise_scene *x, int j);
 void pw_specialise_elements (const pw_specialise_scene *x);
 void pw_specialise_signals (const pw_specialise_scene *x);
 
+/* #define EACH_name(X) X (0) X (1) ...: a loop without a counter, so that arrays stay in registers. */
+void pw_specialise_list (FILE *out, const char *name, int n);
+
+/* Lists what lanes load for each run. */
+void pw_specialise_data (const pw_specialise_scene *x);
+
 /* Writes products with J, factorisations and solutions; prepare's statements are collected.  PW_RETRY if there is no
  * fixed order of elimination; PW_RESOURCE. */
 int pw_specialise_algebra (pw_specialise_scene *x);

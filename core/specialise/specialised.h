@@ -6,6 +6,7 @@
 #include "pinwheel.h"
 
 #define PW_SCENE_ABI 4
+enum { PW_LANES_MOST = 8 };
 #define PW_SCENE_PIVOT 4e-4 /* least pivot of a constraint equation relative to its diagonal entry: a squared sine */
 
 /* A run's data for specialised code.  Arrays over coordinates have `coordinates` entries, those over constraint
@@ -48,8 +49,20 @@ typedef struct pw_scene_step {
   double *q, *v, *lambda;      /* q, v: the new state; multipliers of a stage */
 } pw_scene_step;
 
-/* Consecutive steps of size h of a method with this tableau, projected or not, with what the run does after each of them:
- * energies, residuals, and the watchdog's checks (watchdog.c).  Arrays are the run's. */
+/* The watchdog (watchdog.c) in specialised code: limits, beyond which the general engine makes a step, and what it records. */
+typedef struct {
+  double lost;                           /* largest scaled residuals */
+  double sine, reach, near_sine, growth; /* sine - reach (moved + growth x motion of the step) > near_sine */
+  double rank, regular, drift,
+      no_branch; /* the sines that belong to a residual; residual below which they need no check */
+  double length, per_length, per_angle; /* scale of lengths; units of accelerations */
+  double moved, step;                   /* motion since the sine was computed, and of the last step */
+  double norm, reference;               /* accelerations: of the state reached, largest so far */
+  double position, g, velocity, jv;     /* largest residuals of the steps */
+} pw_scene_watch;
+
+/* Consecutive steps of size h of a method with this tableau, projected or not, with what a run does after each of them.
+ * Arrays are the run's. */
 typedef struct pw_scene_steps {
   int count, done; /* steps to take; taken */
   int project;     /* 1: onto the constraints after each step */
@@ -58,26 +71,16 @@ typedef struct pw_scene_steps {
   const double *c;      /* stages: abscissae */
   double h, base;       /* the i-th step ends at base + (number + i) h, i > 0 */
   long number;
-  double t, t0; /* the state reached, and the one before: times */
-  double *state,
-      *state0; /* positions, velocities, accelerations (state: and multipliers), with three entries more each */
-  double *ledger, *ledger0;    /* work and losses */
-  double *rate, *rate0;        /* powers */
+  double t, t0;             /* the state reached, and the one before: times */
+  double *state, *state0;   /* positions, velocities, accelerations with three more entries each; state: multipliers */
+  double *ledger, *ledger0; /* work and losses */
+  double *rate, *rate0;     /* powers */
   double *const *V, *const *A; /* stages: scratch */
   double *const *R;
   pw_configuration *configuration; /* of the state reached */
   double *J;
-
-  /* The watchdog: steps that exceed a limit are left to the general engine. */
-  double lost;                           /* largest scaled residuals */
-  double sine, reach, near_sine, growth; /* sine - reach (moved + growth x motion of the step) > near_sine */
-  double rank, regular, drift,
-      no_branch; /* the sines that belong to a residual; residual below which they need no check */
-  double length, per_length, per_angle; /* scale of lengths; units of accelerations */
-  double moved, step;                   /* motion since the sine was computed, and of the last step */
-  double norm, reference;               /* accelerations: of the state reached, largest so far */
-  double position, g, velocity, jv;     /* largest residuals so far */
-  long iterations;                      /* of all projections */
+  pw_scene_watch watch;
+  long iterations; /* of all projections */
 } pw_scene_steps;
 
 /* Functions return 0, or 1 if the general engine has to do the work: an angle beyond the range of the own sine, a small
@@ -97,8 +100,18 @@ typedef struct pw_specialised {
   int (*stages) (pw_scene *s, const pw_scene_step *x);
   /* Residuals of an evaluated state. */
   void (*residuals) (pw_scene *s, const double *q, const double *v, const pw_configuration *c, const double *J);
+  /* Takes steps until a guard refuses one. */
   void (*steps) (pw_scene *s, pw_scene_steps *x);
 } pw_specialised;
+
+/* The same code for several runs at once, in the lanes of vector registers. */
+struct pw_specialised_lanes {
+  int abi, lanes;
+  unsigned long shape, size; /* size: of memory, in bytes */
+  /* Takes steps of `lanes` runs, whose sizes and tableaus are the same, each until a guard refuses one.
+   * memory: scratch, aligned to 64 bytes. */
+  void (*steps) (pw_scene *const *s, pw_scene_steps *const *x, void *memory);
+};
 
 /* Hash of what the generated text depends on besides the library's version. */
 unsigned long pw_system_shape (const pw_system *s);

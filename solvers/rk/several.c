@@ -31,19 +31,27 @@ static int several_count (const pw_run *r, double t, double t_end) {
   return n;
 }
 
-static void several_watch (const pw_run *r, pw_scene_steps *x) {
+static pw_scene_watch several_watch (const pw_run *r) {
   const pw_watchdog *limit = &r->limits;
   const pw_geometry *g = &r->geometry;
-  double per = r->w->scale.time * r->w->scale.time;
-  x->lost = pw_stabilised_by (r, PW_UNSTABILISED) ? limit->lost_unstabilised : limit->lost;
-  x->sine = g->saddle ? g->state_sine : INFINITY; /* a tree is never singular */
-  x->reach = g->saddle ? limit->lipschitz * g->typical : 0;
-  x->near_sine = g->saddle ? limit->near * g->typical : 0;
-  x->growth = limit->growth;
-  x->rank = limit->rank, x->regular = limit->regular * g->typical, x->drift = limit->drift_near;
-  x->no_branch = 0.5 * x->drift * x->rank * x->rank;
-  x->length = r->s->scale.length, x->per_length = per / r->s->scale.length, x->per_angle = per;
-  x->moved = g->moved, x->reference = r->reference_level;
+  const int loops = g->saddle != NULL; /* a tree is never singular */
+  const double length = r->s->scale.length, per = r->w->scale.time * r->w->scale.time;
+  return (pw_scene_watch){
+    .lost = pw_stabilised_by (r, PW_UNSTABILISED) ? limit->lost_unstabilised : limit->lost,
+    .sine = loops ? g->state_sine : INFINITY,
+    .reach = loops ? limit->lipschitz * g->typical : 0,
+    .near_sine = loops ? limit->near * g->typical : 0,
+    .growth = limit->growth,
+    .rank = limit->rank,
+    .regular = limit->regular * g->typical,
+    .drift = limit->drift_near,
+    .no_branch = 0.5 * limit->drift_near * limit->rank * limit->rank,
+    .length = length,
+    .per_length = per / length,
+    .per_angle = per,
+    .moved = g->moved,
+    .reference = r->reference_level,
+  };
 }
 
 static void several_report (pw_run *r, const pw_scene_steps *x) {
@@ -54,13 +62,13 @@ static void several_report (pw_run *r, const pw_scene_steps *x) {
   d->t0 = x->t0, d->projected0 = r->projected;
   d->count += x->done;
   r->near = 0, r->w->failed = NULL;
-  r->reference_level = x->reference, r->previous_norm = x->norm;
+  r->reference_level = x->watch.reference, r->previous_norm = x->watch.norm;
   s->steps += x->done;
-  s->position = pw_larger (s->position, x->position), s->g = pw_larger (s->g, x->g);
-  s->velocity = pw_larger (s->velocity, x->velocity), s->jv = pw_larger (s->jv, x->jv);
+  s->position = pw_larger (s->position, x->watch.position), s->g = pw_larger (s->g, x->watch.g);
+  s->velocity = pw_larger (s->velocity, x->watch.velocity), s->jv = pw_larger (s->jv, x->watch.jv);
   pw_specialised_count (r, (long)x->stages * x->done, x->iterations);
   if (g->saddle == NULL) return;
-  g->step = x->step, g->moved = x->moved, g->alert = 0;
+  g->step = x->watch.step, g->moved = x->watch.moved, g->alert = 0;
   g->before = NAN, g->slope = 0, g->crossed = 0;
   g->t = r->t, g->start_sine = NAN;
   memcpy (g->q, r->q, (size_t)r->s->coords * sizeof *g->q);
@@ -89,8 +97,8 @@ int pw_several_plan (pw_run *r, double t, double t_end, pw_scene_steps *x) {
                          .A = d->A,
                          .R = d->R,
                          .configuration = r->w->configuration,
-                         .J = r->w->J };
-  several_watch (r, x);
+                         .J = r->w->J,
+                         .watch = several_watch (r) };
   pw_specialised_scale (r);
   return count;
 }
@@ -113,6 +121,63 @@ int pw_run_advance_towards (pw_run *r, double t, double t_end, pw_error *error) 
   r->specialised->steps (r->scene, &x);
   int status = pw_several_finish (r, &x, error);
   return status == PW_OK && x.done == 0 ? pw_run_advance (r, t_end, error) : status;
+}
+
+/* ---- Several runs ---- */
+
+/* A single run is faster in specialised code of its own than together with this part of the lanes empty. */
+static int several_fill (int planned, int lanes) {
+  return 2 * planned > lanes;
+}
+
+/* Runs whose next steps can be in lanes together: those with the step size and method of the first. */
+typedef struct {
+  pw_run *const *run;
+  int n, which[PW_LANES_MOST];
+  pw_scene_steps steps[PW_LANES_MOST];
+} several_lanes;
+
+static void several_add (several_lanes *x, int i, double t_end) {
+  const pw_run *first = x->n > 0 ? x->run[x->which[0]] : NULL, *r = x->run[i];
+  if (pw_several_plan (x->run[i], t_end, t_end, &x->steps[x->n]) == 0) return;
+  if (first && (r->method != first->method || r->stabilisation != first->stabilisation ||
+                r->settings.step != first->settings.step))
+    return;
+  x->which[x->n++] = i;
+}
+
+/* Empty lanes repeat the first run. */
+static void several_take (several_lanes *x, const pw_specialised_lanes *code, void *memory) {
+  pw_scene_steps *steps[PW_LANES_MOST];
+  pw_scene *scene[PW_LANES_MOST];
+  for (int k = 0; k < code->lanes; k++) {
+    if (k >= x->n) x->steps[k] = x->steps[0], x->which[k] = x->which[0];
+    steps[k] = &x->steps[k], scene[k] = x->run[x->which[k]]->scene;
+  }
+  code->steps (scene, steps, memory);
+}
+
+void pw_runs_advance (pw_run *const *runs, int count, double t_end, const pw_specialised_lanes *code, void *memory,
+                      int *status, pw_error *error) {
+  several_lanes x = { .run = runs };
+  int done[PW_LANES_MOST] = { 0 };
+  for (int i = 0; i < count && code && count <= code->lanes; i++) {
+    runs[i]->stopped = 0;
+    if (pw_run_stop_requested (runs[i]))
+      status[i] = PW_STOPPED, done[i] = 1;
+    else
+      several_add (&x, i, t_end);
+  }
+  if (x.n > 0 && several_fill (x.n, code->lanes)) {
+    several_take (&x, code, memory);
+    for (int k = 0; k < x.n; k++) {
+      int i = x.which[k];
+      status[i] = pw_several_finish (runs[i], &x.steps[k], &error[i]);
+      done[i] = x.steps[k].done > 0 || status[i] != PW_OK;
+    }
+  }
+  for (int i = 0; i < count; i++)
+    if (i >= PW_LANES_MOST || !done[i]) status[i] = pw_run_advance_towards (runs[i], t_end, t_end, &error[i]);
 }
 
 int pw_run_advance_to (pw_run *r, double t, double t_end, pw_error *error) {

@@ -13,7 +13,7 @@
 
 extern char **environ;
 
-enum { BUILD_WORDS = 40 };
+enum { BUILD_WORDS = 48 };
 
 /* The command line: the words of a compiler's command, then our options. */
 typedef struct {
@@ -118,31 +118,52 @@ static int build_include (const char *path, char **include, pw_error *error) {
                   path);
 }
 
-const char *pw_scene_level (void) {
-#ifdef __x86_64__
-  if (__builtin_cpu_supports ("avx2")) return "-mavx2";
+int pw_processor_lanes (void) {
+#if defined __x86_64__ && !defined __clang_analyzer__
+  if (__builtin_cpu_supports ("avx512f") && __builtin_cpu_supports ("avx512dq") && __builtin_cpu_supports ("avx512vl"))
+    return 8;
+  if (__builtin_cpu_supports ("avx2")) return 4;
 #endif
-  return "-O2";
+  return 1;
 }
 
-static int build_shared (const char *path, const char *object, const char *log, const sigset_t *before,
+/* gcc 12.2 fuses operations when it vectorises straight code, see the Makefile. */
+#define BUILD_SCENE "-std=c11", "-ffp-contract=off", "-fPIC", "-shared", "-fno-tree-slp-vectorize"
+#define BUILD_LANES BUILD_SCENE, "-O3", "-fno-math-errno", "-fno-trapping-math", "-fopenmp-simd"
+
+const char *const *pw_scene_options (int lanes) {
+  static const char *const one[] = { BUILD_SCENE, "-O2", NULL };
+  static const char *const two[] = { BUILD_LANES, "-DPW_LANES=2", NULL };
+#ifdef __x86_64__
+  static const char *const one_avx2[] = { BUILD_SCENE, "-O2", "-mavx2", NULL };
+  static const char *const two_avx[] = { BUILD_LANES, "-DPW_LANES=2", "-mavx", NULL };
+  static const char *const four[] = { BUILD_LANES, "-DPW_LANES=4", "-mavx2", NULL };
+  static const char *const eight[] = { BUILD_LANES,  "-DPW_LANES=8", "-mavx512f",
+                                       "-mavx512dq", "-mavx512vl",   "-mprefer-vector-width=512",
+                                       NULL };
+  static const char *const eight_avx2[] = { BUILD_LANES, "-DPW_LANES=8", "-mavx2", NULL };
+  if (pw_processor_lanes () >= 4)
+    return lanes == 0                   ? one_avx2
+           : lanes == 2                 ? two_avx
+           : lanes == 4                 ? four
+           : pw_processor_lanes () == 8 ? eight
+                                        : eight_avx2;
+#endif
+  static const char *const four_any[] = { BUILD_LANES, "-DPW_LANES=4", NULL };
+  static const char *const eight_any[] = { BUILD_LANES, "-DPW_LANES=8", NULL };
+  return lanes == 0 ? one : lanes == 2 ? two : lanes == 4 ? four_any : eight_any;
+}
+
+/* Options of a plug-in: those of generated code without a log. */
+static int build_shared (const char *path, const char *object, const char *log, int lanes, const sigset_t *before,
                          pw_error *error) {
+  static const char *const plugin[] = { "-std=c11", "-O2", "-ffp-contract=off", "-fPIC", "-shared", "-Wall", NULL };
   char *include = NULL;
-  int status = build_include (path, &include, error);
-  const char *const options[] = { "-std=c11",
-                                  "-O2",
-                                  "-ffp-contract=off",
-                                  "-fPIC",
-                                  "-shared",
-                                  log ? PW_SCENE_FLAG : "-Wall",
-                                  log ? pw_scene_level () : "-O2",
-                                  "-I",
-                                  include,
-                                  "-o",
-                                  object,
-                                  path,
-                                  "-lm",
-                                  NULL };
+  int status = build_include (path, &include, error), n = 0;
+  const char *options[BUILD_WORDS / 2 + 1];
+  for (const char *const *o = log ? pw_scene_options (lanes) : plugin; *o; o++) options[n++] = *o;
+  const char *const rest[] = { "-I", include, "-o", object, path, "-lm", NULL };
+  memcpy (options + n, rest, sizeof rest);
   if (status == PW_OK) status = build_object (path, pw_compiler (), options, log, before, error);
   free (include);
   return status;
@@ -190,7 +211,7 @@ int pw_compile_file (const char *path, const char *page, pw_object_user *use, vo
   int status = !folder   ? PW_RESOURCE
                : !object ? pw_fail (error, PW_RESOURCE, "out of memory")
                : page    ? build_page (path, page, object, &before, error)
-                         : build_shared (path, object, NULL, &before, error);
+                         : build_shared (path, object, NULL, 0, &before, error);
   if (status == PW_OK) status = use (context, object, error);
   if (object) unlink (object);
   if (folder) rmdir (folder);
@@ -200,10 +221,10 @@ int pw_compile_file (const char *path, const char *page, pw_object_user *use, vo
   return status;
 }
 
-int pw_compile_scene (const char *path, const char *object, const char *log, pw_error *error) {
+int pw_compile_scene (const char *path, const char *object, const char *log, int lanes, pw_error *error) {
   sigset_t before;
   build_defer (&before);
-  int status = build_shared (path, object, log, &before, error);
+  int status = build_shared (path, object, log, lanes, &before, error);
   pthread_sigmask (SIG_SETMASK, &before, NULL);
   return status;
 }

@@ -18,6 +18,7 @@ enum { CODE_MAX_BYTES = 64 << 20, CODE_KEY = 33, CODE_MAX_WAITS = 3000 }; /* byt
 struct pw_scene_code {
   void *handle;
   const pw_specialised *table;
+  const pw_specialised_lanes *lanes;
   char notice[600];
 };
 
@@ -32,6 +33,7 @@ static const char code_magic[16] = "pinwheel scene\n";
 typedef struct {
   const pw_system *system;
   const char *text;
+  int lanes;      /* 0: for single runs */
   char how[2000]; /* versions, compiler and options */
   char key[CODE_KEY];
   char *folder, *source, *log, *part, *object;
@@ -85,8 +87,8 @@ static int code_read (const char *path, char **text, size_t *size, pw_error *err
 static int code_identify (code_job *x, pw_error *error) {
   char *include, *header = NULL, *text = NULL, sum[40] = "";
   size_t size;
-  code_add (x, "pinwheel " PW_VERSION " -std=c11 -O2 -ffp-contract=off " PW_SCENE_FLAG);
-  code_add (x, pw_scene_level ());
+  code_add (x, "pinwheel " PW_VERSION);
+  for (const char *const *o = pw_scene_options (x->lanes); *o; o++) code_add (x, *o);
   if (code_add_compiler (x) != PW_OK) return pw_fail (error, PW_RESOURCE, "out of memory, or CC is too long");
   int status = pw_search_include (&include, error);
   if (include) header = pw_path_join (include, "pinwheel.h", "");
@@ -146,9 +148,11 @@ static int code_load (code_job *x, pw_error *error) {
   const char *why = handle ? NULL : dlerror ();
   if (handle == NULL) return pw_fail (error, PW_RESOURCE, "it cannot be loaded: %s", why ? why : "unknown reason");
   const pw_specialised *table = dlsym (handle, "pw_specialised_scene");
-  if (table && pw_specialised_fits (table, x->system)) {
+  const pw_specialised_lanes *lanes = dlsym (handle, "pw_specialised_scene_lanes");
+  if (x->lanes ? lanes && pw_specialised_lanes_fit (lanes, x->system)
+               : table && pw_specialised_fits (table, x->system)) {
     x->code->handle = handle;
-    x->code->table = table;
+    x->code->table = table, x->code->lanes = lanes;
     return PW_OK;
   }
   dlclose (handle);
@@ -197,7 +201,7 @@ static int code_compile (code_job *x, FILE *source, pw_error *error) {
   int status = PW_OK;
   if (fputs (x->text, source) < 0 || fflush (source) != 0)
     status = pw_fail (error, PW_RESOURCE, "cannot write %s: %s", x->source, strerror (errno));
-  if (status == PW_OK) status = pw_compile_scene (x->source, x->part, x->log, error);
+  if (status == PW_OK) status = pw_compile_scene (x->source, x->part, x->log, x->lanes, error);
   int keep = status == PW_METHOD;
   if (status == PW_OK) status = code_add_trailer (x, error);
   if (status == PW_OK && (status = code_load (x, error)) != PW_OK) unlink (x->object);
@@ -260,14 +264,22 @@ static int code_open (code_job *x, pw_error *error) {
   return status == PW_OK || status == PW_RETRY ? code_compile_temporary (x, error) : status;
 }
 
-pw_scene_code *pw_scene_code_open (const char *text, const pw_system *s, pw_error *error) {
-  code_job x = { .system = s, .text = text, .code = calloc (1, sizeof *x.code) };
+pw_scene_code *pw_scene_lanes_open (const char *text, const pw_system *s, int lanes, pw_error *error) {
+  code_job x = { .system = s, .text = text, .lanes = lanes, .code = calloc (1, sizeof *x.code) };
   int status = x.code ? code_open (&x, error) : pw_fail (error, PW_RESOURCE, "out of memory");
   char *const path[] = { x.folder, x.source, x.log, x.part, x.object };
   for (int i = 0; i < 5; i++) free (path[i]);
   if (status == PW_OK) return x.code;
   free (x.code);
   return NULL;
+}
+
+pw_scene_code *pw_scene_code_open (const char *text, const pw_system *s, pw_error *error) {
+  return pw_scene_lanes_open (text, s, 0, error);
+}
+
+const pw_specialised_lanes *pw_scene_code_lanes (const pw_scene_code *c) {
+  return c && c->lanes && pw_specialised_lanes_count (c->lanes) > 0 ? c->lanes : NULL;
 }
 
 const pw_specialised *pw_scene_code_table (const pw_scene_code *c) {
