@@ -59,6 +59,38 @@ const pw_specialised *pw_cli_engine_code (const pw_cli_engine *e) {
   return pw_scene_code_table (e->code);
 }
 
+/* Why there are no lanes; NULL if there may be. */
+static const char *engine_no_lanes (const pw_cli_engine *e, const pw_system *s, const char *method, const pw_run *r) {
+  const pw_method *integrator;
+  int stabilisation;
+  if (e->code == NULL) return "the general engine is in use";
+  if (pw_method_parse (method, &integrator, &stabilisation, NULL) != PW_OK || pw_method_adaptive (integrator, method))
+    return "the method controls its step size";
+  if (r == NULL || pw_run_redundant (r) > 0) return "the scene has redundant constraint equations";
+  return pw_system_has_lanes (s) ? NULL : "the scene has element types of its own, or signals that depend on the state";
+}
+
+pw_scene_code *pw_cli_engine_lanes (const pw_cli_engine *e, const pw_system *s, const char *method, int lanes,
+                                    double steps) {
+  const int chosen = lanes > 1;
+  pw_error own = { 0 };
+  if (lanes == 0 && steps >= PW_LANES_STEPS) lanes = pw_processor_lanes ();
+  if (lanes <= 1) return NULL;
+  pw_run *r = pw_run_open (s, "rk4+none", NULL, NULL);
+  const char *why = engine_no_lanes (e, s, method, r);
+  char *text = why ? NULL : pw_run_source (r, &own);
+  pw_scene_code *code = text ? pw_scene_lanes_open (text, s, lanes, &own) : NULL;
+  if (code == NULL && why == NULL) why = own.text;
+  if (code && pw_scene_code_lanes (code) == NULL) {
+    pw_scene_code_close (code);
+    code = NULL, why = "clang does not vectorise loops over runs; gcc does";
+  }
+  if (why && (chosen || why == own.text) && pw_stop == 0) pw_cli_say ("pinwheel: one run after the other: %s\n", why);
+  free (text);
+  pw_run_close (r);
+  return code;
+}
+
 const char *pw_cli_engine_name (const pw_cli_engine *e) {
   return e->code ? "specialised" : "general";
 }

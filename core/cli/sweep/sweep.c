@@ -11,10 +11,12 @@
 #include "progress.h"
 #include "sweep_journal.h"
 
-/* A compiled system that several threads use. */
+enum { SWEEP_LANES = 8 };
+
+/* A compiled system that several runs use. */
 typedef struct shared_system {
   long parameters; /* pw_grid_parameters of its rows */
-  int users;       /* threads */
+  int users;       /* runs */
   int ready;       /* 0: a thread is compiling it */
   pw_sweep_system system;
   pw_error error; /* why it could not be compiled */
@@ -32,7 +34,7 @@ typedef struct sweep_code {
 typedef struct {
   /* as given */
   pw_cli_line line;
-  const char *path, *part_text, *jobs_text;
+  const char *path, *part_text, *jobs_text, *lanes_text;
   const char **ranges;
   int merge, cpu;
   /* as understood */
@@ -64,11 +66,12 @@ static int sweep_read (const sweep *x, pw_error *error) {
 /* The first option that has no effect on parts; NULL if there is none. */
 static const char *sweep_ignored (const sweep *x) {
   const pw_cli_line *l = &x->line;
-  const void *given[] = { x->ranges,     l->method,    l->t_end,     l->step,          l->rtol,
-                          l->atol,       l->limit,     l->sets,      l->max_steps,     l->starts,
-                          l->specialise, x->jobs_text, x->part_text, x->cpu ? x : NULL };
-  static const char *const name[] = { "--vary", "--method",    "--t-end", "--step",       "--rtol", "--atol", "--limit",
-                                      "--set",  "--max-steps", "--start", "--specialise", "--jobs", "--part", "--cpu" };
+  const void *given[] = { x->ranges,     l->method,    l->t_end,     l->step,           l->rtol,
+                          l->atol,       l->limit,     l->sets,      l->max_steps,      l->starts,
+                          l->specialise, x->jobs_text, x->part_text, x->cpu ? x : NULL, x->lanes_text };
+  static const char *const name[] = { "--vary",       "--method", "--t-end", "--step",      "--rtol",
+                                      "--atol",       "--limit",  "--set",   "--max-steps", "--start",
+                                      "--specialise", "--jobs",   "--part",  "--cpu",       "--lanes" };
   for (size_t i = 0; i < sizeof given / sizeof *given; i++)
     if (given[i]) return name[i];
   return NULL;
@@ -86,6 +89,15 @@ static int sweep_part (sweep *x, pw_error *error) {
                   x->part_text);
 }
 
+static int sweep_lanes (sweep *x, pw_error *error) {
+  static const char *const width[] = { "1", "2", "4", "8", NULL };
+  char hint[PW_HINT];
+  int i = x->lanes_text ? pw_find_name (width, sizeof *width, x->lanes_text, hint) : -1;
+  if (x->lanes_text && i < 0) return pw_fail (error, PW_INPUT, "--lanes %.60s: expected 1, 2, 4 or 8", x->lanes_text);
+  x->plan.lanes = i < 0 ? 0 : 1 << i;
+  return PW_OK;
+}
+
 static int sweep_settings (sweep *x, pw_error *error) {
   pw_plan *p = &x->plan;
   pw_run_defaults d = pw_cli_defaults (pw_file_table (p->file));
@@ -98,6 +110,7 @@ static int sweep_settings (sweep *x, pw_error *error) {
   int status = pw_cli_settings (&x->line, &d, &p->t_end, &p->settings, &limit, error);
   p->limit = limit.most;
   if (status == PW_OK) status = pw_cli_specialise (x->line.specialise, &p->specialise, error);
+  if (status == PW_OK) status = sweep_lanes (x, error);
   if (status == PW_OK) status = pw_parallel_jobs (x->jobs_text, &x->jobs, error);
   return status == PW_OK ? sweep_part (x, error) : status;
 }
@@ -171,12 +184,9 @@ static void sweep_release (sweep *x, shared_system *s) {
   free (s);
 }
 
-/* Replaces a thread's system by that of a row, shared with other threads, or compiled without the lock.  NULL if out of
- * memory. */
-static shared_system *sweep_share (sweep *x, shared_system *last, long row) {
+/* The system of a row, shared with other threads, or compiled without the lock.  NULL if out of memory. */
+static shared_system *sweep_share (sweep *x, long row) {
   long parameters = pw_grid_parameters (&x->plan.grid, row);
-  if (last && last->parameters == parameters) return last;
-  sweep_release (x, last);
   shared_system *s = x->shared;
   while (s && s->parameters != parameters) s = s->next;
   if (s) {
@@ -218,29 +228,84 @@ static long sweep_take (sweep *x) {
   return -1;
 }
 
+/* A thread's runs: as many as fit into lanes, else one. */
+typedef struct {
+  sweep *x;
+  const pw_specialised_lanes *code;
+  void *memory;
+  int width;
+  pw_sweep_run run[SWEEP_LANES];
+  shared_system *system[SWEEP_LANES]; /* NULL: no run */
+  pw_text text;
+} sweep_worker;
+
+/* Opens the run of the next row; 0 if there is none.  The caller holds the lock. */
+static int sweep_begin (sweep_worker *w, int k) {
+  sweep *x = w->x;
+  pw_error own = { 0 };
+  long row = sweep_take (x);
+  if (row < 0) return 0;
+  w->system[k] = sweep_share (x, row);
+  if (w->system[k] == NULL)
+    pw_fail (x->error, PW_RESOURCE, "row %ld of the grid: out of memory", row + 1), pw_stop = 1;
+  else
+    own = w->system[k]->error;
+  pthread_mutex_unlock (&x->lock);
+  if (w->system[k]) pw_sweep_run_open (&w->run[k], &x->plan, &w->system[k]->system, row, &own);
+  pthread_mutex_lock (&x->lock);
+  return w->system[k] != NULL;
+}
+
+/* Stores the row of a run that has ended.  The caller holds the lock. */
+static void sweep_end (sweep_worker *w, int k) {
+  sweep *x = w->x;
+  pthread_mutex_unlock (&x->lock);
+  pw_text_clear (&w->text);
+  int status = pw_sweep_run_close (&w->run[k], &w->text);
+  pthread_mutex_lock (&x->lock);
+  sweep_keep (x, w->run[k].row, status, &w->text, &w->run[k].error);
+  sweep_release (x, w->system[k]);
+  w->system[k] = NULL;
+}
+
+/* Advances the runs, those with the first system's code in lanes, until one of them ends. */
+static void sweep_advance (sweep_worker *w) {
+  const double t_end = w->x->plan.t_end;
+  pw_run *run[SWEEP_LANES];
+  int which[SWEEP_LANES], status[SWEEP_LANES], n = 0, same = 1, ended = 0;
+  pw_error error[SWEEP_LANES];
+  for (int k = 0; k < w->width; k++) {
+    if (w->system[k] == NULL) continue;
+    if (pw_sweep_run_ended (&w->run[k])) return;
+    same &= w->system[k]->system.code == pw_cli_engine_code (&w->x->plan.engine);
+    which[n] = k, error[n] = (pw_error){ 0 }, run[n++] = w->run[k].run;
+  }
+  while (!ended) {
+    pw_runs_advance (run, n, t_end, same ? w->code : NULL, w->memory, status, error);
+    for (int i = 0; i < n; i++) ended |= status[i] != PW_OK || !(pw_run_time (run[i]) < t_end);
+  }
+  for (int i = 0; i < n; i++) w->run[which[i]].status = status[i], w->run[which[i]].error = error[i];
+}
+
 /* Computes rows until there are none. */
 static void sweep_thread (void *context, int i) {
   sweep *x = context;
+  sweep_worker w = { .x = x, .code = pw_scene_code_lanes (x->plan.code), .width = 1 };
   (void)i;
-  pw_text text = { .at = NULL };
-  shared_system *s = NULL;
+  if (w.code && (w.memory = pw_specialised_lanes_memory (w.code)) != NULL)
+    w.width = pw_specialised_lanes_count (w.code);
   pthread_mutex_lock (&x->lock);
-  for (long row; (row = sweep_take (x)) >= 0;) {
-    s = sweep_share (x, s, row);
-    pw_error own = { 0 };
-    if (s)
-      own = s->error;
-    else
-      pw_fail (&own, PW_RESOURCE, "out of memory");
+  for (int runs = 1; runs > 0;) {
+    for (int k = runs = 0; k < w.width; k++) runs += w.system[k] != NULL || sweep_begin (&w, k);
     pthread_mutex_unlock (&x->lock);
-    pw_text_clear (&text);
-    int status = pw_sweep_row (&x->plan, s ? &s->system : NULL, row, &text, &own);
+    if (runs) sweep_advance (&w);
     pthread_mutex_lock (&x->lock);
-    sweep_keep (x, row, status, &text, &own);
+    for (int k = 0; k < w.width; k++)
+      if (w.system[k] && pw_sweep_run_ended (&w.run[k])) sweep_end (&w, k);
   }
-  sweep_release (x, s);
   pthread_mutex_unlock (&x->lock);
-  pw_text_free (&text);
+  pw_text_free (&w.text);
+  free (w.memory);
 }
 
 static void sweep_all (sweep *x) {
@@ -333,6 +398,9 @@ static const struct poptOption sweep_options[] = {
                   "RANGE: lin:FIRST:LAST:COUNT, log:FIRST:LAST:COUNT, or a list V1,V2,..."),
   PW_TEXT_OPTION (sweep, path, "output", 'o', "FILE.csv", "Write the table to this file"),
   PW_TEXT_OPTION (sweep, jobs_text, "jobs", 'j', "N", "Number of concurrent runs (default: one per processor)"),
+  PW_TEXT_OPTION (sweep, lanes_text, "lanes", 0, "N",
+                  "Runs per processor at once, 1, 2, 4 or 8, by methods of fixed step size in specialised code "
+                  "(default: as many as pay)"),
   PW_TEXT_OPTION (sweep, part_text, "part", 0, "I/N", "Compute every N-th row, from the I-th on, for a later --merge"),
   PW_FLAG_OPTION (sweep, merge, "merge", "Merge the parts named instead of a model"),
   PW_FLAG_OPTION (sweep, cpu, "cpu", "Add a column with the processor time of each run, which is never reproducible"),

@@ -129,6 +129,7 @@ static void plan_engine (pw_plan *p, const pw_system *s) {
   pw_run_defaults d = pw_cli_defaults (pw_file_table (p->file));
   double steps = (double)p->grid.rows * pw_method_steps (p->method, &p->settings, d.step, p->t_end);
   pw_cli_engine_open (&p->engine, s, p->specialise, steps);
+  p->code = p->cpu || isfinite (p->limit) ? NULL : pw_cli_engine_lanes (&p->engine, s, p->method, p->lanes, steps);
 }
 
 static int plan_scan_row (pw_plan *p, long row, plan_scan *scan, pw_error *error) {
@@ -244,6 +245,7 @@ int pw_plan_open (pw_plan *p, const char **ranges, pw_error *error) {
 
 void pw_plan_close (pw_plan *p) {
   pw_cli_engine_close (&p->engine);
+  pw_scene_code_close (p->code);
   pw_grid_free (&p->grid);
   pw_names_close (&p->index);
   pw_arena_free (&p->arena);
@@ -276,38 +278,44 @@ static int row_read (const pw_sweep_system *s, pw_run *r, row_result *x, pw_erro
   return PW_OK;
 }
 
-/* The run itself; PW_RETRY if it was stopped.  A failed run still reports the time it reached. */
-static int row_run (const pw_plan *p, const pw_sweep_system *s, const pw_settings *settings, row_result *x,
-                    pw_error *error) {
-  pw_run *r = pw_run_open (s->m.system, p->method, settings, error);
-  int status = r ? PW_OK : error->status;
-  while (status == PW_OK && pw_run_time (r) < p->t_end) status = pw_run_advance_towards (r, p->t_end, p->t_end, error);
-  if (status == PW_STOPPED) status = pw_limit_fail (settings->stop_context, pw_run_time (r), error);
-  if (r == NULL) return status;
-  int read = row_read (s, r, x, status == PW_OK ? error : &(pw_error){ 0 });
-  pw_run_close (r);
-  return status == PW_OK ? read : status;
-}
-
-/* With the initial values of the row. */
-static int row_start (const pw_plan *p, const pw_sweep_system *s, long row, row_result *x, pw_error *error) {
-  pw_limit limit = { .most = p->limit };
+void pw_sweep_run_open (pw_sweep_run *x, const pw_plan *p, const pw_sweep_system *s, long row, const pw_error *error) {
+  *x = (pw_sweep_run){
+    .plan = p, .system = s, .row = row, .limit = { .most = p->limit }, .status = error->status, .error = *error
+  };
+  if (x->status != PW_OK) return;
   pw_settings settings = p->settings;
   pw_initial_value *initial = malloc (((size_t)p->grid.axes + 1) * sizeof *initial);
-  if (initial == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
+  if (initial == NULL) {
+    x->status = pw_fail (&x->error, PW_RESOURCE, "out of memory");
+    return;
+  }
   for (int i = 0; i < p->grid.axes; i++)
     if (s->state[i] >= 0)
       initial[settings.initials++] = (pw_initial_value){ s->state[i], pw_grid_value (&p->grid, i, row) };
   settings.initial = initial;
   settings.specialised = s->code;
   settings.stop = pw_limit_over;
-  settings.stop_context = &limit;
-  pw_limit_start (&limit);
-  double start = pw_seconds (CLOCK_THREAD_CPUTIME_ID);
-  int status = row_run (p, s, &settings, x, error);
-  x->cpu = pw_seconds (CLOCK_THREAD_CPUTIME_ID) - start;
+  settings.stop_context = &x->limit;
+  pw_limit_start (&x->limit);
+  x->start = pw_seconds (CLOCK_THREAD_CPUTIME_ID);
+  x->run = pw_run_open (s->m.system, p->method, &settings, &x->error);
+  if (x->run == NULL) x->status = x->error.status;
   free (initial);
-  return status > 0 && pw_stop == 0 ? pw_fail (error, PW_METHOD, "the method gave up") : status;
+}
+
+int pw_sweep_run_ended (const pw_sweep_run *x) {
+  return x->status != PW_OK || !(pw_run_time (x->run) < x->plan->t_end);
+}
+
+/* The result; a failed run still reports the time it reached. */
+static void row_result_of (pw_sweep_run *x, row_result *result) {
+  if (x->status == PW_STOPPED) x->status = pw_limit_fail (&x->limit, pw_run_time (x->run), &x->error);
+  if (x->run) {
+    int read = row_read (x->system, x->run, result, x->status == PW_OK ? &x->error : &(pw_error){ 0 });
+    if (x->status == PW_OK) x->status = read;
+    result->cpu = pw_seconds (CLOCK_THREAD_CPUTIME_ID) - x->start;
+  }
+  if (x->status > 0 && pw_stop == 0) x->status = pw_fail (&x->error, PW_METHOD, "the method gave up");
 }
 
 static void row_write (const pw_plan *p, long row, int status, const row_result *x, const char *reason, pw_text *t) {
@@ -321,13 +329,17 @@ static void row_write (const pw_plan *p, long row, int status, const row_result 
   pw_text_quoted (t, reason);
 }
 
-int pw_sweep_row (const pw_plan *p, const pw_sweep_system *s, long row, pw_text *text, pw_error *error) {
-  row_result x = { NAN, NAN, NAN, NAN, NAN, NAN, 0, NULL };
-  x.state = malloc (((size_t)p->columns + 1) * sizeof *x.state);
-  if (x.state == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
-  for (int i = 0; i < p->columns; i++) x.state[i] = NAN;
-  int status = error->status == PW_OK ? row_start (p, s, row, &x, error) : error->status;
-  if (status != PW_RETRY && status != PW_RESOURCE) row_write (p, row, status, &x, error->text, text);
-  free (x.state);
-  return text->failed ? pw_fail (error, PW_RESOURCE, "out of memory") : status;
+int pw_sweep_run_close (pw_sweep_run *x, pw_text *text) {
+  row_result result = { NAN, NAN, NAN, NAN, NAN, NAN, 0, NULL };
+  const int columns = x->plan->columns;
+  result.state = malloc (((size_t)columns + 1) * sizeof *result.state);
+  if (result.state == NULL) x->status = pw_fail (&x->error, PW_RESOURCE, "out of memory");
+  for (int i = 0; i < columns && result.state; i++) result.state[i] = NAN;
+  if (result.state) row_result_of (x, &result);
+  if (x->status != PW_RETRY && x->status != PW_RESOURCE)
+    row_write (x->plan, x->row, x->status, &result, x->error.text, text);
+  free (result.state);
+  pw_run_close (x->run);
+  x->run = NULL;
+  return text->failed ? pw_fail (&x->error, PW_RESOURCE, "out of memory") : x->status;
 }

@@ -22,10 +22,12 @@ typedef struct {
   int cpu;      /* 1: a column with each run's processor time */
   int part, parts;
   pw_specialise specialise;
+  int lanes; /* as given; 0: not given */
   /* set by pw_plan_open */
   pw_file *file;
   pw_grid grid;
   pw_cli_engine engine; /* of the first row that can be built, so that it does not depend on the part */
+  pw_scene_code *code;  /* the same for several runs at once; NULL: none */
   struct pw_column {
     const char *name, *unit;
   } * column; /* columns: the states of all bodies and elements */
@@ -63,10 +65,25 @@ void pw_sweep_system_close (pw_sweep_system *x);
 
 /* ---- One run ---- */
 
-/* Performs a run with the system of its parameters and appends its cells, without the end of the line.  `error` has the
- * reason if the system could not be opened.  Returns the status of the run, which has a row even if it failed; PW_RETRY
- * if pw_stop became non-zero; PW_RESOURCE with the error if the run was impossible.  May be called by several threads
- * at once. */
-int pw_sweep_row (const pw_plan *p, const pw_sweep_system *s, long row, pw_text *text, pw_error *error);
+/* The run of a row. */
+typedef struct {
+  const pw_plan *plan;
+  const pw_sweep_system *system;
+  long row;
+  pw_run *run;
+  pw_limit limit;
+  double start; /* of the thread's processor time [s] */
+  int status;   /* while it is not PW_OK, the run has ended */
+  pw_error error;
+} pw_sweep_run;
+
+/* Opens the run of a row, with the system of its parameters; `error`: the reason if that could not be opened.  May be
+ * called by several threads at once.  Close the run in every case. */
+void pw_sweep_run_open (pw_sweep_run *x, const pw_plan *p, const pw_sweep_system *s, long row, const pw_error *error);
+/* 1 if the run has failed or reached the end. */
+int pw_sweep_run_ended (const pw_sweep_run *x);
+/* Appends the cells of the row, without the end of the line.  Returns the status of the run, which has a row even if it
+ * failed; PW_RETRY if pw_stop became non-zero; PW_RESOURCE with the error if the run was impossible. */
+int pw_sweep_run_close (pw_sweep_run *x, pw_text *text);
 
 #endif
