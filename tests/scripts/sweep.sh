@@ -60,4 +60,38 @@ if command -v parallel >/dev/null; then
 else
   echo '# GNU parallel is not there: not tried'
 fi
+# Several runs per processor at once: the same bytes for any number of lanes and jobs, and after kills.  Some runs fail; guards
+# leave steps to the general engine; the structure of the scene changes.
+same_lanes () {
+  name=$1 failed=0
+  shift
+  "$pinwheel" sweep "$@" --specialise always --lanes 1 --jobs 1 -o "$work/lanes.csv" 2>"$work/err" || failed=1
+  for lanes in 2 4 8; do
+    for jobs in 1 3; do
+      "$pinwheel" sweep "$@" --specialise always --lanes $lanes --jobs $jobs -o "$work/lanes$lanes.csv" 2>"$work/err" &&
+        cmp "$work/lanes$lanes.csv" "$work/lanes.csv" || failed=1
+      rm -f "$work/lanes$lanes.csv"*
+    done
+  done
+  rm -f "$work"/lanes.csv*
+  report "lanes: $name" $failed
+}
+same_lanes 'initial values' snakeboard --t-end 2 --vary board.vx=lin:0:1:11
+same_lanes 'parameters, work of a signal' ezyroller --t-end 2 --vary m1=lin:0.8:1.2:7 --vary a=0.4,0.5
+same_lanes 'motors' roller-racer --t-end 2 --vary swing=lin:0.4:0.8:5 --vary m1=4,5
+same_lanes 'tyres, without stabilisation' car-tyres --method rk4+none --t-end 2 --vary car.vy=lin:0:1:9
+same_lanes 'springs, runs that fail' andrews-squeezer --method rk4+projection --t-end 0.01 --vary K1.omega=lin:-100:200:5
+same_lanes 'singular configurations' slider-crank --t-end 3 --vary crank.omega=lin:1:5:9
+same_lanes 'order 8' car-two-trailers --method erk8+projection:steps=fixed --t-end 2 --vary car.vx=lin:1:2:5
+same_lanes 'numbers of bodies' n-trailer --t-end 1 --vary n=1,2,3 --vary tractor.vx=lin:0.5:1:5
+same_lanes 'redundant equations' differential-drive --t-end 1 --vary left=lin:0.3:0.5:3
+
+if [ "$("$pinwheel" sweep snakeboard --t-end 0.1 --vary board.vx=0,1 --specialise always --lanes 4 -o "$work/x.csv" 2>&1)" = '' ]; then
+  grid='snakeboard --vary board.vx=lin:0:1:40 --t-end 20 --specialise always --lanes 4'
+  "$pinwheel" sweep $grid --jobs 1 -o "$work/whole.csv" 2>"$work/err"
+  signal=KILL most=20
+  until_done "$work/killed.csv" --jobs 2
+  cmp "$work/killed.csv" "$work/whole.csv"
+  report "four lanes, stopped $kills times" $?
+fi
 exit $bad

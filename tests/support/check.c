@@ -42,6 +42,6 @@ void check_error_at (const pw_error *error, int status, const char *text, const 
 
 void check_ok_at (int status, const pw_error *error, const char *file, int line) {
   if (status == PW_OK) return;
-  print_error ("status %d: %s\n", status, error->text);
+  print_error ("status %d: %s\n", status, error ? error->text : "");
   _fail (file, line);
 }
