@@ -54,6 +54,19 @@ static engine_case engine_cases[] = {
   SPECIALISED ("roller-racer", 0),
   SPECIALISED ("theo-jansen", 0.4),
   SPECIALISED ("andrews-squeezer", 0),
+#define LANES(name, limit)                                                                                  \
+  {                                                                                                         \
+    "lanes-" name, name ", a step of rk4+projection, runs in lanes (right) against general", "step", limit, \
+        engine_open_lanes, engine_close_lanes, .model = name                                                \
+  }
+  LANES ("ezyroller", 0.1),
+  LANES ("snakeboard", 0),
+  LANES ("n-trailer", 0),
+  LANES ("roller-racer", 0),
+  LANES ("theo-jansen", 0),
+  LANES ("andrews-squeezer", 0),
+  LANES ("wheeled-snake", 0),
+  LANES ("chain", 0),
   { "chain-10", "chain of 10, one evaluation, per body", "body", 1.6, engine_open_chain, engine_close_chain,
     .links = 10, .calls = 10 },
   { "chain-100", "chain of 100", "body", 1.6, engine_open_chain, engine_close_chain, .links = 100, .calls = 4 },

@@ -43,6 +43,9 @@ pw_system *engine_grid (int cells);  /* cells x cells squares of pinned bars, 2 
 pw_run *engine_open (pw_system *s, const char *method, const pw_settings *settings);
 pw_model *engine_describe_chain (int links); /* the chain's description, built */
 
+/* Steps of a fixed size. */
+void engine_steps (pw_run *r, long n);
+
 /* Specialised code of a system. */
 struct pw_scene_code *engine_specialise (const pw_system *s);
 
@@ -63,6 +66,8 @@ void engine_close_ezy (engine_case *c);
 void engine_open_specialised (engine_case *c); /* a scene of the gallery, general against specialised: an evaluation */
 void engine_open_specialised_step (engine_case *c); /* a step of rk4+projection */
 void engine_close_specialised (engine_case *c);
+void engine_open_lanes (engine_case *c); /* a step of several runs at once, per run */
+void engine_close_lanes (engine_case *c);
 void engine_open_chain (engine_case *c); /* one evaluation, per body */
 void engine_close_chain (engine_case *c);
 void engine_open_ida (engine_case *c); /* a step of ida+ggl */

@@ -32,6 +32,12 @@ pw_scene_code *engine_specialise (const pw_system *s) {
   return code;
 }
 
+void engine_steps (pw_run *r, long n) {
+  pw_error error = { 0 };
+  if (pw_run_advance_to (r, r->t + ((double)n - 0.5) * r->settings.step, 1e9, &error) != PW_OK)
+    engine_die (r->s->model, error.text);
+}
+
 /* And the default step. */
 static pw_system *specialised_system (const char *name, double *step) {
   pw_error error = { 0 };
@@ -70,12 +76,12 @@ static long specialised_evaluate (void *context, long n) {
 
 static long specialised_step (void *context, long n) {
   specialised_side *x = context;
-  pw_error error = { 0 };
-  for (long i = 0; i < n; i++) {
-    if (++x->steps % SPECIALISED_STEPS == 0) pw_run_restart (x->d->run[x->side], x->d->q, x->d->v, &error);
-    pw_run_advance (x->d->run[x->side], 1e9, &error);
+  for (long i = 0, more; i < n; i += more, x->steps += more) {
+    long left = SPECIALISED_STEPS - x->steps % SPECIALISED_STEPS;
+    more = n - i < left ? n - i : left;
+    if (left == SPECIALISED_STEPS) pw_run_restart (x->d->run[x->side], x->d->q, x->d->v, NULL);
+    engine_steps (x->d->run[x->side], more);
   }
-  if (error.status != PW_OK) engine_die (x->d->system->model, error.text);
   return n;
 }
 
@@ -116,7 +122,7 @@ void engine_open_specialised (engine_case *c) {
 void engine_open_specialised_step (engine_case *c) {
   specialised_open (c, "rk4+projection");
   c->base.run = c->ours.run = specialised_step;
-  c->base_function = c->our_function = "pw_run_advance";
+  c->base_function = c->our_function = "pw_run_advance_to";
 }
 
 void engine_close_specialised (engine_case *c) {
@@ -125,5 +131,90 @@ void engine_close_specialised (engine_case *c) {
   pw_scene_code_close (d->code);
   pw_system_free (d->system);
   free (d->q);
+  free (d);
+}
+
+/* ---- Several runs at once ---- */
+
+enum { LANES_MOST = 8 };
+
+/* Runs that begin with slightly different velocities: in the general engine, one after the other; in lanes. */
+typedef struct {
+  pw_system *system;
+  pw_scene_code *code, *lanes;
+  void *memory;
+  int n, steps; /* runs; steps after which they begin again */
+  double step;
+  pw_run *general[LANES_MOST], *run[LANES_MOST];
+} lanes_data;
+
+static void lanes_again (pw_run *r, const pw_system *s, int k) {
+  double v[300];
+  memcpy (v, s->v0, (size_t)s->coords * sizeof *v);
+  v[0] += 1e-3 * k;
+  pw_run_restart (r, s->q0, v, NULL);
+}
+
+static long lanes_general (void *context, long n) {
+  lanes_data *d = context;
+  n = (n + d->n - 1) / d->n;
+  for (int k = 0; k < d->n; k++)
+    for (long i = 0, more; i < n; i += more) {
+      more = n - i < d->steps ? n - i : d->steps;
+      lanes_again (d->general[k], d->system, k);
+      engine_steps (d->general[k], more);
+    }
+  return n * d->n;
+}
+
+static long lanes_run (void *context, long n) {
+  lanes_data *d = context;
+  n = (n + d->n - 1) / d->n;
+  for (long i = 0, more; i < n; i += more) {
+    more = n - i < d->steps ? n - i : d->steps;
+    for (int k = 0; k < d->n; k++) lanes_again (d->run[k], d->system, k);
+    const double end = d->run[0]->t + (double)more * d->step;
+    while (pw_run_time (d->run[0]) < end) {
+      int status[LANES_MOST];
+      pw_error error[LANES_MOST] = { { 0 } };
+      pw_runs_advance (d->run, d->n, end, pw_scene_code_lanes (d->lanes), d->memory, status, error);
+      for (int k = 0; k < d->n; k++)
+        if (status[k] != PW_OK) engine_die (d->system->model, error[k].text);
+    }
+  }
+  return n * d->n;
+}
+
+void engine_open_lanes (engine_case *c) {
+  lanes_data *d = c->data = calloc (1, sizeof *d);
+  pw_error error = { 0 };
+  if (d == NULL) engine_die (c->key, "out of memory");
+  d->system = specialised_system (c->model, &d->step);
+  d->steps = SPECIALISED_STEPS;
+  d->n = pw_processor_lanes ();
+  d->code = engine_specialise (d->system);
+  char *text = pw_system_source (d->system, NULL, &error);
+  d->lanes = text && d->n > 1 ? pw_scene_lanes_open (text, d->system, d->n, &error) : NULL;
+  free (text);
+  if (pw_scene_code_lanes (d->lanes) == NULL) engine_die (c->key, d->n > 1 ? error.text : "no lanes on this processor");
+  d->memory = pw_specialised_lanes_memory (pw_scene_code_lanes (d->lanes));
+  for (int k = 0; k < d->n; k++) {
+    pw_settings set = { .step = d->step, .span = 100 };
+    d->general[k] = engine_open (d->system, "rk4+projection", &set);
+    set.specialised = pw_scene_code_table (d->code);
+    d->run[k] = engine_open (d->system, "rk4+projection", &set);
+  }
+  c->base = (timing_work){ lanes_general, d }, c->ours = (timing_work){ lanes_run, d };
+  lanes_general (d, 1600), lanes_run (d, 1600);
+  c->difference = engine_difference (d->general[1]->q, d->run[1]->q, d->system->coords);
+}
+
+void engine_close_lanes (engine_case *c) {
+  lanes_data *d = c->data;
+  for (int k = 0; k < d->n; k++) pw_run_close (d->general[k]), pw_run_close (d->run[k]);
+  pw_scene_code_close (d->code);
+  pw_scene_code_close (d->lanes);
+  pw_system_free (d->system);
+  free (d->memory);
   free (d);
 }
