@@ -35,8 +35,8 @@ typedef double libm_lanes __attribute__ ((vector_size (8 * LIBM_LANES)));
 extern double tanh (double x);
 #pragma omp declare simd notinbranch
 extern double hypot (double x, double y);
-LIBM (libm_tanh (libm_lanes x) __asm__ (LIBM_NAME "_tanh"));
-LIBM (libm_hypot (libm_lanes x, libm_lanes y) __asm__ (LIBM_NAME "v_hypot"));
+LIBM (libm_tanh (libm_lanes x) __asm__(LIBM_NAME "_tanh"));
+LIBM (libm_hypot (libm_lanes x, libm_lanes y) __asm__(LIBM_NAME "v_hypot"));
 __attribute__ ((noinline)) static double one_tanh (double x) {
   return tanh (x);
 }
