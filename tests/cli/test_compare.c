@@ -218,16 +218,18 @@ static const char *compare_word (const char *name, int word) {
 /* The processor time of the method with rows `from` to `to` - 1 for an error, in a pendulum of 1 m: errors of lengths and angles
  * count alike.  NaN if it is not reached. */
 static double compare_cost (const char *file, int from, int to, double error) {
-  double before = 0;
+  double before = 0, least = NAN;
   for (int row = from; row < to; row++) {
     double length = compare_number (file, row, MOST), angle = compare_number (file, row, MOST + 1),
-           here = fmax (length, angle), cpu = compare_number (file, row, CPU);
-    if (here > error) before = here;
-    if (here > error) continue;
-    double cpu_before = compare_number (file, row - 1, CPU), part = log (error / before) / log (here / before);
-    return fmin (cpu, exp (log (cpu_before) + part * log (cpu / cpu_before)));
+           here = fmax (length, angle), cpu = compare_number (file, row, CPU), cost = cpu;
+    if (here <= error && before > error) {
+      double cpu_before = compare_number (file, row - 1, CPU), part = log (error / before) / log (here / before);
+      cost = fmin (cpu, exp (log (cpu_before) + part * log (cpu / cpu_before)));
+    }
+    if (here <= error) least = fmin (least, cost); /* NaN: none so far */
+    before = here;
   }
-  return NAN;
+  return least;
 }
 
 /* Costs are interpolated between rows and relative to the cheapest; rows appear only on demand. */
