@@ -34,7 +34,7 @@
 #endif
 #endif
 
-enum { MEMORY_FRAMES = 40, MEMORY_SAID = 40000 };
+enum { MEMORY_FRAMES = 40, MEMORY_SAID = 200000 };
 
 /* What the process of an attempt and the one that watches it both see. */
 static struct memory_state {

@@ -236,6 +236,7 @@ typedef struct {
   int width;
   pw_sweep_run run[SWEEP_LANES];
   shared_system *system[SWEEP_LANES]; /* NULL: no run */
+  shared_system *last;                /* of a run that has ended, kept since the next row may have the same parameters */
   pw_text text;
 } sweep_worker;
 
@@ -264,7 +265,8 @@ static void sweep_end (sweep_worker *w, int k) {
   int status = pw_sweep_run_close (&w->run[k], &w->text);
   pthread_mutex_lock (&x->lock);
   sweep_keep (x, w->run[k].row, status, &w->text, &w->run[k].error);
-  sweep_release (x, w->system[k]);
+  sweep_release (x, w->last);
+  w->last = w->system[k];
   w->system[k] = NULL;
 }
 
@@ -303,6 +305,7 @@ static void sweep_thread (void *context, int i) {
     for (int k = 0; k < w.width; k++)
       if (w.system[k] && pw_sweep_run_ended (&w.run[k])) sweep_end (&w, k);
   }
+  sweep_release (x, w.last);
   pthread_mutex_unlock (&x->lock);
   pw_text_free (&w.text);
   free (w.memory);
