@@ -18,7 +18,7 @@ engine_tables () {
     $1 == "one step of rk4+projection" { $1 = scene ", " $1 ", specialised (right) against general" }
     $2 ~ /^(evaluation|step|body)$/ {
       sub(/, one evaluation, per body$/, "", $1)
-      printf "| %s | %s | %s | %s | %s | %s | %s |\n", $1 ($2 == "body" ? ", one evaluation, per body" : ""), short($3), short($4), short($5), short($6), short($7), ($6 > 0 ? sprintf("%.2f", $7 / $6) : "") }'
+      printf "| %s | %s | %s | %s | %s | %s | %s |\n", $1 ($2 == "body" ? ", one evaluation, per body" : ""), short($3), short($4), short($5), short($6), short($7), ($6 > 0 && $7 > 0 ? sprintf("%.2f", $7 / $6) : "") }'
   echo
   echo '| growth with the number of bodies N | measured |'
   echo '|---|---|'
