@@ -36,7 +36,7 @@ set logscale xy
 set format '10^{%T}'
 set xlabel 'bodies N'
 set ylabel 'time per body [ns]'
-set key inside bottom right
+set key inside top left
 eval panel(left, width - right, 22, height - bottom)
 set xrange [7:150000]
 plot '$work/chain, evaluation' w lp lw 1.1 pt 7 lc rgb '#004488' t 'chain: one evaluation', \
