@@ -27,8 +27,8 @@ struct pw_run {
   double *coefficient;         /* redundant x rows: each redundant row as a combination of active rows; then scratch */
   double *least_norm;          /* rows: least-norm multipliers for the ledger; NULL: no redundant row moves */
   char *rank_memory;
-  double conditioning;                      /* of the active rows at the state reached (rank.h) */
-  double reselect;                          /* conditioning below which other rows are tried */
+  double independence;                      /* of the active rows at the state reached (rank.h) */
+  double reselect_below;                    /* independence below which other rows are tried */
   const struct pw_specialised *specialised; /* compiled code of the scene in use, or NULL */
   struct pw_scene *scene;                   /* data of that code */
   void *scene_memory;
@@ -36,7 +36,7 @@ struct pw_run {
   pw_watchdog limits;     /* thresholds */
   pw_geometry geometry;   /* distance of the constraints from a singular configuration */
   double refuse;          /* sine at which an evaluation is refused */
-  int near;               /* 1 after an evaluation near a singular configuration */
+  int near_singular;      /* 1 after an evaluation near a singular configuration */
   double reference_level; /* largest acceleration norm away from singular configurations, in units of L / T^2; >= 1 */
   double previous_norm;   /* acceleration norm of the last such state */
   int differentiates;     /* 1: the method uses the derivatives of the equations (tangent.h) */
@@ -168,13 +168,13 @@ int pw_run_open_saddle (pw_run *r, pw_error *error);
 int pw_run_evaluate (pw_run *r, pw_error *error);
 
 /* Sets the reference values of the watchdog at the state reached, which must be regular. */
-void pw_run_watch (pw_run *r);
+void pw_run_set_references (pw_run *r);
 
 /* Finds the next discontinuity after the state reached. */
 int pw_run_look_ahead (pw_run *r, pw_error *error);
 
 /* Makes the accelerations of this state the reference level for later ones. */
-void pw_run_reference_level (pw_run *r);
+void pw_run_set_reference_level (pw_run *r);
 
 /* Plans the linear algebra at the state reached, where J is evaluated, and reopens the method.  fresh: reference
  * pivots are those of this state; otherwise they are unchanged. */
@@ -219,10 +219,10 @@ static inline int pw_run_stop_requested (pw_run *r) {
 }
 
 /* Before each attempted step: PW_OK; PW_STOPPED if the caller requests it; PW_METHOD at max_steps. */
-int pw_run_attempt (pw_run *r, pw_error *error);
+int pw_run_check_limits (pw_run *r, pw_error *error);
 
 /* After each step: records speeds; PW_METHOD if coordinates are too large for double precision to resolve the scene. */
-int pw_run_resolve (pw_run *r, pw_error *error);
+int pw_run_check_resolution (pw_run *r, pw_error *error);
 
 /* ---- Energy (ledger.c) ---- */
 

@@ -29,7 +29,7 @@ typedef struct {
   double lands;                             /* sine at the end of a step over that at its beginning */
   double agree, agree_best;                 /* difference between two divisions of a step */
   double sample, sample_best;               /* the same for a sample inside a step */
-  double loosened, loose;                   /* conditioning of the active rows */
+  double loosened, loose;                   /* independence of the active rows */
   double extreme; /* the largest mass, and one over the smallest [kg]; the largest initial value */
   double stalled; /* consecutive steps that do not advance */
 } pw_watchdog;

@@ -19,7 +19,7 @@ typedef struct {
   pw_found *found;
   int count;
   size_t room;       /* entries allocated */
-  char folders[400]; /* the existing folders, "/first:/second", for messages */
+  char folders[400]; /* the folders searched, "/first:/second", also for messages */
 } pw_search;
 
 /* Searches every folder of the search path.  Close in every case.  PW_OK or PW_RESOURCE. */
@@ -28,8 +28,8 @@ void pw_search_close (pw_search *s);
 
 /* The folder of pinwheel.h that belongs to this library, malloced; NULL if there is none.  PW_OK or PW_RESOURCE. */
 int pw_search_include (char **folder, pw_error *error);
-/* The same for the path of a file of the engine of pages. */
-int pw_search_page (const char *file, char **path, pw_error *error);
+/* The same for a file of the engine of interactive pages. */
+int pw_search_page_file (const char *file, char **path, pw_error *error);
 
 /* Whether a name ends in ".so" or the like, with at least one character before it. */
 int pw_ends_with (const char *name, const char *ending);

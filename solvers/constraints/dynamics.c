@@ -81,7 +81,7 @@ int pw_run_accelerate (pw_run *r, double t, const double *q, const double *v, do
   if (status != PW_OK) return status;
   pw_evaluate_gamma (r->w, lambda);
   status = dynamics_solve (r, v, a, lambda, &near);
-  if (near) r->near = 1;
+  if (near) r->near_singular = 1;
   return status;
 }
 

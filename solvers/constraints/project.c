@@ -144,7 +144,7 @@ int pw_project_velocities (pw_projector *p, pw_run *r, double *v) {
  * configuration, or with redundant equations, that is not sufficient. */
 static int project_is_good (const pw_projector *p, pw_run *r) {
   r->residuals.velocity = NAN;
-  if (p->own_velocity || p->active || r->near) return 0;
+  if (p->own_velocity || p->active || r->near_singular) return 0;
   pw_residuals now;
   pw_evaluate_velocity_residual (r->w, NULL, &now);
   if (!(now.velocity <= PROJECT_GOOD)) return 0;

@@ -48,7 +48,7 @@ int pw_rank_reselect (struct pw_run *r);
 /* Conditioning of the active equations: 1 over their largest coefficient in a sum of the redundant ones with irregular
  * weights (rows of length 1).  Residuals of the redundant equations are those of the active ones divided by this.  J must be
  * evaluated and the run's saddle factorised at the configuration. */
-double pw_rank_conditioning (struct pw_run *r);
+double pw_rank_independence (struct pw_run *r);
 
 /* Saves or loads r->active; the number of redundant equations must not change.  Saddle and method still use the previous
  * set. */

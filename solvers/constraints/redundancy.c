@@ -71,7 +71,7 @@ void pw_rank_coefficients (pw_run *r, int i) {
 }
 
 /* A sum of the redundant equations with irregular weights, so that terms do not cancel, needs one solution only. */
-double pw_rank_conditioning (pw_run *r) {
+double pw_rank_independence (pw_run *r) {
   double *c = r->coefficient, *f = redundancy_force (r), most = 0;
   for (int i = 0; i < r->redundant; i++) {
     int row = r->redundant_row[i];

@@ -147,7 +147,7 @@ static void galpha_accept (pw_run *r) {
 
 static int galpha_advance (pw_run *r, double t_end, pw_error *error) {
   int status = pw_implicit_advance (r, t_end, galpha_step, galpha_accept, error);
-  if (status == PW_OK) r->near = pw_saddle_factor (r->saddle) != PW_OK || pw_watchdog_near (r);
+  if (status == PW_OK) r->near_singular = pw_saddle_factor (r->saddle) != PW_OK || pw_watchdog_near (r);
   return status;
 }
 

@@ -72,7 +72,7 @@ void pw_implicit_fill (pw_implicit *x, int size) {
 static int implicit_fail (pw_run *r, int status, double h, pw_error *error) {
   if (status == PW_METHOD) return pw_fail_signal (r->t, error);
   if (status == PW_RESOURCE) return pw_fail (error, PW_RESOURCE, "t = %.6g s: out of memory in KLU", r->t);
-  if (r->near || pw_watchdog_near_state (r)) return pw_fail_singular (r, r->t, error);
+  if (r->near_singular || pw_watchdog_near_state (r)) return pw_fail_singular (r, r->t, error);
   return pw_fail (error, PW_METHOD, "t = %.6g s: %s; the step of %.6g s may be too large", r->t,
                   status == PW_INPUT ? "the Newton matrix is singular" : "the iteration does not converge", h);
 }
@@ -85,7 +85,7 @@ static int implicit_step_around (pw_run *r, pw_implicit_step *step, double h, do
   for (size_t i = 0; i < sizeof longer / sizeof *longer; i++) {
     double later = r->t + longer[i] * h;
     if ((status != PW_RETRY && status != PW_INPUT) || !(later <= stop)) break;
-    if (!r->near && !pw_watchdog_near_state (r)) break;
+    if (!r->near_singular && !pw_watchdog_near_state (r)) break;
     r->statistics.rejected++;
     status = step (r, later - r->t, later);
     if (status == PW_OK) *t1 = later;
@@ -99,7 +99,7 @@ int pw_implicit_advance (pw_run *r, double t_end, pw_implicit_step *step, void (
   const double end = pw_step_end (r, x->base, x->count, t_end, &whole);
   double h = whole ? r->settings.step : end - r->t, t1 = end;
   size_t n = (size_t)r->s->coords * sizeof (double);
-  r->near = 0;
+  r->near_singular = 0;
   int status = whole ? implicit_step_around (r, step, h, fmin (t_end, r->breakpoint), &t1) : step (r, h, t1);
   if (t1 > end) h = t1 - r->t, whole = 0;
   if (status != PW_OK) return implicit_fail (r, status, h, error);

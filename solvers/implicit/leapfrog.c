@@ -203,13 +203,13 @@ static int drift_solve (pw_run *r, double h, double t1) {
 
 /* ---- Second half: v' ---- */
 
-/* Kinematics and factors of the saddle-point matrix at (t, q, v); sets r->near in a singular configuration. */
+/* Kinematics and factors of the saddle-point matrix at (t, q, v); sets r->near_singular in a singular configuration. */
 static int leapfrog_factor (pw_run *r, double t, const double *q, const double *v) {
   int status = pw_evaluate_J_at (r->w, t, q, v);
   if (status != PW_OK) return status;
   r->statistics.factorisations++;
   status = pw_saddle_factor (r->saddle);
-  if (status != PW_OK || pw_watchdog_near (r)) r->near = 1;
+  if (status != PW_OK || pw_watchdog_near (r)) r->near_singular = 1;
   return status;
 }
 

@@ -149,7 +149,7 @@ static void radau_close (pw_run *r) {
 static int radau_fail (pw_run *r, int status, double h, pw_error *error) {
   if (status == PW_METHOD) return pw_fail_signal (r->t, error);
   if (status == PW_RESOURCE) return pw_fail (error, PW_RESOURCE, "t = %.6g s: out of memory in KLU", r->t);
-  if (r->near || pw_watchdog_near_state (r)) return pw_fail_singular (r, r->t, error);
+  if (r->near_singular || pw_watchdog_near_state (r)) return pw_fail_singular (r, r->t, error);
   if (status == PW_INPUT) return pw_fail (error, PW_METHOD, "t = %.6g s: the Newton matrix is singular", r->t);
   if (r->data->fixed)
     return pw_fail (error, PW_METHOD,
@@ -164,7 +164,7 @@ static void radau_finish (pw_run *r, double h) {
   radau *d = r->data;
   double *const *Z = d->last.Z, *end = d->now.y + 2 * d->n;
   int status = pw_saddle_factor (r->saddle);
-  d->near = r->near = status != PW_OK || pw_watchdog_near (r);
+  d->near = r->near_singular = status != PW_OK || pw_watchdog_near (r);
   if (status == PW_OK)
     pw_run_accelerate_updated (r, r->v, r->a, r->lambda);
   else
@@ -220,7 +220,7 @@ static double radau_next (const radau *d, double h, double error, int rejected) 
 /* A step of size h; *error: in units of the tolerances, INFINITY if its equations could not be solved. */
 static int radau_try (pw_run *r, double h, double t1, int again, double *error) {
   *error = INFINITY;
-  r->near = 0;
+  r->near_singular = 0;
   int status = pw_radau_solve (r, h, t1);
   if (status == PW_OK && !r->data->fixed) status = pw_radau_estimate (r, h, again, error);
   if (status == PW_OK && r->s->entries > 0 && (*error < 1 || r->data->fixed)) {
@@ -263,7 +263,7 @@ static int radau_advance (pw_run *r, double t_end, pw_error *error) {
     int cut = r->t + d->h > stop - 0.01 * d->h;
     double h = cut ? stop - r->t : d->h, t1 = cut ? stop : r->t + h;
     if (!cut && !(h > least)) return radau_fail (r, status, h, error);
-    if (rejected > 0 && (status = pw_run_attempt (r, error)) != PW_OK) return status;
+    if (rejected > 0 && (status = pw_run_check_limits (r, error)) != PW_OK) return status;
     status = radau_try (r, h, t1, rejected > 0 || d->before == 0, &off);
     if (status == PW_OK && off < 1) status = radau_accept_adaptive (r, h, t1, off, rejected, cut);
     if (status == PW_OK && off < 1) return PW_OK;
@@ -355,7 +355,7 @@ static int radau_at (pw_run *r, double t, pw_error *error) {
   r->projected_at = r->projected;
   if (status == PW_OK) return PW_OK;
   if (status == PW_METHOD) return pw_fail_signal (t, error);
-  if (r->near) return pw_fail_singular (r, t, error);
+  if (r->near_singular) return pw_fail_singular (r, t, error);
   return pw_fail (error, PW_METHOD, "t = %.6g s: no state near the interpolated one satisfies the constraints", t);
 }
 

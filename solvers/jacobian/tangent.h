@@ -4,7 +4,8 @@
  *   momentum        M a + J^T lambda - f                                    by (q, v, a, lambda)
  *   velocities      J v - eta                                               by (q, v)
  *   positions       g                                                       by q
- *   accelerations   J a - gamma + 2 alpha (J v - eta) + beta^2 g            by (q, v, a) */
+ *   accelerations   J a - gamma + 2 alpha (J v - eta) + beta^2 g            by (q, v, a)
+ *                   (nonholonomic: + alpha (J v - eta)) */
 #ifndef PW_TANGENT_H
 #define PW_TANGENT_H
 

@@ -110,7 +110,7 @@ static int linear_run (pw_run *r, int most, int modes, pw_linear *l, pw_error *e
   *l = (pw_linear){ .least = NAN };
   if (pw_require (r, "a run", error) != PW_OK) return PW_INPUT;
   pw_statistics before = r->statistics;
-  int near = r->near, status = pw_linear_open (&x, r, modes, most);
+  int near = r->near_singular, status = pw_linear_open (&x, r, modes, most);
   l->coordinates = x.n;
   l->rank = x.rank;
   l->positions = x.positions;
@@ -119,7 +119,7 @@ static int linear_run (pw_run *r, int most, int modes, pw_linear *l, pw_error *e
   if (status == PW_OK && x.n <= most) status = linear_compute (&x, l, error);
   pw_linear_close (&x);
   r->statistics = before;
-  r->near = near;
+  r->near_singular = near;
   return status == PW_RESOURCE ? pw_fail_memory (r->s, error) : status;
 }
 

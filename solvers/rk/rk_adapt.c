@@ -165,7 +165,7 @@ static double adapt_factor (const struct pw_method_data *d, double error) {
 static int adapt_step (pw_run *r, double h, double t1, int project, double *added, double *off) {
   struct pw_method_data *d = r->data;
   double before = pw_before_breakpoint (r, t1);
-  r->near = 0;
+  r->near_singular = 0;
   int status = pw_rk_step (r, h, t1, project, added);
   if (status == PW_OK && before < t1) status = pw_run_accelerate (r, before, d->q, d->v, d->a, d->lambda);
   *off = status == PW_OK ? adapt_error (r, h, project) : INFINITY;
@@ -202,7 +202,7 @@ int pw_rk_advance_adaptive (pw_run *r, double t_end, pw_error *error) {
     if (cut) t1 = stop;
     double h = t1 - r->t;
     if (!cut && !(h > least)) return adapt_fail (r, status, h, error);
-    if (most < 5 && (status = pw_run_attempt (r, error)) != PW_OK) return status;
+    if (most < 5 && (status = pw_run_check_limits (r, error)) != PW_OK) return status;
     status = adapt_step (r, h, t1, project, r->settings.ledger ? &added : NULL, &off);
     if (status < 0) return pw_rk_fail (r, status, h, error);
     if (off <= 1) {

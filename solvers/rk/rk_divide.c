@@ -78,17 +78,17 @@ int pw_rk_at (pw_run *r, double t, pw_error *error) {
   const divide_begin from = { d->t0, d->q0, d->ledger0, d->rate0, d->projected0 };
   const pw_statistics statistics = r->statistics;
   const double refuse = r->refuse;
-  const int near = r->near;
+  const int near = r->near_singular;
   double by;
-  r->near = 0;
+  r->near_singular = 0;
   r->refuse = 0;
   int status = divide_step (r, &from, t, d->projects, r->settings.ledger);
-  if (r->near && status >= 0) {
+  if (r->near_singular && status >= 0) {
     status = divide (r, &from, status, t, d->projects, d->t0, r->limits.sample_best, r->limits.sample, &by);
     if (status == PW_OK) status = divide_two_parts (r, &from, by, t, d->projects);
   }
   memcpy (r->q_at, d->q, pw_rk_block (r, 1));
-  r->statistics = statistics, r->refuse = refuse, r->near = near;
+  r->statistics = statistics, r->refuse = refuse, r->near_singular = near;
   return status == PW_OK ? PW_OK : pw_rk_fail (r, status, t - d->t0, error);
 }
 
@@ -121,10 +121,10 @@ int pw_rk_advance_fixed (pw_run *r, double t_end, pw_error *error) {
   double added = 0, t1 = pw_step_end (r, d->base, d->count, t_end, &whole),
          h = whole && !d->split ? r->settings.step : t1 - r->t;
   const int split = d->split;
-  r->near = 0;
+  r->near_singular = 0;
   int status = pw_rk_step (r, h, t1, project, r->settings.ledger ? &added : NULL);
-  int lands = r->near && r->geometry.sine < r->limits.lands * r->geometry.state_sine;
-  d->split = r->near && !d->split;
+  int lands = r->near_singular && r->geometry.sine < r->limits.lands * r->geometry.state_sine;
+  d->split = r->near_singular && !d->split;
   double stop = whole ? fmin (t_end, r->breakpoint) : t1, t = t1;
   if (d->split) status = fixed_step_around (r, status, lands, t1, stop, project, &t);
   if (r->stopped) {

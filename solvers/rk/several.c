@@ -61,7 +61,7 @@ static void several_report (pw_run *r, const pw_scene_steps *x) {
   r->t = x->t;
   d->t0 = x->t0, d->projected0 = r->projected;
   d->count += x->done;
-  r->near = 0, r->w->failed = NULL;
+  r->near_singular = 0, r->w->failed = NULL;
   r->reference_level = x->watch.reference, r->previous_norm = x->watch.norm;
   s->steps += x->done;
   s->position = pw_larger (s->position, x->watch.position), s->g = pw_larger (s->g, x->watch.g);
@@ -105,9 +105,11 @@ int pw_several_plan (pw_run *r, double t, double t_end, pw_scene_steps *x) {
 
 int pw_several_finish (pw_run *r, const pw_scene_steps *x, pw_error *error) {
   if (x->done > 0) several_report (r, x);
+  if (r->s->coords > 3 * r->s->bodies) pw_point_to_internal (r->w, r->q, r->v);
+  pw_saddle_postpone (r->saddle, PW_SCENE_PIVOT);
   if (x->done < x->count && pw_evaluate_J_at (r->w, r->t, r->q, r->v) != PW_OK) return pw_fail_signal (r->t, error);
   if (x->done == 0) return PW_OK;
-  int status = pw_run_resolve (r, error);
+  int status = pw_run_check_resolution (r, error);
   if (status == PW_OK) pw_ledger_note (r);
   return status;
 }

@@ -74,7 +74,7 @@ int pw_dense_output_at (pw_dense_output *b, pw_run *r, double t, pw_error *error
   r->statistics = keep;
   if (status == PW_OK) return PW_OK;
   if (status == PW_METHOD) return pw_fail_signal (t, error);
-  if (r->near) return pw_fail_singular (r, t, error);
+  if (r->near_singular) return pw_fail_singular (r, t, error);
   return pw_fail (error, PW_METHOD,
                   "t = %.6g s: no state near the interpolated one satisfies the constraints; "
                   "the step of %.6g s may be too large",

@@ -61,13 +61,13 @@ static int limits_fail_steps (const pw_run *r, pw_error *error) {
                   s->steps + s->rejected, s->rejected, grows);
 }
 
-int pw_run_attempt (pw_run *r, pw_error *error) {
+int pw_run_check_limits (pw_run *r, pw_error *error) {
   if (pw_run_stop_requested (r)) return PW_STOPPED;
   if (r->statistics.steps + r->statistics.rejected < r->settings.max_steps || pw_fixed_steps (r)) return PW_OK;
   return limits_fail_steps (r, error);
 }
 
-int pw_run_resolve (pw_run *r, pw_error *error) {
+int pw_run_check_resolution (pw_run *r, pw_error *error) {
   const pw_system *s = r->s;
   char name[120];
   if (!limits_mark (r) && r->statistics.steps % LIMITS_INTERVAL != 0) return PW_OK;

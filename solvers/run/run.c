@@ -12,7 +12,7 @@ int pw_run_annotate_error (const pw_run *r, int status, pw_error *error) {
   char signal[160];
   if (status == PW_OK || error == NULL || *pw_failed_signal (r->w, signal, sizeof signal) == 0) return status;
   size_t n = strlen (error->text);
-  const char *glue = strstr (error->text, "a signal failed") ? ":" : "; ahead";
+  const char *glue = strstr (error->text, "a signal failed") ? ":" : "; in the attempted step,";
   const char *either = r->w->failed->of_force ? "" : ", or a derivative of it,";
   snprintf (error->text + n, sizeof error->text - n, "%s %s%s is not a finite number", glue, signal, either);
   return status;
@@ -35,11 +35,11 @@ int pw_run_evaluate (pw_run *r, pw_error *error) {
   return PW_OK;
 }
 
-void pw_run_watch (pw_run *r) {
+void pw_run_set_references (pw_run *r) {
   pw_watchdog_begin (r);
   if (r->redundant == 0) return;
-  r->conditioning = pw_rank_conditioning (r);
-  r->reselect = fmin (r->limits.loosened * r->conditioning, r->limits.loose);
+  r->independence = pw_rank_independence (r);
+  r->reselect_below = fmin (r->limits.loosened * r->independence, r->limits.loose);
 }
 
 int pw_run_look_ahead (pw_run *r, pw_error *error) {
@@ -55,7 +55,7 @@ int pw_run_look_ahead (pw_run *r, pw_error *error) {
                   signal);
 }
 
-void pw_run_reference_level (pw_run *r) {
+void pw_run_set_reference_level (pw_run *r) {
   r->previous_norm = pw_run_acceleration_norm (r);
   r->reference_level = fmax (1, r->previous_norm);
 }
@@ -82,8 +82,8 @@ void pw_run_close (pw_run *r) {
   free (r);
 }
 
-/* Accelerations change at a discontinuity, and the method restarts. */
-static int run_pass_breakpoint (pw_run *r, pw_error *error) {
+/* After a discontinuity, where accelerations change, or a step that was interrupted. */
+static int run_restart_method (pw_run *r, pw_error *error) {
   int status = pw_run_look_ahead (r, error);
   if (status == PW_OK) status = pw_run_evaluate (r, error);
   return status == PW_OK ? r->method->restart (r, error) : status;
@@ -95,7 +95,7 @@ int pw_run_renew (pw_run *r, int fresh, pw_error *error) {
   if (status == PW_OK) status = pw_run_evaluate (r, error);
   if (status != PW_OK && status != PW_RESOURCE) return status;
   if (status == PW_OK && fresh)
-    pw_run_watch (r);
+    pw_run_set_references (r);
   else if (status == PW_OK)
     pw_watchdog_begin (r);
   run_drop_method (r);
@@ -111,11 +111,11 @@ static int run_has_no_method (const pw_run *r, pw_error *error) {
   return 1;
 }
 
-/* The active rows have become nearly dependent: if another set is not, the method restarts with it.  This is done before
- * the next step, so that the last one can be sampled, and does not depend on samples. */
+/* The active rows have become nearly dependent: looks for another set that is not, with which the method restarts.  This is done
+ * before the next step, since the last one can still be sampled, whether or not it is. */
 static int run_reselect (pw_run *r, pw_error *error) {
   pw_sample sample;
-  r->reselect = r->conditioning / 2;
+  r->reselect_below = r->independence / 2;
   int status = pw_run_sample (r, r->t, &sample, error);
   if (status != PW_OK) return status;
   int other = pw_rank_reselect (r);
@@ -124,14 +124,14 @@ static int run_reselect (pw_run *r, pw_error *error) {
   return pw_run_renew (r, 1, error);
 }
 
-/* If an evaluation fails at the next time, libraries repeat steps below the round-off of time endlessly. */
+/* If an evaluation fails at the next time, SUNDIALS repeats steps below the round-off of time endlessly. */
 static int run_check_progress (pw_run *r, double before, pw_error *error) {
   r->stalled = r->t - before > 64 * DBL_EPSILON * fabs (r->t) ? 0 : r->stalled + 1;
   if (r->stalled < r->limits.stalled) return PW_OK;
-  return pw_fail (
-      error, PW_METHOD,
-      "t = %.6g s: no step succeeds, however small: the next states cannot be evaluated, or not within the tolerances",
-      r->t);
+  return pw_fail (error, PW_METHOD,
+                  "t = %.6g s: no step succeeds, however small: the next state cannot be evaluated, or not to within "
+                  "the tolerances",
+                  r->t);
 }
 
 int pw_run_advance (pw_run *r, double t_end, pw_error *error) {
@@ -142,22 +142,22 @@ int pw_run_advance (pw_run *r, double t_end, pw_error *error) {
   if (!(r->t < t_end)) return PW_OK;
   if (run_has_no_method (r, error)) return PW_RESOURCE;
   r->stopped = 0;
-  status = pw_run_attempt (r, error);
+  status = pw_run_check_limits (r, error);
   if (status != PW_OK) return status;
   pw_forget_residuals (r);
   if (r->stalled == 0) r->w->failed = NULL; /* otherwise it is the signal that stops the run */
-  if (r->t >= r->breakpoint || r->interrupted) status = run_pass_breakpoint (r, error);
+  if (r->t >= r->breakpoint || r->interrupted) status = run_restart_method (r, error);
   r->interrupted = 0;
-  if (status == PW_OK && r->redundant && r->conditioning < r->reselect) status = run_reselect (r, error);
+  if (status == PW_OK && r->redundant && r->independence < r->reselect_below) status = run_reselect (r, error);
   if (status == PW_OK) status = r->method->advance (r, t_end, error);
   if (status == PW_STOPPED) return status;
   if (status == PW_OK) status = pw_run_watchdog (r, error);
-  if (status == PW_OK) status = pw_run_resolve (r, error);
+  if (status == PW_OK) status = pw_run_check_resolution (r, error);
   if (status == PW_OK) pw_ledger_note (r);
   if (status == PW_OK) status = run_check_progress (r, before, error);
   if (status != PW_OK) return pw_run_annotate_error (r, status, error);
   if (r->redundant == 0) return PW_OK;
-  r->conditioning = pw_saddle_factor (r->saddle) == PW_OK ? pw_rank_conditioning (r) : 0;
+  r->independence = pw_saddle_factor (r->saddle) == PW_OK ? pw_rank_independence (r) : 0;
   return PW_OK;
 }
 
@@ -165,7 +165,7 @@ double pw_run_time (const pw_run *r) {
   return r->t;
 }
 
-/* Energies and ledger of the sample, where kinematics are up to date. */
+/* Energies and ledger of the sample; kinematics must be those of the sample. */
 static void run_account (pw_run *r, pw_sample *sample) {
   const pw_system *s = r->s;
   sample->kinetic = pw_kinetic (s, r->v_at);
@@ -206,8 +206,7 @@ static int run_check_state (const pw_run *r, const double *x, int velocities, pw
   return PW_OK;
 }
 
-/* Makes (q, v) (NULL: unchanged), which may be in the sample arrays, the state reached, and copies the previous one to
- * the sample arrays. */
+/* Makes (q, v) the state reached and moves the previous one to the sample arrays.  q and v may be in these; NULL: unchanged. */
 static void run_exchange (pw_run *r, const double *q, const double *v) {
   size_t n = (size_t)r->s->coords, bytes = n * sizeof *q;
   double *other = r->scratch;
@@ -236,14 +235,15 @@ int pw_run_restart (pw_run *r, const double *q, const double *v, pw_error *error
   if (status != PW_OK) return status;
   r->w->t_signal = NAN;
   run_exchange (r, q, v);
-  r->near = 0;
+  r->near_singular = 0;
   r->geometry.alert = 1;
   status = pw_run_make_consistent (r, NULL, error);
   if (status == PW_OK) status = pw_run_evaluate (r, error);
   if (status == PW_OK) status = run_energy (r, &after, error);
   if (status == PW_OK) {
     pw_watchdog_begin (r);
-    if (!r->near) pw_run_reference_level (r); /* accelerations near a singular configuration are no reference */
+    if (!r->near_singular)
+      pw_run_set_reference_level (r); /* accelerations near a singular configuration are no reference */
     r->energy0 += after - before;
     return r->method->restart (r, error);
   }

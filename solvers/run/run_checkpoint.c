@@ -31,8 +31,8 @@ static void checkpoint_statistics (pw_statistics *s, pw_archive *a) {
 static void checkpoint_state (pw_run *r, pw_archive *a) {
   size_t n = (size_t)r->s->coords * sizeof (double), entries = (size_t)r->s->entries * sizeof (double);
   double *const number[] = {
-    &r->t,         &r->breakpoint,      &r->projected,     &r->energy0,      &r->potential0, &r->exchanged,
-    &r->power,     &r->reference_level, &r->previous_norm, &r->conditioning, &r->reselect,   &r->geometry.typical,
+    &r->t,         &r->breakpoint,      &r->projected,     &r->energy0,      &r->potential0,     &r->exchanged,
+    &r->power,     &r->reference_level, &r->previous_norm, &r->independence, &r->reselect_below, &r->geometry.typical,
     &r->mark_time, &r->mark_speed,      &r->before_time,   &r->before_speed
   };
   for (size_t i = 0; i < sizeof number / sizeof *number; i++) pw_archive_bytes (a, number[i], sizeof (double));
@@ -54,7 +54,7 @@ static int checkpoint_plausible (const pw_run *r) {
 /* Continues from the state in the run, after saving or loading; `a` is loading, at the method's own data, if any. */
 static int checkpoint_continue (pw_run *r, pw_archive *a, pw_error *error) {
   if (pw_evaluate_J_at (r->w, r->t, r->q, r->v) != PW_OK) return pw_fail_signal (r->t, error);
-  r->near = 0;
+  r->near_singular = 0;
   if (r->method->serialise == NULL) r->statistics.restarts++;
   int status = pw_run_renew (r, 0, error);
   if (status == PW_OK && r->method->serialise) r->method->serialise (r, a);
@@ -64,7 +64,7 @@ static int checkpoint_continue (pw_run *r, pw_archive *a, pw_error *error) {
 
 int pw_run_save (pw_run *r, pw_archive *a, pw_error *error) {
   pw_sample sample;
-  if (r->near) return PW_RETRY;
+  if (r->near_singular) return PW_RETRY;
   int status = pw_run_sample (r, r->t, &sample, error); /* some methods evaluate the state reached only here */
   if (status != PW_OK) return status;
   checkpoint_sizes (r, a);

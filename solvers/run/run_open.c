@@ -108,13 +108,13 @@ static int run_first_evaluation (pw_run *r, pw_error *error) {
   }
   r->geometry.alert = 1;
   status = pw_run_evaluate (r, error);
-  if (status == PW_OK) pw_run_watch (r);
+  if (status == PW_OK) pw_run_set_references (r);
   return status;
 }
 
 /* Initialises energies, ledger and statistics at the consistent state. */
 static int run_begin (pw_run *r, pw_error *error) {
-  pw_run_reference_level (r);
+  pw_run_set_reference_level (r);
   pw_ledger_begin (r);
   pw_forget_residuals (r);
   pw_note_residuals (r);

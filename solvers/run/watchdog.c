@@ -90,7 +90,7 @@ static int watchdog_follow (pw_run *r, pw_error *error) {
     g->before = last;
   } else
     g->before = NAN, g->slope = 0, g->crossed = 0;
-  if (now && g->state_sine < near) r->near = 1;
+  if (now && g->state_sine < near) r->near_singular = 1;
   g->alert = now && watchdog_reaches (r, near, ahead);
   g->t = r->t;
   g->start_sine = now ? g->state_sine : NAN;
@@ -174,7 +174,7 @@ static int watchdog_check_turn (pw_run *r, double now, pw_error *error) {
 /* 1 near a singular configuration of nonholonomic rows, or if the state is not finite. */
 static int watchdog_near_rows (pw_run *r, double norm) {
   int row;
-  if (!r->near) return 0;
+  if (!r->near_singular) return 0;
   pw_watchdog_sine (r, &row);
   return row < 0 || row >= r->s->holonomic || !isfinite (norm);
 }
@@ -186,7 +186,7 @@ static int watchdog_check_jump (pw_run *r, pw_error *error) {
     return pw_fail (error, PW_METHOD,
                     "t = %.6g s: lost at a singular configuration: the accelerations are %.3g times those before", r->t,
                     now / r->reference_level);
-  if (r->near || watchdog_unresolved (r, watchdog_residual (r), r->limits.drift_near))
+  if (r->near_singular || watchdog_unresolved (r, watchdog_residual (r), r->limits.drift_near))
     return watchdog_check_turn (r, now, error);
   r->reference_level = pw_larger (now, r->reference_level);
   r->previous_norm = now;

@@ -249,7 +249,7 @@ static int ida_reach (ida_data *d) {
   int status = pw_saddle_factor (r->saddle);
   if (status < 0) return status;
   if (status == PW_OK && !d->velocities) pw_run_accelerate_updated (r, r->v, r->a_at, r->lambda);
-  r->near = status != PW_OK || pw_watchdog_near (r);
+  r->near_singular = status != PW_OK || pw_watchdog_near (r);
   return r->s->entries > 0 && ida_work (d, status) != 0 ? PW_METHOD : PW_OK;
 }
 

@@ -1,11 +1,12 @@
 /* The equations of motion as F (t, y, y') = 0, for IDA; y = (q, v, lambda, mu).
  *
  *   none, baumgarte   q' = v,               M v' + J^T lambda = f,   J v' = gamma - 2 alpha (J v - eta) - beta^2 g
+ *                     with alpha (J v - eta) alone for nonholonomic equations
  *   index2            q' = v,               M v' + J^T lambda = f,   J v = eta
  *   ggl               q' = v - D G^T mu,    M v' + J^T lambda = f,   J v = eta,   g = 0
  *   si1               q' = v - D G^T mu',   M v' + J^T lambda' = f,  J v = eta,   g = 0
  *
- * with D = 1 for lengths and 1/L^2 for angles, so that mu has one unit (Baumgarte 1972; Gear, Gupta & Leimkuhler 1985;
+ * with G the rows of J of the holonomic equations, D = 1 for lengths and 1/L^2 for angles, so that mu has one unit (Baumgarte 1972; Gear, Gupta & Leimkuhler 1985;
  * Gear 1988).  In si1 the unknowns lambda and mu are the integrals of the multipliers. */
 #include "ida_equations.h"
 
@@ -15,6 +16,8 @@ int pw_ida_update (ida_data *d, double t, const double *y) {
 }
 
 /* ---- Residual ---- */
+
+/* d->given is scratch in the following functions: for n + 3 numbers (forces are added in blocks of 3), then for as many more. */
 
 /* q' - v + D G^T mu */
 static void ida_kinematics (ida_data *d, const double *y, const double *yp, double *out) {
@@ -36,7 +39,7 @@ static void ida_momentum (ida_data *d, const double *y, const double *yp, double
   for (int j = 0; j < n; j++) out[j] = s->mass[j] * yp[n + j] + pull[j] - f[j];
 }
 
-/* jv = J v' - gamma + 2 alpha (J v - eta) + beta^2 g of all equations; jv is J v - eta on entry */
+/* jv = J v' - gamma + 2 alpha (J v - eta) + beta^2 g, or + alpha (J v - eta) of nonholonomic equations; on entry J v - eta */
 static void ida_stabilised (ida_data *d, const double *yp, double *jv, double *other) {
   pw_run *r = d->sun.run;
   const pw_system *s = r->s;

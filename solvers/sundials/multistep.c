@@ -108,9 +108,9 @@ static int multistep_interpolate (multistep_data *d, double t) {
 }
 
 static int multistep_power (pw_run *r, double t, double *rate) {
-  int near = r->near, status = multistep_interpolate (r->data, t) == CV_SUCCESS ? PW_OK : PW_RETRY;
+  int near = r->near_singular, status = multistep_interpolate (r->data, t) == CV_SUCCESS ? PW_OK : PW_RETRY;
   if (status == PW_OK) status = multistep_complete (r->data, t);
-  r->near = near;
+  r->near_singular = near;
   if (status == PW_OK) pw_ledger_rates (r, r->lambda_at, rate);
   return status;
 }
@@ -254,7 +254,7 @@ static int multistep_advance (pw_run *r, double t_end, pw_error *error) {
   double stop = fmin (t_end, r->breakpoint), t = r->t;
   int flag = stop != d->sun.stop ? CVodeSetStopTime (d->cvode, stop) : CV_SUCCESS;
   d->sun.stop = stop;
-  r->near = 0;
+  r->near_singular = 0;
   if (flag >= 0) flag = CVode (d->cvode, stop, d->sun.y, &t, CV_ONE_STEP);
   if (flag < 0) return multistep_fail (d, flag, error);
   if (flag == CV_TSTOP_RETURN) d->sun.stop = NAN;
@@ -266,13 +266,13 @@ static int multistep_advance (pw_run *r, double t_end, pw_error *error) {
 static int multistep_complete_reached (multistep_data *d) {
   pw_run *r = d->sun.run;
   pw_statistics keep = r->statistics;
-  int near = r->near;
+  int near = r->near_singular;
   if (d->evaluated) return PW_OK;
   r->refuse = 0;
   int status = pw_run_accelerate (r, pw_before_breakpoint (r, r->t), r->q, r->v, r->a, r->lambda);
   r->refuse = r->limits.rank;
   r->statistics = keep;
-  r->near = near;
+  r->near_singular = near;
   d->evaluated = status == PW_OK;
   return status;
 }

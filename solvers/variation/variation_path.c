@@ -59,10 +59,11 @@ static int path_grow (pw_variation *x) {
 static int path_accelerations (pw_variation *x, const pw_sample *s, double *a, pw_error *error) {
   pw_run *r = x->r;
   pw_statistics before = r->statistics;
-  int near = r->near, status = pw_run_accelerate (r, pw_before_breakpoint (r, s->t), s->q, s->v, a, x->linear.z);
+  int near = r->near_singular,
+      status = pw_run_accelerate (r, pw_before_breakpoint (r, s->t), s->q, s->v, a, x->linear.z);
   r->statistics = before;
   if (status > 0) return pw_fail_singular (r, s->t, error);
-  r->near = near;
+  r->near_singular = near;
   return status < 0 ? pw_fail_signal (s->t, error) : PW_OK;
 }
 

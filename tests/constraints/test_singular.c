@@ -266,7 +266,7 @@ static void test_nan (void **state) {
     double q = r->q[j], v = r->v[j], a = r->a[j];
     pw_error error = { 0 };
     pw_residuals now;
-    r->near = 1;
+    r->near_singular = 1;
     check_ok (pw_run_watchdog (r, &error), &error);
     r->a[j] = NAN;
     assert_int_equal (pw_run_watchdog (r, &error), PW_METHOD);

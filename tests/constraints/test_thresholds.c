@@ -151,13 +151,13 @@ static void test_jump (void **state) {
   pw_system *s = scene_named ("chaplygin-sleigh", NULL, 0);
   pw_run *r = runs_open (s, "rk4+projection", NULL);
   pw_error error = { 0 };
-  r->near = 1;
+  r->near_singular = 1;
   r->a[0] = 1.5 * r->limits.jump * r->reference_level * s->scale.length / (r->w->scale.time * r->w->scale.time);
   assert_int_equal (pw_run_watchdog (r, &error), PW_METHOD);
   assert_non_null (strstr (error.text, "lost at a singular configuration: the accelerations are 150 times"));
   r->limits.jump *= 2;
   error = (pw_error){ 0 };
-  r->near = 1;
+  r->near_singular = 1;
   check_ok (pw_run_watchdog (r, &error), &error);
   pw_run_close (r);
   pw_system_free (s);

@@ -79,7 +79,7 @@ static void page_stroke (void *context, const pw_plot_stroke *s) {
 
 static void page_symbol (FILE *f, const pw_plots *p, const pw_plot_link *link) {
   double heading = pw_plot_heading (link);
-  fprintf (f, ",\"contact\":%d,\"line\":%d,\"heading\":", link->contact, pw_plot_line (link));
+  fprintf (f, ",\"contact\":%d,\"line\":%d,\"heading\":", link->contact, pw_plot_has_rail (link));
   page_numbers (f, &heading, 1, 9);
   fputs (",\"strokes\":[", f);
   if (link->kind->symbol) pw_plot_strokes (p, 0, link, p->samples, page_stroke, f);

@@ -155,7 +155,7 @@ int pw_plot_shown (const pw_plots *p, int body);
 /* Finds elements with points on the bodies drawn, and at joints of these, up to the available number. */
 void pw_plot_find_links (pw_plots *p, const pw_model *m);
 /* 1 if the last body has a line: a rail or slot. */
-int pw_plot_line (const pw_plot_link *link);
+int pw_plot_has_rail (const pw_plot_link *link);
 /* The diagonal of the smallest rectangle around the first n samples and, unless `most` is given, the ground [m]; *n becomes
  * the number of samples for which it is less than `most`. */
 double pw_plot_diagonal (const pw_plots *p, int *n, double most);
@@ -164,13 +164,13 @@ double pw_plot_unit (const pw_plots *p);
 /* A point of a body in the inertial frame [m]; motion: x, y, phi. */
 void pw_plot_point (const double *motion, const double *at, double out[2]);
 
-/* Passes the strokes of a symbol and of the ground at it, rails as long as the travel from sample i during `samples`. */
+/* Passes the strokes of a symbol and of the ground at it, rails as long as the travel during the first `samples`. */
 typedef void pw_plot_stroke_function (void *context, const pw_plot_stroke *s);
 void pw_plot_strokes (const pw_plots *p, int i, const pw_plot_link *link, int samples, pw_plot_stroke_function *out,
                       void *context);
 /* The field `heading` of an element [rad]; 0 if it has none. */
 double pw_plot_heading (const pw_plot_link *link);
-/* Passes the lines of a symbol at sample i, rails as long as the travel during `samples`. */
+/* Passes the lines of a symbol at sample i, rails as long as the travel during the first `samples`. */
 void pw_plot_draw_symbol (const pw_plots *p, int i, const pw_plot_link *link, int samples, pw_plot_line_function *out,
                           void *context);
 /* Forces of these elements [N], x and y each. */

@@ -83,14 +83,14 @@ int pw_plot_shown (const pw_plots *p, int body) {
   return -2;
 }
 
-int pw_plot_line (const pw_plot_link *link) {
+int pw_plot_has_rail (const pw_plot_link *link) {
   return link->kind->symbol && strstr (link->kind->symbol, "inf");
 }
 
 /* The joint of two bodies: the end of an earlier link on the first one. */
 static int shapes_joint (const pw_plots *p, int one, int other, pw_plot_link *link) {
   for (const pw_plot_link *l = p->link; l < p->link + p->links; l++)
-    for (int n = 0; n < 2 && l->ends == 2 && !pw_plot_line (l); n++)
+    for (int n = 0; n < 2 && l->ends == 2 && !pw_plot_has_rail (l); n++)
       if (l->end[n].body == one && l->end[1 - n].body == other) {
         link->end[link->ends++] = l->end[n];
         return 1;

@@ -4,8 +4,8 @@
  * the point p1 + a (p2 - p1) + u (x e + y n), where p1 and p2 are the points of the first and the last body, u the unit of
  * symbols, e a direction and n its normal to the left.  e is the heading of a contact point, or that of the field `heading` in
  * the last body; without them the direction from p1 to p2, or the x axis of the first body if they coincide.  x = inf and -inf
- * extend to the ends of the travel along e.  "o a x y r" is a circle of radius u r, "g" the pitch circles of gears with axles
- * p1 and p2 and the field `ratio`.  A stroke whose last vertex is its first encloses an area, which hides what is below.
+ * extend to the ends of the travel along e.  "o a x y r" is a circle of radius u r; "g1" and "g2" are the pitch circles of gears
+ * with the axles p1 and p2 and the field `ratio`.  A stroke whose last vertex is its first encloses an area, which hides what is below.
  * "NAME:" before a stroke: it is drawn if that field of the element is not zero; "NAME=2:": if it is 2. */
 #include <ctype.h>
 #include <math.h>
@@ -48,7 +48,8 @@ static void symbol_circle (pw_plot_stroke *s, const double *centre, double r, do
   }
 }
 
-/* Radii R1 and R2 = |i| R1, with R1 + R2 = |p2 - p1|, or their difference if one is a ring (Willis 1870). */
+/* Radii R1 and R2 = |i| R1 of the ratio i: R1 + R2 = |p2 - p1| if i < 0, |R1 - R2| if i > 0 and one is a ring (Willis 1870); equal
+ * circles for i = 1. */
 static void symbol_gear (const pw_plot_link *link, pw_plot_stroke *s, int second) {
   double i = symbol_field (link, "ratio", 5), first = i == 1 ? 0.5 : 1 / fabs (1 - i);
   symbol_circle (s, (const double[]){ second, 0, 0 }, 0, second ? first * fabs (i) : first);
@@ -101,7 +102,7 @@ static void symbol_end (const pw_plots *p, int i, const pw_plot_link *link, int 
 
 static symbol_frame symbol_place (const pw_plots *p, int i, const pw_plot_link *link) {
   symbol_frame f = { .unit = pw_plot_unit (p) };
-  int last = link->ends - 1, line = pw_plot_line (link);
+  int last = link->ends - 1, line = pw_plot_has_rail (link);
   int body = link->end[line ? last : 0].body;
   double p2[2], angle = body < 0 ? 0 : pw_plot_track (p, i, &p->bodies, body)[2];
   symbol_end (p, i, link, 0, f.p);
@@ -120,7 +121,7 @@ static symbol_frame symbol_place (const pw_plots *p, int i, const pw_plot_link *
 /* The travel of p1 along the line, from p2. */
 static symbol_frame symbol_travel (const pw_plots *p, int sample, const pw_plot_link *link, int samples) {
   symbol_frame f = symbol_place (p, sample, link);
-  for (int i = 0; i < samples && pw_plot_line (link); i++) {
+  for (int i = 0; i < samples && pw_plot_has_rail (link); i++) {
     symbol_frame g = symbol_place (p, i, link);
     double s = -(g.d[0] * g.e[0] + g.d[1] * g.e[1]);
     f.low = fmin (f.low, s), f.high = fmax (f.high, s);
@@ -129,7 +130,8 @@ static symbol_frame symbol_travel (const pw_plots *p, int sample, const pw_plot_
   return f;
 }
 
-/* Hatching from x0 to x1 of a line below the last point. */
+/* Hatching of the line from x0 to x1 at height y relative to p2, on its lower side; the fourth number of a vertex, along
+ * p2 - p1's normal, is 0. */
 static void symbol_hatch (double x0, double x1, double y, int upright, pw_plot_stroke_function *out, void *context) {
   pw_plot_stroke s = { .count = 2, .upright = upright };
   int strokes = (int)fmin (60, ceil ((x1 - x0) / 0.6));
@@ -147,8 +149,9 @@ static void symbol_ground (double low, double high, const pw_plot_link *link, pw
   static const pw_plot_stroke support = {
     6, 0, 1, { { 1, 1.1, -1.5 }, { 1, .8, -1.5 }, { 1, 0, 0 }, { 1, -.8, -1.5 }, { 1, -1.1, -1.5 }, { 1, 1.1, -1.5 } }
   };
-  if (pw_plot_line (link)) {
-    symbol_hatch (low, high, strstr (link->kind->symbol, "1 -inf -") ? -.4 : 0, 0, out, context);
+  const double groove = -.4; /* the lower edge of a slot, as in the symbols of element types */
+  if (pw_plot_has_rail (link)) {
+    symbol_hatch (low, high, strstr (link->kind->symbol, "1 -inf -") ? groove : 0, 0, out, context);
     return;
   }
   out (context, &support);

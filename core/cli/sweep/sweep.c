@@ -236,7 +236,7 @@ typedef struct {
   int width;
   pw_sweep_run run[SWEEP_LANES];
   shared_system *system[SWEEP_LANES]; /* NULL: no run */
-  shared_system *last;                /* of a run that has ended, kept since the next row may have the same parameters */
+  shared_system *last; /* of a run that has ended, kept since the next row may have the same parameters */
   pw_text text;
 } sweep_worker;
 

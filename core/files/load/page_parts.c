@@ -41,7 +41,7 @@ static int page_use_engine (void *context, const char *object, pw_error *error) 
 /* Text models share one engine; a model in C is compiled into its own. */
 static int page_engine (pw_page *p, const char *source, pw_error *error) {
   char *path;
-  int status = pw_search_page (source ? "pinwheel-page.objects" : "pinwheel.wasm", &path, error);
+  int status = pw_search_page_file (source ? "pinwheel-page.objects" : "pinwheel.wasm", &path, error);
   if (status == PW_OK && path == NULL)
     status = pw_fail (error, PW_INPUT,
                       "this Pinwheel was built without the engine of interactive pages: install %s and build it again",

@@ -96,7 +96,7 @@ static int search_entry (pw_search *s, const char *folder, const char *entry, pw
   return status;
 }
 
-/* Adds a folder to "/first:/second"; 0 if it was searched before. */
+/* Adds a folder to s->folders, "/first:/second"; 0 if it is there already, so that it is searched once. */
 static int search_add_folder (pw_search *s, const char *real) {
   size_t n = strlen (real), used = strlen (s->folders);
   for (const char *p = s->folders; *p; p += strcspn (p, ":"), p += *p == ':')
@@ -181,7 +181,7 @@ int pw_search_include (char **include, pw_error *error) {
   return status;
 }
 
-int pw_search_page (const char *file, char **path, pw_error *error) {
+int pw_search_page_file (const char *file, char **path, pw_error *error) {
   static const search_folders where = { { "page", "../page", "../lib/pinwheel/page" },
                                         { "page", "../page", "pinwheel/page" } };
   search_file x = { file, NULL };

@@ -1,4 +1,4 @@
-/* Files and folders that one process uses at a time.
+/* Files and folders that are locked while a process uses them.
  *
  * The lock counts, not the existence of the file: a lock ends with its process, so files left by a killed process do
  * not block others. */
@@ -27,8 +27,9 @@ const char *pw_lock_reason (int code) {
                              : strerror (code);
 }
 
-/* Does not follow links; a new file must not exist. */
-static int lock_open (const char *path, pw_lock_how how, int *created) {
+/* Opens the file, never through a symbolic link, and creates it unless `how` is PW_LOCK_EXISTING; *created is 1 only if it
+ * did not exist. */
+static int lock_open_file (const char *path, pw_lock_how how, int *created) {
   int file = -1;
   *created = 0;
   if (how != PW_LOCK_EXISTING) {
@@ -40,7 +41,7 @@ static int lock_open (const char *path, pw_lock_how how, int *created) {
 }
 
 /* Locks the open file.  0 or an errno value; ESTALE if the path now names another file. */
-static int lock_opened (int file, const char *path) {
+static int lock_descriptor (int file, const char *path) {
   struct stat info, now;
   if (fstat (file, &info) != 0) return errno;
   if (!S_ISREG (info.st_mode)) return ENODEV;
@@ -51,14 +52,16 @@ static int lock_opened (int file, const char *path) {
 
 int pw_lock_file (const char *path, pw_lock_how how, int *created) {
   for (int tries = 0; tries < LOCK_TRIES; tries++) {
-    int file = lock_open (path, how, created), code = file < 0 ? errno : lock_opened (file, path);
+    int file = lock_open_file (path, how, created), code = file < 0 ? errno : lock_descriptor (file, path);
     if (code == 0 && (*created || how != PW_LOCK_NEW)) return file;
     if (code == 0 && unlink (path) != 0) code = errno; /* left by a killed process */
-    if (*created && code != 0 && code != ESTALE) unlink (path);
+    if (*created && code != 0 && code != ESTALE && code != EWOULDBLOCK)
+      unlink (path); /* else it is another process's */
     if (file >= 0) close (file);
     errno = code;
     if (code != 0 && code != ESTALE && (code != ENOENT || how == PW_LOCK_EXISTING)) return -1;
   }
+  errno = EWOULDBLOCK;
   return -1;
 }
 
@@ -71,7 +74,7 @@ int pw_lock_path (const char *path, pw_error *error) {
 int pw_lock_folder (const char *path, pw_error *error) {
   int file = open (path, O_RDONLY | O_DIRECTORY | O_CLOEXEC);
   int code = file < 0 ? errno : lock_acquire (file);
-  if (code == EBADF) code = 0; /* NFS only locks files open for writing, never folders */
+  if (code == EBADF) code = 0; /* NFS locks only what is open for writing, which folders never are: no protection */
   if (code == 0) return file;
   if (file >= 0) close (file);
   pw_fail (error, PW_RESOURCE, "cannot write into %s: %s", path,
