@@ -50,12 +50,6 @@ static void specialise_sources (const pw_specialise_scene *x) {
 
 /* ---- The whole ---- */
 
-void pw_specialise_list (FILE *out, const char *name, int n) {
-  fprintf (out, "#define EACH_%s(X)", name);
-  for (int i = 0; i < n; i++) fprintf (out, " X (%d)", i);
-  fputc ('\n', out);
-}
-
 /* Coordinates by pairs, X (0, pair) X (2, pair) X (4, one), and one by one. */
 static void specialise_coordinates (FILE *out, int n) {
   fputs ("#define EACH_COORDINATES(X)", out);

@@ -16,6 +16,12 @@ char *pw_specialise_identifier (const pw_kind *kind, char *buffer, size_t size) 
   return buffer;
 }
 
+void pw_specialise_list (FILE *out, const char *name, int n) {
+  fprintf (out, "#define EACH_%s(X)", name);
+  for (int i = 0; i < n; i++) fprintf (out, " X (%d)", i);
+  fputc ('\n', out);
+}
+
 /* ---- Elements ---- */
 
 /* Opens a block with a batch of one element, `more` at the end of its initialiser. */
