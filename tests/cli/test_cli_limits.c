@@ -88,11 +88,11 @@ static void test_rows_of_a_step (void **state) {
   char command[300];
   (void)state;
   for (int i = 0; i < 4; i++) {
-    snprintf (
-        command, sizeof command,
-        "\"${PINWHEEL:-build/pinwheel}\" run ezyroller --method %s --every 1e-12 -o @/e.csv & p=$!; "
-        "while [ ! -s @/e.csv.part ]; do sleep 0.01; done; kill -TERM $p; wait $p; s=$?; rm -f @/e.csv.part; exit $s",
-        method[i]);
+    snprintf (command, sizeof command,
+              "\"${PINWHEEL:-build/pinwheel}\" run ezyroller --method %s --every 1e-12 -o @/e.csv & p=$!; "
+              "while kill -0 $! 2>/dev/null && [ ! -s @/e.csv.part ]; do sleep 0.01; done; kill -TERM $p; wait $p; "
+              "s=$?; rm -f @/e.csv.part; exit $s",
+              method[i]);
     assert_int_equal (cli_run (command), 130);
     assert_non_null (strstr (cli_err, "interrupted at t = "));
   }

@@ -411,10 +411,11 @@ static void test_failure (void **state) {
 /* Interrupted in the middle: rows done stay. */
 static void test_interrupt (void **state) {
   (void)state;
-  int status = cli_run ("\"${PINWHEEL:-build/pinwheel}\" compare ezyroller --methods rk4" ONCE
-                        "--t-end 2 --step-ladder 0.1:1e-8 --limit 100 -o @/i &\n"
-                        "p=$!; while ! grep -q '^rk4' @/i/compare.csv.part 2>/dev/null; do sleep 0.05; done\n"
-                        "kill -TERM $p; wait $p; test $? = 130 && ls @/i");
+  int status = cli_run (
+      "\"${PINWHEEL:-build/pinwheel}\" compare ezyroller --methods rk4" ONCE
+      "--t-end 2 --step-ladder 0.1:1e-8 --limit 100 -o @/i &\n"
+      "p=$!; while kill -0 $! 2>/dev/null && ! grep -q '^rk4' @/i/compare.csv.part 2>/dev/null; do sleep 0.05; done\n"
+      "kill -TERM $p; wait $p; test $? = 130 && ls @/i");
   assert_int_equal (status, 0);
   assert_non_null (strstr (cli_out, "compare.csv.part\ntruth.csv\n"));
   assert_non_null (strstr (cli_err, "rows are done, and kept in"));

@@ -150,8 +150,9 @@ static void test_failure (void **state) {
 static void test_interrupt (void **state) {
   (void)state;
   int status =
-      cli_run ("\"${PINWHEEL:-build/pinwheel}\" drift ezyroller --t-end 1 --step 1e-3 --vary every=1,2 -o @/i &\n"
-               "p=$!; while ! grep -q '^methods,rk4' @/i/drift.csv.part 2>/dev/null; do sleep 0.02; done\n"
+      cli_run ("\"${PINWHEEL:-build/pinwheel}\" drift ezyroller --t-end 4 --step 1e-3 --vary every=1,2 -o @/i &\n"
+               "p=$!; while kill -0 $! 2>/dev/null && ! grep -q '^methods,rk4' @/i/drift.csv.part 2>/dev/null; do "
+               "sleep 0.02; done\n"
                "kill -TERM $p; wait $p; test $? = 130 && ls @/i");
   if (status != 0) return; /* it was quicker than the signal: nothing to see */
   assert_non_null (strstr (cli_out, "drift.csv.part\n"));

@@ -143,7 +143,7 @@ static void test_keeps_lock (void **state) {
   cli_good ("rm -rf @/l; mkdir @/l");
   cli_run ("\"${PINWHEEL:-build/pinwheel}\" run ezyroller -t 1e6 --every 100 --json @/l/a.json --animate @/l/a.html "
            "--checkpoint @/l/a.ck --checkpoint-every 1 -o @/l/a.csv >@/log 2>&1 & p=$!\n"
-           "while [ ! -e @/l/a.ck ]; do sleep 0.02; done\n"
+           "while kill -0 $! 2>/dev/null && [ ! -e @/l/a.ck ]; do sleep 0.02; done\n"
            "for f in '-o @/l/a.csv' '--json @/l/a.json' '--animate @/l/a.html' '--checkpoint @/l/a.ck'; do\n"
            "  pinwheel run ezyroller -t 0.1 $f; echo $?\ndone; kill -KILL $p");
   assert_string_equal (cli_out, "1\n1\n1\n1\n");
@@ -225,7 +225,7 @@ static void test_together (void **state) {
   (void)state;
   cli_run ("mkdir -p @/t/sub; cd @/t; mkfifo go\n"
            "\"$OLDPWD/${PINWHEEL:-build/pinwheel}\" run ezyroller -t 20 -o a.csv --json sub/a.json >log 2>&1 & p=$!\n"
-           "while [ ! -s a.csv.part ]; do sleep 0.01; done; rm -r sub; wait $p; echo $?; ls");
+           "while kill -0 $! 2>/dev/null && [ ! -s a.csv.part ]; do sleep 0.01; done; rm -r sub; wait $p; echo $?; ls");
   if (strstr (cli_out, "No such") == NULL) assert_string_equal (cli_out, "1\na.csv.part\ngo\nlog\n");
 }
 
@@ -347,7 +347,8 @@ static void test_process (void **state) {
   assert_string_equal (cli_out, "12\n");
   cli_run (
       "trap '' INT TERM; \"${PINWHEEL:-build/pinwheel}\" run ezyroller -t 1e6 --every 0.01 -o @/i.csv 2>@/log & p=$!\n"
-      "while [ ! -s @/i.csv.part ]; do sleep 0.01; done; kill -INT $p; kill -TERM $p; size=$(wc -c <@/i.csv.part)\n"
+      "while kill -0 $! 2>/dev/null && [ ! -s @/i.csv.part ]; do sleep 0.01; done; kill -INT $p; kill -TERM $p; "
+      "size=$(wc -c <@/i.csv.part)\n"
       "while kill -0 $p && [ $(wc -c <@/i.csv.part) -lt $((size + 100000)) ]; do sleep 0.01; done\n"
       "kill -KILL $p; wait $p; echo $?"); /* it has gone on writing */
   assert_string_equal (cli_out, "137\n");

@@ -53,7 +53,7 @@ static void test_restarts (void **state) {
 static void test_interrupted (void **state) {
   (void)state;
   cli_run ("rm -f @/a.*; " RESUME_PROGRAM RESUME_RUN "-m rk4 --step 1e-5 -o @/a.csv --checkpoint @/a.ck & "
-           "while [ ! -e @/a.ck ]; do sleep 0.02; done; kill -TERM $!; wait $!; echo $?");
+           "while kill -0 $! 2>/dev/null && [ ! -e @/a.ck ]; do sleep 0.02; done; kill -TERM $!; wait $!; echo $?");
   assert_string_equal (cli_out, "130\n");
   assert_non_null (strstr (cli_err, "a.csv.part\n"));
   assert_non_null (strstr (cli_err, "/a.ck continues from t = "));

@@ -126,8 +126,9 @@ static void test_killed (void **state) {
       FRESH
       "printf '#!/bin/sh\\necho call >>@/calls\\n[ -e @/go ] || { : >@/on; sleep 0.6; }\\nexec cc $*\\n' >@/cc\n"
       "rm -f @/go @/on; ${PINWHEEL:-build/pinwheel} run chaplygin-sleigh -t 0.1 --specialise always >/dev/null 2>&1 &\n"
-      "while [ ! -e @/on ]; do sleep 0.02; done; kill -9 $!; wait $! 2>/dev/null; : >@/go\n" RUN
-      "| grep -c specialised; sleep 1; " RUN "| grep -c specialised; " CALLS "ls @/c/pinwheel/*.c 2>/dev/null || :");
+      "while kill -0 $! 2>/dev/null && [ ! -e @/on ]; do sleep 0.02; done; kill -9 $!; wait $! 2>/dev/null; : "
+      ">@/go\n" RUN "| grep -c specialised; sleep 1; " RUN "| grep -c specialised; " CALLS
+      "ls @/c/pinwheel/*.c 2>/dev/null || :");
   assert_string_equal (cli_out, "1\n1\n2\n");
 }
 

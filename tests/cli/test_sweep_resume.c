@@ -103,7 +103,7 @@ static void test_lock (void **state) {
   (void)state;
   cli_shell (
       "\"${PINWHEEL:-build/pinwheel}\" sweep ezyroller --vary omega=lin:1:4:400 --t-end 50 -o @/lock.csv & first=$!\n"
-      "while [ ! -s @/lock.csv.part ]; do sleep 0.02; done\n"
+      "while kill -0 $! 2>/dev/null && [ ! -s @/lock.csv.part ]; do sleep 0.02; done\n"
       "pinwheel sweep ezyroller --vary omega=lin:1:4:400 --t-end 50 -o @/lock.csv; echo $?; kill -KILL $first");
   assert_string_equal (cli_out, "1\n");
   char expected[200];
