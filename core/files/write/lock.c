@@ -61,7 +61,7 @@ int pw_lock_file (const char *path, pw_lock_how how, int *created) {
     errno = code;
     if (code != 0 && code != ESTALE && (code != ENOENT || how == PW_LOCK_EXISTING)) return -1;
   }
-  errno = EWOULDBLOCK;
+  if (errno == 0 || errno == ESTALE) errno = EWOULDBLOCK; /* others create and remove it all the time */
   return -1;
 }
 
