@@ -193,7 +193,7 @@ void pw_specialise_signals (const pw_specialise_scene *x) {
 
 int pw_system_has_lanes (const pw_system *s) {
   for (int k = 0; k < s->batches; k++)
-    if (!pw_specialise_is_built_in (s->batch[k].kind)) return 0;
+    if (!pw_specialise_is_built_in (s->batch[k].kind) || s->batch[k].kind->element % sizeof (double)) return 0;
   return s->rows <= SPECIALISE_ROWS && s->state_dependent == 0;
 }
 

@@ -84,6 +84,7 @@ same_lanes 'springs, runs that fail' andrews-squeezer --method rk4+projection --
 same_lanes 'singular configurations' slider-crank --t-end 3 --vary crank.omega=lin:1:5:9
 same_lanes 'order 8' car-two-trailers --method erk8+projection:steps=fixed --t-end 2 --vary car.vx=lin:1:2:5
 same_lanes 'numbers of bodies' n-trailer --t-end 1 --vary n=1,2,3 --vary tractor.vx=lin:0.5:1:5
+same_lanes 'every form of signals' tests/models/signals.yaml --method rk4+projection --t-end 2 --vary roller.omega=lin:0:1:5
 same_lanes 'redundant equations' differential-drive --t-end 1 --vary left=lin:0.3:0.5:3
 
 if [ "$("$pinwheel" sweep snakeboard --t-end 0.1 --vary board.vx=0,1 --specialise always --lanes 4 -o "$work/x.csv" 2>&1)" = '' ]; then
