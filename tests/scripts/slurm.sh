@@ -66,7 +66,7 @@ wait_for () {
   done
 }
 idle () { [ "$(sinfo -h -t idle -o %D 2>/dev/null)" = "$1" ]; }
-ended () { [ -z "$(squeue -h -j "$1" 2>/dev/null)" ]; }
+ended () { left=$(squeue -h -j "$1" 2>/dev/null) && [ -z "$left" ]; } # no answer is not an end
 { slurmctld -c && slurmd -N one && slurmd -N two && wait_for 60 idle 2; } >"$work/log" 2>&1
 report 'two nodes are idle' $?
 
