@@ -201,7 +201,7 @@ int pw_system_has_lanes (const pw_system *s) {
 void pw_specialise_data (const pw_specialise_scene *x) {
   const pw_system *s = x->s;
   int data = 0;
-  fputs ("\nstatic const int datum[] = { ", x->out);
+  fputs ("\nstatic const int datum_begin[] = { ", x->out);
   for (int k = 0; k < s->batches; k++) {
     fprintf (x->out, "%d, ", data);
     data += s->batch[k].b.count * (int)(s->batch[k].kind->element / sizeof (double));

@@ -1,13 +1,14 @@
 /* Several steps of fixed size in one call of specialised code.
  *
- * The bits are those of single steps.  What a run does less often than every step (limits.c, ledger.c) is done after the last of
+ * Results are bit-identical to those of single steps.  What a run does less often than every step (limits.c, ledger.c) is done after the last of
  * them, so there are never more than PW_SEVERAL_STEPS. */
 #include <float.h>
 #include <math.h>
 #include <string.h>
 #include "rk_step.h"
 
-/* 1 if all that a step consists of is part of `steps`. */
+/* 1 if the specialised function `steps` does everything that a step of this run needs.  The first steps are recorded one by one
+ * (ledger.c). */
 static int several_suits (const pw_run *r) {
   const struct pw_method_data *d = r->data;
   if (r->method->advance != pw_rk_advance || d == NULL || d->adaptive || d->held || d->null_space || d->split) return 0;
@@ -17,13 +18,15 @@ static int several_suits (const pw_run *r) {
          r->statistics.steps >= PW_SEVERAL_STEPS;
 }
 
-/* The number of steps before one that ends at t_end or at a breakpoint, up to the first that reaches t. */
+/* The number of whole steps that can be taken at once: before t_end and breakpoints, with the tolerance of pw_step_end; up to the
+ * first that reaches t; up to a multiple of PW_SEVERAL_STEPS and the next record of speeds (limits.c); each longer than what counts as
+ * stalled (run.c). */
 static int several_count (const pw_run *r, double t, double t_end) {
   const struct pw_method_data *d = r->data;
   const double h = r->settings.step, stop = fmin (t_end, r->breakpoint) - 1e-9 * h, tiny = 128 * DBL_EPSILON;
   int most = PW_SEVERAL_STEPS - (int)(r->statistics.steps % PW_SEVERAL_STEPS), n = 0;
   double reached = r->t;
-  while (n < most && reached < t && reached - r->settings.t < 2 * r->mark_time) {
+  while (n < most && reached < t && reached < t_end && reached - r->settings.t < 2 * r->mark_time) {
     double next = d->base + (double)(d->count + n + 1) * h;
     if (!(next <= stop && h > tiny * fabs (next))) break;
     reached = next, n++;
@@ -45,7 +48,7 @@ static pw_scene_watch several_watch (const pw_run *r) {
     .rank = limit->rank,
     .regular = limit->regular * g->typical,
     .drift = limit->drift_near,
-    .no_branch = 0.5 * limit->drift_near * limit->rank * limit->rank,
+    .no_branch = 0.5 * limit->drift_near * limit->rank * limit->rank, /* 0.5: a margin for round-off */
     .length = length,
     .per_length = per / length,
     .per_angle = per,
@@ -67,7 +70,7 @@ static void several_report (pw_run *r, const pw_scene_steps *x) {
   s->position = pw_larger (s->position, x->watch.position), s->g = pw_larger (s->g, x->watch.g);
   s->velocity = pw_larger (s->velocity, x->watch.velocity), s->jv = pw_larger (s->jv, x->watch.jv);
   pw_specialised_count (r, (long)x->stages * x->done, x->iterations);
-  if (g->saddle == NULL) return;
+  if (g->saddle == NULL) return; /* else as watchdog_follow leaves it where the sine need not be computed */
   g->step = x->watch.step, g->moved = x->watch.moved, g->alert = 0;
   g->before = NAN, g->slope = 0, g->crossed = 0;
   g->t = r->t, g->start_sine = NAN;
@@ -104,14 +107,19 @@ int pw_several_plan (pw_run *r, double t, double t_end, pw_scene_steps *x) {
 }
 
 int pw_several_finish (pw_run *r, const pw_scene_steps *x, pw_error *error) {
-  if (x->done > 0) several_report (r, x);
+  int status = PW_OK;
   if (r->s->coords > 3 * r->s->bodies) pw_point_to_internal (r->w, r->q, r->v);
-  pw_saddle_postpone (r->saddle, PW_SCENE_PIVOT);
-  if (x->done < x->count && pw_evaluate_J_at (r->w, r->t, r->q, r->v) != PW_OK) return pw_fail_signal (r->t, error);
-  if (x->done == 0) return PW_OK;
-  int status = pw_run_check_resolution (r, error);
-  if (status == PW_OK) pw_ledger_note (r);
-  return status;
+  if (x->done > 0) {
+    several_report (r, x);
+    pw_saddle_postpone (r->saddle, PW_SCENE_PIVOT);
+  }
+  /* A step that was refused has left its own configurations and J. */
+  if (x->done < x->count && pw_evaluate_J_at (r->w, r->t, r->q, r->v) != PW_OK) status = pw_fail_signal (r->t, error);
+  if (x->done > 0 && status == PW_OK) {
+    status = pw_run_check_resolution (r, error);
+    if (status == PW_OK) pw_ledger_note (r);
+  }
+  return pw_run_annotate_error (r, status, error);
 }
 
 int pw_run_advance_towards (pw_run *r, double t, double t_end, pw_error *error) {
@@ -127,9 +135,9 @@ int pw_run_advance_towards (pw_run *r, double t, double t_end, pw_error *error) 
 
 /* ---- Several runs ---- */
 
-/* A single run is faster in specialised code of its own than together with this part of the lanes empty. */
-static int several_fill (int planned, int lanes) {
-  return 2 * planned > lanes;
+/* If half of the lanes are empty, runs are faster one after the other. */
+static int several_lanes_pay (int used, int lanes) {
+  return 2 * used > lanes;
 }
 
 /* Runs whose next steps can be in lanes together: those with the step size and method of the first. */
@@ -139,13 +147,13 @@ typedef struct {
   pw_scene_steps steps[PW_LANES_MOST];
 } several_lanes;
 
+/* Plans the next steps of run i, if it can share lanes with the first. */
 static void several_add (several_lanes *x, int i, double t_end) {
   const pw_run *first = x->n > 0 ? x->run[x->which[0]] : NULL, *r = x->run[i];
-  if (pw_several_plan (x->run[i], t_end, t_end, &x->steps[x->n]) == 0) return;
   if (first && (r->method != first->method || r->stabilisation != first->stabilisation ||
                 r->settings.step != first->settings.step))
     return;
-  x->which[x->n++] = i;
+  if (pw_several_plan (x->run[i], t_end, t_end, &x->steps[x->n]) > 0) x->which[x->n++] = i;
 }
 
 /* Empty lanes repeat the first run. */
@@ -170,7 +178,7 @@ void pw_runs_advance (pw_run *const *runs, int count, double t_end, const pw_spe
     else
       several_add (&x, i, t_end);
   }
-  if (x.n > 0 && several_fill (x.n, code->lanes)) {
+  if (x.n > 0 && several_lanes_pay (x.n, code->lanes)) {
     several_take (&x, code, memory);
     for (int k = 0; k < x.n; k++) {
       int i = x.which[k];

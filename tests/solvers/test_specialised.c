@@ -359,6 +359,7 @@ static void test_several_steps (void **state) {
       check_bits ("motion since the last sine", &one->geometry.moved, &many->geometry.moved, 1);
       check_bits ("accelerations so far", &one->reference_level, &many->reference_level, 1);
       check_bits ("energy so far", &one->exchanged, &many->exchanged, 1);
+      assert_int_equal (pw_run_advance_towards (many, 1, NAN, &(pw_error){ 0 }), PW_INPUT);
       pw_run_close (one);
       both_close (&x);
     }

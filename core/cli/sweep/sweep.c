@@ -63,8 +63,8 @@ static int sweep_read (const sweep *x, pw_error *error) {
   return x->merge ? PW_OK : pw_cli_at_most (&pw_cli_sweep, &x->line, 1, error);
 }
 
-/* The first option that has no effect on parts; NULL if there is none. */
-static const char *sweep_ignored (const sweep *x) {
+/* The first option given that cannot be combined with --merge; NULL if there is none. */
+static const char *sweep_not_for_merge (const sweep *x) {
   const pw_cli_line *l = &x->line;
   const void *given[] = { x->ranges,     l->method,    l->t_end,     l->step,           l->rtol,
                           l->atol,       l->limit,     l->sets,      l->max_steps,      l->starts,
@@ -208,11 +208,17 @@ static shared_system *sweep_share (sweep *x, long row) {
 
 /* ---- The sweep ---- */
 
-/* Stores a row, or the first error, which stops the sweep. */
+/* Stores the first error, which stops the sweep. */
+static void sweep_fail (sweep *x, long row, const char *why) {
+  if (x->error->status == PW_OK) pw_fail (x->error, PW_RESOURCE, "row %ld of the grid: %s", row + 1, why);
+  if (pw_stop == 0) pw_stop = 1;
+}
+
+/* Stores a row, or the first error. */
 static void sweep_keep (sweep *x, long row, int status, const pw_text *text, const pw_error *own) {
   if (status == PW_RETRY || x->error->status != PW_OK) return;
   if (status == PW_RESOURCE)
-    pw_fail (x->error, status, "row %ld of the grid: %s", row + 1, own->text);
+    sweep_fail (x, row, own->text);
   else if (pw_journal_add (&x->journal, &x->plan, row, -status, text->at, &x->scratch, x->error) == PW_OK)
     pw_progress_at (&x->progress, (double)x->journal.done);
   if (x->error->status != PW_OK && pw_stop == 0) pw_stop = 1;
@@ -248,7 +254,7 @@ static int sweep_begin (sweep_worker *w, int k) {
   if (row < 0) return 0;
   w->system[k] = sweep_share (x, row);
   if (w->system[k] == NULL)
-    pw_fail (x->error, PW_RESOURCE, "row %ld of the grid: out of memory", row + 1), pw_stop = 1;
+    sweep_fail (x, row, "out of memory");
   else
     own = w->system[k]->error;
   pthread_mutex_unlock (&x->lock);
@@ -296,6 +302,8 @@ static void sweep_thread (void *context, int i) {
   (void)i;
   if (w.code && (w.memory = pw_specialised_lanes_memory (w.code)) != NULL)
     w.width = pw_specialised_lanes_count (w.code);
+  if (w.width > SWEEP_LANES) w.width = 1;
+  while (w.width > 1 && x->journal.rows < (long)w.width * x->jobs) w.width--; /* work for all threads */
   pthread_mutex_lock (&x->lock);
   for (int runs = 1; runs > 0;) {
     for (int k = runs = 0; k < w.width; k++) runs += w.system[k] != NULL || sweep_begin (&w, k);
@@ -344,7 +352,7 @@ static int sweep_verdict (const pw_tally *tally, int is_part, pw_error *error) {
 
 static int sweep_merge (sweep *x, pw_error *error) {
   pw_tally tally;
-  const char *option = sweep_ignored (x);
+  const char *option = sweep_not_for_merge (x);
   if (option)
     return pw_fail (error, PW_INPUT, "%s cannot be combined with --merge: the parts define the sweep", option);
   int status = pw_table_merge (x->line.argument, x->line.arguments, x->path, &tally, error);
@@ -400,9 +408,9 @@ static const struct poptOption sweep_options[] = {
                   "Vary a parameter or an initial value such as frame.vx; repeatable, the last one varies fastest. "
                   "RANGE: lin:FIRST:LAST:COUNT, log:FIRST:LAST:COUNT, or a list V1,V2,..."),
   PW_TEXT_OPTION (sweep, path, "output", 'o', "FILE.csv", "Write the table to this file"),
-  PW_TEXT_OPTION (sweep, jobs_text, "jobs", 'j', "N", "Number of concurrent runs (default: one per processor)"),
+  PW_TEXT_OPTION (sweep, jobs_text, "jobs", 'j', "N", "Number of threads (default: one per processor)"),
   PW_TEXT_OPTION (sweep, lanes_text, "lanes", 0, "N",
-                  "Runs per processor at once, 1, 2, 4 or 8, by methods of fixed step size in specialised code "
+                  "Runs that a thread advances at once, 1, 2, 4 or 8, with steps of fixed size and specialised code "
                   "(default: as many as pay)"),
   PW_TEXT_OPTION (sweep, part_text, "part", 0, "I/N", "Compute every N-th row, from the I-th on, for a later --merge"),
   PW_FLAG_OPTION (sweep, merge, "merge", "Merge the parts named instead of a model"),
