@@ -14,16 +14,15 @@ static void resume_killed (const char *method) {
   snprintf (command, sizeof command,
             "pinwheel " RESUME_RUN "-m %s -o @/whole.csv --json @/whole.json --checkpoint @/whole.ck", method);
   cli_good (command);
-  snprintf (command, sizeof command,
-            "rm -f @/killed.*; kills=0\n"
-            "for wait in 0.03 0.05 0.08 0.12 0.2 60; do\n"
-            "  resume=; [ ! -e @/killed.ck ] || resume='--resume @/killed.ck'\n"
-            "  " RESUME_PROGRAM RESUME_RUN
-            "-m %s -o @/killed.csv --json @/killed.json --checkpoint @/killed.ck $resume &\n"
-            "  if [ $wait = 60 ]; then wait $!; else sleep $wait; kill -9 $! && kills=$((kills + 1)); wait $!; fi\n"
-            "  [ ! -e @/killed.csv ] || break\n"
-            "done 2>/dev/null; [ $kills -gt 0 ] && echo killed",
-            method);
+  snprintf (
+      command, sizeof command,
+      "rm -f @/killed.*; kills=0\n"
+      "for wait in 0.03 0.05 0.08 0.12 0.2 60; do\n"
+      "  resume=; [ ! -e @/killed.ck ] || resume='--resume @/killed.ck'\n"
+      "  " RESUME_PROGRAM RESUME_RUN "-m %s -o @/killed.csv --json @/killed.json --checkpoint @/killed.ck $resume &\n"
+      "  if [ $wait = 60 ]; then wait $!; else sleep $wait; kill -9 $! && kills=$((kills + 1)); wait $!; fi && break\n"
+      "done 2>/dev/null; [ $kills -gt 0 ] && echo killed",
+      method);
   cli_run (command);
   if (strcmp (cli_out, "killed\n") != 0) print_error ("%s: never killed\n%s", method, cli_err);
   assert_string_equal (cli_out, "killed\n");

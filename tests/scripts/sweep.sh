@@ -10,18 +10,18 @@ grid='ezyroller --vary omega=log:1:10:20 --vary a=0.4,0.5,0.6 --vary frame.omega
 "$pinwheel" sweep $grid --jobs 1 -o "$work/whole.csv" 2>"$work/err"
 report 'a sweep that is left alone' $?
 
-# until_done FILE OPTION...: starts it, kills it with the signal, starts it again; then lets it be.
+# until_done FILE OPTION...: starts it, kills it with the signal, starts it again until it succeeds; then lets it be.  The
+# table may exist before: a kill between writing it and removing the journal leaves both, and the next start removes the journal.
 until_done () {
   file=$1 kills=0
   shift
   while [ $kills -lt "$most" ]; do
-    "$pinwheel" sweep $grid "$@" -o "$file" 2>"$work/err" &
+    env --default-signal=INT "$pinwheel" sweep $grid "$@" -o "$file" 2>"$work/err" &
     child=$!
-    random 0.02 0.4
+    random 0.02 0.15
     sleep "$random"
     kill -"$signal" $child 2>/dev/null
-    wait $child 2>/dev/null
-    [ ! -e "$file" ] || return 0
+    wait $child 2>/dev/null && return 0
     kills=$((kills + 1))
   done
   "$pinwheel" sweep $grid "$@" -o "$file" 2>"$work/err"
@@ -40,6 +40,10 @@ done
 "$pinwheel" sweep $grid --part 1/3 -o "$work/part.csv" 2>"$work/err"
 cp "$work/part.csv" "$work/good.csv"
 size=$(wc -c <"$work/good.csv") failed=0 i=0
+cp "$work/good.csv" "$work/part.csv.part" # killed when the table was complete
+"$pinwheel" sweep $grid --part 1/3 -o "$work/part.csv" 2>"$work/err" && cmp "$work/part.csv" "$work/good.csv" &&
+  [ ! -e "$work/part.csv.part" ]
+report 'a table and its complete journal' $?
 while [ $i -lt 40 ]; do
   i=$((i + 1))
   random 0 "$size"
@@ -92,7 +96,7 @@ if [ "$("$pinwheel" sweep snakeboard --t-end 0.1 --vary board.vx=0,1 --specialis
   "$pinwheel" sweep $grid --jobs 1 -o "$work/whole.csv" 2>"$work/err"
   signal=KILL most=20
   until_done "$work/killed.csv" --jobs 2
-  cmp "$work/killed.csv" "$work/whole.csv"
+  cmp "$work/killed.csv" "$work/whole.csv" && [ ! -e "$work/killed.csv.part" ]
   report "four lanes, stopped $kills times" $?
 fi
 exit $bad
