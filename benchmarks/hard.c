@@ -2,9 +2,9 @@
  *
  *     hard [-j CELLS] [-c CASE] [-m METHOD] [-s] [-v] [-o PAGE] FOLDER
  *
- * Writes PAGE.md and PAGE.csv.  FOLDER holds cases/ and models/; CASE and METHOD are patterns; -s: specialised scenes.  Each cell runs in its own process with a limit
- * of processor time, so that a crash or a hang becomes a verdict.  Exit status: 0 if all verdicts are as expected and none
- * is wrong, 1 if not, 2 for a mistake in the cases. */
+ * Writes PAGE.md and PAGE.csv.  FOLDER holds cases/ and models/; CASE and METHOD are patterns; -s: specialised scenes.
+ * Each cell runs in its own process with a limit of processor time, so that a crash or a hang becomes a verdict.  Exit
+ * status: 0 if all verdicts are as expected and none is wrong, 1 if not, 2 for a mistake in the cases. */
 #define _XOPEN_SOURCE 700
 #include <dirent.h>
 #include <fnmatch.h>

@@ -1,5 +1,5 @@
-/* An integration method of your own: Kutta's of order 3, and its order from runs of a pendulum whose motion is known.  From the
- * source tree, after `make`:
+/* An integration method of your own: Kutta's of order 3, and its order from runs of a pendulum whose motion is known.
+ * From the source tree, after `make`:
  *     cc -std=c11 -Ibuild/include docs/method.c -o method -Lbuild -lpinwheel-files -lpinwheel -Wl,-rpath,$PWD/build -lm
  * with an installed Pinwheel as docs/embed.c. */
 #include <math.h>
@@ -13,8 +13,8 @@ static int kutta3_open (pw_run *r, pw_error *error) {
   return pw_step_open (r, ARRAYS, error);
 }
 
-/* k2 = f (t + h/2, y + h/2 k1),  k3 = f (t + h, y - h k1 + 2 h k2),  y' = y + h/6 (k1 + 4 k2 + k3)  (Kutta 1901), with y = (q, v)
- * and k = (v, a). */
+/* k2 = f (t + h/2, y + h/2 k1),  k3 = f (t + h, y - h k1 + 2 h k2),  y' = y + h/6 (k1 + 4 k2 + k3)  (Kutta 1901), with
+ * y = (q, v) and k = (v, a). */
 static int kutta3_advance (pw_run *r, double t_end, pw_error *error) {
   const pw_state x = pw_run_state (r);
   const int n = pw_system_coordinates (x.system);

@@ -221,6 +221,9 @@ static inline int pw_run_stop_requested (pw_run *r) {
 /* Before each attempted step: PW_OK; PW_STOPPED if the caller requests it; PW_METHOD at max_steps. */
 int pw_run_check_limits (pw_run *r, pw_error *error);
 
+/* Steps between checks of coordinates and records of energies; at most as many are made in one call of specialised code. */
+enum { PW_CHECK_INTERVAL = 16 };
+
 /* After each step: records speeds; PW_METHOD if coordinates are too large for double precision to resolve the scene. */
 int pw_run_check_resolution (pw_run *r, pw_error *error);
 

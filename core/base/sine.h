@@ -2,8 +2,8 @@
  *
  * x = n pi/2 + y with pi/2 in three parts of 33 bits, whose products with n are exact, and a tail (Cody & Waite 1980).  The
  * differences keep their round-off, so that y + lo is accurate next to multiples of pi/2 too.  Sine and cosine of y are the
- * polynomials of fdlibm (Sun Microsystems 1993, k_sin.c and k_cos.c).  There are no branches, and nothing is fused, so that the
- * bits do not depend on the C library, the compiler or the processor. */
+ * polynomials of fdlibm (Sun Microsystems 1993, k_sin.c and k_cos.c).  There are no branches, and nothing is fused, so
+ * that the bits do not depend on the C library, the compiler or the processor. */
 #ifndef PW_SINE_H
 #define PW_SINE_H
 

@@ -26,8 +26,8 @@ void pw_nearest_try (pw_nearest *n, const char *candidate);
  * near and all fit; else "". */
 char *pw_nearest_text (const pw_nearest *n, char *buffer, size_t size);
 
-/* The index of a name in a table whose entries, of this size, begin with a name and whose last name is NULL; -1, with the hint
- * of pw_nearest_text, if it is not there.  The table may be NULL: it has no entries. */
+/* The index of a name in a table whose entries, of this size, begin with a name and whose last name is NULL; -1, with
+ * the hint of pw_nearest_text, if it is not there.  The table may be NULL: it has no entries. */
 enum { PW_HINT = 130 };
 int pw_find_name (const void *table, size_t entry, const char *name, char hint[PW_HINT]);
 /* "", ">= 0", "> 0", "1, 2, ...", "0 to 1" */

@@ -215,8 +215,8 @@ void pw_cli_engine_close (pw_cli_engine *e);
 const pw_specialised *pw_cli_engine_code (const pw_cli_engine *e); /* for pw_settings.specialised */
 const char *pw_cli_engine_name (const pw_cli_engine *e);           /* "specialised", "general" */
 
-/* The code for `lanes` runs at once (0: as many as pay for this number of steps), by a method of fixed step size; NULL: one run
- * after the other. */
+/* The code for `lanes` runs at once (0: as many as pay for this number of steps), by a method of fixed step size; NULL:
+ * one run after the other. */
 #define PW_LANES_STEPS 1e7
 pw_scene_code *pw_cli_engine_lanes (const pw_cli_engine *e, const pw_system *s, const char *method, int lanes,
                                     double steps);

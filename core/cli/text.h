@@ -25,8 +25,8 @@ void pw_text_quoted (pw_text *t, const char *text);
 /* Ends the line, writes it to a file of the folder, and frees it.  PW_OK or PW_RESOURCE. */
 int pw_text_line (pw_text *t, FILE *f, const char *folder, pw_error *error);
 
-/* Closes an incomplete table: it remains as NAME.part, whose path goes to the buffer; without rows it is removed, and the path
- * is "". */
+/* Closes an incomplete table: it remains as NAME.part, whose path goes to the buffer; without rows it is removed, and
+ * the path is "". */
 void pw_text_abandon (pw_output *o, long rows, char *part, size_t size);
 /* Closes a table with the status of writing it: PW_OK renames it to NAME, else it remains as NAME.part.  Returns a status. */
 int pw_text_end (pw_output *o, int status, pw_error *error);

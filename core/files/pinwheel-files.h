@@ -24,8 +24,8 @@ typedef struct pw_file pw_file;
  * compile, is not a Pinwheel plug-in, has another ABI or parameters outside their structure or domain; PW_RESOURCE. */
 pw_file *pw_file_open (const char *model, pw_error *error);
 
-/* The same with another limit in bytes than PW_FILE_DEFAULT_BYTES for a model in YAML, up to PW_FILE_MAX_BYTES.  Reading one takes
- * about 10 times its size in memory. */
+/* The same with another limit in bytes than PW_FILE_DEFAULT_BYTES for a model in YAML, up to PW_FILE_MAX_BYTES.
+ * Reading one takes about 10 times its size in memory. */
 #define PW_FILE_DEFAULT_BYTES (64u << 20)
 #define PW_FILE_MAX_BYTES (2000u << 20)
 pw_file *pw_file_open_limited (const char *model, size_t largest, pw_error *error);

@@ -12,9 +12,9 @@
 #define FLATTEN
 #endif
 
-/* WHERE (condition, x): x where the condition holds, else an arbitrary number.  Code for several runs at once (PW_LANES) has no
- * branches; functions of libm are called for one run after the other, by the names that the x86-64 vector function ABI gives
- * to their forms for vector registers. */
+/* WHERE (condition, x): x where the condition holds, else an arbitrary number.  Code for several runs at once
+ * (PW_LANES) has no branches; functions of libm are called for one run after the other, by the names that the x86-64
+ * vector function ABI gives to their forms for vector registers. */
 #ifndef PW_LANES
 #define WHERE(condition, x) ((condition) ? (x) : 0)
 #else

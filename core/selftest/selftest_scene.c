@@ -111,7 +111,8 @@ static void scene_drift (scene *x, double *out) {
 
 /* ---- Comparing ---- */
 
-/* The largest of the terms of the element of entry k: its derivatives with respect to positions multiply round-off of these. */
+/* The largest of the terms of the element of entry k: its derivatives with respect to positions multiply round-off of
+ * these. */
 static double scene_largest_term (const scene *x, int k, int rows) {
   double most = 0;
   for (int i = k - k % rows; i < k - k % rows + rows; i++) most = fmax (most, x->terms[i]);

@@ -20,8 +20,8 @@ typedef struct {
 } pw_elimination;
 
 /* K: n x n terms of the lower triangle and their mirror image, n = coordinates + rows; length[i, b] = 1 if the
- * entries of equation i for the velocities vx, vy of body b form a vector of constant length; takes_part[i] = 0 for an equation
- * that is ignored.  Writes the statements of the factorisation, which end with what the solution needs in F.
+ * entries of equation i for the velocities vx, vy of body b form a vector of constant length; takes_part[i] = 0 for an
+ * equation that is ignored.  Writes the statements of the factorisation, which end with what the solution needs in F.
  * PW_RETRY if a massless coordinate is determined by no equation, or an equation has no pivot.  Errors: PW_RESOURCE. */
 int pw_elimination_open (pw_elimination *x, const pw_system *s, const pw_term *K, const unsigned char *length,
                          const unsigned char *takes_part, pw_emitter *e);

@@ -49,7 +49,8 @@ typedef struct pw_scene_step {
   double *q, *v, *lambda;      /* q, v: the new state; multipliers of a stage */
 } pw_scene_step;
 
-/* The watchdog (watchdog.c) in specialised code: limits, beyond which the general engine makes a step, and what it records. */
+/* The watchdog (watchdog.c) in specialised code: limits, beyond which the general engine makes a step, and what it
+ * records. */
 typedef struct {
   double lost;                           /* largest scaled residuals */
   double sine, reach, near_sine, growth; /* sine - reach (moved + growth x motion of the step) > near_sine */

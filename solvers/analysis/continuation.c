@@ -102,7 +102,8 @@ static int branch_descend (pw_branch *b, double *u, pw_error *error) {
 }
 
 /* Iterates at constant c u, or constant p, with steps shortened by `damping` in proportion to |F| (Levenberg &
- * Marquardt), which leads to the nearest of solutions that are not isolated (Yamashita & Fukushima 2001).  Damped only without c: on a branch a short step is the better remedy. */
+ * Marquardt), which leads to the nearest of solutions that are not isolated (Yamashita & Fukushima 2001).  Damped only
+ * without c: on a branch a short step is the better remedy. */
 static int branch_iterate (pw_branch *b, double *u, const double *c, double damping, pw_error *error) {
   int n = b->of.unknowns + 1, status;
   double before = INFINITY;

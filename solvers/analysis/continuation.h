@@ -52,8 +52,8 @@ int pw_branch_open (pw_branch *b, const pw_branch_equations *of, pw_error *error
 void pw_branch_close (pw_branch *b);
 
 /* Newton's method from u = (x, p) at constant p, with steps shortened until |F| decreases; first with the damping of
- * Levenberg and Marquardt, which leads to the nearest of solutions that are not isolated, then without.  PW_RETRY, and *u is where it
- * stopped, if it does not converge. */
+ * Levenberg and Marquardt, which leads to the nearest of solutions that are not isolated, then without.  PW_RETRY, and
+ * *u is where it stopped, if it does not converge. */
 int pw_branch_solve (pw_branch *b, double *u, pw_error *error);
 
 /* Starts a branch at a solution: p increases along the tangent if direction > 0.  PW_RETRY at a fold. */
@@ -68,7 +68,8 @@ int pw_branch_step (pw_branch *b, pw_error *error);
 int pw_branch_between (pw_branch *b, double s, pw_branch_point *point, pw_error *error);
 
 /* The point between the last two points where a test changes its sign, to `accuracy` of their distance, or as near as
- * Newton's method converges: at a bifurcation it does not.  `test` (a status) sets *value.  Folds: the last entry of the tangent. */
+ * Newton's method converges: at a bifurcation it does not.  `test` (a status) sets *value.  Folds: the last entry of
+ * the tangent. */
 int pw_branch_locate (pw_branch *b,
                       int (*test) (void *context, const pw_branch_point *point, double *value, pw_error *error),
                       void *context, double accuracy, pw_branch_point *point, pw_error *error);

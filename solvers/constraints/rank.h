@@ -36,9 +36,9 @@ int pw_rank_basis (const pw_workspace *w, double tol, int holonomic, int all, do
  * independent ones, in order where they are about equal.  Returns the rank, or PW_RESOURCE. */
 int pw_rank_select (const pw_workspace *w, double tol, unsigned char *active);
 
-/* Selects r->active for the run at its consistent initial state: rows dependent there and at up to three configurations nearby.
- * It stays NULL if all equations are independent.  Errors: PW_RESOURCE, PW_INITIAL (the initial
- * configuration is singular). */
+/* Selects r->active for the run at its consistent initial state: rows dependent there and at up to three configurations
+ * nearby. It stays NULL if all equations are independent.  Errors: PW_RESOURCE, PW_INITIAL (the initial configuration
+ * is singular). */
 int pw_rank_open (struct pw_run *r, pw_error *error);
 
 /* Selects r->active again with the J last evaluated.  Returns 1 if another set has the same rank, else 0.  Saddle and

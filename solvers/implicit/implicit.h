@@ -26,7 +26,8 @@ int pw_implicit_open (pw_implicit *x, pw_run *r, const pw_array *array, size_t c
 /* Allocates the recorded matrix of this size: PW_OK or PW_RESOURCE. */
 int pw_implicit_lay_out (pw_implicit *x, int size);
 
-/* Completes the opening, or reports that memory is exhausted if `status` is not PW_OK; velocities: 1 if the method enforces J v = eta. */
+/* Completes the opening, or reports that memory is exhausted if `status` is not PW_OK; velocities: 1 if the method
+ * enforces J v = eta. */
 int pw_implicit_complete (pw_run *r, int status, int velocities, pw_error *error);
 
 /* Scales of the rows and columns of a Newton matrix of q, v, lambda and `mus` multipliers mu, whose derivatives by q' and a

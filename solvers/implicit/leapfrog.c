@@ -1,5 +1,5 @@
-/* leapfrog: the reversible leapfrog method for constrained systems, explicit in position-dependent forces, fixed step.  From t to
- * t' = t + h, with u the velocities at half the step and (q*, t*) the mean of both ends,
+/* leapfrog: the reversible leapfrog method for constrained systems, explicit in position-dependent forces, fixed step.
+ * From t to t' = t + h, with u the velocities at half the step and (q*, t*) the mean of both ends,
  *
  *   M (u - v)  = h/2 (f (t, q, v) - J (q)^T lambda+)         g (t', q') = 0,    S (t*, q*) u = b (t*, q*)
  *   q' - q     = h u

@@ -80,7 +80,8 @@ PW_INLINE void massless_eliminate (pw_component *c, int p, int n) {
   P[pivot] = inverse;
 }
 
-/* Eliminates with the pivots matched before, or matches them (with `search`).  Returns the number of pivots that are large enough. */
+/* Eliminates with the pivots matched before, or matches them (with `search`).  Returns the number of pivots that are
+ * large enough. */
 PW_INLINE int massless_reduce (pw_component *c, int search, int n) {
   massless_copy (c);
   c->least = INFINITY;

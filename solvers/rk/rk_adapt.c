@@ -3,9 +3,9 @@
  *   h_new = 0.9 h err^-(k - 3 m / 4) err_before^m,  limited to h/5 ... 5 h
  *
  * with k the tableau's exponent and m its memory (Gustafsson 1991; Hairer, Norsett & Wanner 1993, section II.4).  The
- * error e is that of positions and velocities in units of the tolerances.  After a projection there remains e', the part of the
- * error tangential to the constraints (Eich 1993; Hindmarsh et al., CVODE), to which a small part of the whole error
- * is added:
+ * error e is that of positions and velocities in units of the tolerances.  After a projection there remains e', the
+ * part of the error tangential to the constraints (Eich 1993; Hindmarsh et al., CVODE), to which a small part of the
+ * whole error is added:
  *
  *   e = sqrt (e'^2 + rtol^(1/2) e_before^2)      so that the displacement, e_before rtol, is at most rtol^(3/4)
  *

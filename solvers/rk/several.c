@@ -1,30 +1,30 @@
 /* Several steps of fixed size in one call of specialised code.
  *
- * Results are bit-identical to those of single steps.  What a run does less often than every step (limits.c, ledger.c) is done after the last of
- * them, so there are never more than PW_SEVERAL_STEPS. */
+ * Results are bit-identical to those of single steps.  What a run does less often than every step (limits.c, ledger.c)
+ * is done after the last of them, so there are never more than PW_CHECK_INTERVAL. */
 #include <float.h>
 #include <math.h>
 #include <string.h>
 #include "rk_step.h"
 
-/* 1 if the specialised function `steps` does everything that a step of this run needs.  The first steps are recorded one by one
- * (ledger.c). */
+/* 1 if the specialised function `steps` does everything that a step of this run needs.  The first steps are recorded
+ * one by one (ledger.c). */
 static int several_suits (const pw_run *r) {
   const struct pw_method_data *d = r->data;
   if (r->method->advance != pw_rk_advance || d == NULL || d->adaptive || d->held || d->null_space || d->split) return 0;
   if (d->projects && !(d->every == 1 && d->projector.by_mass && !d->projector.alone)) return 0;
   return pw_specialised_suits (r) && r->redundant == 0 && r->alpha + r->beta == 0 && !r->settings.ledger &&
          !r->interrupted && r->stalled == 0 && !(r->geometry.saddle && r->geometry.alert) &&
-         r->statistics.steps >= PW_SEVERAL_STEPS;
+         r->statistics.steps >= PW_CHECK_INTERVAL;
 }
 
-/* The number of whole steps that can be taken at once: before t_end and breakpoints, with the tolerance of pw_step_end; up to the
- * first that reaches t; up to a multiple of PW_SEVERAL_STEPS and the next record of speeds (limits.c); each longer than what counts as
- * stalled (run.c). */
+/* The number of whole steps that can be taken at once: before t_end and breakpoints, with the tolerance of pw_step_end;
+ * up to the first that reaches t; up to a multiple of PW_CHECK_INTERVAL and the next record of speeds (limits.c); each
+ * longer than what counts as stalled (run.c). */
 static int several_count (const pw_run *r, double t, double t_end) {
   const struct pw_method_data *d = r->data;
   const double h = r->settings.step, stop = fmin (t_end, r->breakpoint) - 1e-9 * h, tiny = 128 * DBL_EPSILON;
-  int most = PW_SEVERAL_STEPS - (int)(r->statistics.steps % PW_SEVERAL_STEPS), n = 0;
+  int most = PW_CHECK_INTERVAL - (int)(r->statistics.steps % PW_CHECK_INTERVAL), n = 0;
   double reached = r->t;
   while (n < most && reached < t && reached < t_end && reached - r->settings.t < 2 * r->mark_time) {
     double next = d->base + (double)(d->count + n + 1) * h;

@@ -44,11 +44,10 @@ void pw_ledger_begin (pw_run *r) {
   if (r->energy_scene == 0 && r->s->entries > 0) r->energy_scene = ledger_massless_energy (r);
 }
 
-/* Samples the first 16 steps and every 16th: sufficient for a scale, at negligible cost. */
+/* Samples the first steps and then some: sufficient for a scale, at negligible cost. */
 void pw_ledger_note (pw_run *r) {
-  const long every = 16;
   double power = 0;
-  if (r->statistics.steps > every && r->statistics.steps % every != 0) return;
+  if (r->statistics.steps > PW_CHECK_INTERVAL && r->statistics.steps % PW_CHECK_INTERVAL != 0) return;
   double exchanged = fmax (pw_kinetic (r->s, r->v), fabs (pw_potential (r->w) - r->potential0));
   for (int i = 0; i < r->s->entries; i++) power += fabs (r->rate[i]);
   if (exchanged > r->exchanged && isfinite (exchanged)) r->exchanged = exchanged;

@@ -15,7 +15,6 @@
 
 #define LIMITS_RESOLVED 1e-2   /* of the unit: eps |q| beyond which a run fails */
 #define LIMITS_FAST 1e3        /* in u / T: speeds beyond which growth is reported */
-enum { LIMITS_INTERVAL = 16 }; /* steps between checks of the size of coordinates */
 #define LIMITS_GROWTH 0.25     /* exponent p of t^p above which a velocity counts as growing */
 
 /* The largest velocity at the state reached, in units of the scene; *state: index of that velocity. */
@@ -70,7 +69,7 @@ int pw_run_check_limits (pw_run *r, pw_error *error) {
 int pw_run_check_resolution (pw_run *r, pw_error *error) {
   const pw_system *s = r->s;
   char name[120];
-  if (!limits_mark (r) && r->statistics.steps % LIMITS_INTERVAL != 0) return PW_OK;
+  if (!limits_mark (r) && r->statistics.steps % PW_CHECK_INTERVAL != 0) return PW_OK;
   for (int j = 0; j < s->coords; j++) {
     double known = fabs (r->q[j]) * DBL_EPSILON;
     if (!(known > LIMITS_RESOLVED * pw_unit (s, j))) continue;

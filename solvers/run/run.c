@@ -111,8 +111,8 @@ static int run_has_no_method (const pw_run *r, pw_error *error) {
   return 1;
 }
 
-/* The active rows have become nearly dependent: looks for another set that is not, with which the method restarts.  This is done
- * before the next step, since the last one can still be sampled, whether or not it is. */
+/* The active rows have become nearly dependent: looks for another set that is not, with which the method restarts.
+ * This is done before the next step, since the last one can still be sampled, whether or not it is. */
 static int run_reselect (pw_run *r, pw_error *error) {
   pw_sample sample;
   r->reselect_below = r->independence / 2;
@@ -206,7 +206,8 @@ static int run_check_state (const pw_run *r, const double *x, int velocities, pw
   return PW_OK;
 }
 
-/* Makes (q, v) the state reached and moves the previous one to the sample arrays.  q and v may be in these; NULL: unchanged. */
+/* Makes (q, v) the state reached and moves the previous one to the sample arrays.  q and v may be in these; NULL:
+ * unchanged. */
 static void run_exchange (pw_run *r, const double *q, const double *v) {
   size_t n = (size_t)r->s->coords, bytes = n * sizeof *q;
   double *other = r->scratch;

@@ -6,8 +6,9 @@
  *   ggl               q' = v - D G^T mu,    M v' + J^T lambda = f,   J v = eta,   g = 0
  *   si1               q' = v - D G^T mu',   M v' + J^T lambda' = f,  J v = eta,   g = 0
  *
- * with G the rows of J of the holonomic equations, D = 1 for lengths and 1/L^2 for angles, so that mu has one unit (Baumgarte 1972; Gear, Gupta & Leimkuhler 1985;
- * Gear 1988).  In si1 the unknowns lambda and mu are the integrals of the multipliers. */
+ * with G the rows of J of the holonomic equations, D = 1 for lengths and 1/L^2 for angles, so that mu has one unit
+ * (Baumgarte 1972; Gear, Gupta & Leimkuhler 1985; Gear 1988).  In si1 the unknowns lambda and mu are the integrals of
+ * the multipliers. */
 #include "ida_equations.h"
 
 int pw_ida_update (ida_data *d, double t, const double *y) {
@@ -17,7 +18,8 @@ int pw_ida_update (ida_data *d, double t, const double *y) {
 
 /* ---- Residual ---- */
 
-/* d->given is scratch in the following functions: for n + 3 numbers (forces are added in blocks of 3), then for as many more. */
+/* d->given is scratch in the following functions: for n + 3 numbers (forces are added in blocks of 3), then for as many
+ * more. */
 
 /* q' - v + D G^T mu */
 static void ida_kinematics (ida_data *d, const double *y, const double *yp, double *out) {

@@ -1,4 +1,5 @@
-/* Eigenvalues against perturbed runs: each steady motion of the gallery, perturbed along each mode, follows exp (re + i im) t. */
+/* Eigenvalues against perturbed runs: each steady motion of the gallery, perturbed along each mode, follows exp (re + i
+ * im) t. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>

@@ -126,8 +126,8 @@ static void test_uncertain_order (void **state) {
   }
 }
 
-/* However long a run takes, it is repeated: one number has no spread.  (On a machine that does this one in less than a sixth of a
- * second, more repeats follow anyway.) */
+/* However long a run takes, it is repeated: one number has no spread.  (On a machine that does this one in less than a
+ * sixth of a second, more repeats follow anyway.) */
 static void test_repeats (void **state) {
   (void)state;
   cli_good ("pinwheel compare ezyroller --methods rk4+projection -t 2 --reference @/known.csv --step-ladder 4e-6:4e-6 "
@@ -215,8 +215,8 @@ static const char *compare_word (const char *name, int word) {
   }
 }
 
-/* The processor time of the method with rows `from` to `to` - 1 for an error, in a pendulum of 1 m: errors of lengths and angles
- * count alike.  NaN if it is not reached. */
+/* The processor time of the method with rows `from` to `to` - 1 for an error, in a pendulum of 1 m: errors of lengths
+ * and angles count alike.  NaN if it is not reached. */
 static double compare_cost (const char *file, int from, int to, double error) {
   double before = 0, least = NAN;
   for (int row = from; row < to; row++) {
@@ -335,7 +335,8 @@ static void test_multiplier_scale (void **state) {
   assert_true (error[0] > 0 && error[1] == error[0]);
 }
 
-/* The reference of its own making agrees with digits computed in quadruple precision (tests/reference) as far as it claims. */
+/* The reference of its own making agrees with digits computed in quadruple precision (tests/reference) as far as it
+ * claims. */
 static void test_own_reference (void **state) {
   (void)state;
   const double x[3] = { 0.122485077560987708, -0.0509563103339871023, -0.0717230785643341303 };

@@ -60,8 +60,8 @@ static int limits_stop (void *context) {
   return --*(int *)context == 0;
 }
 
-/* Wherever a run is stopped, it goes on when it is advanced again, and nothing but the last digits of a method that has to start
- * anew, or of steps that were tried with another size, shows it. */
+/* Wherever a run is stopped, it goes on when it is advanced again, and nothing but the last digits of a method that has
+ * to start anew, or of steps that were tried with another size, shows it. */
 static void test_stop (void **state) {
   static const char *const one_step[] = { "rk4+projection", "galpha", "leapfrog", "erk8+projection", NULL };
   (void)state;

@@ -194,7 +194,8 @@ static void test_own_states (void **state) {
   }
 }
 
-/* The signal of a drive with its derivatives: value, rate and acceleration at a time; a system's context outlives the model. */
+/* The signal of a drive with its derivatives: value, rate and acceleration at a time; a system's context outlives the
+ * model. */
 static void test_drive (void **state) {
   text x =
       text_of (TWO_BODIES "elements:\n"

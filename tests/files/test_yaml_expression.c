@@ -481,7 +481,8 @@ static void test_undecided (void **state) {
   }
 }
 
-/* am (u | m) = u - m (u - sin u cos u)/4 + ... (Abramowitz & Stegun 16.13.4): the slope by m where the means have converged. */
+/* am (u | m) = u - m (u - sin u cos u)/4 + ... (Abramowitz & Stegun 16.13.4): the slope by m where the means have
+ * converged. */
 static void test_amplitude (void **state) {
   double u[3], small = 2;
   (void)state;

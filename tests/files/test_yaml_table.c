@@ -23,7 +23,8 @@ static void table_write (const char *name, const char *text, size_t size) {
   assert_int_equal (fclose (f), 0);
 }
 
-/* Builds a model in the subfolder "model" whose torque is this table; the signal goes to *signal, its first points to `point`. */
+/* Builds a model in the subfolder "model" whose torque is this table; the signal goes to *signal, its first points to
+ * `point`. */
 static pw_error table_build (const char *table, pw_signal *signal, double point[2][3]) {
   char text[400];
   pw_error error = { 0 };

@@ -1,5 +1,5 @@
-/* A checkpoint: the file as it is, its state loaded into a run whatever its check sum, and one that a run has written, forged:
- * numbers of its state changed, its check sum made right, and resumed by the command. */
+/* A checkpoint: the file as it is, its state loaded into a run whatever its check sum, and one that a run has written,
+ * forged: numbers of its state changed, its check sum made right, and resumed by the command. */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>

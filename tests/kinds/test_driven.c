@@ -131,9 +131,9 @@ static void test_copies (void **state) {
   pw_system_free (s);
 }
 
-/* A crank driven through the points of a cubic table, whose acceleration has a kink at each: where methods of higher order end
- * their steps there, no step is rejected and errors are below the tolerance; stepped over, kinks cost a hundred rejected steps
- * and leave 2e-9 at rtol 1e-10. */
+/* A crank driven through the points of a cubic table, whose acceleration has a kink at each: where methods of higher
+ * order end their steps there, no step is rejected and errors are below the tolerance; stepped over, kinks cost a
+ * hundred rejected steps and leave 2e-9 at rtol 1e-10. */
 static void driven_crank (pw_model *m, const void *parameters) {
   enum { POINTS = 41 };
   double t[POINTS], angle[POINTS];

@@ -1,4 +1,5 @@
-/* Friction and other forces that saturate within a velocity far below the tolerance bring bodies to rest, at all tolerances. */
+/* Friction and other forces that saturate within a velocity far below the tolerance bring bodies to rest, at all
+ * tolerances. */
 #include <math.h>
 #include <stdio.h>
 #include <string.h>

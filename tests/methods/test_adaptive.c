@@ -94,8 +94,8 @@ static void test_work (void **state) {
 
 /* ---- Steps limited by stability ----
  *
- * One body follows a force through a stiff damper, m v' = k (cos w t - v), another swings on a spring whose accuracy needs steps
- * near the damper's limit of stability, 6.4 / k:  v = (k^2 cos w t + k w sin w t) / (k^2 + w^2) */
+ * One body follows a force through a stiff damper, m v' = k (cos w t - v), another swings on a spring whose accuracy
+ * needs steps near the damper's limit of stability, 6.4 / k:  v = (k^2 cos w t + k w sin w t) / (k^2 + w^2) */
 
 enum { ADAPTIVE_DAMPING = 400, ADAPTIVE_DRIVE = 2 };
 

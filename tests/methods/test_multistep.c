@@ -139,8 +139,9 @@ static void test_cost (void **state) {
 
 /* ---- Prescribed motion ---- */
 
-/* A step over a jump of a prescribed third derivative leaves the constraints before it is projected, and the accelerations at its end are those of the
- * displaced state.  An estimate that ignores displacements leaves errors of up to 850 rtol here. */
+/* A step over a jump of a prescribed third derivative leaves the constraints before it is projected, and the
+ * accelerations at its end are those of the displaced state.  An estimate that ignores displacements leaves errors of
+ * up to 850 rtol here. */
 static void test_lifted (void **state) {
   (void)state;
   for (int i = 0; i < 10; i++) {

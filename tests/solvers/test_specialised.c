@@ -67,7 +67,8 @@ static long both_specialised (const both *x) {
   return pw_run_statistics (x->special)->specialised;
 }
 
-/* Every model without element types of its own (test_specialise has these): 100 steps of 1e-4 s, nearly all of them by specialised code. */
+/* Every model without element types of its own (test_specialise has these): 100 steps of 1e-4 s, nearly all of them by
+ * specialised code. */
 static void test_gallery (void **state) {
   static const char *const model[] = { "ackermann-car",
                                        "andrews-squeezer",
@@ -103,8 +104,8 @@ static void test_gallery (void **state) {
     }
 }
 
-/* Steps of adaptive methods so long that a singular configuration may be within one, though none is: specialised code evaluates
- * them. */
+/* Steps of adaptive methods so long that a singular configuration may be within one, though none is: specialised code
+ * evaluates them. */
 static void test_long_steps (void **state) {
   static const struct {
     const char *model, *method;
@@ -201,8 +202,8 @@ static void refuse_steps (pw_scene *s, pw_scene_steps *x) {
   x->done = 0;
 }
 
-/* Several steps at once, and the stages of a step at once, have the bits of single evaluations, between steps too, at breakpoints, and where guards leave
- * some of them to the general engine. */
+/* Several steps at once, and the stages of a step at once, have the bits of single evaluations, between steps too, at
+ * breakpoints, and where guards leave some of them to the general engine. */
 static void test_stages (void **state) {
   static const struct {
     const char *model, *method; /* NULL: pulsed */

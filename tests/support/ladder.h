@@ -17,8 +17,8 @@ typedef struct {
 ladder_error ladder_solve (const char *model, const char *method, const pw_settings *settings, double t);
 ladder_error ladder_run (const char *model, const char *method, double step, double t);
 
-/* Checks that errors of positions, and with `depth` of velocities or multipliers too, decrease by a factor of 2^(order - band) to
- * 2^(order + band) from each of three steps h, h/2, h/4 to the next. */
+/* Checks that errors of positions, and with `depth` of velocities or multipliers too, decrease by a factor of 2^(order
+ * - band) to 2^(order + band) from each of three steps h, h/2, h/4 to the next. */
 typedef enum { LADDER_Q, LADDER_V, LADDER_LAMBDA } ladder_depth;
 void ladder_expect (const char *model, const char *method, double h, double t, int order, double band,
                     ladder_depth depth);

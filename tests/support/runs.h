@@ -16,8 +16,8 @@ const pw_method *runs_method (int i, char name[40]);
 void runs_state (pw_system *s, const char *method, const pw_settings *settings, double t, double *q, double *v,
                  pw_statistics *statistics);
 
-/* Reads a reference table, whose caption lines begin with #: at most `lines` lines of `columns` numbers.  Returns the number of
- * lines. */
+/* Reads a reference table, whose caption lines begin with #: at most `lines` lines of `columns` numbers.  Returns the
+ * number of lines. */
 int runs_reference (const char *path, int lines, int columns, double *table);
 
 #endif

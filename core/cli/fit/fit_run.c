@@ -1,5 +1,5 @@
-/* Runs of a fit at the times of the data; derivatives of its model values, by the variational equations, or if these cannot be
- * used by differences; its statistics. */
+/* Runs of a fit at the times of the data; derivatives of its model values, by the variational equations, or if these
+ * cannot be used by differences; its statistics. */
 #define _POSIX_C_SOURCE 200809L
 #include <float.h>
 #include <gsl/gsl_cdf.h>

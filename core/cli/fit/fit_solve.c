@@ -1,7 +1,7 @@
 /* The solution of a least-squares fit, by GSL's Levenberg-Marquardt method.
  *
- * Bounds: the method varies u, and x = low + (high - low) (1 + sin u) / 2 between two bounds, x = low + s (sqrt (1 + u^2) - 1)
- * above one (James & Roos 1975, MINUIT), with s the scale of the unknown. */
+ * Bounds: the method varies u, and x = low + (high - low) (1 + sin u) / 2 between two bounds, x = low + s (sqrt (1 +
+ * u^2) - 1) above one (James & Roos 1975, MINUIT), with s the scale of the unknown. */
 #define _POSIX_C_SOURCE 200809L
 #include <gsl/gsl_blas.h>
 #include <gsl/gsl_errno.h>

@@ -34,9 +34,9 @@ int pw_unknowns_open (pw_unknowns *u, const pw_cli_line *line, const pw_cli_mode
                       pw_error *error);
 void pw_unknowns_close (pw_unknowns *u);
 
-/* The model with values of the unknowns, compiled, and settings of its runs; limit: its stop context.  PW_INPUT if the model refuses
- * the values; PW_RESOURCE.  Close the model by pw_cli_close_model in every case.  May be called by several threads at
- * once. */
+/* The model with values of the unknowns, compiled, and settings of its runs; limit: its stop context.  PW_INPUT if the
+ * model refuses the values; PW_RESOURCE.  Close the model by pw_cli_close_model in every case.  May be called by
+ * several threads at once. */
 int pw_unknowns_system (const pw_unknowns *u, const double *x, pw_cli_model *m, pw_settings *settings, pw_limit *limit,
                         pw_error *error);
 

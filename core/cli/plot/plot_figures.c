@@ -74,7 +74,8 @@ static void data_vertex (FILE *f, const double *at, double t, int body, const ch
   data_row (f, (const double[]){ at[0], at[1], t, body + 1 }, 4, end);
 }
 
-/* A body: its outline, and lines from the centre of mass to the attachment points inside, which without an outline are all. */
+/* A body: its outline, and lines from the centre of mass to the attachment points inside, which without an outline are
+ * all. */
 static void data_body (FILE *f, const pw_plot_body *shape, const double *motion, double t, int body) {
   double point[2];
   for (int k = 0; k <= shape->corners && shape->corners; k++) {

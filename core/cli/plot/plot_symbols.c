@@ -2,11 +2,12 @@
  *
  * The text of a symbol (pw_kind.symbol) consists of strokes separated by semicolons.  A stroke is a list of vertices "a x y":
  * the point p1 + a (p2 - p1) + u (x e + y n), where p1 and p2 are the points of the first and the last body, u the unit of
- * symbols, e a direction and n its normal to the left.  e is the heading of a contact point, or that of the field `heading` in
- * the last body; without them the direction from p1 to p2, or the x axis of the first body if they coincide.  x = inf and -inf
- * extend to the ends of the travel along e.  "o a x y r" is a circle of radius u r; "g1" and "g2" are the pitch circles of gears
- * with the axles p1 and p2 and the field `ratio`.  A stroke whose last vertex is its first encloses an area, which hides what is below.
- * "NAME:" before a stroke: it is drawn if that field of the element is not zero; "NAME=2:": if it is 2. */
+ * symbols, e a direction and n its normal to the left.  e is the heading of a contact point, or that of the field
+ * `heading` in the last body; without them the direction from p1 to p2, or the x axis of the first body if they
+ * coincide.  x = inf and -inf extend to the ends of the travel along e.  "o a x y r" is a circle of radius u r; "g1"
+ * and "g2" are the pitch circles of gears with the axles p1 and p2 and the field `ratio`.  A stroke whose last vertex
+ * is its first encloses an area, which hides what is below. "NAME:" before a stroke: it is drawn if that field of the
+ * element is not zero; "NAME=2:": if it is 2. */
 #include <ctype.h>
 #include <math.h>
 #include <stdlib.h>
@@ -48,8 +49,8 @@ static void symbol_circle (pw_plot_stroke *s, const double *centre, double r, do
   }
 }
 
-/* Radii R1 and R2 = |i| R1 of the ratio i: R1 + R2 = |p2 - p1| if i < 0, |R1 - R2| if i > 0 and one is a ring (Willis 1870); equal
- * circles for i = 1. */
+/* Radii R1 and R2 = |i| R1 of the ratio i: R1 + R2 = |p2 - p1| if i < 0, |R1 - R2| if i > 0 and one is a ring (Willis
+ * 1870); equal circles for i = 1. */
 static void symbol_gear (const pw_plot_link *link, pw_plot_stroke *s, int second) {
   double i = symbol_field (link, "ratio", 5), first = i == 1 ? 0.5 : 1 / fabs (1 - i);
   symbol_circle (s, (const double[]){ second, 0, 0 }, 0, second ? first * fabs (i) : first);

@@ -36,8 +36,8 @@ int pw_reference_write (const pw_reference *r, const char *folder, const pw_stud
 
 /* ---- The conclusion of a comparison (conclusion.c) ---- */
 
-/* Prints the processor time of each method for 3, 6 and 9 correct digits against a known reference, and failures.  `column` of
- * the rows is the largest error of lengths; that of angles follows. */
+/* Prints the processor time of each method for 3, 6 and 9 correct digits against a known reference, and failures.
+ * `column` of the rows is the largest error of lengths; that of angles follows. */
 void pw_conclusion_print (const pw_study *s, const pw_reference *t, int column);
 
 #endif

@@ -113,10 +113,12 @@ struct pw_study {
 int pw_study_command (pw_study *x, const pw_study_type *type, pw_error *error);
 
 /* Reads --methods: names separated by commas; "all" stands for each integrator with each stabilisation, "rk4+all" for
- * rk4 with each, "all+ggl" for each integrator that has ggl.  A method named twice is used once.  PW_INPUT with the nearest valid name. */
+ * rk4 with each, "all+ggl" for each integrator that has ggl.  A method named twice is used once.  PW_INPUT with the
+ * nearest valid name. */
 int pw_study_read_methods (pw_study *x, const char *text, pw_error *error);
 
-/* Adds a row of a line of a group, without numbers.  Its label is its method unless it is set; rows of a line follow each other.  NULL and PW_RESOURCE. */
+/* Adds a row of a line of a group, without numbers.  Its label is its method unless it is set; rows of a line follow
+ * each other.  NULL and PW_RESOURCE. */
 pw_row *pw_study_add (pw_study *x, int group, int line, const char *method, int points, pw_error *error);
 
 /* Called after each step of a run that reaches time `due`, which it may change. */
@@ -130,15 +132,16 @@ typedef struct pw_study_visitor {
 /* One run of a row to the end or a limit: fills t, statistics, cpu, and state if it is stopped by cpu_end; the visitor may
  * be NULL.  Runs of different rows may be concurrent.  PW_RETRY: stopped, or interrupted. */
 int pw_study_run (pw_study *x, pw_row *r, const pw_settings *settings, pw_study_visitor *v, pw_error *error);
-/* Calls task (context, i) for each i < count, several at a time.  A task returns a status; after one other than PW_OK, which is
- * returned, no further ones are called. */
+/* Calls task (context, i) for each i < count, several at a time.  A task returns a status; after one other than PW_OK,
+ * which is returned, no further ones are called. */
 int pw_study_concurrently (pw_study *x, int count, int (*task) (pw_study *x, void *context, int i, pw_error *error),
                            void *context, pw_error *error);
 /* Begins to show the progress of `rows` rows. */
 void pw_study_show (pw_study *x, const char *what, const char *unit, int rows);
 /* Shows that a part of a row is done, of 1. */
 void pw_study_part (pw_study *x, pw_row *r, double part);
-/* Fills the time and the counts of the row, and a failure of pw_study_run.  Returns PW_OK, or the status that ends the study. */
+/* Fills the time and the counts of the row, and a failure of pw_study_run.  Returns PW_OK, or the status that ends the
+ * study. */
 int pw_study_outcome (const pw_study *x, pw_row *r, int status, const pw_error *run_error, pw_error *error);
 
 /* ---- Tables and figures (study_table.c) ---- */

@@ -1,8 +1,8 @@
 /* Expressions: numbers written as arithmetic over names.
  *
  *   operators   + - * / ^, < <= > >= == !=, && ||, CONDITION ? THEN : ELSE, parentheses
- *   functions   sin cos tan asin acos atan atan2 sinh cosh tanh exp log log10 sqrt abs sign floor ceil round hypot mod min max
- *               jacobi_am (u, m), elliptic_K (m)
+ *   functions   sin cos tan asin acos atan atan2 sinh cosh tanh exp log log10 sqrt abs sign floor ceil round hypot mod
+ *               min max jacobi_am (u, m), elliptic_K (m)
  *   constants   pi, e, deg = pi / 180
  *
  * A scope defines names of numbers; other names are variables, the first of which is the time.  Expressions are

@@ -1,8 +1,8 @@
 /* Loads the code of specialised scenes: compiles it, or loads it from the cache.
  *
- * An object in the cache, KEY.so, is followed by the text it was compiled from, the compiler and options, and a checksum; they are compared
- * before it is loaded.  KEY.c is locked while it is compiled; it is only kept, with the messages in KEY.log, if that
- * fails. */
+ * An object in the cache, KEY.so, is followed by the text it was compiled from, the compiler and options, and a
+ * checksum; they are compared before it is loaded.  KEY.c is locked while it is compiled; it is only kept, with the
+ * messages in KEY.log, if that fails. */
 #define _POSIX_C_SOURCE 200809L
 #include <dlfcn.h>
 #include <errno.h>
