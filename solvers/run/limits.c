@@ -13,9 +13,9 @@
 #include <stdio.h>
 #include "method.h"
 
-#define LIMITS_RESOLVED 1e-2   /* of the unit: eps |q| beyond which a run fails */
-#define LIMITS_FAST 1e3        /* in u / T: speeds beyond which growth is reported */
-#define LIMITS_GROWTH 0.25     /* exponent p of t^p above which a velocity counts as growing */
+#define LIMITS_RESOLVED 1e-2 /* of the unit: eps |q| beyond which a run fails */
+#define LIMITS_FAST 1e3      /* in u / T: speeds beyond which growth is reported */
+#define LIMITS_GROWTH 0.25   /* exponent p of t^p above which a velocity counts as growing */
 
 /* The largest velocity at the state reached, in units of the scene; *state: index of that velocity. */
 static double limits_speed (const pw_run *r, int *state) {
