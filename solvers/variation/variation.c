@@ -101,10 +101,9 @@ static int variation_changes (const pw_variation *x, pw_direction_copy *d) {
     for (int k = 0; k < s->batches; k++) {
       const pw_element_batch *a = &s->batch[k], *b = &other->batch[k];
       if (a->kind != b->kind || a->b.count != b->b.count) return PW_INPUT;
-      int differs = memcmp (a->b.element, b->b.element, (size_t)a->b.count * a->kind->element) != 0;
-      differs |= variation_signals (a, b);
-      d->changes[k] |= differs != 0;
-      d->signals |= differs && a->kind->signals > 0;
+      int signals = variation_signals (a, b);
+      d->changes[k] |= signals || memcmp (a->b.element, b->b.element, (size_t)a->b.count * a->kind->element) != 0;
+      d->signals |= signals;
     }
     d->changes[s->batches] |=
         memcmp (s->mass, other->mass, bytes) != 0 || memcmp (s->constant, other->constant, bytes) != 0;
@@ -231,7 +230,7 @@ int pw_variation_advance (pw_variation *x, double t, double t_end, pw_error *err
     }
     if (status == PW_OK) status = variation_lead (x, t, t_end, error);
     if (status == PW_OK && pw_run_stop_requested (r)) return PW_STOPPED;
-    if (status == PW_OK) status = pw_variation_step (x, fmin (t, r->t), error);
+    if (status == PW_OK) status = pw_variation_step (x, fmin (t, r->breakpoint), error);
     pw_variation_forget (x);
   }
   return status;

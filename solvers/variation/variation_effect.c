@@ -74,6 +74,10 @@ static int effect_neighbour (pw_variation *x, pw_direction_copy *d, int i, doubl
   memcpy (w->configuration, x->r->w->configuration, (size_t)w->s->bodies * sizeof *w->configuration);
   pw_point_to_internal (w, x->q, x->v);
   int status = d->signals ? pw_update_signals (w, t, x->q, x->v) : PW_OK;
+  if (!d->signals) {
+    memcpy (w->u, x->r->w->u, 3 * (size_t)w->s->sources * sizeof *w->u);
+    w->t_signal = x->r->w->t_signal;
+  }
   for (int c = 0; c < d->columns && status == PW_OK; c++) {
     double weight = pw_variation_weight (&d->given, d->column[c].which, i);
     if (weight != 0) effect_add_to (x, d, w, c, weight);

@@ -33,7 +33,7 @@ typedef struct pw_direction_copy {
   /* of each column: */
   double *effect[2];      /* n + m: derivatives of f - M a - J^T lambda, gamma - J a by the parameter */
   double *row[2];         /* 2 m: of g, J v - eta */
-  int signals;            /* 1: some of the batches that differ have signals */
+  int signals;            /* 1: some signals differ in the neighbours */
   unsigned char *changes; /* of batches: 1 if it differs in the neighbours; then 1 for masses and constant forces */
   char *memory;
 } pw_direction_copy;
@@ -51,7 +51,7 @@ struct pw_variation {
   pw_linearisation linear;      /* at the state last evaluated */
   double t;                     /* of the derivatives */
   double at;                    /* time of the state last evaluated */
-  double h;                     /* next step */
+  double h, off;                /* next step, relative error of the last one */
   double *q, *v;                /* n: the state last evaluated */
   double *scratch;              /* 4 (2 n + m + entries + 3) */
   double *values, *output;      /* the same, 2 + m + entries: of pw_variation_outputs */
@@ -92,7 +92,7 @@ int pw_variation_outputs (pw_variation *x, const pw_variation_column *c, const d
 
 /* Makes every column's `trial`, projected, its derivatives at the state evaluated. */
 int pw_variation_begin (pw_variation *x, pw_error *error);
-/* A step that does not pass t1, up to which there are states. */
+/* A step that does not pass t1 or the state that the run has reached. */
 int pw_variation_step (pw_variation *x, double t1, pw_error *error);
 
 /* ---- variation_breakpoint.c ---- */

@@ -118,28 +118,40 @@ static double step_tolerance (const pw_run *r) {
   return pw_fixed_steps (r) ? STEP_TOLERANCE : fmax (STEP_TOLERANCE, 0.1 * r->settings.rtol);
 }
 
+/* The factor of the next step for a tolerance, with the error of the last step as well, which damps oscillations of the step
+ * at the limit of stability (Hairer & Wanner 1996, section IV.2). */
+static double step_factor (const pw_variation *x, double off, double tolerance) {
+  double factor = 0.9 * pow (off / tolerance, -0.17) * pow (fmax (x->off, 1e-4 * tolerance) / tolerance, 0.04);
+  return fmin (5, fmax (0.2, factor));
+}
+
 /* The next step by the error of one of size h: for the strict tolerance, or the loose one up to `fine`. */
-static double step_next (double h, double off, double tolerance, double fine) {
-  double strict = fmin (5, fmax (0.2, 0.9 * pow (off / tolerance, -0.2)));
-  double loose = fmin (5, fmax (0.2, 0.9 * pow (off / STEP_LOOSE, -0.2)));
-  return isfinite (off) ? fmax (h * strict, fmin (h * loose, fine)) : h / 10;
+static double step_next (const pw_variation *x, double h, double off, double tolerance, double fine) {
+  if (!isfinite (off)) return h / 10;
+  return fmax (h * step_factor (x, off, tolerance), fmin (h * step_factor (x, off, STEP_LOOSE), fine));
+}
+
+/* The end of the next step: two equal steps rather than a short one reach t1. */
+static double step_end (const pw_variation *x, double t1) {
+  double rest = t1 - x->t;
+  if (!(x->h < rest * (1 - 1e-9))) return fmin (t1, x->r->t);
+  return fmin (x->t + (2 * x->h > rest ? rest / 2 : x->h), x->r->t);
 }
 
 int pw_variation_step (pw_variation *x, double t1, pw_error *error) {
   double tolerance = step_tolerance (x->r), fine = pw_fixed_steps (x->r) ? STEP_RATIO * x->r->settings.step : 0;
   while (x->h > STEP_SMALLEST * x->r->w->scale.time) {
-    double rest = t1 - x->t, h = x->h < rest * (1 - 1e-9) ? x->h : rest, end = h < rest ? x->t + h : t1;
-    if (h < rest && 2 * h > rest) h = rest / 2, end = x->t + h;
+    double end = step_end (x, t1), h = end - x->t;
     int status = step_stages (x, h, end, error);
     if (status != PW_OK) return status;
-    double off = step_error (x, h), next = step_next (h, off, tolerance, fine);
+    double off = step_error (x, h), next = step_next (x, h, off, tolerance, fine);
     if (off <= (h <= fine ? STEP_LOOSE : tolerance)) {
       x->h = h < x->h ? fmax (x->h, next) : next;
-      x->t = end;
+      x->t = end, x->off = off;
       step_accept (x);
       return PW_OK;
     }
-    x->h = fmin (next, h / 2);
+    x->h = fmin (next, 0.9 * h);
   }
   if (pw_evaluate_J_at (x->r->w, x->at, x->q, x->v) == PW_OK && pw_watchdog_sine (x->r, NULL) < STEP_SINGULAR)
     return pw_fail (
