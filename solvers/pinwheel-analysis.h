@@ -89,8 +89,8 @@ int pw_variation_advance (pw_variation *x, double t, double t_end, pw_error *err
 
 /* The derivative along direction i of the sample at the time reached by pw_variation_advance: each number in it is that
  * of the sample differentiated at constant time (residuals, projection, balance: 0; without `ledger`, work, loss and
- * ledger: NaN).  error_of, unless NULL, receives its difference from the one with doubled `step`, divided by 3: a bound
- * on the error of the differences (0 with `initial` and with `no_error`).  Arrays are valid until the next call. */
+ * ledger: NaN).  error_of, unless NULL, receives an estimate of its error by differences and by integration, without that of
+ * the run (0 with `no_error`).  Arrays are valid until the next call. */
 int pw_variation_sample (pw_variation *x, int i, pw_sample *derivative, pw_sample *error_of, pw_error *error);
 
 /* The first breakpoint of the run after the time reached, or INFINITY; *slope: the derivative along direction i of that, or

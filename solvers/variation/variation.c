@@ -8,8 +8,9 @@
  *
  * the first part by the exact blocks of the element types (linear_variation.c), the second by differences of the systems
  * of neighbouring runs, at the state of this one (variation_effect.c).  Initial values of dq and dv are differences of
- * the neighbours' consistent initial states.  Each quantity is computed with two steps of p; from both follow the
- * result, extrapolated (Richardson), and its error.
+ * the neighbours' consistent initial states.  Differences with two steps of p give both the extrapolated ones (Richardson)
+ * and their error.  The error of the result obeys the same equations, with the error of the differences in place of the
+ * effects of p, and after each step with the error of the step added.
  *
  * One method serves all runs: the explicit pair of order 5 (variation_step.c) along the states that the run has reached,
  * with steps of its own, between which it ends at samples and breakpoints.  Steps of a run with a fixed step are usually
@@ -51,7 +52,7 @@ static int variation_arrays (pw_variation *x) {
     pw_array own[8 + 2 * (3 + PW_VARIATION_RATES)], *a = own;
     for (int c = 0; c < 2; c++) {
       pw_variation_column *k = &d->column[c];
-      *k = (pw_variation_column){ .direction = d, .which = c };
+      *k = (pw_variation_column){ .direction = d };
       *a++ = (pw_array){ &d->effect[c], n + m };
       *a++ = (pw_array){ &d->row[c], 2 * m };
       *a++ = (pw_array){ &k->Y, size };
@@ -115,18 +116,17 @@ static int variation_changes (const pw_variation *x, pw_direction_copy *d) {
 static int variation_start (pw_variation *x, pw_direction_copy *d, const pw_direction *given, pw_error *error) {
   int n = x->n;
   d->given = *given;
-  d->columns = given->initial || given->no_error ? 1 : 2;
-  if (given->no_error) d->column[0].which = 2;
+  d->columns = given->no_error ? 1 : 2;
   int status = variation_changes (x, d);
   if (status == PW_INPUT)
     return pw_fail (error, PW_INPUT, "direction %d: the elements change", (int)(d - x->direction) + 1);
   if (status != PW_OK) return pw_fail_memory (x->r->s, error);
   for (int c = 0; c < d->columns; c++) {
     double *Y = d->column[c].trial;
-    if (given->initial) memcpy (Y, given->initial, 2 * (size_t)n * sizeof *Y);
+    if (given->initial && c == 0) memcpy (Y, given->initial, 2 * (size_t)n * sizeof *Y);
     for (int i = 0; i < PW_VARIATION_NEAR && given->initial == NULL; i++) {
       const pw_run *r = given->neighbour[i];
-      double weight = pw_variation_weight (given, d->column[c].which, i);
+      double weight = pw_variation_weight (given, c, i);
       for (int j = 0; j < n; j++) Y[j] += weight * (r->q[j] - x->r->q[j]), Y[n + j] += weight * (r->v[j] - x->r->v[j]);
     }
   }
@@ -238,41 +238,30 @@ int pw_variation_advance (pw_variation *x, double t, double t_end, pw_error *err
 
 /* ---- Samples ---- */
 
-static void variation_fill (const pw_variation *x, double *out, const double *output, const pw_variation_column *c,
-                            double weight) {
-  int n = x->n, length = 2 * n, entries = x->entries;
-  for (int j = 0; j < length; j++) out[j] += weight * c->Y[j];
-  for (int j = 0; j < n; j++) out[length + j] += weight * c->K[0][n + j];
-  for (int i = 0; i < x->m; i++) out[3 * n + i] += weight * output[2 + entries + i];
-  for (int i = 0; i < entries; i++) out[3 * n + x->m + i] += x->ledger ? weight * c->Y[length + i] : NAN;
-}
-
-/* One combination of the columns' samples. */
-static int variation_combine (pw_variation *x, const pw_direction_copy *d, const double *weight, double *out,
-                              pw_sample *sample) {
-  int n = x->n;
-  const double *ledger = out + 3 * n + x->m;
-  memset (out, 0, (size_t)(3 * n + x->m + x->entries) * sizeof *out);
+/* A column as a sample; zeros without a column. */
+static int variation_fill (pw_variation *x, const pw_direction_copy *d, int c, pw_sample *sample) {
+  int n = x->n, m = x->m, entries = x->entries;
+  const pw_variation_column *from = &d->column[c];
+  double *out = x->sample[c], *ledger = out + 3 * n + m;
+  memset (out, 0, (size_t)(3 * n + m + entries) * sizeof *out);
   *sample = (pw_sample){ .t = x->t, .q = out, .v = out + n, .a = out + 2 * n, .lambda = out + 3 * n, .ledger = ledger };
-  for (const pw_variation_column *c = d->column; c < d->column + d->columns; c++) {
-    const double part = weight[pw_variation_index (c)];
-    if (pw_variation_outputs (x, c, c->Y, x->output) != PW_OK) return PW_METHOD;
-    variation_fill (x, out, x->output, c, part);
-    sample->kinetic += part * x->output[0];
-    sample->potential += part * x->output[1];
-  }
-  for (int i = 0; i < x->entries; i++)
+  if (c >= d->columns) return PW_OK;
+  if (pw_variation_outputs (x, from, from->Y, x->output) != PW_OK) return PW_METHOD;
+  memcpy (out, from->Y, 2 * (size_t)n * sizeof *out);
+  memcpy (out + 2 * n, from->K[0] + n, (size_t)n * sizeof *out);
+  memcpy (out + 3 * n, x->output + 2 + entries, (size_t)m * sizeof *out);
+  sample->kinetic = x->output[0], sample->potential = x->output[1];
+  for (int i = 0; i < entries; i++) {
+    ledger[i] = x->ledger ? from->Y[2 * n + i] : NAN;
     *(x->r->s->entry[i].type == PW_WORK ? &sample->work : &sample->loss) += ledger[i];
+  }
   return PW_OK;
 }
 
 int pw_variation_sample (pw_variation *x, int i, pw_sample *derivative, pw_sample *error_of, pw_error *error) {
   if (pw_require (x, "derivatives", error) != PW_OK) return PW_INPUT;
-  static const double two[2][2] = { { 4. / 3, -1. / 3 }, { 1. / 3, -1. / 3 } }, one[2][2] = { { 1, 0 }, { 0, 0 } };
-  const pw_direction_copy *d = &x->direction[i];
-  const double (*weight)[2] = d->columns > 1 ? two : one;
-  int status = variation_combine (x, d, weight[0], x->sample[0], derivative);
-  if (status == PW_OK && error_of) status = variation_combine (x, d, weight[1], x->sample[1], error_of);
+  int status = variation_fill (x, &x->direction[i], 0, derivative);
+  if (status == PW_OK && error_of) status = variation_fill (x, &x->direction[i], 1, error_of);
   (void)pw_evaluate_J_at (x->r->w, x->at, x->q, x->v);
   return status == PW_OK ? PW_OK : pw_fail (error, PW_METHOD, "t = %.6g s: a signal failed", x->t);
 }

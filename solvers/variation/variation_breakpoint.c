@@ -13,9 +13,10 @@
 /* Differences with two steps must agree to this, relative to the movement; curvature over a step is far smaller. */
 static const double BREAKPOINT_SMOOTH = 1e-3;
 
-static double breakpoint_derivative (const pw_direction_copy *d, int which) {
+/* The derivative of a breakpoint, or its error (c = 1). */
+static double breakpoint_derivative (const pw_direction_copy *d, int c) {
   double sum = 0;
-  for (int i = 0; i < PW_VARIATION_NEAR; i++) sum += pw_variation_weight (&d->given, which, i) * d->breakpoint[i];
+  for (int i = 0; i < PW_VARIATION_NEAR; i++) sum += pw_variation_weight (&d->given, c, i) * d->breakpoint[i];
   return sum;
 }
 
@@ -28,7 +29,7 @@ static int breakpoint_smooth (const pw_direction_copy *d, double next) {
   }
   double allowed = BREAKPOINT_SMOOTH * most + round;
   if (!d->given.one_sided && !(fabs (mean) <= allowed)) return 0;
-  return fabs (breakpoint_derivative (d, 0) - breakpoint_derivative (d, 1)) * step <= allowed;
+  return 3 * fabs (breakpoint_derivative (d, 1)) * step <= allowed;
 }
 
 int pw_variation_look_ahead (pw_variation *x, pw_direction_copy *d, double next, pw_error *error) {
@@ -64,7 +65,7 @@ int pw_variation_pass (pw_variation *x, pw_error *error) {
   double *before = x->values, next;
   memcpy (before, x->linear.a, (size_t)n * sizeof *before);
   next = pw_next_breakpoint (x->r->w, x->r->method->order > 2, x->t);
-  PW_EACH_COLUMN (c, x) c->slope = d->given.initial ? 0 : breakpoint_derivative (d, c->which);
+  PW_EACH_COLUMN (c, x) c->slope = d->given.initial ? 0 : breakpoint_derivative (d, pw_variation_index (c));
   for (int i = 0; i < x->count && status == PW_OK; i++) {
     pw_direction_copy *d = &x->direction[i];
     status = pw_variation_look_ahead (x, d, next, error);

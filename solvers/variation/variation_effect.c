@@ -5,11 +5,11 @@
 #include "rank.h"
 #include "variation_parts.h"
 
-double pw_variation_weight (const pw_direction *d, int which, int i) {
+double pw_variation_weight (const pw_direction *d, int c, int i) {
   static const double central[2][PW_VARIATION_NEAR] = { { 0, -0.5, 0.5, 0 }, { -0.25, 0, 0, 0.25 } };
   static const double one_sided[2][PW_VARIATION_NEAR] = { { -1.5, 2, -0.5, 0 }, { -0.75, 0, 1, -0.25 } };
   const double (*weight)[PW_VARIATION_NEAR] = d->one_sided ? one_sided : central;
-  return (which == 2 ? (4 * weight[0][i] - weight[1][i]) / 3 : weight[which][i]) / d->step;
+  return ((c == 0 ? 4 : 1) * weight[0][i] - weight[1][i]) / 3 / d->step;
 }
 
 /* ---- Effects of parameters ---- */
@@ -19,7 +19,7 @@ static void effect_add (double *to, const double *from, double weight, int n) {
 }
 
 /* The rows of a batch of a neighbour. */
-static void effect_rows (pw_variation *x, double *effect, double *row, pw_element_batch *k, double weight) {
+static void effect_rows (pw_variation *x, double *effect, double *row, pw_element_batch *k) {
   const pw_linearisation *l = &x->linear;
   int rows = k->kind->rows, n = x->n, m = x->m;
   double *gamma = l->z, *g = gamma + m, *eta = g + m;
@@ -37,52 +37,57 @@ static void effect_rows (pw_variation *x, double *effect, double *row, pw_elemen
       if (j >= n) continue;
       acceleration -= *J * l->a[j];
       velocity += *J * x->v[j];
-      effect[j] -= weight * *J * l->lambda[i];
+      effect[j] -= *J * l->lambda[i];
     }
-    effect[n + i] += weight * acceleration;
-    row[i] += weight * g[r];
-    row[m + i] += weight * velocity;
+    effect[n + i] += acceleration;
+    row[i] += g[r];
+    row[m + i] += velocity;
   }
 }
 
-static void effect_force (pw_variation *x, double *effect, pw_element_batch *k, double weight) {
+static void effect_force (const pw_variation *x, double *effect, pw_element_batch *k) {
   const double *f = k->block;
   k->kind->force (&k->b, k->block);
   for (int e = 0; e < k->b.count; e++)
     for (int c = 0; c < k->b.cols; c++, f++) {
       int j = pw_global (k, e, c);
-      if (j < x->n) effect[j] += weight * *f;
+      if (j < x->n) effect[j] += *f;
     }
 }
 
-/* Adds f - M a - J^T lambda, gamma - J a; g and J v - eta of a neighbour's system at the state of the run to those of
- * column c, without the elements that are the same in all neighbours. */
-static void effect_add_to (pw_variation *x, pw_direction_copy *d, pw_workspace *w, int c, double weight) {
+/* f - M a - J^T lambda, gamma - J a; g and J v - eta of a neighbour's system at the state of the run, without the elements
+ * that are the same in all neighbours. */
+static void effect_at_state (pw_variation *x, const pw_direction_copy *d, pw_workspace *w, double *effect,
+                             double *row) {
   const pw_system *s = w->s;
+  memset (effect, 0, (size_t)(x->n + x->m) * sizeof *effect);
+  memset (row, 0, 2 * (size_t)x->m * sizeof *row);
   for (int i = 0; i < s->batches; i++) {
     const pw_kind *kind = w->batch[i].kind;
     if (!d->changes[i]) continue;
-    if (kind->rows > 0) effect_rows (x, d->effect[c], d->row[c], &w->batch[i], weight);
-    if (kind->force && !kind->constant) effect_force (x, d->effect[c], &w->batch[i], weight);
+    if (kind->rows > 0) effect_rows (x, effect, row, &w->batch[i]);
+    if (kind->force && !kind->constant) effect_force (x, effect, &w->batch[i]);
   }
-  for (int j = 0; j < x->n && d->changes[s->batches]; j++)
-    d->effect[c][j] += weight * (s->constant[j] - s->mass[j] * x->linear.a[j]);
+  for (int j = 0; j < x->n && d->changes[s->batches]; j++) effect[j] += s->constant[j] - s->mass[j] * x->linear.a[j];
 }
 
 static int effect_neighbour (pw_variation *x, pw_direction_copy *d, int i, double t) {
   pw_workspace *w = d->given.neighbour[i]->w;
+  double *effect = x->output, *row = effect + x->n + x->m;
   memcpy (w->configuration, x->r->w->configuration, (size_t)w->s->bodies * sizeof *w->configuration);
   pw_point_to_internal (w, x->q, x->v);
-  int status = d->signals ? pw_update_signals (w, t, x->q, x->v) : PW_OK;
   if (!d->signals) {
     memcpy (w->u, x->r->w->u, 3 * (size_t)w->s->sources * sizeof *w->u);
     w->t_signal = x->r->w->t_signal;
+  } else if (pw_update_signals (w, t, x->q, x->v) != PW_OK)
+    return PW_METHOD;
+  effect_at_state (x, d, w, effect, row);
+  for (int c = 0; c < d->columns; c++) {
+    double weight = pw_variation_weight (&d->given, c, i);
+    effect_add (d->effect[c], effect, weight, x->n + x->m);
+    effect_add (d->row[c], row, weight, 2 * x->m);
   }
-  for (int c = 0; c < d->columns && status == PW_OK; c++) {
-    double weight = pw_variation_weight (&d->given, d->column[c].which, i);
-    if (weight != 0) effect_add_to (x, d, w, c, weight);
-  }
-  return status;
+  return PW_OK;
 }
 
 /* Between the breakpoints of the neighbours, of which one may be passed slightly before that of the run. */
@@ -127,10 +132,10 @@ static int effect_values (pw_run *r, double t, const double *q, const double *v,
   return PW_OK;
 }
 
-/* By the state: central differences over about 1e-5 of the scene, or twice that for column 1. */
+/* By the state: central differences over about 1e-5 of the scene. */
 static int effect_by_state (pw_variation *x, const pw_variation_column *c, const double *Y, double *out) {
   int n = x->n, m = x->m, status = PW_OK;
-  double step = (1 + pw_variation_index (c)) * 1e-5 / (c->largest > 0 ? c->largest : 1);
+  double step = 1e-5 / (c->largest > 0 ? c->largest : 1);
   double *q = x->values + 2 + x->entries + m, *v = q + n + 3, *lambda = v + n + 3;
   for (int side = -1; side <= 1 && status == PW_OK; side += 2) {
     for (int j = 0; j < n; j++) q[j] = x->q[j] + side * step * Y[j], v[j] = x->v[j] + side * step * Y[n + j];
@@ -146,7 +151,7 @@ int pw_variation_outputs (pw_variation *x, const pw_variation_column *c, const d
   int length = 2 + x->entries + x->m, status = PW_OK;
   memset (out, 0, (size_t)length * sizeof *out);
   for (int i = 0; i < PW_VARIATION_NEAR && status == PW_OK && d->given.initial == NULL; i++) {
-    double weight = pw_variation_weight (&d->given, c->which, i);
+    double weight = pw_variation_weight (&d->given, pw_variation_index (c), i);
     if (weight == 0) continue;
     status = effect_values (d->given.neighbour[i], effect_time (d, x->at), x->q, x->v, x->linear.lambda, x->values);
     effect_add (out, x->values, weight, length);
@@ -170,16 +175,21 @@ static void effect_accelerations (pw_variation *x, const pw_variation_column *c,
   memcpy (da, l->da, (size_t)x->n * sizeof *da);
 }
 
-int pw_variation_rates (pw_variation *x, int k) {
-  int n = x->n, status = PW_OK;
-  PW_EACH_COLUMN (c, x) {
-    memcpy (c->K[k], c->trial + n, (size_t)n * sizeof (double));
-    effect_accelerations (x, c, c->K[k] + n);
+void pw_variation_accelerate (pw_variation *x, int c, int k) {
+  for (pw_direction_copy *d = x->direction; d < x->direction + x->count; d++) {
+    pw_variation_column *to = &d->column[c];
+    if (c >= d->columns) continue;
+    memcpy (to->K[k], to->trial + x->n, (size_t)x->n * sizeof (double));
+    effect_accelerations (x, to, to->K[k] + x->n);
   }
+}
+
+int pw_variation_ledger_rates (pw_variation *x, int k) {
+  int status = PW_OK;
   if (!x->ledger) return PW_OK;
   PW_EACH_COLUMN (c, x) {
     if (status == PW_OK) status = pw_variation_outputs (x, c, c->trial, x->output);
-    memcpy (c->K[k] + 2 * n, x->output + 2, (size_t)x->entries * sizeof (double));
+    memcpy (c->K[k] + 2 * x->n, x->output + 2, (size_t)x->entries * sizeof (double));
   }
   /* J and its factors are again those of the state */
   if (pw_evaluate_J_at (x->r->w, x->at, x->q, x->v) == PW_OK) pw_saddle_factor (x->r->saddle);

@@ -11,10 +11,9 @@ enum {
   PW_VARIATION_POINTS = 256 /* most states of the run between the derivatives' time and its own */
 };
 
-/* One derivative: along a direction, with neighbours at `step` or at twice that. */
+/* The derivative along a direction, or its error. */
 typedef struct {
   const struct pw_direction_copy *direction;
-  int which;                     /* differences with: 0, `step`; 1, twice that; 2, both, extrapolated */
   double *Y;                     /* size: dq, dv, d ledger, the latter only with `ledger` */
   double *K[PW_VARIATION_RATES]; /* size: time derivatives of Y at the stages */
   double *lambda;                /* m: d lambda at the state last evaluated */
@@ -26,7 +25,7 @@ typedef struct {
 
 typedef struct pw_direction_copy {
   pw_direction given;
-  int columns; /* 2, or 1 with `initial` or `no_error` */
+  int columns; /* 2, or 1 with `no_error` */
   pw_variation_column column[2];
   double breakpoint[PW_VARIATION_NEAR]; /* of the neighbours: the next one */
   double first, last;                   /* times between which no neighbour has a breakpoint */
@@ -80,8 +79,10 @@ void pw_variation_state (const pw_variation *x, double t, double *out);
 
 /* Evaluates the linearised equations, and the effects of parameters, at (t, x->q, x->v).  A status. */
 int pw_variation_evaluate (pw_variation *x, double t, pw_error *error);
-/* The time derivative of every column's `trial` at the state evaluated, into K[k]. */
-int pw_variation_rates (pw_variation *x, int k);
+/* Time derivatives of the columns' `trial` at the state evaluated, into K[k]: of dq and dv of column c of each direction;
+ * then of the ledger, of all columns.  Non-zero if a signal fails. */
+void pw_variation_accelerate (pw_variation *x, int c, int k);
+int pw_variation_ledger_rates (pw_variation *x, int k);
 /* Projects every column's `trial` onto the linearised constraints at the state evaluated. */
 void pw_variation_project (pw_variation *x);
 /* Derivatives of kinetic and potential energy, the ledger's rates, least-norm multipliers along a column: 2 + entries + m
@@ -102,8 +103,8 @@ static inline int pw_variation_index (const pw_variation_column *c) {
   return (int)(c - c->direction->column);
 }
 
-/* Weight of neighbour i in the derivative by differences. */
-double pw_variation_weight (const pw_direction *d, int which, int i);
+/* Weight of neighbour i in column c: the derivative by extrapolated differences, or the error of the differences. */
+double pw_variation_weight (const pw_direction *d, int c, int i);
 /* Finds the neighbours' breakpoints that correspond to the next one of the run. */
 int pw_variation_look_ahead (pw_variation *x, pw_direction_copy *d, double next, pw_error *error);
 /* Passes the breakpoint at which run and derivatives have arrived. */

@@ -59,14 +59,31 @@ static int step_evaluate (pw_variation *x, double t, pw_error *error) {
   return pw_variation_evaluate (x, pw_before_breakpoint (x->r, t), error);
 }
 
-static int step_rates (pw_variation *x, int k, pw_error *error) {
-  return pw_variation_rates (x, k) == PW_OK ? PW_OK : pw_fail (error, PW_METHOD, "t = %.6g s: a signal failed", x->at);
+/* Adds the errors of the step, the difference of the pair, to the errors of derivatives: entries from `first` to `end` - 1. */
+static void step_add_errors (pw_variation *x, double h, int first, int end) {
+  PW_EACH_COLUMN (c, x) {
+    const pw_variation_column *derivative = &d->column[0];
+    if (c == derivative) continue;
+    for (int k = 0; k < PW_VARIATION_RATES; k++)
+      for (int j = first; j < end; j++) c->trial[j] += h * pw_erk5_tableau.e[k] * derivative->K[k][j];
+  }
 }
 
-/* The largest relative error of all columns. */
+static int step_fail (const pw_variation *x, pw_error *error) {
+  return pw_fail (error, PW_METHOD, "t = %.6g s: a signal failed", x->at);
+}
+
+static int step_rates (pw_variation *x, int k, pw_error *error) {
+  pw_variation_accelerate (x, 0, k);
+  pw_variation_accelerate (x, 1, k);
+  return pw_variation_ledger_rates (x, k) == PW_OK ? PW_OK : step_fail (x, error);
+}
+
+/* The largest relative error of all derivatives. */
 static double step_error (pw_variation *x, double h) {
   double most = 0;
   PW_EACH_COLUMN (c, x) {
+    if (pw_variation_index (c) > 0) continue;
     double *e = x->values, size = fmax (c->largest, step_norm (x, c->trial));
     if (c->direction->given.initial == NULL) size = fmax (size, STEP_LEAST * 1e-5 / fabs (c->direction->given.step));
     memset (e, 0, (size_t)x->size * sizeof *e);
@@ -92,7 +109,12 @@ static int step_stages (pw_variation *x, double h, double t1, pw_error *error) {
   if (status != PW_OK) return status;
   step_stage (x, b->b, b->stages, h); /* at the state of the last stage */
   pw_variation_project (x);
-  return step_rates (x, b->stages, error);
+  pw_variation_accelerate (x, 0, b->stages);
+  step_add_errors (x, h, 0, 2 * x->n);
+  pw_variation_accelerate (x, 1, b->stages);
+  if (pw_variation_ledger_rates (x, b->stages) != PW_OK) return step_fail (x, error);
+  step_add_errors (x, h, 2 * x->n, x->size);
+  return PW_OK;
 }
 
 static void step_accept (pw_variation *x) {

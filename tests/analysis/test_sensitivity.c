@@ -39,13 +39,18 @@ static void test_sleigh (void **state) {
   static const double expected[] = { -2.19064940477924161196941078323, 4.38129880955848322393882156646,
                                      -23.1682436429820667965804011701, -3.52690525296758368801569681518,
                                      -1.6156668371657765493636643037 };
-  double x[SENSITIVITY_MOST];
+  double x[SENSITIVITY_MOST], error[SENSITIVITY_MOST];
   (void)state;
   cli_good ("pinwheel sensitivity chaplygin-sleigh --of sleigh.phi --by m --by I --by a --by u0 --by w0 -o @/sens");
   assert_int_equal (sensitivity_last (x), 7);
   for (int i = 0; i < 5; i++)
     check_close ("derivative", x[2 + i], expected[i], 1e-8 * fabs (expected[i]),
                  "steps of 1e-9, about 20 of them matter");
+  assert_int_equal (sensitivity_json ("\"error\": ", error), 5);
+  for (int i = 0; i < 5; i++) {
+    check_below ("derivative", fabs (x[2 + i] - expected[i]), error[i], "the estimate is that of order 4");
+    check_below ("error", error[i], 1e-8 * fabs (expected[i]), "steps of 1e-9, about 20 of them matter");
+  }
   assert_non_null (strstr (cli_out, "  a [m]                   0.25   -23.1682436  rad per m"));
 }
 
@@ -132,6 +137,21 @@ static void test_parameters (void **state) {
   check_close ("dwork/dI", x[5], pow (sin (2), 2) / 2, 1e-9, "steps of 1e-9");
 }
 
+/* A chain of ten rods amplifies errors of integration, which differ with the rows of the table, by 1e9 in 3 s. */
+static void test_chaos (void **state) {
+  double x[2], error[2];
+  (void)state;
+  for (int i = 0; i < 2; i++) {
+    cli_shell (i ? "pinwheel sensitivity chain --of link1.x --by l --every 0.1 -o @/sens"
+                 : "pinwheel sensitivity chain --of link1.x --by l -o @/sens");
+    assert_int_equal (sensitivity_json ("\"derivative\": ", x + i), 1);
+    assert_int_equal (sensitivity_json ("\"error\": ", error + i), 1);
+    assert_string_equal (cli_err, "pinwheel: the motion amplifies errors; uncertain by more than 1 %: link1.x by l\n");
+  }
+  assert_true (fabs (x[1] - x[0]) > 0.01 * fabs (x[0]));
+  check_below ("difference", fabs (x[1] - x[0]), error[0] + error[1], "the estimated errors");
+}
+
 /* A breakpoint that moves: the accelerations before it and after it differ, whatever the times of rows. */
 static void test_pulse (void **state) {
   double x[2][SENSITIVITY_MOST];
@@ -192,7 +212,7 @@ int main (void) {
   const struct CMUnitTest tests[] = {
     cmocka_unit_test (test_sleigh),   cmocka_unit_test (test_pendulum),   cmocka_unit_test (test_incline),
     cmocka_unit_test (test_outputs),  cmocka_unit_test (test_pulse),      cmocka_unit_test (test_files),
-    cmocka_unit_test (test_refusals), cmocka_unit_test (test_parameters),
+    cmocka_unit_test (test_refusals), cmocka_unit_test (test_parameters), cmocka_unit_test (test_chaos),
   };
   return cmocka_run_group_tests (tests, cli_setup, cli_teardown);
 }

@@ -97,7 +97,7 @@ static void block_derive (block b, const char *name, const char *method, double 
   check_ok (pw_variation_sample (v, 0, &x, &e, &error), &error);
   out[0] = x.q[0];
   out[1] = x.v[0];
-  check_below ("error", fmax (fabs (e.q[0]), fabs (e.v[0])), 1e-8 * (1 + fabs (x.q[0])), "differences of 1e-5");
+  check_below ("error", fmax (fabs (e.q[0]), fabs (e.v[0])), 1e-7 * (1 + fabs (x.q[0])), "steps to 1e-9 each");
   pw_variation_close (v);
   variation_free (&c);
 }

@@ -58,6 +58,24 @@ static void sensitivity_print (const pw_sensitivity *x) {
   }
 }
 
+/* 1 if the error exceeds 1 % of the derivative, and of the output for a change of the unknown by its size. */
+static int sensitivity_is_uncertain (const pw_sensitivity *x, int o, int p) {
+  double result[3], value = pw_outcome_value (&x->outcomes, o, NULL), size = 1e5 * fabs (x->direction[p].step);
+  sensitivity_result (x, o, p, result);
+  return result[1] > 0.01 * fabs (result[0]) && result[1] * size > fmax (0.01 * fabs (value), 1e-6);
+}
+
+static void sensitivity_warn (const pw_sensitivity *x) {
+  char list[1000] = "";
+  size_t used = 0;
+  for (int o = 0; o < x->outcomes.outcomes && !x->stopped; o++)
+    for (int p = 0; p < x->unknowns && used < sizeof list; p++)
+      if (sensitivity_is_uncertain (x, o, p))
+        used += (size_t)snprintf (list + used, sizeof list - used, "%s%s by %s", used ? ", " : "", x->of[o],
+                                  x->unknown[p].name);
+  if (used) pw_cli_say ("pinwheel: the motion amplifies errors; uncertain by more than 1 %%: %s\n", list);
+}
+
 /* ---- Files ---- */
 
 static void sensitivity_json (const void *context, pw_json *j) {
@@ -226,7 +244,7 @@ static int sensitivity_command (void *options, pw_error *error) {
   if (status == PW_OK) status = pw_figure_results (&x->line, &x->m, x->folder, "sensitivity", &lock, error);
   if (status == PW_OK) pw_report_model (x->m.model);
   if (status == PW_OK) status = sensitivity_compute (x, error);
-  if (status == PW_OK) sensitivity_print (x);
+  if (status == PW_OK) sensitivity_print (x), sensitivity_warn (x);
   if (status == PW_OK && x->folder) status = sensitivity_write (x, error);
   int stopped = status == PW_OK && x->stopped;
   if (stopped) status = pw_limit_fail (&x->limit, pw_run_time (x->base.run), error);
