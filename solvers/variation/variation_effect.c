@@ -5,11 +5,15 @@
 #include "rank.h"
 #include "variation_parts.h"
 
-double pw_variation_weight (const pw_direction *d, int c, int i) {
+/* Weight of neighbour i in the difference with `step` (which = 0) or twice that. */
+static double effect_weight (const pw_direction *d, int which, int i) {
   static const double central[2][PW_VARIATION_NEAR] = { { 0, -0.5, 0.5, 0 }, { -0.25, 0, 0, 0.25 } };
   static const double one_sided[2][PW_VARIATION_NEAR] = { { -1.5, 2, -0.5, 0 }, { -0.75, 0, 1, -0.25 } };
-  const double (*weight)[PW_VARIATION_NEAR] = d->one_sided ? one_sided : central;
-  return ((c == 0 ? 4 : 1) * weight[0][i] - weight[1][i]) / 3 / d->step;
+  return (d->one_sided ? one_sided : central)[which][i] / d->step;
+}
+
+double pw_variation_weight (const pw_direction *d, int c, int i) {
+  return ((c == 0 ? 4 : 1) * effect_weight (d, 0, i) - effect_weight (d, 1, i)) / 3;
 }
 
 /* ---- Effects of parameters ---- */
@@ -19,7 +23,7 @@ static void effect_add (double *to, const double *from, double weight, int n) {
 }
 
 /* The rows of a batch of a neighbour. */
-static void effect_rows (pw_variation *x, double *effect, double *row, pw_element_batch *k) {
+static void effect_rows (pw_variation *x, double *effect, double *row, pw_element_batch *k, double weight) {
   const pw_linearisation *l = &x->linear;
   int rows = k->kind->rows, n = x->n, m = x->m;
   double *gamma = l->z, *g = gamma + m, *eta = g + m;
@@ -37,43 +41,40 @@ static void effect_rows (pw_variation *x, double *effect, double *row, pw_elemen
       if (j >= n) continue;
       acceleration -= *J * l->a[j];
       velocity += *J * x->v[j];
-      effect[j] -= *J * l->lambda[i];
+      effect[j] -= weight * *J * l->lambda[i];
     }
-    effect[n + i] += acceleration;
-    row[i] += g[r];
-    row[m + i] += velocity;
+    effect[n + i] += weight * acceleration;
+    row[i] += weight * g[r];
+    row[m + i] += weight * velocity;
   }
 }
 
-static void effect_force (const pw_variation *x, double *effect, pw_element_batch *k) {
+static void effect_force (pw_variation *x, double *effect, pw_element_batch *k, double weight) {
   const double *f = k->block;
   k->kind->force (&k->b, k->block);
   for (int e = 0; e < k->b.count; e++)
     for (int c = 0; c < k->b.cols; c++, f++) {
       int j = pw_global (k, e, c);
-      if (j < x->n) effect[j] += *f;
+      if (j < x->n) effect[j] += weight * *f;
     }
 }
 
-/* f - M a - J^T lambda, gamma - J a; g and J v - eta of a neighbour's system at the state of the run, without the elements
- * that are the same in all neighbours. */
-static void effect_at_state (pw_variation *x, const pw_direction_copy *d, pw_workspace *w, double *effect,
-                             double *row) {
+/* Adds f - M a - J^T lambda, gamma - J a; g and J v - eta of a neighbour's system at the state of the run to one of the
+ * differences, without the elements that are the same in all neighbours. */
+static void effect_add_to (pw_variation *x, pw_direction_copy *d, pw_workspace *w, int which, double weight) {
   const pw_system *s = w->s;
-  memset (effect, 0, (size_t)(x->n + x->m) * sizeof *effect);
-  memset (row, 0, 2 * (size_t)x->m * sizeof *row);
   for (int i = 0; i < s->batches; i++) {
     const pw_kind *kind = w->batch[i].kind;
     if (!d->changes[i]) continue;
-    if (kind->rows > 0) effect_rows (x, effect, row, &w->batch[i]);
-    if (kind->force && !kind->constant) effect_force (x, effect, &w->batch[i]);
+    if (kind->rows > 0) effect_rows (x, d->effect[which], d->row[which], &w->batch[i], weight);
+    if (kind->force && !kind->constant) effect_force (x, d->effect[which], &w->batch[i], weight);
   }
-  for (int j = 0; j < x->n && d->changes[s->batches]; j++) effect[j] += s->constant[j] - s->mass[j] * x->linear.a[j];
+  for (int j = 0; j < x->n && d->changes[s->batches]; j++)
+    d->effect[which][j] += weight * (s->constant[j] - s->mass[j] * x->linear.a[j]);
 }
 
 static int effect_neighbour (pw_variation *x, pw_direction_copy *d, int i, double t) {
   pw_workspace *w = d->given.neighbour[i]->w;
-  double *effect = x->output, *row = effect + x->n + x->m;
   memcpy (w->configuration, x->r->w->configuration, (size_t)w->s->bodies * sizeof *w->configuration);
   pw_point_to_internal (w, x->q, x->v);
   if (!d->signals) {
@@ -81,11 +82,9 @@ static int effect_neighbour (pw_variation *x, pw_direction_copy *d, int i, doubl
     w->t_signal = x->r->w->t_signal;
   } else if (pw_update_signals (w, t, x->q, x->v) != PW_OK)
     return PW_METHOD;
-  effect_at_state (x, d, w, effect, row);
-  for (int c = 0; c < d->columns; c++) {
-    double weight = pw_variation_weight (&d->given, c, i);
-    effect_add (d->effect[c], effect, weight, x->n + x->m);
-    effect_add (d->row[c], row, weight, 2 * x->m);
+  for (int which = 0; which < 2; which++) {
+    double weight = effect_weight (&d->given, which, i);
+    if (weight != 0) effect_add_to (x, d, w, which, weight);
   }
   return PW_OK;
 }
@@ -95,14 +94,26 @@ static double effect_time (const pw_direction_copy *d, double t) {
   return fmax (d->first, fmin (t, nextafter (d->last, -INFINITY)));
 }
 
+/* The two differences become the extrapolated one and its error, as in pw_variation_weight. */
+static void effect_extrapolate (double *one, double *two, int n) {
+  for (int i = 0; i < n; i++) {
+    double error = (one[i] - two[i]) / 3;
+    one[i] += error;
+    two[i] = error;
+  }
+}
+
 static int effect_direction (pw_variation *x, pw_direction_copy *d, double t) {
   int length = x->n + x->m, rows = 2 * x->m, status = PW_OK;
-  for (int c = 0; c < 2; c++) {
-    memset (d->effect[c], 0, (size_t)length * sizeof (double));
-    memset (d->row[c], 0, (size_t)rows * sizeof (double));
+  if (d->given.initial) return PW_OK;
+  for (int which = 0; which < 2; which++) {
+    memset (d->effect[which], 0, (size_t)length * sizeof (double));
+    memset (d->row[which], 0, (size_t)rows * sizeof (double));
   }
-  for (int i = 0; i < PW_VARIATION_NEAR && status == PW_OK && d->given.initial == NULL; i++)
+  for (int i = 0; i < PW_VARIATION_NEAR && status == PW_OK; i++)
     status = effect_neighbour (x, d, i, effect_time (d, t));
+  effect_extrapolate (d->effect[0], d->effect[1], length);
+  effect_extrapolate (d->row[0], d->row[1], rows);
   return status;
 }
 
