@@ -120,7 +120,7 @@ static int flow_vary (pw_periodic *x, pw_run *r, double end) {
   pw_direction *d = calloc ((size_t)size + 1, sizeof *d);
   pw_sample sample;
   if (d == NULL) return pw_fail_memory (x->s, &x->why);
-  for (int c = 0; c < size; c++) d[c].initial = x->basis + 2 * n * c;
+  for (int c = 0; c < size; c++) d[c].initial = x->basis + 2 * n * c, d[c].no_error = 1;
   pw_variation *variation = pw_variation_open (r, d, size, 0, &x->why);
   int status = variation ? pw_variation_advance (variation, end, end, &x->why) : x->why.status;
   for (int c = 0; c < size && status == PW_OK; c++) {
