@@ -60,8 +60,8 @@ static void periodic_one (const pw_periodic_cli *x, const pw_periodic_orbit *o) 
   double d[3];
   char text[200];
   periodic_displacement (o, d);
-  printf ("%s: a periodic motion, apart from %d symmetries\n\n", pw_file_name (x->m.file),
-          pw_periodic_symmetries (x->search));
+  printf ("%s: a periodic motion%s\n\n", pw_file_name (x->m.file),
+          pw_states_symmetries (pw_periodic_symmetries (x->search), text));
   printf ("  period                       %.9g s, %s\n", o->period, x->source);
   printf ("  displacement per period      %.6g m", periodic_round (d[2]));
   printf (periodic_round (d[2]) > 0 ? ": %.6g m along %s, %.6g m to its left\n" : "\n", periodic_round (d[0]),
@@ -76,8 +76,9 @@ static void periodic_one (const pw_periodic_cli *x, const pw_periodic_orbit *o) 
 }
 
 static void periodic_branch (const pw_periodic_cli *x) {
-  printf ("%s: a branch of periodic motions, %s from %.9g to %.9g, %d symmetries, %d points\n\n",
-          pw_file_name (x->m.file), x->vary.name, x->set.first, x->set.last, pw_periodic_symmetries (x->search),
+  char text[40];
+  printf ("%s: a branch of periodic motions%s, %s from %.9g to %.9g, %d points\n\n", pw_file_name (x->m.file),
+          pw_states_symmetries (pw_periodic_symmetries (x->search), text), x->vary.name, x->set.first, x->set.last,
           x->points);
   for (pw_table t = { 0 }; pw_table_pass (&t);) {
     pw_cell (&t, -15, "event");

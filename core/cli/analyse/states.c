@@ -57,3 +57,8 @@ void pw_states_head (const pw_system *s, pw_text *t) {
   for (int i = 0; i < 2 * pw_system_coordinates (s); i++)
     pw_text_name (t, pw_system_state_name (s, i, name, sizeof name), pw_system_state_unit (s, i));
 }
+
+const char *pw_states_symmetries (int count, char text[40]) {
+  snprintf (text, 40, count == 0 ? "" : count == 1 ? " up to 1 symmetry" : " up to %d symmetries", count);
+  return text;
+}

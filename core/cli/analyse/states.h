@@ -22,4 +22,7 @@ void pw_states_print (const pw_system *s, const double *q, const double *v, int 
 void pw_states_json (const pw_system *s, const double *q, const double *v, const char *key, pw_json *j);
 void pw_states_head (const pw_system *s, pw_text *t);
 
+/* " up to 3 symmetries", or "" without. */
+const char *pw_states_symmetries (int count, char text[40]);
+
 #endif

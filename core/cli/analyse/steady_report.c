@@ -99,17 +99,18 @@ static void steady_branches (const pw_steady_cli *x) {
 }
 
 void pw_steady_print (const pw_steady_cli *x) {
-  char first[32], last[32];
-  const char *model = pw_file_name (x->m.file);
+  char first[32], last[32], text[40];
+  const char *model = pw_file_name (x->m.file),
+             *symmetries = pw_states_symmetries (pw_steady_symmetries (x->steady), text);
   if (x->vary_text) {
-    printf ("%s: %d %s of steady motions, %s from %s to %s, %d symmetries\n\n", model, x->branches,
-            x->branches == 1 ? "branch" : "branches", x->vary.name, pw_format (first, x->set.first, 9),
-            pw_format (last, x->set.last, 9), pw_steady_symmetries (x->steady));
+    printf ("%s: %d %s of steady motions%s, %s from %s to %s\n\n", model, x->branches,
+            x->branches == 1 ? "branch" : "branches", symmetries, x->vary.name, pw_format (first, x->set.first, 9),
+            pw_format (last, x->set.last, 9));
     steady_branches (x);
     return;
   }
-  printf ("%s: %d steady %s, apart from %d symmetries, from the initial state and %d random ones\n\n", model, x->points,
-          x->points == 1 ? "motion" : "motions", pw_steady_symmetries (x->steady), x->attempts);
+  printf ("%s: %d steady %s%s, from the initial state and %d random ones\n\n", model, x->points,
+          x->points == 1 ? "motion" : "motions", symmetries, x->attempts);
   steady_motions (x);
   for (int i = 0; i < x->points && i < STEADY_CONFIGURATIONS; i++) {
     const double *state = x->point[i].state;
