@@ -148,11 +148,12 @@ static int initial_ranked (pw_run *r, const unsigned char *prescribed, initial_f
   const pw_system *s = r->s;
   const unsigned char *before = r->active;
   size_t n = (size_t)s->coords, m = (size_t)s->rows;
-  initial_failure later;
+  initial_failure later = { .row = -1 };
   int status = initial_attempt (r, prescribed, r->q_given, failure, error), rank = s->rows;
   if (status != PW_RETRY || before || (double)s->rows * s->coords > PW_RANK_MOST) return status;
-  double *at = malloc (2 * n * sizeof *at + m), *from = at + n;
+  double *at = malloc (2 * n * sizeof *at + m);
   if (at == NULL) return pw_fail_memory (s, error);
+  double *from = at + n;
   unsigned char *active = (unsigned char *)(from + n);
   memcpy (at, r->q_given, n * sizeof *at);
   memcpy (from, at, n * sizeof *at);
@@ -248,8 +249,9 @@ static int initial_try (pw_run *r, const unsigned char *prescribed, initial_fail
   const int sets = sizeof initial_sets / sizeof *initial_sets;
   const pw_system *s = r->s;
   size_t n = (size_t)s->coords;
-  unsigned char *mask = malloc (4 * n + 1), *last = mask + 2 * n;
+  unsigned char *mask = malloc (4 * n + 1);
   if (mask == NULL) return pw_fail_memory (s, error);
+  unsigned char *last = mask + 2 * n;
   int status = PW_RETRY, small = (double)s->rows * s->coords < INITIAL_SMALL, before = -1, assembled = 0;
   for (const struct initial_set *set = initial_sets; set < initial_sets + sets && status == PW_RETRY; set++) {
     if (!initial_mask (s, prescribed, set, mask)) continue;

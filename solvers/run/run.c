@@ -242,6 +242,7 @@ int pw_run_restart (pw_run *r, const double *q, const double *v, pw_error *error
   if (status == PW_OK) status = pw_run_evaluate (r, error);
   if (status == PW_OK) status = run_energy (r, &after, error);
   if (status == PW_OK) {
+    pw_run_count_moved (r);
     pw_watchdog_begin (r);
     if (!r->near_singular)
       pw_run_set_reference_level (r); /* accelerations near a singular configuration are no reference */

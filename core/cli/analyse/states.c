@@ -59,6 +59,7 @@ void pw_states_head (const pw_system *s, pw_text *t) {
 }
 
 const char *pw_states_symmetries (int count, char text[40]) {
-  snprintf (text, 40, count == 0 ? "" : count == 1 ? " up to 1 symmetry" : " up to %d symmetries", count);
+  *text = 0;
+  if (count > 0) snprintf (text, 40, " up to %d %s", count, count == 1 ? "symmetry" : "symmetries");
   return text;
 }
