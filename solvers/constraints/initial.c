@@ -12,6 +12,14 @@
 #include "method.h"
 #include "rank.h"
 
+/* Rows times coordinates above which dependent equations are not sought while states specified by the model are
+ * prescribed: that usually fails for sketches of linkages, which specify all positions. */
+#define INITIAL_SMALL 1e4
+
+/* Off the constraints dependent equations appear independent, the more the larger the residuals: hence several tolerances. */
+enum { TOLERANCES = 4 };
+static const double initial_tolerance[TOLERANCES] = { 1e-7, 1e-4, 1e-2, 0.1 };
+
 /* Where an attempt failed. */
 typedef struct {
   int row;
@@ -72,6 +80,48 @@ static int initial_velocities (pw_projector *p, pw_run *r, double *v, initial_fa
   return PW_RETRY;
 }
 
+static int initial_project (pw_run *r, int velocities, const double *weight, initial_failure *failure,
+                            pw_error *error) {
+  pw_projector p;
+  int status = pw_projector_open (&p, r, weight, weight + r->s->coords, error);
+  if (status != PW_OK) return status;
+  status = velocities ? initial_velocities (&p, r, r->v, failure) : initial_positions (&p, r, failure);
+  pw_projector_close (&p);
+  return status;
+}
+
+/* Projects positions or velocities.  If that fails since equations depend on each other in the coordinates that are not
+ * prescribed, it is repeated with independent ones; the others must then be satisfied by the prescribed values. */
+static int initial_stage (pw_run *r, int velocities, const unsigned char *prescribed, const double *weight,
+                          initial_failure *failure, pw_error *error) {
+  const pw_system *s = r->s;
+  const unsigned char *before = r->active;
+  size_t bytes = (size_t)s->coords * sizeof (double);
+  int small = (double)s->rows * s->coords < INITIAL_SMALL, rank = s->rows;
+  unsigned char *start = malloc (bytes + (size_t)s->rows + 1);
+  if (start == NULL) return pw_fail_memory (s, error);
+  unsigned char *active = start + bytes;
+  pw_residuals now;
+  initial_failure own;
+  memcpy (start, velocities ? r->v : r->q, bytes);
+  int status = initial_project (r, velocities, weight, failure, error);
+  for (int i = 0; i < TOLERANCES && status == PW_RETRY && prescribed && small; i++) {
+    memcpy (velocities ? r->v : r->q, start, bytes);
+    if (pw_evaluate_J_at (r->w, r->t, r->q, r->v) != PW_OK) break;
+    int found = pw_rank_select (r->w, initial_tolerance[i], prescribed, active);
+    if (found < 0) status = pw_fail_memory (s, error);
+    if (found < 0 || found == rank) continue;
+    rank = found;
+    r->active = active;
+    status = initial_project (r, velocities, weight, &own, error);
+    r->active = before;
+    pw_evaluate_residuals (r->w, NULL, &now);
+    if (status == PW_OK && !(now.position <= 64 * DBL_EPSILON)) status = PW_RETRY;
+  }
+  free (start);
+  return status;
+}
+
 /* One attempt from these positions and the given velocities, with some states prescribed.  The velocity metric is the
  * mass matrix if that determines all velocities, else the position metric. */
 static int initial_attempt (pw_run *r, const unsigned char *prescribed, const double *from, initial_failure *failure,
@@ -83,22 +133,18 @@ static int initial_attempt (pw_run *r, const unsigned char *prescribed, const do
   initial_weights (s, s->metric, prescribed, weight);
   int status = PW_OK;
   for (int choice = 0; choice < 2 && status == PW_OK; choice++) {
-    pw_projector p;
-    pw_error none = { 0 };
+    pw_error none = { 0 }, *why = choice == 0 ? &none : error;
     memcpy (r->q, from, bytes);
     memcpy (r->v, r->v_given, bytes);
     status = pw_evaluate_J_at (r->w, r->t, r->q, r->v);
     if (status != PW_OK) break;
     initial_weights (s, choice == 0 ? s->mass : s->metric, prescribed ? prescribed + s->coords : NULL,
                      weight + s->coords);
-    status = pw_projector_open (&p, r, weight, weight + s->coords, choice == 0 ? &none : error);
-    if (status == PW_OK) {
-      status = initial_positions (&p, r, failure);
-      failure->assembled |= status == PW_OK;
-      if (status == PW_OK) status = initial_velocities (&p, r, r->v, failure);
-      pw_projector_close (&p);
-      if (status != PW_RETRY || !failure->velocities) break;
-    }
+    status = initial_stage (r, 0, prescribed, weight, failure, why);
+    failure->assembled |= status == PW_OK;
+    if (status == PW_OK)
+      status = initial_stage (r, 1, prescribed ? prescribed + s->coords : NULL, weight, failure, why);
+    if (none.status == PW_OK && (status != PW_RETRY || !failure->velocities)) break;
     if (none.status == PW_RESOURCE) status = pw_fail (error, PW_RESOURCE, "%s", none.text);
     if (choice == 0 && none.status != PW_RESOURCE) status = PW_OK;
   }
@@ -140,11 +186,8 @@ int pw_initial_specified (const pw_initial_report *report, int state) {
 
 /* If redundant equations make an attempt with all equations fail, it is repeated with an independent set, selected at
  * the given positions or, failing that, at those reached by an attempt without prescribed values, from which it then
- * starts.  Off the constraints redundant equations appear independent, the more the larger the residuals: hence several
- * tolerances. */
+ * starts. */
 static int initial_ranked (pw_run *r, const unsigned char *prescribed, initial_failure *failure, pw_error *error) {
-  static const double tolerance[] = { 1e-7, 1e-4, 1e-2, 0.1 };
-  enum { TOLERANCES = sizeof tolerance / sizeof *tolerance };
   const pw_system *s = r->s;
   const unsigned char *before = r->active;
   size_t n = (size_t)s->coords, m = (size_t)s->rows;
@@ -164,7 +207,7 @@ static int initial_ranked (pw_run *r, const unsigned char *prescribed, initial_f
       rank = s->rows;
     }
     if (status != PW_RETRY || pw_evaluate_J_at (r->w, r->t, at, r->v_given) != PW_OK) continue;
-    int now = pw_rank_select (r->w, tolerance[i % TOLERANCES], active);
+    int now = pw_rank_select (r->w, initial_tolerance[i % TOLERANCES], NULL, active);
     if (now < 0) status = pw_fail_memory (s, error);
     if (now < 0 || now == rank) continue;
     rank = now;
@@ -239,10 +282,6 @@ static int initial_released (const pw_system *s, const unsigned char *prescribed
   for (int j = 0; prescribed && j < 2 * s->coords; j++) released |= prescribed[j] & PW_GIVEN && !mask[j];
   return released;
 }
-
-/* Rows times coordinates above which redundant equations are not sought while states specified by the model are
- * prescribed: that usually fails for sketches of linkages, which specify all positions. */
-#define INITIAL_SMALL 1e4
 
 static int initial_try (pw_run *r, const unsigned char *prescribed, initial_failure *failure, int *released,
                         pw_error *error) {

@@ -70,21 +70,28 @@ static int rank_keep (double tol, int most, double *rows, double *norm, int *kep
   return rank;
 }
 
-int pw_rank_basis (const pw_workspace *w, double tol, int holonomic, int all, double *rows, int *kept,
-                   unsigned char *active) {
+static int rank_basis (const pw_workspace *w, double tol, const unsigned char *fixed, int holonomic, int all,
+                       double *rows, int *kept, unsigned char *active) {
   const pw_system *s = w->s;
   double *norm = rows + (size_t)s->rows * (size_t)s->coords;
   pw_rank_rows (w, rows, NULL);
+  for (int i = 0; fixed && i < s->rows * s->coords; i++)
+    if (fixed[i % s->coords]) rows[i] = 0;
   memset (active, 0, (size_t)s->rows);
   int rank = rank_keep (tol, holonomic, rows, norm, kept, active, 0, 0, s->holonomic, s->coords);
   return rank_keep (tol, all, rows, norm, kept, active, rank, s->holonomic, s->rows, s->coords);
 }
 
-int pw_rank_select (const pw_workspace *w, double tol, unsigned char *active) {
+int pw_rank_basis (const pw_workspace *w, double tol, int holonomic, int all, double *rows, int *kept,
+                   unsigned char *active) {
+  return rank_basis (w, tol, NULL, holonomic, all, rows, kept, active);
+}
+
+int pw_rank_select (const pw_workspace *w, double tol, const unsigned char *fixed, unsigned char *active) {
   const pw_system *s = w->s;
   double *rows = malloc (pw_rank_room (s) * sizeof *rows);
   int *kept = malloc (((size_t)s->rows + 1) * sizeof *kept), rank = PW_RESOURCE;
-  if (rows && kept) rank = pw_rank_basis (w, tol, s->rows, s->rows, rows, kept, active);
+  if (rows && kept) rank = rank_basis (w, tol, fixed, s->rows, s->rows, rows, kept, active);
   free (rows);
   free (kept);
   return rank;

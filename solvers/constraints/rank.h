@@ -33,8 +33,9 @@ int pw_rank_basis (const pw_workspace *w, double tol, int holonomic, int all, do
 
 /* Rows kept by Gram-Schmidt on the evaluated J, lengths and angles in units of the scene: active[i] = 1 for a row
  * whose part independent of those kept before exceeds tol of it; holonomic equations first, of these the most
- * independent ones, in order where they are about equal.  Returns the rank, or PW_RESOURCE. */
-int pw_rank_select (const pw_workspace *w, double tol, unsigned char *active);
+ * independent ones, in order where they are about equal.  fixed, or NULL: 1 for coordinates without part in this.  Returns the
+ * rank, or PW_RESOURCE. */
+int pw_rank_select (const pw_workspace *w, double tol, const unsigned char *fixed, unsigned char *active);
 
 /* Selects r->active for the run at its consistent initial state: rows dependent there and at up to three configurations
  * nearby. It stays NULL if all equations are independent.  Errors: PW_RESOURCE, PW_INITIAL (the initial configuration

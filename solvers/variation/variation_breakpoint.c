@@ -13,10 +13,11 @@
 /* Differences with two steps must agree to this, relative to the movement; curvature over a step is far smaller. */
 static const double BREAKPOINT_SMOOTH = 1e-3;
 
-/* The derivative of a breakpoint, or its error (c = 1). */
+/* The derivative of a breakpoint, or its error (c = 1); without round-off where it does not move. */
 static double breakpoint_derivative (const pw_direction_copy *d, int c) {
   double sum = 0;
-  for (int i = 0; i < PW_VARIATION_NEAR; i++) sum += pw_variation_weight (&d->given, c, i) * d->breakpoint[i];
+  for (int i = 0; i < PW_VARIATION_NEAR; i++)
+    sum += pw_variation_weight (&d->given, c, i) * (d->breakpoint[i] - d->breakpoint[1]);
   return sum;
 }
 
