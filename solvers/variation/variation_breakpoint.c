@@ -1,8 +1,9 @@
 /* Breakpoints that move with a parameter.  At a breakpoint t_b the accelerations jump from a- to a+ and the states do not;
  * the derivatives of the states at constant time therefore jump by
  *
- *     dv+ = dv- + (a- - a+) dt_b/dp
+ *     dv+ = dv- + (a- - a+) dt_b/dp,
  *
+ * and those of work and losses by (P- - P+) dt_b/dp, with their powers P
  * (Rozenvasser 1967; Hairer, Norsett & Wanner 1993, section I.14, for smooth problems).  dt_b/dp comes from the breakpoints
  * of the neighbouring runs. */
 #include <float.h>
@@ -61,10 +62,18 @@ static int breakpoint_check (pw_variation *x, pw_error *error) {
   return pw_fail (error, PW_METHOD, "t = %.6g s: prescribed velocities jump: the motion is not differentiable", x->t);
 }
 
+/* Accelerations and powers at the state evaluated. */
+static int breakpoint_rates (pw_variation *x, double *rates) {
+  memcpy (rates, x->linear.a, (size_t)x->n * sizeof *rates);
+  if (pw_evaluate_J_at (x->r->w, x->at, x->q, x->v) != PW_OK) return PW_METHOD;
+  pw_ledger_rates (x->r, x->linear.lambda, rates + x->n);
+  return PW_OK;
+}
+
 int pw_variation_pass (pw_variation *x, pw_error *error) {
   int n = x->n, status = PW_OK;
-  double *before = x->values, next;
-  memcpy (before, x->linear.a, (size_t)n * sizeof *before);
+  double *before = x->values, *after = before + n + x->entries, next;
+  if (breakpoint_rates (x, before) != PW_OK) return pw_fail_signal (x->t, error);
   next = pw_next_breakpoint (x->r->w, x->r->method->order > 2, x->t);
   PW_EACH_COLUMN (c, x) c->slope = d->given.initial ? 0 : breakpoint_derivative (d, pw_variation_index (c));
   for (int i = 0; i < x->count && status == PW_OK; i++) {
@@ -74,9 +83,10 @@ int pw_variation_pass (pw_variation *x, pw_error *error) {
   if (status == PW_OK) status = pw_variation_evaluate (x, x->t, error);
   if (status == PW_OK) status = breakpoint_check (x, error);
   if (status != PW_OK) return status;
+  if (breakpoint_rates (x, after) != PW_OK) return pw_fail_signal (x->t, error);
   PW_EACH_COLUMN (c, x) {
     memcpy (c->trial, c->Y, (size_t)x->size * sizeof *c->Y);
-    for (int j = 0; j < n; j++) c->trial[n + j] += (before[j] - x->linear.a[j]) * c->slope;
+    for (int j = n; j < x->size; j++) c->trial[j] += (before[j - n] - after[j - n]) * c->slope;
   }
   memcpy (x->point[0].x + 2 * n, x->linear.a, (size_t)n * sizeof *before);
   x->passed = x->t;

@@ -206,6 +206,8 @@ static void test_refusals (void **state) {
   };
   (void)state;
   cli_bad_each ("sensitivity", each, sizeof each / sizeof *each);
+  cli_bad ("pinwheel sensitivity pendulum --of 'sqrt(-bob.x^2-1)' --by l -t 1", 4,
+           "sqrt(-bob.x^2-1) is not a finite number at the end of the run");
 }
 
 int main (void) {

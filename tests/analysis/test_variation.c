@@ -83,8 +83,8 @@ static double block_value (const block *b, const char *name) {
                                        : b->width;
 }
 
-/* The derivatives of x and vx at time t. */
-static void block_derive (block b, const char *name, const char *method, double t, double out[2]) {
+/* The derivatives of x, vx and the work of the force at time t. */
+static void block_derive (block b, const char *name, const char *method, double t, double out[3]) {
   double value = block_value (&b, name);
   pw_sample x, e;
   pw_error error = { 0 };
@@ -97,6 +97,7 @@ static void block_derive (block b, const char *name, const char *method, double 
   check_ok (pw_variation_sample (v, 0, &x, &e, &error), &error);
   out[0] = x.q[0];
   out[1] = x.v[0];
+  out[2] = x.work;
   check_below ("error", fmax (fabs (e.q[0]), fabs (e.v[0])), 1e-7 * (1 + fabs (x.q[0])), "steps to 1e-9 each");
   pw_variation_close (v);
   variation_free (&c);
@@ -111,7 +112,7 @@ static void test_oscillator (void **state) {
   (void)state;
   for (size_t i = 0; i < sizeof methods / sizeof *methods; i++) {
     block b = { .k = 8, .m = 2, .x0 = 0.3, .start = 99, .width = 1 };
-    double d[2], bound = strcmp (methods[i], "galpha") && strcmp (methods[i], "leapfrog") ? 2e-8 : 1e-5;
+    double d[3], bound = strcmp (methods[i], "galpha") && strcmp (methods[i], "leapfrog") ? 2e-8 : 1e-5;
     const char *why = "the run's tolerance, or h^2 t w";
     block_derive (b, "k", methods[i], t, d);
     check_close ("dx/dk", d[0], -0.3 * t * sin (w * t) / (2 * sqrt (16.)), bound, why);
@@ -126,16 +127,18 @@ static void test_oscillator (void **state) {
 /* A free block pushed from `start` on for `width`: afterwards v = F width / m, x = v (t - start - width / 2). */
 static void test_breakpoints (void **state) {
   block b = { .m = 2, .height = 3, .start = 0.5, .width = 0.7 };
-  double d[2];
+  double d[3];
   (void)state;
   for (int i = 0; i < 3; i++) {
     const char *method = (const char *[]){ "rk4", "erk8", "bdf" }[i];
     block_derive (b, "start", method, 2, d);
     check_close ("dx/dstart", d[0], -3 * 0.7 / 2, 1e-9, "round-off of differences");
     check_close ("dv/dstart", d[1], 0, 1e-9, "round-off of differences");
+    check_close ("dW/dstart", d[2], 0, 1e-8, "round-off of differences");
     block_derive (b, "width", method, 2, d);
     check_close ("dx/dwidth", d[0], 1.5 * (2 - 0.5 - 0.7), 1e-9, "round-off of differences");
     check_close ("dv/dwidth", d[1], 1.5, 1e-9, "round-off of differences");
+    check_close ("dW/dwidth", d[2], 2 * 1.5 * 0.7 * 1.5, 1e-8, "round-off of differences, W = m v^2 / 2");
   }
 }
 

@@ -14,11 +14,12 @@
 
 enum { SENSITIVITY_DIGITS = 9, SENSITIVITY_UNIT = 64 };
 
-/* "m per kg"; "" if both are unknown or numbers. */
+/* "m per kg"; "" if both are numbers, and of a formula, whose unit is unknown. */
 static const char *sensitivity_unit (const pw_sensitivity *x, int o, int p, char unit[SENSITIVITY_UNIT]) {
   char of[SENSITIVITY_UNIT / 2];
   const char *by = x->unknown[p].unit;
   pw_outcome_unit (&x->outcomes, o, of, sizeof of);
+  if (*of == 0 && x->outcomes.outcome[o].formula) return strcpy (unit, "");
   snprintf (unit, SENSITIVITY_UNIT, *by ? "%s per %s" : "%s", *of || *by == 0 ? of : "1", by);
   return unit;
 }
@@ -236,6 +237,13 @@ static int sensitivity_compute (pw_sensitivity *x, pw_error *error) {
   return status;
 }
 
+static int sensitivity_check (const pw_sensitivity *x, pw_error *error) {
+  for (int o = 0; o < x->outcomes.outcomes && !x->stopped; o++)
+    if (!isfinite (pw_outcome_value (&x->outcomes, o, NULL)))
+      return pw_fail (error, PW_METHOD, "%.300s is not a finite number at the end of the run", x->of[o]);
+  return PW_OK;
+}
+
 static int sensitivity_command (void *options, pw_error *error) {
   pw_sensitivity *x = options;
   int lock = -1, status = pw_cli_open (&x->m, &x->line, error);
@@ -244,6 +252,7 @@ static int sensitivity_command (void *options, pw_error *error) {
   if (status == PW_OK) status = pw_figure_results (&x->line, &x->m, x->folder, "sensitivity", &lock, error);
   if (status == PW_OK) pw_report_model (x->m.model);
   if (status == PW_OK) status = sensitivity_compute (x, error);
+  if (status == PW_OK) status = sensitivity_check (x, error);
   if (status == PW_OK) sensitivity_print (x), sensitivity_warn (x);
   if (status == PW_OK && x->folder) status = sensitivity_write (x, error);
   int stopped = status == PW_OK && x->stopped;
