@@ -97,8 +97,8 @@ int pw_variation_sample (pw_variation *x, int i, pw_sample *derivative, pw_sampl
  * of the one just reached. */
 double pw_variation_breakpoint (const pw_variation *x, int i, double *slope);
 
-/* Evaluations of the linearised equations so far, each of about 6 evaluations of the accelerations. */
-long pw_variation_evaluations (const pw_variation *x);
+/* The size of the next step of the derivatives [s], over which they are smooth. */
+double pw_variation_step_size (const pw_variation *x);
 
 void pw_variation_close (pw_variation *x);
 

@@ -200,8 +200,8 @@ void pw_variation_close (pw_variation *x) {
   free (x);
 }
 
-long pw_variation_evaluations (const pw_variation *x) {
-  return x->evaluations;
+double pw_variation_step_size (const pw_variation *x) {
+  return x->h;
 }
 
 /* ---- Advancing ---- */

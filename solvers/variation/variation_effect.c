@@ -120,7 +120,6 @@ static int effect_direction (pw_variation *x, pw_direction_copy *d, double t) {
 int pw_variation_evaluate (pw_variation *x, double t, pw_error *error) {
   pw_statistics before = x->r->statistics;
   int near = x->r->near_singular, status = pw_linear_evaluate (&x->linear, t, x->q, x->v);
-  x->evaluations++;
   x->at = t;
   for (int i = 0; i < x->count && status == PW_OK; i++) status = effect_direction (x, &x->direction[i], t);
   x->r->statistics = before;

@@ -58,7 +58,6 @@ struct pw_variation {
   int points, room;
   pw_variation_point *point; /* room: states of the run from t on */
   double passed;             /* the last breakpoint that the derivatives have passed */
-  long evaluations;
   char *memory;
 };
 

@@ -137,6 +137,28 @@ static void test_parameters (void **state) {
   check_close ("dwork/dI", x[5], pow (sin (2), 2) / 2, 1e-9, "steps of 1e-9");
 }
 
+/* Integrals over 200 periods, against differences. */
+static void test_oscillation (void **state) {
+  double x[2], value[2][SENSITIVITY_MOST];
+  (void)state;
+  cli_write ("fast.yaml",
+             "pinwheel: 1\nparameters:\n  - {name: c, value: 0.05, unit: N s/m}\n"
+             "bodies:\n  - {name: a, mass: 1, inertia: 1, start: {x: 1.1}}\n"
+             "elements:\n  - {spring: S, body: [ground, a], at: [[0, 0], [0, 0]], stiffness: 3943.84, damping: c, "
+             "length: 1}\n");
+  cli_good ("pinwheel sensitivity @/fast.yaml --of rms:a.vx --of mean:kinetic --by c -t 20 -o @/sens --every 20");
+  assert_int_equal (sensitivity_json ("\"derivative\": ", x), 2);
+  for (int i = 0; i < 2; i++) {
+    cli_good (
+        i ? "pinwheel sensitivity @/fast.yaml --of rms:a.vx --of mean:kinetic --by c -t 20 -o @/sens --set c=0.0505"
+          : "pinwheel sensitivity @/fast.yaml --of rms:a.vx --of mean:kinetic --by c -t 20 -o @/sens --set c=0.0495");
+    assert_int_equal (sensitivity_json ("\"value\": ", value[i]), 4);
+  }
+  for (int i = 0; i < 2; i++)
+    check_close ("derivative", x[i], (value[1][2 * i] - value[0][2 * i]) / 0.001, 1e-4 * fabs (x[i]),
+                 "differences: (dc t)^2 / 24");
+}
+
 /* A chain of ten rods amplifies errors of integration, which differ with the rows of the table, by 1e9 in 3 s. */
 static void test_chaos (void **state) {
   double x[2], error[2];
@@ -212,9 +234,10 @@ static void test_refusals (void **state) {
 
 int main (void) {
   const struct CMUnitTest tests[] = {
-    cmocka_unit_test (test_sleigh),   cmocka_unit_test (test_pendulum),   cmocka_unit_test (test_incline),
-    cmocka_unit_test (test_outputs),  cmocka_unit_test (test_pulse),      cmocka_unit_test (test_files),
-    cmocka_unit_test (test_refusals), cmocka_unit_test (test_parameters), cmocka_unit_test (test_chaos),
+    cmocka_unit_test (test_sleigh),      cmocka_unit_test (test_pendulum),   cmocka_unit_test (test_incline),
+    cmocka_unit_test (test_outputs),     cmocka_unit_test (test_pulse),      cmocka_unit_test (test_files),
+    cmocka_unit_test (test_refusals),    cmocka_unit_test (test_parameters), cmocka_unit_test (test_chaos),
+    cmocka_unit_test (test_oscillation),
   };
   return cmocka_run_group_tests (tests, cli_setup, cli_teardown);
 }

@@ -2,15 +2,16 @@
  *
  * An output is a function of functionals of columns.  At a time, the derivative of a column is that of the sample.  That
  * of an extremum is the column's at its time, since inside a step the effect of a shift of time vanishes; that of an
- * integral is the integral of the column's, by Gauss' formula with 5 nodes between rows of the table and breakpoints. */
+ * integral is the integral of the column's, by Gauss' formula with 5 nodes over a few steps of the derivatives, up to rows
+ * of the table and breakpoints. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 #include "sensitivity.h"
 #include "util.h"
 
-/* Rows of the table; intervals of integrals without a table; times of the progress without either. */
-enum { SENSITIVITY_ROWS = 1000, SENSITIVITY_INTERVALS = 200, SENSITIVITY_PARTS = 20 };
+/* Rows of the table; times of the progress without one; steps of the derivatives in an interval of integrals. */
+enum { SENSITIVITY_ROWS = 1000, SENSITIVITY_PARTS = 20, SENSITIVITY_STEPS = 2 };
 
 int pw_sensitivity_runs_along (const pw_sensitivity *x, int output) {
   const pw_outcome *o = &x->outcomes.outcome[output];
@@ -180,7 +181,8 @@ static int sensitivity_interval (pw_sensitivity *x, double t0, double t1, sensit
 
 static int sensitivity_along (pw_sensitivity *x, sensitivity_event *list, pw_progress *progress, pw_error *error) {
   double t = 0, slope;
-  int status = pw_sensitivity_at (x, 0, error);
+  int integrates = 0, status = pw_sensitivity_at (x, 0, error);
+  for (int i = 0; i < x->outcomes.functionals; i++) integrates |= pw_is_integral (x->outcomes.functional[i].type);
   if (status == PW_OK) status = sensitivity_row (x, 0, error);
   for (int i = 0; i < x->outcomes.functionals && status == PW_OK; i++)
     if (pw_is_extremum (x->outcomes.functional[i].type)) sensitivity_keep (x, i, 0);
@@ -188,6 +190,7 @@ static int sensitivity_along (pw_sensitivity *x, sensitivity_event *list, pw_pro
     double to = (double)k * x->dt < x->t_end * (1 - 1e-12) ? (double)k * x->dt : x->t_end;
     while (t < to && status == PW_OK) {
       double next = fmin (to, pw_variation_breakpoint (x->variation, 0, &slope));
+      if (integrates) next = fmin (next, t + SENSITIVITY_STEPS * pw_variation_step_size (x->variation));
       status = sensitivity_interval (x, t, next, list, error);
       t = next;
       pw_progress_at (progress, t);
@@ -221,10 +224,7 @@ static int sensitivity_workspaces (pw_sensitivity *x, pw_error *error) {
 
 int pw_sensitivity_open (pw_sensitivity *x, int unknowns, int table, pw_error *error) {
   size_t P = (size_t)unknowns;
-  int integrates = 0;
-  for (const char **of = x->of; *of; of++)
-    integrates |= strstr (*of, "integral:") || strstr (*of, "mean:") || strstr (*of, "rms:");
-  x->dt = x->t_end / (table ? SENSITIVITY_ROWS : integrates ? SENSITIVITY_INTERVALS : SENSITIVITY_PARTS);
+  x->dt = x->t_end / (table ? SENSITIVITY_ROWS : SENSITIVITY_PARTS);
   x->unknown = calloc (P, sizeof *x->unknown);
   x->near = calloc (4 * P, sizeof *x->near);
   x->direction = calloc (P, sizeof *x->direction);
