@@ -159,6 +159,15 @@ static void test_oscillation (void **state) {
                  "differences: (dc t)^2 / 24");
 }
 
+/* A force that jumps at x = 1: the derivative's jump is not computed, which is said. */
+static void test_jump (void **state) {
+  (void)state;
+  cli_write ("jump.yaml", "pinwheel: 1\nbodies:\n  - {name: a, mass: 1, inertia: 1, rate: {vx: 1}}\n"
+                          "elements:\n  - {force: F, body: a, fx: 'a.x > 1 ? -0.3 : 0'}\n");
+  cli_shell ("pinwheel sensitivity @/jump.yaml --of a.x --by a.vx -t 2");
+  assert_non_null (strstr (cli_err, "derivatives ignore these jumps: they are wrong where the motion passes one\n"));
+}
+
 /* A chain of ten rods amplifies errors of integration, which differ with the rows of the table, by 1e9 in 3 s. */
 static void test_chaos (void **state) {
   double x[2], error[2];
@@ -237,7 +246,7 @@ int main (void) {
     cmocka_unit_test (test_sleigh),      cmocka_unit_test (test_pendulum),   cmocka_unit_test (test_incline),
     cmocka_unit_test (test_outputs),     cmocka_unit_test (test_pulse),      cmocka_unit_test (test_files),
     cmocka_unit_test (test_refusals),    cmocka_unit_test (test_parameters), cmocka_unit_test (test_chaos),
-    cmocka_unit_test (test_oscillation),
+    cmocka_unit_test (test_oscillation), cmocka_unit_test (test_jump),
   };
   return cmocka_run_group_tests (tests, cli_setup, cli_teardown);
 }

@@ -250,7 +250,7 @@ static int sensitivity_command (void *options, pw_error *error) {
   if (status == PW_OK) status = sensitivity_settings (x, error);
   if (status == PW_OK) status = sensitivity_unknowns (x, error);
   if (status == PW_OK) status = pw_figure_results (&x->line, &x->m, x->folder, "sensitivity", &lock, error);
-  if (status == PW_OK) pw_report_model (x->m.model);
+  if (status == PW_OK) pw_report_derivatives (x->m.model);
   if (status == PW_OK) status = sensitivity_compute (x, error);
   if (status == PW_OK) status = sensitivity_check (x, error);
   if (status == PW_OK) sensitivity_print (x), sensitivity_warn (x);
