@@ -168,6 +168,35 @@ static void test_jump (void **state) {
   assert_non_null (strstr (cli_err, "derivatives ignore these jumps: they are wrong where the motion passes one\n"));
 }
 
+/* Integrals of reactions, which jump at breakpoints that move, against differences. */
+static void test_jumping_integrals (void **state) {
+  static const char command[] =
+      "pinwheel sensitivity @/rod.yaml --of integral:A.Fx --of rms:A.Fx --of mean:A.Fy --of F.work "
+      "--by s --by w -o @/sens -m erk8+projection --rtol 1e-11 --set s=%g --set w=%g";
+  double x[SENSITIVITY_MOST], value[2][SENSITIVITY_MOST];
+  char text[400];
+  (void)state;
+  cli_write ("rod.yaml", "pinwheel: 1\nrun: {t_end: 2}\nparameters:\n  - {name: s, value: 0.5, unit: s}\n"
+                         "  - {name: w, value: 0.7, unit: s}\n"
+                         "bodies:\n  - {name: rod, mass: 1, inertia: 0.1, start: {x: 1}}\n"
+                         "elements:\n  - {pin: A, body: [ground, rod], at: [[0, 0], [-1, 0]]}\n"
+                         "  - {force: F, body: rod, fx: {pulse: {height: 3, start: s, width: w}}}\n"
+                         "  - {gravity: g, acceleration: [0, -9.81]}\n");
+  snprintf (text, sizeof text, command, 0.5, 0.7);
+  cli_good (text);
+  assert_int_equal (sensitivity_json ("\"derivative\": ", x), 8);
+  for (int p = 0; p < 2; p++) {
+    for (int i = 0; i < 2; i++) {
+      double h = i ? 1e-4 : -1e-4;
+      snprintf (text, sizeof text, command, p == 0 ? 0.5 + h : 0.5, p == 1 ? 0.7 + h : 0.7);
+      cli_good (text);
+      assert_int_equal (sensitivity_json ("\"value\": ", value[i]), 12); /* each output's, then those of s and w */
+    }
+    for (int o = 0; o < 4; o++)
+      check_close ("derivative", x[2 * o + p], (value[1][3 * o] - value[0][3 * o]) / 2e-4, 1e-5, "differences of 1e-4");
+  }
+}
+
 /* A chain of ten rods amplifies errors of integration, which differ with the rows of the table, by 1e9 in 3 s. */
 static void test_chaos (void **state) {
   double x[2], error[2];
@@ -246,7 +275,7 @@ int main (void) {
     cmocka_unit_test (test_sleigh),      cmocka_unit_test (test_pendulum),   cmocka_unit_test (test_incline),
     cmocka_unit_test (test_outputs),     cmocka_unit_test (test_pulse),      cmocka_unit_test (test_files),
     cmocka_unit_test (test_refusals),    cmocka_unit_test (test_parameters), cmocka_unit_test (test_chaos),
-    cmocka_unit_test (test_oscillation), cmocka_unit_test (test_jump),
+    cmocka_unit_test (test_oscillation), cmocka_unit_test (test_jump),       cmocka_unit_test (test_jumping_integrals),
   };
   return cmocka_run_group_tests (tests, cli_setup, cli_teardown);
 }

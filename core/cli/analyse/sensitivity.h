@@ -28,8 +28,9 @@ typedef struct {
   double *value;         /* F */
   double *slope, *error; /* F x P: derivatives, and their errors */
   double *end_slope, *end_error;
-  int rows;    /* the table: t, then each output and its derivatives */
-  double *row; /* rows x columns */
+  double *before; /* F: values before a jump */
+  int rows;       /* the table: t, then each output and its derivatives */
+  double *row;    /* rows x columns */
   size_t room;
   int columns;
   double cpu;  /* [s] */

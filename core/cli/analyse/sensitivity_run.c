@@ -179,8 +179,28 @@ static int sensitivity_interval (pw_sensitivity *x, double t0, double t1, sensit
   return status == PW_OK ? pw_sensitivity_at (x, t1, error) : status;
 }
 
+/* To a breakpoint t_b from just before it.  The integral of a column that jumps there from x- to x+ has the derivative
+ * (x- - x+) dt_b/dp. */
+static int sensitivity_jump (pw_sensitivity *x, double t0, double t, pw_error *error) {
+  memcpy (x->before, x->value, (size_t)x->outcomes.functionals * sizeof *x->before);
+  int status = pw_sensitivity_at (x, t, error);
+  for (int i = 0; i < x->outcomes.functionals && status == PW_OK; i++) {
+    const pw_functional *f = &x->outcomes.functional[i];
+    double jump = x->before[i] - x->value[i], slope;
+    if (pw_is_extremum (f->type) && f->t > t0 && f->t <= t) sensitivity_keep (x, i, 1);
+    if (!pw_is_integral (f->type) || jump == 0) continue;
+    if (f->type != PW_INTEGRAL) jump /= x->t_end;
+    if (f->type == PW_RMS) jump *= (x->before[i] + x->value[i]) / (2 * f->value);
+    for (int p = 0; p < x->unknowns; p++) {
+      pw_variation_breakpoint (x->variation, p, &slope);
+      x->end_slope[i * x->unknowns + p] += jump * slope;
+    }
+  }
+  return status;
+}
+
 static int sensitivity_along (pw_sensitivity *x, sensitivity_event *list, pw_progress *progress, pw_error *error) {
-  double t = 0, slope;
+  double t = 0, slope, breakpoint;
   int integrates = 0, status = pw_sensitivity_at (x, 0, error);
   for (int i = 0; i < x->outcomes.functionals; i++) integrates |= pw_is_integral (x->outcomes.functional[i].type);
   if (status == PW_OK) status = sensitivity_row (x, 0, error);
@@ -189,9 +209,13 @@ static int sensitivity_along (pw_sensitivity *x, sensitivity_event *list, pw_pro
   for (long k = 1; t < x->t_end && status == PW_OK; k++) {
     double to = (double)k * x->dt < x->t_end * (1 - 1e-12) ? (double)k * x->dt : x->t_end;
     while (t < to && status == PW_OK) {
-      double next = fmin (to, pw_variation_breakpoint (x->variation, 0, &slope));
+      breakpoint = pw_variation_breakpoint (x->variation, 0, &slope);
+      double next = fmin (to, breakpoint);
       if (integrates) next = fmin (next, t + SENSITIVITY_STEPS * pw_variation_step_size (x->variation));
-      status = sensitivity_interval (x, t, next, list, error);
+      int jumps = integrates && next == breakpoint;
+      double end = jumps ? next - fmin (1e-9 * x->dt, next - t) : next;
+      status = sensitivity_interval (x, t, end, list, error);
+      if (status == PW_OK && jumps) status = sensitivity_jump (x, end, next, error);
       t = next;
       pw_progress_at (progress, t);
     }
@@ -235,13 +259,14 @@ int pw_sensitivity_open (pw_sensitivity *x, int unknowns, int table, pw_error *e
 
 static int sensitivity_arrays (pw_sensitivity *x, pw_error *error) {
   size_t F = (size_t)x->outcomes.functionals, P = (size_t)x->unknowns;
-  x->value = calloc (2 * F + 4 * F * P + 1, sizeof *x->value);
+  x->value = calloc (3 * F + 4 * F * P + 1, sizeof *x->value);
   x->columns = 1;
   for (int o = 0; o < x->outcomes.outcomes; o++)
     if (pw_sensitivity_runs_along (x, o)) x->columns += 1 + x->unknowns;
   if (x->value == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
   x->slope = x->value + 2 * F, x->error = x->slope + F * P;
   x->end_slope = x->error + F * P, x->end_error = x->end_slope + F * P;
+  x->before = x->end_error + F * P;
   return PW_OK;
 }
 
