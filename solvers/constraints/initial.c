@@ -80,20 +80,14 @@ static int initial_velocities (pw_projector *p, pw_run *r, double *v, initial_fa
   return PW_RETRY;
 }
 
-static int initial_project (pw_run *r, int velocities, const double *weight, initial_failure *failure,
-                            pw_error *error) {
-  pw_projector p;
-  int status = pw_projector_open (&p, r, weight, weight + r->s->coords, error);
-  if (status != PW_OK) return status;
-  status = velocities ? initial_velocities (&p, r, r->v, failure) : initial_positions (&p, r, failure);
-  pw_projector_close (&p);
-  return status;
+static int initial_project (pw_projector *p, pw_run *r, int velocities, initial_failure *failure) {
+  return velocities ? initial_velocities (p, r, r->v, failure) : initial_positions (p, r, failure);
 }
 
 /* Projects positions or velocities.  If that fails since equations depend on each other in the coordinates that are not
- * prescribed, it is repeated with independent ones; the others must then be satisfied by the prescribed values. */
-static int initial_stage (pw_run *r, int velocities, const unsigned char *prescribed, const double *weight,
-                          initial_failure *failure, pw_error *error) {
+ * prescribed, it is repeated with independent ones; the prescribed values must then satisfy the others to round-off. */
+static int initial_stage (pw_projector *p, pw_run *r, int velocities, const unsigned char *prescribed,
+                          const double *weight, initial_failure *failure, pw_error *error) {
   const pw_system *s = r->s;
   const unsigned char *before = r->active;
   size_t bytes = (size_t)s->coords * sizeof (double);
@@ -101,11 +95,13 @@ static int initial_stage (pw_run *r, int velocities, const unsigned char *prescr
   unsigned char *start = malloc (bytes + (size_t)s->rows + 1);
   if (start == NULL) return pw_fail_memory (s, error);
   unsigned char *active = start + bytes;
-  pw_residuals now;
-  initial_failure own;
   memcpy (start, velocities ? r->v : r->q, bytes);
-  int status = initial_project (r, velocities, weight, failure, error);
+  int status = initial_project (p, r, velocities, failure);
   for (int i = 0; i < TOLERANCES && status == PW_RETRY && prescribed && small; i++) {
+    pw_projector own;
+    pw_error why = { 0 };
+    pw_residuals now;
+    initial_failure unused;
     memcpy (velocities ? r->v : r->q, start, bytes);
     if (pw_evaluate_J_at (r->w, r->t, r->q, r->v) != PW_OK) break;
     int found = pw_rank_select (r->w, initial_tolerance[i], prescribed, active);
@@ -113,8 +109,14 @@ static int initial_stage (pw_run *r, int velocities, const unsigned char *prescr
     if (found < 0 || found == rank) continue;
     rank = found;
     r->active = active;
-    status = initial_project (r, velocities, weight, &own, error);
+    status = pw_projector_open (&own, r, weight, velocities ? weight + s->coords : weight, &why);
     r->active = before;
+    if (status != PW_OK) { /* out of memory, or the mass matrix does not determine these velocities */
+      status = why.status == PW_RESOURCE ? pw_fail (error, PW_RESOURCE, "%s", why.text) : PW_RETRY;
+      continue;
+    }
+    status = initial_project (&own, r, velocities, &unused);
+    pw_projector_close (&own);
     pw_evaluate_residuals (r->w, NULL, &now);
     if (status == PW_OK && !(now.position <= 64 * DBL_EPSILON)) status = PW_RETRY;
   }
@@ -133,18 +135,23 @@ static int initial_attempt (pw_run *r, const unsigned char *prescribed, const do
   initial_weights (s, s->metric, prescribed, weight);
   int status = PW_OK;
   for (int choice = 0; choice < 2 && status == PW_OK; choice++) {
-    pw_error none = { 0 }, *why = choice == 0 ? &none : error;
+    pw_projector p;
+    pw_error none = { 0 };
     memcpy (r->q, from, bytes);
     memcpy (r->v, r->v_given, bytes);
     status = pw_evaluate_J_at (r->w, r->t, r->q, r->v);
     if (status != PW_OK) break;
     initial_weights (s, choice == 0 ? s->mass : s->metric, prescribed ? prescribed + s->coords : NULL,
                      weight + s->coords);
-    status = initial_stage (r, 0, prescribed, weight, failure, why);
-    failure->assembled |= status == PW_OK;
-    if (status == PW_OK)
-      status = initial_stage (r, 1, prescribed ? prescribed + s->coords : NULL, weight, failure, why);
-    if (none.status == PW_OK && (status != PW_RETRY || !failure->velocities)) break;
+    status = pw_projector_open (&p, r, weight, weight + s->coords, choice == 0 ? &none : error);
+    if (status == PW_OK) {
+      status = initial_stage (&p, r, 0, prescribed, weight, failure, error);
+      failure->assembled |= status == PW_OK;
+      if (status == PW_OK)
+        status = initial_stage (&p, r, 1, prescribed ? prescribed + s->coords : NULL, weight, failure, error);
+      pw_projector_close (&p);
+      if (status != PW_RETRY || !failure->velocities) break;
+    }
     if (none.status == PW_RESOURCE) status = pw_fail (error, PW_RESOURCE, "%s", none.text);
     if (choice == 0 && none.status != PW_RESOURCE) status = PW_OK;
   }
