@@ -263,5 +263,5 @@ int pw_variation_sample (pw_variation *x, int i, pw_sample *derivative, pw_sampl
   int status = variation_fill (x, &x->direction[i], 0, derivative);
   if (status == PW_OK && error_of) status = variation_fill (x, &x->direction[i], 1, error_of);
   (void)pw_evaluate_J_at (x->r->w, x->at, x->q, x->v);
-  return status == PW_OK ? PW_OK : pw_fail (error, PW_METHOD, "t = %.6g s: a signal failed", x->t);
+  return status == PW_OK ? PW_OK : pw_fail_signal (x->t, error);
 }

@@ -62,9 +62,10 @@ static int breakpoint_check (pw_variation *x, pw_error *error) {
   return pw_fail (error, PW_METHOD, "t = %.6g s: prescribed velocities jump: the motion is not differentiable", x->t);
 }
 
-/* Accelerations and powers at the state evaluated. */
+/* Accelerations at the state evaluated and, with the ledger, powers. */
 static int breakpoint_rates (pw_variation *x, double *rates) {
   memcpy (rates, x->linear.a, (size_t)x->n * sizeof *rates);
+  if (!x->ledger) return PW_OK;
   if (pw_evaluate_J_at (x->r->w, x->at, x->q, x->v) != PW_OK) return PW_METHOD;
   pw_ledger_rates (x->r, x->linear.lambda, rates + x->n);
   return PW_OK;

@@ -69,14 +69,10 @@ static void step_add_errors (pw_variation *x, double h, int first, int end) {
   }
 }
 
-static int step_fail (const pw_variation *x, pw_error *error) {
-  return pw_fail (error, PW_METHOD, "t = %.6g s: a signal failed", x->at);
-}
-
 static int step_rates (pw_variation *x, int k, pw_error *error) {
   pw_variation_accelerate (x, 0, k);
   pw_variation_accelerate (x, 1, k);
-  return pw_variation_ledger_rates (x, k) == PW_OK ? PW_OK : step_fail (x, error);
+  return pw_variation_ledger_rates (x, k) == PW_OK ? PW_OK : pw_fail_signal (x->at, error);
 }
 
 /* The largest relative error of all derivatives. */
@@ -112,7 +108,7 @@ static int step_stages (pw_variation *x, double h, double t1, pw_error *error) {
   pw_variation_accelerate (x, 0, b->stages);
   step_add_errors (x, h, 0, 2 * x->n);
   pw_variation_accelerate (x, 1, b->stages);
-  if (pw_variation_ledger_rates (x, b->stages) != PW_OK) return step_fail (x, error);
+  if (pw_variation_ledger_rates (x, b->stages) != PW_OK) return pw_fail_signal (x->at, error);
   step_add_errors (x, h, 2 * x->n, x->size);
   return PW_OK;
 }

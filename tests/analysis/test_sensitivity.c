@@ -206,7 +206,8 @@ static void test_chaos (void **state) {
                  : "pinwheel sensitivity chain --of link1.x --by l -o @/sens");
     assert_int_equal (sensitivity_json ("\"derivative\": ", x + i), 1);
     assert_int_equal (sensitivity_json ("\"error\": ", error + i), 1);
-    assert_string_equal (cli_err, "pinwheel: the motion amplifies errors; uncertain by more than 1 %: link1.x by l\n");
+    assert_string_equal (
+        cli_err, "pinwheel: derivatives with errors above 1 %, as where the motion amplifies them: link1.x by l\n");
   }
   assert_true (fabs (x[1] - x[0]) > 0.01 * fabs (x[0]));
   check_below ("difference", fabs (x[1] - x[0]), error[0] + error[1], "the estimated errors");

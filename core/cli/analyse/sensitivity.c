@@ -59,7 +59,8 @@ static void sensitivity_print (const pw_sensitivity *x) {
   }
 }
 
-/* 1 if the error exceeds 1 % of the derivative, and of the output for a change of the unknown by its size. */
+/* 1 if the error exceeds 1 % of the derivative, and of the output (1e-6 at least, in SI units) for a change of the unknown by its
+ * size, of which direction.step is 1e-5. */
 static int sensitivity_is_uncertain (const pw_sensitivity *x, int o, int p) {
   double result[3], value = pw_outcome_value (&x->outcomes, o, NULL), size = 1e5 * fabs (x->direction[p].step);
   sensitivity_result (x, o, p, result);
@@ -74,7 +75,9 @@ static void sensitivity_warn (const pw_sensitivity *x) {
       if (sensitivity_is_uncertain (x, o, p))
         used += (size_t)snprintf (list + used, sizeof list - used, "%s%s by %s", used ? ", " : "", x->of[o],
                                   x->unknown[p].name);
-  if (used) pw_cli_say ("pinwheel: the motion amplifies errors; uncertain by more than 1 %%: %s\n", list);
+  if (used)
+    pw_cli_say ("pinwheel: derivatives with errors above 1 %%, as where the motion amplifies them: %s%s\n", list,
+                used < sizeof list ? "" : " ...");
 }
 
 /* ---- Files ---- */

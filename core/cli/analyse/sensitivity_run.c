@@ -10,7 +10,8 @@
 #include "sensitivity.h"
 #include "util.h"
 
-/* Rows of the table; times of the progress without one; steps of the derivatives in an interval of integrals. */
+/* Rows of the table; times of the progress without one; steps of the derivatives in an interval of integrals, in which the
+ * square of a column is smooth enough for 5 nodes. */
 enum { SENSITIVITY_ROWS = 1000, SENSITIVITY_PARTS = 20, SENSITIVITY_STEPS = 2 };
 
 int pw_sensitivity_runs_along (const pw_sensitivity *x, int output) {
@@ -200,7 +201,7 @@ static int sensitivity_jump (pw_sensitivity *x, double t0, double t, pw_error *e
 }
 
 static int sensitivity_along (pw_sensitivity *x, sensitivity_event *list, pw_progress *progress, pw_error *error) {
-  double t = 0, slope, breakpoint;
+  double t = 0, slope;
   int integrates = 0, status = pw_sensitivity_at (x, 0, error);
   for (int i = 0; i < x->outcomes.functionals; i++) integrates |= pw_is_integral (x->outcomes.functional[i].type);
   if (status == PW_OK) status = sensitivity_row (x, 0, error);
@@ -209,7 +210,7 @@ static int sensitivity_along (pw_sensitivity *x, sensitivity_event *list, pw_pro
   for (long k = 1; t < x->t_end && status == PW_OK; k++) {
     double to = (double)k * x->dt < x->t_end * (1 - 1e-12) ? (double)k * x->dt : x->t_end;
     while (t < to && status == PW_OK) {
-      breakpoint = pw_variation_breakpoint (x->variation, 0, &slope);
+      double breakpoint = pw_variation_breakpoint (x->variation, 0, &slope);
       double next = fmin (to, breakpoint);
       if (integrates) next = fmin (next, t + SENSITIVITY_STEPS * pw_variation_step_size (x->variation));
       int jumps = integrates && next == breakpoint;
