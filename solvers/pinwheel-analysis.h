@@ -74,6 +74,9 @@ typedef struct {
   const double *initial; /* copied; NULL with neighbours */
 } pw_direction;
 
+/* p of neighbour i, minus that of the run. */
+double pw_direction_offset (const pw_direction *d, int i);
+
 /* Derivatives of the motion of a run, integrated with it. */
 typedef struct pw_variation pw_variation;
 
@@ -83,8 +86,12 @@ typedef struct pw_variation pw_variation;
  * PW_METHOD if the state or a breakpoint is not differentiable; PW_RESOURCE. */
 pw_variation *pw_variation_open (pw_run *r, const pw_direction *d, int count, int ledger, pw_error *error);
 
-/* Advances the run and the derivatives to time t <= t_end, which is then in the last step of the run.  Returns as
- * pw_run_advance; also PW_METHOD where the motion is not differentiable. */
+/* 1 if accelerations may jump with the state: the system has element types of the user's, or signals that depend on it.  Then
+ * derivatives need states ahead of them: take samples of another run with the same settings. */
+int pw_variation_may_jump (const pw_system *s);
+
+/* Advances the run and the derivatives to time t <= t_end, which is then in the last step of the run unless accelerations
+ * may jump.  Returns as pw_run_advance; also PW_METHOD where the motion is not differentiable. */
 int pw_variation_advance (pw_variation *x, double t, double t_end, pw_error *error);
 
 /* The derivative along direction i of the sample at the time reached by pw_variation_advance: each number in it is that
@@ -96,6 +103,12 @@ int pw_variation_sample (pw_variation *x, int i, pw_sample *derivative, pw_sampl
 /* The first breakpoint of the run after the time reached, or INFINITY; *slope: the derivative along direction i of that, or
  * of the one just reached. */
 double pw_variation_breakpoint (const pw_variation *x, int i, double *slope);
+
+/* Advances the run to time t and returns the time just after the first jump of its accelerations with the state after the time
+ * reached, or INFINITY; at most 256 steps ahead.  NAN and the error if that fails. */
+double pw_variation_next_jump (pw_variation *x, double t, double t_end, pw_error *error);
+/* The derivative along direction i of the time of the last jump passed. */
+double pw_variation_jump_slope (const pw_variation *x, int i);
 
 /* The size of the next step of the derivatives [s], over which they are smooth. */
 double pw_variation_step_size (const pw_variation *x);

@@ -28,6 +28,9 @@
 #include "util.h"
 #include "variation_parts.h"
 
+/* Several times the movement of neighbours, in units of the scene: their accelerations may jump so much before the run's. */
+static const double VARIATION_NEAR = 1e-4;
+
 /* ---- Opening ---- */
 
 static int variation_linear (pw_variation *x) {
@@ -43,10 +46,18 @@ static int variation_linear (pw_variation *x) {
 static int variation_arrays (pw_variation *x) {
   size_t n = (size_t)x->n, m = (size_t)x->m, entries = (size_t)x->r->s->entries, size = (size_t)x->size;
   size_t all = 3 * n + 4 * m + entries + 9, sample = 3 * n + m + entries;
-  const pw_array array[] = { { &x->q, n + 3 },         { &x->v, n + 3 },    { &x->scratch, all },
-                             { &x->values, 2 * all },  { &x->output, all }, { &x->sample[0], sample },
-                             { &x->sample[1], sample } };
+  const pw_array array[] = { { &x->q, n + 3 },
+                             { &x->v, n + 3 },
+                             { &x->scratch, all },
+                             { &x->values, 2 * all },
+                             { &x->output, all },
+                             { &x->sample[0], sample },
+                             { &x->sample[1], sample },
+                             { &x->a[0], PW_VARIATION_RATES * n },
+                             { &x->hold[0].state, 2 * n },
+                             { &x->hold[1].state, 2 * n } };
   x->memory = pw_alloc_arrays (array, sizeof array / sizeof *array);
+  for (int k = 1; x->memory && k < PW_VARIATION_RATES; k++) x->a[k] = x->a[k - 1] + n;
   for (int i = 0; x->memory && i < x->count; i++) {
     pw_direction_copy *d = &x->direction[i];
     pw_array own[8 + 2 * (3 + PW_VARIATION_RATES)], *a = own;
@@ -147,6 +158,20 @@ static int variation_blocks (const pw_variation *x, pw_error *error) {
       x->r->s->model, block);
 }
 
+static double variation_reversal (pw_run *r) {
+  char element[80];
+  double least;
+  int state = pw_run_saturation (r, &least, element, sizeof element);
+  return state < 0 ? 1 : fmin (1, least * r->w->scale.time / pw_unit (r->s, state - r->s->coords));
+}
+
+int pw_variation_may_jump (const pw_system *s) {
+  int built_in = 0;
+  for (int i = 0; i < s->batches; i++)
+    for (const pw_kind *const *k = pw_kinds; *k; k++) built_in += *k == s->batch[i].kind;
+  return s->state_dependent > 0 || built_in < s->batches;
+}
+
 static int variation_open (pw_variation *x, const pw_direction *d, pw_error *error) {
   pw_run *r = x->r;
   if (pw_run_option (r, "inputs") != 0)
@@ -155,6 +180,7 @@ static int variation_open (pw_variation *x, const pw_direction *d, pw_error *err
     if (variation_check (x, &d[i], i, error) != PW_OK) return PW_INPUT;
   int status = variation_blocks (x, error);
   if (status != PW_OK) return status;
+  x->reversal = variation_reversal (r);
   x->direction = calloc ((size_t)x->count + 1, sizeof *x->direction);
   if (x->direction == NULL || variation_arrays (x) != PW_OK || variation_linear (x) != PW_OK)
     return pw_fail_memory (r->s, error);
@@ -180,6 +206,8 @@ pw_variation *pw_variation_open (pw_run *r, const pw_direction *d, int count, in
   x->size = 2 * x->n + (ledger ? x->entries : 0);
   x->t = r->t;
   x->passed = -INFINITY;
+  x->may_jump = pw_variation_may_jump (r->s);
+  x->hold[0].to = x->hold[1].to = -INFINITY;
   x->h = 1e-3 * r->w->scale.time;
   if (variation_open (x, d, error) == PW_OK) return x;
   pw_variation_close (x);
@@ -206,10 +234,9 @@ double pw_variation_step_size (const pw_variation *x) {
 
 /* ---- Advancing ---- */
 
-/* Advances the run until its states cover the next step of the derivatives. */
-static int variation_lead (pw_variation *x, double t, double t_end, pw_error *error) {
+/* Advances the run until its states reach time `to`, a breakpoint, or are too many. */
+static int variation_lead (pw_variation *x, double to, double t_end, pw_error *error) {
   pw_run *r = x->r;
-  double to = fmin (t, x->t + x->h);
   int status = PW_OK;
   while (status == PW_OK && r->t < to && x->points < PW_VARIATION_POINTS && (r->t < r->breakpoint || r->t == x->t)) {
     double t0 = r->t;
@@ -219,21 +246,48 @@ static int variation_lead (pw_variation *x, double t, double t_end, pw_error *er
   return status;
 }
 
+/* The time that the run must reach for the next step. */
+static double variation_ahead (const pw_variation *x, double t, double t_end) {
+  double near = x->may_jump ? VARIATION_NEAR * x->r->w->scale.time : 0;
+  return fmin (fmin (t, x->t + x->h) + near, t_end);
+}
+
+static int variation_pass (pw_variation *x, int (*pass) (pw_variation *x, pw_error *error), pw_error *error) {
+  int status = pass (x, error);
+  return status == PW_OK ? pw_variation_begin (x, error) : status;
+}
+
 int pw_variation_advance (pw_variation *x, double t, double t_end, pw_error *error) {
   if (pw_require (x, "derivatives", error) != PW_OK) return PW_INPUT;
   pw_run *r = x->r;
   int status = PW_OK;
   while (status == PW_OK && x->t < fmin (t, t_end)) {
-    if (x->t == r->breakpoint && x->passed < x->t) {
-      status = pw_variation_pass (x, error);
-      if (status == PW_OK) status = pw_variation_begin (x, error);
+    if (x->t == pw_variation_recorded_jump (x))
+      status = variation_pass (x, pw_variation_pass_jump, error);
+    else if (x->t == r->breakpoint && x->passed < x->t)
+      status = variation_pass (x, pw_variation_pass, error);
+    else {
+      status = variation_lead (x, variation_ahead (x, t, t_end), t_end, error);
+      if (status == PW_OK && pw_run_stop_requested (r)) return PW_STOPPED;
+      double to = fmin (fmin (t, r->breakpoint), pw_variation_recorded_jump (x));
+      if (status == PW_OK) status = pw_variation_approach_jump (x, error);
+      if (status == PW_OK) status = pw_variation_step (x, to, error);
     }
-    if (status == PW_OK) status = variation_lead (x, t, t_end, error);
-    if (status == PW_OK && pw_run_stop_requested (r)) return PW_STOPPED;
-    if (status == PW_OK) status = pw_variation_step (x, fmin (t, r->breakpoint), error);
     pw_variation_forget (x);
   }
   return status;
+}
+
+double pw_variation_next_jump (pw_variation *x, double t, double t_end, pw_error *error) {
+  int status = x->may_jump ? variation_lead (x, t, t_end, error) : PW_OK;
+  double jump = pw_variation_recorded_jump (x);
+  for (int i = 0; i + 1 < x->points && status == PW_OK; i++)
+    if (x->point[i].jumps && x->point[i].t == jump) return x->point[i + 1].t;
+  return status == PW_OK ? INFINITY : NAN;
+}
+
+double pw_variation_jump_slope (const pw_variation *x, int i) {
+  return x->direction[i].column[0].slope;
 }
 
 /* ---- Samples ---- */

@@ -71,27 +71,36 @@ static int breakpoint_rates (pw_variation *x, double *rates) {
   return PW_OK;
 }
 
-int pw_variation_pass (pw_variation *x, pw_error *error) {
+int pw_variation_jump (pw_variation *x, double t, const double *state, pw_error *error) {
   int n = x->n, status = PW_OK;
-  double *before = x->values, *after = before + n + x->entries, next;
+  double *before = x->values, *after = before + n + x->entries;
   if (breakpoint_rates (x, before) != PW_OK) return pw_fail_signal (x->t, error);
-  next = pw_next_breakpoint (x->r->w, x->r->method->order > 2, x->t);
+  memcpy (x->q, state, (size_t)n * sizeof *x->q);
+  memcpy (x->v, state + n, (size_t)n * sizeof *x->v);
+  status = pw_variation_evaluate (x, t, error);
+  if (status != PW_OK) return status;
+  if (breakpoint_rates (x, after) != PW_OK) return pw_fail_signal (t, error);
+  PW_EACH_COLUMN (c, x) {
+    memcpy (c->trial, c->Y, (size_t)x->size * sizeof *c->Y);
+    for (int j = n; j < x->size; j++) c->trial[j] += (before[j - n] - after[j - n]) * c->slope;
+  }
+  x->t = t;
+  return PW_OK;
+}
+
+int pw_variation_pass (pw_variation *x, pw_error *error) {
+  double next = pw_next_breakpoint (x->r->w, x->r->method->order > 2, x->t);
+  int status = PW_OK;
   PW_EACH_COLUMN (c, x) c->slope = d->given.initial ? 0 : breakpoint_derivative (d, pw_variation_index (c));
   for (int i = 0; i < x->count && status == PW_OK; i++) {
     pw_direction_copy *d = &x->direction[i];
     status = pw_variation_look_ahead (x, d, next, error);
   }
-  if (status == PW_OK) status = pw_variation_evaluate (x, x->t, error);
+  if (status == PW_OK) status = pw_variation_jump (x, x->t, x->point[0].x, error);
   if (status == PW_OK) status = breakpoint_check (x, error);
-  if (status != PW_OK) return status;
-  if (breakpoint_rates (x, after) != PW_OK) return pw_fail_signal (x->t, error);
-  PW_EACH_COLUMN (c, x) {
-    memcpy (c->trial, c->Y, (size_t)x->size * sizeof *c->Y);
-    for (int j = n; j < x->size; j++) c->trial[j] += (before[j - n] - after[j - n]) * c->slope;
-  }
-  memcpy (x->point[0].x + 2 * n, x->linear.a, (size_t)n * sizeof *before);
+  if (status == PW_OK) memcpy (x->point[0].x + 2 * x->n, x->linear.a, (size_t)x->n * sizeof (double));
   x->passed = x->t;
-  return PW_OK;
+  return status;
 }
 
 double pw_variation_breakpoint (const pw_variation *x, int i, double *slope) {

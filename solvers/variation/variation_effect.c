@@ -16,6 +16,11 @@ double pw_variation_weight (const pw_direction *d, int c, int i) {
   return ((c == 0 ? 4 : 1) * effect_weight (d, 0, i) - effect_weight (d, 1, i)) / 3;
 }
 
+double pw_direction_offset (const pw_direction *d, int i) {
+  static const double offset[2][PW_VARIATION_NEAR] = { { -2, -1, 1, 2 }, { 0, 1, 2, 4 } };
+  return offset[d->one_sided][i] * d->step;
+}
+
 /* ---- Effects of parameters ---- */
 
 static void effect_add (double *to, const double *from, double weight, int n) {
@@ -73,25 +78,41 @@ static void effect_add_to (pw_variation *x, pw_direction_copy *d, pw_workspace *
     d->effect[which][j] += weight * (s->constant[j] - s->mass[j] * x->linear.a[j]);
 }
 
-static int effect_neighbour (pw_variation *x, pw_direction_copy *d, int i, double t) {
-  pw_workspace *w = d->given.neighbour[i]->w;
+/* The time and the state at which neighbours are evaluated. */
+typedef struct {
+  double t;
+  const double *q, *v;
+  int held; /* 1: not those of the run */
+} effect_place;
+
+/* Between the breakpoints of the neighbours, of which one may be passed slightly before that of the run; likewise at jumps. */
+static effect_place effect_at (const pw_variation *x, const pw_direction_copy *d) {
+  for (const pw_variation_hold *h = x->hold; h < x->hold + 2; h++)
+    if (h->from <= x->at && x->at <= h->to) return (effect_place){ h->t, h->state, h->state + x->n, 1 };
+  double t = fmax (d->first, fmin (x->at, nextafter (d->last, -INFINITY)));
+  return (effect_place){ t, x->q, x->v, 0 };
+}
+
+/* Kinematics and signals of a neighbour; those of the run where they are the same. */
+static int effect_kinematics (pw_variation *x, const pw_direction_copy *d, pw_workspace *w) {
+  effect_place at = effect_at (x, d);
+  if (at.held) return pw_update_kinematics (w, at.t, at.q, at.v);
   memcpy (w->configuration, x->r->w->configuration, (size_t)w->s->bodies * sizeof *w->configuration);
   pw_point_to_internal (w, x->q, x->v);
-  if (!d->signals) {
-    memcpy (w->u, x->r->w->u, 3 * (size_t)w->s->sources * sizeof *w->u);
-    w->t_signal = x->r->w->t_signal;
-  } else if (pw_update_signals (w, t, x->q, x->v) != PW_OK)
-    return PW_METHOD;
+  if (d->signals) return pw_update_signals (w, at.t, x->q, x->v);
+  memcpy (w->u, x->r->w->u, 3 * (size_t)w->s->sources * sizeof *w->u);
+  w->t_signal = x->r->w->t_signal;
+  return PW_OK;
+}
+
+static int effect_neighbour (pw_variation *x, pw_direction_copy *d, int i) {
+  pw_workspace *w = d->given.neighbour[i]->w;
+  if (effect_kinematics (x, d, w) != PW_OK) return PW_METHOD;
   for (int which = 0; which < 2; which++) {
     double weight = effect_weight (&d->given, which, i);
     if (weight != 0) effect_add_to (x, d, w, which, weight);
   }
   return PW_OK;
-}
-
-/* Between the breakpoints of the neighbours, of which one may be passed slightly before that of the run. */
-static double effect_time (const pw_direction_copy *d, double t) {
-  return fmax (d->first, fmin (t, nextafter (d->last, -INFINITY)));
 }
 
 /* The two differences become the extrapolated one and its error, as in pw_variation_weight. */
@@ -103,15 +124,14 @@ static void effect_extrapolate (double *one, double *two, int n) {
   }
 }
 
-static int effect_direction (pw_variation *x, pw_direction_copy *d, double t) {
+static int effect_direction (pw_variation *x, pw_direction_copy *d) {
   int length = x->n + x->m, rows = 2 * x->m, status = PW_OK;
   if (d->given.initial) return PW_OK;
   for (int which = 0; which < 2; which++) {
     memset (d->effect[which], 0, (size_t)length * sizeof (double));
     memset (d->row[which], 0, (size_t)rows * sizeof (double));
   }
-  for (int i = 0; i < PW_VARIATION_NEAR && status == PW_OK; i++)
-    status = effect_neighbour (x, d, i, effect_time (d, t));
+  for (int i = 0; i < PW_VARIATION_NEAR && status == PW_OK; i++) status = effect_neighbour (x, d, i);
   effect_extrapolate (d->effect[0], d->effect[1], length);
   effect_extrapolate (d->row[0], d->row[1], rows);
   return status;
@@ -121,7 +141,7 @@ int pw_variation_evaluate (pw_variation *x, double t, pw_error *error) {
   pw_statistics before = x->r->statistics;
   int near = x->r->near_singular, status = pw_linear_evaluate (&x->linear, t, x->q, x->v);
   x->at = t;
-  for (int i = 0; i < x->count && status == PW_OK; i++) status = effect_direction (x, &x->direction[i], t);
+  for (int i = 0; i < x->count && status == PW_OK; i++) status = effect_direction (x, &x->direction[i]);
   x->r->statistics = before;
   if (status > 0) status = pw_fail_singular (x->r, t, error);
   x->r->near_singular = near;
@@ -142,15 +162,20 @@ static int effect_values (pw_run *r, double t, const double *q, const double *v,
   return PW_OK;
 }
 
-/* By the state: central differences over about 1e-5 of the scene. */
-static int effect_by_state (pw_variation *x, const pw_variation_column *c, const double *Y, double *out) {
+double pw_variation_step_along (const pw_variation_column *c) {
+  return 1e-5 / (c->largest > 0 ? c->largest : 1);
+}
+
+/* By the state: central differences. */
+static int effect_by_state (pw_variation *x, const pw_variation_column *c, effect_place at, const double *Y,
+                            double *out) {
   int n = x->n, m = x->m, status = PW_OK;
-  double step = 1e-5 / (c->largest > 0 ? c->largest : 1);
+  double step = pw_variation_step_along (c);
   double *q = x->values + 2 + x->entries + m, *v = q + n + 3, *lambda = v + n + 3;
   for (int side = -1; side <= 1 && status == PW_OK; side += 2) {
-    for (int j = 0; j < n; j++) q[j] = x->q[j] + side * step * Y[j], v[j] = x->v[j] + side * step * Y[n + j];
+    for (int j = 0; j < n; j++) q[j] = at.q[j] + side * step * Y[j], v[j] = at.v[j] + side * step * Y[n + j];
     for (int i = 0; i < m; i++) lambda[i] = x->linear.lambda[i] + side * step * c->lambda[i];
-    status = effect_values (x->r, x->at, q, v, lambda, x->values);
+    status = effect_values (x->r, at.held ? at.t : x->at, q, v, lambda, x->values);
     effect_add (out, x->values, side / (2 * step), 2 + x->entries + m);
   }
   return status;
@@ -158,15 +183,16 @@ static int effect_by_state (pw_variation *x, const pw_variation_column *c, const
 
 int pw_variation_outputs (pw_variation *x, const pw_variation_column *c, const double *Y, double *out) {
   const pw_direction_copy *d = c->direction;
+  effect_place at = effect_at (x, d);
   int length = 2 + x->entries + x->m, status = PW_OK;
   memset (out, 0, (size_t)length * sizeof *out);
   for (int i = 0; i < PW_VARIATION_NEAR && status == PW_OK && d->given.initial == NULL; i++) {
     double weight = pw_variation_weight (&d->given, pw_variation_index (c), i);
     if (weight == 0) continue;
-    status = effect_values (d->given.neighbour[i], effect_time (d, x->at), x->q, x->v, x->linear.lambda, x->values);
+    status = effect_values (d->given.neighbour[i], at.t, at.q, at.v, x->linear.lambda, x->values);
     effect_add (out, x->values, weight, length);
   }
-  if (status == PW_OK) status = effect_by_state (x, c, Y, out);
+  if (status == PW_OK) status = effect_by_state (x, c, at, Y, out);
   if (!x->r->redundant) memcpy (out + 2 + x->entries, c->lambda, (size_t)x->m * sizeof *out);
   return status;
 }

@@ -40,24 +40,37 @@ typedef struct pw_direction_copy {
 /* A state of the run: t, q, v, a. */
 typedef struct {
   double t, *x; /* 3 n */
+  int jumps;    /* 1: accelerations jump between this state and the next one, at the same time but for round-off */
 } pw_variation_point;
+
+/* Times on one side of a jump at which neighbours of the state of the run may be on the other side.  They are evaluated near
+ * the state of another time instead; the interval is so short that this changes their effect by round-off. */
+typedef struct {
+  double from, to;
+  double t, *state; /* q, v */
+} pw_variation_hold;
 
 struct pw_variation {
   pw_run *r;
   int n, m, entries, size, count; /* size: 2 n + entries; count: directions */
   int ledger;
-  pw_direction_copy *direction; /* count */
-  pw_linearisation linear;      /* at the state last evaluated */
-  double t;                     /* of the derivatives */
-  double at;                    /* time of the state last evaluated */
-  double h, off;                /* next step, relative error of the last one */
-  double *q, *v;                /* n: the state last evaluated */
-  double *scratch;              /* 4 (2 n + m + entries + 3) */
-  double *values, *output;      /* the same, 2 + m + entries: of pw_variation_outputs */
-  double *sample[2];            /* 3 n + m + entries: results */
+  pw_direction_copy *direction;  /* count */
+  pw_linearisation linear;       /* at the state last evaluated */
+  double t;                      /* of the derivatives */
+  double at;                     /* time of the state last evaluated */
+  double h, off;                 /* next step, relative error of the last one */
+  double *q, *v;                 /* n: the state last evaluated */
+  double *a[PW_VARIATION_RATES]; /* n: accelerations of the run at the stages */
+  double speed;                  /* largest velocity of the run so far, in units of the scene */
+  double reversal;         /* change of a velocity over which a force reverses, at most 1, in units of the scene */
+  double *scratch;         /* 4 (2 n + m + entries + 3) */
+  double *values, *output; /* the same, 2 + m + entries: of pw_variation_outputs */
+  double *sample[2];       /* 3 n + m + entries: results */
+  int may_jump;            /* 1: accelerations may jump with the state */
   int points, room;
   pw_variation_point *point; /* room: states of the run from t on */
   double passed;             /* the last breakpoint that the derivatives have passed */
+  pw_variation_hold hold[2]; /* before the next jump, after the last one */
   char *memory;
 };
 
@@ -69,6 +82,11 @@ struct pw_variation {
 
 /* Appends the last step of the run, from time t0, to the states.  A status. */
 int pw_variation_record (pw_variation *x, double t0, pw_error *error);
+/* A new last point, without a state. */
+int pw_variation_add_point (pw_variation *x, pw_error *error);
+/* Accelerations of the run's equations at a state; just before a breakpoint.  A status. */
+int pw_variation_accelerations (pw_variation *x, double t, const double *q, const double *v, double *a,
+                                pw_error *error);
 /* Forgets states before t. */
 void pw_variation_forget (pw_variation *x);
 /* The state at a time, q and v, by Hermite interpolation. */
@@ -84,15 +102,19 @@ void pw_variation_accelerate (pw_variation *x, int c, int k);
 int pw_variation_ledger_rates (pw_variation *x, int k);
 /* Projects every column's `trial` onto the linearised constraints at the state evaluated. */
 void pw_variation_project (pw_variation *x);
+/* The step of differences along a column: the state changes by at most 1e-5 in units of the scene. */
+double pw_variation_step_along (const pw_variation_column *c);
 /* Derivatives of kinetic and potential energy, the ledger's rates, least-norm multipliers along a column: 2 + entries + m
  * numbers.  Non-zero if a signal fails. */
 int pw_variation_outputs (pw_variation *x, const pw_variation_column *c, const double *Y, double *out);
 
 /* ---- variation_step.c ---- */
 
+/* pw_variation_evaluate at the state of the run at time t. */
+int pw_variation_evaluate_at (pw_variation *x, double t, pw_error *error);
 /* Makes every column's `trial`, projected, its derivatives at the state evaluated. */
 int pw_variation_begin (pw_variation *x, pw_error *error);
-/* A step that does not pass t1 or the state that the run has reached. */
+/* Tries a step that does not pass t1 or the state that the run has reached; the next one is smaller if it fails. */
 int pw_variation_step (pw_variation *x, double t1, pw_error *error);
 
 /* ---- variation_breakpoint.c ---- */
@@ -108,5 +130,19 @@ double pw_variation_weight (const pw_direction *d, int c, int i);
 int pw_variation_look_ahead (pw_variation *x, pw_direction_copy *d, double next, pw_error *error);
 /* Passes the breakpoint at which run and derivatives have arrived. */
 int pw_variation_pass (pw_variation *x, pw_error *error);
+/* To the state q, v at time t, at which accelerations jump from those at the state evaluated: `trial` becomes every column
+ * after the jump, whose time has the derivative `slope`. */
+int pw_variation_jump (pw_variation *x, double t, const double *state, pw_error *error);
+
+/* ---- variation_jump.c ---- */
+
+/* Finds jumps between the points from `first` on, and inserts the states on both sides.  A status. */
+int pw_variation_find_jumps (pw_variation *x, int first, pw_error *error);
+/* The time of the first of these jumps that has not been passed, or INFINITY. */
+double pw_variation_recorded_jump (const pw_variation *x);
+/* Prepares the steps up to the first of these jumps. */
+int pw_variation_approach_jump (pw_variation *x, pw_error *error);
+/* Passes the jump at which the derivatives have arrived. */
+int pw_variation_pass_jump (pw_variation *x, pw_error *error);
 
 #endif

@@ -55,31 +55,36 @@ static int path_grow (pw_variation *x) {
   return PW_OK;
 }
 
-/* Accelerations just before a breakpoint; those of the run may be those after it. */
-static int path_accelerations (pw_variation *x, const pw_sample *s, double *a, pw_error *error) {
+int pw_variation_add_point (pw_variation *x, pw_error *error) {
+  if (x->points == x->room && path_grow (x) != PW_OK) return pw_fail_memory (x->r->s, error);
+  x->point[x->points++].jumps = 0;
+  return PW_OK;
+}
+
+int pw_variation_accelerations (pw_variation *x, double t, const double *q, const double *v, double *a,
+                                pw_error *error) {
   pw_run *r = x->r;
   pw_statistics before = r->statistics;
-  int near = r->near_singular,
-      status = pw_run_accelerate (r, pw_before_breakpoint (r, s->t), s->q, s->v, a, x->linear.z);
+  int near = r->near_singular, status = pw_run_accelerate (r, pw_before_breakpoint (r, t), q, v, a, x->linear.z);
   r->statistics = before;
-  if (status > 0) return pw_fail_singular (r, s->t, error);
+  if (status > 0) return pw_fail_singular (r, t, error);
   r->near_singular = near;
-  return status < 0 ? pw_fail_signal (s->t, error) : PW_OK;
+  return status < 0 ? pw_fail_signal (t, error) : PW_OK;
 }
 
 static int path_append (pw_variation *x, double t, pw_error *error) {
   pw_sample s;
   size_t n = (size_t)x->n;
-  if (x->points == x->room && path_grow (x) != PW_OK) return pw_fail_memory (x->r->s, error);
   int status = pw_run_sample (x->r, t, &s, error);
-  pw_variation_point *p = x->point + x->points;
+  if (status == PW_OK) status = pw_variation_add_point (x, error);
   if (status != PW_OK) return status;
+  pw_variation_point *p = x->point + x->points - 1;
   p->t = t;
   memcpy (p->x, s.q, n * sizeof (double));
   memcpy (p->x + n, s.v, n * sizeof (double));
   memcpy (p->x + 2 * n, s.a, n * sizeof (double));
-  x->points++;
-  return t < x->r->breakpoint ? PW_OK : path_accelerations (x, &s, p->x + 2 * n, error);
+  /* at a breakpoint the run's accelerations may be those after it */
+  return t < x->r->breakpoint ? PW_OK : pw_variation_accelerations (x, t, s.q, s.v, p->x + 2 * n, error);
 }
 
 /* 1 if interpolation between points i and i + 1 gives the last point to a tenth of the run's tolerance. */
@@ -110,7 +115,8 @@ static int path_refine (pw_variation *x, int i, int depth, pw_error *error) {
 }
 
 int pw_variation_record (pw_variation *x, double t0, pw_error *error) {
-  int first = x->points == 0;
-  int status = path_append (x, first ? t0 : x->r->t, error);
-  return status == PW_OK && !first ? path_refine (x, x->points - 2, PATH_DEPTH, error) : status;
+  int last = x->points - 1;
+  int status = path_append (x, last < 0 ? t0 : x->r->t, error);
+  if (status == PW_OK && last >= 0) status = path_refine (x, last, PATH_DEPTH, error);
+  return status == PW_OK && last >= 0 ? pw_variation_find_jumps (x, last, error) : status;
 }

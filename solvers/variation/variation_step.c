@@ -10,11 +10,18 @@
 static const double STEP_TOLERANCE = 1e-9, STEP_LOOSE = 1e-7;
 enum { STEP_RATIO = 5 }; /* linearisations per step of the derivatives */
 
+/* Error of the run's velocities in a step, relative to the largest. */
+static const double STEP_MOTION = 1e-8;
+
+/* Round-off of positions, relative to the scene or themselves, that interpolation between fixed steps turns into one of
+ * velocities. */
+static const double STEP_ROUND = 1e-14;
+
 /* Derivatives by p below this part of the scene's unit per p are computed to the same absolute error. */
 static const double STEP_LEAST = 0.1;
 
 /* The smallest step, in units of the scene. */
-static const double STEP_SMALLEST = 1e-7;
+static const double STEP_SMALLEST = 1e-12;
 
 /* Sine between constraint equations below which the round-off of accelerations prevents steps. */
 static const double STEP_SINGULAR = 0.01;
@@ -50,8 +57,7 @@ static void step_stage (pw_variation *x, const double *weight, int count, double
   }
 }
 
-/* Evaluates the equations at time t of the run's motion. */
-static int step_evaluate (pw_variation *x, double t, pw_error *error) {
+int pw_variation_evaluate_at (pw_variation *x, double t, pw_error *error) {
   double *state = x->scratch;
   pw_variation_state (x, t, state);
   memcpy (x->q, state, (size_t)x->n * sizeof *x->q);
@@ -70,9 +76,62 @@ static void step_add_errors (pw_variation *x, double h, int first, int end) {
 }
 
 static int step_rates (pw_variation *x, int k, pw_error *error) {
+  memcpy (x->a[k], x->linear.a, (size_t)x->n * sizeof *x->q);
   pw_variation_accelerate (x, 0, k);
   pw_variation_accelerate (x, 1, k);
   return pw_variation_ledger_rates (x, k) == PW_OK ? PW_OK : pw_fail_signal (x->at, error);
+}
+
+/* Largest of velocities in units of the scene. */
+static double step_speed (const pw_variation *x, const double *v) {
+  double most = 0;
+  for (int j = 0; j < x->n; j++) most = fmax (most, fabs (v[j]) * x->r->w->scale.time / pw_unit (x->r->s, j));
+  return most;
+}
+
+/* The error of the same method for the velocities of the run, relative to the largest: derivatives alone may not see that a
+ * step passes over a short phase of the motion, such as the reversal of friction. */
+static double step_motion_error (const pw_variation *x, double h) {
+  double *e = x->values;
+  memset (e, 0, (size_t)x->n * sizeof *e);
+  for (int k = 0; k < PW_VARIATION_RATES; k++)
+    for (int j = 0; j < x->n; j++) e[j] += h * pw_erk5_tableau.e[k] * x->a[k][j];
+  return step_speed (x, e) / fmax (1, x->speed);
+}
+
+/* Errors of the run's velocities between its steps, in units of the scene. */
+static double step_noise (const pw_variation *x) {
+  double most = 1;
+  if (!pw_fixed_steps (x->r)) return 0.2 * x->r->settings.rtol * fmax (1, x->speed);
+  for (int j = 0; j < x->n; j++) most = fmax (most, fabs (x->q[j]) / pw_unit (x->r->s, j));
+  return STEP_ROUND * most * x->r->w->scale.time / fmin (x->r->settings.step, x->r->w->scale.time);
+}
+
+/* The difference between a step of the run's velocities and the integral of its accelerations, relative to the latter: large
+ * where the run does not resolve the motion.  Errors of the method, and of the velocities if they are small compared with
+ * the change over which forces reverse, do not count. */
+static double step_defect (const pw_variation *x, double h) {
+  const pw_tableau *b = &pw_erk5_tableau;
+  double *state = x->scratch, *change = state + x->n, most = 0;
+  pw_variation_state (x, x->t, state);
+  for (int k = 0; k < b->stages; k++) {
+    for (int j = 0; j < x->n; j++) change[j] += h * b->b[k] * x->a[k][j];
+    most = fmax (most, h * step_speed (x, x->a[k]));
+  }
+  for (int j = 0; j < x->n; j++) change[j] -= x->v[j];
+  double defect = step_speed (x, change) - step_noise (x) * x->reversal - step_motion_error (x, h) * fmax (1, x->speed);
+  return defect > 0 ? fmin (1, defect / most) : 0;
+}
+
+/* Adds to the errors of derivatives the part of their change that the run does not resolve. */
+static void step_add_defect (pw_variation *x, double h) {
+  double defect = step_defect (x, h);
+  PW_EACH_COLUMN (c, x) {
+    const pw_variation_column *derivative = &d->column[0];
+    if (c == derivative) continue;
+    for (int j = 0; j < x->size; j++)
+      c->trial[j] += copysign (defect * (derivative->trial[j] - derivative->Y[j]), c->trial[j]);
+  }
 }
 
 /* The largest relative error of all derivatives. */
@@ -99,21 +158,25 @@ static int step_stages (pw_variation *x, double h, double t1, pw_error *error) {
   int status = PW_OK;
   for (int k = 1; k < b->stages && status == PW_OK; weight += k++) {
     step_stage (x, weight, k, h);
-    status = step_evaluate (x, k + 1 < b->stages ? x->t + b->c[k] * h : t1, error);
+    status = pw_variation_evaluate_at (x, k + 1 < b->stages ? x->t + b->c[k] * h : t1, error);
     if (status == PW_OK) status = step_rates (x, k, error);
   }
   if (status != PW_OK) return status;
   step_stage (x, b->b, b->stages, h); /* at the state of the last stage */
   pw_variation_project (x);
+  memcpy (x->a[b->stages], x->linear.a, (size_t)x->n * sizeof *x->q);
   pw_variation_accelerate (x, 0, b->stages);
   step_add_errors (x, h, 0, 2 * x->n);
   pw_variation_accelerate (x, 1, b->stages);
   if (pw_variation_ledger_rates (x, b->stages) != PW_OK) return pw_fail_signal (x->at, error);
   step_add_errors (x, h, 2 * x->n, x->size);
+  step_add_defect (x, h);
   return PW_OK;
 }
 
 static void step_accept (pw_variation *x) {
+  memcpy (x->a[0], x->a[PW_VARIATION_RATES - 1], (size_t)x->n * sizeof *x->q);
+  x->speed = fmax (x->speed, step_speed (x, x->v));
   PW_EACH_COLUMN (c, x) {
     double *first = c->K[0];
     memcpy (c->Y, c->trial, (size_t)x->size * sizeof *c->Y);
@@ -156,21 +219,7 @@ static double step_end (const pw_variation *x, double t1) {
   return fmin (x->t + (2 * x->h > rest ? rest / 2 : x->h), x->r->t);
 }
 
-int pw_variation_step (pw_variation *x, double t1, pw_error *error) {
-  double tolerance = step_tolerance (x->r), fine = pw_fixed_steps (x->r) ? STEP_RATIO * x->r->settings.step : 0;
-  while (x->h > STEP_SMALLEST * x->r->w->scale.time) {
-    double end = step_end (x, t1), h = end - x->t;
-    int status = step_stages (x, h, end, error);
-    if (status != PW_OK) return status;
-    double off = step_error (x, h), next = step_next (x, h, off, tolerance, fine);
-    if (off <= (h <= fine ? STEP_LOOSE : tolerance)) {
-      x->h = h < x->h ? fmax (x->h, next) : next;
-      x->t = end, x->off = off;
-      step_accept (x);
-      return PW_OK;
-    }
-    x->h = fmin (next, 0.9 * h);
-  }
+static int step_fail (pw_variation *x, pw_error *error) {
   if (pw_evaluate_J_at (x->r->w, x->at, x->q, x->v) == PW_OK && pw_watchdog_sine (x->r, NULL) < STEP_SINGULAR)
     return pw_fail (
         error, PW_METHOD,
@@ -182,4 +231,21 @@ int pw_variation_step (pw_variation *x, double t1, pw_error *error) {
       "t = %.6g s: no step of the derivatives meets their tolerance, however small: the motion is too stiff, "
       "or not differentiable",
       x->t);
+}
+
+int pw_variation_step (pw_variation *x, double t1, pw_error *error) {
+  double tolerance = step_tolerance (x->r), fine = pw_fixed_steps (x->r) ? STEP_RATIO * x->r->settings.step : 0;
+  if (x->h <= STEP_SMALLEST * x->r->w->scale.time) return step_fail (x, error);
+  double end = step_end (x, t1), h = end - x->t, allowed = h <= fine ? STEP_LOOSE : tolerance;
+  int status = step_stages (x, h, end, error);
+  if (status != PW_OK) return status;
+  double off = pw_larger_or_nan (step_error (x, h), step_motion_error (x, h) * allowed / STEP_MOTION);
+  double next = step_next (x, h, off, tolerance, fine);
+  if (off <= allowed) {
+    x->h = h < x->h ? fmax (x->h, next) : next;
+    x->t = end, x->off = off;
+    step_accept (x);
+  } else
+    x->h = fmin (next, 0.9 * h);
+  return PW_OK;
 }

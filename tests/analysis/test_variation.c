@@ -98,7 +98,9 @@ static void block_derive (block b, const char *name, const char *method, double 
   out[0] = x.q[0];
   out[1] = x.v[0];
   out[2] = x.work;
-  check_below ("error", fmax (fabs (e.q[0]), fabs (e.v[0])), 1e-7 * (1 + fabs (x.q[0])), "steps to 1e-9 each");
+  int order2 = strcmp (method, "galpha") == 0 || strcmp (method, "leapfrog") == 0;
+  check_below ("error", fmax (fabs (e.q[0]), fabs (e.v[0])), (order2 ? 1e-3 : 1e-6) * (1 + fabs (x.q[0])),
+               "steps to 1e-9 each, and what the steps of the run do not resolve");
   pw_variation_close (v);
   variation_free (&c);
 }

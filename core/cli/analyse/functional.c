@@ -105,8 +105,8 @@ static void functional_average (pw_functional *f, double span) {
 
 /* ---- Extrema ---- */
 
-static void functional_better (pw_functional *f, double t, double value) {
-  if (f->type == PW_MAX ? value > f->value : value < f->value) f->value = value, f->t = t;
+static void functional_better (const functional_step *p, pw_functional *f, double t, double value) {
+  if (f->type == PW_MAX ? value > f->value : value < f->value) f->value = value, f->t = t, f->step = p->t1 - p->t0;
 }
 
 typedef struct {
@@ -138,7 +138,7 @@ static void functional_refine (functional_step *p, pw_functional *f, const doubl
   }
   double least = gsl_min_fminimizer_f_minimum (m);
   if (p->status == PW_OK)
-    functional_better (f, t[1] + gsl_min_fminimizer_x_minimum (m), f->type == PW_MAX ? -least : least);
+    functional_better (p, f, t[1] + gsl_min_fminimizer_x_minimum (m), f->type == PW_MAX ? -least : least);
   gsl_min_fminimizer_free (m);
 }
 
@@ -153,7 +153,7 @@ static void functional_extremum (functional_step *p, pw_functional *f, const dou
   for (int i = 0; i < FUNCTIONAL_TIMES; i++) range = fmax (range, y[i] - y[best]);
   int inside = best > 0 && best < FUNCTIONAL_TIMES - 1 && y[best] < y[best - 1] && y[best] < y[best + 1];
   int leads = y[best] - range < (f->type == PW_MAX ? -f->value : f->value);
-  functional_better (f, t[best], value[best]);
+  functional_better (p, f, t[best], value[best]);
   if (inside && leads) functional_refine (p, f, t + best - 1, y + best - 1);
 }
 
@@ -225,7 +225,7 @@ static int functional_advance (pw_outcomes *x, pw_run *r, pw_error *error) {
     if (pw_is_integral (f->type) && nodes) functional_integrate (&p, f, p.t0, p.t1, f->at + 2, 0);
     if (pw_is_integral (f->type) && !nodes) functional_simpson (&p, f);
     if (pw_is_extremum (f->type) && nodes) functional_extremum (&p, f, t, f->at);
-    if (pw_is_extremum (f->type) && !nodes) functional_better (f, p.t1, f->at[FUNCTIONAL_TIMES - 1]);
+    if (pw_is_extremum (f->type) && !nodes) functional_better (&p, f, p.t1, f->at[FUNCTIONAL_TIMES - 1]);
     f->at[0] = f->at[FUNCTIONAL_TIMES - 1];
   }
   return p.status;

@@ -62,6 +62,7 @@ typedef struct {
   pw_column column;
   double value;                   /* so far; after pw_outcomes_run that of the run */
   double t;                       /* time of the extremum, or of the end [s] */
+  double step;                    /* the step of the run that contains the extremum [s] */
   double at[PW_FUNCTIONAL_TIMES]; /* private: the column in the last step; [0] at its beginning */
 } pw_functional;
 

@@ -151,7 +151,7 @@ static int periodic_command (void *options, pw_error *error) {
   int lock = -1, status = pw_cli_open (&x->m, &x->line, error);
   if (status == PW_OK) status = periodic_options (x, error);
   if (status == PW_OK) status = pw_figure_results (&x->line, &x->m, x->folder, "periodic", &lock, error);
-  if (status == PW_OK) pw_report_derivatives (x->m.model);
+  if (status == PW_OK) pw_report_model (x->m.model);
   if (status == PW_OK) status = periodic_compute (x, error);
   if (status == PW_OK && x->points) pw_periodic_print (x);
   if (status == PW_OK && x->points && x->folder) status = pw_periodic_write (x, error);

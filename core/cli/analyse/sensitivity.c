@@ -76,8 +76,9 @@ static void sensitivity_warn (const pw_sensitivity *x) {
         used += (size_t)snprintf (list + used, sizeof list - used, "%s%s by %s", used ? ", " : "", x->of[o],
                                   x->unknown[p].name);
   if (used)
-    pw_cli_say ("pinwheel: derivatives with errors above 1 %%, as where the motion amplifies them: %s%s\n", list,
-                used < sizeof list ? "" : " ...");
+    pw_cli_say ("pinwheel: derivatives with errors above 1 %%, which the motion amplifies or the steps of the run "
+                "cause: %s%s\n",
+                list, used < sizeof list ? "" : " ...");
 }
 
 /* ---- Files ---- */
@@ -253,7 +254,7 @@ static int sensitivity_command (void *options, pw_error *error) {
   if (status == PW_OK) status = sensitivity_settings (x, error);
   if (status == PW_OK) status = sensitivity_unknowns (x, error);
   if (status == PW_OK) status = pw_figure_results (&x->line, &x->m, x->folder, "sensitivity", &lock, error);
-  if (status == PW_OK) pw_report_derivatives (x->m.model);
+  if (status == PW_OK) pw_report_model (x->m.model);
   if (status == PW_OK) status = sensitivity_compute (x, error);
   if (status == PW_OK) status = sensitivity_check (x, error);
   if (status == PW_OK) sensitivity_print (x), sensitivity_warn (x);

@@ -21,6 +21,8 @@ typedef struct {
   pw_unknown_run base, *near; /* the run; 4 neighbours of each unknown */
   pw_direction *direction;
   pw_variation *variation;
+  pw_run *sampled;          /* the run of which samples are taken; NULL: base.run */
+  int along;                /* 1: there are extrema or integrals */
   pw_outcomes outcomes;     /* of the run */
   pw_workspace **workspace; /* 5 of each unknown: of the run's system and of the neighbours', for contact points */
   /* Of all functionals F of the outputs and unknowns P at the time last evaluated, and of the run. */
@@ -28,7 +30,7 @@ typedef struct {
   double *value;         /* F */
   double *slope, *error; /* F x P: derivatives, and their errors */
   double *end_slope, *end_error;
-  double *before; /* F: values before a jump */
+  double *before; /* F + F P: values and derivatives before a jump */
   int rows;       /* the table: t, then each output and its derivatives */
   double *row;    /* rows x columns */
   size_t room;

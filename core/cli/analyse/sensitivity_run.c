@@ -49,15 +49,14 @@ static int sensitivity_contact (const pw_sensitivity *x, int unknown, int which,
 /* Contact points are functions of positions and parameters: differences in both. */
 static int sensitivity_contact_slope (const pw_sensitivity *x, int unknown, int index, const pw_sample *s,
                                       const double *dq, double *slope, pw_error *error) {
-  static const double weight[2][4] = { { 0, -0.5, 0.5, 0 }, { -1.5, 2, -0.5, 0 } },
-                      offset[2][4] = { { -2, -1, 1, 2 }, { 0, 1, 2, 4 } };
+  static const double weight[2][4] = { { 0, -0.5, 0.5, 0 }, { -1.5, 2, -0.5, 0 } };
   const pw_direction *d = &x->direction[unknown];
   int status = PW_OK;
   *slope = 0;
   for (int k = 0; k < 4 && status == PW_OK; k++) {
     double value = 0;
     if (weight[d->one_sided][k] == 0) continue;
-    status = sensitivity_contact (x, unknown, 1 + k, index, s, dq, offset[d->one_sided][k] * d->step, &value, error);
+    status = sensitivity_contact (x, unknown, 1 + k, index, s, dq, pw_direction_offset (d, k), &value, error);
     *slope += weight[d->one_sided][k] * value / d->step;
   }
   return status;
@@ -75,10 +74,18 @@ static int sensitivity_values (pw_sensitivity *x, const pw_sample *s, pw_error *
   return status;
 }
 
+/* A sample of the run at a time that the derivatives have reached. */
+static int sensitivity_sample (pw_sensitivity *x, double t, pw_sample *s, pw_error *error) {
+  int status = PW_OK;
+  while (x->sampled && status == PW_OK && pw_run_time (x->sampled) < t)
+    status = pw_run_advance (x->sampled, x->t_end, error);
+  return status == PW_OK ? pw_run_sample (x->sampled ? x->sampled : x->base.run, t, s, error) : status;
+}
+
 int pw_sensitivity_at (pw_sensitivity *x, double t, pw_error *error) {
   pw_sample s, d, e;
   int status = pw_variation_advance (x->variation, t, x->t_end, error), P = x->unknowns;
-  if (status == PW_OK) status = pw_run_sample (x->base.run, t, &s, error);
+  if (status == PW_OK) status = sensitivity_sample (x, t, &s, error);
   if (status == PW_OK) status = sensitivity_values (x, &s, error);
   for (int p = 0; p < P && status == PW_OK; p++) {
     status = pw_variation_sample (x->variation, p, &d, &e, error);
@@ -96,6 +103,9 @@ int pw_sensitivity_at (pw_sensitivity *x, double t, pw_error *error) {
 
 /* ---- Functionals ---- */
 
+/* Relative difference of derivatives before and after a jump that are the same. */
+static const double SENSITIVITY_SAME = 1e-5;
+
 /* Adds the current columns to the integrals, with a weight. */
 static void sensitivity_add (pw_sensitivity *x, double weight) {
   for (int i = 0; i < x->outcomes.functionals; i++) {
@@ -110,14 +120,34 @@ static void sensitivity_add (pw_sensitivity *x, double weight) {
   }
 }
 
-/* Keeps the current derivatives of functional i.  An extremum at a breakpoint moves with it. */
-static void sensitivity_keep (pw_sensitivity *x, int i, int moves) {
-  for (int p = 0; p < x->unknowns; p++) {
-    double slope = 0;
-    int at = i * x->unknowns + p;
-    if (moves) pw_variation_breakpoint (x->variation, p, &slope);
-    x->end_slope[at] = slope == 0 ? x->slope[at] : NAN;
-    x->end_error[at] = x->error[at];
+/* The derivative of the time of a breakpoint, or of the last jump with the state. */
+static double sensitivity_moves (const pw_sensitivity *x, int unknown, int with_state) {
+  double slope;
+  if (with_state) return pw_variation_jump_slope (x->variation, unknown);
+  pw_variation_breakpoint (x->variation, unknown, &slope);
+  return slope;
+}
+
+/* Keeps the current derivatives of functional i that exist. */
+static void sensitivity_keep (pw_sensitivity *x, int i) {
+  for (int at = i * x->unknowns; at < (i + 1) * x->unknowns; at++)
+    if (!isnan (x->end_slope[at])) x->end_slope[at] = x->slope[at], x->end_error[at] = x->error[at];
+}
+
+/* An extremum at a breakpoint that moves has no derivative. */
+static void sensitivity_keep_breakpoint (pw_sensitivity *x, int i) {
+  sensitivity_keep (x, i);
+  for (int p = 0; p < x->unknowns; p++)
+    if (sensitivity_moves (x, p, 0) != 0) x->end_slope[i * x->unknowns + p] = NAN;
+}
+
+/* Nor has one in the step of the run that passes a jump with the state, if derivatives jump there from `before`. */
+static void sensitivity_drop (pw_sensitivity *x, double t, const double *before) {
+  for (int i = 0; i < x->outcomes.functionals; i++) {
+    const pw_functional *f = &x->outcomes.functional[i];
+    for (int at = i * x->unknowns; at < (i + 1) * x->unknowns && pw_is_extremum (f->type); at++)
+      if (fabs (f->t - t) <= f->step && fabs (x->slope[at] - before[at]) > SENSITIVITY_SAME * fabs (before[at]))
+        x->end_slope[at] = NAN;
   }
 }
 
@@ -174,56 +204,77 @@ static int sensitivity_interval (pw_sensitivity *x, double t0, double t1, sensit
     if (status != PW_OK) break;
     if (list[i].extremum < 0)
       sensitivity_add (x, list[i].weight);
+    else if (fabs (t - breakpoint) < 1e-9 * (1 + fabs (t)))
+      sensitivity_keep_breakpoint (x, list[i].extremum);
     else
-      sensitivity_keep (x, list[i].extremum, fabs (t - breakpoint) < 1e-9 * (1 + fabs (t)));
+      sensitivity_keep (x, list[i].extremum);
   }
   return status == PW_OK ? pw_sensitivity_at (x, t1, error) : status;
 }
 
-/* To a breakpoint t_b from just before it.  The integral of a column that jumps there from x- to x+ has the derivative
- * (x- - x+) dt_b/dp. */
-static int sensitivity_jump (pw_sensitivity *x, double t0, double t, pw_error *error) {
-  memcpy (x->before, x->value, (size_t)x->outcomes.functionals * sizeof *x->before);
+/* To a breakpoint t_b, or past a jump with the state, from just before it.  The integral of a column that jumps there from x-
+ * to x+ has the derivative (x- - x+) dt_b/dp. */
+static int sensitivity_jump (pw_sensitivity *x, double t0, double t, int with_state, pw_error *error) {
+  size_t F = (size_t)x->outcomes.functionals, P = (size_t)x->unknowns;
+  double *slope = x->before + F;
+  memcpy (x->before, x->value, F * sizeof *x->before);
+  memcpy (slope, x->slope, F * P * sizeof *slope);
   int status = pw_sensitivity_at (x, t, error);
+  if (status == PW_OK && with_state) sensitivity_drop (x, t, slope);
   for (int i = 0; i < x->outcomes.functionals && status == PW_OK; i++) {
     const pw_functional *f = &x->outcomes.functional[i];
-    double jump = x->before[i] - x->value[i], slope;
-    if (pw_is_extremum (f->type) && f->t > t0 && f->t <= t) sensitivity_keep (x, i, 1);
+    double jump = x->before[i] - x->value[i];
+    if (pw_is_extremum (f->type) && f->t > t0 && f->t <= t)
+      (with_state ? sensitivity_keep : sensitivity_keep_breakpoint) (x, i);
     if (!pw_is_integral (f->type) || jump == 0) continue;
     if (f->type != PW_INTEGRAL) jump /= x->t_end;
     if (f->type == PW_RMS) jump *= (x->before[i] + x->value[i]) / (2 * f->value);
-    for (int p = 0; p < x->unknowns; p++) {
-      pw_variation_breakpoint (x->variation, p, &slope);
-      x->end_slope[i * x->unknowns + p] += jump * slope;
-    }
+    for (int p = 0; p < x->unknowns; p++)
+      x->end_slope[i * x->unknowns + p] += jump * sensitivity_moves (x, p, with_state);
+  }
+  return status;
+}
+
+/* The end of the next interval, in which derivatives are smooth, unless it ends at a jump.  *jump: 0, or 1 at a breakpoint, 2
+ * at a jump with the state.  NAN and the error. */
+static double sensitivity_next (pw_sensitivity *x, double t, double to, int *jump, pw_error *error) {
+  double slope, breakpoint = pw_variation_breakpoint (x->variation, 0, &slope);
+  *jump = 0;
+  if (!x->along) return fmin (to, breakpoint);
+  double next = fmin (fmin (to, breakpoint), t + SENSITIVITY_STEPS * pw_variation_step_size (x->variation));
+  double with_state = pw_variation_next_jump (x->variation, next, x->t_end, error);
+  if (isnan (with_state)) return NAN;
+  *jump = with_state < next ? 2 : next == breakpoint;
+  return fmin (next, with_state);
+}
+
+static int sensitivity_advance (pw_sensitivity *x, double t, double to, sensitivity_event *list, pw_progress *progress,
+                                pw_error *error) {
+  int jump, status = PW_OK;
+  while (t < to && status == PW_OK) {
+    double next = sensitivity_next (x, t, to, &jump, error);
+    if (isnan (next)) return error->status;
+    double end = jump ? next - fmin (1e-9 * x->dt, next - t) : next;
+    status = sensitivity_interval (x, t, end, list, error);
+    if (status == PW_OK && jump) status = sensitivity_jump (x, end, next, jump == 2, error);
+    pw_progress_at (progress, t = next);
   }
   return status;
 }
 
 static int sensitivity_along (pw_sensitivity *x, sensitivity_event *list, pw_progress *progress, pw_error *error) {
-  double t = 0, slope;
-  int integrates = 0, status = pw_sensitivity_at (x, 0, error);
-  for (int i = 0; i < x->outcomes.functionals; i++) integrates |= pw_is_integral (x->outcomes.functional[i].type);
+  double t = 0, to;
+  int status = pw_sensitivity_at (x, 0, error);
   if (status == PW_OK) status = sensitivity_row (x, 0, error);
   for (int i = 0; i < x->outcomes.functionals && status == PW_OK; i++)
-    if (pw_is_extremum (x->outcomes.functional[i].type)) sensitivity_keep (x, i, 0);
-  for (long k = 1; t < x->t_end && status == PW_OK; k++) {
-    double to = (double)k * x->dt < x->t_end * (1 - 1e-12) ? (double)k * x->dt : x->t_end;
-    while (t < to && status == PW_OK) {
-      double breakpoint = pw_variation_breakpoint (x->variation, 0, &slope);
-      double next = fmin (to, breakpoint);
-      if (integrates) next = fmin (next, t + SENSITIVITY_STEPS * pw_variation_step_size (x->variation));
-      int jumps = integrates && next == breakpoint;
-      double end = jumps ? next - fmin (1e-9 * x->dt, next - t) : next;
-      status = sensitivity_interval (x, t, end, list, error);
-      if (status == PW_OK && jumps) status = sensitivity_jump (x, end, next, error);
-      t = next;
-      pw_progress_at (progress, t);
-    }
-    if (status == PW_OK) status = sensitivity_row (x, t, error);
+    if (pw_is_extremum (x->outcomes.functional[i].type)) sensitivity_keep (x, i);
+  for (long k = 1; t < x->t_end && status == PW_OK; k++, t = to) {
+    to = (double)k * x->dt < x->t_end * (1 - 1e-12) ? (double)k * x->dt : x->t_end;
+    status = sensitivity_advance (x, t, to, list, progress, error);
+    if (status == PW_OK) status = sensitivity_row (x, to, error);
   }
   for (int i = 0; i < x->outcomes.functionals; i++)
-    if (x->outcomes.functional[i].type == PW_FINAL) sensitivity_keep (x, i, 0);
+    if (x->outcomes.functional[i].type == PW_FINAL) sensitivity_keep (x, i);
   return status;
 }
 
@@ -260,7 +311,7 @@ int pw_sensitivity_open (pw_sensitivity *x, int unknowns, int table, pw_error *e
 
 static int sensitivity_arrays (pw_sensitivity *x, pw_error *error) {
   size_t F = (size_t)x->outcomes.functionals, P = (size_t)x->unknowns;
-  x->value = calloc (3 * F + 4 * F * P + 1, sizeof *x->value);
+  x->value = calloc (3 * F + 5 * F * P + 1, sizeof *x->value);
   x->columns = 1;
   for (int o = 0; o < x->outcomes.outcomes; o++)
     if (pw_sensitivity_runs_along (x, o)) x->columns += 1 + x->unknowns;
@@ -282,10 +333,15 @@ static int sensitivity_ledger (pw_sensitivity *x, pw_error *error) {
 
 /* The values of extrema and integrals, and the times of extrema, from a run of its own. */
 static int sensitivity_functionals (pw_sensitivity *x, pw_error *error) {
-  for (int i = 0; i < x->outcomes.functionals; i++)
-    if (x->outcomes.functional[i].type != PW_FINAL)
-      return pw_outcomes_run (&x->outcomes, x->method, &x->settings, x->t_end, error);
-  return PW_OK;
+  for (int i = 0; i < x->outcomes.functionals; i++) x->along |= x->outcomes.functional[i].type != PW_FINAL;
+  return x->along ? pw_outcomes_run (&x->outcomes, x->method, &x->settings, x->t_end, error) : PW_OK;
+}
+
+/* The run of which samples are taken, where the derivatives' is ahead. */
+static int sensitivity_sampled (pw_sensitivity *x, pw_error *error) {
+  if (!pw_variation_may_jump (x->base.system)) return PW_OK;
+  x->sampled = pw_run_open (x->base.system, x->method, &x->settings, error);
+  return x->sampled ? PW_OK : error->status;
 }
 
 int pw_sensitivity_start (pw_sensitivity *x, pw_error *error) {
@@ -302,6 +358,7 @@ int pw_sensitivity_start (pw_sensitivity *x, pw_error *error) {
     status = pw_unknown_directions (x->direction, x->near, &x->line, x->m.file, x->unknown, x->unknowns, x->method,
                                     &plain, error);
   if (status == PW_OK) status = sensitivity_workspaces (x, error);
+  if (status == PW_OK) status = sensitivity_sampled (x, error);
   pw_limit_start (&x->limit);
   if (status != PW_OK) return status;
   for (int p = 0; p < x->unknowns; p++) x->direction[p].no_error = x->no_error;
@@ -317,6 +374,7 @@ int pw_sensitivity_compute (pw_sensitivity *x, pw_progress *progress, pw_error *
 
 void pw_sensitivity_close (pw_sensitivity *x) {
   pw_variation_close (x->variation);
+  pw_run_close (x->sampled);
   if (x->outcomes.system) pw_outcomes_close (&x->outcomes);
   for (int i = 0; x->workspace && i < 5 * x->unknowns; i++) pw_workspace_free (x->workspace[i]);
   for (int i = 0; x->near && i < 4 * x->unknowns; i++) pw_unknown_close (&x->near[i]);

@@ -72,39 +72,29 @@ static void report_angle (const char *kind, const char *name, const char *what, 
 }
 
 /* Expressions that may jump when states change; steps do not end at such jumps. */
-static int report_jump (const pw_element *e, const char *field, const pw_signal *s) {
-  if (s->type != PW_FUNCTION || s->function.text == NULL || s->function.text->jump == NULL) return 0;
+static void report_jump (const pw_element *e, const char *field, const pw_signal *s) {
+  if (s->type != PW_FUNCTION || s->function.text == NULL || s->function.text->jump == NULL) return;
   pw_cli_say (
       "pinwheel: %s %s: %s: \"%.80s\" may jump as states change; steps do not end there, which costs accuracy\n",
       e->kind->name, pw_element_name (e), field, s->function.text->jump);
-  return 1;
 }
 
-/* Returns the number of jumps. */
-static int report_field (const pw_element *e, const pw_field *f) {
-  int jumps = 0;
+static void report_field (const pw_element *e, const pw_field *f) {
   const void *at = (const char *)e->definition + f->offset;
   const pw_signal *s = f->type == PW_SIGNAL ? at : NULL;
   int heading = strcmp (f->name, "heading") == 0;
   if (heading && f->type == PW_NUMBER) report_angle (e->kind->name, pw_element_name (e), f->name, *(const double *)at);
   if (heading && s && s->type == PW_CONSTANT) report_angle (e->kind->name, pw_element_name (e), f->name, s->constant);
-  for (int i = 0; s && i < pw_field_count (f); i++) jumps += report_jump (e, f->name, s + i);
-  return jumps;
+  for (int i = 0; s && i < pw_field_count (f); i++) report_jump (e, f->name, s + i);
 }
 
-int pw_report_model (const pw_model *m) {
-  int bodies, elements, jumps = 0;
+void pw_report_model (const pw_model *m) {
+  int bodies, elements;
   const pw_body *b = pw_model_bodies (m, &bodies);
   const pw_element *e = pw_model_elements (m, &elements);
   for (int i = 0; i < bodies; i++) report_angle ("body", b[i].name, "initial phi", b[i].start[2]);
   for (int i = 0; i < elements; i++)
-    for (const pw_field *f = e[i].kind->fields; f->name; f++) jumps += report_field (&e[i], f);
-  return jumps;
-}
-
-void pw_report_derivatives (const pw_model *m) {
-  if (pw_report_model (m) > 0)
-    pw_cli_say ("pinwheel: derivatives ignore these jumps: they are wrong where the motion passes one\n");
+    for (const pw_field *f = e[i].kind->fields; f->name; f++) report_field (&e[i], f);
 }
 
 /* ---- Initialisation ---- */

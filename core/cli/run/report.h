@@ -6,11 +6,8 @@
 
 /* ---- Warnings on standard error ---- */
 
-/* Angles of more than a turn, which are probably degrees, and expressions that may jump as states change.  Returns the number of
- * the latter. */
-int pw_report_model (const pw_model *m);
-/* The same for an analysis that differentiates motions. */
-void pw_report_derivatives (const pw_model *m);
+/* Angles of more than a turn, which are probably degrees, and expressions that may jump as states change. */
+void pw_report_model (const pw_model *m);
 
 /* Options without effect, long fixed steps, an absolute tolerance within which a force saturates. */
 void pw_report_settings (pw_run *r, const pw_system *s, const char *method, const pw_cli_line *l,

@@ -1,0 +1,283 @@
+/* Jumps of the accelerations at a state, such as those of sign (vx).
+ *
+ * With the surface s (y, t, p) = 0 in the space of states, where y' jumps from y'- to y'+, derivatives jump by
+ *
+ *     dy+ = dy- + (y'- - y'+) dt_s/dp
+ *
+ * as at breakpoints (variation_breakpoint.c), with the time t_s at which the motion meets the surface (Aizerman &
+ * Gantmakher 1958; Leine & Nijmeijer 2004, section 7.2).  Neither the surface nor its gradient is known; bisection finds t_s
+ * of the run, and that of neighbours along y + (p_i - p) dy + (t - t_s) y'-, by the accelerations, which are nearer to one
+ * or to the other of the two sides. */
+#include <math.h>
+#include <string.h>
+#include "util.h"
+#include "variation_parts.h"
+
+enum { JUMP_MANY = 8 }; /* jumps in one step of a run: more are chatter */
+
+/* Accelerations jump if they change by this part of their change over a step between adjacent times; changes below the
+ * second, in units of the scene, are not considered. */
+static const double JUMP_PART = 0.25, JUMP_LEAST = 1e-6;
+
+/* Part of the change of accelerations by which they differ from linear ones where a jump is looked for. */
+static const double JUMP_BEND = 0.1;
+
+/* The first and the largest interval of time in which a neighbour meets the surface, in units of the scene. */
+static const double JUMP_NEAR = 1e-9, JUMP_FAR = 1e-2;
+
+/* Times that do not differ, in units of the scene. */
+static const double JUMP_ZERO = 1e-20;
+
+/* Largest difference of accelerations, in units of the scene. */
+static double jump_distance (const pw_variation *x, const double *a, const double *b) {
+  double most = 0, T = x->r->w->scale.time;
+  for (int j = 0; j < x->n; j++) most = pw_larger_or_nan (most, fabs (a[j] - b[j]) * T * T / pw_unit (x->r->s, j));
+  return most;
+}
+
+/* ---- Jumps of the run ---- */
+
+/* The state and the accelerations between recorded ones. */
+static int jump_state (pw_variation *x, double t, double *state, pw_error *error) {
+  int n = x->n;
+  pw_variation_state (x, t, state);
+  return pw_variation_accelerations (x, t, state, state + n, state + 2 * n, error);
+}
+
+/* Inserts a state between points i and i + 1. */
+static int jump_insert (pw_variation *x, int i, double t, const double *state, pw_error *error) {
+  if (pw_variation_add_point (x, error) != PW_OK) return PW_RESOURCE;
+  pw_variation_point p = x->point[x->points - 1];
+  p.t = t;
+  memcpy (p.x, state, 3 * (size_t)x->n * sizeof *state);
+  memmove (x->point + i + 2, x->point + i + 1, (size_t)(x->points - i - 2) * sizeof p);
+  x->point[i + 1] = p;
+  return PW_OK;
+}
+
+/* Bisects the interval from t0 to t1, with the states `left` and `right`, towards the larger change of the accelerations.
+ * *found: 1 if they jump between the times t0 and t1 that remain. */
+static int jump_bisect (pw_variation *x, double *t0, double *t1, double *left, double *right, int *found,
+                        pw_error *error) {
+  double *middle = x->scratch, first = jump_distance (x, left + 2 * x->n, right + 2 * x->n), t;
+  size_t bytes = 3 * (size_t)x->n * sizeof *left;
+  while (*t1 - *t0 > JUMP_ZERO * x->r->w->scale.time && (t = *t0 + (*t1 - *t0) / 2) > *t0 && t < *t1) {
+    int status = jump_state (x, t, middle, error);
+    if (status != PW_OK) return status;
+    double before = jump_distance (x, left + 2 * x->n, middle + 2 * x->n),
+           after = jump_distance (x, middle + 2 * x->n, right + 2 * x->n);
+    first = fmax (first, fmax (before, after));
+    if (!(fmax (before, after) > fmax (JUMP_LEAST, JUMP_PART * first))) return PW_OK;
+    memcpy (before < after ? left : right, middle, bytes);
+    *(before < after ? t0 : t1) = t;
+  }
+  *found = 1;
+  return PW_OK;
+}
+
+/* 1 if accelerations between points i and i + 1 may jump: they are not linear. */
+static int jump_suspected (pw_variation *x, int i, double *state, int *suspected, pw_error *error) {
+  const double *left = x->point[i].x + 2 * x->n, *right = x->point[i + 1].x + 2 * x->n;
+  double t = x->point[i].t + (x->point[i + 1].t - x->point[i].t) / 2, *a = state + 2 * x->n;
+  int status = jump_state (x, t, state, error);
+  double most = fmax (jump_distance (x, left, a), jump_distance (x, a, right));
+  for (int j = 0; j < x->n; j++) a[j] -= left[j] / 2, state[j] = right[j] / 2;
+  *suspected = jump_distance (x, a, state) > fmax (JUMP_LEAST, JUMP_BEND * most);
+  return status;
+}
+
+static int jump_find (pw_variation *x, int i, int *found, pw_error *error) {
+  double t0 = x->point[i].t, t1 = x->point[i + 1].t, *left = x->values, *right = left + 3 * x->n;
+  int status = jump_suspected (x, i, left, found, error);
+  if (status != PW_OK || !*found) return status;
+  *found = 0;
+  status = jump_state (x, t0, left, error);
+  if (status == PW_OK) status = jump_state (x, t1, right, error);
+  if (status == PW_OK) status = jump_bisect (x, &t0, &t1, left, right, found, error);
+  if (status != PW_OK || !*found) return status;
+  if (t0 > x->point[i].t)
+    status = jump_insert (x, i++, t0, left, error);
+  else
+    memcpy (x->point[i].x + 2 * x->n, left + 2 * x->n, (size_t)x->n * sizeof *left);
+  x->point[i].jumps = 1;
+  return status == PW_OK && t1 < x->point[i + 1].t ? jump_insert (x, i, t1, right, error) : status;
+}
+
+int pw_variation_find_jumps (pw_variation *x, int first, pw_error *error) {
+  int found, status = PW_OK, many = 0;
+  if (!x->may_jump) return PW_OK;
+  for (int i = first; i + 1 < x->points && status == PW_OK; i += !found) {
+    found = 0;
+    if (x->point[i].jumps) continue;
+    status = jump_find (x, i, &found, error);
+    many += found;
+    if (status == PW_OK && many > JUMP_MANY)
+      return pw_fail (error, PW_METHOD,
+                      "t = %.6g s: accelerations jump more than %d times in one step of the run: the "
+                      "motion is not differentiable",
+                      x->point[i].t, JUMP_MANY);
+  }
+  return status;
+}
+
+double pw_variation_recorded_jump (const pw_variation *x) {
+  for (int i = 0; i < x->points; i++)
+    if (x->point[i].jumps && x->point[i].t >= x->t) return x->point[i].t;
+  return INFINITY;
+}
+
+/* ---- Derivatives of their times ---- */
+
+static int jump_fail (double t, pw_error *error) {
+  return pw_fail (
+      error, PW_METHOD,
+      "t = %.6g s: the motion touches, slides along, or starts at states where accelerations jump: it is not "
+      "differentiable",
+      t);
+}
+
+/* A motion near that of the run: y + step dy + (t - t_s) y'-, of a system. */
+typedef struct {
+  pw_variation *x;
+  pw_run *r;
+  double t, t_after;            /* t_s, and the time after it */
+  const double *before, *after; /* q, v, a of the run at t_s, on both sides */
+  const double *dy;
+  double step;
+} jump_neighbour;
+
+/* The run at the recorded jump at time t. */
+static jump_neighbour jump_of (pw_variation *x, double t) {
+  const pw_variation_point *p = x->point;
+  while (!(p->jumps && p->t == t)) p++;
+  return (jump_neighbour){ .x = x, .r = x->r, .t = t, .t_after = p[1].t, .before = p[0].x, .after = p[1].x };
+}
+
+/* 1 if the accelerations of the neighbour at time t_s + t are those after the jump, 0 before it. */
+static int jump_side (const jump_neighbour *k, double t, int *side) {
+  pw_variation *x = k->x;
+  int n = x->n;
+  double *q = x->scratch, *v = q + n + 3, *a = v + n + 3, *lambda = a + n + 3;
+  for (int j = 0; j < n; j++) {
+    q[j] = k->before[j] + k->step * k->dy[j] + t * k->before[n + j];
+    v[j] = k->before[n + j] + k->step * k->dy[n + j] + t * k->before[2 * n + j];
+  }
+  pw_statistics statistics = k->r->statistics;
+  int near = k->r->near_singular, status = pw_run_accelerate (k->r, k->t + t, q, v, a, lambda);
+  k->r->statistics = statistics;
+  k->r->near_singular = near;
+  *side = jump_distance (x, a, k->after + 2 * n) < jump_distance (x, a, k->before + 2 * n);
+  return status;
+}
+
+/* The time at which the neighbour meets the surface, minus t_s; NaN if it does not, or cannot be evaluated. */
+static double jump_time (const jump_neighbour *k) {
+  double T = k->x->r->w->scale.time, lo, hi, middle;
+  int before = 1, after = 0, side;
+  for (double near = JUMP_NEAR; (before || !after) && near <= JUMP_FAR; near *= 10) {
+    lo = -near * T, hi = near * T;
+    if (jump_side (k, lo, &before) != PW_OK || jump_side (k, hi, &after) != PW_OK) return NAN;
+  }
+  if (before || !after) return NAN;
+  while ((middle = lo + (hi - lo) / 2) > lo && middle < hi) {
+    if (jump_side (k, middle, &side) != PW_OK) return NAN;
+    *(side ? &hi : &lo) = middle;
+    if (hi - lo < fmax (1e-12 * fabs (middle), JUMP_ZERO * T)) break;
+  }
+  return fabs (middle) > 2 * JUMP_ZERO * T ? middle : 0;
+}
+
+/* The derivative of t_s by the state along a column. */
+static double jump_along (const pw_variation_column *c, jump_neighbour k) {
+  double step = pw_variation_step_along (c);
+  k.dy = c->Y;
+  k.step = step;
+  double later = jump_time (&k);
+  k.step = -step;
+  return (later - jump_time (&k)) / (2 * step);
+}
+
+/* The derivative of t_s, or its error. */
+static double jump_slope (const pw_variation_column *c, jump_neighbour k) {
+  const pw_direction *d = &c->direction->given;
+  int index = pw_variation_index (c);
+  double slope = d->initial || index == 1 ? jump_along (c, k) : 0;
+  k.dy = c->direction->column[0].Y;
+  for (int i = 0; i < PW_VARIATION_NEAR && d->initial == NULL; i++) {
+    double weight = pw_variation_weight (d, index, i);
+    k.r = d->neighbour[i];
+    k.step = pw_direction_offset (d, i);
+    if (weight != 0) slope += weight * jump_time (&k);
+  }
+  return slope;
+}
+
+/* 1 if the motion leaves the surface after the jump, instead of sliding along it. */
+static int jump_leaves (jump_neighbour k) {
+  int n = k.x->n, side;
+  double *dy = k.x->output;
+  for (int j = 0; j < n; j++) dy[j] = 0, dy[n + j] = k.after[2 * n + j] - k.before[2 * n + j];
+  k.dy = dy, k.step = JUMP_NEAR * k.x->r->w->scale.time;
+  return jump_side (&k, k.step, &side) == PW_OK && side;
+}
+
+/* 1 if the motion has come from another state, where accelerations were those before the jump, instead of starting at it. */
+static int jump_arrives (jump_neighbour k) {
+  int n = k.x->n, side;
+  double t = -JUMP_NEAR * k.x->r->w->scale.time, *a = k.x->scratch + 2 * (n + 3);
+  k.dy = k.before;
+  return jump_side (&k, t, &side) == PW_OK &&
+         jump_distance (k.x, a, k.before + 2 * n) < JUMP_PART * jump_distance (k.x, k.before + 2 * n, k.after + 2 * n);
+}
+
+/* The largest difference between t_s and the times at which neighbours pass the surface, those at the state of the run and
+ * those near it, at which powers are differentiated. */
+static double jump_width (pw_variation *x, jump_neighbour k) {
+  double most = 0;
+  PW_EACH_COLUMN (c, x)
+  for (int side = -1; side <= 1 && x->ledger; side += 2) {
+    k.dy = c->Y, k.step = side * pw_variation_step_along (c);
+    most = pw_larger_or_nan (most, fabs (jump_time (&k)));
+  }
+  k.dy = k.before, k.step = 0;
+  for (pw_direction_copy *d = x->direction; d < x->direction + x->count; d++)
+    for (int i = 0; i < PW_VARIATION_NEAR && d->given.initial == NULL; i++) {
+      k.r = d->given.neighbour[i];
+      most = pw_larger_or_nan (most, fabs (jump_time (&k)));
+    }
+  return most;
+}
+
+/* The state at t_s + t, with the velocities and accelerations of one side. */
+static void jump_hold (pw_variation_hold *h, const double *state, double t_s, double t, int n) {
+  for (int j = 0; j < 2 * n; j++) h->state[j] = state[j] + t * state[n + j];
+  h->t = t_s + t;
+  h->from = fmin (t_s, h->t), h->to = fmax (t_s, h->t);
+}
+
+int pw_variation_approach_jump (pw_variation *x, pw_error *error) {
+  double t = pw_variation_recorded_jump (x);
+  if (isinf (t) || t == x->hold[0].to) return PW_OK;
+  jump_neighbour k = jump_of (x, t);
+  double width = 2 * jump_width (x, k);
+  if (!isfinite (width)) return jump_fail (t, error);
+  jump_hold (&x->hold[0], k.before, t, -width, x->n);
+  jump_hold (&x->hold[1], k.after, k.t_after, width, x->n);
+  if (x->t < x->hold[0].from) return PW_OK;
+  PW_EACH_COLUMN (c, x) memcpy (c->trial, c->Y, (size_t)x->size * sizeof *c->Y);
+  int status = pw_variation_evaluate_at (x, x->t, error);
+  return status == PW_OK ? pw_variation_begin (x, error) : status;
+}
+
+int pw_variation_pass_jump (pw_variation *x, pw_error *error) {
+  int moves = 0, smooth;
+  jump_neighbour k = jump_of (x, x->t);
+  smooth = jump_leaves (k);
+  PW_EACH_COLUMN (c, x) {
+    c->slope = jump_slope (c, k);
+    smooth &= isfinite (c->slope);
+    moves |= c->slope != 0;
+  }
+  if (!smooth || (moves && !jump_arrives (k))) return jump_fail (x->t, error);
+  return pw_variation_jump (x, k.t_after, k.after, error);
+}

@@ -1,0 +1,203 @@
+/* Derivatives of motions that pass states where accelerations jump, or change within a short time: closed forms, differences
+ * of runs, refusals. */
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include "check.h"
+#include "cli.h"
+
+enum { JUMPS_MOST = 40 };
+
+/* Numbers under a key of sensitivity.json, in order. */
+static int jumps_json (const char *key, double *value) {
+  int count = 0;
+  for (const char *at = cli_file ("sens/sensitivity.json"); (at = strstr (at, key)) != NULL && count < JUMPS_MOST;)
+    value[count++] = strtod (at += strlen (key), NULL);
+  return count;
+}
+
+/* Without force up to x = w, then with -F: with the time s = t - w/v after that, x = w + v s - F s^2 / 2, the work
+ * -F (v s - F s^2 / 2) and the mean of the work (1/t) times the integral of that, by v, F and w. */
+static void test_closed_form (void **state) {
+  static const char *const methods[] = { "rk4 --step 1e-4",   "erk5 --rtol 1e-9",  "erk8 --rtol 1e-9",
+                                         "radau --rtol 1e-9", "adams --rtol 1e-9", "bdf --rtol 1e-9" };
+  const double F = 0.3, s = 1,
+               expected[] = { 2 - F, -0.5, F, -F * (2 - F), -(1 - F), F * (1 - F), -0.2025, -0.2, 0.1275 };
+  double x[JUMPS_MOST];
+  char command[400];
+  (void)state;
+  cli_write ("jump.yaml", "pinwheel: 1\nparameters: [{name: F, value: 0.3}, {name: w, value: 1}]\n"
+                          "bodies:\n  - {name: a, mass: 1, inertia: 1, rate: {vx: 1}}\n"
+                          "elements:\n  - {force: f, body: a, fx: 'a.x > w ? -F : 0'}\n");
+  for (size_t i = 0; i < sizeof methods / sizeof *methods; i++) {
+    snprintf (command, sizeof command,
+              "pinwheel sensitivity @/jump.yaml --of a.x --of f.work --of mean:f.work --by a.vx --by F "
+              "--by w -t 2 -o @/sens -m %s",
+              methods[i]);
+    cli_shell (command);
+    assert_string_equal (cli_err,
+                         "pinwheel: force f: fx: \"a.x > w\" may jump as states change; steps do not end there, "
+                         "which costs accuracy\n");
+    assert_int_equal (jumps_json ("\"derivative\": ", x), 9);
+    for (int k = 0; k < 9; k++) check_close (methods[i], x[k], expected[k], 1e-4 * s, "errors of the run");
+  }
+}
+
+/* The smallest velocity, at the jump of a force from -1 to 1: it has no derivative by the state there. */
+static void test_extremum (void **state) {
+  (void)state;
+  cli_write ("least.yaml", "pinwheel: 1\nbodies:\n  - {name: a, mass: 1, inertia: 1, rate: {vx: 2}}\n"
+                           "elements:\n  - {force: f, body: a, fx: 'a.x > 1 ? 1 : -1'}\n");
+  cli_shell ("pinwheel sensitivity @/least.yaml --of min:a.vx --of a.vx --by a.vx -t 2 -o @/sens");
+  assert_non_null (strstr (cli_file ("sens/sensitivity.json"), "\"derivative\": null"));
+  assert_non_null (strstr (cli_out, "none"));
+}
+
+/* Derivatives of outputs of a model by a parameter against extrapolated differences of accurate runs. */
+static void jumps_compare (const char *file, const char *outputs, const char *by, double value, double step) {
+  static const char command[] =
+      "pinwheel sensitivity @/%s %s --by %s --set %s=%.17g -o @/sens -m erk8 --rtol 1e-11 --atol "
+      "1e-13";
+  double derivative[JUMPS_MOST], x[4][JUMPS_MOST];
+  char text[600];
+  snprintf (text, sizeof text, command, file, outputs, by, by, value);
+  cli_shell (text);
+  int count = jumps_json ("\"derivative\": ", derivative);
+  assert_true (count > 0);
+  for (int k = 0; k < 4; k++) {
+    snprintf (text, sizeof text, command, file, outputs, by, by, value + (k < 2 ? k - 2 : k - 1) * step);
+    cli_shell (text);
+    assert_int_equal (jumps_json ("\"value\": ", x[k]), 2 * count);
+  }
+  for (int i = 0; i < count; i++) {
+    double one = (x[2][2 * i] - x[1][2 * i]) / (2 * step), two = (x[3][2 * i] - x[0][2 * i]) / (4 * step);
+    check_close (by, derivative[i], (4 * one - two) / 3, fabs (one - two) + 1e-6 * fabs (one) + 1e-9,
+                 "extrapolated differences of runs");
+  }
+}
+
+/* A vehicle whose steering torque switches; a block with friction by sign (vx), at rest at the start; a bouncing ball, of
+ * which only the derivative of the force jumps. */
+static void test_differences (void **state) {
+  static const char outputs[] = "--of b.y --of t.work --of mean:p.Fx --of rms:a.vx --of max:a.vx --of kinetic";
+  (void)state;
+  cli_write ("switch.yaml",
+             "pinwheel: 1\nrun: {t_end: 0.6}\nparameters: [{name: amp, value: 5}, {name: h, value: 0.2}]\nbodies:\n"
+             "  - {name: a, mass: 1, inertia: 1, start: {x: 0}, rate: {vx: 1}}\n"
+             "  - {name: b, mass: 0.5, inertia: 0.1, start: {x: 1}, rate: {vx: 1}}\nelements:\n"
+             "  - {pin: p, body: [a, b], at: [[0.5, 0], [-0.5, 0]]}\n  - {wheel: w, body: a, at: [-0.3, 0]}\n"
+             "  - {torque: t, body: [b, a], value: '(b.phi - a.phi > h ? -amp : amp) - 0.5*(b.omega - a.omega)'}\n");
+  jumps_compare ("switch.yaml", outputs, "amp", 5, 1e-3);
+  jumps_compare ("switch.yaml", outputs, "h", 0.2, 1e-4);
+  cli_write ("sign.yaml", "pinwheel: 1\nrun: {t_end: 3}\nparameters: [{name: k, value: 100}]\n"
+                          "bodies:\n  - {name: a, mass: 1, inertia: 1, start: {x: 1}}\nelements:\n"
+                          "  - {slider: s, body: [a, ground], at: [[0, 0], [0, 0]]}\n"
+                          "  - {force: f, body: a, fx: '-k*a.x - 0.5*sign(a.vx)'}\n");
+  jumps_compare ("sign.yaml", "--of a.x --of a.vx --of f.work --of integral:a.x --of min:a.x", "k", 100, 1e-2);
+  cli_write ("ball.yaml", "pinwheel: 1\nrun: {t_end: 2}\nparameters: [{name: k, value: 1e4}]\n"
+                          "bodies:\n  - {name: a, mass: 1, inertia: 1, start: {y: 1}}\nelements:\n"
+                          "  - {gravity: g, acceleration: [0, -9.81]}\n"
+                          "  - {force: f, body: a, fy: 'a.y < 0 ? -k*a.y : 0'}\n");
+  jumps_compare ("ball.yaml", "--of a.y --of a.vy", "k", 1e4, 1);
+}
+
+/* Friction that reverses within 1 mm/s: each method resolves it, or the error shows that it does not. */
+static void test_narrow_friction (void **state) {
+  static const char *const methods[] = { "rk4",      "erk5", "erk8",  "erk8 --rtol 1e-4 --atol 1e-4",
+                                         "leapfrog", "bdf",  "adams", "bdf --rtol 1e-4 --atol 1e-4",
+                                         "galpha",   "ida",  "radau", "radau --rtol 1e-4 --atol 1e-4" };
+  double expected, x, error;
+  char command[300];
+  (void)state;
+  cli_write ("friction.yaml",
+             "pinwheel: 1\nrun: {t_end: 20}\nparameters: [{name: k, value: 100}]\n"
+             "bodies:\n  - {name: a, mass: 1, inertia: 1, start: {x: 1}}\nelements:\n"
+             "  - {slider: s, body: [a, ground], at: [[0, 0], [0, 0]]}\n"
+             "  - {spring: S, body: [a, ground], at: [[0, 0], [-5, 0]], stiffness: k, length: 5}\n"
+             "  - {sliding-friction: f, body: [a, ground], at: [[0, 0], [0, 0]], limit: 0.5, speed: 0.001}\n");
+  jumps_compare ("friction.yaml", "--of a.x", "k", 100, 1e-2);
+  cli_shell ("pinwheel sensitivity @/friction.yaml --of a.x --by k -o @/sens -m erk8 --rtol 1e-11 --atol 1e-13");
+  assert_int_equal (jumps_json ("\"derivative\": ", &expected), 1);
+  for (size_t i = 0; i < sizeof methods / sizeof *methods; i++) {
+    snprintf (command, sizeof command, "pinwheel sensitivity @/friction.yaml --of a.x --by k -o @/sens -m %s",
+              methods[i]);
+    cli_shell (command);
+    assert_int_equal (jumps_json ("\"derivative\": ", &x), 1);
+    assert_int_equal (jumps_json ("\"error\": ", &error), 1);
+    check_below (methods[i], fabs (x - expected), 10 * error + 0.01 * expected,
+                 "ten times the error, or below the notice");
+  }
+}
+
+static void jumps_bad (const char *command, const char *text) {
+  char all[400];
+  snprintf (all, sizeof all,
+            "pinwheel: force f: fx: \"sign(a.vx)\" may jump as states change; steps do not end there, which "
+            "costs accuracy\npinwheel: %s",
+            text);
+  cli_bad (command, 4, all + strlen ("pinwheel: "));
+}
+
+/* A motion that ends sliding along a jump, or starts at one. */
+static void test_refusals (void **state) {
+  (void)state;
+  cli_write ("stop.yaml", "pinwheel: 1\nparameters: [{name: F, value: 0}, {name: v, value: 0.5}]\n"
+                          "bodies:\n  - {name: a, mass: 1, inertia: 1, rate: {vx: v}}\nelements:\n"
+                          "  - {slider: s, body: [a, ground], at: [[0, 0], [0, 0]]}\n"
+                          "  - {force: f, body: a, fx: 'F - 0.5*sign(a.vx)'}\n");
+  jumps_bad ("pinwheel sensitivity @/stop.yaml --of a.x --by F -t 2 -m erk8",
+             "t = 1 s: the motion touches, slides along, or starts at states where accelerations jump: it is not "
+             "differentiable");
+  jumps_bad ("pinwheel sensitivity @/stop.yaml --of a.x --by F -t 2 -m rk4",
+             "t = 1 s: accelerations jump more than 8 times in one step of the run: the motion is not differentiable");
+  jumps_bad ("pinwheel sensitivity @/stop.yaml --set F=1 --set v=0 --of a.x --by v -t 2",
+             "t = 0 s: the motion touches, slides along, or starts at states where accelerations jump: it is not "
+             "differentiable");
+  cli_shell ("pinwheel sensitivity @/stop.yaml --set F=1 --set v=0 --of a.x --by F -t 2 -m erk8 -o @/sens");
+  double x;
+  assert_int_equal (jumps_json ("\"derivative\": ", &x), 1);
+  check_close ("da.x/dF", x, 2, 1e-4, "t^2/2, and the error of the run");
+}
+
+/* Floquet multipliers of a forced oscillator with friction, against differences of the map over a period. */
+static void test_periodic (void **state) {
+  double map[4][2], J[2][2];
+  const double x0 = 0.43974888, v0 = 0.24544215, step = 1e-4;
+  char command[400];
+  (void)state;
+  cli_write ("forced.yaml", "pinwheel: 1\nbodies:\n  - {name: a, mass: 1, inertia: 1, start: {x: 1}}\nelements:\n"
+                            "  - {slider: s, body: [a, ground], at: [[0, 0], [0, 0]]}\n"
+                            "  - {force: f, body: a, fx: '-20*a.x - 0.5*sign(a.vx) - 0.3*a.vx'}\n"
+                            "  - {force: g, body: a, fx: {harmonic: {amplitude: 5, omega: 3}}}\n");
+  for (int k = 0; k < 4; k++) {
+    snprintf (
+        command, sizeof command,
+        "pinwheel run @/forced.yaml -t 2*pi/3 -m erk8 --rtol 1e-11 --atol 1e-13 --start a.x=%.17g --start a.vx=%.17g "
+        "--json @/f.json",
+        x0 + (k == 0   ? step
+              : k == 1 ? -step
+                       : 0),
+        v0 + (k == 2   ? step
+              : k == 3 ? -step
+                       : 0));
+    cli_shell (command);
+    const char *json = cli_file ("f.json");
+    map[k][0] = cli_number (json, "bodies", "a", "x", NULL), map[k][1] = cli_number (json, "bodies", "a", "vx", NULL);
+  }
+  for (int i = 0; i < 2; i++)
+    for (int j = 0; j < 2; j++) J[i][j] = (map[2 * j][i] - map[2 * j + 1][i]) / (2 * step);
+  cli_shell ("pinwheel periodic @/forced.yaml --period 2*pi/3 -m erk8 --rtol 1e-9 -o @/per");
+  const char *at = strstr (cli_out, "modulus ");
+  assert_non_null (at);
+  check_close ("modulus", strtod (at + 8, NULL), sqrt (J[0][0] * J[1][1] - J[0][1] * J[1][0]), 1e-5,
+               "six digits, and differences of 1e-4");
+}
+
+int main (void) {
+  const struct CMUnitTest tests[] = {
+    cmocka_unit_test (test_closed_form), cmocka_unit_test (test_differences), cmocka_unit_test (test_narrow_friction),
+    cmocka_unit_test (test_refusals),    cmocka_unit_test (test_periodic),    cmocka_unit_test (test_extremum),
+  };
+  return cmocka_run_group_tests (tests, cli_setup, cli_teardown);
+}
