@@ -74,8 +74,10 @@ typedef struct {
   const double *initial; /* copied; NULL with neighbours */
 } pw_direction;
 
-/* p of neighbour i, minus that of the run. */
+/* p of neighbour i, minus that of the run; its weight in the derivative of a function of p by extrapolated differences, or in the
+ * error of that. */
 double pw_direction_offset (const pw_direction *d, int i);
+double pw_direction_weight (const pw_direction *d, int of_error, int i);
 
 /* Derivatives of the motion of a run, integrated with it. */
 typedef struct pw_variation pw_variation;

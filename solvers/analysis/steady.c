@@ -52,14 +52,15 @@ static int steady_arrays (pw_steady *x) {
 int pw_signals_change (pw_run *r, double t, double period, double span, int *changed, pw_error *error) {
   pw_workspace *w = r->w;
   int count = 3 * r->s->sources, status = PW_OK;
-  double *before = calloc (3 * (size_t)count + 1, sizeof *before), *largest = before + count, *off = largest + count;
+  double *before = calloc (3 * (size_t)count + 1, sizeof *before), *largest = before + count, *off = largest + count,
+         at = t;
   if (before == NULL) return pw_fail_memory (r->s, error);
   for (int k = 1; status == PW_OK && k <= STEADY_TIMES; k++) {
-    double at = period > 0 ? t + span * fmod (0.618034 * k, 1) : t, part = k / (double)STEADY_TIMES;
-    status = pw_update_kinematics (w, at, r->q, r->v);
+    double from = period > 0 ? t + span * fmod (0.618034 * k, 1) : t, part = k / (double)STEADY_TIMES;
+    status = pw_update_kinematics (w, at = from, r->q, r->v);
     if (status == PW_OK && count) memcpy (before, w->u, (size_t)count * sizeof *before);
     if (status == PW_OK)
-      status = pw_update_kinematics (w, period > 0 ? at + period : t + span * part * part, r->q, r->v);
+      status = pw_update_kinematics (w, at = period > 0 ? from + period : t + span * part * part, r->q, r->v);
     for (int i = 0; status == PW_OK && i < count; i++) {
       off[i] = pw_larger_or_nan (off[i], fabs (w->u[i] - before[i]));
       largest[i] = fmax (largest[i], fmax (fabs (before[i]), fabs (w->u[i])));
@@ -69,7 +70,7 @@ int pw_signals_change (pw_run *r, double t, double period, double span, int *cha
   for (int i = count; i-- > 0;)
     if (!(off[i] <= SIGNAL_SAME * largest[i])) *changed = i / 3;
   free (before);
-  return status == PW_OK ? PW_OK : pw_fail_signal (t, error);
+  return status == PW_OK ? PW_OK : pw_run_annotate_error (r, pw_fail_signal (at, error), error);
 }
 
 /* PW_INPUT with the first signal that changes with time, in the initial state, within the span. */

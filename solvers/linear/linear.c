@@ -91,7 +91,8 @@ static int linear_compute (pw_linearisation *x, pw_linear *l, pw_error *error) {
   pw_run *r = x->r;
   int status = pw_linear_evaluate (x, r->t, r->q, r->v);
   if (status != PW_OK)
-    return status > 0 ? pw_fail_singular (r, r->t, error) : pw_fail (error, PW_METHOD, "a signal failed");
+    return status > 0 ? pw_fail_singular (r, r->t, error)
+                      : pw_run_annotate_error (r, pw_fail_signal (r->t, error), error);
   l->least = pw_linear_bases (x);
   pw_linear_choose_frame (x);
   for (int c = 0; c < x->size; c++) linear_column_of_A (x, c);

@@ -11,6 +11,7 @@
 int pw_run_annotate_error (const pw_run *r, int status, pw_error *error) {
   char signal[160];
   if (status == PW_OK || error == NULL || *pw_failed_signal (r->w, signal, sizeof signal) == 0) return status;
+  if (strstr (error->text, signal)) return status;
   size_t n = strlen (error->text);
   const char *glue = strstr (error->text, "a signal failed") ? ":" : "; in the attempted step,";
   const char *either = r->w->failed->of_force ? "" : ", or a derivative of it,";

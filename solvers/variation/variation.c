@@ -137,7 +137,7 @@ static int variation_start (pw_variation *x, pw_direction_copy *d, const pw_dire
     if (given->initial && c == 0) memcpy (Y, given->initial, 2 * (size_t)n * sizeof *Y);
     for (int i = 0; i < PW_VARIATION_NEAR && given->initial == NULL; i++) {
       const pw_run *r = given->neighbour[i];
-      double weight = pw_variation_weight (given, c, i);
+      double weight = pw_direction_weight (given, c, i);
       for (int j = 0; j < n; j++) Y[j] += weight * (r->q[j] - x->r->q[j]), Y[n + j] += weight * (r->v[j] - x->r->v[j]);
     }
   }
@@ -209,7 +209,7 @@ pw_variation *pw_variation_open (pw_run *r, const pw_direction *d, int count, in
   x->may_jump = pw_variation_may_jump (r->s);
   x->hold[0].to = x->hold[1].to = -INFINITY;
   x->h = 1e-3 * r->w->scale.time;
-  if (variation_open (x, d, error) == PW_OK) return x;
+  if (pw_run_annotate_error (r, variation_open (x, d, error), error) == PW_OK) return x;
   pw_variation_close (x);
   return NULL;
 }
@@ -275,7 +275,7 @@ int pw_variation_advance (pw_variation *x, double t, double t_end, pw_error *err
     }
     pw_variation_forget (x);
   }
-  return status;
+  return pw_run_annotate_error (r, status, error);
 }
 
 double pw_variation_next_jump (pw_variation *x, double t, double t_end, pw_error *error) {
@@ -317,5 +317,5 @@ int pw_variation_sample (pw_variation *x, int i, pw_sample *derivative, pw_sampl
   int status = variation_fill (x, &x->direction[i], 0, derivative);
   if (status == PW_OK && error_of) status = variation_fill (x, &x->direction[i], 1, error_of);
   (void)pw_evaluate_J_at (x->r->w, x->at, x->q, x->v);
-  return status == PW_OK ? PW_OK : pw_fail_signal (x->t, error);
+  return pw_run_annotate_error (x->r, status == PW_OK ? PW_OK : pw_fail_signal (x->t, error), error);
 }

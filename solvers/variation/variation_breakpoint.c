@@ -18,7 +18,7 @@ static const double BREAKPOINT_SMOOTH = 1e-3;
 static double breakpoint_derivative (const pw_direction_copy *d, int c) {
   double sum = 0;
   for (int i = 0; i < PW_VARIATION_NEAR; i++)
-    sum += pw_variation_weight (&d->given, c, i) * (d->breakpoint[i] - d->breakpoint[1]);
+    sum += pw_direction_weight (&d->given, c, i) * (d->breakpoint[i] - d->breakpoint[1]);
   return sum;
 }
 
@@ -54,11 +54,19 @@ int pw_variation_look_ahead (pw_variation *x, pw_direction_copy *d, double next,
                   x->t, (int)(d - x->direction) + 1);
 }
 
-/* The right-hand state's velocities must satisfy the constraints, or they jump. */
-static int breakpoint_check (pw_variation *x, pw_error *error) {
+/* Velocities jump if the residual of velocity constraints does, by more than this in units of the scene. */
+static const double BREAKPOINT_VELOCITY = 1e-6;
+
+/* The residual of velocity constraints at the state evaluated. */
+static double breakpoint_residual (pw_variation *x) {
   pw_residuals now;
+  if (pw_evaluate_J_at (x->r->w, x->at, x->q, x->v) != PW_OK) return NAN;
   pw_evaluate_velocity_residual (x->r->w, x->r->active, &now);
-  if (!(now.velocity > 1e-6)) return PW_OK;
+  return now.velocity;
+}
+
+static int breakpoint_check (pw_variation *x, double before, pw_error *error) {
+  if (breakpoint_residual (x) <= 2 * before + BREAKPOINT_VELOCITY) return PW_OK;
   return pw_fail (error, PW_METHOD, "t = %.6g s: prescribed velocities jump: the motion is not differentiable", x->t);
 }
 
@@ -89,7 +97,7 @@ int pw_variation_jump (pw_variation *x, double t, const double *state, pw_error 
 }
 
 int pw_variation_pass (pw_variation *x, pw_error *error) {
-  double next = pw_next_breakpoint (x->r->w, x->r->method->order > 2, x->t);
+  double next = pw_next_breakpoint (x->r->w, x->r->method->order > 2, x->t), residual = breakpoint_residual (x);
   int status = PW_OK;
   PW_EACH_COLUMN (c, x) c->slope = d->given.initial ? 0 : breakpoint_derivative (d, pw_variation_index (c));
   for (int i = 0; i < x->count && status == PW_OK; i++) {
@@ -97,7 +105,7 @@ int pw_variation_pass (pw_variation *x, pw_error *error) {
     status = pw_variation_look_ahead (x, d, next, error);
   }
   if (status == PW_OK) status = pw_variation_jump (x, x->t, x->point[0].x, error);
-  if (status == PW_OK) status = breakpoint_check (x, error);
+  if (status == PW_OK) status = breakpoint_check (x, residual, error);
   if (status == PW_OK) memcpy (x->point[0].x + 2 * x->n, x->linear.a, (size_t)x->n * sizeof (double));
   x->passed = x->t;
   return status;

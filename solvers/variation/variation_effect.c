@@ -12,8 +12,8 @@ static double effect_weight (const pw_direction *d, int which, int i) {
   return (d->one_sided ? one_sided : central)[which][i] / d->step;
 }
 
-double pw_variation_weight (const pw_direction *d, int c, int i) {
-  return ((c == 0 ? 4 : 1) * effect_weight (d, 0, i) - effect_weight (d, 1, i)) / 3;
+double pw_direction_weight (const pw_direction *d, int of_error, int i) {
+  return ((of_error ? 1 : 4) * effect_weight (d, 0, i) - effect_weight (d, 1, i)) / 3;
 }
 
 double pw_direction_offset (const pw_direction *d, int i) {
@@ -115,7 +115,7 @@ static int effect_neighbour (pw_variation *x, pw_direction_copy *d, int i) {
   return PW_OK;
 }
 
-/* The two differences become the extrapolated one and its error, as in pw_variation_weight. */
+/* The two differences become the extrapolated one and its error, as in pw_direction_weight. */
 static void effect_extrapolate (double *one, double *two, int n) {
   for (int i = 0; i < n; i++) {
     double error = (one[i] - two[i]) / 3;
@@ -145,7 +145,7 @@ int pw_variation_evaluate (pw_variation *x, double t, pw_error *error) {
   x->r->statistics = before;
   if (status > 0) status = pw_fail_singular (x->r, t, error);
   x->r->near_singular = near;
-  return status < 0 ? pw_fail (error, status, "t = %.6g s: a signal failed", t) : status;
+  return status < 0 ? pw_fail_signal (t, error) : status;
 }
 
 /* ---- Derivatives of energies, powers, least-norm multipliers ---- */
@@ -187,7 +187,7 @@ int pw_variation_outputs (pw_variation *x, const pw_variation_column *c, const d
   int length = 2 + x->entries + x->m, status = PW_OK;
   memset (out, 0, (size_t)length * sizeof *out);
   for (int i = 0; i < PW_VARIATION_NEAR && status == PW_OK && d->given.initial == NULL; i++) {
-    double weight = pw_variation_weight (&d->given, pw_variation_index (c), i);
+    double weight = pw_direction_weight (&d->given, pw_variation_index (c), i);
     if (weight == 0) continue;
     status = effect_values (d->given.neighbour[i], at.t, at.q, at.v, x->linear.lambda, x->values);
     effect_add (out, x->values, weight, length);

@@ -204,7 +204,7 @@ static double jump_slope (const pw_variation_column *c, jump_neighbour k) {
   double slope = d->initial || index == 1 ? jump_along (c, k) : 0;
   k.dy = c->direction->column[0].Y;
   for (int i = 0; i < PW_VARIATION_NEAR && d->initial == NULL; i++) {
-    double weight = pw_variation_weight (d, index, i);
+    double weight = pw_direction_weight (d, index, i);
     k.r = d->neighbour[i];
     k.step = pw_direction_offset (d, i);
     if (weight != 0) slope += weight * jump_time (&k);

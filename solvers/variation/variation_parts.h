@@ -124,8 +124,6 @@ static inline int pw_variation_index (const pw_variation_column *c) {
   return (int)(c - c->direction->column);
 }
 
-/* Weight of neighbour i in column c: the derivative by extrapolated differences, or the error of the differences. */
-double pw_variation_weight (const pw_direction *d, int c, int i);
 /* Finds the neighbours' breakpoints that correspond to the next one of the run. */
 int pw_variation_look_ahead (pw_variation *x, pw_direction_copy *d, double next, pw_error *error);
 /* Passes the breakpoint at which run and derivatives have arrived. */

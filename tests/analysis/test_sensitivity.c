@@ -236,6 +236,10 @@ static void test_files (void **state) {
   assert_true (cli_says (json, "model", "pendulum"));
   assert_true (cli_says (json, "output", "bob.x"));
   assert_true (cli_says (json, "unit", "m"));
+  cli_good ("pinwheel sensitivity roller-racer --of rear.x --of seat.x --by a -t 3 -o @/sens");
+  double x[2];
+  assert_int_equal (sensitivity_json ("\"error\": ", x), 2);
+  check_close ("error of a contact point", x[0] / x[1], 1, 0.1, "0.1 m from the centre of mass");
   assert_non_null (strstr (json, "\"complete\": true"));
   assert_non_null (cli_file ("sens/sensitivity.svg"));
 }

@@ -20,8 +20,7 @@
 #define FUNCTIONAL_PARABOLA 1e-4
 #define FUNCTIONAL_LINEAR 0.2
 #define FUNCTIONAL_AGREE 1e-3
-#define FUNCTIONAL_BEFORE 1e-6 /* of a step, to see whether an extremum is before its end */
-#define FUNCTIONAL_WIDTH 1e-8  /* of the interval that contains an extremum, relative to the first one */
+#define FUNCTIONAL_WIDTH 1e-8 /* of the interval that contains an extremum, relative to the first one */
 enum {
   FUNCTIONAL_TIMES = PW_FUNCTIONAL_TIMES,
   FUNCTIONAL_MIDDLE = 4,
@@ -161,7 +160,6 @@ static void functional_extremum (functional_step *p, pw_functional *f, const dou
 
 static int functional_begin (pw_outcomes *x, pw_run *r, pw_error *error) {
   pw_sample s;
-  gsl_set_error_handler_off (); /* the default handler ends the program */
   x->t0 = x->t = pw_run_time (r);
   int status = pw_run_sample (r, x->t, &s, error);
   if (status == PW_OK) status = functional_prepare (x, &s, error);
@@ -176,9 +174,9 @@ static int functional_begin (pw_outcomes *x, pw_run *r, pw_error *error) {
 /* Times in a step: the ends, times just inside them, the nodes. */
 static void functional_times (const functional_step *p, double t[FUNCTIONAL_TIMES]) {
   const double h = p->t1 - p->t0;
-  t[0] = p->t0, t[1] = p->t0 + FUNCTIONAL_BEFORE * h;
+  t[0] = p->t0, t[1] = p->t0 + PW_FUNCTIONAL_BEFORE * h;
   for (int i = 0; i < PW_GAUSS_NODES; i++) t[2 + i] = functional_time (p->t0, p->t1, i);
-  t[FUNCTIONAL_TIMES - 2] = p->t1 - FUNCTIONAL_BEFORE * h, t[FUNCTIONAL_TIMES - 1] = p->t1;
+  t[FUNCTIONAL_TIMES - 2] = p->t1 - PW_FUNCTIONAL_BEFORE * h, t[FUNCTIONAL_TIMES - 1] = p->t1;
 }
 
 static void functional_take (functional_step *p, double t, int i) {

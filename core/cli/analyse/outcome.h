@@ -44,6 +44,8 @@ double pw_column_value (const pw_system *s, pw_column c, const pw_sample *sample
 typedef enum { PW_FINAL, PW_MAX, PW_MIN, PW_MEAN, PW_INTEGRAL, PW_RMS } pw_functional_type;
 
 #define PW_FUNCTIONAL_TIMES 9
+/* Part of a step, to see whether an extremum is at its end or just before or after it. */
+#define PW_FUNCTIONAL_BEFORE 1e-6
 
 static inline int pw_is_integral (pw_functional_type type) {
   return type == PW_MEAN || type == PW_INTEGRAL || type == PW_RMS;

@@ -23,6 +23,7 @@ typedef struct {
   pw_variation *variation;
   pw_run *sampled;          /* the run of which samples are taken; NULL: base.run */
   int along;                /* 1: there are extrema or integrals */
+  double passed;            /* the last breakpoint before the time last evaluated [s] */
   pw_outcomes outcomes;     /* of the run */
   pw_workspace **workspace; /* 5 of each unknown: of the run's system and of the neighbours', for contact points */
   /* Of all functionals F of the outputs and unknowns P at the time last evaluated, and of the run. */

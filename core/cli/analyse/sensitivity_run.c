@@ -46,18 +46,23 @@ static int sensitivity_contact (const pw_sensitivity *x, int unknown, int which,
   return status;
 }
 
-/* Contact points are functions of positions and parameters: differences in both. */
+/* Contact points are functions of positions and parameters: differences in both, with the derivatives of positions and their
+ * errors. */
 static int sensitivity_contact_slope (const pw_sensitivity *x, int unknown, int index, const pw_sample *s,
-                                      const double *dq, double *slope, pw_error *error) {
-  static const double weight[2][4] = { { 0, -0.5, 0.5, 0 }, { -1.5, 2, -0.5, 0 } };
+                                      const double *dq, const double *eq, double *slope, double *error_of,
+                                      pw_error *error) {
   const pw_direction *d = &x->direction[unknown];
+  double value = 0;
   int status = PW_OK;
-  *slope = 0;
+  *slope = *error_of = 0;
   for (int k = 0; k < 4 && status == PW_OK; k++) {
-    double value = 0;
-    if (weight[d->one_sided][k] == 0) continue;
     status = sensitivity_contact (x, unknown, 1 + k, index, s, dq, pw_direction_offset (d, k), &value, error);
-    *slope += weight[d->one_sided][k] * value / d->step;
+    *slope += pw_direction_weight (d, 0, k) * value;
+    *error_of += pw_direction_weight (d, 1, k) * value;
+  }
+  for (int side = -1; side <= 1 && status == PW_OK; side += 2) {
+    status = sensitivity_contact (x, unknown, 0, index, s, eq, side, &value, error);
+    *error_of += side * value / 2;
   }
   return status;
 }
@@ -95,7 +100,8 @@ int pw_sensitivity_at (pw_sensitivity *x, double t, pw_error *error) {
       x->slope[i * P + p] = pw_column_value (x->base.system, c, &d);
       x->error[i * P + p] = pw_column_value (x->base.system, c, &e);
       if (c.type == PW_COLUMN_CONTACT)
-        status = sensitivity_contact_slope (x, p, c.index, &s, d.q, &x->slope[i * P + p], error);
+        status =
+            sensitivity_contact_slope (x, p, c.index, &s, d.q, e.q, &x->slope[i * P + p], &x->error[i * P + p], error);
     }
   }
   return status;
@@ -120,10 +126,10 @@ static void sensitivity_add (pw_sensitivity *x, double weight) {
   }
 }
 
-/* The derivative of the time of a breakpoint, or of the last jump with the state. */
-static double sensitivity_moves (const pw_sensitivity *x, int unknown, int with_state) {
+/* The derivative of the time of the next breakpoint, or of the last breakpoint or jump that has been passed. */
+static double sensitivity_moves (const pw_sensitivity *x, int unknown, int passed) {
   double slope;
-  if (with_state) return pw_variation_jump_slope (x->variation, unknown);
+  if (passed) return pw_variation_jump_slope (x->variation, unknown);
   pw_variation_breakpoint (x->variation, unknown, &slope);
   return slope;
 }
@@ -134,11 +140,16 @@ static void sensitivity_keep (pw_sensitivity *x, int i) {
     if (!isnan (x->end_slope[at])) x->end_slope[at] = x->slope[at], x->end_error[at] = x->error[at];
 }
 
-/* An extremum at a breakpoint that moves has no derivative. */
-static void sensitivity_keep_breakpoint (pw_sensitivity *x, int i) {
+/* Keeps those of an extremum, which has none at a breakpoint that moves, nor just after it.  reached: 1 if it is at a
+ * breakpoint that is not passed yet. */
+static void sensitivity_keep_extremum (pw_sensitivity *x, int i, int reached) {
+  const pw_functional *f = &x->outcomes.functional[i];
+  double slope, next = pw_variation_breakpoint (x->variation, 0, &slope);
+  int before = reached || fabs (f->t - next) < 1e-9 * (1 + fabs (next)),
+      after = f->t - x->passed <= 2 * PW_FUNCTIONAL_BEFORE * f->step;
   sensitivity_keep (x, i);
-  for (int p = 0; p < x->unknowns; p++)
-    if (sensitivity_moves (x, p, 0) != 0) x->end_slope[i * x->unknowns + p] = NAN;
+  for (int p = 0; p < x->unknowns && (before || after); p++)
+    if (sensitivity_moves (x, p, !before) != 0) x->end_slope[i * x->unknowns + p] = NAN;
 }
 
 /* Nor has one in the step of the run that passes a jump with the state, if derivatives jump there from `before`. */
@@ -196,7 +207,6 @@ static int sensitivity_events (const pw_sensitivity *x, double t0, double t1, se
 
 /* From t0, where the columns are evaluated, to t1. */
 static int sensitivity_interval (pw_sensitivity *x, double t0, double t1, sensitivity_event *list, pw_error *error) {
-  double slope, breakpoint = pw_variation_breakpoint (x->variation, 0, &slope);
   int count = sensitivity_events (x, t0, t1, list), status = PW_OK;
   for (int i = 0; i < count && status == PW_OK; i++) {
     double t = list[i].t;
@@ -204,10 +214,8 @@ static int sensitivity_interval (pw_sensitivity *x, double t0, double t1, sensit
     if (status != PW_OK) break;
     if (list[i].extremum < 0)
       sensitivity_add (x, list[i].weight);
-    else if (fabs (t - breakpoint) < 1e-9 * (1 + fabs (t)))
-      sensitivity_keep_breakpoint (x, list[i].extremum);
     else
-      sensitivity_keep (x, list[i].extremum);
+      sensitivity_keep_extremum (x, list[i].extremum, 0);
   }
   return status == PW_OK ? pw_sensitivity_at (x, t1, error) : status;
 }
@@ -224,8 +232,7 @@ static int sensitivity_jump (pw_sensitivity *x, double t0, double t, int with_st
   for (int i = 0; i < x->outcomes.functionals && status == PW_OK; i++) {
     const pw_functional *f = &x->outcomes.functional[i];
     double jump = x->before[i] - x->value[i];
-    if (pw_is_extremum (f->type) && f->t > t0 && f->t <= t)
-      (with_state ? sensitivity_keep : sensitivity_keep_breakpoint) (x, i);
+    if (pw_is_extremum (f->type) && f->t > t0 && f->t <= t) sensitivity_keep_extremum (x, i, !with_state);
     if (!pw_is_integral (f->type) || jump == 0) continue;
     if (f->type != PW_INTEGRAL) jump /= x->t_end;
     if (f->type == PW_RMS) jump *= (x->before[i] + x->value[i]) / (2 * f->value);
@@ -257,6 +264,7 @@ static int sensitivity_advance (pw_sensitivity *x, double t, double to, sensitiv
     double end = jump ? next - fmin (1e-9 * x->dt, next - t) : next;
     status = sensitivity_interval (x, t, end, list, error);
     if (status == PW_OK && jump) status = sensitivity_jump (x, end, next, jump == 2, error);
+    if (jump == 1) x->passed = next;
     pw_progress_at (progress, t = next);
   }
   return status;
@@ -264,6 +272,7 @@ static int sensitivity_advance (pw_sensitivity *x, double t, double to, sensitiv
 
 static int sensitivity_along (pw_sensitivity *x, sensitivity_event *list, pw_progress *progress, pw_error *error) {
   double t = 0, to;
+  x->passed = -INFINITY;
   int status = pw_sensitivity_at (x, 0, error);
   if (status == PW_OK) status = sensitivity_row (x, 0, error);
   for (int i = 0; i < x->outcomes.functionals && status == PW_OK; i++)

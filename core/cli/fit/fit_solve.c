@@ -277,7 +277,6 @@ static int solve_open (solution *p) {
 int pw_fit_solve (pw_fit *x, pw_error *error) {
   solution p = { .x = x, .error = error };
   gsl_multifit_nlinear_parameters parameters = gsl_multifit_nlinear_default_parameters ();
-  gsl_set_error_handler_off ();
   p.status = solve_open (&p);
   gsl_multifit_nlinear_workspace *w = p.status == PW_OK
                                           ? gsl_multifit_nlinear_alloc (gsl_multifit_nlinear_trust, &parameters,

@@ -5,7 +5,6 @@
  * best results continue with a tighter tolerance.  A run that fails gets a value that is worse than all before it. */
 #define _POSIX_C_SOURCE 200809L
 #include "optimise_parts.h"
-#include <gsl/gsl_errno.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -220,7 +219,6 @@ static void optimise_close (pw_optimise *x) {
 static int optimise_command (void *options, pw_error *error) {
   pw_optimise *x = options;
   pw_output *file[2] = { NULL, NULL };
-  gsl_set_error_handler_off (); /* the default handler ends the program */
   int folder = -1, status = optimise_read (x, error);
   if (status == PW_OK) status = optimise_open (x, file, &folder, error);
   if (status == PW_OK) status = optimise_search (x, error);
