@@ -187,6 +187,8 @@ const pw_initial_report *pw_run_initial (const pw_run *r);
 int pw_initial_moved (const pw_system *s, const pw_initial_report *report, int state);
 /* 1 if the model or the user specifies the initial value of this state. */
 int pw_initial_specified (const pw_initial_report *report, int state);
+/* 1 if the user gives it: pw_model_set_initial, pw_settings.initial. */
+int pw_initial_given (const pw_initial_report *report, int state);
 const pw_scale *pw_run_scale (const pw_run *r);
 
 /* ---- For programs in other languages (bindings.c) ---- */

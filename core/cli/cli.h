@@ -187,6 +187,11 @@ void pw_cli_vary_progress (const pw_cli_vary *v, pw_progress *p, double from, do
 /* The system at a value of the parameter; for pw_steady_settings.compile. */
 pw_system *pw_cli_vary_compile (void *vary, double value, pw_error *error);
 
+enum { PW_CHANGE_TEXT = 400 };
+/* The given initial value that the consistent initialisation of a run at its beginning has changed most: the change, and
+ * a text such as "frame.vy from 1 to 1.2 m/s".  0: all are as given. */
+double pw_cli_change (const pw_run *r, const pw_system *s, char text[PW_CHANGE_TEXT]);
+
 /* A path, relative to the current directory if that contains it; the result may be in `buffer`. */
 const char *pw_cli_short_path (const char *path, char *buffer, size_t size);
 

@@ -57,6 +57,21 @@ void pw_cli_close_model (pw_cli_model *m) {
   *m = (pw_cli_model){ .file = NULL };
 }
 
+double pw_cli_change (const pw_run *r, const pw_system *s, char text[PW_CHANGE_TEXT]) {
+  const pw_initial_report *x = pw_run_initial (r);
+  int n = pw_system_coordinates (s);
+  double most = 0;
+  char name[300], a[32], b[32];
+  for (int i = 0; i < 2 * n; i++) {
+    double from = i < n ? x->q_given[i] : x->v_given[i - n], to = i < n ? x->q[i] : x->v[i - n];
+    if (!pw_initial_given (x, i) || !pw_initial_moved (s, x, i) || !(fabs (to - from) > most)) continue;
+    most = fabs (to - from);
+    snprintf (text, PW_CHANGE_TEXT, "%s from %s to %s %s", pw_system_state_name (s, i, name, sizeof name),
+              pw_format (a, from, 10), pw_format (b, to, 10), pw_system_state_unit (s, i));
+  }
+  return most;
+}
+
 const char *pw_cli_short_path (const char *path, char *buffer, size_t size) {
   size_t n = getcwd (buffer, size) ? strlen (buffer) : 0;
   return n > 1 && strncmp (path, buffer, n) == 0 && path[n] == '/' ? path + n + 1 : path;

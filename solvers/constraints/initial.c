@@ -191,6 +191,10 @@ int pw_initial_specified (const pw_initial_report *report, int state) {
   return (report->origin[state] & (PW_GIVEN | PW_SPECIFIED)) != 0;
 }
 
+int pw_initial_given (const pw_initial_report *report, int state) {
+  return (report->origin[state] & PW_GIVEN) != 0;
+}
+
 /* If redundant equations make an attempt with all equations fail, it is repeated with an independent set, selected at
  * the given positions or, failing that, at those reached by an attempt without prescribed values, from which it then
  * starts. */

@@ -300,12 +300,23 @@ static void test_starts (void **state) {
   assert_non_null (strstr (said, "--set k="));
 }
 
+/* Given initial values that the fitted run does not have. */
+static void test_changed_values (void **state) {
+  (void)state;
+  cli_shell ("pinwheel run ezyroller --t-end 1 --every 0.1 -o @/e.csv");
+  assert_int_equal (cli_run ("pinwheel fit ezyroller --data @/e.csv --columns frame.y --free M0 --start frame.vy=0 "
+                             "--start frame.omega=7"),
+                    0);
+  assert_non_null (strstr (cli_err, "pinwheel: the constraints changed given initial values of this result, at worst "
+                                    "frame.omega from 7 to 2 rad/s\n"));
+}
+
 int main (void) {
   const struct CMUnitTest tests[] = {
-    cmocka_unit_test (test_exact),    cmocka_unit_test (test_derivatives), cmocka_unit_test (test_errors),
-    cmocka_unit_test (test_coverage), cmocka_unit_test (test_unweighted),  cmocka_unit_test (test_undetermined),
-    cmocka_unit_test (test_failing),  cmocka_unit_test (test_bound),       cmocka_unit_test (test_bad),
-    cmocka_unit_test (test_starts),
+    cmocka_unit_test (test_exact),    cmocka_unit_test (test_derivatives),    cmocka_unit_test (test_errors),
+    cmocka_unit_test (test_coverage), cmocka_unit_test (test_unweighted),     cmocka_unit_test (test_undetermined),
+    cmocka_unit_test (test_failing),  cmocka_unit_test (test_bound),          cmocka_unit_test (test_bad),
+    cmocka_unit_test (test_starts),   cmocka_unit_test (test_changed_values),
   };
   return cmocka_run_group_tests (tests, fit_setup, cli_teardown);
 }

@@ -221,12 +221,24 @@ static void test_unbounded (void **state) {
   }
 }
 
+/* Given initial values that the best run does not have. */
+static void test_changed_values (void **state) {
+  (void)state;
+  assert_int_equal (
+      cli_run ("pinwheel optimise ezyroller --t-end 0.1 --maximise frame.x --free frame.vx=0:1 --starts 1 "
+               "--start frame.vy=0 --start frame.omega=7"),
+      0);
+  assert_string_equal (cli_err, "pinwheel: the constraints changed given initial values of this result, at worst "
+                                "frame.omega from 7 to 2 rad/s\n");
+}
+
 int main (void) {
-  const struct CMUnitTest tests[] = { cmocka_unit_test (test_valley),     cmocka_unit_test (test_derivatives),
-                                      cmocka_unit_test (test_constraint), cmocka_unit_test (test_bound),
-                                      cmocka_unit_test (test_failing),    cmocka_unit_test (test_sweep),
-                                      cmocka_unit_test (test_edge),       cmocka_unit_test (test_starts),
-                                      cmocka_unit_test (test_jobs),       cmocka_unit_test (test_interrupt),
-                                      cmocka_unit_test (test_bad),        cmocka_unit_test (test_unbounded) };
+  const struct CMUnitTest tests[] = { cmocka_unit_test (test_valley),        cmocka_unit_test (test_derivatives),
+                                      cmocka_unit_test (test_constraint),    cmocka_unit_test (test_bound),
+                                      cmocka_unit_test (test_failing),       cmocka_unit_test (test_sweep),
+                                      cmocka_unit_test (test_edge),          cmocka_unit_test (test_starts),
+                                      cmocka_unit_test (test_jobs),          cmocka_unit_test (test_interrupt),
+                                      cmocka_unit_test (test_bad),           cmocka_unit_test (test_unbounded),
+                                      cmocka_unit_test (test_changed_values) };
   return cmocka_run_group_tests (tests, optimise_setup, cli_teardown);
 }

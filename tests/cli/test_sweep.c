@@ -73,6 +73,16 @@ static void test_start_values (void **state) {
   assert_string_equal (cli_out, "start.frame.vx [m/s],status,t [s],frame.x [m],frame.y [m]\n");
 }
 
+/* Varied and given initial values that the constraints change are counted, with the largest change. */
+static void test_changed_values (void **state) {
+  (void)state;
+  assert_int_equal (
+      cli_run ("pinwheel sweep ezyroller --vary frame.vy=0,1,2 --start frame.omega=0 --t-end 0.01 -o @/v.csv"), 0);
+  assert_string_equal (cli_err, "pinwheel: in 2 of 3 runs the constraints changed given initial values, at worst "
+                                "frame.omega from 0 to 2.857142857 rad/s\n");
+  cli_good ("pinwheel sweep ezyroller --vary frame.vy=0,1,2 --t-end 0.01 -o @/v.csv");
+}
+
 /* Bodies may come and go with a count; where there is none there is no number. */
 static void test_counts (void **state) {
   (void)state;
@@ -200,10 +210,10 @@ static void test_bad_input (void **state) {
 
 int main (void) {
   const struct CMUnitTest tests[] = {
-    cmocka_unit_test (test_order),        cmocka_unit_test (test_ranges),    cmocka_unit_test (test_row_is_run),
-    cmocka_unit_test (test_start_values), cmocka_unit_test (test_counts),    cmocka_unit_test (test_cpu),
-    cmocka_unit_test (test_shared),       cmocka_unit_test (test_failures),  cmocka_unit_test (test_all_fail),
-    cmocka_unit_test (test_fails_late),   cmocka_unit_test (test_bad_input),
+    cmocka_unit_test (test_order),        cmocka_unit_test (test_ranges),         cmocka_unit_test (test_row_is_run),
+    cmocka_unit_test (test_start_values), cmocka_unit_test (test_counts),         cmocka_unit_test (test_cpu),
+    cmocka_unit_test (test_shared),       cmocka_unit_test (test_failures),       cmocka_unit_test (test_all_fail),
+    cmocka_unit_test (test_fails_late),   cmocka_unit_test (test_changed_values), cmocka_unit_test (test_bad_input),
   };
   return cmocka_run_group_tests_name ("sweeps", tests, cli_setup, cli_teardown);
 }

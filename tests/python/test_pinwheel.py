@@ -184,6 +184,15 @@ def test_failures_keep_the_samples():
     assert r.status == "failed" and "max_steps" in r.reason.replace("-", "_") and len(r) > 2
 
 
+def test_changed_initial_values_are_reported():
+    model = pw.Model("ezyroller")
+    assert model.run(t_end=0.01).changed == {}
+    r = model.run(t_end=0.01, start={"frame.vy": 1})
+    assert r.changed["frame.omega"] == (0, pytest.approx(2, rel=1e-12)) and len(r.changed) == 3
+    with pytest.warns(UserWarning, match="model ezyroller: .*changed given initial values: frame.vy from 1 to .*, frame.omega from 0"):
+        model.run(t_end=0.01, start={"frame.vy": 1, "frame.omega": 0})
+
+
 def test_controller():
     """A torque that is set every 10 ms is the same as a pulse train: omega is the sum of impulses."""
     bodies = [{"name": "disc", "mass": 1, "inertia": 2}]

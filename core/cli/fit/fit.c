@@ -204,6 +204,7 @@ static int fit_search (pw_fit *x, pw_error *error) {
 
 static int fit_finish (pw_fit *x, pw_output *file[FIT_FILES], pw_error *error) {
   pw_fit_print (x);
+  pw_unknowns_report (&x->unknowns, x->x);
   int status = file[FIT_TABLE] ? pw_fit_table (x, pw_output_stream (file[FIT_TABLE]), error) : PW_OK;
   if (file[FIT_SUMMARY]) pw_fit_json (x, x->converged ? "ok" : "method", pw_output_stream (file[FIT_SUMMARY]));
   if (status == PW_OK) {

@@ -192,6 +192,7 @@ static int optimise_finish (pw_optimise *x, pw_output *file[2], pw_error *error)
   pw_error why = { 0 };
   int converged = optimise_converged (x, &why) == PW_OK;
   pw_optimise_print (x);
+  pw_unknowns_report (&x->unknowns, x->start[x->best].best);
   if (file[0]) pw_optimise_yaml (x, pw_output_stream (file[0]));
   if (file[1])
     pw_optimise_json (x, interrupted ? "interrupted" : converged ? "ok" : "method", pw_output_stream (file[1]));

@@ -122,6 +122,19 @@ int pw_unknowns_system (const pw_unknowns *u, const double *x, pw_cli_model *m, 
   return PW_OK;
 }
 
+void pw_unknowns_report (const pw_unknowns *u, const double *x) {
+  char text[PW_CHANGE_TEXT];
+  pw_cli_model m;
+  pw_settings settings;
+  pw_limit limit;
+  int status = pw_unknowns_system (u, x, &m, &settings, &limit, &(pw_error){ 0 });
+  pw_run *r = status == PW_OK ? pw_run_open (m.system, u->method, &settings, NULL) : NULL;
+  if (r && pw_cli_change (r, m.system, text) > 0)
+    pw_cli_say ("pinwheel: the constraints changed given initial values of this result, at worst %s\n", text);
+  if (r) pw_run_close (r);
+  pw_cli_close_model (&m);
+}
+
 int pw_unknowns_differentiate (const pw_unknowns *u, const double *x, const char **outputs, pw_sensitivity *s,
                                pw_error *error) {
   pw_error none = { 0 };

@@ -51,6 +51,9 @@ int pw_unknowns_differentiate (const pw_unknowns *u, const double *x, const char
 enum { PW_UNKNOWNS_STARTED = 40 };
 double *pw_unknowns_starts (const pw_unknowns *u, int count, double seed);
 
+/* A notice if the constraints change given initial values at these values of the unknowns. */
+void pw_unknowns_report (const pw_unknowns *u, const double *x);
+
 /* Options that set the values, "--set a=1 --start frame.vx=2".  0 if the text is too short. */
 int pw_unknowns_options (const pw_unknowns *u, const double *x, char *text, size_t size);
 

@@ -50,6 +50,9 @@ typedef struct {
   pw_progress progress;
   pw_text scratch;
   pw_error *error;
+  long changed, runs; /* runs whose given initial values the constraints have changed; all that were opened now */
+  double change;      /* the largest change */
+  char worst[PW_CHANGE_TEXT];
 } sweep;
 
 /* ---- Before the sweep ---- */
@@ -263,9 +266,19 @@ static int sweep_begin (sweep_worker *w, int k) {
   return w->system[k] != NULL;
 }
 
+/* Counts changed initial values.  The caller holds the lock. */
+static void sweep_change (sweep *x, const pw_sweep_run *r) {
+  x->runs++;
+  x->changed += r->change > 0;
+  if (!(r->change > x->change)) return;
+  x->change = r->change;
+  memcpy (x->worst, r->changed, sizeof x->worst);
+}
+
 /* Stores the row of a run that has ended.  The caller holds the lock. */
 static void sweep_end (sweep_worker *w, int k) {
   sweep *x = w->x;
+  sweep_change (x, &w->run[k]);
   pthread_mutex_unlock (&x->lock);
   pw_text_clear (&w->text);
   int status = pw_sweep_run_close (&w->run[k], &w->text);
@@ -361,6 +374,9 @@ static int sweep_merge (sweep *x, pw_error *error) {
 
 static int sweep_finish (sweep *x, pw_error *error) {
   pw_tally tally;
+  if (x->changed)
+    pw_cli_say ("pinwheel: in %ld of %ld runs the constraints changed given initial values, at worst %s\n", x->changed,
+                x->runs, x->worst);
   if (x->journal.done == 0) {
     fputs ("pinwheel: interrupted before the first run was done\n", stderr);
     return PW_INTERRUPTED;

@@ -300,6 +300,7 @@ void pw_sweep_run_open (pw_sweep_run *x, const pw_plan *p, const pw_sweep_system
   x->start = pw_seconds (CLOCK_THREAD_CPUTIME_ID);
   x->run = pw_run_open (s->m.system, p->method, &settings, &x->error);
   if (x->run == NULL) x->status = x->error.status;
+  if (x->run) x->change = pw_cli_change (x->run, s->m.system, x->changed);
   free (initial);
 }
 

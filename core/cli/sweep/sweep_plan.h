@@ -72,8 +72,10 @@ typedef struct {
   long row;
   pw_run *run;
   pw_limit limit;
-  double start; /* of the thread's processor time [s] */
-  int status;   /* while it is not PW_OK, the run has ended */
+  double start;  /* of the thread's processor time [s] */
+  double change; /* of its given initial values by the constraints; 0: none */
+  char changed[PW_CHANGE_TEXT];
+  int status; /* while it is not PW_OK, the run has ended */
   pw_error error;
 } pw_sweep_run;
 

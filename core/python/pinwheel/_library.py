@@ -143,6 +143,7 @@ pw_settings = _structure(
 pw_statistics = _structure(
     "pw_statistics", steps=c.c_long, rejected=c.c_long, rhs=c.c_long, jacobians=c.c_long, factorisations=c.c_long,
     specialised=c.c_long, position=c.c_double, velocity=c.c_double, g=c.c_double, jv=c.c_double)
+pw_initial_report = _structure("pw_initial_report", q_given=_double_p, v_given=_double_p, q=_double_p, v=_double_p)
 pw_parameter = _structure("pw_parameter", name=c.c_char_p, value=c.c_double, unit=c.c_char_p, about=c.c_char_p)
 pw_field = _structure(
     "pw_field", name=c.c_char_p, type=c.c_int, count=c.c_int, unit=c.c_char_p, required=c.c_int, domain=c.c_int,
@@ -195,6 +196,8 @@ _declare(core, _i, ("pw_run_advance_to", _p, _d, _d, _e), ("pw_run_restart", _p,
          ("pw_run_record_width", _p), ("pw_run_linear_modes", _p, _i, c.POINTER(pw_linear), _e),
          ("pw_run_record", _p, _d, _p, c.c_long, c.c_long, _p, c.POINTER(c.c_long), _e))
 _declare(core, _d, ("pw_run_time", _p))
+_declare(core, c.POINTER(pw_initial_report), ("pw_run_initial", _p))
+_declare(core, _i, ("pw_initial_moved", _p, c.POINTER(pw_initial_report), _i), ("pw_initial_given", c.POINTER(pw_initial_report), _i))
 _declare(core, c.POINTER(pw_statistics), ("pw_run_statistics", _p))
 
 

@@ -25,6 +25,8 @@ class Result:
         Why the run ended early, or "".
     statistics : dict
         Steps, evaluations (how many by specialised code), largest constraint residuals.
+    changed : dict of tuple
+        Initial values that the constraints have changed, (described, consistent) by name.
     cause : Exception or None
         What a function in Python raised, if that ended the run.
     model : Model
@@ -45,6 +47,7 @@ class Result:
         self.status, self.reason, self.statistics = status, reason, statistics or {}
         self.model, self.settings = model, settings or {}
         self.states, self.reactions, self.ledger = groups["states"], groups["reactions"], groups["ledger"]
+        self.changed: dict[str, tuple[float, float]] = {}
         self._column = {name: i for i, name in enumerate(units)}
         self.t = rows[:, 0]
 

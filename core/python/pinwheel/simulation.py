@@ -7,6 +7,7 @@ import ctypes as c
 import os
 import threading
 import time
+import warnings
 from collections.abc import Callable, Iterator, MutableMapping
 
 import numpy as np
@@ -101,6 +102,9 @@ class Simulation:
     method : str
     inputs : Inputs
         Inputs that may be set between steps, by name; after a change the method restarts from the state reached.
+    changed : dict of tuple
+        Initial values that did not satisfy the constraints, (described, consistent) by name; a warning names those that the
+        user has given.
 
     Examples
     --------
@@ -119,10 +123,26 @@ class Simulation:
         error = lib.pw_error()
         self._run = lib.core.pw_run_open(system.pointer, lib.encode(method, "method"), c.byref(settings), c.byref(error))
         system.check(error)
-        self.inputs = Inputs(cells, self._changed)
+        self.inputs = Inputs(cells, self._input_changed)
+        self.changed = self._initial()
 
-    def _changed(self):
+    def _input_changed(self):
         self._restart = True
+
+    def _initial(self):
+        """Initial values that the constraints have changed."""
+        s, core, report, changed, given = self._system.pointer, lib.core, lib.core.pw_run_initial(self._run), {}, []
+        n, x = core.pw_system_coordinates(s), report.contents
+        for i in range(2 * n):
+            if not core.pw_initial_moved(s, report, i):
+                continue
+            name = lib.name_of(core.pw_system_state_name, s, i)
+            changed[name] = (x.q_given[i], x.q[i]) if i < n else (x.v_given[i - n], x.v[i - n])
+            if core.pw_initial_given(report, i):
+                given.append(f"{name} from {changed[name][0]:.10g} to {changed[name][1]:.10g} {lib.text(core.pw_system_state_unit(s, i))}")
+        if given:
+            warnings.warn(f"model {self.model.name}: the constraints changed given initial values: {', '.join(given)}", stacklevel=4)
+        return changed
 
     def __enter__(self) -> Simulation:
         return self
@@ -262,7 +282,7 @@ class Simulation:
             units, groups = self._columns()
         result = Result(rows.used, groups, units, status, reason, self.statistics, self.model,
                         {"method": self.method, "t_end": t_end})
-        result.cause = cause
+        result.cause, result.changed = cause, self.changed
         return result
 
     @staticmethod
