@@ -39,11 +39,16 @@ static int command_table (pw_cli_line *l, const struct poptOption *options) {
 }
 
 /* Records the text or list that popt has allocated for an option, to release it even if the variable changes.  If an
- * option is repeated, a text replaces the previous one, a list grows. */
-static void command_note (pw_cli_line *l, int i) {
-  unsigned type = l->table[i].argInfo & POPT_ARG_MASK;
+ * option is repeated, a list grows; a text is refused, under either name of the option. */
+static int command_note (const pw_command *c, pw_cli_line *l, int i, pw_error *error) {
+  const struct poptOption *o = l->table + i;
+  unsigned type = o->argInfo & POPT_ARG_MASK;
+  int given = 0;
+  for (int j = 0; l->table[j].longName; j++) given |= l->table[j].arg == o->arg && l->text[j] != NULL;
   if (type == POPT_ARG_STRING) free (l->text[i]);
-  if (type == POPT_ARG_STRING || type == POPT_ARG_ARGV) l->text[i] = *(void **)l->table[i].arg;
+  if (type == POPT_ARG_STRING || type == POPT_ARG_ARGV) l->text[i] = *(void **)o->arg;
+  if (type != POPT_ARG_STRING || !given) return PW_OK;
+  return pw_fail (error, PW_INPUT, "%s: option --%s is given twice", c->name, o->longName);
 }
 
 /* ---- Help ---- */
@@ -111,7 +116,8 @@ static int command_read (const pw_command *c, pw_cli_line *l, int argc, const ch
   if (command_table (l, c->options) == PW_OK) l->popt = poptGetContext (argv[0], argc, argv, l->table, 0);
   if (l->popt == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
   int got = poptGetNextOpt (l->popt);
-  for (; got > 0 && got != COMMAND_HELP; got = poptGetNextOpt (l->popt)) command_note (l, got - 1);
+  for (; got > 0 && got != COMMAND_HELP; got = poptGetNextOpt (l->popt))
+    if (command_note (c, l, got - 1, error) != PW_OK) return error->status;
   if (errno == ENOMEM)
     return pw_fail (error, PW_RESOURCE, "out of memory"); /* popt omits texts that it cannot allocate */
   if (got == COMMAND_HELP) {

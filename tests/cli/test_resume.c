@@ -40,10 +40,10 @@ static void test_killed (void **state) {
 /* Saving disturbs no step of a one-step method; the summary counts the restarts of a multistep one. */
 static void test_restarts (void **state) {
   (void)state;
-  cli_good ("pinwheel " RESUME_RUN "-m rk4 --json @/a.json --checkpoint @/a.ck");
+  cli_good ("pinwheel " RESUME_RUN "-m rk4 -o @/a.csv --json @/a.json --checkpoint @/a.ck");
   assert_true (cli_number (cli_file ("a.json"), "restarts", NULL) == 0);
   assert_true (cli_number (cli_file ("a.json"), "steps", NULL) == 30000);
-  cli_good ("pinwheel " RESUME_RUN "-m ida+ggl --json @/a.json --checkpoint @/a.ck");
+  cli_good ("pinwheel " RESUME_RUN "-m ida+ggl -o @/a.csv --json @/a.json --checkpoint @/a.ck");
   assert_true (cli_number (cli_file ("a.json"), "restarts", NULL) == 59);
   cli_good ("pinwheel run ezyroller --t-end 30 -m ida+ggl --checkpoint @/a.ck | grep -q 'restarted at 9 checkpoints'");
 }
@@ -78,7 +78,8 @@ static void test_every_step (void **state) {
 
 /* ---- What is refused ---- */
 
-#define RESUME_SHORT "run ezyroller --t-end 2 --checkpoint-every 0.5 -o @/b.csv "
+#define RESUME_WITH(t_end, every) "run ezyroller --t-end " t_end " --checkpoint-every " every " -o @/b.csv "
+#define RESUME_SHORT RESUME_WITH ("2", "0.5")
 
 /* A checkpoint of a run that was stopped, with its table. */
 static void resume_prepare (void) {
@@ -99,8 +100,9 @@ static void test_other_run (void **state) {
   resume_bad (":", "--set a=0.6", OTHER "parameter a is 0.5 there and 0.59999999999999998 here");
   resume_bad (":", "--step 2e-3", OTHER "step is 0.001 there and 0.002 here");
   resume_bad (":", "-m rk4+baumgarte", OTHER "method is rk4+projection there and rk4+baumgarte here");
-  resume_bad (":", "-t 3", OTHER "t-end is 2 there and 3 here");
-  resume_bad (":", "--checkpoint-every 1", OTHER "checkpoint-every is 0.5 there and 1 here");
+  resume_prepare ();
+  cli_bad ("pinwheel " RESUME_WITH ("3", "0.5") "--resume @/b.ck", 2, OTHER "t-end is 2 there and 3 here");
+  cli_bad ("pinwheel " RESUME_WITH ("2", "1") "--resume @/b.ck", 2, OTHER "checkpoint-every is 0.5 there and 1 here");
   resume_bad (":", "--start frame.vx=1", OTHER "start frame.vx is 1 here and not set there");
   resume_bad (":", "--energy", OTHER "energy is not kept there and kept here");
   resume_prepare ();
