@@ -236,6 +236,9 @@ pw_scene_code *pw_cli_engine_lanes (const pw_cli_engine *e, const pw_system *s, 
  * of the command line and, if its file is open (`file` is not NULL), the tables that it reads. */
 int pw_cli_uses (const pw_cli_line *l, const pw_file *file, pw_use *use, int count, pw_error *error);
 
+/* PW_INPUT if the path of -o names a NumPy archive (.npz); for tables that contain texts and are CSV. */
+int pw_cli_csv (const char *path, pw_error *error);
+
 /* ---- Messages ---- */
 
 /* Print to standard error, and to a stream; on a terminal control characters are escaped, since names may contain

@@ -111,6 +111,13 @@ int pw_cli_uses (const pw_cli_line *l, const pw_file *file, pw_use *use, int cou
   return status;
 }
 
+int pw_cli_csv (const char *path, pw_error *error) {
+  const char *ending = path ? strrchr (path, '.') : NULL;
+  if (ending == NULL || strcmp (ending, ".npz") != 0) return PW_OK;
+  return pw_fail (error, PW_INPUT, "-o %s: this command writes no NumPy archives: expected a name that ends in .csv",
+                  path);
+}
+
 /* ---- A parameter that varies continuously, of --vary NAME=FIRST:LAST ---- */
 
 int pw_cli_vary_read (pw_cli_vary *v, const pw_cli_line *l, const pw_cli_model *m, const char *text, pw_error *error) {

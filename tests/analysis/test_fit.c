@@ -272,6 +272,8 @@ static void test_bad (void **state) {
     { "@/wheel.yaml --data @/word.csv --columns w.phi --free k",
       "@/word.csv:3: column 2: expected a finite number, found \"many\"" },
   };
+  cli_bad (FIT "--free k -o @/f.npz", 2,
+           "-o @/f.npz: this command writes no NumPy archives: expected a name that ends in .csv");
   cli_write ("two.csv", "t,w.phi\n1,0\n2,0.1\n3,nan\n");
   cli_write ("mixed.csv", "t,w.phi,w.omega\n1,0,0\n2,0.1,0\n");
   cli_write ("word.csv", "t,w.phi\n1,0\n2,many\n");
