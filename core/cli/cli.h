@@ -136,6 +136,9 @@ int pw_cli_main (const pw_command *c, int argc, const char **argv);
 /* Refuses more than `most` arguments. */
 int pw_cli_at_most (const pw_command *c, const pw_cli_line *l, int most, pw_error *error);
 
+/* Refuses an option that is given (`text` is not NULL) without the one that it belongs to: `with`, if that is `has`. */
+int pw_cli_only (const char *option, const char *text, const char *with, int has, pw_error *error);
+
 /* Reads the value of an option ("--step") in any locale; a NULL text leaves *value unchanged.  PW_INPUT if it is not a
  * number in the domain. */
 int pw_cli_number (const char *option, const char *text, pw_domain domain, double *value, pw_error *error);
@@ -143,6 +146,9 @@ int pw_cli_number (const char *option, const char *text, pw_domain domain, doubl
 /* The model's defaults overridden by options: t_end, settings except the ledger, and the limit, which stops the run. */
 int pw_cli_settings (const pw_cli_line *l, const pw_run_defaults *model, double *t_end, pw_settings *settings,
                      pw_limit *limit, pw_error *error);
+
+/* Notices of options without effect on a method.  Steps together with tolerances, common in scripts, are not reported. */
+void pw_cli_unused (const char *method, const pw_cli_line *l);
 
 /* ---- Models ---- */
 

@@ -155,6 +155,11 @@ int pw_cli_main (const pw_command *c, int argc, const char **argv) {
 
 /* ---- Values ---- */
 
+int pw_cli_only (const char *option, const char *text, const char *with, int has, pw_error *error) {
+  if (text == NULL || has) return PW_OK;
+  return pw_fail (error, PW_INPUT, "%s %s: only with %s", option, text, with);
+}
+
 int pw_cli_number (const char *option, const char *text, pw_domain domain, double *value, pw_error *error) {
   if (text == NULL) return PW_OK;
   double x;
@@ -186,4 +191,17 @@ int pw_cli_settings (const pw_cli_line *l, const pw_run_defaults *model, double 
   settings->max_steps = most < 9e18 ? (long)most : LONG_MAX;
   settings->span = *t_end;
   return status;
+}
+
+void pw_cli_unused (const char *method, const pw_cli_line *l) {
+  const pw_method *integrator;
+  int stabilisation;
+  if (pw_method_parse (method, &integrator, &stabilisation, &(pw_error){ 0 }) != PW_OK) return;
+  int adaptive = pw_method_adaptive (integrator, method);
+  if (adaptive && l->step && !l->rtol && !l->atol)
+    pw_cli_say ("pinwheel: --step has no effect: %s chooses its steps by --rtol, --atol\n", method);
+  if (!adaptive && l->max_steps)
+    pw_cli_say ("pinwheel: --max-steps has no effect: %s takes as many steps as --step requires\n", method);
+  if (!adaptive && (l->rtol || l->atol) && !l->step)
+    pw_cli_say ("pinwheel: --%s has no effect: %s takes steps of --step\n", l->rtol ? "rtol" : "atol", method);
 }

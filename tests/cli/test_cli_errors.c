@@ -35,7 +35,15 @@ static void test_bad_lines (void **state) {
     { "run ezyroller --t-end -1", "--t-end -1: expected a number > 0" },
     { "run ezyroller --rtol 0", "--rtol 0: expected a number > 0" },
     { "run ezyroller --atol -1", "--atol -1: expected a number > 0" },
-    { "run ezyroller --every 0", "--every 0: expected a number > 0" },
+    { "run ezyroller --every 0 -o @/a.csv", "--every 0: expected a number > 0" },
+    { "run ezyroller --every 0.1", "--every 0.1: only with -o FILE" },
+    { "run ezyroller --every 0.1 --json @/a.json", "--every 0.1: only with -o FILE" },
+    { "run ezyroller --width 85mm", "--width 85mm: only with --plots DIR" },
+    { "run ezyroller --colour time", "--colour time: only with --plots DIR" },
+    { "optimise ezyroller --maximise frame.x --free a --width 85mm", "--width 85mm: only with --plots DIR" },
+    { "compare ezyroller --width 85mm", "--width 85mm: only with -o DIR" },
+    { "steady pendulum --width 85mm", "--width 85mm: only with -o DIR" },
+    { "sensitivity pendulum --of bob.x --by l --every 1", "--every 1: only with -o DIR" },
     { "run ezyroller --set aa=1", "model ezyroller has no parameter \"aa\"; did you mean \"a\"?" },
     { "run ezyroller --set m1=-1", "model ezyroller: parameter m1 = -1: expected a number > 0" },
     { "run ezyroller --set m1=nan", "model ezyroller: parameter m1 = nan: expected a finite number" },
@@ -53,6 +61,8 @@ static void test_bad_lines (void **state) {
     { "show", "missing argument; usage: pinwheel show MODEL [OPTION...]" },
     { "show ezyroler", "there is no model \"ezyroler\"; did you mean \"ezyroller\"?" },
     { "show ezyroller --at -1", "--at -1: expected a number >= 0" },
+    { "show ezyroller --yaml --c", "expected one of --matrices, --yaml and --c" },
+    { "show ezyroller --yaml --at 1", "expected one of --at T, --yaml and --c" },
     { "list foo", "there is no list of \"foo\"; valid are models, methods, kinds, signals" },
     { "list models b", "unexpected argument \"b\"; usage: pinwheel list models" },
     { "list methods rk5", "there is no integrator \"rk5\"; did you mean \"erk5\"?" },
@@ -77,6 +87,10 @@ static void test_useless_options (void **state) {
   assert_string_equal (cli_err, rtol);
   assert_int_equal (cli_run ("pinwheel run pendulum --t-end 0.1 --method erk8+none:steps=fixed --atol 1e-9"), 0);
   assert_string_equal (cli_err, atol);
+  assert_int_equal (cli_run ("pinwheel sweep pendulum --t-end 0.1 --method erk5+projection --step 0.1 --vary l=1,2 "
+                             "-o @/sweep.csv"),
+                    0);
+  assert_string_equal (cli_err, step);
   cli_good ("pinwheel run pendulum --t-end 0.1 --method rk4+none --rtol 1e-9 --step 0.01");
   cli_good ("pinwheel run pendulum --t-end 0.1 --method ida+ggl --rtol 1e-6 --step 0.01");
 }

@@ -99,6 +99,15 @@ static void test_cpu (void **state) {
   assert_string_equal (cli_out, "rhs,cpu [s],reason\n");
 }
 
+/* Why runs that are measured or limited one by one have no lanes. */
+static void test_no_lanes (void **state) {
+  (void)state;
+  assert_int_equal (cli_run ("pinwheel sweep ezyroller " GRID " --lanes 4 --cpu -o @/cpu.csv"), 0);
+  assert_string_equal (cli_err, "pinwheel: one run after the other: --cpu measures each run\n");
+  assert_int_equal (cli_run ("pinwheel sweep ezyroller " GRID " --lanes 4 --limit 60 -o @/cpu.csv"), 0);
+  assert_string_equal (cli_err, "pinwheel: one run after the other: --limit stops each run by itself\n");
+}
+
 /* ---- Compiled systems ---- */
 
 /* A model that counts how often it is built: once for the columns, then once for each of two lengths, whichever
@@ -212,10 +221,11 @@ static void test_bad_input (void **state) {
 
 int main (void) {
   const struct CMUnitTest tests[] = {
-    cmocka_unit_test (test_order),        cmocka_unit_test (test_ranges),         cmocka_unit_test (test_row_is_run),
-    cmocka_unit_test (test_start_values), cmocka_unit_test (test_counts),         cmocka_unit_test (test_cpu),
-    cmocka_unit_test (test_shared),       cmocka_unit_test (test_failures),       cmocka_unit_test (test_all_fail),
-    cmocka_unit_test (test_fails_late),   cmocka_unit_test (test_changed_values), cmocka_unit_test (test_bad_input),
+    cmocka_unit_test (test_order),        cmocka_unit_test (test_ranges),     cmocka_unit_test (test_row_is_run),
+    cmocka_unit_test (test_start_values), cmocka_unit_test (test_counts),     cmocka_unit_test (test_cpu),
+    cmocka_unit_test (test_no_lanes),     cmocka_unit_test (test_shared),     cmocka_unit_test (test_failures),
+    cmocka_unit_test (test_all_fail),     cmocka_unit_test (test_fails_late), cmocka_unit_test (test_changed_values),
+    cmocka_unit_test (test_bad_input),
   };
   return cmocka_run_group_tests_name ("sweeps", tests, cli_setup, cli_teardown);
 }

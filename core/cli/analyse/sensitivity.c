@@ -216,6 +216,7 @@ static int sensitivity_unknowns (pw_sensitivity *x, pw_error *error) {
   if (count == 0) return pw_fail (error, PW_INPUT, "--by is missing: expected a parameter or an initial value");
   if (x->of == NULL) return pw_fail (error, PW_INPUT, "--of is missing: expected an output, such as frame.x");
   int status = pw_sensitivity_open (x, count, x->folder != NULL, error);
+  if (status == PW_OK) status = pw_cli_only ("--every", x->every, "-o DIR", x->folder != NULL, error);
   if (status == PW_OK) status = pw_cli_number ("--every", x->every, PW_POSITIVE, &x->dt, error);
   if (status != PW_OK) return status;
   pw_run *r = pw_run_open (x->m.system, x->method, &x->settings, error);

@@ -125,6 +125,7 @@ static int optimise_read (pw_optimise *x, pw_error *error) {
   if (status == PW_OK) status = pw_cli_number ("--seed", x->seed_text, PW_COUNT, &x->seed, error);
   if (status == PW_OK) status = pw_parallel_jobs (x->jobs_text, &x->jobs, error);
   if (status == PW_OK && starts > 1e5) status = pw_fail (error, PW_INPUT, "--starts: at most 100000");
+  if (status == PW_OK) status = pw_cli_only ("--width", x->line.width, "--plots DIR", x->plots_path != NULL, error);
   x->starts = (int)starts;
   return status == PW_OK ? optimise_texts (x, error) : status;
 }

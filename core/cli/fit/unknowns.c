@@ -85,6 +85,7 @@ int pw_unknowns_open (pw_unknowns *u, const pw_cli_line *line, const pw_cli_mode
   int status = pw_method_parse (u->method, &method, &stabilisation, error);
   if (status == PW_OK) status = pw_cli_settings (line, &d, &u->t_end, &u->settings, &limit, error);
   u->limit = limit.most;
+  if (status == PW_OK) pw_cli_unused (u->method, line);
   for (int i = 0; i < count && status == PW_OK; i++) status = unknowns_add (u, list[i], error);
   if (status == PW_OK) status = pw_cli_specialise (line->specialise, &when, error);
   if (status == PW_OK)

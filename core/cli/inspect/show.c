@@ -240,13 +240,15 @@ static int show_command (void *options, pw_error *error) {
   const show *x = options;
   pw_cli_model m = { .file = NULL };
   double t = 0;
-  int status = pw_cli_number ("--at", x->at, PW_NONNEGATIVE, &t, error);
+  int matrices = x->matrices || x->at, status = pw_cli_number ("--at", x->at, PW_NONNEGATIVE, &t, error);
+  if (status == PW_OK && matrices + x->yaml + x->code > 1)
+    status = pw_fail (error, PW_INPUT, "expected one of --%s, --yaml and --c", x->at ? "at T" : "matrices");
   if (status == PW_OK) status = pw_cli_open (&m, &x->line, error);
   if (status == PW_OK && x->code)
     status = show_code (&m, error);
   else if (status == PW_OK && x->yaml)
     status = pw_show_yaml (&m, error);
-  else if (status == PW_OK && (x->matrices || x->at))
+  else if (status == PW_OK && matrices)
     status = show_matrices (&m, t, error);
   else if (status == PW_OK)
     show_model (&m);

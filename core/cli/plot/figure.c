@@ -79,7 +79,7 @@ int pw_figure_results (const pw_cli_line *l, const pw_cli_model *m, const char *
   const char *names[ENDINGS + 1] = { NULL };
   for (int i = 0; i < ENDINGS; i++) snprintf (text[i], sizeof text[i], "%s%s", name, ending[i]), names[i] = text[i];
   pw_use use[] = { PW_CLI_MODEL_USE, { "-o", folder, PW_WRITES_INTO, names } };
-  if (folder == NULL) return PW_OK;
+  if (folder == NULL) return pw_cli_only ("--width", l->width, "-o DIR", 0, error);
   if (pw_cli_uses (l, m->file, use, 2, error) != PW_OK) return error->status;
   *lock = pw_figure_folder (folder, error);
   return *lock < 0 ? error->status : PW_OK;

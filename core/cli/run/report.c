@@ -14,16 +14,6 @@ static void report_more (FILE *f, int more, const char *hint) {
 
 /* ---- Settings ---- */
 
-/* Options without effect.  Steps together with tolerances, common in scripts, are not reported. */
-static void report_unused (const char *method, int adaptive, const pw_cli_line *l) {
-  if (adaptive && l->step && !l->rtol && !l->atol)
-    pw_cli_say ("pinwheel: --step has no effect: %s chooses its steps by --rtol, --atol\n", method);
-  if (!adaptive && l->max_steps)
-    pw_cli_say ("pinwheel: --max-steps has no effect: %s takes as many steps as --step requires\n", method);
-  if (!adaptive && (l->rtol || l->atol) && !l->step)
-    pw_cli_say ("pinwheel: --%s has no effect: %s takes steps of --step\n", l->rtol ? "rtol" : "atol", method);
-}
-
 /* A fixed step longer than the time in which the initial motion changes. */
 static void report_step (const pw_run *r, double step) {
   char h[32], pace[32];
@@ -52,7 +42,7 @@ void pw_report_settings (pw_run *r, const pw_system *s, const char *method, cons
   int stabilisation;
   if (pw_method_parse (method, &integrator, &stabilisation, &(pw_error){ 0 }) != PW_OK) return;
   int adaptive = pw_method_adaptive (integrator, method);
-  report_unused (method, adaptive, l);
+  pw_cli_unused (method, l);
   if (adaptive)
     report_atol (r, s, settings->atol);
   else

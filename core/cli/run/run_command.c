@@ -47,7 +47,10 @@ static int run_open_outputs (run *x, pw_error *error) {
   if (ending && strcmp (ending, ".npz") == 0 && (x->check.path || x->check.resume))
     return pw_fail (error, PW_INPUT, "-o %s: an .npz archive cannot be continued after a checkpoint: write a .csv",
                     x->csv_path);
-  int status = x->animate_path ? pw_animation_check (x->animate_path, error) : PW_OK;
+  int status = pw_cli_only ("--every", x->every_text, "-o FILE", x->csv_path != NULL, error);
+  if (status == PW_OK) status = pw_cli_only ("--width", x->line.width, "--plots DIR", x->plots_path != NULL, error);
+  if (status == PW_OK) status = pw_cli_only ("--colour", x->colour, "--plots DIR", x->plots_path != NULL, error);
+  if (status == PW_OK && x->animate_path) status = pw_animation_check (x->animate_path, error);
   if (status == PW_OK) status = run_uses (x, error);
   if (status == PW_OK) status = run_open_output (x, PW_RUN_SUMMARY, &x->json_path, error);
   if (status == PW_OK) status = run_open_output (x, PW_RUN_PAGE, &x->animate_path, error);

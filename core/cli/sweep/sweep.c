@@ -113,6 +113,7 @@ static int sweep_settings (sweep *x, pw_error *error) {
   pw_limit limit;
   int status = pw_cli_settings (&x->line, &d, &p->t_end, &p->settings, &limit, error);
   p->limit = limit.most;
+  if (status == PW_OK) pw_cli_unused (p->method, &x->line);
   if (status == PW_OK) status = pw_cli_specialise (x->line.specialise, &p->specialise, error);
   if (status == PW_OK) status = sweep_lanes (x, error);
   if (status == PW_OK) status = pw_parallel_jobs (x->jobs_text, &x->jobs, error);

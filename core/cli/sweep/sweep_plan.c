@@ -129,7 +129,11 @@ static void plan_engine (pw_plan *p, const pw_system *s) {
   pw_run_defaults d = pw_cli_defaults (pw_file_table (p->file));
   double steps = (double)p->grid.rows * pw_method_steps (p->method, &p->settings, d.step, p->t_end);
   pw_cli_engine_open (&p->engine, s, p->specialise, steps);
-  p->code = p->cpu || isfinite (p->limit) ? NULL : pw_cli_engine_lanes (&p->engine, s, p->method, p->lanes, steps);
+  const char *why = p->cpu                ? "--cpu measures each run"
+                    : isfinite (p->limit) ? "--limit stops each run by itself"
+                                          : NULL;
+  if (why == NULL) p->code = pw_cli_engine_lanes (&p->engine, s, p->method, p->lanes, steps);
+  if (why && p->lanes > 1) pw_cli_say ("pinwheel: one run after the other: %s\n", why);
 }
 
 static int plan_scan_row (pw_plan *p, long row, plan_scan *scan, pw_error *error) {
