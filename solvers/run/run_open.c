@@ -9,6 +9,7 @@
 #include "util.h"
 
 #define RUN_LEAST_RTOL (100 * DBL_EPSILON)
+#define RUN_MOST_STEPS 1e15 /* of a fixed size: shorter ones vanish in the round-off of the time */
 
 static int run_settings (pw_settings *to, const pw_settings *from, const pw_method *method, pw_error *error) {
   const struct {
@@ -32,6 +33,13 @@ static int run_settings (pw_settings *to, const pw_settings *from, const pw_meth
   if (to->max_steps == 0) to->max_steps = PW_MAX_STEPS;
   if (to->span == 0) to->span = method->adaptive ? 1 : 1000 * to->step;
   return PW_OK;
+}
+
+static int run_step (const pw_settings *x, pw_error *error) {
+  double end = fabs (x->t) + x->span;
+  if (x->step * RUN_MOST_STEPS >= end) return PW_OK;
+  return pw_fail (error, PW_INPUT, "setting step = %g: expected at least %g for a run to t = %g", x->step,
+                  end / RUN_MOST_STEPS, x->t + x->span);
 }
 
 static int run_allocate (pw_run *r) {
@@ -166,6 +174,7 @@ static int run_open (pw_run *r, const char *method, const pw_settings *settings,
     return PW_INPUT;
   pw_choose_steps (r);
   int status = run_settings (&r->settings, settings, r->method, error);
+  if (status == PW_OK && !pw_method_adaptive (r->method, method)) status = run_step (&r->settings, error);
   if (status != PW_OK) return status;
   r->t = r->t_at = r->settings.t;
   pw_hold_signals (r->w, 0);

@@ -148,7 +148,7 @@ static int linearise_open_files (const pw_linearise *x, pw_output **file, pw_err
     use[1 + i] = (pw_use){ "-o", path[i], PW_WRITES, NULL };
   }
   use[LINEARISE_FILES] = (pw_use){ "--animate", x->animate, PW_WRITES, NULL };
-  if (x->animate && pw_animation_check (x->animate, error) != PW_OK) return error->status;
+  if (x->animate && pw_animation_check ("--animate", x->animate, error) != PW_OK) return error->status;
   if (pw_cli_uses (&x->line, x->m.file, use, 1 + LINEARISE_FILES, error) != PW_OK) return error->status;
   for (int i = 0; i < LINEARISE_FILES; i++)
     if (use[1 + i].path && (file[i] = pw_output_open (use[1 + i].path, error)) == NULL) return error->status;

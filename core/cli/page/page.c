@@ -165,7 +165,7 @@ static int page_open (page *x, pw_error *error) {
   pw_limit limit;
   pw_use use[] = { PW_CLI_MODEL_USE, { "-o", x->path, PW_WRITES, NULL } };
   if (x->path == NULL) return pw_fail (error, PW_INPUT, "-o FILE.html is missing: the page to write");
-  int status = pw_animation_check (x->path, error);
+  int status = pw_animation_check ("-o", x->path, error);
   if (status == PW_OK) status = pw_cli_open (&x->m, &x->line, error);
   if (status == PW_OK) status = pw_cli_uses (&x->line, x->m.file, use, 2, error);
   if (status != PW_OK) return status;

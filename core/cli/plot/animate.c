@@ -187,11 +187,11 @@ static void page_insert (FILE *f, pw_page_part part, const void *context) {
   fputs (");\n", f);
 }
 
-int pw_animation_check (const char *path, pw_error *error) {
+int pw_animation_check (const char *option, const char *path, pw_error *error) {
   static const char ending[] = ".html";
   size_t n = strlen (path), m = sizeof ending - 1;
   if (n > m && strcasecmp (path + n - m, ending) == 0) return PW_OK;
-  return pw_fail (error, PW_INPUT, "--animate %s: expected a name that ends in .html", path);
+  return pw_fail (error, PW_INPUT, "%s %s: expected a name that ends in .html", option, path);
 }
 
 int pw_animate (const pw_plots *p, const char *path, pw_output *o, const char *method, const char *reason) {

@@ -32,7 +32,7 @@ void pw_plots_serialise (pw_plots *p, pw_archive *a);
 int pw_plots_finish (pw_plots *p, int draw, pw_error *error);
 
 /* PW_INPUT unless the name of an animation ends in .html. */
-int pw_animation_check (const char *path, pw_error *error);
+int pw_animation_check (const char *option, const char *path, pw_error *error);
 /* Writes the samples of a run, with forces, to the output of that path, which the caller completes; `reason`: why the
  * run did not reach its end, or "".  Returns 0 and reports it if the run is too short. */
 int pw_animate (const pw_plots *p, const char *path, pw_output *o, const char *method, const char *reason);

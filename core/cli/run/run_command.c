@@ -50,7 +50,7 @@ static int run_open_outputs (run *x, pw_error *error) {
   int status = pw_cli_only ("--every", x->every_text, "-o FILE", x->csv_path != NULL, error);
   if (status == PW_OK) status = pw_cli_only ("--width", x->line.width, "--plots DIR", x->plots_path != NULL, error);
   if (status == PW_OK) status = pw_cli_only ("--colour", x->colour, "--plots DIR", x->plots_path != NULL, error);
-  if (status == PW_OK && x->animate_path) status = pw_animation_check (x->animate_path, error);
+  if (status == PW_OK && x->animate_path) status = pw_animation_check ("--animate", x->animate_path, error);
   if (status == PW_OK) status = run_uses (x, error);
   if (status == PW_OK) status = run_open_output (x, PW_RUN_SUMMARY, &x->json_path, error);
   if (status == PW_OK) status = run_open_output (x, PW_RUN_PAGE, &x->animate_path, error);

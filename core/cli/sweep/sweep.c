@@ -58,6 +58,9 @@ typedef struct {
 /* ---- Before the sweep ---- */
 
 static int sweep_read (const sweep *x, pw_error *error) {
+  if (x->line.arguments == 0)
+    return pw_fail (error, PW_INPUT, "missing argument; usage: pinwheel sweep %s",
+                    x->merge ? "--merge PART... -o FILE.csv" : pw_cli_sweep.synopsis);
   if (x->path == NULL || *x->path == 0) return pw_fail (error, PW_INPUT, "nowhere to write the table: add -o FILE.csv");
   if (strcmp (x->path, "-") == 0)
     return pw_fail (error, PW_INPUT, "-o -: a sweep needs a file, next to which it keeps what it has done");
@@ -446,7 +449,6 @@ const pw_command pw_cli_sweep = {
       "Run a model for all combinations of varied parameters and initial values, and write a table with one row per "
       "run. A sweep that was interrupted is continued by the same command. A sweep may be divided into parts, which "
       "`pinwheel sweep --merge PART... -o FILE.csv` puts together.",
-  .least = 1,
   .size = sizeof (sweep),
   .function = sweep_command,
   .options = sweep_options,
