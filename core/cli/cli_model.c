@@ -7,6 +7,17 @@
 #include "cli.h"
 #include "util.h"
 
+/* Refuses a parameter among initial values, and the reverse: names of states have a dot, those of parameters have none. */
+static int model_confused (const pw_model *m, const char *option, const char *text, const char *name, pw_error *error) {
+  int parameter = pw_cli_parameter (m, name) != NULL;
+  if (parameter && strcmp (option, "--start") == 0)
+    return pw_fail (error, PW_INPUT, "--start %s: %s is a parameter, expected a state; use --set", text, name);
+  if (!parameter && strcmp (option, "--set") == 0 && strchr (name, '.'))
+    return pw_fail (error, PW_INPUT, "--set %s: expected a parameter; initial values of states are given by --start",
+                    text);
+  return PW_OK;
+}
+
 int pw_cli_apply (pw_model *m, const char *option, const char **list,
                   int (*set) (pw_model *m, const char *name, double value, pw_error *error), pw_error *error) {
   for (; list && *list; list++) {
@@ -18,7 +29,8 @@ int pw_cli_apply (pw_model *m, const char *option, const char **list,
     snprintf (name, sizeof name, "%.*s", (int)(equals - *list), *list);
     if (pw_read_expression (equals + 1, &value) != PW_OK)
       return pw_fail (error, PW_INPUT, "%s %s: \"%s\" is not a number", option, *list, equals + 1);
-    int status = set (m, name, value, error);
+    int status = model_confused (m, option, *list, name, error);
+    if (status == PW_OK) status = set (m, name, value, error);
     if (status != PW_OK) return status;
   }
   return PW_OK;

@@ -42,6 +42,10 @@ def test_every_model_of_the_gallery_opens():
 @pytest.mark.parametrize("make, kind, text", [
     (lambda: pw.Model("snakebord"), pw.InputError, 'did you mean "snakeboard"?'),
     (lambda: pw.Model("snakeboard", swin=1), pw.InputError, "did you mean 'swing'?"),
+    (lambda: pw.Model("ezyroller", q=1), pw.InputError, "no parameter 'q'; valid are a, b, c, d, m1, I1, m2, I2, M0, omega"),
+    (lambda: pw.Model("ezyroller", start={"m1": 1}), pw.InputError, "start: m1 is a parameter of model ezyroller, expected a state"),
+    (lambda: pw.Model("ezyroller", **{"frame.vx": 1}), pw.InputError, "'frame.vx': expected a parameter; initial values of states"),
+    (lambda: pw.Model("snakeboard").run(step=1e-300), pw.InputError, "setting step = 1e-300: expected at least"),
     (lambda: pw.Model("pendulum", m=-1).run(), pw.InputError, "m = -1"),
     (lambda: pw.Model("snakeboard").run("rk9"), pw.InputError, "rk9"),
     (lambda: pw.Model("snakeboard").run(start={"bord.x": 1}), pw.InputError, 'did you mean "board.x"?'),

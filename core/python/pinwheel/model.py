@@ -187,7 +187,12 @@ class Model:
         self.parameters = {p.name.decode(): p.value for p in listed}
         self.units = {p.name.decode(): lib.text(p.unit) for p in listed}
         self._given = {}
+        for name in self.start:
+            if name in self.parameters:
+                raise lib.InputError(f"start: {name} is a parameter of model {self.name}, expected a state; pass {name}=VALUE")
         for name, value in parameters.items():
+            if name not in self.parameters and "." in name:
+                raise lib.InputError(f"{name!r}: expected a parameter; initial values of states are given by start={{...}}")
             if name not in self.parameters:
                 raise lib.InputError(f"model {self.name} has no parameter {name!r}{_nearest(name, self.parameters)}")
             self.parameters[name] = self._given[name] = lib.number(value, name)

@@ -99,4 +99,5 @@ class Result:
 def _nearest(name, names):
     import difflib
     near = difflib.get_close_matches(str(name), list(names), 1, 0.5)
-    return f"; did you mean {near[0]!r}?" if near else ""
+    known = ", ".join(names)
+    return f"; did you mean {near[0]!r}?" if near else f"; valid are {known}" if known and len(known) < 88 else ""
