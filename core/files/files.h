@@ -20,6 +20,7 @@ typedef struct {
   int count;
   size_t room;       /* entries allocated */
   char folders[400]; /* the folders searched, "/first:/second", also for messages */
+  char unread[160];  /* folders of PINWHEEL_MODELS that cannot be searched: "/nowhere (No such file or directory)" */
 } pw_search;
 
 /* Searches every folder of the search path.  Close in every case.  PW_OK or PW_RESOURCE. */

@@ -84,6 +84,18 @@ static void test_bad_lines (void **state) {
   cli_bad_each ("", bad, sizeof bad / sizeof *bad);
 }
 
+/* A folder of the search path that is not there is named if a model is missing, and only then. */
+static void test_search_path (void **state) {
+  (void)state;
+  assert_int_equal (cli_run ("PINWHEEL_MODELS=@/nowhere pinwheel run pendulu"), 2);
+  char expected[300];
+  cli_expand ("; PINWHEEL_MODELS has @/nowhere (No such file or directory); did you mean \"pendulum\"?\n", expected,
+              sizeof expected);
+  assert_non_null (strstr (cli_err, "pinwheel: there is no model \"pendulu\" in /"));
+  assert_non_null (strstr (cli_err, expected));
+  cli_good ("PINWHEEL_MODELS=@/nowhere pinwheel run pendulum --t-end 0.1");
+}
+
 /* A tolerance that the method does not follow, a step it does not take; if both are given there is no message. */
 static void test_useless_options (void **state) {
   static const char step[] = "pinwheel: --step has no effect: erk5+projection chooses its steps by --rtol, --atol\n",
@@ -312,11 +324,11 @@ static void test_compiled (void **state) {
 
 int main (void) {
   const struct CMUnitTest tests[] = {
-    cmocka_unit_test (test_bad_lines),   cmocka_unit_test (test_useless_options), cmocka_unit_test (test_unwritable),
-    cmocka_unit_test (test_full_disk),   cmocka_unit_test (test_bad_models),      cmocka_unit_test (test_bad_tables),
-    cmocka_unit_test (test_bad_files),   cmocka_unit_test (test_found_twice),     cmocka_unit_test (test_failing_step),
-    cmocka_unit_test (test_interrupted), cmocka_unit_test (test_moved),           cmocka_unit_test (test_one_voice),
-    cmocka_unit_test (test_compiled),
+    cmocka_unit_test (test_bad_lines),    cmocka_unit_test (test_search_path), cmocka_unit_test (test_useless_options),
+    cmocka_unit_test (test_unwritable),   cmocka_unit_test (test_full_disk),   cmocka_unit_test (test_bad_models),
+    cmocka_unit_test (test_bad_tables),   cmocka_unit_test (test_bad_files),   cmocka_unit_test (test_found_twice),
+    cmocka_unit_test (test_failing_step), cmocka_unit_test (test_interrupted), cmocka_unit_test (test_moved),
+    cmocka_unit_test (test_one_voice),    cmocka_unit_test (test_compiled),
   };
   return cmocka_run_group_tests (tests, cli_setup, cli_teardown);
 }

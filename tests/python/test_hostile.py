@@ -48,7 +48,7 @@ REFUSED = {
         ("m.run(start={'frame.x': 'a'})", "frame.x = 'a'"), ("m.run(start={'frame.vx': 1e300})", "extreme"),
         ("m.run(t_end=NAN)", "t_end"), ("m.run(t_end=INF)", "t_end"), ("m.run(t_end=-1)", "t_end"), ("m.run(t_end='a')", "t_end"),
         ("m.run(t_end=[])", "t_end"), ("m.run(every=NAN)", "every"), ("m.run(every=INF)", "every"), ("m.run(every=0)", "every"),
-        ("m.run(every='a')", "every"), ("m.run(every=1e-300)", "memory"), ("m.run(every=1e-10)", "memory"), ("m.run(t_end=1e300, every=1)", "memory"),
+        ("m.run(every='a')", "every"), ("m.run(every=1e-300)", "memory"), ("m.run(every=1e-10)", "memory"), ("m.run(t_end=1e300, every=1)", "setting step"),
         *[(f"m.run({name}={value})", name) for name in ("step", "rtol", "atol", "max_steps") for value in ("0", "-1", "NAN", "INF", "'a'")],
         ("m.run(max_steps=1.5)", "whole number"), ("m.run(max_steps=10**30)", "whole number"), ("m.linearise(NAN)", "t_end"),
         ("m.linearise(-1)", "t_end"), ("m.linearise('a')", "at = 'a'"), ("m.linearise(0, 0)", "most"), ("m.linearise(0, None)", "most"),

@@ -123,6 +123,16 @@ static int search_folder (void *context, const char *folder, pw_error *error) {
   return status;
 }
 
+/* Whether a folder can be searched; why not is recorded. */
+static int search_can (pw_search *s, const char *folder) {
+  char inside[PATH_MAX];
+  size_t used = strlen (s->unread);
+  snprintf (inside, sizeof inside, "%s/.", folder);
+  if (access (inside, R_OK | X_OK) == 0) return 1;
+  snprintf (s->unread + used, sizeof s->unread - used, "%s%.80s (%s)", used ? ", " : "", folder, strerror (errno));
+  return 0;
+}
+
 static int search_environment (pw_search *s, pw_error *error) {
   const char *list = getenv ("PINWHEEL_MODELS");
   if (list == NULL) return PW_OK;
@@ -130,7 +140,7 @@ static int search_environment (pw_search *s, pw_error *error) {
   if (copy == NULL) return search_no_memory (error);
   int status = PW_OK;
   while (status == PW_OK && (folder = strsep (&rest, ":")) != NULL)
-    if (*folder) status = search_folder (s, folder, error);
+    if (*folder && search_can (s, folder)) status = search_folder (s, folder, error);
   free (copy);
   return status;
 }
