@@ -313,12 +313,29 @@ static void test_changed_values (void **state) {
                                     "frame.omega from 7 to 2 rad/s\n"));
 }
 
+/* After Ctrl-C the values reached are written, without their errors. */
+static void test_interrupt (void **state) {
+  (void)state;
+  char command[1000];
+  const char *program = getenv ("PINWHEEL");
+  fit_write (0);
+  snprintf (command, sizeof command,
+            "timeout --preserve-status -s INT 1 '%s' fit @/wheel.yaml --data @/data.csv --columns w.phi --free k=1:100 "
+            "--set k=60 --starts 100000 --json @/stop.json -o @/stop.csv",
+            program ? program : "build/pinwheel");
+  assert_int_equal (cli_run (command), 130);
+  assert_non_null (strstr (cli_err, "interrupted; these are the values so far, without their errors"));
+  assert_true (cli_says (cli_file ("stop.json"), "status", "interrupted"));
+  assert_non_null (strstr (cli_file ("stop.json"), "\"standard_error\": null"));
+  assert_int_equal (strncmp (cli_file ("stop.csv"), "t [s],w.phi [rad],w.phi.model [rad]", 35), 0);
+}
+
 int main (void) {
   const struct CMUnitTest tests[] = {
-    cmocka_unit_test (test_exact),    cmocka_unit_test (test_derivatives),    cmocka_unit_test (test_errors),
-    cmocka_unit_test (test_coverage), cmocka_unit_test (test_unweighted),     cmocka_unit_test (test_undetermined),
-    cmocka_unit_test (test_failing),  cmocka_unit_test (test_bound),          cmocka_unit_test (test_bad),
-    cmocka_unit_test (test_starts),   cmocka_unit_test (test_changed_values),
+    cmocka_unit_test (test_exact),    cmocka_unit_test (test_derivatives), cmocka_unit_test (test_errors),
+    cmocka_unit_test (test_coverage), cmocka_unit_test (test_unweighted),  cmocka_unit_test (test_undetermined),
+    cmocka_unit_test (test_failing),  cmocka_unit_test (test_bound),       cmocka_unit_test (test_bad),
+    cmocka_unit_test (test_starts),   cmocka_unit_test (test_interrupt),   cmocka_unit_test (test_changed_values),
   };
   return cmocka_run_group_tests (tests, fit_setup, cli_teardown);
 }

@@ -191,6 +191,15 @@ static int fit_open (pw_fit *x, pw_output *file[FIT_FILES], int *folder, pw_erro
   return status;
 }
 
+/* Errors of the estimates are not known after Ctrl-C. */
+static void fit_interrupt (pw_fit *x) {
+  int n = x->unknowns.count;
+  for (int i = 0; i < n; i++) x->deviation[i] = NAN;
+  for (int i = 0; i < n * n; i++) x->covariance[i] = NAN;
+  x->rank = n;
+  x->interrupted = 1;
+}
+
 static int fit_search (pw_fit *x, pw_error *error) {
   pw_stop_catch ();
   pw_progress_count (&x->progress, pw_file_name (x->m.file), "iterations", 0, 20. * x->starts);
@@ -198,9 +207,11 @@ static int fit_search (pw_fit *x, pw_error *error) {
   pw_progress_end (&x->progress);
   pw_stop_release ();
   if (status != PW_RETRY) return status;
-  char options[4000] = "";
-  if (x->iterations > 0) pw_unknowns_options (&x->unknowns, x->x, options, sizeof options);
-  pw_cli_say ("pinwheel: interrupted after %d iterations%s%s\n", x->iterations, *options ? ": " : "", options);
+  if (x->iterations > 0) {
+    fit_interrupt (x);
+    return PW_OK;
+  }
+  fputs ("pinwheel: interrupted before the first iteration was done\n", stderr);
   return PW_INTERRUPTED;
 }
 
@@ -208,12 +219,15 @@ static int fit_finish (pw_fit *x, pw_output *file[FIT_FILES], pw_error *error) {
   pw_fit_print (x);
   pw_unknowns_report (&x->unknowns, x->x);
   int status = file[FIT_TABLE] ? pw_fit_table (x, pw_output_stream (file[FIT_TABLE]), error) : PW_OK;
-  if (file[FIT_SUMMARY]) pw_fit_json (x, x->converged ? "ok" : "method", pw_output_stream (file[FIT_SUMMARY]));
+  const char *word = x->interrupted ? "interrupted" : x->converged ? "ok" : "method";
+  if (file[FIT_SUMMARY]) pw_fit_json (x, word, pw_output_stream (file[FIT_SUMMARY]));
   if (status == PW_OK) {
     status = pw_output_finish_all (file, FIT_FILES, error);
     for (int i = 0; i < FIT_FILES; i++) file[i] = NULL;
   }
   if (status == PW_OK && x->plots_path) status = pw_fit_draw (x, error);
+  if (x->interrupted) pw_cli_say ("pinwheel: interrupted; these are the values so far, without their errors\n");
+  if (status == PW_OK && x->interrupted) return PW_INTERRUPTED;
   if (status == PW_OK && !x->converged)
     status = pw_fail (error, PW_METHOD,
                       "no minimum was found in %d iterations; begin nearer to it, by --set or --start", x->iterations);

@@ -36,6 +36,7 @@ typedef struct {
   double initial_chi2;
   int by_differences; /* 1: derivatives are those of runs, since the variational equations could not be used */
   int converged, iterations;
+  int interrupted; /* 1: by Ctrl-C; the values are those reached, their errors NaN */
   long runs;
   pw_progress progress;
 } pw_fit;

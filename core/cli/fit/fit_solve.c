@@ -111,6 +111,16 @@ static int solve_derivatives (const gsl_vector *u, void *context, gsl_matrix *J)
 
 /* ---- Minimum ---- */
 
+/* Until a search has ended, the values that the first one has reached are the result. */
+static void solve_reached (const solution *p, const gsl_vector *u, double size) {
+  pw_fit *x = p->x;
+  if (isfinite (p->least) || !p->known) return;
+  x->chi2 = size * size;
+  for (int i = 0; i < x->unknowns.count; i++)
+    x->x[i] = solve_unknown (x->unknowns.at + i, gsl_vector_get (u, (size_t)i));
+  memcpy (x->model, p->model, (size_t)x->columns * (size_t)x->rows * sizeof *x->model);
+}
+
 static void solve_progress (const size_t iteration, void *context, const gsl_multifit_nlinear_workspace *w) {
   solution *p = context;
   char number[32];
@@ -118,8 +128,7 @@ static void solve_progress (const size_t iteration, void *context, const gsl_mul
   if (p->status != PW_OK) return;
   if (iteration == 0 && p->before == 0) p->x->initial_chi2 = size * size;
   p->x->iterations = p->before + (int)iteration;
-  for (int i = 0; i < p->x->unknowns.count && !isfinite (p->least); i++)
-    p->x->x[i] = solve_unknown (p->x->unknowns.at + i, gsl_vector_get (gsl_multifit_nlinear_position (w), (size_t)i));
+  solve_reached (p, gsl_multifit_nlinear_position (w), size);
   snprintf (p->x->progress.note, sizeof p->x->progress.note, "residual %s", pw_format (number, size, 6));
   pw_progress_at (&p->x->progress, p->x->iterations);
 }
@@ -173,9 +182,10 @@ static int solve_minima (solution *p, gsl_multifit_nlinear_workspace *w) {
   if (point == NULL || x->minimum == NULL) p->status = pw_fail (p->error, PW_RESOURCE, "out of memory");
   p->least = INFINITY;
   for (size_t i = 0; i < starts && p->status == PW_OK; i++) {
+    x->minimum[i * (1 + n)] = INFINITY;
     memcpy (x->minimum + i * (1 + n) + 1, point + i * n, n * sizeof *point);
-    solve_minimum (p, w, x->minimum + i * (1 + n));
   }
+  for (size_t i = 0; i < starts && p->status == PW_OK; i++) solve_minimum (p, w, x->minimum + i * (1 + n));
   free (point);
   if (p->status == PW_OK && !isfinite (p->least))
     p->status =
