@@ -1,5 +1,6 @@
 /* Figures: contents for several models, with gnuplot and without. */
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 #include "check.h"
 #include "cli.h"
@@ -28,6 +29,25 @@ static void plots_draw (const char *model) {
     const char *pdf = cli_file (name);
     assert_true (pdf && memcmp (pdf, "%PDF", 4) == 0);
   }
+}
+
+/* After Ctrl-C data and scripts are written; the figures of an earlier run are removed. */
+static void test_interrupted (void **state) {
+  (void)state;
+  const char *program = getenv ("PINWHEEL");
+  char command[1000], expected[400];
+  cli_run ("mkdir @/stopped; touch @/stopped/paths.svg");
+  snprintf (command, sizeof command,
+            "timeout --preserve-status -s INT 1 '%s' run ezyroller --t-end 300 --step 1e-5 --specialise never --plots "
+            "@/stopped",
+            program ? program : "build/pinwheel");
+  assert_int_equal (cli_run (command), 130);
+  cli_expand ("pinwheel: the run was interrupted, so no figures are drawn; data and scripts are in @/stopped: gnuplot "
+              "FILE.gp draws them there\n",
+              expected, sizeof expected);
+  assert_non_null (strstr (cli_err, expected));
+  assert_null (cli_file ("stopped/paths.svg"));
+  assert_non_null (cli_file ("stopped/paths.gp"));
 }
 
 static void test_drawn (void **state) {
@@ -203,10 +223,10 @@ static void test_refusals (void **state) {
 
 int main (void) {
   const struct CMUnitTest tests[] = {
-    cmocka_unit_test (test_drawn),         cmocka_unit_test (test_written),  cmocka_unit_test (test_data),
-    cmocka_unit_test (test_ground),        cmocka_unit_test (test_layouts),  cmocka_unit_test (test_outline),
-    cmocka_unit_test (test_gnuplot_fails), cmocka_unit_test (test_refusals), cmocka_unit_test (test_symbols),
-    cmocka_unit_test (test_style),         cmocka_unit_test (test_legend),
+    cmocka_unit_test (test_drawn),   cmocka_unit_test (test_interrupted),   cmocka_unit_test (test_written),
+    cmocka_unit_test (test_data),    cmocka_unit_test (test_ground),        cmocka_unit_test (test_layouts),
+    cmocka_unit_test (test_outline), cmocka_unit_test (test_gnuplot_fails), cmocka_unit_test (test_refusals),
+    cmocka_unit_test (test_symbols), cmocka_unit_test (test_style),         cmocka_unit_test (test_legend),
   };
   return cmocka_run_group_tests (tests, cli_setup, cli_teardown);
 }

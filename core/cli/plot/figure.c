@@ -229,11 +229,15 @@ static void gnuplot_remove_figures (const char *folder, const char *const *names
     }
 }
 
-static int gnuplot_absent (const char *folder) {
-  pw_cli_say ("pinwheel: gnuplot was not found, so no figures are drawn; data and scripts are in %s: gnuplot FILE.gp "
-              "draws them there\n",
-              folder);
+int pw_figure_undrawn (const char *folder, const char *const *names, const char *why) {
+  gnuplot_remove_figures (folder, names);
+  pw_cli_say ("pinwheel: %s, so no figures are drawn; data and scripts are in %s: gnuplot FILE.gp draws them there\n",
+              why, folder);
   return PW_OK;
+}
+
+static int gnuplot_absent (const char *folder, const char *const *names) {
+  return pw_figure_undrawn (folder, names, "gnuplot was not found");
 }
 
 int pw_figure_draw (const char *folder, const char *const *names, pw_error *error) {
@@ -248,11 +252,11 @@ int pw_figure_draw (const char *folder, const char *const *names, pw_error *erro
   fflush (stderr);
   gnuplot_remove_figures (folder, names);
   int failed = gnuplot_start (argv, &child);
-  if (failed == ENOENT) return gnuplot_absent (folder);
+  if (failed == ENOENT) return gnuplot_absent (folder, names);
   if (failed) return pw_fail (error, PW_RESOURCE, "cannot run gnuplot: %s", strerror (failed));
   while (waitpid (child, &status, 0) < 0)
     if (errno != EINTR) return pw_fail (error, PW_RESOURCE, "cannot wait for gnuplot: %s", strerror (errno));
-  if (WIFEXITED (status) && WEXITSTATUS (status) == GNUPLOT_ABSENT) return gnuplot_absent (folder);
+  if (WIFEXITED (status) && WEXITSTATUS (status) == GNUPLOT_ABSENT) return gnuplot_absent (folder, names);
   if (WIFEXITED (status) && WEXITSTATUS (status) == 0) return PW_OK;
   gnuplot_remove_figures (folder, names);
   int ended = WIFSIGNALED (status);

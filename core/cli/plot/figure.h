@@ -64,5 +64,7 @@ int pw_figure_write (const pw_cli_line *l, const pw_cli_model *m, const char *fo
 /* Runs gnuplot on NAME.gp for each of at most FIGURE_SCRIPTS names, a list ended by NULL; a missing gnuplot is reported
  * on standard error.  PW_RESOURCE if gnuplot fails. */
 int pw_figure_draw (const char *folder, const char *const *names, pw_error *error);
+/* Removes the figures of an earlier run and reports why these are not drawn.  PW_OK. */
+int pw_figure_undrawn (const char *folder, const char *const *names, const char *why);
 
 #endif

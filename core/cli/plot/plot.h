@@ -27,8 +27,8 @@ void pw_plots_add (pw_plots *p, const pw_sample *sample);
 /* Saves or loads the samples taken so far. */
 void pw_plots_serialise (pw_plots *p, pw_archive *a);
 
-/* Does nothing without a folder.  Writes data and scripts and, if `draw`, runs gnuplot; a missing gnuplot is reported
- * on standard error, but not an error.  PW_RESOURCE if a file cannot be written or gnuplot fails. */
+/* Does nothing without a folder.  Writes data and scripts and, if `draw`, runs gnuplot; after an interrupt (`draw` 0), or
+ * without gnuplot, a notice says how to draw them.  PW_RESOURCE if a file cannot be written or gnuplot fails. */
 int pw_plots_finish (pw_plots *p, int draw, pw_error *error);
 
 /* PW_INPUT unless the name of an animation ends in .html. */

@@ -244,5 +244,7 @@ int pw_plots_finish (pw_plots *p, int draw, pw_error *error) {
   int closeup = data_closeup (p), status = data_write (p, &figures, closeup, error);
   for (const char *const *name = names; status == PW_OK && *name; name++)
     status = figures_write (p, &figures, *name, closeup, error);
-  return status == PW_OK && draw ? pw_figure_draw (p->folder, names, error) : status;
+  if (status != PW_OK) return status;
+  return draw ? pw_figure_draw (p->folder, names, error)
+              : pw_figure_undrawn (p->folder, names, "the run was interrupted");
 }
