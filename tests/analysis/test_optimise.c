@@ -85,7 +85,10 @@ static void test_bound (void **state) {
   assert_non_null (strstr (json, "\"bound\": \"high\""));
   assert_non_null (strstr (cli_out, "at its upper bound"));
   assert_non_null (strstr (cli_out, "--set a=0.5 --start p.vy="));
+  char run[300];
+  cli_expand ("# pinwheel run @/point.yaml --set a=0.5 --start p.vy=", run, sizeof run);
   const char *yaml = cli_file ("o.yaml");
+  assert_int_equal (strncmp (yaml, run, strlen (run)), 0);
   assert_non_null (strstr (yaml, "set:\n  a: 0.5\nstart:\n  p.vy: "));
 }
 

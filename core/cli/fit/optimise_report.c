@@ -2,6 +2,7 @@
 #include "optimise_parts.h"
 #include <math.h>
 #include <stdlib.h>
+#include <string.h>
 #include "figure.h"
 #include "print_table.h"
 
@@ -196,9 +197,10 @@ static void report_quoted (FILE *f, const char *key, const char *text) {
 
 void pw_optimise_yaml (const pw_optimise *x, FILE *f) {
   char number[32], options[REPORT_OPTIONS];
+  const char *model = x->line.argument[0];
   const pw_search_start *s = x->start + x->best;
-  if (pw_unknowns_options (&x->unknowns, s->best, options, sizeof options))
-    fprintf (f, "# pinwheel run %s %s\n", pw_file_name (x->m.file), options);
+  if (pw_unknowns_options (&x->unknowns, s->best, options, sizeof options) && strpbrk (model, "\r\n") == NULL)
+    fprintf (f, "# pinwheel run %s %s\n", model, options);
   report_quoted (f, "model", pw_file_name (x->m.file));
   report_quoted (f, x->maximise ? "maximise" : "minimise", x->objective);
   fprintf (f, "value: %s\n", pw_format (number, s->value[0], 17));
