@@ -154,7 +154,7 @@ static void test_bad (void **state) {
     { "n-trailer --set m=1 --vary m=1:2", "m is given by --vary and by --set" },
     { "n-trailer --vary n=1:3", "--vary n=1:3: n counts something and cannot vary continuously; use `pinwheel sweep`" },
     { "n-trailer --vary mm=1:3", "model n-trailer has no parameter \"mm\"; did you mean \"m0\"?" },
-    { "n-trailer --starts -1", "--starts -1: expected a whole number >= 1" },
+    { "n-trailer --starts -1", "--starts -1: expected a whole number >= 0" },
     { "snakeboard", "model snakeboard: signal swing.value changes with time, so that there are no steady motions; "
                     "`pinwheel periodic` finds periodic ones" },
     { "chain --set n=200", "model chain has 600 coordinates; steady motions are sought with at most 400" },

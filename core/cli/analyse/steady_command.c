@@ -43,10 +43,9 @@ static int steady_options (pw_steady_cli *x, pw_error *error) {
   x->set.hold = x->hold = calloc (PW_HOLDS + 1, sizeof *x->hold);
   if (x->hold == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
   if (status == PW_OK) status = pw_cli_number ("--limit", x->line.limit, PW_POSITIVE, &x->limit.most, error);
-  if (status == PW_OK && x->starts_text && strcmp (x->starts_text, "0") == 0)
-    starts = 0;
-  else if (status == PW_OK)
-    status = pw_cli_number ("--starts", x->starts_text, PW_COUNT, &starts, error);
+  if (status == PW_OK) status = pw_cli_number ("--starts", x->starts_text, PW_REAL, &starts, error);
+  if (status == PW_OK && !(starts >= 0 && starts <= 1e9 && starts == floor (starts)))
+    status = pw_fail (error, PW_INPUT, "--starts %s: expected a whole number >= 0", x->starts_text);
   for (const char **text = x->hold_texts; status == PW_OK && text && *text; text++)
     status = pw_hold_read (x->m.system, "--hold", *text, x->hold, &x->set.holds, error);
   if (status == PW_OK && x->vary_text) status = steady_vary (x, error);
