@@ -49,6 +49,13 @@ static int periodic_arrays (pw_periodic *x) {
 
 static int periodic_open (pw_periodic *x, pw_error *error) {
   const pw_system *s = x->s;
+  const pw_method *integrator;
+  int stabilisation;
+  if (pw_method_parse (x->set.method, &integrator, &stabilisation, error) != PW_OK) return error->status;
+  if (!pw_method_adaptive (integrator, x->set.method))
+    return pw_fail (error, PW_INPUT,
+                    "method %s: periodic motions need one that controls its steps, such as erk8+projection",
+                    x->set.method);
   if (x->n > PERIODIC_MOST)
     return pw_fail (error, PW_INPUT, "model %s has %d coordinates; periodic motions are sought with at most %d",
                     s->model, x->n, PERIODIC_MOST);

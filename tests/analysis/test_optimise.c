@@ -224,6 +224,13 @@ static void test_unbounded (void **state) {
   }
 }
 
+/* A pendulum at rest without gravity. */
+static void test_no_effect (void **state) {
+  (void)state;
+  cli_shell ("pinwheel optimise pendulum --maximise bob.y --free I=0:1 --set g=0 -t 0.1 --starts 2");
+  assert_string_equal (cli_err, "pinwheel: bob.y is the same in all runs: no free value has an effect on it\n");
+}
+
 /* Given initial values that the best run does not have. */
 static void test_changed_values (void **state) {
   (void)state;
@@ -236,12 +243,12 @@ static void test_changed_values (void **state) {
 }
 
 int main (void) {
-  const struct CMUnitTest tests[] = { cmocka_unit_test (test_valley),        cmocka_unit_test (test_derivatives),
-                                      cmocka_unit_test (test_constraint),    cmocka_unit_test (test_bound),
-                                      cmocka_unit_test (test_failing),       cmocka_unit_test (test_sweep),
-                                      cmocka_unit_test (test_edge),          cmocka_unit_test (test_starts),
-                                      cmocka_unit_test (test_jobs),          cmocka_unit_test (test_interrupt),
-                                      cmocka_unit_test (test_bad),           cmocka_unit_test (test_unbounded),
-                                      cmocka_unit_test (test_changed_values) };
+  const struct CMUnitTest tests[] = {
+    cmocka_unit_test (test_valley),         cmocka_unit_test (test_derivatives), cmocka_unit_test (test_constraint),
+    cmocka_unit_test (test_bound),          cmocka_unit_test (test_failing),     cmocka_unit_test (test_sweep),
+    cmocka_unit_test (test_edge),           cmocka_unit_test (test_starts),      cmocka_unit_test (test_jobs),
+    cmocka_unit_test (test_interrupt),      cmocka_unit_test (test_bad),         cmocka_unit_test (test_unbounded),
+    cmocka_unit_test (test_changed_values), cmocka_unit_test (test_no_effect)
+  };
   return cmocka_run_group_tests (tests, optimise_setup, cli_teardown);
 }

@@ -119,6 +119,8 @@ static void test_bad (void **state) {
     { "snakeboard --period -1", "--period -1: expected a number > 0" },
     { "snakeboard --periods 0", "--periods 0: expected a whole number >= 1" },
     { "snakeboard --periods 2 --period 4", "--periods 2: not together with --period" },
+    { "snakeboard --method rk4",
+      "method rk4: periodic motions need one that controls its steps, such as erk8+projection" },
     { "snakeboard --guess 2", "--guess 2: only with --period free" },
     { "pendulum",
       "pendulum: no signal has a known period (those of expressions and tables are not known): give --period T, or "

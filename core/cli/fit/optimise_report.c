@@ -40,6 +40,18 @@ static double report_initial (const pw_optimise *x) {
   return x->start[0].runs > 0 ? x->start[0].trial[x->unknowns.count] : NAN;
 }
 
+/* 1 if the objective is the same in all runs that did not fail. */
+static int report_constant (const pw_optimise *x) {
+  double least = INFINITY, most = -INFINITY;
+  int columns = x->unknowns.count + x->outputs;
+  for (int i = 0; i < x->starts + x->polished; i++)
+    for (long k = 0; k < x->start[i].runs; k++) {
+      double value = x->start[i].trial[k * columns + x->unknowns.count];
+      least = fmin (least, value), most = fmax (most, value);
+    }
+  return most - least <= 1e-14 * fabs (most);
+}
+
 /* Whether the best value of unknown i is at its lower (-1) or upper bound. */
 static int report_side (const pw_optimise *x, int i) {
   const pw_free_number *u = x->unknowns.at + i;
@@ -109,6 +121,8 @@ void pw_optimise_print (const pw_optimise *x) {
             report_derivatives (x));
   if (failed)
     pw_cli_print (stdout, "%ld runs failed and count as infeasible, the first of them: %s\n", failed, first->text);
+  if (report_constant (x))
+    pw_cli_say ("pinwheel: %s is the same in all runs: no free value has an effect on it\n", x->text[0]);
   if (pw_unknowns_options (&x->unknowns, x->start[x->best].best, options, sizeof options)) printf ("\n%s\n", options);
 }
 
