@@ -4,20 +4,17 @@
 
 #include "outcome.h"
 #include "progress.h"
-#include "sensitivity_direction.h"
+#include "unknown.h"
 
 typedef struct {
   pw_cli_line line;
   const char **of, **by; /* as given, ended by NULL */
   const char *every, *folder;
   pw_cli_model m;
-  const char *method;
-  pw_settings settings;
   pw_limit limit;
   pw_cli_engine engine;
   double t_end, dt; /* time between rows [s] */
-  pw_unknown *unknown;
-  int unknowns;
+  pw_unknown_runs runs;
   pw_unknown_run base, *near; /* the run; 4 neighbours of each unknown */
   pw_direction *direction;
   pw_variation *variation;

@@ -25,7 +25,7 @@ double pw_sensitivity_derivative (const pw_sensitivity *x, int output, int unkno
   const pw_outcome *o = &x->outcomes.outcome[output];
   double *gradient = x->value + x->outcomes.functionals, sum = 0;
   pw_outcome_value (&x->outcomes, output, gradient);
-  for (int i = 0; i < o->terms; i++) sum += gradient[o->term[i]] * slope[o->term[i] * x->unknowns + unknown];
+  for (int i = 0; i < o->terms; i++) sum += gradient[o->term[i]] * slope[o->term[i] * x->runs.count + unknown];
   return sum;
 }
 
@@ -34,7 +34,7 @@ double pw_sensitivity_derivative (const pw_sensitivity *x, int output, int unkno
 /* Coordinate `index` of all contact points in one of an unknown's systems. */
 static int sensitivity_contact (const pw_sensitivity *x, int unknown, int which, int index, const pw_sample *s,
                                 const double *dq, double by, double *value, pw_error *error) {
-  const pw_system *system = x->base.system;
+  const pw_system *system = x->base.m.system;
   int n = pw_system_coordinates (system), contacts = pw_system_contacts (system), status;
   double *q = malloc ((size_t)n * sizeof *q), (*at)[3] = malloc (((size_t)contacts + 1) * sizeof *at);
   for (int j = 0; q && j < n; j++) q[j] = s->q[j] + (dq ? by * dq[j] : 0);
@@ -74,7 +74,7 @@ static int sensitivity_values (pw_sensitivity *x, const pw_sample *s, pw_error *
     if (c.type == PW_COLUMN_CONTACT)
       status = sensitivity_contact (x, 0, 0, c.index, s, NULL, 0, &x->value[i], error);
     else
-      x->value[i] = pw_column_value (x->base.system, c, s);
+      x->value[i] = pw_column_value (x->base.m.system, c, s);
   }
   return status;
 }
@@ -89,7 +89,7 @@ static int sensitivity_sample (pw_sensitivity *x, double t, pw_sample *s, pw_err
 
 int pw_sensitivity_at (pw_sensitivity *x, double t, pw_error *error) {
   pw_sample s, d, e;
-  int status = pw_variation_advance (x->variation, t, x->t_end, error), P = x->unknowns;
+  int status = pw_variation_advance (x->variation, t, x->t_end, error), P = x->runs.count;
   if (status == PW_OK) status = sensitivity_sample (x, t, &s, error);
   if (status == PW_OK) status = sensitivity_values (x, &s, error);
   for (int p = 0; p < P && status == PW_OK; p++) {
@@ -97,8 +97,8 @@ int pw_sensitivity_at (pw_sensitivity *x, double t, pw_error *error) {
     for (int i = 0; i < x->outcomes.functionals && status == PW_OK; i++) {
       pw_column c = x->outcomes.functional[i].column;
       d.t = e.t = 0; /* the column t does not depend on anything */
-      x->slope[i * P + p] = pw_column_value (x->base.system, c, &d);
-      x->error[i * P + p] = pw_column_value (x->base.system, c, &e);
+      x->slope[i * P + p] = pw_column_value (x->base.m.system, c, &d);
+      x->error[i * P + p] = pw_column_value (x->base.m.system, c, &e);
       if (c.type == PW_COLUMN_CONTACT)
         status =
             sensitivity_contact_slope (x, p, c.index, &s, d.q, e.q, &x->slope[i * P + p], &x->error[i * P + p], error);
@@ -119,7 +119,7 @@ static void sensitivity_add (pw_sensitivity *x, double weight) {
     double factor = f->type == PW_INTEGRAL ? weight : weight / x->t_end;
     if (!pw_is_integral (f->type)) continue;
     if (f->type == PW_RMS) factor *= f->value > 0 ? x->value[i] / f->value : 0;
-    for (int p = i * x->unknowns; p < (i + 1) * x->unknowns; p++) {
+    for (int p = i * x->runs.count; p < (i + 1) * x->runs.count; p++) {
       x->end_slope[p] += factor * x->slope[p];
       x->end_error[p] += factor * x->error[p];
     }
@@ -136,7 +136,7 @@ static double sensitivity_moves (const pw_sensitivity *x, int unknown, int passe
 
 /* Keeps the current derivatives of functional i that exist. */
 static void sensitivity_keep (pw_sensitivity *x, int i) {
-  for (int at = i * x->unknowns; at < (i + 1) * x->unknowns; at++)
+  for (int at = i * x->runs.count; at < (i + 1) * x->runs.count; at++)
     if (!isnan (x->end_slope[at])) x->end_slope[at] = x->slope[at], x->end_error[at] = x->error[at];
 }
 
@@ -148,15 +148,15 @@ static void sensitivity_keep_extremum (pw_sensitivity *x, int i, int reached) {
   int before = reached || fabs (f->t - next) < 1e-9 * (1 + fabs (next)),
       after = f->t - x->passed <= 2 * PW_FUNCTIONAL_BEFORE * f->step;
   sensitivity_keep (x, i);
-  for (int p = 0; p < x->unknowns && (before || after); p++)
-    if (sensitivity_moves (x, p, !before) != 0) x->end_slope[i * x->unknowns + p] = NAN;
+  for (int p = 0; p < x->runs.count && (before || after); p++)
+    if (sensitivity_moves (x, p, !before) != 0) x->end_slope[i * x->runs.count + p] = NAN;
 }
 
 /* Nor has one in the step of the run that passes a jump with the state, if derivatives jump there from `before`. */
 static void sensitivity_drop (pw_sensitivity *x, double t, const double *before) {
   for (int i = 0; i < x->outcomes.functionals; i++) {
     const pw_functional *f = &x->outcomes.functional[i];
-    for (int at = i * x->unknowns; at < (i + 1) * x->unknowns && pw_is_extremum (f->type); at++)
+    for (int at = i * x->runs.count; at < (i + 1) * x->runs.count && pw_is_extremum (f->type); at++)
       if (fabs (f->t - t) <= f->step && fabs (x->slope[at] - before[at]) > SENSITIVITY_SAME * fabs (before[at]))
         x->end_slope[at] = NAN;
   }
@@ -173,7 +173,7 @@ static int sensitivity_row (pw_sensitivity *x, double t, pw_error *error) {
   for (int o = 0; o < x->outcomes.outcomes; o++) {
     if (!pw_sensitivity_runs_along (x, o)) continue;
     *out++ = pw_outcome_value (&x->outcomes, o, NULL);
-    for (int p = 0; p < x->unknowns; p++) *out++ = pw_sensitivity_derivative (x, o, p, x->slope);
+    for (int p = 0; p < x->runs.count; p++) *out++ = pw_sensitivity_derivative (x, o, p, x->slope);
   }
   return PW_OK;
 }
@@ -223,7 +223,7 @@ static int sensitivity_interval (pw_sensitivity *x, double t0, double t1, sensit
 /* To a breakpoint t_b, or past a jump with the state, from just before it.  The integral of a column that jumps there from x-
  * to x+ has the derivative (x- - x+) dt_b/dp. */
 static int sensitivity_jump (pw_sensitivity *x, double t0, double t, int with_state, pw_error *error) {
-  size_t F = (size_t)x->outcomes.functionals, P = (size_t)x->unknowns;
+  size_t F = (size_t)x->outcomes.functionals, P = (size_t)x->runs.count;
   double *slope = x->before + F;
   memcpy (x->before, x->value, F * sizeof *x->before);
   memcpy (slope, x->slope, F * P * sizeof *slope);
@@ -236,8 +236,8 @@ static int sensitivity_jump (pw_sensitivity *x, double t0, double t, int with_st
     if (!pw_is_integral (f->type) || jump == 0) continue;
     if (f->type != PW_INTEGRAL) jump /= x->t_end;
     if (f->type == PW_RMS) jump *= (x->before[i] + x->value[i]) / (2 * f->value);
-    for (int p = 0; p < x->unknowns; p++)
-      x->end_slope[i * x->unknowns + p] += jump * sensitivity_moves (x, p, with_state);
+    for (int p = 0; p < x->runs.count; p++)
+      x->end_slope[i * x->runs.count + p] += jump * sensitivity_moves (x, p, with_state);
   }
   return status;
 }
@@ -299,8 +299,8 @@ static int sensitivity_integrate (pw_sensitivity *x, pw_progress *progress, pw_e
 /* ---- Opening ---- */
 
 static int sensitivity_workspaces (pw_sensitivity *x, pw_error *error) {
-  for (int i = 0; i < 5 * x->unknowns; i++) {
-    const pw_system *s = i % 5 ? x->near[4 * (i / 5) + i % 5 - 1].system : x->base.system;
+  for (int i = 0; i < 5 * x->runs.count; i++) {
+    const pw_system *s = i % 5 ? x->near[4 * (i / 5) + i % 5 - 1].m.system : x->base.m.system;
     x->workspace[i] = pw_workspace_new (s, error);
     if (x->workspace[i] == NULL) return PW_RESOURCE;
   }
@@ -310,20 +310,22 @@ static int sensitivity_workspaces (pw_sensitivity *x, pw_error *error) {
 int pw_sensitivity_open (pw_sensitivity *x, int unknowns, int table, pw_error *error) {
   size_t P = (size_t)unknowns;
   x->dt = x->t_end / (table ? SENSITIVITY_ROWS : SENSITIVITY_PARTS);
-  x->unknown = calloc (P, sizeof *x->unknown);
+  x->runs.line = &x->line, x->runs.file = x->m.file;
+  x->runs.list = calloc (P, sizeof *x->runs.list);
   x->near = calloc (4 * P, sizeof *x->near);
   x->direction = calloc (P, sizeof *x->direction);
   x->workspace = calloc (5 * P, sizeof *x->workspace);
-  x->unknowns = unknowns;
-  return x->unknown && x->near && x->direction && x->workspace ? PW_OK : pw_fail (error, PW_RESOURCE, "out of memory");
+  x->runs.count = unknowns;
+  return x->runs.list && x->near && x->direction && x->workspace ? PW_OK
+                                                                 : pw_fail (error, PW_RESOURCE, "out of memory");
 }
 
 static int sensitivity_arrays (pw_sensitivity *x, pw_error *error) {
-  size_t F = (size_t)x->outcomes.functionals, P = (size_t)x->unknowns;
+  size_t F = (size_t)x->outcomes.functionals, P = (size_t)x->runs.count;
   x->value = calloc (3 * F + 5 * F * P + 1, sizeof *x->value);
   x->columns = 1;
   for (int o = 0; o < x->outcomes.outcomes; o++)
-    if (pw_sensitivity_runs_along (x, o)) x->columns += 1 + x->unknowns;
+    if (pw_sensitivity_runs_along (x, o)) x->columns += 1 + x->runs.count;
   if (x->value == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
   x->slope = x->value + 2 * F, x->error = x->slope + F * P;
   x->end_slope = x->error + F * P, x->end_error = x->end_slope + F * P;
@@ -334,44 +336,48 @@ static int sensitivity_arrays (pw_sensitivity *x, pw_error *error) {
 /* Work and losses need a run with the ledger. */
 static int sensitivity_ledger (pw_sensitivity *x, pw_error *error) {
   if (!x->outcomes.ledger) return PW_OK;
-  x->settings.ledger = 1;
+  x->runs.settings.ledger = 1;
   pw_run_close (x->base.run);
-  x->base.run = pw_run_open (x->base.system, x->method, &x->settings, error);
+  x->base.run = pw_run_open (x->base.m.system, x->runs.method, &x->runs.settings, error);
   return x->base.run ? PW_OK : error->status;
 }
 
 /* The values of extrema and integrals, and the times of extrema, from a run of its own. */
 static int sensitivity_functionals (pw_sensitivity *x, pw_error *error) {
   for (int i = 0; i < x->outcomes.functionals; i++) x->along |= x->outcomes.functional[i].type != PW_FINAL;
-  return x->along ? pw_outcomes_run (&x->outcomes, x->method, &x->settings, x->t_end, error) : PW_OK;
+  return x->along ? pw_outcomes_run (&x->outcomes, x->runs.method, &x->runs.settings, x->t_end, error) : PW_OK;
 }
 
 /* The run of which samples are taken, where the derivatives' is ahead. */
 static int sensitivity_sampled (pw_sensitivity *x, pw_error *error) {
-  if (!pw_variation_may_jump (x->base.system)) return PW_OK;
-  x->sampled = pw_run_open (x->base.system, x->method, &x->settings, error);
+  if (!pw_variation_may_jump (x->base.m.system)) return PW_OK;
+  x->sampled = pw_run_open (x->base.m.system, x->runs.method, &x->runs.settings, error);
   return x->sampled ? PW_OK : error->status;
 }
 
-int pw_sensitivity_start (pw_sensitivity *x, pw_error *error) {
-  int count = 0;
+/* The run and its neighbours. */
+static int sensitivity_runs (pw_sensitivity *x, pw_error *error) {
+  double *values = malloc ((size_t)x->runs.count * sizeof *values);
+  int count = 0, status = values ? PW_OK : pw_fail (error, PW_RESOURCE, "out of memory");
   while (x->of[count]) count++;
-  pw_settings plain = x->settings;
-  plain.specialised = NULL;
-  int status =
-      pw_unknown_open (&x->base, &x->line, x->m.file, x->unknown, x->unknowns, -1, 0, x->method, &x->settings, error);
-  if (status == PW_OK) status = pw_outcomes_open (&x->outcomes, x->base.system, "--of", x->of, count, error);
+  for (int p = 0; values && p < x->runs.count; p++) values[p] = x->runs.list[p].value;
+  if (status == PW_OK) status = pw_unknown_open (&x->base, &x->runs, values, error);
+  if (status == PW_OK) status = pw_outcomes_open (&x->outcomes, x->base.m.system, "--of", x->of, count, error);
   if (status == PW_OK) status = sensitivity_ledger (x, error);
+  if (status == PW_OK) status = pw_unknown_directions (x->direction, &x->runs, values, &x->base, x->near, error);
+  for (int p = 0; p < x->runs.count; p++) x->direction[p].no_error = x->no_error;
+  free (values);
+  return status;
+}
+
+int pw_sensitivity_start (pw_sensitivity *x, pw_error *error) {
+  int status = sensitivity_runs (x, error);
   if (status == PW_OK) status = sensitivity_arrays (x, error);
-  if (status == PW_OK)
-    status = pw_unknown_directions (x->direction, x->near, &x->line, x->m.file, x->unknown, x->unknowns, x->method,
-                                    &plain, error);
   if (status == PW_OK) status = sensitivity_workspaces (x, error);
   if (status == PW_OK) status = sensitivity_sampled (x, error);
   pw_limit_start (&x->limit);
   if (status != PW_OK) return status;
-  for (int p = 0; p < x->unknowns; p++) x->direction[p].no_error = x->no_error;
-  x->variation = pw_variation_open (x->base.run, x->direction, x->unknowns, x->outcomes.ledger, error);
+  x->variation = pw_variation_open (x->base.run, x->direction, x->runs.count, x->outcomes.ledger, error);
   return x->variation ? PW_OK : error->status;
 }
 
@@ -385,13 +391,13 @@ void pw_sensitivity_close (pw_sensitivity *x) {
   pw_variation_close (x->variation);
   pw_run_close (x->sampled);
   if (x->outcomes.system) pw_outcomes_close (&x->outcomes);
-  for (int i = 0; x->workspace && i < 5 * x->unknowns; i++) pw_workspace_free (x->workspace[i]);
-  for (int i = 0; x->near && i < 4 * x->unknowns; i++) pw_unknown_close (&x->near[i]);
+  for (int i = 0; x->workspace && i < 5 * x->runs.count; i++) pw_workspace_free (x->workspace[i]);
+  for (int i = 0; x->near && i < 4 * x->runs.count; i++) pw_unknown_close (&x->near[i]);
   pw_unknown_close (&x->base);
   free (x->workspace);
   free (x->near);
   free (x->direction);
-  free (x->unknown);
+  free (x->runs.list);
   free (x->value);
   free (x->row);
 }

@@ -35,7 +35,7 @@ int pw_fit_run (const pw_fit *x, const double *unknowns, double *out, pw_error *
   status = pw_unknowns_system (&x->unknowns, unknowns, &m, &settings, &limit, error);
   if (status == PW_OK) status = pw_outcomes_open (&o, m.system, "--columns", x->name, x->columns, error);
   settings.ledger = o.ledger;
-  pw_run *r = status == PW_OK ? pw_run_open (m.system, x->unknowns.method, &settings, error) : NULL;
+  pw_run *r = status == PW_OK ? pw_run_open (m.system, x->unknowns.runs.method, &settings, error) : NULL;
   if (status == PW_OK) status = r ? fit_sample (x, &o, r, out, row, error) : error->status;
   if (status == PW_STOPPED) status = pw_limit_fail (&limit, pw_run_time (r), error);
   if (r) pw_run_close (r);
@@ -48,7 +48,7 @@ int pw_fit_run (const pw_fit *x, const double *unknowns, double *out, pw_error *
 /* ---- Statistics ---- */
 
 int pw_fit_freedom (const pw_fit *x) {
-  return x->residuals - x->unknowns.count;
+  return x->residuals - x->unknowns.runs.count;
 }
 
 double pw_fit_quantile (const pw_fit *x) {
@@ -62,10 +62,10 @@ double pw_fit_quantile (const pw_fit *x) {
 static double jacobian_smooth (const pw_fit *x) {
   const pw_method *method;
   int stabilisation;
-  if (pw_method_parse (x->unknowns.method, &method, &stabilisation, NULL) != PW_OK ||
-      !pw_method_adaptive (method, x->unknowns.method))
+  if (pw_method_parse (x->unknowns.runs.method, &method, &stabilisation, NULL) != PW_OK ||
+      !pw_method_adaptive (method, x->unknowns.runs.method))
     return DBL_EPSILON;
-  return x->unknowns.settings.rtol > 0 ? x->unknowns.settings.rtol : 1e-6;
+  return x->unknowns.runs.settings.rtol > 0 ? x->unknowns.runs.settings.rtol : 1e-6;
 }
 
 double pw_fit_noise (const pw_fit *x) {
@@ -85,8 +85,8 @@ typedef struct {
 static void jacobian_side (void *context, int task) {
   jacobian_differences *d = context;
   const pw_fit *x = d->x;
-  const pw_free_number *u = x->unknowns.at + task / 2;
-  int n = x->unknowns.count;
+  const pw_unknown *u = x->unknowns.runs.list + task / 2;
+  int n = x->unknowns.runs.count;
   double *at = malloc ((size_t)n * sizeof *at), size = fmax (fabs (d->at[task / 2]), 1e-2 * u->scale);
   if (at == NULL) {
     pw_fail (d->error + task, PW_RESOURCE, "out of memory");
@@ -119,7 +119,7 @@ static int jacobian_column (const jacobian_differences *d, int j, const double *
 
 static int jacobian_by_differences (pw_fit *x, const double *at, const double *model, double *jacobian,
                                     pw_error *error) {
-  size_t n = (size_t)x->unknowns.count, cells = (size_t)x->columns * (size_t)x->rows;
+  size_t n = (size_t)x->unknowns.runs.count, cells = (size_t)x->columns * (size_t)x->rows;
   jacobian_differences d = { x, at, malloc ((2 * n * cells + 2 * n) * sizeof *d.run), NULL,
                              calloc (2 * n, sizeof *d.error) };
   int status = d.run && d.error ? PW_OK : pw_fail (error, PW_RESOURCE, "out of memory");
@@ -128,7 +128,7 @@ static int jacobian_by_differences (pw_fit *x, const double *at, const double *m
     status = pw_parallel (x->jobs, (int)(2 * n), jacobian_side, &d, error);
     x->runs += 2 * (long)n;
   }
-  for (int j = 0; j < x->unknowns.count && status == PW_OK; j++)
+  for (int j = 0; j < x->unknowns.runs.count && status == PW_OK; j++)
     status = jacobian_column (&d, j, model, jacobian + (size_t)j * cells, error);
   free (d.run);
   free (d.error);
@@ -139,7 +139,7 @@ static int jacobian_by_differences (pw_fit *x, const double *at, const double *m
 
 /* Derivatives at the time of a row. */
 static int jacobian_row (pw_sensitivity *s, const pw_fit *x, int row, double *jacobian, pw_error *error) {
-  const int n = x->unknowns.count;
+  const int n = x->unknowns.runs.count;
   int status = pw_sensitivity_at (s, x->t[row], error);
   for (int i = 0; i < x->columns && status == PW_OK; i++) {
     const double *slope = s->slope + s->outcomes.outcome[i].term[0] * n;

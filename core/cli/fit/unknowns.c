@@ -8,33 +8,17 @@
 #include <string.h>
 #include "util.h"
 
-/* An unknown name is reported as --set or --start would. */
-static int unknowns_find (pw_free_number *u, const pw_cli_model *m, pw_error *error) {
-  u->parameter = pw_cli_parameter (m->model, u->name);
-  if (u->parameter) {
-    u->unit = u->parameter->unit;
-    u->value = pw_model_parameter (m->model, u->parameter);
-    u->low = u->parameter->domain == PW_REAL ? -INFINITY : 0;
-    u->high = u->parameter->domain == PW_FRACTION ? 1 : INFINITY;
-    if (u->parameter->domain != PW_COUNT) return PW_OK;
-    return pw_fail (error, PW_INPUT, "--free %s: it is a count, and only continuous parameters can be free", u->name);
-  }
-  if (strchr (u->name, '.') == NULL) {
-    pw_model *other = pw_file_model (m->file, error);
-    int status = other ? pw_model_set (other, u->name, 1, error) : error->status;
-    pw_model_free (other);
-    return status;
-  }
-  int state = pw_system_find_state (m->system, u->name, error), n = pw_system_coordinates (m->system);
-  if (state < 0) return error->status;
-  u->unit = pw_system_state_unit (m->system, state);
-  u->value = state < n ? pw_system_initial_q (m->system)[state] : pw_system_initial_v (m->system)[state - n];
-  u->low = -INFINITY, u->high = INFINITY;
-  return PW_OK;
+static int unknowns_find (pw_unknown *u, const pw_cli_model *m, const char *name, pw_error *error) {
+  int status = pw_unknown_find (u, m, name, error);
+  pw_domain domain = u->parameter ? u->parameter->domain : PW_REAL;
+  u->low = domain == PW_REAL ? -INFINITY : 0;
+  u->high = domain == PW_FRACTION ? 1 : INFINITY;
+  if (domain != PW_COUNT) return status;
+  return pw_fail (error, PW_INPUT, "--free %s: it is a count, and only continuous parameters can be free", name);
 }
 
 /* "LOW:HIGH" */
-static int unknowns_bounds (pw_free_number *u, char *text, pw_error *error) {
+static int unknowns_bounds (pw_unknown *u, char *text, pw_error *error) {
   char *colon = strchr (text, ':');
   double low, high;
   if (colon) *colon = 0;
@@ -54,67 +38,69 @@ static int unknowns_bounds (pw_free_number *u, char *text, pw_error *error) {
                   u->name, u->value, low, high, u->parameter ? "--set" : "--start");
 }
 
-static int unknowns_add (pw_unknowns *u, const char *text, pw_error *error) {
-  char copy[300];
-  if (snprintf (copy, sizeof copy, "%s", text) >= (int)sizeof copy)
-    return pw_fail (error, PW_INPUT, "--free %.60s...: too long a name", text);
-  char *equals = strchr (copy, '=');
+/* name: "NAME" or "NAME=LOW:HIGH", of which it keeps the name. */
+static int unknowns_add (pw_unknowns *u, char *name, pw_error *error) {
+  char *equals = strchr (name, '=');
+  pw_unknown *list = u->runs.list, *x = list + u->runs.count;
   if (equals) *equals = 0;
-  for (int i = 0; i < u->count; i++)
-    if (strcmp (u->at[i].name, copy) == 0) return pw_fail (error, PW_INPUT, "--free %s is given twice", copy);
-  pw_free_number *x = u->at + u->count;
-  if ((x->name = strdup (copy)) == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
-  u->count++;
-  int status = unknowns_find (x, u->m, error);
+  for (int i = 0; i < u->runs.count; i++)
+    if (strcmp (list[i].name, name) == 0) return pw_fail (error, PW_INPUT, "--free %s is given twice", name);
+  u->runs.count++;
+  int status = unknowns_find (x, u->m, name, error);
   if (status == PW_OK && equals) status = unknowns_bounds (x, equals + 1, error);
   x->scale = x->given ? x->high - x->low : x->value != 0 ? fabs (x->value) : 1;
+  return status;
+}
+
+static int unknowns_read (pw_unknowns *u, const char **list, pw_error *error) {
+  size_t count = 0, length = 0;
+  for (; list[count]; count++) length += strlen (list[count]) + 1;
+  u->runs.list = calloc (count, sizeof *u->runs.list);
+  char *at = u->names = malloc (length);
+  int status = at && u->runs.list ? PW_OK : pw_fail (error, PW_RESOURCE, "out of memory");
+  for (size_t i = 0; i < count && status == PW_OK; i++) {
+    size_t size = strlen (list[i]) + 1;
+    memcpy (at, list[i], size);
+    status = unknowns_add (u, at, error);
+    at += size;
+  }
   return status;
 }
 
 int pw_unknowns_open (pw_unknowns *u, const pw_cli_line *line, const pw_cli_model *m, const char **list, double runs,
                       pw_error *error) {
   pw_run_defaults d = pw_cli_defaults (pw_file_table (m->file));
+  const char *name = line->method ? line->method : d.method;
   const pw_method *method;
-  int stabilisation, count = 0;
+  int stabilisation;
   pw_specialise when;
   pw_limit limit;
-  *u = (pw_unknowns){ .line = line, .m = m, .method = line->method ? line->method : d.method };
+  *u = (pw_unknowns){ .runs = { .line = line, .file = m->file, .method = name }, .m = m };
   if (list == NULL) return pw_fail (error, PW_INPUT, "nothing is free: add --free NAME or --free NAME=LOW:HIGH");
-  while (list[count]) count++;
-  if ((u->at = calloc ((size_t)count, sizeof *u->at)) == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
-  int status = pw_method_parse (u->method, &method, &stabilisation, error);
-  if (status == PW_OK) status = pw_cli_settings (line, &d, &u->t_end, &u->settings, &limit, error);
+  int status = pw_method_parse (name, &method, &stabilisation, error);
+  if (status == PW_OK) status = pw_cli_settings (line, &d, &u->t_end, &u->runs.settings, &limit, error);
   u->limit = limit.most;
-  if (status == PW_OK) pw_cli_unused (u->method, line);
-  for (int i = 0; i < count && status == PW_OK; i++) status = unknowns_add (u, list[i], error);
+  if (status == PW_OK) pw_cli_unused (name, line);
+  if (status == PW_OK) status = unknowns_read (u, list, error);
   if (status == PW_OK) status = pw_cli_specialise (line->specialise, &when, error);
   if (status == PW_OK)
     pw_cli_engine_open (&u->engine, m->system, when,
-                        runs * pw_method_steps (u->method, &u->settings, d.step, u->t_end));
+                        runs * pw_method_steps (name, &u->runs.settings, d.step, u->t_end));
   return status;
 }
 
 void pw_unknowns_close (pw_unknowns *u) {
-  for (int i = 0; i < u->count; i++) free (u->at[i].name);
-  free (u->at);
+  free (u->runs.list);
+  free (u->names);
   pw_cli_engine_close (&u->engine);
 }
 
 int pw_unknowns_system (const pw_unknowns *u, const double *x, pw_cli_model *m, pw_settings *settings, pw_limit *limit,
                         pw_error *error) {
-  *m = (pw_cli_model){ .model = pw_file_model (u->m->file, error) };
-  if (m->model == NULL) return error->status;
-  int status = pw_cli_apply (m->model, "--set", u->line->sets, pw_model_set, error);
-  for (int i = 0; i < u->count && status == PW_OK; i++)
-    if (u->at[i].parameter) status = pw_model_set (m->model, u->at[i].name, x[i], error);
-  if (status == PW_OK) status = pw_cli_apply (m->model, "--start", u->line->starts, pw_model_set_initial, error);
-  for (int i = 0; i < u->count && status == PW_OK; i++)
-    if (u->at[i].parameter == NULL) status = pw_model_set_initial (m->model, u->at[i].name, x[i], error);
-  if (status == PW_OK) status = pw_model_build (m->model, error);
-  if (status == PW_OK) m->system = pw_system_compile (m->model, error);
-  if (m->system == NULL) return error->status;
+  int status = pw_unknown_system (m, &u->runs, x, error);
+  if (status != PW_OK) return status;
   const pw_specialised *code = pw_cli_engine_code (&u->engine);
-  *settings = u->settings;
+  *settings = u->runs.settings;
   *limit = (pw_limit){ .most = u->limit };
   settings->stop = pw_limit_over;
   settings->stop_context = limit;
@@ -129,7 +115,7 @@ void pw_unknowns_report (const pw_unknowns *u, const double *x) {
   pw_settings settings;
   pw_limit limit;
   int status = pw_unknowns_system (u, x, &m, &settings, &limit, &(pw_error){ 0 });
-  pw_run *r = status == PW_OK ? pw_run_open (m.system, u->method, &settings, NULL) : NULL;
+  pw_run *r = status == PW_OK ? pw_run_open (m.system, u->runs.method, &settings, NULL) : NULL;
   if (r && pw_cli_change (r, m.system, text) > 0)
     pw_cli_say ("pinwheel: the constraints changed given initial values of this result, at worst %s\n", text);
   if (r) pw_run_close (r);
@@ -138,25 +124,21 @@ void pw_unknowns_report (const pw_unknowns *u, const double *x) {
 
 int pw_unknowns_differentiate (const pw_unknowns *u, const double *x, const char **outputs, pw_sensitivity *s,
                                pw_error *error) {
-  pw_error none = { 0 };
-  *s = (pw_sensitivity){ .line = *u->line, .of = outputs, .m = *u->m, .method = u->method, .settings = u->settings };
-  s->t_end = u->t_end;
+  *s = (pw_sensitivity){ .line = *u->runs.line, .of = outputs, .m = *u->m, .runs = u->runs, .t_end = u->t_end };
   s->no_error = 1;
   s->limit.most = u->limit;
-  s->settings.stop = pw_limit_over;
-  s->settings.stop_context = &s->limit;
-  int status = pw_sensitivity_open (s, u->count, 0, error);
-  for (int i = 0; i < u->count && status == PW_OK; i++) {
-    const pw_free_number *f = u->at + i;
-    s->unknown[i] = (pw_unknown){ .name = f->name, .parameter = f->parameter, .state = -1, .value = x[i] };
-    snprintf (s->unknown[i].unit, sizeof s->unknown[i].unit, "%s", f->unit);
-    if (f->parameter == NULL) s->unknown[i].state = pw_system_find_state (u->m->system, f->name, &none);
+  s->runs.settings.stop = pw_limit_over;
+  s->runs.settings.stop_context = &s->limit;
+  int status = pw_sensitivity_open (s, u->runs.count, 0, error);
+  for (int i = 0; i < u->runs.count && status == PW_OK; i++) {
+    s->runs.list[i] = u->runs.list[i];
+    s->runs.list[i].value = x[i];
   }
   return status;
 }
 
 /* In a range of length 1. */
-static double unknowns_between (const pw_free_number *k, double part) {
+static double unknowns_between (const pw_unknown *k, double part) {
   double x = k->given ? k->low + part * k->scale : k->value + (2 * part - 1) * k->scale;
   return fmin (fmax (x, k->low), k->high);
 }
@@ -165,12 +147,12 @@ static double unknowns_between (const pw_free_number *k, double part) {
 static int unknowns_sobol (const pw_unknowns *u, int count, double seed, double *out) {
   double point[PW_UNKNOWNS_STARTED], shift[PW_UNKNOWNS_STARTED];
   gsl_rng *random = gsl_rng_alloc (gsl_rng_mt19937);
-  gsl_qrng *sobol = gsl_qrng_alloc (gsl_qrng_sobol, (unsigned)u->count);
+  gsl_qrng *sobol = gsl_qrng_alloc (gsl_qrng_sobol, (unsigned)u->runs.count);
   if (random) gsl_rng_set (random, (unsigned long)seed);
-  for (int j = 0; random && j < u->count; j++) shift[j] = gsl_rng_uniform (random);
+  for (int j = 0; random && j < u->runs.count; j++) shift[j] = gsl_rng_uniform (random);
   for (int i = 1; random && sobol && i < count; i++) {
     gsl_qrng_get (sobol, point);
-    for (int j = 0; j < u->count; j++) *out++ = unknowns_between (u->at + j, fmod (point[j] + shift[j], 1));
+    for (int j = 0; j < u->runs.count; j++) *out++ = unknowns_between (u->runs.list + j, fmod (point[j] + shift[j], 1));
   }
   int status = random && sobol ? PW_OK : PW_RESOURCE;
   if (random) gsl_rng_free (random);
@@ -179,10 +161,10 @@ static int unknowns_sobol (const pw_unknowns *u, int count, double seed, double 
 }
 
 double *pw_unknowns_starts (const pw_unknowns *u, int count, double seed) {
-  double *out = malloc ((size_t)count * (size_t)u->count * sizeof *out);
+  double *out = malloc ((size_t)count * (size_t)u->runs.count * sizeof *out);
   if (out == NULL) return NULL;
-  for (int j = 0; j < u->count; j++) out[j] = u->at[j].value;
-  if (count == 1 || unknowns_sobol (u, count, seed, out + u->count) == PW_OK) return out;
+  for (int j = 0; j < u->runs.count; j++) out[j] = u->runs.list[j].value;
+  if (count == 1 || unknowns_sobol (u, count, seed, out + u->runs.count) == PW_OK) return out;
   free (out);
   return NULL;
 }
@@ -191,8 +173,9 @@ int pw_unknowns_options (const pw_unknowns *u, const double *x, char *text, size
   size_t used = 0;
   char number[32];
   *text = 0;
-  for (int i = 0; i < u->count && used < size; i++)
+  for (int i = 0; i < u->runs.count && used < size; i++)
     used += (size_t)snprintf (text + used, size - used, "%s--%s %s=%s", i ? " " : "",
-                              u->at[i].parameter ? "set" : "start", u->at[i].name, pw_format (number, x[i], 12));
+                              u->runs.list[i].parameter ? "set" : "start", u->runs.list[i].name,
+                              pw_format (number, x[i], 12));
   return used < size;
 }

@@ -5,25 +5,11 @@
 #include "sensitivity.h"
 
 typedef struct {
-  char *name;
-  const char *unit;
-  const pw_parameter *parameter; /* NULL: the initial value of a state */
-  double value;                  /* at the beginning */
-  double low, high;              /* bounds; infinite without one */
-  double scale;                  /* size of typical changes: the distance of the bounds, else |value|, else 1 */
-  int given;                     /* 1: the bounds are the user's */
-} pw_free_number;
-
-typedef struct {
-  pw_free_number *at;
-  int count;
-  /* of all runs */
-  const pw_cli_line *line;
+  pw_unknown_runs runs; /* settings: except stop, initial, specialised */
+  char *names;          /* copies */
   const pw_cli_model *m;
-  const char *method;
   double t_end;
-  pw_settings settings; /* except stop, initial, specialised */
-  double limit;         /* of each run's processor time [s] */
+  double limit; /* of each run's processor time [s] */
   pw_cli_engine engine;
 } pw_unknowns;
 
