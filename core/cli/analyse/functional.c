@@ -238,11 +238,9 @@ static int functional_end (pw_outcomes *x, pw_run *r, pw_error *error) {
   return p.status;
 }
 
-int pw_outcomes_sample (pw_outcomes *x, pw_run *r, double t, double *value, pw_error *error) {
-  pw_sample s;
-  int status = pw_run_sample (r, t, &s, error);
-  if (status == PW_OK) status = functional_prepare (x, &s, error);
-  for (int i = 0; status == PW_OK && i < x->functionals; i++) value[i] = functional_read (x, x->functional + i, &s);
+int pw_outcomes_read (pw_outcomes *x, const pw_sample *s, double *value, pw_error *error) {
+  int status = functional_prepare (x, s, error);
+  for (int i = 0; status == PW_OK && i < x->functionals; i++) value[i] = functional_read (x, x->functional + i, s);
   return status;
 }
 

@@ -93,8 +93,8 @@ int pw_outcomes_open (pw_outcomes *x, const pw_system *s, const char *option, co
                       pw_error *error);
 void pw_outcomes_close (pw_outcomes *x);
 
-/* The columns of all functionals at a time in the last step. */
-int pw_outcomes_sample (pw_outcomes *x, pw_run *r, double t, double *value, pw_error *error);
+/* The columns of all functionals in a sample. */
+int pw_outcomes_read (pw_outcomes *x, const pw_sample *s, double *value, pw_error *error);
 /* Evaluates them along a run to t_end.  A run that was stopped fails as pw_limit_fail says; settings.stop_context is a
  * pw_limit. */
 int pw_outcomes_run (pw_outcomes *x, const char *method, const pw_settings *settings, double t_end, pw_error *error);

@@ -67,23 +67,9 @@ static int sensitivity_contact_slope (const pw_sensitivity *x, int unknown, int 
   return status;
 }
 
-static int sensitivity_values (pw_sensitivity *x, const pw_sample *s, pw_error *error) {
-  int status = PW_OK;
-  for (int i = 0; i < x->outcomes.functionals && status == PW_OK; i++) {
-    pw_column c = x->outcomes.functional[i].column;
-    if (c.type == PW_COLUMN_CONTACT)
-      status = sensitivity_contact (x, 0, 0, c.index, s, NULL, 0, &x->value[i], error);
-    else
-      x->value[i] = pw_column_value (x->base.m.system, c, s);
-  }
-  return status;
-}
-
 /* A sample of the run at a time that the derivatives have reached. */
 static int sensitivity_sample (pw_sensitivity *x, double t, pw_sample *s, pw_error *error) {
-  int status = PW_OK;
-  while (x->sampled && status == PW_OK && pw_run_time (x->sampled) < t)
-    status = pw_run_advance (x->sampled, x->t_end, error);
+  int status = x->sampled ? pw_run_advance_to (x->sampled, t, x->t_end, error) : PW_OK;
   return status == PW_OK ? pw_run_sample (x->sampled ? x->sampled : x->base.run, t, s, error) : status;
 }
 
@@ -91,7 +77,7 @@ int pw_sensitivity_at (pw_sensitivity *x, double t, pw_error *error) {
   pw_sample s, d, e;
   int status = pw_variation_advance (x->variation, t, x->t_end, error), P = x->runs.count;
   if (status == PW_OK) status = sensitivity_sample (x, t, &s, error);
-  if (status == PW_OK) status = sensitivity_values (x, &s, error);
+  if (status == PW_OK) status = pw_outcomes_read (&x->outcomes, &s, x->value, error);
   for (int p = 0; p < P && status == PW_OK; p++) {
     status = pw_variation_sample (x->variation, p, &d, &e, error);
     for (int i = 0; i < x->outcomes.functionals && status == PW_OK; i++) {

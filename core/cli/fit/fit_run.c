@@ -15,10 +15,12 @@
 
 /* Samples at the times of the data, after each other. */
 static int fit_sample (const pw_fit *x, pw_outcomes *o, pw_run *r, double *out, double *row, pw_error *error) {
+  pw_sample s;
   int status = PW_OK;
   for (int k = 0; k < x->rows && status == PW_OK; k++) {
     status = pw_run_advance_to (r, x->t[k], x->unknowns.t_end, error);
-    if (status == PW_OK) status = pw_outcomes_sample (o, r, x->t[k], row, error);
+    if (status == PW_OK) status = pw_run_sample (r, x->t[k], &s, error);
+    if (status == PW_OK) status = pw_outcomes_read (o, &s, row, error);
     for (int i = 0; i < x->columns && status == PW_OK; i++) out[i * x->rows + k] = row[i];
   }
   return status;
