@@ -1,6 +1,7 @@
 /* Command lines: options bound to a command's structure, help, values of options. */
 #define _POSIX_C_SOURCE 200809L
 #include <errno.h>
+#include <gsl/gsl_errno.h>
 #include <limits.h>
 #include <math.h>
 #include <stdio.h>
@@ -145,6 +146,7 @@ static void command_close (pw_cli_line *l) {
 }
 
 int pw_cli_main (const pw_command *c, int argc, const char **argv) {
+  gsl_set_error_handler_off (); /* the default handler ends the program */
   pw_error error = { 0 };
   pw_cli_line *l = calloc (1, c->size);
   int status = l ? command_read (c, l, argc, argv, &error) : pw_fail (&error, PW_RESOURCE, "out of memory");

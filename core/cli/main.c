@@ -1,7 +1,6 @@
 /* The program `pinwheel`: finds the command and runs it. */
 #define _POSIX_C_SOURCE 200809L
 #include <errno.h>
-#include <gsl/gsl_errno.h>
 #include <gsl/gsl_version.h>
 #include <nlopt.h>
 #include <signal.h>
@@ -71,7 +70,6 @@ static int main_dispatch (int argc, const char **argv) {
 }
 
 int main (int argc, char **argv) {
-  gsl_set_error_handler_off (); /* the default handler ends the program */
   signal (SIGPIPE,
           SIG_IGN); /* a closed pipe or a file size limit makes writes fail, which is handled like other errors */
   signal (SIGXFSZ, SIG_IGN);
