@@ -93,8 +93,8 @@ int pw_run_advance (pw_run *r, double t_end, pw_error *error);
  * beyond the first that reaches t.  Returns as pw_run_advance. */
 int pw_run_advance_towards (pw_run *r, double t, double t_end, pw_error *error);
 
-/* Advances each run by one or several steps, those of fixed size at once in the lanes of `code` (NULL: one run after
- * the other); `memory` as the code requires.  The runs' systems have the structure of the code's.  Results are those of
+/* Advances each run by one or several steps, those of fixed size at once in the lanes of `code` (NULL, or few runs
+ * for them, or too many: one run after the other); `memory` as the code requires.  The runs' systems have the structure of the code's.  Results are those of
  * pw_run_advance_towards, bit for bit, and do not depend on the other runs.  status, error: of each run. */
 void pw_runs_advance (pw_run *const *runs, int count, double t_end, const pw_specialised_lanes *code, void *memory,
                       int *status, pw_error *error);

@@ -145,7 +145,8 @@ void pw_add_JT (const pw_workspace *w, const double *lambda, double *out) {
   }
 }
 
-/* The worst constraint equation so far: largest residual, largest scaled residual, and its index.  NaN is the worst. */
+/* The largest residual and the largest scaled residual so far, and the constraint equation of the latter.  NaN is the
+ * largest. */
 typedef struct {
   double largest, scaled;
   int row;
@@ -153,7 +154,7 @@ typedef struct {
 
 static inline evaluate_worst evaluate_update_worst (evaluate_worst worst, int row, double residual, double size) {
   double error = fabs (residual), scaled = error / size;
-  worst.largest = pw_larger (worst.largest, error);
+  if (!(error <= worst.largest) && !isnan (worst.largest)) worst.largest = error;
   if (!(scaled <= worst.scaled) && !isnan (worst.scaled)) worst.scaled = scaled, worst.row = row;
   return worst;
 }

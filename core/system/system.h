@@ -119,7 +119,7 @@ void pw_hold_signals (pw_workspace *w, int hold);
 
 void pw_evaluate_J (pw_workspace *w);                    /* fills J of every batch */
 void pw_evaluate_g (pw_workspace *w, double *g);         /* holonomic */
-void pw_evaluate_g_size (pw_workspace *w, double *size); /* holonomic; at least the length scale */
+void pw_evaluate_g_size (pw_workspace *w, double *size); /* holonomic; at least the length scale, also of angles */
 void pw_evaluate_eta (pw_workspace *w, double *eta);
 void pw_evaluate_gamma (pw_workspace *w, double *gamma);
 void pw_evaluate_force (pw_workspace *w, double *f);

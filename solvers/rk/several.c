@@ -37,13 +37,13 @@ static int several_count (const pw_run *r, double t, double t_end) {
 static pw_scene_watch several_watch (const pw_run *r) {
   const pw_watchdog *limit = &r->limits;
   const pw_geometry *g = &r->geometry;
-  const int loops = g->saddle != NULL; /* a tree is never singular */
+  const int watched = g->saddle != NULL; /* a tree of holonomic joints is never singular */
   const double length = r->s->scale.length, per = r->w->scale.time * r->w->scale.time;
   return (pw_scene_watch){
     .lost = pw_stabilised_by (r, PW_UNSTABILISED) ? limit->lost_unstabilised : limit->lost,
-    .sine = loops ? g->state_sine : INFINITY,
-    .reach = loops ? limit->lipschitz * g->typical : 0,
-    .near_sine = loops ? limit->near * g->typical : 0,
+    .sine = watched ? g->state_sine : INFINITY,
+    .reach = watched ? limit->lipschitz * g->typical : 0,
+    .near_sine = watched ? limit->near * g->typical : 0,
     .growth = limit->growth,
     .rank = limit->rank,
     .regular = limit->regular * g->typical,
@@ -172,6 +172,7 @@ void pw_runs_advance (pw_run *const *runs, int count, double t_end, const pw_spe
   several_lanes x = { .run = runs };
   int done[PW_LANES_MOST] = { 0 };
   for (int i = 0; i < count && code && count <= code->lanes; i++) {
+    if (runs[i] == NULL) continue; /* refused below */
     runs[i]->stopped = 0;
     if (pw_run_stop_requested (runs[i]))
       status[i] = PW_STOPPED, done[i] = 1;

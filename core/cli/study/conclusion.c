@@ -9,7 +9,7 @@ static const int conclusion_digits[CONCLUSION_LEVELS] = { 3, 6, 9 };
 
 typedef struct {
   double cpu; /* [s]; NaN: no run is as accurate */
-  int most;   /* 1: an upper bound, since no less accurate run is known */
+  int most;   /* 1: an upper bound: no less accurate run is known, or the error only as below the uncertainty */
 } cost;
 
 typedef struct {
@@ -35,7 +35,7 @@ static double conclusion_error (const pw_reference *t, const double *of) {
   double most = 0;
   for (int unit = MOTION_LENGTH; unit <= MOTION_ANGLE; unit++) {
     double error = of[unit] / conclusion_scale (t, unit);
-    if (t->uncertainty[MOTION_MOST + unit] > 0 && !(error <= most)) most = error;
+    if (t->uncertainty[MOTION_MOST + unit] > 0 && !(error <= most) && !isnan (most)) most = error;
   }
   return most;
 }
@@ -46,8 +46,9 @@ static double conclusion_level (int k) {
 
 /* ---- Costs ---- */
 
-/* Between measured levels, on logarithmic scales; a run that is accurate enough without a less accurate one before it is an
- * upper bound. */
+/* The least processor time of a method for this error, interpolated between neighbouring runs on logarithmic scales.  Upper
+ * bounds are the time of a run without a less accurate one before it, and an interpolation to an error that is only known to
+ * be below the uncertainty. */
 static cost conclusion_cost (const conclusion *x, int line, double level) {
   cost least = { NAN, 0 };
   double before = NAN;
@@ -136,7 +137,7 @@ static void conclusion_table (const conclusion *x) {
       uncertain |= *text == 'u';
     }
   }
-  puts (most ? "\n<: at most: already the least accurate run of the method has that many digits" : "");
+  puts (most ? "\n<: at most: no run has fewer digits, or the reference cannot tell how many the next one has" : "");
   if (uncertain) puts ("uncertain: the reference is not accurate enough to distinguish methods");
 }
 

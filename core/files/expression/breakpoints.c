@@ -88,7 +88,7 @@ double pw_expression_breakpoint (const pw_expression *x, double t) {
   search s = {
     .x = x, .from = t, .remaining = 400 + 4000000 / (100 + x->codes), .min_width = 0x1p-36, .noise_end = INFINITY
   };
-  s.max_equal = 1 + s.remaining / 120; /* 36 doublings, of two or three intervals each, before the limit */
+  s.max_equal = 1 + s.remaining / 120; /* all 26 doublings, to 2^-10, before the limit */
   double a = t, found = INFINITY;
   if (!x->breaks) return INFINITY;
   for (double w = 1e-9 * (1 + fabs (t)); a < latest && found == INFINITY; w *= 2) {
