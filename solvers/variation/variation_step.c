@@ -189,6 +189,7 @@ static void step_accept (pw_variation *x) {
 
 int pw_variation_begin (pw_variation *x, pw_error *error) {
   pw_variation_project (x);
+  PW_EACH_COLUMN (c, x) c->largest = fmax (c->largest, step_norm (x, c->trial));
   int status = step_rates (x, PW_VARIATION_RATES - 1, error);
   if (status == PW_OK) step_accept (x);
   return status;
