@@ -63,16 +63,25 @@ static void condense_elements (pw_plan *c, int rows, const unsigned char *active
     }
 }
 
-/* Adds the rows of components that are not pivots; the multiplier of a row without contributions stays 0. */
+/* 1 for an unmatched row that becomes a node: it has massive coordinates, and not only prescribed ones. */
+static int condense_remains (const pw_plan *c, const pw_component *p, int i) {
+  int prescribed = 0;
+  for (int n = 0; n < p->cols; n++) {
+    if (c->k->inverse[p->global[n]] > 0 && pw_massless_is_entry (p, i, n)) return 1;
+    prescribed |= !p->massless[n] && c->k->inverse[p->global[n]] == 0;
+  }
+  return p->massives > 0 && !prescribed;
+}
+
+/* Adds the unmatched rows; the multiplier of one that does not become a node stays 0. */
 static void condense_components (pw_plan *c) {
   int schurs = 0;
   for (int n = 0; n < c->k->massless.components; n++) {
     pw_component *p = &c->k->massless.component[n];
     for (int i = p->pivots; i < p->rows; i++) {
-      int before = c->contributions;
+      if (!condense_remains (c, p, i)) continue;
       for (int g = 0; g < p->groups; g++)
         condense_contribute (c, p->A + i * p->stride + p->group[g].column, p->stride, p->group[g].j, 0);
-      if (c->contributions == before) continue;
       if (c->node)
         c->node[c->nodes] = (pw_plan_node){ .size = 1,
                                             .row = PW_PLAN_SCHUR,

@@ -39,13 +39,20 @@ static void massless_swap (pw_component *c, int a, int b) {
   }
 }
 
+/* Entries below this part of their row are what round-off leaves of 0. */
+#define MASSLESS_ROUND_OFF 1e-12
+
+int pw_massless_is_entry (const pw_component *c, int i, int column) {
+  return fabs (c->A[i * c->stride + column]) * sqrt (c->square[column]) > MASSLESS_ROUND_OFF * sqrt (c->row[i].terms);
+}
+
 /* Moves the row with the largest entry in a massless column to p, each row scaled by its largest original entry, so
  * that the remainder of a dependent row is small.  Returns 0 if all are round-off; the component is then matched again
  * at the next factorisation. */
 static int massless_select_pivot (pw_component *c, int p) {
   const double guard = 0.1;
   int row = -1, column = -1;
-  double best = 1e-12;
+  double best = MASSLESS_ROUND_OFF;
   for (int i = p; i < c->rows; i++)
     for (int n = 0; n < c->cols; n++) {
       double scaled = c->massless[n] ? sqrt (c->square[n]) * fabs (c->A[i * c->stride + n]) / c->row[i].size : 0;
@@ -87,7 +94,7 @@ PW_INLINE int massless_reduce (pw_component *c, int search, int n) {
   c->least = INFINITY;
   for (int i = search ? 0 : n; i < c->rows; i++) c->row[i].terms = massless_square (c, i, c->square);
   for (int i = 0; search && i < c->rows; i++) {
-    c->row[i].size = 0;
+    c->row[i].size = c->row[i].lambda = 0;
     for (int k = 0; k < c->cols; k++)
       c->row[i].size = fmax (c->row[i].size, sqrt (c->square[k]) * fabs (c->A[i * c->stride + k]));
   }

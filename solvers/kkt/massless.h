@@ -82,6 +82,9 @@ void pw_massless_close (pw_massless *r);
  * columns, and eliminates them.  Returns the number of pivots found. */
 int pw_massless_match (pw_component *c);
 
+/* 1 if an entry of the row i of Z' is larger than what round-off leaves of its terms. */
+int pw_massless_is_entry (const pw_component *c, int i, int column);
+
 /* Eliminates with the J last evaluated, and matches again if a pivot has become much smaller than when it was
  * matched.  Returns the smallest pivot squared, relative to its row, or of an unmatched row its remainder, if smaller;
  * 0 if singular. */

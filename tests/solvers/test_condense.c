@@ -1,0 +1,160 @@
+/* Condensation to the constraint equations: rows of prescribed coordinates alone, bodies that are not condensed. */
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+#include "check.h"
+#include "saddle.h"
+#include "scene.h"
+
+/* The saddle-point system of a scene at its initial state. */
+static pw_saddle *condense_open (pw_workspace *w, const double *weight) {
+  const pw_system *s = w->s;
+  pw_error error = { 0 };
+  assert_int_equal (pw_update_kinematics (w, 0, s->q0, s->v0), PW_OK);
+  pw_evaluate_J (w);
+  pw_saddle *k = pw_saddle_open (w, weight, s->rows, NULL, &error);
+  check_ok (k ? PW_OK : error.status, &error);
+  return k;
+}
+
+/* ---- Prescribed coordinates ---- */
+
+/* A disc whose centre is at the end of a massless arm. */
+static void condense_arm (pw_model *m, const void *parameters) {
+  (void)parameters;
+  pw_add_body (m, &(pw_body){ .name = "disc", .mass = 2, .inertia = 0.5, .start = { 0.6, 0.8, 0 } });
+  pw_add_body (m, &(pw_body){ .name = "arm", .start = { 0.3, 0.4, 0.3 } });
+  double x = 0.5 * cos (atan2 (0.8, 0.6) - 0.3), y = 0.5 * sin (atan2 (0.8, 0.6) - 0.3);
+  pw_add_pin (m, &(pw_pin){ .name = "A", .body = { "disc", "arm" }, .at = { { 0, 0 }, { x, y } } });
+  pw_add_pin (m, &(pw_pin){ .name = "O", .body = { "arm", "ground" }, .at = { { -x, -y } } });
+}
+
+static const pw_plugin_table condense_arm_table = { .abi = PW_ABI,
+                                                    .size = sizeof (pw_plugin_table),
+                                                    .build = condense_arm };
+
+/* The equation that remains after the elimination of the arm contains the position of the disc only, not its angle.  It has
+ * no multiplier, also after the arm has turned so far that another equation remains. */
+static void test_prescribed_centre (void **state) {
+  (void)state;
+  pw_system *s = scene_system (&condense_arm_table, NULL);
+  pw_workspace *w = pw_workspace_new (s, NULL);
+  const double weight[] = { INFINITY, INFINITY, 0.5, 0, 0, 0 }, gamma[4] = { 0 }, f[9] = { 0, 0, 3, 5, 7, 2 };
+  const double expected[] = { 0, 0, 6, 0, 0, 0 };
+  pw_saddle *k = condense_open (w, weight);
+  for (int turn = 0; turn < 12; turn++) {
+    double a[9], lambda[4], q[9], sum[9] = { 0 };
+    memcpy (q, s->q0, 6 * sizeof *q);
+    q[5] += 0.55 * turn;
+    assert_int_equal (pw_update_kinematics (w, 0, q, s->v0), PW_OK);
+    pw_evaluate_J (w);
+    assert_int_equal (pw_saddle_factor_solve (k, f, gamma, a, lambda), PW_OK);
+    pw_add_JT (w, lambda, sum);
+    for (int j = 0; j < 6; j++) check_close ("acceleration", a[j], expected[j], 16 * CHECK_EPS, "round-off");
+    for (int j = 3; j < 6; j++) check_close ("force", sum[j], f[j], 64 * CHECK_EPS, "round-off of their terms");
+    assert_int_equal ((lambda[0] == 0) + (lambda[1] == 0) + (lambda[2] == 0) + (lambda[3] == 0), 1);
+  }
+  pw_saddle_close (k);
+  pw_workspace_free (w);
+  pw_system_free (s);
+}
+
+/* ---- Bodies that are not condensed ---- */
+
+enum { PLATFORM_LEGS = 10, PLATFORM_COORDS = 3 * PLATFORM_LEGS + 3, PLATFORM_ROWS = 4 * PLATFORM_LEGS };
+
+typedef struct {
+  double mass, last, feet; /* of the platform; 1: it is declared after its legs; legs that stand on the ground */
+} platform;
+
+static const pw_parameter platform_list[] = {
+  { PW_AT (platform, mass), 1, "kg", "of the platform", PW_POSITIVE },
+  { PW_AT (platform, last), .about = "1: the platform is the last body" },
+  { PW_AT (platform, feet), 2, .about = "legs that stand on the ground" },
+  { .name = NULL },
+};
+
+/* A platform with legs.  In the coordinates of a leg that stands on the ground its two pins are dependent; the second one is
+ * therefore eliminated after the platform. */
+static void platform_build (pw_model *m, const void *parameters) {
+  const platform *p = parameters;
+  char leg[20], pin[20];
+  for (int i = -1; i <= PLATFORM_LEGS; i++) {
+    snprintf (leg, sizeof leg, "leg%d", i);
+    if (i == (p->last != 0 ? PLATFORM_LEGS : -1))
+      pw_add_body (m,
+                   &(pw_body){ .name = "platform", .mass = p->mass, .inertia = 0.3 * p->mass, .start = { 0, 1, 0 } });
+    if (i >= 0 && i < PLATFORM_LEGS)
+      pw_add_body (m, &(pw_body){ .name = leg, .mass = 0.1, .inertia = 0.01, .start = { 0.3 * i, 0.5, 0.1 * i } });
+  }
+  for (int i = 0; i < PLATFORM_LEGS; i++) {
+    double c = 0.5 * cos (0.1 * i), s = 0.5 * sin (0.1 * i);
+    snprintf (leg, sizeof leg, "leg%d", i);
+    snprintf (pin, sizeof pin, "foot%d", i);
+    if (i < p->feet)
+      pw_add_pin (m,
+                  &(pw_pin){ .name = pin, .body = { leg, "ground" }, .at = { { 0.1 - s, -c }, { 0.3 * i + 0.1, 0 } } });
+    snprintf (pin, sizeof pin, "pin%d", i);
+    pw_add_pin (m, &(pw_pin){ .name = pin, .body = { leg, "platform" }, .at = { { s, c }, { 0.3 * i, 0 } } });
+  }
+}
+
+static const pw_plugin_table platform_table = { .abi = PW_ABI,
+                                                .size = sizeof (pw_plugin_table),
+                                                .parameters = platform_list,
+                                                .parameters_size = sizeof (platform),
+                                                .build = platform_build };
+
+typedef struct {
+  double a[PLATFORM_COORDS + 3], lambda[PLATFORM_ROWS], sine;
+  int status, row;
+} solution;
+
+/* The accelerations of the legs come first. */
+static solution platform_solve (double mass, int last, int feet) {
+  solution x = { .row = -1 };
+  pw_system *s = scene_system (&platform_table, "mass", mass, "last", (double)last, "feet", (double)feet, NULL);
+  pw_workspace *w = pw_workspace_new (s, NULL);
+  double f[PLATFORM_COORDS + 3] = { 0 }, gamma[PLATFORM_ROWS], a[PLATFORM_COORDS + 3];
+  const int first = last ? 0 : 3, coords = PLATFORM_COORDS;
+  assert_true (s->coords == coords && s->rows == 2 * (PLATFORM_LEGS + feet));
+  pw_saddle *k = condense_open (w, s->mass);
+  for (int j = 0; j < coords; j++) f[(j + first) % coords] = cos (j);
+  for (int i = 0; i < s->rows; i++) gamma[i] = sin (3 * i);
+  x.status = pw_saddle_factor_solve (k, f, gamma, a, x.lambda);
+  if (x.status == PW_OK) x.sine = pw_saddle_pivot (k, &x.row);
+  for (int j = 0; j < coords; j++) x.a[j] = a[(j + first) % coords];
+  pw_saddle_close (k);
+  pw_workspace_free (w);
+  pw_system_free (s);
+  return x;
+}
+
+static void platform_compare (const char *what, const double *a, const double *b, int n) {
+  double size = 0;
+  for (int i = 0; i < n; i++) size = fmax (size, fabs (a[i]));
+  for (int i = 0; i < n; i++)
+    check_close (what, a[i] / size, b[i] / size, 1e4 * CHECK_EPS, "round-off, over the square of a sine above 0.01");
+}
+
+/* Accelerations, multipliers, the smallest pivot and the verdict do not depend on the order of the bodies. */
+static void test_order_of_bodies (void **state) {
+  (void)state;
+  for (double mass = 1e-3; mass < 2e3; mass *= 10)
+    for (int feet = 1; feet <= 4; feet++) {
+      const solution x = platform_solve (mass, 0, feet), y = platform_solve (mass, 1, feet);
+      assert_int_equal (x.status, feet < 4 ? PW_OK : PW_RETRY); /* three legs hold the platform */
+      assert_int_equal (y.status, x.status);
+      if (x.status != PW_OK) continue;
+      platform_compare ("acceleration", x.a, y.a, PLATFORM_COORDS);
+      platform_compare ("multiplier", x.lambda, y.lambda, 2 * (PLATFORM_LEGS + feet));
+      check_close ("sine", x.sine / y.sine, 1, 1e4 * CHECK_EPS, "round-off, over the square of a sine above 0.01");
+      assert_int_equal (x.row, y.row);
+    }
+}
+
+int main (void) {
+  const struct CMUnitTest tests[] = { cmocka_unit_test (test_prescribed_centre),
+                                      cmocka_unit_test (test_order_of_bodies) };
+  return cmocka_run_group_tests (tests, NULL, NULL);
+}
