@@ -289,7 +289,8 @@ typedef struct {
   const unsigned char *active; /* rows that are enforced; NULL: all */
   int alone;                   /* 1: inactive rows are not checked */
   int by_mass;                 /* 1: both metrics are the mass matrix */
-  int against;                 /* redundant row violated after the last position projection, or -1 */
+  int row;                     /* worst row of the last position projection */
+  int against;                 /* redundant row violated after it, or -1 */
 } pw_projector;
 
 /* Position metric `weight_q` and velocity metric `weight_v` (NULL: the mass matrix).  J must be evaluated at a typical
@@ -300,8 +301,8 @@ int pw_projector_open_by_options (pw_projector *p, pw_run *r, pw_error *error);
 void pw_projector_close (pw_projector *p);
 
 /* Gauss-Newton iteration on g(q) = 0 to round-off, minimal changes in the metric.  Leaves kinematics and J evaluated at
- * (t, q, v).  PW_RETRY if it does not converge: *row is the worst constraint equation, *worst its residual. */
-int pw_project_positions (pw_projector *p, pw_run *r, double t, double *q, const double *v, int *row, double *worst);
+ * (t, q, v).  PW_RETRY if it does not converge, or if a redundant equation contradicts the others. */
+int pw_project_positions (pw_projector *p, pw_run *r, double t, double *q, const double *v);
 
 /* One linear solve for J v = eta at the current configuration; updates the velocity kinematics.  PW_RETRY if singular;
  * PW_METHOD if a signal that depends on velocities failed. */

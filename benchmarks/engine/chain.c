@@ -80,13 +80,11 @@ static long cost_evaluation (void *context, long n) {
 static long cost_projection (void *context, long n) {
   engine_cost *d = context;
   for (long i = 0; i < n; i++) {
-    int row;
-    double worst;
     for (int j = 0; j < d->system->coords; j++) {
       double off = 1e-8 * ((j * 7) % 11 - 5) / 5;
       d->q1[j] = d->q[j] + off, d->v1[j] = d->v[j] + off;
     }
-    if (pw_project_positions (&d->projector, d->run, 0, d->q1, d->v1, &row, &worst) != PW_OK ||
+    if (pw_project_positions (&d->projector, d->run, 0, d->q1, d->v1) != PW_OK ||
         pw_project_velocities (&d->projector, d->run, d->v1) != PW_OK)
       engine_die ("projection", "does not converge");
   }

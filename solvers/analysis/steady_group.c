@@ -98,14 +98,12 @@ int pw_steady_null (int rows, int n, double *M, double tolerance, double *out) {
 static int group_place (pw_steady *x, double apart) {
   pw_run *r = x->at[0].r;
   pw_projector p;
-  double worst;
-  int row;
   for (int j = 0; j < x->n; j++) {
     x->q[j] = r->q[j] + apart * pw_unit (x->s, j) * pw_sin (1.7 + GROUP_GOLDEN * (j + 1));
     x->v[j] = r->v[j] + apart * pw_unit (x->s, j) / x->T * pw_sin (2.9 + GROUP_GOLDEN * (j + 1));
   }
   if (pw_projector_open (&p, r, x->s->metric, x->s->metric, &x->why) != PW_OK) return PW_RESOURCE;
-  int status = pw_project_positions (&p, r, x->set.t, x->q, x->v, &row, &worst);
+  int status = pw_project_positions (&p, r, x->set.t, x->q, x->v);
   if (status == PW_OK) status = pw_project_velocities (&p, r, x->v);
   pw_projector_close (&p);
   if (status == PW_OK) status = pw_linear_evaluate (&x->at[0].x, x->set.t, x->q, x->v);

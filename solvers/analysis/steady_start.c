@@ -18,10 +18,8 @@ static double start_random (uint64_t *state) {
 
 /* Makes the positions x->q consistent, if possible. */
 static int start_assemble (pw_steady *x, pw_projector *p) {
-  double worst;
-  int row;
   memcpy (x->dq, x->q, (size_t)x->n * sizeof *x->q);
-  int status = pw_project_positions (p, x->at[0].r, x->set.t, x->dq, x->v, &row, &worst);
+  int status = pw_project_positions (p, x->at[0].r, x->set.t, x->dq, x->v);
   if (status == PW_OK) memcpy (x->q, x->dq, (size_t)x->n * sizeof *x->q);
   return status;
 }

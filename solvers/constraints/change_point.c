@@ -24,9 +24,9 @@ typedef struct {
   pw_run *r;
   pw_projector projector;
   double t, *q, *next;       /* position of the walk, and a candidate for the next */
-  double *end, *in;          /* end of the walk; direction in which a crossing was entered */
+  double *end, *in;          /* end of the walk; the last position before a crossing, and the first one inside */
   double sine, least, slope; /* sine at q; smallest sine; its fastest change */
-  int passed;                /* 1: stepping over a crossing of branches; 2: passed straight on; -1: passed otherwise */
+  int inside, turned;        /* 1: stepping over a crossing of branches; one was not left straight on */
   int row;                   /* where the sine was smallest */
 } change_walk;
 
@@ -47,31 +47,29 @@ static double change_distance (const pw_system *s, const double *a, const double
 /* Projects q onto the constraints; *sine: the sine there. */
 static int change_project (change_walk *w, double t, double *q, double *sine) {
   pw_run *r = w->r;
-  int row;
-  double worst;
-  int status = pw_project_positions (&w->projector, r, t, q, r->v, &row, &worst);
+  int row, status = pw_project_positions (&w->projector, r, t, q, r->v);
   if (status != PW_OK) return status;
   status = pw_saddle_factor (w->projector.position);
-  *sine = status == PW_OK ? pw_saddle_pivot (w->projector.position, &row) : 0;
+  *sine = pw_saddle_pivot (w->projector.position, &row);
+  if (status != PW_OK) *sine = 0;
   if (*sine < w->least) w->least = *sine, w->row = row;
   return PW_OK;
 }
 
-/* Records where a crossing of branches is entered; checks that it is left straight on. */
+/* Records where a crossing of branches is entered; checks that each is left straight on. */
 static void change_straight (change_walk *w, double sine) {
   const pw_system *s = w->r->s;
   const double inside = w->r->limits.crossing;
   size_t n = (size_t)s->coords * sizeof (double);
-  if (w->passed == 0 && sine < inside) {
+  if (!w->inside && sine < inside) {
     memcpy (w->in, w->q, n);
     memcpy (w->in + s->coords, w->next, n);
-    w->passed = 1;
-  } else if (w->passed == 1 && sine >= inside) {
+  } else if (w->inside && sine >= inside) {
     const double *from = w->in, *to = from + s->coords;
-    double dot = change_dot (s, to, from, w->next, w->q);
-    w->passed =
-        dot > w->r->limits.straight * change_distance (s, to, from) * change_distance (s, w->next, w->q) ? 2 : -1;
+    double along = change_dot (s, to, from, w->next, w->q);
+    w->turned |= !(along > w->r->limits.straight * change_distance (s, to, from) * change_distance (s, w->next, w->q));
   }
+  w->inside = sine < inside;
 }
 
 /* Steps to q + part (to - q), projected; tries longer strides if that fails.  PW_RETRY if all fail. */
@@ -110,7 +108,7 @@ static change_verdict change_follow (change_walk *w) {
     return CHANGE_UNKNOWN;
   for (int i = 0; i < CHANGE_STRIDES; i++) {
     double distance = change_distance (r->s, w->q, w->end);
-    if (distance <= r->limits.floor) return w->passed < 0 ? CHANGE_OTHER : CHANGE_SAME;
+    if (distance <= r->limits.floor) return w->turned ? CHANGE_OTHER : CHANGE_SAME;
     double part = fmin (1, change_length (w) / distance);
     if (change_stride (w, w->end, end, part) != PW_OK) return CHANGE_UNKNOWN;
     if (change_distance (r->s, w->q, w->end) <= distance * (1 - r->limits.progress * part)) continue;
@@ -125,7 +123,7 @@ static change_verdict change_follow (change_walk *w) {
 static change_verdict change_walk_there (pw_run *r, change_walk *w, pw_error *error) {
   const pw_system *s = r->s;
   size_t n = (size_t)s->coords + 3;
-  double *memory = malloc (6 * n * sizeof *memory);
+  double *memory = malloc (5 * n * sizeof *memory);
   const pw_residuals known = r->residuals;
   const pw_statistics statistics = r->statistics;
   change_verdict verdict = CHANGE_UNKNOWN;
@@ -170,13 +168,14 @@ static int change_may_be_low (pw_run *r, double start_sine, double sine, double 
   return length <= r->limits.stride || change_low_between (r, length);
 }
 
-static int change_fail (pw_run *r, int row, double least, const char *what, double length, pw_error *error) {
+/* apart: distance of the branches, estimated as the sine over its change per unit of motion. */
+static int change_fail (pw_run *r, int row, double apart, const char *what, double length, pw_error *error) {
   char element[120] = "the constraints";
   if (row >= 0) pw_system_row_name (r->s, row, element, sizeof element);
   return pw_fail (error, PW_METHOD,
                   "t = %.6g s: change point at %s: %s; branches come within %.2g of each other, the step is "
                   "%.2g long (scaled); use a smaller %s",
-                  r->t, element, what, least, length, pw_fixed_steps (r) ? "step" : "tolerance");
+                  r->t, element, what, apart, length, pw_fixed_steps (r) ? "step" : "tolerance");
 }
 
 int pw_change_point_resolve (pw_run *r, double last, pw_error *error) {
@@ -195,9 +194,9 @@ static int change_report (pw_run *r, const change_walk *w, change_verdict verdic
   double low = r->limits.unresolved * fmin (g->start_sine, sine);
   g->crossed |= verdict == CHANGE_UNKNOWN || w->least <= r->limits.crossing;
   if (verdict == CHANGE_OTHER)
-    return change_fail (r, w->row, w->least, "the motion has left its branch", length, error);
+    return change_fail (r, w->row, w->least / w->slope, "the motion has left its branch", length, error);
   if (verdict == CHANGE_SAME && !g->crossed && w->least < low)
-    return change_fail (r, w->row, w->least, "the step does not resolve it", length, error);
+    return change_fail (r, w->row, w->least / w->slope, "the step does not resolve it", length, error);
   return PW_OK;
 }
 

@@ -48,8 +48,7 @@ static int independent_nearby (pw_run *r, independent_search *x, int rank, int n
   const pw_system *s = r->s;
   pw_projector p;
   pw_error none = { 0 };
-  int row, away = 0;
-  double worst;
+  int away = 0;
   if (pw_evaluate_J_at (r->w, r->t, r->q, r->v) != PW_OK) return 0;
   independent_rank (r, x);
   independent_direction (s, x, rank, r->v, number);
@@ -58,7 +57,7 @@ static int independent_nearby (pw_run *r, independent_search *x, int rank, int n
   r->active = x->active;
   if (pw_projector_open (&p, r, s->metric, s->metric, &none) == PW_OK) {
     p.alone = 1;
-    if (pw_project_positions (&p, r, r->t, x->q, r->v, &row, &worst) == PW_OK) away = independent_rank (r, x);
+    if (pw_project_positions (&p, r, r->t, x->q, r->v) == PW_OK) away = independent_rank (r, x);
     pw_projector_close (&p);
   }
   r->active = before;

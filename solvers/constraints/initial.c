@@ -52,13 +52,11 @@ static void initial_weights (const pw_system *s, const double *metric, const uns
 }
 
 static int initial_positions (pw_projector *p, pw_run *r, initial_failure *failure) {
-  int row = -1;
-  double worst;
-  int status = pw_project_positions (p, r, r->t, r->q, r->v, &row, &worst);
+  int status = pw_project_positions (p, r, r->t, r->q, r->v);
   if (status == PW_OK) return PW_OK;
-  if (pw_update_kinematics (r->w, r->t, r->q, r->v) == PW_OK && row >= 0) {
+  if (pw_update_kinematics (r->w, r->t, r->q, r->v) == PW_OK && p->row >= 0) {
     pw_evaluate_g (r->w, p->scratch);
-    *failure = (initial_failure){ row, 0, fabs (p->scratch[row]), 0 };
+    *failure = (initial_failure){ p->row, 0, fabs (p->scratch[p->row]), 0 };
   }
   return status;
 }

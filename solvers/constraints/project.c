@@ -27,6 +27,7 @@ int pw_projector_open (pw_projector *p, pw_run *r, const double *weight_q, const
   *p = (pw_projector){ .own_velocity = weight_v != NULL,
                        .velocity = weight_v ? NULL : r->saddle,
                        .active = r->active,
+                       .row = -1,
                        .against = -1,
                        .by_mass = weight_q == NULL && weight_v == NULL };
   p->scratch = malloc (((size_t)(3 * s->rows + s->coords) + 4) * sizeof *p->scratch);
@@ -64,10 +65,9 @@ void pw_projector_close (pw_projector *p) {
 #define PROJECT_GOOD (4 * DBL_EPSILON)
 #define PROJECT_ENOUGH (64 * DBL_EPSILON)
 
-/* Redundant equations follow from the others to round-off; PW_RETRY if one does not: it contradicts them, and its number goes
- * to *row. */
+/* Redundant equations follow from the others to round-off; PW_RETRY if one does not: it contradicts them. */
 static int project_check_redundant (pw_projector *p, const pw_system *s, double follows, const double *g,
-                                    const double *size, int *row) {
+                                    const double *size) {
   double most = follows;
   p->against = -1;
   if (p->active == NULL || p->alone) return PW_OK;
@@ -76,13 +76,12 @@ static int project_check_redundant (pw_projector *p, const pw_system *s, double 
     if (off > most || isnan (off)) most = off, p->against = i;
   }
   if (p->against < 0) return PW_OK;
-  *row = p->against;
+  p->row = p->against;
   return PW_RETRY;
 }
 
 /* pw_project_positions without the final evaluation of J. */
-static int project_positions (pw_projector *p, pw_run *r, double t, double *q, const double *v, int *row,
-                              double *worst) {
+static int project_positions (pw_projector *p, pw_run *r, double t, double *q, const double *v) {
   const double slight = 1e-6; /* corrections below this leave the sizes of the terms unchanged */
   const int most = 30;
   const pw_system *s = r->s;
@@ -94,12 +93,11 @@ static int project_positions (pw_projector *p, pw_run *r, double t, double *q, c
     pw_evaluate_g (r->w, g);
     if (!(before < slight)) pw_evaluate_g_size (r->w, size);
     pw_worst_position (s, g, size, p->active, &now);
-    *row = now.row_position;
-    *worst = now.position;
-    int stalled = *worst > before / 4;
-    if (*worst <= PROJECT_GOOD || (stalled && *worst <= PROJECT_ENOUGH)) break;
-    if (p->iterations >= most || !isfinite (*worst)) return PW_RETRY;
-    before = *worst;
+    p->row = now.row_position;
+    int stalled = now.position > before / 4;
+    if (now.position <= PROJECT_GOOD || (stalled && now.position <= PROJECT_ENOUGH)) break;
+    if (p->iterations >= most || !isfinite (now.position)) return PW_RETRY;
+    before = now.position;
     pw_evaluate_J (r->w);
     r->statistics.factorisations++;
     if (pw_saddle_factor (p->position) != PW_OK) return PW_RETRY;
@@ -108,11 +106,11 @@ static int project_positions (pw_projector *p, pw_run *r, double t, double *q, c
     for (int j = 0; j < s->coords; j++) q[j] += dq[j];
   }
   if (p->active == NULL) r->residuals.position = now.position, r->residuals.g = now.g;
-  return project_check_redundant (p, s, r->limits.follows, g, size, row);
+  return project_check_redundant (p, s, r->limits.follows, g, size);
 }
 
-int pw_project_positions (pw_projector *p, pw_run *r, double t, double *q, const double *v, int *row, double *worst) {
-  int status = project_positions (p, r, t, q, v, row, worst);
+int pw_project_positions (pw_projector *p, pw_run *r, double t, double *q, const double *v) {
+  int status = project_positions (p, r, t, q, v);
   if (status == PW_OK) pw_evaluate_J (r->w);
   return status;
 }
@@ -153,13 +151,12 @@ static int project_is_good (const pw_projector *p, pw_run *r) {
 }
 
 int pw_project_state (pw_projector *p, pw_run *r, double t, double *q, double *v, double *a, double *lambda) {
-  double worst;
-  int row, status;
+  int status;
   if (pw_specialised_project (p, r, t, q, v, a, lambda)) {
     p->iterations = r->scene->iterations, p->against = -1;
     return PW_OK;
   }
-  status = project_positions (p, r, t, q, v, &row, &worst);
+  status = project_positions (p, r, t, q, v);
   if (status != PW_OK) return status;
   pw_evaluate_J (r->w);
   pw_evaluate_gamma (r->w, lambda);

@@ -329,11 +329,10 @@ static void radau_interpolate (pw_run *r, double x) {
 /* Projects the sample onto the constraints that the steps satisfy, with accelerations and multipliers from there. */
 static int radau_inside (pw_run *r, double t) {
   radau *d = r->data;
-  double worst;
-  int row, status;
+  int status;
   radau_interpolate (r, (t - d->last.t) / d->last.h);
   if (d->mus > 0 || !d->velocities)
-    status = pw_project_positions (&d->projector, r, t, r->q_at, r->v_at, &row, &worst);
+    status = pw_project_positions (&d->projector, r, t, r->q_at, r->v_at);
   else
     status = pw_evaluate_J_at (r->w, t, r->q_at, r->v_at);
   if (status == PW_OK && d->velocities) status = pw_project_velocities (&d->projector, r, r->v_at);

@@ -216,11 +216,11 @@ static int nullspace_energy (pw_nullspace *b, pw_run *r, double t, const double 
 
 int pw_nullspace_finalise (pw_nullspace *b, pw_projector *p, pw_run *r, double t, double *q, double *v, double *added) {
   const pw_system *s = r->s;
-  int row, status = PW_OK;
-  double worst, before = 0;
+  int status = PW_OK;
+  double before = 0;
   if (p == NULL || s->holonomic == 0) return pw_nullspace_velocities (b, r, t, q, v);
   if (added) status = nullspace_energy (b, r, t, q, v, &before);
-  if (status == PW_OK) status = pw_project_positions (p, r, t, q, v, &row, &worst);
+  if (status == PW_OK) status = pw_project_positions (p, r, t, q, v);
   if (status == PW_OK) status = nullspace_correct_velocities (b, r, v);
   if (status == PW_OK && added) *added += pw_kinetic (s, v) + pw_potential (r->w) - before;
   return status;

@@ -42,8 +42,7 @@ static double dense_hermite (double x, double h, double y0, double s0, double y1
 static int dense_inside (pw_dense_output *b, pw_run *r, double t) {
   const pw_system *s = r->s;
   const double *q0 = b->q0, *v0 = q0 + (r->v - r->q), *a0 = q0 + (r->a - r->q), *lambda0 = q0 + (r->lambda - r->q);
-  double h = r->t - b->t0, x = (t - b->t0) / h, worst;
-  int row;
+  double h = r->t - b->t0, x = (t - b->t0) / h;
   for (int j = 0; j < s->coords; j++) {
     r->q_at[j] = dense_hermite (x, h, q0[j], v0[j], r->q[j], r->v[j]);
     r->v_at[j] = dense_hermite (x, h, v0[j], a0[j], r->v[j], r->a[j]);
@@ -53,7 +52,7 @@ static int dense_inside (pw_dense_output *b, pw_run *r, double t) {
   for (int i = 0; i < s->entries; i++)
     r->ledger_at[i] = b->ledger0[i] + h * x * (b->rate0[i] + 0.5 * x * (r->rate[i] - b->rate0[i]));
   if (b->velocities < 0) return pw_evaluate_J_at (r->w, t, r->q_at, r->v_at);
-  int status = pw_project_positions (&b->projector, r, t, r->q_at, r->v_at, &row, &worst);
+  int status = pw_project_positions (&b->projector, r, t, r->q_at, r->v_at);
   return status == PW_OK && b->velocities ? pw_project_velocities (&b->projector, r, r->v_at) : status;
 }
 

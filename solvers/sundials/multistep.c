@@ -44,9 +44,8 @@ static int multistep_weigh (N_Vector y, N_Vector weights, void *data) {
 /* Projects q and v at t.  Returns as pw_project_positions. */
 static int multistep_project (multistep_data *d, double t, double *q, double *v) {
   pw_run *r = d->sun.run;
-  int row, status = pw_update_kinematics (r->w, t, q, v);
-  double worst;
-  if (status == PW_OK) status = pw_project_positions (&d->projector, r, t, q, v, &row, &worst);
+  int status = pw_update_kinematics (r->w, t, q, v);
+  if (status == PW_OK) status = pw_project_positions (&d->projector, r, t, q, v);
   return status == PW_OK ? pw_project_velocities (&d->projector, r, v) : status;
 }
 

@@ -203,6 +203,41 @@ static void test_no_change_point (void **state) {
   }
 }
 
+enum { WATCHDOG_BARS = 9 };
+static const double watchdog_bar = 2.5;
+
+/* A parallelogram with cranks of 1 m at this angle; crossed: on the other branch, its pin C is reflected at the line from
+ * pin B to pin D. */
+static void watchdog_bars_at (double phi, int crossed, double *q) {
+  const double b = watchdog_bar, x = cos (phi), y = sin (phi);
+  const double part = crossed ? 2 * b * (b - x) / ((b - x) * (b - x) + y * y) : 0;
+  const double Cx = x + (crossed ? part * (b - x) - b : b), Cy = y - part * y;
+  const double bars[WATCHDOG_BARS] = { x / 2,        y / 2,        phi,
+                                       (x + Cx) / 2, (y + Cy) / 2, atan2 (Cy - y, Cx - x),
+                                       (b + Cx) / 2, Cy / 2,       atan2 (Cy, Cx - b) };
+  memcpy (q, bars, sizeof bars);
+  q[8] += 2 * PW_PI * round ((phi - q[8]) / (2 * PW_PI));
+}
+
+/* Of two crossings of branches within a step, the second one must also be left straight on. */
+static void test_two_crossings (void **state) {
+  (void)state;
+  for (int crossed = 0; crossed < 2; crossed++) {
+    pw_error error = { 0 };
+    pw_system *s = scene_system (&bars_table, "b", watchdog_bar, "d", watchdog_bar, NULL);
+    pw_run *r = runs_open (s, "rk4+projection", &(pw_settings){ .step = 1e-3, .span = 1 });
+    r->geometry.start_sine = NAN;
+    watchdog_bars_at (-0.3, 0, r->geometry.q);
+    watchdog_bars_at (PW_PI + 0.3, crossed, r->q);
+    assert_int_equal (pw_evaluate_J_at (r->w, r->t, r->q, r->v), PW_OK);
+    double sine = pw_watchdog_sine (r, NULL);
+    assert_int_equal (pw_change_point_check (r, sine, &error), crossed ? PW_METHOD : PW_OK);
+    assert_true (!crossed || strstr (error.text, "the motion has left its branch"));
+    pw_run_close (r);
+    pw_system_free (s);
+  }
+}
+
 /* ---- Messages ---- */
 
 static void watchdog_expect (const char *model, const char *parameter, double value, const char *method,
@@ -263,6 +298,7 @@ int main (void) {
     cmocka_unit_test (test_close_branches_slider_crank),
     cmocka_unit_test (test_close_branches_four_bar),
     cmocka_unit_test (test_no_change_point),
+    cmocka_unit_test (test_two_crossings),
     cmocka_unit_test (test_messages),
     cmocka_unit_test (test_extreme),
   };
