@@ -274,9 +274,6 @@ static inline void pw_forget_residuals (pw_run *r) {
   r->residuals.position = r->residuals.velocity = NAN;
 }
 
-/* Coefficients of the i-th redundant row in the active ones, where J is evaluated and the saddle factorised. */
-void pw_rank_coefficients (pw_run *r, int i);
-
 /* ---- Projection ---- */
 
 typedef struct {
@@ -342,9 +339,9 @@ void pw_specialised_count (pw_run *r, long evaluations, long iterations);
 
 /* ---- Initial conditions ---- */
 
-/* Makes r->q, r->v consistent at r->t and fills the report; prescribed (or NULL): origins of states, of which those given
+/* Makes r->q, r->v consistent at r->t and fills the report; origin (or NULL): origins of states, of which those given
  * or specified are kept if possible.  Errors: PW_INITIAL. */
-int pw_run_make_consistent (pw_run *r, const unsigned char *prescribed, pw_error *error);
+int pw_run_make_consistent (pw_run *r, const unsigned char *origin, pw_error *error);
 /* Counts the states that moved, in the report; needs the scales. */
 void pw_run_count_moved (pw_run *r);
 

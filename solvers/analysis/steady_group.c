@@ -9,11 +9,10 @@
 #include "steady_parts.h"
 #include "util.h"
 
-/* GROUP_APART: distance of that state from the initial one, in units of the scene, in directions without a pattern: by
- * the sine of multiples of GROUP_GOLDEN, the golden angle.  GROUP_ROUND: round-off of derivatives.  GROUP_PIVOT, GROUP_ZERO:
+/* GROUP_APART: distance of that state from the initial one, in units of the scene, in an irregular
+ * direction.  GROUP_ROUND: round-off of derivatives.  GROUP_PIVOT, GROUP_ZERO:
  * smallest pivots and entries of rates. */
-static const double GROUP_APART = 0.02, GROUP_GOLDEN = 2.39996, GROUP_ROUND = 1e-12, GROUP_PIVOT = 1e-6,
-                    GROUP_ZERO = 1e-7;
+static const double GROUP_APART = 0.02, GROUP_ROUND = 1e-12, GROUP_PIVOT = 1e-6, GROUP_ZERO = 1e-7;
 
 void pw_steady_field (const pw_steady *x, const double *rates, const double *q, double *v) {
   int bodies = 3 * x->s->bodies;
@@ -99,8 +98,8 @@ static int group_place (pw_steady *x, double apart) {
   pw_run *r = x->at[0].r;
   pw_projector p;
   for (int j = 0; j < x->n; j++) {
-    x->q[j] = r->q[j] + apart * pw_unit (x->s, j) * pw_sin (1.7 + GROUP_GOLDEN * (j + 1));
-    x->v[j] = r->v[j] + apart * pw_unit (x->s, j) / x->T * pw_sin (2.9 + GROUP_GOLDEN * (j + 1));
+    x->q[j] = r->q[j] + apart * pw_unit (x->s, j) * pw_irregular (1.7, j + 1);
+    x->v[j] = r->v[j] + apart * pw_unit (x->s, j) / x->T * pw_irregular (2.9, j + 1);
   }
   if (pw_projector_open (&p, r, x->s->metric, x->s->metric, &x->why) != PW_OK) return PW_RESOURCE;
   int status = pw_project_positions (&p, r, x->set.t, x->q, x->v);

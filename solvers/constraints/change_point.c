@@ -133,7 +133,7 @@ static change_verdict change_walk_there (pw_run *r, change_walk *w, pw_error *er
     return verdict;
   }
   w->q = memory, w->next = w->q + n, w->end = w->next + n, w->in = w->end + n;
-  for (int j = 0; j < s->coords; j++) w->in[j] = pw_rank_unit (s, j) * pw_rank_unit (s, j);
+  pw_rank_weights (s, w->in);
   if (pw_projector_open (&w->projector, r, w->in, NULL, error) == PW_OK) {
     verdict = change_follow (w);
     pw_projector_close (&w->projector);

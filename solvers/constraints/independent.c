@@ -37,7 +37,7 @@ static void independent_direction (const pw_system *s, const independent_search 
                                    int number) {
   double most = 0;
   for (int j = 0; j < s->coords; j++)
-    x->motion[j] = number == 0 ? v[j] * pw_rank_unit (s, j) : pw_sin (1.7 + 2.39996 * (j + 1) * number);
+    x->motion[j] = number == 0 ? v[j] * pw_rank_unit (s, j) : pw_irregular (1.7, (j + 1) * number);
   pw_rank_orthogonalise (x->motion, x->rows, x->kept, rank, s->coords);
   for (int j = 0; j < s->coords; j++) most = fmax (most, fabs (x->motion[j]));
   for (int j = 0; most > 0 && j < s->coords; j++) x->motion[j] *= s->scale.length / most / pw_rank_unit (s, j);
@@ -55,7 +55,7 @@ static int independent_nearby (pw_run *r, independent_search *x, int rank, int n
   for (int j = 0; j < s->coords; j++) x->q[j] = r->q[j] + 0.03 * x->motion[j];
   const unsigned char *before = r->active;
   r->active = x->active;
-  if (pw_projector_open (&p, r, s->metric, s->metric, &none) == PW_OK) {
+  if (pw_projector_open (&p, r, s->metric, NULL, &none) == PW_OK) {
     p.alone = 1;
     if (pw_project_positions (&p, r, r->t, x->q, r->v) == PW_OK) away = independent_rank (r, x);
     pw_projector_close (&p);

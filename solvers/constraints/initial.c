@@ -65,13 +65,12 @@ static int initial_positions (pw_projector *p, pw_run *r, initial_failure *failu
  * correction. */
 static int initial_velocities (pw_projector *p, pw_run *r, double *v, initial_failure *failure) {
   pw_residuals now;
-  for (int i = 0; i < 3; i++) {
-    pw_evaluate_residuals (r->w, NULL, &now);
-    if (now.velocity <= 4 * DBL_EPSILON) return PW_OK;
-    if (i == 2) break;
+  pw_evaluate_residuals (r->w, NULL, &now);
+  for (int i = 0; i < 2 && !(now.velocity <= 4 * DBL_EPSILON); i++) {
     int status = pw_project_velocities (p, r, v);
     if (status < 0) return status;
     if (status != PW_OK) break;
+    pw_evaluate_residuals (r->w, NULL, &now);
   }
   if (now.velocity <= 64 * DBL_EPSILON) return PW_OK;
   *failure = (initial_failure){ now.row_velocity, 1, now.jv, 1 };
@@ -198,11 +197,10 @@ int pw_initial_given (const pw_initial_report *report, int state) {
  * starts. */
 static int initial_ranked (pw_run *r, const unsigned char *prescribed, initial_failure *failure, pw_error *error) {
   const pw_system *s = r->s;
-  const unsigned char *before = r->active;
   size_t n = (size_t)s->coords, m = (size_t)s->rows;
   initial_failure later = { .row = -1 };
   int status = initial_attempt (r, prescribed, r->q_given, failure, error), rank = s->rows;
-  if (status != PW_RETRY || before || (double)s->rows * s->coords > PW_RANK_MOST) return status;
+  if (status != PW_RETRY || r->active || (double)s->rows * s->coords > PW_RANK_MOST) return status;
   double *at = malloc (2 * n * sizeof *at + m);
   if (at == NULL) return pw_fail_memory (s, error);
   double *from = at + n;
@@ -212,7 +210,7 @@ static int initial_ranked (pw_run *r, const unsigned char *prescribed, initial_f
   for (int i = 0; i < 2 * TOLERANCES && status == PW_RETRY; i++) {
     if (i == TOLERANCES) {
       if (initial_attempt (r, NULL, r->q_given, &later, error) == PW_RESOURCE) status = PW_RESOURCE;
-      for (size_t j = 0; j < n; j++) at[j] = r->q[j], from[j] = prescribed && prescribed[j] ? from[j] : r->q[j];
+      for (size_t j = 0; j < n; j++) at[j] = r->q[j], from[j] = prescribed[j] ? from[j] : r->q[j];
       rank = s->rows;
     }
     if (status != PW_RETRY || pw_evaluate_J_at (r->w, r->t, at, r->v_given) != PW_OK) continue;
@@ -223,7 +221,7 @@ static int initial_ranked (pw_run *r, const unsigned char *prescribed, initial_f
     r->active = active;
     later = (initial_failure){ .row = -1 };
     status = initial_attempt (r, prescribed, from, &later, error);
-    r->active = before;
+    r->active = NULL;
     failure->assembled |= later.assembled;
   }
   free (at);
@@ -271,12 +269,13 @@ static const struct initial_set {
   { 0, 0, INITIAL_FREE },
 };
 
-/* The mask of a set of prescribed states; returns 0 if the set does not apply. */
-static int initial_mask (const pw_system *s, const unsigned char *prescribed, const struct initial_set *set,
+/* The mask of a set of prescribed states; returns 0 if the set does not apply.  origin may be NULL: nothing is given or
+ * specified. */
+static int initial_mask (const pw_system *s, const unsigned char *origin, const struct initial_set *set,
                          unsigned char *mask) {
   int n = s->coords, massless = 0, massive = 0, perhaps = 0;
   for (int j = 0; j < n; j++) {
-    int q = prescribed ? prescribed[j] : 0, v = prescribed ? prescribed[n + j] : 0;
+    int q = origin ? origin[j] : 0, v = origin ? origin[n + j] : 0;
     int keep = set->mass && s->mass[j] > 0 && !(q & set->q);
     mask[j] = (q & set->q) != 0 || keep;
     mask[n + j] = (v & set->v) != 0;
@@ -286,13 +285,13 @@ static int initial_mask (const pw_system *s, const unsigned char *prescribed, co
 }
 
 /* 1 if a value given by the user is not prescribed by the mask. */
-static int initial_released (const pw_system *s, const unsigned char *prescribed, const unsigned char *mask) {
+static int initial_released (const pw_system *s, const unsigned char *origin, const unsigned char *mask) {
   int released = 0;
-  for (int j = 0; prescribed && j < 2 * s->coords; j++) released |= prescribed[j] & PW_GIVEN && !mask[j];
+  for (int j = 0; origin && j < 2 * s->coords; j++) released |= origin[j] & PW_GIVEN && !mask[j];
   return released;
 }
 
-static int initial_try (pw_run *r, const unsigned char *prescribed, initial_failure *failure, int *released,
+static int initial_try (pw_run *r, const unsigned char *origin, initial_failure *failure, int *released,
                         pw_error *error) {
   const int sets = sizeof initial_sets / sizeof *initial_sets;
   const pw_system *s = r->s;
@@ -302,7 +301,7 @@ static int initial_try (pw_run *r, const unsigned char *prescribed, initial_fail
   unsigned char *last = mask + 2 * n;
   int status = PW_RETRY, small = (double)s->rows * s->coords < INITIAL_SMALL, before = -1, assembled = 0;
   for (const struct initial_set *set = initial_sets; set < initial_sets + sets && status == PW_RETRY; set++) {
-    if (!initial_mask (s, prescribed, set, mask)) continue;
+    if (!initial_mask (s, origin, set, mask)) continue;
     int ranked = small || !((set->q | set->v) & PW_SPECIFIED);
     if (ranked == before && memcmp (mask, last, assembled ? 2 * n : n) == 0) continue;
     initial_failure now = { .row = -1 };
@@ -311,12 +310,12 @@ static int initial_try (pw_run *r, const unsigned char *prescribed, initial_fail
     before = ranked, assembled = now.assembled;
     if (now.row >= 0) *failure = now;
   }
-  *released = initial_released (s, prescribed, mask);
+  *released = initial_released (s, origin, mask);
   free (mask);
   return status;
 }
 
-int pw_run_make_consistent (pw_run *r, const unsigned char *prescribed, pw_error *error) {
+int pw_run_make_consistent (pw_run *r, const unsigned char *origin, pw_error *error) {
   const pw_system *s = r->s;
   size_t bytes = (size_t)s->coords * sizeof (double);
   pw_residuals before;
@@ -328,7 +327,7 @@ int pw_run_make_consistent (pw_run *r, const unsigned char *prescribed, pw_error
   if (status != PW_OK) return pw_fail_signal (r->t, error);
   pw_evaluate_residuals (r->w, NULL, &before);
   if (!(before.position <= 8 * DBL_EPSILON && before.velocity <= 8 * DBL_EPSILON))
-    status = initial_try (r, prescribed, &failure, &released, error);
+    status = initial_try (r, origin, &failure, &released, error);
   r->initial = (pw_initial_report){ .q_given = r->q_given,
                                     .v_given = r->v_given,
                                     .q = r->q,

@@ -80,16 +80,15 @@ static int project_check_redundant (pw_projector *p, const pw_system *s, double 
   return PW_RETRY;
 }
 
-/* pw_project_positions without the final evaluation of J. */
-static int project_positions (pw_projector *p, pw_run *r, double t, double *q, const double *v) {
+int pw_project_positions (pw_projector *p, pw_run *r, double t, double *q, const double *v) {
   const double slight = 1e-6; /* corrections below this leave the sizes of the terms unchanged */
   const int most = 30;
   const pw_system *s = r->s;
   pw_residuals now = { 0 };
   double *g = p->scratch, *size = g + s->rows, *mu = size + s->rows, *dq = mu + s->rows, before = INFINITY;
   for (p->iterations = 0;; p->iterations++) {
-    int status = pw_update_kinematics (r->w, t, q, v);
-    if (status != PW_OK) return status;
+    int failed = pw_update_kinematics (r->w, t, q, v);
+    if (failed) return failed;
     pw_evaluate_g (r->w, g);
     if (!(before < slight)) pw_evaluate_g_size (r->w, size);
     pw_worst_position (s, g, size, p->active, &now);
@@ -106,35 +105,27 @@ static int project_positions (pw_projector *p, pw_run *r, double t, double *q, c
     for (int j = 0; j < s->coords; j++) q[j] += dq[j];
   }
   if (p->active == NULL) r->residuals.position = now.position, r->residuals.g = now.g;
-  return project_check_redundant (p, s, r->limits.follows, g, size);
-}
-
-int pw_project_positions (pw_projector *p, pw_run *r, double t, double *q, const double *v) {
-  int status = project_positions (p, r, t, q, v);
+  int status = project_check_redundant (p, s, r->limits.follows, g, size);
   if (status == PW_OK) pw_evaluate_J (r->w);
   return status;
 }
 
 /* v += dv with J (v + dv) = eta. */
-static int project_once (pw_projector *p, pw_run *r, double *v, int fresh) {
+static void project_once (pw_projector *p, pw_run *r, double *v) {
   const pw_system *s = r->s;
   double *right = p->scratch, *eta = right + s->rows, *mu = eta + s->rows, *dv = mu + s->rows;
-  int status = PW_OK;
   pw_mul_J (r->w, v, right);
   if (s->rheonomic) pw_evaluate_eta (r->w, eta);
   for (int i = 0; i < s->rows; i++) right[i] = (s->rheonomic ? eta[i] : 0) - right[i];
-  if (fresh)
-    status = pw_saddle_factor_solve (p->velocity, NULL, right, dv, mu);
-  else
-    pw_saddle_solve (p->velocity, NULL, right, dv, mu);
-  for (int j = 0; j < s->coords && status == PW_OK; j++) v[j] += dv[j];
-  return status;
+  pw_saddle_solve (p->velocity, NULL, right, dv, mu);
+  for (int j = 0; j < s->coords; j++) v[j] += dv[j];
 }
 
 int pw_project_velocities (pw_projector *p, pw_run *r, double *v) {
   r->statistics.factorisations++;
-  if (project_once (p, r, v, 1) != PW_OK) return PW_RETRY;
-  if (pw_saddle_below (p->velocity, r->limits.refine)) project_once (p, r, v, 0);
+  if (pw_saddle_factor (p->velocity) != PW_OK) return PW_RETRY;
+  project_once (p, r, v);
+  if (pw_saddle_below (p->velocity, r->limits.refine)) project_once (p, r, v);
   return pw_update_velocities (r->w, v);
 }
 
@@ -151,21 +142,19 @@ static int project_is_good (const pw_projector *p, pw_run *r) {
 }
 
 int pw_project_state (pw_projector *p, pw_run *r, double t, double *q, double *v, double *a, double *lambda) {
-  int status;
   if (pw_specialised_project (p, r, t, q, v, a, lambda)) {
     p->iterations = r->scene->iterations, p->against = -1;
     return PW_OK;
   }
-  status = project_positions (p, r, t, q, v);
+  int status = pw_project_positions (p, r, t, q, v);
   if (status != PW_OK) return status;
-  pw_evaluate_J (r->w);
-  pw_evaluate_gamma (r->w, lambda);
-  if (project_is_good (p, r)) return pw_run_accelerate_evaluated (r, v, a, lambda);
-  status = pw_project_velocities (p, r, v);
-  if (status != PW_OK) return status;
-  if (!p->own_velocity) {
-    pw_run_accelerate_updated (r, v, a, lambda);
-    return PW_OK;
+  if (!project_is_good (p, r)) {
+    status = pw_project_velocities (p, r, v);
+    if (status != PW_OK) return status;
+    if (!p->own_velocity) {
+      pw_run_accelerate_updated (r, v, a, lambda);
+      return PW_OK;
+    }
   }
   pw_evaluate_gamma (r->w, lambda);
   return pw_run_accelerate_evaluated (r, v, a, lambda);

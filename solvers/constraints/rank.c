@@ -8,6 +8,10 @@ double pw_rank_unit (const pw_system *s, int j) {
   return pw_is_angle (s, j) ? s->scale.length : 1;
 }
 
+void pw_rank_weights (const pw_system *s, double *weight) {
+  for (int j = 0; j < s->coords; j++) weight[j] = pw_rank_unit (s, j) * pw_rank_unit (s, j);
+}
+
 void pw_rank_rows (const pw_workspace *w, double *rows, double *norm) {
   const pw_system *s = w->s;
   int n = s->coords;

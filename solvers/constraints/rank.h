@@ -17,6 +17,14 @@ void pw_rank_rows (const pw_workspace *w, double *rows, double *norm);
 /* Unit of coordinate j in these rows, which are derivatives with respect to q[j], times this unit. */
 double pw_rank_unit (const pw_system *s, int j);
 
+/* Weights of a metric of lengths: the squares of these units. */
+void pw_rank_weights (const pw_system *s, double *weight);
+
+/* The n-th of a sequence of irregular numbers in [-1, 1]: sines of multiples of the golden angle. */
+static inline double pw_irregular (double phase, int n) {
+  return pw_sin (phase + 2.39996 * n);
+}
+
 /* Orthogonalises a row of length n against the `rank` kept ones, of length 1; returns its norm afterwards. */
 double pw_rank_orthogonalise (double *row, const double *rows, const int *kept, int rank, int n);
 

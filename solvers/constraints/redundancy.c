@@ -64,7 +64,8 @@ static double *redundancy_force (pw_run *r) {
   return memset (f, 0, (size_t)r->s->coords * sizeof *f);
 }
 
-void pw_rank_coefficients (pw_run *r, int i) {
+/* Coefficients of the i-th redundant row in the active ones, where J is evaluated and the saddle factorised. */
+static void redundancy_coefficients (pw_run *r, int i) {
   double *f = redundancy_force (r);
   redundancy_add_row (r->w, r->redundant_row[i], 1, f);
   redundancy_solve (r, f, r->coefficient + i * r->s->rows);
@@ -75,7 +76,7 @@ double pw_rank_independence (pw_run *r) {
   double *c = r->coefficient, *f = redundancy_force (r), most = 0;
   for (int i = 0; i < r->redundant; i++) {
     int row = r->redundant_row[i];
-    double x = pw_sin (2.39996 * (row + 1)), length = redundancy_length (r->w, row);
+    double x = pw_irregular (0, row + 1), length = redundancy_length (r->w, row);
     if (length > 0) redundancy_add_row (r->w, row, (x + copysign (1, x)) / 2 / length, f);
   }
   redundancy_solve (r, f, c);
@@ -87,7 +88,7 @@ double pw_rank_independence (pw_run *r) {
 void pw_rank_least_norm (pw_run *r, double *lambda) {
   int m = r->s->rows, k = r->redundant;
   double *c = r->coefficient, *A = c + k * m, *z = A + k * k;
-  for (int i = 0; i < k; i++) pw_rank_coefficients (r, i);
+  for (int i = 0; i < k; i++) redundancy_coefficients (r, i);
   memset (A, 0, (size_t)(k * k + k) * sizeof *A);
   for (int row = 0; row < m; row++) { /* minimise sum ((lambda + N z) / size)^2, N = [e_i - c_i] */
     double size = pw_rank_multiplier_unit (r->w, row), weight = 1 / (size * size);
@@ -149,7 +150,7 @@ char *pw_run_redundancy (pw_run *r, int i, char *buffer, size_t size) {
   size_t n = redundancy_name_row (s, row, 1, buffer, size, 0);
   if (pw_evaluate_J_at (r->w, r->t, r->q, r->v) != PW_OK) return buffer;
   if (pw_saddle_factor (r->saddle) != PW_OK) return buffer;
-  pw_rank_coefficients (r, i);
+  redundancy_coefficients (r, i);
   const double *c = r->coefficient + i * s->rows;
   char element[120], own[120], before[120] = "";
   pw_system_row_name (s, row, own, sizeof own);

@@ -1,6 +1,7 @@
 /* The watchdog's thresholds, and the distance of the constraints from singular configurations; see watchdog.h. */
 #include <math.h>
 #include <stdlib.h>
+#include "massless.h"
 #include "method.h"
 #include "rank.h"
 
@@ -97,11 +98,6 @@ const pw_watchdog pw_watchdog_limits = {
 
 /* ---- Opening ---- */
 
-static int singular_root (int *set, int b) {
-  while (set[b] != b) b = set[b] = set[set[b]];
-  return b;
-}
-
 /* 1 if an element connects bodies that are already connected (the ground is a body); -1 if out of memory. */
 static int singular_has_loops (const pw_system *s) {
   int loops = 0, *set = malloc (((size_t)s->bodies + 1) * sizeof *set);
@@ -111,8 +107,8 @@ static int singular_has_loops (const pw_system *s) {
     for (int e = 0; e < k->b.count; e++)
       for (int n = 1; n < k->kind->bodies; n++) {
         const int *column = k->column + e * k->kind->bodies;
-        int a = singular_root (set, column[0] < 3 * s->bodies ? column[0] / 3 : s->bodies);
-        int b = singular_root (set, column[n] < 3 * s->bodies ? column[n] / 3 : s->bodies);
+        int a = pw_root (set, column[0] < 3 * s->bodies ? column[0] / 3 : s->bodies);
+        int b = pw_root (set, column[n] < 3 * s->bodies ? column[n] / 3 : s->bodies);
         loops |= a == b;
         set[b] = a;
       }
@@ -127,14 +123,13 @@ int pw_watchdog_open (pw_run *r, pw_error *error) {
   size_t n = (size_t)s->coords + 3;
   g->loops = singular_has_loops (s);
   if (g->loops < 0) return pw_fail_memory (s, error);
-  g->fixed = pw_fixed_steps (r);
   if (g->loops == 0 && s->rows == s->holonomic) return PW_OK;
   pw_saddle_close (g->saddle);
   if (g->q == NULL) g->q = malloc (n * sizeof *g->q);
   double *weight = malloc (n * sizeof *weight);
   g->saddle = NULL;
   if (g->q && weight) {
-    for (int j = 0; j < s->coords; j++) weight[j] = pw_rank_unit (s, j) * pw_rank_unit (s, j);
+    pw_rank_weights (s, weight);
     g->saddle = pw_saddle_open (r->w, weight, s->rows, r->active, error);
   }
   free (weight);
@@ -156,13 +151,13 @@ double pw_watchdog_sine (pw_run *r, int *row) {
   int status = pw_saddle_factor (k);
   double sine = pw_saddle_pivot (k, &which);
   if (row) *row = which;
-  return status == PW_OK && !isnan (sine) ? sine : 0;
+  return status == PW_OK ? sine : 0;
 }
 
 int pw_watchdog_near (pw_run *r) {
   pw_geometry *g = &r->geometry;
   if (!g->alert || g->saddle == NULL) return 0;
-  if (!g->fixed && !pw_saddle_below (r->saddle, r->limits.refine)) return 0;
+  if (!pw_fixed_steps (r) && !pw_saddle_below (r->saddle, r->limits.refine)) return 0;
   g->sine = pw_watchdog_sine (r, NULL);
   return g->sine < r->limits.near * g->typical;
 }

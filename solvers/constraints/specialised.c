@@ -64,7 +64,8 @@ void pw_specialised_close (pw_run *r) {
  * methods ask for it only below the pivots that the specialised code accepts. */
 int pw_specialised_suits (const pw_run *r) {
   const pw_geometry *g = &r->geometry;
-  return r->specialised && !r->least_norm && !(g->alert && g->saddle && g->fixed) && !r->near_singular && !r->w->hold;
+  return r->specialised && !r->least_norm && !(g->alert && g->saddle && pw_fixed_steps (r)) && !r->near_singular &&
+         !r->w->hold;
 }
 
 void pw_specialised_scale (pw_run *r) {

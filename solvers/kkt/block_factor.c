@@ -70,6 +70,33 @@ static void block_assemble (const pw_block_ldl *l) {
 
 /* ---- Elimination ---- */
 
+typedef struct {
+  double xx, xy, yx, yy;
+} block_square;
+
+/* A diagonal block L D L^T in place of its lower triangle: 1 / d_1, l, 1 / d_2. */
+static inline void block_pivot (int k, double *D, pw_block_ldl *l, int y) {
+  double a = D[0], b = D[1], minor = k == 2 ? a * D[2] - b * b : 0;
+  block_track_pivot (l, a, D[k == 2 ? 3 : 1], y);
+  D[0] = 1 / a;
+  if (k == 1) return;
+  block_track_pivot (l, minor, fabs (a) * D[4], y + 1);
+  D[1] = b * D[0], D[2] = a / minor;
+}
+
+/* L = A D^-1: A ki x kj. */
+static inline block_square block_scale (int ki, int kj, const double *A, const double *D) {
+  block_pair x = block_divide (kj, D, A[0], kj == 2 ? A[1] : 0), y = { 0 };
+  if (ki == 2) y = block_divide (kj, D, A[kj], kj == 2 ? A[3] : 0);
+  return (block_square){ x.x, x.y, y.x, y.y };
+}
+
+/* D -= L A^T, of a diagonal block, of which there is the lower triangle: L ki x kj, A ki x kj. */
+static inline void block_subtract_diagonal (int ki, double *D, block_square L, const double *A, int kj) {
+  D[0] -= block_dot (kj, L.xx, L.xy, A);
+  if (ki == 2) D[1] -= block_dot (kj, L.yx, L.yy, A), D[2] -= block_dot (kj, L.yx, L.yy, A + kj);
+}
+
 /* T -= L A^T: L ki x kj, A kq x kj. */
 static inline void block_subtract (int kq, double *T, block_square L, const double *A, int ki, int kj) {
   T[0] -= block_dot (kj, L.xx, L.xy, A);
@@ -113,7 +140,7 @@ void pw_block_factor (pw_block_ldl *l) {
   l->pivot = INFINITY;
   l->row = -1;
   block_assemble (l);
-  for (int j = 0; j < l->nodes && (j == 0 || l->pivot > l->least);)
+  for (int j = 0; j < l->nodes && l->pivot > l->least;)
     if (chain->column == j) {
       pw_chain_factor (l, chain);
       j += chain->bodies + chain->whole;

@@ -22,26 +22,12 @@ static inline double block_product (int width, block_row a, const double *b) {
   return width == 3 ? a.x * b[0] + a.y * b[1] + a.z * b[2] : a.x * b[0];
 }
 
-typedef struct {
-  double xx, xy, yx, yy;
-} block_square;
-
 /* Updates the smallest pivot relative to its diagonal entry `was`, dividing only if it is smaller; NaN and 0 / 0
  * count as smaller.  `was` is negative only for uncondensed bodies, which do not count. */
 static inline void block_track_pivot (pw_block_ldl *l, double pivot, double was, int y) {
   if (pivot > l->pivot * was || was < 0) return;
   l->pivot = pivot / was;
   l->row = y;
-}
-
-/* A diagonal block L D L^T in place of its lower triangle: 1 / d_1, l, 1 / d_2. */
-static inline void block_pivot (int k, double *D, pw_block_ldl *l, int y) {
-  double a = D[0], b = D[1], minor = k == 2 ? a * D[2] - b * b : 0;
-  block_track_pivot (l, a, D[k == 2 ? 3 : 1], y);
-  D[0] = 1 / a;
-  if (k == 1) return;
-  block_track_pivot (l, minor, fabs (a) * D[4], y + 1);
-  D[1] = b * D[0], D[2] = a / minor;
 }
 
 typedef struct {
@@ -55,21 +41,8 @@ static inline block_pair block_divide (int k, const double *D, double x, double 
   return (block_pair){ x * D[0] - D[1] * z, z };
 }
 
-/* L = A D^-1: A ki x kj. */
-static inline block_square block_scale (int ki, int kj, const double *A, const double *D) {
-  block_pair x = block_divide (kj, D, A[0], kj == 2 ? A[1] : 0), y = { 0 };
-  if (ki == 2) y = block_divide (kj, D, A[kj], kj == 2 ? A[3] : 0);
-  return (block_square){ x.x, x.y, y.x, y.y };
-}
-
 static inline double block_dot (int kj, double x, double y, const double *A) {
   return kj == 2 ? x * A[0] + y * A[1] : x * A[0];
-}
-
-/* D -= L A^T, of a diagonal block, of which there is the lower triangle: L ki x kj, A ki x kj. */
-static inline void block_subtract_diagonal (int ki, double *D, block_square L, const double *A, int kj) {
-  D[0] -= block_dot (kj, L.xx, L.xy, A);
-  if (ki == 2) D[1] -= block_dot (kj, L.yx, L.yy, A), D[2] -= block_dot (kj, L.yx, L.yy, A + kj);
 }
 
 #endif

@@ -102,7 +102,7 @@ PW_INLINE int massless_reduce (pw_component *c, int search, int n) {
     if (search && !massless_select_pivot (c, p)) return p;
     const pw_massless_row *row = &c->row[p];
     double pivot = fabs (c->A[p * c->stride + row->pivot]) * row->scale;
-    if (!(pivot >= c->least)) c->least = pivot, c->least_row = row->row;
+    if (!(pivot >= c->least)) c->least = pivot;
     if (!search && !(pivot >= row->least)) return p;
     massless_eliminate (c, p, n);
   }
@@ -116,15 +116,13 @@ int pw_massless_match (pw_component *c) {
 double pw_massless_factor (pw_massless *r) {
   double least = INFINITY;
   for (pw_component *c = r->component; c < r->end; c++) {
-    if ((c->pivots == 3 ? massless_reduce (c, 0, 3) : massless_reduce (c, 0, c->pivots)) < c->pivots) {
-      int found = pw_massless_match (c);
-      if (found < c->pivots) return r->least_row = c->row[found].row, 0;
-    }
+    if ((c->pivots == 3 ? massless_reduce (c, 0, 3) : massless_reduce (c, 0, c->pivots)) < c->pivots)
+      if (pw_massless_match (c) < c->pivots) return 0;
     for (int i = c->pivots; i < c->rows; i++) {
       double remainder = c->row[i].terms > 0 ? sqrt (massless_square (c, i, c->massive_square) / c->row[i].terms) : 0;
-      if (!(remainder >= c->least)) c->least = remainder, c->least_row = c->row[i].row;
+      if (!(remainder >= c->least)) c->least = remainder;
     }
-    if (!(c->least >= least)) least = c->least, r->least_row = c->least_row;
+    if (!(c->least >= least)) least = c->least;
   }
   return least > 1 ? 1 : least * least;
 }

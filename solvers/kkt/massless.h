@@ -32,6 +32,9 @@ static inline int pw_group_width (const pw_system *s, int j) {
   return j < 3 * s->bodies ? 3 : 1;
 }
 
+/* The root of a member of a union-find structure, with path halving. */
+int pw_root (int *parent, int i);
+
 typedef struct {
   int j, width; /* first global coordinate; 3 of a body, or 1 */
   int column;   /* first local column */
@@ -61,14 +64,12 @@ typedef struct {
   double *A;               /* rows x stride: U, with inverses on its diagonal, and H', or 0 and Z'; then L, or M */
   int lower, stride;       /* first column of L: cols rounded up to an even number; distance between rows of A */
   double least;            /* smallest pivot relative to its row, or row of Z' relative to its terms */
-  int least_row;           /* its global row */
 } pw_component;
 
 typedef struct {
   int components;
   pw_component *component, *end;
   int *component_of_row; /* -1: without massless coordinates */
-  int least_row;         /* row of the smallest pivot at the last factorisation */
   char *memory;
 } pw_massless;
 

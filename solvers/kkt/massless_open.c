@@ -23,9 +23,9 @@ static int massless_contains (const massless_plan *p, int g) {
   return 0;
 }
 
-static int massless_root (const massless_plan *p, int g) {
-  while (p->parent[g] != g) g = p->parent[g] = p->parent[p->parent[g]];
-  return g;
+int pw_root (int *parent, int i) {
+  while (parent[i] != i) i = parent[i] = parent[parent[i]];
+  return i;
 }
 
 /* The groups of an element's coordinates, without the ground, and their first local columns. */
@@ -58,7 +58,7 @@ static void massless_unite (massless_plan *p) {
       for (int i = 0; any && i < n; i++) {
         if (!massless_contains (p, group[i])) continue;
         p->member[group[i]] = 0;
-        if (last >= 0) p->parent[massless_root (p, group[i])] = massless_root (p, last);
+        if (last >= 0) p->parent[pw_root (p->parent, group[i])] = pw_root (p->parent, last);
         last = group[i];
       }
     }
@@ -93,7 +93,7 @@ static void massless_add_rows (massless_plan *p, pw_massless *r) {
       while (first < n && !massless_contains (p, group[first])) first++;
       for (int i = e * k->kind->rows; first < n && i < (e + 1) * k->kind->rows; i++) {
         if (!massless_is_active (p, k->row + i)) continue;
-        int component = r->component_of_row[k->row + i] = p->member[massless_root (p, group[first])];
+        int component = r->component_of_row[k->row + i] = p->member[pw_root (p->parent, group[first])];
         massless_add_row (p->s, &r->component[component], k->row + i, n, group, at, k->J + i * k->b.cols);
       }
     }
@@ -175,7 +175,7 @@ static int massless_number_components (pw_massless *r, massless_plan *p, pw_erro
     int j = pw_group_first (p->s, g);
     while (p->weight[j] != 0) j++;
     if (p->member[g] < 0) return massless_undetermined (p->s, j, error);
-    if (massless_root (p, g) == g) p->member[g] = r->components++;
+    if (pw_root (p->parent, g) == g) p->member[g] = r->components++;
   }
   return PW_OK;
 }

@@ -66,7 +66,7 @@ int pw_saddle_below (pw_saddle *k, double sine) {
 
 double pw_saddle_pivot (pw_saddle *k, int *row) {
   if (k->postponed > 0) pw_saddle_factor (k);
-  *row = k->pivot_row < 0 && k->massless.components ? k->massless.least_row : k->pivot_row;
+  *row = k->pivot_row;
   return k->pivot > 0 ? sqrt (fmin (k->pivot, 1)) : 0;
 }
 

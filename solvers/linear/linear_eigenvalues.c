@@ -5,6 +5,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include "linear.h"
+#include "rank.h"
 
 /* EIGEN_ROUND: size of the trial errors, relative to the terms of an entry of A and to the largest entry of the
  * balanced matrix: a hundred times round-off, the loss in derivatives and QR algorithm.  EIGEN_CERTAIN: an eigenvalue
@@ -26,7 +27,7 @@ static void eigen_disturb (int n, double least, double *B) {
   for (int i = 0; i < n; i++, B += n) {
     double most = least;
     for (int k = 0; k < n; k++) most = fmax (most, fabs (B[k]));
-    for (int k = 0; k < n; k++) B[k] += EIGEN_ROUND * most * pw_sin (1.7 + 2.39996 * (double)(i * n + k + 1));
+    for (int k = 0; k < n; k++) B[k] += EIGEN_ROUND * most * pw_irregular (1.7, i * n + k + 1);
   }
 }
 

@@ -188,7 +188,7 @@ static int linear_same (pw_linearisation *x, double time) {
 static void linear_probe (pw_linearisation *x) {
   memset (x->along, 0, 2 * (size_t)x->n * sizeof *x->along);
   for (int c = 0; c < x->size; c++) {
-    double weight = x->r->s->scale.length * pw_sin (1.7 + 2.39996 * (c + 1));
+    double weight = x->r->s->scale.length * pw_irregular (1.7, c + 1);
     pw_linear_tangent (x, c);
     for (int j = 0; j < 2 * x->n; j++) x->along[j] += weight * x->x[j];
   }

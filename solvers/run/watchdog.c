@@ -6,6 +6,7 @@
 #include <stdio.h>
 #include <string.h>
 #include "method.h"
+#include "rank.h"
 
 double pw_run_acceleration_norm (const pw_run *r) {
   const pw_system *s = r->s;
@@ -51,7 +52,7 @@ static void watchdog_sample_sines (pw_run *r) {
   const pw_system *s = r->s;
   pw_geometry *g = &r->geometry;
   for (int n = 1; n <= 4; n++) {
-    for (int j = 0; j < s->coords; j++) g->q[j] = r->q[j] + 0.5 * pw_unit (s, j) * pw_sin (2.39996 * (j + 1) * n + n);
+    for (int j = 0; j < s->coords; j++) g->q[j] = r->q[j] + 0.5 * pw_unit (s, j) * pw_irregular (n, (j + 1) * n);
     if (pw_evaluate_J_at (r->w, r->t, g->q, r->v) != PW_OK) break;
     g->typical = fmax (g->typical, pw_watchdog_sine (r, NULL));
   }
