@@ -301,7 +301,7 @@ void pw_projector_close (pw_projector *p);
  * (t, q, v).  PW_RETRY if it does not converge, or if a redundant equation contradicts the others. */
 int pw_project_positions (pw_projector *p, pw_run *r, double t, double *q, const double *v);
 
-/* One linear solve for J v = eta at the current configuration; updates the velocity kinematics.  PW_RETRY if singular;
+/* A linear solve for J v = eta at the current configuration, near a singular one two; updates the velocity kinematics.  PW_RETRY if singular;
  * PW_METHOD if a signal that depends on velocities failed. */
 int pw_project_velocities (pw_projector *p, pw_run *r, double *v);
 

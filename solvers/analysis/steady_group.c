@@ -35,7 +35,7 @@ static void group_change (pw_steady *x, int c, double *rates, double *out) {
   pw_linear_vary (l);
   out = pw_linear_violation (l, out);
   if (c == 2) pw_linear_turn (l, -1, l->a, l->da);
-  for (int j = 0; j < x->n; j++) out[j] = l->da[j] * pw_rank_unit (x->s, j) * x->T * x->T / x->L;
+  for (int j = 0; j < x->n; j++) out[j] = l->da[j] * pw_as_length (x->s, j) * x->T * x->T / x->L;
 }
 
 /* The largest change of an acceleration by a single coordinate. */
@@ -47,7 +47,7 @@ static double group_size (pw_steady *x) {
     l->x[c] = pw_unit (x->s, c);
     pw_linear_vary (l);
     for (int j = 0; j < x->n; j++)
-      most = pw_larger_or_nan (most, fabs (l->da[j]) * pw_rank_unit (x->s, j) * x->T * x->T / x->L);
+      most = pw_larger_or_nan (most, fabs (l->da[j]) * pw_as_length (x->s, j) * x->T * x->T / x->L);
   }
   return most;
 }

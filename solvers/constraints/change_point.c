@@ -25,7 +25,7 @@ typedef struct {
   pw_projector projector;
   double t, *q, *next;       /* position of the walk, and a candidate for the next */
   double *end, *in;          /* end of the walk; the last position before a crossing, and the first one inside */
-  double sine, least, slope; /* sine at q; smallest sine; its fastest change */
+  double sine, least, slope; /* sine at q; smallest sine; its fastest change per unit of motion */
   int inside, turned;        /* 1: stepping over a crossing of branches; one was not left straight on */
   int row;                   /* where the sine was smallest */
 } change_walk;
@@ -90,6 +90,7 @@ static int change_stride (change_walk *w, const double *to, double t1, double pa
   return PW_RETRY;
 }
 
+/* Length of the next stride: a part of the distance at which the sine could vanish. */
 static double change_length (const change_walk *w) {
   const pw_watchdog *limit = &w->r->limits;
   return fmax (fmin (limit->stride * w->sine / w->slope, limit->stride), limit->floor);

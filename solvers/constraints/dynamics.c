@@ -48,8 +48,6 @@ static void dynamics_refine (pw_run *r, const double *v, double *a, double *lamb
   }
 }
 
-/* On entry to these functions lambda contains gamma. */
-
 void pw_run_accelerate_updated (pw_run *r, const double *v, double *a, double *lambda) {
   pw_evaluate_gamma (r->w, lambda);
   const double *f = dynamics_right_side (r, v, r->scratch, lambda);
@@ -58,7 +56,7 @@ void pw_run_accelerate_updated (pw_run *r, const double *v, double *a, double *l
   if (pw_saddle_below (r->saddle, r->limits.refine)) dynamics_refine (r, v, a, lambda);
 }
 
-/* Factorises and solves; *near = 1 near a singular configuration. */
+/* Factorises and solves; *near = 1 near a singular configuration.  On entry lambda contains gamma. */
 static inline int dynamics_solve (pw_run *r, const double *v, double *a, double *lambda, int *near) {
   const double *f = dynamics_right_side (r, v, r->scratch, lambda);
   r->statistics.rhs++;

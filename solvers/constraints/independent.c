@@ -37,10 +37,10 @@ static void independent_direction (const pw_system *s, const independent_search 
                                    int number) {
   double most = 0;
   for (int j = 0; j < s->coords; j++)
-    x->motion[j] = number == 0 ? v[j] * pw_rank_unit (s, j) : pw_irregular (1.7, (j + 1) * number);
+    x->motion[j] = number == 0 ? v[j] * pw_as_length (s, j) : pw_irregular (1.7, (j + 1) * number);
   pw_rank_orthogonalise (x->motion, x->rows, x->kept, rank, s->coords);
   for (int j = 0; j < s->coords; j++) most = fmax (most, fabs (x->motion[j]));
-  for (int j = 0; most > 0 && j < s->coords; j++) x->motion[j] *= s->scale.length / most / pw_rank_unit (s, j);
+  for (int j = 0; most > 0 && j < s->coords; j++) x->motion[j] *= s->scale.length / most / pw_as_length (s, j);
 }
 
 /* The rank a short motion away; x->active: the independent rows there.  0 if no such configuration is found. */
@@ -96,9 +96,7 @@ int pw_rank_open (pw_run *r, pw_error *error) {
   memcpy (x.best, x.active, (size_t)s->rows);
   for (int number = 0; number < 3 && status == PW_OK; number++) {
     int away = independent_nearby (r, &x, rank, number);
-    if (away <= best) continue;
-    best = away;
-    memcpy (x.best, x.active, (size_t)s->rows);
+    if (away > best) best = away;
   }
   if (best > rank)
     status = pw_fail (

@@ -1,4 +1,4 @@
-/* Consistent initial conditions: positions by Gauss-Newton, then velocities by one linear solve.
+/* Consistent initial conditions: positions by Gauss-Newton, then velocities by linear solves.
  *
  * States given by the user or specified by the model are prescribed, and so are, where possible, the positions of
  * coordinates with mass; the rest moves as little as possible in the metric.  If that fails, first the velocities
@@ -13,7 +13,8 @@
 #include "rank.h"
 
 /* Rows times coordinates above which dependent equations are not sought while states specified by the model are
- * prescribed: that usually fails for sketches of linkages, which specify all positions. */
+ * prescribed: that usually fails for sketches of linkages, which specify all positions; nor, unless values are given, for
+ * the coordinates that are not prescribed. */
 #define INITIAL_SMALL 1e4
 
 /* Off the constraints dependent equations appear independent, the more the larger the residuals: hence several tolerances. */
@@ -33,7 +34,7 @@ typedef struct {
 static double initial_massless_scale (const pw_system *s) {
   double least = INFINITY, most = 0, massless = 0;
   for (int j = 0; j < s->coords; j++) {
-    double unit = pw_is_angle (s, j) ? s->scale.length : 1, entry = s->metric[j] / (unit * unit);
+    double length = pw_as_length (s, j), entry = s->metric[j] / (length * length);
     if (s->mass[j] > 0)
       least = fmin (least, entry), most = fmax (most, entry);
     else
@@ -82,19 +83,20 @@ static int initial_project (pw_projector *p, pw_run *r, int velocities, initial_
 }
 
 /* Projects positions or velocities.  If that fails since equations depend on each other in the coordinates that are not
- * prescribed, it is repeated with independent ones; the prescribed values must then satisfy the others to round-off. */
+ * prescribed (not NULL), it is repeated with independent ones; the prescribed values must then satisfy the others to
+ * round-off. */
 static int initial_stage (pw_projector *p, pw_run *r, int velocities, const unsigned char *prescribed,
                           const double *weight, initial_failure *failure, pw_error *error) {
   const pw_system *s = r->s;
   const unsigned char *before = r->active;
   size_t bytes = (size_t)s->coords * sizeof (double);
-  int small = (double)s->rows * s->coords < INITIAL_SMALL, rank = s->rows;
+  int rank = s->rows;
   unsigned char *start = malloc (bytes + (size_t)s->rows + 1);
   if (start == NULL) return pw_fail_memory (s, error);
   unsigned char *active = start + bytes;
   memcpy (start, velocities ? r->v : r->q, bytes);
   int status = initial_project (p, r, velocities, failure);
-  for (int i = 0; i < TOLERANCES && status == PW_RETRY && prescribed && small; i++) {
+  for (int i = 0; i < TOLERANCES && status == PW_RETRY && prescribed; i++) {
     pw_projector own;
     pw_error why = { 0 };
     pw_residuals now;
@@ -121,10 +123,11 @@ static int initial_stage (pw_projector *p, pw_run *r, int velocities, const unsi
   return status;
 }
 
-/* One attempt from these positions and the given velocities, with some states prescribed.  The velocity metric is the
+/* One attempt from these positions and the given velocities, with some states prescribed; seek: dependent equations are
+ * sought in the coordinates that are not.  The velocity metric is the
  * mass matrix if that determines all velocities, else the position metric. */
-static int initial_attempt (pw_run *r, const unsigned char *prescribed, const double *from, initial_failure *failure,
-                            pw_error *error) {
+static int initial_attempt (pw_run *r, const unsigned char *prescribed, int seek, const double *from,
+                            initial_failure *failure, pw_error *error) {
   const pw_system *s = r->s;
   size_t bytes = (size_t)s->coords * sizeof (double);
   double *weight = malloc (2 * bytes);
@@ -142,10 +145,10 @@ static int initial_attempt (pw_run *r, const unsigned char *prescribed, const do
                      weight + s->coords);
     status = pw_projector_open (&p, r, weight, weight + s->coords, choice == 0 ? &none : error);
     if (status == PW_OK) {
-      status = initial_stage (&p, r, 0, prescribed, weight, failure, error);
+      status = initial_stage (&p, r, 0, seek ? prescribed : NULL, weight, failure, error);
       failure->assembled |= status == PW_OK;
       if (status == PW_OK)
-        status = initial_stage (&p, r, 1, prescribed ? prescribed + s->coords : NULL, weight, failure, error);
+        status = initial_stage (&p, r, 1, seek ? prescribed + s->coords : NULL, weight, failure, error);
       pw_projector_close (&p);
       if (status != PW_RETRY || !failure->velocities) break;
     }
@@ -195,11 +198,12 @@ int pw_initial_given (const pw_initial_report *report, int state) {
 /* If redundant equations make an attempt with all equations fail, it is repeated with an independent set, selected at
  * the given positions or, failing that, at those reached by an attempt without prescribed values, from which it then
  * starts. */
-static int initial_ranked (pw_run *r, const unsigned char *prescribed, initial_failure *failure, pw_error *error) {
+static int initial_ranked (pw_run *r, const unsigned char *prescribed, int seek, initial_failure *failure,
+                           pw_error *error) {
   const pw_system *s = r->s;
   size_t n = (size_t)s->coords, m = (size_t)s->rows;
   initial_failure later = { .row = -1 };
-  int status = initial_attempt (r, prescribed, r->q_given, failure, error), rank = s->rows;
+  int status = initial_attempt (r, prescribed, seek, r->q_given, failure, error), rank = s->rows;
   if (status != PW_RETRY || r->active || (double)s->rows * s->coords > PW_RANK_MOST) return status;
   double *at = malloc (2 * n * sizeof *at + m);
   if (at == NULL) return pw_fail_memory (s, error);
@@ -209,7 +213,7 @@ static int initial_ranked (pw_run *r, const unsigned char *prescribed, initial_f
   memcpy (from, at, n * sizeof *at);
   for (int i = 0; i < 2 * TOLERANCES && status == PW_RETRY; i++) {
     if (i == TOLERANCES) {
-      if (initial_attempt (r, NULL, r->q_given, &later, error) == PW_RESOURCE) status = PW_RESOURCE;
+      if (initial_attempt (r, NULL, 0, r->q_given, &later, error) == PW_RESOURCE) status = PW_RESOURCE;
       for (size_t j = 0; j < n; j++) at[j] = r->q[j], from[j] = prescribed[j] ? from[j] : r->q[j];
       rank = s->rows;
     }
@@ -220,7 +224,7 @@ static int initial_ranked (pw_run *r, const unsigned char *prescribed, initial_f
     rank = now;
     r->active = active;
     later = (initial_failure){ .row = -1 };
-    status = initial_attempt (r, prescribed, from, &later, error);
+    status = initial_attempt (r, prescribed, seek, from, &later, error);
     r->active = NULL;
     failure->assembled |= later.assembled;
   }
@@ -299,13 +303,16 @@ static int initial_try (pw_run *r, const unsigned char *origin, initial_failure 
   unsigned char *mask = malloc (4 * n + 1);
   if (mask == NULL) return pw_fail_memory (s, error);
   unsigned char *last = mask + 2 * n;
-  int status = PW_RETRY, small = (double)s->rows * s->coords < INITIAL_SMALL, before = -1, assembled = 0;
+  int status = PW_RETRY, small = (double)s->rows * s->coords < INITIAL_SMALL, before = -1, assembled = 0, given = 0;
+  for (size_t j = 0; origin && j < 2 * n; j++) given |= origin[j] & PW_GIVEN;
   for (const struct initial_set *set = initial_sets; set < initial_sets + sets && status == PW_RETRY; set++) {
     if (!initial_mask (s, origin, set, mask)) continue;
     int ranked = small || !((set->q | set->v) & PW_SPECIFIED);
     if (ranked == before && memcmp (mask, last, assembled ? 2 * n : n) == 0) continue;
+    int seek = small || (ranked && given && (double)s->rows * s->coords <= PW_RANK_MOST);
     initial_failure now = { .row = -1 };
-    status = ranked ? initial_ranked (r, mask, &now, error) : initial_attempt (r, mask, r->q_given, &now, error);
+    status =
+        ranked ? initial_ranked (r, mask, seek, &now, error) : initial_attempt (r, mask, seek, r->q_given, &now, error);
     memcpy (last, mask, 2 * n);
     before = ranked, assembled = now.assembled;
     if (now.row >= 0) *failure = now;

@@ -81,8 +81,8 @@ static int project_check_redundant (pw_projector *p, const pw_system *s, double 
 }
 
 int pw_project_positions (pw_projector *p, pw_run *r, double t, double *q, const double *v) {
-  const double slight = 1e-6; /* corrections below this leave the sizes of the terms unchanged */
-  const int most = 30;
+  const double slight = 1e-6; /* residuals whose correction changes the sizes of the terms by no more than this part */
+  const int most = 30;        /* quadratic convergence needs some 5; a bad start needs more */
   const pw_system *s = r->s;
   pw_residuals now = { 0 };
   double *g = p->scratch, *size = g + s->rows, *mu = size + s->rows, *dq = mu + s->rows, before = INFINITY;
@@ -93,7 +93,7 @@ int pw_project_positions (pw_projector *p, pw_run *r, double t, double *q, const
     if (!(before < slight)) pw_evaluate_g_size (r->w, size);
     pw_worst_position (s, g, size, p->active, &now);
     p->row = now.row_position;
-    int stalled = now.position > before / 4;
+    int stalled = now.position > before / 4; /* at round-off, since convergence is quadratic */
     if (now.position <= PROJECT_GOOD || (stalled && now.position <= PROJECT_ENOUGH)) break;
     if (p->iterations >= most || !isfinite (now.position)) return PW_RETRY;
     before = now.position;

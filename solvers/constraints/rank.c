@@ -4,12 +4,12 @@
 #include <string.h>
 #include "rank.h"
 
-double pw_rank_unit (const pw_system *s, int j) {
+double pw_as_length (const pw_system *s, int j) {
   return pw_is_angle (s, j) ? s->scale.length : 1;
 }
 
 void pw_rank_weights (const pw_system *s, double *weight) {
-  for (int j = 0; j < s->coords; j++) weight[j] = pw_rank_unit (s, j) * pw_rank_unit (s, j);
+  for (int j = 0; j < s->coords; j++) weight[j] = pw_as_length (s, j) * pw_as_length (s, j);
 }
 
 void pw_rank_rows (const pw_workspace *w, double *rows, double *norm) {
@@ -21,7 +21,7 @@ void pw_rank_rows (const pw_workspace *w, double *rows, double *norm) {
       double *row = rows + (size_t)(k->row + i) * (size_t)n, square = 0;
       for (int c = 0; c < k->b.cols; c++) {
         int j = pw_global (k, i / k->kind->rows, c);
-        if (j < n) row[j] += k->J[i * k->b.cols + c] / pw_rank_unit (s, j);
+        if (j < n) row[j] += k->J[i * k->b.cols + c] / pw_as_length (s, j);
       }
       for (int j = 0; j < n; j++) square += row[j] * row[j];
       for (int j = 0; square > 0 && j < n; j++) row[j] /= sqrt (square);

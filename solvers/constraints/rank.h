@@ -10,14 +10,14 @@ struct pw_run;
 /* Limit of rows x coordinates for dense matrices. */
 #define PW_RANK_MOST 4e7
 
-/* All rows of the evaluated J, dense (rows x coords), in units of the scene and normalised to length 1; `norm` (rows, or
+/* All rows of the evaluated J, dense (rows x coords), as derivatives with respect to lengths, normalised to length 1; `norm` (rows, or
  * NULL): their former lengths; empty rows stay 0. */
 void pw_rank_rows (const pw_workspace *w, double *rows, double *norm);
 
-/* Unit of coordinate j in these rows, which are derivatives with respect to q[j], times this unit. */
-double pw_rank_unit (const pw_system *s, int j);
+/* The factor that makes coordinate j a length: 1, or L for an angle.  (pw_unit is the scene's unit of a coordinate.) */
+double pw_as_length (const pw_system *s, int j);
 
-/* Weights of a metric of lengths: the squares of these units. */
+/* Weights of a metric of lengths: the squares of these factors. */
 void pw_rank_weights (const pw_system *s, double *weight);
 
 /* The n-th of a sequence of irregular numbers in [-1, 1]: sines of multiples of the golden angle. */
@@ -41,7 +41,7 @@ int pw_rank_basis (const pw_workspace *w, double tol, int holonomic, int all, do
 
 /* Rows kept by Gram-Schmidt on the evaluated J, lengths and angles in units of the scene: active[i] = 1 for a row
  * whose part independent of those kept before exceeds tol of it; holonomic equations first, of these the most
- * independent ones, in order where they are about equal.  fixed, or NULL: 1 for coordinates without part in this.  Returns the
+ * independent ones, in order where they are about equal.  fixed, or NULL: 1 for coordinates that are left out.  Returns the
  * rank, or PW_RESOURCE. */
 int pw_rank_select (const pw_workspace *w, double tol, const unsigned char *fixed, unsigned char *active);
 

@@ -34,7 +34,7 @@ static double redundancy_length (const pw_workspace *w, int row) {
   const pw_element_batch *k = redundancy_find (w, row, &n);
   for (int c = 0; c < k->b.cols; c++) {
     int j = pw_global (k, n / k->kind->rows, c);
-    double x = j < w->s->coords ? k->J[n * k->b.cols + c] / pw_rank_unit (w->s, j) : 0;
+    double x = j < w->s->coords ? k->J[n * k->b.cols + c] / pw_as_length (w->s, j) : 0;
     square += x * x;
   }
   return sqrt (square);
@@ -145,6 +145,7 @@ static void redundancy_describe_pair (const pw_system *s, int one, int two, char
 
 char *pw_run_redundancy (pw_run *r, int i, char *buffer, size_t size) {
   enum { MOST = 6 };
+  const double none = 1e-8; /* round-off of a coefficient: eps / s^2 at a sine of 1.5e-4 */
   const pw_system *s = r->s;
   int row = r->redundant_row[i], partners = 0, last = -1, elements = 0;
   size_t n = redundancy_name_row (s, row, 1, buffer, size, 0);
@@ -155,7 +156,7 @@ char *pw_run_redundancy (pw_run *r, int i, char *buffer, size_t size) {
   char element[120], own[120], before[120] = "";
   pw_system_row_name (s, row, own, sizeof own);
   for (int a = 0; a < s->rows; a++) {
-    if (fabs (c[a]) < 1e-8) continue;
+    if (fabs (c[a]) < none) continue;
     partners++, last = a;
     pw_system_row_name (s, a, element, sizeof element);
     if (elements > MOST || n + 1 >= size || strcmp (element, own) == 0 || strcmp (element, before) == 0) continue;

@@ -13,15 +13,15 @@ const pw_watchdog pw_watchdog_limits = {
   .lost = 1e-2,
   .lost_unstabilised = 0.1,
 
-  /* A redundant row follows from the others up to a round-off of 1e6 eps, or up to their residuals divided by a sine
+  /* A redundant row follows from the others up to a round-off of some 1e6 eps, or up to their residuals divided by a sine
    * as small as 1e-4. */
   .follows = 1e-9,
   .magnified = 1e4,
 
   /* Round-off leaves sqrt (eps) = 1.5e-8 of a row that depends on others; below the sine 1e-6 accelerations, with an
-   * error of eps / s after refinement, are wrong by more than 1e-10.  `suspect`: after rows that are nearly
-   * dependent themselves, round-off leaves up to 1e-5; the rank is examined below a hundred times that, or refused
-   * below `dependent` if it cannot be. */
+   * error of eps / s after refinement, are wrong by more than 1e-10.  After rows that are nearly
+   * dependent themselves, round-off leaves up to 1e-5: `dependent`, which is refused where a scene is too large for
+   * its rank to be computed.  Below a hundred times that, `suspect`, the rank is computed. */
   .rank = 1e-6,
   .suspect = 1e-3,
   .dependent = 1e-5,
@@ -45,8 +45,8 @@ const pw_watchdog pw_watchdog_limits = {
   .drift_far = 1e-2,
   .drift_any = 0.1,
 
-  /* Nonholonomic rows: accelerations do not grow when the motion passes a singular configuration; in a jump they reach
-   * 1 / near times and more. */
+  /* Nonholonomic rows: accelerations do not grow when the motion passes a singular configuration; in a jump at the sine
+   * s they reach 1 / s: 100 at half of `near`. */
   .jump = 100,
 
   /* The direction of a row of length 1 turns by at most an angle of 1 per rad, that of the others too; step sizes of
@@ -75,10 +75,11 @@ const pw_watchdog pw_watchdog_limits = {
   /* Divisions of a step near a singular configuration mostly agree to 1e-11; those that differ by more than the
    * error of a good step, 1e-7, do not agree. */
   .agree = 1e-7,
+  .agree_best = 1e-11,
+
   /* A step that ends within a tenth of its length from a singular configuration: the accelerations, whose error is that of
    * the state over the sine, are ten times less accurate than at its beginning. */
   .lands = 0.1,
-  .agree_best = 1e-11,
 
   /* A sample does not affect the next step: an error of a hundredth is acceptable. */
   .sample = 1e-2,
@@ -92,7 +93,8 @@ const pw_watchdog pw_watchdog_limits = {
   /* Products of three masses must neither overflow nor underflow. */
   .extreme = 1e100,
 
-  /* Libraries reduce a step by factors of 4 to 10: 25 reductions until it is below round-off. */
+  /* Libraries reduce a step by factors of 4 to 10: it is below round-off after 25 reductions; a thousand steps that do
+   * not advance are no search for a step size. */
   .stalled = 1000,
 };
 
@@ -166,7 +168,8 @@ int pw_fail_singular (pw_run *r, double t, pw_error *error) {
   char element[120] = "a constraint";
   int row = -1;
   double sine = pw_watchdog_sine (r, &row);
-  if (sine > r->limits.dependent && sine > r->limits.near * r->geometry.typical) /* 0 while the run is opened */
+  if (sine > r->limits.dependent &&
+      sine > r->limits.near * r->geometry.typical) /* `typical` is 0 while the run is opened */
     return pw_fail (
         error, PW_METHOD,
         "t = %.6g s: values too extreme: masses and inertias differ by so much that the equations of motion "
@@ -200,7 +203,7 @@ int pw_watchdog_check_values (const pw_run *r, pw_error *error) {
                       s->model, pw_system_state_name (s, i, name, sizeof name), value, extreme);
   }
   for (int j = 0; s->rows > 0 && j < s->coords; j++) {
-    double mass = s->mass[j] / (pw_rank_unit (s, j) * pw_rank_unit (s, j));
+    double mass = s->mass[j] / (pw_as_length (s, j) * pw_as_length (s, j));
     if (mass != 0 && !(mass < extreme && mass > 1 / extreme))
       return pw_fail (
           error, PW_INPUT,

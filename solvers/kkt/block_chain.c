@@ -93,7 +93,7 @@ PW_INLINE chain_point chain_divide_kept (const chain_sweep *s, chain_lanes x, ch
 
 /* ---- Factorisation ---- */
 
-/* As block_pivot; the smallest pivot changes rarely. */
+/* As block_pivot (block_factor.c); the smallest pivot changes rarely. */
 PW_INLINE void chain_pivot (chain_lanes *D, pw_block_ldl *l, const chain_sweep *s) {
   const chain_lanes a = D[0], minor = a * D[2] - D[1] * D[1], least = { l->pivot, l->pivot };
   const chain_lanes first = least * D[3], second = least * a * D[4];

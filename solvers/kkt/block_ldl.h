@@ -2,7 +2,7 @@
  * assembled body by body and factorised column by column (Duff, Erisman & Reid 2017, Direct Methods for Sparse
  * Matrices, chapters 5, 10 and 12).
  *
- * A node is a constraint equation, or two of one element.  A body block collects the contributions of the nodes
+ * A node is a constraint equation, or two with the same columns.  A body block collects the contributions of the nodes
  * that touch a body (or an internal coordinate), each being the node's columns there.  Any two
  * contributions of a body block couple their nodes.
  *
@@ -21,7 +21,7 @@
  *
  *   K_cc += m 1 + i a a^T,   K_(c+1)c = +-m 1 + i b a^T = K,   K_(c+1)(c+1) += m 1 + i b b^T
  *   L = K D_c^-1,   D_(c+1) = K_(c+1)(c+1) - L K^T,   y_(c+1) -= L y_c
- *   backwards:   y_c = D_c^-1 (y_c - K^T y_(c+1)),   K^T y = +-m y + i (b . y) a
+ *   backwards:   y_c = -D_c^-1 (y_c + K^T y_(c+1)),   K^T y = +-m y + i (b . y) a
  *
  * where D and y are passed from pin to pin, and only the factors of D are stored.  If nothing is below the last pin, the
  * elimination proceeds from both ends to the middle. */

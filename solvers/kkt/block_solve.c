@@ -1,9 +1,9 @@
 /* Solution with the factors; see block_ldl.h.
  *
- *   for each body:                y_a -= J_a W^-1 f
+ *   for each body:                y_p -= J_p W^-1 f
  *   for each column j:            y_p -= L_pj y_j
  *   for each column j backwards:  y_j = -D^-1 y_j - sum_p L_pj^T y_p
- *   for each body:                a = W^-1 (f - sum_a J_a^T y_a) */
+ *   for each body:                a = W^-1 (f - sum_p J_p^T y_p) */
 #include "block_parts.h"
 #include "unroll.h"
 

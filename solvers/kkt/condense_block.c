@@ -140,7 +140,7 @@ static int condense_open (pw_plan *c) {
 
 /* The first node before the uncondensed bodies with a nearly vanishing pivot, or -1. */
 static int condense_find_dependent (const pw_plan *c) {
-  const double follows = 1e-8; /* squared sine */
+  const double follows = 1e-8; /* squared sine: half of the digits are lost */
   pw_block_ldl *l = c->k->block;
   l->least = follows;
   pw_block_factor (l);
@@ -151,11 +151,11 @@ static int condense_find_dependent (const pw_plan *c) {
   return -1;
 }
 
-/* Before the uncondensed bodies, an equation may follow from others: two legs of a platform that stands on the
- * ground.  Such equations, found at the present configuration, are moved after the bodies, one by one; if they are
+/* Before the uncondensed bodies, an equation may follow from others: those of a leg that is pinned to a platform and
+ * to the ground.  Such equations, found at the present configuration, are moved after the bodies, one by one; if they are
  * many, all equations that touch these bodies are moved. */
 int pw_condense_block (pw_plan *c) {
-  const int most = 12;
+  const int most = 12; /* each attempt plans and factorises anew */
   for (int attempt = 0;; attempt++) {
     int status = condense_open (c), n = -1;
     if (status == PW_OK && c->uncondenseds > 0 && attempt <= most) n = condense_find_dependent (c);

@@ -39,7 +39,7 @@ static void massless_swap (pw_component *c, int a, int b) {
   }
 }
 
-/* Entries below this part of their row are what round-off leaves of 0. */
+/* Entries below this part of their row, some 1e3 eps, are what round-off leaves of 0. */
 #define MASSLESS_ROUND_OFF 1e-12
 
 int pw_massless_is_entry (const pw_component *c, int i, int column) {
@@ -50,7 +50,7 @@ int pw_massless_is_entry (const pw_component *c, int i, int column) {
  * that the remainder of a dependent row is small.  Returns 0 if all are round-off; the component is then matched again
  * at the next factorisation. */
 static int massless_select_pivot (pw_component *c, int p) {
-  const double guard = 0.1;
+  const double guard = 0.1; /* a pivot may lose one digit until the component is matched again */
   int row = -1, column = -1;
   double best = MASSLESS_ROUND_OFF;
   for (int i = p; i < c->rows; i++)

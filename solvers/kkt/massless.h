@@ -4,12 +4,12 @@
  * Gaussian elimination of the massless columns, with the matched rows p as pivot rows, leaves
  *
  *     [ P H ]   [ L 0 ] [ U H' ]       P, H: matched rows in the massless and in the massive columns
- *     [ K Z ] = [ M 1 ] [ 0 Z' ]       K, Z: unmatched rows i
+ *     [ K Z ] = [ R 1 ] [ 0 Z' ]       K, Z: unmatched rows i
  *
- * With  w = U^-T f_P,  f~ = f - H'^T w,  gamma~ = [ L 0 ; M 1 ]^-1 gamma,  the rows Z' and the massive coordinates form
+ * With  w = U^-T f_P,  f~ = f - H'^T w,  gamma~ = [ L 0 ; R 1 ]^-1 gamma,  the rows Z' and the massive coordinates form
  * a system without the massless ones.  Its solution yields
  *
- *     a_P = U^-1 (gamma~_p - H' a),       lambda_p = L^-T (w - M^T lambda_i). */
+ *     a_P = U^-1 (gamma~_p - H' a),       lambda_p = L^-T (w - R^T lambda_i). */
 #ifndef PW_MASSLESS_H
 #define PW_MASSLESS_H
 
@@ -61,8 +61,8 @@ typedef struct {
   double *square;          /* cols: 1, or for an angle 1 / L^2 */
   double *massive_square;  /* cols: the same, 0 for a massless coordinate */
   pw_massless_row *row;    /* the matched ones first, in the order of elimination */
-  double *A;               /* rows x stride: U, with inverses on its diagonal, and H', or 0 and Z'; then L, or M */
-  int lower, stride;       /* first column of L: cols rounded up to an even number; distance between rows of A */
+  double *A;               /* rows x stride: U, with inverses on its diagonal, and H', or 0 and Z'; then L, or R */
+  int lower, stride;       /* first column of L and R: cols rounded up to an even number; distance between rows of A */
   double least;            /* smallest pivot relative to its row, or row of Z' relative to its terms */
 } pw_component;
 

@@ -97,7 +97,7 @@ static void linear_change (pw_linearisation *x, int k, double *out) {
   pw_linear_coordinates (x, dq, dv, 1, x->S + k * x->size);
   out = pw_linear_violation (x, out);
   if (k == 2) pw_linear_turn (x, -1, x->a, x->da);
-  for (int j = 0; j < x->n; j++) out[j] = x->da[j] * pw_rank_unit (x->r->s, j) / linear_unit (x);
+  for (int j = 0; j < x->n; j++) out[j] = x->da[j] * pw_as_length (x->r->s, j) / linear_unit (x);
 }
 
 /* Tolerance of symmetries: round-off grows with the derivatives of the accelerations, by 1e-4 of their size. */
@@ -157,7 +157,7 @@ static void linear_later (const pw_linearisation *x, double time, double *q, dou
 static int linear_agree (const pw_linearisation *x, const double *a, const double *b) {
   double off = 0, most = linear_unit (x);
   for (int j = 0; j < x->n; j++) {
-    double unit = pw_rank_unit (x->r->s, j);
+    double unit = pw_as_length (x->r->s, j);
     off = pw_larger_or_nan (off, fabs (a[j] - b[j]) * unit);
     most = fmax (most, fabs (b[j]) * unit);
   }

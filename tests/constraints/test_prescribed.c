@@ -89,6 +89,48 @@ static void test_given_satisfied_rows (void **state) {
   }
 }
 
+/* Discs on massless arms.  Position and velocity of a disc's centre are given: with its arm's pins they leave one equation that
+ * they satisfy, in scenes of any size. */
+static void start_arms (pw_model *m, const void *parameters) {
+  static char disc[40][16], arm[40][16], pin[80][16];
+  for (int i = 0; i < *(const double *)parameters; i++) {
+    snprintf (disc[i], sizeof disc[i], "disc%d", i);
+    snprintf (arm[i], sizeof arm[i], "arm%d", i);
+    snprintf (pin[2 * i], sizeof *pin, "tip%d", i);
+    snprintf (pin[2 * i + 1], sizeof *pin, "hub%d", i);
+    pw_add_body (
+        m,
+        &(pw_body){ .name = disc[i], .mass = 2, .inertia = 0.5, .start = { 3 * i + 0.6, 0.8 }, .rate = { -0.8, 0.6 } });
+    pw_add_body (m, &(pw_body){ .name = arm[i], .start = { 0, 0, 0.3 } });
+    pw_add_pin (m, &(pw_pin){ .name = pin[2 * i], .body = { disc[i], arm[i] }, .at = { { 0 }, { 0.4, 0.3 } } });
+    pw_add_pin (
+        m, &(pw_pin){ .name = pin[2 * i + 1], .body = { arm[i], "ground" }, .at = { { -0.4, -0.3 }, { 3 * i, 0 } } });
+  }
+}
+
+static void test_given_centre_kept (void **state) {
+  static const char *const name[] = { "disc0.x", "disc0.y", "disc0.vx", "disc0.vy" };
+  static const double value[] = { 0.6, 0.8, -0.8, 0.6 };
+  static const pw_parameter list[] = { { .name = "arms", .value = 1 }, { .name = NULL } };
+  static const pw_plugin_table table = {
+    .abi = PW_ABI, .size = sizeof table, .parameters = list, .parameters_size = sizeof (double), .build = start_arms
+  };
+  (void)state;
+  for (int arms = 1; arms <= 40; arms += 13) {
+    pw_error error = { 0 };
+    pw_model *m = scene_model (&table, "arms", (double)arms, NULL);
+    for (int i = 0; i < 4; i++) check_ok (pw_model_set_initial (m, name[i], value[i], &error), &error);
+    pw_system *s = scene_compile (m);
+    pw_run *r = runs_open (s, "rk4", NULL);
+    const pw_initial_report *start = pw_run_initial (r);
+    assert_true (start->released == 0 && start->moved > 0);
+    check_bits ("position", start->q, value, 2);
+    check_bits ("velocity", start->v, value + 2, 2);
+    check_below ("position", runs_to (r, 0).position, START_ROUND_OFF, START_REASON);
+    start_close (r, s);
+  }
+}
+
 /* A given angle of the massless steering assembly does not move the frame. */
 static void test_massive_body_kept (void **state) {
   (void)state;
@@ -263,9 +305,10 @@ int main (void) {
   const struct CMUnitTest tests[] = {
     cmocka_unit_test (test_given_values_kept),    cmocka_unit_test (test_given_body_kept),
     cmocka_unit_test (test_given_satisfied_rows), cmocka_unit_test (test_released),
-    cmocka_unit_test (test_massive_body_kept),    cmocka_unit_test (test_velocities_change),
-    cmocka_unit_test (test_velocities_kept),      cmocka_unit_test (test_least_change),
-    cmocka_unit_test (test_driven_constraint),    cmocka_unit_test (test_inconsistent),
+    cmocka_unit_test (test_given_centre_kept),    cmocka_unit_test (test_massive_body_kept),
+    cmocka_unit_test (test_velocities_change),    cmocka_unit_test (test_velocities_kept),
+    cmocka_unit_test (test_least_change),         cmocka_unit_test (test_driven_constraint),
+    cmocka_unit_test (test_inconsistent),
   };
   return cmocka_run_group_tests (tests, NULL, NULL);
 }
