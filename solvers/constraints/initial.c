@@ -124,8 +124,8 @@ static int initial_stage (pw_projector *p, pw_run *r, int velocities, const unsi
 }
 
 /* One attempt from these positions and the given velocities, with some states prescribed; seek: dependent equations are
- * sought in the coordinates that are not.  The velocity metric is the
- * mass matrix if that determines all velocities, else the position metric. */
+ * sought in the coordinates that are not.  The velocity metric is the mass matrix if that determines all velocities, else
+ * the position metric. */
 static int initial_attempt (pw_run *r, const unsigned char *prescribed, int seek, const double *from,
                             initial_failure *failure, pw_error *error) {
   const pw_system *s = r->s;

@@ -10,8 +10,8 @@ struct pw_run;
 /* Limit of rows x coordinates for dense matrices. */
 #define PW_RANK_MOST 4e7
 
-/* All rows of the evaluated J, dense (rows x coords), as derivatives with respect to lengths, normalised to length 1; `norm` (rows, or
- * NULL): their former lengths; empty rows stay 0. */
+/* All rows of the evaluated J, dense (rows x coords), as derivatives with respect to lengths, normalised to length 1;
+ * `norm` (rows, or NULL): their former lengths; empty rows stay 0. */
 void pw_rank_rows (const pw_workspace *w, double *rows, double *norm);
 
 /* The factor that makes coordinate j a length: 1, or L for an angle.  (pw_unit is the scene's unit of a coordinate.) */

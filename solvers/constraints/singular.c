@@ -19,9 +19,9 @@ const pw_watchdog pw_watchdog_limits = {
   .magnified = 1e4,
 
   /* Round-off leaves sqrt (eps) = 1.5e-8 of a row that depends on others; below the sine 1e-6 accelerations, with an
-   * error of eps / s after refinement, are wrong by more than 1e-10.  After rows that are nearly
-   * dependent themselves, round-off leaves up to 1e-5: `dependent`, which is refused where a scene is too large for
-   * its rank to be computed.  Below a hundred times that, `suspect`, the rank is computed. */
+   * error of eps / s after refinement, are wrong by more than 1e-10.  After rows that are nearly dependent
+   * themselves, round-off leaves up to 1e-5: `dependent`, which is refused where a scene is too large for its rank to be
+   * computed.  Below a hundred times that, `suspect`, the rank is computed. */
   .rank = 1e-6,
   .suspect = 1e-3,
   .dependent = 1e-5,
@@ -168,8 +168,7 @@ int pw_fail_singular (pw_run *r, double t, pw_error *error) {
   char element[120] = "a constraint";
   int row = -1;
   double sine = pw_watchdog_sine (r, &row);
-  if (sine > r->limits.dependent &&
-      sine > r->limits.near * r->geometry.typical) /* `typical` is 0 while the run is opened */
+  if (sine > r->limits.dependent && sine > r->limits.near * r->geometry.typical) /* typical is 0 at opening */
     return pw_fail (
         error, PW_METHOD,
         "t = %.6g s: values too extreme: masses and inertias differ by so much that the equations of motion "

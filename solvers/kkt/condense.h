@@ -1,7 +1,7 @@
 /* Condensation of a scene's constraint equations, planned by condense*.c and executed by saddle.c.
  *
- * Equations are grouped into nodes of 1 or 2 with the same columns; a node contributes to the bodies and internal coordinates
- * with weight in its equations.  Two contributions to the same one make a block of S = J W^-1 J^T. */
+ * Equations are grouped into nodes of 1 or 2 with the same columns; a node contributes to the bodies and internal
+ * coordinates with weight in its equations.  Two contributions to the same one make a block of S = J W^-1 J^T. */
 #ifndef PW_CONDENSE_H
 #define PW_CONDENSE_H
 
