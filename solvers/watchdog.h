@@ -38,8 +38,8 @@ extern const pw_watchdog pw_watchdog_limits;
 
 /* Geometry of the constraints along a run. */
 typedef struct {
-  pw_saddle *saddle;    /* weights 1 and L^2: its pivots are the sines; NULL: a tree of holonomic joints, never singular */
-  int loops;            /* 1: bodies form closed loops, whose branches can meet */
+  pw_saddle *saddle; /* weights 1 and L^2: its pivots are the sines; NULL: a tree of holonomic joints, never singular */
+  int loops;         /* 1: bodies form closed loops, whose branches can meet */
   double sine, typical; /* the last sine computed; the largest at a state reached */
   double state_sine;    /* the sine at the last accepted state for which it was computed */
   double moved;         /* motion since then [units of L, rad] */
