@@ -97,10 +97,10 @@ static void test_units (void **state) {
 
 /* What is not known, or measures something else, is refused with column and unit. */
 static void test_bad_units (void **state) {
-  static const char csv[] = "t [s],u [lbf ft],w [deg],f [N],z [N m/],h [%]\n0,1,2,3,4,5\n1,2,3,4,5,6\n";
+  static const char csv[] = "t [s],u [dyn cm],w [deg],f [N],z [N m/],h [%]\n0,1,2,3,4,5\n1,2,3,4,5,6\n";
   (void)state;
   table_write ("model/u.csv", csv, strlen (csv));
-  table_bad ("{file: u.csv}", "u.csv:1: column \"u [lbf ft]\": the unit \"lbf ft\" is not known; expected N m");
+  table_bad ("{file: u.csv}", "u.csv:1: column \"u [dyn cm]\": the unit \"dyn cm\" is not known; expected N m");
   table_bad ("{file: u.csv, columns: [t, w]}", "column \"w [deg]\": the unit \"deg\" does not measure what N m does");
   table_bad ("{file: u.csv, columns: [t, f]}", "column \"f [N]\": the unit \"N\" does not measure what N m does");
   table_bad ("{file: u.csv, columns: [t, z]}", "the unit \"N m/\" is not known");
@@ -184,6 +184,12 @@ static void test_unit_factors (void **state) {
     { "rev", 180 * PW_PI },
     { "rpm", 3 * PW_PI },
     { "km/h", 25 },
+    { "mph", 40.2336 },
+    { "ft", 27.432 },
+    { "in", 2.286 },
+    { "mi", 144840.96 },
+    { "lb", 40.8233133 },
+    { "lbf", 400.339945373445 },
     { "um", 9e-5 },
     { "mm", 0.09 },
     { "cm", 0.9 },
