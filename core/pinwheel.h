@@ -794,6 +794,8 @@ void *
 pw_specialised_lanes_memory (const pw_specialised_lanes *code); /* for one thread; NULL if out of memory; free it */
 /* 0 if there are element types of the user's, or signals that depend on the state; redundant equations count as such, too. */
 int pw_system_has_lanes (const pw_system *s);
+/* 1 if accelerations may jump with the state: the system has element types of the user's, or signals that depend on it. */
+int pw_system_may_jump (const pw_system *s);
 
 /* ---- Elements of a system, in the order of its constraint equations ---- */
 

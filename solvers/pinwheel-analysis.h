@@ -88,12 +88,8 @@ typedef struct pw_variation pw_variation;
  * PW_METHOD if the state or a breakpoint is not differentiable; PW_RESOURCE. */
 pw_variation *pw_variation_open (pw_run *r, const pw_direction *d, int count, int ledger, pw_error *error);
 
-/* 1 if accelerations may jump with the state: the system has element types of the user's, or signals that depend on it.  Then
- * derivatives need states ahead of them: take samples of another run with the same settings. */
-int pw_variation_may_jump (const pw_system *s);
-
-/* Advances the run and the derivatives to time t <= t_end, which is then in the last step of the run unless accelerations
- * may jump.  Returns as pw_run_advance; also PW_METHOD where the motion is not differentiable. */
+/* Advances the run and the derivatives to time t <= t_end, which is then in the last step of the run; but where
+ * pw_system_may_jump, the run is ahead of it: take samples of another run with the same settings.  Returns as pw_run_advance; also PW_METHOD where the motion is not differentiable. */
 int pw_variation_advance (pw_variation *x, double t, double t_end, pw_error *error);
 
 /* The derivative along direction i of the sample at the time reached by pw_variation_advance: each number in it is that

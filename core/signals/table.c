@@ -84,8 +84,8 @@ void pw_table_eval (const pw_signal *s, const double *spline, double t, double u
   u[2] = M + x * third;
 }
 
-/* A linear table has a kink at each point; a cubic one at its ends, and a kink of its second derivative at each
- * point. */
+/* A linear table has a kink at each point; a cubic one has a kink at its ends, or with ends at rest a jump of the second
+ * derivative, and between them kinks of the second derivative. */
 double pw_table_breakpoint (const pw_signal *s, int knots, double t) {
   int n = s->table.count, next = table_passed (s, t);
   if (next == n) return INFINITY;

@@ -86,9 +86,43 @@ int pw_linear_open (pw_linearisation *x, pw_run *r, int modes, int most) {
   return status;
 }
 
+/* Changes of a state, in units of the scene, and the least change of the accelerations that counts as a jump. */
+static const double LINEAR_FAR = 1e-6, LINEAR_NEAR = 1e-8, LINEAR_JUMP = 1e-6;
+
+/* The change of the accelerations, in units of the scene, if state j changes by `part` of its unit. */
+static double linear_change (pw_linearisation *x, int j, double part) {
+  pw_run *r = x->r;
+  int n = x->n;
+  double T = r->w->scale.time, most = 0, *q = x->x, *v = q + n;
+  memcpy (q, r->q, (size_t)n * sizeof *q);
+  memcpy (v, r->v, (size_t)n * sizeof *v);
+  *(j < n ? q + j : v + j - n) += part * pw_unit (r->s, j % n) / (j < n ? 1 : T);
+  if (pw_run_accelerate (r, r->t, q, v, x->da, x->z) != PW_OK) return 0;
+  for (int i = 0; i < n; i++) most = fmax (most, fabs (x->da[i] - x->a[i]) * T * T / pw_unit (r->s, i));
+  return most;
+}
+
+/* The first state at which accelerations jump: their change does not decrease with that of the state.  -1: none. */
+static int linear_jump (pw_linearisation *x) {
+  pw_run *r = x->r;
+  if (!pw_system_may_jump (r->s) || pw_run_accelerate (r, r->t, r->q, r->v, x->a, x->lambda) != PW_OK) return -1;
+  for (int j = 0; j < 2 * x->n; j++)
+    for (int side = -1; side <= 1; side += 2) {
+      double change = linear_change (x, j, side * LINEAR_FAR);
+      if (change > LINEAR_JUMP && linear_change (x, j, side * LINEAR_NEAR) > change / 2) return j;
+    }
+  return -1;
+}
+
 /* The current state is evaluated last, so that the workspace is left there. */
 static int linear_compute (pw_linearisation *x, pw_linear *l, pw_error *error) {
   pw_run *r = x->r;
+  char name[120];
+  int jump = linear_jump (x);
+  if (jump >= 0)
+    return pw_fail (error, PW_METHOD,
+                    "t = %.6g s: accelerations jump with %s at this state, which has no linearisation", r->t,
+                    pw_system_state_name (r->s, jump, name, sizeof name));
   int status = pw_linear_evaluate (x, r->t, r->q, r->v);
   if (status != PW_OK)
     return status > 0 ? pw_fail_singular (r, r->t, error)

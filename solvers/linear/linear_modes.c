@@ -1,7 +1,7 @@
 /* Inputs, states and mode shapes of a linearisation.
  *
  * A signal of a force changes the accelerations by the solution of the saddle-point system with the right-hand side
- * (f_u, 0); its column of B follows as in linear_variation.c.
+ * (f_u, 0); its column of the input matrix B is (0, T N_v^T da), with T and N_v of linear_variation.c.
  *
  * With the reflections Q that split off k rigid displacements, A = Q [ A11 A12 ; 0 A22 ] Q^T.  An eigenvector y2 of A22
  * for the eigenvalue mu has the rigid part y1 with  (A11 - mu) y1 = -A12 y2  and belongs to the mode Q (y1, y2). */
@@ -59,10 +59,10 @@ int pw_linear_matrices (pw_linearisation *x, pw_linear *l) {
 
 /* ---- Shapes ---- */
 
-/* 1 if mu is an eigenvalue of the rigid displacements: 0 or +- i w. */
-static int modes_near_rigid (const pw_linearisation *x, double complex mu) {
+/* 1 if mu is about an eigenvalue of the k rigid displacements: 0 for a rotation, +- i w for two translations. */
+static int modes_near_rigid (const pw_linearisation *x, int k, double complex mu) {
   double bound = MODES_APART / x->r->w->scale.time, w = x->frame.twist[2];
-  return cabs (mu) <= bound || cabs (mu - I * w) <= bound || cabs (mu + I * w) <= bound;
+  return (k != 2 && cabs (mu) <= bound) || (k >= 2 && (cabs (mu - I * w) <= bound || cabs (mu + I * w) <= bound));
 }
 
 /* Sets the first k entries of y, the rigid part of the mode, from the others. */
@@ -70,7 +70,7 @@ static void modes_rigid_part (const pw_linearisation *x, int k, double complex m
   double complex M[9];
   int pivot[3];
   for (int i = 0; i < k; i++) y[i] = 0;
-  if (k == 0 || modes_near_rigid (x, mu)) return;
+  if (k == 0 || modes_near_rigid (x, k, mu)) return;
   for (int i = 0; i < k; i++)
     for (int c = 0; c < x->size; c++)
       if (c < k)
@@ -80,7 +80,8 @@ static void modes_rigid_part (const pw_linearisation *x, int k, double complex m
   LAPACKE_zgesv_work (LAPACK_COL_MAJOR, k, 1, M, k, pivot, y, k);
 }
 
-/* y = the eigenvector j of the split matrix, after k entries: LAPACK has the conjugate, since B is stored by rows. */
+/* y, after k entries, = the eigenvector j of A22: LAPACK has the conjugate, a left eigenvector of A22^T, since A22 is stored by
+ * rows. */
 static void modes_vector (const pw_linearisation *x, int k, int j, double complex *y) {
   int n = x->size - k;
   double im = x->left[n * n + j];

@@ -165,13 +165,6 @@ static double variation_reversal (pw_run *r) {
   return state < 0 ? 1 : fmin (1, least * r->w->scale.time / pw_unit (r->s, state - r->s->coords));
 }
 
-int pw_variation_may_jump (const pw_system *s) {
-  int built_in = 0;
-  for (int i = 0; i < s->batches; i++)
-    for (const pw_kind *const *k = pw_kinds; *k; k++) built_in += *k == s->batch[i].kind;
-  return s->state_dependent > 0 || built_in < s->batches;
-}
-
 static int variation_open (pw_variation *x, const pw_direction *d, pw_error *error) {
   pw_run *r = x->r;
   if (pw_run_option (r, "inputs") != 0)
@@ -206,7 +199,7 @@ pw_variation *pw_variation_open (pw_run *r, const pw_direction *d, int count, in
   x->size = 2 * x->n + (ledger ? x->entries : 0);
   x->t = r->t;
   x->passed = -INFINITY;
-  x->may_jump = pw_variation_may_jump (r->s);
+  x->may_jump = pw_system_may_jump (r->s);
   x->hold[0].to = x->hold[1].to = -INFINITY;
   x->h = 1e-3 * r->w->scale.time;
   if (pw_run_annotate_error (r, variation_open (x, d, error), error) == PW_OK) return x;

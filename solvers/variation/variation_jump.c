@@ -5,7 +5,7 @@
  *     dy+ = dy- + (y'- - y'+) dt_s/dp
  *
  * as at breakpoints (variation_breakpoint.c), with the time t_s at which the motion meets the surface (Aizerman &
- * Gantmakher 1958; Leine & Nijmeijer 2004, section 7.2).  Neither the surface nor its gradient is known; bisection finds t_s
+ * Gantmakher 1958; Leine & Nijmeijer 2004).  Neither the surface nor its gradient is known; bisection finds t_s
  * of the run, and that of neighbours along y + (p_i - p) dy + (t - t_s) y'-, by the accelerations, which are nearer to one
  * or to the other of the two sides. */
 #include <math.h>
@@ -15,11 +15,12 @@
 
 enum { JUMP_MANY = 8 }; /* jumps in one step of a run: more are chatter */
 
-/* Accelerations jump if they change by this part of their change over a step between adjacent times; changes below the
- * second, in units of the scene, are not considered. */
+/* A jump: between times that do not differ, accelerations change by at least this part of their change in the interval that
+ * was searched, and by JUMP_LEAST in units of the scene. */
 static const double JUMP_PART = 0.25, JUMP_LEAST = 1e-6;
 
-/* Part of the change of accelerations by which they differ from linear ones where a jump is looked for. */
+/* An interval is searched if accelerations at its middle differ from the mean of those at its ends by more than this part of
+ * their change. */
 static const double JUMP_BEND = 0.1;
 
 /* The first and the largest interval of time in which a neighbour meets the surface, in units of the scene. */

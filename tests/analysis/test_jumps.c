@@ -217,11 +217,21 @@ static void test_periodic (void **state) {
                "six digits, and differences of 1e-4");
 }
 
+/* Accelerations that jump at a state have no linearisation there. */
+static void test_linearise (void **state) {
+  (void)state;
+  jumps_bad ("pinwheel linearise @/forced.yaml --start a.vx=0",
+             "t = 0 s: accelerations jump with a.vx at this state, which has no linearisation");
+  cli_shell ("pinwheel linearise @/forced.yaml --start a.vx=1");
+  cli_shell ("pinwheel check @/forced.yaml");
+  assert_non_null (strstr (cli_out, "accelerations jump with a.vx at this state"));
+}
+
 int main (void) {
   const struct CMUnitTest tests[] = {
     cmocka_unit_test (test_closed_form), cmocka_unit_test (test_differences), cmocka_unit_test (test_narrow_friction),
-    cmocka_unit_test (test_refusals),    cmocka_unit_test (test_periodic),    cmocka_unit_test (test_extremum),
-    cmocka_unit_test (test_breakpoint),
+    cmocka_unit_test (test_refusals),    cmocka_unit_test (test_periodic),    cmocka_unit_test (test_linearise),
+    cmocka_unit_test (test_extremum),    cmocka_unit_test (test_breakpoint),
   };
   return cmocka_run_group_tests (tests, cli_setup, cli_teardown);
 }

@@ -222,6 +222,36 @@ static double complex modes_transfer (const pw_linear *l, double omega, int j) {
 }
 
 /* A damped compound pendulum with a torque: phi = tau / (k - J w^2 + i d w), k = m g l, J = I + m l^2. */
+/* A rotor of inertia I that turns at 1 rad/s about its centre, and on it at r = 0.5 m a pendulum, 1 kg at a = 1 m.  The
+ * perturbations u of the rotor's angle and b of the pendulum's obey
+ *
+ *     (I + r^2) u'' + r a b'' - r a (b - u) = 0,   a^2 b'' + r a u'' + r a (b - u) = 0.
+ *
+ * With I = 2.25 kg m^2 they oscillate at 1 rad/s, as fast as the rotor turns, with u = -b/2.  That is no eigenvalue of a rigid
+ * rotation, which is the only symmetry. */
+static void modes_rotor (pw_model *m, const void *parameters) {
+  (void)parameters;
+  pw_add_body (m, &(pw_body){ .name = "rotor", .mass = 1, .inertia = 2.25, .rate = { 0, 0, 1 } });
+  pw_add_body (m, &(pw_body){ .name = "bob", .mass = 1, .start = { 1.5 }, .rate = { 0, 1.5, 1 } });
+  pw_add_pin (m, &(pw_pin){ .name = "O", .body = { "rotor", "ground" } });
+  pw_add_pin (m, &(pw_pin){ .name = "P", .body = { "rotor", "bob" }, .at = { { 0.5, 0 }, { -1, 0 } } });
+}
+
+static void test_rotor (void **state) {
+  static const pw_plugin_table table = { .abi = PW_ABI, .size = sizeof table, .build = modes_rotor };
+  (void)state;
+  modes x = modes_of (scene_system (&table, NULL));
+  int mode = -1;
+  for (int i = 0; i < x.l.unknowns; i++)
+    if (fabs (x.l.im[i] - 1) < 1e-6) mode = i;
+  assert_true (mode >= 0);
+  const double *shape = x.l.shape + 4 * x.n * mode; /* complex */
+  double complex rotor = shape[2 * 2] + I * shape[2 * 2 + 1], bob = shape[2 * 5] + I * shape[2 * 5 + 1];
+  check_close ("rotor / bob", creal (rotor / bob), -0.5, 1e-9, "round-off");
+  check_close ("phase", cimag (rotor / bob), 0, 1e-9, "round-off");
+  modes_close (&x);
+}
+
 static void modes_pendulum (pw_model *m, const void *parameters) {
   (void)parameters;
   pw_add_body (m, &(pw_body){ .name = "bob", .mass = 2, .inertia = 0.5, .start = { 0, -0.7, -PW_PI / 2 } });
@@ -271,11 +301,8 @@ static void test_constraint_signal (void **state) {
 
 int main (void) {
   const struct CMUnitTest tests[] = {
-    cmocka_unit_test (test_spread),
-    cmocka_unit_test (test_decay),
-    cmocka_unit_test (test_torque),
-    cmocka_unit_test (test_transfer),
-    cmocka_unit_test (test_constraint_signal),
+    cmocka_unit_test (test_spread), cmocka_unit_test (test_decay),    cmocka_unit_test (test_torque),
+    cmocka_unit_test (test_rotor),  cmocka_unit_test (test_transfer), cmocka_unit_test (test_constraint_signal),
   };
   return cmocka_run_group_tests (tests, NULL, NULL);
 }

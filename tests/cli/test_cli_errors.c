@@ -77,8 +77,10 @@ static void test_bad_lines (void **state) {
     { "list methods rk5", "there is no integrator \"rk5\"; did you mean \"erk5\"?" },
     { "list kinds pinn", "there is no element type \"pinn\"; did you mean \"pin\"?" },
     { "new", "missing argument; usage: pinwheel new NAME.c|NAME.yaml" },
-    { "new foo.x", "\"foo.x\": a model file's name is made of letters, digits, _ and -, and ends in .c or .yaml" },
-    { "new 'a b.c'", "\"a b.c\": a model file's name is made of letters, digits, _ and -, and ends in .c or .yaml" },
+    { "new foo.x", "\"foo.x\": a model file's name has at most 99 letters, digits, _ and -, does not begin with -, and "
+                   "ends in .c or .yaml" },
+    { "new 'a b.c'", "\"a b.c\": a model file's name has at most 99 letters, digits, _ and -, does not begin with -, "
+                     "and ends in .c or .yaml" },
   };
   (void)state;
   cli_bad_each ("", bad, sizeof bad / sizeof *bad);

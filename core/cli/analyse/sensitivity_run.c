@@ -336,7 +336,7 @@ static int sensitivity_functionals (pw_sensitivity *x, pw_error *error) {
 
 /* The run of which samples are taken, where the derivatives' is ahead. */
 static int sensitivity_sampled (pw_sensitivity *x, pw_error *error) {
-  if (!pw_variation_may_jump (x->base.m.system)) return PW_OK;
+  if (!pw_system_may_jump (x->base.m.system)) return PW_OK;
   x->sampled = pw_run_open (x->base.m.system, x->runs.method, &x->runs.settings, error);
   return x->sampled ? PW_OK : error->status;
 }

@@ -295,11 +295,10 @@ static void report_linear (pw_json *j, const pw_check *x) {
   if (x->r == NULL || (j && l->A == NULL)) return;
   report_section (j, "linearisation", '{', "Linearised at the initial state");
   report_entry (j, "unknowns", l->unknowns, "unknowns", "%d", l->unknowns);
-  if (l->A == NULL) {
+  if (l->A == NULL && l->coordinates > CHECK_MOST)
     report_entry (j, NULL, 0, "eigenvalues", "not computed: %d coordinates, the limit is %d", l->coordinates,
                   CHECK_MOST);
-    return;
-  }
+  if (l->A == NULL) return;
   report_motion (j, l);
   if (j == NULL && x->fastest < 0 && l->twist[2] == 0)
     report_entry (j, NULL, 0, "eigenvalues", "all 0: nothing vibrates, grows or decays");

@@ -8,7 +8,7 @@
  * new_model_yaml. */
 #include "new.inc"
 
-/* "folder/my_car.c" gives "my_car" and ".c"; PW_INPUT if a model could not be found under that name. */
+/* "folder/my_car.c" gives "my_car" and ".c"; PW_INPUT for a name that would need quotes, begins with -, or is too long. */
 static int new_name (const char *path, char *name, size_t size, const char **ending, pw_error *error) {
   const char *base = strrchr (path, '/');
   base = base ? base + 1 : path;
@@ -16,7 +16,10 @@ static int new_name (const char *path, char *name, size_t size, const char **end
   *ending = base + n;
   if (n == 0 || n >= size || base[0] == '-' || (strcmp (*ending, ".c") != 0 && strcmp (*ending, ".yaml") != 0))
     return pw_fail (error, PW_INPUT,
-                    "\"%s\": a model file's name is made of letters, digits, _ and -, and ends in .c or .yaml", path);
+                    "\"%s\": a model file's name has at most %zu letters, digits, _ and -, does not begin with -, and "
+                    "ends in .c or "
+                    ".yaml",
+                    path, size - 1);
   snprintf (name, size, "%.*s", (int)n, base);
   return PW_OK;
 }
