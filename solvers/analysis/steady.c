@@ -3,6 +3,7 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
+#include "rank.h"
 #include "util.h"
 
 /* STEADY_EXACT: residual of a solution, in units of the scene;
@@ -49,27 +50,62 @@ static int steady_arrays (pw_steady *x) {
   return PW_OK;
 }
 
-int pw_signals_change (pw_run *r, double t, double period, double span, int *changed, pw_error *error) {
+typedef struct {
+  pw_run *r;
+  double *state;         /* 2 n: q, v */
+  double *values;        /* count: at the first of two times */
+  double *largest, *off; /* count: magnitude, difference */
+  int count;             /* numbers of signals */
+} signal_times;
+
+/* Compares signals at two times, in the run's state (number = 0) or one near it: a factor may be 0 in the run's.  A status; signals may
+ * fail in other states. */
+static int signals_compare (signal_times *x, int number, double t0, double t1) {
+  pw_run *r = x->r;
   pw_workspace *w = r->w;
-  int count = 3 * r->s->sources, status = PW_OK;
-  double *before = calloc (3 * (size_t)count + 1, sizeof *before), *largest = before + count, *off = largest + count,
-         at = t;
-  if (before == NULL) return pw_fail_memory (r->s, error);
-  for (int k = 1; status == PW_OK && k <= STEADY_TIMES; k++) {
-    double from = period > 0 ? t + span * fmod (0.618034 * k, 1) : t, part = k / (double)STEADY_TIMES;
-    status = pw_update_kinematics (w, at = from, r->q, r->v);
-    if (status == PW_OK && count) memcpy (before, w->u, (size_t)count * sizeof *before);
-    if (status == PW_OK)
-      status = pw_update_kinematics (w, at = period > 0 ? from + period : t + span * part * part, r->q, r->v);
-    for (int i = 0; status == PW_OK && i < count; i++) {
-      off[i] = pw_larger_or_nan (off[i], fabs (w->u[i] - before[i]));
-      largest[i] = fmax (largest[i], fmax (fabs (before[i]), fabs (w->u[i])));
-    }
+  int n = r->s->coords;
+  double *q = x->state, *v = q + n;
+  for (int j = 0; j < n; j++) {
+    double unit = number > 0 ? pw_unit (r->s, j) : 0;
+    q[j] = r->q[j] + unit * pw_irregular (1.7 + number, j + 1);
+    v[j] = r->v[j] + unit / w->scale.time * pw_irregular (2.9 + number, j + 1);
+  }
+  int status = pw_update_kinematics (w, t0, q, v);
+  if (status == PW_OK && x->count) memcpy (x->values, w->u, (size_t)x->count * sizeof *w->u);
+  if (status == PW_OK) status = pw_update_kinematics (w, t1, q, v);
+  for (int i = 0; status == PW_OK && i < x->count; i++) {
+    x->off[i] = pw_larger_or_nan (x->off[i], fabs (w->u[i] - x->values[i]));
+    x->largest[i] = fmax (x->largest[i], fmax (fabs (x->values[i]), fabs (w->u[i])));
+  }
+  return number > 0 ? PW_OK : status;
+}
+
+/* The middle between the first two breakpoints after t, up to t1; INFINITY without one.  *t: the first of them. */
+static double signals_between (pw_workspace *w, double *t, double t1) {
+  *t = pw_next_breakpoint (w, 1, *t);
+  return *t < t1 ? *t + (fmin (pw_next_breakpoint (w, 1, *t), t1) - *t) / 2 : INFINITY;
+}
+
+int pw_signals_change (pw_run *r, double t, double period, double span, int *changed, pw_error *error) {
+  signal_times x = { .r = r, .count = 3 * r->s->sources };
+  size_t count = (size_t)x.count;
+  double at = t, breakpoint = t;
+  int status = PW_OK;
+  x.values = calloc (3 * count + 2 * (size_t)r->s->coords + 1, sizeof *x.values);
+  if (x.values == NULL) return pw_fail_memory (r->s, error);
+  x.largest = x.values + count, x.off = x.largest + count, x.state = x.off + count;
+  for (int k = 1; status == PW_OK && k <= 2 * STEADY_TIMES && isfinite (at); k++) {
+    double part = k / (double)STEADY_TIMES;
+    at = k > STEADY_TIMES ? signals_between (r->w, &breakpoint, t + span)
+         : period > 0     ? t + span * fmod (0.618034 * k, 1)
+                          : t + span * part * part;
+    for (int number = 0; number < 2 && status == PW_OK && isfinite (at); number++)
+      status = signals_compare (&x, number, period > 0 ? at : t, period > 0 ? at + period : at);
   }
   *changed = -1;
-  for (int i = count; i-- > 0;)
-    if (!(off[i] <= SIGNAL_SAME * largest[i])) *changed = i / 3;
-  free (before);
+  for (int i = x.count; i-- > 0;)
+    if (!(x.off[i] <= SIGNAL_SAME * x.largest[i])) *changed = i / 3;
+  free (x.values);
   return status == PW_OK ? PW_OK : pw_run_annotate_error (r, pw_fail_signal (at, error), error);
 }
 

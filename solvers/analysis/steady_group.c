@@ -9,6 +9,9 @@
 #include "steady_parts.h"
 #include "util.h"
 
+/* Several states, since a body alone has more displacements than equations. */
+enum { GROUP_STATES = 2 };
+
 /* GROUP_APART: distance of that state from the initial one, in units of the scene, in an irregular
  * direction.  GROUP_ROUND: round-off of derivatives.  GROUP_PIVOT, GROUP_ZERO:
  * smallest pivots and entries of rates. */
@@ -93,13 +96,13 @@ int pw_steady_null (int rows, int n, double *M, double tolerance, double *out) {
   return left;
 }
 
-/* A state near the initial one, in general position on the constraints: off them residuals rotate with the whole. */
-static int group_place (pw_steady *x, double apart) {
+/* State `number` near the initial one, in general position on the constraints: off them residuals rotate with the whole. */
+static int group_place (pw_steady *x, double apart, int number) {
   pw_run *r = x->at[0].r;
   pw_projector p;
   for (int j = 0; j < x->n; j++) {
-    x->q[j] = r->q[j] + apart * pw_unit (x->s, j) * pw_irregular (1.7, j + 1);
-    x->v[j] = r->v[j] + apart * pw_unit (x->s, j) / x->T * pw_irregular (2.9, j + 1);
+    x->q[j] = r->q[j] + apart * pw_unit (x->s, j) * pw_irregular (1.7 + number, j + 1);
+    x->v[j] = r->v[j] + apart * pw_unit (x->s, j) / x->T * pw_irregular (2.9 + number, j + 1);
   }
   if (pw_projector_open (&p, r, x->s->metric, x->s->metric, &x->why) != PW_OK) return PW_RESOURCE;
   int status = pw_project_positions (&p, r, x->set.t, x->q, x->v);
@@ -139,17 +142,21 @@ static int group_effective (pw_steady *x, int rates) {
 
 int pw_steady_find_group (pw_steady *x) {
   pw_linearisation *l = &x->at[0].x;
-  int rates = pw_steady_rates (x->s), length = l->holonomic + l->rank + x->n, rows = length + 3;
-  int status = group_place (x, GROUP_APART);
-  if (status == PW_RETRY) status = group_place (x, GROUP_APART / 100);
-  if (status != PW_OK) return status;
-  double *M = calloc ((size_t)rows * (size_t)rates + (size_t)rates, sizeof *M), tolerance;
+  int rates = pw_steady_rates (x->s), length = l->holonomic + l->rank + x->n, rows = GROUP_STATES * (length + 3);
+  int status = PW_OK;
+  double *M = calloc ((size_t)rows * (size_t)rates + (size_t)rates, sizeof *M), size = 0;
   if (M == NULL) return PW_RESOURCE;
-  for (int c = 0; c < rates; c++) group_change (x, c, M + rows * rates, M + c * rows);
-  tolerance = PW_LINEAR_SYMMETRIC + 1e-4 * PW_LINEAR_SYMMETRIC * group_size (x);
-  x->group = x->s->bodies ? pw_steady_null (rows, rates, M, tolerance, x->axis) : 0;
+  for (int k = 0; k < GROUP_STATES && status == PW_OK; k++) {
+    status = group_place (x, GROUP_APART, k);
+    if (status == PW_RETRY) status = group_place (x, GROUP_APART / 100, k);
+    for (int c = 0; c < rates && status == PW_OK; c++)
+      group_change (x, c, M + rows * rates, M + c * rows + k * (length + 3));
+    if (status == PW_OK) size = fmax (size, group_size (x));
+  }
+  double tolerance = PW_LINEAR_SYMMETRIC * (1 + 1e-4 * size);
+  if (status == PW_OK) x->group = x->s->bodies ? pw_steady_null (rows, rates, M, tolerance, x->axis) : 0;
   free (M);
-  if (x->group < 0) return x->group;
+  if (status != PW_OK || x->group < 0) return status != PW_OK ? status : x->group;
   int idle = group_effective (x, rates);
   if (idle < 0) return idle;
   group_reduce (x->group, rates, x->axis);

@@ -116,7 +116,7 @@ int pw_steady_start (pw_steady *x, int k, double *u);
 
 /* ---- steady.c ---- */
 
-/* *changed: the first signal that differs, in the run's state, between times t and t + part of the span; with a period,
+/* *changed: the first signal that differs, in the run's state or one near it, between times t and t + part of the span; with a period,
  * between times in the span after t and one period later.  -1: none.  A status. */
 int pw_signals_change (pw_run *r, double t, double period, double span, int *changed, pw_error *error);
 

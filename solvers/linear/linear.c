@@ -102,10 +102,9 @@ static double linear_change (pw_linearisation *x, int j, double part) {
   return most;
 }
 
-/* The first state at which accelerations jump: their change does not decrease with that of the state.  -1: none. */
+/* The first state with which accelerations jump: their change does not decrease with that of the state.  -1: none. */
 static int linear_jump (pw_linearisation *x) {
-  pw_run *r = x->r;
-  if (!pw_system_may_jump (r->s) || pw_run_accelerate (r, r->t, r->q, r->v, x->a, x->lambda) != PW_OK) return -1;
+  if (!pw_system_may_jump (x->r->s)) return -1;
   for (int j = 0; j < 2 * x->n; j++)
     for (int side = -1; side <= 1; side += 2) {
       double change = linear_change (x, j, side * LINEAR_FAR);
@@ -118,16 +117,17 @@ static int linear_jump (pw_linearisation *x) {
 static int linear_compute (pw_linearisation *x, pw_linear *l, pw_error *error) {
   pw_run *r = x->r;
   char name[120];
-  int jump = linear_jump (x);
-  if (jump >= 0)
-    return pw_fail (error, PW_METHOD,
-                    "t = %.6g s: accelerations jump with %s at this state, which has no linearisation", r->t,
-                    pw_system_state_name (r->s, jump, name, sizeof name));
   int status = pw_linear_evaluate (x, r->t, r->q, r->v);
   if (status != PW_OK)
     return status > 0 ? pw_fail_singular (r, r->t, error)
                       : pw_run_annotate_error (r, pw_fail_signal (r->t, error), error);
   l->least = pw_linear_bases (x);
+  int jump = linear_jump (x);
+  if (jump >= 0)
+    return pw_fail (error, PW_METHOD,
+                    "t = %.6g s: accelerations jump with %s at this state, which has no linearisation", r->t,
+                    pw_system_state_name (r->s, jump, name, sizeof name));
+  if (pw_system_may_jump (r->s)) (void)pw_linear_evaluate (x, r->t, r->q, r->v);
   pw_linear_choose_frame (x);
   for (int c = 0; c < x->size; c++) linear_column_of_A (x, c);
   if (x->modes && pw_linear_matrices (x, l) != PW_OK) return PW_RESOURCE;

@@ -200,6 +200,7 @@ static void test_undetermined (void **state) {
   cli_shell (FIT "--free k --free s --free c --free w.x");
   const char *json = cli_file ("fit.json");
   assert_true (cli_number (json, "rank", NULL) == 2);
+  assert_true (cli_number (json, "freedom", NULL) == cli_number (json, "residuals", NULL) - 2);
   assert_non_null (strstr (cli_out, "The data do not determine k, s: changes in the ratio "));
   assert_non_null (strstr (cli_out, "The data do not determine w.x, which has no effect"));
   check_close ("s k", fit_value (json, "k", "value") * fit_value (json, "s", "value"), fit_k, 0.3, "the noise");

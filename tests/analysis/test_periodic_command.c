@@ -152,11 +152,26 @@ static void test_none (void **state) {
   assert_non_null (strstr (cli_err, "Newton's method leads to a steady motion or an equilibrium"));
 }
 
+/* A force that changes with time, except in the initial state, and one that acts for a short time. */
+static void test_vanishing (void **state) {
+  (void)state;
+  cli_write ("grow.yaml", "pinwheel: 1\nbodies: [{name: m, mass: 1, inertia: 1, rate: {vx: 1}}]\nelements:\n"
+                          "  - {force: f, body: m, fx: '-(1 + 0.5*cos (1.7*t))*m.x'}\n");
+  cli_bad ("pinwheel periodic @/grow.yaml --period pi", 2,
+           "model grow: signal f.fx does not repeat after 3.14159265359 s");
+  cli_bad ("pinwheel periodic @/grow.yaml --period free", 2,
+           "model grow: signal f.fx changes with time, so that the period is not free");
+  cli_write ("short.yaml", "pinwheel: 1\nbodies: [{name: m, mass: 1, inertia: 1}]\nelements:\n"
+                           "  - {force: f, body: m, fx: {harmonic: {amplitude: 1, omega: 2*pi}}}\n"
+                           "  - {force: g, body: m, fx: {pulse: {height: 1, start: 1.501, width: 0.002}}}\n");
+  cli_bad ("pinwheel periodic @/short.yaml --period 1", 2, "model short: signal g.fx does not repeat after 1 s");
+}
+
 int main (void) {
   const struct CMUnitTest tests[] = {
     cmocka_unit_test (test_motion), cmocka_unit_test (test_periods), cmocka_unit_test (test_free_period),
     cmocka_unit_test (test_branch), cmocka_unit_test (test_turns),   cmocka_unit_test (test_limit),
-    cmocka_unit_test (test_bad),    cmocka_unit_test (test_none),
+    cmocka_unit_test (test_bad),    cmocka_unit_test (test_none),    cmocka_unit_test (test_vanishing),
   };
   return cmocka_run_group_tests (tests, cli_setup, cli_teardown);
 }

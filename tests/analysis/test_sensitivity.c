@@ -186,6 +186,17 @@ static void test_jumping_integrals (void **state) {
     for (int o = 0; o < 4; o++)
       check_close ("derivative", x[2 * o + p], (value[1][3 * o] - value[0][3 * o]) / 2e-4, 1e-5, "differences of 1e-4");
   }
+  static const char *const methods[] = { "adams", "bdf", "ida", "radau", "galpha", "leapfrog" };
+  for (size_t k = 0; k < sizeof methods / sizeof *methods; k++) {
+    double other[SENSITIVITY_MOST];
+    snprintf (text, sizeof text, command, 0.5, 0.7);
+    char *at = strstr (text, "erk8+projection");
+    snprintf (at, sizeof text - (size_t)(at - text), "%s --rtol 1e-8", methods[k]);
+    cli_shell (text);
+    assert_int_equal (sensitivity_json ("\"derivative\": ", other), 8);
+    for (int i = 0; i < 8; i++)
+      check_close (methods[k], other[i], x[i], 2e-3 * (1 + fabs (x[i])), "steps of 1 ms with order 2");
+  }
 }
 
 /* A chain of ten rods amplifies errors of integration, which differ with the rows of the table, by 1e9 in 3 s. */

@@ -141,6 +141,24 @@ static void test_limit (void **state) {
   cli_bad ("pinwheel steady n-trailer --limit 1e-9 -o @/limit", 4, "--limit 1e-9: stopped; results are incomplete");
 }
 
+/* One body on two springs, the truss of von Mises: it has fewer equations than a plane has displacements, and no symmetry.  With
+ * k = 100 N/m, h = 3 m: fold and zero eigenvalues in closed form. */
+static void test_one_body (void **state) {
+  (void)state;
+  cli_write (
+      "truss.yaml",
+      "pinwheel: 1\nparameters: [{name: F, value: 0}]\nbodies: [{name: m, mass: 1, inertia: 1, start: {y: 3}}]\n"
+      "elements:\n  - {spring: l, body: [m, ground], at: [[0, 0], [-1, 0]], stiffness: 100, length: 'hypot(1, 3)'}\n"
+      "  - {spring: r, body: [m, ground], at: [[0, 0], [1, 0]], stiffness: 100, length: 'hypot(1, 3)'}\n"
+      "  - {drag: D, body: m, linear: 0.2, turning: 0.2}\n"
+      "  - {rotational-spring: q, body: [m, ground], stiffness: 1}\n  - {force: P, body: m, fy: -F}\n");
+  cli_good ("pinwheel steady @/truss.yaml --vary F=-50:400 --starts 0");
+  assert_non_null (strstr (cli_out, "truss: 2 branches of steady motions, F"));
+  assert_non_null (strstr (cli_out, "fold               248.075599"));
+  assert_non_null (strstr (cli_out, "zero eigenvalue    78.34980"));
+  assert_non_null (strstr (cli_out, "zero eigenvalue    238.6312"));
+}
+
 static void test_bad (void **state) {
   static const cli_wrong each[] = {
     { "n-trailer --hold tractor.radus=1",
@@ -176,6 +194,7 @@ int main (void) {
     cmocka_unit_test (test_motion),        cmocka_unit_test (test_branch), cmocka_unit_test (test_vary_held),
     cmocka_unit_test (test_linearise),     cmocka_unit_test (test_limit),  cmocka_unit_test (test_bad),
     cmocka_unit_test (test_closed_branch), cmocka_unit_test (test_ends),   cmocka_unit_test (test_rest),
+    cmocka_unit_test (test_one_body),
   };
   return cmocka_run_group_tests (tests, cli_setup, cli_teardown);
 }

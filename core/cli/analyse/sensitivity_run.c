@@ -206,9 +206,10 @@ static int sensitivity_interval (pw_sensitivity *x, double t0, double t1, sensit
   return status == PW_OK ? pw_sensitivity_at (x, t1, error) : status;
 }
 
-/* To a breakpoint t_b, or past a jump with the state, from just before it.  The integral of a column that jumps there from x-
- * to x+ has the derivative (x- - x+) dt_b/dp. */
+/* Past a breakpoint t_b, or a jump with the state, from just before it.  The integral of a column that jumps there from x- to x+
+ * has the derivative (x- - x+) dt_b/dp.  A breakpoint at the end of the run is only reached. */
 static int sensitivity_jump (pw_sensitivity *x, double t0, double t, int with_state, pw_error *error) {
+  int passed = with_state || t > x->passed;
   size_t F = (size_t)x->outcomes.functionals, P = (size_t)x->runs.count;
   double *slope = x->before + F;
   memcpy (x->before, x->value, F * sizeof *x->before);
@@ -218,12 +219,12 @@ static int sensitivity_jump (pw_sensitivity *x, double t0, double t, int with_st
   for (int i = 0; i < x->outcomes.functionals && status == PW_OK; i++) {
     const pw_functional *f = &x->outcomes.functional[i];
     double jump = x->before[i] - x->value[i];
-    if (pw_is_extremum (f->type) && f->t > t0 && f->t <= t) sensitivity_keep_extremum (x, i, !with_state);
+    if (pw_is_extremum (f->type) && f->t > t0 && f->t <= t) sensitivity_keep_extremum (x, i, !passed);
     if (!pw_is_integral (f->type) || jump == 0) continue;
     if (f->type != PW_INTEGRAL) jump /= x->t_end;
     if (f->type == PW_RMS) jump *= (x->before[i] + x->value[i]) / (2 * f->value);
     for (int p = 0; p < x->runs.count; p++)
-      x->end_slope[i * x->runs.count + p] += jump * sensitivity_moves (x, p, with_state);
+      x->end_slope[i * x->runs.count + p] += jump * sensitivity_moves (x, p, passed);
   }
   return status;
 }
@@ -245,12 +246,12 @@ static int sensitivity_advance (pw_sensitivity *x, double t, double to, sensitiv
                                 pw_error *error) {
   int jump, status = PW_OK;
   while (t < to && status == PW_OK) {
-    double next = sensitivity_next (x, t, to, &jump, error);
+    double next = sensitivity_next (x, t, to, &jump, error), near = 1e-9 * x->dt;
     if (isnan (next)) return error->status;
-    double end = jump ? next - fmin (1e-9 * x->dt, next - t) : next;
+    double end = jump ? next - fmin (near, next - t) : next;
+    if (jump == 1) x->passed = next, next = fmin (next + near, x->t_end);
     status = sensitivity_interval (x, t, end, list, error);
     if (status == PW_OK && jump) status = sensitivity_jump (x, end, next, jump == 2, error);
-    if (jump == 1) x->passed = next;
     pw_progress_at (progress, t = next);
   }
   return status;

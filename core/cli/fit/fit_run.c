@@ -50,7 +50,7 @@ int pw_fit_run (const pw_fit *x, const double *unknowns, double *out, pw_error *
 /* ---- Statistics ---- */
 
 int pw_fit_freedom (const pw_fit *x) {
-  return x->residuals - x->unknowns.runs.count;
+  return x->residuals - x->rank;
 }
 
 double pw_fit_quantile (const pw_fit *x) {

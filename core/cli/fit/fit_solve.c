@@ -229,12 +229,11 @@ static int solve_converged (const pw_fit *x, const gsl_matrix *J) {
 /* J = U S V^T with columns of length 1: the covariance is V S^-2 V^T, over the singular values that differ from 0. */
 static void solve_covariance (pw_fit *x) {
   const double *size = x->length;
-  int n = x->unknowns.runs.count, freedom = pw_fit_freedom (x);
-  double factor = x->weighted   ? 1
-                  : freedom > 0 ? x->chi2 / freedom
-                                : NAN,
-         least = fmax (SOLVE_RANK, 10 * pw_fit_noise (x)) * x->singular[0];
+  int n = x->unknowns.runs.count;
+  double least = fmax (SOLVE_RANK, 10 * pw_fit_noise (x)) * x->singular[0];
   for (x->rank = 0; x->rank < n && x->singular[x->rank] > least;) x->rank++;
+  int freedom = pw_fit_freedom (x);
+  double factor = x->weighted ? 1 : freedom > 0 ? x->chi2 / freedom : NAN;
   for (int i = 0; i < n; i++)
     for (int j = 0; j < n; j++) {
       double sum = 0;

@@ -143,9 +143,11 @@ static int check_linear (pw_check *x, pw_error *error) {
   x->limit = x->doubling = INFINITY;
   x->fastest = -1;
   if (x->r == NULL) return PW_OK;
-  int status = pw_run_linearise (x->r, CHECK_MOST, &x->linear, error);
-  if (status == PW_METHOD) check_add (&x->finding, "%s", error->text);
+  pw_error none = { 0 };
+  int status = pw_run_linearise (x->r, CHECK_MOST, &x->linear, &none);
+  if (status == PW_METHOD) check_add (&x->finding, "%s", none.text);
   if (status == PW_METHOD) return PW_OK;
+  if (status != PW_OK) *error = none;
   if (status != PW_OK || x->linear.A == NULL) return status;
   check_fastest (x);
   if (x->explicit_rk4 && x->step > x->limit)
