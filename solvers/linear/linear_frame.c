@@ -48,6 +48,27 @@ static pw_linear_frame linear_try (const pw_linearisation *x, int b, int turning
   return f;
 }
 
+/* The frame that turns with the positions of all bodies, if not with one of them: at their mean, with its velocity and the
+ * angular velocity that fits theirs. */
+static pw_linear_frame linear_fit (const pw_linearisation *x) {
+  const double *q = x->r->q, *v = x->r->v;
+  int bodies = 3 * x->r->s->bodies;
+  double moment = 0, square = 0;
+  pw_linear_frame f = { .residual = INFINITY };
+  for (int j = 0; j < bodies; j++)
+    if (j % 3 < 2) f.origin[j % 3] += 3 * q[j] / bodies, f.twist[j % 3] += 3 * v[j] / bodies;
+  for (int j = 0; j < bodies; j += 3) {
+    double dx = q[j] - f.origin[0], dy = q[j + 1] - f.origin[1];
+    moment += dx * (v[j + 1] - f.twist[1]) - dy * (v[j] - f.twist[0]);
+    square += dx * dx + dy * dy;
+  }
+  if (!(square > 0)) return f;
+  f.twist[2] = moment / square;
+  f.acceleration = linear_residual (x, &f);
+  f.residual = f.acceleration / linear_unit (x);
+  return f;
+}
+
 void pw_linear_choose_frame (pw_linearisation *x) {
   if (x->r->s->bodies == 0) return;
   x->frame = linear_try (x, 0, 0);
@@ -55,6 +76,8 @@ void pw_linear_choose_frame (pw_linearisation *x) {
     pw_linear_frame f = linear_try (x, b, 1);
     if (f.residual < x->frame.residual / 2) x->frame = f;
   }
+  pw_linear_frame f = linear_fit (x);
+  if (x->frame.residual > LINEAR_EXACT && f.residual < x->frame.residual / 2) x->frame = f;
 }
 
 /* ---- Symmetries ---- */

@@ -92,6 +92,20 @@ static void test_times (void **state) {
   linearise_shows ("the eigenvalues are not stability exponents\n");
 }
 
+/* Two masses on a spring that whirl at W = 1.5 rad/s, neither of which turns: the frame is that of their positions, and the
+ * frequency of the only mode is (3 W^2 + k/mu)^(1/2), k/mu = 15 1/s^2. */
+static void test_whirl (void **state) {
+  (void)state;
+  cli_write ("whirl.yaml",
+             "pinwheel: 1\nlet: {mu: 2/3, r: '10*0.5/(10 - mu*1.5^2)'}\nbodies:\n"
+             "  - {name: a, mass: 1, inertia: 0.1, start: {x: 2*r/3}, rate: {vy: r}}\n"
+             "  - {name: b, mass: 2, inertia: 0.3, start: {x: -r/3}, rate: {vy: -r/2}}\n"
+             "elements:\n  - {spring: S, body: [a, b], at: [[0, 0], [0, 0]], stiffness: 10, length: 0.5}\n");
+  cli_good ("pinwheel linearise @/whirl.yaml");
+  assert_non_null (strstr (cli_out, "The motion is steady"));
+  assert_non_null (strstr (cli_out, "     1             0           4.6637         0.74225"));
+}
+
 static void test_bad (void **state) {
   static const cli_wrong each[] = {
     { "n-trailer --output tractor.q",
@@ -156,7 +170,7 @@ static void test_page (void **state) {
 int main (void) {
   const struct CMUnitTest tests[] = {
     cmocka_unit_test (test_oscillator), cmocka_unit_test (test_npz), cmocka_unit_test (test_page),
-    cmocka_unit_test (test_times),      cmocka_unit_test (test_bad),
+    cmocka_unit_test (test_times),      cmocka_unit_test (test_bad), cmocka_unit_test (test_whirl),
   };
   return cmocka_run_group_tests (tests, cli_setup, cli_teardown);
 }
