@@ -6,21 +6,24 @@
 #include "util.h"
 
 /* NEWTON_MOST: iterations of a solution, of a point of a branch.  BRANCH_TURN: cosine of the largest angle between the
- * tangents of successive points; BRANCH_APART: largest correction of a predictor, relative to the step. */
+ * tangents of successive points; BRANCH_BENT: largest distance between the directions of a chord and of the sum of the
+ * tangents at its ends, which is of second order on a smooth branch, but not from one branch to another.  BRANCH_APART and
+ * BRANCH_ASIDE: largest correction of a predictor and of an interpolated point, relative to the step. */
 enum { NEWTON_MOST = 60, BRANCH_MOST = 8, NEWTON_HALVINGS = 10, LOCATE_MOST = 60 };
-static const double BRANCH_TURN = 0.96, BRANCH_APART = 0.3, BRANCH_GROW = 1.5, NEWTON_DAMPING = 0.1, BRANCH_END = 1e-9;
+static const double BRANCH_TURN = 0.96, BRANCH_APART = 0.3, BRANCH_BENT = 0.02, BRANCH_ASIDE = 0.002, BRANCH_GROW = 1.5,
+                    NEWTON_DAMPING = 0.1, BRANCH_END = 1e-9;
 
 int pw_branch_open (pw_branch *b, const pw_branch_equations *of, pw_error *error) {
   size_t n = (size_t)of->unknowns + 1, m = (size_t)of->equations + n, large = n > m ? n : m;
   *b = (pw_branch){ .of = *of, .room = (int)(8 * large + 200) };
   if (!(b->of.rank > 0)) b->of.rank = 1e-9;
-  const pw_array array[] = { { &b->at.u, n },        { &b->at.tangent, n },
-                             { &b->before.u, n },    { &b->before.tangent, n },
-                             { &b->next.u, n },      { &b->next.tangent, n },
-                             { &b->F, large },       { &b->J, m * n },
-                             { &b->du, large },      { &b->trial, n },
-                             { &b->condition, n },   { &b->end.u, n },
-                             { &b->end.tangent, n }, { &b->work, (size_t)b->room + 34 * large } };
+  const pw_array array[] = {
+    { &b->at.u, n },           { &b->at.tangent, n },  { &b->before.u, n },
+    { &b->before.tangent, n }, { &b->next.u, n },      { &b->next.tangent, n },
+    { &b->F, large },          { &b->J, m * n },       { &b->du, large },
+    { &b->trial, n },          { &b->condition, n },   { &b->predicted, n },
+    { &b->end.u, n },          { &b->end.tangent, n }, { &b->work, (size_t)b->room + 34 * large }
+  };
   b->room += (int)(34 * large);
   b->memory = pw_alloc_arrays (array, sizeof array / sizeof *array);
   b->pivot = malloc (n * sizeof *b->pivot);
@@ -160,24 +163,36 @@ int pw_branch_start (pw_branch *b, const double *u, double direction, pw_error *
   return branch_tangent (b, b->at.u, b->condition, b->at.tangent, error);
 }
 
-/* The point near `from` + h tangent, on the plane perpendicular to the tangent; its own tangent. */
-static int branch_correct (pw_branch *b, const pw_branch_point *from, double h, pw_branch_point *to, pw_error *error) {
-  int n = b->of.unknowns + 1;
-  double away = 0;
-  memcpy (b->condition, from->tangent, (size_t)n * sizeof *b->condition);
-  for (int j = 0; j < n; j++) to->u[j] = from->u[j] + h * from->tangent[j];
+static double branch_distance (const pw_branch *b, const double *x, const double *y) {
+  double sum = 0;
+  for (int j = 0; j <= b->of.unknowns; j++) sum += pow (x[j] - y[j], 2);
+  return sqrt (sum);
+}
+
+/* Corrects to->u on the plane perpendicular to a tangent, and sets its own tangent.  PW_RETRY farther than `most` away. */
+static int branch_correct (pw_branch *b, const double *tangent, double most, pw_branch_point *to, pw_error *error) {
+  size_t bytes = ((size_t)b->of.unknowns + 1) * sizeof *tangent;
+  memcpy (b->condition, tangent, bytes);
+  memcpy (b->predicted, to->u, bytes);
   int status = branch_iterate (b, to->u, b->condition, 0, error);
   if (status != PW_OK) return status;
-  for (int j = 0; j < n; j++) away += pow (to->u[j] - from->u[j] - h * from->tangent[j], 2);
-  if (sqrt (away) > BRANCH_APART * fabs (h)) return PW_RETRY;
+  if (branch_distance (b, to->u, b->predicted) > most) return PW_RETRY;
   return branch_tangent (b, to->u, b->condition, to->tangent, error);
 }
 
+/* Whether two points are on one smooth branch: the chord between them has the direction of the sum of their tangents. */
+static int branch_smooth (const pw_branch *b, const pw_branch_point *from, const pw_branch_point *to) {
+  double chord = branch_distance (b, to->u, from->u), dot = 0, off = 0;
+  for (int j = 0; j <= b->of.unknowns; j++) dot += from->tangent[j] * to->tangent[j];
+  for (int j = 0; j <= b->of.unknowns; j++)
+    off += pow ((to->u[j] - from->u[j]) / chord - (to->tangent[j] + from->tangent[j]) / sqrt (2 + 2 * dot), 2);
+  return dot >= BRANCH_TURN && sqrt (off) <= BRANCH_BENT;
+}
+
 static int branch_try (pw_branch *b, pw_error *error) {
-  double dot = 0;
-  int status = branch_correct (b, &b->at, b->step, &b->next, error);
-  for (int j = 0; j <= b->of.unknowns; j++) dot += b->at.tangent[j] * b->next.tangent[j];
-  return status == PW_OK && dot < BRANCH_TURN ? PW_RETRY : status;
+  for (int j = 0; j <= b->of.unknowns; j++) b->next.u[j] = b->at.u[j] + b->step * b->at.tangent[j];
+  int status = branch_correct (b, b->at.tangent, BRANCH_APART * b->step, &b->next, error);
+  return status == PW_OK && !branch_smooth (b, &b->at, &b->next) ? PW_RETRY : status;
 }
 
 int pw_branch_step (pw_branch *b, pw_error *error) {
@@ -194,10 +209,13 @@ int pw_branch_step (pw_branch *b, pw_error *error) {
   return PW_OK;
 }
 
+/* From the cubic through both points along their tangents. */
 int pw_branch_between (pw_branch *b, double s, pw_branch_point *point, pw_error *error) {
-  double h = 0;
-  for (int j = 0; j <= b->of.unknowns; j++) h += (b->at.u[j] - b->before.u[j]) * b->before.tangent[j];
-  return branch_correct (b, &b->before, s * h, point, error);
+  double chord = branch_distance (b, b->at.u, b->before.u), r = 1 - s;
+  for (int j = 0; j <= b->of.unknowns; j++)
+    point->u[j] = r * r * ((1 + 2 * s) * b->before.u[j] + s * chord * b->before.tangent[j]) +
+                  s * s * ((1 + 2 * r) * b->at.u[j] - r * chord * b->at.tangent[j]);
+  return branch_correct (b, b->before.tangent, BRANCH_ASIDE * chord, point, error);
 }
 
 int pw_branch_fold (void *context, const pw_branch_point *point, double *value, pw_error *error) {
@@ -262,12 +280,11 @@ int pw_branch_at_end (pw_branch *b, int *ended, pw_error *error) {
 }
 
 int pw_branch_closed (const pw_branch *b, const pw_branch_point *first) {
-  double step = 0, off = 0, before = 0, now = 0;
+  double before = 0, now = 0;
   for (int j = 0; j <= b->of.unknowns; j++) {
-    step += pow (b->at.u[j] - b->before.u[j], 2);
-    off += pow (b->at.u[j] - first->u[j], 2);
     before += (b->before.u[j] - first->u[j]) * first->tangent[j];
     now += (b->at.u[j] - first->u[j]) * first->tangent[j];
   }
-  return off < 1.2 * step && before < 0 && now >= 0;
+  double off = branch_distance (b, b->at.u, first->u), step = branch_distance (b, b->at.u, b->before.u);
+  return off < 1.1 * step && before < 0 && now >= 0;
 }

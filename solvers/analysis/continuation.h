@@ -42,7 +42,7 @@ typedef struct {
   /* private */
   pw_branch_point next, end;
   double limit; /* of p, sought */
-  double *F, *J, *du, *trial, *work, *condition;
+  double *F, *J, *du, *trial, *work, *condition, *predicted;
   int *pivot, room;
   char *memory;
 } pw_branch;
@@ -60,7 +60,7 @@ int pw_branch_solve (pw_branch *b, double *u, pw_error *error);
 int pw_branch_start (pw_branch *b, const double *u, double direction, pw_error *error);
 
 /* The next point.  The step length adapts to the curvature of the branch.  PW_RETRY if no step of length `least`
- * converges to a point nearby. */
+ * converges to a point nearby on a smooth branch.  Branches that bifurcate from it are not followed. */
 int pw_branch_step (pw_branch *b, pw_error *error);
 
 /* The point of the branch at fraction s (0 to 1) of the distance between the last two points.  *point has its own

@@ -61,6 +61,52 @@ static void test_folds (void **state) {
   pw_branch_close (&b);
 }
 
+/* Pitchforks at p = *context on the curved branch x = 3 sin p: other branches leave it at (x - 3 sin p)^2 = p - *context. */
+static int pitchfork (void *context, const double *u, double *F, double *dF, pw_error *error) {
+  double off = u[0] - 3 * sin (u[1]), p = u[1] - *(double *)context;
+  (void)error;
+  F[0] = off * (p - off * off);
+  if (dF) dF[0] = p - 3 * off * off, dF[1] = off - 3 * cos (u[1]) * dF[0];
+  return PW_OK;
+}
+
+static int pitchfork_sign (void *context, const pw_branch_point *point, double *value, pw_error *error) {
+  double F, dF[2] = { 0 };
+  int status = pitchfork (context, point->u, &F, dF, error);
+  *value = dF[0];
+  return status;
+}
+
+/* Steps of any length pass pitchforks on the same branch, and the pitchfork is located. */
+static void test_pitchforks (void **state) {
+  double at[2], tangent[2], where;
+  const pw_branch_equations of = {
+    .unknowns = 1, .equations = 1, .tolerance = 1e-9, .rank = 1e-7, .evaluate = pitchfork, .context = &where
+  };
+  pw_branch_point point = { at, tangent };
+  pw_error error = { 0 };
+  (void)state;
+  for (int k = 0; k < 300; k++) {
+    double u[2] = { 0, 0 };
+    int passed = 0;
+    pw_branch b;
+    check_ok (pw_branch_open (&b, &of, &error), &error);
+    b.most = 0.05 + 0.001 * k, b.step = b.most / 4, b.least = 1e-6, where = 0.8 + 0.01 * (k % 17);
+    check_ok (pw_branch_start (&b, u, 1, &error), &error);
+    while (b.at.u[1] < 1.5) {
+      check_ok (pw_branch_step (&b, &error), &error);
+      check_close ("x", b.at.u[0], 3 * sin (b.at.u[1]), 1e-4, "the tolerance over the distance from the pitchfork");
+      assert_false (b.folded);
+      if (passed || b.at.u[1] < where) continue;
+      check_ok (pw_branch_locate (&b, pitchfork_sign, &where, 1e-7, &point, &error), &error);
+      check_close ("p", at[1], where, 5e-4, "Newton's method ends where J is almost singular: 1e-3 of the step");
+      passed = 1;
+    }
+    assert_true (passed);
+    pw_branch_close (&b);
+  }
+}
+
 /* With p decreasing from the same point x decreases, and steps grow without curvature. */
 static void test_direction (void **state) {
   double u[3] = { -2, 0, -6 };
@@ -143,9 +189,9 @@ static void test_damping (void **state) {
 }
 
 int main (void) {
-  const struct CMUnitTest tests[] = {
-    cmocka_unit_test (test_folds), cmocka_unit_test (test_direction),        cmocka_unit_test (test_start_at_fold),
-    cmocka_unit_test (test_end),   cmocka_unit_test (test_without_solution), cmocka_unit_test (test_damping)
-  };
+  const struct CMUnitTest tests[] = { cmocka_unit_test (test_folds),     cmocka_unit_test (test_pitchforks),
+                                      cmocka_unit_test (test_direction), cmocka_unit_test (test_start_at_fold),
+                                      cmocka_unit_test (test_end),       cmocka_unit_test (test_without_solution),
+                                      cmocka_unit_test (test_damping) };
   return cmocka_run_group_tests (tests, NULL, NULL);
 }
