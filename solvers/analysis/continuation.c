@@ -209,13 +209,17 @@ int pw_branch_step (pw_branch *b, pw_error *error) {
   return PW_OK;
 }
 
-/* From the cubic through both points along their tangents. */
 int pw_branch_between (pw_branch *b, double s, pw_branch_point *point, pw_error *error) {
+  size_t bytes = ((size_t)b->of.unknowns + 1) * sizeof *point->u;
   double chord = branch_distance (b, b->at.u, b->before.u), r = 1 - s;
   for (int j = 0; j <= b->of.unknowns; j++)
     point->u[j] = r * r * ((1 + 2 * s) * b->before.u[j] + s * chord * b->before.tangent[j]) +
                   s * s * ((1 + 2 * r) * b->at.u[j] - r * chord * b->at.tangent[j]);
-  return branch_correct (b, b->before.tangent, BRANCH_ASIDE * chord, point, error);
+  int status = branch_correct (b, b->before.tangent, BRANCH_ASIDE * chord, point, error);
+  if (status != PW_RETRY) return status;
+  memcpy (point->u, b->predicted, bytes);
+  memcpy (point->tangent, b->before.tangent, bytes);
+  return PW_OK;
 }
 
 int pw_branch_fold (void *context, const pw_branch_point *point, double *value, pw_error *error) {

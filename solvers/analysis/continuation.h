@@ -63,13 +63,12 @@ int pw_branch_start (pw_branch *b, const double *u, double direction, pw_error *
  * converges to a point nearby on a smooth branch.  Branches that bifurcate from it are not followed. */
 int pw_branch_step (pw_branch *b, pw_error *error);
 
-/* The point of the branch at fraction s (0 to 1) of the distance between the last two points.  *point has its own
- * arrays. */
+/* The point of the branch at fraction s (0 to 1) of the distance between the last two points; that of the cubic through
+ * both if Newton's method does not converge, as near bifurcations.  *point has its own arrays. */
 int pw_branch_between (pw_branch *b, double s, pw_branch_point *point, pw_error *error);
 
-/* The point between the last two points where a test changes its sign, to `accuracy` of their distance, or as near as
- * Newton's method converges: at a bifurcation it does not.  `test` (a status) sets *value.  Folds: the last entry of
- * the tangent. */
+/* The point between the last two points where a test changes its sign, to `accuracy` of their distance.  `test`
+ * (a status) sets *value. */
 int pw_branch_locate (pw_branch *b,
                       int (*test) (void *context, const pw_branch_point *point, double *value, pw_error *error),
                       void *context, double accuracy, pw_branch_point *point, pw_error *error);
