@@ -95,8 +95,26 @@ pw_run *pw_periodic_run (pw_periodic *x, int which, double value, double rtol, c
 
 /* ---- The flow ---- */
 
-/* Bases at the initial state of the run, for perturbations on the constraints and their minimal coordinates. */
-static int flow_basis (pw_periodic *x, pw_run *r) {
+/* x->change = the change of the consistent state nearest to x->moved with entry j, in units of the scene, by differences. */
+static int flow_nearest (pw_periodic *x, pw_run *r, int j) {
+  const double h = 1e-5, initial = x->moved[j];
+  int n = x->n, status = PW_OK;
+  memset (x->change, 0, 2 * (size_t)n * sizeof *x->change);
+  for (int side = -1; side <= 1 && status == PW_OK; side += 2) {
+    x->moved[j] = initial + side * h * pw_periodic_unit (x, j);
+    status = pw_run_restart (r, x->moved, x->moved + n, &x->why);
+    for (int i = 0; i < n; i++) {
+      x->change[i] += side * r->q[i] / (2 * h);
+      x->change[n + i] += side * r->v[i] / (2 * h);
+    }
+  }
+  x->moved[j] = initial;
+  return status;
+}
+
+/* Bases at the initial state of the run, for perturbations on the constraints and their minimal coordinates: of such
+ * perturbations, or of changes of the consistent state nearest to x->moved. */
+static int flow_basis (pw_periodic *x, pw_run *r, int nearest) {
   pw_linearisation l;
   int n = x->n, status = pw_linear_open (&l, r, 0, n);
   if (status == PW_OK) status = pw_linear_evaluate (&l, r->t, r->q, r->v);
@@ -109,10 +127,11 @@ static int flow_basis (pw_periodic *x, pw_run *r) {
   for (int j = 0; status == PW_OK && j < 2 * n; j++) {
     memset (x->change, 0, 2 * (size_t)n * sizeof *x->change);
     x->change[j] = pw_periodic_unit (x, j);
+    if (nearest) status = flow_nearest (x, r, j);
     pw_linear_coordinates (&l, x->change, x->change + n, 1, x->dual + j * l.size);
   }
   pw_linear_close (&l);
-  return status;
+  return status == PW_OK && nearest ? pw_run_restart (r, x->moved, x->moved + n, &x->why) : status;
 }
 
 static int flow_vary (pw_periodic *x, pw_run *r, double end) {
@@ -135,16 +154,16 @@ static int flow_vary (pw_periodic *x, pw_run *r, double end) {
 }
 
 /* Advances a run, at its initial state, by one period. */
-static int flow_run (pw_periodic *x, pw_run *r, double period, int derivatives) {
+static int flow_run (pw_periodic *x, pw_run *r, double period, pw_flow_accuracy accuracy) {
   size_t n = (size_t)x->n, bytes = n * sizeof *r->q;
   double end = x->set.t + period;
   pw_sample sample;
-  int status = derivatives ? flow_basis (x, r) : PW_OK;
+  int status = accuracy == PW_FLOW ? PW_OK : flow_basis (x, r, accuracy == PW_FLOW_DERIVATIVES);
   if (status != PW_OK) return status == PW_RETRY ? pw_fail_singular (r, r->t, &x->why) : status;
   status = pw_run_sample (r, r->t, &sample, &x->why);
   if (status != PW_OK) return status;
   memcpy (x->y0, sample.q, bytes), memcpy (x->y0 + n, sample.v, bytes), memcpy (x->a0, sample.a, bytes);
-  if (derivatives) return flow_vary (x, r, end);
+  if (accuracy != PW_FLOW) return flow_vary (x, r, end);
   while (status == PW_OK && pw_run_time (r) < end) status = pw_run_advance (r, end, &x->why);
   if (status == PW_OK) status = pw_run_sample (r, end, &sample, &x->why);
   if (status != PW_OK) return status;
@@ -159,7 +178,7 @@ int pw_periodic_flow (pw_periodic *x, const double *u, pw_flow_accuracy accuracy
   if (x->set.free && !(period * FLOW_FAR > x->about && period < FLOW_FAR * x->about)) return PW_RETRY;
   for (int j = 0; j < 2 * x->n; j++) x->moved[j] = u[j] * pw_periodic_unit (x, j);
   pw_run *r = pw_periodic_run (x, which, value, rtol, x->moved);
-  int status = r ? flow_run (x, r, x->set.free ? period : x->at[which].period, accuracy != PW_FLOW) : x->why.status;
+  int status = r ? flow_run (x, r, x->set.free ? period : x->at[which].period, accuracy) : x->why.status;
   if (r) pw_run_close (r);
   if (status == PW_OK) return PW_OK;
   if (status == PW_RESOURCE || (status == PW_INPUT && r == NULL)) return *error = x->why, status;

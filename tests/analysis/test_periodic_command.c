@@ -105,6 +105,45 @@ static void test_branch (void **state) {
   assert_non_null (strstr (cli_file ("branch/periodic.gp"), "label_of_x = 'A'"));
 }
 
+/* A driven pendulum loses its symmetry at A = 1.00431948, where det (M - 1) of its own equation, by RK4, vanishes. */
+static void test_pitchfork (void **state) {
+  (void)state;
+  cli_write ("driven.yaml",
+             "pinwheel: 1\n"
+             "parameters: [{name: A, value: 0.5}]\n"
+             "bodies: [{name: bob, mass: 1, inertia: 1}]\n"
+             "elements:\n"
+             "  - {pin: pivot, body: [bob, ground], at: [[0, 0], [0, 0]]}\n"
+             "  - {torque: weight, body: [bob, ground], value: -sin(bob.phi)}\n"
+             "  - {friction: air, body: [bob, ground], viscous: 0.5}\n"
+             "  - {torque: drive, body: [bob, ground], value: {harmonic: {amplitude: A, omega: 2/3}}}\n");
+  static const char *const command[] = { "pinwheel periodic @/driven.yaml --vary A=0.5:1.2",
+                                         "pinwheel periodic @/driven.yaml --vary A=0.9:1.2" };
+  for (size_t k = 0; k < sizeof command / sizeof *command; k++) {
+    cli_good (command[k]);
+    periodic_shows ("  branch point       1.004319");
+    if (strstr (cli_out, "fold")) fail_msg ("a fold in\n%s", cli_out);
+  }
+}
+
+/* The heading of a wheel, and with it the consistent initial states, depend on the parameter. */
+static void test_constraint (void **state) {
+  (void)state;
+  cli_write (
+      "gait.yaml",
+      "pinwheel: 1\n"
+      "parameters: [{name: off, value: 0.1}]\n"
+      "bodies:\n"
+      "  - {name: car, mass: 8, inertia: 1, start: {x: 0, y: 0, phi: 0}, rate: {vx: 1}}\n"
+      "elements:\n"
+      "  - {wheel: W, body: car, at: [0, 0]}\n"
+      "  - {steered-wheel: S, body: car, at: [0.6, 0], heading: {harmonic: {amplitude: 0.2, omega: 2, offset: off}}}\n"
+      "  - {force: push, body: car, fx: cos(car.phi), fy: sin(car.phi)}\n"
+      "  - {drag: D, body: car, linear: 2, quadratic: 1}\n");
+  cli_good ("pinwheel periodic @/gait.yaml --vary off=0.1:0.3");
+  periodic_shows ("  ends                      0.3");
+}
+
 static void test_limit (void **state) {
   (void)state;
   cli_bad ("pinwheel periodic snakeboard --limit 1e-9 -o @/limit", 4, "--limit 1e-9: stopped; results are incomplete");
@@ -169,9 +208,10 @@ static void test_vanishing (void **state) {
 
 int main (void) {
   const struct CMUnitTest tests[] = {
-    cmocka_unit_test (test_motion), cmocka_unit_test (test_periods), cmocka_unit_test (test_free_period),
-    cmocka_unit_test (test_branch), cmocka_unit_test (test_turns),   cmocka_unit_test (test_limit),
-    cmocka_unit_test (test_bad),    cmocka_unit_test (test_none),    cmocka_unit_test (test_vanishing),
+    cmocka_unit_test (test_motion),    cmocka_unit_test (test_periods),    cmocka_unit_test (test_free_period),
+    cmocka_unit_test (test_pitchfork), cmocka_unit_test (test_constraint), cmocka_unit_test (test_branch),
+    cmocka_unit_test (test_turns),     cmocka_unit_test (test_limit),      cmocka_unit_test (test_bad),
+    cmocka_unit_test (test_none),      cmocka_unit_test (test_vanishing),
   };
   return cmocka_run_group_tests (tests, cli_setup, cli_teardown);
 }
