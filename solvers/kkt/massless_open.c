@@ -144,21 +144,22 @@ static int massless_check (pw_massless *r, const massless_plan *p, pw_error *err
   static const double zero[3] = { 0 };
   const pw_system *s = p->s;
   for (pw_component *c = r->component; c < r->end; c++) {
-    c->pivots = 0;
+    int massless = 0;
     for (int n = 0; n < c->cols; n++) {
       int j = c->global[n];
       c->square[n] = pw_is_angle (s, j) ? 1 / (s->scale.length * s->scale.length) : 1;
       c->massless[n] = p->weight[j] == 0;
       c->massive_square[n] = c->massless[n] ? 0 : c->square[n];
       if (!c->massless[n]) c->massive[c->massives++] = n;
-      c->pivots += c->massless[n];
+      massless += c->massless[n];
     }
+    c->pivots = massless < c->rows ? massless : c->rows;
     c->lower = c->cols + c->cols % 2;
     c->stride = c->lower + c->pivots;
     for (int i = 0; i < c->rows * c->groups; i++)
       if (c->row[i / c->groups].from[i % c->groups] == NULL) c->row[i / c->groups].from[i % c->groups] = zero;
-    int found = c->pivots <= c->rows ? pw_massless_match (c) : 0;
-    if (found == c->pivots) continue;
+    int found = pw_massless_match (c);
+    if (found == massless) continue;
     for (int n = 0; n < c->cols; n++) {
       int used = 0;
       for (int q = 0; q < found; q++) used |= c->row[q].pivot == n;
