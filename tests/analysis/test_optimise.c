@@ -229,6 +229,10 @@ static void test_no_effect (void **state) {
   (void)state;
   cli_shell ("pinwheel optimise pendulum --maximise bob.y --free I=0:1 --set g=0 -t 0.1 --starts 2");
   assert_string_equal (cli_err, "pinwheel: bob.y is the same in all runs: no free value has an effect on it\n");
+  cli_shell ("pinwheel optimise @/point.yaml --minimise p.x --free b=-3:3 --free a=-1:3 --json @/o.json");
+  if (!strstr (cli_out, " 3  without effect\n") || !strstr (cli_out, " 3  at its lower bound\n"))
+    fail_msg ("one without effect, one at its bound:\n%s", cli_out);
+  assert_non_null (strstr (cli_file ("o.json"), "\"bound\": null"));
 }
 
 /* Given initial values that the best run does not have. */

@@ -52,9 +52,25 @@ static int report_constant (const pw_optimise *x) {
   return most - least <= 1e-14 * fabs (most);
 }
 
-/* Whether the best value of unknown i is at its lower (-1) or upper bound. */
+/* 1 if outputs are the same in all runs that differ from the first one of their search in unknown i alone. */
+static int report_inert (const pw_optimise *x, int i) {
+  int n = x->unknowns.runs.count, columns = n + x->outputs, pairs = 0;
+  for (const pw_search_start *s = x->start; s < x->start + x->starts + x->polished; s++)
+    for (long k = 1; k < s->runs; k++) {
+      const double *a = s->trial, *b = a + k * columns;
+      int others = a[i] == b[i];
+      for (int j = 0; j < n; j++) others |= j != i && a[j] != b[j];
+      for (int j = n; j < columns && !others; j++)
+        if (!(fabs (a[j] - b[j]) <= 1e-14 * fabs (a[j]))) return 0;
+      pairs += !others;
+    }
+  return pairs > 0;
+}
+
+/* Whether the best value of unknown i, if that has an effect, is at its lower (-1) or upper bound. */
 static int report_side (const pw_optimise *x, int i) {
   const pw_unknown *u = x->unknowns.runs.list + i;
+  if (report_inert (x, i)) return 0;
   double near = 10 * PW_SEARCH_FINE * u->scale, value = x->start[x->best].best[i];
   return value - u->low <= near ? -1 : u->high - value <= near;
 }
@@ -80,7 +96,10 @@ static void report_unknowns (const pw_optimise *x) {
       pw_cell_number (&t, 12, x->start[x->best].best[i], REPORT_DIGITS);
       pw_cell_number (&t, 12, isfinite (u->low) ? u->low : NAN, REPORT_DIGITS);
       pw_cell_number (&t, 12, isfinite (u->high) ? u->high : NAN, REPORT_DIGITS);
-      pw_cell (&t, -1, (const char *[]){ "at its lower bound", "", "at its upper bound" }[1 + report_side (x, i)]);
+      pw_cell (&t, -1,
+               report_inert (x, i)
+                   ? "without effect"
+                   : (const char *[]){ "at its lower bound", "", "at its upper bound" }[1 + report_side (x, i)]);
       pw_row_end (&t);
     }
   }
