@@ -83,7 +83,7 @@ static void test_singular (void **state) {
   assert_int_equal (cli_run ("pinwheel check @/loose.yaml"), 2);
   check_shows ("saddle-point matrix                singular; see below");
   check_shows ("  FAILED: model loose: ");
-  assert_non_null (strstr (cli_err, "ghost.x has no mass"));
+  assert_non_null (strstr (cli_err, "ghost.phi has no inertia"));
   assert_int_equal (cli_run ("pinwheel check @/loose.yaml --json -"), 2);
   assert_non_null (strstr (cli_out, "\"saddle_point\": \"singular\""));
   assert_true (cli_says (cli_out, "status", "failed"));
