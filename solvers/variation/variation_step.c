@@ -43,17 +43,18 @@ static double step_energy (const pw_variation *x, const double *Y) {
   return most;
 }
 
-static void step_combine (const pw_variation *x, const pw_variation_column *c, const double *weight, int count,
-                          double h, double *out) {
+/* Adds h sum weight_k K_k to `out`: entries from `first` to `end` - 1. */
+static void step_combine (const pw_variation_column *c, const double *weight, int count, double h, int first, int end,
+                          double *out) {
   for (int k = 0; k < count; k++)
-    for (int j = 0; j < x->size; j++) out[j] += h * weight[k] * c->K[k][j];
+    for (int j = first; j < end; j++) out[j] += h * weight[k] * c->K[k][j];
 }
 
-/* The derivatives of every column at stage k, or with `b` at the end, into `trial`. */
+/* The derivatives of every column after `count` stages into `trial`. */
 static void step_stage (pw_variation *x, const double *weight, int count, double h) {
   PW_EACH_COLUMN (c, x) {
     memcpy (c->trial, c->Y, (size_t)x->size * sizeof *c->Y);
-    step_combine (x, c, weight, count, h, c->trial);
+    step_combine (c, weight, count, h, 0, x->size, c->trial);
   }
 }
 
@@ -67,12 +68,9 @@ int pw_variation_evaluate_at (pw_variation *x, double t, pw_error *error) {
 
 /* Adds the errors of the step, the difference of the pair, to the errors of derivatives: entries from `first` to `end` - 1. */
 static void step_add_errors (pw_variation *x, double h, int first, int end) {
-  PW_EACH_COLUMN (c, x) {
-    const pw_variation_column *derivative = &d->column[0];
-    if (c == derivative) continue;
-    for (int k = 0; k < PW_VARIATION_RATES; k++)
-      for (int j = first; j < end; j++) c->trial[j] += h * pw_erk5_tableau.e[k] * derivative->K[k][j];
-  }
+  for (pw_direction_copy *d = x->direction; d < x->direction + x->count; d++)
+    if (d->columns > 1)
+      step_combine (&d->column[0], pw_erk5_tableau.e, PW_VARIATION_RATES, h, first, end, d->column[1].trial);
 }
 
 static int step_rates (pw_variation *x, int k, pw_error *error) {
@@ -142,7 +140,7 @@ static double step_error (pw_variation *x, double h) {
     double *e = x->values, size = fmax (c->largest, step_norm (x, c->trial));
     if (c->direction->given.initial == NULL) size = fmax (size, STEP_LEAST * 1e-5 / fabs (c->direction->given.step));
     memset (e, 0, (size_t)x->size * sizeof *e);
-    step_combine (x, c, pw_erk5_tableau.e, PW_VARIATION_RATES, h, e);
+    step_combine (c, pw_erk5_tableau.e, PW_VARIATION_RATES, h, 0, x->size, e);
     if (size > 0) most = pw_larger_or_nan (most, step_norm (x, e) / size);
     double energy = fmax (c->energy, step_energy (x, c->trial));
     energy = fmax (energy, 0.01 * STEP_LEAST * fmax (x->r->exchanged, x->r->energy_scene) * size);
