@@ -1,4 +1,4 @@
-/* The equations of a step of galpha, solved by Newton's iteration.  Unknown are q', v', lambda', mu; w' and a' follow
+/* The equations of a step of galpha, solved by Newton's iteration.  The unknowns are q', v', lambda' and mu; w' and a' follow
  * from v'.  With c = gamma / (h beta) and e = (1 - alpha_m) / ((1 - alpha_f) h gamma):
  *
  *   c (q' - q - h v - h^2 (1/2 - beta) w - h^2 beta w') + D G^T mu = 0          dw' = dv' / (h gamma)

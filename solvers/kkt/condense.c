@@ -56,7 +56,7 @@ static void condense_elements (pw_plan *c, int rows, const unsigned char *active
   const pw_system *s = c->k->s;
   for (const pw_element_batch *b = c->k->w->batch;
        b < c->k->w->batch + s->batches && b->kind->rows > 0 && b->row < rows; b++)
-    for (int n = 0, end = b->b.count * b->kind->rows, size; n<end; n += size> 0 ? size : 1) {
+    for (int n = 0, end = b->b.count * b->kind->rows, size; n < end; n += size ? size : 1) {
       for (size = 0; n + size < end && size < PW_BLOCK_NODE; size++)
         if (!condense_takes_part (c, b, n + size, active) || (size > 0 && !condense_joins (b, n))) break;
       if (size > 0) condense_element (c, b, n / b->kind->rows, n % b->kind->rows, size);

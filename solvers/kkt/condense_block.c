@@ -84,7 +84,7 @@ static void condense_body (const pw_plan *c, pw_block_ldl *l, int j, pw_body_blo
         (pw_contribution){ .y = c->node[i].y, .D = l->column[l->place[i]].at, .size = (short)c->node[i].size };
 }
 
-static void condense_take_block (const pw_plan *c, pw_layout *lay, pw_block_ldl *l) {
+static void condense_block_arrays (const pw_plan *c, pw_layout *lay, pw_block_ldl *l) {
   l->body = pw_layout_alloc (lay, (size_t)l->bodies + 1, sizeof *l->body);
   l->contribution =
       pw_layout_alloc (lay, (size_t)(c->contributions - 2 * c->linked + 2 * c->uncondenseds), sizeof *l->contribution);
@@ -106,11 +106,11 @@ static int condense_fill (const pw_plan *c, pw_block_ldl *l) {
   l->inverse = c->k->inverse;
   for (int n = 0; n < c->groups; n++) l->bodies += condense_has_block (c, n);
   l->chains = c->chains;
-  condense_take_block (c, &lay, l);
+  condense_block_arrays (c, &lay, l);
   l->memory = malloc (lay.used + 1);
   if (l->memory == NULL) return PW_RESOURCE;
   lay = (pw_layout){ l->memory, 0 };
-  condense_take_block (c, &lay, l);
+  condense_block_arrays (c, &lay, l);
   memcpy (l->chain, c->chain, (size_t)c->chains * sizeof *l->chain);
   l->chain[l->chains] = (pw_chain){ .column = l->nodes + 1 };
   for (int kept = 0; kept < 2; kept++) /* uncondensed bodies last: they add to diagonals that the others store */

@@ -9,7 +9,7 @@ static const int conclusion_digits[CONCLUSION_LEVELS] = { 3, 6, 9 };
 
 typedef struct {
   double cpu; /* [s]; NaN: no run is as accurate */
-  int most;   /* 1: an upper bound: no less accurate run is known, or the error only as below the uncertainty */
+  int at_most; /* 1: an upper bound: there is no less accurate run, or its error is only known to be below the uncertainty */
 } cost;
 
 typedef struct {
@@ -69,7 +69,7 @@ static cost conclusion_cost (const conclusion *x, int line, double level) {
   return least;
 }
 
-/* The cheapest method of each level that the reference can tell. */
+/* The cheapest method of each level that the reference can distinguish. */
 static void conclusion_find (conclusion *x) {
   for (int k = 0; k < CONCLUSION_LEVELS; k++) {
     x->best[k] = -1;
@@ -106,14 +106,15 @@ static void conclusion_heading (const conclusion *x) {
 static char *conclusion_time (char text[40], cost c) {
   char number[32];
   int ms = c.cpu < 1;
-  snprintf (text, 40, "%s%s %s", c.most ? "<" : "", pw_format (number, ms ? 1e3 * c.cpu : c.cpu, 2), ms ? "ms" : "s");
+  snprintf (text, 40, "%s%s %s", c.at_most ? "<" : "", pw_format (number, ms ? 1e3 * c.cpu : c.cpu, 2),
+            ms ? "ms" : "s");
   return isnan (c.cpu) ? strcpy (text, "-") : text;
 }
 
 static char *conclusion_ratio (char text[40], const conclusion *x, int method, int k) {
   cost c = conclusion_cost (x, method, conclusion_level (k));
   double ratio = c.cpu / x->cheapest[k].cpu;
-  snprintf (text, 40, "%s%.*f", c.most ? "<" : "", ratio < 9.95, ratio);
+  snprintf (text, 40, "%s%.*f", c.at_most ? "<" : "", ratio < 9.95, ratio);
   if (x->uncertainty > conclusion_level (k)) return strcpy (text, "uncertain");
   return isnan (c.cpu) ? strcpy (text, "not reached") : text;
 }
