@@ -12,7 +12,7 @@ static const struct {
   size_t function, original;
   enum { BLOCKS_RAW, BLOCKS_J_W, BLOCKS_JT_LAMBDA } product;
   int velocity; /* derivative with respect to v instead of q */
-  int columns;  /* 1: it has as many rows as local columns; 0: kind->rows */
+  int square;   /* 1: it has as many rows as local columns; 0: kind->rows */
 } blocks_table[PW_BLOCKS] = {
   [PW_JW_Q] = { offsetof (pw_kind, jw_q), offsetof (pw_kind, J), BLOCKS_J_W, 0, 0 },
   [PW_JTL_Q] = { offsetof (pw_kind, jw_q), offsetof (pw_kind, J), BLOCKS_JT_LAMBDA, 0, 1 },
@@ -32,7 +32,7 @@ pw_batch_function *pw_block_function (const pw_kind *kind, pw_block block) {
 }
 
 int pw_block_rows (const pw_kind *kind, pw_block block) {
-  return blocks_table[block].columns ? 3 * kind->bodies + kind->internal : kind->rows;
+  return blocks_table[block].square ? 3 * kind->bodies + kind->internal : kind->rows;
 }
 
 /* A batch of one element with a copy of its configurations, which can be changed without affecting other elements. */
