@@ -246,7 +246,8 @@ static int radau_correct (pw_run *r, double h, double t1, double *size, double *
   return PW_OK;
 }
 
-/* 1: converged; 0: continue; -1: it will not converge in time.  size: of the correction, before: of the previous one. */
+/* 1: converged; 0: continue; -1: it will not converge in time.  size: of the correction, before: of the previous one; rough: in
+ * units of round-off.  The tests are those of Hairer & Wanner 1996, section IV.8, and one for round-off. */
 static int radau_converged (pw_run *r, int done, double size, double before, double rough) {
   radau *d = r->data;
   const int most = d->fixed ? 50 : 7;
