@@ -105,7 +105,8 @@ typedef struct pw_formula pw_formula;
  * PW_RESOURCE. */
 #define PW_FORMULA_NAMES 32
 pw_formula *pw_formula_open (const char *text, const char *const *names, pw_error *error);
-/* The value, which may be non-finite, for values of the names; its derivative with respect to name `by`. */
+/* The value for values of the names, and its derivative with respect to name `by`; both may be non-finite.  At a jump or
+ * kink, the derivative is the one on the right. */
 double pw_formula_value (const pw_formula *f, const double *value);
 double pw_formula_derivative (const pw_formula *f, const double *value, int by);
 void pw_formula_close (pw_formula *f);
