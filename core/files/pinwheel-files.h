@@ -28,7 +28,7 @@ pw_file *pw_file_open (const char *model, pw_error *error);
  * Reading one takes about 10 times its size in memory. */
 #define PW_FILE_DEFAULT_BYTES (64u << 20)
 #define PW_FILE_MAX_BYTES (2000u << 20)
-pw_file *pw_file_open_limited (const char *model, size_t largest, pw_error *error);
+pw_file *pw_file_open_limited (const char *model, size_t max_bytes, pw_error *error);
 void pw_file_close (pw_file *f);
 
 /* A new model from the file, parameters at their defaults, not yet built.  The file must outlive it. */
@@ -233,8 +233,9 @@ void pw_checkpoint_free (pw_checkpoint *c);
 /* Begin with { .f = stream }, add arrays, then end. */
 typedef struct {
   FILE *f;
-  int count, room, failed;
   struct pw_npz_entry *entry;
+  size_t room;
+  int count, failed;
   unsigned long at; /* bytes written */
 } pw_npz;
 
