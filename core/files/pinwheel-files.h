@@ -28,7 +28,7 @@ pw_file *pw_file_open (const char *model, pw_error *error);
  * Reading one takes about 10 times its size in memory. */
 #define PW_FILE_DEFAULT_BYTES (64u << 20)
 #define PW_FILE_MAX_BYTES (2000u << 20)
-pw_file *pw_file_open_limited (const char *model, size_t largest, pw_error *error);
+pw_file *pw_file_open_limited (const char *model, size_t max_bytes, pw_error *error);
 void pw_file_close (pw_file *f);
 
 /* A new model from the file, parameters at their defaults, not yet built.  The file must outlive it. */
@@ -105,7 +105,8 @@ typedef struct pw_formula pw_formula;
  * PW_RESOURCE. */
 #define PW_FORMULA_NAMES 32
 pw_formula *pw_formula_open (const char *text, const char *const *names, pw_error *error);
-/* The value, which may be non-finite, for values of the names; its derivative with respect to name `by`. */
+/* The value for values of the names, and its derivative with respect to name `by`; both may be non-finite.  At a jump or
+ * kink, the derivative is the one on the right. */
 double pw_formula_value (const pw_formula *f, const double *value);
 double pw_formula_derivative (const pw_formula *f, const double *value, int by);
 void pw_formula_close (pw_formula *f);
@@ -232,8 +233,9 @@ void pw_checkpoint_free (pw_checkpoint *c);
 /* Begin with { .f = stream }, add arrays, then end. */
 typedef struct {
   FILE *f;
-  int count, room, failed;
   struct pw_npz_entry *entry;
+  size_t room;
+  int count, failed;
   unsigned long at; /* bytes written */
 } pw_npz;
 

@@ -4,10 +4,12 @@
 #include <errno.h>
 #include <fcntl.h>
 #include <math.h>
+#include <signal.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/file.h>
+#include <sys/resource.h>
 #include <sys/stat.h>
 #include <sys/wait.h>
 #include <unistd.h>
@@ -339,6 +341,26 @@ static void test_forged (void **state) {
   output_forge (-2, -1); /* as an integer: negative */
 }
 
+/* A checkpoint that cannot be written leaves nothing, and the message names nothing. */
+static void test_not_written (void **state) {
+  char path[300], head[6000];
+  struct rlimit before;
+  pw_error error = { 0 };
+  (void)state;
+  cli_expand ("@/full.ck", path, sizeof path);
+  memset (head, 'a', sizeof head - 1);
+  head[sizeof head - 1] = 0;
+  void (*handler) (int) = signal (SIGXFSZ, SIG_IGN);
+  getrlimit (RLIMIT_FSIZE, &before);
+  setrlimit (RLIMIT_FSIZE, &(struct rlimit){ 4096, before.rlim_max });
+  int status = pw_checkpoint_write (path, head, &(pw_archive){ .used = 0 }, &error);
+  setrlimit (RLIMIT_FSIZE, &before);
+  signal (SIGXFSZ, handler);
+  assert_int_equal (status, PW_RESOURCE);
+  assert_null (strstr (error.text, "what was written"));
+  cli_good ("[ -z \"$(ls @ | grep full)\" ]");
+}
+
 /* ---- The process ---- */
 
 static void test_process (void **state) {
@@ -398,11 +420,12 @@ static void test_limit (void **state) {
 
 int main (int argc, char **argv) {
   const struct CMUnitTest tests[] = {
-    cmocka_unit_test (test_left_over),  cmocka_unit_test (test_whole_lines), cmocka_unit_test (test_uses),
-    cmocka_unit_test (test_links),      cmocka_unit_test (test_lock),        cmocka_unit_test (test_direct),
-    cmocka_unit_test (test_keeps_lock), cmocka_unit_test (test_mode),        cmocka_unit_test (test_types),
-    cmocka_unit_test (test_together),   cmocka_unit_test (test_bounded),     cmocka_unit_test (test_process),
-    cmocka_unit_test (test_forged),     cmocka_unit_test (test_terminal),    cmocka_unit_test (test_limit),
+    cmocka_unit_test (test_left_over),   cmocka_unit_test (test_whole_lines), cmocka_unit_test (test_uses),
+    cmocka_unit_test (test_links),       cmocka_unit_test (test_lock),        cmocka_unit_test (test_direct),
+    cmocka_unit_test (test_keeps_lock),  cmocka_unit_test (test_mode),        cmocka_unit_test (test_types),
+    cmocka_unit_test (test_together),    cmocka_unit_test (test_bounded),     cmocka_unit_test (test_process),
+    cmocka_unit_test (test_forged),      cmocka_unit_test (test_terminal),    cmocka_unit_test (test_limit),
+    cmocka_unit_test (test_not_written),
   };
   if (argc > 1) return setenv ("CHILD", argv[1], 1) || system ("echo $$ >\"$CHILD\"; sleep 600");
   return cmocka_run_group_tests (tests, cli_setup, cli_teardown);

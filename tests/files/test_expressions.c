@@ -161,6 +161,23 @@ static void test_continuous (void **state) {
   }
 }
 
+/* No name of a formula is the time: at a jump its value is that of the jump, whichever name comes first. */
+static void test_formula (void **state) {
+  static const struct {
+    const char *text;
+    double value;
+  } formula[] = { { "ceil(a)", 2 }, { "ceil(b)", 2 }, { "a <= 2", 1 }, { "a == b", 1 }, { "sign(a - b)", 0 } };
+  const char *const names[] = { "a", "b", NULL };
+  (void)state;
+  for (size_t i = 0; i < sizeof formula / sizeof *formula; i++) {
+    pw_error error = { 0 };
+    pw_formula *f = pw_formula_open (formula[i].text, names, &error);
+    check_ok (f ? PW_OK : error.status, &error);
+    check_close (formula[i].text, pw_formula_value (f, (const double[]){ 2, 2 }), formula[i].value, 0, "exact");
+    pw_formula_close (f);
+  }
+}
+
 static int setup (void **state) {
   (void)state;
   int file = mkstemps (path, 5);
@@ -173,8 +190,8 @@ static int teardown (void **state) {
 }
 
 int main (void) {
-  const struct CMUnitTest tests[] = { cmocka_unit_test (test_push), cmocka_unit_test (test_built_in),
-                                      cmocka_unit_test (test_gradient), cmocka_unit_test (test_continuous),
-                                      cmocka_unit_test (test_no_derivative) };
+  const struct CMUnitTest tests[] = { cmocka_unit_test (test_push),          cmocka_unit_test (test_built_in),
+                                      cmocka_unit_test (test_gradient),      cmocka_unit_test (test_continuous),
+                                      cmocka_unit_test (test_no_derivative), cmocka_unit_test (test_formula) };
   return cmocka_run_group_tests (tests, setup, teardown);
 }

@@ -1,12 +1,11 @@
 /* Breakpoints: times at which an expression jumps or has a kink.
  *
- * Interval arithmetic shows that no comparison or other discontinuous operation changes over a time interval, and that no
- * operand of it leaves the domain of a function, where comparisons with NaN become false; otherwise
- * the interval is bisected, the earlier half first, down to a relative width of 2^-36.  Bisection then finds the two
- * neighbouring numbers between which an operation changes: steps must end there
- * (Moore, Kearfott & Cloud 2009, Introduction to Interval Analysis, chapter 8).
- * Changes that cancel within this width, and changes by round-off only, are ignored.  While two compared numbers stay
- * equal, the width grows. */
+ * Interval arithmetic shows that no comparison or other discontinuous operation changes in an interval of time, and that
+ * none of its operands leaves the domain of a function, where comparisons with NaN become false; otherwise the interval
+ * is bisected, the earlier half first, down to a relative width of 2^-36 (Moore, Kearfott & Cloud 2009, Introduction to
+ * Interval Analysis, chapter 8).  Bisection then finds the two adjacent floating-point numbers between which an operation
+ * changes: steps must end there.  Changes that cancel within this width, and changes by round-off only, are ignored.
+ * While two compared numbers stay equal, the width grows. */
 #include <math.h>
 #include "expression_parts.h"
 #include "pinwheel.h"
@@ -19,7 +18,7 @@ typedef struct {
   int max_equal;                            /* number of these after which `min_width` doubles */
   double min_width;                         /* relative width below which intervals are not bisected */
   double noise_end;                         /* end of the noise; INFINITY without noisy operations */
-  unsigned char noisy[PW_EXPRESSION_CODES]; /* per operation: changes repeatedly */
+  unsigned char noisy[PW_EXPRESSION_CODES]; /* per operation: 1: changes too often for steps to end there */
 } search;
 
 /* Evaluates all discrete operations (comparisons and the like) at a time. */
@@ -42,7 +41,7 @@ static int search_differ (const search *s, double a, double b) {
   return 0;
 }
 
-/* Bisects to neighbouring numbers; returns the first one after the change. */
+/* Bisects to adjacent floating-point numbers; returns the one after the change. */
 static double search_bisect (const search *s, double a, double b) {
   const double first = a;
   for (double middle = a + (b - a) / 2; middle > a && middle < b; middle = a + (b - a) / 2)
@@ -53,8 +52,8 @@ static double search_bisect (const search *s, double a, double b) {
   return b;
 }
 
-/* Marks operations as noisy that change so often between a and b or just after b that the cause is round-off of equal
- * numbers or the changes are too fast for any step; returns whether it marked any. */
+/* Marks operations as noisy that change more than 8 times between a and b, or just after b: by round-off of equal numbers,
+ * or too fast for any step.  Returns whether it marked any. */
 static int search_mark_noisy (search *s, double a, double b) {
   const double width = 1e-6 * (1 + fabs (b));
   double value[2][PW_EXPRESSION_CODES];
@@ -82,7 +81,7 @@ static double search_first (search *s, double a, double b) {
   return first < INFINITY ? first : search_first (s, middle, b);
 }
 
-/* At the limit of the search, or with noise, returns a time that is not a breakpoint; the next call continues there. */
+/* At the limit of the search, or with noise, returns a time that need not be a breakpoint; the next call continues there. */
 double pw_expression_breakpoint (const pw_expression *x, double t) {
   const double latest = 1e18;
   search s = {

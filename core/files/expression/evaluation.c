@@ -26,7 +26,7 @@ static inline double value_jump (int op, double x, int *tie) {
   return y;
 }
 
-/* The value of an operation of x, or of a and x; *tie becomes 1 just before a jump. */
+/* The value of an operation of x, or of a and x. */
 static inline double value_of (const pw_expression_code *c, double a, double x, int *tie) {
   switch (c->op) {
   case PW_OP_NEGATE:

@@ -1,12 +1,12 @@
-/* Expressions: numbers written as arithmetic over names.
+/* Expressions: arithmetic on numbers, named numbers and variables.
  *
  *   operators   + - * / ^, < <= > >= == !=, && ||, CONDITION ? THEN : ELSE, parentheses
  *   functions   sin cos tan asin acos atan atan2 sinh cosh tanh exp log log10 sqrt abs sign floor ceil round hypot mod
  *               min max jacobi_am (u, m), elliptic_K (m)
  *   constants   pi, e, deg = pi / 180
  *
- * A scope defines names of numbers; other names are variables, the first of which is the time.  Expressions are
- * immutable: any number of threads may evaluate them. */
+ * A scope defines the named numbers.  The first variable is the time.  Expressions are immutable: any number of threads
+ * may evaluate them. */
 #ifndef PW_EXPRESSION_H
 #define PW_EXPRESSION_H
 
@@ -28,13 +28,13 @@ typedef struct pw_scope pw_scope;
 pw_scope *pw_scope_open (int names);
 void pw_scope_close (pw_scope *s);
 
-/* Adds a name, whose text must outlive the scope.  At most `names` of pw_scope_open. */
+/* Adds a name, of which the scope keeps a pointer; at most as many as pw_scope_open was given. */
 void pw_scope_add (pw_scope *s, const char *name, double value);
 
 /* One operation of an expression; its operands are on a stack. */
 typedef struct {
   short op;    /* pw_expression_op */
-  short which; /* variable or function */
+  short which; /* index of the variable or function */
   double value;
 } pw_expression_code;
 
@@ -60,7 +60,7 @@ int pw_expression_constant (const pw_scope *s, const char *text, double *value, 
 
 /* ---- Values ---- */
 
-/* The value, which may be non-finite; at a jump in time, the value just after it. */
+/* The value, which may be non-finite; at a jump in time, that just after it. */
 double pw_expression_value (const pw_expression *x, const double *variable);
 
 /* The value and its first two derivatives with respect to one variable; at a jump, those just after it. */
@@ -72,13 +72,13 @@ double pw_expression_breakpoint (const pw_expression *x, double t);
 
 /* ---- Words ---- */
 
-/* Whether a text can be a name: a letter or _, then letters, digits and _; neither a function nor a constant. */
+/* Whether a text has the form of a name: a letter or _, then letters, digits and _, at most 63 bytes. */
 int pw_expression_is_name (const char *text);
 /* Whether a function or constant has this name. */
 int pw_expression_is_reserved (const char *text);
 
-/* Calls `each` with every name in an expression, functions and constants too, until it returns non-zero; returns its result.
- * */
+/* Calls `each` with every name in an expression, functions and constants too, until it returns non-zero; returns its
+ * result. */
 int pw_expression_names (const char *text, int (*each) (void *context, const char *name, size_t length, size_t at),
                          void *context);
 

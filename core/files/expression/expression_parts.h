@@ -118,7 +118,7 @@ double pw_expression_mod (double x, double y);
 
 /* ---- Evaluation ---- */
 
-/* The value of operations; *tie becomes 1 just before a jump. */
+/* The value of operations; *tie becomes 1 where one of them may jump: at equal numbers, at poles. */
 double pw_expression_run (const pw_expression_code *code, int codes, const double *variable, int *tie);
 
 /* The value of an operation of x, or of a and x. */

@@ -1,6 +1,6 @@
 /* Formulas: expressions for programs, which read them from a command line. */
 #include <stdlib.h>
-#include "expression.h"
+#include "expression_parts.h"
 #include "pinwheel-files.h"
 
 struct pw_formula {
@@ -25,7 +25,8 @@ pw_formula *pw_formula_open (const char *text, const char *const *names, pw_erro
 }
 
 double pw_formula_value (const pw_formula *f, const double *value) {
-  return pw_expression_value (f->expression, value);
+  int tie; /* no name is the time: the value at a jump, not after it */
+  return pw_expression_run (f->expression->code, f->expression->codes, value, &tie);
 }
 
 double pw_formula_derivative (const pw_formula *f, const double *value, int by) {

@@ -88,9 +88,9 @@ static pw_range range_sin (double lo, double hi, double shift) {
   return r;
 }
 
-static pw_range range_even (const pw_range *x, double (*f) (double)) {
+static pw_range range_cosh (const pw_range *x) {
   pw_range r = range_abs (x);
-  return range_rounded (f (fmax (0, r.lo)), f (r.hi));
+  return range_rounded (cosh (fmax (0, r.lo)), cosh (r.hi));
 }
 
 static pw_range range_tan (const pw_range *x) {
@@ -99,20 +99,21 @@ static pw_range range_tan (const pw_range *x) {
   return range_rounded (tan (x->lo), tan (x->hi));
 }
 
-static pw_range range_monotonic (const pw_expression_function *f, const pw_range *x) {
+/* A function of one argument in its domain. */
+static pw_range range_in_domain (const pw_expression_function *f, const pw_range *x) {
   if (f->one == pw_sin) return range_sin (x->lo, x->hi, 0);
   if (f->one == pw_cos) return range_sin (x->lo, x->hi, PW_PI / 2);
-  if (f->one == cosh) return range_even (x, cosh);
+  if (f->one == cosh) return range_cosh (x);
   if (f->one == tan) return range_tan (x);
   return f->trend == PW_INCREASING ? range_rounded (f->one (x->lo), f->one (x->hi))
                                    : range_rounded (f->one (x->hi), f->one (x->lo));
 }
 
 /* NaN outside the domain. */
-static pw_range range_smooth (const pw_expression_function *f, const pw_range *x) {
+static pw_range range_one_argument (const pw_expression_function *f, const pw_range *x) {
   pw_range part = { fmax (x->lo, f->from), fmin (x->hi, f->to), 0, 0, 0 };
   if (part.lo > part.hi) return range_nan;
-  pw_range r = range_monotonic (f, &part);
+  pw_range r = range_in_domain (f, &part);
   r.nan |= part.lo > x->lo || part.hi < x->hi;
   return r;
 }
@@ -246,7 +247,7 @@ static pw_range range_operation (const pw_expression_code *c, const pw_range *x)
     return range_integer (c->op, x);
   case PW_OP_TAN:
   case PW_OP_ONE:
-    return range_smooth (&pw_expression_functions[c->which], x);
+    return range_one_argument (&pw_expression_functions[c->which], x);
   case PW_OP_ADD:
     return range_sum (x, y);
   case PW_OP_SUBTRACT:

@@ -12,12 +12,12 @@ size_t pw_expression_name_size (const char *p) {
 }
 
 size_t pw_expression_number_size (const char *p) {
-  size_t n = strspn (p, DIGITS), part = p[n] == '.' ? strspn (p + n + 1, DIGITS) : 0;
-  if (n + part == 0) return 0;
-  n += p[n] == '.' ? 1 + part : 0;
-  size_t sign = n + 1 + (p[n] != 0 && (p[n + 1] == '+' || p[n + 1] == '-'));
-  size_t power = p[n] == 'e' || p[n] == 'E' ? strspn (p + sign, DIGITS) : 0;
-  return power ? sign + power : n;
+  size_t n = strspn (p, DIGITS), decimals = p[n] == '.' ? strspn (p + n + 1, DIGITS) : 0;
+  if (n + decimals == 0) return 0;
+  n += p[n] == '.' ? 1 + decimals : 0;
+  size_t exponent = n + 1 + (p[n] != 0 && (p[n + 1] == '+' || p[n + 1] == '-'));
+  size_t digits = p[n] == 'e' || p[n] == 'E' ? strspn (p + exponent, DIGITS) : 0;
+  return digits ? exponent + digits : n;
 }
 
 int pw_expression_number (const char *text, double *value) {

@@ -9,7 +9,7 @@
 #include <unistd.h>
 #include "files.h"
 
-enum { CACHE_MAX_BYTES = 64 << 20, CACHE_MAX_FILES = 4096 }; /* bytes, files */
+enum { CACHE_MAX_BYTES = 64 << 20, CACHE_MAX_FILES = 4096 };
 
 /* $XDG_CACHE_HOME or $HOME/.cache, malloced; NULL if neither is an absolute path. */
 static char *cache_parent (void) {

@@ -1,7 +1,7 @@
 /* Reads columns of numbers from a CSV file.
  *
  * The separator is the one of , ; and tab that the first line contains.  A first line without numbers names the
- * columns, "NAME" or "NAME [unit]"; a column in another unit than requested is converted.  Empty lines and lines that
+ * columns, "NAME" or "NAME [unit]"; a column in another unit than requested is converted.  Blank lines and lines that
  * begin with # are skipped. */
 #include <math.h>
 #include <stdarg.h>
@@ -9,7 +9,7 @@
 #include <string.h>
 #include "files.h"
 
-enum { COLUMNS_MAX_BYTES = 64 << 20, COLUMNS_MAX_LINES = 1000000 }; /* bytes; lines of numbers */
+enum { COLUMNS_MAX_BYTES = 64 << 20, COLUMNS_MAX_LINES = 1000000 };
 
 typedef struct {
   const char *shown; /* path for messages */
@@ -18,11 +18,11 @@ typedef struct {
   int cells;         /* per line */
   int columns;       /* to read; the first one is the time */
   int gaps;          /* 1: in others, empty cells and nan are NaN */
-  char separator;
+  char separator;    /* 0 before the first line */
   pw_error *error;
 } columns;
 
-static int columns_fail (const columns *c, const char *format, ...) {
+PW_PRINTF (2, 3) static int columns_fail (const columns *c, const char *format, ...) {
   char text[300];
   va_list arguments;
   va_start (arguments, format);
@@ -33,15 +33,17 @@ static int columns_fail (const columns *c, const char *format, ...) {
 
 /* ---- Lines and cells ---- */
 
-/* The next line that is neither empty nor a comment, or NULL. */
+/* The next line that is neither blank nor a comment, or NULL. */
 static char *columns_line (columns *c) {
   while (*c->rest) {
     char *line = c->rest, *end = line + strcspn (line, "\n");
     c->rest = *end ? end + 1 : end;
     c->line++;
-    while (end > line && strchr (" \t\r", end[-1]) && !(c->separator == '\t' && end[-1] == '\t')) end--;
     *end = 0;
-    if (*line && *line != '#') return line;
+    if (*line == '#' || line[strspn (line, " \t\r")] == 0) continue;
+    if (c->separator == 0) c->separator = strchr (line, ',') ? ',' : strchr (line, ';') ? ';' : '\t';
+    while (strchr (c->separator == '\t' ? " \r" : " \t\r", end[-1])) *--end = 0;
+    return line;
   }
   return NULL;
 }
@@ -143,7 +145,6 @@ static int columns_all (columns *c, const char *const *column, const char *const
   if (line == NULL) return columns_fail (c, "the file is empty");
   if (index == NULL || factor == NULL) return pw_fail (c->error, PW_RESOURCE, "%s: out of memory", c->shown);
   if (lines > COLUMNS_MAX_LINES) return columns_fail (c, "more than %d lines", COLUMNS_MAX_LINES);
-  c->separator = strchr (line, ',') ? ',' : strchr (line, ';') ? ';' : '\t';
   c->cells = columns_count (c, line);
   int named = columns_names (c, line);
   for (int k = 0; k < c->columns; k++) {

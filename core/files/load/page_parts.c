@@ -68,8 +68,11 @@ typedef struct {
   pw_error *error;
 } page_tables;
 
+/* Adds a table once, however many signals read it. */
 static int page_table (void *context, const char *path) {
   page_tables *x = context;
+  for (int i = 0; i < x->p->files; i++)
+    if (strcmp (x->p->file[i].name, path + x->folder) == 0) return PW_OK;
   return page_read (x->p, path + x->folder, path, x->error);
 }
 

@@ -49,7 +49,6 @@ static int plugin_ending (const char *name) {
   return i;
 }
 
-/* C++ */
 static int plugin_is_cpp (const char *name) {
   return pw_ends_with (name, ".cpp") || pw_ends_with (name, ".cc") || pw_ends_with (name, ".cxx") ||
          pw_ends_with (name, ".C");

@@ -13,7 +13,7 @@
 #include <unistd.h>
 #include "files.h"
 
-enum { CODE_MAX_BYTES = 64 << 20, CODE_KEY = 33, CODE_MAX_WAITS = 3000 }; /* bytes; characters; times 20 ms */
+enum { CODE_MAX_BYTES = 64 << 20, CODE_KEY = 33, CODE_MAX_WAITS = 3000 }; /* size of a key; waits of 20 ms */
 
 struct pw_scene_code {
   void *handle;

@@ -46,7 +46,7 @@ static int search_anchor (int which, char **folder, pw_error *error) {
 /* Folders relative to the program, and to the library. */
 typedef const char *const search_folders[2][3];
 
-/* Visits these folders; they may not exist. */
+/* Calls `visit` with each of these folders, which may not exist. */
 static int search_visit (search_folders where, int (*visit) (void *context, const char *folder, pw_error *error),
                          void *context, pw_error *error) {
   int status = PW_OK;
@@ -123,7 +123,7 @@ static int search_folder (void *context, const char *folder, pw_error *error) {
   return status;
 }
 
-/* Whether a folder can be searched; why not is recorded. */
+/* Whether a folder can be searched; if not, adds it to s->unread with the reason. */
 static int search_can (pw_search *s, const char *folder) {
   char inside[PATH_MAX];
   size_t used = strlen (s->unread);

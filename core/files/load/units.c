@@ -105,8 +105,9 @@ static int units_read (const char *text, units_value *u) {
   int over = 0;
   *u = (units_value){ .factor = 1 };
   for (const char *p = text; *p;) {
-    int power, degree = strncmp (p, "°", 2) == 0 || strncmp (p, "µ", 2) == 0;
-    size_t n = (degree ? 2 : 0) + strcspn (p + (degree ? 2 : 0), ends);
+    int power;
+    size_t sign = strncmp (p, "°", 2) == 0 || strncmp (p, "µ", 2) == 0 ? 2 : 0;
+    size_t n = sign + strcspn (p + sign, ends);
     if (n == 0 && *p == '1') n = 1;
     if (n > 0) {
       const char *after = units_power (p + n, &power);

@@ -4,8 +4,6 @@
 #include <string.h>
 #include "files.h"
 
-#define CHECKPOINT_LAST "end\n"
-
 /* ---- Writing ---- */
 
 static unsigned long long checkpoint_check (const char *head, size_t head_size, const void *state, size_t size) {
@@ -26,7 +24,7 @@ int pw_checkpoint_put (pw_output *o, const char *head, const pw_archive *state, 
 }
 
 int pw_checkpoint_write (const char *path, const char *head, const pw_archive *state, pw_error *error) {
-  pw_output *o = pw_output_open (path, error);
+  pw_output *o = pw_output_open_as (path, ".next", error);
   return o ? pw_checkpoint_put (o, head, state, error) : error->status;
 }
 
@@ -56,8 +54,9 @@ static int checkpoint_parse (const char *path, pw_checkpoint *c, size_t size, pw
   size_t bytes = 0;
   unsigned long long check = 0;
   int n = 0;
-  const char *end = strstr (c->text, "\nend\n");
-  c->head_end = end ? end + 1 + sizeof CHECKPOINT_LAST - 1 : NULL;
+  static const char last[] = "\nend\n";
+  const char *end = strstr (c->text, last);
+  c->head_end = end ? end + strlen (last) : NULL;
   if (end == NULL || sscanf (c->head_end, "state = %zu bytes, check sum %16llx%n", &bytes, &check, &n) != 2 ||
       c->head_end[n] != '\n')
     return pw_fail (error, PW_INPUT, "the checkpoint %s is truncated or damaged", path);

@@ -26,17 +26,10 @@ struct pw_csv {
 
 /* ---- Archives ---- */
 
-static int archive_reserve (csv_archive *a) {
-  size_t room = 2 * a->room + 1024;
-  double *more = a->count < a->room ? a->value : realloc (a->value, room * sizeof *more);
-  if (more == NULL) return PW_RESOURCE;
-  if (a->count == a->room) a->value = more, a->room = room;
-  return PW_OK;
-}
-
 static void archive_number (pw_csv *c, double value) {
-  if (!c->failed && archive_reserve (c->archive) != PW_OK) c->failed = 1;
-  if (!c->failed) c->archive->value[c->archive->count++] = value;
+  csv_archive *a = c->archive;
+  c->failed |= pw_grow (&a->value, a->count, &a->room, sizeof *a->value) != PW_OK;
+  if (!c->failed) a->value[a->count++] = value;
 }
 
 static void archive_name (pw_csv *c, const char *name) {

@@ -82,7 +82,7 @@ static void json_bodies (pw_json *j, const pw_system *s, const pw_sample *x) {
   pw_json_open (j, "bodies", '{');
   for (int b = 0; b < pw_system_bodies (s); b++) {
     pw_json_open (j, pw_system_body_name (s, b), '{');
-    for (int i = 0; i < 6; i++) pw_json_number (j, names[i], (i < 3 ? x->q : x->v - 3)[3 * b + i]);
+    for (int i = 0; i < 6; i++) pw_json_number (j, names[i], i < 3 ? x->q[3 * b + i] : x->v[3 * b + i - 3]);
     pw_json_close (j, '}');
   }
   pw_json_close (j, '}');

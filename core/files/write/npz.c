@@ -49,24 +49,15 @@ static void npz_describe (pw_npz *z, const struct pw_npz_entry *e) {
 }
 
 static struct pw_npz_entry *npz_entry (pw_npz *z) {
-  if (z->count == z->room) {
-    int room = 2 * z->room + 8;
-    struct pw_npz_entry *more = realloc (z->entry, (size_t)room * sizeof *more);
-    if (more == NULL) return NULL;
-    z->entry = more;
-    z->room = room;
-  }
-  return z->entry + z->count++;
+  z->failed |= pw_grow (&z->entry, (size_t)z->count, &z->room, sizeof *z->entry) != PW_OK;
+  return z->failed ? NULL : z->entry + z->count++;
 }
 
 void pw_npz_add (pw_npz *z, const char *name, long rows, long columns, int parts, const double *value) {
   char head[NPZ_HEAD + 1] = "\x93NUMPY\x01", shape[60];
   size_t size = (size_t)rows * (size_t)(columns ? columns : 1) * (size_t)parts * sizeof *value;
-  struct pw_npz_entry *e = z->failed ? NULL : npz_entry (z);
-  if (e == NULL) {
-    z->failed = 1;
-    return;
-  }
+  struct pw_npz_entry *e = npz_entry (z);
+  if (e == NULL) return;
   snprintf (shape, sizeof shape, columns ? "%ld, %ld" : "%ld,", rows, columns);
   head[8] = NPZ_HEAD - 10;
   sprintf (head + 10, "{'descr': '%c%s', 'fortran_order': False, 'shape': (%s), }",

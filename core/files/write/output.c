@@ -289,8 +289,7 @@ static int output_check (int file, pw_mark *mark) {
 }
 
 int pw_output_named (const pw_output *o, const char *ending) {
-  size_t length = strlen (o->path), end = strlen (ending);
-  return length > end && strcmp (o->path + length - end, ending) == 0;
+  return pw_ends_with (o->path, ending);
 }
 
 int pw_output_continued (const pw_output *o) {

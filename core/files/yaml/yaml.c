@@ -155,7 +155,7 @@ static int yaml_head (pw_yaml *y, const pw_reader *r) {
 
 /* ---- The file ---- */
 
-pw_yaml *pw_yaml_open (const char *path, const char *shown, size_t largest, pw_error *error) {
+pw_yaml *pw_yaml_open (const char *path, const char *shown, size_t max_bytes, pw_error *error) {
   const char *slash = strrchr (path, '/');
   pw_yaml *y = calloc (1, sizeof *y);
   if (y) y->path = strdup (shown);
@@ -165,9 +165,9 @@ pw_yaml *pw_yaml_open (const char *path, const char *shown, size_t largest, pw_e
     pw_yaml_close (y);
     return NULL;
   }
-  y->ahead = YAML_AHEAD * fmax (1, (double)largest / PW_FILE_DEFAULT_BYTES);
+  y->ahead = YAML_AHEAD * fmax (1, (double)max_bytes / PW_FILE_DEFAULT_BYTES);
   y->table = (pw_plugin_table){ .abi = PW_ABI, .size = sizeof y->table, .build = pw_yaml_build };
-  if (pw_yaml_read_source (y, path, largest, error) == PW_OK && pw_yaml_read_tree (y, error) == PW_OK &&
+  if (pw_yaml_read_source (y, path, max_bytes, error) == PW_OK && pw_yaml_read_tree (y, error) == PW_OK &&
       yaml_head (y, &(pw_reader){ .y = y, .error = error }) == PW_OK)
     return y;
   pw_yaml_close (y);

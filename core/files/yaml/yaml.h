@@ -9,8 +9,8 @@
  *   yaml_build.c       bodies and elements, through the field tables of their types
  *   yaml.c             the head of a model: parameters and default run settings, stored in a plug-in's table
  *
- * Functions with a reader return the status of its error, the first one; after an error they do nothing.
- * A sequence of calls needs one check.  A NULL node is absent; nothing is read. */
+ * Functions with a reader return the status of its first error; after an error they do nothing, so that a sequence of
+ * calls needs one check.  A NULL node is absent: nothing is read. */
 #ifndef PW_YAML_H
 #define PW_YAML_H
 
@@ -38,7 +38,7 @@ struct pw_yaml {
   char *folder;          /* of the file, links resolved */
   char *source;          /* the text, zero-terminated */
   size_t size;
-  double ahead;   /* limit of indicators that libfyaml may read before an event */
+  double ahead;   /* most indicators ([ ] { } , :) that libfyaml may read ahead of an event */
   pw_arena arena; /* nodes and texts */
   const pw_node *root;
   const pw_node *bodies, *elements, *let, *reference; /* or NULL */
@@ -50,7 +50,7 @@ struct pw_yaml {
 typedef struct {
   const pw_yaml *y;
   pw_error *error;
-  pw_scope *x; /* parameters and what `let` defines, or NULL */
+  pw_scope *scope; /* parameters and what `let` defines, or NULL */
   /* for building */
   pw_model *m;
   pw_arena *arena;              /* lives as long as the model */
@@ -75,8 +75,8 @@ enum { PW_YAML_MAX_ITEMS = 1000000, PW_YAML_MAX_POINTS = 20000000, PW_YAML_MAX_O
 
 /* ---- The text (yaml_source.c) ---- */
 
-/* Reads a file of at most `largest` bytes into y->source and y->size. */
-int pw_yaml_read_source (pw_yaml *y, const char *path, size_t largest, pw_error *error);
+/* Reads a file of at most `max_bytes` bytes into y->source and y->size. */
+int pw_yaml_read_source (pw_yaml *y, const char *path, size_t max_bytes, pw_error *error);
 
 /* Fails with "PATH:LINE:COLUMN: error: TEXT", the line of the source at an offset, and a caret below. */
 int pw_yaml_fail (const pw_reader *r, size_t at, const char *format, ...) PW_PRINTF (3, 4);
@@ -95,7 +95,7 @@ int pw_yaml_load_tree (pw_yaml *y, const char *bytes, size_t size, pw_error *err
 
 /* ---- Reading the tree (yaml_read.c) ---- */
 
-enum { PW_YAML_MAX_KEYS = 40 }; /* at most, in a map of fixed keys */
+enum { PW_YAML_MAX_KEYS = 40 }; /* most known keys of a map */
 
 /* Finds known keys (ending with NULL) in a map: value[i] becomes the value of key[i], or NULL.  The first `skip` pairs
  * are skipped.  Other keys, repeated keys and empty values are refused; `what` ("a body") is for messages. */
@@ -111,7 +111,7 @@ int pw_yaml_list (const pw_reader *r, const pw_node *node, const char *what, int
 /* A scalar's text, not empty. */
 int pw_yaml_text (const pw_reader *r, const pw_node *node, const char *what, const char **text);
 
-/* A scalar as a number of a domain: an expression over r->x; a list [x, y] of them; one of several words, ending with
+/* A scalar as a number of a domain: an expression over r->scope; a list [x, y] of them; one of several words, ending with
  * NULL. */
 int pw_yaml_number (const pw_reader *r, const pw_node *node, const char *what, pw_domain domain, double *value);
 int pw_yaml_pair (const pw_reader *r, const pw_node *node, const char *what, double *value);

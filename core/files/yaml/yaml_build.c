@@ -112,8 +112,8 @@ static int build_field (pw_reader *r, const pw_kind *kind, const pw_field *f, co
 
 /* ---- Elements ---- */
 
-/* Whether a text contains a word. */
-static int build_contains_word (const char *text, const char *word) {
+/* Whether the first occurrence of a text of 3 bytes or more begins a word. */
+static int build_begins_word (const char *text, const char *word) {
   const char *at = strlen (word) < 3 ? NULL : strstr (text, word);
   return at != NULL && (at == text || strchr (" (", at[-1]));
 }
@@ -142,7 +142,7 @@ static const pw_kind *build_kind (const pw_reader *r, const pw_node *node) {
   const char *kind = build_later_type (first);
   if (kind) pw_yaml_fail (r, first->at, "an element begins with its type: write {%s: NAME, ...}", kind);
   for (const pw_kind *const *k = pw_kinds; *k && !near.near; k++) /* "revolute", "hinge" */
-    if (build_contains_word ((*k)->about, first->text))
+    if (build_begins_word ((*k)->about, first->text))
       snprintf (near.best, sizeof near.best, "%s", (*k)->name), near.near = 1;
   pw_yaml_fail (r, first->at, "an element begins with its type, and there is no type \"%.60s\"%s", first->text,
                 near.near ? pw_nearest_text (&near, hint, sizeof hint) : ": see pinwheel list kinds");
@@ -188,11 +188,11 @@ static int build_element (pw_reader *r, const pw_node *node) {
 static int build_let (pw_reader *r) {
   const pw_yaml *y = r->y;
   char what[100];
-  for (int i = 0; i < y->parameters; i++) pw_scope_add (r->x, y->parameter[i].name, r->parameter[i]);
+  for (int i = 0; i < y->parameters; i++) pw_scope_add (r->scope, y->parameter[i].name, r->parameter[i]);
   for (const pw_node *n = y->let ? y->let->first : NULL; n; n = n->next->next) {
     snprintf (what, sizeof what, "let %s", n->text);
     if (pw_yaml_number (r, n->next, what, PW_REAL, &r->let[r->lets]) != PW_OK) return r->error->status;
-    pw_scope_add (r->x, n->text, r->let[r->lets++]);
+    pw_scope_add (r->scope, n->text, r->let[r->lets++]);
   }
   return PW_OK;
 }
@@ -227,8 +227,8 @@ static int build_open (pw_reader *r) {
   r->definition = malloc (largest);
   r->node = malloc ((all + 1) * sizeof *r->node);
   r->let = malloc ((lets + 1) * sizeof *r->let);
-  r->x = pw_scope_open (y->parameters + (int)lets);
-  if (r->reference && r->definition && r->node && r->let && r->x && pw_names_open (&r->bodies, bodies) == PW_OK &&
+  r->scope = pw_scope_open (y->parameters + (int)lets);
+  if (r->reference && r->definition && r->node && r->let && r->scope && pw_names_open (&r->bodies, bodies) == PW_OK &&
       pw_names_open (&r->all, all) == PW_OK)
     return PW_OK;
   return pw_yaml_no_memory (r);
@@ -239,7 +239,7 @@ void pw_yaml_build (pw_model *m, const void *parameters) {
   pw_reader r = { .y = table, .m = m, .parameter = parameters, .error = pw_model_error (m) };
   pw_yaml_list (&r, r.y->bodies, "bodies", -1, "");
   if (pw_yaml_list (&r, r.y->elements, "elements", -1, "") == PW_OK && build_open (&r) == PW_OK) build_all (&r);
-  pw_scope_close (r.x);
+  pw_scope_close (r.scope);
   pw_names_close (&r.bodies);
   pw_names_close (&r.all);
   pw_names_close (&r.elements);

@@ -7,7 +7,7 @@
 #include <string.h>
 #include "yaml.h"
 
-enum { MAX_SIGNAL_STATES = 16, MAX_BREAKPOINTS = 100 }; /* most states per signal */
+enum { MAX_SIGNAL_STATES = 16, MAX_BREAKPOINTS = 100 }; /* states of a signal; breakpoints checked for jumps */
 
 /* A signal defined by expressions. */
 typedef struct {
@@ -44,14 +44,14 @@ static int reading_expression (const reading *x, const char *const *variable, co
                                const pw_expression **expression) {
   pw_expression_error error;
   if (pw_yaml_text (x->r, x->node, x->what, text) != PW_OK) return x->r->error->status;
-  int status = pw_expression_read (x->r->x, variable, *text, x->r->arena, expression, &error);
+  int status = pw_expression_read (x->r->scope, variable, *text, x->r->arena, expression, &error);
   if (status == PW_INPUT) return reading_fail (x, error.at, "%s", error.text);
   return status == PW_OK ? PW_OK : pw_yaml_no_memory (x->r);
 }
 
 /* ---- States: BODY.phi, ELEMENT.spin ---- */
 
-/* Indexes all elements, including those not built yet; their errors are reported later. */
+/* Indexes all elements, including those not built yet, whose errors are reported later. */
 static int state_elements (pw_reader *r) {
   const pw_node *list = r->y->elements;
   if (r->elements.slot) return PW_OK;
@@ -229,7 +229,7 @@ static int time_check (const reading *x, int i, const char *name) {
   return PW_OK;
 }
 
-/* The largest value of u[i] at times around t. */
+/* The largest magnitude of u[i] at times within 1 s of t. */
 static double time_size (const time_function *f, double t, int i) {
   double size = 0;
   for (int k = -20; k <= 20; k++) {

@@ -96,7 +96,7 @@ int pw_yaml_number (const pw_reader *r, const pw_node *node, const char *what, p
   if (node->type != PW_YAML_SCALAR)
     return pw_yaml_fail (r, node->at, "%s: expected a number, found %s", what, pw_yaml_found (node));
   int status =
-      pw_expression_number (node->text, value) ? PW_OK : pw_expression_constant (r->x, node->text, value, &error);
+      pw_expression_number (node->text, value) ? PW_OK : pw_expression_constant (r->scope, node->text, value, &error);
   if (status == PW_RESOURCE) return pw_yaml_no_memory (r);
   if (status != PW_OK)
     return pw_yaml_fail (r, pw_yaml_offset (r->y, node, error.at), "%s: %s", what,

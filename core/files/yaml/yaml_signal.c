@@ -44,7 +44,7 @@ static int table_leaves_folder (const char *name) {
 /* The real path of the file if it is below the folder; malloced. */
 static char *table_path_in_folder (const char *folder, const char *name, const char **reason) {
   char *joined = pw_path_join (folder, name, ""), *path = joined ? realpath (joined, NULL) : NULL;
-  size_t n = strcmp (folder, "/") == 0 ? 0 : strlen (folder);
+  size_t n = strlen (folder); /* 0 for the root */
   *reason = joined == NULL ? "out of memory" : strerror (errno);
   free (joined);
   if (path == NULL || (strncmp (path, folder, n) == 0 && (path[n] == '/' || path[n] == 0))) return path;

@@ -1,7 +1,7 @@
 /* The text of a model file, and messages that point into it.
  *
- * libfyaml 0.7.12 does not terminate on some lines that begin with %.  So the text is checked
- * first: size, UTF-8, no control characters, no such line. */
+ * The text is checked first: size, UTF-8, no control characters, no line that begins with %, on some of which libfyaml
+ * 0.7.12 does not terminate. */
 #include <stdarg.h>
 #include <string.h>
 #include "yaml.h"
@@ -88,11 +88,11 @@ static int source_check (const pw_reader *r) {
   return PW_OK;
 }
 
-int pw_yaml_read_source (pw_yaml *y, const char *path, size_t largest, pw_error *error) {
+int pw_yaml_read_source (pw_yaml *y, const char *path, size_t max_bytes, pw_error *error) {
   const char *why;
   FILE *f = pw_open_input (path, &why);
   if (f == NULL) return pw_fail (error, pw_open_input_status (), "cannot open the model file %s: %s", y->path, why);
-  int status = pw_read_rest (f, largest, y->path, "the limit for a model unless --max-file raises it", &y->source,
+  int status = pw_read_rest (f, max_bytes, y->path, "the limit for a model unless --max-file raises it", &y->source,
                              &y->size, error);
   fclose (f);
   return status == PW_OK ? source_check (&(pw_reader){ .y = y, .error = error }) : status;

@@ -43,7 +43,6 @@ static pw_node *stored_read (stored_bytes *x, int depth) {
     char *text = pw_arena_alloc (&x->y->arena, (size_t)h.count + 1);
     if (text == NULL) return NULL;
     memcpy (text, x->at, h.count);
-    text[h.count] = 0;
     n->text = text;
     n->count = 0;
     x->at += h.count;

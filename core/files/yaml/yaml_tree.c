@@ -18,20 +18,22 @@ typedef struct {
   int depth;
   int documents;
   /* source read by the parser since the last event */
-  size_t from, fed;     /* bytes */
-  double marks, opened; /* indicators; opening minus closing brackets */
-  int too_deep;         /* 1: too many brackets */
-  int too_long;         /* 1: too much source */
-  int line, column;     /* of the last mark, from 0 */
-  size_t mark_at;       /* offset of the last mark */
-  unsigned at;          /* of the last node, for events without a position */
+  size_t from, fed;  /* bytes */
+  double indicators; /* [ ] { } , : */
+  double opened;     /* opening minus closing brackets */
+  int too_deep;      /* 1: too many open brackets */
+  int too_many;      /* 1: too many indicators */
+  /* the last position converted */
+  int line, column; /* from 0 */
+  size_t offset;
+  unsigned at; /* of the last node, for events without a position */
 } tree;
 
-/* The offset of a mark, from its line and its column, in characters: libfyaml 0.7.12 gives cause offsets for
- * input read in pieces.  Marks are nearly in order. */
+/* The offset of a mark from its line and column, which counts characters, since the offsets of libfyaml 0.7.12 are wrong
+ * if the input is read in pieces.  Starts from the last mark: marks are nearly in order. */
 static unsigned tree_offset_of (tree *x, const struct fy_mark *mark) {
   static const char bom[] = "\xEF\xBB\xBF"; /* byte order mark, not counted as a column */
-  const char *source = x->y->source, *end = source + x->y->size, *p = source + x->mark_at;
+  const char *source = x->y->source, *end = source + x->y->size, *p = source + x->offset;
   if (x->line != mark->line) {
     for (; x->line < mark->line && p < end; p++) x->line += *p == '\n';
     for (; p > source && (x->line > mark->line || p[-1] != '\n'); p--) x->line -= p[-1] == '\n';
@@ -41,8 +43,8 @@ static unsigned tree_offset_of (tree *x, const struct fy_mark *mark) {
   for (; x->column < mark->column && p < end; x->column++) p += pw_utf8_size (p);
   for (; x->column > mark->column && p > source; x->column--)
     for (p--; p > source && (*p & 0xC0) == 0x80;) p--;
-  x->mark_at = (size_t)(p - source);
-  return (unsigned)x->mark_at;
+  x->offset = (size_t)(p - source);
+  return (unsigned)x->offset;
 }
 
 static unsigned tree_event_offset (tree *x, struct fy_event *e) {
@@ -67,8 +69,8 @@ static pw_node *tree_add (tree *x, pw_yaml_type type, unsigned at) {
   return n;
 }
 
-/* Joins the pieces of a scalar; returns their size, or -1 if they do not fit.  (fy_token_get_text of libfyaml 0.7.12
- * leaks 4 KB for every text of more than about ten pieces: escapes, lines.) */
+/* Joins the pieces of a scalar, unless `to` is NULL; returns their size, or -1 if out of memory.  (fy_token_get_text of
+ * libfyaml 0.7.12 leaks 4 KB for every text of more than about ten pieces: escapes, lines.) */
 static long tree_text (tree *x, struct fy_token *token, char *to) {
   const struct fy_iter_chunk *piece = NULL;
   long size = 0;
@@ -93,7 +95,6 @@ static int tree_scalar (tree *x, struct fy_event *e) {
   char *text = n && size >= 0 ? pw_arena_alloc (&x->y->arena, (size_t)size + 1) : NULL;
   if (text == NULL || tree_text (x, token, text) != size) return pw_yaml_no_memory (&x->r);
   if (memchr (text, 0, (size_t)size)) return pw_yaml_fail (&x->r, n->at, "a text must not contain the character 0");
-  text[size] = 0;
   for (const char *p = text; *p; p++) /* possible through escapes */
     if (pw_control (p))
       return pw_yaml_fail (&x->r, n->at, "a text must not contain the control character of code %d", pw_control (p));
@@ -114,14 +115,14 @@ static int tree_begin (tree *x, struct fy_event *e, pw_yaml_type type) {
 
 /* ---- Events ---- */
 
-static int tree_refuse_marks (tree *x, struct fy_event *e) {
+static int tree_refuse_anchor (tree *x, struct fy_event *e) {
   struct fy_token *anchor = fy_event_get_anchor_token (e), *tag = fy_event_get_tag_token (e);
   struct fy_token *token = e->type == FYET_ALIAS ? e->alias.anchor : anchor ? anchor : tag;
   if (token == NULL) return PW_OK;
   const struct fy_mark *mark = fy_token_start_mark (token);
   size_t at = mark && mark->line >= 0 ? tree_offset_of (x, mark) : tree_event_offset (x, e);
   const char *source = x->y->source;
-  while (at > 0 && !strchr ("&*!", source[at]) && source[at - 1] != '\n') at--; /* marks may follow the sign */
+  while (at > 0 && !strchr ("&*!", source[at]) && source[at - 1] != '\n') at--; /* a mark may be that of the name */
   return pw_yaml_fail (&x->r, at, "%s do not belong in a model file; use parameters",
                        e->type == FYET_ALIAS ? "aliases (*)"
                        : anchor              ? "anchors (&)"
@@ -131,8 +132,8 @@ static int tree_refuse_marks (tree *x, struct fy_event *e) {
 /* ---- Input ---- */
 
 /* libfyaml cannot tell a list or map in brackets from a key before it has seen what follows the closing bracket, and
- * until then keeps some 350 bytes for each indicator.  So it receives the source in pieces, and none after too
- * much source without an event, or too many brackets. */
+ * until then keeps some 350 bytes for each indicator.  So it receives the source in pieces, and none after too many
+ * indicators without an event, or too many open brackets. */
 enum { TREE_NESTED = 10000 };
 
 /* Adds (1) or subtracts (-1) the indicators between two offsets. */
@@ -140,7 +141,7 @@ static void tree_count (tree *x, size_t from, size_t to, int sign) {
   for (const char *p = x->y->source + from; p < x->y->source + to; p++) {
     int opens = *p == '[' || *p == '{', closes = *p == ']' || *p == '}';
     x->opened += sign * (opens - closes);
-    x->marks += sign * (opens || closes || *p == ',' || *p == ':');
+    x->indicators += sign * (opens || closes || *p == ',' || *p == ':');
   }
 }
 
@@ -152,12 +153,12 @@ static ssize_t tree_feed (void *user, void *to, size_t count) {
   tree_count (x, x->fed, x->fed + n, 1);
   x->fed += n;
   x->too_deep = x->opened > TREE_NESTED;
-  x->too_long = x->marks > x->y->ahead;
-  return x->too_deep || x->too_long ? 0 : (ssize_t)n; /* libfyaml 0.7.12 retries after an error */
+  x->too_many = x->indicators > x->y->ahead;
+  return x->too_deep || x->too_many ? 0 : (ssize_t)n; /* libfyaml 0.7.12 retries after an error */
 }
 
 static int tree_event (tree *x, struct fy_event *e) {
-  if (tree_refuse_marks (x, e) != PW_OK) return PW_INPUT;
+  if (tree_refuse_anchor (x, e) != PW_OK) return PW_INPUT;
   size_t at = tree_event_offset (x, e);
   if (at > x->fed) at = x->fed;
   if (at > x->from) tree_count (x, x->from, at, -1), x->from = at;
@@ -234,10 +235,10 @@ static int tree_parse (tree *x) {
   struct fy_event *e;
   int status = PW_OK;
   while (status == PW_OK && (e = fy_parser_parse (x->parser)) != NULL) {
-    status = x->too_long ? tree_refused (x) : tree_event (x, e);
+    status = x->too_many ? tree_refused (x) : tree_event (x, e);
     fy_parser_event_free (x->parser, e);
   }
-  if (status == PW_OK && (x->too_deep || x->too_long)) return tree_refused (x);
+  if (status == PW_OK && (x->too_deep || x->too_many)) return tree_refused (x);
   return status == PW_OK && fy_parser_get_stream_error (x->parser) ? tree_syntax (x) : status;
 }
 
