@@ -29,7 +29,7 @@ void pw_search_close (pw_search *s);
 
 /* The folder of pinwheel.h that belongs to this library, malloced; NULL if there is none.  PW_OK or PW_RESOURCE. */
 int pw_search_include (char **folder, pw_error *error);
-/* The same for a file of the engine of interactive pages. */
+/* The path of a file of the engine of interactive pages, malloced; NULL if there is none.  PW_OK or PW_RESOURCE. */
 int pw_search_page_file (const char *file, char **path, pw_error *error);
 
 /* Whether a name ends in ".so" or the like, with at least one character before it. */
@@ -40,17 +40,17 @@ int pw_ends_with (const char *name, const char *ending);
 /* Uses a shared object, which may be deleted afterwards. */
 typedef int pw_object_user (void *context, const char *object, pw_error *error);
 
-/* Compiles a C file in a private temporary folder, calls `use` with the object, and removes both: a shared object, or
- * WebAssembly linked with the object `page`.  PW_INPUT if it does not compile or there is no compiler; PW_RESOURCE; or what
- * `use` returns. */
-int pw_compile_file (const char *path, const char *page, pw_object_user *use, void *context, pw_error *error);
+/* Compiles a C file in a private temporary folder to a shared object or, unless `engine` is NULL, to WebAssembly linked
+ * with that object file; calls `use` with the result and removes it.  PW_INPUT if it does not compile or there is no
+ * compiler; PW_RESOURCE; or what `use` returns. */
+int pw_compile_file (const char *path, const char *engine, pw_object_user *use, void *context, pw_error *error);
 #define PW_PAGE_TOOLS "clang, lld, wasi-libc and libclang-rt-14-dev-wasm32 (make deps TOOLS=page)"
 
-/* Compiles generated code with all messages in a log; lanes > 0: for that many runs at once.  PW_INPUT: no compiler;
- * PW_METHOD: it does not compile; PW_RESOURCE. */
+/* Compiles generated code with all messages in a log, for `lanes` runs at once; 0: for single runs.  PW_INPUT if there is
+ * no compiler; PW_METHOD if it does not compile; PW_RESOURCE. */
 int pw_compile_scene (const char *path, const char *object, const char *log, int lanes, pw_error *error);
-/* The compiler's options for generated code, ending with NULL: those for this processor's instructions, without fused
- * operations, so that results have the same bits. */
+/* The compiler's options for generated code, ending with NULL: the instructions of this processor, except fused
+ * multiply-add, so that results have the same bits. */
 const char *const *pw_scene_options (int lanes);
 
 /* The command of the C compiler: CC in the environment, else "cc". */
@@ -107,7 +107,9 @@ extern const pw_unit_name pw_unit_names[]; /* ends with a NULL name */
 /* folder + "/" + name + ending, malloced; NULL if out of memory. */
 char *pw_path_join (const char *folder, const char *name, const char *ending);
 
-/* Reads the rest of a file of at most `max_bytes` bytes into *text, malloced, zero-terminated; free it in every case. */
+/* Reads the rest of a file of at most `max_bytes` bytes into *text, malloced, zero-terminated; free it in every case.
+ * `what` explains the limit in messages: "the limit for a table".  PW_INPUT if the file is larger or cannot be read;
+ * PW_RESOURCE. */
 int pw_read_rest (FILE *f, size_t max_bytes, const char *path, const char *what, char **text, size_t *size,
                   pw_error *error);
 
@@ -147,7 +149,7 @@ const char *pw_lock_reason (int code);
 
 /* Writes; PW_RESOURCE with the reason if this or an earlier write fails. */
 int pw_output_text (pw_output *o, const char *text, size_t size, pw_error *error);
-/* PW_RESOURCE if a write to its stream has failed since errno was 0. */
+/* PW_RESOURCE if a write to its stream has failed; set errno to 0 before writing, for the reason. */
 int pw_output_check (pw_output *o, pw_error *error);
 
 /* Whether the output continues a file that is not empty. */

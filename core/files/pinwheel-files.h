@@ -48,9 +48,7 @@ int pw_file_list (int (*each) (void *context, const char *name, const char *path
 
 /* ---- Interactive pages ---- */
 
-/* What a page needs to simulate a model in the browser, as bytes.  Errors: PW_INPUT if the model is a .so without its
- * source, does not compile to WebAssembly, or tools for that are missing, with the command that installs them;
- * PW_RESOURCE. */
+/* What a page needs to simulate a model in the browser. */
 typedef struct {
   char *name; /* "engine", "model", "tree", or the path of a table relative to the model */
   char *bytes;
@@ -60,27 +58,30 @@ typedef struct {
   pw_page_file *file;
   int files;
 } pw_page;
+/* Errors: PW_INPUT if the model is a .so without its source, does not compile to WebAssembly, or tools for that are
+ * missing, with the command that installs them; PW_RESOURCE. */
 int pw_page_open (pw_page *p, const pw_file *f, pw_error *error);
 void pw_page_close (pw_page *p); /* in every case */
 
 /* ---- Specialised scenes ---- */
 
-/* Loaded code of a system. */
+/* The loaded code of a system. */
 typedef struct pw_scene_code pw_scene_code;
 
 /* Loads what $CC or cc makes of the text of pw_system_source: from the cache, pinwheel/ below $XDG_CACHE_HOME or
  * ~/.cache, or compiled; without a cache in a temporary folder.  Systems of the same structure share code
- * (pw_specialised_fits).  Processes may do so at the same time.
+ * (pw_specialised_fits), and so may processes at the same time.
  *
- * NULL and PW_INPUT if there is no compiler; PW_METHOD if
- * the text does not compile, with the path at which it is kept; PW_RESOURCE. */
+ * NULL and PW_INPUT if there is no compiler; PW_METHOD if the text does not compile, with the path at which it is kept;
+ * PW_RESOURCE. */
 pw_scene_code *pw_scene_code_open (const char *text, const pw_system *s, pw_error *error);
-/* The same for as many runs at once (pw_runs_advance): 2, 4 or 8. */
+/* The same for 2, 4 or 8 runs at once (pw_runs_advance). */
 pw_scene_code *pw_scene_lanes_open (const char *text, const pw_system *s, int lanes, pw_error *error);
-const pw_specialised_lanes *pw_scene_code_lanes (const pw_scene_code *c); /* NULL: none, or not for this compiler */
+const pw_specialised_lanes *
+pw_scene_code_lanes (const pw_scene_code *c); /* NULL if it is for single runs, or compiled by clang */
 /* The number of runs whose lanes fill a vector register of this processor; 1 if lanes do not pay. */
 int pw_processor_lanes (void);
-/* For pw_settings.specialised; NULL of NULL. */
+/* For pw_settings.specialised; NULL if c is NULL. */
 const pw_specialised *pw_scene_code_table (const pw_scene_code *c);
 /* A line about a cache that was ignored, or ""; lives as long as the code. */
 const char *pw_scene_code_notice (const pw_scene_code *c);
@@ -274,8 +275,8 @@ void pw_json_flag (pw_json *j, const char *key, int value);
 
 /* ---- Summaries ---- */
 
-/* The largest errors of a run against the reference: lengths, angles, velocities [m/s] and angular velocities;
- * reactions relative to the largest one of the same unit.  NaN: unknown. */
+/* The errors of a run against the reference, at the end and the largest: of lengths, angles, velocities [m/s] and angular
+ * velocities; the largest one of reactions, relative to the largest reaction of the same unit.  NaN: unknown. */
 typedef struct {
   const char *source; /* "the model", or the path of a table */
   int samples;        /* compared */

@@ -285,10 +285,10 @@ static void test_limits (void **state) {
   table_bad ("{file: long.csv}", message);
 }
 
-/* A page has a table once, although two signals read it. */
+/* A page has a table once, although two signals read it, and takes no definition for a table. */
 static void test_page (void **state) {
   static const char text[] =
-      "pinwheel: 1\nbodies: [{name: a, mass: 1, inertia: 1}]\n"
+      "pinwheel: 1\nlet: {file: 3}\nbodies: [{name: a, mass: file, inertia: 1}]\n"
       "elements: [{force: F, body: a, fx: {table: {file: t.csv}}, fy: {table: {file: t.csv}}}]\n";
   pw_error error = { 0 };
   pw_page page;

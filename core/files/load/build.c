@@ -26,8 +26,7 @@ const char *pw_compiler (void) {
   return cc && cc[strspn (cc, " \t")] ? cc : "cc";
 }
 
-/* The command may be more than one word ("ccache gcc"); half of the array is reserved for our options, which end with
- * NULL. */
+/* Splits the compiler's command into at most half of the words ("ccache gcc"), and adds our options with their final NULL. */
 static int build_words (build_command *c, const char *compiler, const char *const *options) {
   char *rest = NULL;
   int words = 0;
@@ -154,7 +153,7 @@ const char *const *pw_scene_options (int lanes) {
   return lanes == 0 ? one : lanes == 2 ? two : lanes == 4 ? four_any : eight_any;
 }
 
-/* Options of a plug-in: those of generated code without a log. */
+/* Compiles generated code if there is a log, else a plug-in. */
 static int build_shared (const char *path, const char *object, const char *log, int lanes, const sigset_t *before,
                          pw_error *error) {
   static const char *const plugin[] = { "-std=c11", "-O2", "-ffp-contract=off", "-fPIC", "-shared", "-Wall", NULL };
@@ -204,13 +203,13 @@ static void build_defer (sigset_t *before) {
   pthread_sigmask (SIG_BLOCK, &stop, before);
 }
 
-int pw_compile_file (const char *path, const char *page, pw_object_user *use, void *context, pw_error *error) {
+int pw_compile_file (const char *path, const char *engine, pw_object_user *use, void *context, pw_error *error) {
   sigset_t before;
   build_defer (&before);
   char *folder = pw_temporary_folder (error), *object = folder ? pw_path_join (folder, "model.so", "") : NULL;
   int status = !folder   ? PW_RESOURCE
                : !object ? pw_fail (error, PW_RESOURCE, "out of memory")
-               : page    ? build_page (path, page, object, &before, error)
+               : engine  ? build_page (path, engine, object, &before, error)
                          : build_shared (path, object, NULL, 0, &before, error);
   if (status == PW_OK) status = use (context, object, error);
   if (object) unlink (object);

@@ -16,7 +16,8 @@ static int yaml_new_name (const pw_reader *r, const pw_node *node, const char *w
   const char *name;
   if (pw_yaml_text (r, node, what, &name) != PW_OK) return r->error->status;
   if (!pw_expression_is_name (name))
-    return pw_yaml_fail (r, node->at, "%s \"%.60s\": expected a letter, then letters, digits and _", what, name);
+    return pw_yaml_fail (r, node->at, "%s \"%.60s\": expected a letter, then letters, digits and _, at most 63 in all",
+                         what, name);
   if (strcmp (name, "t") == 0 || pw_expression_is_reserved (name))
     return pw_yaml_fail (r, node->at, "%s \"%s\": this name is reserved: %s", what, name,
                          *name == 't' && name[1] == 0 ? "it is the time" : "a function or constant");
@@ -204,5 +205,5 @@ static int yaml_each_table (const pw_yaml *y, const pw_node *node, int (*each) (
 }
 
 int pw_yaml_tables (const pw_yaml *y, int (*each) (void *context, const char *path), void *context) {
-  return y->root ? yaml_each_table (y, y->root, each, context) : 0;
+  return y->elements ? yaml_each_table (y, y->elements, each, context) : 0; /* a definition may be named "file" */
 }
