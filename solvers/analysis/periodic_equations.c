@@ -6,7 +6,8 @@
  *     phi (P (y)) - D (s) P (y) = 0,    y - P (y) = 0,
  *
  * and corrections are orthogonal to symmetries and, with a free period, to the motion.  Derivatives of phi are those of
- * the variational equations (variation.c), along a basis of perturbations on the constraints; those of P are differences.
+ * the variational equations (variation.c), along a basis B of perturbations on the constraints.  P' = B B^+, which is
+ * exact for such perturbations; on branches, whose tangents need all others, P' is a difference.
  *
  * Multipliers are the eigenvalues of D (s)^-1 phi' in minimal coordinates: of changes of shape and velocity in the frame of
  * the vehicle.  (Wulff & Schebesch 2008, Numerical continuation of symmetric periodic orbits.) */

@@ -158,7 +158,8 @@ static int flow_run (pw_periodic *x, pw_run *r, double period, pw_flow_accuracy 
   size_t n = (size_t)x->n, bytes = n * sizeof *r->q;
   double end = x->set.t + period;
   pw_sample sample;
-  int status = accuracy == PW_FLOW ? PW_OK : flow_basis (x, r, accuracy == PW_FLOW_DERIVATIVES);
+  int branch = x->set.compile != NULL; /* whose tangents need the exact derivatives */
+  int status = accuracy == PW_FLOW ? PW_OK : flow_basis (x, r, branch && accuracy == PW_FLOW_DERIVATIVES);
   if (status != PW_OK) return status == PW_RETRY ? pw_fail_singular (r, r->t, &x->why) : status;
   status = pw_run_sample (r, r->t, &sample, &x->why);
   if (status != PW_OK) return status;

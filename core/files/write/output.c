@@ -178,7 +178,7 @@ int pw_output_check (pw_output *o, pw_error *error) {
 
 int pw_output_text (pw_output *o, const char *text, size_t size, pw_error *error) {
   errno = 0;
-  fwrite (text, 1, size, o->stream);
+  if (size > 0) fwrite (text, 1, size, o->stream);
   return pw_output_check (o, error);
 }
 
