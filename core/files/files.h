@@ -90,8 +90,8 @@ const pw_yaml *pw_file_yaml (const pw_file *f);
  * column must be increasing; with `gaps`, empty cells and nan in others become NaN.  `unit` is the requested unit of each
  * (NULL: any), to which it is converted if the header names another.
  * PW_INPUT with "SHOWN:LINE: REASON", PW_RESOURCE. */
-int pw_columns_read (FILE *f, const char *shown, const char *const *column, const char *const *unit, int width,
-                     int gaps, pw_arena *arena, double **value, int *count, pw_error *error);
+int pw_columns_from_stream (FILE *f, const char *shown, const char *const *column, const char *const *unit, int width,
+                            int gaps, pw_arena *arena, double **value, int *count, pw_error *error);
 
 /* ---- Units (units.c) ---- */
 

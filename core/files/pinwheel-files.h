@@ -126,9 +126,9 @@ size_t pw_unit_split (const char *cell, char *unit, size_t size);
 int pw_unit_check (const char *cell, const char *wanted, double *factor, char *why, size_t size);
 
 /* Reads columns of a table by their names or numbers, in SI units: `unit` of each, or NULL for any.  The first one is the
- * time, which increases; in the others empty cells and nan are gaps, NaN.  Returns `columns` arrays of *rows numbers, one
+ * time, which increases; in the others empty cells and nan are gaps, NaN.  Returns `width` arrays of *rows numbers, one
  * after the other; free it.  NULL and PW_INPUT with file, line and nearest name, or PW_RESOURCE. */
-double *pw_read_columns (const char *path, const char *const *column, const char *const *unit, int columns, int *rows,
+double *pw_read_columns (const char *path, const char *const *column, const char *const *unit, int width, int *rows,
                          pw_error *error);
 
 /* Opens a regular file for reading, without waiting (a FIFO is refused).  NULL, with the reason in *why, if that fails

@@ -15,7 +15,7 @@ int LLVMFuzzerTestOneInput (const uint8_t *data, size_t size) {
   if (size < 2) return 0;
   FILE *f = fmemopen ((void *)(size_t)(data + 1), size - 1, "rb");
   if (f == NULL) return 0;
-  if (pw_columns_read (f, "data.csv", column[data[0] % 3], unit, 2, 0, &arena, value, &count, &error) == PW_OK)
+  if (pw_columns_from_stream (f, "data.csv", column[data[0] % 3], unit, 2, 0, &arena, value, &count, &error) == PW_OK)
     for (int i = 0; i < count; i++) {
       if (!isfinite (value[0][i]) || !isfinite (value[1][i])) abort ();
       if (i > 0 && !(value[0][i] > value[0][i - 1])) abort ();

@@ -155,8 +155,8 @@ static int columns_all (columns *c, const char *const *column, const char *const
   return columns_rows (c, named ? columns_line (c) : line, index, factor, value, count);
 }
 
-int pw_columns_read (FILE *f, const char *shown, const char *const *column, const char *const *unit, int width,
-                     int gaps, pw_arena *arena, double **value, int *count, pw_error *error) {
+int pw_columns_from_stream (FILE *f, const char *shown, const char *const *column, const char *const *unit, int width,
+                            int gaps, pw_arena *arena, double **value, int *count, pw_error *error) {
   static const char mark[] = "\xEF\xBB\xBF"; /* byte order mark, which some programs write */
   char *text;
   size_t size;
@@ -179,7 +179,7 @@ double *pw_read_columns (const char *path, const char *const *column, const char
   int status = PW_OK;
   FILE *f = pw_open_input (path, &why);
   if (f == NULL) status = pw_fail (error, pw_open_input_status (), "%s: cannot be read: %s", path, why);
-  if (f && value) status = pw_columns_read (f, path, column, unit, width, 1, &arena, value, rows, error);
+  if (f && value) status = pw_columns_from_stream (f, path, column, unit, width, 1, &arena, value, rows, error);
   if (f) fclose (f);
   if (status == PW_OK && value) all = malloc (((size_t)*rows * (size_t)width + 1) * sizeof *all);
   if (status == PW_OK && all == NULL) pw_fail (error, PW_RESOURCE, "%s: out of memory", path);

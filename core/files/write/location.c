@@ -1,4 +1,4 @@
-/* Locations of files: follows links, also to files that do not exist yet, and detects names of the same file. */
+/* Opens inputs; follows links, also to files that do not exist yet; detects names of the same file. */
 #include <errno.h>
 #include <fcntl.h>
 #include <stdlib.h>

@@ -274,7 +274,7 @@ int pw_output_finish (pw_output *o, pw_error *error) {
 /* ---- Continuation of an interrupted run ---- */
 
 /* Checksum of the last 64 kB before `length`; PW_RETRY if the file is shorter. */
-static int output_check (int file, pw_mark *mark) {
+static int output_checksum (int file, pw_mark *mark) {
   char bytes[4096];
   unsigned long long at = mark->length > 65536 ? mark->length - 65536 : 0;
   mark->check = PW_CHECK;
@@ -303,14 +303,14 @@ int pw_output_mark (pw_output *o, pw_mark *mark, pw_error *error) {
   int code = output_sync (o);
   if (code) return output_fail (o, code, 0, error);
   mark->length = (unsigned long long)ftello (o->stream);
-  if (output_check (o->file, mark) == PW_OK) return PW_OK;
+  if (output_checksum (o->file, mark) == PW_OK) return PW_OK;
   return pw_fail (error, PW_RESOURCE, "cannot read %s", o->part);
 }
 
 /* 1 if the temporary file begins with the marked contents. */
 static int output_is_marked (const pw_output *o, const pw_mark *mark) {
   pw_mark now = { .length = mark->length };
-  return output_check (o->file, &now) == PW_OK && now.check == mark->check;
+  return output_checksum (o->file, &now) == PW_OK && now.check == mark->check;
 }
 
 /* A process killed just after completing its table leaves it under its final name. */

@@ -55,18 +55,18 @@ typedef struct {
   pw_model *m;
   pw_arena *arena;              /* lives as long as the model */
   pw_reference_text *reference; /* the model's */
-  const double *parameter;      /* their values */
+  const double *parameter;      /* values of y->parameter */
   double *let;                  /* values of what `let` defines */
   int lets;                     /* so far */
-  pw_names bodies;              /* names of bodies, to their index */
-  pw_names all;                 /* names of bodies and elements, to the index in nodes */
-  pw_names elements;     /* once an expression asks for them: names of all elements, to the index of their types */
-  const pw_node **node;  /* where each is named; */
-  int named;             /* their number so far */
-  const pw_field *field; /* the current one, and its definition with all preceding fields */
-  char *definition;
-  double points; /* of tables, so far */
-  double codes;  /* operations of all expressions so far */
+  pw_names bodies;              /* names of bodies so far */
+  pw_names all;                 /* names of bodies and elements so far, to the index in `node` */
+  pw_names elements;     /* names of all elements, to the index of their types; made when an expression needs it */
+  const pw_node **node;  /* where each body and element is named */
+  int named;             /* entries of `node` so far */
+  const pw_field *field; /* being read */
+  char *definition;      /* of the element being read, with all preceding fields */
+  double points;         /* of all tables so far */
+  double codes;          /* operations of all expressions so far */
 } pw_reader;
 
 /* Limits of one model, about 1 GB each, so that a small file cannot use all memory: bodies, elements, parameters or

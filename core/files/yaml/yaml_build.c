@@ -112,10 +112,11 @@ static int build_field (pw_reader *r, const pw_kind *kind, const pw_field *f, co
 
 /* ---- Elements ---- */
 
-/* Whether the first occurrence of a text of 3 bytes or more begins a word. */
-static int build_begins_word (const char *text, const char *word) {
-  const char *at = strlen (word) < 3 ? NULL : strstr (text, word);
-  return at != NULL && (at == text || strchr (" (", at[-1]));
+/* Whether a word of a text begins with this prefix, of 3 bytes or more. */
+static int build_has_word (const char *text, const char *prefix) {
+  for (const char *at = text; strlen (prefix) >= 3 && (at = strstr (at, prefix)) != NULL; at++)
+    if (at == text || strchr (" (", at[-1])) return 1;
+  return 0;
 }
 
 /* The element type that appears later in an element, as a key or as {kind: wheel, ...}; NULL if there is none. */
@@ -142,7 +143,7 @@ static const pw_kind *build_kind (const pw_reader *r, const pw_node *node) {
   const char *kind = build_later_type (first);
   if (kind) pw_yaml_fail (r, first->at, "an element begins with its type: write {%s: NAME, ...}", kind);
   for (const pw_kind *const *k = pw_kinds; *k && !near.near; k++) /* "revolute", "hinge" */
-    if (build_begins_word ((*k)->about, first->text))
+    if (build_has_word ((*k)->about, first->text))
       snprintf (near.best, sizeof near.best, "%s", (*k)->name), near.near = 1;
   pw_yaml_fail (r, first->at, "an element begins with its type, and there is no type \"%.60s\"%s", first->text,
                 near.near ? pw_nearest_text (&near, hint, sizeof hint) : ": see pinwheel list kinds");

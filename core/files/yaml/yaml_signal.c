@@ -86,7 +86,7 @@ static int table_file (pw_reader *r, const char *what, const pw_node *node, cons
   FILE *f = table_open (r->y, name, &reason);
   if (f == NULL && errno == ENOMEM) return pw_yaml_no_memory (r);
   if (f == NULL) return pw_yaml_fail (r, node->at, "%s: cannot read \"%.60s\": %s", what, name, reason);
-  int status = pw_columns_read (f, name, column, unit, 2, 0, r->arena, value, &s->table.count, &cause);
+  int status = pw_columns_from_stream (f, name, column, unit, 2, 0, r->arena, value, &s->table.count, &cause);
   fclose (f);
   s->table.t = value[0];
   s->table.value = value[1];
@@ -127,7 +127,7 @@ static int signal_fields (pw_reader *r, const pw_signal_form *form, const char *
 }
 
 /* Checks the signal as a whole; reports an error at the faulty point of a table, or at the signal. */
-static int signal_fault (pw_reader *r, const pw_kind *kind, const char *what, const pw_node *node,
+static int signal_check (pw_reader *r, const pw_kind *kind, const char *what, const pw_node *node,
                          const pw_node *points, const pw_signal *signal) {
   char fault[300];
   int point;
@@ -152,7 +152,7 @@ static int signal_form (pw_reader *r, const pw_kind *kind, const pw_signal_form 
   if (pw_yaml_keys (r, node, 0, key, about, v) != PW_OK || signal_fields (r, form, what, node, v, signal) != PW_OK ||
       (is_table && table_points (r, what, node, v + fields, signal) != PW_OK))
     return r->error->status;
-  return signal_fault (r, kind, what, node, is_table ? v[fields] : NULL, signal);
+  return signal_check (r, kind, what, node, is_table ? v[fields] : NULL, signal);
 }
 
 enum { SIGNAL_CONSTANT, SIGNAL_EXPRESSION, SIGNAL_RATE, SIGNAL_ACCELERATION, SIGNAL_FORMS };

@@ -6,7 +6,7 @@
 enum { STORED_DEPTH = 40 };
 
 typedef struct {
-  unsigned char type, quoted;
+  unsigned char type, quoted, unused[2]; /* no padding, which would be written uninitialised */
   unsigned at, count;
 } stored_head;
 
@@ -14,7 +14,7 @@ typedef struct {
 
 static void stored_write (const pw_node *n, FILE *f) {
   int scalar = n->type == PW_YAML_SCALAR;
-  stored_head h = { n->type, n->quoted, n->at, scalar ? (unsigned)strlen (n->text) : (unsigned)n->count };
+  stored_head h = { n->type, n->quoted, { 0 }, n->at, scalar ? (unsigned)strlen (n->text) : (unsigned)n->count };
   fwrite (&h, sizeof h, 1, f);
   if (scalar) fwrite (n->text, 1, h.count, f);
   for (const pw_node *entry = scalar ? NULL : n->first; entry; entry = entry->next) stored_write (entry, f);
