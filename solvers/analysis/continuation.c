@@ -17,13 +17,25 @@ int pw_branch_open (pw_branch *b, const pw_branch_equations *of, pw_error *error
   size_t n = (size_t)of->unknowns + 1, m = (size_t)of->equations + n, large = n > m ? n : m;
   *b = (pw_branch){ .of = *of, .room = (int)(8 * large + 200) };
   if (!(b->of.rank > 0)) b->of.rank = 1e-9;
-  const pw_array array[] = {
-    { &b->at.u, n },           { &b->at.tangent, n },  { &b->before.u, n },
-    { &b->before.tangent, n }, { &b->next.u, n },      { &b->next.tangent, n },
-    { &b->F, large },          { &b->J, m * n },       { &b->du, large },
-    { &b->trial, n },          { &b->condition, n },   { &b->predicted, n },
-    { &b->end.u, n },          { &b->end.tangent, n }, { &b->work, (size_t)b->room + 34 * large }
-  };
+  const pw_array array[] = { { &b->at.u, n },
+                             { &b->at.tangent, n },
+                             { &b->before.u, n },
+                             { &b->before.tangent, n },
+                             { &b->next.u, n },
+                             { &b->next.tangent, n },
+                             { &b->F, large },
+                             { &b->J, m * n },
+                             { &b->du, large },
+                             { &b->trial, n },
+                             { &b->condition, n },
+                             { &b->predicted, n },
+                             { &b->end.u, n },
+                             { &b->end.tangent, n },
+                             { &b->side[0].u, n },
+                             { &b->side[0].tangent, n },
+                             { &b->side[1].u, n },
+                             { &b->side[1].tangent, n },
+                             { &b->work, (size_t)b->room + 34 * large } };
   b->room += (int)(34 * large);
   b->memory = pw_alloc_arrays (array, sizeof array / sizeof *array);
   b->pivot = malloc (n * sizeof *b->pivot);
@@ -159,8 +171,17 @@ int pw_branch_start (pw_branch *b, const double *u, double direction, pw_error *
   memset (b->condition, 0, n * sizeof *b->condition);
   b->condition[n - 1] = direction > 0 ? 1 : -1;
   b->folded = 0;
+  b->at.residual = b->residual, b->at.interpolated = 0;
   memmove (b->at.u, u, n * sizeof *u);
   return branch_tangent (b, b->at.u, b->condition, b->at.tangent, error);
+}
+
+void pw_branch_copy (const pw_branch *b, const pw_branch_point *from, pw_branch_point *to) {
+  size_t bytes = ((size_t)b->of.unknowns + 1) * sizeof *from->u;
+  if (from->u == to->u) return;
+  memcpy (to->u, from->u, bytes);
+  memcpy (to->tangent, from->tangent, bytes);
+  to->residual = from->residual, to->interpolated = from->interpolated;
 }
 
 static double branch_distance (const pw_branch *b, const double *x, const double *y) {
@@ -177,6 +198,7 @@ static int branch_correct (pw_branch *b, const double *tangent, double most, pw_
   int status = branch_iterate (b, to->u, b->condition, 0, error);
   if (status != PW_OK) return status;
   if (branch_distance (b, to->u, b->predicted) > most) return PW_RETRY;
+  to->residual = b->residual, to->interpolated = 0;
   return branch_tangent (b, to->u, b->condition, to->tangent, error);
 }
 
@@ -209,17 +231,22 @@ int pw_branch_step (pw_branch *b, pw_error *error) {
   return PW_OK;
 }
 
-int pw_branch_between (pw_branch *b, double s, pw_branch_point *point, pw_error *error) {
+/* The point at fraction s (0 to 1) of the distance between two points; that of the cubic through both if Newton's method
+ * does not converge nearby, as at bifurcations. */
+static int branch_between (pw_branch *b, const pw_branch_point *from, const pw_branch_point *to, double s,
+                           pw_branch_point *point, pw_error *error) {
   size_t bytes = ((size_t)b->of.unknowns + 1) * sizeof *point->u;
-  double chord = branch_distance (b, b->at.u, b->before.u), r = 1 - s;
+  double chord = branch_distance (b, to->u, from->u), r = 1 - s;
   for (int j = 0; j <= b->of.unknowns; j++)
-    point->u[j] = r * r * ((1 + 2 * s) * b->before.u[j] + s * chord * b->before.tangent[j]) +
-                  s * s * ((1 + 2 * r) * b->at.u[j] - r * chord * b->at.tangent[j]);
-  int status = branch_correct (b, b->before.tangent, BRANCH_ASIDE * chord, point, error);
+    point->u[j] = r * r * ((1 + 2 * s) * from->u[j] + s * chord * from->tangent[j]) +
+                  s * s * ((1 + 2 * r) * to->u[j] - r * chord * to->tangent[j]);
+  int status = branch_correct (b, from->tangent, BRANCH_ASIDE * chord, point, error);
   if (status != PW_RETRY) return status;
   memcpy (point->u, b->predicted, bytes);
-  memcpy (point->tangent, b->before.tangent, bytes);
-  return PW_OK;
+  memcpy (point->tangent, from->tangent, bytes);
+  status = branch_evaluate (b, point->u, 0, error);
+  point->residual = branch_size (b), point->interpolated = 1;
+  return status;
 }
 
 int pw_branch_fold (void *context, const pw_branch_point *point, double *value, pw_error *error) {
@@ -229,31 +256,34 @@ int pw_branch_fold (void *context, const pw_branch_point *point, double *value, 
   return PW_OK;
 }
 
-static void branch_copy (const pw_branch *b, const pw_branch_point *from, pw_branch_point *to) {
-  size_t bytes = ((size_t)b->of.unknowns + 1) * sizeof *from->u;
-  memcpy (to->u, from->u, bytes);
-  memcpy (to->tangent, from->tangent, bytes);
-}
-
-/* The Illinois variant of regula falsi (Dowell & Jarratt 1971), every fourth step a bisection. */
+/* The Illinois variant of regula falsi (Dowell & Jarratt 1971), every fourth step a bisection.  Points to which Newton's
+ * method converges become ends of the cubic, which s in [0, 1] measures; `scale`: its length, relative to the step. */
 int pw_branch_locate (pw_branch *b,
                       int (*test) (void *context, const pw_branch_point *point, double *value, pw_error *error),
                       void *context, double accuracy, pw_branch_point *point, pw_error *error) {
-  double s[2] = { 0, 1 }, f[2], middle, value;
+  double s[2] = { 0, 1 }, f[2], middle, value, scale = 1;
   int status = test (context, &b->before, &f[0], error), last = -1;
   if (status == PW_OK) status = test (context, &b->at, &f[1], error);
   if (status != PW_OK) return status;
-  branch_copy (b, fabs (f[0]) < fabs (f[1]) ? &b->before : &b->at, point);
-  for (int i = 0; i < LOCATE_MOST && s[1] - s[0] > accuracy; i++) {
+  pw_branch_copy (b, &b->before, &b->side[0]);
+  pw_branch_copy (b, &b->at, &b->side[1]);
+  pw_branch_copy (b, fabs (f[0]) < fabs (f[1]) ? &b->before : &b->at, point);
+  for (int i = 0; i < LOCATE_MOST && (s[1] - s[0]) * scale > accuracy; i++) {
     middle = f[1] != f[0] && i % 4 < 3 ? s[1] - f[1] * (s[1] - s[0]) / (f[1] - f[0]) : (s[0] + s[1]) / 2;
-    status = pw_branch_between (b, middle, &b->next, error);
+    status = branch_between (b, &b->side[0], &b->side[1], middle, &b->next, error);
     if (status == PW_OK) status = test (context, &b->next, &value, error);
     if (status != PW_OK) return status == PW_RETRY ? PW_OK : status;
-    branch_copy (b, &b->next, point);
+    pw_branch_copy (b, &b->next, point);
     if (value == 0) break;
     int side = (value > 0) == (f[1] > 0);
     if (side == last) f[!side] /= 2;
     s[side] = middle, f[side] = value, last = side;
+    if (point->interpolated || !branch_smooth (b, &b->side[0], point) || !branch_smooth (b, point, &b->side[1]))
+      continue;
+    pw_branch_copy (b, point, &b->side[side]);
+    scale *= side ? middle : 1 - middle;
+    s[!side] = side ? s[0] / middle : (s[1] - middle) / (1 - middle);
+    s[side] = side;
   }
   return PW_OK;
 }
@@ -269,7 +299,6 @@ static int branch_beyond (void *context, const pw_branch_point *point, double *v
 
 int pw_branch_at_end (pw_branch *b, int *ended, pw_error *error) {
   int p = b->of.unknowns;
-  size_t bytes = ((size_t)p + 1) * sizeof *b->at.u;
   if (b->at.u[p] <= 1 && b->at.u[p] >= 0) return PW_OK;
   *ended = 1;
   b->limit = b->at.u[p] > 1;
@@ -277,8 +306,8 @@ int pw_branch_at_end (pw_branch *b, int *ended, pw_error *error) {
   if (status != PW_OK) return status;
   b->end.u[p] = b->limit;
   status = pw_branch_solve (b, b->end.u, error);
-  memcpy (b->at.u, b->end.u, bytes);
-  memcpy (b->at.tangent, b->end.tangent, bytes);
+  b->end.residual = b->residual, b->end.interpolated = 0;
+  pw_branch_copy (b, &b->end, &b->at);
   b->folded = b->before.tangent[p] * b->at.tangent[p] < 0;
   return status;
 }

@@ -24,9 +24,11 @@ typedef struct {
   void *context;
 } pw_branch_equations;
 
-/* A point of a branch: u, then the unit tangent, unknowns + 1 entries each. */
+/* A point of a branch. */
 typedef struct {
-  double *u, *tangent;
+  double *u, *tangent; /* unknowns + 1 each; the tangent has unit length */
+  double residual;     /* largest |F_i| */
+  int interpolated;    /* 1: on the cubic through two points, since Newton's method does not converge */
 } pw_branch_point;
 
 typedef struct {
@@ -40,7 +42,7 @@ typedef struct {
   int rank;                   /* of dF/dx (or of dF with the arclength condition) there */
   int folded;                 /* 1: p has an extremum between the last two points */
   /* private */
-  pw_branch_point next, end;
+  pw_branch_point next, end, side[2];
   double limit; /* of p, sought */
   double *F, *J, *du, *trial, *work, *condition, *predicted;
   int *pivot, room;
@@ -63,12 +65,8 @@ int pw_branch_start (pw_branch *b, const double *u, double direction, pw_error *
  * converges to a point nearby on a smooth branch.  Branches that bifurcate from it are not followed. */
 int pw_branch_step (pw_branch *b, pw_error *error);
 
-/* The point of the branch at fraction s (0 to 1) of the distance between the last two points; that of the cubic through
- * both if Newton's method does not converge, as near bifurcations.  *point has its own arrays. */
-int pw_branch_between (pw_branch *b, double s, pw_branch_point *point, pw_error *error);
-
-/* The point between the last two points where a test changes its sign, to `accuracy` of their distance.  `test`
- * (a status) sets *value. */
+/* The point between the last two points where a test changes its sign, to `accuracy` of their distance; interpolated if
+ * Newton's method does not converge nearby, as at bifurcations.  `test` (a status) sets *value; *point has its own arrays. */
 int pw_branch_locate (pw_branch *b,
                       int (*test) (void *context, const pw_branch_point *point, double *value, pw_error *error),
                       void *context, double accuracy, pw_branch_point *point, pw_error *error);
@@ -77,6 +75,9 @@ int pw_branch_locate (pw_branch *b,
 int pw_branch_at_end (pw_branch *b, int *ended, pw_error *error);
 /* 1 if the last step has passed the point `first`, in the same direction: the branch is closed. */
 int pw_branch_closed (const pw_branch *b, const pw_branch_point *first);
+
+/* Copies a point to one with its own arrays. */
+void pw_branch_copy (const pw_branch *b, const pw_branch_point *from, pw_branch_point *to);
 
 /* For pw_branch_locate: the last entry of the tangent. */
 int pw_branch_fold (void *context, const pw_branch_point *point, double *value, pw_error *error);

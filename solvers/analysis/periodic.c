@@ -171,15 +171,12 @@ int pw_periodic_solve (pw_periodic *x, int settle, double parameter, pw_periodic
 
 /* ---- Branches ---- */
 
-static void periodic_queue (pw_periodic *x, const double *u, pw_periodic_event event) {
-  size_t bytes = ((size_t)x->branch.of.unknowns + 1) * sizeof *u;
+static void periodic_queue (pw_periodic *x, const pw_branch_point *point, pw_periodic_event event) {
   x->queue[x->queued].event = event;
-  if (u != x->queue[x->queued].point.u) memcpy (x->queue[x->queued].point.u, u, bytes);
-  x->queued++;
+  pw_branch_copy (&x->branch, point, &x->queue[x->queued++].point);
 }
 
 int pw_periodic_follow (pw_periodic *x, int direction, pw_error *error) {
-  size_t bytes = ((size_t)x->branch.of.unknowns + 1) * sizeof *x->u;
   pw_branch *b = &x->branch;
   x->steps = x->ended = x->queued = x->returned = 0;
   b->most = 1.0 / x->set.points, b->step = b->most / 4, b->least = PERIODIC_LEAST;
@@ -187,9 +184,8 @@ int pw_periodic_follow (pw_periodic *x, int direction, pw_error *error) {
   int status = pw_branch_start (b, x->u, direction, error);
   if (status == PW_RETRY) return pw_fail (error, PW_METHOD, "the branch cannot be followed from here");
   if (status != PW_OK) return status;
-  memcpy (x->first.u, b->at.u, bytes);
-  memcpy (x->first.tangent, b->at.tangent, bytes);
-  periodic_queue (x, b->at.u, PW_PERIODIC_POINT);
+  pw_branch_copy (b, &b->at, &x->first);
+  periodic_queue (x, &b->at, PW_PERIODIC_POINT);
   return PW_OK;
 }
 
@@ -215,7 +211,7 @@ static int periodic_crossing (pw_periodic *x, int before, int now, pw_error *err
   if (status == PW_OK) status = periodic_test (x, point, &value, error);
   re = x->re[x->sought], im = x->im[x->sought];
   if (status == PW_OK)
-    periodic_queue (x, point->u,
+    periodic_queue (x, point,
                     fabs (im) > PERIODIC_REAL ? PW_PERIODIC_TORUS
                     : re > 0                  ? PW_PERIODIC_REAL
                                               : PW_PERIODIC_FLIP);
@@ -232,7 +228,7 @@ static int periodic_events (pw_periodic *x, pw_error *error) {
   if (b->folded) {
     pw_branch_point *point = &x->queue[x->queued].point;
     status = pw_branch_locate (b, pw_branch_fold, b, PERIODIC_EVENT, point, error);
-    if (status == PW_OK) periodic_queue (x, point->u, PW_PERIODIC_FOLD);
+    if (status == PW_OK) periodic_queue (x, point, PW_PERIODIC_FOLD);
   }
   int change = before > o.unstable ? before - o.unstable : o.unstable - before;
   if (status == PW_OK && before >= 0 && change > b->folded) status = periodic_crossing (x, before, o.unstable, error);
@@ -248,7 +244,7 @@ static int periodic_advance (pw_periodic *x, pw_error *error) {
   if (status == PW_RETRY && !*x->why.text) pw_fail (&x->why, PW_METHOD, "Newton's method fails at the smallest step");
   if (status == PW_OK) status = pw_branch_at_end (&x->branch, &x->ended, error);
   if (status == PW_OK) status = periodic_events (x, error);
-  if (status == PW_OK) periodic_queue (x, x->branch.at.u, PW_PERIODIC_POINT);
+  if (status == PW_OK) periodic_queue (x, &x->branch.at, PW_PERIODIC_POINT);
   x->ended |= x->steps > 2 && pw_branch_closed (&x->branch, &x->first);
   return status;
 }
@@ -268,6 +264,6 @@ int pw_periodic_next (pw_periodic *x, pw_periodic_orbit *out, pw_error *error) {
   if (x->unstable < 0) x->unstable = out->unstable;
   out->event = x->queue[i].event;
   out->iterations = x->branch.iterations;
-  out->residual = x->branch.residual;
+  out->residual = x->queue[i].point.residual;
   return status;
 }

@@ -12,7 +12,6 @@ enum { BRANCH_LIMIT = 100 };
 
 /* Room for one more point, where `along` counts from 0 (the point before) to 1. */
 static void branch_queue (pw_steady *x, pw_branch_point point, pw_steady_event event, double along) {
-  size_t bytes = ((size_t)pw_steady_unknowns (x) + 1) * sizeof *point.u;
   int i = x->queued++;
   for (; i > 0 && x->queue[i - 1].along > along; i--) {
     pw_branch_point other = x->queue[i].point;
@@ -21,9 +20,7 @@ static void branch_queue (pw_steady *x, pw_branch_point point, pw_steady_event e
   }
   x->queue[i].event = event;
   x->queue[i].along = along;
-  if (point.u == x->queue[i].point.u) return;
-  memcpy (x->queue[i].point.u, point.u, bytes);
-  memcpy (x->queue[i].point.tangent, point.tangent, bytes);
+  pw_branch_copy (&x->branch, &point, &x->queue[i].point);
 }
 
 int pw_steady_follow (pw_steady *x, const double *q, const double *v, double parameter, int direction,
@@ -41,8 +38,7 @@ int pw_steady_follow (pw_steady *x, const double *q, const double *v, double par
   if (status == PW_OK) status = pw_branch_start (&x->branch, x->u, direction, error);
   if (status != PW_OK)
     return status < 0 && error->status ? status : pw_fail (error, PW_METHOD, "the branch cannot be followed from here");
-  memcpy (x->first.u, x->branch.at.u, ((size_t)unknowns + 1) * sizeof *x->u);
-  memcpy (x->first.tangent, x->branch.at.tangent, ((size_t)unknowns + 1) * sizeof *x->u);
+  pw_branch_copy (&x->branch, &x->branch.at, &x->first);
   x->unstable = motion.unstable;
   x->branch.most = 1.0 / x->set.points;
   x->branch.step = x->branch.most / 4;
@@ -163,7 +159,7 @@ int pw_steady_next (pw_steady *x, pw_steady_motion *out, pw_error *error) {
   int i = x->returned++, neutral = x->neutral;
   out->event = x->queue[i].event;
   out->iterations = x->branch.iterations;
-  out->residual = x->branch.residual;
+  out->residual = x->queue[i].point.residual;
   status = pw_steady_motion_at (x, x->queue[i].point.u, out, error);
   x->neutral = neutral;
   return status;

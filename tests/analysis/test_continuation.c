@@ -34,7 +34,7 @@ static void continuation_open (pw_branch *b, const pw_branch_equations *of) {
 /* The branch passes both folds, at p = +- 2 / sqrt (27), x = -+ 1 / sqrt (3). */
 static void test_folds (void **state) {
   double at[2][3], tangent[3], u[3] = { -2, 0.7, -5 }, next = 1;
-  pw_branch_point fold = { at[0], tangent };
+  pw_branch_point fold = { .u = at[0], .tangent = tangent };
   pw_error error = { 0 };
   pw_branch b;
   int folds = 0, points = 0;
@@ -79,11 +79,11 @@ static int pitchfork_sign (void *context, const pw_branch_point *point, double *
 
 /* Steps of any length pass pitchforks on the same branch, and the pitchfork is located. */
 static void test_pitchforks (void **state) {
-  double at[2], tangent[2], where;
+  double at[2], tangent[2], where, F;
   const pw_branch_equations of = {
     .unknowns = 1, .equations = 1, .tolerance = 1e-9, .rank = 1e-7, .evaluate = pitchfork, .context = &where
   };
-  pw_branch_point point = { at, tangent };
+  pw_branch_point point = { .u = at, .tangent = tangent };
   pw_error error = { 0 };
   (void)state;
   for (int k = 0; k < 300; k++) {
@@ -99,7 +99,9 @@ static void test_pitchforks (void **state) {
       assert_false (b.folded);
       if (passed || b.at.u[1] < where) continue;
       check_ok (pw_branch_locate (&b, pitchfork_sign, &where, 1e-7, &point, &error), &error);
-      check_close ("p", at[1], where, 1e-3, "the cubic interpolant, at steps up to 0.35");
+      check_close ("p", at[1], where, 1e-7, "a cubic between points nearby");
+      check_ok (pitchfork (&where, at, &F, NULL, &error), &error);
+      check_close ("residual", point.residual, fabs (F), 0, "that of the point");
       passed = 1;
     }
     assert_true (passed);

@@ -66,6 +66,31 @@ static void test_vary_held (void **state) {
   check_close ("omega", cli_number (json, "motions", "state", "tractor.omega", NULL), 0.2, 1e-9, "speed / radius");
 }
 
+/* A pitchfork at p = 1 of two curved branches, x = 3 sin p and (x - 3 sin p)^2 = p - 1. */
+static void test_curved_pitchfork (void **state) {
+  static const double last[] = { 1.5, 5, 9 };
+  (void)state;
+  cli_write ("fork.yaml", "pinwheel: 1\nparameters: [{name: p, value: 0.2}]\n"
+                          "bodies: [{name: b, mass: 1, inertia: 1, start: {x: 3*sin(p)}}]\nelements:\n"
+                          "  - {force: f, body: b, fy: -b.y - b.vy, "
+                          "fx: '(b.x - 3*sin(p))*(p - 1 - (b.x - 3*sin(p))^2) - b.vx'}\n"
+                          "  - {rotational-spring: s, body: [b, ground], stiffness: 3, damping: 0.2}\n");
+  for (size_t k = 0; k < sizeof last / sizeof *last; k++) {
+    int events = 0;
+    char command[200];
+    snprintf (command, sizeof command, "pinwheel steady @/fork.yaml --vary p=0.2:%g -o @/fork", last[k]);
+    cli_good (command);
+    for (const char *line = strchr (cli_file ("fork/steady.csv"), '\n') + 1; *line; line = strchr (line, '\n') + 1) {
+      double p = table_number (line, 2);
+      check_close ("residual", table_number (line, 4), 0, 1e-9, "Newton's tolerance, or the cubic near the pitchfork");
+      if (strncmp (line + 2, "point", 5) == 0) continue;
+      check_close ("pitchfork", p, 1, 1e-6, "a cubic between points nearby");
+      events++;
+    }
+    assert_int_equal (events, 2);
+  }
+}
+
 /* Equilibria on the circle x^2 + p^2 = 1, which reaches neither end of the range: followed once around. */
 static void test_closed_branch (void **state) {
   int points = 0, folds = 0;
@@ -191,9 +216,16 @@ static void test_bad (void **state) {
 
 int main (void) {
   const struct CMUnitTest tests[] = {
-    cmocka_unit_test (test_motion),        cmocka_unit_test (test_branch), cmocka_unit_test (test_vary_held),
-    cmocka_unit_test (test_linearise),     cmocka_unit_test (test_limit),  cmocka_unit_test (test_bad),
-    cmocka_unit_test (test_closed_branch), cmocka_unit_test (test_ends),   cmocka_unit_test (test_rest),
+    cmocka_unit_test (test_motion),
+    cmocka_unit_test (test_branch),
+    cmocka_unit_test (test_vary_held),
+    cmocka_unit_test (test_linearise),
+    cmocka_unit_test (test_limit),
+    cmocka_unit_test (test_bad),
+    cmocka_unit_test (test_curved_pitchfork),
+    cmocka_unit_test (test_closed_branch),
+    cmocka_unit_test (test_ends),
+    cmocka_unit_test (test_rest),
     cmocka_unit_test (test_one_body),
   };
   return cmocka_run_group_tests (tests, cli_setup, cli_teardown);

@@ -23,7 +23,7 @@ static void steady_number (pw_table *t, double value) {
 static void steady_rightmost (pw_table *t, const pw_steady_point *p) {
   int best = -1, crossing = p->event != PW_STEADY_POINT;
   for (int i = 0; i < p->unknowns; i++) {
-    if (p->rigid[i] || (!crossing && p->re[i] == 0 && p->im[i] == 0)) continue;
+    if (!crossing && (p->rigid[i] || (p->re[i] == 0 && p->im[i] == 0))) continue;
     if ((p->im[i] != 0) != (p->event == PW_STEADY_OSCILLATION) && crossing) continue;
     if (best < 0 || (crossing && fabs (p->re[i]) < fabs (p->re[best]))) best = i;
   }
