@@ -17,25 +17,16 @@ int pw_branch_open (pw_branch *b, const pw_branch_equations *of, pw_error *error
   size_t n = (size_t)of->unknowns + 1, m = (size_t)of->equations + n, large = n > m ? n : m;
   *b = (pw_branch){ .of = *of, .room = (int)(8 * large + 200) };
   if (!(b->of.rank > 0)) b->of.rank = 1e-9;
-  const pw_array array[] = { { &b->at.u, n },
-                             { &b->at.tangent, n },
-                             { &b->before.u, n },
-                             { &b->before.tangent, n },
-                             { &b->next.u, n },
-                             { &b->next.tangent, n },
-                             { &b->F, large },
-                             { &b->J, m * n },
-                             { &b->du, large },
-                             { &b->trial, n },
-                             { &b->condition, n },
-                             { &b->predicted, n },
-                             { &b->end.u, n },
-                             { &b->end.tangent, n },
-                             { &b->side[0].u, n },
-                             { &b->side[0].tangent, n },
-                             { &b->side[1].u, n },
-                             { &b->side[1].tangent, n },
-                             { &b->work, (size_t)b->room + 34 * large } };
+  pw_branch_point *const point[] = { &b->at, &b->before, &b->found, &b->first, &b->next, &b->side[0], &b->side[1] };
+  enum { OWN = sizeof point / sizeof *point, POINTS = OWN + PW_BRANCH_QUEUE };
+  pw_array array[2 * POINTS + 7] = { { &b->F, large },    { &b->J, m * n },
+                                     { &b->du, large },   { &b->work, (size_t)b->room + 34 * large },
+                                     { &b->trial, n },    { &b->condition, n },
+                                     { &b->predicted, n } };
+  for (int i = 0; i < POINTS; i++) {
+    pw_branch_point *p = i < OWN ? point[i] : &b->queue[i - OWN].point;
+    array[2 * i + 7] = (pw_array){ &p->u, n }, array[2 * i + 8] = (pw_array){ &p->tangent, n };
+  }
   b->room += (int)(34 * large);
   b->memory = pw_alloc_arrays (array, sizeof array / sizeof *array);
   b->pivot = malloc (n * sizeof *b->pivot);
@@ -166,22 +157,37 @@ static int branch_tangent (pw_branch *b, const double *u, const double *c, doubl
   return isfinite (norm) && norm > 0 && fabs (dot - 1) < 1e-3 ? PW_OK : PW_RETRY;
 }
 
+static void branch_copy (const pw_branch *b, const pw_branch_point *from, pw_branch_point *to) {
+  size_t bytes = ((size_t)b->of.unknowns + 1) * sizeof *from->u;
+  memcpy (to->u, from->u, bytes);
+  memcpy (to->tangent, from->tangent, bytes);
+  to->residual = from->residual, to->interpolated = from->interpolated;
+}
+
+/* Queues a point before those that are farther along. */
+static void branch_put (pw_branch *b, const pw_branch_point *point, int event, double along) {
+  int i = b->queued++;
+  for (; i > 0 && b->queue[i - 1].along > along; i--) {
+    pw_branch_event last = b->queue[i];
+    b->queue[i] = b->queue[i - 1];
+    b->queue[i - 1] = last;
+  }
+  b->queue[i].event = event, b->queue[i].along = along;
+  branch_copy (b, point, &b->queue[i].point);
+}
+
 int pw_branch_start (pw_branch *b, const double *u, double direction, pw_error *error) {
   size_t n = (size_t)b->of.unknowns + 1;
   memset (b->condition, 0, n * sizeof *b->condition);
   b->condition[n - 1] = direction > 0 ? 1 : -1;
-  b->folded = 0;
+  b->folded = b->steps = b->ended = b->queued = b->returned = 0;
   b->at.residual = b->residual, b->at.interpolated = 0;
   memmove (b->at.u, u, n * sizeof *u);
-  return branch_tangent (b, b->at.u, b->condition, b->at.tangent, error);
-}
-
-void pw_branch_copy (const pw_branch *b, const pw_branch_point *from, pw_branch_point *to) {
-  size_t bytes = ((size_t)b->of.unknowns + 1) * sizeof *from->u;
-  if (from->u == to->u) return;
-  memcpy (to->u, from->u, bytes);
-  memcpy (to->tangent, from->tangent, bytes);
-  to->residual = from->residual, to->interpolated = from->interpolated;
+  int status = branch_tangent (b, b->at.u, b->condition, b->at.tangent, error);
+  if (status != PW_OK) return status;
+  branch_copy (b, &b->at, &b->first);
+  branch_put (b, &b->at, PW_BRANCH_POINT, 0);
+  return PW_OK;
 }
 
 static double branch_distance (const pw_branch *b, const double *x, const double *y) {
@@ -249,38 +255,33 @@ static int branch_between (pw_branch *b, const pw_branch_point *from, const pw_b
   return status;
 }
 
-int pw_branch_fold (void *context, const pw_branch_point *point, double *value, pw_error *error) {
-  const pw_branch *b = context;
-  (void)error;
-  *value = point->tangent[b->of.unknowns];
-  return PW_OK;
-}
-
 /* The Illinois variant of regula falsi (Dowell & Jarratt 1971), every fourth step a bisection.  Points to which Newton's
  * method converges become ends of the cubic, which s in [0, 1] measures; `scale`: its length, relative to the step. */
 int pw_branch_locate (pw_branch *b,
                       int (*test) (void *context, const pw_branch_point *point, double *value, pw_error *error),
-                      void *context, double accuracy, pw_branch_point *point, pw_error *error) {
+                      void *context, pw_error *error) {
+  pw_branch_point *point = &b->found;
   double s[2] = { 0, 1 }, f[2], middle, value, scale = 1;
   int status = test (context, &b->before, &f[0], error), last = -1;
   if (status == PW_OK) status = test (context, &b->at, &f[1], error);
   if (status != PW_OK) return status;
-  pw_branch_copy (b, &b->before, &b->side[0]);
-  pw_branch_copy (b, &b->at, &b->side[1]);
-  pw_branch_copy (b, fabs (f[0]) < fabs (f[1]) ? &b->before : &b->at, point);
-  for (int i = 0; i < LOCATE_MOST && (s[1] - s[0]) * scale > accuracy; i++) {
-    middle = f[1] != f[0] && i % 4 < 3 ? s[1] - f[1] * (s[1] - s[0]) / (f[1] - f[0]) : (s[0] + s[1]) / 2;
+  branch_copy (b, &b->before, &b->side[0]);
+  branch_copy (b, &b->at, &b->side[1]);
+  branch_copy (b, fabs (f[0]) < fabs (f[1]) ? &b->before : &b->at, point);
+  for (int i = 0; i < LOCATE_MOST && (s[1] - s[0]) * scale > b->accuracy; i++) {
+    middle = s[1] - f[1] * (s[1] - s[0]) / (f[1] - f[0]);
+    if (i % 4 == 3 || !(middle > s[0] && middle < s[1])) middle = (s[0] + s[1]) / 2;
     status = branch_between (b, &b->side[0], &b->side[1], middle, &b->next, error);
     if (status == PW_OK) status = test (context, &b->next, &value, error);
     if (status != PW_OK) return status == PW_RETRY ? PW_OK : status;
-    pw_branch_copy (b, &b->next, point);
+    branch_copy (b, &b->next, point);
     if (value == 0) break;
     int side = (value > 0) == (f[1] > 0);
     if (side == last) f[!side] /= 2;
     s[side] = middle, f[side] = value, last = side;
     if (point->interpolated || !branch_smooth (b, &b->side[0], point) || !branch_smooth (b, point, &b->side[1]))
       continue;
-    pw_branch_copy (b, point, &b->side[side]);
+    branch_copy (b, point, &b->side[side]);
     scale *= side ? middle : 1 - middle;
     s[!side] = side ? s[0] / middle : (s[1] - middle) / (1 - middle);
     s[side] = side;
@@ -288,36 +289,92 @@ int pw_branch_locate (pw_branch *b,
   return PW_OK;
 }
 
-/* ---- Ends ---- */
+/* ---- Events and ends ---- */
 
-static int branch_beyond (void *context, const pw_branch_point *point, double *value, pw_error *error) {
-  const pw_branch *b = context;
+double pw_branch_along (const pw_branch *b, const pw_branch_point *point) {
+  double part = 0, whole = 0;
+  for (int j = 0; j <= b->of.unknowns; j++) {
+    part += (point->u[j] - b->before.u[j]) * b->before.tangent[j];
+    whole += (b->at.u[j] - b->before.u[j]) * b->before.tangent[j];
+  }
+  return fmin (part / whole, 1);
+}
+
+void pw_branch_queue (pw_branch *b, int event) {
+  branch_put (b, &b->found, event, pw_branch_along (b, &b->found));
+}
+
+static int branch_fold (void *branch, const pw_branch_point *point, double *value, pw_error *error) {
+  const pw_branch *b = branch;
   (void)error;
-  *value = point->u[b->of.unknowns] - b->limit;
+  *value = point->tangent[b->of.unknowns];
   return PW_OK;
 }
 
-int pw_branch_at_end (pw_branch *b, int *ended, pw_error *error) {
+static int branch_beyond (void *branch, const pw_branch_point *point, double *value, pw_error *error) {
+  const pw_branch *b = branch;
+  (void)error;
+  *value = point->u[b->of.unknowns] - b->end;
+  return PW_OK;
+}
+
+/* If the point reached is beyond the range of p: moves it back to its end. */
+static int branch_end (pw_branch *b, pw_error *error) {
   int p = b->of.unknowns;
+  double accuracy = b->accuracy;
   if (b->at.u[p] <= 1 && b->at.u[p] >= 0) return PW_OK;
-  *ended = 1;
-  b->limit = b->at.u[p] > 1;
-  int status = pw_branch_locate (b, branch_beyond, b, BRANCH_END, &b->end, error);
+  b->end = b->at.u[p] > 1, b->ended = 1, b->accuracy = BRANCH_END;
+  int status = pw_branch_locate (b, branch_beyond, b, error);
+  b->accuracy = accuracy;
   if (status != PW_OK) return status;
-  b->end.u[p] = b->limit;
-  status = pw_branch_solve (b, b->end.u, error);
-  b->end.residual = b->residual, b->end.interpolated = 0;
-  pw_branch_copy (b, &b->end, &b->at);
+  b->found.u[p] = b->end;
+  status = pw_branch_solve (b, b->found.u, error);
+  b->found.residual = b->residual, b->found.interpolated = 0;
+  branch_copy (b, &b->found, &b->at);
   b->folded = b->before.tangent[p] * b->at.tangent[p] < 0;
   return status;
 }
 
-int pw_branch_closed (const pw_branch *b, const pw_branch_point *first) {
+/* Whether the last step has passed the first point, in the same direction. */
+static int branch_closed (const pw_branch *b) {
   double before = 0, now = 0;
   for (int j = 0; j <= b->of.unknowns; j++) {
-    before += (b->before.u[j] - first->u[j]) * first->tangent[j];
-    now += (b->at.u[j] - first->u[j]) * first->tangent[j];
+    before += (b->before.u[j] - b->first.u[j]) * b->first.tangent[j];
+    now += (b->at.u[j] - b->first.u[j]) * b->first.tangent[j];
   }
-  double off = branch_distance (b, b->at.u, first->u), step = branch_distance (b, b->at.u, b->before.u);
-  return off < 1.1 * step && before < 0 && now >= 0;
+  double off = branch_distance (b, b->at.u, b->first.u), step = branch_distance (b, b->at.u, b->before.u);
+  return b->steps > 2 && off < 1.1 * step && before < 0 && now >= 0;
+}
+
+/* A step, with its events. */
+static int branch_advance (pw_branch *b, int (*events) (void *context, pw_error *error), pw_error *why,
+                           pw_error *error) {
+  *why = (pw_error){ 0 };
+  if (b->steps++ > b->limit) return pw_fail (why, PW_METHOD, "the branch has more than %d points", b->limit), PW_RETRY;
+  int status = pw_branch_step (b, error);
+  if (status == PW_OK) *why = (pw_error){ 0 };
+  if (status == PW_OK) status = branch_end (b, error);
+  if (status == PW_OK && b->folded) {
+    status = pw_branch_locate (b, branch_fold, b, error);
+    if (status == PW_OK) pw_branch_queue (b, PW_BRANCH_FOLD);
+  }
+  if (status == PW_OK) status = events (b->of.context, error);
+  if (status == PW_RETRY && !*why->text) pw_fail (why, PW_METHOD, "Newton's method fails at the smallest step");
+  if (status != PW_OK) return status;
+  branch_put (b, &b->at, PW_BRANCH_POINT, 1);
+  b->ended |= branch_closed (b);
+  return PW_OK;
+}
+
+int pw_branch_next (pw_branch *b, int (*events) (void *context, pw_error *error), pw_error *why,
+                    const pw_branch_event **next, pw_error *error) {
+  *next = NULL;
+  if (b->returned == b->queued && !b->ended) {
+    b->queued = b->returned = 0;
+    int status = branch_advance (b, events, why, error);
+    if (status == PW_RETRY) return b->ended = 1, PW_OK;
+    if (status != PW_OK) return status;
+  }
+  if (b->returned < b->queued) *next = &b->queue[b->returned++];
+  return PW_OK;
 }

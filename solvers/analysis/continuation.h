@@ -24,26 +24,44 @@ typedef struct {
   void *context;
 } pw_branch_equations;
 
-/* A point of a branch. */
+/* A point of a branch.  Those of the caller have their own arrays. */
 typedef struct {
   double *u, *tangent; /* unknowns + 1 each; the tangent has unit length */
   double residual;     /* largest |F_i| */
   int interpolated;    /* 1: on the cubic through two points, since Newton's method does not converge */
 } pw_branch_point;
 
+/* What a point is; users number their own events from PW_BRANCH_OTHER. */
+enum { PW_BRANCH_POINT, PW_BRANCH_FOLD /* p has an extremum */, PW_BRANCH_OTHER };
+
+typedef struct {
+  pw_branch_point point;
+  int event;
+  double along; /* 0 at the point before, 1 at the point reached */
+} pw_branch_event;
+
+enum { PW_BRANCH_QUEUE = 8 };
+
 typedef struct {
   pw_branch_equations of;
   pw_branch_point at, before; /* the point reached, and the one before it */
+  pw_branch_point found;      /* by pw_branch_locate */
   double step;                /* length of the next step */
   double most;                /* largest change of p that a step predicts */
   double least;               /* smallest step */
+  double accuracy;            /* of events, relative to the step */
+  int limit;                  /* points at most */
   int iterations;             /* of the last solution */
   double residual;            /* largest |F_i| there, or where the iteration stopped */
   int rank;                   /* of dF/dx (or of dF with the arclength condition) there */
   int folded;                 /* 1: p has an extremum between the last two points */
+  /* Points of the last step not yet returned, in order; those before the last one are events. */
+  pw_branch_event queue[PW_BRANCH_QUEUE];
+  int queued, returned;
   /* private */
-  pw_branch_point next, end, side[2];
-  double limit; /* of p, sought */
+  int steps, ended;
+  pw_branch_point first, next, side[2];
+  double end; /* p, sought */
   double *F, *J, *du, *trial, *work, *condition, *predicted;
   int *pivot, room;
   char *memory;
@@ -58,28 +76,27 @@ void pw_branch_close (pw_branch *b);
  * *u is where it stopped, if it does not converge. */
 int pw_branch_solve (pw_branch *b, double *u, pw_error *error);
 
-/* Starts a branch at a solution: p increases along the tangent if direction > 0.  PW_RETRY at a fold. */
+/* Starts a branch at a solution, the first point: p increases along the tangent if direction > 0.  PW_RETRY at a fold. */
 int pw_branch_start (pw_branch *b, const double *u, double direction, pw_error *error);
 
-/* The next point.  The step length adapts to the curvature of the branch.  PW_RETRY if no step of length `least`
+/* Moves to the next point.  The step length adapts to the curvature of the branch.  PW_RETRY if no step of length `least`
  * converges to a point nearby on a smooth branch.  Branches that bifurcate from it are not followed. */
 int pw_branch_step (pw_branch *b, pw_error *error);
 
-/* The point between the last two points where a test changes its sign, to `accuracy` of their distance; interpolated if
- * Newton's method does not converge nearby, as at bifurcations.  `test` (a status) sets *value; *point has its own arrays. */
+/* The next point or event of the branch in p = 0 to 1, or NULL after its last one: at an end of the range, the start of a
+ * closed branch, or, with the reason in *why, where no step succeeds.  `events` (a status; context: that of the equations)
+ * queues those of a step that are no folds; evaluations may leave their reason in *why. */
+int pw_branch_next (pw_branch *b, int (*events) (void *context, pw_error *error), pw_error *why,
+                    const pw_branch_event **next, pw_error *error);
+
+/* Sets b->found to the point between the last two points where a test changes its sign; interpolated if Newton's method
+ * does not converge nearby, as at bifurcations.  `test` (a status) sets *value. */
 int pw_branch_locate (pw_branch *b,
                       int (*test) (void *context, const pw_branch_point *point, double *value, pw_error *error),
-                      void *context, double accuracy, pw_branch_point *point, pw_error *error);
-
-/* If the point reached is beyond the range 0 to 1 of p: moves it back to its end, and sets *ended. */
-int pw_branch_at_end (pw_branch *b, int *ended, pw_error *error);
-/* 1 if the last step has passed the point `first`, in the same direction: the branch is closed. */
-int pw_branch_closed (const pw_branch *b, const pw_branch_point *first);
-
-/* Copies a point to one with its own arrays. */
-void pw_branch_copy (const pw_branch *b, const pw_branch_point *from, pw_branch_point *to);
-
-/* For pw_branch_locate: the last entry of the tangent. */
-int pw_branch_fold (void *context, const pw_branch_point *point, double *value, pw_error *error);
+                      void *context, pw_error *error);
+/* Where a point between the last two is (pw_branch_event.along). */
+double pw_branch_along (const pw_branch *b, const pw_branch_point *point);
+/* Queues b->found as an event. */
+void pw_branch_queue (pw_branch *b, int event);
 
 #endif

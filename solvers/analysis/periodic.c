@@ -8,11 +8,11 @@
 /* PERIODIC_MOST: coordinates, since the cost is cubic; PERIODIC_LIMIT: points of a branch at most, as a multiple of those
  * asked for.  PERIODIC_EXACT: residual of a solution, in units of the scene; PERIODIC_RANK: of derivatives; PERIODIC_CIRCLE:
  * distance from the unit circle that is not round-off; PERIODIC_LEAST: smallest step, relative to the range of the parameter;
- * PERIODIC_EVENT: accuracy of events, relative to the step; PERIODIC_REAL: imaginary part, after location, of a pair that is
+ * PERIODIC_EVENT: accuracy of events, relative to the step; PERIODIC_FOLD: largest distance of a fold from the crossing of a multiplier there, relative to the step; PERIODIC_REAL: imaginary part, after location, of a pair that is
  * about to become real. */
 enum { PERIODIC_MOST = 100, PERIODIC_POINTS = 20, PERIODIC_LIMIT = 50 };
 static const double PERIODIC_EXACT = 1e-9, PERIODIC_RANK = 1e-7, PERIODIC_CIRCLE = 1e-6, PERIODIC_LEAST = 1e-5,
-                    PERIODIC_EVENT = 1e-7, PERIODIC_REAL = 1e-3;
+                    PERIODIC_EVENT = 1e-7, PERIODIC_FOLD = 1e-3, PERIODIC_REAL = 1e-3;
 
 /* ---- Opening ---- */
 
@@ -34,14 +34,6 @@ static int periodic_arrays (pw_periodic *x) {
     { &x->im, states },
     { &x->work, (size_t)pw_steady_rates (x->s) + most },
     { &x->there, most + 2 * states },
-    { &x->first.u, most },
-    { &x->first.tangent, most },
-    { &x->queue[0].point.u, most },
-    { &x->queue[0].point.tangent, most },
-    { &x->queue[1].point.u, most },
-    { &x->queue[1].point.tangent, most },
-    { &x->queue[2].point.u, most },
-    { &x->queue[2].point.tangent, most },
   };
   x->memory = pw_alloc_arrays (array, sizeof array / sizeof *array);
   return x->memory ? PW_OK : PW_RESOURCE;
@@ -171,22 +163,13 @@ int pw_periodic_solve (pw_periodic *x, int settle, double parameter, pw_periodic
 
 /* ---- Branches ---- */
 
-static void periodic_queue (pw_periodic *x, const pw_branch_point *point, pw_periodic_event event) {
-  x->queue[x->queued].event = event;
-  pw_branch_copy (&x->branch, point, &x->queue[x->queued++].point);
-}
-
 int pw_periodic_follow (pw_periodic *x, int direction, pw_error *error) {
   pw_branch *b = &x->branch;
-  x->steps = x->ended = x->queued = x->returned = 0;
   b->most = 1.0 / x->set.points, b->step = b->most / 4, b->least = PERIODIC_LEAST;
+  b->accuracy = PERIODIC_EVENT, b->limit = PERIODIC_LIMIT * x->set.points;
   x->unstable = -1;
   int status = pw_branch_start (b, x->u, direction, error);
-  if (status == PW_RETRY) return pw_fail (error, PW_METHOD, "the branch cannot be followed from here");
-  if (status != PW_OK) return status;
-  pw_branch_copy (b, &b->at, &x->first);
-  periodic_queue (x, &b->at, PW_PERIODIC_POINT);
-  return PW_OK;
+  return status == PW_RETRY ? pw_fail (error, PW_METHOD, "the branch cannot be followed from here") : status;
 }
 
 /* For pw_branch_locate: how far multiplier number `sought` is outside the unit circle. */
@@ -199,71 +182,55 @@ static int periodic_test (void *periodic, const pw_branch_point *point, double *
   return status;
 }
 
-/* Locates the multiplier that crosses the unit circle between the last two points. */
-static int periodic_crossing (pw_periodic *x, int before, int now, pw_error *error) {
-  pw_branch_point *point = &x->queue[x->queued].point;
-  double value, re, im;
-  x->sought = (before > now ? before : now) - 1;
+/* Locates where multiplier number `sought` crosses the unit circle between the last two points, from *inside. */
+static int periodic_crossing (pw_periodic *x, const pw_branch_point *inside, pw_periodic_event *event,
+                              pw_error *error) {
+  pw_branch *b = &x->branch;
+  double value;
   x->along = 0;
-  int status = periodic_test (x, before > now ? &x->branch.at : &x->branch.before, &value, error);
+  int status = periodic_test (x, inside, &value, error);
   x->along = fabs (value) < PERIODIC_CIRCLE;
-  if (status == PW_OK) status = pw_branch_locate (&x->branch, periodic_test, x, PERIODIC_EVENT, point, error);
-  if (status == PW_OK) status = periodic_test (x, point, &value, error);
-  re = x->re[x->sought], im = x->im[x->sought];
-  if (status == PW_OK)
-    periodic_queue (x, point,
-                    fabs (im) > PERIODIC_REAL ? PW_PERIODIC_TORUS
-                    : re > 0                  ? PW_PERIODIC_REAL
-                                              : PW_PERIODIC_FLIP);
+  if (status == PW_OK) status = pw_branch_locate (b, periodic_test, x, error);
+  if (status == PW_OK) status = periodic_test (x, &b->found, &value, error);
+  *event = fabs (x->im[x->sought]) > PERIODIC_REAL ? PW_PERIODIC_TORUS
+           : x->re[x->sought] > 0                  ? PW_PERIODIC_REAL
+                                                   : PW_PERIODIC_FLIP;
   return status;
 }
 
-/* Queues the events between the last two points.  At a fold a multiplier passes 1. */
-static int periodic_events (pw_periodic *x, pw_error *error) {
+/* Queues the events between the last two points: the k-th largest multiplier crosses the unit circle.  At a fold, one that
+ * passes 1 is no event of its own. */
+static int periodic_events (void *periodic, pw_error *error) {
+  pw_periodic *x = periodic;
   pw_branch *b = &x->branch;
   pw_periodic_orbit o;
   int before = x->unstable, status = periodic_orbit (x, b->at.u, &o, error);
   if (status != PW_OK) return status;
   x->unstable = o.unstable;
-  if (b->folded) {
-    pw_branch_point *point = &x->queue[x->queued].point;
-    status = pw_branch_locate (b, pw_branch_fold, b, PERIODIC_EVENT, point, error);
-    if (status == PW_OK) periodic_queue (x, point, PW_PERIODIC_FOLD);
+  int least = before < o.unstable ? before : o.unstable, most = before < o.unstable ? o.unstable : before;
+  double fold = b->folded ? b->queue[0].along : -1;
+  if (before < 0 || most - least <= b->folded) return PW_OK;
+  for (x->sought = least; x->sought < most && b->queued < PW_BRANCH_QUEUE - 1; x->sought++) {
+    pw_periodic_event event;
+    status = periodic_crossing (x, before > x->unstable ? &b->at : &b->before, &event, error);
+    if (status != PW_OK) return status;
+    if (event != PW_PERIODIC_REAL || fabs (pw_branch_along (b, &b->found) - fold) > PERIODIC_FOLD)
+      pw_branch_queue (b, (int)event);
+    x->sought += event == PW_PERIODIC_TORUS;
   }
-  int change = before > o.unstable ? before - o.unstable : o.unstable - before;
-  if (status == PW_OK && before >= 0 && change > b->folded) status = periodic_crossing (x, before, o.unstable, error);
-  return status;
-}
-
-static int periodic_advance (pw_periodic *x, pw_error *error) {
-  x->queued = x->returned = 0;
-  x->why = (pw_error){ 0 };
-  if (x->steps++ > PERIODIC_LIMIT * x->set.points)
-    return pw_fail (&x->why, PW_METHOD, "the branch has more than %d points", PERIODIC_LIMIT * x->set.points), PW_RETRY;
-  int status = pw_branch_step (&x->branch, error);
-  if (status == PW_RETRY && !*x->why.text) pw_fail (&x->why, PW_METHOD, "Newton's method fails at the smallest step");
-  if (status == PW_OK) status = pw_branch_at_end (&x->branch, &x->ended, error);
-  if (status == PW_OK) status = periodic_events (x, error);
-  if (status == PW_OK) periodic_queue (x, &x->branch.at, PW_PERIODIC_POINT);
-  x->ended |= x->steps > 2 && pw_branch_closed (&x->branch, &x->first);
-  return status;
+  return PW_OK;
 }
 
 int pw_periodic_next (pw_periodic *x, pw_periodic_orbit *out, pw_error *error) {
-  int status = PW_OK;
   *out = (pw_periodic_orbit){ .event = PW_PERIODIC_END };
-  if (x->returned == x->queued) {
-    if (x->ended) return PW_OK;
-    status = periodic_advance (x, error);
-    if (status == PW_RETRY) return x->ended = 1, PW_OK;
-    if (status != PW_OK) return status;
-  }
-  int i = x->returned++;
-  status = periodic_orbit (x, x->queue[i].point.u, out, error);
+  const pw_branch_event *next;
+  int status = pw_branch_next (&x->branch, periodic_events, &x->why, &next, error);
+  if (next == NULL) return status;
+  status = periodic_orbit (x, next->point.u, out, error);
   if (status != PW_OK) return status;
   if (x->unstable < 0) x->unstable = out->unstable;
-  out->event = x->queue[i].event;
+  out->event = (pw_periodic_event)next->event;
   out->iterations = x->branch.iterations;
-  out->residual = x->queue[i].point.residual;
+  out->residual = next->point.residual;
   return status;
 }

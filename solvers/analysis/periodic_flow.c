@@ -7,8 +7,9 @@
 
 /* FLOW_MULTIPLES: of one signal's period that are tried for a common one.  FLOW_FAR: ratio of a free period to the last
  * one known.  RETURN_SAMPLES: of a run that seeks a return, RETURN_STEPS per scale of time; RETURN_NEAR: distance of a
- * return, relative to the largest on the way. */
-enum { FLOW_MULTIPLES = 24, FLOW_FAR = 4, RETURN_SAMPLES = 20000, RETURN_STEPS = 20 };
+ * return, relative to the largest on the way.  FLOW_STEPS: of a trial of Newton's method, relative to those of the motion
+ * that it is to improve; a trial far away, with enormous velocities, would take millions. */
+enum { FLOW_MULTIPLES = 24, FLOW_FAR = 4, FLOW_STEPS = 20, RETURN_SAMPLES = 20000, RETURN_STEPS = 20 };
 static const double RETURN_NEAR = 0.2, RETURN_LEAST = 1e-6;
 
 /* Derivatives need fewer digits than states: Newton's method converges all the same. */
@@ -164,8 +165,12 @@ static int flow_run (pw_periodic *x, pw_run *r, double period, pw_flow_accuracy 
   status = pw_run_sample (r, r->t, &sample, &x->why);
   if (status != PW_OK) return status;
   memcpy (x->y0, sample.q, bytes), memcpy (x->y0 + n, sample.v, bytes), memcpy (x->a0, sample.a, bytes);
-  if (accuracy != PW_FLOW) return flow_vary (x, r, end);
-  while (status == PW_OK && pw_run_time (r) < end) status = pw_run_advance (r, end, &x->why);
+  if (accuracy != PW_FLOW) return x->steps = 0, flow_vary (x, r, end);
+  while (status == PW_OK && pw_run_time (r) < end) {
+    status = pw_run_advance (r, end, &x->why);
+    if (x->steps > 0 && pw_run_statistics (r)->steps > FLOW_STEPS * x->steps) return PW_RETRY;
+  }
+  if (x->steps == 0) x->steps = pw_run_statistics (r)->steps;
   if (status == PW_OK) status = pw_run_sample (r, end, &sample, &x->why);
   if (status != PW_OK) return status;
   memcpy (x->y1, sample.q, bytes), memcpy (x->y1 + n, sample.v, bytes), memcpy (x->a1, sample.a, bytes);

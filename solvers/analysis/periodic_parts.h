@@ -8,8 +8,6 @@
 /* A flow alone; with derivatives accurate enough for Newton's method; with accurate ones. */
 typedef enum { PW_FLOW, PW_FLOW_DERIVATIVES, PW_FLOW_MULTIPLIERS } pw_flow_accuracy;
 
-enum { PW_PERIODIC_QUEUE = 3 };
-
 struct pw_periodic {
   const pw_system *s; /* as described */
   pw_periodic_settings set;
@@ -30,21 +28,14 @@ struct pw_periodic {
   double *moved, *change;    /* 2 n: scratch */
   double *Phi, *basis;       /* 2 n x size, by columns: derivative at the end, at the begin */
   double *dual;              /* size x 2 n, by columns: minimal coordinates of changes of the state */
+  long steps;                /* of the last motion at a solution or a step of Newton's method; 0: not yet known */
   int size;                  /* minimal coordinates of changes of the state */
   double *M, *re, *im;       /* size x size: derivative of the return map; its eigenvalues */
   double *work, *there;      /* scratch: rates; unknowns and residuals beside a point */
   pw_error why;              /* the last reason why a motion could not be computed */
-  /* Points of a branch not yet returned; those before the last one are events. */
-  struct {
-    pw_branch_point point; /* arrays of its own */
-    pw_periodic_event event;
-  } queue[PW_PERIODIC_QUEUE];
-  int queued, returned;  /* points put into the queue, and taken from it */
-  pw_branch_point first; /* of the branch */
-  int steps, ended;      /* of the branch; 1: it has ended */
-  int unstable;          /* multipliers outside the unit circle at the last point; -1: not known */
-  int sought;            /* index of the multiplier whose crossing of the unit circle is located */
-  int along;             /* 1: it moves along the circle before it leaves it */
+  int unstable;              /* multipliers outside the unit circle at the last point; -1: not known */
+  int sought;                /* index of the multiplier whose crossing of the unit circle is located */
+  int along;                 /* 1: it moves along the circle before it leaves it */
   char *memory;
 };
 

@@ -26,24 +26,17 @@ static int steady_arrays (pw_steady *x) {
     { &x->rates, rates },
     { &x->sum, rates },
     { &x->u, most + 1 },
-    { &x->first.u, most + 1 },
-    { &x->first.tangent, most + 1 },
     { &x->F, equations + n * rates + 41 * most },
     { &x->q0, n },
     { &x->v0, n },
     { &x->dq, n },
     { &x->dv, n },
     { &x->null, (most + 1) * (most + 1) },
-    { &x->queue[0].point.u, STEADY_QUEUE * 2 * (most + 1) },
   };
   x->memory = pw_alloc_arrays (array, sizeof array / sizeof *array);
   x->cyclic = calloc (n + 1, 1);
   x->known = calloc (2 * n + 1, sizeof *x->known);
   x->hold = calloc (holds + 1, sizeof *x->hold);
-  for (int i = 0; x->memory && i < STEADY_QUEUE; i++) {
-    x->queue[i].point.u = x->queue[0].point.u + 2 * (size_t)i * (most + 1);
-    x->queue[i].point.tangent = x->queue[i].point.u + most + 1;
-  }
   if (!x->memory || !x->cyclic || !x->known || !x->hold) return PW_RESOURCE;
   if (holds) memcpy (x->hold, x->set.hold, holds * sizeof *x->hold);
   for (int j = 0; j < 2 * x->n; j++) x->known[j].state = j;

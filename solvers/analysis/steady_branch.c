@@ -10,19 +10,6 @@
 static const double BRANCH_LEAST = 1e-7, BRANCH_ACCURACY = 1e-9, BRANCH_FOLD = 1e-3;
 enum { BRANCH_LIMIT = 100 };
 
-/* Room for one more point, where `along` counts from 0 (the point before) to 1. */
-static void branch_queue (pw_steady *x, pw_branch_point point, pw_steady_event event, double along) {
-  int i = x->queued++;
-  for (; i > 0 && x->queue[i - 1].along > along; i--) {
-    pw_branch_point other = x->queue[i].point;
-    x->queue[i] = x->queue[i - 1];
-    x->queue[i - 1].point = other;
-  }
-  x->queue[i].event = event;
-  x->queue[i].along = along;
-  pw_branch_copy (&x->branch, &point, &x->queue[i].point);
-}
-
 int pw_steady_follow (pw_steady *x, const double *q, const double *v, double parameter, int direction,
                       pw_error *error) {
   if (pw_require (x, "a search", error) != PW_OK) return PW_INPUT;
@@ -38,13 +25,10 @@ int pw_steady_follow (pw_steady *x, const double *q, const double *v, double par
   if (status == PW_OK) status = pw_branch_start (&x->branch, x->u, direction, error);
   if (status != PW_OK)
     return status < 0 && error->status ? status : pw_fail (error, PW_METHOD, "the branch cannot be followed from here");
-  pw_branch_copy (&x->branch, &x->branch.at, &x->first);
   x->unstable = motion.unstable;
   x->branch.most = 1.0 / x->set.points;
   x->branch.step = x->branch.most / 4;
-  x->branch.least = BRANCH_LEAST;
-  x->steps = x->ended = x->queued = x->returned = 0;
-  branch_queue (x, x->branch.at, PW_STEADY_POINT, 0);
+  x->branch.least = BRANCH_LEAST, x->branch.accuracy = BRANCH_ACCURACY, x->branch.limit = BRANCH_LIMIT * x->set.points;
   return PW_OK;
 }
 
@@ -74,16 +58,6 @@ static int branch_test (void *steady, const pw_branch_point *point, double *valu
   return PW_OK;
 }
 
-static double branch_along (const pw_steady *x, const pw_branch_point *point) {
-  const pw_branch *b = &x->branch;
-  double part = 0, whole = 0;
-  for (int j = 0; j <= b->of.unknowns; j++) {
-    part += (point->u[j] - b->before.u[j]) * b->before.tangent[j];
-    whole += (b->at.u[j] - b->before.u[j]) * b->before.tangent[j];
-  }
-  return part / whole;
-}
-
 /* Whether a pair changes its sign at the point located, of `apart` modes that do between the last two points. */
 static int branch_pair (const pw_steady *x, int apart) {
   double im;
@@ -96,29 +70,23 @@ static int branch_pair (const pw_steady *x, int apart) {
  * real one is no event of its own. */
 static int branch_changes (pw_steady *x, int before, int now, pw_error *error) {
   int least = before < now ? before : now, most = before < now ? now : before, pair = 0;
-  double fold = x->queued ? x->queue[0].along : -1;
-  for (x->sought = least; x->sought < most && x->queued < STEADY_QUEUE - 1; x->sought += 1 + pair) {
-    pw_branch_point *point = &x->queue[x->queued].point;
-    int status = pw_branch_locate (&x->branch, branch_test, x, BRANCH_ACCURACY, point, error);
+  pw_branch *b = &x->branch;
+  double fold = b->queued ? b->queue[0].along : -1;
+  for (x->sought = least; x->sought < most && b->queued < PW_BRANCH_QUEUE - 1; x->sought += 1 + pair) {
+    int status = pw_branch_locate (b, branch_test, x, error);
     if (status != PW_OK) return status;
-    double along = branch_along (x, point);
     pair = branch_pair (x, most - least);
-    if (pair || fabs (along - fold) > BRANCH_FOLD)
-      branch_queue (x, *point, pair ? PW_STEADY_OSCILLATION : PW_STEADY_REAL, along);
+    if (pair || fabs (pw_branch_along (b, &b->found) - fold) > BRANCH_FOLD)
+      pw_branch_queue (b, pair ? PW_STEADY_OSCILLATION : PW_STEADY_REAL);
   }
   return PW_OK;
 }
 
 /* Queues the events between the last two points.  At a fold a real eigenvalue changes its sign. */
-static int branch_events (pw_steady *x, pw_error *error) {
+static int branch_events (void *steady, pw_error *error) {
+  pw_steady *x = steady;
   pw_steady_motion motion;
-  int before = x->unstable, neutral = x->neutral, status = PW_OK;
-  if (x->branch.folded) {
-    pw_branch_point *point = &x->queue[x->queued].point;
-    status = pw_branch_locate (&x->branch, pw_branch_fold, &x->branch, BRANCH_ACCURACY, point, error);
-    if (status == PW_OK) branch_queue (x, *point, PW_STEADY_FOLD, branch_along (x, point));
-  }
-  if (status == PW_OK) status = pw_steady_motion_at (x, x->branch.at.u, &motion, error);
+  int before = x->unstable, neutral = x->neutral, status = pw_steady_motion_at (x, x->branch.at.u, &motion, error);
   if (status != PW_OK) return status;
   int apart = before > motion.unstable ? before - motion.unstable : motion.unstable - before;
   x->compare = neutral == x->neutral ? neutral : -1;
@@ -129,38 +97,18 @@ static int branch_events (pw_steady *x, pw_error *error) {
   return status;
 }
 
-/* ---- Steps ---- */
-
-static int branch_advance (pw_steady *x, pw_error *error) {
-  x->why = (pw_error){ 0 };
-  if (x->steps++ > BRANCH_LIMIT * x->set.points)
-    return pw_fail (&x->why, PW_METHOD, "the branch has more than %d points", BRANCH_LIMIT * x->set.points), PW_RETRY;
-  int status = pw_branch_step (&x->branch, error);
-  if (status == PW_RETRY && !*x->why.text) pw_fail (&x->why, PW_METHOD, "Newton's method fails at the smallest step");
-  if (status == PW_OK) x->why = (pw_error){ 0 };
-  if (status == PW_OK) status = pw_branch_at_end (&x->branch, &x->ended, error);
-  if (status == PW_OK) status = branch_events (x, error);
-  if (status == PW_OK) branch_queue (x, x->branch.at, PW_STEADY_POINT, 1);
-  x->ended |= x->steps > 2 && pw_branch_closed (&x->branch, &x->first);
-  return status;
-}
-
 int pw_steady_next (pw_steady *x, pw_steady_motion *out, pw_error *error) {
   int status = pw_require (x, "a search", error);
   *out = (pw_steady_motion){ .event = PW_STEADY_END };
   if (status != PW_OK) return status;
-  if (x->returned == x->queued) {
-    if (x->ended) return PW_OK;
-    x->queued = x->returned = 0;
-    status = branch_advance (x, error);
-    if (status == PW_RETRY) return x->ended = 1, PW_OK;
-    if (status != PW_OK) return status;
-  }
-  int i = x->returned++, neutral = x->neutral;
-  out->event = x->queue[i].event;
+  const pw_branch_event *next;
+  status = pw_branch_next (&x->branch, branch_events, &x->why, &next, error);
+  if (next == NULL) return status;
+  int neutral = x->neutral;
+  out->event = (pw_steady_event)next->event;
   out->iterations = x->branch.iterations;
-  out->residual = x->queue[i].point.residual;
-  status = pw_steady_motion_at (x, x->queue[i].point.u, out, error);
+  out->residual = next->point.residual;
+  status = pw_steady_motion_at (x, next->point.u, out, error);
   x->neutral = neutral;
   return status;
 }

@@ -6,8 +6,6 @@
 #include "continuation.h"
 #include "linear.h"
 
-enum { STEADY_QUEUE = 8 };
-
 struct pw_steady {
   const pw_system *s; /* as described */
   pw_steady_settings set;
@@ -38,17 +36,8 @@ struct pw_steady {
   pw_linear linear; /* of the state q, v */
   pw_error why;     /* the last reason why a system could not be evaluated */
 
-  /* Points of a branch not yet returned, in order; those before the last one are events. */
-  struct {
-    pw_branch_point point; /* arrays of its own */
-    pw_steady_event event;
-    double along;
-  } queue[STEADY_QUEUE];
-  int queued, returned;
-  int steps, ended;
   int unstable, neutral; /* eigenvalues at the point reached: growing, with real part 0 */
-  int sought, compare;   /* for steady_test */
-  pw_branch_point first; /* unknowns + 1: the start of the branch */
+  int sought, compare;   /* for branch_test */
   char *memory;
 };
 

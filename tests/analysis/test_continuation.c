@@ -31,10 +31,15 @@ static void continuation_open (pw_branch *b, const pw_branch_equations *of) {
   b->step = 0.05, b->most = 0.1, b->least = 1e-6;
 }
 
+static int slope_of_p (void *context, const pw_branch_point *point, double *value, pw_error *error) {
+  (void)context, (void)error;
+  *value = point->tangent[2];
+  return PW_OK;
+}
+
 /* The branch passes both folds, at p = +- 2 / sqrt (27), x = -+ 1 / sqrt (3). */
 static void test_folds (void **state) {
-  double at[2][3], tangent[3], u[3] = { -2, 0.7, -5 }, next = 1;
-  pw_branch_point fold = { .u = at[0], .tangent = tangent };
+  double u[3] = { -2, 0.7, -5 }, next = 1;
   pw_error error = { 0 };
   pw_branch b;
   int folds = 0, points = 0;
@@ -51,10 +56,10 @@ static void test_folds (void **state) {
     assert_true (fabs (b.at.u[2] - b.before.u[2]) < 0.2); /* predicted: 0.1 */
     assert_true (b.at.u[0] > b.before.u[0]);
     if (!b.folded) continue;
-    fold.u = at[folds];
-    check_ok (pw_branch_locate (&b, pw_branch_fold, &b, 1e-10, &fold, &error), &error);
-    check_close ("x", fold.u[0], -next / sqrt (3), 1e-9, "10 times the accuracy asked, steps < 1");
-    check_close ("p", fold.u[2], next * 2 / sqrt (27), 1e-12, "quadratic at the fold");
+    b.accuracy = 1e-10;
+    check_ok (pw_branch_locate (&b, slope_of_p, NULL, &error), &error);
+    check_close ("x", b.found.u[0], -next / sqrt (3), 1e-9, "10 times the accuracy asked, steps < 1");
+    check_close ("p", b.found.u[2], next * 2 / sqrt (27), 1e-12, "quadratic at the fold");
     folds++, next = -1;
   }
   assert_int_equal (folds, 2);
@@ -79,11 +84,10 @@ static int pitchfork_sign (void *context, const pw_branch_point *point, double *
 
 /* Steps of any length pass pitchforks on the same branch, and the pitchfork is located. */
 static void test_pitchforks (void **state) {
-  double at[2], tangent[2], where, F;
+  double where, F;
   const pw_branch_equations of = {
     .unknowns = 1, .equations = 1, .tolerance = 1e-9, .rank = 1e-7, .evaluate = pitchfork, .context = &where
   };
-  pw_branch_point point = { .u = at, .tangent = tangent };
   pw_error error = { 0 };
   (void)state;
   for (int k = 0; k < 300; k++) {
@@ -91,22 +95,55 @@ static void test_pitchforks (void **state) {
     int passed = 0;
     pw_branch b;
     check_ok (pw_branch_open (&b, &of, &error), &error);
-    b.most = 0.05 + 0.001 * k, b.step = b.most / 4, b.least = 1e-6, where = 0.8 + 0.01 * (k % 17);
+    b.most = 0.05 + 0.001 * k, b.step = b.most / 4, b.least = 1e-6, b.accuracy = 1e-7, where = 0.8 + 0.01 * (k % 17);
     check_ok (pw_branch_start (&b, u, 1, &error), &error);
     while (b.at.u[1] < 1.5) {
       check_ok (pw_branch_step (&b, &error), &error);
       check_close ("x", b.at.u[0], 3 * sin (b.at.u[1]), 1e-4, "the tolerance over the distance from the pitchfork");
       assert_false (b.folded);
       if (passed || b.at.u[1] < where) continue;
-      check_ok (pw_branch_locate (&b, pitchfork_sign, &where, 1e-7, &point, &error), &error);
-      check_close ("p", at[1], where, 1e-7, "a cubic between points nearby");
-      check_ok (pitchfork (&where, at, &F, NULL, &error), &error);
-      check_close ("residual", point.residual, fabs (F), 0, "that of the point");
+      check_ok (pw_branch_locate (&b, pitchfork_sign, &where, &error), &error);
+      check_close ("p", b.found.u[1], where, 1e-7, "a cubic between points nearby");
+      check_ok (pitchfork (&where, b.found.u, &F, NULL, &error), &error);
+      check_close ("residual", b.found.residual, fabs (F), 0, "that of the point");
       passed = 1;
     }
     assert_true (passed);
     pw_branch_close (&b);
   }
+}
+
+/* x = sin p, without derivatives near p = 1. */
+static int gap (void *context, const double *u, double *F, double *dF, pw_error *error) {
+  (void)context, (void)error;
+  F[0] = u[0] - sin (u[1]);
+  if (dF) dF[0] = fabs (u[1] - 1) < 0.01 ? NAN : 1, dF[1] = -cos (u[1]);
+  return PW_OK;
+}
+
+static int gap_middle (void *context, const pw_branch_point *point, double *value, pw_error *error) {
+  (void)context, (void)error;
+  *value = point->u[1] - 1;
+  return PW_OK;
+}
+
+/* Where Newton's method fails, events are interpolated from the nearest points. */
+static void test_interpolated (void **state) {
+  const pw_branch_equations of = { .unknowns = 1, .equations = 1, .tolerance = 1e-12, .evaluate = gap };
+  double u[2] = { 0, 0 };
+  pw_error error = { 0 };
+  pw_branch b;
+  (void)state;
+  check_ok (pw_branch_open (&b, &of, &error), &error);
+  b.most = b.step = 0.2, b.least = 1e-6, b.accuracy = 1e-9;
+  check_ok (pw_branch_start (&b, u, 1, &error), &error);
+  while (b.at.u[1] < 1) check_ok (pw_branch_step (&b, &error), &error);
+  check_ok (pw_branch_locate (&b, gap_middle, NULL, &error), &error);
+  assert_int_equal (b.found.interpolated, 1);
+  check_close ("p", b.found.u[1], 1, 1e-9, "the accuracy asked, steps < 1");
+  check_close ("x", b.found.u[0], sin (1), 4e-6, "the cubic between points 0.2 apart: 0.2^4/384");
+  check_close ("residual", b.found.residual, fabs (b.found.u[0] - sin (b.found.u[1])), 0, "that of the point");
+  pw_branch_close (&b);
 }
 
 /* With p decreasing from the same point x decreases, and steps grow without curvature. */
@@ -191,9 +228,13 @@ static void test_damping (void **state) {
 }
 
 int main (void) {
-  const struct CMUnitTest tests[] = { cmocka_unit_test (test_folds),     cmocka_unit_test (test_pitchforks),
-                                      cmocka_unit_test (test_direction), cmocka_unit_test (test_start_at_fold),
-                                      cmocka_unit_test (test_end),       cmocka_unit_test (test_without_solution),
+  const struct CMUnitTest tests[] = { cmocka_unit_test (test_folds),
+                                      cmocka_unit_test (test_pitchforks),
+                                      cmocka_unit_test (test_interpolated),
+                                      cmocka_unit_test (test_direction),
+                                      cmocka_unit_test (test_start_at_fold),
+                                      cmocka_unit_test (test_end),
+                                      cmocka_unit_test (test_without_solution),
                                       cmocka_unit_test (test_damping) };
   return cmocka_run_group_tests (tests, NULL, NULL);
 }

@@ -126,6 +126,29 @@ static void test_pitchfork (void **state) {
   }
 }
 
+/* The dampings of two oscillators vanish within one step, at p = 0.31 and 0.33. */
+static void test_two_events (void **state) {
+  int events = 0;
+  (void)state;
+  cli_write ("two.yaml", "pinwheel: 1\n"
+                         "parameters: [{name: p, value: 0.1}]\n"
+                         "bodies: [{name: a, mass: 1, inertia: 1}, {name: b, mass: 1, inertia: 1}]\n"
+                         "elements:\n"
+                         "  - {pin: A, body: [a, ground], at: [[0, 0], [0, 0]]}\n"
+                         "  - {pin: B, body: [b, ground], at: [[0, 0], [0, 0]]}\n"
+                         "  - {torque: ta, body: [a, ground], value: -2*a.phi + (p - 0.31)*a.omega}\n"
+                         "  - {torque: tb, body: [b, ground], value: -5*b.phi + (p - 0.33)*b.omega}\n"
+                         "  - {torque: drive, body: [a, ground], value: {harmonic: {amplitude: 0.1, omega: 1}}}\n");
+  cli_good ("pinwheel periodic @/two.yaml --vary p=0.1:2 -o @/two");
+  for (const char *line = cli_file ("two/periodic.csv"); *line; line = strchr (line, '\n') + 1) {
+    char *end;
+    double p = strtod (line, &end);
+    if (strncmp (end, ",Neimark-Sacker,", 16)) continue;
+    check_close ("p", p, 0.31 + 0.02 * events++, 1e-7, "the accuracy of a location, steps of 0.1");
+  }
+  assert_int_equal (events, 2);
+}
+
 /* The heading of a wheel, and with it the consistent initial states, depend on the parameter. */
 static void test_constraint (void **state) {
   (void)state;
@@ -209,9 +232,9 @@ static void test_vanishing (void **state) {
 int main (void) {
   const struct CMUnitTest tests[] = {
     cmocka_unit_test (test_motion),    cmocka_unit_test (test_periods),    cmocka_unit_test (test_free_period),
-    cmocka_unit_test (test_pitchfork), cmocka_unit_test (test_constraint), cmocka_unit_test (test_branch),
-    cmocka_unit_test (test_turns),     cmocka_unit_test (test_limit),      cmocka_unit_test (test_bad),
-    cmocka_unit_test (test_none),      cmocka_unit_test (test_vanishing),
+    cmocka_unit_test (test_pitchfork), cmocka_unit_test (test_two_events), cmocka_unit_test (test_constraint),
+    cmocka_unit_test (test_branch),    cmocka_unit_test (test_turns),      cmocka_unit_test (test_limit),
+    cmocka_unit_test (test_bad),       cmocka_unit_test (test_none),       cmocka_unit_test (test_vanishing),
   };
   return cmocka_run_group_tests (tests, cli_setup, cli_teardown);
 }
