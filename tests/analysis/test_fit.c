@@ -328,6 +328,7 @@ static void test_interrupt (void **state) {
   assert_non_null (strstr (cli_err, "interrupted; these are the values so far, without their errors"));
   assert_true (cli_says (cli_file ("stop.json"), "status", "interrupted"));
   assert_non_null (strstr (cli_file ("stop.json"), "\"standard_error\": null"));
+  assert_non_null (strstr (cli_file ("stop.json"), "\"determined\": null"));
   assert_int_equal (strncmp (cli_file ("stop.csv"), "t [s],w.phi [rad],w.phi.model [rad]", 35), 0);
 }
 

@@ -186,7 +186,10 @@ static void report_json_unknown (const pw_fit *x, pw_json *j, int i) {
   pw_json_number (j, "standard_error", x->deviation[i]);
   pw_json_number (j, "from", report_end (x, i, -1));
   pw_json_number (j, "to", report_end (x, i, 1));
-  pw_json_flag (j, "determined", !isinf (x->deviation[i]));
+  if (x->interrupted)
+    pw_json_text (j, "determined", NULL);
+  else
+    pw_json_flag (j, "determined", !isinf (x->deviation[i]));
   pw_json_flag (j, "bound", *report_bound (x, i) != 0);
   pw_json_close (j, '}');
 }

@@ -34,14 +34,21 @@ static int yaml_domain (const pw_reader *r, const pw_node *domain, const pw_node
   return status;
 }
 
+/* The first place where a name is a word of its own in a text, or NULL. */
+static const char *yaml_find_word (const char *text, const char *name) {
+  for (const char *at = strstr (text, name); at; at = strstr (at + 1, name))
+    if ((at == text || !isalpha ((unsigned char)at[-1])) && !isalpha ((unsigned char)at[strlen (name)])) return at;
+  return NULL;
+}
+
 /* Refuses units other than SI units: 40 with the unit deg would mean 40 rad. */
 static int yaml_unit (const pw_reader *r, const pw_node *node, const pw_node *value, const char **unit) {
   if (node == NULL || pw_yaml_text (r, node, "unit", unit) != PW_OK) return r->error->status;
   int number = value->type == PW_YAML_SCALAR && pw_expression_number (value->text, &(double){ 0 });
   for (const pw_unit_name *other = pw_unit_names; other->name; other++) {
-    const char *at = strcmp (other->factor, "1") ? strstr (*unit, other->name) : NULL,
-               *after = at ? at + strlen (other->name) : NULL;
-    if (at == NULL || (at > *unit && isalpha ((unsigned char)at[-1])) || isalpha ((unsigned char)*after)) continue;
+    const char *at = strcmp (other->factor, "1") ? yaml_find_word (*unit, other->name) : NULL;
+    if (at == NULL) continue;
+    const char *after = at + strlen (other->name);
     return pw_yaml_fail (r, node->at,
                          "unit: numbers are in SI units, angles in radians, and no unit converts a value; write "
                          "\"value: %.30s%c%s%.2s, unit: %.*s%s%.30s\"",
