@@ -305,6 +305,15 @@ static void test_page (void **state) {
   if (status != PW_OK && strstr (error.text, "without the engine")) skip ();
   check_ok (status, &error);
   assert_int_equal (tables, 1);
+  const char named[] = "pinwheel: 1\nbodies: [{name: a, mass: 1, inertia: 1}]\n"
+                       "elements: [{force: F, body: a, fx: {table: {file: tree}}}]\n";
+  table_write ("model/m.yaml", named, strlen (named));
+  table_write ("model/tree", "0,1\n1,2\n", 8);
+  f = pw_file_open (table_in ("model/m.yaml"), &error);
+  assert_int_equal (pw_page_open (&page, f, &error), PW_INPUT);
+  assert_string_equal (error.text, "table tree: a page has a part of this name; rename the file, to tree.csv");
+  pw_page_close (&page);
+  pw_file_close (f);
 }
 
 static int table_setup (void **state) {

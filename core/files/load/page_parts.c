@@ -62,6 +62,8 @@ static int page_tree (pw_page *p, const pw_yaml *y, pw_error *error) {
   return page_add (p, "tree", tree.text, tree.size, error);
 }
 
+enum { PAGE_PARTS = 3 }; /* engine, model, tree; then tables */
+
 typedef struct {
   pw_page *p;
   size_t folder; /* length of the model's folder, with its slash */
@@ -71,9 +73,14 @@ typedef struct {
 /* Adds a table once, however many signals read it. */
 static int page_table (void *context, const char *path) {
   page_tables *x = context;
+  const char *name = path + x->folder;
   for (int i = 0; i < x->p->files; i++)
-    if (strcmp (x->p->file[i].name, path + x->folder) == 0) return PW_OK;
-  return page_read (x->p, path + x->folder, path, x->error);
+    if (strcmp (x->p->file[i].name, name) == 0)
+      return i >= PAGE_PARTS
+                 ? PW_OK
+                 : pw_fail (x->error, PW_INPUT, "table %s: a page has a part of this name; rename the file, to %s.csv",
+                            name, name);
+  return page_read (x->p, name, path, x->error);
 }
 
 static int page_text (pw_page *p, const pw_file *f, const pw_yaml *y, pw_error *error) {
