@@ -84,9 +84,10 @@ int pw_method_adaptive (const pw_method *integrator, const char *method);
 enum { PW_SPECIALISE_STEPS = 1000000 };
 double pw_method_steps (const char *method, const pw_settings *s, double step, double t_end);
 
-/* One accepted step that does not pass t_end.  PW_STOPPED, without an error, if settings.stop requested it: the run
- * stays where it was, and the next call continues.  Errors: PW_METHOD with the time reached and the reason, such as
- * max_steps. */
+/* One accepted step that does not pass t_end; to an end or a discontinuity that is the time reached up to round-off, none
+ * but that the time becomes this one.  PW_STOPPED, without an error, if settings.stop requested it: the run stays where it
+ * was, and the next call continues.  Errors: PW_INPUT if t_end is not a number; PW_METHOD with the time reached and the
+ * reason, such as max_steps; PW_RESOURCE. */
 int pw_run_advance (pw_run *r, double t_end, pw_error *error);
 
 /* One step, or several of a fixed size if specialised code is in use, which end where single steps would, none of them

@@ -154,6 +154,20 @@ static void test_adjacent_breakpoints (void **state) {
   pw_system_free (s);
 }
 
+/* One pulse ends and another one begins, in motion: both times are meant to be the same but differ in the last digit. */
+static void test_adjacent_in_motion (void **state) {
+  char name[STEPS_NAME];
+  (void)state;
+  pw_system *s = steps_open ((pw_signal){ PW_PULSE, .pulse = { .height = 10, .start = 0.1, .width = 0.2 } },
+                             (pw_signal){ PW_PULSE, .pulse = { .height = -10, .start = 0.3, .width = 0.5 } });
+  for (int i = 0; steps_method (i, name); i++) {
+    pw_run *r = runs_open (s, name, &(pw_settings){ .step = 0.01, .rtol = 1e-6 });
+    check_close (name, runs_to (r, 1).q[2], 10 / 1.1 * (0.02 + 0.1 - 0.125 - 0.06), 1e-3, "1000 rtol; galpha: h^2");
+    pw_run_close (r);
+  }
+  pw_system_free (s);
+}
+
 /* ---- User functions ---- */
 
 static int steps_breaks (void *context, double t, const double *x, double value[3], double *gradient) {
@@ -237,6 +251,7 @@ int main (void) {
     cmocka_unit_test (test_beginning),
     cmocka_unit_test (test_endless),
     cmocka_unit_test (test_adjacent_breakpoints),
+    cmocka_unit_test (test_adjacent_in_motion),
     cmocka_unit_test (test_not_a_number),
     cmocka_unit_test (test_breakpoints_told),
   };
