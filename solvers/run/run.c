@@ -94,15 +94,15 @@ int pw_run_renew (pw_run *r, int fresh, pw_error *error) {
   int status = pw_run_open_saddle (r, error);
   r->geometry.alert = 1;
   if (status == PW_OK) status = pw_run_evaluate (r, error);
-  if (status != PW_OK && status != PW_RESOURCE) return status;
   if (status == PW_OK && fresh)
     pw_run_set_references (r);
   else if (status == PW_OK)
     pw_watchdog_begin (r);
-  run_drop_method (r);
-  if (status == PW_OK) status = r->method->open (r, error);
-  if (status != PW_OK) run_drop_method (r);
-  return status;
+  run_drop_method (r); /* it may use the previous saddle */
+  if (status == PW_RESOURCE) return status;
+  int opened = r->method->open (r, error);
+  if (opened != PW_OK) run_drop_method (r);
+  return status == PW_OK ? opened : status;
 }
 
 /* 1 if memory did not suffice to reopen the method: the run can only be closed. */

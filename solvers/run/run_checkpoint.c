@@ -45,8 +45,7 @@ static void checkpoint_state (pw_run *r, pw_archive *a) {
 
 /* A file may be intact and yet not have been written by a run. */
 static int checkpoint_plausible (const pw_run *r) {
-  const pw_statistics *s = &r->statistics;
-  int good = isfinite (r->t) && r->t >= 0 && s->steps >= 0 && s->rejected >= 0 && s->rhs >= 0;
+  int good = isfinite (r->t) && r->t >= r->settings.t;
   for (int i = 0; i < r->s->coords; i++) good &= isfinite (r->q[i]) && isfinite (r->v[i]);
   return good;
 }
