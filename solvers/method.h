@@ -54,7 +54,6 @@ struct pw_run {
   double projected;  /* energy added by projections up to t; only with settings.ledger */
 
   /* The state requested from pw_run_sample. */
-  double t_at;
   double *q_at, *v_at, *a_at, *lambda_at, *ledger_at; /* same layout */
   double projected_at;
 

@@ -195,8 +195,10 @@ int pw_run_sample (pw_run *r, double t, pw_sample *sample, pw_error *error) {
   if (isnan (t)) return pw_fail (error, PW_INPUT, "t = nan: expected a time inside the last step");
   r->stopped = 0;
   if (t < r->t && pw_run_stop_requested (r)) return PW_STOPPED;
-  r->t_at = t;
-  int status = r->method->at (r, t, error);
+  const pw_source *failed = r->w->failed;
+  r->w->failed = NULL;
+  int status = pw_run_annotate_error (r, r->method->at (r, t, error), error);
+  r->w->failed = failed;
   if (status != PW_OK) return status;
   *sample = (pw_sample){ .t = t, .q = r->q_at, .v = r->v_at, .a = r->a_at, .lambda = r->lambda_at };
   if (r->redundant && pw_saddle_factor (r->saddle) == PW_OK) pw_rank_least_norm (r, r->lambda_at);

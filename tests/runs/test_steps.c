@@ -177,7 +177,7 @@ static int steps_breaks (void *context, double t, const double *x, double value[
   return 0;
 }
 
-/* A function value that is not finite stops the run with the name of the element, and is in no sample. */
+/* A function value that is not finite stops the run, or refuses a sample, with the name of the element. */
 static void test_not_a_number (void **state) {
   char name[STEPS_NAME];
   double until = 0.25;
@@ -190,6 +190,21 @@ static void test_not_a_number (void **state) {
     assert_int_equal (pw_run_advance_to (r, 1, 1, &error), PW_METHOD);
     assert_true (pw_run_time (r) > 0.1 && pw_run_time (r) <= until);
     assert_non_null (strstr (error.text, "torque T: value is not a finite number"));
+    pw_run_close (r);
+  }
+  for (int i = 0; steps_method (i, name); i++) {
+    if (strstr (name, "held")) continue; /* evaluates the signal at the beginning of the step only */
+    pw_error error = { 0 };
+    pw_sample sample;
+    until = 1;
+    pw_run *r = runs_open (s, name, &(pw_settings){ .step = 0.01 });
+    for (int k = 0; k < 3; k++) check_ok (pw_run_advance (r, 1, &error), &error);
+    double t = pw_run_time (r) * (1 - 1e-6);
+    char text[100];
+    snprintf (text, sizeof text, "t = %.6g s: a signal failed: torque T: value is not a finite number", t);
+    until = 0;
+    assert_int_equal (pw_run_sample (r, t, &sample, &error), PW_METHOD);
+    check_error (&error, PW_METHOD, text);
     pw_run_close (r);
   }
   until = -1;
