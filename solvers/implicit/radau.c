@@ -217,16 +217,13 @@ static double radau_next (const radau *d, double h, double error, int rejected) 
   return d->rate <= RADAU_KEEP && next >= h && next <= RADAU_LONGER * h ? h : next;
 }
 
-/* A step of size h; *error: in units of the tolerances, INFINITY if its equations could not be solved. */
+/* A step of size h; *error: in units of the tolerances, INFINITY if its equations could not be solved or it is fixed. */
 static int radau_try (pw_run *r, double h, double t1, int again, double *error) {
   *error = INFINITY;
   r->near_singular = 0;
   int status = pw_radau_solve (r, h, t1);
   if (status == PW_OK && !r->data->fixed) status = pw_radau_estimate (r, h, again, error);
-  if (status == PW_OK && r->s->entries > 0 && (*error < 1 || r->data->fixed)) {
-    if (r->data->fixed) *error = 0;
-    status = pw_radau_work (r, h, t1, error);
-  }
+  if (status == PW_OK && r->s->entries > 0 && (*error < 1 || r->data->fixed)) status = pw_radau_work (r, h, t1, error);
   return status;
 }
 

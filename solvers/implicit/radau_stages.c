@@ -128,7 +128,7 @@ static int radau_factor (pw_run *r, double h) {
   if (status == PW_OK) status = pw_sparse_factor (&d->complex, d->value);
   r->statistics.factorisations += 2;
   if (status == PW_OK) d->factored = h;
-  return status > 0 ? PW_INPUT : status;
+  return status;
 }
 
 /* x = (gamma/h B - F_y)^-1 x */
