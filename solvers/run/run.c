@@ -112,17 +112,20 @@ static int run_has_no_method (const pw_run *r, pw_error *error) {
   return 1;
 }
 
-/* The active rows have become nearly dependent: looks for another set that is not, with which the method restarts.
+/* If the active rows have become nearly dependent, looks for another set that is not, with which the method restarts.
  * This is done before the next step, since the last one can still be sampled, whether or not it is. */
 static int run_reselect (pw_run *r, pw_error *error) {
-  pw_sample sample;
+  if (r->redundant == 0 || r->independence >= r->reselect_below) return PW_OK;
   r->reselect_below = r->independence / 2;
-  int status = pw_run_sample (r, r->t, &sample, error);
-  if (status != PW_OK) return status;
+  if (pw_evaluate_J_at (r->w, r->t, r->q, r->v) != PW_OK) return pw_fail_signal (r->t, error);
   int other = pw_rank_reselect (r);
   if (other < 0) return pw_fail_memory (r->s, error);
-  if (other == 0) return PW_OK;
-  return pw_run_renew (r, 1, error);
+  return other ? pw_run_renew (r, 1, error) : PW_OK;
+}
+
+/* Computes r->independence with the J last evaluated. */
+static void run_check_rows (pw_run *r) {
+  if (r->redundant) r->independence = pw_saddle_factor (r->saddle) == PW_OK ? pw_rank_independence (r) : 0;
 }
 
 /* 1 if t is the time reached, up to round-off.  No step is made to such a time, since methods divide by its length:
@@ -155,7 +158,7 @@ int pw_run_advance (pw_run *r, double t_end, pw_error *error) {
   if (r->stalled == 0) r->w->failed = NULL; /* otherwise it is the signal that stops the run */
   if (r->t >= r->breakpoint || r->interrupted) status = run_restart_method (r, error);
   r->interrupted = 0;
-  if (status == PW_OK && r->redundant && r->independence < r->reselect_below) status = run_reselect (r, error);
+  if (status == PW_OK) status = run_reselect (r, error);
   const double stop = fmin (t_end, r->breakpoint);
   if (status == PW_OK && run_is_at (r, stop)) {
     r->t = stop;
@@ -168,8 +171,7 @@ int pw_run_advance (pw_run *r, double t_end, pw_error *error) {
   if (status == PW_OK) pw_ledger_note (r);
   if (status == PW_OK) status = run_check_progress (r, before, error);
   if (status != PW_OK) return pw_run_annotate_error (r, status, error);
-  if (r->redundant == 0) return PW_OK;
-  r->independence = pw_saddle_factor (r->saddle) == PW_OK ? pw_rank_independence (r) : 0;
+  run_check_rows (r);
   return PW_OK;
 }
 
@@ -232,6 +234,14 @@ static void run_exchange (pw_run *r, const double *q, const double *v) {
   memcpy (r->v, other + n, bytes);
 }
 
+/* Rows that are independent at the state reached. */
+static int run_select (pw_run *r, pw_error *error) {
+  if (r->redundant == 0) return PW_OK;
+  if (pw_evaluate_J_at (r->w, r->t, r->q, r->v) != PW_OK) return pw_fail_signal (r->t, error);
+  run_check_rows (r);
+  return run_reselect (r, error);
+}
+
 static int run_energy (pw_run *r, double *energy, pw_error *error) {
   if (pw_update_kinematics (r->w, r->t, r->q, r->v) != PW_OK) return pw_fail_signal (r->t, error);
   *energy = pw_kinetic (r->s, r->v) + pw_potential (r->w);
@@ -248,11 +258,13 @@ int pw_run_restart (pw_run *r, const double *q, const double *v, pw_error *error
   int status = run_energy (r, &before, error);
   if (status == PW_OK) status = pw_run_look_ahead (r, error);
   if (status != PW_OK) return status;
+  const double below = r->reselect_below;
   r->w->t_signal = NAN;
   run_exchange (r, q, v);
   r->near_singular = 0;
   r->geometry.alert = 1;
-  status = pw_run_make_consistent (r, NULL, error);
+  status = run_select (r, error);
+  if (status == PW_OK) status = pw_run_make_consistent (r, NULL, error);
   if (status == PW_OK) status = pw_run_evaluate (r, error);
   if (status == PW_OK) status = run_energy (r, &after, error);
   if (status == PW_OK) {
@@ -264,7 +276,8 @@ int pw_run_restart (pw_run *r, const double *q, const double *v, pw_error *error
     return r->method->restart (r, error);
   }
   memcpy (r->q, r->q_at, pw_state_length (r->s) * sizeof *r->q);
-  pw_run_evaluate (r, NULL);
+  r->reselect_below = below;
+  if (run_select (r, NULL) == PW_OK) pw_run_evaluate (r, NULL);
   return status;
 }
 
