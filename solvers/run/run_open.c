@@ -120,7 +120,7 @@ static int run_first_evaluation (pw_run *r, pw_error *error) {
   return status;
 }
 
-/* Initialises energies, ledger and statistics at the consistent state. */
+/* Initialises energies, ledger and statistics at the consistent state, and finds the first discontinuity. */
 static int run_begin (pw_run *r, pw_error *error) {
   pw_run_set_reference_level (r);
   pw_ledger_begin (r);

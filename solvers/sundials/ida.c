@@ -178,7 +178,8 @@ static int ida_open (pw_run *r, pw_error *error) {
   if (ida_open_vectors (d, r) != PW_OK || pw_ida_open_matrix (d) != PW_OK || ida_open_solver (d) != PW_OK ||
       pw_quadrature_open (&d->sun.quadrature, r, ida_power) != PW_OK)
     return pw_sun_no_memory (r, error);
-  if (r->statistics.steps == 0) d->sun.before = (pw_statistics){ 0 };
+  if (r->statistics.steps == 0)
+    d->sun.before = (pw_statistics){ 0 }; /* without evaluations of the initial conditions */
   return PW_OK;
 }
 
