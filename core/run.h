@@ -110,8 +110,8 @@ typedef struct {
 
 /* Saves or loads bytes, so that one function that lists the parts of a state does both. */
 void pw_archive_bytes (pw_archive *a, void *bytes, size_t count);
-void pw_archive_count (pw_archive *a,
-                       long *count);   /* saves or loads a count; fails if a loaded one is negative or > LONG_MAX / 2 */
+/* Saves or loads a count; fails if a loaded one is negative or above LONG_MAX / 2. */
+void pw_archive_count (pw_archive *a, long *count);
 void pw_archive_clear (pw_archive *a); /* rewinds */
 void pw_archive_free (pw_archive *a);
 

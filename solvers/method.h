@@ -54,7 +54,6 @@ struct pw_run {
   double projected;  /* energy added by projections up to t; only with settings.ledger */
 
   /* The state requested from pw_run_sample. */
-  double t_at;
   double *q_at, *v_at, *a_at, *lambda_at, *ledger_at; /* same layout */
   double projected_at;
 
@@ -152,8 +151,8 @@ void pw_read_baumgarte (pw_run *r);
   }
 extern const char *const pw_metrics[];
 
-/* Initial step size for methods that begin with order 1: the error h^2 / T^2 equals the tolerance; states that
- * saturating forces depend on change by at most their tolerance. */
+/* Initial step size for methods that begin with order 1: the error h^2 / T^2 is a quarter of the tolerance; states that
+ * saturating forces depend on change by at most their tolerance, unless that takes less than 1e-9 T. */
 double pw_first_step (const pw_run *r);
 
 /* ---- Parts of opening and advancing a run (run.c) ---- */
@@ -301,8 +300,8 @@ void pw_projector_close (pw_projector *p);
  * (t, q, v).  PW_RETRY if it does not converge, or if a redundant equation contradicts the others. */
 int pw_project_positions (pw_projector *p, pw_run *r, double t, double *q, const double *v);
 
-/* A linear solve for J v = eta at the current configuration, near a singular one two; updates the velocity kinematics.  PW_RETRY if singular;
- * PW_METHOD if a signal that depends on velocities failed. */
+/* A linear solve for J v = eta at the current configuration, near a singular one two; updates the velocity kinematics.
+ * PW_RETRY if singular; PW_METHOD if a signal that depends on velocities failed. */
 int pw_project_velocities (pw_projector *p, pw_run *r, double *v);
 
 /* Both, then accelerations and multipliers of the projected state, with the run's saddle factorised there.

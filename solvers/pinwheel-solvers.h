@@ -84,9 +84,10 @@ int pw_method_adaptive (const pw_method *integrator, const char *method);
 enum { PW_SPECIALISE_STEPS = 1000000 };
 double pw_method_steps (const char *method, const pw_settings *s, double step, double t_end);
 
-/* One accepted step that does not pass t_end.  PW_STOPPED, without an error, if settings.stop requested it: the run
- * stays where it was, and the next call continues.  Errors: PW_METHOD with the time reached and the reason, such as
- * max_steps. */
+/* One accepted step that does not pass t_end; to an end or a discontinuity that is the time reached up to round-off, none
+ * but that the time becomes this one.  PW_STOPPED, without an error, if settings.stop requested it: the run stays where it
+ * was, and the next call continues.  Errors: PW_INPUT if t_end is not a number; PW_METHOD with the time reached and the
+ * reason, such as max_steps; PW_RESOURCE. */
 int pw_run_advance (pw_run *r, double t_end, pw_error *error);
 
 /* One step, or several of a fixed size if specialised code is in use, which end where single steps would, none of them
@@ -107,7 +108,9 @@ int pw_run_advance_to (pw_run *r, double t, double t_end, pw_error *error);
 double pw_run_time (const pw_run *r);
 
 /* The state at a time inside the last accepted step, its end included.  PW_STOPPED as pw_run_advance, but never at
- * the end: the state reached is available however a run has stopped; after a stop, other times may not be. */
+ * the end: the state reached is available however a run has stopped; after a stop, other times may not be.  Errors:
+ * PW_INPUT if t lies outside the step; PW_METHOD if a signal fails there, or no state satisfies the constraints;
+ * PW_RESOURCE. */
 int pw_run_sample (pw_run *r, double t, pw_sample *sample, pw_error *error);
 
 /* Energy defect of a sample, including energy added by projections, relative to the energy that the run has
@@ -133,11 +136,13 @@ void pw_run_close (pw_run *r);
 
 /* Appends the state reached to the archive, and continues as a run loaded from it would: matrices are planned again,
  * and a multistep method restarts, which the statistics count.  Take samples of the last step before.  PW_RETRY near
- * a singular configuration, where nothing is done: try after the next step.  Errors: PW_RESOURCE. */
+ * a singular configuration, where nothing is done: try after the next step.  Errors: PW_METHOD if the state cannot be
+ * evaluated; PW_RESOURCE. */
 int pw_run_save (pw_run *r, pw_archive *a, pw_error *error);
 
 /* Loads a saved state into a run opened with the same system, method and settings that has not advanced; it
- * continues bit for bit as the run that was saved.  Errors: PW_INPUT if the archive does not match; PW_RESOURCE. */
+ * continues bit for bit as the run that was saved.  After an error it can only be closed: PW_INPUT if the archive does not
+ * match; PW_METHOD; PW_RESOURCE. */
 int pw_run_load (pw_run *r, pw_archive *a, pw_error *error);
 
 /* The number of redundant constraint equations, and a description of those that the i-th one follows from, in the

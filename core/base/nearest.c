@@ -90,7 +90,8 @@ const char *pw_domain_check (pw_domain domain, double value) {
   if (!isfinite (value)) return "a finite number";
   if (domain == PW_NONNEGATIVE && value < 0) return "a number >= 0";
   if (domain == PW_POSITIVE && value <= 0) return "a number > 0";
-  if (domain == PW_COUNT && (value < 1 || value != floor (value) || value > 1e9)) return "a whole number >= 1";
+  if (domain == PW_COUNT && (value < 1 || value != floor (value))) return "a whole number >= 1";
+  if (domain == PW_COUNT && value > 1e9) return "a whole number up to 1e9";
   if (domain == PW_FRACTION && (value < 0 || value > 1)) return "a number from 0 to 1";
   return "";
 }

@@ -32,6 +32,8 @@ enum { PW_HINT = 130 };
 int pw_find_name (const void *table, size_t entry, const char *name, char hint[PW_HINT]);
 /* "", ">= 0", "> 0", "1, 2, ...", "0 to 1" */
 const char *pw_domain_text (pw_domain domain);
+/* "" if a value lies in the domain, else the expected one ("a number >= 0"). */
+const char *pw_domain_check (pw_domain domain, double value);
 
 /* ---- Zero-terminated texts (characters.c) ---- */
 
@@ -100,8 +102,5 @@ char *pw_alloc_arrays (const pw_array *array, size_t arrays);
 /* PW_OK if `bytes` can be allocated now, else PW_RESOURCE.  Used before calls of libraries that crash when an
  * allocation fails. */
 int pw_reserve (size_t bytes);
-
-/* "" if a value lies in the domain, else the expected one ("a number >= 0"). */
-const char *pw_domain_check (pw_domain domain, double value);
 
 #endif

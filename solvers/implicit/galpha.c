@@ -15,9 +15,9 @@
  * For order 2 from the first step, the initial w is a + shift h a-dot.  In index3, where g = 0 requires a velocity
  * error C h^2 G a-dot, C = 1/6 - beta - shift/2, the initial v includes that error; otherwise the first multipliers
  * have an error of order h (Arnold, Brüls & Cardona 2015, Error analysis of generalized-alpha Lie group time
- * integration methods for constrained mechanical systems).  A change of step size requires a new initialisation.  If
- * vibrations too fast for the step dominate a-dot, this would amplify them a hundredfold; then a-dot is the change of a
- * in a trial step from w = a.
+ * integration methods for constrained mechanical systems).  A change of step size and a discontinuity require a new
+ * initialisation, from velocities projected onto J v = eta.  If vibrations too fast for the step dominate a-dot, this
+ * would amplify them a hundredfold; then a-dot is the change of a in a trial step from w = a.
  *
  * Newton's equations are scaled by powers of the step, so that their condition number does not depend on it (Bottasso,
  * Bauchau & Cardona 2007, Time-step-size-independent conditioning and sensitivity to perturbations in the numerical
@@ -116,7 +116,7 @@ static int galpha_begin (pw_run *r, double h) {
   double *jerk = d->w1;
   int status = PW_OK;
   memcpy (d->v, r->v, (size_t)d->n * sizeof *d->v);
-  if (!d->ggl && d->work.h > 0) { /* velocities include the error of the previous step size */
+  if (!d->ggl) { /* velocities include the error of the steps before */
     status = pw_evaluate_J_at (r->w, r->t, r->q, d->v);
     if (status == PW_OK) status = pw_project_velocities (&d->work.last.projector, r, d->v);
   }

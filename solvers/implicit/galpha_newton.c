@@ -98,8 +98,7 @@ static int galpha_factor (pw_run *r, double h) {
     for (int64_t i = x->colptr[c]; i < x->colptr[c + 1]; i++) d->work.value[i] *= d->row[x->rowind[i]] * d->column[c];
   r->statistics.jacobians++;
   r->statistics.factorisations++;
-  int status = pw_sparse_factor (&d->work.sparse, d->work.value);
-  return status > 0 ? PW_INPUT : status;
+  return pw_sparse_factor (&d->work.sparse, d->work.value);
 }
 
 /* ---- Iteration ---- */

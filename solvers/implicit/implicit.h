@@ -1,4 +1,4 @@
-/* The driver of implicit fixed-step methods other than those of SUNDIALS: Newton matrix, last step, dense output. */
+/* The driver of galpha and leapfrog, implicit methods with a fixed step: Newton matrix, last step, dense output. */
 #ifndef PW_IMPLICIT_H
 #define PW_IMPLICIT_H
 

@@ -217,16 +217,13 @@ static double radau_next (const radau *d, double h, double error, int rejected) 
   return d->rate <= RADAU_KEEP && next >= h && next <= RADAU_LONGER * h ? h : next;
 }
 
-/* A step of size h; *error: in units of the tolerances, INFINITY if its equations could not be solved. */
+/* A step of size h; *error: in units of the tolerances, INFINITY if its equations could not be solved or it is fixed. */
 static int radau_try (pw_run *r, double h, double t1, int again, double *error) {
   *error = INFINITY;
   r->near_singular = 0;
   int status = pw_radau_solve (r, h, t1);
   if (status == PW_OK && !r->data->fixed) status = pw_radau_estimate (r, h, again, error);
-  if (status == PW_OK && r->s->entries > 0 && (*error < 1 || r->data->fixed)) {
-    if (r->data->fixed) *error = 0;
-    status = pw_radau_work (r, h, t1, error);
-  }
+  if (status == PW_OK && r->s->entries > 0 && (*error < 1 || r->data->fixed)) status = pw_radau_work (r, h, t1, error);
   return status;
 }
 
@@ -254,6 +251,16 @@ static int radau_accept_adaptive (pw_run *r, double h, double t1, double error, 
   return PW_OK;
 }
 
+/* In index3 the state reached violates g = 0 and J v = eta within the tolerances.  A step of size h corrects positions by
+ * velocities of that size over h: no step, however small, has a smaller error, unless the state is projected. */
+static void radau_project_start (pw_run *r) {
+  radau *d = r->data;
+  double *q = d->now.y, *v = q + d->n;
+  if (d->velocities || pw_project_positions (&d->projector, r, r->t, q, v) != PW_OK) return;
+  (void)pw_project_velocities (&d->projector, r, v);
+  pw_forget_residuals (r);
+}
+
 static int radau_advance (pw_run *r, double t_end, pw_error *error) {
   radau *d = r->data;
   if (d->fixed) return radau_advance_fixed (r, t_end, error);
@@ -271,6 +278,7 @@ static int radau_advance (pw_run *r, double t_end, pw_error *error) {
     if (status == PW_RESOURCE || status == PW_INPUT || signal) return radau_fail (r, status, h, error);
     r->statistics.rejected++;
     d->outdated = !d->current;
+    if (status == PW_OK && rejected > 0) radau_project_start (r);
     d->h = status == PW_OK ? fmin (0.9 * h, radau_next (d, h, off, 1)) : h * (status == PW_RETRY ? d->shorter : 0.25);
   }
 }

@@ -128,7 +128,7 @@ static int radau_factor (pw_run *r, double h) {
   if (status == PW_OK) status = pw_sparse_factor (&d->complex, d->value);
   r->statistics.factorisations += 2;
   if (status == PW_OK) d->factored = h;
-  return status > 0 ? PW_INPUT : status;
+  return status;
 }
 
 /* x = (gamma/h B - F_y)^-1 x */
@@ -204,7 +204,7 @@ static void radau_predict (pw_run *r, double h) {
       continue;
     }
     memset (Z, 0, (size_t)d->size * sizeof *Z);
-    for (int j = 0; j < d->n; j++) Z[j] = ch * (r->v[j] + 0.5 * ch * r->a[j]), Z[d->n + j] = ch * r->a[j];
+    for (int j = 0, n = d->n; j < n; j++) Z[j] = ch * (d->now.y[n + j] + 0.5 * ch * r->a[j]), Z[n + j] = ch * r->a[j];
   }
   radau_combine (d, radau_inverse_T, d->now.Z, d->W);
 }
@@ -317,7 +317,7 @@ int pw_radau_estimate (pw_run *r, double h, int again, double *error) {
   double *const *Z = d->now.Z;
   for (int i = 0; i < d->size; i++) {
     rest[i] = i < 2 * n ? d->B[i] / h * (radau_e[0] * Z[0][i] + radau_e[1] * Z[1][i] + radau_e[2] * Z[2][i]) : 0;
-    e[i] = rest[i] + (i < n ? r->v[i] : i < 2 * n ? d->B[i] * r->a[i - n] : 0);
+    e[i] = rest[i] + (i < n ? d->now.y[n + i] : i < 2 * n ? d->B[i] * r->a[i - n] : 0);
   }
   if (radau_solve_real (d, e) != PW_OK) return PW_RESOURCE;
   *error = radau_norm (d, e);

@@ -49,10 +49,10 @@ int pw_sparse_factor (pw_sparse *k, double *value) {
   if (sparse_refactor (k, value)) return PW_OK;
   pw_sparse_forget (k);
   k->factors = k->field->factor (k->colptr, k->rowind, value, k->order, &k->common);
-  if (k->factors == NULL) return k->common.status == KLU_OUT_OF_MEMORY ? PW_RESOURCE : PW_RETRY;
+  if (k->factors == NULL) return k->common.status == KLU_OUT_OF_MEMORY ? PW_RESOURCE : PW_INPUT;
   if (!k->field->rcond (k->order, k->factors, &k->common)) return PW_RESOURCE;
   k->least = 0.01 * k->common.rcond;
-  return k->common.rcond > 0 ? PW_OK : PW_RETRY;
+  return k->common.rcond > 0 ? PW_OK : PW_INPUT;
 }
 
 int pw_sparse_solve (pw_sparse *k, double *x) {

@@ -20,7 +20,7 @@ int pw_sparse_open (pw_sparse *k, int n, int64_t *colptr, int64_t *rowind);
 int pw_sparse_open_complex (pw_sparse *k, int n, int64_t *colptr, int64_t *rowind);
 void pw_sparse_close (pw_sparse *k);
 
-/* PW_OK, PW_RETRY if the matrix is singular, PW_RESOURCE. */
+/* PW_OK, PW_INPUT if the matrix is singular, PW_RESOURCE. */
 int pw_sparse_factor (pw_sparse *k, double *value);
 
 /* The next factorisation chooses its pivots again. */

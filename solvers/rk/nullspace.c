@@ -55,7 +55,7 @@ int pw_nullspace_open (pw_nullspace *b, pw_run *r, pw_error *error) {
                     "model %s: stabilisation nullspace works with dense matrices, for up to %d constraint rows, and "
                     "this scene has %d; use %s+projection",
                     s->model, PW_NULLSPACE_MOST, b->rows, r->method->name);
-  if (nullspace_allocate (b, s) != PW_OK) return pw_fail (error, PW_RESOURCE, "model %s: out of memory", s->model);
+  if (nullspace_allocate (b, s) != PW_OK) return pw_fail_memory (s, error);
   for (int i = 0, n = 0; i < s->rows; i++) b->place[i] = r->active && !r->active[i] ? -1 : n++;
   return PW_OK;
 }

@@ -26,7 +26,7 @@ void pw_nullspace_close (pw_nullspace *b);
 int pw_nullspace_begin (pw_nullspace *b, pw_run *r);
 
 /* Replaces v by the velocities at (t, q) with the same null-space velocities; updates kinematics and J.  PW_RETRY if the
- * step is too large for its basis, or the configuration is singular. */
+ * step is too large for its basis, or the configuration is singular; PW_METHOD if a signal failed. */
 int pw_nullspace_velocities (pw_nullspace *b, pw_run *r, double t, const double *q, double *v);
 
 /* Accelerations and multipliers right after pw_nullspace_velocities.  Returns as pw_run_accelerate. */

@@ -13,7 +13,7 @@ typedef struct {
   const double *e;  /* stages + 1: of the error estimate, the last for the new state; NULL: none */
   const double *e3; /* as e: of a second, cruder estimate, combined as in DOP853; NULL: none */
   const double *e6; /* as e: of a third, sharper one, with e3 only */
-  double exponent;  /* of the error in the step size: 1 / order of the estimate + 1 */
+  double exponent;  /* of the error in the step size: 1 / (order of the estimate + 1) */
   double memory;    /* of the previous error in the step size (Gustafsson 1991) */
 } pw_tableau;
 

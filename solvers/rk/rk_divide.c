@@ -89,6 +89,7 @@ int pw_rk_at (pw_run *r, double t, pw_error *error) {
   }
   memcpy (r->q_at, d->q, pw_rk_block (r, 1));
   r->statistics = statistics, r->refuse = refuse, r->near_singular = near;
+  if (status < 0) return pw_fail_signal (t, error);
   return status == PW_OK ? PW_OK : pw_rk_fail (r, status, t - d->t0, error);
 }
 

@@ -85,7 +85,7 @@ static int rk_allocate (struct pw_method_data *d, const pw_system *s) {
 
 int pw_rk_open (pw_run *r, const pw_tableau *tableau, pw_error *error) {
   struct pw_method_data *d = r->data = calloc (1, sizeof *d);
-  if (d == NULL) return pw_fail (error, PW_RESOURCE, "model %s: out of memory", r->s->model);
+  if (d == NULL) return pw_fail_memory (r->s, error);
   d->tableau = tableau;
   rk_list_weights (d);
   d->adaptive = tableau->e != NULL && pw_run_option (r, "steps") == 0;
@@ -94,7 +94,7 @@ int pw_rk_open (pw_run *r, const pw_tableau *tableau, pw_error *error) {
   d->null_space = pw_stabilised_by (r, PW_NULLSPACE);
   d->projects_positions = d->null_space && pw_run_option (r, "positions") == 0;
   d->every = (int)pw_run_option (r, "every");
-  if (rk_allocate (d, r->s) != PW_OK) return pw_fail (error, PW_RESOURCE, "model %s: out of memory", r->s->model);
+  if (rk_allocate (d, r->s) != PW_OK) return pw_fail_memory (r->s, error);
   int status = d->projects || d->projects_positions ? pw_projector_open_by_options (&d->projector, r, error) : PW_OK;
   if (status == PW_OK && d->null_space) status = pw_nullspace_open (&d->nullspace, r, error);
   return status == PW_OK ? pw_rk_restart (r, error) : status;

@@ -172,7 +172,7 @@ int pw_rk_fail (pw_run *r, int status, double h, pw_error *error) {
   int finite = rk_finite (r, r->data->q, r->data->v) && rk_finite (r, r->q, r->v);
   int against = (r->data->projects || r->data->projects_positions) && finite ? r->data->projector.against : -1;
   char element[120];
-  if (status < 0) return pw_fail (error, PW_METHOD, "t = %.6g s: a signal failed", r->t);
+  if (status < 0) return pw_fail_signal (r->t, error);
   if (against >= 0) /* a redundant equation contradicts the others */
     return pw_fail (error, PW_METHOD, "t = %.6g s: %s contradicts the other constraints", r->t,
                     pw_system_row_name (r->s, against, element, sizeof element));

@@ -54,6 +54,9 @@ int pw_rk_fail (pw_run *r, int status, double h, pw_error *error);
 int pw_rk_advance_fixed (pw_run *r, double t_end, pw_error *error);
 int pw_rk_advance_adaptive (pw_run *r, double t_end, pw_error *error);
 
+/* The first step of an adaptive method. */
+void pw_rk_begin_adaptive (pw_run *r);
+
 /* ---- Several steps (several.c) ---- */
 
 /* Fills x for the next steps up to t and before t_end, two at least, and returns their number; 0: single steps have to
@@ -61,8 +64,5 @@ int pw_rk_advance_adaptive (pw_run *r, double t_end, pw_error *error);
 int pw_several_plan (pw_run *r, double t, double t_end, pw_scene_steps *x);
 /* Makes the result the state reached.  Errors: PW_METHOD. */
 int pw_several_finish (pw_run *r, const pw_scene_steps *x, pw_error *error);
-
-/* The first step of an adaptive method. */
-void pw_rk_begin_adaptive (pw_run *r);
 
 #endif

@@ -12,7 +12,7 @@ int pw_dense_output_open (pw_dense_output *b, pw_run *r, int velocities, pw_erro
   const pw_array array[] = { { &b->q0, pw_state_length (r->s) }, { &b->ledger0, entries }, { &b->rate0, entries } };
   b->memory = pw_alloc_arrays (array, sizeof array / sizeof *array);
   if (b->memory == NULL) return pw_fail_memory (r->s, error);
-  return pw_projector_open (&b->projector, r, NULL, NULL, error);
+  return velocities < 0 ? PW_OK : pw_projector_open (&b->projector, r, NULL, NULL, error);
 }
 
 void pw_dense_output_close (pw_dense_output *b) {

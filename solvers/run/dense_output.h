@@ -8,7 +8,7 @@ typedef struct {
   double t0;                    /* the beginning of the last step */
   double *q0, *ledger0, *rate0; /* the state there, laid out as in pw_run */
   int velocities;               /* 1: project velocities; 0: positions only; -1: neither */
-  pw_projector projector;
+  pw_projector projector;       /* unless velocities is -1 */
   char *memory;
 } pw_dense_output;
 

@@ -1,4 +1,5 @@
 /* The table of integrators, and method names: integrator[+stabilisation][:option=value]... */
+#include <assert.h>
 #include <math.h>
 #include <string.h>
 #include "method.h"
@@ -32,6 +33,7 @@ static const char *methods_lack (const pw_method *m) {
   while (m->options && m->options[options].name) options++;
   if (m->stabilisations == NULL || m->stabilisations[0].name == NULL) return "its table has no stabilisations";
   if (m->options == NULL) return "its table has no options: a list that is ended by a NULL name";
+  static_assert (PW_MAX_OPTIONS == 12, "the number in the next line");
   if (options > PW_MAX_OPTIONS) return "its table has more than 12 options";
   if (!m->open || !m->advance || !m->at || !m->restart || !m->close)
     return "its table needs open, advance, at, restart and close";
@@ -42,7 +44,7 @@ static int methods_integrator (const char *name, const pw_method *const *own, co
                                pw_error *error) {
   const pw_method *const *const list[] = { pw_methods, own };
   pw_nearest near = { .sought = name };
-  char hint[100];
+  char hint[PW_HINT];
   for (int l = 0; l < 2; l++)
     for (int i = 0; list[l] && list[l][i]; i++) {
       pw_nearest_try (&near, list[l][i]->name);
@@ -97,7 +99,7 @@ static int methods_number (const pw_option *o, const char *text, double *value, 
  * read. */
 static int methods_option (const pw_method *method, int stabilisation, char *part, double *values, unsigned *given,
                            pw_error *error) {
-  char hint[100], *equals = strchr (part, '=');
+  char hint[PW_HINT], *equals = strchr (part, '=');
   const char *with = method->stabilisations[stabilisation].name;
   if (equals == NULL) return pw_fail (error, PW_INPUT, "method option \"%s\": expected NAME=VALUE", part);
   *equals = 0;
@@ -171,6 +173,7 @@ void pw_read_baumgarte (pw_run *r) {
 }
 
 #define METHODS_STEP_RATIO 20. /* typical ratio of an adaptive step at rtol 1e-6 to the model's fixed step */
+#define METHODS_ORDER 6.       /* typical order of the error of such a step */
 
 int pw_method_adaptive (const pw_method *integrator, const char *method) {
   return integrator->adaptive && strstr (method, ":steps=fixed") == NULL;
@@ -181,5 +184,5 @@ double pw_method_steps (const char *method, const pw_settings *s, double step, d
   int stabilisation;
   if (pw_method_parse (method, &integrator, &stabilisation, NULL) != PW_OK) return 0;
   if (!pw_method_adaptive (integrator, method)) return t_end / (s->step > 0 ? s->step : step);
-  return t_end / (METHODS_STEP_RATIO * step) * pow (1e-6 / (s->rtol > 0 ? s->rtol : 1e-6), 1. / 6);
+  return t_end / (METHODS_STEP_RATIO * step) * pow (1e-6 / (s->rtol > 0 ? s->rtol : 1e-6), 1 / METHODS_ORDER);
 }

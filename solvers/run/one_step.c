@@ -8,13 +8,13 @@
 
 struct pw_method_data {
   pw_dense_output last;
-  pw_projector projector; /* if the method projects */
-  double base;            /* time from which steps are counted */
-  long count;             /* steps since then */
-  double end;             /* of the step whose size was last requested */
-  int whole;              /* 1: it has the full step size */
-  size_t length;          /* of an array */
-  double *a, *lambda;     /* of the new state */
+  int projects;       /* with the projector of `last` */
+  double base;        /* time from which steps are counted */
+  long count;         /* steps since then */
+  double end;         /* of the step whose size was last requested */
+  int whole;          /* 1: it has the full step size */
+  size_t length;      /* of an array */
+  double *a, *lambda; /* of the new state */
   double *array;
   char *memory;
 };
@@ -40,19 +40,17 @@ int pw_step_restart (pw_run *r, pw_error *error) {
 int pw_step_open (pw_run *r, int arrays, pw_error *error) {
   struct pw_method_data *d = r->data = calloc (1, sizeof *d);
   size_t n = (size_t)r->s->coords + 3, rows = (size_t)r->s->rows;
-  int projects = pw_stabilised_by (r, PW_PROJECTION);
   if (d) d->length = n > rows ? n : rows;
   const pw_array array[] = { { &d->a, n }, { &d->lambda, rows }, { &d->array, (size_t)arrays * (d ? d->length : 0) } };
   if (d) d->memory = pw_alloc_arrays (array, sizeof array / sizeof *array);
   if (d == NULL || d->memory == NULL) return pw_fail_memory (r->s, error);
-  int status = pw_dense_output_open (&d->last, r, projects ? 1 : -1, error);
-  if (status == PW_OK && projects) status = pw_projector_open (&d->projector, r, NULL, NULL, error);
+  d->projects = pw_stabilised_by (r, PW_PROJECTION);
+  int status = pw_dense_output_open (&d->last, r, d->projects ? 1 : -1, error);
   return status == PW_OK ? pw_step_restart (r, error) : status;
 }
 
 void pw_step_close (pw_run *r) {
   pw_dense_output_close (&r->data->last);
-  pw_projector_close (&r->data->projector);
   free (r->data->memory);
   free (r->data);
 }
@@ -81,10 +79,10 @@ static int step_evaluate (pw_run *r, double t, double *q, double *v) {
   double size = 0;
   for (int j = 0; j < s->coords; j++) size += q[j] * q[j] + v[j] * v[j];
   if (!(size < 1e300)) return PW_RETRY;
-  if (d->projector.position == NULL) return pw_run_accelerate (r, t, q, v, d->a, d->lambda);
+  if (!d->projects) return pw_run_accelerate (r, t, q, v, d->a, d->lambda);
   int status = pw_update_kinematics (r->w, t, q, v);
   double before = pw_kinetic (s, v) + pw_potential (r->w);
-  if (status == PW_OK) status = pw_project_state (&d->projector, r, t, q, v, d->a, d->lambda);
+  if (status == PW_OK) status = pw_project_state (&d->last.projector, r, t, q, v, d->a, d->lambda);
   if (status == PW_OK && r->settings.ledger) r->projected += pw_kinetic (s, v) + pw_potential (r->w) - before;
   return status;
 }

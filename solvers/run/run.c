@@ -94,15 +94,15 @@ int pw_run_renew (pw_run *r, int fresh, pw_error *error) {
   int status = pw_run_open_saddle (r, error);
   r->geometry.alert = 1;
   if (status == PW_OK) status = pw_run_evaluate (r, error);
-  if (status != PW_OK && status != PW_RESOURCE) return status;
   if (status == PW_OK && fresh)
     pw_run_set_references (r);
   else if (status == PW_OK)
     pw_watchdog_begin (r);
-  run_drop_method (r);
-  if (status == PW_OK) status = r->method->open (r, error);
-  if (status != PW_OK) run_drop_method (r);
-  return status;
+  run_drop_method (r); /* it may use the previous saddle */
+  if (status == PW_RESOURCE) return status;
+  int opened = r->method->open (r, error);
+  if (opened != PW_OK) run_drop_method (r);
+  return status == PW_OK ? opened : status;
 }
 
 /* 1 if memory did not suffice to reopen the method: the run can only be closed. */
@@ -112,17 +112,26 @@ static int run_has_no_method (const pw_run *r, pw_error *error) {
   return 1;
 }
 
-/* The active rows have become nearly dependent: looks for another set that is not, with which the method restarts.
+/* If the active rows have become nearly dependent, looks for another set that is not, with which the method restarts.
  * This is done before the next step, since the last one can still be sampled, whether or not it is. */
 static int run_reselect (pw_run *r, pw_error *error) {
-  pw_sample sample;
+  if (r->redundant == 0 || r->independence >= r->reselect_below) return PW_OK;
   r->reselect_below = r->independence / 2;
-  int status = pw_run_sample (r, r->t, &sample, error);
-  if (status != PW_OK) return status;
+  if (pw_evaluate_J_at (r->w, r->t, r->q, r->v) != PW_OK) return pw_fail_signal (r->t, error);
   int other = pw_rank_reselect (r);
   if (other < 0) return pw_fail_memory (r->s, error);
-  if (other == 0) return PW_OK;
-  return pw_run_renew (r, 1, error);
+  return other ? pw_run_renew (r, 1, error) : PW_OK;
+}
+
+/* Computes r->independence with the J last evaluated. */
+static void run_check_rows (pw_run *r) {
+  if (r->redundant) r->independence = pw_saddle_factor (r->saddle) == PW_OK ? pw_rank_independence (r) : 0;
+}
+
+/* 1 if t is the time reached, up to round-off.  No step is made to such a time, since methods divide by its length:
+ * between discontinuities that are meant to coincide, at 0.3 and 0.1 + 0.2. */
+static int run_is_at (const pw_run *r, double t) {
+  return t - r->t <= 8 * DBL_EPSILON * fmax (fabs (r->t), r->w->scale.time);
 }
 
 /* If an evaluation fails at the next time, SUNDIALS repeats steps below the round-off of time endlessly. */
@@ -149,7 +158,12 @@ int pw_run_advance (pw_run *r, double t_end, pw_error *error) {
   if (r->stalled == 0) r->w->failed = NULL; /* otherwise it is the signal that stops the run */
   if (r->t >= r->breakpoint || r->interrupted) status = run_restart_method (r, error);
   r->interrupted = 0;
-  if (status == PW_OK && r->redundant && r->independence < r->reselect_below) status = run_reselect (r, error);
+  if (status == PW_OK) status = run_reselect (r, error);
+  const double stop = fmin (t_end, r->breakpoint);
+  if (status == PW_OK && run_is_at (r, stop)) {
+    r->t = stop;
+    return run_check_progress (r, before, error);
+  }
   if (status == PW_OK) status = r->method->advance (r, t_end, error);
   if (status == PW_STOPPED) return status;
   if (status == PW_OK) status = pw_run_watchdog (r, error);
@@ -157,8 +171,7 @@ int pw_run_advance (pw_run *r, double t_end, pw_error *error) {
   if (status == PW_OK) pw_ledger_note (r);
   if (status == PW_OK) status = run_check_progress (r, before, error);
   if (status != PW_OK) return pw_run_annotate_error (r, status, error);
-  if (r->redundant == 0) return PW_OK;
-  r->independence = pw_saddle_factor (r->saddle) == PW_OK ? pw_rank_independence (r) : 0;
+  run_check_rows (r);
   return PW_OK;
 }
 
@@ -184,8 +197,10 @@ int pw_run_sample (pw_run *r, double t, pw_sample *sample, pw_error *error) {
   if (isnan (t)) return pw_fail (error, PW_INPUT, "t = nan: expected a time inside the last step");
   r->stopped = 0;
   if (t < r->t && pw_run_stop_requested (r)) return PW_STOPPED;
-  r->t_at = t;
-  int status = r->method->at (r, t, error);
+  const pw_source *failed = r->w->failed;
+  r->w->failed = NULL;
+  int status = pw_run_annotate_error (r, r->method->at (r, t, error), error);
+  r->w->failed = failed;
   if (status != PW_OK) return status;
   *sample = (pw_sample){ .t = t, .q = r->q_at, .v = r->v_at, .a = r->a_at, .lambda = r->lambda_at };
   if (r->redundant && pw_saddle_factor (r->saddle) == PW_OK) pw_rank_least_norm (r, r->lambda_at);
@@ -219,6 +234,14 @@ static void run_exchange (pw_run *r, const double *q, const double *v) {
   memcpy (r->v, other + n, bytes);
 }
 
+/* Rows that are independent at the state reached. */
+static int run_select (pw_run *r, pw_error *error) {
+  if (r->redundant == 0) return PW_OK;
+  if (pw_evaluate_J_at (r->w, r->t, r->q, r->v) != PW_OK) return pw_fail_signal (r->t, error);
+  run_check_rows (r);
+  return run_reselect (r, error);
+}
+
 static int run_energy (pw_run *r, double *energy, pw_error *error) {
   if (pw_update_kinematics (r->w, r->t, r->q, r->v) != PW_OK) return pw_fail_signal (r->t, error);
   *energy = pw_kinetic (r->s, r->v) + pw_potential (r->w);
@@ -235,11 +258,13 @@ int pw_run_restart (pw_run *r, const double *q, const double *v, pw_error *error
   int status = run_energy (r, &before, error);
   if (status == PW_OK) status = pw_run_look_ahead (r, error);
   if (status != PW_OK) return status;
+  const double below = r->reselect_below;
   r->w->t_signal = NAN;
   run_exchange (r, q, v);
   r->near_singular = 0;
   r->geometry.alert = 1;
-  status = pw_run_make_consistent (r, NULL, error);
+  status = run_select (r, error);
+  if (status == PW_OK) status = pw_run_make_consistent (r, NULL, error);
   if (status == PW_OK) status = pw_run_evaluate (r, error);
   if (status == PW_OK) status = run_energy (r, &after, error);
   if (status == PW_OK) {
@@ -251,7 +276,8 @@ int pw_run_restart (pw_run *r, const double *q, const double *v, pw_error *error
     return r->method->restart (r, error);
   }
   memcpy (r->q, r->q_at, pw_state_length (r->s) * sizeof *r->q);
-  pw_run_evaluate (r, NULL);
+  r->reselect_below = below;
+  if (run_select (r, NULL) == PW_OK) pw_run_evaluate (r, NULL);
   return status;
 }
 

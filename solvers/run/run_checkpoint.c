@@ -6,6 +6,7 @@
 #include <math.h>
 #include "method.h"
 #include "rank.h"
+#include "util.h"
 
 /* 1 if the archive is from a run of these sizes. */
 static int checkpoint_sizes (pw_run *r, pw_archive *a) {
@@ -45,8 +46,7 @@ static void checkpoint_state (pw_run *r, pw_archive *a) {
 
 /* A file may be intact and yet not have been written by a run. */
 static int checkpoint_plausible (const pw_run *r) {
-  const pw_statistics *s = &r->statistics;
-  int good = isfinite (r->t) && r->t >= 0 && s->steps >= 0 && s->rejected >= 0 && s->rhs >= 0;
+  int good = isfinite (r->t) && r->t >= r->settings.t;
   for (int i = 0; i < r->s->coords; i++) good &= isfinite (r->q[i]) && isfinite (r->v[i]);
   return good;
 }
@@ -64,6 +64,7 @@ static int checkpoint_continue (pw_run *r, pw_archive *a, pw_error *error) {
 
 int pw_run_save (pw_run *r, pw_archive *a, pw_error *error) {
   pw_sample sample;
+  if (pw_require (r, "a run", error) != PW_OK) return PW_INPUT;
   if (r->near_singular) return PW_RETRY;
   int status = pw_run_sample (r, r->t, &sample, error); /* some methods evaluate the state reached only here */
   if (status != PW_OK) return status;
@@ -78,6 +79,7 @@ int pw_run_save (pw_run *r, pw_archive *a, pw_error *error) {
 }
 
 int pw_run_load (pw_run *r, pw_archive *a, pw_error *error) {
+  if (pw_require (r, "a run", error) != PW_OK) return PW_INPUT;
   int good = checkpoint_sizes (r, a);
   if (good) checkpoint_state (r, a);
   if (!good || a->failed) return pw_fail (error, PW_INPUT, "the saved state is not of this run");

@@ -35,7 +35,7 @@ static int run_settings (pw_settings *to, const pw_settings *from, const pw_meth
   return PW_OK;
 }
 
-static int run_step (const pw_settings *x, pw_error *error) {
+static int run_check_step (const pw_settings *x, pw_error *error) {
   double end = fabs (x->t) + x->span;
   if (x->step * RUN_MOST_STEPS >= end) return PW_OK;
   return pw_fail (error, PW_INPUT, "setting step = %g: expected at least %g for a run to t = %g", x->step,
@@ -120,7 +120,7 @@ static int run_first_evaluation (pw_run *r, pw_error *error) {
   return status;
 }
 
-/* Initialises energies, ledger and statistics at the consistent state. */
+/* Initialises energies, ledger and statistics at the consistent state, and finds the first discontinuity. */
 static int run_begin (pw_run *r, pw_error *error) {
   pw_run_set_reference_level (r);
   pw_ledger_begin (r);
@@ -154,9 +154,7 @@ static int run_check_derivatives (pw_run *r, const char *method, pw_error *error
   if (!r->differentiates) return PW_OK;
   int found = pw_find_missing_block (r->w, r->t, r->q, r->v, block, sizeof block);
   if (found == PW_RESOURCE) return pw_fail_memory (r->s, error);
-  if (found == 0)
-    return pw_update_kinematics (r->w, r->t, r->q, r->v) == PW_OK ? PW_OK
-                                                                  : pw_fail (error, PW_METHOD, "a signal failed");
+  if (found == 0) return pw_update_kinematics (r->w, r->t, r->q, r->v) == PW_OK ? PW_OK : pw_fail_signal (r->t, error);
   return pw_fail (
       error, PW_INPUT,
       "model %s: %s is left out, but it is not zero, and %s needs it: add it, or PW_BY_DIFFERENCES in its place",
@@ -174,9 +172,9 @@ static int run_open (pw_run *r, const char *method, const pw_settings *settings,
     return PW_INPUT;
   pw_choose_steps (r);
   int status = run_settings (&r->settings, settings, r->method, error);
-  if (status == PW_OK && !pw_method_adaptive (r->method, method)) status = run_step (&r->settings, error);
+  if (status == PW_OK && pw_fixed_steps (r)) status = run_check_step (&r->settings, error);
   if (status != PW_OK) return status;
-  r->t = r->t_at = r->settings.t;
+  r->t = r->settings.t;
   pw_hold_signals (r->w, 0);
   r->w->scale.time = r->settings.span;
   status = pw_run_make_consistent (r, r->origin, error);

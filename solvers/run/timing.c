@@ -197,7 +197,7 @@ static int profile_allocate (profile *p, pw_error *error) {
                              { &p->f, n },     { &p->y, n },        { &p->gamma, rows }, { &p->eta, rows },
                              { &p->jv, rows }, { &p->lambda, rows } };
   p->memory = pw_alloc_arrays (array, sizeof array / sizeof *array);
-  return p->memory ? PW_OK : pw_fail (error, PW_RESOURCE, "out of memory");
+  return p->memory ? PW_OK : pw_fail_memory (p->s, error);
 }
 
 static int profile_open (profile *p, pw_error *error) {
@@ -216,9 +216,11 @@ static int profile_open (profile *p, pw_error *error) {
 }
 
 int pw_run_profile (pw_run *r, pw_profile *x, pw_error *error) {
+  *x = (pw_profile){ .kinds = 0 };
+  if (pw_require (r, "a run", error) != PW_OK) return PW_INPUT;
   profile p = { .r = r, .s = r->s, .done = r->statistics };
-  *x = (pw_profile){ .kind = calloc ((size_t)r->s->batches + 1, sizeof *x->kind) };
-  int status = x->kind ? profile_open (&p, error) : pw_fail (error, PW_RESOURCE, "out of memory");
+  x->kind = calloc ((size_t)r->s->batches + 1, sizeof *x->kind);
+  int status = x->kind ? profile_open (&p, error) : pw_fail_memory (r->s, error);
   if (status == PW_OK) status = pw_run_accelerate (r, p.t, p.q, p.v, p.a, p.lambda) == PW_OK ? PW_OK : PW_RETRY;
   if (status == PW_OK) profile_measure (&p, x);
   r->statistics = p.done;

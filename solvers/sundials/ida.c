@@ -2,7 +2,6 @@
  *
  * The Newton matrix is exact and sparse, factorised by KLU.  The error test excludes lambda and mu but no velocities,
  * not even those of massless coordinates.  In si1 it includes all unknowns. */
-#include <float.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -85,13 +84,12 @@ static void ida_read (const ida_data *d, double *q, double *v, double *a, double
  * configurations.  Returns an IDA flag. */
 static int ida_interpolate (ida_data *d, double t) {
   pw_run *r = d->sun.run;
-  int flag = t > r->t ? IDA_BAD_T : IDA_SUCCESS;
-  if (t == d->sun.t0 && t == r->t)
-    ida_fill_vectors (d);
-  else {
-    if (flag == IDA_SUCCESS) flag = IDAGetDky (d->memory, t, 1, d->yp);
-    if (flag == IDA_SUCCESS) flag = IDAGetDky (d->memory, t, 0, d->sun.y);
-  }
+  long steps = 0;
+  int flag = IDAGetNumSteps (d->memory, &steps);
+  if (flag == IDA_SUCCESS && (steps == 0 ? t != r->t : t > r->t)) flag = IDA_BAD_T;
+  if (steps == 0) ida_fill_vectors (d);
+  if (flag == IDA_SUCCESS && steps > 0) flag = IDAGetDky (d->memory, t, 1, d->yp);
+  if (flag == IDA_SUCCESS && steps > 0) flag = IDAGetDky (d->memory, t, 0, d->sun.y);
   if (flag != IDA_SUCCESS) return flag;
   ida_read (d, r->q_at, r->v_at, r->a_at, r->lambda_at);
   if (pw_ida_update (d, t, N_VGetArrayPointer (d->sun.y)) != 0) return IDA_RES_FAIL;
@@ -180,7 +178,8 @@ static int ida_open (pw_run *r, pw_error *error) {
   if (ida_open_vectors (d, r) != PW_OK || pw_ida_open_matrix (d) != PW_OK || ida_open_solver (d) != PW_OK ||
       pw_quadrature_open (&d->sun.quadrature, r, ida_power) != PW_OK)
     return pw_sun_no_memory (r, error);
-  if (r->statistics.steps == 0) d->sun.before = (pw_statistics){ 0 };
+  if (r->statistics.steps == 0)
+    d->sun.before = (pw_statistics){ 0 }; /* without evaluations of the initial conditions */
   return PW_OK;
 }
 
@@ -229,15 +228,6 @@ static int ida_restart (pw_run *r, pw_error *error) {
   return flag == IDA_SUCCESS ? PW_OK : pw_sun_fail_restart (&d->sun, flag, error);
 }
 
-/* IDA refuses to start within round-off of its stop time: moves the time there without a step. */
-static int ida_skip (pw_run *r, double stop, pw_error *error) {
-  r->t = stop;
-  r->statistics.steps++;
-  if (pw_ida_update (r->data, stop, N_VGetArrayPointer (r->data->sun.y)) != 0)
-    return ida_fail (r->data, IDA_RES_FAIL, error);
-  return ida_restart (r, error);
-}
-
 /* Reads the current state from y and updates the ledger.  IDA's multipliers are accurate if it solves J v = eta.  On
  * acceleration level, only the Newton iteration determines those of prescribed motions, and they may drift without
  * effect on the motion: there they are recomputed.  PW_METHOD if a signal failed. */
@@ -256,7 +246,6 @@ static int ida_reach (ida_data *d) {
 static int ida_advance (pw_run *r, double t_end, pw_error *error) {
   ida_data *d = r->data;
   double stop = fmin (t_end, r->breakpoint), t = r->t;
-  if (t == d->sun.t0 && stop - t <= 8 * DBL_EPSILON * fabs (t)) return ida_skip (r, stop, error);
   int flag = stop != d->sun.stop ? IDASetStopTime (d->memory, stop) : IDA_SUCCESS;
   d->sun.stop = stop;
   if (flag >= 0) flag = IDASolve (d->memory, stop, &t, d->sun.y, d->yp, IDA_ONE_STEP);

@@ -85,13 +85,14 @@ static int multistep_correct (pw_real t, N_Vector vy, N_Vector change, pw_real e
  * multipliers. */
 static int multistep_complete (multistep_data *d, double t) {
   pw_run *r = d->sun.run;
-  int status = PW_OK;
+  int status = PW_OK, near = r->near_singular;
   pw_statistics keep = r->statistics;
   r->refuse = 0;
   if (d->projects) status = multistep_project (d, t, r->q_at, r->v_at);
   if (status == PW_OK) status = pw_run_accelerate (r, t, r->q_at, r->v_at, r->a_at, r->lambda_at);
   r->refuse = r->limits.rank;
   r->statistics = keep;
+  r->near_singular = near;
   return status;
 }
 
@@ -107,9 +108,8 @@ static int multistep_interpolate (multistep_data *d, double t) {
 }
 
 static int multistep_power (pw_run *r, double t, double *rate) {
-  int near = r->near_singular, status = multistep_interpolate (r->data, t) == CV_SUCCESS ? PW_OK : PW_RETRY;
+  int status = multistep_interpolate (r->data, t) == CV_SUCCESS ? PW_OK : PW_RETRY;
   if (status == PW_OK) status = multistep_complete (r->data, t);
-  r->near_singular = near;
   if (status == PW_OK) pw_ledger_rates (r, r->lambda_at, rate);
   return status;
 }
@@ -239,12 +239,12 @@ static int multistep_reach (multistep_data *d, double t, pw_error *error) {
   memcpy (r->a, d->a, (size_t)d->n * sizeof *y);
   memcpy (r->lambda, d->lambda, (size_t)r->s->rows * sizeof *y);
   r->t = t;
-  pw_forget_residuals (r);
   d->evaluated = 0;
   if (pw_evaluate_J_at (r->w, pw_before_breakpoint (r, t), r->q, r->v) != PW_OK)
     return multistep_fail (d, CV_RHSFUNC_FAIL, error);
   pw_bound_tolerances (r);
   if (r->s->entries > 0 && multistep_work (d) != PW_OK) return multistep_fail (d, CV_RHSFUNC_FAIL, error);
+  pw_forget_residuals (r); /* those of projections before and inside the step */
   return PW_OK;
 }
 

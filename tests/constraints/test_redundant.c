@@ -267,6 +267,35 @@ static void test_moments (void **state) {
   pw_system_free (s);
 }
 
+/* Two bodies with two common pins: the redundant equation is the one along the line between them. */
+static void redundant_two_pins (pw_model *m, const void *parameter) {
+  static const char *const name[] = { "one", "two" };
+  (void)parameter;
+  for (int i = 0; i < 2; i++)
+    pw_add_body (m, &(pw_body){ .name = name[i], .mass = 1, .inertia = 0.1, .rate = { 0, 0, 1 } });
+  for (int i = 0; i < 2; i++)
+    pw_add_pin (m, &(pw_pin){ .name = i ? "Q" : "P", .body = { "one", "two" }, .at = { { i, 0 }, { i, 0 } } });
+}
+
+/* After a restart with this line turned by 90 degrees other equations are independent. */
+static void test_restart (void **state) {
+  static const pw_plugin_table pins = TRIAL_TABLE (redundant_two_pins);
+  static const double turned[] = { 0, 0, PW_PI / 2, 0, 0, PW_PI / 2 };
+  (void)state;
+  char method[40];
+  pw_system *s = scene_system (&pins, NULL);
+  for (int i = 0; runs_method (i, method); i++) {
+    pw_error error = { 0 };
+    pw_run *r = runs_open (s, method, &(pw_settings){ .step = 0.01, .rtol = 1e-6 });
+    runs_to (r, 0.1);
+    check_ok (pw_run_restart (r, turned, NULL, &error), &error);
+    check_close (method, runs_to (r, 1).q[2], PW_PI / 2 + 0.9, 1e-5, "10 rtol");
+    assert_int_equal (pw_run_redundant (r), 1);
+    pw_run_close (r);
+  }
+  pw_system_free (s);
+}
+
 int main (void) {
   const struct CMUnitTest tests[] = {
     cmocka_unit_test (test_parallelogram_twins),
@@ -278,6 +307,7 @@ int main (void) {
     cmocka_unit_test (test_names),
     cmocka_unit_test (test_kept),
     cmocka_unit_test (test_moments),
+    cmocka_unit_test (test_restart),
   };
   return cmocka_run_group_tests (tests, NULL, NULL);
 }

@@ -174,7 +174,7 @@ static void test_domains (void **state) {
     { PW_COUNT, 1, "" },
     { PW_COUNT, 0, "a whole number >= 1" },
     { PW_COUNT, 2.5, "a whole number >= 1" },
-    { PW_COUNT, 1e10, "a whole number >= 1" },
+    { PW_COUNT, 1e10, "a whole number up to 1e9" },
     { PW_FRACTION, 0, "" },
     { PW_FRACTION, 1, "" },
     { PW_FRACTION, 1.001, "a number from 0 to 1" },

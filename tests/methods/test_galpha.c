@@ -189,14 +189,14 @@ static double galpha_breakpoint (void *context, double t) {
   return t < 1. / 3 ? 1. / 3 : INFINITY;
 }
 
-static void galpha_switched_run (const char *method, pw_settings settings, double *state, double *lambda) {
+static void galpha_switched_run (const char *method, pw_settings settings, double t, double *state, double *lambda) {
   pw_error error = { 0 };
   pw_signal torque = { PW_FUNCTION, .function = { .eval = galpha_switched, .breakpoint = galpha_breakpoint } };
   pw_model *m = scene_model (&scene_ezyroller, NULL);
   check_ok (pw_model_set_signal (m, "rider", "value", &torque, &error), &error);
   pw_system *s = scene_compile (m);
   pw_run *r = runs_open (s, method, &settings);
-  pw_sample x = runs_to (r, 0.5);
+  pw_sample x = runs_to (r, t);
   memcpy (state, x.q, 6 * sizeof *state);
   memcpy (state + 6, x.v, 6 * sizeof *state);
   memcpy (lambda, x.lambda, 4 * sizeof *lambda);
@@ -208,18 +208,49 @@ static void test_breakpoint (void **state) {
   static const char *const method[] = { "galpha+index3", "galpha+ggl", "leapfrog" };
   (void)state;
   double x[12], l[4];
-  galpha_switched_run ("erk8+projection", (pw_settings){ .rtol = 1e-12, .span = 1 }, x, l);
+  galpha_switched_run ("erk8+projection", (pw_settings){ .rtol = 1e-12, .span = 1 }, 0.5, x, l);
   for (int i = 0; i < 3; i++) {
     double off[2] = { 0 }, force[2] = { 0 };
     for (int k = 0; k < 2; k++) {
       double y[12], m[4];
-      galpha_switched_run (method[i], (pw_settings){ .step = k ? 0.005 : 0.02, .span = 1 }, y, m);
+      galpha_switched_run (method[i], (pw_settings){ .step = k ? 0.005 : 0.02, .span = 1 }, 0.5, y, m);
       for (int j = 0; j < 12; j++) off[k] = fmax (off[k], fabs (y[j] - x[j]));
       for (int j = 0; j < 4; j++) force[k] = fmax (force[k], fabs (m[j] - l[j]));
     }
     check_below ("states", off[1], off[0] / 10, "order 2 has 1/16");
     check_below ("multipliers", force[1], force[0] / 10, "order 2 has 1/16");
   }
+}
+
+/* A pendulum whose torque jumps: the multipliers have order 2 from the first step after the jump on. */
+static void galpha_pushed (pw_model *m, const void *parameters) {
+  (void)parameters;
+  pw_add_body (m, &(pw_body){ .name = "arm", .mass = 1, .inertia = 0.5, .start = { 0.5 } });
+  pw_add_pin (m, &(pw_pin){ .name = "pivot", .body = { "arm", "ground" }, .at = { { -0.5, 0 }, { 0, 0 } } });
+  pw_add_gravity (m, &(pw_gravity){ .name = "g", .acceleration = { 0, -9.81 } });
+  pw_add_torque (m, &(pw_torque){ .name = "push",
+                                  .body = { "arm", "ground" },
+                                  .value = { PW_PULSE, .pulse = { .height = 3, .start = 1. / 3 } } });
+}
+
+static void test_restart (void **state) {
+  static const pw_plugin_table table = { .abi = PW_ABI, .size = sizeof (pw_plugin_table), .build = galpha_pushed };
+  (void)state;
+  pw_system *s = scene_system (&table, NULL);
+  for (int i = 0; i < 2; i++) {
+    const char *method = i ? "galpha+ggl" : "galpha+index3";
+    double off[2] = { 0 };
+    for (int k = 0; k < 2; k++) {
+      double h = k ? 0.0025 : 0.01, t = 1. / 3 + 3 * h;
+      pw_run *r = runs_open (s, method, &(pw_settings){ .step = h, .span = 1 });
+      pw_run *exact = runs_open (s, "erk8+projection", &(pw_settings){ .rtol = 1e-12, .span = 1 });
+      pw_sample x = runs_to (r, t), y = runs_to (exact, t);
+      for (int j = 0; j < 2; j++) off[k] = fmax (off[k], fabs (x.lambda[j] - y.lambda[j]));
+      pw_run_close (r), pw_run_close (exact);
+    }
+    check_below (method, off[1], off[0] / 10, "order 2 has 1/16, order 1 has 1/4");
+  }
+  pw_system_free (s);
 }
 
 /* ---- Damping ---- */
@@ -288,10 +319,10 @@ static void test_no_overshoot (void **state) {
 
 int main (void) {
   const struct CMUnitTest tests[] = {
-    cmocka_unit_test (test_order),        cmocka_unit_test (test_start),       cmocka_unit_test (test_cut),
-    cmocka_unit_test (test_residuals),    cmocka_unit_test (test_small_steps), cmocka_unit_test (test_large_steps),
-    cmocka_unit_test (test_condition),    cmocka_unit_test (test_samples),     cmocka_unit_test (test_breakpoint),
-    cmocka_unit_test (test_no_overshoot), cmocka_unit_test (test_damping),
+    cmocka_unit_test (test_order),     cmocka_unit_test (test_start),        cmocka_unit_test (test_cut),
+    cmocka_unit_test (test_residuals), cmocka_unit_test (test_small_steps),  cmocka_unit_test (test_large_steps),
+    cmocka_unit_test (test_condition), cmocka_unit_test (test_samples),      cmocka_unit_test (test_breakpoint),
+    cmocka_unit_test (test_restart),   cmocka_unit_test (test_no_overshoot), cmocka_unit_test (test_damping),
   };
   return cmocka_run_group_tests (tests, NULL, NULL);
 }

@@ -99,6 +99,7 @@ static void test_refused (void **state) {
   methods_refused ("rk4+projection:metric=masses", "method option metric cannot be \"masses\"; did you mean \"mass\"?");
   methods_refused ("rk4+projection:every", "method option \"every\": expected NAME=VALUE");
   methods_refused ("rk4+projection:every=0", "method option every=0: expected a whole number >= 1");
+  methods_refused ("rk4+projection:every=2e9", "method option every=2e9: expected a whole number up to 1e9");
   methods_refused ("rk4+projection:every=2.5", "method option every=2.5: expected a whole number >= 1");
   methods_refused ("rk4+baumgarte:alpha=-1", "method option alpha=-1: expected a number >= 0");
   methods_refused ("rk4+baumgarte:alpha=", "method option alpha=: expected a number");

@@ -4,6 +4,7 @@
 #include <stdio.h>
 #include "check.h"
 #include "ladder.h"
+#include "method.h"
 #include "scene.h"
 #include "system.h"
 
@@ -173,11 +174,32 @@ static void test_options (void **state) {
   check_below ("identity metric", identity.cost.position, 32 * CHECK_EPS, "round-off");
 }
 
+/* Samples inside a step, some of them near singular configurations, change nothing in the run. */
+static void test_sampled (void **state) {
+  static const char *const method[] = { "adams", "bdf", "bdf+projection" };
+  (void)state;
+  for (int i = 0; i < 3; i++) {
+    pw_error error = { 0 };
+    pw_sample x;
+    pw_system *s = ladder_open ("n-four-bar");
+    pw_run *r = runs_open (s, method[i], &(pw_settings){ .rtol = 1e-4, .span = 2.5 });
+    for (double before = 0; pw_run_time (r) < 2.5; before = pw_run_time (r)) {
+      check_ok (pw_run_advance (r, 2.5, &error), &error);
+      int near = r->near_singular;
+      for (int k = 1; k < 10; k++)
+        check_ok (pw_run_sample (r, before + k * (pw_run_time (r) - before) / 10, &x, &error), &error);
+      assert_int_equal (r->near_singular, near);
+    }
+    pw_run_close (r);
+    pw_system_free (s);
+  }
+}
+
 int main (void) {
   const struct CMUnitTest tests[] = {
     cmocka_unit_test (test_tolerances),  cmocka_unit_test (test_orders),  cmocka_unit_test (test_residuals),
     cmocka_unit_test (test_multipliers), cmocka_unit_test (test_stiff),   cmocka_unit_test (test_cost),
-    cmocka_unit_test (test_lifted),      cmocka_unit_test (test_options),
+    cmocka_unit_test (test_lifted),      cmocka_unit_test (test_options), cmocka_unit_test (test_sampled),
   };
   return cmocka_run_group_tests (tests, NULL, NULL);
 }

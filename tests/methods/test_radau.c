@@ -59,6 +59,20 @@ static void test_order_index3 (void **state) {
   }
 }
 
+/* With step-size control: small steps after a turn correct positions that Newton's iteration has left within its
+ * tolerance, by velocities of that size over the step. */
+static void test_small_steps_index3 (void **state) {
+  double q[2][3 * 8], v[3 * 8];
+  (void)state;
+  pw_system *s = ladder_open ("n-four-bar");
+  int n = pw_system_coordinates (s);
+  assert_true (n <= 3 * 8);
+  runs_state (s, "erk8+projection", &(pw_settings){ .rtol = 1e-12, .span = 1 }, 1, q[0], v, NULL);
+  runs_state (s, "radau+index3", &(pw_settings){ .rtol = 1e-8, .span = 1 }, 1, q[1], v, NULL);
+  for (int j = 0; j < n; j++) check_close ("n-four-bar", q[1][j], q[0][j], 1e-4, "1e4 rtol");
+  pw_system_free (s);
+}
+
 /* Constraints enforced by each form. */
 static void test_residuals (void **state) {
   (void)state;
@@ -285,10 +299,10 @@ static void test_large_steps (void **state) {
 
 int main (void) {
   const struct CMUnitTest tests[] = {
-    cmocka_unit_test (test_order),   cmocka_unit_test (test_order_index3),       cmocka_unit_test (test_residuals),
-    cmocka_unit_test (test_digits),  cmocka_unit_test (test_tolerances),         cmocka_unit_test (test_switched),
-    cmocka_unit_test (test_damping), cmocka_unit_test (test_unresolved_samples), cmocka_unit_test (test_pulled),
-    cmocka_unit_test (test_samples), cmocka_unit_test (test_large_steps),
+    cmocka_unit_test (test_order),     cmocka_unit_test (test_order_index3), cmocka_unit_test (test_small_steps_index3),
+    cmocka_unit_test (test_residuals), cmocka_unit_test (test_digits),       cmocka_unit_test (test_tolerances),
+    cmocka_unit_test (test_switched),  cmocka_unit_test (test_damping),      cmocka_unit_test (test_unresolved_samples),
+    cmocka_unit_test (test_pulled),    cmocka_unit_test (test_samples),      cmocka_unit_test (test_large_steps),
   };
   return cmocka_run_group_tests (tests, NULL, NULL);
 }

@@ -7,6 +7,7 @@
 #include "check.h"
 #include "pinwheel-files.h"
 #include "runs.h"
+#include "scene.h"
 
 static const struct {
   const char *scene, *parameter;
@@ -261,10 +262,96 @@ static void test_ledger (void **state) {
   }
 }
 
+/* Times may be negative. */
+static void test_negative (void **state) {
+  (void)state;
+  char name[40];
+  pw_system *s = saved_system (0);
+  int n = pw_system_coordinates (s);
+  for (int i = 0; runs_method (i, name); i++) {
+    pw_error error = { 0 };
+    pw_archive archive = { .at = NULL };
+    double q[6];
+    const pw_settings settings = { .t = -2, .step = 0.01, .rtol = 1e-6, .span = 3 };
+    pw_run *r = runs_open (s, name, &settings);
+    runs_to (r, -1);
+    check_ok (pw_run_save (r, &archive, &error), &error);
+    memcpy (q, runs_to (r, 1).q, sizeof q);
+    pw_run_close (r);
+    r = runs_open (s, name, &settings);
+    pw_archive from = { .at = archive.at, .size = archive.used, .loading = 1 };
+    check_ok (pw_run_load (r, &from, &error), &error);
+    check_bits (name, runs_to (r, 1).q, q, n);
+    pw_run_close (r);
+    pw_archive_free (&archive);
+  }
+  pw_system_free (s);
+}
+
+/* ---- A signal that fails once, while a run is saved ---- */
+
+static int saved_calls, saved_failing; /* evaluations of the signal; the one that fails */
+
+static int saved_torque (void *context, double t, const double *x, double value[3], double *gradient) {
+  (void)context, (void)t;
+  value[0] = ++saved_calls == saved_failing ? NAN : 0.1 - 0.2 * x[0];
+  if (gradient) gradient[0] = -0.2;
+  return 0;
+}
+
+static void saved_build (pw_model *m, const void *parameters) {
+  static const char *const reads[] = { "arm.omega", NULL };
+  (void)parameters;
+  pw_add_body (m, &(pw_body){ .name = "arm", .mass = 1, .inertia = 0.5, .start = { 0.5 } });
+  pw_add_pin (m, &(pw_pin){ .name = "pivot", .body = { "arm", "ground" }, .at = { { -0.5, 0 }, { 0, 0 } } });
+  pw_add_torque (m, &(pw_torque){ .name = "M",
+                                  .body = { "arm", "ground" },
+                                  .value = { PW_FUNCTION, .function = { .eval = saved_torque, .reads = reads } } });
+}
+
+/* The run stays where it was, and continues; if the method has been opened again, samples begin there. */
+static void saved_fail (pw_system *s, const char *method, double phi) {
+  pw_sample x;
+  int reopened = 0;
+  for (saved_failing = 1; saved_failing <= 4; saved_failing++) {
+    pw_error error = { 0 };
+    pw_archive archive = { .at = NULL };
+    saved_calls = 10;
+    pw_run *r = runs_open (s, method, &(pw_settings){ .step = 1e-3, .rtol = 1e-6 });
+    check_ok (pw_run_advance_to (r, 0.5, 1, &error), &error);
+    check_ok (pw_run_sample (r, pw_run_time (r), &x, &error), &error);
+    saved_calls = 0;
+    int failed = pw_run_save (r, &archive, &error) == PW_METHOD;
+    saved_calls = 10;
+    error = (pw_error){ 0 };
+    check_ok (pw_run_sample (r, pw_run_time (r), &x, &error), &error);
+    int inside = pw_run_sample (r, pw_run_time (r) - 1e-6, &x, &error);
+    reopened += failed && inside == PW_INPUT;
+    if (inside != PW_OK) assert_non_null (strstr (error.text, "lies outside the last step"));
+    check_close (method, runs_to (r, 1).q[2], phi, 1e-4, "100 rtol");
+    pw_run_close (r);
+    pw_archive_free (&archive);
+  }
+  assert_true (reopened > 0);
+}
+
+static void test_failing (void **state) {
+  static const pw_plugin_table table = { .abi = PW_ABI, .size = sizeof (pw_plugin_table), .build = saved_build };
+  (void)state;
+  char name[40];
+  double q[3], v[3];
+  pw_system *s = scene_system (&table, NULL);
+  saved_failing = 0;
+  runs_state (s, "erk8+projection", &(pw_settings){ .rtol = 1e-10 }, 1, q, v, NULL);
+  for (int i = 0; runs_method (i, name); i++) saved_fail (s, name, q[2]);
+  pw_system_free (s);
+}
+
 int main (void) {
   const struct CMUnitTest tests[] = {
-    cmocka_unit_test (test_same),   cmocka_unit_test (test_options), cmocka_unit_test (test_other),
-    cmocka_unit_test (test_kicked), cmocka_unit_test (test_counts),  cmocka_unit_test (test_ledger),
+    cmocka_unit_test (test_same),     cmocka_unit_test (test_options), cmocka_unit_test (test_other),
+    cmocka_unit_test (test_kicked),   cmocka_unit_test (test_counts),  cmocka_unit_test (test_ledger),
+    cmocka_unit_test (test_negative), cmocka_unit_test (test_failing),
   };
   return cmocka_run_group_tests (tests, saved_setup, saved_teardown);
 }

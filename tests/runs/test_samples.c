@@ -181,7 +181,7 @@ static void test_short_end (void **state) {
     long steps = pw_run_statistics (r)->steps;
     assert_true (0.1 * 3 > 0.3);
     runs_to (r, 0.1 * 3);
-    assert_int_equal (pw_run_statistics (r)->steps, steps + 1);
+    assert_int_equal (pw_run_statistics (r)->steps, steps);
     check_ok (pw_run_advance (r, 2, &error), &error);
     check_below ("half of a usual step of erk5", 0.03, pw_run_time (r) - 0.3, "step sizes are unchanged");
     pw_run_close (r);

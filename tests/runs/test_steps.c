@@ -154,6 +154,20 @@ static void test_adjacent_breakpoints (void **state) {
   pw_system_free (s);
 }
 
+/* One pulse ends and another one begins, in motion: both times are meant to be the same but differ in the last digit. */
+static void test_adjacent_in_motion (void **state) {
+  char name[STEPS_NAME];
+  (void)state;
+  pw_system *s = steps_open ((pw_signal){ PW_PULSE, .pulse = { .height = 10, .start = 0.1, .width = 0.2 } },
+                             (pw_signal){ PW_PULSE, .pulse = { .height = -10, .start = 0.3, .width = 0.5 } });
+  for (int i = 0; steps_method (i, name); i++) {
+    pw_run *r = runs_open (s, name, &(pw_settings){ .step = 0.01, .rtol = 1e-6 });
+    check_close (name, runs_to (r, 1).q[2], 10 / 1.1 * (0.02 + 0.1 - 0.125 - 0.06), 1e-3, "1000 rtol; galpha: h^2");
+    pw_run_close (r);
+  }
+  pw_system_free (s);
+}
+
 /* ---- User functions ---- */
 
 static int steps_breaks (void *context, double t, const double *x, double value[3], double *gradient) {
@@ -163,7 +177,7 @@ static int steps_breaks (void *context, double t, const double *x, double value[
   return 0;
 }
 
-/* A function value that is not finite stops the run with the name of the element, and is in no sample. */
+/* A function value that is not finite stops the run, or refuses a sample, with the name of the element. */
 static void test_not_a_number (void **state) {
   char name[STEPS_NAME];
   double until = 0.25;
@@ -176,6 +190,21 @@ static void test_not_a_number (void **state) {
     assert_int_equal (pw_run_advance_to (r, 1, 1, &error), PW_METHOD);
     assert_true (pw_run_time (r) > 0.1 && pw_run_time (r) <= until);
     assert_non_null (strstr (error.text, "torque T: value is not a finite number"));
+    pw_run_close (r);
+  }
+  for (int i = 0; steps_method (i, name); i++) {
+    if (strstr (name, "held")) continue; /* evaluates the signal at the beginning of the step only */
+    pw_error error = { 0 };
+    pw_sample sample;
+    until = 1;
+    pw_run *r = runs_open (s, name, &(pw_settings){ .step = 0.01 });
+    for (int k = 0; k < 3; k++) check_ok (pw_run_advance (r, 1, &error), &error);
+    double t = pw_run_time (r) * (1 - 1e-6);
+    char text[100];
+    snprintf (text, sizeof text, "t = %.6g s: a signal failed: torque T: value is not a finite number", t);
+    until = 0;
+    assert_int_equal (pw_run_sample (r, t, &sample, &error), PW_METHOD);
+    check_error (&error, PW_METHOD, text);
     pw_run_close (r);
   }
   until = -1;
@@ -237,6 +266,7 @@ int main (void) {
     cmocka_unit_test (test_beginning),
     cmocka_unit_test (test_endless),
     cmocka_unit_test (test_adjacent_breakpoints),
+    cmocka_unit_test (test_adjacent_in_motion),
     cmocka_unit_test (test_not_a_number),
     cmocka_unit_test (test_breakpoints_told),
   };

@@ -36,10 +36,9 @@ PER_ELEMENT (drag_force, drag, 3) {
   out[0] = -x.c * x.A->vx, out[1] = -x.c * x.A->vy, out[2] = -x.d * x.A->omega;
 }
 
-/* d(|v| v)/dv = |v| 1 + v v^T / |v|, zero at rest. */
+/* d(|v| v)/dv = |v| 1 + v v^T / |v|, zero at rest; v / |v| is divided, since 1 / |v| may overflow. */
 PER_ELEMENT (drag_force_v, drag, 9) {
-  double ex = x.v > 0 ? x.A->vx / x.v : 0,
-         ey = x.v > 0 ? x.A->vy / x.v : 0; /* direction; not v_x * (1 / v), which may overflow */
+  double ex = x.v > 0 ? x.A->vx / x.v : 0, ey = x.v > 0 ? x.A->vy / x.v : 0;
   memset (out, 0, 9 * sizeof *out);
   out[0] = -x.c - x.k->c2 * x.A->vx * ex;
   out[1] = out[3] = -x.k->c2 * x.A->vx * ey;

@@ -82,8 +82,7 @@ PER_ELEMENT (rod_jw_q, rod, 6) {
   out[5] += rod_dot (x.d, x.S2) * x.w[5] / x.L;
 }
 
-/* dd'/dphi1 = -w1 (X1, Y1), dd'/dphi2 = w2 (X2, Y2); the derivatives of the arms are columns of D, for arm 2 negated.
- * */
+/* dd'/dphi1 = -w1 (X1, Y1), dd'/dphi2 = w2 (X2, Y2); derivatives of the arms are columns of D, for arm 2 negated. */
 PER_ELEMENT (rod_gamma_q, rod, 6) {
   double w1 = x.w1 * x.w1, w2 = x.w2 * x.w2;
   const double turn[2] = { x.S1[0] * w1 - x.S2[0] * w2, x.S1[1] * w1 - x.S2[1] * w2 };
