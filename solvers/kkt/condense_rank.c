@@ -3,6 +3,8 @@
  * Nodes of rank 0 are eliminated before the uncondensed bodies, as if these were at rest; those of rank 2 after them.  The
  * former must be regular wherever the mechanism is.  With a leg between an uncondensed body and the ground, or another
  * uncondensed body, they are not: at rest at both ends, it is singular where it is stretched.  So the nodes at one end have rank 2.
+ * Then multipliers of rank 0 without force on the bodies of a leg exert none on the body at its end either, since joints
+ * exert no resultant force and moment: dependent equations of rank 0 are dependent in the whole mechanism.
  *
  * A leg is a set of bodies joined by nodes that touch neither uncondensed bodies nor the ground. */
 #include <stdlib.h>

@@ -46,14 +46,14 @@ typedef struct {
 } pw_massless_group;
 
 typedef struct {
-  int row;       /* global */
-  int pivot;     /* matched rows: the local column of the coordinate */
-  double size;   /* largest entry when last matched, angles in units of length */
-  double scale;  /* matched rows: factor of the pivot that makes it relative to `size` */
-  double least;  /* matched rows: the pivot, relative to `size`, below which the component is matched again */
-  double terms;  /* unmatched rows: sum of the squares of the entries, and of what is subtracted in massive columns */
-  double gamma;  /* gamma~ */
-  double lambda; /* matched rows: w; then the multiplier */
+  int row;             /* global */
+  int pivot;           /* matched rows: the local column of the coordinate */
+  double size;         /* largest entry when last matched, angles in units of length */
+  double scale;        /* matched rows: factor of the pivot that makes it relative to `size` */
+  double least;        /* matched rows: the pivot, relative to `size`, below which the component is matched again */
+  double terms;        /* unmatched rows: sum of squares: entries, and what is subtracted from the massive ones */
+  double gamma;        /* gamma~ */
+  double lambda;       /* matched rows: w; then the multiplier */
   const double **from; /* groups: its entries in the batch, or zeros */
 } pw_massless_row;
 
