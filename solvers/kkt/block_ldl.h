@@ -110,7 +110,7 @@ typedef struct {
 } pw_plan_node;
 
 /* pair: 2 x pairs node numbers with a block between them, each unordered pair any number of times, the diagonal not
- * needed.  The order is that of the nodes if it fills in no more than minimum degree does (AMD: Amestoy, Davis & Duff
+ * needed, fewer than 2^30.  The order is that of the nodes if it fills in no more than minimum degree does (AMD: Amestoy, Davis & Duff
  * 1996).  NULL if out of memory. */
 pw_block_ldl *pw_block_open (int nodes, const pw_plan_node *node, long pairs, const int *pair);
 void pw_block_close (pw_block_ldl *l);

@@ -1,4 +1,5 @@
 /* Planning of the block L D L^T: the pattern of S, body blocks, uncondensed bodies; see condense.h and block_ldl.h. */
+#include <limits.h>
 #include <stdlib.h>
 #include <string.h>
 #include "condense.h"
@@ -32,7 +33,7 @@ static void condense_pairs (pw_plan *c, int *pair) {
 
 static pw_block_ldl *condense_pattern (pw_plan *c) {
   condense_pairs (c, NULL);
-  int *pair = malloc ((size_t)(2 * c->pairs + 1) * sizeof *pair);
+  int *pair = c->pairs < INT_MAX / 2 ? malloc ((size_t)(2 * c->pairs + 1) * sizeof *pair) : NULL;
   if (pair) condense_pairs (c, pair);
   pw_block_ldl *l = pair ? pw_block_open (c->nodes, c->node, c->pairs, pair) : NULL;
   free (pair);
