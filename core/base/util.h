@@ -1,4 +1,4 @@
-/* Utilities: nearest names, texts, streams into memory, name tables, arenas, layouts. */
+/* Utilities: nearest names, texts, streams into memory, name tables, union-find, arenas, layouts. */
 #ifndef PW_UTIL_H
 #define PW_UTIL_H
 
@@ -75,6 +75,12 @@ int pw_names_find (const pw_names *n, const char *name);     /* -1 if absent */
 
 /* Makes room for one more entry of an array, *(void **)array, of which `count` are in use.  PW_OK or PW_RESOURCE. */
 int pw_grow (void *array, size_t count, size_t *room, size_t size);
+
+/* The root of member i of a union-find structure, in which a root is its own parent; halves the path. */
+static inline int pw_root (int *parent, int i) {
+  while (parent[i] != i) i = parent[i] = parent[parent[i]];
+  return i;
+}
 
 /* Memory that grows and is released as a whole. */
 typedef struct {

@@ -16,6 +16,8 @@
 #include "method.h"
 #include "rank.h"
 
+/* Strides of a walk, and evaluations between the ends of a step, at most; a stride that fails is made longer, up to 1.7^7 = 41
+ * times. */
 enum { CHANGE_STRIDES = 1000, CHANGE_TRIES = 8 };
 
 typedef enum { CHANGE_SAME, CHANGE_OTHER, CHANGE_UNKNOWN } change_verdict;
@@ -153,7 +155,7 @@ static double change_sine_at (pw_run *r, double t, const double *q) {
 /* 1 if the sine is low somewhere on the straight line between the ends of a long step. */
 static int change_low_between (pw_run *r, double length) {
   const pw_geometry *g = &r->geometry;
-  int parts = (int)(length / r->limits.stride) + 1;
+  int parts = (int)fmin (length / r->limits.stride, CHANGE_STRIDES) + 1;
   for (int i = 1; i < parts; i++) {
     double x = (double)i / parts;
     for (int j = 0; j < r->s->coords; j++) r->q_at[j] = g->q[j] + x * (r->q[j] - g->q[j]);

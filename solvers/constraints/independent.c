@@ -43,7 +43,8 @@ static void independent_direction (const pw_system *s, const independent_search 
   for (int j = 0; most > 0 && j < s->coords; j++) x->motion[j] *= s->scale.length / most / pw_as_length (s, j);
 }
 
-/* The rank a short motion away; x->active: the independent rows there.  0 if no such configuration is found. */
+/* The rank a short motion away, of 0.03 L or rad: far enough for sines well above `independent`, near enough for the
+ * projection to converge.  x->active: the independent rows there.  0 if no such configuration is found. */
 static int independent_nearby (pw_run *r, independent_search *x, int rank, int number) {
   const pw_system *s = r->s;
   pw_projector p;

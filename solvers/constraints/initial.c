@@ -12,9 +12,9 @@
 #include "method.h"
 #include "rank.h"
 
-/* Rows times coordinates above which dependent equations are not sought while states specified by the model are
- * prescribed: that usually fails for sketches of linkages, which specify all positions; nor, unless values are given, for
- * the coordinates that are not prescribed. */
+/* Rows times coordinates above which the cost of seeking dependent equations, rows^2 x coordinates, counts.  Then they are not
+ * sought while states specified by the model are prescribed: that usually fails for sketches of linkages, which specify all
+ * positions; nor, unless values are given, for the coordinates that are not prescribed. */
 #define INITIAL_SMALL 1e4
 
 /* Off the constraints dependent equations appear independent, the more the larger the residuals: hence several tolerances. */

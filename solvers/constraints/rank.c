@@ -41,7 +41,8 @@ double pw_rank_orthogonalise (double *row, const double *rows, const int *kept, 
   return sqrt (norm);
 }
 
-/* The next row to keep of rows first .. end - 1: the first whose norm is at least 0.9 of the largest. */
+/* The next row to keep of rows first .. end - 1: the first whose norm is at least 0.9 of the largest, so that equal rows keep
+ * their order whatever their round-off. */
 static int rank_pivot (const double *norm, const unsigned char *active, int first, int end) {
   double most = 0;
   for (int i = first; i < end; i++)

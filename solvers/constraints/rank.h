@@ -7,7 +7,7 @@
 
 struct pw_run;
 
-/* Limit of rows x coordinates for dense matrices. */
+/* Limit of rows x coordinates for dense matrices: 320 MB. */
 #define PW_RANK_MOST 4e7
 
 /* All rows of the evaluated J, dense (rows x coords), as derivatives with respect to lengths, normalised to length 1;
@@ -28,22 +28,21 @@ static inline double pw_irregular (double phase, int n) {
 /* Orthogonalises a row of length n against the `rank` kept ones, of length 1; returns its norm afterwards. */
 double pw_rank_orthogonalise (double *row, const double *rows, const int *kept, int rank, int n);
 
+/* Selects independent equations by Gram-Schmidt on the evaluated J, rows of length 1: active[i] = 1 for one whose part
+ * independent of those kept before exceeds tol.  Holonomic equations come first, since a nonholonomic one must not replace
+ * a holonomic one; of these the most independent ones, in order where they are about equal.  fixed (coords, or NULL): 1 for
+ * coordinates that are left out.  Returns the rank, or PW_RESOURCE. */
+int pw_rank_select (const pw_workspace *w, double tol, const unsigned char *fixed, unsigned char *active);
+
 /* Size of `rows` of pw_rank_basis: rows x coords, and a norm for each row. */
 static inline size_t pw_rank_room (const pw_system *s) {
   return (size_t)s->rows * ((size_t)s->coords + 1) + 1;
 }
 
-/* pw_rank_select for at most `holonomic` holonomic equations and `all` equations.  The selected rows become an
- * orthonormal basis of the range of J^T; `kept`: their indices.  Holonomic equations come first, since a nonholonomic
- * one must not replace a holonomic one. */
+/* The same for at most `holonomic` holonomic equations and `all` equations.  The selected rows become an orthonormal basis
+ * of the range of J^T; `kept`: their indices.  Returns the rank. */
 int pw_rank_basis (const pw_workspace *w, double tol, int holonomic, int all, double *rows, int *kept,
                    unsigned char *active);
-
-/* Rows kept by Gram-Schmidt on the evaluated J, lengths and angles in units of the scene: active[i] = 1 for a row
- * whose part independent of those kept before exceeds tol of it; holonomic equations first, of these the most
- * independent ones, in order where they are about equal.  fixed, or NULL: 1 for coordinates that are left out.  Returns the
- * rank, or PW_RESOURCE. */
-int pw_rank_select (const pw_workspace *w, double tol, const unsigned char *fixed, unsigned char *active);
 
 /* Selects r->active for the run at its consistent initial state: rows dependent there and at up to three configurations
  * nearby. It stays NULL if all equations are independent.  Errors: PW_RESOURCE, PW_INITIAL (the initial configuration

@@ -1,9 +1,9 @@
 /* The watchdog's thresholds, and the distance of the constraints from singular configurations; see watchdog.h. */
 #include <math.h>
 #include <stdlib.h>
-#include "massless.h"
 #include "method.h"
 #include "rank.h"
+#include "util.h"
 
 /* Residuals are scaled, sines are of angles between rows. s: the sine over the largest one; d: the constraint
  * residual.  Where branches cross, the constraints are x y = 0 in suitable coordinates, and s = |(x, y)|; with a

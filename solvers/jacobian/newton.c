@@ -86,13 +86,13 @@ static void newton_J (const pw_workspace *w, pw_scatter_map *t, const pw_placeme
        k++) {
     const double *value = k->J;
     double factor = k->row >= s->holonomic ? put->factor_nonholonomic : put->factor;
-    int turns = newton_is_pin (k->kind);
+    int pin = newton_is_pin (k->kind);
     for (int e = 0; e < k->b.count; e++)
       for (int r = 0; r < k->kind->rows; r++) {
         int i = newton_row (put, k->row + e * k->kind->rows + r);
         for (int c = 0; c < k->b.cols; c++, value++) {
           int j = pw_global (k, e, c);
-          if (j >= s->coords || i < 0 || (turns && newton_is_length (k->kind, c) && c % 3 == 1 - r)) continue;
+          if (j >= s->coords || i < 0 || (pin && newton_is_length (k->kind, c) && c % 3 == 1 - r)) continue;
           if (transposed)
             pw_scatter_add (t, put->row + j, put->col + i, factor * *value * (put->row_scale ? put->row_scale[j] : 1));
           else

@@ -51,7 +51,7 @@ int pw_sparse_factor (pw_sparse *k, double *value) {
   k->factors = k->field->factor (k->colptr, k->rowind, value, k->order, &k->common);
   if (k->factors == NULL) return k->common.status == KLU_OUT_OF_MEMORY ? PW_RESOURCE : PW_INPUT;
   if (!k->field->rcond (k->order, k->factors, &k->common)) return PW_RESOURCE;
-  k->least = 0.01 * k->common.rcond;
+  k->least = 0.01 * k->common.rcond; /* two digits may be lost */
   return k->common.rcond > 0 ? PW_OK : PW_INPUT;
 }
 

@@ -140,7 +140,7 @@ void pw_block_factor (pw_block_ldl *l) {
   l->pivot = INFINITY;
   l->row = -1;
   block_assemble (l);
-  for (int j = 0; j < l->nodes && l->pivot > l->least;)
+  for (int j = 0; j < l->nodes && l->pivot > 0;)
     if (chain->column == j) {
       pw_chain_factor (l, chain);
       j += chain->bodies + chain->whole;

@@ -12,8 +12,8 @@
  *     [ S    J_k ] [ lambda ]   [ J W^-1 f - gamma ]
  *     [ J_k^T -M ] [ -a_k   ] = [ f_k              ]      with S of all other bodies,
  *
- * quasi-definite, so that L D L^T goes without pivoting (Vanderbei 1995), with the nodes of -a_k after its
- * equations, and equations that touch nothing but uncondensed bodies after that.
+ * quasi-definite, so that L D L^T goes without pivoting (Vanderbei 1995), with the nodes of -a_k (rank 1) after the
+ * equations of rank 0 and before those of rank 2 (condense_rank.c).
  *
  * Chains are bodies one after another, each pinned to the one before and the one after.  Nothing else touches the
  * pins inside a chain, so their part of the matrix is block tridiagonal and need not be stored: with a body's arms a
@@ -50,7 +50,7 @@ typedef struct {
   const double *J; /* first row and column */
   int y;           /* of its first row in the right-hand side */
   int D;           /* its node's diagonal block in the values */
-  short step;      /* from row to row of J */
+  int step;        /* from row to row of J */
   short size;      /* rows */
 } pw_contribution;
 
@@ -93,7 +93,6 @@ typedef struct {
   int bodies, chains;
   double pivot; /* smallest pivot of the last factorisation, relative to the diagonal entry it came from */
   int row;      /* its position in the right-hand side */
-  double least; /* factorisation ends at the first pivot not above this: 0, except while planning */
   char *pattern, *memory;
 } pw_block_ldl;
 
@@ -105,12 +104,13 @@ typedef struct {
   int size;               /* unknowns */
   int row;                /* the first global one, or PW_PLAN_SCHUR, PW_PLAN_UNCONDENSED */
   int rank;               /* 0 to PW_BLOCK_RANKS - 1 */
+  int grounded;           /* 1: touches the ground or prescribed coordinates (pw_is_grounded) */
   int y;                  /* their position in the right-hand side */
   double *gamma, *lambda; /* of a Schur row */
 } pw_plan_node;
 
 /* pair: 2 x pairs node numbers with a block between them, each unordered pair any number of times, the diagonal not
- * needed.  The order is that of the nodes if it fills in no more than minimum degree does (AMD: Amestoy, Davis & Duff
+ * needed, fewer than 2^30.  The order is that of the nodes if it fills in no more than minimum degree does (AMD: Amestoy, Davis & Duff
  * 1996).  NULL if out of memory. */
 pw_block_ldl *pw_block_open (int nodes, const pw_plan_node *node, long pairs, const int *pair);
 void pw_block_close (pw_block_ldl *l);
@@ -128,7 +128,7 @@ static inline int pw_block_diagonal (int size) {
 
 /* ---- Numbers ---- */
 
-/* S = J W^-1 J^T = L D L^T; stops at a pivot that is not larger than `least`. */
+/* S = J W^-1 J^T = L D L^T; stops at a pivot that is not positive. */
 void pw_block_factor (pw_block_ldl *l);
 
 /* y, which holds gamma, becomes lambda; a = W^-1 (f - J^T lambda).  f and a may be the same; f NULL: zero. */

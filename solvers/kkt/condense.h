@@ -40,22 +40,22 @@ int pw_condense (struct pw_saddle *k, const double *weight, int rows, const unsi
 
 /* ---- Planning ---- */
 
-/* A node's columns at a body. */
+/* A node's columns at a body or internal coordinate, whose first coordinate is j. */
 typedef struct {
   const double *J;
-  int node, step, j;
-  int is_pin; /* 1: both rows of a pin, whose x and y columns are a multiple of the unit matrix */
+  int node, step, j; /* step: from row to row of J */
+  int is_pin;        /* 1: both rows of a pin, whose x and y columns are a multiple of the unit matrix */
 } pw_plan_contribution;
 
-/* Nodes and contributions; while the arrays are NULL they are only counted. */
+/* Nodes and contributions, those of a node together; while the arrays are NULL they are only counted. */
 typedef struct {
   struct pw_saddle *k;
   const double *weight;
   pw_plan_node *node;
   pw_plan_contribution *contribution;
   int nodes, contributions;
-  int *start, *list; /* contributions by coordinate: list[start[j]] .. list[start[j + 1]] */
-  int groups;        /* bodies, then internal coordinates */
+  int *start, *list; /* contributions by coordinate: list[start[j]] .. list[start[j + 1] - 1] */
+  int groups;        /* number of bodies and internal coordinates */
   int *uncondensed;  /* bodies: first of the two nodes of an uncondensed body, or -1 */
   int uncondenseds;
   pw_chain *chain;
@@ -63,6 +63,9 @@ typedef struct {
   unsigned char *is_linked; /* groups: 1 for a body in a chain */
   long pairs;               /* of nodes with a common coordinate */
 } pw_plan;
+
+/* Ranks the nodes of a scene with uncondensed bodies.  PW_OK or PW_RESOURCE. */
+int pw_condense_rank (pw_plan *c);
 
 /* Makes k->block.  Errors: PW_RESOURCE. */
 int pw_condense_block (pw_plan *c);

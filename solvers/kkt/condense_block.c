@@ -1,4 +1,5 @@
 /* Planning of the block L D L^T: the pattern of S, body blocks, uncondensed bodies; see condense.h and block_ldl.h. */
+#include <limits.h>
 #include <stdlib.h>
 #include <string.h>
 #include "condense.h"
@@ -32,7 +33,7 @@ static void condense_pairs (pw_plan *c, int *pair) {
 
 static pw_block_ldl *condense_pattern (pw_plan *c) {
   condense_pairs (c, NULL);
-  int *pair = malloc ((size_t)(2 * c->pairs + 1) * sizeof *pair);
+  int *pair = c->pairs < INT_MAX / 2 ? malloc ((size_t)(2 * c->pairs + 1) * sizeof *pair) : NULL;
   if (pair) condense_pairs (c, pair);
   pw_block_ldl *l = pair ? pw_block_open (c->nodes, c->node, c->pairs, pair) : NULL;
   free (pair);
@@ -72,7 +73,7 @@ static void condense_body (const pw_plan *c, pw_block_ldl *l, int j, pw_body_blo
     const pw_plan_contribution *a = &c->contribution[c->list[x]];
     const pw_plan_node *n = &c->node[a->node];
     l->contribution[(*contributions)++] =
-        (pw_contribution){ a->J, n->y, l->column[l->place[a->node]].at, (short)a->step, (short)n->size };
+        (pw_contribution){ a->J, n->y, l->column[l->place[a->node]].at, a->step, (short)n->size };
     if (own >= 0)
       for (int i = 0; i < 2; i++) l->coupling[(*couplings)++] = condense_coupling (l, a->node, own + i);
     else
@@ -125,7 +126,7 @@ static int condense_fill (const pw_plan *c, pw_block_ldl *l) {
 
 /* ---- Opening ---- */
 
-static int condense_open (pw_plan *c) {
+int pw_condense_block (pw_plan *c) {
   pw_block_ldl *l = c->k->block = condense_pattern (c);
   if (l) condense_sort (c, l->place);
   int status = l ? pw_condense_chains (c, l) : PW_RESOURCE;
@@ -133,40 +134,6 @@ static int condense_open (pw_plan *c) {
   if (status == PW_OK) status = condense_fill (c, l);
   free (c->chain);
   free (c->is_linked);
-  c->chain = NULL;
-  c->is_linked = NULL;
+  if (l) free (l->place), l->place = NULL;
   return status;
-}
-
-/* The first node before the uncondensed bodies with a nearly vanishing pivot, or -1. */
-static int condense_find_dependent (const pw_plan *c) {
-  const double follows = 1e-8; /* squared sine: half of the digits are lost */
-  pw_block_ldl *l = c->k->block;
-  l->least = follows;
-  pw_block_factor (l);
-  l->least = 0;
-  if (l->pivot > follows || l->row < 0) return -1;
-  for (int n = 0; n < c->nodes; n++)
-    if (c->node[n].rank == 0 && l->row >= c->node[n].y && l->row < c->node[n].y + c->node[n].size) return n;
-  return -1;
-}
-
-/* Before the uncondensed bodies, an equation may follow from others: those of a leg that is pinned to a platform and
- * to the ground.  Such equations, found at the present configuration, are moved after the bodies, one by one; if they are
- * many, all equations that touch these bodies are moved. */
-int pw_condense_block (pw_plan *c) {
-  const int most = 12; /* each attempt plans and factorises anew */
-  for (int attempt = 0;; attempt++) {
-    int status = condense_open (c), n = -1;
-    if (status == PW_OK && c->uncondenseds > 0 && attempt <= most) n = condense_find_dependent (c);
-    if (n < 0) {
-      if (c->k->block) free (c->k->block->place), c->k->block->place = NULL;
-      return status;
-    }
-    c->node[n].rank = 2;
-    for (int p = 0; p < c->contributions && attempt == most; p++)
-      if (condense_own_nodes (c, c->contribution[p].j) >= 0) c->node[c->contribution[p].node].rank = 2;
-    pw_block_close (c->k->block);
-    c->k->block = NULL;
-  }
 }

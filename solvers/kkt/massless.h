@@ -15,7 +15,7 @@
 
 #include "system.h"
 
-enum { PW_MASSLESS_BLOCKS = PW_MAX_BODIES + PW_MAX_INTERNAL };
+enum { PW_MASSLESS_GROUPS = PW_MAX_BODIES + PW_MAX_INTERNAL }; /* most groups of one element */
 
 /* Groups of coordinates: bodies, then internal coordinates.  The number of groups; the group of a coordinate; the
  * first coordinate of a group; the number of coordinates in the group that begins with coordinate j. */
@@ -32,8 +32,13 @@ static inline int pw_group_width (const pw_system *s, int j) {
   return j < 3 * s->bodies ? 3 : 1;
 }
 
-/* The root of a member of a union-find structure, with path halving. */
-int pw_root (int *parent, int i);
+/* 1 if an element's equations may change under a rigid displacement of its bodies: it touches the ground, or is
+ * nonholonomic. */
+static inline int pw_is_grounded (const pw_system *s, const pw_element_batch *k, int e) {
+  int grounded = k->kind->bodies < 2 || k->row >= s->holonomic;
+  for (int b = 0; b < k->kind->bodies; b++) grounded |= k->column[e * k->kind->bodies + b] >= s->coords;
+  return grounded;
+}
 
 typedef struct {
   int j, width; /* first global coordinate; 3 of a body, or 1 */
@@ -46,7 +51,7 @@ typedef struct {
   double size;         /* largest entry when last matched, angles in units of length */
   double scale;        /* matched rows: factor of the pivot that makes it relative to `size` */
   double least;        /* matched rows: the pivot, relative to `size`, below which the component is matched again */
-  double terms;        /* unmatched rows: sum of the squares of the terms whose sum is the row of Z' */
+  double terms;        /* unmatched rows: sum of squares: entries, and what is subtracted from the massive ones */
   double gamma;        /* gamma~ */
   double lambda;       /* matched rows: w; then the multiplier */
   const double **from; /* groups: its entries in the batch, or zeros */
@@ -54,6 +59,7 @@ typedef struct {
 
 typedef struct {
   int rows, cols, pivots, groups;
+  int grounded; /* 1: one of its elements is (pw_is_grounded) */
   pw_massless_group *group;
   int *global;             /* cols: global coordinate */
   unsigned char *massless; /* cols: 1 for a coordinate without weight */

@@ -23,11 +23,6 @@ static int massless_contains (const massless_plan *p, int g) {
   return 0;
 }
 
-int pw_root (int *parent, int i) {
-  while (parent[i] != i) i = parent[i] = parent[parent[i]];
-  return i;
-}
-
 /* The groups of an element's coordinates, without the ground, and their first local columns. */
 static int massless_element_groups (const pw_system *s, const pw_element_batch *k, int e, int *group, int *at) {
   int n = 0;
@@ -50,7 +45,7 @@ static int massless_is_active (const massless_plan *p, int row) {
 
 /* Unites massless groups that share an active row, and marks them as members. */
 static void massless_unite (massless_plan *p) {
-  int group[PW_MASSLESS_BLOCKS], at[PW_MASSLESS_BLOCKS];
+  int group[PW_MASSLESS_GROUPS], at[PW_MASSLESS_GROUPS];
   for (const pw_element_batch *k = p->w->batch; k < p->w->batch + p->s->constraints; k++)
     for (int e = 0; e < k->b.count; e++) {
       int any = 0, last = -1, n = massless_element_groups (p->s, k, e, group, at);
@@ -86,7 +81,7 @@ static void massless_add_row (const pw_system *s, pw_component *c, int row, int 
 
 /* Adds each active row with a massless group to the component of this group. */
 static void massless_add_rows (massless_plan *p, pw_massless *r) {
-  int group[PW_MASSLESS_BLOCKS], at[PW_MASSLESS_BLOCKS];
+  int group[PW_MASSLESS_GROUPS], at[PW_MASSLESS_GROUPS];
   for (const pw_element_batch *k = p->w->batch; k < p->w->batch + p->s->constraints; k++)
     for (int e = 0; e < k->b.count; e++) {
       int n = massless_element_groups (p->s, k, e, group, at), first = 0;
@@ -94,6 +89,7 @@ static void massless_add_rows (massless_plan *p, pw_massless *r) {
       for (int i = e * k->kind->rows; first < n && i < (e + 1) * k->kind->rows; i++) {
         if (!massless_is_active (p, k->row + i)) continue;
         int component = r->component_of_row[k->row + i] = p->member[pw_root (p->parent, group[first])];
+        r->component[component].grounded |= pw_is_grounded (p->s, k, e);
         massless_add_row (p->s, &r->component[component], k->row + i, n, group, at, k->J + i * k->b.cols);
       }
     }

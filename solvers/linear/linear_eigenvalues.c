@@ -156,8 +156,8 @@ int pw_linear_eigenvalues (pw_linearisation *x, pw_linear *l, pw_error *error) {
 
 /* ---- RK4 ---- */
 
-/* |1 + z + z^2/2 + z^3/6 + z^4/24| <= 1 for z = h mu (Hairer & Wanner 1996, section IV.2).  For a growing solution only
- * its frequency counts. */
+/* |1 + z + z^2/2 + z^3/6 + z^4/24| <= 1 for z = h mu, a region within |z| < 4 (Hairer & Wanner 1996, section IV.2).  For a
+ * growing solution only its frequency counts. */
 static int rk4_stable (double re, double im, double h) {
   double x = h * fmin (re, 0), y = h * im, u = 1, v = 0;
   for (int k = 4; k > 0; k--) { /* u + i v = 1 + z (u + i v) / k */

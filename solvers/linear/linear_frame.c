@@ -52,12 +52,12 @@ static pw_linear_frame linear_try (const pw_linearisation *x, int b, int turning
  * angular velocity that fits theirs. */
 static pw_linear_frame linear_fit (const pw_linearisation *x) {
   const double *q = x->r->q, *v = x->r->v;
-  int bodies = 3 * x->r->s->bodies;
+  int bodies = x->r->s->bodies;
   double moment = 0, square = 0;
   pw_linear_frame f = { .residual = INFINITY };
-  for (int j = 0; j < bodies; j++)
-    if (j % 3 < 2) f.origin[j % 3] += 3 * q[j] / bodies, f.twist[j % 3] += 3 * v[j] / bodies;
-  for (int j = 0; j < bodies; j += 3) {
+  for (int j = 0; j < 3 * bodies; j++)
+    if (j % 3 < 2) f.origin[j % 3] += q[j] / bodies, f.twist[j % 3] += v[j] / bodies;
+  for (int j = 0; j < 3 * bodies; j += 3) {
     double dx = q[j] - f.origin[0], dy = q[j + 1] - f.origin[1];
     moment += dx * (v[j + 1] - f.twist[1]) - dy * (v[j] - f.twist[0]);
     square += dx * dx + dy * dy;
@@ -112,8 +112,8 @@ double *pw_linear_violation (pw_linearisation *x, double *out) {
   return out;
 }
 
-/* All changes caused by a rigid displacement of the system. */
-static void linear_change (pw_linearisation *x, int k, double *out) {
+/* What the rigid displacement k of the system changes, 0 for a symmetry; its minimal coordinates go to S. */
+static void linear_asymmetry (pw_linearisation *x, int k, double *out) {
   const double *dq = x->x, *dv = x->x + x->n;
   linear_displace (x, k);
   pw_linear_vary (x);
@@ -136,7 +136,7 @@ int pw_linear_symmetries (pw_linearisation *x) {
   int length = x->holonomic + x->rank + x->n, left = 0;
   double tolerance = linear_tolerance (x), sigma[3], V[9], *work = x->residual + 3 * length;
   if (x->r->s->bodies == 0) return 0;
-  for (int k = 0; k < 3; k++) linear_change (x, k, x->residual + k * length);
+  for (int k = 0; k < 3; k++) linear_asymmetry (x, k, x->residual + k * length);
   for (int i = 0; i < 3 * length; i++)
     if (!isfinite (x->residual[i])) return 0;
   if (LAPACKE_dgesvd_work (LAPACK_COL_MAJOR, 'N', 'A', length, 3, x->residual, length, sigma, NULL, 1, V, 3, work,
@@ -221,6 +221,7 @@ static void linear_probe (pw_linearisation *x) {
   memcpy (x->a0, x->a, (size_t)x->n * sizeof *x->a);
 }
 
+/* Times at irregular fractions of the span and of T, so that a periodic change is not sampled at its period. */
 pw_steadiness pw_linear_steady (pw_linearisation *x) {
   static const double fraction[] = { 0.0123, 0.31, 0.77, 1 };
   pw_run *r = x->r;

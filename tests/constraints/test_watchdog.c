@@ -238,6 +238,41 @@ static void test_two_crossings (void **state) {
   }
 }
 
+/* ---- A body that moves far in one step ---- */
+
+static long watchdog_count;
+
+/* Counts the configurations that are evaluated. */
+static int watchdog_torque (void *context, double t, const double *x, double value[3], double *gradient) {
+  (void)context, (void)t, (void)x, (void)gradient;
+  watchdog_count++;
+  value[0] = 0;
+  return 0;
+}
+
+/* The four-bar linkage beside a free disc that turns by 1e5 rad in a step of 1e-3 s. */
+static void watchdog_build_disc (pw_model *m, const void *parameters) {
+  bars_table.build (m, parameters);
+  pw_add_body (m, &(pw_body){ .name = "disc", .mass = 1, .inertia = 1, .rate = { 0, 0, 1e8 } });
+  pw_torque torque = { .name = "torque", .body = { "disc", "ground" } };
+  torque.value = (pw_signal){ .type = PW_FUNCTION, .function = { .eval = watchdog_torque } };
+  pw_add_torque (m, &torque);
+}
+
+static void test_fast_disc (void **state) {
+  (void)state;
+  pw_plugin_table table = bars_table;
+  table.build = watchdog_build_disc;
+  pw_error error = { 0 };
+  pw_system *s = scene_system (&table, NULL);
+  watchdog_count = 0;
+  pw_run *r = runs_open (s, "rk4+projection", &(pw_settings){ .step = 1e-3, .span = 1 });
+  for (int i = 0; i < 3; i++) check_ok (pw_run_advance (r, 1, &error), &error);
+  check_close ("evaluations", (double)watchdog_count, 0, 1e4, "a thousand within each step, and some");
+  pw_run_close (r);
+  pw_system_free (s);
+}
+
 /* ---- Messages ---- */
 
 static void watchdog_expect (const char *model, const char *parameter, double value, const char *method,
@@ -299,6 +334,7 @@ int main (void) {
     cmocka_unit_test (test_close_branches_four_bar),
     cmocka_unit_test (test_no_change_point),
     cmocka_unit_test (test_two_crossings),
+    cmocka_unit_test (test_fast_disc),
     cmocka_unit_test (test_messages),
     cmocka_unit_test (test_extreme),
   };

@@ -1,6 +1,7 @@
 /* Condensation to the constraint equations: rows of prescribed coordinates alone, bodies that are not condensed. */
 #include <math.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 #include "check.h"
 #include "saddle.h"
@@ -153,8 +154,49 @@ static void test_order_of_bodies (void **state) {
     }
 }
 
+/* A platform with free arms, on a leg of two links that is bent. */
+static void bent_leg_build (pw_model *m, const void *parameters) {
+  (void)parameters;
+  pw_add_body (m, &(pw_body){ .name = "thigh", .mass = 0.2, .inertia = 0.01, .start = { 0, 0, 0.5 } });
+  pw_add_body (m, &(pw_body){ .name = "shank", .mass = 0.2, .inertia = 0.01 });
+  pw_add_body (m, &(pw_body){ .name = "platform", .mass = 1, .inertia = 0.3 });
+  pw_add_pin (m, &(pw_pin){ .name = "hip", .body = { "ground", "thigh" }, .at = { { 0, 1 }, { 0, 0.5 } } });
+  pw_add_pin (m, &(pw_pin){ .name = "knee", .body = { "thigh", "shank" }, .at = { { 0, -0.5 }, { 0, 0.5 } } });
+  pw_add_pin (m, &(pw_pin){ .name = "foot", .body = { "shank", "platform" }, .at = { { 0, -0.5 }, { 0, 0 } } });
+  for (int i = 0; i < PLATFORM_LEGS; i++) {
+    char arm[20], pin[20];
+    snprintf (arm, sizeof arm, "arm%d", i);
+    snprintf (pin, sizeof pin, "pin%d", i);
+    pw_add_body (m, &(pw_body){ .name = arm, .mass = 0.1, .inertia = 0.01 });
+    pw_add_pin (m, &(pw_pin){ .name = pin, .body = { arm, "platform" }, .at = { { 0, 0.5 }, { 0.3 * i, 0 } } });
+  }
+}
+
+static const pw_plugin_table bent_leg_table = { .abi = PW_ABI,
+                                                .size = sizeof (pw_plugin_table),
+                                                .build = bent_leg_build };
+
+/* A stretched leg is singular for a platform at rest, not for one that moves. */
+static void test_stretched_leg (void **state) {
+  (void)state;
+  pw_system *s = scene_system (&bent_leg_table, NULL);
+  pw_workspace *w = pw_workspace_new (s, NULL);
+  double *q = calloc ((size_t)s->coords, sizeof *q);
+  int row;
+  pw_saddle *k = condense_open (w, s->mass);
+  assert_int_equal (pw_saddle_factor (k), PW_OK);
+  assert_int_equal (pw_update_kinematics (w, 0, q, s->v0), PW_OK);
+  pw_evaluate_J (w);
+  assert_int_equal (pw_saddle_factor (k), PW_OK);
+  assert_true (pw_saddle_pivot (k, &row) > 0.05);
+  free (q);
+  pw_saddle_close (k);
+  pw_workspace_free (w);
+  pw_system_free (s);
+}
+
 int main (void) {
   const struct CMUnitTest tests[] = { cmocka_unit_test (test_prescribed_centre),
-                                      cmocka_unit_test (test_order_of_bodies) };
+                                      cmocka_unit_test (test_order_of_bodies), cmocka_unit_test (test_stretched_leg) };
   return cmocka_run_group_tests (tests, NULL, NULL);
 }
