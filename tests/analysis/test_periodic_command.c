@@ -105,6 +105,20 @@ static void test_branch (void **state) {
   assert_non_null (strstr (cli_file ("branch/periodic.gp"), "label_of_x = 'A'"));
 }
 
+/* A branch over the damping of a driven oscillator from 0 to 1, the end of its domain, and back. */
+static void test_domain (void **state) {
+  (void)state;
+  cli_write ("damped.yaml", "pinwheel: 1\nparameters: [{name: c, value: 0.5, domain: nonnegative}]\n"
+                            "bodies: [{name: rod, mass: 1, inertia: 1}]\nelements:\n"
+                            "  - {pin: O, body: [ground, rod], at: [[0, 0], [0, 0]]}\n"
+                            "  - {rotational-spring: s, body: [rod, ground], stiffness: 3, damping: c}\n"
+                            "  - {torque: drive, body: [rod, ground], value: {harmonic: {amplitude: 1, omega: 1}}}\n");
+  cli_good ("pinwheel periodic @/damped.yaml --vary c=0:1");
+  periodic_shows ("  ends                        1      6.283185");
+  cli_good ("pinwheel periodic @/damped.yaml --vary c=1:0");
+  periodic_shows ("  ends                        0      6.283185");
+}
+
 /* A driven pendulum loses its symmetry at A = 1.00431948, where det (M - 1) of its own equation, by RK4, vanishes. */
 static void test_pitchfork (void **state) {
   (void)state;
@@ -234,7 +248,8 @@ int main (void) {
     cmocka_unit_test (test_motion),    cmocka_unit_test (test_periods),    cmocka_unit_test (test_free_period),
     cmocka_unit_test (test_pitchfork), cmocka_unit_test (test_two_events), cmocka_unit_test (test_constraint),
     cmocka_unit_test (test_branch),    cmocka_unit_test (test_turns),      cmocka_unit_test (test_limit),
-    cmocka_unit_test (test_bad),       cmocka_unit_test (test_none),       cmocka_unit_test (test_vanishing),
+    cmocka_unit_test (test_bad),       cmocka_unit_test (test_domain),     cmocka_unit_test (test_none),
+    cmocka_unit_test (test_vanishing),
   };
   return cmocka_run_group_tests (tests, cli_setup, cli_teardown);
 }

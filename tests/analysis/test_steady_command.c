@@ -130,6 +130,15 @@ static void test_ends (void **state) {
   line = strchr (cli_file ("ends/steady.csv"), '\n') + 1;
   for (const char *next; *(next = strchr (line, '\n') + 1);) line = next;
   assert_true (table_number (line, 2) == 0.5);
+  cli_write ("damped.yaml", "pinwheel: 1\nparameters: [{name: c, value: 0.5, domain: nonnegative}]\n"
+                            "bodies: [{name: rod, mass: 1, inertia: 1}]\nelements:\n"
+                            "  - {pin: O, body: [ground, rod], at: [[0, 0], [0, 0]]}\n"
+                            "  - {rotational-spring: s, body: [rod, ground], stiffness: 3, damping: c}\n");
+  cli_good ("pinwheel steady @/damped.yaml --vary c=1:0 --starts 0 -o @/ends");
+  steady_shows ("damped: 1 branch of steady motions");
+  line = strchr (cli_file ("ends/steady.csv"), '\n') + 1;
+  for (const char *next; *(next = strchr (line, '\n') + 1);) line = next;
+  assert_true (table_number (line, 2) == 0);
   cli_good ("pinwheel steady pendulum --starts 60");
   steady_shows ("pendulum: 2 steady motions, ");
 }
