@@ -223,16 +223,40 @@ static int branch_try (pw_branch *b, pw_error *error) {
   return status == PW_OK && !branch_smooth (b, &b->at, &b->next) ? PW_RETRY : status;
 }
 
-int pw_branch_step (pw_branch *b, pw_error *error) {
+/* Makes b->next the point reached. */
+static void branch_accept (pw_branch *b) {
   int n = b->of.unknowns;
-  b->step = fmin (b->step, b->most / fmax (fabs (b->at.tangent[n]), 1e-3));
-  for (int status; (status = branch_try (b, error)) != PW_OK; b->step /= 2)
-    if (status != PW_RETRY || b->step < 2 * b->least) return status;
   pw_branch_point oldest = b->before;
   b->before = b->at;
   b->at = b->next;
   b->next = oldest;
   b->folded = b->before.tangent[n] * b->at.tangent[n] < 0;
+}
+
+/* Moves to the end of the range if the next step would pass it, without evaluations beyond it, where the parameter may not be
+ * admissible.  PW_RETRY if it would not, or no point is found there. */
+static int branch_reach (pw_branch *b, pw_error *error) {
+  int n = b->of.unknowns;
+  double slope = b->at.tangent[n], end = slope > 0, step = (end - b->at.u[n]) / slope;
+  if (!(step > 0 && step <= fmin (b->step, b->most / fmax (fabs (slope), 1e-3)))) return PW_RETRY;
+  for (int j = 0; j < n; j++) b->next.u[j] = b->at.u[j] + step * b->at.tangent[j];
+  b->next.u[n] = end;
+  memset (b->trial, 0, (size_t)n * sizeof *b->trial);
+  b->trial[n] = slope > 0 ? 1 : -1;
+  int status = branch_correct (b, b->trial, BRANCH_APART * step, &b->next, error);
+  if (status != PW_OK) return status;
+  b->next.u[n] = end;
+  if (!branch_smooth (b, &b->at, &b->next)) return PW_RETRY;
+  branch_accept (b);
+  b->ended = 1;
+  return PW_OK;
+}
+
+int pw_branch_step (pw_branch *b, pw_error *error) {
+  b->step = fmin (b->step, b->most / fmax (fabs (b->at.tangent[b->of.unknowns]), 1e-3));
+  for (int status; (status = branch_try (b, error)) != PW_OK; b->step /= 2)
+    if (status != PW_RETRY || b->step < 2 * b->least) return status;
+  branch_accept (b);
   if (b->iterations <= BRANCH_MOST / 2) b->step *= BRANCH_GROW;
   return PW_OK;
 }
@@ -351,7 +375,8 @@ static int branch_advance (pw_branch *b, int (*events) (void *context, pw_error 
                            pw_error *error) {
   *why = (pw_error){ 0 };
   if (b->steps++ > b->limit) return pw_fail (why, PW_METHOD, "the branch has more than %d points", b->limit), PW_RETRY;
-  int status = pw_branch_step (b, error);
+  int status = branch_reach (b, error);
+  if (status == PW_RETRY) status = pw_branch_step (b, error);
   if (status == PW_OK) *why = (pw_error){ 0 };
   if (status == PW_OK) status = branch_end (b, error);
   if (status == PW_OK && b->folded) {

@@ -151,7 +151,7 @@ int pw_periodic_solve (pw_periodic *x, int settle, double parameter, pw_periodic
   *out = (pw_periodic_orbit){ .residual = INFINITY };
   if (x->set.free) x->about = x->set.period > 0 ? x->set.period : 2 * PW_PI * x->T;
   int status = pw_periodic_settle (x, parameter, settle);
-  if (status == PW_RESOURCE || status == PW_INPUT) return *error = x->why, status;
+  if (status < 0) return *error = x->why, status;
   if (status != PW_OK) return status;
   periodic_unknowns (x, parameter);
   status = pw_branch_solve (&x->branch, x->u, error);

@@ -144,19 +144,27 @@ static void equations_by_period (pw_periodic *x, double *column) {
   }
 }
 
-/* By central differences over the parameter, of the flow from the same state. */
+/* By central differences over the parameter, of the flow from the same state, or on one side at the end of its domain. */
 static int equations_by_parameter (pw_periodic *x, const double *u, double *column, pw_error *error) {
   const double h = 1e-5;
-  int unknowns = pw_periodic_unknowns (x), rows = 4 * x->n, status = PW_OK;
-  double *there = x->there, *F = there + unknowns + 1;
-  for (int side = -1; side <= 1 && status == PW_OK; side += 2) {
-    memcpy (there, u, ((size_t)unknowns + 1) * sizeof *u);
-    there[unknowns] += side * h;
-    status = pw_periodic_flow (x, there, PW_FLOW, 1, error);
-    if (status == PW_OK) equations_residual (x, there, F);
-    for (int i = 0; i < rows && status == PW_OK; i++) column[i] += side * F[i] / (2 * h);
+  int unknowns = pw_periodic_unknowns (x), rows = 4 * x->n;
+  double *there = x->there, *F = there + unknowns + 1, distance = 0;
+  memcpy (there, u, ((size_t)unknowns + 1) * sizeof *u);
+  for (int side = -1; side <= 1; side += 2) {
+    there[unknowns] = u[unknowns] + side * h;
+    int status = pw_periodic_flow (x, there, PW_FLOW, 1, error);
+    if (status == PW_OK)
+      distance += h;
+    else if (status == PW_RETRY) {
+      there[unknowns] = u[unknowns];
+      status = pw_periodic_flow (x, there, PW_FLOW, 1, error);
+    }
+    if (status != PW_OK) return status;
+    equations_residual (x, there, F);
+    for (int i = 0; i < rows; i++) column[i] += side * F[i];
   }
-  return status;
+  for (int i = 0; i < rows; i++) column[i] /= distance;
+  return distance > 0 ? PW_OK : PW_RETRY;
 }
 
 int pw_periodic_evaluate (void *periodic, const double *u, double *F, double *dF, pw_error *error) {

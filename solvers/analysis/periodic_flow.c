@@ -187,7 +187,8 @@ int pw_periodic_flow (pw_periodic *x, const double *u, pw_flow_accuracy accuracy
   int status = r ? flow_run (x, r, x->set.free ? period : x->at[which].period, accuracy) : x->why.status;
   if (r) pw_run_close (r);
   if (status == PW_OK) return PW_OK;
-  if (status == PW_RESOURCE || (status == PW_INPUT && r == NULL)) return *error = x->why, status;
+  int refused = x->set.compile && x->at[which].own == NULL; /* the value of the parameter, by the model */
+  if (status == PW_RESOURCE || (status == PW_INPUT && r == NULL && !refused)) return *error = x->why, status;
   return PW_RETRY;
 }
 

@@ -6,8 +6,8 @@
 #include "rank.h"
 #include "util.h"
 
-/* STEADY_EXACT: residual of a solution, in units of the scene;
- * STEADY_SLOW: rates that may be round-off at a double root; SIGNAL_SAME: a difference of signals that counts as 0. */
+/* STEADY_POINTS: of a branch, by default; STEADY_TIMES: times at which signals are compared, and as many between breakpoints;
+ * STEADY_EXACT: residual of a solution, in units of the scene; STEADY_SLOW: rates that may be round-off at a double root; SIGNAL_SAME: a difference of signals that counts as 0. */
 enum { STEADY_POINTS = 50, STEADY_TIMES = 16 };
 static const double STEADY_EXACT = 1e-9, STEADY_SLOW = 1e-4, SIGNAL_SAME = 1e-8;
 
@@ -35,9 +35,10 @@ static int steady_arrays (pw_steady *x) {
   };
   x->memory = pw_alloc_arrays (array, sizeof array / sizeof *array);
   x->cyclic = calloc (n + 1, 1);
+  x->pivot = calloc (rates + 1, sizeof *x->pivot);
   x->known = calloc (2 * n + 1, sizeof *x->known);
   x->hold = calloc (holds + 1, sizeof *x->hold);
-  if (!x->memory || !x->cyclic || !x->known || !x->hold) return PW_RESOURCE;
+  if (!x->memory || !x->cyclic || !x->pivot || !x->known || !x->hold) return PW_RESOURCE;
   if (holds) memcpy (x->hold, x->set.hold, holds * sizeof *x->hold);
   for (int j = 0; j < 2 * x->n; j++) x->known[j].state = j;
   return PW_OK;
@@ -171,6 +172,7 @@ void pw_steady_close (pw_steady *x) {
   pw_branch_close (&x->branch);
   pw_linear_free (&x->linear);
   free (x->cyclic);
+  free (x->pivot);
   free (x->known);
   free (x->hold);
   free (x->memory);
@@ -241,7 +243,7 @@ static void steady_rest (pw_steady *x) {
 }
 
 int pw_steady_solve (pw_steady *x, int attempt, double parameter, pw_steady_motion *out, pw_error *error) {
-  *out = (pw_steady_motion){ .parameter = parameter };
+  *out = (pw_steady_motion){ .parameter = parameter, .residual = INFINITY };
   if (pw_require (x, "a search", error) != PW_OK) return PW_INPUT;
   double range = x->set.last - x->set.first;
   x->gauge = 0;

@@ -15,6 +15,7 @@ struct pw_steady {
   double L, T;             /* scales at the initial state */
   double origin[2], *axis; /* group x pw_steady_rates: symmetries as rates (steady_group.c) */
   unsigned char *cyclic;   /* n: 1 for angles on which nothing depends */
+  int *pivot;              /* scratch: group */
   int gauge;               /* symmetries that leave what is held unchanged; 0 before a solution is found */
   double *fixed;           /* gauge x group: combinations of symmetries */
   double *norm;            /* m: lengths of the rows of J */
@@ -89,8 +90,9 @@ void pw_steady_leave (pw_steady *x, int k); /* frees it */
 
 /* ---- steady_hold.c ---- */
 
-/* The change of what is held by a variation (dq, dv), in units of the scene, and divided by `unit`. */
+/* The unit of A in terms of those of the scene. */
 double pw_hold_unit (const pw_steady *x, const pw_initial_value *hold);
+/* A - value B, of what is held (steady_hold.c), and its change by a variation (dq, dv). */
 double pw_hold_residual (const pw_system *s, const pw_initial_value *hold, const double *q, const double *v);
 double pw_hold_change (const pw_system *s, const pw_initial_value *hold, const double *q, const double *v,
                        const double *dq, const double *dv);

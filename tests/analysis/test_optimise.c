@@ -90,6 +90,10 @@ static void test_bound (void **state) {
   const char *yaml = cli_file ("o.yaml");
   assert_int_equal (strncmp (yaml, run, strlen (run)), 0);
   assert_non_null (strstr (yaml, "set:\n  a: 0.5\nstart:\n  p.vy: "));
+  cli_shell ("pinwheel optimise pendulum --maximise bob.vx --free g=5:8 --set g=6 --set 'l=1*2' -t 0.5 -o @/o.yaml");
+  yaml = cli_file ("o.yaml");
+  static const char given[] = "# pinwheel run pendulum --set 'g=6' --set 'l=1*2' --t-end '0.5' --set g=";
+  assert_int_equal (strncmp (yaml, given, sizeof given - 1), 0);
 }
 
 /* Beyond p.x = 0.3 every run fails. */

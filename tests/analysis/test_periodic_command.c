@@ -105,6 +105,43 @@ static void test_branch (void **state) {
   assert_non_null (strstr (cli_file ("branch/periodic.gp"), "label_of_x = 'A'"));
 }
 
+/* All seven pairs of multipliers of seven oscillators are shown. */
+static void test_pairs (void **state) {
+  char text[4000];
+  int n = snprintf (text, sizeof text, "pinwheel: 1\nbodies:\n");
+  (void)state;
+  for (int i = 1; i <= 7; i++)
+    n += snprintf (text + n, sizeof text - (size_t)n, "  - {name: b%d, mass: 1, inertia: 1}\n", i);
+  n += snprintf (text + n, sizeof text - (size_t)n, "elements:\n");
+  for (int i = 1; i <= 7; i++)
+    n += snprintf (text + n, sizeof text - (size_t)n,
+                   "  - {pin: p%d, body: [ground, b%d], at: [[0, 0], [0, 0]]}\n"
+                   "  - {rotational-spring: s%d, body: [b%d, ground], stiffness: 0.%d, damping: 0.2}\n",
+                   i, i, i, i, i);
+  snprintf (text + n, sizeof text - (size_t)n,
+            "  - {torque: T, body: [b1, ground], value: {harmonic: {amplitude: 1, omega: 1}}}\n");
+  cli_write ("pairs.yaml", text);
+  cli_good ("pinwheel periodic @/pairs.yaml");
+  assert_null (strstr (cli_out, "..."));
+  int pairs = 0;
+  for (const char *at = cli_out; (at = strstr (at, " i, modulus ")) != NULL; at++) pairs++;
+  assert_int_equal (pairs, 7);
+}
+
+/* A branch over the damping of a driven oscillator from 0 to 1, the end of its domain, and back. */
+static void test_domain (void **state) {
+  (void)state;
+  cli_write ("damped.yaml", "pinwheel: 1\nparameters: [{name: c, value: 0.5, domain: nonnegative}]\n"
+                            "bodies: [{name: rod, mass: 1, inertia: 1}]\nelements:\n"
+                            "  - {pin: O, body: [ground, rod], at: [[0, 0], [0, 0]]}\n"
+                            "  - {rotational-spring: s, body: [rod, ground], stiffness: 3, damping: c}\n"
+                            "  - {torque: drive, body: [rod, ground], value: {harmonic: {amplitude: 1, omega: 1}}}\n");
+  cli_good ("pinwheel periodic @/damped.yaml --vary c=0:1");
+  periodic_shows ("  ends                        1      6.283185");
+  cli_good ("pinwheel periodic @/damped.yaml --vary c=1:0");
+  periodic_shows ("  ends                        0      6.283185");
+}
+
 /* A driven pendulum loses its symmetry at A = 1.00431948, where det (M - 1) of its own equation, by RK4, vanishes. */
 static void test_pitchfork (void **state) {
   (void)state;
@@ -180,6 +217,7 @@ static void test_bad (void **state) {
     { "snakeboard --period fast", "--period: \"fast\" is not a number" },
     { "snakeboard --period -1", "--period -1: expected a number > 0" },
     { "snakeboard --periods 0", "--periods 0: expected a whole number >= 1" },
+    { "snakeboard --periods 1e6", "--periods 1e6: expected at most 100000" },
     { "snakeboard --periods 2 --period 4", "--periods 2: not together with --period" },
     { "snakeboard --method rk4",
       "method rk4: periodic motions need one that controls its steps, such as erk8+projection" },
@@ -194,6 +232,11 @@ static void test_bad (void **state) {
   };
   (void)state;
   cli_bad_each ("periodic", each, sizeof each / sizeof *each);
+  cli_write ("two.yaml", "pinwheel: 1\nbodies: [{name: b, mass: 1, inertia: 1}]\nelements:\n"
+                         "  - {force: f, body: b, fx: {harmonic: {amplitude: 1, omega: 1}}}\n"
+                         "  - {force: g, body: b, fx: {harmonic: {amplitude: 1, omega: sqrt(2)}}}\n");
+  cli_bad ("pinwheel periodic @/two.yaml", 2,
+           "two: the periods of its signals have no common multiple: give --period T");
   cli_bad ("pinwheel periodic @/oscillator.yaml --vary n=1:3", 2,
            "--vary n=1:3: n counts something and cannot vary continuously; use `pinwheel sweep`");
   cli_bad ("pinwheel periodic @/oscillator.yaml --period 2.5*pi --vary w=0.8:1", 2,
@@ -234,7 +277,8 @@ int main (void) {
     cmocka_unit_test (test_motion),    cmocka_unit_test (test_periods),    cmocka_unit_test (test_free_period),
     cmocka_unit_test (test_pitchfork), cmocka_unit_test (test_two_events), cmocka_unit_test (test_constraint),
     cmocka_unit_test (test_branch),    cmocka_unit_test (test_turns),      cmocka_unit_test (test_limit),
-    cmocka_unit_test (test_bad),       cmocka_unit_test (test_none),       cmocka_unit_test (test_vanishing),
+    cmocka_unit_test (test_bad),       cmocka_unit_test (test_domain),     cmocka_unit_test (test_pairs),
+    cmocka_unit_test (test_none),      cmocka_unit_test (test_vanishing),
   };
   return cmocka_run_group_tests (tests, cli_setup, cli_teardown);
 }

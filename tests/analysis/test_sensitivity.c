@@ -231,6 +231,13 @@ static void test_pulse (void **state) {
     assert_int_equal (sensitivity_last (x[i]), 3);
     check_close ("loss", x[i][2], -0.0511971431, 1e-9, "extrapolated differences of runs, 9 digits");
   }
+  cli_write ("spin.yaml",
+             "pinwheel: 1\nparameters:\n  - {name: M, value: 1, unit: N m}\n"
+             "bodies:\n  - {name: block, mass: 1, inertia: 1}\nelements:\n"
+             "  - {torque: T, body: [block, ground], value: {pulse: {height: M, start: 0.35, width: 0.3}}}\n");
+  cli_good ("pinwheel sensitivity @/spin.yaml --of mean:block.omega --by M -t 1 --every 1e9 -o @/sens");
+  assert_int_equal (sensitivity_json ("\"derivative\": ", x[0]), 1);
+  check_close ("mean", x[0][0], 0.15, 1e-9, "0.3 s of angular acceleration at 0.5 s, whatever the rows of the table");
 }
 
 /* ---- Files ---- */
@@ -253,6 +260,8 @@ static void test_files (void **state) {
   check_close ("error of a contact point", x[0] / x[1], 1, 0.1, "0.1 m from the centre of mass");
   assert_non_null (strstr (json, "\"complete\": true"));
   assert_non_null (cli_file ("sens/sensitivity.svg"));
+  cli_good ("pinwheel sensitivity pendulum --of 2*bob.x --by l -t 1 -o @/sens");
+  assert_non_null (strstr (cli_file ("sens/sensitivity.gp"), "label[1] = 'l × ∂/∂l'\n"));
 }
 
 /* ---- Bad input ---- */

@@ -130,8 +130,34 @@ static void test_ends (void **state) {
   line = strchr (cli_file ("ends/steady.csv"), '\n') + 1;
   for (const char *next; *(next = strchr (line, '\n') + 1);) line = next;
   assert_true (table_number (line, 2) == 0.5);
+  cli_write ("damped.yaml", "pinwheel: 1\nparameters: [{name: c_d, value: 0.5, domain: nonnegative}]\n"
+                            "bodies: [{name: rod, mass: 1, inertia: 1}]\nelements:\n"
+                            "  - {pin: O, body: [ground, rod], at: [[0, 0], [0, 0]]}\n"
+                            "  - {rotational-spring: s, body: [rod, ground], stiffness: 3, damping: c_d}\n");
+  cli_good ("pinwheel steady @/damped.yaml --vary c_d=1:0 --starts 0 -o @/ends");
+  steady_shows ("damped: 1 branch of steady motions");
+  assert_non_null (strstr (cli_file ("ends/steady.svg"), ">c_d<")); /* plain text, without a subscript */
+  line = strchr (cli_file ("ends/steady.csv"), '\n') + 1;
+  for (const char *next; *(next = strchr (line, '\n') + 1);) line = next;
+  assert_true (table_number (line, 2) == 0);
   cli_good ("pinwheel steady pendulum --starts 60");
   steady_shows ("pendulum: 2 steady motions, ");
+}
+
+/* Seventy discs that turn freely: a symmetry each. */
+static void test_many_symmetries (void **state) {
+  char text[12000];
+  int n = snprintf (text, sizeof text, "pinwheel: 1\nbodies:\n");
+  (void)state;
+  for (int i = 0; i < 70; i++)
+    n += snprintf (text + n, sizeof text - (size_t)n, "  - {name: d%d, mass: 1, inertia: 1}\n", i);
+  n += snprintf (text + n, sizeof text - (size_t)n, "elements:\n");
+  for (int i = 0; i < 70; i++)
+    n += snprintf (text + n, sizeof text - (size_t)n, "  - {pin: p%d, body: [d%d, ground], at: [[0, 0], [0, 0]]}\n", i,
+                   i);
+  cli_write ("many.yaml", text);
+  cli_good ("pinwheel steady @/many.yaml --starts 0");
+  steady_shows ("many: 1 steady motion up to 70 symmetries, ");
 }
 
 /* At rest the resistance and its derivative are 0: the velocity is exactly 0 as well. */
@@ -226,6 +252,7 @@ int main (void) {
     cmocka_unit_test (test_closed_branch),
     cmocka_unit_test (test_ends),
     cmocka_unit_test (test_rest),
+    cmocka_unit_test (test_many_symmetries),
     cmocka_unit_test (test_one_body),
   };
   return cmocka_run_group_tests (tests, cli_setup, cli_teardown);

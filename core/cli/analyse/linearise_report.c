@@ -7,11 +7,8 @@
 #include "print_table.h"
 #include "text.h"
 
-enum {
-  LINEARISE_DIGITS = 5,
-  LINEARISE_MODES = 12,
-  LINEARISE_BODIES = 20
-};                                          /* mode shapes, and bodies of each, in the text */
+/* LINEARISE_MODES: mode shapes in the text; LINEARISE_BODIES: bodies of each, and internal coordinates. */
+enum { LINEARISE_DIGITS = 5, LINEARISE_MODES = 12, LINEARISE_BODIES = 20 };
 static const double LINEARISE_SMALL = 1e-9; /* components below it are shown as 0 */
 
 static const char *const linearise_motion[] = { "steady", "accelerated", "changing" };
@@ -288,7 +285,7 @@ static void page_state (const page *p, int mode, double t, double end) {
                s = growth * sin (im * t);
   const double rate_c = im == 0 ? re * c : -im * s, rate_s = im * c;
   for (int j = 0; j < l->coordinates; j++) {
-    const double *shape = l->shape + 2 * ((size_t)mode * 2 * (size_t)l->coordinates + (size_t)j);
+    const double *shape = linearise_shape (l, mode, j);
     p->state[j] = p->base[j] + p->size * (c * shape[0] - s * shape[1]);
     p->state[l->coordinates + j] = p->size * (rate_c * shape[0] - rate_s * shape[1]);
   }

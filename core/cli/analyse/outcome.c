@@ -131,9 +131,9 @@ static int outcome_term (pw_outcomes *x, pw_outcome *o, const char *what, const 
   pw_functional_type type = outcome_type (&name);
   pw_error own = { 0 };
   if (pw_column_find (x->system, name, what, &c, &own) != PW_OK)
-    return pw_fail (error, PW_INPUT,
-                    next == ':' ? "%s: no \"%s:\"; valid are final:, max:, min:, mean:, integral: and rms:" : "%s",
-                    next == ':' ? what : own.text, name);
+    return next == ':' ? pw_fail (error, PW_INPUT,
+                                  "%s: no \"%s:\"; valid are final:, max:, min:, mean:, integral: and rms:", what, name)
+                       : pw_fail (error, PW_INPUT, "%s", own.text);
   int f = outcome_add (x, type, c), i = 0;
   if (f < 0) return pw_fail (error, PW_RESOURCE, "out of memory");
   while (i < o->terms && o->term[i] != f) i++;

@@ -9,6 +9,8 @@
 #include "report.h"
 #include "util.h"
 
+enum { PERIODIC_MOST = 100000 }; /* periods of the signals in one of the motion */
+
 /* Periods of a run before each attempt. */
 static const int periodic_settle[PW_PERIODIC_ATTEMPTS] = { 0, 10, 100 };
 
@@ -26,8 +28,15 @@ static int periodic_period (pw_periodic_cli *x, pw_error *error) {
   if (status == PW_OK) status = pw_cli_number ("--periods", x->periods_text, PW_COUNT, &periods, error);
   if (status == PW_OK && !x->set.free)
     status = pw_cli_number ("--period", x->period_text, PW_POSITIVE, &x->set.period, error);
-  x->set.periods = (int)fmin (periods, 1e6);
-  if (status != PW_OK || x->period_text || pw_system_period (x->m.system) > 0) return status;
+  if (status == PW_OK && periods > PERIODIC_MOST)
+    status = pw_fail (error, PW_INPUT, "--periods %s: expected at most %d", x->periods_text, PERIODIC_MOST);
+  if (status != PW_OK) return status;
+  x->set.periods = (int)periods;
+  double signals = pw_system_period (x->m.system);
+  if (x->period_text || signals > 0) return PW_OK;
+  if (isnan (signals))
+    return pw_fail (error, PW_INPUT, "%s: the periods of its signals have no common multiple: give --period T",
+                    pw_file_name (x->m.file));
   return pw_fail (
       error, PW_INPUT,
       "%s: no signal has a known period (those of expressions and tables are not known): give --period T, or "

@@ -32,14 +32,18 @@ static double periodic_round (double value) {
 }
 
 static void periodic_multipliers (const pw_periodic_orbit *o, int symmetries) {
-  int own = o->multipliers - o->trivial, shown = 0;
+  int own = o->multipliers - o->trivial, shown = 0, more = 0;
   printf ("  Floquet multipliers          ");
-  for (int i = 0; i < own && shown < PERIODIC_SHOWN; i++) {
+  for (int i = 0; i < own; i++) {
     if (o->im[i] < 0) continue;
+    if (shown == PERIODIC_SHOWN) {
+      more = 1;
+      break;
+    }
     if (shown++) printf ("\n                               ");
     printf (o->im[i] > 0 ? "%.6g +- %.6g i, modulus %.6g" : "%.6g", o->re[i], o->im[i], hypot (o->re[i], o->im[i]));
   }
-  puts (own == 0 ? "none" : own > PERIODIC_SHOWN ? " ..." : "");
+  puts (own == 0 ? "none" : more ? " ..." : "");
   printf ("  trivial multipliers          %d%s%s\n", o->trivial, symmetries ? ", of symmetries" : "",
           o->trivial > symmetries ? ", of a shift in time" : "");
 }
@@ -204,10 +208,11 @@ static int periodic_csv (const void *context, FILE *f, pw_error *error) {
 /* t / T, then x, y, phi, omega of the bodies, over one period. */
 static int periodic_motion (const pw_periodic_cli *x, const pw_periodic_orbit *o, FILE *f, pw_error *error) {
   const pw_settings settings = { .span = o->period, .rtol = 1e-9 };
-  int bodies = pw_system_bodies (x->m.system), status = PW_OK;
+  int bodies = pw_system_bodies (x->m.system), status;
   pw_run *r = pw_run_open (x->m.system, x->set.method, &settings, error);
-  if (r) status = pw_run_restart (r, o->q, o->v, error);
-  for (int i = 0; r && i <= PERIODIC_SAMPLES && status == PW_OK; i++) {
+  if (r == NULL) return error->status;
+  status = pw_run_restart (r, o->q, o->v, error);
+  for (int i = 0; i <= PERIODIC_SAMPLES && status == PW_OK; i++) {
     double t = o->period * i / PERIODIC_SAMPLES;
     pw_sample sample;
     status = pw_run_advance_to (r, t, o->period, error);
@@ -219,7 +224,6 @@ static int periodic_motion (const pw_periodic_cli *x, const pw_periodic_orbit *o
                sample.v[3 * b + 2]);
     fputs ("\n", f);
   }
-  if (r == NULL) return error->status;
   pw_run_close (r);
   return status;
 }

@@ -132,7 +132,7 @@ static int sensitivity_csv (const void *context, FILE *f, pw_error *error) {
   pw_text t = { 0 };
   pw_text_cell (&t, "t [s]");
   for (int o = 0; o < x->outcomes.outcomes; o++) {
-    if (!pw_sensitivity_runs_along (x, o)) continue;
+    if (!pw_sensitivity_in_table (x, o)) continue;
     sensitivity_cell (&t, x->of[o], pw_outcome_unit (&x->outcomes, o, unit, sizeof unit));
     for (int p = 0; p < x->runs.count; p++) {
       snprintf (name, sizeof name, "d(%.140s)/d(%.140s)", x->of[o], x->runs.list[p].name);
@@ -150,10 +150,13 @@ static int sensitivity_csv (const void *context, FILE *f, pw_error *error) {
 static void sensitivity_label (const pw_sensitivity *x, int o, int p, char *label, size_t size) {
   char unit[SENSITIVITY_UNIT];
   const char *name = x->runs.list[p].name;
-  if (x->runs.list[p].value != 0)
-    snprintf (label, size, "%.100s × ∂/∂%.100s [%s]", name, name, pw_outcome_unit (&x->outcomes, o, unit, sizeof unit));
-  else
-    snprintf (label, size, "∂/∂%.100s [%s]", name, sensitivity_unit (x, o, p, unit));
+  if (x->runs.list[p].value != 0) {
+    pw_outcome_unit (&x->outcomes, o, unit, sizeof unit);
+    snprintf (label, size, *unit ? "%.100s × ∂/∂%.100s [%s]" : "%.100s × ∂/∂%.100s", name, name, unit);
+  } else {
+    sensitivity_unit (x, o, p, unit);
+    snprintf (label, size, *unit ? "∂/∂%.100s [%s]" : "∂/∂%.100s", name, unit);
+  }
 }
 
 /* A block for each derivative. */
@@ -177,11 +180,11 @@ static void sensitivity_variables (const void *context, FILE *f) {
   const pw_sensitivity *x = context;
   int panels = 0;
   fprintf (f, "unknowns = %d\nt_end = %.10g\n", x->runs.count, x->t_end);
-  for (int i = 0; i < x->outcomes.outcomes; i++) panels += pw_sensitivity_runs_along (x, i);
+  for (int i = 0; i < x->outcomes.outcomes; i++) panels += pw_sensitivity_in_table (x, i);
   fprintf (f, "panels = %d\narray output[%d]\narray label[%d]\n", panels, panels, panels * x->runs.count);
   for (int i = 0, k = 0; i < x->outcomes.outcomes; i++) {
     char label[300];
-    if (!pw_sensitivity_runs_along (x, i)) continue;
+    if (!pw_sensitivity_in_table (x, i)) continue;
     pw_figure_element (f, "output", ++k, x->of[i]);
     for (int p = 0; p < x->runs.count; p++) {
       sensitivity_label (x, i, p, label, sizeof label);

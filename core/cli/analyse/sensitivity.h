@@ -25,7 +25,7 @@ typedef struct {
   pw_workspace **workspace; /* 5 of each unknown: of the run's system and of the neighbours', for contact points */
   /* Of all functionals F of the outputs and unknowns P at the time last evaluated, and of the run. */
   int no_error;          /* 1: derivatives without errors */
-  double *value;         /* F */
+  double *value;         /* 2 F: values; the gradient of an output (scratch) */
   double *slope, *error; /* F x P: derivatives, and their errors */
   double *end_slope, *end_error;
   double *before; /* F + F P: values and derivatives before a jump */
@@ -47,8 +47,8 @@ int pw_sensitivity_at (pw_sensitivity *x, double t, pw_error *error);
 /* All of it, with extrema, integrals and the table.  A status. */
 int pw_sensitivity_compute (pw_sensitivity *x, pw_progress *progress, pw_error *error);
 void pw_sensitivity_close (pw_sensitivity *x);
-/* 1 if an output is a function of columns at one time, so that it has columns in the table. */
-int pw_sensitivity_runs_along (const pw_sensitivity *x, int output);
+/* 1 if an output has columns in the table: it is a function of columns at one time, without extrema and integrals. */
+int pw_sensitivity_in_table (const pw_sensitivity *x, int output);
 /* The derivative of an output by an unknown from those of the functionals, and its error. */
 double pw_sensitivity_derivative (const pw_sensitivity *x, int output, int unknown, const double *slope);
 

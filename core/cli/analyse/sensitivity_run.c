@@ -14,7 +14,7 @@
  * square of a column is smooth enough for 5 nodes. */
 enum { SENSITIVITY_ROWS = 1000, SENSITIVITY_PARTS = 20, SENSITIVITY_STEPS = 2 };
 
-int pw_sensitivity_runs_along (const pw_sensitivity *x, int output) {
+int pw_sensitivity_in_table (const pw_sensitivity *x, int output) {
   const pw_outcome *o = &x->outcomes.outcome[output];
   for (int i = 0; i < o->terms; i++)
     if (x->outcomes.functional[o->term[i]].type != PW_FINAL) return 0;
@@ -31,7 +31,7 @@ double pw_sensitivity_derivative (const pw_sensitivity *x, int output, int unkno
 
 /* ---- Columns at a time ---- */
 
-/* Coordinate `index` of all contact points in one of an unknown's systems. */
+/* Coordinate `index` of the contact points, in system `which` of an unknown, at the positions q + by dq. */
 static int sensitivity_contact (const pw_sensitivity *x, int unknown, int which, int index, const pw_sample *s,
                                 const double *dq, double by, double *value, pw_error *error) {
   const pw_system *system = x->base.m.system;
@@ -126,8 +126,8 @@ static void sensitivity_keep (pw_sensitivity *x, int i) {
     if (!isnan (x->end_slope[at])) x->end_slope[at] = x->slope[at], x->end_error[at] = x->error[at];
 }
 
-/* Keeps those of an extremum, which has none at a breakpoint that moves, nor just after it.  reached: 1 if it is at a
- * breakpoint that is not passed yet. */
+/* Keeps those of an extremum; at a breakpoint that moves, and just after it, they do not exist.  reached: 1 if the extremum is at
+ * a breakpoint that is not passed yet. */
 static void sensitivity_keep_extremum (pw_sensitivity *x, int i, int reached) {
   const pw_functional *f = &x->outcomes.functional[i];
   double slope, next = pw_variation_breakpoint (x->variation, 0, &slope);
@@ -138,7 +138,8 @@ static void sensitivity_keep_extremum (pw_sensitivity *x, int i, int reached) {
     if (sensitivity_moves (x, p, !before) != 0) x->end_slope[i * x->runs.count + p] = NAN;
 }
 
-/* Nor has one in the step of the run that passes a jump with the state, if derivatives jump there from `before`. */
+/* Drops derivatives of extrema in the step of the run that passes a jump with the state at t, if those of the column jump there
+ * from `before`: they do not exist. */
 static void sensitivity_drop (pw_sensitivity *x, double t, const double *before) {
   for (int i = 0; i < x->outcomes.functionals; i++) {
     const pw_functional *f = &x->outcomes.functional[i];
@@ -157,7 +158,7 @@ static int sensitivity_row (pw_sensitivity *x, double t, pw_error *error) {
   for (int i = 0; i < x->outcomes.functionals; i++)
     if (x->outcomes.functional[i].type == PW_FINAL) x->outcomes.functional[i].value = x->value[i];
   for (int o = 0; o < x->outcomes.outcomes; o++) {
-    if (!pw_sensitivity_runs_along (x, o)) continue;
+    if (!pw_sensitivity_in_table (x, o)) continue;
     *out++ = pw_outcome_value (&x->outcomes, o, NULL);
     for (int p = 0; p < x->runs.count; p++) *out++ = pw_sensitivity_derivative (x, o, p, x->slope);
   }
@@ -244,9 +245,10 @@ static double sensitivity_next (pw_sensitivity *x, double t, double to, int *jum
 
 static int sensitivity_advance (pw_sensitivity *x, double t, double to, sensitivity_event *list, pw_progress *progress,
                                 pw_error *error) {
+  const double near = 1e-9 * fmin (x->dt, x->t_end / SENSITIVITY_PARTS); /* distance of states beside a jump from it */
   int jump, status = PW_OK;
   while (t < to && status == PW_OK) {
-    double next = sensitivity_next (x, t, to, &jump, error), near = 1e-9 * x->dt;
+    double next = sensitivity_next (x, t, to, &jump, error);
     if (isnan (next)) return error->status;
     double end = jump ? next - fmin (near, next - t) : next;
     if (jump == 1) x->passed = next, next = fmin (next + near, x->t_end);
@@ -312,7 +314,7 @@ static int sensitivity_arrays (pw_sensitivity *x, pw_error *error) {
   x->value = calloc (3 * F + 5 * F * P + 1, sizeof *x->value);
   x->columns = 1;
   for (int o = 0; o < x->outcomes.outcomes; o++)
-    if (pw_sensitivity_runs_along (x, o)) x->columns += 1 + x->runs.count;
+    if (pw_sensitivity_in_table (x, o)) x->columns += 1 + x->runs.count;
   if (x->value == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
   x->slope = x->value + 2 * F, x->error = x->slope + F * P;
   x->end_slope = x->error + F * P, x->end_error = x->end_slope + F * P;

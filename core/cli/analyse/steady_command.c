@@ -50,7 +50,6 @@ static int steady_options (pw_steady_cli *x, pw_error *error) {
     status = pw_hold_read (x->m.system, "--hold", *text, x->hold, &x->set.holds, error);
   if (status == PW_OK && x->vary_text) status = steady_vary (x, error);
   x->attempts = (int)starts;
-  x->given = x->set.holds;
   return status;
 }
 

@@ -75,10 +75,10 @@ static void steady_motions (const pw_steady_cli *x) {
 static void steady_branches (const pw_steady_cli *x) {
   int events = 0;
   for (pw_table t = { 0 }; pw_table_pass (&t);) {
+    events = 0;
     pw_cell (&t, 6, "branch");
     pw_cell (&t, -15, "event");
     *x->unit ? pw_cell_unit (&t, 12, x->vary.name, x->unit) : pw_cell (&t, 12, x->vary.name);
-    events = 0;
     for (int k = 0; k < 3; k++) pw_cell (&t, 7, (const char *[]){ "growing", "rightmost [1/s]", "frequency [Hz]" }[k]);
     pw_row_end (&t);
     for (const pw_steady_point *p = x->point; p < x->point + x->points; p++) {

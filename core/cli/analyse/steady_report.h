@@ -28,7 +28,6 @@ typedef struct {
   pw_limit limit;
   pw_steady_settings set;
   pw_initial_value *hold; /* set.holds, with room */
-  int given;              /* of these, by the user; others follow */
   pw_cli_vary vary;       /* what --vary varies */
   const char *unit;
   int attempts; /* random ones at each end */

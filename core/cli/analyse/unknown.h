@@ -5,7 +5,6 @@
 #include "cli.h"
 #include "pinwheel-analysis.h"
 
-/* Begin with the name. */
 typedef struct {
   const char *name;              /* "length", "body.vx" */
   const pw_parameter *parameter; /* NULL: the initial value of a state */

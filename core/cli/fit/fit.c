@@ -211,7 +211,7 @@ static int fit_search (pw_fit *x, pw_error *error) {
     fit_interrupt (x);
     return PW_OK;
   }
-  fputs ("pinwheel: interrupted before the first iteration was done\n", stderr);
+  pw_cli_say ("pinwheel: interrupted before the first iteration was done\n");
   return PW_INTERRUPTED;
 }
 

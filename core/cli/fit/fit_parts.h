@@ -41,6 +41,9 @@ typedef struct {
   pw_progress progress;
 } pw_fit;
 
+/* Smallest component of an undetermined combination of unknowns that counts. */
+#define PW_FIT_PART 0.1
+
 /* Runs the model with values of the unknowns; out: columns x rows.  A status; PW_RETRY after Ctrl-C. */
 int pw_fit_run (const pw_fit *x, const double *unknowns, double *out, pw_error *error);
 

@@ -7,7 +7,6 @@
 #include "print_table.h"
 #include "text.h"
 
-#define REPORT_PART 0.1 /* smallest component of an undetermined combination that is shown */
 enum { REPORT_DIGITS = 7, REPORT_CORRELATIONS = 9, REPORT_PANELS = 4, REPORT_OPTIONS = 4000 };
 
 static double report_correlation (const pw_fit *x, int i, int j) {
@@ -103,7 +102,7 @@ static void report_columns (const pw_fit *x) {
 
 /* 1 if a combination of unknowns that changes no datum contains unknown i. */
 static int report_contains (const pw_fit *x, int combination, int i) {
-  return fabs (x->vectors[i * x->unknowns.runs.count + combination]) > REPORT_PART;
+  return fabs (x->vectors[i * x->unknowns.runs.count + combination]) > PW_FIT_PART;
 }
 
 /* Changes of the unknowns along a singular vector; that of the first one is its estimate, if this is not 0. */

@@ -244,7 +244,7 @@ static void solve_covariance (pw_fit *x) {
   for (int i = 0; i < n; i++) {
     x->deviation[i] = sqrt (x->covariance[i * n + i]);
     for (int k = x->rank; k < n; k++)
-      if (fabs (x->vectors[i * n + k]) > 0.1) x->deviation[i] = INFINITY;
+      if (fabs (x->vectors[i * n + k]) > PW_FIT_PART) x->deviation[i] = INFINITY;
   }
 }
 

@@ -228,12 +228,34 @@ static void report_quoted (FILE *f, const char *key, const char *text) {
   fputs ("'\n", f);
 }
 
+/* An option of the command line with its value in quotes, on one line; nothing if it is not given. */
+static void report_given (FILE *f, const char *option, const char *value) {
+  if (value == NULL) return;
+  fprintf (f, " %s '", option);
+  for (; *value; value++) fputc ((unsigned char)*value < ' ' ? ' ' : *value, f);
+  fputc ('\'', f);
+}
+
+/* The run of the result, as a comment: with the options given, then with the values found. */
+static void report_run (const pw_optimise *x, const char *options, FILE *f) {
+  const pw_cli_line *l = &x->line;
+  fprintf (f, "# pinwheel run %s", l->argument[0]);
+  for (const char **set = l->sets; set && *set; set++) report_given (f, "--set", *set);
+  for (const char **start = l->starts; start && *start; start++) report_given (f, "--start", *start);
+  report_given (f, "--method", l->method);
+  report_given (f, "--t-end", l->t_end);
+  report_given (f, "--step", l->step);
+  report_given (f, "--rtol", l->rtol);
+  report_given (f, "--atol", l->atol);
+  fprintf (f, " %s\n", options);
+}
+
 void pw_optimise_yaml (const pw_optimise *x, FILE *f) {
   char number[32], options[REPORT_OPTIONS];
-  const char *model = x->line.argument[0];
   const pw_search_start *s = x->start + x->best;
-  if (pw_unknowns_options (&x->unknowns, s->best, options, sizeof options) && strpbrk (model, "\r\n") == NULL)
-    fprintf (f, "# pinwheel run %s %s\n", model, options);
+  if (pw_unknowns_options (&x->unknowns, s->best, options, sizeof options) &&
+      strpbrk (x->line.argument[0], "\r\n") == NULL)
+    report_run (x, options, f);
   report_quoted (f, "model", pw_file_name (x->m.file));
   report_quoted (f, x->maximise ? "maximise" : "minimise", x->objective);
   fprintf (f, "value: %s\n", pw_format (number, s->value[0], 17));

@@ -137,7 +137,7 @@ int pw_unknowns_differentiate (const pw_unknowns *u, const double *x, const char
   return status;
 }
 
-/* In a range of length 1. */
+/* The value at this part, from 0 to 1, of the range of starts. */
 static double unknowns_between (const pw_unknown *k, double part) {
   double x = k->given ? k->low + part * k->scale : k->value + (2 * part - 1) * k->scale;
   return fmin (fmax (x, k->low), k->high);

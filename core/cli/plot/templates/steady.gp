@@ -30,19 +30,19 @@ do for [form in forms] {
        data index 2 using 1:($2 == 1 ? y_min - margin(y_min, y_max) : NaN):(0):(y_max - y_min + 2*margin(y_min, y_max)) \
          with vectors nohead dt (10,4,2,4) lw 0.7 lc rgb '#c49a00' title 'fold'
   set format x
-  set xlabel label_of_x
+  set xlabel label_of_x noenhanced
   set ylabel 'frequency [Hz]'
   top_of_z = max(z_max, -z_min) > 1e-9*max(1, max(y_max, -y_min)) ? max(z_max, -z_min) : 0.1
   set yrange [0:1.08*top_of_z/(2*pi)]
   eval panel(left, width - right, top + part + 10, top + 2*part + 10)
   plot data index 0 using 1:($3 > 1e-12 ? $3 : NaN) with lines lw 1.1 dt 1 lc rgb '#004488' title '', \
        data index 1 using 1:($3 > 1e-12 ? $3 : NaN) with lines lw 1.1 dt (8,5) lc rgb '#cc6677' title ''
-  set xlabel 'real part [1/s]'
+  set xlabel 'real part [1/s]' enhanced
   set ylabel 'imaginary part [1/s]'
   set xrange [y_min - margin(y_min, y_max):y_max + margin(y_min, y_max)]
   set yrange [-1.08*top_of_z:1.08*top_of_z]
   set arrow 1 from 0,graph 0 to 0,graph 1 nohead lw 0.5 lc rgb '#999999'
-  set cblabel label_of_x offset 1.5,0
+  set cblabel label_of_x offset 1.5,0 noenhanced
   set cbrange [first:last]
   eval panel(left, width - right - 62, height - bottom - part, height - bottom)
   plot data index 3 using 2:3:1 with points pt 7 ps 0.35 lc palette title ''
