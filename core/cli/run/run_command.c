@@ -98,9 +98,10 @@ static int run_engine (run *x, pw_error *error) {
   int status = pw_cli_specialise (x->line.specialise, &when, error);
   if (status == PW_OK) status = pw_checkpoints_open (x, &when, error);
   if (status != PW_OK) return status;
-  if (x->profile && when == PW_SPECIALISE_AUTO) when = PW_SPECIALISE_NEVER; /* stages are those of the general engine */
-  pw_cli_engine_open (&x->engine, x->m.system, when, pw_method_steps (x->method, &x->settings, d.step, x->t_end));
-  if (x->profile && when == PW_SPECIALISE_NEVER) strcpy (x->engine.why, "--profile");
+  int general = x->profile && when == PW_SPECIALISE_AUTO; /* the stages of --profile are those of the general engine */
+  pw_cli_engine_open (&x->engine, x->m.system, general ? PW_SPECIALISE_NEVER : when,
+                      pw_method_steps (x->method, &x->settings, d.step, x->t_end));
+  if (general) strcpy (x->engine.why, "--profile");
   x->settings.specialised = pw_cli_engine_code (&x->engine);
   return PW_OK;
 }
@@ -211,9 +212,9 @@ static int run_integrate (run *x, pw_error *error) {
   int status = run_steps (x, error);
   pw_progress_end (&x->progress);
   pw_stop_release ();
-  if (status == PW_STOPPED) status = pw_limit_fail (&x->limit, pw_run_time (x->r), error);
   const pw_statistics *s = pw_run_statistics (x->r);
-  x->limited = status == PW_METHOD && (pw_limit_over (&x->limit) || s->steps + s->rejected >= x->settings.max_steps);
+  x->limited = status == PW_STOPPED || (status == PW_METHOD && s->steps + s->rejected >= x->settings.max_steps);
+  if (status == PW_STOPPED) status = pw_limit_fail (&x->limit, pw_run_time (x->r), error);
   return status;
 }
 
