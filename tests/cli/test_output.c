@@ -377,14 +377,14 @@ static void test_process (void **state) {
 }
 
 /* What a command prints at a terminal. */
-static void output_terminal (const char *program, const char *argument, char *text, size_t size) {
+static void output_terminal (const char *program, const char *command, const char *argument, char *text, size_t size) {
   int near = posix_openpt (O_RDWR | O_NOCTTY);
   if (near < 0 || grantpt (near) != 0 || unlockpt (near) != 0) skip ();
   int far = open (ptsname (near), O_RDWR | O_NOCTTY), how;
   pid_t child = fork ();
   if (child == 0) {
     dup2 (far, STDOUT_FILENO);
-    execl (program, program, "new", argument, (char *)NULL);
+    execl (program, program, command, argument, (char *)NULL);
     _exit (127);
   }
   close (far);
@@ -397,14 +397,18 @@ static void output_terminal (const char *program, const char *argument, char *te
 
 static void test_terminal (void **state) {
   const char *program = getenv ("PINWHEEL");
-  char path[300], text[1000];
+  char path[300], text[10000];
   (void)state;
   cli_expand ("@/odd\033[31m", path, sizeof path);
   assert_int_equal (mkdir (path, 0700), 0);
   strcat (path, "/x.yaml");
-  output_terminal (program ? program : "build/pinwheel", path, text, sizeof text);
+  if (program == NULL) program = "build/pinwheel";
+  output_terminal (program, "new", path, text, sizeof text);
   assert_null (strchr (text, '\033'));
   assert_non_null (strstr (text, "/odd\\x1b[31m/x.yaml is written"));
+  output_terminal (program, "show", path, text, sizeof text);
+  assert_null (strchr (text, '\033'));
+  assert_non_null (strstr (text, "/odd\\x1b[31m/x.yaml\r\n"));
 }
 
 /* A test program that takes too long ends its children, says its name and fails (limit.c). */

@@ -83,8 +83,8 @@ static int list_model (void *context, const char *name, const char *path) {
   pw_file *f = pw_file_open (path, &error);
   const char *about = f ? pw_file_table (f)->about : error.text;
   const int width = *(const int *)context;
-  printf ("  %-*s  %s\n  %-*s  %s\n", width, name, about ? about : "", width, "",
-          pw_cli_short_path (path, folder, sizeof folder));
+  pw_cli_print (stdout, "  %-*s  %s\n  %-*s  %s\n", width, name, about ? about : "", width, "",
+                pw_cli_short_path (path, folder, sizeof folder));
   pw_file_close (f);
   return 0;
 }
