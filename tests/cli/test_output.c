@@ -174,6 +174,17 @@ static void test_whole_lines (void **state) {
   cli_good ("rm @/cut.csv.part");
 }
 
+/* The other files of a run whose table is incomplete are incomplete too, and named. */
+static void test_kept (void **state) {
+  (void)state;
+  assert_int_equal (
+      cli_run ("(ulimit -f 400; pinwheel run ezyroller -t 5 -o @/k.csv --animate @/k.html --json @/k.json)"), 1);
+  assert_non_null (strstr (cli_err, "the table so far is kept in "));
+  assert_non_null (strstr (cli_err, "the page is kept in "));
+  assert_non_null (strstr (cli_err, "the summary is kept in "));
+  cli_good ("rm @/k.csv.part @/k.html.part @/k.json.part");
+}
+
 /* ---- Outputs that are not regular files ---- */
 
 static void test_direct (void **state) {
@@ -424,12 +435,12 @@ static void test_limit (void **state) {
 
 int main (int argc, char **argv) {
   const struct CMUnitTest tests[] = {
-    cmocka_unit_test (test_left_over),   cmocka_unit_test (test_whole_lines), cmocka_unit_test (test_uses),
-    cmocka_unit_test (test_links),       cmocka_unit_test (test_lock),        cmocka_unit_test (test_direct),
-    cmocka_unit_test (test_keeps_lock),  cmocka_unit_test (test_mode),        cmocka_unit_test (test_types),
-    cmocka_unit_test (test_together),    cmocka_unit_test (test_bounded),     cmocka_unit_test (test_process),
-    cmocka_unit_test (test_forged),      cmocka_unit_test (test_terminal),    cmocka_unit_test (test_limit),
-    cmocka_unit_test (test_not_written),
+    cmocka_unit_test (test_left_over), cmocka_unit_test (test_whole_lines), cmocka_unit_test (test_kept),
+    cmocka_unit_test (test_uses),      cmocka_unit_test (test_links),       cmocka_unit_test (test_lock),
+    cmocka_unit_test (test_direct),    cmocka_unit_test (test_keeps_lock),  cmocka_unit_test (test_mode),
+    cmocka_unit_test (test_types),     cmocka_unit_test (test_together),    cmocka_unit_test (test_bounded),
+    cmocka_unit_test (test_process),   cmocka_unit_test (test_forged),      cmocka_unit_test (test_terminal),
+    cmocka_unit_test (test_limit),     cmocka_unit_test (test_not_written),
   };
   if (argc > 1) return setenv ("CHILD", argv[1], 1) || system ("echo $$ >\"$CHILD\"; sleep 600");
   return cmocka_run_group_tests (tests, cli_setup, cli_teardown);
