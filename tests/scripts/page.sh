@@ -74,6 +74,15 @@ elements:
 Y
 printf 't,fx\n0,0\n1,3\n5,-1\n' >"$work/push.csv"
 
+{
+  printf 'pinwheel: 1\nparameters: [{name: m, value: 2}]\nbodies: [{name: sled, mass: m, inertia: 0.5}]\nelements:\n'
+  for i in $(seq 70); do
+    echo "  - {force: f$i, body: sled, fx: {table: {file: f$i.csv}}}"
+    printf 't,fx\n0,1\n5,2\n' >"$work/f$i.csv"
+  done
+} >"$work/many.yaml"
+try 'many tables' "$work/many.yaml" m 3 1
+
 # Texts of a model are texts, and a page reaches nothing: neither by script nor by an image.
 cat >"$work/hostile.yaml" <<'Y'
 pinwheel: 1
