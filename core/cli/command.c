@@ -85,7 +85,7 @@ static void command_help (const pw_command *c, const pw_cli_line *l) {
 /* ---- Reading ---- */
 
 static int command_unknown (const pw_command *c, const pw_cli_line *l, const char *bad, pw_error *error) {
-  char sought[100], hint[120];
+  char sought[100], hint[140];
   const char *name = bad + strspn (bad, "-");
   snprintf (sought, sizeof sought, "%.*s", (int)strcspn (name, "="), name);
   pw_nearest near = { .sought = sought };

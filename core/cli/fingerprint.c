@@ -27,7 +27,7 @@ int pw_fingerprint_file (pw_text *t, const char *key, const char *name, const ch
   uint64_t h = PW_CHECK;
   const char *reason;
   FILE *f = pw_open_input (path, &reason);
-  if (f == NULL) return pw_fail (error, errno ? PW_RESOURCE : PW_INPUT, "cannot read %s: %s", path, reason);
+  if (f == NULL) return pw_fail (error, pw_open_input_status (), "cannot read %s: %s", path, reason);
   for (size_t n; (n = fread (block, 1, sizeof block, f)) > 0;) h = pw_check_sum (h, block, n);
   int why = ferror (f) ? errno : 0;
   fclose (f);

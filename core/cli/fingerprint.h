@@ -11,9 +11,9 @@
 /* "KEY OF = VALUE"; OF may be NULL. */
 void pw_fingerprint_line (pw_text *t, const char *key, const char *of, const char *value);
 void pw_fingerprint_number (pw_text *t, const char *key, const char *of, double value);
-/* A file's name and a checksum of its contents.  PW_RESOURCE if it cannot be read. */
+/* A file's name and a checksum of its contents.  PW_INPUT or PW_RESOURCE if it cannot be read. */
 int pw_fingerprint_file (pw_text *t, const char *key, const char *name, const char *path, pw_error *error);
-/* The model's name and checksums of its file and, if not 0, of its tables.  PW_RESOURCE if the file cannot be read. */
+/* The model's name and checksums of its file and, if not 0, of its tables.  Errors as of pw_fingerprint_file. */
 int pw_fingerprint_model (pw_text *t, const pw_file *file, uint64_t tables, pw_error *error);
 /* A checksum of the tables in a model's signals that continues `sum`; 0 at first. */
 uint64_t pw_check_tables (uint64_t sum, const pw_model *m);

@@ -70,8 +70,8 @@ static int main_dispatch (int argc, const char **argv) {
 }
 
 int main (int argc, char **argv) {
-  signal (SIGPIPE,
-          SIG_IGN); /* a closed pipe or a file size limit makes writes fail, which is handled like other errors */
+  /* A closed pipe or a file size limit makes writes fail, which is handled like other errors. */
+  signal (SIGPIPE, SIG_IGN);
   signal (SIGXFSZ, SIG_IGN);
   unsetenv ("POSIXLY_CORRECT"); /* popt would not accept options after the model */
   int status = main_dispatch (argc, (const char **)(void *)argv);

@@ -46,6 +46,8 @@ static void test_finding (void **state) {
   cli_write ("rod.yaml", text);
   cli_good ("pinwheel check @/rod.yaml");
   stability_shows ("\nNo problems found\n");
+  cli_good ("pinwheel check @/rod.yaml --start rod.vx=0.25");
+  stability_shows ("\n1 finding\n  --start gives rod.vx = 0.25 m/s, but the constraints require 0 m/s\n");
 }
 
 /* Hundreds of defective zeros, which round-off spreads over a circle: the QR algorithm converges, and they are

@@ -35,6 +35,10 @@ static void test_limit (void **state) {
     assert_non_null (strstr (cli_err, "s: the limit of 0.02 s of processor time is reached (--limit)"));
     assert_non_null (strstr (cli_err, "the table so far is kept in "));
   }
+  assert_int_equal (cli_run ("pinwheel run ezyroller --t-end 1e9 --specialise never --limit 0.1 --checkpoint @/l.ck "
+                             "--checkpoint-every 0.1"),
+                    4);
+  assert_non_null (strstr (cli_err, "l.ck continues from t = "));
 }
 
 /* Runs of a sweep and of a drift end each by itself, as rows with the reason. */

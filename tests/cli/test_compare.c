@@ -477,7 +477,8 @@ static void test_bad (void **state) {
     { "ezyroller --reference @/x.csv", "--reference @/x.csv: the first column is \"x\", expected \"t [s]\"" },
     { "ezyroller --reference @/y.csv", "--reference @/y.csv: no column is a state of this model, such as \"frame.x\"" },
     { "ezyroller --reference @/z.csv", "--reference @/z.csv: line 2: \"one\" is not a number" },
-    { "ezyroller --reference @/back.csv", "--reference @/back.csv: line 3: times must increase" },
+    { "ezyroller --reference @/back.csv", "--reference @/back.csv: line 3: times must be finite and increase" },
+    { "ezyroller --reference @/inf.csv", "--reference @/inf.csv: line 3: times must be finite and increase" },
     { "ezyroller --reference @/short.csv --t-end 2",
       "--reference @/short.csv: no row at the final time, t = 2 s; the last one before it is at 1 s" },
   };
@@ -486,6 +487,7 @@ static void test_bad (void **state) {
   cli_write ("y.csv", "t,y\n0,0\n");
   cli_write ("z.csv", "t,frame.x\n1,one\n");
   cli_write ("back.csv", "t,frame.x\n1,0\n0.5,0\n");
+  cli_write ("inf.csv", "t,frame.x\n1,0\ninf,0\n");
   cli_write ("short.csv", "t,frame.x\n1,0\n");
   cli_bad_each ("compare", bad, sizeof bad / sizeof *bad);
   cli_write ("file", "");

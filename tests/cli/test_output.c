@@ -174,6 +174,17 @@ static void test_whole_lines (void **state) {
   cli_good ("rm @/cut.csv.part");
 }
 
+/* The other files of a run whose table is incomplete are incomplete too, and named. */
+static void test_kept (void **state) {
+  (void)state;
+  assert_int_equal (
+      cli_run ("(ulimit -f 400; pinwheel run ezyroller -t 5 -o @/k.csv --animate @/k.html --json @/k.json)"), 1);
+  assert_non_null (strstr (cli_err, "the table so far is kept in "));
+  assert_non_null (strstr (cli_err, "the page is kept in "));
+  assert_non_null (strstr (cli_err, "the summary is kept in "));
+  cli_good ("rm @/k.csv.part @/k.html.part @/k.json.part");
+}
+
 /* ---- Outputs that are not regular files ---- */
 
 static void test_direct (void **state) {
@@ -377,14 +388,14 @@ static void test_process (void **state) {
 }
 
 /* What a command prints at a terminal. */
-static void output_terminal (const char *program, const char *argument, char *text, size_t size) {
+static void output_terminal (const char *program, const char *command, const char *argument, char *text, size_t size) {
   int near = posix_openpt (O_RDWR | O_NOCTTY);
   if (near < 0 || grantpt (near) != 0 || unlockpt (near) != 0) skip ();
   int far = open (ptsname (near), O_RDWR | O_NOCTTY), how;
   pid_t child = fork ();
   if (child == 0) {
     dup2 (far, STDOUT_FILENO);
-    execl (program, program, "new", argument, (char *)NULL);
+    execl (program, program, command, argument, (char *)NULL);
     _exit (127);
   }
   close (far);
@@ -397,14 +408,18 @@ static void output_terminal (const char *program, const char *argument, char *te
 
 static void test_terminal (void **state) {
   const char *program = getenv ("PINWHEEL");
-  char path[300], text[1000];
+  char path[300], text[10000];
   (void)state;
   cli_expand ("@/odd\033[31m", path, sizeof path);
   assert_int_equal (mkdir (path, 0700), 0);
   strcat (path, "/x.yaml");
-  output_terminal (program ? program : "build/pinwheel", path, text, sizeof text);
+  if (program == NULL) program = "build/pinwheel";
+  output_terminal (program, "new", path, text, sizeof text);
   assert_null (strchr (text, '\033'));
   assert_non_null (strstr (text, "/odd\\x1b[31m/x.yaml is written"));
+  output_terminal (program, "show", path, text, sizeof text);
+  assert_null (strchr (text, '\033'));
+  assert_non_null (strstr (text, "/odd\\x1b[31m/x.yaml\r\n"));
 }
 
 /* A test program that takes too long ends its children, says its name and fails (limit.c). */
@@ -420,12 +435,12 @@ static void test_limit (void **state) {
 
 int main (int argc, char **argv) {
   const struct CMUnitTest tests[] = {
-    cmocka_unit_test (test_left_over),   cmocka_unit_test (test_whole_lines), cmocka_unit_test (test_uses),
-    cmocka_unit_test (test_links),       cmocka_unit_test (test_lock),        cmocka_unit_test (test_direct),
-    cmocka_unit_test (test_keeps_lock),  cmocka_unit_test (test_mode),        cmocka_unit_test (test_types),
-    cmocka_unit_test (test_together),    cmocka_unit_test (test_bounded),     cmocka_unit_test (test_process),
-    cmocka_unit_test (test_forged),      cmocka_unit_test (test_terminal),    cmocka_unit_test (test_limit),
-    cmocka_unit_test (test_not_written),
+    cmocka_unit_test (test_left_over), cmocka_unit_test (test_whole_lines), cmocka_unit_test (test_kept),
+    cmocka_unit_test (test_uses),      cmocka_unit_test (test_links),       cmocka_unit_test (test_lock),
+    cmocka_unit_test (test_direct),    cmocka_unit_test (test_keeps_lock),  cmocka_unit_test (test_mode),
+    cmocka_unit_test (test_types),     cmocka_unit_test (test_together),    cmocka_unit_test (test_bounded),
+    cmocka_unit_test (test_process),   cmocka_unit_test (test_forged),      cmocka_unit_test (test_terminal),
+    cmocka_unit_test (test_limit),     cmocka_unit_test (test_not_written),
   };
   if (argc > 1) return setenv ("CHILD", argv[1], 1) || system ("echo $$ >\"$CHILD\"; sleep 600");
   return cmocka_run_group_tests (tests, cli_setup, cli_teardown);

@@ -58,6 +58,12 @@ static void test_interrupted (void **state) {
   assert_non_null (strstr (cli_err, "/a.ck continues from t = "));
 }
 
+/* An interval far below the round-off of time: a checkpoint after every step. */
+static void test_short_interval (void **state) {
+  (void)state;
+  cli_good ("timeout -s KILL 20 " RESUME_PROGRAM "run ezyroller -t 0.02 --checkpoint-every 1e-20 --checkpoint @/s.ck");
+}
+
 /* With a row for every step, too, none is there twice; a run that had ended already, but for its checkpoint, goes on. */
 static void test_every_step (void **state) {
   static const char *const left[] = { "cp @/one.csv @/two.csv.part", "cp @/one.csv @/two.csv", NULL };
@@ -171,14 +177,17 @@ static void test_options (void **state) {
            "--checkpoint: a table on standard output cannot be continued; write it to a file");
   cli_bad ("pinwheel run ezyroller --checkpoint @/c.ck -o /dev/null", 2,
            "/dev/null cannot be continued: it is not a regular file");
+  cli_bad ("pinwheel run ezyroller --checkpoint @/c.ck --reference @/none.csv", 2,
+           "cannot read @/none.csv: No such file or directory");
   cli_bad ("pinwheel run ezyroller --checkpoint @/none/c.ck", 1, "cannot write @/none/c.ck: No such file or directory");
 }
 
 int main (void) {
   const struct CMUnitTest tests[] = {
-    cmocka_unit_test (test_killed),    cmocka_unit_test (test_restarts),   cmocka_unit_test (test_interrupted),
-    cmocka_unit_test (test_other_run), cmocka_unit_test (test_other_file), cmocka_unit_test (test_damaged),
-    cmocka_unit_test (test_options),   cmocka_unit_test (test_summary),    cmocka_unit_test (test_every_step),
+    cmocka_unit_test (test_killed),         cmocka_unit_test (test_restarts),   cmocka_unit_test (test_interrupted),
+    cmocka_unit_test (test_other_run),      cmocka_unit_test (test_other_file), cmocka_unit_test (test_damaged),
+    cmocka_unit_test (test_options),        cmocka_unit_test (test_summary),    cmocka_unit_test (test_every_step),
+    cmocka_unit_test (test_short_interval),
   };
   return cmocka_run_group_tests (tests, cli_setup, cli_teardown);
 }

@@ -146,6 +146,8 @@ static void test_bad_parts (void **state) {
            "-o @/p2.csv would overwrite the part, @/p2.csv");
   cli_bad ("pinwheel sweep --merge @/p1.csv -o @/m.csv --jobs 2", 2,
            "--jobs cannot be combined with --merge: the parts define the sweep");
+  cli_bad ("pinwheel sweep --merge @/p1.csv -o @/m.csv --max-file 2", 2,
+           "--max-file cannot be combined with --merge: the parts define the sweep");
   cli_good ("ls @ | grep -c '^m.csv' || true");
   assert_string_equal (cli_out, "0\n");
 }

@@ -38,13 +38,13 @@ static void check_given (pw_check *x) {
   for (int i = 0; x->r && i < 2 * pw_system_coordinates (s); i++) {
     char name[PW_STATE_NAME], a[32], b[32];
     double from, to;
-    if (!pw_initial_moved (s, pw_run_initial (x->r), i)) continue;
-    pw_report_state (x->m.system, pw_run_initial (x->r), i, name, &from, &to);
-    if (fabs (to) < 1e-12 * fabs (from)) to = 0;
-    if (pw_initial_specified (pw_run_initial (x->r), i))
-      check_add (&x->finding, "the model specifies %s = %s %s, but the constraints require %s %s", name,
-                 pw_format (a, from, 10), pw_system_state_unit (s, i), pw_format (b, to, 10),
-                 pw_system_state_unit (s, i));
+    const pw_initial_report *initial = pw_run_initial (x->r);
+    if (!pw_initial_moved (s, initial, i) || !pw_initial_specified (initial, i)) continue;
+    pw_report_state (s, initial, i, name, &from, &to);
+    if (fabs (to) < 1e-12 * fabs (from)) to = 0; /* round-off */
+    check_add (&x->finding, "%s %s = %s %s, but the constraints require %s %s",
+               pw_initial_given (initial, i) ? "--start gives" : "the model specifies", name, pw_format (a, from, 10),
+               pw_system_state_unit (s, i), pw_format (b, to, 10), pw_system_state_unit (s, i));
   }
 }
 

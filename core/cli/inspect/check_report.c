@@ -40,7 +40,7 @@ static void report_entry (pw_json *j, const char *key, double value, const char 
   putchar ('\n');
 }
 
-/* An item of a list, of which the text shows the first few; `shown` counts them. */
+/* An item of a list, of which the text shows the first few; `listed` counts them. */
 static void report_item (pw_json *j, int *listed, const char *text, const char *line) {
   if (text) pw_json_text (j, NULL, text);
   if ((*listed)++ < REPORT_LISTED) report_say (j, "    %s\n", line);

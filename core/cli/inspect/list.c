@@ -48,7 +48,7 @@ static void list_fields (pw_table *t, const pw_field *fields) {
  * name.  `what`: "element type". */
 static int list_named (const char *what, const void *const *item, void (*show) (const void *item), const char **name,
                        pw_error *error) {
-  char hint[100];
+  char hint[PW_HINT];
   for (int shown = 0; *name; name++) {
     int all = strcmp (*name, "all") == 0, found = all;
     pw_nearest near = { .sought = *name };
@@ -83,8 +83,8 @@ static int list_model (void *context, const char *name, const char *path) {
   pw_file *f = pw_file_open (path, &error);
   const char *about = f ? pw_file_table (f)->about : error.text;
   const int width = *(const int *)context;
-  printf ("  %-*s  %s\n  %-*s  %s\n", width, name, about ? about : "", width, "",
-          pw_cli_short_path (path, folder, sizeof folder));
+  pw_cli_print (stdout, "  %-*s  %s\n  %-*s  %s\n", width, name, about ? about : "", width, "",
+                pw_cli_short_path (path, folder, sizeof folder));
   pw_file_close (f);
   return 0;
 }
@@ -116,7 +116,7 @@ static void list_option (const pw_option *o) {
 static void list_method (const pw_method *m) {
   printf ("  %s  (%s)\n      %s\n", m->name, m->adaptive ? "adaptive steps; --rtol, --atol" : "fixed steps; --step",
           m->about);
-  for (const pw_stabilisation *s = m->stabilisations; s && s->name; s++)
+  for (const pw_stabilisation *s = m->stabilisations; s->name; s++)
     printf ("    +%-12s %s%s\n", s->name, s->about, s == m->stabilisations ? " (default)" : "");
   for (const pw_stabilisation *s = m->refused; s && s->name; s++) printf ("    no %s: %s\n", s->name, s->about);
 }

@@ -17,8 +17,7 @@ static int new_name (const char *path, char *name, size_t size, const char **end
   if (n == 0 || n >= size || base[0] == '-' || (strcmp (*ending, ".c") != 0 && strcmp (*ending, ".yaml") != 0))
     return pw_fail (error, PW_INPUT,
                     "\"%s\": a model file's name has at most %zu letters, digits, _ and -, does not begin with -, and "
-                    "ends in .c or "
-                    ".yaml",
+                    "ends in .c or .yaml",
                     path, size - 1);
   snprintf (name, size, "%.*s", (int)n, base);
   return PW_OK;

@@ -102,8 +102,8 @@ static void show_model (const pw_cli_model *m) {
   int elements;
   const pw_plugin_table *table = pw_model_table (m->model);
   const pw_element *e = pw_model_elements (m->model, &elements);
-  printf ("%s: %s\n%s\n", pw_model_name (m->model), table->about ? table->about : "",
-          pw_cli_short_path (pw_file_path (m->file), folder, sizeof folder));
+  pw_cli_print (stdout, "%s: %s\n%s\n", pw_model_name (m->model), table->about ? table->about : "",
+                pw_cli_short_path (pw_file_path (m->file), folder, sizeof folder));
   show_bodies (m->system);
   if (elements) puts ("\nElements");
   for (int i = 0; i < elements; i++) show_element (&e[i]);

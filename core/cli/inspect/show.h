@@ -1,4 +1,4 @@
-/* The other outputs of `pinwheel show`. */
+/* Models as text, for `pinwheel show` and `pinwheel show --yaml`. */
 #ifndef PW_SHOW_H
 #define PW_SHOW_H
 

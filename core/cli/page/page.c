@@ -18,6 +18,7 @@ typedef struct {
   pw_page page;
   double t_end;
   pw_settings settings;
+  pw_limit limit;
   char method[100];
 } page;
 
@@ -64,7 +65,7 @@ static void page_parameters (const page *x, pw_json *j) {
   pw_json_close (j, ']');
 }
 
-/* Initial values of bodies as described; those of --start are marked. */
+/* The consistent initial state; values of --start are marked as given, and are as described. */
 static void page_states (const page *x, const pw_initial_report *initial, pw_json *j) {
   char name[300];
   int n = pw_system_coordinates (x->m.system);
@@ -73,7 +74,10 @@ static void page_states (const page *x, const pw_initial_report *initial, pw_jso
     pw_json_open (j, NULL, '{');
     pw_json_text (j, "name", pw_system_state_name (x->m.system, i, name, sizeof name));
     pw_json_text (j, "unit", pw_system_state_unit (x->m.system, i));
-    pw_json_number (j, "value", i < n ? initial->q[i] : initial->v[i - n]);
+    int given = pw_initial_given (initial, i);
+    const double *q = given ? initial->q_given : initial->q, *v = given ? initial->v_given : initial->v;
+    pw_json_number (j, "value", i < n ? q[i] : v[i - n]);
+    pw_json_flag (j, "given", given);
     pw_json_close (j, '}');
   }
   pw_json_close (j, ']');
@@ -143,7 +147,7 @@ static int page_in_engine (const pw_method *m, int stabilisation) {
   return page_integrators[i] && m->stabilisations[stabilisation].kind != PW_NULLSPACE;
 }
 
-/* The method of --method or of the model; one that the engine does not have is replaced or refused. */
+/* The method of --method, or that of the model, which is replaced if the engine does not have it. */
 static int page_choose_method (page *x, const pw_run_defaults *d, pw_error *error) {
   const pw_method *m;
   int stabilisation;
@@ -153,8 +157,10 @@ static int page_choose_method (page *x, const pw_run_defaults *d, pw_error *erro
   if (!known && x->line.method)
     return pw_fail (error, PW_INPUT, "--method %s: pages have rk4, erk5 and erk8 with projection, baumgarte or none",
                     wanted);
-  if (strchr (wanted, ':')) return pw_fail (error, PW_INPUT, "--method %s: methods of pages have no options", wanted);
-  if (known)
+  int options = strchr (wanted, ':') != NULL;
+  if (options && x->line.method)
+    return pw_fail (error, PW_INPUT, "--method %s: methods of pages have no options", wanted);
+  if (known && !options)
     snprintf (x->method, sizeof x->method, "%s+%s", m->name, m->stabilisations[stabilisation].name);
   else
     strcpy (x->method, PAGE_METHOD);
@@ -162,7 +168,6 @@ static int page_choose_method (page *x, const pw_run_defaults *d, pw_error *erro
 }
 
 static int page_open (page *x, pw_error *error) {
-  pw_limit limit;
   pw_use use[] = { PW_CLI_MODEL_USE, { "-o", x->path, PW_WRITES, NULL } };
   if (x->path == NULL) return pw_fail (error, PW_INPUT, "-o FILE.html is missing: the page to write");
   int status = pw_animation_check ("-o", x->path, error);
@@ -170,7 +175,7 @@ static int page_open (page *x, pw_error *error) {
   if (status == PW_OK) status = pw_cli_uses (&x->line, x->m.file, use, 2, error);
   if (status != PW_OK) return status;
   pw_run_defaults d = pw_cli_defaults (pw_file_table (x->m.file));
-  status = pw_cli_settings (&x->line, &d, &x->t_end, &x->settings, &limit, error);
+  status = pw_cli_settings (&x->line, &d, &x->t_end, &x->settings, &x->limit, error);
   if (status == PW_OK) status = page_choose_method (x, &d, error);
   return status == PW_OK ? pw_page_open (&x->page, x->m.file, error) : status;
 }

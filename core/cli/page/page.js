@@ -54,7 +54,7 @@ class Engine {
   integrate (s, limit, samples) {
     const w = this.wasm, method = this.text(s.method);
     this.numbers(w.parameters(s.parameters.length), s.parameters.length).set(s.parameters);
-    const initial = new DataView(w.memory.buffer, w.initial(s.initial.length));
+    const at = w.initial(s.initial.length), initial = new DataView(w.memory.buffer, at); /* allocation may replace the buffer */
     s.initial.forEach(([state, value], i) => { initial.setInt32(16 * i, state, true); initial.setFloat64(16 * i + 8, value, true); });
     const before = performance.now(), status = w.run(method, s.step, s.rtol, s.end, limit, samples), ms = performance.now() - before;
     w.release(method);
@@ -108,12 +108,13 @@ let engine, page, settings, reference = null, runs = []; /* runs: { method, ms, 
 
 const byName = name => page.methods.find(m => m.name === name);
 const clone = () => ({ method: page.method, accuracy: null, end: page.t_end,
-  parameters: page.parameters.map(p => p.value), initial: new Map() });
+  parameters: page.parameters.map(p => p.value), initial: new Map(page.states.flatMap((x, i) => x.given ? [[i, x.value]] : [])) });
 
-/* Fixed steps: step size; initial values belong to the page's own numbers of bodies; adaptive: tolerance.  The slider is its decimal logarithm. */
+/* The tolerance of an adaptive method, else the step size [s]; the slider is its decimal logarithm. */
 function accuracy (s) {
   return s.accuracy ?? (byName(s.method).adaptive ? page.rtol : page.step);
 }
+/* Initial values only with the page's own numbers of bodies: indices of states depend on them. */
 function engineSettings (s) {
   const counts = page.parameters.some((p, i) => p.domain === "count" && s.parameters[i] !== p.value);
   return { ...s, initial: counts ? [] : [...s.initial], step: accuracy(s), rtol: accuracy(s) };
@@ -222,7 +223,7 @@ function later () {
   timer = setTimeout(simulate, 20);
 }
 
-/* The largest difference of the positions x and y at the end [m]; angles alone if nothing else moves. */
+/* The largest difference of x, y [m] and phi [rad] of the bodies at the end. */
 function difference (a, b) {
   let most = 0;
   for (let k = 0; k < 6 * a.bodies.length; k++)
@@ -335,7 +336,8 @@ function link () {
   if (settings.accuracy !== null) list.set("accuracy", settings.accuracy);
   if (settings.end !== page.t_end) list.set("t_end", settings.end);
   page.parameters.forEach((p, i) => { if (settings.parameters[i] !== p.value) list.set(p.name, settings.parameters[i]); });
-  for (const [state, value] of settings.initial) list.set("start." + page.states[state].name, value);
+  for (const [i, value] of settings.initial)
+    if (!page.states[i].given || value !== page.states[i].value) list.set("start." + page.states[i].name, value);
   return list.toString();
 }
 

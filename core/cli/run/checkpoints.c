@@ -126,11 +126,11 @@ void pw_checkpoints_close (pw_checkpoints *c) {
 
 /* ---- Saving and resuming ---- */
 
-/* The first multiple of the interval after t is due next. */
+/* The first multiple of the interval after t is due next; every step, if t has 2^53 intervals, where n + 1 is n. */
 static void checkpoints_next (pw_checkpoints *c, double t) {
   if (c->every == 0) return;
-  double n = floor (t / c->every);
-  while (n * c->every <= t) n++;
+  double n = fmin (floor (t / c->every), 0x1p53);
+  while (n * c->every <= t && n < 0x1p53) n++;
   c->due = n * c->every;
 }
 

@@ -82,8 +82,8 @@ static double motion_load (const pw_system *s, const pw_motion *reference, int i
 static void motion_multipliers (const pw_system *s, const pw_motion *reference, const pw_motion *m, double *error) {
   const char *unit = NULL; /* neighbours mostly have the same unit */
   double load = 1;
-  int jumps[MOTION_SAMPLES],
-      smooth = 0; /* at a jump they have two values, and methods differ in which one they report */
+  int jumps[MOTION_SAMPLES], smooth = 0;
+  /* At a jump they have two values, and methods differ in which one they report. */
   for (int k = 0; k < m->samples; k++) smooth += !(jumps[k] = pw_system_jumps (s, reference->t[k]));
   if (smooth == 0) error[MOTION_LAMBDA] = NAN;
   for (int i = 0; i < pw_system_rows (s); i++) {

@@ -4,20 +4,20 @@
 
 #include "cli.h"
 
-enum { MOTION_SAMPLES = 100 };
+enum { MOTION_SAMPLES = 100 /* of a motion, at most */ };
 
 /* Errors: the largest of the coordinates and velocities of a unit, at the end, then over all samples; of the multipliers
  * relative to the largest one of the same unit, except at times at which a signal makes them jump. */
 enum { MOTION_END, MOTION_MOST = 4, MOTION_LAMBDA = 8, MOTION_ERRORS };
 enum { MOTION_LENGTH, MOTION_ANGLE, MOTION_SPEED, MOTION_RATE, MOTION_UNITS };
 
-/* NaN: not known. */
 typedef struct {
   int samples, width; /* width: coordinates, velocities, multipliers */
   double *t;          /* samples [s] */
-  double *x;          /* samples x width */
+  double *x;          /* samples x width; NaN: not known */
 } pw_motion;
 
+/* Errors: PW_RESOURCE. */
 int pw_motion_open (pw_motion *m, const pw_system *s, int samples, pw_error *error);
 void pw_motion_close (pw_motion *m);
 /* Stores a sample as number i. */
@@ -30,12 +30,12 @@ void pw_motion_distance (const pw_system *s, const pw_motion *reference, const p
 /* The unit of a state: MOTION_LENGTH, ... */
 int pw_motion_unit (const pw_system *s, int state);
 
-/* Opens a motion with the model's own reference solution up to t_end. */
+/* Opens a motion with the model's own reference solution up to t_end; close it in every case. */
 int pw_motion_reference (pw_motion *m, const pw_model *model, const pw_system *s, double t_end, pw_error *error);
 
-/* Opens a motion from a table with columns as `pinwheel run -o` writes them; MOTION_SAMPLES rows
- * are selected, rows after t_end skipped.  *t_end = 0: set to the time of the last row.  `whole`: a row at the end is
- * required.  PW_INPUT with the line. */
+/* Opens a motion from a table with columns as `pinwheel run -o` writes them: of its rows after 0 and up to t_end, at most
+ * MOTION_SAMPLES.  *t_end = 0: set to the time of the last row.  `whole`: a row at the end is required.  PW_INPUT with the
+ * line, PW_RESOURCE. */
 int pw_motion_read (pw_motion *m, const pw_system *s, const char *path, double *t_end, int whole, pw_error *error);
 
 /* ---- A run compared with a reference ---- */

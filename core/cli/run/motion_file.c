@@ -4,6 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include "motion.h"
+#include "util.h"
 
 #define FILE_SAME 1e-9 /* relative to the end: smaller differences of times are ignored */
 
@@ -18,6 +19,8 @@ typedef struct {
   double *sign;  /* factor to SI units; negative for reactions, which are -lambda */
   double second; /* unit of the time [s] */
   int columns, known;
+  pw_names index; /* in a motion, of states and reactions */
+  pw_arena names;
 } file_reader;
 
 /* ---- Lines ---- */
@@ -35,8 +38,8 @@ static int file_read_line (file_reader *in) {
   do {
     if (in->room - used < 2) {
       size_t room = in->room ? 2 * in->room : 1 << 12;
-      char *more = room > 2 * FILE_LINE ? NULL : realloc (in->line, room);
-      if (more == NULL) return file_fail (in, room > 2 * FILE_LINE ? EOVERFLOW : ENOMEM);
+      char *more = room > FILE_LINE ? NULL : realloc (in->line, room);
+      if (more == NULL) return file_fail (in, room > FILE_LINE ? EOVERFLOW : ENOMEM);
       in->line = more;
       in->room = room;
     }
@@ -77,28 +80,46 @@ static int file_number (const file_reader *in, const char *cell, double *value, 
 
 /* ---- Columns ---- */
 
-/* The index in a motion of a column "frame.x [m]", or -1. */
-static int file_place (const pw_system *s, const char *name, size_t n, double *sign) {
-  char known[300];
+static int file_index (file_reader *in, const pw_system *s) {
+  char name[300];
+  int states = 2 * pw_system_coordinates (s), rows = pw_system_rows (s);
+  if (pw_names_open (&in->index, (size_t)(states + rows)) != PW_OK) return PW_RESOURCE;
+  for (int i = 0; i < states + rows; i++) {
+    if (i < states)
+      pw_system_state_name (s, i, name, sizeof name);
+    else
+      pw_system_reaction_name (s, i - states, name, sizeof name);
+    const char *copy = pw_arena_copy (&in->names, name);
+    if (copy == NULL) return PW_RESOURCE;
+    pw_names_add (&in->index, copy, i);
+  }
+  return PW_OK;
+}
+
+/* Finds column i, such as "frame.x [m]", in a motion. */
+static int file_column (file_reader *in, int i, const pw_system *s, const char *cell, pw_error *error) {
+  char name[300], unit[260];
+  double factor;
   int states = 2 * pw_system_coordinates (s);
-  *sign = 1;
-  for (int i = 0; i < states; i++)
-    if (strlen (pw_system_state_name (s, i, known, sizeof known)) == n && memcmp (known, name, n) == 0) return i;
-  *sign = -1;
-  for (int i = 0; i < pw_system_rows (s); i++)
-    if (strlen (pw_system_reaction_name (s, i, known, sizeof known)) == n && memcmp (known, name, n) == 0)
-      return states + i;
-  return -1;
+  snprintf (name, sizeof name, "%.*s", (int)pw_unit_split (cell, unit, sizeof unit), cell);
+  int place = in->place[i] = pw_names_find (&in->index, name), is_state = place < states;
+  if (place < 0) return PW_OK;
+  const char *wanted = is_state ? pw_system_state_unit (s, place) : pw_system_reaction_unit (s, place - states);
+  if (pw_unit_check (cell, wanted, &factor, unit, sizeof unit) != PW_OK)
+    return pw_fail (error, PW_INPUT, "--reference %s: %s", in->path, unit);
+  in->sign[i] = is_state ? factor : -factor;
+  in->known += is_state;
+  return PW_OK;
 }
 
 static int file_columns (file_reader *in, const pw_system *s, pw_error *error) {
   char example[300], unit[260], *rest;
-  int n = pw_system_coordinates (s);
   if (!file_line (in)) return pw_fail (error, PW_INPUT, "--reference %s: the file is empty", in->path);
   for (const char *c = in->line; *c; c++) in->columns += *c == ',';
   in->place = calloc ((size_t)in->columns + 1, sizeof *in->place);
   in->sign = calloc ((size_t)in->columns + 1, sizeof *in->sign);
-  if (in->place == NULL || in->sign == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
+  if (in->place == NULL || in->sign == NULL || file_index (in, s) != PW_OK)
+    return pw_fail (error, PW_RESOURCE, "out of memory");
   rest = in->line;
   const char *first = file_cell (&rest);
   if (pw_unit_split (first, unit, sizeof unit) != 1 || *first != 't')
@@ -106,18 +127,8 @@ static int file_columns (file_reader *in, const pw_system *s, pw_error *error) {
                     first);
   if (pw_unit_check (first, "s", &in->second, unit, sizeof unit) != PW_OK)
     return pw_fail (error, PW_INPUT, "--reference %s: %s", in->path, unit);
-  for (int i = 0; i < in->columns; i++) {
-    const char *cell = file_cell (&rest);
-    double factor = 1;
-    in->place[i] = file_place (s, cell, pw_unit_split (cell, unit, sizeof unit), &in->sign[i]);
-    in->known += in->place[i] >= 0 && in->place[i] < 2 * n;
-    const char *wanted = in->place[i] < 0       ? NULL
-                         : in->place[i] < 2 * n ? pw_system_state_unit (s, in->place[i])
-                                                : pw_system_reaction_unit (s, in->place[i] - 2 * n);
-    if (in->place[i] >= 0 && pw_unit_check (cell, wanted, &factor, unit, sizeof unit) != PW_OK)
-      return pw_fail (error, PW_INPUT, "--reference %s: %s", in->path, unit);
-    in->sign[i] *= factor;
-  }
+  for (int i = 0; i < in->columns; i++)
+    if (file_column (in, i, s, file_cell (&rest), error) != PW_OK) return error->status;
   if (in->known) return PW_OK;
   return pw_fail (error, PW_INPUT, "--reference %s: no column is a state of this model, such as \"%s\"", in->path,
                   pw_system_state_name (s, 0, example, sizeof example));
@@ -140,8 +151,9 @@ static int file_count (file_reader *in, double *t_end, int whole, int *rows, pw_
   char *rest;
   int status;
   for (*rows = 0; (status = file_time (in, &rest, &t, error)) == PW_OK;) {
-    if (!(t > before))
-      return pw_fail (error, PW_INPUT, "--reference %s: line %ld: times must increase", in->path, in->number);
+    if (!(t > before) || isinf (t))
+      return pw_fail (error, PW_INPUT, "--reference %s: line %ld: times must be finite and increase", in->path,
+                      in->number);
     before = t;
     if (t <= 0 || (*t_end > 0 && t > *t_end * (1 + FILE_SAME))) continue;
     last = t;
@@ -223,5 +235,7 @@ int pw_motion_read (pw_motion *m, const pw_system *s, const char *path, double *
   free (in.line);
   free (in.place);
   free (in.sign);
+  pw_names_close (&in.index);
+  pw_arena_free (&in.names);
   return own.status;
 }

@@ -98,9 +98,10 @@ static int run_engine (run *x, pw_error *error) {
   int status = pw_cli_specialise (x->line.specialise, &when, error);
   if (status == PW_OK) status = pw_checkpoints_open (x, &when, error);
   if (status != PW_OK) return status;
-  if (x->profile && when == PW_SPECIALISE_AUTO) when = PW_SPECIALISE_NEVER; /* stages are those of the general engine */
-  pw_cli_engine_open (&x->engine, x->m.system, when, pw_method_steps (x->method, &x->settings, d.step, x->t_end));
-  if (x->profile && when == PW_SPECIALISE_NEVER) strcpy (x->engine.why, "--profile");
+  int general = x->profile && when == PW_SPECIALISE_AUTO; /* the stages of --profile are those of the general engine */
+  pw_cli_engine_open (&x->engine, x->m.system, general ? PW_SPECIALISE_NEVER : when,
+                      pw_method_steps (x->method, &x->settings, d.step, x->t_end));
+  if (general) strcpy (x->engine.why, "--profile");
   x->settings.specialised = pw_cli_engine_code (&x->engine);
   return PW_OK;
 }
@@ -211,9 +212,9 @@ static int run_integrate (run *x, pw_error *error) {
   int status = run_steps (x, error);
   pw_progress_end (&x->progress);
   pw_stop_release ();
-  if (status == PW_STOPPED) status = pw_limit_fail (&x->limit, pw_run_time (x->r), error);
   const pw_statistics *s = pw_run_statistics (x->r);
-  x->limited = status == PW_METHOD && (pw_limit_over (&x->limit) || s->steps + s->rejected >= x->settings.max_steps);
+  x->limited = status == PW_STOPPED || (status == PW_METHOD && s->steps + s->rejected >= x->settings.max_steps);
+  if (status == PW_STOPPED) status = pw_limit_fail (&x->limit, pw_run_time (x->r), error);
   return status;
 }
 
@@ -243,10 +244,10 @@ static void run_add_error (pw_error *error, const pw_error *own) {
 /* The JSON summary, written however the run has ended, except that a failed resumption does not replace the previous
  * summary. */
 static void run_write_json (run *x, const pw_summary *summary, const pw_sample *sample, pw_error *error) {
-  pw_output *o = x->output[PW_RUN_SUMMARY];
   pw_error own = { 0 };
   if (x->check.resume && !x->resumed) run_discard (x, PW_RUN_SUMMARY);
-  if (x->output[PW_RUN_SUMMARY] == NULL) return;
+  pw_output *o = x->output[PW_RUN_SUMMARY];
+  if (o == NULL) return;
   if (pw_json_write (summary, x->m.system, sample, x->energy, x->r ? pw_run_statistics (x->r) : NULL, o, &own) != PW_OK)
     x->lost |= pw_output_is_file (o);
   run_add_error (error, &own);
@@ -301,6 +302,7 @@ static int run_prints_file (const run *x) {
 
 /* Everything after the last step: table, summary, figures, final message. */
 static int run_finish (run *x, pw_error *error) {
+  static const char *const what[PW_RUN_OUTPUTS] = { "the table so far", "the page", "the summary" };
   char reason[80] = "", t[32];
   int interrupted = error->status == PW_OK && pw_stop;
   pw_sample sample, *last = NULL;
@@ -321,8 +323,8 @@ static int run_finish (run *x, pw_error *error) {
   if (interrupted) pw_cli_say ("pinwheel: %s\n", reason);
   int status = pw_cli_end (error);
   error->status = PW_OK;
-  if (*x->part[PW_RUN_TABLE]) pw_cli_say ("pinwheel: the table so far is kept in %s\n", x->part[PW_RUN_TABLE]);
-  if (*x->part[PW_RUN_SUMMARY]) pw_cli_say ("pinwheel: the summary is kept in %s\n", x->part[PW_RUN_SUMMARY]);
+  for (int i = 0; i < PW_RUN_OUTPUTS; i++)
+    if (*x->part[i]) pw_cli_say ("pinwheel: %s is kept in %s\n", what[i], x->part[i]);
   if (x->check.saved > 0 && (interrupted || x->limited || status == -PW_RESOURCE))
     pw_cli_say ("pinwheel: --resume %s continues from t = %s s\n", x->check.path, pw_format (t, x->check.saved, 6));
   return interrupted && status == 0 ? PW_INTERRUPTED : status;

@@ -47,7 +47,7 @@ typedef struct {
   pw_progress progress;
   /* in progress */
   long row;                        /* rows written */
-  int limited;                     /* 1: --limit or --max-steps has stopped it */
+  int limited;                     /* 1: --limit, --max-steps or a signal has stopped it */
   int resumed;                     /* 1: the state of the checkpoint has been loaded */
   long batch;                      /* steps between checks of signals and progress */
   double cpu;                      /* of the method [s] */

@@ -381,8 +381,7 @@ const pw_command pw_cli_compare = {
   .synopsis = "MODEL [OPTION...]",
   .summary = "compare the accuracy and cost of methods against a reference solution",
   .help = "Run a model by several methods, each with a ladder of tolerances or step sizes, and compare their errors "
-          "against "
-          "a reference solution with their processor times.",
+          "against a reference solution with their processor times.",
   .least = 1,
   .most = 1,
   .size = sizeof (pw_compare),

@@ -8,8 +8,8 @@ enum { CONCLUSION_LEVELS = 3, CONCLUSION_WIDTH = 14, CONCLUSION_REASON = 70 };
 static const int conclusion_digits[CONCLUSION_LEVELS] = { 3, 6, 9 };
 
 typedef struct {
-  double cpu; /* [s]; NaN: no run is as accurate */
-  int at_most; /* 1: an upper bound: there is no less accurate run, or its error is only known to be below the uncertainty */
+  double cpu;  /* [s]; NaN: no run is as accurate */
+  int at_most; /* 1: an upper bound, see conclusion_cost */
 } cost;
 
 typedef struct {
@@ -168,16 +168,18 @@ static void conclusion_failure (const pw_study *x, int line) {
 
 /* One line for all methods that the limit has ended. */
 static void conclusion_limit (const pw_study *x) {
-  const char *between = "stopped by the limit of %s s: ";
   char text[32];
+  int found = 0;
   for (int i = 0; i < x->methods; i++) {
     const pw_row *first = conclusion_first (x, i, 1u << ROW_STOPPED | 1u << ROW_SKIPPED);
     if (first == NULL) continue;
-    printf (between, pw_format (text, x->cpu_end, 4));
+    if (found++ == 0)
+      printf ("stopped by the limit of %s s: ", pw_format (text, x->cpu_end, 4));
+    else
+      printf (", ");
     printf ("%s from %s", first->method, pw_format (text, first->level, 4));
-    between = ", ";
   }
-  if (*between == ',') putchar ('\n');
+  if (found) putchar ('\n');
 }
 
 void pw_conclusion_print (const pw_study *s, const pw_reference *t, int column) {

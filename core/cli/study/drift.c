@@ -188,7 +188,7 @@ typedef struct {
 
 /* The larger of both, NaN if one is. */
 static void drift_raise (double *most, double value) {
-  if (!(value <= *most)) *most = value;
+  if (!isnan (*most) && !(value <= *most)) *most = value;
 }
 
 /* The part of the run that a time belongs to, its end included. */
@@ -254,7 +254,7 @@ static int drift_write_times (const pw_study *x, pw_error *error) {
   int status = pw_text_line (&t, pw_output_stream (o), x->folder, error);
   for (const pw_row *r = x->row; r < x->row + x->rows; r++)
     for (int k = 0; status == PW_OK && r->points > 1 && k < r->points; k++) {
-      if (isnan (r->point[k][1 + DRIFT_VELOCITY])) continue;
+      if (isnan (r->point[k][1])) continue;
       pw_text_cell (&t, r->method);
       for (int i = 0; i <= DRIFT_QUANTITIES; i++) pw_text_number (&t, r->point[k][i]);
       status = pw_text_line (&t, pw_output_stream (o), x->folder, error);

@@ -90,7 +90,7 @@ static int reference_run (pw_study *x, void *context, int i, pw_error *error) {
   return c->good ? PW_OK : pw_study_outcome (x, &c->row, status, &own, error);
 }
 
-/* The distance of two motions, relative to their size. */
+/* The distance of two motions, relative to their size; NaN if it is unknown. */
 static double reference_distance (const pw_system *s, const candidate *a, const candidate *b) {
   double error[MOTION_ERRORS], most = 0;
   pw_reference t = { .motion = a->motion };
@@ -98,7 +98,7 @@ static double reference_distance (const pw_system *s, const candidate *a, const 
   pw_motion_distance (s, &a->motion, &b->motion, error);
   for (int i = 0; i < MOTION_UNITS; i++) {
     double part = error[MOTION_MOST + i] / (t.size[i] > 0 ? t.size[i] : 1);
-    if (!(part <= most)) most = part;
+    if (!isnan (most) && !(part <= most)) most = part;
   }
   return most;
 }

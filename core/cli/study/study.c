@@ -262,11 +262,11 @@ static int study_method (pw_study *x, void *context, int line, pw_error *error) 
 
 /* Writes the rows that are done after one that an interruption has stopped. */
 static int study_write_kept (pw_study *x, pw_error *error) {
-  for (const pw_row *r = x->row + x->done; r < x->row + x->rows; r++)
-    if (r->measured && pw_table_row (x, r, error) != PW_OK)
-      return error->status;
-    else
-      x->done += r->measured;
+  for (const pw_row *r = x->row + x->done; r < x->row + x->rows; r++) {
+    if (!r->measured) continue;
+    if (pw_table_row (x, r, error) != PW_OK) return error->status;
+    x->done++;
+  }
   return PW_RETRY;
 }
 

@@ -95,11 +95,12 @@ int pw_table_row (pw_study *x, const pw_row *r, pw_error *error) {
 
 /* ---- Figures ---- */
 
-/* The next defined point of a group, after point *k of *r; NULL after the last one. */
+/* The next defined point of a group, after point *k of *r; NULL after the last one.  Coordinate 0 may be set in advance, the
+ * others are set together. */
 static const double *table_next (const pw_study *x, int group, const pw_row **r, int *k) {
   for (; *r < x->row + x->rows; ++*r, *k = -1)
     while ((*r)->group == group && ++*k < (*r)->points)
-      if (!isnan ((*r)->point[*k][2])) return (*r)->point[*k];
+      if (!isnan ((*r)->point[*k][1])) return (*r)->point[*k];
   return NULL;
 }
 

@@ -73,14 +73,27 @@ static int sweep_read (const sweep *x, pw_error *error) {
 /* The first option given that cannot be combined with --merge; NULL if there is none. */
 static const char *sweep_not_for_merge (const sweep *x) {
   const pw_cli_line *l = &x->line;
-  const void *given[] = { x->ranges,     l->method,    l->t_end,     l->step,           l->rtol,
-                          l->atol,       l->limit,     l->sets,      l->max_steps,      l->starts,
-                          l->specialise, x->jobs_text, x->part_text, x->cpu ? x : NULL, x->lanes_text };
-  static const char *const name[] = { "--vary",       "--method", "--t-end", "--step",      "--rtol",
-                                      "--atol",       "--limit",  "--set",   "--max-steps", "--start",
-                                      "--specialise", "--jobs",   "--part",  "--cpu",       "--lanes" };
-  for (size_t i = 0; i < sizeof given / sizeof *given; i++)
-    if (given[i]) return name[i];
+  const struct {
+    const char *name;
+    const void *given;
+  } option[] = { { "--vary", x->ranges },
+                 { "--method", l->method },
+                 { "--t-end", l->t_end },
+                 { "--step", l->step },
+                 { "--rtol", l->rtol },
+                 { "--atol", l->atol },
+                 { "--limit", l->limit },
+                 { "--set", l->sets },
+                 { "--max-steps", l->max_steps },
+                 { "--start", l->starts },
+                 { "--specialise", l->specialise },
+                 { "--jobs", x->jobs_text },
+                 { "--part", x->part_text },
+                 { "--cpu", x->cpu ? x : NULL },
+                 { "--lanes", x->lanes_text },
+                 { "--max-file", l->max_file } };
+  for (size_t i = 0; i < sizeof option / sizeof *option; i++)
+    if (option[i].given) return option[i].name;
   return NULL;
 }
 
@@ -108,7 +121,6 @@ static int sweep_lanes (sweep *x, pw_error *error) {
 static int sweep_settings (sweep *x, pw_error *error) {
   pw_plan *p = &x->plan;
   pw_run_defaults d = pw_cli_defaults (pw_file_table (p->file));
-  p->model = x->line.argument[0];
   p->method = x->line.method ? x->line.method : d.method;
   p->sets = x->line.sets;
   p->starts = x->line.starts;
@@ -151,7 +163,11 @@ static const pw_specialised *sweep_compile (sweep *x, char *text, const pw_syste
     while (!c->ready) pthread_cond_wait (&x->compiled, &x->lock);
     return pw_scene_code_table (c->code);
   }
-  if ((c = malloc (sizeof *c)) == NULL) return free (text), NULL;
+  if ((c = malloc (sizeof *c)) == NULL) {
+    free (text);
+    pw_fail (error, PW_RESOURCE, "out of memory");
+    return NULL;
+  }
   *c = (sweep_code){ .text = text, .next = x->codes };
   x->codes = c;
   pthread_mutex_unlock (&x->lock);

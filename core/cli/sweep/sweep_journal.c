@@ -259,17 +259,19 @@ typedef struct {
 
 static int table_open_part (table_part *x, const char *path, pw_error *error) {
   const char *reason;
+  char numbers[40] = "";
   size_t size;
   FILE *f = pw_open_input (path, &reason);
   x->path = path;
   if (f == NULL) return pw_fail (error, pw_open_input_status (), "cannot open the part %s: %s", path, reason);
   int status = journal_map_open (&x->map, fileno (f)), why = errno;
   fclose (f);
-  if (status != PW_OK) return pw_fail (error, PW_INPUT, "cannot read the part %s: %s", path, strerror (why));
+  if (status != PW_OK) return pw_fail (error, PW_RESOURCE, "cannot read the part %s: %s", path, strerror (why));
   x->rows = x->at = pw_fingerprint_end (PW_SWEEP_MAGIC, x->map.at, x->map.end);
   const char *part = x->rows ? pw_fingerprint_value (x->map.at, x->rows, "part", &size) : NULL;
-  if (part == NULL || sscanf (part, "%9d/%9d", &x->part, &x->parts) != 2 || x->parts < 1 || x->part < 1 ||
-      x->part > x->parts)
+  if (part)
+    snprintf (numbers, sizeof numbers, "%.*s", (int)(size < 39 ? size : 39), part); /* a map is not terminated */
+  if (sscanf (numbers, "%9d/%9d", &x->part, &x->parts) != 2 || x->parts < 1 || x->part < 1 || x->part > x->parts)
     return pw_fail (error, PW_INPUT, "%s is not a part of a sweep: parts are written by --part I/N", path);
   return PW_OK;
 }
@@ -306,8 +308,9 @@ static int table_weave (table_part *x, int count, FILE *stream, pw_tally *tally,
   size_t size = 0;
   const char *value = pw_fingerprint_value (x->map.at, x->rows, "rows", &size);
   const char *head = pw_fingerprint_value (x->map.at, x->rows, "columns", &size);
-  long rows = value ? strtol (value, NULL, 10) : -1;
-  if (head == NULL) return pw_fail (error, PW_INPUT, "%s has no columns: it was changed", x->path);
+  if (value == NULL || head == NULL)
+    return pw_fail (error, PW_INPUT, "%s has no number of rows or no columns: it was changed", x->path);
+  long rows = strtol (value, NULL, 10);
   fwrite (head, 1, size, stream);
   putc ('\n', stream);
   for (long r = 0; r < rows; r++) {

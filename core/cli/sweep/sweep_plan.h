@@ -14,7 +14,7 @@
 
 typedef struct {
   /* from the command line; read only */
-  const char *model, *method;
+  const char *method;
   const char **sets, **starts;
   pw_settings settings;
   double t_end; /* [s] */

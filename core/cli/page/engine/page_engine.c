@@ -13,13 +13,12 @@ __attribute__ ((import_module ("page"), import_name ("now"))) double pw_page_now
 
 /* ---- Files ---- */
 
-typedef struct {
+static struct {
   const char *name, *bytes;
   size_t size;
-} page_part;
-
-static page_part *page_file;
+} *page_file;
 static int page_files;
+static size_t page_room;
 
 PAGE_EXPORT (allocate) void *page_allocate (size_t size) {
   return calloc (1, size);
@@ -27,10 +26,10 @@ PAGE_EXPORT (allocate) void *page_allocate (size_t size) {
 
 /* The name and bytes belong to the engine from now on. */
 PAGE_EXPORT (file) void page_add_file (const char *name, const char *bytes, size_t size) {
-  page_part *more = realloc (page_file, (size_t)(page_files + 1) * sizeof *more);
-  if (more == NULL) return;
-  page_file = more;
-  page_file[page_files++] = (page_part){ name, bytes, size };
+  if (pw_grow (&page_file, (size_t)page_files, &page_room, sizeof *page_file) != PW_OK) return; /* not found later */
+  page_file[page_files].name = name;
+  page_file[page_files].bytes = bytes;
+  page_file[page_files++].size = size;
 }
 
 static int page_find_file (const char *name) {
