@@ -167,8 +167,8 @@ pw_file *pw_cli_file (const pw_cli_line *l, pw_error *error);
 int pw_cli_open (pw_cli_model *m, const pw_cli_line *l, pw_error *error);
 void pw_cli_close_model (pw_cli_model *m);
 
-/* Applies every "NAME=VALUE" of a NULL-terminated list to a model by pw_model_set or pw_model_set_initial; `option`
- * ("--set") is for messages. */
+/* Applies every "NAME=VALUE" of a NULL-terminated list to a model by pw_model_set or pw_model_set_initial; `option` is the
+ * list's, "--set" or "--start".  PW_INPUT. */
 int pw_cli_apply (pw_model *m, const char *option, const char **list,
                   int (*set) (pw_model *m, const char *name, double value, pw_error *error), pw_error *error);
 
@@ -186,7 +186,7 @@ typedef struct {
 
 /* Reads the option; the name need not be that of a parameter. */
 int pw_cli_vary_read (pw_cli_vary *v, const pw_cli_line *l, const pw_cli_model *m, const char *text, pw_error *error);
-/* PW_INPUT if that parameter cannot vary in the range, or is also set. */
+/* PW_INPUT if the name, which is that of a parameter, cannot vary in the range, or is also set. */
 int pw_cli_vary_check (const pw_cli_vary *v, pw_error *error);
 /* Shows the progress of a branch; the first call, with a progress of zeros, starts it. */
 void pw_cli_vary_progress (const pw_cli_vary *v, pw_progress *p, double from, double value, double to);

@@ -71,32 +71,32 @@ void pw_fingerprint_initial (pw_text *t, const char **starts) {
 
 /* ---- Reading ---- */
 
-static const char print_last[] = "end\n";
+static const char fingerprint_last[] = "end\n";
 
 /* The next line, or NULL at the end or if it is not whole. */
-static const char *print_next (const char *at, const char *end) {
+static const char *fingerprint_next (const char *at, const char *end) {
   const char *newline = at < end ? memchr (at, '\n', (size_t)(end - at)) : NULL;
   return newline ? newline + 1 : NULL;
 }
 
 const char *pw_fingerprint_end (const char *magic, const char *at, const char *end) {
-  size_t n = strlen (magic), last = sizeof print_last - 1;
+  size_t n = strlen (magic), last = sizeof fingerprint_last - 1;
   if ((size_t)(end - at) < n || memcmp (at, magic, n) != 0) return NULL;
-  for (const char *next; (next = print_next (at, end)) != NULL; at = next)
-    if ((size_t)(next - at) == last && memcmp (at, print_last, last) == 0) return next;
+  for (const char *next; (next = fingerprint_next (at, end)) != NULL; at = next)
+    if ((size_t)(next - at) == last && memcmp (at, fingerprint_last, last) == 0) return next;
   return NULL;
 }
 
 /* The key's size in a line; 0 if the line has none. */
-static size_t print_key (const char *line, const char *next) {
+static size_t fingerprint_key (const char *line, const char *next) {
   for (const char *c = line; c + 3 < next; c++)
     if (memcmp (c, " = ", 3) == 0) return (size_t)(c - line);
   return 0;
 }
 
-static const char *print_find (const char *at, const char *end, const char *key, size_t key_size, size_t *size) {
-  for (const char *next; (next = print_next (at, end)) != NULL; at = next)
-    if (print_key (at, next) == key_size && memcmp (at, key, key_size) == 0) {
+static const char *fingerprint_find (const char *at, const char *end, const char *key, size_t key_size, size_t *size) {
+  for (const char *next; (next = fingerprint_next (at, end)) != NULL; at = next)
+    if (fingerprint_key (at, next) == key_size && memcmp (at, key, key_size) == 0) {
       *size = (size_t)(next - at) - key_size - 4;
       return at + key_size + 3;
     }
@@ -104,16 +104,16 @@ static const char *print_find (const char *at, const char *end, const char *key,
 }
 
 const char *pw_fingerprint_value (const char *at, const char *end, const char *key, size_t *size) {
-  return print_find (at, end, key, strlen (key), size);
+  return fingerprint_find (at, end, key, strlen (key), size);
 }
 
 /* Looks for the first line of `a` that is not in `b`. */
-static int print_missing (const char *a, const char *a_end, const char *b, const char *b_end, int parts,
-                          const char *words[2], char *text, size_t size) {
-  for (const char *next; (next = print_next (a, a_end)) != NULL; a = next) {
-    size_t n = print_key (a, next), value = (size_t)(next - a) - n - 4, other;
+static int fingerprint_missing (const char *a, const char *a_end, const char *b, const char *b_end, int parts,
+                                const char *words[2], char *text, size_t size) {
+  for (const char *next; (next = fingerprint_next (a, a_end)) != NULL; a = next) {
+    size_t n = fingerprint_key (a, next), value = (size_t)(next - a) - n - 4, other;
     if (n == 0 || (!parts && n == 4 && memcmp (a, "part", 4) == 0)) continue;
-    const char *found = print_find (b, b_end, a, n, &other);
+    const char *found = fingerprint_find (b, b_end, a, n, &other);
     if (found && other == value && memcmp (found, a + n + 3, value) == 0) continue;
     int shown = value < 120 ? (int)value : 120, seen = found && other < 120 ? (int)other : found ? 120 : 0;
     snprintf (text, size, "%.*s is %.*s %s and %.*s %s", (int)n, a, shown, a + n + 3, words[0], found ? seen : 7,
@@ -126,6 +126,6 @@ static int print_missing (const char *a, const char *a_end, const char *b, const
 int pw_fingerprint_differ (const char *a, const char *a_end, const char *b, const char *b_end, int parts,
                            const char *words[2], char *text, size_t size) {
   const char *turned[2] = { words[1], words[0] };
-  return print_missing (a, a_end, b, b_end, parts, words, text, size) ||
-         print_missing (b, b_end, a, a_end, parts, turned, text, size);
+  return fingerprint_missing (a, a_end, b, b_end, parts, words, text, size) ||
+         fingerprint_missing (b, b_end, a, a_end, parts, turned, text, size);
 }

@@ -11,9 +11,9 @@
 typedef struct {
   FILE *f; /* NULL: standard output */
   int pass;
-  int column, width[12];
-  int pad;    /* blanks before the next cell */
-  int indent; /* characters of the row so far, with those blanks */
+  int column, width[12]; /* the current column, of at most 12 */
+  int pad;               /* blanks before the next cell */
+  int indent;            /* characters of the row so far, with those blanks */
 } pw_table;
 
 int pw_table_pass (pw_table *t);

@@ -208,7 +208,7 @@ static int study_open_folder (pw_study *x, pw_error *error) {
   if (pw_figures_of (&x->figures, &x->line, &x->m, x->folder, error) != PW_OK) return error->status;
   if (pw_cli_uses (&x->line, x->m.file, use, sizeof use / sizeof *use, error) != PW_OK) return error->status;
   x->lock = pw_figure_folder (x->folder, error);
-  return x->lock < 0 ? error->status : pw_table_open (x, error);
+  return x->lock < 0 ? error->status : pw_study_open_table (x, error);
 }
 
 /* Estimated number of steps of all runs. */
@@ -248,7 +248,7 @@ static int study_row (pw_study *x, void *context, int i, pw_error *error) {
   x->row[i].measured = 1;
   pw_progress_end (&x->progress);
   for (; status == PW_OK && x->done < x->rows && x->row[x->done].measured; x->done++)
-    status = pw_table_row (x, &x->row[x->done], error);
+    status = pw_study_write_row (x, &x->row[x->done], error);
   pthread_mutex_unlock (&x->mutex);
   return status;
 }
@@ -264,7 +264,7 @@ static int study_method (pw_study *x, void *context, int line, pw_error *error) 
 static int study_write_kept (pw_study *x, pw_error *error) {
   for (const pw_row *r = x->row + x->done; r < x->row + x->rows; r++) {
     if (!r->measured) continue;
-    if (pw_table_row (x, r, error) != PW_OK) return error->status;
+    if (pw_study_write_row (x, r, error) != PW_OK) return error->status;
     x->done++;
   }
   return PW_RETRY;

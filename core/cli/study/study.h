@@ -147,9 +147,9 @@ int pw_study_outcome (const pw_study *x, pw_row *r, int status, const pw_error *
 /* ---- Tables and figures (study_table.c) ---- */
 
 /* Opens the CSV file with its first line. */
-int pw_table_open (pw_study *x, pw_error *error);
+int pw_study_open_table (pw_study *x, pw_error *error);
 /* Prints a row unless the study is quiet, and writes it into the CSV file. */
-int pw_table_row (pw_study *x, const pw_row *r, pw_error *error);
+int pw_study_write_row (pw_study *x, const pw_row *r, pw_error *error);
 
 /* 1 if a coordinate of the points of a group is positive somewhere. */
 int pw_study_positive (const pw_study *x, int group, int coordinate);

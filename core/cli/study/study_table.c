@@ -21,7 +21,7 @@ static int table_is_end (const pw_study_column *c) {
 /* ---- CSV ---- */
 
 /* Rows are written as they finish, to NAME.part, which remains if the study is stopped. */
-int pw_table_open (pw_study *x, pw_error *error) {
+int pw_study_open_table (pw_study *x, pw_error *error) {
   pw_text t = { .at = NULL };
   x->csv = pw_figure_open (x->folder, x->type->tables[0], error);
   if (x->csv == NULL) return error->status;
@@ -87,7 +87,7 @@ static void table_print (const pw_study *x, const pw_row *r) {
   fflush (stdout);
 }
 
-int pw_table_row (pw_study *x, const pw_row *r, pw_error *error) {
+int pw_study_write_row (pw_study *x, const pw_row *r, pw_error *error) {
   if (!x->quiet && (r == x->row || r->group != r[-1].group)) table_heading (x, r->group);
   if (!x->quiet) table_print (x, r);
   return x->csv ? table_write (x, r, error) : PW_OK;

@@ -389,7 +389,7 @@ static int sweep_merge (sweep *x, pw_error *error) {
   const char *option = sweep_not_for_merge (x);
   if (option)
     return pw_fail (error, PW_INPUT, "%s cannot be combined with --merge: the parts define the sweep", option);
-  int status = pw_table_merge (x->line.argument, x->line.arguments, x->path, &tally, error);
+  int status = pw_sweep_merge (x->line.argument, x->line.arguments, x->path, &tally, error);
   return status == PW_OK ? sweep_verdict (&tally, 0, error) : status;
 }
 
@@ -407,7 +407,7 @@ static int sweep_finish (sweep *x, pw_error *error) {
                 x->journal.done, x->journal.rows, x->journal.part);
     return PW_INTERRUPTED;
   }
-  int status = pw_table_finish (&x->journal, &x->plan, &tally, error);
+  int status = pw_sweep_finish (&x->journal, &x->plan, &tally, error);
   return status == PW_OK ? sweep_verdict (&tally, x->plan.parts > 1, error) : status;
 }
 

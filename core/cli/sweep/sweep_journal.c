@@ -229,7 +229,7 @@ static int table_write (const pw_journal *j, const pw_plan *p, const journal_map
   return PW_OK;
 }
 
-int pw_table_finish (pw_journal *j, const pw_plan *p, pw_tally *tally, pw_error *error) {
+int pw_sweep_finish (pw_journal *j, const pw_plan *p, pw_tally *tally, pw_error *error) {
   journal_map map;
   pw_error own = { 0 };
   *tally = (pw_tally){ .rows = 0 };
@@ -326,7 +326,7 @@ static int table_weave (table_part *x, int count, FILE *stream, pw_tally *tally,
   return PW_OK;
 }
 
-int pw_table_merge (const char *const *parts, int count, const char *path, pw_tally *tally, pw_error *error) {
+int pw_sweep_merge (const char *const *parts, int count, const char *path, pw_tally *tally, pw_error *error) {
   *tally = (pw_tally){ .rows = 0 };
   pw_output *o = NULL;
   table_part *x = calloc ((size_t)count, sizeof *x);

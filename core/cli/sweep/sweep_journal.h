@@ -34,8 +34,8 @@ typedef struct {
 } pw_tally;
 
 /* Writes the table of a complete journal, or its part, and removes the journal. */
-int pw_table_finish (pw_journal *j, const pw_plan *p, pw_tally *tally, pw_error *error);
+int pw_sweep_finish (pw_journal *j, const pw_plan *p, pw_tally *tally, pw_error *error);
 /* Writes the table at `path` from all parts of a sweep. */
-int pw_table_merge (const char *const *parts, int count, const char *path, pw_tally *tally, pw_error *error);
+int pw_sweep_merge (const char *const *parts, int count, const char *path, pw_tally *tally, pw_error *error);
 
 #endif
