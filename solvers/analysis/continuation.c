@@ -377,7 +377,6 @@ static int branch_advance (pw_branch *b, int (*events) (void *context, pw_error 
   if (b->steps++ > b->limit) return pw_fail (why, PW_METHOD, "the branch has more than %d points", b->limit), PW_RETRY;
   int status = branch_reach (b, error);
   if (status == PW_RETRY) status = pw_branch_step (b, error);
-  if (status == PW_OK) *why = (pw_error){ 0 };
   if (status == PW_OK) status = branch_end (b, error);
   if (status == PW_OK && b->folded) {
     status = pw_branch_locate (b, branch_fold, b, error);
@@ -386,6 +385,7 @@ static int branch_advance (pw_branch *b, int (*events) (void *context, pw_error 
   if (status == PW_OK) status = events (b->of.context, error);
   if (status == PW_RETRY && !*why->text) pw_fail (why, PW_METHOD, "Newton's method fails at the smallest step");
   if (status != PW_OK) return status;
+  *why = (pw_error){ 0 }; /* of shorter steps */
   branch_put (b, &b->at, PW_BRANCH_POINT, 1);
   b->ended |= branch_closed (b);
   return PW_OK;

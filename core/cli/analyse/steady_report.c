@@ -185,17 +185,25 @@ static void steady_json (const void *context, pw_json *j) {
 
 /* ---- The table ---- */
 
+/* The largest number of eigenvalues of a point. */
+static int steady_eigenvalues (const pw_steady_cli *x) {
+  int most = 0;
+  for (int i = 0; i < x->points; i++)
+    if (x->point[i].unknowns > most) most = x->point[i].unknowns;
+  return most;
+}
+
 static int steady_csv (const void *context, FILE *f, pw_error *error) {
   const pw_steady_cli *x = context;
   const pw_system *s = x->m.system;
-  int states = 2 * pw_system_coordinates (s);
+  int states = 2 * pw_system_coordinates (s), most = steady_eigenvalues (x);
   pw_text t = { .at = NULL };
   char name[300];
   pw_text_cell (&t, "branch,event");
   pw_text_name (&t, x->vary_text ? x->vary.name : "parameter", x->unit);
   pw_text_cell (&t, "growing,residual");
   pw_states_head (s, &t);
-  for (int i = 1; i <= x->point->unknowns; i++)
+  for (int i = 1; i <= most; i++)
     for (int k = 0; k < 2; k++)
       snprintf (name, sizeof name, "%s%d", k ? "im" : "re", i), pw_text_name (&t, name, "1/s");
   int status = pw_text_line (&t, f, x->folder, error);
@@ -206,7 +214,8 @@ static int steady_csv (const void *context, FILE *f, pw_error *error) {
     pw_text_number (&t, p->unstable);
     pw_text_number (&t, p->residual);
     for (int i = 0; i < states; i++) pw_text_number (&t, p->state[i]);
-    for (int i = 0; i < p->unknowns; i++) pw_text_number (&t, p->re[i]), pw_text_number (&t, p->im[i]);
+    for (int i = 0; i < most; i++)
+      for (int k = 0; k < 2; k++) pw_text_number (&t, i < p->unknowns ? (k ? p->im : p->re)[i] : NAN);
     status = pw_text_line (&t, f, x->folder, error);
   }
   return status;
@@ -256,7 +265,7 @@ static int steady_data (const void *context, FILE *f, pw_error *error) {
   for (int stable = 1; stable >= 0; stable--) {
     for (int i = 0, count; i < x->points; i += count) {
       for (count = 1; i + count < x->points && x->point[i + count].branch == x->point[i].branch;) count++;
-      for (int k = 0; k < x->point->unknowns; k++) steady_line (f, x->point + i, count, k, stable);
+      for (int k = 0; k < steady_eigenvalues (x); k++) steady_line (f, x->point + i, count, k, stable);
     }
     fputs ("nan nan nan\n\n\n", f);
   }

@@ -228,7 +228,7 @@ static int search_repeat (search *p, double *u) {
     double before = p->s->found ? p->s->value[0] : NAN, value;
     nlopt_result result = nlopt_optimize (p->opt, u, &value);
     if (result == NLOPT_OUT_OF_MEMORY) return PW_RESOURCE;
-    p->s->converged = result != NLOPT_MAXEVAL_REACHED;
+    p->s->converged = (result > 0 && result != NLOPT_MAXEVAL_REACHED) || result == NLOPT_ROUNDOFF_LIMITED;
     if (!p->s->found || fabs (p->s->value[0] - before) <= SEARCH_GAIN * fabs (before)) break;
     search_point (&p->x->unknowns, p->s->best, u);
   }
