@@ -42,11 +42,11 @@ static int check_name (const pw_model *m, const char *what, const char *name, pw
                     what, PW_NAME_MAX, name, PW_NAME_MAX, strlen (name));
   if (strcmp (name, "ground") == 0)
     return pw_fail (error, PW_INPUT, "model %s: %s \"ground\": this name is reserved for the ground", m->name, what);
-  for (const char *c = name; *c; c++)
-    if (!isalnum ((unsigned char)*c) && *c != '_' && *c != '-' && !(*c & 0x80))
-      return pw_fail (error, PW_INPUT, "model %s: %s \"%s\": a name consists of letters, digits, _ and -", m->name,
-                      what, name);
-  return PW_OK;
+  int valid = pw_is_text (name);
+  for (const char *c = name; *c; c++) valid &= isalnum ((unsigned char)*c) || *c == '_' || *c == '-' || *c & 0x80;
+  if (valid) return PW_OK;
+  return pw_fail (error, PW_INPUT, "model %s: %s \"%s\": a name consists of letters, digits, _ and -", m->name, what,
+                  name);
 }
 
 int pw_model_check_body (const pw_model *m, const pw_body *b, pw_error *error) {
@@ -130,18 +130,16 @@ static int check_element (const pw_model *m, const pw_element *e, const pw_names
   if (check_name (m, e->kind->name, pw_element_name (e), error) != PW_OK) return PW_INPUT;
   for (const pw_field *f = e->kind->fields; f->name; f++)
     if (check_field (m, e, f, bodies, error) != PW_OK) return PW_INPUT;
-  const char *first = NULL;
   for (int i = 0; i < e->kind->bodies && !e->kind->each_body; i++) {
     const char *body = *(const char *const *)pw_field_at (e->kind, e->definition, PW_BODY, i);
     for (int n = 0; n < i; n++)
       if (strcmp (*(const char *const *)pw_field_at (e->kind, e->definition, PW_BODY, n), body) == 0)
         return pw_fail (error, PW_INPUT, "model %s: %s %s: %s of its bodies are \"%s\": expected different ones",
                         m->name, e->kind->name, pw_element_name (e), e->kind->bodies > 2 ? "two" : "both", body);
-    first = body;
+    if (e->kind->bodies == 1 && strcmp (body, "ground") == 0)
+      return pw_fail (error, PW_INPUT, "model %s: %s %s: expected a body other than the ground, which does not move",
+                      m->name, e->kind->name, pw_element_name (e));
   }
-  if (e->kind->bodies == 1 && first && strcmp (first, "ground") == 0)
-    return pw_fail (error, PW_INPUT, "model %s: %s %s: expected a body other than the ground, which does not move",
-                    m->name, e->kind->name, pw_element_name (e));
   return PW_OK;
 }
 

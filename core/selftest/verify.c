@@ -2,8 +2,9 @@
  * solvers.
  *
  * Each residual is divided by the sum of the absolute values of its terms, plus its unit formed from the scene's
- * length L and time T, so that round-off is about 1e-16 in any units.  Forces are compared with the largest one in
- * the scene, since those on a massless body may all be round-off. */
+ * length L and time T, so that round-off is about 1e-16 in any units.  A position residual is divided by the size that its
+ * element type states, at least L.  Forces are compared with the largest one in the scene, since those on a massless body may
+ * all be round-off. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -50,17 +51,17 @@ static void verify_products (verify *x, const pw_element_batch *k, const double 
 
 static void verify_rows (verify *x, const pw_element_batch *k, const double *v, const double *a, const double *lambda) {
   const pw_kind *kind = k->kind;
-  int n = k->b.count * kind->rows, holonomic = kind->level == PW_HOLONOMIC;
+  int n = k->b.count * kind->rows;
   verify_products (x, k, v, a, lambda);
   const double *y = verify_evaluate (x, k, kind->eta, n);
   for (int i = 0; i < n; i++) verify_add (&x->velocity[k->row + i], &x->velocity_size[k->row + i], -y[i]);
   y = verify_evaluate (x, k, kind->gamma, n);
   for (int i = 0; i < n; i++) verify_add (&x->acceleration[k->row + i], &x->acceleration_size[k->row + i], -y[i]);
-  if (!holonomic) return;
+  if (kind->level != PW_HOLONOMIC) return;
   y = verify_evaluate (x, k, kind->g, n);
   for (int i = 0; i < n; i++) x->position[k->row + i] = y[i];
   y = verify_evaluate (x, k, kind->g_size, n);
-  for (int i = 0; i < n; i++) x->position_size[k->row + i] = fmax (y[i], x->s->scale.length);
+  for (int i = 0; i < n; i++) x->position_size[k->row + i] = fmax (y[i], x->w->scale.length);
 }
 
 static void verify_forces (verify *x, const pw_element_batch *k) {
@@ -87,20 +88,20 @@ static void verify_force_sizes (verify *x) {
 
 typedef char *verify_name (const pw_system *s, int i, char *buffer, size_t size);
 
-/* The worst of n residuals; `floor` is added to each size. */
-static void verify_worst (const pw_system *s, int n, const double *residual, const double *size, double floor,
-                          verify_name *name, int first, pw_worst_residual *worst_residual) {
+/* The worst of n residuals; `unit` is added to each size. */
+static void verify_worst (const pw_system *s, int n, const double *residual, const double *size, double unit,
+                          verify_name *name, int first, pw_worst_residual *result) {
   int worst = -1;
-  *worst_residual = (pw_worst_residual){ 0 };
+  *result = (pw_worst_residual){ 0 };
   for (int i = 0; i < n; i++) {
-    double error = fabs (residual[i]), scaled = error > 0 ? error / (size[i] + floor) : error;
-    if (isnan (error)) error = scaled = INFINITY;
-    worst_residual->absolute = fmax (worst_residual->absolute, error);
-    if (worst >= 0 && scaled <= worst_residual->scaled) continue;
-    worst_residual->scaled = scaled;
+    double error = fabs (residual[i]), scaled = error > 0 ? error / (size[i] + unit) : error;
+    if (!isfinite (error)) error = scaled = INFINITY;
+    result->absolute = fmax (result->absolute, error);
+    if (worst >= 0 && scaled <= result->scaled) continue;
+    result->scaled = scaled;
     worst = i;
   }
-  if (worst >= 0) name (s, first + worst, worst_residual->name, sizeof worst_residual->name);
+  if (worst >= 0) name (s, first + worst, result->name, sizeof result->name);
 }
 
 static void verify_all (verify *x, const double *v, const double *a, const double *lambda, pw_verification *result) {

@@ -10,6 +10,10 @@
 /* Guard bytes after an element; prepare must not change them. */
 enum { COMPILE_GUARD = 64, COMPILE_MARK = 0xa5 };
 
+/* The most elements, coordinates and constraint equations: products with numbers of one element (columns, signals) are
+ * int. */
+enum { COMPILE_MOST = INT_MAX / 64 };
+
 typedef struct {
   const pw_model *m;
   pw_system *s;
@@ -25,6 +29,10 @@ typedef struct {
 
 static int compile_no_memory (const compilation *c) {
   return pw_fail (c->error, PW_RESOURCE, "model %s: out of memory", c->m->name);
+}
+
+static int compile_too_large (const compilation *c) {
+  return pw_fail (c->error, PW_INPUT, "model %s is too large", c->m->name);
 }
 
 /* Memory that belongs to the system.  NULL and the error if out of memory. */
@@ -58,7 +66,7 @@ static int compile_names (compilation *c) {
     if (pw_names_add (&c->element, name, i) >= 0)
       return pw_fail (c->error, PW_INPUT, "model %s: two elements are named \"%s\"", m->name, name);
   }
-  return pw_check_model (m, &c->body, c->error);
+  return PW_OK;
 }
 
 /* Number of elements of the system created from an element of the description. */
@@ -74,6 +82,7 @@ static int compile_types (compilation *c) {
   static const pw_level order[] = { PW_HOLONOMIC, PW_NONHOLONOMIC, PW_FORCE };
   const pw_model *m = c->m;
   size_t types = (size_t)m->elements + 1;
+  double elements = 0;
   c->kind = pw_arena_alloc (&c->scratch, types * sizeof *c->kind);
   c->count = pw_arena_alloc (&c->scratch, types * sizeof *c->count);
   c->batch_of = pw_arena_alloc (&c->scratch, types * sizeof *c->batch_of);
@@ -85,7 +94,10 @@ static int compile_types (compilation *c) {
       int k = 0;
       while (k < c->s->batches && c->kind[k] != kind) k++;
       if (k == c->s->batches) c->kind[c->s->batches++] = kind;
-      c->count[k] += compile_copies (m, kind);
+      int copies = compile_copies (m, kind);
+      elements += copies;
+      if (elements > COMPILE_MOST) return compile_too_large (c);
+      c->count[k] += copies;
       c->batch_of[i] = k;
       if (c->bytes < kind->element + COMPILE_GUARD) c->bytes = kind->element + COMPILE_GUARD;
     }
@@ -102,8 +114,7 @@ static int compile_count (const compilation *c) {
     coords += (double)c->count[k] * c->kind[k]->internal;
     rows += (double)c->count[k] * c->kind[k]->rows;
   }
-  if (coords > INT_MAX / 64 || rows > INT_MAX / 64)
-    return pw_fail (c->error, PW_INPUT, "model %s is too large", m->name);
+  if (coords > COMPILE_MOST || rows > COMPILE_MOST) return compile_too_large (c);
   s->bodies = m->bodies;
   s->coords = (int)coords;
   s->rows = (int)rows;
@@ -338,6 +349,8 @@ static int compile_initial (const compilation *c) {
   return PW_OK;
 }
 
+/* The largest distance of an element's point from the origin of its body; without any, the radius of gyration of the first
+ * body that has one, or 1 m. */
 static double compile_length (const compilation *c) {
   const pw_model *m = c->m;
   double L = 0;
@@ -391,6 +404,7 @@ static int compile_totals (const compilation *c) {
 
 static int compile_all (compilation *c) {
   int status = compile_names (c);
+  if (status == PW_OK) status = pw_check_model (c->m, &c->body, c->error);
   if (status == PW_OK) status = compile_types (c);
   if (status == PW_OK) status = compile_count (c);
   if (status == PW_OK) status = compile_arrays (c);

@@ -43,7 +43,7 @@ struct pw_system {
   int sources;             /* signals */
   int state_dependent;     /* of these, state-dependent */
   int reads;               /* total number of states they read */
-  int rheonomic;           /* batches with an eta (rheonomic constraints) */
+  int rheonomic;           /* batches with an eta: J v = eta may be other than 0 */
   pw_scale scale;          /* the time is 1 s here; a run's is in its workspace */
   const char **body_name;  /* bodies */
   double *mass;            /* coords: diagonal of M */

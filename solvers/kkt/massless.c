@@ -3,6 +3,8 @@
 #include "massless.h"
 #include "unroll.h"
 
+/* n: the number of pivots, a constant 3 in most calls, so that loops are unrolled. */
+
 /* ---- Elimination ---- */
 
 PW_INLINE void massless_copy (pw_component *c) {
@@ -58,8 +60,10 @@ static int massless_select_pivot (pw_component *c, int p) {
       double scaled = c->massless[n] ? sqrt (c->square[n]) * fabs (c->A[i * c->stride + n]) / c->row[i].size : 0;
       if (scaled > best) best = scaled, row = i, column = n;
     }
-  for (int i = 0; row < 0 && i < c->pivots; i++) c->row[i].least = NAN;
-  if (row < 0) return 0;
+  if (row < 0) {
+    for (int i = 0; i < c->pivots; i++) c->row[i].least = NAN;
+    return 0;
+  }
   massless_swap (c, p, row);
   c->row[p].pivot = column;
   c->row[p].scale = sqrt (c->square[column]) / c->row[p].size;
@@ -127,7 +131,7 @@ double pw_massless_factor (pw_massless *r) {
   return least > 1 ? 1 : least * least;
 }
 
-/* ---- Solving; n: the number of pivots, a constant 3 in most calls, so that loops are unrolled ---- */
+/* ---- Solving ---- */
 
 PW_INLINE void massless_forward (pw_component *c, const double *gamma, double *f, int n) {
   pw_massless_row *row = c->row;

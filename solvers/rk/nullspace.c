@@ -70,7 +70,7 @@ void pw_nullspace_close (pw_nullspace *b) {
 /* K_i += J_i (W^-1 J0^T), mu_i -= J_i w, for the entries of row i in columns j to j + width - 1: 3 of a body, or 1. */
 PW_INLINE void nullspace_gather (pw_nullspace *b, int i, int j, int width, const double *J, const double *w, int m) {
   double *restrict K = b->K + i * m;
-  const double *restrict x = b->reference + j * m, *restrict y = x + m, *restrict z = y + m, a = J[0];
+  const double *restrict x = b->reference + (size_t)j * (size_t)m, *restrict y = x + m, *restrict z = y + m, a = J[0];
   if (width == 1) {
     PW_UNROLL for (int n = 0; n < m; n++) K[n] += a * x[n];
     b->mu[i] -= a * w[j];
@@ -93,7 +93,7 @@ PW_INLINE void nullspace_assemble (pw_nullspace *b, const pw_run *r, const doubl
         width = c < of_bodies ? 3 : 1;
         if (w && j < s->coords) nullspace_gather (b, i, j, width, J + c, w, m);
         for (int x = 0; w == NULL && j < s->coords && x < width; x++)
-          b->reference[(j + x) * m + i] = J[c + x] / s->metric[j + x];
+          b->reference[(size_t)(j + x) * (size_t)m + (size_t)i] = J[c + x] / s->metric[j + x];
       }
   }
 }
@@ -107,10 +107,10 @@ PW_INLINE void nullspace_assemble_system (pw_nullspace *b, pw_run *r, const doub
   nullspace_assemble (b, r, w, m);
 }
 
-/* mu = K^-1 mu without pivoting; K is factorised in place.  Returns 0 if a pivot is smaller than `least` times its
- * diagonal entry. */
+/* mu = K^-1 mu without pivoting; K is factorised in place.  Returns 0 if a pivot is not positive, or smaller than `least`
+ * times its diagonal entry. */
 PW_INLINE int nullspace_eliminate (double *restrict K, double *restrict mu, int m) {
-  const double least = 0.01;
+  const double least = 0.01; /* two digits are lost */
   PW_UNROLL for (int p = 0; p < m; p++) {
     double diagonal = K[p * m + p];
     PW_UNROLL for (int i = 0; i < p; i++) {
@@ -118,7 +118,7 @@ PW_INLINE int nullspace_eliminate (double *restrict K, double *restrict mu, int 
       PW_UNROLL for (int j = i + 1; j < m; j++) K[p * m + j] -= f * K[i * m + j];
       mu[p] -= f * mu[i];
     }
-    if (!(K[p * m + p] > least * diagonal)) return 0;
+    if (!(K[p * m + p] > least * fabs (diagonal))) return 0;
     K[p * m + p] = 1 / K[p * m + p];
   }
   PW_UNROLL for (int i = m - 1; i >= 0; i--) {
@@ -130,7 +130,7 @@ PW_INLINE int nullspace_eliminate (double *restrict K, double *restrict mu, int 
 
 /* The same by LAPACK, with scaled rows and pivoting.  PW_RETRY if a pivot is round-off: dependent constraint equations. */
 static int nullspace_eliminate_pivoted (pw_nullspace *b) {
-  const double least = 1e-13;
+  const double least = 1e-13; /* some 500 eps; the largest entry of a row is 1 */
   int m = b->rows;
   double *K = b->K;
   for (int i = 0; i < m; i++) {

@@ -1,4 +1,4 @@
-/* Minimal velocities of a step, which satisfy the constraints by construction; equations in nullspace.c. */
+/* Null-space velocities of a step, whose velocities satisfy the constraints by construction; equations in nullspace.c. */
 #ifndef PW_NULLSPACE_H
 #define PW_NULLSPACE_H
 
@@ -32,8 +32,8 @@ int pw_nullspace_velocities (pw_nullspace *b, pw_run *r, double t, const double 
 /* Accelerations and multipliers right after pw_nullspace_velocities.  Returns as pw_run_accelerate. */
 int pw_nullspace_accelerate (pw_run *r, const double *v, double *a, double *lambda);
 
-/* Velocities at the end of a step, after projecting positions onto g = 0 if there is a projector; added: receives the
- * energy this adds, or NULL. */
+/* Velocities at the end of a step, after projecting positions onto g = 0 if there is a projector; *added grows by the
+ * energy this adds, unless added is NULL. */
 int pw_nullspace_finalise (pw_nullspace *b, pw_projector *p, pw_run *r, double t, double *q, double *v, double *added);
 
 #endif

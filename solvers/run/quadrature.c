@@ -91,7 +91,7 @@ static int quadrature_parts (pw_quadrature *x, pw_run *r, double from, double to
 
 /* Halves the parts until the integrals, in x->sum, converge; stops if powers cannot be evaluated. */
 static void quadrature_refine (pw_quadrature *x, pw_run *r, double from, double to, double tolerance) {
-  const int most = 64;
+  const int most = 64; /* 256 nodes */
   double off = INFINITY;
   for (int parts = 1; parts <= most && off > tolerance; parts *= 2) {
     if (quadrature_parts (x, r, from, to, parts) != PW_OK) return;
@@ -114,7 +114,7 @@ static int quadrature_leaps (const pw_quadrature *x) {
   return x->points > 2 && x->t[0] - x->t[1] > leap * (x->t[1] - x->t[x->points - 1]);
 }
 
-/* Energy defect of a step: change of energy less work and losses. */
+/* Energy defect of a step: change of energy, less work, plus losses.  Keeps the energy for the next step. */
 static double quadrature_defect (pw_quadrature *x, pw_run *r) {
   double before = x->energy, off;
   x->energy = pw_kinetic (r->s, r->v) + pw_potential (r->w);
@@ -124,7 +124,7 @@ static double quadrature_defect (pw_quadrature *x, pw_run *r) {
 }
 
 int pw_quadrature_step (pw_quadrature *x, pw_run *r, int order) {
-  const double methods = 100; /* times the tolerance: energy error of the method in a step */
+  const double of_method = 100; /* energy error that the method itself may make in a step, in tolerances */
   int entries = r->s->entries, last = PW_QUADRATURE_POINTS - 1;
   double *oldest = x->rate[last], h = r->t - x->t[0];
   memcpy (x->ledger0, r->ledger, (size_t)entries * sizeof (double));
@@ -137,7 +137,8 @@ int pw_quadrature_step (pw_quadrature *x, pw_run *r, int order) {
   x->order = order;
   double tolerance = pw_ledger_tolerance (r, h),
          off = quadrature_polynomial (x, entries, quadrature_degree (x, order), 1);
-  x->refined = (quadrature_defect (x, r) > methods * tolerance) | (off > tolerance) | quadrature_leaps (x);
+  double defect = quadrature_defect (x, r);
+  x->refined = defect > of_method * tolerance || off > tolerance || quadrature_leaps (x);
   if (x->refined) quadrature_refine (x, r, x->t[1], x->t[0], tolerance);
   for (int e = 0; e < entries; e++) r->ledger[e] += x->sum[e];
   return x->refined;

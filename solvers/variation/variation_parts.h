@@ -59,14 +59,14 @@ struct pw_variation {
   double t;                      /* of the derivatives */
   double at;                     /* time of the state last evaluated */
   double h, off;                 /* next step, relative error of the last one */
-  double *q, *v;                 /* n: the state last evaluated */
+  double *q, *v;                 /* n + 3: the state last evaluated */
   double *a[PW_VARIATION_RATES]; /* n: accelerations of the run at the stages */
   double speed;                  /* largest velocity of the run so far, in units of the scene */
-  double reversal;         /* change of a velocity over which a force reverses, at most 1, in units of the scene */
-  double *scratch;         /* 4 (2 n + m + entries + 3) */
-  double *values, *output; /* the same, 2 + m + entries: of pw_variation_outputs */
-  double *sample[2];       /* 3 n + m + entries: results */
-  int may_jump;            /* 1: accelerations may jump with the state */
+  double reversal;          /* change of a velocity over which a force reverses, at most 1, in units of the scene */
+  double *scratch, *output; /* k = 3 n + 4 m + entries + 9; output: 2 + entries + m of pw_variation_outputs */
+  double *values;           /* 2 k: scratch */
+  double *sample[2];        /* 3 n + m + entries: results */
+  int may_jump;             /* 1: accelerations may jump with the state */
   int points, room;
   pw_variation_point *point; /* room: states of the run from t on */
   double passed;             /* the last breakpoint that the derivatives have passed */

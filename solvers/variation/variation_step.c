@@ -5,20 +5,22 @@
 #include "rk.h"
 #include "variation_parts.h"
 
-/* Error of a step relative to the largest derivative; less accurate where it would need more than a linearisation per
- * step of a run with fixed steps, which are then large for such fast motions, too. */
+/* Permitted error of a step, relative to the largest derivative.  The loose one applies where the other would need more than
+ * one linearisation per step of a run with fixed steps: the motion is so fast that these are large for it, too. */
 static const double STEP_TOLERANCE = 1e-9, STEP_LOOSE = 1e-7;
-enum { STEP_RATIO = 5 }; /* linearisations per step of the derivatives */
+enum { STEP_RATIO = 5 }; /* linearisations in a step of the derivatives */
 
-/* Error of the run's velocities in a step, relative to the largest. */
+/* Permitted error of the run's velocities in a step, relative to the largest. */
 static const double STEP_MOTION = 1e-8;
 
 /* Round-off of positions, relative to the scene or themselves, that interpolation between fixed steps turns into one of
  * velocities. */
 static const double STEP_ROUND = 1e-14;
 
-/* Derivatives by p below this part of the scene's unit per p are computed to the same absolute error. */
-static const double STEP_LEAST = 0.1;
+/* Derivatives by p below this part of the scene's unit per p are computed to the same absolute error; p is estimated from the
+ * step of its differences, usually STEP_OF_P times p.  Derivatives of work and losses: below this part of the energy exchanged
+ * per unit of the scene. */
+static const double STEP_LEAST = 0.1, STEP_OF_P = 1e-5, STEP_LEAST_ENERGY = 1e-3;
 
 /* The smallest step, in units of the scene. */
 static const double STEP_SMALLEST = 1e-12;
@@ -97,7 +99,8 @@ static double step_motion_error (const pw_variation *x, double h) {
   return step_speed (x, e) / fmax (1, x->speed);
 }
 
-/* Errors of the run's velocities between its steps, in units of the scene. */
+/* Errors of the run's velocities between its steps, in units of the scene; estimated as a fifth of the tolerance if it
+ * adapts its steps. */
 static double step_noise (const pw_variation *x) {
   double most = 1;
   if (!pw_fixed_steps (x->r)) return 0.2 * x->r->settings.rtol * fmax (1, x->speed);
@@ -111,7 +114,7 @@ static double step_noise (const pw_variation *x) {
 static double step_defect (const pw_variation *x, double h) {
   const pw_tableau *b = &pw_erk5_tableau;
   double *state = x->scratch, *change = state + x->n, most = 0;
-  pw_variation_state (x, x->t, state);
+  pw_variation_state (x, x->t, state); /* change: the velocities at the beginning, so far */
   for (int k = 0; k < b->stages; k++) {
     for (int j = 0; j < x->n; j++) change[j] += h * b->b[k] * x->a[k][j];
     most = fmax (most, h * step_speed (x, x->a[k]));
@@ -124,26 +127,26 @@ static double step_defect (const pw_variation *x, double h) {
 /* Adds to the errors of derivatives the part of their change that the run does not resolve. */
 static void step_add_defect (pw_variation *x, double h) {
   double defect = step_defect (x, h);
-  PW_EACH_COLUMN (c, x) {
+  for (pw_direction_copy *d = x->direction; d < x->direction + x->count; d++) {
     const pw_variation_column *derivative = &d->column[0];
-    if (c == derivative) continue;
-    for (int j = 0; j < x->size; j++)
-      c->trial[j] += copysign (defect * (derivative->trial[j] - derivative->Y[j]), c->trial[j]);
+    double *error = d->column[1].trial;
+    for (int j = 0; j < x->size && d->columns > 1; j++)
+      error[j] += copysign (defect * (derivative->trial[j] - derivative->Y[j]), error[j]);
   }
 }
 
 /* The largest relative error of all derivatives. */
 static double step_error (pw_variation *x, double h) {
   double most = 0;
-  PW_EACH_COLUMN (c, x) {
-    if (pw_variation_index (c) > 0) continue;
+  for (const pw_direction_copy *d = x->direction; d < x->direction + x->count; d++) {
+    const pw_variation_column *c = &d->column[0];
     double *e = x->values, size = fmax (c->largest, step_norm (x, c->trial));
-    if (c->direction->given.initial == NULL) size = fmax (size, STEP_LEAST * 1e-5 / fabs (c->direction->given.step));
+    if (d->given.initial == NULL) size = fmax (size, STEP_LEAST * STEP_OF_P / fabs (d->given.step));
     memset (e, 0, (size_t)x->size * sizeof *e);
     step_combine (c, pw_erk5_tableau.e, PW_VARIATION_RATES, h, 0, x->size, e);
     if (size > 0) most = pw_larger_or_nan (most, step_norm (x, e) / size);
     double energy = fmax (c->energy, step_energy (x, c->trial));
-    energy = fmax (energy, 0.01 * STEP_LEAST * fmax (x->r->exchanged, x->r->energy_scene) * size);
+    energy = fmax (energy, STEP_LEAST_ENERGY * fmax (x->r->exchanged, x->r->energy_scene) * size);
     if (energy > 0) most = pw_larger_or_nan (most, step_energy (x, e) / energy);
   }
   return most;
@@ -193,13 +196,14 @@ int pw_variation_begin (pw_variation *x, pw_error *error) {
   return status;
 }
 
-/* A tenth of the tolerance of an adaptive run. */
+/* The strict tolerance; in a run that adapts its steps, a tenth of its tolerance if that is larger. */
 static double step_tolerance (const pw_run *r) {
   return pw_fixed_steps (r) ? STEP_TOLERANCE : fmax (STEP_TOLERANCE, 0.1 * r->settings.rtol);
 }
 
-/* The factor of the next step for a tolerance, with the error of the last step as well, which damps oscillations of the step
- * at the limit of stability (Hairer & Wanner 1996, section IV.2). */
+/* The factor of the next step for a tolerance.  It depends on the error of the last accepted step, too (at least 1e-4 of the
+ * tolerance: the first step has none), which damps oscillations of the step at the limit of stability (Hairer & Wanner 1996,
+ * section IV.2: exponents 1 / order - 0.75 b and b, b = 0.04). */
 static double step_factor (const pw_variation *x, double off, double tolerance) {
   double factor = 0.9 * pow (off / tolerance, -0.17) * pow (fmax (x->off, 1e-4 * tolerance) / tolerance, 0.04);
   return fmin (5, fmax (0.2, factor));

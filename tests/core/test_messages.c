@@ -1,6 +1,7 @@
 /* Invalid descriptions: every message of the core about bodies, elements, fields,
  * signals and kinds. */
 #include <math.h>
+#include <stdio.h>
 #include <string.h>
 #include "check.h"
 #include "scene.h"
@@ -46,6 +47,8 @@ static void test_bad_names (void **state) {
   BAD (": wheel \"ground\": this name is reserved for the ground", WHEEL (.name = "ground", .body = "frame"));
   BAD (": body \"rear axle\": a name consists of letters, digits, _ and -", BODY (.name = "rear axle"));
   BAD (": body \"a.b\": a name consists of letters, digits, _ and -", BODY (.name = "a.b"));
+  BAD (": body \"a?\": a name consists of letters, digits, _ and -", BODY (.name = "a\xFF"));
+  BAD (": body \"a??\": a name consists of letters, digits, _ and -", BODY (.name = "a\xC2\x9B"));
   BAD (": body \"" MESSAGES_50 "...\": a name has at most 50 bytes, this one 51", BODY (.name = MESSAGES_50 "x"));
   BAD (": wheel \"" MESSAGES_50 "...\": a name has at most 50 bytes, this one 150",
        WHEEL (.name = MESSAGES_50 MESSAGES_50 MESSAGES_50, .body = "frame"));
@@ -164,6 +167,21 @@ static void test_bad_kinds (void **state) {
   BAD (": element type (unnamed): the table is NULL", pw_add (m, NULL, &(messages_chooser){ "c", "frame", 0 }));
 }
 
+/* Gravity acts on each body: the scene has 6000 x 6000 elements. */
+static void test_too_large (void **state) {
+  enum { COUNT = 6000 };
+  static char name[COUNT][2][8];
+  (void)state;
+  pw_model *m = scene_model (&messages_table, NULL);
+  for (int i = 0; i < COUNT; i++) {
+    snprintf (name[i][0], sizeof name[i][0], "b%d", i);
+    snprintf (name[i][1], sizeof name[i][1], "g%d", i);
+    pw_add_body (m, &(pw_body){ .name = name[i][0], .mass = 1, .inertia = 1 });
+    pw_add_gravity (m, &(pw_gravity){ .name = name[i][1], .acceleration = { 0, -9.81 } });
+  }
+  messages_refused (m, "model scene is too large");
+}
+
 /* Writes as much as its definition has, whatever room there is. */
 static int messages_prepare (const void *definition, const pw_body *const *bodies, void *element, pw_internal *internal,
                              pw_error *error) {
@@ -228,10 +246,11 @@ static void test_no_body (void **state) {
 
 int main (void) {
   const struct CMUnitTest tests[] = {
-    cmocka_unit_test (test_bad_names),   cmocka_unit_test (test_bad_bodies),    cmocka_unit_test (test_bad_references),
-    cmocka_unit_test (test_bad_numbers), cmocka_unit_test (test_bad_signals),   cmocka_unit_test (test_bad_readers),
-    cmocka_unit_test (test_bad_choices), cmocka_unit_test (test_bad_kinds),     cmocka_unit_test (test_no_body),
-    cmocka_unit_test (test_bad_prepare), cmocka_unit_test (test_missing_names), cmocka_unit_test (test_bad_parameters),
+    cmocka_unit_test (test_bad_names),      cmocka_unit_test (test_bad_bodies),  cmocka_unit_test (test_bad_references),
+    cmocka_unit_test (test_bad_numbers),    cmocka_unit_test (test_bad_signals), cmocka_unit_test (test_bad_readers),
+    cmocka_unit_test (test_bad_choices),    cmocka_unit_test (test_bad_kinds),   cmocka_unit_test (test_no_body),
+    cmocka_unit_test (test_too_large),      cmocka_unit_test (test_bad_prepare), cmocka_unit_test (test_missing_names),
+    cmocka_unit_test (test_bad_parameters),
   };
   return cmocka_run_group_tests (tests, NULL, NULL);
 }

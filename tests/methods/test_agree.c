@@ -297,6 +297,10 @@ static void test_verifier_detects_errors (void **state) {
   pw_verification v;
   assert_int_equal (pw_verify (s, pw_run_scale (r), now.t, x[0], now.v, now.a, now.lambda, &v), PW_OK);
   assert_true (isinf (v.position.scaled) && v.position.name[0]);
+  memcpy (x[2], now.a, (size_t)n * sizeof (double));
+  x[2][0] = INFINITY;
+  assert_int_equal (pw_verify (s, pw_run_scale (r), now.t, now.q, now.v, x[2], now.lambda, &v), PW_OK);
+  assert_true (isinf (v.acceleration.scaled) && isinf (v.force.scaled) && v.force.name[0]);
   pw_run_close (r);
   pw_system_free (s);
 }

@@ -98,8 +98,12 @@ static int build_value (pw_reader *r, const pw_kind *kind, const pw_field *f, co
 
 static int build_field (pw_reader *r, const pw_kind *kind, const pw_field *f, const pw_node *node, const char *element,
                         char *at) {
-  static const char *const plural[] = { "numbers", "points, each [x, y],", "vectors, each [x, y],", "bodies", "signals",
-                                        "choices" };
+  static const char *const plural[] = { [PW_NUMBER] = "numbers",
+                                        [PW_POINT] = "points, each [x, y],",
+                                        [PW_VECTOR] = "vectors, each [x, y],",
+                                        [PW_BODY] = "bodies",
+                                        [PW_SIGNAL] = "signals",
+                                        [PW_CHOICE] = "choices" };
   char what[200];
   int count = pw_field_count (f);
   snprintf (what, sizeof what, "%s %.60s: %s", kind->name, element, f->name);
@@ -112,7 +116,7 @@ static int build_field (pw_reader *r, const pw_kind *kind, const pw_field *f, co
 
 /* ---- Elements ---- */
 
-/* Whether a word of a text begins with this prefix, of 3 bytes or more. */
+/* Whether a word of a text begins with this prefix; no if the prefix is shorter than 3 bytes. */
 static int build_has_word (const char *text, const char *prefix) {
   for (const char *at = text; strlen (prefix) >= 3 && (at = strstr (at, prefix)) != NULL; at++)
     if (at == text || strchr (" (", at[-1])) return 1;
@@ -141,8 +145,8 @@ static const pw_kind *build_kind (const pw_reader *r, const pw_node *node) {
     pw_nearest_try (&near, (*k)->name);
   }
   const char *kind = build_later_type (first);
-  if (kind) pw_yaml_fail (r, first->at, "an element begins with its type: write {%s: NAME, ...}", kind);
-  for (const pw_kind *const *k = pw_kinds; *k && !near.near; k++) /* "revolute", "hinge" */
+  if (kind) return pw_yaml_fail (r, first->at, "an element begins with its type: write {%s: NAME, ...}", kind), NULL;
+  for (const pw_kind *const *k = pw_kinds; *k && !near.near; k++) /* else by its description: "revolute", "hinge" */
     if (build_has_word ((*k)->about, first->text))
       snprintf (near.best, sizeof near.best, "%s", (*k)->name), near.near = 1;
   pw_yaml_fail (r, first->at, "an element begins with its type, and there is no type \"%.60s\"%s", first->text,
