@@ -1,9 +1,9 @@
 /* The independent verifier: plain loops over elements, rows and columns; it shares only the element types with the
  * solvers.
  *
- * Each residual is divided by the sum of the absolute values of its terms, plus its unit formed from the scene's
- * length L and time T, so that round-off is about 1e-16 in any units.  Forces are compared with the largest one in
- * the scene, since those on a massless body may all be round-off. */
+ * Each residual is divided by the sum of the absolute values of its terms, plus its unit formed from the run's
+ * length L and time T (positions: by the larger of the two), so that round-off is about 1e-16 in any units.  Forces are
+ * compared with the largest one in the scene, since those on a massless body may all be round-off. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -60,7 +60,7 @@ static void verify_rows (verify *x, const pw_element_batch *k, const double *v, 
   y = verify_evaluate (x, k, kind->g, n);
   for (int i = 0; i < n; i++) x->position[k->row + i] = y[i];
   y = verify_evaluate (x, k, kind->g_size, n);
-  for (int i = 0; i < n; i++) x->position_size[k->row + i] = fmax (y[i], x->s->scale.length);
+  for (int i = 0; i < n; i++) x->position_size[k->row + i] = fmax (y[i], x->w->scale.length);
 }
 
 static void verify_forces (verify *x, const pw_element_batch *k) {
