@@ -52,9 +52,13 @@ static joints joints_at (const inversor *p, double angle) {
 
 static void build (pw_model *m, const void *parameter) {
   const inversor *p = parameter;
-  double OB = 2 * p->a * cos (p->swing / 2), L = p->L / 2, r = p->s / 2;
-  if (OB <= fabs (p->L - p->s) || 2 * p->a >= p->L + p->s) {
+  double OB = 2 * p->a * cos (fmin (fabs (p->swing), PW_PI) / 2), L = p->L / 2, r = p->s / 2; /* OB: the least */
+  if (OB <= fabs (p->L - p->s)) {
     pw_model_refuse (m, "swing = %g: arms and rhombus do not reach the crank there", p->swing);
+    return;
+  }
+  if (2 * p->a >= p->L + p->s) {
+    pw_model_refuse (m, "a = %g: arms and rhombus do not reach the crank at the angle 0", p->a);
     return;
   }
   joints j = joints_at (p, p->swing);

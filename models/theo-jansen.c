@@ -1,4 +1,4 @@
-/* Theo Jansen's leg: a crank and seven links whose proportions give the foot a walking motion.
+/* Theo Jansen's leg: a crank and six links whose proportions give the foot a walking motion.
  *
  * The lengths are those of the strandbeests, in hundredths of a metre at size 0.01: two triangles, b d e on the ground
  * pivot B and g h i with the foot, and the bars j, k, c and f.  The crank turns at constant speed about O.

@@ -24,7 +24,7 @@ static const pw_parameter parameters[] = {
   { .name = NULL },
 };
 
-/* The angle of joint i: link i relative to link i - 1, the one ahead. */
+/* The angle of joint i: the link behind it relative to the one ahead. */
 static double joint_angle (const snake *p, int i) {
   return p->amplitude * cos (-p->lag * i);
 }

@@ -11,6 +11,12 @@ const pw_kind *const pw_kinds[] = {
       NULL
 };
 
+int pw_kind_is_built_in (const pw_kind *kind) {
+  for (const pw_kind *const *k = pw_kinds; *k; k++)
+    if (*k == kind) return 1;
+  return 0;
+}
+
 size_t pw_field_bytes (pw_field_type type) {
   switch (type) {
   case PW_NUMBER:

@@ -46,6 +46,9 @@ int pw_check_model (const pw_model *m, const pw_names *bodies, pw_error *error);
  * inconsistent table. */
 const char *pw_kind_check (const pw_kind *kind, char *buffer, size_t size);
 
+/* 1 for the library's own element types, 0 for those of plug-ins. */
+int pw_kind_is_built_in (const pw_kind *kind);
+
 /* As pw_field_at, for a definition that will be modified. */
 static inline void *pw_field_mutable (const pw_kind *kind, void *definition, pw_field_type type, int k) {
   const char *at = pw_field_at (kind, definition, type, k);

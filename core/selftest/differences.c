@@ -40,12 +40,6 @@ char *pw_system_difference_name (const pw_system *s, int i, char *buffer, size_t
 
 /* ---- Missing blocks ---- */
 
-static int differences_built_in (const pw_kind *kind) {
-  int i = 0;
-  while (pw_kinds[i] && pw_kinds[i] != kind) i++;
-  return pw_kinds[i] != NULL;
-}
-
 /* Tests the first, the last and a middle element of the batch. */
 static int differences_test (const pw_workspace *w, pw_element_batch *k, char *buffer, size_t size) {
   const int element[] = { 0, k->b.count - 1, k->b.count / 2 };
@@ -80,7 +74,7 @@ int pw_find_missing_block (pw_workspace *w, double t, const double *q, const dou
   const pw_system *s = w->s;
   pw_random random = { 1 };
   int not_built_in = 0, found = 0;
-  for (pw_element_batch *k = w->batch; k < w->batch + s->batches; k++) not_built_in += !differences_built_in (k->kind);
+  for (pw_element_batch *k = w->batch; k < w->batch + s->batches; k++) not_built_in += !pw_kind_is_built_in (k->kind);
   if (not_built_in == 0) return 0;
   double *state = malloc ((2 * (size_t)s->coords + 1) * sizeof *state);
   if (state == NULL) return PW_RESOURCE;
@@ -91,7 +85,7 @@ int pw_find_missing_block (pw_workspace *w, double t, const double *q, const dou
   }
   pw_update_kinematics (w, t, state, state + s->coords);
   for (pw_element_batch *k = w->batch; found == 0 && k < w->batch + s->batches; k++)
-    if (!differences_built_in (k->kind)) found = differences_search (w, k, &random, buffer, size);
+    if (!pw_kind_is_built_in (k->kind)) found = differences_search (w, k, &random, buffer, size);
   free (state);
   pw_hold_signals (w, w->hold); /* causes signals to be evaluated again */
   return found;

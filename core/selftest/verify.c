@@ -1,7 +1,7 @@
 /* The independent verifier: plain loops over elements, rows and columns; it shares only the element types with the
  * solvers.
  *
- * Each residual is divided by the sum of the absolute values of its terms, plus its unit formed from the scene's
+ * Each residual is divided by the sum of the absolute values of its terms, plus its unit formed from the run's
  * length L and time T, so that round-off is about 1e-16 in any units.  A position residual is divided by the size that its
  * element type states, at least L.  Forces are compared with the largest one in the scene, since those on a massless body may
  * all be round-off. */

@@ -70,7 +70,7 @@ int pw_sparsity_find (const pw_kind *kind, pw_sparsity *out) {
   int known = 0, status = PW_OK;
   memset (out, 0, sizeof *out);
   memset (out->length, 1, sizeof out->length);
-  for (int n = 0; n < SPARSITY_SCENES && status == PW_OK; n++) {
+  for (int n = 0; pw_kind_is_built_in (kind) && n < SPARSITY_SCENES && status == PW_OK; n++) {
     pw_error why = { 0 };
     pw_system *s = pw_random_scene (kind, &random, &why);
     status = s ? sparsity_scene (s, &random, &known, out) : why.status == PW_RESOURCE ? PW_RESOURCE : PW_OK;

@@ -14,7 +14,8 @@ typedef struct {
   unsigned char length[PW_MAX_ROWS * PW_MAX_COLS / 3];
 } pw_sparsity;
 
-/* A type that rejects random definitions has variable entries only.  Returns PW_OK or PW_RESOURCE. */
+/* Types of plug-ins have variable entries only: what is 0 at random states, like the force of a wall, may not be 0 at
+ * others.  So have types that reject random definitions.  Returns PW_OK or PW_RESOURCE. */
 int pw_sparsity_find (const pw_kind *kind, pw_sparsity *out);
 
 #endif

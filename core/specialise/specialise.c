@@ -36,13 +36,12 @@ static void specialise_sources (const pw_specialise_scene *x) {
   const pw_source_text *done[SPECIALISE_SOURCES];
   char name[80], file[90];
   int count = 0;
-  fputs ("#include <math.h>\n#include <string.h>\n#include "
-         "\"pinwheel.h\"\n",
-         x->out);
+  fputs ("#include <math.h>\n#include <string.h>\n#include \"pinwheel.h\"\n", x->out);
   specialise_source (x->out, "specialised.h", done, &count);
   specialise_source (x->out, "sine.h", done, &count);
+  specialise_source (x->out, "batch.h", done, &count);
   for (int k = 0; k < x->s->batches; k++) {
-    if (!pw_specialise_is_built_in (x->s->batch[k].kind)) continue;
+    if (!pw_kind_is_built_in (x->s->batch[k].kind)) continue;
     snprintf (file, sizeof file, "%s.c", pw_specialise_identifier (x->s->batch[k].kind, name, sizeof name));
     specialise_source (x->out, file, done, &count);
   }

@@ -3,12 +3,6 @@
 #include <string.h>
 #include "specialise_parts.h"
 
-int pw_specialise_is_built_in (const pw_kind *kind) {
-  for (const pw_kind *const *k = pw_kinds; *k; k++)
-    if (*k == kind) return 1;
-  return 0;
-}
-
 char *pw_specialise_identifier (const pw_kind *kind, char *buffer, size_t size) {
   snprintf (buffer, size, "%s", kind->name);
   for (char *c = buffer; *c; c++)
@@ -47,7 +41,7 @@ static void specialise_batch (const pw_specialise_scene *x, int k, int e, const 
 static void specialise_call (const pw_specialise_scene *x, int k, const char *function, const char *to) {
   char name[80];
   const pw_kind *kind = x->s->batch[k].kind;
-  if (pw_specialise_is_built_in (kind))
+  if (pw_kind_is_built_in (kind))
     fprintf (x->out, "    scene_%s.%s (&b, %s);\n", pw_specialise_identifier (kind, name, sizeof name), function, to);
   else
     fprintf (x->out, "    s->kind[%d]->%s (&b, %s);\n", k, function, to);
@@ -193,7 +187,7 @@ void pw_specialise_signals (const pw_specialise_scene *x) {
 
 int pw_system_has_lanes (const pw_system *s) {
   for (int k = 0; k < s->batches; k++)
-    if (!pw_specialise_is_built_in (s->batch[k].kind) || s->batch[k].kind->element % sizeof (double)) return 0;
+    if (!pw_kind_is_built_in (s->batch[k].kind) || s->batch[k].kind->element % sizeof (double)) return 0;
   return s->rows <= SPECIALISE_ROWS && s->state_dependent == 0;
 }
 

@@ -26,7 +26,6 @@ typedef struct {
   int constants;
 } pw_specialise_scene;
 
-int pw_specialise_is_built_in (const pw_kind *kind);
 /* "rolling_wheel", in the buffer, which is returned. */
 char *pw_specialise_identifier (const pw_kind *kind, char *buffer, size_t size);
 static inline int pw_specialise_is_independent (const pw_specialise_scene *x, int row) {

@@ -185,6 +185,9 @@ static void test_gallery (void **state) {
     { "chaplygin-sleigh --set a=-0.3 --set w0=-1.1 --set u0=0.2 --set m=2 --set I=0.7", 1e-10, "100 h^4" },
     { "knife-edge-incline --set w=1.7 --set alpha=0.4", 1e-10, "100 h^4" },
     { "pendulum --set theta=-0.3 --set I=0.2 --set l=0.8 --set m=1.5", 1e-9, "1000 h^4: 4 rad/s" },
+    { "pendulum --set theta=3", 1e-9, "1000 h^4: released beyond the highest point, 6 rad/s" },
+    { "pendulum --set theta=-4", 1e-9, "1000 h^4: 5 rad/s" },
+    { "pendulum --set theta=6", 1e-9, "1000 h^4: 5 rad/s" },
     { "differential-drive --set ahead=0.1 --set right=0.2 --set track=0.4 --set radius=0.1", 1e-10, "100 h^4" },
     { "car --set steer=-0.2 --set b=1.1 --set u0=3", 1e-10, "100 h^4" },
     { "n-trailer --set n=4 --set R=3 --set w=-0.8 --set longer=0.1", 1e-10, "100 h^4" },
@@ -228,12 +231,21 @@ static void test_digits (void **state) {
   check_below ("angles", truth_error ("end", "angle"), 1e-6, "100 (h w)^4 at h = 10 us and w = 1000 rad/s");
 }
 
+/* A crank that turns all the way around, and one that is too long. */
+static void test_peaucellier (void **state) {
+  (void)state;
+  cli_bad ("pinwheel run peaucellier --set swing=-12.5", 2,
+           "model peaucellier: swing = -12.5: arms and rhombus do not reach the crank there");
+  cli_bad ("pinwheel run peaucellier --set a=0.8 --set swing=0.1", 2,
+           "model peaucellier: a = 0.8: arms and rhombus do not reach the crank at the angle 0");
+}
+
 int main (void) {
   const struct CMUnitTest tests[] = {
     cmocka_unit_test (test_text),       cmocka_unit_test (test_does_no_harm), cmocka_unit_test (test_compare),
     cmocka_unit_test (test_round_trip), cmocka_unit_test (test_function),     cmocka_unit_test (test_started_elsewhere),
     cmocka_unit_test (test_table),      cmocka_unit_test (test_resume),       cmocka_unit_test (test_gallery),
-    cmocka_unit_test (test_elliptic),   cmocka_unit_test (test_digits),
+    cmocka_unit_test (test_elliptic),   cmocka_unit_test (test_digits),       cmocka_unit_test (test_peaucellier),
   };
   return cmocka_run_group_tests (tests, cli_setup, cli_teardown);
 }

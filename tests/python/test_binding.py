@@ -157,6 +157,11 @@ def test_missing_library_is_named():
     assert done.returncode and "PINWHEEL_LIBRARY" in done.stderr
 
 
+def test_library_may_be_in_the_working_directory(monkeypatch):
+    monkeypatch.chdir(lib.library_path.parent)
+    assert importing(".").returncode == 0
+
+
 @pytest.mark.parametrize("source, text", [
     ('const char pw_version[] = "9.8.7";', "is Pinwheel 9.8.7, this package belongs to 0.1.0"),
     ("int nothing;", "is not a library of Pinwheel"),

@@ -151,6 +151,18 @@ def test_an_interrupt_in_a_function_keeps_the_samples():
     assert r.status == "stopped" and 0.04 < r.t[-1] < 1
 
 
+def test_an_interrupt_in_a_function_ends_runs_by_methods_that_shorten_the_step():
+    calls = []
+
+    def value(t):
+        calls.append(t)
+        if len(calls) == 40:
+            raise KeyboardInterrupt
+        return 0.1 * np.cos(t)
+    r = signals(value).run("radau", t_end=1000)
+    assert r.status == "stopped" and r.t[-1] < 1000
+
+
 def test_interrupts_are_noticed_between_few_steps():
     """A step takes 20 ms: Ctrl-C cannot wait for many of them."""
     def value(t):
@@ -175,6 +187,8 @@ def test_tables_larger_than_the_memory_are_refused(model, monkeypatch):
     monkeypatch.setattr(pw.simulation, "_MEMORY", 8 * 31 * 20000)
     with pytest.raises(pw.ResourceError, match="out of memory"):
         model.run(t_end=100, every=1e-3)
+    with pytest.raises(pw.ResourceError, match="1e\\+10 samples"):
+        model.run(t_end=10, every=1e-9)
     r = model.run("rk4+projection", t_end=100, step=1e-3)
     assert r.status == "failed" and "out of memory" in r.reason and len(r) == 20000
     assert len(model.run("rk4+projection", t_end=15, step=1e-3)) == 15001

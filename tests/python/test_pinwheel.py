@@ -251,6 +251,17 @@ def test_notebook_shows_the_animation():
     assert page.startswith("<iframe srcdoc=") and "pendulum" in page
 
 
+def test_notebook_shows_the_animation_of_the_settings_that_were_used(tmp_path, monkeypatch):
+    words = []
+    monkeypatch.setattr(pw.results._program, "run", lambda given: words.extend(given) or (tmp_path / "no page").read_text())
+    with pw.Model("pendulum").open(step="2e-3") as simulation:
+        r = simulation.record(1)
+    r._repr_html_()
+    assert r.settings["step"] == 0.002 and "--step=0.002" in words
+    with pw.Model("ezyroller").open(inputs={"rider": 0.1}) as simulation:
+        assert "cannot set inputs" in simulation.record(1)._repr_html_()
+
+
 def test_notebook_shows_the_interactive_page():
     page = pw.Model("snakeboard", swing=0.61)._repr_html_()
     assert page.startswith("<iframe srcdoc=") and "0.6099999" in page and "WebAssembly" in page

@@ -301,6 +301,69 @@ static void test_independent (void **state) {
   pw_system_free (s);
 }
 
+/* ---- Element types of a plug-in ---- */
+
+/* A wall at x = 10, far from all random states: the force -k (x - 10) beyond. */
+typedef struct {
+  const char *name;
+  const char *body;
+} wall;
+
+enum { WALL_AT = 10, WALL_STIFFNESS = 10 };
+
+static int wall_prepare (const void *definition, const pw_body *const *bodies, void *element, pw_internal *internal,
+                         pw_error *error) {
+  (void)definition, (void)bodies, (void)element, (void)internal, (void)error;
+  return PW_OK;
+}
+
+static void wall_force (const pw_batch *b, double *out) {
+  for (int e = 0; e < b->count; e++, out += 3) {
+    out[0] = -WALL_STIFFNESS * fmax (0, b->configuration[b->body[e]].x - WALL_AT);
+    out[1] = out[2] = 0;
+  }
+}
+
+static const pw_field wall_fields[] = {
+  { PW_AT (wall, body), PW_BODY, .required = 1, .about = "the body" },
+  { .name = NULL },
+};
+
+static const pw_kind wall_kind = {
+  .name = "wall",
+  .about = "keeps a body at x below 10 m",
+  .definition = sizeof (wall),
+  .element = 1,
+  .fields = wall_fields,
+  .bodies = 1,
+  .level = PW_FORCE,
+  .prepare = wall_prepare,
+  .force = wall_force,
+  .force_q = PW_BY_DIFFERENCES,
+};
+
+static void wall_build (pw_model *m, const void *parameters) {
+  (void)parameters;
+  pw_add_body (m, &(pw_body){ .name = "ball", .mass = 1, .inertia = 1, .rate = { 2 } });
+  pw_add (m, &wall_kind, &(wall){ .name = "end", .body = "ball" });
+}
+
+/* A scene without any element type of the library, whose force is 0 at the initial state and at all random ones. */
+static void test_plug_in (void **state) {
+  static const pw_plugin_table table = { .abi = PW_ABI, .size = sizeof table, .build = wall_build };
+  const double w = sqrt (WALL_STIFFNESS), t = 6;
+  both x;
+  (void)state;
+  both_open (&x, scene_system (&table, NULL), "rk4+none", &(pw_settings){ .step = 1e-3, .span = t });
+  both_run (&x, t);
+  check_close ("x", runs_to (x.special, t).q[0], WALL_AT - 2 * (t - WALL_AT / 2 - PW_PI / w), 1e-6,
+               "second order where the force begins");
+  assert_true (both_specialised (&x) > 4 * 5900);
+  both_close (&x);
+}
+
+/* ---- Codes of other scenes ---- */
+
 /* A code with all equations does not suit a run with redundant ones, nor one for another scene at all. */
 static void test_another (void **state) {
   pw_error error = { 0 };
@@ -374,6 +437,7 @@ int main (void) {
     cmocka_unit_test (test_singular),    cmocka_unit_test (test_another),
     cmocka_unit_test (test_refused),     cmocka_unit_test (test_guard),
     cmocka_unit_test (test_independent), cmocka_unit_test (test_stages),
+    cmocka_unit_test (test_plug_in),
   };
   return cmocka_run_group_tests (tests, NULL, NULL);
 }

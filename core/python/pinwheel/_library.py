@@ -52,12 +52,15 @@ def _folders():
         yield parent / "lib"
 
 
+_named = os.environ.get("PINWHEEL_LIBRARY")
+
+
 def _load(name, folders):
     file = f"lib{name}.so"
     for folder in folders:
         for path in sorted(folder.glob(file + "*")):
             return c.CDLL(str(path), mode=c.RTLD_GLOBAL), path
-    system = None if "PINWHEEL_LIBRARY" in os.environ else ctypes.util.find_library(name)
+    system = None if _named else ctypes.util.find_library(name)
     if system is None:
         raise ImportError(f"{file} was not found in {', '.join(map(str, folders[:2]))} ...: build Pinwheel with `make`, "
                           "install it, or name the folder of the library in PINWHEEL_LIBRARY")
@@ -76,8 +79,7 @@ def _check_version(library, path):
                           "or name the folder of the other library in PINWHEEL_LIBRARY")
 
 
-_named = os.environ.get("PINWHEEL_LIBRARY")
-core, library_path = _load("pinwheel", [pathlib.Path(_named)] if _named else list(_folders()))
+core, library_path = _load("pinwheel", [pathlib.Path(_named).absolute()] if _named else list(_folders()))
 _check_version(core, library_path)
 files, _ = _load("pinwheel-files", [library_path.parent] if library_path.parent.name else [])
 

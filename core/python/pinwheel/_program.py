@@ -36,10 +36,11 @@ def run(arguments):
 
 def animation(result) -> str:
     """The animation of a result's model and settings, in a frame; a text with the reason if there is none."""
-    given = {"step": "step", "rtol": "rtol", "atol": "atol"}
-    words = [f"--method={result.settings['method']}", f"--t-end={result.settings['t_end']!r}"]
-    words += [f"--{o}={result.settings[k]!r}" for k, o in given.items() if result.settings.get(k)]
-    words += [f"--specialise={result.settings.get('specialise', 'auto')}"]
+    given = result.settings
+    if "inputs" in given:
+        return html.escape(f"{result!r}, not shown: the program cannot set inputs")
+    words = [f"--method={given['method']}", f"--t-end={given['t_end']!r}", f"--specialise={given.get('specialise', 'auto')}"]
+    words += [f"--{name}={given[name]!r}" for name in ("step", "rtol", "atol") if name in given]
     return _page("run", result.model, "--animate", words, repr(result))
 
 

@@ -56,10 +56,10 @@ class _System:
     def check(self, error) -> None:
         """Raises the exception of a library error; what a function in Python has raised is its cause."""
         raised = self._raised.pop(threading.get_ident(), None)
-        if error.status < 0 and isinstance(raised, Exception):
-            error.text += f": {type(raised).__name__}: {raised}".encode()[:499 - len(error.text)]
-        elif error.status < 0 and raised is not None:
+        if raised is not None and not isinstance(raised, Exception):  # KeyboardInterrupt, though the method may have gone on
             raise raised
+        if error.status < 0 and raised is not None:
+            error.text += f": {type(raised).__name__}: {raised}".encode()[:499 - len(error.text)]
         try:
             lib.check(error)
         except lib.Error as failure:
@@ -307,15 +307,20 @@ class Model:
         InputError, InitialError, MethodError
         """
         settings = lib.pw_settings()
-        for name, value in {"span": t_end, "step": step, "rtol": rtol, "atol": atol, "max_steps": max_steps}.items():
+        numbers = {"span": t_end, "step": step, "rtol": rtol, "atol": atol, "max_steps": max_steps}
+        for name, value in numbers.items():
             setattr(settings, name, self._setting(name, value))
         settings.ledger = bool(energy)
+        given = {name: getattr(settings, name) for name, value in numbers.items() if value is not None and name != "span"}
+        given |= {"energy": True} if energy else {}
+        given |= {"specialise": specialise} if specialise != "auto" else {}
+        given |= {"inputs": lib.numbers(inputs, "inputs")} if inputs else {}
         method = self.defaults["method"] if method is None else method
         steps = lib.core.pw_method_steps(lib.encode(method, "method"), c.byref(settings), self.defaults["step"], settings.span)
         system, cells = self._compile(inputs or {})
         if specialised(specialise, steps):
             settings.specialised = system.code()
-        return Simulation(self, system, cells, method, settings, bool(energy))
+        return Simulation(self, system, cells, method, settings, given)
 
     def _setting(self, name, value):
         if value is None:
@@ -344,7 +349,7 @@ class Model:
         progress : callable or bool, optional
             Called now and then with the fraction done; True: a progress bar, False: none; default: a bar in notebooks.
         **settings
-            step, rtol, atol, max_steps, energy, specialise: see :meth:`open`.
+            step, rtol, atol, max_steps, energy, inputs, specialise: see :meth:`open`.
 
         Returns
         -------
@@ -357,9 +362,7 @@ class Model:
         model = self.replace(start=start) if start else self
         end = self.defaults["t_end"] if t_end is None else lib.number(t_end, "t_end")
         with model.open(method, t_end=end or None, **settings) as simulation:
-            result = simulation.record(end, every, times, progress)
-        result.settings.update(settings)
-        return result
+            return simulation.record(end, every, times, progress)
 
     # ---- Analyses ----
 
@@ -389,7 +392,7 @@ class Model:
             with simulation._used() as run:
                 lib.core.pw_run_linear_modes(run, min(most, 2**31 - 1), c.byref(linear), c.byref(error))
             try:
-                lib.check(error)
+                simulation._system.check(error)
                 return self._linear(linear, simulation._system.pointer)
             finally:
                 lib.core.pw_linear_free(c.byref(linear))

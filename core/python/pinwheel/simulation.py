@@ -17,9 +17,7 @@ from ._progress import watched
 from .results import Result, _nearest
 
 _HEAD = {"t": "s", "position_residual": "", "velocity_residual": "", "kinetic": "J", "potential": "J", "work": "J", "loss": "J",
-         "projection": "J", "balance": "J"}
-
-
+         "projection": "J", "balance": "J"}  # the first columns of every table, and their units
 _MEMORY = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")  # bytes
 
 
@@ -116,9 +114,9 @@ class Simulation:
     _run = None
     _cancelled = staticmethod(lambda: False)
 
-    def __init__(self, model, system, cells, method, settings, ledger):
+    def __init__(self, model, system, cells, method, settings, given):
         self.model, self._system, self._settings = model, system, settings
-        self.method, self._ledger, self._restart = method, ledger, False
+        self.method, self._given, self._restart = method, given, False
         self._lock, self._steps = threading.Lock(), 16
         error = lib.pw_error()
         self._run = lib.core.pw_run_open(system.pointer, lib.encode(method, "method"), c.byref(settings), c.byref(error))
@@ -204,7 +202,7 @@ class Simulation:
         groups["reactions"] = [lib.name_of(core.pw_system_reaction_name, s, i) for i in range(core.pw_system_rows(s))]
         for i, name in enumerate(groups["reactions"]):
             units[name] = lib.text(core.pw_system_reaction_unit(s, i))
-        entries = core.pw_system_ledger_entries(s) if self._ledger else 0
+        entries = core.pw_system_ledger_entries(s) if self._settings.ledger else 0
         groups["ledger"] = [lib.name_of(core.pw_system_ledger_name, s, i) for i in range(entries)]
         units.update(dict.fromkeys(groups["ledger"], "J"))
         return units, groups
@@ -281,7 +279,7 @@ class Simulation:
                 status, reason, cause = "failed", str(failure), failure.__cause__
             units, groups = self._columns()
         result = Result(rows.used, groups, units, status, reason, self.statistics, self.model,
-                        {"method": self.method, "t_end": t_end})
+                        {"method": self.method, "t_end": t_end, **self._given})
         result.cause, result.changed = cause, self.changed
         return result
 
@@ -297,8 +295,8 @@ class Simulation:
         if times is None:
             every = lib.number(every, "every", above=0)
             count = np.floor((t_end - start) / every * (1 + 1e-12))
-            if not count < 1e12:
-                raise lib.ResourceError(f"every = {every}: {count:g} samples do not fit in memory")
+            if not count * 8 * len(_HEAD) < _MEMORY:
+                raise lib.ResourceError(f"every = {every}: {count:g} samples: out of memory")
             times = start + every * np.arange(count + 1)
             return np.append(times[:-1], t_end) if abs(times[-1] - t_end) < 1e-9 * every else np.append(times, t_end)
         try:
