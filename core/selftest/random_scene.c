@@ -104,13 +104,10 @@ static pw_system *scene_try (const pw_kind *kind, pw_random *random, pw_error *e
 }
 
 pw_system *pw_random_scene (const pw_kind *kind, pw_random *random, pw_error *error) {
-  pw_error cause;
   for (int i = 0; i < 50; i++) { /* the type may reject inconsistent numbers */
-    cause = (pw_error){ 0 };
-    pw_system *s = scene_try (kind, random, &cause);
-    if (s) return s;
-    if (cause.status != PW_INPUT) break;
+    *error = (pw_error){ 0 };
+    pw_system *s = scene_try (kind, random, error);
+    if (s || error->status != PW_INPUT) return s;
   }
-  pw_fail (error, cause.status, "%s", cause.text);
   return NULL;
 }

@@ -280,8 +280,9 @@ int pw_selftest (const pw_kind *kind, unsigned seed, pw_selftest_report *report,
   pw_probe_record (report, "table", "consistent sizes, fields and functions", *fault != 0, 0, "exact", fault);
   if (*fault) return PW_OK;
   pw_random random = { seed };
-  pw_system *s = pw_random_scene (kind, &random, error);
-  if (s == NULL) return error ? error->status : PW_INPUT;
+  pw_error cause = { 0 };
+  pw_system *s = pw_random_scene (kind, &random, &cause);
+  if (s == NULL) return pw_fail (error, cause.status, "%s", cause.text);
   pw_workspace *w = pw_workspace_new (s, error);
   if (w == NULL) {
     pw_system_free (s);

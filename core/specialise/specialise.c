@@ -115,6 +115,10 @@ static int specialise_write (pw_specialise_scene *x) {
            "J[ENTRIES + 1];\n"
            "  reference_jacobian (s, J);\n  (void)M, (void)C, (void)J;\n%s  return 0;\n}\n",
            x->prepare.text ? x->prepare.text : "");
+  fprintf (x->out,
+           "\nPW_EXPORT const pw_specialised pw_specialised_scene = {\n"
+           "  PW_SCENE_ABI, %d, %luu, independent, prepare, evaluate, project, stages, residuals, steps\n};\n#endif\n",
+           x->constants + 1, pw_system_shape (x->s));
   return status;
 }
 
@@ -191,13 +195,6 @@ char *pw_system_source (const pw_system *s, const unsigned char *independent, pw
   pw_specialise_scene x = { .s = s, .independent = independent, .out = pw_stream_open (&text) };
   int status = x.out ? specialise_open (&x) : PW_RESOURCE;
   if (status == PW_OK) status = specialise_write (&x);
-  if (status == PW_OK) {
-    fprintf (
-        x.out,
-        "\nPW_EXPORT const pw_specialised pw_specialised_scene = {\n"
-        "  PW_SCENE_ABI, %d, %luu, independent, prepare, evaluate, project, stages, residuals, steps\n};\n#endif\n",
-        x.constants + 1, pw_system_shape (s));
-  }
   if (pw_stream_close (x.out, &text) != PW_OK) status = PW_RESOURCE;
   pw_workspace_free (x.w);
   free (x.sparsity);

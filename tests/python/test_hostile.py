@@ -50,8 +50,8 @@ REFUSED = {
         ("m.run(t_end=[])", "t_end"), ("m.run(every=NAN)", "every"), ("m.run(every=INF)", "every"), ("m.run(every=0)", "every"),
         ("m.run(every='a')", "every"), ("m.run(every=1e-300)", "memory"), ("m.run(every=1e-10)", "memory"), ("m.run(t_end=1e300, every=1)", "setting step"),
         *[(f"m.run({name}={value})", name) for name in ("step", "rtol", "atol", "max_steps") for value in ("0", "-1", "NAN", "INF", "'a'")],
-        ("m.run(max_steps=1.5)", "whole number"), ("m.run(max_steps=10**30)", "whole number"), ("m.linearise(NAN)", "t_end"),
-        ("m.linearise(-1)", "t_end"), ("m.linearise('a')", "at = 'a'"), ("m.linearise(0, 0)", "most"), ("m.linearise(0, None)", "most"),
+        ("m.run(max_steps=1.5)", "whole number"), ("m.run(max_steps=10**30)", "whole number"), ("m.linearise(NAN)", "at = nan"),
+        ("m.linearise(-1)", "at = -1"), ("m.linearise('a')", "at = 'a'"), ("m.linearise(0, 0)", "most"), ("m.linearise(0, None)", "most"),
         ("m.linearise(0, 2)", "raise `most`"), ("m.open().advance(NAN)", "finite"), ("m.open().advance(INF)", "finite"),
         ("m.open().advance('a')", "expected a number"), ("m.open().advance(-1)", "has reached"), ("m.open().record(-1)", "has reached"),
         ("m.open().record(None)", "t_end"), ("m.open(inputs={'rider': 'a'})", "rider = 'a'"),
@@ -71,6 +71,7 @@ REFUSED = {
         ("pw.describe(bodies=[BODY], let=[1])", "let"), ("pw.describe(bodies=[{'name': 'a', 'mass': -1}])", "mass = -1"),
         ("pw.describe(bodies=[{'name': 'a', 'mass': NAN}])", "NaN"), ("pw.describe(bodies=[{'name': 'a', 'mass': object()}])", "description"),
         ("pw.describe(bodies=[{'name': 'a\\0b', 'mass': 1}])", "character 0"), ("pw.describe(bodies=[BODY] * 2)", "already"),
+        ("pw.describe(bodies=[BODY], signals=[1])", "signals: expected a dict"),
         ("pw.describe(bodies=[BODY], elements=[{'pn': 'p'}])", 'did you mean "pin"'), ("pw.describe(bodies=[BODY], nonsense=3)", "nonsense"),
         *[(f"pw.describe({name}, bodies=[BODY])", "name") for name in ("'a/b'", "'../x'", "''", "'\\0'", "None", "'a' * 300")]],
     "functions": [

@@ -349,7 +349,7 @@ def test_fit_of_arrays():
 
 
 def test_optimum():
-    best = pw.Model("pendulum").optimise(maximise="max:bob.x", free={"theta": (-3, 0)}, starts=2, t_end=2)
+    best = pw.Model("pendulum").optimise(maximise="max:bob.x", free={"theta": np.array([-3, 0])}, starts=2, t_end=2)
     assert best["status"] == "ok" and -3 <= best["unknowns"][0]["value"] <= 0
 
 

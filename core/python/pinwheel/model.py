@@ -385,6 +385,8 @@ class Model:
         InputError, InitialError, MethodError
         """
         at, most = lib.number(at, "at"), int(lib.number(most, "most", above=0))
+        if not 0 <= at < math.inf:
+            raise lib.InputError(f"at = {at!r}: expected a time >= 0")
         with self.open(t_end=at or None) as simulation:
             if at:
                 simulation.advance(at)
@@ -495,7 +497,7 @@ def describe(name: str = "model", *, about: str = "", bodies=(), elements=(), pa
     ...                      elements=[pw.Wheel("edge", body="sleigh", at=[-0.25, 0]),
     ...                                pw.Torque("motor", body=["sleigh", "ground"], value=lambda t: math.sin(t))])
     """
-    signals, plain = dict(model.pop("signals", None) or {}), []
+    signals, plain = _functions(model.pop("signals", None) or {}), []
     for element in _entries(elements, "elements"):
         kind = next(iter(element))
         signals.update({f"{element[kind]}.{field}": value for field, value in element.items() if callable(value)})

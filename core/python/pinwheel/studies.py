@@ -231,6 +231,9 @@ def _output(name, described, folder, tables):
     return None
 
 
+_LISTS = (list, tuple, np.ndarray)
+
+
 def _words(key, value, folder):
     """An option as arguments."""
     option = "--" + key.replace("_", "-")
@@ -240,11 +243,11 @@ def _words(key, value, folder):
         return []
     if hasattr(value, "items"):
         return [f"{option}={name}={_value(x)}" for name, x in value.items()]
-    return [option if item is True else f"{option}={item}" for item in (value if isinstance(value, (list, tuple)) else [value])]
+    return [option if item is True else f"{option}={item}" for item in (value if isinstance(value, _LISTS) else [value])]
 
 
 def _value(x):
-    return ":".join(map(str, x)) if isinstance(x, (list, tuple)) else str(x)
+    return ":".join(map(str, x)) if isinstance(x, _LISTS) else str(x)
 
 
 def _write_columns(path, columns):
