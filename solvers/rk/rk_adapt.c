@@ -1,13 +1,13 @@
 /* Runge-Kutta methods with step-size control.
  *
- *   h_new = 0.9 h err^-(k - 3 m / 4) err_before^m,  limited to h/5 ... 5 h
+ *   h_new = 0.9 h e^-(k - 3 m / 4) e_last^m,  limited to h/5 ... 5 h; after a rejection to 0.9 h
  *
  * with k the tableau's exponent and m its memory (Gustafsson 1991; Hairer, Norsett & Wanner 1993, section II.4).  The
  * error e is that of positions and velocities in units of the tolerances.  After a projection there remains e', the
  * part of the error tangential to the constraints (Eich 1993; Hindmarsh et al., CVODE), to which a small part of the
  * whole error is added:
  *
- *   e = sqrt (e'^2 + rtol^(1/2) e_before^2)      so that the displacement, e_before rtol, is at most rtol^(3/4)
+ *   e = sqrt (e'^2 + rtol^(1/2) e_whole^2)      so that the displacement by the projection is at most rtol^(3/4)
  *
  * Through the curvature of the constraints, the square of the displacement adds to the tangential error; without this
  * limit the steps of a mostly prescribed motion would grow until that dominates.
@@ -60,7 +60,7 @@ static void adapt_weigh (const pw_run *r) {
 }
 
 /* Mean square of the errors of positions and velocities in units of the tolerances. */
-static double adapt_norm (const pw_run *r, const double *eq, const double *ev) {
+static double adapt_mean_square (const pw_run *r, const double *eq, const double *ev) {
   const double *w = r->data->weight;
   int coords = r->s->coords;
   double sum = 0;
@@ -71,27 +71,29 @@ static double adapt_norm (const pw_run *r, const double *eq, const double *ev) {
   return sum / (2 * coords);
 }
 
-/* The error of an estimate before projection. */
+/* Mean square of an estimate before projection, divided by h^2; its errors go to r->q_at and r->v_at. */
 static double adapt_whole (pw_run *r, const pw_rk_row *e) {
   struct pw_method_data *d = r->data;
   adapt_estimate (e, d->V, r->s->coords, r->q_at);
   adapt_estimate (e, d->A, r->s->coords, r->v_at);
-  return adapt_norm (r, r->q_at, r->v_at);
+  return adapt_mean_square (r, r->q_at, r->v_at);
 }
 
-static double adapt_left (pw_run *r, double whole, int projected) {
+/* Mean square of what a projection leaves of the errors in r->q_at and r->v_at, with the share of the whole. */
+static double adapt_remaining (pw_run *r, double whole, int projected) {
   struct pw_method_data *d = r->data;
   if (!projected && !d->null_space) return whole;
   if (projected || d->projects_positions) pw_project_error (r, r->saddle, r->q_at, r->s->holonomic);
   pw_project_error (r, r->saddle, r->v_at, r->s->rows);
-  return adapt_norm (r, r->q_at, r->v_at) + sqrt (r->settings.rtol) * whole;
+  return adapt_mean_square (r, r->q_at, r->v_at) + sqrt (r->settings.rtol) * whole;
 }
 
+/* Both for one estimate. */
 static double adapt_one (pw_run *r, const pw_rk_row *e, int projected) {
-  return adapt_left (r, adapt_whole (r, e), projected);
+  return adapt_remaining (r, adapt_whole (r, e), projected);
 }
 
-/* Combinations of the mean squares of three estimates; see the top of this file. */
+/* From the mean squares of estimates to an error; see the top of this file. */
 static double adapt_sharpen (double e5, double e3) {
   return e5 == 0 ? 0 : e5 / sqrt (e5 + 0.01 * e3);
 }
@@ -110,7 +112,8 @@ static double adapt_state (pw_run *r, int projected) {
   if (b->e3 == NULL) return sqrt (e);
   double off = adapt_sharpen (e, adapt_one (r, &d->estimate[1], projected));
   double e6 = adapt_whole (r, &d->estimate[2]);
-  if (adapt_watch (e6, e) > off) off = fmax (off, adapt_watch (adapt_left (r, e6, projected), e));
+  if (adapt_watch (e6, e) > off) /* otherwise its projection, which mostly reduces e6, is not needed */
+    off = fmax (off, adapt_watch (adapt_remaining (r, e6, projected), e));
   return off;
 }
 
@@ -160,8 +163,8 @@ static double adapt_factor (const struct pw_method_data *d, double error) {
   return fmin (5, fmax (0.2, f));
 }
 
-/* The step to t1.  If a signal jumps at t1, the error is estimated with the derivative before the jump, which is not an
- * error of the step. */
+/* The step to t1, its error in *off.  If a signal jumps at t1, the estimate uses the derivative just before t1, since the
+ * jump is not an error of the step. */
 static int adapt_step (pw_run *r, double h, double t1, int project, double *added, double *off) {
   struct pw_method_data *d = r->data;
   double before = pw_before_breakpoint (r, t1);
@@ -175,7 +178,8 @@ static int adapt_step (pw_run *r, double h, double t1, int project, double *adde
   return status;
 }
 
-/* A shortened step does not reduce the next one, which gets at least the size planned before. */
+/* After a step shortened by the requested end, the next one has at least the size planned before; its error is remembered if
+ * it was long enough to predict that of the next one. */
 static void adapt_accept (pw_run *r, double h, double t1, double added, double off, double most, int cut) {
   struct pw_method_data *d = r->data;
   double next = h * fmin (most, adapt_factor (d, off));

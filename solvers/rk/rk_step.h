@@ -10,7 +10,7 @@
 struct pw_method_data {
   const pw_tableau *tableau;
   pw_rk_row row[PW_RK_STAGES];        /* [i] stage i > 0; [0] the new state, as stage 0 needs no weights */
-  pw_rk_row estimate[3];              /* error estimates; the last weight is that of the new state's derivative */
+  pw_rk_row estimate[3];              /* e, e3, e6; the last weight is that of the new state's derivative */
   int adaptive;                       /* 1: step-size control; 0: fixed steps */
   int projects, held, every;          /* projection; signals constant over the step; steps between projections */
   int null_space, projects_positions; /* stabilisation nullspace; it projects positions too */
@@ -31,7 +31,7 @@ struct pw_method_data {
 };
 
 /* A step from the current state to t1 = t + h; the new state is left in d->q, d->v, d->a, d->lambda.  project: onto the
- * constraints; added: receives the energy this adds, or NULL.  PW_RETRY: a smaller step may succeed. */
+ * constraints; *added grows by the energy this adds, unless NULL.  PW_RETRY: a smaller step may succeed. */
 int pw_rk_step (pw_run *r, double h, double t1, int project, double *added);
 
 /* Makes the new state the current one. */
@@ -54,7 +54,7 @@ int pw_rk_fail (pw_run *r, int status, double h, pw_error *error);
 int pw_rk_advance_fixed (pw_run *r, double t_end, pw_error *error);
 int pw_rk_advance_adaptive (pw_run *r, double t_end, pw_error *error);
 
-/* The first step of an adaptive method. */
+/* Sets the size of the first step of an adaptive method, also after a discontinuity. */
 void pw_rk_begin_adaptive (pw_run *r);
 
 /* ---- Several steps (several.c) ---- */

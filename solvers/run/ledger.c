@@ -72,7 +72,7 @@ int pw_ledger_reacts (const pw_system *s) {
 /* If kinetic and potential energies are negligible, as for light bodies against friction, the scale is the work
  * done, limited to that of a time T since it grows without bound. */
 double pw_ledger_tolerance (const pw_run *r, double h) {
-  const double share = 5;         /* allows for one of 25 states in a root mean square */
+  const double share = 5;         /* sqrt (25): as strict as for one state of 25 in a root mean square */
   const double round_off = 1e-11; /* of powers, due to multipliers */
   const pw_settings *set = &r->settings;
   double work = 0, rtol = fmax (set->rtol, set->atol > 0 ? set->atol / fmax (r->s->scale.length, 1) : 0);
@@ -91,13 +91,14 @@ double pw_run_energy_defect (const pw_run *r, const pw_sample *sample) {
 }
 
 const char *pw_run_energy_advice (const pw_run *r, double defect) {
-  const double limit = 1e-12, of_step = 10; /* times rtol: acceptable defect per step */
+  const double least = 1e-12; /* rtol that round-off allows */
+  const double of_step = 10;  /* times rtol: acceptable defect per step */
   const pw_statistics *s = &r->statistics;
   int projects = pw_stabilised_by (r, PW_PROJECTION);
   if (!projects && fmax (s->position, s->velocity) > 0.1 * defect)
     return "the constraints have drifted; a method with projection satisfies them";
   if (pw_fixed_steps (r)) return "a smaller step, or another method, follows the motion better";
-  if (r->settings.rtol <= limit) return "the tolerance cannot be much smaller; compare with another method";
+  if (r->settings.rtol <= least) return "the tolerance cannot be much smaller; compare with another method";
   if (defect > of_step * r->settings.rtol * (double)s->steps)
     return "that is more than the tolerance explains; compare with another method";
   return "a smaller tolerance, or another method, follows the motion better";

@@ -171,7 +171,9 @@ static void test_whole_lines (void **state) {
   cli_good ("tail -c 1 @/cut.csv.part | od -An -c | tr -d ' '; wc -l <@/cut.csv.part");
   assert_memory_equal (cli_out, "\\n\n", 3);
   check_below ("lines", 10, atof (cli_out + 3), "4096 bytes take more than 20 of them");
-  cli_good ("rm @/cut.csv.part");
+  assert_int_equal (cli_run ("(ulimit -f 8; pinwheel run pendulum -t 10 --every 0.01 -o @/cut.npz)"), 1);
+  assert_non_null (strstr (cli_err, "cut.npz: File too large\n"));
+  cli_good ("rm @/cut.csv.part @/cut.npz.part");
 }
 
 /* The other files of a run whose table is incomplete are incomplete too, and named. */

@@ -32,6 +32,20 @@ static void test_reactions (void **state) {
   reports_shows (" of the largest\n");
 }
 
+/* The angle is not known at the end, but at other times. */
+static void test_unknown_end (void **state) {
+  (void)state;
+  assert_int_equal (
+      cli_run ("pinwheel run pendulum --t-end 0.5 --every 0.1 -o @/ends.csv >@/log && "
+               "awk -F, -v OFS=, 'NR > 1 && $1 == 0.5 { $4 = \"nan\" } 1' @/ends.csv >@/unknown.csv && "
+               "pinwheel run pendulum --t-end 0.5 --step 2e-3 --reference @/unknown.csv --json @/unknown.json"),
+      0);
+  const char *json = cli_file ("unknown.json");
+  assert_non_null (strstr (json, "\"angle\": null"));
+  assert_true (cli_number (json, "truth", "end", "length", NULL) > 0);
+  assert_true (cli_number (json, "truth", "largest", "angle", NULL) > 0);
+}
+
 static void test_signals (void **state) {
   (void)state;
   cli_good ("pinwheel show tests/models/signals.yaml");
@@ -236,11 +250,12 @@ static void test_ladder (void **state) {
 
 int main (void) {
   const struct CMUnitTest tests[] = {
-    cmocka_unit_test (test_roller),        cmocka_unit_test (test_reactions), cmocka_unit_test (test_signals),
-    cmocka_unit_test (test_unbound),       cmocka_unit_test (test_literals),  cmocka_unit_test (test_nothing),
-    cmocka_unit_test (test_failures),      cmocka_unit_test (test_sorted),    cmocka_unit_test (test_figures_resumed),
-    cmocka_unit_test (test_domains),       cmocka_unit_test (test_ladder),    cmocka_unit_test (test_many_redundant),
-    cmocka_unit_test (test_contradiction), cmocka_unit_test (test_alone),     cmocka_unit_test (test_columns),
+    cmocka_unit_test (test_roller),          cmocka_unit_test (test_reactions),     cmocka_unit_test (test_unknown_end),
+    cmocka_unit_test (test_signals),         cmocka_unit_test (test_unbound),       cmocka_unit_test (test_literals),
+    cmocka_unit_test (test_nothing),         cmocka_unit_test (test_failures),      cmocka_unit_test (test_sorted),
+    cmocka_unit_test (test_figures_resumed), cmocka_unit_test (test_domains),       cmocka_unit_test (test_ladder),
+    cmocka_unit_test (test_many_redundant),  cmocka_unit_test (test_contradiction), cmocka_unit_test (test_alone),
+    cmocka_unit_test (test_columns),
   };
   return cmocka_run_group_tests (tests, cli_setup, cli_teardown);
 }

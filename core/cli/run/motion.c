@@ -50,26 +50,29 @@ int pw_motion_unit (const pw_system *s, int state) {
   return (rate ? MOTION_SPEED : MOTION_LENGTH) + angle;
 }
 
-/* The maximum that propagates NaN: a quantity unknown at one time has no maximum.  Columns missing in the reference are
- * skipped. */
+/* Raises a maximum; NaN stays, since an error that is unknown at one time has no maximum. */
 static void motion_raise (double *most, double value) {
-  if (!(value <= *most)) *most = isnan (*most) ? *most : value;
+  if (value > *most || isnan (value)) *most = value;
 }
 
 static void motion_states (const pw_system *s, const pw_motion *reference, const pw_motion *m, double *error) {
+  int last = m->samples - 1, known[MOTION_UNITS] = { 0 };
   for (int j = 0; j < 2 * pw_system_coordinates (s); j++) {
     int unit = pw_motion_unit (s, j);
     for (int k = 0; k < m->samples; k++) {
       double exact = reference->x[k * reference->width + j];
-      if (isnan (exact)) continue;
+      if (isnan (exact)) continue; /* not compared */
       double d = fabs (m->x[k * m->width + j] - exact);
       motion_raise (&error[MOTION_MOST + unit], d);
-      if (k == m->samples - 1) motion_raise (&error[MOTION_END + unit], d);
+      if (k == last) motion_raise (&error[MOTION_END + unit], d), known[unit] = 1;
     }
   }
+  for (int i = 0; i < MOTION_UNITS; i++)
+    if (!known[i]) error[MOTION_END + i] = NAN;
 }
 
-/* The largest multiplier of the same unit as row i: forces and moments are not compared with each other. */
+/* The largest multiplier of the same unit as row i, since forces and moments are not compared with each other; 1 N or
+ * N m if all are zero or unknown. */
 static double motion_load (const pw_system *s, const pw_motion *reference, int i) {
   double most = 0;
   for (int j = 0; j < pw_system_rows (s); j++)
@@ -82,10 +85,9 @@ static double motion_load (const pw_system *s, const pw_motion *reference, int i
 static void motion_multipliers (const pw_system *s, const pw_motion *reference, const pw_motion *m, double *error) {
   const char *unit = NULL; /* neighbours mostly have the same unit */
   double load = 1;
-  int jumps[MOTION_SAMPLES], smooth = 0;
-  /* At a jump they have two values, and methods differ in which one they report. */
-  for (int k = 0; k < m->samples; k++) smooth += !(jumps[k] = pw_system_jumps (s, reference->t[k]));
-  if (smooth == 0) error[MOTION_LAMBDA] = NAN;
+  int jumps[MOTION_SAMPLES], compared = 0;
+  /* At a jump multipliers have two values, and methods differ in which one they report. */
+  for (int k = 0; k < m->samples; k++) jumps[k] = pw_system_jumps (s, reference->t[k]);
   for (int i = 0; i < pw_system_rows (s); i++) {
     if (unit == NULL || strcmp (unit, pw_system_reaction_unit (s, i)) != 0) {
       unit = pw_system_reaction_unit (s, i);
@@ -94,10 +96,12 @@ static void motion_multipliers (const pw_system *s, const pw_motion *reference, 
     int j = 2 * pw_system_coordinates (s) + i;
     for (int k = 0; k < m->samples; k++) {
       double exact = reference->x[k * reference->width + j];
-      if (!isnan (exact) && !jumps[k])
-        motion_raise (&error[MOTION_LAMBDA], fabs (m->x[k * m->width + j] - exact) / load);
+      if (isnan (exact) || jumps[k]) continue;
+      motion_raise (&error[MOTION_LAMBDA], fabs (m->x[k * m->width + j] - exact) / load);
+      compared = 1;
     }
   }
+  if (!compared) error[MOTION_LAMBDA] = NAN;
 }
 
 void pw_motion_distance (const pw_system *s, const pw_motion *reference, const pw_motion *m,

@@ -7,7 +7,7 @@
 enum { MOTION_SAMPLES = 100 /* of a motion, at most */ };
 
 /* Errors: the largest of the coordinates and velocities of a unit, at the end, then over all samples; of the multipliers
- * relative to the largest one of the same unit, except at times at which a signal makes them jump. */
+ * relative to the largest one of the same unit, except at times at which a signal makes them jump.  NaN: not known. */
 enum { MOTION_END, MOTION_MOST = 4, MOTION_LAMBDA = 8, MOTION_ERRORS };
 enum { MOTION_LENGTH, MOTION_ANGLE, MOTION_SPEED, MOTION_RATE, MOTION_UNITS };
 
@@ -17,12 +17,12 @@ typedef struct {
   double *x;          /* samples x width; NaN: not known */
 } pw_motion;
 
-/* Errors: PW_RESOURCE. */
+/* Opens a motion of 1 to MOTION_SAMPLES samples.  Errors: PW_RESOURCE. */
 int pw_motion_open (pw_motion *m, const pw_system *s, int samples, pw_error *error);
 void pw_motion_close (pw_motion *m);
 /* Stores a sample as number i. */
 void pw_motion_take (pw_motion *m, const pw_system *s, int i, const pw_sample *sample);
-/* Samples evenly spaced, the last one at t_end. */
+/* Sets the times t_end / samples, ..., t_end. */
 void pw_motion_times (pw_motion *m, double t_end);
 /* The errors of a motion relative to a reference at the same times. */
 void pw_motion_distance (const pw_system *s, const pw_motion *reference, const pw_motion *m,

@@ -47,13 +47,15 @@ static int archive_write (pw_csv *c, pw_error *error) {
   long rows = a->columns ? (long)(a->count / a->columns) : 0;
   double *column = malloc (((size_t)rows + 1) * sizeof *column);
   c->failed |= column == NULL;
+  errno = 0; /* for pw_output_check */
   for (size_t i = 0; i < a->columns && !c->failed; i++) {
     for (long row = 0; row < rows; row++) column[row] = a->value[(size_t)row * a->columns + i];
     pw_npz_add (&z, a->name[i], rows, 0, 1, column);
   }
   free (column);
   int status = pw_npz_end (&z, error);
-  return c->failed ? pw_fail (error, PW_RESOURCE, "out of memory while writing a table") : status;
+  if (c->failed) return pw_fail (error, PW_RESOURCE, "out of memory while writing a table");
+  return status == PW_OK ? pw_output_check (c->output, error) : status;
 }
 
 static void archive_free (csv_archive *a) {
@@ -155,6 +157,11 @@ static void csv_free (pw_csv *c) {
 pw_csv *pw_csv_open (const pw_system *s, int ledger, pw_output *o, pw_error *error) {
   pw_csv *c = calloc (1, sizeof *c);
   int archive = pw_output_named (o, ".npz");
+  if (archive && pw_output_continued (o)) {
+    pw_fail (error, PW_INPUT, "an archive of arrays cannot be continued: write a table that ends in .csv");
+    free (c);
+    return NULL;
+  }
   if (c) c->contact = calloc ((size_t)pw_system_contacts (s) + 1, sizeof *c->contact);
   if (c && archive) c->archive = calloc (1, sizeof *c->archive);
   if (c && c->contact && (c->archive || !archive)) {

@@ -17,9 +17,8 @@ typedef struct {
 
 /* A rod in the current state. */
 typedef struct {
-  const rod *k;
   const pw_configuration *A, *B;
-  const double *w;
+  const double *w; /* that J is multiplied by, for jw_q only */
   double D[2][6];
   double S1[2], S2[2];  /* arms in world axes */
   double d[2], rate[2]; /* from end 2 to end 1, and its velocity */
@@ -30,7 +29,7 @@ typedef struct {
 static inline rod_state rod_at (const pw_batch *b, int e) {
   const rod *k = (const rod *)b->element + e;
   const pw_configuration *A = &b->configuration[b->body[2 * e]], *B = &b->configuration[b->body[2 * e + 1]];
-  rod_state s = { k, A, B, batch_w (b, e), .w1 = A->omega, .w2 = B->omega, .L = k->length };
+  rod_state s = { A, B, batch_w (b, e), .w1 = A->omega, .w2 = B->omega, .L = k->length };
   s.S1[0] = A->cos * k->s1[0] - A->sin * k->s1[1], s.S1[1] = A->sin * k->s1[0] + A->cos * k->s1[1];
   s.S2[0] = B->cos * k->s2[0] - B->sin * k->s2[1], s.S2[1] = B->sin * k->s2[0] + B->cos * k->s2[1];
   s.D[0][0] = s.D[1][1] = 1, s.D[0][3] = s.D[1][4] = -1;
@@ -73,7 +72,7 @@ PER_ELEMENT (rod_gamma, rod, 1) {
   *out = (turn - rod_dot (x.rate, x.rate)) / x.L;
 }
 
-/* ((D w)^T D + d^T d(D w)/dq) / L with d(D w)/dphi1 = -(X1, Y1) w(phi1), d(D w)/dphi2 = (X2, Y2) w(phi2). */
+/* ((D w)^T D + d^T d(D w)/dq) / L with d(D w)/dphi1 = -(X1, Y1) w_2, d(D w)/dphi2 = (X2, Y2) w_5. */
 PER_ELEMENT (rod_jw_q, rod, 6) {
   double Dw[2] = { 0, 0 };
   for (int j = 0; j < 6; j++) Dw[0] += x.D[0][j] * x.w[j], Dw[1] += x.D[1][j] * x.w[j];
@@ -84,16 +83,16 @@ PER_ELEMENT (rod_jw_q, rod, 6) {
 
 /* dd'/dphi1 = -w1 (X1, Y1), dd'/dphi2 = w2 (X2, Y2); derivatives of the arms are columns of D, for arm 2 negated. */
 PER_ELEMENT (rod_gamma_q, rod, 6) {
-  double w1 = x.w1 * x.w1, w2 = x.w2 * x.w2;
-  const double turn[2] = { x.S1[0] * w1 - x.S2[0] * w2, x.S1[1] * w1 - x.S2[1] * w2 };
+  const double square1 = x.w1 * x.w1, square2 = x.w2 * x.w2;
+  const double turn[2] = { x.S1[0] * square1 - x.S2[0] * square2, x.S1[1] * square1 - x.S2[1] * square2 };
   rod_through (&x, turn, out);
-  out[2] += (w1 * (x.d[0] * x.D[0][2] + x.d[1] * x.D[1][2]) + 2 * x.w1 * rod_dot (x.rate, x.S1)) / x.L;
-  out[5] += (w2 * (x.d[0] * x.D[0][5] + x.d[1] * x.D[1][5]) - 2 * x.w2 * rod_dot (x.rate, x.S2)) / x.L;
+  out[2] += (square1 * (x.d[0] * x.D[0][2] + x.d[1] * x.D[1][2]) + 2 * x.w1 * rod_dot (x.rate, x.S1)) / x.L;
+  out[5] += (square2 * (x.d[0] * x.D[0][5] + x.d[1] * x.D[1][5]) - 2 * x.w2 * rod_dot (x.rate, x.S2)) / x.L;
 }
 
 PER_ELEMENT (rod_gamma_v, rod, 6) {
-  const double twice[2] = { -2 * x.rate[0], -2 * x.rate[1] };
-  rod_through (&x, twice, out);
+  const double minus_twice[2] = { -2 * x.rate[0], -2 * x.rate[1] };
+  rod_through (&x, minus_twice, out);
   out[2] += 2 * x.w1 * rod_dot (x.d, x.S1) / x.L;
   out[5] -= 2 * x.w2 * rod_dot (x.d, x.S2) / x.L;
 }
