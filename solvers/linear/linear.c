@@ -27,7 +27,7 @@ static int linear_arrays (pw_linearisation *x) {
     { &x->x, 2 * n },
     { &x->y, n + 2 * m },
     { &x->da, n + 3 },
-    { &x->z, n + m + 3 },
+    { &x->z, n + 3 * m + 3 },
     { &x->c, m },
     { &x->S, 3 * size },
     { &x->a0, n },
@@ -121,7 +121,8 @@ static int linear_compute (pw_linearisation *x, pw_linear *l, pw_error *error) {
   if (status != PW_OK)
     return status > 0 ? pw_fail_singular (r, r->t, error)
                       : pw_run_annotate_error (r, pw_fail_signal (r->t, error), error);
-  l->least = pw_linear_bases (x);
+  l->least = pw_linear_least (x);
+  pw_linear_bases (x);
   int jump = linear_jump (x);
   if (jump >= 0)
     return pw_fail (error, PW_METHOD,

@@ -37,7 +37,7 @@ typedef struct {
   double *x;                     /* 2 n: a variation */
   double *y;                     /* n + 2 m: derivatives times x: those of -F, gamma - J a, J v - eta */
   double *da;                    /* n + 3: the resulting variation of accelerations */
-  double *z, *c;                 /* n + m + 3, m: scratch */
+  double *z, *c;                 /* n + 3 m + 3, m: scratch */
   double *residual;              /* 3 x (2 m + n): violations by rigid displacements; then scratch, 2 m + n + 15 */
   double *a0, *along, *response; /* n, 2 n, n: accelerations, a variation and its da at the current state */
   double *there;                 /* 2 n: a later state */
@@ -68,8 +68,10 @@ void pw_linear_close (pw_linearisation *x);
 
 /* Records the scatter map of the derivatives.  PW_OK or PW_RESOURCE. */
 int pw_linear_derivatives (pw_linearisation *x);
-/* J^T = Q R of the independent constraint equations; returns the smallest singular value of J. */
-double pw_linear_bases (pw_linearisation *x);
+/* The smallest singular value of J, rows of length 1; NaN without constraint equations. */
+double pw_linear_least (pw_linearisation *x);
+/* J^T = Q R of the independent constraint equations at the state evaluated. */
+void pw_linear_bases (pw_linearisation *x);
 /* Evaluates accelerations and derivatives at a state; kinematics are left there.  Returns as pw_run_accelerate. */
 int pw_linear_evaluate (pw_linearisation *x, double t, const double *q, const double *v);
 /* Computes y from the variation x; y and da. */

@@ -104,21 +104,31 @@ static int linear_stride (int n) {
   return n > 1 ? n : 1; /* LAPACK refuses 0 */
 }
 
-double pw_linear_bases (pw_linearisation *x) {
-  int n = x->n, rank = x->rank;
-  double least = INFINITY, *tau = x->da;
+/* The rows of J of the independent equations, of length 1, to Q. */
+static void linear_independent (pw_linearisation *x) {
+  size_t n = (size_t)x->n;
   pw_rank_rows (x->r->w, x->R, x->norm);
-  for (int k = 0; k < rank; k++)
-    memcpy (linear_column (x, k), x->R + (size_t)x->row[k] * (size_t)n, (size_t)n * sizeof *x->R);
-  memcpy (x->R, x->Q, (size_t)rank * (size_t)n * sizeof *x->R);
-  int failed = rank && LAPACKE_dgesvj_work (LAPACK_COL_MAJOR, 'G', 'N', 'N', n, rank, x->R, n, x->c, 0, NULL, 1, x->z,
+  for (int k = 0; k < x->rank; k++) memcpy (linear_column (x, k), x->R + (size_t)x->row[k] * n, n * sizeof *x->R);
+}
+
+double pw_linear_least (pw_linearisation *x) {
+  int n = x->n, rank = x->rank;
+  double least = INFINITY;
+  linear_independent (x);
+  int failed = rank && LAPACKE_dgesvj_work (LAPACK_COL_MAJOR, 'G', 'N', 'N', n, rank, x->Q, n, x->c, 0, NULL, 1, x->z,
                                             n + x->m + 3) != 0;
   for (int k = 0; k < rank; k++) least = fmin (least, x->z[0] * x->c[k]);
+  return rank && !failed ? least : NAN;
+}
+
+void pw_linear_bases (pw_linearisation *x) {
+  int n = x->n, rank = x->rank;
+  double *tau = x->da;
+  linear_independent (x);
   LAPACKE_dgeqrf_work (LAPACK_COL_MAJOR, n, rank, x->Q, n, tau, x->z, n);
   for (int k = 0; k < rank; k++)
     memcpy (x->R + (size_t)k * (size_t)rank, linear_column (x, k), (size_t)(k + 1) * sizeof *x->R);
   LAPACKE_dorgqr_work (LAPACK_COL_MAJOR, n, n, rank, x->Q, n, tau, x->z, n);
-  return rank && !failed ? least : NAN;
 }
 
 /* ---- The reduced system ---- */
@@ -140,7 +150,7 @@ void pw_linear_tangent (pw_linearisation *x, int c) {
   for (int j = 0; j < x->n; j++)
     x->x[velocity ? x->n + j : j] = linear_column (x, column)[j] / pw_as_length (x->r->s, j) / (velocity ? T : 1);
   if (velocity) return;
-  pw_linear_vary (x);
+  pw_linear_multiply (x);
   linear_follow (x);
 }
 

@@ -12,10 +12,11 @@
  * and their error.  The error of the result obeys the same equations, with the error of the differences in place of the
  * effects of p, and after each step with the error of the step added.
  *
- * One method serves all runs: the explicit pair of order 5 (variation_step.c) along the states that the run has reached,
- * with steps of its own, between which it ends at samples and breakpoints.  Steps of a run with a fixed step are usually
- * much smaller; a linearisation costs about 6 evaluations of the accelerations.  The result is therefore the derivative
- * of the motion that the run follows, to 1e-10 or the accuracy of its states, not that of its discretisation error.
+ * Steps are explicit (variation_explicit.c), or implicit if the motion is stiff (variation_implicit.c), for runs by all
+ * methods: along the states that the run has reached, with steps of their own, which end at samples and breakpoints.  Steps
+ * of a run with a fixed step are usually much smaller; a linearisation costs about 6 evaluations of the accelerations.  The
+ * result is therefore the derivative of the motion that the run follows, to 1e-10 or the accuracy of its states, not that of
+ * its discretisation error.
  *
  * After each step dq and dv are projected onto the tangent of the constraints,
  *
@@ -36,7 +37,8 @@ static const double VARIATION_NEAR = 1e-4;
 static int variation_linear (pw_variation *x) {
   pw_linearisation *l = &x->linear;
   size_t n = (size_t)x->n, m = (size_t)x->m;
-  *l = (pw_linearisation){ .r = x->r, .n = x->n, .m = x->m };
+  int status = pw_linear_open (l, x->r, 0, PW_VARIATION_DENSE);
+  if (status != PW_OK || x->n <= PW_VARIATION_DENSE) return status;
   const pw_array array[] = { { &l->a, n + 3 },  { &l->lambda, m }, { &l->x, 2 * n },        { &l->y, n + 2 * m },
                              { &l->da, n + 3 }, { &l->c, m },      { &l->z, n + 3 * m + 3 } };
   l->memory = pw_alloc_arrays (array, sizeof array / sizeof *array);
@@ -46,21 +48,17 @@ static int variation_linear (pw_variation *x) {
 static int variation_arrays (pw_variation *x) {
   size_t n = (size_t)x->n, m = (size_t)x->m, entries = (size_t)x->r->s->entries, size = (size_t)x->size;
   size_t all = 3 * n + 4 * m + entries + 9, sample = 3 * n + m + entries;
-  const pw_array array[] = { { &x->q, n + 3 },
-                             { &x->v, n + 3 },
-                             { &x->scratch, all },
-                             { &x->values, 2 * all },
-                             { &x->output, all },
-                             { &x->sample[0], sample },
-                             { &x->sample[1], sample },
-                             { &x->a[0], PW_VARIATION_RATES * n },
-                             { &x->hold[0].state, 2 * n },
-                             { &x->hold[1].state, 2 * n } };
+  const pw_array array[] = {
+    { &x->q, n + 3 },    { &x->v, n + 3 },          { &x->scratch, all },         { &x->values, 2 * all },
+    { &x->output, all }, { &x->sample[0], sample }, { &x->sample[1], sample },    { &x->a[0], PW_VARIATION_RATES * n },
+    { &x->motion, n },   { &x->defect, n },         { &x->hold[0].state, 2 * n }, { &x->hold[1].state, 2 * n }
+  };
   x->memory = pw_alloc_arrays (array, sizeof array / sizeof *array);
   for (int k = 1; x->memory && k < PW_VARIATION_RATES; k++) x->a[k] = x->a[k - 1] + n;
   for (int i = 0; x->memory && i < x->count; i++) {
     pw_direction_copy *d = &x->direction[i];
-    pw_array own[8 + 2 * (3 + PW_VARIATION_RATES)], *a = own;
+    pw_array own[9 + 2 * (3 + PW_VARIATION_RATES)], *a = own;
+    *a++ = (pw_array){ &d->local, size };
     for (int c = 0; c < 2; c++) {
       pw_variation_column *k = &d->column[c];
       *k = (pw_variation_column){ .direction = d };
@@ -158,6 +156,19 @@ static int variation_blocks (const pw_variation *x, pw_error *error) {
       x->r->s->model, block);
 }
 
+/* Appends the last step of the run, from time t0, to its states.  A step across a jump is not refined: samples in it, each an own step of a Runge-Kutta method, are not continuous in time and
+ * might seem to cross it several times. */
+static int variation_record (pw_variation *x, double t0, pw_error *error) {
+  int last = x->points - 1, points;
+  int status = pw_variation_append (x, last < 0 ? t0 : x->r->t, error);
+  if (status != PW_OK || last < 0) return status;
+  points = x->points;
+  status = pw_variation_find_jumps (x, last, error);
+  if (status != PW_OK || x->points > points || x->point[last].jumps) return status;
+  status = pw_variation_refine (x, last, error);
+  return status == PW_OK && x->points > points ? pw_variation_find_jumps (x, last, error) : status;
+}
+
 static double variation_reversal (pw_run *r) {
   char element[80];
   double least;
@@ -177,7 +188,7 @@ static int variation_open (pw_variation *x, const pw_direction *d, pw_error *err
   x->direction = calloc ((size_t)x->count + 1, sizeof *x->direction);
   if (x->direction == NULL || variation_arrays (x) != PW_OK || variation_linear (x) != PW_OK)
     return pw_fail_memory (r->s, error);
-  status = pw_variation_record (x, x->t, error);
+  status = variation_record (x, x->t, error);
   for (int i = 0; i < x->count && status == PW_OK; i++) status = variation_start (x, &x->direction[i], &d[i], error);
   if (status != PW_OK) return status;
   memcpy (x->q, r->q, (size_t)x->n * sizeof *x->q);
@@ -215,6 +226,7 @@ void pw_variation_close (pw_variation *x) {
   }
   for (int i = 0; i < x->room; i++) free (x->point[i].x);
   pw_linear_close (&x->linear);
+  pw_variation_implicit_close (x->implicit);
   free (x->point);
   free (x->direction);
   free (x->memory);
@@ -234,7 +246,7 @@ static int variation_lead (pw_variation *x, double to, double t_end, pw_error *e
   while (status == PW_OK && r->t < to && x->points < PW_VARIATION_POINTS && (r->t < r->breakpoint || r->t == x->t)) {
     double t0 = r->t;
     status = pw_run_advance (r, t_end, error);
-    if (status == PW_OK && r->t > t0) status = pw_variation_record (x, t0, error);
+    if (status == PW_OK && r->t > t0) status = variation_record (x, t0, error);
   }
   return status;
 }

@@ -148,6 +148,14 @@ int pw_variation_evaluate (pw_variation *x, double t, pw_error *error) {
   return status < 0 ? pw_fail_signal (t, error) : status;
 }
 
+int pw_variation_evaluate_at (pw_variation *x, double t, pw_error *error) {
+  double *state = x->scratch;
+  pw_variation_state (x, t, state);
+  memcpy (x->q, state, (size_t)x->n * sizeof *x->q);
+  memcpy (x->v, state + x->n, (size_t)x->n * sizeof *x->v);
+  return pw_variation_evaluate (x, pw_before_breakpoint (x->r, t), error);
+}
+
 /* ---- Derivatives of energies, powers, least-norm multipliers ---- */
 
 /* The values at a state of a run. */
@@ -199,6 +207,15 @@ int pw_variation_outputs (pw_variation *x, const pw_variation_column *c, const d
 
 /* ---- Columns ---- */
 
+double pw_variation_norm (const pw_variation *x, const double *Y) {
+  const pw_system *s = x->r->s;
+  double most = 0;
+  for (int j = 0; j < x->n; j++)
+    most = pw_larger_or_nan (most,
+                             pw_larger_or_nan (fabs (Y[j]), fabs (Y[x->n + j]) * x->r->w->scale.time) / pw_unit (s, j));
+  return most;
+}
+
 /* d a and d lambda of a column with the derivatives Y of the state. */
 static void effect_accelerations (pw_variation *x, const pw_variation_column *c, double *da) {
   pw_linearisation *l = &x->linear;
@@ -232,21 +249,26 @@ int pw_variation_ledger_rates (pw_variation *x, int k) {
   return status;
 }
 
+int pw_variation_rates (pw_variation *x, int k, pw_error *error) {
+  memcpy (x->a[k], x->linear.a, (size_t)x->n * sizeof *x->q);
+  pw_variation_accelerate (x, 0, k);
+  pw_variation_accelerate (x, 1, k);
+  return pw_variation_ledger_rates (x, k) == PW_OK ? PW_OK : pw_fail_signal (x->at, error);
+}
+
 /* Positions first; the velocities' equations contain them. */
-void pw_variation_project (pw_variation *x) {
+void pw_variation_project (pw_variation *x, pw_variation_column *c) {
   pw_linearisation *l = &x->linear;
   int n = x->n, m = x->m, holonomic = x->r->s->holonomic;
-  PW_EACH_COLUMN (c, x) {
-    const double *row = c->direction->row[pw_variation_index (c)];
-    pw_mul_J (x->r->w, c->trial, l->z);
-    for (int i = 0; i < m; i++) l->z[i] = i < holonomic ? -l->z[i] - row[i] : 0;
-    pw_saddle_solve (x->r->saddle, NULL, l->z, l->da, l->z);
-    effect_add (c->trial, l->da, 1, n);
-    memcpy (l->x, c->trial, 2 * (size_t)n * sizeof *l->x);
-    pw_linear_multiply (l);
-    pw_mul_J (x->r->w, c->trial + n, l->z);
-    for (int i = 0; i < m; i++) l->z[i] = -l->z[i] - l->y[n + m + i] - row[m + i];
-    pw_saddle_solve (x->r->saddle, NULL, l->z, l->da, l->z);
-    effect_add (c->trial + n, l->da, 1, n);
-  }
+  const double *row = c->direction->row[pw_variation_index (c)];
+  pw_mul_J (x->r->w, c->trial, l->z);
+  for (int i = 0; i < m; i++) l->z[i] = i < holonomic ? -l->z[i] - row[i] : 0;
+  pw_saddle_solve (x->r->saddle, NULL, l->z, l->da, l->z);
+  effect_add (c->trial, l->da, 1, n);
+  memcpy (l->x, c->trial, 2 * (size_t)n * sizeof *l->x);
+  pw_linear_multiply (l);
+  pw_mul_J (x->r->w, c->trial + n, l->z);
+  for (int i = 0; i < m; i++) l->z[i] = -l->z[i] - l->y[n + m + i] - row[m + i];
+  pw_saddle_solve (x->r->saddle, NULL, l->z, l->da, l->z);
+  effect_add (c->trial + n, l->da, 1, n);
 }

@@ -87,6 +87,22 @@ static int jump_suspected (pw_variation *x, int i, double *state, int *suspected
   return status;
 }
 
+static void jump_replace (pw_variation *x, int i, double t, const double *state) {
+  x->point[i].t = t;
+  memcpy (x->point[i].x, state, 3 * (size_t)x->n * sizeof *state);
+}
+
+/* Extends a recorded jump by one that adjoins it: a state may lie on the surface, where sign (0) = 0. */
+static int jump_extend (pw_variation *x, int i, double t0, double t1, const double *left, const double *right) {
+  if (i > 0 && x->point[i - 1].jumps && t0 == x->point[i].t)
+    jump_replace (x, i, t1, right);
+  else if (x->point[i + 1].jumps && t1 == x->point[i + 1].t)
+    jump_replace (x, i + 1, t0, left);
+  else
+    return 0;
+  return 1;
+}
+
 static int jump_find (pw_variation *x, int i, int *found, pw_error *error) {
   double t0 = x->point[i].t, t1 = x->point[i + 1].t, *left = x->values, *right = left + 3 * x->n;
   int status = jump_suspected (x, i, left, found, error);
@@ -95,7 +111,7 @@ static int jump_find (pw_variation *x, int i, int *found, pw_error *error) {
   status = jump_state (x, t0, left, error);
   if (status == PW_OK) status = jump_state (x, t1, right, error);
   if (status == PW_OK) status = jump_bisect (x, &t0, &t1, left, right, found, error);
-  if (status != PW_OK || !*found) return status;
+  if (status != PW_OK || !*found || jump_extend (x, i, t0, t1, left, right)) return status;
   if (t0 > x->point[i].t)
     status = jump_insert (x, i++, t0, left, error);
   else

@@ -6,9 +6,11 @@
 #include "linear.h"
 
 enum {
-  PW_VARIATION_NEAR = 4,    /* neighbouring runs of a direction */
-  PW_VARIATION_RATES = 7,   /* stages of a step, and the derivative at its end */
-  PW_VARIATION_POINTS = 256 /* most states of the run between the derivatives' time and its own */
+  PW_VARIATION_NEAR = 4,     /* neighbouring runs of a direction */
+  PW_VARIATION_STAGES = 3,   /* of an implicit step */
+  PW_VARIATION_RATES = 7,    /* stages of a step, and the derivative at its end */
+  PW_VARIATION_POINTS = 256, /* most states of the run between the derivatives' time and its own */
+  PW_VARIATION_DENSE = 100   /* most coordinates for implicit steps, which need dense matrices */
 };
 
 /* The derivative along a direction, or its error. */
@@ -32,6 +34,7 @@ typedef struct pw_direction_copy {
   /* of each column: */
   double *effect[2];      /* n + m: derivatives of f - M a - J^T lambda, gamma - J a by the parameter */
   double *row[2];         /* 2 m: of g, J v - eta */
+  double *local;          /* size: error of the derivative in the last step */
   int signals;            /* 1: some signals differ in the neighbours */
   unsigned char *changes; /* of batches: 1 if it differs in the neighbours; then 1 for masses and constant forces */
   char *memory;
@@ -54,14 +57,17 @@ struct pw_variation {
   pw_run *r;
   int n, m, entries, size, count; /* size: 2 n + entries; count: directions */
   int ledger;
-  pw_direction_copy *direction;  /* count */
-  pw_linearisation linear;       /* at the state last evaluated */
-  double t;                      /* of the derivatives */
-  double at;                     /* time of the state last evaluated */
-  double h, off;                 /* next step, relative error of the last one */
-  double *q, *v;                 /* n + 3: the state last evaluated */
-  double *a[PW_VARIATION_RATES]; /* n: accelerations of the run at the stages */
-  double speed;                  /* largest velocity of the run so far, in units of the scene */
+  pw_direction_copy *direction;           /* count */
+  pw_linearisation linear;                /* at the state last evaluated */
+  double t;                               /* of the derivatives */
+  double at;                              /* time of the state last evaluated */
+  double h, off;                          /* next step, relative error of the last one */
+  int stiff;                              /* number of steps whose size stability limited */
+  struct pw_variation_implicit *implicit; /* implicit steps; NULL: explicit ones */
+  double *q, *v;                          /* n + 3: the state last evaluated */
+  double *a[PW_VARIATION_RATES];          /* n: accelerations of the run at the stages */
+  double *motion, *defect;                /* n: errors of the last step for the run's velocities: estimate, actual */
+  double speed;                           /* largest velocity of the run so far, in units of the scene */
   double reversal;          /* change of a velocity over which a force reverses, at most 1, in units of the scene */
   double *scratch, *output; /* k = 3 n + 4 m + entries + 9; output: 2 + entries + m of pw_variation_outputs */
   double *values;           /* 2 k: scratch */
@@ -80,8 +86,11 @@ struct pw_variation {
 
 /* ---- variation_path.c ---- */
 
-/* Appends the last step of the run, from time t0, to the states.  A status. */
-int pw_variation_record (pw_variation *x, double t0, pw_error *error);
+/* Appends the state of the run at time t, in its last step.  A status. */
+int pw_variation_append (pw_variation *x, double t, pw_error *error);
+/* Inserts states between point i and the last one, in the last step of a run that adapts its steps, until interpolation is as
+ * good as a tenth of its tolerance.  A status. */
+int pw_variation_refine (pw_variation *x, int i, pw_error *error);
 /* A new last point, without a state. */
 int pw_variation_add_point (pw_variation *x, pw_error *error);
 /* Accelerations of the run's equations at a state; just before a breakpoint.  A status. */
@@ -96,12 +105,18 @@ void pw_variation_state (const pw_variation *x, double t, double *out);
 
 /* Evaluates the linearised equations, and the effects of parameters, at (t, x->q, x->v).  A status. */
 int pw_variation_evaluate (pw_variation *x, double t, pw_error *error);
+/* The same at the state of the run at time t. */
+int pw_variation_evaluate_at (pw_variation *x, double t, pw_error *error);
+/* The largest of the derivatives of a state, Y, in units of the scene. */
+double pw_variation_norm (const pw_variation *x, const double *Y);
 /* Time derivatives of the columns' `trial` at the state evaluated, into K[k]: of dq and dv of column c of each direction;
  * then of the ledger, of all columns.  Non-zero if a signal fails. */
 void pw_variation_accelerate (pw_variation *x, int c, int k);
 int pw_variation_ledger_rates (pw_variation *x, int k);
-/* Projects every column's `trial` onto the linearised constraints at the state evaluated. */
-void pw_variation_project (pw_variation *x);
+/* All of these; accelerations of the run into a[k].  A status. */
+int pw_variation_rates (pw_variation *x, int k, pw_error *error);
+/* Projects a column's `trial` onto the linearised constraints at the state evaluated. */
+void pw_variation_project (pw_variation *x, pw_variation_column *c);
 /* The step of differences along a column: the state changes by at most 1e-5 in units of the scene. */
 double pw_variation_step_along (const pw_variation_column *c);
 /* Derivatives of kinetic and potential energy, the ledger's rates, least-norm multipliers along a column: 2 + entries + m
@@ -110,12 +125,29 @@ int pw_variation_outputs (pw_variation *x, const pw_variation_column *c, const d
 
 /* ---- variation_step.c ---- */
 
-/* pw_variation_evaluate at the state of the run at time t. */
-int pw_variation_evaluate_at (pw_variation *x, double t, pw_error *error);
 /* Makes every column's `trial`, projected, its derivatives at the state evaluated. */
 int pw_variation_begin (pw_variation *x, pw_error *error);
 /* Tries a step that does not pass t1 or the state that the run has reached; the next one is smaller if it fails. */
 int pw_variation_step (pw_variation *x, double t1, pw_error *error);
+
+/* ---- variation_explicit.c ---- */
+
+/* The columns after a step from x->t to t1 = x->t + h into `trial`, with the state there evaluated; `motion`; adds the
+ * integral of accelerations to `defect`. */
+int pw_variation_explicit_stages (pw_variation *x, double h, double t1, pw_error *error);
+/* Entries from `first` to `end` - 1 of `local`, when the last time derivatives are known. */
+void pw_variation_explicit_errors (pw_variation *x, double h, int first, int end);
+/* h times the rate of the fastest component of the derivatives. */
+double pw_variation_stiffness (const pw_variation *x, double h);
+
+/* ---- variation_implicit.c ---- */
+
+typedef struct pw_variation_implicit pw_variation_implicit;
+/* NULL without memory. */
+pw_variation_implicit *pw_variation_implicit_open (const pw_variation *x);
+void pw_variation_implicit_close (pw_variation_implicit *p);
+/* As pw_variation_explicit_stages, and `local`; all errors are estimates of order h^4. */
+int pw_variation_implicit_stages (pw_variation *x, double h, double t1, pw_error *error);
 
 /* ---- variation_breakpoint.c ---- */
 

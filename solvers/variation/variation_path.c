@@ -72,7 +72,7 @@ int pw_variation_accelerations (pw_variation *x, double t, const double *q, cons
   return status < 0 ? pw_fail_signal (t, error) : PW_OK;
 }
 
-static int path_append (pw_variation *x, double t, pw_error *error) {
+int pw_variation_append (pw_variation *x, double t, pw_error *error) {
   pw_sample s;
   size_t n = (size_t)x->n;
   int status = pw_run_sample (x->r, t, &s, error);
@@ -103,7 +103,7 @@ static int path_good (const pw_variation *x, int i) {
 static int path_refine (pw_variation *x, int i, int depth, pw_error *error) {
   double t0 = x->point[i].t, t1 = x->point[i + 1].t, middle = t0 + (t1 - t0) / 2;
   if (pw_fixed_steps (x->r) || depth == 0 || !(t0 < middle && middle < t1)) return PW_OK;
-  int status = path_append (x, middle, error);
+  int status = pw_variation_append (x, middle, error);
   if (status != PW_OK) return status;
   int good = path_good (x, i);
   pw_variation_point kept = x->point[x->points - 1];
@@ -114,9 +114,6 @@ static int path_refine (pw_variation *x, int i, int depth, pw_error *error) {
   return status == PW_OK ? path_refine (x, i, depth - 1, error) : status;
 }
 
-int pw_variation_record (pw_variation *x, double t0, pw_error *error) {
-  int last = x->points - 1;
-  int status = path_append (x, last < 0 ? t0 : x->r->t, error);
-  if (status == PW_OK && last >= 0) status = path_refine (x, last, PATH_DEPTH, error);
-  return status == PW_OK && last >= 0 ? pw_variation_find_jumps (x, last, error) : status;
+int pw_variation_refine (pw_variation *x, int i, pw_error *error) {
+  return path_refine (x, i, PATH_DEPTH, error);
 }

@@ -1,8 +1,6 @@
-/* Steps of the derivatives, by the method of order 5 of Dormand & Prince with the error control of its pair; the
- * equations are in variation.c. */
+/* Error control of the derivatives' steps: explicit ones, and implicit ones if the motion is stiff. */
 #include <math.h>
 #include <string.h>
-#include "rk.h"
 #include "variation_parts.h"
 
 /* Permitted error of a step, relative to the largest derivative.  The loose one applies where the other would need more than
@@ -28,58 +26,16 @@ static const double STEP_SMALLEST = 1e-12;
 /* Sine between constraint equations below which the round-off of accelerations prevents steps. */
 static const double STEP_SINGULAR = 0.01;
 
-/* Largest entry in units of the scene. */
-static double step_norm (const pw_variation *x, const double *Y) {
-  const pw_system *s = x->r->s;
-  double most = 0;
-  for (int j = 0; j < x->n; j++)
-    most = pw_larger_or_nan (most,
-                             pw_larger_or_nan (fabs (Y[j]), fabs (Y[x->n + j]) * x->r->w->scale.time) / pw_unit (s, j));
-  return most;
-}
+/* The motion is stiff if that many steps were longer than this part of the time in which its fastest component decays.  A
+ * tolerance of 1e-9 alone permits about 0.2; stability limits it to 3.3 (Hairer & Wanner 1996, section IV.2). */
+enum { STEP_STIFF = 100 };
+static const double STEP_FAST = 1;
 
 /* Largest derivative of work and losses. */
 static double step_energy (const pw_variation *x, const double *Y) {
   double most = 0;
   for (int i = 2 * x->n; i < x->size; i++) most = pw_larger_or_nan (most, fabs (Y[i]));
   return most;
-}
-
-/* Adds h sum weight_k K_k to `out`: entries from `first` to `end` - 1. */
-static void step_combine (const pw_variation_column *c, const double *weight, int count, double h, int first, int end,
-                          double *out) {
-  for (int k = 0; k < count; k++)
-    for (int j = first; j < end; j++) out[j] += h * weight[k] * c->K[k][j];
-}
-
-/* The derivatives of every column after `count` stages into `trial`. */
-static void step_stage (pw_variation *x, const double *weight, int count, double h) {
-  PW_EACH_COLUMN (c, x) {
-    memcpy (c->trial, c->Y, (size_t)x->size * sizeof *c->Y);
-    step_combine (c, weight, count, h, 0, x->size, c->trial);
-  }
-}
-
-int pw_variation_evaluate_at (pw_variation *x, double t, pw_error *error) {
-  double *state = x->scratch;
-  pw_variation_state (x, t, state);
-  memcpy (x->q, state, (size_t)x->n * sizeof *x->q);
-  memcpy (x->v, state + x->n, (size_t)x->n * sizeof *x->v);
-  return pw_variation_evaluate (x, pw_before_breakpoint (x->r, t), error);
-}
-
-/* Adds the errors of the step, the difference of the pair, to the errors of derivatives: entries from `first` to `end` - 1. */
-static void step_add_errors (pw_variation *x, double h, int first, int end) {
-  for (pw_direction_copy *d = x->direction; d < x->direction + x->count; d++)
-    if (d->columns > 1)
-      step_combine (&d->column[0], pw_erk5_tableau.e, PW_VARIATION_RATES, h, first, end, d->column[1].trial);
-}
-
-static int step_rates (pw_variation *x, int k, pw_error *error) {
-  memcpy (x->a[k], x->linear.a, (size_t)x->n * sizeof *x->q);
-  pw_variation_accelerate (x, 0, k);
-  pw_variation_accelerate (x, 1, k);
-  return pw_variation_ledger_rates (x, k) == PW_OK ? PW_OK : pw_fail_signal (x->at, error);
 }
 
 /* Largest of velocities in units of the scene. */
@@ -89,14 +45,10 @@ static double step_speed (const pw_variation *x, const double *v) {
   return most;
 }
 
-/* The error of the same method for the velocities of the run, relative to the largest: derivatives alone may not see that a
- * step passes over a short phase of the motion, such as the reversal of friction. */
-static double step_motion_error (const pw_variation *x, double h) {
-  double *e = x->values;
-  memset (e, 0, (size_t)x->n * sizeof *e);
-  for (int k = 0; k < PW_VARIATION_RATES; k++)
-    for (int j = 0; j < x->n; j++) e[j] += h * pw_erk5_tableau.e[k] * x->a[k][j];
-  return step_speed (x, e) / fmax (1, x->speed);
+/* The error of the method for the velocities of the run, relative to the largest: derivatives alone may not see that a step
+ * passes over a short phase of the motion, such as the reversal of friction. */
+static double step_motion_error (const pw_variation *x) {
+  return step_speed (x, x->motion) / fmax (1, x->speed);
 }
 
 /* Errors of the run's velocities between its steps, in units of the scene; estimated as a fifth of the tolerance if it
@@ -108,19 +60,19 @@ static double step_noise (const pw_variation *x) {
   return STEP_ROUND * most * x->r->w->scale.time / fmin (x->r->settings.step, x->r->w->scale.time);
 }
 
+/* The permitted one: STEP_MOTION, or the run's own if that is small compared with the change over which forces reverse. */
+static double step_motion_tolerance (const pw_variation *x) {
+  return fmax (STEP_MOTION, step_noise (x) * x->reversal / fmax (1, x->speed));
+}
+
 /* The difference between a step of the run's velocities and the integral of its accelerations, relative to the latter: large
  * where the run does not resolve the motion.  Errors of the method, and of the velocities if they are small compared with
  * the change over which forces reverse, do not count. */
 static double step_defect (const pw_variation *x, double h) {
-  const pw_tableau *b = &pw_erk5_tableau;
-  double *state = x->scratch, *change = state + x->n, most = 0;
-  pw_variation_state (x, x->t, state); /* change: the velocities at the beginning, so far */
-  for (int k = 0; k < b->stages; k++) {
-    for (int j = 0; j < x->n; j++) change[j] += h * b->b[k] * x->a[k][j];
-    most = fmax (most, h * step_speed (x, x->a[k]));
-  }
-  for (int j = 0; j < x->n; j++) change[j] -= x->v[j];
-  double defect = step_speed (x, change) - step_noise (x) * x->reversal - step_motion_error (x, h) * fmax (1, x->speed);
+  int stages = x->implicit ? 1 + PW_VARIATION_STAGES : PW_VARIATION_RATES - 1;
+  double most = 0;
+  for (int k = 0; k < stages; k++) most = fmax (most, h * step_speed (x, x->a[k]));
+  double defect = step_speed (x, x->defect) - step_noise (x) * x->reversal - step_motion_error (x) * fmax (1, x->speed);
   return defect > 0 ? fmin (1, defect / most) : 0;
 }
 
@@ -135,42 +87,68 @@ static void step_add_defect (pw_variation *x, double h) {
   }
 }
 
+/* What errors of a derivative are relative to; likewise of those of work and losses. */
+static double step_size (const pw_variation *x, const pw_direction_copy *d) {
+  double size = fmax (d->column->largest, pw_variation_norm (x, d->column->trial));
+  return d->given.initial ? size : fmax (size, STEP_LEAST * STEP_OF_P / fabs (d->given.step));
+}
+
+static double step_size_energy (const pw_variation *x, const pw_direction_copy *d) {
+  double energy = fmax (d->column->energy, step_energy (x, d->column->trial));
+  return fmax (energy, STEP_LEAST_ENERGY * fmax (x->r->exchanged, x->r->energy_scene) * step_size (x, d));
+}
+
 /* The largest relative error of all derivatives. */
-static double step_error (pw_variation *x, double h) {
+static double step_error (const pw_variation *x) {
   double most = 0;
   for (const pw_direction_copy *d = x->direction; d < x->direction + x->count; d++) {
-    const pw_variation_column *c = &d->column[0];
-    double *e = x->values, size = fmax (c->largest, step_norm (x, c->trial));
-    if (d->given.initial == NULL) size = fmax (size, STEP_LEAST * STEP_OF_P / fabs (d->given.step));
-    memset (e, 0, (size_t)x->size * sizeof *e);
-    step_combine (c, pw_erk5_tableau.e, PW_VARIATION_RATES, h, 0, x->size, e);
-    if (size > 0) most = pw_larger_or_nan (most, step_norm (x, e) / size);
-    double energy = fmax (c->energy, step_energy (x, c->trial));
-    energy = fmax (energy, STEP_LEAST_ENERGY * fmax (x->r->exchanged, x->r->energy_scene) * size);
-    if (energy > 0) most = pw_larger_or_nan (most, step_energy (x, e) / energy);
+    double size = step_size (x, d), energy = step_size_energy (x, d);
+    if (size > 0) most = pw_larger_or_nan (most, pw_variation_norm (x, d->local) / size);
+    if (energy > 0) most = pw_larger_or_nan (most, step_energy (x, d->local) / energy);
   }
   return most;
 }
 
-/* The stages and the new derivatives in `trial`. */
-static int step_stages (pw_variation *x, double h, double t1, pw_error *error) {
-  const pw_tableau *b = &pw_erk5_tableau;
-  const double *weight = b->A;
-  int status = PW_OK;
-  for (int k = 1; k < b->stages && status == PW_OK; weight += k++) {
-    step_stage (x, weight, k, h);
-    status = pw_variation_evaluate_at (x, k + 1 < b->stages ? x->t + b->c[k] * h : t1, error);
-    if (status == PW_OK) status = step_rates (x, k, error);
+/* Adds the errors of the step to the errors of derivatives: entries from `first` to `end` - 1. */
+static void step_add_errors (pw_variation *x, int first, int end) {
+  for (pw_direction_copy *d = x->direction; d < x->direction + x->count; d++)
+    for (int j = first; j < end && d->columns > 1; j++) d->column[1].trial[j] += d->local[j];
+}
+
+/* Scales an estimate of order h^4, relative to `size`, to the error of the implicit step. */
+static void step_sharpen (double *error, double relative, int n) {
+  double factor = fmin (1, sqrt (1000 * relative));
+  for (int j = 0; j < n && relative > 0; j++) error[j] *= factor;
+}
+
+static void step_implicit_errors (pw_variation *x) {
+  for (pw_direction_copy *d = x->direction; d < x->direction + x->count; d++) {
+    step_sharpen (d->local, pw_variation_norm (x, d->local) / step_size (x, d), 2 * x->n);
+    step_sharpen (d->local + 2 * x->n, step_energy (x, d->local) / step_size_energy (x, d), x->size - 2 * x->n);
   }
+  step_sharpen (x->motion, step_motion_error (x), x->n);
+}
+
+/* The stages, the new derivatives in `trial`, their time derivatives and errors. */
+static int step_stages (pw_variation *x, double h, double t1, pw_error *error) {
+  int last = PW_VARIATION_RATES - 1, status;
+  pw_variation_state (x, x->t, x->scratch);
+  pw_variation_state (x, t1, x->values);
+  for (int j = x->n; j < 2 * x->n; j++) x->defect[j - x->n] = x->scratch[j] - x->values[j];
+  status =
+      x->implicit ? pw_variation_implicit_stages (x, h, t1, error) : pw_variation_explicit_stages (x, h, t1, error);
   if (status != PW_OK) return status;
-  step_stage (x, b->b, b->stages, h); /* at the state of the last stage */
-  pw_variation_project (x);
-  memcpy (x->a[b->stages], x->linear.a, (size_t)x->n * sizeof *x->q);
-  pw_variation_accelerate (x, 0, b->stages);
-  step_add_errors (x, h, 0, 2 * x->n);
-  pw_variation_accelerate (x, 1, b->stages);
-  if (pw_variation_ledger_rates (x, b->stages) != PW_OK) return pw_fail_signal (x->at, error);
-  step_add_errors (x, h, 2 * x->n, x->size);
+  memcpy (x->a[last], x->linear.a, (size_t)x->n * sizeof *x->q);
+  pw_variation_accelerate (x, 0, last);
+  if (x->implicit)
+    step_implicit_errors (x);
+  else
+    pw_variation_explicit_errors (x, h, 0, 2 * x->n);
+  step_add_errors (x, 0, 2 * x->n);
+  pw_variation_accelerate (x, 1, last);
+  if (pw_variation_ledger_rates (x, last) != PW_OK) return pw_fail_signal (x->at, error);
+  if (x->implicit == NULL) pw_variation_explicit_errors (x, h, 2 * x->n, x->size);
+  step_add_errors (x, 2 * x->n, x->size);
   step_add_defect (x, h);
   return PW_OK;
 }
@@ -183,15 +161,17 @@ static void step_accept (pw_variation *x) {
     memcpy (c->Y, c->trial, (size_t)x->size * sizeof *c->Y);
     c->K[0] = c->K[PW_VARIATION_RATES - 1];
     c->K[PW_VARIATION_RATES - 1] = first;
-    c->largest = fmax (c->largest, step_norm (x, c->Y));
+    c->largest = fmax (c->largest, pw_variation_norm (x, c->Y));
     c->energy = fmax (c->energy, step_energy (x, c->Y));
   }
 }
 
 int pw_variation_begin (pw_variation *x, pw_error *error) {
-  pw_variation_project (x);
-  PW_EACH_COLUMN (c, x) c->largest = fmax (c->largest, step_norm (x, c->trial));
-  int status = step_rates (x, PW_VARIATION_RATES - 1, error);
+  PW_EACH_COLUMN (c, x) {
+    pw_variation_project (x, c);
+    c->largest = fmax (c->largest, pw_variation_norm (x, c->trial));
+  }
+  int status = pw_variation_rates (x, PW_VARIATION_RATES - 1, error);
   if (status == PW_OK) step_accept (x);
   return status;
 }
@@ -236,19 +216,30 @@ static int step_fail (pw_variation *x, pw_error *error) {
       x->t);
 }
 
+/* Changes to implicit steps if stability limited many steps. */
+static int step_check_stiffness (pw_variation *x, double h, pw_error *error) {
+  if (x->implicit || x->n > PW_VARIATION_DENSE) return PW_OK;
+  x->stiff = pw_variation_stiffness (x, h) > STEP_FAST ? x->stiff + 1 : x->stiff > 0 ? x->stiff - 1 : 0;
+  if (x->stiff < STEP_STIFF) return PW_OK;
+  x->implicit = pw_variation_implicit_open (x);
+  return x->implicit ? PW_OK : pw_fail_memory (x->r->s, error);
+}
+
 int pw_variation_step (pw_variation *x, double t1, pw_error *error) {
-  double tolerance = step_tolerance (x->r), fine = pw_fixed_steps (x->r) ? STEP_RATIO * x->r->settings.step : 0;
+  double tolerance = step_tolerance (x->r),
+         fine = pw_fixed_steps (x->r) && x->implicit == NULL ? STEP_RATIO * x->r->settings.step : 0;
   if (x->h <= STEP_SMALLEST * x->r->w->scale.time) return step_fail (x, error);
   double end = step_end (x, t1), h = end - x->t, allowed = h <= fine ? STEP_LOOSE : tolerance;
   int status = step_stages (x, h, end, error);
   if (status != PW_OK) return status;
-  double off = pw_larger_or_nan (step_error (x, h), step_motion_error (x, h) * allowed / STEP_MOTION);
+  double off = pw_larger_or_nan (step_error (x), step_motion_error (x) * allowed / step_motion_tolerance (x));
   double next = step_next (x, h, off, tolerance, fine);
   if (off <= allowed) {
+    status = step_check_stiffness (x, h, error);
     x->h = h < x->h ? fmax (x->h, next) : next;
     x->t = end, x->off = off;
     step_accept (x);
   } else
     x->h = fmin (next, 0.9 * h);
-  return PW_OK;
+  return status;
 }

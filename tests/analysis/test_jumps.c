@@ -183,6 +183,30 @@ static void test_refusals (void **state) {
   check_close ("da.x/dF", x, 2, 1e-4, "t^2/2, and the error of the run");
 }
 
+/* A motion that turns around twice, from many initial velocities and with steps of many sizes: whether a state lies on the
+ * surface, or samples near it are accurate, must not matter. */
+static void test_crossings (void **state) {
+  static const char *const methods[] = { "erk8 --rtol 1e-9", "erk8 --rtol 1e-6", "erk5 --rtol 1e-4",
+                                         "bdf --rtol 1e-7" };
+  char command[400];
+  double expected, x;
+  (void)state;
+  cli_write ("turns.yaml", "pinwheel: 1\nbodies:\n  - {name: a, mass: 1, inertia: 1, start: {x: 0.44}}\nelements:\n"
+                           "  - {slider: s, body: [a, ground], at: [[0, 0], [0, 0]]}\n"
+                           "  - {force: f, body: a, fx: '-20*a.x - 0.5*sign(a.vx) - 0.3*a.vx'}\n"
+                           "  - {force: g, body: a, fx: {harmonic: {amplitude: 5, omega: 3}}}\n");
+  for (int i = 0; i < 20; i++)
+    for (size_t k = 0; k < sizeof methods / sizeof *methods; k++) {
+      snprintf (command, sizeof command,
+                "pinwheel sensitivity @/turns.yaml -t 2 --of a.x --by a.vx --start a.vx=%.17g -m %s -o @/sens",
+                0.24 + 1e-3 * i, methods[k]);
+      cli_shell (command);
+      assert_int_equal (jumps_json ("\"derivative\": ", &x), 1);
+      if (k == 0) expected = x;
+      check_close (methods[k], x, expected, 1e-3 * fabs (expected), "ten times the largest tolerance");
+    }
+}
+
 /* Floquet multipliers of a forced oscillator with friction, against differences of the map over a period. */
 static void test_periodic (void **state) {
   double map[4][2], J[2][2];
@@ -230,8 +254,8 @@ static void test_linearise (void **state) {
 int main (void) {
   const struct CMUnitTest tests[] = {
     cmocka_unit_test (test_closed_form), cmocka_unit_test (test_differences), cmocka_unit_test (test_narrow_friction),
-    cmocka_unit_test (test_refusals),    cmocka_unit_test (test_periodic),    cmocka_unit_test (test_linearise),
-    cmocka_unit_test (test_extremum),    cmocka_unit_test (test_breakpoint),
+    cmocka_unit_test (test_refusals),    cmocka_unit_test (test_crossings),   cmocka_unit_test (test_periodic),
+    cmocka_unit_test (test_linearise),   cmocka_unit_test (test_extremum),    cmocka_unit_test (test_breakpoint),
   };
   return cmocka_run_group_tests (tests, cli_setup, cli_teardown);
 }

@@ -45,38 +45,39 @@ static void variation_free (variation_case *c) {
 
 typedef struct {
   const char *name; /* of the parameter that is changed */
-  double k, m, x0, height, start, width;
+  double k, c, m, x0, height, start, width;
 } block;
 
 static void block_build (pw_model *m, const void *parameters) {
   const block *b = parameters;
   pw_add_body (m, &(pw_body){ .name = "block", .mass = b->m, .inertia = 1, .start = { 1 + b->x0 } });
   if (b->k > 0)
-    pw_add_spring (m, &(pw_spring){ .name = "S", .body = { "ground", "block" }, .stiffness = b->k, .length = 1 });
+    pw_add_spring (
+        m, &(pw_spring){ .name = "S", .body = { "ground", "block" }, .stiffness = b->k, .damping = b->c, .length = 1 });
   pw_signal pulse = { .type = PW_PULSE, .pulse = { .height = b->height, .start = b->start, .width = b->width } };
   pw_add_force (m, &(pw_force){ .name = "F", .body = "block", .fx = pulse });
 }
 
 static pw_system *block_make (const void *context, double value) {
-  static const pw_parameter parameters[] = { { PW_AT (block, k), 0, "", "", 0 },
-                                             { PW_AT (block, m), 1, "", "", 0 },
-                                             { PW_AT (block, x0), 0.1, "", "", 0 },
-                                             { PW_AT (block, height), 0, "", "", 0 },
-                                             { PW_AT (block, start), 1, "", "", 0 },
-                                             { PW_AT (block, width), 1, "", "", 0 },
-                                             { 0 } };
+  static const pw_parameter parameters[] = {
+    { PW_AT (block, k), 0, "", "", 0 },      { PW_AT (block, c), 0, "", "", 0 },
+    { PW_AT (block, m), 1, "", "", 0 },      { PW_AT (block, x0), 0.1, "", "", 0 },
+    { PW_AT (block, height), 0, "", "", 0 }, { PW_AT (block, start), 1, "", "", 0 },
+    { PW_AT (block, width), 1, "", "", 0 },  { 0 }
+  };
   static const pw_plugin_table table = { .abi = PW_ABI,
                                          .size = sizeof (pw_plugin_table),
                                          .parameters = parameters,
                                          .parameters_size = sizeof (block),
                                          .build = block_build };
   const block *b = context;
-  return scene_system (&table, "k", b->k, "m", b->m, "x0", b->x0, "height", b->height, "start", b->start, "width",
-                       b->width, b->name, value, NULL);
+  return scene_system (&table, "k", b->k, "c", b->c, "m", b->m, "x0", b->x0, "height", b->height, "start", b->start,
+                       "width", b->width, b->name, value, NULL);
 }
 
 static double block_value (const block *b, const char *name) {
   return strcmp (name, "k") == 0       ? b->k
+         : strcmp (name, "c") == 0     ? b->c
          : strcmp (name, "m") == 0     ? b->m
          : strcmp (name, "x0") == 0    ? b->x0
          : strcmp (name, "start") == 0 ? b->start
@@ -123,6 +124,48 @@ static void test_oscillator (void **state) {
     check_close ("dx/dm", d[0], 0.3 * t * sin (w * t) * w / 4, bound, why);
     block_derive (b, "x0", methods[i], t, d);
     check_close ("dx/dx0", d[0], cos (w * t), bound, why);
+  }
+}
+
+/* Overdamped: x = x0 (r2 exp (-r1 t) - r1 exp (-r2 t)) / (r2 - r1), r1 r2 = k / m, r1 + r2 = c / m; and the loss. */
+static void stiff_closed (double k, double c, double t, double out[3]) {
+  double m = 2, x0 = 0.3, r1 = c / (2 * m) + sqrt (c * c / (4 * m * m) - k / m), r2 = k / m / r1;
+  double fast = exp (-r1 * t), slow = exp (-r2 * t);
+  out[0] = x0 * (r2 * fast - r1 * slow) / (r2 - r1);
+  out[1] = x0 * r1 * r2 * (slow - fast) / (r2 - r1);
+  out[2] = k / 2 * (x0 * x0 - out[0] * out[0]) - m / 2 * out[1] * out[1];
+}
+
+/* A rate of 2e4/s beside one of 1/s, by adaptive methods and by rk4: the derivatives
+ * are as accurate as those of slow motions, and their steps are much longer than an explicit method could make. */
+static void test_stiff (void **state) {
+  static const char *const methods[] = { "radau", "bdf", "ida+ggl", "rk4" };
+  const double t = 1, k = 4e4, c = 4e4;
+  (void)state;
+  for (int i = 0; i < 8; i++) {
+    const char *method = methods[i / 2];
+    double value = i % 2 ? c : k, step = 1e-4 * value, plus[3], minus[3];
+    block b = { .name = i % 2 ? "c" : "k", .k = k, .c = c, .m = 2, .x0 = 0.3, .start = 99, .width = 1 };
+    variation_case v = variation_open (block_make, &b, value, 1e-5 * value, method,
+                                       &(pw_settings){ .span = t, .rtol = 1e-10, .step = 1e-5 });
+    pw_error error = { 0 };
+    pw_sample x, e;
+    pw_variation *d = pw_variation_open (v.r, &v.d, 1, 1, &error);
+    check_ok (error.status, &error);
+    check_ok (pw_variation_advance (d, t, t, &error), &error);
+    check_ok (pw_variation_sample (d, 0, &x, &e, &error), &error);
+    stiff_closed (i % 2 ? k : k + step, i % 2 ? c + step : c, t, plus);
+    stiff_closed (i % 2 ? k : k - step, i % 2 ? c - step : c, t, minus);
+    const double got[3] = { x.q[0], x.v[0], x.loss }, claimed[3] = { e.q[0], e.v[0], e.loss };
+    const double scale[3] = { 0.3 / value, 0.3 / value, 0.09 / 2 * k / value };
+    for (int j = 0; j < 3; j++) {
+      double expected = (plus[j] - minus[j]) / (2 * step);
+      check_close (method, got[j], expected, 1e-7 * scale[j], "differences of 1e-4, steps to 1e-9");
+      check_close ("within its error", got[j], expected, fabs (claimed[j]) + 1e-8 * scale[j], "the claim");
+    }
+    assert_true (pw_variation_step_size (d) > 20 * 3.3 * 2 / c);
+    pw_variation_close (d);
+    variation_free (&v);
   }
 }
 
@@ -361,9 +404,10 @@ static void test_run (void **state) {
 
 int main (void) {
   const struct CMUnitTest tests[] = {
-    cmocka_unit_test (test_no_error),    cmocka_unit_test (test_few_steps), cmocka_unit_test (test_oscillator),
-    cmocka_unit_test (test_breakpoints), cmocka_unit_test (test_tangent),   cmocka_unit_test (test_methods),
-    cmocka_unit_test (test_gallery),     cmocka_unit_test (test_refusals),  cmocka_unit_test (test_run),
+    cmocka_unit_test (test_no_error), cmocka_unit_test (test_few_steps),   cmocka_unit_test (test_oscillator),
+    cmocka_unit_test (test_stiff),    cmocka_unit_test (test_breakpoints), cmocka_unit_test (test_tangent),
+    cmocka_unit_test (test_methods),  cmocka_unit_test (test_gallery),     cmocka_unit_test (test_refusals),
+    cmocka_unit_test (test_run),
   };
   return cmocka_run_group_tests (tests, NULL, NULL);
 }

@@ -1,0 +1,68 @@
+/* Explicit steps of the derivatives, by the pair of orders 5 and 4 of Dormand & Prince (erk5.c); the equations are in
+ * variation.c. */
+#include <math.h>
+#include <string.h>
+#include "rk.h"
+#include "variation_parts.h"
+
+/* Adds h sum weight_k K_k to `out`: entries from `first` to `end` - 1. */
+static void explicit_combine (const pw_variation_column *c, const double *weight, int count, double h, int first,
+                              int end, double *out) {
+  for (int k = 0; k < count; k++)
+    for (int j = first; j < end; j++) out[j] += h * weight[k] * c->K[k][j];
+}
+
+/* The derivatives of every column after `count` stages into `trial`. */
+static void explicit_stage (pw_variation *x, const double *weight, int count, double h) {
+  PW_EACH_COLUMN (c, x) {
+    memcpy (c->trial, c->Y, (size_t)x->size * sizeof *c->Y);
+    explicit_combine (c, weight, count, h, 0, x->size, c->trial);
+  }
+}
+
+int pw_variation_explicit_stages (pw_variation *x, double h, double t1, pw_error *error) {
+  const pw_tableau *b = &pw_erk5_tableau;
+  const double *weight = b->A;
+  int status = PW_OK;
+  for (int k = 1; k < b->stages && status == PW_OK; weight += k++) {
+    explicit_stage (x, weight, k, h);
+    status = pw_variation_evaluate_at (x, k + 1 < b->stages ? x->t + b->c[k] * h : t1, error);
+    if (status == PW_OK) status = pw_variation_rates (x, k, error);
+  }
+  if (status != PW_OK) return status;
+  explicit_stage (x, b->b, b->stages, h); /* at the state of the last stage */
+  PW_EACH_COLUMN (c, x) pw_variation_project (x, c);
+  memset (x->motion, 0, (size_t)x->n * sizeof *x->motion);
+  for (int k = 0; k < PW_VARIATION_RATES; k++) {
+    const double *a = k < b->stages ? x->a[k] : x->linear.a;
+    for (int j = 0; j < x->n; j++) {
+      x->motion[j] += h * b->e[k] * a[j];
+      if (k < b->stages) x->defect[j] += h * b->b[k] * a[j];
+    }
+  }
+  return PW_OK;
+}
+
+void pw_variation_explicit_errors (pw_variation *x, double h, int first, int end) {
+  for (pw_direction_copy *d = x->direction; d < x->direction + x->count; d++) {
+    memset (d->local + first, 0, (size_t)(end - first) * sizeof *d->local);
+    explicit_combine (&d->column[0], pw_erk5_tableau.e, PW_VARIATION_RATES, h, first, end, d->local);
+  }
+}
+
+/* The last two stages, both at the end of the step, approach each other at the rate of the fastest component. */
+double pw_variation_stiffness (const pw_variation *x, double h) {
+  const pw_tableau *b = &pw_erk5_tableau;
+  const double *row = b->A + (b->stages - 1) * (b->stages - 2) / 2;
+  double most = 0, weight[PW_VARIATION_RATES], *change = x->values, *rate = change + 2 * x->n;
+  for (int k = 0; k < b->stages; k++) weight[k] = b->b[k] - (k + 1 < b->stages ? row[k] : 0);
+  for (const pw_direction_copy *d = x->direction; d < x->direction + x->count; d++) {
+    const pw_variation_column *c = d->column;
+    memset (change, 0, 2 * (size_t)x->n * sizeof *change);
+    explicit_combine (c, weight, b->stages, h, 0, 2 * x->n, change);
+    for (int j = 0; j < 2 * x->n; j++) rate[j] = h * (c->K[b->stages][j] - c->K[b->stages - 1][j]);
+    if (pw_variation_norm (x, change) > 0)
+      most = fmax (most, pw_variation_norm (x, rate) / pw_variation_norm (x, change));
+  }
+  return most;
+}

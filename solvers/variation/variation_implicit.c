@@ -1,0 +1,251 @@
+/* Implicit steps of the derivatives, for stiff motions, by the Radau IIA method of order 5 (Hairer & Wanner 1996, Solving
+ * Ordinary Differential Equations II, section IV.8).
+ *
+ * Stages are projected onto the linearised constraints (projected collocation, Ascher & Petzold 1991).  With the projection
+ * p_i of the derivative Y at t, and the directions N_i of minimal coordinates (linear_variation.c), both at the state of
+ * the run at t_i = t + c_i h,
+ *
+ *     Y_i = p_i + N_i z_i,   N_i^+ (Y_i - Y - h sum_j a_ij F_j) = 0,   F_j = F_j (p_j) + A_j z_j,
+ *
+ * with the derivative F_j of Y_j and its response A_j to N_j: linear equations for the z_i of all columns.  The last stage is
+ * the new derivative.  The error estimate, of order h^4,
+ *
+ *     err = N_3 (gamma/h - N_3^+ A_3)^-1 N_3^+ (F + sum_i e_i (Y_i - Y)/h),
+ *
+ * is e = err/|Y|; (10 e)^(3/2) is about the error of the method, of order h^6, as in RADAU5. */
+#include <lapacke.h>
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+#include "rank.h"
+#include "util.h"
+#include "variation_parts.h"
+
+enum { STAGES = PW_VARIATION_STAGES };
+
+static const double implicit_c[STAGES] = { 0.15505102572168219018, 0.64494897427831780982, 1 };
+static const double implicit_A[STAGES][STAGES] = {
+  { 0.19681547722366042587, -0.06553542585019838811, 0.02377097434822015242 },
+  { 0.39442431473908727700, 0.29207341166522846302, -0.04154875212599793020 },
+  { 0.37640306270046727505, 0.51248582618842161384, 0.11111111111111111111 },
+};
+static const double implicit_gamma = 3.63783425274449573221;
+static const double implicit_e[STAGES] = { -10.04880939982741556, 1.38214273316074889, -1. / 3 };
+
+struct pw_variation_implicit {
+  int size;          /* minimal coordinates */
+  double *N[STAGES]; /* size x 2n: N_i */
+  double *A[STAGES]; /* size x 2n: A_i */
+  double *D[STAGES]; /* size x n: N_i^+, which maps positions and velocities separately */
+  double *matrix;    /* 3 size x 3 size, by columns */
+  double *filter;    /* size x size, by columns: gamma/h - N_3^+ A_3 */
+  double *z;         /* 3 size for each column of the directions */
+  lapack_int *pivot; /* 3 size, then size of the filter */
+  char *memory;
+};
+
+pw_variation_implicit *pw_variation_implicit_open (const pw_variation *x) {
+  pw_variation_implicit *p = calloc (1, sizeof *p);
+  size_t size = (size_t)x->linear.size, rows = STAGES * size, vectors = 2 * size * (size_t)x->n;
+  if (p == NULL) return NULL;
+  p->size = x->linear.size;
+  const pw_array array[] = { { &p->N[0], vectors },       { &p->N[1], vectors },
+                             { &p->N[2], vectors },       { &p->A[0], vectors },
+                             { &p->A[1], vectors },       { &p->A[2], vectors },
+                             { &p->D[0], vectors / 2 },   { &p->D[1], vectors / 2 },
+                             { &p->D[2], vectors / 2 },   { &p->matrix, rows * rows },
+                             { &p->filter, size * size }, { &p->z, 2 * rows * (size_t)x->count } };
+  p->memory = pw_alloc_arrays (array, sizeof array / sizeof *array);
+  p->pivot = malloc ((rows + size + 1) * sizeof *p->pivot);
+  if (p->memory && p->pivot) return p;
+  pw_variation_implicit_close (p);
+  return NULL;
+}
+
+void pw_variation_implicit_close (pw_variation_implicit *p) {
+  if (p == NULL) return;
+  free (p->memory);
+  free (p->pivot);
+  free (p);
+}
+
+static double implicit_dot (const double *a, const double *b, int n) {
+  double sum = 0;
+  for (int j = 0; j < n; j++) sum += a[j] * b[j];
+  return sum;
+}
+
+static void implicit_add (double *restrict to, const double *restrict from, double weight, int n) {
+  for (int j = 0; j < n; j++) to[j] += weight * from[j];
+}
+
+/* ---- Stages ---- */
+
+/* N_i, A_i, N_i^+ of minimal coordinate c at the state evaluated. */
+static void implicit_direction (pw_variation *x, int i, int c) {
+  pw_linearisation *l = &x->linear;
+  pw_variation_implicit *p = x->implicit;
+  size_t n = (size_t)x->n, row = (size_t)c * n, half = n * sizeof (double);
+  int velocity = c >= l->positions;
+  double T = velocity ? x->r->w->scale.time : 1, *N = p->N[i] + 2 * row, *A = p->A[i] + 2 * row, *D = p->D[i] + row;
+  pw_linear_tangent (l, c);
+  memcpy (N, l->x, 2 * half);
+  for (int j = 0; j < x->n; j++) {
+    double length = pw_as_length (x->r->s, j) * T;
+    D[j] = N[velocity ? x->n + j : j] * length * length;
+  }
+  pw_linear_vary (l);
+  memcpy (A, N + n, half);
+  memcpy (A + n, l->da, half);
+}
+
+/* p_i of a column into `trial`: 0 if the constraints do not depend on the parameter. */
+static void implicit_particular (pw_variation *x, pw_variation_column *c) {
+  const double *row = c->direction->row[pw_variation_index (c)];
+  int depends = 0;
+  for (int i = 0; i < 2 * x->m; i++) depends |= row[i] != 0;
+  memset (c->trial, 0, 2 * (size_t)x->n * sizeof *c->trial);
+  if (depends) pw_variation_project (x, c);
+}
+
+/* Stage i: p_i into K[4 + i], F_i (p_i) into K[1 + i]. */
+static int implicit_stage (pw_variation *x, int i, double h, double t1, pw_error *error) {
+  size_t bytes = 2 * (size_t)x->n * sizeof (double);
+  int status = pw_variation_evaluate_at (x, i + 1 < STAGES ? x->t + implicit_c[i] * h : t1, error);
+  if (status != PW_OK) return status;
+  memcpy (x->a[1 + i], x->linear.a, bytes / 2);
+  PW_EACH_COLUMN (c, x) {
+    implicit_particular (x, c);
+    memcpy (c->K[4 + i], c->trial, bytes);
+  }
+  pw_variation_accelerate (x, 0, 1 + i);
+  pw_variation_accelerate (x, 1, 1 + i);
+  pw_linear_bases (&x->linear);
+  for (int c = 0; c < x->linear.size; c++) implicit_direction (x, i, c);
+  return PW_OK;
+}
+
+/* ---- Equations ---- */
+
+/* Minimal coordinates of a vector in the directions of stage i, into z. */
+static void implicit_coordinates (const pw_variation *x, int i, const double *vector, double *z) {
+  int n = x->n, positions = x->linear.positions;
+  const double *D = x->implicit->D[i];
+  for (int k = 0; k < x->implicit->size; k++, D += n) z[k] = implicit_dot (D, k < positions ? vector : vector + n, n);
+}
+
+/* Factorises the matrix of the z_i and the filter.  A singular one gives derivatives that are not finite. */
+static void implicit_factor (pw_variation *x, double h) {
+  pw_variation_implicit *p = x->implicit;
+  int size = p->size, rows = STAGES * size;
+  for (int j = 0; j < rows; j++) {
+    const double *A = p->A[j / size] + (size_t)(j % size) * 2 * (size_t)x->n;
+    double *column = p->matrix + (size_t)j * (size_t)rows;
+    for (int i = 0; i < STAGES; i++) {
+      double *part = column + i * size;
+      implicit_coordinates (x, i, A, part);
+      for (int k = 0; k < size && i + 1 == STAGES && j >= 2 * size; k++)
+        p->filter[(j - 2 * size) * size + k] = (i * size + k == j) * implicit_gamma / h - part[k];
+      for (int k = 0; k < size; k++) part[k] = (i * size + k == j) - h * implicit_A[i][j / size] * part[k];
+    }
+  }
+  LAPACKE_dgetrf_work (LAPACK_COL_MAJOR, rows, rows, p->matrix, rows, p->pivot);
+  LAPACKE_dgetrf_work (LAPACK_COL_MAJOR, size, size, p->filter, size, p->pivot + rows);
+}
+
+/* The right-hand sides of a column. */
+static void implicit_right (pw_variation *x, const pw_variation_column *c, double h, double *z) {
+  int length = 2 * x->n;
+  double *sum = x->values;
+  for (int i = 0; i < STAGES; i++, z += x->implicit->size) {
+    for (int j = 0; j < length; j++) sum[j] = c->Y[j] - c->K[4 + i][j];
+    for (int k = 0; k < STAGES; k++) implicit_add (sum, c->K[1 + k], h * implicit_A[i][k], length);
+    implicit_coordinates (x, i, sum, z);
+  }
+}
+
+/* Solves for the stages: Y_i into K[4 + i]. */
+static void implicit_solve (pw_variation *x, double h) {
+  pw_variation_implicit *p = x->implicit;
+  int rows = STAGES * p->size, columns = 0, length = 2 * x->n;
+  PW_EACH_COLUMN (c, x) implicit_right (x, c, h, p->z + rows * columns++);
+  LAPACKE_dgetrs_work (LAPACK_COL_MAJOR, 'N', rows, columns, p->matrix, rows, p->pivot, p->z, rows);
+  const double *z = p->z;
+  PW_EACH_COLUMN (c, x)
+  for (int i = 0; i < STAGES; i++)
+    for (int k = 0; k < p->size; k++, z++) implicit_add (c->K[4 + i], p->N[i] + (size_t)k * (size_t)length, *z, length);
+}
+
+/* Powers at the stages. */
+static int implicit_powers (pw_variation *x, double h, double t1, pw_error *error) {
+  for (int i = 0; x->ledger && i < STAGES; i++) {
+    int status = pw_variation_evaluate_at (x, i + 1 < STAGES ? x->t + implicit_c[i] * h : t1, error);
+    if (status != PW_OK) return status;
+    PW_EACH_COLUMN (c, x) memcpy (c->trial, c->K[4 + i], 2 * (size_t)x->n * sizeof *c->trial);
+    pw_variation_accelerate (x, 0, 1 + i);
+    pw_variation_accelerate (x, 1, 1 + i);
+    if (pw_variation_ledger_rates (x, 1 + i) != PW_OK) return pw_fail_signal (x->at, error);
+  }
+  PW_EACH_COLUMN (c, x)
+  for (int i = 0; i < STAGES; i++)
+    for (int j = 2 * x->n; j < x->size; j++) {
+      c->K[4 + i][j] = c->Y[j];
+      for (int k = 0; k < STAGES; k++) c->K[4 + i][j] += h * implicit_A[i][k] * c->K[1 + k][j];
+    }
+  return PW_OK;
+}
+
+/* ---- Errors ---- */
+
+/* e = N_3 (gamma/h - N_3^+ A_3)^-1 N_3^+ e */
+static void implicit_filter (pw_variation *x, double *e) {
+  pw_variation_implicit *p = x->implicit;
+  int size = p->size, length = 2 * x->n;
+  implicit_coordinates (x, 2, e, p->z);
+  LAPACKE_dgetrs_work (LAPACK_COL_MAJOR, 'N', size, 1, p->filter, size, p->pivot + STAGES * size, p->z, size);
+  memset (e, 0, (size_t)length * sizeof *e);
+  for (int k = 0; k < size; k++) implicit_add (e, p->N[2] + (size_t)k * (size_t)length, p->z[k], length);
+}
+
+/* The errors of the derivatives. */
+static void implicit_errors (pw_variation *x, double h) {
+  for (pw_direction_copy *d = x->direction; d < x->direction + x->count; d++) {
+    const pw_variation_column *c = d->column;
+    memcpy (d->local, c->K[0], (size_t)x->size * sizeof *d->local);
+    for (int i = 0; i < STAGES; i++)
+      for (int j = 0; j < x->size; j++) d->local[j] += implicit_e[i] / h * (c->K[4 + i][j] - c->Y[j]);
+    implicit_filter (x, d->local);
+    for (int j = 2 * x->n; j < x->size; j++) d->local[j] *= h / implicit_gamma;
+  }
+}
+
+/* The same for the velocities of the run; the defect of the integral of its accelerations. */
+static void implicit_motion (pw_variation *x, double h) {
+  int n = x->n;
+  double *e = x->values, *defect = e + 2 * n;
+  memset (e, 0, 4 * (size_t)n * sizeof *e);
+  memcpy (e + n, x->a[0], (size_t)n * sizeof *e);
+  memcpy (defect + n, x->defect, (size_t)n * sizeof *e);
+  for (int k = 0; k < STAGES; k++) {
+    for (int i = 0; i < STAGES; i++) implicit_add (e + n, x->a[1 + k], implicit_e[i] * implicit_A[i][k], n);
+    implicit_add (defect + n, x->a[1 + k], h * implicit_A[2][k], n);
+  }
+  implicit_filter (x, e);
+  implicit_filter (x, defect);
+  memcpy (x->motion, e + n, (size_t)n * sizeof *e);
+  for (int j = 0; j < n; j++) x->defect[j] = defect[n + j] * implicit_gamma / h;
+}
+
+int pw_variation_implicit_stages (pw_variation *x, double h, double t1, pw_error *error) {
+  int status = PW_OK;
+  for (int i = 0; i < STAGES && status == PW_OK; i++) status = implicit_stage (x, i, h, t1, error);
+  if (status != PW_OK) return status;
+  implicit_factor (x, h);
+  implicit_solve (x, h);
+  status = implicit_powers (x, h, t1, error);
+  if (status != PW_OK) return status;
+  implicit_errors (x, h);
+  implicit_motion (x, h);
+  PW_EACH_COLUMN (c, x) memcpy (c->trial, c->K[3 + STAGES], (size_t)x->size * sizeof *c->trial);
+  return PW_OK;
+}
