@@ -78,20 +78,21 @@ void pw_evaluate_constant (pw_workspace *w, double *f) {
     if (k->kind->force && k->kind->constant) evaluate_add_force (k, f);
 }
 
-/* Sum over all elements of a function, at offset `function` of the table, with one value per element. */
-static double evaluate_total (pw_workspace *w, size_t function) {
+double pw_potential (pw_workspace *w) {
   double sum = 0;
   for (pw_element_batch *k = w->batch; k < w->batch + w->s->batches; k++) {
-    pw_batch_function *f = *(pw_batch_function *const *)(const void *)((const char *)k->kind + function);
-    if (f == NULL) continue;
-    f (&k->b, k->block);
+    if (k->kind->energy == NULL) continue;
+    k->kind->energy (&k->b, k->block);
     for (int e = 0; e < k->b.count; e++) sum += k->block[e];
   }
   return sum;
 }
 
-double pw_potential (pw_workspace *w) {
-  return evaluate_total (w, offsetof (pw_kind, energy));
+void pw_evaluate_energies (pw_workspace *w, double *out) {
+  for (pw_element_batch *k = w->batch; k < w->batch + w->s->batches; k++) {
+    if (k->kind->energy) k->kind->energy (&k->b, out);
+    out += k->b.count;
+  }
 }
 
 double pw_kinetic (const pw_system *s, const double *v) {

@@ -131,6 +131,8 @@ void pw_evaluate_saturation (pw_workspace *w, double *least);
  * saturates. */
 int pw_find_saturation (pw_workspace *w, double *least, char *element, size_t size);
 double pw_potential (pw_workspace *w);
+/* The potential energy of each element [J], in the order of the batches; elements without one are left out. */
+void pw_evaluate_energies (pw_workspace *w, double *out);
 double pw_kinetic (const pw_system *s, const double *v);
 /* Power of each entry of the ledger [W]; needs J and lambda. */
 void pw_evaluate_ledger (pw_workspace *w, const double *lambda, double *rate);

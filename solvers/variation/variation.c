@@ -23,6 +23,7 @@
  *     G dq + dg/dp = 0,   J dv + ((J v)_q - eta_q) dq + d (J v - eta)/dp = 0,
  *
  * in the metric of the mass matrix. */
+#include <float.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -48,22 +49,30 @@ static int variation_linear (pw_variation *x) {
 static int variation_arrays (pw_variation *x) {
   size_t n = (size_t)x->n, m = (size_t)x->m, entries = (size_t)x->r->s->entries, size = (size_t)x->size;
   size_t all = 3 * n + 4 * m + entries + 9, sample = 3 * n + m + entries;
-  const pw_array array[] = {
-    { &x->q, n + 3 },    { &x->v, n + 3 },          { &x->scratch, all },         { &x->values, 2 * all },
-    { &x->output, all }, { &x->sample[0], sample }, { &x->sample[1], sample },    { &x->a[0], PW_VARIATION_RATES * n },
-    { &x->motion, n },   { &x->defect, n },         { &x->hold[0].state, 2 * n }, { &x->hold[1].state, 2 * n }
-  };
+  const pw_array array[] = { { &x->q, n + 3 },
+                             { &x->v, n + 3 },
+                             { &x->scratch, all },
+                             { &x->values, 2 * all },
+                             { &x->output, all },
+                             { &x->sample[0], sample },
+                             { &x->sample[1], sample },
+                             { &x->a[0], PW_VARIATION_RATES * n },
+                             { &x->energy, 2 * (size_t)x->energies },
+                             { &x->motion, n },
+                             { &x->defect, n },
+                             { &x->hold[0].state, 2 * n },
+                             { &x->hold[1].state, 2 * n } };
   x->memory = pw_alloc_arrays (array, sizeof array / sizeof *array);
   for (int k = 1; x->memory && k < PW_VARIATION_RATES; k++) x->a[k] = x->a[k - 1] + n;
   for (int i = 0; x->memory && i < x->count; i++) {
     pw_direction_copy *d = &x->direction[i];
-    pw_array own[9 + 2 * (3 + PW_VARIATION_RATES)], *a = own;
+    pw_array own[10 + 2 * (3 + PW_VARIATION_RATES)], *a = own;
     *a++ = (pw_array){ &d->local, size };
+    *a++ = (pw_array){ &d->size, n + 3 * m };
     for (int c = 0; c < 2; c++) {
       pw_variation_column *k = &d->column[c];
       *k = (pw_variation_column){ .direction = d };
-      *a++ = (pw_array){ &d->effect[c], n + m };
-      *a++ = (pw_array){ &d->row[c], 2 * m };
+      *a++ = (pw_array){ &d->effect[c], n + 3 * m };
       *a++ = (pw_array){ &k->Y, size };
       *a++ = (pw_array){ &k->trial, size };
       *a++ = (pw_array){ &k->lambda, m };
@@ -121,6 +130,20 @@ static int variation_changes (const pw_variation *x, pw_direction_copy *d) {
   return PW_OK;
 }
 
+/* Adds round-off of the differences of the initial states to their error. */
+static void variation_round (const pw_variation *x, pw_direction_copy *d) {
+  const pw_run *near = d->given.neighbour[1], *r = x->r;
+  const double by = 2 * DBL_EPSILON * fabs (pw_direction_weight (&d->given, 0, 1)), *Y = d->column[0].trial;
+  double *error = d->column[1].trial;
+  for (int j = 0; j < 2 * x->n; j++) {
+    int i = j % x->n;
+    double part = (j < x->n ? 1 : r->w->scale.time) / pw_unit (r->s, i), value = j < x->n ? near->q[i] : near->v[i],
+           round = value != (j < x->n ? r->q[i] : r->v[i]) ? by * fabs (value) : 0;
+    error[j] += copysign (round, error[j]);
+    d->start.all += part * fabs (Y[j]), d->start.error += part * fabs (error[j]), d->start.round += part * round;
+  }
+}
+
 /* Initial derivatives. */
 static int variation_start (pw_variation *x, pw_direction_copy *d, const pw_direction *given, pw_error *error) {
   int n = x->n;
@@ -139,6 +162,7 @@ static int variation_start (pw_variation *x, pw_direction_copy *d, const pw_dire
       for (int j = 0; j < n; j++) Y[j] += weight * (r->q[j] - x->r->q[j]), Y[n + j] += weight * (r->v[j] - x->r->v[j]);
     }
   }
+  if (d->columns > 1 && given->initial == NULL) variation_round (x, d);
   for (int i = 0; i < PW_VARIATION_NEAR; i++) d->breakpoint[i] = x->t;
   return pw_variation_look_ahead (x, d, x->r->breakpoint, error);
 }
@@ -208,6 +232,7 @@ pw_variation *pw_variation_open (pw_run *r, const pw_direction *d, int count, in
     .r = r, .n = r->s->coords, .m = r->s->rows, .entries = r->s->entries, .count = count, .ledger = ledger
   };
   x->size = 2 * x->n + (ledger ? x->entries : 0);
+  for (int i = 0; i < r->s->batches; i++) x->energies += r->s->batch[i].b.count;
   x->t = r->t;
   x->passed = -INFINITY;
   x->may_jump = pw_system_may_jump (r->s);

@@ -1,4 +1,5 @@
 /* The linearised equations at a state: effects of the state, exact, and of parameters, by differences of neighbours. */
+#include <float.h>
 #include <math.h>
 #include <string.h>
 #include "util.h"
@@ -23,12 +24,19 @@ double pw_direction_offset (const pw_direction *d, int i) {
 
 /* ---- Effects of parameters ---- */
 
-static void effect_add (double *to, const double *from, double weight, int n) {
-  for (int i = 0; i < n; i++) to[i] += weight * from[i];
+/* One of the differences: of f - M a - J^T lambda (n), of gamma - J a, g, J v - eta (m each); the sizes of what is summed. */
+typedef struct {
+  double *sum, weight;
+  double *size; /* or NULL */
+} effect_difference;
+
+static void effect_term (const effect_difference *to, int i, double value, double size) {
+  to->sum[i] += to->weight * value;
+  if (to->size) to->size[i] += size;
 }
 
 /* The rows of a batch of a neighbour. */
-static void effect_rows (pw_variation *x, double *effect, double *row, pw_element_batch *k, double weight) {
+static void effect_rows (pw_variation *x, const effect_difference *to, pw_element_batch *k) {
   const pw_linearisation *l = &x->linear;
   int rows = k->kind->rows, n = x->n, m = x->m;
   double *gamma = l->z, *g = gamma + m, *eta = g + m;
@@ -40,62 +48,58 @@ static void effect_rows (pw_variation *x, double *effect, double *row, pw_elemen
   const double *J = k->J;
   for (int r = 0; r < k->b.count * rows; r++) {
     int i = k->row + r;
-    double acceleration = gamma[r], velocity = -eta[r];
+    double acceleration = gamma[r], velocity = -eta[r], size[3] = { fabs (gamma[r]), fabs (g[r]), fabs (eta[r]) };
     for (int c = 0; c < k->b.cols; c++, J++) {
       int j = pw_global (k, r / rows, c);
       if (j >= n) continue;
       acceleration -= *J * l->a[j];
       velocity += *J * x->v[j];
-      effect[j] -= weight * *J * l->lambda[i];
+      size[0] += fabs (*J * l->a[j]), size[1] += fabs (*J * x->q[j]), size[2] += fabs (*J * x->v[j]);
+      effect_term (to, j, -*J * l->lambda[i], fabs (*J * l->lambda[i]));
     }
-    effect[n + i] += weight * acceleration;
-    row[i] += weight * g[r];
-    row[m + i] += weight * velocity;
+    effect_term (to, n + i, acceleration, size[0]);
+    effect_term (to, n + m + i, g[r], size[1]);
+    effect_term (to, n + 2 * m + i, velocity, size[2]);
   }
 }
 
-static void effect_force (pw_variation *x, double *effect, pw_element_batch *k, double weight) {
+static void effect_force (pw_variation *x, const effect_difference *to, pw_element_batch *k) {
   const double *f = k->block;
   k->kind->force (&k->b, k->block);
   for (int e = 0; e < k->b.count; e++)
     for (int c = 0; c < k->b.cols; c++, f++) {
       int j = pw_global (k, e, c);
-      if (j < x->n) effect[j] += weight * *f;
+      if (j < x->n) effect_term (to, j, *f, fabs (*f));
     }
 }
 
 /* Adds f - M a - J^T lambda, gamma - J a; g and J v - eta of a neighbour's system at the state of the run to one of the
  * differences, without the elements that are the same in all neighbours. */
-static void effect_add_to (pw_variation *x, pw_direction_copy *d, pw_workspace *w, int which, double weight) {
+static void effect_add_to (pw_variation *x, const pw_direction_copy *d, const effect_difference *to, pw_workspace *w) {
   const pw_system *s = w->s;
   for (int i = 0; i < s->batches; i++) {
     const pw_kind *kind = w->batch[i].kind;
     if (!d->changes[i]) continue;
-    if (kind->rows > 0) effect_rows (x, d->effect[which], d->row[which], &w->batch[i], weight);
-    if (kind->force && !kind->constant) effect_force (x, d->effect[which], &w->batch[i], weight);
+    if (kind->rows > 0) effect_rows (x, to, &w->batch[i]);
+    if (kind->force && !kind->constant) effect_force (x, to, &w->batch[i]);
   }
-  for (int j = 0; j < x->n && d->changes[s->batches]; j++)
-    d->effect[which][j] += weight * (s->constant[j] - s->mass[j] * x->linear.a[j]);
+  for (int j = 0; j < x->n && d->changes[s->batches]; j++) {
+    double inertial = s->mass[j] * x->linear.a[j];
+    effect_term (to, j, s->constant[j] - inertial, fabs (s->constant[j]) + fabs (inertial));
+  }
 }
 
-/* The time and the state at which neighbours are evaluated. */
-typedef struct {
-  double t;
-  const double *q, *v;
-  int held; /* 1: not those of the run */
-} effect_place;
-
 /* Between the breakpoints of the neighbours, of which one may be passed slightly before that of the run; likewise at jumps. */
-static effect_place effect_at (const pw_variation *x, const pw_direction_copy *d) {
+pw_variation_place pw_variation_place_of (const pw_variation *x, const pw_direction_copy *d) {
   for (const pw_variation_hold *h = x->hold; h < x->hold + 2; h++)
-    if (h->from <= x->at && x->at <= h->to) return (effect_place){ h->t, h->state, h->state + x->n, 1 };
+    if (h->from <= x->at && x->at <= h->to) return (pw_variation_place){ h->t, h->state, h->state + x->n, 1 };
   double t = fmax (d->first, fmin (x->at, nextafter (d->last, -INFINITY)));
-  return (effect_place){ t, x->q, x->v, 0 };
+  return (pw_variation_place){ t, x->q, x->v, 0 };
 }
 
 /* Kinematics and signals of a neighbour; those of the run where they are the same. */
 static int effect_kinematics (pw_variation *x, const pw_direction_copy *d, pw_workspace *w) {
-  effect_place at = effect_at (x, d);
+  pw_variation_place at = pw_variation_place_of (x, d);
   if (at.held) return pw_update_kinematics (w, at.t, at.q, at.v);
   memcpy (w->configuration, x->r->w->configuration, (size_t)w->s->bodies * sizeof *w->configuration);
   pw_point_to_internal (w, x->q, x->v);
@@ -109,31 +113,61 @@ static int effect_neighbour (pw_variation *x, pw_direction_copy *d, int i) {
   pw_workspace *w = d->given.neighbour[i]->w;
   if (effect_kinematics (x, d, w) != PW_OK) return PW_METHOD;
   for (int which = 0; which < 2; which++) {
-    double weight = effect_weight (&d->given, which, i);
-    if (weight != 0) effect_add_to (x, d, w, which, weight);
+    double *size = which == 0 && i == 1 ? d->size : NULL; /* it has the largest weight */
+    const effect_difference to = { d->effect[which], effect_weight (&d->given, which, i), size };
+    if (to.weight != 0) effect_add_to (x, d, &to, w);
   }
   return PW_OK;
 }
 
-/* The two differences become the extrapolated one and its error, as in pw_direction_weight. */
-static void effect_extrapolate (double *one, double *two, int n) {
-  for (int i = 0; i < n; i++) {
-    double error = (one[i] - two[i]) / 3;
+/* Acceleration, in units of the scene, that an effect causes by itself. */
+static double effect_part (const pw_variation *x, int i) {
+  double T = x->r->w->scale.time;
+  if (i < x->n) return x->r->s->mass[i] > 0 ? T * T / x->r->s->mass[i] / pw_unit (x->r->s, i) : 0;
+  return (i < x->n + x->m ? T * T : i < x->n + 2 * x->m ? 1 : T) / x->r->s->scale.length;
+}
+
+/* The two differences become the extrapolated one and its error, as in pw_direction_weight, to which round-off is added. */
+static void effect_extrapolate (const pw_variation *x, pw_direction_copy *d) {
+  double *one = d->effect[0], *two = d->effect[1];
+  double round = 2 * DBL_EPSILON * fabs (effect_weight (&d->given, 0, 1));
+  for (int i = 0; i < x->n + 3 * x->m; i++) {
+    double error = (one[i] - two[i]) / 3, part = effect_part (x, i);
     one[i] += error;
-    two[i] = error;
+    two[i] = error + copysign (round * d->size[i], error);
+    d->effects.all += fabs (one[i]) * part;
+    d->effects.error += fabs (two[i]) * part;
+    d->effects.round += round * d->size[i] * part;
   }
 }
 
+/* Relative errors of differences that are sufficiently small, and those aimed at with another step. */
+static const double EFFECT_GOOD = 1e-7, EFFECT_AIM = 1e-8;
+
+/* The factor of the step with which differences have errors of EFFECT_AIM. */
+static double effect_factor (const pw_difference_sums *s) {
+  double off = s->all > 0 ? s->error / s->all : 0;
+  if (off <= EFFECT_GOOD) return 1;
+  return s->round > 0.1 * s->error ? fmin (1000, off / EFFECT_AIM) : fmax (0.001, sqrt (EFFECT_AIM / off));
+}
+
+double pw_variation_better_step (const pw_variation *x, int i) {
+  const pw_direction_copy *d = &x->direction[i];
+  double step = d->given.step, start = effect_factor (&d->start), effects = effect_factor (&d->effects);
+  if (d->given.initial) return step;
+  if (d->column->largest == 0 && memchr (d->changes, 1, (size_t)x->r->s->batches + 1) == NULL) return 1000 * step;
+  return step * (start == 1 ? effects : effects == 1 ? start : fmin (start, effects));
+}
+
 static int effect_direction (pw_variation *x, pw_direction_copy *d) {
-  int length = x->n + x->m, rows = 2 * x->m, status = PW_OK;
+  size_t bytes = ((size_t)x->n + 3 * (size_t)x->m) * sizeof (double);
+  int status = PW_OK;
   if (d->given.initial) return PW_OK;
-  for (int which = 0; which < 2; which++) {
-    memset (d->effect[which], 0, (size_t)length * sizeof (double));
-    memset (d->row[which], 0, (size_t)rows * sizeof (double));
-  }
+  memset (d->effect[0], 0, bytes);
+  memset (d->effect[1], 0, bytes);
+  memset (d->size, 0, bytes);
   for (int i = 0; i < PW_VARIATION_NEAR && status == PW_OK; i++) status = effect_neighbour (x, d, i);
-  effect_extrapolate (d->effect[0], d->effect[1], length);
-  effect_extrapolate (d->row[0], d->row[1], rows);
+  effect_extrapolate (x, d);
   return status;
 }
 
@@ -154,55 +188,6 @@ int pw_variation_evaluate_at (pw_variation *x, double t, pw_error *error) {
   memcpy (x->q, state, (size_t)x->n * sizeof *x->q);
   memcpy (x->v, state + x->n, (size_t)x->n * sizeof *x->v);
   return pw_variation_evaluate (x, pw_before_breakpoint (x->r, t), error);
-}
-
-/* ---- Derivatives of energies, powers, least-norm multipliers ---- */
-
-/* The values at a state of a run. */
-static int effect_values (pw_run *r, double t, const double *q, const double *v, const double *lambda, double *out) {
-  int status = pw_evaluate_J_at (r->w, t, q, v), entries = r->s->entries;
-  if (status != PW_OK) return status;
-  out[0] = pw_kinetic (r->s, v);
-  out[1] = pw_potential (r->w);
-  memcpy (out + 2 + entries, lambda, (size_t)r->s->rows * sizeof *lambda);
-  pw_ledger_rates (r, lambda, out + 2);
-  if (r->redundant && pw_saddle_factor (r->saddle) == PW_OK) pw_rank_least_norm (r, out + 2 + entries);
-  return PW_OK;
-}
-
-double pw_variation_step_along (const pw_variation_column *c) {
-  return 1e-5 / (c->largest > 0 ? c->largest : 1);
-}
-
-/* By the state: central differences. */
-static int effect_by_state (pw_variation *x, const pw_variation_column *c, effect_place at, const double *Y,
-                            double *out) {
-  int n = x->n, m = x->m, status = PW_OK;
-  double step = pw_variation_step_along (c);
-  double *q = x->values + 2 + x->entries + m, *v = q + n + 3, *lambda = v + n + 3;
-  for (int side = -1; side <= 1 && status == PW_OK; side += 2) {
-    for (int j = 0; j < n; j++) q[j] = at.q[j] + side * step * Y[j], v[j] = at.v[j] + side * step * Y[n + j];
-    for (int i = 0; i < m; i++) lambda[i] = x->linear.lambda[i] + side * step * c->lambda[i];
-    status = effect_values (x->r, at.held ? at.t : x->at, q, v, lambda, x->values);
-    effect_add (out, x->values, side / (2 * step), 2 + x->entries + m);
-  }
-  return status;
-}
-
-int pw_variation_outputs (pw_variation *x, const pw_variation_column *c, const double *Y, double *out) {
-  const pw_direction_copy *d = c->direction;
-  effect_place at = effect_at (x, d);
-  int length = 2 + x->entries + x->m, status = PW_OK;
-  memset (out, 0, (size_t)length * sizeof *out);
-  for (int i = 0; i < PW_VARIATION_NEAR && status == PW_OK && d->given.initial == NULL; i++) {
-    double weight = pw_direction_weight (&d->given, pw_variation_index (c), i);
-    if (weight == 0) continue;
-    status = effect_values (d->given.neighbour[i], at.t, at.q, at.v, x->linear.lambda, x->values);
-    effect_add (out, x->values, weight, length);
-  }
-  if (status == PW_OK) status = effect_by_state (x, c, at, Y, out);
-  if (!x->r->redundant) memcpy (out + 2 + x->entries, c->lambda, (size_t)x->m * sizeof *out);
-  return status;
 }
 
 /* ---- Columns ---- */
@@ -237,38 +222,19 @@ void pw_variation_accelerate (pw_variation *x, int c, int k) {
   }
 }
 
-int pw_variation_ledger_rates (pw_variation *x, int k) {
-  int status = PW_OK;
-  if (!x->ledger) return PW_OK;
-  PW_EACH_COLUMN (c, x) {
-    if (status == PW_OK) status = pw_variation_outputs (x, c, c->trial, x->output);
-    memcpy (c->K[k] + 2 * x->n, x->output + 2, (size_t)x->entries * sizeof (double));
-  }
-  /* J and its factors are again those of the state */
-  if (pw_evaluate_J_at (x->r->w, x->at, x->q, x->v) == PW_OK) pw_saddle_factor (x->r->saddle);
-  return status;
-}
-
-int pw_variation_rates (pw_variation *x, int k, pw_error *error) {
-  memcpy (x->a[k], x->linear.a, (size_t)x->n * sizeof *x->q);
-  pw_variation_accelerate (x, 0, k);
-  pw_variation_accelerate (x, 1, k);
-  return pw_variation_ledger_rates (x, k) == PW_OK ? PW_OK : pw_fail_signal (x->at, error);
-}
-
 /* Positions first; the velocities' equations contain them. */
 void pw_variation_project (pw_variation *x, pw_variation_column *c) {
   pw_linearisation *l = &x->linear;
   int n = x->n, m = x->m, holonomic = x->r->s->holonomic;
-  const double *row = c->direction->row[pw_variation_index (c)];
+  const double *row = c->direction->effect[pw_variation_index (c)] + n + m;
   pw_mul_J (x->r->w, c->trial, l->z);
   for (int i = 0; i < m; i++) l->z[i] = i < holonomic ? -l->z[i] - row[i] : 0;
   pw_saddle_solve (x->r->saddle, NULL, l->z, l->da, l->z);
-  effect_add (c->trial, l->da, 1, n);
+  pw_variation_add (c->trial, l->da, 1, n);
   memcpy (l->x, c->trial, 2 * (size_t)n * sizeof *l->x);
   pw_linear_multiply (l);
   pw_mul_J (x->r->w, c->trial + n, l->z);
   for (int i = 0; i < m; i++) l->z[i] = -l->z[i] - l->y[n + m + i] - row[m + i];
   pw_saddle_solve (x->r->saddle, NULL, l->z, l->da, l->z);
-  effect_add (c->trial + n, l->da, 1, n);
+  pw_variation_add (c->trial + n, l->da, 1, n);
 }

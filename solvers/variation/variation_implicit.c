@@ -101,7 +101,7 @@ static void implicit_direction (pw_variation *x, int i, int c) {
 
 /* p_i of a column into `trial`: 0 if the constraints do not depend on the parameter. */
 static void implicit_particular (pw_variation *x, pw_variation_column *c) {
-  const double *row = c->direction->row[pw_variation_index (c)];
+  const double *row = c->direction->effect[pw_variation_index (c)] + x->n + x->m;
   int depends = 0;
   for (int i = 0; i < 2 * x->m; i++) depends |= row[i] != 0;
   memset (c->trial, 0, 2 * (size_t)x->n * sizeof *c->trial);

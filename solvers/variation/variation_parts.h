@@ -25,6 +25,11 @@ typedef struct {
   double energy;                 /* largest derivative of work and losses so far */
 } pw_variation_column;
 
+/* Sums of the magnitudes, in units of the scene, of differences, of their errors, and of the round-off in these. */
+typedef struct {
+  double all, error, round;
+} pw_difference_sums;
+
 typedef struct pw_direction_copy {
   pw_direction given;
   int columns; /* 2, or 1 with `no_error` */
@@ -32,10 +37,11 @@ typedef struct pw_direction_copy {
   double breakpoint[PW_VARIATION_NEAR]; /* of the neighbours: the next one */
   double first, last;                   /* times between which no neighbour has a breakpoint */
   /* of each column: */
-  double *effect[2];      /* n + m: derivatives of f - M a - J^T lambda, gamma - J a by the parameter */
-  double *row[2];         /* 2 m: of g, J v - eta */
-  double *local;          /* size: error of the derivative in the last step */
-  int signals;            /* 1: some signals differ in the neighbours */
+  double *effect[2]; /* n + 3 m: derivatives of f - M a - J^T lambda, gamma - J a, g, J v - eta by the parameter */
+  double *size;      /* n + 3 m: sizes of the terms of which these are differences */
+  pw_difference_sums start, effects; /* of the initial state; of the effects at all evaluations */
+  double *local;                     /* size: error of the derivative in the last step */
+  int signals;                       /* 1: some signals differ in the neighbours */
   unsigned char *changes; /* of batches: 1 if it differs in the neighbours; then 1 for masses and constant forces */
   char *memory;
 } pw_direction_copy;
@@ -71,8 +77,10 @@ struct pw_variation {
   double reversal;          /* change of a velocity over which a force reverses, at most 1, in units of the scene */
   double *scratch, *output; /* k = 3 n + 4 m + entries + 9; output: 2 + entries + m of pw_variation_outputs */
   double *values;           /* 2 k: scratch */
-  double *sample[2];        /* 3 n + m + entries: results */
-  int may_jump;             /* 1: accelerations may jump with the state */
+  int energies;
+  double *energy;    /* 2 energies: of the elements, at two states */
+  double *sample[2]; /* 3 n + m + entries: results */
+  int may_jump;      /* 1: accelerations may jump with the state */
   int points, room;
   pw_variation_point *point; /* room: states of the run from t on */
   double passed;             /* the last breakpoint that the derivatives have passed */
@@ -83,6 +91,17 @@ struct pw_variation {
 #define PW_EACH_COLUMN(c, x)                                                        \
   for (pw_direction_copy *d = (x)->direction; d < (x)->direction + (x)->count; d++) \
     for (pw_variation_column *c = d->column; c < d->column + d->columns; c++)
+
+/* The time and the state at which neighbours are evaluated. */
+typedef struct {
+  double t;
+  const double *q, *v;
+  int held; /* 1: not those of the run */
+} pw_variation_place;
+
+static inline void pw_variation_add (double *to, const double *from, double weight, int n) {
+  for (int i = 0; i < n; i++) to[i] += weight * from[i];
+}
 
 /* ---- variation_path.c ---- */
 
@@ -109,19 +128,23 @@ int pw_variation_evaluate (pw_variation *x, double t, pw_error *error);
 int pw_variation_evaluate_at (pw_variation *x, double t, pw_error *error);
 /* The largest of the derivatives of a state, Y, in units of the scene. */
 double pw_variation_norm (const pw_variation *x, const double *Y);
-/* Time derivatives of the columns' `trial` at the state evaluated, into K[k]: of dq and dv of column c of each direction;
- * then of the ledger, of all columns.  Non-zero if a signal fails. */
+/* Time derivatives of dq and dv, of column c of each direction, at its `trial` and the state evaluated, into K[k]. */
 void pw_variation_accelerate (pw_variation *x, int c, int k);
-int pw_variation_ledger_rates (pw_variation *x, int k);
-/* All of these; accelerations of the run into a[k].  A status. */
-int pw_variation_rates (pw_variation *x, int k, pw_error *error);
 /* Projects a column's `trial` onto the linearised constraints at the state evaluated. */
 void pw_variation_project (pw_variation *x, pw_variation_column *c);
+pw_variation_place pw_variation_place_of (const pw_variation *x, const pw_direction_copy *d);
+
+/* ---- variation_outputs.c ---- */
+
 /* The step of differences along a column: the state changes by at most 1e-5 in units of the scene. */
 double pw_variation_step_along (const pw_variation_column *c);
 /* Derivatives of kinetic and potential energy, the ledger's rates, least-norm multipliers along a column: 2 + entries + m
  * numbers.  Non-zero if a signal fails. */
 int pw_variation_outputs (pw_variation *x, const pw_variation_column *c, const double *Y, double *out);
+/* Time derivatives of the columns' ledgers into K[k].  Non-zero if a signal fails. */
+int pw_variation_ledger_rates (pw_variation *x, int k);
+/* All time derivatives into K[k]; accelerations of the run into a[k].  A status. */
+int pw_variation_rates (pw_variation *x, int k, pw_error *error);
 
 /* ---- variation_step.c ---- */
 

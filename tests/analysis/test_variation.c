@@ -169,6 +169,35 @@ static void test_stiff (void **state) {
   }
 }
 
+/* Differences with a step that changes nothing, or little: their errors contain the result, and a few better steps lead to an
+ * accurate one. */
+static void test_steps (void **state) {
+  const double t = 3, steps[] = { 1e-19, 1e-15 };
+  (void)state;
+  for (int i = 0; i < 2; i++) {
+    block b = { .name = "x0", .k = 8, .m = 2, .x0 = 1e-12, .start = 99, .width = 1 };
+    double step, next = steps[i];
+    pw_sample x, e;
+    int count = 0;
+    do {
+      pw_error error = { 0 };
+      step = next;
+      variation_case c =
+          variation_open (block_make, &b, b.x0, step, "erk8", &(pw_settings){ .span = t, .rtol = 1e-11 });
+      pw_variation *v = pw_variation_open (c.r, &c.d, 1, 0, &error);
+      check_ok (error.status, &error);
+      check_ok (pw_variation_advance (v, t, t, &error), &error);
+      check_ok (pw_variation_sample (v, 0, &x, &e, &error), &error);
+      if (x.q[0] != 0) check_close ("within its error", x.q[0], cos (2 * t), fabs (e.q[0]), "the claim");
+      next = pw_variation_better_step (v, 0);
+      pw_variation_close (v);
+      variation_free (&c);
+    } while (next != step && ++count < 8);
+    assert_true (count > 0 && count < 8);
+    check_close ("dx/dx0", x.q[0], cos (2 * t), 1e-7, "differences accurate to 1e-7");
+  }
+}
+
 /* A free block pushed from `start` on for `width`: afterwards v = F width / m, x = v (t - start - width / 2). */
 static void test_breakpoints (void **state) {
   block b = { .m = 2, .height = 3, .start = 0.5, .width = 0.7 };
@@ -404,10 +433,10 @@ static void test_run (void **state) {
 
 int main (void) {
   const struct CMUnitTest tests[] = {
-    cmocka_unit_test (test_no_error), cmocka_unit_test (test_few_steps),   cmocka_unit_test (test_oscillator),
-    cmocka_unit_test (test_stiff),    cmocka_unit_test (test_breakpoints), cmocka_unit_test (test_tangent),
-    cmocka_unit_test (test_methods),  cmocka_unit_test (test_gallery),     cmocka_unit_test (test_refusals),
-    cmocka_unit_test (test_run),
+    cmocka_unit_test (test_no_error), cmocka_unit_test (test_few_steps), cmocka_unit_test (test_oscillator),
+    cmocka_unit_test (test_stiff),    cmocka_unit_test (test_steps),     cmocka_unit_test (test_breakpoints),
+    cmocka_unit_test (test_tangent),  cmocka_unit_test (test_methods),   cmocka_unit_test (test_gallery),
+    cmocka_unit_test (test_refusals), cmocka_unit_test (test_run),
   };
   return cmocka_run_group_tests (tests, NULL, NULL);
 }

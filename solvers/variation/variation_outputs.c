@@ -1,0 +1,114 @@
+/* Derivatives of energies, powers and multipliers along a column: exact, or by differences along the derivative of the state. */
+#include <float.h>
+#include <math.h>
+#include <string.h>
+#include "rank.h"
+#include "util.h"
+#include "variation_parts.h"
+
+/* ---- Energies ---- */
+
+/* sum m v dv + sum dm/dp v^2 / 2 */
+static double output_kinetic (const pw_variation *x, const pw_variation_column *c, const double *v, const double *dv) {
+  const pw_direction *d = &c->direction->given;
+  const double *mass = x->r->s->mass;
+  double sum = 0;
+  for (int j = 0; j < x->n; j++) sum += mass[j] * v[j] * dv[j];
+  for (int i = 0; i < PW_VARIATION_NEAR && d->initial == NULL; i++) {
+    double weight = pw_direction_weight (d, pw_variation_index (c), i);
+    const double *other = d->neighbour[i]->s->mass;
+    for (int j = 0; j < x->n; j++) sum += weight * (other[j] - mass[j]) * v[j] * v[j] / 2;
+  }
+  return sum;
+}
+
+/* The sum over the elements of their potential energies minus those in x->energy, which are close: the energies of elements on
+ * which a derivative does not depend must not contribute round-off. */
+static double output_potential (pw_variation *x, pw_workspace *w) {
+  double sum = 0;
+  pw_evaluate_energies (w, x->energy + x->energies);
+  for (int i = 0; i < x->energies; i++) sum += x->energy[x->energies + i] - x->energy[i];
+  return sum;
+}
+
+/* Round-off of a difference of the energies between those in x->energy and the ones last evaluated. */
+static double output_round (const pw_variation *x) {
+  double sum = 0;
+  for (int i = 0; i < x->energies; i++)
+    if (x->energy[x->energies + i] != x->energy[i]) sum += DBL_EPSILON * fabs (x->energy[i]);
+  return sum;
+}
+
+/* ---- All outputs ---- */
+
+/* The values at a state of a run, without the kinetic energy. */
+static int output_values (pw_variation *x, pw_run *r, double t, const double *q, const double *v,
+                          const double *lambda) {
+  double *out = x->values;
+  int status = pw_evaluate_J_at (r->w, t, q, v), entries = r->s->entries;
+  if (status != PW_OK) return status;
+  out[0] = 0;
+  out[1] = output_potential (x, r->w);
+  memcpy (out + 2 + entries, lambda, (size_t)r->s->rows * sizeof *lambda);
+  pw_ledger_rates (r, lambda, out + 2);
+  if (r->redundant && pw_saddle_factor (r->saddle) == PW_OK) pw_rank_least_norm (r, out + 2 + entries);
+  return PW_OK;
+}
+
+double pw_variation_step_along (const pw_variation_column *c) {
+  return 1e-5 / (c->largest > 0 ? c->largest : 1);
+}
+
+/* By the state: central differences. */
+static int output_by_state (pw_variation *x, const pw_variation_column *c, pw_variation_place at, const double *Y,
+                            double *out) {
+  int n = x->n, m = x->m, status = PW_OK;
+  double step = pw_variation_step_along (c);
+  double *q = x->values + 2 + x->entries + m, *v = q + n + 3, *lambda = v + n + 3;
+  for (int side = -1; side <= 1 && status == PW_OK; side += 2) {
+    for (int j = 0; j < n; j++) q[j] = at.q[j] + side * step * Y[j], v[j] = at.v[j] + side * step * Y[n + j];
+    for (int i = 0; i < m; i++) lambda[i] = x->linear.lambda[i] + side * step * c->lambda[i];
+    status = output_values (x, x->r, at.held ? at.t : x->at, q, v, lambda);
+    pw_variation_add (out, x->values, side / (2 * step), 2 + x->entries + m);
+  }
+  if (pw_variation_index (c) == 1)
+    out[1] += copysign (output_round (x) / pw_variation_step_along (c->direction->column), out[1]);
+  return status;
+}
+
+int pw_variation_outputs (pw_variation *x, const pw_variation_column *c, const double *Y, double *out) {
+  const pw_direction_copy *d = c->direction;
+  pw_variation_place at = pw_variation_place_of (x, d);
+  int length = 2 + x->entries + x->m, status = PW_OK;
+  memset (out, 0, (size_t)length * sizeof *out);
+  pw_evaluate_energies (x->r->w, x->energy);
+  for (int i = 0; i < PW_VARIATION_NEAR && status == PW_OK && d->given.initial == NULL; i++) {
+    double weight = pw_direction_weight (&d->given, pw_variation_index (c), i);
+    if (weight == 0) continue;
+    status = output_values (x, d->given.neighbour[i], at.t, at.q, at.v, x->linear.lambda);
+    pw_variation_add (out, x->values, weight, length);
+  }
+  if (status == PW_OK) status = output_by_state (x, c, at, Y, out);
+  out[0] = output_kinetic (x, c, at.v, Y + x->n);
+  if (!x->r->redundant) memcpy (out + 2 + x->entries, c->lambda, (size_t)x->m * sizeof *out);
+  return status;
+}
+
+int pw_variation_ledger_rates (pw_variation *x, int k) {
+  int status = PW_OK;
+  if (!x->ledger) return PW_OK;
+  PW_EACH_COLUMN (c, x) {
+    if (status == PW_OK) status = pw_variation_outputs (x, c, c->trial, x->output);
+    memcpy (c->K[k] + 2 * x->n, x->output + 2, (size_t)x->entries * sizeof (double));
+  }
+  /* J and its factors are again those of the state */
+  if (pw_evaluate_J_at (x->r->w, x->at, x->q, x->v) == PW_OK) pw_saddle_factor (x->r->saddle);
+  return status;
+}
+
+int pw_variation_rates (pw_variation *x, int k, pw_error *error) {
+  memcpy (x->a[k], x->linear.a, (size_t)x->n * sizeof *x->q);
+  pw_variation_accelerate (x, 0, k);
+  pw_variation_accelerate (x, 1, k);
+  return pw_variation_ledger_rates (x, k) == PW_OK ? PW_OK : pw_fail_signal (x->at, error);
+}
