@@ -65,12 +65,17 @@ static double step_motion_tolerance (const pw_variation *x) {
   return fmax (STEP_MOTION, step_noise (x) * x->reversal / fmax (1, x->speed));
 }
 
+/* Changes of velocities below this part of the largest, or this multiple of the run's tolerance, count as that large: the error
+ * of a body in free flight, which does not accelerate, is no large part of its motion. */
+static const double STEP_CHANGE = 1e-6, STEP_CHANGE_RTOL = 1000;
+
 /* The difference between a step of the run's velocities and the integral of its accelerations, relative to the latter: large
  * where the run does not resolve the motion.  Errors of the method, and of the velocities if they are small compared with
  * the change over which forces reverse, do not count. */
 static double step_defect (const pw_variation *x, double h) {
   int stages = x->implicit ? 1 + PW_VARIATION_STAGES : PW_VARIATION_RATES - 1;
-  double most = 0;
+  double most =
+      fmax (STEP_CHANGE, pw_fixed_steps (x->r) ? 0 : STEP_CHANGE_RTOL * x->r->settings.rtol) * fmax (1, x->speed);
   for (int k = 0; k < stages; k++) most = fmax (most, h * step_speed (x, x->a[k]));
   double defect = step_speed (x, x->defect) - step_noise (x) * x->reversal - step_motion_error (x) * fmax (1, x->speed);
   return defect > 0 ? fmin (1, defect / most) : 0;
