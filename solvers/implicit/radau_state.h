@@ -15,10 +15,8 @@ typedef struct {
 } radau_step;
 
 struct pw_method_data {
-  int fixed;              /* 1: fixed steps */
-  int velocities;         /* 1: J v = eta; 0: g = 0 in place of its holonomic rows */
-  int n, rows, mus, size; /* coordinates, independent equations, multipliers mu, unknowns */
-  pw_tangent tangent;
+  int fixed; /* 1: fixed steps */
+  pw_dae dae;
   pw_sparse real, complex;
   double *matrix;                                          /* -F_y */
   double *value;                                           /* of the real matrix; of the complex one, in pairs */
@@ -28,7 +26,6 @@ struct pw_method_data {
   double *tolerance, *enough, *floor;                      /* 2 n: of the error test, of corrections; round-off */
   double *row, *column;                                    /* scales of the matrices */
   double *W[PW_RADAU_STAGES], *F[PW_RADAU_STAGES], *x, *Y; /* unknowns; x: twice */
-  double *pull, *f, *jv, *eta;                             /* scratch: coords + 3, coords + 3, rows, rows */
   double *rates;                                           /* entries */
   radau_step now, last;
   double *a1;              /* coords: accelerations at the end of the last step */
