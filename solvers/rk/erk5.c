@@ -27,9 +27,5 @@ const pw_method pw_method_erk5 = {
   .stabilisations = pw_rk_stabilisations,
   .options = pw_rk_options,
   .open = erk5_open,
-  .advance = pw_rk_advance,
-  .at = pw_rk_at,
-  .restart = pw_rk_restart,
-  .close = pw_rk_close,
-  .serialise = pw_rk_serialise,
+  PW_RK_FUNCTIONS,
 };

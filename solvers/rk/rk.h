@@ -26,6 +26,8 @@ int pw_rk_at (pw_run *r, double t, pw_error *error);
 int pw_rk_restart (pw_run *r, pw_error *error);
 void pw_rk_close (pw_run *r);
 void pw_rk_serialise (pw_run *r, pw_archive *a);
+#define PW_RK_FUNCTIONS \
+  .advance = pw_rk_advance, .at = pw_rk_at, .restart = pw_rk_restart, .close = pw_rk_close, .serialise = pw_rk_serialise
 extern const pw_stabilisation pw_rk_stabilisations[];
 extern const pw_option pw_rk_options[]; /* the first one only for tableaus with an error estimate */
 

@@ -7,6 +7,12 @@
 #include "rk.h"
 #include "specialised.h"
 
+/* The beginning of a step. */
+typedef struct {
+  double t, *q; /* q, v, a in one block, as in the run */
+  double *ledger, *rate, projected;
+} pw_rk_begin;
+
 struct pw_method_data {
   const pw_tableau *tableau;
   pw_rk_row row[PW_RK_STAGES];        /* [i] stage i > 0; [0] the new state, as stage 0 needs no weights */
@@ -24,15 +30,16 @@ struct pw_method_data {
   double *q, *v, *a, *lambda; /* state of a stage, then the new state: one block, as in the run */
   double h, before;           /* adaptive: next step, error of the last one */
   double *weight;             /* adaptive: reciprocal tolerances of each position and its velocity */
-  /* the beginning of the last step, for samples inside it: one block */
-  double t0, *q0, *v0, *a0, *ledger0, *rate0, projected0;
-  double *middle, *ledger_middle, *rate_middle; /* a state between that and a sample: q, v, a in one block */
+  pw_rk_begin last, middle;   /* of the last step, for samples inside it; of the second part of a divided step */
   char *memory;
 };
 
 /* A step from the current state to t1 = t + h; the new state is left in d->q, d->v, d->a, d->lambda.  project: onto the
  * constraints; *added grows by the energy this adds, unless NULL.  PW_RETRY: a smaller step may succeed. */
 int pw_rk_step (pw_run *r, double h, double t1, int project, double *added);
+
+/* The state reached is the beginning of the last step. */
+void pw_rk_keep (pw_run *r);
 
 /* Makes the new state the current one. */
 void pw_rk_accept (pw_run *r, double h, double t1, double added);

@@ -62,7 +62,7 @@ static void several_report (pw_run *r, const pw_scene_steps *x) {
   pw_statistics *s = &r->statistics;
   pw_geometry *g = &r->geometry;
   r->t = x->t;
-  d->t0 = x->t0, d->projected0 = r->projected;
+  d->last.t = x->t0, d->last.projected = r->projected;
   d->count += x->done;
   r->near_singular = 0, r->w->failed = NULL;
   r->reference_level = x->watch.reference, r->previous_norm = x->watch.norm;
@@ -91,11 +91,11 @@ int pw_several_plan (pw_run *r, double t, double t_end, pw_scene_steps *x) {
                          .number = d->count,
                          .t = r->t,
                          .state = r->q,
-                         .state0 = d->q0,
+                         .state0 = d->last.q,
                          .ledger = r->ledger,
-                         .ledger0 = d->ledger0,
+                         .ledger0 = d->last.ledger,
                          .rate = r->rate,
-                         .rate0 = d->rate0,
+                         .rate0 = d->last.rate,
                          .V = d->V,
                          .A = d->A,
                          .R = d->R,
