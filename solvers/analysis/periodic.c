@@ -129,7 +129,7 @@ static int periodic_orbit (pw_periodic *x, const double *u, pw_periodic_orbit *o
   if (status == PW_OK) status = periodic_turns (x);
   if (status != PW_OK) return status;
   out->parameter = pw_periodic_parameter (x, u);
-  out->period = x->about = pw_periodic_period (x, u);
+  out->period = x->about = x->set.free ? u[pw_periodic_unknowns (x) - 1] * x->T : x->at[0].period;
   out->q = x->y0, out->v = x->y0 + x->n, out->end = x->y1;
   out->multipliers = x->size;
   out->re = x->re, out->im = x->im;

@@ -115,15 +115,15 @@ static int steady_constant (pw_steady *x, pw_error *error) {
       x->s->model, pw_system_signal_name (x->s, changed, name, sizeof name));
 }
 
-/* Scales and symmetries at the initial state. */
-static int steady_begin (pw_steady *x, pw_error *error) {
+/* Scales and symmetries at the initial state; forced: signals may change with time. */
+static int steady_begin (pw_steady *x, int forced, pw_error *error) {
   pw_run *r = x->at[0].r;
   x->L = x->s->scale.length;
   x->T = r->w->scale.time;
   memcpy (x->start, r->q, (size_t)x->n * sizeof *r->q);
   memcpy (x->start + x->n, r->v, (size_t)x->n * sizeof *r->v);
   if (x->s->bodies) memcpy (x->origin, r->q, sizeof x->origin);
-  int status = x->forced ? PW_OK : steady_constant (x, error);
+  int status = forced ? PW_OK : steady_constant (x, error);
   if (status != PW_OK) return status;
   status = pw_steady_find_group (x);
   if (status == PW_RESOURCE) return pw_fail_memory (x->s, error);
@@ -135,9 +135,8 @@ static int steady_begin (pw_steady *x, pw_error *error) {
 static pw_steady *steady_open (const pw_system *s, const pw_steady_settings *settings, int forced, pw_error *error) {
   pw_steady *x = calloc (1, sizeof *x);
   if (x == NULL) return pw_fail_memory (s, error), NULL;
-  x->s = s, x->set = *settings, x->forced = forced;
+  x->s = s, x->set = *settings;
   x->n = s->coords, x->m = s->rows, x->holonomic = s->holonomic;
-  x->vary = settings->vary;
   if (x->set.points <= 0) x->set.points = STEADY_POINTS;
   int status = PW_OK;
   if (x->n > PW_STEADY_MOST)
@@ -145,7 +144,7 @@ static pw_steady *steady_open (const pw_system *s, const pw_steady_settings *set
                       s->model, x->n, PW_STEADY_MOST);
   if (status == PW_OK && steady_arrays (x) != PW_OK) status = pw_fail_memory (s, error);
   if (status == PW_OK && pw_steady_at (x, 0, x->set.first) != PW_OK) *error = x->why, status = error->status;
-  if (status == PW_OK) status = steady_begin (x, error);
+  if (status == PW_OK) status = steady_begin (x, forced, error);
   const pw_branch_equations of = { .unknowns = pw_steady_unknowns (x),
                                    .equations = pw_steady_equations (x),
                                    .tolerance = STEADY_EXACT,
@@ -248,9 +247,8 @@ int pw_steady_solve (pw_steady *x, int attempt, double parameter, pw_steady_moti
   double range = x->set.last - x->set.first;
   x->gauge = 0;
   if (pw_steady_at (x, 0, parameter) != PW_OK) return *error = x->why, error->status;
-  int status = pw_steady_start (x, attempt, x->u);
-  if (status == PW_RESOURCE) return pw_fail_memory (x->s, error);
-  if (status != PW_OK) return pw_fail (error, PW_METHOD, "the symmetries cannot be separated");
+  int status = pw_steady_start (x, attempt, x->u, error);
+  if (status != PW_OK) return status;
   x->u[pw_steady_unknowns (x)] = range != 0 ? (parameter - x->set.first) / range : 0;
   status = pw_branch_solve (&x->branch, x->u, error);
   if (status == PW_OK) steady_rest (x);
@@ -263,9 +261,8 @@ int pw_steady_solve (pw_steady *x, int attempt, double parameter, pw_steady_moti
   if (out->family == PW_RESOURCE) return pw_fail_memory (x->s, error);
   if (out->family < 0) return pw_fail (error, PW_METHOD, "the family of the steady motion cannot be determined");
   pw_steady_home (x, x->q, x->v);
-  if (pw_steady_guess (x, x->q, x->v, x->u) != PW_OK)
-    return pw_fail (error, PW_METHOD, "the symmetries cannot be separated");
-  return pw_steady_motion_at (x, x->u, out, error);
+  status = pw_steady_guess (x, x->q, x->v, x->u, error);
+  return status == PW_OK ? pw_steady_motion_at (x, x->u, out, error) : status;
 }
 
 /* ---- Suggestions ---- */
@@ -274,10 +271,7 @@ int pw_steady_solve (pw_steady *x, int attempt, double parameter, pw_steady_moti
 static double suggest_change (pw_steady *x, const pw_initial_value *hold, int relative, int i) {
   const double *z = x->null + (size_t)i * (size_t)pw_steady_unknowns (x);
   double *dq = x->dq, *dv = x->dv;
-  memset (x->sum, 0, (size_t)pw_steady_rates (x->s) * sizeof *x->sum);
-  for (int k = 0; k < x->group; k++)
-    for (int c = 0; c < pw_steady_rates (x->s); c++)
-      x->sum[c] += z[x->n + k] / x->T * x->axis[k * pw_steady_rates (x->s) + c];
+  pw_steady_combine (x, z + x->n, x->T, x->sum);
   pw_steady_field (x, x->sum, x->q, dv);
   for (int j = 0; j < x->n; j++) dq[j] = z[j] * pw_unit (x->s, j);
   pw_linear_turn (&x->at[0].x, x->rates[2], dq, dv);

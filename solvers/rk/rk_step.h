@@ -64,12 +64,4 @@ int pw_rk_advance_adaptive (pw_run *r, double t_end, pw_error *error);
 /* Sets the size of the first step of an adaptive method, also after a discontinuity. */
 void pw_rk_begin_adaptive (pw_run *r);
 
-/* ---- Several steps (several.c) ---- */
-
-/* Fills x for the next steps up to t and before t_end, two at least, and returns their number; 0: single steps have to
- * be taken. */
-int pw_several_plan (pw_run *r, double t, double t_end, pw_scene_steps *x);
-/* Makes the result the state reached.  Errors: PW_METHOD. */
-int pw_several_finish (pw_run *r, const pw_scene_steps *x, pw_error *error);
-
 #endif
