@@ -23,10 +23,9 @@ typedef struct pw_method_data ida_data;
 
 /* ---- Equations ---- */
 
-/* Updates kinematics and J at the unknowns.  0, or -1 if a signal failed. */
+/* Updates kinematics and J at the unknowns. */
 static int ida_update (ida_data *d, double t, const double *y) {
-  int status = pw_evaluate_J_at (d->sun.run->w, pw_before_breakpoint (d->sun.run, t), y, y + d->dae.n);
-  return status == PW_OK ? 0 : -1;
+  return pw_evaluate_J_at (d->sun.run->w, pw_before_breakpoint (d->sun.run, t), y, y + d->dae.n);
 }
 
 /* The multipliers of the independent equations, among the unknowns or among their derivatives. */
@@ -40,7 +39,7 @@ static int ida_residual (pw_real t, N_Vector vy, N_Vector vyp, N_Vector out, voi
   int n = d->dae.n;
   const double *y = N_VGetArrayPointer (vy), *yp = N_VGetArrayPointer (vyp);
   double *F = N_VGetArrayPointer (out);
-  if (pw_run_stop_requested (d->sun.run) || ida_update (d, t, y) != 0) return -1;
+  if (pw_run_stop_requested (d->sun.run) || ida_update (d, t, y) != PW_OK) return -1;
   pw_dae_residual (&d->dae, y + n, yp + n, ida_lambda (d, y, yp), F);
   for (int j = 0; j < n; j++) F[j] += yp[j] - y[n + j];
   return 0;
@@ -53,7 +52,7 @@ static int ida_matrix (pw_real t, pw_real c, N_Vector vy, N_Vector vyp, N_Vector
   pw_tangent *x = &d->dae.tangent;
   const double *y = N_VGetArrayPointer (vy), *yp = N_VGetArrayPointer (vyp), *v = y + d->dae.n;
   (void)residual, (void)t1, (void)t2, (void)t3;
-  if (ida_update (d, t, y) != 0) return -1;
+  if (ida_update (d, t, y) != PW_OK) return -1;
   pw_sun_clear (matrix, x->colptr, x->rowind);
   pw_scatter_begin (&x->scatter, SUNSparseMatrix_Data (matrix));
   pw_dae_matrix (&d->dae, v, yp + d->dae.n, ida_lambda (d, y, yp), c, c);
@@ -150,7 +149,7 @@ static int ida_interpolate (ida_data *d, double t) {
   if (flag == IDA_SUCCESS && steps > 0) flag = IDAGetDky (d->memory, t, 0, d->sun.y);
   if (flag != IDA_SUCCESS) return flag;
   ida_read (d, r->q_at, r->v_at, r->a_at, r->lambda_at);
-  if (ida_update (d, t, N_VGetArrayPointer (d->sun.y)) != 0) return IDA_RES_FAIL;
+  if (ida_update (d, t, N_VGetArrayPointer (d->sun.y)) != PW_OK) return IDA_RES_FAIL;
   pw_statistics keep = r->statistics;
   if (pw_saddle_factor (r->saddle) == PW_OK) pw_run_accelerate_updated (r, r->v_at, r->a_at, r->lambda_at);
   r->statistics = keep;
@@ -166,11 +165,10 @@ static int ida_power (pw_run *r, double t, double *rate) {
 }
 
 /* Work and losses up to the current state; the saddle-point matrix is factorised if `status` is PW_OK.  Multipliers
- * outside the error test are not accurate enough and are recomputed.  0, or -1 if a signal failed. */
+ * outside the error test are not accurate enough and are recomputed.  PW_METHOD if a signal failed. */
 static int ida_work (ida_data *d, int status) {
   pw_run *r = d->sun.run;
   int order = 1;
-  double *y = N_VGetArrayPointer (d->sun.y);
   const double *lambda = r->lambda;
   if (status == PW_OK && d->dae.velocities && pw_ledger_reacts (r->s)) {
     pw_run_accelerate_updated (r, r->v, r->a_at, r->lambda_at);
@@ -178,10 +176,8 @@ static int ida_work (ida_data *d, int status) {
   }
   pw_ledger_rates (r, lambda, r->rate);
   IDAGetLastOrder (d->memory, &order);
-  if (!pw_quadrature_step (&d->sun.quadrature, r, order)) return 0;
-  memcpy (y, r->q, (size_t)d->dae.n * sizeof *y);
-  memcpy (y + d->dae.n, r->v, (size_t)d->dae.n * sizeof *y);
-  return ida_update (d, r->t, y);
+  if (!pw_quadrature_step (&d->sun.quadrature, r, order)) return PW_OK;
+  return pw_evaluate_J_at (r->w, pw_before_breakpoint (r, r->t), r->q, r->v);
 }
 
 /* ---- Opening ---- */
@@ -282,13 +278,14 @@ static int ida_restart (pw_run *r, pw_error *error) {
 static int ida_reach (ida_data *d) {
   pw_run *r = d->sun.run;
   ida_read (d, r->q, r->v, r->a, r->lambda);
-  if (ida_update (d, r->t, N_VGetArrayPointer (d->sun.y)) != 0) return PW_METHOD;
+  int status = ida_update (d, r->t, N_VGetArrayPointer (d->sun.y));
+  if (status != PW_OK) return status;
   pw_bound_tolerances (r);
-  int status = pw_saddle_factor (r->saddle);
+  status = pw_saddle_factor (r->saddle);
   if (status < 0) return status;
   if (status == PW_OK && !d->dae.velocities) pw_run_accelerate_updated (r, r->v, r->a_at, r->lambda);
   r->near_singular = status != PW_OK || pw_watchdog_near (r);
-  return r->s->entries > 0 && ida_work (d, status) != 0 ? PW_METHOD : PW_OK;
+  return r->s->entries > 0 ? ida_work (d, status) : PW_OK;
 }
 
 static int ida_advance (pw_run *r, double t_end, pw_error *error) {

@@ -73,8 +73,8 @@ static int vectors_scale_each (int count, pw_real *c, N_Vector *x, N_Vector *z) 
 
 /* ---- Norms ---- */
 
-/* The sum of (x_i w_i)^2; with an id, only over id_i > 0. */
-PW_INLINE double vectors_squares (N_Vector vx, N_Vector vw, const double *id) {
+/* sqrt (sum (x_i w_i)^2 / n); with an id, only over id_i > 0. */
+PW_INLINE double vectors_root (N_Vector vx, N_Vector vw, const double *id) {
   sunindextype i = 0, n = NV_LENGTH_S (vx);
   const double *x = NV_DATA_S (vx), *w = NV_DATA_S (vw);
   double even = 0, odd = 0;
@@ -84,23 +84,15 @@ PW_INLINE double vectors_squares (N_Vector vx, N_Vector vw, const double *id) {
     if (id == NULL || id[i + 1] > 0) odd += q * q;
   }
   if (i < n && (id == NULL || id[i] > 0)) even += x[i] * w[i] * (x[i] * w[i]);
-  return even + odd;
-}
-
-static pw_real vectors_sum_squares (N_Vector x, N_Vector w) {
-  return vectors_squares (x, w, NULL);
-}
-
-static pw_real vectors_sum_squares_of (N_Vector x, N_Vector w, N_Vector id) {
-  return vectors_squares (x, w, NV_DATA_S (id));
+  return sqrt ((even + odd) / (double)n);
 }
 
 static pw_real vectors_norm (N_Vector x, N_Vector w) {
-  return sqrt (vectors_squares (x, w, NULL) / (double)NV_LENGTH_S (x));
+  return vectors_root (x, w, NULL);
 }
 
 static pw_real vectors_norm_of (N_Vector x, N_Vector w, N_Vector id) {
-  return sqrt (vectors_squares (x, w, NV_DATA_S (id)) / (double)NV_LENGTH_S (x));
+  return vectors_root (x, w, NV_DATA_S (id));
 }
 
 N_Vector pw_sun_vector (sunindextype length, SUNContext context) {
@@ -114,7 +106,5 @@ N_Vector pw_sun_vector (sunindextype length, SUNContext context) {
   v->ops->nvscalevectorarray = vectors_scale_each;
   v->ops->nvwrmsnorm = vectors_norm;
   v->ops->nvwrmsnormmask = vectors_norm_of;
-  v->ops->nvwsqrsumlocal = vectors_sum_squares;
-  v->ops->nvwsqrsummasklocal = vectors_sum_squares_of;
   return v;
 }
