@@ -47,7 +47,7 @@ static int radau_restart (pw_run *r, pw_error *error) {
   (void)error;
   d->base = d->last.t = r->t;
   d->count = 0;
-  d->before = d->last.h = 0;
+  d->last_h = d->last.h = 0;
   d->left = 1;
   d->outdated = 1;
   d->current = 0;
@@ -192,16 +192,16 @@ static int radau_accept (pw_run *r, double h, double t1) {
   return PW_OK;
 }
 
-/* The size of the next step, from the errors of this and the last one. */
+/* The size of the next step, from the errors of this and the last one; constants as in RADAU5. */
 static double radau_next (const radau *d, double h, double error, int rejected) {
   const int most = 7;
   double safety = 0.9 * fmin (1, (1. + 2 * most) / (d->iterations + 2 * most));
-  double by = fmin (5, fmax (1. / 8, pow (error, 0.25) / safety));
-  if (error < 1 && d->before > 0) {
-    double trend = d->before / h * pow (d->error / (error * error), 0.25) * 0.9;
-    by = fmax (by, fmin (5, fmax (1. / 8, 1 / trend)));
+  double quotient = fmin (5, fmax (1. / 8, pow (error, 0.25) / safety));
+  if (error < 1 && d->last_h > 0) {
+    double trend = d->last_h / h * pow (d->last_error / (error * error), 0.25) * 0.9;
+    quotient = fmax (quotient, fmin (5, fmax (1. / 8, 1 / trend)));
   }
-  double next = h / by;
+  double next = h / quotient;
   if (rejected) next = fmin (next, h);
   return d->rate <= RADAU_KEEP && next >= h && next <= RADAU_LONGER * h ? h : next;
 }
@@ -219,8 +219,8 @@ static int radau_try (pw_run *r, double h, double t1, int again, double *error) 
 static int radau_advance_fixed (pw_run *r, double t_end, pw_error *error) {
   radau *d = r->data;
   int whole;
-  double off, t1 = pw_step_end (r, d->base, d->count, t_end, &whole), h = whole ? r->settings.step : t1 - r->t;
-  int status = radau_try (r, h, t1, 0, &off);
+  double err, t1 = pw_step_end (r, d->base, d->count, t_end, &whole), h = whole ? r->settings.step : t1 - r->t;
+  int status = radau_try (r, h, t1, 0, &err);
   if (status == PW_OK) status = radau_accept (r, h, t1);
   if (status != PW_OK) return radau_fail (r, status, h, error);
   d->count++;
@@ -234,8 +234,8 @@ static int radau_accept_adaptive (pw_run *r, double h, double t1, double error, 
   double next = radau_next (d, h, error, rejected);
   int status = radau_accept (r, h, t1);
   if (status != PW_OK) return status;
-  d->before = h;
-  d->error = fmax (1e-2, error);
+  d->last_h = h;
+  d->last_error = fmax (1e-2, error);
   d->h = cut ? fmax (next, d->h) : next;
   return PW_OK;
 }
@@ -254,21 +254,21 @@ static int radau_advance (pw_run *r, double t_end, pw_error *error) {
   radau *d = r->data;
   if (d->fixed) return radau_advance_fixed (r, t_end, error);
   double stop = fmin (t_end, r->breakpoint), least = 16 * DBL_EPSILON * fmax (fabs (r->t), 1e-6 * r->w->scale.time),
-         off;
+         err;
   for (int rejected = 0, status = PW_OK;; rejected++) {
     int cut = r->t + d->h > stop - 0.01 * d->h;
     double h = cut ? stop - r->t : d->h, t1 = cut ? stop : r->t + h;
     if (!cut && !(h > least)) return radau_fail (r, status, h, error);
     if (rejected > 0 && (status = pw_run_check_limits (r, error)) != PW_OK) return status;
-    status = radau_try (r, h, t1, rejected > 0 || d->before == 0, &off);
-    if (status == PW_OK && off < 1) status = radau_accept_adaptive (r, h, t1, off, rejected, cut);
-    if (status == PW_OK && off < 1) return PW_OK;
+    status = radau_try (r, h, t1, rejected > 0 || d->last_h == 0, &err);
+    if (status == PW_OK && err < 1) status = radau_accept_adaptive (r, h, t1, err, rejected, cut);
+    if (status == PW_OK && err < 1) return PW_OK;
     int signal = status == PW_METHOD && h < RADAU_SIGNAL * r->w->scale.time;
     if (status == PW_RESOURCE || status == PW_INPUT || signal) return radau_fail (r, status, h, error);
     r->statistics.rejected++;
     d->outdated = !d->current;
     if (status == PW_OK && rejected > 0) radau_project_start (r);
-    d->h = status == PW_OK ? fmin (0.9 * h, radau_next (d, h, off, 1)) : h * (status == PW_RETRY ? d->shorter : 0.25);
+    d->h = status == PW_OK ? fmin (0.9 * h, radau_next (d, h, err, 1)) : h * (status == PW_RETRY ? d->shorter : 0.25);
   }
 }
 

@@ -28,15 +28,16 @@ struct pw_method_data {
   double *W[PW_RADAU_STAGES], *F[PW_RADAU_STAGES], *x, *Y; /* unknowns; x: twice */
   double *rates;                                           /* entries */
   radau_step now, last;
-  double *a1;              /* coords: accelerations at the end of the last step */
-  double base;             /* fixed steps: time from which they are counted */
-  long count;              /* steps since then */
-  double h, before, error; /* the next step; size and error of the last one, 0: none */
-  double factored;         /* step for which the matrices are factorised; 0: none */
-  int forget;              /* 1: select pivots anew */
-  int current, outdated;   /* F_y was evaluated at y; it must be evaluated again */
-  double rate, left;       /* of the last iteration: contraction rate, remaining error over the last correction */
-  double shorter;          /* factor of the step if the iteration does not converge */
+  double *a1;                /* coords: accelerations at the end of the last step */
+  double base;               /* fixed steps: time from which they are counted */
+  long count;                /* steps since then */
+  double h;                  /* the next step */
+  double last_h, last_error; /* size and error of the last one, 0: none */
+  double factored;           /* step for which the matrices are factorised; 0: none */
+  int forget;                /* 1: select pivots anew */
+  int current, outdated;     /* F_y was evaluated at y; it must be evaluated again */
+  double rate, left;         /* of the last iteration: contraction rate, remaining error over the last correction */
+  double shorter;            /* factor of the step if the iteration does not converge */
   int iterations;
   int near; /* 1: the state reached is near a singular configuration */
   pw_projector projector;

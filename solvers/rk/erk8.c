@@ -64,17 +64,7 @@ static const pw_tableau erk8_tableau = {
 };
 /* clang-format on */
 
-static int erk8_open (pw_run *r, pw_error *error) {
-  return pw_rk_open (r, &erk8_tableau, error);
-}
-
-const pw_method pw_method_erk8 = {
-  .name = "erk8",
-  .about = "explicit Runge-Kutta of order 8(5,3), adaptive (Dormand & Prince; Hairer, Norsett & Wanner 1993)",
-  .adaptive = 1,
-  .order = 8,
-  .stabilisations = pw_rk_stabilisations,
-  .options = pw_rk_options,
-  .open = erk8_open,
-  PW_RK_FUNCTIONS,
-};
+PW_RK_METHOD (
+    erk8, erk8_tableau,
+    .about = "explicit Runge-Kutta of order 8(5,3), adaptive (Dormand & Prince; Hairer, Norsett & Wanner 1993)",
+    .adaptive = 1, .order = 8, .options = pw_rk_options);

@@ -22,7 +22,7 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
-#include "nullspace.h"
+#include "rk_step.h"
 #include "unroll.h"
 #include "util.h"
 

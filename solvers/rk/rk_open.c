@@ -116,7 +116,7 @@ void pw_rk_serialise (pw_run *r, pw_archive *a) {
   pw_archive_count (a, &d->count);
   pw_archive_bytes (a, &d->split, sizeof d->split);
   pw_archive_bytes (a, &d->h, sizeof d->h);
-  pw_archive_bytes (a, &d->before, sizeof d->before);
+  pw_archive_bytes (a, &d->last_error, sizeof d->last_error);
 }
 
 /* ---- Advancing ---- */
