@@ -198,7 +198,7 @@ static double radau_next (const radau *d, double h, double error, int rejected) 
   double safety = 0.9 * fmin (1, (1. + 2 * most) / (d->iterations + 2 * most));
   double quotient = fmin (5, fmax (1. / 8, pow (error, 0.25) / safety));
   if (error < 1 && d->last_h > 0) {
-    double trend = d->last_h / h * pow (d->last_error / (error * error), 0.25) * 0.9;
+    double trend = h / d->last_h * pow (d->last_error / (error * error), 0.25) * 0.9;
     quotient = fmax (quotient, fmin (5, fmax (1. / 8, 1 / trend)));
   }
   double next = h / quotient;
