@@ -35,10 +35,9 @@ static int steady_arrays (pw_steady *x) {
   };
   x->memory = pw_alloc_arrays (array, sizeof array / sizeof *array);
   x->cyclic = calloc (n + 1, 1);
-  x->pivot = calloc (rates + 1, sizeof *x->pivot);
   x->known = calloc (2 * n + 1, sizeof *x->known);
   x->hold = calloc (holds + 1, sizeof *x->hold);
-  if (!x->memory || !x->cyclic || !x->pivot || !x->known || !x->hold) return PW_RESOURCE;
+  if (!x->memory || !x->cyclic || !x->known || !x->hold) return PW_RESOURCE;
   if (holds) memcpy (x->hold, x->set.hold, holds * sizeof *x->hold);
   for (int j = 0; j < 2 * x->n; j++) x->known[j].state = j;
   return PW_OK;
@@ -171,7 +170,6 @@ void pw_steady_close (pw_steady *x) {
   pw_branch_close (&x->branch);
   pw_linear_free (&x->linear);
   free (x->cyclic);
-  free (x->pivot);
   free (x->known);
   free (x->hold);
   free (x->memory);

@@ -36,14 +36,14 @@ void pw_steady_state (pw_steady *x, const double *u) {
 int pw_steady_guess (pw_steady *x, const double *q, const double *v, double *u, pw_error *error) {
   int n = x->n, group = x->group, rank;
   double *S = x->F, *right = S + n * group, *work = right + n + group; /* enough: see steady_arrays */
-  memset (x->pivot, 0, (size_t)group * sizeof *x->pivot);
+  memset (x->branch.pivot, 0, (size_t)group * sizeof *x->branch.pivot);
   for (int j = 0; j < n; j++) u[j] = q[j] / pw_unit (x->s, j), right[j] = v[j] / pw_unit (x->s, j) * x->T;
   for (int k = 0; k < group; k++) {
     pw_steady_field (x, x->axis + k * pw_steady_rates (x->s), q, S + k * n);
     for (int j = 0; j < n; j++) S[k * n + j] /= pw_unit (x->s, j);
   }
-  if (group && LAPACKE_dgelsy_work (LAPACK_COL_MAJOR, n, group, 1, S, n, right, n > group ? n : group, x->pivot, 1e-9,
-                                    &rank, work, 40 * (n + group)))
+  if (group && LAPACKE_dgelsy_work (LAPACK_COL_MAJOR, n, group, 1, S, n, right, n > group ? n : group, x->branch.pivot,
+                                    1e-9, &rank, work, 40 * (n + group)))
     return pw_fail (error, PW_METHOD, "the symmetries cannot be separated");
   memcpy (u + n, right, (size_t)group * sizeof *u);
   return PW_OK;

@@ -14,7 +14,6 @@ struct pw_steady {
   double L, T;             /* scales at the initial state */
   double origin[2], *axis; /* group x pw_steady_rates: symmetries as rates (steady_group.c) */
   unsigned char *cyclic;   /* n: 1 for angles on which nothing depends */
-  int *pivot;              /* scratch: group */
   int gauge;               /* symmetries that leave what is held unchanged; 0 before a solution is found */
   double *fixed;           /* gauge x group: combinations of symmetries */
   double *norm;            /* m: lengths of the rows of J */

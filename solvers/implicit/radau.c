@@ -151,14 +151,13 @@ static int radau_fail (pw_run *r, int status, double h, pw_error *error) {
  * configurations those of the last stage. */
 static void radau_finish (pw_run *r, double h) {
   radau *d = r->data;
-  double *const *Z = d->last.Z, *end = d->now.y + 2 * d->dae.n;
+  double *end = d->now.y + 2 * d->dae.n;
   int status = pw_saddle_factor (r->saddle);
   d->near = r->near_singular = status != PW_OK || pw_watchdog_near (r);
   if (status == PW_OK)
     pw_run_accelerate_updated (r, r->v, r->a, r->lambda);
   else
-    for (int j = 0, i = d->dae.n; j < d->dae.n; j++, i++)
-      r->a[j] = (radau_end[0] * Z[0][i] + radau_end[1] * Z[1][i] + radau_end[2] * Z[2][i]) / h;
+    for (int j = 0, i = d->dae.n; j < d->dae.n; j++, i++) r->a[j] = pw_radau_sum (0, radau_end, d->last.Z, i) / h;
   if (status != PW_OK) pw_tangent_store (&d->dae.tangent, end, r->lambda);
   pw_tangent_compress (&d->dae.tangent, r->lambda, d->dae.rows, end);
   memcpy (d->a1, r->a, (size_t)d->dae.n * sizeof *d->a1);
@@ -309,14 +308,12 @@ static void radau_interpolate (pw_run *r, double x) {
   int n = d->dae.n;
   double weight[STAGES], *y = d->Y, *q = d->F[0], *v = d->F[1];
   pw_radau_basis (x, weight);
-  for (int i = 0; i < d->dae.size; i++)
-    y[i] = p->y[i] + weight[0] * p->Z[0][i] + weight[1] * p->Z[1][i] + weight[2] * p->Z[2][i];
+  for (int i = 0; i < d->dae.size; i++) y[i] = pw_radau_sum (p->y[i], weight, p->Z, i);
   memcpy (r->q_at, y, (size_t)n * sizeof *y);
   memcpy (r->v_at, y + n, (size_t)n * sizeof *y);
   pw_tangent_store (&d->dae.tangent, y + 2 * n, r->lambda_at);
   for (int j = 0; j < n; j++) r->a_at[j] = (1 - x) * p->a[j] + x * d->a1[j];
-  for (int e = 0; e < r->s->entries; e++)
-    r->ledger_at[e] = p->ledger[e] + weight[0] * p->w[0][e] + weight[1] * p->w[1][e] + weight[2] * p->w[2][e];
+  for (int e = 0; e < r->s->entries; e++) r->ledger_at[e] = pw_radau_sum (p->ledger[e], weight, p->w, e);
   radau_quintic (r, x, q, v);
   if (!radau_resolved (r, q, v)) return;
   memcpy (r->q_at, q, (size_t)n * sizeof *q);

@@ -171,9 +171,7 @@ static void radau_predict (pw_run *r, double h) {
     double *Z = d->now.Z[k], ch = radau_c[k] * h;
     if (last->h > 0) {
       pw_radau_basis (1 + ch / last->h, weight);
-      for (int i = 0; i < d->dae.size; i++)
-        Z[i] = last->y[i] - d->now.y[i] + weight[0] * last->Z[0][i] + weight[1] * last->Z[1][i] +
-               weight[2] * last->Z[2][i];
+      for (int i = 0; i < d->dae.size; i++) Z[i] = pw_radau_sum (last->y[i] - d->now.y[i], weight, last->Z, i);
       continue;
     }
     memset (Z, 0, (size_t)d->dae.size * sizeof *Z);
@@ -290,7 +288,7 @@ int pw_radau_estimate (pw_run *r, double h, int again, double *error) {
   double *e = d->F[0], *rest = d->F[1];
   double *const *Z = d->now.Z;
   for (int i = 0; i < d->dae.size; i++) {
-    rest[i] = i < 2 * n ? d->B[i] / h * (radau_e[0] * Z[0][i] + radau_e[1] * Z[1][i] + radau_e[2] * Z[2][i]) : 0;
+    rest[i] = i < 2 * n ? d->B[i] / h * pw_radau_sum (0, radau_e, Z, i) : 0;
     e[i] = rest[i] + (i < n ? d->now.y[n + i] : i < 2 * n ? d->B[i] * r->a[i - n] : 0);
   }
   if (radau_solve_real (d, e) != PW_OK) return PW_RESOURCE;
@@ -324,8 +322,7 @@ int pw_radau_work (pw_run *r, double h, double t1, double *error) {
       for (int e = 0; e < entries; e++) d->now.w[i][e] += h * radau_A[i][k] * d->rates[e];
   }
   for (int e = 0; e < entries; e++) {
-    double off = h * r->rate[e];
-    for (int k = 0; k < STAGES; k++) off += radau_e[k] * d->now.w[k][e];
+    double off = pw_radau_sum (h * r->rate[e], radau_e, d->now.w, e);
     sum += off * off;
   }
   double tolerance = pw_ledger_tolerance (r, h) * fmax (1, pw_radau_rtol (r) / r->settings.rtol);

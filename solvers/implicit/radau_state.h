@@ -56,6 +56,11 @@ double pw_radau_rtol (const pw_run *r);
  * matrix is singular, PW_METHOD if a signal failed, PW_RESOURCE. */
 int pw_radau_solve (pw_run *r, double h, double t1);
 
+/* y + the weighted sum of the values of entry i at the stages. */
+static inline double pw_radau_sum (double y, const double *weight, double *const *Z, int i) {
+  return y + weight[0] * Z[0][i] + weight[1] * Z[1][i] + weight[2] * Z[2][i];
+}
+
 /* Stores the unknowns at stage k in d->Y. */
 void pw_radau_stage (const radau *d, int k);
 

@@ -59,7 +59,7 @@ static const double erk8_e3[] = {
   2.01365400804030348374776537501e-1, 4.47106157277725905176885569043e-2 - 0.220588235294117647058823529412e-1, 0,
 };
 static const pw_tableau erk8_tableau = {
-  .stages = 12, .order = 8, .c = erk8_c, .A = erk8_A, .b = erk8_b, .e = erk8_e, .e3 = erk8_e3, .e6 = erk8_e6,
+  .stages = 12, .c = erk8_c, .A = erk8_A, .b = erk8_b, .e = erk8_e, .e3 = erk8_e3, .e6 = erk8_e6,
   .exponent = 1. / 8, .memory = 0.04
 };
 /* clang-format on */

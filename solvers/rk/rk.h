@@ -8,7 +8,7 @@ enum { PW_RK_STAGES = 16 };
 
 /* c and b have `stages` entries; A holds the rows of the lower triangle, one after the other. */
 typedef struct {
-  int stages, order;
+  int stages;
   const double *c, *A, *b;
   const double *e;  /* stages + 1: of the error estimate, the last for the new state; NULL: none */
   const double *e3; /* as e: of a second, cruder estimate, combined as in DOP853; NULL: none */

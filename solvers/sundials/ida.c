@@ -34,7 +34,7 @@ static const double *ida_lambda (const ida_data *d, const double *y, const doubl
 }
 
 /* Called by IDA: F (t, y, y'). */
-static int ida_residual (pw_real t, N_Vector vy, N_Vector vyp, N_Vector out, void *data) {
+static int ida_residual (realtype t, N_Vector vy, N_Vector vyp, N_Vector out, void *data) {
   ida_data *d = data;
   int n = d->dae.n;
   const double *y = N_VGetArrayPointer (vy), *yp = N_VGetArrayPointer (vyp);
@@ -46,8 +46,8 @@ static int ida_residual (pw_real t, N_Vector vy, N_Vector vyp, N_Vector out, voi
 }
 
 /* Called by IDA: dF/dy + c dF/dy'. */
-static int ida_matrix (pw_real t, pw_real c, N_Vector vy, N_Vector vyp, N_Vector residual, SUNMatrix matrix, void *data,
-                       N_Vector t1, N_Vector t2, N_Vector t3) {
+static int ida_matrix (realtype t, realtype c, N_Vector vy, N_Vector vyp, N_Vector residual, SUNMatrix matrix,
+                       void *data, N_Vector t1, N_Vector t2, N_Vector t3) {
   ida_data *d = data;
   pw_tangent *x = &d->dae.tangent;
   const double *y = N_VGetArrayPointer (vy), *yp = N_VGetArrayPointer (vyp), *v = y + d->dae.n;
@@ -72,7 +72,7 @@ static int ida_open_matrix (ida_data *d) {
 /* The coefficient c of the current step, 1 / h before the first; at least 1 / T. */
 static double ida_leading (const ida_data *d) {
   const pw_run *r = d->sun.run;
-  pw_real c = 0;
+  realtype c = 0;
   if (r->t == d->sun.t0 || IDAGetCurrentCj (d->memory, &c) != IDA_SUCCESS || c == 0) c = 1 / pw_first_step (r);
   return fmax (c, 1 / r->w->scale.time);
 }

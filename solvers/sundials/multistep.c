@@ -22,7 +22,7 @@
 
 /* ---- Callbacks ---- */
 
-static int multistep_derivative (pw_real t, N_Vector vy, N_Vector derivative, void *data) {
+static int multistep_derivative (realtype t, N_Vector vy, N_Vector derivative, void *data) {
   multistep_data *d = data;
   const double *y = N_VGetArrayPointer (vy);
   double *out = N_VGetArrayPointer (derivative);
@@ -60,7 +60,7 @@ static void multistep_project_error (multistep_data *d, double *e) {
 }
 
 /* The projection function of CVODES. */
-static int multistep_correct (pw_real t, N_Vector vy, N_Vector change, pw_real enough, N_Vector error, void *data) {
+static int multistep_correct (realtype t, N_Vector vy, N_Vector change, realtype enough, N_Vector error, void *data) {
   multistep_data *d = data;
   const double *y = N_VGetArrayPointer (vy);
   double *out = N_VGetArrayPointer (change);

@@ -30,11 +30,11 @@ static void vectors_sum_by (sunindextype n, double a, const double *x, double b,
     vectors_sum (n, a, x, b, y, z);
 }
 
-static void vectors_linear_sum (pw_real a, N_Vector x, pw_real b, N_Vector y, N_Vector z) {
+static void vectors_linear_sum (realtype a, N_Vector x, realtype b, N_Vector y, N_Vector z) {
   vectors_sum_by (NV_LENGTH_S (z), a, NV_DATA_S (x), b, NV_DATA_S (y), NV_DATA_S (z));
 }
 
-static void vectors_scale (pw_real c, N_Vector vx, N_Vector vz) {
+static void vectors_scale (realtype c, N_Vector vx, N_Vector vz) {
   sunindextype i = 0, n = NV_LENGTH_S (vz);
   const double *x = NV_DATA_S (vx);
   double *z = NV_DATA_S (vz);
@@ -45,13 +45,13 @@ static void vectors_scale (pw_real c, N_Vector vx, N_Vector vz) {
   for (; i < n; i++) z[i] = c * x[i];
 }
 
-static void vectors_const (pw_real c, N_Vector vz) {
+static void vectors_const (realtype c, N_Vector vz) {
   double *z = NV_DATA_S (vz);
   for (sunindextype i = 0, n = NV_LENGTH_S (vz); i < n; i++) z[i] = c;
 }
 
 /* z = sum_k c_k x_k */
-static int vectors_combine (int count, pw_real *c, N_Vector *x, N_Vector z) {
+static int vectors_combine (int count, realtype *c, N_Vector *x, N_Vector z) {
   if (count == 1)
     vectors_scale (c[0], x[0], z);
   else
@@ -61,12 +61,12 @@ static int vectors_combine (int count, pw_real *c, N_Vector *x, N_Vector z) {
 }
 
 /* z_k = a_k x + y_k */
-static int vectors_add_to (int count, pw_real *a, N_Vector x, N_Vector *y, N_Vector *z) {
+static int vectors_add_to (int count, realtype *a, N_Vector x, N_Vector *y, N_Vector *z) {
   for (int k = 0; k < count; k++) vectors_linear_sum (a[k], x, 1, y[k], z[k]);
   return 0;
 }
 
-static int vectors_scale_each (int count, pw_real *c, N_Vector *x, N_Vector *z) {
+static int vectors_scale_each (int count, realtype *c, N_Vector *x, N_Vector *z) {
   for (int k = 0; k < count; k++) vectors_scale (c[k], x[k], z[k]);
   return 0;
 }
@@ -87,11 +87,11 @@ PW_INLINE double vectors_root (N_Vector vx, N_Vector vw, const double *id) {
   return sqrt ((even + odd) / (double)n);
 }
 
-static pw_real vectors_norm (N_Vector x, N_Vector w) {
+static realtype vectors_norm (N_Vector x, N_Vector w) {
   return vectors_root (x, w, NULL);
 }
 
-static pw_real vectors_norm_of (N_Vector x, N_Vector w, N_Vector id) {
+static realtype vectors_norm_of (N_Vector x, N_Vector w, N_Vector id) {
   return vectors_root (x, w, NV_DATA_S (id));
 }
 
