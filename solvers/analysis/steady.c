@@ -6,10 +6,13 @@
 #include "rank.h"
 #include "util.h"
 
-/* STEADY_POINTS: of a branch, by default; STEADY_TIMES: times at which signals are compared, and as many between breakpoints;
- * STEADY_EXACT: residual of a solution, in units of the scene; STEADY_SLOW: rates that may be round-off at a double root; SIGNAL_SAME: a difference of signals that counts as 0. */
-enum { STEADY_POINTS = 50, STEADY_TIMES = 16 };
-static const double STEADY_EXACT = 1e-9, STEADY_SLOW = 1e-4, SIGNAL_SAME = 1e-8;
+enum {
+  STEADY_POINTS = 50, /* of a branch, by default */
+  STEADY_TIMES = 16   /* times at which signals are compared, and as many between breakpoints */
+};
+static const double STEADY_EXACT = 1e-9, /* residual of a solution, in units of the scene */
+    STEADY_SLOW = 1e-4,                  /* rates that may be round-off at a double root */
+    SIGNAL_SAME = 1e-8;                  /* difference of signals, relative to their largest value, that counts as 0 */
 
 /* ---- Opening ---- */
 
@@ -51,8 +54,8 @@ typedef struct {
   int count;             /* numbers of signals */
 } signal_times;
 
-/* Compares signals at two times, in the run's state (number = 0) or one near it: a factor may be 0 in the run's.  A status; signals may
- * fail in other states. */
+/* Compares signals at two times, in the run's state (number = 0) or one near it: a factor may be 0 in the run's.  A status;
+ * signals may fail in other states. */
 static int signals_compare (signal_times *x, int number, double t0, double t1) {
   pw_run *r = x->r;
   pw_workspace *w = r->w;

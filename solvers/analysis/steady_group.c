@@ -12,8 +12,8 @@
 /* Several states, since a body alone has more displacements than equations. */
 enum { GROUP_STATES = 2 };
 
-/* GROUP_APART: distance of the states from the initial one, in units of the scene, in irregular directions.  GROUP_ROUND: round-off
- * of derivatives.  GROUP_PIVOT, GROUP_ZERO: smallest pivots and entries of rates. */
+/* GROUP_APART: distance of the states from the initial one, in units of the scene, in irregular directions.
+ * GROUP_ROUND: round-off of derivatives.  GROUP_PIVOT, GROUP_ZERO: smallest pivots and entries of rates. */
 static const double GROUP_APART = 0.02, GROUP_ROUND = 1e-12, GROUP_PIVOT = 1e-6, GROUP_ZERO = 1e-7;
 
 void pw_steady_combine (const pw_steady *x, const double *part, double unit, double *rates) {

@@ -107,8 +107,8 @@ int pw_steady_start (pw_steady *x, int k, double *u, pw_error *error);
 
 /* ---- steady.c ---- */
 
-/* *changed: the first signal that differs, in the run's state or one near it, between times t and t + part of the span; with a period,
- * between times in the span after t and one period later.  -1: none.  A status. */
+/* *changed: the first signal that differs, in the run's state or one near it, between times t and t + part of the span; with
+ * a period, between times in the span after t and one period later.  -1: none.  A status. */
 int pw_signals_change (pw_run *r, double t, double period, double span, int *changed, pw_error *error);
 
 /* Scales and symmetries at time t of a system whose signals may change with time; for other searches. */

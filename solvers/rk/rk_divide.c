@@ -36,12 +36,13 @@ static int divide_two_parts (pw_run *r, const pw_rk_begin *from, double by, doub
 /* Tries divisions of the step to t1 in two parts of irregular sizes, the first one longer than to `least`, until two
  * results are closer than `best`; *by: that of the closest, which must be closer than `enough`.  status: of the undivided
  * step, whose result is in d->q.  In a step from the state reached, energy added by projections is an error, too. */
-static int divide (pw_run *r, const pw_rk_begin *from, int status, double t1, int project, double least, double best,
-                   double enough, double *by) {
+static int divide (pw_run *r, const pw_rk_begin *from, int status, double t1, int project, double least, double *by) {
   static const double part[] = { 0.382, 0.681, 0.209, 0.847, 0.127, 0.541, 0.943, 0.302, 0.764, 0.891 };
   const struct pw_method_data *d = r->data;
   double closest = INFINITY, energy = fmax (r->energy_scene, r->exchanged);
-  int known = status == PW_OK, is_step = from->q == r->q;
+  int known = status == PW_OK, is_step = from->q == r->q; /* otherwise it is a sample */
+  const double best = is_step ? r->limits.agree_best : r->limits.sample_best;
+  const double enough = is_step ? r->limits.agree : r->limits.sample;
   if (known) memcpy (r->q_at, d->q, pw_rk_block (r, 1));
   for (size_t i = 0; i < sizeof part / sizeof *part && closest > best; i++) {
     double t = from->t + part[i] * (t1 - from->t);
@@ -78,7 +79,7 @@ int pw_rk_at (pw_run *r, double t, pw_error *error) {
   r->refuse = 0;
   int status = divide_step (r, from, t, d->projects, r->settings.ledger);
   if (r->near_singular && status >= 0) {
-    status = divide (r, from, status, t, d->projects, from->t, r->limits.sample_best, r->limits.sample, &by);
+    status = divide (r, from, status, t, d->projects, from->t, &by);
     if (status == PW_OK) status = divide_two_parts (r, from, by, t, d->projects);
   }
   memcpy (r->q_at, d->q, pw_rk_block (r, 1));
@@ -96,15 +97,12 @@ int pw_rk_at (pw_run *r, double t, pw_error *error) {
 static int fixed_step_around (pw_run *r, int status, int lands, double t1, double stop, int project, double *t) {
   static const double beyond[] = { 0.62, 2.62, 7.62 };
   const pw_rk_begin from = { r->t, r->q, r->ledger, r->rate, r->projected };
-  const pw_watchdog *limit = &r->limits;
   double added = 0;
-  if (!lands) status = divide (r, &from, status, t1, project, r->t, limit->agree_best, limit->agree, t);
+  if (!lands) status = divide (r, &from, status, t1, project, r->t, t);
   if (lands && status == PW_OK) status = PW_RETRY;
   for (size_t i = 0; i < sizeof beyond / sizeof *beyond && status == PW_RETRY && t1 < stop; i++)
-    status = divide (r, &from, status, fmin (t1 + beyond[i] * r->settings.step, stop), project, t1, limit->agree_best,
-                     limit->agree, t);
-  if (lands && status == PW_RETRY)
-    status = divide (r, &from, status, t1, project, r->t, limit->agree_best, limit->agree, t);
+    status = divide (r, &from, status, fmin (t1 + beyond[i] * r->settings.step, stop), project, t1, t);
+  if (lands && status == PW_RETRY) status = divide (r, &from, status, t1, project, r->t, t);
   if (status == PW_OK) status = pw_rk_step (r, *t - r->t, *t, project, &added);
   if (status == PW_OK) pw_rk_accept (r, *t - r->t, *t, r->settings.ledger ? added : 0);
   return status;
