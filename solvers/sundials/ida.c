@@ -291,12 +291,10 @@ static int ida_reach (ida_data *d) {
 static int ida_advance (pw_run *r, double t_end, pw_error *error) {
   ida_data *d = r->data;
   double stop = fmin (t_end, r->breakpoint), t = r->t;
-  int flag = stop != d->sun.stop ? IDASetStopTime (d->memory, stop) : IDA_SUCCESS;
-  d->sun.stop = stop;
+  int flag = IDASetStopTime (d->memory, stop);
   if (flag >= 0) flag = IDASolve (d->memory, stop, &t, d->sun.y, d->yp, IDA_ONE_STEP);
   if (flag < 0) return ida_fail (d, flag, error);
   r->t = flag == IDA_TSTOP_RETURN ? stop : t;
-  if (flag == IDA_TSTOP_RETURN) d->sun.stop = NAN;
   if (ida_reach (d) != PW_OK) return ida_fail (d, IDA_RES_FAIL, error);
   ida_statistics (d);
   return PW_OK;

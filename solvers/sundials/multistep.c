@@ -255,12 +255,10 @@ static int multistep_reach (multistep_data *d, double t, pw_error *error) {
 static int multistep_advance (pw_run *r, double t_end, pw_error *error) {
   multistep_data *d = r->data;
   double stop = fmin (t_end, r->breakpoint), t = r->t;
-  int flag = stop != d->sun.stop ? CVodeSetStopTime (d->cvode, stop) : CV_SUCCESS;
-  d->sun.stop = stop;
+  int flag = CVodeSetStopTime (d->cvode, stop);
   r->near_singular = 0;
   if (flag >= 0) flag = CVode (d->cvode, stop, d->sun.y, &t, CV_ONE_STEP);
   if (flag < 0) return multistep_fail (d, flag, error);
-  if (flag == CV_TSTOP_RETURN) d->sun.stop = NAN;
   multistep_count (d);
   return multistep_reach (d, flag == CV_TSTOP_RETURN ? stop : t, error);
 }

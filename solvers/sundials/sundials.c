@@ -45,7 +45,6 @@ void pw_sun_restart (pw_sun *x) {
   double *y = N_VGetArrayPointer (x->y);
   memcpy (y, r->q, (size_t)r->s->coords * sizeof *y);
   memcpy (y + r->s->coords, r->v, (size_t)r->s->coords * sizeof *y);
-  x->stop = NAN;
   x->t0 = r->t;
   x->before = r->statistics;
 }

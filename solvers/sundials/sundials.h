@@ -25,7 +25,6 @@ typedef struct {
   SUNNonlinearSolver iteration; /* NULL: the default of the integrator */
   double correction;            /* size of the last Newton correction */
   pw_quadrature quadrature;     /* of work and losses */
-  double stop;                  /* the stop time set in the integrator */
   double t0;                    /* of the initial conditions or the last restart */
   pw_statistics before;         /* counts at t0, where those of the integrator begin */
   char message[256];            /* the last message of the integrator */
