@@ -25,9 +25,10 @@
  *   c (q' - q - h v - h^2 (1/2 - beta) w - h^2 beta w')  for q' - v,   dw' = dv' / (h gamma),   da' = e dv'
  *
  * so that c and e are the coefficients of dF/dy'.  Corrections of v', lambda', mu are in units of c, c e m, c, and the
- * equations are divided by c, c e m, c, with m a mass: then all entries of the matrix are of the same size for every h, and its
- * condition number does not depend on h (Bottasso, Bauchau & Cardona 2007, Time-step-size-independent conditioning and
- * sensitivity to perturbations in the numerical solution of index three differential algebraic equations). */
+ * equations are divided by c, c e m, c, with m a mass: then all entries of the matrix are of the same size for every
+ * step, and its condition number does not depend on the step (Bottasso, Bauchau & Cardona 2007,
+ * Time-step-size-independent conditioning and sensitivity to perturbations in the numerical solution of index three
+ * differential algebraic equations). */
 #include <float.h>
 #include <math.h>
 #include <stdlib.h>
@@ -135,8 +136,8 @@ static int galpha_correct (pw_run *r, double h, double *most, double *floor) {
   return PW_OK;
 }
 
-/* Computes the new state at t1 = t + h with its accelerations and multipliers; kinematics and J are left there.  PW_RETRY if
- * the iteration does not converge, PW_INPUT if its matrix is singular, PW_METHOD if a signal failed.
+/* Computes the new state at t1 = t + h with its accelerations and multipliers; kinematics and J are left there.
+ * PW_RETRY if the iteration does not converge, PW_INPUT if its matrix is singular, PW_METHOD if a signal failed.
  *
  * The matrix is evaluated at the prediction, and again while convergence is slow.  The remaining error must be small
  * against the method's error in multipliers, which is of order h^2; a correction changes the multipliers by 1/h^2 times

@@ -30,8 +30,8 @@ int pw_implicit_lay_out (pw_implicit *x, int size);
  * enforces J v = eta. */
 int pw_implicit_complete (pw_run *r, int status, int velocities, pw_error *error);
 
-/* Scales of the rows and columns of a Newton matrix whose derivatives by q' and a have the coefficients c and e, so that all
- * entries are of the same size for every step. */
+/* Scales of the rows and columns of a Newton matrix whose derivatives by q' and a have the coefficients c and e, so
+ * that all entries are of the same size for every step. */
 void pw_implicit_scale (const pw_dae *x, double c, double e, double *row, double *column);
 
 /* Sets the matrix to 0 and begins to fill it. */

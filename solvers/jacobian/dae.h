@@ -1,16 +1,16 @@
-/* The equations of motion as differential-algebraic equations F (t, y, y') = 0, y = (q, v, lambda, mu), and their matrix:
+/* The equations of motion as differential-algebraic equations F (t, y, y') = 0, y = (q, v, lambda, mu):
  *
  *   kinematics    q' - v + D G^T mu
  *   momentum      M a + J^T lambda - f,   a = v'
  *   constraints, by stabilisation:
- *     none, baumgarte   J a - gamma + 2 alpha (J v - eta) + beta^2 g,  with alpha (J v - eta) alone if nonholonomic; mu = 0
+ *     none, baumgarte   J a - gamma + 2 alpha (J v - eta) + beta^2 g   (nonholonomic: + alpha (J v - eta)), mu = 0
  *     index2            J v - eta                                      mu = 0
  *     index3            g,  of nonholonomic constraints J v - eta      mu = 0
  *     ggl, si1          J v - eta,  g
  *
  * with G the rows of J of the holonomic equations, D = 1 for lengths and 1/L^2 for angles, so that mu has one unit
- * (Baumgarte 1972; Gear, Gupta & Leimkuhler 1985; Gear 1988).  In si1 the unknowns lambda and mu are the integrals of the
- * multipliers. */
+ * (Baumgarte 1972; Gear, Gupta & Leimkuhler 1985; Gear 1988).  In si1 the unknowns lambda and mu are the integrals of
+ * the multipliers. */
 #ifndef PW_DAE_H
 #define PW_DAE_H
 
@@ -31,8 +31,8 @@ typedef struct {
 int pw_dae_open (pw_dae *x, pw_run *r);
 void pw_dae_close (pw_dae *x);
 
-/* F without q' - v, where kinematics are up to date and J is evaluated; lambda: the multipliers of the independent equations,
- * mu after them; a = NULL: 0 (not on acceleration level). */
+/* F without q' - v, where kinematics are up to date and J is evaluated; lambda: the multipliers of the independent
+ * equations, mu after them; a = NULL: 0 (not on acceleration level). */
 void pw_dae_residual (pw_dae *x, const double *v, const double *a, const double *lambda, double *F);
 
 /* Adds dF/dy, with the derivatives by q' times of_q, those by a, and by the multipliers of si1, times of_a. */
