@@ -11,7 +11,7 @@
  * BRANCH_ASIDE: largest correction of a predictor and of an interpolated point, relative to the step. */
 enum { NEWTON_MOST = 60, BRANCH_MOST = 8, NEWTON_HALVINGS = 10, LOCATE_MOST = 60 };
 static const double BRANCH_TURN = 0.96, BRANCH_APART = 0.3, BRANCH_BENT = 0.02, BRANCH_ASIDE = 0.002, BRANCH_GROW = 1.5,
-                    NEWTON_DAMPING = 0.1, BRANCH_END = 1e-9;
+                    NEWTON_DAMPING = 0.1;
 
 int pw_branch_open (pw_branch *b, const pw_branch_equations *of, pw_error *error) {
   size_t n = (size_t)of->unknowns + 1, m = (size_t)of->equations + n, large = n > m ? n : m;
@@ -220,6 +220,8 @@ static int branch_smooth (const pw_branch *b, const pw_branch_point *from, const
 static int branch_try (pw_branch *b, pw_error *error) {
   for (int j = 0; j <= b->of.unknowns; j++) b->next.u[j] = b->at.u[j] + b->step * b->at.tangent[j];
   int status = branch_correct (b, b->at.tangent, BRANCH_APART * b->step, &b->next, error);
+  double p = b->next.u[b->of.unknowns];
+  if (status == PW_OK && b->bounded && !(p >= 0 && p <= 1)) return PW_RETRY; /* branch_reach finds the end */
   return status == PW_OK && !branch_smooth (b, &b->at, &b->next) ? PW_RETRY : status;
 }
 
@@ -335,30 +337,6 @@ static int branch_fold (void *branch, const pw_branch_point *point, double *valu
   return PW_OK;
 }
 
-static int branch_beyond (void *branch, const pw_branch_point *point, double *value, pw_error *error) {
-  const pw_branch *b = branch;
-  (void)error;
-  *value = point->u[b->of.unknowns] - b->end;
-  return PW_OK;
-}
-
-/* If the point reached is beyond the range of p: moves it back to its end. */
-static int branch_end (pw_branch *b, pw_error *error) {
-  int p = b->of.unknowns;
-  double accuracy = b->accuracy;
-  if (b->at.u[p] <= 1 && b->at.u[p] >= 0) return PW_OK;
-  b->end = b->at.u[p] > 1, b->ended = 1, b->accuracy = BRANCH_END;
-  int status = pw_branch_locate (b, branch_beyond, b, error);
-  b->accuracy = accuracy;
-  if (status != PW_OK) return status;
-  b->found.u[p] = b->end;
-  status = pw_branch_solve (b, b->found.u, error);
-  b->found.residual = b->residual, b->found.interpolated = 0;
-  branch_copy (b, &b->found, &b->at);
-  b->folded = b->before.tangent[p] * b->at.tangent[p] < 0;
-  return status;
-}
-
 /* Whether the last step has passed the first point, in the same direction. */
 static int branch_closed (const pw_branch *b) {
   double before = 0, now = 0;
@@ -370,14 +348,14 @@ static int branch_closed (const pw_branch *b) {
   return b->steps > 2 && off < 1.1 * step && before < 0 && now >= 0;
 }
 
-/* A step, with its events. */
+/* A step in the range of p, with its events. */
 static int branch_advance (pw_branch *b, int (*events) (void *context, pw_error *error), pw_error *why,
                            pw_error *error) {
   *why = (pw_error){ 0 };
+  b->bounded = 1;
   if (b->steps++ > b->limit) return pw_fail (why, PW_METHOD, "the branch has more than %d points", b->limit), PW_RETRY;
   int status = branch_reach (b, error);
   if (status == PW_RETRY) status = pw_branch_step (b, error);
-  if (status == PW_OK) status = branch_end (b, error);
   if (status == PW_OK && b->folded) {
     status = pw_branch_locate (b, branch_fold, b, error);
     if (status == PW_OK) pw_branch_queue (b, PW_BRANCH_FOLD);

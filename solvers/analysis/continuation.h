@@ -61,7 +61,7 @@ typedef struct {
   /* private */
   int steps, ended;
   pw_branch_point first, next, side[2];
-  double end; /* p, sought */
+  int bounded; /* 1: points beyond p = 0 to 1 are refused */
   double *F, *J, *du, *trial, *work, *condition, *predicted;
   int *pivot, room;
   char *memory;

@@ -1,18 +1,22 @@
-/* The search for relative periodic motions, and their branches; equations in periodic_flow.c. */
+/* The search for relative periodic motions, and their branches; equations in periodic_equations.c. */
 #include "periodic_parts.h"
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 #include "util.h"
 
-/* PERIODIC_MOST: coordinates, since the cost is cubic; PERIODIC_LIMIT: points of a branch at most, as a multiple of those
- * asked for.  PERIODIC_EXACT: residual of a solution, in units of the scene; PERIODIC_RANK: of derivatives; PERIODIC_CIRCLE:
- * distance from the unit circle that is not round-off; PERIODIC_LEAST: smallest step, relative to the range of the parameter;
- * PERIODIC_EVENT: accuracy of events, relative to the step; PERIODIC_FOLD: largest distance of a fold from the crossing of a multiplier there, relative to the step; PERIODIC_REAL: imaginary part, after location, of a pair that is
- * about to become real. */
-enum { PERIODIC_MOST = 100, PERIODIC_POINTS = 20, PERIODIC_LIMIT = 50 };
-static const double PERIODIC_EXACT = 1e-9, PERIODIC_RANK = 1e-7, PERIODIC_CIRCLE = 1e-6, PERIODIC_LEAST = 1e-5,
-                    PERIODIC_EVENT = 1e-7, PERIODIC_FOLD = 1e-3, PERIODIC_REAL = 1e-3;
+enum {
+  PERIODIC_MOST = 100,  /* coordinates, since the cost is cubic */
+  PERIODIC_POINTS = 20, /* of a branch, by default */
+  PERIODIC_LIMIT = 50   /* points of a branch at most, as a multiple of those asked for */
+};
+static const double PERIODIC_EXACT = 1e-9, /* residual of a solution, in units of the scene */
+    PERIODIC_RANK = 1e-7,                  /* of derivatives */
+    PERIODIC_CIRCLE = 1e-6,                /* distance from the unit circle that is not round-off */
+    PERIODIC_LEAST = 1e-5,                 /* smallest step, relative to the range of the parameter */
+    PERIODIC_EVENT = 1e-7,                 /* accuracy of events, relative to the step */
+    PERIODIC_FOLD = 1e-3, /* largest distance of a fold from the crossing of a multiplier there, relative to the step */
+    PERIODIC_REAL = 1e-3; /* imaginary part, after location, of a pair that is about to become real */
 
 /* ---- Opening ---- */
 
@@ -129,7 +133,7 @@ static int periodic_orbit (pw_periodic *x, const double *u, pw_periodic_orbit *o
   if (status == PW_OK) status = periodic_turns (x);
   if (status != PW_OK) return status;
   out->parameter = pw_periodic_parameter (x, u);
-  out->period = x->about = pw_periodic_period (x, u);
+  out->period = x->about = x->set.free ? u[pw_periodic_unknowns (x) - 1] * x->T : x->at[0].period;
   out->q = x->y0, out->v = x->y0 + x->n, out->end = x->y1;
   out->multipliers = x->size;
   out->re = x->re, out->im = x->im;

@@ -23,14 +23,6 @@ static const double EQUATIONS_STEADY = 1e-4;
 
 /* ---- Displacements ---- */
 
-/* The rates of a combination of symmetries. */
-static void equations_rates (const pw_periodic *x, const double *s, double *rates) {
-  int count = pw_steady_rates (x->s);
-  memset (rates, 0, (size_t)count * sizeof *rates);
-  for (int k = 0; k < x->group; k++)
-    for (int c = 0; c < count; c++) rates[c] += s[k] * x->scene->axis[k * count + c];
-}
-
 /* A state displaced by rates: a translation t and a rotation w about the origin, at the same time: p -> R p + V t. */
 static void equations_displace (const pw_periodic *x, const double *rates, const double *y, double *out) {
   int n = x->n, bodies = x->s->bodies;
@@ -53,17 +45,14 @@ static void equations_symmetry (const pw_periodic *x, int k, const double *y, do
   const double *axis = x->scene->axis + k * pw_steady_rates (x->s);
   pw_steady_field (x->scene, axis, y, out);
   memset (out + x->n, 0, (size_t)x->n * sizeof *out);
-  for (int j = 0; j < 3 * x->s->bodies; j += 3) {
-    out[x->n + j] = -axis[2] * y[x->n + j + 1];
-    out[x->n + j + 1] = axis[2] * y[x->n + j];
-  }
+  pw_linear_turn (&x->scene->at[0].x, axis[2], y + x->n, out + x->n);
 }
 
 /* ---- Equations ---- */
 
 static void equations_residual (pw_periodic *x, const double *u, double *F) {
   int states = 2 * x->n;
-  equations_rates (x, u + states, x->work);
+  pw_steady_combine (x->scene, u + states, 1, x->work);
   equations_displace (x, x->work, x->y0, x->moved);
   for (int j = 0; j < states; j++) {
     F[j] = pw_periodic_difference (x, j, x->y1[j], x->moved[j]) / pw_periodic_unit (x, j);
@@ -80,7 +69,7 @@ static void equations_by_displacement (pw_periodic *x, const double *u, int rows
     for (int side = -1; side <= 1; side += 2) {
       memcpy (s, u + states, (size_t)x->group * sizeof *s);
       s[k] += side * h;
-      equations_rates (x, s, x->work);
+      pw_steady_combine (x->scene, s, 1, x->work);
       equations_displace (x, x->work, x->y0, x->moved);
       for (int j = 0; j < states; j++) column[j] -= side * x->moved[j] / (2 * h) / pw_periodic_unit (x, j);
     }
@@ -88,18 +77,13 @@ static void equations_by_displacement (pw_periodic *x, const double *u, int rows
 
 /* The change of D (s) y by a change of y: positions and velocities are rotated. */
 static void equations_rotate (const pw_periodic *x, double w, const double *in, double *out) {
-  double c = pw_cos (w), s = pw_sin (w);
-  memcpy (out, in, 2 * (size_t)x->n * sizeof *out);
-  for (int part = 0; part <= x->n; part += x->n)
-    for (int j = part; j < part + 3 * x->s->bodies; j += 3) {
-      out[j] = c * in[j] - s * in[j + 1];
-      out[j + 1] = s * in[j] + c * in[j + 1];
-    }
+  pw_linear_rotate (&x->scene->at[0].x, w, in, out);
+  pw_linear_rotate (&x->scene->at[0].x, w, in + x->n, out + x->n);
 }
 
 static void equations_by_state (pw_periodic *x, const double *u, int rows, double *dF) {
   int states = 2 * x->n, size = x->size;
-  equations_rates (x, u + states, x->work);
+  pw_steady_combine (x->scene, u + states, 1, x->work);
   for (int c = 0; c < size; c++) {
     const double *B = x->basis + states * c, *Phi = x->Phi + states * c;
     equations_rotate (x, x->work[2], B, x->moved);
@@ -230,7 +214,7 @@ int pw_periodic_multipliers (pw_periodic *x, const double *u, int *trivial) {
   int n = x->n, size = x->size, lwork = 34 * size;
   double *S = x->M + size * size, *tau = S + size * size, *work = tau + size;
   int k = *trivial = equations_shifts (x, S);
-  equations_rates (x, u + 2 * n, x->work);
+  pw_steady_combine (x->scene, u + 2 * n, 1, x->work);
   for (int c = 0; c < size; c++) {
     equations_rotate (x, -x->work[2], x->Phi + 2 * n * c, x->change);
     equations_coordinates (x, x->change, x->M + c * size);

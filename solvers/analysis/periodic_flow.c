@@ -135,6 +135,11 @@ static int flow_basis (pw_periodic *x, pw_run *r, int nearest) {
   return status == PW_OK && nearest ? pw_run_restart (r, x->moved, x->moved + n, &x->why) : status;
 }
 
+static void flow_state (const pw_periodic *x, const pw_sample *sample, double *y) {
+  memcpy (y, sample->q, (size_t)x->n * sizeof *y);
+  memcpy (y + x->n, sample->v, (size_t)x->n * sizeof *y);
+}
+
 static int flow_vary (pw_periodic *x, pw_run *r, double end) {
   int size = x->size, n = x->n;
   pw_direction *d = calloc ((size_t)size + 1, sizeof *d);
@@ -145,9 +150,7 @@ static int flow_vary (pw_periodic *x, pw_run *r, double end) {
   int status = variation ? pw_variation_advance (variation, end, end, &x->why) : x->why.status;
   for (int c = 0; c < size && status == PW_OK; c++) {
     status = pw_variation_sample (variation, c, &sample, NULL, &x->why);
-    if (status != PW_OK) break;
-    memcpy (x->Phi + 2 * n * c, sample.q, (size_t)n * sizeof *sample.q);
-    memcpy (x->Phi + 2 * n * c + n, sample.v, (size_t)n * sizeof *sample.v);
+    if (status == PW_OK) flow_state (x, &sample, x->Phi + 2 * n * c);
   }
   pw_variation_close (variation);
   free (d);
@@ -156,7 +159,7 @@ static int flow_vary (pw_periodic *x, pw_run *r, double end) {
 
 /* Advances a run, at its initial state, by one period. */
 static int flow_run (pw_periodic *x, pw_run *r, double period, pw_flow_accuracy accuracy) {
-  size_t n = (size_t)x->n, bytes = n * sizeof *r->q;
+  size_t bytes = (size_t)x->n * sizeof *r->q;
   double end = x->set.t + period;
   pw_sample sample;
   int branch = x->set.compile != NULL; /* whose tangents need the exact derivatives */
@@ -164,7 +167,7 @@ static int flow_run (pw_periodic *x, pw_run *r, double period, pw_flow_accuracy 
   if (status != PW_OK) return status == PW_RETRY ? pw_fail_singular (r, r->t, &x->why) : status;
   status = pw_run_sample (r, r->t, &sample, &x->why);
   if (status != PW_OK) return status;
-  memcpy (x->y0, sample.q, bytes), memcpy (x->y0 + n, sample.v, bytes), memcpy (x->a0, sample.a, bytes);
+  flow_state (x, &sample, x->y0), memcpy (x->a0, sample.a, bytes);
   if (accuracy != PW_FLOW) return x->steps = 0, flow_vary (x, r, end);
   while (status == PW_OK && pw_run_time (r) < end) {
     status = pw_run_advance (r, end, &x->why);
@@ -173,7 +176,7 @@ static int flow_run (pw_periodic *x, pw_run *r, double period, pw_flow_accuracy 
   if (x->steps == 0) x->steps = pw_run_statistics (r)->steps;
   if (status == PW_OK) status = pw_run_sample (r, end, &sample, &x->why);
   if (status != PW_OK) return status;
-  memcpy (x->y1, sample.q, bytes), memcpy (x->y1 + n, sample.v, bytes), memcpy (x->a1, sample.a, bytes);
+  flow_state (x, &sample, x->y1), memcpy (x->a1, sample.a, bytes);
   return PW_OK;
 }
 
@@ -206,8 +209,7 @@ static int flow_distance (pw_periodic *x, pw_run *r, double t, double *y, double
   pw_sample sample;
   int n = x->n, status = pw_run_sample (r, t, &sample, &x->why);
   if (status != PW_OK) return status;
-  memcpy (y, sample.q, (size_t)n * sizeof *y);
-  memcpy (y + n, sample.v, (size_t)n * sizeof *y);
+  flow_state (x, &sample, y);
   pw_steady_canonical (x->scene, y, y + n);
   *distance = 0;
   for (int j = 0; j < 2 * n; j++)
@@ -236,7 +238,6 @@ static int flow_return (pw_periodic *x, pw_run *r) {
 
 int pw_periodic_settle (pw_periodic *x, double value, int periods) {
   pw_sample sample;
-  int n = x->n;
   pw_run *r = pw_periodic_run (x, 0, value, 1e-9, NULL);
   if (r == NULL) return x->why.status;
   double end = r->t + periods * (x->set.free ? x->about : x->at[0].period);
@@ -244,9 +245,8 @@ int pw_periodic_settle (pw_periodic *x, double value, int periods) {
   if (status == PW_OK && pw_run_stop_requested (r)) status = PW_STOPPED;
   if (status == PW_OK) status = pw_run_sample (r, pw_run_time (r), &sample, &x->why);
   if (status == PW_OK) {
-    memcpy (x->moved, sample.q, (size_t)n * sizeof *x->moved);
-    memcpy (x->moved + n, sample.v, (size_t)n * sizeof *x->moved);
-    pw_steady_home (x->scene, x->moved, x->moved + n);
+    flow_state (x, &sample, x->moved);
+    pw_steady_home (x->scene, x->moved, x->moved + x->n);
   }
   if (status == PW_OK && x->set.free && x->set.period <= 0) status = flow_return (x, r);
   pw_run_close (r);

@@ -51,10 +51,6 @@ double pw_periodic_difference (const pw_periodic *x, int j, double a, double b);
 static inline double pw_periodic_parameter (const pw_periodic *x, const double *u) {
   return x->set.first + u[pw_periodic_unknowns (x)] * (x->set.last - x->set.first);
 }
-/* After a flow. */
-static inline double pw_periodic_period (const pw_periodic *x, const double *u) {
-  return x->set.free ? u[pw_periodic_unknowns (x) - 1] * x->T : x->at[0].period;
-}
 
 /* ---- periodic_flow.c ---- */
 

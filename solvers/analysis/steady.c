@@ -6,10 +6,13 @@
 #include "rank.h"
 #include "util.h"
 
-/* STEADY_POINTS: of a branch, by default; STEADY_TIMES: times at which signals are compared, and as many between breakpoints;
- * STEADY_EXACT: residual of a solution, in units of the scene; STEADY_SLOW: rates that may be round-off at a double root; SIGNAL_SAME: a difference of signals that counts as 0. */
-enum { STEADY_POINTS = 50, STEADY_TIMES = 16 };
-static const double STEADY_EXACT = 1e-9, STEADY_SLOW = 1e-4, SIGNAL_SAME = 1e-8;
+enum {
+  STEADY_POINTS = 50, /* of a branch, by default */
+  STEADY_TIMES = 16   /* times at which signals are compared, and as many between breakpoints */
+};
+static const double STEADY_EXACT = 1e-9, /* residual of a solution, in units of the scene */
+    STEADY_SLOW = 1e-4,                  /* rates that may be round-off at a double root */
+    SIGNAL_SAME = 1e-8;                  /* difference of signals, relative to their largest value, that counts as 0 */
 
 /* ---- Opening ---- */
 
@@ -35,10 +38,9 @@ static int steady_arrays (pw_steady *x) {
   };
   x->memory = pw_alloc_arrays (array, sizeof array / sizeof *array);
   x->cyclic = calloc (n + 1, 1);
-  x->pivot = calloc (rates + 1, sizeof *x->pivot);
   x->known = calloc (2 * n + 1, sizeof *x->known);
   x->hold = calloc (holds + 1, sizeof *x->hold);
-  if (!x->memory || !x->cyclic || !x->pivot || !x->known || !x->hold) return PW_RESOURCE;
+  if (!x->memory || !x->cyclic || !x->known || !x->hold) return PW_RESOURCE;
   if (holds) memcpy (x->hold, x->set.hold, holds * sizeof *x->hold);
   for (int j = 0; j < 2 * x->n; j++) x->known[j].state = j;
   return PW_OK;
@@ -52,8 +54,8 @@ typedef struct {
   int count;             /* numbers of signals */
 } signal_times;
 
-/* Compares signals at two times, in the run's state (number = 0) or one near it: a factor may be 0 in the run's.  A status; signals may
- * fail in other states. */
+/* Compares signals at two times, in the run's state (number = 0) or one near it: a factor may be 0 in the run's.  A status;
+ * signals may fail in other states. */
 static int signals_compare (signal_times *x, int number, double t0, double t1) {
   pw_run *r = x->r;
   pw_workspace *w = r->w;
@@ -115,15 +117,15 @@ static int steady_constant (pw_steady *x, pw_error *error) {
       x->s->model, pw_system_signal_name (x->s, changed, name, sizeof name));
 }
 
-/* Scales and symmetries at the initial state. */
-static int steady_begin (pw_steady *x, pw_error *error) {
+/* Scales and symmetries at the initial state; forced: signals may change with time. */
+static int steady_begin (pw_steady *x, int forced, pw_error *error) {
   pw_run *r = x->at[0].r;
   x->L = x->s->scale.length;
   x->T = r->w->scale.time;
   memcpy (x->start, r->q, (size_t)x->n * sizeof *r->q);
   memcpy (x->start + x->n, r->v, (size_t)x->n * sizeof *r->v);
   if (x->s->bodies) memcpy (x->origin, r->q, sizeof x->origin);
-  int status = x->forced ? PW_OK : steady_constant (x, error);
+  int status = forced ? PW_OK : steady_constant (x, error);
   if (status != PW_OK) return status;
   status = pw_steady_find_group (x);
   if (status == PW_RESOURCE) return pw_fail_memory (x->s, error);
@@ -135,9 +137,8 @@ static int steady_begin (pw_steady *x, pw_error *error) {
 static pw_steady *steady_open (const pw_system *s, const pw_steady_settings *settings, int forced, pw_error *error) {
   pw_steady *x = calloc (1, sizeof *x);
   if (x == NULL) return pw_fail_memory (s, error), NULL;
-  x->s = s, x->set = *settings, x->forced = forced;
+  x->s = s, x->set = *settings;
   x->n = s->coords, x->m = s->rows, x->holonomic = s->holonomic;
-  x->vary = settings->vary;
   if (x->set.points <= 0) x->set.points = STEADY_POINTS;
   int status = PW_OK;
   if (x->n > PW_STEADY_MOST)
@@ -145,7 +146,7 @@ static pw_steady *steady_open (const pw_system *s, const pw_steady_settings *set
                       s->model, x->n, PW_STEADY_MOST);
   if (status == PW_OK && steady_arrays (x) != PW_OK) status = pw_fail_memory (s, error);
   if (status == PW_OK && pw_steady_at (x, 0, x->set.first) != PW_OK) *error = x->why, status = error->status;
-  if (status == PW_OK) status = steady_begin (x, error);
+  if (status == PW_OK) status = steady_begin (x, forced, error);
   const pw_branch_equations of = { .unknowns = pw_steady_unknowns (x),
                                    .equations = pw_steady_equations (x),
                                    .tolerance = STEADY_EXACT,
@@ -172,7 +173,6 @@ void pw_steady_close (pw_steady *x) {
   pw_branch_close (&x->branch);
   pw_linear_free (&x->linear);
   free (x->cyclic);
-  free (x->pivot);
   free (x->known);
   free (x->hold);
   free (x->memory);
@@ -248,9 +248,8 @@ int pw_steady_solve (pw_steady *x, int attempt, double parameter, pw_steady_moti
   double range = x->set.last - x->set.first;
   x->gauge = 0;
   if (pw_steady_at (x, 0, parameter) != PW_OK) return *error = x->why, error->status;
-  int status = pw_steady_start (x, attempt, x->u);
-  if (status == PW_RESOURCE) return pw_fail_memory (x->s, error);
-  if (status != PW_OK) return pw_fail (error, PW_METHOD, "the symmetries cannot be separated");
+  int status = pw_steady_start (x, attempt, x->u, error);
+  if (status != PW_OK) return status;
   x->u[pw_steady_unknowns (x)] = range != 0 ? (parameter - x->set.first) / range : 0;
   status = pw_branch_solve (&x->branch, x->u, error);
   if (status == PW_OK) steady_rest (x);
@@ -263,9 +262,8 @@ int pw_steady_solve (pw_steady *x, int attempt, double parameter, pw_steady_moti
   if (out->family == PW_RESOURCE) return pw_fail_memory (x->s, error);
   if (out->family < 0) return pw_fail (error, PW_METHOD, "the family of the steady motion cannot be determined");
   pw_steady_home (x, x->q, x->v);
-  if (pw_steady_guess (x, x->q, x->v, x->u) != PW_OK)
-    return pw_fail (error, PW_METHOD, "the symmetries cannot be separated");
-  return pw_steady_motion_at (x, x->u, out, error);
+  status = pw_steady_guess (x, x->q, x->v, x->u, error);
+  return status == PW_OK ? pw_steady_motion_at (x, x->u, out, error) : status;
 }
 
 /* ---- Suggestions ---- */
@@ -274,10 +272,7 @@ int pw_steady_solve (pw_steady *x, int attempt, double parameter, pw_steady_moti
 static double suggest_change (pw_steady *x, const pw_initial_value *hold, int relative, int i) {
   const double *z = x->null + (size_t)i * (size_t)pw_steady_unknowns (x);
   double *dq = x->dq, *dv = x->dv;
-  memset (x->sum, 0, (size_t)pw_steady_rates (x->s) * sizeof *x->sum);
-  for (int k = 0; k < x->group; k++)
-    for (int c = 0; c < pw_steady_rates (x->s); c++)
-      x->sum[c] += z[x->n + k] / x->T * x->axis[k * pw_steady_rates (x->s) + c];
+  pw_steady_combine (x, z + x->n, x->T, x->sum);
   pw_steady_field (x, x->sum, x->q, dv);
   for (int j = 0; j < x->n; j++) dq[j] = z[j] * pw_unit (x->s, j);
   pw_linear_turn (&x->at[0].x, x->rates[2], dq, dv);

@@ -17,9 +17,9 @@ int pw_steady_follow (pw_steady *x, const double *q, const double *v, double par
   double range = x->set.last - x->set.first;
   pw_steady_motion motion;
   x->gauge = 0;
-  if (pw_steady_guess (x, q, v, x->u) != PW_OK) return pw_fail (error, PW_METHOD, "the symmetries cannot be separated");
+  int status = pw_steady_guess (x, q, v, x->u, error);
   x->u[unknowns] = (parameter - x->set.first) / range;
-  int status = pw_branch_solve (&x->branch, x->u, error);
+  if (status == PW_OK) status = pw_branch_solve (&x->branch, x->u, error);
   if (status == PW_OK) status = pw_steady_motion_at (x, x->u, &motion, error);
   if (status == PW_OK) status = pw_steady_find_gauge (x);
   if (status == PW_OK) status = pw_branch_start (&x->branch, x->u, direction, error);

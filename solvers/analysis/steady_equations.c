@@ -27,27 +27,24 @@ double pw_steady_parameter (const pw_steady *x, const double *u) {
 }
 
 void pw_steady_state (pw_steady *x, const double *u) {
-  int rates = pw_steady_rates (x->s);
   for (int j = 0; j < x->n; j++) x->q[j] = u[j] * pw_unit (x->s, j);
-  memset (x->rates, 0, (size_t)rates * sizeof *x->rates);
-  for (int k = 0; k < x->group; k++)
-    for (int c = 0; c < rates; c++) x->rates[c] += u[x->n + k] / x->T * x->axis[k * rates + c];
+  pw_steady_combine (x, u + x->n, x->T, x->rates);
   pw_steady_field (x, x->rates, x->q, x->v);
-  if (x->vary >= 0) x->hold[x->vary].value = pw_steady_parameter (x, u);
+  if (x->set.vary >= 0) x->hold[x->set.vary].value = pw_steady_parameter (x, u);
 }
 
-int pw_steady_guess (pw_steady *x, const double *q, const double *v, double *u) {
+int pw_steady_guess (pw_steady *x, const double *q, const double *v, double *u, pw_error *error) {
   int n = x->n, group = x->group, rank;
   double *S = x->F, *right = S + n * group, *work = right + n + group; /* enough: see steady_arrays */
-  memset (x->pivot, 0, (size_t)group * sizeof *x->pivot);
+  memset (x->branch.pivot, 0, (size_t)group * sizeof *x->branch.pivot);
   for (int j = 0; j < n; j++) u[j] = q[j] / pw_unit (x->s, j), right[j] = v[j] / pw_unit (x->s, j) * x->T;
   for (int k = 0; k < group; k++) {
     pw_steady_field (x, x->axis + k * pw_steady_rates (x->s), q, S + k * n);
     for (int j = 0; j < n; j++) S[k * n + j] /= pw_unit (x->s, j);
   }
-  if (group && LAPACKE_dgelsy_work (LAPACK_COL_MAJOR, n, group, 1, S, n, right, n > group ? n : group, x->pivot, 1e-9,
-                                    &rank, work, 40 * (n + group)))
-    return PW_METHOD;
+  if (group && LAPACKE_dgelsy_work (LAPACK_COL_MAJOR, n, group, 1, S, n, right, n > group ? n : group, x->branch.pivot,
+                                    1e-9, &rank, work, 40 * (n + group)))
+    return pw_fail (error, PW_METHOD, "the symmetries cannot be separated");
   memcpy (u + n, right, (size_t)group * sizeof *u);
   return PW_OK;
 }
@@ -92,14 +89,12 @@ static void steady_change (pw_steady *x, double dw, double *F) {
 
 /* The conditions that dq is orthogonal to symmetries. */
 static void steady_conditions (pw_steady *x, double *dF) {
-  int equations = pw_steady_equations (x), rates = pw_steady_rates (x->s);
+  int equations = pw_steady_equations (x);
   dF += equations - x->group;
   for (int i = 0; i < x->gauge; i++) {
-    double *sum = x->sum, square = 0;
-    memset (sum, 0, (size_t)rates * sizeof *sum);
-    for (int k = 0; k < x->group; k++)
-      for (int c = 0; c < rates; c++) sum[c] += x->fixed[i * x->group + k] * x->axis[k * rates + c];
-    pw_steady_field (x, sum, x->q, x->dq);
+    double square = 0;
+    pw_steady_combine (x, x->fixed + i * x->group, 1, x->sum);
+    pw_steady_field (x, x->sum, x->q, x->dq);
     for (int j = 0; j < x->n; j++) x->dq[j] /= pw_unit (x->s, j), square += x->dq[j] * x->dq[j];
     for (int j = 0; j < x->n; j++) dF[j * equations + i] = x->dq[j] / sqrt (square);
   }
@@ -163,10 +158,10 @@ int pw_steady_evaluate (void *steady, const double *u, double *F, double *dF, pw
   steady_columns (x, dF);
   steady_conditions (x, dF);
   dF += (size_t)unknowns * (size_t)equations;
-  if (x->vary >= 0)
-    dF[equations - x->group - x->set.holds + x->vary] = pw_hold_slope (x->s, x->hold + x->vary, x->q, x->v) *
-                                                        (x->set.last - x->set.first) /
-                                                        pw_hold_unit (x, x->hold + x->vary);
+  if (x->set.vary >= 0)
+    dF[equations - x->group - x->set.holds + x->set.vary] = pw_hold_slope (x->s, x->hold + x->set.vary, x->q, x->v) *
+                                                            (x->set.last - x->set.first) /
+                                                            pw_hold_unit (x, x->hold + x->set.vary);
   status = x->set.compile ? steady_by_parameter (x, value, F, dF) : PW_OK;
   if (status < 0) *error = x->why;
   return status;

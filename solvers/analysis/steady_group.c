@@ -12,9 +12,16 @@
 /* Several states, since a body alone has more displacements than equations. */
 enum { GROUP_STATES = 2 };
 
-/* GROUP_APART: distance of the states from the initial one, in units of the scene, in irregular directions.  GROUP_ROUND: round-off
- * of derivatives.  GROUP_PIVOT, GROUP_ZERO: smallest pivots and entries of rates. */
+/* GROUP_APART: distance of the states from the initial one, in units of the scene, in irregular directions.
+ * GROUP_ROUND: round-off of derivatives.  GROUP_PIVOT, GROUP_ZERO: smallest pivots and entries of rates. */
 static const double GROUP_APART = 0.02, GROUP_ROUND = 1e-12, GROUP_PIVOT = 1e-6, GROUP_ZERO = 1e-7;
+
+void pw_steady_combine (const pw_steady *x, const double *part, double unit, double *rates) {
+  int count = pw_steady_rates (x->s);
+  memset (rates, 0, (size_t)count * sizeof *rates);
+  for (int k = 0; k < x->group; k++)
+    for (int c = 0; c < count; c++) rates[c] += part[k] / unit * x->axis[k * count + c];
+}
 
 void pw_steady_field (const pw_steady *x, const double *rates, const double *q, double *v) {
   int bodies = 3 * x->s->bodies;
@@ -34,10 +41,7 @@ static void group_change (pw_steady *x, int c, double *rates, double *out) {
   memset (l->x, 0, 2 * (size_t)x->n * sizeof *l->x);
   pw_steady_field (x, rates, x->q, l->x);
   if (c == 2) pw_linear_turn (l, 1, x->v, l->x + x->n);
-  pw_linear_vary (l);
-  out = pw_linear_violation (l, out);
-  if (c == 2) pw_linear_turn (l, -1, l->a, l->da);
-  for (int j = 0; j < x->n; j++) out[j] = l->da[j] * pw_as_length (x->s, j) * x->T * x->T / x->L;
+  pw_linear_asymmetry (l, c == 2, out);
 }
 
 /* The largest change of an acceleration by a single coordinate. */

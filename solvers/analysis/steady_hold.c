@@ -47,25 +47,26 @@ const char *pw_system_held_unit (const pw_system *s, int held) {
   return other < 0 ? pw_system_state_unit (s, held) : hold_other[other % HOLD_OTHERS].unit;
 }
 
+typedef struct {
+  double A, B;
+} hold_pair;
+
 /* A and B, or with (dq, dv) their changes. */
-static void hold_terms (const pw_system *s, int held, const double *q, const double *v, const double *dq,
-                        const double *dv, double *A, double *B) {
+static hold_pair hold_terms (const pw_system *s, int held, const double *q, const double *v, const double *dq,
+                             const double *dv) {
   int other = held - 2 * s->coords, b = 3 * (other / HOLD_OTHERS);
-  if (other < 0) {
-    const double *state = held < s->coords ? dq ? dq : q : dq ? dv : v;
-    *A = state[held % s->coords], *B = dq ? 0 : 1;
-    return;
-  }
+  const double *state = held < s->coords ? dq ? dq : q : dq ? dv : v, one = dq ? 0 : 1;
+  if (other < 0) return (hold_pair){ state[held % s->coords], one };
   double c = pw_cos (q[b + 2]), sine = pw_sin (q[b + 2]), speed = c * v[b] + sine * v[b + 1], omega = v[b + 2];
   if (dq) speed = c * dv[b] + sine * dv[b + 1] + (c * v[b + 1] - sine * v[b]) * dq[b + 2], omega = dv[b + 2];
-  *A = other % HOLD_OTHERS == HOLD_CURVATURE ? omega : speed;
-  *B = other % HOLD_OTHERS == HOLD_SPEED ? dq ? 0 : 1 : other % HOLD_OTHERS == HOLD_RADIUS ? omega : speed;
+  return other % HOLD_OTHERS == HOLD_SPEED    ? (hold_pair){ speed, one }
+         : other % HOLD_OTHERS == HOLD_RADIUS ? (hold_pair){ speed, omega }
+                                              : (hold_pair){ omega, speed };
 }
 
 double pw_system_held_value (const pw_system *s, int held, const double *q, const double *v) {
-  double A, B;
-  hold_terms (s, held, q, v, NULL, NULL, &A, &B);
-  return A / B;
+  const hold_pair x = hold_terms (s, held, q, v, NULL, NULL);
+  return x.A / x.B;
 }
 
 double pw_hold_unit (const pw_steady *x, const pw_initial_value *hold) {
@@ -75,20 +76,15 @@ double pw_hold_unit (const pw_steady *x, const pw_initial_value *hold) {
 }
 
 double pw_hold_residual (const pw_system *s, const pw_initial_value *hold, const double *q, const double *v) {
-  double A, B;
-  hold_terms (s, hold->state, q, v, NULL, NULL, &A, &B);
-  return A - hold->value * B;
+  return pw_hold_change (s, hold, q, v, NULL, NULL);
 }
 
 double pw_hold_change (const pw_system *s, const pw_initial_value *hold, const double *q, const double *v,
                        const double *dq, const double *dv) {
-  double A, B;
-  hold_terms (s, hold->state, q, v, dq, dv, &A, &B);
-  return A - hold->value * B;
+  const hold_pair x = hold_terms (s, hold->state, q, v, dq, dv);
+  return x.A - hold->value * x.B;
 }
 
 double pw_hold_slope (const pw_system *s, const pw_initial_value *hold, const double *q, const double *v) {
-  double A, B;
-  hold_terms (s, hold->state, q, v, NULL, NULL, &A, &B);
-  return -B;
+  return -hold_terms (s, hold->state, q, v, NULL, NULL).B;
 }

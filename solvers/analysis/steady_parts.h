@@ -10,12 +10,10 @@ struct pw_steady {
   const pw_system *s; /* as described */
   pw_steady_settings set;
   pw_initial_value *hold; /* those of the settings */
-  int n, m, holonomic, group, vary;
-  int forced;              /* 1: signals may change with time */
+  int n, m, holonomic, group;
   double L, T;             /* scales at the initial state */
   double origin[2], *axis; /* group x pw_steady_rates: symmetries as rates (steady_group.c) */
   unsigned char *cyclic;   /* n: 1 for angles on which nothing depends */
-  int *pivot;              /* scratch: group */
   int gauge;               /* symmetries that leave what is held unchanged; 0 before a solution is found */
   double *fixed;           /* gauge x group: combinations of symmetries */
   double *norm;            /* m: lengths of the rows of J */
@@ -49,6 +47,8 @@ struct pw_steady {
 static inline int pw_steady_rates (const pw_system *s) {
   return 3 + s->bodies + s->coords - 3 * s->bodies;
 }
+/* The rates of a combination of symmetries: `group` numbers, divided by a unit. */
+void pw_steady_combine (const pw_steady *x, const double *part, double unit, double *rates);
 /* The velocities that rates cause at a configuration. */
 void pw_steady_field (const pw_steady *x, const double *rates, const double *q, double *v);
 /* Orthonormal rows of the null space of M (rows x n, by columns, destroyed; rows >= n), within a tolerance, at least
@@ -76,8 +76,8 @@ static inline int pw_steady_equations (const pw_steady *x) {
 int pw_steady_evaluate (void *steady, const double *u, double *F, double *dF, pw_error *error);
 /* The state q, v of unknowns u. */
 void pw_steady_state (pw_steady *x, const double *u);
-/* The unknowns of the steady motion nearest to the velocities v at q. */
-int pw_steady_guess (pw_steady *x, const double *q, const double *v, double *u);
+/* The unknowns of the steady motion nearest to the velocities v at q.  PW_METHOD if LAPACK fails. */
+int pw_steady_guess (pw_steady *x, const double *q, const double *v, double *u, pw_error *error);
 double pw_steady_parameter (const pw_steady *x, const double *u);
 
 /* ---- steady_systems.c ---- */
@@ -103,12 +103,12 @@ double pw_hold_slope (const pw_system *s, const pw_initial_value *hold, const do
 
 /* The unknowns with which attempt k begins: 0, those of the initial state; 1, of a state to which forces lead from there;
  * then random states, near and far, every other pair of them consistent, half of these relaxed. */
-int pw_steady_start (pw_steady *x, int k, double *u);
+int pw_steady_start (pw_steady *x, int k, double *u, pw_error *error);
 
 /* ---- steady.c ---- */
 
-/* *changed: the first signal that differs, in the run's state or one near it, between times t and t + part of the span; with a period,
- * between times in the span after t and one period later.  -1: none.  A status. */
+/* *changed: the first signal that differs, in the run's state or one near it, between times t and t + part of the span; with
+ * a period, between times in the span after t and one period later.  -1: none.  A status. */
 int pw_signals_change (pw_run *r, double t, double period, double span, int *changed, pw_error *error);
 
 /* Scales and symmetries at time t of a system whose signals may change with time; for other searches. */

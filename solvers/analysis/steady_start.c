@@ -51,18 +51,18 @@ static void start_relax (pw_steady *x, pw_projector *p) {
   }
 }
 
-int pw_steady_start (pw_steady *x, int k, double *u) {
-  int status = pw_steady_guess (x, x->start, x->start + x->n, u);
+int pw_steady_start (pw_steady *x, int k, double *u, pw_error *error) {
+  int status = pw_steady_guess (x, x->start, x->start + x->n, u, error);
   uint64_t state = (uint64_t)k * 0xd1342543de82ef95;
   double wide = k % 2 ? 1 : 0.2;
   pw_projector p;
   for (int j = 0; k > 1 && j < pw_steady_unknowns (x); j++)
     u[j] += wide * start_random (&state) * (j >= x->n ? 2 : pw_is_angle (x->s, j) ? PW_PI : 1);
-  if (k != 1 && k % 4 < 2) return status;
+  if (status != PW_OK || (k != 1 && k % 4 < 2)) return status;
   pw_steady_state (x, u);
-  if (status == PW_OK) status = pw_evaluate_J_at (x->at[0].r->w, x->set.t, x->q, x->v);
-  if (status == PW_OK) status = pw_projector_open (&p, x->at[0].r, x->s->metric, x->s->metric, &x->why);
-  if (status != PW_OK) return status == PW_RESOURCE ? status : PW_OK;
+  if (pw_evaluate_J_at (x->at[0].r->w, x->set.t, x->q, x->v) != PW_OK) return PW_OK;
+  if (pw_projector_open (&p, x->at[0].r, x->s->metric, x->s->metric, &x->why) != PW_OK)
+    return pw_fail_memory (x->s, error);
   if (start_assemble (x, &p) == PW_OK && k % 4 < 3) start_relax (x, &p);
   pw_projector_close (&p);
   for (int j = 0; j < x->n; j++) u[j] = x->q[j] / pw_unit (x->s, j);

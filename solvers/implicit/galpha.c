@@ -19,13 +19,152 @@
  * initialisation, from velocities projected onto J v = eta.  If vibrations too fast for the step dominate a-dot, this
  * would amplify them a hundredfold; then a-dot is the change of a in a trial step from w = a.
  *
- * Newton's equations are scaled by powers of the step, so that their condition number does not depend on it (Bottasso,
- * Bauchau & Cardona 2007, Time-step-size-independent conditioning and sensitivity to perturbations in the numerical
- * solution of index three differential algebraic equations). */
+ * Newton's iteration has the unknowns q', v', lambda', mu; w' and a' follow from v'.  With c = gamma / (h beta) and
+ * e = (1 - alpha_m) / ((1 - alpha_f) h gamma) the equations are those of dae.h, with
+ *
+ *   c (q' - q - h v - h^2 (1/2 - beta) w - h^2 beta w')  for q' - v,   dw' = dv' / (h gamma),   da' = e dv'
+ *
+ * so that c and e are the coefficients of dF/dy'.  Corrections of v', lambda', mu are in units of c, c e m, c, and the
+ * equations are divided by c, c e m, c, with m a mass: then all entries of the matrix are of the same size for every
+ * step, and its condition number does not depend on the step (Bottasso, Bauchau & Cardona 2007,
+ * Time-step-size-independent conditioning and sensitivity to perturbations in the numerical solution of index three
+ * differential algebraic equations). */
+#include <float.h>
+#include <math.h>
 #include <stdlib.h>
 #include <string.h>
-#include "galpha_state.h"
-#include "util.h"
+#include "implicit.h"
+
+struct pw_method_data {
+  pw_implicit work; /* first; its q1 and v1 are the first unknowns */
+  double alpha_m, alpha_f, beta, gamma;
+  double *v, *a, *w;        /* velocities, accelerations and w at the beginning of the next step */
+  double *y, *a1, *w1;      /* unknowns; accelerations and w of the new state */
+  double *z, *row, *column; /* unknowns: residual, then correction; scales of the matrix */
+};
+
+typedef struct pw_method_data galpha;
+
+/* Coefficients of the derivatives by q' and a'. */
+static double galpha_of_q (const galpha *d, double h) {
+  return d->gamma / (h * d->beta);
+}
+static double galpha_of_a (const galpha *d, double h) {
+  return (1 - d->alpha_m) / ((1 - d->alpha_f) * h * d->gamma);
+}
+
+/* ---- Newton's iteration ---- */
+
+static int galpha_update (pw_run *r, double t1) {
+  return pw_evaluate_J_at (r->w, pw_before_breakpoint (r, t1), r->data->work.q1, r->data->work.v1);
+}
+
+/* The new velocity of coordinate j; its displacement in the step, less that by mu. */
+static double galpha_velocity (const galpha *d, double h, int j) {
+  return d->v[j] + h * ((1 - d->gamma) * d->w[j] + d->gamma * d->w1[j]);
+}
+static double galpha_displacement (const galpha *d, double h, int j) {
+  return h * (d->v[j] + h * ((0.5 - d->beta) * d->w[j] + d->beta * d->w1[j]));
+}
+
+static int galpha_residual (pw_run *r, double h, double t1) {
+  galpha *d = r->data;
+  pw_dae *x = &d->work.dae;
+  int status = galpha_update (r, t1);
+  if (status != PW_OK) return status;
+  pw_dae_residual (x, d->work.v1, d->a1, d->y + 2 * x->n, d->z);
+  for (int j = 0; j < x->n; j++)
+    d->z[j] += galpha_of_q (d, h) * (d->work.q1[j] - r->q[j] - galpha_displacement (d, h, j));
+  r->statistics.rhs++;
+  return PW_OK;
+}
+
+static void galpha_fill (galpha *d, double h) {
+  pw_dae *x = &d->work.dae;
+  pw_dae_matrix (x, d->work.v1, d->a1, d->y + 2 * x->n, galpha_of_q (d, h), galpha_of_a (d, h));
+}
+
+static int galpha_factor (pw_run *r, double h) {
+  galpha *d = r->data;
+  const pw_dae *x = &d->work.dae;
+  const int64_t *colptr = x->tangent.colptr, *rowind = x->tangent.rowind;
+  pw_implicit_fill (&d->work, x->size);
+  galpha_fill (d, h);
+  for (int c = 0; c < x->size; c++)
+    for (int64_t i = colptr[c]; i < colptr[c + 1]; i++) d->work.value[i] *= d->row[rowind[i]] * d->column[c];
+  r->statistics.jacobians++;
+  r->statistics.factorisations++;
+  return pw_sparse_factor (&d->work.sparse, d->work.value);
+}
+
+/* The prediction: the accelerations stay constant. */
+static void galpha_predict (pw_run *r, double h) {
+  galpha *d = r->data;
+  const pw_dae *x = &d->work.dae;
+  memset (d->y, 0, (size_t)x->size * sizeof *d->y);
+  for (int j = 0; j < x->n; j++) {
+    d->a1[j] = d->a[j];
+    d->w1[j] = (d->a[j] - d->alpha_m * d->w[j]) / (1 - d->alpha_m);
+    d->work.v1[j] = galpha_velocity (d, h, j);
+    d->work.q1[j] = r->q[j] + galpha_displacement (d, h, j);
+  }
+  pw_tangent_compress (&x->tangent, r->lambda, x->rows, d->y + 2 * x->n);
+}
+
+/* Solves for the correction and applies it.  *most: its size, the largest of q and h v in units of the scene; *floor:
+ * their round-off.  PW_OK or PW_RESOURCE. */
+static int galpha_correct (pw_run *r, double h, double *most, double *floor) {
+  galpha *d = r->data;
+  int n = d->work.dae.n, size = d->work.dae.size;
+  double large = 1;
+  for (int i = 0; i < size; i++) d->z[i] *= -d->row[i];
+  if (pw_sparse_solve (&d->work.sparse, d->z) != PW_OK) return PW_RESOURCE;
+  *most = 0;
+  for (int j = 0; j < n; j++) {
+    double most_j = pw_larger_or_nan (fabs (d->z[j]), fabs (d->z[n + j]));
+    *most = pw_larger_or_nan (*most, most_j / pw_unit (r->s, j));
+  }
+  for (int i = 0; i < size; i++) d->y[i] += d->column[i] * d->z[i];
+  for (int j = 0; j < n; j++) {
+    double dv = d->column[n + j] * d->z[n + j];
+    d->w1[j] += dv / (h * d->gamma);
+    d->a1[j] += galpha_of_a (d, h) * dv;
+    d->work.v1[j] = galpha_velocity (d, h, j);
+    large = fmax (large, fmax (fabs (d->work.q1[j]), h * fabs (d->work.v1[j])) / pw_unit (r->s, j));
+  }
+  *floor = 4 * DBL_EPSILON * large;
+  return PW_OK;
+}
+
+/* Computes the new state at t1 = t + h with its accelerations and multipliers; kinematics and J are left there.
+ * PW_RETRY if the iteration does not converge, PW_INPUT if its matrix is singular, PW_METHOD if a signal failed.
+ *
+ * The matrix is evaluated at the prediction, and again while convergence is slow.  The remaining error must be small
+ * against the method's error in multipliers, which is of order h^2; a correction changes the multipliers by 1/h^2 times
+ * its size. */
+static int galpha_solve (pw_run *r, double h, double t1) {
+  const int most = 20;
+  galpha *d = r->data;
+  double before = INFINITY, size, floor, good = fmin (1e-9, 1e-3 * pow (h / r->w->scale.time, 4)), rate = 1;
+  if (h != d->work.h) pw_implicit_scale (&d->work.dae, galpha_of_q (d, h), galpha_of_a (d, h), d->row, d->column);
+  galpha_predict (r, h);
+  for (int i = 0, fresh = 1; i < most; i++) {
+    int status = galpha_residual (r, h, t1);
+    if (status == PW_OK && fresh) status = galpha_factor (r, h);
+    if (status == PW_OK) status = galpha_correct (r, h, &size, &floor);
+    if (status != PW_OK) return status;
+    double enough = fmax (good, floor);
+    if (!isfinite (size)) return PW_RETRY;
+    if (i > 0) rate = size / before;
+    int stalled = rate > 0.25 && size <= 32 * floor;
+    if (size <= enough || stalled || (rate < 1 && size * rate / (1 - rate) <= enough)) return galpha_update (r, t1);
+    if (rate > 2 && i > 3) return PW_RETRY;
+    fresh = i > 0 && rate > 0.02;
+    if (fresh) pw_sparse_forget (&d->work.sparse);
+    before = size;
+  }
+  return PW_RETRY;
+}
 
 /* ---- Opening ---- */
 
@@ -40,21 +179,20 @@ static void galpha_coefficients (galpha *d, double rho) {
 static int galpha_open (pw_run *r, pw_error *error) {
   galpha *d = r->data = calloc (1, sizeof *d);
   const pw_system *s = r->s;
-  size_t n = (size_t)s->coords + 3, rows = (size_t)s->rows, size = 2 * (n + rows);
+  size_t n = (size_t)s->coords + 3, most = 2 * (n + (size_t)s->rows);
   if (d == NULL) return pw_fail_memory (s, error);
-  const pw_array array[] = { { &d->v, n },      { &d->a, n },       { &d->w, n },      { &d->work.q1, n },
-                             { &d->a1, n },     { &d->work.v1, n }, { &d->w1, n },     { &d->lambda1, rows },
-                             { &d->mu1, rows }, { &d->z, size },    { &d->row, size }, { &d->column, size },
-                             { &d->pull, n },   { &d->f, n },       { &d->jv, rows },  { &d->eta, rows } };
+  const pw_array array[] = { { &d->v, n },  { &d->a, n },    { &d->w, n },      { &d->y, most },     { &d->a1, n },
+                             { &d->w1, n }, { &d->z, most }, { &d->row, most }, { &d->column, most } };
   int status = pw_implicit_open (&d->work, r, array, sizeof array / sizeof *array);
-  d->ggl = pw_stabilised_by (r, PW_GGL);
-  galpha_coefficients (d, pw_run_option (r, "rho"));
-  d->n = s->coords;
-  d->rows = d->work.tangent.rows;
-  d->positions = d->ggl ? d->work.tangent.holonomic : 0;
-  d->size = 2 * d->n + d->rows + d->positions;
-  if (status == PW_OK) status = pw_galpha_open_matrix (r);
-  return pw_implicit_complete (r, status, d->ggl, error);
+  pw_dae *x = &d->work.dae;
+  if (status == PW_OK) {
+    galpha_coefficients (d, pw_run_option (r, "rho"));
+    d->work.q1 = d->y, d->work.v1 = d->y + x->n;
+    pw_scatter_record (&x->tangent.scatter);
+    galpha_fill (d, 1);
+    status = pw_implicit_lay_out (&d->work, x->size);
+  }
+  return pw_implicit_complete (r, status, x->velocities, error);
 }
 
 /* ---- Initialisation ---- */
@@ -64,12 +202,13 @@ static int galpha_open (pw_run *r, pw_error *error) {
 static int galpha_jerk (pw_run *r, double h, double *jerk) {
   galpha *d = r->data;
   double s = 1e-3 * h;
-  for (int j = 0; j < d->n; j++) {
+  for (int j = 0; j < d->work.dae.n; j++) {
     d->work.q1[j] = r->q[j] + s * (d->v[j] + 0.5 * s * d->a[j]);
     d->work.v1[j] = d->v[j] + s * d->a[j];
   }
-  int status = pw_run_accelerate (r, pw_before_breakpoint (r, r->t + s), d->work.q1, d->work.v1, jerk, d->eta);
-  for (int j = 0; j < d->n; j++) jerk[j] = (jerk[j] - d->a[j]) / s;
+  int status =
+      pw_run_accelerate (r, pw_before_breakpoint (r, r->t + s), d->work.q1, d->work.v1, jerk, d->work.dae.other);
+  for (int j = 0; j < d->work.dae.n; j++) jerk[j] = (jerk[j] - d->a[j]) / s;
   return status;
 }
 
@@ -77,7 +216,7 @@ static int galpha_jerk (pw_run *r, double h, double *jerk) {
 static int galpha_fast (const pw_run *r, double h, const double *jerk) {
   const galpha *d = r->data;
   double change = 0, size = 0;
-  for (int j = 0; j < d->n; j++) {
+  for (int j = 0; j < d->work.dae.n; j++) {
     change += r->s->metric[j] * jerk[j] * jerk[j];
     size += r->s->metric[j] * d->a[j] * d->a[j];
   }
@@ -88,9 +227,9 @@ static int galpha_fast (const pw_run *r, double h, const double *jerk) {
  * resolve. */
 static int galpha_try (pw_run *r, double h, double *jerk) {
   galpha *d = r->data;
-  memcpy (d->w, d->a, (size_t)d->n * sizeof *d->w);
-  int status = pw_galpha_solve (r, h, r->t + h);
-  for (int j = 0; j < d->n; j++) jerk[j] = status == PW_OK ? (d->a1[j] - d->a[j]) / h : 0;
+  memcpy (d->w, d->a, (size_t)d->work.dae.n * sizeof *d->w);
+  int status = galpha_solve (r, h, r->t + h);
+  for (int j = 0; j < d->work.dae.n; j++) jerk[j] = status == PW_OK ? (d->a1[j] - d->a[j]) / h : 0;
   return status > 0 ? PW_OK : status; /* the step itself may still succeed */
 }
 
@@ -101,12 +240,12 @@ static int galpha_displace (pw_run *r, double h, const double *jerk) {
   double C = 1. / 6 - d->beta - 0.5 * (d->alpha_m - d->alpha_f), *dv = d->work.v1;
   int status = pw_evaluate_J_at (r->w, r->t, r->q, d->v);
   if (status != PW_OK) return status;
-  pw_mul_J (r->w, jerk, d->jv);
-  for (int i = 0; i < s->rows; i++) d->jv[i] *= i < s->holonomic ? C * h * h : 0;
+  pw_mul_J (r->w, jerk, d->work.dae.jv);
+  for (int i = 0; i < s->rows; i++) d->work.dae.jv[i] *= i < s->holonomic ? C * h * h : 0;
   status = pw_saddle_factor (r->saddle);
   if (status != PW_OK) return status;
-  pw_saddle_solve (r->saddle, NULL, d->jv, dv, d->eta);
-  for (int j = 0; j < d->n; j++) d->v[j] += dv[j];
+  pw_saddle_solve (r->saddle, NULL, d->work.dae.jv, dv, d->work.dae.other);
+  for (int j = 0; j < d->work.dae.n; j++) d->v[j] += dv[j];
   return PW_OK;
 }
 
@@ -115,34 +254,34 @@ static int galpha_begin (pw_run *r, double h) {
   galpha *d = r->data;
   double *jerk = d->w1;
   int status = PW_OK;
-  memcpy (d->v, r->v, (size_t)d->n * sizeof *d->v);
-  if (!d->ggl) { /* velocities include the error of the steps before */
+  memcpy (d->v, r->v, (size_t)d->work.dae.n * sizeof *d->v);
+  if (!d->work.dae.velocities) { /* velocities include the error of the steps before */
     status = pw_evaluate_J_at (r->w, r->t, r->q, d->v);
     if (status == PW_OK) status = pw_project_velocities (&d->work.last.projector, r, d->v);
   }
-  if (status == PW_OK) status = pw_run_accelerate (r, r->t, r->q, d->v, d->a, d->eta);
+  if (status == PW_OK) status = pw_run_accelerate (r, r->t, r->q, d->v, d->a, d->work.dae.other);
   if (status == PW_OK) status = galpha_jerk (r, h, jerk);
   if (status == PW_OK && galpha_fast (r, h, jerk)) status = galpha_try (r, h, jerk);
   if (status != PW_OK) return status;
-  for (int j = 0; j < d->n; j++) d->w[j] = d->a[j] + (d->alpha_m - d->alpha_f) * h * jerk[j];
-  return d->ggl || r->s->holonomic == 0 ? PW_OK : galpha_displace (r, h, jerk);
+  for (int j = 0; j < d->work.dae.n; j++) d->w[j] = d->a[j] + (d->alpha_m - d->alpha_f) * h * jerk[j];
+  return d->work.dae.velocities || r->s->holonomic == 0 ? PW_OK : galpha_displace (r, h, jerk);
 }
 
 /* ---- Advancing ---- */
 
 static int galpha_step (pw_run *r, double h, double t1) {
   int status = h != r->data->work.h ? galpha_begin (r, h) : PW_OK;
-  return status == PW_OK ? pw_galpha_solve (r, h, t1) : status;
+  return status == PW_OK ? galpha_solve (r, h, t1) : status;
 }
 
 static void galpha_accept (pw_run *r) {
   galpha *d = r->data;
-  size_t n = (size_t)d->n * sizeof (double);
+  size_t n = (size_t)d->work.dae.n * sizeof (double);
   memcpy (r->a, d->a1, n);
   memcpy (d->v, r->v, n);
   memcpy (d->a, d->a1, n);
   memcpy (d->w, d->w1, n);
-  pw_tangent_store (&d->work.tangent, d->lambda1, r->lambda);
+  pw_tangent_store (&d->work.dae.tangent, d->y + 2 * d->work.dae.n, r->lambda);
 }
 
 static int galpha_advance (pw_run *r, double t_end, pw_error *error) {

@@ -12,11 +12,11 @@ static pw_implicit *implicit_of (pw_run *r) {
 
 int pw_implicit_open (pw_implicit *x, pw_run *r, const pw_array *array, size_t count) {
   x->memory = pw_alloc_arrays (array, count);
-  return x->memory ? pw_tangent_open (&x->tangent, r) : PW_RESOURCE;
+  return x->memory ? pw_dae_open (&x->dae, r) : PW_RESOURCE;
 }
 
 int pw_implicit_lay_out (pw_implicit *x, int size) {
-  pw_tangent *t = &x->tangent;
+  pw_tangent *t = &x->dae.tangent;
   if (pw_scatter_lay_out (&t->scatter, size, &t->colptr, &t->rowind) != PW_OK) return PW_RESOURCE;
   x->value = malloc (((size_t)t->colptr[size] + 1) * sizeof *x->value);
   return x->value ? pw_sparse_open (&x->sparse, size, t->colptr, t->rowind) : PW_RESOURCE;
@@ -32,7 +32,7 @@ void pw_implicit_close (pw_run *r) {
   pw_implicit *x = implicit_of (r);
   pw_dense_output_close (&x->last);
   pw_sparse_close (&x->sparse);
-  pw_tangent_close (&x->tangent);
+  pw_dae_close (&x->dae);
   free (x->value);
   free (x->memory);
   free (r->data);
@@ -47,9 +47,9 @@ int pw_implicit_restart (pw_run *r, pw_error *error) {
   return PW_OK;
 }
 
-void pw_implicit_scale (const pw_tangent *x, int mus, int third, double c, double e, double *row, double *column) {
-  const pw_system *s = x->run->s;
-  int n = s->coords;
+void pw_implicit_scale (const pw_dae *x, double c, double e, double *row, double *column) {
+  const pw_system *s = x->tangent.run->s;
+  int n = x->n, third = x->velocities ? 0 : x->tangent.holonomic; /* rows of lambda that enforce positions */
   double mass = 0;
   for (int j = 0; j < n; j++) mass = fmax (mass, s->mass[j]);
   if (mass == 0) mass = 1;
@@ -58,14 +58,14 @@ void pw_implicit_scale (const pw_tangent *x, int mus, int third, double c, doubl
     row[n + j] = 1 / (c * e * mass), column[n + j] = c;
   }
   for (int i = 0; i < x->rows; i++) row[2 * n + i] = i < third ? 1 : 1 / c, column[2 * n + i] = c * e * mass;
-  for (int i = 2 * n + x->rows; i < 2 * n + x->rows + mus; i++) row[i] = 1, column[i] = c;
+  for (int i = 2 * n + x->rows; i < x->size; i++) row[i] = 1, column[i] = c;
 }
 
 /* ---- Advancing ---- */
 
 void pw_implicit_fill (pw_implicit *x, int size) {
-  memset (x->value, 0, (size_t)x->tangent.colptr[size] * sizeof *x->value);
-  pw_scatter_begin (&x->tangent.scatter, x->value);
+  memset (x->value, 0, (size_t)x->dae.tangent.colptr[size] * sizeof *x->value);
+  pw_scatter_begin (&x->dae.tangent.scatter, x->value);
 }
 
 /* Reports a failed step; the reason may be a singular configuration at its beginning. */

@@ -2,25 +2,25 @@
 #ifndef PW_IMPLICIT_H
 #define PW_IMPLICIT_H
 
+#include "dae.h"
 #include "dense_output.h"
 #include "sparse.h"
-#include "tangent.h"
 #include "util.h"
 
 /* The data of each of these methods begin with this. */
 typedef struct {
-  double base;        /* time from which steps are counted */
-  long count;         /* steps since then */
-  double h;           /* size of the last step; 0: the next one is the first */
-  double *q1, *v1;    /* the new state: coords + 3 */
-  pw_tangent tangent; /* its scatter map has recorded the matrix */
-  pw_sparse sparse;   /* its factors */
-  double *value;      /* of the matrix */
+  double base;      /* time from which steps are counted */
+  long count;       /* steps since then */
+  double h;         /* size of the last step; 0: the next one is the first */
+  double *q1, *v1;  /* the new state: coords + 3 */
+  pw_dae dae;       /* its scatter map has recorded the matrix; leapfrog uses only its tangent */
+  pw_sparse sparse; /* its factors */
+  double *value;    /* of the matrix */
   pw_dense_output last;
   char *memory; /* of the method's arrays */
 } pw_implicit;
 
-/* Allocates the method's arrays, `count` of them, and the tangent: PW_OK or PW_RESOURCE. */
+/* Allocates the method's arrays, `count` of them, and the equations: PW_OK or PW_RESOURCE. */
 int pw_implicit_open (pw_implicit *x, pw_run *r, const pw_array *array, size_t count);
 
 /* Allocates the recorded matrix of this size: PW_OK or PW_RESOURCE. */
@@ -30,10 +30,9 @@ int pw_implicit_lay_out (pw_implicit *x, int size);
  * enforces J v = eta. */
 int pw_implicit_complete (pw_run *r, int status, int velocities, pw_error *error);
 
-/* Scales of the rows and columns of a Newton matrix of q, v, lambda and `mus` multipliers mu, whose derivatives by q' and a
- * have the coefficients c and e, so that all entries are of the same size for every step; `third`: holonomic equations that
- * enforce positions in the rows of lambda. */
-void pw_implicit_scale (const pw_tangent *x, int mus, int third, double c, double e, double *row, double *column);
+/* Scales of the rows and columns of a Newton matrix whose derivatives by q' and a have the coefficients c and e, so
+ * that all entries are of the same size for every step. */
+void pw_implicit_scale (const pw_dae *x, double c, double e, double *row, double *column);
 
 /* Sets the matrix to 0 and begins to fill it. */
 void pw_implicit_fill (pw_implicit *x, int size);

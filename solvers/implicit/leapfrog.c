@@ -87,7 +87,7 @@ static void drift_positions (pw_run *r, double h) {
 
 /* M and J^T at the beginning; kinematics must be those of the beginning. */
 static void drift_put_momentum (pw_run *r) {
-  pw_tangent *x = &r->data->work.tangent;
+  pw_tangent *x = &r->data->work.dae.tangent;
   const pw_system *s = r->s;
   for (int j = 0; j < s->coords; j++) pw_scatter_add (&x->scatter, j, j, s->mass[j]);
   pw_newton_JT (
@@ -97,7 +97,7 @@ static void drift_put_momentum (pw_run *r) {
 
 /* S + h/2 ((S u)_q - b_q) at the middle; kinematics must be those of the middle. */
 static void drift_put_middle (pw_run *r, double h) {
-  pw_tangent *x = &r->data->work.tangent;
+  pw_tangent *x = &r->data->work.dae.tangent;
   const pw_system *s = r->s;
   pw_placement put = {
     .row = s->coords, .rows = s->rows, .factor_nonholonomic = 0.5 * h, .map = x->map, .w = r->data->u
@@ -111,23 +111,23 @@ static void drift_put_middle (pw_run *r, double h) {
 
 /* G at the end; kinematics must be those of the end. */
 static void drift_put_end (pw_run *r) {
-  pw_tangent *x = &r->data->work.tangent;
+  pw_tangent *x = &r->data->work.dae.tangent;
   pw_newton_J (r->w, &x->scatter,
                &(pw_placement){ .row = r->s->coords, .rows = r->s->holonomic, .factor = 1, .map = x->map });
 }
 
 static int drift_open_matrix (pw_run *r) {
   leapfrog *d = r->data;
-  pw_scatter_record (&d->work.tangent.scatter);
+  pw_scatter_record (&d->work.dae.tangent.scatter);
   drift_put_momentum (r);
   drift_put_middle (r, 1);
   drift_put_end (r);
-  return pw_implicit_lay_out (&d->work, r->s->coords + d->work.tangent.rows);
+  return pw_implicit_lay_out (&d->work, r->s->coords + d->work.dae.tangent.rows);
 }
 
 static int drift_factor (pw_run *r, double h, double t1) {
   leapfrog *d = r->data;
-  pw_tangent *x = &d->work.tangent;
+  pw_tangent *x = &d->work.dae.tangent;
   pw_implicit_fill (&d->work, r->s->coords + x->rows);
   int status = pw_evaluate_J_at (r->w, r->t, r->q, r->v);
   if (status != PW_OK) return status;
@@ -173,7 +173,7 @@ static int drift_correct (pw_run *r, double h, leapfrog_progress *p) {
   int n = r->s->coords;
   memset (d->z, 0, (size_t)n * sizeof *d->z);
   for (int i = 0; i < r->s->rows; i++) d->off[i] = -d->off[i];
-  pw_tangent_compress (&d->work.tangent, d->off, d->work.tangent.rows, d->z + n);
+  pw_tangent_compress (&d->work.dae.tangent, d->off, d->work.dae.tangent.rows, d->z + n);
   if (pw_sparse_solve (&d->work.sparse, d->z) != PW_OK) return PW_RESOURCE;
   p->size = 0, p->large = 1;
   for (int j = 0; j < n; j++) {

@@ -47,22 +47,22 @@ static int radau_restart (pw_run *r, pw_error *error) {
   (void)error;
   d->base = d->last.t = r->t;
   d->count = 0;
-  d->before = d->last.h = 0;
+  d->last_h = d->last.h = 0;
   d->left = 1;
   d->outdated = 1;
   d->current = 0;
   d->h = pw_first_step (r);
   if (d->h >= 0.5 * T * sqrt (r->settings.rtol)) d->h = fmax (d->h, 0.1 * T * sqrt (sqrt (pw_radau_rtol (r))));
-  memcpy (d->now.y, r->q, (size_t)d->n * sizeof (double));
-  memcpy (d->now.y + d->n, r->v, (size_t)d->n * sizeof (double));
-  memset (d->now.y + 2 * d->n, 0, (size_t)(d->rows + d->mus) * sizeof (double));
-  pw_tangent_compress (&d->tangent, r->lambda, d->rows, d->now.y + 2 * d->n);
+  memcpy (d->now.y, r->q, (size_t)d->dae.n * sizeof (double));
+  memcpy (d->now.y + d->dae.n, r->v, (size_t)d->dae.n * sizeof (double));
+  memset (d->now.y + 2 * d->dae.n, 0, (size_t)(d->dae.rows + d->dae.mus) * sizeof (double));
+  pw_tangent_compress (&d->dae.tangent, r->lambda, d->dae.rows, d->now.y + 2 * d->dae.n);
   return PW_OK;
 }
 
 static int radau_allocate (pw_run *r) {
   radau *d = r->data;
-  size_t n = (size_t)d->n + 3, rows = (size_t)r->s->rows, size = (size_t)d->size, entries = (size_t)r->s->entries;
+  size_t n = (size_t)d->dae.n + 3, size = (size_t)d->dae.size, entries = (size_t)r->s->entries;
   pw_array array[64] = {
     { &d->B, 2 * n },
     { &d->unit, size },
@@ -73,10 +73,6 @@ static int radau_allocate (pw_run *r) {
     { &d->column, size },
     { &d->x, 2 * size },
     { &d->Y, size },
-    { &d->pull, n },
-    { &d->f, n },
-    { &d->jv, rows },
-    { &d->eta, rows },
     { &d->rates, entries },
     { &d->a1, n },
     { &d->now.y, size },
@@ -86,7 +82,7 @@ static int radau_allocate (pw_run *r) {
     { &d->now.ledger, entries },
     { &d->last.ledger, entries },
   };
-  size_t count = 21;
+  size_t count = 17;
   for (int k = 0; k < STAGES; k++) {
     array[count++] = (pw_array){ &d->now.Z[k], size };
     array[count++] = (pw_array){ &d->last.Z[k], size };
@@ -103,7 +99,7 @@ static int radau_allocate (pw_run *r) {
 static void radau_constants (pw_run *r) {
   radau *d = r->data;
   const pw_system *s = r->s;
-  int n = d->n;
+  int n = d->dae.n;
   for (int j = 0; j < n; j++) {
     d->B[j] = 1;
     d->B[n + j] = s->mass[j];
@@ -114,18 +110,11 @@ static void radau_constants (pw_run *r) {
 
 static int radau_open (pw_run *r, pw_error *error) {
   radau *d = r->data = calloc (1, sizeof *d);
-  int status = d ? pw_tangent_open (&d->tangent, r) : PW_RESOURCE;
-  if (status == PW_OK) {
-    d->fixed = pw_fixed_steps (r);
-    d->velocities = pw_stabilised_by (r, PW_GGL) || pw_stabilised_by (r, PW_INDEX2);
-    d->n = r->s->coords;
-    d->rows = d->tangent.rows;
-    d->mus = pw_stabilised_by (r, PW_GGL) ? d->tangent.holonomic : 0;
-    d->size = 2 * d->n + d->rows + d->mus;
-    status = radau_allocate (r);
-  }
+  int status = d ? pw_dae_open (&d->dae, r) : PW_RESOURCE;
+  if (status == PW_OK) status = radau_allocate (r);
   if (status == PW_OK) status = pw_radau_open_matrices (r);
   if (status != PW_OK) return pw_fail_memory (r->s, error);
+  d->fixed = pw_fixed_steps (r);
   radau_constants (r);
   status = pw_projector_open (&d->projector, r, NULL, NULL, error);
   return status == PW_OK ? radau_restart (r, error) : status;
@@ -136,7 +125,7 @@ static void radau_close (pw_run *r) {
   pw_projector_close (&d->projector);
   pw_sparse_close (&d->real);
   pw_sparse_close (&d->complex);
-  pw_tangent_close (&d->tangent);
+  pw_dae_close (&d->dae);
   free (d->matrix);
   free (d->value);
   free (d->diagonal);
@@ -162,17 +151,16 @@ static int radau_fail (pw_run *r, int status, double h, pw_error *error) {
  * configurations those of the last stage. */
 static void radau_finish (pw_run *r, double h) {
   radau *d = r->data;
-  double *const *Z = d->last.Z, *end = d->now.y + 2 * d->n;
+  double *end = d->now.y + 2 * d->dae.n;
   int status = pw_saddle_factor (r->saddle);
   d->near = r->near_singular = status != PW_OK || pw_watchdog_near (r);
   if (status == PW_OK)
     pw_run_accelerate_updated (r, r->v, r->a, r->lambda);
   else
-    for (int j = 0, i = d->n; j < d->n; j++, i++)
-      r->a[j] = (radau_end[0] * Z[0][i] + radau_end[1] * Z[1][i] + radau_end[2] * Z[2][i]) / h;
-  if (status != PW_OK) pw_tangent_store (&d->tangent, end, r->lambda);
-  pw_tangent_compress (&d->tangent, r->lambda, d->rows, end);
-  memcpy (d->a1, r->a, (size_t)d->n * sizeof *d->a1);
+    for (int j = 0, i = d->dae.n; j < d->dae.n; j++, i++) r->a[j] = pw_radau_sum (0, radau_end, d->last.Z, i) / h;
+  if (status != PW_OK) pw_tangent_store (&d->dae.tangent, end, r->lambda);
+  pw_tangent_compress (&d->dae.tangent, r->lambda, d->dae.rows, end);
+  memcpy (d->a1, r->a, (size_t)d->dae.n * sizeof *d->a1);
   pw_bound_tolerances (r);
   pw_ledger_rates (r, r->lambda, r->rate);
 }
@@ -180,20 +168,20 @@ static void radau_finish (pw_run *r, double h) {
 /* The last stage becomes the state reached. */
 static int radau_accept (pw_run *r, double h, double t1) {
   radau *d = r->data;
-  size_t n = (size_t)d->n * sizeof (double), entries = (size_t)r->s->entries;
+  size_t n = (size_t)d->dae.n * sizeof (double), entries = (size_t)r->s->entries;
   radau_step done = d->now;
   pw_radau_stage (d, STAGES - 1);
-  int status = pw_evaluate_J_at (r->w, pw_before_breakpoint (r, t1), d->Y, d->Y + d->n);
+  int status = pw_evaluate_J_at (r->w, pw_before_breakpoint (r, t1), d->Y, d->Y + d->dae.n);
   if (status != PW_OK) return status;
   done.t = r->t, done.h = h;
   memcpy (done.a, r->a, n);
   memcpy (done.ledger, r->ledger, entries * sizeof (double));
   d->now = d->last;
   d->last = done;
-  memcpy (d->now.y, d->Y, (size_t)d->size * sizeof (double));
-  memset (d->now.y + 2 * d->n + d->rows, 0, (size_t)d->mus * sizeof (double));
+  memcpy (d->now.y, d->Y, (size_t)d->dae.size * sizeof (double));
+  memset (d->now.y + 2 * d->dae.n + d->dae.rows, 0, (size_t)d->dae.mus * sizeof (double));
   memcpy (r->q, d->Y, n);
-  memcpy (r->v, d->Y + d->n, n);
+  memcpy (r->v, d->Y + d->dae.n, n);
   r->t = t1;
   for (size_t e = 0; e < entries; e++) r->ledger[e] += done.w[STAGES - 1][e];
   radau_finish (r, h);
@@ -203,16 +191,16 @@ static int radau_accept (pw_run *r, double h, double t1) {
   return PW_OK;
 }
 
-/* The size of the next step, from the errors of this and the last one. */
+/* The size of the next step, from the errors of this and the last one; constants as in RADAU5. */
 static double radau_next (const radau *d, double h, double error, int rejected) {
   const int most = 7;
   double safety = 0.9 * fmin (1, (1. + 2 * most) / (d->iterations + 2 * most));
-  double by = fmin (5, fmax (1. / 8, pow (error, 0.25) / safety));
-  if (error < 1 && d->before > 0) {
-    double trend = d->before / h * pow (d->error / (error * error), 0.25) * 0.9;
-    by = fmax (by, fmin (5, fmax (1. / 8, 1 / trend)));
+  double quotient = fmin (5, fmax (1. / 8, pow (error, 0.25) / safety));
+  if (error < 1 && d->last_h > 0) {
+    double trend = h / d->last_h * pow (d->last_error / (error * error), 0.25) * 0.9;
+    quotient = fmax (quotient, fmin (5, fmax (1. / 8, 1 / trend)));
   }
-  double next = h / by;
+  double next = h / quotient;
   if (rejected) next = fmin (next, h);
   return d->rate <= RADAU_KEEP && next >= h && next <= RADAU_LONGER * h ? h : next;
 }
@@ -230,8 +218,8 @@ static int radau_try (pw_run *r, double h, double t1, int again, double *error) 
 static int radau_advance_fixed (pw_run *r, double t_end, pw_error *error) {
   radau *d = r->data;
   int whole;
-  double off, t1 = pw_step_end (r, d->base, d->count, t_end, &whole), h = whole ? r->settings.step : t1 - r->t;
-  int status = radau_try (r, h, t1, 0, &off);
+  double err, t1 = pw_step_end (r, d->base, d->count, t_end, &whole), h = whole ? r->settings.step : t1 - r->t;
+  int status = radau_try (r, h, t1, 0, &err);
   if (status == PW_OK) status = radau_accept (r, h, t1);
   if (status != PW_OK) return radau_fail (r, status, h, error);
   d->count++;
@@ -245,8 +233,8 @@ static int radau_accept_adaptive (pw_run *r, double h, double t1, double error, 
   double next = radau_next (d, h, error, rejected);
   int status = radau_accept (r, h, t1);
   if (status != PW_OK) return status;
-  d->before = h;
-  d->error = fmax (1e-2, error);
+  d->last_h = h;
+  d->last_error = fmax (1e-2, error);
   d->h = cut ? fmax (next, d->h) : next;
   return PW_OK;
 }
@@ -255,8 +243,8 @@ static int radau_accept_adaptive (pw_run *r, double h, double t1, double error, 
  * velocities of that size over h: no step, however small, has a smaller error, unless the state is projected. */
 static void radau_project_start (pw_run *r) {
   radau *d = r->data;
-  double *q = d->now.y, *v = q + d->n;
-  if (d->velocities || pw_project_positions (&d->projector, r, r->t, q, v) != PW_OK) return;
+  double *q = d->now.y, *v = q + d->dae.n;
+  if (d->dae.velocities || pw_project_positions (&d->projector, r, r->t, q, v) != PW_OK) return;
   (void)pw_project_velocities (&d->projector, r, v);
   pw_forget_residuals (r);
 }
@@ -265,21 +253,21 @@ static int radau_advance (pw_run *r, double t_end, pw_error *error) {
   radau *d = r->data;
   if (d->fixed) return radau_advance_fixed (r, t_end, error);
   double stop = fmin (t_end, r->breakpoint), least = 16 * DBL_EPSILON * fmax (fabs (r->t), 1e-6 * r->w->scale.time),
-         off;
+         err;
   for (int rejected = 0, status = PW_OK;; rejected++) {
     int cut = r->t + d->h > stop - 0.01 * d->h;
     double h = cut ? stop - r->t : d->h, t1 = cut ? stop : r->t + h;
     if (!cut && !(h > least)) return radau_fail (r, status, h, error);
     if (rejected > 0 && (status = pw_run_check_limits (r, error)) != PW_OK) return status;
-    status = radau_try (r, h, t1, rejected > 0 || d->before == 0, &off);
-    if (status == PW_OK && off < 1) status = radau_accept_adaptive (r, h, t1, off, rejected, cut);
-    if (status == PW_OK && off < 1) return PW_OK;
+    status = radau_try (r, h, t1, rejected > 0 || d->last_h == 0, &err);
+    if (status == PW_OK && err < 1) status = radau_accept_adaptive (r, h, t1, err, rejected, cut);
+    if (status == PW_OK && err < 1) return PW_OK;
     int signal = status == PW_METHOD && h < RADAU_SIGNAL * r->w->scale.time;
     if (status == PW_RESOURCE || status == PW_INPUT || signal) return radau_fail (r, status, h, error);
     r->statistics.rejected++;
     d->outdated = !d->current;
     if (status == PW_OK && rejected > 0) radau_project_start (r);
-    d->h = status == PW_OK ? fmin (0.9 * h, radau_next (d, h, off, 1)) : h * (status == PW_RETRY ? d->shorter : 0.25);
+    d->h = status == PW_OK ? fmin (0.9 * h, radau_next (d, h, err, 1)) : h * (status == PW_RETRY ? d->shorter : 0.25);
   }
 }
 
@@ -289,8 +277,8 @@ static int radau_advance (pw_run *r, double t_end, pw_error *error) {
 static void radau_quintic (const pw_run *r, double x, double *q, double *v) {
   const radau *d = r->data;
   double h = d->last.h;
-  for (int j = 0; j < d->n; j++) {
-    double q0 = d->last.y[j], v0 = h * d->last.y[d->n + j], a0 = 0.5 * h * h * d->last.a[j];
+  for (int j = 0; j < d->dae.n; j++) {
+    double q0 = d->last.y[j], v0 = h * d->last.y[d->dae.n + j], a0 = 0.5 * h * h * d->last.a[j];
     double dq = r->q[j] - q0 - v0 - a0, dv = h * r->v[j] - v0 - 2 * a0, da = 0.5 * h * h * (d->a1[j] - d->last.a[j]);
     double c3 = 10 * dq - 4 * dv + da, c4 = -15 * dq + 7 * dv - 2 * da, c5 = 6 * dq - 3 * dv + da;
     q[j] = q0 + x * (v0 + x * (a0 + x * (c3 + x * (c4 + x * c5))));
@@ -303,31 +291,29 @@ static void radau_quintic (const pw_run *r, double x, double *q, double *v) {
 static int radau_resolved (const pw_run *r, const double *q, const double *v) {
   const radau *d = r->data;
   double sum = 0;
-  for (int i = 0; i < 2 * d->n; i++) {
-    double off = i < d->n ? q[i] - r->q_at[i] : v[i - d->n] - r->v_at[i - d->n], allowed = d->tolerance[i];
+  for (int i = 0; i < 2 * d->dae.n; i++) {
+    double off = i < d->dae.n ? q[i] - r->q_at[i] : v[i - d->dae.n] - r->v_at[i - d->dae.n], allowed = d->tolerance[i];
     if (d->fixed) {
       allowed = d->floor[i];
       for (int k = 0; k < STAGES; k++) allowed = fmax (allowed, 0.1 * fabs (d->last.Z[k][i]));
     }
     sum += off * off / (allowed * allowed);
   }
-  return sum <= 2 * d->n;
+  return sum <= 2 * d->dae.n;
 }
 
 static void radau_interpolate (pw_run *r, double x) {
   radau *d = r->data;
   const radau_step *p = &d->last;
-  int n = d->n;
+  int n = d->dae.n;
   double weight[STAGES], *y = d->Y, *q = d->F[0], *v = d->F[1];
   pw_radau_basis (x, weight);
-  for (int i = 0; i < d->size; i++)
-    y[i] = p->y[i] + weight[0] * p->Z[0][i] + weight[1] * p->Z[1][i] + weight[2] * p->Z[2][i];
+  for (int i = 0; i < d->dae.size; i++) y[i] = pw_radau_sum (p->y[i], weight, p->Z, i);
   memcpy (r->q_at, y, (size_t)n * sizeof *y);
   memcpy (r->v_at, y + n, (size_t)n * sizeof *y);
-  pw_tangent_store (&d->tangent, y + 2 * n, r->lambda_at);
+  pw_tangent_store (&d->dae.tangent, y + 2 * n, r->lambda_at);
   for (int j = 0; j < n; j++) r->a_at[j] = (1 - x) * p->a[j] + x * d->a1[j];
-  for (int e = 0; e < r->s->entries; e++)
-    r->ledger_at[e] = p->ledger[e] + weight[0] * p->w[0][e] + weight[1] * p->w[1][e] + weight[2] * p->w[2][e];
+  for (int e = 0; e < r->s->entries; e++) r->ledger_at[e] = pw_radau_sum (p->ledger[e], weight, p->w, e);
   radau_quintic (r, x, q, v);
   if (!radau_resolved (r, q, v)) return;
   memcpy (r->q_at, q, (size_t)n * sizeof *q);
@@ -339,11 +325,11 @@ static int radau_inside (pw_run *r, double t) {
   radau *d = r->data;
   int status;
   radau_interpolate (r, (t - d->last.t) / d->last.h);
-  if (d->mus > 0 || !d->velocities)
+  if (d->dae.mus > 0 || !d->dae.velocities)
     status = pw_project_positions (&d->projector, r, t, r->q_at, r->v_at);
   else
     status = pw_evaluate_J_at (r->w, t, r->q_at, r->v_at);
-  if (status == PW_OK && d->velocities) status = pw_project_velocities (&d->projector, r, r->v_at);
+  if (status == PW_OK && d->dae.velocities) status = pw_project_velocities (&d->projector, r, r->v_at);
   if (status == PW_OK && pw_saddle_factor (r->saddle) == PW_OK)
     pw_run_accelerate_updated (r, r->v_at, r->a_at, r->lambda_at);
   return status;

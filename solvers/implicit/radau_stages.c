@@ -30,72 +30,46 @@ static const double radau_e[STAGES] = { -10.04880939982741556, 1.382142733160748
 
 /* ---- Equations ---- */
 
-/* F (t, y); leaves kinematics and J there. */
+/* F (t, y) = B y' - (the equations of dae.h); leaves kinematics and J there. */
 static int radau_evaluate (pw_run *r, double t, const double *y, double *F) {
   radau *d = r->data;
-  int n = d->n;
+  int n = d->dae.n;
   int status = pw_evaluate_J_at (r->w, pw_before_breakpoint (r, t), y, y + n);
   if (status != PW_OK) return status;
   r->statistics.rhs++;
-  pw_tangent_pull (&d->tangent, y + 2 * n + d->rows, d->mus, d->pull);
-  for (int j = 0; j < n; j++) F[j] = y[n + j] - d->tangent.D[j] * d->pull[j];
-  pw_tangent_pull (&d->tangent, y + 2 * n, d->rows, d->pull);
-  pw_evaluate_force (r->w, d->f);
-  for (int j = 0; j < n; j++) F[n + j] = d->f[j] - d->pull[j];
-  pw_mul_J (r->w, y + n, d->jv);
-  pw_evaluate_eta (r->w, d->eta);
-  for (int i = 0; i < r->s->rows; i++) d->jv[i] = d->eta[i] - d->jv[i];
-  if (d->mus || !d->velocities) pw_evaluate_g (r->w, d->eta);
-  for (int i = 0; i < r->s->holonomic; i++) {
-    if (!d->velocities) d->jv[i] = -d->eta[i];
-    d->eta[i] = -d->eta[i];
-  }
-  pw_tangent_compress (&d->tangent, d->jv, d->rows, F + 2 * n);
-  pw_tangent_compress (&d->tangent, d->eta, d->mus, F + 2 * n + d->rows);
+  pw_dae_residual (&d->dae, y + n, NULL, y + 2 * n, F);
+  for (int i = 0; i < d->dae.size; i++) F[i] = (i < n ? y[n + i] : 0) - F[i];
   return PW_OK;
 }
 
 /* ---- Matrices ---- */
 
-static void radau_fill (radau *d) {
-  int n = d->n, mu = 2 * n + d->rows;
-  const double *y = d->now.y;
-  const pw_tangent_layout to = {
-    .momentum = n, .constraint = 2 * n, .v = n, .a = n, .lambda = 2 * n, .mu = mu, .of_lambda = 1
-  };
-  pw_tangent_kinematics (&d->tangent, &to, pw_tangent_mu (&d->tangent, y + mu, d->mus));
-  pw_tangent_momentum (&d->tangent, &to, pw_tangent_lambda (&d->tangent, y + 2 * n));
-  pw_tangent_velocities (&d->tangent, &to, y + n, d->velocities);
-  if (d->mus || !d->velocities) pw_tangent_positions (&d->tangent, &to, d->velocities ? mu : 2 * n);
-}
-
 int pw_radau_open_matrices (pw_run *r) {
   radau *d = r->data;
-  pw_tangent *x = &d->tangent;
-  pw_scatter_record (&x->scatter);
-  radau_fill (d);
-  if (pw_scatter_lay_out (&x->scatter, d->size, &x->colptr, &x->rowind) != PW_OK) return PW_RESOURCE;
-  size_t nonzeros = (size_t)x->colptr[d->size] + 1;
+  pw_tangent *x = &d->dae.tangent;
+  const double *y = d->now.y;
+  if (pw_dae_lay_out (&d->dae, y + d->dae.n, NULL, y + 2 * d->dae.n) != PW_OK) return PW_RESOURCE;
+  size_t nonzeros = (size_t)x->colptr[d->dae.size] + 1;
   d->matrix = malloc (nonzeros * sizeof *d->matrix);
   d->value = malloc (2 * nonzeros * sizeof *d->value);
-  d->diagonal = malloc (((size_t)(2 * d->n) + 1) * sizeof *d->diagonal);
+  d->diagonal = malloc (((size_t)(2 * d->dae.n) + 1) * sizeof *d->diagonal);
   if (!d->matrix || !d->value || !d->diagonal) return PW_RESOURCE;
-  for (int j = 0; j < 2 * d->n; j++)
+  for (int j = 0; j < 2 * d->dae.n; j++)
     for (d->diagonal[j] = x->colptr[j]; x->rowind[d->diagonal[j]] != j;) d->diagonal[j]++;
-  int status = pw_sparse_open (&d->real, d->size, x->colptr, x->rowind);
-  return status == PW_OK ? pw_sparse_open_complex (&d->complex, d->size, x->colptr, x->rowind) : status;
+  int status = pw_sparse_open (&d->real, d->dae.size, x->colptr, x->rowind);
+  return status == PW_OK ? pw_sparse_open_complex (&d->complex, d->dae.size, x->colptr, x->rowind) : status;
 }
 
 /* Evaluates F_y at the beginning of the step. */
 static int radau_linearise (pw_run *r) {
   radau *d = r->data;
   const double *y = d->now.y;
-  int status = pw_evaluate_J_at (r->w, r->t, y, y + d->n);
+  int status = pw_evaluate_J_at (r->w, r->t, y, y + d->dae.n);
   if (status != PW_OK) return status;
-  memset (d->matrix, 0, (size_t)d->tangent.colptr[d->size] * sizeof *d->matrix);
-  pw_scatter_begin (&d->tangent.scatter, d->matrix);
-  radau_fill (d);
-  pw_matrix_evaluated (r, y, y + d->n);
+  memset (d->matrix, 0, (size_t)d->dae.tangent.colptr[d->dae.size] * sizeof *d->matrix);
+  pw_scatter_begin (&d->dae.tangent.scatter, d->matrix);
+  pw_dae_matrix (&d->dae, y + d->dae.n, NULL, y + 2 * d->dae.n, 0, 0);
+  pw_matrix_evaluated (r, y, y + d->dae.n);
   r->statistics.jacobians++;
   d->current = 1;
   d->outdated = 0;
@@ -105,10 +79,10 @@ static int radau_linearise (pw_run *r) {
 
 /* Stores -F_y + re B in every stride-th value, scaled, and im B in the value after it. */
 static void radau_shift (radau *d, int stride, double re, double im) {
-  const int64_t *colptr = d->tangent.colptr, *rowind = d->tangent.rowind;
-  for (int c = 0; c < d->size; c++)
+  const int64_t *colptr = d->dae.tangent.colptr, *rowind = d->dae.tangent.rowind;
+  for (int c = 0; c < d->dae.size; c++)
     for (int64_t i = colptr[c]; i < colptr[c + 1]; i++) {
-      double scale = d->row[rowind[i]] * d->column[c], b = c < 2 * d->n && i == d->diagonal[c] ? d->B[c] : 0;
+      double scale = d->row[rowind[i]] * d->column[c], b = c < 2 * d->dae.n && i == d->diagonal[c] ? d->B[c] : 0;
       d->value[stride * i] = scale * (d->matrix[i] + re * b);
       if (stride == 2) d->value[2 * i + 1] = scale * im * b;
     }
@@ -120,8 +94,7 @@ static int radau_factor (pw_run *r, double h) {
   d->factored = 0;
   if (d->forget) pw_sparse_forget (&d->real), pw_sparse_forget (&d->complex);
   d->forget = 0;
-  pw_implicit_scale (&d->tangent, d->mus, d->velocities ? 0 : d->tangent.holonomic, radau_gamma / h, radau_gamma / h,
-                     d->row, d->column);
+  pw_implicit_scale (&d->dae, radau_gamma / h, radau_gamma / h, d->row, d->column);
   radau_shift (d, 1, radau_gamma / h, 0);
   int status = pw_sparse_factor (&d->real, d->value);
   radau_shift (d, 2, radau_alpha / h, radau_beta / h);
@@ -133,18 +106,18 @@ static int radau_factor (pw_run *r, double h) {
 
 /* x = (gamma/h B - F_y)^-1 x */
 static int radau_solve_real (radau *d, double *x) {
-  for (int i = 0; i < d->size; i++) x[i] *= d->row[i];
+  for (int i = 0; i < d->dae.size; i++) x[i] *= d->row[i];
   int status = pw_sparse_solve (&d->real, x);
-  for (int i = 0; i < d->size; i++) x[i] *= d->column[i];
+  for (int i = 0; i < d->dae.size; i++) x[i] *= d->column[i];
   return status;
 }
 
 /* The same with the complex matrix, for re + i im. */
 static int radau_solve_complex (radau *d, double *re, double *im) {
   double *x = d->x;
-  for (int i = 0; i < d->size; i++) x[2 * i] = d->row[i] * re[i], x[2 * i + 1] = d->row[i] * im[i];
+  for (int i = 0; i < d->dae.size; i++) x[2 * i] = d->row[i] * re[i], x[2 * i + 1] = d->row[i] * im[i];
   int status = pw_sparse_solve (&d->complex, x);
-  for (int i = 0; i < d->size; i++) re[i] = d->column[i] * x[2 * i], im[i] = d->column[i] * x[2 * i + 1];
+  for (int i = 0; i < d->dae.size; i++) re[i] = d->column[i] * x[2 * i], im[i] = d->column[i] * x[2 * i + 1];
   return status;
 }
 
@@ -159,7 +132,7 @@ double pw_radau_rtol (const pw_run *r) {
 static void radau_weigh (pw_run *r, double h) {
   radau *d = r->data;
   const pw_settings *set = &r->settings;
-  int n = d->n, third = !d->velocities && d->tangent.holonomic > 0;
+  int n = d->dae.n, third = !d->dae.velocities && d->dae.tangent.holonomic > 0;
   double rtol = pw_radau_rtol (r), newton = fmax (10 * DBL_EPSILON / rtol, fmin (0.03, sqrt (rtol)));
   double large = 1; /* the largest coordinate: its round-off may affect others */
   for (int j = 0; j < n; j++) large = fmax (large, fabs (d->now.y[j]) / d->unit[j]);
@@ -183,7 +156,7 @@ void pw_radau_basis (double x, double *weight) {
 }
 
 static void radau_combine (radau *d, const double by[STAGES][STAGES], double *const *from, double *const *to) {
-  for (int i = 0; i < d->size; i++) {
+  for (int i = 0; i < d->dae.size; i++) {
     double a = from[0][i], b = from[1][i], c = from[2][i];
     for (int k = 0; k < STAGES; k++) to[k][i] = by[k][0] * a + by[k][1] * b + by[k][2] * c;
   }
@@ -198,19 +171,18 @@ static void radau_predict (pw_run *r, double h) {
     double *Z = d->now.Z[k], ch = radau_c[k] * h;
     if (last->h > 0) {
       pw_radau_basis (1 + ch / last->h, weight);
-      for (int i = 0; i < d->size; i++)
-        Z[i] = last->y[i] - d->now.y[i] + weight[0] * last->Z[0][i] + weight[1] * last->Z[1][i] +
-               weight[2] * last->Z[2][i];
+      for (int i = 0; i < d->dae.size; i++) Z[i] = pw_radau_sum (last->y[i] - d->now.y[i], weight, last->Z, i);
       continue;
     }
-    memset (Z, 0, (size_t)d->size * sizeof *Z);
-    for (int j = 0, n = d->n; j < n; j++) Z[j] = ch * (d->now.y[n + j] + 0.5 * ch * r->a[j]), Z[n + j] = ch * r->a[j];
+    memset (Z, 0, (size_t)d->dae.size * sizeof *Z);
+    for (int j = 0, n = d->dae.n; j < n; j++)
+      Z[j] = ch * (d->now.y[n + j] + 0.5 * ch * r->a[j]), Z[n + j] = ch * r->a[j];
   }
   radau_combine (d, radau_inverse_T, d->now.Z, d->W);
 }
 
 void pw_radau_stage (const radau *d, int k) {
-  for (int i = 0; i < d->size; i++) d->Y[i] = d->now.y[i] + d->now.Z[k][i];
+  for (int i = 0; i < d->dae.size; i++) d->Y[i] = d->now.y[i] + d->now.Z[k][i];
 }
 
 static double radau_time (const pw_run *r, int k, double h, double t1) {
@@ -227,7 +199,7 @@ static int radau_correct (pw_run *r, double h, double t1, double *size, double *
     if (status != PW_OK) return status;
   }
   radau_combine (d, radau_inverse_T, F, F);
-  for (int i = 0; i < 2 * d->n; i++) {
+  for (int i = 0; i < 2 * d->dae.n; i++) {
     double b = d->B[i] / h;
     F[0][i] -= b * radau_gamma * W[0][i];
     F[1][i] -= b * (radau_alpha * W[1][i] - radau_beta * W[2][i]);
@@ -235,13 +207,13 @@ static int radau_correct (pw_run *r, double h, double t1, double *size, double *
   }
   if (radau_solve_real (d, F[0]) != PW_OK || radau_solve_complex (d, F[1], F[2]) != PW_OK) return PW_RESOURCE;
   *size = *rough = 0;
-  for (int i = 0; i < 2 * d->n; i++) {
+  for (int i = 0; i < 2 * d->dae.n; i++) {
     double most = pw_larger_or_nan (pw_larger_or_nan (fabs (F[0][i]), fabs (F[1][i])), fabs (F[2][i]));
     *size = pw_larger_or_nan (*size, most / d->enough[i]);
     *rough = pw_larger_or_nan (*rough, most / d->floor[i]);
   }
   for (int k = 0; k < STAGES; k++)
-    for (int i = 0; i < d->size; i++) W[k][i] += F[k][i];
+    for (int i = 0; i < d->dae.size; i++) W[k][i] += F[k][i];
   radau_combine (d, radau_T, W, d->now.Z);
   return PW_OK;
 }
@@ -306,25 +278,25 @@ int pw_radau_solve (pw_run *r, double h, double t1) {
 /* Root of the sum of the squares of errors in units of the tolerances, over the number of states. */
 static double radau_norm (const radau *d, const double *e) {
   double sum = 0;
-  for (int i = 0; i < 2 * d->n; i++) sum += e[i] * e[i] / (d->tolerance[i] * d->tolerance[i]);
-  return sqrt (sum / (2 * d->n));
+  for (int i = 0; i < 2 * d->dae.n; i++) sum += e[i] * e[i] / (d->tolerance[i] * d->tolerance[i]);
+  return sqrt (sum / (2 * d->dae.n));
 }
 
 int pw_radau_estimate (pw_run *r, double h, int again, double *error) {
   radau *d = r->data;
-  int n = d->n;
+  int n = d->dae.n;
   double *e = d->F[0], *rest = d->F[1];
   double *const *Z = d->now.Z;
-  for (int i = 0; i < d->size; i++) {
-    rest[i] = i < 2 * n ? d->B[i] / h * (radau_e[0] * Z[0][i] + radau_e[1] * Z[1][i] + radau_e[2] * Z[2][i]) : 0;
+  for (int i = 0; i < d->dae.size; i++) {
+    rest[i] = i < 2 * n ? d->B[i] / h * pw_radau_sum (0, radau_e, Z, i) : 0;
     e[i] = rest[i] + (i < n ? d->now.y[n + i] : i < 2 * n ? d->B[i] * r->a[i - n] : 0);
   }
   if (radau_solve_real (d, e) != PW_OK) return PW_RESOURCE;
   *error = radau_norm (d, e);
   if (!again || *error < 1) return PW_OK;
-  for (int i = 0; i < d->size; i++) d->Y[i] = d->now.y[i] + e[i];
+  for (int i = 0; i < d->dae.size; i++) d->Y[i] = d->now.y[i] + e[i];
   if (radau_evaluate (r, r->t, d->Y, e) != PW_OK) return PW_OK;
-  for (int i = 0; i < d->size; i++) e[i] += rest[i];
+  for (int i = 0; i < d->dae.size; i++) e[i] += rest[i];
   if (radau_solve_real (d, e) != PW_OK) return PW_RESOURCE;
   *error = radau_norm (d, e);
   return PW_OK;
@@ -332,17 +304,17 @@ int pw_radau_estimate (pw_run *r, double h, int again, double *error) {
 
 int pw_radau_work (pw_run *r, double h, double t1, double *error) {
   radau *d = r->data;
-  int entries = r->s->entries, again = !d->velocities && pw_ledger_reacts (r->s);
+  int entries = r->s->entries, again = !d->dae.velocities && pw_ledger_reacts (r->s);
   double sum = 0;
   for (int k = 0; k < STAGES; k++) memset (d->now.w[k], 0, (size_t)entries * sizeof (double));
   for (int k = 0; k < STAGES; k++) {
     pw_radau_stage (d, k);
     double t = pw_before_breakpoint (r, radau_time (r, k, h, t1));
-    int status = pw_evaluate_J_at (r->w, t, d->Y, d->Y + d->n);
+    int status = pw_evaluate_J_at (r->w, t, d->Y, d->Y + d->dae.n);
     if (status != PW_OK) return status;
-    const double *lambda = pw_tangent_lambda (&d->tangent, d->Y + 2 * d->n);
+    const double *lambda = pw_tangent_lambda (&d->dae.tangent, d->Y + 2 * d->dae.n);
     if (again && pw_saddle_factor (r->saddle) == PW_OK) {
-      pw_run_accelerate_updated (r, d->Y + d->n, r->a_at, r->lambda_at);
+      pw_run_accelerate_updated (r, d->Y + d->dae.n, r->a_at, r->lambda_at);
       lambda = r->lambda_at;
     }
     pw_ledger_rates (r, lambda, d->rates);
@@ -350,8 +322,7 @@ int pw_radau_work (pw_run *r, double h, double t1, double *error) {
       for (int e = 0; e < entries; e++) d->now.w[i][e] += h * radau_A[i][k] * d->rates[e];
   }
   for (int e = 0; e < entries; e++) {
-    double off = h * r->rate[e];
-    for (int k = 0; k < STAGES; k++) off += radau_e[k] * d->now.w[k][e];
+    double off = pw_radau_sum (h * r->rate[e], radau_e, d->now.w, e);
     sum += off * off;
   }
   double tolerance = pw_ledger_tolerance (r, h) * fmax (1, pw_radau_rtol (r) / r->settings.rtol);

@@ -15,10 +15,8 @@ typedef struct {
 } radau_step;
 
 struct pw_method_data {
-  int fixed;              /* 1: fixed steps */
-  int velocities;         /* 1: J v = eta; 0: g = 0 in place of its holonomic rows */
-  int n, rows, mus, size; /* coordinates, independent equations, multipliers mu, unknowns */
-  pw_tangent tangent;
+  int fixed; /* 1: fixed steps */
+  pw_dae dae;
   pw_sparse real, complex;
   double *matrix;                                          /* -F_y */
   double *value;                                           /* of the real matrix; of the complex one, in pairs */
@@ -28,18 +26,18 @@ struct pw_method_data {
   double *tolerance, *enough, *floor;                      /* 2 n: of the error test, of corrections; round-off */
   double *row, *column;                                    /* scales of the matrices */
   double *W[PW_RADAU_STAGES], *F[PW_RADAU_STAGES], *x, *Y; /* unknowns; x: twice */
-  double *pull, *f, *jv, *eta;                             /* scratch: coords + 3, coords + 3, rows, rows */
   double *rates;                                           /* entries */
   radau_step now, last;
-  double *a1;              /* coords: accelerations at the end of the last step */
-  double base;             /* fixed steps: time from which they are counted */
-  long count;              /* steps since then */
-  double h, before, error; /* the next step; size and error of the last one, 0: none */
-  double factored;         /* step for which the matrices are factorised; 0: none */
-  int forget;              /* 1: select pivots anew */
-  int current, outdated;   /* F_y was evaluated at y; it must be evaluated again */
-  double rate, left;       /* of the last iteration: contraction rate, remaining error over the last correction */
-  double shorter;          /* factor of the step if the iteration does not converge */
+  double *a1;                /* coords: accelerations at the end of the last step */
+  double base;               /* fixed steps: time from which they are counted */
+  long count;                /* steps since then */
+  double h;                  /* the next step */
+  double last_h, last_error; /* size and error of the last one, 0: none */
+  double factored;           /* step for which the matrices are factorised; 0: none */
+  int forget;                /* 1: select pivots anew */
+  int current, outdated;     /* F_y was evaluated at y; it must be evaluated again */
+  double rate, left;         /* of the last iteration: contraction rate, remaining error over the last correction */
+  double shorter;            /* factor of the step if the iteration does not converge */
   int iterations;
   int near; /* 1: the state reached is near a singular configuration */
   pw_projector projector;
@@ -57,6 +55,11 @@ double pw_radau_rtol (const pw_run *r);
 /* Solves for the stages of the step to t1 = t + h.  PW_RETRY if Newton's iteration does not converge, PW_INPUT if its
  * matrix is singular, PW_METHOD if a signal failed, PW_RESOURCE. */
 int pw_radau_solve (pw_run *r, double h, double t1);
+
+/* y + the weighted sum of the values of entry i at the stages. */
+static inline double pw_radau_sum (double y, const double *weight, double *const *Z, int i) {
+  return y + weight[0] * Z[0][i] + weight[1] * Z[1][i] + weight[2] * Z[2][i];
+}
 
 /* Stores the unknowns at stage k in d->Y. */
 void pw_radau_stage (const radau *d, int k);

@@ -23,7 +23,6 @@ static int linear_arrays (pw_linearisation *x) {
     { &x->norm, m },
     { &x->R, m * n },
     { &x->Q, n * n },
-    { &x->A, size * size },
     { &x->x, 2 * n },
     { &x->y, n + 2 * m },
     { &x->da, n + 3 },
@@ -67,14 +66,14 @@ static int linear_rows (pw_linearisation *x) {
   return x->row ? PW_OK : PW_RESOURCE;
 }
 
-static int linear_results (const pw_linearisation *x, pw_linear *l) {
+static int linear_results (pw_linearisation *x, pw_linear *l) {
   size_t size = (size_t)x->size;
   l->A = malloc ((size * size + 1) * sizeof *l->A);
   l->re = calloc (2 * size + 1, sizeof *l->re);
   l->rigid = calloc (size + 1, 1);
   if (l->A == NULL || l->re == NULL || l->rigid == NULL) return PW_RESOURCE;
   l->im = l->re + size;
-  memcpy (l->A, x->A, size * size * sizeof *l->A);
+  x->A = l->A;
   return PW_OK;
 }
 
@@ -130,10 +129,10 @@ static int linear_compute (pw_linearisation *x, pw_linear *l, pw_error *error) {
                     pw_system_state_name (r->s, jump, name, sizeof name));
   if (pw_system_may_jump (r->s)) (void)pw_linear_evaluate (x, r->t, r->q, r->v);
   pw_linear_choose_frame (x);
+  if (linear_results (x, l) != PW_OK) return PW_RESOURCE;
   for (int c = 0; c < x->size; c++) linear_column_of_A (x, c);
   if (x->modes && pw_linear_matrices (x, l) != PW_OK) return PW_RESOURCE;
   l->symmetries = pw_linear_symmetries (x);
-  if (linear_results (x, l) != PW_OK) return PW_RESOURCE;
   memcpy (l->twist, x->frame.twist, sizeof l->twist);
   l->acceleration = x->frame.acceleration;
   status = pw_linear_eigenvalues (x, l, error);

@@ -32,7 +32,7 @@ typedef struct {
   double *norm;                  /* m: lengths of the rows of J in units of the scene */
   double *R;                     /* rank x rank: J^T = Q R, by columns; before that the rows of J, n long each */
   double *Q;                     /* n x n, by columns */
-  double *A;                     /* size x size, by rows */
+  double *A;                     /* size x size, by rows: in the result */
   double *S;                     /* 3 x size: symmetry directions in minimal coordinates */
   double *x;                     /* 2 n: a variation */
   double *y;                     /* n + 2 m: derivatives times x: those of -F, gamma - J a, J v - eta */
@@ -83,6 +83,8 @@ void pw_linear_tangent (pw_linearisation *x, int c);
 void pw_linear_coordinates (const pw_linearisation *x, const double *dq, const double *dv, int stride, double *out);
 /* out += W in: (x, y) of each body, times w and rotated by 90 degrees. */
 void pw_linear_turn (const pw_linearisation *x, double w, const double *in, double *out);
+/* out = in with (x, y) of each body rotated by an angle. */
+void pw_linear_rotate (const pw_linearisation *x, double angle, const double *in, double *out);
 
 /* ---- linear_eigenvalues.c ---- */
 
@@ -102,9 +104,9 @@ int pw_linear_shapes (pw_linearisation *x, int k, pw_linear *l);
 
 /* Chooses the frame in which the accelerations of the evaluated state are smallest. */
 void pw_linear_choose_frame (pw_linearisation *x);
-/* The scaled residuals of G dq = 0 and J dv + B dq = 0 for the variation x: `holonomic` + `rank` numbers; y and J must be
- * up to date.  Returns the end of the numbers. */
-double *pw_linear_violation (pw_linearisation *x, double *out);
+/* What the variation x changes, in units of the scene, 0 for a symmetry: violations, then `n` accelerations; turns: 1 if it is a
+ * rotation of the whole by 1 rad, with which accelerations rotate. */
+void pw_linear_asymmetry (pw_linearisation *x, int turns, double *out);
 /* Number of rigid displacements of the whole (x, y, phi) under which the equations are invariant to first order; their
  * directions go to S. */
 int pw_linear_symmetries (pw_linearisation *x);

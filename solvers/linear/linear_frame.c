@@ -24,8 +24,8 @@ static double linear_unit (const pw_linearisation *x) {
 
 /* ---- The frame ---- */
 
-/* The largest |a - W v| and, for motions relative to the frame, |W d|. */
-static double linear_residual (const pw_linearisation *x, const pw_linear_frame *f) {
+/* Sets the frame's residual: the largest |a - W v| and, for motions relative to the frame, |W d|. */
+static void linear_judge (const pw_linearisation *x, pw_linear_frame *f) {
   const double *q = x->r->q, *v = x->r->v, *a = x->a, w = f->twist[2];
   double most = 0;
   for (int j = 0; j < 3 * x->r->s->bodies; j += 3) {
@@ -36,15 +36,15 @@ static double linear_residual (const pw_linearisation *x, const pw_linear_frame 
     most = pw_larger_or_nan (most, fabs (a[j + 2]) * x->r->s->scale.length);
   }
   for (int j = 3 * x->r->s->bodies; j < x->n; j++) most = pw_larger_or_nan (most, fabs (a[j]) * x->r->s->scale.length);
-  return most;
+  f->acceleration = most;
+  f->residual = most / linear_unit (x);
 }
 
 /* The frame at body b, at rest or with its twist. */
 static pw_linear_frame linear_try (const pw_linearisation *x, int b, int turning) {
   const double *q = x->r->q + 3 * b, *v = x->r->v + 3 * b;
   pw_linear_frame f = { .origin = { q[0], q[1] }, .twist = { v[0], v[1], turning ? v[2] : 0 } };
-  f.acceleration = linear_residual (x, &f);
-  f.residual = f.acceleration / linear_unit (x);
+  linear_judge (x, &f);
   return f;
 }
 
@@ -64,8 +64,7 @@ static pw_linear_frame linear_fit (const pw_linearisation *x) {
   }
   if (!(square > 0)) return f;
   f.twist[2] = moment / square;
-  f.acceleration = linear_residual (x, &f);
-  f.residual = f.acceleration / linear_unit (x);
+  linear_judge (x, &f);
   return f;
 }
 
@@ -100,7 +99,9 @@ static void linear_displace (pw_linearisation *x, int k) {
   if (k == 2) pw_linear_turn (x, 1, v, x->x + x->n);
 }
 
-double *pw_linear_violation (pw_linearisation *x, double *out) {
+/* The scaled residuals of G dq = 0 and J dv + B dq = 0 for the variation x: `holonomic` + `rank` numbers; y and J must be
+ * up to date.  Returns the end of the numbers. */
+static double *linear_violation (pw_linearisation *x, double *out) {
   const pw_system *s = x->r->s;
   pw_mul_J (x->r->w, x->x, x->c);
   for (int k = 0; k < x->holonomic; k++) *out++ = x->c[x->row[k]] / x->norm[x->row[k]] / s->scale.length;
@@ -112,14 +113,10 @@ double *pw_linear_violation (pw_linearisation *x, double *out) {
   return out;
 }
 
-/* What the rigid displacement k of the system changes, 0 for a symmetry; its minimal coordinates go to S. */
-static void linear_asymmetry (pw_linearisation *x, int k, double *out) {
-  const double *dq = x->x, *dv = x->x + x->n;
-  linear_displace (x, k);
+void pw_linear_asymmetry (pw_linearisation *x, int turns, double *out) {
   pw_linear_vary (x);
-  pw_linear_coordinates (x, dq, dv, 1, x->S + k * x->size);
-  out = pw_linear_violation (x, out);
-  if (k == 2) pw_linear_turn (x, -1, x->a, x->da);
+  out = linear_violation (x, out);
+  if (turns) pw_linear_turn (x, -1, x->a, x->da);
   for (int j = 0; j < x->n; j++) out[j] = x->da[j] * pw_as_length (x->r->s, j) / linear_unit (x);
 }
 
@@ -136,7 +133,11 @@ int pw_linear_symmetries (pw_linearisation *x) {
   int length = x->holonomic + x->rank + x->n, left = 0;
   double tolerance = linear_tolerance (x), sigma[3], V[9], *work = x->residual + 3 * length;
   if (x->r->s->bodies == 0) return 0;
-  for (int k = 0; k < 3; k++) linear_asymmetry (x, k, x->residual + k * length);
+  for (int k = 0; k < 3; k++) {
+    linear_displace (x, k);
+    pw_linear_coordinates (x, x->x, x->x + x->n, 1, x->S + k * x->size);
+    pw_linear_asymmetry (x, k == 2, x->residual + k * length);
+  }
   for (int i = 0; i < 3 * length; i++)
     if (!isfinite (x->residual[i])) return 0;
   if (LAPACKE_dgesvd_work (LAPACK_COL_MAJOR, 'N', 'A', length, 3, x->residual, length, sigma, NULL, 1, V, 3, work,
@@ -152,22 +153,12 @@ int pw_linear_symmetries (pw_linearisation *x) {
 
 /* ---- Steadiness ---- */
 
-/* Rotates a vector of all coordinates with the frame. */
-static void linear_rotate (const pw_linearisation *x, double angle, const double *in, double *out) {
-  double c = pw_cos (angle), s = pw_sin (angle);
-  memcpy (out, in, (size_t)x->n * sizeof *out);
-  for (int j = 0; j < 3 * x->r->s->bodies; j += 3) {
-    out[j] = c * in[j] - s * in[j + 1];
-    out[j + 1] = s * in[j] + c * in[j + 1];
-  }
-}
-
 /* The state of a steady motion after a time: rotated with the frame about its origin, which has moved along an arc.
  * Angles, internal coordinates, and all coordinates if the frame does not rotate, continue at constant velocity. */
 static void linear_later (const pw_linearisation *x, double time, double *q, double *v) {
   const pw_linear_frame *f = &x->frame;
   double w = f->twist[2], c = pw_cos (w * time), s = pw_sin (w * time);
-  linear_rotate (x, w * time, x->r->v, v);
+  pw_linear_rotate (x, w * time, x->r->v, v);
   for (int j = 0; j < x->n; j++) q[j] = x->r->q[j] + time * x->r->v[j];
   for (int j = 0; w != 0 && j < 3 * x->r->s->bodies; j += 3) {
     double dx = x->r->q[j] - f->origin[0], dy = x->r->q[j + 1] - f->origin[1];
@@ -195,15 +186,15 @@ static int linear_same (pw_linearisation *x, double time) {
   if (pw_linear_evaluate (x, x->r->t + time, q, v) != PW_OK) return 0;
   pw_evaluate_residuals (x->r->w, x->r->active, &now);
   if (!(now.position <= LINEAR_STEADY && now.velocity <= LINEAR_STEADY)) return 0;
-  linear_rotate (x, angle, x->a0, expected);
+  pw_linear_rotate (x, angle, x->a0, expected);
   if (!linear_agree (x, x->a, expected)) return 0;
-  linear_rotate (x, angle, x->along, x->x);
-  linear_rotate (x, angle, x->along + x->n, x->x + x->n);
+  pw_linear_rotate (x, angle, x->along, x->x);
+  pw_linear_rotate (x, angle, x->along + x->n, x->x + x->n);
   pw_linear_vary (x);
-  double *end = pw_linear_violation (x, x->residual);
+  double *end = linear_violation (x, x->residual);
   for (double *i = x->residual; i < end; i++)
     if (!(fabs (*i) <= LINEAR_STEADY)) return 0;
-  linear_rotate (x, angle, x->response, expected);
+  pw_linear_rotate (x, angle, x->response, expected);
   return linear_agree (x, x->da, expected);
 }
 

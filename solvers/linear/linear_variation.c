@@ -172,3 +172,12 @@ void pw_linear_turn (const pw_linearisation *x, double w, const double *in, doub
     out[j + 1] += w * in[j];
   }
 }
+
+void pw_linear_rotate (const pw_linearisation *x, double angle, const double *in, double *out) {
+  double c = pw_cos (angle), s = pw_sin (angle);
+  memcpy (out, in, (size_t)x->n * sizeof *out);
+  for (int j = 0; j < 3 * x->r->s->bodies; j += 3) {
+    out[j] = c * in[j] - s * in[j + 1];
+    out[j + 1] = s * in[j] + c * in[j + 1];
+  }
+}

@@ -59,26 +59,12 @@ static const double erk8_e3[] = {
   2.01365400804030348374776537501e-1, 4.47106157277725905176885569043e-2 - 0.220588235294117647058823529412e-1, 0,
 };
 static const pw_tableau erk8_tableau = {
-  .stages = 12, .order = 8, .c = erk8_c, .A = erk8_A, .b = erk8_b, .e = erk8_e, .e3 = erk8_e3, .e6 = erk8_e6,
+  .stages = 12, .c = erk8_c, .A = erk8_A, .b = erk8_b, .e = erk8_e, .e3 = erk8_e3, .e6 = erk8_e6,
   .exponent = 1. / 8, .memory = 0.04
 };
 /* clang-format on */
 
-static int erk8_open (pw_run *r, pw_error *error) {
-  return pw_rk_open (r, &erk8_tableau, error);
-}
-
-const pw_method pw_method_erk8 = {
-  .name = "erk8",
-  .about = "explicit Runge-Kutta of order 8(5,3), adaptive (Dormand & Prince; Hairer, Norsett & Wanner 1993)",
-  .adaptive = 1,
-  .order = 8,
-  .stabilisations = pw_rk_stabilisations,
-  .options = pw_rk_options,
-  .open = erk8_open,
-  .advance = pw_rk_advance,
-  .at = pw_rk_at,
-  .restart = pw_rk_restart,
-  .close = pw_rk_close,
-  .serialise = pw_rk_serialise,
-};
+PW_RK_METHOD (
+    erk8, erk8_tableau,
+    .about = "explicit Runge-Kutta of order 8(5,3), adaptive (Dormand & Prince; Hairer, Norsett & Wanner 1993)",
+    .adaptive = 1, .order = 8, .options = pw_rk_options);

@@ -22,7 +22,7 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
-#include "nullspace.h"
+#include "rk_step.h"
 #include "unroll.h"
 #include "util.h"
 
@@ -30,20 +30,13 @@
 
 static int nullspace_allocate (pw_nullspace *b, const pw_system *s) {
   size_t m = (size_t)b->rows, all = (size_t)s->rows, n = (size_t)s->coords;
-  pw_layout l = { NULL, 0 };
-  for (int pass = 0; pass < 2; pass++) {
-    b->place = pw_layout_alloc (&l, all, sizeof *b->place);
-    b->pivot = pw_layout_alloc (&l, m, sizeof *b->pivot);
-    b->reference = pw_layout_alloc (&l, n * m, sizeof *b->reference);
-    b->K = pw_layout_alloc (&l, m * m, sizeof *b->K);
-    b->mu = pw_layout_alloc (&l, m, sizeof *b->mu);
-    b->eta = pw_layout_alloc (&l, all, sizeof *b->eta);
-    b->v = pw_layout_alloc (&l, n + 3, sizeof *b->v);
-    if (pass == 1) break;
-    b->memory = calloc (1, l.used + 1);
-    if (b->memory == NULL) return PW_RESOURCE;
-    l = (pw_layout){ b->memory, 0 };
-  }
+  const pw_array array[] = {
+    { &b->reference, n * m }, { &b->K, m * m }, { &b->mu, m }, { &b->eta, all }, { &b->v, n + 3 }
+  };
+  b->memory = pw_alloc_arrays (array, sizeof array / sizeof *array);
+  b->place = malloc ((2 * all + 1) * sizeof *b->place);
+  if (b->memory == NULL || b->place == NULL) return PW_RESOURCE;
+  b->pivot = b->place + all;
   return PW_OK;
 }
 
@@ -62,6 +55,7 @@ int pw_nullspace_open (pw_nullspace *b, pw_run *r, pw_error *error) {
 
 void pw_nullspace_close (pw_nullspace *b) {
   free (b->memory);
+  free (b->place);
   *b = (pw_nullspace){ 0 };
 }
 

@@ -8,7 +8,7 @@ enum { PW_RK_STAGES = 16 };
 
 /* c and b have `stages` entries; A holds the rows of the lower triangle, one after the other. */
 typedef struct {
-  int stages, order;
+  int stages;
   const double *c, *A, *b;
   const double *e;  /* stages + 1: of the error estimate, the last for the new state; NULL: none */
   const double *e3; /* as e: of a second, cruder estimate, combined as in DOP853; NULL: none */
@@ -19,7 +19,6 @@ typedef struct {
 
 extern const pw_tableau pw_erk5_tableau;
 
-/* For the table of each method. */
 int pw_rk_open (pw_run *r, const pw_tableau *tableau, pw_error *error);
 int pw_rk_advance (pw_run *r, double t_end, pw_error *error);
 int pw_rk_at (pw_run *r, double t, pw_error *error);
@@ -28,5 +27,20 @@ void pw_rk_close (pw_run *r);
 void pw_rk_serialise (pw_run *r, pw_archive *a);
 extern const pw_stabilisation pw_rk_stabilisations[];
 extern const pw_option pw_rk_options[]; /* the first one only for tableaus with an error estimate */
+
+/* Defines the table of a method with this tableau; then follow the members that methods do not share. */
+#define PW_RK_METHOD(method, tableau, ...)                                       \
+  static int method##_open (pw_run *r, pw_error *error) {                        \
+    return pw_rk_open (r, &tableau, error);                                      \
+  }                                                                              \
+  const pw_method pw_method_##method = { .name = #method,                        \
+                                         .stabilisations = pw_rk_stabilisations, \
+                                         .open = method##_open,                  \
+                                         .advance = pw_rk_advance,               \
+                                         .at = pw_rk_at,                         \
+                                         .restart = pw_rk_restart,               \
+                                         .close = pw_rk_close,                   \
+                                         .serialise = pw_rk_serialise,           \
+                                         __VA_ARGS__ }
 
 #endif

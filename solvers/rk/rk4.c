@@ -4,22 +4,7 @@
 static const double rk4_c[] = { 0, 0.5, 0.5, 1 };
 static const double rk4_A[] = { 0.5, 0, 0.5, 0, 0, 1 };
 static const double rk4_b[] = { 1. / 6, 1. / 3, 1. / 3, 1. / 6 };
-static const pw_tableau rk4_tableau = { .stages = 4, .order = 4, .c = rk4_c, .A = rk4_A, .b = rk4_b };
+static const pw_tableau rk4_tableau = { .stages = 4, .c = rk4_c, .A = rk4_A, .b = rk4_b };
 
-static int rk4_open (pw_run *r, pw_error *error) {
-  return pw_rk_open (r, &rk4_tableau, error);
-}
-
-const pw_method pw_method_rk4 = {
-  .name = "rk4",
-  .about = "classical Runge-Kutta of order 4, fixed step (Kutta 1901)",
-  .order = 4,
-  .stabilisations = pw_rk_stabilisations,
-  .options = pw_rk_options + 1,
-  .open = rk4_open,
-  .advance = pw_rk_advance,
-  .at = pw_rk_at,
-  .restart = pw_rk_restart,
-  .close = pw_rk_close,
-  .serialise = pw_rk_serialise,
-};
+PW_RK_METHOD (rk4, rk4_tableau, .about = "classical Runge-Kutta of order 4, fixed step (Kutta 1901)", .order = 4,
+              .options = pw_rk_options + 1);

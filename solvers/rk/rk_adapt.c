@@ -29,7 +29,7 @@
 void pw_rk_begin_adaptive (pw_run *r) {
   struct pw_method_data *d = r->data;
   d->h = 0.1 * r->w->scale.time * pow (r->settings.rtol, d->tableau->exponent);
-  d->before = 1e-4;
+  d->last_error = 1e-4;
 }
 
 /* out = sum_j w_j K_j, two entries at a time. */
@@ -94,11 +94,11 @@ static double adapt_one (pw_run *r, const pw_rk_row *e, int projected) {
 }
 
 /* From the mean squares of estimates to an error; see the top of this file. */
-static double adapt_sharpen (double e5, double e3) {
+static double adapt_combine (double e5, double e3) {
   return e5 == 0 ? 0 : e5 / sqrt (e5 + 0.01 * e3);
 }
 
-static double adapt_watch (double e6, double e5) {
+static double adapt_guard (double e6, double e5) {
   return e6 == 0 ? 0 : e6 * sqrt (e6) / (e6 + e5);
 }
 
@@ -110,11 +110,11 @@ static double adapt_state (pw_run *r, int projected) {
   adapt_weigh (r);
   double e = adapt_one (r, &d->estimate[0], projected);
   if (b->e3 == NULL) return sqrt (e);
-  double off = adapt_sharpen (e, adapt_one (r, &d->estimate[1], projected));
+  double err = adapt_combine (e, adapt_one (r, &d->estimate[1], projected));
   double e6 = adapt_whole (r, &d->estimate[2]);
-  if (adapt_watch (e6, e) > off) /* otherwise its projection, which mostly reduces e6, is not needed */
-    off = fmax (off, adapt_watch (adapt_remaining (r, e6, projected), e));
-  return off;
+  if (adapt_guard (e6, e) > err) /* otherwise its projection, which mostly reduces e6, is not needed */
+    err = fmax (err, adapt_guard (adapt_remaining (r, e6, projected), e));
+  return err;
 }
 
 /* The error of work and losses, which projections do not change, divided by h. */
@@ -127,8 +127,8 @@ static double adapt_ledger (pw_run *r, double h) {
     adapt_estimate (&d->estimate[k], d->R, r->s->entries, r->ledger_at);
     for (int i = 0; i < r->s->entries; i++) e[k] += r->ledger_at[i] * r->ledger_at[i] / (tolerance * tolerance);
   }
-  double off = b->e3 ? fmax (adapt_sharpen (e[0], e[1]), adapt_watch (e[2], e[0])) : sqrt (e[0]);
-  return isfinite (off) ? off : 0;
+  double err = b->e3 ? fmax (adapt_combine (e[0], e[1]), adapt_guard (e[2], e[0])) : sqrt (e[0]);
+  return isfinite (err) ? err : 0;
 }
 
 /* The error of the step, accepted up to 1.  Work and losses are checked only if the state is accepted. */
@@ -144,49 +144,49 @@ static double adapt_reversal (const pw_run *r) {
   int n = r->s->coords, stages = d->tableau->stages;
   double sum = 0;
   for (int j = 0; j < n; j++) {
-    double range = pw_saturation_range (r, n + j), off = 0, change = 0;
+    double range = pw_saturation_range (r, n + j), moved = 0, change = 0;
     for (int i = 1; i <= stages && isfinite (range); i++) {
-      off = fmax (off, fabs (d->V[i][j] - r->v[j]));
+      moved = fmax (moved, fabs (d->V[i][j] - r->v[j]));
       change = fmax (change, fabs (d->A[i][j] - r->a[j]));
     }
-    change *= off > range ? 0.5 * d->weight[2 * j + 1] : 0;
+    change *= moved > range ? 0.5 * d->weight[2 * j + 1] : 0;
     sum += change * change;
   }
   return sqrt (sum / (2 * n));
 }
 
 /* The factor of the step size, 0.2 to 5. */
-static double adapt_factor (const struct pw_method_data *d, double error) {
+static double adapt_factor (const struct pw_method_data *d, double err) {
   const pw_tableau *b = d->tableau;
-  if (error == 0) return 5;
-  double f = 0.9 * pow (error, -(b->exponent - 0.75 * b->memory)) * pow (d->before, b->memory);
+  if (err == 0) return 5;
+  double f = 0.9 * pow (err, -(b->exponent - 0.75 * b->memory)) * pow (d->last_error, b->memory);
   return fmin (5, fmax (0.2, f));
 }
 
-/* The step to t1, its error in *off.  If a signal jumps at t1, the estimate uses the derivative just before t1, since the
+/* The step to t1, its error in *err.  If a signal jumps at t1, the estimate uses the derivative just before t1, since the
  * jump is not an error of the step. */
-static int adapt_step (pw_run *r, double h, double t1, int project, double *added, double *off) {
+static int adapt_step (pw_run *r, double h, double t1, int project, double *added, double *err) {
   struct pw_method_data *d = r->data;
   double before = pw_before_breakpoint (r, t1);
   r->near_singular = 0;
   int status = pw_rk_step (r, h, t1, project, added);
   if (status == PW_OK && before < t1) status = pw_run_accelerate (r, before, d->q, d->v, d->a, d->lambda);
-  *off = status == PW_OK ? adapt_error (r, h, project) : INFINITY;
-  if (r->s->saturates && *off <= 1) *off = hypot (*off, pow (r->settings.rtol, 0.25) * h * adapt_reversal (r));
+  *err = status == PW_OK ? adapt_error (r, h, project) : INFINITY;
+  if (r->s->saturates && *err <= 1) *err = hypot (*err, pow (r->settings.rtol, 0.25) * h * adapt_reversal (r));
   if (status == PW_OK && before < t1) status = pw_run_accelerate (r, t1, d->q, d->v, d->a, d->lambda);
-  if (status != PW_OK) *off = INFINITY;
+  if (status != PW_OK) *err = INFINITY;
   return status;
 }
 
 /* After a step shortened by the requested end, the next one has at least the size planned before; its error is remembered if
  * it was long enough to predict that of the next one. */
-static void adapt_accept (pw_run *r, double h, double t1, double added, double off, double most, int cut) {
+static void adapt_accept (pw_run *r, double h, double t1, double added, double err, double most, int cut) {
   struct pw_method_data *d = r->data;
-  double next = h * fmin (most, adapt_factor (d, off));
+  double next = h * fmin (most, adapt_factor (d, err));
   pw_rk_accept (r, h, t1, added);
   pw_bound_tolerances (r);
   d->h = cut ? fmax (next, d->h) : next;
-  if (!cut || h > 0.5 * d->h) d->before = fmax (off, 1e-4);
+  if (!cut || h > 0.5 * d->h) d->last_error = fmax (err, 1e-4);
   r->statistics.steps++;
 }
 
@@ -201,20 +201,20 @@ int pw_rk_advance_adaptive (pw_run *r, double t_end, pw_error *error) {
   double least = 16 * DBL_EPSILON * fmax (fabs (r->t), 1e-6 * r->w->scale.time);
   int status = PW_OK, project = d->projects && (r->statistics.steps + 1) % d->every == 0;
   for (;;) {
-    double t1 = r->t + d->h, added = 0, off;
+    double t1 = r->t + d->h, added = 0, err;
     int cut = t1 > stop - 0.01 * d->h;
     if (cut) t1 = stop;
     double h = t1 - r->t;
     if (!cut && !(h > least)) return adapt_fail (r, status, h, error);
     if (most < 5 && (status = pw_run_check_limits (r, error)) != PW_OK) return status;
-    status = adapt_step (r, h, t1, project, r->settings.ledger ? &added : NULL, &off);
+    status = adapt_step (r, h, t1, project, r->settings.ledger ? &added : NULL, &err);
     if (status < 0) return pw_rk_fail (r, status, h, error);
-    if (off <= 1) {
-      adapt_accept (r, h, t1, added, off, most, cut);
+    if (err <= 1) {
+      adapt_accept (r, h, t1, added, err, most, cut);
       return PW_OK;
     }
     r->statistics.rejected++;
-    d->h = h * (isfinite (off) ? fmin (0.9, adapt_factor (d, off)) : 0.2);
+    d->h = h * (isfinite (err) ? fmin (0.9, adapt_factor (d, err)) : 0.2);
     most = 1; /* no growth right after a rejection */
   }
 }

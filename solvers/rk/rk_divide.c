@@ -8,14 +8,8 @@
 #include "dense_output.h"
 #include "rk_step.h"
 
-/* A state from which a step can begin, with the run's layout. */
-typedef struct {
-  double t, *q;
-  double *ledger, *rate, projected;
-} divide_begin;
-
 /* A step to t: state in d->q, ledger in ledger_at; energy: 1 to compute projected_at. */
-static int divide_step (pw_run *r, const divide_begin *from, double t, int project, int energy) {
+static int divide_step (pw_run *r, const pw_rk_begin *from, double t, int project, int energy) {
   const double h = t - from->t, reached = r->t;
   double *const q = r->q, *const v = r->v, *const a = r->a, *const rate = r->rate, added = 0;
   const size_t n = (size_t)r->s->coords + 3;
@@ -28,26 +22,27 @@ static int divide_step (pw_run *r, const divide_begin *from, double t, int proje
 }
 
 /* The same in two parts, by way of the time `by`. */
-static int divide_two_parts (pw_run *r, const divide_begin *from, double by, double t, int project) {
+static int divide_two_parts (pw_run *r, const pw_rk_begin *from, double by, double t, int project) {
   struct pw_method_data *d = r->data;
   int status = divide_step (r, from, by, project, 1);
   if (status != PW_OK) return status;
-  const divide_begin middle = { by, d->middle, d->ledger_middle, d->rate_middle, r->projected_at };
-  memcpy (d->middle, d->q, pw_rk_block (r, 0));
-  memcpy (d->ledger_middle, r->ledger_at, (size_t)r->s->entries * sizeof (double));
-  pw_ledger_rates (r, d->lambda, d->rate_middle);
-  return divide_step (r, &middle, t, project, 1);
+  d->middle.t = by, d->middle.projected = r->projected_at;
+  memcpy (d->middle.q, d->q, pw_rk_block (r, 0));
+  memcpy (d->middle.ledger, r->ledger_at, (size_t)r->s->entries * sizeof (double));
+  pw_ledger_rates (r, d->lambda, d->middle.rate);
+  return divide_step (r, &d->middle, t, project, 1);
 }
 
 /* Tries divisions of the step to t1 in two parts of irregular sizes, the first one longer than to `least`, until two
  * results are closer than `best`; *by: that of the closest, which must be closer than `enough`.  status: of the undivided
  * step, whose result is in d->q.  In a step from the state reached, energy added by projections is an error, too. */
-static int divide (pw_run *r, const divide_begin *from, int status, double t1, int project, double least, double best,
-                   double enough, double *by) {
+static int divide (pw_run *r, const pw_rk_begin *from, int status, double t1, int project, double least, double *by) {
   static const double part[] = { 0.382, 0.681, 0.209, 0.847, 0.127, 0.541, 0.943, 0.302, 0.764, 0.891 };
   const struct pw_method_data *d = r->data;
   double closest = INFINITY, energy = fmax (r->energy_scene, r->exchanged);
-  int known = status == PW_OK, is_step = from->q == r->q;
+  int known = status == PW_OK, is_step = from->q == r->q; /* otherwise it is a sample */
+  const double best = is_step ? r->limits.agree_best : r->limits.sample_best;
+  const double enough = is_step ? r->limits.agree : r->limits.sample;
   if (known) memcpy (r->q_at, d->q, pw_rk_block (r, 1));
   for (size_t i = 0; i < sizeof part / sizeof *part && closest > best; i++) {
     double t = from->t + part[i] * (t1 - from->t);
@@ -70,27 +65,27 @@ static int divide (pw_run *r, const divide_begin *from, int status, double t1, i
 
 int pw_rk_at (pw_run *r, double t, pw_error *error) {
   struct pw_method_data *d = r->data;
-  if (t > r->t || t < d->t0) return pw_fail_outside (r, d->t0, t, error);
+  const pw_rk_begin *from = &d->last;
+  if (t > r->t || t < from->t) return pw_fail_outside (r, from->t, t, error);
   if (t == r->t) {
     pw_show_reached (r);
     return PW_OK;
   }
-  const divide_begin from = { d->t0, d->q0, d->ledger0, d->rate0, d->projected0 };
   const pw_statistics statistics = r->statistics;
   const double refuse = r->refuse;
   const int near = r->near_singular;
   double by;
   r->near_singular = 0;
   r->refuse = 0;
-  int status = divide_step (r, &from, t, d->projects, r->settings.ledger);
+  int status = divide_step (r, from, t, d->projects, r->settings.ledger);
   if (r->near_singular && status >= 0) {
-    status = divide (r, &from, status, t, d->projects, d->t0, r->limits.sample_best, r->limits.sample, &by);
-    if (status == PW_OK) status = divide_two_parts (r, &from, by, t, d->projects);
+    status = divide (r, from, status, t, d->projects, from->t, &by);
+    if (status == PW_OK) status = divide_two_parts (r, from, by, t, d->projects);
   }
   memcpy (r->q_at, d->q, pw_rk_block (r, 1));
   r->statistics = statistics, r->refuse = refuse, r->near_singular = near;
   if (status < 0) return pw_fail_signal (t, error);
-  return status == PW_OK ? PW_OK : pw_rk_fail (r, status, t - d->t0, error);
+  return status == PW_OK ? PW_OK : pw_rk_fail (r, status, t - from->t, error);
 }
 
 /* ---- Fixed steps ---- */
@@ -101,16 +96,13 @@ int pw_rk_at (pw_run *r, double t, pw_error *error) {
  * *t. */
 static int fixed_step_around (pw_run *r, int status, int lands, double t1, double stop, int project, double *t) {
   static const double beyond[] = { 0.62, 2.62, 7.62 };
-  const divide_begin from = { r->t, r->q, r->ledger, r->rate, r->projected };
-  const pw_watchdog *limit = &r->limits;
+  const pw_rk_begin from = { r->t, r->q, r->ledger, r->rate, r->projected };
   double added = 0;
-  if (!lands) status = divide (r, &from, status, t1, project, r->t, limit->agree_best, limit->agree, t);
+  if (!lands) status = divide (r, &from, status, t1, project, r->t, t);
   if (lands && status == PW_OK) status = PW_RETRY;
   for (size_t i = 0; i < sizeof beyond / sizeof *beyond && status == PW_RETRY && t1 < stop; i++)
-    status = divide (r, &from, status, fmin (t1 + beyond[i] * r->settings.step, stop), project, t1, limit->agree_best,
-                     limit->agree, t);
-  if (lands && status == PW_RETRY)
-    status = divide (r, &from, status, t1, project, r->t, limit->agree_best, limit->agree, t);
+    status = divide (r, &from, status, fmin (t1 + beyond[i] * r->settings.step, stop), project, t1, t);
+  if (lands && status == PW_RETRY) status = divide (r, &from, status, t1, project, r->t, t);
   if (status == PW_OK) status = pw_rk_step (r, *t - r->t, *t, project, &added);
   if (status == PW_OK) pw_rk_accept (r, *t - r->t, *t, r->settings.ledger ? added : 0);
   return status;

@@ -56,30 +56,22 @@ static void rk_list_weights (struct pw_method_data *d) {
 }
 
 static int rk_allocate (struct pw_method_data *d, const pw_system *s) {
-  size_t n = (size_t)s->coords + 3, entries = (size_t)s->entries;
-  pw_layout l = { NULL, 0 };
-  for (int pass = 0; pass < 2; pass++) {
-    for (int i = 1; i < d->tableau->stages; i++) {
-      d->V[i] = pw_layout_alloc (&l, n, sizeof (double));
-      d->A[i] = pw_layout_alloc (&l, n, sizeof (double));
-      d->R[i] = pw_layout_alloc (&l, entries, sizeof (double));
-    }
-    d->R[d->tableau->stages] = pw_layout_alloc (&l, entries, sizeof (double)); /* at the new state, for the error */
-    d->q = pw_layout_alloc (&l, 3 * n + (size_t)s->rows, sizeof (double));
-    d->q0 = pw_layout_alloc (&l, 3 * n, sizeof (double));
-    d->weight = pw_layout_alloc (&l, 2 * n, sizeof (double));
-    d->ledger0 = pw_layout_alloc (&l, entries, sizeof (double));
-    d->rate0 = pw_layout_alloc (&l, entries, sizeof (double));
-    d->middle = pw_layout_alloc (&l, 3 * n, sizeof (double));
-    d->ledger_middle = pw_layout_alloc (&l, entries, sizeof (double));
-    d->rate_middle = pw_layout_alloc (&l, entries, sizeof (double));
-    if (pass == 1) break;
-    d->memory = calloc (1, l.used);
-    if (d->memory == NULL) return PW_RESOURCE;
-    l = (pw_layout){ d->memory, 0 };
+  size_t n = (size_t)s->coords + 3, entries = (size_t)s->entries, count = 9;
+  int stages = d->tableau->stages;
+  pw_array array[9 + 3 * PW_RK_STAGES] = {
+    { &d->R[stages], entries }, /* at the new state, for the error */
+    { &d->q, 3 * n + (size_t)s->rows }, { &d->weight, 2 * n },       { &d->last.q, 3 * n },
+    { &d->last.ledger, entries },       { &d->last.rate, entries },  { &d->middle.q, 3 * n },
+    { &d->middle.ledger, entries },     { &d->middle.rate, entries }
+  };
+  for (int i = 1; i < stages; i++) {
+    array[count++] = (pw_array){ &d->V[i], n };
+    array[count++] = (pw_array){ &d->A[i], n };
+    array[count++] = (pw_array){ &d->R[i], entries };
   }
+  d->memory = pw_alloc_arrays (array, count);
+  if (d->memory == NULL) return PW_RESOURCE;
   d->v = d->q + n, d->a = d->v + n, d->lambda = d->a + n;
-  d->v0 = d->q0 + n, d->a0 = d->v0 + n;
   return PW_OK;
 }
 
@@ -109,16 +101,12 @@ void pw_rk_close (pw_run *r) {
 
 int pw_rk_restart (pw_run *r, pw_error *error) {
   struct pw_method_data *d = r->data;
-  size_t entries = (size_t)r->s->entries * sizeof (double);
   (void)error;
-  d->base = d->t0 = r->t;
+  d->base = r->t;
   d->count = 0;
   d->split = 0;
   if (d->adaptive) pw_rk_begin_adaptive (r);
-  memcpy (d->q0, r->q, pw_rk_block (r, 0));
-  memcpy (d->ledger0, r->ledger, entries);
-  memcpy (d->rate0, r->rate, entries);
-  d->projected0 = r->projected;
+  pw_rk_keep (r);
   return PW_OK;
 }
 
@@ -128,7 +116,7 @@ void pw_rk_serialise (pw_run *r, pw_archive *a) {
   pw_archive_count (a, &d->count);
   pw_archive_bytes (a, &d->split, sizeof d->split);
   pw_archive_bytes (a, &d->h, sizeof d->h);
-  pw_archive_bytes (a, &d->before, sizeof d->before);
+  pw_archive_bytes (a, &d->last_error, sizeof d->last_error);
 }
 
 /* ---- Advancing ---- */

@@ -141,18 +141,21 @@ int pw_rk_step (pw_run *r, double h, double t1, int project, double *added) {
   return status == PW_OK ? pw_nullspace_accelerate (r, d->v, d->a, d->lambda) : status;
 }
 
-/* The step is good: it becomes the state reached. */
+void pw_rk_keep (pw_run *r) {
+  pw_rk_begin *last = &r->data->last;
+  size_t entries = (size_t)r->s->entries * sizeof (double);
+  last->t = r->t, last->projected = r->projected;
+  memcpy (last->q, r->q, pw_rk_block (r, 0));
+  memcpy (last->ledger, r->ledger, entries);
+  memcpy (last->rate, r->rate, entries);
+}
+
 void pw_rk_accept (pw_run *r, double h, double t1, double added) {
   struct pw_method_data *d = r->data;
-  size_t entries = (size_t)r->s->entries;
-  d->t0 = r->t;
-  memcpy (d->q0, r->q, pw_rk_block (r, 0));
+  pw_rk_keep (r);
   memcpy (r->q, d->q, pw_rk_block (r, 1));
   r->t = t1;
-  memcpy (d->ledger0, r->ledger, entries * sizeof (double));
-  memcpy (d->rate0, r->rate, entries * sizeof (double));
-  d->projected0 = r->projected;
-  pw_rk_ledger (r, r->ledger, d->ledger0, h);
+  pw_rk_ledger (r, r->ledger, d->last.ledger, h);
   r->projected += added;
   pw_ledger_rates (r, r->lambda, r->rate);
 }

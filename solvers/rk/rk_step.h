@@ -1,11 +1,31 @@
 /* Private to Runge-Kutta methods: stages and steps (rk_step.c), step-size control (rk_adapt.c), fixed steps and samples
- * (rk_divide.c). */
+ * (rk_divide.c), null-space method (nullspace.c). */
 #ifndef PW_RK_STEP_H
 #define PW_RK_STEP_H
 
-#include "nullspace.h"
 #include "rk.h"
 #include "specialised.h"
+
+/* Null-space velocities (nullspace.c). */
+enum { PW_NULLSPACE_MOST = 256 }; /* constraint equations: their matrix is dense */
+
+typedef struct {
+  int rows;          /* active ones */
+  int *place;        /* all equations: index among the active ones, or -1 */
+  double *reference; /* coords x rows: W^-1 J0^T */
+  double *K;         /* rows x rows: J W^-1 J0^T, factorised in place */
+  double *mu;        /* rows */
+  double *eta;       /* all equations */
+  double *v;         /* coords + 3: scratch */
+  int *pivot;        /* rows */
+  char *memory;
+} pw_nullspace;
+
+/* The beginning of a step. */
+typedef struct {
+  double t, *q; /* q, v, a in one block, as in the run */
+  double *ledger, *rate, projected;
+} pw_rk_begin;
 
 struct pw_method_data {
   const pw_tableau *tableau;
@@ -22,17 +42,18 @@ struct pw_method_data {
   /* velocities, accelerations and ledger rates of the stages */
   double *V[PW_RK_STAGES], *A[PW_RK_STAGES], *R[PW_RK_STAGES];
   double *q, *v, *a, *lambda; /* state of a stage, then the new state: one block, as in the run */
-  double h, before;           /* adaptive: next step, error of the last one */
+  double h, last_error;       /* adaptive: next step, error of the last one */
   double *weight;             /* adaptive: reciprocal tolerances of each position and its velocity */
-  /* the beginning of the last step, for samples inside it: one block */
-  double t0, *q0, *v0, *a0, *ledger0, *rate0, projected0;
-  double *middle, *ledger_middle, *rate_middle; /* a state between that and a sample: q, v, a in one block */
+  pw_rk_begin last, middle;   /* of the last step, for samples inside it; of the second part of a divided step */
   char *memory;
 };
 
 /* A step from the current state to t1 = t + h; the new state is left in d->q, d->v, d->a, d->lambda.  project: onto the
  * constraints; *added grows by the energy this adds, unless NULL.  PW_RETRY: a smaller step may succeed. */
 int pw_rk_step (pw_run *r, double h, double t1, int project, double *added);
+
+/* The state reached is the beginning of the last step. */
+void pw_rk_keep (pw_run *r);
 
 /* Makes the new state the current one. */
 void pw_rk_accept (pw_run *r, double h, double t1, double added);
@@ -57,12 +78,24 @@ int pw_rk_advance_adaptive (pw_run *r, double t_end, pw_error *error);
 /* Sets the size of the first step of an adaptive method, also after a discontinuity. */
 void pw_rk_begin_adaptive (pw_run *r);
 
-/* ---- Several steps (several.c) ---- */
+/* ---- Null-space velocities of a step, which satisfy the constraints by construction (nullspace.c) ---- */
 
-/* Fills x for the next steps up to t and before t_end, two at least, and returns their number; 0: single steps have to
- * be taken. */
-int pw_several_plan (pw_run *r, double t, double t_end, pw_scene_steps *x);
-/* Makes the result the state reached.  Errors: PW_METHOD. */
-int pw_several_finish (pw_run *r, const pw_scene_steps *x, pw_error *error);
+/* PW_INPUT if the scene has more than PW_NULLSPACE_MOST independent constraint equations; PW_RESOURCE. */
+int pw_nullspace_open (pw_nullspace *b, pw_run *r, pw_error *error);
+void pw_nullspace_close (pw_nullspace *b);
+
+/* Begins a step at the current state of the run.  PW_METHOD if a signal failed. */
+int pw_nullspace_begin (pw_nullspace *b, pw_run *r);
+
+/* Replaces v by the velocities at (t, q) with the same null-space velocities; updates kinematics and J.  PW_RETRY if the
+ * step is too large for its basis, or the configuration is singular; PW_METHOD if a signal failed. */
+int pw_nullspace_velocities (pw_nullspace *b, pw_run *r, double t, const double *q, double *v);
+
+/* Accelerations and multipliers right after pw_nullspace_velocities.  Returns as pw_run_accelerate. */
+int pw_nullspace_accelerate (pw_run *r, const double *v, double *a, double *lambda);
+
+/* Velocities at the end of a step, after projecting positions onto g = 0 if there is a projector; *added grows by the
+ * energy this adds, unless added is NULL. */
+int pw_nullspace_finalise (pw_nullspace *b, pw_projector *p, pw_run *r, double t, double *q, double *v, double *added);
 
 #endif

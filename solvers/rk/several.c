@@ -62,7 +62,7 @@ static void several_report (pw_run *r, const pw_scene_steps *x) {
   pw_statistics *s = &r->statistics;
   pw_geometry *g = &r->geometry;
   r->t = x->t;
-  d->t0 = x->t0, d->projected0 = r->projected;
+  d->last.t = x->t0, d->last.projected = r->projected;
   d->count += x->done;
   r->near_singular = 0, r->w->failed = NULL;
   r->reference_level = x->watch.reference, r->previous_norm = x->watch.norm;
@@ -77,7 +77,9 @@ static void several_report (pw_run *r, const pw_scene_steps *x) {
   memcpy (g->q, r->q, (size_t)r->s->coords * sizeof *g->q);
 }
 
-int pw_several_plan (pw_run *r, double t, double t_end, pw_scene_steps *x) {
+/* Fills x for the next steps up to t and before t_end, two at least, and returns their number; 0: single steps have to
+ * be taken. */
+static int several_plan (pw_run *r, double t, double t_end, pw_scene_steps *x) {
   struct pw_method_data *d = r->data;
   int count = several_suits (r) ? several_count (r, t, t_end) : 0;
   if (count < 2) return 0;
@@ -91,11 +93,11 @@ int pw_several_plan (pw_run *r, double t, double t_end, pw_scene_steps *x) {
                          .number = d->count,
                          .t = r->t,
                          .state = r->q,
-                         .state0 = d->q0,
+                         .state0 = d->last.q,
                          .ledger = r->ledger,
-                         .ledger0 = d->ledger0,
+                         .ledger0 = d->last.ledger,
                          .rate = r->rate,
-                         .rate0 = d->rate0,
+                         .rate0 = d->last.rate,
                          .V = d->V,
                          .A = d->A,
                          .R = d->R,
@@ -106,7 +108,8 @@ int pw_several_plan (pw_run *r, double t, double t_end, pw_scene_steps *x) {
   return count;
 }
 
-int pw_several_finish (pw_run *r, const pw_scene_steps *x, pw_error *error) {
+/* Makes the result the state reached.  Errors: PW_METHOD. */
+static int several_finish (pw_run *r, const pw_scene_steps *x, pw_error *error) {
   int status = PW_OK;
   if (r->s->coords > 3 * r->s->bodies) pw_point_to_internal (r->w, r->q, r->v);
   if (x->done > 0) {
@@ -125,11 +128,11 @@ int pw_several_finish (pw_run *r, const pw_scene_steps *x, pw_error *error) {
 int pw_run_advance_towards (pw_run *r, double t, double t_end, pw_error *error) {
   pw_scene_steps x;
   if (pw_require (r, "a run", error) != PW_OK) return PW_INPUT;
-  if (pw_several_plan (r, t, t_end, &x) == 0) return pw_run_advance (r, t_end, error);
+  if (several_plan (r, t, t_end, &x) == 0) return pw_run_advance (r, t_end, error);
   r->stopped = 0;
   if (pw_run_stop_requested (r)) return PW_STOPPED;
   r->specialised->steps (r->scene, &x);
-  int status = pw_several_finish (r, &x, error);
+  int status = several_finish (r, &x, error);
   return status == PW_OK && x.done == 0 ? pw_run_advance (r, t_end, error) : status;
 }
 
@@ -153,7 +156,7 @@ static void several_add (several_lanes *x, int i, double t_end) {
   if (first && (r->method != first->method || r->stabilisation != first->stabilisation ||
                 r->settings.step != first->settings.step))
     return;
-  if (pw_several_plan (x->run[i], t_end, t_end, &x->steps[x->n]) > 0) x->which[x->n++] = i;
+  if (several_plan (x->run[i], t_end, t_end, &x->steps[x->n]) > 0) x->which[x->n++] = i;
 }
 
 /* Empty lanes repeat the first run. */
@@ -183,7 +186,7 @@ void pw_runs_advance (pw_run *const *runs, int count, double t_end, const pw_spe
     several_take (&x, code, memory);
     for (int k = 0; k < x.n; k++) {
       int i = x.which[k];
-      status[i] = pw_several_finish (runs[i], &x.steps[k], &error[i]);
+      status[i] = several_finish (runs[i], &x.steps[k], &error[i]);
       done[i] = x.steps[k].done > 0 || status[i] != PW_OK;
     }
   }

@@ -43,8 +43,8 @@ static void newton_combine (pw_bdf_newton *w, int n) {
 }
 
 /* Called by CVODES: evaluates T unless the current one is still valid, then forms the matrix with gamma. */
-static int newton_set_up (pw_real t, N_Vector y, N_Vector derivative, SUNMatrix matrix, booleantype good,
-                          booleantype *fresh, pw_real gamma, void *data, N_Vector t1, N_Vector t2, N_Vector t3) {
+static int newton_set_up (realtype t, N_Vector y, N_Vector derivative, SUNMatrix matrix, booleantype good,
+                          booleantype *fresh, realtype gamma, void *data, N_Vector t1, N_Vector t2, N_Vector t3) {
   multistep_data *d = data;
   pw_bdf_newton *w = &d->newton;
   const pw_tangent *x = &w->tangent;
@@ -83,7 +83,7 @@ static void newton_right (const multistep_data *d, const double *b, double *righ
   }
 }
 
-static int newton_solve (SUNLinearSolver solver, SUNMatrix matrix, N_Vector vx, N_Vector vb, pw_real tolerance) {
+static int newton_solve (SUNLinearSolver solver, SUNMatrix matrix, N_Vector vx, N_Vector vb, realtype tolerance) {
   multistep_data *d = solver->content;
   pw_bdf_newton *w = &d->newton;
   const double *b = N_VGetArrayPointer (vb), *da = N_VGetArrayPointer (w->change);

@@ -1,4 +1,4 @@
-/* ida: the variable-order BDF code IDAS of SUNDIALS (Hindmarsh et al. 2005), on the equations of ida_equations.c.
+/* ida: the variable-order BDF code IDAS of SUNDIALS (Hindmarsh et al. 2005), on the equations of dae.h.
  *
  * The Newton matrix is exact and sparse, factorised by KLU.  The error test excludes lambda and mu but no velocities,
  * not even those of massless coordinates.  In si1 it includes all unknowns. */
@@ -6,16 +6,73 @@
 #include <stdlib.h>
 #include <string.h>
 #include <idas/idas.h>
+#include "dae.h"
 #include "dense_output.h"
-#include "ida_equations.h"
 #include "rank.h"
+#include "sundials.h"
+
+struct pw_method_data {
+  pw_sun sun;   /* first */
+  void *memory; /* IDA's */
+  pw_dae dae;
+  N_Vector yp, id;
+  double *unit; /* rows: 1 for a force, L for a moment */
+};
+
+typedef struct pw_method_data ida_data;
+
+/* ---- Equations ---- */
+
+/* Updates kinematics and J at the unknowns. */
+static int ida_update (ida_data *d, double t, const double *y) {
+  return pw_evaluate_J_at (d->sun.run->w, pw_before_breakpoint (d->sun.run, t), y, y + d->dae.n);
+}
+
+/* The multipliers of the independent equations, among the unknowns or among their derivatives. */
+static const double *ida_lambda (const ida_data *d, const double *y, const double *yp) {
+  return (d->dae.impulses ? yp : y) + 2 * d->dae.n;
+}
+
+/* Called by IDA: F (t, y, y'). */
+static int ida_residual (realtype t, N_Vector vy, N_Vector vyp, N_Vector out, void *data) {
+  ida_data *d = data;
+  int n = d->dae.n;
+  const double *y = N_VGetArrayPointer (vy), *yp = N_VGetArrayPointer (vyp);
+  double *F = N_VGetArrayPointer (out);
+  if (pw_run_stop_requested (d->sun.run) || ida_update (d, t, y) != PW_OK) return -1;
+  pw_dae_residual (&d->dae, y + n, yp + n, ida_lambda (d, y, yp), F);
+  for (int j = 0; j < n; j++) F[j] += yp[j] - y[n + j];
+  return 0;
+}
+
+/* Called by IDA: dF/dy + c dF/dy'. */
+static int ida_matrix (realtype t, realtype c, N_Vector vy, N_Vector vyp, N_Vector residual, SUNMatrix matrix,
+                       void *data, N_Vector t1, N_Vector t2, N_Vector t3) {
+  ida_data *d = data;
+  pw_tangent *x = &d->dae.tangent;
+  const double *y = N_VGetArrayPointer (vy), *yp = N_VGetArrayPointer (vyp), *v = y + d->dae.n;
+  (void)residual, (void)t1, (void)t2, (void)t3;
+  if (ida_update (d, t, y) != PW_OK) return -1;
+  pw_sun_clear (matrix, x->colptr, x->rowind);
+  pw_scatter_begin (&x->scatter, SUNSparseMatrix_Data (matrix));
+  pw_dae_matrix (&d->dae, v, yp + d->dae.n, ida_lambda (d, y, yp), c, c);
+  pw_matrix_evaluated (d->sun.run, y, v);
+  return 0;
+}
+
+static int ida_open_matrix (ida_data *d) {
+  const double *y = N_VGetArrayPointer (d->sun.y), *yp = N_VGetArrayPointer (d->yp);
+  int n = d->dae.n, status = pw_dae_lay_out (&d->dae, y + n, yp + n, ida_lambda (d, y, yp));
+  return status == PW_OK ? pw_sun_open_matrix (&d->sun, d->dae.size, d->dae.tangent.colptr, d->dae.tangent.rowind)
+                         : status;
+}
 
 /* ---- Error weights ---- */
 
 /* The coefficient c of the current step, 1 / h before the first; at least 1 / T. */
 static double ida_leading (const ida_data *d) {
   const pw_run *r = d->sun.run;
-  pw_real c = 0;
+  realtype c = 0;
   if (r->t == d->sun.t0 || IDAGetCurrentCj (d->memory, &c) != IDA_SUCCESS || c == 0) c = 1 / pw_first_step (r);
   return fmax (c, 1 / r->w->scale.time);
 }
@@ -40,16 +97,16 @@ static int ida_weigh (N_Vector vy, N_Vector weights, void *user) {
   const pw_run *r = d->sun.run;
   const pw_settings *set = &r->settings;
   const double *y = N_VGetArrayPointer (vy);
-  int stiff = d->velocities && !d->impulses;
+  int stiff = d->dae.velocities && !d->dae.impulses;
   double *w = N_VGetArrayPointer (weights), force = ida_force (r);
   double L = r->s->scale.length, T = r->w->scale.time, c = stiff ? ida_leading (d) : 1 / T;
-  double relax = d->impulses ? T : c * T, mu = (set->atol > 0 ? set->atol : set->rtol * L / T) * relax;
+  double relax = d->dae.impulses ? T : c * T, mu = (set->atol > 0 ? set->atol : set->rtol * L / T) * relax;
   pw_sun_weigh (&d->sun, y, w);
-  for (int i = 0; i < d->rows; i++) {
-    double lambda = d->impulses ? r->lambda[d->tangent.map ? d->tangent.row[i] : i] : y[2 * d->n + i];
-    w[2 * d->n + i] = 1 / (relax * set->rtol * (fabs (lambda) + force * d->unit[i]));
+  for (int i = 0; i < d->dae.rows; i++) {
+    double lambda = d->dae.impulses ? r->lambda[d->dae.tangent.map ? d->dae.tangent.row[i] : i] : y[2 * d->dae.n + i];
+    w[2 * d->dae.n + i] = 1 / (relax * set->rtol * (fabs (lambda) + force * d->unit[i]));
   }
-  for (int i = 0; i < d->mus; i++) w[2 * d->n + d->rows + i] = 1 / (mu * d->unit[i]);
+  for (int i = 0; i < d->dae.mus; i++) w[2 * d->dae.n + d->dae.rows + i] = 1 / (mu * d->unit[i]);
   return 0;
 }
 
@@ -58,25 +115,25 @@ static int ida_weigh (N_Vector vy, N_Vector weights, void *user) {
 /* Fills IDA's vectors with the current state. */
 static void ida_fill_vectors (ida_data *d) {
   const pw_run *r = d->sun.run;
-  size_t n = (size_t)d->n;
+  size_t n = (size_t)d->dae.n;
   double *y = N_VGetArrayPointer (d->sun.y), *yp = N_VGetArrayPointer (d->yp);
-  memset (y, 0, (size_t)d->size * sizeof *y);
-  memset (yp, 0, (size_t)d->size * sizeof *y);
+  memset (y, 0, (size_t)d->dae.size * sizeof *y);
+  memset (yp, 0, (size_t)d->dae.size * sizeof *y);
   memcpy (y, r->q, n * sizeof *y);
   memcpy (y + n, r->v, n * sizeof *y);
-  pw_tangent_compress (&d->tangent, r->lambda, d->rows, (d->impulses ? yp : y) + 2 * n);
+  pw_tangent_compress (&d->dae.tangent, r->lambda, d->dae.rows, (d->dae.impulses ? yp : y) + 2 * n);
   memcpy (yp, r->v, n * sizeof *y);
   memcpy (yp + n, r->a, n * sizeof *y);
 }
 
 /* Copies (q, v, a, lambda) from y and y'. */
 static void ida_read (const ida_data *d, double *q, double *v, double *a, double *lambda) {
-  size_t n = (size_t)d->n;
+  size_t n = (size_t)d->dae.n;
   const double *y = N_VGetArrayPointer (d->sun.y), *yp = N_VGetArrayPointer (d->yp);
   memcpy (q, y, n * sizeof *q);
   memcpy (v, y + n, n * sizeof *v);
   memcpy (a, yp + n, n * sizeof *a);
-  pw_tangent_store (&d->tangent, pw_ida_lambda (d, y, yp), lambda);
+  pw_tangent_store (&d->dae.tangent, ida_lambda (d, y, yp), lambda);
 }
 
 /* Interpolates the state at t into the sample arrays and updates kinematics.  Accelerations and multipliers are
@@ -92,7 +149,7 @@ static int ida_interpolate (ida_data *d, double t) {
   if (flag == IDA_SUCCESS && steps > 0) flag = IDAGetDky (d->memory, t, 0, d->sun.y);
   if (flag != IDA_SUCCESS) return flag;
   ida_read (d, r->q_at, r->v_at, r->a_at, r->lambda_at);
-  if (pw_ida_update (d, t, N_VGetArrayPointer (d->sun.y)) != 0) return IDA_RES_FAIL;
+  if (ida_update (d, t, N_VGetArrayPointer (d->sun.y)) != PW_OK) return IDA_RES_FAIL;
   pw_statistics keep = r->statistics;
   if (pw_saddle_factor (r->saddle) == PW_OK) pw_run_accelerate_updated (r, r->v_at, r->a_at, r->lambda_at);
   r->statistics = keep;
@@ -108,37 +165,32 @@ static int ida_power (pw_run *r, double t, double *rate) {
 }
 
 /* Work and losses up to the current state; the saddle-point matrix is factorised if `status` is PW_OK.  Multipliers
- * outside the error test are not accurate enough and are recomputed.  0, or -1 if a signal failed. */
+ * outside the error test are not accurate enough and are recomputed.  PW_METHOD if a signal failed. */
 static int ida_work (ida_data *d, int status) {
   pw_run *r = d->sun.run;
   int order = 1;
-  double *y = N_VGetArrayPointer (d->sun.y);
   const double *lambda = r->lambda;
-  if (status == PW_OK && d->velocities && pw_ledger_reacts (r->s)) {
+  if (status == PW_OK && d->dae.velocities && pw_ledger_reacts (r->s)) {
     pw_run_accelerate_updated (r, r->v, r->a_at, r->lambda_at);
     lambda = r->lambda_at;
   }
   pw_ledger_rates (r, lambda, r->rate);
   IDAGetLastOrder (d->memory, &order);
-  if (!pw_quadrature_step (&d->sun.quadrature, r, order)) return 0;
-  memcpy (y, r->q, (size_t)d->n * sizeof *y);
-  memcpy (y + d->n, r->v, (size_t)d->n * sizeof *y);
-  return pw_ida_update (d, r->t, y);
+  if (!pw_quadrature_step (&d->sun.quadrature, r, order)) return PW_OK;
+  return pw_evaluate_J_at (r->w, pw_before_breakpoint (r, r->t), r->q, r->v);
 }
 
 /* ---- Opening ---- */
 
 static int ida_open_vectors (ida_data *d, pw_run *r) {
-  const pw_system *s = r->s;
-  if (pw_sun_open (&d->sun, r, d->size) != PW_OK) return PW_RESOURCE;
-  d->yp = pw_sun_vector (d->size, d->sun.context);
-  d->id = pw_sun_vector (d->size, d->sun.context);
-  d->given = calloc ((size_t)(2 * d->n + 6 + 3 * s->rows), sizeof *d->given);
-  if (!d->yp || !d->id || !d->given) return PW_RESOURCE;
-  d->unit = d->given + 2 * d->n + 6 + 2 * s->rows;
-  for (int i = 0; i < d->rows; i++)
-    d->unit[i] = pw_rank_multiplier_unit (d->sun.run->w, d->tangent.map ? d->tangent.row[i] : i);
-  for (int i = 0; i < d->size; i++) N_VGetArrayPointer (d->id)[i] = i < 2 * d->n || d->impulses;
+  if (pw_sun_open (&d->sun, r, d->dae.size) != PW_OK) return PW_RESOURCE;
+  d->yp = pw_sun_vector (d->dae.size, d->sun.context);
+  d->id = pw_sun_vector (d->dae.size, d->sun.context);
+  d->unit = calloc ((size_t)d->dae.rows + 1, sizeof *d->unit);
+  if (!d->yp || !d->id || !d->unit) return PW_RESOURCE;
+  for (int i = 0; i < d->dae.rows; i++)
+    d->unit[i] = pw_rank_multiplier_unit (d->sun.run->w, d->dae.tangent.map ? d->dae.tangent.row[i] : i);
+  for (int i = 0; i < d->dae.size; i++) N_VGetArrayPointer (d->id)[i] = i < 2 * d->dae.n || d->dae.impulses;
   ida_fill_vectors (d);
   return PW_OK;
 }
@@ -153,10 +205,10 @@ static int ida_open_solver (ida_data *d) {
   if (m == NULL || pw_sun_open_solver (x, x->y, d, NULL) != PW_OK) return PW_RESOURCE;
   x->solver->ops->initialize = ida_initialise;
   if (IDASetErrHandlerFn (m, pw_sun_message, x) || IDASetUserData (m, d) ||
-      IDAInit (m, pw_ida_residual, x->run->t, x->y, d->yp) || IDAWFtolerances (m, ida_weigh) || IDASetId (m, d->id) ||
+      IDAInit (m, ida_residual, x->run->t, x->y, d->yp) || IDAWFtolerances (m, ida_weigh) || IDASetId (m, d->id) ||
       IDASetSuppressAlg (m, 1) || IDASetMaxNumSteps (m, -1) || IDASetMaxConvFails (m, PW_SUN_ATTEMPTS) ||
       IDASetMaxErrTestFails (m, PW_SUN_ATTEMPTS) || IDASetInitStep (m, pw_first_step (x->run)) ||
-      IDASetLinearSolver (m, x->solver, x->matrix) || IDASetJacFn (m, pw_ida_matrix))
+      IDASetLinearSolver (m, x->solver, x->matrix) || IDASetJacFn (m, ida_matrix))
     return PW_RESOURCE;
   if (!x->run->s->saturates) return PW_OK;
   x->iteration = SUNNonlinSol_Newton (x->y, x->context);
@@ -167,16 +219,8 @@ static int ida_open_solver (ida_data *d) {
 static int ida_open (pw_run *r, pw_error *error) {
   ida_data *d = r->data = calloc (1, sizeof *d);
   if (d == NULL) return pw_sun_no_memory (r, error);
-  d->impulses = pw_stabilised_by (r, PW_SI1);
-  d->positions = d->impulses || pw_stabilised_by (r, PW_GGL);
-  d->velocities = d->positions || pw_stabilised_by (r, PW_INDEX2);
-  if (pw_tangent_open (&d->tangent, r) != PW_OK) return pw_sun_no_memory (r, error);
-  d->n = r->s->coords;
-  d->rows = d->tangent.rows;
-  d->mus = d->positions ? d->tangent.holonomic : 0;
-  d->size = 2 * d->n + d->rows + d->mus;
-  if (ida_open_vectors (d, r) != PW_OK || pw_ida_open_matrix (d) != PW_OK || ida_open_solver (d) != PW_OK ||
-      pw_quadrature_open (&d->sun.quadrature, r, ida_power) != PW_OK)
+  if (pw_dae_open (&d->dae, r) != PW_OK || ida_open_vectors (d, r) != PW_OK || ida_open_matrix (d) != PW_OK ||
+      ida_open_solver (d) != PW_OK || pw_quadrature_open (&d->sun.quadrature, r, ida_power) != PW_OK)
     return pw_sun_no_memory (r, error);
   if (r->statistics.steps == 0)
     d->sun.before = (pw_statistics){ 0 }; /* without evaluations of the initial conditions */
@@ -189,8 +233,8 @@ static void ida_close (pw_run *r) {
   if (d->yp) N_VDestroy (d->yp);
   if (d->id) N_VDestroy (d->id);
   pw_sun_close (&d->sun);
-  pw_tangent_close (&d->tangent);
-  free (d->given);
+  pw_dae_close (&d->dae);
+  free (d->unit);
   free (d);
 }
 
@@ -234,24 +278,23 @@ static int ida_restart (pw_run *r, pw_error *error) {
 static int ida_reach (ida_data *d) {
   pw_run *r = d->sun.run;
   ida_read (d, r->q, r->v, r->a, r->lambda);
-  if (pw_ida_update (d, r->t, N_VGetArrayPointer (d->sun.y)) != 0) return PW_METHOD;
+  int status = ida_update (d, r->t, N_VGetArrayPointer (d->sun.y));
+  if (status != PW_OK) return status;
   pw_bound_tolerances (r);
-  int status = pw_saddle_factor (r->saddle);
+  status = pw_saddle_factor (r->saddle);
   if (status < 0) return status;
-  if (status == PW_OK && !d->velocities) pw_run_accelerate_updated (r, r->v, r->a_at, r->lambda);
+  if (status == PW_OK && !d->dae.velocities) pw_run_accelerate_updated (r, r->v, r->a_at, r->lambda);
   r->near_singular = status != PW_OK || pw_watchdog_near (r);
-  return r->s->entries > 0 && ida_work (d, status) != 0 ? PW_METHOD : PW_OK;
+  return r->s->entries > 0 ? ida_work (d, status) : PW_OK;
 }
 
 static int ida_advance (pw_run *r, double t_end, pw_error *error) {
   ida_data *d = r->data;
   double stop = fmin (t_end, r->breakpoint), t = r->t;
-  int flag = stop != d->sun.stop ? IDASetStopTime (d->memory, stop) : IDA_SUCCESS;
-  d->sun.stop = stop;
+  int flag = IDASetStopTime (d->memory, stop);
   if (flag >= 0) flag = IDASolve (d->memory, stop, &t, d->sun.y, d->yp, IDA_ONE_STEP);
   if (flag < 0) return ida_fail (d, flag, error);
   r->t = flag == IDA_TSTOP_RETURN ? stop : t;
-  if (flag == IDA_TSTOP_RETURN) d->sun.stop = NAN;
   if (ida_reach (d) != PW_OK) return ida_fail (d, IDA_RES_FAIL, error);
   ida_statistics (d);
   return PW_OK;

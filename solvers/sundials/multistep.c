@@ -22,7 +22,7 @@
 
 /* ---- Callbacks ---- */
 
-static int multistep_derivative (pw_real t, N_Vector vy, N_Vector derivative, void *data) {
+static int multistep_derivative (realtype t, N_Vector vy, N_Vector derivative, void *data) {
   multistep_data *d = data;
   const double *y = N_VGetArrayPointer (vy);
   double *out = N_VGetArrayPointer (derivative);
@@ -43,10 +43,8 @@ static int multistep_weigh (N_Vector y, N_Vector weights, void *data) {
 
 /* Projects q and v at t.  Returns as pw_project_positions. */
 static int multistep_project (multistep_data *d, double t, double *q, double *v) {
-  pw_run *r = d->sun.run;
-  int status = pw_update_kinematics (r->w, t, q, v);
-  if (status == PW_OK) status = pw_project_positions (&d->projector, r, t, q, v);
-  return status == PW_OK ? pw_project_velocities (&d->projector, r, v) : status;
+  int status = pw_project_positions (&d->projector, d->sun.run, t, q, v);
+  return status == PW_OK ? pw_project_velocities (&d->projector, d->sun.run, v) : status;
 }
 
 /* Leaves the part of the error tangential to the constraints (Eich 1993), in the metric of the projection, plus a small
@@ -62,7 +60,7 @@ static void multistep_project_error (multistep_data *d, double *e) {
 }
 
 /* The projection function of CVODES. */
-static int multistep_correct (pw_real t, N_Vector vy, N_Vector change, pw_real enough, N_Vector error, void *data) {
+static int multistep_correct (realtype t, N_Vector vy, N_Vector change, realtype enough, N_Vector error, void *data) {
   multistep_data *d = data;
   const double *y = N_VGetArrayPointer (vy);
   double *out = N_VGetArrayPointer (change);
@@ -81,19 +79,25 @@ static int multistep_correct (pw_real t, N_Vector vy, N_Vector change, pw_real e
 
 /* ---- Inside the last step ---- */
 
-/* Completes a sample: projects the interpolated state if the method projects, then evaluates accelerations and
- * multipliers. */
-static int multistep_complete (multistep_data *d, double t) {
+/* Accelerations and multipliers at q, v, projected before if `project` is 1; near singular configurations, too, and not
+ * counted in the statistics. */
+static int multistep_complete (multistep_data *d, double t, int project, double *q, double *v, double *a,
+                               double *lambda) {
   pw_run *r = d->sun.run;
-  int status = PW_OK, near = r->near_singular;
+  int near = r->near_singular;
   pw_statistics keep = r->statistics;
   r->refuse = 0;
-  if (d->projects) status = multistep_project (d, t, r->q_at, r->v_at);
-  if (status == PW_OK) status = pw_run_accelerate (r, t, r->q_at, r->v_at, r->a_at, r->lambda_at);
+  int status = project ? multistep_project (d, t, q, v) : PW_OK;
+  if (status == PW_OK) status = pw_run_accelerate (r, t, q, v, a, lambda);
   r->refuse = r->limits.rank;
   r->statistics = keep;
   r->near_singular = near;
   return status;
+}
+
+static int multistep_complete_sample (multistep_data *d, double t) {
+  pw_run *r = d->sun.run;
+  return multistep_complete (d, t, d->projects, r->q_at, r->v_at, r->a_at, r->lambda_at);
 }
 
 /* Interpolates the state at t into the sample arrays.  CV_SUCCESS or CV_BAD_T. */
@@ -109,7 +113,7 @@ static int multistep_interpolate (multistep_data *d, double t) {
 
 static int multistep_power (pw_run *r, double t, double *rate) {
   int status = multistep_interpolate (r->data, t) == CV_SUCCESS ? PW_OK : PW_RETRY;
-  if (status == PW_OK) status = multistep_complete (r->data, t);
+  if (status == PW_OK) status = multistep_complete_sample (r->data, t);
   if (status == PW_OK) pw_ledger_rates (r, r->lambda_at, rate);
   return status;
 }
@@ -251,43 +255,27 @@ static int multistep_reach (multistep_data *d, double t, pw_error *error) {
 static int multistep_advance (pw_run *r, double t_end, pw_error *error) {
   multistep_data *d = r->data;
   double stop = fmin (t_end, r->breakpoint), t = r->t;
-  int flag = stop != d->sun.stop ? CVodeSetStopTime (d->cvode, stop) : CV_SUCCESS;
-  d->sun.stop = stop;
+  int flag = CVodeSetStopTime (d->cvode, stop);
   r->near_singular = 0;
   if (flag >= 0) flag = CVode (d->cvode, stop, d->sun.y, &t, CV_ONE_STEP);
   if (flag < 0) return multistep_fail (d, flag, error);
-  if (flag == CV_TSTOP_RETURN) d->sun.stop = NAN;
   multistep_count (d);
   return multistep_reach (d, flag == CV_TSTOP_RETURN ? stop : t, error);
 }
 
-/* Evaluates the accelerations of the current state unless that is done already; not counted in the statistics. */
-static int multistep_complete_reached (multistep_data *d) {
-  pw_run *r = d->sun.run;
-  pw_statistics keep = r->statistics;
-  int near = r->near_singular;
-  if (d->evaluated) return PW_OK;
-  r->refuse = 0;
-  int status = pw_run_accelerate (r, pw_before_breakpoint (r, r->t), r->q, r->v, r->a, r->lambda);
-  r->refuse = r->limits.rank;
-  r->statistics = keep;
-  r->near_singular = near;
-  d->evaluated = status == PW_OK;
-  return status;
-}
-
 static int multistep_at (pw_run *r, double t, pw_error *error) {
   multistep_data *d = r->data;
-  int status;
+  int status = PW_OK;
   if (t == r->t) {
-    status = multistep_complete_reached (d);
+    if (!d->evaluated) status = multistep_complete (d, pw_before_breakpoint (r, t), 0, r->q, r->v, r->a, r->lambda);
+    d->evaluated = status == PW_OK;
     if (status == PW_OK) pw_show_reached (r);
   } else {
     if (t < r->t && r->s->entries > 0) pw_quadrature_at (&d->sun.quadrature, r, t);
     int flag = multistep_interpolate (d, t);
     if (flag == CV_BAD_T) return pw_fail_outside (r, NAN, t, error);
     if (flag != CV_SUCCESS) return multistep_fail (d, flag, error);
-    status = multistep_complete (d, t);
+    status = multistep_complete_sample (d, t);
   }
   if (status > 0) return pw_fail_singular (r, t, error);
   return status == PW_OK ? PW_OK : pw_fail_signal (t, error);

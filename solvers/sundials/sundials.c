@@ -23,7 +23,7 @@ int pw_sun_open (pw_sun *x, pw_run *r, int unknowns) {
   enum { VECTORS = 60, TABLE = 1024, REST = 1 << 17 };
   x->run = r;
   if (pw_reserve (VECTORS * (TABLE + (size_t)unknowns * sizeof (double)) + REST) != PW_OK ||
-      SUNContext_Create (PW_SUN_NO_COMM, &x->context) != 0)
+      SUNContext_Create (NULL, &x->context) != 0)
     return PW_RESOURCE;
   x->y = pw_sun_vector (unknowns, x->context);
   if (x->y) pw_sun_restart (x);
@@ -45,7 +45,6 @@ void pw_sun_restart (pw_sun *x) {
   double *y = N_VGetArrayPointer (x->y);
   memcpy (y, r->q, (size_t)r->s->coords * sizeof *y);
   memcpy (y + r->s->coords, r->v, (size_t)r->s->coords * sizeof *y);
-  x->stop = NAN;
   x->t0 = r->t;
   x->before = r->statistics;
 }
@@ -75,7 +74,7 @@ static int sun_factorise (SUNLinearSolver solver, SUNMatrix matrix) {
   return SUNLinSolSetup (((pw_sun *)solver->content)->klu, matrix);
 }
 
-static int sun_solve (SUNLinearSolver solver, SUNMatrix matrix, N_Vector result, N_Vector b, pw_real tolerance) {
+static int sun_solve (SUNLinearSolver solver, SUNMatrix matrix, N_Vector result, N_Vector b, realtype tolerance) {
   const pw_sun *x = solver->content;
   if (x->run->outdated) return SUNLS_PACKAGE_FAIL_REC;
   return SUNLinSolSolve (x->klu, matrix, result, b, tolerance);
@@ -95,7 +94,7 @@ int pw_sun_open_solver (pw_sun *x, N_Vector right, void *content, pw_sun_solve *
 /* ---- Newton's iteration, error weights ---- */
 
 /* Tests the size of the correction, or of the error that remains after it at the current rate of convergence. */
-static int sun_converged (SUNNonlinearSolver newton, N_Vector y, N_Vector change, pw_real enough, N_Vector weights,
+static int sun_converged (SUNNonlinearSolver newton, N_Vector y, N_Vector change, realtype enough, N_Vector weights,
                           void *data) {
   double *before = data, size = N_VWrmsNorm (change, weights), rate = size / *before;
   int iteration = 0;

@@ -1,10 +1,8 @@
-/* Common parts of the SUNDIALS integrators; the only file that depends on its version.  Tested with 6.4; the names of
- * 7.x are unverified. */
+/* Common parts of the SUNDIALS integrators, for version 6 (tested with 6.4). */
 #ifndef PW_SUNDIALS_H
 #define PW_SUNDIALS_H
 
 #include <stdint.h>
-#include <sundials/sundials_config.h>
 #include <sundials/sundials_types.h>
 #include <sundials/sundials_context.h>
 #include <nvector/nvector_serial.h>
@@ -12,14 +10,6 @@
 #include <sunmatrix/sunmatrix_sparse.h>
 #include <sunnonlinsol/sunnonlinsol_newton.h>
 #include "quadrature.h"
-
-#if SUNDIALS_VERSION_MAJOR >= 7 /* unverified */
-#define PW_SUN_NO_COMM SUN_COMM_NULL
-typedef sunrealtype pw_real;
-#else
-#define PW_SUN_NO_COMM NULL
-typedef realtype pw_real;
-#endif
 
 /* Attempts at a step, each about a quarter of the previous one, if the Newton iteration does not converge or the error
  * is too large: from 1 s down to the round-off of time.  SUNDIALS' default of 10, a millionth of the step, does not
@@ -35,7 +25,6 @@ typedef struct {
   SUNNonlinearSolver iteration; /* NULL: the default of the integrator */
   double correction;            /* size of the last Newton correction */
   pw_quadrature quadrature;     /* of work and losses */
-  double stop;                  /* the stop time set in the integrator */
   double t0;                    /* of the initial conditions or the last restart */
   pw_statistics before;         /* counts at t0, where those of the integrator begin */
   char message[256];            /* the last message of the integrator */
@@ -53,7 +42,7 @@ N_Vector pw_sun_vector (sunindextype length, SUNContext context);
 
 /* A matrix of this pattern, in compressed columns, and a linear solver that refuses an outdated matrix, so that the
  * integrator requests a new one; otherwise it calls `solve` (NULL: that of KLU) with `content`. */
-typedef int pw_sun_solve (SUNLinearSolver solver, SUNMatrix matrix, N_Vector x, N_Vector b, pw_real tolerance);
+typedef int pw_sun_solve (SUNLinearSolver solver, SUNMatrix matrix, N_Vector x, N_Vector b, realtype tolerance);
 int pw_sun_open_matrix (pw_sun *x, int size, const int64_t *colptr, const int64_t *rowind);
 int pw_sun_open_solver (pw_sun *x, N_Vector right, void *content, pw_sun_solve *solve);
 

@@ -30,11 +30,11 @@ static void vectors_sum_by (sunindextype n, double a, const double *x, double b,
     vectors_sum (n, a, x, b, y, z);
 }
 
-static void vectors_linear_sum (pw_real a, N_Vector x, pw_real b, N_Vector y, N_Vector z) {
+static void vectors_linear_sum (realtype a, N_Vector x, realtype b, N_Vector y, N_Vector z) {
   vectors_sum_by (NV_LENGTH_S (z), a, NV_DATA_S (x), b, NV_DATA_S (y), NV_DATA_S (z));
 }
 
-static void vectors_scale (pw_real c, N_Vector vx, N_Vector vz) {
+static void vectors_scale (realtype c, N_Vector vx, N_Vector vz) {
   sunindextype i = 0, n = NV_LENGTH_S (vz);
   const double *x = NV_DATA_S (vx);
   double *z = NV_DATA_S (vz);
@@ -45,13 +45,13 @@ static void vectors_scale (pw_real c, N_Vector vx, N_Vector vz) {
   for (; i < n; i++) z[i] = c * x[i];
 }
 
-static void vectors_const (pw_real c, N_Vector vz) {
+static void vectors_const (realtype c, N_Vector vz) {
   double *z = NV_DATA_S (vz);
   for (sunindextype i = 0, n = NV_LENGTH_S (vz); i < n; i++) z[i] = c;
 }
 
 /* z = sum_k c_k x_k */
-static int vectors_combine (int count, pw_real *c, N_Vector *x, N_Vector z) {
+static int vectors_combine (int count, realtype *c, N_Vector *x, N_Vector z) {
   if (count == 1)
     vectors_scale (c[0], x[0], z);
   else
@@ -61,20 +61,20 @@ static int vectors_combine (int count, pw_real *c, N_Vector *x, N_Vector z) {
 }
 
 /* z_k = a_k x + y_k */
-static int vectors_add_to (int count, pw_real *a, N_Vector x, N_Vector *y, N_Vector *z) {
+static int vectors_add_to (int count, realtype *a, N_Vector x, N_Vector *y, N_Vector *z) {
   for (int k = 0; k < count; k++) vectors_linear_sum (a[k], x, 1, y[k], z[k]);
   return 0;
 }
 
-static int vectors_scale_each (int count, pw_real *c, N_Vector *x, N_Vector *z) {
+static int vectors_scale_each (int count, realtype *c, N_Vector *x, N_Vector *z) {
   for (int k = 0; k < count; k++) vectors_scale (c[k], x[k], z[k]);
   return 0;
 }
 
 /* ---- Norms ---- */
 
-/* The sum of (x_i w_i)^2; with an id, only over id_i > 0. */
-PW_INLINE double vectors_squares (N_Vector vx, N_Vector vw, const double *id) {
+/* sqrt (sum (x_i w_i)^2 / n); with an id, only over id_i > 0. */
+PW_INLINE double vectors_root (N_Vector vx, N_Vector vw, const double *id) {
   sunindextype i = 0, n = NV_LENGTH_S (vx);
   const double *x = NV_DATA_S (vx), *w = NV_DATA_S (vw);
   double even = 0, odd = 0;
@@ -84,23 +84,15 @@ PW_INLINE double vectors_squares (N_Vector vx, N_Vector vw, const double *id) {
     if (id == NULL || id[i + 1] > 0) odd += q * q;
   }
   if (i < n && (id == NULL || id[i] > 0)) even += x[i] * w[i] * (x[i] * w[i]);
-  return even + odd;
+  return sqrt ((even + odd) / (double)n);
 }
 
-static pw_real vectors_sum_squares (N_Vector x, N_Vector w) {
-  return vectors_squares (x, w, NULL);
+static realtype vectors_norm (N_Vector x, N_Vector w) {
+  return vectors_root (x, w, NULL);
 }
 
-static pw_real vectors_sum_squares_of (N_Vector x, N_Vector w, N_Vector id) {
-  return vectors_squares (x, w, NV_DATA_S (id));
-}
-
-static pw_real vectors_norm (N_Vector x, N_Vector w) {
-  return sqrt (vectors_squares (x, w, NULL) / (double)NV_LENGTH_S (x));
-}
-
-static pw_real vectors_norm_of (N_Vector x, N_Vector w, N_Vector id) {
-  return sqrt (vectors_squares (x, w, NV_DATA_S (id)) / (double)NV_LENGTH_S (x));
+static realtype vectors_norm_of (N_Vector x, N_Vector w, N_Vector id) {
+  return vectors_root (x, w, NV_DATA_S (id));
 }
 
 N_Vector pw_sun_vector (sunindextype length, SUNContext context) {
@@ -114,7 +106,5 @@ N_Vector pw_sun_vector (sunindextype length, SUNContext context) {
   v->ops->nvscalevectorarray = vectors_scale_each;
   v->ops->nvwrmsnorm = vectors_norm;
   v->ops->nvwrmsnormmask = vectors_norm_of;
-  v->ops->nvwsqrsumlocal = vectors_sum_squares;
-  v->ops->nvwsqrsummasklocal = vectors_sum_squares_of;
   return v;
 }

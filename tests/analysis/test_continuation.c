@@ -186,6 +186,43 @@ static void test_end (void **state) {
   pw_branch_close (&b);
 }
 
+/* p = x^2 / 2 */
+static int parabola (void *context, const double *u, double *F, double *dF, pw_error *error) {
+  (void)context, (void)error;
+  F[0] = u[0] * u[0] / 2 - u[1];
+  if (dF) dF[0] = u[0], dF[1] = -1;
+  return PW_OK;
+}
+
+static int no_events (void *context, pw_error *error) {
+  (void)context, (void)error;
+  return PW_OK;
+}
+
+/* From p = 0.5 through the fold up to p = 1, which no point exceeds though tangents predict too little. */
+static void test_range (void **state) {
+  const pw_branch_equations of = { .unknowns = 1, .equations = 1, .tolerance = 1e-12, .evaluate = parabola };
+  pw_error error = { 0 }, why;
+  (void)state;
+  for (int k = 0; k < 100; k++) {
+    double u[2] = { -1, 0.5 }, p = 0;
+    int folds = 0;
+    pw_branch b;
+    const pw_branch_event *next;
+    continuation_open (&b, &of);
+    b.most = b.step = 0.2 + 0.003 * k, b.accuracy = 1e-9, b.limit = 1000;
+    check_ok (pw_branch_start (&b, u, -1, &error), &error);
+    while (pw_branch_next (&b, no_events, &why, &next, &error) == PW_OK && next) {
+      p = next->point.u[1], folds += next->event == PW_BRANCH_FOLD;
+      assert_true (p >= -1e-12 && p <= 1);
+    }
+    assert_int_equal (folds, 1);
+    check_close ("p", p, 1, 0, "the end of the range");
+    check_close ("x", b.at.u[0], sqrt (2), 1e-12, "the tolerance");
+    pw_branch_close (&b);
+  }
+}
+
 static int without_solution (void *context, const double *u, double *F, double *dF, pw_error *error) {
   (void)context, (void)error;
   F[0] = u[0] * u[0] + 1;
@@ -228,13 +265,10 @@ static void test_damping (void **state) {
 }
 
 int main (void) {
-  const struct CMUnitTest tests[] = { cmocka_unit_test (test_folds),
-                                      cmocka_unit_test (test_pitchforks),
-                                      cmocka_unit_test (test_interpolated),
-                                      cmocka_unit_test (test_direction),
-                                      cmocka_unit_test (test_start_at_fold),
-                                      cmocka_unit_test (test_end),
-                                      cmocka_unit_test (test_without_solution),
+  const struct CMUnitTest tests[] = { cmocka_unit_test (test_folds),         cmocka_unit_test (test_pitchforks),
+                                      cmocka_unit_test (test_interpolated),  cmocka_unit_test (test_direction),
+                                      cmocka_unit_test (test_start_at_fold), cmocka_unit_test (test_end),
+                                      cmocka_unit_test (test_range),         cmocka_unit_test (test_without_solution),
                                       cmocka_unit_test (test_damping) };
   return cmocka_run_group_tests (tests, NULL, NULL);
 }

@@ -12,7 +12,7 @@
 enum { ARKODE_MOST = 12 };
 
 /* (q, v)' = (v, a), evaluated by a separate run. */
-static int arkode_slope (pw_real t, N_Vector y, N_Vector slope, void *run) {
+static int arkode_slope (realtype t, N_Vector y, N_Vector slope, void *run) {
   pw_run *r = run;
   int n = r->s->coords;
   double q[ARKODE_MOST] = { 0 }, v[ARKODE_MOST] = { 0 }, a[ARKODE_MOST], lambda[ARKODE_MOST];
@@ -30,7 +30,7 @@ static int arkode_slope (pw_real t, N_Vector y, N_Vector slope, void *run) {
 static void arkode_run (pw_run *r, double h, double t_end, double *y_end) {
   SUNContext context;
   int n = r->s->coords;
-  assert_int_equal (SUNContext_Create (PW_SUN_NO_COMM, &context), 0);
+  assert_int_equal (SUNContext_Create (NULL, &context), 0);
   N_Vector y = N_VNew_Serial (2 * n, context);
   memcpy (N_VGetArrayPointer (y), r->q, (size_t)n * sizeof (double));
   memcpy (N_VGetArrayPointer (y) + n, r->v, (size_t)n * sizeof (double));
@@ -41,7 +41,7 @@ static void arkode_run (pw_run *r, double h, double t_end, double *y_end) {
   assert_int_equal (ARKStepSetFixedStep (ark, h), 0);
   assert_int_equal (ARKStepSetStopTime (ark, t_end), 0);
   assert_int_equal (ARKStepSetMaxNumSteps (ark, 100000), 0);
-  pw_real t = 0;
+  realtype t = 0;
   assert_true (ARKStepEvolve (ark, t_end, y, &t, ARK_NORMAL) >= 0);
   assert_true (fabs (t - t_end) <= 1e-12);
   memcpy (y_end, N_VGetArrayPointer (y), 2 * (size_t)n * sizeof (double));

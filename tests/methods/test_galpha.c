@@ -4,7 +4,7 @@
 #include <stdio.h>
 #include <string.h>
 #include "check.h"
-#include "galpha_state.h"
+#include "implicit.h"
 #include "ladder.h"
 #include "scene.h"
 #include "system.h"
@@ -99,8 +99,9 @@ static double galpha_condition (const char *model, const char *method, double h)
   pw_system *s = ladder_open (model);
   pw_run *r = runs_open (s, method, &(pw_settings){ .step = h, .span = 1 });
   runs_to (r, 3 * h);
-  pw_sparse *k = &r->data->work.sparse;
-  klu_l_condest (k->colptr, r->data->work.value, k->order, k->factors, &k->common);
+  pw_implicit *x = (pw_implicit *)r->data;
+  pw_sparse *k = &x->sparse;
+  klu_l_condest (k->colptr, x->value, k->order, k->factors, &k->common);
   double condition = k->common.condest;
   pw_run_close (r);
   pw_system_free (s);

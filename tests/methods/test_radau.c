@@ -135,6 +135,17 @@ static void test_tolerances (void **state) {
       }
 }
 
+/* The controller predicts the error of a step from the two before it (Gustafsson 1994): few steps are rejected where the
+ * motion repeats. */
+static void test_step_sizes (void **state) {
+  static const char *const model[] = { "pendulum", "wheeled-snake" };
+  (void)state;
+  for (int i = 0; i < 2; i++) {
+    pw_statistics n = ladder_solve (model[i], "radau+ggl", &(pw_settings){ .rtol = 1e-4, .span = 5 }, 5).cost;
+    check_below (model[i], (double)n.rejected, (double)n.steps / 10, "one step in ten");
+  }
+}
+
 /* ---- Breakpoints ---- */
 
 static int radau_switched (void *context, double t, const double *x, double value[3], double *gradient) {
@@ -299,10 +310,19 @@ static void test_large_steps (void **state) {
 
 int main (void) {
   const struct CMUnitTest tests[] = {
-    cmocka_unit_test (test_order),     cmocka_unit_test (test_order_index3), cmocka_unit_test (test_small_steps_index3),
-    cmocka_unit_test (test_residuals), cmocka_unit_test (test_digits),       cmocka_unit_test (test_tolerances),
-    cmocka_unit_test (test_switched),  cmocka_unit_test (test_damping),      cmocka_unit_test (test_unresolved_samples),
-    cmocka_unit_test (test_pulled),    cmocka_unit_test (test_samples),      cmocka_unit_test (test_large_steps),
+    cmocka_unit_test (test_order),
+    cmocka_unit_test (test_order_index3),
+    cmocka_unit_test (test_small_steps_index3),
+    cmocka_unit_test (test_residuals),
+    cmocka_unit_test (test_digits),
+    cmocka_unit_test (test_tolerances),
+    cmocka_unit_test (test_step_sizes),
+    cmocka_unit_test (test_switched),
+    cmocka_unit_test (test_damping),
+    cmocka_unit_test (test_unresolved_samples),
+    cmocka_unit_test (test_pulled),
+    cmocka_unit_test (test_samples),
+    cmocka_unit_test (test_large_steps),
   };
   return cmocka_run_group_tests (tests, NULL, NULL);
 }

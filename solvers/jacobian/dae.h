@@ -1,0 +1,44 @@
+/* The equations of motion as differential-algebraic equations F (t, y, y') = 0, y = (q, v, lambda, mu):
+ *
+ *   kinematics    q' - v + D G^T mu
+ *   momentum      M a + J^T lambda - f,   a = v'
+ *   constraints, by stabilisation:
+ *     none, baumgarte   J a - gamma + 2 alpha (J v - eta) + beta^2 g   (nonholonomic: + alpha (J v - eta)), mu = 0
+ *     index2            J v - eta                                      mu = 0
+ *     index3            g,  of nonholonomic constraints J v - eta      mu = 0
+ *     ggl, si1          J v - eta,  g
+ *
+ * with G the rows of J of the holonomic equations, D = 1 for lengths and 1/L^2 for angles, so that mu has one unit
+ * (Baumgarte 1972; Gear, Gupta & Leimkuhler 1985; Gear 1988).  In si1 the unknowns lambda and mu are the integrals of
+ * the multipliers. */
+#ifndef PW_DAE_H
+#define PW_DAE_H
+
+#include "tangent.h"
+
+typedef struct {
+  pw_tangent tangent;
+  int velocities;         /* 1: J v = eta is enforced */
+  int positions;          /* 1: g = 0 is enforced: with mu if velocities are, too; neither: acceleration level */
+  int impulses;           /* 1: si1 */
+  int n, rows, mus, size; /* coordinates, independent equations, multipliers mu, unknowns */
+  double *pull, *f;       /* coords + 3: generalised forces of the constraints; applied ones */
+  double *jv, *other;     /* all constraint equations: residuals; terms of them, or g */
+  char *memory;
+} pw_dae;
+
+/* The equations of a run's stabilisation.  PW_OK or PW_RESOURCE; close it in every case. */
+int pw_dae_open (pw_dae *x, pw_run *r);
+void pw_dae_close (pw_dae *x);
+
+/* F without q' - v, where kinematics are up to date and J is evaluated; lambda: the multipliers of the independent
+ * equations, mu after them; a = NULL: 0 (not on acceleration level). */
+void pw_dae_residual (pw_dae *x, const double *v, const double *a, const double *lambda, double *F);
+
+/* Adds dF/dy, with the derivatives by q' times of_q, those by a, and by the multipliers of si1, times of_a. */
+void pw_dae_matrix (pw_dae *x, const double *v, const double *a, const double *lambda, double of_q, double of_a);
+
+/* Determines the pattern of this matrix, in x->tangent.  PW_OK or PW_RESOURCE. */
+int pw_dae_lay_out (pw_dae *x, const double *v, const double *a, const double *lambda);
+
+#endif
