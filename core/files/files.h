@@ -86,12 +86,10 @@ const pw_yaml *pw_file_yaml (const pw_file *f);
 
 /* ---- Tables of numbers (columns.c) ---- */
 
-/* Reads `width` columns of a CSV file into arrays of the arena.  `column` names them, or numbers them from 1; the first
- * column must be increasing; with `gaps`, empty cells and nan in others become NaN.  `unit` is the requested unit of each
- * (NULL: any), to which it is converted if the header names another.
- * PW_INPUT with "SHOWN:LINE: REASON", PW_RESOURCE. */
-int pw_columns_from_stream (FILE *f, const char *shown, const char *const *column, const char *const *unit, int width,
-                            int gaps, pw_arena *arena, double **value, int *count, pw_error *error);
+/* As pw_read_columns, from a stream; `shown` is its path in messages, "SHOWN:LINE: REASON".  Without `gaps`, gaps are
+ * errors. */
+double *pw_columns_from_stream (FILE *f, const char *shown, const char *const *column, const char *const *unit,
+                                int width, int gaps, int *rows, pw_error *error);
 
 /* ---- Units (units.c) ---- */
 

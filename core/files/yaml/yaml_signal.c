@@ -74,7 +74,6 @@ static const char *table_unit (const pw_reader *r) {
 
 static int table_file (pw_reader *r, const char *what, const pw_node *node, const pw_node *columns, pw_signal *s) {
   const char *name, *reason, *column[2] = { "1", "2" }, *const unit[2] = { "s", table_unit (r) };
-  double *value[2];
   pw_error cause = { 0 };
   char text[240];
   snprintf (text, sizeof text, "%s: columns", what);
@@ -86,12 +85,13 @@ static int table_file (pw_reader *r, const char *what, const pw_node *node, cons
   FILE *f = table_open (r->y, name, &reason);
   if (f == NULL && errno == ENOMEM) return pw_yaml_no_memory (r);
   if (f == NULL) return pw_yaml_fail (r, node->at, "%s: cannot read \"%.60s\": %s", what, name, reason);
-  int status = pw_columns_from_stream (f, name, column, unit, 2, 0, r->arena, value, &s->table.count, &cause);
+  double *t = pw_columns_from_stream (f, name, column, unit, 2, 0, &s->table.count, &cause);
   fclose (f);
-  s->table.t = value[0];
-  s->table.value = value[1];
-  if (status == PW_INPUT) return pw_yaml_fail (r, node->at, "%s: %s", what, cause.text);
-  return status == PW_OK ? PW_OK : pw_yaml_no_memory (r);
+  if (cause.status == PW_INPUT) return pw_yaml_fail (r, node->at, "%s: %s", what, cause.text);
+  if (t == NULL || pw_model_keep (r->m, t, free) != PW_OK) return pw_yaml_no_memory (r);
+  s->table.t = t;
+  s->table.value = t + s->table.count;
+  return PW_OK;
 }
 
 /* Reads v[0], points, or v[1], a file, with v[2], its columns.  Limits the total number of points, since many tables
