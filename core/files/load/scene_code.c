@@ -22,14 +22,6 @@ struct pw_scene_code {
   char notice[600];
 };
 
-/* The end of a cached object. */
-typedef struct {
-  char magic[16];
-  unsigned long long object, text, how, check; /* bytes of each part; sum of all of them */
-} code_trailer;
-
-static const char code_magic[16] = "pinwheel scene\n";
-
 typedef struct {
   const pw_system *system;
   const char *text;
@@ -120,24 +112,17 @@ static int code_paths (code_job *x, pw_error *error) {
 
 /* ---- Loading ---- */
 
-static unsigned long long code_sum (const char *bytes, size_t size) {
-  return pw_check_sum (PW_CHECK, bytes, size);
-}
-
 /* Checks a cached object.  PW_RETRY: missing, or of another scene; PW_INPUT: damaged. */
 static int code_check (const code_job *x, pw_error *error) {
   char *bytes;
   size_t size = 0, text = strlen (x->text), how = strlen (x->how);
-  code_trailer end;
+  unsigned long long check = 0;
   int status = code_read (x->object, &bytes, &size, error);
-  if (status == PW_OK && size >= sizeof end) memcpy (&end, bytes + size - sizeof end, sizeof end);
-  if (status == PW_OK &&
-      (size < sizeof end || memcmp (end.magic, code_magic, sizeof code_magic) != 0 || end.object > size ||
-       end.text > size || end.how > size || end.object + end.text + end.how + sizeof end != size ||
-       code_sum (bytes, size - sizeof end) != end.check))
+  if (status == PW_OK && size >= sizeof check) memcpy (&check, bytes + (size -= sizeof check), sizeof check);
+  if (status == PW_OK && pw_check_sum (PW_CHECK, bytes, size) != check)
     status = pw_fail (error, PW_INPUT, "it is damaged");
-  if (status == PW_OK && (end.text != text || end.how != how || memcmp (bytes + end.object, x->text, text) != 0 ||
-                          memcmp (bytes + end.object + text, x->how, how) != 0))
+  if (status == PW_OK && (size < text + how || memcmp (bytes + size - how, x->how, how) != 0 ||
+                          memcmp (bytes + size - how - text, x->text, text) != 0))
     status = PW_RETRY;
   free (bytes);
   return status;
@@ -173,27 +158,23 @@ static int code_load_cached (code_job *x) {
 /* ---- Compiling ---- */
 
 /* Appends text, options and checksum to an object, and renames it. */
-static int code_add_trailer (const code_job *x, pw_error *error) {
+static int code_complete (const code_job *x, pw_error *error) {
   char *bytes;
-  code_trailer end = { .text = strlen (x->text), .how = strlen (x->how) };
-  size_t size;
-  int status = code_read (x->part, &bytes, &size, NULL);
-  if (status != PW_OK) status = pw_fail (error, PW_RESOURCE, "the compiler has written no object");
-  FILE *f = status == PW_OK ? fopen (x->part, "ab") : NULL;
-  if (f) {
-    memcpy (end.magic, code_magic, sizeof code_magic);
-    end.object = size;
-    end.check = pw_check_sum (pw_check_sum (code_sum (bytes, size), x->text, end.text), x->how, end.how);
-    fwrite (x->text, 1, end.text, f);
-    fwrite (x->how, 1, end.how, f);
-    fwrite (&end, sizeof end, 1, f);
-    int failed = ferror (f);
-    if (fclose (f) != 0 || failed || rename (x->part, x->object) != 0) f = NULL;
+  size_t size, text = strlen (x->text), how = strlen (x->how);
+  if (code_read (x->part, &bytes, &size, NULL) != PW_OK) {
+    free (bytes);
+    return pw_fail (error, PW_RESOURCE, "the compiler has written no object");
   }
-  if (status == PW_OK && f == NULL)
-    status = pw_fail (error, PW_RESOURCE, "cannot write %s: %s", x->object, strerror (errno));
+  unsigned long long check =
+      pw_check_sum (pw_check_sum (pw_check_sum (PW_CHECK, bytes, size), x->text, text), x->how, how);
   free (bytes);
-  return status;
+  FILE *f = fopen (x->part, "ab");
+  if (f) fprintf (f, "%s%s", x->text, x->how);
+  if (f) fwrite (&check, sizeof check, 1, f);
+  int failed = f == NULL || ferror (f);
+  if (f && fclose (f) != 0) failed = 1;
+  if (!failed && rename (x->part, x->object) == 0) return PW_OK;
+  return pw_fail (error, PW_RESOURCE, "cannot write %s: %s", x->object, strerror (errno));
 }
 
 /* Compiles KEY.c, which this process has locked. */
@@ -203,7 +184,7 @@ static int code_compile (code_job *x, FILE *source, pw_error *error) {
     status = pw_fail (error, PW_RESOURCE, "cannot write %s: %s", x->source, strerror (errno));
   if (status == PW_OK) status = pw_compile_scene (x->source, x->part, x->log, x->lanes, error);
   int keep = status == PW_METHOD;
-  if (status == PW_OK) status = code_add_trailer (x, error);
+  if (status == PW_OK) status = code_complete (x, error);
   if (status == PW_OK && (status = code_load (x, error)) != PW_OK) unlink (x->object);
   unlink (x->part);
   if (!keep) unlink (x->source), unlink (x->log);
