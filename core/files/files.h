@@ -138,9 +138,9 @@ typedef enum {
   PW_LOCK_EXISTING /* the existing file; ENOENT if there is none */
 } pw_lock_how;
 
-/* Opens a regular file for reading and writing and locks it until it is closed; *created is 1 for a new file;
- * a symbolic link is not followed.  -1 and errno, for pw_lock_reason. */
-int pw_lock_file (const char *path, pw_lock_how how, int *created);
+/* Opens a regular file for reading and writing and locks it until it is closed; a symbolic link is not followed.  -1 and
+ * errno, for pw_lock_reason. */
+int pw_lock_file (const char *path, pw_lock_how how);
 const char *pw_lock_reason (int code);
 
 /* ---- Outputs (output.c) ---- */

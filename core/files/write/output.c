@@ -86,14 +86,13 @@ static int output_stream (pw_output *o) {
 
 /* Opens the folder and locks the temporary file. */
 static int output_open_part (pw_output *o, pw_lock_how how) {
-  int created;
   char *folder = pw_folder_of (o->real);
   if (folder == NULL) return ENOMEM;
   o->folder = open (folder, O_RDONLY | O_DIRECTORY | O_CLOEXEC);
   int code = o->folder < 0 && errno != EACCES ? errno : 0; /* a folder that cannot be listed may still be writable */
   free (folder);
   if (code) return code;
-  o->file = pw_lock_file (o->part, how, &created);
+  o->file = pw_lock_file (o->part, how);
   return o->file < 0 ? errno : 0;
 }
 
@@ -315,7 +314,7 @@ static int output_is_marked (const pw_output *o, const pw_mark *mark) {
 
 /* A process killed just after completing its table leaves it under its final name. */
 static int output_restore_part (pw_output *o, const pw_mark *mark) {
-  int created, file = pw_lock_file (o->real, PW_LOCK_EXISTING, &created);
+  int file = pw_lock_file (o->real, PW_LOCK_EXISTING);
   if (file < 0) return errno;
   o->file = file;
   return output_is_marked (o, mark) && rename (o->real, o->part) != 0 ? errno : 0;
