@@ -11,6 +11,8 @@ static inline int pw_require (const void *object, const char *what, pw_error *er
   return object ? PW_OK : pw_fail (error, PW_INPUT, "%s is missing", what);
 }
 
+enum { PW_HINT = 140 }; /* "; did you mean \"...\"?" with the longest name */
+
 /* Collects valid names, and the one nearest to an unknown name: least distance over the length of the longer name.
  * Start with { .sought = name }. */
 typedef struct {
@@ -20,15 +22,14 @@ typedef struct {
   int near;                /* 1: best is near enough to suggest */
   int overflow;            /* 1: `all` is too small for the valid names */
   char all[88];            /* the valid names, separated by commas */
+  char hint[PW_HINT];
 } pw_nearest;
 void pw_nearest_try (pw_nearest *n, const char *candidate);
-/* Writes the hint to the buffer and returns it: "; did you mean \"steer\"?"; "; valid are x, y, z" if no name is
- * near and all fit; else "". */
-char *pw_nearest_text (const pw_nearest *n, char *buffer, size_t size);
+/* The hint: "; did you mean \"steer\"?"; "; valid are x, y, z" if no name is near and all fit; else "". */
+const char *pw_nearest_text (pw_nearest *n);
 
 /* The index of a name in a table whose entries, of this size, begin with a name and whose last name is NULL; -1, with
  * the hint of pw_nearest_text, if it is not there.  The table may be NULL: it has no entries. */
-enum { PW_HINT = 130 };
 int pw_find_name (const void *table, size_t entry, const char *name, char hint[PW_HINT]);
 /* "", ">= 0", "> 0", "1, 2, ...", "0 to 1" */
 const char *pw_domain_text (pw_domain domain);

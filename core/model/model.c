@@ -211,7 +211,6 @@ int pw_model_set_signal (pw_model *m, const char *element, const char *field, co
                     : field == NULL ? "the name of a field"
                                     : "a signal");
   pw_nearest near = { .sought = element };
-  char hint[100];
   for (int i = 0; i < m->elements; i++) {
     const pw_element *e = &m->element[i];
     const char *name = pw_element_name (e);
@@ -228,10 +227,9 @@ int pw_model_set_signal (pw_model *m, const char *element, const char *field, co
       return m->error.status == PW_OK ? PW_OK : pw_fail (error, m->error.status, "%s", m->error.text);
     }
     return pw_fail (error, PW_INPUT, "model %s: %s %s has no signal \"%s\"%s", m->name, e->kind->name, element, field,
-                    pw_nearest_text (&fields, hint, sizeof hint));
+                    pw_nearest_text (&fields));
   }
-  return pw_fail (error, PW_INPUT, "model %s has no element \"%s\"%s", m->name, element,
-                  pw_nearest_text (&near, hint, sizeof hint));
+  return pw_fail (error, PW_INPUT, "model %s has no element \"%s\"%s", m->name, element, pw_nearest_text (&near));
 }
 
 int pw_model_set_initial (pw_model *m, const char *state, double value, pw_error *error) {

@@ -88,9 +88,8 @@ static int check_body_name (const pw_model *m, const pw_element *e, const char *
   pw_nearest near = { .sought = body };
   for (int i = 0; i < m->bodies; i++) pw_nearest_try (&near, m->body[i].name);
   pw_nearest_try (&near, "ground");
-  char hint[100];
   return pw_fail (error, PW_INPUT, "model %s: %s %s: there is no body \"%s\"%s", m->name, kind, name, body,
-                  pw_nearest_text (&near, hint, sizeof hint));
+                  pw_nearest_text (&near));
 }
 
 static int check_number (const pw_model *m, const pw_element *e, const pw_field *f, double value, pw_error *error) {

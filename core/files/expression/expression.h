@@ -22,13 +22,18 @@ typedef struct {
 /* ---- Reading ---- */
 
 /* Named numbers. */
-typedef struct pw_scope pw_scope;
+typedef struct {
+  int names;
+  const char **name; /* names */
+  double *value;     /* names */
+  pw_names index;    /* of each name */
+} pw_scope;
 
-/* A scope with room for `names` names; NULL if out of memory. */
-pw_scope *pw_scope_open (int names);
-void pw_scope_close (pw_scope *s);
+/* Opens a scope with room for `room` names, in an arena.  PW_OK or PW_RESOURCE. */
+int pw_scope_open (pw_scope *s, int room, pw_arena *arena);
+void pw_scope_close (pw_scope *s); /* names and numbers stay in the arena */
 
-/* Adds a name, of which the scope keeps a pointer; at most as many as pw_scope_open was given. */
+/* Adds a name, of which the scope keeps a pointer. */
 void pw_scope_add (pw_scope *s, const char *name, double value);
 
 /* One operation of an expression; its operands are on a stack. */

@@ -84,7 +84,7 @@ static int columns_names (const columns *c, const char *line) {
 
 /* Finds a column from its name in the first line, with or without its unit, or from its number. */
 static int columns_find (const columns *c, const char *first, int named, const char *name, int *index) {
-  char cell[100], unit[100], hint[200], *end;
+  char cell[100], unit[100], *end;
   pw_nearest near = { .sought = name };
   long number = strtol (name, &end, 10);
   if (*end == 0 && number >= 1 && number <= c->cells) return *index = (int)number - 1, PW_OK;
@@ -103,7 +103,7 @@ static int columns_find (const columns *c, const char *first, int named, const c
   }
   if (*index >= 0) return PW_OK;
   if (!named) return columns_fail (c, "there are no names of columns before the numbers, so no \"%.60s\"", name);
-  return columns_fail (c, "there is no column \"%.60s\"%s", name, pw_nearest_text (&near, hint, sizeof hint));
+  return columns_fail (c, "there is no column \"%.60s\"%s", name, pw_nearest_text (&near));
 }
 
 /* Finds a column and its conversion factor. */
@@ -144,7 +144,7 @@ static int columns_rows (columns *c, char *line, double *value, size_t room, int
   return PW_OK;
 }
 
-/* Stores the columns in *value, one after the other, malloced; to be freed in every case. */
+/* Stores the columns in *value, one after the other, for the caller to release in every case. */
 static int columns_all (columns *c, const char *const *column, const char *const *unit, double **value, int *rows) {
   size_t lines = 1;
   for (const char *p = c->rest; (p = strchr (p, '\n')) != NULL; p++) lines++;

@@ -50,19 +50,14 @@ struct pw_yaml {
 typedef struct {
   const pw_yaml *y;
   pw_error *error;
-  pw_scope *scope; /* parameters and what `let` defines, or NULL */
+  pw_scope *scope; /* parameters and what `let` defines so far, or NULL */
   /* for building */
   pw_model *m;
   pw_arena *arena;              /* lives as long as the model */
   pw_reference_text *reference; /* the model's */
-  const double *parameter;      /* values of y->parameter */
-  double *let;                  /* values of what `let` defines */
-  int lets;                     /* so far */
   pw_names bodies;              /* names of bodies so far */
-  pw_names all;                 /* names of bodies and elements so far, to the index in `node` */
+  pw_names all;                 /* names of bodies and elements so far, to their offsets in the source */
   pw_names elements;     /* names of all elements, to the index of their types; made when an expression needs it */
-  const pw_node **node;  /* where each body and element is named */
-  int named;             /* entries of `node` so far */
   const pw_field *field; /* being read */
   char *definition;      /* of the element being read, with all preceding fields */
   double points;         /* of all tables so far */

@@ -66,14 +66,13 @@ static int state_elements (pw_reader *r) {
 }
 
 static int state_unknown_owner (const reading *x, const char *owner, size_t at) {
-  char hint[200];
   pw_nearest near = { .sought = owner };
   pw_yaml_suggest_bodies (x->r, &near);
   for (size_t i = 0; i < x->r->elements.size; i++) {
     const struct pw_name *e = &x->r->elements.slot[i];
     if (e->name && pw_kinds[e->value]->internal > 0) pw_nearest_try (&near, e->name);
   }
-  return reading_fail (x, at, "there is no body \"%s\"%s", owner, pw_nearest_text (&near, hint, sizeof hint));
+  return reading_fail (x, at, "there is no body \"%s\"%s", owner, pw_nearest_text (&near));
 }
 
 static int state_of_element (const reading *x, const char *owner, const char *part, size_t at) {
@@ -159,21 +158,10 @@ static void *time_open (void *context) {
 /* ---- Reading of signals ---- */
 
 /* Stores the names that expressions may use, and their values, for `show`. */
-static int time_store_names (pw_reader *r) {
-  pw_reference_text *t = r->reference;
-  size_t names = (size_t)r->y->parameters + (size_t)r->lets;
-  if (t->name) return PW_OK;
-  t->name = pw_arena_alloc (r->arena, (names + 1) * sizeof *t->name);
-  t->value = pw_arena_alloc (r->arena, (names + 1) * sizeof *t->value);
-  if (t->name == NULL || t->value == NULL) return pw_yaml_no_memory (r);
-  const pw_node *n = r->y->let ? r->y->let->first : NULL;
-  for (int i = 0; i < (int)names; i++, t->names++) {
-    int parameter = i < r->y->parameters;
-    t->name[i] = parameter ? r->y->parameter[i].name : n->text;
-    t->value[i] = parameter ? r->parameter[i] : r->let[i - r->y->parameters];
-    if (!parameter) n = n->next->next;
-  }
-  return PW_OK;
+static void time_store_names (const pw_reader *r) {
+  r->reference->names = r->scope->names;
+  r->reference->name = r->scope->name;
+  r->reference->value = r->scope->value;
 }
 
 /* Adds a state that the expression depends on. */
@@ -283,7 +271,8 @@ int pw_yaml_time_signal (pw_reader *r, const pw_kind *kind, const char *what, co
   signal->function.close = free;
   signal->function.text = &f->text;
   reading x = { r, NULL, what, f, pw_kind_signals_force (kind), &signal->function };
-  if (time_store_names (r) != PW_OK || time_all (&x, v) != PW_OK) return r->error->status;
+  time_store_names (r);
+  if (time_all (&x, v) != PW_OK) return r->error->status;
   if (f->states) signal->function.reads = f->name + 1;
   return PW_OK;
 }
@@ -318,7 +307,8 @@ int pw_yaml_reference (pw_reader *r) {
   const pw_node *map = r->y->reference;
   pw_reference_text *t = r->reference;
   pw_names seen = { .size = 0 };
-  if (map == NULL || time_store_names (r) != PW_OK) return r->error->status;
+  if (map == NULL) return r->error->status;
+  time_store_names (r);
   if (map->type != PW_YAML_MAP)
     return pw_yaml_fail (r, map->at, "truth: expected a map {STATE: EXPRESSION, ...}, found %s", pw_yaml_found (map));
   t->state = pw_arena_alloc (r->arena, ((size_t)map->count + 1) * sizeof *t->state);

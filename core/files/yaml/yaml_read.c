@@ -22,7 +22,6 @@ static const char *read_key_hint (const char *text, const char *const *key) {
 
 static int read_key (const pw_reader *r, const pw_node *node, const char *const *key, const char *what,
                      const pw_node **value) {
-  char hint[100];
   if (node->type != PW_YAML_SCALAR)
     return pw_yaml_fail (r, node->at, "expected a key of %s, found %s", what, pw_yaml_found (node));
   pw_nearest near = { .sought = node->text };
@@ -36,7 +35,7 @@ static int read_key (const pw_reader *r, const pw_node *node, const char *const 
   }
   const char *mistake = read_key_hint (node->text, key);
   return pw_yaml_fail (r, node->at, "%s has no \"%.60s\"%s", what, node->text,
-                       *mistake ? mistake : pw_nearest_text (&near, hint, sizeof hint));
+                       *mistake ? mistake : pw_nearest_text (&near));
 }
 
 int pw_yaml_keys (const pw_reader *r, const pw_node *map, int skip, const char *const *key, const char *what,
