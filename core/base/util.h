@@ -74,7 +74,7 @@ void pw_names_close (pw_names *n);
 int pw_names_add (pw_names *n, const char *name, int value); /* -1, or the value the name already has */
 int pw_names_find (const pw_names *n, const char *name);     /* -1 if absent */
 
-/* Makes room for one more entry of an array, *(void **)array, of which `count` are in use.  PW_OK or PW_RESOURCE. */
+/* Makes room for more than `count` entries of an array, *(void **)array.  PW_OK or PW_RESOURCE. */
 int pw_grow (void *array, size_t count, size_t *room, size_t size);
 
 /* The root of member i of a union-find structure, in which a root is its own parent; halves the path. */
