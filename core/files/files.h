@@ -27,9 +27,9 @@ typedef struct {
 int pw_search_open (pw_search *s, pw_error *error);
 void pw_search_close (pw_search *s);
 
-/* The folder of pinwheel.h that belongs to this library, malloced; NULL if there is none.  PW_OK or PW_RESOURCE. */
-int pw_search_include (char **folder, pw_error *error);
-/* The path of a file of the engine of interactive pages, malloced; NULL if there is none.  PW_OK or PW_RESOURCE. */
+/* The path of the pinwheel.h that belongs to this library, or of a file of the engine of interactive pages; malloced,
+ * NULL if there is none.  PW_OK or PW_RESOURCE. */
+int pw_search_header (char **path, pw_error *error);
 int pw_search_page_file (const char *file, char **path, pw_error *error);
 
 /* Whether a name ends in ".so" or the like, with at least one character before it. */

@@ -76,27 +76,34 @@ static int build_run (const build_how *how, char *const *word, const char *sourc
 
 enum { BUILD_COMMAND = 24, BUILD_OPTIONS = 24 }; /* most words of a compiler's command, of our options */
 
+/* Adds words to a command line, which execv does not modify. */
+static void build_add (char **word, int *count, const char *const *more) {
+  for (; *more; more++) memcpy (&word[(*count)++], more, sizeof *more);
+}
+
 /* Compiles a source to an object. */
 static int build_object (const build_how *how, const char *source, const char *object, pw_error *error) {
-  char *include = NULL, *command = strdup (how->compiler), *rest = NULL, *word[BUILD_COMMAND + BUILD_OPTIONS];
-  int status = command ? pw_search_include (&include, error) : pw_fail (error, PW_RESOURCE, "out of memory"), n = 0;
-  if (status == PW_OK && include == NULL)
+  char *header, *include = NULL, *command = strdup (how->compiler), *rest = NULL;
+  char *word[BUILD_COMMAND + BUILD_OPTIONS] = { NULL };
+  int words = 0, status = pw_search_header (&header, error);
+  if (header) include = pw_folder_of (header);
+  if (status == PW_OK && header == NULL)
     status = pw_fail (error, PW_INPUT,
                       "cannot compile %s: pinwheel.h is neither in \"include\" next to the program nor in "
                       "\"../include/pinwheel\"",
                       source);
-  for (char *w = command ? strtok_r (command, " \t", &rest) : NULL; w && n < BUILD_COMMAND;
-       w = strtok_r (NULL, " \t", &rest))
-    word[n++] = w;
-  const char *const files[] = { "-I", include, "-o", object, source, NULL }, *const *const list[] = { how->options,
-                                                                                                      files,
-                                                                                                      how->last };
-  for (int i = 0; i < 3; i++)
-    for (const char *const *o = list[i]; *o; o++) memcpy (&word[n++], o, sizeof *o);
-  word[n] = NULL;
-  if (status == PW_OK) status = build_run (how, word, source, error);
+  if (status == PW_OK && (include == NULL || command == NULL)) status = pw_fail (error, PW_RESOURCE, "out of memory");
+  if (status == PW_OK) {
+    for (char *w = strtok_r (command, " \t", &rest); w && words < BUILD_COMMAND; w = strtok_r (NULL, " \t", &rest))
+      word[words++] = w;
+    build_add (word, &words, how->options);
+    build_add (word, &words, (const char *const[]){ "-I", include, "-o", object, source, NULL });
+    build_add (word, &words, how->last);
+    status = build_run (how, word, source, error);
+  }
   free (command);
   free (include);
+  free (header);
   return status;
 }
 

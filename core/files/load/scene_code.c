@@ -13,7 +13,7 @@
 #include <unistd.h>
 #include "files.h"
 
-enum { CODE_MAX_BYTES = 64 << 20, CODE_KEY = 33, CODE_MAX_WAITS = 3000 }; /* size of a key; waits of 20 ms */
+enum { CODE_MAX_BYTES = 64 << 20, CODE_MAX_WAITS = 3000 }; /* waits of 20 ms */
 
 struct pw_scene_code {
   void *handle;
@@ -27,7 +27,7 @@ typedef struct {
   const char *text;
   int lanes;      /* 0: for single runs */
   char how[2000]; /* versions, compiler and options */
-  char key[CODE_KEY];
+  char key[17];   /* checksum of text and how, in hexadecimal */
   char *folder, *source, *log, *part, *object;
   pw_scene_code *code;
 } code_job;
@@ -77,21 +77,17 @@ static int code_read (const char *path, char **text, size_t *size, pw_error *err
 }
 
 static int code_identify (code_job *x, pw_error *error) {
-  char *include, *header = NULL, *text = NULL, sum[40] = "";
+  char *header, *text = NULL, sum[40] = "";
   size_t size;
   code_add (x, "pinwheel " PW_VERSION);
   for (const char *const *o = pw_scene_options (x->lanes); *o; o++) code_add (x, *o);
   if (code_add_compiler (x) != PW_OK) return pw_fail (error, PW_RESOURCE, "out of memory, or CC is too long");
-  int status = pw_search_include (&include, error);
-  if (include) header = pw_path_join (include, "pinwheel.h", "");
+  int status = pw_search_header (&header, error);
   if (header && code_read (header, &text, &size, NULL) == PW_OK)
     snprintf (sum, sizeof sum, "%016llx", pw_check_sum (PW_CHECK, text, size));
   code_add (x, sum);
-  for (unsigned long long i = 0, h = PW_CHECK; i < 2; i++) {
-    h = pw_check_sum (pw_check_sum (h ^ (i << 40), x->text, strlen (x->text)), x->how, strlen (x->how));
-    snprintf (x->key + 16 * i, CODE_KEY - 16 * i, "%016llx", h);
-  }
-  free (include);
+  snprintf (x->key, sizeof x->key, "%016llx",
+            pw_check_sum (pw_check_sum (PW_CHECK, x->text, strlen (x->text)), x->how, strlen (x->how)));
   free (header);
   free (text);
   return status;
