@@ -105,6 +105,10 @@ extern const pw_unit_name pw_unit_names[]; /* ends with a NULL name */
 /* folder + "/" + name + ending, malloced; NULL if out of memory. */
 char *pw_path_join (const char *folder, const char *name, const char *ending);
 
+/* As pw_read_rest, of the regular file at a path; a failure to open it is "CANNOT PATH: REASON". */
+int pw_read_file (const char *cannot, const char *path, size_t max_bytes, const char *what, char **text, size_t *size,
+                  pw_error *error);
+
 /* Reads the rest of a file of at most `max_bytes` bytes into *text, malloced, zero-terminated; free it in every case.
  * `what` explains the limit in messages: "the limit for a table".  PW_INPUT if the file is larger or cannot be read;
  * PW_RESOURCE. */

@@ -16,6 +16,10 @@ static int model_no_memory (pw_model *m) {
   return pw_fail (&m->error, PW_RESOURCE, "model %s: out of memory", m->name ? m->name : "");
 }
 
+static int model_status (const pw_model *m, pw_error *error) {
+  return m->error.status == PW_OK ? PW_OK : pw_fail (error, m->error.status, "%s", m->error.text);
+}
+
 pw_model *pw_model_new (const char *name, const pw_plugin_table *table, pw_error *error) {
   if (name == NULL || table == NULL) {
     pw_fail (error, PW_INPUT, "a model has no %s", name ? "table" : "name");
@@ -72,7 +76,7 @@ int pw_model_build (pw_model *m, pw_error *error) {
   if (m->built) return pw_fail (error, PW_INPUT, "model %s: pw_model_build called twice", m->name);
   m->table->build (m, m->parameters);
   m->built = 1;
-  return m->error.status == PW_OK ? PW_OK : pw_fail (error, m->error.status, "%s", m->error.text);
+  return model_status (m, error);
 }
 
 int pw_model_refuse (pw_model *m, const char *format, ...) {
@@ -224,7 +228,7 @@ int pw_model_set_signal (pw_model *m, const char *element, const char *field, co
       if (strcmp (f->name, field) != 0) continue;
       void *at = memcpy ((char *)e->definition + f->offset, signal, sizeof *signal);
       model_copy_table (m, at);
-      return m->error.status == PW_OK ? PW_OK : pw_fail (error, m->error.status, "%s", m->error.text);
+      return model_status (m, error);
     }
     return pw_fail (error, PW_INPUT, "model %s: %s %s has no signal \"%s\"%s", m->name, e->kind->name, element, field,
                     pw_nearest_text (&fields));
@@ -242,7 +246,7 @@ int pw_model_set_initial (pw_model *m, const char *state, double value, pw_error
     m->initial[m->initials] = (pw_initial_setting){ model_copy_text (m, state), value };
     if (m->initial[m->initials].state) m->initials++;
   }
-  return m->error.status == PW_OK ? PW_OK : pw_fail (error, m->error.status, "%s", m->error.text);
+  return model_status (m, error);
 }
 
 /* ---- Reference solution: a function in C, or expressions of a text model ---- */

@@ -1,6 +1,5 @@
 /* Compiles C to a shared object: runs the user's compiler without a shell, in a folder that only the user can write
  * to. */
-#define _POSIX_C_SOURCE 200809L
 #include <errno.h>
 #include <fcntl.h>
 #include <signal.h>

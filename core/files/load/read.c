@@ -29,3 +29,14 @@ int pw_read_rest (FILE *f, size_t max_bytes, const char *path, const char *what,
   }
   return ferror (f) ? pw_fail (error, PW_INPUT, "cannot read %s: %s", path, strerror (errno)) : PW_OK;
 }
+
+int pw_read_file (const char *cannot, const char *path, size_t max_bytes, const char *what, char **text, size_t *size,
+                  pw_error *error) {
+  const char *why;
+  FILE *f = pw_open_input (path, &why);
+  *text = NULL;
+  if (f == NULL) return pw_fail (error, pw_open_input_status (), "%s %s: %s", cannot, path, why);
+  int status = pw_read_rest (f, max_bytes, path, what, text, size, error);
+  fclose (f);
+  return status;
+}

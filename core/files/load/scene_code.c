@@ -3,7 +3,6 @@
  * An object in the cache, KEY.so, is followed by the text it was compiled from, the compiler and options, and a
  * checksum; they are compared before it is loaded.  KEY.c is locked while it is compiled; it is only kept, with the
  * messages in KEY.log, if that fails. */
-#define _POSIX_C_SOURCE 200809L
 #include <dlfcn.h>
 #include <errno.h>
 #include <fcntl.h>
@@ -67,13 +66,8 @@ static int code_add_compiler (code_job *x) {
 }
 
 static int code_read (const char *path, char **text, size_t *size, pw_error *error) {
-  const char *why;
-  FILE *f = pw_open_input (path, &why);
-  *text = NULL;
-  if (f == NULL) return pw_fail (error, errno == ENOENT ? PW_RETRY : pw_open_input_status (), "%s", why);
-  int status = pw_read_rest (f, CODE_MAX_BYTES, path, "the limit for an object", text, size, error);
-  fclose (f);
-  return status;
+  int status = pw_read_file ("cannot read", path, CODE_MAX_BYTES, "the limit for an object", text, size, error);
+  return status == PW_INPUT && *text == NULL && errno == ENOENT ? PW_RETRY : status;
 }
 
 static int code_identify (code_job *x, pw_error *error) {

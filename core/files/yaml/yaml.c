@@ -1,6 +1,5 @@
 /* The head of a text model: version, description, default run settings, parameters.  They are stored in a plug-in's
  * table, so that text models can be used like compiled ones; the build function reads bodies and elements. */
-#define _POSIX_C_SOURCE 200809L
 #include <ctype.h>
 #include <math.h>
 #include <stdlib.h>

@@ -12,7 +12,7 @@ enum { MAX_SIGNAL_STATES = 16, MAX_BREAKPOINTS = 100 }; /* states of a signal; b
 /* A signal defined by expressions. */
 typedef struct {
   const pw_expression *x[3];               /* value, rate, acceleration; NULL: not given, differentiated instead */
-  int derivatives;                         /* required time derivatives: 0, 1, 2 */
+  int derivatives;                         /* required time derivatives: 0 (of a force), 1, 2 */
   int states;                              /* number of states in it */
   const char *name[MAX_SIGNAL_STATES + 2]; /* "t", then states, "BODY.phi"; used for reading only */
   pw_signal_text text;
@@ -23,10 +23,7 @@ typedef struct {
   pw_reader *r;
   const pw_node *node;
   const char *what; /* "torque T: value", for messages */
-  /* of a signal */
-  time_function *f;
-  int of_force;
-  pw_function *signal;
+  time_function *f; /* the signal it belongs to, or NULL */
 } reading;
 
 /* Reports an error at an offset of the expression. */
@@ -173,7 +170,8 @@ static int time_add_state (void *context, const char *name, size_t length, size_
   snprintf (text, sizeof text, "%.*s", (int)length, name);
   for (int i = 1; i <= f->states; i++)
     if (strcmp (f->name[i], text) == 0) return PW_OK;
-  if (!x->of_force) return reading_fail (x, at, "\"%s\": the signal of a constraint depends on the time t alone", text);
+  if (f->derivatives)
+    return reading_fail (x, at, "\"%s\": the signal of a constraint depends on the time t alone", text);
   if (state_check (x, text, at) != PW_OK) return x->r->error->status;
   if (f->states == MAX_SIGNAL_STATES || length >= sizeof text)
     return reading_fail (x, at, "more than %d states", MAX_SIGNAL_STATES);
@@ -188,7 +186,6 @@ static int time_expression (reading *x, int i) {
     return r->error->status;
   if (reading_expression (x, f->name, &f->text.part[i], &f->x[i]) != PW_OK) return r->error->status;
   const pw_expression *made = f->x[i];
-  if (made->breaks) x->signal->breakpoint = time_breakpoint;
   if ((r->codes += made->codes) > PW_YAML_MAX_OPERATIONS)
     return pw_yaml_fail (r, x->node->at,
                          "%s: the expressions up to here have more than %d operations, which need more "
@@ -229,21 +226,21 @@ static double time_size (const time_function *f, double t, int i) {
 }
 
 /* Refuses signals that a constraint cannot follow: a jump of the value or, for positions, of its derivative. */
-static int time_continuous (const reading *x, int levels) {
+static int time_continuous (const reading *x) {
   static const char *const name[] = { "its value", "its rate" };
   double t = 0, before[3], after[3];
-  for (int k = 0; k < MAX_BREAKPOINTS && x->signal->breakpoint; k++) {
+  for (int k = 0; k < MAX_BREAKPOINTS; k++) {
     t = time_breakpoint (x->f, t);
     if (t == INFINITY) return PW_OK;
     time_derivatives (x->f, &(double){ nextafter (t, -INFINITY) }, before);
     time_derivatives (x->f, &t, after);
     double between = t - nextafter (t, -INFINITY);
-    for (int i = 0; i < levels; i++)
+    for (int i = 0; i < x->f->derivatives; i++)
       if (fabs (after[i] - before[i]) >
           1e-9 * time_size (x->f, t, i) + 2 * between * (fabs (after[i + 1]) + fabs (before[i + 1])))
         return pw_yaml_fail (x->r, x->node->at, "%s: %s jumps from %.6g to %.6g at t = %.9g s, and that of %s must not",
                              x->what, name[i], before[i], after[i], t,
-                             levels > 1 ? "a prescribed position" : "a velocity constraint");
+                             x->f->derivatives > 1 ? "a prescribed position" : "a velocity constraint");
   }
   return PW_OK;
 }
@@ -257,7 +254,7 @@ static int time_all (reading *x, const pw_node *const v[3]) {
     if (i > 0 && x->f->x[i - 1] && !x->f->states && time_check (x, i, key[i]) != PW_OK) return x->r->error->status;
   }
   x->node = v[0];
-  return x->of_force ? PW_OK : time_continuous (x, x->f->derivatives);
+  return x->f->derivatives ? time_continuous (x) : PW_OK;
 }
 
 int pw_yaml_time_signal (pw_reader *r, const pw_kind *kind, const char *what, const pw_node *const v[3],
@@ -270,9 +267,10 @@ int pw_yaml_time_signal (pw_reader *r, const pw_kind *kind, const char *what, co
   signal->function.open = time_open;
   signal->function.close = free;
   signal->function.text = &f->text;
-  reading x = { r, NULL, what, f, pw_kind_signals_force (kind), &signal->function };
   time_store_names (r);
-  if (time_all (&x, v) != PW_OK) return r->error->status;
+  if (time_all (&(reading){ r, NULL, what, f }, v) != PW_OK) return r->error->status;
+  for (int i = 0; i < 3; i++)
+    if (f->x[i] && f->x[i]->breaks) signal->function.breakpoint = time_breakpoint;
   if (f->states) signal->function.reads = f->name + 1;
   return PW_OK;
 }
@@ -293,10 +291,10 @@ static int reference_entry (pw_reader *r, const pw_node *n, pw_names *seen) {
   if (pw_yaml_text (r, n, "truth", &name) != PW_OK) return r->error->status;
   if (strchr (name, '.') == NULL)
     return pw_yaml_fail (r, n->at, "truth: expected a state such as BODY.phi, found \"%.60s\"", name);
-  if (state_check (&(reading){ r, n, "truth", NULL, 0, NULL }, n->text, 0) != PW_OK) return r->error->status;
+  if (state_check (&(reading){ r, n, "truth", NULL }, n->text, 0) != PW_OK) return r->error->status;
   if (pw_names_add (seen, n->text, 0) >= 0) return pw_yaml_fail (r, n->at, "truth: a second \"%s\"", n->text);
   snprintf (what, sizeof what, "truth of %.60s", n->text);
-  const reading value = { r, n->next, what, NULL, 0, NULL };
+  const reading value = { r, n->next, what, NULL };
   t->state[t->states] = n->text;
   int status = reading_expression (&value, time, &t->text[t->states], &x[t->states]);
   t->states += status == PW_OK;
