@@ -95,12 +95,12 @@ static int search_entry (pw_search *s, const char *folder, const char *entry, pw
   return status;
 }
 
-/* Adds a folder to s->folders, "/first:/second"; 0 if it is there already, so that it is searched once. */
+/* Adds a folder to s->folders, "/first:/second", if it fits; 0 if it is there already, so that it is searched once. */
 static int search_add_folder (pw_search *s, const char *real) {
   size_t n = strlen (real), used = strlen (s->folders);
   for (const char *p = s->folders; *p; p += strcspn (p, ":"), p += *p == ':')
     if (strcspn (p, ":") == n && strncmp (p, real, n) == 0) return 0;
-  snprintf (s->folders + used, sizeof s->folders - used, "%s%s", used ? ":" : "", real);
+  if (used + n + 2 <= sizeof s->folders) sprintf (s->folders + used, "%s%s", used ? ":" : "", real);
   return 1;
 }
 
