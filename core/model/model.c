@@ -214,26 +214,24 @@ int pw_model_set_signal (pw_model *m, const char *element, const char *field, co
                     element == NULL ? "the name of an element"
                     : field == NULL ? "the name of a field"
                                     : "a signal");
-  pw_nearest near = { .sought = element };
-  for (int i = 0; i < m->elements; i++) {
-    const pw_element *e = &m->element[i];
-    const char *name = pw_element_name (e);
-    if (name == NULL) continue;
-    pw_nearest_try (&near, name);
-    if (strcmp (name, element) != 0) continue;
-    pw_nearest fields = { .sought = field };
-    for (const pw_field *f = e->kind->fields; f->name; f++) {
-      if (f->type != PW_SIGNAL) continue;
-      pw_nearest_try (&fields, f->name);
-      if (strcmp (f->name, field) != 0) continue;
-      void *at = memcpy ((char *)e->definition + f->offset, signal, sizeof *signal);
-      model_copy_table (m, at);
-      return model_status (m, error);
-    }
+  pw_nearest elements = { .sought = element }, fields = { .sought = field };
+  const pw_element *e = NULL;
+  for (int i = 0; i < m->elements && e == NULL; i++) {
+    const char *name = pw_element_name (&m->element[i]);
+    if (name) pw_nearest_try (&elements, name);
+    if (name && strcmp (name, element) == 0) e = &m->element[i];
+  }
+  if (e == NULL)
+    return pw_fail (error, PW_INPUT, "model %s has no element \"%s\"%s", m->name, element, pw_nearest_text (&elements));
+  const pw_field *f = e->kind->fields;
+  for (; f->name && !(f->type == PW_SIGNAL && strcmp (f->name, field) == 0); f++)
+    if (f->type == PW_SIGNAL) pw_nearest_try (&fields, f->name);
+  if (f->name == NULL)
     return pw_fail (error, PW_INPUT, "model %s: %s %s has no signal \"%s\"%s", m->name, e->kind->name, element, field,
                     pw_nearest_text (&fields));
-  }
-  return pw_fail (error, PW_INPUT, "model %s has no element \"%s\"%s", m->name, element, pw_nearest_text (&near));
+  void *at = memcpy ((char *)e->definition + f->offset, signal, sizeof *signal);
+  model_copy_table (m, at);
+  return model_status (m, error);
 }
 
 int pw_model_set_initial (pw_model *m, const char *state, double value, pw_error *error) {

@@ -82,10 +82,10 @@ int pw_expression_is_name (const char *text);
 /* Whether a function or constant has this name. */
 int pw_expression_is_reserved (const char *text);
 
-/* Calls `each` with every name in an expression, functions and constants too, until it returns non-zero; returns its
- * result. */
-int pw_expression_names (const char *text, int (*each) (void *context, const char *name, size_t length, size_t at),
-                         void *context);
+/* Copies the next name in an expression, of functions and constants too, to the buffer, cut to its size; *rest moves
+ * behind it.  Returns its position, or NULL after the last name. */
+enum { PW_EXPRESSION_NAME = 100 };
+const char *pw_expression_next_name (const char **rest, char name[PW_EXPRESSION_NAME]);
 
 /* Whether a text is a single number; its value may overflow to infinity. */
 int pw_expression_number (const char *text, double *value);

@@ -13,7 +13,7 @@
 #include "pinwheel.h"
 #include "pinwheel-files.h"
 
-enum { PARSER_MAX_LENGTH = 4000, PARSER_MAX_DEPTH = 200, PARSER_NAME = 100 };
+enum { PARSER_MAX_LENGTH = 4000, PARSER_MAX_DEPTH = 200 };
 enum { ON_TIME = 1, ON_STATES = 2 };
 
 /* ---- Tokens ---- */
@@ -165,7 +165,7 @@ static parser_part parser_unexpected (parser *p, char open, size_t at) {
 }
 
 static parser_part parser_missing (parser *p) {
-  char last[PARSER_NAME];
+  char last[PW_EXPRESSION_NAME];
   if (p->status != PW_OK) return parser_nothing;
   snprintf (last, sizeof last, "%.*s", (int)(p->end - p->before), p->text + p->before);
   if (p->type == 0 && p->end == 0) return parser_fail (p, 0, "an expression is missing");
@@ -248,7 +248,7 @@ static parser_part parser_number (parser *p) {
 }
 
 static parser_part parser_operand (parser *p) {
-  char name[PARSER_NAME];
+  char name[PW_EXPRESSION_NAME];
   if (p->status != PW_OK) return parser_nothing;
   if (p->type == '0') return parser_number (p);
   if (p->type == '(') return parser_group (p);

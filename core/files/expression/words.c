@@ -39,15 +39,15 @@ int pw_expression_is_name (const char *text) {
   return n && text[n] == 0 && n < 64 && strchr (text, '.') == NULL;
 }
 
-int pw_expression_names (const char *text, int (*each) (void *context, const char *name, size_t length, size_t at),
-                         void *context) {
-  for (const char *p = text; *p;) {
+const char *pw_expression_next_name (const char **rest, char name[PW_EXPRESSION_NAME]) {
+  while (**rest) {
+    const char *p = *rest;
     size_t n = pw_expression_name_size (p), number = n ? 0 : pw_expression_number_size (p);
-    int stop = n ? each (context, p, n, (size_t)(p - text)) : 0;
-    if (stop) return stop;
-    p += n ? n : number ? number : 1;
+    *rest += n ? n : number ? number : 1;
+    snprintf (name, PW_EXPRESSION_NAME, "%.*s", (int)n, p);
+    if (n) return p;
   }
-  return 0;
+  return NULL;
 }
 
 /* ---- Named numbers ---- */

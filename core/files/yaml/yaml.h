@@ -112,7 +112,7 @@ int pw_yaml_number (const pw_reader *r, const pw_node *node, const char *what, p
 int pw_yaml_pair (const pw_reader *r, const pw_node *node, const char *what, double *value);
 int pw_yaml_choice (const pw_reader *r, const pw_node *node, const char *what, const char *const *choices, int *value);
 
-/* Whether an expression depends on the time t or a state, BODY.phi, and at which offset (at may be NULL). */
+/* Whether an expression depends on the time t or a state, BODY.phi, and at which offset. */
 int pw_yaml_varies (const char *text, size_t *at);
 
 /* Converts an offset in a scalar's text to an offset in the source. */

@@ -161,29 +161,26 @@ static void time_store_names (const pw_reader *r) {
   r->reference->value = r->scope->value;
 }
 
-/* Adds a state that the expression depends on. */
-static int time_add_state (void *context, const char *name, size_t length, size_t at) {
-  const reading *x = context;
+/* Adds a state, unless it is known already. */
+static int time_add_state (const reading *x, const char *name, size_t at) {
   time_function *f = x->f;
-  char text[100];
-  if (memchr (name, '.', length) == NULL) return PW_OK;
-  snprintf (text, sizeof text, "%.*s", (int)length, name);
   for (int i = 1; i <= f->states; i++)
-    if (strcmp (f->name[i], text) == 0) return PW_OK;
+    if (strcmp (f->name[i], name) == 0) return PW_OK;
   if (f->derivatives)
-    return reading_fail (x, at, "\"%s\": the signal of a constraint depends on the time t alone", text);
-  if (state_check (x, text, at) != PW_OK) return x->r->error->status;
-  if (f->states == MAX_SIGNAL_STATES || length >= sizeof text)
-    return reading_fail (x, at, "more than %d states", MAX_SIGNAL_STATES);
-  f->name[f->states + 1] = pw_arena_copy (x->r->arena, text);
+    return reading_fail (x, at, "\"%s\": the signal of a constraint depends on the time t alone", name);
+  if (state_check (x, name, at) != PW_OK) return x->r->error->status;
+  if (f->states == MAX_SIGNAL_STATES) return reading_fail (x, at, "more than %d states", MAX_SIGNAL_STATES);
+  f->name[f->states + 1] = pw_arena_copy (x->r->arena, name);
   return f->name[++f->states] ? PW_OK : pw_yaml_no_memory (x->r);
 }
 
 static int time_expression (reading *x, int i) {
   pw_reader *r = x->r;
   time_function *f = x->f;
-  if (x->node->type == PW_YAML_SCALAR && pw_expression_names (x->node->text, time_add_state, x) != PW_OK)
-    return r->error->status;
+  const char *source = x->node->type == PW_YAML_SCALAR ? x->node->text : "";
+  char name[PW_EXPRESSION_NAME];
+  for (const char *rest = source, *p; (p = pw_expression_next_name (&rest, name)) != NULL;)
+    if (strchr (name, '.') && time_add_state (x, name, (size_t)(p - source)) != PW_OK) return r->error->status;
   if (reading_expression (x, f->name, &f->text.part[i], &f->x[i]) != PW_OK) return r->error->status;
   const pw_expression *made = f->x[i];
   if ((r->codes += made->codes) > PW_YAML_MAX_OPERATIONS)

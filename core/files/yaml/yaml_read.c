@@ -78,14 +78,11 @@ size_t pw_yaml_offset (const pw_yaml *y, const pw_node *node, size_t offset) {
   return at + n <= y->size && strncmp (y->source + at, node->text, n) == 0 ? at + offset : node->at;
 }
 
-static int read_varies (void *context, const char *name, size_t length, size_t at) {
-  if ((length != 1 || *name != 't') && memchr (name, '.', length) == NULL) return 0;
-  if (context) *(size_t *)context = at;
-  return 1;
-}
-
 int pw_yaml_varies (const char *text, size_t *at) {
-  return pw_expression_names (text, read_varies, at);
+  char name[PW_EXPRESSION_NAME];
+  for (const char *rest = text, *p; (p = pw_expression_next_name (&rest, name)) != NULL;)
+    if (strcmp (name, "t") == 0 || strchr (name, '.')) return *at = (size_t)(p - text), 1;
+  return 0;
 }
 
 int pw_yaml_number (const pw_reader *r, const pw_node *node, const char *what, pw_domain domain, double *value) {

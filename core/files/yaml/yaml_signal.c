@@ -189,8 +189,9 @@ static int signal_map (pw_reader *r, const pw_kind *kind, const char *what, cons
 
 int pw_yaml_signal (pw_reader *r, const pw_kind *kind, const char *what, const pw_node *node, pw_signal *signal) {
   const pw_node *const v[3] = { node, NULL, NULL };
+  size_t at;
   if (node->type == PW_YAML_MAP) return signal_map (r, kind, what, node, signal);
-  if (node->type == PW_YAML_SCALAR && pw_yaml_varies (node->text, NULL))
+  if (node->type == PW_YAML_SCALAR && pw_yaml_varies (node->text, &at))
     return pw_yaml_time_signal (r, kind, what, v, signal);
   return pw_yaml_number (r, node, what, PW_REAL, &signal->constant);
 }
