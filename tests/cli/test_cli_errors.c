@@ -276,6 +276,10 @@ static void test_failing_step (void **state) {
   assert_true (strncmp (part, "t [s],", 6) == 0 && part[strlen (part) - 1] == '\n');
   const char *json = cli_file ("fail.json");
   assert_true (cli_says (json, "status", "method"));
+  /* an archive is complete: it ends with the record of 22 bytes that ends its directory */
+  assert_int_equal (cli_run ("pinwheel run ezyroller --step 0.5 --set M0=1e9 -o @/fail.npz"), 4);
+  cli_good ("tail -c 22 @/fail.npz.part | head -c 2");
+  assert_string_equal (cli_out, "PK");
 }
 
 static void test_interrupted (void **state) {

@@ -170,7 +170,7 @@ pw_csv *pw_csv_open (const pw_system *s, int ledger, pw_output *o, pw_error *err
 
 int pw_csv_write (pw_csv *c, const pw_system *s, const pw_sample *sample, pw_error *error) {
   int status = PW_OK;
-  (void)s;
+  (void)s; /* that of pw_csv_open */
   if (c->workspace)
     status = pw_workspace_contact_points (c->workspace, sample->t, sample->q, sample->v, c->contact, error);
   return status == PW_OK ? csv_line (c, 0, sample, error) : status;
