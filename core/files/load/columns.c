@@ -122,8 +122,9 @@ static int columns_open (const columns *c, const char *first, int named, const c
 static int columns_number (const columns *c, const char *line, columns_source source, int gap, double *value) {
   char cell[100];
   columns_cell (c, line, source.index, cell, sizeof cell);
-  if (gap && (*cell == 0 || (pw_read_number (cell, value) == PW_OK && isnan (*value)))) return *value = NAN, PW_OK;
-  if (pw_read_number (cell, value) != PW_OK || !isfinite (*value))
+  int number = pw_read_number (cell, value) == PW_OK;
+  if (gap && (*cell == 0 || (number && isnan (*value)))) return *value = NAN, PW_OK;
+  if (!number || !isfinite (*value))
     return columns_fail (c, "column %d: expected a finite number, found \"%.40s\"", source.index + 1, cell);
   *value *= source.factor;
   if (isfinite (*value)) return PW_OK;

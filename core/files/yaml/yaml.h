@@ -106,10 +106,10 @@ int pw_yaml_list (const pw_reader *r, const pw_node *node, const char *what, int
 /* A scalar's text, not empty. */
 int pw_yaml_text (const pw_reader *r, const pw_node *node, const char *what, const char **text);
 
-/* A scalar as a number of a domain: an expression over r->scope; a list [x, y] of them; one of several words, ending with
- * NULL. */
+/* A scalar as a number of a domain: an expression over r->scope; a list of two, `items` ("numbers, [x, y]"); one of several
+ * words, ending with NULL. */
 int pw_yaml_number (const pw_reader *r, const pw_node *node, const char *what, pw_domain domain, double *value);
-int pw_yaml_pair (const pw_reader *r, const pw_node *node, const char *what, double *value);
+int pw_yaml_pair (const pw_reader *r, const pw_node *node, const char *what, const char *items, double *value);
 int pw_yaml_choice (const pw_reader *r, const pw_node *node, const char *what, const char *const *choices, int *value);
 
 /* Whether an expression depends on the time t or a state, BODY.phi, and at which offset. */

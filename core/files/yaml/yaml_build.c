@@ -81,7 +81,7 @@ static int build_value (pw_reader *r, const pw_kind *kind, const pw_field *f, co
     return pw_yaml_number (r, node, what, f->domain, at);
   case PW_POINT:
   case PW_VECTOR:
-    return pw_yaml_pair (r, node, what, at);
+    return pw_yaml_pair (r, node, what, "numbers, [x, y]", at);
   case PW_BODY:
     return build_body_name (r, node, what, at);
   case PW_SIGNAL:

@@ -105,8 +105,8 @@ int pw_yaml_number (const pw_reader *r, const pw_node *node, const char *what, p
 
 /* ---- Pairs, choices, bodies ---- */
 
-int pw_yaml_pair (const pw_reader *r, const pw_node *node, const char *what, double *value) {
-  if (node == NULL || pw_yaml_list (r, node, what, 2, "numbers, [x, y]") != PW_OK) return r->error->status;
+int pw_yaml_pair (const pw_reader *r, const pw_node *node, const char *what, const char *items, double *value) {
+  if (node == NULL || pw_yaml_list (r, node, what, 2, items) != PW_OK) return r->error->status;
   pw_yaml_number (r, node->first, what, PW_REAL, value);
   return pw_yaml_number (r, node->first->next, what, PW_REAL, value + 1);
 }

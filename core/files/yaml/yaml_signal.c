@@ -25,8 +25,7 @@ static int table_list (pw_reader *r, const char *what, const pw_node *list, pw_s
   for (const pw_node *n = list->first; n; n = n->next) {
     double point[2] = { 0 };
     snprintf (text, sizeof text, "%s: point %d", what, s->table.count + 1);
-    pw_yaml_list (r, n, text, 2, "numbers, [time, value]");
-    if (pw_yaml_pair (r, n, text, point) != PW_OK) return r->error->status;
+    if (pw_yaml_pair (r, n, text, "numbers, [time, value]", point) != PW_OK) return r->error->status;
     t[s->table.count] = point[0];
     value[s->table.count++] = point[1];
   }
