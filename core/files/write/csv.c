@@ -33,16 +33,16 @@ static void csv_array (pw_csv *c, const char *name) {
   for (size_t row = 0; column && row < rows; row++) column[row] = c->value[row * c->columns + (size_t)c->cells];
   if (column) pw_npz_add (&c->npz, name, (long)rows, 0, 1, column);
   free (column);
-  c->cells++;
 }
 
 static void csv_name (pw_csv *c, const char *name, const char *unit) {
-  int has_unit = unit && *unit;
-  if (c->is_archive)
+  if (c->is_archive) {
     csv_array (c, name);
-  else
-    fprintf (c->f, "%s%s%s%s%s", c->cells++ ? "," : "", name, has_unit ? " [" : "", has_unit ? unit : "",
-             has_unit ? "]" : "");
+  } else {
+    fprintf (c->f, "%s%s", c->cells ? "," : "", name);
+    if (unit && *unit) fprintf (c->f, " [%s]", unit);
+  }
+  c->cells++;
 }
 
 static void csv_number (pw_csv *c, double value) {

@@ -41,7 +41,7 @@ static void build_triple (const pw_reader *r, const pw_node *node, const char *w
 
 static int build_body (pw_reader *r, const pw_node *node) {
   static const char *const key[] = { "name", "mass", "inertia", "start", "rate", NULL };
-  static const char *const start[] = { "x", "y", "phi", NULL }, *const rate[] = { "vx", "vy", "omega", NULL };
+  static const char *const state[][4] = { { "x", "y", "phi", NULL }, { "vx", "vy", "omega", NULL } };
   const pw_node *v[sizeof key / sizeof *key];
   pw_body body = { .specified = PW_SPECIFIES_NOTHING };
   pw_error cause = { 0 };
@@ -53,10 +53,10 @@ static int build_body (pw_reader *r, const pw_node *node) {
     snprintf (what, sizeof what, "body %.60s: %s", body.name, key[1 + i]);
     pw_yaml_number (r, v[1 + i], what, PW_NONNEGATIVE, i ? &body.inertia : &body.mass);
   }
-  snprintf (what, sizeof what, "start of body %.60s", body.name);
-  build_triple (r, v[3], what, start, body.start, &body.specified, 0);
-  snprintf (what, sizeof what, "rate of body %.60s", body.name);
-  build_triple (r, v[4], what, rate, body.rate, &body.specified, 3);
+  for (int i = 0; i < 2; i++) {
+    snprintf (what, sizeof what, "%s of body %.60s", key[3 + i], body.name);
+    build_triple (r, v[3 + i], what, state[i], i ? body.rate : body.start, &body.specified, 3 * i);
+  }
   if (r->error->status != PW_OK) return r->error->status;
   if (pw_model_check_body (r->m, &body, &cause) != PW_OK) return build_fail (r, v[0], &cause);
   pw_names_add (&r->bodies, body.name, 0);
