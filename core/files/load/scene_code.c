@@ -184,11 +184,9 @@ static int code_compile (code_job *x, FILE *source, pw_error *error) {
 /* Waits while another process compiles the scene.  NULL after a minute, or if the folder was removed. */
 static FILE *code_lock (const code_job *x) {
   const struct timespec pause = { .tv_nsec = 20000000 };
-  int file = pw_lock_file (x->source, PW_LOCK_NEW);
-  for (int i = 0; file < 0 && errno == EWOULDBLOCK && i < CODE_MAX_WAITS; i++) {
+  int file, waits = 0;
+  while ((file = pw_lock_file (x->source, PW_LOCK_NEW)) < 0 && errno == EWOULDBLOCK && waits++ < CODE_MAX_WAITS)
     nanosleep (&pause, NULL);
-    file = pw_lock_file (x->source, PW_LOCK_NEW);
-  }
   FILE *f = file >= 0 ? fdopen (file, "wb") : NULL;
   if (f == NULL && file >= 0) close (file);
   return f;
