@@ -3,20 +3,11 @@
 #include <stdlib.h>
 #include <string.h>
 #include "run.h"
-
-static int archive_grow (pw_archive *a, size_t count) {
-  if (a->used + count <= a->size) return 1;
-  size_t size = 2 * (a->used + count) + 1000;
-  unsigned char *more = realloc (a->at, size);
-  if (more == NULL) return 0;
-  a->at = more;
-  a->size = size;
-  return 1;
-}
+#include "util.h"
 
 void pw_archive_bytes (pw_archive *a, void *bytes, size_t count) {
   if (count == 0 || a->failed) return;
-  a->failed = a->loading ? a->size - a->used < count : !archive_grow (a, count);
+  a->failed = a->loading ? a->size - a->used < count : pw_grow (&a->at, a->used + count, &a->size, 1) != PW_OK;
   if (a->failed) return;
   if (a->loading)
     memcpy (bytes, a->at + a->used, count);

@@ -1,40 +1,22 @@
-/* Jacobi's elliptic functions (the exact motion of a pendulum) by the arithmetic-geometric mean of 1 and sqrt (1 - m):
+/* Jacobi's elliptic functions (the exact motion of a pendulum) from the arithmetic-geometric mean a after N steps:
  *
- *     a' = (a + b) / 2,   b' = sqrt (a b),   c' = (a - b) / 2,       K (m) = pi / (2 a)  in the limit,
+ *     K (m) = pi / (2 a),   am (u) from phi = 2^N a u by N steps of  2 phi = phi' + asin (c' sin phi' / a')
  *
- * and am (u) from phi = 2^N a u by N steps of  2 phi = phi' + asin (c' sin phi' / a').
  * (Abramowitz & Stegun 1964, sections 16.4 and 17.6.) */
-#include <float.h>
-#include <math.h>
+#include "elliptic.h"
 #include "pinwheel.h"
 
-enum { ELLIPTIC_STEPS = 12 }; /* sufficient for any m < 1 */
-
-/* Stores the mean in *a and c / a of each step in `ratio`.  Returns the number of steps. */
-static int elliptic_mean (double m, double *a, double ratio[ELLIPTIC_STEPS]) {
-  double b = sqrt (1 - m);
-  int n = 0;
-  *a = 1;
-  while (n < ELLIPTIC_STEPS && fabs (*a - b) > 4 * DBL_EPSILON * *a) {
-    double mean = (*a + b) / 2;
-    ratio[n++] = (*a - b) / 2 / mean;
-    b = sqrt (*a * b);
-    *a = mean;
-  }
-  return n;
-}
-
 double pw_elliptic_K (double m) {
-  double a, ratio[ELLIPTIC_STEPS];
+  double a, ratio[PW_ELLIPTIC_STEPS], part[PW_ELLIPTIC_STEPS];
   if (!(m < 1)) return m == 1 ? INFINITY : NAN;
-  elliptic_mean (m, &a, ratio);
+  pw_elliptic_mean (m, &a, ratio, part);
   return PW_PI / (2 * a);
 }
 
 double pw_jacobi_am (double u, double m) {
-  double a, ratio[ELLIPTIC_STEPS];
+  double a, ratio[PW_ELLIPTIC_STEPS], part[PW_ELLIPTIC_STEPS];
   if (!(m < 1)) return m == 1 ? 2 * atan (tanh (u / 2)) : NAN;
-  int n = elliptic_mean (m, &a, ratio);
+  int n = pw_elliptic_mean (m, &a, ratio, part);
   double phi = ldexp (a * u, n);
   while (n-- > 0) phi = (phi + asin (ratio[n] * pw_sin (phi))) / 2;
   return phi;

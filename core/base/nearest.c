@@ -60,13 +60,13 @@ void pw_nearest_try (pw_nearest *n, const char *candidate) {
   n->near = nearest_is_near (n->sought, a, candidate, b, distance);
 }
 
-char *pw_nearest_text (const pw_nearest *n, char *buffer, size_t size) {
-  buffer[0] = 0;
+const char *pw_nearest_text (pw_nearest *n) {
+  *n->hint = 0;
   if (*n->best && n->near)
-    snprintf (buffer, size, "; did you mean \"%s\"?", n->best);
+    snprintf (n->hint, sizeof n->hint, "; did you mean \"%s\"?", n->best);
   else if (*n->best && !n->overflow)
-    snprintf (buffer, size, "; valid %s %s", strchr (n->all, ',') ? "are" : "is", n->all);
-  return buffer;
+    snprintf (n->hint, sizeof n->hint, "; valid %s %s", strchr (n->all, ',') ? "are" : "is", n->all);
+  return n->hint;
 }
 
 int pw_find_name (const void *table, size_t entry, const char *name, char hint[PW_HINT]) {
@@ -77,7 +77,7 @@ int pw_find_name (const void *table, size_t entry, const char *name, char hint[P
     if (strcmp (known, name) == 0) return i;
     pw_nearest_try (&near, known);
   }
-  pw_nearest_text (&near, hint, PW_HINT);
+  strcpy (hint, pw_nearest_text (&near));
   return -1;
 }
 

@@ -11,6 +11,7 @@ unsigned long long pw_check_sum (unsigned long long sum, const void *bytes, size
 int pw_grow (void *array, size_t count, size_t *room, size_t size) {
   if (count < *room) return PW_OK;
   size_t more = *room ? 2 * *room : 8;
+  while (more <= count) more *= 2;
   void *p = realloc (*(void **)array, more * size);
   if (p == NULL) return PW_RESOURCE;
   *(void **)array = p;

@@ -7,13 +7,7 @@
 
 static ssize_t stream_write (void *cookie, const char *bytes, size_t count) {
   pw_stream *t = cookie;
-  if (count >= t->room - t->size) {
-    size_t room = 2 * t->room + count;
-    char *more = realloc (t->text, room);
-    if (more == NULL) return 0;
-    t->text = more;
-    t->room = room;
-  }
+  if (pw_grow (&t->text, t->size + count, &t->room, 1) != PW_OK) return 0;
   memcpy (t->text + t->size, bytes, count);
   t->size += count;
   t->text[t->size] = 0;

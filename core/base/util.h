@@ -11,6 +11,8 @@ static inline int pw_require (const void *object, const char *what, pw_error *er
   return object ? PW_OK : pw_fail (error, PW_INPUT, "%s is missing", what);
 }
 
+enum { PW_HINT = 140 }; /* "; did you mean \"...\"?" with the longest name */
+
 /* Collects valid names, and the one nearest to an unknown name: least distance over the length of the longer name.
  * Start with { .sought = name }. */
 typedef struct {
@@ -20,15 +22,14 @@ typedef struct {
   int near;                /* 1: best is near enough to suggest */
   int overflow;            /* 1: `all` is too small for the valid names */
   char all[88];            /* the valid names, separated by commas */
+  char hint[PW_HINT];
 } pw_nearest;
 void pw_nearest_try (pw_nearest *n, const char *candidate);
-/* Writes the hint to the buffer and returns it: "; did you mean \"steer\"?"; "; valid are x, y, z" if no name is
- * near and all fit; else "". */
-char *pw_nearest_text (const pw_nearest *n, char *buffer, size_t size);
+/* The hint: "; did you mean \"steer\"?"; "; valid are x, y, z" if no name is near and all fit; else "". */
+const char *pw_nearest_text (pw_nearest *n);
 
 /* The index of a name in a table whose entries, of this size, begin with a name and whose last name is NULL; -1, with
  * the hint of pw_nearest_text, if it is not there.  The table may be NULL: it has no entries. */
-enum { PW_HINT = 130 };
 int pw_find_name (const void *table, size_t entry, const char *name, char hint[PW_HINT]);
 /* "", ">= 0", "> 0", "1, 2, ...", "0 to 1" */
 const char *pw_domain_text (pw_domain domain);
@@ -73,7 +74,7 @@ void pw_names_close (pw_names *n);
 int pw_names_add (pw_names *n, const char *name, int value); /* -1, or the value the name already has */
 int pw_names_find (const pw_names *n, const char *name);     /* -1 if absent */
 
-/* Makes room for one more entry of an array, *(void **)array, of which `count` are in use.  PW_OK or PW_RESOURCE. */
+/* Makes room for more than `count` entries of an array, *(void **)array.  PW_OK or PW_RESOURCE. */
 int pw_grow (void *array, size_t count, size_t *room, size_t size);
 
 /* The root of member i of a union-find structure, in which a root is its own parent; halves the path. */

@@ -42,13 +42,12 @@ static int main_unknown (const char *word) {
   for (const pw_command *const *c = main_commands; *c; c++) pw_nearest_try (&near, (*c)->name);
   for (const char *const *o = (const char *const[]){ "help", "--help", "--version", NULL }; *o; o++)
     pw_nearest_try (&near, *o);
-  char hint[100];
   size_t n = strlen (word);
   if (strchr (word, '/') || (n > 5 && strcmp (word + n - 5, ".yaml") == 0))
     pw_fail (&error, PW_INPUT, "\"%s\" is not a command; to run a model write pinwheel run %s", word, word);
   else
     pw_fail (&error, PW_INPUT, "there is no %s \"%s\"%s", word[0] == '-' ? "option" : "command", word,
-             pw_nearest_text (&near, hint, sizeof hint));
+             pw_nearest_text (&near));
   return pw_cli_end (&error);
 }
 

@@ -27,9 +27,9 @@ typedef struct {
 int pw_search_open (pw_search *s, pw_error *error);
 void pw_search_close (pw_search *s);
 
-/* The folder of pinwheel.h that belongs to this library, malloced; NULL if there is none.  PW_OK or PW_RESOURCE. */
-int pw_search_include (char **folder, pw_error *error);
-/* The path of a file of the engine of interactive pages, malloced; NULL if there is none.  PW_OK or PW_RESOURCE. */
+/* The path of the pinwheel.h that belongs to this library, or of a file of the engine of interactive pages; malloced,
+ * NULL if there is none.  PW_OK or PW_RESOURCE. */
+int pw_search_header (char **path, pw_error *error);
 int pw_search_page_file (const char *file, char **path, pw_error *error);
 
 /* Whether a name ends in ".so" or the like, with at least one character before it. */
@@ -86,12 +86,10 @@ const pw_yaml *pw_file_yaml (const pw_file *f);
 
 /* ---- Tables of numbers (columns.c) ---- */
 
-/* Reads `width` columns of a CSV file into arrays of the arena.  `column` names them, or numbers them from 1; the first
- * column must be increasing; with `gaps`, empty cells and nan in others become NaN.  `unit` is the requested unit of each
- * (NULL: any), to which it is converted if the header names another.
- * PW_INPUT with "SHOWN:LINE: REASON", PW_RESOURCE. */
-int pw_columns_from_stream (FILE *f, const char *shown, const char *const *column, const char *const *unit, int width,
-                            int gaps, pw_arena *arena, double **value, int *count, pw_error *error);
+/* As pw_read_columns, from a stream; `shown` is its path in messages, "SHOWN:LINE: REASON".  Without `gaps`, gaps are
+ * errors. */
+double *pw_columns_from_stream (FILE *f, const char *shown, const char *const *column, const char *const *unit,
+                                int width, int gaps, int *rows, pw_error *error);
 
 /* ---- Units (units.c) ---- */
 
@@ -106,6 +104,10 @@ extern const pw_unit_name pw_unit_names[]; /* ends with a NULL name */
 
 /* folder + "/" + name + ending, malloced; NULL if out of memory. */
 char *pw_path_join (const char *folder, const char *name, const char *ending);
+
+/* As pw_read_rest, of the regular file at a path; a failure to open it is "CANNOT PATH: REASON". */
+int pw_read_file (const char *cannot, const char *path, size_t max_bytes, const char *what, char **text, size_t *size,
+                  pw_error *error);
 
 /* Reads the rest of a file of at most `max_bytes` bytes into *text, malloced, zero-terminated; free it in every case.
  * `what` explains the limit in messages: "the limit for a table".  PW_INPUT if the file is larger or cannot be read;
@@ -140,9 +142,9 @@ typedef enum {
   PW_LOCK_EXISTING /* the existing file; ENOENT if there is none */
 } pw_lock_how;
 
-/* Opens a regular file for reading and writing and locks it until it is closed; *created is 1 for a new file;
- * a symbolic link is not followed.  -1 and errno, for pw_lock_reason. */
-int pw_lock_file (const char *path, pw_lock_how how, int *created);
+/* Opens a regular file for reading and writing and locks it until it is closed; a symbolic link is not followed.  -1 and
+ * errno, for pw_lock_reason. */
+int pw_lock_file (const char *path, pw_lock_how how);
 const char *pw_lock_reason (int code);
 
 /* ---- Outputs (output.c) ---- */

@@ -1,5 +1,4 @@
 /* Numbers as text, the same in every locale. */
-#define _POSIX_C_SOURCE 200809L
 #define __STDC_WANT_IEC_60559_BFP_EXT__ 1 /* strfromd */
 #include <ctype.h>
 #include <locale.h>

@@ -16,6 +16,10 @@ static int model_no_memory (pw_model *m) {
   return pw_fail (&m->error, PW_RESOURCE, "model %s: out of memory", m->name ? m->name : "");
 }
 
+static int model_status (const pw_model *m, pw_error *error) {
+  return m->error.status == PW_OK ? PW_OK : pw_fail (error, m->error.status, "%s", m->error.text);
+}
+
 pw_model *pw_model_new (const char *name, const pw_plugin_table *table, pw_error *error) {
   if (name == NULL || table == NULL) {
     pw_fail (error, PW_INPUT, "a model has no %s", name ? "table" : "name");
@@ -72,7 +76,7 @@ int pw_model_build (pw_model *m, pw_error *error) {
   if (m->built) return pw_fail (error, PW_INPUT, "model %s: pw_model_build called twice", m->name);
   m->table->build (m, m->parameters);
   m->built = 1;
-  return m->error.status == PW_OK ? PW_OK : pw_fail (error, m->error.status, "%s", m->error.text);
+  return model_status (m, error);
 }
 
 int pw_model_refuse (pw_model *m, const char *format, ...) {
@@ -210,28 +214,24 @@ int pw_model_set_signal (pw_model *m, const char *element, const char *field, co
                     element == NULL ? "the name of an element"
                     : field == NULL ? "the name of a field"
                                     : "a signal");
-  pw_nearest near = { .sought = element };
-  char hint[100];
-  for (int i = 0; i < m->elements; i++) {
-    const pw_element *e = &m->element[i];
-    const char *name = pw_element_name (e);
-    if (name == NULL) continue;
-    pw_nearest_try (&near, name);
-    if (strcmp (name, element) != 0) continue;
-    pw_nearest fields = { .sought = field };
-    for (const pw_field *f = e->kind->fields; f->name; f++) {
-      if (f->type != PW_SIGNAL) continue;
-      pw_nearest_try (&fields, f->name);
-      if (strcmp (f->name, field) != 0) continue;
-      void *at = memcpy ((char *)e->definition + f->offset, signal, sizeof *signal);
-      model_copy_table (m, at);
-      return m->error.status == PW_OK ? PW_OK : pw_fail (error, m->error.status, "%s", m->error.text);
-    }
-    return pw_fail (error, PW_INPUT, "model %s: %s %s has no signal \"%s\"%s", m->name, e->kind->name, element, field,
-                    pw_nearest_text (&fields, hint, sizeof hint));
+  pw_nearest elements = { .sought = element }, fields = { .sought = field };
+  const pw_element *e = NULL;
+  for (int i = 0; i < m->elements && e == NULL; i++) {
+    const char *name = pw_element_name (&m->element[i]);
+    if (name) pw_nearest_try (&elements, name);
+    if (name && strcmp (name, element) == 0) e = &m->element[i];
   }
-  return pw_fail (error, PW_INPUT, "model %s has no element \"%s\"%s", m->name, element,
-                  pw_nearest_text (&near, hint, sizeof hint));
+  if (e == NULL)
+    return pw_fail (error, PW_INPUT, "model %s has no element \"%s\"%s", m->name, element, pw_nearest_text (&elements));
+  const pw_field *f = e->kind->fields;
+  for (; f->name && !(f->type == PW_SIGNAL && strcmp (f->name, field) == 0); f++)
+    if (f->type == PW_SIGNAL) pw_nearest_try (&fields, f->name);
+  if (f->name == NULL)
+    return pw_fail (error, PW_INPUT, "model %s: %s %s has no signal \"%s\"%s", m->name, e->kind->name, element, field,
+                    pw_nearest_text (&fields));
+  void *at = memcpy ((char *)e->definition + f->offset, signal, sizeof *signal);
+  model_copy_table (m, at);
+  return model_status (m, error);
 }
 
 int pw_model_set_initial (pw_model *m, const char *state, double value, pw_error *error) {
@@ -244,7 +244,7 @@ int pw_model_set_initial (pw_model *m, const char *state, double value, pw_error
     m->initial[m->initials] = (pw_initial_setting){ model_copy_text (m, state), value };
     if (m->initial[m->initials].state) m->initials++;
   }
-  return m->error.status == PW_OK ? PW_OK : pw_fail (error, m->error.status, "%s", m->error.text);
+  return model_status (m, error);
 }
 
 /* ---- Reference solution: a function in C, or expressions of a text model ---- */

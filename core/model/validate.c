@@ -88,9 +88,8 @@ static int check_body_name (const pw_model *m, const pw_element *e, const char *
   pw_nearest near = { .sought = body };
   for (int i = 0; i < m->bodies; i++) pw_nearest_try (&near, m->body[i].name);
   pw_nearest_try (&near, "ground");
-  char hint[100];
   return pw_fail (error, PW_INPUT, "model %s: %s %s: there is no body \"%s\"%s", m->name, kind, name, body,
-                  pw_nearest_text (&near, hint, sizeof hint));
+                  pw_nearest_text (&near));
 }
 
 static int check_number (const pw_model *m, const pw_element *e, const pw_field *f, double value, pw_error *error) {
@@ -110,16 +109,14 @@ static int check_choice (const pw_model *m, const pw_element *e, const pw_field 
 
 static int check_field (const pw_model *m, const pw_element *e, const pw_field *f, const pw_names *bodies,
                         pw_error *error) {
-  const char *at = (const char *)e->definition + f->offset;
   for (int i = 0; i < pw_field_count (f); i++) {
-    int status = PW_OK;
-    if (f->type == PW_NUMBER) status = check_number (m, e, f, ((const double *)(const void *)at)[i], error);
-    if (f->type == PW_POINT || f->type == PW_VECTOR)
-      for (int k = 0; k < 2 && status == PW_OK; k++)
-        status = check_number (m, e, f, ((const double *)(const void *)at)[2 * i + k], error);
-    if (f->type == PW_BODY) status = check_body_name (m, e, ((const char *const *)(const void *)at)[i], bodies, error);
-    if (f->type == PW_SIGNAL) status = check_signal (m, e, f, (const pw_signal *)(const void *)at + i, error);
-    if (f->type == PW_CHOICE) status = check_choice (m, e, f, ((const int *)(const void *)at)[i], error);
+    const void *at = (const char *)e->definition + f->offset + (size_t)i * pw_field_bytes (f->type);
+    int status = PW_OK, numbers = f->type == PW_NUMBER ? 1 : f->type == PW_POINT || f->type == PW_VECTOR ? 2 : 0;
+    for (int k = 0; k < numbers && status == PW_OK; k++)
+      status = check_number (m, e, f, ((const double *)at)[k], error);
+    if (f->type == PW_BODY) status = check_body_name (m, e, *(const char *const *)at, bodies, error);
+    if (f->type == PW_SIGNAL) status = check_signal (m, e, f, at, error);
+    if (f->type == PW_CHOICE) status = check_choice (m, e, f, *(const int *)at, error);
     if (status != PW_OK) return status;
   }
   return PW_OK;

@@ -119,11 +119,10 @@ typedef char *query_name (const pw_system *s, int i, char *buffer, size_t size);
 /* Fails with the nearest of `count` names, unless it is known already. */
 static int query_missing (const pw_system *s, const char *what, int count, query_name *name, pw_nearest *near,
                           pw_error *error) {
-  char text[120], hint[160];
+  char text[120];
   for (int i = 0, search = *near->best == 0; search && i < count; i++)
     pw_nearest_try (near, name (s, i, text, sizeof text));
-  return pw_fail (error, PW_INPUT, "model %s has no %s \"%s\"%s", s->model, what, near->sought,
-                  pw_nearest_text (near, hint, sizeof hint));
+  return pw_fail (error, PW_INPUT, "model %s has no %s \"%s\"%s", s->model, what, near->sought, pw_nearest_text (near));
 }
 
 int pw_system_find_state (const pw_system *s, const char *name, pw_error *error) {

@@ -14,11 +14,10 @@ static const struct {
 
 static int hold_fail (const pw_system *s, const char *name, pw_error *error) {
   pw_nearest near = { .sought = name };
-  char known[300], hint[400];
+  char known[300];
   for (int i = 0; i < 2 * s->coords + HOLD_OTHERS * s->bodies; i++)
     pw_nearest_try (&near, pw_system_held_name (s, i, known, sizeof known));
-  return pw_fail (error, PW_INPUT, "model %s has no state \"%s\"%s", s->model, name,
-                  pw_nearest_text (&near, hint, sizeof hint));
+  return pw_fail (error, PW_INPUT, "model %s has no state \"%s\"%s", s->model, name, pw_nearest_text (&near));
 }
 
 int pw_system_find_held (const pw_system *s, const char *name, pw_error *error) {

@@ -44,7 +44,6 @@ static int methods_integrator (const char *name, const pw_method *const *own, co
                                pw_error *error) {
   const pw_method *const *const list[] = { pw_methods, own };
   pw_nearest near = { .sought = name };
-  char hint[PW_HINT];
   for (int l = 0; l < 2; l++)
     for (int i = 0; list[l] && list[l][i]; i++) {
       pw_nearest_try (&near, list[l][i]->name);
@@ -53,7 +52,7 @@ static int methods_integrator (const char *name, const pw_method *const *own, co
       const char *lack = methods_lack (*method);
       return *lack ? pw_fail (error, PW_INPUT, "integrator %s: %s", name, lack) : PW_OK;
     }
-  return pw_fail (error, PW_INPUT, "there is no integrator \"%s\"%s", name, pw_nearest_text (&near, hint, sizeof hint));
+  return pw_fail (error, PW_INPUT, "there is no integrator \"%s\"%s", name, pw_nearest_text (&near));
 }
 
 static int methods_stabilisation (const pw_method *method, const char *name, int *stabilisation, pw_error *error) {
@@ -99,7 +98,7 @@ static int methods_number (const pw_option *o, const char *text, double *value, 
  * read. */
 static int methods_option (const pw_method *method, int stabilisation, char *part, double *values, unsigned *given,
                            pw_error *error) {
-  char hint[PW_HINT], *equals = strchr (part, '=');
+  char *equals = strchr (part, '=');
   const char *with = method->stabilisations[stabilisation].name;
   if (equals == NULL) return pw_fail (error, PW_INPUT, "method option \"%s\": expected NAME=VALUE", part);
   *equals = 0;
@@ -115,7 +114,7 @@ static int methods_option (const pw_method *method, int stabilisation, char *par
                       : methods_number (o, equals + 1, values + i, error);
   }
   return pw_fail (error, PW_INPUT, "method %s+%s has no option \"%s\"%s", method->name, with, part,
-                  pw_nearest_text (&near, hint, sizeof hint));
+                  pw_nearest_text (&near));
 }
 
 int pw_parse_options (const char *text, const pw_method *const *own, const pw_method **method, int *stabilisation,

@@ -251,6 +251,16 @@ static void test_found_twice (void **state) {
   assert_true (cli_says (cli_out, "model", "twin"));
 }
 
+/* A folder is searched although its path begins that of another one, which does not fit into the list for messages
+ * (399 bytes). */
+static void test_long_search_path (void **state) {
+  (void)state;
+  cli_good ("d=$(cd @ && pwd -P); m=$d/m; long=$d/$(printf %0200d 0)/; rest=$((398 - ${#m} - ${#long}))\n"
+            "long=$long$(printf %0${rest}d 0); mkdir -p $long ${m}m $m\n"
+            "cp ${BUILD:-build}/models/ezyroller.so $m/other.so\n"
+            "PINWHEEL_MODELS=$long:${m}m:$m pinwheel run other --t-end 0.1");
+}
+
 /* ---- Runs that end early ---- */
 
 /* A step with which the method fails: the time reached and the reason, the rows so far in NAME.part, status 4. */
@@ -266,6 +276,10 @@ static void test_failing_step (void **state) {
   assert_true (strncmp (part, "t [s],", 6) == 0 && part[strlen (part) - 1] == '\n');
   const char *json = cli_file ("fail.json");
   assert_true (cli_says (json, "status", "method"));
+  /* an archive is complete: it ends with the record of 22 bytes that ends its directory */
+  assert_int_equal (cli_run ("pinwheel run ezyroller --step 0.5 --set M0=1e9 -o @/fail.npz"), 4);
+  cli_good ("tail -c 22 @/fail.npz.part | head -c 2");
+  assert_string_equal (cli_out, "PK");
 }
 
 static void test_interrupted (void **state) {
@@ -326,11 +340,14 @@ static void test_compiled (void **state) {
 
 int main (void) {
   const struct CMUnitTest tests[] = {
-    cmocka_unit_test (test_bad_lines),    cmocka_unit_test (test_search_path), cmocka_unit_test (test_useless_options),
-    cmocka_unit_test (test_unwritable),   cmocka_unit_test (test_full_disk),   cmocka_unit_test (test_bad_models),
-    cmocka_unit_test (test_bad_tables),   cmocka_unit_test (test_bad_files),   cmocka_unit_test (test_found_twice),
-    cmocka_unit_test (test_failing_step), cmocka_unit_test (test_interrupted), cmocka_unit_test (test_moved),
-    cmocka_unit_test (test_one_voice),    cmocka_unit_test (test_compiled),
+    cmocka_unit_test (test_bad_lines),       cmocka_unit_test (test_search_path),
+    cmocka_unit_test (test_useless_options), cmocka_unit_test (test_unwritable),
+    cmocka_unit_test (test_full_disk),       cmocka_unit_test (test_bad_models),
+    cmocka_unit_test (test_bad_tables),      cmocka_unit_test (test_bad_files),
+    cmocka_unit_test (test_found_twice),     cmocka_unit_test (test_long_search_path),
+    cmocka_unit_test (test_failing_step),    cmocka_unit_test (test_interrupted),
+    cmocka_unit_test (test_moved),           cmocka_unit_test (test_one_voice),
+    cmocka_unit_test (test_compiled),
   };
   return cmocka_run_group_tests (tests, cli_setup, cli_teardown);
 }

@@ -208,7 +208,8 @@ static void test_reading (void **state) {
   memory_each (1, "check pendulum --json @/o/a.json");
   memory_each (1, "linearise n-trailer --at 0.1 -o @/o/a");
   memory_each (1, "linearise car-tyres --animate @/o/a.html");
-  memory_each (1, "page pendulum -o @/o/a.html");
+  cli_run ("pinwheel page pendulum -o @/a.html");
+  if (strstr (cli_err, "built without the engine") == NULL) memory_each (1, "page pendulum -o @/o/a.html");
   memory_each (1, "sensitivity pendulum --of bob.x --of max:bob.y --by l --by bob.phi --t-end 0.02");
   memory_each (1, "new @/o/mine.yaml");
 }

@@ -96,6 +96,22 @@ static void bad_write (const char *text, size_t size) {
   assert_int_equal (fclose (f), 0);
 }
 
+/* Columns of the first line do not count a byte order mark. */
+static void test_byte_order_mark (void **state) {
+  static const char *const bad[] = { "about: a: b\n", "pinwheel: 2\n", "pinwheel: 1, x: [\n", "{pinwheel: 1, x: 3}\n" };
+  (void)state;
+  for (size_t i = 0; i < sizeof bad / sizeof *bad; i++) {
+    char text[100];
+    bad_write (bad[i], strlen (bad[i]));
+    pw_error without = bad_open (bad_path);
+    snprintf (text, sizeof text, "\xEF\xBB\xBF%s", bad[i]);
+    bad_write (text, strlen (text));
+    pw_error with = bad_open (bad_path);
+    assert_int_equal (without.status, PW_INPUT);
+    assert_string_equal (with.text, without.text);
+  }
+}
+
 /* A good model with one byte changed, or cut off somewhere, is read or refused with a text, never more. */
 static void test_damage (void **state) {
   static const char byte[] = "{}[],:#&*!|>'\"%@ \n-t.=(1\xC3";
@@ -133,7 +149,7 @@ static void test_size (void **state) {
 }
 
 int main (void) {
-  const struct CMUnitTest tests[] = { cmocka_unit_test (test_bad_models), cmocka_unit_test (test_damage),
-                                      cmocka_unit_test (test_size) };
+  const struct CMUnitTest tests[] = { cmocka_unit_test (test_bad_models), cmocka_unit_test (test_byte_order_mark),
+                                      cmocka_unit_test (test_damage), cmocka_unit_test (test_size) };
   return cmocka_run_group_tests (tests, bad_setup, bad_teardown);
 }

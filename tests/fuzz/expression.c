@@ -380,12 +380,6 @@ static void expression_try (const pw_expression *x, const char *text) {
   if (x->codes < 30 || x->codes % 16 == 0) expression_breakpoints (x, text); /* they take a hundred times as long */
 }
 
-static int expression_name (void *context, const char *name, size_t length, size_t at) {
-  const char *text = context;
-  if (at + length > strlen (text) || strncmp (text + at, name, length) != 0) abort ();
-  return 0;
-}
-
 int LLVMFuzzerTestOneInput (const uint8_t *data, size_t size) {
   static const char *const variable[] = { "x", "speed", NULL };
   char *text = fuzz_text (data, size);
@@ -393,12 +387,14 @@ int LLVMFuzzerTestOneInput (const uint8_t *data, size_t size) {
   pw_expression_error trouble = { 0 };
   const pw_expression *x;
   double value;
+  char name[PW_EXPRESSION_NAME];
   if (pw_expression_read (NULL, variable, text, &arena, &x, &trouble) == PW_OK)
     expression_try (x, text);
   else if (trouble.at > strlen (text) || *trouble.text == 0)
     abort ();
   pw_expression_constant (NULL, text, &value, &trouble);
-  pw_expression_names (text, expression_name, text);
+  for (const char *rest = text, *p; (p = pw_expression_next_name (&rest, name)) != NULL;)
+    if (p < text || rest > text + strlen (text) || strncmp (p, name, strlen (name)) != 0) abort ();
   pw_expression_number (text, &value);
   pw_expression_is_name (text);
   pw_arena_free (&arena);

@@ -53,7 +53,7 @@ const char *pw_column_unit (const pw_system *s, pw_column c) {
 }
 
 int pw_column_find (const pw_system *s, const char *name, const char *what, pw_column *c, pw_error *error) {
-  char buffer[300], hint[400];
+  char buffer[300];
   pw_nearest near = { .sought = name };
   for (*c = (pw_column){ 0 }; c->type < PW_COLUMN_TYPES; c->type++)
     for (c->index = 0; c->index < outcome_columns (s, c->type); c->index++) {
@@ -61,8 +61,7 @@ int pw_column_find (const pw_system *s, const char *name, const char *what, pw_c
       if (strcmp (known, name) == 0) return PW_OK;
       pw_nearest_try (&near, known);
     }
-  return pw_fail (error, PW_INPUT, "%s: no column \"%.100s\"%s", what, name,
-                  pw_nearest_text (&near, hint, sizeof hint));
+  return pw_fail (error, PW_INPUT, "%s: no column \"%.100s\"%s", what, name, pw_nearest_text (&near));
 }
 
 double pw_column_value (const pw_system *s, pw_column c, const pw_sample *x) {

@@ -48,7 +48,6 @@ static void list_fields (pw_table *t, const pw_field *fields) {
  * name.  `what`: "element type". */
 static int list_named (const char *what, const void *const *item, void (*show) (const void *item), const char **name,
                        pw_error *error) {
-  char hint[PW_HINT];
   for (int shown = 0; *name; name++) {
     int all = strcmp (*name, "all") == 0, found = all;
     pw_nearest near = { .sought = *name };
@@ -60,9 +59,7 @@ static int list_named (const char *what, const void *const *item, void (*show) (
       show (*i);
       found = 1;
     }
-    if (!found)
-      return pw_fail (error, PW_INPUT, "there is no %s \"%s\"%s", what, *name,
-                      pw_nearest_text (&near, hint, sizeof hint));
+    if (!found) return pw_fail (error, PW_INPUT, "there is no %s \"%s\"%s", what, *name, pw_nearest_text (&near));
   }
   return PW_OK;
 }

@@ -77,7 +77,7 @@ static int drift_vary (pw_drift *x, const char *text, pw_error *error) {
     const char *name;
     pw_grid *grid;
   } known[] = { { "alpha", &x->alpha }, { "beta", &x->beta }, { "every", &x->every } };
-  char name[60], hint[100];
+  char name[60];
   snprintf (name, sizeof name, "%.*s", (int)strcspn (text, "="), text);
   pw_nearest near = { .sought = name };
   for (size_t i = 0; i < sizeof known / sizeof *known; i++) {
@@ -85,7 +85,7 @@ static int drift_vary (pw_drift *x, const char *text, pw_error *error) {
     pw_nearest_try (&near, known[i].name);
   }
   return pw_fail (error, PW_INPUT, "--vary %.100s: alpha, beta and every can be varied%s", text,
-                  pw_nearest_text (&near, hint, sizeof hint));
+                  pw_nearest_text (&near));
 }
 
 /* The defaults, then the options. */

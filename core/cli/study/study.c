@@ -26,7 +26,7 @@ static int methods_add (pw_study *x, const char *name, pw_error *error) {
 
 /* Adds an integrator, or all of them (NULL), with a stabilisation, or all of them (NULL). */
 static int methods_add_all (pw_study *x, const pw_method *integrator, const char *stabilisation, pw_error *error) {
-  char name[STUDY_NAME], hint[100];
+  char name[STUDY_NAME];
   pw_nearest near = { .sought = stabilisation };
   int status = PW_OK, found = 0;
   for (int i = 0; pw_methods[i]; i++)
@@ -40,7 +40,7 @@ static int methods_add_all (pw_study *x, const pw_method *integrator, const char
     }
   if (status != PW_OK || found) return status;
   return pw_fail (error, PW_INPUT, "--methods all+%.60s: no integrator has this stabilisation%s", stabilisation,
-                  pw_nearest_text (&near, hint, sizeof hint));
+                  pw_nearest_text (&near));
 }
 
 /* "all", "INTEGRATOR+all", "all+STABILISATION", or a method. */

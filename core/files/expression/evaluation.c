@@ -95,8 +95,8 @@ double pw_expression_run (const pw_expression_code *code, int codes, const doubl
 /* ---- Derivatives ---- */
 
 typedef struct {
-  double v, d, dd;
-  int on; /* 1: depends on the variable */
+  double v, d, dd; /* value, first and second derivative with respect to the variable */
+  int on;          /* 1: depends on the variable */
 } jet;
 
 /* Operands independent of the variable contribute nothing, even with an infinite derivative. */

@@ -22,13 +22,18 @@ typedef struct {
 /* ---- Reading ---- */
 
 /* Named numbers. */
-typedef struct pw_scope pw_scope;
+typedef struct {
+  int names;
+  const char **name; /* names */
+  double *value;     /* names */
+  pw_names index;    /* of each name */
+} pw_scope;
 
-/* A scope with room for `names` names; NULL if out of memory. */
-pw_scope *pw_scope_open (int names);
-void pw_scope_close (pw_scope *s);
+/* Opens a scope with room for `room` names, in an arena.  PW_OK or PW_RESOURCE. */
+int pw_scope_open (pw_scope *s, int room, pw_arena *arena);
+void pw_scope_close (pw_scope *s); /* names and numbers stay in the arena */
 
-/* Adds a name, of which the scope keeps a pointer; at most as many as pw_scope_open was given. */
+/* Adds a name, of which the scope keeps a pointer. */
 void pw_scope_add (pw_scope *s, const char *name, double value);
 
 /* One operation of an expression; its operands are on a stack. */
@@ -77,10 +82,10 @@ int pw_expression_is_name (const char *text);
 /* Whether a function or constant has this name. */
 int pw_expression_is_reserved (const char *text);
 
-/* Calls `each` with every name in an expression, functions and constants too, until it returns non-zero; returns its
- * result. */
-int pw_expression_names (const char *text, int (*each) (void *context, const char *name, size_t length, size_t at),
-                         void *context);
+/* Copies the next name in an expression, of functions and constants too, to the buffer, cut to its size; *rest moves
+ * behind it.  Returns its position, or NULL after the last name. */
+enum { PW_EXPRESSION_NAME = 100 };
+const char *pw_expression_next_name (const char **rest, char name[PW_EXPRESSION_NAME]);
 
 /* Whether a text is a single number; its value may overflow to infinity. */
 int pw_expression_number (const char *text, double *value);

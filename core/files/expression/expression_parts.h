@@ -101,15 +101,6 @@ const pw_expression_constant_name *pw_expression_find_constant (const char *name
 size_t pw_expression_name_size (const char *p);
 size_t pw_expression_number_size (const char *p);
 
-struct pw_scope {
-  int names;
-  pw_names table;
-  struct {
-    const char *name;
-    double value;
-  } entry[];
-};
-
 /* x^y and its derivatives, with respect to x alone unless y varies. */
 double pw_expression_power (double x, double y);
 pw_partials pw_expression_power_partials (double x, double y, double f, int varies);

@@ -1,8 +1,7 @@
 /* Functions and constants of expressions, with derivatives of the smooth functions
  * (Abramowitz & Stegun 1964, chapters 4 and 17). */
-#include <float.h>
-#include <math.h>
 #include <string.h>
+#include "elliptic.h"
 #include "expression_parts.h"
 #include "pinwheel.h"
 
@@ -72,34 +71,18 @@ double pw_expression_mod (double x, double y) {
 
 /* ---- Elliptic functions ----
  *
- * With the arithmetic-geometric mean a, b, c of core/base/elliptic.c, its angles phi_n, R = sum of 2^(n-1) c_n^2 / m
- * from n = 1,
+ * With the arithmetic-geometric mean a, b, c of core/base/elliptic.h, the angles phi_n of am (elliptic.c), and R = sum of
+ * 2^(n-1) c_n^2 / m from n = 1,
  *
  *   dK/dm = K (1/2 - R) / (2 (1 - m)),   m (1 - m) d2K/dm2 = K / 4 - (1 - 2 m) dK/dm
  *   N = (E (phi) - (1 - m) u) / m = u (1/2 - R) + sum of c_n / m sin phi_n
  *   d am/du = dn,   d am/dm = -dn (N - sin cos / dn) / (2 (1 - m))
  *   dN/dm = (dn d am/dm + u/2 - N/2) / m        with constant u */
 
-enum { MAX_MEANS = 12 };
-
-/* Computes the mean *a, ratio = c_n / a_n, part = c_n / m and R; returns the number of steps. */
-static int partials_mean (double m, double *a, double ratio[MAX_MEANS], double part[MAX_MEANS], double *R) {
-  double b = sqrt (1 - m), c = m, p = 1, power = 1;
-  int n = 0;
-  *a = 1;
-  *R = 0;
-  while (n == 0 || (n < MAX_MEANS && fabs (*a - b) > 4 * DBL_EPSILON * *a)) {
-    double mean = (*a + b) / 2;
-    p = n == 0 ? 1 / (2 * (1 + b)) : c * p / (4 * mean);
-    c = m * p;
-    b = sqrt (*a * b);
-    *a = mean;
-    part[n] = p;
-    ratio[n++] = c / mean;
-    *R += power * c * p;
-    power *= 2;
-  }
-  return n;
+static double partials_R (double m, int steps, const double part[PW_ELLIPTIC_STEPS]) {
+  double R = 0;
+  for (int n = 0; n < steps; n++) R += ldexp (m * part[n] * part[n], n);
+  return R;
 }
 
 /* The second derivative of K by its series, for small m, where the formula above cancels. */
@@ -114,18 +97,19 @@ static double partials_K_series (double m) {
 }
 
 static pw_partials partials_elliptic_K (double m, double y, double K) {
-  double a, R, ratio[MAX_MEANS], part[MAX_MEANS];
+  double a, ratio[PW_ELLIPTIC_STEPS], part[PW_ELLIPTIC_STEPS];
   (void)y;
-  partials_mean (m, &a, ratio, part, &R);
-  double first = K * (0.5 - R) / (2 * (1 - m));
+  int n = pw_elliptic_mean (m, &a, ratio, part);
+  double first = K * (0.5 - partials_R (m, n, part)) / (2 * (1 - m));
   return partials_of_one (first,
                           fabs (m) < 0.2 ? partials_K_series (m) : (K / 4 - (1 - 2 * m) * first) / (m * (1 - m)));
 }
 
 static pw_partials partials_jacobi_am (double u, double m, double phi) {
-  double a, R, ratio[MAX_MEANS], part[MAX_MEANS], s = pw_sin (phi), c = pw_cos (phi), dn = sqrt (1 - m * s * s);
-  int n = partials_mean (m, &a, ratio, part, &R);
-  double N = u * (0.5 - R), angle = ldexp (a * u, n), rest = 1 - m;
+  double a, ratio[PW_ELLIPTIC_STEPS], part[PW_ELLIPTIC_STEPS];
+  double s = pw_sin (phi), c = pw_cos (phi), dn = sqrt (1 - m * s * s);
+  int n = pw_elliptic_mean (m, &a, ratio, part);
+  double N = u * (0.5 - partials_R (m, n, part)), angle = ldexp (a * u, n), rest = 1 - m;
   for (; n > 0; n--) {
     N += part[n - 1] * pw_sin (angle);
     angle = (angle + asin (ratio[n - 1] * pw_sin (angle))) / 2;

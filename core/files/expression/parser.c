@@ -13,7 +13,7 @@
 #include "pinwheel.h"
 #include "pinwheel-files.h"
 
-enum { PARSER_MAX_LENGTH = 4000, PARSER_MAX_DEPTH = 200, PARSER_NAME = 100 };
+enum { PARSER_MAX_LENGTH = 4000, PARSER_MAX_DEPTH = 200 };
 enum { ON_TIME = 1, ON_STATES = 2 };
 
 /* ---- Tokens ---- */
@@ -165,7 +165,7 @@ static parser_part parser_unexpected (parser *p, char open, size_t at) {
 }
 
 static parser_part parser_missing (parser *p) {
-  char last[PARSER_NAME];
+  char last[PW_EXPRESSION_NAME];
   if (p->status != PW_OK) return parser_nothing;
   snprintf (last, sizeof last, "%.*s", (int)(p->end - p->before), p->text + p->before);
   if (p->type == 0 && p->end == 0) return parser_fail (p, 0, "an expression is missing");
@@ -175,14 +175,13 @@ static parser_part parser_missing (parser *p) {
 }
 
 static parser_part parser_unknown (parser *p, const char *name) {
-  char hint[100];
   pw_nearest near = { .sought = name };
   for (const char *const *v = p->variable; v && *v; v++) pw_nearest_try (&near, *v);
-  for (int i = 0; p->scope && i < p->scope->names; i++) pw_nearest_try (&near, p->scope->entry[i].name);
+  for (int i = 0; p->scope && i < p->scope->names; i++) pw_nearest_try (&near, p->scope->name[i]);
   for (const pw_expression_constant_name *c = pw_expression_constants; c->name; c++) pw_nearest_try (&near, c->name);
   for (const pw_expression_function *f = pw_expression_functions; f->name; f++) pw_nearest_try (&near, f->name);
   if (strcmp (name, "T") == 0) pw_nearest_try (&near, "t"); /* the time, defined in some expressions only */
-  return parser_fail (p, p->at, "there is no \"%s\"%s", name, pw_nearest_text (&near, hint, sizeof hint));
+  return parser_fail (p, p->at, "there is no \"%s\"%s", name, pw_nearest_text (&near));
 }
 
 /* Whether the next token is an opening parenthesis. */
@@ -193,14 +192,14 @@ static int parser_is_call (const parser *p) {
 
 static parser_part parser_name (parser *p, const char *name) {
   const pw_expression_constant_name *c = pw_expression_find_constant (name);
-  int i = 0, known = p->scope ? pw_names_find (&p->scope->table, name) : -1;
+  int i = 0, known = p->scope ? pw_names_find (&p->scope->index, name) : -1;
   while (p->variable && p->variable[i] && strcmp (p->variable[i], name) != 0) i++;
   int variable = p->variable && p->variable[i];
   if (!variable && known < 0 && c == NULL) return parser_unknown (p, name);
   if (parser_is_call (p))
     return parser_fail (p, p->at, "\"%s\" is a number, not a function; a product is written with *", name);
   if (variable) return parser_leaf (p, PW_OP_VARIABLE, i, 0);
-  return parser_leaf (p, PW_OP_CONSTANT, 0, known >= 0 ? p->scope->entry[known].value : c->value);
+  return parser_leaf (p, PW_OP_CONSTANT, 0, known >= 0 ? p->scope->value[known] : c->value);
 }
 
 /* min and max combine more than two arguments pairwise. */
@@ -249,7 +248,7 @@ static parser_part parser_number (parser *p) {
 }
 
 static parser_part parser_operand (parser *p) {
-  char name[PARSER_NAME];
+  char name[PW_EXPRESSION_NAME];
   if (p->status != PW_OK) return parser_nothing;
   if (p->type == '0') return parser_number (p);
   if (p->type == '(') return parser_group (p);

@@ -1,5 +1,4 @@
 /* Names and numbers in a text, and named numbers. */
-#include <stdlib.h>
 #include <string.h>
 #include "expression_parts.h"
 #include "pinwheel-files.h"
@@ -40,33 +39,31 @@ int pw_expression_is_name (const char *text) {
   return n && text[n] == 0 && n < 64 && strchr (text, '.') == NULL;
 }
 
-int pw_expression_names (const char *text, int (*each) (void *context, const char *name, size_t length, size_t at),
-                         void *context) {
-  for (const char *p = text; *p;) {
+const char *pw_expression_next_name (const char **rest, char name[PW_EXPRESSION_NAME]) {
+  while (**rest) {
+    const char *p = *rest;
     size_t n = pw_expression_name_size (p), number = n ? 0 : pw_expression_number_size (p);
-    int stop = n ? each (context, p, n, (size_t)(p - text)) : 0;
-    if (stop) return stop;
-    p += n ? n : number ? number : 1;
+    *rest += n ? n : number ? number : 1;
+    snprintf (name, PW_EXPRESSION_NAME, "%.*s", (int)n, p);
+    if (n) return p;
   }
-  return 0;
+  return NULL;
 }
 
 /* ---- Named numbers ---- */
 
-pw_scope *pw_scope_open (int names) {
-  pw_scope *s = calloc (1, sizeof *s + (size_t)names * sizeof *s->entry);
-  if (s && pw_names_open (&s->table, (size_t)names + 1) == PW_OK) return s;
-  free (s);
-  return NULL;
+int pw_scope_open (pw_scope *s, int room, pw_arena *arena) {
+  s->name = pw_arena_alloc (arena, ((size_t)room + 1) * sizeof *s->name);
+  s->value = pw_arena_alloc (arena, ((size_t)room + 1) * sizeof *s->value);
+  return s->name && s->value ? pw_names_open (&s->index, (size_t)room) : PW_RESOURCE;
 }
 
 void pw_scope_close (pw_scope *s) {
-  if (s) pw_names_close (&s->table);
-  free (s);
+  pw_names_close (&s->index);
 }
 
 void pw_scope_add (pw_scope *s, const char *name, double value) {
-  s->entry[s->names].name = name;
-  s->entry[s->names].value = value;
-  pw_names_add (&s->table, name, s->names++);
+  s->name[s->names] = name;
+  s->value[s->names] = value;
+  pw_names_add (&s->index, name, s->names++);
 }

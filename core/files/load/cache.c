@@ -9,7 +9,7 @@
 #include <unistd.h>
 #include "files.h"
 
-enum { CACHE_MAX_BYTES = 64 << 20, CACHE_MAX_FILES = 4096 };
+enum { CACHE_MAX_BYTES = 64 << 20 };
 
 /* $XDG_CACHE_HOME or $HOME/.cache, malloced; NULL if neither is an absolute path. */
 static char *cache_parent (void) {
@@ -54,46 +54,35 @@ char *pw_cache_folder (char *notice, size_t size) {
 
 /* ---- Size ---- */
 
-typedef struct {
-  char name[80];
-  struct timespec used;
-  long long size;
-} cache_file;
-
-static int cache_order (const void *a, const void *b) {
-  const struct timespec *t = &((const cache_file *)a)->used, *u = &((const cache_file *)b)->used;
-  if (t->tv_sec != u->tv_sec) return t->tv_sec < u->tv_sec ? -1 : 1;
-  return (t->tv_nsec > u->tv_nsec) - (t->tv_nsec < u->tv_nsec);
-}
-
-static int cache_list (const char *folder, cache_file *file) {
-  int count = 0;
+/* Returns the size of all files [bytes], and the path of the one that was used least recently, malloced; NULL if there is
+ * none. */
+static long long cache_size (const char *folder, char **oldest) {
+  long long size = 0;
+  struct timespec used = { 0 };
+  struct dirent *e;
   DIR *dir = opendir (folder);
-  for (struct dirent *e; dir && count < CACHE_MAX_FILES && (e = readdir (dir)) != NULL;) {
+  *oldest = NULL;
+  while (dir && (e = readdir (dir)) != NULL) {
     struct stat info;
-    char *path =
-        e->d_name[0] == '.' || strlen (e->d_name) >= sizeof file->name ? NULL : pw_path_join (folder, e->d_name, "");
+    char *path = e->d_name[0] == '.' ? NULL : pw_path_join (folder, e->d_name, "");
     if (path && lstat (path, &info) == 0 && S_ISREG (info.st_mode)) {
-      file[count] = (cache_file){ .used = info.st_mtim, .size = info.st_size };
-      strcpy (file[count++].name, e->d_name);
+      const struct timespec *t = &info.st_mtim;
+      size += info.st_size;
+      if (*oldest == NULL || t->tv_sec < used.tv_sec || (t->tv_sec == used.tv_sec && t->tv_nsec < used.tv_nsec)) {
+        free (*oldest);
+        *oldest = path;
+        path = NULL;
+        used = *t;
+      }
     }
     free (path);
   }
   if (dir) closedir (dir);
-  return count;
+  return size;
 }
 
 void pw_cache_trim (const char *folder) {
-  cache_file *file = malloc (CACHE_MAX_FILES * sizeof *file);
-  long long sum = 0;
-  int count = file ? cache_list (folder, file) : 0, over = count == CACHE_MAX_FILES;
-  if (count) qsort (file, (size_t)count, sizeof *file, cache_order);
-  for (int i = 0; i < count; i++) sum += file[i].size;
-  for (int i = 0; i < count && (sum > CACHE_MAX_BYTES || (over && i < CACHE_MAX_FILES / 2)); i++) {
-    char *path = pw_path_join (folder, file[i].name, "");
-    if (path) unlink (path);
-    sum -= file[i].size;
-    free (path);
-  }
-  free (file);
+  char *oldest;
+  while (cache_size (folder, &oldest) > CACHE_MAX_BYTES && (unlink (oldest) == 0 || errno == ENOENT)) free (oldest);
+  free (oldest);
 }

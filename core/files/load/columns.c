@@ -11,14 +11,21 @@
 
 enum { COLUMNS_MAX_BYTES = 64 << 20, COLUMNS_MAX_LINES = 1000000 };
 
+/* A column to read. */
 typedef struct {
-  const char *shown; /* path for messages */
-  char *rest;        /* text not yet read */
-  int line;          /* number of the last line read */
-  int cells;         /* per line */
-  int columns;       /* to read; the first one is the time */
-  int gaps;          /* 1: in others, empty cells and nan are NaN */
-  char separator;    /* 0 before the first line */
+  int index;     /* of its cells in a line */
+  double factor; /* to SI units */
+} columns_source;
+
+typedef struct {
+  const char *shown;      /* path for messages */
+  char *rest;             /* text not yet read */
+  int line;               /* number of the last line read */
+  int cells;              /* per line */
+  columns_source *source; /* of each column to read; the first one is the time */
+  int columns;
+  int gaps;       /* 1: in others, empty cells and nan are NaN */
+  char separator; /* 0 before the first line */
   pw_error *error;
 } columns;
 
@@ -77,7 +84,7 @@ static int columns_names (const columns *c, const char *line) {
 
 /* Finds a column from its name in the first line, with or without its unit, or from its number. */
 static int columns_find (const columns *c, const char *first, int named, const char *name, int *index) {
-  char cell[100], unit[100], hint[200], *end;
+  char cell[100], unit[100], *end;
   pw_nearest near = { .sought = name };
   long number = strtol (name, &end, 10);
   if (*end == 0 && number >= 1 && number <= c->cells) return *index = (int)number - 1, PW_OK;
@@ -96,96 +103,98 @@ static int columns_find (const columns *c, const char *first, int named, const c
   }
   if (*index >= 0) return PW_OK;
   if (!named) return columns_fail (c, "there are no names of columns before the numbers, so no \"%.60s\"", name);
-  return columns_fail (c, "there is no column \"%.60s\"%s", name, pw_nearest_text (&near, hint, sizeof hint));
+  return columns_fail (c, "there is no column \"%.60s\"%s", name, pw_nearest_text (&near));
 }
 
 /* Finds a column and its conversion factor. */
-static int columns_open (const columns *c, const char *first, int named, const char *name, const char *unit, int *index,
-                         double *factor) {
+static int columns_open (const columns *c, const char *first, int named, const char *name, const char *unit,
+                         columns_source *source) {
   char cell[100], reason[260];
-  *factor = 1;
-  if (columns_find (c, first, named, name, index) != PW_OK) return PW_INPUT;
-  columns_cell (c, first, *index, cell, sizeof cell);
-  if (!named || pw_unit_check (cell, unit, factor, reason, sizeof reason) == PW_OK) return PW_OK;
+  source->factor = 1;
+  if (columns_find (c, first, named, name, &source->index) != PW_OK) return PW_INPUT;
+  columns_cell (c, first, source->index, cell, sizeof cell);
+  if (!named || pw_unit_check (cell, unit, &source->factor, reason, sizeof reason) == PW_OK) return PW_OK;
   return columns_fail (c, "%s", reason);
 }
 
 /* ---- Numbers ---- */
 
-static int columns_number (const columns *c, const char *line, int index, double factor, int gap, double *value) {
+static int columns_number (const columns *c, const char *line, columns_source source, int gap, double *value) {
   char cell[100];
-  columns_cell (c, line, index, cell, sizeof cell);
-  if (gap && (*cell == 0 || (pw_read_number (cell, value) == PW_OK && isnan (*value)))) return *value = NAN, PW_OK;
-  if (pw_read_number (cell, value) != PW_OK || !isfinite (*value))
-    return columns_fail (c, "column %d: expected a finite number, found \"%.40s\"", index + 1, cell);
-  *value *= factor;
+  columns_cell (c, line, source.index, cell, sizeof cell);
+  int number = pw_read_number (cell, value) == PW_OK;
+  if (gap && (*cell == 0 || (number && isnan (*value)))) return *value = NAN, PW_OK;
+  if (!number || !isfinite (*value))
+    return columns_fail (c, "column %d: expected a finite number, found \"%.40s\"", source.index + 1, cell);
+  *value *= source.factor;
   if (isfinite (*value)) return PW_OK;
-  return columns_fail (c, "column %d: \"%.40s\" is too large in SI units", index + 1, cell);
+  return columns_fail (c, "column %d: \"%.40s\" is too large in SI units", source.index + 1, cell);
 }
 
-static int columns_rows (columns *c, char *line, const int *index, const double *factor, double **value, int *count) {
-  for (int n = 0; line; line = columns_line (c), *count = ++n) {
+/* Reads lines into columns of `room` numbers. */
+static int columns_rows (columns *c, char *line, double *value, size_t room, int *rows) {
+  for (int n = 0; line; line = columns_line (c), *rows = ++n) {
     int cells = columns_count (c, line);
     if (cells != c->cells) return columns_fail (c, "expected %d cells as in the first line, found %d", c->cells, cells);
     for (int k = 0; k < c->columns; k++)
-      if (columns_number (c, line, index[k], factor[k], k > 0 && c->gaps, &value[k][n]) != PW_OK) return PW_INPUT;
-    if (n > 0 && !(value[0][n] > value[0][n - 1]))
-      return columns_fail (c, "%.9g comes after %.9g: expected increasing times", value[0][n], value[0][n - 1]);
+      if (columns_number (c, line, c->source[k], k > 0 && c->gaps, &value[(size_t)k * room + (size_t)n]) != PW_OK)
+        return PW_INPUT;
+    if (n > 0 && !(value[n] > value[n - 1]))
+      return columns_fail (c, "%.9g comes after %.9g: expected increasing times", value[n], value[n - 1]);
   }
   return PW_OK;
 }
 
-static int columns_all (columns *c, const char *const *column, const char *const *unit, pw_arena *arena, double **value,
-                        int *count) {
-  int *index = pw_arena_alloc (arena, (size_t)c->columns * sizeof *index);
-  double *factor = pw_arena_alloc (arena, (size_t)c->columns * sizeof *factor);
+/* Stores the columns in *value, one after the other, for the caller to release in every case. */
+static int columns_all (columns *c, const char *const *column, const char *const *unit, double **value, int *rows) {
   size_t lines = 1;
   for (const char *p = c->rest; (p = strchr (p, '\n')) != NULL; p++) lines++;
   char *line = columns_line (c);
   if (line == NULL) return columns_fail (c, "the file is empty");
-  if (index == NULL || factor == NULL) return pw_fail (c->error, PW_RESOURCE, "%s: out of memory", c->shown);
   if (lines > COLUMNS_MAX_LINES) return columns_fail (c, "more than %d lines", COLUMNS_MAX_LINES);
   c->cells = columns_count (c, line);
   int named = columns_names (c, line);
-  for (int k = 0; k < c->columns; k++) {
-    if (columns_open (c, line, named, column[k], unit[k], &index[k], &factor[k]) != PW_OK) return PW_INPUT;
-    value[k] = pw_arena_alloc (arena, lines * sizeof (double));
-    if (value[k] == NULL) return pw_fail (c->error, PW_RESOURCE, "%s: out of memory", c->shown);
-  }
-  return columns_rows (c, named ? columns_line (c) : line, index, factor, value, count);
+  for (int k = 0; k < c->columns; k++)
+    if (columns_open (c, line, named, column[k], unit[k], &c->source[k]) != PW_OK) return PW_INPUT;
+  *value = malloc ((size_t)c->columns * lines * sizeof **value);
+  if (*value == NULL) return pw_fail (c->error, PW_RESOURCE, "%s: out of memory", c->shown);
+  if (columns_rows (c, named ? columns_line (c) : line, *value, lines, rows) != PW_OK) return PW_INPUT;
+  size_t n = (size_t)*rows;
+  for (size_t k = 1; k < (size_t)c->columns; k++) memmove (*value + k * n, *value + k * lines, n * sizeof **value);
+  return PW_OK;
 }
 
-int pw_columns_from_stream (FILE *f, const char *shown, const char *const *column, const char *const *unit, int width,
-                            int gaps, pw_arena *arena, double **value, int *count, pw_error *error) {
+double *pw_columns_from_stream (FILE *f, const char *shown, const char *const *column, const char *const *unit,
+                                int width, int gaps, int *rows, pw_error *error) {
   static const char mark[] = "\xEF\xBB\xBF"; /* byte order mark, which some programs write */
   char *text;
   size_t size;
-  *count = 0;
+  double *value = NULL;
+  *rows = 0;
   int status = pw_read_rest (f, COLUMNS_MAX_BYTES, shown, "the limit for a table", &text, &size, error);
   columns c = { .shown = shown, .rest = text, .columns = width, .gaps = gaps, .error = error };
+  c.source = calloc ((size_t)width, sizeof *c.source);
+  if (status == PW_OK && c.source == NULL) status = pw_fail (error, PW_RESOURCE, "%s: out of memory", shown);
   if (status == PW_OK && strlen (text) != size)
     status = pw_fail (error, PW_INPUT, "%.80s: a table is text, and this has a byte 0", shown);
   if (status == PW_OK && strncmp (text, mark, 3) == 0) c.rest += 3;
-  if (status == PW_OK) status = columns_all (&c, column, unit, arena, value, count);
+  if (status == PW_OK) status = columns_all (&c, column, unit, &value, rows);
   free (text);
-  return status;
+  free (c.source);
+  if (status == PW_OK) return value;
+  free (value);
+  return NULL;
 }
 
 double *pw_read_columns (const char *path, const char *const *column, const char *const *unit, int width, int *rows,
                          pw_error *error) {
   const char *why;
-  pw_arena arena = { NULL };
-  double **value = calloc ((size_t)width, sizeof *value), *all = NULL;
-  int status = PW_OK;
   FILE *f = pw_open_input (path, &why);
-  if (f == NULL) status = pw_fail (error, pw_open_input_status (), "%s: cannot be read: %s", path, why);
-  if (f && value) status = pw_columns_from_stream (f, path, column, unit, width, 1, &arena, value, rows, error);
-  if (f) fclose (f);
-  if (status == PW_OK && value) all = malloc (((size_t)*rows * (size_t)width + 1) * sizeof *all);
-  if (status == PW_OK && all == NULL) pw_fail (error, PW_RESOURCE, "%s: out of memory", path);
-  for (int k = 0; all && k < width; k++)
-    memcpy (all + (size_t)k * (size_t)*rows, value[k], (size_t)*rows * sizeof *all);
-  pw_arena_free (&arena);
-  free (value);
-  return all;
+  if (f == NULL) {
+    pw_fail (error, pw_open_input_status (), "%s: cannot be read: %s", path, why);
+    return NULL;
+  }
+  double *value = pw_columns_from_stream (f, path, column, unit, width, 1, rows, error);
+  fclose (f);
+  return value;
 }

@@ -1,5 +1,4 @@
 /* The parts of an interactive page: the engine as WebAssembly, the text of a model, its tree, its tables. */
-#define _POSIX_C_SOURCE 200809L
 #include <stdlib.h>
 #include <string.h>
 #include "files.h"
@@ -20,13 +19,10 @@ static int page_add (pw_page *p, const char *name, char *bytes, size_t size, pw_
 }
 
 static int page_read (pw_page *p, const char *name, const char *path, pw_error *error) {
-  const char *why;
-  char *bytes = NULL;
+  char *bytes;
   size_t size;
-  FILE *f = pw_open_input (path, &why);
-  if (f == NULL) return pw_fail (error, pw_open_input_status (), "cannot read %s: %s", path, why);
-  int status = pw_read_rest (f, PAGE_MAX_BYTES, path, "the limit for a part of a page", &bytes, &size, error);
-  fclose (f);
+  int status =
+      pw_read_file ("cannot read", path, PAGE_MAX_BYTES, "the limit for a part of a page", &bytes, &size, error);
   if (status == PW_OK) return page_add (p, name, bytes, size, error);
   free (bytes);
   return status;

@@ -4,7 +4,6 @@
 #include <errno.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/stat.h>
 #include "files.h"
 
 struct pw_file {
@@ -90,7 +89,7 @@ static int plugin_find_path (pw_file *f, const char *path, pw_error *error) {
 /* The hint for an unknown name: to use a path if the current directory has such a file, else the nearest name. */
 static int plugin_unknown (const pw_search *s, const char *name, pw_error *error) {
   struct stat info;
-  char hint[120], here[200], unread[300] = "";
+  char here[200], unread[300] = "";
   for (int i = 0; i < PLUGIN_ENDINGS; i++) {
     snprintf (here, sizeof here, "%s%s", name, plugin_endings[i]);
     if (stat (here, &info) == 0)
@@ -103,7 +102,7 @@ static int plugin_unknown (const pw_search *s, const char *name, pw_error *error
                     *s->folders ? s->folders : "the folders of PINWHEEL_MODELS or next to the program", unread);
   pw_nearest near = { .sought = name };
   for (int i = 0; i < s->count; i++) pw_nearest_try (&near, s->found[i].name);
-  pw_nearest_text (&near, hint, sizeof hint);
+  const char *hint = pw_nearest_text (&near);
   if (*unread == 0) return pw_fail (error, PW_INPUT, "there is no model \"%s\"%s", name, hint);
   return pw_fail (error, PW_INPUT, "there is no model \"%s\" in %s%s%s", name, s->folders, unread, hint);
 }

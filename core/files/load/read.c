@@ -11,23 +11,32 @@ char *pw_path_join (const char *folder, const char *name, const char *ending) {
   return path;
 }
 
+enum { READ_CHUNK = 1 << 16 };
+
 int pw_read_rest (FILE *f, size_t max_bytes, const char *path, const char *what, char **text, size_t *size,
                   pw_error *error) {
-  size_t capacity = 1 << 16;
+  size_t room = 0;
+  *text = NULL;
   *size = 0;
-  *text = malloc (capacity + 1);
-  for (size_t n = 1; *text && n > 0; *size += n) {
-    if (*size == capacity) {
-      char *more = realloc (*text, (capacity *= 2) + 1);
-      if (more == NULL) return pw_fail (error, PW_RESOURCE, "%s: out of memory", path);
-      *text = more;
-    }
-    n = fread (*text + *size, 1, capacity - *size, f);
+  for (size_t n = 1; n > 0; *size += n) {
+    if (pw_grow (text, *size + READ_CHUNK, &room, 1) != PW_OK)
+      return pw_fail (error, PW_RESOURCE, "%s: out of memory", path);
+    n = fread (*text + *size, 1, room - *size - 1, f);
     (*text)[*size + n] = 0;
     if (*size + n > max_bytes)
       return pw_fail (error, PW_INPUT, "%s: the file has more than %g MB, %s", path, (double)(max_bytes >> 10) / 1024,
                       what);
   }
-  if (*text == NULL) return pw_fail (error, PW_RESOURCE, "%s: out of memory", path);
   return ferror (f) ? pw_fail (error, PW_INPUT, "cannot read %s: %s", path, strerror (errno)) : PW_OK;
+}
+
+int pw_read_file (const char *cannot, const char *path, size_t max_bytes, const char *what, char **text, size_t *size,
+                  pw_error *error) {
+  const char *why;
+  FILE *f = pw_open_input (path, &why);
+  *text = NULL;
+  if (f == NULL) return pw_fail (error, pw_open_input_status (), "%s %s: %s", cannot, path, why);
+  int status = pw_read_rest (f, max_bytes, path, what, text, size, error);
+  fclose (f);
+  return status;
 }

@@ -3,7 +3,6 @@
  * An object in the cache, KEY.so, is followed by the text it was compiled from, the compiler and options, and a
  * checksum; they are compared before it is loaded.  KEY.c is locked while it is compiled; it is only kept, with the
  * messages in KEY.log, if that fails. */
-#define _POSIX_C_SOURCE 200809L
 #include <dlfcn.h>
 #include <errno.h>
 #include <fcntl.h>
@@ -13,7 +12,7 @@
 #include <unistd.h>
 #include "files.h"
 
-enum { CODE_MAX_BYTES = 64 << 20, CODE_KEY = 33, CODE_MAX_WAITS = 3000 }; /* size of a key; waits of 20 ms */
+enum { CODE_MAX_BYTES = 64 << 20, CODE_MAX_WAITS = 3000 }; /* waits of 20 ms */
 
 struct pw_scene_code {
   void *handle;
@@ -22,20 +21,12 @@ struct pw_scene_code {
   char notice[600];
 };
 
-/* The end of a cached object. */
-typedef struct {
-  char magic[16];
-  unsigned long long object, text, how, check; /* bytes of each part; sum of all of them */
-} code_trailer;
-
-static const char code_magic[16] = "pinwheel scene\n";
-
 typedef struct {
   const pw_system *system;
   const char *text;
   int lanes;      /* 0: for single runs */
   char how[2000]; /* versions, compiler and options */
-  char key[CODE_KEY];
+  char key[17];   /* checksum of text and how, in hexadecimal */
   char *folder, *source, *log, *part, *object;
   pw_scene_code *code;
 } code_job;
@@ -75,31 +66,22 @@ static int code_add_compiler (code_job *x) {
 }
 
 static int code_read (const char *path, char **text, size_t *size, pw_error *error) {
-  const char *why;
-  FILE *f = pw_open_input (path, &why);
-  *text = NULL;
-  if (f == NULL) return pw_fail (error, errno == ENOENT ? PW_RETRY : pw_open_input_status (), "%s", why);
-  int status = pw_read_rest (f, CODE_MAX_BYTES, path, "the limit for an object", text, size, error);
-  fclose (f);
-  return status;
+  int status = pw_read_file ("cannot read", path, CODE_MAX_BYTES, "the limit for an object", text, size, error);
+  return status == PW_INPUT && *text == NULL && errno == ENOENT ? PW_RETRY : status;
 }
 
 static int code_identify (code_job *x, pw_error *error) {
-  char *include, *header = NULL, *text = NULL, sum[40] = "";
+  char *header, *text = NULL, sum[40] = "";
   size_t size;
   code_add (x, "pinwheel " PW_VERSION);
   for (const char *const *o = pw_scene_options (x->lanes); *o; o++) code_add (x, *o);
   if (code_add_compiler (x) != PW_OK) return pw_fail (error, PW_RESOURCE, "out of memory, or CC is too long");
-  int status = pw_search_include (&include, error);
-  if (include) header = pw_path_join (include, "pinwheel.h", "");
+  int status = pw_search_header (&header, error);
   if (header && code_read (header, &text, &size, NULL) == PW_OK)
     snprintf (sum, sizeof sum, "%016llx", pw_check_sum (PW_CHECK, text, size));
   code_add (x, sum);
-  for (unsigned long long i = 0, h = PW_CHECK; i < 2; i++) {
-    h = pw_check_sum (pw_check_sum (h ^ (i << 40), x->text, strlen (x->text)), x->how, strlen (x->how));
-    snprintf (x->key + 16 * i, CODE_KEY - 16 * i, "%016llx", h);
-  }
-  free (include);
+  snprintf (x->key, sizeof x->key, "%016llx",
+            pw_check_sum (pw_check_sum (PW_CHECK, x->text, strlen (x->text)), x->how, strlen (x->how)));
   free (header);
   free (text);
   return status;
@@ -120,24 +102,17 @@ static int code_paths (code_job *x, pw_error *error) {
 
 /* ---- Loading ---- */
 
-static unsigned long long code_sum (const char *bytes, size_t size) {
-  return pw_check_sum (PW_CHECK, bytes, size);
-}
-
 /* Checks a cached object.  PW_RETRY: missing, or of another scene; PW_INPUT: damaged. */
 static int code_check (const code_job *x, pw_error *error) {
   char *bytes;
   size_t size = 0, text = strlen (x->text), how = strlen (x->how);
-  code_trailer end;
+  unsigned long long check = 0;
   int status = code_read (x->object, &bytes, &size, error);
-  if (status == PW_OK && size >= sizeof end) memcpy (&end, bytes + size - sizeof end, sizeof end);
-  if (status == PW_OK &&
-      (size < sizeof end || memcmp (end.magic, code_magic, sizeof code_magic) != 0 || end.object > size ||
-       end.text > size || end.how > size || end.object + end.text + end.how + sizeof end != size ||
-       code_sum (bytes, size - sizeof end) != end.check))
+  if (status == PW_OK && size >= sizeof check) memcpy (&check, bytes + (size -= sizeof check), sizeof check);
+  if (status == PW_OK && pw_check_sum (PW_CHECK, bytes, size) != check)
     status = pw_fail (error, PW_INPUT, "it is damaged");
-  if (status == PW_OK && (end.text != text || end.how != how || memcmp (bytes + end.object, x->text, text) != 0 ||
-                          memcmp (bytes + end.object + text, x->how, how) != 0))
+  if (status == PW_OK && (size < text + how || memcmp (bytes + size - how, x->how, how) != 0 ||
+                          memcmp (bytes + size - how - text, x->text, text) != 0))
     status = PW_RETRY;
   free (bytes);
   return status;
@@ -173,27 +148,23 @@ static int code_load_cached (code_job *x) {
 /* ---- Compiling ---- */
 
 /* Appends text, options and checksum to an object, and renames it. */
-static int code_add_trailer (const code_job *x, pw_error *error) {
+static int code_complete (const code_job *x, pw_error *error) {
   char *bytes;
-  code_trailer end = { .text = strlen (x->text), .how = strlen (x->how) };
-  size_t size;
-  int status = code_read (x->part, &bytes, &size, NULL);
-  if (status != PW_OK) status = pw_fail (error, PW_RESOURCE, "the compiler has written no object");
-  FILE *f = status == PW_OK ? fopen (x->part, "ab") : NULL;
-  if (f) {
-    memcpy (end.magic, code_magic, sizeof code_magic);
-    end.object = size;
-    end.check = pw_check_sum (pw_check_sum (code_sum (bytes, size), x->text, end.text), x->how, end.how);
-    fwrite (x->text, 1, end.text, f);
-    fwrite (x->how, 1, end.how, f);
-    fwrite (&end, sizeof end, 1, f);
-    int failed = ferror (f);
-    if (fclose (f) != 0 || failed || rename (x->part, x->object) != 0) f = NULL;
+  size_t size, text = strlen (x->text), how = strlen (x->how);
+  if (code_read (x->part, &bytes, &size, NULL) != PW_OK) {
+    free (bytes);
+    return pw_fail (error, PW_RESOURCE, "the compiler has written no object");
   }
-  if (status == PW_OK && f == NULL)
-    status = pw_fail (error, PW_RESOURCE, "cannot write %s: %s", x->object, strerror (errno));
+  unsigned long long check =
+      pw_check_sum (pw_check_sum (pw_check_sum (PW_CHECK, bytes, size), x->text, text), x->how, how);
   free (bytes);
-  return status;
+  FILE *f = fopen (x->part, "ab");
+  if (f) fprintf (f, "%s%s", x->text, x->how);
+  if (f) fwrite (&check, sizeof check, 1, f);
+  int failed = f == NULL || ferror (f);
+  if (f && fclose (f) != 0) failed = 1;
+  if (!failed && rename (x->part, x->object) == 0) return PW_OK;
+  return pw_fail (error, PW_RESOURCE, "cannot write %s: %s", x->object, strerror (errno));
 }
 
 /* Compiles KEY.c, which this process has locked. */
@@ -203,7 +174,7 @@ static int code_compile (code_job *x, FILE *source, pw_error *error) {
     status = pw_fail (error, PW_RESOURCE, "cannot write %s: %s", x->source, strerror (errno));
   if (status == PW_OK) status = pw_compile_scene (x->source, x->part, x->log, x->lanes, error);
   int keep = status == PW_METHOD;
-  if (status == PW_OK) status = code_add_trailer (x, error);
+  if (status == PW_OK) status = code_complete (x, error);
   if (status == PW_OK && (status = code_load (x, error)) != PW_OK) unlink (x->object);
   unlink (x->part);
   if (!keep) unlink (x->source), unlink (x->log);
@@ -213,11 +184,9 @@ static int code_compile (code_job *x, FILE *source, pw_error *error) {
 /* Waits while another process compiles the scene.  NULL after a minute, or if the folder was removed. */
 static FILE *code_lock (const code_job *x) {
   const struct timespec pause = { .tv_nsec = 20000000 };
-  int created, file = pw_lock_file (x->source, PW_LOCK_NEW, &created);
-  for (int i = 0; file < 0 && errno == EWOULDBLOCK && i < CODE_MAX_WAITS; i++) {
+  int file, waits = 0;
+  while ((file = pw_lock_file (x->source, PW_LOCK_NEW)) < 0 && errno == EWOULDBLOCK && waits++ < CODE_MAX_WAITS)
     nanosleep (&pause, NULL);
-    file = pw_lock_file (x->source, PW_LOCK_NEW, &created);
-  }
   FILE *f = file >= 0 ? fdopen (file, "wb") : NULL;
   if (f == NULL && file >= 0) close (file);
   return f;

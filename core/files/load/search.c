@@ -9,7 +9,6 @@
 #include <limits.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/stat.h>
 #include <unistd.h>
 #include "files.h"
 
@@ -96,12 +95,12 @@ static int search_entry (pw_search *s, const char *folder, const char *entry, pw
   return status;
 }
 
-/* Adds a folder to s->folders, "/first:/second"; 0 if it is there already, so that it is searched once. */
+/* Adds a folder to s->folders, "/first:/second", if it fits; 0 if it is there already, so that it is searched once. */
 static int search_add_folder (pw_search *s, const char *real) {
   size_t n = strlen (real), used = strlen (s->folders);
   for (const char *p = s->folders; *p; p += strcspn (p, ":"), p += *p == ':')
     if (strcspn (p, ":") == n && strncmp (p, real, n) == 0) return 0;
-  snprintf (s->folders + used, sizeof s->folders - used, "%s%s", used ? ":" : "", real);
+  if (used + n + 2 <= sizeof s->folders) sprintf (s->folders + used, "%s%s", used ? ":" : "", real);
   return 1;
 }
 
@@ -170,24 +169,26 @@ void pw_search_close (pw_search *s) {
 
 typedef struct {
   const char *file;
-  char *folder; /* the first that contains it */
+  char *path; /* of the first that can be read */
 } search_file;
 
 static int search_find_file (void *context, const char *folder, pw_error *error) {
   search_file *x = context;
-  char *path = pw_path_join (folder, x->file, "");
-  int exists = path && access (path, R_OK) == 0;
-  if (exists && x->folder == NULL) x->folder = strdup (folder);
-  free (path);
-  return path == NULL || (exists && x->folder == NULL) ? search_no_memory (error) : PW_OK;
+  char *path = x->path ? NULL : pw_path_join (folder, x->file, "");
+  if (x->path == NULL && path == NULL) return search_no_memory (error);
+  if (path && access (path, R_OK) == 0)
+    x->path = path;
+  else
+    free (path);
+  return PW_OK;
 }
 
-int pw_search_include (char **include, pw_error *error) {
+int pw_search_header (char **path, pw_error *error) {
   static const search_folders where = { { "include", "../include", "../include/pinwheel" },
                                         { "include", "../include", "../include/pinwheel" } };
   search_file x = { "pinwheel.h", NULL };
   int status = search_visit (where, search_find_file, &x, error);
-  *include = x.folder;
+  *path = x.path;
   return status;
 }
 
@@ -196,8 +197,6 @@ int pw_search_page_file (const char *file, char **path, pw_error *error) {
                                         { "page", "../page", "pinwheel/page" } };
   search_file x = { file, NULL };
   int status = search_visit (where, search_find_file, &x, error);
-  *path = x.folder ? pw_path_join (x.folder, file, "") : NULL;
-  if (x.folder && *path == NULL) status = search_no_memory (error);
-  free (x.folder);
+  *path = x.path;
   return status;
 }

@@ -68,18 +68,16 @@ static int units_read (const char *text, units_value *u);
 /* Multiplies by a power of the unit whose name has n bytes. */
 static int units_name (const char *name, size_t n, int power, units_value *u) {
   units_value one = { .factor = 1 };
-  int i = 0;
-  for (; pw_unit_names[i].name; i++)
-    if (strlen (pw_unit_names[i].name) == n && memcmp (pw_unit_names[i].name, name, n) == 0) break;
-  if (pw_unit_names[i].name == NULL && !(n == 1 && *name == '1')) return PW_INPUT;
-  if (pw_unit_names[i].name) pw_read_expression (pw_unit_names[i].factor, &one.factor);
-  if (i < UNITS_BASE)
-    one.power[i] = 1;
-  else if (pw_unit_names[i].name) {
-    units_value rest;
-    units_read (pw_unit_names[i].si, &rest);
-    one.factor *= rest.factor;
-    memcpy (one.power, rest.power, sizeof one.power);
+  const pw_unit_name *unit = pw_unit_names;
+  while (unit->name && !(strlen (unit->name) == n && memcmp (unit->name, name, n) == 0)) unit++;
+  if (unit->name == NULL && !(n == 1 && *name == '1')) return PW_INPUT;
+  if (unit < pw_unit_names + UNITS_BASE)
+    one.power[unit - pw_unit_names] = 1;
+  else if (unit->name) {
+    double factor = 1;
+    pw_read_expression (unit->factor, &factor);
+    units_read (unit->si, &one);
+    one.factor *= factor;
   }
   u->factor *= power == 1 ? one.factor : pow (one.factor, power);
   for (int k = 0; k < UNITS_BASE; k++) u->power[k] += power * one.power[k];

@@ -30,15 +30,6 @@ int pw_checkpoint_write (const char *path, const char *head, const pw_archive *s
 
 /* ---- Reading ---- */
 
-static int checkpoint_load (const char *path, char **text, size_t *size, pw_error *error) {
-  const char *why;
-  FILE *f = pw_open_input (path, &why);
-  if (f == NULL) return pw_fail (error, pw_open_input_status (), "cannot read the checkpoint %s: %s", path, why);
-  int status = pw_read_rest (f, SIZE_MAX / 4, path, "the limit for a checkpoint", text, size, error);
-  fclose (f);
-  return status;
-}
-
 /* Checks the first line. */
 static int checkpoint_version (const char *path, const char *text, pw_error *error) {
   static const char magic[] = PW_CHECKPOINT_MAGIC;
@@ -74,7 +65,8 @@ static int checkpoint_parse (const char *path, pw_checkpoint *c, size_t size, pw
 int pw_checkpoint_read (const char *path, pw_checkpoint *c, pw_error *error) {
   size_t size = 0;
   *c = (pw_checkpoint){ .text = NULL };
-  int status = checkpoint_load (path, &c->text, &size, error);
+  int status = pw_read_file ("cannot read the checkpoint", path, SIZE_MAX / 4, "the limit for a checkpoint", &c->text,
+                             &size, error);
   if (status == PW_OK) status = checkpoint_version (path, c->text, error);
   return status == PW_OK ? checkpoint_parse (path, c, size, error) : status;
 }

@@ -6,222 +6,183 @@
 #include <stdlib.h>
 #include "files.h"
 
-/* A table that becomes a NumPy archive. */
-typedef struct {
-  char (*name)[300];
-  double *value; /* rows x columns */
-  size_t columns, count, room;
-} csv_archive;
-
 struct pw_csv {
+  const pw_system *system;
+  int ledger;
+  pw_workspace *workspace; /* for contact points; NULL if the system has none */
+  double (*contact)[3];    /* contact points of the system */
   pw_output *output;
   FILE *f;
-  csv_archive *archive;    /* NULL: lines of text */
-  int cells;               /* written in the current line */
-  int failed;              /* 1: memory was exhausted */
-  pw_workspace *workspace; /* for contact points; NULL if the system has none */
-  int ledger;
-  double (*contact)[3]; /* contact points of the system */
+  int names;  /* 1: the names of the columns are being written, 0: their values */
+  int cells;  /* written in the current line */
+  int failed; /* 1: memory was exhausted */
+  /* a NumPy archive, whose arrays are written when the table is closed */
+  int is_archive;
+  double *value; /* line by line */
+  size_t values, room, columns;
+  pw_npz npz;
 };
-
-/* ---- Archives ---- */
-
-static void archive_number (pw_csv *c, double value) {
-  csv_archive *a = c->archive;
-  c->failed |= pw_grow (&a->value, a->count, &a->room, sizeof *a->value) != PW_OK;
-  if (!c->failed) a->value[a->count++] = value;
-}
-
-static void archive_name (pw_csv *c, const char *name) {
-  csv_archive *a = c->archive;
-  char (*more)[300] = c->failed ? NULL : realloc (a->name, (a->columns + 1) * sizeof *more);
-  c->failed |= more == NULL;
-  if (more == NULL) return;
-  a->name = more;
-  snprintf (a->name[a->columns++], sizeof *a->name, "%s", name);
-}
-
-static int archive_write (pw_csv *c, pw_error *error) {
-  const csv_archive *a = c->archive;
-  pw_npz z = { .f = c->f };
-  long rows = a->columns ? (long)(a->count / a->columns) : 0;
-  double *column = malloc (((size_t)rows + 1) * sizeof *column);
-  c->failed |= column == NULL;
-  errno = 0; /* for pw_output_check */
-  for (size_t i = 0; i < a->columns && !c->failed; i++) {
-    for (long row = 0; row < rows; row++) column[row] = a->value[(size_t)row * a->columns + i];
-    pw_npz_add (&z, a->name[i], rows, 0, 1, column);
-  }
-  free (column);
-  int status = pw_npz_end (&z, error);
-  if (c->failed) return pw_fail (error, PW_RESOURCE, "out of memory while writing a table");
-  return status == PW_OK ? pw_output_check (c->output, error) : status;
-}
-
-static void archive_free (csv_archive *a) {
-  if (a == NULL) return;
-  free (a->name);
-  free (a->value);
-  free (a);
-}
 
 /* ---- Cells ---- */
 
-static void csv_number (pw_csv *c, double value) {
-  char text[32];
-  if (c->archive) {
-    archive_number (c, value);
-    return;
-  }
-  if (c->cells++) fputc (',', c->f);
-  fputs (isfinite (value) ? pw_format (text, value, 17) : "nan", c->f);
+/* Adds the next column to the archive. */
+static void csv_array (pw_csv *c, const char *name) {
+  size_t rows = c->columns ? c->values / c->columns : 0;
+  double *column = malloc ((rows + 1) * sizeof *column);
+  c->failed |= column == NULL;
+  for (size_t row = 0; column && row < rows; row++) column[row] = c->value[row * c->columns + (size_t)c->cells];
+  if (column) pw_npz_add (&c->npz, name, (long)rows, 0, 1, column);
+  free (column);
 }
 
 static void csv_name (pw_csv *c, const char *name, const char *unit) {
-  int has_unit = unit && *unit;
-  if (c->archive) {
-    archive_name (c, name);
-    return;
+  if (c->is_archive) {
+    csv_array (c, name);
+  } else {
+    fprintf (c->f, "%s%s", c->cells ? "," : "", name);
+    if (unit && *unit) fprintf (c->f, " [%s]", unit);
   }
-  fprintf (c->f, "%s%s%s%s%s", c->cells++ ? "," : "", name, has_unit ? " [" : "", has_unit ? unit : "",
-           has_unit ? "]" : "");
+  c->cells++;
 }
 
-static int csv_end (pw_csv *c, pw_error *error) {
+static void csv_number (pw_csv *c, double value) {
+  char text[32];
+  if (c->is_archive) {
+    c->failed |= pw_grow (&c->value, c->values, &c->room, sizeof *c->value) != PW_OK;
+    if (!c->failed) c->value[c->values++] = value;
+  } else {
+    if (c->cells) fputc (',', c->f);
+    fputs (isfinite (value) ? pw_format (text, value, 17) : "nan", c->f);
+  }
+  c->cells++;
+}
+
+static void csv_cell (pw_csv *c, const char *name, const char *unit, double value) {
+  if (c->names)
+    csv_name (c, name, unit);
+  else
+    csv_number (c, value);
+}
+
+/* ---- Lines ---- */
+
+static void csv_state (pw_csv *c, const pw_sample *x, int state) {
+  char name[300];
+  int n = pw_system_coordinates (c->system);
+  if (c->names)
+    csv_name (c, pw_system_state_name (c->system, state, name, sizeof name), pw_system_state_unit (c->system, state));
+  else
+    csv_number (c, state < n ? x->q[state] : x->v[state - n]);
+}
+
+static void csv_states (pw_csv *c, const pw_sample *x) {
+  int bodies = pw_system_bodies (c->system), n = pw_system_coordinates (c->system);
+  for (int b = 0; b < bodies; b++)
+    for (int i = 0; i < 6; i++) csv_state (c, x, i < 3 ? 3 * b + i : n + 3 * b + i - 3);
+  for (int state = 3 * bodies; state < n; state++) {
+    csv_state (c, x, state);
+    csv_state (c, x, n + state);
+  }
+}
+
+static void csv_contacts (pw_csv *c) {
+  char name[300] = "";
+  for (int e = 0; c->workspace && e < pw_system_elements (c->system); e++) {
+    const pw_element_info x = pw_system_element (c->system, e);
+    for (int i = 0; x.contact >= 0 && i < 2; i++) {
+      if (c->names) snprintf (name, sizeof name, "%s.%c", x.name, "xy"[i]);
+      csv_cell (c, name, "m", c->contact[x.contact][i]);
+    }
+  }
+}
+
+static void csv_reactions (pw_csv *c, const pw_sample *x) {
+  char name[300];
+  for (int i = 0; i < pw_system_rows (c->system); i++)
+    if (c->names)
+      csv_name (c, pw_system_reaction_name (c->system, i, name, sizeof name), pw_system_reaction_unit (c->system, i));
+    else
+      csv_number (c, 0 - x->lambda[i]); /* avoids -0 */
+}
+
+static void csv_ledger (pw_csv *c, const pw_sample *x) {
+  char name[300] = "";
+  csv_cell (c, "kinetic", "J", x->kinetic);
+  csv_cell (c, "potential", "J", x->potential);
+  for (int i = 0; i < pw_system_ledger_entries (c->system); i++) {
+    if (c->names) pw_system_ledger_name (c->system, i, name, sizeof name);
+    csv_cell (c, name, "J", x->ledger ? x->ledger[i] : NAN);
+  }
+  csv_cell (c, "projection", "J", x->projection);
+  csv_cell (c, "balance", "J", x->balance);
+}
+
+/* A line of names, with any sample, or of values. */
+static int csv_line (pw_csv *c, int names, const pw_sample *x, pw_error *error) {
+  errno = 0; /* for pw_output_check */
+  c->names = names;
   c->cells = 0;
+  csv_cell (c, "t", "s", x->t);
+  csv_states (c, x);
+  csv_contacts (c);
+  csv_reactions (c, x);
+  csv_cell (c, "residual.position", NULL, x->position);
+  csv_cell (c, "residual.velocity", NULL, x->velocity);
+  if (c->ledger) csv_ledger (c, x);
+  c->columns = (size_t)c->cells;
   if (c->failed) return pw_fail (error, PW_RESOURCE, "out of memory while writing a table");
-  if (c->archive) return PW_OK;
+  if (c->is_archive) return PW_OK;
   fputc ('\n', c->f);
   return pw_output_check (c->output, error);
 }
 
-/* ---- The header ---- */
+static const pw_sample csv_no_sample = { 0 };
 
-static void csv_name_states (pw_csv *c, const pw_system *s) {
-  char name[300];
-  int bodies = pw_system_bodies (s), n = pw_system_coordinates (s);
-  for (int b = 0; b < bodies; b++)
-    for (int i = 0; i < 6; i++) {
-      int state = i < 3 ? 3 * b + i : n + 3 * b + i - 3;
-      csv_name (c, pw_system_state_name (s, state, name, sizeof name), pw_system_state_unit (s, state));
-    }
-  for (int j = 3 * bodies; j < n; j++)
-    for (int state = j; state < 2 * n; state += n)
-      csv_name (c, pw_system_state_name (s, state, name, sizeof name), pw_system_state_unit (s, state));
-}
-
-static void csv_name_contacts (pw_csv *c, const pw_system *s) {
-  char name[300];
-  int elements = pw_system_elements (s);
-  for (int e = 0; e < elements; e++) {
-    const pw_element_info x = pw_system_element (s, e);
-    for (int i = 0; x.contact >= 0 && i < 2; i++) {
-      snprintf (name, sizeof name, "%s.%c", x.name, "xy"[i]);
-      csv_name (c, name, "m");
-    }
-  }
-}
-
-static void csv_name_ledger (pw_csv *c, const pw_system *s) {
-  char name[300];
-  csv_name (c, "kinetic", "J");
-  csv_name (c, "potential", "J");
-  for (int i = 0; i < pw_system_ledger_entries (s); i++)
-    csv_name (c, pw_system_ledger_name (s, i, name, sizeof name), "J");
-  csv_name (c, "projection", "J");
-  csv_name (c, "balance", "J");
-}
-
-static int csv_header (pw_csv *c, const pw_system *s, pw_error *error) {
-  char name[300];
-  errno = 0;
-  csv_name (c, "t", "s");
-  csv_name_states (c, s);
-  csv_name_contacts (c, s);
-  for (int i = 0; i < pw_system_rows (s); i++)
-    csv_name (c, pw_system_reaction_name (s, i, name, sizeof name), pw_system_reaction_unit (s, i));
-  csv_name (c, "residual.position", NULL);
-  csv_name (c, "residual.velocity", NULL);
-  if (c->ledger) csv_name_ledger (c, s);
-  return csv_end (c, error);
-}
+/* ---- The table ---- */
 
 static void csv_free (pw_csv *c) {
   if (c == NULL) return;
   pw_workspace_free (c->workspace);
-  archive_free (c->archive);
+  free (c->value);
   free (c->contact);
   free (c);
 }
 
 pw_csv *pw_csv_open (const pw_system *s, int ledger, pw_output *o, pw_error *error) {
-  pw_csv *c = calloc (1, sizeof *c);
-  int archive = pw_output_named (o, ".npz");
-  if (archive && pw_output_continued (o)) {
+  int contacts = pw_system_contacts (s), is_archive = pw_output_named (o, ".npz"), continued = pw_output_continued (o);
+  if (is_archive && continued) {
     pw_fail (error, PW_INPUT, "an archive of arrays cannot be continued: write a table that ends in .csv");
-    free (c);
     return NULL;
   }
-  if (c) c->contact = calloc ((size_t)pw_system_contacts (s) + 1, sizeof *c->contact);
-  if (c && archive) c->archive = calloc (1, sizeof *c->archive);
-  if (c && c->contact && (c->archive || !archive)) {
-    c->output = o, c->f = pw_output_stream (o), c->ledger = ledger;
-    if (pw_system_contacts (s) > 0) c->workspace = pw_workspace_new (s, error);
-    if ((c->workspace || pw_system_contacts (s) == 0) && (pw_output_continued (o) || csv_header (c, s, error) == PW_OK))
-      return c;
+  pw_csv *c = calloc (1, sizeof *c);
+  if (c) {
+    *c = (pw_csv){ .system = s, .ledger = ledger, .output = o, .f = pw_output_stream (o), .is_archive = is_archive };
+    c->npz.f = c->f;
+    c->contact = calloc ((size_t)contacts + 1, sizeof *c->contact);
+    c->workspace = contacts > 0 ? pw_workspace_new (s, error) : NULL;
   }
+  int good = c && c->contact && (c->workspace || contacts == 0);
+  if (good && (is_archive || continued || csv_line (c, 1, &csv_no_sample, error) == PW_OK)) return c;
   pw_fail (error, PW_RESOURCE, "out of memory while writing a table");
   csv_free (c);
   return NULL;
 }
 
-int pw_csv_close (pw_csv *c, pw_error *error) {
-  int status = c && c->archive ? archive_write (c, error) : PW_OK;
-  csv_free (c);
-  return status;
-}
-
-/* ---- Samples ---- */
-
-static void csv_states (pw_csv *c, const pw_system *s, const pw_sample *x) {
-  int bodies = pw_system_bodies (s), n = pw_system_coordinates (s);
-  for (int b = 0; b < bodies; b++) {
-    for (int i = 0; i < 3; i++) csv_number (c, x->q[3 * b + i]);
-    for (int i = 0; i < 3; i++) csv_number (c, x->v[3 * b + i]);
-  }
-  for (int j = 3 * bodies; j < n; j++) {
-    csv_number (c, x->q[j]);
-    csv_number (c, x->v[j]);
-  }
-}
-
-static void csv_contacts (pw_csv *c, const pw_system *s) {
-  for (int i = 0; i < pw_system_contacts (s); i++) {
-    csv_number (c, c->contact[i][0]);
-    csv_number (c, c->contact[i][1]);
-  }
-}
-
-static void csv_ledger (pw_csv *c, const pw_system *s, const pw_sample *x) {
-  csv_number (c, x->kinetic);
-  csv_number (c, x->potential);
-  for (int i = 0; i < pw_system_ledger_entries (s); i++) csv_number (c, x->ledger ? x->ledger[i] : NAN);
-  csv_number (c, x->projection);
-  csv_number (c, x->balance);
-}
-
 int pw_csv_write (pw_csv *c, const pw_system *s, const pw_sample *sample, pw_error *error) {
   int status = PW_OK;
+  (void)s; /* that of pw_csv_open */
   if (c->workspace)
     status = pw_workspace_contact_points (c->workspace, sample->t, sample->q, sample->v, c->contact, error);
-  if (status != PW_OK) return status;
-  errno = 0;
-  csv_number (c, sample->t);
-  csv_states (c, s, sample);
-  csv_contacts (c, s);
-  for (int i = 0; i < pw_system_rows (s); i++) csv_number (c, 0 - sample->lambda[i]); /* avoids -0 */
-  csv_number (c, sample->position);
-  csv_number (c, sample->velocity);
-  if (c->ledger) csv_ledger (c, s, sample);
-  return csv_end (c, error);
+  return status == PW_OK ? csv_line (c, 0, sample, error) : status;
+}
+
+int pw_csv_close (pw_csv *c, pw_error *error) {
+  int status = PW_OK;
+  if (c && c->is_archive) {
+    status = csv_line (c, 1, &csv_no_sample, error);
+    int end = pw_npz_end (&c->npz, error);
+    if (status == PW_OK) status = end == PW_OK ? pw_output_check (c->output, error) : end;
+  }
+  csv_free (c);
+  return status;
 }

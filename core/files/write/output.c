@@ -86,25 +86,39 @@ static int output_stream (pw_output *o) {
 
 /* Opens the folder and locks the temporary file. */
 static int output_open_part (pw_output *o, pw_lock_how how) {
-  int created;
   char *folder = pw_folder_of (o->real);
   if (folder == NULL) return ENOMEM;
   o->folder = open (folder, O_RDONLY | O_DIRECTORY | O_CLOEXEC);
   int code = o->folder < 0 && errno != EACCES ? errno : 0; /* a folder that cannot be listed may still be writable */
   free (folder);
   if (code) return code;
-  o->file = pw_lock_file (o->part, how, &created);
+  o->file = pw_lock_file (o->part, how);
   return o->file < 0 ? errno : 0;
 }
 
-/* Finds the location `p`, and o->part unless the file is written directly. */
-static int output_locate (pw_output *o, pw_location *p, const char *ending) {
-  int code = pw_locate (p, o->path);
-  o->real = p->path;
+/* Finds the location of a file to be written; *direct is 1 if it is written directly. */
+static int output_locate (const char *path, pw_location *p, int *direct) {
+  int code = pw_locate (p, path);
   if (code) return code;
   if (p->exists && S_ISDIR (p->info.st_mode)) return EISDIR;
-  if (p->descriptor >= 0 || (p->exists && !S_ISREG (p->info.st_mode))) return 0;
-  if (p->exists && access (p->path, W_OK) != 0) return errno;
+  *direct = p->descriptor >= 0 || (p->exists && !S_ISREG (p->info.st_mode));
+  return !*direct && p->exists && access (p->path, W_OK) != 0 ? errno : 0;
+}
+
+char *pw_output_path (const char *path, pw_error *error) {
+  pw_location p;
+  int direct, code = output_locate (path, &p, &direct);
+  if (code == 0 && !direct) return p.path;
+  pw_fail (error, PW_RESOURCE, "cannot write %s: %s", path, code ? strerror (code) : pw_not_regular (p.info.st_mode));
+  free (p.path);
+  return NULL;
+}
+
+/* Finds the location `p`, and o->part unless the file is written directly. */
+static int output_name (pw_output *o, pw_location *p, const char *ending) {
+  int direct, code = output_locate (o->path, p, &direct);
+  o->real = p->path;
+  if (code || direct) return code;
   size_t size = strlen (o->real) + strlen (ending) + 1;
   o->part = malloc (size);
   if (o->part == NULL) return ENOMEM;
@@ -112,20 +126,9 @@ static int output_locate (pw_output *o, pw_location *p, const char *ending) {
   return 0;
 }
 
-char *pw_output_path (const char *path, pw_error *error) {
-  pw_location p;
-  pw_output o = { .path = (char *)(size_t)path };
-  int code = output_locate (&o, &p, "");
-  if (code == 0 && o.part) free (o.real);
-  if (code == 0 && o.part) return o.part;
-  pw_fail (error, PW_RESOURCE, "cannot write %s: %s", path, code ? strerror (code) : pw_not_regular (p.info.st_mode));
-  free (o.real);
-  return NULL;
-}
-
 static int output_open_file (pw_output *o, const char *ending) {
   pw_location p;
-  int code = output_locate (o, &p, ending);
+  int code = output_name (o, &p, ending);
   if (code) return code;
   if (o->part == NULL) return output_open_direct (o, &p);
   code = output_open_part (o, PW_LOCK_NEW);
@@ -217,7 +220,7 @@ static void output_truncate (pw_output *o) {
 char *pw_output_abandon (pw_output *o, char *buffer, size_t size) {
   if (o->stream) output_close (o, fflush (o->stream));
   buffer[0] = 0;
-  if (o->part) output_truncate (o);
+  if (o->part && !pw_output_named (o, ".npz")) output_truncate (o); /* archives are complete, and have no lines */
   if (o->part) snprintf (buffer, size, "%s", o->part);
   output_free (o);
   return *buffer ? buffer : NULL;
@@ -315,7 +318,7 @@ static int output_is_marked (const pw_output *o, const pw_mark *mark) {
 
 /* A process killed just after completing its table leaves it under its final name. */
 static int output_restore_part (pw_output *o, const pw_mark *mark) {
-  int created, file = pw_lock_file (o->real, PW_LOCK_EXISTING, &created);
+  int file = pw_lock_file (o->real, PW_LOCK_EXISTING);
   if (file < 0) return errno;
   o->file = file;
   return output_is_marked (o, mark) && rename (o->real, o->part) != 0 ? errno : 0;
@@ -323,7 +326,7 @@ static int output_restore_part (pw_output *o, const pw_mark *mark) {
 
 static int output_reopen (pw_output *o, const pw_mark *mark, pw_error *error) {
   pw_location p;
-  int code = output_locate (o, &p, ".part");
+  int code = output_name (o, &p, ".part");
   if (code) return output_fail (o, code, 0, error);
   if (o->part == NULL) return pw_fail (error, PW_INPUT, "cannot continue %s: it is not a regular file", o->path);
   code = output_open_part (o, PW_LOCK_EXISTING);

@@ -1,6 +1,5 @@
 /* The head of a text model: version, description, default run settings, parameters.  They are stored in a plug-in's
  * table, so that text models can be used like compiled ones; the build function reads bodies and elements. */
-#define _POSIX_C_SOURCE 200809L
 #include <ctype.h>
 #include <math.h>
 #include <stdlib.h>
@@ -58,26 +57,15 @@ static int yaml_unit (const pw_reader *r, const pw_node *node, const pw_node *va
   return PW_OK;
 }
 
-typedef struct {
-  const pw_names *names;
-  size_t at;
-} yaml_search;
-
-static int yaml_is_parameter (void *context, const char *name, size_t length, size_t at) {
-  yaml_search *s = context;
-  char text[64];
-  snprintf (text, sizeof text, "%.*s", (int)length, name);
-  s->at = at;
-  return length < sizeof text && pw_names_find (s->names, text) >= 0;
-}
-
 /* A default must not depend on other parameters: --set would have to change it, too. */
 static int yaml_default (const pw_reader *r, const pw_node *node, const char *what, const pw_names *names,
                          pw_parameter *p) {
-  yaml_search s = { names, 0 };
-  if (node->type == PW_YAML_SCALAR && pw_expression_names (node->text, yaml_is_parameter, &s))
-    return pw_yaml_fail (r, pw_yaml_offset (r->y, node, s.at),
-                         "%s: a default is made of numbers; what follows from parameters belongs in let", what);
+  const char *text = node->type == PW_YAML_SCALAR ? node->text : "";
+  char name[PW_EXPRESSION_NAME];
+  for (const char *rest = text, *at; (at = pw_expression_next_name (&rest, name)) != NULL;)
+    if (pw_names_find (names, name) >= 0)
+      return pw_yaml_fail (r, pw_yaml_offset (r->y, node, (size_t)(at - text)),
+                           "%s: a default is made of numbers; what follows from parameters belongs in let", what);
   return pw_yaml_number (r, node, what, p->domain, &p->value);
 }
 

@@ -50,19 +50,14 @@ struct pw_yaml {
 typedef struct {
   const pw_yaml *y;
   pw_error *error;
-  pw_scope *scope; /* parameters and what `let` defines, or NULL */
+  pw_scope *scope; /* parameters and what `let` defines so far, or NULL */
   /* for building */
   pw_model *m;
   pw_arena *arena;              /* lives as long as the model */
   pw_reference_text *reference; /* the model's */
-  const double *parameter;      /* values of y->parameter */
-  double *let;                  /* values of what `let` defines */
-  int lets;                     /* so far */
   pw_names bodies;              /* names of bodies so far */
-  pw_names all;                 /* names of bodies and elements so far, to the index in `node` */
+  pw_names all;                 /* names of bodies and elements so far, to their offsets in the source */
   pw_names elements;     /* names of all elements, to the index of their types; made when an expression needs it */
-  const pw_node **node;  /* where each body and element is named */
-  int named;             /* entries of `node` so far */
   const pw_field *field; /* being read */
   char *definition;      /* of the element being read, with all preceding fields */
   double points;         /* of all tables so far */
@@ -111,13 +106,13 @@ int pw_yaml_list (const pw_reader *r, const pw_node *node, const char *what, int
 /* A scalar's text, not empty. */
 int pw_yaml_text (const pw_reader *r, const pw_node *node, const char *what, const char **text);
 
-/* A scalar as a number of a domain: an expression over r->scope; a list [x, y] of them; one of several words, ending with
- * NULL. */
+/* A scalar as a number of a domain: an expression over r->scope; a list of two, `items` ("numbers, [x, y]"); one of several
+ * words, ending with NULL. */
 int pw_yaml_number (const pw_reader *r, const pw_node *node, const char *what, pw_domain domain, double *value);
-int pw_yaml_pair (const pw_reader *r, const pw_node *node, const char *what, double *value);
+int pw_yaml_pair (const pw_reader *r, const pw_node *node, const char *what, const char *items, double *value);
 int pw_yaml_choice (const pw_reader *r, const pw_node *node, const char *what, const char *const *choices, int *value);
 
-/* Whether an expression depends on the time t or a state, BODY.phi, and at which offset (at may be NULL). */
+/* Whether an expression depends on the time t or a state, BODY.phi, and at which offset. */
 int pw_yaml_varies (const char *text, size_t *at);
 
 /* Converts an offset in a scalar's text to an offset in the source. */

@@ -8,12 +8,10 @@
 /* Bodies and elements share one set of names. */
 static int build_name (pw_reader *r, const pw_node *node, const char *what, const char **name) {
   if (pw_yaml_text (r, node, what, name) != PW_OK) return r->error->status;
-  int before = pw_names_add (&r->all, *name, r->named);
-  if (before >= 0)
-    return pw_yaml_fail (r, node->at, "%s \"%.60s\": line %d already uses this name", what, *name,
-                         pw_yaml_line (r->y, r->node[before]->at));
-  r->node[r->named++] = node;
-  return PW_OK;
+  int before = pw_names_add (&r->all, *name, (int)node->at); /* a file has less than INT_MAX bytes */
+  if (before < 0) return PW_OK;
+  return pw_yaml_fail (r, node->at, "%s \"%.60s\": line %d already uses this name", what, *name,
+                       pw_yaml_line (r->y, (size_t)before));
 }
 
 /* The core's message without its prefix "model NAME: ", at a position. */
@@ -43,7 +41,7 @@ static void build_triple (const pw_reader *r, const pw_node *node, const char *w
 
 static int build_body (pw_reader *r, const pw_node *node) {
   static const char *const key[] = { "name", "mass", "inertia", "start", "rate", NULL };
-  static const char *const start[] = { "x", "y", "phi", NULL }, *const rate[] = { "vx", "vy", "omega", NULL };
+  static const char *const state[][4] = { { "x", "y", "phi", NULL }, { "vx", "vy", "omega", NULL } };
   const pw_node *v[sizeof key / sizeof *key];
   pw_body body = { .specified = PW_SPECIFIES_NOTHING };
   pw_error cause = { 0 };
@@ -55,10 +53,10 @@ static int build_body (pw_reader *r, const pw_node *node) {
     snprintf (what, sizeof what, "body %.60s: %s", body.name, key[1 + i]);
     pw_yaml_number (r, v[1 + i], what, PW_NONNEGATIVE, i ? &body.inertia : &body.mass);
   }
-  snprintf (what, sizeof what, "start of body %.60s", body.name);
-  build_triple (r, v[3], what, start, body.start, &body.specified, 0);
-  snprintf (what, sizeof what, "rate of body %.60s", body.name);
-  build_triple (r, v[4], what, rate, body.rate, &body.specified, 3);
+  for (int i = 0; i < 2; i++) {
+    snprintf (what, sizeof what, "%s of body %.60s", key[3 + i], body.name);
+    build_triple (r, v[3 + i], what, state[i], i ? body.rate : body.start, &body.specified, 3 * i);
+  }
   if (r->error->status != PW_OK) return r->error->status;
   if (pw_model_check_body (r->m, &body, &cause) != PW_OK) return build_fail (r, v[0], &cause);
   pw_names_add (&r->bodies, body.name, 0);
@@ -68,14 +66,12 @@ static int build_body (pw_reader *r, const pw_node *node) {
 /* ---- Fields ---- */
 
 static int build_body_name (const pw_reader *r, const pw_node *node, const char *what, const char **name) {
-  char hint[100];
   if (pw_yaml_text (r, node, what, name) != PW_OK) return r->error->status;
   if (strcmp (*name, "ground") == 0 || pw_names_find (&r->bodies, *name) >= 0) return PW_OK;
   pw_nearest near = { .sought = *name };
   pw_yaml_suggest_bodies (r, &near);
   pw_nearest_try (&near, "ground");
-  return pw_yaml_fail (r, node->at, "%s: there is no body \"%.60s\"%s", what, *name,
-                       pw_nearest_text (&near, hint, sizeof hint));
+  return pw_yaml_fail (r, node->at, "%s: there is no body \"%.60s\"%s", what, *name, pw_nearest_text (&near));
 }
 
 static int build_value (pw_reader *r, const pw_kind *kind, const pw_field *f, const pw_node *node, const char *what,
@@ -85,7 +81,7 @@ static int build_value (pw_reader *r, const pw_kind *kind, const pw_field *f, co
     return pw_yaml_number (r, node, what, f->domain, at);
   case PW_POINT:
   case PW_VECTOR:
-    return pw_yaml_pair (r, node, what, at);
+    return pw_yaml_pair (r, node, what, "numbers, [x, y]", at);
   case PW_BODY:
     return build_body_name (r, node, what, at);
   case PW_SIGNAL:
@@ -135,7 +131,6 @@ static const char *build_later_type (const pw_node *first) {
 }
 
 static const pw_kind *build_kind (const pw_reader *r, const pw_node *node) {
-  char hint[100];
   const pw_node *first = node->type == PW_YAML_MAP ? node->first : NULL;
   if (first == NULL || first->type != PW_YAML_SCALAR)
     return pw_yaml_fail (r, node->at, "expected an element {TYPE: NAME, ...}, found %s", pw_yaml_found (node)), NULL;
@@ -150,7 +145,7 @@ static const pw_kind *build_kind (const pw_reader *r, const pw_node *node) {
     if (build_has_word ((*k)->about, first->text))
       snprintf (near.best, sizeof near.best, "%s", (*k)->name), near.near = 1;
   pw_yaml_fail (r, first->at, "an element begins with its type, and there is no type \"%.60s\"%s", first->text,
-                near.near ? pw_nearest_text (&near, hint, sizeof hint) : ": see pinwheel list kinds");
+                near.near ? pw_nearest_text (&near) : ": see pinwheel list kinds");
   return NULL;
 }
 
@@ -190,21 +185,22 @@ static int build_element (pw_reader *r, const pw_node *node) {
 /* ---- The model ---- */
 
 /* Reads `let`: numbers defined from parameters and preceding definitions. */
-static int build_let (pw_reader *r) {
+static int build_let (pw_reader *r, const double *parameter) {
   const pw_yaml *y = r->y;
   char what[100];
-  for (int i = 0; i < y->parameters; i++) pw_scope_add (r->scope, y->parameter[i].name, r->parameter[i]);
+  double value;
+  for (int i = 0; i < y->parameters; i++) pw_scope_add (r->scope, y->parameter[i].name, parameter[i]);
   for (const pw_node *n = y->let ? y->let->first : NULL; n; n = n->next->next) {
     snprintf (what, sizeof what, "let %s", n->text);
-    if (pw_yaml_number (r, n->next, what, PW_REAL, &r->let[r->lets]) != PW_OK) return r->error->status;
-    pw_scope_add (r->scope, n->text, r->let[r->lets++]);
+    if (pw_yaml_number (r, n->next, what, PW_REAL, &value) != PW_OK) return r->error->status;
+    pw_scope_add (r->scope, n->text, value);
   }
   return PW_OK;
 }
 
-static int build_all (pw_reader *r) {
+static int build_all (pw_reader *r, const double *parameter) {
   const pw_yaml *y = r->y;
-  if (build_let (r) != PW_OK) return r->error->status;
+  if (build_let (r, parameter) != PW_OK) return r->error->status;
   for (const pw_node *n = y->bodies ? y->bodies->first : NULL; n; n = n->next)
     if (build_body (r, n) != PW_OK) return r->error->status;
   for (const pw_node *n = y->elements ? y->elements->first : NULL; n; n = n->next)
@@ -217,8 +213,8 @@ static void build_free (void *arena) {
   free (arena);
 }
 
-/* Allocates the memory for building and the arena of the model: expressions, points of tables, the reference
- * solution. */
+/* Allocates the memory for building and the arena of the model: named numbers, expressions, points of tables, the
+ * reference solution. */
 static int build_open (pw_reader *r) {
   const pw_yaml *y = r->y;
   size_t largest = 1, bodies = y->bodies ? (size_t)y->bodies->count : 0, lets = y->let ? (size_t)y->let->count : 0;
@@ -230,25 +226,22 @@ static int build_open (pw_reader *r) {
   r->reference = pw_arena_alloc (r->arena, sizeof *r->reference);
   pw_model_set_reference (r->m, r->reference);
   r->definition = malloc (largest);
-  r->node = malloc ((all + 1) * sizeof *r->node);
-  r->let = malloc ((lets + 1) * sizeof *r->let);
-  r->scope = pw_scope_open (y->parameters + (int)lets);
-  if (r->reference && r->definition && r->node && r->let && r->scope && pw_names_open (&r->bodies, bodies) == PW_OK &&
-      pw_names_open (&r->all, all) == PW_OK)
+  if (r->reference && r->definition && pw_scope_open (r->scope, y->parameters + (int)lets, r->arena) == PW_OK &&
+      pw_names_open (&r->bodies, bodies) == PW_OK && pw_names_open (&r->all, all) == PW_OK)
     return PW_OK;
   return pw_yaml_no_memory (r);
 }
 
 void pw_yaml_build (pw_model *m, const void *parameters) {
   const void *table = pw_model_table (m);
-  pw_reader r = { .y = table, .m = m, .parameter = parameters, .error = pw_model_error (m) };
+  pw_scope scope = { 0 };
+  pw_reader r = { .y = table, .m = m, .scope = &scope, .error = pw_model_error (m) };
   pw_yaml_list (&r, r.y->bodies, "bodies", -1, "");
-  if (pw_yaml_list (&r, r.y->elements, "elements", -1, "") == PW_OK && build_open (&r) == PW_OK) build_all (&r);
-  pw_scope_close (r.scope);
+  if (pw_yaml_list (&r, r.y->elements, "elements", -1, "") == PW_OK && build_open (&r) == PW_OK)
+    build_all (&r, parameters);
+  pw_scope_close (&scope);
   pw_names_close (&r.bodies);
   pw_names_close (&r.all);
   pw_names_close (&r.elements);
-  free (r.node);
-  free (r.let);
   free (r.definition);
 }

@@ -12,7 +12,7 @@ enum { MAX_SIGNAL_STATES = 16, MAX_BREAKPOINTS = 100 }; /* states of a signal; b
 /* A signal defined by expressions. */
 typedef struct {
   const pw_expression *x[3];               /* value, rate, acceleration; NULL: not given, differentiated instead */
-  int derivatives;                         /* required time derivatives: 0, 1, 2 */
+  int derivatives;                         /* required time derivatives: 0 (of a force), 1, 2 */
   int states;                              /* number of states in it */
   const char *name[MAX_SIGNAL_STATES + 2]; /* "t", then states, "BODY.phi"; used for reading only */
   pw_signal_text text;
@@ -23,10 +23,7 @@ typedef struct {
   pw_reader *r;
   const pw_node *node;
   const char *what; /* "torque T: value", for messages */
-  /* of a signal */
-  time_function *f;
-  int of_force;
-  pw_function *signal;
+  time_function *f; /* the signal it belongs to, or NULL */
 } reading;
 
 /* Reports an error at an offset of the expression. */
@@ -66,14 +63,13 @@ static int state_elements (pw_reader *r) {
 }
 
 static int state_unknown_owner (const reading *x, const char *owner, size_t at) {
-  char hint[200];
   pw_nearest near = { .sought = owner };
   pw_yaml_suggest_bodies (x->r, &near);
   for (size_t i = 0; i < x->r->elements.size; i++) {
     const struct pw_name *e = &x->r->elements.slot[i];
     if (e->name && pw_kinds[e->value]->internal > 0) pw_nearest_try (&near, e->name);
   }
-  return reading_fail (x, at, "there is no body \"%s\"%s", owner, pw_nearest_text (&near, hint, sizeof hint));
+  return reading_fail (x, at, "there is no body \"%s\"%s", owner, pw_nearest_text (&near));
 }
 
 static int state_of_element (const reading *x, const char *owner, const char *part, size_t at) {
@@ -159,48 +155,34 @@ static void *time_open (void *context) {
 /* ---- Reading of signals ---- */
 
 /* Stores the names that expressions may use, and their values, for `show`. */
-static int time_store_names (pw_reader *r) {
-  pw_reference_text *t = r->reference;
-  size_t names = (size_t)r->y->parameters + (size_t)r->lets;
-  if (t->name) return PW_OK;
-  t->name = pw_arena_alloc (r->arena, (names + 1) * sizeof *t->name);
-  t->value = pw_arena_alloc (r->arena, (names + 1) * sizeof *t->value);
-  if (t->name == NULL || t->value == NULL) return pw_yaml_no_memory (r);
-  const pw_node *n = r->y->let ? r->y->let->first : NULL;
-  for (int i = 0; i < (int)names; i++, t->names++) {
-    int parameter = i < r->y->parameters;
-    t->name[i] = parameter ? r->y->parameter[i].name : n->text;
-    t->value[i] = parameter ? r->parameter[i] : r->let[i - r->y->parameters];
-    if (!parameter) n = n->next->next;
-  }
-  return PW_OK;
+static void time_store_names (const pw_reader *r) {
+  r->reference->names = r->scope->names;
+  r->reference->name = r->scope->name;
+  r->reference->value = r->scope->value;
 }
 
-/* Adds a state that the expression depends on. */
-static int time_add_state (void *context, const char *name, size_t length, size_t at) {
-  const reading *x = context;
+/* Adds a state, unless it is known already. */
+static int time_add_state (const reading *x, const char *name, size_t at) {
   time_function *f = x->f;
-  char text[100];
-  if (memchr (name, '.', length) == NULL) return PW_OK;
-  snprintf (text, sizeof text, "%.*s", (int)length, name);
   for (int i = 1; i <= f->states; i++)
-    if (strcmp (f->name[i], text) == 0) return PW_OK;
-  if (!x->of_force) return reading_fail (x, at, "\"%s\": the signal of a constraint depends on the time t alone", text);
-  if (state_check (x, text, at) != PW_OK) return x->r->error->status;
-  if (f->states == MAX_SIGNAL_STATES || length >= sizeof text)
-    return reading_fail (x, at, "more than %d states", MAX_SIGNAL_STATES);
-  f->name[f->states + 1] = pw_arena_copy (x->r->arena, text);
+    if (strcmp (f->name[i], name) == 0) return PW_OK;
+  if (f->derivatives)
+    return reading_fail (x, at, "\"%s\": the signal of a constraint depends on the time t alone", name);
+  if (state_check (x, name, at) != PW_OK) return x->r->error->status;
+  if (f->states == MAX_SIGNAL_STATES) return reading_fail (x, at, "more than %d states", MAX_SIGNAL_STATES);
+  f->name[f->states + 1] = pw_arena_copy (x->r->arena, name);
   return f->name[++f->states] ? PW_OK : pw_yaml_no_memory (x->r);
 }
 
 static int time_expression (reading *x, int i) {
   pw_reader *r = x->r;
   time_function *f = x->f;
-  if (x->node->type == PW_YAML_SCALAR && pw_expression_names (x->node->text, time_add_state, x) != PW_OK)
-    return r->error->status;
+  const char *source = x->node->type == PW_YAML_SCALAR ? x->node->text : "";
+  char name[PW_EXPRESSION_NAME];
+  for (const char *rest = source, *p; (p = pw_expression_next_name (&rest, name)) != NULL;)
+    if (strchr (name, '.') && time_add_state (x, name, (size_t)(p - source)) != PW_OK) return r->error->status;
   if (reading_expression (x, f->name, &f->text.part[i], &f->x[i]) != PW_OK) return r->error->status;
   const pw_expression *made = f->x[i];
-  if (made->breaks) x->signal->breakpoint = time_breakpoint;
   if ((r->codes += made->codes) > PW_YAML_MAX_OPERATIONS)
     return pw_yaml_fail (r, x->node->at,
                          "%s: the expressions up to here have more than %d operations, which need more "
@@ -241,21 +223,21 @@ static double time_size (const time_function *f, double t, int i) {
 }
 
 /* Refuses signals that a constraint cannot follow: a jump of the value or, for positions, of its derivative. */
-static int time_continuous (const reading *x, int levels) {
+static int time_continuous (const reading *x) {
   static const char *const name[] = { "its value", "its rate" };
   double t = 0, before[3], after[3];
-  for (int k = 0; k < MAX_BREAKPOINTS && x->signal->breakpoint; k++) {
+  for (int k = 0; k < MAX_BREAKPOINTS; k++) {
     t = time_breakpoint (x->f, t);
     if (t == INFINITY) return PW_OK;
     time_derivatives (x->f, &(double){ nextafter (t, -INFINITY) }, before);
     time_derivatives (x->f, &t, after);
     double between = t - nextafter (t, -INFINITY);
-    for (int i = 0; i < levels; i++)
+    for (int i = 0; i < x->f->derivatives; i++)
       if (fabs (after[i] - before[i]) >
           1e-9 * time_size (x->f, t, i) + 2 * between * (fabs (after[i + 1]) + fabs (before[i + 1])))
         return pw_yaml_fail (x->r, x->node->at, "%s: %s jumps from %.6g to %.6g at t = %.9g s, and that of %s must not",
                              x->what, name[i], before[i], after[i], t,
-                             levels > 1 ? "a prescribed position" : "a velocity constraint");
+                             x->f->derivatives > 1 ? "a prescribed position" : "a velocity constraint");
   }
   return PW_OK;
 }
@@ -269,7 +251,7 @@ static int time_all (reading *x, const pw_node *const v[3]) {
     if (i > 0 && x->f->x[i - 1] && !x->f->states && time_check (x, i, key[i]) != PW_OK) return x->r->error->status;
   }
   x->node = v[0];
-  return x->of_force ? PW_OK : time_continuous (x, x->f->derivatives);
+  return x->f->derivatives ? time_continuous (x) : PW_OK;
 }
 
 int pw_yaml_time_signal (pw_reader *r, const pw_kind *kind, const char *what, const pw_node *const v[3],
@@ -282,8 +264,10 @@ int pw_yaml_time_signal (pw_reader *r, const pw_kind *kind, const char *what, co
   signal->function.open = time_open;
   signal->function.close = free;
   signal->function.text = &f->text;
-  reading x = { r, NULL, what, f, pw_kind_signals_force (kind), &signal->function };
-  if (time_store_names (r) != PW_OK || time_all (&x, v) != PW_OK) return r->error->status;
+  time_store_names (r);
+  if (time_all (&(reading){ r, NULL, what, f }, v) != PW_OK) return r->error->status;
+  for (int i = 0; i < 3; i++)
+    if (f->x[i] && f->x[i]->breaks) signal->function.breakpoint = time_breakpoint;
   if (f->states) signal->function.reads = f->name + 1;
   return PW_OK;
 }
@@ -304,10 +288,10 @@ static int reference_entry (pw_reader *r, const pw_node *n, pw_names *seen) {
   if (pw_yaml_text (r, n, "truth", &name) != PW_OK) return r->error->status;
   if (strchr (name, '.') == NULL)
     return pw_yaml_fail (r, n->at, "truth: expected a state such as BODY.phi, found \"%.60s\"", name);
-  if (state_check (&(reading){ r, n, "truth", NULL, 0, NULL }, n->text, 0) != PW_OK) return r->error->status;
+  if (state_check (&(reading){ r, n, "truth", NULL }, n->text, 0) != PW_OK) return r->error->status;
   if (pw_names_add (seen, n->text, 0) >= 0) return pw_yaml_fail (r, n->at, "truth: a second \"%s\"", n->text);
   snprintf (what, sizeof what, "truth of %.60s", n->text);
-  const reading value = { r, n->next, what, NULL, 0, NULL };
+  const reading value = { r, n->next, what, NULL };
   t->state[t->states] = n->text;
   int status = reading_expression (&value, time, &t->text[t->states], &x[t->states]);
   t->states += status == PW_OK;
@@ -318,7 +302,8 @@ int pw_yaml_reference (pw_reader *r) {
   const pw_node *map = r->y->reference;
   pw_reference_text *t = r->reference;
   pw_names seen = { .size = 0 };
-  if (map == NULL || time_store_names (r) != PW_OK) return r->error->status;
+  if (map == NULL) return r->error->status;
+  time_store_names (r);
   if (map->type != PW_YAML_MAP)
     return pw_yaml_fail (r, map->at, "truth: expected a map {STATE: EXPRESSION, ...}, found %s", pw_yaml_found (map));
   t->state = pw_arena_alloc (r->arena, ((size_t)map->count + 1) * sizeof *t->state);

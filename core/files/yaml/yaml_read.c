@@ -22,7 +22,6 @@ static const char *read_key_hint (const char *text, const char *const *key) {
 
 static int read_key (const pw_reader *r, const pw_node *node, const char *const *key, const char *what,
                      const pw_node **value) {
-  char hint[100];
   if (node->type != PW_YAML_SCALAR)
     return pw_yaml_fail (r, node->at, "expected a key of %s, found %s", what, pw_yaml_found (node));
   pw_nearest near = { .sought = node->text };
@@ -36,7 +35,7 @@ static int read_key (const pw_reader *r, const pw_node *node, const char *const 
   }
   const char *mistake = read_key_hint (node->text, key);
   return pw_yaml_fail (r, node->at, "%s has no \"%.60s\"%s", what, node->text,
-                       *mistake ? mistake : pw_nearest_text (&near, hint, sizeof hint));
+                       *mistake ? mistake : pw_nearest_text (&near));
 }
 
 int pw_yaml_keys (const pw_reader *r, const pw_node *map, int skip, const char *const *key, const char *what,
@@ -79,14 +78,11 @@ size_t pw_yaml_offset (const pw_yaml *y, const pw_node *node, size_t offset) {
   return at + n <= y->size && strncmp (y->source + at, node->text, n) == 0 ? at + offset : node->at;
 }
 
-static int read_varies (void *context, const char *name, size_t length, size_t at) {
-  if ((length != 1 || *name != 't') && memchr (name, '.', length) == NULL) return 0;
-  if (context) *(size_t *)context = at;
-  return 1;
-}
-
 int pw_yaml_varies (const char *text, size_t *at) {
-  return pw_expression_names (text, read_varies, at);
+  char name[PW_EXPRESSION_NAME];
+  for (const char *rest = text, *p; (p = pw_expression_next_name (&rest, name)) != NULL;)
+    if (strcmp (name, "t") == 0 || strchr (name, '.')) return *at = (size_t)(p - text), 1;
+  return 0;
 }
 
 int pw_yaml_number (const pw_reader *r, const pw_node *node, const char *what, pw_domain domain, double *value) {
@@ -109,8 +105,8 @@ int pw_yaml_number (const pw_reader *r, const pw_node *node, const char *what, p
 
 /* ---- Pairs, choices, bodies ---- */
 
-int pw_yaml_pair (const pw_reader *r, const pw_node *node, const char *what, double *value) {
-  if (node == NULL || pw_yaml_list (r, node, what, 2, "numbers, [x, y]") != PW_OK) return r->error->status;
+int pw_yaml_pair (const pw_reader *r, const pw_node *node, const char *what, const char *items, double *value) {
+  if (node == NULL || pw_yaml_list (r, node, what, 2, items) != PW_OK) return r->error->status;
   pw_yaml_number (r, node->first, what, PW_REAL, value);
   return pw_yaml_number (r, node->first->next, what, PW_REAL, value + 1);
 }

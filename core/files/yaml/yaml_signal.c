@@ -25,8 +25,7 @@ static int table_list (pw_reader *r, const char *what, const pw_node *list, pw_s
   for (const pw_node *n = list->first; n; n = n->next) {
     double point[2] = { 0 };
     snprintf (text, sizeof text, "%s: point %d", what, s->table.count + 1);
-    pw_yaml_list (r, n, text, 2, "numbers, [time, value]");
-    if (pw_yaml_pair (r, n, text, point) != PW_OK) return r->error->status;
+    if (pw_yaml_pair (r, n, text, "numbers, [time, value]", point) != PW_OK) return r->error->status;
     t[s->table.count] = point[0];
     value[s->table.count++] = point[1];
   }
@@ -74,7 +73,6 @@ static const char *table_unit (const pw_reader *r) {
 
 static int table_file (pw_reader *r, const char *what, const pw_node *node, const pw_node *columns, pw_signal *s) {
   const char *name, *reason, *column[2] = { "1", "2" }, *const unit[2] = { "s", table_unit (r) };
-  double *value[2];
   pw_error cause = { 0 };
   char text[240];
   snprintf (text, sizeof text, "%s: columns", what);
@@ -86,12 +84,13 @@ static int table_file (pw_reader *r, const char *what, const pw_node *node, cons
   FILE *f = table_open (r->y, name, &reason);
   if (f == NULL && errno == ENOMEM) return pw_yaml_no_memory (r);
   if (f == NULL) return pw_yaml_fail (r, node->at, "%s: cannot read \"%.60s\": %s", what, name, reason);
-  int status = pw_columns_from_stream (f, name, column, unit, 2, 0, r->arena, value, &s->table.count, &cause);
+  double *t = pw_columns_from_stream (f, name, column, unit, 2, 0, &s->table.count, &cause);
   fclose (f);
-  s->table.t = value[0];
-  s->table.value = value[1];
-  if (status == PW_INPUT) return pw_yaml_fail (r, node->at, "%s: %s", what, cause.text);
-  return status == PW_OK ? PW_OK : pw_yaml_no_memory (r);
+  if (cause.status == PW_INPUT) return pw_yaml_fail (r, node->at, "%s: %s", what, cause.text);
+  if (t == NULL || pw_model_keep (r->m, t, free) != PW_OK) return pw_yaml_no_memory (r);
+  s->table.t = t;
+  s->table.value = t + s->table.count;
+  return PW_OK;
 }
 
 /* Reads v[0], points, or v[1], a file, with v[2], its columns.  Limits the total number of points, since many tables
@@ -189,8 +188,9 @@ static int signal_map (pw_reader *r, const pw_kind *kind, const char *what, cons
 
 int pw_yaml_signal (pw_reader *r, const pw_kind *kind, const char *what, const pw_node *node, pw_signal *signal) {
   const pw_node *const v[3] = { node, NULL, NULL };
+  size_t at;
   if (node->type == PW_YAML_MAP) return signal_map (r, kind, what, node, signal);
-  if (node->type == PW_YAML_SCALAR && pw_yaml_varies (node->text, NULL))
+  if (node->type == PW_YAML_SCALAR && pw_yaml_varies (node->text, &at))
     return pw_yaml_time_signal (r, kind, what, v, signal);
   return pw_yaml_number (r, node, what, PW_REAL, &signal->constant);
 }

@@ -28,11 +28,12 @@ static int source_count (const char *from, const char *to) {
   return n;
 }
 
-/* Long lines are shown around the caret, cut between characters. */
+/* Long lines are shown around the caret, cut between characters.  A byte order mark is no part of the first line. */
 static void source_window (const pw_yaml *y, size_t at, const char **begin, const char **from, const char **to) {
   const char *caret = y->source + at, *end = y->source + y->size;
   *begin = caret;
   while (*begin > y->source && (*begin)[-1] != '\n') --*begin;
+  if (*begin == y->source && strncmp (*begin, "\xEF\xBB\xBF", 3) == 0 && caret - *begin >= 3) *begin += 3;
   *from = caret - *begin > SOURCE_SHOWN / 2 ? caret - SOURCE_SHOWN / 2 : *begin;
   while (*from < caret && (**from & 0xC0) == 0x80) ++*from;
   *to = *from;

@@ -40,7 +40,7 @@ static unsigned tree_offset_of (tree *x, const struct fy_mark *mark) {
     x->column = 0;
   }
   if (p == source && strncmp (p, bom, 3) == 0) p += 3;
-  for (; x->column < mark->column && p < end; x->column++) p += pw_utf8_size (p);
+  for (; x->column < mark->column && p < end && *p != '\n'; x->column++) p += pw_utf8_size (p);
   for (; x->column > mark->column && p > source; x->column--)
     for (p--; p > source && (*p & 0xC0) == 0x80;) p--;
   x->offset = (size_t)(p - source);
@@ -206,15 +206,13 @@ static const char *tree_hint (const pw_yaml *y, size_t at, const char *message) 
 }
 
 /* Reports an unterminated node at its start. */
-static int tree_syntax (const tree *x) {
+static int tree_syntax (tree *x) {
   void *first = NULL;
   struct fy_diag_error *e = fy_diag_errors_iterate (x->diag, &first);
   if (e == NULL) return pw_yaml_fail (&x->r, x->at, "this is not YAML");
-  const char *source = x->y->source, *p = source, *end = source + x->y->size;
-  for (int line = e->line; line > 1 && p < end; p++) line -= *p == '\n';
-  for (int column = e->column; column > 1 && p < end && *p != '\n'; column--) p += pw_utf8_size (p);
-  size_t at = (size_t)(p - source);
-  if (p + strspn (p, " \t\r\n") == end && x->depth > 0) {
+  const char *source = x->y->source;
+  size_t at = tree_offset_of (x, &(struct fy_mark){ .line = e->line - 1, .column = e->column - 1 });
+  if (at + strspn (source + at, " \t\r\n") == x->y->size && x->depth > 0) {
     size_t begin = x->open[x->depth - 1]->at;
     if (source[begin] == '[' || source[begin] == '{') at = begin;
   }
