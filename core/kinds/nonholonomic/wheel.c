@@ -8,11 +8,8 @@
 #include "contact.h"
 
 PREPARE (wheel_prepare, pw_wheel, contact) {
-  *k = contact_make (d->at, d->heading, -pw_sin (d->heading), pw_cos (d->heading));
-}
-
-PER_ELEMENT (wheel_contact, contact, 3) {
-  contact_to_world (x.A, x.k->at, x.k->heading, out);
+  *k = contact_across (d->at, d->heading);
+  return PW_OK;
 }
 
 static const pw_field wheel_fields[] = {
@@ -41,5 +38,5 @@ const pw_kind pw_kind_wheel = {
   .jw_q = contact_jw_q,
   .gamma_q = contact_gamma_q,
   .gamma_v = contact_gamma_v,
-  .contact = wheel_contact,
+  .contact = contact_place,
 };
