@@ -6,16 +6,14 @@
 
 enum { SPARSITY_SCENES = 12, SPARSITY_STATES = 4 };
 
-/* Updates an entry with its value at a state; `first` is its value at the first state of the scene. */
-static unsigned char sparsity_merge (unsigned char type, double value, double first) {
-  if (value != first) return PW_ENTRY_VARIABLE;
-  if ((type == PW_ENTRY_ZERO && value == 0) || (type == PW_ENTRY_ONE && value == 1)) return type;
-  if ((type == PW_ENTRY_MINUS_ONE && value == -1) || type == PW_ENTRY_VARIABLE) return type;
-  return PW_ENTRY_CONSTANT;
-}
-
 static unsigned char sparsity_first (double value) {
   return value == 0 ? PW_ENTRY_ZERO : value == 1 ? PW_ENTRY_ONE : value == -1 ? PW_ENTRY_MINUS_ONE : PW_ENTRY_CONSTANT;
+}
+
+/* Updates an entry with its value at a state; `first` is its value at the first state of the scene. */
+static unsigned char sparsity_merge (unsigned char type, double value, double first) {
+  if (value != first || type == PW_ENTRY_VARIABLE) return PW_ENTRY_VARIABLE;
+  return sparsity_first (value) == type ? type : PW_ENTRY_CONSTANT;
 }
 
 /* Elements of the scene that touch the ground have entries that are constant there only. */

@@ -8,7 +8,7 @@
 static pw_term specialise_entry (const pw_specialise_scene *x, int k, int e, int r, int c) {
   const pw_element_batch *b = &x->s->batch[k];
   unsigned char type = x->sparsity[k].J[r * b->b.cols + c];
-  int at = x->J[k] + (e * b->kind->rows + r) * b->b.cols + c;
+  int at = pw_specialise_J (x, k, e) + r * b->b.cols + c;
   if (type == PW_ENTRY_ZERO) return pw_term_zero ();
   if (type == PW_ENTRY_ONE || type == PW_ENTRY_MINUS_ONE)
     return (pw_term){ PW_TERM_ONE, type == PW_ENTRY_ONE ? 1 : -1, "1", type == PW_ENTRY_ONE ? 1 : -1 };

@@ -23,12 +23,8 @@ static const struct {
   [PW_FORCE_V] = { offsetof (pw_kind, force_v), offsetof (pw_kind, force), BLOCKS_RAW, 1, 1 },
 };
 
-static pw_batch_function *blocks_member (const pw_kind *kind, size_t offset) {
-  return *(pw_batch_function *const *)(const void *)((const char *)kind + offset);
-}
-
 pw_batch_function *pw_block_function (const pw_kind *kind, pw_block block) {
-  return blocks_member (kind, blocks_table[block].function);
+  return pw_kind_function (kind, blocks_table[block].function);
 }
 
 int pw_block_rows (const pw_kind *kind, pw_block block) {
@@ -74,7 +70,7 @@ static double *blocks_variable (const pw_kind *kind, blocks_single *one, int c, 
 }
 
 static void blocks_value (const pw_kind *kind, pw_block block, blocks_single *one, double *y) {
-  pw_batch_function *original = blocks_member (kind, blocks_table[block].original);
+  pw_batch_function *original = pw_kind_function (kind, blocks_table[block].original);
   int rows = kind->rows, cols = one->b.cols;
   double J[PW_MAX_ROWS * PW_MAX_COLS] = { 0 };
   memset (y, 0, PW_MAX_COLS * sizeof *y);
@@ -137,7 +133,7 @@ int pw_block_missing (const pw_workspace *w, const pw_element_batch *k, int e, p
   const pw_kind *kind = k->kind;
   int rows = pw_block_rows (kind, block), cols = k->b.cols;
   blocks_single one;
-  if (pw_block_function (kind, block) || blocks_member (kind, blocks_table[block].original) == NULL) return 0;
+  if (pw_block_function (kind, block) || pw_kind_function (kind, blocks_table[block].original) == NULL) return 0;
   blocks_isolate (k, e, &one);
   blocks_value (kind, block, &one, value);
   for (int r = 0; r < rows; r++) most = fmax (most, fabs (value[r]));

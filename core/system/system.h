@@ -167,6 +167,11 @@ double pw_next_breakpoint (pw_workspace *w, int knots, double t);
  * buffer. */
 int pw_find_nonfinite (pw_workspace *w, char *buffer, size_t size);
 
+/* The function at this offset of the type's table. */
+static inline pw_batch_function *pw_kind_function (const pw_kind *kind, size_t offset) {
+  return *(pw_batch_function *const *)(const void *)((const char *)kind + offset);
+}
+
 /* Second-order blocks: terms of the exact Newton matrices of implicit methods besides M, J and J^T. */
 typedef enum { PW_JW_Q, PW_JTL_Q, PW_ETA_Q, PW_GAMMA_Q, PW_GAMMA_V, PW_FORCE_Q, PW_FORCE_V, PW_BLOCKS } pw_block;
 
