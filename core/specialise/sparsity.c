@@ -41,11 +41,11 @@ static void sparsity_state (const pw_element_batch *k, int e, int fresh, int kno
 }
 
 static int sparsity_scene (const pw_system *s, pw_random *random, int *known, pw_sparsity *out) {
-  double q[200], v[200], first[PW_SCENE_BATCH][PW_MAX_ROWS * PW_MAX_COLS];
+  double q[PW_SCENE_COORDS], v[PW_SCENE_COORDS], first[PW_SCENE_BATCH][PW_MAX_ROWS * PW_MAX_COLS];
   pw_workspace *w = pw_workspace_new (s, NULL);
   if (w == NULL) return PW_RESOURCE;
   pw_element_batch *k = w->batch;
-  for (int state = 0; state < SPARSITY_STATES && s->coords <= 200; state++) {
+  for (int state = 0; state < SPARSITY_STATES; state++) {
     for (int j = 0; j < s->coords; j++) {
       q[j] = s->q0[j] + pw_random_between (random, -2, 2);
       v[j] = pw_random_between (random, -2, 2);

@@ -19,7 +19,6 @@ typedef struct {
   pw_workspace *w;       /* at the initial state */
   pw_sparsity *sparsity; /* batches */
   int entries;           /* of J */
-  int holonomic_only;    /* 1: positions are projected by the holonomic equations alone */
   pw_stream prepare;     /* prepare's statements */
   int constants;
 } pw_specialise_scene;

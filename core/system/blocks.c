@@ -10,17 +10,17 @@
  * differentiation. */
 static const struct {
   size_t function, original;
-  enum { BLOCKS_RAW, BLOCKS_J_W, BLOCKS_JT_LAMBDA } product;
+  enum { BLOCKS_NONE, BLOCKS_J_W, BLOCKS_JT_LAMBDA } product;
   int velocity; /* derivative with respect to v instead of q */
   int square;   /* 1: it has as many rows as local columns; 0: kind->rows */
 } blocks_table[PW_BLOCKS] = {
-  [PW_JW_Q] = { offsetof (pw_kind, jw_q), offsetof (pw_kind, J), BLOCKS_J_W, 0, 0 },
-  [PW_JTL_Q] = { offsetof (pw_kind, jw_q), offsetof (pw_kind, J), BLOCKS_JT_LAMBDA, 0, 1 },
-  [PW_ETA_Q] = { offsetof (pw_kind, eta_q), offsetof (pw_kind, eta), BLOCKS_RAW, 0, 0 },
-  [PW_GAMMA_Q] = { offsetof (pw_kind, gamma_q), offsetof (pw_kind, gamma), BLOCKS_RAW, 0, 0 },
-  [PW_GAMMA_V] = { offsetof (pw_kind, gamma_v), offsetof (pw_kind, gamma), BLOCKS_RAW, 1, 0 },
-  [PW_FORCE_Q] = { offsetof (pw_kind, force_q), offsetof (pw_kind, force), BLOCKS_RAW, 0, 1 },
-  [PW_FORCE_V] = { offsetof (pw_kind, force_v), offsetof (pw_kind, force), BLOCKS_RAW, 1, 1 },
+  [PW_JW_Q] = { offsetof (pw_kind, jw_q), offsetof (pw_kind, J), BLOCKS_J_W },
+  [PW_JTL_Q] = { offsetof (pw_kind, jw_q), offsetof (pw_kind, J), BLOCKS_JT_LAMBDA, .square = 1 },
+  [PW_ETA_Q] = { offsetof (pw_kind, eta_q), offsetof (pw_kind, eta) },
+  [PW_GAMMA_Q] = { offsetof (pw_kind, gamma_q), offsetof (pw_kind, gamma) },
+  [PW_GAMMA_V] = { offsetof (pw_kind, gamma_v), offsetof (pw_kind, gamma), .velocity = 1 },
+  [PW_FORCE_Q] = { offsetof (pw_kind, force_q), offsetof (pw_kind, force), .square = 1 },
+  [PW_FORCE_V] = { offsetof (pw_kind, force_v), offsetof (pw_kind, force), .velocity = 1, .square = 1 },
 };
 
 pw_batch_function *pw_block_function (const pw_kind *kind, pw_block block) {
@@ -79,7 +79,7 @@ static void blocks_value (const pw_kind *kind, pw_block block, blocks_single *on
     pw_sin_cos (p->phi, &p->sin, &p->cos);
   }
   if (original == NULL) return;
-  if (blocks_table[block].product == BLOCKS_RAW) {
+  if (blocks_table[block].product == BLOCKS_NONE) {
     original (&one->b, y);
     return;
   }

@@ -71,9 +71,8 @@ struct pw_workspace {
   const pw_source *failed;         /* the last signal that failed, or NULL */
 };
 
-/* The most entries that an element may have in the ledger; fills the entries of a system with signals. */
-int pw_ledger_max_entries (const pw_kind *kind);
-void pw_ledger_fill (pw_system *s);
+/* Lists the entries of the ledger, unless entry is NULL, of a system with signals.  Returns their number. */
+int pw_ledger_list (const pw_system *s, pw_entry *entry);
 
 /* Closes the contexts made by `open`; signals not opened yet are all zero. */
 void pw_close_signals (const pw_source *source, int count);
