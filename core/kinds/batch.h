@@ -77,9 +77,13 @@ LIBM (libm_hypot (libm_lanes x, libm_lanes y)) {
   static inline int function##_one (const definition_type *d, MAYBE_UNUSED const pw_body *const *bodies, type *k,  \
                                     MAYBE_UNUSED pw_internal *internal, MAYBE_UNUSED pw_error *error)
 
-/* Members of a type's table. */
+/* Members of a type's table; functions that have the names of their members: weld_J, weld_gamma, ... */
 #define DEFINITION(type, table) .definition = sizeof (type), .fields = table
 #define ELEMENT(type, function) .element = sizeof (type), .prepare = function
+#define POSITION(type) .g = type##_g, .g_size = type##_g_size
+#define CONSTRAINT(type) \
+  .J = type##_J, .gamma = type##_gamma, .jw_q = type##_jw_q, .gamma_q = type##_gamma_q, .gamma_v = type##_gamma_v
+#define FORCE(type) .force = type##_force, .force_q = type##_force_q, .force_v = type##_force_v
 
 /* The vector w of an element; NULL where the batch has none. */
 static inline const double *batch_w (const pw_batch *b, int e) {

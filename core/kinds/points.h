@@ -45,16 +45,16 @@ static inline points_state points_at (const pw_batch *b, int e) {
   return points_of ((const points *)b->element + e, b, e);
 }
 
-PER_ELEMENT (points_d, points, 2) {
+PER_ELEMENT (points_g, points, 2) {
   out[0] = x.d[0], out[1] = x.d[1];
 }
 
-PER_ELEMENT (points_size, points, 2) {
+PER_ELEMENT (points_g_size, points, 2) {
   out[0] = fabs (x.A->x) + fabs (x.S1[0]) + fabs (x.B->x) + fabs (x.S2[0]);
   out[1] = fabs (x.A->y) + fabs (x.S1[1]) + fabs (x.B->y) + fabs (x.S2[1]);
 }
 
-PER_ELEMENT (points_D, points, 12) {
+PER_ELEMENT (points_J, points, 12) {
   out[0] = 1, out[1] = 0, out[2] = -x.S1[1], out[3] = -1, out[4] = 0, out[5] = x.S2[1];
   out[6] = 0, out[7] = 1, out[8] = x.S1[0], out[9] = 0, out[10] = -1, out[11] = -x.S2[0];
 }
@@ -71,7 +71,7 @@ static inline void points_angles (double *out, double x1, double y1, double x2, 
   out[2] = x1, out[8] = y1, out[5] = x2, out[11] = y2;
 }
 
-PER_ELEMENT (points_Dw_q, points, 12) {
+PER_ELEMENT (points_jw_q, points, 12) {
   double w1 = x.w[2], w2 = x.w[5];
   points_angles (out, -x.S1[0] * w1, -x.S1[1] * w1, x.S2[0] * w2, x.S2[1] * w2);
 }

@@ -88,10 +88,8 @@ const pw_kind pw_kind_motor = {
   ELEMENT (motor, motor_prepare),
   .bodies = 2,
   .signals = 2,
-  .force = motor_force,
+  FORCE (motor),
   .force_u = motor_force_u,
-  .force_q = motor_force_q,
-  .force_v = motor_force_v,
   .saturation = motor_saturation,
   .power = motor_power,
 };

@@ -83,9 +83,7 @@ const pw_kind pw_kind_rolling_resistance = {
   DEFINITION (pw_rolling_resistance, resistance_fields),
   ELEMENT (resistance, resistance_prepare),
   .bodies = 1,
-  .force = resistance_force,
-  .force_q = resistance_force_q,
-  .force_v = resistance_force_v,
+  FORCE (resistance),
   .saturation = resistance_saturation,
   .loss = resistance_loss,
 };

@@ -68,9 +68,7 @@ const pw_kind pw_kind_rotational_spring = {
   DEFINITION (pw_rotational_spring, twist_fields),
   ELEMENT (twist, twist_prepare),
   .bodies = 2,
-  .force = twist_force,
-  .force_q = twist_force_q,
-  .force_v = twist_force_v,
+  FORCE (twist),
   .energy = twist_energy,
   .loss = twist_loss,
 };

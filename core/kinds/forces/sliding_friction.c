@@ -85,9 +85,7 @@ const pw_kind pw_kind_sliding_friction = {
   DEFINITION (pw_sliding_friction, sliding_fields),
   ELEMENT (sliding, sliding_prepare),
   .bodies = 2,
-  .force = sliding_force,
-  .force_q = sliding_force_q,
-  .force_v = sliding_force_v,
+  FORCE (sliding),
   .saturation = sliding_saturation,
   .loss = sliding_loss,
 };

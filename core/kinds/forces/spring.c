@@ -28,7 +28,7 @@ typedef struct {
 static inline spring_state spring_at (const pw_batch *b, int e) {
   const spring *k = (const spring *)b->element + e;
   spring_state x = { .k = k, .p = points_of (&k->points, b, e) };
-  points_D_one (x.p, x.D);
+  points_J_one (x.p, x.D);
   x.l = hypot (x.p.d[0], x.p.d[1]);
   x.il = x.l > 1e-150 ? 1 / x.l : 0;
   x.e[0] = x.p.d[0] * x.il, x.e[1] = x.p.d[1] * x.il;
@@ -113,9 +113,7 @@ const pw_kind pw_kind_spring = {
   DEFINITION (pw_spring, spring_fields),
   ELEMENT (spring, spring_prepare),
   .bodies = 2,
-  .force = spring_force,
-  .force_q = spring_force_q,
-  .force_v = spring_force_v,
+  FORCE (spring),
   .energy = spring_energy,
   .loss = spring_loss,
 };

@@ -74,7 +74,6 @@ const pw_kind pw_kind_gear = {
   .rows = 1,
   .level = PW_HOLONOMIC,
   .reaction = gear_reaction,
-  .g = gear_g,
-  .g_size = gear_g_size,
+  POSITION (gear),
   .J = gear_J,
 };

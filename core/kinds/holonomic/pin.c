@@ -32,11 +32,6 @@ const pw_kind pw_kind_pin = {
   .rows = 2,
   .level = PW_HOLONOMIC,
   .reaction = pin_reaction,
-  .g = points_d,
-  .g_size = points_size,
-  .J = points_D,
-  .gamma = points_gamma,
-  .jw_q = points_Dw_q,
-  .gamma_q = points_gamma_q,
-  .gamma_v = points_gamma_v,
+  POSITION (points),
+  CONSTRAINT (points),
 };

@@ -25,7 +25,7 @@ typedef struct {
 static inline rod_state rod_at (const pw_batch *b, int e) {
   const rod *k = (const rod *)b->element + e;
   rod_state x = { .p = points_of (&k->points, b, e), .L = k->length };
-  points_D_one (x.p, x.D);
+  points_J_one (x.p, x.D);
   x.w1 = x.p.A->omega, x.w2 = x.p.B->omega;
   return x;
 }
@@ -50,7 +50,7 @@ PER_ELEMENT (rod_g, rod, 1) {
 
 PER_ELEMENT (rod_g_size, rod, 1) {
   double size[2];
-  points_size_one (x.p, size);
+  points_g_size_one (x.p, size);
   *out = (fabs (x.p.d[0]) * size[0] + fabs (x.p.d[1]) * size[1]) / x.L + x.L / 2;
 }
 
@@ -112,11 +112,6 @@ const pw_kind pw_kind_rod = {
   .rows = 1,
   .level = PW_HOLONOMIC,
   .reaction = rod_reaction,
-  .g = rod_g,
-  .g_size = rod_g_size,
-  .J = rod_J,
-  .gamma = rod_gamma,
-  .jw_q = rod_jw_q,
-  .gamma_q = rod_gamma_q,
-  .gamma_v = rod_gamma_v,
+  POSITION (rod),
+  CONSTRAINT (rod),
 };

@@ -74,11 +74,6 @@ const pw_kind pw_kind_slider = {
   .rows = 2,
   .level = PW_HOLONOMIC,
   .reaction = slider_reaction,
-  .g = slider_g,
-  .g_size = slider_g_size,
-  .J = slider_J,
-  .gamma = slider_gamma,
-  .jw_q = slider_jw_q,
-  .gamma_q = slider_gamma_q,
-  .gamma_v = slider_gamma_v,
+  POSITION (slider),
+  CONSTRAINT (slider),
 };

@@ -34,11 +34,6 @@ const pw_kind pw_kind_slot = {
   .rows = 1,
   .level = PW_HOLONOMIC,
   .reaction = slot_reaction,
-  .g = line_g,
-  .g_size = line_g_size,
-  .J = line_J,
-  .gamma = line_gamma,
-  .jw_q = line_jw_q,
-  .gamma_q = line_gamma_q,
-  .gamma_v = line_gamma_v,
+  POSITION (line),
+  CONSTRAINT (line),
 };

@@ -29,17 +29,17 @@ PREPARE (weld_prepare, pw_weld, weld) {
 }
 
 PER_ELEMENT (weld_g, weld, 3) {
-  points_d_one (x.p, out);
+  points_g_one (x.p, out);
   out[2] = x.p.A->phi - x.p.B->phi + x.beta;
 }
 
 PER_ELEMENT (weld_g_size, weld, 3) {
-  points_size_one (x.p, out);
+  points_g_size_one (x.p, out);
   out[2] = fabs (x.p.A->phi) + fabs (x.p.B->phi) + fabs (x.beta);
 }
 
 PER_ELEMENT (weld_J, weld, 18) {
-  points_D_one (x.p, out);
+  points_J_one (x.p, out);
   out[12] = out[13] = out[15] = out[16] = 0, out[14] = 1, out[17] = -1;
 }
 
@@ -49,7 +49,7 @@ PER_ELEMENT (weld_gamma, weld, 3) {
 }
 
 PER_ELEMENT (weld_jw_q, weld, 18) {
-  points_Dw_q_one (x.p, out);
+  points_jw_q_one (x.p, out);
   memset (out + 12, 0, 6 * sizeof *out);
 }
 
@@ -87,11 +87,6 @@ const pw_kind pw_kind_weld = {
   .rows = 3,
   .level = PW_HOLONOMIC,
   .reaction = weld_reaction,
-  .g = weld_g,
-  .g_size = weld_g_size,
-  .J = weld_J,
-  .gamma = weld_gamma,
-  .jw_q = weld_jw_q,
-  .gamma_q = weld_gamma_q,
-  .gamma_v = weld_gamma_v,
+  POSITION (weld),
+  CONSTRAINT (weld),
 };

@@ -90,9 +90,5 @@ const pw_kind pw_kind_pfaffian = {
   .level = PW_NONHOLONOMIC,
   .reaction = pfaffian_reaction,
   .eta = batch_signal,
-  .J = pfaffian_J,
-  .gamma = pfaffian_gamma,
-  .jw_q = pfaffian_jw_q,
-  .gamma_q = pfaffian_gamma_q,
-  .gamma_v = pfaffian_gamma_v,
+  CONSTRAINT (pfaffian),
 };

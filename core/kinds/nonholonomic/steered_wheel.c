@@ -79,10 +79,6 @@ const pw_kind pw_kind_steered_wheel = {
   .signals = 1,
   .level = PW_NONHOLONOMIC,
   .reaction = steered_reaction,
-  .J = steered_J,
-  .gamma = steered_gamma,
-  .jw_q = steered_jw_q,
-  .gamma_q = steered_gamma_q,
-  .gamma_v = steered_gamma_v,
+  CONSTRAINT (steered),
   .contact = steered_contact,
 };

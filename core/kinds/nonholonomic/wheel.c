@@ -33,10 +33,6 @@ const pw_kind pw_kind_wheel = {
   .rows = 1,
   .level = PW_NONHOLONOMIC,
   .reaction = wheel_reaction,
-  .J = contact_J,
-  .gamma = contact_gamma,
-  .jw_q = contact_jw_q,
-  .gamma_q = contact_gamma_q,
-  .gamma_v = contact_gamma_v,
+  CONSTRAINT (contact),
   .contact = contact_place,
 };
