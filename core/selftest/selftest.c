@@ -150,16 +150,16 @@ static void selftest_blocks (pw_probe *x) {
   pw_probe_evaluate (x, x->kind->J, "J", n * x->cols, J);
   pw_probe_gamma (x, gamma);
   pw_probe_force (x, force);
-  double sJ = selftest_largest (n * x->cols, J), sg = selftest_largest (n, gamma);
+  double size_J = selftest_largest (n * x->cols, J), size_gamma = selftest_largest (n, gamma);
   if (x->rows > 0) {
-    selftest_block (x, PW_JW_Q, "jw_q", "jw_q = d(J w)/dq", sJ);
+    selftest_block (x, PW_JW_Q, "jw_q", "jw_q = d(J w)/dq", size_J);
     selftest_block (x, PW_ETA_Q, "eta_q", "eta_q = d eta/dq", 0);
-    selftest_block (x, PW_GAMMA_Q, "gamma_q", "gamma_q = d gamma/dq", sg);
-    selftest_block (x, PW_GAMMA_V, "gamma_v", "gamma_v = d gamma/dv", sg);
+    selftest_block (x, PW_GAMMA_Q, "gamma_q", "gamma_q = d gamma/dq", size_gamma);
+    selftest_block (x, PW_GAMMA_V, "gamma_v", "gamma_v = d gamma/dv", size_gamma);
   }
-  double sf = selftest_largest (x->elements * x->cols, force);
-  selftest_block (x, PW_FORCE_Q, "force_q", "force_q = d force/dq", sf);
-  selftest_block (x, PW_FORCE_V, "force_v", "force_v = d force/dv", sf);
+  double size_force = selftest_largest (x->elements * x->cols, force);
+  selftest_block (x, PW_FORCE_Q, "force_q", "force_q = d force/dq", size_force);
+  selftest_block (x, PW_FORCE_V, "force_v", "force_v = d force/dv", size_force);
 }
 
 /* Makes a check at velocities multiplied by a factor. */
