@@ -14,13 +14,19 @@ static const struct {
   int velocity; /* derivative with respect to v instead of q */
   int square;   /* 1: it has as many rows as local columns; 0: kind->rows */
 } blocks_table[PW_BLOCKS] = {
-  [PW_JW_Q] = { offsetof (pw_kind, jw_q), offsetof (pw_kind, J), BLOCKS_J_W },
-  [PW_JTL_Q] = { offsetof (pw_kind, jw_q), offsetof (pw_kind, J), BLOCKS_JT_LAMBDA, .square = 1 },
-  [PW_ETA_Q] = { offsetof (pw_kind, eta_q), offsetof (pw_kind, eta) },
-  [PW_GAMMA_Q] = { offsetof (pw_kind, gamma_q), offsetof (pw_kind, gamma) },
-  [PW_GAMMA_V] = { offsetof (pw_kind, gamma_v), offsetof (pw_kind, gamma), .velocity = 1 },
-  [PW_FORCE_Q] = { offsetof (pw_kind, force_q), offsetof (pw_kind, force), .square = 1 },
-  [PW_FORCE_V] = { offsetof (pw_kind, force_v), offsetof (pw_kind, force), .velocity = 1, .square = 1 },
+  [PW_JW_Q] = { .function = offsetof (pw_kind, jw_q), .original = offsetof (pw_kind, J), .product = BLOCKS_J_W },
+  [PW_JTL_Q] = { .function = offsetof (pw_kind, jw_q),
+                 .original = offsetof (pw_kind, J),
+                 .product = BLOCKS_JT_LAMBDA,
+                 .square = 1 },
+  [PW_ETA_Q] = { .function = offsetof (pw_kind, eta_q), .original = offsetof (pw_kind, eta) },
+  [PW_GAMMA_Q] = { .function = offsetof (pw_kind, gamma_q), .original = offsetof (pw_kind, gamma) },
+  [PW_GAMMA_V] = { .function = offsetof (pw_kind, gamma_v), .original = offsetof (pw_kind, gamma), .velocity = 1 },
+  [PW_FORCE_Q] = { .function = offsetof (pw_kind, force_q), .original = offsetof (pw_kind, force), .square = 1 },
+  [PW_FORCE_V] = { .function = offsetof (pw_kind, force_v),
+                   .original = offsetof (pw_kind, force),
+                   .velocity = 1,
+                   .square = 1 },
 };
 
 pw_batch_function *pw_block_function (const pw_kind *kind, pw_block block) {
