@@ -8,25 +8,20 @@
 
 /* Each block: its function in the type's table, the function it differentiates, and the product formed before
  * differentiation. */
+#define BLOCKS_ENTRY(f, g) .function = offsetof (pw_kind, f), .original = offsetof (pw_kind, g)
 static const struct {
   size_t function, original;
   enum { BLOCKS_NONE, BLOCKS_J_W, BLOCKS_JT_LAMBDA } product;
   int velocity; /* derivative with respect to v instead of q */
   int square;   /* 1: it has as many rows as local columns; 0: kind->rows */
 } blocks_table[PW_BLOCKS] = {
-  [PW_JW_Q] = { .function = offsetof (pw_kind, jw_q), .original = offsetof (pw_kind, J), .product = BLOCKS_J_W },
-  [PW_JTL_Q] = { .function = offsetof (pw_kind, jw_q),
-                 .original = offsetof (pw_kind, J),
-                 .product = BLOCKS_JT_LAMBDA,
-                 .square = 1 },
-  [PW_ETA_Q] = { .function = offsetof (pw_kind, eta_q), .original = offsetof (pw_kind, eta) },
-  [PW_GAMMA_Q] = { .function = offsetof (pw_kind, gamma_q), .original = offsetof (pw_kind, gamma) },
-  [PW_GAMMA_V] = { .function = offsetof (pw_kind, gamma_v), .original = offsetof (pw_kind, gamma), .velocity = 1 },
-  [PW_FORCE_Q] = { .function = offsetof (pw_kind, force_q), .original = offsetof (pw_kind, force), .square = 1 },
-  [PW_FORCE_V] = { .function = offsetof (pw_kind, force_v),
-                   .original = offsetof (pw_kind, force),
-                   .velocity = 1,
-                   .square = 1 },
+  [PW_JW_Q] = { BLOCKS_ENTRY (jw_q, J), .product = BLOCKS_J_W },
+  [PW_JTL_Q] = { BLOCKS_ENTRY (jw_q, J), .product = BLOCKS_JT_LAMBDA, .square = 1 },
+  [PW_ETA_Q] = { BLOCKS_ENTRY (eta_q, eta) },
+  [PW_GAMMA_Q] = { BLOCKS_ENTRY (gamma_q, gamma) },
+  [PW_GAMMA_V] = { BLOCKS_ENTRY (gamma_v, gamma), .velocity = 1 },
+  [PW_FORCE_Q] = { BLOCKS_ENTRY (force_q, force), .square = 1 },
+  [PW_FORCE_V] = { BLOCKS_ENTRY (force_v, force), .velocity = 1, .square = 1 },
 };
 
 pw_batch_function *pw_block_function (const pw_kind *kind, pw_block block) {

@@ -18,10 +18,10 @@ int pw_ledger_list (const pw_system *s, pw_entry *entry) {
   int count = 0;
   for (int i = 0; i < s->batches; i++) {
     const pw_element_batch *k = &s->batch[i];
-    for (int type = PW_WORK; type <= PW_LOSS; type++)
+    for (int loss = 0; loss < 2; loss++)
       for (int e = 0; e < k->b.count; e++) {
-        if (type == PW_WORK ? !ledger_has_work (k, e) : k->kind->loss == NULL) continue;
-        if (entry) entry[count] = (pw_entry){ i, e, type };
+        if (loss ? k->kind->loss == NULL : !ledger_has_work (k, e)) continue;
+        if (entry) entry[count] = (pw_entry){ i, e, loss ? PW_LOSS : PW_WORK };
         count++;
       }
   }
