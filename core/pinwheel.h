@@ -790,8 +790,8 @@ int pw_specialised_fits (const pw_specialised *code, const pw_system *s);
 typedef struct pw_specialised_lanes pw_specialised_lanes;
 int pw_specialised_lanes_fit (const pw_specialised_lanes *code, const pw_system *s);
 int pw_specialised_lanes_count (const pw_specialised_lanes *code);
-void *
-pw_specialised_lanes_memory (const pw_specialised_lanes *code); /* for one thread; NULL if out of memory; free it */
+/* Memory for the runs of one thread; NULL if out of memory.  Free it. */
+void *pw_specialised_lanes_memory (const pw_specialised_lanes *code);
 /* 0 if there are element types of the user's, or signals that depend on the state; redundant equations count as such, too. */
 int pw_system_has_lanes (const pw_system *s);
 /* 1 if accelerations may jump with the state: the system has element types of the user's, or signals that depend on it. */

@@ -18,8 +18,8 @@ typedef struct {
 /* How to integrate; zeros select the defaults. */
 typedef struct {
   double t; /* initial time [s] */
-  double
-      span; /* approximate duration of the run [s]; for scales: of time if the scene is initially at rest, of energy */
+  /* Approximate duration of the run [s]: for the scale of time if the scene is initially at rest, and that of energy. */
+  double span;
   double step; /* fixed-step methods: step size [s]; default 1e-3 */
   double rtol; /* adaptive methods: relative tolerance; default 1e-6 */
   double atol; /* absolute tolerance of every state; default rtol x (L, 1 rad, L/T, 1/T), see pw_scale */

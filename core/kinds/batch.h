@@ -8,8 +8,10 @@
 /* Inlines all calls in a function, so that it computes no more of a state than it uses. */
 #if defined(__GNUC__)
 #define FLATTEN __attribute__ ((flatten))
+#define MAYBE_UNUSED __attribute__ ((unused))
 #else
 #define FLATTEN
+#define MAYBE_UNUSED
 #endif
 
 /* WHERE (condition, x): x where the condition holds, else an arbitrary number.  Code for several runs at once
@@ -53,8 +55,9 @@ LIBM (libm_hypot (libm_lanes x, libm_lanes y)) {
 }
 #endif
 
-/* PER_ELEMENT (pin_J, pin, 12) { ... } defines the batch function pin_J.  The body fills `out`, the 12 numbers of one
- * element, from `x`, a pin_state: the element in its current state, as pin_at (b, e) returns it. */
+/* PER_ELEMENT (rod_J, rod, 6) { ... } defines the batch function rod_J and rod_J_one, the same for one element.  The body
+ * fills `out`, the 6 numbers of the element, from `x`, a rod_state: the element in its current state, as rod_at (b, e)
+ * returns it. */
 #define PER_ELEMENT(function, type, size)                                                   \
   static inline void function##_one (type##_state x, double *out);                          \
   FLATTEN static inline void function (const pw_batch *b, double *out) {                    \
@@ -62,25 +65,57 @@ LIBM (libm_hypot (libm_lanes x, libm_lanes y)) {
   }                                                                                         \
   static inline void function##_one (type##_state x, double *out)
 
-/* PREPARE (pin_prepare, pw_pin, pin) { ... } defines a `prepare` that cannot fail: it fills `k`, a pin, from the
- * definition `d`. */
+/* PREPARE (gear_prepare, pw_gear, gear) { ... } defines a `prepare`: it fills `k`, a gear, from the definition `d`, may
+ * use its other parameters `bodies`, `internal` and `error`, and returns a status. */
 #define PREPARE(function, definition_type, type)                                                                   \
-  static inline void function##_one (const definition_type *d, type *k);                                           \
+  static inline int function##_one (const definition_type *d, const pw_body *const *bodies, type *k,               \
+                                    pw_internal *internal, pw_error *error);                                       \
   static int function (const void *definition, const pw_body *const *bodies, void *element, pw_internal *internal, \
                        pw_error *error) {                                                                          \
-    (void)bodies, (void)internal, (void)error;                                                                     \
-    function##_one (definition, element);                                                                          \
-    return PW_OK;                                                                                                  \
+    return function##_one (definition, bodies, element, internal, error);                                          \
   }                                                                                                                \
-  static inline void function##_one (const definition_type *d, type *k)
+  static inline int function##_one (const definition_type *d, MAYBE_UNUSED const pw_body *const *bodies, type *k,  \
+                                    MAYBE_UNUSED pw_internal *internal, MAYBE_UNUSED pw_error *error)
 
-/* Members of a type's table. */
+/* Members of a type's table; functions that have the names of their members: weld_J, weld_gamma, ... */
 #define DEFINITION(type, table) .definition = sizeof (type), .fields = table
 #define ELEMENT(type, function) .element = sizeof (type), .prepare = function
+#define POSITION(type) .g = type##_g, .g_size = type##_g_size
+#define CONSTRAINT(type) \
+  .J = type##_J, .gamma = type##_gamma, .jw_q = type##_jw_q, .gamma_q = type##_gamma_q, .gamma_v = type##_gamma_v
+#define FORCE(type) .force = type##_force, .force_q = type##_force_q, .force_v = type##_force_v
 
 /* The vector w of an element; NULL where the batch has none. */
 static inline const double *batch_w (const pw_batch *b, int e) {
   return b->w ? b->w + e * b->cols : NULL;
+}
+
+/* Body n of element e, in its current state. */
+static inline const pw_configuration *batch_body (const pw_batch *b, int e, int bodies, int n) {
+  return &b->configuration[b->body[bodies * e + n]];
+}
+
+/* eta of a velocity constraint whose right-hand side is the element's only signal. */
+static inline void batch_signal (const pw_batch *b, double *out) {
+  for (int e = 0; e < b->count; e++) out[e] = b->u[3 * e];
+}
+
+/* A vector in a body's frame, in world axes. */
+static inline void to_world (const pw_configuration *A, const double s[2], double out[2]) {
+  out[0] = A->cos * s[0] - A->sin * s[1];
+  out[1] = A->sin * s[0] + A->cos * s[1];
+}
+
+/* The force of the torque T on body 1 and -T on body 2. */
+static inline void opposite_torques (double T, double *out) {
+  out[0] = out[1] = out[3] = out[4] = 0, out[2] = T, out[5] = -T;
+}
+
+/* Its derivative by the angles, or by the angular velocities, if T decreases with those of body 1 relative to body 2 by
+ * `slope`: 6 x 6. */
+static inline void opposite_torques_block (double slope, double *out) {
+  for (int i = 0; i < 36; i++) out[i] = 0;
+  out[14] = out[35] = -slope, out[17] = out[32] = slope;
 }
 
 #endif

@@ -36,8 +36,10 @@ static inline line line_make (const double at[2][2], double heading) {
   return k;
 }
 
-static inline line_state line_rotate (const line *k, const pw_configuration *A, const pw_configuration *B) {
-  line_state s = { .k = k, .A = A, .B = B };
+/* The line k of element e of a batch of elements with two bodies and at most one signal. */
+static inline line_state line_of (const line *k, const pw_batch *b, int e) {
+  const pw_configuration *A = batch_body (b, e, 2, 0), *B = batch_body (b, e, 2, 1);
+  line_state s = { .k = k, .A = A, .B = B, .w = batch_w (b, e), .u = b->u + 3 * e };
   s.nx = B->cos * k->n[0] - B->sin * k->n[1], s.ny = B->sin * k->n[0] + B->cos * k->n[1];
   s.tx = s.ny, s.ty = -s.nx;
   s.X = A->cos * k->s1[0] - A->sin * k->s1[1], s.Y = A->sin * k->s1[0] + A->cos * k->s1[1];
@@ -48,29 +50,25 @@ static inline line_state line_rotate (const line *k, const pw_configuration *A, 
 }
 
 static inline line_state line_at (const pw_batch *b, int e) {
-  line_state s = line_rotate ((const line *)b->element + e, &b->configuration[b->body[2 * e]],
-                              &b->configuration[b->body[2 * e + 1]]);
-  s.w = batch_w (b, e);
-  s.u = b->u + 3 * e;
-  return s;
+  return line_of ((const line *)b->element + e, b, e);
 }
 
-static inline double line_g (const line_state *s) {
-  return s->nD - s->k->c;
+PER_ELEMENT (line_g, line, 1) {
+  *out = x.nD - x.k->c;
 }
 
-static inline double line_g_size (const line_state *s) {
-  return fabs (s->nx) * (fabs (s->A->x) + fabs (s->X) + fabs (s->B->x)) +
-         fabs (s->ny) * (fabs (s->A->y) + fabs (s->Y) + fabs (s->B->y)) + fabs (s->k->c);
+PER_ELEMENT (line_g_size, line, 1) {
+  *out = fabs (x.nx) * (fabs (x.A->x) + fabs (x.X) + fabs (x.B->x)) +
+         fabs (x.ny) * (fabs (x.A->y) + fabs (x.Y) + fabs (x.B->y)) + fabs (x.k->c);
 }
 
-static inline void line_J (const line_state *s, double *out) {
-  out[0] = s->nx, out[1] = s->ny, out[2] = s->ta, out[3] = -s->nx, out[4] = -s->ny, out[5] = -s->tD;
+PER_ELEMENT (line_J, line, 6) {
+  out[0] = x.nx, out[1] = x.ny, out[2] = x.ta, out[3] = -x.nx, out[4] = -x.ny, out[5] = -x.tD;
 }
 
-static inline double line_gamma (const line_state *s) {
-  double w1 = s->A->omega, w2 = s->B->omega, tV = s->tx * (s->A->vx - s->B->vx) + s->ty * (s->A->vy - s->B->vy);
-  return 2 * w2 * tV + w1 * (w1 - 2 * w2) * s->na + w2 * w2 * s->nD;
+PER_ELEMENT (line_gamma, line, 1) {
+  double w1 = x.A->omega, w2 = x.B->omega, tV = x.tx * (x.A->vx - x.B->vx) + x.ty * (x.A->vy - x.B->vy);
+  *out = 2 * w2 * tV + w1 * (w1 - 2 * w2) * x.na + w2 * w2 * x.nD;
 }
 
 /* out = factor H w */
@@ -91,33 +89,23 @@ static inline void line_jtl_q (const line_state *s, double l, double *out) {
   out[14] = -l * s->na, out[17] = out[32] = l * s->na, out[35] = -l * s->nD;
 }
 
-static inline void line_gamma_q (const line_state *s, double *out) {
-  double w1 = s->A->omega, w2 = s->B->omega, nV = s->nx * (s->A->vx - s->B->vx) + s->ny * (s->A->vy - s->B->vy);
-  out[0] = w2 * w2 * s->nx;
-  out[1] = w2 * w2 * s->ny;
-  out[2] = (w1 - w2) * (w1 - w2) * s->ta;
-  out[3] = -out[0];
-  out[4] = -out[1];
-  out[5] = 2 * w2 * nV - w1 * (w1 - 2 * w2) * s->ta - w2 * w2 * s->tD;
-}
-
-static inline void line_gamma_v (const line_state *s, double *out) {
-  const double v[6] = { s->A->vx, s->A->vy, s->A->omega, s->B->vx, s->B->vy, s->B->omega };
-  line_multiply_H (s, -2, v, out);
-}
-
-/* ---- Batches of elements with one line equation each ---- */
-
-PER_ELEMENT (lines_jw_q, line, 6) {
+PER_ELEMENT (line_jw_q, line, 6) {
   line_multiply_H (&x, 1, x.w, out);
 }
 
-PER_ELEMENT (lines_gamma_q, line, 6) {
-  line_gamma_q (&x, out);
+PER_ELEMENT (line_gamma_q, line, 6) {
+  double w1 = x.A->omega, w2 = x.B->omega, nV = x.nx * (x.A->vx - x.B->vx) + x.ny * (x.A->vy - x.B->vy);
+  out[0] = w2 * w2 * x.nx;
+  out[1] = w2 * w2 * x.ny;
+  out[2] = (w1 - w2) * (w1 - w2) * x.ta;
+  out[3] = -out[0];
+  out[4] = -out[1];
+  out[5] = 2 * w2 * nV - w1 * (w1 - 2 * w2) * x.ta - w2 * w2 * x.tD;
 }
 
-PER_ELEMENT (lines_gamma_v, line, 6) {
-  line_gamma_v (&x, out);
+PER_ELEMENT (line_gamma_v, line, 6) {
+  const double v[6] = { x.A->vx, x.A->vy, x.A->omega, x.B->vx, x.B->vy, x.B->omega };
+  line_multiply_H (&x, -2, v, out);
 }
 
 #endif

@@ -8,33 +8,26 @@ static const char *const differences_name[PW_BLOCKS] = {
   [PW_GAMMA_V] = "gamma_v", [PW_FORCE_Q] = "force_q", [PW_FORCE_V] = "force_v",
 };
 
-/* The batch and block of the i-th block by differences; NULL, and their number in *count, if there are fewer. */
-static const pw_element_batch *differences_find (const pw_system *s, int i, pw_block *block, int *count) {
-  *count = 0;
+/* The batch and block of the i-th block by differences; NULL if there are fewer. */
+static const pw_element_batch *differences_find (const pw_system *s, int i, int *block) {
   for (const pw_element_batch *k = s->batch; k < s->batch + s->batches; k++)
-    for (int b = 0; b < PW_BLOCKS; b++) {
-      if (b == PW_JTL_Q || pw_block_function (k->kind, (pw_block)b) != pw_by_differences || (*count)++ != i) continue;
-      *block = (pw_block)b;
-      return k;
-    }
+    for (*block = 0; *block < PW_BLOCKS; ++*block)
+      if (*block != PW_JTL_Q && pw_block_function (k->kind, (pw_block)*block) == pw_by_differences && i-- == 0)
+        return k;
   return NULL;
 }
 
 int pw_system_differences (const pw_system *s) {
-  pw_block block;
-  int count;
-  differences_find (s, -1, &block, &count);
+  int block, count = 0;
+  while (differences_find (s, count, &block)) count++;
   return count;
 }
 
 char *pw_system_difference_name (const pw_system *s, int i, char *buffer, size_t size) {
-  pw_block block;
-  int count;
-  const pw_element_batch *k = differences_find (s, i, &block, &count);
-  if (k)
-    snprintf (buffer, size, "%s of element type %s", differences_name[block], k->kind->name);
-  else
-    snprintf (buffer, size, "%s", "");
+  int block;
+  const pw_element_batch *k = differences_find (s, i, &block);
+  if (size > 0) buffer[0] = 0;
+  if (k) snprintf (buffer, size, "%s of element type %s", differences_name[block], k->kind->name);
   return buffer;
 }
 

@@ -1,20 +1,8 @@
-/* The self-test's probe: a random state of a random scene, and the derivatives of an element type's functions there. */
-#include <float.h>
+/* The probe of the self-tests: see probe.h. */
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
 #include "probe.h"
-
-/* Central differences with a step of about eps^(1/3) have an error of the order eps^(2/3) times the function's size,
- * from truncation and from round-off alike (Dennis & Schnabel 1983, section 5.6).  All numbers in the scene are of
- * the order 1, so the sizes of a function and of its third derivative are about the same. */
-const char pw_probe_reason[] = "100 eps^(2/3) of the largest term: central differences";
-
-/* ---- The report ---- */
-
-double pw_probe_bound (void) {
-  return 100 * cbrt (DBL_EPSILON) * cbrt (DBL_EPSILON);
-}
 
 void pw_probe_record (pw_selftest_report *r, const char *name, const char *about, double error, double bound,
                       const char *reason, const char *where) {
@@ -31,54 +19,44 @@ void pw_probe_record (pw_selftest_report *r, const char *name, const char *about
   snprintf (c->where, sizeof c->where, "%s", where);
 }
 
-int pw_probe_ground (const pw_probe *x, int e, int c) {
-  return pw_global (x->k, e, c) >= x->s->coords;
+int pw_probe_open (pw_probe *x, pw_error *error) {
+  x->kind = x->k->kind;
+  x->elements = x->k->b.count, x->rows = x->kind->rows, x->cols = x->k->b.cols;
+  size_t n = (size_t)x->s->coords, rows = (size_t)(x->elements * x->rows), cols = (size_t)x->cols;
+  const pw_array array[] = {
+    { &x->q, n },
+    { &x->v, n },
+    { &x->a, n },
+    { &x->dq, n },
+    { &x->dv, n },
+    { &x->q_now, n },
+    { &x->v_now, n },
+    { &x->w, (size_t)x->elements * cols },
+    { &x->lambda, rows },
+    { &x->J, rows * cols + PW_PROBE_GUARD },
+    { &x->eta, rows + PW_PROBE_GUARD },
+  };
+  x->memory = pw_alloc_arrays (array, sizeof array / sizeof *array);
+  x->k->b.w = x->w, x->k->b.lambda = x->lambda;
+  return x->memory ? PW_OK : pw_fail (error, PW_RESOURCE, "model %s: out of memory", x->s->model);
 }
 
-void pw_probe_compare (pw_probe *x, const char *name, const char *about, int rows, int cols, const double *value,
-                       const double *reference) {
-  double size = 1 + x->size, worst = -1;
-  int n = x->elements * rows * cols, at = 0;
-  for (int i = 0; i < n; i++) size = fmax (size, fabs (reference[i]));
-  for (int i = 0; i < n; i++) {
-    if (cols == x->cols && pw_probe_ground (x, i / (rows * cols), i % cols)) continue;
-    double error = fabs (value[i] - reference[i]) / size;
-    if (isnan (error)) error = INFINITY;
-    if (error > worst) worst = error, at = i;
-  }
-  char where[120];
-  snprintf (where, sizeof where, "%s, row %d, column %d: %.9g, expected %.9g", x->k->name[at / (rows * cols)],
-            at / cols % rows, at % cols, value[at], reference[at]);
-  pw_probe_record (x->report, name, about, worst, pw_probe_bound (), pw_probe_reason, where);
-}
-
-/* ---- The state ---- */
-
-/* Bodies near the corners of a square, everything else at random. */
-void pw_probe_randomise (pw_probe *x, pw_random *r) {
-  static const double corner[PW_SCENE_BODIES][2] = { { 2, 2 }, { -2, 2 }, { -2, -2 }, { 2, -2 } };
-  x->t = pw_random_between (r, 0.1, 3);
+void pw_probe_update (pw_probe *x, pw_probe_move move, double h) {
+  double step = move == PW_PROBE_MOTION ? h * x->tau : 0;
   for (int j = 0; j < x->s->coords; j++) {
-    x->q[j] = pw_random_between (r, -0.5, 0.5);
-    if (pw_is_angle (x->s, j))
-      x->q[j] = pw_random_between (r, -3, 3);
-    else
-      x->q[j] += corner[j / 3][j % 3];
-    x->v[j] = pw_random_between (r, -1.5, 1.5);
-    x->a[j] = pw_random_between (r, -1.5, 1.5);
+    x->q_now[j] = x->q[j] + step * (x->v[j] + step * x->a[j] / 2) + (move == PW_PROBE_Q ? h * x->dq[j] : 0);
+    x->v_now[j] = x->v[j] + step * x->a[j] + (move == PW_PROBE_V ? h * x->dv[j] : 0);
   }
-  for (int i = 0; i < x->elements * x->cols; i++) x->w[i] = pw_random_between (r, -1.5, 1.5);
-  for (int i = 0; i < x->elements * x->rows; i++) x->lambda[i] = pw_random_between (r, -1.5, 1.5);
-  x->k->b.w = x->w;
-  x->k->b.lambda = x->lambda;
+  pw_update_kinematics (x->work, move >= PW_PROBE_TIME ? x->t + h * x->tau : x->t, x->q_now, x->v_now);
 }
 
-/* ---- Functions of the state, and their derivatives ---- */
+/* ---- Functions ---- */
 
 void pw_probe_evaluate (pw_probe *x, pw_batch_function *f, const char *name, int n, double *out) {
   for (int i = 0; i < n + PW_PROBE_GUARD; i++) out[i] = f ? NAN : 0;
   if (f == NULL) return;
   f (&x->k->b, out);
+  if (!x->counts) return;
   char where[120];
   int untouched = 0, beyond = 0;
   for (int i = 0; i < n; i++) untouched += !isfinite (out[i]);
@@ -88,41 +66,58 @@ void pw_probe_evaluate (pw_probe *x, pw_batch_function *f, const char *name, int
   pw_probe_record (x->report, "size", "each function fills exactly its array", untouched + beyond, 0, "exact", where);
 }
 
-void pw_probe_update (pw_probe *x, int j, double h) {
-  int motion = j == PW_PROBE_MOTION;
-  for (int i = 0; i < x->s->coords; i++) {
-    x->q_now[i] = x->q[i] + (motion ? h * (x->v[i] + h * x->a[i] / 2) : i == j ? h : 0);
-    x->v_now[i] = x->v[i] + (motion ? h * x->a[i] : 0);
+void pw_probe_g (pw_probe *x, double *out) {
+  pw_probe_evaluate (x, x->kind->g, "g", x->elements * x->rows, out);
+}
+
+void pw_probe_eta (pw_probe *x, double *out) {
+  pw_probe_evaluate (x, x->kind->eta, "eta", x->elements * x->rows, out);
+}
+
+void pw_probe_gamma (pw_probe *x, double *out) {
+  pw_probe_evaluate (x, x->kind->gamma, "gamma", x->elements * x->rows, out);
+}
+
+void pw_probe_force (pw_probe *x, double *out) {
+  pw_probe_evaluate (x, x->kind->force, "force", x->elements * x->cols, out);
+}
+
+void pw_probe_Jw (pw_probe *x, double *out) {
+  pw_probe_evaluate (x, x->kind->J, "J", x->elements * x->rows * x->cols, x->J);
+  for (int i = 0; i < x->elements * x->rows; i++) {
+    out[i] = 0;
+    for (int c = 0; c < x->cols; c++) out[i] += x->J[i * x->cols + c] * x->w[i / x->rows * x->cols + c];
   }
-  pw_update_kinematics (x->work, j < 0 ? x->t + h : x->t, x->q_now, x->v_now);
+}
+
+void pw_probe_drift (pw_probe *x, double *out) {
+  pw_probe_eta (x, x->eta);
+  pw_probe_multiply_J (x, x->v_now, out);
+  for (int i = 0; i < x->elements * x->rows; i++) out[i] -= x->eta[i];
+}
+
+/* ---- Products ---- */
+
+int pw_probe_ground (const pw_probe *x, int e, int c) {
+  return pw_global (x->k, e, c) >= x->s->coords;
 }
 
 double pw_probe_local (const pw_probe *x, const double *vector, int e, int c) {
   return pw_probe_ground (x, e, c) ? 0 : vector[pw_global (x->k, e, c)];
 }
 
-void pw_probe_multiply_J (pw_probe *x, const double *w, double *out) {
-  double J[PW_PROBE_OUT + PW_PROBE_GUARD];
-  pw_probe_evaluate (x, x->kind->J, "J", x->elements * x->rows * x->cols, J);
-  for (int i = 0; i < x->elements * x->rows; i++) {
-    out[i] = 0;
-    for (int c = 0; c < x->cols; c++) out[i] += J[i * x->cols + c] * pw_probe_local (x, w, i / x->rows, c);
-  }
+void pw_probe_multiply (const pw_probe *x, const double *block, int rows, const double *vector, double factor,
+                        double *out, double *terms) {
+  for (int i = 0; i < x->elements * rows; i++)
+    for (int c = 0; c < x->cols; c++) {
+      double term = factor * block[i * x->cols + c] * pw_probe_local (x, vector, i / rows, c);
+      out[i] += term;
+      if (terms) terms[i] += fabs (term);
+    }
 }
 
-double pw_probe_largest (int n, const double *y) {
-  double most = 0;
-  for (int i = 0; i < n; i++) most = fmax (most, fabs (y[i]));
-  return most;
-}
-
-void pw_probe_derivative (pw_probe *x, pw_probe_function *f, int j, int n, double *derivative) {
-  double plus[PW_PROBE_OUT + PW_PROBE_GUARD], minus[PW_PROBE_OUT + PW_PROBE_GUARD];
-  pw_probe_update (x, j, PW_PROBE_STEP);
-  f (x, plus);
-  pw_probe_update (x, j, -PW_PROBE_STEP);
-  f (x, minus);
-  pw_probe_update (x, j, 0);
-  x->size = pw_probe_largest (n, plus);
-  for (int i = 0; i < n; i++) derivative[i] = (plus[i] - minus[i]) / (2 * PW_PROBE_STEP);
+void pw_probe_multiply_J (pw_probe *x, const double *vector, double *out) {
+  pw_probe_evaluate (x, x->kind->J, "J", x->elements * x->rows * x->cols, x->J);
+  memset (out, 0, (size_t)(x->elements * x->rows) * sizeof *out);
+  pw_probe_multiply (x, x->J, x->rows, vector, 1, out, NULL);
 }

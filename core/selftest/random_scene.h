@@ -8,7 +8,8 @@
 enum {
   PW_SCENE_BODIES = 4,
   PW_SCENE_ELEMENTS = 3,
-  PW_SCENE_BATCH = 4 /* most elements of the compiled scene: one per body, or the described ones */
+  PW_SCENE_BATCH = 4, /* most elements of the compiled scene: one per body, or the described ones */
+  PW_SCENE_COORDS = 3 * PW_SCENE_BODIES + PW_SCENE_BATCH * PW_MAX_INTERNAL /* most coordinates */
 };
 
 /* Random numbers, the same on every machine. */

@@ -44,9 +44,10 @@ static void elimination_place (pw_elimination *x, int p, int partner) {
 
 /* ---- Guards ---- */
 
-/* The general engine takes over if a pivot lost more than this. */
-#define ELIMINATION_ROW "PW_SCENE_PIVOT" /* of its diagonal entry */
-#define ELIMINATION_COLUMN "0.04"        /* squared, of its column */
+/* The general engine takes over if a pivot is not larger than this part of its diagonal entry, or, both squared, of the norm
+ * of its column, where elimination_is_large demands 0.4 of the largest entry at the initial state. */
+#define ELIMINATION_ROW "PW_SCENE_PIVOT"
+#define ELIMINATION_COLUMN "0.04"
 
 static void elimination_guard_row (pw_emitter *e, pw_term pivot, pw_term diagonal) {
   char a[24], b[24];
@@ -131,7 +132,8 @@ static int elimination_is_large (const pw_elimination *x, int i, int j) {
   return fabs (AT (i, j).value) > 0.4 * most;
 }
 
-/* The next such pair: a pivot of 1, else a constant, else a variable one; of these the one with the least fill-in. */
+/* The next such pair: a pivot of 1, else a constant, else a variable one; of these the one with the least fill-in, which
+ * is far below 1000000. */
 static int elimination_next_pair (const pw_elimination *x, const double *mass, int *c, int *r) {
   long least = -1;
   for (int j = 0; j < x->coordinates; j++)
@@ -144,6 +146,8 @@ static int elimination_next_pair (const pw_elimination *x, const double *mass, i
   return least >= 0;
 }
 
+/* The next equation: the one with the least fill-in, to which variable pivots add, so that constant ones are preferred;
+ * vanishing pivots are last. */
 static int elimination_next_row (const pw_elimination *x) {
   int best = -1, least = 0;
   for (int i = x->coordinates; i < x->n; i++) {

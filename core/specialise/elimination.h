@@ -9,14 +9,14 @@
 
 typedef struct {
   const pw_system *s;
-  int coordinates, n;   /* unknowns: the coordinates, then the constraint equations */
-  pw_term *K, *L;       /* n x n: column p has its values when p was eliminated; multipliers */
-  pw_term *inverse;     /* n: reciprocal pivots */
-  int *order, *partner; /* n: unknowns in their order; partner of a 2 x 2 pivot, or -1 */
-  int *step;            /* n: position in the order; n + 1: takes no part */
-  int pivots, factors;  /* unknowns in the order; entries of F */
-  const pw_term *first; /* n x n: before the elimination */
-  const unsigned char *length;
+  int coordinates, n;          /* unknowns: the coordinates, then the constraint equations */
+  pw_term *K, *L;              /* n x n: column p has its values when p was eliminated; multipliers */
+  pw_term *inverse;            /* n: reciprocal pivots */
+  int *order, *partner;        /* n: unknowns in their order; partner of a 2 x 2 pivot, or -1 */
+  int *step;                   /* n: position in the order; n + 1: takes no part */
+  int pivots, factors;         /* unknowns in the order; entries of F */
+  const pw_term *first;        /* n x n: before the elimination */
+  const unsigned char *length; /* rows x bodies: see pw_elimination_open */
 } pw_elimination;
 
 /* K: n x n terms of the lower triangle and their mirror image, n = coordinates + rows; length[i, b] = 1 if the

@@ -6,16 +6,14 @@
 
 enum { SPARSITY_SCENES = 12, SPARSITY_STATES = 4 };
 
-/* Updates an entry with its value at a state; `first` is its value at the first state of the scene. */
-static unsigned char sparsity_merge (unsigned char type, double value, double first) {
-  if (value != first) return PW_ENTRY_VARIABLE;
-  if ((type == PW_ENTRY_ZERO && value == 0) || (type == PW_ENTRY_ONE && value == 1)) return type;
-  if ((type == PW_ENTRY_MINUS_ONE && value == -1) || type == PW_ENTRY_VARIABLE) return type;
-  return PW_ENTRY_CONSTANT;
-}
-
 static unsigned char sparsity_first (double value) {
   return value == 0 ? PW_ENTRY_ZERO : value == 1 ? PW_ENTRY_ONE : value == -1 ? PW_ENTRY_MINUS_ONE : PW_ENTRY_CONSTANT;
+}
+
+/* Updates an entry with its value at a state; `first` is its value at the first state of the scene. */
+static unsigned char sparsity_merge (unsigned char type, double value, double first) {
+  if (value != first || type == PW_ENTRY_VARIABLE) return PW_ENTRY_VARIABLE;
+  return sparsity_first (value) == type ? type : PW_ENTRY_CONSTANT;
 }
 
 /* Elements of the scene that touch the ground have entries that are constant there only. */
@@ -43,11 +41,11 @@ static void sparsity_state (const pw_element_batch *k, int e, int fresh, int kno
 }
 
 static int sparsity_scene (const pw_system *s, pw_random *random, int *known, pw_sparsity *out) {
-  double q[200], v[200], first[PW_SCENE_BATCH][PW_MAX_ROWS * PW_MAX_COLS];
+  double q[PW_SCENE_COORDS], v[PW_SCENE_COORDS], first[PW_SCENE_BATCH][PW_MAX_ROWS * PW_MAX_COLS];
   pw_workspace *w = pw_workspace_new (s, NULL);
   if (w == NULL) return PW_RESOURCE;
   pw_element_batch *k = w->batch;
-  for (int state = 0; state < SPARSITY_STATES && s->coords <= 200; state++) {
+  for (int state = 0; state < SPARSITY_STATES; state++) {
     for (int j = 0; j < s->coords; j++) {
       q[j] = s->q0[j] + pw_random_between (random, -2, 2);
       v[j] = pw_random_between (random, -2, 2);

@@ -1,7 +1,6 @@
 /* Writes a compiled system as C code for this scene alone: the sources of its element types, called for one element at a
  * time with constant indices, and a factorisation without loops. */
 #define _POSIX_C_SOURCE 200809L
-#include <stdint.h>
 #include <stdlib.h>
 #include <string.h>
 #include "sources.h"
@@ -126,45 +125,36 @@ static int specialise_open (pw_specialise_scene *x) {
   const pw_system *s = x->s;
   size_t n = (size_t)s->batches + 1;
   x->sparsity = malloc (n * sizeof *x->sparsity);
-  x->J = malloc (2 * n * sizeof *x->J);
   x->w = pw_workspace_new (s, NULL);
-  if (x->sparsity == NULL || x->J == NULL || x->w == NULL) return PW_RESOURCE;
+  if (x->sparsity == NULL || x->w == NULL) return PW_RESOURCE;
   if (pw_update_kinematics (x->w, 0, s->q0, s->v0) == PW_OK) pw_evaluate_J (x->w);
-  x->u = x->J + n;
-  int u = 0, status = PW_OK;
+  int status = PW_OK;
   for (int k = 0; k < s->batches && status == PW_OK; k++) {
-    const pw_element_batch *b = &s->batch[k];
-    x->J[k] = x->entries, x->u[k] = u;
-    x->entries += b->b.count * b->kind->rows * b->b.cols;
-    u += b->b.count * b->kind->signals;
-    status = pw_sparsity_find (b->kind, &x->sparsity[k]);
+    x->entries += s->batch[k].b.count * s->batch[k].kind->rows * s->batch[k].b.cols;
+    status = pw_sparsity_find (s->batch[k].kind, &x->sparsity[k]);
   }
   return status;
 }
 
-static void specialise_hash (uint64_t *h, const void *bytes, size_t size) {
-  for (const unsigned char *b = bytes; size > 0; size--) *h = (*h ^ *b++) * 1099511628211u; /* FNV-1a */
-}
-
 unsigned long pw_system_shape (const pw_system *s) {
-  uint64_t h = 14695981039346656037u;
+  unsigned long long h = PW_CHECK;
   const int counts[] = {
     s->bodies, s->coords, s->rows, s->holonomic, s->batches, s->entries, s->sources, s->rheonomic
   };
-  specialise_hash (&h, counts, sizeof counts);
-  for (int j = 0; j < s->coords; j++) specialise_hash (&h, &(char){ s->mass[j] > 0 }, 1);
+  h = pw_check_sum (h, counts, sizeof counts);
+  for (int j = 0; j < s->coords; j++) h = pw_check_sum (h, &(char){ s->mass[j] > 0 }, 1);
   for (int k = 0; k < s->batches; k++) {
     const pw_element_batch *b = &s->batch[k];
-    specialise_hash (&h, b->kind->name, strlen (b->kind->name) + 1);
-    specialise_hash (&h, b->b.body, (size_t)(b->b.count * b->kind->bodies) * sizeof *b->b.body);
+    h = pw_check_sum (h, b->kind->name, strlen (b->kind->name) + 1);
+    h = pw_check_sum (h, b->b.body, (size_t)(b->b.count * b->kind->bodies) * sizeof *b->b.body);
     const int sizes[] = { b->b.count, (int)b->kind->element, b->kind->rows, b->kind->internal, b->kind->signals };
-    specialise_hash (&h, sizes, sizeof sizes);
+    h = pw_check_sum (h, sizes, sizeof sizes);
   }
   for (int i = 0; i < s->sources; i++)
-    specialise_hash (&h, (int[]){ (int)s->source[i].signal.type, s->source[i].of_force, s->source[i].reads },
-                     3 * sizeof (int));
+    h = pw_check_sum (h, (int[]){ (int)s->source[i].signal.type, s->source[i].of_force, s->source[i].reads },
+                      3 * sizeof (int));
   for (int i = 0; i < s->entries; i++)
-    specialise_hash (&h, (int[]){ s->entry[i].batch, s->entry[i].element, (int)s->entry[i].type }, 3 * sizeof (int));
+    h = pw_check_sum (h, (int[]){ s->entry[i].batch, s->entry[i].element, (int)s->entry[i].type }, 3 * sizeof (int));
   return (unsigned long)h;
 }
 
@@ -198,7 +188,6 @@ char *pw_system_source (const pw_system *s, const unsigned char *independent, pw
   if (pw_stream_close (x.out, &text) != PW_OK) status = PW_RESOURCE;
   pw_workspace_free (x.w);
   free (x.sparsity);
-  free (x.J);
   free (x.prepare.text);
   if (status == PW_OK) return text.text;
   free (text.text);

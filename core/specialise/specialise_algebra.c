@@ -8,7 +8,7 @@
 static pw_term specialise_entry (const pw_specialise_scene *x, int k, int e, int r, int c) {
   const pw_element_batch *b = &x->s->batch[k];
   unsigned char type = x->sparsity[k].J[r * b->b.cols + c];
-  int at = x->J[k] + (e * b->kind->rows + r) * b->b.cols + c;
+  int at = pw_specialise_J (x, k, e) + r * b->b.cols + c;
   if (type == PW_ENTRY_ZERO) return pw_term_zero ();
   if (type == PW_ENTRY_ONE || type == PW_ENTRY_MINUS_ONE)
     return (pw_term){ PW_TERM_ONE, type == PW_ENTRY_ONE ? 1 : -1, "1", type == PW_ENTRY_ONE ? 1 : -1 };
@@ -153,18 +153,13 @@ int pw_specialise_algebra (pw_specialise_scene *x) {
   int status = K && length && e.prepare ? specialise_factor (x, &all, &e, K, length, "factor", s->rows) : PW_RESOURCE;
   if (status == PW_OK) status = specialise_solve (x, &all, &e, SPECIALISE_ACCELERATE);
   if (status == PW_OK) status = specialise_solve (x, &all, &e, SPECIALISE_VELOCITY);
-  x->holonomic_only = 1;
-  if (status == PW_OK) {
-    status = specialise_factor (x, &position, &e, K, length, "factor_position", s->holonomic);
-    if (status == PW_RETRY) {
-      x->holonomic_only = 0;
-      status = specialise_solve (x, &all, &e, SPECIALISE_POSITION);
-    } else if (status == PW_OK)
-      status = specialise_solve (x, &position, &e, SPECIALISE_POSITION);
-  }
+  int alone = PW_OK; /* if the holonomic equations alone determine the massless coordinates */
+  if (status == PW_OK) alone = specialise_factor (x, &position, &e, K, length, "factor_position", s->holonomic);
+  if (alone == PW_RESOURCE) status = PW_RESOURCE;
+  if (status == PW_OK) status = specialise_solve (x, alone == PW_OK ? &position : &all, &e, SPECIALISE_POSITION);
   x->constants = e.constants;
   fprintf (x->out, "\nenum { FACTORS = %d };\n", 1 + (all.factors > position.factors ? all.factors : position.factors));
-  if (!x->holonomic_only) fputs ("#define factor_position factor\n", x->out);
+  if (alone != PW_OK) fputs ("#define factor_position factor\n", x->out);
   if (pw_stream_close (e.prepare, &x->prepare) != PW_OK) status = PW_RESOURCE;
   pw_elimination_close (&all);
   pw_elimination_close (&position);

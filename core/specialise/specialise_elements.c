@@ -33,7 +33,7 @@ static void specialise_batch (const pw_specialise_scene *x, int k, int e, const 
   if (b->kind->internal)
     fprintf (x->out, ", .q = q + %d, .v = v + %d", b->internal + e * b->kind->internal,
              b->internal + e * b->kind->internal);
-  if (b->kind->signals) fprintf (x->out, ", .u = s->u + %d", 3 * (x->u[k] + e * b->kind->signals));
+  if (b->kind->signals) fprintf (x->out, ", .u = s->u + %d", 3 * pw_specialise_u (x, k, e));
   fprintf (x->out, "%s };\n", more);
 }
 
@@ -50,36 +50,22 @@ static void specialise_call (const pw_specialise_scene *x, int k, const char *fu
 #define ARGUMENTS "const pw_scene *s, const pw_configuration *c, const double *q, const double *v, double *out"
 #define UNUSED "  (void)s, (void)c, (void)q, (void)v, (void)out;\n"
 
-/* A function over constraint equations; `function` is at `offset` of the table; NULL: zeros. */
+/* A function of the first `rows` constraint equations, one number for each, or J; `function` is at `offset` of the table;
+ * NULL: zeros. */
 static void specialise_rows (const pw_specialise_scene *x, const char *name, const char *function, size_t offset,
                              int rows) {
   char to[40];
   fprintf (x->out, "\nINLINE void %s (" ARGUMENTS ") {\n" UNUSED, name);
   for (int k = 0; k < x->s->constraints && x->s->batch[k].row < rows; k++) {
     const pw_element_batch *b = &x->s->batch[k];
-    int has = *(pw_batch_function *const *)(const void *)((const char *)b->kind + offset) != NULL;
     for (int e = 0; e < b->b.count; e++) {
-      int row = b->row + e * b->kind->rows;
-      for (int r = 0; !has && r < b->kind->rows; r++) fprintf (x->out, "  out[%d] = 0;\n", row + r);
+      int first = e * b->kind->rows, has = pw_kind_function (b->kind, offset) != NULL;
+      for (int r = 0; !has && r < b->kind->rows; r++) fprintf (x->out, "  out[%d] = 0;\n", b->row + first + r);
       if (!has) continue;
       specialise_batch (x, k, e, "");
-      snprintf (to, sizeof to, "out + %d", row);
+      int at = offset == offsetof (pw_kind, J) ? pw_specialise_J (x, k, e) : b->row + first;
+      snprintf (to, sizeof to, "out + %d", at);
       specialise_call (x, k, function, to);
-      fputs ("  }\n", x->out);
-    }
-  }
-  fputs ("}\n", x->out);
-}
-
-static void specialise_jacobian (const pw_specialise_scene *x) {
-  char to[40];
-  fputs ("\nINLINE void jacobian (" ARGUMENTS ") {\n" UNUSED, x->out);
-  for (int k = 0; k < x->s->constraints; k++) {
-    const pw_element_batch *b = &x->s->batch[k];
-    for (int e = 0; e < b->b.count; e++) {
-      specialise_batch (x, k, e, "");
-      snprintf (to, sizeof to, "out + %d", x->J[k] + e * b->kind->rows * b->b.cols);
-      specialise_call (x, k, "J", to);
       fputs ("  }\n", x->out);
     }
   }
@@ -143,7 +129,7 @@ static void specialise_ledger (const pw_specialise_scene *x) {
 }
 
 void pw_specialise_elements (const pw_specialise_scene *x) {
-  specialise_jacobian (x);
+  specialise_rows (x, "jacobian", "J", offsetof (pw_kind, J), x->s->rows);
   specialise_rows (x, "constraints", "g", offsetof (pw_kind, g), x->s->holonomic);
   specialise_rows (x, "sizes", "g_size", offsetof (pw_kind, g_size), x->s->holonomic);
   specialise_rows (x, "right_sides", "eta", offsetof (pw_kind, eta), x->s->rows);
@@ -211,4 +197,5 @@ void pw_specialise_data (const pw_specialise_scene *x) {
   pw_specialise_list (x->out, "FIXED", x->constants);
   pw_specialise_list (x->out, "LEDGER", s->entries);
   pw_specialise_list (x->out, "BATCH", s->batches + 1);
+  pw_specialise_list (x->out, "WATCH", (int)(sizeof (pw_scene_watch) / sizeof (double)));
 }

@@ -18,16 +18,21 @@ typedef struct {
   FILE *out;
   pw_workspace *w;       /* at the initial state */
   pw_sparsity *sparsity; /* batches */
-  int *J;                /* batches: first entry of J */
-  int *u;                /* batches: first signal */
   int entries;           /* of J */
-  int holonomic_only;    /* 1: positions are projected by the holonomic equations alone */
   pw_stream prepare;     /* prepare's statements */
   int constants;
 } pw_specialise_scene;
 
 /* "rolling_wheel", in the buffer, which is returned. */
 char *pw_specialise_identifier (const pw_kind *kind, char *buffer, size_t size);
+/* The first entry of J and the first signal of an element. */
+static inline int pw_specialise_J (const pw_specialise_scene *x, int k, int e) {
+  const pw_element_batch *b = &x->w->batch[k];
+  return (int)(b->J - x->w->J) + e * b->kind->rows * b->b.cols;
+}
+static inline int pw_specialise_u (const pw_specialise_scene *x, int k, int e) {
+  return (int)(x->s->batch[k].source - x->s->source) + e * x->s->batch[k].kind->signals;
+}
 static inline int pw_specialise_is_independent (const pw_specialise_scene *x, int row) {
   return x->independent == NULL || x->independent[row];
 }

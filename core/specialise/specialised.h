@@ -54,12 +54,12 @@ typedef struct pw_scene_step {
 typedef struct {
   double lost;                           /* largest scaled residuals */
   double sine, reach, near_sine, growth; /* sine - reach (moved + growth x motion of the step) > near_sine */
-  double rank, regular, drift,
-      no_branch; /* the sines that belong to a residual; residual below which they need no check */
-  double length, per_length, per_angle; /* scale of lengths; units of accelerations */
-  double moved, step;                   /* motion since the sine was computed, and of the last step */
-  double norm, reference;               /* accelerations: of the state reached, largest so far */
-  double position, g, velocity, jv;     /* largest residuals of the steps */
+  double rank, regular, drift;           /* the sines that belong to a residual */
+  double no_branch;                      /* residual below which they need no check */
+  double length, per_length, per_angle;  /* scale of lengths; units of accelerations */
+  double moved, step;                    /* motion since the sine was computed, and of the last step */
+  double norm, reference;                /* accelerations: of the state reached, largest so far */
+  double position, g, velocity, jv;      /* largest residuals of the steps */
 } pw_scene_watch;
 
 /* Consecutive steps of size h of a method with this tableau, projected or not, with what a run does after each of them.

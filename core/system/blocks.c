@@ -8,27 +8,24 @@
 
 /* Each block: its function in the type's table, the function it differentiates, and the product formed before
  * differentiation. */
+#define BLOCKS_ENTRY(f, g) .function = offsetof (pw_kind, f), .original = offsetof (pw_kind, g)
 static const struct {
   size_t function, original;
-  enum { BLOCKS_RAW, BLOCKS_J_W, BLOCKS_JT_LAMBDA } product;
+  enum { BLOCKS_NONE, BLOCKS_J_W, BLOCKS_JT_LAMBDA } product;
   int velocity; /* derivative with respect to v instead of q */
   int square;   /* 1: it has as many rows as local columns; 0: kind->rows */
 } blocks_table[PW_BLOCKS] = {
-  [PW_JW_Q] = { offsetof (pw_kind, jw_q), offsetof (pw_kind, J), BLOCKS_J_W, 0, 0 },
-  [PW_JTL_Q] = { offsetof (pw_kind, jw_q), offsetof (pw_kind, J), BLOCKS_JT_LAMBDA, 0, 1 },
-  [PW_ETA_Q] = { offsetof (pw_kind, eta_q), offsetof (pw_kind, eta), BLOCKS_RAW, 0, 0 },
-  [PW_GAMMA_Q] = { offsetof (pw_kind, gamma_q), offsetof (pw_kind, gamma), BLOCKS_RAW, 0, 0 },
-  [PW_GAMMA_V] = { offsetof (pw_kind, gamma_v), offsetof (pw_kind, gamma), BLOCKS_RAW, 1, 0 },
-  [PW_FORCE_Q] = { offsetof (pw_kind, force_q), offsetof (pw_kind, force), BLOCKS_RAW, 0, 1 },
-  [PW_FORCE_V] = { offsetof (pw_kind, force_v), offsetof (pw_kind, force), BLOCKS_RAW, 1, 1 },
+  [PW_JW_Q] = { BLOCKS_ENTRY (jw_q, J), .product = BLOCKS_J_W },
+  [PW_JTL_Q] = { BLOCKS_ENTRY (jw_q, J), .product = BLOCKS_JT_LAMBDA, .square = 1 },
+  [PW_ETA_Q] = { BLOCKS_ENTRY (eta_q, eta) },
+  [PW_GAMMA_Q] = { BLOCKS_ENTRY (gamma_q, gamma) },
+  [PW_GAMMA_V] = { BLOCKS_ENTRY (gamma_v, gamma), .velocity = 1 },
+  [PW_FORCE_Q] = { BLOCKS_ENTRY (force_q, force), .square = 1 },
+  [PW_FORCE_V] = { BLOCKS_ENTRY (force_v, force), .velocity = 1, .square = 1 },
 };
 
-static pw_batch_function *blocks_member (const pw_kind *kind, size_t offset) {
-  return *(pw_batch_function *const *)(const void *)((const char *)kind + offset);
-}
-
 pw_batch_function *pw_block_function (const pw_kind *kind, pw_block block) {
-  return blocks_member (kind, blocks_table[block].function);
+  return pw_kind_function (kind, blocks_table[block].function);
 }
 
 int pw_block_rows (const pw_kind *kind, pw_block block) {
@@ -74,7 +71,7 @@ static double *blocks_variable (const pw_kind *kind, blocks_single *one, int c, 
 }
 
 static void blocks_value (const pw_kind *kind, pw_block block, blocks_single *one, double *y) {
-  pw_batch_function *original = blocks_member (kind, blocks_table[block].original);
+  pw_batch_function *original = pw_kind_function (kind, blocks_table[block].original);
   int rows = kind->rows, cols = one->b.cols;
   double J[PW_MAX_ROWS * PW_MAX_COLS] = { 0 };
   memset (y, 0, PW_MAX_COLS * sizeof *y);
@@ -83,7 +80,7 @@ static void blocks_value (const pw_kind *kind, pw_block block, blocks_single *on
     pw_sin_cos (p->phi, &p->sin, &p->cos);
   }
   if (original == NULL) return;
-  if (blocks_table[block].product == BLOCKS_RAW) {
+  if (blocks_table[block].product == BLOCKS_NONE) {
     original (&one->b, y);
     return;
   }
@@ -137,7 +134,7 @@ int pw_block_missing (const pw_workspace *w, const pw_element_batch *k, int e, p
   const pw_kind *kind = k->kind;
   int rows = pw_block_rows (kind, block), cols = k->b.cols;
   blocks_single one;
-  if (pw_block_function (kind, block) || blocks_member (kind, blocks_table[block].original) == NULL) return 0;
+  if (pw_block_function (kind, block) || pw_kind_function (kind, blocks_table[block].original) == NULL) return 0;
   blocks_isolate (k, e, &one);
   blocks_value (kind, block, &one, value);
   for (int r = 0; r < rows; r++) most = fmax (most, fabs (value[r]));

@@ -120,7 +120,6 @@ static int compile_count (const compilation *c) {
   s->rows = (int)rows;
   for (int k = 0; k < s->batches; k++) {
     if (c->kind[k]->level == PW_HOLONOMIC) s->holonomic += c->count[k] * c->kind[k]->rows;
-    s->entries += c->count[k] * pw_ledger_max_entries (c->kind[k]);
     s->sources += c->count[k] * c->kind[k]->signals;
   }
   return PW_OK;
@@ -138,9 +137,8 @@ static int compile_arrays (const compilation *c) {
   s->q0 = compile_alloc (c, coords, sizeof *s->q0);
   s->v0 = compile_alloc (c, coords, sizeof *s->v0);
   s->origin = compile_alloc (c, 2 * coords, 1);
-  s->entry = compile_alloc (c, (size_t)s->entries, sizeof *s->entry);
   int complete = s->batch && s->source && s->body_name && s->mass && s->metric && s->constant && s->q0 && s->v0;
-  return complete && s->origin && s->entry ? PW_OK : PW_RESOURCE;
+  return complete && s->origin ? PW_OK : PW_RESOURCE;
 }
 
 /* ---- Bodies and elements ---- */
@@ -380,10 +378,14 @@ static void compile_metric (pw_system *s) {
     s->metric[j] = s->mass[j] > 0 ? s->mass[j] : weight * (pw_is_angle (s, j) ? L2 : 1);
 }
 
-/* Counts the batches that have a property, and evaluates the constant forces. */
+/* Counts the batches that have a property, lists the ledger's entries, and evaluates the constant forces. */
 static int compile_totals (const compilation *c) {
   pw_system *s = c->s;
   int constant = 0;
+  s->entries = pw_ledger_list (s, NULL);
+  s->entry = compile_alloc (c, (size_t)s->entries, sizeof *s->entry);
+  if (s->entry == NULL) return PW_RESOURCE;
+  pw_ledger_list (s, s->entry);
   for (int i = 0; i < s->batches; i++) {
     const pw_kind *kind = s->batch[i].kind;
     s->constraints += kind->rows > 0;
@@ -413,7 +415,6 @@ static int compile_all (compilation *c) {
   if (status == PW_OK) status = compile_signals (c);
   if (status == PW_OK) status = compile_initial (c);
   if (status != PW_OK) return status;
-  pw_ledger_fill (c->s);
   c->s->scale = (pw_scale){ compile_length (c), 1 };
   compile_metric (c->s);
   return compile_totals (c);

@@ -16,7 +16,7 @@ void pw_evaluate_J (pw_workspace *w) {
 static void evaluate_rows (pw_workspace *w, size_t function, int rows, double *out) {
   EACH_CONSTRAINT (k, w) {
     if (k->row >= rows) break;
-    pw_batch_function *f = *(pw_batch_function *const *)(const void *)((const char *)k->kind + function);
+    pw_batch_function *f = pw_kind_function (k->kind, function);
     if (f)
       f (&k->b, out + k->row);
     else

@@ -2,10 +2,6 @@
 #include <stdio.h>
 #include "system.h"
 
-int pw_ledger_max_entries (const pw_kind *k) {
-  return (k->power != NULL || (k->rows > 0 && k->eta != NULL)) + (k->loss != NULL);
-}
-
 /* 1 if an element may do work: it has power or a rheonomic constraint.  A position prescribed by constants does no
  * work. */
 static int ledger_has_work (const pw_element_batch *k, int element) {
@@ -18,15 +14,18 @@ static int ledger_has_work (const pw_element_batch *k, int element) {
   return kind->level != PW_HOLONOMIC || constants < kind->signals;
 }
 
-void pw_ledger_fill (pw_system *s) {
-  pw_entry *entry = s->entry;
+int pw_ledger_list (const pw_system *s, pw_entry *entry) {
+  int count = 0;
   for (int i = 0; i < s->batches; i++) {
     const pw_element_batch *k = &s->batch[i];
-    for (int e = 0; e < k->b.count; e++)
-      if (ledger_has_work (k, e)) *entry++ = (pw_entry){ i, e, PW_WORK };
-    for (int e = 0; k->kind->loss && e < k->b.count; e++) *entry++ = (pw_entry){ i, e, PW_LOSS };
+    for (int loss = 0; loss < 2; loss++)
+      for (int e = 0; e < k->b.count; e++) {
+        if (loss ? k->kind->loss == NULL : !ledger_has_work (k, e)) continue;
+        if (entry) entry[count] = (pw_entry){ i, e, loss ? PW_LOSS : PW_WORK };
+        count++;
+      }
   }
-  s->entries = (int)(entry - s->entry);
+  return count;
 }
 
 int pw_system_ledger_entries (const pw_system *s) {

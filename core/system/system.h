@@ -71,9 +71,8 @@ struct pw_workspace {
   const pw_source *failed;         /* the last signal that failed, or NULL */
 };
 
-/* The most entries that an element may have in the ledger; fills the entries of a system with signals. */
-int pw_ledger_max_entries (const pw_kind *kind);
-void pw_ledger_fill (pw_system *s);
+/* Lists the entries of the ledger, unless entry is NULL, of a system with signals.  Returns their number. */
+int pw_ledger_list (const pw_system *s, pw_entry *entry);
 
 /* Closes the contexts made by `open`; signals not opened yet are all zero. */
 void pw_close_signals (const pw_source *source, int count);
@@ -168,6 +167,11 @@ double pw_next_breakpoint (pw_workspace *w, int knots, double t);
 /* 1 if the force, J or gamma of an element is not finite at the current state; writes "force of attraction sun" to the
  * buffer. */
 int pw_find_nonfinite (pw_workspace *w, char *buffer, size_t size);
+
+/* The function at this offset of the type's table. */
+static inline pw_batch_function *pw_kind_function (const pw_kind *kind, size_t offset) {
+  return *(pw_batch_function *const *)(const void *)((const char *)kind + offset);
+}
 
 /* Second-order blocks: terms of the exact Newton matrices of implicit methods besides M, J and J^T. */
 typedef enum { PW_JW_Q, PW_JTL_Q, PW_ETA_Q, PW_GAMMA_Q, PW_GAMMA_V, PW_FORCE_Q, PW_FORCE_V, PW_BLOCKS } pw_block;

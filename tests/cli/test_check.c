@@ -191,7 +191,7 @@ static void check_scene_expect (const pw_kind *kind, const char *what) {
   pw_random random = { 5 };
   pw_system *s = pw_random_scene (kind, &random, &error);
   assert_non_null (s);
-  double q[PW_PROBE_COORDS], v[PW_PROBE_COORDS];
+  double q[PW_SCENE_COORDS], v[PW_SCENE_COORDS];
   for (int j = 0; j < s->coords; j++) q[j] = sin (1. + 3 * j), v[j] = 0;
   check_ok (pw_selftest_scene (s, 1, kind, 0, q, v, 7, &report, &error), &error);
   for (int i = 0; i < report.checks; i++)

@@ -23,13 +23,14 @@ typedef struct {
 
 static inline drag_state drag_at (const pw_batch *b, int e) {
   const drag *k = (const drag *)b->element + e;
-  const pw_configuration *A = &b->configuration[b->body[e]];
+  const pw_configuration *A = batch_body (b, e, 1, 0);
   double v = hypot (A->vx, A->vy);
   return (drag_state){ k, A, v, k->c1 + k->c2 * v, k->d1 + k->d2 * fabs (A->omega) };
 }
 
 PREPARE (drag_prepare, pw_drag, drag) {
   *k = (drag){ d->linear, d->quadratic, d->turning, d->turning_quadratic };
+  return PW_OK;
 }
 
 PER_ELEMENT (drag_force, drag, 3) {

@@ -22,7 +22,7 @@ typedef struct {
 
 static inline force_state force_at (const pw_batch *b, int e) {
   const force *k = (const force *)b->element + e;
-  const pw_configuration *A = &b->configuration[b->body[e]];
+  const pw_configuration *A = batch_body (b, e, 1, 0);
   const double *u = b->u + 6 * e;
   force_state x = { k, A, .cos = k->turns > 0 ? A->cos : 1, .sin = k->turns > 0 ? A->sin : 0 };
   x.X = A->cos * k->at[0] - A->sin * k->at[1], x.Y = A->sin * k->at[0] + A->cos * k->at[1];
@@ -33,6 +33,7 @@ static inline force_state force_at (const pw_batch *b, int e) {
 
 PREPARE (force_prepare, pw_force, force) {
   *k = (force){ { d->at[0], d->at[1] }, d->axes == PW_AXES_BODY };
+  return PW_OK;
 }
 
 PER_ELEMENT (force_force, force, 3) {

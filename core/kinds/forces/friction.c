@@ -3,7 +3,6 @@
  *   f = (0, 0, -T | 0, 0, T),  loss = T w >= 0,  w = w1 - w2            T(w) as F in coulomb.h
  *
  * The limit is the friction coefficient times radius times load. */
-#include <string.h>
 #include "coulomb.h"
 
 /* Friction in the current state: its law and the relative angular velocity. */
@@ -14,25 +13,19 @@ typedef struct {
 
 static inline friction_state friction_at (const pw_batch *b, int e) {
   return (friction_state){ (const coulomb *)b->element + e,
-                           b->configuration[b->body[2 * e]].omega - b->configuration[b->body[2 * e + 1]].omega };
+                           batch_body (b, e, 2, 0)->omega - batch_body (b, e, 2, 1)->omega };
 }
 
-static int friction_prepare (const void *definition, const pw_body *const *bodies, void *element, pw_internal *internal,
-                             pw_error *error) {
-  const pw_friction *d = definition;
-  (void)bodies, (void)internal;
-  return coulomb_make (d->viscous, d->limit, d->speed, element, error);
+PREPARE (friction_prepare, pw_friction, coulomb) {
+  return coulomb_make (d->viscous, d->limit, d->speed, k, error);
 }
 
 PER_ELEMENT (friction_force, friction, 6) {
-  double T = coulomb_force (x.k, x.w);
-  out[0] = out[1] = out[3] = out[4] = 0, out[2] = -T, out[5] = T;
+  opposite_torques (-coulomb_force (x.k, x.w), out);
 }
 
 PER_ELEMENT (friction_force_v, friction, 36) {
-  double slope = coulomb_slope (x.k, x.w);
-  memset (out, 0, 36 * sizeof *out);
-  out[14] = out[35] = -slope, out[17] = out[32] = slope;
+  opposite_torques_block (coulomb_slope (x.k, x.w), out);
 }
 
 PER_ELEMENT (friction_saturation, friction, 12) {

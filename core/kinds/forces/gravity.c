@@ -13,15 +13,12 @@ typedef struct {
 } gravity_state;
 
 static inline gravity_state gravity_at (const pw_batch *b, int e) {
-  return (gravity_state){ (const gravity *)b->element + e, &b->configuration[b->body[e]] };
+  return (gravity_state){ (const gravity *)b->element + e, batch_body (b, e, 1, 0) };
 }
 
-static int gravity_prepare (const void *definition, const pw_body *const *bodies, void *element, pw_internal *internal,
-                            pw_error *error) {
-  const pw_gravity *d = definition;
+PREPARE (gravity_prepare, pw_gravity, gravity) {
   double m = bodies[0]->mass;
-  *(gravity *)element = (gravity){ m * d->acceleration[0], m * d->acceleration[1] };
-  (void)internal, (void)error;
+  *k = (gravity){ m * d->acceleration[0], m * d->acceleration[1] };
   return PW_OK;
 }
 

@@ -6,11 +6,8 @@
 #include "contact.h"
 
 PREPARE (marker_prepare, pw_marker, contact) {
-  *k = contact_make (d->at, 0, 1, 0);
-}
-
-PER_ELEMENT (marker_contact, contact, 3) {
-  contact_to_world (x.A, x.k->at, 0, out);
+  *k = contact_along (d->at, 0);
+  return PW_OK;
 }
 
 static const pw_field marker_fields[] = {
@@ -26,5 +23,5 @@ const pw_kind pw_kind_marker = {
   DEFINITION (pw_marker, marker_fields),
   ELEMENT (contact, marker_prepare),
   .bodies = 1,
-  .contact = marker_contact,
+  .contact = contact_place,
 };

@@ -25,7 +25,7 @@ typedef struct {
 
 static inline motor_state motor_at (const pw_batch *b, int e) {
   const motor *k = (const motor *)b->element + e;
-  const pw_configuration *A = &b->configuration[b->body[2 * e]], *B = &b->configuration[b->body[2 * e + 1]];
+  const pw_configuration *A = batch_body (b, e, 2, 0), *B = batch_body (b, e, 2, 1);
   const double *u = b->u + 6 * e;
   double y = k->k * (u[0] - A->phi + B->phi) + k->c * (u[3] - A->omega + B->omega);
   double tanh_y = WHERE (k->limit > 0, tanh (y / k->limit));
@@ -34,10 +34,11 @@ static inline motor_state motor_at (const pw_batch *b, int e) {
 
 PREPARE (motor_prepare, pw_motor, motor) {
   *k = (motor){ d->stiffness, d->damping, d->limit };
+  return PW_OK;
 }
 
 PER_ELEMENT (motor_force, motor, 6) {
-  out[0] = out[1] = out[3] = out[4] = 0, out[2] = x.T, out[5] = -x.T;
+  opposite_torques (x.T, out);
 }
 
 PER_ELEMENT (motor_force_u, motor, 12) {
@@ -46,18 +47,12 @@ PER_ELEMENT (motor_force_u, motor, 12) {
   out[10] = -out[4], out[11] = -out[5];
 }
 
-/* The four angle entries of a 6 x 6 block. */
-static inline void motor_block (double *out, double x) {
-  memset (out, 0, 36 * sizeof *out);
-  out[14] = out[35] = -x, out[17] = out[32] = x;
-}
-
 PER_ELEMENT (motor_force_q, motor, 36) {
-  motor_block (out, x.slope * x.k->k);
+  opposite_torques_block (x.slope * x.k->k, out);
 }
 
 PER_ELEMENT (motor_force_v, motor, 36) {
-  motor_block (out, x.slope * x.k->c);
+  opposite_torques_block (x.slope * x.k->c, out);
 }
 
 PER_ELEMENT (motor_saturation, motor, 12) {
@@ -93,10 +88,8 @@ const pw_kind pw_kind_motor = {
   ELEMENT (motor, motor_prepare),
   .bodies = 2,
   .signals = 2,
-  .force = motor_force,
+  FORCE (motor),
   .force_u = motor_force_u,
-  .force_q = motor_force_q,
-  .force_v = motor_force_v,
   .saturation = motor_saturation,
   .power = motor_power,
 };

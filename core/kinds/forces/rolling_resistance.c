@@ -6,6 +6,7 @@
  *
  * (Wong 2008, Theory of Ground Vehicles, section 1.2.)
  * It has no lateral component; a wheel at the same point provides that. */
+#include <string.h>
 #include "contact.h"
 #include "coulomb.h"
 
@@ -23,18 +24,14 @@ typedef struct {
 
 static inline resistance_state resistance_at (const pw_batch *b, int e) {
   const resistance *k = (const resistance *)b->element + e;
-  const pw_configuration *A = &b->configuration[b->body[e]];
-  contact_state d = contact_rotate (&k->point, A);
-  return (
-      resistance_state){ k, A, { d.dx, d.dy, k->point.arm }, d.dx * A->vx + d.dy * A->vy + k->point.arm * A->omega };
+  contact_state d = contact_of (k->point, b, e);
+  resistance_state x = { k, d.A, .ve = contact_speed (&d) };
+  contact_J_one (d, x.E);
+  return x;
 }
 
-static int resistance_prepare (const void *definition, const pw_body *const *bodies, void *element,
-                               pw_internal *internal, pw_error *error) {
-  const pw_rolling_resistance *d = definition;
-  resistance *k = element;
-  k->point = contact_make (d->at, d->heading, pw_cos (d->heading), pw_sin (d->heading));
-  (void)bodies, (void)internal;
+PREPARE (resistance_prepare, pw_rolling_resistance, resistance) {
+  k->point = contact_along (d->at, d->heading);
   return coulomb_make (0, d->limit, d->speed, &k->law, error);
 }
 
@@ -86,9 +83,7 @@ const pw_kind pw_kind_rolling_resistance = {
   DEFINITION (pw_rolling_resistance, resistance_fields),
   ELEMENT (resistance, resistance_prepare),
   .bodies = 1,
-  .force = resistance_force,
-  .force_q = resistance_force_q,
-  .force_v = resistance_force_v,
+  FORCE (resistance),
   .saturation = resistance_saturation,
   .loss = resistance_loss,
 };

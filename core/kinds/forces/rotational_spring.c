@@ -6,7 +6,6 @@
  *
  * (Shabana 2001, Computational Dynamics, section 6.5.)
  * Angles accumulate over full turns. */
-#include <string.h>
 #include "batch.h"
 
 typedef struct {
@@ -21,31 +20,25 @@ typedef struct {
 
 static inline twist_state twist_at (const pw_batch *b, int e) {
   const twist *k = (const twist *)b->element + e;
-  const pw_configuration *A = &b->configuration[b->body[2 * e]], *B = &b->configuration[b->body[2 * e + 1]];
+  const pw_configuration *A = batch_body (b, e, 2, 0), *B = batch_body (b, e, 2, 1);
   return (twist_state){ k, A->phi - B->phi - k->beta, A->omega - B->omega };
 }
 
 PREPARE (twist_prepare, pw_rotational_spring, twist) {
   *k = (twist){ d->stiffness, d->damping, d->angle };
+  return PW_OK;
 }
 
 PER_ELEMENT (twist_force, twist, 6) {
-  double T = x.k->k * x.angle + x.k->c * x.rate;
-  out[0] = out[1] = out[3] = out[4] = 0, out[2] = -T, out[5] = T;
-}
-
-/* The four angle entries of a 6 x 6 block. */
-static inline void twist_block (double *out, double x) {
-  memset (out, 0, 36 * sizeof *out);
-  out[14] = out[35] = -x, out[17] = out[32] = x;
+  opposite_torques (-(x.k->k * x.angle + x.k->c * x.rate), out);
 }
 
 PER_ELEMENT (twist_force_q, twist, 36) {
-  twist_block (out, x.k->k);
+  opposite_torques_block (x.k->k, out);
 }
 
 PER_ELEMENT (twist_force_v, twist, 36) {
-  twist_block (out, x.k->c);
+  opposite_torques_block (x.k->c, out);
 }
 
 PER_ELEMENT (twist_energy, twist, 1) {
@@ -75,9 +68,7 @@ const pw_kind pw_kind_rotational_spring = {
   DEFINITION (pw_rotational_spring, twist_fields),
   ELEMENT (twist, twist_prepare),
   .bodies = 2,
-  .force = twist_force,
-  .force_q = twist_force_q,
-  .force_v = twist_force_v,
+  FORCE (twist),
   .energy = twist_energy,
   .loss = twist_loss,
 };

@@ -22,19 +22,15 @@ typedef struct {
 
 static inline sliding_state sliding_at (const pw_batch *b, int e) {
   const sliding *k = (const sliding *)b->element + e;
-  const pw_configuration *A = &b->configuration[b->body[2 * e]], *B = &b->configuration[b->body[2 * e + 1]];
-  sliding_state x = { k, line_rotate (&k->across, A, B), { A->vx, A->vy, A->omega, B->vx, B->vy, B->omega }, .w = 0 };
-  line_J (&x.s, x.E);
+  const pw_configuration *A = batch_body (b, e, 2, 0), *B = batch_body (b, e, 2, 1);
+  sliding_state x = { k, line_of (&k->across, b, e), { A->vx, A->vy, A->omega, B->vx, B->vy, B->omega }, .w = 0 };
+  line_J_one (x.s, x.E);
   for (int i = 0; i < 6; i++) x.w += x.E[i] * x.v[i];
   return x;
 }
 
-static int sliding_prepare (const void *definition, const pw_body *const *bodies, void *element, pw_internal *internal,
-                            pw_error *error) {
-  const pw_sliding_friction *d = definition;
-  sliding *k = element;
+PREPARE (sliding_prepare, pw_sliding_friction, sliding) {
   k->across = line_make (d->at, d->heading - PW_PI / 2);
-  (void)bodies, (void)internal;
   return coulomb_make (d->viscous, d->limit, d->speed, &k->law, error);
 }
 
@@ -89,9 +85,7 @@ const pw_kind pw_kind_sliding_friction = {
   DEFINITION (pw_sliding_friction, sliding_fields),
   ELEMENT (sliding, sliding_prepare),
   .bodies = 2,
-  .force = sliding_force,
-  .force_q = sliding_force_q,
-  .force_v = sliding_force_v,
+  FORCE (sliding),
   .saturation = sliding_saturation,
   .loss = sliding_loss,
 };

@@ -1,22 +1,19 @@
 /* torque: the signal u acts on body 1, -u on body 2.
  *
  *   f = (0, 0, u | 0, 0, -u),  power = u (w1 - w2) */
-#include "pinwheel.h"
+#include "batch.h"
 
 static void torque_force (const pw_batch *b, double *out) {
-  for (int e = 0; e < b->count; e++, out += 6) {
-    double u = b->u[3 * e];
-    out[0] = 0, out[1] = 0, out[2] = u, out[3] = 0, out[4] = 0, out[5] = -u;
-  }
+  for (int e = 0; e < b->count; e++) opposite_torques (b->u[3 * e], out + 6 * e);
 }
 
 static void torque_force_u (const pw_batch *b, double *out) {
-  for (int e = 0; e < b->count; e++, out += 6) out[0] = 0, out[1] = 0, out[2] = 1, out[3] = 0, out[4] = 0, out[5] = -1;
+  for (int e = 0; e < b->count; e++) opposite_torques (1, out + 6 * e);
 }
 
 static void torque_power (const pw_batch *b, double *out) {
   for (int e = 0; e < b->count; e++)
-    out[e] = b->u[3 * e] * (b->configuration[b->body[2 * e]].omega - b->configuration[b->body[2 * e + 1]].omega);
+    out[e] = b->u[3 * e] * (batch_body (b, e, 2, 0)->omega - batch_body (b, e, 2, 1)->omega);
 }
 
 static const pw_field torque_fields[] = {

@@ -3,7 +3,8 @@
  *   sigma = v_n / R,  R = sqrt (v_e^2 + v0^2)      v_e, v_n: speed of P along the heading and to its left
  *   F     = -C sigma                                              (linear: no limit)
  *   F     = -mu N tanh (C sigma / (mu N))                         (saturating)
- *   f     = F S,  S = [ -sin(theta)  cos(theta)  l ]              theta = phi + psi, l: the arm along the heading
+ *   f     = F S,  S = [ -sin(theta)  cos(theta)  l ]              theta = phi + psi, l: the arm along the heading;
+ *   v_n   = S v,  v_e = [ cos(theta)  sin(theta)  -m ] v          as in contact.h
  *   loss  = -F v_n >= 0
  *
  * (Pacejka 2012, Tire and Vehicle Dynamics, chapter 1, for slip and cornering stiffness; the regularising v0 keeps the
@@ -13,48 +14,37 @@
 #include "contact.h"
 
 typedef struct {
-  double at[2];        /* contact point in the body's frame [m] */
-  double cos, sin;     /* of the heading in the body's frame */
-  double along, aside; /* components of the arm along the heading and to its left [m] */
-  double heading;      /* [rad] */
-  double stiffness;    /* C [N] */
-  double speed;        /* v0 [m/s] */
-  double limit;        /* mu N [N]; 0: no limit */
+  contact along, across; /* the two components of the velocity of P */
+  double stiffness;      /* C [N] */
+  double speed;          /* v0 [m/s] */
+  double limit;          /* mu N [N]; 0: no limit */
 } tyre;
 
-/* The slip of one tyre: directions, speeds, the force and its derivatives. */
+/* A tyre in the current state. */
 typedef struct {
   const tyre *k;
-  const pw_configuration *A;
-  double c, s, ve, vn, F; /* heading in the world; speeds of P; force along n */
-  double F_ve, F_vn;      /* derivatives of F */
+  contact_state e, n;  /* along and across the heading */
+  double ve, vn, R, F; /* speeds of P; R; force along n */
+  double F_ve, F_vn;   /* derivatives of F */
 } tyre_state;
 
 static inline tyre_state tyre_at (const pw_batch *b, int e) {
   const tyre *k = (const tyre *)b->element + e;
-  const pw_configuration *A = &b->configuration[b->body[e]];
-  tyre_state x = { k, A, .c = A->cos * k->cos - A->sin * k->sin, .s = A->sin * k->cos + A->cos * k->sin };
-  x.ve = x.c * A->vx + x.s * A->vy - k->aside * A->omega;
-  x.vn = x.c * A->vy - x.s * A->vx + k->along * A->omega;
-  double R = sqrt (x.ve * x.ve + k->speed * k->speed), sigma = x.vn / R, slope = -k->stiffness;
+  tyre_state x = { .k = k, .e = contact_of (k->along, b, e), .n = contact_of (k->across, b, e) };
+  x.ve = contact_speed (&x.e), x.vn = contact_speed (&x.n), x.R = sqrt (x.ve * x.ve + k->speed * k->speed);
+  double sigma = x.vn / x.R, slope = -k->stiffness;
   x.F = slope * sigma;
   double y = WHERE (k->limit > 0, tanh (x.F / k->limit));
   x.F = k->limit > 0 ? k->limit * y : x.F;
   slope *= k->limit > 0 ? 1 - y * y : 1;
-  x.F_vn = slope / R;
-  x.F_ve = -slope * sigma * x.ve / (R * R);
+  x.F_vn = slope / x.R;
+  x.F_ve = -slope * sigma * x.ve / (x.R * x.R);
   return x;
 }
 
-static int tyre_prepare (const void *definition, const pw_body *const *bodies, void *element, pw_internal *internal,
-                         pw_error *error) {
-  const pw_tyre *d = definition;
-  double c = pw_cos (d->heading), s = pw_sin (d->heading), along = d->at[0] * c + d->at[1] * s,
-         aside = d->at[1] * c - d->at[0] * s;
-  *(tyre *)element = (tyre){
-    { d->at[0], d->at[1] }, c, s, along, aside, d->heading, d->stiffness, d->speed, d->friction * d->load,
-  };
-  (void)bodies, (void)internal;
+PREPARE (tyre_prepare, pw_tyre, tyre) {
+  *k = (tyre){ contact_along (d->at, d->heading), contact_across (d->at, d->heading), d->stiffness, d->speed,
+               d->friction * d->load };
   if (d->load > 0 && !(d->friction > 0))
     return pw_fail (error, PW_INPUT, "friction = %g: expected > 0, since a load limits the force to friction x load",
                     d->friction);
@@ -62,31 +52,35 @@ static int tyre_prepare (const void *definition, const pw_body *const *bodies, v
 }
 
 PER_ELEMENT (tyre_force, tyre, 3) {
-  out[0] = -x.F * x.s, out[1] = x.F * x.c, out[2] = x.F * x.k->along;
+  out[0] = x.F * x.n.dx, out[1] = x.F * x.n.dy, out[2] = x.F * x.k->across.arm;
 }
 
 /* d(F S)/dphi with dS/dphi = -(c, s, 0), dv_n/dphi = -(c, s) . v, dv_e/dphi = (-s, c) . v, v: velocity of the body. */
 PER_ELEMENT (tyre_force_q, tyre, 9) {
-  double slope = -x.F_vn * (x.c * x.A->vx + x.s * x.A->vy) + x.F_ve * (x.c * x.A->vy - x.s * x.A->vx);
+  const pw_configuration *A = x.n.A;
+  double c = x.e.dx, s = x.e.dy, slope = -x.F_vn * (c * A->vx + s * A->vy) + x.F_ve * (c * A->vy - s * A->vx);
   memset (out, 0, 9 * sizeof *out);
-  out[2] = -x.F * x.c - slope * x.s;
-  out[5] = -x.F * x.s + slope * x.c;
-  out[8] = slope * x.k->along;
+  out[2] = -x.F * c - slope * s;
+  out[5] = -x.F * s + slope * c;
+  out[8] = slope * x.k->across.arm;
 }
 
 PER_ELEMENT (tyre_force_v, tyre, 9) {
-  const double S[3] = { -x.s, x.c, x.k->along }, E[3] = { x.c, x.s, -x.k->aside };
+  double S[3], E[3];
+  contact_J_one (x.n, S);
+  contact_J_one (x.e, E);
   for (int i = 0; i < 9; i++) out[i] = S[i / 3] * (x.F_vn * S[i % 3] + x.F_ve * E[i % 3]);
 }
 
 /* Velocity scales: R along the heading, over which the slip varies near rest; laterally, if there is a limit, the
  * change that reverses a saturated force. */
 PER_ELEMENT (tyre_saturation, tyre, 6) {
-  double R = sqrt (x.ve * x.ve + x.k->speed * x.k->speed), across = x.k->limit / x.k->stiffness * R + fabs (x.vn);
-  double vc = x.c * x.A->vx + x.s * x.A->vy, vs = x.c * x.A->vy - x.s * x.A->vx;
-  const double E[6] = { 0, 0, vs, x.c, x.s, -x.k->aside }, S[6] = { 0, 0, -vc, -x.s, x.c, x.k->along };
+  double across = x.k->limit / x.k->stiffness * x.R + fabs (x.vn), E[6] = { 0 }, S[6] = { 0 };
+  E[2] = x.n.dx * x.n.A->vx + x.n.dy * x.n.A->vy, S[2] = -x.e.dx * x.e.A->vx - x.e.dy * x.e.A->vy;
+  contact_J_one (x.e, E + 3);
+  contact_J_one (x.n, S + 3);
   for (int i = 0; i < 6; i++) {
-    if (E[i] != 0) out[i] = R / fabs (E[i]);
+    if (E[i] != 0) out[i] = x.R / fabs (E[i]);
     if (S[i] != 0 && x.k->limit > 0) out[i] = fmin (out[i], across / fabs (S[i]));
   }
 }
@@ -96,7 +90,7 @@ PER_ELEMENT (tyre_loss, tyre, 1) {
 }
 
 PER_ELEMENT (tyre_contact, tyre, 3) {
-  contact_to_world (x.A, x.k->at, x.k->heading, out);
+  contact_place_one (x.e, out);
 }
 
 static const pw_field tyre_fields[] = {
@@ -122,9 +116,7 @@ const pw_kind pw_kind_tyre = {
   DEFINITION (pw_tyre, tyre_fields),
   ELEMENT (tyre, tyre_prepare),
   .bodies = 1,
-  .force = tyre_force,
-  .force_q = tyre_force_q,
-  .force_v = tyre_force_v,
+  FORCE (tyre),
   .saturation = tyre_saturation,
   .loss = tyre_loss,
   .contact = tyre_contact,

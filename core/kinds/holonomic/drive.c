@@ -12,17 +12,21 @@
 
 PREPARE (drive_prepare, pw_drive, line) {
   *k = (line){ .s1 = { d->at[0][0], d->at[0][1] }, .angle = d->what == PW_DRIVE_ANGLE };
-  if (d->what == PW_DRIVE_ANGLE) return;
+  if (d->what == PW_DRIVE_ANGLE) return PW_OK;
   k->n[d->what] = 1;
   k->c = d->at[1][d->what];
+  return PW_OK;
 }
 
 PER_ELEMENT (drive_g, line, 1) {
-  *out = line_g (&x) + x.k->angle * (x.A->phi - x.B->phi) - x.u[0];
+  line_g_one (x, out);
+  *out = *out + x.k->angle * (x.A->phi - x.B->phi) - x.u[0];
 }
 
 PER_ELEMENT (drive_g_size, line, 1) {
-  *out = line_g_size (&x) + x.k->angle * (fabs (x.A->phi) + fabs (x.B->phi)) + fabs (x.u[0]);
+  line_g_size_one (x, out);
+  *out += x.k->angle * (fabs (x.A->phi) + fabs (x.B->phi));
+  *out += fabs (x.u[0]);
 }
 
 static void drive_eta (const pw_batch *b, double *out) {
@@ -30,12 +34,13 @@ static void drive_eta (const pw_batch *b, double *out) {
 }
 
 PER_ELEMENT (drive_J, line, 6) {
-  line_J (&x, out);
+  line_J_one (x, out);
   out[2] += x.k->angle, out[5] -= x.k->angle;
 }
 
 PER_ELEMENT (drive_gamma, line, 1) {
-  *out = x.u[2] + line_gamma (&x);
+  line_gamma_one (x, out);
+  *out += x.u[2];
 }
 
 static const char *const drive_what[] = { "x", "y", "angle", NULL };
@@ -75,12 +80,11 @@ const pw_kind pw_kind_drive = {
   .level = PW_HOLONOMIC,
   .reaction = drive_reaction,
   .reaction_unit = drive_unit,
-  .g = drive_g,
-  .g_size = drive_g_size,
+  POSITION (drive),
   .eta = drive_eta,
   .J = drive_J,
   .gamma = drive_gamma,
-  .jw_q = lines_jw_q,
-  .gamma_q = lines_gamma_q,
-  .gamma_v = lines_gamma_v,
+  .jw_q = line_jw_q,
+  .gamma_q = line_gamma_q,
+  .gamma_v = line_gamma_v,
 };

@@ -15,14 +15,11 @@ typedef struct {
   double offset; /* c [rad] */
 } gear;
 
-static int gear_prepare (const void *definition, const pw_body *const *bodies, void *element, pw_internal *internal,
-                         pw_error *error) {
-  const pw_gear *d = definition;
+PREPARE (gear_prepare, pw_gear, gear) {
   double phi[3];
   for (int n = 0; n < 3; n++) phi[n] = bodies[n]->start[2];
   double start = phi[0] - phi[2] - d->ratio * (phi[1] - phi[2]);
-  *(gear *)element = (gear){ d->ratio, d->from == PW_GEAR_START ? start : d->offset };
-  (void)internal;
+  *k = (gear){ d->ratio, d->from == PW_GEAR_START ? start : d->offset };
   if (d->ratio == 0) return pw_fail (error, PW_INPUT, "ratio = 0: expected another number, positive or negative");
   return PW_OK;
 }
@@ -33,9 +30,8 @@ typedef struct {
 } gear_state;
 
 static inline gear_state gear_at (const pw_batch *b, int e) {
-  const int *body = b->body + 3 * e;
-  const pw_configuration *p = b->configuration;
-  return (gear_state){ (const gear *)b->element + e, p[body[0]].phi, p[body[1]].phi, p[body[2]].phi };
+  return (gear_state){ (const gear *)b->element + e, batch_body (b, e, 3, 0)->phi, batch_body (b, e, 3, 1)->phi,
+                       batch_body (b, e, 3, 2)->phi };
 }
 
 PER_ELEMENT (gear_g, gear, 1) {
@@ -78,7 +74,6 @@ const pw_kind pw_kind_gear = {
   .rows = 1,
   .level = PW_HOLONOMIC,
   .reaction = gear_reaction,
-  .g = gear_g,
-  .g_size = gear_g_size,
+  POSITION (gear),
   .J = gear_J,
 };

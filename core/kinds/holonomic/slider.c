@@ -10,40 +10,41 @@
 PREPARE (slider_prepare, pw_slider, line) {
   *k = line_make (d->at, d->heading);
   k->angle = d->angle;
+  return PW_OK;
 }
 
 PER_ELEMENT (slider_g, line, 2) {
-  out[0] = line_g (&x);
+  line_g_one (x, out);
   out[1] = x.A->phi - x.B->phi - x.k->angle;
 }
 
 PER_ELEMENT (slider_g_size, line, 2) {
-  out[0] = line_g_size (&x);
+  line_g_size_one (x, out);
   out[1] = fabs (x.A->phi) + fabs (x.B->phi) + fabs (x.k->angle);
 }
 
 PER_ELEMENT (slider_J, line, 12) {
-  line_J (&x, out);
+  line_J_one (x, out);
   out[6] = out[7] = out[9] = out[10] = 0, out[8] = 1, out[11] = -1;
 }
 
 PER_ELEMENT (slider_gamma, line, 2) {
-  out[0] = line_gamma (&x);
+  line_gamma_one (x, out);
   out[1] = 0;
 }
 
 PER_ELEMENT (slider_jw_q, line, 12) {
-  line_multiply_H (&x, 1, x.w, out);
+  line_jw_q_one (x, out);
   memset (out + 6, 0, 6 * sizeof *out);
 }
 
 PER_ELEMENT (slider_gamma_q, line, 12) {
-  line_gamma_q (&x, out);
+  line_gamma_q_one (x, out);
   memset (out + 6, 0, 6 * sizeof *out);
 }
 
 PER_ELEMENT (slider_gamma_v, line, 12) {
-  line_gamma_v (&x, out);
+  line_gamma_v_one (x, out);
   memset (out + 6, 0, 6 * sizeof *out);
 }
 
@@ -73,11 +74,6 @@ const pw_kind pw_kind_slider = {
   .rows = 2,
   .level = PW_HOLONOMIC,
   .reaction = slider_reaction,
-  .g = slider_g,
-  .g_size = slider_g_size,
-  .J = slider_J,
-  .gamma = slider_gamma,
-  .jw_q = slider_jw_q,
-  .gamma_q = slider_gamma_q,
-  .gamma_v = slider_gamma_v,
+  POSITION (slider),
+  CONSTRAINT (slider),
 };

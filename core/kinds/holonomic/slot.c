@@ -7,22 +7,7 @@
 
 PREPARE (slot_prepare, pw_slot, line) {
   *k = line_make (d->at, d->heading);
-}
-
-PER_ELEMENT (slot_g, line, 1) {
-  *out = line_g (&x);
-}
-
-PER_ELEMENT (slot_g_size, line, 1) {
-  *out = line_g_size (&x);
-}
-
-PER_ELEMENT (slot_J, line, 6) {
-  line_J (&x, out);
-}
-
-PER_ELEMENT (slot_gamma, line, 1) {
-  *out = line_gamma (&x);
+  return PW_OK;
 }
 
 static const pw_field slot_fields[] = {
@@ -49,11 +34,6 @@ const pw_kind pw_kind_slot = {
   .rows = 1,
   .level = PW_HOLONOMIC,
   .reaction = slot_reaction,
-  .g = slot_g,
-  .g_size = slot_g_size,
-  .J = slot_J,
-  .gamma = slot_gamma,
-  .jw_q = lines_jw_q,
-  .gamma_q = lines_gamma_q,
-  .gamma_v = lines_gamma_v,
+  POSITION (line),
+  CONSTRAINT (line),
 };

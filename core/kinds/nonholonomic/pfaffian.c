@@ -25,28 +25,20 @@ typedef struct {
 
 static inline pfaffian_state pfaffian_at (const pw_batch *b, int e) {
   const pfaffian *k = (const pfaffian *)b->element + e;
-  const pw_configuration *P = &b->configuration[b->body[2 * e]], *Q = &b->configuration[b->body[2 * e + 1]];
+  const pw_configuration *P = batch_body (b, e, 2, 0), *Q = batch_body (b, e, 2, 1);
   pfaffian_state x = { .k = k, .P = P, .Q = Q, .w = batch_w (b, e), .u = b->u + 3 * e };
   x.Ax = P->cos * k->a[0] - P->sin * k->a[1], x.Ay = P->sin * k->a[0] + P->cos * k->a[1];
   x.Bx = P->cos * k->b[0] - P->sin * k->b[1], x.By = P->sin * k->b[0] + P->cos * k->b[1];
   return x;
 }
 
-static int pfaffian_prepare (const void *definition, const pw_body *const *bodies, void *element, pw_internal *internal,
-                             pw_error *error) {
-  const pw_pfaffian *d = definition;
-  pfaffian *k = element;
+PREPARE (pfaffian_prepare, pw_pfaffian, pfaffian) {
   double size = 0;
   memcpy (k->a, d->a, sizeof k->a);
   memcpy (k->b, d->b, sizeof k->b);
   for (int i = 0; i < 3; i++) size = fmax (size, fmax (fabs (d->a[i]), fabs (d->b[i])));
-  (void)bodies, (void)internal;
   if (size == 0) return pw_fail (error, PW_INPUT, "a and b are all zero: expected at least one other number");
   return PW_OK;
-}
-
-static void pfaffian_eta (const pw_batch *b, double *out) {
-  for (int e = 0; e < b->count; e++) out[e] = b->u[3 * e];
 }
 
 PER_ELEMENT (pfaffian_J, pfaffian, 6) {
@@ -97,10 +89,6 @@ const pw_kind pw_kind_pfaffian = {
   .signals = 1,
   .level = PW_NONHOLONOMIC,
   .reaction = pfaffian_reaction,
-  .eta = pfaffian_eta,
-  .J = pfaffian_J,
-  .gamma = pfaffian_gamma,
-  .jw_q = pfaffian_jw_q,
-  .gamma_q = pfaffian_gamma_q,
-  .gamma_v = pfaffian_gamma_v,
+  .eta = batch_signal,
+  CONSTRAINT (pfaffian),
 };

@@ -3,66 +3,70 @@
  *   n . v_P = 0,  e . v_P - R chi' = 0,  e = (cos, sin)(phi + psi), n = (-sin, cos)(phi + psi)    (2 nonholonomic)
  *   S     = [ -s  c   l   0 ]      (c, s) = e; l and m are the components of the contact point's arm along e and n
  *           [  c  s  -m  -R ]
- *   gamma = ( w (c vx + s vy),  w (s vx - c vy) )                 so that S a = gamma
+ *   gamma = ( w (c vx + s vy),  w (s vx - c vy) )                 so that S a = gamma; both rows as in contact.h
  *   f     = u on chi, power = u chi'                              u: torque about the axle
  *
- * (Neimark & Fufaev 1972, Dynamics of Nonholonomic Systems, chapter I.)
  * On the body act -lambda(1) along n and -lambda(2) along e.  The axle is horizontal, so the reaction to u and the
  * gyroscopic moments of the wheel have no component in the plane model. */
-#include <math.h>
-#include <string.h>
 #include "contact.h"
 
 typedef struct {
-  double at[2];        /* contact point in the body's frame [m] */
-  double cos, sin;     /* of the heading in the body's frame */
-  double along, aside; /* components of the arm along the heading and to its left [m] */
-  double radius;       /* [m] */
-  double heading;      /* [rad] */
+  contact across, along; /* the two components of the contact point's velocity */
+  double radius;         /* [m] */
 } rolling;
 
-/* A wheel in the current state: rolling direction (c, s) in the world. */
+/* A wheel in the current state. */
 typedef struct {
-  const rolling *k;
-  const pw_configuration *A;
-  const double *w;
-  double c, s;
+  contact_state across, along;
+  double radius;
 } rolling_state;
 
 static inline rolling_state rolling_at (const pw_batch *b, int e) {
   const rolling *k = (const rolling *)b->element + e;
-  const pw_configuration *A = &b->configuration[b->body[e]];
-  return (rolling_state){ k, A, batch_w (b, e), A->cos * k->cos - A->sin * k->sin, A->sin * k->cos + A->cos * k->sin };
+  return (rolling_state){ contact_of (k->across, b, e), contact_of (k->along, b, e), k->radius };
 }
 
 /* The spin rate for rolling at the initial velocity of the body. */
 static double rolling_spin_rate (const rolling *k, const pw_body *body) {
-  double angle = body->start[2] + k->heading;
-  return (pw_cos (angle) * body->rate[0] + pw_sin (angle) * body->rate[1] - k->aside * body->rate[2]) / k->radius;
+  double angle = body->start[2] + k->along.heading;
+  return (pw_cos (angle) * body->rate[0] + pw_sin (angle) * body->rate[1] + k->along.arm * body->rate[2]) / k->radius;
 }
 
-static int rolling_prepare (const void *definition, const pw_body *const *bodies, void *element, pw_internal *internal,
-                            pw_error *error) {
-  const pw_rolling_wheel *d = definition;
-  double c = pw_cos (d->heading), s = pw_sin (d->heading), along = d->at[0] * c + d->at[1] * s,
-         aside = d->at[1] * c - d->at[0] * s;
-  rolling *k = element;
-  *k = (rolling){ { d->at[0], d->at[1] }, c, s, along, aside, d->radius, d->heading };
+PREPARE (rolling_prepare, pw_rolling_wheel, rolling) {
+  *k = (rolling){ contact_across (d->at, d->heading), contact_along (d->at, d->heading), d->radius };
   internal[0] = (pw_internal){
     d->inertia, d->start, d->rate != 0 ? d->rate : rolling_spin_rate (k, bodies[0]), { d->start != 0, d->rate != 0 }
   };
-  (void)error;
   return PW_OK;
 }
 
 PER_ELEMENT (rolling_J, rolling, 8) {
-  out[0] = -x.s, out[1] = x.c, out[2] = x.k->along, out[3] = 0;
-  out[4] = x.c, out[5] = x.s, out[6] = -x.k->aside, out[7] = -x.k->radius;
+  contact_J_one (x.across, out);
+  contact_J_one (x.along, out + 4);
+  out[3] = 0, out[7] = -x.radius;
 }
 
 PER_ELEMENT (rolling_gamma, rolling, 2) {
-  out[0] = x.A->omega * (x.c * x.A->vx + x.s * x.A->vy);
-  out[1] = x.A->omega * (x.s * x.A->vx - x.c * x.A->vy);
+  contact_gamma_one (x.across, out);
+  contact_gamma_one (x.along, out + 1);
+}
+
+PER_ELEMENT (rolling_jw_q, rolling, 8) {
+  contact_jw_q_one (x.across, out);
+  contact_jw_q_one (x.along, out + 4);
+  out[3] = out[7] = 0;
+}
+
+PER_ELEMENT (rolling_gamma_q, rolling, 8) {
+  contact_gamma_q_one (x.across, out);
+  contact_gamma_q_one (x.along, out + 4);
+  out[3] = out[7] = 0;
+}
+
+PER_ELEMENT (rolling_gamma_v, rolling, 8) {
+  contact_gamma_v_one (x.across, out);
+  contact_gamma_v_one (x.along, out + 4);
+  out[3] = out[7] = 0;
 }
 
 static void rolling_force (const pw_batch *b, double *out) {
@@ -77,28 +81,8 @@ static void rolling_power (const pw_batch *b, double *out) {
   for (int e = 0; e < b->count; e++) out[e] = b->u[3 * e] * b->v[e];
 }
 
-/* Sets the phi column of a 2 x 4 block, the others to zero. */
-static inline void rolling_angle (double *out, double first, double second) {
-  memset (out, 0, 8 * sizeof *out);
-  out[2] = first, out[6] = second;
-}
-
-PER_ELEMENT (rolling_jw_q, rolling, 8) {
-  double wx = x.w[0], wy = x.w[1];
-  rolling_angle (out, -x.c * wx - x.s * wy, x.c * wy - x.s * wx);
-}
-
-PER_ELEMENT (rolling_gamma_q, rolling, 8) {
-  rolling_angle (out, x.A->omega * (x.c * x.A->vy - x.s * x.A->vx), x.A->omega * (x.c * x.A->vx + x.s * x.A->vy));
-}
-
-PER_ELEMENT (rolling_gamma_v, rolling, 8) {
-  out[0] = x.A->omega * x.c, out[1] = x.A->omega * x.s, out[2] = x.c * x.A->vx + x.s * x.A->vy, out[3] = 0;
-  out[4] = x.A->omega * x.s, out[5] = -x.A->omega * x.c, out[6] = x.s * x.A->vx - x.c * x.A->vy, out[7] = 0;
-}
-
 PER_ELEMENT (rolling_contact, rolling, 3) {
-  contact_to_world (x.A, x.k->at, x.k->heading, out);
+  contact_place_one (x.along, out);
 }
 
 static const pw_field rolling_fields[] = {
@@ -140,13 +124,9 @@ const pw_kind pw_kind_rolling_wheel = {
   .level = PW_NONHOLONOMIC,
   .reaction = rolling_reaction,
   .coordinate = rolling_coordinate,
-  .J = rolling_J,
-  .gamma = rolling_gamma,
+  CONSTRAINT (rolling),
   .force = rolling_force,
   .force_u = rolling_force_u,
-  .jw_q = rolling_jw_q,
-  .gamma_q = rolling_gamma_q,
-  .gamma_v = rolling_gamma_v,
   .power = rolling_power,
   .contact = rolling_contact,
 };

@@ -9,11 +9,8 @@
 #include "contact.h"
 
 PREPARE (speed_prepare, pw_speed, contact) {
-  *k = contact_make (d->at, d->heading, pw_cos (d->heading), pw_sin (d->heading));
-}
-
-static void speed_eta (const pw_batch *b, double *out) {
-  for (int e = 0; e < b->count; e++) out[e] = b->u[3 * e];
+  *k = contact_along (d->at, d->heading);
+  return PW_OK;
 }
 
 static void speed_gamma (const pw_batch *b, double *out) {
@@ -43,7 +40,7 @@ const pw_kind pw_kind_speed = {
   .signals = 1,
   .level = PW_NONHOLONOMIC,
   .reaction = speed_reaction,
-  .eta = speed_eta,
+  .eta = batch_signal,
   .J = contact_J,
   .gamma = speed_gamma,
   .jw_q = contact_jw_q,

@@ -4,9 +4,7 @@
  *   S     = [ -sin(theta)  cos(theta)  l ]      theta = phi + u;  l, m: arm of P along the heading, to its left
  *   gamma = (w + u') (cos(theta) vx + sin(theta) vy) - u' m w     so that S a = gamma, with l' = u' m
  *
- * (Neimark & Fufaev 1972, Dynamics of Nonholonomic Systems, chapter I.) The lateral force on the body, along n, is N
- * = -lambda.  It acts at the steering pivot, so steering needs no moment and does no work. */
-#include <math.h>
+ * S is that of contact.h for the direction n.  The lateral force on the body, along n, is N = -lambda.  It acts at the steering pivot, so steering needs no moment and does no work. */
 #include "contact.h"
 
 typedef struct {
@@ -15,58 +13,47 @@ typedef struct {
 
 /* A wheel in the current state. */
 typedef struct {
-  const steered *k;
-  const pw_configuration *A;
-  const double *w, *u;
-  double c, s;         /* heading in the world */
-  double along, aside; /* l, m */
-  double turn, rate;   /* u' and w + u' */
+  contact_state n;
+  double aside;      /* m */
+  double turn, rate; /* u' and w + u' */
 } steered_state;
 
 static inline steered_state steered_at (const pw_batch *b, int e) {
-  const steered *k = (const steered *)b->element + e;
-  const pw_configuration *A = &b->configuration[b->body[e]];
-  const double *u = b->u + 3 * e;
+  const double *at = ((const steered *)b->element)[e].at, *u = b->u + 3 * e;
   double c, s;
   pw_sin_cos (u[0], &s, &c);
-  return (steered_state){ k,
-                          A,
-                          batch_w (b, e),
-                          u,
-                          .c = A->cos * c - A->sin * s,
-                          .s = A->sin * c + A->cos * s,
-                          .along = k->at[0] * c + k->at[1] * s,
-                          .aside = k->at[1] * c - k->at[0] * s,
-                          .turn = u[1],
-                          .rate = A->omega + u[1] };
+  contact_state n = contact_of (contact_make (at, u[0], -s, c), b, e);
+  return (steered_state){ n, at[1] * c - at[0] * s, u[1], n.A->omega + u[1] };
 }
 
 PREPARE (steered_prepare, pw_steered_wheel, steered) {
   *k = (steered){ { d->at[0], d->at[1] } };
+  return PW_OK;
 }
 
 PER_ELEMENT (steered_J, steered, 3) {
-  out[0] = -x.s, out[1] = x.c, out[2] = x.along;
+  contact_J_one (x.n, out);
 }
 
 PER_ELEMENT (steered_gamma, steered, 1) {
-  *out = x.rate * (x.c * x.A->vx + x.s * x.A->vy) - x.turn * x.aside * x.A->omega;
+  *out = x.rate * (x.n.dy * x.n.A->vx - x.n.dx * x.n.A->vy) - x.turn * x.aside * x.n.A->omega;
 }
 
 PER_ELEMENT (steered_jw_q, steered, 3) {
-  out[0] = out[1] = 0, out[2] = -x.c * x.w[0] - x.s * x.w[1];
+  contact_jw_q_one (x.n, out);
 }
 
 PER_ELEMENT (steered_gamma_q, steered, 3) {
-  out[0] = out[1] = 0, out[2] = x.rate * (x.c * x.A->vy - x.s * x.A->vx);
+  out[0] = out[1] = 0, out[2] = x.rate * (x.n.dx * x.n.A->vx + x.n.dy * x.n.A->vy);
 }
 
 PER_ELEMENT (steered_gamma_v, steered, 3) {
-  out[0] = x.rate * x.c, out[1] = x.rate * x.s, out[2] = x.c * x.A->vx + x.s * x.A->vy - x.turn * x.aside;
+  out[0] = x.rate * x.n.dy, out[1] = -x.rate * x.n.dx;
+  out[2] = x.n.dy * x.n.A->vx - x.n.dx * x.n.A->vy - x.turn * x.aside;
 }
 
 PER_ELEMENT (steered_contact, steered, 3) {
-  contact_to_world (x.A, x.k->at, x.u[0], out);
+  contact_place_one (x.n, out);
 }
 
 static const pw_field steered_fields[] = {
@@ -92,10 +79,6 @@ const pw_kind pw_kind_steered_wheel = {
   .signals = 1,
   .level = PW_NONHOLONOMIC,
   .reaction = steered_reaction,
-  .J = steered_J,
-  .gamma = steered_gamma,
-  .jw_q = steered_jw_q,
-  .gamma_q = steered_gamma_q,
-  .gamma_v = steered_gamma_v,
+  CONSTRAINT (steered),
   .contact = steered_contact,
 };

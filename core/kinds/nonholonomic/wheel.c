@@ -8,11 +8,8 @@
 #include "contact.h"
 
 PREPARE (wheel_prepare, pw_wheel, contact) {
-  *k = contact_make (d->at, d->heading, -pw_sin (d->heading), pw_cos (d->heading));
-}
-
-PER_ELEMENT (wheel_contact, contact, 3) {
-  contact_to_world (x.A, x.k->at, x.k->heading, out);
+  *k = contact_across (d->at, d->heading);
+  return PW_OK;
 }
 
 static const pw_field wheel_fields[] = {
@@ -36,10 +33,6 @@ const pw_kind pw_kind_wheel = {
   .rows = 1,
   .level = PW_NONHOLONOMIC,
   .reaction = wheel_reaction,
-  .J = contact_J,
-  .gamma = contact_gamma,
-  .jw_q = contact_jw_q,
-  .gamma_q = contact_gamma_q,
-  .gamma_v = contact_gamma_v,
-  .contact = wheel_contact,
+  CONSTRAINT (contact),
+  .contact = contact_place,
 };
