@@ -143,6 +143,9 @@ int pw_cli_only (const char *option, const char *text, const char *with, int has
  * number in the domain. */
 int pw_cli_number (const char *option, const char *text, pw_domain domain, double *value, pw_error *error);
 
+/* Reads a range "FIRST:LAST"; PW_INPUT if it is not two finite numbers. */
+int pw_cli_range (const char *text, double *first, double *last);
+
 /* The model's defaults overridden by options: t_end, settings except the ledger, and the limit, which stops the run. */
 int pw_cli_settings (const pw_cli_line *l, const pw_run_defaults *model, double *t_end, pw_settings *settings,
                      pw_limit *limit, pw_error *error);
@@ -174,24 +177,6 @@ int pw_cli_apply (pw_model *m, const char *option, const char **list,
 
 /* The parameter of a model of this name; NULL: there is none. */
 const pw_parameter *pw_cli_parameter (const pw_model *m, const char *name);
-
-/* A parameter that varies continuously, of --vary NAME=FIRST:LAST. */
-typedef struct {
-  const pw_cli_line *line;
-  const pw_cli_model *m;
-  const char *text; /* of the option */
-  char name[200];
-  double first, last;
-} pw_cli_vary;
-
-/* Reads the option; the name need not be that of a parameter. */
-int pw_cli_vary_read (pw_cli_vary *v, const pw_cli_line *l, const pw_cli_model *m, const char *text, pw_error *error);
-/* PW_INPUT if the name, which is that of a parameter, cannot vary in the range, or is also set. */
-int pw_cli_vary_check (const pw_cli_vary *v, pw_error *error);
-/* Shows the progress of a branch; the first call, with a progress of zeros, starts it. */
-void pw_cli_vary_progress (const pw_cli_vary *v, pw_progress *p, double from, double value, double to);
-/* The system at a value of the parameter; for pw_steady_settings.compile. */
-pw_system *pw_cli_vary_compile (void *vary, double value, pw_error *error);
 
 enum { PW_CHANGE_TEXT = 400 };
 /* The given initial value that the consistent initialisation of a run at its beginning has changed most: the change, and

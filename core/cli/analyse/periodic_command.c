@@ -52,18 +52,15 @@ static int periodic_options (pw_periodic_cli *x, pw_error *error) {
   int status = pw_cli_settings (&x->line, &d, &t_end, &settings, &x->limit, error);
   x->set.method = x->line.method ? x->line.method : "erk8+projection";
   x->set.rtol = settings.rtol;
-  x->unit = "";
+  x->vary.name = x->vary.unit = "";
   x->set.stop = pw_limit_over, x->set.stop_context = &x->limit;
   if (status == PW_OK) status = periodic_period (x, error);
   if (status != PW_OK || x->vary_text == NULL) return status;
-  if (pw_cli_vary_read (&x->vary, &x->line, &x->m, x->vary_text, error) != PW_OK) return PW_INPUT;
+  if (pw_vary_read (&x->vary, &x->line, &x->m, x->vary_text, error) != PW_OK) return PW_INPUT;
   x->set.first = x->vary.first, x->set.last = x->vary.last;
-  const pw_parameter *p = pw_cli_parameter (x->m.model, x->vary.name);
-  if (p == NULL) return pw_model_set (x->m.model, x->vary.name, x->set.first, error);
-  x->unit = p->unit;
-  x->set.compile = pw_cli_vary_compile;
+  x->set.compile = pw_vary_compile;
   x->set.context = &x->vary;
-  return pw_cli_vary_check (&x->vary, error);
+  return x->vary.parameter ? PW_OK : pw_model_set (x->m.model, x->vary.name, x->set.first, error);
 }
 
 /* ---- The search ---- */
@@ -126,13 +123,13 @@ static int periodic_fail (const pw_periodic_cli *x, pw_error *error) {
 static int periodic_branch (pw_periodic_cli *x, pw_error *error) {
   pw_periodic_orbit o;
   pw_progress progress = { .t_end = 0 };
-  pw_cli_vary_progress (&x->vary, &progress, x->set.first, x->set.first, x->set.last);
+  pw_vary_progress (&x->vary, &progress, x->set.first, x->set.first, x->set.last);
   int status = pw_periodic_follow (x->search, 1, error);
   while (status == PW_OK && !periodic_stop (x)) {
     status = pw_periodic_next (x->search, &o, error);
     if (status != PW_OK || o.event == PW_PERIODIC_END) break;
     status = periodic_add (x, &o, error);
-    pw_cli_vary_progress (&x->vary, &progress, x->set.first, o.parameter, x->set.last);
+    pw_vary_progress (&x->vary, &progress, x->set.first, o.parameter, x->set.last);
   }
   pw_progress_end (&progress);
   periodic_stop (x);

@@ -2,8 +2,7 @@
 #ifndef PW_PERIODIC_REPORT_H
 #define PW_PERIODIC_REPORT_H
 
-#include "cli.h"
-#include "pinwheel-analysis.h"
+#include "vary.h"
 
 /* A periodic motion found, or a point of a branch. */
 typedef struct {
@@ -20,8 +19,7 @@ typedef struct {
   pw_limit limit;
   pw_periodic_settings set;
   const char *source; /* of the period: "of the signals", "--period", "found" */
-  const char *unit;   /* of the parameter */
-  pw_cli_vary vary;
+  pw_vary vary;
   pw_periodic *search;
   pw_periodic_point *point;
   int points;

@@ -17,20 +17,18 @@ enum { STEADY_STARTS = 30 };
 /* NAME=FIRST:LAST, a parameter of the model or something held. */
 static int steady_vary (pw_steady_cli *x, pw_error *error) {
   char hold[400], value[32];
-  if (pw_cli_vary_read (&x->vary, &x->line, &x->m, x->vary_text, error) != PW_OK) return PW_INPUT;
+  if (pw_vary_read (&x->vary, &x->line, &x->m, x->vary_text, error) != PW_OK) return PW_INPUT;
   x->set.first = x->vary.first, x->set.last = x->vary.last;
-  const pw_parameter *p = pw_cli_parameter (x->m.model, x->vary.name);
-  if (p) {
-    x->unit = p->unit;
-    x->set.compile = pw_cli_vary_compile;
+  if (x->vary.parameter) {
+    x->set.compile = pw_vary_compile;
     x->set.context = &x->vary;
-    return pw_cli_vary_check (&x->vary, error);
+    return PW_OK;
   }
   if (strchr (x->vary.name, '.') == NULL) return pw_model_set (x->m.model, x->vary.name, x->set.first, error);
   snprintf (hold, sizeof hold, "%s=%s", x->vary.name, pw_format (value, x->set.first, 17));
   x->set.vary = x->set.holds;
   int status = pw_hold_read (x->m.system, "--vary", hold, x->hold, &x->set.holds, error);
-  if (status == PW_OK) x->unit = pw_system_held_unit (x->m.system, x->hold[x->set.vary].state);
+  if (status == PW_OK) x->vary.unit = pw_system_held_unit (x->m.system, x->hold[x->set.vary].state);
   return status;
 }
 
@@ -173,8 +171,7 @@ static int steady_branch (pw_steady_cli *x, const pw_steady_point *from, int dir
     status = pw_steady_next (x->steady, &m, error);
     if (status != PW_OK || m.event == PW_STEADY_END) break;
     if (steady_add (x, &m, attempt, error) == NULL) status = PW_RESOURCE;
-    pw_cli_vary_progress (&x->vary, &progress, from->parameter, m.parameter,
-                          direction > 0 ? x->set.last : x->set.first);
+    pw_vary_progress (&x->vary, &progress, from->parameter, m.parameter, direction > 0 ? x->set.last : x->set.first);
   }
   pw_progress_end (&progress);
   free (state);
@@ -236,7 +233,7 @@ static int steady_complete (pw_steady_cli *x, pw_error *error) {
 /* The value in the model, or in its initial state. */
 static double steady_model_value (const pw_steady_cli *x) {
   const pw_system *s = x->m.system;
-  if (x->set.vary < 0) return pw_model_parameter (x->m.model, pw_cli_parameter (x->m.model, x->vary.name));
+  if (x->set.vary < 0) return pw_model_parameter (x->m.model, x->vary.parameter);
   return pw_system_held_value (s, x->hold[x->set.vary].state, pw_system_initial_q (s), pw_system_initial_v (s));
 }
 

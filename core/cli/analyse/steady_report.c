@@ -78,7 +78,7 @@ static void steady_branches (const pw_steady_cli *x) {
     events = 0;
     pw_cell (&t, 6, "branch");
     pw_cell (&t, -15, "event");
-    *x->unit ? pw_cell_unit (&t, 12, x->vary.name, x->unit) : pw_cell (&t, 12, x->vary.name);
+    *x->vary.unit ? pw_cell_unit (&t, 12, x->vary.name, x->vary.unit) : pw_cell (&t, 12, x->vary.name);
     for (int k = 0; k < 3; k++) pw_cell (&t, 7, (const char *[]){ "growing", "rightmost [1/s]", "frequency [Hz]" }[k]);
     pw_row_end (&t);
     for (const pw_steady_point *p = x->point; p < x->point + x->points; p++) {
@@ -164,7 +164,7 @@ static void steady_json (const void *context, pw_json *j) {
   pw_json_number (j, "schema", 1);
   pw_json_text (j, "model", pw_file_name (x->m.file));
   pw_json_text (j, "parameter", x->vary_text ? x->vary.name : NULL);
-  pw_json_text (j, "unit", x->unit);
+  pw_json_text (j, "unit", x->vary.unit);
   pw_json_open (j, "held", '{');
   for (int i = 0; i < x->set.holds; i++)
     if (i != x->set.vary)
@@ -200,7 +200,7 @@ static int steady_csv (const void *context, FILE *f, pw_error *error) {
   pw_text t = { .at = NULL };
   char name[300];
   pw_text_cell (&t, "branch,event");
-  pw_text_name (&t, x->vary_text ? x->vary.name : "parameter", x->unit);
+  pw_text_name (&t, x->vary_text ? x->vary.name : "parameter", x->vary.unit);
   pw_text_cell (&t, "growing,residual");
   pw_states_head (s, &t);
   for (int i = 1; i <= most; i++)
@@ -283,7 +283,7 @@ static int steady_data (const void *context, FILE *f, pw_error *error) {
 
 static void steady_variables (const void *context, FILE *f) {
   const pw_steady_cli *x = context;
-  pw_figure_label (f, "label_of_x", 0, x->vary.name, x->unit);
+  pw_figure_label (f, "label_of_x", 0, x->vary.name, x->vary.unit);
   fprintf (f, "first = %.10g\nlast = %.10g\n", fmin (x->set.first, x->set.last), fmax (x->set.first, x->set.last));
 }
 

@@ -2,8 +2,7 @@
 #ifndef PW_STEADY_REPORT_H
 #define PW_STEADY_REPORT_H
 
-#include "cli.h"
-#include "pinwheel-analysis.h"
+#include "vary.h"
 
 /* A steady motion found, or a point of a branch. */
 typedef struct {
@@ -28,8 +27,7 @@ typedef struct {
   pw_limit limit;
   pw_steady_settings set;
   pw_initial_value *hold; /* set.holds, with room */
-  pw_cli_vary vary;       /* what --vary varies */
-  const char *unit;
+  pw_vary vary;
   int attempts; /* random ones at each end */
   pw_steady *steady;
   pw_steady_point *point;

@@ -161,14 +161,16 @@ static int fit_options (pw_fit *x, pw_error *error) {
 /* Runs end at the last datum. */
 static int fit_open_data (pw_fit *x, pw_error *error) {
   int status = fit_read (x, error);
-  if (status == PW_OK) status = pw_unknowns_open (&x->unknowns, &x->line, &x->m, x->free, 50, error);
+  if (status == PW_OK) status = pw_unknowns_open (&x->unknowns, &x->line, &x->m, error);
+  if (status == PW_OK) status = pw_unknowns_read (&x->unknowns, x->free, error);
   if (status != PW_OK) return status;
-  if (x->residuals < x->unknowns.runs.count)
+  if (x->residuals < x->unknowns.count)
     return pw_fail (error, PW_INPUT, "--data %s has fewer data (%d) than there are unknowns (%d)", x->data_path,
-                    x->residuals, x->unknowns.runs.count);
-  if (x->starts > 1 && x->unknowns.runs.count > PW_UNKNOWNS_STARTED)
+                    x->residuals, x->unknowns.count);
+  if (x->starts > 1 && x->unknowns.count > PW_UNKNOWNS_STARTED)
     return pw_fail (error, PW_INPUT, "--starts: at most %d unknowns", PW_UNKNOWNS_STARTED);
-  x->unknowns.t_end = x->unknowns.runs.settings.span = x->t[x->rows - 1];
+  x->unknowns.t_end = x->unknowns.settings.span = x->t[x->rows - 1];
+  pw_unknowns_engine (&x->unknowns, 50);
   return PW_OK;
 }
 
@@ -193,7 +195,7 @@ static int fit_open (pw_fit *x, pw_output *file[FIT_FILES], int *folder, pw_erro
 
 /* Errors of the estimates are not known after Ctrl-C. */
 static void fit_interrupt (pw_fit *x) {
-  int n = x->unknowns.runs.count;
+  int n = x->unknowns.count;
   for (int i = 0; i < n; i++) x->deviation[i] = NAN;
   for (int i = 0; i < n * n; i++) x->covariance[i] = NAN;
   x->rank = n;

@@ -4,7 +4,7 @@
 
 #include "outcome.h"
 #include "progress.h"
-#include "unknowns.h"
+#include "sensitivity.h"
 
 typedef struct {
   pw_cli_line line;

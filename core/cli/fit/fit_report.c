@@ -10,7 +10,7 @@
 enum { REPORT_DIGITS = 7, REPORT_CORRELATIONS = 9, REPORT_PANELS = 4, REPORT_OPTIONS = 4000 };
 
 static double report_correlation (const pw_fit *x, int i, int j) {
-  int n = x->unknowns.runs.count;
+  int n = x->unknowns.count;
   double size = sqrt (x->covariance[i * n + i] * x->covariance[j * n + j]);
   return size > 0 && isfinite (x->deviation[i]) && isfinite (x->deviation[j]) ? x->covariance[i * n + j] / size : NAN;
 }
@@ -21,7 +21,7 @@ static double report_end (const pw_fit *x, int i, int side) {
 }
 
 static const char *report_bound (const pw_fit *x, int i) {
-  const pw_unknown *u = x->unknowns.runs.list + i;
+  const pw_unknown *u = x->unknowns.list + i;
   double near = 1e-3 * u->scale;
   return x->x[i] - u->low < near ? "at its lower bound" : u->high - x->x[i] < near ? "at its upper bound" : "";
 }
@@ -53,9 +53,9 @@ static void report_unknowns (const pw_fit *x) {
     pw_cell (&t, 12, head);
     pw_cell (&t, 12, "to");
     pw_row_end (&t);
-    for (int i = 0; i < x->unknowns.runs.count; i++) {
-      pw_cell_unit (&t, -12, x->unknowns.runs.list[i].name, x->unknowns.runs.list[i].unit);
-      pw_cell_number (&t, 12, x->unknowns.runs.list[i].value, REPORT_DIGITS);
+    for (int i = 0; i < x->unknowns.count; i++) {
+      pw_cell_unit (&t, -12, x->unknowns.list[i].name, x->unknowns.list[i].unit);
+      pw_cell_number (&t, 12, x->unknowns.list[i].value, REPORT_DIGITS);
       pw_cell_number (&t, 12, x->x[i], REPORT_DIGITS);
       pw_cell_number (&t, 14, isfinite (x->deviation[i]) ? x->deviation[i] : NAN, 3);
       pw_cell_number (&t, 12, report_end (x, i, -1), REPORT_DIGITS);
@@ -67,15 +67,15 @@ static void report_unknowns (const pw_fit *x) {
 }
 
 static void report_correlations (const pw_fit *x) {
-  int n = x->unknowns.runs.count;
+  int n = x->unknowns.count;
   if (n < 2 || n > REPORT_CORRELATIONS) return;
   putchar ('\n');
   for (pw_table t = { 0 }; pw_table_pass (&t);)
     for (int i = 0; i < n; i++) {
-      pw_cell (&t, -12, i ? x->unknowns.runs.list[i].name : "correlations");
+      pw_cell (&t, -12, i ? x->unknowns.list[i].name : "correlations");
       for (int j = 0; j < n - 1; j++)
         if (i == 0)
-          pw_cell (&t, 8, x->unknowns.runs.list[j].name);
+          pw_cell (&t, 8, x->unknowns.list[j].name);
         else if (j < i)
           pw_cell_number (&t, 8, round (1e4 * report_correlation (x, i, j)) / 1e4 + 0, 4);
       pw_row_end (&t);
@@ -102,14 +102,14 @@ static void report_columns (const pw_fit *x) {
 
 /* 1 if a combination of unknowns that changes no datum contains unknown i. */
 static int report_contains (const pw_fit *x, int combination, int i) {
-  return fabs (x->vectors[i * x->unknowns.runs.count + combination]) > PW_FIT_PART;
+  return fabs (x->vectors[i * x->unknowns.count + combination]) > PW_FIT_PART;
 }
 
 /* Changes of the unknowns along a singular vector; that of the first one is its estimate, if this is not 0. */
 static void report_ratio (const pw_fit *x, int combination) {
   double scale = 0;
-  for (int i = 0; i < x->unknowns.runs.count; i++) {
-    double change = x->vectors[i * x->unknowns.runs.count + combination] / x->length[i];
+  for (int i = 0; i < x->unknowns.count; i++) {
+    double change = x->vectors[i * x->unknowns.count + combination] / x->length[i];
     if (!report_contains (x, combination, i)) continue;
     printf (scale != 0 ? " : " : ": changes in the ratio ");
     if (scale == 0) scale = (x->x[i] != 0 ? x->x[i] : 1) / change;
@@ -119,11 +119,11 @@ static void report_ratio (const pw_fit *x, int combination) {
 }
 
 static void report_undetermined (const pw_fit *x) {
-  for (int k = x->rank; k < x->unknowns.runs.count; k++) {
+  for (int k = x->rank; k < x->unknowns.count; k++) {
     int count = 0;
-    for (int i = 0; i < x->unknowns.runs.count; i++)
+    for (int i = 0; i < x->unknowns.count; i++)
       if (report_contains (x, k, i))
-        pw_cli_print (stdout, "%s%s", count++ ? ", " : "\nThe data do not determine ", x->unknowns.runs.list[i].name);
+        pw_cli_print (stdout, "%s%s", count++ ? ", " : "\nThe data do not determine ", x->unknowns.list[i].name);
     if (count == 1)
       puts (", which has no effect");
     else
@@ -142,7 +142,7 @@ static void report_minima (const pw_fit *x) {
   const double *next = NULL;
   int same = 0;
   for (int i = 0; i < x->starts; i++) {
-    const double *minimum = x->minimum + i * (1 + x->unknowns.runs.count);
+    const double *minimum = x->minimum + i * (1 + x->unknowns.count);
     same += report_same (x, minimum);
     if (!report_same (x, minimum) && isfinite (*minimum) && (next == NULL || *minimum < *next)) next = minimum;
   }
@@ -175,7 +175,7 @@ void pw_fit_print (const pw_fit *x) {
 /* ---- Files ---- */
 
 static void report_json_unknown (const pw_fit *x, pw_json *j, int i) {
-  const pw_unknown *u = x->unknowns.runs.list + i;
+  const pw_unknown *u = x->unknowns.list + i;
   j->line = 1;
   pw_json_open (j, NULL, '{');
   pw_json_text (j, "name", u->name);
@@ -212,7 +212,7 @@ static void report_json_columns (const pw_fit *x, pw_json *j) {
 
 /* Rows of a square matrix of the unknowns. */
 static void report_json_matrix (const pw_fit *x, pw_json *j, const char *key, int correlation) {
-  int n = x->unknowns.runs.count;
+  int n = x->unknowns.count;
   pw_json_open (j, key, '[');
   for (int i = 0; i < n; i++) {
     j->line = 1;
@@ -226,7 +226,7 @@ static void report_json_matrix (const pw_fit *x, pw_json *j, const char *key, in
 
 /* Where each search ended. */
 static void report_json_minima (const pw_fit *x, pw_json *j) {
-  int n = x->unknowns.runs.count;
+  int n = x->unknowns.count;
   pw_json_open (j, "searches", '[');
   for (const double *minimum = x->minimum; minimum < x->minimum + x->starts * (1 + n); minimum += 1 + n) {
     j->line = 1;
@@ -249,7 +249,7 @@ void pw_fit_json (const pw_fit *x, const char *status, FILE *f) {
   pw_json_text (j, "status", status);
   pw_json_text (j, "data", x->data_path);
   pw_json_text (j, "options", pw_unknowns_options (&x->unknowns, x->x, options, sizeof options) ? options : NULL);
-  pw_json_text (j, "method", x->unknowns.runs.method);
+  pw_json_text (j, "method", x->unknowns.method);
   pw_json_number (j, "residuals", x->residuals);
   pw_json_number (j, "freedom", pw_fit_freedom (x));
   pw_json_flag (j, "weighted", x->weighted);
@@ -260,7 +260,7 @@ void pw_fit_json (const pw_fit *x, const char *status, FILE *f) {
   pw_json_number (j, "iterations", x->iterations);
   pw_json_text (j, "derivatives", x->by_differences ? "differences" : "variational");
   pw_json_open (j, "unknowns", '[');
-  for (int i = 0; i < x->unknowns.runs.count; i++) report_json_unknown (x, j, i);
+  for (int i = 0; i < x->unknowns.count; i++) report_json_unknown (x, j, i);
   pw_json_close (j, ']');
   report_json_columns (x, j);
   report_json_matrix (x, j, "covariance", 0);

@@ -34,10 +34,10 @@ int pw_fit_run (const pw_fit *x, const double *unknowns, double *out, pw_error *
   double *row = calloc ((size_t)x->columns, sizeof *row);
   int status = row ? PW_OK : pw_fail (error, PW_RESOURCE, "out of memory");
   if (status != PW_OK) return status;
-  status = pw_unknowns_system (&x->unknowns, unknowns, &m, &settings, &limit, error);
+  status = pw_unknowns_prepare (&m, &settings, &limit, &x->unknowns, unknowns, error);
   if (status == PW_OK) status = pw_outcomes_open (&o, m.system, "--columns", x->name, x->columns, error);
   settings.ledger = o.ledger;
-  pw_run *r = status == PW_OK ? pw_run_open (m.system, x->unknowns.runs.method, &settings, error) : NULL;
+  pw_run *r = status == PW_OK ? pw_run_open (m.system, x->unknowns.method, &settings, error) : NULL;
   if (status == PW_OK) status = r ? fit_sample (x, &o, r, out, row, error) : error->status;
   if (status == PW_STOPPED) status = pw_limit_fail (&limit, pw_run_time (r), error);
   if (r) pw_run_close (r);
@@ -64,10 +64,10 @@ double pw_fit_quantile (const pw_fit *x) {
 static double jacobian_smooth (const pw_fit *x) {
   const pw_method *method;
   int stabilisation;
-  if (pw_method_parse (x->unknowns.runs.method, &method, &stabilisation, NULL) != PW_OK ||
-      !pw_method_adaptive (method, x->unknowns.runs.method))
+  if (pw_method_parse (x->unknowns.method, &method, &stabilisation, NULL) != PW_OK ||
+      !pw_method_adaptive (method, x->unknowns.method))
     return DBL_EPSILON;
-  return x->unknowns.runs.settings.rtol > 0 ? x->unknowns.runs.settings.rtol : 1e-6;
+  return x->unknowns.settings.rtol > 0 ? x->unknowns.settings.rtol : 1e-6;
 }
 
 double pw_fit_noise (const pw_fit *x) {
@@ -87,8 +87,8 @@ typedef struct {
 static void jacobian_side (void *context, int task) {
   jacobian_differences *d = context;
   const pw_fit *x = d->x;
-  const pw_unknown *u = x->unknowns.runs.list + task / 2;
-  int n = x->unknowns.runs.count;
+  const pw_unknown *u = x->unknowns.list + task / 2;
+  int n = x->unknowns.count;
   double *at = malloc ((size_t)n * sizeof *at), size = fmax (fabs (d->at[task / 2]), 1e-2 * u->scale);
   if (at == NULL) {
     pw_fail (d->error + task, PW_RESOURCE, "out of memory");
@@ -121,7 +121,7 @@ static int jacobian_column (const jacobian_differences *d, int j, const double *
 
 static int jacobian_by_differences (pw_fit *x, const double *at, const double *model, double *jacobian,
                                     pw_error *error) {
-  size_t n = (size_t)x->unknowns.runs.count, cells = (size_t)x->columns * (size_t)x->rows;
+  size_t n = (size_t)x->unknowns.count, cells = (size_t)x->columns * (size_t)x->rows;
   jacobian_differences d = { x, at, malloc ((2 * n * cells + 2 * n) * sizeof *d.run), NULL,
                              calloc (2 * n, sizeof *d.error) };
   int status = d.run && d.error ? PW_OK : pw_fail (error, PW_RESOURCE, "out of memory");
@@ -130,7 +130,7 @@ static int jacobian_by_differences (pw_fit *x, const double *at, const double *m
     status = pw_parallel (x->jobs, (int)(2 * n), jacobian_side, &d, error);
     x->runs += 2 * (long)n;
   }
-  for (int j = 0; j < x->unknowns.runs.count && status == PW_OK; j++)
+  for (int j = 0; j < x->unknowns.count && status == PW_OK; j++)
     status = jacobian_column (&d, j, model, jacobian + (size_t)j * cells, error);
   free (d.run);
   free (d.error);
@@ -141,7 +141,7 @@ static int jacobian_by_differences (pw_fit *x, const double *at, const double *m
 
 /* Derivatives at the time of a row. */
 static int jacobian_row (pw_sensitivity *s, const pw_fit *x, int row, double *jacobian, pw_error *error) {
-  const int n = x->unknowns.runs.count;
+  const int n = x->unknowns.count;
   int status = pw_sensitivity_at (s, x->t[row], error);
   for (int i = 0; i < x->columns && status == PW_OK; i++) {
     const double *slope = s->slope + s->outcomes.outcome[i].term[0] * n;
@@ -154,8 +154,8 @@ static int jacobian_row (pw_sensitivity *s, const pw_fit *x, int row, double *ja
 }
 
 static int jacobian_by_variation (const pw_fit *x, const double *at, double *jacobian, pw_error *error) {
-  pw_sensitivity s;
-  int status = pw_unknowns_differentiate (&x->unknowns, at, x->name, &s, error);
+  pw_sensitivity s = { .of = x->name, .unknowns = x->unknowns, .no_error = 1 };
+  int status = pw_sensitivity_open (&s, at, error);
   if (status == PW_OK) status = pw_sensitivity_start (&s, error);
   for (int row = 0; row < x->rows && status == PW_OK; row++) status = jacobian_row (&s, x, row, jacobian, error);
   if (status == PW_STOPPED) status = pw_limit_fail (&s.limit, pw_run_time (s.base.run), error);

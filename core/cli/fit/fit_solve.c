@@ -54,10 +54,10 @@ static double solve_start (const pw_unknown *k, double value) {
 
 static int solve_at (solution *p, const gsl_vector *u) {
   pw_fit *x = p->x;
-  int n = x->unknowns.runs.count, same = p->known;
+  int n = x->unknowns.count, same = p->known;
   pw_error own = { 0 };
   for (int i = 0; i < n; i++) {
-    double value = solve_unknown (x->unknowns.runs.list + i, gsl_vector_get (u, (size_t)i));
+    double value = solve_unknown (x->unknowns.list + i, gsl_vector_get (u, (size_t)i));
     same &= value == p->at[i];
     p->at[i] = value;
   }
@@ -99,8 +99,8 @@ static int solve_derivatives (const gsl_vector *u, void *context, gsl_matrix *J)
   if (u && solve_at (p, u) != PW_OK) return GSL_EBADFUNC;
   p->status = pw_fit_jacobian (x, p->at, p->model, p->jacobian, p->error);
   if (p->status != PW_OK) return GSL_EBADFUNC;
-  for (int j = 0; j < x->unknowns.runs.count; j++) {
-    double slope = u ? solve_slope (x->unknowns.runs.list + j, gsl_vector_get (u, (size_t)j)) : 1;
+  for (int j = 0; j < x->unknowns.count; j++) {
+    double slope = u ? solve_slope (x->unknowns.list + j, gsl_vector_get (u, (size_t)j)) : 1;
     for (int i = 0, k = 0; i < cells; i++)
       if (!isnan (x->value[i]))
         gsl_matrix_set (J, (size_t)k++, (size_t)j,
@@ -116,8 +116,8 @@ static void solve_reached (const solution *p, const gsl_vector *u, double size) 
   pw_fit *x = p->x;
   if (isfinite (p->least) || !p->known) return;
   x->chi2 = size * size;
-  for (int i = 0; i < x->unknowns.runs.count; i++)
-    x->x[i] = solve_unknown (x->unknowns.runs.list + i, gsl_vector_get (u, (size_t)i));
+  for (int i = 0; i < x->unknowns.count; i++)
+    x->x[i] = solve_unknown (x->unknowns.list + i, gsl_vector_get (u, (size_t)i));
   memcpy (x->model, p->model, (size_t)x->columns * (size_t)x->rows * sizeof *x->model);
 }
 
@@ -136,7 +136,7 @@ static void solve_progress (const size_t iteration, void *context, const gsl_mul
 /* Stores the minimum that a search has reached. */
 static void solve_keep (solution *p, double *minimum) {
   pw_fit *x = p->x;
-  size_t n = (size_t)x->unknowns.runs.count, cells = (size_t)x->columns * (size_t)x->rows;
+  size_t n = (size_t)x->unknowns.count, cells = (size_t)x->columns * (size_t)x->rows;
   *minimum = 0;
   for (size_t i = 0; i < cells; i++)
     if (!isnan (x->value[i])) *minimum += pow ((p->model[i] - x->value[i]) / x->sigma[i], 2);
@@ -150,14 +150,14 @@ static void solve_keep (solution *p, double *minimum) {
 /* A search; without a result, only that from the initial values fails. */
 static int solve_minimum (solution *p, gsl_multifit_nlinear_workspace *w, double *minimum) {
   pw_fit *x = p->x;
-  size_t n = (size_t)x->unknowns.runs.count;
+  size_t n = (size_t)x->unknowns.count;
   gsl_multifit_nlinear_fdf f = {
     .f = solve_residuals, .df = solve_derivatives, .n = (size_t)x->residuals, .p = n, .params = p
   };
   gsl_vector *u = gsl_vector_alloc (n);
   int info;
   if (u == NULL) return pw_fail (p->error, PW_RESOURCE, "out of memory");
-  for (size_t i = 0; i < n; i++) gsl_vector_set (u, i, solve_start (x->unknowns.runs.list + i, minimum[1 + i]));
+  for (size_t i = 0; i < n; i++) gsl_vector_set (u, i, solve_start (x->unknowns.list + i, minimum[1 + i]));
   *minimum = INFINITY;
   p->worst = 0;
   int first = x->runs == 0, status = solve_at (p, u) == PW_OK ? gsl_multifit_nlinear_init (u, &f, w) : GSL_EBADFUNC;
@@ -176,7 +176,7 @@ static int solve_minimum (solution *p, gsl_multifit_nlinear_workspace *w, double
 /* Searches from all starts. */
 static int solve_minima (solution *p, gsl_multifit_nlinear_workspace *w) {
   pw_fit *x = p->x;
-  size_t n = (size_t)x->unknowns.runs.count, starts = (size_t)x->starts;
+  size_t n = (size_t)x->unknowns.count, starts = (size_t)x->starts;
   double *point = pw_unknowns_starts (&x->unknowns, x->starts, 1);
   x->minimum = malloc (starts * (1 + n) * sizeof *x->minimum);
   if (point == NULL || x->minimum == NULL) p->status = pw_fail (p->error, PW_RESOURCE, "out of memory");
@@ -198,15 +198,15 @@ static int solve_minima (solution *p, gsl_multifit_nlinear_workspace *w) {
 /* Makes the lengths of columns 1, or 0 without effect. */
 static void solve_scale (pw_fit *x, gsl_matrix *J) {
   double largest = 0, *size = x->length;
-  int n = x->unknowns.runs.count;
+  int n = x->unknowns.count;
   for (int j = 0; j < n; j++) {
     gsl_vector_view c = gsl_matrix_column (J, (size_t)j);
     size[j] = gsl_blas_dnrm2 (&c.vector);
-    largest = fmax (largest, size[j] * x->unknowns.runs.list[j].scale);
+    largest = fmax (largest, size[j] * x->unknowns.list[j].scale);
   }
   for (int j = 0; j < n; j++) {
     gsl_vector_view c = gsl_matrix_column (J, (size_t)j);
-    if (!(size[j] * x->unknowns.runs.list[j].scale > SOLVE_EFFECT * largest)) size[j] = 0;
+    if (!(size[j] * x->unknowns.list[j].scale > SOLVE_EFFECT * largest)) size[j] = 0;
     gsl_vector_scale (&c.vector, size[j] > 0 ? 1 / size[j] : 0);
   }
 }
@@ -214,8 +214,8 @@ static void solve_scale (pw_fit *x, gsl_matrix *J) {
 /* The residual is orthogonal to all columns of length 1 at a minimum; unknowns at a bound do not count. */
 static int solve_converged (const pw_fit *x, const gsl_matrix *J) {
   double size = sqrt (x->chi2), worst = 0, noise = fmax (SOLVE_GRADIENT, pw_fit_noise (x));
-  for (int j = 0; j < x->unknowns.runs.count; j++) {
-    const pw_unknown *u = x->unknowns.runs.list + j;
+  for (int j = 0; j < x->unknowns.count; j++) {
+    const pw_unknown *u = x->unknowns.list + j;
     double dot = 0, near = SOLVE_INSIDE * u->scale;
     if (x->x[j] - u->low < near || u->high - x->x[j] < near) continue;
     for (int i = 0, k = 0; i < x->columns * x->rows; i++)
@@ -229,7 +229,7 @@ static int solve_converged (const pw_fit *x, const gsl_matrix *J) {
 /* J = U S V^T with columns of length 1: the covariance is V S^-2 V^T, over the singular values that differ from 0. */
 static void solve_covariance (pw_fit *x) {
   const double *size = x->length;
-  int n = x->unknowns.runs.count;
+  int n = x->unknowns.count;
   double least = fmax (SOLVE_RANK, 10 * pw_fit_noise (x)) * x->singular[0];
   for (x->rank = 0; x->rank < n && x->singular[x->rank] > least;) x->rank++;
   int freedom = pw_fit_freedom (x);
@@ -250,7 +250,7 @@ static void solve_covariance (pw_fit *x) {
 
 static int solve_errors (solution *p) {
   pw_fit *x = p->x;
-  size_t n = (size_t)x->unknowns.runs.count;
+  size_t n = (size_t)x->unknowns.count;
   gsl_matrix *J = gsl_matrix_alloc ((size_t)x->residuals, n), *V = gsl_matrix_alloc (n, n);
   gsl_vector *S = gsl_vector_alloc (n);
   if (J == NULL || V == NULL || S == NULL) p->status = pw_fail (p->error, PW_RESOURCE, "out of memory");
@@ -273,7 +273,7 @@ static int solve_errors (solution *p) {
 
 static int solve_open (solution *p) {
   pw_fit *x = p->x;
-  size_t n = (size_t)x->unknowns.runs.count, cells = (size_t)x->columns * (size_t)x->rows;
+  size_t n = (size_t)x->unknowns.count, cells = (size_t)x->columns * (size_t)x->rows;
   p->at = calloc (n + (1 + n) * cells, sizeof *p->at);
   x->x = calloc (4 * n + 2 * n * n + cells, sizeof *x->x);
   if (p->at == NULL || x->x == NULL) return pw_fail (p->error, PW_RESOURCE, "out of memory");
@@ -287,14 +287,14 @@ int pw_fit_solve (pw_fit *x, pw_error *error) {
   solution p = { .x = x, .error = error };
   gsl_multifit_nlinear_parameters parameters = gsl_multifit_nlinear_default_parameters ();
   p.status = solve_open (&p);
-  gsl_multifit_nlinear_workspace *w =
-      p.status == PW_OK ? gsl_multifit_nlinear_alloc (gsl_multifit_nlinear_trust, &parameters, (size_t)x->residuals,
-                                                      (size_t)x->unknowns.runs.count)
-                        : NULL;
+  gsl_multifit_nlinear_workspace *w = p.status == PW_OK
+                                          ? gsl_multifit_nlinear_alloc (gsl_multifit_nlinear_trust, &parameters,
+                                                                        (size_t)x->residuals, (size_t)x->unknowns.count)
+                                          : NULL;
   if (p.status == PW_OK && w == NULL) p.status = pw_fail (error, PW_RESOURCE, "out of memory");
   if (p.status == PW_OK) solve_minima (&p, w);
   if (p.status == PW_OK) {
-    memcpy (p.at, x->x, (size_t)x->unknowns.runs.count * sizeof *x->x);
+    memcpy (p.at, x->x, (size_t)x->unknowns.count * sizeof *x->x);
     memcpy (p.model, x->model, (size_t)x->columns * (size_t)x->rows * sizeof *x->model);
     solve_errors (&p);
   }

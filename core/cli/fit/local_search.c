@@ -46,10 +46,10 @@ static int search_run (const search *p, pw_error *error) {
   pw_settings settings;
   pw_limit limit;
   char number[32];
-  int status = pw_unknowns_system (u, p->at, &m, &settings, &limit, error);
+  int status = pw_unknowns_prepare (&m, &settings, &limit, u, p->at, error);
   if (status == PW_OK) status = pw_outcomes_open (&o, m.system, "output", p->x->text, p->x->outputs, error);
   settings.ledger = o.ledger;
-  if (status == PW_OK) status = pw_outcomes_run (&o, u->runs.method, &settings, u->t_end, error);
+  if (status == PW_OK) status = pw_outcomes_run (&o, u->method, &settings, u->t_end, error);
   for (int i = 0; status == PW_OK && i < p->x->outputs; i++) {
     p->value[i] = pw_outcome_value (&o, i, NULL);
     if (!isfinite (p->value[i]))
@@ -64,15 +64,15 @@ static int search_run (const search *p, pw_error *error) {
 static int search_differentiate (search *p, pw_error *error) {
   const pw_unknowns *u = &p->x->unknowns;
   pw_progress silent = { 0 };
-  pw_sensitivity s;
-  int status = pw_unknowns_differentiate (u, p->at, p->x->text, &s, error);
+  pw_sensitivity s = { .of = p->x->text, .unknowns = *u, .no_error = 1 };
+  int status = pw_sensitivity_open (&s, p->at, error);
   if (status == PW_OK) status = pw_sensitivity_compute (&s, &silent, error);
   if (status == PW_OK && s.stopped) status = pw_limit_fail (&s.limit, pw_run_time (s.base.run), error);
   for (int i = 0; i < p->x->outputs && status == PW_OK; i++) {
     p->value[i] = pw_outcome_value (&s.outcomes, i, NULL);
-    for (int j = 0; j < u->runs.count && status == PW_OK; j++) {
-      double *slope = p->slope + i * u->runs.count + j;
-      *slope = u->runs.list[j].scale * pw_sensitivity_derivative (&s, i, j, s.end_slope);
+    for (int j = 0; j < u->count && status == PW_OK; j++) {
+      double *slope = p->slope + i * u->count + j;
+      *slope = u->list[j].scale * pw_sensitivity_derivative (&s, i, j, s.end_slope);
       if (!isfinite (p->value[i] + *slope)) status = pw_fail (error, PW_METHOD, "%s has no derivative", p->x->text[i]);
     }
   }
@@ -90,7 +90,7 @@ int pw_search_feasible (const pw_optimise *x, const double *value) {
 /* Appends the last run to those of the start. */
 static int search_store (search *p) {
   pw_search_start *s = p->s;
-  int n = p->x->unknowns.runs.count, width = n + p->x->outputs;
+  int n = p->x->unknowns.count, width = n + p->x->outputs;
   if (pw_grow (&s->trial, (size_t)s->runs, &s->room, (size_t)width * sizeof *s->trial) != PW_OK) return PW_RESOURCE;
   double *row = s->trial + s->runs++ * width;
   memcpy (row, p->at, (size_t)n * sizeof *row);
@@ -107,7 +107,7 @@ static void search_keep (search *p) {
   p->most = fmax (p->most, value);
   if (!pw_search_feasible (x, p->value) || (s->found && !(value < x->sign[0] * s->value[0]))) return;
   s->found = 1;
-  memcpy (s->best, p->at, (size_t)x->unknowns.runs.count * sizeof *s->best);
+  memcpy (s->best, p->at, (size_t)x->unknowns.count * sizeof *s->best);
   memcpy (s->value, p->value, (size_t)x->outputs * sizeof *s->value);
   pthread_mutex_lock (&x->lock);
   if (value < x->leading) {
@@ -136,11 +136,11 @@ static int search_try (search *p, int slopes, pw_error *error) {
 /* Runs with these scaled unknowns (slopes 1: with derivatives), unless the last run did. */
 static void search_evaluate (search *p, const double *u, int slopes) {
   pw_optimise *x = p->x;
-  int n = x->unknowns.runs.count;
+  int n = x->unknowns.count;
   pw_error own = { 0 };
   if (p->known && (p->sloped || !slopes) && memcmp (p->u, u, (size_t)n * sizeof *u) == 0) return;
   memcpy (p->u, u, (size_t)n * sizeof *u);
-  for (int i = 0; i < n; i++) p->at[i] = search_unknown (x->unknowns.runs.list + i, u[i]);
+  for (int i = 0; i < n; i++) p->at[i] = search_unknown (x->unknowns.list + i, u[i]);
   int status = search_try (p, slopes, &own);
   if (status == PW_RETRY || pw_stop) {
     nlopt_force_stop (p->opt);
@@ -162,7 +162,7 @@ static void search_evaluate (search *p, const double *u, int slopes) {
 
 /* The derivatives of factor x output. */
 static void search_gradient (const search *p, int output, double factor, double *gradient) {
-  int n = p->x->unknowns.runs.count;
+  int n = p->x->unknowns.count;
   for (int j = 0; gradient && j < n; j++) gradient[j] = p->failed || p->refused ? 0 : factor * p->slope[output * n + j];
 }
 
@@ -197,16 +197,16 @@ static double search_excess (unsigned n, const double *u, double *gradient, void
 /* Bounds and tolerances. */
 static int search_open (search *p, search_constraint *c, double first, double last) {
   const pw_unknowns *k = &p->x->unknowns;
-  int n = k->runs.count, status = 1;
+  int n = k->count, status = 1;
   nlopt_algorithm simple = n == 1 ? NLOPT_LN_SBPLX : NLOPT_LN_BOBYQA; /* BOBYQA needs two unknowns and no constraints */
   p->opt = nlopt_create (p->slope ? NLOPT_LD_SLSQP : p->x->outputs > 1 ? NLOPT_LN_COBYLA : simple, (unsigned)n);
   if (p->opt == NULL) return PW_RESOURCE;
   nlopt_set_min_objective (p->opt, search_objective, p);
   for (int i = 0; i < n; i++) {
-    if (isfinite (k->runs.list[i].low))
-      status &= nlopt_set_lower_bound (p->opt, i, search_scaled (k->runs.list + i, k->runs.list[i].low)) > 0;
-    if (isfinite (k->runs.list[i].high))
-      status &= nlopt_set_upper_bound (p->opt, i, search_scaled (k->runs.list + i, k->runs.list[i].high)) > 0;
+    if (isfinite (k->list[i].low))
+      status &= nlopt_set_lower_bound (p->opt, i, search_scaled (k->list + i, k->list[i].low)) > 0;
+    if (isfinite (k->list[i].high))
+      status &= nlopt_set_upper_bound (p->opt, i, search_scaled (k->list + i, k->list[i].high)) > 0;
   }
   for (int i = 1; i < p->x->outputs; i++) {
     c[i] = (search_constraint){ p, i };
@@ -219,7 +219,7 @@ static int search_open (search *p, search_constraint *c, double first, double la
 }
 
 static void search_point (const pw_unknowns *k, const double *x, double *u) {
-  for (int i = 0; i < k->runs.count; i++) u[i] = search_scaled (k->runs.list + i, x[i]);
+  for (int i = 0; i < k->count; i++) u[i] = search_scaled (k->list + i, x[i]);
 }
 
 /* Searches from u.  SLSQP may end early, where derivatives change much: it begins again at its result. */
@@ -237,7 +237,7 @@ static int search_repeat (search *p, double *u) {
 
 static int search_from (search *p, int slopes, double first, double last) {
   const pw_unknowns *k = &p->x->unknowns;
-  size_t n = (size_t)k->runs.count, outputs = (size_t)p->x->outputs;
+  size_t n = (size_t)k->count, outputs = (size_t)p->x->outputs;
   double *memory = calloc (3 * n + outputs + n * outputs, sizeof *memory);
   search_constraint *c = calloc (outputs, sizeof *c);
   int status = memory && c ? PW_OK : PW_RESOURCE;
@@ -275,6 +275,6 @@ void pw_search_rough (void *context, int i) {
 
 void pw_search_fine (void *context, int i) {
   pw_optimise *x = context;
-  int slopes = x->smooth && x->unknowns.runs.count >= SEARCH_SLOPES;
+  int slopes = x->smooth && x->unknowns.count >= SEARCH_SLOPES;
   search_task (x, x->starts + i, slopes, SEARCH_ROUGH, PW_SEARCH_FINE);
 }

@@ -18,7 +18,7 @@ static const double OPTIMISE_FAR = 1e6; /* in units of its scale: an unknown wit
 /* ---- Starts ---- */
 
 static int optimise_open_starts (pw_optimise *x, pw_error *error) {
-  int n = x->unknowns.runs.count, all = x->starts + OPTIMISE_POLISHED, failed = 0;
+  int n = x->unknowns.count, all = x->starts + OPTIMISE_POLISHED, failed = 0;
   double *point = pw_unknowns_starts (&x->unknowns, x->starts, x->seed);
   x->start = calloc ((size_t)all, sizeof *x->start);
   for (int i = 0; x->start && i < all; i++) {
@@ -48,7 +48,7 @@ static int optimise_continue (pw_optimise *x, pw_error *error) {
   if (used == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
   for (int best; x->polished < OPTIMISE_POLISHED && (best = optimise_best (x, x->starts, used)) >= 0;) {
     pw_search_start *s = x->start + x->starts + x->polished++;
-    memcpy (s->first, x->start[best].best, (size_t)x->unknowns.runs.count * sizeof *s->first);
+    memcpy (s->first, x->start[best].best, (size_t)x->unknowns.count * sizeof *s->first);
     for (int i = 0; i < x->starts; i++) used[i] |= (unsigned char)pw_optimise_same (x, x->start + i, x->start + best);
   }
   free (used);
@@ -141,8 +141,10 @@ static int optimise_open (pw_optimise *x, pw_output *file[2], int *folder, pw_er
   x->smooth = 1;
   if (status == PW_OK) status = optimise_outputs (x, 0, 1, x->maximise ? "--maximise" : "--minimise", error);
   if (status == PW_OK) status = optimise_outputs (x, 1, x->outputs - 1, "--subject-to", error);
-  if (status == PW_OK) status = pw_unknowns_open (&x->unknowns, &x->line, &x->m, x->free, 20. * x->starts, error);
-  if (status == PW_OK && x->unknowns.runs.count > PW_UNKNOWNS_STARTED)
+  if (status == PW_OK) status = pw_unknowns_open (&x->unknowns, &x->line, &x->m, error);
+  if (status == PW_OK) status = pw_unknowns_read (&x->unknowns, x->free, error);
+  if (status == PW_OK) pw_unknowns_engine (&x->unknowns, 20. * x->starts);
+  if (status == PW_OK && x->unknowns.count > PW_UNKNOWNS_STARTED)
     status = pw_fail (error, PW_INPUT, "--free: at most %d unknowns", PW_UNKNOWNS_STARTED);
   if (status == PW_OK) status = pw_cli_uses (&x->line, x->m.file, use, sizeof use / sizeof *use, error);
   if (status == PW_OK && x->path && (file[0] = pw_output_open (x->path, error)) == NULL) status = error->status;
@@ -174,8 +176,8 @@ static int optimise_converged (const pw_optimise *x, pw_error *error) {
   const pw_search_start *s = x->start + x->best;
   const pw_unknown *far = NULL;
   double most = 0;
-  for (int i = 0; i < x->unknowns.runs.count; i++) {
-    const pw_unknown *k = x->unknowns.runs.list + i;
+  for (int i = 0; i < x->unknowns.count; i++) {
+    const pw_unknown *k = x->unknowns.list + i;
     if (!k->given && fabs (s->best[i]) >= most * k->scale) far = k, most = fabs (s->best[i]) / k->scale;
   }
   if (s->converged && most < OPTIMISE_FAR) return PW_OK;

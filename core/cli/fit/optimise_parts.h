@@ -5,7 +5,7 @@
 #include <pthread.h>
 #include "outcome.h"
 #include "progress.h"
-#include "unknowns.h"
+#include "sensitivity.h"
 
 /* The search from one start.  Runs are its rows of `trial`. */
 typedef struct {

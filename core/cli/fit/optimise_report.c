@@ -10,8 +10,8 @@
 
 int pw_optimise_same (const pw_optimise *x, const pw_search_start *a, const pw_search_start *b) {
   int same = a->found && b->found;
-  for (int j = 0; same && j < x->unknowns.runs.count; j++)
-    same = fabs (a->best[j] - b->best[j]) <= OPTIMISE_SAME * x->unknowns.runs.list[j].scale;
+  for (int j = 0; same && j < x->unknowns.count; j++)
+    same = fabs (a->best[j] - b->best[j]) <= OPTIMISE_SAME * x->unknowns.list[j].scale;
   return same;
 }
 
@@ -37,16 +37,16 @@ static long report_runs (const pw_optimise *x, long *failed, const pw_error **fi
 
 /* The output of the first run, with the initial values; NaN if it failed. */
 static double report_initial (const pw_optimise *x) {
-  return x->start[0].runs > 0 ? x->start[0].trial[x->unknowns.runs.count] : NAN;
+  return x->start[0].runs > 0 ? x->start[0].trial[x->unknowns.count] : NAN;
 }
 
 /* 1 if the objective is the same in all runs that did not fail. */
 static int report_constant (const pw_optimise *x) {
   double least = INFINITY, most = -INFINITY;
-  int columns = x->unknowns.runs.count + x->outputs;
+  int columns = x->unknowns.count + x->outputs;
   for (int i = 0; i < x->starts + x->polished; i++)
     for (long k = 0; k < x->start[i].runs; k++) {
-      double value = x->start[i].trial[k * columns + x->unknowns.runs.count];
+      double value = x->start[i].trial[k * columns + x->unknowns.count];
       least = fmin (least, value), most = fmax (most, value);
     }
   return most - least <= 1e-14 * fabs (most);
@@ -54,7 +54,7 @@ static int report_constant (const pw_optimise *x) {
 
 /* 1 if outputs are the same in all runs that differ from the first one of their search in unknown i alone. */
 static int report_inert (const pw_optimise *x, int i) {
-  int n = x->unknowns.runs.count, columns = n + x->outputs, pairs = 0;
+  int n = x->unknowns.count, columns = n + x->outputs, pairs = 0;
   for (const pw_search_start *s = x->start; s < x->start + x->starts + x->polished; s++)
     for (long k = 1; k < s->runs; k++) {
       const double *a = s->trial, *b = a + k * columns;
@@ -69,7 +69,7 @@ static int report_inert (const pw_optimise *x, int i) {
 
 /* Whether the best value of unknown i, if that has an effect, is at its lower (-1) or upper bound. */
 static int report_side (const pw_optimise *x, int i) {
-  const pw_unknown *u = x->unknowns.runs.list + i;
+  const pw_unknown *u = x->unknowns.list + i;
   if (report_inert (x, i)) return 0;
   double near = 10 * PW_SEARCH_FINE * u->scale, value = x->start[x->best].best[i];
   return value - u->low <= near ? -1 : u->high - value <= near;
@@ -89,8 +89,8 @@ static void report_unknowns (const pw_optimise *x) {
     static const char *const head[] = { "free", "initially", "best", "from", "to", NULL };
     for (int i = 0; head[i]; i++) pw_cell (&t, i ? 12 : -12, head[i]);
     pw_row_end (&t);
-    for (int i = 0; i < x->unknowns.runs.count; i++) {
-      const pw_unknown *u = x->unknowns.runs.list + i;
+    for (int i = 0; i < x->unknowns.count; i++) {
+      const pw_unknown *u = x->unknowns.list + i;
       pw_cell_unit (&t, -12, u->name, u->unit);
       pw_cell_number (&t, 12, u->value, REPORT_DIGITS);
       pw_cell_number (&t, 12, x->start[x->best].best[i], REPORT_DIGITS);
@@ -148,7 +148,7 @@ void pw_optimise_print (const pw_optimise *x) {
 /* ---- JSON ---- */
 
 static void report_json_unknown (const pw_optimise *x, pw_json *j, int i) {
-  const pw_unknown *u = x->unknowns.runs.list + i;
+  const pw_unknown *u = x->unknowns.list + i;
   j->line = 1;
   pw_json_open (j, NULL, '{');
   pw_json_text (j, "name", u->name);
@@ -168,10 +168,10 @@ static void report_json_start (const pw_optimise *x, pw_json *j, const pw_search
   pw_json_number (j, "runs", (double)s->runs);
   pw_json_number (j, "failed", (double)s->failed);
   pw_json_open (j, "from", '[');
-  for (int i = 0; i < x->unknowns.runs.count; i++) pw_json_number (j, NULL, s->first[i]);
+  for (int i = 0; i < x->unknowns.count; i++) pw_json_number (j, NULL, s->first[i]);
   pw_json_close (j, ']');
   pw_json_open (j, "to", '[');
-  for (int i = 0; s->found && i < x->unknowns.runs.count; i++) pw_json_number (j, NULL, s->best[i]);
+  for (int i = 0; s->found && i < x->unknowns.count; i++) pw_json_number (j, NULL, s->best[i]);
   pw_json_close (j, ']');
   pw_json_close (j, '}');
 }
@@ -200,7 +200,7 @@ void pw_optimise_json (const pw_optimise *x, const char *status, FILE *f) {
   pw_json_number (j, "initial", report_initial (x));
   pw_json_text (j, "options",
                 pw_unknowns_options (&x->unknowns, x->start[x->best].best, options, sizeof options) ? options : NULL);
-  pw_json_text (j, "method", x->unknowns.runs.method);
+  pw_json_text (j, "method", x->unknowns.method);
   pw_json_number (j, "t_end", x->unknowns.t_end);
   pw_json_number (j, "seed", x->seed);
   pw_json_number (j, "runs", (double)runs);
@@ -208,7 +208,7 @@ void pw_optimise_json (const pw_optimise *x, const char *status, FILE *f) {
   pw_json_number (j, "derivatives", (double)report_derivatives (x));
   pw_json_text (j, "reason", first ? first->text : "");
   pw_json_open (j, "unknowns", '[');
-  for (int i = 0; i < x->unknowns.runs.count; i++) report_json_unknown (x, j, i);
+  for (int i = 0; i < x->unknowns.count; i++) report_json_unknown (x, j, i);
   pw_json_close (j, ']');
   pw_json_open (j, "constraints", '[');
   for (int i = 1; i < x->outputs; i++) report_json_constraint (x, j, i);
@@ -260,11 +260,11 @@ void pw_optimise_yaml (const pw_optimise *x, FILE *f) {
   report_quoted (f, x->maximise ? "maximise" : "minimise", x->objective);
   fprintf (f, "value: %s\n", pw_format (number, s->value[0], 17));
   for (int initial = 0; initial < 2; initial++)
-    for (int i = 0, first = 1; i < x->unknowns.runs.count; i++) {
-      if ((x->unknowns.runs.list[i].parameter == NULL) != initial) continue;
+    for (int i = 0, first = 1; i < x->unknowns.count; i++) {
+      if ((x->unknowns.list[i].parameter == NULL) != initial) continue;
       if (first) fputs (initial ? "start:\n" : "set:\n", f);
       first = 0;
-      fprintf (f, "  %s: %s\n", x->unknowns.runs.list[i].name, pw_format (number, s->best[i], 17));
+      fprintf (f, "  %s: %s\n", x->unknowns.list[i].name, pw_format (number, s->best[i], 17));
     }
 }
 
@@ -273,11 +273,11 @@ void pw_optimise_yaml (const pw_optimise *x, FILE *f) {
 /* A row per run: number of the start, unknowns, output, whether it satisfies the constraints. */
 static int report_data (const void *context, FILE *f, pw_error *error) {
   const pw_optimise *x = context;
-  int n = x->unknowns.runs.count, width = n + x->outputs;
+  int n = x->unknowns.count, width = n + x->outputs;
   char number[32];
   (void)error;
   fputs ("# start", f);
-  for (int i = 0; i < n; i++) fprintf (f, ", %s [%s]", x->unknowns.runs.list[i].name, x->unknowns.runs.list[i].unit);
+  for (int i = 0; i < n; i++) fprintf (f, ", %s [%s]", x->unknowns.list[i].name, x->unknowns.list[i].unit);
   fprintf (f, ", %s, 1 if the constraints are satisfied\n", x->objective);
   for (int i = 0; i < x->starts + x->polished; i++)
     for (long k = 0; k < x->start[i].runs; k++) {
@@ -291,12 +291,12 @@ static int report_data (const void *context, FILE *f, pw_error *error) {
 
 static void report_variables (const void *context, FILE *f) {
   const pw_optimise *x = context;
-  int panels = x->unknowns.runs.count < REPORT_PANELS ? x->unknowns.runs.count : REPORT_PANELS;
+  int panels = x->unknowns.count < REPORT_PANELS ? x->unknowns.count : REPORT_PANELS;
   char unit[80], number[32];
   fprintf (f, "constraints = %d\npanels = %d\nunknowns = %d\narray label[%d]\narray best[%d]\n", x->outputs - 1, panels,
-           x->unknowns.runs.count, panels, panels);
+           x->unknowns.count, panels, panels);
   for (int i = 0; i < panels; i++) {
-    pw_figure_label (f, "label", i + 1, x->unknowns.runs.list[i].name, x->unknowns.runs.list[i].unit);
+    pw_figure_label (f, "label", i + 1, x->unknowns.list[i].name, x->unknowns.list[i].unit);
     fprintf (f, "best[%d] = %s\n", i + 1, pw_format (number, x->start[x->best].best[i], 12));
   }
   pw_figure_label (f, "objective", 0, x->objective, report_unit (x, 0, unit, sizeof unit));
