@@ -15,9 +15,9 @@ typedef struct {
   double confidence;
   int jobs, starts;
   /* data: `columns` arrays of `rows` each, one after the other */
-  char *names;       /* copies of the texts of --columns and --sigma */
-  const char **name; /* columns */
-  double *table;     /* as read: times, data, columns with standard deviations */
+  char *names;               /* copy of the text of --columns */
+  const char **name, **unit; /* columns */
+  double *table;             /* as read: times, data, columns with standard deviations */
   int columns, rows;
   const double *t, *value; /* rows [s]; columns x rows, NaN: none */
   double *sigma;           /* columns x rows: standard deviations */

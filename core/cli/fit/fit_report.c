@@ -35,11 +35,6 @@ static double report_rms (const pw_fit *x, int column, int *count) {
   return sqrt (sum / *count);
 }
 
-static const char *report_unit (const pw_fit *x, int column) {
-  pw_column c;
-  return pw_column_find (x->m.system, x->name[column], "", &c, NULL) == PW_OK ? pw_column_unit (x->m.system, c) : "";
-}
-
 /* ---- Text ---- */
 
 static void report_unknowns (const pw_fit *x) {
@@ -92,7 +87,7 @@ static void report_columns (const pw_fit *x) {
     for (int i = 0; i < x->columns; i++) {
       int count;
       double rms = report_rms (x, i, &count);
-      pw_cell_unit (&t, -12, x->name[i], report_unit (x, i));
+      pw_cell_unit (&t, -12, x->name[i], x->unit[i]);
       pw_cell_number (&t, 8, count, 9);
       pw_cell_number (&t, 12, rms, 4);
       pw_row_end (&t);
@@ -202,7 +197,7 @@ static void report_json_columns (const pw_fit *x, pw_json *j) {
     j->line = 1;
     pw_json_open (j, NULL, '{');
     pw_json_text (j, "name", x->name[i]);
-    pw_json_text (j, "unit", report_unit (x, i));
+    pw_json_text (j, "unit", x->unit[i]);
     pw_json_number (j, "data", count);
     pw_json_number (j, "rms", rms);
     pw_json_close (j, '}');
@@ -277,7 +272,7 @@ int pw_fit_table (const pw_fit *x, FILE *f, pw_error *error) {
   for (int i = 0; i < x->columns; i++)
     for (int k = 0; k < 4; k++) {
       snprintf (name, sizeof name, "%s%s", x->name[i], part[k]);
-      pw_text_name (&t, name, report_unit (x, i));
+      pw_text_name (&t, name, x->unit[i]);
     }
   int status = pw_text_line (&t, f, x->path, error);
   for (int row = 0; row < x->rows && status == PW_OK; row++) {
@@ -316,7 +311,7 @@ static void report_variables (const void *context, FILE *f) {
   const pw_fit *x = context;
   int panels = x->columns < REPORT_PANELS ? x->columns : REPORT_PANELS;
   fprintf (f, "panels = %d\nweighted = %d\narray label[%d]\n", panels, x->weighted, panels);
-  for (int i = 0; i < panels; i++) pw_figure_label (f, "label", i + 1, x->name[i], report_unit (x, i));
+  for (int i = 0; i < panels; i++) pw_figure_label (f, "label", i + 1, x->name[i], x->unit[i]);
 }
 
 int pw_fit_draw (const pw_fit *x, pw_error *error) {

@@ -40,7 +40,7 @@ int pw_fit_run (const pw_fit *x, const double *unknowns, double *out, pw_error *
   pw_run *r = status == PW_OK ? pw_run_open (m.system, x->unknowns.method, &settings, error) : NULL;
   if (status == PW_OK) status = r ? fit_sample (x, &o, r, out, row, error) : error->status;
   if (status == PW_STOPPED) status = pw_limit_fail (&limit, pw_run_time (r), error);
-  if (r) pw_run_close (r);
+  pw_run_close (r);
   pw_outcomes_close (&o);
   pw_cli_close_model (&m);
   free (row);
@@ -75,12 +75,11 @@ double pw_fit_noise (const pw_fit *x) {
   return x->by_differences ? pow (smooth, 2. / 3) : fmax (smooth, JACOBIAN_EXACT);
 }
 
-/* Runs on both sides of each unknown. */
+/* Runs on both sides of each unknown: task 2 j below, 2 j + 1 above. */
 typedef struct {
   const pw_fit *x;
-  const double *at;
-  double *run, *step; /* 2 unknowns arrays; distances from `at` */
-  pw_error *error;    /* 2 unknowns */
+  double *at, *run, *step; /* of each task: unknowns, values of the run, distance from the middle */
+  pw_error *error;
 } jacobian_differences;
 
 /* The step balances the truncation error, proportional to its square, and the noise, divided by the step. */
@@ -88,18 +87,12 @@ static void jacobian_side (void *context, int task) {
   jacobian_differences *d = context;
   const pw_fit *x = d->x;
   const pw_unknown *u = x->unknowns.list + task / 2;
-  int n = x->unknowns.count;
-  double *at = malloc ((size_t)n * sizeof *at), size = fmax (fabs (d->at[task / 2]), 1e-2 * u->scale);
-  if (at == NULL) {
-    pw_fail (d->error + task, PW_RESOURCE, "out of memory");
-    return;
-  }
-  memcpy (at, d->at, (size_t)n * sizeof *at);
-  at[task / 2] = fmin (fmax (at[task / 2] + (task % 2 ? 1 : -1) * size * cbrt (jacobian_smooth (x)), u->low), u->high);
-  d->step[task] = at[task / 2] - d->at[task / 2];
-  int status = pw_fit_run (x, at, d->run + (size_t)task * (size_t)x->columns * (size_t)x->rows, d->error + task);
-  d->error[task].status = status;
-  free (at);
+  double *at = d->at + task * x->unknowns.count, *value = at + task / 2, middle = *value;
+  double size = fmax (fabs (middle), 1e-2 * u->scale) * cbrt (jacobian_smooth (x));
+  *value = fmin (fmax (middle + (task % 2 ? size : -size), u->low), u->high);
+  d->step[task] = *value - middle;
+  pw_error *error = d->error + task;
+  error->status = pw_fit_run (x, at, d->run + (size_t)task * (size_t)x->columns * (size_t)x->rows, error);
 }
 
 /* One side is enough, if the other one fails. */
@@ -122,17 +115,18 @@ static int jacobian_column (const jacobian_differences *d, int j, const double *
 static int jacobian_by_differences (pw_fit *x, const double *at, const double *model, double *jacobian,
                                     pw_error *error) {
   size_t n = (size_t)x->unknowns.count, cells = (size_t)x->columns * (size_t)x->rows;
-  jacobian_differences d = { x, at, malloc ((2 * n * cells + 2 * n) * sizeof *d.run), NULL,
-                             calloc (2 * n, sizeof *d.error) };
-  int status = d.run && d.error ? PW_OK : pw_fail (error, PW_RESOURCE, "out of memory");
+  jacobian_differences d = { .x = x, .at = malloc (2 * n * (n + cells + 1) * sizeof *d.at) };
+  d.error = calloc (2 * n, sizeof *d.error);
+  int status = d.at && d.error ? PW_OK : pw_fail (error, PW_RESOURCE, "out of memory");
   if (status == PW_OK) {
-    d.step = d.run + 2 * n * cells;
+    d.run = d.at + 2 * n * n, d.step = d.run + 2 * n * cells;
+    for (size_t task = 0; task < 2 * n; task++) memcpy (d.at + task * n, at, n * sizeof *at);
     status = pw_parallel (x->jobs, (int)(2 * n), jacobian_side, &d, error);
     x->runs += 2 * (long)n;
   }
   for (int j = 0; j < x->unknowns.count && status == PW_OK; j++)
     status = jacobian_column (&d, j, model, jacobian + (size_t)j * cells, error);
-  free (d.run);
+  free (d.at);
   free (d.error);
   return status;
 }

@@ -20,6 +20,7 @@ enum { SOLVE_ITERATIONS = 100 };
 
 typedef struct {
   pw_fit *x;
+  double *u;                     /* where a search begins and ends */
   double *at, *model, *jacobian; /* unknowns of the last run; its values; derivatives */
   int known, status;
   double worst; /* largest residual norm of a run that succeeded */
@@ -154,10 +155,10 @@ static int solve_minimum (solution *p, gsl_multifit_nlinear_workspace *w, double
   gsl_multifit_nlinear_fdf f = {
     .f = solve_residuals, .df = solve_derivatives, .n = (size_t)x->residuals, .p = n, .params = p
   };
-  gsl_vector *u = gsl_vector_alloc (n);
+  gsl_vector_view view = gsl_vector_view_array (p->u, n);
+  gsl_vector *u = &view.vector;
   int info;
-  if (u == NULL) return pw_fail (p->error, PW_RESOURCE, "out of memory");
-  for (size_t i = 0; i < n; i++) gsl_vector_set (u, i, solve_start (x->unknowns.list + i, minimum[1 + i]));
+  for (size_t i = 0; i < n; i++) p->u[i] = solve_start (x->unknowns.list + i, minimum[1 + i]);
   *minimum = INFINITY;
   p->worst = 0;
   int first = x->runs == 0, status = solve_at (p, u) == PW_OK ? gsl_multifit_nlinear_init (u, &f, w) : GSL_EBADFUNC;
@@ -169,7 +170,6 @@ static int solve_minimum (solution *p, gsl_multifit_nlinear_workspace *w, double
     if (solve_at (p, u) == PW_OK) solve_keep (p, minimum);
   } else if (p->status == PW_OK && first)
     p->status = pw_fail (p->error, PW_METHOD, "least squares: %s", gsl_strerror (status));
-  gsl_vector_free (u);
   return p->status;
 }
 
@@ -251,21 +251,18 @@ static void solve_covariance (pw_fit *x) {
 static int solve_errors (solution *p) {
   pw_fit *x = p->x;
   size_t n = (size_t)x->unknowns.count;
-  gsl_matrix *J = gsl_matrix_alloc ((size_t)x->residuals, n), *V = gsl_matrix_alloc (n, n);
-  gsl_vector *S = gsl_vector_alloc (n);
-  if (J == NULL || V == NULL || S == NULL) p->status = pw_fail (p->error, PW_RESOURCE, "out of memory");
-  if (p->status == PW_OK) solve_derivatives (NULL, p, J);
+  gsl_matrix *J = gsl_matrix_alloc ((size_t)x->residuals, n);
+  gsl_matrix_view V = gsl_matrix_view_array (x->vectors, n, n);
+  gsl_vector_view S = gsl_vector_view_array (x->singular, n);
+  if (J == NULL) return pw_fail (p->error, PW_RESOURCE, "out of memory");
+  solve_derivatives (NULL, p, J);
   if (p->status == PW_OK) {
     solve_scale (x, J);
     x->converged = solve_converged (x, J);
-    gsl_linalg_SV_decomp_jacobi (J, V, S);
-    for (size_t i = 0; i < n; i++) x->singular[i] = gsl_vector_get (S, i);
-    for (size_t i = 0; i < n * n; i++) x->vectors[i] = gsl_matrix_get (V, i / n, i % n);
+    gsl_linalg_SV_decomp_jacobi (J, &V.matrix, &S.vector);
     solve_covariance (x);
   }
-  if (J) gsl_matrix_free (J);
-  if (V) gsl_matrix_free (V);
-  if (S) gsl_vector_free (S);
+  gsl_matrix_free (J);
   return p->status;
 }
 
@@ -274,10 +271,10 @@ static int solve_errors (solution *p) {
 static int solve_open (solution *p) {
   pw_fit *x = p->x;
   size_t n = (size_t)x->unknowns.count, cells = (size_t)x->columns * (size_t)x->rows;
-  p->at = calloc (n + (1 + n) * cells, sizeof *p->at);
+  p->at = calloc (2 * n + (1 + n) * cells, sizeof *p->at);
   x->x = calloc (4 * n + 2 * n * n + cells, sizeof *x->x);
   if (p->at == NULL || x->x == NULL) return pw_fail (p->error, PW_RESOURCE, "out of memory");
-  p->model = p->at + n, p->jacobian = p->model + cells;
+  p->u = p->at + n, p->model = p->u + n, p->jacobian = p->model + cells;
   x->deviation = x->x + n, x->singular = x->deviation + n, x->length = x->singular + n, x->covariance = x->length + n;
   x->vectors = x->covariance + n * n, x->model = x->vectors + n * n;
   return PW_OK;
@@ -296,7 +293,7 @@ int pw_fit_solve (pw_fit *x, pw_error *error) {
   if (p.status == PW_OK) {
     memcpy (p.at, x->x, (size_t)x->unknowns.count * sizeof *x->x);
     memcpy (p.model, x->model, (size_t)x->columns * (size_t)x->rows * sizeof *x->model);
-    solve_errors (&p);
+    p.status = solve_errors (&p);
   }
   if (w) gsl_multifit_nlinear_free (w);
   free (p.at);
