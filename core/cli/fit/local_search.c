@@ -22,6 +22,7 @@ typedef struct {
   pw_search_start *s;
   nlopt_opt opt;
   double *u, *at, *value; /* the last run: scaled unknowns, unknowns, outputs */
+  double *allowed;        /* outputs: excess of the constraints of which the search does not take notice */
   double *slope;          /* outputs x unknowns: derivatives with respect to scaled unknowns; NULL: without */
   int known, sloped;      /* 1: there was a run; with derivatives */
   int failed;             /* 1: the last run failed */
@@ -176,26 +177,24 @@ static double search_objective (unsigned n, const double *u, double *gradient, v
   return isfinite (p->most) ? p->most + fmax (p->most - p->least, 0.1 * fabs (p->most)) : 0;
 }
 
-typedef struct {
-  search *p;
-  int output;
-} search_constraint;
-
-/* In units of the bound; 1 for a run that failed. */
-static double search_excess (unsigned n, const double *u, double *gradient, void *context) {
-  const search_constraint *c = context;
-  const pw_optimise *x = c->p->x;
-  double bound = x->bound[c->output], factor = x->sign[c->output] / (bound != 0 ? fabs (bound) : 1);
-  (void)n;
-  search_evaluate (c->p, u, gradient != NULL);
-  search_gradient (c->p, c->output, factor, gradient);
-  return c->p->failed ? 1 : factor * (c->p->value[c->output] - bound);
+/* The constraints, in units of their bounds; 1 for a run that failed. */
+static void search_excess (unsigned count, double *excess, unsigned n, const double *u, double *gradient,
+                           void *context) {
+  search *p = context;
+  const pw_optimise *x = p->x;
+  search_evaluate (p, u, gradient != NULL);
+  for (unsigned i = 0; i < count; i++) {
+    int output = 1 + (int)i;
+    double bound = x->bound[output], factor = x->sign[output] / (bound != 0 ? fabs (bound) : 1);
+    excess[i] = p->failed ? 1 : factor * (p->value[output] - bound);
+    search_gradient (p, output, factor, gradient ? gradient + i * n : NULL);
+  }
 }
 
 /* ---- Searches ---- */
 
 /* Bounds and tolerances. */
-static int search_open (search *p, search_constraint *c, double first, double last) {
+static int search_open (search *p, double first, double last) {
   const pw_unknowns *k = &p->x->unknowns;
   int n = k->count, status = 1;
   nlopt_algorithm simple = n == 1 ? NLOPT_LN_SBPLX : NLOPT_LN_BOBYQA; /* BOBYQA needs two unknowns and no constraints */
@@ -208,10 +207,7 @@ static int search_open (search *p, search_constraint *c, double first, double la
     if (isfinite (k->list[i].high))
       status &= nlopt_set_upper_bound (p->opt, i, search_scaled (k->list + i, k->list[i].high)) > 0;
   }
-  for (int i = 1; i < p->x->outputs; i++) {
-    c[i] = (search_constraint){ p, i };
-    status &= nlopt_add_inequality_constraint (p->opt, search_excess, c + i, SEARCH_ALLOWED / 10) > 0;
-  }
+  status &= nlopt_add_inequality_mconstraint (p->opt, (unsigned)p->x->outputs - 1, search_excess, p, p->allowed) > 0;
   status &= nlopt_set_xtol_abs1 (p->opt, last) > 0;
   status &= nlopt_set_initial_step1 (p->opt, first) > 0;
   nlopt_set_maxeval (p->opt, 200 + 100 * n);
@@ -238,23 +234,22 @@ static int search_repeat (search *p, double *u) {
 static int search_from (search *p, int slopes, double first, double last) {
   const pw_unknowns *k = &p->x->unknowns;
   size_t n = (size_t)k->count, outputs = (size_t)p->x->outputs;
-  double *memory = calloc (3 * n + outputs + n * outputs, sizeof *memory);
-  search_constraint *c = calloc (outputs, sizeof *c);
-  int status = memory && c ? PW_OK : PW_RESOURCE;
+  double *memory = calloc (3 * n + 2 * outputs + n * outputs, sizeof *memory);
+  int status = memory ? PW_OK : PW_RESOURCE;
   if (status == PW_OK) {
-    p->u = memory, p->at = memory + n, p->value = memory + 2 * n;
-    double *u = p->value + outputs;
+    p->u = memory, p->at = memory + n, p->value = memory + 2 * n, p->allowed = p->value + outputs;
+    double *u = p->allowed + outputs;
     p->slope = slopes ? u + n : NULL;
     p->known = p->refused = 0;
+    for (size_t i = 0; i < outputs; i++) p->allowed[i] = SEARCH_ALLOWED / 10;
     search_point (k, p->s->first, u);
-    status = search_open (p, c, first, last);
+    status = search_open (p, first, last);
     if (status == PW_OK) search_evaluate (p, u, slopes);
     if (status == PW_OK) status = search_repeat (p, u);
   }
   nlopt_destroy (p->opt);
   p->opt = NULL;
   free (memory);
-  free (c);
   return status;
 }
 

@@ -55,6 +55,13 @@ static int optimise_continue (pw_optimise *x, pw_error *error) {
   return pw_parallel (x->jobs, x->polished, pw_search_fine, x, error);
 }
 
+static void optimise_count (pw_optimise *x) {
+  for (const pw_search_start *s = x->start; s < x->start + x->starts + x->polished; s++) {
+    x->runs += s->runs, x->failed += s->failed, x->derivatives += s->derivatives;
+    if (x->why == NULL && s->failed) x->why = &s->error;
+  }
+}
+
 static int optimise_search (pw_optimise *x, pw_error *error) {
   pw_stop_catch ();
   pthread_mutex_init (&x->lock, NULL);
@@ -65,6 +72,7 @@ static int optimise_search (pw_optimise *x, pw_error *error) {
   pthread_mutex_destroy (&x->lock);
   pw_stop_release ();
   x->best = optimise_best (x, x->starts + x->polished, NULL);
+  optimise_count (x);
   return x->error.status != PW_OK ? pw_fail (error, x->error.status, "%s", x->error.text) : status;
 }
 
@@ -90,8 +98,10 @@ static int optimise_texts (pw_optimise *x, pw_error *error) {
   for (const char **c = x->subject; c && *c; c++) count++, size += strlen (*c) + 1;
   x->texts = malloc (size);
   x->text = calloc (count + 1, sizeof *x->text);
+  x->unit = calloc (count, sizeof *x->unit);
   x->bound = calloc (2 * count, sizeof *x->bound);
-  if (x->texts == NULL || x->text == NULL || x->bound == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
+  if (x->texts == NULL || x->text == NULL || x->unit == NULL || x->bound == NULL)
+    return pw_fail (error, PW_RESOURCE, "out of memory");
   x->sign = x->bound + count;
   x->text[0] = x->objective;
   x->sign[0] = x->maximise ? -1 : 1;
@@ -108,6 +118,7 @@ static int optimise_texts (pw_optimise *x, pw_error *error) {
 static int optimise_outputs (pw_optimise *x, int from, int count, const char *option, pw_error *error) {
   pw_outcomes o;
   int status = pw_outcomes_open (&o, x->m.system, option, x->text + from, count, error);
+  for (int i = 0; i < o.outcomes; i++) pw_outcome_unit (&o, i, x->unit[from + i], sizeof *x->unit);
   for (int i = 0; i < o.functionals; i++) x->smooth &= !pw_is_extremum (o.functional[i].type);
   pw_outcomes_close (&o);
   return status;
@@ -159,15 +170,8 @@ static int optimise_open (pw_optimise *x, pw_output *file[2], int *folder, pw_er
 
 /* No run satisfied the constraints: the first error, if there was one. */
 static int optimise_nothing (const pw_optimise *x, pw_error *error) {
-  long runs = 0, failed = 0;
-  const pw_error *why = NULL;
-  for (int i = 0; i < x->starts; i++) {
-    const pw_search_start *s = x->start + i;
-    runs += s->runs, failed += s->failed;
-    if (why == NULL && s->failed) why = &s->error;
-  }
-  if (failed == runs && why)
-    return pw_fail (error, why->status, "none of %ld runs succeeded, the first one: %s", runs, why->text);
+  if (x->failed == x->runs && x->why)
+    return pw_fail (error, x->why->status, "none of %ld runs succeeded, the first one: %s", x->runs, x->why->text);
   return pw_fail (error, PW_METHOD, "no run from %d starts satisfies --subject-to", x->starts);
 }
 
@@ -215,6 +219,7 @@ static void optimise_close (pw_optimise *x) {
   free (x->start);
   free (x->texts);
   free (x->text);
+  free (x->unit);
   free (x->bound);
   pw_unknowns_close (&x->unknowns);
   pw_cli_close_model (&x->m);

@@ -29,15 +29,18 @@ typedef struct {
   const char *objective;
   char *texts;       /* copies of the constraints */
   const char **text; /* outputs: the objective, then constraints */
+  char (*unit)[80];  /* outputs */
   double *bound;     /* outputs: of the constraint */
   double *sign;      /* outputs: sign x (value - bound) <= 0; of the objective: sign x value is minimised */
   int outputs, starts, jobs;
   int polished; /* results from which searches continue with a tight tolerance */
   int smooth;   /* 1: outputs have derivatives, except where a motion has none */
   double seed;
-  pw_search_start *start; /* starts, then polished */
-  int best;               /* index of the search with the best result; -1: none */
-  pthread_mutex_t lock;   /* of what follows */
+  pw_search_start *start;         /* starts, then polished */
+  int best;                       /* index of the search with the best result; -1: none */
+  long runs, failed, derivatives; /* of all searches */
+  const pw_error *why;            /* of the first failed run; NULL: there is none */
+  pthread_mutex_t lock;           /* of what follows */
   pw_progress progress;
   int done;
   double leading; /* sign x best objective so far */

@@ -17,24 +17,6 @@ int pw_optimise_same (const pw_optimise *x, const pw_search_start *a, const pw_s
 
 enum { REPORT_DIGITS = 9, REPORT_PANELS = 6, REPORT_OPTIONS = 4000 };
 
-static long report_derivatives (const pw_optimise *x) {
-  long derivatives = 0;
-  for (int i = 0; i < x->starts + x->polished; i++) derivatives += x->start[i].derivatives;
-  return derivatives;
-}
-
-static long report_runs (const pw_optimise *x, long *failed, const pw_error **first) {
-  long runs = 0;
-  *failed = 0;
-  for (int i = 0; i < x->starts + x->polished; i++) {
-    const pw_search_start *s = x->start + i;
-    runs += s->runs;
-    if (*failed == 0 && s->failed) *first = &s->error;
-    *failed += s->failed;
-  }
-  return runs;
-}
-
 /* The output of the first run, with the initial values; NaN if it failed. */
 static double report_initial (const pw_optimise *x) {
   return x->start[0].runs > 0 ? x->start[0].trial[x->unknowns.count] : NAN;
@@ -75,15 +57,6 @@ static int report_side (const pw_optimise *x, int i) {
   return value - u->low <= near ? -1 : u->high - value <= near;
 }
 
-static const char *report_unit (const pw_optimise *x, int output, char *buffer, size_t size) {
-  pw_outcomes o;
-  *buffer = 0;
-  if (pw_outcomes_open (&o, x->m.system, "", x->text, x->outputs, NULL) == PW_OK)
-    pw_outcome_unit (&o, output, buffer, size);
-  pw_outcomes_close (&o);
-  return buffer;
-}
-
 static void report_unknowns (const pw_optimise *x) {
   for (pw_table t = { 0 }; pw_table_pass (&t);) {
     static const char *const head[] = { "free", "initially", "best", "from", "to", NULL };
@@ -107,7 +80,6 @@ static void report_unknowns (const pw_optimise *x) {
 
 static void report_outputs (const pw_optimise *x) {
   const pw_search_start *s = x->start + x->best;
-  char unit[80];
   putchar ('\n');
   for (pw_table t = { 0 }; pw_table_pass (&t);)
     for (int i = 0; i < x->outputs; i++) {
@@ -117,7 +89,7 @@ static void report_outputs (const pw_optimise *x) {
                 : x->sign[i] > 0 ? "at most %s"
                                  : "at least %s",
                 pw_format (number, x->bound[i], REPORT_DIGITS));
-      pw_cell_unit (&t, -12, x->text[i], report_unit (x, i, unit, sizeof unit));
+      pw_cell_unit (&t, -12, x->text[i], x->unit[i]);
       pw_cell_number (&t, 12, s->value[i], REPORT_DIGITS);
       pw_cell (&t, -1, text);
       if (i == 0) snprintf (text, sizeof text, "(initially %s)", pw_format (number, report_initial (x), REPORT_DIGITS));
@@ -128,18 +100,16 @@ static void report_outputs (const pw_optimise *x) {
 
 void pw_optimise_print (const pw_optimise *x) {
   char options[REPORT_OPTIONS];
-  const pw_error *first = NULL;
-  long failed, runs = report_runs (x, &failed, &first);
   int same = 0;
   for (int i = 0; i < x->starts; i++) same += pw_optimise_same (x, x->start + i, x->start + x->best);
   report_unknowns (x);
   report_outputs (x);
-  printf ("\n%ld runs from %d starts, %d of which end at this optimum\n", runs, x->starts, same);
-  if (report_derivatives (x))
+  printf ("\n%ld runs from %d starts, %d of which end at this optimum\n", x->runs, x->starts, same);
+  if (x->derivatives)
     printf ("with derivatives at %ld points of the searches that continue (SLSQP), without in the others\n",
-            report_derivatives (x));
-  if (failed)
-    pw_cli_print (stdout, "%ld runs failed and count as infeasible, the first of them: %s\n", failed, first->text);
+            x->derivatives);
+  if (x->why)
+    pw_cli_print (stdout, "%ld runs failed and count as infeasible, the first of them: %s\n", x->failed, x->why->text);
   if (report_constant (x))
     pw_cli_say ("pinwheel: %s is the same in all runs: no free value has an effect on it\n", x->text[0]);
   if (pw_unknowns_options (&x->unknowns, x->start[x->best].best, options, sizeof options)) printf ("\n%s\n", options);
@@ -189,8 +159,6 @@ static void report_json_constraint (const pw_optimise *x, pw_json *j, int i) {
 void pw_optimise_json (const pw_optimise *x, const char *status, FILE *f) {
   pw_json json = { .f = f, .lines = 2 }, *j = &json;
   char options[REPORT_OPTIONS];
-  const pw_error *first = NULL;
-  long failed, runs = report_runs (x, &failed, &first);
   pw_json_open (j, NULL, '{');
   pw_json_number (j, "schema", 1);
   pw_json_text (j, "model", pw_file_name (x->m.file));
@@ -203,10 +171,10 @@ void pw_optimise_json (const pw_optimise *x, const char *status, FILE *f) {
   pw_json_text (j, "method", x->unknowns.method);
   pw_json_number (j, "t_end", x->unknowns.t_end);
   pw_json_number (j, "seed", x->seed);
-  pw_json_number (j, "runs", (double)runs);
-  pw_json_number (j, "failed", (double)failed);
-  pw_json_number (j, "derivatives", (double)report_derivatives (x));
-  pw_json_text (j, "reason", first ? first->text : "");
+  pw_json_number (j, "runs", (double)x->runs);
+  pw_json_number (j, "failed", (double)x->failed);
+  pw_json_number (j, "derivatives", (double)x->derivatives);
+  pw_json_text (j, "reason", x->why ? x->why->text : "");
   pw_json_open (j, "unknowns", '[');
   for (int i = 0; i < x->unknowns.count; i++) report_json_unknown (x, j, i);
   pw_json_close (j, ']');
@@ -292,14 +260,14 @@ static int report_data (const void *context, FILE *f, pw_error *error) {
 static void report_variables (const void *context, FILE *f) {
   const pw_optimise *x = context;
   int panels = x->unknowns.count < REPORT_PANELS ? x->unknowns.count : REPORT_PANELS;
-  char unit[80], number[32];
+  char number[32];
   fprintf (f, "constraints = %d\npanels = %d\nunknowns = %d\narray label[%d]\narray best[%d]\n", x->outputs - 1, panels,
            x->unknowns.count, panels, panels);
   for (int i = 0; i < panels; i++) {
     pw_figure_label (f, "label", i + 1, x->unknowns.list[i].name, x->unknowns.list[i].unit);
     fprintf (f, "best[%d] = %s\n", i + 1, pw_format (number, x->start[x->best].best[i], 12));
   }
-  pw_figure_label (f, "objective", 0, x->objective, report_unit (x, 0, unit, sizeof unit));
+  pw_figure_label (f, "objective", 0, x->objective, x->unit[0]);
   fprintf (f, "value = %s\n", pw_format (number, x->start[x->best].value[0], 12));
 }
 
