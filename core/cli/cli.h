@@ -150,6 +150,9 @@ int pw_cli_range (const char *text, double *first, double *last);
 int pw_cli_settings (const pw_cli_line *l, const pw_run_defaults *model, double *t_end, pw_settings *settings,
                      pw_limit *limit, pw_error *error);
 
+/* The status of a command with incomplete results: PW_INTERRUPTED and a message after a signal; else PW_METHOD with --limit. */
+int pw_cli_incomplete (const pw_cli_line *l, pw_error *error);
+
 /* Notices of options without effect on a method.  Steps together with tolerances, common in scripts, are not reported. */
 void pw_cli_unused (const char *method, const pw_cli_line *l);
 

@@ -204,6 +204,12 @@ int pw_cli_settings (const pw_cli_line *l, const pw_run_defaults *model, double 
   return status;
 }
 
+int pw_cli_incomplete (const pw_cli_line *l, pw_error *error) {
+  if (!pw_stop) return pw_fail (error, PW_METHOD, "--limit %s: stopped; results are incomplete", l->limit);
+  pw_cli_say ("pinwheel: interrupted; results are incomplete\n");
+  return PW_INTERRUPTED;
+}
+
 void pw_cli_unused (const char *method, const pw_cli_line *l) {
   const pw_method *integrator;
   int stabilisation;

@@ -145,7 +145,6 @@ static int periodic_compute (pw_periodic_cli *x, pw_error *error) {
   int status = periodic_find (x, &o, error);
   if (status == PW_RETRY && !periodic_stop (x)) status = periodic_fail (x, error);
   if (status == PW_OK) status = x->vary_text ? periodic_branch (x, error) : periodic_add (x, &o, error);
-  x->interrupted = pw_stop > 0;
   pw_stop_release ();
   return status == PW_RETRY ? PW_OK : status;
 }
@@ -161,16 +160,12 @@ static int periodic_command (void *options, pw_error *error) {
   if (status == PW_OK) status = periodic_compute (x, error);
   if (status == PW_OK && x->points) pw_periodic_print (x);
   if (status == PW_OK && x->points && x->folder) status = pw_periodic_write (x, error);
-  int stopped = x->stopped, interrupted = x->interrupted;
   if (lock >= 0) close (lock);
   for (int i = 0; i < x->points; i++) free (x->point[i].state);
   free (x->point);
   pw_periodic_close (x->search);
   pw_cli_close_model (&x->m);
-  if (status != PW_OK || !stopped) return status;
-  if (!interrupted) return pw_fail (error, PW_METHOD, "--limit %s: stopped; results are incomplete", x->line.limit);
-  pw_cli_say ("pinwheel: interrupted; results are incomplete\n");
-  return PW_INTERRUPTED;
+  return status == PW_OK && x->stopped ? pw_cli_incomplete (&x->line, error) : status;
 }
 
 static const struct poptOption periodic_options_table[] = {

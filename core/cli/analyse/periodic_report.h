@@ -26,7 +26,7 @@ typedef struct {
   size_t room;
   double nearest[PW_PERIODIC_ATTEMPTS]; /* residuals at the end of the attempts without solution */
   char reason[300];                     /* why, of the nearest one */
-  int stopped, interrupted;
+  int stopped;                          /* 1: by Ctrl-C or --limit */
 } pw_periodic_cli;
 
 void pw_periodic_print (const pw_periodic_cli *x);

@@ -256,7 +256,6 @@ static int steady_compute (pw_steady_cli *x, pw_error *error) {
   if (x->steady == NULL) return error->status;
   pw_stop_catch ();
   int status = x->vary_text ? steady_branches (x, error) : steady_search (x, 0, error);
-  x->interrupted = pw_stop > 0;
   pw_stop_release ();
   if (status == PW_OK && x->points == 0 && !x->stopped) status = steady_fail (x, error);
   return status;
@@ -281,12 +280,8 @@ static int steady_command (void *options, pw_error *error) {
   if (status == PW_OK) status = steady_compute (x, error);
   if (status == PW_OK && x->points) pw_steady_print (x);
   if (status == PW_OK && x->points && x->folder) status = pw_steady_write (x, error);
-  int stopped = x->stopped, interrupted = x->interrupted;
   steady_close (x, lock);
-  if (status != PW_OK || !stopped) return status;
-  if (!interrupted) return pw_fail (error, PW_METHOD, "--limit %s: stopped; results are incomplete", x->line.limit);
-  pw_cli_say ("pinwheel: interrupted; results are incomplete\n");
-  return PW_INTERRUPTED;
+  return status == PW_OK && x->stopped ? pw_cli_incomplete (&x->line, error) : status;
 }
 
 static const struct poptOption steady_options_table[] = {

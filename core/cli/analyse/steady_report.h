@@ -37,7 +37,6 @@ typedef struct {
   int branches;
   double nearest[2];     /* smallest residual without solution: from the initial state, from random ones */
   int changing, stopped; /* motions of equations that change; 1: by Ctrl-C or --limit */
-  int interrupted;
 } pw_steady_cli;
 
 void pw_steady_print (const pw_steady_cli *x);

@@ -18,18 +18,19 @@ static const double OPTIMISE_FAR = 1e6; /* in units of its scale: an unknown wit
 /* ---- Starts ---- */
 
 static int optimise_open_starts (pw_optimise *x, pw_error *error) {
-  int n = x->unknowns.count, all = x->starts + OPTIMISE_POLISHED, failed = 0;
-  double *point = pw_unknowns_starts (&x->unknowns, x->starts, x->seed);
-  x->start = calloc ((size_t)all, sizeof *x->start);
-  for (int i = 0; x->start && i < all; i++) {
+  const size_t n = (size_t)x->unknowns.count, width = 2 * n + (size_t)x->outputs, starts = (size_t)x->starts,
+               all = starts + OPTIMISE_POLISHED;
+  double *point = pw_unknowns_starts (&x->unknowns, x->starts, x->seed),
+         *memory = pw_arena_alloc (&x->arena, all * width * sizeof *memory);
+  x->start = pw_arena_alloc (&x->arena, all * sizeof *x->start);
+  int status = point && memory && x->start ? PW_OK : pw_fail (error, PW_RESOURCE, "out of memory");
+  for (size_t i = 0; status == PW_OK && i < all; i++) {
     pw_search_start *s = x->start + i;
-    s->first = calloc ((size_t)(2 * n + x->outputs), sizeof *s->first);
-    if (s->first) s->best = s->first + n, s->value = s->best + n;
-    failed |= s->first == NULL || point == NULL;
-    for (int j = 0; i < x->starts && j < n && !failed; j++) s->first[j] = point[i * n + j];
+    s->first = memory + i * width, s->best = s->first + n, s->value = s->best + n;
+    if (i < starts) memcpy (s->first, point + i * n, n * sizeof *point);
   }
   free (point);
-  return x->start && !failed ? PW_OK : pw_fail (error, PW_RESOURCE, "out of memory");
+  return status;
 }
 
 /* The best of the first `count` starts, which are not `used`; the first one of equal ones.  -1: there is none. */
@@ -92,24 +93,21 @@ static int optimise_constraint (pw_optimise *x, char *text, const char *given, p
   return PW_OK;
 }
 
-/* Copies of the constraints' texts, which are split. */
 static int optimise_texts (pw_optimise *x, pw_error *error) {
-  size_t count = 1, size = 1, used = 0;
-  for (const char **c = x->subject; c && *c; c++) count++, size += strlen (*c) + 1;
-  x->texts = malloc (size);
-  x->text = calloc (count + 1, sizeof *x->text);
-  x->unit = calloc (count, sizeof *x->unit);
-  x->bound = calloc (2 * count, sizeof *x->bound);
-  if (x->texts == NULL || x->text == NULL || x->unit == NULL || x->bound == NULL)
-    return pw_fail (error, PW_RESOURCE, "out of memory");
+  size_t count = 1;
+  int status = PW_OK;
+  for (const char **c = x->subject; c && *c; c++) count++;
+  x->text = pw_arena_alloc (&x->arena, (count + 1) * sizeof *x->text);
+  x->unit = pw_arena_alloc (&x->arena, count * sizeof *x->unit);
+  x->bound = pw_arena_alloc (&x->arena, 2 * count * sizeof *x->bound);
+  if (x->text == NULL || x->unit == NULL || x->bound == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
   x->sign = x->bound + count;
   x->text[0] = x->objective;
   x->sign[0] = x->maximise ? -1 : 1;
   x->outputs = 1;
-  int status = PW_OK;
   for (const char **c = x->subject; c && *c && status == PW_OK; c++) {
-    status = optimise_constraint (x, strcpy (x->texts + used, *c), *c, error);
-    used += strlen (*c) + 1;
+    char *copy = pw_arena_copy (&x->arena, *c);
+    status = copy ? optimise_constraint (x, copy, *c, error) : pw_fail (error, PW_RESOURCE, "out of memory");
   }
   return status;
 }
@@ -212,15 +210,8 @@ static int optimise_finish (pw_optimise *x, pw_output *file[2], pw_error *error)
 }
 
 static void optimise_close (pw_optimise *x) {
-  for (int i = 0; x->start && i < x->starts + OPTIMISE_POLISHED; i++) {
-    free (x->start[i].first);
-    free (x->start[i].trial);
-  }
-  free (x->start);
-  free (x->texts);
-  free (x->text);
-  free (x->unit);
-  free (x->bound);
+  for (int i = 0; x->start && i < x->starts + OPTIMISE_POLISHED; i++) free (x->start[i].trial);
+  pw_arena_free (&x->arena);
   pw_unknowns_close (&x->unknowns);
   pw_cli_close_model (&x->m);
 }

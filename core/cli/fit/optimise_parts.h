@@ -6,6 +6,7 @@
 #include "outcome.h"
 #include "progress.h"
 #include "sensitivity.h"
+#include "util.h"
 
 /* The search from one start.  Runs are its rows of `trial`. */
 typedef struct {
@@ -27,7 +28,7 @@ typedef struct {
   pw_cli_model m;
   pw_unknowns unknowns;
   const char *objective;
-  char *texts;       /* copies of the constraints */
+  pw_arena arena;    /* of what follows, without trials */
   const char **text; /* outputs: the objective, then constraints */
   char (*unit)[80];  /* outputs */
   double *bound;     /* outputs: of the constraint */
