@@ -102,9 +102,9 @@ static int periodic_find (pw_periodic_cli *x, pw_periodic_orbit *o, pw_error *er
 }
 
 static int periodic_fail (const pw_periodic_cli *x, pw_error *error) {
-  char period[60] = "a free period", tried[200] = "", number[32];
+  char period[60] = "a free period", tried[200] = "";
   double T = x->set.period > 0 ? x->set.period : x->set.periods * pw_system_period (x->m.system);
-  if (!x->set.free) snprintf (period, sizeof period, "period %s s", pw_format (number, T, 9));
+  if (!x->set.free) snprintf (period, sizeof period, "period %.9g s", T);
   for (int k = 0; k < PW_PERIODIC_ATTEMPTS; k++) {
     size_t used = strlen (tried);
     snprintf (tried + used, sizeof tried - used, isfinite (x->nearest[k]) ? "%s%d (%.2g)" : "%s%d (not begun)",

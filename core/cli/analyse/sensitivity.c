@@ -33,10 +33,9 @@ static void sensitivity_result (const pw_sensitivity *x, int o, int p, double re
 }
 
 static void sensitivity_print (const pw_sensitivity *x) {
-  char t[32], value[32], unit[SENSITIVITY_UNIT], digits[32];
+  char value[32], unit[SENSITIVITY_UNIT], digits[32];
   static const char *const head[] = { "value", "derivative", "unit", "error", "elasticity", NULL };
-  printf ("%s by %s to t = %s s\n", pw_file_name (x->m.file), x->unknowns.method,
-          pw_format (t, pw_run_time (x->base.run), 9));
+  printf ("%s by %s to t = %.9g s\n", pw_file_name (x->m.file), x->unknowns.method, pw_run_time (x->base.run));
   for (int o = 0; o < x->outcomes.outcomes && !x->stopped; o++) {
     pw_outcome_unit (&x->outcomes, o, unit, sizeof unit);
     pw_cli_print (stdout, "\n%s = %s %s\n", x->of[o], pw_format (value, pw_outcome_value (&x->outcomes, o, NULL), 12),

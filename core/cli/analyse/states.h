@@ -12,7 +12,10 @@ enum { PW_HOLDS = 40 };
   PW_LIST_OPTION (type, member, "hold", 0, "STATE=VALUE", \
                   "Seek motions with this value of a state, or of BODY.speed, .radius or .curvature; repeatable")
 
-/* Adds "NAME=VALUE" to the list, which has room for PW_HOLDS; `option` is for messages.  PW_INPUT. */
+/* Adds a value to the list, which has room for PW_HOLDS; `option` and `text` are for messages.  PW_INPUT. */
+int pw_hold_add (const pw_system *s, const char *option, const char *text, const char *name, double value,
+                 pw_initial_value *hold, int *holds, pw_error *error);
+/* The same of a text "NAME=VALUE". */
 int pw_hold_read (const pw_system *s, const char *option, const char *text, pw_initial_value *hold, int *holds,
                   pw_error *error);
 

@@ -16,7 +16,6 @@ enum { STEADY_STARTS = 30 };
 
 /* NAME=FIRST:LAST, a parameter of the model or something held. */
 static int steady_vary (pw_steady_cli *x, pw_error *error) {
-  char hold[400], value[32];
   if (pw_vary_read (&x->vary, &x->line, &x->m, x->vary_text, error) != PW_OK) return PW_INPUT;
   x->set.first = x->vary.first, x->set.last = x->vary.last;
   if (x->vary.parameter) {
@@ -25,9 +24,9 @@ static int steady_vary (pw_steady_cli *x, pw_error *error) {
     return PW_OK;
   }
   if (strchr (x->vary.name, '.') == NULL) return pw_model_set (x->m.model, x->vary.name, x->set.first, error);
-  snprintf (hold, sizeof hold, "%s=%s", x->vary.name, pw_format (value, x->set.first, 17));
   x->set.vary = x->set.holds;
-  int status = pw_hold_read (x->m.system, "--vary", hold, x->hold, &x->set.holds, error);
+  int status =
+      pw_hold_add (x->m.system, "--vary", x->vary_text, x->vary.name, x->set.first, x->hold, &x->set.holds, error);
   if (status == PW_OK) x->vary.unit = pw_system_held_unit (x->m.system, x->hold[x->set.vary].state);
   return status;
 }
@@ -38,8 +37,7 @@ static int steady_options (pw_steady_cli *x, pw_error *error) {
   x->limit.most = INFINITY;
   x->set.span = pw_cli_defaults (pw_file_table (x->m.file)).t_end;
   x->set.vary = -1;
-  x->set.hold = x->hold = calloc (PW_HOLDS + 1, sizeof *x->hold);
-  if (x->hold == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
+  x->set.hold = x->hold;
   if (status == PW_OK) status = pw_cli_number ("--limit", x->line.limit, PW_POSITIVE, &x->limit.most, error);
   if (status == PW_OK) status = pw_cli_number ("--starts", x->starts_text, PW_REAL, &starts, error);
   if (status == PW_OK && !(starts >= 0 && starts <= 1e9 && starts == floor (starts)))
@@ -82,13 +80,12 @@ static pw_steady_point *steady_add (pw_steady_cli *x, const pw_steady_motion *m,
 /* What else to hold to select the motion last found within its family. */
 static int steady_advise (pw_steady_cli *x, pw_steady_point *p, pw_error *error) {
   pw_initial_value hold[PW_HOLDS];
-  char name[300], value[32];
+  char name[300];
   size_t used = 0;
   int count = p->family > 0 ? pw_steady_suggest (x->steady, hold, PW_HOLDS) : 0;
   for (int i = 0; i < count && used < sizeof p->advice; i++)
-    used += (size_t)snprintf (p->advice + used, sizeof p->advice - used, " --hold %s=%s",
-                              pw_system_held_name (x->m.system, hold[i].state, name, sizeof name),
-                              pw_format (value, hold[i].value, 9));
+    used += (size_t)snprintf (p->advice + used, sizeof p->advice - used, " --hold %s=%.9g",
+                              pw_system_held_name (x->m.system, hold[i].state, name, sizeof name), hold[i].value);
   return count < 0 ? pw_fail (error, count, "%s: out of memory", pw_file_name (x->m.file)) : PW_OK;
 }
 
@@ -212,7 +209,7 @@ static int steady_from (pw_steady_cli *x, double parameter, int direction, pw_er
 static int steady_complete (pw_steady_cli *x, pw_error *error) {
   const pw_system *s = x->m.system;
   pw_steady_motion m;
-  char name[300], value[32];
+  char name[300];
   double parameter = x->set.first;
   if (x->set.vary >= 0)
     parameter = pw_system_held_value (s, x->hold[x->set.vary].state, pw_system_initial_q (s), pw_system_initial_v (s));
@@ -222,8 +219,8 @@ static int steady_complete (pw_steady_cli *x, pw_error *error) {
   int more = pw_steady_suggest (x->steady, x->hold + x->set.holds, PW_HOLDS - x->set.holds);
   if (more < 0) return pw_fail (error, more, "%s: out of memory", pw_file_name (x->m.file));
   for (int i = x->set.holds; i < x->set.holds + more; i++)
-    pw_cli_say ("pinwheel: holding %s=%s, as in the motion nearest to the initial state\n",
-                pw_system_held_name (s, x->hold[i].state, name, sizeof name), pw_format (value, x->hold[i].value, 9));
+    pw_cli_say ("pinwheel: holding %s=%.9g, as in the motion nearest to the initial state\n",
+                pw_system_held_name (s, x->hold[i].state, name, sizeof name), x->hold[i].value);
   x->set.holds += more;
   pw_steady_close (x->steady);
   x->steady = pw_steady_open (x->m.system, &x->set, error);
@@ -266,7 +263,6 @@ static void steady_close (pw_steady_cli *x, int lock) {
   for (int i = 0; i < x->points; i++) free (x->point[i].state);
   free (x->point);
   free (x->end);
-  free (x->hold);
   pw_steady_close (x->steady);
   pw_cli_close_model (&x->m);
 }

@@ -99,13 +99,12 @@ static void steady_branches (const pw_steady_cli *x) {
 }
 
 void pw_steady_print (const pw_steady_cli *x) {
-  char first[32], last[32], text[40];
+  char text[40];
   const char *model = pw_file_name (x->m.file),
              *symmetries = pw_states_symmetries (pw_steady_symmetries (x->steady), text);
   if (x->vary_text) {
-    printf ("%s: %d %s of steady motions%s, %s from %s to %s\n\n", model, x->branches,
-            x->branches == 1 ? "branch" : "branches", symmetries, x->vary.name, pw_format (first, x->set.first, 9),
-            pw_format (last, x->set.last, 9));
+    printf ("%s: %d %s of steady motions%s, %s from %.9g to %.9g\n\n", model, x->branches,
+            x->branches == 1 ? "branch" : "branches", symmetries, x->vary.name, x->set.first, x->set.last);
     steady_branches (x);
     return;
   }
@@ -245,13 +244,11 @@ static double steady_ranked (const pw_steady_point *p, int imaginary, int k) {
 
 /* Lines of the k-th real part and frequency of a branch, with a blank line after each part of the given stability. */
 static void steady_line (FILE *f, const pw_steady_point *first, int count, int k, int stable) {
-  char text[3][32];
   int drawing = 0;
   for (const pw_steady_point *p = first; p < first + count; p++) {
     int here = p + 1 < first + count && steady_stable (p) == stable;
     if (here || drawing)
-      fprintf (f, "%s %s %s\n", pw_format (text[0], p->parameter, 10), pw_format (text[1], steady_ranked (p, 0, k), 10),
-               pw_format (text[2], steady_ranked (p, 1, k) / (2 * PW_PI), 10));
+      fprintf (f, "%.10g %.10g %.10g\n", p->parameter, steady_ranked (p, 0, k), steady_ranked (p, 1, k) / (2 * PW_PI));
     if (drawing && !here) fputs ("\n", f);
     drawing = here;
   }
@@ -259,7 +256,6 @@ static void steady_line (FILE *f, const pw_steady_point *first, int count, int k
 
 static int steady_data (const void *context, FILE *f, pw_error *error) {
   const pw_steady_cli *x = context;
-  char text[3][32];
   fprintf (f, "# %s, real part [1/s], frequency [Hz]: stable parts; unstable ones; events; eigenvalues [1/s]\n",
            x->vary.name);
   for (int stable = 1; stable >= 0; stable--) {
@@ -270,13 +266,11 @@ static int steady_data (const void *context, FILE *f, pw_error *error) {
     fputs ("nan nan nan\n\n\n", f);
   }
   for (const pw_steady_point *p = x->point; p < x->point + x->points; p++)
-    if (p->event != PW_STEADY_POINT) fprintf (f, "%s %d\n", pw_format (text[0], p->parameter, 10), p->event);
+    if (p->event != PW_STEADY_POINT) fprintf (f, "%.10g %d\n", p->parameter, p->event);
   fputs ("nan nan\n\n\n", f);
   for (const pw_steady_point *p = x->point; p < x->point + x->points; p++)
     for (int i = 0; i < p->unknowns; i++)
-      if (!p->rigid[i])
-        fprintf (f, "%s %s %s\n", pw_format (text[0], p->parameter, 10), pw_format (text[1], p->re[i], 10),
-                 pw_format (text[2], p->im[i], 10));
+      if (!p->rigid[i]) fprintf (f, "%.10g %.10g %.10g\n", p->parameter, p->re[i], p->im[i]);
   (void)error;
   return PW_OK;
 }

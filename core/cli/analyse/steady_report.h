@@ -2,6 +2,7 @@
 #ifndef PW_STEADY_REPORT_H
 #define PW_STEADY_REPORT_H
 
+#include "states.h"
 #include "vary.h"
 
 /* A steady motion found, or a point of a branch. */
@@ -26,7 +27,7 @@ typedef struct {
   pw_cli_model m;
   pw_limit limit;
   pw_steady_settings set;
-  pw_initial_value *hold; /* set.holds, with room */
+  pw_initial_value hold[PW_HOLDS]; /* set.holds */
   pw_vary vary;
   int attempts; /* random ones at each end */
   pw_steady *steady;

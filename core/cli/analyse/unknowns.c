@@ -262,10 +262,9 @@ double *pw_unknowns_starts (const pw_unknowns *u, int count, double seed) {
 
 int pw_unknowns_options (const pw_unknowns *u, const double *x, char *text, size_t size) {
   size_t used = 0;
-  char number[32];
   *text = 0;
   for (int i = 0; i < u->count && used < size; i++)
-    used += (size_t)snprintf (text + used, size - used, "%s--%s %s=%s", i ? " " : "",
-                              u->list[i].parameter ? "set" : "start", u->list[i].name, pw_format (number, x[i], 12));
+    used += (size_t)snprintf (text + used, size - used, "%s--%s %s=%.12g", i ? " " : "",
+                              u->list[i].parameter ? "set" : "start", u->list[i].name, x[i]);
   return used < size;
 }

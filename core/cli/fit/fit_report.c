@@ -133,7 +133,7 @@ static int report_same (const pw_fit *x, const double *minimum) {
 
 /* Searches that ended at the best minimum, and the next best one. */
 static void report_minima (const pw_fit *x) {
-  char options[REPORT_OPTIONS], chi[32];
+  char options[REPORT_OPTIONS];
   const double *next = NULL;
   int same = 0;
   for (int i = 0; i < x->starts; i++) {
@@ -143,22 +143,20 @@ static void report_minima (const pw_fit *x) {
   }
   if (x->starts > 1) printf ("%d of %d searches end at this minimum", same, x->starts);
   if (next && pw_unknowns_options (&x->unknowns, next + 1, options, sizeof options))
-    printf ("; the next one is %s at %s", pw_format (chi, *next, 6), options);
+    printf ("; the next one is %.6g at %s", *next, options);
   if (x->starts > 1) putchar ('\n');
 }
 
 void pw_fit_print (const pw_fit *x) {
-  char options[REPORT_OPTIONS], chi[32], initial[32];
+  char options[REPORT_OPTIONS];
   int freedom = pw_fit_freedom (x);
   report_unknowns (x);
   report_columns (x);
   if (x->weighted)
-    printf ("\nchi^2 %s with %d degrees of freedom (initially %s); it is larger with probability %.2g\n",
-            pw_format (chi, x->chi2, 6), freedom, pw_format (initial, x->initial_chi2, 6),
-            freedom > 0 ? gsl_cdf_chisq_Q (x->chi2, freedom) : 1);
+    printf ("\nchi^2 %.6g with %d degrees of freedom (initially %.6g); it is larger with probability %.2g\n", x->chi2,
+            freedom, x->initial_chi2, freedom > 0 ? gsl_cdf_chisq_Q (x->chi2, freedom) : 1);
   else
-    printf ("\nsum of squares %s with %d degrees of freedom (initially %s)\n", pw_format (chi, x->chi2, 6), freedom,
-            pw_format (initial, x->initial_chi2, 6));
+    printf ("\nsum of squares %.6g with %d degrees of freedom (initially %.6g)\n", x->chi2, freedom, x->initial_chi2);
   report_correlations (x);
   report_undetermined (x);
   printf ("\n%ld runs, %d iterations, derivatives by %s\n", x->runs, x->iterations,

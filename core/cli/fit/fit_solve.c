@@ -124,13 +124,12 @@ static void solve_reached (const solution *p, const gsl_vector *u, double size) 
 
 static void solve_progress (const size_t iteration, void *context, const gsl_multifit_nlinear_workspace *w) {
   solution *p = context;
-  char number[32];
   double size = gsl_blas_dnrm2 (gsl_multifit_nlinear_residual (w));
   if (p->status != PW_OK) return;
   if (iteration == 0 && p->before == 0) p->x->initial_chi2 = size * size;
   p->x->iterations = p->before + (int)iteration;
   solve_reached (p, gsl_multifit_nlinear_position (w), size);
-  snprintf (p->x->progress.note, sizeof p->x->progress.note, "residual %s", pw_format (number, size, 6));
+  snprintf (p->x->progress.note, sizeof p->x->progress.note, "residual %.6g", size);
   pw_progress_at (&p->x->progress, p->x->iterations);
 }
 

@@ -112,9 +112,8 @@ static void search_keep (search *p) {
   memcpy (s->value, p->value, (size_t)x->outputs * sizeof *s->value);
   pthread_mutex_lock (&x->lock);
   if (value < x->leading) {
-    char number[32];
     x->leading = value;
-    snprintf (x->progress.note, sizeof x->progress.note, "best %s", pw_format (number, p->value[0], 7));
+    snprintf (x->progress.note, sizeof x->progress.note, "best %.7g", p->value[0]);
   }
   pw_progress_at (&x->progress, x->done);
   pthread_mutex_unlock (&x->lock);

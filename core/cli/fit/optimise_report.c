@@ -219,20 +219,20 @@ static void report_run (const pw_optimise *x, const char *options, FILE *f) {
 }
 
 void pw_optimise_yaml (const pw_optimise *x, FILE *f) {
-  char number[32], options[REPORT_OPTIONS];
+  char options[REPORT_OPTIONS];
   const pw_search_start *s = x->start + x->best;
   if (pw_unknowns_options (&x->unknowns, s->best, options, sizeof options) &&
       strpbrk (x->line.argument[0], "\r\n") == NULL)
     report_run (x, options, f);
   report_quoted (f, "model", pw_file_name (x->m.file));
   report_quoted (f, x->maximise ? "maximise" : "minimise", x->objective);
-  fprintf (f, "value: %s\n", pw_format (number, s->value[0], 17));
+  fprintf (f, "value: %.17g\n", s->value[0]);
   for (int initial = 0; initial < 2; initial++)
     for (int i = 0, first = 1; i < x->unknowns.count; i++) {
       if ((x->unknowns.list[i].parameter == NULL) != initial) continue;
       if (first) fputs (initial ? "start:\n" : "set:\n", f);
       first = 0;
-      fprintf (f, "  %s: %s\n", x->unknowns.list[i].name, pw_format (number, s->best[i], 17));
+      fprintf (f, "  %s: %.17g\n", x->unknowns.list[i].name, s->best[i]);
     }
 }
 
@@ -260,15 +260,14 @@ static int report_data (const void *context, FILE *f, pw_error *error) {
 static void report_variables (const void *context, FILE *f) {
   const pw_optimise *x = context;
   int panels = x->unknowns.count < REPORT_PANELS ? x->unknowns.count : REPORT_PANELS;
-  char number[32];
   fprintf (f, "constraints = %d\npanels = %d\nunknowns = %d\narray label[%d]\narray best[%d]\n", x->outputs - 1, panels,
            x->unknowns.count, panels, panels);
   for (int i = 0; i < panels; i++) {
     pw_figure_label (f, "label", i + 1, x->unknowns.list[i].name, x->unknowns.list[i].unit);
-    fprintf (f, "best[%d] = %s\n", i + 1, pw_format (number, x->start[x->best].best[i], 12));
+    fprintf (f, "best[%d] = %.12g\n", i + 1, x->start[x->best].best[i]);
   }
   pw_figure_label (f, "objective", 0, x->objective, x->unit[0]);
-  fprintf (f, "value = %s\n", pw_format (number, x->start[x->best].value[0], 12));
+  fprintf (f, "value = %.12g\n", x->start[x->best].value[0]);
 }
 
 int pw_optimise_draw (const pw_optimise *x, pw_error *error) {
