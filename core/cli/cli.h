@@ -230,6 +230,25 @@ pw_scene_code *pw_cli_engine_lanes (const pw_cli_engine *e, const pw_system *s, 
  * of the command line and, if its file is open (`file` is not NULL), the tables that it reads. */
 int pw_cli_uses (const pw_cli_line *l, const pw_file *file, pw_use *use, int count, pw_error *error);
 
+/* Makes a folder and those above it, and locks it until the descriptor that is returned is closed.  -1 and PW_INPUT or
+ * PW_RESOURCE. */
+int pw_cli_folder (const char *folder, pw_error *error);
+
+/* The files that a command writes, at their places in the list of pw_cli_uses, and the lock of a folder. */
+enum { PW_FILES = 6 };
+typedef struct {
+  pw_output *file[PW_FILES]; /* NULL: not wanted */
+  int locked, lock;          /* 1: there is a folder; its descriptor */
+} pw_files;
+
+/* Opens them after the checks of pw_cli_uses, before anything is computed.  Close them in every case. */
+int pw_files_open (pw_files *x, const pw_cli_line *l, const pw_cli_model *m, pw_use *use, int count, pw_error *error);
+FILE *pw_files_stream (const pw_files *x, int i); /* NULL: not wanted */
+/* Gives all of them their names (pw_output_finish_all). */
+int pw_files_finish (pw_files *x, pw_error *error);
+/* Unlocks the folder, and removes files that have not been finished. */
+void pw_files_close (pw_files *x);
+
 /* PW_INPUT if the path of -o names a NumPy archive (.npz); for tables that contain texts and are CSV. */
 int pw_cli_csv (const char *path, pw_error *error);
 

@@ -1,4 +1,4 @@
-/* The model of a command line, and the files that a command reads and writes. */
+/* The model of a command line. */
 #define _POSIX_C_SOURCE 200809L
 #include <math.h>
 #include <stdlib.h>
@@ -95,37 +95,4 @@ pw_run_defaults pw_cli_defaults (const pw_plugin_table *table) {
   if (d.step == 0) d.step = 1e-3;
   if (d.method == NULL) d.method = "rk4+projection";
   return d;
-}
-
-typedef struct {
-  pw_use *use;
-  int count;
-  pw_error *error;
-} model_uses;
-
-static int model_table (void *context, const char *path) {
-  model_uses *x = context;
-  x->use[0].what = "a table of the model";
-  x->use[0].path = path;
-  return pw_check_paths (x->use, x->count, x->error);
-}
-
-int pw_cli_uses (const pw_cli_line *l, const pw_file *file, pw_use *use, int count, pw_error *error) {
-  model_uses x = { use, count, error };
-  pw_error own = { 0 };
-  char *path = file ? NULL : pw_file_find (l->argument[0], &own);
-  use[0].path = file ? pw_file_path (file) : path;
-  int status = own.status == PW_RESOURCE ? pw_fail (error, PW_RESOURCE, "%s", own.text) : PW_OK;
-  if (status == PW_OK) status = pw_check_paths (use, count, error); /* opening the model reports what else is wrong */
-  if (status == PW_OK && file) status = pw_file_tables (file, model_table, &x);
-  use[0].path = NULL;
-  free (path);
-  return status;
-}
-
-int pw_cli_csv (const char *path, pw_error *error) {
-  const char *ending = path ? strrchr (path, '.') : NULL;
-  if (ending == NULL || strcmp (ending, ".npz") != 0) return PW_OK;
-  return pw_fail (error, PW_INPUT, "-o %s: this command writes no NumPy archives: expected a name that ends in .csv",
-                  path);
 }

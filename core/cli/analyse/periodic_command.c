@@ -2,7 +2,6 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
-#include <unistd.h>
 #include "figure.h"
 #include "periodic_report.h"
 #include "progress.h"
@@ -153,14 +152,14 @@ static int periodic_compute (pw_periodic_cli *x, pw_error *error) {
 
 static int periodic_command (void *options, pw_error *error) {
   pw_periodic_cli *x = options;
-  int lock = -1, status = pw_cli_open (&x->m, &x->line, error);
+  int status = pw_cli_open (&x->m, &x->line, error);
   if (status == PW_OK) status = periodic_options (x, error);
-  if (status == PW_OK) status = pw_figure_results (&x->line, &x->m, x->folder, "periodic", &lock, error);
+  if (status == PW_OK) status = pw_figure_results (&x->line, &x->m, x->folder, "periodic", &x->files, error);
   if (status == PW_OK) pw_report_model (x->m.model);
   if (status == PW_OK) status = periodic_compute (x, error);
   if (status == PW_OK && x->points) pw_periodic_print (x);
   if (status == PW_OK && x->points && x->folder) status = pw_periodic_write (x, error);
-  if (lock >= 0) close (lock);
+  pw_files_close (&x->files);
   for (int i = 0; i < x->points; i++) free (x->point[i].state);
   free (x->point);
   pw_periodic_close (x->search);

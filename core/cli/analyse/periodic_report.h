@@ -16,6 +16,7 @@ typedef struct {
   pw_cli_line line;
   const char *period_text, *periods_text, *guess_text, *vary_text, *folder;
   pw_cli_model m;
+  pw_files files;
   pw_limit limit;
   pw_periodic_settings set;
   const char *source; /* of the period: "of the signals", "--period", "found" */

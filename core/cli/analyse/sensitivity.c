@@ -3,7 +3,6 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
-#include <unistd.h>
 #include "figure.h"
 #include "print_table.h"
 #include "report.h"
@@ -265,8 +264,8 @@ static int sensitivity_check (const pw_sensitivity *x, pw_error *error) {
 
 static int sensitivity_command (void *options, pw_error *error) {
   pw_sensitivity *x = options;
-  int lock = -1, status = sensitivity_open (x, error);
-  if (status == PW_OK) status = pw_figure_results (&x->line, &x->m, x->folder, "sensitivity", &lock, error);
+  int status = sensitivity_open (x, error);
+  if (status == PW_OK) status = pw_figure_results (&x->line, &x->m, x->folder, "sensitivity", &x->files, error);
   if (status == PW_OK) pw_report_model (x->m.model);
   if (status == PW_OK) status = sensitivity_compute (x, error);
   if (status == PW_OK) status = sensitivity_check (x, error);
@@ -274,7 +273,7 @@ static int sensitivity_command (void *options, pw_error *error) {
   if (status == PW_OK && x->folder) status = sensitivity_write (x, error);
   int stopped = status == PW_OK && x->stopped;
   if (stopped) status = pw_limit_fail (&x->limit, pw_run_time (x->base.run), error);
-  if (lock >= 0) close (lock);
+  pw_files_close (&x->files);
   pw_sensitivity_close (x);
   pw_unknowns_close (&x->unknowns);
   pw_cli_close_model (&x->m);

@@ -11,6 +11,7 @@ typedef struct {
   const char **of, **by; /* as given, ended by NULL */
   const char *every, *folder;
   pw_cli_model m;
+  pw_files files;
   pw_limit limit; /* of all runs */
   pw_unknowns unknowns;
   double *at;                 /* their values */

@@ -3,7 +3,6 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
-#include <unistd.h>
 #include "figure.h"
 #include "progress.h"
 #include "report.h"
@@ -153,32 +152,25 @@ static int steady_fail (pw_steady_cli *x, pw_error *error) {
 /* ---- Branches ---- */
 
 static int steady_branch (pw_steady_cli *x, const pw_steady_point *from, int direction, pw_error *error) {
-  int n = pw_system_coordinates (x->m.system), status;
-  double *state = malloc (2 * (size_t)n * sizeof *state);
   char (*more)[PW_STEADY_REASON] = realloc (x->end, ((size_t)x->branches + 1) * sizeof *more);
-  if (more) x->end = more;
-  if (state == NULL || more == NULL) return free (state), pw_fail (error, PW_RESOURCE, "out of memory");
+  if (more == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
+  x->end = more;
+  char *end = x->end[x->branches++];
   pw_steady_motion m = { 0 };
   pw_progress progress = { .t_end = 0 };
-  int attempt = from->attempt;
-  memcpy (state, from->state, 2 * (size_t)n * sizeof *state);
-  *x->end[x->branches++] = 0;
-  status = pw_steady_follow (x->steady, state, state + n, from->parameter, direction, error);
+  const double *v = from->state + pw_system_coordinates (x->m.system);
+  int status = pw_steady_follow (x->steady, from->state, v, from->parameter, direction, error);
   while (status == PW_OK && !steady_stop (x)) {
     status = pw_steady_next (x->steady, &m, error);
     if (status != PW_OK || m.event == PW_STEADY_END) break;
-    if (steady_add (x, &m, attempt, error) == NULL) status = PW_RESOURCE;
+    if (steady_add (x, &m, from->attempt, error) == NULL) status = PW_RESOURCE;
     pw_vary_progress (&x->vary, &progress, from->parameter, m.parameter, direction > 0 ? x->set.last : x->set.first);
   }
   pw_progress_end (&progress);
-  free (state);
-  if (status == PW_METHOD) {
-    snprintf (x->end[x->branches - 1], sizeof *x->end, "%.199s", error->text);
-    *error = (pw_error){ 0 };
-    return PW_OK;
-  }
-  snprintf (x->end[x->branches - 1], sizeof *x->end, "%.199s", pw_steady_reason (x->steady));
-  return status;
+  snprintf (end, PW_STEADY_REASON, "%.199s", status == PW_METHOD ? error->text : pw_steady_reason (x->steady));
+  if (status != PW_METHOD) return status;
+  *error = (pw_error){ 0 };
+  return PW_OK;
 }
 
 /* Follows the solutions at one end of the range that are on no branch yet. */
@@ -258,8 +250,8 @@ static int steady_compute (pw_steady_cli *x, pw_error *error) {
   return status;
 }
 
-static void steady_close (pw_steady_cli *x, int lock) {
-  if (lock >= 0) close (lock);
+static void steady_close (pw_steady_cli *x) {
+  pw_files_close (&x->files);
   for (int i = 0; i < x->points; i++) free (x->point[i].state);
   free (x->point);
   free (x->end);
@@ -269,14 +261,14 @@ static void steady_close (pw_steady_cli *x, int lock) {
 
 static int steady_command (void *options, pw_error *error) {
   pw_steady_cli *x = options;
-  int lock = -1, status = pw_cli_open (&x->m, &x->line, error);
+  int status = pw_cli_open (&x->m, &x->line, error);
   if (status == PW_OK) status = steady_options (x, error);
-  if (status == PW_OK) status = pw_figure_results (&x->line, &x->m, x->folder, "steady", &lock, error);
+  if (status == PW_OK) status = pw_figure_results (&x->line, &x->m, x->folder, "steady", &x->files, error);
   if (status == PW_OK) pw_report_model (x->m.model);
   if (status == PW_OK) status = steady_compute (x, error);
   if (status == PW_OK && x->points) pw_steady_print (x);
   if (status == PW_OK && x->points && x->folder) status = pw_steady_write (x, error);
-  steady_close (x, lock);
+  steady_close (x);
   return status == PW_OK && x->stopped ? pw_cli_incomplete (&x->line, error) : status;
 }
 

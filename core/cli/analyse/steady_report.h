@@ -25,6 +25,7 @@ typedef struct {
   pw_cli_line line;
   const char **hold_texts, *vary_text, *starts_text, *at_text, *folder;
   pw_cli_model m;
+  pw_files files;
   pw_limit limit;
   pw_steady_settings set;
   pw_initial_value hold[PW_HOLDS]; /* set.holds */

@@ -4,7 +4,6 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
-#include <unistd.h>
 #include "figure.h"
 #include "parallel.h"
 
@@ -128,7 +127,7 @@ static int fit_read (pw_fit *x, pw_error *error) {
 
 /* ---- The command ---- */
 
-enum { FIT_TABLE, FIT_SUMMARY, FIT_FILES };
+enum { FIT_TABLE = 2, FIT_SUMMARY }; /* in the list of files */
 
 static int fit_options (pw_fit *x, pw_error *error) {
   double starts = 1;
@@ -163,7 +162,7 @@ static int fit_open_data (pw_fit *x, pw_error *error) {
   return PW_OK;
 }
 
-static int fit_open (pw_fit *x, pw_output *file[FIT_FILES], int *folder, pw_error *error) {
+static int fit_open (pw_fit *x, pw_error *error) {
   static const char *const figures[] = { "fit.dat", "fit.gp", "fit.svg", "fit.png", "fit.pdf", NULL };
   pw_use use[] = { PW_CLI_MODEL_USE,
                    { "--data", x->data_path, PW_READS, NULL },
@@ -173,13 +172,7 @@ static int fit_open (pw_fit *x, pw_output *file[FIT_FILES], int *folder, pw_erro
   int status = fit_options (x, error);
   if (status == PW_OK) status = pw_cli_open (&x->m, &x->line, error);
   if (status == PW_OK) status = fit_open_data (x, error);
-  if (status == PW_OK) status = pw_cli_uses (&x->line, x->m.file, use, sizeof use / sizeof *use, error);
-  if (status == PW_OK && x->path && (file[FIT_TABLE] = pw_output_open (x->path, error)) == NULL) status = error->status;
-  if (status == PW_OK && x->json_path && (file[FIT_SUMMARY] = pw_output_open (x->json_path, error)) == NULL)
-    status = error->status;
-  if (status == PW_OK && x->plots_path && (*folder = pw_figure_folder (x->plots_path, error)) < 0)
-    status = error->status;
-  return status;
+  return status == PW_OK ? pw_files_open (&x->files, &x->line, &x->m, use, sizeof use / sizeof *use, error) : status;
 }
 
 /* Errors of the estimates are not known after Ctrl-C. */
@@ -206,16 +199,14 @@ static int fit_search (pw_fit *x, pw_error *error) {
   return PW_INTERRUPTED;
 }
 
-static int fit_finish (pw_fit *x, pw_output *file[FIT_FILES], pw_error *error) {
+static int fit_finish (pw_fit *x, pw_error *error) {
+  FILE *table = pw_files_stream (&x->files, FIT_TABLE), *summary = pw_files_stream (&x->files, FIT_SUMMARY);
   pw_fit_print (x);
   pw_unknowns_report (&x->unknowns, x->x);
-  int status = file[FIT_TABLE] ? pw_fit_table (x, pw_output_stream (file[FIT_TABLE]), error) : PW_OK;
+  int status = table ? pw_fit_table (x, table, error) : PW_OK;
   const char *word = x->interrupted ? "interrupted" : x->converged ? "ok" : "method";
-  if (file[FIT_SUMMARY]) pw_fit_json (x, word, pw_output_stream (file[FIT_SUMMARY]));
-  if (status == PW_OK) {
-    status = pw_output_finish_all (file, FIT_FILES, error);
-    for (int i = 0; i < FIT_FILES; i++) file[i] = NULL;
-  }
+  if (summary) pw_fit_json (x, word, summary);
+  if (status == PW_OK) status = pw_files_finish (&x->files, error);
   if (status == PW_OK && x->plots_path) status = pw_fit_draw (x, error);
   if (x->interrupted) pw_cli_say ("pinwheel: interrupted; these are the values so far, without their errors\n");
   if (status == PW_OK && x->interrupted) return PW_INTERRUPTED;
@@ -227,13 +218,10 @@ static int fit_finish (pw_fit *x, pw_output *file[FIT_FILES], pw_error *error) {
 
 static int fit_command (void *options, pw_error *error) {
   pw_fit *x = options;
-  pw_output *file[FIT_FILES] = { NULL };
-  int folder = -1, status = fit_open (x, file, &folder, error);
+  int status = fit_open (x, error);
   if (status == PW_OK) status = fit_search (x, error);
-  if (status == PW_OK) status = fit_finish (x, file, error);
-  for (int i = 0; i < FIT_FILES; i++)
-    if (file[i]) pw_output_discard (file[i]);
-  if (folder >= 0) close (folder);
+  if (status == PW_OK) status = fit_finish (x, error);
+  pw_files_close (&x->files);
   free (x->names);
   free (x->name);
   free (x->table);

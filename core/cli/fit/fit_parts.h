@@ -11,6 +11,7 @@ typedef struct {
   const char *data_path, *columns_text, *path, *json_path, *plots_path, *confidence_text, *starts_text, *jobs_text;
   const char **free, **sigma_list;
   pw_cli_model m;
+  pw_files files;
   pw_unknowns unknowns;
   double confidence;
   int jobs, starts;

@@ -8,7 +8,6 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
-#include <unistd.h>
 #include "figure.h"
 #include "parallel.h"
 
@@ -139,7 +138,9 @@ static int optimise_read (pw_optimise *x, pw_error *error) {
   return status == PW_OK ? optimise_texts (x, error) : status;
 }
 
-static int optimise_open (pw_optimise *x, pw_output *file[2], int *folder, pw_error *error) {
+enum { OPTIMISE_RESULT = 1, OPTIMISE_SUMMARY }; /* in the list of files */
+
+static int optimise_open (pw_optimise *x, pw_error *error) {
   static const char *const figures[] = { "optimise.dat", "optimise.gp",  "optimise.svg",
                                          "optimise.png", "optimise.pdf", NULL };
   pw_use use[] = { PW_CLI_MODEL_USE,
@@ -155,12 +156,7 @@ static int optimise_open (pw_optimise *x, pw_output *file[2], int *folder, pw_er
   if (status == PW_OK) pw_unknowns_engine (&x->unknowns, 20. * x->starts);
   if (status == PW_OK && x->unknowns.count > PW_UNKNOWNS_STARTED)
     status = pw_fail (error, PW_INPUT, "--free: at most %d unknowns", PW_UNKNOWNS_STARTED);
-  if (status == PW_OK) status = pw_cli_uses (&x->line, x->m.file, use, sizeof use / sizeof *use, error);
-  if (status == PW_OK && x->path && (file[0] = pw_output_open (x->path, error)) == NULL) status = error->status;
-  if (status == PW_OK && x->json_path && (file[1] = pw_output_open (x->json_path, error)) == NULL)
-    status = error->status;
-  if (status == PW_OK && x->plots_path && (*folder = pw_figure_folder (x->plots_path, error)) < 0)
-    status = error->status;
+  if (status == PW_OK) status = pw_files_open (&x->files, &x->line, &x->m, use, sizeof use / sizeof *use, error);
   return status == PW_OK ? optimise_open_starts (x, error) : status;
 }
 
@@ -190,7 +186,8 @@ static int optimise_converged (const pw_optimise *x, pw_error *error) {
                   s->runs, far->name);
 }
 
-static int optimise_finish (pw_optimise *x, pw_output *file[2], pw_error *error) {
+static int optimise_finish (pw_optimise *x, pw_error *error) {
+  FILE *result = pw_files_stream (&x->files, OPTIMISE_RESULT), *summary = pw_files_stream (&x->files, OPTIMISE_SUMMARY);
   int interrupted = pw_stop != 0;
   if (x->best < 0 && interrupted) fputs ("pinwheel: interrupted before the first run was done\n", stderr);
   if (x->best < 0) return interrupted ? PW_INTERRUPTED : optimise_nothing (x, error);
@@ -198,11 +195,9 @@ static int optimise_finish (pw_optimise *x, pw_output *file[2], pw_error *error)
   int converged = optimise_converged (x, &why) == PW_OK;
   pw_optimise_print (x);
   pw_unknowns_report (&x->unknowns, x->start[x->best].best);
-  if (file[0]) pw_optimise_yaml (x, pw_output_stream (file[0]));
-  if (file[1])
-    pw_optimise_json (x, interrupted ? "interrupted" : converged ? "ok" : "method", pw_output_stream (file[1]));
-  int status = pw_output_finish_all (file, 2, error);
-  file[0] = file[1] = NULL;
+  if (result) pw_optimise_yaml (x, result);
+  if (summary) pw_optimise_json (x, interrupted ? "interrupted" : converged ? "ok" : "method", summary);
+  int status = pw_files_finish (&x->files, error);
   if (status == PW_OK && x->plots_path) status = pw_optimise_draw (x, error);
   if (interrupted) pw_cli_say ("pinwheel: interrupted; this is the best result so far\n");
   if (status == PW_OK && interrupted) return PW_INTERRUPTED;
@@ -212,20 +207,17 @@ static int optimise_finish (pw_optimise *x, pw_output *file[2], pw_error *error)
 static void optimise_close (pw_optimise *x) {
   for (int i = 0; x->start && i < x->starts + OPTIMISE_POLISHED; i++) free (x->start[i].trial);
   pw_arena_free (&x->arena);
+  pw_files_close (&x->files);
   pw_unknowns_close (&x->unknowns);
   pw_cli_close_model (&x->m);
 }
 
 static int optimise_command (void *options, pw_error *error) {
   pw_optimise *x = options;
-  pw_output *file[2] = { NULL, NULL };
-  int folder = -1, status = optimise_read (x, error);
-  if (status == PW_OK) status = optimise_open (x, file, &folder, error);
+  int status = optimise_read (x, error);
+  if (status == PW_OK) status = optimise_open (x, error);
   if (status == PW_OK) status = optimise_search (x, error);
-  if (status == PW_OK) status = optimise_finish (x, file, error);
-  for (int i = 0; i < 2; i++)
-    if (file[i]) pw_output_discard (file[i]);
-  if (folder >= 0) close (folder);
+  if (status == PW_OK) status = optimise_finish (x, error);
   optimise_close (x);
   return status;
 }

@@ -26,6 +26,7 @@ typedef struct {
   const char *maximise, *minimise, *path, *json_path, *plots_path, *starts_text, *seed_text, *jobs_text;
   const char **free, **subject;
   pw_cli_model m;
+  pw_files files;
   pw_unknowns unknowns;
   const char *objective;
   pw_arena arena;    /* of what follows, without trials */
