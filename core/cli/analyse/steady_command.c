@@ -51,28 +51,20 @@ static int steady_options (pw_steady_cli *x, pw_error *error) {
 /* ---- Points ---- */
 
 static pw_steady_point *steady_add (pw_steady_cli *x, const pw_steady_motion *m, int attempt, pw_error *error) {
-  size_t states = 2 * (size_t)pw_system_coordinates (x->m.system), n = (size_t)m->linear->unknowns;
-  if (pw_grow (&x->point, (size_t)x->points, &x->room, sizeof *x->point) != PW_OK)
-    return pw_fail (error, PW_RESOURCE, "out of memory"), NULL;
-  pw_steady_point *p = x->point + x->points;
-  *p = (pw_steady_point){ .branch = x->branches,
-                          .attempt = attempt,
-                          .family = m->family,
-                          .unstable = m->unstable,
-                          .event = m->event,
-                          .parameter = m->parameter,
-                          .residual = m->residual,
-                          .unknowns = m->linear->unknowns,
-                          .state = malloc ((states + 2 * n) * sizeof (double) + n) };
-  if (p->state == NULL) return pw_fail (error, PW_RESOURCE, "out of memory"), NULL;
-  p->re = p->state + states, p->im = p->re + n, p->rigid = (unsigned char *)(p->im + n);
-  memcpy (p->state, m->q, states / 2 * sizeof *m->q);
-  memcpy (p->state + states / 2, m->v, states / 2 * sizeof *m->v);
-  memcpy (p->re, m->linear->re, n * sizeof *p->re);
-  memcpy (p->im, m->linear->im, n * sizeof *p->im);
-  memcpy (p->rigid, m->linear->rigid, n);
-  memcpy (p->twist, m->linear->twist, sizeof p->twist);
-  x->points++;
+  size_t coordinates = (size_t)pw_system_coordinates (x->m.system), n = (size_t)m->linear->unknowns;
+  int status = pw_grow (&x->point, (size_t)x->points, &x->room, sizeof *x->point);
+  double *a = status == PW_OK ? malloc ((2 * coordinates + 2 * n) * sizeof *a + n) : NULL;
+  if (a == NULL) return pw_fail (error, PW_RESOURCE, "out of memory"), NULL;
+  pw_steady_point *p = x->point + x->points++;
+  *p = (pw_steady_point){ .branch = x->branches, .attempt = attempt, .motion = *m, .state = a };
+  p->motion.linear = NULL;
+  p->linear.unknowns = (int)n;
+  memcpy (p->linear.twist, m->linear->twist, sizeof p->linear.twist);
+  p->motion.q = memcpy (a, m->q, coordinates * sizeof *a);
+  p->motion.v = memcpy (a += coordinates, m->v, coordinates * sizeof *a);
+  p->linear.re = memcpy (a += coordinates, m->linear->re, n * sizeof *a);
+  p->linear.im = memcpy (a += n, m->linear->im, n * sizeof *a);
+  p->linear.rigid = memcpy (a + n, m->linear->rigid, n);
   return p;
 }
 
@@ -81,17 +73,16 @@ static int steady_advise (pw_steady_cli *x, pw_steady_point *p, pw_error *error)
   pw_initial_value hold[PW_HOLDS];
   char name[300];
   size_t used = 0;
-  int count = p->family > 0 ? pw_steady_suggest (x->steady, hold, PW_HOLDS) : 0;
+  int count = p->motion.family > 0 ? pw_steady_suggest (x->steady, hold, PW_HOLDS) : 0;
   for (int i = 0; i < count && used < sizeof p->advice; i++)
     used += (size_t)snprintf (p->advice + used, sizeof p->advice - used, " --hold %s=%.9g",
                               pw_system_held_name (x->m.system, hold[i].state, name, sizeof name), hold[i].value);
   return count < 0 ? pw_fail (error, count, "%s: out of memory", pw_file_name (x->m.file)) : PW_OK;
 }
 
-static int steady_same (const pw_steady_cli *x, const pw_steady_point *p, const pw_steady_motion *m) {
-  int n = pw_system_coordinates (x->m.system);
-  return fabs (p->parameter - m->parameter) <= 1e-9 * fabs (m->parameter) &&
-         pw_steady_same (x->steady, p->state, p->state + n, m->q, m->v);
+static int steady_same (const pw_steady_cli *x, const pw_steady_motion *a, const pw_steady_motion *b) {
+  return fabs (a->parameter - b->parameter) <= 1e-9 * fabs (b->parameter) &&
+         pw_steady_same (x->steady, a->q, a->v, b->q, b->v);
 }
 
 static int steady_stop (pw_steady_cli *x) {
@@ -104,9 +95,9 @@ static int steady_stop (pw_steady_cli *x) {
 static int steady_found (pw_steady_cli *x, const pw_steady_motion *m, int attempt, pw_error *error) {
   if (m->linear->steady == PW_CHANGING) return x->changing++, PW_OK;
   for (int i = 0; i < x->points; i++) {
-    const pw_steady_point *p = x->point + i;
-    if (m->family > 0 && p->family == m->family && p->unstable == m->unstable) return PW_OK;
-    if (steady_same (x, p, m)) return PW_OK;
+    const pw_steady_motion *known = &x->point[i].motion;
+    if (m->family > 0 && known->family == m->family && known->unstable == m->unstable) return PW_OK;
+    if (steady_same (x, known, m)) return PW_OK;
   }
   if (!x->vary_text) x->branches++;
   pw_steady_point *p = steady_add (x, m, attempt, error);
@@ -158,13 +149,13 @@ static int steady_branch (pw_steady_cli *x, const pw_steady_point *from, int dir
   char *end = x->end[x->branches++];
   pw_steady_motion m = { 0 };
   pw_progress progress = { .t_end = 0 };
-  const double *v = from->state + pw_system_coordinates (x->m.system);
-  int status = pw_steady_follow (x->steady, from->state, v, from->parameter, direction, error);
+  const double begin = from->motion.parameter;
+  int status = pw_steady_follow (x->steady, from->motion.q, from->motion.v, begin, direction, error);
   while (status == PW_OK && !steady_stop (x)) {
     status = pw_steady_next (x->steady, &m, error);
     if (status != PW_OK || m.event == PW_STEADY_END) break;
     if (steady_add (x, &m, from->attempt, error) == NULL) status = PW_RESOURCE;
-    pw_vary_progress (&x->vary, &progress, from->parameter, m.parameter, direction > 0 ? x->set.last : x->set.first);
+    pw_vary_progress (&x->vary, &progress, begin, m.parameter, direction > 0 ? x->set.last : x->set.first);
   }
   pw_progress_end (&progress);
   snprintf (end, PW_STEADY_REASON, "%.199s", status == PW_METHOD ? error->text : pw_steady_reason (x->steady));
@@ -186,10 +177,8 @@ static int steady_from (pw_steady_cli *x, double parameter, int direction, pw_er
   if (found) memcpy (start, x->point + known, (size_t)found * sizeof *start);
   x->points = known;
   for (int i = 0; i < found; i++) {
-    pw_steady_motion m = { .parameter = parameter, .q = start[i].state };
     int seen = 0;
-    m.v = m.q + pw_system_coordinates (x->m.system);
-    for (int k = 0; k < x->points; k++) seen |= steady_same (x, x->point + k, &m);
+    for (int k = 0; k < x->points; k++) seen |= steady_same (x, &x->point[k].motion, &start[i].motion);
     if (status == PW_OK && !seen && !x->stopped) status = steady_branch (x, start + i, direction, error);
     free (start[i].state);
   }

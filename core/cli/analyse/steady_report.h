@@ -7,16 +7,12 @@
 
 /* A steady motion found, or a point of a branch. */
 typedef struct {
-  int branch;  /* from 1; without --vary its number */
-  int attempt; /* 0: the initial state, else a random one */
-  int family, unstable;
-  pw_steady_event event;
-  double parameter, residual, twist[3];
-  double *state;        /* 2 coordinates */
-  double *re, *im;      /* unknowns */
-  unsigned char *rigid; /* unknowns */
-  int unknowns;
-  char advice[200]; /* options that select it within its family, " --hold NAME=VALUE..." */
+  int branch;              /* from 1; without --vary its number */
+  int attempt;             /* 0: the initial state, else a random one */
+  pw_steady_motion motion; /* its arrays are those of `state` */
+  pw_linear linear;        /* twist, unknowns and eigenvalues of it */
+  double *state;           /* q, v; then re, im, rigid */
+  char advice[200];        /* options that select it within its family, " --hold NAME=VALUE..." */
 } pw_steady_point;
 
 enum { PW_STEADY_REASON = 200 };
