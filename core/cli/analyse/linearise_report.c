@@ -5,6 +5,7 @@
 #include "linearise.h"
 #include "plot.h"
 #include "print_table.h"
+#include "states.h"
 #include "text.h"
 
 /* LINEARISE_MODES: mode shapes in the text; LINEARISE_BODIES: bodies of each, and internal coordinates. */
@@ -169,11 +170,8 @@ static void linearise_mode_json (const pw_linearise *x, pw_json *j, int i) {
   pw_json_number (j, "halving_time", linearise_time (l, i, -1));
   pw_json_flag (j, "rigid", l->rigid[i]);
   pw_json_open (j, "shape", '{');
-  for (int k = 0; linearise_has_shape (l, i) && k < 2 * l->coordinates; k++) {
-    pw_json_open (j, pw_system_state_name (x->m.system, k, name, sizeof name), '[');
-    for (int part = 0; part < 2; part++) pw_json_number (j, NULL, linearise_shape (l, i, k)[part]);
-    pw_json_close (j, ']');
-  }
+  for (int k = 0; linearise_has_shape (l, i) && k < 2 * l->coordinates; k++)
+    pw_numbers_json (j, pw_system_state_name (x->m.system, k, name, sizeof name), linearise_shape (l, i, k), 2);
   pw_json_close (j, '}');
   pw_json_close (j, '}');
 }
@@ -205,9 +203,7 @@ void pw_linearise_json (const pw_linearise *x, pw_json *j) {
   pw_json_number (j, "positions", l->positions);
   pw_json_number (j, "velocities", l->velocities);
   pw_json_number (j, "symmetries", l->symmetries);
-  pw_json_open (j, "twist", '[');
-  for (int i = 0; i < 3; i++) pw_json_number (j, NULL, l->twist[i]);
-  pw_json_close (j, ']');
+  pw_numbers_json (j, "twist", l->twist, 3);
   linearise_names (x, j, 1);
   linearise_names (x, j, 0);
   for (int i = 0; i < 4; i++) linearise_matrix (x, j, (const char *[]){ "A", "B", "C", "D" }[i], i / 2, i % 2);

@@ -24,6 +24,8 @@ void pw_states_print (const pw_system *s, const double *q, const double *v, int 
 /* Writes an object; adds cells with the names. */
 void pw_states_json (const pw_system *s, const double *q, const double *v, const char *key, pw_json *j);
 void pw_states_head (const pw_system *s, pw_text *t);
+/* Writes a list of numbers. */
+void pw_numbers_json (pw_json *j, const char *key, const double *value, int count);
 
 /* " up to 3 symmetries", or "" without. */
 const char *pw_states_symmetries (int count, char text[40]);

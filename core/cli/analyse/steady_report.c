@@ -152,9 +152,7 @@ static void steady_point_json (const pw_steady_cli *x, const pw_steady_point *p,
   pw_json_number (j, "residual", p->motion.residual);
   if (!x->vary_text) pw_json_number (j, "family", p->motion.family);
   pw_json_number (j, "growing", p->motion.unstable);
-  pw_json_open (j, "twist", '[');
-  for (int i = 0; i < 3; i++) pw_json_number (j, NULL, p->linear.twist[i]);
-  pw_json_close (j, ']');
+  pw_numbers_json (j, "twist", p->linear.twist, 3);
   pw_states_json (s, p->motion.q, p->motion.v, "state", j);
   steady_eigenvalues_json (&p->linear, j);
   pw_json_close (j, '}');

@@ -131,25 +131,22 @@ int pw_unknowns_system (pw_cli_model *m, const pw_unknowns *u, const double *x, 
   return m->system ? PW_OK : error->status;
 }
 
-int pw_unknowns_prepare (pw_cli_model *m, pw_settings *settings, pw_limit *limit, const pw_unknowns *u, const double *x,
-                         pw_error *error) {
-  int status = pw_unknowns_system (m, u, x, error);
-  if (status != PW_OK) return status;
-  const pw_specialised *code = pw_cli_engine_code (&u->engine);
-  *settings = u->settings;
-  *limit = (pw_limit){ .most = u->limit };
-  settings->stop = pw_limit_over;
-  settings->stop_context = limit;
-  settings->specialised = code && pw_specialised_fits (code, m->system) ? code : NULL;
-  pw_limit_start (limit);
-  return PW_OK;
+int pw_unknown_open (pw_unknown_run *to, const pw_unknowns *u, const double *x, pw_error *error) {
+  *to = (pw_unknown_run){ .settings = u->settings };
+  if (pw_unknowns_system (&to->m, u, x, error) != PW_OK) return error->status;
+  to->run = pw_run_open (to->m.system, u->method, &to->settings, error);
+  return to->run ? PW_OK : error->status;
 }
 
-int pw_unknown_open (pw_unknown_run *to, const pw_unknowns *u, const double *x, pw_error *error) {
-  *to = (pw_unknown_run){ .run = NULL };
+int pw_unknown_prepare (pw_unknown_run *to, const pw_unknowns *u, const double *x, pw_error *error) {
+  const pw_specialised *code = pw_cli_engine_code (&u->engine);
+  *to = (pw_unknown_run){ .settings = u->settings, .limit = { .most = u->limit } };
   if (pw_unknowns_system (&to->m, u, x, error) != PW_OK) return error->status;
-  to->run = pw_run_open (to->m.system, u->method, &u->settings, error);
-  return to->run ? PW_OK : error->status;
+  to->settings.stop = pw_limit_over;
+  to->settings.stop_context = &to->limit;
+  to->settings.specialised = code && pw_specialised_fits (code, to->m.system) ? code : NULL;
+  pw_limit_start (&to->limit);
+  return PW_OK;
 }
 
 void pw_unknown_close (pw_unknown_run *x) {
@@ -160,15 +157,12 @@ void pw_unknown_close (pw_unknown_run *x) {
 
 void pw_unknowns_report (const pw_unknowns *u, const double *x) {
   char text[PW_CHANGE_TEXT];
-  pw_cli_model m;
-  pw_settings settings;
-  pw_limit limit;
-  int status = pw_unknowns_prepare (&m, &settings, &limit, u, x, &(pw_error){ 0 });
-  pw_run *r = status == PW_OK ? pw_run_open (m.system, u->method, &settings, NULL) : NULL;
-  if (r && pw_cli_change (r, m.system, text) > 0)
+  pw_unknown_run r;
+  if (pw_unknown_prepare (&r, u, x, &(pw_error){ 0 }) == PW_OK)
+    r.run = pw_run_open (r.m.system, u->method, &r.settings, NULL);
+  if (r.run && pw_cli_change (r.run, r.m.system, text) > 0)
     pw_cli_say ("pinwheel: the constraints changed given initial values of this result, at worst %s\n", text);
-  pw_run_close (r);
-  pw_cli_close_model (&m);
+  pw_unknown_close (&r);
 }
 
 /* ---- Directions ---- */

@@ -47,16 +47,18 @@ void pw_unknowns_engine (pw_unknowns *u, double runs);
 /* The model with values of the unknowns, compiled.  PW_INPUT if it refuses them; PW_RESOURCE.  Close it by pw_cli_close_model
  * in every case.  May be called by several threads at once. */
 int pw_unknowns_system (pw_cli_model *m, const pw_unknowns *u, const double *x, pw_error *error);
-/* The same with the settings of its run, and their stop context, whose clock starts. */
-int pw_unknowns_prepare (pw_cli_model *m, pw_settings *settings, pw_limit *limit, const pw_unknowns *u, const double *x,
-                         pw_error *error);
 
-/* A run with u->settings.  Close it in every case. */
+/* A run of it. */
 typedef struct {
   pw_cli_model m;
+  pw_settings settings;
+  pw_limit limit; /* of pw_unknown_prepare */
   pw_run *run;
 } pw_unknown_run;
+/* Opens a run with u->settings.  Close it in every case. */
 int pw_unknown_open (pw_unknown_run *to, const pw_unknowns *u, const double *x, pw_error *error);
+/* The same with the engine and a limit of its own, whose clock starts; the run itself is opened by the caller. */
+int pw_unknown_prepare (pw_unknown_run *to, const pw_unknowns *u, const double *x, pw_error *error);
 void pw_unknown_close (pw_unknown_run *x);
 
 /* Directions of the run along all unknowns, with their neighbours; x is used for these and restored.  near: room for 4 runs of

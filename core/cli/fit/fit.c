@@ -1,6 +1,6 @@
 /* pinwheel fit: parameters and initial values with which a model agrees best with measured data. */
 #define _POSIX_C_SOURCE 200809L
-#include "fit_parts.h"
+#include "fit.h"
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>

@@ -1,10 +1,11 @@
 /* The reports of `pinwheel fit`. */
-#include "fit_parts.h"
+#include "fit.h"
 #include <gsl/gsl_cdf.h>
 #include <math.h>
 #include <stdlib.h>
 #include "figure.h"
 #include "print_table.h"
+#include "states.h"
 #include "text.h"
 
 enum { REPORT_DIGITS = 7, REPORT_CORRELATIONS = 9, REPORT_PANELS = 4, REPORT_OPTIONS = 4000 };
@@ -225,9 +226,7 @@ static void report_json_minima (const pw_fit *x, pw_json *j) {
     j->line = 1;
     pw_json_open (j, NULL, '{');
     pw_json_number (j, "chi2", *minimum);
-    pw_json_open (j, "values", '[');
-    for (int i = 0; i < n; i++) pw_json_number (j, NULL, minimum[1 + i]);
-    pw_json_close (j, ']');
+    pw_numbers_json (j, "values", minimum + 1, n);
     pw_json_close (j, '}');
   }
   pw_json_close (j, ']');

@@ -6,7 +6,7 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
-#include "fit_parts.h"
+#include "fit.h"
 #include "parallel.h"
 
 #define JACOBIAN_EXACT 1e-8 /* relative error of derivatives by the variational equations */
@@ -28,21 +28,17 @@ static int fit_sample (const pw_fit *x, pw_outcomes *o, pw_run *r, double *out, 
 
 int pw_fit_run (const pw_fit *x, const double *unknowns, double *out, pw_error *error) {
   pw_outcomes o = { .system = NULL };
-  pw_cli_model m;
-  pw_settings settings;
-  pw_limit limit;
+  pw_unknown_run r;
   double *row = calloc ((size_t)x->columns, sizeof *row);
-  int status = row ? PW_OK : pw_fail (error, PW_RESOURCE, "out of memory");
-  if (status != PW_OK) return status;
-  status = pw_unknowns_prepare (&m, &settings, &limit, &x->unknowns, unknowns, error);
-  if (status == PW_OK) status = pw_outcomes_open (&o, m.system, "--columns", x->name, x->columns, error);
-  settings.ledger = o.ledger;
-  pw_run *r = status == PW_OK ? pw_run_open (m.system, x->unknowns.method, &settings, error) : NULL;
-  if (status == PW_OK) status = r ? fit_sample (x, &o, r, out, row, error) : error->status;
-  if (status == PW_STOPPED) status = pw_limit_fail (&limit, pw_run_time (r), error);
-  pw_run_close (r);
+  if (row == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
+  int status = pw_unknown_prepare (&r, &x->unknowns, unknowns, error);
+  if (status == PW_OK) status = pw_outcomes_open (&o, r.m.system, "--columns", x->name, x->columns, error);
+  r.settings.ledger = o.ledger;
+  if (status == PW_OK) r.run = pw_run_open (r.m.system, x->unknowns.method, &r.settings, error);
+  if (status == PW_OK) status = r.run ? fit_sample (x, &o, r.run, out, row, error) : error->status;
+  if (status == PW_STOPPED) status = pw_limit_fail (&r.limit, pw_run_time (r.run), error);
   pw_outcomes_close (&o);
-  pw_cli_close_model (&m);
+  pw_unknown_close (&r);
   free (row);
   return status;
 }

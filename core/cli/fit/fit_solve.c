@@ -10,7 +10,7 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
-#include "fit_parts.h"
+#include "fit.h"
 
 #define SOLVE_INSIDE 1e-3   /* of the distance of bounds: initial values begin this far from them */
 #define SOLVE_GRADIENT 1e-4 /* largest cosine between the residual and a column of the Jacobian at a minimum */

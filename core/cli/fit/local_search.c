@@ -4,7 +4,7 @@
 #include <nlopt.h>
 #include <stdlib.h>
 #include <string.h>
-#include "optimise_parts.h"
+#include "optimise.h"
 #include "util.h"
 
 #define SEARCH_FIRST 0.1    /* first steps, relative to the scales of the unknowns */
@@ -43,21 +43,19 @@ static double search_scaled (const pw_unknown *k, double x) {
 static int search_run (const search *p, pw_error *error) {
   const pw_unknowns *u = &p->x->unknowns;
   pw_outcomes o = { .system = NULL };
-  pw_cli_model m;
-  pw_settings settings;
-  pw_limit limit;
+  pw_unknown_run r;
   char number[32];
-  int status = pw_unknowns_prepare (&m, &settings, &limit, u, p->at, error);
-  if (status == PW_OK) status = pw_outcomes_open (&o, m.system, "output", p->x->text, p->x->outputs, error);
-  settings.ledger = o.ledger;
-  if (status == PW_OK) status = pw_outcomes_run (&o, u->method, &settings, u->t_end, error);
+  int status = pw_unknown_prepare (&r, u, p->at, error);
+  if (status == PW_OK) status = pw_outcomes_open (&o, r.m.system, "output", p->x->text, p->x->outputs, error);
+  r.settings.ledger = o.ledger;
+  if (status == PW_OK) status = pw_outcomes_run (&o, u->method, &r.settings, u->t_end, error);
   for (int i = 0; status == PW_OK && i < p->x->outputs; i++) {
     p->value[i] = pw_outcome_value (&o, i, NULL);
     if (!isfinite (p->value[i]))
       status = pw_fail (error, PW_METHOD, "%s is %s", p->x->text[i], pw_format (number, p->value[i], 9));
   }
   pw_outcomes_close (&o);
-  pw_cli_close_model (&m);
+  pw_unknown_close (&r);
   return status;
 }
 

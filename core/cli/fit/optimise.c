@@ -4,7 +4,7 @@
  * displaced by the seed.  Each start is a task of its own, so that results do not depend on the number of threads.  The
  * best results continue with a tighter tolerance.  A run that fails gets a value that is worse than all before it. */
 #define _POSIX_C_SOURCE 200809L
-#include "optimise_parts.h"
+#include "optimise.h"
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>

@@ -1,10 +1,11 @@
 /* The reports of `pinwheel optimise`. */
-#include "optimise_parts.h"
+#include "optimise.h"
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 #include "figure.h"
 #include "print_table.h"
+#include "states.h"
 
 #define OPTIMISE_SAME 0.01 /* distance of results of the same optimum, relative to the scales of the unknowns */
 
@@ -137,12 +138,8 @@ static void report_json_start (const pw_optimise *x, pw_json *j, const pw_search
   pw_json_number (j, "value", s->found ? s->value[0] : NAN);
   pw_json_number (j, "runs", (double)s->runs);
   pw_json_number (j, "failed", (double)s->failed);
-  pw_json_open (j, "from", '[');
-  for (int i = 0; i < x->unknowns.count; i++) pw_json_number (j, NULL, s->first[i]);
-  pw_json_close (j, ']');
-  pw_json_open (j, "to", '[');
-  for (int i = 0; s->found && i < x->unknowns.count; i++) pw_json_number (j, NULL, s->best[i]);
-  pw_json_close (j, ']');
+  pw_numbers_json (j, "from", s->first, x->unknowns.count);
+  pw_numbers_json (j, "to", s->best, s->found ? x->unknowns.count : 0);
   pw_json_close (j, '}');
 }
 
