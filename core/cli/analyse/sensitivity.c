@@ -271,14 +271,12 @@ static int sensitivity_command (void *options, pw_error *error) {
   if (status == PW_OK) status = sensitivity_check (x, error);
   if (status == PW_OK) sensitivity_print (x), sensitivity_warn (x);
   if (status == PW_OK && x->folder) status = sensitivity_write (x, error);
-  int stopped = status == PW_OK && x->stopped;
-  if (stopped) status = pw_limit_fail (&x->limit, pw_run_time (x->base.run), error);
+  if (status == PW_OK && x->stopped) status = pw_limit_fail (&x->limit, pw_run_time (x->base.run), error);
   pw_files_close (&x->files);
   pw_sensitivity_close (x);
   pw_unknowns_close (&x->unknowns);
   pw_cli_close_model (&x->m);
-  if (status == PW_RETRY) pw_cli_say ("pinwheel: interrupted; results are incomplete\n");
-  return status == PW_RETRY ? PW_INTERRUPTED : status;
+  return status == PW_RETRY ? pw_cli_incomplete (&x->line, error) : status;
 }
 
 static const struct poptOption sensitivity_options[] = {

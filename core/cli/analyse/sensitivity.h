@@ -14,16 +14,15 @@ typedef struct {
   pw_files files;
   pw_limit limit; /* of all runs */
   pw_unknowns unknowns;
-  double *at;                 /* their values */
+  double *at;                 /* values of the unknowns */
   double dt;                  /* time between rows [s]; 0: a few rows */
   pw_unknown_run base, *near; /* the run; 4 neighbours of each unknown */
   pw_direction *direction;
   pw_variation *variation;
-  pw_run *sampled;          /* the run of which samples are taken; NULL: base.run */
-  int along;                /* 1: there are extrema or integrals */
-  double passed;            /* the last breakpoint before the time last evaluated [s] */
-  pw_outcomes outcomes;     /* of the run */
-  pw_workspace **workspace; /* of the neighbours, for contact points */
+  pw_run *sampled;      /* the run of which samples are taken; NULL: base.run */
+  int along;            /* 1: there are extrema or integrals */
+  double passed;        /* the last breakpoint before the time last evaluated [s] */
+  pw_outcomes outcomes; /* of the run */
   /* Of all functionals F of the outputs and unknowns P at the time last evaluated, and of the run. */
   int no_error;          /* 1: derivatives without errors */
   double *value;         /* 2 F: values; the gradient of an output (scratch) */

@@ -56,8 +56,10 @@ static int sensitivity_contact_slope (const pw_sensitivity *x, int unknown, int 
   int status = PW_OK;
   *slope = *error_of = 0;
   for (int k = 0; k < 4 && status == PW_OK; k++) {
-    status =
-        sensitivity_contact (x, x->workspace[4 * unknown + k], index, s, dq, pw_direction_offset (d, k), &value, error);
+    pw_unknown_run *near = &x->near[4 * unknown + k];
+    if (near->workspace == NULL) near->workspace = pw_workspace_new (near->m.system, error);
+    if (near->workspace == NULL) return error->status;
+    status = sensitivity_contact (x, near->workspace, index, s, dq, pw_direction_offset (d, k), &value, error);
     *slope += pw_direction_weight (d, 0, k) * value;
     *error_of += pw_direction_weight (d, 1, k) * value;
   }
@@ -289,14 +291,6 @@ static int sensitivity_integrate (pw_sensitivity *x, pw_progress *progress, pw_e
 
 /* ---- Opening ---- */
 
-static int sensitivity_workspaces (pw_sensitivity *x, pw_error *error) {
-  for (int i = 0; i < 4 * x->unknowns.count; i++) {
-    x->workspace[i] = pw_workspace_new (x->near[i].m.system, error);
-    if (x->workspace[i] == NULL) return PW_RESOURCE;
-  }
-  return PW_OK;
-}
-
 int pw_sensitivity_open (pw_sensitivity *x, const double *at, pw_error *error) {
   size_t P = (size_t)x->unknowns.count;
   if (x->dt == 0) x->dt = x->unknowns.t_end / SENSITIVITY_ROWS;
@@ -306,9 +300,8 @@ int pw_sensitivity_open (pw_sensitivity *x, const double *at, pw_error *error) {
   x->at = malloc (P * sizeof *x->at);
   x->near = calloc (4 * P, sizeof *x->near);
   x->direction = calloc (P, sizeof *x->direction);
-  x->workspace = calloc (4 * P, sizeof *x->workspace);
   for (size_t p = 0; p < P && x->at; p++) x->at[p] = at ? at[p] : x->unknowns.list[p].value;
-  return x->at && x->near && x->direction && x->workspace ? PW_OK : pw_fail (error, PW_RESOURCE, "out of memory");
+  return x->at && x->near && x->direction ? PW_OK : pw_fail (error, PW_RESOURCE, "out of memory");
 }
 
 static int sensitivity_arrays (pw_sensitivity *x, pw_error *error) {
@@ -362,7 +355,6 @@ static int sensitivity_runs (pw_sensitivity *x, pw_error *error) {
 int pw_sensitivity_start (pw_sensitivity *x, pw_error *error) {
   int status = sensitivity_runs (x, error);
   if (status == PW_OK) status = sensitivity_arrays (x, error);
-  if (status == PW_OK) status = sensitivity_workspaces (x, error);
   if (status == PW_OK) status = sensitivity_sampled (x, error);
   pw_limit_start (&x->limit);
   if (status != PW_OK) return status;
@@ -380,10 +372,8 @@ void pw_sensitivity_close (pw_sensitivity *x) {
   pw_variation_close (x->variation);
   pw_run_close (x->sampled);
   if (x->outcomes.system) pw_outcomes_close (&x->outcomes);
-  for (int i = 0; x->workspace && i < 4 * x->unknowns.count; i++) pw_workspace_free (x->workspace[i]);
   for (int i = 0; x->near && i < 4 * x->unknowns.count; i++) pw_unknown_close (&x->near[i]);
   pw_unknown_close (&x->base);
-  free (x->workspace);
   free (x->near);
   free (x->direction);
   free (x->at);

@@ -8,7 +8,7 @@
 /* A steady motion found, or a point of a branch. */
 typedef struct {
   int branch;              /* from 1; without --vary its number */
-  int attempt;             /* 0: the initial state, else a random one */
+  int attempt;             /* of pw_steady_solve: 0 and 1 begin at the initial state */
   pw_steady_motion motion; /* its arrays are those of `state` */
   pw_linear linear;        /* twist, unknowns and eigenvalues of it */
   double *state;           /* q, v; then re, im, rigid */

@@ -151,8 +151,9 @@ int pw_unknown_prepare (pw_unknown_run *to, const pw_unknowns *u, const double *
 
 void pw_unknown_close (pw_unknown_run *x) {
   pw_run_close (x->run);
-  x->run = NULL;
+  pw_workspace_free (x->workspace);
   pw_cli_close_model (&x->m);
+  *x = (pw_unknown_run){ .run = NULL };
 }
 
 void pw_unknowns_report (const pw_unknowns *u, const double *x) {

@@ -30,8 +30,8 @@ typedef struct {
   const char *method;
   pw_settings settings; /* except stop, initial, specialised */
   double t_end;
-  double limit; /* of each run's processor time [s] */
-  pw_specialise when;
+  double limit;       /* of each run's processor time [s] */
+  pw_specialise when; /* of --specialise */
   pw_cli_engine engine;
 } pw_unknowns;
 
@@ -54,6 +54,7 @@ typedef struct {
   pw_settings settings;
   pw_limit limit; /* of pw_unknown_prepare */
   pw_run *run;
+  pw_workspace *workspace; /* for contact points; NULL: not needed yet */
 } pw_unknown_run;
 /* Opens a run with u->settings.  Close it in every case. */
 int pw_unknown_open (pw_unknown_run *to, const pw_unknowns *u, const double *x, pw_error *error);

@@ -202,7 +202,7 @@ static int fit_search (pw_fit *x, pw_error *error) {
 static int fit_finish (pw_fit *x, pw_error *error) {
   FILE *table = pw_files_stream (&x->files, FIT_TABLE), *summary = pw_files_stream (&x->files, FIT_SUMMARY);
   pw_fit_print (x);
-  pw_unknowns_report (&x->unknowns, x->x);
+  pw_unknowns_report (&x->unknowns, x->estimate);
   int status = table ? pw_fit_table (x, table, error) : PW_OK;
   const char *word = x->interrupted ? "interrupted" : x->converged ? "ok" : "method";
   if (summary) pw_fit_json (x, word, summary);
@@ -226,7 +226,7 @@ static int fit_command (void *options, pw_error *error) {
   free (x->name);
   free (x->table);
   free (x->sigma);
-  free (x->x);
+  free (x->estimate);
   free (x->minimum);
   pw_unknowns_close (&x->unknowns);
   pw_cli_close_model (&x->m);

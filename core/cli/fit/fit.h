@@ -25,10 +25,10 @@ typedef struct {
   int weighted;            /* 1: they are given; else 1 */
   int residuals;           /* data */
   /* results */
-  double *minimum;    /* starts x (1 + unknowns): sum of squares, INFINITY if a search failed, and values */
-  double *x, *model;  /* unknowns; columns x rows */
-  double *deviation;  /* unknowns: standard errors; INFINITY: not identifiable, NaN: no degrees of freedom */
-  double *covariance; /* unknowns x unknowns */
+  double *minimum;          /* starts x (1 + unknowns): sum of squares, INFINITY if a search failed, and values */
+  double *estimate, *model; /* unknowns; columns x rows */
+  double *deviation;        /* unknowns: standard errors; INFINITY: not identifiable, NaN: no degrees of freedom */
+  double *covariance;       /* unknowns x unknowns */
   double *singular,
       *vectors;   /* unknowns: singular values of the scaled Jacobian, the largest one first; in columns: vectors */
   double *length; /* unknowns: lengths of the columns of the Jacobian; 0: no effect */
@@ -41,6 +41,9 @@ typedef struct {
   long runs;
   pw_progress progress;
 } pw_fit;
+
+/* In units of the scale: an unknown that is nearer to a bound is at it; no search begins so near. */
+#define PW_FIT_INSIDE 1e-3
 
 /* Smallest component of an undetermined combination of unknowns that counts. */
 #define PW_FIT_PART 0.1

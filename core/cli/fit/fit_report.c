@@ -18,13 +18,13 @@ static double report_correlation (const pw_fit *x, int i, int j) {
 
 /* The lower (-1) or upper end of the confidence interval; NaN without one. */
 static double report_end (const pw_fit *x, int i, int side) {
-  return isfinite (x->deviation[i]) ? x->x[i] + side * pw_fit_quantile (x) * x->deviation[i] : NAN;
+  return isfinite (x->deviation[i]) ? x->estimate[i] + side * pw_fit_quantile (x) * x->deviation[i] : NAN;
 }
 
 static const char *report_bound (const pw_fit *x, int i) {
   const pw_unknown *u = x->unknowns.list + i;
-  double near = 1e-3 * u->scale;
-  return x->x[i] - u->low < near ? "at its lower bound" : u->high - x->x[i] < near ? "at its upper bound" : "";
+  const double value = x->estimate[i], near = PW_FIT_INSIDE * u->scale;
+  return value - u->low < near ? "at its lower bound" : u->high - value < near ? "at its upper bound" : "";
 }
 
 /* Root mean square of the residuals of a column; the number of its data. */
@@ -52,7 +52,7 @@ static void report_unknowns (const pw_fit *x) {
     for (int i = 0; i < x->unknowns.count; i++) {
       pw_cell_unit (&t, -12, x->unknowns.list[i].name, x->unknowns.list[i].unit);
       pw_cell_number (&t, 12, x->unknowns.list[i].value, REPORT_DIGITS);
-      pw_cell_number (&t, 12, x->x[i], REPORT_DIGITS);
+      pw_cell_number (&t, 12, x->estimate[i], REPORT_DIGITS);
       pw_cell_number (&t, 14, isfinite (x->deviation[i]) ? x->deviation[i] : NAN, 3);
       pw_cell_number (&t, 12, report_end (x, i, -1), REPORT_DIGITS);
       pw_cell_number (&t, 12, report_end (x, i, 1), REPORT_DIGITS);
@@ -108,7 +108,7 @@ static void report_ratio (const pw_fit *x, int combination) {
     double change = x->vectors[i * x->unknowns.count + combination] / x->length[i];
     if (!report_contains (x, combination, i)) continue;
     printf (scale != 0 ? " : " : ": changes in the ratio ");
-    if (scale == 0) scale = (x->x[i] != 0 ? x->x[i] : 1) / change;
+    if (scale == 0) scale = (x->estimate[i] != 0 ? x->estimate[i] : 1) / change;
     printf ("%.3g", change * scale);
   }
   puts (" have no effect");
@@ -127,7 +127,7 @@ static void report_undetermined (const pw_fit *x) {
   }
 }
 
-/* 1 if a search ended at the best minimum. */
+/* 1 if a search ended at the best minimum, up to round-off and the tolerances of searches. */
 static int report_same (const pw_fit *x, const double *minimum) {
   return *minimum <= x->chi2 + 1e-6 * x->chi2 + 1e-12 * x->initial_chi2;
 }
@@ -163,7 +163,7 @@ void pw_fit_print (const pw_fit *x) {
   printf ("\n%ld runs, %d iterations, derivatives by %s\n", x->runs, x->iterations,
           x->by_differences ? "differences of runs" : "the variational equations");
   report_minima (x);
-  if (pw_unknowns_options (&x->unknowns, x->x, options, sizeof options)) printf ("\n%s\n", options);
+  if (pw_unknowns_options (&x->unknowns, x->estimate, options, sizeof options)) printf ("\n%s\n", options);
 }
 
 /* ---- Files ---- */
@@ -175,7 +175,7 @@ static void report_json_unknown (const pw_fit *x, pw_json *j, int i) {
   pw_json_text (j, "name", u->name);
   pw_json_text (j, "unit", u->unit);
   pw_json_number (j, "initial", u->value);
-  pw_json_number (j, "value", x->x[i]);
+  pw_json_number (j, "value", x->estimate[i]);
   pw_json_number (j, "standard_error", x->deviation[i]);
   pw_json_number (j, "from", report_end (x, i, -1));
   pw_json_number (j, "to", report_end (x, i, 1));
@@ -240,7 +240,8 @@ void pw_fit_json (const pw_fit *x, const char *status, FILE *f) {
   pw_json_text (j, "model", pw_file_name (x->m.file));
   pw_json_text (j, "status", status);
   pw_json_text (j, "data", x->data_path);
-  pw_json_text (j, "options", pw_unknowns_options (&x->unknowns, x->x, options, sizeof options) ? options : NULL);
+  pw_json_text (j, "options",
+                pw_unknowns_options (&x->unknowns, x->estimate, options, sizeof options) ? options : NULL);
   pw_json_text (j, "method", x->unknowns.method);
   pw_json_number (j, "residuals", x->residuals);
   pw_json_number (j, "freedom", pw_fit_freedom (x));

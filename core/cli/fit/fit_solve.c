@@ -12,7 +12,6 @@
 #include <string.h>
 #include "fit.h"
 
-#define SOLVE_INSIDE 1e-3   /* of the distance of bounds: initial values begin this far from them */
 #define SOLVE_GRADIENT 1e-4 /* largest cosine between the residual and a column of the Jacobian at a minimum */
 #define SOLVE_RANK 1e-6     /* smallest singular value of the scaled Jacobian, relative to the largest one */
 #define SOLVE_EFFECT 1e-9   /* smallest effect of an unknown, relative to the largest one */
@@ -24,7 +23,7 @@ typedef struct {
   double *at, *model, *jacobian; /* unknowns of the last run; its values; derivatives */
   int known, status;
   double worst; /* largest residual norm of a run that succeeded */
-  double least; /* sum of squares at the best minimum so far; its values are x->x and x->model */
+  double least; /* sum of squares at the best minimum so far; its values are x->estimate and x->model */
   int before;   /* iterations of earlier searches */
   pw_error *error;
 } solution;
@@ -46,8 +45,8 @@ static double solve_slope (const pw_unknown *k, double u) {
 /* The slope is not 0 there. */
 static double solve_start (const pw_unknown *k, double value) {
   double part = isfinite (k->high) ? (value - k->low) / (k->high - k->low) : (value - k->low) / k->scale;
-  part = fmax (part, SOLVE_INSIDE);
-  if (isfinite (k->low) && isfinite (k->high)) return asin (2 * fmin (part, 1 - SOLVE_INSIDE) - 1);
+  part = fmax (part, PW_FIT_INSIDE);
+  if (isfinite (k->low) && isfinite (k->high)) return asin (2 * fmin (part, 1 - PW_FIT_INSIDE) - 1);
   return isfinite (k->low) ? sqrt ((1 + part) * (1 + part) - 1) : value / k->scale;
 }
 
@@ -118,7 +117,7 @@ static void solve_reached (const solution *p, const gsl_vector *u, double size) 
   if (isfinite (p->least) || !p->known) return;
   x->chi2 = size * size;
   for (int i = 0; i < x->unknowns.count; i++)
-    x->x[i] = solve_unknown (x->unknowns.list + i, gsl_vector_get (u, (size_t)i));
+    x->estimate[i] = solve_unknown (x->unknowns.list + i, gsl_vector_get (u, (size_t)i));
   memcpy (x->model, p->model, (size_t)x->columns * (size_t)x->rows * sizeof *x->model);
 }
 
@@ -143,7 +142,7 @@ static void solve_keep (solution *p, double *minimum) {
   memcpy (minimum + 1, p->at, n * sizeof *p->at);
   if (!(*minimum < p->least)) return;
   x->chi2 = p->least = *minimum;
-  memcpy (x->x, p->at, n * sizeof *p->at);
+  memcpy (x->estimate, p->at, n * sizeof *p->at);
   memcpy (x->model, p->model, cells * sizeof *p->model);
 }
 
@@ -215,8 +214,8 @@ static int solve_converged (const pw_fit *x, const gsl_matrix *J) {
   double size = sqrt (x->chi2), worst = 0, noise = fmax (SOLVE_GRADIENT, pw_fit_noise (x));
   for (int j = 0; j < x->unknowns.count; j++) {
     const pw_unknown *u = x->unknowns.list + j;
-    double dot = 0, near = SOLVE_INSIDE * u->scale;
-    if (x->x[j] - u->low < near || u->high - x->x[j] < near) continue;
+    double dot = 0, near = PW_FIT_INSIDE * u->scale;
+    if (x->estimate[j] - u->low < near || u->high - x->estimate[j] < near) continue;
     for (int i = 0, k = 0; i < x->columns * x->rows; i++)
       if (!isnan (x->value[i]))
         dot += gsl_matrix_get (J, (size_t)k++, (size_t)j) * (x->model[i] - x->value[i]) / x->sigma[i];
@@ -271,10 +270,11 @@ static int solve_open (solution *p) {
   pw_fit *x = p->x;
   size_t n = (size_t)x->unknowns.count, cells = (size_t)x->columns * (size_t)x->rows;
   p->at = calloc (2 * n + (1 + n) * cells, sizeof *p->at);
-  x->x = calloc (4 * n + 2 * n * n + cells, sizeof *x->x);
-  if (p->at == NULL || x->x == NULL) return pw_fail (p->error, PW_RESOURCE, "out of memory");
+  x->estimate = calloc (4 * n + 2 * n * n + cells, sizeof *x->estimate);
+  if (p->at == NULL || x->estimate == NULL) return pw_fail (p->error, PW_RESOURCE, "out of memory");
   p->u = p->at + n, p->model = p->u + n, p->jacobian = p->model + cells;
-  x->deviation = x->x + n, x->singular = x->deviation + n, x->length = x->singular + n, x->covariance = x->length + n;
+  x->deviation = x->estimate + n, x->singular = x->deviation + n, x->length = x->singular + n,
+  x->covariance = x->length + n;
   x->vectors = x->covariance + n * n, x->model = x->vectors + n * n;
   return PW_OK;
 }
@@ -290,7 +290,7 @@ int pw_fit_solve (pw_fit *x, pw_error *error) {
   if (p.status == PW_OK && w == NULL) p.status = pw_fail (error, PW_RESOURCE, "out of memory");
   if (p.status == PW_OK) solve_minima (&p, w);
   if (p.status == PW_OK) {
-    memcpy (p.at, x->x, (size_t)x->unknowns.count * sizeof *x->x);
+    memcpy (p.at, x->estimate, (size_t)x->unknowns.count * sizeof *x->estimate);
     memcpy (p.model, x->model, (size_t)x->columns * (size_t)x->rows * sizeof *x->model);
     p.status = solve_errors (&p);
   }
