@@ -12,7 +12,7 @@
 
 /* Rows if their distance is not given; steps of the derivatives in an interval of integrals, in which the square of a column is
  * smooth enough for 5 nodes. */
-enum { SENSITIVITY_ROWS = 20, SENSITIVITY_STEPS = 2 };
+enum { SENSITIVITY_PARTS = 20, SENSITIVITY_STEPS = 2 };
 
 int pw_sensitivity_in_table (const pw_sensitivity *x, int output) {
   const pw_outcome *o = &x->outcomes.outcome[output];
@@ -249,7 +249,7 @@ static double sensitivity_next (pw_sensitivity *x, double t, double to, int *jum
 static int sensitivity_advance (pw_sensitivity *x, double t, double to, sensitivity_event *list, pw_progress *progress,
                                 pw_error *error) {
   const double near =
-      1e-9 * fmin (x->dt, x->unknowns.t_end / SENSITIVITY_ROWS); /* distance of states beside a jump from it */
+      1e-9 * fmin (x->dt, x->unknowns.t_end / SENSITIVITY_PARTS); /* distance of states beside a jump from it */
   int jump, status = PW_OK;
   while (t < to && status == PW_OK) {
     double next = sensitivity_next (x, t, to, &jump, error);
@@ -293,7 +293,7 @@ static int sensitivity_integrate (pw_sensitivity *x, pw_progress *progress, pw_e
 
 int pw_sensitivity_open (pw_sensitivity *x, const double *at, pw_error *error) {
   size_t P = (size_t)x->unknowns.count;
-  if (x->dt == 0) x->dt = x->unknowns.t_end / SENSITIVITY_ROWS;
+  if (x->dt == 0) x->dt = x->unknowns.t_end / SENSITIVITY_PARTS;
   x->limit.most = x->unknowns.limit;
   x->unknowns.settings.stop = pw_limit_over;
   x->unknowns.settings.stop_context = &x->limit;
