@@ -150,7 +150,8 @@ int pw_cli_range (const char *text, double *first, double *last);
 int pw_cli_settings (const pw_cli_line *l, const pw_run_defaults *model, double *t_end, pw_settings *settings,
                      pw_limit *limit, pw_error *error);
 
-/* The status of a command with incomplete results: PW_INTERRUPTED and a message after a signal; else PW_METHOD with --limit. */
+/* The status of a command with incomplete results: PW_INTERRUPTED and a message after a signal; else PW_METHOD with
+ * --limit. */
 int pw_cli_incomplete (const pw_cli_line *l, pw_error *error);
 
 /* Notices of options without effect on a method.  Steps together with tolerances, common in scripts, are not reported. */
@@ -234,7 +235,8 @@ int pw_cli_uses (const pw_cli_line *l, const pw_file *file, pw_use *use, int cou
  * PW_RESOURCE. */
 int pw_cli_folder (const char *folder, pw_error *error);
 
-/* The files that a command writes, at their places in the list of pw_cli_uses, and the lock of a folder. */
+/* The files that a command writes, at their places in the list of pw_cli_uses, which has at most PW_FILES entries, and
+ * the lock of a folder. */
 enum { PW_FILES = 6 };
 typedef struct {
   pw_output *file[PW_FILES]; /* NULL: not wanted */

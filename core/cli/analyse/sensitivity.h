@@ -37,8 +37,8 @@ typedef struct {
   int stopped; /* 1: stopped before t_end */
 } pw_sensitivity;
 
-/* Prepares derivatives of the outputs x->of, ended by NULL, with respect to x->unknowns at these values; NULL: their own.
- * Close it in every case. */
+/* Prepares derivatives of the outputs x->of, ended by NULL, with respect to x->unknowns at these values; NULL: their
+ * own.  Close it in every case. */
 int pw_sensitivity_open (pw_sensitivity *x, const double *at, pw_error *error);
 /* Begins a run with derivatives; then advances to a time, and sets value, slope and error of all columns there.  A
  * status. */

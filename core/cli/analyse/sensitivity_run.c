@@ -10,8 +10,8 @@
 #include "sensitivity.h"
 #include "util.h"
 
-/* Rows if their distance is not given; steps of the derivatives in an interval of integrals, in which the square of a column is
- * smooth enough for 5 nodes. */
+/* Rows if their distance is not given; steps of the derivatives in an interval of integrals, in which the square of a
+ * column is smooth enough for 5 nodes. */
 enum { SENSITIVITY_PARTS = 20, SENSITIVITY_STEPS = 2 };
 
 int pw_sensitivity_in_table (const pw_sensitivity *x, int output) {

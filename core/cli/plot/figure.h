@@ -34,8 +34,8 @@ int pw_figures_of (pw_figures *f, const pw_cli_line *l, const pw_cli_model *m, c
 pw_output *pw_figure_open (const char *folder, const char *name, pw_error *error);
 pw_output *pw_figure_data (const pw_figures *f, const char *name, pw_error *error);
 
-/* Locks the folder of results of the option -o, in which NAME.csv, NAME.json and the figure NAME will be written; nothing
- * without one.  A status. */
+/* Locks the folder of results of the option -o, in which NAME.csv, NAME.json and the figure NAME will be written;
+ * nothing without one.  A status. */
 int pw_figure_results (const pw_cli_line *l, const pw_cli_model *m, const char *folder, const char *name,
                        pw_files *files, pw_error *error);
 /* Writes NAME.csv and NAME.json, with `lines` levels of separate lines, into the folder.  A status. */
