@@ -143,9 +143,16 @@ int pw_cli_only (const char *option, const char *text, const char *with, int has
  * number in the domain. */
 int pw_cli_number (const char *option, const char *text, pw_domain domain, double *value, pw_error *error);
 
+/* Reads a range "FIRST:LAST"; PW_INPUT if it is not two finite numbers. */
+int pw_cli_range (const char *text, double *first, double *last);
+
 /* The model's defaults overridden by options: t_end, settings except the ledger, and the limit, which stops the run. */
 int pw_cli_settings (const pw_cli_line *l, const pw_run_defaults *model, double *t_end, pw_settings *settings,
                      pw_limit *limit, pw_error *error);
+
+/* The status of a command with incomplete results: PW_INTERRUPTED and a message after a signal; else PW_METHOD with
+ * --limit. */
+int pw_cli_incomplete (const pw_cli_line *l, pw_error *error);
 
 /* Notices of options without effect on a method.  Steps together with tolerances, common in scripts, are not reported. */
 void pw_cli_unused (const char *method, const pw_cli_line *l);
@@ -174,24 +181,6 @@ int pw_cli_apply (pw_model *m, const char *option, const char **list,
 
 /* The parameter of a model of this name; NULL: there is none. */
 const pw_parameter *pw_cli_parameter (const pw_model *m, const char *name);
-
-/* A parameter that varies continuously, of --vary NAME=FIRST:LAST. */
-typedef struct {
-  const pw_cli_line *line;
-  const pw_cli_model *m;
-  const char *text; /* of the option */
-  char name[200];
-  double first, last;
-} pw_cli_vary;
-
-/* Reads the option; the name need not be that of a parameter. */
-int pw_cli_vary_read (pw_cli_vary *v, const pw_cli_line *l, const pw_cli_model *m, const char *text, pw_error *error);
-/* PW_INPUT if the name, which is that of a parameter, cannot vary in the range, or is also set. */
-int pw_cli_vary_check (const pw_cli_vary *v, pw_error *error);
-/* Shows the progress of a branch; the first call, with a progress of zeros, starts it. */
-void pw_cli_vary_progress (const pw_cli_vary *v, pw_progress *p, double from, double value, double to);
-/* The system at a value of the parameter; for pw_steady_settings.compile. */
-pw_system *pw_cli_vary_compile (void *vary, double value, pw_error *error);
 
 enum { PW_CHANGE_TEXT = 400 };
 /* The given initial value that the consistent initialisation of a run at its beginning has changed most: the change, and
@@ -241,6 +230,26 @@ pw_scene_code *pw_cli_engine_lanes (const pw_cli_engine *e, const pw_system *s, 
 /* Refuses files that a command would read and write, or write twice.  The list begins with PW_CLI_MODEL_USE: the model
  * of the command line and, if its file is open (`file` is not NULL), the tables that it reads. */
 int pw_cli_uses (const pw_cli_line *l, const pw_file *file, pw_use *use, int count, pw_error *error);
+
+/* Makes a folder and those above it, and locks it until the descriptor that is returned is closed.  -1 and PW_INPUT or
+ * PW_RESOURCE. */
+int pw_cli_folder (const char *folder, pw_error *error);
+
+/* The files that a command writes, at their places in the list of pw_cli_uses, which has at most PW_FILES entries, and
+ * the lock of a folder. */
+enum { PW_FILES = 6 };
+typedef struct {
+  pw_output *file[PW_FILES]; /* NULL: not wanted */
+  int locked, lock;          /* 1: there is a folder; its descriptor */
+} pw_files;
+
+/* Opens them after the checks of pw_cli_uses, before anything is computed.  Close them in every case. */
+int pw_files_open (pw_files *x, const pw_cli_line *l, const pw_cli_model *m, pw_use *use, int count, pw_error *error);
+FILE *pw_files_stream (const pw_files *x, int i); /* NULL: not wanted */
+/* Gives all of them their names (pw_output_finish_all). */
+int pw_files_finish (pw_files *x, pw_error *error);
+/* Unlocks the folder, and removes files that have not been finished. */
+void pw_files_close (pw_files *x);
 
 /* PW_INPUT if the path of -o names a NumPy archive (.npz); for tables that contain texts and are CSV. */
 int pw_cli_csv (const char *path, pw_error *error);

@@ -173,6 +173,15 @@ int pw_cli_number (const char *option, const char *text, pw_domain domain, doubl
   return PW_OK;
 }
 
+int pw_cli_range (const char *text, double *first, double *last) {
+  const char *colon = strchr (text, ':');
+  char number[100];
+  if (colon == NULL || (size_t)(colon - text) >= sizeof number) return PW_INPUT;
+  snprintf (number, sizeof number, "%.*s", (int)(colon - text), text);
+  if (pw_read_expression (number, first) != PW_OK || pw_read_expression (colon + 1, last) != PW_OK) return PW_INPUT;
+  return isfinite (*last - *first) ? PW_OK : PW_INPUT;
+}
+
 int pw_cli_settings (const pw_cli_line *l, const pw_run_defaults *model, double *t_end, pw_settings *settings,
                      pw_limit *limit, pw_error *error) {
   double most = PW_MAX_STEPS;
@@ -193,6 +202,12 @@ int pw_cli_settings (const pw_cli_line *l, const pw_run_defaults *model, double 
   settings->max_steps = most < 9e18 ? (long)most : LONG_MAX;
   settings->span = *t_end;
   return status;
+}
+
+int pw_cli_incomplete (const pw_cli_line *l, pw_error *error) {
+  if (!pw_stop) return pw_fail (error, PW_METHOD, "--limit %s: stopped; results are incomplete", l->limit);
+  pw_cli_say ("pinwheel: interrupted; results are incomplete\n");
+  return PW_INTERRUPTED;
 }
 
 void pw_cli_unused (const char *method, const pw_cli_line *l) {

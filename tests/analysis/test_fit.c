@@ -314,6 +314,15 @@ static void test_changed_values (void **state) {
                                     "frame.omega from 7 to 2 rad/s\n"));
 }
 
+/* The engine is chosen for runs to the last datum, not to the final time of the model. */
+static void test_engine (void **state) {
+  (void)state;
+  cli_shell ("pinwheel run pendulum --t-end 30 --every 15 -o @/long.csv");
+  cli_shell ("export CC=/nonexistent XDG_CACHE_HOME=@/none\n"
+             "pinwheel fit pendulum --data @/long.csv --columns bob.phi --free l=0.9:1.2 2>@/engine.txt");
+  assert_non_null (strstr (cli_file ("engine.txt"), "general engine: "));
+}
+
 /* After Ctrl-C the values reached are written, without their errors. */
 static void test_interrupt (void **state) {
   (void)state;
@@ -338,6 +347,7 @@ int main (void) {
     cmocka_unit_test (test_coverage), cmocka_unit_test (test_unweighted),  cmocka_unit_test (test_undetermined),
     cmocka_unit_test (test_failing),  cmocka_unit_test (test_bound),       cmocka_unit_test (test_bad),
     cmocka_unit_test (test_starts),   cmocka_unit_test (test_interrupt),   cmocka_unit_test (test_changed_values),
+    cmocka_unit_test (test_engine),
   };
   return cmocka_run_group_tests (tests, fit_setup, cli_teardown);
 }

@@ -284,6 +284,8 @@ static void test_refusals (void **state) {
   cli_bad_each ("sensitivity", each, sizeof each / sizeof *each);
   cli_bad ("pinwheel sensitivity pendulum --of 'sqrt(-bob.x^2-1)' --by l -t 1", 4,
            "sqrt(-bob.x^2-1) is not a finite number at the end of the run");
+  cli_run ("pinwheel sensitivity pendulum --of bob.x --by l -t 1 --method rk4+none --rtol 1e-9");
+  assert_string_equal (cli_err, "pinwheel: --rtol has no effect: rk4+none takes steps of --step\n");
 }
 
 int main (void) {

@@ -135,43 +135,37 @@ static int linearise_compute (pw_linearise *x, pw_error *error) {
 
 /* ---- Files ---- */
 
-enum { LINEARISE_NAMED = 3, LINEARISE_FILES };
+enum { LINEARISE_JSON = 1, LINEARISE_CSV, LINEARISE_NPZ, LINEARISE_PAGE, LINEARISE_FILES };
 
 /* Opens NAME.json, .csv, .npz, and the page, before anything is computed. */
-static int linearise_open_files (const pw_linearise *x, pw_output **file, pw_error *error) {
-  static const char *const ending[LINEARISE_NAMED] = { "json", "csv", "npz" };
-  char path[LINEARISE_NAMED][4096];
-  pw_use use[1 + LINEARISE_FILES] = { PW_CLI_MODEL_USE };
-  for (int i = 0; i < LINEARISE_NAMED && x->name; i++) {
+static int linearise_open_files (pw_linearise *x, pw_error *error) {
+  static const char *const ending[] = { [LINEARISE_JSON] = "json", "csv", "npz" };
+  char path[LINEARISE_PAGE][4096];
+  pw_use use[LINEARISE_FILES] = { PW_CLI_MODEL_USE, [LINEARISE_PAGE] = { "--animate", x->animate, PW_WRITES, NULL } };
+  for (int i = LINEARISE_JSON; i < LINEARISE_PAGE && x->name; i++) {
     if (snprintf (path[i], sizeof path[i], "%s.%s", x->name, ending[i]) >= (int)sizeof path[i])
       return pw_fail (error, PW_INPUT, "-o: the name is too long");
-    use[1 + i] = (pw_use){ "-o", path[i], PW_WRITES, NULL };
+    use[i] = (pw_use){ "-o", path[i], PW_WRITES, NULL };
   }
-  use[LINEARISE_FILES] = (pw_use){ "--animate", x->animate, PW_WRITES, NULL };
   if (x->animate && pw_animation_check ("--animate", x->animate, error) != PW_OK) return error->status;
-  if (pw_cli_uses (&x->line, x->m.file, use, 1 + LINEARISE_FILES, error) != PW_OK) return error->status;
-  for (int i = 0; i < LINEARISE_FILES; i++)
-    if (use[1 + i].path && (file[i] = pw_output_open (use[1 + i].path, error)) == NULL) return error->status;
-  return PW_OK;
+  return pw_files_open (&x->files, &x->line, &x->m, use, LINEARISE_FILES, error);
 }
 
-static int linearise_write (const pw_linearise *x, pw_output **file, pw_error *error) {
+static int linearise_write (pw_linearise *x, pw_error *error) {
   int status = PW_OK;
   if (x->name) {
-    pw_linearise_json (x, &(pw_json){ .f = pw_output_stream (file[0]), .lines = 1 });
-    status = pw_linearise_csv (x, pw_output_stream (file[1]), error);
-    if (status == PW_OK) status = pw_linearise_npz (x, pw_output_stream (file[2]), error);
+    pw_linearise_json (x, &(pw_json){ .f = pw_files_stream (&x->files, LINEARISE_JSON), .lines = 1 });
+    status = pw_linearise_csv (x, pw_files_stream (&x->files, LINEARISE_CSV), error);
+    if (status == PW_OK) status = pw_linearise_npz (x, pw_files_stream (&x->files, LINEARISE_NPZ), error);
   }
-  if (status == PW_OK && x->animate) status = pw_linearise_page (x, pw_output_stream (file[LINEARISE_NAMED]), error);
-  if (status != PW_OK) return status;
-  status = pw_output_finish_all (file, LINEARISE_FILES, error);
-  for (int i = 0; i < LINEARISE_FILES; i++) file[i] = NULL;
-  return status;
+  if (status == PW_OK && x->animate) status = pw_linearise_page (x, pw_files_stream (&x->files, LINEARISE_PAGE), error);
+  return status == PW_OK ? pw_files_finish (&x->files, error) : status;
 }
 
 static void linearise_close (pw_linearise *x) {
   pw_linear_free (&x->linear);
-  if (x->r) pw_run_close (x->r);
+  pw_files_close (&x->files);
+  pw_run_close (x->r);
   free (x->initial);
   free (x->input);
   free (x->output);
@@ -180,18 +174,15 @@ static void linearise_close (pw_linearise *x) {
 
 static int linearise_command (void *options, pw_error *error) {
   pw_linearise *x = options;
-  pw_output *file[LINEARISE_FILES] = { NULL };
   int status = pw_cli_number ("--at", x->at, PW_NONNEGATIVE, &x->t, error);
   if (status == PW_OK && x->hold_texts && !x->steady) status = pw_fail (error, PW_INPUT, "--hold needs --steady");
   if (status == PW_OK) status = pw_cli_open (&x->m, &x->line, error);
   if (status == PW_OK) status = linearise_select (x, error);
-  if (status == PW_OK) status = linearise_open_files (x, file, error);
+  if (status == PW_OK) status = linearise_open_files (x, error);
   if (status == PW_OK) pw_report_model (x->m.model);
   if (status == PW_OK) status = linearise_compute (x, error);
   if (status == PW_OK) pw_linearise_print (x);
-  if (status == PW_OK) status = linearise_write (x, file, error);
-  for (int i = 0; i < LINEARISE_FILES; i++)
-    if (file[i]) pw_output_discard (file[i]);
+  if (status == PW_OK) status = linearise_write (x, error);
   linearise_close (x);
   if (status == PW_RETRY) pw_cli_say ("pinwheel: interrupted\n");
   return status == PW_RETRY ? PW_INTERRUPTED : status;

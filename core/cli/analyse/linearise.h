@@ -13,6 +13,7 @@ typedef struct {
   int steady;
   const char **input_names, **output_names; /* as given, ended by NULL; or NULL: all */
   pw_cli_model m;
+  pw_files files;
   pw_run *r;
   double t;
   pw_initial_value *initial; /* 2 coordinates: the steady motion; NULL: the model's initial state */

@@ -5,6 +5,7 @@
 #include "linearise.h"
 #include "plot.h"
 #include "print_table.h"
+#include "states.h"
 #include "text.h"
 
 /* LINEARISE_MODES: mode shapes in the text; LINEARISE_BODIES: bodies of each, and internal coordinates. */
@@ -70,15 +71,14 @@ static const double *linearise_shape (const pw_linear *l, int i, int state) {
 /* A real component, or amplitude and phase of a complex one. */
 static void linearise_component (pw_table *t, const pw_linear *l, int mode, int coordinate) {
   const double *c = linearise_shape (l, mode, coordinate);
-  char text[80], size[32], phase[32];
+  char text[80];
   double amplitude = hypot (c[0], c[1]);
   if (amplitude < LINEARISE_SMALL)
     snprintf (text, sizeof text, "0");
   else if (l->im[mode] == 0)
-    pw_format (text, c[0], LINEARISE_DIGITS);
+    snprintf (text, sizeof text, "%.5g", c[0]);
   else
-    snprintf (text, sizeof text, "%s at %s deg", pw_format (size, amplitude, LINEARISE_DIGITS),
-              pw_format (phase, round (1800 / PW_PI * atan2 (c[1], c[0])) / 10 + 0, LINEARISE_DIGITS));
+    snprintf (text, sizeof text, "%.5g at %.5g deg", amplitude, round (1800 / PW_PI * atan2 (c[1], c[0])) / 10 + 0);
   pw_cell (t, 12, text);
 }
 
@@ -121,12 +121,11 @@ static void linearise_shapes (const pw_linearise *x) {
 
 void pw_linearise_print (const pw_linearise *x) {
   const pw_linear *l = &x->linear;
-  char t[32], w[32], a[32];
-  printf ("%s%s at t = %s s: %d minimal coordinates, %d of positions and %d of velocities\n", pw_file_name (x->m.file),
-          x->steady ? ", steady motion" : "", pw_format (t, x->t, 9), l->unknowns, l->positions, l->velocities);
-  if (l->twist[2] != 0) printf ("The frame turns at %s rad/s\n", pw_format (w, l->twist[2], LINEARISE_DIGITS));
+  printf ("%s%s at t = %.9g s: %d minimal coordinates, %d of positions and %d of velocities\n",
+          pw_file_name (x->m.file), x->steady ? ", steady motion" : "", x->t, l->unknowns, l->positions, l->velocities);
+  if (l->twist[2] != 0) printf ("The frame turns at %.5g rad/s\n", l->twist[2]);
   if (l->steady == PW_ACCELERATED)
-    printf ("Not steady: accelerations of %s m/s^2 in the co-moving frame", pw_format (a, l->acceleration, 3));
+    printf ("Not steady: accelerations of %.3g m/s^2 in the co-moving frame", l->acceleration);
   else if (l->steady == PW_CHANGING)
     printf ("Not steady: the equations change with time or along the motion");
   puts (l->steady == PW_STEADY ? "The motion is steady" : "; the eigenvalues are not stability exponents");
@@ -171,11 +170,8 @@ static void linearise_mode_json (const pw_linearise *x, pw_json *j, int i) {
   pw_json_number (j, "halving_time", linearise_time (l, i, -1));
   pw_json_flag (j, "rigid", l->rigid[i]);
   pw_json_open (j, "shape", '{');
-  for (int k = 0; linearise_has_shape (l, i) && k < 2 * l->coordinates; k++) {
-    pw_json_open (j, pw_system_state_name (x->m.system, k, name, sizeof name), '[');
-    for (int part = 0; part < 2; part++) pw_json_number (j, NULL, linearise_shape (l, i, k)[part]);
-    pw_json_close (j, ']');
-  }
+  for (int k = 0; linearise_has_shape (l, i) && k < 2 * l->coordinates; k++)
+    pw_numbers_json (j, pw_system_state_name (x->m.system, k, name, sizeof name), linearise_shape (l, i, k), 2);
   pw_json_close (j, '}');
   pw_json_close (j, '}');
 }
@@ -207,9 +203,7 @@ void pw_linearise_json (const pw_linearise *x, pw_json *j) {
   pw_json_number (j, "positions", l->positions);
   pw_json_number (j, "velocities", l->velocities);
   pw_json_number (j, "symmetries", l->symmetries);
-  pw_json_open (j, "twist", '[');
-  for (int i = 0; i < 3; i++) pw_json_number (j, NULL, l->twist[i]);
-  pw_json_close (j, ']');
+  pw_numbers_json (j, "twist", l->twist, 3);
   linearise_names (x, j, 1);
   linearise_names (x, j, 0);
   for (int i = 0; i < 4; i++) linearise_matrix (x, j, (const char *[]){ "A", "B", "C", "D" }[i], i / 2, i % 2);
@@ -273,7 +267,6 @@ typedef struct {
   const double *base; /* configuration */
   double *state;      /* q, v: scratch */
   double size;        /* [m] */
-  int status;
   pw_error *error;
 } page;
 
@@ -291,37 +284,32 @@ static void page_state (const page *p, int mode, double t, double end) {
   }
 }
 
-static void page_mode (page *p, FILE *f, int mode) {
+static void page_mode (const page *p, FILE *f, int mode) {
   const pw_linear *l = &p->x->linear;
   const double re = l->re[mode], im = l->im[mode],
                end = im == 0 ? PAGE_TIMES / fabs (re) : 2 * PW_PI * PAGE_PERIODS / im;
-  char title[200], number[2][32];
+  char title[200];
   pw_plots *plots = pw_plots_open (NULL, 0, p->x->m.model, p->x->m.system, end, p->error);
-  if (plots == NULL) {
-    p->status = p->error->status;
-    return;
-  }
+  if (plots == NULL) return;
   for (int k = 0; k <= PAGE_SAMPLES; k++) {
     const double t = end * k / PAGE_SAMPLES;
     page_state (p, mode, t, end);
     pw_plots_add (plots, &(pw_sample){ .t = t, .q = p->state, .v = p->state + l->coordinates });
   }
-  int n = snprintf (title, sizeof title, "mode %d: %s 1/s", mode + 1, pw_format (number[0], re, 5));
-  if (im != 0)
-    snprintf (title + n, sizeof title - (size_t)n, ", %s Hz, growth is not shown",
-              pw_format (number[1], im / (2 * PW_PI), 5));
+  int n = snprintf (title, sizeof title, "mode %d: %.5g 1/s", mode + 1, re);
+  if (im != 0) snprintf (title + n, sizeof title - (size_t)n, ", %.5g Hz, growth is not shown", im / (2 * PW_PI));
   pw_animation_run (f, plots, title, "");
   pw_plots_close (plots);
 }
 
 static void page_insert (FILE *f, pw_page_part part, const void *context) {
-  page *p = *(page *const *)context;
+  const page *p = context;
   if (part == PW_PAGE_PANEL) {
     fputs ("<p class=\"bar\"><label>Mode <select id=\"mode\"></select></label></p>\n", f);
     return;
   }
   fputs ("const modes = [", f);
-  for (int i = 0, shown = 0; i < p->x->linear.unknowns && p->status == PW_OK; i++) {
+  for (int i = 0, shown = 0; i < p->x->linear.unknowns && p->error->status == PW_OK; i++) {
     if (!linearise_shows (&p->x->linear, i)) continue;
     fputs (shown++ ? ",\n" : "\n", f);
     page_mode (p, f, i);
@@ -336,21 +324,16 @@ static void page_insert (FILE *f, pw_page_part part, const void *context) {
 int pw_linearise_page (const pw_linearise *x, FILE *f, pw_error *error) {
   const size_t n = (size_t)x->linear.coordinates;
   pw_sample now;
-  double *memory = malloc (3 * n * sizeof *memory);
-  page p = {
-    .x = x, .base = memory, .state = memory + n, .size = PAGE_SIZE * pw_run_scale (x->r)->length, .error = error
-  };
-  page *context = &p;
   int shown = 0;
   for (int i = 0; i < x->linear.unknowns; i++) shown += linearise_shows (&x->linear, i);
-  p.status =
-      memory ? pw_run_sample (x->r, pw_run_time (x->r), &now, error) : pw_fail (error, PW_RESOURCE, "out of memory");
-  if (p.status == PW_OK && shown == 0)
-    p.status = pw_fail (error, PW_INPUT, "--animate %s: there is no mode with a shape", x->animate);
-  if (p.status == PW_OK) {
-    memcpy (memory, now.q, n * sizeof *memory);
-    pw_animation_page (f, page_insert, &context);
-  }
-  free (memory);
-  return p.status;
+  if (shown == 0) return pw_fail (error, PW_INPUT, "--animate %s: there is no mode with a shape", x->animate);
+  if (pw_run_sample (x->r, pw_run_time (x->r), &now, error) != PW_OK) return error->status;
+  double *state = malloc (2 * n * sizeof *state);
+  if (state == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
+  const page p = {
+    .x = x, .base = now.q, .state = state, .size = PAGE_SIZE * pw_run_scale (x->r)->length, .error = error
+  };
+  pw_animation_page (f, page_insert, &p);
+  free (state);
+  return error->status;
 }

@@ -1,6 +1,7 @@
 /* Columns by name, and the texts of outputs. */
 #define _POSIX_C_SOURCE 200809L
 #include <math.h>
+#include <stddef.h>
 #include <stdlib.h>
 #include <string.h>
 #include "outcome.h"
@@ -8,19 +9,20 @@
 
 /* ---- Columns ---- */
 
-/* Names of single columns. */
+/* Columns that are one number of a sample. */
 static const struct {
   const char *name, *unit;
+  size_t at; /* in pw_sample */
 } outcome_single[PW_COLUMN_TYPES] = {
-  [PW_COLUMN_TIME] = { "t", "s" },
-  [PW_COLUMN_POSITION] = { "residual.position", "" },
-  [PW_COLUMN_VELOCITY] = { "residual.velocity", "" },
-  [PW_COLUMN_KINETIC] = { "kinetic", "J" },
-  [PW_COLUMN_POTENTIAL] = { "potential", "J" },
-  [PW_COLUMN_PROJECTION] = { "projection", "J" },
-  [PW_COLUMN_BALANCE] = { "balance", "J" },
-  [PW_COLUMN_WORK] = { "work", "J" },
-  [PW_COLUMN_LOSS] = { "loss", "J" },
+  [PW_COLUMN_TIME] = { "t", "s", offsetof (pw_sample, t) },
+  [PW_COLUMN_POSITION] = { "residual.position", "", offsetof (pw_sample, position) },
+  [PW_COLUMN_VELOCITY] = { "residual.velocity", "", offsetof (pw_sample, velocity) },
+  [PW_COLUMN_KINETIC] = { "kinetic", "J", offsetof (pw_sample, kinetic) },
+  [PW_COLUMN_POTENTIAL] = { "potential", "J", offsetof (pw_sample, potential) },
+  [PW_COLUMN_PROJECTION] = { "projection", "J", offsetof (pw_sample, projection) },
+  [PW_COLUMN_BALANCE] = { "balance", "J", offsetof (pw_sample, balance) },
+  [PW_COLUMN_WORK] = { "work", "J", offsetof (pw_sample, work) },
+  [PW_COLUMN_LOSS] = { "loss", "J", offsetof (pw_sample, loss) },
 };
 
 static int outcome_columns (const pw_system *s, pw_column_type type) {
@@ -66,34 +68,11 @@ int pw_column_find (const pw_system *s, const char *name, const char *what, pw_c
 
 double pw_column_value (const pw_system *s, pw_column c, const pw_sample *x) {
   int n = pw_system_coordinates (s);
-  switch (c.type) {
-  case PW_COLUMN_TIME:
-    return x->t;
-  case PW_COLUMN_STATE:
-    return c.index < n ? x->q[c.index] : x->v[c.index - n];
-  case PW_COLUMN_REACTION:
-    return 0 - x->lambda[c.index];
-  case PW_COLUMN_POSITION:
-    return x->position;
-  case PW_COLUMN_VELOCITY:
-    return x->velocity;
-  case PW_COLUMN_KINETIC:
-    return x->kinetic;
-  case PW_COLUMN_POTENTIAL:
-    return x->potential;
-  case PW_COLUMN_LEDGER:
-    return x->ledger ? x->ledger[c.index] : NAN;
-  case PW_COLUMN_PROJECTION:
-    return x->projection;
-  case PW_COLUMN_BALANCE:
-    return x->balance;
-  case PW_COLUMN_WORK:
-    return x->work;
-  case PW_COLUMN_LOSS:
-    return x->loss;
-  default:
-    return NAN;
-  }
+  if (c.type == PW_COLUMN_STATE) return c.index < n ? x->q[c.index] : x->v[c.index - n];
+  if (c.type == PW_COLUMN_REACTION) return 0 - x->lambda[c.index];
+  if (c.type == PW_COLUMN_LEDGER) return x->ledger ? x->ledger[c.index] : NAN;
+  if (c.type == PW_COLUMN_CONTACT) return NAN;
+  return *(const double *)((const char *)x + outcome_single[c.type].at);
 }
 
 /* ---- Texts ---- */
@@ -123,9 +102,16 @@ static int outcome_add (pw_outcomes *x, pw_functional_type type, pw_column c) {
   return x->functionals++;
 }
 
+/* Name of the variable of term i in a formula. */
+enum { OUTCOME_VARIABLE = 20 };
+static const char *outcome_variable (char name[OUTCOME_VARIABLE], int i) {
+  snprintf (name, OUTCOME_VARIABLE, "column%d", i + 1);
+  return name;
+}
+
 /* Adds [TYPE:]NAME to an output, followed by `next` in its text, and the name of its variable in the formula to a text. */
 static int outcome_term (pw_outcomes *x, pw_outcome *o, const char *what, const char *name, char next,
-                         char variable[20], pw_error *error) {
+                         char variable[OUTCOME_VARIABLE], pw_error *error) {
   pw_column c;
   pw_functional_type type = outcome_type (&name);
   pw_error own = { 0 };
@@ -138,7 +124,7 @@ static int outcome_term (pw_outcomes *x, pw_outcome *o, const char *what, const 
   while (i < o->terms && o->term[i] != f) i++;
   if (i == PW_FORMULA_NAMES) return pw_fail (error, PW_INPUT, "%s: more than %d columns", what, PW_FORMULA_NAMES);
   if (i == o->terms) o->term[o->terms++] = f;
-  snprintf (variable, 20, "column%d", i + 1);
+  outcome_variable (variable, i);
   return PW_OK;
 }
 
@@ -175,16 +161,10 @@ static size_t outcome_copied (const char *text) {
 
 /* Replaces columns by variables of a formula. */
 static int outcome_formula (pw_outcomes *x, pw_outcome *o, const char *what, pw_error *error) {
-  static const char *const names[] = { "column1",  "column2",  "column3",  "column4",  "column5",  "column6",
-                                       "column7",  "column8",  "column9",  "column10", "column11", "column12",
-                                       "column13", "column14", "column15", "column16", "column17", "column18",
-                                       "column19", "column20", "column21", "column22", "column23", "column24",
-                                       "column25", "column26", "column27", "column28", "column29", "column30",
-                                       "column31", "column32", NULL };
   char text[4000], name[300];
   size_t used = 0;
   for (const char *at = o->text; *at;) {
-    char variable[20];
+    char variable[OUTCOME_VARIABLE];
     size_t n = outcome_length (x->system, at), size = n ? 0 : outcome_copied (at);
     if (n >= sizeof name || used + size + sizeof variable > sizeof text)
       return pw_fail (error, PW_INPUT, "%s: the expression is too long", what);
@@ -196,6 +176,9 @@ static int outcome_formula (pw_outcomes *x, pw_outcome *o, const char *what, pw_
     at += n + size;
   }
   text[used] = 0;
+  char variables[PW_FORMULA_NAMES][OUTCOME_VARIABLE];
+  const char *names[PW_FORMULA_NAMES + 1] = { NULL };
+  for (int i = 0; i < PW_FORMULA_NAMES; i++) names[i] = outcome_variable (variables[i], i);
   pw_error own = { 0 };
   o->formula = pw_formula_open (text, names, &own);
   return o->formula ? PW_OK : pw_fail (error, own.status, "%s: %s", what, own.text);
@@ -203,7 +186,7 @@ static int outcome_formula (pw_outcomes *x, pw_outcome *o, const char *what, pw_
 
 /* A single column may have any name. */
 static int outcome_read (pw_outcomes *x, pw_outcome *o, const char *option, pw_error *error) {
-  char what[300], variable[20];
+  char what[300], variable[OUTCOME_VARIABLE];
   snprintf (what, sizeof what, "%s %.200s", option, o->text);
   if (*o->text == 0) return pw_fail (error, PW_INPUT, "%s is empty: expected a column, such as frame.x", option);
   pw_error own = { 0 };

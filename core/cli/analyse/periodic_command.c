@@ -2,7 +2,6 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
-#include <unistd.h>
 #include "figure.h"
 #include "periodic_report.h"
 #include "progress.h"
@@ -52,18 +51,15 @@ static int periodic_options (pw_periodic_cli *x, pw_error *error) {
   int status = pw_cli_settings (&x->line, &d, &t_end, &settings, &x->limit, error);
   x->set.method = x->line.method ? x->line.method : "erk8+projection";
   x->set.rtol = settings.rtol;
-  x->unit = "";
+  x->vary.name = x->vary.unit = "";
   x->set.stop = pw_limit_over, x->set.stop_context = &x->limit;
   if (status == PW_OK) status = periodic_period (x, error);
   if (status != PW_OK || x->vary_text == NULL) return status;
-  if (pw_cli_vary_read (&x->vary, &x->line, &x->m, x->vary_text, error) != PW_OK) return PW_INPUT;
+  if (pw_vary_read (&x->vary, &x->line, &x->m, x->vary_text, error) != PW_OK) return PW_INPUT;
   x->set.first = x->vary.first, x->set.last = x->vary.last;
-  const pw_parameter *p = pw_cli_parameter (x->m.model, x->vary.name);
-  if (p == NULL) return pw_model_set (x->m.model, x->vary.name, x->set.first, error);
-  x->unit = p->unit;
-  x->set.compile = pw_cli_vary_compile;
+  x->set.compile = pw_vary_compile;
   x->set.context = &x->vary;
-  return pw_cli_vary_check (&x->vary, error);
+  return x->vary.parameter ? PW_OK : pw_model_set (x->m.model, x->vary.name, x->set.first, error);
 }
 
 /* ---- The search ---- */
@@ -105,9 +101,9 @@ static int periodic_find (pw_periodic_cli *x, pw_periodic_orbit *o, pw_error *er
 }
 
 static int periodic_fail (const pw_periodic_cli *x, pw_error *error) {
-  char period[60] = "a free period", tried[200] = "", number[32];
+  char period[60] = "a free period", tried[200] = "";
   double T = x->set.period > 0 ? x->set.period : x->set.periods * pw_system_period (x->m.system);
-  if (!x->set.free) snprintf (period, sizeof period, "period %s s", pw_format (number, T, 9));
+  if (!x->set.free) snprintf (period, sizeof period, "period %.9g s", T);
   for (int k = 0; k < PW_PERIODIC_ATTEMPTS; k++) {
     size_t used = strlen (tried);
     snprintf (tried + used, sizeof tried - used, isfinite (x->nearest[k]) ? "%s%d (%.2g)" : "%s%d (not begun)",
@@ -126,13 +122,13 @@ static int periodic_fail (const pw_periodic_cli *x, pw_error *error) {
 static int periodic_branch (pw_periodic_cli *x, pw_error *error) {
   pw_periodic_orbit o;
   pw_progress progress = { .t_end = 0 };
-  pw_cli_vary_progress (&x->vary, &progress, x->set.first, x->set.first, x->set.last);
+  pw_vary_progress (&x->vary, &progress, x->set.first, x->set.first, x->set.last);
   int status = pw_periodic_follow (x->search, 1, error);
   while (status == PW_OK && !periodic_stop (x)) {
     status = pw_periodic_next (x->search, &o, error);
     if (status != PW_OK || o.event == PW_PERIODIC_END) break;
     status = periodic_add (x, &o, error);
-    pw_cli_vary_progress (&x->vary, &progress, x->set.first, o.parameter, x->set.last);
+    pw_vary_progress (&x->vary, &progress, x->set.first, o.parameter, x->set.last);
   }
   pw_progress_end (&progress);
   periodic_stop (x);
@@ -148,7 +144,6 @@ static int periodic_compute (pw_periodic_cli *x, pw_error *error) {
   int status = periodic_find (x, &o, error);
   if (status == PW_RETRY && !periodic_stop (x)) status = periodic_fail (x, error);
   if (status == PW_OK) status = x->vary_text ? periodic_branch (x, error) : periodic_add (x, &o, error);
-  x->interrupted = pw_stop > 0;
   pw_stop_release ();
   return status == PW_RETRY ? PW_OK : status;
 }
@@ -157,23 +152,19 @@ static int periodic_compute (pw_periodic_cli *x, pw_error *error) {
 
 static int periodic_command (void *options, pw_error *error) {
   pw_periodic_cli *x = options;
-  int lock = -1, status = pw_cli_open (&x->m, &x->line, error);
+  int status = pw_cli_open (&x->m, &x->line, error);
   if (status == PW_OK) status = periodic_options (x, error);
-  if (status == PW_OK) status = pw_figure_results (&x->line, &x->m, x->folder, "periodic", &lock, error);
+  if (status == PW_OK) status = pw_figure_results (&x->line, &x->m, x->folder, "periodic", &x->files, error);
   if (status == PW_OK) pw_report_model (x->m.model);
   if (status == PW_OK) status = periodic_compute (x, error);
   if (status == PW_OK && x->points) pw_periodic_print (x);
   if (status == PW_OK && x->points && x->folder) status = pw_periodic_write (x, error);
-  int stopped = x->stopped, interrupted = x->interrupted;
-  if (lock >= 0) close (lock);
+  pw_files_close (&x->files);
   for (int i = 0; i < x->points; i++) free (x->point[i].state);
   free (x->point);
   pw_periodic_close (x->search);
   pw_cli_close_model (&x->m);
-  if (status != PW_OK || !stopped) return status;
-  if (!interrupted) return pw_fail (error, PW_METHOD, "--limit %s: stopped; results are incomplete", x->line.limit);
-  pw_cli_say ("pinwheel: interrupted; results are incomplete\n");
-  return PW_INTERRUPTED;
+  return status == PW_OK && x->stopped ? pw_cli_incomplete (&x->line, error) : status;
 }
 
 static const struct poptOption periodic_options_table[] = {

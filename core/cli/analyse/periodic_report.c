@@ -86,7 +86,7 @@ static void periodic_branch (const pw_periodic_cli *x) {
           x->points);
   for (pw_table t = { 0 }; pw_table_pass (&t);) {
     pw_cell (&t, -15, "event");
-    *x->unit ? pw_cell_unit (&t, 12, x->vary.name, x->unit) : pw_cell (&t, 12, x->vary.name);
+    *x->vary.unit ? pw_cell_unit (&t, 12, x->vary.name, x->vary.unit) : pw_cell (&t, 12, x->vary.name);
     for (int k = 0; k < 5; k++)
       pw_cell (
           &t, 12,
@@ -162,7 +162,7 @@ static void periodic_json (const void *context, pw_json *j) {
   pw_json_number (j, "schema", 1);
   pw_json_text (j, "model", pw_file_name (x->m.file));
   pw_json_text (j, "parameter", x->vary_text ? x->vary.name : NULL);
-  pw_json_text (j, "unit", x->unit);
+  pw_json_text (j, "unit", x->vary.unit);
   pw_json_text (j, "method", x->set.method);
   pw_json_number (j, "symmetries", pw_periodic_symmetries (x->search));
   pw_json_flag (j, "complete", !x->stopped);
@@ -181,7 +181,7 @@ static int periodic_csv (const void *context, FILE *f, pw_error *error) {
   int states = 2 * pw_system_coordinates (s), most = x->point->orbit.multipliers;
   pw_text t = { .at = NULL };
   char name[300];
-  pw_text_name (&t, x->vary_text ? x->vary.name : "parameter", x->unit);
+  pw_text_name (&t, x->vary_text ? x->vary.name : "parameter", x->vary.unit);
   pw_text_cell (&t, "event,period [s],displacement [m],rotation [rad],growing,residual");
   pw_states_head (s, &t);
   for (int i = 1; i <= most; i++)
@@ -285,7 +285,7 @@ static void periodic_variables (const void *context, FILE *f) {
   const pw_periodic_cli *x = context;
   int bodies = pw_system_bodies (x->m.system);
   if (bodies > PERIODIC_BODIES) bodies = PERIODIC_BODIES;
-  pw_figure_label (f, "label_of_x", 0, x->vary.name, x->unit);
+  pw_figure_label (f, "label_of_x", 0, x->vary.name, x->vary.unit);
   fprintf (f, "branch = %d\nfirst = %.10g\nlast = %.10g\nbodies = %d\narray body[%d]\n", x->vary_text != NULL,
            fmin (x->set.first, x->set.last), fmax (x->set.first, x->set.last), bodies, bodies ? bodies : 1);
   fputs ("array low[3]\narray high[3]\n", f);

@@ -2,8 +2,7 @@
 #ifndef PW_PERIODIC_REPORT_H
 #define PW_PERIODIC_REPORT_H
 
-#include "cli.h"
-#include "pinwheel-analysis.h"
+#include "vary.h"
 
 /* A periodic motion found, or a point of a branch. */
 typedef struct {
@@ -17,18 +16,18 @@ typedef struct {
   pw_cli_line line;
   const char *period_text, *periods_text, *guess_text, *vary_text, *folder;
   pw_cli_model m;
+  pw_files files;
   pw_limit limit;
   pw_periodic_settings set;
   const char *source; /* of the period: "of the signals", "--period", "found" */
-  const char *unit;   /* of the parameter */
-  pw_cli_vary vary;
+  pw_vary vary;
   pw_periodic *search;
   pw_periodic_point *point;
   int points;
   size_t room;
   double nearest[PW_PERIODIC_ATTEMPTS]; /* residuals at the end of the attempts without solution */
   char reason[300];                     /* why, of the nearest one */
-  int stopped, interrupted;
+  int stopped;                          /* 1: by Ctrl-C or --limit */
 } pw_periodic_cli;
 
 void pw_periodic_print (const pw_periodic_cli *x);

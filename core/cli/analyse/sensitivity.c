@@ -3,7 +3,6 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
-#include <unistd.h>
 #include "figure.h"
 #include "print_table.h"
 #include "report.h"
@@ -12,12 +11,12 @@
 
 /* ---- The terminal ---- */
 
-enum { SENSITIVITY_DIGITS = 9, SENSITIVITY_UNIT = 64 };
+enum { SENSITIVITY_DIGITS = 9, SENSITIVITY_UNIT = 64, SENSITIVITY_ROWS = 1000 };
 
 /* "m per kg"; "" if both are numbers, and of a formula, whose unit is unknown. */
 static const char *sensitivity_unit (const pw_sensitivity *x, int o, int p, char unit[SENSITIVITY_UNIT]) {
   char of[SENSITIVITY_UNIT / 2];
-  const char *by = x->runs.list[p].unit;
+  const char *by = x->unknowns.list[p].unit;
   pw_outcome_unit (&x->outcomes, o, of, sizeof of);
   if (*of == 0 && x->outcomes.outcome[o].formula) return strcpy (unit, "");
   snprintf (unit, SENSITIVITY_UNIT, *by ? "%s per %s" : "%s", *of || *by == 0 ? of : "1", by);
@@ -29,14 +28,13 @@ static void sensitivity_result (const pw_sensitivity *x, int o, int p, double re
   double value = pw_outcome_value (&x->outcomes, o, NULL);
   result[0] = pw_sensitivity_derivative (x, o, p, x->end_slope);
   result[1] = fabs (pw_sensitivity_derivative (x, o, p, x->end_error));
-  result[2] = value != 0 && x->runs.list[p].value != 0 ? result[0] * x->runs.list[p].value / value : NAN;
+  result[2] = value != 0 && x->unknowns.list[p].value != 0 ? result[0] * x->unknowns.list[p].value / value : NAN;
 }
 
 static void sensitivity_print (const pw_sensitivity *x) {
-  char t[32], value[32], unit[SENSITIVITY_UNIT], digits[32];
+  char value[32], unit[SENSITIVITY_UNIT], digits[32];
   static const char *const head[] = { "value", "derivative", "unit", "error", "elasticity", NULL };
-  printf ("%s by %s to t = %s s\n", pw_file_name (x->m.file), x->runs.method,
-          pw_format (t, pw_run_time (x->base.run), 9));
+  printf ("%s by %s to t = %.9g s\n", pw_file_name (x->m.file), x->unknowns.method, pw_run_time (x->base.run));
   for (int o = 0; o < x->outcomes.outcomes && !x->stopped; o++) {
     pw_outcome_unit (&x->outcomes, o, unit, sizeof unit);
     pw_cli_print (stdout, "\n%s = %s %s\n", x->of[o], pw_format (value, pw_outcome_value (&x->outcomes, o, NULL), 12),
@@ -45,11 +43,11 @@ static void sensitivity_print (const pw_sensitivity *x) {
       pw_cell (&table, -14, "by");
       for (const char *const *h = head; *h; h++) pw_cell (&table, *h == head[2] ? -8 : 12, *h);
       pw_row_end (&table);
-      for (int p = 0; p < x->runs.count; p++) {
+      for (int p = 0; p < x->unknowns.count; p++) {
         double result[3];
         sensitivity_result (x, o, p, result);
-        pw_cell_unit (&table, -14, x->runs.list[p].name, x->runs.list[p].unit);
-        pw_cell_number (&table, 12, x->runs.list[p].value, SENSITIVITY_DIGITS);
+        pw_cell_unit (&table, -14, x->unknowns.list[p].name, x->unknowns.list[p].unit);
+        pw_cell_number (&table, 12, x->unknowns.list[p].value, SENSITIVITY_DIGITS);
         pw_cell (&table, 12, isnan (result[0]) ? "none" : pw_format (digits, result[0], SENSITIVITY_DIGITS));
         pw_cell (&table, -8, sensitivity_unit (x, o, p, unit));
         pw_cell_number (&table, 12, result[1], 2);
@@ -72,10 +70,10 @@ static void sensitivity_warn (const pw_sensitivity *x) {
   char list[1000] = "";
   size_t used = 0;
   for (int o = 0; o < x->outcomes.outcomes && !x->stopped; o++)
-    for (int p = 0; p < x->runs.count && used < sizeof list; p++)
+    for (int p = 0; p < x->unknowns.count && used < sizeof list; p++)
       if (sensitivity_is_uncertain (x, o, p))
         used += (size_t)snprintf (list + used, sizeof list - used, "%s%s by %s", used ? ", " : "", x->of[o],
-                                  x->runs.list[p].name);
+                                  x->unknowns.list[p].name);
   if (used)
     pw_cli_say ("pinwheel: derivatives with errors above 1 %%, which the motion amplifies or the steps of the run "
                 "cause: %s%s\n",
@@ -89,7 +87,7 @@ static void sensitivity_json (const void *context, pw_json *j) {
   char unit[SENSITIVITY_UNIT];
   pw_json_open (j, NULL, '{');
   pw_json_text (j, "model", pw_file_name (x->m.file));
-  pw_json_text (j, "method", x->runs.method);
+  pw_json_text (j, "method", x->unknowns.method);
   pw_json_number (j, "t_end", pw_run_time (x->base.run));
   pw_json_flag (j, "complete", !x->stopped);
   pw_json_number (j, "cpu_seconds", x->cpu);
@@ -100,12 +98,12 @@ static void sensitivity_json (const void *context, pw_json *j) {
     pw_json_text (j, "unit", pw_outcome_unit (&x->outcomes, o, unit, sizeof unit));
     pw_json_number (j, "value", pw_outcome_value (&x->outcomes, o, NULL));
     pw_json_open (j, "derivatives", '[');
-    for (int p = 0; p < x->runs.count; p++) {
+    for (int p = 0; p < x->unknowns.count; p++) {
       double result[3];
       sensitivity_result (x, o, p, result);
       pw_json_open (j, NULL, '{');
-      pw_json_text (j, "by", x->runs.list[p].name);
-      pw_json_number (j, "value", x->runs.list[p].value);
+      pw_json_text (j, "by", x->unknowns.list[p].name);
+      pw_json_number (j, "value", x->unknowns.list[p].value);
       pw_json_text (j, "unit", sensitivity_unit (x, o, p, unit));
       pw_json_number (j, "derivative", result[0]);
       pw_json_number (j, "error", result[1]);
@@ -134,8 +132,8 @@ static int sensitivity_csv (const void *context, FILE *f, pw_error *error) {
   for (int o = 0; o < x->outcomes.outcomes; o++) {
     if (!pw_sensitivity_in_table (x, o)) continue;
     sensitivity_cell (&t, x->of[o], pw_outcome_unit (&x->outcomes, o, unit, sizeof unit));
-    for (int p = 0; p < x->runs.count; p++) {
-      snprintf (name, sizeof name, "d(%.140s)/d(%.140s)", x->of[o], x->runs.list[p].name);
+    for (int p = 0; p < x->unknowns.count; p++) {
+      snprintf (name, sizeof name, "d(%.140s)/d(%.140s)", x->of[o], x->unknowns.list[p].name);
       sensitivity_cell (&t, name, sensitivity_unit (x, o, p, unit));
     }
   }
@@ -149,8 +147,8 @@ static int sensitivity_csv (const void *context, FILE *f, pw_error *error) {
 
 static void sensitivity_label (const pw_sensitivity *x, int o, int p, char *label, size_t size) {
   char unit[SENSITIVITY_UNIT];
-  const char *name = x->runs.list[p].name;
-  if (x->runs.list[p].value != 0) {
+  const char *name = x->unknowns.list[p].name;
+  if (x->unknowns.list[p].value != 0) {
     pw_outcome_unit (&x->outcomes, o, unit, sizeof unit);
     snprintf (label, size, *unit ? "%.100s × ∂/∂%.100s [%s]" : "%.100s × ∂/∂%.100s", name, name, unit);
   } else {
@@ -166,9 +164,10 @@ static int sensitivity_data (const void *context, FILE *f, pw_error *error) {
   size_t columns = (size_t)x->columns;
   (void)error;
   for (int c = 1; c < x->columns; c++) {
-    int p = (c - 1) % (1 + x->runs.count) - 1;
+    int p = (c - 1) % (1 + x->unknowns.count) - 1;
     if (p < 0) continue;
-    double factor = x->runs.list[p].value != 0 ? x->runs.list[p].value : 1; /* so that unknowns can be compared */
+    double factor =
+        x->unknowns.list[p].value != 0 ? x->unknowns.list[p].value : 1; /* so that unknowns can be compared */
     for (int k = 0; k < x->rows; k++)
       fprintf (f, "%.9g %.9g\n", row[(size_t)k * columns], row[(size_t)k * columns + (size_t)c] * factor);
     fputs ("\n\n", f);
@@ -179,16 +178,16 @@ static int sensitivity_data (const void *context, FILE *f, pw_error *error) {
 static void sensitivity_variables (const void *context, FILE *f) {
   const pw_sensitivity *x = context;
   int panels = 0;
-  fprintf (f, "unknowns = %d\nt_end = %.10g\n", x->runs.count, x->t_end);
+  fprintf (f, "unknowns = %d\nt_end = %.10g\n", x->unknowns.count, x->unknowns.t_end);
   for (int i = 0; i < x->outcomes.outcomes; i++) panels += pw_sensitivity_in_table (x, i);
-  fprintf (f, "panels = %d\narray output[%d]\narray label[%d]\n", panels, panels, panels * x->runs.count);
+  fprintf (f, "panels = %d\narray output[%d]\narray label[%d]\n", panels, panels, panels * x->unknowns.count);
   for (int i = 0, k = 0; i < x->outcomes.outcomes; i++) {
     char label[300];
     if (!pw_sensitivity_in_table (x, i)) continue;
     pw_figure_element (f, "output", ++k, x->of[i]);
-    for (int p = 0; p < x->runs.count; p++) {
+    for (int p = 0; p < x->unknowns.count; p++) {
       sensitivity_label (x, i, p, label, sizeof label);
-      pw_figure_element (f, "label", (k - 1) * x->runs.count + p + 1, label);
+      pw_figure_element (f, "label", (k - 1) * x->unknowns.count + p + 1, label);
     }
   }
 }
@@ -200,19 +199,6 @@ static int sensitivity_write (const pw_sensitivity *x, pw_error *error) {
 }
 
 /* ---- The command ---- */
-
-static int sensitivity_settings (pw_sensitivity *x, pw_error *error) {
-  pw_run_defaults d = pw_cli_defaults (pw_file_table (x->m.file));
-  pw_specialise when;
-  x->runs.method = x->line.method ? x->line.method : d.method;
-  int status = pw_cli_settings (&x->line, &d, &x->t_end, &x->runs.settings, &x->limit, error);
-  if (status == PW_OK) status = pw_cli_specialise (x->line.specialise, &when, error);
-  if (status != PW_OK) return status;
-  pw_cli_engine_open (&x->engine, x->m.system, when,
-                      pw_method_steps (x->runs.method, &x->runs.settings, d.step, x->t_end));
-  x->runs.settings.specialised = pw_cli_engine_code (&x->engine);
-  return PW_OK;
-}
 
 /* An initial value is the consistent one. */
 static int sensitivity_unknown (const pw_sensitivity *x, pw_unknown *u, const pw_run *r, const char *name,
@@ -227,30 +213,41 @@ static int sensitivity_unknown (const pw_sensitivity *x, pw_unknown *u, const pw
 
 /* Finds the unknowns with a run of their own, which has their values. */
 static int sensitivity_unknowns (pw_sensitivity *x, pw_error *error) {
-  int count = 0;
-  while (x->by && x->by[count]) count++;
-  if (count == 0) return pw_fail (error, PW_INPUT, "--by is missing: expected a parameter or an initial value");
+  pw_unknowns *u = &x->unknowns;
+  if (x->by == NULL) return pw_fail (error, PW_INPUT, "--by is missing: expected a parameter or an initial value");
   if (x->of == NULL) return pw_fail (error, PW_INPUT, "--of is missing: expected an output, such as frame.x");
-  int status = pw_sensitivity_open (x, count, x->folder != NULL, error);
-  if (status == PW_OK) status = pw_cli_only ("--every", x->every, "-o DIR", x->folder != NULL, error);
-  if (status == PW_OK) status = pw_cli_number ("--every", x->every, PW_POSITIVE, &x->dt, error);
-  if (status != PW_OK) return status;
-  pw_run *r = pw_run_open (x->m.system, x->runs.method, &x->runs.settings, error);
-  status = r ? PW_OK : error->status;
-  for (int i = 0; i < count && status == PW_OK; i++) {
-    status = sensitivity_unknown (x, &x->runs.list[i], r, x->by[i], error);
+  while (x->by[u->count]) u->count++;
+  u->list = calloc ((size_t)u->count, sizeof *u->list);
+  if (u->list == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
+  pw_run *r = pw_run_open (x->m.system, u->method, &u->settings, error);
+  int status = r ? PW_OK : error->status;
+  for (int i = 0; i < u->count && status == PW_OK; i++) {
+    status = sensitivity_unknown (x, &u->list[i], r, x->by[i], error);
     for (int k = 0; k < i && status == PW_OK; k++)
       if (strcmp (x->by[k], x->by[i]) == 0) status = pw_fail (error, PW_INPUT, "--by %s is given twice", x->by[i]);
   }
-  if (r) pw_run_close (r);
+  pw_run_close (r);
   return status;
+}
+
+static int sensitivity_open (pw_sensitivity *x, pw_error *error) {
+  int status = pw_cli_open (&x->m, &x->line, error);
+  if (status == PW_OK) status = pw_unknowns_open (&x->unknowns, &x->line, &x->m, error);
+  if (status != PW_OK) return status;
+  pw_unknowns_engine (&x->unknowns, 1);
+  x->unknowns.settings.specialised = pw_cli_engine_code (&x->unknowns.engine);
+  if (x->folder) x->dt = x->unknowns.t_end / SENSITIVITY_ROWS;
+  status = pw_cli_only ("--every", x->every, "-o DIR", x->folder != NULL, error);
+  if (status == PW_OK) status = pw_cli_number ("--every", x->every, PW_POSITIVE, &x->dt, error);
+  if (status == PW_OK) status = sensitivity_unknowns (x, error);
+  return status == PW_OK ? pw_sensitivity_open (x, NULL, error) : status;
 }
 
 static int sensitivity_compute (pw_sensitivity *x, pw_error *error) {
   pw_progress progress;
   double begun = pw_cpu_clock ();
   pw_stop_catch ();
-  pw_progress_start (&progress, pw_file_name (x->m.file), x->t_end, 1);
+  pw_progress_start (&progress, pw_file_name (x->m.file), x->unknowns.t_end, 1);
   int status = pw_sensitivity_compute (x, &progress, error);
   pw_progress_end (&progress);
   pw_stop_release ();
@@ -267,23 +264,19 @@ static int sensitivity_check (const pw_sensitivity *x, pw_error *error) {
 
 static int sensitivity_command (void *options, pw_error *error) {
   pw_sensitivity *x = options;
-  int lock = -1, status = pw_cli_open (&x->m, &x->line, error);
-  if (status == PW_OK) status = sensitivity_settings (x, error);
-  if (status == PW_OK) status = sensitivity_unknowns (x, error);
-  if (status == PW_OK) status = pw_figure_results (&x->line, &x->m, x->folder, "sensitivity", &lock, error);
+  int status = sensitivity_open (x, error);
+  if (status == PW_OK) status = pw_figure_results (&x->line, &x->m, x->folder, "sensitivity", &x->files, error);
   if (status == PW_OK) pw_report_model (x->m.model);
   if (status == PW_OK) status = sensitivity_compute (x, error);
   if (status == PW_OK) status = sensitivity_check (x, error);
   if (status == PW_OK) sensitivity_print (x), sensitivity_warn (x);
   if (status == PW_OK && x->folder) status = sensitivity_write (x, error);
-  int stopped = status == PW_OK && x->stopped;
-  if (stopped) status = pw_limit_fail (&x->limit, pw_run_time (x->base.run), error);
-  if (lock >= 0) close (lock);
+  if (status == PW_OK && x->stopped) status = pw_limit_fail (&x->limit, pw_run_time (x->base.run), error);
+  pw_files_close (&x->files);
   pw_sensitivity_close (x);
-  pw_cli_engine_close (&x->engine);
+  pw_unknowns_close (&x->unknowns);
   pw_cli_close_model (&x->m);
-  if (status == PW_RETRY) pw_cli_say ("pinwheel: interrupted; results are incomplete\n");
-  return status == PW_RETRY ? PW_INTERRUPTED : status;
+  return status == PW_RETRY ? pw_cli_incomplete (&x->line, error) : status;
 }
 
 static const struct poptOption sensitivity_options[] = {

@@ -4,25 +4,25 @@
 
 #include "outcome.h"
 #include "progress.h"
-#include "unknown.h"
+#include "unknowns.h"
 
 typedef struct {
   pw_cli_line line;
   const char **of, **by; /* as given, ended by NULL */
   const char *every, *folder;
   pw_cli_model m;
-  pw_limit limit;
-  pw_cli_engine engine;
-  double t_end, dt; /* time between rows [s] */
-  pw_unknown_runs runs;
+  pw_files files;
+  pw_limit limit; /* of all runs */
+  pw_unknowns unknowns;
+  double *at;                 /* values of the unknowns */
+  double dt;                  /* time between rows [s]; 0: a few rows */
   pw_unknown_run base, *near; /* the run; 4 neighbours of each unknown */
   pw_direction *direction;
   pw_variation *variation;
-  pw_run *sampled;          /* the run of which samples are taken; NULL: base.run */
-  int along;                /* 1: there are extrema or integrals */
-  double passed;            /* the last breakpoint before the time last evaluated [s] */
-  pw_outcomes outcomes;     /* of the run */
-  pw_workspace **workspace; /* 5 of each unknown: of the run's system and of the neighbours', for contact points */
+  pw_run *sampled;      /* the run of which samples are taken; NULL: base.run */
+  int along;            /* 1: there are extrema or integrals */
+  double passed;        /* the last breakpoint before the time last evaluated [s] */
+  pw_outcomes outcomes; /* of the run */
   /* Of all functionals F of the outputs and unknowns P at the time last evaluated, and of the run. */
   int no_error;          /* 1: derivatives without errors */
   double *value;         /* 2 F: values; the gradient of an output (scratch) */
@@ -37,9 +37,9 @@ typedef struct {
   int stopped; /* 1: stopped before t_end */
 } pw_sensitivity;
 
-/* Prepares derivatives with respect to a number of unknowns, which the caller then sets; x has line, of, m, method,
- * settings and t_end.  table: with one.  Close it in every case. */
-int pw_sensitivity_open (pw_sensitivity *x, int unknowns, int table, pw_error *error);
+/* Prepares derivatives of the outputs x->of, ended by NULL, with respect to x->unknowns at these values; NULL: their
+ * own.  Close it in every case. */
+int pw_sensitivity_open (pw_sensitivity *x, const double *at, pw_error *error);
 /* Begins a run with derivatives; then advances to a time, and sets value, slope and error of all columns there.  A
  * status. */
 int pw_sensitivity_start (pw_sensitivity *x, pw_error *error);

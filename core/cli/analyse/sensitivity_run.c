@@ -10,9 +10,9 @@
 #include "sensitivity.h"
 #include "util.h"
 
-/* Rows of the table; times of the progress without one; steps of the derivatives in an interval of integrals, in which the
- * square of a column is smooth enough for 5 nodes. */
-enum { SENSITIVITY_ROWS = 1000, SENSITIVITY_PARTS = 20, SENSITIVITY_STEPS = 2 };
+/* Rows if their distance is not given; steps of the derivatives in an interval of integrals, in which the square of a
+ * column is smooth enough for 5 nodes. */
+enum { SENSITIVITY_PARTS = 20, SENSITIVITY_STEPS = 2 };
 
 int pw_sensitivity_in_table (const pw_sensitivity *x, int output) {
   const pw_outcome *o = &x->outcomes.outcome[output];
@@ -25,20 +25,20 @@ double pw_sensitivity_derivative (const pw_sensitivity *x, int output, int unkno
   const pw_outcome *o = &x->outcomes.outcome[output];
   double *gradient = x->value + x->outcomes.functionals, sum = 0;
   pw_outcome_value (&x->outcomes, output, gradient);
-  for (int i = 0; i < o->terms; i++) sum += gradient[o->term[i]] * slope[o->term[i] * x->runs.count + unknown];
+  for (int i = 0; i < o->terms; i++) sum += gradient[o->term[i]] * slope[o->term[i] * x->unknowns.count + unknown];
   return sum;
 }
 
 /* ---- Columns at a time ---- */
 
-/* Coordinate `index` of the contact points, in system `which` of an unknown, at the positions q + by dq. */
-static int sensitivity_contact (const pw_sensitivity *x, int unknown, int which, int index, const pw_sample *s,
+/* Coordinate `index` of the contact points in a workspace's system, at the positions q + by dq. */
+static int sensitivity_contact (const pw_sensitivity *x, pw_workspace *w, int index, const pw_sample *s,
                                 const double *dq, double by, double *value, pw_error *error) {
   const pw_system *system = x->base.m.system;
   int n = pw_system_coordinates (system), contacts = pw_system_contacts (system), status;
   double *q = malloc ((size_t)n * sizeof *q), (*at)[3] = malloc (((size_t)contacts + 1) * sizeof *at);
-  for (int j = 0; q && j < n; j++) q[j] = s->q[j] + (dq ? by * dq[j] : 0);
-  status = q && at ? pw_workspace_contact_points (x->workspace[5 * unknown + which], s->t, q, s->v, at, error)
+  for (int j = 0; q && j < n; j++) q[j] = s->q[j] + by * dq[j];
+  status = q && at ? pw_workspace_contact_points (w, s->t, q, s->v, at, error)
                    : pw_fail (error, PW_RESOURCE, "out of memory");
   if (status == PW_OK) *value = at[index / 2][index % 2];
   free (q);
@@ -56,12 +56,15 @@ static int sensitivity_contact_slope (const pw_sensitivity *x, int unknown, int 
   int status = PW_OK;
   *slope = *error_of = 0;
   for (int k = 0; k < 4 && status == PW_OK; k++) {
-    status = sensitivity_contact (x, unknown, 1 + k, index, s, dq, pw_direction_offset (d, k), &value, error);
+    pw_unknown_run *near = &x->near[4 * unknown + k];
+    if (near->workspace == NULL) near->workspace = pw_workspace_new (near->m.system, error);
+    if (near->workspace == NULL) return error->status;
+    status = sensitivity_contact (x, near->workspace, index, s, dq, pw_direction_offset (d, k), &value, error);
     *slope += pw_direction_weight (d, 0, k) * value;
     *error_of += pw_direction_weight (d, 1, k) * value;
   }
   for (int side = -1; side <= 1 && status == PW_OK; side += 2) {
-    status = sensitivity_contact (x, unknown, 0, index, s, eq, side, &value, error);
+    status = sensitivity_contact (x, x->outcomes.workspace, index, s, eq, side, &value, error);
     *error_of += side * value / 2;
   }
   return status;
@@ -69,13 +72,13 @@ static int sensitivity_contact_slope (const pw_sensitivity *x, int unknown, int 
 
 /* A sample of the run at a time that the derivatives have reached. */
 static int sensitivity_sample (pw_sensitivity *x, double t, pw_sample *s, pw_error *error) {
-  int status = x->sampled ? pw_run_advance_to (x->sampled, t, x->t_end, error) : PW_OK;
+  int status = x->sampled ? pw_run_advance_to (x->sampled, t, x->unknowns.t_end, error) : PW_OK;
   return status == PW_OK ? pw_run_sample (x->sampled ? x->sampled : x->base.run, t, s, error) : status;
 }
 
 int pw_sensitivity_at (pw_sensitivity *x, double t, pw_error *error) {
   pw_sample s, d, e;
-  int status = pw_variation_advance (x->variation, t, x->t_end, error), P = x->runs.count;
+  int status = pw_variation_advance (x->variation, t, x->unknowns.t_end, error), P = x->unknowns.count;
   if (status == PW_OK) status = sensitivity_sample (x, t, &s, error);
   if (status == PW_OK) status = pw_outcomes_read (&x->outcomes, &s, x->value, error);
   for (int p = 0; p < P && status == PW_OK; p++) {
@@ -102,10 +105,10 @@ static const double SENSITIVITY_SAME = 1e-5;
 static void sensitivity_add (pw_sensitivity *x, double weight) {
   for (int i = 0; i < x->outcomes.functionals; i++) {
     const pw_functional *f = &x->outcomes.functional[i];
-    double factor = f->type == PW_INTEGRAL ? weight : weight / x->t_end;
+    double factor = f->type == PW_INTEGRAL ? weight : weight / x->unknowns.t_end;
     if (!pw_is_integral (f->type)) continue;
     if (f->type == PW_RMS) factor *= f->value > 0 ? x->value[i] / f->value : 0;
-    for (int p = i * x->runs.count; p < (i + 1) * x->runs.count; p++) {
+    for (int p = i * x->unknowns.count; p < (i + 1) * x->unknowns.count; p++) {
       x->end_slope[p] += factor * x->slope[p];
       x->end_error[p] += factor * x->error[p];
     }
@@ -122,7 +125,7 @@ static double sensitivity_moves (const pw_sensitivity *x, int unknown, int passe
 
 /* Keeps the current derivatives of functional i that exist. */
 static void sensitivity_keep (pw_sensitivity *x, int i) {
-  for (int at = i * x->runs.count; at < (i + 1) * x->runs.count; at++)
+  for (int at = i * x->unknowns.count; at < (i + 1) * x->unknowns.count; at++)
     if (!isnan (x->end_slope[at])) x->end_slope[at] = x->slope[at], x->end_error[at] = x->error[at];
 }
 
@@ -134,8 +137,8 @@ static void sensitivity_keep_extremum (pw_sensitivity *x, int i, int reached) {
   int before = reached || fabs (f->t - next) < 1e-9 * (1 + fabs (next)),
       after = f->t - x->passed <= 2 * PW_FUNCTIONAL_BEFORE * f->step;
   sensitivity_keep (x, i);
-  for (int p = 0; p < x->runs.count && (before || after); p++)
-    if (sensitivity_moves (x, p, !before) != 0) x->end_slope[i * x->runs.count + p] = NAN;
+  for (int p = 0; p < x->unknowns.count && (before || after); p++)
+    if (sensitivity_moves (x, p, !before) != 0) x->end_slope[i * x->unknowns.count + p] = NAN;
 }
 
 /* Drops derivatives of extrema in the step of the run that passes a jump with the state at t, if those of the column jump there
@@ -143,7 +146,7 @@ static void sensitivity_keep_extremum (pw_sensitivity *x, int i, int reached) {
 static void sensitivity_drop (pw_sensitivity *x, double t, const double *before) {
   for (int i = 0; i < x->outcomes.functionals; i++) {
     const pw_functional *f = &x->outcomes.functional[i];
-    for (int at = i * x->runs.count; at < (i + 1) * x->runs.count && pw_is_extremum (f->type); at++)
+    for (int at = i * x->unknowns.count; at < (i + 1) * x->unknowns.count && pw_is_extremum (f->type); at++)
       if (fabs (f->t - t) <= f->step && fabs (x->slope[at] - before[at]) > SENSITIVITY_SAME * fabs (before[at]))
         x->end_slope[at] = NAN;
   }
@@ -160,7 +163,7 @@ static int sensitivity_row (pw_sensitivity *x, double t, pw_error *error) {
   for (int o = 0; o < x->outcomes.outcomes; o++) {
     if (!pw_sensitivity_in_table (x, o)) continue;
     *out++ = pw_outcome_value (&x->outcomes, o, NULL);
-    for (int p = 0; p < x->runs.count; p++) *out++ = pw_sensitivity_derivative (x, o, p, x->slope);
+    for (int p = 0; p < x->unknowns.count; p++) *out++ = pw_sensitivity_derivative (x, o, p, x->slope);
   }
   return PW_OK;
 }
@@ -211,7 +214,7 @@ static int sensitivity_interval (pw_sensitivity *x, double t0, double t1, sensit
  * has the derivative (x- - x+) dt_b/dp.  A breakpoint at the end of the run is only reached. */
 static int sensitivity_jump (pw_sensitivity *x, double t0, double t, int with_state, pw_error *error) {
   int passed = with_state || t > x->passed;
-  size_t F = (size_t)x->outcomes.functionals, P = (size_t)x->runs.count;
+  size_t F = (size_t)x->outcomes.functionals, P = (size_t)x->unknowns.count;
   double *slope = x->before + F;
   memcpy (x->before, x->value, F * sizeof *x->before);
   memcpy (slope, x->slope, F * P * sizeof *slope);
@@ -222,10 +225,10 @@ static int sensitivity_jump (pw_sensitivity *x, double t0, double t, int with_st
     double jump = x->before[i] - x->value[i];
     if (pw_is_extremum (f->type) && f->t > t0 && f->t <= t) sensitivity_keep_extremum (x, i, !passed);
     if (!pw_is_integral (f->type) || jump == 0) continue;
-    if (f->type != PW_INTEGRAL) jump /= x->t_end;
+    if (f->type != PW_INTEGRAL) jump /= x->unknowns.t_end;
     if (f->type == PW_RMS) jump *= (x->before[i] + x->value[i]) / (2 * f->value);
-    for (int p = 0; p < x->runs.count; p++)
-      x->end_slope[i * x->runs.count + p] += jump * sensitivity_moves (x, p, passed);
+    for (int p = 0; p < x->unknowns.count; p++)
+      x->end_slope[i * x->unknowns.count + p] += jump * sensitivity_moves (x, p, passed);
   }
   return status;
 }
@@ -237,7 +240,7 @@ static double sensitivity_next (pw_sensitivity *x, double t, double to, int *jum
   *jump = 0;
   if (!x->along) return fmin (to, breakpoint);
   double next = fmin (fmin (to, breakpoint), t + SENSITIVITY_STEPS * pw_variation_step_size (x->variation));
-  double with_state = pw_variation_next_jump (x->variation, next, x->t_end, error);
+  double with_state = pw_variation_next_jump (x->variation, next, x->unknowns.t_end, error);
   if (isnan (with_state)) return NAN;
   *jump = with_state < next ? 2 : next == breakpoint;
   return fmin (next, with_state);
@@ -245,13 +248,14 @@ static double sensitivity_next (pw_sensitivity *x, double t, double to, int *jum
 
 static int sensitivity_advance (pw_sensitivity *x, double t, double to, sensitivity_event *list, pw_progress *progress,
                                 pw_error *error) {
-  const double near = 1e-9 * fmin (x->dt, x->t_end / SENSITIVITY_PARTS); /* distance of states beside a jump from it */
+  const double near =
+      1e-9 * fmin (x->dt, x->unknowns.t_end / SENSITIVITY_PARTS); /* distance of states beside a jump from it */
   int jump, status = PW_OK;
   while (t < to && status == PW_OK) {
     double next = sensitivity_next (x, t, to, &jump, error);
     if (isnan (next)) return error->status;
     double end = jump ? next - fmin (near, next - t) : next;
-    if (jump == 1) x->passed = next, next = fmin (next + near, x->t_end);
+    if (jump == 1) x->passed = next, next = fmin (next + near, x->unknowns.t_end);
     status = sensitivity_interval (x, t, end, list, error);
     if (status == PW_OK && jump) status = sensitivity_jump (x, end, next, jump == 2, error);
     pw_progress_at (progress, t = next);
@@ -266,8 +270,8 @@ static int sensitivity_along (pw_sensitivity *x, sensitivity_event *list, pw_pro
   if (status == PW_OK) status = sensitivity_row (x, 0, error);
   for (int i = 0; i < x->outcomes.functionals && status == PW_OK; i++)
     if (pw_is_extremum (x->outcomes.functional[i].type)) sensitivity_keep (x, i);
-  for (long k = 1; t < x->t_end && status == PW_OK; k++, t = to) {
-    to = (double)k * x->dt < x->t_end * (1 - 1e-12) ? (double)k * x->dt : x->t_end;
+  for (long k = 1; t < x->unknowns.t_end && status == PW_OK; k++, t = to) {
+    to = (double)k * x->dt < x->unknowns.t_end * (1 - 1e-12) ? (double)k * x->dt : x->unknowns.t_end;
     status = sensitivity_advance (x, t, to, list, progress, error);
     if (status == PW_OK) status = sensitivity_row (x, to, error);
   }
@@ -287,34 +291,25 @@ static int sensitivity_integrate (pw_sensitivity *x, pw_progress *progress, pw_e
 
 /* ---- Opening ---- */
 
-static int sensitivity_workspaces (pw_sensitivity *x, pw_error *error) {
-  for (int i = 0; i < 5 * x->runs.count; i++) {
-    const pw_system *s = i % 5 ? x->near[4 * (i / 5) + i % 5 - 1].m.system : x->base.m.system;
-    x->workspace[i] = pw_workspace_new (s, error);
-    if (x->workspace[i] == NULL) return PW_RESOURCE;
-  }
-  return PW_OK;
-}
-
-int pw_sensitivity_open (pw_sensitivity *x, int unknowns, int table, pw_error *error) {
-  size_t P = (size_t)unknowns;
-  x->dt = x->t_end / (table ? SENSITIVITY_ROWS : SENSITIVITY_PARTS);
-  x->runs.line = &x->line, x->runs.file = x->m.file;
-  x->runs.list = calloc (P, sizeof *x->runs.list);
+int pw_sensitivity_open (pw_sensitivity *x, const double *at, pw_error *error) {
+  size_t P = (size_t)x->unknowns.count;
+  if (x->dt == 0) x->dt = x->unknowns.t_end / SENSITIVITY_PARTS;
+  x->limit.most = x->unknowns.limit;
+  x->unknowns.settings.stop = pw_limit_over;
+  x->unknowns.settings.stop_context = &x->limit;
+  x->at = malloc (P * sizeof *x->at);
   x->near = calloc (4 * P, sizeof *x->near);
   x->direction = calloc (P, sizeof *x->direction);
-  x->workspace = calloc (5 * P, sizeof *x->workspace);
-  x->runs.count = unknowns;
-  return x->runs.list && x->near && x->direction && x->workspace ? PW_OK
-                                                                 : pw_fail (error, PW_RESOURCE, "out of memory");
+  for (size_t p = 0; p < P && x->at; p++) x->at[p] = at ? at[p] : x->unknowns.list[p].value;
+  return x->at && x->near && x->direction ? PW_OK : pw_fail (error, PW_RESOURCE, "out of memory");
 }
 
 static int sensitivity_arrays (pw_sensitivity *x, pw_error *error) {
-  size_t F = (size_t)x->outcomes.functionals, P = (size_t)x->runs.count;
+  size_t F = (size_t)x->outcomes.functionals, P = (size_t)x->unknowns.count;
   x->value = calloc (3 * F + 5 * F * P + 1, sizeof *x->value);
   x->columns = 1;
   for (int o = 0; o < x->outcomes.outcomes; o++)
-    if (pw_sensitivity_in_table (x, o)) x->columns += 1 + x->runs.count;
+    if (pw_sensitivity_in_table (x, o)) x->columns += 1 + x->unknowns.count;
   if (x->value == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
   x->slope = x->value + 2 * F, x->error = x->slope + F * P;
   x->end_slope = x->error + F * P, x->end_error = x->end_slope + F * P;
@@ -325,48 +320,45 @@ static int sensitivity_arrays (pw_sensitivity *x, pw_error *error) {
 /* Work and losses need a run with the ledger. */
 static int sensitivity_ledger (pw_sensitivity *x, pw_error *error) {
   if (!x->outcomes.ledger) return PW_OK;
-  x->runs.settings.ledger = 1;
+  x->unknowns.settings.ledger = 1;
   pw_run_close (x->base.run);
-  x->base.run = pw_run_open (x->base.m.system, x->runs.method, &x->runs.settings, error);
+  x->base.run = pw_run_open (x->base.m.system, x->unknowns.method, &x->unknowns.settings, error);
   return x->base.run ? PW_OK : error->status;
 }
 
 /* The values of extrema and integrals, and the times of extrema, from a run of its own. */
 static int sensitivity_functionals (pw_sensitivity *x, pw_error *error) {
   for (int i = 0; i < x->outcomes.functionals; i++) x->along |= x->outcomes.functional[i].type != PW_FINAL;
-  return x->along ? pw_outcomes_run (&x->outcomes, x->runs.method, &x->runs.settings, x->t_end, error) : PW_OK;
+  return x->along ? pw_outcomes_run (&x->outcomes, x->unknowns.method, &x->unknowns.settings, x->unknowns.t_end, error)
+                  : PW_OK;
 }
 
 /* The run of which samples are taken, where the derivatives' is ahead. */
 static int sensitivity_sampled (pw_sensitivity *x, pw_error *error) {
   if (!pw_system_may_jump (x->base.m.system)) return PW_OK;
-  x->sampled = pw_run_open (x->base.m.system, x->runs.method, &x->runs.settings, error);
+  x->sampled = pw_run_open (x->base.m.system, x->unknowns.method, &x->unknowns.settings, error);
   return x->sampled ? PW_OK : error->status;
 }
 
 /* The run and its neighbours. */
 static int sensitivity_runs (pw_sensitivity *x, pw_error *error) {
-  double *values = malloc ((size_t)x->runs.count * sizeof *values);
-  int count = 0, status = values ? PW_OK : pw_fail (error, PW_RESOURCE, "out of memory");
+  int count = 0;
   while (x->of[count]) count++;
-  for (int p = 0; values && p < x->runs.count; p++) values[p] = x->runs.list[p].value;
-  if (status == PW_OK) status = pw_unknown_open (&x->base, &x->runs, values, error);
+  int status = pw_unknown_open (&x->base, &x->unknowns, x->at, error);
   if (status == PW_OK) status = pw_outcomes_open (&x->outcomes, x->base.m.system, "--of", x->of, count, error);
   if (status == PW_OK) status = sensitivity_ledger (x, error);
-  if (status == PW_OK) status = pw_unknown_directions (x->direction, &x->runs, values, &x->base, x->near, error);
-  for (int p = 0; p < x->runs.count; p++) x->direction[p].no_error = x->no_error;
-  free (values);
+  if (status == PW_OK) status = pw_unknown_directions (x->direction, &x->unknowns, x->at, &x->base, x->near, error);
+  for (int p = 0; p < x->unknowns.count; p++) x->direction[p].no_error = x->no_error;
   return status;
 }
 
 int pw_sensitivity_start (pw_sensitivity *x, pw_error *error) {
   int status = sensitivity_runs (x, error);
   if (status == PW_OK) status = sensitivity_arrays (x, error);
-  if (status == PW_OK) status = sensitivity_workspaces (x, error);
   if (status == PW_OK) status = sensitivity_sampled (x, error);
   pw_limit_start (&x->limit);
   if (status != PW_OK) return status;
-  x->variation = pw_variation_open (x->base.run, x->direction, x->runs.count, x->outcomes.ledger, error);
+  x->variation = pw_variation_open (x->base.run, x->direction, x->unknowns.count, x->outcomes.ledger, error);
   return x->variation ? PW_OK : error->status;
 }
 
@@ -380,13 +372,11 @@ void pw_sensitivity_close (pw_sensitivity *x) {
   pw_variation_close (x->variation);
   pw_run_close (x->sampled);
   if (x->outcomes.system) pw_outcomes_close (&x->outcomes);
-  for (int i = 0; x->workspace && i < 5 * x->runs.count; i++) pw_workspace_free (x->workspace[i]);
-  for (int i = 0; x->near && i < 4 * x->runs.count; i++) pw_unknown_close (&x->near[i]);
+  for (int i = 0; x->near && i < 4 * x->unknowns.count; i++) pw_unknown_close (&x->near[i]);
   pw_unknown_close (&x->base);
-  free (x->workspace);
   free (x->near);
   free (x->direction);
-  free (x->runs.list);
+  free (x->at);
   free (x->value);
   free (x->row);
 }

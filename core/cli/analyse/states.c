@@ -6,23 +6,28 @@
 
 enum { STATES_BODIES = 20 }; /* printed */
 
+int pw_hold_add (const pw_system *s, const char *option, const char *text, const char *name, double value,
+                 pw_initial_value *hold, int *holds, pw_error *error) {
+  if (*holds == PW_HOLDS) return pw_fail (error, PW_INPUT, "%s: more than %d values are held", option, PW_HOLDS);
+  int state = pw_system_find_held (s, name, error);
+  if (state < 0) return error->status;
+  for (int i = 0; i < *holds; i++)
+    if (hold[i].state == state) return pw_fail (error, PW_INPUT, "%s %s: %s is held already", option, text, name);
+  hold[(*holds)++] = (pw_initial_value){ state, value };
+  return PW_OK;
+}
+
 int pw_hold_read (const pw_system *s, const char *option, const char *text, pw_initial_value *hold, int *holds,
                   pw_error *error) {
   char name[200];
   const char *equals = strchr (text, '=');
-  pw_initial_value *new = hold + *holds;
-  if (*holds == PW_HOLDS) return pw_fail (error, PW_INPUT, "%s: more than %d values are held", option, PW_HOLDS);
+  double value;
   if (equals == NULL || equals == text || (size_t)(equals - text) >= sizeof name)
     return pw_fail (error, PW_INPUT, "%s %s: expected STATE=VALUE", option, text);
   snprintf (name, sizeof name, "%.*s", (int)(equals - text), text);
-  if (pw_read_expression (equals + 1, &new->value) != PW_OK || !isfinite (new->value))
+  if (pw_read_expression (equals + 1, &value) != PW_OK || !isfinite (value))
     return pw_fail (error, PW_INPUT, "%s %s: \"%s\" is not a number", option, text, equals + 1);
-  new->state = pw_system_find_held (s, name, error);
-  if (new->state < 0) return error->status;
-  for (int i = 0; i < *holds; i++)
-    if (hold[i].state == new->state) return pw_fail (error, PW_INPUT, "%s %s: %s is held already", option, text, name);
-  ++*holds;
-  return PW_OK;
+  return pw_hold_add (s, option, text, name, value, hold, holds, error);
 }
 
 void pw_states_print (const pw_system *s, const double *q, const double *v, int digits, double small) {
@@ -50,6 +55,12 @@ void pw_states_json (const pw_system *s, const double *q, const double *v, const
   for (int i = 0; i < 2 * n; i++)
     pw_json_number (j, pw_system_state_name (s, i, name, sizeof name), i < n ? q[i] : v[i - n]);
   pw_json_close (j, '}');
+}
+
+void pw_numbers_json (pw_json *j, const char *key, const double *value, int count) {
+  pw_json_open (j, key, '[');
+  for (int i = 0; i < count; i++) pw_json_number (j, NULL, value[i]);
+  pw_json_close (j, ']');
 }
 
 void pw_states_head (const pw_system *s, pw_text *t) {

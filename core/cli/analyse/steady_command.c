@@ -3,7 +3,6 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
-#include <unistd.h>
 #include "figure.h"
 #include "progress.h"
 #include "report.h"
@@ -16,21 +15,18 @@ enum { STEADY_STARTS = 30 };
 
 /* NAME=FIRST:LAST, a parameter of the model or something held. */
 static int steady_vary (pw_steady_cli *x, pw_error *error) {
-  char hold[400], value[32];
-  if (pw_cli_vary_read (&x->vary, &x->line, &x->m, x->vary_text, error) != PW_OK) return PW_INPUT;
+  if (pw_vary_read (&x->vary, &x->line, &x->m, x->vary_text, error) != PW_OK) return PW_INPUT;
   x->set.first = x->vary.first, x->set.last = x->vary.last;
-  const pw_parameter *p = pw_cli_parameter (x->m.model, x->vary.name);
-  if (p) {
-    x->unit = p->unit;
-    x->set.compile = pw_cli_vary_compile;
+  if (x->vary.parameter) {
+    x->set.compile = pw_vary_compile;
     x->set.context = &x->vary;
-    return pw_cli_vary_check (&x->vary, error);
+    return PW_OK;
   }
   if (strchr (x->vary.name, '.') == NULL) return pw_model_set (x->m.model, x->vary.name, x->set.first, error);
-  snprintf (hold, sizeof hold, "%s=%s", x->vary.name, pw_format (value, x->set.first, 17));
   x->set.vary = x->set.holds;
-  int status = pw_hold_read (x->m.system, "--vary", hold, x->hold, &x->set.holds, error);
-  if (status == PW_OK) x->unit = pw_system_held_unit (x->m.system, x->hold[x->set.vary].state);
+  int status =
+      pw_hold_add (x->m.system, "--vary", x->vary_text, x->vary.name, x->set.first, x->hold, &x->set.holds, error);
+  if (status == PW_OK) x->vary.unit = pw_system_held_unit (x->m.system, x->hold[x->set.vary].state);
   return status;
 }
 
@@ -40,8 +36,7 @@ static int steady_options (pw_steady_cli *x, pw_error *error) {
   x->limit.most = INFINITY;
   x->set.span = pw_cli_defaults (pw_file_table (x->m.file)).t_end;
   x->set.vary = -1;
-  x->set.hold = x->hold = calloc (PW_HOLDS + 1, sizeof *x->hold);
-  if (x->hold == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
+  x->set.hold = x->hold;
   if (status == PW_OK) status = pw_cli_number ("--limit", x->line.limit, PW_POSITIVE, &x->limit.most, error);
   if (status == PW_OK) status = pw_cli_number ("--starts", x->starts_text, PW_REAL, &starts, error);
   if (status == PW_OK && !(starts >= 0 && starts <= 1e9 && starts == floor (starts)))
@@ -56,48 +51,38 @@ static int steady_options (pw_steady_cli *x, pw_error *error) {
 /* ---- Points ---- */
 
 static pw_steady_point *steady_add (pw_steady_cli *x, const pw_steady_motion *m, int attempt, pw_error *error) {
-  size_t states = 2 * (size_t)pw_system_coordinates (x->m.system), n = (size_t)m->linear->unknowns;
-  if (pw_grow (&x->point, (size_t)x->points, &x->room, sizeof *x->point) != PW_OK)
-    return pw_fail (error, PW_RESOURCE, "out of memory"), NULL;
-  pw_steady_point *p = x->point + x->points;
-  *p = (pw_steady_point){ .branch = x->branches,
-                          .attempt = attempt,
-                          .family = m->family,
-                          .unstable = m->unstable,
-                          .event = m->event,
-                          .parameter = m->parameter,
-                          .residual = m->residual,
-                          .unknowns = m->linear->unknowns,
-                          .state = malloc ((states + 2 * n) * sizeof (double) + n) };
-  if (p->state == NULL) return pw_fail (error, PW_RESOURCE, "out of memory"), NULL;
-  p->re = p->state + states, p->im = p->re + n, p->rigid = (unsigned char *)(p->im + n);
-  memcpy (p->state, m->q, states / 2 * sizeof *m->q);
-  memcpy (p->state + states / 2, m->v, states / 2 * sizeof *m->v);
-  memcpy (p->re, m->linear->re, n * sizeof *p->re);
-  memcpy (p->im, m->linear->im, n * sizeof *p->im);
-  memcpy (p->rigid, m->linear->rigid, n);
-  memcpy (p->twist, m->linear->twist, sizeof p->twist);
-  x->points++;
+  size_t coordinates = (size_t)pw_system_coordinates (x->m.system), n = (size_t)m->linear->unknowns;
+  int status = pw_grow (&x->point, (size_t)x->points, &x->room, sizeof *x->point);
+  double *a = status == PW_OK ? malloc ((2 * coordinates + 2 * n) * sizeof *a + n) : NULL;
+  if (a == NULL) return pw_fail (error, PW_RESOURCE, "out of memory"), NULL;
+  pw_steady_point *p = x->point + x->points++;
+  *p = (pw_steady_point){ .branch = x->branches, .attempt = attempt, .motion = *m, .state = a };
+  p->motion.linear = NULL;
+  p->linear.unknowns = (int)n;
+  memcpy (p->linear.twist, m->linear->twist, sizeof p->linear.twist);
+  p->motion.q = memcpy (a, m->q, coordinates * sizeof *a);
+  p->motion.v = memcpy (a += coordinates, m->v, coordinates * sizeof *a);
+  p->linear.re = memcpy (a += coordinates, m->linear->re, n * sizeof *a);
+  p->linear.im = memcpy (a += n, m->linear->im, n * sizeof *a);
+  p->linear.rigid = memcpy (a + n, m->linear->rigid, n);
   return p;
 }
 
 /* What else to hold to select the motion last found within its family. */
 static int steady_advise (pw_steady_cli *x, pw_steady_point *p, pw_error *error) {
   pw_initial_value hold[PW_HOLDS];
-  char name[300], value[32];
+  char name[300];
   size_t used = 0;
-  int count = p->family > 0 ? pw_steady_suggest (x->steady, hold, PW_HOLDS) : 0;
+  int count = p->motion.family > 0 ? pw_steady_suggest (x->steady, hold, PW_HOLDS) : 0;
   for (int i = 0; i < count && used < sizeof p->advice; i++)
-    used += (size_t)snprintf (p->advice + used, sizeof p->advice - used, " --hold %s=%s",
-                              pw_system_held_name (x->m.system, hold[i].state, name, sizeof name),
-                              pw_format (value, hold[i].value, 9));
+    used += (size_t)snprintf (p->advice + used, sizeof p->advice - used, " --hold %s=%.9g",
+                              pw_system_held_name (x->m.system, hold[i].state, name, sizeof name), hold[i].value);
   return count < 0 ? pw_fail (error, count, "%s: out of memory", pw_file_name (x->m.file)) : PW_OK;
 }
 
-static int steady_same (const pw_steady_cli *x, const pw_steady_point *p, const pw_steady_motion *m) {
-  int n = pw_system_coordinates (x->m.system);
-  return fabs (p->parameter - m->parameter) <= 1e-9 * fabs (m->parameter) &&
-         pw_steady_same (x->steady, p->state, p->state + n, m->q, m->v);
+static int steady_same (const pw_steady_cli *x, const pw_steady_motion *a, const pw_steady_motion *b) {
+  return fabs (a->parameter - b->parameter) <= 1e-9 * fabs (b->parameter) &&
+         pw_steady_same (x->steady, a->q, a->v, b->q, b->v);
 }
 
 static int steady_stop (pw_steady_cli *x) {
@@ -110,9 +95,9 @@ static int steady_stop (pw_steady_cli *x) {
 static int steady_found (pw_steady_cli *x, const pw_steady_motion *m, int attempt, pw_error *error) {
   if (m->linear->steady == PW_CHANGING) return x->changing++, PW_OK;
   for (int i = 0; i < x->points; i++) {
-    const pw_steady_point *p = x->point + i;
-    if (m->family > 0 && p->family == m->family && p->unstable == m->unstable) return PW_OK;
-    if (steady_same (x, p, m)) return PW_OK;
+    const pw_steady_motion *known = &x->point[i].motion;
+    if (m->family > 0 && known->family == m->family && known->unstable == m->unstable) return PW_OK;
+    if (steady_same (x, known, m)) return PW_OK;
   }
   if (!x->vary_text) x->branches++;
   pw_steady_point *p = steady_add (x, m, attempt, error);
@@ -158,33 +143,25 @@ static int steady_fail (pw_steady_cli *x, pw_error *error) {
 /* ---- Branches ---- */
 
 static int steady_branch (pw_steady_cli *x, const pw_steady_point *from, int direction, pw_error *error) {
-  int n = pw_system_coordinates (x->m.system), status;
-  double *state = malloc (2 * (size_t)n * sizeof *state);
   char (*more)[PW_STEADY_REASON] = realloc (x->end, ((size_t)x->branches + 1) * sizeof *more);
-  if (more) x->end = more;
-  if (state == NULL || more == NULL) return free (state), pw_fail (error, PW_RESOURCE, "out of memory");
+  if (more == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
+  x->end = more;
+  char *end = x->end[x->branches++];
   pw_steady_motion m = { 0 };
   pw_progress progress = { .t_end = 0 };
-  int attempt = from->attempt;
-  memcpy (state, from->state, 2 * (size_t)n * sizeof *state);
-  *x->end[x->branches++] = 0;
-  status = pw_steady_follow (x->steady, state, state + n, from->parameter, direction, error);
+  const double begin = from->motion.parameter;
+  int status = pw_steady_follow (x->steady, from->motion.q, from->motion.v, begin, direction, error);
   while (status == PW_OK && !steady_stop (x)) {
     status = pw_steady_next (x->steady, &m, error);
     if (status != PW_OK || m.event == PW_STEADY_END) break;
-    if (steady_add (x, &m, attempt, error) == NULL) status = PW_RESOURCE;
-    pw_cli_vary_progress (&x->vary, &progress, from->parameter, m.parameter,
-                          direction > 0 ? x->set.last : x->set.first);
+    if (steady_add (x, &m, from->attempt, error) == NULL) status = PW_RESOURCE;
+    pw_vary_progress (&x->vary, &progress, begin, m.parameter, direction > 0 ? x->set.last : x->set.first);
   }
   pw_progress_end (&progress);
-  free (state);
-  if (status == PW_METHOD) {
-    snprintf (x->end[x->branches - 1], sizeof *x->end, "%.199s", error->text);
-    *error = (pw_error){ 0 };
-    return PW_OK;
-  }
-  snprintf (x->end[x->branches - 1], sizeof *x->end, "%.199s", pw_steady_reason (x->steady));
-  return status;
+  snprintf (end, PW_STEADY_REASON, "%.199s", status == PW_METHOD ? error->text : pw_steady_reason (x->steady));
+  if (status != PW_METHOD) return status;
+  *error = (pw_error){ 0 };
+  return PW_OK;
 }
 
 /* Follows the solutions at one end of the range that are on no branch yet. */
@@ -200,10 +177,8 @@ static int steady_from (pw_steady_cli *x, double parameter, int direction, pw_er
   if (found) memcpy (start, x->point + known, (size_t)found * sizeof *start);
   x->points = known;
   for (int i = 0; i < found; i++) {
-    pw_steady_motion m = { .parameter = parameter, .q = start[i].state };
     int seen = 0;
-    m.v = m.q + pw_system_coordinates (x->m.system);
-    for (int k = 0; k < x->points; k++) seen |= steady_same (x, x->point + k, &m);
+    for (int k = 0; k < x->points; k++) seen |= steady_same (x, &x->point[k].motion, &start[i].motion);
     if (status == PW_OK && !seen && !x->stopped) status = steady_branch (x, start + i, direction, error);
     free (start[i].state);
   }
@@ -215,7 +190,7 @@ static int steady_from (pw_steady_cli *x, double parameter, int direction, pw_er
 static int steady_complete (pw_steady_cli *x, pw_error *error) {
   const pw_system *s = x->m.system;
   pw_steady_motion m;
-  char name[300], value[32];
+  char name[300];
   double parameter = x->set.first;
   if (x->set.vary >= 0)
     parameter = pw_system_held_value (s, x->hold[x->set.vary].state, pw_system_initial_q (s), pw_system_initial_v (s));
@@ -225,8 +200,8 @@ static int steady_complete (pw_steady_cli *x, pw_error *error) {
   int more = pw_steady_suggest (x->steady, x->hold + x->set.holds, PW_HOLDS - x->set.holds);
   if (more < 0) return pw_fail (error, more, "%s: out of memory", pw_file_name (x->m.file));
   for (int i = x->set.holds; i < x->set.holds + more; i++)
-    pw_cli_say ("pinwheel: holding %s=%s, as in the motion nearest to the initial state\n",
-                pw_system_held_name (s, x->hold[i].state, name, sizeof name), pw_format (value, x->hold[i].value, 9));
+    pw_cli_say ("pinwheel: holding %s=%.9g, as in the motion nearest to the initial state\n",
+                pw_system_held_name (s, x->hold[i].state, name, sizeof name), x->hold[i].value);
   x->set.holds += more;
   pw_steady_close (x->steady);
   x->steady = pw_steady_open (x->m.system, &x->set, error);
@@ -236,7 +211,7 @@ static int steady_complete (pw_steady_cli *x, pw_error *error) {
 /* The value in the model, or in its initial state. */
 static double steady_model_value (const pw_steady_cli *x) {
   const pw_system *s = x->m.system;
-  if (x->set.vary < 0) return pw_model_parameter (x->m.model, pw_cli_parameter (x->m.model, x->vary.name));
+  if (x->set.vary < 0) return pw_model_parameter (x->m.model, x->vary.parameter);
   return pw_system_held_value (s, x->hold[x->set.vary].state, pw_system_initial_q (s), pw_system_initial_v (s));
 }
 
@@ -259,37 +234,31 @@ static int steady_compute (pw_steady_cli *x, pw_error *error) {
   if (x->steady == NULL) return error->status;
   pw_stop_catch ();
   int status = x->vary_text ? steady_branches (x, error) : steady_search (x, 0, error);
-  x->interrupted = pw_stop > 0;
   pw_stop_release ();
   if (status == PW_OK && x->points == 0 && !x->stopped) status = steady_fail (x, error);
   return status;
 }
 
-static void steady_close (pw_steady_cli *x, int lock) {
-  if (lock >= 0) close (lock);
+static void steady_close (pw_steady_cli *x) {
+  pw_files_close (&x->files);
   for (int i = 0; i < x->points; i++) free (x->point[i].state);
   free (x->point);
   free (x->end);
-  free (x->hold);
   pw_steady_close (x->steady);
   pw_cli_close_model (&x->m);
 }
 
 static int steady_command (void *options, pw_error *error) {
   pw_steady_cli *x = options;
-  int lock = -1, status = pw_cli_open (&x->m, &x->line, error);
+  int status = pw_cli_open (&x->m, &x->line, error);
   if (status == PW_OK) status = steady_options (x, error);
-  if (status == PW_OK) status = pw_figure_results (&x->line, &x->m, x->folder, "steady", &lock, error);
+  if (status == PW_OK) status = pw_figure_results (&x->line, &x->m, x->folder, "steady", &x->files, error);
   if (status == PW_OK) pw_report_model (x->m.model);
   if (status == PW_OK) status = steady_compute (x, error);
   if (status == PW_OK && x->points) pw_steady_print (x);
   if (status == PW_OK && x->points && x->folder) status = pw_steady_write (x, error);
-  int stopped = x->stopped, interrupted = x->interrupted;
-  steady_close (x, lock);
-  if (status != PW_OK || !stopped) return status;
-  if (!interrupted) return pw_fail (error, PW_METHOD, "--limit %s: stopped; results are incomplete", x->line.limit);
-  pw_cli_say ("pinwheel: interrupted; results are incomplete\n");
-  return PW_INTERRUPTED;
+  steady_close (x);
+  return status == PW_OK && x->stopped ? pw_cli_incomplete (&x->line, error) : status;
 }
 
 static const struct poptOption steady_options_table[] = {

@@ -21,14 +21,15 @@ static void steady_number (pw_table *t, double value) {
 
 /* Real part and frequency of the rightmost eigenvalue, of events of that which crosses the imaginary axis. */
 static void steady_rightmost (pw_table *t, const pw_steady_point *p) {
-  int best = -1, crossing = p->event != PW_STEADY_POINT;
-  for (int i = 0; i < p->unknowns; i++) {
-    if (!crossing && (p->rigid[i] || (p->re[i] == 0 && p->im[i] == 0))) continue;
-    if ((p->im[i] != 0) != (p->event == PW_STEADY_OSCILLATION) && crossing) continue;
-    if (best < 0 || (crossing && fabs (p->re[i]) < fabs (p->re[best]))) best = i;
+  const pw_linear *l = &p->linear;
+  int best = -1, crossing = p->motion.event != PW_STEADY_POINT;
+  for (int i = 0; i < l->unknowns; i++) {
+    if (!crossing && (l->rigid[i] || (l->re[i] == 0 && l->im[i] == 0))) continue;
+    if ((l->im[i] != 0) != (p->motion.event == PW_STEADY_OSCILLATION) && crossing) continue;
+    if (best < 0 || (crossing && fabs (l->re[i]) < fabs (l->re[best]))) best = i;
   }
-  double im = best < 0 ? NAN : fabs (p->im[best]);
-  steady_number (t, best < 0 ? NAN : crossing ? round (p->re[best] * 1e8) / 1e8 + 0 : p->re[best]);
+  double im = best < 0 ? NAN : fabs (l->im[best]);
+  steady_number (t, best < 0 ? NAN : crossing ? round (l->re[best] * 1e8) / 1e8 + 0 : l->re[best]);
   steady_number (t, im > 0 ? im / (2 * PW_PI) : NAN);
 }
 
@@ -38,7 +39,7 @@ static double steady_held (const pw_steady_cli *x, const pw_steady_point *p, con
   const pw_system *s = x->m.system;
   snprintf (name, sizeof name, "%s.%s", pw_system_body_name (s, 0), quantity);
   int held = pw_system_find_held (s, name, &none);
-  return held < 0 ? NAN : pw_system_held_value (s, held, p->state, p->state + pw_system_coordinates (s));
+  return held < 0 ? NAN : pw_system_held_value (s, held, p->motion.q, p->motion.v);
 }
 
 static void steady_cell_name (pw_table *t, const pw_steady_cli *x, const char *quantity, const char *unit) {
@@ -61,10 +62,10 @@ static void steady_motions (const pw_steady_cli *x) {
       pw_cell_number (&t, 6, i + 1, 6);
       steady_number (&t, steady_held (x, p, "speed"));
       steady_number (&t, steady_held (x, p, "omega"));
-      pw_cell_number (&t, 7, p->family, 6);
-      pw_cell_number (&t, 7, p->unstable, 6);
+      pw_cell_number (&t, 7, p->motion.family, 6);
+      pw_cell_number (&t, 7, p->motion.unstable, 6);
       steady_rightmost (&t, p);
-      pw_cell_number (&t, 8, p->residual, 2);
+      pw_cell_number (&t, 8, p->motion.residual, 2);
       pw_row_end (&t);
     }
   }
@@ -78,17 +79,20 @@ static void steady_branches (const pw_steady_cli *x) {
     events = 0;
     pw_cell (&t, 6, "branch");
     pw_cell (&t, -15, "event");
-    *x->unit ? pw_cell_unit (&t, 12, x->vary.name, x->unit) : pw_cell (&t, 12, x->vary.name);
+    *x->vary.unit ? pw_cell_unit (&t, 12, x->vary.name, x->vary.unit) : pw_cell (&t, 12, x->vary.name);
     for (int k = 0; k < 3; k++) pw_cell (&t, 7, (const char *[]){ "growing", "rightmost [1/s]", "frequency [Hz]" }[k]);
     pw_row_end (&t);
     for (const pw_steady_point *p = x->point; p < x->point + x->points; p++) {
       int first = p == x->point || p[-1].branch != p->branch,
           last = p == x->point + x->points - 1 || p[1].branch != p->branch;
-      if (!first && !last && (p->event == PW_STEADY_POINT || ++events > STEADY_EVENTS)) continue;
+      if (!first && !last && (p->motion.event == PW_STEADY_POINT || ++events > STEADY_EVENTS)) continue;
       pw_cell_number (&t, 6, p->branch, 6);
-      pw_cell (&t, -15, first ? "begins" : p->event != PW_STEADY_POINT ? steady_events[p->event] : "ends");
-      pw_cell_number (&t, 12, p->parameter, 9);
-      pw_cell_number (&t, 7, p->unstable, 6);
+      pw_cell (&t, -15,
+               first                                ? "begins"
+               : p->motion.event != PW_STEADY_POINT ? steady_events[p->motion.event]
+                                                    : "ends");
+      pw_cell_number (&t, 12, p->motion.parameter, 9);
+      pw_cell_number (&t, 7, p->motion.unstable, 6);
       steady_rightmost (&t, p);
       pw_row_end (&t);
     }
@@ -99,13 +103,12 @@ static void steady_branches (const pw_steady_cli *x) {
 }
 
 void pw_steady_print (const pw_steady_cli *x) {
-  char first[32], last[32], text[40];
+  char text[40];
   const char *model = pw_file_name (x->m.file),
              *symmetries = pw_states_symmetries (pw_steady_symmetries (x->steady), text);
   if (x->vary_text) {
-    printf ("%s: %d %s of steady motions%s, %s from %s to %s\n\n", model, x->branches,
-            x->branches == 1 ? "branch" : "branches", symmetries, x->vary.name, pw_format (first, x->set.first, 9),
-            pw_format (last, x->set.last, 9));
+    printf ("%s: %d %s of steady motions%s, %s from %.9g to %.9g\n\n", model, x->branches,
+            x->branches == 1 ? "branch" : "branches", symmetries, x->vary.name, x->set.first, x->set.last);
     steady_branches (x);
     return;
   }
@@ -113,26 +116,26 @@ void pw_steady_print (const pw_steady_cli *x) {
           x->points == 1 ? "motion" : "motions", symmetries, x->attempts);
   steady_motions (x);
   for (int i = 0; i < x->points && i < STEADY_CONFIGURATIONS; i++) {
-    const double *state = x->point[i].state;
+    const pw_steady_motion *m = &x->point[i].motion;
     printf ("\nMotion %d, found from %s\n", i + 1, x->point[i].attempt > 1 ? "a random state" : "the initial state");
-    pw_states_print (x->m.system, state, state + pw_system_coordinates (x->m.system), STEADY_DIGITS, STEADY_SMALL);
+    pw_states_print (x->m.system, m->q, m->v, STEADY_DIGITS, STEADY_SMALL);
   }
   for (int i = 0; i < x->points && i < STEADY_SHOWN; i++)
     if (*x->point[i].advice)
-      printf ("\nMotion %d is one of a family of dimension %d; to select one:%s\n", i + 1, x->point[i].family,
+      printf ("\nMotion %d is one of a family of dimension %d; to select one:%s\n", i + 1, x->point[i].motion.family,
               x->point[i].advice);
 }
 
 /* ---- JSON ---- */
 
-static void steady_eigenvalues_json (const pw_steady_point *p, pw_json *j) {
+static void steady_eigenvalues_json (const pw_linear *l, pw_json *j) {
   pw_json_open (j, "eigenvalues", '[');
-  for (int i = 0; i < p->unknowns; i++) {
+  for (int i = 0; i < l->unknowns; i++) {
     pw_json_open (j, NULL, '{');
-    pw_json_number (j, "re", p->re[i]);
-    pw_json_number (j, "im", p->im[i]);
-    pw_json_number (j, "frequency_hz", fabs (p->im[i]) / (2 * PW_PI));
-    pw_json_flag (j, "rigid", p->rigid[i]);
+    pw_json_number (j, "re", l->re[i]);
+    pw_json_number (j, "im", l->im[i]);
+    pw_json_number (j, "frequency_hz", fabs (l->im[i]) / (2 * PW_PI));
+    pw_json_flag (j, "rigid", l->rigid[i]);
     pw_json_close (j, '}');
   }
   pw_json_close (j, ']');
@@ -143,17 +146,15 @@ static void steady_point_json (const pw_steady_cli *x, const pw_steady_point *p,
   j->line = 1;
   pw_json_open (j, NULL, '{');
   pw_json_number (j, "branch", p->branch);
-  if (x->vary_text) pw_json_text (j, "event", steady_events[p->event]);
-  if (x->vary_text) pw_json_number (j, "parameter", p->parameter);
+  if (x->vary_text) pw_json_text (j, "event", steady_events[p->motion.event]);
+  if (x->vary_text) pw_json_number (j, "parameter", p->motion.parameter);
   pw_json_number (j, "attempt", p->attempt);
-  pw_json_number (j, "residual", p->residual);
-  if (!x->vary_text) pw_json_number (j, "family", p->family);
-  pw_json_number (j, "growing", p->unstable);
-  pw_json_open (j, "twist", '[');
-  for (int i = 0; i < 3; i++) pw_json_number (j, NULL, p->twist[i]);
-  pw_json_close (j, ']');
-  pw_states_json (s, p->state, p->state + pw_system_coordinates (s), "state", j);
-  steady_eigenvalues_json (p, j);
+  pw_json_number (j, "residual", p->motion.residual);
+  if (!x->vary_text) pw_json_number (j, "family", p->motion.family);
+  pw_json_number (j, "growing", p->motion.unstable);
+  pw_numbers_json (j, "twist", p->linear.twist, 3);
+  pw_states_json (s, p->motion.q, p->motion.v, "state", j);
+  steady_eigenvalues_json (&p->linear, j);
   pw_json_close (j, '}');
 }
 
@@ -164,7 +165,7 @@ static void steady_json (const void *context, pw_json *j) {
   pw_json_number (j, "schema", 1);
   pw_json_text (j, "model", pw_file_name (x->m.file));
   pw_json_text (j, "parameter", x->vary_text ? x->vary.name : NULL);
-  pw_json_text (j, "unit", x->unit);
+  pw_json_text (j, "unit", x->vary.unit);
   pw_json_open (j, "held", '{');
   for (int i = 0; i < x->set.holds; i++)
     if (i != x->set.vary)
@@ -189,7 +190,7 @@ static void steady_json (const void *context, pw_json *j) {
 static int steady_eigenvalues (const pw_steady_cli *x) {
   int most = 0;
   for (int i = 0; i < x->points; i++)
-    if (x->point[i].unknowns > most) most = x->point[i].unknowns;
+    if (x->point[i].linear.unknowns > most) most = x->point[i].linear.unknowns;
   return most;
 }
 
@@ -200,7 +201,7 @@ static int steady_csv (const void *context, FILE *f, pw_error *error) {
   pw_text t = { .at = NULL };
   char name[300];
   pw_text_cell (&t, "branch,event");
-  pw_text_name (&t, x->vary_text ? x->vary.name : "parameter", x->unit);
+  pw_text_name (&t, x->vary_text ? x->vary.name : "parameter", x->vary.unit);
   pw_text_cell (&t, "growing,residual");
   pw_states_head (s, &t);
   for (int i = 1; i <= most; i++)
@@ -209,13 +210,14 @@ static int steady_csv (const void *context, FILE *f, pw_error *error) {
   int status = pw_text_line (&t, f, x->folder, error);
   for (const pw_steady_point *p = x->point; status == PW_OK && p < x->point + x->points; p++) {
     pw_text_number (&t, p->branch);
-    pw_text_cell (&t, steady_events[p->event]);
-    pw_text_number (&t, p->parameter);
-    pw_text_number (&t, p->unstable);
-    pw_text_number (&t, p->residual);
+    pw_text_cell (&t, steady_events[p->motion.event]);
+    pw_text_number (&t, p->motion.parameter);
+    pw_text_number (&t, p->motion.unstable);
+    pw_text_number (&t, p->motion.residual);
     for (int i = 0; i < states; i++) pw_text_number (&t, p->state[i]);
     for (int i = 0; i < most; i++)
-      for (int k = 0; k < 2; k++) pw_text_number (&t, i < p->unknowns ? (k ? p->im : p->re)[i] : NAN);
+      for (int k = 0; k < 2; k++)
+        pw_text_number (&t, i < p->linear.unknowns ? (k ? p->linear.im : p->linear.re)[i] : NAN);
     status = pw_text_line (&t, f, x->folder, error);
   }
   return status;
@@ -225,33 +227,32 @@ static int steady_csv (const void *context, FILE *f, pw_error *error) {
 
 /* Whether the part of a branch from p to the next point is stable: events belong to both sides. */
 static int steady_stable (const pw_steady_point *p) {
-  return (p->event == PW_STEADY_POINT ? p : p + 1)->unstable == 0;
+  return (p->motion.event == PW_STEADY_POINT ? p : p + 1)->motion.unstable == 0;
 }
 
 /* The real part, or modulus of the imaginary part, of a point that is number k in descending order, without rigid
  * displacements; NaN if there are fewer. */
-static double steady_ranked (const pw_steady_point *p, int imaginary, int k) {
-  for (int i = 0; i < p->unknowns; i++) {
-    double value = imaginary ? fabs (p->im[i]) : p->re[i];
+static double steady_ranked (const pw_linear *l, int imaginary, int k) {
+  for (int i = 0; i < l->unknowns; i++) {
+    double value = imaginary ? fabs (l->im[i]) : l->re[i];
     int above = 0;
-    for (int j = 0; j < p->unknowns; j++) {
-      double other = imaginary ? fabs (p->im[j]) : p->re[j];
-      above += !p->rigid[j] && (other > value || (other == value && j < i));
+    for (int j = 0; j < l->unknowns; j++) {
+      double other = imaginary ? fabs (l->im[j]) : l->re[j];
+      above += !l->rigid[j] && (other > value || (other == value && j < i));
     }
-    if (!p->rigid[i] && above == k) return value;
+    if (!l->rigid[i] && above == k) return value;
   }
   return NAN;
 }
 
 /* Lines of the k-th real part and frequency of a branch, with a blank line after each part of the given stability. */
 static void steady_line (FILE *f, const pw_steady_point *first, int count, int k, int stable) {
-  char text[3][32];
   int drawing = 0;
   for (const pw_steady_point *p = first; p < first + count; p++) {
     int here = p + 1 < first + count && steady_stable (p) == stable;
     if (here || drawing)
-      fprintf (f, "%s %s %s\n", pw_format (text[0], p->parameter, 10), pw_format (text[1], steady_ranked (p, 0, k), 10),
-               pw_format (text[2], steady_ranked (p, 1, k) / (2 * PW_PI), 10));
+      fprintf (f, "%.10g %.10g %.10g\n", p->motion.parameter, steady_ranked (&p->linear, 0, k),
+               steady_ranked (&p->linear, 1, k) / (2 * PW_PI));
     if (drawing && !here) fputs ("\n", f);
     drawing = here;
   }
@@ -259,7 +260,6 @@ static void steady_line (FILE *f, const pw_steady_point *first, int count, int k
 
 static int steady_data (const void *context, FILE *f, pw_error *error) {
   const pw_steady_cli *x = context;
-  char text[3][32];
   fprintf (f, "# %s, real part [1/s], frequency [Hz]: stable parts; unstable ones; events; eigenvalues [1/s]\n",
            x->vary.name);
   for (int stable = 1; stable >= 0; stable--) {
@@ -270,20 +270,19 @@ static int steady_data (const void *context, FILE *f, pw_error *error) {
     fputs ("nan nan nan\n\n\n", f);
   }
   for (const pw_steady_point *p = x->point; p < x->point + x->points; p++)
-    if (p->event != PW_STEADY_POINT) fprintf (f, "%s %d\n", pw_format (text[0], p->parameter, 10), p->event);
+    if (p->motion.event != PW_STEADY_POINT) fprintf (f, "%.10g %d\n", p->motion.parameter, p->motion.event);
   fputs ("nan nan\n\n\n", f);
   for (const pw_steady_point *p = x->point; p < x->point + x->points; p++)
-    for (int i = 0; i < p->unknowns; i++)
-      if (!p->rigid[i])
-        fprintf (f, "%s %s %s\n", pw_format (text[0], p->parameter, 10), pw_format (text[1], p->re[i], 10),
-                 pw_format (text[2], p->im[i], 10));
+    for (int i = 0; i < p->linear.unknowns; i++)
+      if (!p->linear.rigid[i])
+        fprintf (f, "%.10g %.10g %.10g\n", p->motion.parameter, p->linear.re[i], p->linear.im[i]);
   (void)error;
   return PW_OK;
 }
 
 static void steady_variables (const void *context, FILE *f) {
   const pw_steady_cli *x = context;
-  pw_figure_label (f, "label_of_x", 0, x->vary.name, x->unit);
+  pw_figure_label (f, "label_of_x", 0, x->vary.name, x->vary.unit);
   fprintf (f, "first = %.10g\nlast = %.10g\n", fmin (x->set.first, x->set.last), fmax (x->set.first, x->set.last));
 }
 

@@ -2,21 +2,17 @@
 #ifndef PW_STEADY_REPORT_H
 #define PW_STEADY_REPORT_H
 
-#include "cli.h"
-#include "pinwheel-analysis.h"
+#include "states.h"
+#include "vary.h"
 
 /* A steady motion found, or a point of a branch. */
 typedef struct {
-  int branch;  /* from 1; without --vary its number */
-  int attempt; /* 0: the initial state, else a random one */
-  int family, unstable;
-  pw_steady_event event;
-  double parameter, residual, twist[3];
-  double *state;        /* 2 coordinates */
-  double *re, *im;      /* unknowns */
-  unsigned char *rigid; /* unknowns */
-  int unknowns;
-  char advice[200]; /* options that select it within its family, " --hold NAME=VALUE..." */
+  int branch;              /* from 1; without --vary its number */
+  int attempt;             /* of pw_steady_solve: 0 and 1 begin at the initial state */
+  pw_steady_motion motion; /* its arrays are those of `state` */
+  pw_linear linear;        /* twist, unknowns and eigenvalues of it */
+  double *state;           /* q, v; then re, im, rigid */
+  char advice[200];        /* options that select it within its family, " --hold NAME=VALUE..." */
 } pw_steady_point;
 
 enum { PW_STEADY_REASON = 200 };
@@ -25,11 +21,11 @@ typedef struct {
   pw_cli_line line;
   const char **hold_texts, *vary_text, *starts_text, *at_text, *folder;
   pw_cli_model m;
+  pw_files files;
   pw_limit limit;
   pw_steady_settings set;
-  pw_initial_value *hold; /* set.holds, with room */
-  pw_cli_vary vary;       /* what --vary varies */
-  const char *unit;
+  pw_initial_value hold[PW_HOLDS]; /* set.holds */
+  pw_vary vary;
   int attempts; /* random ones at each end */
   pw_steady *steady;
   pw_steady_point *point;
@@ -39,7 +35,6 @@ typedef struct {
   int branches;
   double nearest[2];     /* smallest residual without solution: from the initial state, from random ones */
   int changing, stopped; /* motions of equations that change; 1: by Ctrl-C or --limit */
-  int interrupted;
 } pw_steady_cli;
 
 void pw_steady_print (const pw_steady_cli *x);

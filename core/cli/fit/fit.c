@@ -1,28 +1,28 @@
 /* pinwheel fit: parameters and initial values with which a model agrees best with measured data. */
 #define _POSIX_C_SOURCE 200809L
-#include "fit_parts.h"
+#include "fit.h"
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
-#include <unistd.h>
 #include "figure.h"
 #include "parallel.h"
 
 /* ---- The data: columns of a table and their standard deviations ---- */
 
-/* Standard deviation of a column: a number, or the name of a column. */
+/* Standard deviation of a column: a number, or if that is NaN the name of a column; without text 1. */
 typedef struct {
-  char *column, *text;
+  const char *text;
   double number;
 } fit_sigma;
 
 /* "a,b" in place: pointers to the names. */
 static int data_names (pw_fit *x, pw_error *error) {
-  int count = 1;
+  size_t count = 2;
   for (const char *c = x->columns_text; *c; c++) count += *c == ',';
   x->names = strdup (x->columns_text);
-  x->name = calloc ((size_t)count + 1, sizeof *x->name);
+  x->name = calloc (2 * count, sizeof *x->name);
   if (x->names == NULL || x->name == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
+  x->unit = x->name + count;
   for (char *at = x->names; at;) {
     char *comma = strchr (at, ',');
     pw_column c;
@@ -30,71 +30,68 @@ static int data_names (pw_fit *x, pw_error *error) {
     if (pw_column_find (x->m.system, at, "--columns", &c, error) != PW_OK) return error->status;
     for (int i = 0; i < x->columns; i++)
       if (strcmp (x->name[i], at) == 0) return pw_fail (error, PW_INPUT, "--columns: %s is given twice", at);
+    x->unit[x->columns] = pw_column_unit (x->m.system, c);
     x->name[x->columns++] = at;
     at = comma ? comma + 1 : NULL;
   }
   return PW_OK;
 }
 
-/* "COLUMN=VALUE" or "COLUMN=NAME"; the texts are changed. */
-static int data_sigma (const pw_fit *x, char *text, fit_sigma *s, pw_error *error) {
-  char *equals = strchr (text, '=');
-  if (equals == NULL) return pw_fail (error, PW_INPUT, "--sigma %s: expected COLUMN=VALUE or COLUMN=NAME", text);
-  *equals = 0;
+/* "COLUMN=VALUE" or "COLUMN=NAME" */
+static int data_sigma (const pw_fit *x, const char *text, fit_sigma *s, pw_error *error) {
+  const int size = (int)strcspn (text, "=");
+  const char *value = text + size + 1;
   int i = 0;
-  while (i < x->columns && strcmp (x->name[i], text) != 0) i++;
-  if (i == x->columns) return pw_fail (error, PW_INPUT, "--sigma %s: it is not among --columns", text);
-  if (s[i].text) return pw_fail (error, PW_INPUT, "--sigma %s is given twice", text);
-  double number = NAN;
-  if (pw_read_expression (equals + 1, &number) == PW_OK && !(number > 0))
-    return pw_fail (error, PW_INPUT, "--sigma %s=%s: expected a number > 0", text, equals + 1);
-  s[i] = (fit_sigma){ .column = text, .text = equals + 1, .number = number };
+  if (text[size] == 0) return pw_fail (error, PW_INPUT, "--sigma %s: expected COLUMN=VALUE or COLUMN=NAME", text);
+  while (i < x->columns && (strncmp (x->name[i], text, (size_t)size) != 0 || x->name[i][size])) i++;
+  if (i == x->columns) return pw_fail (error, PW_INPUT, "--sigma %.*s: it is not among --columns", size, text);
+  if (s[i].text) return pw_fail (error, PW_INPUT, "--sigma %.*s is given twice", size, text);
+  s[i] = (fit_sigma){ value, NAN };
+  if (pw_read_expression (value, &s[i].number) == PW_OK && !(s[i].number > 0))
+    return pw_fail (error, PW_INPUT, "--sigma %s: expected a number > 0", text);
   return PW_OK;
 }
 
 /* Without standard deviations, data of one unit have equal weights. */
-static int data_units (const pw_fit *x, pw_error *error) {
-  pw_column first, c;
-  if (pw_column_find (x->m.system, x->name[0], "--columns", &first, error) != PW_OK) return error->status;
-  for (int i = 1; i < x->columns; i++) {
-    if (pw_column_find (x->m.system, x->name[i], "--columns", &c, error) != PW_OK) return error->status;
-    const char *a = pw_column_unit (x->m.system, first), *b = pw_column_unit (x->m.system, c);
-    if (strcmp (a, b) != 0)
+static int data_weights (pw_fit *x, const fit_sigma *s, pw_error *error) {
+  for (int i = 0; i < x->columns; i++) x->weighted |= s[i].text != NULL;
+  for (int i = 0; i < x->columns; i++) {
+    if (x->weighted && s[i].text == NULL)
+      return pw_fail (error, PW_INPUT, "--sigma is given for other columns, but not for %s", x->name[i]);
+    if (!x->weighted && strcmp (x->unit[i], x->unit[0]) != 0)
       return pw_fail (error, PW_INPUT,
                       "%s [%s] and %s [%s] have different units: add --sigma COLUMN=VALUE for each column", x->name[0],
-                      a, x->name[i], b);
+                      x->unit[0], x->name[i], x->unit[i]);
   }
   return PW_OK;
 }
 
-/* Times, data, standard deviations; into x->table. */
-static int data_table (pw_fit *x, const fit_sigma *s, pw_error *error) {
-  int width = 1, at = 0;
-  const char **column = calloc (2 * (size_t)x->columns + 1, sizeof *column),
-             **unit = calloc (2 * (size_t)x->columns + 1, sizeof *unit);
-  if (column && unit) {
-    column[0] = "t", unit[0] = "s";
-    for (int pass = 0; pass < 2; pass++)
-      for (int i = 0; i < x->columns; i++) {
-        pw_column c;
-        if (pass == 1 && !(s[i].text && isnan (s[i].number))) continue;
-        pw_column_find (x->m.system, x->name[i], "", &c, NULL);
-        column[width] = pass ? s[i].text : x->name[i];
-        unit[width++] = pw_column_unit (x->m.system, c);
-      }
-    x->table = pw_read_columns (x->data_path, column, unit, width, &x->rows, error);
-  } else
-    pw_fail (error, PW_RESOURCE, "out of memory");
+/* Reads times, data, and columns of standard deviations. */
+static int data_read (pw_fit *x, const fit_sigma *s, pw_error *error) {
+  const size_t most = 1 + 2 * (size_t)x->columns;
+  const char **column = calloc (2 * most, sizeof *column), **unit = column + most;
+  int width = 1;
+  if (column == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
+  column[0] = "t", unit[0] = "s";
+  for (int i = 0; i < x->columns; i++) column[width] = x->name[i], unit[width++] = x->unit[i];
+  for (int i = 0; i < x->columns; i++)
+    if (s[i].text && isnan (s[i].number)) column[width] = s[i].text, unit[width++] = x->unit[i];
+  x->table = pw_read_columns (x->data_path, column, unit, width, &x->rows, error);
   free (column);
-  free (unit);
-  if (x->table == NULL) return error->status;
+  return x->table ? PW_OK : error->status;
+}
+
+static int data_table (pw_fit *x, const fit_sigma *s, pw_error *error) {
+  if (data_read (x, s, error) != PW_OK) return error->status;
   size_t rows = (size_t)x->rows, cells = (size_t)x->columns * rows;
   x->t = x->table, x->value = x->table + rows;
   x->sigma = malloc ((cells + 1) * sizeof *x->sigma);
   if (x->sigma == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
+  const double *next = x->value + cells;
   for (int i = 0; i < x->columns; i++) {
-    const double *given = s[i].text && isnan (s[i].number) ? x->value + cells + (size_t)at++ * rows : NULL;
+    const double *given = s[i].text && isnan (s[i].number) ? next : NULL;
     for (size_t k = 0; k < rows; k++) x->sigma[(size_t)i * rows + k] = given ? given[k] : s[i].text ? s[i].number : 1;
+    if (given) next += rows;
   }
   return PW_OK;
 }
@@ -118,28 +115,19 @@ static int data_check (pw_fit *x, pw_error *error) {
 static int fit_read (pw_fit *x, pw_error *error) {
   if (data_names (x, error) != PW_OK) return error->status;
   fit_sigma *s = calloc ((size_t)x->columns, sizeof *s);
-  int status = s ? PW_OK : pw_fail (error, PW_RESOURCE, "out of memory"), given = 0;
-  for (const char **text = x->sigma_list; status == PW_OK && text && *text; text++) {
-    char *copy = strdup (*text);
-    status = copy ? data_sigma (x, copy, s, error) : pw_fail (error, PW_RESOURCE, "out of memory");
-    if (status != PW_OK) free (copy);
-  }
-  for (int i = 0; s && i < x->columns; i++) given += s[i].text != NULL;
-  x->weighted = given > 0;
-  for (int i = 0; status == PW_OK && given && i < x->columns; i++)
-    if (s[i].text == NULL)
-      status = pw_fail (error, PW_INPUT, "--sigma is given for other columns, but not for %s", x->name[i]);
-  if (status == PW_OK && !given) status = data_units (x, error);
+  int status = s ? PW_OK : pw_fail (error, PW_RESOURCE, "out of memory");
+  for (const char **text = x->sigma_list; status == PW_OK && text && *text; text++)
+    status = data_sigma (x, *text, s, error);
+  if (status == PW_OK) status = data_weights (x, s, error);
   if (status == PW_OK) status = data_table (x, s, error);
   if (status == PW_OK) status = data_check (x, error);
-  for (int i = 0; s && i < x->columns; i++) free (s[i].column);
   free (s);
   return status;
 }
 
 /* ---- The command ---- */
 
-enum { FIT_TABLE, FIT_SUMMARY, FIT_FILES };
+enum { FIT_TABLE = 2, FIT_SUMMARY }; /* in the list of files */
 
 static int fit_options (pw_fit *x, pw_error *error) {
   double starts = 1;
@@ -161,18 +149,20 @@ static int fit_options (pw_fit *x, pw_error *error) {
 /* Runs end at the last datum. */
 static int fit_open_data (pw_fit *x, pw_error *error) {
   int status = fit_read (x, error);
-  if (status == PW_OK) status = pw_unknowns_open (&x->unknowns, &x->line, &x->m, x->free, 50, error);
+  if (status == PW_OK) status = pw_unknowns_open (&x->unknowns, &x->line, &x->m, error);
+  if (status == PW_OK) status = pw_unknowns_read (&x->unknowns, x->free, error);
   if (status != PW_OK) return status;
-  if (x->residuals < x->unknowns.runs.count)
+  if (x->residuals < x->unknowns.count)
     return pw_fail (error, PW_INPUT, "--data %s has fewer data (%d) than there are unknowns (%d)", x->data_path,
-                    x->residuals, x->unknowns.runs.count);
-  if (x->starts > 1 && x->unknowns.runs.count > PW_UNKNOWNS_STARTED)
+                    x->residuals, x->unknowns.count);
+  if (x->starts > 1 && x->unknowns.count > PW_UNKNOWNS_STARTED)
     return pw_fail (error, PW_INPUT, "--starts: at most %d unknowns", PW_UNKNOWNS_STARTED);
-  x->unknowns.t_end = x->unknowns.runs.settings.span = x->t[x->rows - 1];
+  x->unknowns.t_end = x->unknowns.settings.span = x->t[x->rows - 1];
+  pw_unknowns_engine (&x->unknowns, 50);
   return PW_OK;
 }
 
-static int fit_open (pw_fit *x, pw_output *file[FIT_FILES], int *folder, pw_error *error) {
+static int fit_open (pw_fit *x, pw_error *error) {
   static const char *const figures[] = { "fit.dat", "fit.gp", "fit.svg", "fit.png", "fit.pdf", NULL };
   pw_use use[] = { PW_CLI_MODEL_USE,
                    { "--data", x->data_path, PW_READS, NULL },
@@ -182,18 +172,12 @@ static int fit_open (pw_fit *x, pw_output *file[FIT_FILES], int *folder, pw_erro
   int status = fit_options (x, error);
   if (status == PW_OK) status = pw_cli_open (&x->m, &x->line, error);
   if (status == PW_OK) status = fit_open_data (x, error);
-  if (status == PW_OK) status = pw_cli_uses (&x->line, x->m.file, use, sizeof use / sizeof *use, error);
-  if (status == PW_OK && x->path && (file[FIT_TABLE] = pw_output_open (x->path, error)) == NULL) status = error->status;
-  if (status == PW_OK && x->json_path && (file[FIT_SUMMARY] = pw_output_open (x->json_path, error)) == NULL)
-    status = error->status;
-  if (status == PW_OK && x->plots_path && (*folder = pw_figure_folder (x->plots_path, error)) < 0)
-    status = error->status;
-  return status;
+  return status == PW_OK ? pw_files_open (&x->files, &x->line, &x->m, use, sizeof use / sizeof *use, error) : status;
 }
 
 /* Errors of the estimates are not known after Ctrl-C. */
 static void fit_interrupt (pw_fit *x) {
-  int n = x->unknowns.runs.count;
+  int n = x->unknowns.count;
   for (int i = 0; i < n; i++) x->deviation[i] = NAN;
   for (int i = 0; i < n * n; i++) x->covariance[i] = NAN;
   x->rank = n;
@@ -215,16 +199,14 @@ static int fit_search (pw_fit *x, pw_error *error) {
   return PW_INTERRUPTED;
 }
 
-static int fit_finish (pw_fit *x, pw_output *file[FIT_FILES], pw_error *error) {
+static int fit_finish (pw_fit *x, pw_error *error) {
+  FILE *table = pw_files_stream (&x->files, FIT_TABLE), *summary = pw_files_stream (&x->files, FIT_SUMMARY);
   pw_fit_print (x);
-  pw_unknowns_report (&x->unknowns, x->x);
-  int status = file[FIT_TABLE] ? pw_fit_table (x, pw_output_stream (file[FIT_TABLE]), error) : PW_OK;
+  pw_unknowns_report (&x->unknowns, x->estimate);
+  int status = table ? pw_fit_table (x, table, error) : PW_OK;
   const char *word = x->interrupted ? "interrupted" : x->converged ? "ok" : "method";
-  if (file[FIT_SUMMARY]) pw_fit_json (x, word, pw_output_stream (file[FIT_SUMMARY]));
-  if (status == PW_OK) {
-    status = pw_output_finish_all (file, FIT_FILES, error);
-    for (int i = 0; i < FIT_FILES; i++) file[i] = NULL;
-  }
+  if (summary) pw_fit_json (x, word, summary);
+  if (status == PW_OK) status = pw_files_finish (&x->files, error);
   if (status == PW_OK && x->plots_path) status = pw_fit_draw (x, error);
   if (x->interrupted) pw_cli_say ("pinwheel: interrupted; these are the values so far, without their errors\n");
   if (status == PW_OK && x->interrupted) return PW_INTERRUPTED;
@@ -236,18 +218,15 @@ static int fit_finish (pw_fit *x, pw_output *file[FIT_FILES], pw_error *error) {
 
 static int fit_command (void *options, pw_error *error) {
   pw_fit *x = options;
-  pw_output *file[FIT_FILES] = { NULL };
-  int folder = -1, status = fit_open (x, file, &folder, error);
+  int status = fit_open (x, error);
   if (status == PW_OK) status = fit_search (x, error);
-  if (status == PW_OK) status = fit_finish (x, file, error);
-  for (int i = 0; i < FIT_FILES; i++)
-    if (file[i]) pw_output_discard (file[i]);
-  if (folder >= 0) close (folder);
+  if (status == PW_OK) status = fit_finish (x, error);
+  pw_files_close (&x->files);
   free (x->names);
   free (x->name);
   free (x->table);
   free (x->sigma);
-  free (x->x);
+  free (x->estimate);
   free (x->minimum);
   pw_unknowns_close (&x->unknowns);
   pw_cli_close_model (&x->m);

@@ -6,7 +6,7 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
-#include "fit_parts.h"
+#include "fit.h"
 #include "parallel.h"
 
 #define JACOBIAN_EXACT 1e-8 /* relative error of derivatives by the variational equations */
@@ -28,21 +28,17 @@ static int fit_sample (const pw_fit *x, pw_outcomes *o, pw_run *r, double *out, 
 
 int pw_fit_run (const pw_fit *x, const double *unknowns, double *out, pw_error *error) {
   pw_outcomes o = { .system = NULL };
-  pw_cli_model m;
-  pw_settings settings;
-  pw_limit limit;
+  pw_unknown_run r;
   double *row = calloc ((size_t)x->columns, sizeof *row);
-  int status = row ? PW_OK : pw_fail (error, PW_RESOURCE, "out of memory");
-  if (status != PW_OK) return status;
-  status = pw_unknowns_system (&x->unknowns, unknowns, &m, &settings, &limit, error);
-  if (status == PW_OK) status = pw_outcomes_open (&o, m.system, "--columns", x->name, x->columns, error);
-  settings.ledger = o.ledger;
-  pw_run *r = status == PW_OK ? pw_run_open (m.system, x->unknowns.runs.method, &settings, error) : NULL;
-  if (status == PW_OK) status = r ? fit_sample (x, &o, r, out, row, error) : error->status;
-  if (status == PW_STOPPED) status = pw_limit_fail (&limit, pw_run_time (r), error);
-  if (r) pw_run_close (r);
+  if (row == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
+  int status = pw_unknown_prepare (&r, &x->unknowns, unknowns, error);
+  if (status == PW_OK) status = pw_outcomes_open (&o, r.m.system, "--columns", x->name, x->columns, error);
+  r.settings.ledger = o.ledger;
+  if (status == PW_OK) r.run = pw_run_open (r.m.system, x->unknowns.method, &r.settings, error);
+  if (status == PW_OK) status = r.run ? fit_sample (x, &o, r.run, out, row, error) : error->status;
+  if (status == PW_STOPPED) status = pw_limit_fail (&r.limit, pw_run_time (r.run), error);
   pw_outcomes_close (&o);
-  pw_cli_close_model (&m);
+  pw_unknown_close (&r);
   free (row);
   return status;
 }
@@ -64,10 +60,10 @@ double pw_fit_quantile (const pw_fit *x) {
 static double jacobian_smooth (const pw_fit *x) {
   const pw_method *method;
   int stabilisation;
-  if (pw_method_parse (x->unknowns.runs.method, &method, &stabilisation, NULL) != PW_OK ||
-      !pw_method_adaptive (method, x->unknowns.runs.method))
+  if (pw_method_parse (x->unknowns.method, &method, &stabilisation, NULL) != PW_OK ||
+      !pw_method_adaptive (method, x->unknowns.method))
     return DBL_EPSILON;
-  return x->unknowns.runs.settings.rtol > 0 ? x->unknowns.runs.settings.rtol : 1e-6;
+  return x->unknowns.settings.rtol > 0 ? x->unknowns.settings.rtol : 1e-6;
 }
 
 double pw_fit_noise (const pw_fit *x) {
@@ -75,31 +71,24 @@ double pw_fit_noise (const pw_fit *x) {
   return x->by_differences ? pow (smooth, 2. / 3) : fmax (smooth, JACOBIAN_EXACT);
 }
 
-/* Runs on both sides of each unknown. */
+/* Runs on both sides of each unknown: task 2 j below, 2 j + 1 above. */
 typedef struct {
   const pw_fit *x;
-  const double *at;
-  double *run, *step; /* 2 unknowns arrays; distances from `at` */
-  pw_error *error;    /* 2 unknowns */
+  double *at, *run, *step; /* of each task: unknowns, values of the run, distance from the middle */
+  pw_error *error;
 } jacobian_differences;
 
 /* The step balances the truncation error, proportional to its square, and the noise, divided by the step. */
 static void jacobian_side (void *context, int task) {
   jacobian_differences *d = context;
   const pw_fit *x = d->x;
-  const pw_unknown *u = x->unknowns.runs.list + task / 2;
-  int n = x->unknowns.runs.count;
-  double *at = malloc ((size_t)n * sizeof *at), size = fmax (fabs (d->at[task / 2]), 1e-2 * u->scale);
-  if (at == NULL) {
-    pw_fail (d->error + task, PW_RESOURCE, "out of memory");
-    return;
-  }
-  memcpy (at, d->at, (size_t)n * sizeof *at);
-  at[task / 2] = fmin (fmax (at[task / 2] + (task % 2 ? 1 : -1) * size * cbrt (jacobian_smooth (x)), u->low), u->high);
-  d->step[task] = at[task / 2] - d->at[task / 2];
-  int status = pw_fit_run (x, at, d->run + (size_t)task * (size_t)x->columns * (size_t)x->rows, d->error + task);
-  d->error[task].status = status;
-  free (at);
+  const pw_unknown *u = x->unknowns.list + task / 2;
+  double *at = d->at + task * x->unknowns.count, *value = at + task / 2, middle = *value;
+  double size = fmax (fabs (middle), 1e-2 * u->scale) * cbrt (jacobian_smooth (x));
+  *value = fmin (fmax (middle + (task % 2 ? size : -size), u->low), u->high);
+  d->step[task] = *value - middle;
+  pw_error *error = d->error + task;
+  error->status = pw_fit_run (x, at, d->run + (size_t)task * (size_t)x->columns * (size_t)x->rows, error);
 }
 
 /* One side is enough, if the other one fails. */
@@ -121,18 +110,19 @@ static int jacobian_column (const jacobian_differences *d, int j, const double *
 
 static int jacobian_by_differences (pw_fit *x, const double *at, const double *model, double *jacobian,
                                     pw_error *error) {
-  size_t n = (size_t)x->unknowns.runs.count, cells = (size_t)x->columns * (size_t)x->rows;
-  jacobian_differences d = { x, at, malloc ((2 * n * cells + 2 * n) * sizeof *d.run), NULL,
-                             calloc (2 * n, sizeof *d.error) };
-  int status = d.run && d.error ? PW_OK : pw_fail (error, PW_RESOURCE, "out of memory");
+  size_t n = (size_t)x->unknowns.count, cells = (size_t)x->columns * (size_t)x->rows;
+  jacobian_differences d = { .x = x, .at = malloc (2 * n * (n + cells + 1) * sizeof *d.at) };
+  d.error = calloc (2 * n, sizeof *d.error);
+  int status = d.at && d.error ? PW_OK : pw_fail (error, PW_RESOURCE, "out of memory");
   if (status == PW_OK) {
-    d.step = d.run + 2 * n * cells;
+    d.run = d.at + 2 * n * n, d.step = d.run + 2 * n * cells;
+    for (size_t task = 0; task < 2 * n; task++) memcpy (d.at + task * n, at, n * sizeof *at);
     status = pw_parallel (x->jobs, (int)(2 * n), jacobian_side, &d, error);
     x->runs += 2 * (long)n;
   }
-  for (int j = 0; j < x->unknowns.runs.count && status == PW_OK; j++)
+  for (int j = 0; j < x->unknowns.count && status == PW_OK; j++)
     status = jacobian_column (&d, j, model, jacobian + (size_t)j * cells, error);
-  free (d.run);
+  free (d.at);
   free (d.error);
   return status;
 }
@@ -141,7 +131,7 @@ static int jacobian_by_differences (pw_fit *x, const double *at, const double *m
 
 /* Derivatives at the time of a row. */
 static int jacobian_row (pw_sensitivity *s, const pw_fit *x, int row, double *jacobian, pw_error *error) {
-  const int n = x->unknowns.runs.count;
+  const int n = x->unknowns.count;
   int status = pw_sensitivity_at (s, x->t[row], error);
   for (int i = 0; i < x->columns && status == PW_OK; i++) {
     const double *slope = s->slope + s->outcomes.outcome[i].term[0] * n;
@@ -154,8 +144,8 @@ static int jacobian_row (pw_sensitivity *s, const pw_fit *x, int row, double *ja
 }
 
 static int jacobian_by_variation (const pw_fit *x, const double *at, double *jacobian, pw_error *error) {
-  pw_sensitivity s;
-  int status = pw_unknowns_differentiate (&x->unknowns, at, x->name, &s, error);
+  pw_sensitivity s = { .of = x->name, .unknowns = x->unknowns, .no_error = 1 };
+  int status = pw_sensitivity_open (&s, at, error);
   if (status == PW_OK) status = pw_sensitivity_start (&s, error);
   for (int row = 0; row < x->rows && status == PW_OK; row++) status = jacobian_row (&s, x, row, jacobian, error);
   if (status == PW_STOPPED) status = pw_limit_fail (&s.limit, pw_run_time (s.base.run), error);

@@ -4,7 +4,7 @@
 #include <nlopt.h>
 #include <stdlib.h>
 #include <string.h>
-#include "optimise_parts.h"
+#include "optimise.h"
 #include "util.h"
 
 #define SEARCH_FIRST 0.1    /* first steps, relative to the scales of the unknowns */
@@ -22,6 +22,7 @@ typedef struct {
   pw_search_start *s;
   nlopt_opt opt;
   double *u, *at, *value; /* the last run: scaled unknowns, unknowns, outputs */
+  double *allowed;        /* outputs: excess of the constraints of which the search does not take notice */
   double *slope;          /* outputs x unknowns: derivatives with respect to scaled unknowns; NULL: without */
   int known, sloped;      /* 1: there was a run; with derivatives */
   int failed;             /* 1: the last run failed */
@@ -42,21 +43,19 @@ static double search_scaled (const pw_unknown *k, double x) {
 static int search_run (const search *p, pw_error *error) {
   const pw_unknowns *u = &p->x->unknowns;
   pw_outcomes o = { .system = NULL };
-  pw_cli_model m;
-  pw_settings settings;
-  pw_limit limit;
+  pw_unknown_run r;
   char number[32];
-  int status = pw_unknowns_system (u, p->at, &m, &settings, &limit, error);
-  if (status == PW_OK) status = pw_outcomes_open (&o, m.system, "output", p->x->text, p->x->outputs, error);
-  settings.ledger = o.ledger;
-  if (status == PW_OK) status = pw_outcomes_run (&o, u->runs.method, &settings, u->t_end, error);
+  int status = pw_unknown_prepare (&r, u, p->at, error);
+  if (status == PW_OK) status = pw_outcomes_open (&o, r.m.system, "output", p->x->text, p->x->outputs, error);
+  r.settings.ledger = o.ledger;
+  if (status == PW_OK) status = pw_outcomes_run (&o, u->method, &r.settings, u->t_end, error);
   for (int i = 0; status == PW_OK && i < p->x->outputs; i++) {
     p->value[i] = pw_outcome_value (&o, i, NULL);
     if (!isfinite (p->value[i]))
       status = pw_fail (error, PW_METHOD, "%s is %s", p->x->text[i], pw_format (number, p->value[i], 9));
   }
   pw_outcomes_close (&o);
-  pw_cli_close_model (&m);
+  pw_unknown_close (&r);
   return status;
 }
 
@@ -64,15 +63,15 @@ static int search_run (const search *p, pw_error *error) {
 static int search_differentiate (search *p, pw_error *error) {
   const pw_unknowns *u = &p->x->unknowns;
   pw_progress silent = { 0 };
-  pw_sensitivity s;
-  int status = pw_unknowns_differentiate (u, p->at, p->x->text, &s, error);
+  pw_sensitivity s = { .of = p->x->text, .unknowns = *u, .no_error = 1 };
+  int status = pw_sensitivity_open (&s, p->at, error);
   if (status == PW_OK) status = pw_sensitivity_compute (&s, &silent, error);
   if (status == PW_OK && s.stopped) status = pw_limit_fail (&s.limit, pw_run_time (s.base.run), error);
   for (int i = 0; i < p->x->outputs && status == PW_OK; i++) {
     p->value[i] = pw_outcome_value (&s.outcomes, i, NULL);
-    for (int j = 0; j < u->runs.count && status == PW_OK; j++) {
-      double *slope = p->slope + i * u->runs.count + j;
-      *slope = u->runs.list[j].scale * pw_sensitivity_derivative (&s, i, j, s.end_slope);
+    for (int j = 0; j < u->count && status == PW_OK; j++) {
+      double *slope = p->slope + i * u->count + j;
+      *slope = u->list[j].scale * pw_sensitivity_derivative (&s, i, j, s.end_slope);
       if (!isfinite (p->value[i] + *slope)) status = pw_fail (error, PW_METHOD, "%s has no derivative", p->x->text[i]);
     }
   }
@@ -90,7 +89,7 @@ int pw_search_feasible (const pw_optimise *x, const double *value) {
 /* Appends the last run to those of the start. */
 static int search_store (search *p) {
   pw_search_start *s = p->s;
-  int n = p->x->unknowns.runs.count, width = n + p->x->outputs;
+  int n = p->x->unknowns.count, width = n + p->x->outputs;
   if (pw_grow (&s->trial, (size_t)s->runs, &s->room, (size_t)width * sizeof *s->trial) != PW_OK) return PW_RESOURCE;
   double *row = s->trial + s->runs++ * width;
   memcpy (row, p->at, (size_t)n * sizeof *row);
@@ -107,13 +106,12 @@ static void search_keep (search *p) {
   p->most = fmax (p->most, value);
   if (!pw_search_feasible (x, p->value) || (s->found && !(value < x->sign[0] * s->value[0]))) return;
   s->found = 1;
-  memcpy (s->best, p->at, (size_t)x->unknowns.runs.count * sizeof *s->best);
+  memcpy (s->best, p->at, (size_t)x->unknowns.count * sizeof *s->best);
   memcpy (s->value, p->value, (size_t)x->outputs * sizeof *s->value);
   pthread_mutex_lock (&x->lock);
   if (value < x->leading) {
-    char number[32];
     x->leading = value;
-    snprintf (x->progress.note, sizeof x->progress.note, "best %s", pw_format (number, p->value[0], 7));
+    snprintf (x->progress.note, sizeof x->progress.note, "best %.7g", p->value[0]);
   }
   pw_progress_at (&x->progress, x->done);
   pthread_mutex_unlock (&x->lock);
@@ -136,11 +134,11 @@ static int search_try (search *p, int slopes, pw_error *error) {
 /* Runs with these scaled unknowns (slopes 1: with derivatives), unless the last run did. */
 static void search_evaluate (search *p, const double *u, int slopes) {
   pw_optimise *x = p->x;
-  int n = x->unknowns.runs.count;
+  int n = x->unknowns.count;
   pw_error own = { 0 };
   if (p->known && (p->sloped || !slopes) && memcmp (p->u, u, (size_t)n * sizeof *u) == 0) return;
   memcpy (p->u, u, (size_t)n * sizeof *u);
-  for (int i = 0; i < n; i++) p->at[i] = search_unknown (x->unknowns.runs.list + i, u[i]);
+  for (int i = 0; i < n; i++) p->at[i] = search_unknown (x->unknowns.list + i, u[i]);
   int status = search_try (p, slopes, &own);
   if (status == PW_RETRY || pw_stop) {
     nlopt_force_stop (p->opt);
@@ -162,7 +160,7 @@ static void search_evaluate (search *p, const double *u, int slopes) {
 
 /* The derivatives of factor x output. */
 static void search_gradient (const search *p, int output, double factor, double *gradient) {
-  int n = p->x->unknowns.runs.count;
+  int n = p->x->unknowns.count;
   for (int j = 0; gradient && j < n; j++) gradient[j] = p->failed || p->refused ? 0 : factor * p->slope[output * n + j];
 }
 
@@ -176,42 +174,37 @@ static double search_objective (unsigned n, const double *u, double *gradient, v
   return isfinite (p->most) ? p->most + fmax (p->most - p->least, 0.1 * fabs (p->most)) : 0;
 }
 
-typedef struct {
-  search *p;
-  int output;
-} search_constraint;
-
-/* In units of the bound; 1 for a run that failed. */
-static double search_excess (unsigned n, const double *u, double *gradient, void *context) {
-  const search_constraint *c = context;
-  const pw_optimise *x = c->p->x;
-  double bound = x->bound[c->output], factor = x->sign[c->output] / (bound != 0 ? fabs (bound) : 1);
-  (void)n;
-  search_evaluate (c->p, u, gradient != NULL);
-  search_gradient (c->p, c->output, factor, gradient);
-  return c->p->failed ? 1 : factor * (c->p->value[c->output] - bound);
+/* The constraints, in units of their bounds; 1 for a run that failed. */
+static void search_excess (unsigned count, double *excess, unsigned n, const double *u, double *gradient,
+                           void *context) {
+  search *p = context;
+  const pw_optimise *x = p->x;
+  search_evaluate (p, u, gradient != NULL);
+  for (unsigned i = 0; i < count; i++) {
+    int output = 1 + (int)i;
+    double bound = x->bound[output], factor = x->sign[output] / (bound != 0 ? fabs (bound) : 1);
+    excess[i] = p->failed ? 1 : factor * (p->value[output] - bound);
+    search_gradient (p, output, factor, gradient ? gradient + i * n : NULL);
+  }
 }
 
 /* ---- Searches ---- */
 
 /* Bounds and tolerances. */
-static int search_open (search *p, search_constraint *c, double first, double last) {
+static int search_open (search *p, double first, double last) {
   const pw_unknowns *k = &p->x->unknowns;
-  int n = k->runs.count, status = 1;
+  int n = k->count, status = 1;
   nlopt_algorithm simple = n == 1 ? NLOPT_LN_SBPLX : NLOPT_LN_BOBYQA; /* BOBYQA needs two unknowns and no constraints */
   p->opt = nlopt_create (p->slope ? NLOPT_LD_SLSQP : p->x->outputs > 1 ? NLOPT_LN_COBYLA : simple, (unsigned)n);
   if (p->opt == NULL) return PW_RESOURCE;
   nlopt_set_min_objective (p->opt, search_objective, p);
   for (int i = 0; i < n; i++) {
-    if (isfinite (k->runs.list[i].low))
-      status &= nlopt_set_lower_bound (p->opt, i, search_scaled (k->runs.list + i, k->runs.list[i].low)) > 0;
-    if (isfinite (k->runs.list[i].high))
-      status &= nlopt_set_upper_bound (p->opt, i, search_scaled (k->runs.list + i, k->runs.list[i].high)) > 0;
+    if (isfinite (k->list[i].low))
+      status &= nlopt_set_lower_bound (p->opt, i, search_scaled (k->list + i, k->list[i].low)) > 0;
+    if (isfinite (k->list[i].high))
+      status &= nlopt_set_upper_bound (p->opt, i, search_scaled (k->list + i, k->list[i].high)) > 0;
   }
-  for (int i = 1; i < p->x->outputs; i++) {
-    c[i] = (search_constraint){ p, i };
-    status &= nlopt_add_inequality_constraint (p->opt, search_excess, c + i, SEARCH_ALLOWED / 10) > 0;
-  }
+  status &= nlopt_add_inequality_mconstraint (p->opt, (unsigned)p->x->outputs - 1, search_excess, p, p->allowed) > 0;
   status &= nlopt_set_xtol_abs1 (p->opt, last) > 0;
   status &= nlopt_set_initial_step1 (p->opt, first) > 0;
   nlopt_set_maxeval (p->opt, 200 + 100 * n);
@@ -219,7 +212,7 @@ static int search_open (search *p, search_constraint *c, double first, double la
 }
 
 static void search_point (const pw_unknowns *k, const double *x, double *u) {
-  for (int i = 0; i < k->runs.count; i++) u[i] = search_scaled (k->runs.list + i, x[i]);
+  for (int i = 0; i < k->count; i++) u[i] = search_scaled (k->list + i, x[i]);
 }
 
 /* Searches from u.  SLSQP may end early, where derivatives change much: it begins again at its result. */
@@ -237,24 +230,23 @@ static int search_repeat (search *p, double *u) {
 
 static int search_from (search *p, int slopes, double first, double last) {
   const pw_unknowns *k = &p->x->unknowns;
-  size_t n = (size_t)k->runs.count, outputs = (size_t)p->x->outputs;
-  double *memory = calloc (3 * n + outputs + n * outputs, sizeof *memory);
-  search_constraint *c = calloc (outputs, sizeof *c);
-  int status = memory && c ? PW_OK : PW_RESOURCE;
+  size_t n = (size_t)k->count, outputs = (size_t)p->x->outputs;
+  double *memory = calloc (3 * n + 2 * outputs + n * outputs, sizeof *memory);
+  int status = memory ? PW_OK : PW_RESOURCE;
   if (status == PW_OK) {
-    p->u = memory, p->at = memory + n, p->value = memory + 2 * n;
-    double *u = p->value + outputs;
+    p->u = memory, p->at = memory + n, p->value = memory + 2 * n, p->allowed = p->value + outputs;
+    double *u = p->allowed + outputs;
     p->slope = slopes ? u + n : NULL;
     p->known = p->refused = 0;
+    for (size_t i = 0; i < outputs; i++) p->allowed[i] = SEARCH_ALLOWED / 10;
     search_point (k, p->s->first, u);
-    status = search_open (p, c, first, last);
+    status = search_open (p, first, last);
     if (status == PW_OK) search_evaluate (p, u, slopes);
     if (status == PW_OK) status = search_repeat (p, u);
   }
   nlopt_destroy (p->opt);
   p->opt = NULL;
   free (memory);
-  free (c);
   return status;
 }
 
@@ -275,6 +267,6 @@ void pw_search_rough (void *context, int i) {
 
 void pw_search_fine (void *context, int i) {
   pw_optimise *x = context;
-  int slopes = x->smooth && x->unknowns.runs.count >= SEARCH_SLOPES;
+  int slopes = x->smooth && x->unknowns.count >= SEARCH_SLOPES;
   search_task (x, x->starts + i, slopes, SEARCH_ROUGH, PW_SEARCH_FINE);
 }

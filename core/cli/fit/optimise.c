@@ -4,11 +4,10 @@
  * displaced by the seed.  Each start is a task of its own, so that results do not depend on the number of threads.  The
  * best results continue with a tighter tolerance.  A run that fails gets a value that is worse than all before it. */
 #define _POSIX_C_SOURCE 200809L
-#include "optimise_parts.h"
+#include "optimise.h"
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
-#include <unistd.h>
 #include "figure.h"
 #include "parallel.h"
 
@@ -18,18 +17,19 @@ static const double OPTIMISE_FAR = 1e6; /* in units of its scale: an unknown wit
 /* ---- Starts ---- */
 
 static int optimise_open_starts (pw_optimise *x, pw_error *error) {
-  int n = x->unknowns.runs.count, all = x->starts + OPTIMISE_POLISHED, failed = 0;
-  double *point = pw_unknowns_starts (&x->unknowns, x->starts, x->seed);
-  x->start = calloc ((size_t)all, sizeof *x->start);
-  for (int i = 0; x->start && i < all; i++) {
+  const size_t n = (size_t)x->unknowns.count, width = 2 * n + (size_t)x->outputs, starts = (size_t)x->starts,
+               all = starts + OPTIMISE_POLISHED;
+  double *point = pw_unknowns_starts (&x->unknowns, x->starts, x->seed),
+         *memory = pw_arena_alloc (&x->arena, all * width * sizeof *memory);
+  x->start = pw_arena_alloc (&x->arena, all * sizeof *x->start);
+  int status = point && memory && x->start ? PW_OK : pw_fail (error, PW_RESOURCE, "out of memory");
+  for (size_t i = 0; status == PW_OK && i < all; i++) {
     pw_search_start *s = x->start + i;
-    s->first = calloc ((size_t)(2 * n + x->outputs), sizeof *s->first);
-    if (s->first) s->best = s->first + n, s->value = s->best + n;
-    failed |= s->first == NULL || point == NULL;
-    for (int j = 0; i < x->starts && j < n && !failed; j++) s->first[j] = point[i * n + j];
+    s->first = memory + i * width, s->best = s->first + n, s->value = s->best + n;
+    if (i < starts) memcpy (s->first, point + i * n, n * sizeof *point);
   }
   free (point);
-  return x->start && !failed ? PW_OK : pw_fail (error, PW_RESOURCE, "out of memory");
+  return status;
 }
 
 /* The best of the first `count` starts, which are not `used`; the first one of equal ones.  -1: there is none. */
@@ -48,11 +48,18 @@ static int optimise_continue (pw_optimise *x, pw_error *error) {
   if (used == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
   for (int best; x->polished < OPTIMISE_POLISHED && (best = optimise_best (x, x->starts, used)) >= 0;) {
     pw_search_start *s = x->start + x->starts + x->polished++;
-    memcpy (s->first, x->start[best].best, (size_t)x->unknowns.runs.count * sizeof *s->first);
+    memcpy (s->first, x->start[best].best, (size_t)x->unknowns.count * sizeof *s->first);
     for (int i = 0; i < x->starts; i++) used[i] |= (unsigned char)pw_optimise_same (x, x->start + i, x->start + best);
   }
   free (used);
   return pw_parallel (x->jobs, x->polished, pw_search_fine, x, error);
+}
+
+static void optimise_count (pw_optimise *x) {
+  for (const pw_search_start *s = x->start; s < x->start + x->starts + x->polished; s++) {
+    x->runs += s->runs, x->failed += s->failed, x->derivatives += s->derivatives;
+    if (x->why == NULL && s->failed) x->why = &s->error;
+  }
 }
 
 static int optimise_search (pw_optimise *x, pw_error *error) {
@@ -65,6 +72,7 @@ static int optimise_search (pw_optimise *x, pw_error *error) {
   pthread_mutex_destroy (&x->lock);
   pw_stop_release ();
   x->best = optimise_best (x, x->starts + x->polished, NULL);
+  optimise_count (x);
   return x->error.status != PW_OK ? pw_fail (error, x->error.status, "%s", x->error.text) : status;
 }
 
@@ -84,22 +92,21 @@ static int optimise_constraint (pw_optimise *x, char *text, const char *given, p
   return PW_OK;
 }
 
-/* Copies of the constraints' texts, which are split. */
 static int optimise_texts (pw_optimise *x, pw_error *error) {
-  size_t count = 1, size = 1, used = 0;
-  for (const char **c = x->subject; c && *c; c++) count++, size += strlen (*c) + 1;
-  x->texts = malloc (size);
-  x->text = calloc (count + 1, sizeof *x->text);
-  x->bound = calloc (2 * count, sizeof *x->bound);
-  if (x->texts == NULL || x->text == NULL || x->bound == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
+  size_t count = 1;
+  int status = PW_OK;
+  for (const char **c = x->subject; c && *c; c++) count++;
+  x->text = pw_arena_alloc (&x->arena, (count + 1) * sizeof *x->text);
+  x->unit = pw_arena_alloc (&x->arena, count * sizeof *x->unit);
+  x->bound = pw_arena_alloc (&x->arena, 2 * count * sizeof *x->bound);
+  if (x->text == NULL || x->unit == NULL || x->bound == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
   x->sign = x->bound + count;
   x->text[0] = x->objective;
   x->sign[0] = x->maximise ? -1 : 1;
   x->outputs = 1;
-  int status = PW_OK;
   for (const char **c = x->subject; c && *c && status == PW_OK; c++) {
-    status = optimise_constraint (x, strcpy (x->texts + used, *c), *c, error);
-    used += strlen (*c) + 1;
+    char *copy = pw_arena_copy (&x->arena, *c);
+    status = copy ? optimise_constraint (x, copy, *c, error) : pw_fail (error, PW_RESOURCE, "out of memory");
   }
   return status;
 }
@@ -108,6 +115,7 @@ static int optimise_texts (pw_optimise *x, pw_error *error) {
 static int optimise_outputs (pw_optimise *x, int from, int count, const char *option, pw_error *error) {
   pw_outcomes o;
   int status = pw_outcomes_open (&o, x->m.system, option, x->text + from, count, error);
+  for (int i = 0; i < o.outcomes; i++) pw_outcome_unit (&o, i, x->unit[from + i], sizeof *x->unit);
   for (int i = 0; i < o.functionals; i++) x->smooth &= !pw_is_extremum (o.functional[i].type);
   pw_outcomes_close (&o);
   return status;
@@ -130,7 +138,9 @@ static int optimise_read (pw_optimise *x, pw_error *error) {
   return status == PW_OK ? optimise_texts (x, error) : status;
 }
 
-static int optimise_open (pw_optimise *x, pw_output *file[2], int *folder, pw_error *error) {
+enum { OPTIMISE_RESULT = 1, OPTIMISE_SUMMARY }; /* in the list of files */
+
+static int optimise_open (pw_optimise *x, pw_error *error) {
   static const char *const figures[] = { "optimise.dat", "optimise.gp",  "optimise.svg",
                                          "optimise.png", "optimise.pdf", NULL };
   pw_use use[] = { PW_CLI_MODEL_USE,
@@ -141,15 +151,12 @@ static int optimise_open (pw_optimise *x, pw_output *file[2], int *folder, pw_er
   x->smooth = 1;
   if (status == PW_OK) status = optimise_outputs (x, 0, 1, x->maximise ? "--maximise" : "--minimise", error);
   if (status == PW_OK) status = optimise_outputs (x, 1, x->outputs - 1, "--subject-to", error);
-  if (status == PW_OK) status = pw_unknowns_open (&x->unknowns, &x->line, &x->m, x->free, 20. * x->starts, error);
-  if (status == PW_OK && x->unknowns.runs.count > PW_UNKNOWNS_STARTED)
+  if (status == PW_OK) status = pw_unknowns_open (&x->unknowns, &x->line, &x->m, error);
+  if (status == PW_OK) status = pw_unknowns_read (&x->unknowns, x->free, error);
+  if (status == PW_OK) pw_unknowns_engine (&x->unknowns, 20. * x->starts);
+  if (status == PW_OK && x->unknowns.count > PW_UNKNOWNS_STARTED)
     status = pw_fail (error, PW_INPUT, "--free: at most %d unknowns", PW_UNKNOWNS_STARTED);
-  if (status == PW_OK) status = pw_cli_uses (&x->line, x->m.file, use, sizeof use / sizeof *use, error);
-  if (status == PW_OK && x->path && (file[0] = pw_output_open (x->path, error)) == NULL) status = error->status;
-  if (status == PW_OK && x->json_path && (file[1] = pw_output_open (x->json_path, error)) == NULL)
-    status = error->status;
-  if (status == PW_OK && x->plots_path && (*folder = pw_figure_folder (x->plots_path, error)) < 0)
-    status = error->status;
+  if (status == PW_OK) status = pw_files_open (&x->files, &x->line, &x->m, use, sizeof use / sizeof *use, error);
   return status == PW_OK ? optimise_open_starts (x, error) : status;
 }
 
@@ -157,15 +164,8 @@ static int optimise_open (pw_optimise *x, pw_output *file[2], int *folder, pw_er
 
 /* No run satisfied the constraints: the first error, if there was one. */
 static int optimise_nothing (const pw_optimise *x, pw_error *error) {
-  long runs = 0, failed = 0;
-  const pw_error *why = NULL;
-  for (int i = 0; i < x->starts; i++) {
-    const pw_search_start *s = x->start + i;
-    runs += s->runs, failed += s->failed;
-    if (why == NULL && s->failed) why = &s->error;
-  }
-  if (failed == runs && why)
-    return pw_fail (error, why->status, "none of %ld runs succeeded, the first one: %s", runs, why->text);
+  if (x->failed == x->runs && x->why)
+    return pw_fail (error, x->why->status, "none of %ld runs succeeded, the first one: %s", x->runs, x->why->text);
   return pw_fail (error, PW_METHOD, "no run from %d starts satisfies --subject-to", x->starts);
 }
 
@@ -174,8 +174,8 @@ static int optimise_converged (const pw_optimise *x, pw_error *error) {
   const pw_search_start *s = x->start + x->best;
   const pw_unknown *far = NULL;
   double most = 0;
-  for (int i = 0; i < x->unknowns.runs.count; i++) {
-    const pw_unknown *k = x->unknowns.runs.list + i;
+  for (int i = 0; i < x->unknowns.count; i++) {
+    const pw_unknown *k = x->unknowns.list + i;
     if (!k->given && fabs (s->best[i]) >= most * k->scale) far = k, most = fabs (s->best[i]) / k->scale;
   }
   if (s->converged && most < OPTIMISE_FAR) return PW_OK;
@@ -186,7 +186,8 @@ static int optimise_converged (const pw_optimise *x, pw_error *error) {
                   s->runs, far->name);
 }
 
-static int optimise_finish (pw_optimise *x, pw_output *file[2], pw_error *error) {
+static int optimise_finish (pw_optimise *x, pw_error *error) {
+  FILE *result = pw_files_stream (&x->files, OPTIMISE_RESULT), *summary = pw_files_stream (&x->files, OPTIMISE_SUMMARY);
   int interrupted = pw_stop != 0;
   if (x->best < 0 && interrupted) fputs ("pinwheel: interrupted before the first run was done\n", stderr);
   if (x->best < 0) return interrupted ? PW_INTERRUPTED : optimise_nothing (x, error);
@@ -194,11 +195,9 @@ static int optimise_finish (pw_optimise *x, pw_output *file[2], pw_error *error)
   int converged = optimise_converged (x, &why) == PW_OK;
   pw_optimise_print (x);
   pw_unknowns_report (&x->unknowns, x->start[x->best].best);
-  if (file[0]) pw_optimise_yaml (x, pw_output_stream (file[0]));
-  if (file[1])
-    pw_optimise_json (x, interrupted ? "interrupted" : converged ? "ok" : "method", pw_output_stream (file[1]));
-  int status = pw_output_finish_all (file, 2, error);
-  file[0] = file[1] = NULL;
+  if (result) pw_optimise_yaml (x, result);
+  if (summary) pw_optimise_json (x, interrupted ? "interrupted" : converged ? "ok" : "method", summary);
+  int status = pw_files_finish (&x->files, error);
   if (status == PW_OK && x->plots_path) status = pw_optimise_draw (x, error);
   if (interrupted) pw_cli_say ("pinwheel: interrupted; this is the best result so far\n");
   if (status == PW_OK && interrupted) return PW_INTERRUPTED;
@@ -206,28 +205,19 @@ static int optimise_finish (pw_optimise *x, pw_output *file[2], pw_error *error)
 }
 
 static void optimise_close (pw_optimise *x) {
-  for (int i = 0; x->start && i < x->starts + OPTIMISE_POLISHED; i++) {
-    free (x->start[i].first);
-    free (x->start[i].trial);
-  }
-  free (x->start);
-  free (x->texts);
-  free (x->text);
-  free (x->bound);
+  for (int i = 0; x->start && i < x->starts + OPTIMISE_POLISHED; i++) free (x->start[i].trial);
+  pw_arena_free (&x->arena);
+  pw_files_close (&x->files);
   pw_unknowns_close (&x->unknowns);
   pw_cli_close_model (&x->m);
 }
 
 static int optimise_command (void *options, pw_error *error) {
   pw_optimise *x = options;
-  pw_output *file[2] = { NULL, NULL };
-  int folder = -1, status = optimise_read (x, error);
-  if (status == PW_OK) status = optimise_open (x, file, &folder, error);
+  int status = optimise_read (x, error);
+  if (status == PW_OK) status = optimise_open (x, error);
   if (status == PW_OK) status = optimise_search (x, error);
-  if (status == PW_OK) status = optimise_finish (x, file, error);
-  for (int i = 0; i < 2; i++)
-    if (file[i]) pw_output_discard (file[i]);
-  if (folder >= 0) close (folder);
+  if (status == PW_OK) status = optimise_finish (x, error);
   optimise_close (x);
   return status;
 }

@@ -1,52 +1,35 @@
 /* The reports of `pinwheel optimise`. */
-#include "optimise_parts.h"
+#include "optimise.h"
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 #include "figure.h"
 #include "print_table.h"
+#include "states.h"
 
 #define OPTIMISE_SAME 0.01 /* distance of results of the same optimum, relative to the scales of the unknowns */
 
 int pw_optimise_same (const pw_optimise *x, const pw_search_start *a, const pw_search_start *b) {
   int same = a->found && b->found;
-  for (int j = 0; same && j < x->unknowns.runs.count; j++)
-    same = fabs (a->best[j] - b->best[j]) <= OPTIMISE_SAME * x->unknowns.runs.list[j].scale;
+  for (int j = 0; same && j < x->unknowns.count; j++)
+    same = fabs (a->best[j] - b->best[j]) <= OPTIMISE_SAME * x->unknowns.list[j].scale;
   return same;
 }
 
 enum { REPORT_DIGITS = 9, REPORT_PANELS = 6, REPORT_OPTIONS = 4000 };
 
-static long report_derivatives (const pw_optimise *x) {
-  long derivatives = 0;
-  for (int i = 0; i < x->starts + x->polished; i++) derivatives += x->start[i].derivatives;
-  return derivatives;
-}
-
-static long report_runs (const pw_optimise *x, long *failed, const pw_error **first) {
-  long runs = 0;
-  *failed = 0;
-  for (int i = 0; i < x->starts + x->polished; i++) {
-    const pw_search_start *s = x->start + i;
-    runs += s->runs;
-    if (*failed == 0 && s->failed) *first = &s->error;
-    *failed += s->failed;
-  }
-  return runs;
-}
-
 /* The output of the first run, with the initial values; NaN if it failed. */
 static double report_initial (const pw_optimise *x) {
-  return x->start[0].runs > 0 ? x->start[0].trial[x->unknowns.runs.count] : NAN;
+  return x->start[0].runs > 0 ? x->start[0].trial[x->unknowns.count] : NAN;
 }
 
 /* 1 if the objective is the same in all runs that did not fail. */
 static int report_constant (const pw_optimise *x) {
   double least = INFINITY, most = -INFINITY;
-  int columns = x->unknowns.runs.count + x->outputs;
+  int columns = x->unknowns.count + x->outputs;
   for (int i = 0; i < x->starts + x->polished; i++)
     for (long k = 0; k < x->start[i].runs; k++) {
-      double value = x->start[i].trial[k * columns + x->unknowns.runs.count];
+      double value = x->start[i].trial[k * columns + x->unknowns.count];
       least = fmin (least, value), most = fmax (most, value);
     }
   return most - least <= 1e-14 * fabs (most);
@@ -54,7 +37,7 @@ static int report_constant (const pw_optimise *x) {
 
 /* 1 if outputs are the same in all runs that differ from the first one of their search in unknown i alone. */
 static int report_inert (const pw_optimise *x, int i) {
-  int n = x->unknowns.runs.count, columns = n + x->outputs, pairs = 0;
+  int n = x->unknowns.count, columns = n + x->outputs, pairs = 0;
   for (const pw_search_start *s = x->start; s < x->start + x->starts + x->polished; s++)
     for (long k = 1; k < s->runs; k++) {
       const double *a = s->trial, *b = a + k * columns;
@@ -69,19 +52,10 @@ static int report_inert (const pw_optimise *x, int i) {
 
 /* Whether the best value of unknown i, if that has an effect, is at its lower (-1) or upper bound. */
 static int report_side (const pw_optimise *x, int i) {
-  const pw_unknown *u = x->unknowns.runs.list + i;
+  const pw_unknown *u = x->unknowns.list + i;
   if (report_inert (x, i)) return 0;
   double near = 10 * PW_SEARCH_FINE * u->scale, value = x->start[x->best].best[i];
   return value - u->low <= near ? -1 : u->high - value <= near;
-}
-
-static const char *report_unit (const pw_optimise *x, int output, char *buffer, size_t size) {
-  pw_outcomes o;
-  *buffer = 0;
-  if (pw_outcomes_open (&o, x->m.system, "", x->text, x->outputs, NULL) == PW_OK)
-    pw_outcome_unit (&o, output, buffer, size);
-  pw_outcomes_close (&o);
-  return buffer;
 }
 
 static void report_unknowns (const pw_optimise *x) {
@@ -89,8 +63,8 @@ static void report_unknowns (const pw_optimise *x) {
     static const char *const head[] = { "free", "initially", "best", "from", "to", NULL };
     for (int i = 0; head[i]; i++) pw_cell (&t, i ? 12 : -12, head[i]);
     pw_row_end (&t);
-    for (int i = 0; i < x->unknowns.runs.count; i++) {
-      const pw_unknown *u = x->unknowns.runs.list + i;
+    for (int i = 0; i < x->unknowns.count; i++) {
+      const pw_unknown *u = x->unknowns.list + i;
       pw_cell_unit (&t, -12, u->name, u->unit);
       pw_cell_number (&t, 12, u->value, REPORT_DIGITS);
       pw_cell_number (&t, 12, x->start[x->best].best[i], REPORT_DIGITS);
@@ -107,7 +81,6 @@ static void report_unknowns (const pw_optimise *x) {
 
 static void report_outputs (const pw_optimise *x) {
   const pw_search_start *s = x->start + x->best;
-  char unit[80];
   putchar ('\n');
   for (pw_table t = { 0 }; pw_table_pass (&t);)
     for (int i = 0; i < x->outputs; i++) {
@@ -117,7 +90,7 @@ static void report_outputs (const pw_optimise *x) {
                 : x->sign[i] > 0 ? "at most %s"
                                  : "at least %s",
                 pw_format (number, x->bound[i], REPORT_DIGITS));
-      pw_cell_unit (&t, -12, x->text[i], report_unit (x, i, unit, sizeof unit));
+      pw_cell_unit (&t, -12, x->text[i], x->unit[i]);
       pw_cell_number (&t, 12, s->value[i], REPORT_DIGITS);
       pw_cell (&t, -1, text);
       if (i == 0) snprintf (text, sizeof text, "(initially %s)", pw_format (number, report_initial (x), REPORT_DIGITS));
@@ -128,18 +101,16 @@ static void report_outputs (const pw_optimise *x) {
 
 void pw_optimise_print (const pw_optimise *x) {
   char options[REPORT_OPTIONS];
-  const pw_error *first = NULL;
-  long failed, runs = report_runs (x, &failed, &first);
   int same = 0;
   for (int i = 0; i < x->starts; i++) same += pw_optimise_same (x, x->start + i, x->start + x->best);
   report_unknowns (x);
   report_outputs (x);
-  printf ("\n%ld runs from %d starts, %d of which end at this optimum\n", runs, x->starts, same);
-  if (report_derivatives (x))
+  printf ("\n%ld runs from %d starts, %d of which end at this optimum\n", x->runs, x->starts, same);
+  if (x->derivatives)
     printf ("with derivatives at %ld points of the searches that continue (SLSQP), without in the others\n",
-            report_derivatives (x));
-  if (failed)
-    pw_cli_print (stdout, "%ld runs failed and count as infeasible, the first of them: %s\n", failed, first->text);
+            x->derivatives);
+  if (x->why)
+    pw_cli_print (stdout, "%ld runs failed and count as infeasible, the first of them: %s\n", x->failed, x->why->text);
   if (report_constant (x))
     pw_cli_say ("pinwheel: %s is the same in all runs: no free value has an effect on it\n", x->text[0]);
   if (pw_unknowns_options (&x->unknowns, x->start[x->best].best, options, sizeof options)) printf ("\n%s\n", options);
@@ -148,7 +119,7 @@ void pw_optimise_print (const pw_optimise *x) {
 /* ---- JSON ---- */
 
 static void report_json_unknown (const pw_optimise *x, pw_json *j, int i) {
-  const pw_unknown *u = x->unknowns.runs.list + i;
+  const pw_unknown *u = x->unknowns.list + i;
   j->line = 1;
   pw_json_open (j, NULL, '{');
   pw_json_text (j, "name", u->name);
@@ -167,12 +138,8 @@ static void report_json_start (const pw_optimise *x, pw_json *j, const pw_search
   pw_json_number (j, "value", s->found ? s->value[0] : NAN);
   pw_json_number (j, "runs", (double)s->runs);
   pw_json_number (j, "failed", (double)s->failed);
-  pw_json_open (j, "from", '[');
-  for (int i = 0; i < x->unknowns.runs.count; i++) pw_json_number (j, NULL, s->first[i]);
-  pw_json_close (j, ']');
-  pw_json_open (j, "to", '[');
-  for (int i = 0; s->found && i < x->unknowns.runs.count; i++) pw_json_number (j, NULL, s->best[i]);
-  pw_json_close (j, ']');
+  pw_numbers_json (j, "from", s->first, x->unknowns.count);
+  pw_numbers_json (j, "to", s->best, s->found ? x->unknowns.count : 0);
   pw_json_close (j, '}');
 }
 
@@ -189,8 +156,6 @@ static void report_json_constraint (const pw_optimise *x, pw_json *j, int i) {
 void pw_optimise_json (const pw_optimise *x, const char *status, FILE *f) {
   pw_json json = { .f = f, .lines = 2 }, *j = &json;
   char options[REPORT_OPTIONS];
-  const pw_error *first = NULL;
-  long failed, runs = report_runs (x, &failed, &first);
   pw_json_open (j, NULL, '{');
   pw_json_number (j, "schema", 1);
   pw_json_text (j, "model", pw_file_name (x->m.file));
@@ -200,15 +165,15 @@ void pw_optimise_json (const pw_optimise *x, const char *status, FILE *f) {
   pw_json_number (j, "initial", report_initial (x));
   pw_json_text (j, "options",
                 pw_unknowns_options (&x->unknowns, x->start[x->best].best, options, sizeof options) ? options : NULL);
-  pw_json_text (j, "method", x->unknowns.runs.method);
+  pw_json_text (j, "method", x->unknowns.method);
   pw_json_number (j, "t_end", x->unknowns.t_end);
   pw_json_number (j, "seed", x->seed);
-  pw_json_number (j, "runs", (double)runs);
-  pw_json_number (j, "failed", (double)failed);
-  pw_json_number (j, "derivatives", (double)report_derivatives (x));
-  pw_json_text (j, "reason", first ? first->text : "");
+  pw_json_number (j, "runs", (double)x->runs);
+  pw_json_number (j, "failed", (double)x->failed);
+  pw_json_number (j, "derivatives", (double)x->derivatives);
+  pw_json_text (j, "reason", x->why ? x->why->text : "");
   pw_json_open (j, "unknowns", '[');
-  for (int i = 0; i < x->unknowns.runs.count; i++) report_json_unknown (x, j, i);
+  for (int i = 0; i < x->unknowns.count; i++) report_json_unknown (x, j, i);
   pw_json_close (j, ']');
   pw_json_open (j, "constraints", '[');
   for (int i = 1; i < x->outputs; i++) report_json_constraint (x, j, i);
@@ -251,20 +216,20 @@ static void report_run (const pw_optimise *x, const char *options, FILE *f) {
 }
 
 void pw_optimise_yaml (const pw_optimise *x, FILE *f) {
-  char number[32], options[REPORT_OPTIONS];
+  char options[REPORT_OPTIONS];
   const pw_search_start *s = x->start + x->best;
   if (pw_unknowns_options (&x->unknowns, s->best, options, sizeof options) &&
       strpbrk (x->line.argument[0], "\r\n") == NULL)
     report_run (x, options, f);
   report_quoted (f, "model", pw_file_name (x->m.file));
   report_quoted (f, x->maximise ? "maximise" : "minimise", x->objective);
-  fprintf (f, "value: %s\n", pw_format (number, s->value[0], 17));
+  fprintf (f, "value: %.17g\n", s->value[0]);
   for (int initial = 0; initial < 2; initial++)
-    for (int i = 0, first = 1; i < x->unknowns.runs.count; i++) {
-      if ((x->unknowns.runs.list[i].parameter == NULL) != initial) continue;
+    for (int i = 0, first = 1; i < x->unknowns.count; i++) {
+      if ((x->unknowns.list[i].parameter == NULL) != initial) continue;
       if (first) fputs (initial ? "start:\n" : "set:\n", f);
       first = 0;
-      fprintf (f, "  %s: %s\n", x->unknowns.runs.list[i].name, pw_format (number, s->best[i], 17));
+      fprintf (f, "  %s: %.17g\n", x->unknowns.list[i].name, s->best[i]);
     }
 }
 
@@ -273,11 +238,11 @@ void pw_optimise_yaml (const pw_optimise *x, FILE *f) {
 /* A row per run: number of the start, unknowns, output, whether it satisfies the constraints. */
 static int report_data (const void *context, FILE *f, pw_error *error) {
   const pw_optimise *x = context;
-  int n = x->unknowns.runs.count, width = n + x->outputs;
+  int n = x->unknowns.count, width = n + x->outputs;
   char number[32];
   (void)error;
   fputs ("# start", f);
-  for (int i = 0; i < n; i++) fprintf (f, ", %s [%s]", x->unknowns.runs.list[i].name, x->unknowns.runs.list[i].unit);
+  for (int i = 0; i < n; i++) fprintf (f, ", %s [%s]", x->unknowns.list[i].name, x->unknowns.list[i].unit);
   fprintf (f, ", %s, 1 if the constraints are satisfied\n", x->objective);
   for (int i = 0; i < x->starts + x->polished; i++)
     for (long k = 0; k < x->start[i].runs; k++) {
@@ -291,16 +256,15 @@ static int report_data (const void *context, FILE *f, pw_error *error) {
 
 static void report_variables (const void *context, FILE *f) {
   const pw_optimise *x = context;
-  int panels = x->unknowns.runs.count < REPORT_PANELS ? x->unknowns.runs.count : REPORT_PANELS;
-  char unit[80], number[32];
+  int panels = x->unknowns.count < REPORT_PANELS ? x->unknowns.count : REPORT_PANELS;
   fprintf (f, "constraints = %d\npanels = %d\nunknowns = %d\narray label[%d]\narray best[%d]\n", x->outputs - 1, panels,
-           x->unknowns.runs.count, panels, panels);
+           x->unknowns.count, panels, panels);
   for (int i = 0; i < panels; i++) {
-    pw_figure_label (f, "label", i + 1, x->unknowns.runs.list[i].name, x->unknowns.runs.list[i].unit);
-    fprintf (f, "best[%d] = %s\n", i + 1, pw_format (number, x->start[x->best].best[i], 12));
+    pw_figure_label (f, "label", i + 1, x->unknowns.list[i].name, x->unknowns.list[i].unit);
+    fprintf (f, "best[%d] = %.12g\n", i + 1, x->start[x->best].best[i]);
   }
-  pw_figure_label (f, "objective", 0, x->objective, report_unit (x, 0, unit, sizeof unit));
-  fprintf (f, "value = %s\n", pw_format (number, x->start[x->best].value[0], 12));
+  pw_figure_label (f, "objective", 0, x->objective, x->unit[0]);
+  fprintf (f, "value = %.12g\n", x->start[x->best].value[0]);
 }
 
 int pw_optimise_draw (const pw_optimise *x, pw_error *error) {

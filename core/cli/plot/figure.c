@@ -5,7 +5,6 @@
 #include <spawn.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/stat.h>
 #include <sys/wait.h>
 #include <unistd.h>
 #include "figure.h"
@@ -38,27 +37,6 @@ int pw_figures_of (pw_figures *f, const pw_cli_line *l, const pw_cli_model *m, c
 
 /* ---- The folder ---- */
 
-static int figure_make_folder (const char *folder, pw_error *error) {
-  char path[FIGURE_PATH];
-  size_t n = strlen (folder);
-  if (n == 0 || n >= sizeof path - 32)
-    return pw_fail (error, PW_INPUT, "\"%s\" cannot be the name of a folder", folder);
-  memcpy (path, folder, n + 1);
-  for (size_t i = 1; i <= n; i++) {
-    if (path[i] != '/' && path[i] != 0) continue;
-    char end = path[i];
-    path[i] = 0;
-    if (mkdir (path, 0777) != 0 && errno != EEXIST)
-      return pw_fail (error, PW_RESOURCE, "cannot make the folder %s: %s", path, strerror (errno));
-    path[i] = end;
-  }
-  return PW_OK;
-}
-
-int pw_figure_folder (const char *folder, pw_error *error) {
-  return figure_make_folder (folder, error) == PW_OK ? pw_lock_folder (folder, error) : -1;
-}
-
 pw_output *pw_figure_open (const char *folder, const char *name, pw_error *error) {
   char path[FIGURE_PATH + 40];
   snprintf (path, sizeof path, "%s/%s", folder, name);
@@ -71,8 +49,8 @@ pw_output *pw_figure_data (const pw_figures *f, const char *name, pw_error *erro
   return o;
 }
 
-int pw_figure_results (const pw_cli_line *l, const pw_cli_model *m, const char *folder, const char *name, int *lock,
-                       pw_error *error) {
+int pw_figure_results (const pw_cli_line *l, const pw_cli_model *m, const char *folder, const char *name,
+                       pw_files *files, pw_error *error) {
   static const char *const ending[] = { ".csv", ".json", ".dat", ".gp", ".svg", ".png", ".pdf" };
   enum { ENDINGS = sizeof ending / sizeof *ending };
   char text[ENDINGS][40];
@@ -80,9 +58,7 @@ int pw_figure_results (const pw_cli_line *l, const pw_cli_model *m, const char *
   for (int i = 0; i < ENDINGS; i++) snprintf (text[i], sizeof text[i], "%s%s", name, ending[i]), names[i] = text[i];
   pw_use use[] = { PW_CLI_MODEL_USE, { "-o", folder, PW_WRITES_INTO, names } };
   if (folder == NULL) return pw_cli_only ("--width", l->width, "-o DIR", 0, error);
-  if (pw_cli_uses (l, m->file, use, 2, error) != PW_OK) return error->status;
-  *lock = pw_figure_folder (folder, error);
-  return *lock < 0 ? error->status : PW_OK;
+  return pw_files_open (files, l, m, use, 2, error);
 }
 
 int pw_figure_tables (const char *folder, const char *name, int lines, const void *x,

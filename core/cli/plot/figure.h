@@ -30,18 +30,14 @@ int pw_figure_width (const char *text, double *width, pw_error *error);
 /* Figures of the model of a command line in a folder, of the width that it gives.  A status. */
 int pw_figures_of (pw_figures *f, const pw_cli_line *l, const pw_cli_model *m, const char *folder, pw_error *error);
 
-/* Makes a folder and those above it, and locks it until the descriptor that is returned is closed.  -1 and PW_INPUT or
- * PW_RESOURCE. */
-int pw_figure_folder (const char *folder, pw_error *error);
-
 /* Opens a file of a folder; a data file, with a comment if the run is incomplete.  NULL and PW_RESOURCE. */
 pw_output *pw_figure_open (const char *folder, const char *name, pw_error *error);
 pw_output *pw_figure_data (const pw_figures *f, const char *name, pw_error *error);
 
-/* Locks the folder of results of the option -o, in which NAME.csv, NAME.json and the figure NAME will be written; without
- * one, *lock remains unchanged.  A status. */
-int pw_figure_results (const pw_cli_line *l, const pw_cli_model *m, const char *folder, const char *name, int *lock,
-                       pw_error *error);
+/* Locks the folder of results of the option -o, in which NAME.csv, NAME.json and the figure NAME will be written;
+ * nothing without one.  A status. */
+int pw_figure_results (const pw_cli_line *l, const pw_cli_model *m, const char *folder, const char *name,
+                       pw_files *files, pw_error *error);
 /* Writes NAME.csv and NAME.json, with `lines` levels of separate lines, into the folder.  A status. */
 int pw_figure_tables (const char *folder, const char *name, int lines, const void *x,
                       int (*csv) (const void *x, FILE *f, pw_error *error), void (*json) (const void *x, pw_json *j),

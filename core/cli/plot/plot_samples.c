@@ -65,7 +65,7 @@ static void plot_choose (pw_plots *p) {
 /* Reports a folder that cannot be written before the run. */
 static int plot_try_folder (pw_plots *p, pw_error *error) {
   const pw_figures f = { .folder = p->folder };
-  p->lock = pw_figure_folder (p->folder, error);
+  p->lock = pw_cli_folder (p->folder, error);
   pw_output *probe = p->lock < 0 ? NULL : pw_figure_data (&f, "motion.dat", error);
   if (probe) pw_output_discard (probe);
   return probe ? PW_OK : error->status;

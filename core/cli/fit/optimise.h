@@ -5,7 +5,8 @@
 #include <pthread.h>
 #include "outcome.h"
 #include "progress.h"
-#include "unknowns.h"
+#include "sensitivity.h"
+#include "util.h"
 
 /* The search from one start.  Runs are its rows of `trial`. */
 typedef struct {
@@ -25,19 +26,23 @@ typedef struct {
   const char *maximise, *minimise, *path, *json_path, *plots_path, *starts_text, *seed_text, *jobs_text;
   const char **free, **subject;
   pw_cli_model m;
+  pw_files files;
   pw_unknowns unknowns;
   const char *objective;
-  char *texts;       /* copies of the constraints */
+  pw_arena arena;    /* of what follows, without trials */
   const char **text; /* outputs: the objective, then constraints */
+  char (*unit)[80];  /* outputs */
   double *bound;     /* outputs: of the constraint */
   double *sign;      /* outputs: sign x (value - bound) <= 0; of the objective: sign x value is minimised */
   int outputs, starts, jobs;
   int polished; /* results from which searches continue with a tight tolerance */
   int smooth;   /* 1: outputs have derivatives, except where a motion has none */
   double seed;
-  pw_search_start *start; /* starts, then polished */
-  int best;               /* index of the search with the best result; -1: none */
-  pthread_mutex_t lock;   /* of what follows */
+  pw_search_start *start;         /* starts, then polished */
+  int best;                       /* index of the search with the best result; -1: none */
+  long runs, failed, derivatives; /* of all searches */
+  const pw_error *why;            /* of the first failed run; NULL: there is none */
+  pthread_mutex_t lock;           /* of what follows */
   pw_progress progress;
   int done;
   double leading; /* sign x best objective so far */

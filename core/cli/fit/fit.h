@@ -4,30 +4,31 @@
 
 #include "outcome.h"
 #include "progress.h"
-#include "unknowns.h"
+#include "sensitivity.h"
 
 typedef struct {
   pw_cli_line line;
   const char *data_path, *columns_text, *path, *json_path, *plots_path, *confidence_text, *starts_text, *jobs_text;
   const char **free, **sigma_list;
   pw_cli_model m;
+  pw_files files;
   pw_unknowns unknowns;
   double confidence;
   int jobs, starts;
   /* data: `columns` arrays of `rows` each, one after the other */
-  char *names;       /* copies of the texts of --columns and --sigma */
-  const char **name; /* columns */
-  double *table;     /* as read: times, data, columns with standard deviations */
+  char *names;               /* copy of the text of --columns */
+  const char **name, **unit; /* columns */
+  double *table;             /* as read: times, data, columns with standard deviations */
   int columns, rows;
   const double *t, *value; /* rows [s]; columns x rows, NaN: none */
   double *sigma;           /* columns x rows: standard deviations */
   int weighted;            /* 1: they are given; else 1 */
   int residuals;           /* data */
   /* results */
-  double *minimum;    /* starts x (1 + unknowns): sum of squares, INFINITY if a search failed, and values */
-  double *x, *model;  /* unknowns; columns x rows */
-  double *deviation;  /* unknowns: standard errors; INFINITY: not identifiable, NaN: no degrees of freedom */
-  double *covariance; /* unknowns x unknowns */
+  double *minimum;          /* starts x (1 + unknowns): sum of squares, INFINITY if a search failed, and values */
+  double *estimate, *model; /* unknowns; columns x rows */
+  double *deviation;        /* unknowns: standard errors; INFINITY: not identifiable, NaN: no degrees of freedom */
+  double *covariance;       /* unknowns x unknowns */
   double *singular,
       *vectors;   /* unknowns: singular values of the scaled Jacobian, the largest one first; in columns: vectors */
   double *length; /* unknowns: lengths of the columns of the Jacobian; 0: no effect */
@@ -40,6 +41,9 @@ typedef struct {
   long runs;
   pw_progress progress;
 } pw_fit;
+
+/* In units of the scale: an unknown that is nearer to a bound is at it; no search begins so near. */
+#define PW_FIT_INSIDE 1e-3
 
 /* Smallest component of an undetermined combination of unknowns that counts. */
 #define PW_FIT_PART 0.1

@@ -1,0 +1,265 @@
+/* Parameters and initial values that analyses vary. */
+#include <gsl/gsl_qrng.h>
+#include <gsl/gsl_rng.h>
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+#include "unknowns.h"
+#include "util.h"
+
+int pw_unknown_find (pw_unknown *u, const pw_cli_model *m, const char *name, pw_error *error) {
+  *u = (pw_unknown){ .parameter = pw_cli_parameter (m->model, name), .state = -1 };
+  snprintf (u->name, sizeof u->name, "%s", name);
+  if (u->parameter) {
+    u->value = pw_model_parameter (m->model, u->parameter);
+    snprintf (u->unit, sizeof u->unit, "%s", u->parameter->unit);
+    return PW_OK;
+  }
+  if (strchr (name, '.') == NULL) { /* fails with the nearest name */
+    pw_model *other = pw_file_model (m->file, error);
+    if (other) pw_model_set (other, name, 0, error);
+    pw_model_free (other);
+    return error->status;
+  }
+  u->state = pw_system_find_state (m->system, name, error);
+  if (u->state < 0) return error->status;
+  int n = pw_system_coordinates (m->system);
+  u->value = u->state < n ? pw_system_initial_q (m->system)[u->state] : pw_system_initial_v (m->system)[u->state - n];
+  snprintf (u->unit, sizeof u->unit, "%s", pw_system_state_unit (m->system, u->state));
+  return PW_OK;
+}
+
+/* ---- Options ---- */
+
+int pw_unknowns_open (pw_unknowns *u, const pw_cli_line *line, const pw_cli_model *m, pw_error *error) {
+  pw_run_defaults d = pw_cli_defaults (pw_file_table (m->file));
+  const pw_method *method;
+  int stabilisation;
+  pw_limit limit;
+  *u = (pw_unknowns){ .line = line, .m = m, .method = line->method ? line->method : d.method };
+  int status = pw_method_parse (u->method, &method, &stabilisation, error);
+  if (status == PW_OK) status = pw_cli_settings (line, &d, &u->t_end, &u->settings, &limit, error);
+  if (status == PW_OK) status = pw_cli_specialise (line->specialise, &u->when, error);
+  if (status != PW_OK) return status;
+  u->settings.stop = NULL;
+  u->limit = limit.most;
+  pw_cli_unused (u->method, line);
+  return PW_OK;
+}
+
+void pw_unknowns_engine (pw_unknowns *u, double runs) {
+  pw_run_defaults d = pw_cli_defaults (pw_file_table (u->m->file));
+  pw_cli_engine_open (&u->engine, u->m->system, u->when,
+                      runs * pw_method_steps (u->method, &u->settings, d.step, u->t_end));
+}
+
+void pw_unknowns_close (pw_unknowns *u) {
+  free (u->list);
+  pw_cli_engine_close (&u->engine);
+}
+
+/* ---- Unknowns of --free ---- */
+
+/* "LOW:HIGH" */
+static int free_bounds (pw_unknown *u, const char *text, pw_error *error) {
+  double end[2];
+  if (pw_cli_range (text, &end[0], &end[1]) != PW_OK || !(end[0] < end[1]))
+    return pw_fail (error, PW_INPUT, "--free %s=...: expected bounds LOW:HIGH, two numbers, the first one smaller",
+                    u->name);
+  for (int i = 0; i < 2 && u->parameter; i++) {
+    const char *expected = pw_domain_check (u->parameter->domain, end[i]);
+    if (*expected)
+      return pw_fail (error, PW_INPUT, "--free %s: the %s bound is %g, expected %s", u->name, i ? "upper" : "lower",
+                      end[i], expected);
+  }
+  u->low = end[0], u->high = end[1], u->given = 1;
+  if (u->low <= u->value && u->value <= u->high) return PW_OK;
+  return pw_fail (error, PW_INPUT, "--free %s: its initial value %.9g is not between %.9g and %.9g; set it by %s",
+                  u->name, u->value, u->low, u->high, u->parameter ? "--set" : "--start");
+}
+
+/* "NAME" or "NAME=LOW:HIGH" */
+static int free_add (pw_unknowns *u, const char *text, pw_error *error) {
+  const size_t size = strcspn (text, "=");
+  pw_unknown *x = u->list + u->count;
+  char name[sizeof x->name];
+  snprintf (name, sizeof name, "%.*s", (int)size, text);
+  for (int i = 0; i < u->count; i++)
+    if (strcmp (u->list[i].name, name) == 0) return pw_fail (error, PW_INPUT, "--free %s is given twice", name);
+  u->count++;
+  int status = pw_unknown_find (x, u->m, name, error);
+  pw_domain domain = x->parameter ? x->parameter->domain : PW_REAL;
+  x->low = domain == PW_REAL ? -INFINITY : 0;
+  x->high = domain == PW_FRACTION ? 1 : INFINITY;
+  if (domain == PW_COUNT)
+    status = pw_fail (error, PW_INPUT, "--free %s: it is a count, and only continuous parameters can be free", name);
+  if (status == PW_OK && text[size]) status = free_bounds (x, text + size + 1, error);
+  x->scale = x->given ? x->high - x->low : x->value != 0 ? fabs (x->value) : 1;
+  return status;
+}
+
+int pw_unknowns_read (pw_unknowns *u, const char **list, pw_error *error) {
+  size_t count = 0;
+  int status = PW_OK;
+  if (list == NULL) return pw_fail (error, PW_INPUT, "nothing is free: add --free NAME or --free NAME=LOW:HIGH");
+  while (list[count]) count++;
+  u->list = calloc (count, sizeof *u->list);
+  if (u->list == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
+  for (size_t i = 0; i < count && status == PW_OK; i++) status = free_add (u, list[i], error);
+  return status;
+}
+
+/* ---- Runs ---- */
+
+/* Sets the parameters, or the initial values. */
+static int unknown_set (pw_model *m, const pw_unknowns *u, const double *x, int initial, pw_error *error) {
+  int status = PW_OK;
+  for (int i = 0; i < u->count && status == PW_OK; i++)
+    if ((u->list[i].parameter == NULL) == initial)
+      status = (initial ? pw_model_set_initial : pw_model_set) (m, u->list[i].name, x[i], error);
+  return status;
+}
+
+int pw_unknowns_system (pw_cli_model *m, const pw_unknowns *u, const double *x, pw_error *error) {
+  *m = (pw_cli_model){ .model = pw_file_model (u->m->file, error) };
+  int status = m->model ? pw_cli_apply (m->model, "--set", u->line->sets, pw_model_set, error) : error->status;
+  if (status == PW_OK) status = unknown_set (m->model, u, x, 0, error);
+  if (status == PW_OK) status = pw_cli_apply (m->model, "--start", u->line->starts, pw_model_set_initial, error);
+  if (status == PW_OK) status = unknown_set (m->model, u, x, 1, error);
+  if (status == PW_OK) status = pw_model_build (m->model, error);
+  if (status == PW_OK) m->system = pw_system_compile (m->model, error);
+  return m->system ? PW_OK : error->status;
+}
+
+int pw_unknown_open (pw_unknown_run *to, const pw_unknowns *u, const double *x, pw_error *error) {
+  *to = (pw_unknown_run){ .settings = u->settings };
+  if (pw_unknowns_system (&to->m, u, x, error) != PW_OK) return error->status;
+  to->run = pw_run_open (to->m.system, u->method, &to->settings, error);
+  return to->run ? PW_OK : error->status;
+}
+
+int pw_unknown_prepare (pw_unknown_run *to, const pw_unknowns *u, const double *x, pw_error *error) {
+  const pw_specialised *code = pw_cli_engine_code (&u->engine);
+  *to = (pw_unknown_run){ .settings = u->settings, .limit = { .most = u->limit } };
+  if (pw_unknowns_system (&to->m, u, x, error) != PW_OK) return error->status;
+  to->settings.stop = pw_limit_over;
+  to->settings.stop_context = &to->limit;
+  to->settings.specialised = code && pw_specialised_fits (code, to->m.system) ? code : NULL;
+  pw_limit_start (&to->limit);
+  return PW_OK;
+}
+
+void pw_unknown_close (pw_unknown_run *x) {
+  pw_run_close (x->run);
+  pw_workspace_free (x->workspace);
+  pw_cli_close_model (&x->m);
+  *x = (pw_unknown_run){ .run = NULL };
+}
+
+void pw_unknowns_report (const pw_unknowns *u, const double *x) {
+  char text[PW_CHANGE_TEXT];
+  pw_unknown_run r;
+  if (pw_unknown_prepare (&r, u, x, &(pw_error){ 0 }) == PW_OK)
+    r.run = pw_run_open (r.m.system, u->method, &r.settings, NULL);
+  if (r.run && pw_cli_change (r.run, r.m.system, text) > 0)
+    pw_cli_say ("pinwheel: the constraints changed given initial values of this result, at worst %s\n", text);
+  pw_unknown_close (&r);
+}
+
+/* ---- Directions ---- */
+
+/* 1e-5 of the number's size: the error of extrapolated differences is then about 1e-10, mostly round-off.  Angles count
+ * as at least 0.1 rad, an initial value as at least that of the scene. */
+static double unknown_step (const pw_unknown *u, double value, const pw_run *r) {
+  double size = fabs (value), length = pw_run_scale (r)->length, time = pw_run_scale (r)->time;
+  if (strcmp (u->unit, "rad") == 0) size = fmax (size, 0.1);
+  if (u->state >= 0) size = fmax (size, (*u->unit == 'm' ? length : 1) / (strchr (u->unit, 's') ? time : 1));
+  if (size == 0 && u->parameter) size = fabs (u->parameter->value);
+  return 1e-5 * (size > 0 ? size : 1);
+}
+
+/* At the end of its domain a parameter varies to one side. */
+static void unknown_domain (const pw_unknown *u, double value, pw_direction *d) {
+  pw_domain domain = u->parameter ? u->parameter->domain : PW_REAL;
+  d->one_sided = (domain == PW_NONNEGATIVE || domain == PW_FRACTION) && value - 2 * d->step < 0;
+  if (domain != PW_FRACTION || value + 2 * d->step <= 1) return;
+  d->one_sided = 1;
+  d->step = -d->step;
+}
+
+static int unknown_same (const pw_system *a, const pw_system *b) {
+  return pw_system_elements (a) == pw_system_elements (b) && pw_system_coordinates (a) == pw_system_coordinates (b) &&
+         pw_system_rows (a) == pw_system_rows (b);
+}
+
+static int unknown_direction (pw_direction *d, const pw_unknowns *u, int i, double *x, pw_unknown_run *run,
+                              pw_unknown_run *near, pw_error *error) {
+  double value = x[i];
+  int status = PW_OK;
+  *d = (pw_direction){ .step = unknown_step (&u->list[i], value, run->run) };
+  unknown_domain (&u->list[i], value, d);
+  for (int k = 0; k < 4 && status == PW_OK; k++) {
+    x[i] = value + pw_direction_offset (d, k);
+    status = pw_unknown_open (near + k, u, x, error);
+    if (status == PW_OK && !unknown_same (run->m.system, near[k].m.system))
+      status = pw_fail (error, PW_INPUT,
+                        "%s changes the number of bodies or elements: derivatives with respect to it do not exist",
+                        u->list[i].name);
+    d->neighbour[k] = near[k].run;
+  }
+  x[i] = value;
+  return status;
+}
+
+int pw_unknown_directions (pw_direction *d, const pw_unknowns *u, double *x, pw_unknown_run *run, pw_unknown_run *near,
+                           pw_error *error) {
+  pw_unknowns plain = *u;
+  int status = PW_OK;
+  plain.settings.specialised = NULL;
+  for (int i = 0; i < u->count && status == PW_OK; i++)
+    status = unknown_direction (d + i, &plain, i, x, run, near + 4 * i, error);
+  return status;
+}
+
+/* ---- Starts and results of searches ---- */
+
+/* The value at this part, from 0 to 1, of the range of starts. */
+static double unknowns_between (const pw_unknown *k, double part) {
+  double x = k->given ? k->low + part * k->scale : k->value + (2 * part - 1) * k->scale;
+  return fmin (fmax (x, k->low), k->high);
+}
+
+/* A row per start after the first one. */
+static int unknowns_sobol (const pw_unknowns *u, int count, double seed, double *out) {
+  double point[PW_UNKNOWNS_STARTED], shift[PW_UNKNOWNS_STARTED];
+  gsl_rng *random = gsl_rng_alloc (gsl_rng_mt19937);
+  gsl_qrng *sobol = gsl_qrng_alloc (gsl_qrng_sobol, (unsigned)u->count);
+  if (random) gsl_rng_set (random, (unsigned long)seed);
+  for (int j = 0; random && j < u->count; j++) shift[j] = gsl_rng_uniform (random);
+  for (int i = 1; random && sobol && i < count; i++) {
+    gsl_qrng_get (sobol, point);
+    for (int j = 0; j < u->count; j++) *out++ = unknowns_between (u->list + j, fmod (point[j] + shift[j], 1));
+  }
+  int status = random && sobol ? PW_OK : PW_RESOURCE;
+  if (random) gsl_rng_free (random);
+  if (sobol) gsl_qrng_free (sobol);
+  return status;
+}
+
+double *pw_unknowns_starts (const pw_unknowns *u, int count, double seed) {
+  double *out = malloc ((size_t)count * (size_t)u->count * sizeof *out);
+  if (out == NULL) return NULL;
+  for (int j = 0; j < u->count; j++) out[j] = u->list[j].value;
+  if (count == 1 || unknowns_sobol (u, count, seed, out + u->count) == PW_OK) return out;
+  free (out);
+  return NULL;
+}
+
+int pw_unknowns_options (const pw_unknowns *u, const double *x, char *text, size_t size) {
+  size_t used = 0;
+  *text = 0;
+  for (int i = 0; i < u->count && used < size; i++)
+    used += (size_t)snprintf (text + used, size - used, "%s--%s %s=%.12g", i ? " " : "",
+                              u->list[i].parameter ? "set" : "start", u->list[i].name, x[i]);
+  return used < size;
+}

@@ -1,0 +1,82 @@
+/* Numbers that analyses vary, parameters and initial values, and runs with values of them. */
+#ifndef PW_UNKNOWNS_H
+#define PW_UNKNOWNS_H
+
+#include "cli.h"
+#include "pinwheel-analysis.h"
+
+typedef struct {
+  char name[300];                /* "length", "body.vx" */
+  const pw_parameter *parameter; /* NULL: the initial value of a state */
+  int state;                     /* its number; -1 for a parameter */
+  double value;                  /* at the beginning */
+  char unit[16];
+  /* for searches: */
+  double low, high; /* bounds; infinite without one */
+  double scale;     /* size of typical changes: the distance of the bounds, else |value|, else 1 */
+  int given;        /* 1: the bounds are the user's */
+} pw_unknown;
+
+/* Finds the number of this name in an open model, and its value there.  Errors: PW_INPUT for an unknown name, with the
+ * nearest one. */
+int pw_unknown_find (pw_unknown *u, const pw_cli_model *m, const char *name, pw_error *error);
+
+/* Unknowns of a command line's model, and the options of runs with values x of them. */
+typedef struct {
+  const pw_cli_line *line;
+  const pw_cli_model *m;
+  pw_unknown *list;
+  int count;
+  const char *method;
+  pw_settings settings; /* except stop, initial, specialised */
+  double t_end;
+  double limit;       /* of each run's processor time [s] */
+  pw_specialise when; /* of --specialise */
+  pw_cli_engine engine;
+} pw_unknowns;
+
+/* Reads the options, without unknowns.  The line and the open model must outlive it.  Close it in every case. */
+int pw_unknowns_open (pw_unknowns *u, const pw_cli_line *line, const pw_cli_model *m, pw_error *error);
+void pw_unknowns_close (pw_unknowns *u);
+/* Reads unknowns from a list of "NAME" or "NAME=LOW:HIGH" of --free, ended by NULL.  PW_INPUT for an unknown name, a
+ * count, bounds without the initial value between them or outside the domain. */
+int pw_unknowns_read (pw_unknowns *u, const char **list, pw_error *error);
+/* Chooses the engine for about `runs` runs. */
+void pw_unknowns_engine (pw_unknowns *u, double runs);
+
+/* The model with values of the unknowns, compiled.  PW_INPUT if it refuses them; PW_RESOURCE.  Close it by
+ * pw_cli_close_model in every case.  May be called by several threads at once. */
+int pw_unknowns_system (pw_cli_model *m, const pw_unknowns *u, const double *x, pw_error *error);
+
+/* A run of it. */
+typedef struct {
+  pw_cli_model m;
+  pw_settings settings;
+  pw_limit limit; /* of pw_unknown_prepare */
+  pw_run *run;
+  pw_workspace *workspace; /* for contact points; NULL: not needed yet */
+} pw_unknown_run;
+/* Opens a run with u->settings.  Close it in every case. */
+int pw_unknown_open (pw_unknown_run *to, const pw_unknowns *u, const double *x, pw_error *error);
+/* The same with the engine and a limit of its own, whose clock starts; the run itself is opened by the caller. */
+int pw_unknown_prepare (pw_unknown_run *to, const pw_unknowns *u, const double *x, pw_error *error);
+void pw_unknown_close (pw_unknown_run *x);
+
+/* Directions of the run along all unknowns, with their neighbours; x is used for these and restored.  near: room for 4
+ * runs of each unknown, without specialised code.  Close all of them also after an error. */
+int pw_unknown_directions (pw_direction *d, const pw_unknowns *u, double *x, pw_unknown_run *run, pw_unknown_run *near,
+                           pw_error *error);
+
+/* Points where searches begin, `count` x unknowns: the values at the beginning, then Sobol's sequence between the
+ * user's bounds, otherwise within a scale of the values, displaced by the seed.  Several starts: at most
+ * PW_UNKNOWNS_STARTED unknowns, the limit of the sequence.  NULL if out of memory; free it. */
+enum { PW_UNKNOWNS_STARTED = 40 };
+double *pw_unknowns_starts (const pw_unknowns *u, int count, double seed);
+
+/* A notice if the constraints change given initial values at these values of the unknowns. */
+void pw_unknowns_report (const pw_unknowns *u, const double *x);
+
+/* Options that set the values, "--set a=1 --start frame.vx=2".  0 if the text is too short. */
+int pw_unknowns_options (const pw_unknowns *u, const double *x, char *text, size_t size);
+
+#endif
