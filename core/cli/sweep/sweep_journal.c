@@ -163,13 +163,12 @@ int pw_journal_open (pw_journal *j, const pw_plan *p, const char *path, pw_error
   return j->file >= 0 ? journal_begin (j, p, error) : error->status;
 }
 
-int pw_journal_add (pw_journal *j, const pw_plan *p, long row, int status, const char *cells, pw_text *text,
-                    pw_error *error) {
+int pw_journal_add (pw_journal *j, const pw_plan *p, long row, int status, const char *cells, pw_error *error) {
   off_t at = j->size;
-  pw_text_clear (text);
-  journal_line_add (text, row, status, cells);
-  if (text->failed) return pw_fail (error, PW_RESOURCE, "out of memory");
-  if (journal_write (j, text->at, text->used, error) != PW_OK) return error->status;
+  pw_text_clear (&j->text);
+  journal_line_add (&j->text, row, status, cells);
+  if (j->text.failed) return pw_fail (error, PW_RESOURCE, "out of memory");
+  if (journal_write (j, j->text.at, j->text.used, error) != PW_OK) return error->status;
   j->line[row / p->parts] = at;
   j->done++;
   return PW_OK;
@@ -178,6 +177,7 @@ int pw_journal_add (pw_journal *j, const pw_plan *p, long row, int status, const
 void pw_journal_close (pw_journal *j) {
   if (j->created && j->done == 0 && j->file >= 0) unlink (j->part);
   if (j->file >= 0) close (j->file);
+  pw_text_free (&j->text);
   free (j->line);
   free (j->part);
   free (j->path);
@@ -212,7 +212,6 @@ static size_t table_row (FILE *stream, const char *at, const char *end, long row
 
 /* Completes the file if all went well so far, else removes it. */
 static int table_close (pw_output *o, pw_error *error) {
-  if (error->status == PW_OK) pw_output_ready (o, error);
   if (error->status == PW_OK) return pw_output_finish (o, error);
   pw_output_discard (o);
   return error->status;
