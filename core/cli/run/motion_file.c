@@ -208,7 +208,7 @@ static int file_read (file_reader *in, pw_motion *m, const pw_system *s, double 
   rewind (in->f);
   in->number = 0;
   file_line (in);
-  status = pw_motion_open (m, s, rows < MOTION_SAMPLES ? rows : MOTION_SAMPLES, error);
+  status = pw_motion_open (m, s, rows < MOTION_SAMPLES ? rows : MOTION_SAMPLES, *t_end, error);
   return status == PW_OK ? file_rows (in, rows, *t_end, m, error) : status;
 }
 

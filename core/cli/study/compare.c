@@ -232,12 +232,9 @@ static double compare_predict (const pw_row *r, int before) {
 static int compare_sample (pw_compare *x, pw_row *r, pw_error *error) {
   pw_study *s = &x->study;
   pw_motion motion;
-  const pw_motion *of = &x->reference.motion;
-  int known = x->reference.known;
-  int status = pw_motion_open (&motion, s->m.system, known ? of->samples : MOTION_SAMPLES, error);
+  int status = x->reference.known ? pw_motion_open_at (&motion, s->m.system, &x->reference.motion, error)
+                                  : pw_motion_open (&motion, s->m.system, MOTION_SAMPLES, s->t_end, error);
   if (status != PW_OK) return status;
-  pw_motion_times (&motion, s->t_end);
-  if (known) memcpy (motion.t, of->t, (size_t)of->samples * sizeof *of->t);
   status = pw_motion_run (s, r, &motion, error);
   if (status == PW_OK) compare_errors (x, &motion, r);
   pw_motion_close (&motion);

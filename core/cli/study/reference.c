@@ -15,29 +15,26 @@
 typedef struct {
   pw_study_visitor base;
   pw_motion *motion;
-  int next; /* sample */
 } sampler;
 
 /* Stores the samples up to the time reached. */
 static int sampler_visit (pw_study_visitor *v, pw_run *run, pw_error *error) {
-  sampler *x = (sampler *)v;
-  const pw_motion *m = x->motion;
+  pw_motion *m = ((sampler *)v)->motion;
   pw_sample sample;
-  for (; x->next < m->samples && m->t[x->next] <= pw_run_time (run); x->next++) {
-    int status = pw_run_sample (run, m->t[x->next], &sample, error);
+  while ((v->due = pw_motion_next (m)) <= pw_run_time (run)) {
+    int status = pw_run_sample (run, v->due, &sample, error);
     if (status != PW_OK) return status;
-    pw_motion_take (x->motion, v->study->m.system, x->next, &sample);
+    pw_motion_take (m, v->study->m.system, &sample);
     v->row->balance = fmax (v->row->balance, fabs (sample.balance));
   }
-  v->due = x->next < m->samples ? m->t[x->next] : INFINITY;
   return PW_OK;
 }
 
 int pw_motion_run (pw_study *x, pw_row *r, pw_motion *motion, pw_error *error) {
-  sampler v = { { .visit = sampler_visit, .study = x, .row = r }, motion, 0 };
+  sampler v = { { .visit = sampler_visit, .study = x, .row = r }, motion };
   pw_settings settings = { .span = x->t_end, .ledger = motion != NULL };
   *(r->adaptive ? &settings.rtol : &settings.step) = r->level;
-  if (motion) r->balance = 0;
+  if (motion) r->balance = motion->next = 0;
   return pw_study_run (x, r, &settings, motion ? &v.base : NULL, error);
 }
 
@@ -74,9 +71,8 @@ static int reference_run (pw_study *x, void *context, int i, pw_error *error) {
   candidate *c = (candidate *)context + i;
   double loosest = c->row.adaptive ? REFERENCE_LOOSEST : x->t_end / REFERENCE_FEWEST;
   pw_error own = { 0 };
-  int status = pw_motion_open (&c->motion, x->m.system, MOTION_SAMPLES, error);
+  int status = pw_motion_open (&c->motion, x->m.system, MOTION_SAMPLES, x->t_end, error);
   if (status != PW_OK) return status;
-  pw_motion_times (&c->motion, x->t_end);
   status = PW_RETRY;
   while (status != PW_OK && c->row.level <= loosest) {
     own = (pw_error){ 0 };
