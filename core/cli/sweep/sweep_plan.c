@@ -178,14 +178,8 @@ static void plan_grid (pw_plan *p) {
 
 static int plan_fingerprint (pw_plan *p, const pw_model *m, pw_error *error) {
   char part[60];
-  pw_text_add (&p->fingerprint, PW_SWEEP_MAGIC);
-  pw_fingerprint_line (&p->fingerprint, "version", NULL, PW_VERSION);
-  if (pw_fingerprint_model (&p->fingerprint, p->file, p->tables, error) != PW_OK) return error->status;
-  pw_fingerprint_line (&p->fingerprint, "method", NULL, p->method);
-  pw_fingerprint_number (&p->fingerprint, "t-end", NULL, p->t_end);
-  pw_fingerprint_number (&p->fingerprint, "step", NULL, p->settings.step);
-  pw_fingerprint_number (&p->fingerprint, "rtol", NULL, p->settings.rtol);
-  pw_fingerprint_number (&p->fingerprint, "atol", NULL, p->settings.atol);
+  if (pw_fingerprint_run (&p->fingerprint, PW_SWEEP_MAGIC, p->file, p->tables, p->method, &p->settings, error) != PW_OK)
+    return error->status;
   if (p->settings.max_steps != PW_MAX_STEPS)
     pw_fingerprint_number (&p->fingerprint, "max-steps", NULL, (double)p->settings.max_steps);
   if (isfinite (p->limit.most)) pw_fingerprint_number (&p->fingerprint, "limit", NULL, p->limit.most);
