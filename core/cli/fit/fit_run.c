@@ -84,22 +84,20 @@ typedef struct {
 } jacobian_differences;
 
 /* The step balances the truncation error, proportional to its square, and the noise, divided by the step. */
-static void jacobian_side (void *context, int task) {
+static int jacobian_side (void *context, int task, pw_error *error) {
   jacobian_differences *d = context;
   const pw_fit *x = d->x;
   const pw_unknown *u = x->unknowns.runs.list + task / 2;
   int n = x->unknowns.runs.count;
   double *at = malloc ((size_t)n * sizeof *at), size = fmax (fabs (d->at[task / 2]), 1e-2 * u->scale);
-  if (at == NULL) {
-    pw_fail (d->error + task, PW_RESOURCE, "out of memory");
-    return;
-  }
+  if (at == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
   memcpy (at, d->at, (size_t)n * sizeof *at);
   at[task / 2] = fmin (fmax (at[task / 2] + (task % 2 ? 1 : -1) * size * cbrt (jacobian_smooth (x)), u->low), u->high);
   d->step[task] = at[task / 2] - d->at[task / 2];
   int status = pw_fit_run (x, at, d->run + (size_t)task * (size_t)x->columns * (size_t)x->rows, d->error + task);
   d->error[task].status = status;
   free (at);
+  return PW_OK;
 }
 
 /* One side is enough, if the other one fails. */

@@ -61,14 +61,16 @@ static void reference_floor (const pw_system *s, pw_reference *t) {
 /* ---- Candidates ---- */
 
 typedef struct {
+  pw_study *study;
   pw_row row;
   int good;
   pw_motion motion;
 } candidate;
 
 /* Runs candidate i; increases a tolerance or step that is too small.  PW_RETRY: interrupted. */
-static int reference_run (pw_study *x, void *context, int i, pw_error *error) {
+static int reference_run (void *context, int i, pw_error *error) {
   candidate *c = (candidate *)context + i;
+  pw_study *x = c->study;
   double loosest = c->row.adaptive ? REFERENCE_LOOSEST : x->t_end / REFERENCE_FEWEST;
   pw_error own = { 0 };
   int status = pw_motion_open (&c->motion, x->m.system, MOTION_SAMPLES, x->t_end, error);
@@ -144,15 +146,15 @@ static void reference_choose (pw_reference *t, const pw_system *s, candidate *c)
 
 static int reference_compute (pw_reference *t, pw_study *x, double step, pw_error *error) {
   candidate c[REFERENCE_CANDIDATES] = {
-    { .row = { .method = "erk8+projection", .adaptive = 1, .level = 3e-14 } },
-    { .row = { .method = "rk4+projection", .level = fmin (step, x->t_end / REFERENCE_STEPS) } },
-    { .row = { .method = "ida+ggl", .adaptive = 1, .level = 1e-13 } },
-    { .row = { .method = "ida+baumgarte", .adaptive = 1, .level = 1e-13 } },
+    { x, .row = { .method = "erk8+projection", .adaptive = 1, .level = 3e-14 } },
+    { x, .row = { .method = "rk4+projection", .level = fmin (step, x->t_end / REFERENCE_STEPS) } },
+    { x, .row = { .method = "ida+ggl", .adaptive = 1, .level = 1e-13 } },
+    { x, .row = { .method = "ida+baumgarte", .adaptive = 1, .level = 1e-13 } },
   };
   double limit = x->cpu_end;
   x->cpu_end = fmax (limit, REFERENCE_LIMIT);
   pw_study_show (x, "reference", "methods", REFERENCE_CANDIDATES);
-  int status = pw_study_concurrently (x, REFERENCE_CANDIDATES, reference_run, c, error);
+  int status = pw_study_parallel (x, REFERENCE_CANDIDATES, reference_run, c, error);
   x->cpu_end = limit;
   if (status == PW_OK) reference_choose (t, x->m.system, c);
   for (int i = 0; i < REFERENCE_CANDIDATES; i++) pw_motion_close (&c[i].motion);

@@ -132,10 +132,8 @@ typedef struct pw_study_visitor {
 /* One run of a row to the end or a limit: fills t, statistics, cpu, and state if it is stopped by cpu_end; the visitor may
  * be NULL.  Runs of different rows may be concurrent.  PW_RETRY: stopped, or interrupted. */
 int pw_study_run (pw_study *x, pw_row *r, const pw_settings *settings, pw_study_visitor *v, pw_error *error);
-/* Calls task (context, i) for each i < count, several at a time.  A task returns a status; after one other than PW_OK,
- * which is returned, no further ones are called. */
-int pw_study_concurrently (pw_study *x, int count, int (*task) (pw_study *x, void *context, int i, pw_error *error),
-                           void *context, pw_error *error);
+/* Performs tasks as pw_parallel does, those of a study that is timed as pw_parallel_timed, and ends their progress. */
+int pw_study_parallel (pw_study *x, int count, pw_task *task, void *context, pw_error *error);
 /* Begins to show the progress of `rows` rows. */
 void pw_study_show (pw_study *x, const char *what, const char *unit, int rows);
 /* Shows that a part of a row is done, of 1. */

@@ -326,10 +326,10 @@ static void worker_advance (worker *w) {
 }
 
 /* Computes rows until there are none. */
-static void worker_thread (void *context, int i) {
+static int worker_thread (void *context, int i, pw_error *error) {
   sweep_rows *x = context;
   worker w = { .x = x, .code = pw_scene_code_lanes (x->plan->code), .width = 1 };
-  (void)i;
+  (void)i, (void)error;
   if (w.code && (w.memory = pw_specialised_lanes_memory (w.code)) != NULL)
     w.width = pw_specialised_lanes_count (w.code);
   if (w.width > ROWS_LANES) w.width = 1;
@@ -346,6 +346,7 @@ static void worker_thread (void *context, int i) {
   pthread_mutex_unlock (&x->lock);
   pw_text_free (&w.text);
   free (w.memory);
+  return PW_OK;
 }
 
 static void rows_close (sweep_rows *x) {
