@@ -1,7 +1,8 @@
 /* pinwheel compare: accuracy and cost of methods.  A row for each method and each tolerance or step: one run with samples
  * and ledger, then timed runs without. */
+#include <gsl/gsl_sort.h>
+#include <gsl/gsl_statistics.h>
 #include <math.h>
-#include <stdlib.h>
 #include <string.h>
 #include "reference.h"
 
@@ -43,12 +44,13 @@ enum {
   COLUMN_REPEATS
 };
 
-static const char *compare_ladder (const pw_row *r, char text[STUDY_NAME]) {
-  (void)text;
+static const char *compare_ladder (const pw_row *r) {
   return r->adaptive ? "rtol" : "step";
 }
 
-static const char *compare_below (const pw_row *r, char text[STUDY_NAME]);
+static const char *compare_below (const pw_row *r) {
+  return r->bounds;
+}
 
 static const pw_study_column compare_columns[] = {
   { "method", .text = pw_study_method },
@@ -81,14 +83,6 @@ static const pw_study_column compare_columns[] = {
   { .name = "repeats" },
   { .name = NULL },
 };
-
-/* The names of errors below the uncertainty of the reference. */
-static const char *compare_below (const pw_row *r, char text[STUDY_NAME]) {
-  *text = 0;
-  for (int i = COLUMN_ERROR; i < COLUMN_ERROR + MOTION_ERRORS; i++)
-    if (r->below >> i & 1) strcat (strcat (text, *text ? " " : ""), compare_columns[i].name);
-  return text;
-}
 
 /* ---- Ladders ---- */
 
@@ -172,6 +166,7 @@ static void compare_errors (const pw_compare *x, const pw_motion *motion, pw_row
     if (!(error[i] <= reference->uncertainty[i])) continue;
     error[i] = reference->uncertainty[i];
     r->below |= 1u << (COLUMN_ERROR + i);
+    strcat (strcat (r->bounds, *r->bounds ? " " : ""), compare_columns[COLUMN_ERROR + i].name);
   }
 }
 
@@ -195,11 +190,6 @@ static double compare_order (const pw_compare *x, const pw_row *r, int before) {
   return order > 0 && fabs (order - last) <= COMPARE_AGREE * order ? order : NAN;
 }
 
-static int compare_numbers (const void *a, const void *b) {
-  double x = *(const double *)a, y = *(const double *)b;
-  return (x > y) - (x < y);
-}
-
 static int compare_times (pw_compare *x, pw_row *r, pw_error *error) {
   double cpu[COMPARE_REPEATS], sum = 0;
   int n = 0;
@@ -208,8 +198,8 @@ static int compare_times (pw_compare *x, pw_row *r, pw_error *error) {
     if (status != PW_OK) return status;
     sum += cpu[n++] = r->cpu;
   }
-  qsort (cpu, (size_t)n, sizeof *cpu, compare_numbers);
-  r->cpu = n % 2 ? cpu[n / 2] : (cpu[n / 2 - 1] + cpu[n / 2]) / 2;
+  gsl_sort (cpu, 1, (size_t)n);
+  r->cpu = gsl_stats_median_from_sorted_data (cpu, 1, (size_t)n);
   r->value[COLUMN_REPEATS] = n;
   if (n < 2) return PW_OK;
   r->value[COLUMN_SPREAD] = cpu[n - 1] - cpu[0];

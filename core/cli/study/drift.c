@@ -32,8 +32,7 @@ typedef struct {
 
 enum { COLUMN_ALPHA = 2, COLUMN_BETA, COLUMN_EVERY, COLUMN_T = 6, COLUMN_QUANTITY, COLUMN_STEPS = 16 };
 
-static const char *drift_group_name (const pw_row *r, char text[STUDY_NAME]) {
-  (void)text;
+static const char *drift_group_name (const pw_row *r) {
   return drift_group[r->group];
 }
 

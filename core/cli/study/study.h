@@ -37,6 +37,7 @@ typedef struct {
   char reason[500];
   double value[STUDY_COLUMNS]; /* NaN: unknown */
   unsigned below;              /* bit i: value i is an upper bound */
+  char bounds[STUDY_NAME];     /* the names of those values */
   int points;                  /* number of points in the figure; undefined ones are NaN */
   double (*point)[STUDY_COORDINATES];
 } pw_row;
@@ -45,15 +46,15 @@ typedef struct pw_study pw_study;
 
 /* A column of the table, which is in the CSV file, on the terminal, or both. */
 typedef struct {
-  const char *name, *unit;                                      /* in the CSV file; NULL: not there; without unit */
-  const char *head;                                             /* on the terminal; NULL: not there */
-  int width;                                                    /* on the terminal, including spaces before it */
-  const char *format;                                           /* of numbers on the terminal: "%.1e" */
-  const char *(*text) (const pw_row *r, char text[STUDY_NAME]); /* the text; NULL: the column contains numbers */
+  const char *name, *unit;               /* in the CSV file; NULL: not there; without unit */
+  const char *head;                      /* on the terminal; NULL: not there */
+  int width;                             /* on the terminal, including spaces before it */
+  const char *format;                    /* of numbers on the terminal: "%.1e" */
+  const char *(*text) (const pw_row *r); /* the text; NULL: the column contains numbers */
 } pw_study_column;
 
-const char *pw_study_method (const pw_row *r, char text[STUDY_NAME]);
-const char *pw_study_status (const pw_row *r, char text[STUDY_NAME]); /* "ok", "failed", ... */
+const char *pw_study_method (const pw_row *r);
+const char *pw_study_status (const pw_row *r); /* "ok", "failed", ... */
 
 /* What a command provides.  Functions return a status. */
 typedef struct {
