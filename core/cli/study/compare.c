@@ -127,6 +127,7 @@ static int compare_plan_rows (pw_study *x, const ladder of[2], pw_error *error) 
       pw_row *r = pw_study_add (x, 0, i, x->method[i], 1, error);
       if (r == NULL) return PW_RESOURCE;
       r->adaptive = adaptive;
+      r->rung = k;
       r->level = r->value[COLUMN_LEVEL] = level;
       r->value[COLUMN_REPEATS] = 0;
     }
@@ -183,10 +184,10 @@ static double compare_order_of (const pw_compare *x, const pw_row *r) {
   return known && finer > COMPARE_FINER ? log (before->value[COLUMN_ERROR + i] / error[i]) / log (finer) : NAN;
 }
 
-/* The observed order of convergence of a row with `before` levels of its method before it: only in the asymptotic range,
- * where the last two orders agree and errors are well above the uncertainty of the reference; else NaN. */
-static double compare_order (const pw_compare *x, const pw_row *r, int before) {
-  double order = before >= 2 ? compare_order_of (x, r) : NAN, last = before >= 2 ? compare_order_of (x, r - 1) : NAN;
+/* The observed order of convergence: only in the asymptotic range, where the last two orders agree and errors are well
+ * above the uncertainty of the reference; else NaN. */
+static double compare_order (const pw_compare *x, const pw_row *r) {
+  double order = r->rung >= 2 ? compare_order_of (x, r) : NAN, last = r->rung >= 2 ? compare_order_of (x, r - 1) : NAN;
   return order > 0 && fabs (order - last) <= COMPARE_AGREE * order ? order : NAN;
 }
 
@@ -207,14 +208,14 @@ static int compare_times (pw_compare *x, pw_row *r, pw_error *error) {
   return PW_OK;
 }
 
-/* The CPU time of a row predicted from the `before` levels of its method before it: a halved step doubles it; the factor of a
- * decade is that of the last one, or at first that of a method of order 5. */
-static double compare_predict (const pw_row *r, int before) {
+/* The CPU time of a row predicted from the levels of its method before it: a halved step doubles it; the factor of a decade
+ * is that of the last one, or at first that of a method of order 5. */
+static double compare_predict (const pw_row *r) {
   const pw_row *last = r - 1;
-  if (before == 0 || last->state == ROW_FAILED || last->state == ROW_REFUSED) return 0;
+  if (r->rung == 0 || last->state == ROW_FAILED || last->state == ROW_REFUSED) return 0;
   if (last->state != ROW_DONE) return INFINITY;
   if (!r->adaptive) return 2 * last->cpu;
-  if (before < 2 || last[-1].state != ROW_DONE) return 1.6 * last->cpu;
+  if (r->rung < 2 || last[-1].state != ROW_DONE) return 1.6 * last->cpu;
   return fmax (last->cpu / last[-1].cpu, 1) * last->cpu;
 }
 
@@ -235,9 +236,7 @@ static int compare_measure (pw_study *s, pw_row *r, pw_error *error) {
   pw_compare *x = (pw_compare *)s;
   pw_error own = { 0 };
   char limit[32], text[60] = "";
-  int before = 0;
-  while (r - before > s->row && r[-before - 1].line == r->line) before++;
-  double predicted = compare_predict (r, before);
+  double predicted = compare_predict (r);
   pw_format (limit, s->cpu_end, 4);
   if (predicted > s->cpu_end) {
     r->state = ROW_SKIPPED;
@@ -252,7 +251,7 @@ static int compare_measure (pw_study *s, pw_row *r, pw_error *error) {
     snprintf (r->reason, sizeof r->reason, "too slow: the limit of %s s was reached at t = %s s", limit,
               pw_format (text, r->t, 4));
   status = pw_study_outcome (s, r, status, &own, error);
-  r->value[COLUMN_ORDER] = compare_order (x, r, before);
+  r->value[COLUMN_ORDER] = compare_order (x, r);
   r->value[COLUMN_POSITION] = r->statistics.position;
   r->value[COLUMN_VELOCITY] = r->statistics.velocity;
   r->value[COLUMN_BALANCE] = r->balance;
