@@ -62,11 +62,7 @@ double pw_fit_quantile (const pw_fit *x) {
 
 /* Values of an adaptive method are smooth up to its tolerance, those of fixed steps up to round-off. */
 static double jacobian_smooth (const pw_fit *x) {
-  const pw_method *method;
-  int stabilisation;
-  if (pw_method_parse (x->unknowns.runs.method, &method, &stabilisation, NULL) != PW_OK ||
-      !pw_method_adaptive (method, x->unknowns.runs.method))
-    return DBL_EPSILON;
+  if (pw_cli_adaptive (x->unknowns.runs.method) != 1) return DBL_EPSILON;
   return x->unknowns.runs.settings.rtol > 0 ? x->unknowns.runs.settings.rtol : 1e-6;
 }
 

@@ -38,12 +38,8 @@ static void report_atol (pw_run *r, const pw_system *s, double atol) {
 
 void pw_report_settings (pw_run *r, const pw_system *s, const char *method, const pw_cli_line *l,
                          const pw_settings *settings) {
-  const pw_method *integrator;
-  int stabilisation;
-  if (pw_method_parse (method, &integrator, &stabilisation, &(pw_error){ 0 }) != PW_OK) return;
-  int adaptive = pw_method_adaptive (integrator, method);
   pw_cli_unused (method, l);
-  if (adaptive)
+  if (pw_cli_adaptive (method) == 1)
     report_atol (r, s, settings->atol);
   else
     report_step (r, fmin (settings->step, settings->span));

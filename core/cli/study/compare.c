@@ -117,11 +117,8 @@ static double ladder_level (ladder l, int adaptive, int i) {
 
 /* A row for each level of each method. */
 static int compare_plan_rows (pw_study *x, const ladder of[2], pw_error *error) {
-  const pw_method *integrator;
-  int stabilisation;
   for (int i = 0; i < x->methods; i++) {
-    int adaptive = pw_method_parse (x->method[i], &integrator, &stabilisation, NULL) == PW_OK &&
-                   pw_method_adaptive (integrator, x->method[i]);
+    int adaptive = pw_cli_adaptive (x->method[i]);
     double level;
     for (int k = 0; (level = ladder_level (of[adaptive], adaptive, k)) > 0; k++) {
       pw_row *r = pw_study_add (x, 0, i, x->method[i], 1, error);
