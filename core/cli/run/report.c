@@ -6,7 +6,12 @@
 #include "print_table.h"
 #include "report.h"
 
-enum { REPORT_MOVED = 8, REPORT_BODIES = 20, REPORT_ROWS = 24, REPORT_TEXT = 400 };
+enum {
+  REPORT_MOVED = 8, /* changed states, or messages of a kind, at most */
+  REPORT_BODIES = 20,
+  REPORT_ROWS = 24, /* of reactions, or of internal coordinates */
+  REPORT_TEXT = 400 /* longest description of a redundant equation, end included */
+};
 
 static void report_more (FILE *f, int more, const char *hint) {
   if (more > 0) fprintf (f, "  and %d more%s\n", more, hint);

@@ -329,10 +329,7 @@ static int compare_command (void *options, pw_error *error) {
 
 static const struct poptOption compare_options[] = {
   PW_OPTION_GROUP ("Comparison"),
-  PW_TEXT_OPTION (
-      pw_study, methods_text, "methods", 'm', "A,B,...|all",
-      "Methods, separated by commas; rk4+all: every stabilisation of rk4; all+ggl: every integrator with ggl; all: "
-      "every method (default: eight representative ones)"),
+  PW_STUDY_METHODS_OPTION ("default: eight representative ones"),
   PW_FLAG_OPTION (pw_compare, table, "table", "Print every run, not only the conclusion"),
   PW_TEXT_OPTION (pw_compare, rtol_text, "rtol-ladder", 0, "FROM:TO",
                   "Tolerances of adaptive methods, by decades (default 1e-3:1e-12)"),

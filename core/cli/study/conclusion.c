@@ -4,7 +4,11 @@
 #include <string.h>
 #include "reference.h"
 
-enum { CONCLUSION_LEVELS = 3, CONCLUSION_WIDTH = 14, CONCLUSION_REASON = 70 };
+enum {
+  CONCLUSION_LEVELS = 3,
+  CONCLUSION_WIDTH = 14, /* of a column, at least */
+  CONCLUSION_REASON = 70 /* characters of the reason of a failure, at most */
+};
 static const int conclusion_digits[CONCLUSION_LEVELS] = { 3, 6, 9 };
 
 typedef struct {
@@ -25,17 +29,17 @@ typedef struct {
 /* ---- Errors ---- */
 
 /* Lengths are relative to the largest one of the motion; angles too, unless it exceeds 1 rad. */
-static double conclusion_scale (const pw_reference *t, int unit) {
-  double size = t->size[unit] > 0 ? t->size[unit] : 1;
+static double conclusion_scale (const pw_reference *ref, int unit) {
+  double size = ref->size[unit] > 0 ? ref->size[unit] : 1;
   return unit == MOTION_ANGLE ? fmin (size, 1) : size;
 }
 
 /* The larger of the relative errors of lengths and angles, as far as they are compared; NaN if one is unknown. */
-static double conclusion_error (const pw_reference *t, const double *of) {
+static double conclusion_error (const pw_reference *ref, const double *of) {
   double most = 0;
   for (int unit = MOTION_LENGTH; unit <= MOTION_ANGLE; unit++) {
-    double error = of[unit] / conclusion_scale (t, unit);
-    if (t->uncertainty[MOTION_MOST + unit] > 0 && !(error <= most) && !isnan (most)) most = error;
+    double error = of[unit] / conclusion_scale (ref, unit);
+    if (ref->uncertainty[MOTION_MOST + unit] > 0 && !(error <= most) && !isnan (most)) most = error;
   }
   return most;
 }
@@ -87,15 +91,15 @@ static void conclusion_find (conclusion *x) {
 
 static void conclusion_heading (const conclusion *x) {
   static const char *const unit[] = { "m", "rad" }, *const name[] = { "lengths", "angles" };
-  const pw_reference *t = x->reference;
+  const pw_reference *ref = x->reference;
   const char *between = "";
   char text[32];
   printf ("Processor time for 3, 6 and 9 correct digits, relative to the cheapest method.\n"
           "Digits: the largest error of a coordinate at %d times up to %s s, relative to\n",
-          t->motion.samples, pw_format (text, x->study->t_end, 6));
+          ref->motion.samples, pw_format (text, x->study->t_end, 6));
   for (int i = MOTION_LENGTH; i <= MOTION_ANGLE; i++)
-    if (t->uncertainty[MOTION_MOST + i] > 0) {
-      printf ("%s%s %s (%s)", between, pw_format (text, conclusion_scale (t, i), 3), unit[i], name[i]);
+    if (ref->uncertainty[MOTION_MOST + i] > 0) {
+      printf ("%s%s %s (%s)", between, pw_format (text, conclusion_scale (ref, i), 3), unit[i], name[i]);
       between = ", ";
     }
   printf (". The reference has %.1f digits%s.\n\n", -log10 (x->uncertainty),
@@ -182,9 +186,9 @@ static void conclusion_limit (const pw_study *x) {
   if (found) putchar ('\n');
 }
 
-void pw_conclusion_print (const pw_study *s, const pw_reference *t, int column) {
-  conclusion x = { .study = s, .reference = t, .column = column, .width = CONCLUSION_WIDTH };
-  x.uncertainty = conclusion_error (t, t->uncertainty + MOTION_MOST);
+void pw_conclusion_print (const pw_study *s, const pw_reference *ref, int column) {
+  conclusion x = { .study = s, .reference = ref, .column = column, .width = CONCLUSION_WIDTH };
+  x.uncertainty = conclusion_error (ref, ref->uncertainty + MOTION_MOST);
   for (int i = 0; i < s->methods; i++)
     if ((int)strlen (s->method[i]) > x.width) x.width = (int)strlen (s->method[i]);
   conclusion_find (&x);

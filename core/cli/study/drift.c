@@ -289,10 +289,7 @@ static int drift_command (void *options, pw_error *error) {
 
 static const struct poptOption drift_options[] = {
   PW_OPTION_GROUP ("Comparison"),
-  PW_TEXT_OPTION (
-      pw_study, methods_text, "methods", 'm', "A,B,...|all",
-      "Methods, separated by commas; rk4+all: every stabilisation of rk4; all+ggl: every integrator with ggl; all: "
-      "every method (default rk4+all,ida+all,galpha+all)"),
+  PW_STUDY_METHODS_OPTION ("default rk4+all,ida+all,galpha+all"),
   PW_STEP_OPTIONS,
   PW_LIST_OPTION (
       pw_drift, vary, "vary", 'v', "OPTION=RANGE",

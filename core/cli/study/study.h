@@ -30,7 +30,7 @@ typedef struct {
   pw_row_state state;
   int measured;             /* 1: all is known */
   int runs;                 /* finished */
-  double part;              /* that the progress counts */
+  double part;              /* that is done, as the progress counts it, of 1 */
   double t;                 /* reached [s] */
   double cpu;               /* of the last run [s] */
   double balance;           /* largest |energy balance| of the samples [J] */
@@ -56,6 +56,12 @@ typedef struct {
 
 const char *pw_study_method (const pw_row *r);
 const char *pw_study_status (const pw_row *r); /* "ok", "failed", ... */
+
+/* The option of the methods; `defaults` describes those without it. */
+#define PW_STUDY_METHODS_OPTION(defaults)                                                                              \
+  PW_TEXT_OPTION (pw_study, methods_text, "methods", 'm', "A,B,...|all",                                               \
+                  "Methods, separated by commas; rk4+all: every stabilisation of rk4; all+ggl: every integrator with " \
+                  "ggl; all: every method (" defaults ")")
 
 /* What a command provides.  Functions return a status. */
 typedef struct {
@@ -103,8 +109,8 @@ struct pw_study {
   int rows, done; /* done: printed */
   pthread_mutex_t mutex;
   pw_progress progress;
-  double finished;                       /* sum of the parts of rows */
-  double share;                          /* of a run in its row */
+  double finished;                       /* progress: the sum of `part` of all rows */
+  double share;                          /* of each run in the progress of its row */
   pw_output *csv;                        /* NULL: none */
   const char *drawn[FIGURE_SCRIPTS + 1]; /* scripts */
 };

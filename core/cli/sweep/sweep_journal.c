@@ -303,7 +303,7 @@ static int table_match (table_part *x, int count, pw_error *error) {
 }
 
 /* The rows, taken from the parts in turn: row r is the next one of part r mod n. */
-static int table_weave (table_part *x, int count, FILE *stream, pw_tally *tally, pw_error *error) {
+static int table_merge (table_part *x, int count, FILE *stream, pw_tally *tally, pw_error *error) {
   size_t size = 0;
   const char *value = pw_fingerprint_value (x->map.at, x->rows, "rows", &size);
   const char *head = pw_fingerprint_value (x->map.at, x->rows, "columns", &size);
@@ -337,7 +337,7 @@ int pw_sweep_merge (const char *const *parts, int count, const char *path, pw_ta
   }
   if (status == PW_OK) status = table_match (x, count, error);
   if (status == PW_OK && (o = pw_output_open_as (path, ".sorted", error)) == NULL) status = error->status;
-  if (o) table_weave (x, count, pw_output_stream (o), tally, error);
+  if (o) table_merge (x, count, pw_output_stream (o), tally, error);
   if (o) status = table_close (o, error);
   for (int i = 0; x && i < count; i++) journal_map_close (&x[i].map);
   free (x);
