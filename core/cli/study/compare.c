@@ -124,7 +124,7 @@ static int compare_plan_rows (pw_study *x, const ladder of[2], pw_error *error) 
       pw_row *r = pw_study_add (x, 0, i, x->method[i], 1, error);
       if (r == NULL) return PW_RESOURCE;
       r->adaptive = adaptive;
-      r->rung = k;
+      r->before = k;
       r->level = r->value[COLUMN_LEVEL] = level;
       r->value[COLUMN_REPEATS] = 0;
     }
@@ -184,7 +184,8 @@ static double compare_order_of (const pw_compare *x, const pw_row *r) {
 /* The observed order of convergence: only in the asymptotic range, where the last two orders agree and errors are well
  * above the uncertainty of the reference; else NaN. */
 static double compare_order (const pw_compare *x, const pw_row *r) {
-  double order = r->rung >= 2 ? compare_order_of (x, r) : NAN, last = r->rung >= 2 ? compare_order_of (x, r - 1) : NAN;
+  double order = r->before >= 2 ? compare_order_of (x, r) : NAN,
+         last = r->before >= 2 ? compare_order_of (x, r - 1) : NAN;
   return order > 0 && fabs (order - last) <= COMPARE_AGREE * order ? order : NAN;
 }
 
@@ -209,10 +210,10 @@ static int compare_times (pw_compare *x, pw_row *r, pw_error *error) {
  * is that of the last one, or at first that of a method of order 5. */
 static double compare_predict (const pw_row *r) {
   const pw_row *last = r - 1;
-  if (r->rung == 0 || last->state == ROW_FAILED || last->state == ROW_REFUSED) return 0;
+  if (r->before == 0 || last->state == ROW_FAILED || last->state == ROW_REFUSED) return 0;
   if (last->state != ROW_DONE) return INFINITY;
   if (!r->adaptive) return 2 * last->cpu;
-  if (r->rung < 2 || last[-1].state != ROW_DONE) return 1.6 * last->cpu;
+  if (r->before < 2 || last[-1].state != ROW_DONE) return 1.6 * last->cpu;
   return fmax (last->cpu / last[-1].cpu, 1) * last->cpu;
 }
 

@@ -26,7 +26,7 @@ typedef struct {
   int group, line;         /* group of rows in the table; line in the figure of the group */
   int adaptive;            /* 1: the step size follows a tolerance */
   double level;            /* of compare: tolerance, or step size [s] */
-  int rung;                /* number of levels of its method before it */
+  int before;              /* number of levels of its method before it */
   pw_row_state state;
   int measured;             /* 1: all is known */
   int runs;                 /* finished */
