@@ -74,20 +74,20 @@ int pw_study_read_methods (pw_study *x, const char *text, pw_error *error) {
 /* ---- Rows ---- */
 
 pw_row *pw_study_add (pw_study *x, int group, int line, const char *method, int points, pw_error *error) {
-  pw_row *more = realloc (x->row, (size_t)(x->rows + 1) * sizeof *x->row), *r = more ? more + x->rows : NULL;
-  if (more) x->row = more;
-  if (r)
-    *r =
-        (pw_row){ .group = group, .line = line, .points = points, .point = malloc ((size_t)points * sizeof *r->point) };
-  if (r == NULL || r->point == NULL) {
+  pw_row *r = realloc (x->row, (size_t)(x->rows + 1) * sizeof *r);
+  double (*point)[STUDY_COORDINATES] = malloc ((size_t)points * sizeof *point);
+  if (r) x->row = r;
+  if (r == NULL || point == NULL) {
+    free (point);
     pw_fail (error, PW_RESOURCE, "out of memory");
     return NULL;
   }
+  r += x->rows++;
+  *r = (pw_row){ .group = group, .line = line, .points = points, .point = point };
   snprintf (r->method, sizeof r->method, "%s", method);
   for (int i = 0; i < STUDY_COLUMNS; i++) r->value[i] = NAN;
   for (int k = 0; k < points; k++)
     for (int i = 0; i < STUDY_COORDINATES; i++) r->point[k][i] = NAN;
-  x->rows++;
   return r;
 }
 

@@ -55,8 +55,7 @@ typedef struct {
   row_system *system; /* NULL: no run */
   pw_run *run;
   pw_limit limit;
-  double start; /* of the thread's processor time [s] */
-  int status;   /* while it is not PW_OK, the run has ended */
+  int status; /* while it is not PW_OK, the run has ended */
   pw_error error;
 } row_run;
 
@@ -176,7 +175,6 @@ static void run_open (row_run *x, const pw_plan *p) {
   pw_initial_value *initial = run_initial (p, x, &settings.initials);
   settings.initial = initial;
   pw_limit_start (&x->limit);
-  x->start = pw_seconds (CLOCK_THREAD_CPUTIME_ID);
   if (initial)
     x->run = pw_run_open (x->system->m.system, p->method, &settings, &x->error);
   else
@@ -198,7 +196,7 @@ static void run_cells (const row_run *x, const pw_plan *p, const pw_sample *last
   if (x->run) {
     const pw_statistics *s = pw_run_statistics (x->run);
     cell[1] = s->position, cell[2] = s->velocity, cell[3] = (double)s->steps, cell[4] = (double)s->rhs;
-    cell[5] = pw_seconds (CLOCK_THREAD_CPUTIME_ID) - x->start;
+    cell[5] = pw_seconds (CLOCK_THREAD_CPUTIME_ID) - x->limit.start;
   }
   for (int i = 0; i < p->grid.axes; i++) pw_text_number (t, pw_grid_value (&p->grid, i, x->row));
   pw_text_cell (t, word[-x->status]);
@@ -227,17 +225,11 @@ static int run_close (row_run *x, const pw_plan *p, pw_text *text) {
 
 /* ---- Rows; the caller holds the lock ---- */
 
-/* Stores the first error, which stops the sweep. */
-static void rows_fail (sweep_rows *x, long row, const char *why) {
-  if (x->error->status == PW_OK) pw_fail (x->error, PW_RESOURCE, "row %ld of the grid: %s", row + 1, why);
-  if (pw_stop == 0) pw_stop = 1;
-}
-
-/* Stores a row, or the first error. */
+/* Stores a row, or the first error, which stops the sweep. */
 static void rows_keep (sweep_rows *x, const row_run *r, int status, const pw_text *text) {
   if (status == PW_RETRY || x->error->status != PW_OK) return;
   if (status == PW_RESOURCE)
-    rows_fail (x, r->row, r->error.text);
+    pw_fail (x->error, PW_RESOURCE, "row %ld of the grid: %s", r->row + 1, r->error.text);
   else if (pw_journal_add (x->journal, x->plan, r->row, -status, text->at, x->error) == PW_OK)
     pw_progress_at (&x->progress, (double)x->journal->done);
   if (x->error->status != PW_OK && pw_stop == 0) pw_stop = 1;
@@ -282,7 +274,7 @@ static int worker_begin (sweep_rows *x, row_run *r) {
   r->row = row;
   r->system = system_of (x, row);
   if (r->system == NULL) {
-    rows_fail (x, row, "out of memory");
+    rows_keep (x, r, pw_fail (&r->error, PW_RESOURCE, "out of memory"), NULL);
     return 0;
   }
   pthread_mutex_unlock (&x->lock);
