@@ -121,11 +121,10 @@ static int run_open (run *x, pw_error *error) {
   if (status == PW_OK) status = run_engine (x, error);
   if (status == PW_OK) status = pw_checkpoints_prepare (x, error);
   if (status != PW_OK) return status;
-  if ((x->plots_path || x->animate_path) &&
-      (x->plots = pw_plots_open (x->plots_path, x->animate_path != NULL, x->m.model, x->m.system, x->t_end, error)) ==
-          NULL)
-    return error->status;
-  if (x->plots && pw_plots_style (x->plots, x->line.width, x->colour, error) != PW_OK) return error->status;
+  if (x->plots_path || x->animate_path) {
+    x->plots = pw_plots_open (x->plots_path, x->animate_path != NULL, x->m.model, x->m.system, x->t_end, error);
+    if (x->plots == NULL || pw_plots_style (x->plots, x->line.width, x->colour, error) != PW_OK) return error->status;
+  }
   status = pw_comparison_open (&x->comparison, &x->m, x->reference_path, x->line.starts != NULL, x->t_end, error);
   if (status != PW_OK) return status;
   pw_limit_start (&x->limit);

@@ -148,26 +148,25 @@ static void conclusion_table (const conclusion *x) {
 
 /* ---- Runs that do not reach the end ---- */
 
-/* The first run of a method in a state; NULL if there is none. */
-static const pw_row *conclusion_first (const pw_study *x, int line, unsigned states) {
+/* The number of runs of a method in these states, bits 1 << ROW_DONE etc., and the first of them or NULL. */
+static int conclusion_count (const pw_study *x, int line, unsigned states, const pw_row **first) {
+  int count = 0;
+  *first = NULL;
   for (const pw_row *r = x->row; r < x->row + x->rows; r++)
-    if (r->line == line && states >> r->state & 1) return r;
-  return NULL;
+    if (r->line == line && states >> r->state & 1 && count++ == 0) *first = r;
+  return count;
 }
 
 static void conclusion_failure (const pw_study *x, int line) {
-  int runs = 0, failures = 0;
   char text[32];
-  const pw_row *first = conclusion_first (x, line, 1u << ROW_FAILED | 1u << ROW_REFUSED);
+  const pw_row *first, *any;
+  int failures = conclusion_count (x, line, 1u << ROW_FAILED | 1u << ROW_REFUSED, &first);
   if (first == NULL) return;
-  for (const pw_row *r = x->row; r < x->row + x->rows; r++) {
-    runs += r->line == line;
-    failures += r->line == line && (r->state == ROW_FAILED || r->state == ROW_REFUSED);
-  }
   int cut = strlen (first->reason) > CONCLUSION_REASON;
-  pw_cli_print (stdout, "%s: %d of %d runs %s, first at %s %s: %.*s%s\n", first->method, failures, runs,
-                first->state == ROW_FAILED ? "fail" : "are refused", first->adaptive ? "rtol" : "step",
-                pw_format (text, first->level, 4), CONCLUSION_REASON, first->reason, cut ? "..." : "");
+  pw_cli_print (stdout, "%s: %d of %d runs %s, first at %s %s: %.*s%s\n", first->method, failures,
+                conclusion_count (x, line, ~0u, &any), first->state == ROW_FAILED ? "fail" : "are refused",
+                first->adaptive ? "rtol" : "step", pw_format (text, first->level, 4), CONCLUSION_REASON, first->reason,
+                cut ? "..." : "");
 }
 
 /* One line for all methods that the limit has ended. */
@@ -175,7 +174,8 @@ static void conclusion_limit (const pw_study *x) {
   char text[32];
   int found = 0;
   for (int i = 0; i < x->methods; i++) {
-    const pw_row *first = conclusion_first (x, i, 1u << ROW_STOPPED | 1u << ROW_SKIPPED);
+    const pw_row *first;
+    conclusion_count (x, i, 1u << ROW_STOPPED | 1u << ROW_SKIPPED, &first);
     if (first == NULL) continue;
     if (found++ == 0)
       printf ("stopped by the limit of %s s: ", pw_format (text, x->cpu_end, 4));

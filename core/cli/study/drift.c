@@ -175,7 +175,7 @@ static void drift_raise (double *most, double value) {
   if (!isnan (*most) && !(value <= *most)) *most = value;
 }
 
-/* The part of the run that a time belongs to, its end included. */
+/* The part of the run that a time belongs to, its end included, up to round-off. */
 static int drift_part (const pw_study *x, double t) {
   int k = (int)ceil (t / x->t_end * DRIFT_PARTS - 1e-9) - 1;
   return k < 0 ? 0 : k < DRIFT_PARTS ? k : DRIFT_PARTS - 1;

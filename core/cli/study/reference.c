@@ -4,10 +4,10 @@
 #include <string.h>
 #include "reference.h"
 
-#define REFERENCE_LIMIT 10     /* CPU time of a candidate, at least [s] */
-#define REFERENCE_LOOSEST 1e-9 /* tolerances are loosened up to this if a method fails, */
-#define REFERENCE_FEWEST 1000  /* fixed steps up to t_end over this, */
-#define REFERENCE_STEPS 1e5    /* from t_end over this, or the smallest step of the comparison */
+#define REFERENCE_LIMIT 10     /* smallest limit of the CPU time of a candidate [s] */
+#define REFERENCE_LOOSEST 1e-9 /* the tolerance of a method that fails is loosened up to this, */
+#define REFERENCE_FEWEST 1000  /* and its step of fixed size enlarged up to t_end over this */
+#define REFERENCE_STEPS 1e5    /* steps of fixed size are t_end over this at first, or the smallest of the comparison */
 #define REFERENCE_ROUND_OFF 8  /* eps of the largest number: the smallest uncertainty */
 
 /* ---- Runs ---- */

@@ -56,11 +56,12 @@ static int plan_axis (const pw_plan *p, pw_axis *a, pw_model *m, pw_error *error
 
 /* ---- Columns ---- */
 
-/* The i-th state in the order of the table: six of each body, then internal coordinates and their velocities. */
+/* The i-th state in the order of the table: positions and velocities of each body, then each internal coordinate and its
+ * velocity. */
 static int plan_state (const pw_system *s, int i) {
-  int n = pw_system_coordinates (s), bodies = pw_system_bodies (s), k = i - 6 * bodies;
-  if (k >= 0) return 3 * bodies + k / 2 + k % 2 * n;
-  return i % 6 < 3 ? i / 6 * 3 + i % 6 : n + i / 6 * 3 + i % 6 - 3;
+  int n = pw_system_coordinates (s), bodies = pw_system_bodies (s), internal = i - 6 * bodies;
+  if (internal >= 0) return 3 * bodies + internal / 2 + (internal % 2 ? n : 0);
+  return 3 * (i / 6) + i % 3 + (i % 6 < 3 ? 0 : n);
 }
 
 /* The hash table of names must not be full. */
