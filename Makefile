@@ -153,7 +153,7 @@ $(call obj,core/cli/plot/animate.c): $(BUILD)/obj/core/cli/plot/animate.inc
 $(call obj,core/cli/plot/figure.c): $(BUILD)/obj/core/cli/plot/templates.inc
 $(call obj,core/specialise/sources.c): $(BUILD)/obj/core/specialise/sources.inc
 $(call obj,core/specialise/sources.c): INCLUDE += -iquote $(BUILD)/obj/core/specialise
-$(call obj,core/cli/parallel.c core/cli/sweep/sweep.c $(wildcard core/cli/fit/*.c)) $(BUILD)/pinwheel: private THREADS = -pthread
+$(call obj,core/cli/parallel.c core/cli/sweep/sweep_rows.c $(wildcard core/cli/fit/*.c)) $(BUILD)/pinwheel: private THREADS = -pthread
 ALL_LAYERS := $(CORE_LAYERS) $(FILE_LAYERS) $(SOLVER_LAYERS)
 # Libraries below call functions that tests wrap.
 $(BUILD)/obj/tests/%.o:      STRICT += -fvisibility=default

@@ -154,6 +154,8 @@ int pw_cli_settings (const pw_cli_line *l, const pw_run_defaults *model, double 
  * --limit. */
 int pw_cli_incomplete (const pw_cli_line *l, pw_error *error);
 
+/* 1 if the step size of a method follows a tolerance, 0 if it is fixed; -1 if there is no such method. */
+int pw_cli_adaptive (const char *method);
 /* Notices of options without effect on a method.  Steps together with tolerances, common in scripts, are not reported. */
 void pw_cli_unused (const char *method, const pw_cli_line *l);
 

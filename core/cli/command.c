@@ -210,15 +210,19 @@ int pw_cli_incomplete (const pw_cli_line *l, pw_error *error) {
   return PW_INTERRUPTED;
 }
 
-void pw_cli_unused (const char *method, const pw_cli_line *l) {
+int pw_cli_adaptive (const char *method) {
   const pw_method *integrator;
   int stabilisation;
-  if (pw_method_parse (method, &integrator, &stabilisation, &(pw_error){ 0 }) != PW_OK) return;
-  int adaptive = pw_method_adaptive (integrator, method);
-  if (adaptive && l->step && !l->rtol && !l->atol)
+  if (pw_method_parse (method, &integrator, &stabilisation, NULL) != PW_OK) return -1;
+  return pw_method_adaptive (integrator, method);
+}
+
+void pw_cli_unused (const char *method, const pw_cli_line *l) {
+  int adaptive = pw_cli_adaptive (method);
+  if (adaptive == 1 && l->step && !l->rtol && !l->atol)
     pw_cli_say ("pinwheel: --step has no effect: %s chooses its steps by --rtol, --atol\n", method);
-  if (!adaptive && l->max_steps)
+  if (adaptive == 0 && l->max_steps)
     pw_cli_say ("pinwheel: --max-steps has no effect: %s takes as many steps as --step requires\n", method);
-  if (!adaptive && (l->rtol || l->atol) && !l->step)
+  if (adaptive == 0 && (l->rtol || l->atol) && !l->step)
     pw_cli_say ("pinwheel: --%s has no effect: %s takes steps of --step\n", l->rtol ? "rtol" : "atol", method);
 }

@@ -61,11 +61,8 @@ const pw_specialised *pw_cli_engine_code (const pw_cli_engine *e) {
 
 /* Why there are no lanes; NULL if there may be. */
 static const char *engine_no_lanes (const pw_cli_engine *e, const pw_system *s, const char *method, const pw_run *r) {
-  const pw_method *integrator;
-  int stabilisation;
   if (e->code == NULL) return "the general engine is in use, see --specialise";
-  if (pw_method_parse (method, &integrator, &stabilisation, NULL) != PW_OK || pw_method_adaptive (integrator, method))
-    return "the method controls its step size";
+  if (pw_cli_adaptive (method) != 0) return "the method controls its step size";
   if (r == NULL || pw_run_redundant (r) > 0) return "the scene has redundant constraint equations";
   return pw_system_has_lanes (s) ? NULL : "the scene has element types of its own, or signals that depend on the state";
 }

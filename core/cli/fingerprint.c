@@ -37,13 +37,20 @@ int pw_fingerprint_file (pw_text *t, const char *key, const char *name, const ch
   return PW_OK;
 }
 
-int pw_fingerprint_model (pw_text *t, const pw_file *file, uint64_t tables, pw_error *error) {
+int pw_fingerprint_run (pw_text *t, const char *magic, const pw_file *file, uint64_t tables, const char *method,
+                        const pw_settings *s, pw_error *error) {
   char text[200];
+  pw_text_add (t, magic);
+  pw_fingerprint_line (t, "version", NULL, PW_VERSION);
   int status = pw_fingerprint_file (t, "model", pw_file_name (file), pw_file_path (file), error);
-  if (status != PW_OK || tables == 0) return status;
   snprintf (text, sizeof text, "contents %016llx", (unsigned long long)tables);
-  pw_fingerprint_line (t, "tables", NULL, text);
-  return PW_OK;
+  if (tables) pw_fingerprint_line (t, "tables", NULL, text);
+  pw_fingerprint_line (t, "method", NULL, method);
+  pw_fingerprint_number (t, "t-end", NULL, s->span);
+  pw_fingerprint_number (t, "step", NULL, s->step);
+  pw_fingerprint_number (t, "rtol", NULL, s->rtol);
+  pw_fingerprint_number (t, "atol", NULL, s->atol);
+  return status;
 }
 
 uint64_t pw_check_tables (uint64_t sum, const pw_model *m) {

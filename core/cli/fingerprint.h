@@ -13,8 +13,10 @@ void pw_fingerprint_line (pw_text *t, const char *key, const char *of, const cha
 void pw_fingerprint_number (pw_text *t, const char *key, const char *of, double value);
 /* A file's name and a checksum of its contents.  PW_INPUT or PW_RESOURCE if it cannot be read. */
 int pw_fingerprint_file (pw_text *t, const char *key, const char *name, const char *path, pw_error *error);
-/* The model's name and checksums of its file and, if not 0, of its tables.  Errors as of pw_fingerprint_file. */
-int pw_fingerprint_model (pw_text *t, const pw_file *file, uint64_t tables, pw_error *error);
+/* The first lines of a run's or sweep's fingerprint: `magic`; version, the model's name and checksums of its file and, if not
+ * 0, of its tables; method and settings.  Errors as of pw_fingerprint_file. */
+int pw_fingerprint_run (pw_text *t, const char *magic, const pw_file *file, uint64_t tables, const char *method,
+                        const pw_settings *s, pw_error *error);
 /* A checksum of the tables in a model's signals that continues `sum`; 0 at first. */
 uint64_t pw_check_tables (uint64_t sum, const pw_model *m);
 /* "STATE=VALUE" as on the command line; NULL-terminated, or NULL. */

@@ -34,8 +34,10 @@ int pw_parallel_jobs (const char *text, int *jobs, pw_error *error) {
 typedef struct {
   pthread_mutex_t lock;
   int next, count;
-  void (*task) (void *context, int i);
+  pw_task *task;
   void *context;
+  int status; /* of the first task that failed */
+  pw_error *error;
   int threads, begun;
   void (*bind) (const void *cores, int thread, int threads); /* called first in each thread; NULL: none */
   const void *cores;
@@ -45,18 +47,23 @@ static void *parallel_thread (void *argument) {
   parallel *p = argument;
   pthread_mutex_lock (&p->lock);
   if (p->bind) p->bind (p->cores, p->begun++, p->threads);
-  pthread_mutex_unlock (&p->lock);
-  for (;;) {
-    pthread_mutex_lock (&p->lock);
-    int i = p->next < p->count ? p->next++ : -1;
+  while (p->next < p->count) {
+    int i = p->next++;
+    pw_error own = { 0 };
     pthread_mutex_unlock (&p->lock);
-    if (i < 0) return NULL;
-    p->task (p->context, i);
+    int status = p->task (p->context, i, &own);
+    pthread_mutex_lock (&p->lock);
+    if (status == PW_OK || p->status != PW_OK) continue;
+    p->status = status;
+    *p->error = own;
+    p->next = p->count;
   }
+  pthread_mutex_unlock (&p->lock);
+  return NULL;
 }
 
 /* Starts all threads but one, which is the caller. */
-static int parallel_run (parallel *p, pw_error *error) {
+static int parallel_run (parallel *p) {
   if (p->threads > p->count) p->threads = p->count;
   pthread_t *thread = calloc ((size_t)p->threads + 1, sizeof *thread);
   int started = 1, why = thread ? 0 : ENOMEM;
@@ -64,21 +71,22 @@ static int parallel_run (parallel *p, pw_error *error) {
   pthread_mutex_lock (&p->lock);
   while (why == 0 && started < p->threads && (why = pthread_create (thread + started, NULL, parallel_thread, p)) == 0)
     started++;
-  if (why) p->next = p->count;
-  if (why)
-    pw_fail (error, PW_RESOURCE, "cannot start %d runs at a time, only %d: %s; try --jobs %d", p->threads, started,
-             strerror (why), started);
+  if (why) {
+    p->next = p->count;
+    p->status = pw_fail (p->error, PW_RESOURCE, "cannot start %d runs at a time, only %d: %s; try --jobs %d",
+                         p->threads, started, strerror (why), started);
+  }
   pthread_mutex_unlock (&p->lock);
   parallel_thread (p);
   while (--started > 0) pthread_join (thread[started], NULL);
   pthread_mutex_destroy (&p->lock);
   free (thread);
-  return why ? PW_RESOURCE : PW_OK;
+  return p->status;
 }
 
-int pw_parallel (int jobs, int count, void (*task) (void *context, int i), void *context, pw_error *error) {
-  parallel p = { .count = count, .task = task, .context = context, .threads = jobs };
-  return parallel_run (&p, error);
+int pw_parallel (int jobs, int count, pw_task *task, void *context, pw_error *error) {
+  parallel p = { .count = count, .task = task, .context = context, .error = error, .threads = jobs };
+  return parallel_run (&p);
 }
 
 /* ---- Timed tasks ---- */
@@ -118,20 +126,24 @@ static void parallel_bind (const void *cores, int thread, int threads) {
   sched_setaffinity (0, sizeof own, &own);
 }
 
-int pw_parallel_timed (int jobs, int count, void (*task) (void *context, int i), void *context, pw_error *error) {
+int pw_parallel_timed (int jobs, int count, pw_task *task, void *context, pw_error *error) {
   parallel_cores c;
   parallel_find (&c);
-  parallel p = {
-    .count = count, .task = task, .context = context, .threads = jobs, .bind = parallel_bind, .cores = &c
-  };
+  parallel p = { .count = count,
+                 .task = task,
+                 .context = context,
+                 .error = error,
+                 .threads = jobs,
+                 .bind = parallel_bind,
+                 .cores = &c };
   if (jobs > c.cores) p.threads = c.cores;
   if (p.threads < 2) return pw_parallel (1, count, task, context, error);
-  int status = parallel_run (&p, error);
+  int status = parallel_run (&p);
   sched_setaffinity (0, sizeof c.all, &c.all);
   return status;
 }
 #else
-int pw_parallel_timed (int jobs, int count, void (*task) (void *context, int i), void *context, pw_error *error) {
+int pw_parallel_timed (int jobs, int count, pw_task *task, void *context, pw_error *error) {
   (void)jobs;
   return pw_parallel (1, count, task, context, error);
 }

@@ -58,11 +58,7 @@ double pw_fit_quantile (const pw_fit *x) {
 
 /* Values of an adaptive method are smooth up to its tolerance, those of fixed steps up to round-off. */
 static double jacobian_smooth (const pw_fit *x) {
-  const pw_method *method;
-  int stabilisation;
-  if (pw_method_parse (x->unknowns.method, &method, &stabilisation, NULL) != PW_OK ||
-      !pw_method_adaptive (method, x->unknowns.method))
-    return DBL_EPSILON;
+  if (pw_cli_adaptive (x->unknowns.method) != 1) return DBL_EPSILON;
   return x->unknowns.settings.rtol > 0 ? x->unknowns.settings.rtol : 1e-6;
 }
 
@@ -79,7 +75,7 @@ typedef struct {
 } jacobian_differences;
 
 /* The step balances the truncation error, proportional to its square, and the noise, divided by the step. */
-static void jacobian_side (void *context, int task) {
+static int jacobian_side (void *context, int task, pw_error *error) {
   jacobian_differences *d = context;
   const pw_fit *x = d->x;
   const pw_unknown *u = x->unknowns.list + task / 2;
@@ -87,8 +83,10 @@ static void jacobian_side (void *context, int task) {
   double size = fmax (fabs (middle), 1e-2 * u->scale) * cbrt (jacobian_smooth (x));
   *value = fmin (fmax (middle + (task % 2 ? size : -size), u->low), u->high);
   d->step[task] = *value - middle;
-  pw_error *error = d->error + task;
-  error->status = pw_fit_run (x, at, d->run + (size_t)task * (size_t)x->columns * (size_t)x->rows, error);
+  (void)error;
+  d->error[task].status =
+      pw_fit_run (x, at, d->run + (size_t)task * (size_t)x->columns * (size_t)x->rows, d->error + task);
+  return PW_OK; /* one side is enough */
 }
 
 /* One side is enough, if the other one fails. */

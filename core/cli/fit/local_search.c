@@ -250,23 +250,23 @@ static int search_from (search *p, int slopes, double first, double last) {
   return status;
 }
 
-static void search_task (pw_optimise *x, int i, int slopes, double first, double last) {
+static int search_task (pw_optimise *x, int i, int slopes, double first, double last, pw_error *error) {
   search p = { .x = x, .s = x->start + i, .least = INFINITY, .most = -INFINITY };
-  if (pw_stop) return;
+  if (pw_stop) return PW_OK;
   int status = search_from (&p, slopes, first, last);
   if (status == PW_OK && p.refused) status = search_from (&p, 0, first, last);
   pthread_mutex_lock (&x->lock);
-  if (status != PW_OK) pw_fail (&x->error, status, "out of memory");
   pw_progress_at (&x->progress, ++x->done);
   pthread_mutex_unlock (&x->lock);
+  return status == PW_OK ? PW_OK : pw_fail (error, status, "out of memory");
 }
 
-void pw_search_rough (void *context, int i) {
-  search_task (context, i, 0, SEARCH_FIRST, SEARCH_ROUGH);
+int pw_search_rough (void *context, int i, pw_error *error) {
+  return search_task (context, i, 0, SEARCH_FIRST, SEARCH_ROUGH, error);
 }
 
-void pw_search_fine (void *context, int i) {
+int pw_search_fine (void *context, int i, pw_error *error) {
   pw_optimise *x = context;
   int slopes = x->smooth && x->unknowns.count >= SEARCH_SLOPES;
-  search_task (x, x->starts + i, slopes, SEARCH_ROUGH, PW_SEARCH_FINE);
+  return search_task (x, x->starts + i, slopes, SEARCH_ROUGH, PW_SEARCH_FINE, error);
 }

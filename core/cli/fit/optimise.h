@@ -58,8 +58,8 @@ int pw_search_feasible (const pw_optimise *x, const double *value);
 
 /* Tasks of pw_parallel: the search from start i with a rough tolerance; from the i-th of those that continue with a tight
  * one.  The context is the optimisation. */
-void pw_search_rough (void *optimise, int i);
-void pw_search_fine (void *optimise, int i);
+int pw_search_rough (void *optimise, int i, pw_error *error);
+int pw_search_fine (void *optimise, int i, pw_error *error);
 
 /* ---- Results ---- */
 

@@ -60,14 +60,9 @@ static int checkpoints_head (pw_run_command *x, pw_error *error) {
   char numbers[60];
   pw_text *t = &x->check.head;
   const pw_model *m = x->m.model;
-  pw_text_add (t, PW_CHECKPOINT_MAGIC);
-  pw_fingerprint_line (t, "version", NULL, PW_VERSION);
-  if (pw_fingerprint_model (t, x->m.file, pw_check_tables (0, m), error) != PW_OK) return error->status;
-  pw_fingerprint_line (t, "method", NULL, x->method);
-  pw_fingerprint_number (t, "t-end", NULL, x->t_end);
-  pw_fingerprint_number (t, "step", NULL, x->settings.step);
-  pw_fingerprint_number (t, "rtol", NULL, x->settings.rtol);
-  pw_fingerprint_number (t, "atol", NULL, x->settings.atol);
+  if (pw_fingerprint_run (t, PW_CHECKPOINT_MAGIC, x->m.file, pw_check_tables (0, m), x->method, &x->settings, error) !=
+      PW_OK)
+    return error->status;
   if (x->engine.code) pw_fingerprint_line (t, checkpoints_engine, NULL, pw_cli_engine_name (&x->engine));
   for (const pw_parameter *q = pw_model_table (m)->parameters; q && q->name; q++)
     pw_fingerprint_number (t, "parameter", q->name, pw_model_parameter (m, q));

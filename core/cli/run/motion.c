@@ -1,17 +1,27 @@
-/* Motions and their errors. */
+/* Motions and their errors; a run compared with a reference. */
 #include <math.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include "motion.h"
 
-int pw_motion_open (pw_motion *m, const pw_system *s, int samples, pw_error *error) {
+int pw_motion_open (pw_motion *m, const pw_system *s, int samples, double t_end, pw_error *error) {
   int width = 2 * pw_system_coordinates (s) + pw_system_rows (s);
   *m = (pw_motion){ .samples = samples, .width = width };
   m->t = calloc ((size_t)samples, sizeof *m->t);
   m->x = calloc ((size_t)samples * (size_t)width, sizeof *m->x);
-  if (m->t && m->x) return PW_OK;
-  pw_motion_close (m);
-  return pw_fail (error, PW_RESOURCE, "out of memory");
+  if (m->t == NULL || m->x == NULL) {
+    pw_motion_close (m);
+    return pw_fail (error, PW_RESOURCE, "out of memory");
+  }
+  for (int k = 0; k < samples; k++) m->t[k] = k + 1 < samples ? t_end * (k + 1) / samples : t_end;
+  return PW_OK;
+}
+
+int pw_motion_open_at (pw_motion *m, const pw_system *s, const pw_motion *times, pw_error *error) {
+  int status = pw_motion_open (m, s, times->samples, 0, error);
+  if (status == PW_OK) memcpy (m->t, times->t, (size_t)m->samples * sizeof *m->t);
+  return status;
 }
 
 void pw_motion_close (pw_motion *m) {
@@ -20,22 +30,20 @@ void pw_motion_close (pw_motion *m) {
   *m = (pw_motion){ .samples = 0 };
 }
 
-void pw_motion_times (pw_motion *m, double t_end) {
-  for (int k = 0; k < m->samples; k++) m->t[k] = k + 1 < m->samples ? t_end * (k + 1) / m->samples : t_end;
+double pw_motion_next (const pw_motion *m) {
+  return m->next < m->samples ? m->t[m->next] : INFINITY;
 }
 
-void pw_motion_take (pw_motion *m, const pw_system *s, int i, const pw_sample *sample) {
+void pw_motion_take (pw_motion *m, const pw_system *s, const pw_sample *sample) {
   size_t n = (size_t)pw_system_coordinates (s), rows = (size_t)pw_system_rows (s);
-  double *to = m->x + (size_t)i * (size_t)m->width;
+  double *to = m->x + (size_t)m->next++ * (size_t)m->width;
   memcpy (to, sample->q, n * sizeof *to);
   memcpy (to + n, sample->v, n * sizeof *to);
   if (rows) memcpy (to + 2 * n, sample->lambda, rows * sizeof *to);
 }
 
 int pw_motion_reference (pw_motion *m, const pw_model *model, const pw_system *s, double t_end, pw_error *error) {
-  int n = pw_system_coordinates (s), status = pw_motion_open (m, s, MOTION_SAMPLES, error);
-  if (status != PW_OK) return status;
-  pw_motion_times (m, t_end);
+  int n = pw_system_coordinates (s), status = pw_motion_open (m, s, MOTION_SAMPLES, t_end, error);
   for (int k = 0; k < m->samples && status == PW_OK; k++) {
     double *x = m->x + k * m->width;
     for (int j = 2 * n; j < m->width; j++) x[j] = NAN;
@@ -56,19 +64,21 @@ static void motion_raise (double *most, double value) {
 }
 
 static void motion_states (const pw_system *s, const pw_motion *reference, const pw_motion *m, double *error) {
-  int last = m->samples - 1, known[MOTION_UNITS] = { 0 };
+  int last = m->samples - 1, known[MOTION_UNITS] = { 0 }, at_end[MOTION_UNITS] = { 0 };
   for (int j = 0; j < 2 * pw_system_coordinates (s); j++) {
     int unit = pw_motion_unit (s, j);
     for (int k = 0; k < m->samples; k++) {
       double exact = reference->x[k * reference->width + j];
       if (isnan (exact)) continue; /* not compared */
       double d = fabs (m->x[k * m->width + j] - exact);
-      motion_raise (&error[MOTION_MOST + unit], d);
-      if (k == last) motion_raise (&error[MOTION_END + unit], d), known[unit] = 1;
+      motion_raise (&error[MOTION_MOST + unit], d), known[unit] = 1;
+      if (k == last) motion_raise (&error[MOTION_END + unit], d), at_end[unit] = 1;
     }
   }
-  for (int i = 0; i < MOTION_UNITS; i++)
-    if (!known[i]) error[MOTION_END + i] = NAN;
+  for (int i = 0; i < MOTION_UNITS; i++) {
+    if (!known[i]) error[MOTION_MOST + i] = NAN;
+    if (!at_end[i]) error[MOTION_END + i] = NAN;
+  }
 }
 
 /* The largest multiplier of the same unit as row i, since forces and moments are not compared with each other; 1 N or
@@ -109,4 +119,54 @@ void pw_motion_distance (const pw_system *s, const pw_motion *reference, const p
   for (int i = 0; i < MOTION_ERRORS; i++) error[i] = 0;
   motion_states (s, reference, m, error);
   motion_multipliers (s, reference, m, error);
+}
+
+/* ---- A run compared with a reference ---- */
+
+int pw_comparison_open (pw_comparison *c, const pw_cli_model *m, const char *path, int started, double t_end,
+                        pw_error *error) {
+  int status = PW_OK;
+  *c = (pw_comparison){ .error = { .source = path ? path : "the model" } };
+  if (path == NULL && !pw_system_has_reference (m->model)) return PW_OK;
+  if (path == NULL && started) {
+    fputs ("pinwheel: the model's reference solution holds for its own initial values: with --start errors are not "
+           "computed\n",
+           stderr);
+    return PW_OK;
+  }
+  if (path)
+    status = pw_motion_read (&c->reference, m->system, path, &t_end, 0, error);
+  else
+    status = pw_motion_reference (&c->reference, m->model, m->system, t_end, error);
+  return status == PW_OK ? pw_motion_open_at (&c->motion, m->system, &c->reference, error) : status;
+}
+
+void pw_comparison_close (pw_comparison *c) {
+  pw_motion_close (&c->reference);
+  pw_motion_close (&c->motion);
+}
+
+void pw_comparison_serialise (pw_comparison *c, pw_archive *a) {
+  int next = c->motion.next;
+  if (c->motion.samples == 0) return;
+  pw_archive_bytes (a, &next, sizeof next);
+  if (next < 0 || next > c->motion.samples) a->failed = 1;
+  if (a->failed) return;
+  c->motion.next = next;
+  pw_archive_bytes (a, c->motion.x, (size_t)next * (size_t)c->motion.width * sizeof *c->motion.x);
+}
+
+const pw_reference_error *pw_comparison_errors (pw_comparison *c, const pw_system *s) {
+  double error[MOTION_ERRORS];
+  if (c->motion.next == 0) return NULL;
+  c->motion.samples = c->reference.samples = c->motion.next; /* a run may have ended early */
+  pw_motion_distance (s, &c->reference, &c->motion, error);
+  c->error.samples = c->motion.next;
+  c->error.t = c->motion.t[c->motion.next - 1];
+  for (int i = 0; i < MOTION_UNITS; i++) {
+    c->error.end[i] = error[MOTION_END + i];
+    c->error.most[i] = error[MOTION_MOST + i];
+  }
+  c->error.reactions = error[MOTION_LAMBDA];
+  return &c->error;
 }

@@ -13,17 +13,20 @@ enum { MOTION_LENGTH, MOTION_ANGLE, MOTION_SPEED, MOTION_RATE, MOTION_UNITS };
 
 typedef struct {
   int samples, width; /* width: coordinates, velocities, multipliers */
+  int next;           /* index of the sample that is taken next */
   double *t;          /* samples [s] */
   double *x;          /* samples x width; NaN: not known */
 } pw_motion;
 
-/* Opens a motion of 1 to MOTION_SAMPLES samples.  Errors: PW_RESOURCE. */
-int pw_motion_open (pw_motion *m, const pw_system *s, int samples, pw_error *error);
+/* Opens a motion of 1 to MOTION_SAMPLES samples at the times t_end / samples, ..., t_end.  Errors: PW_RESOURCE. */
+int pw_motion_open (pw_motion *m, const pw_system *s, int samples, double t_end, pw_error *error);
+/* The same at the times of another motion. */
+int pw_motion_open_at (pw_motion *m, const pw_system *s, const pw_motion *times, pw_error *error);
 void pw_motion_close (pw_motion *m);
-/* Stores a sample as number i. */
-void pw_motion_take (pw_motion *m, const pw_system *s, int i, const pw_sample *sample);
-/* Sets the times t_end / samples, ..., t_end. */
-void pw_motion_times (pw_motion *m, double t_end);
+/* The time of the next sample; INFINITY if there is none. */
+double pw_motion_next (const pw_motion *m);
+/* Stores the next sample. */
+void pw_motion_take (pw_motion *m, const pw_system *s, const pw_sample *sample);
 /* The errors of a motion relative to a reference at the same times. */
 void pw_motion_distance (const pw_system *s, const pw_motion *reference, const pw_motion *m,
                          double error[MOTION_ERRORS]);
@@ -41,20 +44,16 @@ int pw_motion_read (pw_motion *m, const pw_system *s, const char *path, double *
 /* ---- A run compared with a reference ---- */
 
 typedef struct {
-  int on; /* 0: there is no reference */
-  pw_motion reference, motion;
-  int next; /* index of the next sample */
+  pw_motion reference, motion; /* of 0 samples: there is no reference */
   pw_reference_error error;
 } pw_comparison;
 
 /* Opens the reference of a run up to t_end: the table at `path`, otherwise the model's reference solution unless the run
- * has other initial values (`started`).  Close it in every case.  Errors: PW_INPUT, PW_RESOURCE. */
+ * has other initial values (`started`).  The run takes the samples of `motion`.  Close it in every case.  Errors: PW_INPUT,
+ * PW_RESOURCE. */
 int pw_comparison_open (pw_comparison *c, const pw_cli_model *m, const char *path, int started, double t_end,
                         pw_error *error);
 void pw_comparison_close (pw_comparison *c);
-/* The time of the next sample, or INFINITY. */
-double pw_comparison_next (const pw_comparison *c);
-void pw_comparison_take (pw_comparison *c, const pw_system *s, const pw_sample *sample);
 /* Saves or loads the samples of a checkpoint. */
 void pw_comparison_serialise (pw_comparison *c, pw_archive *a);
 /* The errors of the samples taken; NULL if there are none. */

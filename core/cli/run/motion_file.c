@@ -14,7 +14,6 @@ typedef struct {
   char *line;
   size_t room;
   long number;   /* of the line */
-  int failed;    /* errno of a failed read */
   int *place;    /* columns after the first: index in a motion, or -1 */
   double *sign;  /* factor to SI units; negative for reactions, which are -lambda */
   double second; /* unit of the time [s] */
@@ -27,42 +26,49 @@ typedef struct {
 
 enum { FILE_LINE = 16 << 20 }; /* bytes of the longest line */
 
-static int file_fail (file_reader *in, int why) {
-  if (in->failed == 0) in->failed = why;
-  return 0;
+static int file_unreadable (const file_reader *in, const char *why, pw_error *error) {
+  return pw_fail (error, PW_INPUT, "--reference %s: cannot be read: %s", in->path, why);
 }
 
-/* Reads up to the end of the line; 0 at the end of the file, or if it fails. */
-static int file_read_line (file_reader *in) {
+/* Doubles the room for a line. */
+static int file_grow (file_reader *in, pw_error *error) {
+  size_t room = in->room ? 2 * in->room : 1 << 12;
+  if (room > FILE_LINE)
+    return pw_fail (error, PW_INPUT, "--reference %s: cannot be read: line %ld has more than %d MB", in->path,
+                    in->number + 1, FILE_LINE >> 20);
+  char *more = realloc (in->line, room);
+  if (more == NULL) return pw_fail (error, PW_RESOURCE, "--reference %s: out of memory", in->path);
+  in->line = more;
+  in->room = room;
+  return PW_OK;
+}
+
+/* Reads up to the end of the line; PW_RETRY at the end of the file. */
+static int file_read_line (file_reader *in, pw_error *error) {
   size_t used = 0;
   do {
-    if (in->room - used < 2) {
-      size_t room = in->room ? 2 * in->room : 1 << 12;
-      char *more = room > FILE_LINE ? NULL : realloc (in->line, room);
-      if (more == NULL) return file_fail (in, room > FILE_LINE ? EOVERFLOW : ENOMEM);
-      in->line = more;
-      in->room = room;
-    }
+    if (in->room - used < 2 && file_grow (in, error) != PW_OK) return error->status;
     errno = 0;
     if (fgets (in->line + used, (int)(in->room - used), in->f) == NULL) {
-      if (!feof (in->f)) return file_fail (in, errno);
-      return used > 0;
+      if (!feof (in->f)) return file_unreadable (in, strerror (errno), error);
+      return used > 0 ? PW_OK : PW_RETRY;
     }
-    if (in->line[used] == 0) return file_fail (in, EILSEQ);
+    if (in->line[used] == 0) return file_unreadable (in, "a table is text, and this has a byte 0", error);
     used += strlen (in->line + used);
   } while (in->line[used - 1] != '\n');
-  return 1;
+  return PW_OK;
 }
 
-/* The next line that is not empty, without its end. */
-static int file_line (file_reader *in) {
-  while (file_read_line (in)) {
+/* The next line that is not empty, without its end; PW_RETRY at the end of the file. */
+static int file_line (file_reader *in, pw_error *error) {
+  for (;;) {
+    int status = file_read_line (in, error);
+    if (status != PW_OK) return status;
     size_t n = strlen (in->line);
-    while (n > 0 && (in->line[n - 1] == '\n' || in->line[n - 1] == '\r')) in->line[--n] = 0;
+    while (n > 0 && strchr ("\r\n", in->line[n - 1])) in->line[--n] = 0;
     in->number++;
-    if (n > 0) return 1;
+    if (n > 0) return PW_OK;
   }
-  return 0;
 }
 
 /* Splits off the next cell. */
@@ -114,7 +120,9 @@ static int file_column (file_reader *in, int i, const pw_system *s, const char *
 
 static int file_columns (file_reader *in, const pw_system *s, pw_error *error) {
   char example[300], unit[260], *rest;
-  if (!file_line (in)) return pw_fail (error, PW_INPUT, "--reference %s: the file is empty", in->path);
+  int status = file_line (in, error);
+  if (status == PW_RETRY) return pw_fail (error, PW_INPUT, "--reference %s: the file is empty", in->path);
+  if (status != PW_OK) return status;
   for (const char *c = in->line; *c; c++) in->columns += *c == ',';
   in->place = calloc ((size_t)in->columns + 1, sizeof *in->place);
   in->sign = calloc ((size_t)in->columns + 1, sizeof *in->sign);
@@ -138,9 +146,10 @@ static int file_columns (file_reader *in, const pw_system *s, pw_error *error) {
 
 /* The next line's time; PW_RETRY at the end. */
 static int file_time (file_reader *in, char **rest, double *t, pw_error *error) {
-  if (!file_line (in)) return PW_RETRY;
+  int status = file_line (in, error);
+  if (status != PW_OK) return status;
   *rest = in->line;
-  int status = file_number (in, file_cell (rest), t, error);
+  status = file_number (in, file_cell (rest), t, error);
   if (status == PW_OK) *t *= in->second;
   return status;
 }
@@ -207,35 +216,22 @@ static int file_read (file_reader *in, pw_motion *m, const pw_system *s, double 
   if (status != PW_OK) return status;
   rewind (in->f);
   in->number = 0;
-  file_line (in);
-  status = pw_motion_open (m, s, rows < MOTION_SAMPLES ? rows : MOTION_SAMPLES, error);
+  status = file_line (in, error);
+  if (status == PW_OK) status = pw_motion_open (m, s, rows < MOTION_SAMPLES ? rows : MOTION_SAMPLES, *t_end, error);
   return status == PW_OK ? file_rows (in, rows, *t_end, m, error) : status;
-}
-
-static int file_failed (const file_reader *in, pw_error *error) {
-  char line[60];
-  if (in->failed == ENOMEM) return pw_fail (error, PW_RESOURCE, "--reference %s: out of memory", in->path);
-  snprintf (line, sizeof line, "line %ld has more than %d MB", in->number + 1, FILE_LINE >> 20);
-  return pw_fail (error, PW_INPUT, "--reference %s: cannot be read: %s", in->path,
-                  in->failed == EOVERFLOW ? line
-                  : in->failed == EILSEQ  ? "a table is text, and this has a byte 0"
-                                          : strerror (in->failed));
 }
 
 int pw_motion_read (pw_motion *m, const pw_system *s, const char *path, double *t_end, int whole, pw_error *error) {
   const char *why;
   file_reader in = { .path = path, .f = pw_open_input (path, &why) };
   if (in.f == NULL) return pw_fail (error, pw_open_input_status (), "--reference %s: cannot be read: %s", path, why);
-  pw_error own = { 0 };
-  file_read (&in, m, s, t_end, whole, &own);
-  if (in.failed) own = (pw_error){ 0 }; /* after a read error the file is not reported as empty or incomplete */
-  if (in.failed) file_failed (&in, &own);
-  if (own.status != PW_OK) pw_fail (error, own.status, "%s", own.text);
+  int status = file_read (&in, m, s, t_end, whole, error);
+  if (status == PW_RETRY) status = file_unreadable (&in, "another program has changed it", error);
   fclose (in.f);
   free (in.line);
   free (in.place);
   free (in.sign);
   pw_names_close (&in.index);
   pw_arena_free (&in.names);
-  return own.status;
+  return status;
 }

@@ -6,7 +6,12 @@
 #include "print_table.h"
 #include "report.h"
 
-enum { REPORT_MOVED = 8, REPORT_BODIES = 20, REPORT_ROWS = 24, REPORT_TEXT = 400 };
+enum {
+  REPORT_MOVED = 8, /* changed states, or messages of a kind, at most */
+  REPORT_BODIES = 20,
+  REPORT_ROWS = 24, /* of reactions, or of internal coordinates */
+  REPORT_TEXT = 400 /* longest description of a redundant equation, end included */
+};
 
 static void report_more (FILE *f, int more, const char *hint) {
   if (more > 0) fprintf (f, "  and %d more%s\n", more, hint);
@@ -38,12 +43,8 @@ static void report_atol (pw_run *r, const pw_system *s, double atol) {
 
 void pw_report_settings (pw_run *r, const pw_system *s, const char *method, const pw_cli_line *l,
                          const pw_settings *settings) {
-  const pw_method *integrator;
-  int stabilisation;
-  if (pw_method_parse (method, &integrator, &stabilisation, &(pw_error){ 0 }) != PW_OK) return;
-  int adaptive = pw_method_adaptive (integrator, method);
   pw_cli_unused (method, l);
-  if (adaptive)
+  if (pw_cli_adaptive (method) == 1)
     report_atol (r, s, settings->atol);
   else
     report_step (r, fmin (settings->step, settings->span));

@@ -121,11 +121,10 @@ static int run_open (run *x, pw_error *error) {
   if (status == PW_OK) status = run_engine (x, error);
   if (status == PW_OK) status = pw_checkpoints_prepare (x, error);
   if (status != PW_OK) return status;
-  if ((x->plots_path || x->animate_path) &&
-      (x->plots = pw_plots_open (x->plots_path, x->animate_path != NULL, x->m.model, x->m.system, x->t_end, error)) ==
-          NULL)
-    return error->status;
-  if (x->plots && pw_plots_style (x->plots, x->line.width, x->colour, error) != PW_OK) return error->status;
+  if (x->plots_path || x->animate_path) {
+    x->plots = pw_plots_open (x->plots_path, x->animate_path != NULL, x->m.model, x->m.system, x->t_end, error);
+    if (x->plots == NULL || pw_plots_style (x->plots, x->line.width, x->colour, error) != PW_OK) return error->status;
+  }
   status = pw_comparison_open (&x->comparison, &x->m, x->reference_path, x->line.starts != NULL, x->t_end, error);
   if (status != PW_OK) return status;
   pw_limit_start (&x->limit);
@@ -167,9 +166,9 @@ static int run_take_samples (run *x, pw_error *error) {
     status = pw_run_sample (x->r, pw_plots_next (x->plots), &sample, error);
     if (status == PW_OK) pw_plots_add (x->plots, &sample);
   }
-  while (status == PW_OK && pw_comparison_next (&x->comparison) <= now) {
-    status = pw_run_sample (x->r, pw_comparison_next (&x->comparison), &sample, error);
-    if (status == PW_OK) pw_comparison_take (&x->comparison, x->m.system, &sample);
+  while (status == PW_OK && pw_motion_next (&x->comparison.motion) <= now) {
+    status = pw_run_sample (x->r, pw_motion_next (&x->comparison.motion), &sample, error);
+    if (status == PW_OK) pw_motion_take (&x->comparison.motion, x->m.system, &sample);
   }
   return status;
 }
@@ -178,7 +177,7 @@ static int run_take_samples (run *x, pw_error *error) {
 static int run_batch (run *x, pw_error *error) {
   double due =
       fmin (fmin (run_next_row (x), x->plots ? pw_plots_next (x->plots) : INFINITY), fmin (x->check.due, x->t_end));
-  due = fmin (due, pw_comparison_next (&x->comparison));
+  due = fmin (due, pw_motion_next (&x->comparison.motion));
   double start = pw_cpu_clock ();
   int status;
   long n = 0;

@@ -51,7 +51,7 @@ typedef struct {
   int resumed;                     /* 1: the state of the checkpoint has been loaded */
   long batch;                      /* steps between checks of signals and progress */
   double cpu;                      /* of the method [s] */
-  char part[PW_RUN_OUTPUTS][4200]; /* paths of the incomplete files that are kept, or "" */
+  char part[PW_RUN_OUTPUTS][4200]; /* paths of the incomplete files that are kept, PATH_MAX and an ending, or "" */
   int lost;                        /* 1: the table or the summary could not be written */
 } pw_run_command;
 

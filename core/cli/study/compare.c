@@ -1,7 +1,8 @@
 /* pinwheel compare: accuracy and cost of methods.  A row for each method and each tolerance or step: one run with samples
  * and ledger, then timed runs without. */
+#include <gsl/gsl_sort.h>
+#include <gsl/gsl_statistics.h>
 #include <math.h>
-#include <stdlib.h>
 #include <string.h>
 #include "reference.h"
 
@@ -43,12 +44,13 @@ enum {
   COLUMN_REPEATS
 };
 
-static const char *compare_ladder (const pw_row *r, char text[STUDY_NAME]) {
-  (void)text;
+static const char *compare_ladder (const pw_row *r) {
   return r->adaptive ? "rtol" : "step";
 }
 
-static const char *compare_below (const pw_row *r, char text[STUDY_NAME]);
+static const char *compare_below (const pw_row *r) {
+  return r->bounds;
+}
 
 static const pw_study_column compare_columns[] = {
   { "method", .text = pw_study_method },
@@ -81,14 +83,6 @@ static const pw_study_column compare_columns[] = {
   { .name = "repeats" },
   { .name = NULL },
 };
-
-/* The names of errors below the uncertainty of the reference. */
-static const char *compare_below (const pw_row *r, char text[STUDY_NAME]) {
-  *text = 0;
-  for (int i = COLUMN_ERROR; i < COLUMN_ERROR + MOTION_ERRORS; i++)
-    if (r->below >> i & 1) strcat (strcat (text, *text ? " " : ""), compare_columns[i].name);
-  return text;
-}
 
 /* ---- Ladders ---- */
 
@@ -123,16 +117,14 @@ static double ladder_level (ladder l, int adaptive, int i) {
 
 /* A row for each level of each method. */
 static int compare_plan_rows (pw_study *x, const ladder of[2], pw_error *error) {
-  const pw_method *integrator;
-  int stabilisation;
   for (int i = 0; i < x->methods; i++) {
-    int adaptive = pw_method_parse (x->method[i], &integrator, &stabilisation, NULL) == PW_OK &&
-                   pw_method_adaptive (integrator, x->method[i]);
+    int adaptive = pw_cli_adaptive (x->method[i]);
     double level;
     for (int k = 0; (level = ladder_level (of[adaptive], adaptive, k)) > 0; k++) {
       pw_row *r = pw_study_add (x, 0, i, x->method[i], 1, error);
       if (r == NULL) return PW_RESOURCE;
       r->adaptive = adaptive;
+      r->before = k;
       r->level = r->value[COLUMN_LEVEL] = level;
       r->value[COLUMN_REPEATS] = 0;
     }
@@ -172,6 +164,7 @@ static void compare_errors (const pw_compare *x, const pw_motion *motion, pw_row
     if (!(error[i] <= reference->uncertainty[i])) continue;
     error[i] = reference->uncertainty[i];
     r->below |= 1u << (COLUMN_ERROR + i);
+    strcat (strcat (r->bounds, *r->bounds ? " " : ""), compare_columns[COLUMN_ERROR + i].name);
   }
 }
 
@@ -188,16 +181,12 @@ static double compare_order_of (const pw_compare *x, const pw_row *r) {
   return known && finer > COMPARE_FINER ? log (before->value[COLUMN_ERROR + i] / error[i]) / log (finer) : NAN;
 }
 
-/* The observed order of convergence of a row with `before` levels of its method before it: only in the asymptotic range,
- * where the last two orders agree and errors are well above the uncertainty of the reference; else NaN. */
-static double compare_order (const pw_compare *x, const pw_row *r, int before) {
-  double order = before >= 2 ? compare_order_of (x, r) : NAN, last = before >= 2 ? compare_order_of (x, r - 1) : NAN;
+/* The observed order of convergence: only in the asymptotic range, where the last two orders agree and errors are well
+ * above the uncertainty of the reference; else NaN. */
+static double compare_order (const pw_compare *x, const pw_row *r) {
+  double order = r->before >= 2 ? compare_order_of (x, r) : NAN,
+         last = r->before >= 2 ? compare_order_of (x, r - 1) : NAN;
   return order > 0 && fabs (order - last) <= COMPARE_AGREE * order ? order : NAN;
-}
-
-static int compare_numbers (const void *a, const void *b) {
-  double x = *(const double *)a, y = *(const double *)b;
-  return (x > y) - (x < y);
 }
 
 static int compare_times (pw_compare *x, pw_row *r, pw_error *error) {
@@ -208,8 +197,8 @@ static int compare_times (pw_compare *x, pw_row *r, pw_error *error) {
     if (status != PW_OK) return status;
     sum += cpu[n++] = r->cpu;
   }
-  qsort (cpu, (size_t)n, sizeof *cpu, compare_numbers);
-  r->cpu = n % 2 ? cpu[n / 2] : (cpu[n / 2 - 1] + cpu[n / 2]) / 2;
+  gsl_sort (cpu, 1, (size_t)n);
+  r->cpu = gsl_stats_median_from_sorted_data (cpu, 1, (size_t)n);
   r->value[COLUMN_REPEATS] = n;
   if (n < 2) return PW_OK;
   r->value[COLUMN_SPREAD] = cpu[n - 1] - cpu[0];
@@ -217,14 +206,14 @@ static int compare_times (pw_compare *x, pw_row *r, pw_error *error) {
   return PW_OK;
 }
 
-/* The CPU time of a row predicted from the `before` levels of its method before it: a halved step doubles it; the factor of a
- * decade is that of the last one, or at first that of a method of order 5. */
-static double compare_predict (const pw_row *r, int before) {
+/* The CPU time of a row predicted from the levels of its method before it: a halved step doubles it; the factor of a decade
+ * is that of the last one, or at first that of a method of order 5. */
+static double compare_predict (const pw_row *r) {
   const pw_row *last = r - 1;
-  if (before == 0 || last->state == ROW_FAILED || last->state == ROW_REFUSED) return 0;
+  if (r->before == 0 || last->state == ROW_FAILED || last->state == ROW_REFUSED) return 0;
   if (last->state != ROW_DONE) return INFINITY;
   if (!r->adaptive) return 2 * last->cpu;
-  if (before < 2 || last[-1].state != ROW_DONE) return 1.6 * last->cpu;
+  if (r->before < 2 || last[-1].state != ROW_DONE) return 1.6 * last->cpu;
   return fmax (last->cpu / last[-1].cpu, 1) * last->cpu;
 }
 
@@ -232,12 +221,9 @@ static double compare_predict (const pw_row *r, int before) {
 static int compare_sample (pw_compare *x, pw_row *r, pw_error *error) {
   pw_study *s = &x->study;
   pw_motion motion;
-  const pw_motion *of = &x->reference.motion;
-  int known = x->reference.known;
-  int status = pw_motion_open (&motion, s->m.system, known ? of->samples : MOTION_SAMPLES, error);
+  int status = x->reference.known ? pw_motion_open_at (&motion, s->m.system, &x->reference.motion, error)
+                                  : pw_motion_open (&motion, s->m.system, MOTION_SAMPLES, s->t_end, error);
   if (status != PW_OK) return status;
-  pw_motion_times (&motion, s->t_end);
-  if (known) memcpy (motion.t, of->t, (size_t)of->samples * sizeof *of->t);
   status = pw_motion_run (s, r, &motion, error);
   if (status == PW_OK) compare_errors (x, &motion, r);
   pw_motion_close (&motion);
@@ -248,9 +234,7 @@ static int compare_measure (pw_study *s, pw_row *r, pw_error *error) {
   pw_compare *x = (pw_compare *)s;
   pw_error own = { 0 };
   char limit[32], text[60] = "";
-  int before = 0;
-  while (r - before > s->row && r[-before - 1].line == r->line) before++;
-  double predicted = compare_predict (r, before);
+  double predicted = compare_predict (r);
   pw_format (limit, s->cpu_end, 4);
   if (predicted > s->cpu_end) {
     r->state = ROW_SKIPPED;
@@ -265,7 +249,7 @@ static int compare_measure (pw_study *s, pw_row *r, pw_error *error) {
     snprintf (r->reason, sizeof r->reason, "too slow: the limit of %s s was reached at t = %s s", limit,
               pw_format (text, r->t, 4));
   status = pw_study_outcome (s, r, status, &own, error);
-  r->value[COLUMN_ORDER] = compare_order (x, r, before);
+  r->value[COLUMN_ORDER] = compare_order (x, r);
   r->value[COLUMN_POSITION] = r->statistics.position;
   r->value[COLUMN_VELOCITY] = r->statistics.velocity;
   r->value[COLUMN_BALANCE] = r->balance;
@@ -346,10 +330,7 @@ static int compare_command (void *options, pw_error *error) {
 
 static const struct poptOption compare_options[] = {
   PW_OPTION_GROUP ("Comparison"),
-  PW_TEXT_OPTION (
-      pw_study, methods_text, "methods", 'm', "A,B,...|all",
-      "Methods, separated by commas; rk4+all: every stabilisation of rk4; all+ggl: every integrator with ggl; all: "
-      "every method (default: eight representative ones)"),
+  PW_STUDY_METHODS_OPTION ("default: eight representative ones"),
   PW_FLAG_OPTION (pw_compare, table, "table", "Print every run, not only the conclusion"),
   PW_TEXT_OPTION (pw_compare, rtol_text, "rtol-ladder", 0, "FROM:TO",
                   "Tolerances of adaptive methods, by decades (default 1e-3:1e-12)"),

@@ -4,7 +4,11 @@
 #include <string.h>
 #include "reference.h"
 
-enum { CONCLUSION_LEVELS = 3, CONCLUSION_WIDTH = 14, CONCLUSION_REASON = 70 };
+enum {
+  CONCLUSION_LEVELS = 3,
+  CONCLUSION_WIDTH = 14, /* of a column, at least */
+  CONCLUSION_REASON = 70 /* characters of the reason of a failure, at most */
+};
 static const int conclusion_digits[CONCLUSION_LEVELS] = { 3, 6, 9 };
 
 typedef struct {
@@ -25,17 +29,17 @@ typedef struct {
 /* ---- Errors ---- */
 
 /* Lengths are relative to the largest one of the motion; angles too, unless it exceeds 1 rad. */
-static double conclusion_scale (const pw_reference *t, int unit) {
-  double size = t->size[unit] > 0 ? t->size[unit] : 1;
+static double conclusion_scale (const pw_reference *ref, int unit) {
+  double size = ref->size[unit] > 0 ? ref->size[unit] : 1;
   return unit == MOTION_ANGLE ? fmin (size, 1) : size;
 }
 
 /* The larger of the relative errors of lengths and angles, as far as they are compared; NaN if one is unknown. */
-static double conclusion_error (const pw_reference *t, const double *of) {
+static double conclusion_error (const pw_reference *ref, const double *of) {
   double most = 0;
   for (int unit = MOTION_LENGTH; unit <= MOTION_ANGLE; unit++) {
-    double error = of[unit] / conclusion_scale (t, unit);
-    if (t->uncertainty[MOTION_MOST + unit] > 0 && !(error <= most) && !isnan (most)) most = error;
+    double error = of[unit] / conclusion_scale (ref, unit);
+    if (ref->uncertainty[MOTION_MOST + unit] > 0 && !(error <= most) && !isnan (most)) most = error;
   }
   return most;
 }
@@ -87,15 +91,15 @@ static void conclusion_find (conclusion *x) {
 
 static void conclusion_heading (const conclusion *x) {
   static const char *const unit[] = { "m", "rad" }, *const name[] = { "lengths", "angles" };
-  const pw_reference *t = x->reference;
+  const pw_reference *ref = x->reference;
   const char *between = "";
   char text[32];
   printf ("Processor time for 3, 6 and 9 correct digits, relative to the cheapest method.\n"
           "Digits: the largest error of a coordinate at %d times up to %s s, relative to\n",
-          t->motion.samples, pw_format (text, x->study->t_end, 6));
+          ref->motion.samples, pw_format (text, x->study->t_end, 6));
   for (int i = MOTION_LENGTH; i <= MOTION_ANGLE; i++)
-    if (t->uncertainty[MOTION_MOST + i] > 0) {
-      printf ("%s%s %s (%s)", between, pw_format (text, conclusion_scale (t, i), 3), unit[i], name[i]);
+    if (ref->uncertainty[MOTION_MOST + i] > 0) {
+      printf ("%s%s %s (%s)", between, pw_format (text, conclusion_scale (ref, i), 3), unit[i], name[i]);
       between = ", ";
     }
   printf (". The reference has %.1f digits%s.\n\n", -log10 (x->uncertainty),
@@ -144,26 +148,25 @@ static void conclusion_table (const conclusion *x) {
 
 /* ---- Runs that do not reach the end ---- */
 
-/* The first run of a method in a state; NULL if there is none. */
-static const pw_row *conclusion_first (const pw_study *x, int line, unsigned states) {
+/* The number of runs of a method in these states, bits 1 << ROW_DONE etc., and the first of them or NULL. */
+static int conclusion_count (const pw_study *x, int line, unsigned states, const pw_row **first) {
+  int count = 0;
+  *first = NULL;
   for (const pw_row *r = x->row; r < x->row + x->rows; r++)
-    if (r->line == line && states >> r->state & 1) return r;
-  return NULL;
+    if (r->line == line && states >> r->state & 1 && count++ == 0) *first = r;
+  return count;
 }
 
 static void conclusion_failure (const pw_study *x, int line) {
-  int runs = 0, failures = 0;
   char text[32];
-  const pw_row *first = conclusion_first (x, line, 1u << ROW_FAILED | 1u << ROW_REFUSED);
+  const pw_row *first, *any;
+  int failures = conclusion_count (x, line, 1u << ROW_FAILED | 1u << ROW_REFUSED, &first);
   if (first == NULL) return;
-  for (const pw_row *r = x->row; r < x->row + x->rows; r++) {
-    runs += r->line == line;
-    failures += r->line == line && (r->state == ROW_FAILED || r->state == ROW_REFUSED);
-  }
   int cut = strlen (first->reason) > CONCLUSION_REASON;
-  pw_cli_print (stdout, "%s: %d of %d runs %s, first at %s %s: %.*s%s\n", first->method, failures, runs,
-                first->state == ROW_FAILED ? "fail" : "are refused", first->adaptive ? "rtol" : "step",
-                pw_format (text, first->level, 4), CONCLUSION_REASON, first->reason, cut ? "..." : "");
+  pw_cli_print (stdout, "%s: %d of %d runs %s, first at %s %s: %.*s%s\n", first->method, failures,
+                conclusion_count (x, line, ~0u, &any), first->state == ROW_FAILED ? "fail" : "are refused",
+                first->adaptive ? "rtol" : "step", pw_format (text, first->level, 4), CONCLUSION_REASON, first->reason,
+                cut ? "..." : "");
 }
 
 /* One line for all methods that the limit has ended. */
@@ -171,7 +174,8 @@ static void conclusion_limit (const pw_study *x) {
   char text[32];
   int found = 0;
   for (int i = 0; i < x->methods; i++) {
-    const pw_row *first = conclusion_first (x, i, 1u << ROW_STOPPED | 1u << ROW_SKIPPED);
+    const pw_row *first;
+    conclusion_count (x, i, 1u << ROW_STOPPED | 1u << ROW_SKIPPED, &first);
     if (first == NULL) continue;
     if (found++ == 0)
       printf ("stopped by the limit of %s s: ", pw_format (text, x->cpu_end, 4));
@@ -182,9 +186,9 @@ static void conclusion_limit (const pw_study *x) {
   if (found) putchar ('\n');
 }
 
-void pw_conclusion_print (const pw_study *s, const pw_reference *t, int column) {
-  conclusion x = { .study = s, .reference = t, .column = column, .width = CONCLUSION_WIDTH };
-  x.uncertainty = conclusion_error (t, t->uncertainty + MOTION_MOST);
+void pw_conclusion_print (const pw_study *s, const pw_reference *ref, int column) {
+  conclusion x = { .study = s, .reference = ref, .column = column, .width = CONCLUSION_WIDTH };
+  x.uncertainty = conclusion_error (ref, ref->uncertainty + MOTION_MOST);
   for (int i = 0; i < s->methods; i++)
     if ((int)strlen (s->method[i]) > x.width) x.width = (int)strlen (s->method[i]);
   conclusion_find (&x);

@@ -15,19 +15,24 @@ enum { DRIFT_POSITION, DRIFT_VELOCITY, DRIFT_BALANCE, DRIFT_QUANTITIES };
 enum { DRIFT_METHODS, DRIFT_BAUMGARTE, DRIFT_PROJECTION, DRIFT_GROUPS };
 static const char *const drift_group[DRIFT_GROUPS] = { "methods", "baumgarte", "projection" };
 
+/* Options whose effect is shown, and their values unless --vary gives them. */
+enum { DRIFT_ALPHA, DRIFT_BETA, DRIFT_EVERY, DRIFT_OPTIONS };
+static const char *const drift_option[] = { "alpha", "beta", "every", NULL };
+static const char *const drift_usual[] = { "alpha=1,3,10,30,100,300,1000", "beta=1,10,100,1000",
+                                           "every=1,2,5,10,20,50,100" };
+
 typedef struct {
   pw_study study;
   const char **vary;
   int only_methods;
-  pw_grid alpha, beta, every; /* one axis each */
+  pw_axis axis[DRIFT_OPTIONS]; /* values of the options */
 } pw_drift;
 
 /* ---- Columns: for each quantity the largest value of all steps and of the last part, and the growth ---- */
 
 enum { COLUMN_ALPHA = 2, COLUMN_BETA, COLUMN_EVERY, COLUMN_T = 6, COLUMN_QUANTITY, COLUMN_STEPS = 16 };
 
-static const char *drift_group_name (const pw_row *r, char text[STUDY_NAME]) {
-  (void)text;
+static const char *drift_group_name (const pw_row *r) {
   return drift_group[r->group];
 }
 
@@ -58,43 +63,18 @@ static const pw_study_column drift_columns[] = {
 
 /* ---- Values of options ---- */
 
-/* Reads one "NAME=RANGE" into a grid of one axis. */
-static int drift_axis (pw_grid *g, const char *text, pw_error *error) {
-  const char *const list[] = { text, NULL };
-  pw_grid_free (g);
-  int status = pw_grid_read (g, list, error);
-  for (long i = 0; status == PW_OK && i < g->rows; i++) {
-    double value = pw_grid_value (g, 0, i);
-    const char *expected = pw_domain_check (strcmp (g->axis->name, "every") == 0 ? PW_COUNT : PW_NONNEGATIVE, value);
-    if (*expected)
-      status = pw_fail (error, PW_INPUT, "--vary %.100s=%.100s: expected %s", g->axis->name, g->axis->range, expected);
-  }
-  return status;
-}
-
 static int drift_vary (pw_drift *x, const char *text, pw_error *error) {
-  const struct {
-    const char *name;
-    pw_grid *grid;
-  } known[] = { { "alpha", &x->alpha }, { "beta", &x->beta }, { "every", &x->every } };
-  char name[60];
+  char name[60], hint[PW_HINT];
   snprintf (name, sizeof name, "%.*s", (int)strcspn (text, "="), text);
-  pw_nearest near = { .sought = name };
-  for (size_t i = 0; i < sizeof known / sizeof *known; i++) {
-    if (strcmp (known[i].name, name) == 0) return drift_axis (known[i].grid, text, error);
-    pw_nearest_try (&near, known[i].name);
+  int option = pw_find_name (drift_option, sizeof *drift_option, name, hint);
+  if (option < 0) return pw_fail (error, PW_INPUT, "--vary %.100s: alpha, beta and every can be varied%s", text, hint);
+  pw_axis *a = &x->axis[option];
+  pw_axis_free (a);
+  int status = pw_axis_read (a, text, error);
+  for (long i = 0; status == PW_OK && i < a->count; i++) {
+    const char *expected = pw_domain_check (option == DRIFT_EVERY ? PW_COUNT : PW_NONNEGATIVE, pw_axis_value (a, i));
+    if (*expected) status = pw_fail (error, PW_INPUT, "--vary %.100s=%.100s: expected %s", a->name, a->range, expected);
   }
-  return pw_fail (error, PW_INPUT, "--vary %.100s: alpha, beta and every can be varied%s", text,
-                  pw_nearest_text (&near));
-}
-
-/* The defaults, then the options. */
-static int drift_axes (pw_drift *x, pw_error *error) {
-  static const char *const usual[] = { "alpha=1,3,10,30,100,300,1000", "beta=1,10,100,1000", "every=1,2,5,10,20,50,100",
-                                       NULL };
-  int status = PW_OK;
-  for (const char *const *v = usual; status == PW_OK && *v; v++) status = drift_vary (x, *v, error);
-  for (const char **v = x->vary; status == PW_OK && v && *v; v++) status = drift_vary (x, *v, error);
   return status;
 }
 
@@ -118,18 +98,19 @@ static int drift_add (pw_drift *x, int group, int line, const char *method, cons
   if (r == NULL) return PW_RESOURCE;
   snprintf (r->label, sizeof r->label, "%s", label);
   r->point[0][0] = r->value[column] = value;
-  if (group == DRIFT_BAUMGARTE) r->value[COLUMN_BETA] = pw_grid_value (&x->beta, 0, line);
+  if (group == DRIFT_BAUMGARTE) r->value[COLUMN_BETA] = pw_axis_value (&x->axis[DRIFT_BETA], line);
   return PW_OK;
 }
 
 /* Pairs of alpha and beta; the figure has a line for each beta. */
 static int drift_plan_baumgarte (pw_drift *x, pw_error *error) {
   const char *integrator = drift_integrator (&x->study, "alpha");
+  const pw_axis *alphas = &x->axis[DRIFT_ALPHA], *betas = &x->axis[DRIFT_BETA];
   char a[32], b[32], method[STUDY_NAME], label[60];
   int status = PW_OK;
-  for (long j = 0; j < x->beta.rows; j++)
-    for (long i = 0; i < x->alpha.rows && status == PW_OK; i++) {
-      double alpha = pw_grid_value (&x->alpha, 0, i), beta = pw_grid_value (&x->beta, 0, j);
+  for (long j = 0; j < betas->count; j++)
+    for (long i = 0; i < alphas->count && status == PW_OK; i++) {
+      double alpha = pw_axis_value (alphas, i), beta = pw_axis_value (betas, j);
       snprintf (label, sizeof label, "beta = %s /s", pw_format (b, beta, 6));
       snprintf (method, sizeof method, "%s+baumgarte:alpha=%s:beta=%s", integrator, pw_format (a, alpha, 9),
                 pw_format (b, beta, 9));
@@ -145,8 +126,8 @@ static int drift_plan_projection (pw_drift *x, pw_error *error) {
   char method[STUDY_NAME];
   int status = PW_OK;
   for (int j = 0; j < 2; j++)
-    for (long i = 0; i < x->every.rows && status == PW_OK; i++) {
-      double every = pw_grid_value (&x->every, 0, i);
+    for (long i = 0; i < x->axis[DRIFT_EVERY].count && status == PW_OK; i++) {
+      double every = pw_axis_value (&x->axis[DRIFT_EVERY], i);
       snprintf (method, sizeof method, "%s+projection:%s:every=%.0f", integrator, metric[j], every);
       status = drift_add (x, DRIFT_PROJECTION, j, method, metric[j], COLUMN_EVERY, every, error);
     }
@@ -155,7 +136,9 @@ static int drift_plan_projection (pw_drift *x, pw_error *error) {
 
 static int drift_plan_rows (pw_drift *x, pw_error *error) {
   pw_study *s = &x->study;
-  double most = s->methods + (double)x->alpha.rows * (double)x->beta.rows + 2 * (double)x->every.rows;
+  const pw_axis *a = x->axis;
+  double most =
+      s->methods + (double)a[DRIFT_ALPHA].count * (double)a[DRIFT_BETA].count + 2 * (double)a[DRIFT_EVERY].count;
   if (most > DRIFT_MOST) return pw_fail (error, PW_INPUT, "%.0f runs are too many; vary less", most);
   for (int i = 0; i < s->methods; i++) {
     pw_row *r = pw_study_add (s, DRIFT_METHODS, i, s->method[i], DRIFT_PARTS, error);
@@ -175,7 +158,8 @@ static int drift_plan (pw_study *s, pw_error *error) {
   s->settings.ledger = 1;
   if (status == PW_OK)
     status = pw_study_read_methods (s, s->methods_text ? s->methods_text : "rk4+all,ida+all,galpha+all", error);
-  if (status == PW_OK) status = drift_axes (x, error);
+  for (int i = 0; status == PW_OK && i < DRIFT_OPTIONS; i++) status = drift_vary (x, drift_usual[i], error);
+  for (const char **v = x->vary; status == PW_OK && v && *v; v++) status = drift_vary (x, *v, error);
   return status == PW_OK ? drift_plan_rows (x, error) : status;
 }
 
@@ -191,7 +175,7 @@ static void drift_raise (double *most, double value) {
   if (!isnan (*most) && !(value <= *most)) *most = value;
 }
 
-/* The part of the run that a time belongs to, its end included. */
+/* The part of the run that a time belongs to, its end included, up to round-off. */
 static int drift_part (const pw_study *x, double t) {
   int k = (int)ceil (t / x->t_end * DRIFT_PARTS - 1e-9) - 1;
   return k < 0 ? 0 : k < DRIFT_PARTS ? k : DRIFT_PARTS - 1;
@@ -282,10 +266,7 @@ static int drift_figures (pw_study *x, pw_error *error) {
 }
 
 static void drift_close (pw_study *s) {
-  pw_drift *x = (pw_drift *)s;
-  pw_grid_free (&x->alpha);
-  pw_grid_free (&x->beta);
-  pw_grid_free (&x->every);
+  for (int i = 0; i < DRIFT_OPTIONS; i++) pw_axis_free (&((pw_drift *)s)->axis[i]);
 }
 
 static int drift_command (void *options, pw_error *error) {
@@ -308,10 +289,7 @@ static int drift_command (void *options, pw_error *error) {
 
 static const struct poptOption drift_options[] = {
   PW_OPTION_GROUP ("Comparison"),
-  PW_TEXT_OPTION (
-      pw_study, methods_text, "methods", 'm', "A,B,...|all",
-      "Methods, separated by commas; rk4+all: every stabilisation of rk4; all+ggl: every integrator with ggl; all: "
-      "every method (default rk4+all,ida+all,galpha+all)"),
+  PW_STUDY_METHODS_OPTION ("default rk4+all,ida+all,galpha+all"),
   PW_STEP_OPTIONS,
   PW_LIST_OPTION (
       pw_drift, vary, "vary", 'v', "OPTION=RANGE",

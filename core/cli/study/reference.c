@@ -4,10 +4,10 @@
 #include <string.h>
 #include "reference.h"
 
-#define REFERENCE_LIMIT 10     /* CPU time of a candidate, at least [s] */
-#define REFERENCE_LOOSEST 1e-9 /* tolerances are loosened up to this if a method fails, */
-#define REFERENCE_FEWEST 1000  /* fixed steps up to t_end over this, */
-#define REFERENCE_STEPS 1e5    /* from t_end over this, or the smallest step of the comparison */
+#define REFERENCE_LIMIT 10     /* smallest limit of the CPU time of a candidate [s] */
+#define REFERENCE_LOOSEST 1e-9 /* the tolerance of a method that fails is loosened up to this, */
+#define REFERENCE_FEWEST 1000  /* and its step of fixed size enlarged up to t_end over this */
+#define REFERENCE_STEPS 1e5    /* steps of fixed size are t_end over this at first, or the smallest of the comparison */
 #define REFERENCE_ROUND_OFF 8  /* eps of the largest number: the smallest uncertainty */
 
 /* ---- Runs ---- */
@@ -15,68 +15,67 @@
 typedef struct {
   pw_study_visitor base;
   pw_motion *motion;
-  int next; /* sample */
 } sampler;
 
 /* Stores the samples up to the time reached. */
 static int sampler_visit (pw_study_visitor *v, pw_run *run, pw_error *error) {
-  sampler *x = (sampler *)v;
-  const pw_motion *m = x->motion;
+  pw_motion *m = ((sampler *)v)->motion;
   pw_sample sample;
-  for (; x->next < m->samples && m->t[x->next] <= pw_run_time (run); x->next++) {
-    int status = pw_run_sample (run, m->t[x->next], &sample, error);
+  while ((v->due = pw_motion_next (m)) <= pw_run_time (run)) {
+    int status = pw_run_sample (run, v->due, &sample, error);
     if (status != PW_OK) return status;
-    pw_motion_take (x->motion, v->study->m.system, x->next, &sample);
+    pw_motion_take (m, v->study->m.system, &sample);
     v->row->balance = fmax (v->row->balance, fabs (sample.balance));
   }
-  v->due = x->next < m->samples ? m->t[x->next] : INFINITY;
   return PW_OK;
 }
 
 int pw_motion_run (pw_study *x, pw_row *r, pw_motion *motion, pw_error *error) {
-  sampler v = { { .visit = sampler_visit, .study = x, .row = r }, motion, 0 };
+  sampler v = { { .visit = sampler_visit, .study = x, .row = r }, motion };
   pw_settings settings = { .span = x->t_end, .ledger = motion != NULL };
   *(r->adaptive ? &settings.rtol : &settings.step) = r->level;
-  if (motion) r->balance = 0;
+  if (motion) r->balance = motion->next = 0;
   return pw_study_run (x, r, &settings, motion ? &v.base : NULL, error);
 }
 
 /* ---- Uncertainty ---- */
 
 /* Sizes of coordinates and velocities; raises uncertainties to round-off. */
-static void reference_floor (const pw_system *s, pw_reference *t) {
+static void reference_floor (const pw_system *s, pw_reference *ref) {
   int n = pw_system_coordinates (s), loads = 0;
-  for (int k = 0; k < t->motion.samples; k++)
-    for (int j = 0; j < t->motion.width; j++) {
-      double value = fabs (t->motion.x[k * t->motion.width + j]);
+  for (int k = 0; k < ref->motion.samples; k++)
+    for (int j = 0; j < ref->motion.width; j++) {
+      double value = fabs (ref->motion.x[k * ref->motion.width + j]);
       if (isnan (value)) continue;
       loads |= j >= 2 * n;
-      if (j < 2 * n) t->size[pw_motion_unit (s, j)] = fmax (t->size[pw_motion_unit (s, j)], value);
+      if (j < 2 * n) ref->size[pw_motion_unit (s, j)] = fmax (ref->size[pw_motion_unit (s, j)], value);
     }
   for (int i = 0; i < MOTION_ERRORS; i++) {
-    double size = i < MOTION_LAMBDA ? t->size[i % MOTION_UNITS] : loads;
-    if (i < MOTION_MOST) t->uncertainty[i] = t->uncertainty[i + MOTION_MOST]; /* at the end it may be accidental */
-    t->uncertainty[i] = fmax (t->uncertainty[i], REFERENCE_ROUND_OFF * DBL_EPSILON * size);
+    double size = i < MOTION_LAMBDA ? ref->size[i % MOTION_UNITS] : loads;
+    if (i < MOTION_MOST) ref->uncertainty[i] = ref->uncertainty[i + MOTION_MOST]; /* at the end it may be accidental */
+    ref->uncertainty[i] = fmax (ref->uncertainty[i], REFERENCE_ROUND_OFF * DBL_EPSILON * size);
   }
-  if (t->uncertainty[MOTION_LAMBDA] >= 1) t->uncertainty[MOTION_LAMBDA] = 0; /* as large as the multipliers: unknown */
+  if (ref->uncertainty[MOTION_LAMBDA] >= 1)
+    ref->uncertainty[MOTION_LAMBDA] = 0; /* as large as the multipliers: unknown */
 }
 
 /* ---- Candidates ---- */
 
 typedef struct {
+  pw_study *study;
   pw_row row;
   int good;
   pw_motion motion;
 } candidate;
 
 /* Runs candidate i; increases a tolerance or step that is too small.  PW_RETRY: interrupted. */
-static int reference_run (pw_study *x, void *context, int i, pw_error *error) {
+static int reference_run (void *context, int i, pw_error *error) {
   candidate *c = (candidate *)context + i;
+  pw_study *x = c->study;
   double loosest = c->row.adaptive ? REFERENCE_LOOSEST : x->t_end / REFERENCE_FEWEST;
   pw_error own = { 0 };
-  int status = pw_motion_open (&c->motion, x->m.system, MOTION_SAMPLES, error);
+  int status = pw_motion_open (&c->motion, x->m.system, MOTION_SAMPLES, x->t_end, error);
   if (status != PW_OK) return status;
-  pw_motion_times (&c->motion, x->t_end);
   status = PW_RETRY;
   while (status != PW_OK && c->row.level <= loosest) {
     own = (pw_error){ 0 };
@@ -93,11 +92,11 @@ static int reference_run (pw_study *x, void *context, int i, pw_error *error) {
 /* The distance of two motions, relative to their size; NaN if it is unknown. */
 static double reference_distance (const pw_system *s, const candidate *a, const candidate *b) {
   double error[MOTION_ERRORS], most = 0;
-  pw_reference t = { .motion = a->motion };
-  reference_floor (s, &t);
+  pw_reference sizes = { .motion = a->motion };
+  reference_floor (s, &sizes);
   pw_motion_distance (s, &a->motion, &b->motion, error);
   for (int i = 0; i < MOTION_UNITS; i++) {
-    double part = error[MOTION_MOST + i] / (t.size[i] > 0 ? t.size[i] : 1);
+    double part = error[MOTION_MOST + i] / (sizes.size[i] > 0 ? sizes.size[i] : 1);
     if (!isnan (most) && !(part <= most)) most = part;
   }
   return most;
@@ -128,74 +127,74 @@ static double reference_pair (const pw_system *s, const candidate *c, int relate
 }
 
 /* Selects the reference: the first of the two candidates that agree best, with different integrators if possible. */
-static void reference_choose (pw_reference *t, const pw_system *s, candidate *c) {
+static void reference_choose (pw_reference *ref, const pw_system *s, candidate *c) {
   int best = -1, with = -1;
   if (isinf (reference_pair (s, c, 0, &best, &with)) && isinf (reference_pair (s, c, 1, &best, &with))) return;
-  t->known = 1;
-  reference_name (&c[best], t->about, sizeof t->about);
-  pw_motion_distance (s, &c[best].motion, &c[with].motion, t->uncertainty);
+  ref->known = 1;
+  reference_name (&c[best], ref->about, sizeof ref->about);
+  pw_motion_distance (s, &c[best].motion, &c[with].motion, ref->uncertainty);
   for (int i = 0; i < REFERENCE_CANDIDATES; i++) {
-    int place = i == with ? 0 : t->partners + (t->partners == 0);
+    int place = i == with ? 0 : ref->partners + (ref->partners == 0);
     if (i == best || !c[i].good) continue;
-    reference_name (&c[i], t->partner[place].about, sizeof t->partner[place].about);
-    pw_motion_distance (s, &c[best].motion, &c[i].motion, t->partner[place].error);
-    t->partners = place + 1 > t->partners ? place + 1 : t->partners;
+    reference_name (&c[i], ref->partner[place].about, sizeof ref->partner[place].about);
+    pw_motion_distance (s, &c[best].motion, &c[i].motion, ref->partner[place].error);
+    ref->partners = place + 1 > ref->partners ? place + 1 : ref->partners;
   }
-  t->motion = c[best].motion;
+  ref->motion = c[best].motion;
   c[best].motion = (pw_motion){ .samples = 0 };
-  reference_floor (s, t);
+  reference_floor (s, ref);
 }
 
-static int reference_compute (pw_reference *t, pw_study *x, double step, pw_error *error) {
+static int reference_compute (pw_reference *ref, pw_study *x, double step, pw_error *error) {
   candidate c[REFERENCE_CANDIDATES] = {
-    { .row = { .method = "erk8+projection", .adaptive = 1, .level = 3e-14 } },
-    { .row = { .method = "rk4+projection", .level = fmin (step, x->t_end / REFERENCE_STEPS) } },
-    { .row = { .method = "ida+ggl", .adaptive = 1, .level = 1e-13 } },
-    { .row = { .method = "ida+baumgarte", .adaptive = 1, .level = 1e-13 } },
+    { x, .row = { .method = "erk8+projection", .adaptive = 1, .level = 3e-14 } },
+    { x, .row = { .method = "rk4+projection", .level = fmin (step, x->t_end / REFERENCE_STEPS) } },
+    { x, .row = { .method = "ida+ggl", .adaptive = 1, .level = 1e-13 } },
+    { x, .row = { .method = "ida+baumgarte", .adaptive = 1, .level = 1e-13 } },
   };
   double limit = x->cpu_end;
   x->cpu_end = fmax (limit, REFERENCE_LIMIT);
   pw_study_show (x, "reference", "methods", REFERENCE_CANDIDATES);
-  int status = pw_study_concurrently (x, REFERENCE_CANDIDATES, reference_run, c, error);
+  int status = pw_study_parallel (x, REFERENCE_CANDIDATES, reference_run, c, error);
   x->cpu_end = limit;
-  if (status == PW_OK) reference_choose (t, x->m.system, c);
+  if (status == PW_OK) reference_choose (ref, x->m.system, c);
   for (int i = 0; i < REFERENCE_CANDIDATES; i++) pw_motion_close (&c[i].motion);
   return status;
 }
 
 /* The exact solution of the model holds only for its own initial conditions. */
-int pw_reference_find (pw_reference *t, pw_study *x, double step, pw_error *error) {
+int pw_reference_find (pw_reference *ref, pw_study *x, double step, pw_error *error) {
   double t_end = x->line.t_end ? x->t_end : 0; /* 0: that of the table */
   int status, exact = x->reference_path == NULL && pw_system_has_reference (x->m.model) && x->line.starts == NULL;
-  if (x->reference_path == NULL && !exact) return reference_compute (t, x, step, error);
-  snprintf (t->about, sizeof t->about, "%s", exact ? "the exact solution of the model" : x->reference_path);
+  if (x->reference_path == NULL && !exact) return reference_compute (ref, x, step, error);
+  snprintf (ref->about, sizeof ref->about, "%s", exact ? "the exact solution of the model" : x->reference_path);
   if (exact)
-    status = pw_motion_reference (&t->motion, x->m.model, x->m.system, x->t_end, error);
+    status = pw_motion_reference (&ref->motion, x->m.model, x->m.system, x->t_end, error);
   else
-    status = pw_motion_read (&t->motion, x->m.system, x->reference_path, &t_end, 1, error);
+    status = pw_motion_read (&ref->motion, x->m.system, x->reference_path, &t_end, 1, error);
   if (status != PW_OK) return status;
   if (!exact) x->t_end = t_end;
-  t->known = 1;
-  reference_floor (x->m.system, t);
+  ref->known = 1;
+  reference_floor (x->m.system, ref);
   return PW_OK;
 }
 
 /* ---- Output ---- */
 
-void pw_reference_print (const pw_reference *t, int measured, int all) {
-  if (!t->known) {
+void pw_reference_print (const pw_reference *ref, int measured, int all) {
+  if (!ref->known) {
     puts ("no two methods reach the end, so errors are unknown; --reference FILE.csv provides a reference\n");
     return;
   }
-  pw_cli_print (stdout, "errors are measured against %s%s\n", t->about, measured ? ", as if it were exact" : "");
-  for (int i = 0; i < (all ? t->partners : t->partners > 0); i++)
-    printf ("  %s agrees with it to %.1e m, %.1e rad%s\n", t->partner[i].about,
-            t->partner[i].error[MOTION_MOST + MOTION_LENGTH], t->partner[i].error[MOTION_MOST + MOTION_ANGLE],
+  pw_cli_print (stdout, "errors are measured against %s%s\n", ref->about, measured ? ", as if it were exact" : "");
+  for (int i = 0; i < (all ? ref->partners : ref->partners > 0); i++)
+    printf ("  %s agrees with it to %.1e m, %.1e rad%s\n", ref->partner[i].about,
+            ref->partner[i].error[MOTION_MOST + MOTION_LENGTH], ref->partner[i].error[MOTION_MOST + MOTION_ANGLE],
             i == 0 ? ": the uncertainty of the reference" : "");
   putchar ('\n');
 }
 
-int pw_reference_write (const pw_reference *r, const char *folder, const pw_study_column *of, pw_error *error) {
+int pw_reference_write (const pw_reference *ref, const char *folder, const pw_study_column *of, pw_error *error) {
   pw_output *o = pw_figure_open (folder, "truth.csv", error);
   if (o == NULL) return error->status;
   FILE *f = pw_output_stream (o);
@@ -203,10 +202,10 @@ int pw_reference_write (const pw_reference *r, const char *folder, const pw_stud
   pw_text_cell (&t, "truth,against");
   for (int k = 0; k < MOTION_ERRORS; k++) pw_text_name (&t, of[k].name, of[k].unit);
   int status = pw_text_line (&t, f, folder, error);
-  for (int i = -1; status == PW_OK && r->known && i < r->partners; i++) {
-    pw_text_quoted (&t, r->about);
-    pw_text_quoted (&t, i < 0 ? "uncertainty" : r->partner[i].about);
-    for (int k = 0; k < MOTION_ERRORS; k++) pw_text_number (&t, i < 0 ? r->uncertainty[k] : r->partner[i].error[k]);
+  for (int i = -1; status == PW_OK && ref->known && i < ref->partners; i++) {
+    pw_text_quoted (&t, ref->about);
+    pw_text_quoted (&t, i < 0 ? "uncertainty" : ref->partner[i].about);
+    for (int k = 0; k < MOTION_ERRORS; k++) pw_text_number (&t, i < 0 ? ref->uncertainty[k] : ref->partner[i].error[k]);
     status = pw_text_line (&t, f, folder, error);
   }
   return pw_text_end (o, status, error);

@@ -27,17 +27,17 @@ int pw_motion_run (pw_study *x, pw_row *r, pw_motion *motion, pw_error *error);
 
 /* Finds the reference; `step` is the smallest of the comparison.  The end of a table is that of the comparison unless
  * --t-end is given.  Close its motion in every case. */
-int pw_reference_find (pw_reference *t, pw_study *x, double step, pw_error *error);
+int pw_reference_find (pw_reference *ref, pw_study *x, double step, pw_error *error);
 
 /* Prints the reference and its uncertainty; `measured`: it is a table; `all`: its distances from all other solutions. */
-void pw_reference_print (const pw_reference *t, int measured, int all);
+void pw_reference_print (const pw_reference *ref, int measured, int all);
 /* FOLDER/truth.csv: the uncertainty of the reference, and its distances from other solutions; `of`: columns of the errors. */
-int pw_reference_write (const pw_reference *r, const char *folder, const pw_study_column *of, pw_error *error);
+int pw_reference_write (const pw_reference *ref, const char *folder, const pw_study_column *of, pw_error *error);
 
 /* ---- The conclusion of a comparison (conclusion.c) ---- */
 
 /* Prints the processor time of each method for 3, 6 and 9 correct digits against a known reference, and failures.
  * `column` of the rows is the largest error of lengths; that of angles follows. */
-void pw_conclusion_print (const pw_study *s, const pw_reference *t, int column);
+void pw_conclusion_print (const pw_study *s, const pw_reference *ref, int column);
 
 #endif

@@ -74,20 +74,20 @@ int pw_study_read_methods (pw_study *x, const char *text, pw_error *error) {
 /* ---- Rows ---- */
 
 pw_row *pw_study_add (pw_study *x, int group, int line, const char *method, int points, pw_error *error) {
-  pw_row *more = realloc (x->row, (size_t)(x->rows + 1) * sizeof *x->row), *r = more ? more + x->rows : NULL;
-  if (more) x->row = more;
-  if (r)
-    *r =
-        (pw_row){ .group = group, .line = line, .points = points, .point = malloc ((size_t)points * sizeof *r->point) };
-  if (r == NULL || r->point == NULL) {
+  pw_row *r = realloc (x->row, (size_t)(x->rows + 1) * sizeof *r);
+  double (*point)[STUDY_COORDINATES] = malloc ((size_t)points * sizeof *point);
+  if (r) x->row = r;
+  if (r == NULL || point == NULL) {
+    free (point);
     pw_fail (error, PW_RESOURCE, "out of memory");
     return NULL;
   }
+  r += x->rows++;
+  *r = (pw_row){ .group = group, .line = line, .points = points, .point = point };
   snprintf (r->method, sizeof r->method, "%s", method);
   for (int i = 0; i < STUDY_COLUMNS; i++) r->value[i] = NAN;
   for (int k = 0; k < points; k++)
     for (int i = 0; i < STUDY_COORDINATES; i++) r->point[k][i] = NAN;
-  x->rows++;
   return r;
 }
 
@@ -148,38 +148,10 @@ int pw_study_run (pw_study *x, pw_row *r, const pw_settings *settings, pw_study_
   return status;
 }
 
-/* ---- Several tasks at a time ---- */
-
-typedef struct {
-  pw_study *study;
-  int (*task) (pw_study *x, void *context, int i, pw_error *error);
-  void *context;
-  int status;
-  pw_error *error;
-} study_tasks;
-
-static void study_task (void *context, int i) {
-  study_tasks *k = context;
-  pw_study *x = k->study;
-  pw_error own = { 0 };
-  pthread_mutex_lock (&x->mutex);
-  int go = k->status == PW_OK;
-  pthread_mutex_unlock (&x->mutex);
-  int status = go ? k->task (x, k->context, i, &own) : PW_OK;
-  pthread_mutex_lock (&x->mutex);
-  if (status != PW_OK && k->status == PW_OK) {
-    k->status = status;
-    *k->error = own;
-  }
-  pthread_mutex_unlock (&x->mutex);
-}
-
-int pw_study_concurrently (pw_study *x, int count, int (*task) (pw_study *x, void *context, int i, pw_error *error),
-                           void *context, pw_error *error) {
-  study_tasks k = { .study = x, .task = task, .context = context, .error = error };
-  int status = (x->type->timed ? pw_parallel_timed : pw_parallel) (x->jobs, count, study_task, &k, error);
+int pw_study_parallel (pw_study *x, int count, pw_task *task, void *context, pw_error *error) {
+  int status = (x->type->timed ? pw_parallel_timed : pw_parallel) (x->jobs, count, task, context, error);
   pw_progress_end (&x->progress);
-  return status == PW_OK ? k.status : status;
+  return status;
 }
 
 int pw_study_outcome (const pw_study *x, pw_row *r, int status, const pw_error *run_error, pw_error *error) {
@@ -239,8 +211,8 @@ static int study_open (pw_study *x, pw_error *error) {
 }
 
 /* Measures a row, then writes all rows that are done before the first one that is not: in their order. */
-static int study_row (pw_study *x, void *context, int i, pw_error *error) {
-  (void)context;
+static int study_row (void *context, int i, pw_error *error) {
+  pw_study *x = context;
   int status = x->type->measure (x, &x->row[i], error);
   if (status != PW_OK) return status;
   pw_study_part (x, &x->row[i], 1);
@@ -253,10 +225,11 @@ static int study_row (pw_study *x, void *context, int i, pw_error *error) {
   return status;
 }
 
-static int study_method (pw_study *x, void *context, int line, pw_error *error) {
+static int study_method (void *context, int line, pw_error *error) {
+  const pw_study *x = context;
   int status = PW_OK;
   for (int i = 0; status == PW_OK && i < x->rows; i++)
-    if (x->row[i].line == line) status = study_row (x, context, i, error);
+    if (x->row[i].line == line) status = study_row (context, i, error);
   return status;
 }
 
@@ -276,8 +249,10 @@ static int study_rows (pw_study *x, pw_error *error) {
   if (status == PW_OK && x->engine.code) puts ("all runs use code specialised for this scene where the method can\n");
   if (status == PW_OK && x->engine.code == NULL) printf ("all runs use the general engine: %s\n\n", x->engine.why);
   pw_study_show (x, pw_file_name (x->m.file), x->type->unit, x->rows);
-  if (status == PW_OK && x->type->timed) status = pw_study_concurrently (x, x->methods, study_method, NULL, error);
-  if (status == PW_OK && !x->type->timed) status = pw_study_concurrently (x, x->rows, study_row, NULL, error);
+  if (status == PW_OK && x->type->timed)
+    status = pw_study_parallel (x, x->methods, study_method, x, error);
+  else if (status == PW_OK)
+    status = pw_study_parallel (x, x->rows, study_row, x, error);
   if (status == PW_RETRY && pw_stop) status = study_write_kept (x, error);
   if (status == PW_OK && x->type->conclude) x->type->conclude (x);
   pw_stop_release ();

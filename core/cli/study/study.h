@@ -26,10 +26,11 @@ typedef struct {
   int group, line;         /* group of rows in the table; line in the figure of the group */
   int adaptive;            /* 1: the step size follows a tolerance */
   double level;            /* of compare: tolerance, or step size [s] */
+  int before;              /* number of levels of its method before it */
   pw_row_state state;
   int measured;             /* 1: all is known */
   int runs;                 /* finished */
-  double part;              /* that the progress counts */
+  double part;              /* that is done, as the progress counts it, of 1 */
   double t;                 /* reached [s] */
   double cpu;               /* of the last run [s] */
   double balance;           /* largest |energy balance| of the samples [J] */
@@ -37,6 +38,7 @@ typedef struct {
   char reason[500];
   double value[STUDY_COLUMNS]; /* NaN: unknown */
   unsigned below;              /* bit i: value i is an upper bound */
+  char bounds[STUDY_NAME];     /* the names of those values */
   int points;                  /* number of points in the figure; undefined ones are NaN */
   double (*point)[STUDY_COORDINATES];
 } pw_row;
@@ -45,15 +47,21 @@ typedef struct pw_study pw_study;
 
 /* A column of the table, which is in the CSV file, on the terminal, or both. */
 typedef struct {
-  const char *name, *unit;                                      /* in the CSV file; NULL: not there; without unit */
-  const char *head;                                             /* on the terminal; NULL: not there */
-  int width;                                                    /* on the terminal, including spaces before it */
-  const char *format;                                           /* of numbers on the terminal: "%.1e" */
-  const char *(*text) (const pw_row *r, char text[STUDY_NAME]); /* the text; NULL: the column contains numbers */
+  const char *name, *unit;               /* in the CSV file; NULL: not there; without unit */
+  const char *head;                      /* on the terminal; NULL: not there */
+  int width;                             /* on the terminal, including spaces before it */
+  const char *format;                    /* of numbers on the terminal: "%.1e" */
+  const char *(*text) (const pw_row *r); /* the text; NULL: the column contains numbers */
 } pw_study_column;
 
-const char *pw_study_method (const pw_row *r, char text[STUDY_NAME]);
-const char *pw_study_status (const pw_row *r, char text[STUDY_NAME]); /* "ok", "failed", ... */
+const char *pw_study_method (const pw_row *r);
+const char *pw_study_status (const pw_row *r); /* "ok", "failed", ... */
+
+/* The option of the methods; `defaults` describes those without it. */
+#define PW_STUDY_METHODS_OPTION(defaults)                                                                              \
+  PW_TEXT_OPTION (pw_study, methods_text, "methods", 'm', "A,B,...|all",                                               \
+                  "Methods, separated by commas; rk4+all: every stabilisation of rk4; all+ggl: every integrator with " \
+                  "ggl; all: every method (" defaults ")")
 
 /* What a command provides.  Functions return a status. */
 typedef struct {
@@ -101,8 +109,8 @@ struct pw_study {
   int rows, done; /* done: printed */
   pthread_mutex_t mutex;
   pw_progress progress;
-  double finished;                       /* sum of the parts of rows */
-  double share;                          /* of a run in its row */
+  double finished;                       /* progress: the sum of `part` of all rows */
+  double share;                          /* of each run in the progress of its row */
   pw_output *csv;                        /* NULL: none */
   const char *drawn[FIGURE_SCRIPTS + 1]; /* scripts */
 };
@@ -132,10 +140,8 @@ typedef struct pw_study_visitor {
 /* One run of a row to the end or a limit: fills t, statistics, cpu, and state if it is stopped by cpu_end; the visitor may
  * be NULL.  Runs of different rows may be concurrent.  PW_RETRY: stopped, or interrupted. */
 int pw_study_run (pw_study *x, pw_row *r, const pw_settings *settings, pw_study_visitor *v, pw_error *error);
-/* Calls task (context, i) for each i < count, several at a time.  A task returns a status; after one other than PW_OK,
- * which is returned, no further ones are called. */
-int pw_study_concurrently (pw_study *x, int count, int (*task) (pw_study *x, void *context, int i, pw_error *error),
-                           void *context, pw_error *error);
+/* Performs tasks as pw_parallel does, those of a study that is timed as pw_parallel_timed, and ends their progress. */
+int pw_study_parallel (pw_study *x, int count, pw_task *task, void *context, pw_error *error);
 /* Begins to show the progress of `rows` rows. */
 void pw_study_show (pw_study *x, const char *what, const char *unit, int rows);
 /* Shows that a part of a row is done, of 1. */

@@ -3,14 +3,12 @@
 #include <string.h>
 #include "study.h"
 
-const char *pw_study_method (const pw_row *r, char text[STUDY_NAME]) {
-  (void)text;
+const char *pw_study_method (const pw_row *r) {
   return r->method;
 }
 
-const char *pw_study_status (const pw_row *r, char text[STUDY_NAME]) {
+const char *pw_study_status (const pw_row *r) {
   static const char *const status[] = { "ok", "failed", "refused", "stopped", "not run" };
-  (void)text;
   return status[r->state];
 }
 
@@ -33,10 +31,9 @@ int pw_study_open_table (pw_study *x, pw_error *error) {
 
 static int table_write (const pw_study *x, const pw_row *r, pw_error *error) {
   pw_text t = { .at = NULL };
-  char text[STUDY_NAME];
   for (const pw_study_column *c = x->type->column; !table_is_end (c); c++)
     if (c->text)
-      pw_text_cell (&t, c->text (r, text));
+      pw_text_cell (&t, c->text (r));
     else if (c->name)
       pw_text_number (&t, r->value[c - x->type->column]);
   pw_text_quoted (&t, r->reason);
@@ -79,7 +76,7 @@ static void table_print (const pw_study *x, const pw_row *r) {
     if (c->text == pw_study_status) shown = r->state == ROW_DONE;
   }
   if (r->state != ROW_DONE) {
-    printf ("  %s", pw_study_status (r, NULL));
+    printf ("  %s", pw_study_status (r));
     if (r->state == ROW_FAILED && strncmp (r->reason, "t = ", 4) != 0) printf (" at t = %s s", pw_format (t, r->t, 4));
     printf (": %s", r->reason);
   }

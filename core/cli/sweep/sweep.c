@@ -3,33 +3,9 @@
  * Every run depends only on its row of the grid.  A journal keeps the rows in the order of completion; at the end they
  * are sorted into the order of the grid.  So the table does not depend on the number of threads or on interruptions of
  * the sweep. */
-#define _POSIX_C_SOURCE 200809L
-#include <pthread.h>
-#include <stdlib.h>
 #include <string.h>
 #include "parallel.h"
-#include "progress.h"
 #include "sweep_journal.h"
-
-enum { SWEEP_LANES = 8 };
-
-/* A compiled system that several runs use. */
-typedef struct shared_system {
-  long parameters; /* pw_grid_parameters of its rows */
-  int users;       /* runs */
-  int ready;       /* 0: a thread is compiling it */
-  pw_sweep_system system;
-  pw_error error; /* why it could not be compiled */
-  struct shared_system *next;
-} shared_system;
-
-/* Code of systems whose structure is not that of the first one. */
-typedef struct sweep_code {
-  char *text;
-  int ready; /* 0: a thread is compiling it */
-  pw_scene_code *code;
-  struct sweep_code *next;
-} sweep_code;
 
 typedef struct {
   /* as given */
@@ -39,20 +15,8 @@ typedef struct {
   int merge, cpu;
   /* as understood */
   pw_plan plan;
-  int jobs;
-  /* in progress; accessed by the thread that holds the lock */
-  pthread_mutex_t lock;
-  pthread_cond_t compiled;
-  shared_system *shared;
-  sweep_code *codes;
-  long next; /* the next row to compute, as in pw_grid_ordered */
   pw_journal journal;
-  pw_progress progress;
-  pw_text scratch;
-  pw_error *error;
-  long changed, runs; /* runs whose given initial values the constraints have changed; all that were opened now */
-  double change;      /* the largest change */
-  char worst[PW_CHANGE_TEXT];
+  int jobs;
 } sweep;
 
 /* ---- Before the sweep ---- */
@@ -72,28 +36,11 @@ static int sweep_read (const sweep *x, pw_error *error) {
 
 /* The first option given that cannot be combined with --merge; NULL if there is none. */
 static const char *sweep_not_for_merge (const sweep *x) {
-  const pw_cli_line *l = &x->line;
-  const struct {
-    const char *name;
-    const void *given;
-  } option[] = { { "--vary", x->ranges },
-                 { "--method", l->method },
-                 { "--t-end", l->t_end },
-                 { "--step", l->step },
-                 { "--rtol", l->rtol },
-                 { "--atol", l->atol },
-                 { "--limit", l->limit },
-                 { "--set", l->sets },
-                 { "--max-steps", l->max_steps },
-                 { "--start", l->starts },
-                 { "--specialise", l->specialise },
-                 { "--jobs", x->jobs_text },
-                 { "--part", x->part_text },
-                 { "--cpu", x->cpu ? x : NULL },
-                 { "--lanes", x->lanes_text },
-                 { "--max-file", l->max_file } };
-  for (size_t i = 0; i < sizeof option / sizeof *option; i++)
-    if (option[i].given) return option[i].name;
+  for (const struct poptOption *o = pw_cli_sweep.options; o->longName || o->descrip; o++) {
+    if (o->longName == NULL || strcmp (o->longName, "output") == 0 || strcmp (o->longName, "merge") == 0) continue;
+    const void *value = (const char *)x + (size_t)o->arg;
+    if (o->argInfo == POPT_ARG_NONE ? *(const int *)value : *(const void *const *)value != NULL) return o->longName;
+  }
   return NULL;
 }
 
@@ -121,13 +68,10 @@ static int sweep_lanes (sweep *x, pw_error *error) {
 static int sweep_settings (sweep *x, pw_error *error) {
   pw_plan *p = &x->plan;
   pw_run_defaults d = pw_cli_defaults (pw_file_table (p->file));
+  p->line = &x->line;
   p->method = x->line.method ? x->line.method : d.method;
-  p->sets = x->line.sets;
-  p->starts = x->line.starts;
   p->cpu = x->cpu;
-  pw_limit limit;
-  int status = pw_cli_settings (&x->line, &d, &p->t_end, &p->settings, &limit, error);
-  p->limit = limit.most;
+  int status = pw_cli_settings (&x->line, &d, &p->t_end, &p->settings, &p->limit, error);
   if (status == PW_OK) pw_cli_unused (p->method, &x->line);
   if (status == PW_OK) status = pw_cli_specialise (x->line.specialise, &p->specialise, error);
   if (status == PW_OK) status = sweep_lanes (x, error);
@@ -152,227 +96,6 @@ static int sweep_open (sweep *x, pw_error *error) {
   return PW_OK;
 }
 
-/* ---- Specialised code ---- */
-
-/* The code of a text, compiled by the first thread that needs it; the caller holds the lock. */
-static const pw_specialised *sweep_compile (sweep *x, char *text, const pw_system *s, pw_error *error) {
-  sweep_code *c = x->codes;
-  while (c && strcmp (c->text, text) != 0) c = c->next;
-  if (c) free (text);
-  if (c) {
-    while (!c->ready) pthread_cond_wait (&x->compiled, &x->lock);
-    return pw_scene_code_table (c->code);
-  }
-  if ((c = malloc (sizeof *c)) == NULL) {
-    free (text);
-    pw_fail (error, PW_RESOURCE, "out of memory");
-    return NULL;
-  }
-  *c = (sweep_code){ .text = text, .next = x->codes };
-  x->codes = c;
-  pthread_mutex_unlock (&x->lock);
-  c->code = pw_scene_code_open (text, s, error);
-  pthread_mutex_lock (&x->lock);
-  c->ready = 1;
-  pthread_cond_broadcast (&x->compiled);
-  return pw_scene_code_table (c->code);
-}
-
-/* The code of a new system: that of the first row, or of its own text, so that it does not depend on the order of runs. */
-static void sweep_specialise (sweep *x, pw_sweep_system *s, pw_error *error) {
-  const pw_specialised *first = pw_cli_engine_code (&x->plan.engine);
-  pw_error own = { 0 };
-  if (first == NULL || error->status != PW_OK) return;
-  if (pw_specialised_fits (first, s->m.system)) {
-    s->code = first;
-    return;
-  }
-  char *text = pw_cli_source (s->m.system, NULL);
-  if (text == NULL) return;
-  pthread_mutex_lock (&x->lock);
-  s->code = sweep_compile (x, text, s->m.system, &own);
-  pthread_mutex_unlock (&x->lock);
-  if (own.status != PW_OK && pw_stop == 0) pw_cli_say ("pinwheel: general engine: %s\n", own.text);
-  if (s->code == NULL && pw_stop) error->status = PW_RETRY; /* Ctrl-C has stopped the compiler too */
-}
-
-/* ---- Compiled systems; the caller holds the lock ---- */
-
-/* Ends the use of a system; the last user frees it. */
-static void sweep_release (sweep *x, shared_system *s) {
-  shared_system **at = &x->shared;
-  if (s == NULL || --s->users > 0) return;
-  while (*at != s) at = &(*at)->next;
-  *at = s->next;
-  pw_sweep_system_close (&s->system);
-  free (s);
-}
-
-/* The system of a row, shared with other threads, or compiled without the lock.  NULL if out of memory. */
-static shared_system *sweep_share (sweep *x, long row) {
-  long parameters = pw_grid_parameters (&x->plan.grid, row);
-  shared_system *s = x->shared;
-  while (s && s->parameters != parameters) s = s->next;
-  if (s) {
-    s->users++;
-    while (!s->ready) pthread_cond_wait (&x->compiled, &x->lock);
-    return s;
-  }
-  if ((s = calloc (1, sizeof *s)) == NULL) return NULL;
-  *s = (shared_system){ .parameters = parameters, .users = 1, .next = x->shared };
-  x->shared = s;
-  pthread_mutex_unlock (&x->lock);
-  pw_sweep_system_open (&s->system, &x->plan, row, &s->error);
-  sweep_specialise (x, &s->system, &s->error);
-  pthread_mutex_lock (&x->lock);
-  s->ready = 1;
-  pthread_cond_broadcast (&x->compiled);
-  return s;
-}
-
-/* ---- The sweep ---- */
-
-/* Stores the first error, which stops the sweep. */
-static void sweep_fail (sweep *x, long row, const char *why) {
-  if (x->error->status == PW_OK) pw_fail (x->error, PW_RESOURCE, "row %ld of the grid: %s", row + 1, why);
-  if (pw_stop == 0) pw_stop = 1;
-}
-
-/* Stores a row, or the first error. */
-static void sweep_keep (sweep *x, long row, int status, const pw_text *text, const pw_error *own) {
-  if (status == PW_RETRY || x->error->status != PW_OK) return;
-  if (status == PW_RESOURCE)
-    sweep_fail (x, row, own->text);
-  else if (pw_journal_add (&x->journal, &x->plan, row, -status, text->at, &x->scratch, x->error) == PW_OK)
-    pw_progress_at (&x->progress, (double)x->journal.done);
-  if (x->error->status != PW_OK && pw_stop == 0) pw_stop = 1;
-}
-
-/* The next missing row of the part; -1 if there is none. */
-static long sweep_take (sweep *x) {
-  const pw_plan *p = &x->plan;
-  while (pw_stop == 0 && x->next < p->grid.rows) {
-    long row = pw_grid_ordered (&p->grid, x->next++);
-    if (row % p->parts == p->part - 1 && x->journal.line[row / p->parts] == 0) return row;
-  }
-  return -1;
-}
-
-/* A thread's runs: as many as fit into lanes, else one. */
-typedef struct {
-  sweep *x;
-  const pw_specialised_lanes *code;
-  void *memory;
-  int width;
-  pw_sweep_run run[SWEEP_LANES];
-  shared_system *system[SWEEP_LANES]; /* NULL: no run */
-  shared_system *last; /* of a run that has ended, kept since the next row may have the same parameters */
-  pw_text text;
-} sweep_worker;
-
-/* Opens the run of the next row; 0 if there is none.  The caller holds the lock. */
-static int sweep_begin (sweep_worker *w, int k) {
-  sweep *x = w->x;
-  pw_error own = { 0 };
-  long row = sweep_take (x);
-  if (row < 0) return 0;
-  w->system[k] = sweep_share (x, row);
-  if (w->system[k] == NULL)
-    sweep_fail (x, row, "out of memory");
-  else
-    own = w->system[k]->error;
-  pthread_mutex_unlock (&x->lock);
-  if (w->system[k]) pw_sweep_run_open (&w->run[k], &x->plan, &w->system[k]->system, row, &own);
-  pthread_mutex_lock (&x->lock);
-  return w->system[k] != NULL;
-}
-
-/* Counts changed initial values.  The caller holds the lock. */
-static void sweep_change (sweep *x, const pw_sweep_run *r) {
-  x->runs++;
-  x->changed += r->change > 0;
-  if (!(r->change > x->change)) return;
-  x->change = r->change;
-  memcpy (x->worst, r->changed, sizeof x->worst);
-}
-
-/* Stores the row of a run that has ended.  The caller holds the lock. */
-static void sweep_end (sweep_worker *w, int k) {
-  sweep *x = w->x;
-  sweep_change (x, &w->run[k]);
-  pthread_mutex_unlock (&x->lock);
-  pw_text_clear (&w->text);
-  int status = pw_sweep_run_close (&w->run[k], &w->text);
-  pthread_mutex_lock (&x->lock);
-  sweep_keep (x, w->run[k].row, status, &w->text, &w->run[k].error);
-  sweep_release (x, w->last);
-  w->last = w->system[k];
-  w->system[k] = NULL;
-}
-
-/* Advances the runs, those with the first system's code in lanes, until one of them ends. */
-static void sweep_advance (sweep_worker *w) {
-  const double t_end = w->x->plan.t_end;
-  pw_run *run[SWEEP_LANES];
-  int which[SWEEP_LANES], status[SWEEP_LANES], n = 0, same = 1, ended = 0;
-  pw_error error[SWEEP_LANES];
-  for (int k = 0; k < w->width; k++) {
-    if (w->system[k] == NULL) continue;
-    if (pw_sweep_run_ended (&w->run[k])) return;
-    same &= w->system[k]->system.code == pw_cli_engine_code (&w->x->plan.engine);
-    which[n] = k, error[n] = (pw_error){ 0 }, run[n++] = w->run[k].run;
-  }
-  while (!ended) {
-    pw_runs_advance (run, n, t_end, same ? w->code : NULL, w->memory, status, error);
-    for (int i = 0; i < n; i++) ended |= status[i] != PW_OK || !(pw_run_time (run[i]) < t_end);
-  }
-  for (int i = 0; i < n; i++) w->run[which[i]].status = status[i], w->run[which[i]].error = error[i];
-}
-
-/* Computes rows until there are none. */
-static void sweep_thread (void *context, int i) {
-  sweep *x = context;
-  sweep_worker w = { .x = x, .code = pw_scene_code_lanes (x->plan.code), .width = 1 };
-  (void)i;
-  if (w.code && (w.memory = pw_specialised_lanes_memory (w.code)) != NULL)
-    w.width = pw_specialised_lanes_count (w.code);
-  if (w.width > SWEEP_LANES) w.width = 1;
-  while (w.width > 1 && x->journal.rows < (long)w.width * x->jobs) w.width--; /* work for all threads */
-  pthread_mutex_lock (&x->lock);
-  for (int runs = 1; runs > 0;) {
-    for (int k = runs = 0; k < w.width; k++) runs += w.system[k] != NULL || sweep_begin (&w, k);
-    pthread_mutex_unlock (&x->lock);
-    if (runs) sweep_advance (&w);
-    pthread_mutex_lock (&x->lock);
-    for (int k = 0; k < w.width; k++)
-      if (w.system[k] && pw_sweep_run_ended (&w.run[k])) sweep_end (&w, k);
-  }
-  sweep_release (x, w.last);
-  pthread_mutex_unlock (&x->lock);
-  pw_text_free (&w.text);
-  free (w.memory);
-}
-
-static void sweep_all (sweep *x) {
-  if (x->jobs > x->journal.rows) x->jobs = (int)x->journal.rows;
-  pthread_mutex_init (&x->lock, NULL);
-  pthread_cond_init (&x->compiled, NULL);
-  pw_parallel (x->jobs, x->jobs, sweep_thread, x, x->error);
-  pthread_cond_destroy (&x->compiled);
-  pthread_mutex_destroy (&x->lock);
-}
-
-static int sweep_run (sweep *x, pw_error *error) {
-  x->error = error;
-  pw_stop_catch ();
-  pw_progress_count (&x->progress, pw_file_name (x->plan.file), "runs", (double)x->journal.done,
-                     (double)x->journal.rows);
-  sweep_all (x);
-  pw_progress_end (&x->progress);
-  pw_stop_release (); /* the rest can be interrupted and repeated */
-  return error->status;
-}
-
 /* ---- The end ---- */
 
 /* Failed runs are rows; the sweep fails only if all runs failed.  A part leaves that to the merge. */
@@ -388,16 +111,13 @@ static int sweep_merge (sweep *x, pw_error *error) {
   pw_tally tally;
   const char *option = sweep_not_for_merge (x);
   if (option)
-    return pw_fail (error, PW_INPUT, "%s cannot be combined with --merge: the parts define the sweep", option);
+    return pw_fail (error, PW_INPUT, "--%s cannot be combined with --merge: the parts define the sweep", option);
   int status = pw_sweep_merge (x->line.argument, x->line.arguments, x->path, &tally, error);
   return status == PW_OK ? sweep_verdict (&tally, 0, error) : status;
 }
 
 static int sweep_finish (sweep *x, pw_error *error) {
   pw_tally tally;
-  if (x->changed)
-    pw_cli_say ("pinwheel: in %ld of %ld runs the constraints changed given initial values, at worst %s\n", x->changed,
-                x->runs, x->worst);
   if (x->journal.done == 0) {
     fputs ("pinwheel: interrupted before the first run was done\n", stderr);
     return PW_INTERRUPTED;
@@ -412,16 +132,9 @@ static int sweep_finish (sweep *x, pw_error *error) {
 }
 
 static void sweep_close (sweep *x) {
-  for (sweep_code *c = x->codes, *next; c; c = next) {
-    next = c->next;
-    pw_scene_code_close (c->code);
-    free (c->text);
-    free (c);
-  }
   pw_journal_close (&x->journal);
   pw_plan_close (&x->plan);
   pw_file_close (x->plan.file);
-  pw_text_free (&x->scratch);
 }
 
 static int sweep_command (void *options, pw_error *error) {
@@ -432,7 +145,7 @@ static int sweep_command (void *options, pw_error *error) {
     status = sweep_merge (x, error);
   else if (status == PW_OK) {
     status = sweep_open (x, error);
-    if (status == PW_OK) status = sweep_run (x, error);
+    if (status == PW_OK) status = pw_sweep_rows (&x->plan, &x->journal, x->jobs, error);
     if (status == PW_OK) status = sweep_finish (x, error);
   }
   sweep_close (x);

@@ -67,13 +67,14 @@ static int grid_range (pw_axis *a, pw_error *error) {
   return PW_OK;
 }
 
-static int grid_axis (pw_axis *a, char *text, pw_error *error) {
-  char *equals = strchr (text, '=');
-  if (equals == NULL || equals == text || equals[1] == 0)
+int pw_axis_read (pw_axis *a, const char *text, pw_error *error) {
+  *a = (pw_axis){ .name = strdup (text) };
+  if (a->name == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
+  char *equals = strchr (a->name, '=');
+  if (equals == NULL || equals == a->name || equals[1] == 0)
     return pw_fail (error, PW_INPUT, "--vary %.200s: expected NAME=lin:FIRST:LAST:COUNT, log:..., or a list v1,v2,...",
                     text);
   *equals = 0;
-  a->name = text;
   a->range = equals + 1;
   a->type = strncmp (a->range, "lin:", 4) == 0   ? PW_AXIS_LIN
             : strncmp (a->range, "log:", 4) == 0 ? PW_AXIS_LOG
@@ -81,6 +82,12 @@ static int grid_axis (pw_axis *a, char *text, pw_error *error) {
   if (a->type == PW_AXIS_LIST && strchr (a->range, ':'))
     return grid_fail (a, "a range begins with lin: or log:", error);
   return a->type == PW_AXIS_LIST ? grid_list (a, error) : grid_range (a, error);
+}
+
+void pw_axis_free (pw_axis *a) {
+  free (a->value);
+  free (a->name);
+  *a = (pw_axis){ .name = NULL };
 }
 
 /* The ends are exact, and intermediate values where possible: the fourth value of lin:0:1:11 is 0.3. */
@@ -137,22 +144,18 @@ int pw_grid_read (pw_grid *g, const char *const *ranges, pw_error *error) {
   while (ranges && ranges[n]) n++;
   *g = (pw_grid){ .axis = calloc ((size_t)n + 1, sizeof *g->axis) };
   if (g->axis == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
-  for (; g->axes < n && status == PW_OK; g->axes++) {
-    char *text = strdup (ranges[g->axes]);
-    if (text == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
-    g->axis[g->axes].name = text; /* released with the grid in every case */
-    status = grid_axis (g->axis + g->axes, text, error);
-    for (int i = 0; i < g->axes && status == PW_OK; i++)
-      if (strcmp (g->axis[i].name, text) == 0) status = pw_fail (error, PW_INPUT, "--vary %.200s is given twice", text);
+  while (g->axes < n && status == PW_OK) {
+    pw_axis *a = g->axis + g->axes++;
+    status = pw_axis_read (a, ranges[a - g->axis], error);
+    for (const pw_axis *other = g->axis; other < a && status == PW_OK; other++)
+      if (strcmp (other->name, a->name) == 0)
+        status = pw_fail (error, PW_INPUT, "--vary %.200s is given twice", a->name);
   }
   return status == PW_OK ? grid_count (g, error) : status;
 }
 
 void pw_grid_free (pw_grid *g) {
-  for (int i = 0; i < g->axes; i++) {
-    free (g->axis[i].value);
-    free (g->axis[i].name);
-  }
+  for (int i = 0; i < g->axes; i++) pw_axis_free (g->axis + i);
   free (g->axis);
   *g = (pw_grid){ .axis = NULL };
 }

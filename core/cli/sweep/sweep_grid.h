@@ -26,11 +26,14 @@ typedef struct {
   long rows;
 } pw_grid;
 
-/* Reads a NULL-terminated list of "NAME=RANGE".  PW_INPUT with the wrong text and the expected one, also for
- * too many rows.  Free the grid in every case. */
+/* Reads "NAME=RANGE".  PW_INPUT with the wrong text and the expected one.  Free the axis in every case. */
+int pw_axis_read (pw_axis *a, const char *text, pw_error *error);
+void pw_axis_free (pw_axis *a);
+double pw_axis_value (const pw_axis *a, long i);
+
+/* Reads a NULL-terminated list of "NAME=RANGE".  PW_INPUT also for too many rows.  Free the grid in every case. */
 int pw_grid_read (pw_grid *g, const char *const *ranges, pw_error *error);
 void pw_grid_free (pw_grid *g);
-double pw_axis_value (const pw_axis *a, long i);
 double pw_grid_value (const pw_grid *g, int axis, long row);
 
 /* The k-th row in the order of execution, in which rows with the same parameters are consecutive. */

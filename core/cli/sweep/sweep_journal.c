@@ -163,13 +163,12 @@ int pw_journal_open (pw_journal *j, const pw_plan *p, const char *path, pw_error
   return j->file >= 0 ? journal_begin (j, p, error) : error->status;
 }
 
-int pw_journal_add (pw_journal *j, const pw_plan *p, long row, int status, const char *cells, pw_text *text,
-                    pw_error *error) {
+int pw_journal_add (pw_journal *j, const pw_plan *p, long row, int status, const char *cells, pw_error *error) {
   off_t at = j->size;
-  pw_text_clear (text);
-  journal_line_add (text, row, status, cells);
-  if (text->failed) return pw_fail (error, PW_RESOURCE, "out of memory");
-  if (journal_write (j, text->at, text->used, error) != PW_OK) return error->status;
+  pw_text_clear (&j->text);
+  journal_line_add (&j->text, row, status, cells);
+  if (j->text.failed) return pw_fail (error, PW_RESOURCE, "out of memory");
+  if (journal_write (j, j->text.at, j->text.used, error) != PW_OK) return error->status;
   j->line[row / p->parts] = at;
   j->done++;
   return PW_OK;
@@ -178,6 +177,7 @@ int pw_journal_add (pw_journal *j, const pw_plan *p, long row, int status, const
 void pw_journal_close (pw_journal *j) {
   if (j->created && j->done == 0 && j->file >= 0) unlink (j->part);
   if (j->file >= 0) close (j->file);
+  pw_text_free (&j->text);
   free (j->line);
   free (j->part);
   free (j->path);
@@ -212,7 +212,6 @@ static size_t table_row (FILE *stream, const char *at, const char *end, long row
 
 /* Completes the file if all went well so far, else removes it. */
 static int table_close (pw_output *o, pw_error *error) {
-  if (error->status == PW_OK) pw_output_ready (o, error);
   if (error->status == PW_OK) return pw_output_finish (o, error);
   pw_output_discard (o);
   return error->status;
@@ -304,7 +303,7 @@ static int table_match (table_part *x, int count, pw_error *error) {
 }
 
 /* The rows, taken from the parts in turn: row r is the next one of part r mod n. */
-static int table_weave (table_part *x, int count, FILE *stream, pw_tally *tally, pw_error *error) {
+static int table_merge (table_part *x, int count, FILE *stream, pw_tally *tally, pw_error *error) {
   size_t size = 0;
   const char *value = pw_fingerprint_value (x->map.at, x->rows, "rows", &size);
   const char *head = pw_fingerprint_value (x->map.at, x->rows, "columns", &size);
@@ -338,7 +337,7 @@ int pw_sweep_merge (const char *const *parts, int count, const char *path, pw_ta
   }
   if (status == PW_OK) status = table_match (x, count, error);
   if (status == PW_OK && (o = pw_output_open_as (path, ".sorted", error)) == NULL) status = error->status;
-  if (o) table_weave (x, count, pw_output_stream (o), tally, error);
+  if (o) table_merge (x, count, pw_output_stream (o), tally, error);
   if (o) status = table_close (o, error);
   for (int i = 0; x && i < count; i++) journal_map_close (&x[i].map);
   free (x);

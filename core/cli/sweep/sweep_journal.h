@@ -1,4 +1,4 @@
-/* The files of a sweep: a journal while it runs, then its table or part. */
+/* The rows of a sweep and their files: a journal while it runs, then its table or part. */
 #ifndef PW_SWEEP_JOURNAL_H
 #define PW_SWEEP_JOURNAL_H
 
@@ -14,17 +14,24 @@ typedef struct {
   off_t *line; /* pw_plan_rows: offset of each row's line; 0: missing */
   long rows, done;
   off_t size;
+  pw_text text; /* of the line that is written */
 } pw_journal;
 
 /* Opens the journal of the table at `path`, or creates it.  It is truncated at the first incomplete or damaged line.
  * Errors: PW_RESOURCE if it cannot be written, PW_INPUT if it belongs to another sweep or is in use by another
  * process. */
 int pw_journal_open (pw_journal *j, const pw_plan *p, const char *path, pw_error *error);
-/* Appends a row of the grid; `text` is scratch.  One thread at a time.  PW_RESOURCE: the journal is unchanged. */
-int pw_journal_add (pw_journal *j, const pw_plan *p, long row, int status, const char *cells, pw_text *text,
-                    pw_error *error);
+/* Appends a row of the grid.  One thread at a time.  PW_RESOURCE: the journal is unchanged. */
+int pw_journal_add (pw_journal *j, const pw_plan *p, long row, int status, const char *cells, pw_error *error);
 /* Closes the journal; removes it if it was created here and has no rows. */
 void pw_journal_close (pw_journal *j);
+
+/* ---- Rows (sweep_rows.c) ---- */
+
+/* Computes the missing rows by `jobs` threads, until all are there or a signal requests a stop.  PW_RESOURCE. */
+int pw_sweep_rows (const pw_plan *p, pw_journal *j, int jobs, pw_error *error);
+
+/* ---- The table ---- */
 
 /* How the runs of a table ended. */
 typedef struct {

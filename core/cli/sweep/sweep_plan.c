@@ -1,4 +1,4 @@
-/* The plan of a sweep: the model, the grid, the columns, the compiled systems; one of its runs. */
+/* The plan of a sweep: the model, the grid, the columns, the fingerprint. */
 #define _POSIX_C_SOURCE 200809L
 #include <math.h>
 #include <stdlib.h>
@@ -8,52 +8,25 @@
 
 enum { PLAN_TRIES = 1000 }; /* number of failed models after which the grid is refused */
 
-/* ---- Compiled systems ---- */
+/* ---- Models ---- */
 
 /* Sets the parameters of a row, and the initial values of the command line. */
 static int plan_build (const pw_plan *p, long row, pw_model *m, pw_error *error) {
-  int status = pw_cli_apply (m, "--set", p->sets, pw_model_set, error);
+  int status = pw_cli_apply (m, "--set", p->line->sets, pw_model_set, error);
   for (int i = 0; i < p->grid.axes && status == PW_OK; i++)
     if (p->grid.axis[i].parameter)
       status = pw_model_set (m, p->grid.axis[i].name, pw_grid_value (&p->grid, i, row), error);
-  if (status == PW_OK) status = pw_cli_apply (m, "--start", p->starts, pw_model_set_initial, error);
+  if (status == PW_OK) status = pw_cli_apply (m, "--start", p->line->starts, pw_model_set_initial, error);
   return status == PW_OK ? pw_model_build (m, error) : status;
 }
 
-static int plan_compile (pw_sweep_system *x, const pw_plan *p, long row, pw_error *error) {
-  *x = (pw_sweep_system){ .m = { .model = pw_file_model (p->file, error) } };
-  if (x->m.model && plan_build (p, row, x->m.model, error) == PW_OK)
-    x->m.system = pw_system_compile (x->m.model, error);
-  if (x->m.system == NULL) return error->status;
-  x->state = malloc (((size_t)p->grid.axes + 1) * sizeof *x->state);
-  if (x->state == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
-  for (int i = 0; i < p->grid.axes; i++) {
-    const pw_axis *a = p->grid.axis + i;
-    x->state[i] = a->parameter ? -1 : pw_system_find_state (x->m.system, a->name, error);
-    if (a->parameter == NULL && x->state[i] < 0) return PW_INPUT;
-  }
+int pw_plan_compile (const pw_plan *p, long row, pw_cli_model *m, pw_error *error) {
+  *m = (pw_cli_model){ .model = pw_file_model (p->file, error) };
+  if (m->model && plan_build (p, row, m->model, error) == PW_OK) m->system = pw_system_compile (m->model, error);
+  if (m->system == NULL) return error->status;
+  for (const pw_axis *a = p->grid.axis; a < p->grid.axis + p->grid.axes; a++)
+    if (a->parameter == NULL && pw_system_find_state (m->system, a->name, error) < 0) return PW_INPUT;
   return PW_OK;
-}
-
-int pw_sweep_system_open (pw_sweep_system *x, const pw_plan *p, long row, pw_error *error) {
-  char name[300];
-  if (plan_compile (x, p, row, error) != PW_OK) return error->status;
-  int states = 2 * pw_system_coordinates (x->m.system);
-  x->column = malloc ((size_t)states * sizeof *x->column);
-  if (x->column == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
-  for (int i = 0; i < states; i++) {
-    x->column[i] = pw_names_find (&p->index, pw_system_state_name (x->m.system, i, name, sizeof name));
-    if (x->column[i] < 0)
-      return pw_fail (error, PW_INPUT,
-                      "%s has no column: the number of bodies may only depend on parameters that are counts", name);
-  }
-  return PW_OK;
-}
-
-void pw_sweep_system_close (pw_sweep_system *x) {
-  pw_cli_close_model (&x->m);
-  free (x->column);
-  free (x->state);
 }
 
 /* ---- Axes ---- */
@@ -71,7 +44,7 @@ static int plan_axis (const pw_plan *p, pw_axis *a, pw_model *m, pw_error *error
   const pw_parameter *q = a->parameter = pw_cli_parameter (m, a->name);
   if (q) a->unit = q->unit;
   const char *option = a->parameter ? "--set" : "--start";
-  if (plan_named (a->parameter ? p->sets : p->starts, a->name))
+  if (plan_named (a->parameter ? p->line->sets : p->line->starts, a->name))
     return pw_fail (error, PW_INPUT, "%s is given by --vary and by %s", a->name, option);
   if (a->parameter == NULL && strchr (a->name, '.')) return PW_OK;
   if (a->parameter == NULL) return pw_model_set (m, a->name, pw_axis_value (a, 0), error);
@@ -83,11 +56,12 @@ static int plan_axis (const pw_plan *p, pw_axis *a, pw_model *m, pw_error *error
 
 /* ---- Columns ---- */
 
-/* The i-th state in the order of the table: six of each body, then internal coordinates and their velocities. */
+/* The i-th state in the order of the table: positions and velocities of each body, then each internal coordinate and its
+ * velocity. */
 static int plan_state (const pw_system *s, int i) {
-  int n = pw_system_coordinates (s), bodies = pw_system_bodies (s), k = i - 6 * bodies;
-  if (k >= 0) return 3 * bodies + k / 2 + k % 2 * n;
-  return i % 6 < 3 ? i / 6 * 3 + i % 6 : n + i / 6 * 3 + i % 6 - 3;
+  int n = pw_system_coordinates (s), bodies = pw_system_bodies (s), internal = i - 6 * bodies;
+  if (internal >= 0) return 3 * bodies + internal / 2 + (internal % 2 ? n : 0);
+  return 3 * (i / 6) + i % 3 + (i % 6 < 3 ? 0 : n);
 }
 
 /* The hash table of names must not be full. */
@@ -101,8 +75,7 @@ static int plan_grow (pw_plan *p) {
 }
 
 /* Adds the new states of a system, and the units of varied initial values. */
-static int plan_columns_of (pw_plan *p, const pw_sweep_system *x, pw_error *error) {
-  const pw_system *s = x->m.system;
+static int plan_columns_of (pw_plan *p, const pw_system *s, pw_error *error) {
   char name[300];
   for (int i = 0; i < 2 * pw_system_coordinates (s); i++) {
     int state = plan_state (s, i);
@@ -113,8 +86,8 @@ static int plan_columns_of (pw_plan *p, const pw_sweep_system *x, pw_error *erro
     p->column[p->columns] = (struct pw_column){ copy, pw_system_state_unit (s, state) };
     pw_names_add (&p->index, copy, p->columns++);
   }
-  for (int i = 0; i < p->grid.axes; i++)
-    if (x->state[i] >= 0) p->grid.axis[i].unit = pw_system_state_unit (s, x->state[i]);
+  for (pw_axis *a = p->grid.axis; a < p->grid.axis + p->grid.axes; a++)
+    if (a->parameter == NULL) a->unit = pw_system_state_unit (s, pw_system_find_state (s, a->name, error));
   return PW_OK;
 }
 
@@ -129,21 +102,21 @@ static void plan_engine (pw_plan *p, const pw_system *s) {
   pw_run_defaults d = pw_cli_defaults (pw_file_table (p->file));
   double steps = (double)p->grid.rows * pw_method_steps (p->method, &p->settings, d.step, p->t_end);
   pw_cli_engine_open (&p->engine, s, p->specialise, steps);
-  const char *why = p->cpu                ? "--cpu measures each run"
-                    : isfinite (p->limit) ? "--limit stops each run by itself"
-                                          : NULL;
+  const char *why = p->cpu                     ? "--cpu measures each run"
+                    : isfinite (p->limit.most) ? "--limit stops each run by itself"
+                                               : NULL;
   if (why == NULL) p->code = pw_cli_engine_lanes (&p->engine, s, p->method, p->lanes, steps);
   if (why && p->lanes > 1) pw_cli_say ("pinwheel: one run after the other: %s\n", why);
 }
 
 static int plan_scan_row (pw_plan *p, long row, plan_scan *scan, pw_error *error) {
-  pw_sweep_system x;
+  pw_cli_model m;
   pw_error own = { 0 };
-  int status = plan_compile (&x, p, row, &own);
-  if (status == PW_OK) p->tables = pw_check_tables (p->tables, x.m.model);
-  if (status == PW_OK) status = plan_columns_of (p, &x, &own);
-  if (status == PW_OK && !scan->built) plan_engine (p, x.m.system);
-  pw_sweep_system_close (&x);
+  int status = pw_plan_compile (p, row, &m, &own);
+  if (status == PW_OK) p->tables = pw_check_tables (p->tables, m.model);
+  if (status == PW_OK) status = plan_columns_of (p, m.system, &own);
+  if (status == PW_OK && !scan->built) plan_engine (p, m.system);
+  pw_cli_close_model (&m);
   if (status == PW_RESOURCE) return pw_fail (error, status, "%s", own.text);
   scan->built |= status == PW_OK;
   if (status != PW_OK && scan->refused++ == 0) scan->first = own;
@@ -193,7 +166,7 @@ static void plan_parameters (pw_plan *p, const pw_model *m) {
 }
 
 static void plan_grid (pw_plan *p) {
-  pw_fingerprint_initial (&p->fingerprint, p->starts);
+  pw_fingerprint_initial (&p->fingerprint, p->line->starts);
   pw_text order = { .at = NULL };
   for (int i = 0; i < p->grid.axes; i++) {
     pw_fingerprint_line (&p->fingerprint, "vary", p->grid.axis[i].name, p->grid.axis[i].range);
@@ -206,17 +179,11 @@ static void plan_grid (pw_plan *p) {
 
 static int plan_fingerprint (pw_plan *p, const pw_model *m, pw_error *error) {
   char part[60];
-  pw_text_add (&p->fingerprint, PW_SWEEP_MAGIC);
-  pw_fingerprint_line (&p->fingerprint, "version", NULL, PW_VERSION);
-  if (pw_fingerprint_model (&p->fingerprint, p->file, p->tables, error) != PW_OK) return error->status;
-  pw_fingerprint_line (&p->fingerprint, "method", NULL, p->method);
-  pw_fingerprint_number (&p->fingerprint, "t-end", NULL, p->t_end);
-  pw_fingerprint_number (&p->fingerprint, "step", NULL, p->settings.step);
-  pw_fingerprint_number (&p->fingerprint, "rtol", NULL, p->settings.rtol);
-  pw_fingerprint_number (&p->fingerprint, "atol", NULL, p->settings.atol);
+  if (pw_fingerprint_run (&p->fingerprint, PW_SWEEP_MAGIC, p->file, p->tables, p->method, &p->settings, error) != PW_OK)
+    return error->status;
   if (p->settings.max_steps != PW_MAX_STEPS)
     pw_fingerprint_number (&p->fingerprint, "max-steps", NULL, (double)p->settings.max_steps);
-  if (isfinite (p->limit)) pw_fingerprint_number (&p->fingerprint, "limit", NULL, p->limit);
+  if (isfinite (p->limit.most)) pw_fingerprint_number (&p->fingerprint, "limit", NULL, p->limit.most);
   if (p->engine.code) pw_fingerprint_line (&p->fingerprint, "engine", NULL, pw_cli_engine_name (&p->engine));
   plan_parameters (p, m);
   plan_grid (p);
@@ -238,7 +205,7 @@ int pw_plan_open (pw_plan *p, const char **ranges, pw_error *error) {
   if (status != PW_OK) return status;
   pw_model *m = pw_file_model (p->file, error);
   if (m == NULL) return error->status;
-  status = pw_cli_apply (m, "--set", p->sets, pw_model_set, error);
+  status = pw_cli_apply (m, "--set", p->line->sets, pw_model_set, error);
   for (int i = 0; i < p->grid.axes && status == PW_OK; i++) status = plan_axis (p, p->grid.axis + i, m, error);
   if (status == PW_OK) status = plan_columns (p, error);
   if (status == PW_OK) plan_head (p);
@@ -256,95 +223,4 @@ void pw_plan_close (pw_plan *p) {
   pw_text_free (&p->head);
   pw_text_free (&p->fingerprint);
   free (p->column);
-}
-
-/* ---- One run, and the cells of its row ---- */
-
-/* The result of a run; NaN if unknown. */
-typedef struct {
-  double t, kinetic, position, velocity, steps, rhs, cpu;
-  double *state; /* columns */
-} row_result;
-
-static int row_read (const pw_sweep_system *s, pw_run *r, row_result *x, pw_error *error) {
-  pw_sample sample;
-  const pw_statistics *statistics = pw_run_statistics (r);
-  int n = pw_system_coordinates (s->m.system);
-  x->t = pw_run_time (r);
-  x->position = statistics->position;
-  x->velocity = statistics->velocity;
-  x->steps = (double)statistics->steps;
-  x->rhs = (double)statistics->rhs;
-  int status = pw_run_sample (r, x->t, &sample, error);
-  if (status != PW_OK) return status;
-  x->kinetic = sample.kinetic;
-  for (int i = 0; i < n; i++) x->state[s->column[i]] = sample.q[i], x->state[s->column[n + i]] = sample.v[i];
-  return PW_OK;
-}
-
-void pw_sweep_run_open (pw_sweep_run *x, const pw_plan *p, const pw_sweep_system *s, long row, const pw_error *error) {
-  *x = (pw_sweep_run){
-    .plan = p, .system = s, .row = row, .limit = { .most = p->limit }, .status = error->status, .error = *error
-  };
-  if (x->status != PW_OK) return;
-  pw_settings settings = p->settings;
-  pw_initial_value *initial = malloc (((size_t)p->grid.axes + 1) * sizeof *initial);
-  if (initial == NULL) {
-    x->status = pw_fail (&x->error, PW_RESOURCE, "out of memory");
-    return;
-  }
-  for (int i = 0; i < p->grid.axes; i++)
-    if (s->state[i] >= 0)
-      initial[settings.initials++] = (pw_initial_value){ s->state[i], pw_grid_value (&p->grid, i, row) };
-  settings.initial = initial;
-  settings.specialised = s->code;
-  settings.stop = pw_limit_over;
-  settings.stop_context = &x->limit;
-  pw_limit_start (&x->limit);
-  x->start = pw_seconds (CLOCK_THREAD_CPUTIME_ID);
-  x->run = pw_run_open (s->m.system, p->method, &settings, &x->error);
-  if (x->run == NULL) x->status = x->error.status;
-  if (x->run) x->change = pw_cli_change (x->run, s->m.system, x->changed);
-  free (initial);
-}
-
-int pw_sweep_run_ended (const pw_sweep_run *x) {
-  return x->status != PW_OK || !(pw_run_time (x->run) < x->plan->t_end);
-}
-
-/* The result; a failed run still reports the time it reached. */
-static void row_result_of (pw_sweep_run *x, row_result *result) {
-  if (x->status == PW_STOPPED) x->status = pw_limit_fail (&x->limit, pw_run_time (x->run), &x->error);
-  if (x->run) {
-    int read = row_read (x->system, x->run, result, x->status == PW_OK ? &x->error : &(pw_error){ 0 });
-    if (x->status == PW_OK) x->status = read;
-    result->cpu = pw_seconds (CLOCK_THREAD_CPUTIME_ID) - x->start;
-  }
-  if (x->status > 0 && pw_stop == 0) x->status = pw_fail (&x->error, PW_METHOD, "the method gave up");
-}
-
-static void row_write (const pw_plan *p, long row, int status, const row_result *x, const char *reason, pw_text *t) {
-  static const char *const word[] = { "ok", "machine", "input", "start", "method" };
-  for (int i = 0; i < p->grid.axes; i++) pw_text_number (t, pw_grid_value (&p->grid, i, row));
-  pw_text_cell (t, word[-status]);
-  pw_text_number (t, x->t);
-  for (int i = 0; i < p->columns; i++) pw_text_number (t, x->state[i]);
-  const double rest[] = { x->kinetic, x->position, x->velocity, x->steps, x->rhs, x->cpu };
-  for (int i = 0; i < (p->cpu ? 6 : 5); i++) pw_text_number (t, rest[i]);
-  pw_text_quoted (t, reason);
-}
-
-int pw_sweep_run_close (pw_sweep_run *x, pw_text *text) {
-  row_result result = { NAN, NAN, NAN, NAN, NAN, NAN, 0, NULL };
-  const int columns = x->plan->columns;
-  result.state = malloc (((size_t)columns + 1) * sizeof *result.state);
-  if (result.state == NULL) x->status = pw_fail (&x->error, PW_RESOURCE, "out of memory");
-  for (int i = 0; i < columns && result.state; i++) result.state[i] = NAN;
-  if (result.state) row_result_of (x, &result);
-  if (x->status != PW_RETRY && x->status != PW_RESOURCE)
-    row_write (x->plan, x->row, x->status, &result, x->error.text, text);
-  free (result.state);
-  pw_run_close (x->run);
-  x->run = NULL;
-  return text->failed ? pw_fail (&x->error, PW_RESOURCE, "out of memory") : x->status;
 }
