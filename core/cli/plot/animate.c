@@ -66,8 +66,7 @@ static void page_bodies (FILE *f, const pw_plots *p) {
 }
 
 /* A stroke of a symbol: 1 if it is closed + 2 if it is upright, then its vertices. */
-static void page_stroke (void *context, const pw_plot_stroke *s) {
-  FILE *f = context;
+static void page_stroke (FILE *f, const pw_plot_stroke *s) {
   fprintf (f, "[%d", s->closed + 2 * s->upright);
   for (int k = 0; k < s->count; k++) {
     fputs (",[", f);
@@ -78,11 +77,13 @@ static void page_stroke (void *context, const pw_plot_stroke *s) {
 }
 
 static void page_symbol (FILE *f, const pw_plots *p, const pw_plot_link *link) {
+  pw_plot_stroke stroke[PLOT_STROKES];
   double heading = pw_plot_heading (link);
+  int strokes = link->kind->symbol ? pw_plot_strokes (p, 0, link, p->samples, stroke) : 0;
   fprintf (f, ",\"contact\":%d,\"line\":%d,\"heading\":", link->contact, pw_plot_has_rail (link));
   page_numbers (f, &heading, 1, 9);
   fputs (",\"strokes\":[", f);
-  if (link->kind->symbol) pw_plot_strokes (p, 0, link, p->samples, page_stroke, f);
+  for (int k = 0; k < strokes; k++) page_stroke (f, &stroke[k]);
   fputs ("0]", f);
 }
 

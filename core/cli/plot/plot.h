@@ -55,6 +55,8 @@ enum {
   PLOT_NUMBERS = 8000000, /* numbers stored, unless that is less than PLOT_FEW samples */
   PLOT_SHOWN = 1000,      /* bodies and wheels drawn at most: more cannot be distinguished */
   PLOT_VERTICES = 32,     /* of a line of a symbol, at most */
+  PLOT_HATCHES = 60,      /* lines of the hatching of the ground, at most */
+  PLOT_STROKES = 80,      /* lines of a symbol and of the ground at it, at most */
   PLOT_POINTS = 24,       /* attachment points drawn of one body, at most */
   PLOT_CURVES = 60        /* bodies or wheels with a curve, at most */
 };
@@ -100,9 +102,6 @@ typedef struct {
   int count, closed, upright;
   double at[PLOT_VERTICES][4];
 } pw_plot_stroke;
-
-/* Receives a line in the inertial frame [m]. */
-typedef void pw_plot_line_function (void *context, double (*at)[2], int count, int closed);
 
 struct pw_plots {
   const char *folder, *model, *about;
@@ -164,15 +163,14 @@ double pw_plot_unit (const pw_plots *p);
 /* A point of a body in the inertial frame [m]; motion: x, y, phi. */
 void pw_plot_point (const double *motion, const double *at, double out[2]);
 
-/* Passes the strokes of a symbol and of the ground at it, rails as long as the travel during the first `samples`. */
-typedef void pw_plot_stroke_function (void *context, const pw_plot_stroke *s);
-void pw_plot_strokes (const pw_plots *p, int i, const pw_plot_link *link, int samples, pw_plot_stroke_function *out,
-                      void *context);
+/* Writes the strokes of a symbol and of the ground at it, rails as long as the travel during the first `samples`; returns
+ * their number. */
+int pw_plot_strokes (const pw_plots *p, int i, const pw_plot_link *link, int samples,
+                     pw_plot_stroke stroke[PLOT_STROKES]);
+/* The vertices of a stroke at sample i, in the inertial frame [m]. */
+void pw_plot_place (const pw_plots *p, int i, const pw_plot_link *link, const pw_plot_stroke *s, double (*at)[2]);
 /* The field `heading` of an element [rad]; 0 if it has none. */
 double pw_plot_heading (const pw_plot_link *link);
-/* Passes the lines of a symbol at sample i, rails as long as the travel during the first `samples`. */
-void pw_plot_draw_symbol (const pw_plots *p, int i, const pw_plot_link *link, int samples, pw_plot_line_function *out,
-                          void *context);
 /* Forces of these elements [N], x and y each. */
 void pw_plot_forces (const pw_plots *p, const pw_sample *sample, double *out);
 

@@ -141,16 +141,17 @@ static void data_block (FILE *f, const pw_plots *p, int i, int block) {
     }
 }
 
-typedef struct {
-  FILE *f;
-  double t;
-  int closed;
-} data_symbols;
-
-static void data_line (void *context, double (*at)[2], int count, int closed) {
-  const data_symbols *x = context;
-  for (int k = 0; k < count && closed == x->closed; k++)
-    data_vertex (x->f, at[k], x->t, -1, k < count - 1 ? "\n" : "\n\n");
+/* The open, or the closed lines of a symbol at the last of n samples. */
+static void data_symbol (FILE *f, const pw_plots *p, const pw_plot_link *link, int n, int closed) {
+  pw_plot_stroke stroke[PLOT_STROKES];
+  double at[PLOT_VERTICES][2];
+  int strokes = link->kind->symbol ? pw_plot_strokes (p, n - 1, link, n, stroke) : 0;
+  for (const pw_plot_stroke *s = stroke; s < stroke + strokes; s++) {
+    if (s->closed != closed) continue;
+    pw_plot_place (p, n - 1, link, s, at);
+    for (int k = 0; k < s->count; k++)
+      data_vertex (f, at[k], pw_plot_sample (p, n - 1)[PLOT_T], -1, k < s->count - 1 ? "\n" : "\n\n");
+  }
 }
 
 /* Blocks: snapshots out of the first n samples; then the last of them, with symbols, open and closed lines.  gnuplot counts
@@ -168,10 +169,8 @@ static int data_mechanism (const pw_plots *p, const pw_figures *f, const char *n
     for (int i = last ? n - 1 : 0; i < n - !last; i += stride) data_block (out, p, i, block % PLOT_BLOCKS);
   }
   for (int closed = 0; closed < 2; closed++) {
-    data_symbols x = { out, pw_plot_sample (p, n - 1)[PLOT_T], closed };
     fprintf (out, "\n\n# symbols, %s\nnan nan nan nan\n\n", closed ? "closed" : "open");
-    for (int i = 0; i < p->links; i++)
-      if (p->link[i].kind->symbol) pw_plot_draw_symbol (p, n - 1, &p->link[i], n, data_line, &x);
+    for (int i = 0; i < p->links; i++) data_symbol (out, p, &p->link[i], n, closed);
   }
   return pw_output_finish (o, error);
 }

@@ -70,7 +70,7 @@ static int symbol_numbers (const char **text, double *out, int most) {
 /* The next stroke of a symbol, without vertices if its condition does not hold; 0 after the last one. */
 static int symbol_next (const pw_plot_link *link, const char **text, pw_plot_stroke *s) {
   double x[4];
-  s->count = 0;
+  s->count = s->upright = 0;
   while (isspace ((unsigned char)**text) || **text == ';') ++*text;
   if (**text == 0) return 0;
   int drawn = symbol_condition (link, text);
@@ -131,72 +131,50 @@ static symbol_frame symbol_travel (const pw_plots *p, int sample, const pw_plot_
   return f;
 }
 
-/* Hatching of the line from x0 to x1 at height y relative to p2, on its lower side; the fourth number of a vertex, along
- * p2 - p1's normal, is 0. */
-static void symbol_hatch (double x0, double x1, double y, int upright, pw_plot_stroke_function *out, void *context) {
-  pw_plot_stroke s = { .count = 2, .upright = upright };
-  int strokes = (int)fmin (60, ceil ((x1 - x0) / 0.6));
+/* Hatching of the line from x0 to x1 at height y relative to p2, on its lower side. */
+static int symbol_hatch (double x0, double x1, double y, int upright, pw_plot_stroke *s) {
+  int strokes = (int)fmin (PLOT_HATCHES, ceil ((x1 - x0) / 0.6));
   for (int k = 0; k < strokes; k++) {
     double x = x0 + (x1 - x0) * (k + 0.5) / strokes;
-    memcpy (s.at[0], (const double[]){ 1, x + 0.25, y, 0 }, sizeof *s.at);
-    memcpy (s.at[1], (const double[]){ 1, x - 0.25, y - 0.5, 0 }, sizeof *s.at);
-    out (context, &s);
+    s[k] = (pw_plot_stroke){ 2, 0, upright, { { 1, x + 0.25, y }, { 1, x - 0.25, y - 0.5 } } };
   }
+  return strokes;
 }
 
 /* A rail on the ground, or a support of a joint on the ground. */
-static void symbol_ground (double low, double high, const pw_plot_link *link, pw_plot_stroke_function *out,
-                           void *context) {
+static int symbol_ground (double low, double high, const pw_plot_link *link, pw_plot_stroke *s) {
   static const pw_plot_stroke support = {
     6, 0, 1, { { 1, 1.1, -1.5 }, { 1, .8, -1.5 }, { 1, 0, 0 }, { 1, -.8, -1.5 }, { 1, -1.1, -1.5 }, { 1, 1.1, -1.5 } }
   };
   const double groove = -.4; /* the lower edge of a slot, as in the symbols of element types */
-  if (pw_plot_has_rail (link)) {
-    symbol_hatch (low, high, strstr (link->kind->symbol, "1 -inf -") ? groove : 0, 0, out, context);
-    return;
-  }
-  out (context, &support);
-  symbol_hatch (-1.1, 1.1, -1.5, 1, out, context);
+  if (pw_plot_has_rail (link))
+    return symbol_hatch (low, high, strstr (link->kind->symbol, "1 -inf -") ? groove : 0, 0, s);
+  *s = support;
+  return 1 + symbol_hatch (-1.1, 1.1, -1.5, 1, s + 1);
 }
 
-void pw_plot_strokes (const pw_plots *p, int i, const pw_plot_link *link, int samples, pw_plot_stroke_function *out,
-                      void *context) {
+int pw_plot_strokes (const pw_plots *p, int i, const pw_plot_link *link, int samples,
+                     pw_plot_stroke stroke[PLOT_STROKES]) {
   const symbol_frame f = symbol_travel (p, i, link, samples);
   const double low = f.low / f.unit, high = f.high / f.unit;
-  pw_plot_stroke s = { .upright = 0 };
-  if (link->end[link->ends - 1].body < 0 || link->end[0].body < 0) symbol_ground (low, high, link, out, context);
-  for (const char *text = link->kind->symbol; symbol_next (link, &text, &s);) {
-    for (int k = 0; k < s.count; k++)
-      if (isinf (s.at[k][1])) s.at[k][1] = s.at[k][1] > 0 ? high : low;
-    if (s.count) out (context, &s);
+  int ground = link->end[link->ends - 1].body < 0 || link->end[0].body < 0, n = 0;
+  if (ground) n = symbol_ground (low, high, link, stroke);
+  for (const char *text = link->kind->symbol; n < PLOT_STROKES && symbol_next (link, &text, &stroke[n]);) {
+    pw_plot_stroke *s = &stroke[n];
+    for (int k = 0; k < s->count; k++)
+      if (isinf (s->at[k][1])) s->at[k][1] = s->at[k][1] > 0 ? high : low;
+    n += s->count > 0;
   }
+  return n;
 }
 
-/* ---- Lines ---- */
-
-typedef struct {
-  symbol_frame along, upright; /* of the element; of its support */
-  pw_plot_line_function *out;
-  void *context;
-} symbol_lines;
-
-static void symbol_line (void *context, const pw_plot_stroke *s) {
-  const symbol_lines *x = context;
-  const symbol_frame *f = s->upright ? &x->upright : &x->along;
-  double at[PLOT_VERTICES][2];
+void pw_plot_place (const pw_plots *p, int i, const pw_plot_link *link, const pw_plot_stroke *s, double (*at)[2]) {
+  symbol_frame f = symbol_place (p, i, link);
+  if (s->upright) f.e[0] = 1, f.e[1] = 0;
+  if (s->upright && link->end[0].body < 0) f.d[0] = f.d[1] = 0;
   for (int k = 0; k < s->count; k++) {
     const double *v = s->at[k];
-    at[k][0] = f->p[0] + v[0] * f->d[0] - v[3] * f->d[1] + f->unit * (v[1] * f->e[0] - v[2] * f->e[1]);
-    at[k][1] = f->p[1] + v[0] * f->d[1] + v[3] * f->d[0] + f->unit * (v[1] * f->e[1] + v[2] * f->e[0]);
+    at[k][0] = f.p[0] + v[0] * f.d[0] - v[3] * f.d[1] + f.unit * (v[1] * f.e[0] - v[2] * f.e[1]);
+    at[k][1] = f.p[1] + v[0] * f.d[1] + v[3] * f.d[0] + f.unit * (v[1] * f.e[1] + v[2] * f.e[0]);
   }
-  x->out (x->context, at, s->count, s->closed);
-}
-
-void pw_plot_draw_symbol (const pw_plots *p, int i, const pw_plot_link *link, int samples, pw_plot_line_function *out,
-                          void *context) {
-  const symbol_frame f = symbol_place (p, i, link);
-  symbol_lines x = { f, f, out, context };
-  if (link->end[0].body < 0) x.upright.d[0] = x.upright.d[1] = 0;
-  x.upright.e[0] = 1, x.upright.e[1] = 0;
-  pw_plot_strokes (p, i, link, samples, symbol_line, &x);
 }
