@@ -58,7 +58,7 @@ static void page_bodies (FILE *f, const pw_plots *p) {
   page_points (f, "],\n\"ground\":", *p->ground, p->grounds, NULL);
   fputs (",\n\"wheels\":[", f);
   for (int w = 0; w < p->wheels.shown; w++) {
-    int body = pw_plot_shown (p, pw_system_element (p->s, p->wheels.index[w]).body[0]);
+    int body = p->shown[pw_system_element (p->s, p->wheels.index[w]).body[0]];
     page_text (f, w ? ",\n{\"name\":" : "\n{\"name\":", pw_plot_name (p, &p->wheels, w));
     fprintf (f, ",\"body\":%d,\"rolls\":%d}", body, pw_plot_rolls (p, w));
   }
@@ -147,9 +147,10 @@ static void page_parameters (FILE *f, const pw_model *m) {
 
 void pw_animation_run (FILE *f, const pw_plots *p, const char *method, const char *reason) {
   int wheels = 3 * p->wheels.shown;
-  page_text (f, "{\nmodel:", p->model);
-  page_text (f, ",\nabout:", p->about ? p->about : "");
-  page_parameters (f, p->description);
+  const char *about = pw_model_table (p->m)->about;
+  page_text (f, "{\nmodel:", pw_system_name (p->s));
+  page_text (f, ",\nabout:", about ? about : "");
+  page_parameters (f, p->m);
   page_text (f, ",\nmethod:", method);
   page_text (f, ",\nreason:", reason);
   fputs (",\n", f);

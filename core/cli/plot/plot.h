@@ -61,6 +61,9 @@ enum {
   PLOT_CURVES = 60        /* bodies or wheels with a curve, at most */
 };
 
+/* In place of a body among those drawn. */
+enum { PLOT_GROUND = -1, PLOT_HIDDEN = -2 };
+
 /* Columns of a sample: these, then x, y, phi, vx, vy, omega of each body drawn, then x, y, heading of each wheel drawn,
  * then the force of each link. */
 enum { PLOT_T, PLOT_KINETIC, PLOT_POTENTIAL, PLOT_WORK, PLOT_LOSS, PLOT_PROJECTION, PLOT_BALANCE, PLOT_FIRST };
@@ -90,10 +93,11 @@ typedef struct {
   int contact; /* its track among wheels; -1: none */
   int ends;    /* 1 or 2 */
   struct {
-    int body;     /* among those drawn, -1: the ground */
+    int body;     /* among those drawn, or PLOT_GROUND */
     double at[2]; /* [m] */
   } end[2];
-  int force, column; /* end, and the first column of its body; -1: at a joint of other elements, without its force */
+  int force;  /* an end on a body; -1: at a joint of other elements, without its force */
+  int offset; /* of that force among those of all elements */
 } pw_plot_link;
 
 /* A line of a symbol: vertices a, x, y, b; the point p1 + a (p2 - p1) + b times that turned to the left + u (x e + y n).
@@ -104,8 +108,8 @@ typedef struct {
 } pw_plot_stroke;
 
 struct pw_plots {
-  const char *folder, *model, *about;
-  const pw_model *description;
+  const char *folder;
+  const pw_model *m;
   double figure_width; /* [mm]; 0: the default */
   int by_time;         /* 1: colours show the time, 0: the bodies */
   int lock;            /* of the folder; -1: none */
@@ -117,6 +121,7 @@ struct pw_plots {
   pw_tracks bodies, wheels;
   int links, grounds;   /* elements with points; points of the ground */
   int with_forces;      /* 1: the forces of links are kept */
+  int *shown;           /* of each body: its index among those drawn or PLOT_HIDDEN; PLOT_GROUND at the end */
   pw_plot_body *shape;  /* bodies */
   double (*ground)[2];  /* grounds [m] */
   double *data;         /* wanted x width */
@@ -145,14 +150,11 @@ int pw_plot_rolls (const pw_plots *p, int wheel);
 /* Largest dimension of the initial configuration [m]. */
 double pw_plot_size (const pw_plots *p);
 
-/* Finds the attachment points of bodies and of the ground, from the points of elements' definitions. */
-int pw_plot_find_shapes (pw_plots *p, const pw_model *m, pw_error *error);
+/* Finds the attachment points of bodies and of the ground, and the links, up to the available number: elements with points
+ * on the bodies drawn, and at joints of these. */
+void pw_plot_find_shapes (pw_plots *p);
 /* 1 if attachment point k is not a corner of the outline. */
 int pw_plot_inside (const pw_plot_body *shape, int k);
-/* The index of a body among those drawn; -1: the ground, -2: not drawn. */
-int pw_plot_shown (const pw_plots *p, int body);
-/* Finds elements with points on the bodies drawn, and at joints of these, up to the available number. */
-void pw_plot_find_links (pw_plots *p, const pw_model *m);
 /* 1 if the last body has a line: a rail or slot. */
 int pw_plot_has_rail (const pw_plot_link *link);
 /* The diagonal of the smallest rectangle around the first n samples and, unless `most` is given, the ground [m]; *n becomes

@@ -125,7 +125,7 @@ static void data_block (FILE *f, const pw_plots *p, int i, int block) {
   for (int w = 0; w < p->wheels.shown && block == PLOT_WHEELS; w++)
     if (pw_plot_rolls (p, w))
       data_wheel (f, pw_plot_track (p, i, &p->wheels, w), 1.6 * pw_plot_unit (p), t,
-                  pw_plot_shown (p, pw_system_element (p->s, p->wheels.index[w]).body[0]));
+                  p->shown[pw_system_element (p->s, p->wheels.index[w]).body[0]]);
   for (int b = 0; b < p->bodies.shown && block != PLOT_WHEELS && block != PLOT_RODS; b++) {
     const double *motion = pw_plot_track (p, i, &p->bodies, b);
     if (block == PLOT_BODIES)
@@ -230,7 +230,9 @@ static int figures_write (const pw_plots *p, const pw_figures *figures, const ch
 
 int pw_plots_finish (pw_plots *p, int draw, pw_error *error) {
   static const char *const names[] = { "paths", "velocities", "angular", "energy", "mechanism", NULL };
-  pw_figures figures = { .folder = p->folder, .model = p->model, .about = p->about, .width = p->figure_width };
+  pw_figures figures = {
+    .folder = p->folder, .model = pw_system_name (p->s), .about = pw_model_table (p->m)->about, .width = p->figure_width
+  };
   char t[32], end[32];
   if (p->folder == NULL) return PW_OK;
   if (p->samples < 2) {

@@ -20,18 +20,19 @@ static int plot_least (int a, int b) {
   return a < b ? a : b;
 }
 
-static int plot_tracks (pw_plots *p, pw_tracks *t, int all) {
+/* Makes room for the numbers of tracks in a sample. */
+static void plot_tracks (pw_plots *p, pw_tracks *t, int all) {
   t->all = all;
   t->shown = plot_least (all, PLOT_SHOWN);
   t->curves = plot_least (t->shown, PLOT_CURVES);
   t->offset = p->width;
   p->width += t->numbers * t->shown;
   t->index = pw_arena_alloc (&p->arena, (size_t)t->shown * sizeof *t->index);
-  return t->index != NULL;
 }
 
-static int plot_allocate (pw_plots *p, int elements) {
-  size_t links = (size_t)plot_least (elements, PLOT_SHOWN);
+static int plot_allocate (pw_plots *p, pw_error *error) {
+  pw_model_elements (p->m, &p->links);
+  p->links = plot_least (p->links, PLOT_SHOWN);
   p->bodies = (pw_tracks){ .file = "motion.dat",
                            .columns = "t [s], x [m], y [m], phi [rad], vx [m/s], vy [m/s], omega [rad/s]",
                            .what = "body",
@@ -39,24 +40,33 @@ static int plot_allocate (pw_plots *p, int elements) {
   p->wheels = (pw_tracks){
     .file = "wheels.dat", .columns = "t [s], x [m], y [m], heading [rad]", .what = "wheel", .numbers = 3
   };
-  if (!plot_tracks (p, &p->bodies, pw_system_bodies (p->s)) || !plot_tracks (p, &p->wheels, pw_system_contacts (p->s)))
-    return 0;
-  p->links = (int)links;
+  p->width = PLOT_FIRST;
+  plot_tracks (p, &p->bodies, pw_system_bodies (p->s));
+  plot_tracks (p, &p->wheels, pw_system_contacts (p->s));
   p->width += p->with_forces ? 2 * p->links : 0;
   p->wanted = PLOT_NUMBERS / p->width;
   p->wanted = 1 + (p->wanted < PLOT_FEW ? PLOT_FEW : plot_least (p->wanted, PLOT_SAMPLES)); /* both ends */
+  p->shown = pw_arena_alloc (&p->arena, ((size_t)p->bodies.all + 1) * sizeof *p->shown);
   p->shape = pw_arena_alloc (&p->arena, (size_t)p->bodies.shown * sizeof *p->shape);
   p->ground = pw_arena_alloc (&p->arena, PLOT_SHOWN * sizeof *p->ground);
   p->data = pw_arena_alloc (&p->arena, (size_t)p->wanted * (size_t)p->width * sizeof *p->data);
   p->contact = pw_arena_alloc (&p->arena, (size_t)p->wheels.all * sizeof *p->contact);
-  p->link = pw_arena_alloc (&p->arena, links * sizeof *p->link);
+  p->link = pw_arena_alloc (&p->arena, (size_t)p->links * sizeof *p->link);
   p->forces = pw_arena_alloc (&p->arena, p->with_forces ? (size_t)pw_system_force_size (p->s) * sizeof *p->forces : 0);
-  return p->shape && p->ground && p->data && p->contact && p->link && p->forces;
+  if (p->bodies.index && p->wheels.index && p->shown && p->shape && p->ground && p->data && p->contact && p->link &&
+      p->forces)
+    return PW_OK;
+  return pw_fail (error, PW_RESOURCE, "plots: out of memory");
 }
 
 /* Bodies, and elements with a contact point, evenly chosen from all. */
 static void plot_choose (pw_plots *p) {
-  for (int i = 0; i < p->bodies.shown; i++) p->bodies.index[i] = pw_plot_pick (i, p->bodies.shown, p->bodies.all);
+  for (int b = 0; b < p->bodies.all; b++) p->shown[b] = PLOT_HIDDEN;
+  p->shown[p->bodies.all] = PLOT_GROUND;
+  for (int i = 0; i < p->bodies.shown; i++) {
+    p->bodies.index[i] = pw_plot_pick (i, p->bodies.shown, p->bodies.all);
+    p->shown[p->bodies.index[i]] = i;
+  }
   for (int e = 0, n = 0, i = 0; i < p->wheels.shown; e++)
     if (pw_system_element (p->s, e).contact >= 0 && n++ == pw_plot_pick (i, p->wheels.shown, p->wheels.all))
       p->wheels.index[i++] = e;
@@ -73,28 +83,19 @@ static int plot_try_folder (pw_plots *p, pw_error *error) {
 
 pw_plots *pw_plots_open (const char *folder, int forces, const pw_model *m, const pw_system *s, double t_end,
                          pw_error *error) {
-  int elements;
   pw_plots *p = malloc (sizeof *p);
-  if (p)
-    *p = (pw_plots){ .folder = folder,
-                     .lock = -1,
-                     .model = pw_system_name (s),
-                     .about = pw_model_table (m)->about,
-                     .description = m,
-                     .s = s,
-                     .t_end = t_end,
-                     .width = PLOT_FIRST,
-                     .with_forces = forces };
-  pw_model_elements (m, &elements);
-  if (p == NULL || (folder && plot_try_folder (p, error) != PW_OK) || !plot_allocate (p, elements)) {
-    if (p == NULL || error->status == PW_OK) pw_fail (error, PW_RESOURCE, "plots: out of memory");
-    pw_plots_close (p);
+  if (p == NULL) {
+    pw_fail (error, PW_RESOURCE, "plots: out of memory");
     return NULL;
   }
-  plot_choose (p);
-  p->workspace = pw_workspace_new (s, error);
-  pw_plot_find_links (p, m);
-  if (p->workspace && pw_plot_find_shapes (p, m, error) == PW_OK) return p;
+  *p = (pw_plots){ .folder = folder, .lock = -1, .m = m, .s = s, .t_end = t_end, .with_forces = forces };
+  if ((folder == NULL || plot_try_folder (p, error) == PW_OK) && plot_allocate (p, error) == PW_OK)
+    p->workspace = pw_workspace_new (s, error);
+  if (p->workspace) {
+    plot_choose (p);
+    pw_plot_find_shapes (p);
+    return p;
+  }
   pw_plots_close (p);
   return NULL;
 }

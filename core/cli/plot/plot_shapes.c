@@ -48,40 +48,17 @@ static void shapes_add_point (pw_plot_body *shape, const double *at) {
   memcpy (shape->at[shape->count++], at, 2 * sizeof *at);
 }
 
-int pw_plot_find_shapes (pw_plots *p, const pw_model *m, pw_error *error) {
-  pw_names shown;
-  int elements;
-  const pw_element *e = pw_model_elements (m, &elements);
-  if (pw_names_open (&shown, (size_t)p->bodies.shown) != PW_OK)
-    return pw_fail (error, PW_RESOURCE, "plots: out of memory");
-  for (int i = 0; i < p->bodies.shown; i++) pw_names_add (&shown, pw_system_body_name (p->s, p->bodies.index[i]), i);
-  for (const pw_element *end = e + elements; e < end; e++)
-    for (int n = 0; n < e->kind->bodies && !e->kind->each_body; n++) {
-      const double *at = pw_field_at (e->kind, e->definition, PW_POINT, n);
-      const char *body = *(const char *const *)pw_field_at (e->kind, e->definition, PW_BODY, n);
-      int b = pw_names_find (&shown, body);
-      if (at && b >= 0) shapes_add_point (&p->shape[b], at);
-      if (at && strcmp (body, "ground") == 0 && p->grounds < PLOT_SHOWN)
-        memcpy (p->ground[p->grounds++], at, 2 * sizeof *at);
-    }
-  const double *mass = pw_system_mass (p->s);
-  for (int b = 0; b < p->bodies.shown; b++) {
-    p->shape[b].point = mass[3 * p->bodies.index[b]] > 0 && mass[3 * p->bodies.index[b] + 2] == 0;
-    shapes_outline (&p->shape[b]);
+/* The points of an element on the bodies drawn and on the ground. */
+static void shapes_add_points (pw_plots *p, const pw_element *e, const int *bodies) {
+  for (int n = 0; n < e->kind->bodies; n++) {
+    const double *at = pw_field_at (e->kind, e->definition, PW_POINT, n);
+    int b = p->shown[bodies[n]];
+    if (at && b >= 0) shapes_add_point (&p->shape[b], at);
+    if (at && b == PLOT_GROUND && p->grounds < PLOT_SHOWN) memcpy (p->ground[p->grounds++], at, 2 * sizeof *at);
   }
-  pw_names_close (&shown);
-  return PW_OK;
 }
 
 /* ---- Links ---- */
-
-int pw_plot_shown (const pw_plots *p, int body) {
-  if (body >= p->bodies.all) return -1;
-  int b = (int)((long long)body * p->bodies.shown / p->bodies.all);
-  for (int near = b - 1; near <= b + 1; near++)
-    if (near >= 0 && near < p->bodies.shown && p->bodies.index[near] == body) return near;
-  return -2;
-}
 
 int pw_plot_has_rail (const pw_plot_link *link) {
   return link->kind->symbol && strstr (link->kind->symbol, "inf");
@@ -100,9 +77,9 @@ static int shapes_joint (const pw_plots *p, int one, int other, pw_plot_link *li
 
 /* An element without points is at the joints of its bodies with the last one. */
 static int shapes_at_joints (const pw_plots *p, const pw_element *e, const int *bodies, pw_plot_link *link) {
-  int last = pw_plot_shown (p, bodies[e->kind->bodies - 1]);
+  int last = p->shown[bodies[e->kind->bodies - 1]];
   for (int n = 0; n < e->kind->bodies - 1 && link->ends < 2; n++)
-    if (!shapes_joint (p, pw_plot_shown (p, bodies[n]), last, link)) return 0;
+    if (!shapes_joint (p, p->shown[bodies[n]], last, link)) return 0;
   return e->kind->symbol && link->ends > 0;
 }
 
@@ -122,26 +99,25 @@ static int shapes_contact (const pw_plots *p, int element) {
 }
 
 /* Fills a link; 0 if the element has no place, or a body that is not shown. */
-static int shapes_fill (const pw_plots *p, const pw_element *e, int element, pw_plot_link *link) {
-  const int *bodies = pw_system_element (p->s, element).body;
+static int shapes_link (const pw_plots *p, const pw_element *e, int element, pw_plot_link *link) {
+  const pw_element_info info = pw_system_element (p->s, element);
   *link = (pw_plot_link){ .element = element,
                           .kind = e->kind,
                           .definition = e->definition,
                           .force = -1,
-                          .column = -1,
                           .contact = shapes_contact (p, element) };
   for (int n = 0; n < e->kind->bodies && link->ends < 2; n++) {
     const double *at = pw_field_at (e->kind, e->definition, PW_POINT, n);
-    int body = pw_plot_shown (p, bodies[n]);
+    int body = p->shown[info.body[n]];
     if (at == NULL) continue;
-    if (body == -2) return 0;
-    if (link->force < 0 && body >= 0) link->force = link->ends, link->column = 3 * n;
+    if (body == PLOT_HIDDEN) return 0;
+    if (link->force < 0 && body >= 0) link->force = link->ends, link->offset = info.force + 3 * n;
     link->end[link->ends].body = body;
     memcpy (link->end[link->ends++].at, at, 2 * sizeof *at);
   }
   pw_plot_link joint = *link;
   joint.ends = 0;
-  if ((link->ends == 0 || shapes_omitted (e)) && shapes_at_joints (p, e, bodies, &joint)) {
+  if ((link->ends == 0 || shapes_omitted (e)) && shapes_at_joints (p, e, info.body, &joint)) {
     *link = joint;
     return 1;
   }
@@ -149,18 +125,26 @@ static int shapes_fill (const pw_plots *p, const pw_element *e, int element, pw_
 }
 
 /* The elements of a kind are in the same order in the model and in the system. */
-void pw_plot_find_links (pw_plots *p, const pw_model *m) {
-  int most = p->links, all = pw_system_elements (p->s), elements, next = 0;
-  const pw_element *e = pw_model_elements (m, &elements);
+void pw_plot_find_shapes (pw_plots *p) {
+  int most = p->links, elements, next = 0;
+  const pw_element *e = pw_model_elements (p->m, &elements);
+  const double *mass = pw_system_mass (p->s);
   const pw_kind *last = NULL;
   p->links = 0;
-  for (int i = 0; i < all && p->links < most; i++) {
-    const pw_kind *kind = pw_system_element (p->s, i).kind;
-    if (kind->each_body) continue;
-    if (kind != last) next = 0;
-    last = kind;
-    while (e[next].kind != kind) next++;
-    p->links += shapes_fill (p, &e[next++], i, &p->link[p->links]);
+  for (int i = 0; i < pw_system_elements (p->s); i++) {
+    const pw_element_info info = pw_system_element (p->s, i);
+    if (info.kind->each_body) continue;
+    if (info.kind != last) next = 0;
+    last = info.kind;
+    while (e[next].kind != last) next++;
+    shapes_add_points (p, &e[next], info.body);
+    if (p->links < most) p->links += shapes_link (p, &e[next], i, &p->link[p->links]);
+    next++;
+  }
+  for (int b = 0; b < p->bodies.shown; b++) {
+    const double *M = mass + 3 * p->bodies.index[b];
+    p->shape[b].point = M[0] > 0 && M[2] == 0;
+    shapes_outline (&p->shape[b]);
   }
 }
 
@@ -170,7 +154,7 @@ void pw_plot_forces (const pw_plots *p, const pw_sample *x, double *out) {
     if (p->link[i].force < 0)
       out[0] = out[1] = 0;
     else
-      memcpy (out, p->forces + pw_system_element (p->s, p->link[i].element).force + p->link[i].column, 2 * sizeof *out);
+      memcpy (out, p->forces + p->link[i].offset, 2 * sizeof *out);
 }
 
 /* ---- The size of what figures show ---- */
