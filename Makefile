@@ -313,7 +313,7 @@ comma := ,
 ALLOC_WRAP := malloc calloc realloc strdup free
 FILES_WRAP := open fopen fdopen fclose fflush fwrite fread fseek fseeko ftell fgets rename ftruncate fsync pread pwrite flock \
               fchmod mkdir realpath opendir \
-              $(addprefix posix_spawn,p _file_actions_init _file_actions_addopen _file_actions_adddup2)
+              $(addprefix posix_spawn,p _file_actions_init _file_actions_addchdir_np _file_actions_addopen _file_actions_adddup2)
 $(BUILD)/tests/test_alloc: WRAP := $(addprefix -Wl$(comma)--wrap=,$(ALLOC_WRAP))
 $(BUILD)/tests/test_cli_faults: WRAP = -pthread $(addprefix -Wl$(comma)--wrap=,$(ALLOC_WRAP) $(FILES_WRAP))
 $(BUILD)/tests/test_memory $(BUILD)/tests/slow_memory: WRAP = -pthread $(addprefix -Wl$(comma)--wrap=,$(ALLOC_WRAP))

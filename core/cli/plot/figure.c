@@ -1,5 +1,5 @@
 /* A folder of figures: data files, gnuplot scripts made of templates, and gnuplot, run without a shell. */
-#define _POSIX_C_SOURCE 200809L
+#define _GNU_SOURCE /* posix_spawn_file_actions_addchdir_np */
 #include <errno.h>
 #include <fcntl.h>
 #include <spawn.h>
@@ -192,27 +192,14 @@ int pw_figure_end (pw_output *o, const char *template_name, pw_error *error) {
 
 extern char **environ;
 
-enum { GNUPLOT_ABSENT = 127 }; /* exit status of a child that could not become gnuplot */
-
-/* "cd 'FOLDER'" for gnuplot, where a quote inside quotes is written twice. */
-static int gnuplot_cd (const char *folder, char *text, size_t size) {
-  size_t n = 4;
-  memcpy (text, "cd '", n);
-  for (; *folder && n + 4 < size; folder++) {
-    if (*folder == '\'') text[n++] = '\'';
-    text[n++] = *folder;
-  }
-  memcpy (text + n, "'", 2);
-  return *folder == 0;
-}
-
-/* Starts gnuplot without input, with its output on standard error, in a locale with all characters of the scripts; the
- * program itself sets no locale.  Returns an errno value. */
-static int gnuplot_start (char *const *argv, pid_t *child) {
+/* Starts gnuplot in a folder, without input, with its output on standard error, in a locale with all characters of the
+ * scripts; the program itself sets no locale.  Returns an errno value. */
+static int gnuplot_start (const char *folder, char *const *argv, pid_t *child) {
   posix_spawn_file_actions_t actions;
   int failed = setenv ("LC_ALL", "C.UTF-8", 1) == 0 ? posix_spawn_file_actions_init (&actions) : ENOMEM;
   if (failed) return failed;
-  failed = posix_spawn_file_actions_addopen (&actions, STDIN_FILENO, "/dev/null", O_RDONLY, 0);
+  failed = posix_spawn_file_actions_addchdir_np (&actions, folder);
+  if (!failed) failed = posix_spawn_file_actions_addopen (&actions, STDIN_FILENO, "/dev/null", O_RDONLY, 0);
   if (!failed) failed = posix_spawn_file_actions_adddup2 (&actions, STDERR_FILENO, STDOUT_FILENO);
   if (!failed) failed = posix_spawnp (child, argv[0], &actions, NULL, argv, environ);
   posix_spawn_file_actions_destroy (&actions);
@@ -236,27 +223,21 @@ int pw_figure_undrawn (const char *folder, const char *const *names, const char 
   return PW_OK;
 }
 
-static int gnuplot_absent (const char *folder, const char *const *names) {
-  return pw_figure_undrawn (folder, names, "gnuplot was not found");
-}
-
 int pw_figure_draw (const char *folder, const char *const *names, pw_error *error) {
-  char cd[2 * FIGURE_PATH], script[FIGURE_SCRIPTS][40], *argv[4 + FIGURE_SCRIPTS + 1] = { "gnuplot", "-d", "-e", cd };
+  char script[FIGURE_SCRIPTS][40], *argv[2 + FIGURE_SCRIPTS + 1] = { "gnuplot", "-d" };
   pid_t child;
   int status;
   for (int i = 0; i < FIGURE_SCRIPTS && names[i]; i++) {
     snprintf (script[i], sizeof script[i], "%s.gp", names[i]);
-    argv[4 + i] = script[i];
+    argv[2 + i] = script[i];
   }
-  if (!gnuplot_cd (folder, cd, sizeof cd)) return pw_fail (error, PW_INPUT, "%s: too long a name", folder);
   fflush (stderr);
   gnuplot_remove_figures (folder, names);
-  int failed = gnuplot_start (argv, &child);
-  if (failed == ENOENT) return gnuplot_absent (folder, names);
+  int failed = gnuplot_start (folder, argv, &child);
+  if (failed == ENOENT) return pw_figure_undrawn (folder, names, "gnuplot was not found");
   if (failed) return pw_fail (error, PW_RESOURCE, "cannot run gnuplot: %s", strerror (failed));
   while (waitpid (child, &status, 0) < 0)
     if (errno != EINTR) return pw_fail (error, PW_RESOURCE, "cannot wait for gnuplot: %s", strerror (errno));
-  if (WIFEXITED (status) && WEXITSTATUS (status) == GNUPLOT_ABSENT) return gnuplot_absent (folder, names);
   if (WIFEXITED (status) && WEXITSTATUS (status) == 0) return PW_OK;
   gnuplot_remove_figures (folder, names);
   int ended = WIFSIGNALED (status);
