@@ -224,7 +224,6 @@ char *pw_cli_source (const pw_system *s, pw_error *error);
 void pw_cli_engine_open (pw_cli_engine *e, const pw_system *s, pw_specialise when, double steps);
 void pw_cli_engine_close (pw_cli_engine *e);
 const pw_specialised *pw_cli_engine_code (const pw_cli_engine *e); /* for pw_settings.specialised */
-const char *pw_cli_engine_name (const pw_cli_engine *e);           /* "specialised", "general" */
 
 /* The code for `lanes` runs at once (0: as many as pay for this number of steps), by a method of fixed step size; NULL:
  * one run after the other. */

@@ -4,7 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
-#include "cli.h"
+#include "report.h"
 #include "util.h"
 
 /* Refuses a parameter among initial values, and the reverse: names of states have a dot, those of parameters have none. */
@@ -51,14 +51,21 @@ pw_file *pw_cli_file (const pw_cli_line *l, pw_error *error) {
   return NULL;
 }
 
+/* A model with --set and --start of a command line and, unless v is NULL, a value of its parameter. */
+static pw_system *model_compile (pw_model *m, const pw_cli_line *l, const pw_cli_vary *v, double value,
+                                 pw_error *error) {
+  if (m && pw_cli_apply (m, "--set", l->sets, pw_model_set, error) == PW_OK &&
+      (v == NULL || pw_model_set (m, v->name, value, error) == PW_OK) &&
+      pw_cli_apply (m, "--start", l->starts, pw_model_set_initial, error) == PW_OK &&
+      pw_model_build (m, error) == PW_OK)
+    return pw_system_compile (m, error);
+  return NULL;
+}
+
 int pw_cli_open (pw_cli_model *m, const pw_cli_line *l, pw_error *error) {
-  *m = (pw_cli_model){ .file = NULL };
-  m->file = pw_cli_file (l, error);
+  *m = (pw_cli_model){ .file = pw_cli_file (l, error) };
   if (m->file) m->model = pw_file_model (m->file, error);
-  if (m->model && pw_cli_apply (m->model, "--set", l->sets, pw_model_set, error) == PW_OK &&
-      pw_cli_apply (m->model, "--start", l->starts, pw_model_set_initial, error) == PW_OK &&
-      pw_model_build (m->model, error) == PW_OK)
-    m->system = pw_system_compile (m->model, error);
+  m->system = model_compile (m->model, l, NULL, 0, error);
   return m->system ? PW_OK : error->status;
 }
 
@@ -71,15 +78,15 @@ void pw_cli_close_model (pw_cli_model *m) {
 
 double pw_cli_change (const pw_run *r, const pw_system *s, char text[PW_CHANGE_TEXT]) {
   const pw_initial_report *x = pw_run_initial (r);
-  int n = pw_system_coordinates (s);
-  double most = 0;
-  char name[300], a[32], b[32];
-  for (int i = 0; i < 2 * n; i++) {
-    double from = i < n ? x->q_given[i] : x->v_given[i - n], to = i < n ? x->q[i] : x->v[i - n];
-    if (!pw_initial_given (x, i) || !pw_initial_moved (s, x, i) || !(fabs (to - from) > most)) continue;
+  double most = 0, from, to;
+  char name[PW_STATE_NAME], a[32], b[32];
+  for (int i = 0; i < 2 * pw_system_coordinates (s); i++) {
+    if (!pw_initial_given (x, i) || !pw_initial_moved (s, x, i)) continue;
+    pw_report_state (s, x, i, name, &from, &to);
+    if (!(fabs (to - from) > most)) continue;
     most = fabs (to - from);
-    snprintf (text, PW_CHANGE_TEXT, "%s from %s to %s %s", pw_system_state_name (s, i, name, sizeof name),
-              pw_format (a, from, 10), pw_format (b, to, 10), pw_system_state_unit (s, i));
+    snprintf (text, PW_CHANGE_TEXT, "%s from %s to %s %s", name, pw_format (a, from, 10), pw_format (b, to, 10),
+              pw_system_state_unit (s, i));
   }
   return most;
 }
@@ -173,12 +180,7 @@ void pw_cli_vary_progress (const pw_cli_vary *v, pw_progress *p, double from, do
 pw_system *pw_cli_vary_compile (void *vary, double value, pw_error *error) {
   const pw_cli_vary *v = vary;
   pw_model *m = pw_file_model (v->m->file, error);
-  pw_system *s = NULL;
-  if (m && pw_cli_apply (m, "--set", v->line->sets, pw_model_set, error) == PW_OK &&
-      pw_model_set (m, v->name, value, error) == PW_OK &&
-      pw_cli_apply (m, "--start", v->line->starts, pw_model_set_initial, error) == PW_OK &&
-      pw_model_build (m, error) == PW_OK)
-    s = pw_system_compile (m, error);
+  pw_system *s = model_compile (m, v->line, v, value, error);
   pw_model_free (m);
   return s;
 }

@@ -53,11 +53,14 @@ class Engine {
    * reason of a failure. */
   integrate (s, limit, samples) {
     const w = this.wasm, method = this.text(s.method);
-    this.numbers(w.parameters(s.parameters.length), s.parameters.length).set(s.parameters);
-    const at = w.initial(s.initial.length), initial = new DataView(w.memory.buffer, at); /* allocation may replace the buffer */
-    s.initial.forEach(([state, value], i) => { initial.setInt32(16 * i, state, true); initial.setFloat64(16 * i + 8, value, true); });
-    const before = performance.now(), status = w.run(method, s.step, s.rtol, s.end, limit, samples), ms = performance.now() - before;
-    w.release(method);
+    const parameters = w.allocate(8 * s.parameters.length), initial = w.allocate(16 * s.initial.length);
+    const view = new DataView(w.memory.buffer, initial); /* after the allocations, which may replace the buffer */
+    this.numbers(parameters, s.parameters.length).set(s.parameters);
+    s.initial.forEach(([state, value], i) => { view.setInt32(16 * i, state, true); view.setFloat64(16 * i + 8, value, true); });
+    const before = performance.now();
+    const status = w.run(method, s.step, s.rtol, s.end, limit, samples, parameters, initial, s.initial.length);
+    const ms = performance.now() - before;
+    for (const at of [method, parameters, initial]) w.release(at);
     return { ms, reason: status === 0 ? "" : this.error() };
   }
 
