@@ -119,11 +119,10 @@ static void page_array (FILE *f, const pw_plots *p, const char *key, int offset,
 }
 
 void pw_animation_scene (FILE *f, const pw_plots *p) {
-  const double size = pw_plot_size (p), symbol = pw_plot_unit (p);
   fputs ("\"size\":", f);
-  page_numbers (f, &size, 1, 9);
+  page_numbers (f, &p->size, 1, 9);
   fputs (",\"symbol\":", f);
-  page_numbers (f, &symbol, 1, 9);
+  page_numbers (f, &p->unit, 1, 9);
   fputs (",\n", f);
   page_bodies (f, p);
   page_links (f, p);
@@ -147,9 +146,8 @@ static void page_parameters (FILE *f, const pw_model *m) {
 
 void pw_animation_run (FILE *f, const pw_plots *p, const char *method, const char *reason) {
   int wheels = 3 * p->wheels.shown;
-  const char *about = pw_model_table (p->m)->about;
-  page_text (f, "{\nmodel:", pw_system_name (p->s));
-  page_text (f, ",\nabout:", about ? about : "");
+  page_text (f, "{\nmodel:", p->figures.model);
+  page_text (f, ",\nabout:", p->figures.about ? p->figures.about : "");
   page_parameters (f, p->m);
   page_text (f, ",\nmethod:", method);
   page_text (f, ",\nreason:", reason);

@@ -6,7 +6,7 @@
 #ifndef PW_PLOT_H
 #define PW_PLOT_H
 
-#include "cli.h"
+#include "figure.h"
 #include "util.h"
 
 typedef struct pw_plots pw_plots;
@@ -108,16 +108,16 @@ typedef struct {
 } pw_plot_stroke;
 
 struct pw_plots {
-  const char *folder;
+  pw_figures figures; /* their folder is NULL without figures */
+  int by_time;        /* 1: colours show the time, 0: the bodies */
+  int lock;           /* of the folder; -1: none */
   const pw_model *m;
-  double figure_width; /* [mm]; 0: the default */
-  int by_time;         /* 1: colours show the time, 0: the bodies */
-  int lock;            /* of the folder; -1: none */
   const pw_system *s;
   pw_workspace *workspace; /* for contact points and forces */
   double t_end;
   int samples, wanted; /* taken so far; planned */
   int width;           /* numbers per sample */
+  double size, unit;   /* largest dimension of the initial configuration; unit of symbols [m] */
   pw_tracks bodies, wheels;
   int links, grounds;   /* elements with points; points of the ground */
   int with_forces;      /* 1: the forces of links are kept */
@@ -147,8 +147,6 @@ static inline int pw_plot_pick (int i, int shown, int all) {
 const char *pw_plot_name (const pw_plots *p, const pw_tracks *t, int k);
 /* 1 for a wheel, 0 for a marker. */
 int pw_plot_rolls (const pw_plots *p, int wheel);
-/* Largest dimension of the initial configuration [m]. */
-double pw_plot_size (const pw_plots *p);
 
 /* Finds the attachment points of bodies and of the ground, and the links, up to the available number: elements with points
  * on the bodies drawn, and at joints of these. */
@@ -160,10 +158,12 @@ int pw_plot_has_rail (const pw_plot_link *link);
 /* The diagonal of the smallest rectangle around the first n samples and, unless `most` is given, the ground [m]; *n becomes
  * the number of samples for which it is less than `most`. */
 double pw_plot_diagonal (const pw_plots *p, int *n, double most);
-/* The unit of symbols [m]. */
-double pw_plot_unit (const pw_plots *p);
+/* Sets size and unit from the first sample. */
+void pw_plot_measure (pw_plots *p);
 /* A point of a body in the inertial frame [m]; motion: x, y, phi. */
 void pw_plot_point (const double *motion, const double *at, double out[2]);
+/* End n of a link at sample i, in the inertial frame [m]. */
+void pw_plot_end (const pw_plots *p, int i, const pw_plot_link *link, int n, double out[2]);
 
 /* Writes the strokes of a symbol and of the ground at it, rails as long as the travel during the first `samples`; returns
  * their number. */

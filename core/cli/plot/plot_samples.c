@@ -4,7 +4,6 @@
 #include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
-#include "figure.h"
 
 const char *pw_plot_name (const pw_plots *p, const pw_tracks *t, int k) {
   return t == &p->bodies ? pw_system_body_name (p->s, t->index[k]) : pw_system_element (p->s, t->index[k]).name;
@@ -74,9 +73,8 @@ static void plot_choose (pw_plots *p) {
 
 /* Reports a folder that cannot be written before the run. */
 static int plot_try_folder (pw_plots *p, pw_error *error) {
-  const pw_figures f = { .folder = p->folder };
-  p->lock = pw_figure_folder (p->folder, error);
-  pw_output *probe = p->lock < 0 ? NULL : pw_figure_data (&f, "motion.dat", error);
+  p->lock = pw_figure_folder (p->figures.folder, error);
+  pw_output *probe = p->lock < 0 ? NULL : pw_figure_data (&p->figures, "motion.dat", error);
   if (probe) pw_output_discard (probe);
   return probe ? PW_OK : error->status;
 }
@@ -88,7 +86,12 @@ pw_plots *pw_plots_open (const char *folder, int forces, const pw_model *m, cons
     pw_fail (error, PW_RESOURCE, "plots: out of memory");
     return NULL;
   }
-  *p = (pw_plots){ .folder = folder, .lock = -1, .m = m, .s = s, .t_end = t_end, .with_forces = forces };
+  *p = (pw_plots){ .figures = { .folder = folder, .model = pw_system_name (s), .about = pw_model_table (m)->about },
+                   .lock = -1,
+                   .m = m,
+                   .s = s,
+                   .t_end = t_end,
+                   .with_forces = forces };
   if ((folder == NULL || plot_try_folder (p, error) == PW_OK) && plot_allocate (p, error) == PW_OK)
     p->workspace = pw_workspace_new (s, error);
   if (p->workspace) {
@@ -104,7 +107,7 @@ int pw_plots_style (pw_plots *p, const char *width, const char *colour, pw_error
   p->by_time = colour && strcmp (colour, "time") == 0;
   if (colour && !p->by_time && strcmp (colour, "body") != 0)
     return pw_fail (error, PW_INPUT, "--colour %.40s: expected body or time", colour);
-  return pw_figure_width (width, &p->figure_width, error);
+  return pw_figure_width (width, &p->figures.width, error);
 }
 
 void pw_plots_close (pw_plots *p) {
@@ -140,6 +143,7 @@ void pw_plots_add (pw_plots *p, const pw_sample *x) {
     memcpy (motion + 3, x->v + 3 * p->bodies.index[b], 3 * sizeof *motion);
   }
   if (p->wheels.shown > 0) plot_contacts (p, x, pw_plot_track (p, i, &p->wheels, 0));
+  if (i == 0) pw_plot_measure (p);
   if (p->with_forces && p->links > 0) pw_plot_forces (p, x, pw_plot_track (p, i, &p->wheels, p->wheels.shown));
 }
 
@@ -150,4 +154,5 @@ void pw_plots_serialise (pw_plots *p, pw_archive *a) {
   if (a->failed) return;
   p->samples = samples;
   pw_archive_bytes (a, p->data, (size_t)samples * (size_t)p->width * sizeof *p->data);
+  if (samples > 0) pw_plot_measure (p);
 }

@@ -201,16 +201,12 @@ double pw_plot_diagonal (const pw_plots *p, int *n, double most) {
   return diagonal;
 }
 
-double pw_plot_size (const pw_plots *p) {
-  int n = 1;
-  double size = pw_plot_diagonal (p, &n, INFINITY);
-  return size > 0 ? size : pw_system_length (p->s);
-}
-
-double pw_plot_unit (const pw_plots *p) {
-  double reach = 0, size = pw_plot_size (p);
+void pw_plot_measure (pw_plots *p) {
+  int first = 1;
+  double reach = 0, size = pw_plot_diagonal (p, &first, INFINITY);
   for (int b = 0; b < p->bodies.shown; b++)
     for (int k = 0; k < p->shape[b].count; k++)
       reach = fmax (reach, hypot (p->shape[b].at[k][0], p->shape[b].at[k][1]));
-  return 0.035 * (reach > 0 ? fmin (size, 4 * reach) : size);
+  p->size = size > 0 ? size : pw_system_length (p->s);
+  p->unit = 0.035 * (reach > 0 ? fmin (p->size, 4 * reach) : p->size);
 }

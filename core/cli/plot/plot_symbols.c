@@ -95,19 +95,19 @@ typedef struct {
   double p[2], d[2], e[2], unit, low, high; /* p1, p2 - p1, direction, unit, ends of the travel from p2 */
 } symbol_frame;
 
-static void symbol_end (const pw_plots *p, int i, const pw_plot_link *link, int n, double out[2]) {
+void pw_plot_end (const pw_plots *p, int i, const pw_plot_link *link, int n, double out[2]) {
   static const double ground[3] = { 0 };
   int body = link->end[n].body;
   pw_plot_point (body < 0 ? ground : pw_plot_track (p, i, &p->bodies, body), link->end[n].at, out);
 }
 
 static symbol_frame symbol_place (const pw_plots *p, int i, const pw_plot_link *link) {
-  symbol_frame f = { .unit = pw_plot_unit (p) };
+  symbol_frame f = { .unit = p->unit };
   int last = link->ends - 1, line = pw_plot_has_rail (link);
   int body = link->end[line ? last : 0].body;
   double p2[2], angle = body < 0 ? 0 : pw_plot_track (p, i, &p->bodies, body)[2];
-  symbol_end (p, i, link, 0, f.p);
-  symbol_end (p, i, link, last, p2);
+  pw_plot_end (p, i, link, 0, f.p);
+  pw_plot_end (p, i, link, last, p2);
   f.d[0] = p2[0] - f.p[0], f.d[1] = p2[1] - f.p[1];
   if (link->contact >= 0)
     angle = pw_plot_track (p, i, &p->wheels, link->contact)[2];
