@@ -190,10 +190,12 @@ $(BUILD)/obj/core/cli/page/page.inc: core/cli/page/page.html core/cli/page/page.
 	@mkdir -p $(@D)
 	@for f in $^; do echo "static const char *const $$(basename $$f | tr .- __)[] = {"; $(AS_STRINGS) $$f; echo 'NULL };'; done >$@
 
-$(BUILD)/obj/core/cli/plot/templates.inc: $(wildcard core/cli/plot/*.gp core/cli/plot/templates/*.gp)
+# A line "# include OTHER.gp" of a template stands for the contents of another one.
+$(BUILD)/obj/core/cli/plot/templates.inc: $(wildcard core/cli/plot/templates/*.gp)
 	@mkdir -p $(@D)
-	@for f in $^; do echo "static const char *const figure_$$(basename $$f .gp | tr - _)[] = {"; \
-	  $(AS_STRINGS) $$f; echo 'NULL };'; done >$@
+	@for f in $^; do echo "{ \"$$(basename $$f .gp)\", (const char *const[]){"; \
+	  awk '/^# include / { while ((getline line <("core/cli/plot/templates/" $$3)) > 0) print line; next } { print }' $$f | \
+	  $(AS_STRINGS); echo 'NULL } },'; done >$@
 
 # The engine of interactive pages, WebAssembly: what integrates with rk4, erk5 and erk8, without libraries.
 WASM_FLAGS := --target=wasm32-wasi -std=c11 -O2 -ffp-contract=off -ffunction-sections -fdata-sections \

@@ -4,7 +4,7 @@
 # at that size.  panel(x0, x1, y0, y1) places a plot, measured from the upper left corner; key(y, columns) a legend, which
 # takes rows(n, columns) below `top`.  Text of the user (labels, names) is plain; our own is enhanced: 'v_x [m/s]',
 # '10^{%T}'.  Line type i: colour, dash and width distinguish it without colour, and wider ones stay visible below later
-# ones.  A new figure: a template NAME.gp, and a line in the list of figure.c.
+# ones.  A new figure is a template NAME.gp; a line "# include OTHER.gp" stands for the contents of another one.
 
 set encoding utf8
 set minussign
