@@ -103,8 +103,8 @@ static void test_outline (void **state) {
                       "9 0 0 2\n11 1 0 2\n\n9 0 0 2\n7 -1 0 2\n\n9 0 0 2\n10 0.5 0 2\n\n";
   assert_int_equal (strncmp (strchr (data, '\n') + 1, drawn, strlen (drawn)), 0);
   const char *page = cli_file ("plate.html");
-  assert_non_null (strstr (page, "\"spokes\":[[0.5,0.2]],\"outline\":[[-1,-1],[1,-1],[1,1],[-1,1]]}"));
-  assert_non_null (strstr (page, "\"outline\":[]}"));
+  assert_non_null (strstr (page, "\"spokes\": [[0.5, 0.2]], \"outline\": [[-1, -1], [1, -1], [1, 1], [-1, 1]]}"));
+  assert_non_null (strstr (page, "\"outline\": []}"));
 }
 
 /* What gnuplot says when it fails is passed on. */

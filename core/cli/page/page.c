@@ -16,6 +16,8 @@ typedef struct {
   const char *path;
   pw_cli_model m;
   pw_page page;
+  char *base64; /* scratch: the longest file of the page as text */
+  pw_run *r;
   double t_end;
   pw_settings settings;
   pw_limit limit;
@@ -24,7 +26,7 @@ typedef struct {
 
 /* ---- Data ---- */
 
-static void page_base64 (pw_json *j, const pw_page_file *file, char *text) {
+static void page_file (pw_json *j, const pw_page_file *file, char *text) {
   static const char digit[] = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
   char *to = text;
   for (size_t i = 0; i < file->size; i += 3, to += 4) {
@@ -37,36 +39,9 @@ static void page_base64 (pw_json *j, const pw_page_file *file, char *text) {
   pw_json_text (j, file->name, text);
 }
 
-static int page_files (const page *x, pw_json *j) {
-  pw_json_open (j, "files", '{');
-  for (int i = 0; i < x->page.files; i++) {
-    char *text = malloc (x->page.file[i].size * 4 / 3 + 5);
-    if (text == NULL) return PW_RESOURCE;
-    page_base64 (j, &x->page.file[i], text);
-    free (text);
-  }
-  pw_json_close (j, '}');
-  return PW_OK;
-}
-
-static void page_parameters (const page *x, pw_json *j) {
-  static const char *const domain[] = { "real", "nonnegative", "positive", "count", "fraction" };
-  const pw_parameter *p = pw_model_table (x->m.model)->parameters;
-  pw_json_open (j, "parameters", '[');
-  for (; p && p->name; p++) {
-    pw_json_open (j, NULL, '{');
-    pw_json_text (j, "name", p->name);
-    pw_json_text (j, "unit", p->unit);
-    pw_json_text (j, "about", p->about);
-    pw_json_text (j, "domain", domain[p->domain]);
-    pw_json_number (j, "value", pw_model_parameter (x->m.model, p));
-    pw_json_close (j, '}');
-  }
-  pw_json_close (j, ']');
-}
-
 /* The consistent initial state; values of --start are marked as given, and are as described. */
-static void page_states (const page *x, const pw_initial_report *initial, pw_json *j) {
+static void page_states (const page *x, pw_json *j) {
+  const pw_initial_report *initial = pw_run_initial (x->r);
   char name[300];
   int n = pw_system_coordinates (x->m.system);
   pw_json_open (j, "states", '[');
@@ -104,7 +79,7 @@ static void page_methods (pw_json *j) {
   pw_json_close (j, ']');
 }
 
-static int page_data (const page *x, const pw_initial_report *initial, FILE *f) {
+static void page_data (const page *x, FILE *f) {
   pw_json j = { .f = f, .lines = 1 };
   pw_json_open (&j, NULL, '{');
   pw_json_text (&j, "name", pw_system_name (x->m.system));
@@ -115,11 +90,12 @@ static int page_data (const page *x, const pw_initial_report *initial, FILE *f) 
   pw_json_number (&j, "step", x->settings.step > 0 ? x->settings.step : 1e-3);
   pw_json_number (&j, "rtol", x->settings.rtol > 0 ? x->settings.rtol : 1e-6);
   page_methods (&j);
-  page_parameters (x, &j);
-  page_states (x, initial, &j);
-  int status = page_files (x, &j);
+  pw_animation_parameters (&j, x->m.model);
+  page_states (x, &j);
+  pw_json_open (&j, "files", '{');
+  for (int i = 0; i < x->page.files; i++) page_file (&j, &x->page.file[i], x->base64);
   pw_json_close (&j, '}');
-  return status;
+  pw_json_close (&j, '}');
 }
 
 /* ---- The page ---- */
@@ -128,18 +104,8 @@ static void page_insert (FILE *f, pw_page_part part, const void *context) {
   for (const char *const *line = part == PW_PAGE_PANEL ? page_html : page_js; *line; line++) fputs (*line, f);
   if (part == PW_PAGE_PANEL) return;
   fputs ("start_page(", f);
-  for (const char *c = context; *c; c++) *c == '<' ? fputs ("\\u003c", f) : fputc (*c, f);
+  page_data (context, f);
   fputs (");\n", f);
-}
-
-static int page_write (const page *x, const pw_initial_report *initial, pw_output *o, pw_error *error) {
-  pw_stream data;
-  FILE *f = pw_stream_open (&data);
-  int whole = f && page_data (x, initial, f) == PW_OK;
-  whole &= pw_stream_close (f, &data) == PW_OK;
-  if (whole) pw_animation_page (pw_output_stream (o), page_insert, data.text);
-  free (data.text);
-  return whole ? PW_OK : pw_fail (error, PW_RESOURCE, "out of memory");
 }
 
 /* ---- The command ---- */
@@ -164,6 +130,15 @@ static int page_choose_method (page *x, const pw_run_defaults *d, pw_error *erro
   return PW_OK;
 }
 
+static int page_open_files (page *x, pw_error *error) {
+  size_t longest = 0;
+  if (pw_page_open (&x->page, x->m.file, error) != PW_OK) return error->status;
+  for (int i = 0; i < x->page.files; i++)
+    if (longest < x->page.file[i].size) longest = x->page.file[i].size;
+  x->base64 = malloc (longest * 4 / 3 + 5);
+  return x->base64 ? PW_OK : pw_fail (error, PW_RESOURCE, "out of memory");
+}
+
 static int page_open (page *x, pw_error *error) {
   pw_use use[] = { PW_CLI_MODEL_USE, { "-o", x->path, PW_WRITES, NULL } };
   if (x->path == NULL) return pw_fail (error, PW_INPUT, "-o FILE.html is missing: the page to write");
@@ -174,24 +149,21 @@ static int page_open (page *x, pw_error *error) {
   pw_run_defaults d = pw_cli_defaults (pw_file_table (x->m.file));
   status = pw_cli_settings (&x->line, &d, &x->t_end, &x->settings, &x->limit, error);
   if (status == PW_OK) status = page_choose_method (x, &d, error);
-  return status == PW_OK ? pw_page_open (&x->page, x->m.file, error) : status;
+  return status == PW_OK ? page_open_files (x, error) : status;
 }
 
 static int page_command (void *options, pw_error *error) {
   page *x = options;
-  pw_run *r = NULL;
-  int status = page_open (x, error);
-  if (status == PW_OK) r = pw_run_open (x->m.system, x->method, &x->settings, error);
-  pw_output *o = r ? pw_output_open (x->path, error) : NULL;
-  if (o) status = page_write (x, pw_run_initial (r), o, error);
-  if (o && status == PW_OK)
-    status = pw_output_finish (o, error);
-  else if (o)
-    pw_output_discard (o);
-  pw_run_close (r);
+  pw_output *o = NULL;
+  if (page_open (x, error) == PW_OK) x->r = pw_run_open (x->m.system, x->method, &x->settings, error);
+  if (x->r) o = pw_output_open (x->path, error);
+  if (o) pw_animation_page (pw_output_stream (o), page_insert, x);
+  if (o) pw_output_finish (o, error);
+  pw_run_close (x->r);
+  free (x->base64);
   pw_page_close (&x->page);
   pw_cli_close_model (&x->m);
-  return o ? status : error->status;
+  return error->status;
 }
 
 static const struct poptOption page_options[] = {

@@ -82,7 +82,7 @@ class Engine {
   scene () {
     const at = this.wasm.scene(), text = this.read(at);
     this.wasm.release(at);
-    return JSON.parse("{" + text.replace(/,\s*$/, "") + "}");
+    return JSON.parse(text);
   }
 
   /* The columns of the samples: t, energies; x, y, phi and velocities of bodies; contacts of wheels; forces of links. */

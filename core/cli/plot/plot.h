@@ -39,8 +39,9 @@ int pw_animate (const pw_plots *p, const char *path, pw_output *o, const char *m
 
 /* Writes the samples as a JavaScript object for begin(); energies only with forces. */
 void pw_animation_run (FILE *f, const pw_plots *p, const char *method, const char *reason);
-/* Writes what does not change in time as members of a JavaScript object: shapes, names, links. */
-void pw_animation_scene (FILE *f, const pw_plots *p);
+/* Writes members of an object that do not change in time: shapes, names, links; the parameters of a model. */
+void pw_animation_scene (pw_json *j, const pw_plots *p);
+void pw_animation_parameters (pw_json *j, const pw_model *m);
 /* Writes animate.html; `insert` writes the parts that differ between pages: the panel of controls, and the statements
  * that call begin() with a run. */
 typedef enum { PW_PAGE_PANEL, PW_PAGE_BEGIN } pw_page_part;

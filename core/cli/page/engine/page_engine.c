@@ -185,7 +185,12 @@ PAGE_EXPORT (result) const double *page_results (void) {
 PAGE_EXPORT (scene) char *page_scene (void) {
   pw_stream scene;
   FILE *f = pw_stream_open (&scene);
-  if (f) pw_animation_scene (f, page_plots);
+  pw_json j = { .f = f };
+  if (f) {
+    pw_json_open (&j, NULL, '{');
+    pw_animation_scene (&j, page_plots);
+    pw_json_close (&j, '}');
+  }
   pw_stream_close (f, &scene);
   return scene.text;
 }
