@@ -13,19 +13,15 @@
 const char *const pw_figure_endings[] = { ".dat", ".gp", ".svg", ".png", ".pdf", NULL };
 
 int pw_figure_width (const char *text, double *width, pw_error *error) {
-  static const struct {
-    const char *name;
-    double mm;
-  } unit[] = { { "mm", 1 }, { "cm", 10 }, { "in", 25.4 } };
   char number[32] = "";
-  size_t n = text ? strlen (text) : 0, k = 0;
+  size_t n = text ? strlen (text) : 0;
+  double metres;
   if (text == NULL) return PW_OK;
-  while (k < 3 && (n < 3 || strcmp (text + n - 2, unit[k].name) != 0)) k++;
-  if (k == 3 || n > sizeof number)
+  if (n < 3 || n > sizeof number || pw_unit_factor (text + n - 2, "m", &metres) != PW_OK)
     return pw_fail (error, PW_INPUT, "--width %.40s: expected a length such as 85mm", text);
   memcpy (number, text, n - 2);
   int status = pw_cli_number ("--width", number, PW_POSITIVE, width, error);
-  *width *= unit[k].mm;
+  *width *= 1000 * metres;
   if (status == PW_OK && !(*width >= 50 && *width <= 500))
     return pw_fail (error, PW_INPUT, "--width %s: expected 50mm to 500mm", text);
   return status;
