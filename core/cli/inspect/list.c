@@ -11,6 +11,13 @@ enum {
   LIST_HEADING = 14 /* of the heading before them */
 };
 
+/* Of each type of field: its name, default, and value in an example. */
+static const struct {
+  const char *name, *zero, *example;
+} list_types[] = { [PW_NUMBER] = { "number", "0", "NUMBER" },      [PW_POINT] = { "point", "[0, 0]", "[X, Y]" },
+                   [PW_VECTOR] = { "vector", "[0, 0]", "[X, Y]" }, [PW_BODY] = { "body", "", "BODY" },
+                   [PW_SIGNAL] = { "signal", "0", "SIGNAL" },      [PW_CHOICE] = { "choice", "", "" } };
+
 /* A row such as "radius  number [m]  required  radius of the wheel". */
 static void list_row (pw_table *t, const char *name, const char *type, const char *given, const char *about) {
   t->pad = t->indent = 4;
@@ -23,10 +30,9 @@ static void list_row (pw_table *t, const char *name, const char *type, const cha
 
 /* "required" or the default; the domain of a number; the alternatives of a choice. */
 static void list_given (const pw_field *f, char *text, size_t size) {
-  static const char *const zero[] = { "0", "[0, 0]", "[0, 0]", "", "0", "" };
   const char *domain = f->type == PW_NUMBER ? pw_domain_text (f->domain) : "";
-  snprintf (text, size, *domain ? "%s (%s)" : "%s", f->required || f->type == PW_BODY ? "required" : zero[f->type],
-            domain);
+  snprintf (text, size, *domain ? "%s (%s)" : "%s",
+            f->required || f->type == PW_BODY ? "required" : list_types[f->type].zero, domain);
   for (int i = 0; f->type == PW_CHOICE && f->choices[i]; i++) {
     size_t used = strlen (text);
     snprintf (text + used, size - used, "%s%s", i ? " | " : f->required ? ": " : "", f->choices[i]);
@@ -34,12 +40,11 @@ static void list_given (const pw_field *f, char *text, size_t size) {
 }
 
 static void list_fields (pw_table *t, const pw_field *fields) {
-  static const char *const types[] = { "number", "point", "vector", "body", "signal", "choice" };
   for (const pw_field *f = fields; f->name; f++) {
     char type[60], given[80], times[16] = "";
     if (pw_field_count (f) > 1) snprintf (times, sizeof times, "%d x ", f->count);
-    snprintf (type, sizeof type, "%s%s%s%s%s", times, types[f->type], f->unit ? " [" : "", f->unit ? f->unit : "",
-              f->unit ? "]" : "");
+    snprintf (type, sizeof type, "%s%s%s%s%s", times, list_types[f->type].name, f->unit ? " [" : "",
+              f->unit ? f->unit : "", f->unit ? "]" : "");
     list_given (f, given, sizeof given);
     list_row (t, f->name, type, given, f->about ? f->about : "");
   }
@@ -142,14 +147,13 @@ static int list_methods (const char **name, pw_error *error) {
 
 /* The shortest element of the type in a text model. */
 static void list_example (const pw_kind *k) {
-  static const char *const text[] = { "NUMBER", "[X, Y]", "[X, Y]", "BODY", "SIGNAL", "" };
   printf ("    - {%s: NAME", k->name);
   for (const pw_field *f = k->fields; f->name; f++) {
     int count = pw_field_count (f);
     if (!f->required && f->type != PW_BODY) continue;
     printf (", %s: %s", f->name, count > 1 ? "[" : "");
     for (int i = 0; i < count; i++)
-      printf ("%s%s", i ? ", " : "", f->type == PW_CHOICE ? f->choices[0] : text[f->type]);
+      printf ("%s%s", i ? ", " : "", f->type == PW_CHOICE ? f->choices[0] : list_types[f->type].example);
     if (count > 1) putchar (']');
   }
   puts ("}");

@@ -6,6 +6,7 @@
 #ifndef PW_PLOT_H
 #define PW_PLOT_H
 
+#include <math.h>
 #include "figure.h"
 #include "util.h"
 
@@ -156,9 +157,14 @@ void pw_plot_find_shapes (pw_plots *p);
 int pw_plot_inside (const pw_plot_body *shape, int k);
 /* 1 if the last body has a line: a rail or slot. */
 int pw_plot_has_rail (const pw_plot_link *link);
-/* The diagonal of the smallest rectangle around the first n samples and, unless `most` is given, the ground [m]; *n becomes
- * the number of samples for which it is less than `most`. */
-double pw_plot_diagonal (const pw_plots *p, int *n, double most);
+/* A rectangle [m]; begin with PLOT_EMPTY, or with one around the points of the ground. */
+typedef struct {
+  double x0, x1, y0, y1;
+} pw_plot_box;
+#define PLOT_EMPTY ((pw_plot_box){ INFINITY, -INFINITY, INFINITY, -INFINITY })
+pw_plot_box pw_plot_ground (const pw_plots *p);
+/* Extends it by all attachment points, centres of mass and wheels of sample i; returns its diagonal. */
+double pw_plot_extend (pw_plot_box *box, const pw_plots *p, int i);
 /* Sets size and unit from the first sample. */
 void pw_plot_measure (pw_plots *p);
 /* A point of a body in the inertial frame [m]; motion: x, y, phi. */

@@ -27,9 +27,13 @@ static int data_extended (const pw_plots *p) {
 /* Number of initial samples shown in a separate panel, if the mechanism travels so far that it is small in a figure of
  * the whole run: those that fit a figure a few times its size; 0: none.  A single point has no size. */
 static int data_closeup (const pw_plots *p) {
-  int all = p->samples, n = p->samples;
-  if (!data_extended (p) || pw_plot_diagonal (p, &all, INFINITY) < 10 * p->size) return 0;
-  pw_plot_diagonal (p, &n, 4 * p->size);
+  pw_plot_box all = pw_plot_ground (p), few = PLOT_EMPTY;
+  double diagonal = 0;
+  int n = 0;
+  if (!data_extended (p)) return 0;
+  for (int i = 0; i < p->samples; i++) diagonal = pw_plot_extend (&all, p, i);
+  if (diagonal < 10 * p->size) return 0;
+  while (n < p->samples && pw_plot_extend (&few, p, n) <= 4 * p->size) n++;
   return n < 12 ? 0 : n;
 }
 

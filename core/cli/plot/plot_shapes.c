@@ -159,24 +159,24 @@ void pw_plot_forces (const pw_plots *p, const pw_sample *x, double *out) {
 
 /* ---- The size of what figures show ---- */
 
-/* A rectangle [m]. */
-typedef struct {
-  double x0, x1, y0, y1;
-} box;
-
 void pw_plot_point (const double *motion, const double *at, double out[2]) {
   double c = cos (motion[2]), s = sin (motion[2]);
   out[0] = motion[0] + c * at[0] - s * at[1];
   out[1] = motion[1] + s * at[0] + c * at[1];
 }
 
-static void box_extend (box *b, const double *point) {
+static void box_extend (pw_plot_box *b, const double *point) {
   if (!isfinite (point[0]) || !isfinite (point[1])) return;
-  *b = (box){ fmin (b->x0, point[0]), fmax (b->x1, point[0]), fmin (b->y0, point[1]), fmax (b->y1, point[1]) };
+  *b = (pw_plot_box){ fmin (b->x0, point[0]), fmax (b->x1, point[0]), fmin (b->y0, point[1]), fmax (b->y1, point[1]) };
 }
 
-/* All attachment points, centres of mass and wheels of a sample. */
-static void box_extend_sample (const pw_plots *p, int i, box *b) {
+pw_plot_box pw_plot_ground (const pw_plots *p) {
+  pw_plot_box b = PLOT_EMPTY;
+  for (int g = 0; g < p->grounds; g++) box_extend (&b, p->ground[g]);
+  return b;
+}
+
+double pw_plot_extend (pw_plot_box *b, const pw_plots *p, int i) {
   for (int k = 0; k < p->bodies.shown; k++) {
     const double *motion = pw_plot_track (p, i, &p->bodies, k);
     box_extend (b, motion);
@@ -187,23 +187,12 @@ static void box_extend_sample (const pw_plots *p, int i, box *b) {
     }
   }
   for (int w = 0; w < p->wheels.shown; w++) box_extend (b, pw_plot_track (p, i, &p->wheels, w));
-}
-
-double pw_plot_diagonal (const pw_plots *p, int *n, double most) {
-  box b = { INFINITY, -INFINITY, INFINITY, -INFINITY };
-  double diagonal = 0;
-  for (int g = 0; g < p->grounds && isinf (most); g++) box_extend (&b, p->ground[g]);
-  for (int i = 0; i < *n; i++) {
-    box_extend_sample (p, i, &b);
-    diagonal = b.x1 >= b.x0 ? hypot (b.x1 - b.x0, b.y1 - b.y0) : 0;
-    if (diagonal > most) *n = i;
-  }
-  return diagonal;
+  return b->x1 >= b->x0 ? hypot (b->x1 - b->x0, b->y1 - b->y0) : 0;
 }
 
 void pw_plot_measure (pw_plots *p) {
-  int first = 1;
-  double reach = 0, size = pw_plot_diagonal (p, &first, INFINITY);
+  pw_plot_box box = pw_plot_ground (p);
+  double reach = 0, size = pw_plot_extend (&box, p, 0);
   for (int b = 0; b < p->bodies.shown; b++)
     for (int k = 0; k < p->shape[b].count; k++)
       reach = fmax (reach, hypot (p->shape[b].at[k][0], p->shape[b].at[k][1]));
