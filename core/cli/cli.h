@@ -225,8 +225,8 @@ void pw_cli_engine_open (pw_cli_engine *e, const pw_system *s, pw_specialise whe
 void pw_cli_engine_close (pw_cli_engine *e);
 const pw_specialised *pw_cli_engine_code (const pw_cli_engine *e); /* for pw_settings.specialised */
 
-/* The code for `lanes` runs at once (0: as many as pay for this number of steps), by a method of fixed step size; NULL:
- * one run after the other. */
+/* The code for `lanes` runs at once, by a method of fixed step size; NULL: one run after the other.  With `lanes` 0, as many
+ * as fill a vector register if all runs together have PW_LANES_STEPS, so that they repay the compilation. */
 #define PW_LANES_STEPS 1e7
 pw_scene_code *pw_cli_engine_lanes (const pw_cli_engine *e, const pw_system *s, const char *method, int lanes,
                                     double steps);

@@ -314,12 +314,8 @@ static void page_mode (page *p, FILE *f, int mode) {
   pw_plots_close (plots);
 }
 
-static void page_insert (FILE *f, pw_page_part part, const void *context) {
+static void page_begin (FILE *f, const void *context) {
   page *p = *(page *const *)context;
-  if (part == PW_PAGE_PANEL) {
-    fputs ("<p class=\"bar\"><label>Mode <select id=\"mode\"></select></label></p>\n", f);
-    return;
-  }
   fputs ("const modes = [", f);
   for (int i = 0, shown = 0; i < p->x->linear.unknowns && p->status == PW_OK; i++) {
     if (!linearise_shows (&p->x->linear, i)) continue;
@@ -334,6 +330,8 @@ static void page_insert (FILE *f, pw_page_part part, const void *context) {
 }
 
 int pw_linearise_page (const pw_linearise *x, FILE *f, pw_error *error) {
+  static const char *const panel[] = { "<p class=\"bar\"><label>Mode <select id=\"mode\"></select></label></p>\n",
+                                       NULL };
   const size_t n = (size_t)x->linear.coordinates;
   pw_sample now;
   double *memory = malloc (3 * n * sizeof *memory);
@@ -349,7 +347,7 @@ int pw_linearise_page (const pw_linearise *x, FILE *f, pw_error *error) {
     p.status = pw_fail (error, PW_INPUT, "--animate %s: there is no mode with a shape", x->animate);
   if (p.status == PW_OK) {
     memcpy (memory, now.q, n * sizeof *memory);
-    pw_animation_page (f, page_insert, &context);
+    pw_animation_page (f, panel, page_begin, &context);
   }
   free (memory);
   return p.status;

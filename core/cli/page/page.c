@@ -98,11 +98,8 @@ static void page_data (const page *x, FILE *f) {
   pw_json_close (&j, '}');
 }
 
-/* ---- The page ---- */
-
-static void page_insert (FILE *f, pw_page_part part, const void *context) {
-  for (const char *const *line = part == PW_PAGE_PANEL ? page_html : page_js; *line; line++) fputs (*line, f);
-  if (part == PW_PAGE_PANEL) return;
+static void page_begin (FILE *f, const void *context) {
+  for (const char *const *line = page_js; *line; line++) fputs (*line, f);
   fputs ("start_page(", f);
   page_data (context, f);
   fputs (");\n", f);
@@ -157,7 +154,7 @@ static int page_command (void *options, pw_error *error) {
   pw_output *o = NULL;
   if (page_open (x, error) == PW_OK) x->r = pw_run_open (x->m.system, x->method, &x->settings, error);
   if (x->r) o = pw_output_open (x->path, error);
-  if (o) pw_animation_page (pw_output_stream (o), page_insert, x);
+  if (o) pw_animation_page (pw_output_stream (o), page_html, page_begin, x);
   if (o) pw_output_finish (o, error);
   pw_run_close (x->r);
   free (x->base64);

@@ -148,27 +148,25 @@ void pw_animation_run (FILE *f, const pw_plots *p, const char *method, const cha
 
 /* ---- The page ---- */
 
-void pw_animation_page (FILE *f, pw_page_insert *insert, const void *context) {
-  static const char *const mark[] = { "<!-- PANEL -->", "/* BEGIN */" };
-  for (const char *const *line = page_lines; *line; line++) {
-    int i = 0;
-    while (i < 2 && strncmp (*line, mark[i], strlen (mark[i])) != 0) i++;
-    if (i < 2)
-      insert (f, (pw_page_part)i, context);
+void pw_animation_page (FILE *f, const char *const *panel, void (*begin) (FILE *f, const void *context),
+                        const void *context) {
+  static const char panel_mark[] = "<!-- PANEL -->\n", begin_mark[] = "/* BEGIN */\n";
+  for (const char *const *line = page_lines; *line; line++)
+    if (strcmp (*line, panel_mark) == 0)
+      while (*panel) fputs (*panel++, f);
+    else if (strcmp (*line, begin_mark) == 0)
+      begin (f, context);
     else
       fputs (*line, f);
-  }
 }
 
-/* The page of one run has no panel. */
 typedef struct {
   const pw_plots *p;
   const char *method, *reason;
 } pw_animation;
 
-static void page_insert (FILE *f, pw_page_part part, const void *context) {
+static void page_begin (FILE *f, const void *context) {
   const pw_animation *x = context;
-  if (part != PW_PAGE_BEGIN) return;
   fputs ("begin(", f);
   pw_animation_run (f, x->p, x->method, x->reason);
   fputs (");\n", f);
@@ -187,6 +185,6 @@ int pw_animate (const pw_plots *p, const char *path, pw_output *o, const char *m
     return 0;
   }
   const pw_animation x = { p, method, reason };
-  pw_animation_page (pw_output_stream (o), page_insert, &x);
+  pw_animation_page (pw_output_stream (o), (const char *const[]){ NULL }, page_begin, &x);
   return 1;
 }

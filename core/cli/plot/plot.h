@@ -43,11 +43,10 @@ void pw_animation_run (FILE *f, const pw_plots *p, const char *method, const cha
 /* Writes members of an object that do not change in time: shapes, names, links; the parameters of a model. */
 void pw_animation_scene (pw_json *j, const pw_plots *p);
 void pw_animation_parameters (pw_json *j, const pw_model *m);
-/* Writes animate.html; `insert` writes the parts that differ between pages: the panel of controls, and the statements
- * that call begin() with a run. */
-typedef enum { PW_PAGE_PANEL, PW_PAGE_BEGIN } pw_page_part;
-typedef void pw_page_insert (FILE *f, pw_page_part part, const void *context);
-void pw_animation_page (FILE *f, pw_page_insert *insert, const void *context);
+/* Writes animate.html with the lines of a panel of controls, ended by NULL; `begin` writes the statements that call begin()
+ * with a run. */
+void pw_animation_page (FILE *f, const char *const *panel, void (*begin) (FILE *f, const void *context),
+                        const void *context);
 
 /* ---- Private to this folder ---- */
 

@@ -43,6 +43,7 @@ heading = wrap(about, int((width - 16)/5.2), "}\n{/*1.13 ")
 top = 30.0
 do for [i = 1:strlen(heading)] { if (heading[i:i] eq "\n") { top = top + 11 } }
 
+# Terminals differ in the place of a legend: lift [pt] moves it up, pitch is the distance of its lines.
 page(form) = sprintf(form eq 'svg' ? "set terminal svg size %.2f,%.2f enhanced ". \
     "font 'DejaVu Sans,Helvetica,sans-serif,10' linewidth 1.3333 background rgb 'white'; set pointsize 0.6; lift = 2; pitch = 0.82; set xlabel offset 0,0.6; set ylabel offset 0.8,0" : \
   form eq 'png' ? "set terminal pngcairo size %.2f,%.2f enhanced font 'DejaVu Sans,7.5' ". \
