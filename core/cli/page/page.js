@@ -357,14 +357,6 @@ function readLink () {
   page.states.forEach((state, i) => { const x = number("start." + state.name, null); if (x !== null) settings.initial.set(i, x); });
 }
 
-function save (name, blob) {
-  const a = document.createElement("a");
-  a.href = URL.createObjectURL(blob);
-  a.download = name;
-  a.click();
-  URL.revokeObjectURL(a.href);
-}
-
 function table () {
   const names = run.bodies.flatMap(body => ["x [m]", "y [m]", "phi [rad]", "vx [m/s]", "vy [m/s]", "omega [rad/s]"].map(n => body.name + "." + n));
   const lines = [["t [s]", ...names].join(",")];
