@@ -110,19 +110,6 @@ static const struct {
 #include "templates.inc"
 };
 
-/* The title for gnuplot's enhanced text: a capital first, special characters escaped. */
-static void figure_title (FILE *f, const char *text) {
-  char title[800];
-  size_t n = 0;
-  for (; *text && n + 3 < sizeof title; text++) {
-    if (strchr ("\\_^{}@&~", *text)) title[n++] = '\\';
-    title[n++] = *text;
-  }
-  title[n] = 0;
-  if (*title >= 'a' && *title <= 'z') *title = (char)(*title - 'a' + 'A');
-  pw_figure_text (f, "about", title);
-}
-
 pw_output *pw_figure_begin (const pw_figures *f, const char *name, pw_error *error) {
   char script[40];
   snprintf (script, sizeof script, "%s.gp", name);
@@ -136,7 +123,7 @@ pw_output *pw_figure_begin (const pw_figures *f, const char *name, pw_error *err
   pw_figure_text (out, "name", name);
   pw_figure_text (out, "model", f->model);
   pw_figure_text (out, "incomplete", f->incomplete);
-  figure_title (out, f->about && *f->about ? f->about : f->model);
+  pw_figure_text (out, "about", f->about && *f->about ? f->about : f->model);
   fprintf (out, "width = %.2f\n", (f->width > 0 ? f->width : FIGURE_WIDTH) / 25.4 * 72);
   return o;
 }

@@ -39,7 +39,14 @@ narrow = width < 300 # one column of a page with two
 space(s, n) = n < 2 || s[n:n] eq ' ' ? n : space(s, n - 1)
 wrap(s, n, between) = strlen(s) <= n || space(s, n) < 2 ? s : \
   s[1:space(s, n) - 1].between.wrap(s[space(s, n) + 1:*], n, between)
-heading = wrap(about, int((width - 16)/5.2), "}\n{/*1.13 ")
+# The title: a capital first, special characters of enhanced text escaped.
+escaped = ''
+do for [i = 1:strlen(about)] {
+  c = about[i:i]
+  small = i == 1 ? strstrt('abcdefghijklmnopqrstuvwxyz', c) : 0
+  escaped = escaped.(strstrt('\_^{}@&~', c) ? '\' : '').(small ? 'ABCDEFGHIJKLMNOPQRSTUVWXYZ'[small:small] : c)
+}
+heading = wrap(escaped, int((width - 16)/5.2), "}\n{/*1.13 ")
 top = 30.0
 do for [i = 1:strlen(heading)] { if (heading[i:i] eq "\n") { top = top + 11 } }
 
