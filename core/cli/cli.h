@@ -246,10 +246,10 @@ int pw_cli_csv (const char *path, pw_error *error);
 
 /* ---- Messages ---- */
 
-/* Print to standard error, and to a stream; on a terminal control characters are escaped, since names may contain
+/* Print to a stream, and to standard error; on a terminal control characters are escaped, since names may contain
  * them. */
-void pw_cli_say (const char *format, ...) PW_PRINTF (1, 2);
 void pw_cli_print (FILE *f, const char *format, ...) PW_PRINTF (2, 3);
+#define pw_cli_say(...) pw_cli_print (stderr, __VA_ARGS__)
 
 /* Prints text broken into lines of `width` characters; the first line continues at column `indent`. */
 void pw_cli_wrap (const char *text, int indent, int width);
