@@ -81,10 +81,8 @@ PAGE_EXPORT (open) int page_open (const char *name) {
 static pw_model *page_model;
 static pw_system *page_system;
 static pw_plots *page_plots;
-static struct {
-  double end; /* reached [s] */
-  double steps, rejected, evaluations, position, velocity, energy;
-} page_result;
+static pw_statistics page_statistics;
+static double page_energy;   /* defect */
 static double page_deadline; /* [ms] */
 
 static int page_late (void *context) {
@@ -119,7 +117,7 @@ static int page_take_samples (pw_run *r) {
   while (status == PW_OK && page_plots && pw_plots_next (page_plots) <= pw_run_time (r)) {
     status = pw_run_sample (r, pw_plots_next (page_plots), &sample, &page_error);
     if (status == PW_OK) pw_plots_add (page_plots, &sample);
-    page_result.energy = status == PW_OK ? pw_run_energy_defect (r, &sample) : NAN;
+    page_energy = status == PW_OK ? pw_run_energy_defect (r, &sample) : NAN;
   }
   return status;
 }
@@ -130,13 +128,7 @@ static int page_integrate (pw_run *r, double t_end) {
     status = pw_run_advance (r, t_end, &page_error);
     if (status == PW_OK) status = page_take_samples (r);
   }
-  const pw_statistics *s = pw_run_statistics (r);
-  page_result.end = pw_run_time (r);
-  page_result.steps = (double)s->steps;
-  page_result.rejected = (double)s->rejected;
-  page_result.evaluations = (double)s->rhs;
-  page_result.position = s->g;
-  page_result.velocity = s->jv;
+  page_statistics = *pw_run_statistics (r);
   return status;
 }
 
@@ -145,7 +137,6 @@ static int page_integrate (pw_run *r, double t_end) {
 PAGE_EXPORT (run)
 int page_run (const char *method, double step, double rtol, double t_end, double limit, int samples,
               const double *parameter, const pw_initial_value *initial, int initials) {
-  memset (&page_result, 0, sizeof page_result);
   if (page_compile (parameter) != PW_OK) return page_error.status;
   page_deadline = pw_page_now () + limit;
   const pw_settings settings = { .span = t_end,
@@ -168,32 +159,34 @@ int page_run (const char *method, double step, double rtol, double t_end, double
 
 /* ---- Results ---- */
 
-PAGE_EXPORT (samples) int page_samples (void) {
-  return page_plots ? page_plots->samples : 0;
-}
-PAGE_EXPORT (width) int page_width (void) {
-  return page_plots->width;
-}
 PAGE_EXPORT (data) const double *page_data (void) {
   return page_plots->data;
 }
-PAGE_EXPORT (result) const double *page_results (void) {
-  return &page_result.end;
+
+static void page_write_scene (pw_json *j) {
+  const pw_statistics *s = &page_statistics;
+  const struct {
+    const char *key;
+    double value;
+  } number[] = { { "samples", page_plots->samples },      { "width", page_plots->width }, { "steps", (double)s->steps },
+                 { "rejected", (double)s->rejected },     { "g", s->g },                  { "jv", s->jv },
+                 { "evaluations", (double)s->rhs },       { "energy_defect", page_energy } };
+  pw_json_open (j, NULL, '{');
+  for (size_t i = 0; i < sizeof number / sizeof *number; i++) pw_json_number (j, number[i].key, number[i].value);
+  pw_animation_scene (j, page_plots);
+  pw_json_close (j, '}');
 }
 
-/* The scene's shapes as JSON; free it by `release`. */
+/* The scene's shapes, the size of the data, and statistics of the run as JSON; free it by `release`.  NULL without a run. */
 PAGE_EXPORT (scene) char *page_scene (void) {
   pw_stream scene;
+  if (page_plots == NULL) return NULL;
   FILE *f = pw_stream_open (&scene);
-  pw_json j = { .f = f };
-  if (f) {
-    pw_json_open (&j, NULL, '{');
-    pw_animation_scene (&j, page_plots);
-    pw_json_close (&j, '}');
-  }
+  if (f) page_write_scene (&(pw_json){ .f = f });
   pw_stream_close (f, &scene);
   return scene.text;
 }
+
 PAGE_EXPORT (release) void page_release (void *p) {
   free (p);
 }
