@@ -81,7 +81,7 @@ static void page_links (pw_json *j, const pw_plots *p) {
     }
     pw_json_close (j, ']');
     pw_json_number (j, "contact", link->contact);
-    pw_json_flag (j, "line", pw_plot_has_rail (link));
+    pw_json_flag (j, "line", link->rail);
     pw_json_number (j, "heading", pw_plot_heading (link));
     page_strokes (j, p, link);
     pw_json_close (j, '}');

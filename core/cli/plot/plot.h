@@ -92,6 +92,7 @@ typedef struct {
   const pw_kind *kind;
   const void *definition;
   int contact; /* its track among wheels; -1: none */
+  int rail;    /* 1 if the last body has a line: a rail or slot */
   int ends;    /* 1 or 2 */
   struct {
     int body;     /* among those drawn, or PLOT_GROUND */
@@ -154,8 +155,6 @@ int pw_plot_rolls (const pw_plots *p, int wheel);
 void pw_plot_find_shapes (pw_plots *p);
 /* 1 if attachment point k is not a corner of the outline. */
 int pw_plot_inside (const pw_plot_body *shape, int k);
-/* 1 if the last body has a line: a rail or slot. */
-int pw_plot_has_rail (const pw_plot_link *link);
 /* A rectangle [m]; begin with PLOT_EMPTY, or with one around the points of the ground. */
 typedef struct {
   double x0, x1, y0, y1;

@@ -60,14 +60,10 @@ static void shapes_add_points (pw_plots *p, const pw_element *e, const int *bodi
 
 /* ---- Links ---- */
 
-int pw_plot_has_rail (const pw_plot_link *link) {
-  return link->kind->symbol && strstr (link->kind->symbol, "inf");
-}
-
 /* The joint of two bodies: the end of an earlier link on the first one. */
 static int shapes_joint (const pw_plots *p, int one, int other, pw_plot_link *link) {
   for (const pw_plot_link *l = p->link; l < p->link + p->links; l++)
-    for (int n = 0; n < 2 && l->ends == 2 && !pw_plot_has_rail (l); n++)
+    for (int n = 0; n < 2 && l->ends == 2 && !l->rail; n++)
       if (l->end[n].body == one && l->end[1 - n].body == other) {
         link->end[link->ends++] = l->end[n];
         return 1;
@@ -104,6 +100,7 @@ static int shapes_link (const pw_plots *p, const pw_element *e, int element, pw_
   *link = (pw_plot_link){ .element = element,
                           .kind = e->kind,
                           .definition = e->definition,
+                          .rail = e->kind->symbol && strstr (e->kind->symbol, "inf"),
                           .force = -1,
                           .contact = shapes_contact (p, element) };
   for (int n = 0; n < e->kind->bodies && link->ends < 2; n++) {

@@ -103,15 +103,14 @@ void pw_plot_end (const pw_plots *p, int i, const pw_plot_link *link, int n, dou
 
 static symbol_frame symbol_place (const pw_plots *p, int i, const pw_plot_link *link) {
   symbol_frame f = { .unit = p->unit };
-  int last = link->ends - 1, line = pw_plot_has_rail (link);
-  int body = link->end[line ? last : 0].body;
+  int last = link->ends - 1, body = link->end[link->rail ? last : 0].body;
   double p2[2], angle = body < 0 ? 0 : pw_plot_track (p, i, &p->bodies, body)[2];
   pw_plot_end (p, i, link, 0, f.p);
   pw_plot_end (p, i, link, last, p2);
   f.d[0] = p2[0] - f.p[0], f.d[1] = p2[1] - f.p[1];
   if (link->contact >= 0)
     angle = pw_plot_track (p, i, &p->wheels, link->contact)[2];
-  else if (line)
+  else if (link->rail)
     angle += pw_plot_heading (link);
   else if (hypot (f.d[0], f.d[1]) > 1e-9 * f.unit)
     angle = atan2 (f.d[1], f.d[0]);
@@ -122,7 +121,7 @@ static symbol_frame symbol_place (const pw_plots *p, int i, const pw_plot_link *
 /* The travel of p1 along the line, from p2. */
 static symbol_frame symbol_travel (const pw_plots *p, int sample, const pw_plot_link *link, int samples) {
   symbol_frame f = symbol_place (p, sample, link);
-  for (int i = 0; i < samples && pw_plot_has_rail (link); i++) {
+  for (int i = 0; i < samples && link->rail; i++) {
     symbol_frame g = symbol_place (p, i, link);
     double s = -(g.d[0] * g.e[0] + g.d[1] * g.e[1]);
     f.low = fmin (f.low, s), f.high = fmax (f.high, s);
@@ -147,8 +146,7 @@ static int symbol_ground (double low, double high, const pw_plot_link *link, pw_
     6, 0, 1, { { 1, 1.1, -1.5 }, { 1, .8, -1.5 }, { 1, 0, 0 }, { 1, -.8, -1.5 }, { 1, -1.1, -1.5 }, { 1, 1.1, -1.5 } }
   };
   const double groove = -.4; /* the lower edge of a slot, as in the symbols of element types */
-  if (pw_plot_has_rail (link))
-    return symbol_hatch (low, high, strstr (link->kind->symbol, "1 -inf -") ? groove : 0, 0, s);
+  if (link->rail) return symbol_hatch (low, high, strstr (link->kind->symbol, "1 -inf -") ? groove : 0, 0, s);
   *s = support;
   return 1 + symbol_hatch (-1.1, 1.1, -1.5, 1, s + 1);
 }
