@@ -55,7 +55,7 @@ static void page_wheels (pw_json *j, const pw_plots *p) {
 /* The strokes of a symbol: 1 if it is closed + 2 if it is upright, then its vertices. */
 static void page_strokes (pw_json *j, const pw_plots *p, const pw_plot_link *link) {
   pw_plot_stroke stroke[PLOT_STROKES];
-  int strokes = link->kind->symbol ? pw_plot_strokes (p, 0, link, p->samples, stroke) : 0;
+  int strokes = pw_plot_strokes (p, link, p->samples, stroke);
   pw_json_open (j, "strokes", '[');
   for (const pw_plot_stroke *s = stroke; s < stroke + strokes; s++) {
     pw_json_open (j, NULL, '[');

@@ -170,10 +170,9 @@ void pw_plot_point (const double *motion, const double *at, double out[2]);
 /* End n of a link at sample i, in the inertial frame [m]. */
 void pw_plot_end (const pw_plots *p, int i, const pw_plot_link *link, int n, double out[2]);
 
-/* Writes the strokes of a symbol and of the ground at it, rails as long as the travel during the first `samples`; returns
- * their number. */
-int pw_plot_strokes (const pw_plots *p, int i, const pw_plot_link *link, int samples,
-                     pw_plot_stroke stroke[PLOT_STROKES]);
+/* Writes the strokes of a symbol, if there is one, and of the ground at it, rails as long as the travel during the first
+ * `samples`; returns their number. */
+int pw_plot_strokes (const pw_plots *p, const pw_plot_link *link, int samples, pw_plot_stroke stroke[PLOT_STROKES]);
 /* The vertices of a stroke at sample i, in the inertial frame [m]. */
 void pw_plot_place (const pw_plots *p, int i, const pw_plot_link *link, const pw_plot_stroke *s, double (*at)[2]);
 /* The field `heading` of an element [rad]; 0 if it has none. */

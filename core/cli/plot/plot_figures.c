@@ -133,7 +133,7 @@ static void data_rods (FILE *f, const pw_plots *p, int i) {
 static void data_symbol (FILE *f, const pw_plots *p, const pw_plot_link *link, int n, int closed) {
   pw_plot_stroke stroke[PLOT_STROKES];
   double at[PLOT_VERTICES][2];
-  int strokes = link->kind->symbol ? pw_plot_strokes (p, n - 1, link, n, stroke) : 0;
+  int strokes = pw_plot_strokes (p, link, n, stroke);
   for (const pw_plot_stroke *s = stroke; s < stroke + strokes; s++) {
     if (s->closed != closed) continue;
     pw_plot_place (p, n - 1, link, s, at);

@@ -92,7 +92,7 @@ static int symbol_next (const pw_plot_link *link, const char **text, pw_plot_str
 /* ---- In the inertial frame ---- */
 
 typedef struct {
-  double p[2], d[2], e[2], unit, low, high; /* p1, p2 - p1, direction, unit, ends of the travel from p2 */
+  double p[2], d[2], e[2]; /* p1, p2 - p1, direction */
 } symbol_frame;
 
 void pw_plot_end (const pw_plots *p, int i, const pw_plot_link *link, int n, double out[2]) {
@@ -102,7 +102,7 @@ void pw_plot_end (const pw_plots *p, int i, const pw_plot_link *link, int n, dou
 }
 
 static symbol_frame symbol_place (const pw_plots *p, int i, const pw_plot_link *link) {
-  symbol_frame f = { .unit = p->unit };
+  symbol_frame f;
   int last = link->ends - 1, body = link->end[link->rail ? last : 0].body;
   double p2[2], angle = body < 0 ? 0 : pw_plot_track (p, i, &p->bodies, body)[2];
   pw_plot_end (p, i, link, 0, f.p);
@@ -112,22 +112,21 @@ static symbol_frame symbol_place (const pw_plots *p, int i, const pw_plot_link *
     angle = pw_plot_track (p, i, &p->wheels, link->contact)[2];
   else if (link->rail)
     angle += pw_plot_heading (link);
-  else if (hypot (f.d[0], f.d[1]) > 1e-9 * f.unit)
+  else if (hypot (f.d[0], f.d[1]) > 1e-9 * p->unit)
     angle = atan2 (f.d[1], f.d[0]);
   f.e[0] = cos (angle), f.e[1] = sin (angle);
   return f;
 }
 
-/* The travel of p1 along the line, from p2. */
-static symbol_frame symbol_travel (const pw_plots *p, int sample, const pw_plot_link *link, int samples) {
-  symbol_frame f = symbol_place (p, sample, link);
+/* The ends of the travel of p1 along a rail and of its symbol, from p2, in units of symbols. */
+static void symbol_travel (const pw_plots *p, const pw_plot_link *link, int samples, double *low, double *high) {
+  *low = *high = 0;
   for (int i = 0; i < samples && link->rail; i++) {
-    symbol_frame g = symbol_place (p, i, link);
-    double s = -(g.d[0] * g.e[0] + g.d[1] * g.e[1]);
-    f.low = fmin (f.low, s), f.high = fmax (f.high, s);
+    symbol_frame f = symbol_place (p, i, link);
+    double s = -(f.d[0] * f.e[0] + f.d[1] * f.e[1]) / p->unit;
+    *low = fmin (*low, s), *high = fmax (*high, s);
   }
-  f.low -= 2.5 * f.unit, f.high += 2.5 * f.unit;
-  return f;
+  *low -= 2.5, *high += 2.5;
 }
 
 /* Hatching of the line from x0 to x1 at height y relative to p2, on its lower side. */
@@ -151,11 +150,11 @@ static int symbol_ground (double low, double high, const pw_plot_link *link, pw_
   return 1 + symbol_hatch (-1.1, 1.1, -1.5, 1, s + 1);
 }
 
-int pw_plot_strokes (const pw_plots *p, int i, const pw_plot_link *link, int samples,
-                     pw_plot_stroke stroke[PLOT_STROKES]) {
-  const symbol_frame f = symbol_travel (p, i, link, samples);
-  const double low = f.low / f.unit, high = f.high / f.unit;
+int pw_plot_strokes (const pw_plots *p, const pw_plot_link *link, int samples, pw_plot_stroke stroke[PLOT_STROKES]) {
   int ground = link->end[link->ends - 1].body < 0 || link->end[0].body < 0, n = 0;
+  double low, high;
+  if (link->kind->symbol == NULL) return 0;
+  symbol_travel (p, link, samples, &low, &high);
   if (ground) n = symbol_ground (low, high, link, stroke);
   for (const char *text = link->kind->symbol; n < PLOT_STROKES && symbol_next (link, &text, &stroke[n]);) {
     pw_plot_stroke *s = &stroke[n];
@@ -172,7 +171,7 @@ void pw_plot_place (const pw_plots *p, int i, const pw_plot_link *link, const pw
   if (s->upright && link->end[0].body < 0) f.d[0] = f.d[1] = 0;
   for (int k = 0; k < s->count; k++) {
     const double *v = s->at[k];
-    at[k][0] = f.p[0] + v[0] * f.d[0] - v[3] * f.d[1] + f.unit * (v[1] * f.e[0] - v[2] * f.e[1]);
-    at[k][1] = f.p[1] + v[0] * f.d[1] + v[3] * f.d[0] + f.unit * (v[1] * f.e[1] + v[2] * f.e[0]);
+    at[k][0] = f.p[0] + v[0] * f.d[0] - v[3] * f.d[1] + p->unit * (v[1] * f.e[0] - v[2] * f.e[1]);
+    at[k][1] = f.p[1] + v[0] * f.d[1] + v[3] * f.d[0] + p->unit * (v[1] * f.e[1] + v[2] * f.e[0]);
   }
 }
