@@ -4,7 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
-#include "report.h"
+#include "cli.h"
 #include "util.h"
 
 /* Refuses a parameter among initial values, and the reverse: names of states have a dot, those of parameters have none. */
@@ -78,15 +78,15 @@ void pw_cli_close_model (pw_cli_model *m) {
 
 double pw_cli_change (const pw_run *r, const pw_system *s, char text[PW_CHANGE_TEXT]) {
   const pw_initial_report *x = pw_run_initial (r);
-  double most = 0, from, to;
-  char name[PW_STATE_NAME], a[32], b[32];
-  for (int i = 0; i < 2 * pw_system_coordinates (s); i++) {
-    if (!pw_initial_given (x, i) || !pw_initial_moved (s, x, i)) continue;
-    pw_report_state (s, x, i, name, &from, &to);
-    if (!(fabs (to - from) > most)) continue;
+  int n = pw_system_coordinates (s);
+  double most = 0;
+  char name[300], a[32], b[32];
+  for (int i = 0; i < 2 * n; i++) {
+    double from = i < n ? x->q_given[i] : x->v_given[i - n], to = i < n ? x->q[i] : x->v[i - n];
+    if (!pw_initial_given (x, i) || !pw_initial_moved (s, x, i) || !(fabs (to - from) > most)) continue;
     most = fabs (to - from);
-    snprintf (text, PW_CHANGE_TEXT, "%s from %s to %s %s", name, pw_format (a, from, 10), pw_format (b, to, 10),
-              pw_system_state_unit (s, i));
+    snprintf (text, PW_CHANGE_TEXT, "%s from %s to %s %s", pw_system_state_name (s, i, name, sizeof name),
+              pw_format (a, from, 10), pw_format (b, to, 10), pw_system_state_unit (s, i));
   }
   return most;
 }
