@@ -190,10 +190,12 @@ $(BUILD)/obj/core/cli/page/page.inc: core/cli/page/page.html core/cli/page/page.
 	@mkdir -p $(@D)
 	@for f in $^; do echo "static const char *const $$(basename $$f | tr .- __)[] = {"; $(AS_STRINGS) $$f; echo 'NULL };'; done >$@
 
-$(BUILD)/obj/core/cli/plot/templates.inc: $(wildcard core/cli/plot/*.gp core/cli/plot/templates/*.gp)
+# A line "# include OTHER.gp" of a template stands for the contents of another one.
+$(BUILD)/obj/core/cli/plot/templates.inc: $(wildcard core/cli/plot/templates/*.gp)
 	@mkdir -p $(@D)
-	@for f in $^; do echo "static const char *const figure_$$(basename $$f .gp | tr - _)[] = {"; \
-	  $(AS_STRINGS) $$f; echo 'NULL };'; done >$@
+	@for f in $^; do echo "{ \"$$(basename $$f .gp)\", (const char *const[]){"; \
+	  awk '/^# include / { while ((getline line <("core/cli/plot/templates/" $$3)) > 0) print line; next } { print }' $$f | \
+	  $(AS_STRINGS); echo 'NULL } },'; done >$@
 
 # The engine of interactive pages, WebAssembly: what integrates with rk4, erk5 and erk8, without libraries.
 WASM_FLAGS := --target=wasm32-wasi -std=c11 -O2 -ffp-contract=off -ffunction-sections -fdata-sections \
@@ -201,7 +203,7 @@ WASM_FLAGS := --target=wasm32-wasi -std=c11 -O2 -ffp-contract=off -ffunction-sec
   $(call layer,$(CORE_LAYERS) core/kinds $(SOLVER_LAYERS) $(FILE_LAYERS) core/cli core/cli/plot $(BUILD)/obj/core/cli/plot) $(SYSTEM)
 WASM       := $(filter-out solvers/jacobian/sparse.c solvers/analysis/% solvers/linear/% solvers/variation/% solvers/run/timing.c solvers/implicit/% solvers/sundials/% core/specialise/specialise_%,$(CORE) $(SOLVERS)) \
   $(filter-out core/files/yaml/yaml_tree.c,$(wildcard core/files/expression/*.c core/files/yaml/*.c)) \
-  $(addprefix core/files/,number.c load/columns.c load/units.c load/read.c) $(addprefix core/cli/plot/,plot_samples.c plot_shapes.c plot_symbols.c plot_figures.c animate.c) \
+  $(addprefix core/files/,number.c write/json.c load/columns.c load/units.c load/read.c) $(addprefix core/cli/plot/,plot_samples.c plot_shapes.c plot_symbols.c plot_figures.c animate.c) \
   $(wildcard core/cli/page/engine/*.c)
 WASM_OBJ   := $(WASM:%.c=$(BUILD)/wasm/%.o)
 
@@ -313,7 +315,7 @@ comma := ,
 ALLOC_WRAP := malloc calloc realloc strdup free
 FILES_WRAP := open fopen fdopen fclose fflush fwrite fread fseek fseeko ftell fgets rename ftruncate fsync pread pwrite flock \
               fchmod mkdir realpath opendir \
-              $(addprefix posix_spawn,p _file_actions_init _file_actions_addopen _file_actions_adddup2)
+              $(addprefix posix_spawn,p _file_actions_init _file_actions_addchdir_np _file_actions_addopen _file_actions_adddup2)
 $(BUILD)/tests/test_alloc: WRAP := $(addprefix -Wl$(comma)--wrap=,$(ALLOC_WRAP))
 $(BUILD)/tests/test_cli_faults: WRAP = -pthread $(addprefix -Wl$(comma)--wrap=,$(ALLOC_WRAP) $(FILES_WRAP))
 $(BUILD)/tests/test_memory $(BUILD)/tests/slow_memory: WRAP = -pthread $(addprefix -Wl$(comma)--wrap=,$(ALLOC_WRAP))

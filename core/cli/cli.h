@@ -215,10 +215,9 @@ char *pw_cli_source (const pw_system *s, pw_error *error);
 void pw_cli_engine_open (pw_cli_engine *e, const pw_system *s, pw_specialise when, double steps);
 void pw_cli_engine_close (pw_cli_engine *e);
 const pw_specialised *pw_cli_engine_code (const pw_cli_engine *e); /* for pw_settings.specialised */
-const char *pw_cli_engine_name (const pw_cli_engine *e);           /* "specialised", "general" */
 
-/* The code for `lanes` runs at once (0: as many as pay for this number of steps), by a method of fixed step size; NULL:
- * one run after the other. */
+/* The code for `lanes` runs at once, by a method of fixed step size; NULL: one run after the other.  With `lanes` 0, as many
+ * as fill a vector register if all runs together have PW_LANES_STEPS, so that they repay the compilation. */
 #define PW_LANES_STEPS 1e7
 pw_scene_code *pw_cli_engine_lanes (const pw_cli_engine *e, const pw_system *s, const char *method, int lanes,
                                     double steps);
@@ -258,10 +257,10 @@ int pw_cli_csv (const char *path, pw_error *error);
 
 /* ---- Messages ---- */
 
-/* Print to standard error, and to a stream; on a terminal control characters are escaped, since names may contain
+/* Print to a stream, and to standard error; on a terminal control characters are escaped, since names may contain
  * them. */
-void pw_cli_say (const char *format, ...) PW_PRINTF (1, 2);
 void pw_cli_print (FILE *f, const char *format, ...) PW_PRINTF (2, 3);
+#define pw_cli_say(...) pw_cli_print (stderr, __VA_ARGS__)
 
 /* Prints text broken into lines of `width` characters; the first line continues at column `indent`. */
 void pw_cli_wrap (const char *text, int indent, int width);

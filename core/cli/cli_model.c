@@ -52,8 +52,7 @@ pw_file *pw_cli_file (const pw_cli_line *l, pw_error *error) {
 }
 
 int pw_cli_open (pw_cli_model *m, const pw_cli_line *l, pw_error *error) {
-  *m = (pw_cli_model){ .file = NULL };
-  m->file = pw_cli_file (l, error);
+  *m = (pw_cli_model){ .file = pw_cli_file (l, error) };
   if (m->file) m->model = pw_file_model (m->file, error);
   if (m->model && pw_cli_apply (m->model, "--set", l->sets, pw_model_set, error) == PW_OK &&
       pw_cli_apply (m->model, "--start", l->starts, pw_model_set_initial, error) == PW_OK &&

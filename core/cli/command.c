@@ -15,13 +15,16 @@ enum {
   COMMAND_WIDTH = 80
 }; /* popt's value for --help (for other options 1, 2, ...); columns of help */
 
+static const struct poptOption command_help_option = { "help", '?',          POPT_ARG_NONE,
+                                                       NULL,   COMMAND_HELP, "Show this help and exit",
+                                                       NULL };
+
 static int command_is_end (const struct poptOption *o) {
   return o->longName == NULL && o->descrip == NULL;
 }
 
 /* The command's options, each pointing into its structure, and help. */
 static int command_table (pw_cli_line *l, const struct poptOption *options) {
-  const struct poptOption help = { "help", '?', POPT_ARG_NONE, NULL, COMMAND_HELP, "Show this help and exit", NULL };
   size_t n = 0;
   while (!command_is_end (options + n)) n++;
   l->table = calloc (n + 2, sizeof *l->table);
@@ -35,7 +38,7 @@ static int command_table (pw_cli_line *l, const struct poptOption *options) {
     l->table[n].val = (int)n + 1;
     n++;
   }
-  l->table[n] = help;
+  l->table[n] = command_help_option;
   return PW_OK;
 }
 
@@ -68,7 +71,7 @@ static void command_option (const struct poptOption *o) {
   pw_cli_wrap (o->descrip, COLUMN, COMMAND_WIDTH);
 }
 
-static void command_help (const pw_command *c, const pw_cli_line *l) {
+static void command_help (const pw_command *c) {
   printf ("Usage: pinwheel %s %s\n", c->name, c->synopsis);
   pw_cli_wrap (c->help, 0, COMMAND_WIDTH);
   for (const struct poptOption *o = c->options; !command_is_end (o); o++)
@@ -76,10 +79,8 @@ static void command_help (const pw_command *c, const pw_cli_line *l) {
       printf ("\n%s:\n", o->descrip);
     else if (o->descrip)
       command_option (o);
-  const struct poptOption *help = l->table;
-  while (help->val != COMMAND_HELP) help++;
   puts ("\nOther:");
-  command_option (help);
+  command_option (&command_help_option);
 }
 
 /* ---- Reading ---- */
@@ -122,7 +123,7 @@ static int command_read (const pw_command *c, pw_cli_line *l, int argc, const ch
   if (errno == ENOMEM)
     return pw_fail (error, PW_RESOURCE, "out of memory"); /* popt omits texts that it cannot allocate */
   if (got == COMMAND_HELP) {
-    command_help (c, l);
+    command_help (c);
     return 1;
   }
   if (got < -1) return command_bad (c, l, got, error);

@@ -36,13 +36,13 @@ char *pw_cli_source (const pw_system *s, pw_error *error) {
 static void engine_load (pw_cli_engine *e, const pw_system *s, pw_specialise when) {
   pw_error own = { 0 };
   char *text = pw_cli_source (s, &own);
-  int has_text = text != NULL, quiet = has_text ? 0 : when == PW_SPECIALISE_AUTO;
+  int has_text = text != NULL;
   if (text) e->code = pw_scene_code_open (text, s, &own);
   free (text);
   if (e->code && *pw_scene_code_notice (e->code)) pw_cli_say ("pinwheel: %s\n", pw_scene_code_notice (e->code));
   if (e->code) return;
   engine_general (e, s, has_text, &own);
-  if (!quiet) pw_cli_say ("pinwheel: general engine: %s\n", own.text);
+  if (has_text || when == PW_SPECIALISE_ALWAYS) pw_cli_say ("pinwheel: general engine: %s\n", own.text);
 }
 
 void pw_cli_engine_open (pw_cli_engine *e, const pw_system *s, pw_specialise when, double steps) {
@@ -86,10 +86,6 @@ pw_scene_code *pw_cli_engine_lanes (const pw_cli_engine *e, const pw_system *s, 
   free (text);
   pw_run_close (r);
   return code;
-}
-
-const char *pw_cli_engine_name (const pw_cli_engine *e) {
-  return e->code ? "specialised" : "general";
 }
 
 void pw_cli_engine_close (pw_cli_engine *e) {

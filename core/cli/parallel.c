@@ -14,10 +14,8 @@ static long parallel_processors (void) {
   const char *text = getenv ("OMP_NUM_THREADS");
   long wanted = text ? strtol (text, NULL, 10) : 0;
   if (wanted > 0) return wanted;
-#ifdef CPU_COUNT
   cpu_set_t set;
   if (sched_getaffinity (0, sizeof set, &set) == 0) return CPU_COUNT (&set);
-#endif
   long n = sysconf (_SC_NPROCESSORS_ONLN);
   return n > 0 ? n : 1;
 }
@@ -32,21 +30,33 @@ int pw_parallel_jobs (const char *text, int *jobs, pw_error *error) {
 /* ---- Threads ---- */
 
 typedef struct {
+  cpu_set_t all;                /* processors that this process may use */
+  int core[CPU_SETSIZE], cores; /* one of them on each physical core */
+} parallel_cores;
+
+typedef struct {
   pthread_mutex_t lock;
-  int next, count;
+  int next, count; /* tasks */
   pw_task *task;
   void *context;
   int status; /* of the first task that failed */
   pw_error *error;
-  int threads, begun;
-  void (*bind) (const void *cores, int thread, int threads); /* called first in each thread; NULL: none */
-  const void *cores;
+  int threads, begun;          /* threads; those that have begun */
+  const parallel_cores *cores; /* NULL: threads run on any processor */
 } parallel;
+
+/* The cores of each thread are its own; there may be several, so that it can avoid other programs. */
+static void parallel_bind (const parallel_cores *c, int thread, int threads) {
+  cpu_set_t own;
+  CPU_ZERO (&own);
+  for (int i = thread; i < c->cores; i += threads) CPU_SET ((size_t)c->core[i], &own);
+  sched_setaffinity (0, sizeof own, &own);
+}
 
 static void *parallel_thread (void *argument) {
   parallel *p = argument;
   pthread_mutex_lock (&p->lock);
-  if (p->bind) p->bind (p->cores, p->begun++, p->threads);
+  if (p->cores) parallel_bind (p->cores, p->begun++, p->threads);
   while (p->next < p->count) {
     int i = p->next++;
     pw_error own = { 0 };
@@ -91,12 +101,6 @@ int pw_parallel (int jobs, int count, pw_task *task, void *context, pw_error *er
 
 /* ---- Timed tasks ---- */
 
-#ifdef CPU_COUNT
-typedef struct {
-  cpu_set_t all;                /* processors that this process may use */
-  int core[CPU_SETSIZE], cores; /* one of them on each physical core */
-} parallel_cores;
-
 /* The lowest processor on the same physical core; the processor itself if that is unknown. */
 static int parallel_sibling (int processor) {
   char name[80];
@@ -117,34 +121,13 @@ static void parallel_find (parallel_cores *c) {
     if (CPU_ISSET ((size_t)i, &c->all) && !known[parallel_sibling (i)]++) c->core[c->cores++] = i;
 }
 
-/* The cores of each thread are its own; there may be several, so that it can avoid other programs. */
-static void parallel_bind (const void *cores, int thread, int threads) {
-  const parallel_cores *c = cores;
-  cpu_set_t own;
-  CPU_ZERO (&own);
-  for (int i = thread; i < c->cores; i += threads) CPU_SET ((size_t)c->core[i], &own);
-  sched_setaffinity (0, sizeof own, &own);
-}
-
 int pw_parallel_timed (int jobs, int count, pw_task *task, void *context, pw_error *error) {
   parallel_cores c;
   parallel_find (&c);
-  parallel p = { .count = count,
-                 .task = task,
-                 .context = context,
-                 .error = error,
-                 .threads = jobs,
-                 .bind = parallel_bind,
-                 .cores = &c };
+  parallel p = { .count = count, .task = task, .context = context, .error = error, .threads = jobs, .cores = &c };
   if (jobs > c.cores) p.threads = c.cores;
   if (p.threads < 2) return pw_parallel (1, count, task, context, error);
   int status = parallel_run (&p);
   sched_setaffinity (0, sizeof c.all, &c.all);
   return status;
 }
-#else
-int pw_parallel_timed (int jobs, int count, pw_task *task, void *context, pw_error *error) {
-  (void)jobs;
-  return pw_parallel (1, count, task, context, error);
-}
-#endif

@@ -63,15 +63,15 @@ void pw_progress_at (pw_progress *p, double t) {
   int full = (int)(part * PROGRESS_WIDTH);
   for (int i = 0; i < PROGRESS_WIDTH; i++) bar[i] = i < full ? '#' : '.';
   bar[PROGRESS_WIDTH] = 0;
-  int timed = strcmp (p->unit, "s") == 0;
   if (p->lines)
     fprintf (stderr, "pinwheel: %s: ", p->what);
   else
     fprintf (stderr, "\r%.16s [%s] ", p->what, bar);
   fprintf (stderr, "%*.0f %%  ", p->lines ? 0 : 3, floor (100 * part));
-  if (*p->unit)
-    fprintf (stderr, "%s%.*g of %.*g %s  ", timed ? "t = " : "", timed ? 4 : 9, timed ? t : floor (t), timed ? 4 : 9,
-             p->t_end, p->unit);
+  if (strcmp (p->unit, "s") == 0)
+    fprintf (stderr, "t = %.4g of %.4g s  ", t, p->t_end);
+  else if (*p->unit)
+    fprintf (stderr, "%.9g of %.9g %s  ", floor (t), p->t_end, p->unit);
   fprintf (stderr, "%s to go%s%s%s", left, *p->note ? "  " : "", p->note, p->lines ? "\n" : "\033[K");
   fflush (stderr);
   p->shown = !p->lines;

@@ -23,27 +23,16 @@ static void say_text (FILE *f, const char *text) {
   }
 }
 
-static void say (FILE *f, const char *format, va_list arguments) {
+void pw_cli_print (FILE *f, const char *format, ...) {
   char text[12000];
+  va_list arguments;
+  va_start (arguments, format);
   vsnprintf (text, sizeof text, format, arguments);
+  va_end (arguments);
   if (isatty (fileno (f)))
     say_text (f, text);
   else
     fputs (text, f);
-}
-
-void pw_cli_say (const char *format, ...) {
-  va_list arguments;
-  va_start (arguments, format);
-  say (stderr, format, arguments);
-  va_end (arguments);
-}
-
-void pw_cli_print (FILE *f, const char *format, ...) {
-  va_list arguments;
-  va_start (arguments, format);
-  say (f, format, arguments);
-  va_end (arguments);
 }
 
 void pw_cli_wrap (const char *text, int indent, int width) {

@@ -1,7 +1,6 @@
 /* Requests to stop. */
 #define _DEFAULT_SOURCE /* clocks of Linux */
 #include <math.h>
-#include <string.h>
 #include <time.h>
 #include "cli.h"
 
@@ -13,23 +12,22 @@ static void stop_on_signal (int number) {
   raise (number);
 }
 
-/* A signal that the program was started to ignore, by nohup or in the background of a script, stays ignored. */
-static void stop_set (int number, void (*handler) (int)) {
-  struct sigaction action, before;
-  memset (&action, 0, sizeof action);
-  action.sa_handler = handler;
+/* Handles SIGINT and SIGTERM; a signal that the program was started to ignore, by nohup or in the background of a script,
+ * stays ignored. */
+static void stop_set (void (*handler) (int)) {
+  static const int number[] = { SIGINT, SIGTERM };
+  struct sigaction action = { .sa_handler = handler }, before;
   sigemptyset (&action.sa_mask);
-  if (sigaction (number, NULL, &before) == 0 && before.sa_handler != SIG_IGN) sigaction (number, &action, NULL);
+  for (int i = 0; i < 2; i++)
+    if (sigaction (number[i], NULL, &before) == 0 && before.sa_handler != SIG_IGN) sigaction (number[i], &action, NULL);
 }
 
 void pw_stop_catch (void) {
-  stop_set (SIGINT, stop_on_signal);
-  stop_set (SIGTERM, stop_on_signal);
+  stop_set (stop_on_signal);
 }
 
 void pw_stop_release (void) {
-  stop_set (SIGINT, SIG_DFL);
-  stop_set (SIGTERM, SIG_DFL);
+  stop_set (SIG_DFL);
 }
 
 /* ---- Limits ---- */

@@ -259,13 +259,14 @@ int pw_csv_close (pw_csv *c, pw_error *error); /* c may be NULL */
 
 /* ---- JSON ---- */
 
-/* Writes JSON to a stream: numbers with 17 digits, null for what is not finite.  Begin with { .f = stream } and open
- * one container.  A key is NULL in lists and for the outermost container.  A NULL pw_json writes nothing. */
+/* Writes JSON to a stream: numbers with 17 digits unless `digits` is set, null for what is not finite; text contains no
+ * "<", so that it may be part of a script in HTML.  Begin with { .f = stream } and open one container.  A key is NULL in lists and for the outermost container.  A NULL pw_json writes nothing. */
 typedef struct {
   FILE *f;
   int lines;        /* levels whose items have separate lines */
   int line;         /* 1: so has the next item, or the end of the container */
   int depth, items; /* containers that are open; items of the innermost so far */
+  int digits;       /* of numbers; 0: 17 */
 } pw_json;
 void pw_json_open (pw_json *j, const char *key, char bracket); /* '{' or '[' */
 void pw_json_close (pw_json *j, char bracket);

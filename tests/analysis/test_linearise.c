@@ -146,16 +146,16 @@ static void test_page (void **state) {
   cli_write ("block.yaml", linearise_block);
   cli_good ("pinwheel linearise @/block.yaml --animate @/modes.html");
   const char *page = cli_file ("modes.html");
-  for (const char *at = page; (at = strstr (at, "method:\"mode ")) != NULL; at++) runs++;
+  for (const char *at = page; (at = strstr (at, "\"method\": \"mode ")) != NULL; at++) runs++;
   assert_int_equal (runs, 1);
-  assert_non_null (strstr (page, "method:\"mode 1: -0.8 1/s, 0.9985 Hz, growth is not shown\""));
+  assert_non_null (strstr (page, "\"method\": \"mode 1: -0.8 1/s, 0.9985 Hz, growth is not shown\""));
   assert_non_null (strstr (page, "<select id=\"mode\">"));
   assert_null (strstr (page, "NaN"));
-  const char *motion = strstr (page, "motion:[");
+  const char *motion = strstr (page, "\"motion\": [");
   double first[6], second[6];
-  assert_int_equal (sscanf (motion, "motion:[ %lf,%lf,%lf,%lf,%lf,%lf, %lf,%lf,%lf,%lf,%lf,%lf", first, first + 1,
-                            first + 2, first + 3, first + 4, first + 5, second, second + 1, second + 2, second + 3,
-                            second + 4, second + 5),
+  assert_int_equal (sscanf (motion, "\"motion\": [ %lf, %lf, %lf, %lf, %lf, %lf, %lf, %lf, %lf, %lf, %lf, %lf", first,
+                            first + 1, first + 2, first + 3, first + 4, first + 5, second, second + 1, second + 2,
+                            second + 3, second + 4, second + 5),
                     12);
   double size = first[0] - 0.8, step = 3 * 2 * PW_PI / 180, rate = sqrt (40 - 0.64);
   assert_true (size > 0.01 && size < 0.1);

@@ -22,7 +22,7 @@ static char *animate_page (const char *name) {
 /* Where the numbers of an array of the page begin. */
 static const char *animate_array (const char *page, const char *key) {
   char mark[32];
-  snprintf (mark, sizeof mark, "\n%s:[", key);
+  snprintf (mark, sizeof mark, "\n  \"%s\": [", key);
   const char *at = strstr (page, mark);
   assert_non_null (at);
   return at + strlen (mark);
@@ -38,7 +38,7 @@ static int animate_numbers (const char *page, const char *key, double *first, do
     *last = strtod (at, &end);
     if (end == at) break;
     if (n++ == 0) *first = *last;
-    at = end + strspn (end, ",\n");
+    at = end + strspn (end, ", \n");
   }
   return n;
 }
@@ -66,13 +66,13 @@ static void test_forces (void **state) {
   (void)state;
   cli_good ("pinwheel run ezyroller --t-end 1 --animate @/run.html");
   char *page = animate_page ("run.html");
-  assert_non_null (strstr (page, "{\"name\":\"B\",\"force\":0,\"ends\":[{\"body\":0"));
-  assert_non_null (strstr (page, "\"strokes\":[[1,[0,0.4,0,0],")); /* the circle of the pin's symbol */
-  assert_non_null (strstr (page, "{\"name\":\"A\",\"force\":0,\"ends\":[{\"body\":0"));
+  assert_non_null (strstr (page, "{\"name\": \"B\", \"force\": 0, \"ends\": [{\"body\": 0"));
+  assert_non_null (strstr (page, "\"strokes\": [[1, [0, 0.4, 0, 0],")); /* the circle of the pin's symbol */
+  assert_non_null (strstr (page, "{\"name\": \"A\", \"force\": 0, \"ends\": [{\"body\": 0"));
   animate_numbers (page, "force", &first, &last);
   const char *row = animate_array (page, "force");
   double f[6];
-  assert_int_equal (sscanf (row + 1, "%lf,%lf,%lf,%lf,%lf,%lf", &f[0], &f[1], &f[2], &f[3], &f[4], &f[5]), 6);
+  assert_int_equal (sscanf (row + 1, "%lf, %lf, %lf, %lf, %lf, %lf", &f[0], &f[1], &f[2], &f[3], &f[4], &f[5]), 6);
   check_close ("size of C", f[5] * f[5] + f[4] * f[4], 0.4 * 0.4, 1e-5, "M0 / (c + d) = 0.1 / 0.25, six digits");
   check_close ("sum on the steering", f[1], f[5], 1e-5, "a massless body: the pin's force on the frame is the wheel's");
   free (page);
@@ -84,8 +84,8 @@ static void test_names (void **state) {
   cli_good (
       "pinwheel run '@/a<b>&.yaml' --t-end 0.1 --animate @/odd.html 2>/dev/null"); /* a notice: its start was moved */
   char *page = animate_page ("odd.html");
-  assert_non_null (strstr (page, "model:\"a\\u003cb\\u003e\\u0026\""));
-  assert_null (strstr (page, "a<b>"));
+  assert_non_null (strstr (page, "\"model\": \"a\\u003Cb>&\""));
+  assert_null (strstr (page, "a<b"));
   free (page);
 }
 

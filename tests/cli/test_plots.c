@@ -75,7 +75,8 @@ static void test_written (void **state) {
 /* Figures that need a layout of their own. */
 static void test_layouts (void **state) {
   (void)state;
-  cli_write ("sled.yaml", "pinwheel: 1\nbodies:\n  - {name: sled, mass: 1, inertia: 1, rate: {vx: 20}}\n"
+  cli_write ("sled.yaml", "pinwheel: 1\nabout: 'it has {braces}, a_b & 100 % ~ \\'\nbodies:\n  - {name: sled, mass: 1, "
+                          "inertia: 1, rate: {vx: 20}}\n"
                           "  - {name: \"a-dog-whose-name-is-as-long-as-the-longest-may-be-\", mass: 1, "
                           "inertia: 1, start: {x: 1}, rate: {vx: 20}}\nelements:\n"
                           "  - {wheel: left, body: sled, at: [0, 0.5]}\n"
@@ -85,6 +86,7 @@ static void test_layouts (void **state) {
   assert_non_null (strstr (cli_file ("drawn/paths.svg"), "the first "));
   assert_non_null (strstr (cli_file ("drawn/velocities.svg"), "a-dog-whose-name-is-as-l…<"));
   assert_non_null (strstr (cli_file ("drawn/energy.svg"), "dissipated"));
+  assert_non_null (strstr (cli_file ("drawn/energy.svg"), "It has {braces}, a_b &amp; 100 % ~ \\"));
   assert_null (strstr (cli_file ("drawn/energy.svg"), "potential"));
 }
 
@@ -103,8 +105,8 @@ static void test_outline (void **state) {
                       "9 0 0 2\n11 1 0 2\n\n9 0 0 2\n7 -1 0 2\n\n9 0 0 2\n10 0.5 0 2\n\n";
   assert_int_equal (strncmp (strchr (data, '\n') + 1, drawn, strlen (drawn)), 0);
   const char *page = cli_file ("plate.html");
-  assert_non_null (strstr (page, "\"spokes\":[[0.5,0.2]],\"outline\":[[-1,-1],[1,-1],[1,1],[-1,1]]}"));
-  assert_non_null (strstr (page, "\"outline\":[]}"));
+  assert_non_null (strstr (page, "\"spokes\": [[0.5, 0.2]], \"outline\": [[-1, -1], [1, -1], [1, 1], [-1, 1]]}"));
+  assert_non_null (strstr (page, "\"outline\": []}"));
 }
 
 /* What gnuplot says when it fails is passed on. */
@@ -182,7 +184,7 @@ static void test_style (void **state) {
       cli_run ("PATH=/none pinwheel run ezyroller -t 1 --plots @/style --width 8.5cm --colour time >/dev/null"), 0);
   assert_non_null (strstr (cli_file ("style/paths.gp"), "\nwidth = 240.94\n"));
   assert_non_null (strstr (cli_file ("style/mechanism.gp"), "\nby_time = 1\n"));
-  assert_non_null (strstr (cli_file ("style/paths.gp"), "about = 'Two-segment ride-on"));
+  assert_non_null (strstr (cli_file ("style/paths.gp"), "about = 'two-segment ride-on"));
   cli_bad ("pinwheel run ezyroller --plots @/style --width 85", 2, "--width 85: expected a length such as 85mm");
   cli_bad ("pinwheel run ezyroller --plots @/style --width 1mm", 2, "--width 1mm: expected 50mm to 500mm");
   cli_bad ("pinwheel run ezyroller --plots @/style --colour red", 2, "--colour red: expected body or time");

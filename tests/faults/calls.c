@@ -33,6 +33,8 @@ CALL (-1, ENOSPC, int, ftruncate, (int fd, off_t size), (fd, size))
 CALL (-1, ENOSPC, ssize_t, pwrite, (int fd, const void *p, size_t size, off_t at), (fd, p, size, at))
 CALL (-1, EROFS, int, mkdir, (const char *path, mode_t mode), (path, mode))
 CALL (EMFILE, EMFILE, int, posix_spawn_file_actions_init, (posix_spawn_file_actions_t * a), (a))
+CALL (EMFILE, EMFILE, int, posix_spawn_file_actions_addchdir_np, (posix_spawn_file_actions_t * a, const char *path),
+      (a, path))
 CALL (EMFILE, EMFILE, int, posix_spawn_file_actions_addopen,
       (posix_spawn_file_actions_t * a, int fd, const char *path, int flags, mode_t mode), (a, fd, path, flags, mode))
 CALL (EMFILE, EMFILE, int, posix_spawn_file_actions_adddup2, (posix_spawn_file_actions_t * a, int from, int to),

@@ -55,13 +55,13 @@ static void test_figures (void **state) {
   assert_non_null (strstr (cli_file ("plots/paths.svg"), "paths of the markers<"));
   assert_non_null (strstr (cli_file ("plots/mechanism.gp"), "\nmarkers = '0 '\n"));
   assert_non_null (strstr (cli_file ("plots/mechanism.dat"), MARKER_WHEELS "nan nan nan nan\n\n\n"));
-  assert_non_null (strstr (cli_file ("arm.html"), "{\"name\":\"tip\",\"body\":0,\"rolls\":0}"));
+  assert_non_null (strstr (cli_file ("arm.html"), "{\"name\": \"tip\", \"body\": 0, \"rolls\": false}"));
   cli_write ("arm.yaml", MARKER_ARM MARKER_TIP "  - {tyre: T, body: arm, at: [0.3, 0], stiffness: 1, speed: 0.1}\n");
   assert_int_equal (cli_run ("pinwheel run @/arm.yaml -t 1 --plots @/plots --animate @/arm.html"), 0);
   assert_non_null (strstr (cli_file ("plots/paths.svg"), "paths of the wheels and markers<"));
   assert_non_null (strstr (cli_file ("plots/mechanism.dat"), MARKER_WHEELS));
   assert_null (strstr (cli_file ("plots/mechanism.dat"), MARKER_WHEELS "nan nan nan nan\n\n\n"));
-  assert_non_null (strstr (cli_file ("arm.html"), "{\"name\":\"T\",\"body\":0,\"rolls\":1}"));
+  assert_non_null (strstr (cli_file ("arm.html"), "{\"name\": \"T\", \"body\": 0, \"rolls\": true}"));
 }
 
 int main (void) {

@@ -302,12 +302,8 @@ static void page_mode (const page *p, FILE *f, int mode) {
   pw_plots_close (plots);
 }
 
-static void page_insert (FILE *f, pw_page_part part, const void *context) {
+static void page_begin (FILE *f, const void *context) {
   const page *p = context;
-  if (part == PW_PAGE_PANEL) {
-    fputs ("<p class=\"bar\"><label>Mode <select id=\"mode\"></select></label></p>\n", f);
-    return;
-  }
   fputs ("const modes = [", f);
   for (int i = 0, shown = 0; i < p->x->linear.unknowns && p->error->status == PW_OK; i++) {
     if (!linearise_shows (&p->x->linear, i)) continue;
@@ -322,6 +318,8 @@ static void page_insert (FILE *f, pw_page_part part, const void *context) {
 }
 
 int pw_linearise_page (const pw_linearise *x, FILE *f, pw_error *error) {
+  static const char *const panel[] = { "<p class=\"bar\"><label>Mode <select id=\"mode\"></select></label></p>\n",
+                                       NULL };
   const size_t n = (size_t)x->linear.coordinates;
   pw_sample now;
   int shown = 0;
@@ -333,7 +331,7 @@ int pw_linearise_page (const pw_linearise *x, FILE *f, pw_error *error) {
   const page p = {
     .x = x, .base = now.q, .state = state, .size = PAGE_SIZE * pw_run_scale (x->r)->length, .error = error
   };
-  pw_animation_page (f, page_insert, &p);
+  pw_animation_page (f, panel, page_begin, &p);
   free (state);
   return error->status;
 }

@@ -35,10 +35,10 @@ static void check_open (pw_check *x) {
 /* Initial values given by the model or the user that the consistent initialisation has changed. */
 static void check_given (pw_check *x) {
   const pw_system *s = x->m.system;
-  for (int i = 0; x->r && i < 2 * pw_system_coordinates (s); i++) {
+  const pw_initial_report *initial = pw_run_initial (x->r);
+  for (int i = 0; i < 2 * pw_system_coordinates (s); i++) {
     char name[PW_STATE_NAME], a[32], b[32];
     double from, to;
-    const pw_initial_report *initial = pw_run_initial (x->r);
     if (!pw_initial_moved (s, initial, i) || !pw_initial_specified (initial, i)) continue;
     pw_report_state (s, initial, i, name, &from, &to);
     if (fabs (to) < 1e-12 * fabs (from)) to = 0; /* round-off */
@@ -48,10 +48,10 @@ static void check_given (pw_check *x) {
   }
 }
 
-/* The model's reference solution must hold initially. */
-static int check_reference (pw_check *x, int started, pw_error *error) {
+/* The model's reference solution must hold initially, unless the user gives initial values. */
+static int check_reference (pw_check *x, pw_error *error) {
   int n = pw_system_coordinates (x->m.system);
-  if (x->r == NULL || started || !pw_system_has_reference (x->m.model)) return PW_OK;
+  if (x->line.starts || !pw_system_has_reference (x->m.model)) return PW_OK;
   double *reference = malloc (2 * (size_t)n * sizeof *reference);
   if (reference == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
   int status = pw_system_reference (x->m.model, x->m.system, 0, reference, reference + n, error);
@@ -73,10 +73,9 @@ static int check_reference (pw_check *x, int started, pw_error *error) {
 
 /* Tests an element type in random scenes; records the reason if none can be generated. */
 static int check_alone (pw_checked_kind *k, pw_error *error) {
-  int status = PW_OK;
-  for (unsigned seed = 1; status == PW_OK && seed <= CHECK_SEEDS; seed++) {
+  for (unsigned seed = 1; seed <= CHECK_SEEDS && !*k->untested; seed++) {
     pw_error own = { 0 };
-    status = pw_selftest (k->kind, seed, &k->alone, &own);
+    int status = pw_selftest (k->kind, seed, &k->alone, &own);
     if (status == PW_RESOURCE) return pw_fail (error, status, "%s", own.text);
     if (status != PW_OK) snprintf (k->untested, sizeof k->untested, "%s", own.text);
   }
@@ -103,24 +102,24 @@ static int check_list_kinds (pw_check *x, pw_error *error) {
   return PW_OK;
 }
 
-/* Tests the element types in use; in the model only if their tables are consistent. */
-static int check_kinds (pw_check *x, pw_error *error) {
+/* Tests an element type in use; in the model only if its table is consistent. */
+static int check_kind (pw_check *x, pw_checked_kind *k, pw_error *error) {
   const pw_system *s = x->m.system;
-  double T = x->r ? pw_run_scale (x->r)->time : 1;
-  const double *q = x->r ? pw_run_initial (x->r)->q : pw_system_initial_q (s),
-               *v = x->r ? pw_run_initial (x->r)->v : pw_system_initial_v (s);
+  const pw_initial_report *initial = x->r ? pw_run_initial (x->r) : NULL;
+  const double *q = initial ? initial->q : pw_system_initial_q (s), *v = initial ? initial->v : pw_system_initial_v (s);
+  int status = check_alone (k, error);
+  const pw_selftest_check *fault = check_fault (&k->alone);
+  if (status == PW_OK && (fault == NULL || strcmp (fault->name, "table") != 0))
+    status = pw_selftest_scene (s, x->r ? pw_run_scale (x->r)->time : 1, k->kind, 0, q, v, 1, &k->inside, error);
+  if (fault == NULL) fault = check_fault (&k->inside);
+  if (fault)
+    check_add (&x->problem, "element type %s fails its self-test: %s (%s)", k->kind->name, fault->about, fault->where);
+  return status;
+}
+
+static int check_kinds (pw_check *x, pw_error *error) {
   int status = check_list_kinds (x, error);
-  for (pw_checked_kind *k = x->kind; status == PW_OK && k < x->kind + x->kinds; k++) {
-    status = check_alone (k, error);
-    if (status != PW_OK) break;
-    const pw_selftest_check *fault = check_fault (&k->alone);
-    if (fault == NULL || strcmp (fault->name, "table") != 0)
-      status = pw_selftest_scene (s, T, k->kind, 0, q, v, 1, &k->inside, error);
-    if (fault == NULL) fault = check_fault (&k->inside);
-    if (fault)
-      check_add (&x->problem, "element type %s fails its self-test: %s (%s)", k->kind->name, fault->about,
-                 fault->where);
-  }
+  for (int i = 0; status == PW_OK && i < x->kinds; i++) status = check_kind (x, &x->kind[i], error);
   return status;
 }
 
@@ -140,14 +139,13 @@ static void check_fastest (pw_check *x) {
 
 static int check_linear (pw_check *x, pw_error *error) {
   char a[32], b[32];
-  x->limit = x->doubling = INFINITY;
-  x->fastest = -1;
-  if (x->r == NULL) return PW_OK;
-  pw_error none = { 0 };
-  int status = pw_run_linearise (x->r, CHECK_MOST, &x->linear, &none);
-  if (status == PW_METHOD) check_add (&x->finding, "%s", none.text);
-  if (status == PW_METHOD) return PW_OK;
-  if (status != PW_OK) *error = none;
+  pw_error own = { 0 };
+  int status = pw_run_linearise (x->r, CHECK_MOST, &x->linear, &own);
+  if (status == PW_METHOD) {
+    check_add (&x->finding, "%s", own.text);
+    return PW_OK;
+  }
+  if (status != PW_OK) *error = own;
   if (status != PW_OK || x->linear.A == NULL) return status;
   check_fastest (x);
   if (x->explicit_rk4 && x->step > x->limit)
@@ -163,18 +161,23 @@ static int check_linear (pw_check *x, pw_error *error) {
 
 /* ---- */
 
-static int check_model (pw_check *x, int started, pw_error *error) {
+static int check_model (pw_check *x, pw_error *error) {
+  int status = PW_OK;
+  x->limit = x->doubling = INFINITY;
+  x->fastest = -1;
   pw_report_model (x->m.model);
   check_open (x);
-  check_given (x);
-  int status = check_reference (x, started, error);
-  if (status == PW_OK) status = check_linear (x, error);
+  if (x->r) {
+    check_given (x);
+    status = check_reference (x, error);
+    if (status == PW_OK) status = check_linear (x, error);
+  }
   return status == PW_OK ? check_kinds (x, error) : status;
 }
 
 static void check_close (pw_check *x) {
   pw_linear_free (&x->linear);
-  if (x->r) pw_run_close (x->r);
+  pw_run_close (x->r);
   free (x->redundant);
   free (x->kind);
   pw_cli_close_model (&x->m);
@@ -193,7 +196,7 @@ static int check_command (void *options, pw_error *error) {
   pw_check *x = options;
   pw_output *o = NULL;
   if (pw_cli_open (&x->m, &x->line, error) == PW_OK && check_open_json (x, &o, error) == PW_OK &&
-      check_model (x, x->line.starts != NULL, error) == PW_OK) {
+      check_model (x, error) == PW_OK) {
     if (o == NULL || pw_output_stream (o) != stdout) pw_check_report (x, NULL);
     if (o) pw_check_report (x, &(pw_json){ .f = pw_output_stream (o) });
     if (o) pw_output_finish (o, error);

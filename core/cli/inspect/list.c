@@ -1,12 +1,22 @@
 /* pinwheel list: models, methods, element types and signals. */
 #include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
 #include "cli.h"
 #include "print_table.h"
 #include "util.h"
 
-enum { LIST_WIDTH = 110 /* of a line, if the last column leaves room */ };
+enum {
+  LIST_WIDTH = 110, /* of a line, if the last column leaves room */
+  LIST_NAMES = 100, /* of a line of names */
+  LIST_HEADING = 14 /* of the heading before them */
+};
+
+/* Of each type of field: its name, default, and value in an example. */
+static const struct {
+  const char *name, *zero, *example;
+} list_types[] = { [PW_NUMBER] = { "number", "0", "NUMBER" },      [PW_POINT] = { "point", "[0, 0]", "[X, Y]" },
+                   [PW_VECTOR] = { "vector", "[0, 0]", "[X, Y]" }, [PW_BODY] = { "body", "", "BODY" },
+                   [PW_SIGNAL] = { "signal", "0", "SIGNAL" },      [PW_CHOICE] = { "choice", "", "" } };
 
 /* A row such as "radius  number [m]  required  radius of the wheel". */
 static void list_row (pw_table *t, const char *name, const char *type, const char *given, const char *about) {
@@ -20,10 +30,9 @@ static void list_row (pw_table *t, const char *name, const char *type, const cha
 
 /* "required" or the default; the domain of a number; the alternatives of a choice. */
 static void list_given (const pw_field *f, char *text, size_t size) {
-  static const char *const zero[] = { "0", "[0, 0]", "[0, 0]", "", "0", "" };
   const char *domain = f->type == PW_NUMBER ? pw_domain_text (f->domain) : "";
-  snprintf (text, size, *domain ? "%s (%s)" : "%s", f->required || f->type == PW_BODY ? "required" : zero[f->type],
-            domain);
+  snprintf (text, size, *domain ? "%s (%s)" : "%s",
+            f->required || f->type == PW_BODY ? "required" : list_types[f->type].zero, domain);
   for (int i = 0; f->type == PW_CHOICE && f->choices[i]; i++) {
     size_t used = strlen (text);
     snprintf (text + used, size - used, "%s%s", i ? " | " : f->required ? ": " : "", f->choices[i]);
@@ -31,12 +40,11 @@ static void list_given (const pw_field *f, char *text, size_t size) {
 }
 
 static void list_fields (pw_table *t, const pw_field *fields) {
-  static const char *const types[] = { "number", "point", "vector", "body", "signal", "choice" };
   for (const pw_field *f = fields; f->name; f++) {
     char type[60], given[80], times[16] = "";
     if (pw_field_count (f) > 1) snprintf (times, sizeof times, "%d x ", f->count);
-    snprintf (type, sizeof type, "%s%s%s%s%s", times, types[f->type], f->unit ? " [" : "", f->unit ? f->unit : "",
-              f->unit ? "]" : "");
+    snprintf (type, sizeof type, "%s%s%s%s%s", times, list_types[f->type].name, f->unit ? " [" : "",
+              f->unit ? f->unit : "", f->unit ? "]" : "");
     list_given (f, given, sizeof given);
     list_row (t, f->name, type, given, f->about ? f->about : "");
   }
@@ -86,7 +94,7 @@ static int list_model (void *context, const char *name, const char *path) {
   return 0;
 }
 
-static const char list_none[] = "none found; folders named in the environment variable PINWHEEL_MODELS are searched";
+static const char list_none[] = " none found; folders named in the environment variable PINWHEEL_MODELS are searched";
 
 static int list_models (const char **name, pw_error *error) {
   int width = 0;
@@ -94,7 +102,7 @@ static int list_models (const char **name, pw_error *error) {
   puts ("Models");
   int status = pw_file_list (list_width, &width, error);
   if (status == PW_OK) status = pw_file_list (list_model, &width, error);
-  if (status == PW_OK && width == 0) printf ("  %s\n", list_none);
+  if (status == PW_OK && width == 0) printf (" %s\n", list_none);
   return status;
 }
 
@@ -136,14 +144,13 @@ static int list_methods (const char **name, pw_error *error) {
 
 /* The shortest element of the type in a text model. */
 static void list_example (const pw_kind *k) {
-  static const char *const text[] = { "NUMBER", "[X, Y]", "[X, Y]", "BODY", "SIGNAL", "" };
   printf ("    - {%s: NAME", k->name);
   for (const pw_field *f = k->fields; f->name; f++) {
     int count = pw_field_count (f);
     if (!f->required && f->type != PW_BODY) continue;
     printf (", %s: %s", f->name, count > 1 ? "[" : "");
     for (int i = 0; i < count; i++)
-      printf ("%s%s", i ? ", " : "", f->type == PW_CHOICE ? f->choices[0] : text[f->type]);
+      printf ("%s%s", i ? ", " : "", f->type == PW_CHOICE ? f->choices[0] : list_types[f->type].example);
     if (count > 1) putchar (']');
   }
   puts ("}");
@@ -214,50 +221,32 @@ static int list_signals (const char **name, pw_error *error) {
 
 /* ---- Without arguments: the names, on one screen ---- */
 
-static int list_model_name (void *context, const char *name, const char *path) {
+/* Prints a name; *column is the end of the line so far. */
+static void list_name (int *column, const char *name) {
+  if (*column + 1 + (int)strlen (name) > LIST_NAMES) *column = printf ("\n%*s", LIST_HEADING, "") - 1;
+  *column += printf (" %s", name);
+}
+
+static int list_model_name (void *column, const char *name, const char *path) {
   (void)path;
-  fprintf (context, "%s ", name);
+  list_name (column, name);
   return 0;
 }
 
-static int list_model_names (FILE *f, pw_error *error) {
-  return pw_file_list (list_model_name, f, error);
-}
-
-static int list_kind_names (FILE *f, pw_error *error) {
-  (void)error;
-  for (const pw_kind *const *k = pw_kinds; *k; k++) fprintf (f, "%s ", (*k)->name);
-  return PW_OK;
-}
-
-static int list_signal_names (FILE *f, pw_error *error) {
-  (void)error;
-  for (const pw_signal_form *s = pw_signal_forms; s->name; s++) fprintf (f, "%s ", s->name);
-  return PW_OK;
-}
-
-static int list_words (const char *heading, int (*write) (FILE *f, pw_error *error), pw_error *error) {
-  pw_stream words;
-  FILE *f = pw_stream_open (&words);
-  int status = f ? write (f, error) : PW_RESOURCE;
-  if (pw_stream_close (f, &words) != PW_OK && error->status == PW_OK)
-    status = pw_fail (error, PW_RESOURCE, "out of memory");
-  printf ("%-15s", heading);
-  if (status == PW_OK) pw_cli_wrap (words.size > 0 ? words.text : list_none, 15, 100);
-  free (words.text);
-  return status;
-}
-
 static int list_overview (pw_error *error) {
-  if (list_words ("models", list_model_names, error) != PW_OK) return error->status;
+  int column = printf ("%-*s", LIST_HEADING, "models");
+  if (pw_file_list (list_model_name, &column, error) != PW_OK) return error->status;
+  puts (column == LIST_HEADING ? list_none : "");
   for (const pw_method *const *m = pw_methods; *m; m++) {
-    printf ("%-15s%s", m == pw_methods ? "methods" : "", (*m)->name);
+    printf ("%-*s %s", LIST_HEADING, m == pw_methods ? "methods" : "", (*m)->name);
     for (const pw_stabilisation *s = (*m)->stabilisations; s->name; s++) printf (" +%s", s->name);
     putchar ('\n');
   }
-  if (list_words ("kinds", list_kind_names, error) != PW_OK) return error->status;
-  if (list_words ("signals", list_signal_names, error) != PW_OK) return error->status;
-  puts ("`pinwheel list models`, `methods`, `kinds` (element types) or `signals` describes them.");
+  column = printf ("%-*s", LIST_HEADING, "kinds");
+  for (const pw_kind *const *k = pw_kinds; *k; k++) list_name (&column, (*k)->name);
+  column = printf ("\n%-*s", LIST_HEADING, "signals") - 1;
+  for (const pw_signal_form *s = pw_signal_forms; s->name; s++) list_name (&column, s->name);
+  puts ("\n`pinwheel list models`, `methods`, `kinds` (element types) or `signals` describes them.");
   return PW_OK;
 }
 

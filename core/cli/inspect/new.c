@@ -41,10 +41,9 @@ static int new_write (const char *path, pw_error *error) {
   if (f == NULL && errno == EEXIST) return pw_fail (error, PW_INPUT, "%s exists already and was not changed", path);
   if (f == NULL) return pw_fail (error, PW_RESOURCE, "cannot write %s: %s", path, strerror (errno));
   new_print (f, name, ending[1] == 'y' ? new_model_yaml : new_model_c);
-  errno = 0;
-  int bad = fflush (f) != 0 || ferror (f), why = errno;
-  if (fclose (f) != 0 && !bad) bad = 1, why = errno;
-  if (bad) {
+  int why = fflush (f) != 0 ? errno : 0;
+  if (fclose (f) != 0 && why == 0) why = errno;
+  if (why) {
     remove (path);
     return pw_fail (error, PW_RESOURCE, "cannot write %s: %s", path, strerror (why));
   }

@@ -158,22 +158,23 @@ static void matrices_rows (const pw_system *s, const pw_equations *k, const pw_s
   }
 }
 
-/* A few columns of J, with scratch memory for them; in a large scene only the rows that are not zero there. */
-static void matrices_panel (const pw_system *s, const pw_equations *k, int first, int columns, double *J) {
+/* A few columns of J; in a large scene only the rows that are not zero there. */
+static void matrices_panel (const pw_system *s, const pw_equations *k, int first, int columns) {
   char name[300];
-  memset (J, 0, (size_t)k->rows * MATRICES_PANEL * sizeof *J);
-  for (int i = 0; i < k->entries; i++)
-    if (k->column[i] >= first && k->column[i] < first + columns)
-      J[k->row[i] * MATRICES_PANEL + k->column[i] - first] = k->value[i] + 0; /* not -0 */
   putchar ('\n');
   for (pw_table t = { 0 }; pw_table_pass (&t);) {
     pw_cell (&t, -22, "J");
     for (int c = 0; c < columns; c++) pw_cell (&t, 13, pw_system_state_name (s, first + c, name, sizeof name));
     pw_row_end (&t);
-    for (int i = 0; i < k->rows; i++) {
-      const double *row = J + (size_t)i * MATRICES_PANEL;
+    for (int i = 0, e = 0; i < k->rows; i++) {
+      double row[MATRICES_PANEL] = { 0 };
       int used = k->coordinates <= 2 * MATRICES_PANEL;
-      for (int c = 0; c < columns; c++) used |= row[c] != 0;
+      for (; e < k->entries && k->row[e] == i; e++) {
+        int c = k->column[e] - first;
+        if (c < 0 || c >= columns) continue;
+        row[c] = k->value[e] + 0; /* not -0 */
+        used |= row[c] != 0;
+      }
       if (!used) continue;
       pw_cell (&t, -22, pw_system_reaction_name (s, i, name, sizeof name));
       for (int c = 0; c < columns; c++) pw_cell_number (&t, 13, row[c], MATRICES_DIGITS);
@@ -182,11 +183,9 @@ static void matrices_panel (const pw_system *s, const pw_equations *k, int first
   }
 }
 
-static int matrices_print (const pw_cli_model *m, const pw_equations *k, const pw_sample *x, pw_error *error) {
+static void matrices_print (const pw_cli_model *m, const pw_equations *k, const pw_sample *x) {
   const pw_system *s = m->system;
   char t[32];
-  double *J = malloc ((size_t)k->rows * MATRICES_PANEL * sizeof *J + 1);
-  if (J == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
   printf ("%s at t = %s s\n", pw_file_name (m->file), pw_format (t, x->t, MATRICES_DIGITS));
   matrices_coordinates (s, k, x);
   if (k->rows == 0) puts ("\nThe model has no constraints: no J, no gamma");
@@ -194,18 +193,7 @@ static int matrices_print (const pw_cli_model *m, const pw_equations *k, const p
   if (k->rows > 0 && k->coordinates > 2 * MATRICES_PANEL)
     puts ("\nRows of J that are zero in the columns shown are left out");
   for (int j = 0; k->rows > 0 && j < k->coordinates; j += MATRICES_PANEL)
-    matrices_panel (s, k, j, k->coordinates - j < MATRICES_PANEL ? k->coordinates - j : MATRICES_PANEL, J);
-  free (J);
-  return PW_OK;
-}
-
-/* Everything at a sample of the run. */
-static int matrices_sample (const pw_cli_model *m, const pw_sample *x, pw_error *error) {
-  pw_equations k;
-  int status = pw_system_equations (m->system, x->t, x->q, x->v, &k, error);
-  if (status == PW_OK) status = matrices_print (m, &k, x, error);
-  pw_equations_free (&k);
-  return status;
+    matrices_panel (s, k, j, k->coordinates - j < MATRICES_PANEL ? k->coordinates - j : MATRICES_PANEL);
 }
 
 static int show_matrices (const pw_cli_model *m, double t, pw_error *error) {
@@ -214,9 +202,12 @@ static int show_matrices (const pw_cli_model *m, double t, pw_error *error) {
   pw_run *r = pw_run_open (m->system, d.method, &settings, error);
   if (r == NULL) return error->status;
   pw_sample x;
+  pw_equations k = { .rows = 0 };
   int status = t > 0 ? pw_run_advance_to (r, t, t, error) : PW_OK;
   if (status == PW_OK) status = pw_run_sample (r, t, &x, error);
-  if (status == PW_OK) status = matrices_sample (m, &x, error);
+  if (status == PW_OK) status = pw_system_equations (m->system, x.t, x.q, x.v, &k, error);
+  if (status == PW_OK) matrices_print (m, &k, &x);
+  pw_equations_free (&k);
   pw_run_close (r);
   return status;
 }

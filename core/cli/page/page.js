@@ -53,11 +53,14 @@ class Engine {
    * reason of a failure. */
   integrate (s, limit, samples) {
     const w = this.wasm, method = this.text(s.method);
-    this.numbers(w.parameters(s.parameters.length), s.parameters.length).set(s.parameters);
-    const at = w.initial(s.initial.length), initial = new DataView(w.memory.buffer, at); /* allocation may replace the buffer */
-    s.initial.forEach(([state, value], i) => { initial.setInt32(16 * i, state, true); initial.setFloat64(16 * i + 8, value, true); });
-    const before = performance.now(), status = w.run(method, s.step, s.rtol, s.end, limit, samples), ms = performance.now() - before;
-    w.release(method);
+    const parameters = w.allocate(8 * s.parameters.length), initial = w.allocate(16 * s.initial.length);
+    const view = new DataView(w.memory.buffer, initial); /* after the allocations, which may replace the buffer */
+    this.numbers(parameters, s.parameters.length).set(s.parameters);
+    s.initial.forEach(([state, value], i) => { view.setInt32(16 * i, state, true); view.setFloat64(16 * i + 8, value, true); });
+    const before = performance.now();
+    const status = w.run(method, s.step, s.rtol, s.end, limit, samples, parameters, initial, s.initial.length);
+    const ms = performance.now() - before;
+    for (const at of [method, parameters, initial]) w.release(at);
     return { ms, reason: status === 0 ? "" : this.error() };
   }
 
@@ -66,25 +69,25 @@ class Engine {
     return Math.min(...[1, 2, 3].map(() => this.integrate(s, 8000, 0).ms));
   }
 
-  /* A run for load(), with its cost. */
+  /* A run for load(), with its computing time [ms] and statistics. */
   run (s, limit) {
     const many = this.page.parameters.find((p, i) => p.domain === "count" && s.parameters[i] > 200);
     if (many) throw new Error(many.name + " is too large for a page, which takes at most 200; use the program");
-    const { ms, reason } = this.integrate(s, limit, 1), samples = this.wasm.samples();
-    if (samples < 2) throw new Error(reason || "the run has no samples");
-    const scene = this.scene();
-    return { ...scene, ...this.arrays(samples, scene), model: this.page.name, about: this.page.about, method: s.method, reason, cost: this.cost(ms) };
+    const { ms, reason } = this.integrate(s, limit, 1), scene = this.scene();
+    if (!scene || scene.samples < 2) throw new Error(reason || "the run has no samples");
+    return { ...scene, ...this.arrays(scene), model: this.page.name, about: this.page.about, method: s.method, reason, ms };
   }
 
+  /* Shapes, number and width of samples, and statistics of the last run; null without one. */
   scene () {
-    const at = this.wasm.scene(), text = this.read(at);
+    const at = this.wasm.scene(), scene = at ? JSON.parse(this.read(at)) : null;
     this.wasm.release(at);
-    return JSON.parse("{" + text.replace(/,\s*$/, "") + "}");
+    return scene;
   }
 
   /* The columns of the samples: t, energies; x, y, phi and velocities of bodies; contacts of wheels; forces of links. */
-  arrays (samples, scene) {
-    const width = this.wasm.width(), data = this.numbers(this.wasm.data(), samples * width);
+  arrays (scene) {
+    const { samples, width } = scene, data = this.numbers(this.wasm.data(), samples * width);
     let from = 7;
     const columns = (first, count) => {
       const part = new Float64Array(samples * count);
@@ -94,11 +97,6 @@ class Engine {
     const next = count => { from += count; return columns(from - count, count); };
     return { t: columns(0, 1), energy: columns(1, 6), motion: next(6 * scene.bodies.length),
       contact: next(3 * scene.wheels.length), force: next(2 * scene.links.length) };
-  }
-
-  cost (ms) {
-    const [end, steps, rejected, evaluations, g, jv, energy] = this.numbers(this.wasm.result(), 7);
-    return { ms, end, steps, rejected, evaluations, g, jv, energy };
   }
 }
 
@@ -259,8 +257,8 @@ function estimate (result) {
     const exact = engine.run({ ...engineSettings(settings), method: "erk8+projection", rtol: 1e-13 }, 8000);
     if (exact.reason) return;
     const error = difference(result, exact);
-    result.cost.ms = Math.max(engine.time(engineSettings(settings)), 0.01);
-    runs.push({ method: result.method, ms: result.cost.ms, error: Math.max(error, 1e-16) });
+    result.ms = Math.max(engine.time(engineSettings(settings)), 0.01);
+    runs.push({ method: result.method, ms: result.ms, error: Math.max(error, 1e-16) });
     showCost(result, error);
     document.documentElement.dataset.estimated = error;
   } catch (error) {
@@ -276,15 +274,15 @@ function rows (id, list) {
   }));
 }
 /* Two digits. */
-function rounded (x) { return isFinite(x) ? number(x, Math.abs(x) / 10) : "unknown"; }
+function rounded (x) { return Number.isFinite(x) ? number(x, Math.abs(x) / 10) : "unknown"; }
 
 function showCost (result, error) {
-  const c = result.cost;
+  const c = result;
   rows("page-results", [["error at the end [m, rad]", error === null ? "\u2026" : rounded(error)],
     ["computing time", (c.ms < 10 ? c.ms.toFixed(2) : c.ms.toFixed(0)) + " ms"], ["steps (rejected)", c.steps + " (" + c.rejected + ")"],
     ["evaluations of accelerations", String(c.evaluations)], ["largest position residual |g|", rounded(c.g)],
     ["largest velocity residual |J v|", rounded(c.jv)],
-    ["relative energy defect", rounded(c.energy)]]);
+    ["relative energy defect", rounded(c.energy_defect)]]);
   plotRuns();
 }
 
@@ -352,14 +350,6 @@ function readLink () {
   settings.end = number("t_end", page.t_end, 0);
   page.parameters.forEach((p, i) => { settings.parameters[i] = number(p.name, p.value); });
   page.states.forEach((state, i) => { const x = number("start." + state.name, null); if (x !== null) settings.initial.set(i, x); });
-}
-
-function save (name, blob) {
-  const a = document.createElement("a");
-  a.href = URL.createObjectURL(blob);
-  a.download = name;
-  a.click();
-  URL.revokeObjectURL(a.href);
 }
 
 function table () {

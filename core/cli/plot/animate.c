@@ -1,5 +1,4 @@
 /* The page of an animation: animate.html, in which the run is a JavaScript object of names, shapes and flat arrays. */
-#include <math.h>
 #include <string.h>
 #include <strings.h>
 #include "plot.h"
@@ -10,178 +9,164 @@ static const char *const page_lines[] = {
   NULL
 };
 
-/* ---- JavaScript literals ---- */
-
-/* Writes `before`, then a text in quotes, safe inside a script element. */
-static void page_text (FILE *f, const char *before, const char *text) {
-  fprintf (f, "%s\"", before);
-  for (; *text; text++) {
-    unsigned char c = (unsigned char)*text;
-    if (c < 32 || c == '"' || c == '\\' || c == '<' || c == '>' || c == '&')
-      fprintf (f, "\\u%04x", c);
-    else
-      fputc (c, f);
-  }
-  fputc ('"', f);
+static void page_numbers (pw_json *j, const char *key, const double *x, int count) {
+  pw_json_open (j, key, '[');
+  for (int i = 0; i < count; i++) pw_json_number (j, NULL, x[i]);
+  pw_json_close (j, ']');
 }
 
-static void page_numbers (FILE *f, const double *x, int count, int digits) {
-  char text[32];
-  for (int i = 0; i < count; i++)
-    fprintf (f, "%s%s", i ? "," : "", isfinite (x[i]) ? pw_format (text, x[i], digits) : "NaN");
-}
-
-/* Writes points of the ground or of a body; with a shape only those inside it. */
-static void page_points (FILE *f, const char *before, const double *at, int count, const pw_plot_body *shape) {
-  fprintf (f, "%s[", before);
-  for (int k = 0, n = 0; k < count; k++) {
-    if (shape && !pw_plot_inside (shape, k)) continue;
-    fputs (n++ ? ",[" : "[", f);
-    page_numbers (f, at + 2 * k, 2, 9);
-    fputc (']', f);
-  }
-  fputc (']', f);
+/* Points of the ground or of a body; with a shape only those inside it. */
+static void page_points (pw_json *j, const char *key, const double *at, int count, const pw_plot_body *shape) {
+  pw_json_open (j, key, '[');
+  for (int k = 0; k < count; k++)
+    if (shape == NULL || pw_plot_inside (shape, k)) page_numbers (j, NULL, at + 2 * k, 2);
+  pw_json_close (j, ']');
 }
 
 /* ---- Shapes ---- */
 
-static void page_bodies (FILE *f, const pw_plots *p) {
-  fputs ("\"bodies\":[", f);
+static void page_bodies (pw_json *j, const pw_plots *p) {
+  pw_json_open (j, "bodies", '[');
   for (int b = 0; b < p->bodies.shown; b++) {
     const pw_plot_body *shape = &p->shape[b];
-    page_text (f, b ? ",\n{\"name\":" : "\n{\"name\":", pw_plot_name (p, &p->bodies, b));
-    page_points (f, ",\"at\":", *shape->at, shape->count, NULL);
-    page_points (f, ",\"spokes\":", *shape->at, shape->count, shape);
-    page_points (f, ",\"outline\":", *shape->corner, shape->corners, NULL);
-    fputc ('}', f);
+    pw_json_open (j, NULL, '{');
+    pw_json_text (j, "name", pw_plot_name (p, &p->bodies, b));
+    page_points (j, "at", *shape->at, shape->count, NULL);
+    page_points (j, "spokes", *shape->at, shape->count, shape);
+    page_points (j, "outline", *shape->corner, shape->corners, NULL);
+    pw_json_close (j, '}');
   }
-  page_points (f, "],\n\"ground\":", *p->ground, p->grounds, NULL);
-  fputs (",\n\"wheels\":[", f);
+  pw_json_close (j, ']');
+  page_points (j, "ground", *p->ground, p->grounds, NULL);
+}
+
+static void page_wheels (pw_json *j, const pw_plots *p) {
+  pw_json_open (j, "wheels", '[');
   for (int w = 0; w < p->wheels.shown; w++) {
-    int body = pw_plot_shown (p, pw_system_element (p->s, p->wheels.index[w]).body[0]);
-    page_text (f, w ? ",\n{\"name\":" : "\n{\"name\":", pw_plot_name (p, &p->wheels, w));
-    fprintf (f, ",\"body\":%d,\"rolls\":%d}", body, pw_plot_rolls (p, w));
+    pw_json_open (j, NULL, '{');
+    pw_json_text (j, "name", pw_plot_name (p, &p->wheels, w));
+    pw_json_number (j, "body", p->shown[pw_system_element (p->s, p->wheels.index[w]).body[0]]);
+    pw_json_flag (j, "rolls", pw_plot_rolls (p, w));
+    pw_json_close (j, '}');
   }
-  fputs ("],\n", f);
+  pw_json_close (j, ']');
 }
 
-/* A stroke of a symbol: 1 if it is closed + 2 if it is upright, then its vertices. */
-static void page_stroke (void *context, const pw_plot_stroke *s) {
-  FILE *f = context;
-  fprintf (f, "[%d", s->closed + 2 * s->upright);
-  for (int k = 0; k < s->count; k++) {
-    fputs (",[", f);
-    page_numbers (f, s->at[k], 4, 5);
-    fputc (']', f);
+/* The strokes of a symbol: 1 if it is closed + 2 if it is upright, then its vertices. */
+static void page_strokes (pw_json *j, const pw_plots *p, const pw_plot_link *link) {
+  pw_plot_stroke stroke[PLOT_STROKES];
+  int strokes = pw_plot_strokes (p, link, p->samples, stroke);
+  pw_json_open (j, "strokes", '[');
+  for (const pw_plot_stroke *s = stroke; s < stroke + strokes; s++) {
+    pw_json_open (j, NULL, '[');
+    pw_json_number (j, NULL, s->closed + 2 * s->upright);
+    for (int k = 0; k < s->count; k++) page_numbers (j, NULL, s->at[k], 4);
+    pw_json_close (j, ']');
   }
-  fputs ("],", f);
+  pw_json_close (j, ']');
 }
 
-static void page_symbol (FILE *f, const pw_plots *p, const pw_plot_link *link) {
-  double heading = pw_plot_heading (link);
-  fprintf (f, ",\"contact\":%d,\"line\":%d,\"heading\":", link->contact, pw_plot_has_rail (link));
-  page_numbers (f, &heading, 1, 9);
-  fputs (",\"strokes\":[", f);
-  if (link->kind->symbol) pw_plot_strokes (p, 0, link, p->samples, page_stroke, f);
-  fputs ("0]", f);
-}
-
-static void page_links (FILE *f, const pw_plots *p) {
-  fputs ("\"links\":[", f);
-  for (int i = 0; i < p->links; i++) {
-    const pw_plot_link *link = &p->link[i];
-    const pw_element_info e = pw_system_element (p->s, link->element);
-    page_text (f, i ? ",\n{\"name\":" : "\n{\"name\":", e.name);
-    fprintf (f, ",\"force\":%d,\"ends\":[", link->force);
+static void page_links (pw_json *j, const pw_plots *p) {
+  pw_json_open (j, "links", '[');
+  for (const pw_plot_link *link = p->link; link < p->link + p->links; link++) {
+    pw_json_open (j, NULL, '{');
+    pw_json_text (j, "name", pw_system_element (p->s, link->element).name);
+    pw_json_number (j, "force", link->force);
+    pw_json_open (j, "ends", '[');
     for (int n = 0; n < link->ends; n++) {
-      fprintf (f, "%s{\"body\":%d,\"at\":[", n ? "," : "", link->end[n].body);
-      page_numbers (f, link->end[n].at, 2, 9);
-      fputs ("]}", f);
+      pw_json_open (j, NULL, '{');
+      pw_json_number (j, "body", link->end[n].body);
+      page_numbers (j, "at", link->end[n].at, 2);
+      pw_json_close (j, '}');
     }
-    fputc (']', f);
-    page_symbol (f, p, link);
-    fputc ('}', f);
+    pw_json_close (j, ']');
+    pw_json_number (j, "contact", link->contact);
+    pw_json_flag (j, "line", link->rail);
+    pw_json_number (j, "heading", pw_plot_heading (link));
+    page_strokes (j, p, link);
+    pw_json_close (j, '}');
   }
-  fputs ("],\n", f);
+  pw_json_close (j, ']');
 }
 
-/* ---- Numbers: `count` of each sample from `offset` on, sample by sample ---- */
+void pw_animation_scene (pw_json *j, const pw_plots *p) {
+  j->digits = 9;
+  pw_json_number (j, "size", p->size);
+  pw_json_number (j, "symbol", p->unit);
+  page_bodies (j, p);
+  page_wheels (j, p);
+  page_links (j, p);
+}
 
-static void page_array (FILE *f, const pw_plots *p, const char *key, int offset, int count, int digits) {
+/* ---- The run ---- */
+
+/* `count` numbers of each sample from `offset` on, sample by sample. */
+static void page_samples (pw_json *j, const pw_plots *p, const char *key, int offset, int count, int digits) {
   if (count == 0) return;
-  fprintf (f, "%s:[", key);
+  j->digits = digits;
+  pw_json_open (j, key, '[');
   for (int i = 0; i < p->samples; i++) {
-    fputs (i ? ",\n" : "\n", f);
-    page_numbers (f, pw_plot_sample (p, i) + offset, count, digits);
+    j->line = 1;
+    for (int k = 0; k < count; k++) pw_json_number (j, NULL, pw_plot_sample (p, i)[offset + k]);
   }
-  fputs ("],\n", f);
+  pw_json_close (j, ']');
 }
 
-void pw_animation_scene (FILE *f, const pw_plots *p) {
-  const double size = pw_plot_size (p), symbol = pw_plot_unit (p);
-  fputs ("\"size\":", f);
-  page_numbers (f, &size, 1, 9);
-  fputs (",\"symbol\":", f);
-  page_numbers (f, &symbol, 1, 9);
-  fputs (",\n", f);
-  page_bodies (f, p);
-  page_links (f, p);
-}
-
-/* The parameters of a model with their values, units and meanings. */
-static void page_parameters (FILE *f, const pw_model *m) {
-  const pw_parameter *list = pw_model_table (m)->parameters;
-  fputs (",\nparameters:[", f);
-  for (const pw_parameter *p = list; p && p->name; p++) {
-    const double value = pw_model_parameter (m, p);
-    page_text (f, p == list ? "{name:" : ",\n{name:", p->name);
-    page_text (f, ",unit:", p->unit ? p->unit : "");
-    page_text (f, ",about:", p->about ? p->about : "");
-    fputs (",value:", f);
-    page_numbers (f, &value, 1, 12);
-    fputc ('}', f);
+void pw_animation_parameters (pw_json *j, const pw_model *m) {
+  static const char *const domain[] = { "real", "nonnegative", "positive", "count", "fraction" };
+  pw_json_open (j, "parameters", '[');
+  for (const pw_parameter *p = pw_model_table (m)->parameters; p && p->name; p++) {
+    pw_json_open (j, NULL, '{');
+    pw_json_text (j, "name", p->name);
+    pw_json_text (j, "unit", p->unit);
+    pw_json_text (j, "about", p->about);
+    pw_json_text (j, "domain", domain[p->domain]);
+    pw_json_number (j, "value", pw_model_parameter (m, p));
+    pw_json_close (j, '}');
   }
-  fputc (']', f);
+  pw_json_close (j, ']');
 }
 
 void pw_animation_run (FILE *f, const pw_plots *p, const char *method, const char *reason) {
+  pw_json j = { .f = f, .lines = 2 };
   int wheels = 3 * p->wheels.shown;
-  page_text (f, "{\nmodel:", p->model);
-  page_text (f, ",\nabout:", p->about ? p->about : "");
-  page_parameters (f, p->description);
-  page_text (f, ",\nmethod:", method);
-  page_text (f, ",\nreason:", reason);
-  fputs (",\n", f);
-  pw_animation_scene (f, p);
-  page_array (f, p, "t", PLOT_T, 1, 10);
-  page_array (f, p, "motion", p->bodies.offset, 6 * p->bodies.shown, 9);
-  page_array (f, p, "contact", p->wheels.offset, wheels, 9);
-  if (p->with_forces) page_array (f, p, "force", p->wheels.offset + wheels, 2 * p->links, 6);
-  if (p->with_forces) page_array (f, p, "energy", PLOT_KINETIC, PLOT_FIRST - PLOT_KINETIC, 7);
-  fputs ("}", f);
+  pw_json_open (&j, NULL, '{');
+  pw_json_text (&j, "model", p->figures.model);
+  pw_json_text (&j, "about", p->figures.about);
+  pw_json_text (&j, "method", method);
+  pw_json_text (&j, "reason", reason);
+  pw_animation_parameters (&j, p->m);
+  pw_animation_scene (&j, p);
+  j.lines = 1;
+  page_samples (&j, p, "t", PLOT_T, 1, 10);
+  page_samples (&j, p, "motion", p->bodies.offset, 6 * p->bodies.shown, 9);
+  page_samples (&j, p, "contact", p->wheels.offset, wheels, 9);
+  if (p->with_forces) page_samples (&j, p, "force", p->wheels.offset + wheels, 2 * p->links, 6);
+  if (p->with_forces) page_samples (&j, p, "energy", PLOT_KINETIC, PLOT_FIRST - PLOT_KINETIC, 7);
+  pw_json_close (&j, '}');
 }
 
-void pw_animation_page (FILE *f, pw_page_insert *insert, const void *context) {
-  static const char *const mark[] = { "<!-- PANEL -->", "/* BEGIN */" };
-  for (const char *const *line = page_lines; *line; line++) {
-    int i = 0;
-    while (i < 2 && strncmp (*line, mark[i], strlen (mark[i])) != 0) i++;
-    if (i < 2)
-      insert (f, (pw_page_part)i, context);
+/* ---- The page ---- */
+
+void pw_animation_page (FILE *f, const char *const *panel, void (*begin) (FILE *f, const void *context),
+                        const void *context) {
+  static const char panel_mark[] = "<!-- PANEL -->\n", begin_mark[] = "/* BEGIN */\n";
+  for (const char *const *line = page_lines; *line; line++)
+    if (strcmp (*line, panel_mark) == 0)
+      while (*panel) fputs (*panel++, f);
+    else if (strcmp (*line, begin_mark) == 0)
+      begin (f, context);
     else
       fputs (*line, f);
-  }
 }
 
-/* The page of one run has no panel. */
 typedef struct {
   const pw_plots *p;
   const char *method, *reason;
 } pw_animation;
 
-static void page_insert (FILE *f, pw_page_part part, const void *context) {
+static void page_begin (FILE *f, const void *context) {
   const pw_animation *x = context;
-  if (part != PW_PAGE_BEGIN) return;
   fputs ("begin(", f);
   pw_animation_run (f, x->p, x->method, x->reason);
   fputs (");\n", f);
@@ -200,6 +185,6 @@ int pw_animate (const pw_plots *p, const char *path, pw_output *o, const char *m
     return 0;
   }
   const pw_animation x = { p, method, reason };
-  pw_animation_page (pw_output_stream (o), page_insert, &x);
+  pw_animation_page (pw_output_stream (o), (const char *const[]){ NULL }, page_begin, &x);
   return 1;
 }

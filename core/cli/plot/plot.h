@@ -6,7 +6,8 @@
 #ifndef PW_PLOT_H
 #define PW_PLOT_H
 
-#include "cli.h"
+#include <math.h>
+#include "figure.h"
 #include "util.h"
 
 typedef struct pw_plots pw_plots;
@@ -39,13 +40,13 @@ int pw_animate (const pw_plots *p, const char *path, pw_output *o, const char *m
 
 /* Writes the samples as a JavaScript object for begin(); energies only with forces. */
 void pw_animation_run (FILE *f, const pw_plots *p, const char *method, const char *reason);
-/* Writes what does not change in time as members of a JavaScript object: shapes, names, links. */
-void pw_animation_scene (FILE *f, const pw_plots *p);
-/* Writes animate.html; `insert` writes the parts that differ between pages: the panel of controls, and the statements
- * that call begin() with a run. */
-typedef enum { PW_PAGE_PANEL, PW_PAGE_BEGIN } pw_page_part;
-typedef void pw_page_insert (FILE *f, pw_page_part part, const void *context);
-void pw_animation_page (FILE *f, pw_page_insert *insert, const void *context);
+/* Writes members of an object that do not change in time: shapes, names, links; the parameters of a model. */
+void pw_animation_scene (pw_json *j, const pw_plots *p);
+void pw_animation_parameters (pw_json *j, const pw_model *m);
+/* Writes animate.html with the lines of a panel of controls, ended by NULL; `begin` writes the statements that call begin()
+ * with a run. */
+void pw_animation_page (FILE *f, const char *const *panel, void (*begin) (FILE *f, const void *context),
+                        const void *context);
 
 /* ---- Private to this folder ---- */
 
@@ -55,9 +56,14 @@ enum {
   PLOT_NUMBERS = 8000000, /* numbers stored, unless that is less than PLOT_FEW samples */
   PLOT_SHOWN = 1000,      /* bodies and wheels drawn at most: more cannot be distinguished */
   PLOT_VERTICES = 32,     /* of a line of a symbol, at most */
+  PLOT_HATCHES = 60,      /* lines of the hatching of the ground, at most */
+  PLOT_STROKES = 80,      /* lines of a symbol and of the ground at it, at most */
   PLOT_POINTS = 24,       /* attachment points drawn of one body, at most */
   PLOT_CURVES = 60        /* bodies or wheels with a curve, at most */
 };
+
+/* In place of a body among those drawn. */
+enum { PLOT_GROUND = -1, PLOT_HIDDEN = -2 };
 
 /* Columns of a sample: these, then x, y, phi, vx, vy, omega of each body drawn, then x, y, heading of each wheel drawn,
  * then the force of each link. */
@@ -86,12 +92,14 @@ typedef struct {
   const pw_kind *kind;
   const void *definition;
   int contact; /* its track among wheels; -1: none */
+  int rail;    /* 1 if the last body has a line: a rail or slot */
   int ends;    /* 1 or 2 */
   struct {
-    int body;     /* among those drawn, -1: the ground */
+    int body;     /* among those drawn, or PLOT_GROUND */
     double at[2]; /* [m] */
   } end[2];
-  int force, column; /* end, and the first column of its body; -1: at a joint of other elements, without its force */
+  int force;  /* an end on a body; -1: at a joint of other elements, without its force */
+  int offset; /* of that force among those of all elements */
 } pw_plot_link;
 
 /* A line of a symbol: vertices a, x, y, b; the point p1 + a (p2 - p1) + b times that turned to the left + u (x e + y n).
@@ -101,23 +109,21 @@ typedef struct {
   double at[PLOT_VERTICES][4];
 } pw_plot_stroke;
 
-/* Receives a line in the inertial frame [m]. */
-typedef void pw_plot_line_function (void *context, double (*at)[2], int count, int closed);
-
 struct pw_plots {
-  const char *folder, *model, *about;
-  const pw_model *description;
-  double figure_width; /* [mm]; 0: the default */
-  int by_time;         /* 1: colours show the time, 0: the bodies */
-  int lock;            /* of the folder; -1: none */
+  pw_figures figures; /* their folder is NULL without figures */
+  int by_time;        /* 1: colours show the time, 0: the bodies */
+  int lock;           /* of the folder; -1: none */
+  const pw_model *m;
   const pw_system *s;
   pw_workspace *workspace; /* for contact points and forces */
   double t_end;
   int samples, wanted; /* taken so far; planned */
   int width;           /* numbers per sample */
+  double size, unit;   /* largest dimension of the initial configuration; unit of symbols [m] */
   pw_tracks bodies, wheels;
   int links, grounds;   /* elements with points; points of the ground */
   int with_forces;      /* 1: the forces of links are kept */
+  int *shown;           /* of each body: its index among those drawn or PLOT_HIDDEN; PLOT_GROUND at the end */
   pw_plot_body *shape;  /* bodies */
   double (*ground)[2];  /* grounds [m] */
   double *data;         /* wanted x width */
@@ -143,36 +149,34 @@ static inline int pw_plot_pick (int i, int shown, int all) {
 const char *pw_plot_name (const pw_plots *p, const pw_tracks *t, int k);
 /* 1 for a wheel, 0 for a marker. */
 int pw_plot_rolls (const pw_plots *p, int wheel);
-/* Largest dimension of the initial configuration [m]. */
-double pw_plot_size (const pw_plots *p);
 
-/* Finds the attachment points of bodies and of the ground, from the points of elements' definitions. */
-int pw_plot_find_shapes (pw_plots *p, const pw_model *m, pw_error *error);
+/* Finds the attachment points of bodies and of the ground, and the links, up to the available number: elements with points
+ * on the bodies drawn, and at joints of these. */
+void pw_plot_find_shapes (pw_plots *p);
 /* 1 if attachment point k is not a corner of the outline. */
 int pw_plot_inside (const pw_plot_body *shape, int k);
-/* The index of a body among those drawn; -1: the ground, -2: not drawn. */
-int pw_plot_shown (const pw_plots *p, int body);
-/* Finds elements with points on the bodies drawn, and at joints of these, up to the available number. */
-void pw_plot_find_links (pw_plots *p, const pw_model *m);
-/* 1 if the last body has a line: a rail or slot. */
-int pw_plot_has_rail (const pw_plot_link *link);
-/* The diagonal of the smallest rectangle around the first n samples and, unless `most` is given, the ground [m]; *n becomes
- * the number of samples for which it is less than `most`. */
-double pw_plot_diagonal (const pw_plots *p, int *n, double most);
-/* The unit of symbols [m]. */
-double pw_plot_unit (const pw_plots *p);
+/* A rectangle [m]; begin with PLOT_EMPTY, or with one around the points of the ground. */
+typedef struct {
+  double x0, x1, y0, y1;
+} pw_plot_box;
+#define PLOT_EMPTY ((pw_plot_box){ INFINITY, -INFINITY, INFINITY, -INFINITY })
+pw_plot_box pw_plot_ground (const pw_plots *p);
+/* Extends it by all attachment points, centres of mass and wheels of sample i; returns its diagonal. */
+double pw_plot_extend (pw_plot_box *box, const pw_plots *p, int i);
+/* Sets size and unit from the first sample. */
+void pw_plot_measure (pw_plots *p);
 /* A point of a body in the inertial frame [m]; motion: x, y, phi. */
 void pw_plot_point (const double *motion, const double *at, double out[2]);
+/* End n of a link at sample i, in the inertial frame [m]. */
+void pw_plot_end (const pw_plots *p, int i, const pw_plot_link *link, int n, double out[2]);
 
-/* Passes the strokes of a symbol and of the ground at it, rails as long as the travel during the first `samples`. */
-typedef void pw_plot_stroke_function (void *context, const pw_plot_stroke *s);
-void pw_plot_strokes (const pw_plots *p, int i, const pw_plot_link *link, int samples, pw_plot_stroke_function *out,
-                      void *context);
+/* Writes the strokes of a symbol, if there is one, and of the ground at it, rails as long as the travel during the first
+ * `samples`; returns their number. */
+int pw_plot_strokes (const pw_plots *p, const pw_plot_link *link, int samples, pw_plot_stroke stroke[PLOT_STROKES]);
+/* The vertices of a stroke at sample i, in the inertial frame [m]. */
+void pw_plot_place (const pw_plots *p, int i, const pw_plot_link *link, const pw_plot_stroke *s, double (*at)[2]);
 /* The field `heading` of an element [rad]; 0 if it has none. */
 double pw_plot_heading (const pw_plot_link *link);
-/* Passes the lines of a symbol at sample i, rails as long as the travel during the first `samples`. */
-void pw_plot_draw_symbol (const pw_plots *p, int i, const pw_plot_link *link, int samples, pw_plot_line_function *out,
-                          void *context);
 /* Forces of these elements [N], x and y each. */
 void pw_plot_forces (const pw_plots *p, const pw_sample *sample, double *out);
 

@@ -1,18 +1,14 @@
 /* The figures of a run: data files, plain columns with a comment line of names and units at the top, and scripts. */
 #include <math.h>
 #include <string.h>
-#include "figure.h"
 #include "plot.h"
 
 enum {
-  PLOT_NAMED = 12,
-  PLOT_COLOURS = 8,
-  PLOT_IMAGES = 60,
-  PLOT_FEWEST = 8
-}; /* curves with a name each; snapshots at most, and least */
-
-/* Blocks of the mechanism's data. */
-enum { PLOT_BODIES, PLOT_WHEELS, PLOT_CENTRES, PLOT_RODS, PLOT_BLOCKS };
+  PLOT_NAMED = 12,  /* curves with a name each, at most */
+  PLOT_COLOURS = 8, /* of bodies */
+  PLOT_IMAGES = 60, /* snapshots, at most */
+  PLOT_FEWEST = 8   /* snapshots, at least */
+};
 
 /* Numbers separated by spaces, then an end. */
 static void data_row (FILE *f, const double *value, int count, const char *end) {
@@ -31,19 +27,21 @@ static int data_extended (const pw_plots *p) {
 /* Number of initial samples shown in a separate panel, if the mechanism travels so far that it is small in a figure of
  * the whole run: those that fit a figure a few times its size; 0: none.  A single point has no size. */
 static int data_closeup (const pw_plots *p) {
-  int all = p->samples, n = p->samples;
-  double size = pw_plot_size (p);
+  pw_plot_box all = pw_plot_ground (p), few = PLOT_EMPTY;
+  double diagonal = 0;
+  int n = 0;
   if (!data_extended (p)) return 0;
-  if (pw_plot_diagonal (p, &all, INFINITY) < 10 * size) return 0;
-  pw_plot_diagonal (p, &n, 4 * size);
+  for (int i = 0; i < p->samples; i++) diagonal = pw_plot_extend (&all, p, i);
+  if (diagonal < 10 * p->size) return 0;
+  while (n < p->samples && pw_plot_extend (&few, p, n) <= 4 * p->size) n++;
   return n < 12 ? 0 : n;
 }
 
 /* ---- Files ---- */
 
 /* One block per curve: time, the numbers of the body or wheel, its number in the model. */
-static int data_tracks (const pw_plots *p, const pw_figures *f, const pw_tracks *t, pw_error *error) {
-  pw_output *o = t->curves ? pw_figure_data (f, t->file, error) : NULL;
+static int data_tracks (const pw_plots *p, const pw_tracks *t, pw_error *error) {
+  pw_output *o = t->curves ? pw_figure_data (&p->figures, t->file, error) : NULL;
   if (o == NULL) return t->curves ? PW_RESOURCE : PW_OK;
   FILE *out = pw_output_stream (o);
   for (int c = 0; c < t->curves; c++) {
@@ -59,9 +57,9 @@ static int data_tracks (const pw_plots *p, const pw_figures *f, const pw_tracks 
 }
 
 /* The first numbers of equal rows. */
-static int data_table (const pw_figures *f, const char *name, const char *heading, const double *row, int width,
+static int data_table (const pw_plots *p, const char *name, const char *heading, const double *row, int width,
                        int count, int rows, pw_error *error) {
-  pw_output *o = rows ? pw_figure_data (f, name, error) : NULL;
+  pw_output *o = rows ? pw_figure_data (&p->figures, name, error) : NULL;
   if (o == NULL) return rows ? PW_RESOURCE : PW_OK;
   fprintf (pw_output_stream (o), "# %s\n", heading);
   for (int i = 0; i < rows; i++, row += width) data_row (pw_output_stream (o), row, count, "\n");
@@ -74,26 +72,74 @@ static void data_vertex (FILE *f, const double *at, double t, int body, const ch
   data_row (f, (const double[]){ at[0], at[1], t, body + 1 }, 4, end);
 }
 
-/* A body: its outline, and lines from the centre of mass to the attachment points inside, which without an outline are
- * all. */
-static void data_body (FILE *f, const pw_plot_body *shape, const double *motion, double t, int body) {
-  double point[2];
-  for (int k = 0; k <= shape->corners && shape->corners; k++) {
-    pw_plot_point (motion, shape->corner[k % shape->corners], point);
-    data_vertex (f, point, t, body, k < shape->corners ? "\n" : "\n\n");
-  }
-  for (int k = 0; k < shape->count; k++) {
-    if (!pw_plot_inside (shape, k)) continue;
-    pw_plot_point (motion, shape->at[k], point);
-    data_vertex (f, motion, t, body, "\n");
-    data_vertex (f, point, t, body, "\n\n");
+static void data_segment (FILE *f, const double *from, const double *to, double t, int body) {
+  data_vertex (f, from, t, body, "\n");
+  data_vertex (f, to, t, body, "\n\n");
+}
+
+/* Bodies of sample i: their outlines, and lines from the centre of mass to the attachment points inside, which without an
+ * outline are all. */
+static void data_bodies (FILE *f, const pw_plots *p, int i) {
+  double t = pw_plot_sample (p, i)[PLOT_T], point[2];
+  for (int b = 0; b < p->bodies.shown; b++) {
+    const pw_plot_body *shape = &p->shape[b];
+    const double *motion = pw_plot_track (p, i, &p->bodies, b);
+    for (int k = 0; k <= shape->corners && shape->corners; k++) {
+      pw_plot_point (motion, shape->corner[k % shape->corners], point);
+      data_vertex (f, point, t, b, k < shape->corners ? "\n" : "\n\n");
+    }
+    for (int k = 0; k < shape->count; k++) {
+      if (!pw_plot_inside (shape, k)) continue;
+      pw_plot_point (motion, shape->at[k], point);
+      data_segment (f, motion, point, t, b);
+    }
   }
 }
 
-static void data_wheel (FILE *f, const double *contact, double half, double t, int body) {
-  double c = half * cos (contact[2]), s = half * sin (contact[2]);
-  data_vertex (f, (const double[]){ contact[0] - c, contact[1] - s }, t, body, "\n");
-  data_vertex (f, (const double[]){ contact[0] + c, contact[1] + s }, t, body, "\n\n");
+/* Wheels of sample i: lines along their headings. */
+static void data_wheels (FILE *f, const pw_plots *p, int i) {
+  for (int w = 0; w < p->wheels.shown; w++) {
+    if (!pw_plot_rolls (p, w)) continue;
+    const double *contact = pw_plot_track (p, i, &p->wheels, w), half = 1.6 * p->unit;
+    const double from[] = { -half, 0 }, to[] = { half, 0 };
+    double end[2][2];
+    pw_plot_point (contact, from, end[0]);
+    pw_plot_point (contact, to, end[1]);
+    data_segment (f, end[0], end[1], pw_plot_sample (p, i)[PLOT_T],
+                  p->shown[pw_system_element (p->s, p->wheels.index[w]).body[0]]);
+  }
+}
+
+/* Bodies of sample i that are points. */
+static void data_centres (FILE *f, const pw_plots *p, int i) {
+  for (int b = 0; b < p->bodies.shown; b++)
+    if (p->shape[b].count == 0 || p->shape[b].point)
+      data_vertex (f, pw_plot_track (p, i, &p->bodies, b), pw_plot_sample (p, i)[PLOT_T], b, "\n");
+}
+
+/* Massless straight elements such as rods at sample i: their symbols begin at one end and end at the other. */
+static void data_rods (FILE *f, const pw_plots *p, int i) {
+  double end[2][2];
+  for (const pw_plot_link *l = p->link; l < p->link + p->links; l++) {
+    if (l->ends != 2 || l->kind->level != PW_HOLONOMIC || !l->kind->symbol ||
+        strncmp (l->kind->symbol, "0 0 0 1 0 0", 11) != 0)
+      continue;
+    for (int n = 0; n < 2; n++) pw_plot_end (p, i, l, n, end[n]);
+    data_segment (f, end[0], end[1], pw_plot_sample (p, i)[PLOT_T], -1);
+  }
+}
+
+/* The open, or the closed lines of a symbol at the last of n samples. */
+static void data_symbol (FILE *f, const pw_plots *p, const pw_plot_link *link, int n, int closed) {
+  pw_plot_stroke stroke[PLOT_STROKES];
+  double at[PLOT_VERTICES][2];
+  int strokes = pw_plot_strokes (p, link, n, stroke);
+  for (const pw_plot_stroke *s = stroke; s < stroke + strokes; s++) {
+    if (s->closed != closed) continue;
+    pw_plot_place (p, n - 1, link, s, at);
+    for (int k = 0; k < s->count; k++)
+      data_vertex (f, at[k], pw_plot_sample (p, n - 1)[PLOT_T], -1, k < s->count - 1 ? "\n" : "\n\n");
+  }
 }
 
 /* Samples from one snapshot to the next, of the first n: the body with the longest path moves by about a third of the
@@ -108,83 +154,46 @@ static int data_stride (const pw_plots *p, int n) {
     }
     longest = fmax (longest, path);
   }
-  double images = fmin (fmax (3 * longest / pw_plot_size (p), PLOT_FEWEST), PLOT_IMAGES);
-  int stride = (int)((n - 1) / images);
+  int stride = (int)((n - 1) / fmin (fmax (3 * longest / p->size, PLOT_FEWEST), PLOT_IMAGES));
   return stride < 1 ? 1 : stride;
-}
-
-/* A massless straight element such as a rod: its symbol begins at one end and ends at the other. */
-static int data_straight (const pw_plot_link *link) {
-  return link->ends == 2 && link->kind->symbol && link->kind->level == PW_HOLONOMIC &&
-         strncmp (link->kind->symbol, "0 0 0 1 0 0", 11) == 0;
-}
-
-static void data_block (FILE *f, const pw_plots *p, int i, int block) {
-  static const double origin[3] = { 0 };
-  double t = pw_plot_sample (p, i)[PLOT_T], point[2];
-  for (int w = 0; w < p->wheels.shown && block == PLOT_WHEELS; w++)
-    if (pw_plot_rolls (p, w))
-      data_wheel (f, pw_plot_track (p, i, &p->wheels, w), 1.6 * pw_plot_unit (p), t,
-                  pw_plot_shown (p, pw_system_element (p->s, p->wheels.index[w]).body[0]));
-  for (int b = 0; b < p->bodies.shown && block != PLOT_WHEELS && block != PLOT_RODS; b++) {
-    const double *motion = pw_plot_track (p, i, &p->bodies, b);
-    if (block == PLOT_BODIES)
-      data_body (f, &p->shape[b], motion, t, b);
-    else if (p->shape[b].count == 0 || p->shape[b].point)
-      data_vertex (f, motion, t, b, "\n");
-  }
-  for (const pw_plot_link *l = p->link; l < p->link + p->links && block == PLOT_RODS; l++)
-    for (int n = 0; n < 2 && data_straight (l); n++) {
-      pw_plot_point (l->end[n].body < 0 ? origin : pw_plot_track (p, i, &p->bodies, l->end[n].body), l->end[n].at,
-                     point);
-      data_vertex (f, point, t, -1, n ? "\n\n" : "\n");
-    }
-}
-
-typedef struct {
-  FILE *f;
-  double t;
-  int closed;
-} data_symbols;
-
-static void data_line (void *context, double (*at)[2], int count, int closed) {
-  const data_symbols *x = context;
-  for (int k = 0; k < count && closed == x->closed; k++)
-    data_vertex (x->f, at[k], x->t, -1, k < count - 1 ? "\n" : "\n\n");
 }
 
 /* Blocks: snapshots out of the first n samples; then the last of them, with symbols, open and closed lines.  gnuplot counts
  * blocks with data only, so each begins with a point that is not drawn. */
-static int data_mechanism (const pw_plots *p, const pw_figures *f, const char *name, int n, pw_error *error) {
-  static const char *const title[] = { "bodies", "wheels", "point masses", "rods" };
-  pw_output *o = pw_figure_data (f, name, error);
+static int data_mechanism (const pw_plots *p, const char *name, int n, pw_error *error) {
+  static const struct {
+    const char *title;
+    void (*write) (FILE *f, const pw_plots *p, int i);
+  } block[] = {
+    { "bodies", data_bodies }, { "wheels", data_wheels }, { "point masses", data_centres }, { "rods", data_rods }
+  };
+  static const char first[] = "nan nan nan nan\n\n";
+  pw_output *o = pw_figure_data (&p->figures, name, error);
   if (o == NULL) return PW_RESOURCE;
-  FILE *out = pw_output_stream (o);
+  FILE *f = pw_output_stream (o);
   int stride = data_stride (p, n);
-  for (int block = 0; block < 2 * PLOT_BLOCKS; block++) {
-    int last = block >= PLOT_BLOCKS;
-    fprintf (out, "%s# %s, %s: x [m], y [m], t [s], number of the body\nnan nan nan nan\n\n", block ? "\n\n" : "",
-             title[block % PLOT_BLOCKS], last ? "at the end" : "before");
-    for (int i = last ? n - 1 : 0; i < n - !last; i += stride) data_block (out, p, i, block % PLOT_BLOCKS);
-  }
+  for (int last = 0; last < 2; last++)
+    for (int k = 0; k < 4; k++) {
+      fprintf (f, "%s# %s, %s: x [m], y [m], t [s], number of the body\n%s", last || k ? "\n\n" : "", block[k].title,
+               last ? "at the end" : "before", first);
+      for (int i = last ? n - 1 : 0; i < n - !last; i += stride) block[k].write (f, p, i);
+    }
   for (int closed = 0; closed < 2; closed++) {
-    data_symbols x = { out, pw_plot_sample (p, n - 1)[PLOT_T], closed };
-    fprintf (out, "\n\n# symbols, %s\nnan nan nan nan\n\n", closed ? "closed" : "open");
-    for (int i = 0; i < p->links; i++)
-      if (p->link[i].kind->symbol) pw_plot_draw_symbol (p, n - 1, &p->link[i], n, data_line, &x);
+    fprintf (f, "\n\n# symbols, %s\n%s", closed ? "closed" : "open", first);
+    for (int i = 0; i < p->links; i++) data_symbol (f, p, &p->link[i], n, closed);
   }
   return pw_output_finish (o, error);
 }
 
-static int data_write (const pw_plots *p, const pw_figures *f, int closeup, pw_error *error) {
+static int data_write (const pw_plots *p, int closeup, pw_error *error) {
   static const char energy[] = "t [s], kinetic [J], potential [J], work [J], loss [J], projection [J], balance [J]";
-  int status = data_tracks (p, f, &p->bodies, error);
-  if (status == PW_OK) status = data_tracks (p, f, &p->wheels, error);
-  if (status == PW_OK) status = data_table (f, "energy.dat", energy, p->data, p->width, PLOT_FIRST, p->samples, error);
+  int status = data_tracks (p, &p->bodies, error);
+  if (status == PW_OK) status = data_tracks (p, &p->wheels, error);
+  if (status == PW_OK) status = data_table (p, "energy.dat", energy, p->data, p->width, PLOT_FIRST, p->samples, error);
   if (status == PW_OK)
-    status = data_table (f, "ground.dat", "points of the ground: x [m], y [m]", *p->ground, 2, 2, p->grounds, error);
-  if (status == PW_OK) status = data_mechanism (p, f, "mechanism.dat", p->samples, error);
-  if (status == PW_OK && closeup > 0) status = data_mechanism (p, f, "mechanism-start.dat", closeup, error);
+    status = data_table (p, "ground.dat", "points of the ground: x [m], y [m]", *p->ground, 2, 2, p->grounds, error);
+  if (status == PW_OK) status = data_mechanism (p, "mechanism.dat", p->samples, error);
+  if (status == PW_OK && closeup > 0) status = data_mechanism (p, "mechanism-start.dat", closeup, error);
   return status;
 }
 
@@ -203,48 +212,46 @@ static void figures_curves (FILE *f, const pw_plots *p, const pw_tracks *t) {
   fputs ("'\n", f);
 }
 
-static int figures_write (const pw_plots *p, const pw_figures *figures, const char *name, int closeup,
-                          pw_error *error) {
-  pw_output *o = pw_figure_begin (figures, name, error);
+/* The names of bodies unless there are too many, and the colours of those with an area. */
+static void figures_bodies (FILE *f, const pw_plots *p) {
+  int bodies = p->bodies.shown, named = bodies <= PLOT_NAMED ? bodies : 0, area[PLOT_COLOURS] = { 0 };
+  fprintf (f, "bodies = %d\narray body[%d]\n", named, bodies);
+  for (int b = 0; b < bodies; b++) area[b % PLOT_COLOURS] |= p->shape[b].corners > 0;
+  fputs ("areas = '", f);
+  for (int c = 0; c < PLOT_COLOURS; c++)
+    if (area[c]) fprintf (f, "%d ", c + 1);
+  fputs ("'\n", f);
+  for (int b = 0; b < named; b++) pw_figure_element (f, "body", b + 1, pw_plot_name (p, &p->bodies, b));
+}
+
+static int figures_write (const pw_plots *p, const char *name, int closeup, pw_error *error) {
+  int mechanism = strcmp (name, "mechanism") == 0, paths = mechanism || strcmp (name, "paths") == 0;
+  pw_output *o = pw_figure_begin (&p->figures, name, error);
   if (o == NULL) return PW_RESOURCE;
   FILE *f = pw_output_stream (o);
-  int paths = *name == 'p' || *name == 'm'; /* paths, mechanism */
   fprintf (f, "t_end = %.9g\nt_detail = %.9g\n", pw_plot_sample (p, p->samples - 1)[PLOT_T],
            closeup > 0 ? pw_plot_sample (p, closeup - 1)[PLOT_T] : 0);
   figures_curves (f, p, paths && p->wheels.shown ? &p->wheels : &p->bodies);
   fprintf (f, "ground = %d\nby_time = %d\n", p->grounds > 0, p->by_time);
-  if (*name == 'm') {
-    int named = p->bodies.shown <= PLOT_NAMED;
-    fprintf (f, "bodies = %d\narray body[%d]\n", named ? p->bodies.shown : 0, p->bodies.shown);
-    fputs ("areas = '", f); /* colours of bodies with an area */
-    for (int c = 0; c < PLOT_COLOURS; c++) {
-      int b = c;
-      while (b < p->bodies.shown && p->shape[b].corners == 0) b += PLOT_COLOURS;
-      if (b < p->bodies.shown) fprintf (f, "%d ", c + 1);
-    }
-    fputs ("'\n", f);
-    for (int b = 0; b < p->bodies.shown && named; b++)
-      pw_figure_element (f, "body", b + 1, pw_plot_name (p, &p->bodies, b));
-  }
+  if (mechanism) figures_bodies (f, p);
   return pw_figure_end (o, name, error);
 }
 
 int pw_plots_finish (pw_plots *p, int draw, pw_error *error) {
   static const char *const names[] = { "paths", "velocities", "angular", "energy", "mechanism", NULL };
-  pw_figures figures = { .folder = p->folder, .model = p->model, .about = p->about, .width = p->figure_width };
+  const char *folder = p->figures.folder;
   char t[32], end[32];
-  if (p->folder == NULL) return PW_OK;
+  if (folder == NULL) return PW_OK;
   if (p->samples < 2) {
-    pw_cli_say ("pinwheel: the run is too short for figures: none are drawn in %s\n", p->folder);
+    pw_cli_say ("pinwheel: the run is too short for figures: none are drawn in %s\n", folder);
     return PW_OK;
   }
   if (p->samples < p->wanted)
-    snprintf (figures.incomplete, sizeof figures.incomplete, ", incomplete: up to t = %s s of %s s",
+    snprintf (p->figures.incomplete, sizeof p->figures.incomplete, ", incomplete: up to t = %s s of %s s",
               pw_format (t, pw_plot_sample (p, p->samples - 1)[PLOT_T], 4), pw_format (end, p->t_end, 4));
-  int closeup = data_closeup (p), status = data_write (p, &figures, closeup, error);
+  int closeup = data_closeup (p), status = data_write (p, closeup, error);
   for (const char *const *name = names; status == PW_OK && *name; name++)
-    status = figures_write (p, &figures, *name, closeup, error);
+    status = figures_write (p, *name, closeup, error);
   if (status != PW_OK) return status;
-  return draw ? pw_figure_draw (p->folder, names, error)
-              : pw_figure_undrawn (p->folder, names, "the run was interrupted");
+  return draw ? pw_figure_draw (folder, names, error) : pw_figure_undrawn (folder, names, "the run was interrupted");
 }

@@ -4,7 +4,6 @@
 #include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
-#include "figure.h"
 
 const char *pw_plot_name (const pw_plots *p, const pw_tracks *t, int k) {
   return t == &p->bodies ? pw_system_body_name (p->s, t->index[k]) : pw_system_element (p->s, t->index[k]).name;
@@ -20,18 +19,19 @@ static int plot_least (int a, int b) {
   return a < b ? a : b;
 }
 
-static int plot_tracks (pw_plots *p, pw_tracks *t, int all) {
+/* Makes room for the numbers of tracks in a sample. */
+static void plot_tracks (pw_plots *p, pw_tracks *t, int all) {
   t->all = all;
   t->shown = plot_least (all, PLOT_SHOWN);
   t->curves = plot_least (t->shown, PLOT_CURVES);
   t->offset = p->width;
   p->width += t->numbers * t->shown;
   t->index = pw_arena_alloc (&p->arena, (size_t)t->shown * sizeof *t->index);
-  return t->index != NULL;
 }
 
-static int plot_allocate (pw_plots *p, int elements) {
-  size_t links = (size_t)plot_least (elements, PLOT_SHOWN);
+static int plot_allocate (pw_plots *p, pw_error *error) {
+  pw_model_elements (p->m, &p->links);
+  p->links = plot_least (p->links, PLOT_SHOWN);
   p->bodies = (pw_tracks){ .file = "motion.dat",
                            .columns = "t [s], x [m], y [m], phi [rad], vx [m/s], vy [m/s], omega [rad/s]",
                            .what = "body",
@@ -39,24 +39,33 @@ static int plot_allocate (pw_plots *p, int elements) {
   p->wheels = (pw_tracks){
     .file = "wheels.dat", .columns = "t [s], x [m], y [m], heading [rad]", .what = "wheel", .numbers = 3
   };
-  if (!plot_tracks (p, &p->bodies, pw_system_bodies (p->s)) || !plot_tracks (p, &p->wheels, pw_system_contacts (p->s)))
-    return 0;
-  p->links = (int)links;
+  p->width = PLOT_FIRST;
+  plot_tracks (p, &p->bodies, pw_system_bodies (p->s));
+  plot_tracks (p, &p->wheels, pw_system_contacts (p->s));
   p->width += p->with_forces ? 2 * p->links : 0;
   p->wanted = PLOT_NUMBERS / p->width;
   p->wanted = 1 + (p->wanted < PLOT_FEW ? PLOT_FEW : plot_least (p->wanted, PLOT_SAMPLES)); /* both ends */
+  p->shown = pw_arena_alloc (&p->arena, ((size_t)p->bodies.all + 1) * sizeof *p->shown);
   p->shape = pw_arena_alloc (&p->arena, (size_t)p->bodies.shown * sizeof *p->shape);
   p->ground = pw_arena_alloc (&p->arena, PLOT_SHOWN * sizeof *p->ground);
   p->data = pw_arena_alloc (&p->arena, (size_t)p->wanted * (size_t)p->width * sizeof *p->data);
   p->contact = pw_arena_alloc (&p->arena, (size_t)p->wheels.all * sizeof *p->contact);
-  p->link = pw_arena_alloc (&p->arena, links * sizeof *p->link);
+  p->link = pw_arena_alloc (&p->arena, (size_t)p->links * sizeof *p->link);
   p->forces = pw_arena_alloc (&p->arena, p->with_forces ? (size_t)pw_system_force_size (p->s) * sizeof *p->forces : 0);
-  return p->shape && p->ground && p->data && p->contact && p->link && p->forces;
+  if (p->bodies.index && p->wheels.index && p->shown && p->shape && p->ground && p->data && p->contact && p->link &&
+      p->forces)
+    return PW_OK;
+  return pw_fail (error, PW_RESOURCE, "plots: out of memory");
 }
 
 /* Bodies, and elements with a contact point, evenly chosen from all. */
 static void plot_choose (pw_plots *p) {
-  for (int i = 0; i < p->bodies.shown; i++) p->bodies.index[i] = pw_plot_pick (i, p->bodies.shown, p->bodies.all);
+  for (int b = 0; b < p->bodies.all; b++) p->shown[b] = PLOT_HIDDEN;
+  p->shown[p->bodies.all] = PLOT_GROUND;
+  for (int i = 0; i < p->bodies.shown; i++) {
+    p->bodies.index[i] = pw_plot_pick (i, p->bodies.shown, p->bodies.all);
+    p->shown[p->bodies.index[i]] = i;
+  }
   for (int e = 0, n = 0, i = 0; i < p->wheels.shown; e++)
     if (pw_system_element (p->s, e).contact >= 0 && n++ == pw_plot_pick (i, p->wheels.shown, p->wheels.all))
       p->wheels.index[i++] = e;
@@ -64,37 +73,32 @@ static void plot_choose (pw_plots *p) {
 
 /* Reports a folder that cannot be written before the run. */
 static int plot_try_folder (pw_plots *p, pw_error *error) {
-  const pw_figures f = { .folder = p->folder };
-  p->lock = pw_cli_folder (p->folder, error);
-  pw_output *probe = p->lock < 0 ? NULL : pw_figure_data (&f, "motion.dat", error);
+  p->lock = pw_cli_folder (p->figures.folder, error);
+  pw_output *probe = p->lock < 0 ? NULL : pw_figure_data (&p->figures, "motion.dat", error);
   if (probe) pw_output_discard (probe);
   return probe ? PW_OK : error->status;
 }
 
 pw_plots *pw_plots_open (const char *folder, int forces, const pw_model *m, const pw_system *s, double t_end,
                          pw_error *error) {
-  int elements;
   pw_plots *p = malloc (sizeof *p);
-  if (p)
-    *p = (pw_plots){ .folder = folder,
-                     .lock = -1,
-                     .model = pw_system_name (s),
-                     .about = pw_model_table (m)->about,
-                     .description = m,
-                     .s = s,
-                     .t_end = t_end,
-                     .width = PLOT_FIRST,
-                     .with_forces = forces };
-  pw_model_elements (m, &elements);
-  if (p == NULL || (folder && plot_try_folder (p, error) != PW_OK) || !plot_allocate (p, elements)) {
-    if (p == NULL || error->status == PW_OK) pw_fail (error, PW_RESOURCE, "plots: out of memory");
-    pw_plots_close (p);
+  if (p == NULL) {
+    pw_fail (error, PW_RESOURCE, "plots: out of memory");
     return NULL;
   }
-  plot_choose (p);
-  p->workspace = pw_workspace_new (s, error);
-  pw_plot_find_links (p, m);
-  if (p->workspace && pw_plot_find_shapes (p, m, error) == PW_OK) return p;
+  *p = (pw_plots){ .figures = { .folder = folder, .model = pw_system_name (s), .about = pw_model_table (m)->about },
+                   .lock = -1,
+                   .m = m,
+                   .s = s,
+                   .t_end = t_end,
+                   .with_forces = forces };
+  if ((folder == NULL || plot_try_folder (p, error) == PW_OK) && plot_allocate (p, error) == PW_OK)
+    p->workspace = pw_workspace_new (s, error);
+  if (p->workspace) {
+    plot_choose (p);
+    pw_plot_find_shapes (p);
+    return p;
+  }
   pw_plots_close (p);
   return NULL;
 }
@@ -103,7 +107,7 @@ int pw_plots_style (pw_plots *p, const char *width, const char *colour, pw_error
   p->by_time = colour && strcmp (colour, "time") == 0;
   if (colour && !p->by_time && strcmp (colour, "body") != 0)
     return pw_fail (error, PW_INPUT, "--colour %.40s: expected body or time", colour);
-  return pw_figure_width (width, &p->figure_width, error);
+  return pw_figure_width (width, &p->figures.width, error);
 }
 
 void pw_plots_close (pw_plots *p) {
@@ -139,6 +143,7 @@ void pw_plots_add (pw_plots *p, const pw_sample *x) {
     memcpy (motion + 3, x->v + 3 * p->bodies.index[b], 3 * sizeof *motion);
   }
   if (p->wheels.shown > 0) plot_contacts (p, x, pw_plot_track (p, i, &p->wheels, 0));
+  if (i == 0) pw_plot_measure (p);
   if (p->with_forces && p->links > 0) pw_plot_forces (p, x, pw_plot_track (p, i, &p->wheels, p->wheels.shown));
 }
 
@@ -149,4 +154,5 @@ void pw_plots_serialise (pw_plots *p, pw_archive *a) {
   if (a->failed) return;
   p->samples = samples;
   pw_archive_bytes (a, p->data, (size_t)samples * (size_t)p->width * sizeof *p->data);
+  if (samples > 0) pw_plot_measure (p);
 }

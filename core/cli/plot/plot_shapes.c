@@ -48,49 +48,22 @@ static void shapes_add_point (pw_plot_body *shape, const double *at) {
   memcpy (shape->at[shape->count++], at, 2 * sizeof *at);
 }
 
-int pw_plot_find_shapes (pw_plots *p, const pw_model *m, pw_error *error) {
-  pw_names shown;
-  int elements;
-  const pw_element *e = pw_model_elements (m, &elements);
-  if (pw_names_open (&shown, (size_t)p->bodies.shown) != PW_OK)
-    return pw_fail (error, PW_RESOURCE, "plots: out of memory");
-  for (int i = 0; i < p->bodies.shown; i++) pw_names_add (&shown, pw_system_body_name (p->s, p->bodies.index[i]), i);
-  for (const pw_element *end = e + elements; e < end; e++)
-    for (int n = 0; n < e->kind->bodies && !e->kind->each_body; n++) {
-      const double *at = pw_field_at (e->kind, e->definition, PW_POINT, n);
-      const char *body = *(const char *const *)pw_field_at (e->kind, e->definition, PW_BODY, n);
-      int b = pw_names_find (&shown, body);
-      if (at && b >= 0) shapes_add_point (&p->shape[b], at);
-      if (at && strcmp (body, "ground") == 0 && p->grounds < PLOT_SHOWN)
-        memcpy (p->ground[p->grounds++], at, 2 * sizeof *at);
-    }
-  const double *mass = pw_system_mass (p->s);
-  for (int b = 0; b < p->bodies.shown; b++) {
-    p->shape[b].point = mass[3 * p->bodies.index[b]] > 0 && mass[3 * p->bodies.index[b] + 2] == 0;
-    shapes_outline (&p->shape[b]);
+/* The points of an element on the bodies drawn and on the ground. */
+static void shapes_add_points (pw_plots *p, const pw_element *e, const int *bodies) {
+  for (int n = 0; n < e->kind->bodies; n++) {
+    const double *at = pw_field_at (e->kind, e->definition, PW_POINT, n);
+    int b = p->shown[bodies[n]];
+    if (at && b >= 0) shapes_add_point (&p->shape[b], at);
+    if (at && b == PLOT_GROUND && p->grounds < PLOT_SHOWN) memcpy (p->ground[p->grounds++], at, 2 * sizeof *at);
   }
-  pw_names_close (&shown);
-  return PW_OK;
 }
 
 /* ---- Links ---- */
 
-int pw_plot_shown (const pw_plots *p, int body) {
-  if (body >= p->bodies.all) return -1;
-  int b = (int)((long long)body * p->bodies.shown / p->bodies.all);
-  for (int near = b - 1; near <= b + 1; near++)
-    if (near >= 0 && near < p->bodies.shown && p->bodies.index[near] == body) return near;
-  return -2;
-}
-
-int pw_plot_has_rail (const pw_plot_link *link) {
-  return link->kind->symbol && strstr (link->kind->symbol, "inf");
-}
-
 /* The joint of two bodies: the end of an earlier link on the first one. */
 static int shapes_joint (const pw_plots *p, int one, int other, pw_plot_link *link) {
   for (const pw_plot_link *l = p->link; l < p->link + p->links; l++)
-    for (int n = 0; n < 2 && l->ends == 2 && !pw_plot_has_rail (l); n++)
+    for (int n = 0; n < 2 && l->ends == 2 && !l->rail; n++)
       if (l->end[n].body == one && l->end[1 - n].body == other) {
         link->end[link->ends++] = l->end[n];
         return 1;
@@ -100,9 +73,9 @@ static int shapes_joint (const pw_plots *p, int one, int other, pw_plot_link *li
 
 /* An element without points is at the joints of its bodies with the last one. */
 static int shapes_at_joints (const pw_plots *p, const pw_element *e, const int *bodies, pw_plot_link *link) {
-  int last = pw_plot_shown (p, bodies[e->kind->bodies - 1]);
+  int last = p->shown[bodies[e->kind->bodies - 1]];
   for (int n = 0; n < e->kind->bodies - 1 && link->ends < 2; n++)
-    if (!shapes_joint (p, pw_plot_shown (p, bodies[n]), last, link)) return 0;
+    if (!shapes_joint (p, p->shown[bodies[n]], last, link)) return 0;
   return e->kind->symbol && link->ends > 0;
 }
 
@@ -122,26 +95,26 @@ static int shapes_contact (const pw_plots *p, int element) {
 }
 
 /* Fills a link; 0 if the element has no place, or a body that is not shown. */
-static int shapes_fill (const pw_plots *p, const pw_element *e, int element, pw_plot_link *link) {
-  const int *bodies = pw_system_element (p->s, element).body;
+static int shapes_link (const pw_plots *p, const pw_element *e, int element, pw_plot_link *link) {
+  const pw_element_info info = pw_system_element (p->s, element);
   *link = (pw_plot_link){ .element = element,
                           .kind = e->kind,
                           .definition = e->definition,
+                          .rail = e->kind->symbol && strstr (e->kind->symbol, "inf"),
                           .force = -1,
-                          .column = -1,
                           .contact = shapes_contact (p, element) };
   for (int n = 0; n < e->kind->bodies && link->ends < 2; n++) {
     const double *at = pw_field_at (e->kind, e->definition, PW_POINT, n);
-    int body = pw_plot_shown (p, bodies[n]);
+    int body = p->shown[info.body[n]];
     if (at == NULL) continue;
-    if (body == -2) return 0;
-    if (link->force < 0 && body >= 0) link->force = link->ends, link->column = 3 * n;
+    if (body == PLOT_HIDDEN) return 0;
+    if (link->force < 0 && body >= 0) link->force = link->ends, link->offset = info.force + 3 * n;
     link->end[link->ends].body = body;
     memcpy (link->end[link->ends++].at, at, 2 * sizeof *at);
   }
   pw_plot_link joint = *link;
   joint.ends = 0;
-  if ((link->ends == 0 || shapes_omitted (e)) && shapes_at_joints (p, e, bodies, &joint)) {
+  if ((link->ends == 0 || shapes_omitted (e)) && shapes_at_joints (p, e, info.body, &joint)) {
     *link = joint;
     return 1;
   }
@@ -149,18 +122,26 @@ static int shapes_fill (const pw_plots *p, const pw_element *e, int element, pw_
 }
 
 /* The elements of a kind are in the same order in the model and in the system. */
-void pw_plot_find_links (pw_plots *p, const pw_model *m) {
-  int most = p->links, all = pw_system_elements (p->s), elements, next = 0;
-  const pw_element *e = pw_model_elements (m, &elements);
+void pw_plot_find_shapes (pw_plots *p) {
+  int most = p->links, elements, next = 0;
+  const pw_element *e = pw_model_elements (p->m, &elements);
+  const double *mass = pw_system_mass (p->s);
   const pw_kind *last = NULL;
   p->links = 0;
-  for (int i = 0; i < all && p->links < most; i++) {
-    const pw_kind *kind = pw_system_element (p->s, i).kind;
-    if (kind->each_body) continue;
-    if (kind != last) next = 0;
-    last = kind;
-    while (e[next].kind != kind) next++;
-    p->links += shapes_fill (p, &e[next++], i, &p->link[p->links]);
+  for (int i = 0; i < pw_system_elements (p->s); i++) {
+    const pw_element_info info = pw_system_element (p->s, i);
+    if (info.kind->each_body) continue;
+    if (info.kind != last) next = 0;
+    last = info.kind;
+    while (e[next].kind != last) next++;
+    shapes_add_points (p, &e[next], info.body);
+    if (p->links < most) p->links += shapes_link (p, &e[next], i, &p->link[p->links]);
+    next++;
+  }
+  for (int b = 0; b < p->bodies.shown; b++) {
+    const double *M = mass + 3 * p->bodies.index[b];
+    p->shape[b].point = M[0] > 0 && M[2] == 0;
+    shapes_outline (&p->shape[b]);
   }
 }
 
@@ -170,15 +151,10 @@ void pw_plot_forces (const pw_plots *p, const pw_sample *x, double *out) {
     if (p->link[i].force < 0)
       out[0] = out[1] = 0;
     else
-      memcpy (out, p->forces + pw_system_element (p->s, p->link[i].element).force + p->link[i].column, 2 * sizeof *out);
+      memcpy (out, p->forces + p->link[i].offset, 2 * sizeof *out);
 }
 
 /* ---- The size of what figures show ---- */
-
-/* A rectangle [m]. */
-typedef struct {
-  double x0, x1, y0, y1;
-} box;
 
 void pw_plot_point (const double *motion, const double *at, double out[2]) {
   double c = cos (motion[2]), s = sin (motion[2]);
@@ -186,13 +162,18 @@ void pw_plot_point (const double *motion, const double *at, double out[2]) {
   out[1] = motion[1] + s * at[0] + c * at[1];
 }
 
-static void box_extend (box *b, const double *point) {
+static void box_extend (pw_plot_box *b, const double *point) {
   if (!isfinite (point[0]) || !isfinite (point[1])) return;
-  *b = (box){ fmin (b->x0, point[0]), fmax (b->x1, point[0]), fmin (b->y0, point[1]), fmax (b->y1, point[1]) };
+  *b = (pw_plot_box){ fmin (b->x0, point[0]), fmax (b->x1, point[0]), fmin (b->y0, point[1]), fmax (b->y1, point[1]) };
 }
 
-/* All attachment points, centres of mass and wheels of a sample. */
-static void box_extend_sample (const pw_plots *p, int i, box *b) {
+pw_plot_box pw_plot_ground (const pw_plots *p) {
+  pw_plot_box b = PLOT_EMPTY;
+  for (int g = 0; g < p->grounds; g++) box_extend (&b, p->ground[g]);
+  return b;
+}
+
+double pw_plot_extend (pw_plot_box *b, const pw_plots *p, int i) {
   for (int k = 0; k < p->bodies.shown; k++) {
     const double *motion = pw_plot_track (p, i, &p->bodies, k);
     box_extend (b, motion);
@@ -203,30 +184,15 @@ static void box_extend_sample (const pw_plots *p, int i, box *b) {
     }
   }
   for (int w = 0; w < p->wheels.shown; w++) box_extend (b, pw_plot_track (p, i, &p->wheels, w));
+  return b->x1 >= b->x0 ? hypot (b->x1 - b->x0, b->y1 - b->y0) : 0;
 }
 
-double pw_plot_diagonal (const pw_plots *p, int *n, double most) {
-  box b = { INFINITY, -INFINITY, INFINITY, -INFINITY };
-  double diagonal = 0;
-  for (int g = 0; g < p->grounds && isinf (most); g++) box_extend (&b, p->ground[g]);
-  for (int i = 0; i < *n; i++) {
-    box_extend_sample (p, i, &b);
-    diagonal = b.x1 >= b.x0 ? hypot (b.x1 - b.x0, b.y1 - b.y0) : 0;
-    if (diagonal > most) *n = i;
-  }
-  return diagonal;
-}
-
-double pw_plot_size (const pw_plots *p) {
-  int n = 1;
-  double size = pw_plot_diagonal (p, &n, INFINITY);
-  return size > 0 ? size : pw_system_length (p->s);
-}
-
-double pw_plot_unit (const pw_plots *p) {
-  double reach = 0, size = pw_plot_size (p);
+void pw_plot_measure (pw_plots *p) {
+  pw_plot_box box = pw_plot_ground (p);
+  double reach = 0, size = pw_plot_extend (&box, p, 0);
   for (int b = 0; b < p->bodies.shown; b++)
     for (int k = 0; k < p->shape[b].count; k++)
       reach = fmax (reach, hypot (p->shape[b].at[k][0], p->shape[b].at[k][1]));
-  return 0.035 * (reach > 0 ? fmin (size, 4 * reach) : size);
+  p->size = size > 0 ? size : pw_system_length (p->s);
+  p->unit = 0.035 * (reach > 0 ? fmin (p->size, 4 * reach) : p->size);
 }

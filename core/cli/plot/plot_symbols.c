@@ -70,7 +70,7 @@ static int symbol_numbers (const char **text, double *out, int most) {
 /* The next stroke of a symbol, without vertices if its condition does not hold; 0 after the last one. */
 static int symbol_next (const pw_plot_link *link, const char **text, pw_plot_stroke *s) {
   double x[4];
-  s->count = 0;
+  s->count = s->upright = 0;
   while (isspace ((unsigned char)**text) || **text == ';') ++*text;
   if (**text == 0) return 0;
   int drawn = symbol_condition (link, text);
@@ -92,111 +92,86 @@ static int symbol_next (const pw_plot_link *link, const char **text, pw_plot_str
 /* ---- In the inertial frame ---- */
 
 typedef struct {
-  double p[2], d[2], e[2], unit, low, high; /* p1, p2 - p1, direction, unit, ends of the travel from p2 */
+  double p[2], d[2], e[2]; /* p1, p2 - p1, direction */
 } symbol_frame;
 
-static void symbol_end (const pw_plots *p, int i, const pw_plot_link *link, int n, double out[2]) {
+void pw_plot_end (const pw_plots *p, int i, const pw_plot_link *link, int n, double out[2]) {
   static const double ground[3] = { 0 };
   int body = link->end[n].body;
   pw_plot_point (body < 0 ? ground : pw_plot_track (p, i, &p->bodies, body), link->end[n].at, out);
 }
 
 static symbol_frame symbol_place (const pw_plots *p, int i, const pw_plot_link *link) {
-  symbol_frame f = { .unit = pw_plot_unit (p) };
-  int last = link->ends - 1, line = pw_plot_has_rail (link);
-  int body = link->end[line ? last : 0].body;
+  symbol_frame f;
+  int last = link->ends - 1, body = link->end[link->rail ? last : 0].body;
   double p2[2], angle = body < 0 ? 0 : pw_plot_track (p, i, &p->bodies, body)[2];
-  symbol_end (p, i, link, 0, f.p);
-  symbol_end (p, i, link, last, p2);
+  pw_plot_end (p, i, link, 0, f.p);
+  pw_plot_end (p, i, link, last, p2);
   f.d[0] = p2[0] - f.p[0], f.d[1] = p2[1] - f.p[1];
   if (link->contact >= 0)
     angle = pw_plot_track (p, i, &p->wheels, link->contact)[2];
-  else if (line)
+  else if (link->rail)
     angle += pw_plot_heading (link);
-  else if (hypot (f.d[0], f.d[1]) > 1e-9 * f.unit)
+  else if (hypot (f.d[0], f.d[1]) > 1e-9 * p->unit)
     angle = atan2 (f.d[1], f.d[0]);
   f.e[0] = cos (angle), f.e[1] = sin (angle);
   return f;
 }
 
-/* The travel of p1 along the line, from p2. */
-static symbol_frame symbol_travel (const pw_plots *p, int sample, const pw_plot_link *link, int samples) {
-  symbol_frame f = symbol_place (p, sample, link);
-  for (int i = 0; i < samples && pw_plot_has_rail (link); i++) {
-    symbol_frame g = symbol_place (p, i, link);
-    double s = -(g.d[0] * g.e[0] + g.d[1] * g.e[1]);
-    f.low = fmin (f.low, s), f.high = fmax (f.high, s);
+/* The ends of the travel of p1 along a rail and of its symbol, from p2, in units of symbols. */
+static void symbol_travel (const pw_plots *p, const pw_plot_link *link, int samples, double *low, double *high) {
+  *low = *high = 0;
+  for (int i = 0; i < samples && link->rail; i++) {
+    symbol_frame f = symbol_place (p, i, link);
+    double s = -(f.d[0] * f.e[0] + f.d[1] * f.e[1]) / p->unit;
+    *low = fmin (*low, s), *high = fmax (*high, s);
   }
-  f.low -= 2.5 * f.unit, f.high += 2.5 * f.unit;
-  return f;
+  *low -= 2.5, *high += 2.5;
 }
 
-/* Hatching of the line from x0 to x1 at height y relative to p2, on its lower side; the fourth number of a vertex, along
- * p2 - p1's normal, is 0. */
-static void symbol_hatch (double x0, double x1, double y, int upright, pw_plot_stroke_function *out, void *context) {
-  pw_plot_stroke s = { .count = 2, .upright = upright };
-  int strokes = (int)fmin (60, ceil ((x1 - x0) / 0.6));
+/* Hatching of the line from x0 to x1 at height y relative to p2, on its lower side. */
+static int symbol_hatch (double x0, double x1, double y, int upright, pw_plot_stroke *s) {
+  int strokes = (int)fmin (PLOT_HATCHES, ceil ((x1 - x0) / 0.6));
   for (int k = 0; k < strokes; k++) {
     double x = x0 + (x1 - x0) * (k + 0.5) / strokes;
-    memcpy (s.at[0], (const double[]){ 1, x + 0.25, y, 0 }, sizeof *s.at);
-    memcpy (s.at[1], (const double[]){ 1, x - 0.25, y - 0.5, 0 }, sizeof *s.at);
-    out (context, &s);
+    s[k] = (pw_plot_stroke){ 2, 0, upright, { { 1, x + 0.25, y }, { 1, x - 0.25, y - 0.5 } } };
   }
+  return strokes;
 }
 
 /* A rail on the ground, or a support of a joint on the ground. */
-static void symbol_ground (double low, double high, const pw_plot_link *link, pw_plot_stroke_function *out,
-                           void *context) {
+static int symbol_ground (double low, double high, const pw_plot_link *link, pw_plot_stroke *s) {
   static const pw_plot_stroke support = {
     6, 0, 1, { { 1, 1.1, -1.5 }, { 1, .8, -1.5 }, { 1, 0, 0 }, { 1, -.8, -1.5 }, { 1, -1.1, -1.5 }, { 1, 1.1, -1.5 } }
   };
   const double groove = -.4; /* the lower edge of a slot, as in the symbols of element types */
-  if (pw_plot_has_rail (link)) {
-    symbol_hatch (low, high, strstr (link->kind->symbol, "1 -inf -") ? groove : 0, 0, out, context);
-    return;
-  }
-  out (context, &support);
-  symbol_hatch (-1.1, 1.1, -1.5, 1, out, context);
+  if (link->rail) return symbol_hatch (low, high, strstr (link->kind->symbol, "1 -inf -") ? groove : 0, 0, s);
+  *s = support;
+  return 1 + symbol_hatch (-1.1, 1.1, -1.5, 1, s + 1);
 }
 
-void pw_plot_strokes (const pw_plots *p, int i, const pw_plot_link *link, int samples, pw_plot_stroke_function *out,
-                      void *context) {
-  const symbol_frame f = symbol_travel (p, i, link, samples);
-  const double low = f.low / f.unit, high = f.high / f.unit;
-  pw_plot_stroke s = { .upright = 0 };
-  if (link->end[link->ends - 1].body < 0 || link->end[0].body < 0) symbol_ground (low, high, link, out, context);
-  for (const char *text = link->kind->symbol; symbol_next (link, &text, &s);) {
-    for (int k = 0; k < s.count; k++)
-      if (isinf (s.at[k][1])) s.at[k][1] = s.at[k][1] > 0 ? high : low;
-    if (s.count) out (context, &s);
+int pw_plot_strokes (const pw_plots *p, const pw_plot_link *link, int samples, pw_plot_stroke stroke[PLOT_STROKES]) {
+  int ground = link->end[link->ends - 1].body < 0 || link->end[0].body < 0, n = 0;
+  double low, high;
+  if (link->kind->symbol == NULL) return 0;
+  symbol_travel (p, link, samples, &low, &high);
+  if (ground) n = symbol_ground (low, high, link, stroke);
+  for (const char *text = link->kind->symbol; n < PLOT_STROKES && symbol_next (link, &text, &stroke[n]);) {
+    pw_plot_stroke *s = &stroke[n];
+    for (int k = 0; k < s->count; k++)
+      if (isinf (s->at[k][1])) s->at[k][1] = s->at[k][1] > 0 ? high : low;
+    n += s->count > 0;
   }
+  return n;
 }
 
-/* ---- Lines ---- */
-
-typedef struct {
-  symbol_frame along, upright; /* of the element; of its support */
-  pw_plot_line_function *out;
-  void *context;
-} symbol_lines;
-
-static void symbol_line (void *context, const pw_plot_stroke *s) {
-  const symbol_lines *x = context;
-  const symbol_frame *f = s->upright ? &x->upright : &x->along;
-  double at[PLOT_VERTICES][2];
+void pw_plot_place (const pw_plots *p, int i, const pw_plot_link *link, const pw_plot_stroke *s, double (*at)[2]) {
+  symbol_frame f = symbol_place (p, i, link);
+  if (s->upright) f.e[0] = 1, f.e[1] = 0;
+  if (s->upright && link->end[0].body < 0) f.d[0] = f.d[1] = 0;
   for (int k = 0; k < s->count; k++) {
     const double *v = s->at[k];
-    at[k][0] = f->p[0] + v[0] * f->d[0] - v[3] * f->d[1] + f->unit * (v[1] * f->e[0] - v[2] * f->e[1]);
-    at[k][1] = f->p[1] + v[0] * f->d[1] + v[3] * f->d[0] + f->unit * (v[1] * f->e[1] + v[2] * f->e[0]);
+    at[k][0] = f.p[0] + v[0] * f.d[0] - v[3] * f.d[1] + p->unit * (v[1] * f.e[0] - v[2] * f.e[1]);
+    at[k][1] = f.p[1] + v[0] * f.d[1] + v[3] * f.d[0] + p->unit * (v[1] * f.e[1] + v[2] * f.e[0]);
   }
-  x->out (x->context, at, s->count, s->closed);
-}
-
-void pw_plot_draw_symbol (const pw_plots *p, int i, const pw_plot_link *link, int samples, pw_plot_line_function *out,
-                          void *context) {
-  const symbol_frame f = symbol_place (p, i, link);
-  symbol_lines x = { f, f, out, context };
-  if (link->end[0].body < 0) x.upright.d[0] = x.upright.d[1] = 0;
-  x.upright.e[0] = 1, x.upright.e[1] = 0;
-  pw_plot_strokes (p, i, link, samples, symbol_line, &x);
 }

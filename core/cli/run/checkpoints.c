@@ -63,7 +63,7 @@ static int checkpoints_head (pw_run_command *x, pw_error *error) {
   if (pw_fingerprint_run (t, PW_CHECKPOINT_MAGIC, x->m.file, pw_check_tables (0, m), x->method, &x->settings, error) !=
       PW_OK)
     return error->status;
-  if (x->engine.code) pw_fingerprint_line (t, checkpoints_engine, NULL, pw_cli_engine_name (&x->engine));
+  if (x->engine.code) pw_fingerprint_line (t, checkpoints_engine, NULL, "specialised");
   for (const pw_parameter *q = pw_model_table (m)->parameters; q && q->name; q++)
     pw_fingerprint_number (t, "parameter", q->name, pw_model_parameter (m, q));
   pw_fingerprint_initial (t, x->line.starts);

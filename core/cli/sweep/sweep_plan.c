@@ -184,7 +184,7 @@ static int plan_fingerprint (pw_plan *p, const pw_model *m, pw_error *error) {
   if (p->settings.max_steps != PW_MAX_STEPS)
     pw_fingerprint_number (&p->fingerprint, "max-steps", NULL, (double)p->settings.max_steps);
   if (isfinite (p->limit.most)) pw_fingerprint_number (&p->fingerprint, "limit", NULL, p->limit.most);
-  if (p->engine.code) pw_fingerprint_line (&p->fingerprint, "engine", NULL, pw_cli_engine_name (&p->engine));
+  if (p->engine.code) pw_fingerprint_line (&p->fingerprint, "engine", NULL, "specialised");
   plan_parameters (p, m);
   plan_grid (p);
   pw_fingerprint_number (&p->fingerprint, "rows", NULL, (double)p->grid.rows);

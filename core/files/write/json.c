@@ -24,7 +24,7 @@ static void json_string (FILE *f, const char *text) {
       fprintf (f, "\\%c", *text);
     else if (*text == '\n')
       fputs ("\\n", f);
-    else if ((unsigned char)*text < ' ')
+    else if ((unsigned char)*text < ' ' || *text == '<')
       fprintf (f, "\\u%04X", (unsigned)*text);
     else
       fwrite (n ? text : "\xEF\xBF\xBD", 1, (size_t)(n ? n : 3), f);
@@ -66,7 +66,7 @@ void pw_json_number (pw_json *j, const char *key, double value) {
   char text[32];
   if (j == NULL) return;
   json_item (j, key);
-  fputs (isfinite (value) ? pw_format (text, value, 17) : "null", j->f);
+  fputs (isfinite (value) ? pw_format (text, value, j->digits ? j->digits : 17) : "null", j->f);
 }
 
 void pw_json_flag (pw_json *j, const char *key, int value) {

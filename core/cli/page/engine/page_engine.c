@@ -13,10 +13,7 @@ __attribute__ ((import_module ("page"), import_name ("now"))) double pw_page_now
 
 /* ---- Files ---- */
 
-static struct {
-  const char *name, *bytes;
-  size_t size;
-} *page_file;
+static pw_page_file *page_file;
 static int page_files;
 static size_t page_room;
 
@@ -25,11 +22,9 @@ PAGE_EXPORT (allocate) void *page_allocate (size_t size) {
 }
 
 /* The name and bytes belong to the engine from now on. */
-PAGE_EXPORT (file) void page_add_file (const char *name, const char *bytes, size_t size) {
+PAGE_EXPORT (file) void page_add_file (char *name, char *bytes, size_t size) {
   if (pw_grow (&page_file, (size_t)page_files, &page_room, sizeof *page_file) != PW_OK) return; /* not found later */
-  page_file[page_files].name = name;
-  page_file[page_files].bytes = bytes;
-  page_file[page_files++].size = size;
+  page_file[page_files++] = (pw_page_file){ name, bytes, size };
 }
 
 static int page_find_file (const char *name) {
@@ -42,7 +37,7 @@ static int page_find_file (const char *name) {
 FILE *pw_open_input (const char *path, const char **why) {
   int i = page_find_file (path);
   *why = "it is not part of this page";
-  return i < page_files ? fmemopen ((void *)page_file[i].bytes, page_file[i].size, "r") : NULL;
+  return i < page_files ? fmemopen (page_file[i].bytes, page_file[i].size, "r") : NULL;
 }
 
 int pw_open_input_status (void) {
@@ -65,9 +60,6 @@ extern const pw_plugin_table pw_plugin __attribute__ ((weak)); /* of a model in 
 static pw_error page_error;
 static const pw_plugin_table *page_table;
 static const char *page_name;
-static double *page_parameter; /* values, in the order of the table */
-static pw_initial_value *page_initial;
-static int page_initials;
 
 PAGE_EXPORT (error) const char *page_error_text (void) {
   return page_error.text;
@@ -84,27 +76,13 @@ PAGE_EXPORT (open) int page_open (const char *name) {
   return page_error.status;
 }
 
-/* Arrays that the page fills before a run: `count` values of parameters; `count` pairs of a state and its value. */
-PAGE_EXPORT (parameters) double *page_parameters (size_t count) {
-  free (page_parameter);
-  return page_parameter = calloc (count + 1, sizeof (double));
-}
-
-PAGE_EXPORT (initial) pw_initial_value *page_initial_values (int count) {
-  free (page_initial);
-  page_initials = count;
-  return page_initial = calloc ((size_t)count + 1, sizeof *page_initial);
-}
-
 /* ---- A run ---- */
 
 static pw_model *page_model;
 static pw_system *page_system;
 static pw_plots *page_plots;
-static struct {
-  double end; /* reached [s] */
-  double steps, rejected, evaluations, position, velocity, energy;
-} page_result;
+static pw_statistics page_statistics;
+static double page_energy;   /* defect */
 static double page_deadline; /* [ms] */
 
 static int page_late (void *context) {
@@ -121,12 +99,13 @@ static void page_close (void) {
   page_model = NULL;
 }
 
-static int page_compile (void) {
+/* `parameter`: values, in the order of the table. */
+static int page_compile (const double *parameter) {
   page_close ();
   page_error = (pw_error){ 0 };
   page_model = pw_model_new (page_name, page_table, &page_error);
   for (int i = 0; page_model && page_table->parameters && page_table->parameters[i].name; i++)
-    pw_model_set (page_model, page_table->parameters[i].name, page_parameter[i], &page_error);
+    pw_model_set (page_model, page_table->parameters[i].name, parameter[i], &page_error);
   if (page_error.status == PW_OK) pw_model_build (page_model, &page_error);
   if (page_error.status == PW_OK) page_system = pw_system_compile (page_model, &page_error);
   return page_error.status;
@@ -138,7 +117,7 @@ static int page_take_samples (pw_run *r) {
   while (status == PW_OK && page_plots && pw_plots_next (page_plots) <= pw_run_time (r)) {
     status = pw_run_sample (r, pw_plots_next (page_plots), &sample, &page_error);
     if (status == PW_OK) pw_plots_add (page_plots, &sample);
-    page_result.energy = status == PW_OK ? pw_run_energy_defect (r, &sample) : NAN;
+    page_energy = status == PW_OK ? pw_run_energy_defect (r, &sample) : NAN;
   }
   return status;
 }
@@ -149,30 +128,24 @@ static int page_integrate (pw_run *r, double t_end) {
     status = pw_run_advance (r, t_end, &page_error);
     if (status == PW_OK) status = page_take_samples (r);
   }
-  const pw_statistics *s = pw_run_statistics (r);
-  page_result.end = pw_run_time (r);
-  page_result.steps = (double)s->steps;
-  page_result.rejected = (double)s->rejected;
-  page_result.evaluations = (double)s->rhs;
-  page_result.position = s->g;
-  page_result.velocity = s->jv;
+  page_statistics = *pw_run_statistics (r);
   return status;
 }
 
 /* Runs the model with the parameters and initial values given, for at most `limit` ms.  0, or a negative status with
  * the error set; the samples so far are kept.  Without `samples` it only integrates, to measure its time. */
 PAGE_EXPORT (run)
-int page_run (const char *method, double step, double rtol, double t_end, double limit, int samples) {
-  memset (&page_result, 0, sizeof page_result);
-  if (page_compile () != PW_OK) return page_error.status;
+int page_run (const char *method, double step, double rtol, double t_end, double limit, int samples,
+              const double *parameter, const pw_initial_value *initial, int initials) {
+  if (page_compile (parameter) != PW_OK) return page_error.status;
   page_deadline = pw_page_now () + limit;
   const pw_settings settings = { .span = t_end,
                                  .step = step,
                                  .rtol = rtol,
                                  .ledger = samples,
                                  .stop = page_late,
-                                 .initial = page_initial,
-                                 .initials = page_initials };
+                                 .initial = initial,
+                                 .initials = initials };
   if (samples) page_plots = pw_plots_open (NULL, 1, page_model, page_system, t_end, &page_error);
   pw_run *r = page_error.status == PW_OK ? pw_run_open (page_system, method, &settings, &page_error) : NULL;
   int status = r ? page_integrate (r, t_end) : page_error.status;
@@ -186,27 +159,34 @@ int page_run (const char *method, double step, double rtol, double t_end, double
 
 /* ---- Results ---- */
 
-PAGE_EXPORT (samples) int page_samples (void) {
-  return page_plots ? page_plots->samples : 0;
-}
-PAGE_EXPORT (width) int page_width (void) {
-  return page_plots->width;
-}
 PAGE_EXPORT (data) const double *page_data (void) {
   return page_plots->data;
 }
-PAGE_EXPORT (result) const double *page_results (void) {
-  return &page_result.end;
+
+static void page_write_scene (pw_json *j) {
+  const pw_statistics *s = &page_statistics;
+  const struct {
+    const char *key;
+    double value;
+  } number[] = { { "samples", page_plots->samples },      { "width", page_plots->width }, { "steps", (double)s->steps },
+                 { "rejected", (double)s->rejected },     { "g", s->g },                  { "jv", s->jv },
+                 { "evaluations", (double)s->rhs },       { "energy_defect", page_energy } };
+  pw_json_open (j, NULL, '{');
+  for (size_t i = 0; i < sizeof number / sizeof *number; i++) pw_json_number (j, number[i].key, number[i].value);
+  pw_animation_scene (j, page_plots);
+  pw_json_close (j, '}');
 }
 
-/* The scene's shapes as JSON; free it by `release`. */
+/* The scene's shapes, the size of the data, and statistics of the run as JSON; free it by `release`.  NULL without a run. */
 PAGE_EXPORT (scene) char *page_scene (void) {
   pw_stream scene;
+  if (page_plots == NULL) return NULL;
   FILE *f = pw_stream_open (&scene);
-  if (f) pw_animation_scene (f, page_plots);
+  if (f) page_write_scene (&(pw_json){ .f = f });
   pw_stream_close (f, &scene);
   return scene.text;
 }
+
 PAGE_EXPORT (release) void page_release (void *p) {
   free (p);
 }

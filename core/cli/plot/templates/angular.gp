@@ -1,3 +1,5 @@
+# include look.gp
+# include curves.gp
 
 # ---- Angular velocities; where they oscillate often, the end of the run in detail as well ----
 

@@ -1,3 +1,5 @@
+# include look.gp
+# include methods.gp
 
 # ---- Drift: residuals and energy defect, a panel each ----
 

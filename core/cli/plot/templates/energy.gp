@@ -1,3 +1,4 @@
+# include look.gp
 
 # ---- Energies, work, and the error of the energy balance in a unit of its own ----
 

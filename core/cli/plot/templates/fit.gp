@@ -1,3 +1,4 @@
+# include look.gp
 
 # ---- Data and model of each column, below them the residuals ----
 

@@ -4,7 +4,7 @@
 # at that size.  panel(x0, x1, y0, y1) places a plot, measured from the upper left corner; key(y, columns) a legend, which
 # takes rows(n, columns) below `top`.  Text of the user (labels, names) is plain; our own is enhanced: 'v_x [m/s]',
 # '10^{%T}'.  Line type i: colour, dash and width distinguish it without colour, and wider ones stay visible below later
-# ones.  A new figure: a template NAME.gp, and a line in the list of figure.c.
+# ones.  A new figure is a template NAME.gp; a line "# include OTHER.gp" stands for the contents of another one.
 
 set encoding utf8
 set minussign
@@ -39,10 +39,18 @@ narrow = width < 300 # one column of a page with two
 space(s, n) = n < 2 || s[n:n] eq ' ' ? n : space(s, n - 1)
 wrap(s, n, between) = strlen(s) <= n || space(s, n) < 2 ? s : \
   s[1:space(s, n) - 1].between.wrap(s[space(s, n) + 1:*], n, between)
-heading = wrap(about, int((width - 16)/5.2), "}\n{/*1.13 ")
+# The title: a capital first, special characters of enhanced text escaped.
+escaped = ''
+do for [i = 1:strlen(about)] {
+  c = about[i:i]
+  small = i == 1 ? strstrt('abcdefghijklmnopqrstuvwxyz', c) : 0
+  escaped = escaped.(strstrt('\_^{}@&~', c) ? '\' : '').(small ? 'ABCDEFGHIJKLMNOPQRSTUVWXYZ'[small:small] : c)
+}
+heading = wrap(escaped, int((width - 16)/5.2), "}\n{/*1.13 ")
 top = 30.0
 do for [i = 1:strlen(heading)] { if (heading[i:i] eq "\n") { top = top + 11 } }
 
+# Terminals differ in the place of a legend: lift [pt] moves it up, pitch is the distance of its lines.
 page(form) = sprintf(form eq 'svg' ? "set terminal svg size %.2f,%.2f enhanced ". \
     "font 'DejaVu Sans,Helvetica,sans-serif,10' linewidth 1.3333 background rgb 'white'; set pointsize 0.6; lift = 2; pitch = 0.82; set xlabel offset 0,0.6; set ylabel offset 0.8,0" : \
   form eq 'png' ? "set terminal pngcairo size %.2f,%.2f enhanced font 'DejaVu Sans,7.5' ". \

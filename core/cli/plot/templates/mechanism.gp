@@ -1,3 +1,5 @@
+# include look.gp
+# include plane.gp
 
 # ---- Snapshots of the motion: earlier ones fainter, the last one with symbols; paths of the markers ----
 

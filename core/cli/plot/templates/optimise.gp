@@ -1,3 +1,4 @@
+# include look.gp
 
 # ---- Output of every run against each unknown, the best one marked ----
 

@@ -1,3 +1,6 @@
+# include look.gp
+# include curves.gp
+# include plane.gp
 
 # ---- Paths of wheels and markers, or of the centres of mass ----
 

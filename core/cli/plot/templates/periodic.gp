@@ -1,3 +1,4 @@
+# include look.gp
 
 # ---- A periodic motion: paths and angular velocities over a period; or a branch over the parameter; multipliers ----
 

@@ -1,3 +1,4 @@
+# include look.gp
 
 # ---- Derivatives of outputs along the run: a panel for each output ----
 

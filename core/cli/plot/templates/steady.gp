@@ -1,3 +1,4 @@
+# include look.gp
 
 # ---- Steady motions: eigenvalues over the parameter, stable parts solid, unstable ones dashed; root locus ----
 

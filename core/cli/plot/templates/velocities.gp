@@ -1,3 +1,5 @@
+# include look.gp
+# include curves.gp
 
 # ---- Velocities of the centres of mass ----
 

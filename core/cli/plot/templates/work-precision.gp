@@ -1,3 +1,5 @@
+# include look.gp
+# include methods.gp
 
 # ---- Work-precision diagram: error against CPU time and against evaluations, a line for each method ----
 
