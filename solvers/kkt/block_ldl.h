@@ -98,15 +98,11 @@ typedef struct {
 
 /* ---- Planning (block_order.c) ---- */
 
-enum { PW_PLAN_SCHUR = -1, PW_PLAN_UNCONDENSED = -2 };
-
 typedef struct {
-  int size;               /* unknowns */
-  int row;                /* the first global one, or PW_PLAN_SCHUR, PW_PLAN_UNCONDENSED */
-  int rank;               /* 0 to PW_BLOCK_RANKS - 1 */
-  int grounded;           /* 1: touches the ground or prescribed coordinates (pw_is_grounded) */
-  int y;                  /* their position in the right-hand side */
-  double *gamma, *lambda; /* of a Schur row */
+  int size;     /* unknowns */
+  int rank;     /* 0 to PW_BLOCK_RANKS - 1 */
+  int grounded; /* 1: touches the ground or prescribed coordinates (pw_is_grounded) */
+  int y;        /* its first unknown in the right-hand side: its first row, or beyond the rows */
 } pw_plan_node;
 
 /* pair: 2 x pairs node numbers with a block between them, each unordered pair any number of times, the diagonal not

@@ -177,16 +177,12 @@ static void order_place_targets (pw_block_ldl *l) {
 
 static int order_carve (pw_block_ldl *l, const pw_plan_node *node, const int *order, const order_lists *L) {
   size_t n = (size_t)l->nodes, below = (size_t)L->first[l->nodes], targets = order_count_targets (l->nodes, L);
-  pw_layout lay = { NULL, 0 };
-  for (int pass = 0; pass < 2; pass++) {
+  for (pw_layout lay = { 0 }; pw_layout_pass (&lay, &l->pattern);) {
     l->column = pw_layout_alloc (&lay, n + 1, sizeof *l->column);
     l->below = pw_layout_alloc (&lay, below, sizeof *l->below);
     l->target = pw_layout_alloc (&lay, targets, sizeof *l->target);
-    if (pass == 1) break;
-    l->pattern = malloc (lay.used);
-    if (l->pattern == NULL) return PW_RESOURCE;
-    lay = (pw_layout){ l->pattern, 0 };
   }
+  if (l->pattern == NULL) return PW_RESOURCE;
   memcpy (l->below, L->list, below * sizeof (int));
   for (int j = 0; j < l->nodes; j++)
     l->column[j] =

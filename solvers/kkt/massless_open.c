@@ -26,15 +26,11 @@ static int massless_contains (const massless_plan *p, int g) {
 /* The groups of an element's coordinates, without the ground, and their first local columns. */
 static int massless_element_groups (const pw_system *s, const pw_element_batch *k, int e, int *group, int *at) {
   int n = 0;
-  for (int b = 0; b < k->kind->bodies; b++) {
-    int j = k->column[e * k->kind->bodies + b];
+  for (int x = 0; x < k->b.cols; x += pw_group_columns (k->kind, x)) {
+    int j = pw_global (k, e, x);
     if (j >= s->coords) continue;
-    at[n] = 3 * b;
+    at[n] = x;
     group[n++] = pw_group_of (s, j);
-  }
-  for (int o = 0; o < k->kind->internal; o++) {
-    at[n] = 3 * k->kind->bodies + o;
-    group[n++] = pw_group_of (s, k->internal + e * k->kind->internal + o);
   }
   return n;
 }
@@ -100,8 +96,7 @@ static void massless_add_rows (massless_plan *p, pw_massless *r) {
 /* Allocates the components.  The number of groups is bounded by that counted with repetition, and by that of the scene;
  * the number of pivots by that of rows. */
 static int massless_lay_out (pw_massless *r, const massless_plan *p) {
-  pw_layout l = { NULL, 0 };
-  for (int pass = 0; pass < 2; pass++) {
+  for (pw_layout l = { 0 }; pw_layout_pass (&l, &r->memory);)
     for (pw_component *c = r->component; c < r->end; c++) {
       size_t rows = (size_t)c->rows, groups = (size_t)(c->groups < p->groups ? c->groups : p->groups),
              cols = 3 * groups;
@@ -112,17 +107,14 @@ static int massless_lay_out (pw_massless *r, const massless_plan *p) {
       c->square = pw_layout_alloc (&l, cols, sizeof *c->square);
       c->massive_square = pw_layout_alloc (&l, cols, sizeof *c->massive_square);
       c->row = pw_layout_alloc (&l, rows, sizeof *c->row);
+      c->y = pw_layout_alloc (&l, rows, sizeof *c->y);
       c->A = pw_layout_alloc (&l, rows * (cols + rows + 1), sizeof *c->A);
       const double **from = pw_layout_alloc (&l, rows * groups, sizeof *from);
-      for (size_t i = 0; pass == 1 && i < rows; i++) c->row[i].from = from + i * groups;
-      if (pass == 1) c->rows = c->groups = 0;
+      if (l.base == NULL) continue;
+      for (size_t i = 0; i < rows; i++) c->row[i].from = from + i * groups;
+      c->rows = c->groups = 0;
     }
-    if (pass == 1) break;
-    r->memory = calloc (1, l.used + 1);
-    if (r->memory == NULL) return PW_RESOURCE;
-    l = (pw_layout){ r->memory, 0 };
-  }
-  return PW_OK;
+  return r->memory ? PW_OK : PW_RESOURCE;
 }
 
 /* ---- Opening ---- */
