@@ -2,52 +2,48 @@
 #include <stdlib.h>
 #include <string.h>
 #include "tangent.h"
+#include "util.h"
 
-static int tangent_number_rows (pw_tangent *x) {
+static void tangent_number_rows (pw_tangent *x) {
   const pw_run *r = x->run;
-  const pw_system *s = r->s;
-  x->rows = s->rows;
-  x->holonomic = s->holonomic;
-  if (r->active == NULL) return PW_OK;
-  x->map = malloc ((size_t)(2 * s->rows) * sizeof *x->map);
-  if (x->map == NULL) return PW_RESOURCE;
-  int *row = x->map + s->rows;
-  x->row = row;
-  x->rows = x->holonomic = 0;
-  for (int i = 0; i < s->rows; i++) {
-    x->map[i] = r->active[i] ? x->rows : -1;
-    if (!r->active[i]) continue;
-    x->holonomic += i < s->holonomic;
-    row[x->rows++] = i;
+  for (int i = 0; i < r->s->rows; i++) {
+    int active = r->active == NULL || r->active[i];
+    x->map[i] = active ? x->rows : -1;
+    if (!active) continue;
+    x->holonomic += i < r->s->holonomic;
+    x->row[x->rows++] = i;
   }
-  return PW_OK;
 }
 
 int pw_tangent_open (pw_tangent *x, pw_run *r) {
   *x = (pw_tangent){ .run = r };
   r->differentiates = 1;
   const pw_system *s = r->s;
-  x->lambda = calloc ((size_t)(2 * s->rows + s->coords), sizeof *x->lambda);
-  if (x->lambda == NULL) return PW_RESOURCE;
-  x->mu = x->lambda + s->rows, x->D = x->mu + s->rows;
+  for (pw_layout l = { 0 }; pw_layout_pass (&l, &x->memory);) {
+    x->map = pw_layout_alloc (&l, (size_t)s->rows, sizeof *x->map);
+    x->row = pw_layout_alloc (&l, (size_t)s->rows, sizeof *x->row);
+    x->lambda = pw_layout_alloc (&l, (size_t)s->rows, sizeof *x->lambda);
+    x->mu = pw_layout_alloc (&l, (size_t)s->rows, sizeof *x->mu);
+    x->D = pw_layout_alloc (&l, (size_t)s->coords, sizeof *x->D);
+  }
+  if (x->memory == NULL) return PW_RESOURCE;
   for (int j = 0; j < s->coords; j++) x->D[j] = pw_is_angle (s, j) ? 1 / (s->scale.length * s->scale.length) : 1;
-  int status = tangent_number_rows (x);
-  return status == PW_OK ? pw_newton_open (&x->newton, r->s) : status;
+  tangent_number_rows (x);
+  return pw_newton_open (&x->newton, r->s);
 }
 
 void pw_tangent_close (pw_tangent *x) {
   pw_scatter_close (&x->scatter);
   pw_newton_close (&x->newton);
-  free (x->map);
-  free (x->lambda);
+  free (x->memory);
   free (x->colptr);
   free (x->rowind);
 }
 
 /* Values of all equations from those of the first `count` active ones; `all` is scratch for the result. */
 static const double *tangent_expand (const pw_tangent *x, const double *used, int count, double *all) {
-  if (x->map == NULL && count == x->rows) return used;
-  for (int i = 0; i < count; i++) all[x->map ? x->row[i] : i] = used[i];
+  if (count == x->run->s->rows) return used;
+  for (int i = 0; i < count; i++) all[x->row[i]] = used[i];
   return all;
 }
 
@@ -61,7 +57,7 @@ const double *pw_tangent_mu (const pw_tangent *x, const double *used, int count)
 
 void pw_tangent_store (const pw_tangent *x, const double *used, double *all) {
   memset (all, 0, (size_t)x->run->s->rows * sizeof *all);
-  for (int i = 0; i < x->rows; i++) all[x->map ? x->row[i] : i] = used[i];
+  for (int i = 0; i < x->rows; i++) all[x->row[i]] = used[i];
 }
 
 void pw_tangent_pull (const pw_tangent *x, const double *used, int count, double *out) {
@@ -70,7 +66,7 @@ void pw_tangent_pull (const pw_tangent *x, const double *used, int count, double
 }
 
 void pw_tangent_compress (const pw_tangent *x, const double *all, int count, double *used) {
-  for (int i = 0; i < count; i++) used[i] = all[x->map ? x->row[i] : i];
+  for (int i = 0; i < count; i++) used[i] = all[x->row[i]];
 }
 
 /* Contributions of the active equations, at this row and column. */

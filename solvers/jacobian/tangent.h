@@ -15,13 +15,14 @@
 typedef struct {
   pw_run *run;
   int rows, holonomic; /* active equations */
-  int *map;            /* all equations: index among the active ones, or -1; NULL: all are active */
-  const int *row;      /* rows: index among all equations */
+  int *map;            /* all equations: index among the active ones, or -1 */
+  int *row;            /* rows: index among all equations */
   double *lambda, *mu; /* all equations: values of the unknowns last expanded */
   double *D;           /* coords: 1 for lengths, 1/L^2 for angles, so that mu has one unit */
   pw_newton newton;
   pw_scatter_map scatter;
   int64_t *colptr, *rowind; /* the pattern, in compressed columns */
+  char *memory;
 } pw_tangent;
 
 int pw_tangent_open (pw_tangent *x, pw_run *r); /* PW_OK or PW_RESOURCE */

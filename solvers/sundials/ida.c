@@ -46,7 +46,7 @@ static int ida_weigh (N_Vector vy, N_Vector weights, void *user) {
   double relax = d->impulses ? T : c * T, mu = (set->atol > 0 ? set->atol : set->rtol * L / T) * relax;
   pw_sun_weigh (&d->sun, y, w);
   for (int i = 0; i < d->rows; i++) {
-    double lambda = d->impulses ? r->lambda[d->tangent.map ? d->tangent.row[i] : i] : y[2 * d->n + i];
+    double lambda = d->impulses ? r->lambda[d->tangent.row[i]] : y[2 * d->n + i];
     w[2 * d->n + i] = 1 / (relax * set->rtol * (fabs (lambda) + force * d->unit[i]));
   }
   for (int i = 0; i < d->mus; i++) w[2 * d->n + d->rows + i] = 1 / (mu * d->unit[i]);
@@ -136,8 +136,7 @@ static int ida_open_vectors (ida_data *d, pw_run *r) {
   d->given = calloc ((size_t)(2 * d->n + 6 + 3 * s->rows), sizeof *d->given);
   if (!d->yp || !d->id || !d->given) return PW_RESOURCE;
   d->unit = d->given + 2 * d->n + 6 + 2 * s->rows;
-  for (int i = 0; i < d->rows; i++)
-    d->unit[i] = pw_rank_multiplier_unit (d->sun.run->w, d->tangent.map ? d->tangent.row[i] : i);
+  for (int i = 0; i < d->rows; i++) d->unit[i] = pw_rank_multiplier_unit (d->sun.run->w, d->tangent.row[i]);
   for (int i = 0; i < d->size; i++) N_VGetArrayPointer (d->id)[i] = i < 2 * d->n || d->impulses;
   ida_fill_vectors (d);
   return PW_OK;
