@@ -81,7 +81,7 @@ typedef struct {
   pw_column *column; /* nodes + 1: the last one ends the ranges */
   int *below;        /* numbers of the columns that the rows below belong to, ascending in each column */
   int *target;       /* for each column, for its rows p descending, q < p: where K_pq is */
-  int *place;        /* column of each node; until planning is over */
+  int *place;        /* column of each node */
   double *value;
   int values;
   const double *inverse; /* diagonal of W^-1 */
@@ -103,6 +103,7 @@ typedef struct {
   int rank;     /* 0 to PW_BLOCK_RANKS - 1 */
   int grounded; /* 1: touches the ground or prescribed coordinates (pw_is_grounded) */
   int y;        /* its first unknown in the right-hand side: its first row, or beyond the rows */
+  int first;    /* its first contribution; its last one is before `first` of the next node */
 } pw_plan_node;
 
 /* pair: 2 x pairs node numbers with a block between them, each unordered pair any number of times, the diagonal not

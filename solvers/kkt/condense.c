@@ -9,6 +9,7 @@
 /* Begins a node: the contributions that follow are its own. */
 static void condense_add_node (pw_plan *c, pw_plan_node node) {
   c->failed |= pw_grow (&c->node, (size_t)c->nodes, &c->node_room, sizeof *c->node) != PW_OK;
+  node.first = c->contributions;
   if (!c->failed) c->node[c->nodes++] = node;
 }
 

@@ -119,8 +119,5 @@ int pw_condense_block (pw_plan *c) {
   condense_sort_columns (c, l->place);
   int status = pw_condense_chains (c, l);
   if (status == PW_OK) status = pw_block_lay_out (l);
-  if (status == PW_OK) status = condense_fill (c, l);
-  free (l->place);
-  l->place = NULL;
-  return status;
+  return status == PW_OK ? condense_fill (c, l) : status;
 }

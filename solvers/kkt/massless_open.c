@@ -65,17 +65,16 @@ static int massless_add_group (const pw_system *s, pw_component *c, int g) {
   return c->groups++;
 }
 
-/* Adds a row and its groups to a component, or, before the layout, only counts them (groups with repetition). */
+/* Adds a row and its groups to a component. */
 static void massless_add_row (const pw_system *s, pw_component *c, int row, int n, const int *group, const int *at,
                               const double *J) {
-  pw_massless_row *to = c->row ? &c->row[c->rows] : NULL;
-  c->rows++;
-  if (to == NULL) c->groups += n;
-  for (int i = 0; to && i < n; i++) to->from[massless_add_group (s, c, group[i])] = J + at[i];
-  if (to) to->row = row;
+  pw_massless_row *to = &c->row[c->rows++];
+  to->row = row;
+  for (int i = 0; i < n; i++) to->from[massless_add_group (s, c, group[i])] = J + at[i];
 }
 
-/* Adds each active row with a massless group to the component of this group. */
+/* Adds each active row with a massless group to the component of this group; before the layout it only counts rows, and
+ * groups with repetition. */
 static void massless_add_rows (massless_plan *p, pw_massless *r) {
   int group[PW_MASSLESS_GROUPS], at[PW_MASSLESS_GROUPS];
   for (const pw_element_batch *k = p->w->batch; k < p->w->batch + p->s->constraints; k++)
@@ -85,8 +84,12 @@ static void massless_add_rows (massless_plan *p, pw_massless *r) {
       for (int i = e * k->kind->rows; first < n && i < (e + 1) * k->kind->rows; i++) {
         if (!massless_is_active (p, k->row + i)) continue;
         int component = r->component_of_row[k->row + i] = p->member[pw_root (p->parent, group[first])];
-        r->component[component].grounded |= pw_is_grounded (p->s, k, e);
-        massless_add_row (p->s, &r->component[component], k->row + i, n, group, at, k->J + i * k->b.cols);
+        pw_component *c = &r->component[component];
+        c->grounded |= pw_is_grounded (p->s, k, e);
+        if (c->row)
+          massless_add_row (p->s, c, k->row + i, n, group, at, k->J + i * k->b.cols);
+        else
+          c->rows++, c->groups += n;
       }
     }
 }
