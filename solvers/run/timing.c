@@ -33,7 +33,6 @@ typedef enum {
 typedef struct {
   pw_run *r;
   const pw_system *s;
-  pw_saddle *saddle;         /* as that of the run */
   pw_projector projector;    /* if the method projects */
   const pw_element_batch *k; /* the batch being measured */
   pw_statistics done;        /* counts of the run, before the measurements */
@@ -83,10 +82,10 @@ static void profile_do (profile *p, profile_work work, double t) {
     pw_evaluate_g (w, p->eta);
     break;
   case PROFILE_FACTOR:
-    pw_saddle_factor (p->saddle);
+    pw_saddle_factor (p->r->saddle);
     break;
   case PROFILE_SOLVE:
-    pw_saddle_solve (p->saddle, p->f, p->gamma, p->a, p->lambda);
+    pw_saddle_solve (p->r->saddle, p->f, p->gamma, p->a, p->lambda);
     break;
   case PROFILE_EVALUATION:
     pw_run_accelerate (p->r, t, p->q, p->v, p->a, p->lambda);
@@ -210,8 +209,6 @@ static int profile_open (profile *p, pw_error *error) {
   memcpy (p->v, p->r->v, bytes);
   for (int j = 0; j < p->s->coords; j++) p->far[j] = p->q[j] + PROFILE_DISTANCE * p->s->scale.length * pw_sin (j + 1);
   (void)pw_evaluate_J_at (p->r->w, p->t, p->q, p->v);
-  p->saddle = pw_saddle_open (p->r->w, p->s->mass, p->s->rows, p->r->active, error);
-  if (p->saddle == NULL) return PW_RESOURCE;
   return pw_stabilised_by (p->r, PW_PROJECTION) ? pw_projector_open_by_options (&p->projector, p->r, error) : PW_OK;
 }
 
@@ -225,7 +222,6 @@ int pw_run_profile (pw_run *r, pw_profile *x, pw_error *error) {
   if (status == PW_OK) profile_measure (&p, x);
   r->statistics = p.done;
   pw_projector_close (&p.projector);
-  pw_saddle_close (p.saddle);
   free (p.memory);
   return status;
 }
