@@ -11,6 +11,7 @@ typedef struct {
   size_t count, room; /* number of contributions; allocated number while recording */
   struct pw_scatter_entry {
     int row, col;
+    size_t number;
   } * entry;     /* while recording */
   size_t *place; /* index in `value` of each contribution */
   size_t next;   /* number of the next contribution */
