@@ -22,16 +22,20 @@ struct pw_run {
   int fixed_steps;             /* 1: fixed step size */
   pw_saddle *saddle;           /* mass matrix, all constraint equations: accelerations, impulses */
   const unsigned char *active; /* rows: 0 for redundant ones; NULL: none is redundant */
-  int redundant;               /* number of redundant rows */
-  int *redundant_row;          /* indices of these rows */
-  double *coefficient;         /* redundant x rows: each redundant row as a combination of active rows; then scratch */
-  double *least_norm;          /* rows: least-norm multipliers for the ledger; NULL: no redundant row moves */
+  int redundant;               /* number of redundant rows; the following only if there are any */
+  int redundant_moves;         /* 1: one of them has an eta, so that work depends on its multiplier */
+  int *redundant_row;          /* redundant: their indices */
+  unsigned char *independent;  /* rows: the run's own `active` */
+  double *coefficient;         /* redundant x rows: each redundant row as a combination of active rows */
+  double *normal;              /* redundant x (redundant + 1): normal equations of least-norm multipliers */
+  double *row_force, *zero;    /* coords + 3, rows: right-hand sides */
+  double *least_norm;          /* rows: least-norm multipliers for the ledger */
   char *rank_memory;
   double independence;                      /* of the active rows at the state reached (rank.h) */
   double reselect_below;                    /* independence below which other rows are tried */
   const struct pw_specialised *specialised; /* compiled code of the scene in use, or NULL */
   struct pw_scene *scene;                   /* data of that code */
-  void *scene_memory;
+  char *scene_memory;
   int scene_ready;        /* 1: its constants have been computed */
   pw_watchdog limits;     /* thresholds */
   pw_geometry geometry;   /* distance of the constraints from a singular configuration */
@@ -125,7 +129,7 @@ static inline int pw_stabilised_by (const pw_run *r, pw_stabilisation_kind kind)
     "baumgarte", "feedback of the residuals into the accelerations (Baumgarte 1972)", PW_BAUMGARTE \
   }
 
-/* Baumgarte's options, the same for all integrators; pw_read_baumgarte copies them to r->alpha and r->beta. */
+/* Baumgarte's options, the same for all integrators. */
 #define PW_BAUMGARTE_OPTIONS                                                                   \
   { .name = "alpha",                                                                           \
     .with = "baumgarte",                                                                       \
@@ -137,7 +141,6 @@ static inline int pw_stabilised_by (const pw_run *r, pw_stabilisation_kind kind)
     .name = "beta", .with = "baumgarte", .value = 10, .domain = PW_NONNEGATIVE, .unit = "1/s", \
     .about = "stiffness of the position residuals"                                             \
   }
-void pw_read_baumgarte (pw_run *r);
 
 /* Options of the projection; pw_projector_open_by_options reads all but `every`. */
 #define PW_PROJECTION_OPTIONS                                                                         \
@@ -316,7 +319,6 @@ void pw_project_error (pw_run *r, pw_saddle *k, double *e, int rows);
 
 /* Opens the settings' specialised code, if any.  Errors: PW_INPUT, PW_RESOURCE. */
 int pw_specialised_open (pw_run *r, pw_error *error);
-void pw_specialised_close (pw_run *r);
 /* Uses it if it has the run's independent equations. */
 void pw_specialised_select (pw_run *r);
 

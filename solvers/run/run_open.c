@@ -170,7 +170,7 @@ static int run_open (pw_run *r, const char *method, const pw_settings *settings,
   if (run_initial_values (r, settings, error) != PW_OK ||
       pw_parse_options (method, settings->methods, &r->method, &r->stabilisation, r->option, error) != PW_OK)
     return PW_INPUT;
-  pw_choose_steps (r);
+  r->fixed_steps = !r->method->adaptive || pw_run_option (r, "steps") != 0;
   int status = run_settings (&r->settings, settings, r->method, error);
   if (status == PW_OK && pw_fixed_steps (r)) status = run_check_step (&r->settings, error);
   if (status != PW_OK) return status;
@@ -184,8 +184,9 @@ static int run_open (pw_run *r, const char *method, const pw_settings *settings,
   r->w->scale.time = run_time_scale (r);
   pw_run_count_moved (r);
   status = run_begin (r, error);
-  if (status == PW_OK) pw_read_baumgarte (r);
-  if (status == PW_OK) status = pw_specialised_open (r, error);
+  if (status != PW_OK) return status;
+  if (pw_stabilised_by (r, PW_BAUMGARTE)) r->alpha = pw_run_option (r, "alpha"), r->beta = pw_run_option (r, "beta");
+  status = pw_specialised_open (r, error);
   if (status == PW_OK) status = r->method->open (r, error);
   return status == PW_OK ? run_check_derivatives (r, method, error) : status;
 }
