@@ -84,12 +84,12 @@ struct pw_run {
   char *memory;
 };
 
-/* Absolute tolerances of coordinate j and of its velocity: the user's atol, or rtol in units of the scene. */
-static inline double pw_atol (const pw_run *r, int j) {
-  return r->settings.atol > 0 ? r->settings.atol : r->settings.rtol * pw_unit (r->s, j);
-}
-static inline double pw_atol_velocity (const pw_run *r, int j) {
-  return r->settings.atol > 0 ? r->settings.atol : r->settings.rtol * pw_unit (r->s, j) / r->w->scale.time;
+/* Absolute tolerance of a state, numbered as in pw_system_find_state: the user's atol, or rtol in units of the scene. */
+static inline double pw_atol (const pw_run *r, int state) {
+  const int n = r->s->coords;
+  if (r->settings.atol > 0) return r->settings.atol;
+  double atol = r->settings.rtol * pw_unit (r->s, state < n ? state : state - n);
+  return state < n ? atol : atol / r->w->scale.time;
 }
 /* Updates r->saturation, the change of state that reverses a saturating force, and r->outdated, at the state
  * reached, whose kinematics must be up to date (tolerances.c). */
@@ -98,13 +98,10 @@ void pw_bound_tolerances (pw_run *r);
 double pw_saturation_range (const pw_run *r, int state);
 /* Records the state at which the Newton matrix was evaluated; kinematics must be up to date there. */
 void pw_matrix_evaluated (pw_run *r, const double *q, const double *v);
-/* Tolerances of coordinate j and of its velocity at a given value, for iterative methods.  They are bounded by the range
- * in which a force saturates; otherwise an iteration could converge to any value of the force. */
-static inline double pw_tolerance (const pw_run *r, int j, double q) {
-  return fmin (r->settings.rtol * fabs (q) + pw_atol (r, j), r->saturation[j]);
-}
-static inline double pw_tolerance_velocity (const pw_run *r, int j, double v) {
-  return fmin (r->settings.rtol * fabs (v) + pw_atol_velocity (r, j), r->saturation[r->s->coords + j]);
+/* Tolerance of a state at a given value, for iterative methods.  It is bounded by the range in which a force saturates;
+ * otherwise an iteration could converge to any value of the force. */
+static inline double pw_tolerance (const pw_run *r, int state, double value) {
+  return fmin (r->settings.rtol * fabs (value) + pw_atol (r, state), r->saturation[state]);
 }
 /* 1 if the step size is fixed. */
 static inline int pw_fixed_steps (const pw_run *r) {
