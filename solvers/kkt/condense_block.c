@@ -99,10 +99,10 @@ static int condense_fill (const pw_plan *c, pw_block_ldl *l) {
   if (l->memory == NULL) return PW_RESOURCE;
   memcpy (l->chain, c->chain, (size_t)c->chains * sizeof *l->chain);
   l->chain[l->chains] = (pw_chain){ .column = l->nodes + 1 };
-  for (int kept = 0; kept < 2; kept++) /* uncondensed bodies last: they add to diagonals that the others store */
+  for (int last = 0; last < 2; last++) /* uncondensed bodies last: they add to diagonals that the others store */
     for (int n = 0; n < c->groups; n++) {
       int first = pw_group_first (c->k->s, n);
-      if (condense_has_block (c, n) && (condense_own_nodes (c, first) >= 0) == kept)
+      if (condense_has_block (c, n) && (condense_own_nodes (c, first) >= 0) == last)
         condense_body (c, l, first, &l->body[body++], &contributions, &couplings);
     }
   l->body[body] = (pw_body_block){ .first = contributions, .coupling = couplings };

@@ -19,10 +19,13 @@ const pw_method *const pw_methods[] = {
       NULL
 };
 
-/* Reads one part of the name, up to + or :. */
-static int methods_part (char *part, size_t size, const char **text, const char *whole, pw_error *error) {
-  size_t n = strcspn (*text, "+:");
-  if (n >= size) return pw_fail (error, PW_INPUT, "method \"%.80s\": a name is too long", whole);
+enum { METHODS_PART = 80 };
+
+/* Reads one part of the method, up to one of the characters `end`; what: "a name". */
+static int methods_part (char part[METHODS_PART], const char **text, const char *end, const char *what,
+                         const char *whole, pw_error *error) {
+  size_t n = strcspn (*text, end);
+  if (n >= METHODS_PART) return pw_fail (error, PW_INPUT, "method \"%.80s\": %s is too long", whole, what);
   memcpy (part, *text, n);
   part[n] = 0;
   *text += n;
@@ -113,29 +116,26 @@ static int methods_option (const pw_method *method, int stabilisation, char *par
 
 int pw_parse_options (const char *text, const pw_method *const *own, const pw_method **method, int *stabilisation,
                       double *values, pw_error *error) {
-  char part[80];
+  char part[METHODS_PART];
   unsigned given = 0;
   const char *whole = text;
   *stabilisation = 0;
   if (text == NULL) return pw_fail (error, PW_INPUT, "the name of a method is missing");
-  if (methods_part (part, sizeof part, &text, whole, error) != PW_OK ||
+  if (methods_part (part, &text, "+:", "a name", whole, error) != PW_OK ||
       methods_integrator (part, own, method, error) != PW_OK)
     return PW_INPUT;
   for (int i = 0; (*method)->options[i].name; i++) values[i] = (*method)->options[i].value;
   if (*text == '+') {
     text++;
-    if (methods_part (part, sizeof part, &text, whole, error) != PW_OK ||
+    if (methods_part (part, &text, "+:", "a name", whole, error) != PW_OK ||
         methods_stabilisation (*method, part, stabilisation, error) != PW_OK)
       return PW_INPUT;
   }
   while (*text == ':') {
     text++;
-    size_t n = strcspn (text, ":");
-    if (n >= sizeof part) return pw_fail (error, PW_INPUT, "method \"%.80s\": an option is too long", whole);
-    memcpy (part, text, n);
-    part[n] = 0;
-    text += n;
-    if (methods_option (*method, *stabilisation, part, values, &given, error) != PW_OK) return PW_INPUT;
+    if (methods_part (part, &text, ":", "an option", whole, error) != PW_OK ||
+        methods_option (*method, *stabilisation, part, values, &given, error) != PW_OK)
+      return PW_INPUT;
   }
   if (*text)
     return pw_fail (error, PW_INPUT, "method \"%.80s\": expected INTEGRATOR+STABILISATION:OPTION=VALUE", whole);
