@@ -2,6 +2,7 @@
 #ifndef PW_METHOD_H
 #define PW_METHOD_H
 
+#include <float.h>
 #include <math.h>
 #include "pinwheel-method.h"
 #include "saddle.h"
@@ -64,7 +65,7 @@ struct pw_run {
   int stopped;     /* 1: settings.stop requested it */
   int interrupted; /* 1: inside a step of SUNDIALS, which must be restarted */
   double mark_time,
-      mark_speed; /* elapsed time [s] of the last record of the largest speed, doubled each time; that speed */
+      mark_speed; /* last record of the largest speed: elapsed time [s], doubled each time; speed (limits.c) */
   double before_time, before_speed; /* the same of the record before */
 
   double energy0, potential0; /* initial kinetic + potential energy; initial potential energy */
@@ -108,7 +109,7 @@ static inline int pw_fixed_steps (const pw_run *r) {
   return r->fixed_steps;
 }
 /* End of the next fixed-size step, `count` steps after the time `base`: a multiple of the size, t_end or a breakpoint,
- * whichever is first; *whole = 1 for the first. */
+ * whichever is first; *whole = 1 for the first.  Times within 1e-9 h of each other differ by round-off only. */
 static inline double pw_step_end (const pw_run *r, double base, long count, double t_end, int *whole) {
   double h = r->settings.step, t1 = base + (double)(count + 1) * h,
          stop = t_end < r->breakpoint ? t_end : r->breakpoint;
@@ -274,6 +275,10 @@ static inline void pw_forget_residuals (pw_run *r) {
 }
 
 /* ---- Projection ---- */
+
+/* Scaled residuals to which an iteration converges, the round-off of the few terms of a row; accepted where it stalls. */
+#define PW_RESIDUAL_GOOD (4 * DBL_EPSILON)
+#define PW_RESIDUAL_ENOUGH (64 * DBL_EPSILON)
 
 typedef struct {
   pw_saddle *position;         /* position metric, holonomic rows; or the run's saddle */

@@ -67,13 +67,13 @@ static int initial_positions (pw_projector *p, pw_run *r, initial_failure *failu
 static int initial_velocities (pw_projector *p, pw_run *r, double *v, initial_failure *failure) {
   pw_residuals now;
   pw_evaluate_residuals (r->w, NULL, &now);
-  for (int i = 0; i < 2 && !(now.velocity <= 4 * DBL_EPSILON); i++) {
+  for (int i = 0; i < 2 && !(now.velocity <= PW_RESIDUAL_GOOD); i++) {
     int status = pw_project_velocities (p, r, v);
     if (status < 0) return status;
     if (status != PW_OK) break;
     pw_evaluate_residuals (r->w, NULL, &now);
   }
-  if (now.velocity <= 64 * DBL_EPSILON) return PW_OK;
+  if (now.velocity <= PW_RESIDUAL_ENOUGH) return PW_OK;
   *failure = (initial_failure){ now.row_velocity, 1, now.jv, 1 };
   return PW_RETRY;
 }
@@ -117,7 +117,7 @@ static int initial_stage (pw_projector *p, pw_run *r, int velocities, const unsi
     status = initial_project (&own, r, velocities, &unused);
     pw_projector_close (&own);
     pw_evaluate_residuals (r->w, NULL, &now);
-    if (status == PW_OK && !(now.position <= 64 * DBL_EPSILON)) status = PW_RETRY;
+    if (status == PW_OK && !(now.position <= PW_RESIDUAL_ENOUGH)) status = PW_RETRY;
   }
   free (start);
   return status;
@@ -232,7 +232,7 @@ static int initial_ranked (pw_run *r, const unsigned char *prescribed, int seek,
   return status;
 }
 
-/* Reports given velocities that have vanished entirely: the wheels allow no motion. */
+/* Reports given velocities of which less than 1e-10 is left, in the norm of the metric: the wheels allow no motion. */
 static int initial_locked (pw_run *r, pw_error *error) {
   const pw_system *s = r->s;
   double given = 0, left = 0;
@@ -333,7 +333,7 @@ int pw_run_make_consistent (pw_run *r, const unsigned char *origin, pw_error *er
   int status = pw_evaluate_J_at (r->w, r->t, r->q, r->v);
   if (status != PW_OK) return pw_fail_signal (r->t, error);
   pw_evaluate_residuals (r->w, NULL, &before);
-  if (!(before.position <= 8 * DBL_EPSILON && before.velocity <= 8 * DBL_EPSILON))
+  if (!(before.position <= 2 * PW_RESIDUAL_GOOD && before.velocity <= 2 * PW_RESIDUAL_GOOD))
     status = initial_try (r, origin, &failure, &released, error);
   r->initial = (pw_initial_report){ .q_given = r->q_given,
                                     .v_given = r->v_given,

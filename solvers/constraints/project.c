@@ -5,7 +5,6 @@
  *
  * (Lubich 1991, Extrapolation integrators for constrained multibody systems; Eich 1993, Convergence results for a
  * coordinate projection method applied to mechanical systems with algebraic constraints.) */
-#include <float.h>
 #include <math.h>
 #include <stdlib.h>
 #include "method.h"
@@ -61,10 +60,6 @@ void pw_projector_close (pw_projector *p) {
   *p = (pw_projector){ 0 };
 }
 
-/* Scaled residuals: round-off of a row's few terms; accepted if the iteration stalls. */
-#define PROJECT_GOOD (4 * DBL_EPSILON)
-#define PROJECT_ENOUGH (64 * DBL_EPSILON)
-
 /* Redundant equations follow from the others to round-off; PW_RETRY if one does not: it contradicts them. */
 static int project_check_redundant (pw_projector *p, const pw_system *s, double follows, const double *g,
                                     const double *size) {
@@ -94,7 +89,7 @@ int pw_project_positions (pw_projector *p, pw_run *r, double t, double *q, const
     pw_worst_position (s, g, size, p->active, &now);
     p->row = now.row_position;
     int stalled = now.position > before / 4; /* at round-off, since convergence is quadratic */
-    if (now.position <= PROJECT_GOOD || (stalled && now.position <= PROJECT_ENOUGH)) break;
+    if (now.position <= PW_RESIDUAL_GOOD || (stalled && now.position <= PW_RESIDUAL_ENOUGH)) break;
     if (p->iterations >= most || !isfinite (now.position)) return PW_RETRY;
     before = now.position;
     pw_evaluate_J (r->w);
@@ -136,7 +131,7 @@ static int project_is_good (const pw_projector *p, pw_run *r) {
   if (p->own_velocity || p->active || r->near_singular) return 0;
   pw_residuals now;
   pw_evaluate_velocity_residual (r->w, NULL, &now);
-  if (!(now.velocity <= PROJECT_GOOD)) return 0;
+  if (!(now.velocity <= PW_RESIDUAL_GOOD)) return 0;
   r->residuals.velocity = now.velocity, r->residuals.jv = now.jv;
   return 1;
 }

@@ -5,23 +5,19 @@
 int pw_newton_open (pw_newton *n, const pw_system *s) {
   size_t block = 1, w = 1;
   for (const pw_element_batch *k = s->batch; k < s->batch + s->batches; k++) {
-    size_t cols = (size_t)k->b.cols, rows = cols > (size_t)k->kind->rows ? cols : (size_t)k->kind->rows;
-    size_t count = (size_t)k->b.count;
-    if (count * rows * cols > block) block = count * rows * cols;
-    if (count * cols * PW_MAX_SIGNALS > block) block = count * cols * PW_MAX_SIGNALS;
-    if (count * cols > w) w = count * cols;
+    const size_t columns = (size_t)k->b.count * (size_t)k->b.cols,
+                 widths[] = { (size_t)k->b.cols, (size_t)k->kind->rows, PW_MAX_SIGNALS };
+    if (columns > w) w = columns;
+    for (int i = 0; i < 3; i++)
+      if (columns * widths[i] > block) block = columns * widths[i];
   }
-  n->block = malloc (block * sizeof *n->block);
-  n->w = malloc (w * sizeof *n->w);
-  if (n->block && n->w) return PW_OK;
-  pw_newton_close (n);
-  return PW_RESOURCE;
+  n->block = malloc ((block + w) * sizeof *n->block);
+  n->w = n->block ? n->block + block : NULL;
+  return n->block ? PW_OK : PW_RESOURCE;
 }
 
 void pw_newton_close (pw_newton *n) {
   free (n->block);
-  free (n->w);
-  n->block = n->w = NULL;
 }
 
 static void newton_gather (const pw_system *s, const pw_element_batch *k, const double *w, double *local) {

@@ -85,8 +85,8 @@ typedef struct {
   char *memory;
 } pw_massless;
 
-/* Finds the components and matches them with the J last evaluated.  Errors: PW_RESOURCE, PW_INPUT (with the
- * name of a coordinate that no row determines). */
+/* Finds the components and matches them with the J last evaluated.  PW_OK, PW_RESOURCE, or PW_INPUT with the error: the
+ * name of a coordinate that no row determines.  Close it in every case. */
 int pw_massless_open (pw_massless *r, pw_workspace *w, const double *weight, int rows, const unsigned char *active,
                       pw_error *error);
 void pw_massless_close (pw_massless *r);

@@ -201,14 +201,11 @@ int pw_massless_open (pw_massless *r, pw_workspace *w, const double *weight, int
   }
   free (p.parent);
   free (p.member);
-  if (status == PW_OK) return PW_OK;
-  pw_massless_close (r);
-  return pw_fail (error, status, "model %s: out of memory", s->model);
+  return status;
 }
 
 void pw_massless_close (pw_massless *r) {
   free (r->memory);
   free (r->component);
   free (r->component_of_row);
-  *r = (pw_massless){ 0 };
 }

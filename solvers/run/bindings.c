@@ -9,36 +9,37 @@ int pw_run_record_width (const pw_run *r) {
   return PW_RECORD_STATES + 3 * r->s->coords + r->s->rows + (r->settings.ledger ? r->s->entries : 0);
 }
 
-static void record_row (const pw_run *r, const pw_sample *x, double *row) {
-  size_t n = (size_t)r->s->coords;
-  const double head[PW_RECORD_STATES] = { x->t,    x->position, x->velocity,   x->kinetic, x->potential,
-                                          x->work, x->loss,     x->projection, x->balance };
+/* Stores a sample in the next row. */
+static int record_sample (pw_run *r, double t, double *rows, long *recorded, pw_error *error) {
+  const size_t n = (size_t)r->s->coords;
+  pw_sample x;
+  int status = pw_run_sample (r, t, &x, error);
+  if (status != PW_OK) return status;
+  const double head[PW_RECORD_STATES] = { x.t,    x.position, x.velocity,   x.kinetic, x.potential,
+                                          x.work, x.loss,     x.projection, x.balance };
+  double *row = rows + (*recorded)++ * pw_run_record_width (r);
   memcpy (row, head, sizeof head);
   row += PW_RECORD_STATES;
-  memcpy (row, x->q, n * sizeof *row);
-  memcpy (row + n, x->v, n * sizeof *row);
-  memcpy (row + 2 * n, x->a, n * sizeof *row);
+  memcpy (row, x.q, n * sizeof *row);
+  memcpy (row + n, x.v, n * sizeof *row);
+  memcpy (row + 2 * n, x.a, n * sizeof *row);
   row += 3 * n;
-  for (int i = 0; i < r->s->rows; i++) row[i] = 0 - x->lambda[i];
-  if (x->ledger) memcpy (row + r->s->rows, x->ledger, (size_t)r->s->entries * sizeof *row);
+  for (int i = 0; i < r->s->rows; i++) row[i] = 0 - x.lambda[i];
+  if (x.ledger) memcpy (row + r->s->rows, x.ledger, (size_t)r->s->entries * sizeof *row);
+  return PW_OK;
 }
 
 int pw_run_record (pw_run *r, double t_end, const double *times, long count, long steps, double *rows, long *recorded,
                    pw_error *error) {
   int status = PW_OK;
-  pw_sample sample;
   *recorded = 0;
   if (pw_require (r, "a run", error) != PW_OK) return PW_INPUT;
   for (long step = 0; status == PW_OK && *recorded < count; step++) {
-    while (times && status == PW_OK && *recorded < count && times[*recorded] <= r->t) {
-      status = pw_run_sample (r, times[*recorded], &sample, error);
-      if (status == PW_OK) record_row (r, &sample, rows + *recorded * pw_run_record_width (r)), ++*recorded;
-    }
+    while (times && status == PW_OK && *recorded < count && times[*recorded] <= r->t)
+      status = record_sample (r, times[*recorded], rows, recorded, error);
     if (status != PW_OK || step == steps || r->t >= t_end) break;
     status = times ? pw_run_advance_towards (r, times[*recorded], t_end, error) : pw_run_advance (r, t_end, error);
-    if (status != PW_OK || times) continue;
-    status = pw_run_sample (r, r->t, &sample, error);
-    if (status == PW_OK) record_row (r, &sample, rows + *recorded * pw_run_record_width (r)), ++*recorded;
+    if (status == PW_OK && times == NULL) status = record_sample (r, r->t, rows, recorded, error);
   }
   return status;
 }
