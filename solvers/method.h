@@ -257,7 +257,7 @@ static inline double pw_before_breakpoint (const pw_run *r, double t) {
  * date. */
 void pw_run_accelerate_updated (pw_run *r, const double *v, double *a, double *lambda);
 
-/* The same where J is evaluated and velocities are up to date, but the saddle is not factorised; gamma is in lambda. */
+/* The same where the saddle is not factorised. */
 int pw_run_accelerate_evaluated (pw_run *r, const double *v, double *a, double *lambda);
 
 /* Copies the state reached to the sample arrays; updates kinematics and J there. */

@@ -151,7 +151,6 @@ int pw_project_state (pw_projector *p, pw_run *r, double t, double *q, double *v
       return PW_OK;
     }
   }
-  pw_evaluate_gamma (r->w, lambda);
   return pw_run_accelerate_evaluated (r, v, a, lambda);
 }
 
