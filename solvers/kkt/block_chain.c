@@ -222,30 +222,20 @@ PW_INLINE chain_point chain_backward (const pw_block_ldl *l, chain_sweep *s, int
   return at;
 }
 
-static void chain_backward_whole (const pw_block_ldl *l, const pw_chain *c, const double *f, double *y, double *a) {
-  chain_sweep s = chain_begin (l, c, -1);
-  chain_move (&s, c->bodies / 2, -1);
-  chain_sweep middle = s;
-  middle.b = middle.a;
-  chain_move (&middle, c->bodies % 2, 1);
-  chain_point at = chain_point_at (&middle, y);
-  const chain_point z = chain_divide_kept (&middle, at.x, at.y);
-  at = (chain_point){ -z.x, -z.y };
-  y[middle.a.y] = at.x[0], y[middle.a.y + 1] = at.y[0];
-  if (c->bodies % 2) {
-    const chain_point before = chain_backward (l, &middle, 1, f, y, a, at);
-    at.x[0] = before.x[0], at.y[0] = before.y[0];
-  }
-  for (int n = 0; n < c->bodies / 2; n++) at = chain_backward (l, &s, -1, f, y, a, at);
-}
-
 void pw_chain_backward (const pw_block_ldl *l, const pw_chain *c, const double *f, double *y, double *a) {
+  chain_sweep s = chain_begin (l, c, c->whole ? -1 : 1), along;
+  chain_move (&s, c->whole ? c->bodies / 2 : 0, -1);
+  along = s;
+  along.b = along.a;
+  chain_move (&along, c->whole ? c->bodies % 2 : c->bodies, 1);
+  chain_point at = chain_point_at (&along, y);
   if (c->whole) {
-    chain_backward_whole (l, c, f, y, a);
-    return;
+    const chain_point z = chain_divide_kept (&along, at.x, at.y);
+    at = (chain_point){ -z.x, -z.y };
+    y[along.a.y] = at.x[0], y[along.a.y + 1] = at.y[0];
   }
-  chain_sweep s = chain_begin (l, c, 1);
-  chain_move (&s, c->bodies, 1);
-  chain_point at = chain_point_at (&s, y);
-  for (int n = 0; n < c->bodies; n++) at = chain_backward (l, &s, 1, f, y, a, at);
+  const chain_point middle = at;
+  for (int n = c->whole ? c->bodies % 2 : c->bodies; n > 0; n--) at = chain_backward (l, &along, 1, f, y, a, at);
+  at.x[1] = middle.x[1], at.y[1] = middle.y[1];
+  for (int n = c->whole ? c->bodies / 2 : 0; n > 0; n--) at = chain_backward (l, &s, -1, f, y, a, at);
 }
