@@ -72,7 +72,7 @@ struct pw_run {
   double exchanged;           /* the largest kinetic energy or change of potential energy so far (ledger.c) */
   double power;               /* the largest sum of the ledger's rates so far */
   double energy_scene; /* kinetic energy at the velocities L and 1 rad per span; for a massless scene see ledger.c */
-  double *scratch;     /* 2 (coords + 3) + 3 rows */
+  double *scratch;     /* 2 (coords + 3) + 3 rows, for projections and evaluations */
   double *saturation;  /* 2 coords: upper bounds of tolerances; INFINITY: unbounded */
   double *matrix_state, *matrix_range; /* 2 coords: state at which the Newton matrix was evaluated; its
                                            valid range; only if the system `saturates` */
@@ -285,7 +285,6 @@ typedef struct {
   int own_position;            /* position is not the run's saddle */
   pw_saddle *velocity;         /* all rows */
   int own_velocity;            /* velocity is not the run's saddle */
-  double *scratch;             /* 3 rows + coords */
   int iterations;              /* of the last position projection */
   const unsigned char *active; /* rows that are enforced; NULL: all */
   int alone;                   /* 1: inactive rows are not checked */

@@ -56,8 +56,8 @@ static int initial_positions (pw_projector *p, pw_run *r, initial_failure *failu
   int status = pw_project_positions (p, r, r->t, r->q, r->v);
   if (status == PW_OK) return PW_OK;
   if (pw_update_kinematics (r->w, r->t, r->q, r->v) == PW_OK && p->row >= 0) {
-    pw_evaluate_g (r->w, p->scratch);
-    *failure = (initial_failure){ p->row, 0, fabs (p->scratch[p->row]), 0 };
+    pw_evaluate_g (r->w, r->scratch);
+    *failure = (initial_failure){ p->row, 0, fabs (r->scratch[p->row]), 0 };
   }
   return status;
 }

@@ -29,8 +29,6 @@ int pw_projector_open (pw_projector *p, pw_run *r, const double *weight_q, const
                        .row = -1,
                        .against = -1,
                        .by_mass = weight_q == NULL && weight_v == NULL };
-  p->scratch = malloc (((size_t)(3 * s->rows + s->coords) + 4) * sizeof *p->scratch);
-  if (p->scratch == NULL) return pw_fail_memory (s, error);
   p->position = weight_q ? pw_saddle_open (r->w, weight_q, s->holonomic, r->active, error) : project_by_mass (r, error);
   p->own_position = p->position != r->saddle;
   if (p->own_velocity) p->velocity = pw_saddle_open (r->w, weight_v, s->rows, r->active, error);
@@ -56,7 +54,6 @@ int pw_projector_open_by_options (pw_projector *p, pw_run *r, pw_error *error) {
 void pw_projector_close (pw_projector *p) {
   if (p->own_position) pw_saddle_close (p->position);
   if (p->own_velocity) pw_saddle_close (p->velocity);
-  free (p->scratch);
   *p = (pw_projector){ 0 };
 }
 
@@ -80,7 +77,7 @@ int pw_project_positions (pw_projector *p, pw_run *r, double t, double *q, const
   const int most = 30;        /* quadratic convergence needs some 5; a bad start needs more */
   const pw_system *s = r->s;
   pw_residuals now = { 0 };
-  double *g = p->scratch, *size = g + s->rows, *mu = size + s->rows, *dq = mu + s->rows, before = INFINITY;
+  double *g = r->scratch, *size = g + s->rows, *mu = size + s->rows, *dq = mu + s->rows, before = INFINITY;
   for (p->iterations = 0;; p->iterations++) {
     int failed = pw_update_kinematics (r->w, t, q, v);
     if (failed) return failed;
@@ -108,7 +105,7 @@ int pw_project_positions (pw_projector *p, pw_run *r, double t, double *q, const
 /* v += dv with J (v + dv) = eta. */
 static void project_once (pw_projector *p, pw_run *r, double *v) {
   const pw_system *s = r->s;
-  double *right = p->scratch, *eta = right + s->rows, *mu = eta + s->rows, *dv = mu + s->rows;
+  double *right = r->scratch, *eta = right + s->rows, *mu = eta + s->rows, *dv = mu + s->rows;
   pw_mul_J (r->w, v, right);
   if (s->rheonomic) pw_evaluate_eta (r->w, eta);
   for (int i = 0; i < s->rows; i++) right[i] = (s->rheonomic ? eta[i] : 0) - right[i];

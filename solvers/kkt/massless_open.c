@@ -99,6 +99,7 @@ static void massless_add_rows (massless_plan *p, pw_massless *r) {
 /* Allocates the components.  The number of groups is bounded by that counted with repetition, and by that of the scene;
  * the number of pivots by that of rows. */
 static int massless_lay_out (pw_massless *r, const massless_plan *p) {
+  static const double zero[3] = { 0 };
   for (pw_layout l = { 0 }; pw_layout_pass (&l, &r->memory);)
     for (pw_component *c = r->component; c < r->end; c++) {
       size_t rows = (size_t)c->rows, groups = (size_t)(c->groups < p->groups ? c->groups : p->groups),
@@ -115,6 +116,7 @@ static int massless_lay_out (pw_massless *r, const massless_plan *p) {
       const double **from = pw_layout_alloc (&l, rows * groups, sizeof *from);
       if (l.base == NULL) continue;
       for (size_t i = 0; i < rows; i++) c->row[i].from = from + i * groups;
+      for (size_t i = 0; i < rows * groups; i++) from[i] = zero;
       c->rows = c->groups = 0;
     }
   return r->memory ? PW_OK : PW_RESOURCE;
@@ -132,7 +134,6 @@ static int massless_undetermined (const pw_system *s, int j, pw_error *error) {
 
 /* Marks the massless columns and matches them; reports a column that no row determines. */
 static int massless_check (pw_massless *r, const massless_plan *p, pw_error *error) {
-  static const double zero[3] = { 0 };
   const pw_system *s = p->s;
   for (pw_component *c = r->component; c < r->end; c++) {
     int massless = 0;
@@ -147,8 +148,6 @@ static int massless_check (pw_massless *r, const massless_plan *p, pw_error *err
     c->pivots = massless < c->rows ? massless : c->rows;
     c->lower = c->cols + c->cols % 2;
     c->stride = c->lower + c->pivots;
-    for (int i = 0; i < c->rows * c->groups; i++)
-      if (c->row[i / c->groups].from[i % c->groups] == NULL) c->row[i / c->groups].from[i % c->groups] = zero;
     int found = pw_massless_match (c);
     if (found == massless) continue;
     for (int n = 0; n < c->cols; n++) {
