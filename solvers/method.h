@@ -85,7 +85,8 @@ struct pw_run {
   char *memory;
 };
 
-/* Absolute tolerance of a state, numbered as in pw_system_find_state: the user's atol, or rtol in units of the scene. */
+/* Absolute tolerance of a state, numbered as in pw_system_find_state: the user's atol, or rtol in units of the
+ * scene. */
 static inline double pw_atol (const pw_run *r, int state) {
   const int n = r->s->coords;
   if (r->settings.atol > 0) return r->settings.atol;
@@ -221,7 +222,8 @@ static inline int pw_run_stop_requested (pw_run *r) {
 /* Before each attempted step: PW_OK; PW_STOPPED if the caller requests it; PW_METHOD at max_steps. */
 int pw_run_check_limits (pw_run *r, pw_error *error);
 
-/* Steps between checks of coordinates and records of energies; at most as many are made in one call of specialised code. */
+/* Steps between checks of coordinates and records of energies; at most as many are made in one call of specialised
+ * code. */
 enum { PW_CHECK_INTERVAL = 16 };
 
 /* After each step: records speeds; PW_METHOD if coordinates are too large for double precision to resolve the scene. */
@@ -276,7 +278,8 @@ static inline void pw_forget_residuals (pw_run *r) {
 
 /* ---- Projection ---- */
 
-/* Scaled residuals to which an iteration converges, the round-off of the few terms of a row; accepted where it stalls. */
+/* Scaled residuals to which an iteration converges, the round-off of the few terms of a row; accepted where it
+ * stalls. */
 #define PW_RESIDUAL_GOOD (4 * DBL_EPSILON)
 #define PW_RESIDUAL_ENOUGH (64 * DBL_EPSILON)
 
@@ -327,7 +330,8 @@ void pw_specialised_select (pw_run *r);
 int pw_specialised_evaluate (pw_run *r, double t, const double *q, const double *v, double *a, double *lambda);
 int pw_specialised_project (const pw_projector *p, pw_run *r, double t, double *q, double *v, double *a,
                             double *lambda);
-/* The stages of a step, if specialised code can evaluate all of them: 1; 0 if not.  Kinematics and J are not updated. */
+/* The stages of a step, if specialised code can evaluate all of them: 1; 0 if not.  Kinematics and J are not
+ * updated. */
 int pw_specialised_stages (pw_run *r, const struct pw_scene_step *x);
 /* Residuals of the state reached, unless they are known or the general engine has to evaluate them. */
 void pw_specialised_residuals (pw_run *r);

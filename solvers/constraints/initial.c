@@ -12,12 +12,13 @@
 #include "method.h"
 #include "rank.h"
 
-/* Rows times coordinates above which the cost of seeking dependent equations, rows^2 x coordinates, counts.  Then they are not
- * sought while states specified by the model are prescribed: that usually fails for sketches of linkages, which specify all
- * positions; nor, unless values are given, for the coordinates that are not prescribed. */
+/* Rows times coordinates above which the cost of seeking dependent equations, rows^2 x coordinates, counts.  Then they
+ * are not sought while states specified by the model are prescribed: that usually fails for sketches of linkages, which
+ * specify all positions; nor, unless values are given, for the coordinates that are not prescribed. */
 #define INITIAL_SMALL 1e4
 
-/* Off the constraints dependent equations appear independent, the more the larger the residuals: hence several tolerances. */
+/* Off the constraints dependent equations appear independent, the more the larger the residuals: hence several
+ * tolerances. */
 enum { TOLERANCES = 4 };
 static const double initial_tolerance[TOLERANCES] = { 1e-7, 1e-4, 1e-2, 0.1 };
 
@@ -124,8 +125,8 @@ static int initial_stage (pw_projector *p, pw_run *r, int velocities, const unsi
 }
 
 /* One attempt from these positions and the given velocities, with some states prescribed; seek: dependent equations are
- * sought in the coordinates that are not.  The velocity metric is the mass matrix if that determines all velocities, else
- * the position metric. */
+ * sought in the coordinates that are not.  The velocity metric is the mass matrix if that determines all velocities,
+ * else the position metric. */
 static int initial_attempt (pw_run *r, const unsigned char *prescribed, int seek, const double *from,
                             initial_failure *failure, pw_error *error) {
   const pw_system *s = r->s;

@@ -62,8 +62,8 @@ double pw_row_basis_orthogonalise (const pw_row_basis *b, double *row, int first
   return sqrt (norm);
 }
 
-/* The next row to keep of rows first .. end - 1: the first whose norm is at least 0.9 of the largest, so that equal rows keep
- * their order whatever their round-off. */
+/* The next row to keep of rows first .. end - 1: the first whose norm is at least 0.9 of the largest, so that equal
+ * rows keep their order whatever their round-off. */
 static int rank_pivot (const pw_row_basis *b, int first, int end) {
   double most = 0;
   for (int i = first; i < end; i++)
@@ -73,8 +73,8 @@ static int rank_pivot (const pw_row_basis *b, int first, int end) {
   return -1;
 }
 
-/* Keeps independent rows among first .. end - 1, until there are `most`.  Each is orthogonalised as others are kept, and
- * once more before it is (Giraud, Langou & Rozloznik 2005). */
+/* Keeps independent rows among first .. end - 1, until there are `most`.  Each is orthogonalised as others are kept,
+ * and once more before it is (Giraud, Langou & Rozloznik 2005). */
 static void rank_keep (pw_row_basis *b, double tol, int most, int first, int end) {
   for (int i = first; i < end; i++) b->norm[i] = pw_row_basis_orthogonalise (b, rank_row (b, i), 0);
   for (int next; b->rank < most && (next = rank_pivot (b, first, end)) >= 0;) {

@@ -38,10 +38,10 @@ typedef struct {
 int pw_row_basis_open (pw_row_basis *b, const pw_system *s); /* PW_OK or PW_RESOURCE */
 void pw_row_basis_close (pw_row_basis *b);
 
-/* Selects at most `holonomic` holonomic and `all` equations by Gram-Schmidt on the evaluated J, rows of length 1: those whose
- * part independent of the ones kept before exceeds tol.  Holonomic equations come first, since a nonholonomic one must not
- * replace a holonomic one; of these the most independent ones, in order where they are about equal.  fixed (coords, or NULL):
- * 1 for coordinates that are left out.  Returns the rank. */
+/* Selects at most `holonomic` holonomic and `all` equations by Gram-Schmidt on the evaluated J, rows of length 1: those
+ * whose part independent of the ones kept before exceeds tol.  Holonomic equations come first, since a nonholonomic one
+ * must not replace a holonomic one; of these the most independent ones, in order where they are about equal.  fixed
+ * (coords, or NULL): 1 for coordinates that are left out.  Returns the rank. */
 int pw_row_basis_select (pw_row_basis *b, const pw_workspace *w, double tol, const unsigned char *fixed, int holonomic,
                          int all);
 
@@ -61,12 +61,12 @@ int pw_rank_open (struct pw_run *r, pw_error *error);
 int pw_rank_reselect (struct pw_run *r);
 
 /* Conditioning of the active equations: 1 over their largest coefficient in a sum of the redundant ones with irregular
- * weights (rows of length 1).  Residuals of the redundant equations are those of the active ones divided by this.  J must be
- * evaluated and the run's saddle factorised at the configuration. */
+ * weights (rows of length 1).  Residuals of the redundant equations are those of the active ones divided by this.  J
+ * must be evaluated and the run's saddle factorised at the configuration. */
 double pw_rank_independence (struct pw_run *r);
 
-/* Saves or loads r->active; the number of redundant equations must not change.  Saddle and method still use the previous
- * set. */
+/* Saves or loads r->active; the number of redundant equations must not change.  Saddle and method still use the
+ * previous set. */
 void pw_rank_serialise (struct pw_run *r, pw_archive *a);
 
 /* The unit of a row's multiplier, from the J last evaluated: 1 for a force, L for a moment (a row without entries in x

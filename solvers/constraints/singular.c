@@ -13,15 +13,15 @@ const pw_watchdog pw_watchdog_limits = {
   .lost = 1e-2,
   .lost_unstabilised = 0.1,
 
-  /* A redundant row follows from the others up to a round-off of some 1e6 eps, or up to their residuals divided by a sine
-   * as small as 1e-4. */
+  /* A redundant row follows from the others up to a round-off of some 1e6 eps, or up to their residuals divided by a
+   * sine as small as 1e-4. */
   .follows = 1e-9,
   .magnified = 1e4,
 
   /* Round-off leaves sqrt (eps) = 1.5e-8 of a row that depends on others; below the sine 1e-6 accelerations, with an
-   * error of eps / s after refinement, are wrong by more than 1e-10.  After rows that are nearly dependent
-   * themselves, round-off leaves up to 1e-5: `dependent`, which is refused where a scene is too large for its rank to be
-   * computed.  Below a hundred times that, `suspect`, the rank is computed. */
+   * error of eps / s after refinement, are wrong by more than 1e-10.  After rows that are nearly dependent themselves,
+   * round-off leaves up to 1e-5: `dependent`, which is refused where a scene is too large for its rank to be computed.
+   * Below a hundred times that, `suspect`, the rank is computed. */
   .rank = 1e-6,
   .suspect = 1e-3,
   .dependent = 1e-5,
@@ -77,8 +77,8 @@ const pw_watchdog pw_watchdog_limits = {
   .agree = 1e-7,
   .agree_best = 1e-11,
 
-  /* A step that ends within a tenth of its length from a singular configuration: the accelerations, whose error is that of
-   * the state over the sine, are ten times less accurate than at its beginning. */
+  /* A step that ends within a tenth of its length from a singular configuration: the accelerations, whose error is that
+   * of the state over the sine, are ten times less accurate than at its beginning. */
   .lands = 0.1,
 
   /* A sample does not affect the next step: an error of a hundredth is acceptable. */

@@ -59,8 +59,8 @@ void pw_specialised_select (pw_run *r) {
   r->specialised = same ? code : NULL;
 }
 
-/* 0 where the general engine has more to do than to evaluate: with fixed steps it watches the sine of every stage; adaptive
- * methods ask for it only below the pivots that the specialised code accepts. */
+/* 0 where the general engine has more to do than to evaluate: with fixed steps it watches the sine of every stage;
+ * adaptive methods ask for it only below the pivots that the specialised code accepts. */
 int pw_specialised_suits (const pw_run *r) {
   const pw_geometry *g = &r->geometry;
   return r->specialised && !r->redundant_moves && !(g->alert && g->saddle && pw_fixed_steps (r)) && !r->near_singular &&

@@ -1,5 +1,5 @@
-/* Repeated assembly of a sparse matrix by the same sequence of contributions: the sequence is recorded once and laid out
- * in compressed columns; from then on the number of a contribution determines its position. */
+/* Repeated assembly of a sparse matrix by the same sequence of contributions: the sequence is recorded once and laid
+ * out in compressed columns; from then on the number of a contribution determines its position. */
 #ifndef PW_SCATTER_H
 #define PW_SCATTER_H
 

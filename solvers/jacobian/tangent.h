@@ -28,8 +28,8 @@ typedef struct {
 int pw_tangent_open (pw_tangent *x, pw_run *r); /* PW_OK or PW_RESOURCE */
 void pw_tangent_close (pw_tangent *x);
 
-/* Multipliers of all equations from those of the active ones, valid until the next call: lambda; the first `count` of mu,
- * NULL if there are none. */
+/* Multipliers of all equations from those of the active ones, valid until the next call: lambda; the first `count` of
+ * mu, NULL if there are none. */
 const double *pw_tangent_lambda (const pw_tangent *x, const double *used);
 const double *pw_tangent_mu (const pw_tangent *x, const double *used, int count);
 /* The same lambda in an array of all equations. */

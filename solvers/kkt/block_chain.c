@@ -126,8 +126,8 @@ PW_INLINE void chain_eliminate (pw_block_ldl *l, chain_sweep *s, int sign, chain
   chain_move (s, 1, sign);
 }
 
-/* Along the chain to the next column; or, if it is `whole`, from both ends to the pin in the middle, which of an odd number
- * of bodies is that after the body in the middle. */
+/* Along the chain to the next column; or, if it is `whole`, from both ends to the pin in the middle, which of an odd
+ * number of bodies is that after the body in the middle. */
 void pw_chain_factor (pw_block_ldl *l, const pw_chain *c) {
   const double *first = l->value + l->column[c->column].at;
   double *last = l->value + l->column[c->column + c->bodies].at;

@@ -23,8 +23,8 @@
  *   L = K D_c^-1,   D_(c+1) = K_(c+1)(c+1) - L K^T,   y_(c+1) -= L y_c
  *   backwards:   y_c = -D_c^-1 (y_c + K^T y_(c+1)),   K^T y = +-m y + i (b . y) a
  *
- * where D and y are passed from pin to pin, and only the factors of D are stored.  If nothing is below the last pin, the
- * elimination proceeds from both ends to the middle. */
+ * where D and y are passed from pin to pin, and only the factors of D are stored.  If nothing is below the last pin,
+ * the elimination proceeds from both ends to the middle. */
 #ifndef PW_BLOCK_LDL_H
 #define PW_BLOCK_LDL_H
 
@@ -107,8 +107,8 @@ typedef struct {
 } pw_plan_node;
 
 /* pair: 2 x pairs node numbers with a block between them, each unordered pair any number of times, the diagonal not
- * needed, fewer than 2^30.  The order is that of the nodes if it fills in no more than minimum degree does (AMD: Amestoy, Davis & Duff
- * 1996).  NULL if out of memory. */
+ * needed, fewer than 2^30.  The order is that of the nodes if it fills in no more than minimum degree does (AMD:
+ * Amestoy, Davis & Duff 1996).  NULL if out of memory. */
 pw_block_ldl *pw_block_open (int nodes, const pw_plan_node *node, long pairs, const int *pair);
 void pw_block_close (pw_block_ldl *l);
 

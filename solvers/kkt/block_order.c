@@ -65,8 +65,8 @@ static void order_graph (order_search *x, int rank) {
   }
 }
 
-/* Passes through the rows of L: row i has entries in the columns on the paths of the elimination tree from those of K to
- * i (Davis 2005, Algorithm 849: LDL).  The first pass counts them in first[column + 2], the second one lists them.
+/* Passes through the rows of L: row i has entries in the columns on the paths of the elimination tree from those of K
+ * to i (Davis 2005, Algorithm 849: LDL).  The first pass counts them in first[column + 2], the second one lists them.
  * PW_RETRY if there are more than `most`. */
 static int order_pass (const order_search *x, int most, const order_variant *v) {
   long count = 0;

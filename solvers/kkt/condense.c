@@ -111,8 +111,8 @@ static int condense_sort (pw_plan *c) {
 /* ---- Bodies that are not condensed ---- */
 
 /* A body at which more nodes than this meet is not condensed, if its weights are finite: n nodes have n (n - 1) / 2
- * couplings, but only 2 n with an uncondensed body, fewer from n = 6.  Measured: 0.6 to 0.9 of the time with 7 nodes, 0.7
- * to 1.0 with 6. */
+ * couplings, but only 2 n with an uncondensed body, fewer from n = 6.  Measured: 0.6 to 0.9 of the time with 7 nodes,
+ * 0.7 to 1.0 with 6. */
 enum { CONDENSE_MEET = 6 };
 
 static int condense_is_crowded (const pw_plan *c, int b) {

@@ -1,10 +1,11 @@
 /* Ranks of the nodes in a scene with uncondensed bodies; see condense.h and block_ldl.h.
  *
- * Nodes of rank 0 are eliminated before the uncondensed bodies, as if these were at rest; those of rank 2 after them.  The
- * former must be regular wherever the mechanism is.  With a leg between an uncondensed body and the ground, or another
- * uncondensed body, they are not: at rest at both ends, it is singular where it is stretched.  So the nodes at one end have rank 2.
- * Then multipliers of rank 0 without force on the bodies of a leg exert none on the body at its end either, since joints
- * exert no resultant force and moment: dependent equations of rank 0 are dependent in the whole mechanism.
+ * Nodes of rank 0 are eliminated before the uncondensed bodies, as if these were at rest; those of rank 2 after them.
+ * The former must be regular wherever the mechanism is.  With a leg between an uncondensed body and the ground, or
+ * another uncondensed body, they are not: at rest at both ends, it is singular where it is stretched.  So the nodes at
+ * one end have rank 2. Then multipliers of rank 0 without force on the bodies of a leg exert none on the body at its
+ * end either, since joints exert no resultant force and moment: dependent equations of rank 0 are dependent in the
+ * whole mechanism.
  *
  * A leg is a set of bodies joined by nodes that touch neither uncondensed bodies nor the ground. */
 #include <stdlib.h>
@@ -43,8 +44,8 @@ static int rank_leg_group (const pw_plan *c, int n, int *touches) {
   return found;
 }
 
-/* Joins the groups of node n, with the ground if it is `grounded`.  Returns 0 if that would connect two of the uncondensed
- * bodies and the ground. */
+/* Joins the groups of node n, with the ground if it is `grounded`.  Returns 0 if that would connect two of the
+ * uncondensed bodies and the ground. */
 static int rank_join (rank_plan *x, int n) {
   const pw_plan *c = x->c;
   const int first = c->node[n].first, end = rank_end (c, n);

@@ -106,8 +106,8 @@ double pw_massless_factor (pw_massless *r);
 /* First half of a solve: f becomes f~ at the massive coordinates, gamma becomes gamma~ at `y` of unmatched rows. */
 void pw_massless_forward (pw_massless *r, double *f, double *gamma);
 
-/* Second half, from a of the massive coordinates and lambda at `y` of unmatched rows: a of the massless coordinates, and
- * lambda of all rows. */
+/* Second half, from a of the massive coordinates and lambda at `y` of unmatched rows: a of the massless coordinates,
+ * and lambda of all rows. */
 void pw_massless_backward (pw_massless *r, double *a, double *lambda);
 
 #endif

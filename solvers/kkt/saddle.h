@@ -37,8 +37,8 @@ int pw_saddle_factor_solve (pw_saddle *k, const double *f, const double *gamma, 
 /* 1 if the smallest pivot of the last factorisation is below this sine. */
 int pw_saddle_below (pw_saddle *k, double sine);
 
-/* The smallest pivot of the last factorisation, as the sine of the angle between a row and those before it: small near a
- * singular configuration; *row: that row, or -1 for one of coordinates without weight. */
+/* The smallest pivot of the last factorisation, as the sine of the angle between a row and those before it: small near
+ * a singular configuration; *row: that row, or -1 for one of coordinates without weight. */
 double pw_saddle_pivot (pw_saddle *k, int *row);
 
 #endif
