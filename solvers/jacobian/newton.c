@@ -75,19 +75,10 @@ void pw_newton_block (pw_newton *n, pw_workspace *w, pw_scatter_map *t, pw_block
   }
 }
 
-/* Adds all entries of J, or of its transpose. */
-static void newton_J (const pw_workspace *w, pw_scatter_map *t, const pw_placement *put, int transposed) {
+void pw_newton_J (const pw_workspace *w, pw_scatter_map *t, int transposed, const pw_placement *put) {
   const pw_system *s = w->s;
   for (const pw_element_batch *k = w->batch; k < w->batch + s->constraints && k->row < put->rows; k++)
     newton_add (s, k, NEWTON_J, transposed, k->J, t, put);
-}
-
-void pw_newton_J (const pw_workspace *w, pw_scatter_map *t, const pw_placement *put) {
-  newton_J (w, t, put, 0);
-}
-
-void pw_newton_JT (const pw_workspace *w, pw_scatter_map *t, const pw_placement *put) {
-  newton_J (w, t, put, 1);
 }
 
 void pw_newton_signals (pw_newton *n, pw_workspace *w, pw_scatter_map *t, int row, int col, int col_v) {

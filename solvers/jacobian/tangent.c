@@ -78,7 +78,7 @@ static void tangent_equations (pw_tangent *x, pw_block block, int row, int col, 
 
 /* Adds J of the first `rows` equations, with these factors. */
 static void tangent_J (pw_tangent *x, int rows, int row, int col, double holonomic, double nonholonomic) {
-  pw_newton_J (x->run->w, &x->scatter, &(pw_placement){ row, col, rows, holonomic, nonholonomic, .map = x->map });
+  pw_newton_J (x->run->w, &x->scatter, 0, &(pw_placement){ row, col, rows, holonomic, nonholonomic, .map = x->map });
 }
 
 /* of_q I + D (G^T mu)_q, -I, D G^T */
@@ -95,7 +95,7 @@ void pw_tangent_kinematics (pw_tangent *x, const pw_tangent_layout *to, const do
   pw_newton_block (&x->newton, x->run->w, &x->scatter, PW_JTL_Q, &put);
   put.col = to->mu;
   put.factor = to->of_lambda;
-  pw_newton_JT (x->run->w, &x->scatter, &put);
+  pw_newton_J (x->run->w, &x->scatter, 1, &put);
 }
 
 /* (J v)_q - eta_q, J */
@@ -125,7 +125,7 @@ void pw_tangent_momentum (pw_tangent *x, const pw_tangent_layout *to, const doub
   for (int j = 0; j < s->coords; j++) pw_scatter_add (&x->scatter, to->momentum + j, to->a + j, to->of_a * s->mass[j]);
   put.factor = put.factor_nonholonomic = to->of_lambda;
   put.col = to->lambda;
-  pw_newton_JT (x->run->w, &x->scatter, &put);
+  pw_newton_J (x->run->w, &x->scatter, 1, &put);
 }
 
 /* (J a)_q - gamma_q + 2 alpha ((J v)_q - eta_q) + beta^2 G, 2 alpha J - gamma_v, J */

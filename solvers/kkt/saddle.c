@@ -90,9 +90,3 @@ void pw_saddle_solve (pw_saddle *k, const double *f, const double *gamma, double
   for (int i = 0; i < k->inactives; i++) lambda[k->inactive[i]] = 0;
   if (k->massless.components) pw_massless_backward (&k->massless, a, lambda);
 }
-
-int pw_saddle_factor_solve (pw_saddle *k, const double *f, const double *gamma, double *a, double *lambda) {
-  int status = pw_saddle_factor (k);
-  if (status == PW_OK) pw_saddle_solve (k, f, gamma, a, lambda);
-  return status;
-}

@@ -31,9 +31,6 @@ void pw_saddle_postpone (pw_saddle *k, double pivot);
  * the same, lambda and gamma too. */
 void pw_saddle_solve (pw_saddle *k, const double *f, const double *gamma, double *a, double *lambda);
 
-/* Factorises and, if that returns PW_OK, solves. */
-int pw_saddle_factor_solve (pw_saddle *k, const double *f, const double *gamma, double *a, double *lambda);
-
 /* 1 if the smallest pivot of the last factorisation is below this sine. */
 int pw_saddle_below (pw_saddle *k, double sine);
 
