@@ -2,6 +2,7 @@
 #ifndef PW_METHOD_H
 #define PW_METHOD_H
 
+#include <float.h>
 #include <math.h>
 #include "pinwheel-method.h"
 #include "saddle.h"
@@ -22,16 +23,20 @@ struct pw_run {
   int fixed_steps;             /* 1: fixed step size */
   pw_saddle *saddle;           /* mass matrix, all constraint equations: accelerations, impulses */
   const unsigned char *active; /* rows: 0 for redundant ones; NULL: none is redundant */
-  int redundant;               /* number of redundant rows */
-  int *redundant_row;          /* indices of these rows */
-  double *coefficient;         /* redundant x rows: each redundant row as a combination of active rows; then scratch */
-  double *least_norm;          /* rows: least-norm multipliers for the ledger; NULL: no redundant row moves */
+  int redundant;               /* number of redundant rows; the following only if there are any */
+  int redundant_moves;         /* 1: one of them has an eta, so that work depends on its multiplier */
+  int *redundant_row;          /* redundant: their indices */
+  unsigned char *independent;  /* rows: the run's own `active` */
+  double *coefficient;         /* redundant x rows: each redundant row as a combination of active rows */
+  double *normal;              /* redundant x (redundant + 1): normal equations of least-norm multipliers */
+  double *row_force, *zero;    /* coords + 3, rows: right-hand sides */
+  double *least_norm;          /* rows: least-norm multipliers for the ledger */
   char *rank_memory;
   double independence;                      /* of the active rows at the state reached (rank.h) */
   double reselect_below;                    /* independence below which other rows are tried */
   const struct pw_specialised *specialised; /* compiled code of the scene in use, or NULL */
   struct pw_scene *scene;                   /* data of that code */
-  void *scene_memory;
+  char *scene_memory;
   int scene_ready;        /* 1: its constants have been computed */
   pw_watchdog limits;     /* thresholds */
   pw_geometry geometry;   /* distance of the constraints from a singular configuration */
@@ -60,14 +65,14 @@ struct pw_run {
   int stopped;     /* 1: settings.stop requested it */
   int interrupted; /* 1: inside a step of SUNDIALS, which must be restarted */
   double mark_time,
-      mark_speed; /* elapsed time [s] of the last record of the largest speed, doubled each time; that speed */
+      mark_speed; /* last record of the largest speed: elapsed time [s], doubled each time; speed (limits.c) */
   double before_time, before_speed; /* the same of the record before */
 
   double energy0, potential0; /* initial kinetic + potential energy; initial potential energy */
   double exchanged;           /* the largest kinetic energy or change of potential energy so far (ledger.c) */
   double power;               /* the largest sum of the ledger's rates so far */
   double energy_scene; /* kinetic energy at the velocities L and 1 rad per span; for a massless scene see ledger.c */
-  double *scratch;     /* 2 (coords + 3) + 3 rows */
+  double *scratch;     /* 2 (coords + 3) + 3 rows, for projections and evaluations */
   double *saturation;  /* 2 coords: upper bounds of tolerances; INFINITY: unbounded */
   double *matrix_state, *matrix_range; /* 2 coords: state at which the Newton matrix was evaluated; its
                                            valid range; only if the system `saturates` */
@@ -80,12 +85,13 @@ struct pw_run {
   char *memory;
 };
 
-/* Absolute tolerances of coordinate j and of its velocity: the user's atol, or rtol in units of the scene. */
-static inline double pw_atol (const pw_run *r, int j) {
-  return r->settings.atol > 0 ? r->settings.atol : r->settings.rtol * pw_unit (r->s, j);
-}
-static inline double pw_atol_velocity (const pw_run *r, int j) {
-  return r->settings.atol > 0 ? r->settings.atol : r->settings.rtol * pw_unit (r->s, j) / r->w->scale.time;
+/* Absolute tolerance of a state, numbered as in pw_system_find_state: the user's atol, or rtol in units of the
+ * scene. */
+static inline double pw_atol (const pw_run *r, int state) {
+  const int n = r->s->coords;
+  if (r->settings.atol > 0) return r->settings.atol;
+  double atol = r->settings.rtol * pw_unit (r->s, state < n ? state : state - n);
+  return state < n ? atol : atol / r->w->scale.time;
 }
 /* Updates r->saturation, the change of state that reverses a saturating force, and r->outdated, at the state
  * reached, whose kinematics must be up to date (tolerances.c). */
@@ -94,20 +100,17 @@ void pw_bound_tolerances (pw_run *r);
 double pw_saturation_range (const pw_run *r, int state);
 /* Records the state at which the Newton matrix was evaluated; kinematics must be up to date there. */
 void pw_matrix_evaluated (pw_run *r, const double *q, const double *v);
-/* Tolerances of coordinate j and of its velocity at a given value, for iterative methods.  They are bounded by the range
- * in which a force saturates; otherwise an iteration could converge to any value of the force. */
-static inline double pw_tolerance (const pw_run *r, int j, double q) {
-  return fmin (r->settings.rtol * fabs (q) + pw_atol (r, j), r->saturation[j]);
-}
-static inline double pw_tolerance_velocity (const pw_run *r, int j, double v) {
-  return fmin (r->settings.rtol * fabs (v) + pw_atol_velocity (r, j), r->saturation[r->s->coords + j]);
+/* Tolerance of a state at a given value, for iterative methods.  It is bounded by the range in which a force saturates;
+ * otherwise an iteration could converge to any value of the force. */
+static inline double pw_tolerance (const pw_run *r, int state, double value) {
+  return fmin (r->settings.rtol * fabs (value) + pw_atol (r, state), r->saturation[state]);
 }
 /* 1 if the step size is fixed. */
 static inline int pw_fixed_steps (const pw_run *r) {
   return r->fixed_steps;
 }
 /* End of the next fixed-size step, `count` steps after the time `base`: a multiple of the size, t_end or a breakpoint,
- * whichever is first; *whole = 1 for the first. */
+ * whichever is first; *whole = 1 for the first.  Times within 1e-9 h of each other differ by round-off only. */
 static inline double pw_step_end (const pw_run *r, double base, long count, double t_end, int *whole) {
   double h = r->settings.step, t1 = base + (double)(count + 1) * h,
          stop = t_end < r->breakpoint ? t_end : r->breakpoint;
@@ -125,7 +128,7 @@ static inline int pw_stabilised_by (const pw_run *r, pw_stabilisation_kind kind)
     "baumgarte", "feedback of the residuals into the accelerations (Baumgarte 1972)", PW_BAUMGARTE \
   }
 
-/* Baumgarte's options, the same for all integrators; pw_read_baumgarte copies them to r->alpha and r->beta. */
+/* Baumgarte's options, the same for all integrators. */
 #define PW_BAUMGARTE_OPTIONS                                                                   \
   { .name = "alpha",                                                                           \
     .with = "baumgarte",                                                                       \
@@ -137,7 +140,6 @@ static inline int pw_stabilised_by (const pw_run *r, pw_stabilisation_kind kind)
     .name = "beta", .with = "baumgarte", .value = 10, .domain = PW_NONNEGATIVE, .unit = "1/s", \
     .about = "stiffness of the position residuals"                                             \
   }
-void pw_read_baumgarte (pw_run *r);
 
 /* Options of the projection; pw_projector_open_by_options reads all but `every`. */
 #define PW_PROJECTION_OPTIONS                                                                         \
@@ -220,7 +222,8 @@ static inline int pw_run_stop_requested (pw_run *r) {
 /* Before each attempted step: PW_OK; PW_STOPPED if the caller requests it; PW_METHOD at max_steps. */
 int pw_run_check_limits (pw_run *r, pw_error *error);
 
-/* Steps between checks of coordinates and records of energies; at most as many are made in one call of specialised code. */
+/* Steps between checks of coordinates and records of energies; at most as many are made in one call of specialised
+ * code. */
 enum { PW_CHECK_INTERVAL = 16 };
 
 /* After each step: records speeds; PW_METHOD if coordinates are too large for double precision to resolve the scene. */
@@ -256,7 +259,7 @@ static inline double pw_before_breakpoint (const pw_run *r, double t) {
  * date. */
 void pw_run_accelerate_updated (pw_run *r, const double *v, double *a, double *lambda);
 
-/* The same where J is evaluated and velocities are up to date, but the saddle is not factorised; gamma is in lambda. */
+/* The same where the saddle is not factorised. */
 int pw_run_accelerate_evaluated (pw_run *r, const double *v, double *a, double *lambda);
 
 /* Copies the state reached to the sample arrays; updates kinematics and J there. */
@@ -275,12 +278,16 @@ static inline void pw_forget_residuals (pw_run *r) {
 
 /* ---- Projection ---- */
 
+/* Scaled residuals to which an iteration converges, the round-off of the few terms of a row; accepted where it
+ * stalls. */
+#define PW_RESIDUAL_GOOD (4 * DBL_EPSILON)
+#define PW_RESIDUAL_ENOUGH (64 * DBL_EPSILON)
+
 typedef struct {
   pw_saddle *position;         /* position metric, holonomic rows; or the run's saddle */
   int own_position;            /* position is not the run's saddle */
   pw_saddle *velocity;         /* all rows */
   int own_velocity;            /* velocity is not the run's saddle */
-  double *scratch;             /* 3 rows + coords */
   int iterations;              /* of the last position projection */
   const unsigned char *active; /* rows that are enforced; NULL: all */
   int alone;                   /* 1: inactive rows are not checked */
@@ -316,7 +323,6 @@ void pw_project_error (pw_run *r, pw_saddle *k, double *e, int rows);
 
 /* Opens the settings' specialised code, if any.  Errors: PW_INPUT, PW_RESOURCE. */
 int pw_specialised_open (pw_run *r, pw_error *error);
-void pw_specialised_close (pw_run *r);
 /* Uses it if it has the run's independent equations. */
 void pw_specialised_select (pw_run *r);
 
@@ -324,7 +330,8 @@ void pw_specialised_select (pw_run *r);
 int pw_specialised_evaluate (pw_run *r, double t, const double *q, const double *v, double *a, double *lambda);
 int pw_specialised_project (const pw_projector *p, pw_run *r, double t, double *q, double *v, double *a,
                             double *lambda);
-/* The stages of a step, if specialised code can evaluate all of them: 1; 0 if not.  Kinematics and J are not updated. */
+/* The stages of a step, if specialised code can evaluate all of them: 1; 0 if not.  Kinematics and J are not
+ * updated. */
 int pw_specialised_stages (pw_run *r, const struct pw_scene_step *x);
 /* Residuals of the state reached, unless they are known or the general engine has to evaluate them. */
 void pw_specialised_residuals (pw_run *r);

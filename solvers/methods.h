@@ -22,7 +22,4 @@
 int pw_parse_options (const char *text, const pw_method *const *own, const pw_method **method, int *stabilisation,
                       double *values, pw_error *error);
 
-/* Sets r->fixed_steps from the method, or from its option `steps`. */
-void pw_choose_steps (pw_run *r);
-
 #endif

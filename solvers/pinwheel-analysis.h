@@ -74,8 +74,8 @@ typedef struct {
   const double *initial; /* copied; NULL with neighbours */
 } pw_direction;
 
-/* p of neighbour i, minus that of the run; its weight in the derivative of a function of p by extrapolated differences, or in the
- * error of that. */
+/* p of neighbour i, minus that of the run; its weight in the derivative of a function of p by extrapolated differences,
+ * or in the error of that. */
 double pw_direction_offset (const pw_direction *d, int i);
 double pw_direction_weight (const pw_direction *d, int of_error, int i);
 
@@ -83,27 +83,28 @@ double pw_direction_weight (const pw_direction *d, int of_error, int i);
 typedef struct pw_variation pw_variation;
 
 /* Begins at the state reached: with neighbours, a run that has not advanced.  The run, which is also advanced by
- * pw_variation_advance alone from now on, must outlive the derivatives.  ledger: with derivatives of work and losses, at
- * about twice the cost.  Errors: PW_INPUT if a system differs in its bodies or elements, or the run holds inputs;
+ * pw_variation_advance alone from now on, must outlive the derivatives.  ledger: with derivatives of work and losses,
+ * at about twice the cost.  Errors: PW_INPUT if a system differs in its bodies or elements, or the run holds inputs;
  * PW_METHOD if the state or a breakpoint is not differentiable; PW_RESOURCE. */
 pw_variation *pw_variation_open (pw_run *r, const pw_direction *d, int count, int ledger, pw_error *error);
 
 /* Advances the run and the derivatives to time t <= t_end, which is then in the last step of the run; but where
- * pw_system_may_jump, the run is ahead of it: take samples of another run with the same settings.  Returns as pw_run_advance; also PW_METHOD where the motion is not differentiable. */
+ * pw_system_may_jump, the run is ahead of it: take samples of another run with the same settings.  Returns as
+ * pw_run_advance; also PW_METHOD where the motion is not differentiable. */
 int pw_variation_advance (pw_variation *x, double t, double t_end, pw_error *error);
 
 /* The derivative along direction i of the sample at the time reached by pw_variation_advance: each number in it is that
  * of the sample differentiated at constant time (residuals, projection, balance: 0; without `ledger`, work, loss and
- * ledger: NaN).  error_of, unless NULL, receives an estimate of its error by differences and by integration, without that of
- * the run (0 with `no_error`).  Arrays are valid until the next call. */
+ * ledger: NaN).  error_of, unless NULL, receives an estimate of its error by differences and by integration, without
+ * that of the run (0 with `no_error`).  Arrays are valid until the next call. */
 int pw_variation_sample (pw_variation *x, int i, pw_sample *derivative, pw_sample *error_of, pw_error *error);
 
-/* The first breakpoint of the run after the time reached, or INFINITY; *slope: the derivative along direction i of that, or
- * of the one just reached. */
+/* The first breakpoint of the run after the time reached, or INFINITY; *slope: the derivative along direction i of
+ * that, or of the one just reached. */
 double pw_variation_breakpoint (const pw_variation *x, int i, double *slope);
 
-/* Advances the run to time t and returns the time just after the first jump of its accelerations with the state after the time
- * reached, or INFINITY; at most 256 steps ahead.  NAN and the error if that fails. */
+/* Advances the run to time t and returns the time just after the first jump of its accelerations with the state after
+ * the time reached, or INFINITY; at most 256 steps ahead.  NAN and the error if that fails. */
 double pw_variation_next_jump (pw_variation *x, double t, double t_end, pw_error *error);
 /* The derivative along direction i of the time of the last jump passed. */
 double pw_variation_jump_slope (const pw_variation *x, int i);
@@ -152,8 +153,8 @@ typedef enum {
   PW_STEADY_END          /* the branch cannot be followed further */
 } pw_steady_event;
 
-/* A steady motion: velocities are those of a rigid displacement of the whole and of angles on which nothing depends, and
- * accelerations vanish in the frame that moves with it.  Arrays are valid until the next call. */
+/* A steady motion: velocities are those of a rigid displacement of the whole and of angles on which nothing depends,
+ * and accelerations vanish in the frame that moves with it.  Arrays are valid until the next call. */
 typedef struct {
   double parameter;
   const double *q, *v; /* pw_system_coordinates */
@@ -186,16 +187,16 @@ int pw_steady_same (pw_steady *x, const double *q1, const double *v1, const doub
  * at most `most`, or a status; the motion stays in a family if they are not enough. */
 int pw_steady_suggest (pw_steady *x, pw_initial_value *hold, int most);
 
-/* Follows the branch of a solution, initially towards the end of the range (direction 1) or its begin (-1); then returns
- * its points, the first one included, and events in between, until PW_STEADY_END: at the end of the range, the start of
- * a closed branch, or where Newton's method fails at the least step (then with the reason in the error). */
+/* Follows the branch of a solution, initially towards the end of the range (direction 1) or its begin (-1); then
+ * returns its points, the first one included, and events in between, until PW_STEADY_END: at the end of the range, the
+ * start of a closed branch, or where Newton's method fails at the least step (then with the reason in the error). */
 int pw_steady_follow (pw_steady *x, const double *q, const double *v, double parameter, int direction, pw_error *error);
 int pw_steady_next (pw_steady *x, pw_steady_motion *out, pw_error *error);
 
 /* ---- Periodic motions (periodic.c) ---- */
 
-/* The period of all signals of which it is known, harmonic ones and repeated pulses [s]; 0: there are none; NaN: they have
- * none in common. */
+/* The period of all signals of which it is known, harmonic ones and repeated pulses [s]; 0: there are none; NaN: they
+ * have none in common. */
 double pw_system_period (const pw_system *s);
 
 typedef struct {
@@ -223,8 +224,8 @@ typedef enum {
 } pw_periodic_event;
 
 /* A relative periodic motion: after one period the state is the initial one, displaced by symmetries of the system: the
- * whole in the plane, and angles on which nothing depends; but for whole turns of bodies, on whose number nothing depends.
- * Arrays are valid until the next call. */
+ * whole in the plane, and angles on which nothing depends; but for whole turns of bodies, on whose number nothing
+ * depends. Arrays are valid until the next call. */
 typedef struct {
   double parameter, period;
   const double *q, *v; /* initial state: pw_system_coordinates */
@@ -246,17 +247,18 @@ typedef struct pw_periodic pw_periodic;
 pw_periodic *pw_periodic_open (const pw_system *s, const pw_periodic_settings *settings, pw_error *error);
 void pw_periodic_close (pw_periodic *x);
 
-/* Newton's method at a value of the parameter, from the state after `settle` >= 0 of the periods, with corrections of least
- * norm.  A free period that is not given is that of the first return of the motion then.  PW_RETRY, without an error, if it
- * does not converge: the residual is that where it ended. */
+/* Newton's method at a value of the parameter, from the state after `settle` >= 0 of the periods, with corrections of
+ * least norm.  A free period that is not given is that of the first return of the motion then.  PW_RETRY, without an
+ * error, if it does not converge: the residual is that where it ended. */
 int pw_periodic_solve (pw_periodic *x, int settle, double parameter, pw_periodic_orbit *out, pw_error *error);
 /* Why the last motion could not be computed, or "". */
 const char *pw_periodic_reason (const pw_periodic *x);
 /* Number of symmetries, as pw_steady_symmetries. */
 int pw_periodic_symmetries (const pw_periodic *x);
 
-/* Follows the branch of the motion last found towards the end of the range (direction 1) or its begin (-1); then returns
- * its points, the first one included, and events in between, until PW_PERIODIC_END (then perhaps with a reason). */
+/* Follows the branch of the motion last found towards the end of the range (direction 1) or its begin (-1); then
+ * returns its points, the first one included, and events in between, until PW_PERIODIC_END (then perhaps with a
+ * reason). */
 int pw_periodic_follow (pw_periodic *x, int direction, pw_error *error);
 int pw_periodic_next (pw_periodic *x, pw_periodic_orbit *out, pw_error *error);
 

@@ -84,19 +84,20 @@ int pw_method_adaptive (const pw_method *integrator, const char *method);
 enum { PW_SPECIALISE_STEPS = 1000000 };
 double pw_method_steps (const char *method, const pw_settings *s, double step, double t_end);
 
-/* One accepted step that does not pass t_end; to an end or a discontinuity that is the time reached up to round-off, none
- * but that the time becomes this one.  PW_STOPPED, without an error, if settings.stop requested it: the run stays where it
- * was, and the next call continues.  Errors: PW_INPUT if t_end is not a number; PW_METHOD with the time reached and the
- * reason, such as max_steps; PW_RESOURCE. */
+/* One accepted step that does not pass t_end; to an end or a discontinuity that is the time reached up to round-off,
+ * none but that the time becomes this one.  PW_STOPPED, without an error, if settings.stop requested it: the run stays
+ * where it was, and the next call continues.  Errors: PW_INPUT if t_end is not a number; PW_METHOD with the time
+ * reached and the reason, such as max_steps; PW_RESOURCE. */
 int pw_run_advance (pw_run *r, double t_end, pw_error *error);
 
 /* One step, or several of a fixed size if specialised code is in use, which end where single steps would, none of them
  * beyond the first that reaches t.  Returns as pw_run_advance. */
 int pw_run_advance_towards (pw_run *r, double t, double t_end, pw_error *error);
 
-/* Advances each run by one or several steps, those of fixed size at once in the lanes of `code` (NULL, or few runs
- * for them, or too many: one run after the other); `memory` as the code requires.  The runs' systems have the structure of the code's.  Results are those of
- * pw_run_advance_towards, bit for bit, and do not depend on the other runs.  status, error: of each run. */
+/* Advances each run by one or several steps, those of fixed size at once in the lanes of `code` (NULL, or few runs for
+ * them, or too many: one run after the other); `memory` as the code requires.  The runs' systems have the structure of
+ * the code's.  Results are those of pw_run_advance_towards, bit for bit, and do not depend on the other runs.  status,
+ * error: of each run. */
 void pw_runs_advance (pw_run *const *runs, int count, double t_end, const pw_specialised_lanes *code, void *memory,
                       int *status, pw_error *error);
 
@@ -140,9 +141,9 @@ void pw_run_close (pw_run *r);
  * evaluated; PW_RESOURCE. */
 int pw_run_save (pw_run *r, pw_archive *a, pw_error *error);
 
-/* Loads a saved state into a run opened with the same system, method and settings that has not advanced; it
- * continues bit for bit as the run that was saved.  After an error it can only be closed: PW_INPUT if the archive does not
- * match; PW_METHOD; PW_RESOURCE. */
+/* Loads a saved state into a run opened with the same system, method and settings that has not advanced; it continues
+ * bit for bit as the run that was saved.  After an error it can only be closed: PW_INPUT if the archive does not match;
+ * PW_METHOD; PW_RESOURCE. */
 int pw_run_load (pw_run *r, pw_archive *a, pw_error *error);
 
 /* The number of redundant constraint equations, and a description of those that the i-th one follows from, in the
@@ -200,9 +201,9 @@ const pw_scale *pw_run_scale (const pw_run *r);
 
 /* Advances to t_end and stores samples in rows of pw_run_record_width numbers, at most `count`: at the given times,
  * increasing, from the time reached on; or after every accepted step (times: NULL).  Returns PW_OK with *recorded rows
- * when t_end is reached, the rows are full, or after `steps` steps: call it again, with the rest of the times; otherwise
- * as pw_run_advance. A row is t, scaled residuals of g = 0 and J v = eta, kinetic and potential energy, work, loss,
- * energy added by projections, balance (PW_RECORD_STATES numbers), then q, v, a, reactions (-lambda) and, with
+ * when t_end is reached, the rows are full, or after `steps` steps: call it again, with the rest of the times;
+ * otherwise as pw_run_advance. A row is t, scaled residuals of g = 0 and J v = eta, kinetic and potential energy, work,
+ * loss, energy added by projections, balance (PW_RECORD_STATES numbers), then q, v, a, reactions (-lambda) and, with
  * pw_settings.ledger, the ledger's entries. */
 enum { PW_RECORD_STATES = 9 };
 int pw_run_record_width (const pw_run *r);

@@ -102,6 +102,17 @@ void *pw_layout_alloc (pw_layout *l, size_t count, size_t size) {
   return p;
 }
 
+int pw_layout_pass (pw_layout *l, char **memory) {
+  if (l->base) return 0;
+  if (l->used == 0) { /* the first pass; counts on from here, so that the second one differs even for no arrays */
+    *memory = NULL;
+    l->used = 1;
+    return 1;
+  }
+  *l = (pw_layout){ *memory = calloc (1, l->used), 0 };
+  return l->base != NULL;
+}
+
 char *pw_alloc_arrays (const pw_array *array, size_t arrays) {
   pw_layout l = { NULL, 0 };
   for (size_t i = 0; i < arrays; i++) pw_layout_alloc (&l, array[i].count, sizeof (double));

@@ -97,6 +97,9 @@ typedef struct {
   size_t used;
 } pw_layout;
 void *pw_layout_alloc (pw_layout *l, size_t count, size_t size);
+/* Passes over these calls, as in  for (pw_layout l = { 0 }; pw_layout_pass (&l, &memory);)  with zeroed memory in the
+ * second one.  Afterwards memory is NULL if there was not enough. */
+int pw_layout_pass (pw_layout *l, char **memory);
 
 /* An array of numbers: where its address is stored, and its length. */
 typedef struct {

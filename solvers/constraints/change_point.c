@@ -16,8 +16,8 @@
 #include "method.h"
 #include "rank.h"
 
-/* Strides of a walk, and evaluations between the ends of a step, at most; a stride that fails is made longer, up to 1.7^7 = 41
- * times. */
+/* Strides of a walk, and evaluations between the ends of a step, at most; a stride that fails is made longer, up to
+ * 1.7^7 = 41 times. */
 enum { CHANGE_STRIDES = 1000, CHANGE_TRIES = 8 };
 
 typedef enum { CHANGE_SAME, CHANGE_OTHER, CHANGE_UNKNOWN } change_verdict;

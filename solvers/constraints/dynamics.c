@@ -56,12 +56,14 @@ void pw_run_accelerate_updated (pw_run *r, const double *v, double *a, double *l
   if (pw_saddle_below (r->saddle, r->limits.refine)) dynamics_refine (r, v, a, lambda);
 }
 
-/* Factorises and solves; *near = 1 near a singular configuration.  On entry lambda contains gamma. */
+/* Factorises and solves; *near = 1 near a singular configuration. */
 static inline int dynamics_solve (pw_run *r, const double *v, double *a, double *lambda, int *near) {
+  pw_evaluate_gamma (r->w, lambda);
   const double *f = dynamics_right_side (r, v, r->scratch, lambda);
   r->statistics.rhs++;
   r->statistics.factorisations++;
-  int status = pw_saddle_factor_solve (r->saddle, f, lambda, a, lambda);
+  int status = pw_saddle_factor (r->saddle);
+  if (status == PW_OK) pw_saddle_solve (r->saddle, f, lambda, a, lambda);
   *near = pw_watchdog_near (r);
   if (*near && r->geometry.sine <= r->refuse) return PW_RETRY;
   if (status == PW_OK && pw_saddle_below (r->saddle, r->limits.refine)) dynamics_refine (r, v, a, lambda);
@@ -77,7 +79,6 @@ int pw_run_accelerate (pw_run *r, double t, const double *q, const double *v, do
   if (pw_specialised_evaluate (r, t, q, v, a, lambda)) return PW_OK;
   int near, status = pw_evaluate_J_at (r->w, t, q, v);
   if (status != PW_OK) return status;
-  pw_evaluate_gamma (r->w, lambda);
   status = dynamics_solve (r, v, a, lambda, &near);
   if (near) r->near_singular = 1;
   return status;

@@ -12,12 +12,13 @@
 #include "method.h"
 #include "rank.h"
 
-/* Rows times coordinates above which the cost of seeking dependent equations, rows^2 x coordinates, counts.  Then they are not
- * sought while states specified by the model are prescribed: that usually fails for sketches of linkages, which specify all
- * positions; nor, unless values are given, for the coordinates that are not prescribed. */
+/* Rows times coordinates above which the cost of seeking dependent equations, rows^2 x coordinates, counts.  Then they
+ * are not sought while states specified by the model are prescribed: that usually fails for sketches of linkages, which
+ * specify all positions; nor, unless values are given, for the coordinates that are not prescribed. */
 #define INITIAL_SMALL 1e4
 
-/* Off the constraints dependent equations appear independent, the more the larger the residuals: hence several tolerances. */
+/* Off the constraints dependent equations appear independent, the more the larger the residuals: hence several
+ * tolerances. */
 enum { TOLERANCES = 4 };
 static const double initial_tolerance[TOLERANCES] = { 1e-7, 1e-4, 1e-2, 0.1 };
 
@@ -56,8 +57,8 @@ static int initial_positions (pw_projector *p, pw_run *r, initial_failure *failu
   int status = pw_project_positions (p, r, r->t, r->q, r->v);
   if (status == PW_OK) return PW_OK;
   if (pw_update_kinematics (r->w, r->t, r->q, r->v) == PW_OK && p->row >= 0) {
-    pw_evaluate_g (r->w, p->scratch);
-    *failure = (initial_failure){ p->row, 0, fabs (p->scratch[p->row]), 0 };
+    pw_evaluate_g (r->w, r->scratch);
+    *failure = (initial_failure){ p->row, 0, fabs (r->scratch[p->row]), 0 };
   }
   return status;
 }
@@ -67,13 +68,13 @@ static int initial_positions (pw_projector *p, pw_run *r, initial_failure *failu
 static int initial_velocities (pw_projector *p, pw_run *r, double *v, initial_failure *failure) {
   pw_residuals now;
   pw_evaluate_residuals (r->w, NULL, &now);
-  for (int i = 0; i < 2 && !(now.velocity <= 4 * DBL_EPSILON); i++) {
+  for (int i = 0; i < 2 && !(now.velocity <= PW_RESIDUAL_GOOD); i++) {
     int status = pw_project_velocities (p, r, v);
     if (status < 0) return status;
     if (status != PW_OK) break;
     pw_evaluate_residuals (r->w, NULL, &now);
   }
-  if (now.velocity <= 64 * DBL_EPSILON) return PW_OK;
+  if (now.velocity <= PW_RESIDUAL_ENOUGH) return PW_OK;
   *failure = (initial_failure){ now.row_velocity, 1, now.jv, 1 };
   return PW_RETRY;
 }
@@ -117,15 +118,15 @@ static int initial_stage (pw_projector *p, pw_run *r, int velocities, const unsi
     status = initial_project (&own, r, velocities, &unused);
     pw_projector_close (&own);
     pw_evaluate_residuals (r->w, NULL, &now);
-    if (status == PW_OK && !(now.position <= 64 * DBL_EPSILON)) status = PW_RETRY;
+    if (status == PW_OK && !(now.position <= PW_RESIDUAL_ENOUGH)) status = PW_RETRY;
   }
   free (start);
   return status;
 }
 
 /* One attempt from these positions and the given velocities, with some states prescribed; seek: dependent equations are
- * sought in the coordinates that are not.  The velocity metric is the mass matrix if that determines all velocities, else
- * the position metric. */
+ * sought in the coordinates that are not.  The velocity metric is the mass matrix if that determines all velocities,
+ * else the position metric. */
 static int initial_attempt (pw_run *r, const unsigned char *prescribed, int seek, const double *from,
                             initial_failure *failure, pw_error *error) {
   const pw_system *s = r->s;
@@ -232,7 +233,7 @@ static int initial_ranked (pw_run *r, const unsigned char *prescribed, int seek,
   return status;
 }
 
-/* Reports given velocities that have vanished entirely: the wheels allow no motion. */
+/* Reports given velocities of which less than 1e-10 is left, in the norm of the metric: the wheels allow no motion. */
 static int initial_locked (pw_run *r, pw_error *error) {
   const pw_system *s = r->s;
   double given = 0, left = 0;
@@ -333,7 +334,7 @@ int pw_run_make_consistent (pw_run *r, const unsigned char *origin, pw_error *er
   int status = pw_evaluate_J_at (r->w, r->t, r->q, r->v);
   if (status != PW_OK) return pw_fail_signal (r->t, error);
   pw_evaluate_residuals (r->w, NULL, &before);
-  if (!(before.position <= 8 * DBL_EPSILON && before.velocity <= 8 * DBL_EPSILON))
+  if (!(before.position <= 2 * PW_RESIDUAL_GOOD && before.velocity <= 2 * PW_RESIDUAL_GOOD))
     status = initial_try (r, origin, &failure, &released, error);
   r->initial = (pw_initial_report){ .q_given = r->q_given,
                                     .v_given = r->v_given,

@@ -5,7 +5,6 @@
  *
  * (Lubich 1991, Extrapolation integrators for constrained multibody systems; Eich 1993, Convergence results for a
  * coordinate projection method applied to mechanical systems with algebraic constraints.) */
-#include <float.h>
 #include <math.h>
 #include <stdlib.h>
 #include "method.h"
@@ -30,8 +29,6 @@ int pw_projector_open (pw_projector *p, pw_run *r, const double *weight_q, const
                        .row = -1,
                        .against = -1,
                        .by_mass = weight_q == NULL && weight_v == NULL };
-  p->scratch = malloc (((size_t)(3 * s->rows + s->coords) + 4) * sizeof *p->scratch);
-  if (p->scratch == NULL) return pw_fail_memory (s, error);
   p->position = weight_q ? pw_saddle_open (r->w, weight_q, s->holonomic, r->active, error) : project_by_mass (r, error);
   p->own_position = p->position != r->saddle;
   if (p->own_velocity) p->velocity = pw_saddle_open (r->w, weight_v, s->rows, r->active, error);
@@ -57,13 +54,8 @@ int pw_projector_open_by_options (pw_projector *p, pw_run *r, pw_error *error) {
 void pw_projector_close (pw_projector *p) {
   if (p->own_position) pw_saddle_close (p->position);
   if (p->own_velocity) pw_saddle_close (p->velocity);
-  free (p->scratch);
   *p = (pw_projector){ 0 };
 }
-
-/* Scaled residuals: round-off of a row's few terms; accepted if the iteration stalls. */
-#define PROJECT_GOOD (4 * DBL_EPSILON)
-#define PROJECT_ENOUGH (64 * DBL_EPSILON)
 
 /* Redundant equations follow from the others to round-off; PW_RETRY if one does not: it contradicts them. */
 static int project_check_redundant (pw_projector *p, const pw_system *s, double follows, const double *g,
@@ -85,7 +77,7 @@ int pw_project_positions (pw_projector *p, pw_run *r, double t, double *q, const
   const int most = 30;        /* quadratic convergence needs some 5; a bad start needs more */
   const pw_system *s = r->s;
   pw_residuals now = { 0 };
-  double *g = p->scratch, *size = g + s->rows, *mu = size + s->rows, *dq = mu + s->rows, before = INFINITY;
+  double *g = r->scratch, *size = g + s->rows, *mu = size + s->rows, *dq = mu + s->rows, before = INFINITY;
   for (p->iterations = 0;; p->iterations++) {
     int failed = pw_update_kinematics (r->w, t, q, v);
     if (failed) return failed;
@@ -94,7 +86,7 @@ int pw_project_positions (pw_projector *p, pw_run *r, double t, double *q, const
     pw_worst_position (s, g, size, p->active, &now);
     p->row = now.row_position;
     int stalled = now.position > before / 4; /* at round-off, since convergence is quadratic */
-    if (now.position <= PROJECT_GOOD || (stalled && now.position <= PROJECT_ENOUGH)) break;
+    if (now.position <= PW_RESIDUAL_GOOD || (stalled && now.position <= PW_RESIDUAL_ENOUGH)) break;
     if (p->iterations >= most || !isfinite (now.position)) return PW_RETRY;
     before = now.position;
     pw_evaluate_J (r->w);
@@ -113,7 +105,7 @@ int pw_project_positions (pw_projector *p, pw_run *r, double t, double *q, const
 /* v += dv with J (v + dv) = eta. */
 static void project_once (pw_projector *p, pw_run *r, double *v) {
   const pw_system *s = r->s;
-  double *right = p->scratch, *eta = right + s->rows, *mu = eta + s->rows, *dv = mu + s->rows;
+  double *right = r->scratch, *eta = right + s->rows, *mu = eta + s->rows, *dv = mu + s->rows;
   pw_mul_J (r->w, v, right);
   if (s->rheonomic) pw_evaluate_eta (r->w, eta);
   for (int i = 0; i < s->rows; i++) right[i] = (s->rheonomic ? eta[i] : 0) - right[i];
@@ -136,7 +128,7 @@ static int project_is_good (const pw_projector *p, pw_run *r) {
   if (p->own_velocity || p->active || r->near_singular) return 0;
   pw_residuals now;
   pw_evaluate_velocity_residual (r->w, NULL, &now);
-  if (!(now.velocity <= PROJECT_GOOD)) return 0;
+  if (!(now.velocity <= PW_RESIDUAL_GOOD)) return 0;
   r->residuals.velocity = now.velocity, r->residuals.jv = now.jv;
   return 1;
 }
@@ -156,7 +148,6 @@ int pw_project_state (pw_projector *p, pw_run *r, double t, double *q, double *v
       return PW_OK;
     }
   }
-  pw_evaluate_gamma (r->w, lambda);
   return pw_run_accelerate_evaluated (r, v, a, lambda);
 }
 

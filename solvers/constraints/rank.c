@@ -3,6 +3,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include "rank.h"
+#include "util.h"
 
 double pw_as_length (const pw_system *s, int j) {
   return pw_is_angle (s, j) ? s->scale.length : 1;
@@ -29,75 +30,88 @@ void pw_rank_rows (const pw_workspace *w, double *rows, double *norm) {
     }
 }
 
-double pw_rank_orthogonalise (double *row, const double *rows, const int *kept, int rank, int n) {
-  double norm = 0;
-  for (int k = 0; k < rank; k++) {
-    const double *other = rows + (size_t)kept[k] * (size_t)n;
-    double dot = 0;
-    for (int j = 0; j < n; j++) dot += row[j] * other[j];
-    for (int j = 0; j < n; j++) row[j] -= dot * other[j];
+int pw_row_basis_open (pw_row_basis *b, const pw_system *s) {
+  size_t rows = (size_t)s->rows;
+  *b = (pw_row_basis){ .coords = s->coords };
+  for (pw_layout l = { 0 }; pw_layout_pass (&l, &b->memory);) {
+    b->rows = pw_layout_alloc (&l, rows * (size_t)s->coords, sizeof *b->rows);
+    b->norm = pw_layout_alloc (&l, rows, sizeof *b->norm);
+    b->kept = pw_layout_alloc (&l, rows, sizeof *b->kept);
+    b->active = pw_layout_alloc (&l, rows, 1);
   }
-  for (int j = 0; j < n; j++) norm += row[j] * row[j];
+  return b->memory ? PW_OK : PW_RESOURCE;
+}
+
+void pw_row_basis_close (pw_row_basis *b) {
+  free (b->memory);
+}
+
+static double *rank_row (const pw_row_basis *b, int i) {
+  return b->rows + (size_t)i * (size_t)b->coords;
+}
+
+double pw_row_basis_orthogonalise (const pw_row_basis *b, double *row, int first) {
+  double norm = 0;
+  for (int k = first; k < b->rank; k++) {
+    const double *other = rank_row (b, b->kept[k]);
+    double dot = 0;
+    for (int j = 0; j < b->coords; j++) dot += row[j] * other[j];
+    for (int j = 0; j < b->coords; j++) row[j] -= dot * other[j];
+  }
+  for (int j = 0; j < b->coords; j++) norm += row[j] * row[j];
   return sqrt (norm);
 }
 
-/* The next row to keep of rows first .. end - 1: the first whose norm is at least 0.9 of the largest, so that equal rows keep
- * their order whatever their round-off. */
-static int rank_pivot (const double *norm, const unsigned char *active, int first, int end) {
+/* The next row to keep of rows first .. end - 1: the first whose norm is at least 0.9 of the largest, so that equal
+ * rows keep their order whatever their round-off. */
+static int rank_pivot (const pw_row_basis *b, int first, int end) {
   double most = 0;
   for (int i = first; i < end; i++)
-    if (!active[i]) most = fmax (most, norm[i]);
+    if (!b->active[i]) most = fmax (most, b->norm[i]);
   for (int i = first; i < end; i++)
-    if (!active[i] && norm[i] > 0 && norm[i] >= 0.9 * most) return i;
+    if (!b->active[i] && b->norm[i] > 0 && b->norm[i] >= 0.9 * most) return i;
   return -1;
 }
 
-/* Keeps independent equations among first .. end - 1 after the `rank` ones kept so far, until there are `most`;
- * returns the new rank.  Each is orthogonalised as others are kept, and once more before it is (Giraud, Langou &
- * Rozloznik 2005). */
-static int rank_keep (double tol, int most, double *rows, double *norm, int *kept, unsigned char *active, int rank,
-                      int first, int end, int n) {
-  for (int i = first; i < end; i++) norm[i] = pw_rank_orthogonalise (rows + (size_t)i * (size_t)n, rows, kept, rank, n);
-  for (int next; rank < most && (next = rank_pivot (norm, active, first, end)) >= 0;) {
-    double *row = rows + (size_t)next * (size_t)n;
-    norm[next] = pw_rank_orthogonalise (row, rows, kept, rank, n);
-    if (!(norm[next] > tol)) {
-      norm[next] = 0;
+/* Keeps independent rows among first .. end - 1, until there are `most`.  Each is orthogonalised as others are kept,
+ * and once more before it is (Giraud, Langou & Rozloznik 2005). */
+static void rank_keep (pw_row_basis *b, double tol, int most, int first, int end) {
+  for (int i = first; i < end; i++) b->norm[i] = pw_row_basis_orthogonalise (b, rank_row (b, i), 0);
+  for (int next; b->rank < most && (next = rank_pivot (b, first, end)) >= 0;) {
+    double *row = rank_row (b, next), norm = b->norm[next] = pw_row_basis_orthogonalise (b, row, 0);
+    if (!(norm > tol)) {
+      b->norm[next] = 0;
       continue;
     }
-    for (int j = 0; j < n; j++) row[j] /= norm[next];
-    active[next] = 1;
-    kept[rank++] = next;
+    for (int j = 0; j < b->coords; j++) row[j] /= norm;
+    b->active[next] = 1;
+    b->kept[b->rank++] = next;
     for (int i = first; i < end; i++)
-      if (!active[i] && norm[i] > 0)
-        norm[i] = pw_rank_orthogonalise (rows + (size_t)i * (size_t)n, rows, kept + rank - 1, 1, n);
+      if (!b->active[i] && b->norm[i] > 0) b->norm[i] = pw_row_basis_orthogonalise (b, rank_row (b, i), b->rank - 1);
   }
-  return rank;
 }
 
-static int rank_basis (const pw_workspace *w, double tol, const unsigned char *fixed, int holonomic, int all,
-                       double *rows, int *kept, unsigned char *active) {
+int pw_row_basis_select (pw_row_basis *b, const pw_workspace *w, double tol, const unsigned char *fixed, int holonomic,
+                         int all) {
   const pw_system *s = w->s;
-  double *norm = rows + (size_t)s->rows * (size_t)s->coords;
-  pw_rank_rows (w, rows, NULL);
+  pw_rank_rows (w, b->rows, NULL);
   for (int i = 0; fixed && i < s->rows * s->coords; i++)
-    if (fixed[i % s->coords]) rows[i] = 0;
-  memset (active, 0, (size_t)s->rows);
-  int rank = rank_keep (tol, holonomic, rows, norm, kept, active, 0, 0, s->holonomic, s->coords);
-  return rank_keep (tol, all, rows, norm, kept, active, rank, s->holonomic, s->rows, s->coords);
-}
-
-int pw_rank_basis (const pw_workspace *w, double tol, int holonomic, int all, double *rows, int *kept,
-                   unsigned char *active) {
-  return rank_basis (w, tol, NULL, holonomic, all, rows, kept, active);
+    if (fixed[i % s->coords]) b->rows[i] = 0;
+  memset (b->active, 0, (size_t)s->rows);
+  b->rank = 0;
+  rank_keep (b, tol, holonomic, 0, s->holonomic);
+  rank_keep (b, tol, all, s->holonomic, s->rows);
+  return b->rank;
 }
 
 int pw_rank_select (const pw_workspace *w, double tol, const unsigned char *fixed, unsigned char *active) {
   const pw_system *s = w->s;
-  double *rows = malloc (pw_rank_room (s) * sizeof *rows);
-  int *kept = malloc (((size_t)s->rows + 1) * sizeof *kept), rank = PW_RESOURCE;
-  if (rows && kept) rank = rank_basis (w, tol, fixed, s->rows, s->rows, rows, kept, active);
-  free (rows);
-  free (kept);
+  pw_row_basis b;
+  int rank = PW_RESOURCE;
+  if (pw_row_basis_open (&b, s) == PW_OK) {
+    rank = pw_row_basis_select (&b, w, tol, fixed, s->rows, s->rows);
+    memcpy (active, b.active, (size_t)s->rows);
+  }
+  pw_row_basis_close (&b);
   return rank;
 }

@@ -25,24 +25,31 @@ static inline double pw_irregular (double phase, int n) {
   return pw_sin (phase + 2.39996 * n);
 }
 
-/* Orthogonalises a row of length n against the `rank` kept ones, of length 1; returns its norm afterwards. */
-double pw_rank_orthogonalise (double *row, const double *rows, const int *kept, int rank, int n);
+/* Independent rows of J. */
+typedef struct {
+  int rank;
+  int *kept;             /* rank: their indices */
+  unsigned char *active; /* rows: 1 for these */
+  double *rows;          /* rows x coords: these are an orthonormal basis of the range of J^T */
+  double *norm;          /* rows: scratch */
+  int coords;
+  char *memory;
+} pw_row_basis;
+int pw_row_basis_open (pw_row_basis *b, const pw_system *s); /* PW_OK or PW_RESOURCE */
+void pw_row_basis_close (pw_row_basis *b);
 
-/* Selects independent equations by Gram-Schmidt on the evaluated J, rows of length 1: active[i] = 1 for one whose part
- * independent of those kept before exceeds tol.  Holonomic equations come first, since a nonholonomic one must not replace
- * a holonomic one; of these the most independent ones, in order where they are about equal.  fixed (coords, or NULL): 1 for
- * coordinates that are left out.  Returns the rank, or PW_RESOURCE. */
+/* Selects at most `holonomic` holonomic and `all` equations by Gram-Schmidt on the evaluated J, rows of length 1: those
+ * whose part independent of the ones kept before exceeds tol.  Holonomic equations come first, since a nonholonomic one
+ * must not replace a holonomic one; of these the most independent ones, in order where they are about equal.  fixed
+ * (coords, or NULL): 1 for coordinates that are left out.  Returns the rank. */
+int pw_row_basis_select (pw_row_basis *b, const pw_workspace *w, double tol, const unsigned char *fixed, int holonomic,
+                         int all);
+
+/* Orthogonalises a row against those kept, from number `first` on; returns its norm afterwards. */
+double pw_row_basis_orthogonalise (const pw_row_basis *b, double *row, int first);
+
+/* Selects as many as there are; only active[i] = 1 is stored.  Returns the rank, or PW_RESOURCE. */
 int pw_rank_select (const pw_workspace *w, double tol, const unsigned char *fixed, unsigned char *active);
-
-/* Size of `rows` of pw_rank_basis: rows x coords, and a norm for each row. */
-static inline size_t pw_rank_room (const pw_system *s) {
-  return (size_t)s->rows * ((size_t)s->coords + 1) + 1;
-}
-
-/* The same for at most `holonomic` holonomic equations and `all` equations.  The selected rows become an orthonormal basis
- * of the range of J^T; `kept`: their indices.  Returns the rank. */
-int pw_rank_basis (const pw_workspace *w, double tol, int holonomic, int all, double *rows, int *kept,
-                   unsigned char *active);
 
 /* Selects r->active for the run at its consistent initial state: rows dependent there and at up to three configurations
  * nearby. It stays NULL if all equations are independent.  Errors: PW_RESOURCE, PW_INITIAL (the initial configuration
@@ -54,12 +61,12 @@ int pw_rank_open (struct pw_run *r, pw_error *error);
 int pw_rank_reselect (struct pw_run *r);
 
 /* Conditioning of the active equations: 1 over their largest coefficient in a sum of the redundant ones with irregular
- * weights (rows of length 1).  Residuals of the redundant equations are those of the active ones divided by this.  J must be
- * evaluated and the run's saddle factorised at the configuration. */
+ * weights (rows of length 1).  Residuals of the redundant equations are those of the active ones divided by this.  J
+ * must be evaluated and the run's saddle factorised at the configuration. */
 double pw_rank_independence (struct pw_run *r);
 
-/* Saves or loads r->active; the number of redundant equations must not change.  Saddle and method still use the previous
- * set. */
+/* Saves or loads r->active; the number of redundant equations must not change.  Saddle and method still use the
+ * previous set. */
 void pw_rank_serialise (struct pw_run *r, pw_archive *a);
 
 /* The unit of a row's multiplier, from the J last evaluated: 1 for a force, L for a moment (a row without entries in x

@@ -50,36 +50,27 @@ static void redundancy_add_row (const pw_workspace *w, int row, double weight, d
   }
 }
 
-/* Solves f = J^T c for the multipliers c; f is in the scratch memory of the run. */
-static void redundancy_solve (pw_run *r, double *f, double *c) {
-  double *nothing = f + r->s->coords + 3;
-  memset (nothing, 0, (size_t)r->s->rows * sizeof *nothing);
-  pw_saddle_solve (r->saddle, f, nothing, f, c);
-}
-
-/* A zero f in the scratch memory of the run. */
-static double *redundancy_force (pw_run *r) {
-  int m = r->s->rows, k = r->redundant;
-  double *f = r->coefficient + k * m + k * k + k;
-  return memset (f, 0, (size_t)r->s->coords * sizeof *f);
+/* Solves r->row_force = J^T c for the multipliers c and clears the force. */
+static void redundancy_solve (pw_run *r, double *c) {
+  pw_saddle_solve (r->saddle, r->row_force, r->zero, r->row_force, c);
+  memset (r->row_force, 0, (size_t)r->s->coords * sizeof *r->row_force);
 }
 
 /* Coefficients of the i-th redundant row in the active ones, where J is evaluated and the saddle factorised. */
 static void redundancy_coefficients (pw_run *r, int i) {
-  double *f = redundancy_force (r);
-  redundancy_add_row (r->w, r->redundant_row[i], 1, f);
-  redundancy_solve (r, f, r->coefficient + i * r->s->rows);
+  redundancy_add_row (r->w, r->redundant_row[i], 1, r->row_force);
+  redundancy_solve (r, r->coefficient + i * r->s->rows);
 }
 
 /* A sum of the redundant equations with irregular weights, so that terms do not cancel, needs one solution only. */
 double pw_rank_independence (pw_run *r) {
-  double *c = r->coefficient, *f = redundancy_force (r), most = 0;
+  double *c = r->coefficient, most = 0;
   for (int i = 0; i < r->redundant; i++) {
     int row = r->redundant_row[i];
     double x = pw_irregular (0, row + 1), length = redundancy_length (r->w, row);
-    if (length > 0) redundancy_add_row (r->w, row, (x + copysign (1, x)) / 2 / length, f);
+    if (length > 0) redundancy_add_row (r->w, row, (x + copysign (1, x)) / 2 / length, r->row_force);
   }
-  redundancy_solve (r, f, c);
+  redundancy_solve (r, c);
   for (int row = 0; row < r->s->rows; row++)
     if (r->active[row]) most = pw_larger_or_nan (most, fabs (c[row]) * redundancy_length (r->w, row));
   return isnan (most) ? 0 : 1 / most;
@@ -87,7 +78,7 @@ double pw_rank_independence (pw_run *r) {
 
 void pw_rank_least_norm (pw_run *r, double *lambda) {
   int m = r->s->rows, k = r->redundant;
-  double *c = r->coefficient, *A = c + k * m, *z = A + k * k;
+  double *c = r->coefficient, *A = r->normal, *z = A + k * k;
   for (int i = 0; i < k; i++) redundancy_coefficients (r, i);
   memset (A, 0, (size_t)(k * k + k) * sizeof *A);
   for (int row = 0; row < m; row++) { /* minimise sum ((lambda + N z) / size)^2, N = [e_i - c_i] */
@@ -105,15 +96,9 @@ void pw_rank_least_norm (pw_run *r, double *lambda) {
 
 /* ---- Description ---- */
 
-/* Appends the element of a row to the buffer: "pin B" or, with its row, "pin B (B.Fx)"; returns the new length. */
-static size_t redundancy_name_row (const pw_system *s, int row, int whole, char *buffer, size_t size, size_t n) {
-  char element[120], reaction[120];
-  if (n + 1 >= size) return n;
-  pw_system_row_name (s, row, element, sizeof element);
-  pw_system_reaction_name (s, row, reaction, sizeof reaction);
-  n += (size_t)(whole ? snprintf (buffer + n, size - n, "%s (%s)", element, reaction)
-                      : snprintf (buffer + n, size - n, "%s", element));
-  return n < size ? n : size - 1;
+static void redundancy_append (char *buffer, size_t size, const char *text) {
+  size_t n = strlen (buffer);
+  snprintf (buffer + n, size - n, "%s", text);
 }
 
 /* The common direction of two rows with the same reaction: "lateral ", or "". */
@@ -148,24 +133,23 @@ char *pw_run_redundancy (pw_run *r, int i, char *buffer, size_t size) {
   const double none = 1e-8; /* round-off of a coefficient: eps / s^2 at a sine of 1.5e-4 */
   const pw_system *s = r->s;
   int row = r->redundant_row[i], partners = 0, last = -1, elements = 0;
-  size_t n = redundancy_name_row (s, row, 1, buffer, size, 0);
+  char element[120], own[120], before[120] = "", reaction[120];
+  pw_system_row_name (s, row, own, sizeof own);
+  snprintf (buffer, size, "%s (%s)", own, pw_system_reaction_name (s, row, reaction, sizeof reaction));
   if (pw_evaluate_J_at (r->w, r->t, r->q, r->v) != PW_OK) return buffer;
   if (pw_saddle_factor (r->saddle) != PW_OK) return buffer;
   redundancy_coefficients (r, i);
   const double *c = r->coefficient + i * s->rows;
-  char element[120], own[120], before[120] = "";
-  pw_system_row_name (s, row, own, sizeof own);
   for (int a = 0; a < s->rows; a++) {
     if (fabs (c[a]) < none) continue;
     partners++, last = a;
     pw_system_row_name (s, a, element, sizeof element);
-    if (elements > MOST || n + 1 >= size || strcmp (element, own) == 0 || strcmp (element, before) == 0) continue;
+    if (elements > MOST || strcmp (element, own) == 0 || strcmp (element, before) == 0) continue;
     strcpy (before, element);
-    const char *glue = elements == MOST ? " and others" : elements > 0 ? ", " : " follows from ";
-    n += (size_t)snprintf (buffer + n, size - n, "%s", glue);
-    if (elements++ < MOST) n = redundancy_name_row (s, a, 0, buffer, size, n);
+    redundancy_append (buffer, size, elements == MOST ? " and others" : elements > 0 ? ", " : " follows from ");
+    if (elements++ < MOST) redundancy_append (buffer, size, element);
   }
-  if (partners == 0 && n + 1 < size) snprintf (buffer + n, size - n, " has no effect in this configuration");
+  if (partners == 0) redundancy_append (buffer, size, " has no effect in this configuration");
   if (partners == 1) redundancy_describe_pair (s, last, row, buffer, size);
   return buffer;
 }

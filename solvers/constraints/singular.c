@@ -13,15 +13,15 @@ const pw_watchdog pw_watchdog_limits = {
   .lost = 1e-2,
   .lost_unstabilised = 0.1,
 
-  /* A redundant row follows from the others up to a round-off of some 1e6 eps, or up to their residuals divided by a sine
-   * as small as 1e-4. */
+  /* A redundant row follows from the others up to a round-off of some 1e6 eps, or up to their residuals divided by a
+   * sine as small as 1e-4. */
   .follows = 1e-9,
   .magnified = 1e4,
 
   /* Round-off leaves sqrt (eps) = 1.5e-8 of a row that depends on others; below the sine 1e-6 accelerations, with an
-   * error of eps / s after refinement, are wrong by more than 1e-10.  After rows that are nearly dependent
-   * themselves, round-off leaves up to 1e-5: `dependent`, which is refused where a scene is too large for its rank to be
-   * computed.  Below a hundred times that, `suspect`, the rank is computed. */
+   * error of eps / s after refinement, are wrong by more than 1e-10.  After rows that are nearly dependent themselves,
+   * round-off leaves up to 1e-5: `dependent`, which is refused where a scene is too large for its rank to be computed.
+   * Below a hundred times that, `suspect`, the rank is computed. */
   .rank = 1e-6,
   .suspect = 1e-3,
   .dependent = 1e-5,
@@ -77,8 +77,8 @@ const pw_watchdog pw_watchdog_limits = {
   .agree = 1e-7,
   .agree_best = 1e-11,
 
-  /* A step that ends within a tenth of its length from a singular configuration: the accelerations, whose error is that of
-   * the state over the sine, are ten times less accurate than at its beginning. */
+  /* A step that ends within a tenth of its length from a singular configuration: the accelerations, whose error is that
+   * of the state over the sine, are ten times less accurate than at its beginning. */
   .lands = 0.1,
 
   /* A sample does not affect the next step: an error of a hundredth is acceptable. */
@@ -100,20 +100,27 @@ const pw_watchdog pw_watchdog_limits = {
 
 /* ---- Opening ---- */
 
-/* 1 if an element connects bodies that are already connected (the ground is a body); -1 if out of memory. */
+/* The n-th body of an element; s->bodies: the ground. */
+static int singular_body (const pw_system *s, const pw_element_batch *k, int e, int n) {
+  int j = k->column[e * k->kind->bodies + n];
+  return j < s->coords ? j / 3 : s->bodies;
+}
+
+/* 1 if an element connects bodies that are already connected; -1 if out of memory.  The ground is a body, to which an
+ * element on one body connects it. */
 static int singular_has_loops (const pw_system *s) {
   int loops = 0, *set = malloc (((size_t)s->bodies + 1) * sizeof *set);
   if (set == NULL) return -1;
   for (int b = 0; b <= s->bodies; b++) set[b] = b;
   for (const pw_element_batch *k = s->batch; k < s->batch + s->constraints && k->row < s->holonomic; k++)
-    for (int e = 0; e < k->b.count; e++)
-      for (int n = 1; n < k->kind->bodies; n++) {
-        const int *column = k->column + e * k->kind->bodies;
-        int a = pw_root (set, column[0] < 3 * s->bodies ? column[0] / 3 : s->bodies);
-        int b = pw_root (set, column[n] < 3 * s->bodies ? column[n] / 3 : s->bodies);
+    for (int e = 0; e < k->b.count; e++) {
+      int first = k->kind->bodies > 1 ? singular_body (s, k, e, 0) : s->bodies;
+      for (int n = k->kind->bodies > 1; n < k->kind->bodies; n++) {
+        int a = pw_root (set, first), b = pw_root (set, singular_body (s, k, e, n));
         loops |= a == b;
         set[b] = a;
       }
+    }
   free (set);
   return loops;
 }

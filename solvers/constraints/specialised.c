@@ -1,30 +1,35 @@
 /* Specialised code in place of the general evaluation and projection.  It refuses states at which a pivot is small or a
  * value extreme; the general engine evaluates these. */
 #include <math.h>
-#include <stdlib.h>
-#include <string.h>
 #include "method.h"
 #include "specialised.h"
+#include "util.h"
 
 static int specialised_update (void *workspace, double t, const double *q, const double *v) {
   return pw_update_signals (workspace, t, q, v);
 }
 
-/* Pointers to elements, types and signals, and the constants: one block. */
+/* The scene's data, with pointers to elements, types and signals, and the constants. */
 static int specialised_allocate (pw_run *r, int constants) {
   const pw_system *s = r->s;
-  size_t k = (size_t)s->batches, n = (size_t)s->sources;
-  const void **element = r->scene_memory =
-      malloc ((2 * k + n + 1) * sizeof *element + (size_t)constants * sizeof (double));
-  if (element == NULL) return PW_RESOURCE;
-  const pw_kind **kind = (const pw_kind **)(void *)(element + k);
-  const pw_signal **signal = (const pw_signal **)(void *)(kind + k);
+  const void **element = NULL;
+  const pw_kind **kind = NULL;
+  const pw_signal **signal = NULL;
+  double *constant = NULL;
+  for (pw_layout l = { 0 }; pw_layout_pass (&l, &r->scene_memory);) {
+    r->scene = pw_layout_alloc (&l, 1, sizeof *r->scene);
+    element = pw_layout_alloc (&l, (size_t)s->batches, sizeof *element);
+    kind = pw_layout_alloc (&l, (size_t)s->batches, sizeof *kind);
+    signal = pw_layout_alloc (&l, (size_t)s->sources, sizeof *signal);
+    constant = pw_layout_alloc (&l, (size_t)constants, sizeof *constant);
+  }
+  if (r->scene_memory == NULL) return PW_RESOURCE;
   for (int i = 0; i < s->batches; i++) element[i] = s->batch[i].b.element, kind[i] = s->batch[i].kind;
   for (int i = 0; i < s->sources; i++) signal[i] = &r->w->source[i].signal;
   *r->scene = (pw_scene){ .element = element,
                           .kind = kind,
                           .signal = signal,
-                          .constant = (double *)(void *)(signal + n),
+                          .constant = constant,
                           .mass = s->mass,
                           .force = s->constant,
                           .u = r->w->u,
@@ -39,8 +44,7 @@ int pw_specialised_open (pw_run *r, pw_error *error) {
   if (code == NULL) return PW_OK;
   if (!pw_specialised_fits (code, r->s))
     return pw_fail (error, PW_INPUT, "model %s: the specialised code belongs to another scene", r->s->model);
-  r->scene = malloc (sizeof *r->scene);
-  if (r->scene == NULL || specialised_allocate (r, code->constants) != PW_OK) return pw_fail_memory (r->s, error);
+  if (specialised_allocate (r, code->constants) != PW_OK) return pw_fail_memory (r->s, error);
   r->scene->follows = r->limits.follows;
   r->scene->alpha = r->alpha, r->scene->beta = r->beta;
   r->scene_ready = code->prepare (r->scene) == 0;
@@ -55,16 +59,11 @@ void pw_specialised_select (pw_run *r) {
   r->specialised = same ? code : NULL;
 }
 
-void pw_specialised_close (pw_run *r) {
-  free (r->scene);
-  free (r->scene_memory);
-}
-
-/* 0 where the general engine has more to do than to evaluate: with fixed steps it watches the sine of every stage; adaptive
- * methods ask for it only below the pivots that the specialised code accepts. */
+/* 0 where the general engine has more to do than to evaluate: with fixed steps it watches the sine of every stage;
+ * adaptive methods ask for it only below the pivots that the specialised code accepts. */
 int pw_specialised_suits (const pw_run *r) {
   const pw_geometry *g = &r->geometry;
-  return r->specialised && !r->least_norm && !(g->alert && g->saddle && pw_fixed_steps (r)) && !r->near_singular &&
+  return r->specialised && !r->redundant_moves && !(g->alert && g->saddle && pw_fixed_steps (r)) && !r->near_singular &&
          !r->w->hold;
 }
 

@@ -19,7 +19,7 @@ int pw_implicit_lay_out (pw_implicit *x, int size) {
   pw_tangent *t = &x->dae.tangent;
   if (pw_scatter_lay_out (&t->scatter, size, &t->colptr, &t->rowind) != PW_OK) return PW_RESOURCE;
   x->value = malloc (((size_t)t->colptr[size] + 1) * sizeof *x->value);
-  return x->value ? pw_sparse_open (&x->sparse, size, t->colptr, t->rowind) : PW_RESOURCE;
+  return x->value ? pw_sparse_open (&x->sparse, 0, size, t->colptr, t->rowind) : PW_RESOURCE;
 }
 
 int pw_implicit_complete (pw_run *r, int status, int velocities, pw_error *error) {

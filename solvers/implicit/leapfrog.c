@@ -90,8 +90,8 @@ static void drift_put_momentum (pw_run *r) {
   pw_tangent *x = &r->data->work.dae.tangent;
   const pw_system *s = r->s;
   for (int j = 0; j < s->coords; j++) pw_scatter_add (&x->scatter, j, j, s->mass[j]);
-  pw_newton_JT (
-      r->w, &x->scatter,
+  pw_newton_J (
+      r->w, &x->scatter, 1,
       &(pw_placement){ .col = s->coords, .rows = s->rows, .factor = 1, .factor_nonholonomic = 1, .map = x->map });
 }
 
@@ -106,13 +106,13 @@ static void drift_put_middle (pw_run *r, double h) {
   put.factor_nonholonomic = -0.5 * h;
   pw_newton_block (&x->newton, r->w, &x->scatter, PW_ETA_Q, &put);
   put.factor_nonholonomic = 1;
-  pw_newton_J (r->w, &x->scatter, &put);
+  pw_newton_J (r->w, &x->scatter, 0, &put);
 }
 
 /* G at the end; kinematics must be those of the end. */
 static void drift_put_end (pw_run *r) {
   pw_tangent *x = &r->data->work.dae.tangent;
-  pw_newton_J (r->w, &x->scatter,
+  pw_newton_J (r->w, &x->scatter, 0,
                &(pw_placement){ .row = r->s->coords, .rows = r->s->holonomic, .factor = 1, .map = x->map });
 }
 

@@ -56,8 +56,8 @@ int pw_radau_open_matrices (pw_run *r) {
   if (!d->matrix || !d->value || !d->diagonal) return PW_RESOURCE;
   for (int j = 0; j < 2 * d->dae.n; j++)
     for (d->diagonal[j] = x->colptr[j]; x->rowind[d->diagonal[j]] != j;) d->diagonal[j]++;
-  int status = pw_sparse_open (&d->real, d->dae.size, x->colptr, x->rowind);
-  return status == PW_OK ? pw_sparse_open_complex (&d->complex, d->dae.size, x->colptr, x->rowind) : status;
+  int status = pw_sparse_open (&d->real, 0, d->dae.size, x->colptr, x->rowind);
+  return status == PW_OK ? pw_sparse_open (&d->complex, 1, d->dae.size, x->colptr, x->rowind) : status;
 }
 
 /* Evaluates F_y at the beginning of the step. */

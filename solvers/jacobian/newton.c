@@ -5,23 +5,19 @@
 int pw_newton_open (pw_newton *n, const pw_system *s) {
   size_t block = 1, w = 1;
   for (const pw_element_batch *k = s->batch; k < s->batch + s->batches; k++) {
-    size_t cols = (size_t)k->b.cols, rows = cols > (size_t)k->kind->rows ? cols : (size_t)k->kind->rows;
-    size_t count = (size_t)k->b.count;
-    if (count * rows * cols > block) block = count * rows * cols;
-    if (count * cols * PW_MAX_SIGNALS > block) block = count * cols * PW_MAX_SIGNALS;
-    if (count * cols > w) w = count * cols;
+    const size_t columns = (size_t)k->b.count * (size_t)k->b.cols,
+                 widths[] = { (size_t)k->b.cols, (size_t)k->kind->rows, PW_MAX_SIGNALS };
+    if (columns > w) w = columns;
+    for (int i = 0; i < 3; i++)
+      if (columns * widths[i] > block) block = columns * widths[i];
   }
-  n->block = malloc (block * sizeof *n->block);
-  n->w = malloc (w * sizeof *n->w);
-  if (n->block && n->w) return PW_OK;
-  pw_newton_close (n);
-  return PW_RESOURCE;
+  n->block = malloc ((block + w) * sizeof *n->block);
+  n->w = n->block ? n->block + block : NULL;
+  return n->block ? PW_OK : PW_RESOURCE;
 }
 
 void pw_newton_close (pw_newton *n) {
   free (n->block);
-  free (n->w);
-  n->block = n->w = NULL;
 }
 
 static void newton_gather (const pw_system *s, const pw_element_batch *k, const double *w, double *local) {
@@ -32,82 +28,57 @@ static void newton_gather (const pw_system *s, const pw_element_batch *k, const 
     }
 }
 
-/* Row of the matrix for a constraint equation. */
-static inline int newton_row (const pw_placement *put, int row) {
-  return put->map ? put->map[row] : row;
+/* What a batch adds: its rows of J; blocks whose rows are its constraint equations, or its coordinates. */
+typedef enum { NEWTON_J, NEWTON_EQUATIONS, NEWTON_COORDINATES } newton_part;
+
+static inline int newton_is_length (int c) {
+  return c % 3 != 2;
 }
 
-/* A pin's second-order blocks are zero in x and y columns, where its rows of J are unit vectors. */
-static int newton_is_pin (const pw_kind *kind) {
-  return kind == &pw_kind_pin;
+/* 1 for an entry of a pin that is always zero: its rows of J are unit vectors in x and y columns. */
+static inline int newton_is_zero (newton_part part, int r, int c) {
+  if (part == NEWTON_J) return newton_is_length (c) && c % 3 == 1 - r;
+  return newton_is_length (c) || (part == NEWTON_COORDINATES && newton_is_length (r));
 }
 
-static inline int newton_is_length (const pw_kind *kind, int c) {
-  return c < 3 * kind->bodies && c % 3 != 2;
+/* Adds the values of a batch, rows x columns of each element. */
+static void newton_add (const pw_system *s, const pw_element_batch *k, newton_part part, int transposed,
+                        const double *value, pw_scatter_map *t, const pw_placement *put) {
+  const int of_coordinates = part == NEWTON_COORDINATES, rows = of_coordinates ? k->b.cols : k->kind->rows,
+            is_pin = k->kind == &pw_kind_pin;
+  const double factor = !of_coordinates && k->row >= s->holonomic ? put->factor_nonholonomic : put->factor;
+  for (int e = 0; e < k->b.count; e++)
+    for (int r = 0; r < rows; r++) {
+      int i = of_coordinates ? pw_global (k, e, r) : k->row + e * rows + r;
+      if (!of_coordinates && put->map) i = put->map[i];
+      for (int c = 0; c < k->b.cols; c++, value++) {
+        int j = pw_global (k, e, c), row = transposed ? j : i;
+        if (j >= s->coords || i < 0 || (of_coordinates && i >= s->coords)) continue;
+        if (is_pin && newton_is_zero (part, r, c)) continue;
+        double scale = put->row_scale ? put->row_scale[row] : 1;
+        pw_scatter_add (t, put->row + row, put->col + (transposed ? i : j), t->recording ? 0 : factor * *value * scale);
+      }
+    }
 }
 
 void pw_newton_block (pw_newton *n, pw_workspace *w, pw_scatter_map *t, pw_block block, const pw_placement *put) {
   const pw_system *s = w->s;
   for (pw_element_batch *k = w->batch; k < w->batch + s->batches; k++) {
-    int rows = pw_block_rows (k->kind, block), cols = k->b.cols;
-    int of_rows = block == PW_JW_Q || block == PW_ETA_Q || block == PW_GAMMA_Q || block == PW_GAMMA_V;
-    int constraint = of_rows || block == PW_JTL_Q;
-    if (constraint && (k->kind->rows == 0 || k->row >= put->rows)) continue;
+    int of_equations = block == PW_JW_Q || block == PW_ETA_Q || block == PW_GAMMA_Q || block == PW_GAMMA_V;
+    if ((of_equations || block == PW_JTL_Q) && (k->kind->rows == 0 || k->row >= put->rows)) continue;
     if (pw_block_function (k->kind, block) == NULL) continue;
     if (put->w) newton_gather (s, k, put->w, n->w);
     k->b.w = n->w;
     k->b.lambda = put->lambda ? put->lambda + k->row : NULL;
     if (!t->recording) pw_evaluate_block (w, k, block, n->block);
-    const double *value = n->block;
-    double factor = of_rows && k->row >= s->holonomic ? put->factor_nonholonomic : put->factor;
-    int angles = constraint && newton_is_pin (k->kind);
-    for (int e = 0; e < k->b.count; e++)
-      for (int r = 0; r < rows; r++) {
-        if (angles && !of_rows && newton_is_length (k->kind, r)) {
-          value += cols;
-          continue;
-        }
-        int i = of_rows ? newton_row (put, k->row + e * rows + r) : pw_global (k, e, r);
-        double scaled = put->row_scale && !of_rows && i < s->coords ? factor * put->row_scale[i] : factor;
-        for (int c = 0; c < cols; c++, value++) {
-          int j = pw_global (k, e, c);
-          if (j >= s->coords || i < 0 || (!of_rows && i >= s->coords)) continue;
-          if (angles && newton_is_length (k->kind, c)) continue;
-          pw_scatter_add (t, put->row + i, put->col + j, t->recording ? 0 : scaled * *value);
-        }
-      }
+    newton_add (s, k, of_equations ? NEWTON_EQUATIONS : NEWTON_COORDINATES, 0, n->block, t, put);
   }
 }
 
-/* Adds all entries of J, or of its transpose. */
-static void newton_J (const pw_workspace *w, pw_scatter_map *t, const pw_placement *put, int transposed) {
+void pw_newton_J (const pw_workspace *w, pw_scatter_map *t, int transposed, const pw_placement *put) {
   const pw_system *s = w->s;
-  for (const pw_element_batch *k = w->batch; k < w->batch + s->batches && k->kind->rows > 0 && k->row < put->rows;
-       k++) {
-    const double *value = k->J;
-    double factor = k->row >= s->holonomic ? put->factor_nonholonomic : put->factor;
-    int pin = newton_is_pin (k->kind);
-    for (int e = 0; e < k->b.count; e++)
-      for (int r = 0; r < k->kind->rows; r++) {
-        int i = newton_row (put, k->row + e * k->kind->rows + r);
-        for (int c = 0; c < k->b.cols; c++, value++) {
-          int j = pw_global (k, e, c);
-          if (j >= s->coords || i < 0 || (pin && newton_is_length (k->kind, c) && c % 3 == 1 - r)) continue;
-          if (transposed)
-            pw_scatter_add (t, put->row + j, put->col + i, factor * *value * (put->row_scale ? put->row_scale[j] : 1));
-          else
-            pw_scatter_add (t, put->row + i, put->col + j, factor * *value);
-        }
-      }
-  }
-}
-
-void pw_newton_J (const pw_workspace *w, pw_scatter_map *t, const pw_placement *put) {
-  newton_J (w, t, put, 0);
-}
-
-void pw_newton_JT (const pw_workspace *w, pw_scatter_map *t, const pw_placement *put) {
-  newton_J (w, t, put, 1);
+  for (const pw_element_batch *k = w->batch; k < w->batch + s->constraints && k->row < put->rows; k++)
+    newton_add (s, k, NEWTON_J, transposed, k->J, t, put);
 }
 
 void pw_newton_signals (pw_newton *n, pw_workspace *w, pw_scatter_map *t, int row, int col, int col_v) {

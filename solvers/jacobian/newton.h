@@ -28,9 +28,8 @@ typedef struct {
 } pw_placement;
 void pw_newton_block (pw_newton *n, pw_workspace *w, pw_scatter_map *t, pw_block block, const pw_placement *put);
 
-/* Adds factor x J, or its transpose, with the J last evaluated. */
-void pw_newton_J (const pw_workspace *w, pw_scatter_map *t, const pw_placement *put);
-void pw_newton_JT (const pw_workspace *w, pw_scatter_map *t, const pw_placement *put);
+/* Adds factor x J, or `transposed`, with the J last evaluated. */
+void pw_newton_J (const pw_workspace *w, pw_scatter_map *t, int transposed, const pw_placement *put);
 
 /* Adds -(derivative of the force by signals) x (derivative of signals by states): rows from `row` on, q in columns from
  * `col` on, v in columns from `col_v` on. */

@@ -1,5 +1,5 @@
-/* Repeated assembly of a sparse matrix by the same sequence of contributions: the sequence is recorded once and laid out
- * in compressed columns; from then on the number of a contribution determines its position. */
+/* Repeated assembly of a sparse matrix by the same sequence of contributions: the sequence is recorded once and laid
+ * out in compressed columns; from then on the number of a contribution determines its position. */
 #ifndef PW_SCATTER_H
 #define PW_SCATTER_H
 
@@ -11,6 +11,7 @@ typedef struct {
   size_t count, room; /* number of contributions; allocated number while recording */
   struct pw_scatter_entry {
     int row, col;
+    size_t number;
   } * entry;     /* while recording */
   size_t *place; /* index in `value` of each contribution */
   size_t next;   /* number of the next contribution */

@@ -14,19 +14,11 @@ static const struct pw_sparse_field sparse_real = { klu_l_factor, klu_l_refactor
 static const struct pw_sparse_field sparse_complex = { klu_zl_factor, klu_zl_refactor, klu_zl_rcond, klu_zl_solve,
                                                        klu_zl_free_numeric };
 
-static int sparse_open (pw_sparse *k, const struct pw_sparse_field *field, int n, int64_t *colptr, int64_t *rowind) {
-  *k = (pw_sparse){ .field = field, .colptr = colptr, .rowind = rowind };
+int pw_sparse_open (pw_sparse *k, int complex, int n, int64_t *colptr, int64_t *rowind) {
+  *k = (pw_sparse){ .field = complex ? &sparse_complex : &sparse_real, .colptr = colptr, .rowind = rowind };
   if (!klu_l_defaults (&k->common)) return PW_RESOURCE;
   k->order = klu_l_analyze (n, colptr, rowind, &k->common);
   return k->order ? PW_OK : PW_RESOURCE;
-}
-
-int pw_sparse_open (pw_sparse *k, int n, int64_t *colptr, int64_t *rowind) {
-  return sparse_open (k, &sparse_real, n, colptr, rowind);
-}
-
-int pw_sparse_open_complex (pw_sparse *k, int n, int64_t *colptr, int64_t *rowind) {
-  return sparse_open (k, &sparse_complex, n, colptr, rowind);
 }
 
 void pw_sparse_forget (pw_sparse *k) {

@@ -15,9 +15,8 @@ typedef struct {
   double least;             /* ratio of pivots below which they are selected again */
 } pw_sparse;
 
-/* n columns in compressed form.  PW_OK or PW_RESOURCE. */
-int pw_sparse_open (pw_sparse *k, int n, int64_t *colptr, int64_t *rowind);
-int pw_sparse_open_complex (pw_sparse *k, int n, int64_t *colptr, int64_t *rowind);
+/* n columns in compressed form; complex: 1 for complex numbers.  PW_OK or PW_RESOURCE. */
+int pw_sparse_open (pw_sparse *k, int complex, int n, int64_t *colptr, int64_t *rowind);
 void pw_sparse_close (pw_sparse *k);
 
 /* PW_OK, PW_INPUT if the matrix is singular, PW_RESOURCE. */

@@ -15,20 +15,21 @@
 typedef struct {
   pw_run *run;
   int rows, holonomic; /* active equations */
-  int *map;            /* all equations: index among the active ones, or -1; NULL: all are active */
-  const int *row;      /* rows: index among all equations */
+  int *map;            /* all equations: index among the active ones, or -1 */
+  int *row;            /* rows: index among all equations */
   double *lambda, *mu; /* all equations: values of the unknowns last expanded */
   double *D;           /* coords: 1 for lengths, 1/L^2 for angles, so that mu has one unit */
   pw_newton newton;
   pw_scatter_map scatter;
   int64_t *colptr, *rowind; /* the pattern, in compressed columns */
+  char *memory;
 } pw_tangent;
 
 int pw_tangent_open (pw_tangent *x, pw_run *r); /* PW_OK or PW_RESOURCE */
 void pw_tangent_close (pw_tangent *x);
 
-/* Multipliers of all equations from those of the active ones, valid until the next call: lambda; the first `count` of mu,
- * NULL if there are none. */
+/* Multipliers of all equations from those of the active ones, valid until the next call: lambda; the first `count` of
+ * mu, NULL if there are none. */
 const double *pw_tangent_lambda (const pw_tangent *x, const double *used);
 const double *pw_tangent_mu (const pw_tangent *x, const double *used, int count);
 /* The same lambda in an array of all equations. */

@@ -126,41 +126,32 @@ PW_INLINE void chain_eliminate (pw_block_ldl *l, chain_sweep *s, int sign, chain
   chain_move (s, 1, sign);
 }
 
-/* From the first pin to the next column. */
-static void chain_factor_along (pw_block_ldl *l, const pw_chain *c, const double *before, double *after) {
-  chain_sweep s = chain_begin (l, c, 1);
+/* Along the chain to the next column; or, if it is `whole`, from both ends to the pin in the middle, which of an odd
+ * number of bodies is that after the body in the middle. */
+void pw_chain_factor (pw_block_ldl *l, const pw_chain *c) {
+  const double *first = l->value + l->column[c->column].at;
+  double *last = l->value + l->column[c->column + c->bodies].at;
+  chain_sweep s = chain_begin (l, c, c->whole ? -1 : 1);
   chain_lanes D[CHAIN_BLOCK];
-  for (int n = 0; n < CHAIN_BLOCK; n++) D[n] = (chain_lanes){ before[n], before[n] };
-  for (int n = 0; n < c->bodies; n++) {
-    chain_eliminate (l, &s, 1, D);
-    if (!(l->pivot > 0)) return;
-  }
-  for (int n = 0; n < CHAIN_BLOCK; n++) after[n] += D[n][0];
-}
-
-/* From both ends to the pin in the middle; of an odd number of bodies, that after the body in the middle. */
-static void chain_factor_whole (pw_block_ldl *l, const pw_chain *c, const double *first, const double *last) {
-  chain_sweep s = chain_begin (l, c, -1);
-  chain_lanes D[CHAIN_BLOCK], E[CHAIN_BLOCK];
-  for (int n = 0; n < CHAIN_BLOCK; n++) D[n] = (chain_lanes){ first[n], last[n] };
-  for (int n = 0; n < c->bodies / 2; n++) {
+  double other[CHAIN_BLOCK]; /* of the pin in the middle, from the second lane */
+  for (int n = 0; n < CHAIN_BLOCK; n++) D[n] = (chain_lanes){ first[n], c->whole ? last[n] : first[n] };
+  for (int n = c->whole ? c->bodies / 2 : 0; n > 0; n--) {
     chain_eliminate (l, &s, -1, D);
     if (!(l->pivot > 0)) return;
   }
-  for (int n = 0; n < CHAIN_BLOCK; n++) E[n] = (chain_lanes){ D[n][0], D[n][0] };
-  s.b = s.a;
-  if (c->bodies % 2) chain_eliminate (l, &s, 1, E);
-  for (int n = 0; n < CHAIN_BLOCK; n++) E[n] += D[n][1];
-  chain_pivot (E, l, &s);
-  for (int n = 0; n < 3; n++) s.a.keep[n] = E[n][0];
-}
-
-void pw_chain_factor (pw_block_ldl *l, const pw_chain *c) {
-  double *first = l->value + l->column[c->column].at, *last = l->value + l->column[c->column + c->bodies].at;
-  if (c->whole)
-    chain_factor_whole (l, c, first, last);
-  else
-    chain_factor_along (l, c, first, last);
+  for (int n = 0; n < CHAIN_BLOCK && c->whole; n++) other[n] = D[n][1], D[n][1] = D[n][0];
+  if (c->whole) s.b = s.a;
+  for (int n = c->whole ? c->bodies % 2 : c->bodies; n > 0; n--) {
+    chain_eliminate (l, &s, 1, D);
+    if (!(l->pivot > 0)) return;
+  }
+  if (!c->whole) {
+    for (int n = 0; n < CHAIN_BLOCK; n++) last[n] += D[n][0];
+    return;
+  }
+  for (int n = 0; n < CHAIN_BLOCK; n++) D[n] += other[n];
+  chain_pivot (D, l, &s);
+  for (int n = 0; n < 3; n++) s.a.keep[n] = D[n][0];
 }
 
 /* ---- Solution ---- */
@@ -231,30 +222,20 @@ PW_INLINE chain_point chain_backward (const pw_block_ldl *l, chain_sweep *s, int
   return at;
 }
 
-static void chain_backward_whole (const pw_block_ldl *l, const pw_chain *c, const double *f, double *y, double *a) {
-  chain_sweep s = chain_begin (l, c, -1);
-  chain_move (&s, c->bodies / 2, -1);
-  chain_sweep middle = s;
-  middle.b = middle.a;
-  chain_move (&middle, c->bodies % 2, 1);
-  chain_point at = chain_point_at (&middle, y);
-  const chain_point z = chain_divide_kept (&middle, at.x, at.y);
-  at = (chain_point){ -z.x, -z.y };
-  y[middle.a.y] = at.x[0], y[middle.a.y + 1] = at.y[0];
-  if (c->bodies % 2) {
-    const chain_point before = chain_backward (l, &middle, 1, f, y, a, at);
-    at.x[0] = before.x[0], at.y[0] = before.y[0];
-  }
-  for (int n = 0; n < c->bodies / 2; n++) at = chain_backward (l, &s, -1, f, y, a, at);
-}
-
 void pw_chain_backward (const pw_block_ldl *l, const pw_chain *c, const double *f, double *y, double *a) {
+  chain_sweep s = chain_begin (l, c, c->whole ? -1 : 1), along;
+  chain_move (&s, c->whole ? c->bodies / 2 : 0, -1);
+  along = s;
+  along.b = along.a;
+  chain_move (&along, c->whole ? c->bodies % 2 : c->bodies, 1);
+  chain_point at = chain_point_at (&along, y);
   if (c->whole) {
-    chain_backward_whole (l, c, f, y, a);
-    return;
+    const chain_point z = chain_divide_kept (&along, at.x, at.y);
+    at = (chain_point){ -z.x, -z.y };
+    y[along.a.y] = at.x[0], y[along.a.y + 1] = at.y[0];
   }
-  chain_sweep s = chain_begin (l, c, 1);
-  chain_move (&s, c->bodies, 1);
-  chain_point at = chain_point_at (&s, y);
-  for (int n = 0; n < c->bodies; n++) at = chain_backward (l, &s, 1, f, y, a, at);
+  const chain_point middle = at;
+  for (int n = c->whole ? c->bodies % 2 : c->bodies; n > 0; n--) at = chain_backward (l, &along, 1, f, y, a, at);
+  at.x[1] = middle.x[1], at.y[1] = middle.y[1];
+  for (int n = c->whole ? c->bodies / 2 : 0; n > 0; n--) at = chain_backward (l, &s, -1, f, y, a, at);
 }

@@ -35,7 +35,7 @@ PW_INLINE void block_contribute (int ka, int width, const pw_block_ldl *l, const
 
 /* An uncondensed body: its mass, its columns of J, and the diagonal that later equations would have if it were
  * condensed. */
-static void block_keep (const pw_block_ldl *l, const pw_body_block *p) {
+static void block_uncondensed (const pw_block_ldl *l, const pw_body_block *p) {
   const pw_contribution *own = l->contribution + p[1].first - 2;
   const double *w = l->inverse + p->j;
   const int *coupling = l->coupling + p->coupling;
@@ -60,7 +60,7 @@ static void block_assemble (const pw_block_ldl *l) {
     const int *coupling = l->coupling + p->coupling;
     const pw_contribution *a = l->contribution + p->first, *end = l->contribution + p[1].first;
     if (p->uncondensed)
-      block_keep (l, p);
+      block_uncondensed (l, p);
     else if (p->width == 3)
       for (; a < end; coupling += end - ++a) BLOCK_SIZE (a->size, block_contribute, 3, l, p, a, coupling);
     else

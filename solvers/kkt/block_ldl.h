@@ -23,8 +23,8 @@
  *   L = K D_c^-1,   D_(c+1) = K_(c+1)(c+1) - L K^T,   y_(c+1) -= L y_c
  *   backwards:   y_c = -D_c^-1 (y_c + K^T y_(c+1)),   K^T y = +-m y + i (b . y) a
  *
- * where D and y are passed from pin to pin, and only the factors of D are stored.  If nothing is below the last pin, the
- * elimination proceeds from both ends to the middle. */
+ * where D and y are passed from pin to pin, and only the factors of D are stored.  If nothing is below the last pin,
+ * the elimination proceeds from both ends to the middle. */
 #ifndef PW_BLOCK_LDL_H
 #define PW_BLOCK_LDL_H
 
@@ -81,7 +81,7 @@ typedef struct {
   pw_column *column; /* nodes + 1: the last one ends the ranges */
   int *below;        /* numbers of the columns that the rows below belong to, ascending in each column */
   int *target;       /* for each column, for its rows p descending, q < p: where K_pq is */
-  int *place;        /* column of each node; until planning is over */
+  int *place;        /* column of each node */
   double *value;
   int values;
   const double *inverse; /* diagonal of W^-1 */
@@ -98,20 +98,17 @@ typedef struct {
 
 /* ---- Planning (block_order.c) ---- */
 
-enum { PW_PLAN_SCHUR = -1, PW_PLAN_UNCONDENSED = -2 };
-
 typedef struct {
-  int size;               /* unknowns */
-  int row;                /* the first global one, or PW_PLAN_SCHUR, PW_PLAN_UNCONDENSED */
-  int rank;               /* 0 to PW_BLOCK_RANKS - 1 */
-  int grounded;           /* 1: touches the ground or prescribed coordinates (pw_is_grounded) */
-  int y;                  /* their position in the right-hand side */
-  double *gamma, *lambda; /* of a Schur row */
+  int size;     /* unknowns */
+  int rank;     /* 0 to PW_BLOCK_RANKS - 1 */
+  int grounded; /* 1: touches the ground or prescribed coordinates (pw_is_grounded) */
+  int y;        /* its first unknown in the right-hand side: its first row, or beyond the rows */
+  int first;    /* its first contribution; its last one is before `first` of the next node */
 } pw_plan_node;
 
 /* pair: 2 x pairs node numbers with a block between them, each unordered pair any number of times, the diagonal not
- * needed, fewer than 2^30.  The order is that of the nodes if it fills in no more than minimum degree does (AMD: Amestoy, Davis & Duff
- * 1996).  NULL if out of memory. */
+ * needed, fewer than 2^30.  The order is that of the nodes if it fills in no more than minimum degree does (AMD:
+ * Amestoy, Davis & Duff 1996).  NULL if out of memory. */
 pw_block_ldl *pw_block_open (int nodes, const pw_plan_node *node, long pairs, const int *pair);
 void pw_block_close (pw_block_ldl *l);
 

@@ -8,118 +8,109 @@
 
 /* ---- Pattern ---- */
 
-/* Neighbours of each node, with repetition; or rows of each column, ascending. */
-typedef struct {
-  int *first, *list; /* of node or column c: list[first[c]] to list[first[c + 1] - 1] */
-} order_lists;
-
-/* An order of elimination. */
+/* An order of elimination, and the rows below the diagonal of each column: below[first[c]] to below[first[c + 1] - 1],
+ * ascending. */
 typedef struct {
   int *order, *place; /* node at each place; place of each node */
-  order_lists L;      /* rows below the diagonal of each column, by place */
+  int *first, *below;
 } order_variant;
 
-static void order_lists_close (order_lists *l) {
-  free (l->first);
-  free (l->list);
-}
+typedef struct {
+  int nodes;
+  const pw_plan_node *node;
+  long pairs;
+  const int *pair;
+  int *first, *list; /* neighbours of node n, with repetition: list[first[n]] to list[first[n + 1] - 1] */
+  int *parent, *mark;
+  order_variant by_degree, natural;
+  char *memory;
+} order_search;
 
-/* The graph of the nodes of at most this rank. */
-static int order_graph (int nodes, const pw_plan_node *node, int rank, long pairs, const int *pair,
-                        order_lists *graph) {
-  int *first = graph->first = calloc ((size_t)nodes + 2, sizeof *first);
-  int *list = graph->list = malloc ((size_t)(2 * pairs + 1) * sizeof *list);
-  if (first == NULL || list == NULL) return PW_RESOURCE;
-  for (int pass = 0; pass < 2; pass++) { /* counts node c in first[c + 2], then fills through first[c + 1] */
-    for (long i = 0; i < 2 * pairs; i++) {
-      int c = pair[i], r = pair[i ^ 1];
-      if (c == r || node[c].rank > rank || node[r].rank > rank) continue;
-      if (pass == 0)
-        first[c + 2]++;
-      else
-        list[first[c + 1]++] = r;
+static int order_open (order_search *x) {
+  size_t n = (size_t)x->nodes + 2;
+  order_variant *const variant[] = { &x->by_degree, &x->natural };
+  for (pw_layout l = { 0 }; pw_layout_pass (&l, &x->memory);) {
+    x->first = pw_layout_alloc (&l, n, sizeof *x->first);
+    x->list = pw_layout_alloc (&l, (size_t)(2 * x->pairs), sizeof *x->list);
+    x->parent = pw_layout_alloc (&l, n, sizeof *x->parent);
+    x->mark = pw_layout_alloc (&l, n, sizeof *x->mark);
+    for (int i = 0; i < 2; i++) {
+      variant[i]->order = pw_layout_alloc (&l, n, sizeof (int));
+      variant[i]->place = pw_layout_alloc (&l, n, sizeof (int));
+      variant[i]->first = pw_layout_alloc (&l, n, sizeof (int));
     }
-    for (int c = 0; pass == 0 && c < nodes; c++) first[c + 2] += first[c + 1];
   }
-  return PW_OK;
+  return x->memory ? PW_OK : PW_RESOURCE;
 }
 
-/* Minimum degree order of the nodes of rank 0. */
-static int order_by_degree (int nodes, const pw_plan_node *node, long pairs, const int *pair, int *order) {
-  order_lists graph = { NULL, NULL };
-  int status = order_graph (nodes, node, 0, pairs, pair, &graph);
-  if (status == PW_OK && nodes > 0 && amd_order (nodes, graph.first, graph.list, order, NULL, NULL) < 0)
-    status = PW_RESOURCE;
-  order_lists_close (&graph);
-  return status;
+static void order_close (order_search *x) {
+  free (x->by_degree.below);
+  free (x->natural.below);
+  free (x->memory);
 }
 
-/* Passes through the rows of L: row i has entries in the columns on the paths of the elimination tree from those of K to
- * i (Davis 2005, Algorithm 849: LDL).  The first pass counts them in first[column + 2] and builds the tree, the second
- * one lists them.  PW_RETRY if there are more than `most`. */
-static int order_pass (int nodes, const order_lists *K, int most, order_variant *v, int *parent, int *mark) {
+/* Lists the neighbours of the nodes of at most this rank. */
+static void order_graph (order_search *x, int rank) {
+  memset (x->first, 0, ((size_t)x->nodes + 2) * sizeof *x->first);
+  for (int pass = 0; pass < 2; pass++) { /* counts node c in first[c + 2], then fills through first[c + 1] */
+    for (long i = 0; i < 2 * x->pairs; i++) {
+      int c = x->pair[i], r = x->pair[i ^ 1];
+      if (c == r || x->node[c].rank > rank || x->node[r].rank > rank) continue;
+      if (pass == 0)
+        x->first[c + 2]++;
+      else
+        x->list[x->first[c + 1]++] = r;
+    }
+    for (int c = 0; pass == 0 && c < x->nodes; c++) x->first[c + 2] += x->first[c + 1];
+  }
+}
+
+/* Passes through the rows of L: row i has entries in the columns on the paths of the elimination tree from those of K
+ * to i (Davis 2005, Algorithm 849: LDL).  The first pass counts them in first[column + 2], the second one lists them.
+ * PW_RETRY if there are more than `most`. */
+static int order_pass (const order_search *x, int most, const order_variant *v) {
   long count = 0;
-  for (int i = 0; i < nodes; i++) mark[i] = -1;
-  for (int i = 0; i < nodes && count <= most; i++) {
-    mark[i] = i;
-    for (int x = K->first[v->order[i]]; x < K->first[v->order[i] + 1]; x++)
-      for (int j = v->place[K->list[x]]; j < i && mark[j] != i; j = parent[j]) {
-        if (parent[j] < 0) parent[j] = i;
-        mark[j] = i;
+  for (int i = 0; i < x->nodes; i++) x->mark[i] = x->parent[i] = -1;
+  for (int i = 0; i < x->nodes && count <= most; i++) {
+    int node = v->order[i];
+    x->mark[i] = i;
+    for (int k = x->first[node]; k < x->first[node + 1]; k++)
+      for (int j = v->place[x->list[k]]; j < i && x->mark[j] != i; j = x->parent[j]) {
+        if (x->parent[j] < 0) x->parent[j] = i;
+        x->mark[j] = i;
         count++;
-        if (v->L.list)
-          v->L.list[v->L.first[j + 1]++] = i;
+        if (v->below)
+          v->below[v->first[j + 1]++] = i;
         else
-          v->L.first[j + 2]++;
+          v->first[j + 2]++;
       }
   }
   return count <= most ? PW_OK : PW_RETRY;
 }
 
-static int order_fill (int nodes, const order_lists *K, int most, order_variant *v) {
-  int *parent = malloc (2 * ((size_t)nodes + 1) * sizeof *parent), *first = NULL;
-  v->L.first = first = calloc ((size_t)nodes + 2, sizeof *first);
-  int status = parent && first ? PW_OK : PW_RESOURCE;
-  for (int j = 0; j < nodes && status == PW_OK; j++) parent[j] = -1;
-  if (status == PW_OK) status = order_pass (nodes, K, most, v, parent, parent + nodes);
-  if (status == PW_OK) {
-    for (int j = 0; j < nodes; j++) first[j + 2] += first[j + 1];
-    v->L.list = malloc (((size_t)first[nodes + 1] + 1) * sizeof *v->L.list);
-    status = v->L.list ? order_pass (nodes, K, most, v, parent, parent + nodes) : PW_RESOURCE;
-  }
-  free (parent);
-  return status;
-}
-
 /* Moves nodes of higher rank to the end, otherwise in the same order, and lists the rows of each column. */
-static int order_try (int nodes, const pw_plan_node *node, const order_lists *K, int most, order_variant *v) {
+static int order_fill (const order_search *x, int most, order_variant *v) {
   int at = 0;
   for (int rank = 0; rank < PW_BLOCK_RANKS; rank++)
-    for (int j = 0; j < nodes; j++)
-      if (node[v->order[j]].rank == rank) v->place[v->order[j]] = at++;
-  for (int n = 0; n < nodes; n++) v->order[v->place[n]] = n;
-  return order_fill (nodes, K, most, v);
+    for (int j = 0; j < x->nodes; j++)
+      if (x->node[v->order[j]].rank == rank) v->place[v->order[j]] = at++;
+  for (int n = 0; n < x->nodes; n++) v->order[v->place[n]] = n;
+  if (order_pass (x, most, v) != PW_OK) return PW_RETRY;
+  for (int j = 0; j < x->nodes; j++) v->first[j + 2] += v->first[j + 1];
+  v->below = malloc (((size_t)v->first[x->nodes + 1] + 1) * sizeof *v->below);
+  return v->below ? order_pass (x, most, v) : PW_RESOURCE;
 }
 
-/* Stores in v[0] the order with less fill-in: minimum degree, or the natural order. */
-static int order_plan (int nodes, const pw_plan_node *node, long pairs, const int *pair, order_variant *v) {
-  order_lists K = { NULL, NULL };
-  for (int i = 0; i < 2; i++) {
-    v[i].order = malloc (((size_t)nodes + 1) * sizeof *v[i].order);
-    v[i].place = malloc (((size_t)nodes + 1) * sizeof *v[i].place);
-    if (v[i].order == NULL || v[i].place == NULL) return PW_RESOURCE;
-  }
-  for (int n = 0; n < nodes; n++) v[1].order[n] = n;
-  int status = order_by_degree (nodes, node, pairs, pair, v[0].order);
-  if (status == PW_OK) status = order_graph (nodes, node, PW_BLOCK_RANKS, pairs, pair, &K);
-  if (status == PW_OK && order_try (nodes, node, &K, INT_MAX / 2, &v[0]) != PW_OK) status = PW_RESOURCE;
-  if (status == PW_OK) {
-    status = order_try (nodes, node, &K, v[0].L.first[nodes], &v[1]);
-    order_variant other = v[0];
-    if (status == PW_OK) v[0] = v[1], v[1] = other;
-  }
-  order_lists_close (&K);
-  return status == PW_RETRY ? PW_OK : status;
+/* The order with less fill-in, of minimum degree or the natural one; NULL if out of memory. */
+static const order_variant *order_choose (order_search *x) {
+  if (order_open (x) != PW_OK) return NULL;
+  order_graph (x, 0);
+  if (x->nodes > 0 && amd_order (x->nodes, x->first, x->list, x->by_degree.order, NULL, NULL) < 0) return NULL;
+  for (int n = 0; n < x->nodes; n++) x->natural.order[n] = n;
+  order_graph (x, PW_BLOCK_RANKS);
+  if (order_fill (x, INT_MAX / 2, &x->by_degree) != PW_OK) return NULL;
+  int status = order_fill (x, x->by_degree.first[x->nodes], &x->natural);
+  return status == PW_OK ? &x->natural : status == PW_RETRY ? &x->by_degree : NULL;
 }
 
 /* ---- Layout ---- */
@@ -146,10 +137,10 @@ static int order_place_columns (pw_block_ldl *l) {
   return PW_OK;
 }
 
-static size_t order_count_targets (int nodes, const order_lists *L) {
+static size_t order_count_targets (int nodes, const order_variant *v) {
   size_t count = 0;
   for (int j = 0; j < nodes; j++) {
-    size_t n = (size_t)(L->first[j + 1] - L->first[j]);
+    size_t n = (size_t)(v->first[j + 1] - v->first[j]);
     if (n > 1) count += n * (n - 1) / 2;
   }
   return count;
@@ -175,23 +166,22 @@ static void order_place_targets (pw_block_ldl *l) {
   }
 }
 
-static int order_carve (pw_block_ldl *l, const pw_plan_node *node, const int *order, const order_lists *L) {
-  size_t n = (size_t)l->nodes, below = (size_t)L->first[l->nodes], targets = order_count_targets (l->nodes, L);
-  pw_layout lay = { NULL, 0 };
-  for (int pass = 0; pass < 2; pass++) {
+static int order_store (pw_block_ldl *l, const pw_plan_node *node, const order_variant *v) {
+  size_t n = (size_t)l->nodes, below = (size_t)v->first[l->nodes], targets = order_count_targets (l->nodes, v);
+  for (pw_layout lay = { 0 }; pw_layout_pass (&lay, &l->pattern);) {
     l->column = pw_layout_alloc (&lay, n + 1, sizeof *l->column);
     l->below = pw_layout_alloc (&lay, below, sizeof *l->below);
     l->target = pw_layout_alloc (&lay, targets, sizeof *l->target);
-    if (pass == 1) break;
-    l->pattern = malloc (lay.used);
-    if (l->pattern == NULL) return PW_RESOURCE;
-    lay = (pw_layout){ l->pattern, 0 };
+    l->place = pw_layout_alloc (&lay, n, sizeof *l->place);
   }
-  memcpy (l->below, L->list, below * sizeof (int));
-  for (int j = 0; j < l->nodes; j++)
-    l->column[j] =
-        (pw_column){ .y = node[order[j]].y, .first = L->first[j], .size = (unsigned char)node[order[j]].size };
-  l->column[l->nodes] = (pw_column){ .first = L->first[l->nodes] };
+  if (l->pattern == NULL) return PW_RESOURCE;
+  memcpy (l->below, v->below, below * sizeof *l->below);
+  memcpy (l->place, v->place, n * sizeof *l->place);
+  for (int j = 0; j < l->nodes; j++) {
+    const pw_plan_node *own = &node[v->order[j]];
+    l->column[j] = (pw_column){ .y = own->y, .first = v->first[j], .size = (unsigned char)own->size };
+  }
+  l->column[l->nodes] = (pw_column){ .first = v->first[l->nodes] };
   return PW_OK;
 }
 
@@ -203,28 +193,17 @@ int pw_block_lay_out (pw_block_ldl *l) {
 }
 
 pw_block_ldl *pw_block_open (int nodes, const pw_plan_node *node, long pairs, const int *pair) {
-  pw_block_ldl *l = calloc (1, sizeof *l);
-  order_variant v[2] = { { 0 } };
-  int status = l ? order_plan (nodes, node, pairs, pair, v) : PW_RESOURCE;
-  if (status == PW_OK) {
-    l->nodes = nodes;
-    l->place = v[0].place;
-    v[0].place = NULL;
-    status = order_carve (l, node, v[0].order, &v[0].L);
-  }
-  for (int i = 0; i < 2; i++) {
-    order_lists_close (&v[i].L);
-    free (v[i].order);
-    free (v[i].place);
-  }
-  if (status == PW_OK) return l;
-  pw_block_close (l);
-  return NULL;
+  order_search x = { .nodes = nodes, .node = node, .pairs = pairs, .pair = pair };
+  const order_variant *v = order_choose (&x);
+  pw_block_ldl *l = v ? calloc (1, sizeof *l) : NULL;
+  if (l) l->nodes = nodes;
+  if (l && order_store (l, node, v) != PW_OK) pw_block_close (l), l = NULL;
+  order_close (&x);
+  return l;
 }
 
 void pw_block_close (pw_block_ldl *l) {
   if (l == NULL) return;
-  free (l->place);
   free (l->value);
   free (l->pattern);
   free (l->memory);

@@ -6,29 +6,33 @@
 
 /* ---- Nodes ---- */
 
+/* Begins a node: the contributions that follow are its own. */
+static void condense_add_node (pw_plan *c, pw_plan_node node) {
+  c->failed |= pw_grow (&c->node, (size_t)c->nodes, &c->node_room, sizeof *c->node) != PW_OK;
+  node.first = c->contributions;
+  if (!c->failed) c->node[c->nodes++] = node;
+}
+
 static void condense_contribute (pw_plan *c, const double *J, int step, int j, int is_pin) {
   int moves = 0, prescribed = 0;
   for (int n = 0; n < pw_group_width (c->k->s, j); n++)
     moves |= c->k->inverse[j + n] > 0, prescribed |= isinf (c->weight[j + n]) != 0;
-  if (c->node) c->node[c->nodes].grounded |= prescribed;
+  if (c->failed) return;
+  c->node[c->nodes - 1].grounded |= prescribed;
   if (!moves) return;
-  if (c->contribution) c->contribution[c->contributions] = (pw_plan_contribution){ J, c->nodes, step, j, is_pin };
-  c->contributions++;
+  c->failed =
+      pw_grow (&c->contribution, (size_t)c->contributions, &c->contribution_room, sizeof *c->contribution) != PW_OK;
+  if (!c->failed) c->contribution[c->contributions++] = (pw_plan_contribution){ J, c->nodes - 1, step, j, is_pin };
 }
 
-static void condense_element (pw_plan *c, const pw_element_batch *b, int e, int r, int size) {
-  const pw_kind *kind = b->kind;
-  const double *J = b->J + (e * kind->rows + r) * b->b.cols;
-  int i = b->row + e * kind->rows + r;
-  if (c->node)
-    c->node[c->nodes] = (pw_plan_node){ .size = size, .row = i, .y = i, .grounded = pw_is_grounded (c->k->s, b, e) };
-  for (int n = 0; n < kind->bodies; n++) {
-    int j = b->column[e * kind->bodies + n];
-    if (j < c->k->s->coords) condense_contribute (c, J + 3 * n, b->b.cols, j, kind == &pw_kind_pin && size == 2);
+/* The node of `size` rows from row n of a batch on. */
+static void condense_element (pw_plan *c, const pw_element_batch *b, int n, int size) {
+  const int e = n / b->kind->rows, is_pin = b->kind == &pw_kind_pin && size == 2;
+  condense_add_node (c, (pw_plan_node){ .size = size, .y = b->row + n, .grounded = pw_is_grounded (c->k->s, b, e) });
+  for (int x = 0; x < b->b.cols; x += pw_group_columns (b->kind, x)) {
+    int j = pw_global (b, e, x);
+    if (j < c->k->s->coords) condense_contribute (c, b->J + n * b->b.cols + x, b->b.cols, j, is_pin);
   }
-  for (int n = 0; n < kind->internal; n++)
-    condense_contribute (c, J + 3 * kind->bodies + n, b->b.cols, b->internal + e * kind->internal + n, 0);
-  c->nodes++;
 }
 
 /* 1 for row n of a batch that becomes part of a node: active, not in a massless component, and not a function of
@@ -56,15 +60,17 @@ static int condense_joins (const pw_element_batch *b, int n) {
   return 1;
 }
 
-/* Groups such rows that follow one another into nodes. */
-static void condense_elements (pw_plan *c, int rows, const unsigned char *active) {
-  const pw_system *s = c->k->s;
-  for (const pw_element_batch *b = c->k->w->batch;
-       b < c->k->w->batch + s->batches && b->kind->rows > 0 && b->row < rows; b++)
+/* Groups such rows that follow one another into nodes; others that are in no massless component are inactive. */
+static void condense_elements (pw_plan *c, const unsigned char *active) {
+  struct pw_saddle *k = c->k;
+  for (const pw_element_batch *b = k->w->batch; b < k->w->batch + k->s->constraints && b->row < k->rows; b++)
     for (int n = 0, end = b->b.count * b->kind->rows, size; n < end; n += size ? size : 1) {
       for (size = 0; n + size < end && size < PW_BLOCK_NODE; size++)
         if (!condense_takes_part (c, b, n + size, active) || (size > 0 && !condense_joins (b, n))) break;
-      if (size > 0) condense_element (c, b, n / b->kind->rows, n % b->kind->rows, size);
+      if (size > 0)
+        condense_element (c, b, n, size);
+      else if (k->massless.component_of_row[b->row + n] < 0)
+        k->inactive[k->inactives++] = b->row + n;
     }
 }
 
@@ -78,53 +84,35 @@ static int condense_remains (const pw_plan *c, const pw_component *p, int i) {
   return p->massives > 0 && !prescribed;
 }
 
-/* Adds the unmatched rows; the multiplier of one that does not become a node stays 0. */
+/* Adds the unmatched rows; the multiplier of one that does not become a node is 0. */
 static void condense_components (pw_plan *c) {
-  int schurs = 0;
-  for (int n = 0; n < c->k->massless.components; n++) {
-    pw_component *p = &c->k->massless.component[n];
+  for (pw_component *p = c->k->massless.component; p < c->k->massless.end; p++)
     for (int i = p->pivots; i < p->rows; i++) {
-      if (!condense_remains (c, p, i)) continue;
-      if (c->node)
-        c->node[c->nodes] = (pw_plan_node){ .size = 1,
-                                            .row = PW_PLAN_SCHUR,
-                                            .y = c->k->s->rows + schurs++,
-                                            .grounded = p->grounded,
-                                            .gamma = &p->row[i].gamma,
-                                            .lambda = &p->row[i].lambda };
+      p->y[i] = condense_remains (c, p, i) ? p->row[i].row : -1;
+      if (p->y[i] < 0) continue;
+      condense_add_node (c, (pw_plan_node){ .size = 1, .y = p->y[i], .grounded = p->grounded });
       for (int g = 0; g < p->groups; g++)
         condense_contribute (c, p->A + i * p->stride + p->group[g].column, p->stride, p->group[g].j, 0);
-      c->nodes++;
     }
-  }
 }
 
-static void condense_nodes (pw_plan *c, int rows, const unsigned char *active) {
-  c->nodes = c->contributions = 0;
-  condense_elements (c, rows, active);
-  condense_components (c);
-}
-
-static int condense_allocate (pw_plan *c, int rows, const unsigned char *active) {
-  condense_nodes (c, rows, active);
-  pw_plan_node *node = malloc (((size_t)c->nodes + 1) * sizeof *node);
-  c->contribution = malloc (((size_t)c->contributions + 1) * sizeof *c->contribution);
-  c->start = calloc ((size_t)c->k->s->coords + 2, sizeof *c->start);
+/* Sorts the contributions by coordinate. */
+static int condense_sort (pw_plan *c) {
+  const int coords = c->k->s->coords;
+  c->start = calloc ((size_t)coords + 2, sizeof *c->start);
   c->list = malloc (((size_t)c->contributions + 1) * sizeof *c->list);
-  c->node = node;
-  if (node == NULL || c->contribution == NULL || c->start == NULL || c->list == NULL) return PW_RESOURCE;
-  condense_nodes (c, rows, active);
+  if (c->failed || c->start == NULL || c->list == NULL) return PW_RESOURCE;
   for (int p = 0; p < c->contributions; p++) c->start[c->contribution[p].j + 2]++;
-  for (int j = 0; j < c->k->s->coords; j++) c->start[j + 2] += c->start[j + 1];
+  for (int j = 0; j < coords; j++) c->start[j + 2] += c->start[j + 1];
   for (int p = 0; p < c->contributions; p++) c->list[c->start[c->contribution[p].j + 1]++] = p;
   return PW_OK;
 }
 
-/* ---- Unknowns beyond the rows ---- */
+/* ---- Bodies that are not condensed ---- */
 
 /* A body at which more nodes than this meet is not condensed, if its weights are finite: n nodes have n (n - 1) / 2
- * couplings, but only 2 n with an uncondensed body, fewer from n = 6.  Measured: 0.6 to 0.9 of the time with 7 nodes, 0.7
- * to 1.0 with 6. */
+ * couplings, but only 2 n with an uncondensed body, fewer from n = 6.  Measured: 0.6 to 0.9 of the time with 7 nodes,
+ * 0.7 to 1.0 with 6. */
 enum { CONDENSE_MEET = 6 };
 
 static int condense_is_crowded (const pw_plan *c, int b) {
@@ -134,72 +122,50 @@ static int condense_is_crowded (const pw_plan *c, int b) {
 
 /* Adds two nodes for every body that is not condensed, and ranks the others. */
 static int condense_uncondensed (pw_plan *c) {
-  int bodies = c->k->s->bodies, nodes = c->nodes;
-  c->uncondensed = malloc (((size_t)bodies + 1) * sizeof *c->uncondensed);
+  struct pw_saddle *k = c->k;
+  c->uncondensed = malloc (((size_t)k->s->bodies + 1) * sizeof *c->uncondensed);
   if (c->uncondensed == NULL) return PW_RESOURCE;
-  for (int b = 0; b < bodies; b++) c->uncondensed[b] = condense_is_crowded (c, b) ? nodes + 2 * c->uncondenseds++ : -1;
-  if (c->uncondenseds == 0) return PW_OK;
-  pw_plan_node *node = realloc (c->node, (size_t)(nodes + 2 * c->uncondenseds) * sizeof *node);
-  if (node == NULL) return PW_RESOURCE;
-  c->node = node;
-  for (int y = c->k->s->rows + c->k->schurs, n = 0; n < c->uncondenseds; n++, y += 3) {
-    node[c->nodes++] = (pw_plan_node){ .size = 2, .row = PW_PLAN_UNCONDENSED, .rank = 1, .y = y };
-    node[c->nodes++] = (pw_plan_node){ .size = 1, .row = PW_PLAN_UNCONDENSED, .rank = 1, .y = y + 2 };
+  for (int b = 0; b < k->s->bodies; b++) {
+    c->uncondensed[b] = -1;
+    if (!condense_is_crowded (c, b)) continue;
+    c->uncondensed[b] = c->nodes;
+    condense_add_node (c, (pw_plan_node){ .size = 2, .rank = 1, .y = k->s->rows + k->more });
+    condense_add_node (c, (pw_plan_node){ .size = 1, .rank = 1, .y = k->s->rows + k->more + 2 });
+    k->more += 3;
   }
-  return pw_condense_rank (c);
+  if (k->more == 0) return PW_OK;
+  k->y = malloc ((size_t)(k->s->rows + k->more) * sizeof *k->y);
+  return c->failed || k->y == NULL ? PW_RESOURCE : pw_condense_rank (c);
 }
 
-/* Lists inactive rows and Schur rows; nodes are in the order of their rows. */
-static void condense_fill_rows (pw_plan *c, int rows) {
-  struct pw_saddle *k = c->k;
-  int schurs = 0, inactives = 0, n = 0;
-  for (int i = 0; i < rows; i++) {
-    while (n < c->nodes && c->node[n].row >= 0 && c->node[n].row + c->node[n].size <= i) n++;
-    int own = n < c->nodes && c->node[n].row >= 0 && c->node[n].row <= i;
-    if (!own && k->massless.component_of_row[i] < 0) k->inactive[inactives++] = i;
-  }
-  for (n = 0; n < c->nodes; n++)
-    if (c->node[n].row == PW_PLAN_SCHUR)
-      k->schur[schurs++] = (pw_schur_row){ c->node[n].y, c->node[n].gamma, c->node[n].lambda };
+/* ---- Opening ---- */
+
+static int condense_plan (pw_plan *c, const unsigned char *active) {
+  condense_elements (c, active);
+  condense_components (c);
+  int status = condense_sort (c);
+  if (status == PW_OK) status = condense_uncondensed (c);
+  return status == PW_OK ? pw_condense_block (c) : status;
 }
 
-static int condense_lay_out (pw_plan *c, int rows) {
-  struct pw_saddle *k = c->k;
-  k->inactives = rows;
-  for (int n = 0; n < c->nodes; n++) {
-    k->schurs += c->node[n].row == PW_PLAN_SCHUR;
-    if (c->node[n].row >= 0) k->inactives -= c->node[n].size;
-  }
-  for (int i = 0; i < rows; i++) k->inactives -= k->massless.component_of_row[i] >= 0;
-  if (condense_uncondensed (c) != PW_OK) return PW_RESOURCE;
-  k->more = k->schurs + 3 * c->uncondenseds;
-  pw_layout l = { NULL, 0 };
-  for (int pass = 0; pass < 2; pass++) {
-    k->force = pw_layout_alloc (&l, k->massless.components ? (size_t)k->s->coords + 3 : 0, sizeof *k->force);
-    k->y = pw_layout_alloc (&l, k->more ? (size_t)(k->s->rows + k->more) : 0, sizeof *k->y);
-    k->schur = pw_layout_alloc (&l, (size_t)k->schurs, sizeof *k->schur);
-    k->inactive = pw_layout_alloc (&l, (size_t)k->inactives, sizeof *k->inactive);
-    if (pass == 1) break;
-    k->memory = malloc (l.used + 1);
-    if (k->memory == NULL) return PW_RESOURCE;
-    l = (pw_layout){ k->memory, 0 };
-  }
-  condense_fill_rows (c, rows);
-  return pw_condense_block (c);
-}
-
-int pw_condense (struct pw_saddle *k, const double *weight, int rows, const unsigned char *active) {
+int pw_condense (struct pw_saddle *k, const double *weight, const unsigned char *active) {
+  size_t n = (size_t)k->s->coords;
   pw_plan c = { .k = k, .weight = weight, .groups = pw_groups (k->s) };
-  k->rows = rows;
-  k->inverse = calloc ((size_t)k->s->coords + 3, sizeof *k->inverse);
-  if (k->inverse == NULL) return PW_RESOURCE;
-  for (int j = 0; j < k->s->coords; j++) k->inverse[j] = weight[j] > 0 ? 1 / weight[j] : 0;
-  int status = condense_allocate (&c, rows, active);
-  if (status == PW_OK) status = condense_lay_out (&c, rows);
+  for (pw_layout l = { 0 }; pw_layout_pass (&l, &k->memory);) {
+    k->inverse = pw_layout_alloc (&l, n + 3, sizeof *k->inverse);
+    k->force = pw_layout_alloc (&l, k->massless.components ? n : 0, sizeof *k->force);
+    k->inactive = pw_layout_alloc (&l, (size_t)k->rows, sizeof *k->inactive);
+  }
+  if (k->memory == NULL) return PW_RESOURCE;
+  for (size_t j = 0; j < n; j++) k->inverse[j] = weight[j] > 0 ? 1 / weight[j] : 0;
+  int status = condense_plan (&c, active);
   free (c.node);
   free (c.contribution);
+  free (c.pair);
   free (c.start);
   free (c.list);
   free (c.uncondensed);
+  free (c.chain);
+  free (c.is_linked);
   return status;
 }

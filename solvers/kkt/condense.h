@@ -8,12 +8,6 @@
 #include "block_ldl.h"
 #include "massless.h"
 
-/* A row of the Schur complement that eliminating massless coordinates leaves: its position and its values. */
-typedef struct {
-  int y;
-  double *gamma, *lambda;
-} pw_schur_row;
-
 struct pw_saddle {
   const pw_system *s;
   const pw_workspace *w; /* contains J */
@@ -22,21 +16,18 @@ struct pw_saddle {
   pw_massless massless;
   double *inverse; /* coords + 3: 1 / weight; 0 for prescribed ones and those without weight; the ground's 0 */
   double *force;   /* coords: forces changed by `massless` */
-  double *y;       /* s->rows and `more`: gamma and lambda where there are more unknowns than rows */
-  int more;        /* Schur rows, and 3 for each uncondensed body */
+  int more;        /* unknowns besides the multipliers of rows: 3 for each uncondensed body */
+  double *y;       /* s->rows and `more`: right-hand side and solution if there are such unknowns */
   pw_block_ldl *block;
-  pw_schur_row *schur;
-  int schurs;
   int *inactive; /* rows that are not enforced */
   int inactives;
   double pivot; /* squared, of `massless` and of `block` when last factorised */
   int pivot_row;
-  double guard; /* squared: the least regular pivot */
   char *memory;
 };
 
 /* Plans everything but `massless`, which must be open.  Errors: PW_RESOURCE. */
-int pw_condense (struct pw_saddle *k, const double *weight, int rows, const unsigned char *active);
+int pw_condense (struct pw_saddle *k, const double *weight, const unsigned char *active);
 
 /* ---- Planning ---- */
 
@@ -47,21 +38,22 @@ typedef struct {
   int is_pin;        /* 1: both rows of a pin, whose x and y columns are a multiple of the unit matrix */
 } pw_plan_contribution;
 
-/* Nodes and contributions, those of a node together; while the arrays are NULL they are only counted. */
 typedef struct {
   struct pw_saddle *k;
   const double *weight;
   pw_plan_node *node;
-  pw_plan_contribution *contribution;
+  pw_plan_contribution *contribution; /* those of a node follow one another */
+  int *pair;                          /* 2 x pairs: nodes with a common coordinate */
   int nodes, contributions;
+  long pairs;
+  size_t node_room, contribution_room, pair_room; /* allocated */
+  int failed;                                     /* 1: out of memory */
   int *start, *list; /* contributions by coordinate: list[start[j]] .. list[start[j + 1] - 1] */
   int groups;        /* number of bodies and internal coordinates */
   int *uncondensed;  /* bodies: first of the two nodes of an uncondensed body, or -1 */
-  int uncondenseds;
   pw_chain *chain;
   int chains, linked;       /* number of chains; number of bodies in them */
   unsigned char *is_linked; /* groups: 1 for a body in a chain */
-  long pairs;               /* of nodes with a common coordinate */
 } pw_plan;
 
 /* Ranks the nodes of a scene with uncondensed bodies.  PW_OK or PW_RESOURCE. */

@@ -12,36 +12,27 @@ static int condense_own_nodes (const pw_plan *c, int j) {
   return j < 3 * c->k->s->bodies ? c->uncondensed[j / 3] : -1;
 }
 
-static void condense_note_pair (pw_plan *c, int *pair, int a, int b) {
-  if (pair) pair[2 * c->pairs] = a, pair[2 * c->pairs + 1] = b;
+static void condense_add_pair (pw_plan *c, int a, int b) {
+  c->failed |= pw_grow (&c->pair, (size_t)c->pairs, &c->pair_room, 2 * sizeof *c->pair) != PW_OK;
+  if (c->failed) return;
+  c->pair[2 * c->pairs] = a, c->pair[2 * c->pairs + 1] = b;
   c->pairs++;
 }
 
-/* Pairs of nodes that meet in a group, or with an uncondensed body; only counted while `pair` is NULL. */
-static void condense_pairs (pw_plan *c, int *pair) {
-  c->pairs = 0;
+/* Pairs of nodes that meet in a group, or with an uncondensed body. */
+static void condense_pairs (pw_plan *c) {
   for (int n = 0; n < c->groups; n++) {
     int j = pw_group_first (c->k->s, n), own = condense_own_nodes (c, j);
     for (int x = c->start[j]; x < c->start[j + 1]; x++) {
       int a = c->contribution[c->list[x]].node;
-      if (own >= 0) condense_note_pair (c, pair, a, own), condense_note_pair (c, pair, a, own + 1);
-      for (int y = c->start[j]; y < x && own < 0; y++)
-        condense_note_pair (c, pair, a, c->contribution[c->list[y]].node);
+      if (own >= 0) condense_add_pair (c, a, own), condense_add_pair (c, a, own + 1);
+      for (int y = c->start[j]; y < x && own < 0; y++) condense_add_pair (c, a, c->contribution[c->list[y]].node);
     }
   }
 }
 
-static pw_block_ldl *condense_pattern (pw_plan *c) {
-  condense_pairs (c, NULL);
-  int *pair = c->pairs < INT_MAX / 2 ? malloc ((size_t)(2 * c->pairs + 1) * sizeof *pair) : NULL;
-  if (pair) condense_pairs (c, pair);
-  pw_block_ldl *l = pair ? pw_block_open (c->nodes, c->node, c->pairs, pair) : NULL;
-  free (pair);
-  return l;
-}
-
 /* The contributions of each group in the order of their columns (few: by insertion). */
-static void condense_sort (const pw_plan *c, const int *place) {
+static void condense_sort_columns (const pw_plan *c, const int *place) {
   for (int n = 0; n < c->groups; n++) {
     int j = pw_group_first (c->k->s, n), *list = c->list + c->start[j], count = c->start[j + 1] - c->start[j];
     for (int x = 1; x < count; x++)
@@ -85,15 +76,6 @@ static void condense_body (const pw_plan *c, pw_block_ldl *l, int j, pw_body_blo
         (pw_contribution){ .y = c->node[i].y, .D = l->column[l->place[i]].at, .size = (short)c->node[i].size };
 }
 
-static void condense_block_arrays (const pw_plan *c, pw_layout *lay, pw_block_ldl *l) {
-  l->body = pw_layout_alloc (lay, (size_t)l->bodies + 1, sizeof *l->body);
-  l->contribution =
-      pw_layout_alloc (lay, (size_t)(c->contributions - 2 * c->linked + 2 * c->uncondenseds), sizeof *l->contribution);
-  l->coupling = pw_layout_alloc (lay, (size_t)(c->pairs - c->linked), sizeof *l->coupling);
-  l->chain = pw_layout_alloc (lay, (size_t)c->chains + 1, sizeof *l->chain);
-  l->chain_factor = pw_layout_alloc (lay, 3 * (size_t)(c->linked + c->chains), sizeof *l->chain_factor);
-}
-
 /* 0 for a body of a chain, and for a group without mass, whose accelerations massless.c computes. */
 static int condense_has_block (const pw_plan *c, int n) {
   int j = pw_group_first (c->k->s, n), width = pw_group_width (c->k->s, j), has_weight = 0;
@@ -102,22 +84,25 @@ static int condense_has_block (const pw_plan *c, int n) {
 }
 
 static int condense_fill (const pw_plan *c, pw_block_ldl *l) {
-  int contributions = 0, couplings = 0, body = 0;
-  pw_layout lay = { NULL, 0 };
+  int contributions = 0, couplings = 0, body = 0, uncondensed = c->k->more / 3;
   l->inverse = c->k->inverse;
   for (int n = 0; n < c->groups; n++) l->bodies += condense_has_block (c, n);
   l->chains = c->chains;
-  condense_block_arrays (c, &lay, l);
-  l->memory = malloc (lay.used + 1);
+  for (pw_layout lay = { 0 }; pw_layout_pass (&lay, &l->memory);) {
+    l->body = pw_layout_alloc (&lay, (size_t)l->bodies + 1, sizeof *l->body);
+    l->contribution =
+        pw_layout_alloc (&lay, (size_t)(c->contributions - 2 * c->linked + 2 * uncondensed), sizeof *l->contribution);
+    l->coupling = pw_layout_alloc (&lay, (size_t)(c->pairs - c->linked), sizeof *l->coupling);
+    l->chain = pw_layout_alloc (&lay, (size_t)c->chains + 1, sizeof *l->chain);
+    l->chain_factor = pw_layout_alloc (&lay, 3 * (size_t)(c->linked + c->chains), sizeof *l->chain_factor);
+  }
   if (l->memory == NULL) return PW_RESOURCE;
-  lay = (pw_layout){ l->memory, 0 };
-  condense_block_arrays (c, &lay, l);
   memcpy (l->chain, c->chain, (size_t)c->chains * sizeof *l->chain);
   l->chain[l->chains] = (pw_chain){ .column = l->nodes + 1 };
-  for (int kept = 0; kept < 2; kept++) /* uncondensed bodies last: they add to diagonals that the others store */
+  for (int last = 0; last < 2; last++) /* uncondensed bodies last: they add to diagonals that the others store */
     for (int n = 0; n < c->groups; n++) {
       int first = pw_group_first (c->k->s, n);
-      if (condense_has_block (c, n) && (condense_own_nodes (c, first) >= 0) == kept)
+      if (condense_has_block (c, n) && (condense_own_nodes (c, first) >= 0) == last)
         condense_body (c, l, first, &l->body[body++], &contributions, &couplings);
     }
   l->body[body] = (pw_body_block){ .first = contributions, .coupling = couplings };
@@ -127,13 +112,12 @@ static int condense_fill (const pw_plan *c, pw_block_ldl *l) {
 /* ---- Opening ---- */
 
 int pw_condense_block (pw_plan *c) {
-  pw_block_ldl *l = c->k->block = condense_pattern (c);
-  if (l) condense_sort (c, l->place);
-  int status = l ? pw_condense_chains (c, l) : PW_RESOURCE;
+  condense_pairs (c);
+  if (c->failed || c->pairs >= INT_MAX / 2) return PW_RESOURCE;
+  pw_block_ldl *l = c->k->block = pw_block_open (c->nodes, c->node, c->pairs, c->pair);
+  if (l == NULL) return PW_RESOURCE;
+  condense_sort_columns (c, l->place);
+  int status = pw_condense_chains (c, l);
   if (status == PW_OK) status = pw_block_lay_out (l);
-  if (status == PW_OK) status = condense_fill (c, l);
-  free (c->chain);
-  free (c->is_linked);
-  if (l) free (l->place), l->place = NULL;
-  return status;
+  return status == PW_OK ? condense_fill (c, l) : status;
 }

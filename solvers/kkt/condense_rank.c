@@ -1,10 +1,11 @@
 /* Ranks of the nodes in a scene with uncondensed bodies; see condense.h and block_ldl.h.
  *
- * Nodes of rank 0 are eliminated before the uncondensed bodies, as if these were at rest; those of rank 2 after them.  The
- * former must be regular wherever the mechanism is.  With a leg between an uncondensed body and the ground, or another
- * uncondensed body, they are not: at rest at both ends, it is singular where it is stretched.  So the nodes at one end have rank 2.
- * Then multipliers of rank 0 without force on the bodies of a leg exert none on the body at its end either, since joints
- * exert no resultant force and moment: dependent equations of rank 0 are dependent in the whole mechanism.
+ * Nodes of rank 0 are eliminated before the uncondensed bodies, as if these were at rest; those of rank 2 after them.
+ * The former must be regular wherever the mechanism is.  With a leg between an uncondensed body and the ground, or
+ * another uncondensed body, they are not: at rest at both ends, it is singular where it is stretched.  So the nodes at
+ * one end have rank 2. Then multipliers of rank 0 without force on the bodies of a leg exert none on the body at its
+ * end either, since joints exert no resultant force and moment: dependent equations of rank 0 are dependent in the
+ * whole mechanism.
  *
  * A leg is a set of bodies joined by nodes that touch neither uncondensed bodies nor the ground. */
 #include <stdlib.h>
@@ -18,18 +19,6 @@ typedef struct {
   int *surplus; /* legs: equations at uncondensed bodies less those at the ground */
 } rank_plan;
 
-/* The contributions first .. end - 1 of a node. */
-typedef struct {
-  int first, end;
-  pw_plan_node *node;
-} rank_node;
-
-static rank_node rank_next (const pw_plan *c, int first) {
-  rank_node n = { first, first + 1, &c->node[c->contribution[first].node] };
-  while (n.end < c->contributions && c->contribution[n.end].node == c->contribution[first].node) n.end++;
-  return n;
-}
-
 static int rank_group (const pw_plan *c, int contribution) {
   return pw_group_of (c->k->s, c->contribution[contribution].j);
 }
@@ -38,11 +27,16 @@ static int rank_is_uncondensed (const pw_plan *c, int group) {
   return group < c->k->s->bodies && c->uncondensed[group] >= 0;
 }
 
-/* The group of a leg that a node touches, or -1; *touches: it touches an uncondensed body. */
-static int rank_leg_group (const pw_plan *c, const rank_node *n, int *touches) {
+/* The end of the contributions of node n. */
+static int rank_end (const pw_plan *c, int n) {
+  return n + 1 < c->nodes ? c->node[n + 1].first : c->contributions;
+}
+
+/* The group of a leg that node n touches, or -1; *touches: it touches an uncondensed body. */
+static int rank_leg_group (const pw_plan *c, int n, int *touches) {
   int found = -1;
   *touches = 0;
-  for (int p = n->first; p < n->end; p++)
+  for (int p = c->node[n].first; p < rank_end (c, n); p++)
     if (rank_is_uncondensed (c, rank_group (c, p)))
       *touches = 1;
     else
@@ -50,19 +44,20 @@ static int rank_leg_group (const pw_plan *c, const rank_node *n, int *touches) {
   return found;
 }
 
-/* Joins the groups of a node, with the ground if it is `grounded`.  Returns 0 if that would connect two of the uncondensed
- * bodies and the ground. */
-static int rank_join (rank_plan *x, const rank_node *n) {
+/* Joins the groups of node n, with the ground if it is `grounded`.  Returns 0 if that would connect two of the
+ * uncondensed bodies and the ground. */
+static int rank_join (rank_plan *x, int n) {
   const pw_plan *c = x->c;
-  int at_rest = n->node->grounded ? c->groups : -1, root = -1;
-  for (int p = n->first; p < n->end; p++) {
+  const int first = c->node[n].first, end = rank_end (c, n);
+  int at_rest = c->node[n].grounded ? c->groups : -1, root = -1;
+  for (int p = first; p < end; p++) {
     root = pw_root (x->parent, rank_group (c, p));
     if (root != c->groups && !rank_is_uncondensed (c, root)) continue;
     if (at_rest >= 0 && at_rest != root) return 0;
     at_rest = root;
   }
   if (at_rest >= 0) root = at_rest;
-  for (int p = n->first; p < n->end; p++) x->parent[pw_root (x->parent, rank_group (c, p))] = root;
+  for (int p = first; p < end; p++) x->parent[pw_root (x->parent, rank_group (c, p))] = root;
   return 1;
 }
 
@@ -71,17 +66,15 @@ static void rank_find_legs (rank_plan *x) {
   const pw_plan *c = x->c;
   int touches;
   for (int g = 0; g <= c->groups; g++) x->parent[g] = g;
-  for (rank_node n = { 0 }; n.end < c->contributions;) {
-    n = rank_next (c, n.end);
-    (void)rank_leg_group (c, &n, &touches);
-    if (!touches && !n.node->grounded) rank_join (x, &n);
+  for (int n = 0; n < c->nodes; n++) {
+    (void)rank_leg_group (c, n, &touches);
+    if (!touches && !c->node[n].grounded) rank_join (x, n);
   }
   for (int g = 0; g < c->groups; g++) x->leg[g] = pw_root (x->parent, g);
-  for (rank_node n = { 0 }; n.end < c->contributions;) {
-    n = rank_next (c, n.end);
-    int group = rank_leg_group (c, &n, &touches);
-    if (group >= 0 && (touches || n.node->grounded))
-      x->surplus[x->leg[group]] += touches ? n.node->size : -n.node->size;
+  for (int n = 0; n < c->nodes; n++) {
+    int group = rank_leg_group (c, n, &touches);
+    if (group >= 0 && (touches || c->node[n].grounded))
+      x->surplus[x->leg[group]] += touches ? c->node[n].size : -c->node[n].size;
   }
 }
 
@@ -92,14 +85,13 @@ int pw_condense_rank (pw_plan *c) {
   if (memory == NULL) return PW_RESOURCE;
   rank_find_legs (&x);
   for (int fewer = 0; fewer < 2; fewer++) /* the end of a leg with fewer equations comes last */
-    for (rank_node i = { 0 }; i.end < c->contributions;) {
-      i = rank_next (c, i.end);
-      int group = rank_leg_group (c, &i, &touches);
-      if (!touches && !i.node->grounded) continue;
+    for (int i = 0; i < c->nodes; i++) {
+      int group = rank_leg_group (c, i, &touches);
+      if (!touches && (group < 0 || !c->node[i].grounded)) continue;
       if (group < 0)
-        i.node->rank = 2;
+        c->node[i].rank = 2;
       else if ((touches == (x.surplus[x.leg[group]] < 0)) == fewer)
-        i.node->rank = rank_join (&x, &i) ? 0 : 2;
+        c->node[i].rank = rank_join (&x, i) ? 0 : 2;
     }
   free (memory);
   return PW_OK;

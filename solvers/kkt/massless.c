@@ -98,7 +98,7 @@ PW_INLINE int massless_reduce (pw_component *c, int search, int n) {
   c->least = INFINITY;
   for (int i = search ? 0 : n; i < c->rows; i++) c->row[i].terms = massless_square (c, i, c->square);
   for (int i = 0; search && i < c->rows; i++) {
-    c->row[i].size = c->row[i].lambda = 0;
+    c->row[i].size = 0;
     for (int k = 0; k < c->cols; k++)
       c->row[i].size = fmax (c->row[i].size, sqrt (c->square[k]) * fabs (c->A[i * c->stride + k]));
   }
@@ -133,13 +133,15 @@ double pw_massless_factor (pw_massless *r) {
 
 /* ---- Solving ---- */
 
-PW_INLINE void massless_forward (pw_component *c, const double *gamma, double *f, int n) {
+PW_INLINE void massless_forward (pw_component *c, double *f, double *gamma, int n) {
   pw_massless_row *row = c->row;
   for (int i = 0; i < c->rows; i++) {
     const double *L = c->A + i * c->stride + c->lower;
     row[i].gamma = gamma[row[i].row];
     PW_UNROLL for (int p = 0; p < n; p++) row[i].gamma -= p < i ? L[p] * row[p].gamma : 0;
   }
+  for (int i = n; i < c->rows; i++)
+    if (c->y[i] >= 0) gamma[c->y[i]] = row[i].gamma;
   PW_UNROLL for (int p = 0; p < n; p++) {
     double w = f[c->global[row[p].pivot]];
     PW_UNROLL for (int q = 0; q < p; q++) w -= c->A[q * c->stride + row[p].pivot] * row[q].lambda;
@@ -152,9 +154,9 @@ PW_INLINE void massless_forward (pw_component *c, const double *gamma, double *f
   }
 }
 
-void pw_massless_forward (pw_massless *r, const double *gamma, double *f) {
+void pw_massless_forward (pw_massless *r, double *f, double *gamma) {
   for (pw_component *c = r->component; c < r->end; c++)
-    c->pivots == 3 ? massless_forward (c, gamma, f, 3) : massless_forward (c, gamma, f, c->pivots);
+    c->pivots == 3 ? massless_forward (c, f, gamma, 3) : massless_forward (c, f, gamma, c->pivots);
 }
 
 PW_INLINE void massless_backward (pw_component *c, double *a, double *lambda, int n) {
@@ -163,6 +165,7 @@ PW_INLINE void massless_backward (pw_component *c, double *a, double *lambda, in
     double x = a[c->global[*m]];
     PW_UNROLL for (int p = 0; p < n; p++) row[p].gamma -= c->A[p * c->stride + *m] * x;
   }
+  for (int i = n; i < c->rows; i++) row[i].lambda = c->y[i] < 0 ? 0 : lambda[c->y[i]];
   for (int i = n; i < c->rows; i++) lambda[row[i].row] = row[i].lambda;
   PW_UNROLL for (int p = n - 1; p >= 0; p--) {
     const double *A = c->A + p * c->stride;

@@ -32,6 +32,11 @@ static inline int pw_group_width (const pw_system *s, int j) {
   return j < 3 * s->bodies ? 3 : 1;
 }
 
+/* The number of columns in the group that begins with local column x of an element. */
+static inline int pw_group_columns (const pw_kind *kind, int x) {
+  return x < 3 * kind->bodies ? 3 : 1;
+}
+
 /* 1 if an element's equations may change under a rigid displacement of its bodies: it touches the ground, or is
  * nonholonomic. */
 static inline int pw_is_grounded (const pw_system *s, const pw_element_batch *k, int e) {
@@ -67,6 +72,7 @@ typedef struct {
   double *square;          /* cols: 1, or for an angle 1 / L^2 */
   double *massive_square;  /* cols: the same, 0 for a massless coordinate */
   pw_massless_row *row;    /* the matched ones first, in the order of elimination */
+  int *y;                  /* rows: where unmatched row i has its gamma~ and multiplier; -1: its multiplier is 0 */
   double *A;               /* rows x stride: U, with inverses on its diagonal, and H', or 0 and Z'; then L, or R */
   int lower, stride;       /* first column of L and R: cols rounded up to an even number; distance between rows of A */
   double least;            /* smallest pivot relative to its row, or row of Z' relative to its terms */
@@ -79,8 +85,8 @@ typedef struct {
   char *memory;
 } pw_massless;
 
-/* Finds the components and matches them with the J last evaluated.  Errors: PW_RESOURCE, PW_INPUT (with the
- * name of a coordinate that no row determines). */
+/* Finds the components and matches them with the J last evaluated.  PW_OK, PW_RESOURCE, or PW_INPUT with the error: the
+ * name of a coordinate that no row determines.  Close it in every case. */
 int pw_massless_open (pw_massless *r, pw_workspace *w, const double *weight, int rows, const unsigned char *active,
                       pw_error *error);
 void pw_massless_close (pw_massless *r);
@@ -97,11 +103,11 @@ int pw_massless_is_entry (const pw_component *c, int i, int column);
  * 0 if singular. */
 double pw_massless_factor (pw_massless *r);
 
-/* First half of a solve: f becomes f~ at the massive coordinates; gamma~ is kept in the components. */
-void pw_massless_forward (pw_massless *r, const double *gamma, double *f);
+/* First half of a solve: f becomes f~ at the massive coordinates, gamma becomes gamma~ at `y` of unmatched rows. */
+void pw_massless_forward (pw_massless *r, double *f, double *gamma);
 
-/* Second half, from a of the massive coordinates and lambda of the unmatched rows: a of the massless coordinates, and
- * lambda of the matched rows. */
+/* Second half, from a of the massive coordinates and lambda at `y` of unmatched rows: a of the massless coordinates,
+ * and lambda of all rows. */
 void pw_massless_backward (pw_massless *r, double *a, double *lambda);
 
 #endif

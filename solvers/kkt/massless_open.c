@@ -26,15 +26,11 @@ static int massless_contains (const massless_plan *p, int g) {
 /* The groups of an element's coordinates, without the ground, and their first local columns. */
 static int massless_element_groups (const pw_system *s, const pw_element_batch *k, int e, int *group, int *at) {
   int n = 0;
-  for (int b = 0; b < k->kind->bodies; b++) {
-    int j = k->column[e * k->kind->bodies + b];
+  for (int x = 0; x < k->b.cols; x += pw_group_columns (k->kind, x)) {
+    int j = pw_global (k, e, x);
     if (j >= s->coords) continue;
-    at[n] = 3 * b;
+    at[n] = x;
     group[n++] = pw_group_of (s, j);
-  }
-  for (int o = 0; o < k->kind->internal; o++) {
-    at[n] = 3 * k->kind->bodies + o;
-    group[n++] = pw_group_of (s, k->internal + e * k->kind->internal + o);
   }
   return n;
 }
@@ -69,17 +65,16 @@ static int massless_add_group (const pw_system *s, pw_component *c, int g) {
   return c->groups++;
 }
 
-/* Adds a row and its groups to a component, or, before the layout, only counts them (groups with repetition). */
+/* Adds a row and its groups to a component. */
 static void massless_add_row (const pw_system *s, pw_component *c, int row, int n, const int *group, const int *at,
                               const double *J) {
-  pw_massless_row *to = c->row ? &c->row[c->rows] : NULL;
-  c->rows++;
-  if (to == NULL) c->groups += n;
-  for (int i = 0; to && i < n; i++) to->from[massless_add_group (s, c, group[i])] = J + at[i];
-  if (to) to->row = row;
+  pw_massless_row *to = &c->row[c->rows++];
+  to->row = row;
+  for (int i = 0; i < n; i++) to->from[massless_add_group (s, c, group[i])] = J + at[i];
 }
 
-/* Adds each active row with a massless group to the component of this group. */
+/* Adds each active row with a massless group to the component of this group; before the layout it only counts rows, and
+ * groups with repetition. */
 static void massless_add_rows (massless_plan *p, pw_massless *r) {
   int group[PW_MASSLESS_GROUPS], at[PW_MASSLESS_GROUPS];
   for (const pw_element_batch *k = p->w->batch; k < p->w->batch + p->s->constraints; k++)
@@ -89,8 +84,12 @@ static void massless_add_rows (massless_plan *p, pw_massless *r) {
       for (int i = e * k->kind->rows; first < n && i < (e + 1) * k->kind->rows; i++) {
         if (!massless_is_active (p, k->row + i)) continue;
         int component = r->component_of_row[k->row + i] = p->member[pw_root (p->parent, group[first])];
-        r->component[component].grounded |= pw_is_grounded (p->s, k, e);
-        massless_add_row (p->s, &r->component[component], k->row + i, n, group, at, k->J + i * k->b.cols);
+        pw_component *c = &r->component[component];
+        c->grounded |= pw_is_grounded (p->s, k, e);
+        if (c->row)
+          massless_add_row (p->s, c, k->row + i, n, group, at, k->J + i * k->b.cols);
+        else
+          c->rows++, c->groups += n;
       }
     }
 }
@@ -100,8 +99,8 @@ static void massless_add_rows (massless_plan *p, pw_massless *r) {
 /* Allocates the components.  The number of groups is bounded by that counted with repetition, and by that of the scene;
  * the number of pivots by that of rows. */
 static int massless_lay_out (pw_massless *r, const massless_plan *p) {
-  pw_layout l = { NULL, 0 };
-  for (int pass = 0; pass < 2; pass++) {
+  static const double zero[3] = { 0 };
+  for (pw_layout l = { 0 }; pw_layout_pass (&l, &r->memory);)
     for (pw_component *c = r->component; c < r->end; c++) {
       size_t rows = (size_t)c->rows, groups = (size_t)(c->groups < p->groups ? c->groups : p->groups),
              cols = 3 * groups;
@@ -112,17 +111,15 @@ static int massless_lay_out (pw_massless *r, const massless_plan *p) {
       c->square = pw_layout_alloc (&l, cols, sizeof *c->square);
       c->massive_square = pw_layout_alloc (&l, cols, sizeof *c->massive_square);
       c->row = pw_layout_alloc (&l, rows, sizeof *c->row);
+      c->y = pw_layout_alloc (&l, rows, sizeof *c->y);
       c->A = pw_layout_alloc (&l, rows * (cols + rows + 1), sizeof *c->A);
       const double **from = pw_layout_alloc (&l, rows * groups, sizeof *from);
-      for (size_t i = 0; pass == 1 && i < rows; i++) c->row[i].from = from + i * groups;
-      if (pass == 1) c->rows = c->groups = 0;
+      if (l.base == NULL) continue;
+      for (size_t i = 0; i < rows; i++) c->row[i].from = from + i * groups;
+      for (size_t i = 0; i < rows * groups; i++) from[i] = zero;
+      c->rows = c->groups = 0;
     }
-    if (pass == 1) break;
-    r->memory = calloc (1, l.used + 1);
-    if (r->memory == NULL) return PW_RESOURCE;
-    l = (pw_layout){ r->memory, 0 };
-  }
-  return PW_OK;
+  return r->memory ? PW_OK : PW_RESOURCE;
 }
 
 /* ---- Opening ---- */
@@ -137,7 +134,6 @@ static int massless_undetermined (const pw_system *s, int j, pw_error *error) {
 
 /* Marks the massless columns and matches them; reports a column that no row determines. */
 static int massless_check (pw_massless *r, const massless_plan *p, pw_error *error) {
-  static const double zero[3] = { 0 };
   const pw_system *s = p->s;
   for (pw_component *c = r->component; c < r->end; c++) {
     int massless = 0;
@@ -152,8 +148,6 @@ static int massless_check (pw_massless *r, const massless_plan *p, pw_error *err
     c->pivots = massless < c->rows ? massless : c->rows;
     c->lower = c->cols + c->cols % 2;
     c->stride = c->lower + c->pivots;
-    for (int i = 0; i < c->rows * c->groups; i++)
-      if (c->row[i / c->groups].from[i % c->groups] == NULL) c->row[i / c->groups].from[i % c->groups] = zero;
     int found = pw_massless_match (c);
     if (found == massless) continue;
     for (int n = 0; n < c->cols; n++) {
@@ -206,14 +200,11 @@ int pw_massless_open (pw_massless *r, pw_workspace *w, const double *weight, int
   }
   free (p.parent);
   free (p.member);
-  if (status == PW_OK) return PW_OK;
-  pw_massless_close (r);
-  return pw_fail (error, status, "model %s: out of memory", s->model);
+  return status;
 }
 
 void pw_massless_close (pw_massless *r) {
   free (r->memory);
   free (r->component);
   free (r->component_of_row);
-  *r = (pw_massless){ 0 };
 }

@@ -12,8 +12,8 @@
 #include "saddle.h"
 #include "condense.h"
 
-/* A pivot is 1 minus a squared cosine.  Round-off leaves a dependent row about eps / s^2, with s the smallest sine of the
- * rows before it: this for an s of 0.07.  With a smaller s, the rank is computed (`suspect` in singular.c). */
+/* A pivot is 1 minus a squared cosine.  Round-off leaves a dependent row about eps / s^2, with s the smallest sine of
+ * the rows before it: this for an s of 0.07.  With a smaller s, the rank is computed (`suspect` in singular.c). */
 #define SADDLE_ROUND_OFF (200 * DBL_EPSILON)
 
 pw_saddle *pw_saddle_open (pw_workspace *w, const double *weight, int rows, const unsigned char *active,
@@ -21,9 +21,9 @@ pw_saddle *pw_saddle_open (pw_workspace *w, const double *weight, int rows, cons
   int status = PW_RESOURCE;
   pw_saddle *k = calloc (1, sizeof *k);
   if (k) {
-    *k = (pw_saddle){ .s = w->s, .w = w, .guard = SADDLE_ROUND_OFF, .pivot = INFINITY, .pivot_row = -1 };
+    *k = (pw_saddle){ .s = w->s, .w = w, .rows = rows, .pivot = INFINITY, .pivot_row = -1 };
     status = pw_massless_open (&k->massless, w, weight, rows, active, error);
-    if (status == PW_OK) status = pw_condense (k, weight, rows, active);
+    if (status == PW_OK) status = pw_condense (k, weight, active);
   }
   if (status == PW_OK) return k;
   pw_saddle_close (k);
@@ -35,7 +35,7 @@ void pw_saddle_close (pw_saddle *k) {
   if (k == NULL) return;
   pw_massless_close (&k->massless);
   pw_block_close (k->block);
-  free (k->inverse);
+  free (k->y);
   free (k->memory);
   free (k);
 }
@@ -50,13 +50,14 @@ int pw_saddle_factor (pw_saddle *k) {
   k->postponed = 0;
   k->pivot_row = -1;
   k->pivot = k->massless.components ? pw_massless_factor (&k->massless) : INFINITY;
-  if (!(k->pivot > k->guard)) return PW_RETRY;
+  if (!(k->pivot > SADDLE_ROUND_OFF)) return PW_RETRY;
   pw_block_factor (k->block);
   if (!(k->block->pivot >= k->pivot)) {
+    const int row = k->block->row;
     k->pivot = k->block->pivot;
-    k->pivot_row = k->block->row < k->s->rows ? k->block->row : -1;
+    k->pivot_row = row >= 0 && row < k->s->rows && k->massless.component_of_row[row] < 0 ? row : -1;
   }
-  return k->pivot > k->guard ? PW_OK : PW_RETRY;
+  return k->pivot > SADDLE_ROUND_OFF ? PW_OK : PW_RETRY;
 }
 
 int pw_saddle_below (pw_saddle *k, double sine) {
@@ -73,40 +74,19 @@ double pw_saddle_pivot (pw_saddle *k, int *row) {
 
 /* ---- Solving ---- */
 
-/* Appends the right-hand sides of the unknowns beyond the rows to gamma. */
-static const double *saddle_extend (pw_saddle *k, const double *gamma) {
-  memcpy (k->y, gamma, (size_t)k->rows * sizeof *gamma);
-  memset (k->y + k->s->rows, 0, (size_t)k->more * sizeof *k->y);
-  for (const pw_schur_row *x = k->schur; x < k->schur + k->schurs; x++) k->y[x->y] = *x->gamma;
-  return k->y;
-}
-
-static void saddle_shorten (pw_saddle *k, double *lambda) {
-  memcpy (lambda, k->y, (size_t)k->rows * sizeof *lambda);
-  for (const pw_schur_row *x = k->schur; x < k->schur + k->schurs; x++) *x->lambda = k->y[x->y];
-}
-
 void pw_saddle_solve (pw_saddle *k, const double *f, const double *gamma, double *a, double *lambda) {
+  const size_t bytes = (size_t)k->rows * sizeof *lambda;
+  double *y = k->more ? k->y : lambda;
   if (k->postponed > 0) pw_saddle_factor (k);
-  double *l = k->more ? k->y : lambda;
+  if (y != gamma) memcpy (y, gamma, bytes);
+  for (int i = 0; i < k->more; i++) y[k->s->rows + i] = 0;
   if (k->massless.components) {
-    if (f)
-      memcpy (k->force, f, (size_t)k->s->coords * sizeof *f);
-    else
-      memset (k->force, 0, (size_t)k->s->coords * sizeof *f);
+    for (int j = 0; j < k->s->coords; j++) k->force[j] = f ? f[j] : 0;
     f = k->force;
-    pw_massless_forward (&k->massless, gamma, k->force);
+    pw_massless_forward (&k->massless, k->force, y);
   }
-  if (k->more) gamma = saddle_extend (k, gamma);
-  if (l != gamma) memcpy (l, gamma, (size_t)k->rows * sizeof *l);
-  pw_block_solve (k->block, f, l, a);
-  if (k->more) saddle_shorten (k, lambda);
+  pw_block_solve (k->block, f, y, a);
+  if (y != lambda) memcpy (lambda, y, bytes);
   for (int i = 0; i < k->inactives; i++) lambda[k->inactive[i]] = 0;
   if (k->massless.components) pw_massless_backward (&k->massless, a, lambda);
-}
-
-int pw_saddle_factor_solve (pw_saddle *k, const double *f, const double *gamma, double *a, double *lambda) {
-  int status = pw_saddle_factor (k);
-  if (status == PW_OK) pw_saddle_solve (k, f, gamma, a, lambda);
-  return status;
 }

@@ -193,7 +193,6 @@ int pw_nullspace_velocities (pw_nullspace *b, pw_run *r, double t, const double 
 }
 
 int pw_nullspace_accelerate (pw_run *r, const double *v, double *a, double *lambda) {
-  pw_evaluate_gamma (r->w, lambda);
   int status = pw_run_accelerate_evaluated (r, v, a, lambda);
   if (pw_watchdog_near (r)) r->near_singular = 1;
   return status;

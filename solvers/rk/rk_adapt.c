@@ -53,9 +53,9 @@ static void adapt_estimate (const pw_rk_row *w, double *const *K, int n, double 
 static void adapt_weigh (const pw_run *r) {
   const struct pw_method_data *d = r->data;
   double *w = d->weight, rtol = r->settings.rtol;
-  for (int j = 0; j < r->s->coords; j++) {
+  for (int j = 0, n = r->s->coords; j < n; j++) {
     *w++ = 1 / (pw_atol (r, j) + rtol * fmax (fabs (r->q[j]), fabs (d->q[j])));
-    *w++ = 1 / (pw_atol_velocity (r, j) + rtol * fmax (fabs (r->v[j]), fabs (d->v[j])));
+    *w++ = 1 / (pw_atol (r, n + j) + rtol * fmax (fabs (r->v[j]), fabs (d->v[j])));
   }
 }
 

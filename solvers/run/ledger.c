@@ -44,7 +44,8 @@ void pw_ledger_begin (pw_run *r) {
   if (r->energy_scene == 0 && r->s->entries > 0) r->energy_scene = ledger_massless_energy (r);
 }
 
-/* Samples the first PW_CHECK_INTERVAL steps and every PW_CHECK_INTERVAL-th: sufficient for a scale, at negligible cost. */
+/* Samples the first PW_CHECK_INTERVAL steps and every PW_CHECK_INTERVAL-th: sufficient for a scale, at negligible
+ * cost. */
 void pw_ledger_note (pw_run *r) {
   double power = 0;
   if (r->statistics.steps > PW_CHECK_INTERVAL && r->statistics.steps % PW_CHECK_INTERVAL != 0) return;
@@ -55,7 +56,7 @@ void pw_ledger_note (pw_run *r) {
 }
 
 void pw_ledger_rates (pw_run *r, const double *lambda, double *rate) {
-  if (r->redundant && r->least_norm && pw_saddle_factor (r->saddle) == PW_OK) {
+  if (r->redundant_moves && pw_saddle_factor (r->saddle) == PW_OK) {
     memcpy (r->least_norm, lambda, (size_t)r->s->rows * sizeof *lambda);
     pw_rank_least_norm (r, r->least_norm);
     lambda = r->least_norm;

@@ -1,6 +1,8 @@
 /* The table of integrators, and method names: integrator[+stabilisation][:option=value]... */
 #include <assert.h>
+#include <locale.h>
 #include <math.h>
+#include <stdlib.h>
 #include <string.h>
 #include "method.h"
 #include "methods.h"
@@ -17,10 +19,13 @@ const pw_method *const pw_methods[] = {
       NULL
 };
 
-/* Reads one part of the name, up to + or :. */
-static int methods_part (char *part, size_t size, const char **text, const char *whole, pw_error *error) {
-  size_t n = strcspn (*text, "+:");
-  if (n >= size) return pw_fail (error, PW_INPUT, "method \"%.80s\": a name is too long", whole);
+enum { METHODS_PART = 80 };
+
+/* Reads one part of the method, up to one of the characters `end`; what: "a name". */
+static int methods_part (char part[METHODS_PART], const char **text, const char *end, const char *what,
+                         const char *whole, pw_error *error) {
+  size_t n = strcspn (*text, end);
+  if (n >= METHODS_PART) return pw_fail (error, PW_INPUT, "method \"%.80s\": %s is too long", whole, what);
   memcpy (part, *text, n);
   part[n] = 0;
   *text += n;
@@ -71,26 +76,17 @@ static int methods_choice (const pw_option *o, const char *text, double *value, 
   return *value < 0 ? pw_fail (error, PW_INPUT, "method option %s cannot be \"%s\"%s", o->name, text, hint) : PW_OK;
 }
 
-/* Decimal numbers, independent of the locale: digits, point, exponent. */
+/* Decimal numbers, whatever the locale. */
 static int methods_number (const pw_option *o, const char *text, double *value, pw_error *error) {
-  const char *p = text;
-  double sign = *p == '-' ? -1 : 1, number = 0;
-  int digits = 0, exponent = 0, sign_e = 1, e = 0;
-  if (*p == '-' || *p == '+') p++;
-  for (; *p >= '0' && *p <= '9'; p++, digits++) number = 10 * number + (*p - '0');
-  if (*p == '.')
-    for (p++; *p >= '0' && *p <= '9'; p++, digits++, exponent--) number = 10 * number + (*p - '0');
-  if (digits && (*p == 'e' || *p == 'E')) {
-    p++;
-    if (*p == '-' || *p == '+') sign_e = *p++ == '-' ? -1 : 1;
-    for (digits = 0; *p >= '0' && *p <= '9' && e < 1000; p++, digits++) e = 10 * e + (*p - '0');
-  }
-  exponent += sign_e * e;
-  for (; exponent > 0; exponent--) number *= 10;
-  double divide = 1;
-  for (; exponent < 0; exponent++) divide *= 10;
-  *value = sign * number / divide;
-  const char *expected = digits && *p == 0 ? pw_domain_check (o->domain, *value) : "a number";
+  locale_t c = newlocale (LC_ALL_MASK, "C", (locale_t)0);
+  if (c == (locale_t)0) return pw_fail (error, PW_RESOURCE, "method option %s: out of memory", o->name);
+  locale_t before = uselocale (c);
+  char *end;
+  *value = strtod (text, &end);
+  uselocale (before);
+  freelocale (c);
+  int decimal = end > text && *end == 0 && text[strspn (text, "+-.0123456789eE")] == 0;
+  const char *expected = decimal ? pw_domain_check (o->domain, *value) : "a number";
   return *expected ? pw_fail (error, PW_INPUT, "method option %s=%s: expected %s", o->name, text, expected) : PW_OK;
 }
 
@@ -119,29 +115,26 @@ static int methods_option (const pw_method *method, int stabilisation, char *par
 
 int pw_parse_options (const char *text, const pw_method *const *own, const pw_method **method, int *stabilisation,
                       double *values, pw_error *error) {
-  char part[80];
+  char part[METHODS_PART];
   unsigned given = 0;
   const char *whole = text;
   *stabilisation = 0;
   if (text == NULL) return pw_fail (error, PW_INPUT, "the name of a method is missing");
-  if (methods_part (part, sizeof part, &text, whole, error) != PW_OK ||
+  if (methods_part (part, &text, "+:", "a name", whole, error) != PW_OK ||
       methods_integrator (part, own, method, error) != PW_OK)
     return PW_INPUT;
   for (int i = 0; (*method)->options[i].name; i++) values[i] = (*method)->options[i].value;
   if (*text == '+') {
     text++;
-    if (methods_part (part, sizeof part, &text, whole, error) != PW_OK ||
+    if (methods_part (part, &text, "+:", "a name", whole, error) != PW_OK ||
         methods_stabilisation (*method, part, stabilisation, error) != PW_OK)
       return PW_INPUT;
   }
   while (*text == ':') {
     text++;
-    size_t n = strcspn (text, ":");
-    if (n >= sizeof part) return pw_fail (error, PW_INPUT, "method \"%.80s\": an option is too long", whole);
-    memcpy (part, text, n);
-    part[n] = 0;
-    text += n;
-    if (methods_option (*method, *stabilisation, part, values, &given, error) != PW_OK) return PW_INPUT;
+    if (methods_part (part, &text, ":", "an option", whole, error) != PW_OK ||
+        methods_option (*method, *stabilisation, part, values, &given, error) != PW_OK)
+      return PW_INPUT;
   }
   if (*text)
     return pw_fail (error, PW_INPUT, "method \"%.80s\": expected INTEGRATOR+STABILISATION:OPTION=VALUE", whole);
@@ -157,18 +150,6 @@ double pw_run_option (const pw_run *r, const char *name) {
   int i = 0;
   while (r->method->options[i].name && strcmp (r->method->options[i].name, name) != 0) i++;
   return r->method->options[i].name ? r->option[i] : 0;
-}
-
-void pw_choose_steps (pw_run *r) {
-  r->fixed_steps = !r->method->adaptive;
-  for (int i = 0; r->method->options[i].name; i++)
-    if (strcmp (r->method->options[i].name, "steps") == 0) r->fixed_steps = r->option[i] != 0;
-}
-
-void pw_read_baumgarte (pw_run *r) {
-  if (!pw_stabilised_by (r, PW_BAUMGARTE)) return;
-  r->alpha = pw_run_option (r, "alpha");
-  r->beta = pw_run_option (r, "beta");
 }
 
 #define METHODS_STEP_RATIO 20. /* typical ratio of an adaptive step at rtol 1e-6 to the model's fixed step */

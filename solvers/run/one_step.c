@@ -78,7 +78,7 @@ static int step_evaluate (pw_run *r, double t, double *q, double *v) {
   const pw_system *s = r->s;
   double size = 0;
   for (int j = 0; j < s->coords; j++) size += q[j] * q[j] + v[j] * v[j];
-  if (!(size < 1e300)) return PW_RETRY;
+  if (!(size < 1e300)) return PW_RETRY; /* too large, or not a number */
   if (!d->projects) return pw_run_accelerate (r, t, q, v, d->a, d->lambda);
   int status = pw_update_kinematics (r->w, t, q, v);
   double before = pw_kinetic (s, v) + pw_potential (r->w);

@@ -108,7 +108,8 @@ static int quadrature_degree (const pw_quadrature *x, int order) {
   return order + 1 < x->points ? order + 1 : x->points - 1;
 }
 
-/* 1 if the step is much longer than all previous ones since the restart: its polynomial then depends on its ends only. */
+/* 1 if the step is much longer than all previous ones since the restart: its polynomial then depends on its ends
+ * only. */
 static int quadrature_leaps (const pw_quadrature *x) {
   const double leap = 10;
   return x->points > 2 && x->t[0] - x->t[1] > leap * (x->t[1] - x->t[x->points - 1]);

@@ -76,7 +76,7 @@ void pw_run_close (pw_run *r) {
   pw_saddle_close (r->saddle);
   pw_watchdog_close (r);
   free (r->rank_memory);
-  pw_specialised_close (r);
+  free (r->scene_memory);
   pw_workspace_free (r->w);
   free (r->memory);
   free (r->origin);

@@ -120,15 +120,6 @@ static int run_first_evaluation (pw_run *r, pw_error *error) {
   return status;
 }
 
-/* Initialises energies, ledger and statistics at the consistent state, and finds the first discontinuity. */
-static int run_begin (pw_run *r, pw_error *error) {
-  pw_run_set_reference_level (r);
-  pw_ledger_begin (r);
-  pw_forget_residuals (r);
-  pw_note_residuals (r);
-  return pw_run_look_ahead (r, error);
-}
-
 /* Initial accelerations that are not finite come from an element or a signal, which is reported, or from a mass that
  * is too small for its force. */
 static int run_check_finite (pw_run *r, pw_error *error) {
@@ -170,7 +161,7 @@ static int run_open (pw_run *r, const char *method, const pw_settings *settings,
   if (run_initial_values (r, settings, error) != PW_OK ||
       pw_parse_options (method, settings->methods, &r->method, &r->stabilisation, r->option, error) != PW_OK)
     return PW_INPUT;
-  pw_choose_steps (r);
+  r->fixed_steps = !r->method->adaptive || pw_run_option (r, "steps") != 0;
   int status = run_settings (&r->settings, settings, r->method, error);
   if (status == PW_OK && pw_fixed_steps (r)) status = run_check_step (&r->settings, error);
   if (status != PW_OK) return status;
@@ -183,9 +174,14 @@ static int run_open (pw_run *r, const char *method, const pw_settings *settings,
   if (status != PW_OK) return status;
   r->w->scale.time = run_time_scale (r);
   pw_run_count_moved (r);
-  status = run_begin (r, error);
-  if (status == PW_OK) pw_read_baumgarte (r);
-  if (status == PW_OK) status = pw_specialised_open (r, error);
+  pw_run_set_reference_level (r);
+  pw_ledger_begin (r);
+  pw_forget_residuals (r);
+  pw_note_residuals (r);
+  status = pw_run_look_ahead (r, error);
+  if (status != PW_OK) return status;
+  if (pw_stabilised_by (r, PW_BAUMGARTE)) r->alpha = pw_run_option (r, "alpha"), r->beta = pw_run_option (r, "beta");
+  status = pw_specialised_open (r, error);
   if (status == PW_OK) status = r->method->open (r, error);
   return status == PW_OK ? run_check_derivatives (r, method, error) : status;
 }

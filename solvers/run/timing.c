@@ -32,17 +32,14 @@ typedef enum {
 
 typedef struct {
   pw_run *r;
-  const pw_system *s;
-  pw_saddle *saddle;         /* as that of the run */
   pw_projector projector;    /* if the method projects */
   const pw_element_batch *k; /* the batch being measured */
   pw_statistics done;        /* counts of the run, before the measurements */
   double t, before;          /* two times, so that signals are evaluated each time */
-  double *q, *v, *far;       /* the last state, and positions off the constraints */
-  const double *from;        /* q or far */
-  double *a, *f, *y;         /* coords + 3: results */
+  double *far;               /* coords: positions off the constraints */
+  const double *from;        /* positions before a projection: of the run, or far */
+  double *q, *v, *f;         /* coords + 3: results; accelerations and multipliers go to the run's sample arrays */
   double *gamma, *eta, *jv;  /* rows: results */
-  double *lambda;
   char *memory;
 } profile;
 
@@ -65,12 +62,13 @@ static void profile_elements (profile *p, profile_work work) {
 }
 
 static void profile_do (profile *p, profile_work work, double t) {
-  pw_workspace *w = p->r->w;
-  size_t bytes = (size_t)p->s->coords * sizeof (double);
+  pw_run *r = p->r;
+  pw_workspace *w = r->w;
+  size_t bytes = (size_t)r->s->coords * sizeof (double);
   switch (work) {
   case PROFILE_CONFIGURATIONS:
   case PROFILE_KINEMATICS:
-    pw_update_kinematics (w, work == PROFILE_KINEMATICS ? t : p->t, p->q, p->v);
+    pw_update_kinematics (w, work == PROFILE_KINEMATICS ? t : p->t, r->q, r->v);
     break;
   case PROFILE_EQUATIONS:
     pw_evaluate_J (w);
@@ -78,23 +76,23 @@ static void profile_do (profile *p, profile_work work, double t) {
     pw_evaluate_force (w, p->f);
     break;
   case PROFILE_STABILISE:
-    pw_mul_J (w, p->v, p->jv);
+    pw_mul_J (w, r->v, p->jv);
     pw_evaluate_eta (w, p->eta);
     pw_evaluate_g (w, p->eta);
     break;
   case PROFILE_FACTOR:
-    pw_saddle_factor (p->saddle);
+    pw_saddle_factor (r->saddle);
     break;
   case PROFILE_SOLVE:
-    pw_saddle_solve (p->saddle, p->f, p->gamma, p->a, p->lambda);
+    pw_saddle_solve (r->saddle, p->f, p->gamma, r->a_at, r->lambda_at);
     break;
   case PROFILE_EVALUATION:
-    pw_run_accelerate (p->r, t, p->q, p->v, p->a, p->lambda);
+    pw_run_accelerate (r, t, r->q, r->v, r->a_at, r->lambda_at);
     break;
   case PROFILE_PROJECT:
-    memcpy (p->f, p->from, bytes);
-    memcpy (p->y, p->v, bytes);
-    pw_project_state (&p->projector, p->r, t, p->f, p->y, p->a, p->lambda);
+    memcpy (p->q, p->from, bytes);
+    memcpy (p->v, r->v, bytes);
+    pw_project_state (&p->projector, r, t, p->q, p->v, r->a_at, r->lambda_at);
     break;
   default:
     profile_elements (p, work);
@@ -167,7 +165,7 @@ static void profile_projection (profile *p, pw_profile *x) {
   x->projections = 1 / fmax (1, pw_run_option (p->r, "every"));
   double others = (double)p->done.rhs + (p->projector.own_velocity ? x->projections * steps : 0);
   x->iterations = fmax (0, (double)p->done.factorisations - others) / (x->projections * steps);
-  p->from = p->q;
+  p->from = p->r->q;
   none = profile_time (p, PROFILE_PROJECT);
   p->from = p->far;
   some = profile_time (p, PROFILE_PROJECT);
@@ -183,7 +181,7 @@ static void profile_measure (profile *p, pw_profile *x) {
     x->evaluations = (double)p->done.rhs / (double)p->done.steps - x->projections;
   }
   x->configurations = profile_time (p, PROFILE_CONFIGURATIONS);
-  for (; x->kinds < p->s->batches; x->kinds++) {
+  for (; x->kinds < p->r->s->batches; x->kinds++) {
     p->k = &p->r->w->batch[x->kinds];
     profile_kind (p, &x->kind[x->kinds]);
   }
@@ -191,41 +189,28 @@ static void profile_measure (profile *p, pw_profile *x) {
 
 /* ---- Opening ---- */
 
-static int profile_allocate (profile *p, pw_error *error) {
-  size_t n = (size_t)p->s->coords + 3, rows = (size_t)p->s->rows;
-  const pw_array array[] = { { &p->q, n },     { &p->v, n },        { &p->far, n },      { &p->a, n },
-                             { &p->f, n },     { &p->y, n },        { &p->gamma, rows }, { &p->eta, rows },
-                             { &p->jv, rows }, { &p->lambda, rows } };
-  p->memory = pw_alloc_arrays (array, sizeof array / sizeof *array);
-  return p->memory ? PW_OK : pw_fail_memory (p->s, error);
-}
-
 static int profile_open (profile *p, pw_error *error) {
-  int status = profile_allocate (p, error);
-  if (status != PW_OK) return status;
-  size_t bytes = (size_t)p->s->coords * sizeof (double);
-  p->t = p->r->t;
-  p->before = nextafter (p->t, -INFINITY);
-  memcpy (p->q, p->r->q, bytes);
-  memcpy (p->v, p->r->v, bytes);
-  for (int j = 0; j < p->s->coords; j++) p->far[j] = p->q[j] + PROFILE_DISTANCE * p->s->scale.length * pw_sin (j + 1);
-  (void)pw_evaluate_J_at (p->r->w, p->t, p->q, p->v);
-  p->saddle = pw_saddle_open (p->r->w, p->s->mass, p->s->rows, p->r->active, error);
-  if (p->saddle == NULL) return PW_RESOURCE;
-  return pw_stabilised_by (p->r, PW_PROJECTION) ? pw_projector_open_by_options (&p->projector, p->r, error) : PW_OK;
+  const pw_run *r = p->r;
+  size_t n = (size_t)r->s->coords + 3, rows = (size_t)r->s->rows;
+  const pw_array array[] = { { &p->far, n },      { &p->q, n },      { &p->v, n },    { &p->f, n },
+                             { &p->gamma, rows }, { &p->eta, rows }, { &p->jv, rows } };
+  p->memory = pw_alloc_arrays (array, sizeof array / sizeof *array);
+  if (p->memory == NULL) return pw_fail_memory (r->s, error);
+  for (int j = 0; j < r->s->coords; j++) p->far[j] = r->q[j] + PROFILE_DISTANCE * r->s->scale.length * pw_sin (j + 1);
+  (void)pw_evaluate_J_at (r->w, p->t, r->q, r->v);
+  return pw_stabilised_by (r, PW_PROJECTION) ? pw_projector_open_by_options (&p->projector, p->r, error) : PW_OK;
 }
 
 int pw_run_profile (pw_run *r, pw_profile *x, pw_error *error) {
   *x = (pw_profile){ .kinds = 0 };
   if (pw_require (r, "a run", error) != PW_OK) return PW_INPUT;
-  profile p = { .r = r, .s = r->s, .done = r->statistics };
+  profile p = { .r = r, .done = r->statistics, .t = r->t, .before = nextafter (r->t, -INFINITY) };
   x->kind = calloc ((size_t)r->s->batches + 1, sizeof *x->kind);
   int status = x->kind ? profile_open (&p, error) : pw_fail_memory (r->s, error);
-  if (status == PW_OK) status = pw_run_accelerate (r, p.t, p.q, p.v, p.a, p.lambda) == PW_OK ? PW_OK : PW_RETRY;
+  if (status == PW_OK && pw_run_accelerate (r, r->t, r->q, r->v, r->a_at, r->lambda_at) != PW_OK) status = PW_RETRY;
   if (status == PW_OK) profile_measure (&p, x);
   r->statistics = p.done;
   pw_projector_close (&p.projector);
-  pw_saddle_close (p.saddle);
   free (p.memory);
   return status;
 }

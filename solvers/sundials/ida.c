@@ -103,7 +103,7 @@ static int ida_weigh (N_Vector vy, N_Vector weights, void *user) {
   double relax = d->dae.impulses ? T : c * T, mu = (set->atol > 0 ? set->atol : set->rtol * L / T) * relax;
   pw_sun_weigh (&d->sun, y, w);
   for (int i = 0; i < d->dae.rows; i++) {
-    double lambda = d->dae.impulses ? r->lambda[d->dae.tangent.map ? d->dae.tangent.row[i] : i] : y[2 * d->dae.n + i];
+    double lambda = d->dae.impulses ? r->lambda[d->dae.tangent.row[i]] : y[2 * d->dae.n + i];
     w[2 * d->dae.n + i] = 1 / (relax * set->rtol * (fabs (lambda) + force * d->unit[i]));
   }
   for (int i = 0; i < d->dae.mus; i++) w[2 * d->dae.n + d->dae.rows + i] = 1 / (mu * d->unit[i]);
@@ -188,8 +188,7 @@ static int ida_open_vectors (ida_data *d, pw_run *r) {
   d->id = pw_sun_vector (d->dae.size, d->sun.context);
   d->unit = calloc ((size_t)d->dae.rows + 1, sizeof *d->unit);
   if (!d->yp || !d->id || !d->unit) return PW_RESOURCE;
-  for (int i = 0; i < d->dae.rows; i++)
-    d->unit[i] = pw_rank_multiplier_unit (d->sun.run->w, d->dae.tangent.map ? d->dae.tangent.row[i] : i);
+  for (int i = 0; i < d->dae.rows; i++) d->unit[i] = pw_rank_multiplier_unit (d->sun.run->w, d->dae.tangent.row[i]);
   for (int i = 0; i < d->dae.size; i++) N_VGetArrayPointer (d->id)[i] = i < 2 * d->dae.n || d->dae.impulses;
   ida_fill_vectors (d);
   return PW_OK;

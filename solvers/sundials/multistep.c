@@ -214,7 +214,6 @@ static void multistep_evaluate (multistep_data *d) {
   pw_run *r = d->sun.run;
   pw_statistics keep = r->statistics;
   r->refuse = 0;
-  pw_evaluate_gamma (r->w, r->lambda);
   d->evaluated = pw_run_accelerate_evaluated (r, r->v, r->a, r->lambda) == PW_OK;
   if (!d->evaluated) memcpy (r->lambda, d->lambda, (size_t)r->s->rows * sizeof *r->lambda);
   r->refuse = r->limits.rank;

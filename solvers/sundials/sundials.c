@@ -113,7 +113,7 @@ int pw_sun_test_newton (SUNNonlinearSolver newton, double *size) {
 void pw_sun_weigh (const pw_sun *x, const double *y, double *w) {
   for (int j = 0, n = x->run->s->coords; j < n; j++) {
     w[j] = 1 / pw_tolerance (x->run, j, y[j]);
-    w[n + j] = 1 / pw_tolerance_velocity (x->run, j, y[n + j]);
+    w[n + j] = 1 / pw_tolerance (x->run, n + j, y[n + j]);
   }
 }
 

@@ -94,7 +94,7 @@ static int path_good (const pw_variation *x, int i) {
   path_interpolate (x, x->point + i, at->t, guess);
   for (int j = 0; j < x->n; j++)
     if (fabs (guess[j] - at->x[j]) > 0.1 * pw_tolerance (x->r, j, at->x[j]) ||
-        fabs (guess[x->n + j] - at->x[x->n + j]) > 0.1 * pw_tolerance_velocity (x->r, j, at->x[x->n + j]))
+        fabs (guess[x->n + j] - at->x[x->n + j]) > 0.1 * pw_tolerance (x->r, x->n + j, at->x[x->n + j]))
       return 0;
   return 1;
 }

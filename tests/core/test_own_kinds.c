@@ -198,6 +198,28 @@ static void test_guide (void **state) {
   }
 }
 
+/* A slot along the same line. */
+static void slotted_build (pw_model *m, const void *parameters) {
+  guide_build (m, parameters);
+  pw_add_slot (m, &(pw_slot){ .name = "slot", .body = { "bead", "ground" }, .heading = atan2 (2, 1) });
+}
+
+static const pw_plugin_table slotted_table = { .abi = PW_ABI,
+                                               .size = sizeof (pw_plugin_table),
+                                               .build = slotted_build };
+
+/* An element on one body connects it to the ground: with another one it can be redundant. */
+static void test_redundant_guide (void **state) {
+  (void)state;
+  pw_system *s = scene_system (&slotted_table, NULL);
+  pw_run *r = runs_open (s, "rk4+projection", &(pw_settings){ .step = 1e-3, .span = 2 });
+  assert_int_equal (pw_run_redundant (r), 1);
+  pw_sample now = runs_to (r, 2);
+  check_close ("u", now.q[3], 0.1 * cos (GUIDE_RATE * 2.0), 1e-9, "0.1 t w (h w)^4 / 120 of rk4, times 5");
+  pw_run_close (r);
+  pw_system_free (s);
+}
+
 /* ---- The program ---- */
 
 /* One notice, with whatever method. */
@@ -265,9 +287,11 @@ static void test_selftest (void **state) {
 
 int main (void) {
   const struct CMUnitTest tests[] = {
-    cmocka_unit_test (test_planet), cmocka_unit_test (test_faster),   cmocka_unit_test (test_methods),
-    cmocka_unit_test (test_notice), cmocka_unit_test (test_show),     cmocka_unit_test (test_expression),
-    cmocka_unit_test (test_guide),  cmocka_unit_test (test_selftest),
+    cmocka_unit_test (test_planet),   cmocka_unit_test (test_faster),
+    cmocka_unit_test (test_methods),  cmocka_unit_test (test_notice),
+    cmocka_unit_test (test_show),     cmocka_unit_test (test_expression),
+    cmocka_unit_test (test_guide),    cmocka_unit_test (test_redundant_guide),
+    cmocka_unit_test (test_selftest),
   };
   return cmocka_run_group_tests (tests, cli_setup, cli_teardown);
 }

@@ -2,6 +2,7 @@
 #include <math.h>
 #include <stdint.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 #include "check.h"
 #include "util.h"
@@ -74,6 +75,21 @@ static void test_layout (void **state) {
        *c = pw_layout_alloc (&place, 2, sizeof (double));
   assert_true (a == room && b >= a + 15 && c >= b && (uintptr_t)c % sizeof (double) == 0);
   assert_true (place.used == size.used && c + 2 * sizeof (double) <= room + size.used);
+}
+
+/* Two passes, also over no arrays. */
+static void test_layout_pass (void **state) {
+  (void)state;
+  for (size_t count = 0; count < 3; count++) {
+    double *a = NULL;
+    char *memory = NULL;
+    int passes = 0;
+    for (pw_layout l = { 0 }; pw_layout_pass (&l, &memory); passes++) a = pw_layout_alloc (&l, count, sizeof *a);
+    assert_int_equal (passes, 2);
+    assert_true (memory && (char *)a == memory);
+    for (size_t i = 0; i < count; i++) assert_true (a[i] == 0);
+    free (memory);
+  }
 }
 
 /* ---- Nearest names ---- */
@@ -185,15 +201,11 @@ static void test_domains (void **state) {
 
 int main (void) {
   const struct CMUnitTest tests[] = {
-    cmocka_unit_test (test_names),
-    cmocka_unit_test (test_names_empty),
-    cmocka_unit_test (test_arena),
-    cmocka_unit_test (test_layout),
-    cmocka_unit_test (test_nearest),
-    cmocka_unit_test (test_nearest_text),
-    cmocka_unit_test (test_nearest_long),
-    cmocka_unit_test (test_long_error),
-    cmocka_unit_test (test_first_error_stays),
+    cmocka_unit_test (test_names),        cmocka_unit_test (test_names_empty),
+    cmocka_unit_test (test_arena),        cmocka_unit_test (test_layout),
+    cmocka_unit_test (test_layout_pass),  cmocka_unit_test (test_nearest),
+    cmocka_unit_test (test_nearest_text), cmocka_unit_test (test_nearest_long),
+    cmocka_unit_test (test_long_error),   cmocka_unit_test (test_first_error_stays),
     cmocka_unit_test (test_domains),
   };
   return cmocka_run_group_tests (tests, NULL, NULL);
