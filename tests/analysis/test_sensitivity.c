@@ -266,6 +266,60 @@ static void test_files (void **state) {
 
 /* ---- Bad input ---- */
 
+/* A parameter that is small compared with what it is added to, in a force or a length, and one over whose usual step the force
+ * is not linear: other steps are found, and the error contains what remains. */
+static void test_steps (void **state) {
+  static const char *const value[] = { "1e-6", "1e-8", "1e-10", "1e-12" }, *const place[] = { "1e3", "1e4", "1e5" };
+  char command[300], text[600];
+  double x, error, expected = 0;
+  (void)state;
+  cli_write ("small.yaml",
+             "pinwheel: 1\nrun: {t_end: 2, method: erk8, rtol: 1e-11}\n"
+             "parameters: [{name: p, value: 0}, {name: dl, value: 0, unit: m}]\n"
+             "bodies: [{name: b, mass: 1, inertia: 1}, {name: c, mass: 1, inertia: 0.1, start: {x: 1 + dl}}]\n"
+             "elements:\n  - {torque: T, body: b, value: {expression: 100*sin(3*t) + p}}\n"
+             "  - {pin: P, body: [ground, c], at: [[0, 0], [-1 - dl, 0]]}\n"
+             "  - {gravity: G, acceleration: [0, -9.81]}\n");
+  for (int dl = 0; dl < 2; dl++)
+    for (int i = -1; i < 4; i++) {
+      snprintf (command, sizeof command, "pinwheel sensitivity @/small.yaml --of %s --by %s --set %s=%s -o @/sens",
+                dl ? "c.phi" : "b.omega", dl ? "dl" : "p", dl ? "dl" : "p", i < 0 ? "0" : value[i]);
+      cli_shell (command);
+      sensitivity_json ("\"derivative\": ", &x);
+      sensitivity_json ("\"error\": ", &error);
+      if (i < 0) expected = dl ? x : 2;
+      check_close (command, x, expected, 1e-6 * fabs (expected), "differences accurate to 1e-7, over 2 s");
+      check_close ("within its error", x, expected, error + 1e-8, "the claim");
+    }
+  for (int i = 0; i < 3; i++) {
+    snprintf (text, sizeof text,
+              "pinwheel: 1\nrun: {t_end: 2, method: erk8, rtol: 1e-11}\nparameters: [{name: x0, value: %s}]\n"
+              "bodies: [{name: b, mass: 1, inertia: 1, start: {x: %s}}]\n"
+              "elements:\n  - {force: F, body: b, fx: '-sin(20*(b.x - x0))'}\n",
+              place[i], place[i]);
+    cli_write ("large.yaml", text);
+    cli_shell ("pinwheel sensitivity @/large.yaml --of b.x --by x0 -o @/sens");
+    sensitivity_json ("\"derivative\": ", &x);
+    check_close (place[i], x, 1 - cos (2 * sqrt (20)), 1e-6, "a linear oscillation near x0");
+  }
+}
+
+/* A fast or heavy body whose energy does not depend on the parameter. */
+static void test_energies (void **state) {
+  double x[2];
+  (void)state;
+  cli_write ("energy.yaml",
+             "pinwheel: 1\nrun: {t_end: 2, method: erk8, rtol: 1e-11}\nparameters: [{name: F, value: 0.001, unit: N}]\n"
+             "bodies:\n  - {name: heavy, mass: 1e5, inertia: 1, start: {y: 100}, rate: {vx: 100}}\n"
+             "  - {name: light, mass: 1, inertia: 1, rate: {vx: 0.01}}\n"
+             "elements:\n  - {force: T, body: light, fy: F}\n  - {gravity: g, acceleration: [0, -9.81]}\n");
+  cli_shell ("pinwheel sensitivity @/energy.yaml --of kinetic --of potential --by F -o @/sens");
+  assert_int_equal (sensitivity_json ("\"derivative\": ", x), 2);
+  check_close ("kinetic", x[0], (0.001 - 9.81) * 4, 1e-8, "F - m g, by t^2, and the error of the run");
+  check_close ("potential", x[1], 9.81 * 2, 1e-5,
+               "m g t^2 / 2, and round-off of 9.81e7 J in differences along the state");
+}
+
 static void test_refusals (void **state) {
   static const cli_wrong each[] = {
     { "pendulum --by l", "--of is missing: expected an output, such as frame.x" },
@@ -274,6 +328,8 @@ static void test_refusals (void **state) {
     { "pendulum --of bob.x --by ll", "model pendulum has no parameter \"ll\"; did you mean \"l\"?" },
     { "pendulum --of bob.x --by bob.z", "model pendulum has no state \"bob.z\"; valid are x, y, phi, vx, vy, omega" },
     { "pendulum --of bob.x --by l --by l", "--by l is given twice" },
+    { "pendulum --of bob.phi --by bob.x --by bob.phi", "--by bob.x: it cannot change while the other initial values of "
+                                                       "--by and --start are kept: constraints determine it" },
     { "chain --of link1.x --by n", "n is a count (10): derivatives need a number that varies continuously" },
     { "slider-crank --of crank.phi --by g",
       "g changes the number of bodies or elements: derivatives with respect to it do not exist" },
@@ -296,6 +352,8 @@ int main (void) {
     cmocka_unit_test (test_outputs),
     cmocka_unit_test (test_pulse),
     cmocka_unit_test (test_files),
+    cmocka_unit_test (test_steps),
+    cmocka_unit_test (test_energies),
     cmocka_unit_test (test_refusals),
     cmocka_unit_test (test_parameters),
     cmocka_unit_test (test_chaos),

@@ -23,12 +23,16 @@ static const char *sensitivity_unit (const pw_sensitivity *x, int o, int p, char
   return unit;
 }
 
+/* Relative changes beyond this one are those of an output that is 0 but for round-off. */
+static const double SENSITIVITY_ELASTIC = 1e12;
+
 /* The derivative of an output, its error, and the relative change for a relative change of the unknown. */
 static void sensitivity_result (const pw_sensitivity *x, int o, int p, double result[3]) {
-  double value = pw_outcome_value (&x->outcomes, o, NULL);
+  double by = x->unknowns.list[p].value;
   result[0] = pw_sensitivity_derivative (x, o, p, x->end_slope);
   result[1] = fabs (pw_sensitivity_derivative (x, o, p, x->end_error));
-  result[2] = value != 0 && x->unknowns.list[p].value != 0 ? result[0] * x->unknowns.list[p].value / value : NAN;
+  result[2] = result[0] * by / pw_outcome_value (&x->outcomes, o, NULL);
+  if (by == 0 || !(fabs (result[2]) < SENSITIVITY_ELASTIC)) result[2] = NAN;
 }
 
 static void sensitivity_print (const pw_sensitivity *x) {
@@ -243,12 +247,45 @@ static int sensitivity_open (pw_sensitivity *x, pw_error *error) {
   return status == PW_OK ? pw_sensitivity_open (x, NULL, error) : status;
 }
 
+/* Computations with better steps of the differences, at most. */
+enum { SENSITIVITY_REPEATED = 5 };
+
+/* Sets better steps of the parameters' differences; 1 if there are any. */
+static int sensitivity_steps (pw_sensitivity *x) {
+  int better = 0;
+  for (int p = 0; p < x->unknowns.count && !x->stopped; p++) {
+    double step = pw_variation_better_step (x->variation, p);
+    if (x->unknowns.list[p].parameter == NULL || step == x->direction[p].step) continue;
+    x->unknowns.list[p].step = fabs (step);
+    better = 1;
+  }
+  return better;
+}
+
+/* Computes all derivatives anew. */
+static int sensitivity_again (pw_sensitivity *x, pw_progress *progress, pw_error *error) {
+  pw_sensitivity_close (x);
+  *x = (pw_sensitivity){ .line = x->line,
+                         .of = x->of,
+                         .by = x->by,
+                         .every = x->every,
+                         .folder = x->folder,
+                         .m = x->m,
+                         .files = x->files,
+                         .unknowns = x->unknowns,
+                         .dt = x->dt };
+  int status = pw_sensitivity_open (x, NULL, error);
+  return status == PW_OK ? pw_sensitivity_compute (x, progress, error) : status;
+}
+
 static int sensitivity_compute (pw_sensitivity *x, pw_error *error) {
   pw_progress progress;
   double begun = pw_cpu_clock ();
   pw_stop_catch ();
   pw_progress_start (&progress, pw_file_name (x->m.file), x->unknowns.t_end, 1);
   int status = pw_sensitivity_compute (x, &progress, error);
+  for (int i = 0; i < SENSITIVITY_REPEATED && status == PW_OK && sensitivity_steps (x); i++)
+    status = sensitivity_again (x, &progress, error);
   pw_progress_end (&progress);
   pw_stop_release ();
   x->cpu = pw_cpu_clock () - begun;

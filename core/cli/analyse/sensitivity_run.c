@@ -340,6 +340,25 @@ static int sensitivity_sampled (pw_sensitivity *x, pw_error *error) {
   return x->sampled ? PW_OK : error->status;
 }
 
+/* Initial values can only change by themselves if the constraints permit it. */
+static int sensitivity_independent (const pw_sensitivity *x, pw_error *error) {
+  int n = pw_system_coordinates (x->base.m.system);
+  for (int p = 0; p < x->unknowns.count; p++) {
+    const pw_unknown *u = &x->unknowns.list[p];
+    const pw_direction *d = &x->direction[p];
+    if (u->state < 0) continue;
+    const pw_sample *s = pw_run_initial (d->neighbour[0]);
+    double value = u->state < n ? s->q[u->state] : s->v[u->state - n];
+    if (fabs (value - x->at[p] - pw_direction_offset (d, 0)) > 1e-2 * fabs (d->step))
+      return pw_fail (
+          error, PW_INPUT,
+          "--by %s: it cannot change while the other initial values of --by and --start are kept: constraints "
+          "determine it",
+          u->name);
+  }
+  return PW_OK;
+}
+
 /* The run and its neighbours. */
 static int sensitivity_runs (pw_sensitivity *x, pw_error *error) {
   int count = 0;
@@ -349,7 +368,7 @@ static int sensitivity_runs (pw_sensitivity *x, pw_error *error) {
   if (status == PW_OK) status = sensitivity_ledger (x, error);
   if (status == PW_OK) status = pw_unknown_directions (x->direction, &x->unknowns, x->at, &x->base, x->near, error);
   for (int p = 0; p < x->unknowns.count; p++) x->direction[p].no_error = x->no_error;
-  return status;
+  return status == PW_OK && !x->no_error ? sensitivity_independent (x, error) : status;
 }
 
 int pw_sensitivity_start (pw_sensitivity *x, pw_error *error) {

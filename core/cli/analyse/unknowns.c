@@ -169,18 +169,20 @@ void pw_unknowns_report (const pw_unknowns *u, const double *x) {
 /* ---- Directions ---- */
 
 /* 1e-5 of the number's size: the error of extrapolated differences is then about 1e-10, mostly round-off.  Angles count
- * as at least 0.1 rad, an initial value as at least that of the scene. */
+ * as at least 0.1 rad, an initial value as at least that of the scene, an unknown of a search as a thousandth of its scale. */
 static double unknown_step (const pw_unknown *u, double value, const pw_run *r) {
+  if (u->step > 0) return u->step;
   double size = fabs (value), length = pw_run_scale (r)->length, time = pw_run_scale (r)->time;
   if (strcmp (u->unit, "rad") == 0) size = fmax (size, 0.1);
   if (u->state >= 0) size = fmax (size, (*u->unit == 'm' ? length : 1) / (strchr (u->unit, 's') ? time : 1));
   if (size == 0 && u->parameter) size = fabs (u->parameter->value);
-  return 1e-5 * (size > 0 ? size : 1);
+  return 1e-5 * fmax (size > 0 ? size : 1, 1e-3 * u->scale);
 }
 
-/* At the end of its domain a parameter varies to one side. */
+/* At the end of its domain a parameter varies to one side; it remains positive. */
 static void unknown_domain (const pw_unknown *u, double value, pw_direction *d) {
   pw_domain domain = u->parameter ? u->parameter->domain : PW_REAL;
+  if (domain == PW_POSITIVE) d->step = fmin (d->step, value / 4);
   d->one_sided = (domain == PW_NONNEGATIVE || domain == PW_FRACTION) && value - 2 * d->step < 0;
   if (domain != PW_FRACTION || value + 2 * d->step <= 1) return;
   d->one_sided = 1;
