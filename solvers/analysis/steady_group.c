@@ -242,20 +242,23 @@ void pw_steady_home (const pw_steady *x, double *q, double *v) {
   for (int j = 0; j < 3 * x->s->bodies; j += 3) q[j] += dx, q[j + 1] += dy;
 }
 
-/* The tolerance is the root of STEADY_EXACT, with a margin: so far solutions can be from an exact double root. */
-int pw_steady_same (pw_steady *x, const double *q1, const double *v1, const double *q2, const double *v2) {
-  const double tolerance = 1e-4;
+double pw_steady_distance (pw_steady *x, const double *q1, const double *v1, const double *q2, const double *v2) {
   size_t bytes = (size_t)x->n * sizeof *q1;
-  double *a = x->q0, *va = x->v0, *b = x->dq, *vb = x->dv;
+  double *a = x->q0, *va = x->v0, *b = x->dq, *vb = x->dv, most = 0;
   memcpy (a, q1, bytes), memcpy (va, v1, bytes), memcpy (b, q2, bytes), memcpy (vb, v2, bytes);
   pw_steady_canonical (x, a, va);
   pw_steady_canonical (x, b, vb);
   for (int j = 0; j < x->n; j++) {
-    double unit = pw_unit (x->s, j), off = (a[j] - b[j]) / unit, most = fmax (1, fabs (b[j] / unit));
-    if (j < 3 * x->s->bodies && j % 3 == 2) off = remainder (off, 2 * PW_PI), most = 1;
-    if (!(fabs (off) <= tolerance * most) && !x->cyclic[j]) return 0;
+    double unit = pw_unit (x->s, j), off = (a[j] - b[j]) / unit, size = fmax (1, fabs (b[j] / unit));
+    if (j < 3 * x->s->bodies && j % 3 == 2) off = remainder (off, 2 * PW_PI), size = 1;
+    if (!x->cyclic[j]) most = pw_larger_or_nan (most, fabs (off) / size);
     off = (va[j] - vb[j]) / unit * x->T;
-    if (!(fabs (off) <= tolerance * fmax (1, fabs (vb[j] / unit * x->T)))) return 0;
+    most = pw_larger_or_nan (most, fabs (off) / fmax (1, fabs (vb[j] / unit * x->T)));
   }
-  return 1;
+  return most;
+}
+
+/* The tolerance is the root of STEADY_EXACT, with a margin: so far solutions can be from an exact double root. */
+int pw_steady_same (pw_steady *x, const double *q1, const double *v1, const double *q2, const double *v2) {
+  return pw_steady_distance (x, q1, v1, q2, v2) <= 1e-4;
 }

@@ -96,7 +96,7 @@ static int steady_advise (pw_steady_cli *x, pw_steady_point *p, pw_error *error)
 
 static int steady_same (const pw_steady_cli *x, const pw_steady_point *p, const pw_steady_motion *m) {
   int n = pw_system_coordinates (x->m.system);
-  return fabs (p->parameter - m->parameter) <= 1e-9 * fabs (m->parameter) &&
+  return fabs (p->parameter - m->parameter) <= 1e-9 * fabs (x->set.last - x->set.first) &&
          pw_steady_same (x->steady, p->state, p->state + n, m->q, m->v);
 }
 
