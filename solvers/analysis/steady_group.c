@@ -143,6 +143,22 @@ static int group_effective (pw_steady *x, int rates) {
   return idle;
 }
 
+/* The coordinate whose change rate c > 2 is. */
+static int group_coordinate (const pw_steady *x, int c) {
+  return c < 3 + x->s->bodies ? 3 * (c - 3) + 2 : 2 * x->s->bodies + c - 3;
+}
+
+/* Finds the angles that are symmetries by themselves. */
+static void group_find_cyclic (pw_steady *x) {
+  int rates = pw_steady_rates (x->s);
+  for (int k = 0; k < x->group; k++) {
+    int last = 0, count = 0;
+    for (int c = 0; c < rates; c++)
+      if (x->axis[k * rates + c] != 0) last = c, count++;
+    if (count == 1 && last > 2) x->cyclic[group_coordinate (x, last)] = 1;
+  }
+}
+
 int pw_steady_find_group (pw_steady *x) {
   pw_linearisation *l = &x->at[0].x;
   int rates = pw_steady_rates (x->s), length = l->holonomic + l->rank + x->n, rows = GROUP_STATES * (length + 3);
@@ -164,6 +180,7 @@ int pw_steady_find_group (pw_steady *x) {
   if (idle < 0) return idle;
   group_reduce (x->group, rates, x->axis);
   x->group -= idle;
+  group_find_cyclic (x);
   return PW_OK;
 }
 
@@ -213,7 +230,7 @@ void pw_steady_canonical (const pw_steady *x, double *q, double *v) {
     int c = rates - 1;
     while (c > 2 && axis[c] == 0) c--;
     if (c > 2 && axis[0] == 0 && axis[1] == 0 && axis[2] == 0) {
-      double by = -q[c < 3 + x->s->bodies ? 3 * (c - 3) + 2 : 2 * x->s->bodies + c - 3] / axis[c];
+      double by = -q[group_coordinate (x, c)] / axis[c];
       for (int b = 0; b < x->s->bodies; b++) q[3 * b + 2] += by * axis[3 + b];
       for (int j = 3 * x->s->bodies; j < x->n; j++) q[j] += by * axis[3 - 2 * x->s->bodies + j];
     }
