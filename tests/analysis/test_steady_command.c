@@ -126,7 +126,8 @@ static int steady_lines (const char *start) {
 }
 
 /* Branches are closed though the vehicle has moved, or a body turned, in a circuit; all motions at the value in the model are on
- * the same one.  A trailer of 1 m behind an axle: tan steer = 0.5 at the folds.  Where a spring winds up, none is closed. */
+ * the same one.  A trailer of 1 m behind an axle: tan steer = 0.5 at the folds.  Where a spring winds up, none is
+ * closed, and it is followed in both directions. */
 static void test_turned_branch (void **state) {
   (void)state;
   cli_write ("turned.yaml", "pinwheel: 1\nparameters: [{name: steer, value: 0}]\nbodies:\n"
@@ -152,9 +153,9 @@ static void test_turned_branch (void **state) {
   steady_shows ("arm: 1 branch of ");
   steady_shows ("       1  fold                        1        0 ");
   assert_int_equal (steady_lines ("1,fold,"), 2);
-  cli_good ("pinwheel steady @/arm.yaml --set k=0.02 --vary T=-3:3 --starts 0 -o @/turns");
+  cli_good ("pinwheel steady @/arm.yaml --set k=0.02 --vary T=-3:3 --starts 0");
   steady_shows ("       1  ends                         3 ");
-  assert_true (steady_lines ("1,fold,") > 20);
+  steady_shows ("       2  ends                        -3 ");
 }
 
 /* Where the speed is 0, any angle of the trailer is an equilibrium, and no velocities are left: there the eigenvalue -u/1.3 of

@@ -187,9 +187,18 @@ static int steady_branch (pw_steady_cli *x, const pw_steady_point *from, int dir
   return status;
 }
 
-/* Follows the solutions at one end of the range that are on no branch yet. */
+/* Whether a motion is one of the points from number `first`. */
+static int steady_seen (const pw_steady_cli *x, const pw_steady_motion *m, int first) {
+  int seen = 0;
+  for (int k = first; k < x->points; k++) seen |= steady_same (x, x->point + k, m);
+  return seen;
+}
+
+/* Follows the solutions that are on no branch yet: from one end of the range, or in between in both directions unless the
+ * branch returns. */
 static int steady_from (pw_steady_cli *x, double parameter, int direction, pw_error *error) {
   int known = x->points, status = steady_search (x, parameter, error), found = x->points - known;
+  int inside = parameter != x->set.first && parameter != x->set.last;
   if (status < 0 && status != PW_RESOURCE && x->branches > 0) {
     pw_cli_say ("pinwheel: no branches sought from the other end: %s\n", error->text);
     *error = (pw_error){ 0 };
@@ -201,10 +210,11 @@ static int steady_from (pw_steady_cli *x, double parameter, int direction, pw_er
   x->points = known;
   for (int i = 0; i < found; i++) {
     pw_steady_motion m = { .parameter = parameter, .q = start[i].state };
-    int seen = 0;
     m.v = m.q + pw_system_coordinates (x->m.system);
-    for (int k = 0; k < x->points; k++) seen |= steady_same (x, x->point + k, &m);
+    int seen = steady_seen (x, &m, 0), before = x->points;
     if (status == PW_OK && !seen && !x->stopped) status = steady_branch (x, start + i, direction, error);
+    if (status == PW_OK && !seen && !x->stopped && inside && !steady_seen (x, &m, before + 1))
+      status = steady_branch (x, start + i, -direction, error);
     free (start[i].state);
   }
   free (start);
