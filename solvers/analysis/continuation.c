@@ -197,8 +197,8 @@ static double branch_distance (const pw_branch *b, const double *x, const double
   return sqrt (sum);
 }
 
-/* Corrects to->u on the plane perpendicular to a tangent, or without one at constant p, to the last bit; sets its own tangent.
- * PW_RETRY farther than `most` away. */
+/* Corrects to->u on the plane perpendicular to a tangent, or without one at constant p, which least squares with p among the
+ * unknowns would change; sets its own tangent.  PW_RETRY farther than `most` away. */
 static int branch_correct (pw_branch *b, const double *tangent, double most, pw_branch_point *to, pw_error *error) {
   size_t bytes = ((size_t)b->of.unknowns + 1) * sizeof *tangent;
   memcpy (b->condition, tangent ? tangent : b->at.tangent, bytes);

@@ -40,7 +40,7 @@ typedef struct {
   pw_branch_point point;
   int event;
   double along; /* 0 at the point before, 1 at the point reached */
-  int note;     /* of users */
+  int note;     /* of the caller: pw_branch_queue */
 } pw_branch_event;
 
 enum { PW_BRANCH_QUEUE = 8 };
