@@ -161,7 +161,7 @@ typedef struct {
   double residual;     /* the largest, in units of the scene: L, L/T, L/T^2 */
   int iterations;
   int family;   /* further quantities to hold to make it isolated, up to symmetries */
-  int unstable; /* growing modes */
+  int unstable; /* growing modes; at an event, without those that change */
   pw_steady_event event;
   const pw_linear *linear; /* NULL if it is not a solution */
 } pw_steady_motion;

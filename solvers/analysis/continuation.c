@@ -8,10 +8,11 @@
 /* NEWTON_MOST: iterations of a solution, of a point of a branch.  BRANCH_TURN: cosine of the largest angle between the
  * tangents of successive points; BRANCH_BENT: largest distance between the directions of a chord and of the sum of the
  * tangents at its ends, which is of second order on a smooth branch, but not from one branch to another.  BRANCH_APART and
- * BRANCH_ASIDE: largest correction of a predictor and of an interpolated point, relative to the step. */
+ * BRANCH_ASIDE: largest correction of a predictor and of an interpolated point, relative to the step.  BRANCH_FINE: a step
+ * that may pass p of the first point twice beside a fold, relative to the longest. */
 enum { NEWTON_MOST = 60, BRANCH_MOST = 8, NEWTON_HALVINGS = 10, LOCATE_MOST = 60 };
-static const double BRANCH_TURN = 0.96, BRANCH_APART = 0.3, BRANCH_BENT = 0.02, BRANCH_ASIDE = 0.002, BRANCH_GROW = 1.5,
-                    NEWTON_DAMPING = 0.1;
+static const double BRANCH_FINE = 1e-3, BRANCH_TURN = 0.96, BRANCH_APART = 0.3, BRANCH_BENT = 0.02,
+                    BRANCH_ASIDE = 0.002, BRANCH_GROW = 1.5, NEWTON_DAMPING = 0.1;
 
 int pw_branch_open (pw_branch *b, const pw_branch_equations *of, pw_error *error) {
   size_t n = (size_t)of->unknowns + 1, m = (size_t)of->equations + n, large = n > m ? n : m;
@@ -165,14 +166,14 @@ static void branch_copy (const pw_branch *b, const pw_branch_point *from, pw_bra
 }
 
 /* Queues a point before those that are farther along. */
-static void branch_put (pw_branch *b, const pw_branch_point *point, int event, double along) {
+static void branch_put (pw_branch *b, const pw_branch_point *point, int event, double along, int note) {
   int i = b->queued++;
   for (; i > 0 && b->queue[i - 1].along > along; i--) {
     pw_branch_event last = b->queue[i];
     b->queue[i] = b->queue[i - 1];
     b->queue[i - 1] = last;
   }
-  b->queue[i].event = event, b->queue[i].along = along;
+  b->queue[i].event = event, b->queue[i].along = along, b->queue[i].note = note;
   branch_copy (b, point, &b->queue[i].point);
 }
 
@@ -186,7 +187,7 @@ int pw_branch_start (pw_branch *b, const double *u, double direction, pw_error *
   int status = branch_tangent (b, b->at.u, b->condition, b->at.tangent, error);
   if (status != PW_OK) return status;
   branch_copy (b, &b->at, &b->first);
-  branch_put (b, &b->at, PW_BRANCH_POINT, 0);
+  branch_put (b, &b->at, PW_BRANCH_POINT, 0, 0);
   return PW_OK;
 }
 
@@ -196,12 +197,13 @@ static double branch_distance (const pw_branch *b, const double *x, const double
   return sqrt (sum);
 }
 
-/* Corrects to->u on the plane perpendicular to a tangent, and sets its own tangent.  PW_RETRY farther than `most` away. */
+/* Corrects to->u on the plane perpendicular to a tangent, or without one at constant p, which least squares with p among the
+ * unknowns would change; sets its own tangent.  PW_RETRY farther than `most` away. */
 static int branch_correct (pw_branch *b, const double *tangent, double most, pw_branch_point *to, pw_error *error) {
   size_t bytes = ((size_t)b->of.unknowns + 1) * sizeof *tangent;
-  memcpy (b->condition, tangent, bytes);
+  memcpy (b->condition, tangent ? tangent : b->at.tangent, bytes);
   memcpy (b->predicted, to->u, bytes);
-  int status = branch_iterate (b, to->u, b->condition, 0, error);
+  int status = branch_iterate (b, to->u, tangent ? b->condition : NULL, 0, error);
   if (status != PW_OK) return status;
   if (branch_distance (b, to->u, b->predicted) > most) return PW_RETRY;
   to->residual = b->residual, to->interpolated = 0;
@@ -217,12 +219,22 @@ static int branch_smooth (const pw_branch *b, const pw_branch_point *from, const
   return dot >= BRANCH_TURN && sqrt (off) <= BRANCH_BENT;
 }
 
+/* Whether the step would pass an end of the range, or p of the first point, perhaps twice beside a fold: branch_reach moves
+ * there. */
+static int branch_passes (const pw_branch *b) {
+  int n = b->of.unknowns;
+  double from = b->at.u[n] - b->first.u[n], to = b->next.u[n] - b->first.u[n], slope = b->at.tangent[n];
+  int folded = slope * b->next.tangent[n] < 0 && b->step > BRANCH_FINE * b->most;
+  if (!(b->next.u[n] >= 0 && b->next.u[n] <= 1)) return 1;
+  if (from == 0) return folded && slope * to < 0;
+  return from * to < 0 || (folded && from * (from + b->step * slope) < 0);
+}
+
 static int branch_try (pw_branch *b, pw_error *error) {
   for (int j = 0; j <= b->of.unknowns; j++) b->next.u[j] = b->at.u[j] + b->step * b->at.tangent[j];
   int status = branch_correct (b, b->at.tangent, BRANCH_APART * b->step, &b->next, error);
-  double p = b->next.u[b->of.unknowns];
-  if (status == PW_OK && b->bounded && !(p >= 0 && p <= 1)) return PW_RETRY; /* branch_reach finds the end */
-  return status == PW_OK && !branch_smooth (b, &b->at, &b->next) ? PW_RETRY : status;
+  if (status != PW_OK) return status;
+  return (b->bounded && branch_passes (b)) || !branch_smooth (b, &b->at, &b->next) ? PW_RETRY : PW_OK;
 }
 
 /* Makes b->next the point reached. */
@@ -235,22 +247,20 @@ static void branch_accept (pw_branch *b) {
   b->folded = b->before.tangent[n] * b->at.tangent[n] < 0;
 }
 
-/* Moves to the end of the range if the next step would pass it, without evaluations beyond it, where the parameter may not be
- * admissible.  PW_RETRY if it would not, or no point is found there. */
+/* Moves to the end of the range, or to p of the first point, if the next step would pass it: without evaluations beyond the
+ * end, where the parameter may not be admissible.  PW_RETRY if it would not, or no point is found there. */
 static int branch_reach (pw_branch *b, pw_error *error) {
   int n = b->of.unknowns;
-  double slope = b->at.tangent[n], end = slope > 0, step = (end - b->at.u[n]) / slope;
+  double slope = b->at.tangent[n], p = b->at.u[n], first = b->first.u[n];
+  double end = (first - p) * slope > 0 ? first : slope > 0, step = (end - p) / slope;
   if (!(step > 0 && step <= fmin (b->step, b->most / fmax (fabs (slope), 1e-3)))) return PW_RETRY;
   for (int j = 0; j < n; j++) b->next.u[j] = b->at.u[j] + step * b->at.tangent[j];
   b->next.u[n] = end;
-  memset (b->trial, 0, (size_t)n * sizeof *b->trial);
-  b->trial[n] = slope > 0 ? 1 : -1;
-  int status = branch_correct (b, b->trial, BRANCH_APART * step, &b->next, error);
+  int status = branch_correct (b, NULL, BRANCH_APART * step, &b->next, error);
   if (status != PW_OK) return status;
-  b->next.u[n] = end;
   if (!branch_smooth (b, &b->at, &b->next)) return PW_RETRY;
   branch_accept (b);
-  b->ended = 1;
+  b->ended = end == 0 || end == 1;
   return PW_OK;
 }
 
@@ -288,7 +298,7 @@ int pw_branch_locate (pw_branch *b,
                       void *context, pw_error *error) {
   pw_branch_point *point = &b->found;
   double s[2] = { 0, 1 }, f[2], middle, value, scale = 1;
-  int status = test (context, &b->before, &f[0], error), last = -1;
+  int status = test (context, &b->before, &f[0], error), last = -1, failed = 0;
   if (status == PW_OK) status = test (context, &b->at, &f[1], error);
   if (status != PW_OK) return status;
   branch_copy (b, &b->before, &b->side[0]);
@@ -297,9 +307,12 @@ int pw_branch_locate (pw_branch *b,
   for (int i = 0; i < LOCATE_MOST && (s[1] - s[0]) * scale > b->accuracy; i++) {
     middle = s[1] - f[1] * (s[1] - s[0]) / (f[1] - f[0]);
     if (i % 4 == 3 || !(middle > s[0] && middle < s[1])) middle = (s[0] + s[1]) / 2;
+    if (failed) middle = s[0] + (s[1] - s[0]) * fmod (0.618034 * i, 1); /* other places */
     status = branch_between (b, &b->side[0], &b->side[1], middle, &b->next, error);
     if (status == PW_OK) status = test (context, &b->next, &value, error);
-    if (status != PW_OK) return status == PW_RETRY ? PW_OK : status;
+    failed |= status == PW_RETRY;
+    if (status == PW_RETRY) continue;
+    if (status != PW_OK) return status;
     branch_copy (b, &b->next, point);
     if (value == 0) break;
     int side = (value > 0) == (f[1] > 0);
@@ -326,8 +339,8 @@ double pw_branch_along (const pw_branch *b, const pw_branch_point *point) {
   return fmin (part / whole, 1);
 }
 
-void pw_branch_queue (pw_branch *b, int event) {
-  branch_put (b, &b->found, event, pw_branch_along (b, &b->found));
+void pw_branch_queue (pw_branch *b, int event, int note) {
+  branch_put (b, &b->found, event, pw_branch_along (b, &b->found), note);
 }
 
 static int branch_fold (void *branch, const pw_branch_point *point, double *value, pw_error *error) {
@@ -337,15 +350,11 @@ static int branch_fold (void *branch, const pw_branch_point *point, double *valu
   return PW_OK;
 }
 
-/* Whether the last step has passed the first point, in the same direction. */
+/* Whether the last step has led to the first point again. */
 static int branch_closed (const pw_branch *b) {
-  double before = 0, now = 0;
-  for (int j = 0; j <= b->of.unknowns; j++) {
-    before += (b->before.u[j] - b->first.u[j]) * b->first.tangent[j];
-    now += (b->at.u[j] - b->first.u[j]) * b->first.tangent[j];
-  }
-  double off = branch_distance (b, b->at.u, b->first.u), step = branch_distance (b, b->at.u, b->before.u);
-  return b->steps > 2 && off < 1.1 * step && before < 0 && now >= 0;
+  if (b->at.u[b->of.unknowns] != b->first.u[b->of.unknowns]) return 0;
+  return branch_distance (b, b->at.u, b->first.u) <= PW_BRANCH_SAME ||
+         (b->of.same && b->of.same (b->of.context, b->first.u, b->at.u));
 }
 
 /* A step in the range of p, with its events. */
@@ -358,13 +367,13 @@ static int branch_advance (pw_branch *b, int (*events) (void *context, pw_error 
   if (status == PW_RETRY) status = pw_branch_step (b, error);
   if (status == PW_OK && b->folded) {
     status = pw_branch_locate (b, branch_fold, b, error);
-    if (status == PW_OK) pw_branch_queue (b, PW_BRANCH_FOLD);
+    if (status == PW_OK) pw_branch_queue (b, PW_BRANCH_FOLD, 0);
   }
   if (status == PW_OK) status = events (b->of.context, error);
   if (status == PW_RETRY && !*why->text) pw_fail (why, PW_METHOD, "Newton's method fails at the smallest step");
   if (status != PW_OK) return status;
   *why = (pw_error){ 0 }; /* of shorter steps */
-  branch_put (b, &b->at, PW_BRANCH_POINT, 1);
+  branch_put (b, &b->at, PW_BRANCH_POINT, 1, 0);
   b->ended |= branch_closed (b);
   return PW_OK;
 }

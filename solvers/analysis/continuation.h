@@ -21,6 +21,8 @@ typedef struct {
   /* Evaluates F (equations) and, unless dF is NULL, its derivatives with respect to u by columns: equations x
    * (unknowns + 1); both are 0 before.  A status; PW_RETRY, with or without an error: F cannot be evaluated there. */
   int (*evaluate) (void *context, const double *u, double *F, double *dF, pw_error *error);
+  /* Whether two solutions are the same, though their unknowns may differ by symmetries; NULL: these are compared. */
+  int (*same) (void *context, const double *u, const double *other);
   void *context;
 } pw_branch_equations;
 
@@ -38,9 +40,12 @@ typedef struct {
   pw_branch_point point;
   int event;
   double along; /* 0 at the point before, 1 at the point reached */
+  int note;     /* of the caller: pw_branch_queue */
 } pw_branch_event;
 
 enum { PW_BRANCH_QUEUE = 8 };
+
+static const double PW_BRANCH_SAME = 1e-6; /* largest difference of unknowns of points that are the same */
 
 typedef struct {
   pw_branch_equations of;
@@ -61,7 +66,7 @@ typedef struct {
   /* private */
   int steps, ended;
   pw_branch_point first, next, side[2];
-  int bounded; /* 1: points beyond p = 0 to 1 are refused */
+  int bounded; /* 1: steps beyond p = 0 to 1 or past p of the first point are refused */
   double *F, *J, *du, *trial, *work, *condition, *predicted;
   int *pivot, room;
   char *memory;
@@ -90,13 +95,14 @@ int pw_branch_next (pw_branch *b, int (*events) (void *context, pw_error *error)
                     const pw_branch_event **next, pw_error *error);
 
 /* Sets b->found to the point between the last two points where a test changes its sign; interpolated if Newton's method
- * does not converge nearby, as at bifurcations.  `test` (a status) sets *value. */
+ * does not converge nearby, as at bifurcations.  `test` (a status) sets *value.  Where it or F cannot be evaluated, as at
+ * singular points, neighbouring points are tried. */
 int pw_branch_locate (pw_branch *b,
                       int (*test) (void *context, const pw_branch_point *point, double *value, pw_error *error),
                       void *context, pw_error *error);
 /* Where a point between the last two is (pw_branch_event.along). */
 double pw_branch_along (const pw_branch *b, const pw_branch_point *point);
 /* Queues b->found as an event. */
-void pw_branch_queue (pw_branch *b, int event);
+void pw_branch_queue (pw_branch *b, int event, int note);
 
 #endif

@@ -18,6 +18,16 @@ static const double PERIODIC_EXACT = 1e-9, /* residual of a solution, in units o
     PERIODIC_FOLD = 1e-3, /* largest distance of a fold from the crossing of a multiplier there, relative to the step */
     PERIODIC_REAL = 1e-3; /* imaginary part, after location, of a pair that is about to become real */
 
+/* Whether two solutions are the same, for pw_branch_equations: but for a shift in time. */
+static int periodic_again (void *periodic, const double *u, const double *other) {
+  pw_periodic *x = periodic;
+  for (int j = 0; j < 2 * x->n; j++) {
+    x->moved[j] = u[j] * pw_periodic_unit (x, j);
+    x->change[j] = other[j] * pw_periodic_unit (x, j);
+  }
+  return pw_steady_distance (x->scene, x->moved, x->moved + x->n, x->change, x->change + x->n) <= PW_BRANCH_SAME;
+}
+
 /* ---- Opening ---- */
 
 static int periodic_arrays (pw_periodic *x) {
@@ -66,6 +76,7 @@ static int periodic_open (pw_periodic *x, pw_error *error) {
                                    .tolerance = PERIODIC_EXACT,
                                    .rank = PERIODIC_RANK,
                                    .evaluate = pw_periodic_evaluate,
+                                   .same = periodic_again,
                                    .context = x };
   if (periodic_arrays (x) != PW_OK) return pw_fail_memory (s, error);
   int status = pw_branch_open (&x->branch, &of, error);
@@ -219,7 +230,7 @@ static int periodic_events (void *periodic, pw_error *error) {
     status = periodic_crossing (x, before > x->unstable ? &b->at : &b->before, &event, error);
     if (status != PW_OK) return status;
     if (event != PW_PERIODIC_REAL || fabs (pw_branch_along (b, &b->found) - fold) > PERIODIC_FOLD)
-      pw_branch_queue (b, (int)event);
+      pw_branch_queue (b, (int)event, 0);
     x->sought += event == PW_PERIODIC_TORUS;
   }
   return PW_OK;

@@ -1,14 +1,16 @@
 /* The search for steady motions; equations in steady_equations.c. */
 #include "steady_parts.h"
 #include <math.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include "rank.h"
 #include "util.h"
 
 enum {
-  STEADY_POINTS = 50, /* of a branch, by default */
-  STEADY_TIMES = 16   /* times at which signals are compared, and as many between breakpoints */
+  STEADY_POINTS = 50,       /* of a branch, by default */
+  STEADY_TIMES = 16,        /* times at which signals are compared, and as many between breakpoints */
+  STEADY_BREAKPOINTS = 1000 /* of signals, that may be the last */
 };
 static const double STEADY_EXACT = 1e-9, /* residual of a solution, in units of the scene */
     STEADY_SLOW = 1e-4,                  /* rates that may be round-off at a double root */
@@ -105,16 +107,34 @@ int pw_signals_change (pw_run *r, double t, double period, double span, int *cha
   return status == PW_OK ? PW_OK : pw_run_annotate_error (r, pw_fail_signal (at, error), error);
 }
 
+/* The last breakpoint of signals within the span. */
+static double signals_last (pw_workspace *w, double t, double span) {
+  double end = t + span, next = t;
+  for (int i = 0; i < STEADY_BREAKPOINTS && next <= end; i++) t = next, next = pw_next_breakpoint (w, 1, t);
+  return t;
+}
+
 /* PW_INPUT with the first signal that changes with time, in the initial state, within the span. */
 static int steady_constant (pw_steady *x, pw_error *error) {
-  char name[200];
-  int changed, status = pw_signals_change (x->at[0].r, x->set.t, 0, x->set.span, &changed, error);
+  pw_run *r = x->at[0].r;
+  char name[200], text[32];
+  int changed, later, status = pw_signals_change (r, x->set.t, 0, x->set.span, &changed, error);
   if (status != PW_OK || changed < 0) return status;
+  pw_system_signal_name (x->s, changed, name, sizeof name);
+  double last = signals_last (r->w, x->set.t, x->set.span);
+  status = pw_signals_change (r, last, 0, x->set.span, &later, error);
+  if (status != PW_OK) return status;
+  snprintf (text, sizeof text, "%.9g", last);
+  if (strtod (text, NULL) < last) snprintf (text, sizeof text, "%.9g", last * (1 + 1e-8));
+  if (later < 0)
+    return pw_fail (error, PW_INPUT,
+                    "model %s: signal %s changes with time, but after %s s no signal does: give --at %s", x->s->model,
+                    name, text, text);
   return pw_fail (
       error, PW_INPUT,
       "model %s: signal %s changes with time, so that there are no steady motions; `pinwheel periodic` finds "
       "periodic ones",
-      x->s->model, pw_system_signal_name (x->s, changed, name, sizeof name));
+      x->s->model, name);
 }
 
 /* Scales and symmetries at the initial state; forced: signals may change with time. */
@@ -151,6 +171,7 @@ static pw_steady *steady_open (const pw_system *s, const pw_steady_settings *set
                                    .equations = pw_steady_equations (x),
                                    .tolerance = STEADY_EXACT,
                                    .evaluate = pw_steady_evaluate,
+                                   .same = pw_steady_again,
                                    .context = x };
   if (status == PW_OK) status = pw_branch_open (&x->branch, &of, error);
   if (status == PW_OK) return x;

@@ -66,6 +66,12 @@ static int branch_pair (const pw_steady *x, int apart) {
   return x->neutral > x->compare ? x->neutral - x->compare >= 2 : im != 0;
 }
 
+/* Notes the number of other growing modes at a fold. */
+static void branch_fold (pw_branch *b, int growing) {
+  for (int i = 0; i < b->queued; i++)
+    if (b->queue[i].event == PW_BRANCH_FOLD) b->queue[i].note = growing;
+}
+
 /* Locates each change from `before` to `now` growing modes: the k-th largest real part changes its sign.  At a fold, a
  * real one is no event of its own. */
 static int branch_changes (pw_steady *x, int before, int now, pw_error *error) {
@@ -77,7 +83,9 @@ static int branch_changes (pw_steady *x, int before, int now, pw_error *error) {
     if (status != PW_OK) return status;
     pair = branch_pair (x, most - least);
     if (pair || fabs (pw_branch_along (b, &b->found) - fold) > BRANCH_FOLD)
-      pw_branch_queue (b, pair ? PW_STEADY_OSCILLATION : PW_STEADY_REAL);
+      pw_branch_queue (b, pair ? PW_STEADY_OSCILLATION : PW_STEADY_REAL, x->sought);
+    else
+      branch_fold (b, x->sought);
   }
   return PW_OK;
 }
@@ -92,6 +100,7 @@ static int branch_events (void *steady, pw_error *error) {
   x->compare = neutral == x->neutral ? neutral : -1;
   neutral = x->neutral;
   x->unstable = motion.unstable;
+  branch_fold (&x->branch, before < motion.unstable ? before : motion.unstable);
   if (apart > x->branch.folded) status = branch_changes (x, before, motion.unstable, error);
   x->neutral = neutral;
   return status;
@@ -109,6 +118,7 @@ int pw_steady_next (pw_steady *x, pw_steady_motion *out, pw_error *error) {
   out->iterations = x->branch.iterations;
   out->residual = next->point.residual;
   status = pw_steady_motion_at (x, next->point.u, out, error);
+  if (next->event != PW_BRANCH_POINT) out->unstable = next->note;
   x->neutral = neutral;
   return status;
 }

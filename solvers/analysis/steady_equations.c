@@ -33,6 +33,16 @@ void pw_steady_state (pw_steady *x, const double *u) {
   if (x->set.vary >= 0) x->hold[x->set.vary].value = pw_steady_parameter (x, u);
 }
 
+int pw_steady_again (void *steady, const double *u, const double *other) {
+  pw_steady *x = steady;
+  size_t n = (size_t)x->n;
+  double *q = x->null, *v = q + n;
+  pw_steady_state (x, u);
+  memcpy (q, x->q, n * sizeof *q), memcpy (v, x->v, n * sizeof *v);
+  pw_steady_state (x, other);
+  return pw_steady_distance (x, q, v, x->q, x->v) <= PW_BRANCH_SAME;
+}
+
 int pw_steady_guess (pw_steady *x, const double *q, const double *v, double *u, pw_error *error) {
   int n = x->n, group = x->group, rank;
   double *S = x->F, *right = S + n * group, *work = right + n + group; /* enough: see steady_arrays */

@@ -143,6 +143,22 @@ static int group_effective (pw_steady *x, int rates) {
   return idle;
 }
 
+/* The coordinate whose change rate c > 2 is. */
+static int group_coordinate (const pw_steady *x, int c) {
+  return c < 3 + x->s->bodies ? 3 * (c - 3) + 2 : 2 * x->s->bodies + c - 3;
+}
+
+/* Finds the angles that are symmetries by themselves. */
+static void group_find_cyclic (pw_steady *x) {
+  int rates = pw_steady_rates (x->s);
+  for (int k = 0; k < x->group; k++) {
+    int last = 0, count = 0;
+    for (int c = 0; c < rates; c++)
+      if (x->axis[k * rates + c] != 0) last = c, count++;
+    if (count == 1 && last > 2) x->cyclic[group_coordinate (x, last)] = 1;
+  }
+}
+
 int pw_steady_find_group (pw_steady *x) {
   pw_linearisation *l = &x->at[0].x;
   int rates = pw_steady_rates (x->s), length = l->holonomic + l->rank + x->n, rows = GROUP_STATES * (length + 3);
@@ -164,6 +180,7 @@ int pw_steady_find_group (pw_steady *x) {
   if (idle < 0) return idle;
   group_reduce (x->group, rates, x->axis);
   x->group -= idle;
+  group_find_cyclic (x);
   return PW_OK;
 }
 
@@ -213,7 +230,7 @@ void pw_steady_canonical (const pw_steady *x, double *q, double *v) {
     int c = rates - 1;
     while (c > 2 && axis[c] == 0) c--;
     if (c > 2 && axis[0] == 0 && axis[1] == 0 && axis[2] == 0) {
-      double by = -q[c < 3 + x->s->bodies ? 3 * (c - 3) + 2 : 2 * x->s->bodies + c - 3] / axis[c];
+      double by = -q[group_coordinate (x, c)] / axis[c];
       for (int b = 0; b < x->s->bodies; b++) q[3 * b + 2] += by * axis[3 + b];
       for (int j = 3 * x->s->bodies; j < x->n; j++) q[j] += by * axis[3 - 2 * x->s->bodies + j];
     }
@@ -242,20 +259,23 @@ void pw_steady_home (const pw_steady *x, double *q, double *v) {
   for (int j = 0; j < 3 * x->s->bodies; j += 3) q[j] += dx, q[j + 1] += dy;
 }
 
-/* The tolerance is the root of STEADY_EXACT, with a margin: so far solutions can be from an exact double root. */
-int pw_steady_same (pw_steady *x, const double *q1, const double *v1, const double *q2, const double *v2) {
-  const double tolerance = 1e-4;
+double pw_steady_distance (pw_steady *x, const double *q1, const double *v1, const double *q2, const double *v2) {
   size_t bytes = (size_t)x->n * sizeof *q1;
-  double *a = x->q0, *va = x->v0, *b = x->dq, *vb = x->dv;
+  double *a = x->q0, *va = x->v0, *b = x->dq, *vb = x->dv, most = 0;
   memcpy (a, q1, bytes), memcpy (va, v1, bytes), memcpy (b, q2, bytes), memcpy (vb, v2, bytes);
   pw_steady_canonical (x, a, va);
   pw_steady_canonical (x, b, vb);
   for (int j = 0; j < x->n; j++) {
-    double unit = pw_unit (x->s, j), off = (a[j] - b[j]) / unit, most = fmax (1, fabs (b[j] / unit));
-    if (j < 3 * x->s->bodies && j % 3 == 2) off = remainder (off, 2 * PW_PI), most = 1;
-    if (!(fabs (off) <= tolerance * most) && !x->cyclic[j]) return 0;
+    double unit = pw_unit (x->s, j), off = (a[j] - b[j]) / unit, size = fmax (1, fabs (b[j] / unit));
+    if (j < 3 * x->s->bodies && j % 3 == 2) off = remainder (off, 2 * PW_PI), size = 1;
+    if (!x->cyclic[j]) most = pw_larger_or_nan (most, fabs (off) / size);
     off = (va[j] - vb[j]) / unit * x->T;
-    if (!(fabs (off) <= tolerance * fmax (1, fabs (vb[j] / unit * x->T)))) return 0;
+    most = pw_larger_or_nan (most, fabs (off) / fmax (1, fabs (vb[j] / unit * x->T)));
   }
-  return 1;
+  return most;
+}
+
+/* The tolerance is the root of STEADY_EXACT, with a margin: so far solutions can be from an exact double root. */
+int pw_steady_same (pw_steady *x, const double *q1, const double *v1, const double *q2, const double *v2) {
+  return pw_steady_distance (x, q1, v1, q2, v2) <= 1e-4;
 }

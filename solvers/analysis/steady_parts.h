@@ -58,6 +58,9 @@ int pw_steady_null (int rows, int n, double *M, double tolerance, double *out);
 int pw_steady_find_group (pw_steady *x);
 /* Finds those that what is held leaves free, at the state u. */
 int pw_steady_find_gauge (pw_steady *x);
+/* The largest difference of two states in units of the scene, or relative to large numbers; but for symmetries and whole
+ * turns. */
+double pw_steady_distance (pw_steady *x, const double *q1, const double *v1, const double *q2, const double *v2);
 /* Displaces a state by symmetries to one that equivalent states share. */
 void pw_steady_canonical (const pw_steady *x, double *q, double *v);
 /* Displaces a state so that the first body is where it was initially, if the whole can be displaced freely. */
@@ -74,6 +77,8 @@ static inline int pw_steady_equations (const pw_steady *x) {
 }
 /* For pw_branch_equations. */
 int pw_steady_evaluate (void *steady, const double *u, double *F, double *dF, pw_error *error);
+/* The same: whether u and other are the same motion. */
+int pw_steady_again (void *steady, const double *u, const double *other);
 /* The state q, v of unknowns u. */
 void pw_steady_state (pw_steady *x, const double *u);
 /* The unknowns of the steady motion nearest to the velocities v at q.  PW_METHOD if LAPACK fails. */

@@ -14,12 +14,17 @@ static int steady_fits (const pw_steady *x, const pw_system *s) {
   return s->coords == x->n && s->rows == x->m && s->holonomic == x->holonomic && s->bodies == x->s->bodies;
 }
 
-/* Opens a run at the last solution, of which it keeps what it can. */
+/* Opens a run at the last solution, of which it keeps what it can: without its velocities where all of them vanish. */
 static int steady_open_run (pw_steady *x, int k, const pw_system *s) {
   const pw_settings settings = {
     .t = x->set.t, .span = x->set.span, .initial = x->known, .initials = x->solved ? 2 * x->n : 0
   };
   x->at[k].r = pw_run_open (s, "rk4+projection", &settings, &x->why);
+  if (x->at[k].r == NULL && x->why.status == PW_INITIAL && x->solved) {
+    for (int j = x->n; j < 2 * x->n; j++) x->known[j].value = 0;
+    x->why = (pw_error){ 0 };
+    x->at[k].r = pw_run_open (s, "rk4+projection", &settings, &x->why);
+  }
   if (x->at[k].r == NULL) return x->why.status;
   if (pw_linear_open (&x->at[k].x, x->at[k].r, 0, PW_STEADY_MOST) == PW_OK) return PW_OK;
   return pw_fail_memory (s, &x->why);

@@ -146,6 +146,29 @@ static void test_interpolated (void **state) {
   pw_branch_close (&b);
 }
 
+/* x = sin p, except at p = 1. */
+static int puncture (void *context, const double *u, double *F, double *dF, pw_error *error) {
+  return fabs (u[1] - 1) < 1e-12 ? PW_RETRY : gap (context, (double[]){ u[0], u[1] }, F, dF, error);
+}
+
+/* An event where the equations cannot be evaluated is located all the same, though the secant leads there at once. */
+static void test_punctured (void **state) {
+  const pw_branch_equations of = { .unknowns = 1, .equations = 1, .tolerance = 1e-12, .evaluate = puncture };
+  pw_error error = { 0 };
+  (void)state;
+  for (int k = 0; k < 20; k++) {
+    double u[2] = { sin (0.01 * k), 0.01 * k };
+    pw_branch b;
+    check_ok (pw_branch_open (&b, &of, &error), &error);
+    b.most = b.step = 0.2, b.least = 1e-6, b.accuracy = 1e-9;
+    check_ok (pw_branch_start (&b, u, 1, &error), &error);
+    while (b.at.u[1] < 1) check_ok (pw_branch_step (&b, &error), &error);
+    check_ok (pw_branch_locate (&b, gap_middle, NULL, &error), &error);
+    check_close ("p", b.found.u[1], 1, 1e-9, "the accuracy asked, steps < 1");
+    pw_branch_close (&b);
+  }
+}
+
 /* With p decreasing from the same point x decreases, and steps grow without curvature. */
 static void test_direction (void **state) {
   double u[3] = { -2, 0, -6 };
@@ -223,6 +246,54 @@ static void test_range (void **state) {
   }
 }
 
+/* p = 0.5 + 0.3 sin x + climb (x - pi), and the same with other angles x. */
+static int wave (void *context, const double *u, double *F, double *dF, pw_error *error) {
+  double climb = *(double *)context;
+  (void)error;
+  F[0] = 0.5 + 0.3 * sin (u[0]) + climb * (u[0] - PW_PI) - u[1];
+  if (dF) dF[0] = 0.3 * cos (u[0]) + climb, dF[1] = -1;
+  return PW_OK;
+}
+
+static int wave_same (void *context, const double *u, const double *other) {
+  (void)context;
+  return fabs (remainder (u[0] - other[0], 2 * PW_PI)) < 1e-6;
+}
+
+/* A branch is closed after a whole turn, also if it begins beside a fold, from one point to the same; but not if p increases
+ * from turn to turn. */
+static void test_turns (void **state) {
+  static const double begin[] = { 0.3, 2, PW_PI / 2 - 1e-3, PW_PI / 2 + 1e-2, -PW_PI / 2 + 2e-3 };
+  double climb;
+  const pw_branch_equations of = {
+    .unknowns = 1, .equations = 1, .tolerance = 1e-12, .evaluate = wave, .same = wave_same, .context = &climb
+  };
+  pw_error error = { 0 }, why;
+  (void)state;
+  for (size_t k = 0; k < 2 * sizeof begin / sizeof *begin; k++) {
+    double x = begin[k / 2], u[2];
+    int folds = 0;
+    pw_branch b;
+    const pw_branch_event *next;
+    climb = k % 2 ? 0.01 : 0;
+    u[0] = x, u[1] = 0.5 + 0.3 * sin (x) + climb * (x - PW_PI);
+    continuation_open (&b, &of);
+    b.most = b.step = 0.1, b.accuracy = 1e-9, b.limit = 1000;
+    check_ok (pw_branch_start (&b, u, 0.3 * cos (x) + climb, &error), &error);
+    while (pw_branch_next (&b, no_events, &why, &next, &error) == PW_OK && next) folds += next->event == PW_BRANCH_FOLD;
+    assert_string_equal (why.text, "");
+    if (climb > 0) {
+      assert_true (folds > 5);
+      check_close ("p", b.at.u[1], 1, 0, "the end of the range");
+    } else {
+      assert_int_equal (folds, 2);
+      check_close ("p", b.at.u[1], u[1], 0, "that of the first point");
+      check_close ("x", b.at.u[0], x + 2 * PW_PI, 1e-8, "the tolerance over the slope");
+    }
+    pw_branch_close (&b);
+  }
+}
+
 static int without_solution (void *context, const double *u, double *F, double *dF, pw_error *error) {
   (void)context, (void)error;
   F[0] = u[0] * u[0] + 1;
@@ -269,6 +340,7 @@ int main (void) {
                                       cmocka_unit_test (test_interpolated),  cmocka_unit_test (test_direction),
                                       cmocka_unit_test (test_start_at_fold), cmocka_unit_test (test_end),
                                       cmocka_unit_test (test_range),         cmocka_unit_test (test_without_solution),
-                                      cmocka_unit_test (test_damping) };
+                                      cmocka_unit_test (test_damping),       cmocka_unit_test (test_punctured),
+                                      cmocka_unit_test (test_turns) };
   return cmocka_run_group_tests (tests, NULL, NULL);
 }

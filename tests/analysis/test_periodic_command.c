@@ -43,6 +43,22 @@ static void test_motion (void **state) {
   assert_non_null (strstr (cli_file ("one/periodic.gp"), "branch = 0\n"));
 }
 
+/* A vehicle without multipliers but those of symmetries: a figure of its path. */
+static void test_without_multipliers (void **state) {
+  (void)state;
+  cli_write ("tricycle.yaml", "pinwheel: 1\nparameters: [{name: steer, value: 0.2}]\n"
+                              "bodies: [{name: car, mass: 2, inertia: 1, rate: {vx: 1}}]\nelements:\n"
+                              "  - {wheel: rear, body: car, at: [-0.4, 0]}\n"
+                              "  - {wheel: front, body: car, at: [0.5, 0], heading: steer}\n"
+                              "  - {speed: engine, body: car, at: [-0.4, 0], "
+                              "value: {harmonic: {amplitude: 0.3, omega: 4, offset: 1}}}\n");
+  cli_good ("pinwheel periodic @/tricycle.yaml -o @/path");
+  assert_string_equal (cli_err, "");
+  cli_good ("pinwheel periodic @/tricycle.yaml --vary steer=0.1:0.3 -o @/path");
+  assert_string_equal (cli_err, "");
+  assert_non_null (cli_file ("path/periodic.svg"));
+}
+
 /* Twice the period: the multipliers are squared. */
 static void test_periods (void **state) {
   (void)state;
@@ -278,7 +294,7 @@ int main (void) {
     cmocka_unit_test (test_pitchfork), cmocka_unit_test (test_two_events), cmocka_unit_test (test_constraint),
     cmocka_unit_test (test_branch),    cmocka_unit_test (test_turns),      cmocka_unit_test (test_limit),
     cmocka_unit_test (test_bad),       cmocka_unit_test (test_domain),     cmocka_unit_test (test_pairs),
-    cmocka_unit_test (test_none),      cmocka_unit_test (test_vanishing),
+    cmocka_unit_test (test_none),      cmocka_unit_test (test_vanishing),  cmocka_unit_test (test_without_multipliers),
   };
   return cmocka_run_group_tests (tests, cli_setup, cli_teardown);
 }

@@ -118,6 +118,132 @@ static void test_closed_branch (void **state) {
   check_close ("far side", beyond[1] - beyond[0], 2, 0.02, "points at 1/50 of the range");
 }
 
+static int steady_lines (const char *start) {
+  int count = 0;
+  for (const char *line = strchr (cli_file ("turns/steady.csv"), '\n') + 1; *line; line = strchr (line, '\n') + 1)
+    count += strncmp (line, start, strlen (start)) == 0;
+  return count;
+}
+
+/* Branches are closed though the vehicle has moved, or a body turned, in a circuit; all motions at the value in the model are on
+ * the same one.  A trailer of 1 m behind an axle: tan steer = 0.5 at the folds.  Where a spring winds up, none is
+ * closed, and it is followed in both directions. */
+static void test_turned_branch (void **state) {
+  (void)state;
+  cli_write ("turned.yaml", "pinwheel: 1\nparameters: [{name: steer, value: 0}]\nbodies:\n"
+                            "  - {name: tractor, mass: 2, inertia: 1, rate: {vx: 1}}\n"
+                            "  - {name: trailer, mass: 1, inertia: 0.5, start: {phi: 0}}\nelements:\n"
+                            "  - {wheel: rear, body: tractor, at: [0, 0]}\n"
+                            "  - {wheel: front, body: tractor, at: [0.5, 0], heading: steer}\n"
+                            "  - {speed: engine, body: tractor, at: [0, 0], value: 1}\n"
+                            "  - {pin: hitch, body: [tractor, trailer], at: [[0, 0], [1, 0]]}\n"
+                            "  - {wheel: axle, body: trailer, at: [0, 0]}\n");
+  cli_good ("pinwheel steady @/turned.yaml --vary steer=-0.7:0.8 -o @/turns");
+  steady_shows ("turned: 1 branch of ");
+  steady_shows ("       1  fold              0.463647609        0 ");
+  steady_shows ("       1  fold             -0.463647609        0 ");
+  assert_int_equal (steady_lines ("1,fold,"), 2);
+  cli_write ("arm.yaml", "pinwheel: 1\nparameters: [{name: T, value: 0}, {name: k, value: 0, domain: nonnegative}]\n"
+                         "bodies: [{name: arm, mass: 1, inertia: 0.1, start: {phi: -pi/2}}]\nelements:\n"
+                         "  - {pin: O, body: [arm, ground], at: [[-1, 0], [0, 0]]}\n"
+                         "  - {gravity: g, acceleration: [0, -1]}\n"
+                         "  - {torque: M, body: [arm, ground], value: T}\n"
+                         "  - {rotational-spring: s, body: [arm, ground], stiffness: k, damping: 0.2}\n");
+  cli_good ("pinwheel steady @/arm.yaml --vary T=-2:2 -o @/turns");
+  steady_shows ("arm: 1 branch of ");
+  steady_shows ("       1  fold                        1        0 ");
+  assert_int_equal (steady_lines ("1,fold,"), 2);
+  cli_good ("pinwheel steady @/arm.yaml --set k=0.02 --vary T=-3:3 --starts 0");
+  steady_shows ("       1  ends                         3 ");
+  steady_shows ("       2  ends                        -3 ");
+}
+
+/* Where the speed is 0, any angle of the trailer is an equilibrium, and no velocities are left: there the eigenvalue -u/1.3 of
+ * the trailer changes its sign, and -m a u/(I + m a^2) of the sleigh, whatever the range. */
+static void test_standstill (void **state) {
+  static const char *const each[] = { "trailer.yaml --vary u=-3:3", "trailer.yaml --vary u=3:-2",
+                                      "trailer.yaml --vary u=-5:1", "sleigh.yaml --vary u=-1:2",
+                                      "sleigh.yaml --vary u=-3:1" };
+  (void)state;
+  cli_write ("trailer.yaml", "pinwheel: 1\nparameters: [{name: u, value: -1}]\nbodies:\n"
+                             "  - {name: tractor, mass: 2, inertia: 1, rate: {vx: u}}\n"
+                             "  - {name: trailer, mass: 1, inertia: 0.5, start: {phi: 0}}\nelements:\n"
+                             "  - {wheel: rear, body: tractor, at: [0, 0]}\n"
+                             "  - {wheel: front, body: tractor, at: [0.5, 0]}\n"
+                             "  - {speed: engine, body: tractor, at: [0, 0], value: u}\n"
+                             "  - {pin: hitch, body: [tractor, trailer], at: [[0, 0], [1.3, 0]]}\n"
+                             "  - {wheel: axle, body: trailer, at: [0, 0]}\n");
+  cli_write ("sleigh.yaml",
+             "pinwheel: 1\nparameters: [{name: u, value: 2}]\n"
+             "bodies: [{name: s, mass: 2, inertia: 0.4, rate: {vx: u}}]\nelements:\n"
+             "  - {speed: e, body: s, at: [-0.3, 0], value: u}\n  - {wheel: w, body: s, at: [-0.3, 0]}\n");
+  for (size_t k = 0; k < sizeof each / sizeof *each; k++) {
+    char command[200];
+    int events = 0;
+    snprintf (command, sizeof command, "pinwheel steady @/%s --starts 0 -o @/still", each[k]);
+    cli_good (command);
+    for (const char *line = strchr (cli_file ("still/steady.csv"), '\n') + 1; *line; line = strchr (line, '\n') + 1) {
+      if (strncmp (line, "1,point,", 8) == 0) continue;
+      assert_int_equal (strncmp (line, "1,zero eigenvalue,", 18), 0);
+      check_close ("u", table_number (line, 2), 0, 1e-9, "located to 1e-9 of a step of 0.1 m/s");
+      check_close ("growing", table_number (line, 3), 0, 0, "without the one that changes");
+      events++;
+    }
+    assert_int_equal (events, 1);
+  }
+  cli_good ("pinwheel steady @/trailer.yaml --vary u=-3:0 --starts 0");
+  steady_shows ("       1  ends                        0 ");
+}
+
+/* Without modes but rigid displacements there is a figure, too, and no message of gnuplot. */
+static void test_without_modes (void **state) {
+  (void)state;
+  cli_write ("tricycle.yaml", "pinwheel: 1\nparameters: [{name: steer, value: 0.2}]\n"
+                              "bodies: [{name: car, mass: 2, inertia: 1, rate: {vx: 1}}]\nelements:\n"
+                              "  - {wheel: rear, body: car, at: [-0.4, 0]}\n"
+                              "  - {wheel: front, body: car, at: [0.5, 0], heading: steer}\n"
+                              "  - {speed: engine, body: car, at: [-0.4, 0], value: 1}\n");
+  cli_good ("pinwheel steady @/tricycle.yaml --vary steer=-0.5:0.5 -o @/tricycle");
+  assert_string_equal (cli_err, "");
+  assert_non_null (cli_file ("tricycle/steady.svg"));
+}
+
+/* A disc that spins freely on a car, listed first or last: its angle makes no other motion. */
+static void test_spin (void **state) {
+  static const char *const body[] = { "  - {name: disc, mass: 1, inertia: 0.1, rate: {vx: 1, omega: 2}}\n",
+                                      "  - {name: car, mass: 2, inertia: 1, start: {x: -0.2}, rate: {vx: 1}}\n" };
+  (void)state;
+  for (int k = 0; k < 2; k++) {
+    char text[1000];
+    snprintf (text, sizeof text,
+              "pinwheel: 1\nbodies:\n%s%selements:\n  - {wheel: rear, body: car, at: [0, 0]}\n"
+              "  - {wheel: front, body: car, at: [0.5, 0], heading: 0.2}\n"
+              "  - {speed: engine, body: car, at: [0, 0], value: 1}\n"
+              "  - {pin: P, body: [disc, car], at: [[0, 0], [0.2, 0]]}\n",
+              body[k], body[1 - k]);
+    cli_write ("spin.yaml", text);
+    cli_good ("pinwheel steady @/spin.yaml --hold disc.omega=2 --starts 10");
+    steady_shows ("spin: 1 steady motion up to 4 symmetries, ");
+  }
+}
+
+/* Signals that stop changing: from then on there are steady motions. */
+static void test_ramp (void **state) {
+  (void)state;
+  cli_write ("ramp.yaml", "pinwheel: 1\nrun: {t_end: 5}\nbodies: [{name: car, mass: 2, inertia: 1, rate: {vx: 1}}]\n"
+                          "elements:\n  - {wheel: rear, body: car, at: [-0.4, 0]}\n"
+                          "  - {steered-wheel: front, body: car, at: [0.5, 0], "
+                          "heading: {ramp: {to: 0.2, start: 1/3, duration: 2}}}\n"
+                          "  - {drag: D, body: car, linear: 0.5, turning: 0.1}\n"
+                          "  - {force: F, body: car, axes: body, fx: {pulse: {height: 1, start: 1, width: 0.5}}}\n"
+                          "  - {force: G, body: car, axes: body, fx: 1}\n");
+  cli_bad ("pinwheel steady @/ramp.yaml", 2,
+           "model ramp: signal front.heading changes with time, but after 2.33333336 s no signal does: give --at "
+           "2.33333336");
+  cli_good ("pinwheel steady @/ramp.yaml --at 2.33333336 --starts 0");
+  steady_shows ("     1          1.96413           0.442387 ");
+}
+
 /* The ends of branches are those of the range to the last bit; the motion is found once, whatever angle it is found at. */
 static void test_ends (void **state) {
   (void)state;
@@ -250,6 +376,11 @@ int main (void) {
     cmocka_unit_test (test_bad),
     cmocka_unit_test (test_curved_pitchfork),
     cmocka_unit_test (test_closed_branch),
+    cmocka_unit_test (test_turned_branch),
+    cmocka_unit_test (test_standstill),
+    cmocka_unit_test (test_without_modes),
+    cmocka_unit_test (test_ramp),
+    cmocka_unit_test (test_spin),
     cmocka_unit_test (test_ends),
     cmocka_unit_test (test_rest),
     cmocka_unit_test (test_many_symmetries),

@@ -284,11 +284,13 @@ static int periodic_data (const void *context, FILE *f, pw_error *error) {
 static void periodic_variables (const void *context, FILE *f) {
   const pw_periodic_cli *x = context;
   int bodies = pw_system_bodies (x->m.system);
+  double largest = 0;
   if (bodies > PERIODIC_BODIES) bodies = PERIODIC_BODIES;
   pw_figure_label (f, "label_of_x", 0, x->vary.name, x->vary.unit);
   fprintf (f, "branch = %d\nfirst = %.10g\nlast = %.10g\nbodies = %d\narray body[%d]\n", x->vary_text != NULL,
            fmin (x->set.first, x->set.last), fmax (x->set.first, x->set.last), bodies, bodies ? bodies : 1);
-  fputs ("array low[3]\narray high[3]\n", f);
+  for (int i = 0; i < x->points; i++) largest = fmax (largest, periodic_largest (&x->point[i].orbit));
+  fprintf (f, "largest = %.9g\narray low[3]\narray high[3]\n", largest);
   for (int k = 0; k < PERIODIC_CURVES; k++) {
     double low = INFINITY, high = -INFINITY;
     for (int i = 0; i < x->points; i++) {

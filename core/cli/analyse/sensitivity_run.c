@@ -347,7 +347,7 @@ static int sensitivity_independent (const pw_sensitivity *x, pw_error *error) {
     const pw_unknown *u = &x->unknowns.list[p];
     const pw_direction *d = &x->direction[p];
     if (u->state < 0) continue;
-    const pw_sample *s = pw_run_initial (d->neighbour[0]);
+    const pw_initial_report *s = pw_run_initial (d->neighbour[0]);
     double value = u->state < n ? s->q[u->state] : s->v[u->state - n];
     if (fabs (value - x->at[p] - pw_direction_offset (d, 0)) > 1e-2 * fabs (d->step))
       return pw_fail (

@@ -81,7 +81,7 @@ static int steady_advise (pw_steady_cli *x, pw_steady_point *p, pw_error *error)
 }
 
 static int steady_same (const pw_steady_cli *x, const pw_steady_motion *a, const pw_steady_motion *b) {
-  return fabs (a->parameter - b->parameter) <= 1e-9 * fabs (b->parameter) &&
+  return fabs (a->parameter - b->parameter) <= 1e-9 * fabs (x->set.last - x->set.first) &&
          pw_steady_same (x->steady, a->q, a->v, b->q, b->v);
 }
 
@@ -164,9 +164,18 @@ static int steady_branch (pw_steady_cli *x, const pw_steady_point *from, int dir
   return PW_OK;
 }
 
-/* Follows the solutions at one end of the range that are on no branch yet. */
+/* Whether a motion is one of the points from number `first`. */
+static int steady_seen (const pw_steady_cli *x, const pw_steady_motion *m, int first) {
+  int seen = 0;
+  for (int k = first; k < x->points; k++) seen |= steady_same (x, &x->point[k].motion, m);
+  return seen;
+}
+
+/* Follows the solutions that are on no branch yet: from one end of the range, or in between in both directions unless the
+ * branch returns. */
 static int steady_from (pw_steady_cli *x, double parameter, int direction, pw_error *error) {
   int known = x->points, status = steady_search (x, parameter, error), found = x->points - known;
+  int inside = parameter != x->set.first && parameter != x->set.last;
   if (status < 0 && status != PW_RESOURCE && x->branches > 0) {
     pw_cli_say ("pinwheel: no branches sought from the other end: %s\n", error->text);
     *error = (pw_error){ 0 };
@@ -177,9 +186,11 @@ static int steady_from (pw_steady_cli *x, double parameter, int direction, pw_er
   if (found) memcpy (start, x->point + known, (size_t)found * sizeof *start);
   x->points = known;
   for (int i = 0; i < found; i++) {
-    int seen = 0;
-    for (int k = 0; k < x->points; k++) seen |= steady_same (x, &x->point[k].motion, &start[i].motion);
+    const pw_steady_motion *m = &start[i].motion;
+    int seen = steady_seen (x, m, 0), before = x->points;
     if (status == PW_OK && !seen && !x->stopped) status = steady_branch (x, start + i, direction, error);
+    if (status == PW_OK && !seen && !x->stopped && inside && !steady_seen (x, m, before + 1))
+      status = steady_branch (x, start + i, -direction, error);
     free (start[i].state);
   }
   free (start);

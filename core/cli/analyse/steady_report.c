@@ -276,12 +276,22 @@ static int steady_data (const void *context, FILE *f, pw_error *error) {
     for (int i = 0; i < p->linear.unknowns; i++)
       if (!p->linear.rigid[i])
         fprintf (f, "%.10g %.10g %.10g\n", p->motion.parameter, p->linear.re[i], p->linear.im[i]);
+  fputs ("nan nan nan\n", f);
   (void)error;
   return PW_OK;
 }
 
 static void steady_variables (const void *context, FILE *f) {
   const pw_steady_cli *x = context;
+  double low[2] = { INFINITY, INFINITY }, high[2] = { -INFINITY, -INFINITY };
+  for (const pw_steady_point *p = x->point; p < x->point + x->points; p++)
+    for (int i = 0; i < p->linear.unknowns; i++)
+      for (int k = 0; k < 2 && !p->linear.rigid[i]; k++) {
+        double value = k ? p->linear.im[i] : p->linear.re[i];
+        low[k] = fmin (low[k], value), high[k] = fmax (high[k], value);
+      }
+  if (low[0] > high[0]) low[0] = -1, high[0] = 1, low[1] = high[1] = 0; /* no eigenvalues */
+  fprintf (f, "y_min = %.10g\ny_max = %.10g\nz_min = %.10g\nz_max = %.10g\n", low[0], high[0], low[1], high[1]);
   pw_figure_label (f, "label_of_x", 0, x->vary.name, x->vary.unit);
   fprintf (f, "first = %.10g\nlast = %.10g\n", fmin (x->set.first, x->set.last), fmax (x->set.first, x->set.last));
 }

@@ -13,8 +13,7 @@ above = top
 top = top + rows(items, per_row)
 full = width - left - right
 side = narrow ? full : (full - 46)/2 # of the square of multipliers
-stats data index (branch ? 3 : 1) using (sqrt($1**2 + $2**2)) name 'm' nooutput
-reach = 1.12*max(1, m_max)
+reach = 1.12*max(1, largest)
 square(x, y) = sprintf('set xrange [%g:%g]; set yrange [%g:%g]; ', -reach, reach, -reach, reach).panel(x, x + side, y, y + side)
 unset offsets
 if (branch) {

@@ -8,8 +8,6 @@ above = top
 top = top + rows(4, 2)
 part = narrow ? 92.0 : 118.0
 height = top + 3*part + 10 + bottom + 6 + bottom
-stats data index 3 using 2 name 'y' nooutput
-stats data index 3 using 3 name 'z' nooutput
 # modes that decay much faster than the others swing or grow are outside
 slow = 5*max(y_max, z_max)
 if (slow > -5e-3*y_min) { y_min = max(y_min, -slow) }
