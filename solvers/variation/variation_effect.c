@@ -144,6 +144,9 @@ static void effect_extrapolate (const pw_variation *x, pw_direction_copy *d) {
 /* Relative errors of differences that are sufficiently small, and those aimed at with another step. */
 static const double EFFECT_GOOD = 1e-7, EFFECT_AIM = 1e-8;
 
+/* A step below which an effect of exactly 0 may be one that numbers of the order of 1 do not show. */
+static const double EFFECT_LOST = 1e-10;
+
 /* The factor of the step with which differences have errors of EFFECT_AIM. */
 static double effect_factor (const pw_difference_sums *s) {
   double off = s->all > 0 ? s->error / s->all : 0;
@@ -155,7 +158,7 @@ double pw_variation_better_step (const pw_variation *x, int i) {
   const pw_direction_copy *d = &x->direction[i];
   double step = d->given.step, start = effect_factor (&d->start), effects = effect_factor (&d->effects);
   if (d->given.initial) return step;
-  if (d->column->largest == 0 && memchr (d->changes, 1, (size_t)x->r->s->batches + 1) == NULL) return 1000 * step;
+  if (d->column->largest == 0) return fabs (step) < EFFECT_LOST ? 1000 * step : step;
   return step * (start == 1 ? effects : effects == 1 ? start : fmin (start, effects));
 }
 

@@ -277,7 +277,7 @@ static void test_steps (void **state) {
              "pinwheel: 1\nrun: {t_end: 2, method: erk8, rtol: 1e-11}\n"
              "parameters: [{name: p, value: 0}, {name: dl, value: 0, unit: m}]\n"
              "bodies: [{name: b, mass: 1, inertia: 1}, {name: c, mass: 1, inertia: 0.1, start: {x: 1 + dl}}]\n"
-             "elements:\n  - {torque: T, body: b, value: {expression: 100*sin(3*t) + p}}\n"
+             "elements:\n  - {torque: T, body: [b, ground], value: {expression: 100*sin(3*t) + p}}\n"
              "  - {pin: P, body: [ground, c], at: [[0, 0], [-1 - dl, 0]]}\n"
              "  - {gravity: G, acceleration: [0, -9.81]}\n");
   for (int dl = 0; dl < 2; dl++)
