@@ -177,7 +177,7 @@ void pw_steady_close (pw_steady *x);
  * none: residual and state are where it ended. Errors: PW_INPUT if a parameter changes the number of coordinates;
  * PW_RESOURCE; PW_METHOD. */
 int pw_steady_solve (pw_steady *x, int attempt, double parameter, pw_steady_motion *out, pw_error *error);
-/* Why the system could last not be evaluated during the search, or "". */
+/* Why the system could last not be evaluated during the search, or why a branch ended within the range; or "". */
 const char *pw_steady_reason (const pw_steady *x);
 /* Number of symmetries: displacements of the whole, and angles on which nothing depends. */
 int pw_steady_symmetries (const pw_steady *x);
@@ -251,7 +251,7 @@ void pw_periodic_close (pw_periodic *x);
  * least norm.  A free period that is not given is that of the first return of the motion then.  PW_RETRY, without an
  * error, if it does not converge: the residual is that where it ended. */
 int pw_periodic_solve (pw_periodic *x, int settle, double parameter, pw_periodic_orbit *out, pw_error *error);
-/* Why the last motion could not be computed, or "". */
+/* Why the last motion could not be computed, or why a branch ended within the range; or "". */
 const char *pw_periodic_reason (const pw_periodic *x);
 /* Number of symmetries, as pw_steady_symmetries. */
 int pw_periodic_symmetries (const pw_periodic *x);

@@ -374,7 +374,7 @@ static int branch_advance (pw_branch *b, int (*events) (void *context, pw_error 
   if (status != PW_OK) return status;
   *why = (pw_error){ 0 }; /* of shorter steps */
   branch_put (b, &b->at, PW_BRANCH_POINT, 1, 0);
-  b->ended |= branch_closed (b);
+  if (branch_closed (b)) b->ended = 1, pw_fail (why, PW_METHOD, "it has returned to its first point");
   return PW_OK;
 }
 

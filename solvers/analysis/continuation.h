@@ -88,8 +88,8 @@ int pw_branch_start (pw_branch *b, const double *u, double direction, pw_error *
  * converges to a point nearby on a smooth branch.  Branches that bifurcate from it are not followed. */
 int pw_branch_step (pw_branch *b, pw_error *error);
 
-/* The next point or event of the branch in p = 0 to 1, or NULL after its last one: at an end of the range, the start of a
- * closed branch, or, with the reason in *why, where no step succeeds.  `events` (a status; context: that of the equations)
+/* The next point or event of the branch in p = 0 to 1, or NULL after its last one: at an end of the range or, with the
+ * reason in *why, at the first point of a closed branch, or where no step succeeds.  `events` (a status; context: that of the equations)
  * queues those of a step that are no folds; evaluations may leave their reason in *why. */
 int pw_branch_next (pw_branch *b, int (*events) (void *context, pw_error *error), pw_error *why,
                     const pw_branch_event **next, pw_error *error);
