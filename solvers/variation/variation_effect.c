@@ -127,31 +127,39 @@ static double effect_part (const pw_variation *x, int i) {
   return (i < x->n + x->m ? T * T : i < x->n + 2 * x->m ? 1 : T) / x->r->s->scale.length;
 }
 
+/* Effects below one unit of the scene per unit of p, or per p (about 1e5 steps) if that is larger, count as that large. */
+static double effect_least (const pw_direction_copy *d) {
+  return fmin (1, 1e-5 / fabs (d->given.step));
+}
+
 /* The two differences become the extrapolated one and its error, as in pw_direction_weight, to which round-off is added. */
 static void effect_extrapolate (const pw_variation *x, pw_direction_copy *d) {
-  double *one = d->effect[0], *two = d->effect[1];
+  double *one = d->effect[0], *two = d->effect[1], all = 0;
   double round = 2 * DBL_EPSILON * fabs (effect_weight (&d->given, 0, 1));
   for (int i = 0; i < x->n + 3 * x->m; i++) {
     double error = (one[i] - two[i]) / 3, part = effect_part (x, i);
     one[i] += error;
     two[i] = error + copysign (round * d->size[i], error);
-    d->effects.all += fabs (one[i]) * part;
+    all += fabs (one[i]) * part;
     d->effects.error += fabs (two[i]) * part;
     d->effects.round += round * d->size[i] * part;
   }
+  d->effects.all += fmax (all, effect_least (d));
 }
 
-/* Relative errors of differences that are sufficiently small, and those aimed at with another step. */
-static const double EFFECT_GOOD = 1e-7, EFFECT_AIM = 1e-8;
+/* Relative errors of differences that are sufficiently small, and a tenth of them, which is aimed at with another step: of round-off,
+ * and of the remainder of each difference, whose square is about that of the extrapolated one. */
+static const double EFFECT_ROUND = 1e-7, EFFECT_REST = 1e-4, EFFECT_AIM = 0.1;
 
 /* A step below which an effect of exactly 0 may be one that numbers of the order of 1 do not show. */
 static const double EFFECT_LOST = 1e-10;
 
-/* The factor of the step with which differences have errors of EFFECT_AIM. */
+/* The factor of the step with which differences are accurate. */
 static double effect_factor (const pw_difference_sums *s) {
-  double off = s->all > 0 ? s->error / s->all : 0;
-  if (off <= EFFECT_GOOD) return 1;
-  return s->round > 0.1 * s->error ? fmin (1000, off / EFFECT_AIM) : fmax (0.001, sqrt (EFFECT_AIM / off));
+  int rounds = s->round > 0.1 * s->error;
+  double off = s->all > 0 ? s->error / s->all / (rounds ? EFFECT_ROUND : EFFECT_REST) : 0;
+  if (off <= 1) return 1;
+  return rounds ? fmin (1000, off / EFFECT_AIM) : fmax (0.001, sqrt (EFFECT_AIM / off));
 }
 
 double pw_variation_better_step (const pw_variation *x, int i) {
