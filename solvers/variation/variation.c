@@ -133,7 +133,7 @@ static int variation_changes (const pw_variation *x, pw_direction_copy *d) {
 /* Adds round-off of the differences of the initial states to their error. */
 static void variation_round (const pw_variation *x, pw_direction_copy *d) {
   const pw_run *near = d->given.neighbour[1], *r = x->r;
-  const double by = 2 * DBL_EPSILON * fabs (pw_direction_weight (&d->given, 0, 1)), *Y = d->column[0].trial;
+  const double by = 4 * DBL_EPSILON * fabs (pw_direction_weight (&d->given, 0, 1)), *Y = d->column[0].trial;
   double *error = d->column[1].trial;
   for (int j = 0; j < 2 * x->n; j++) {
     int i = j % x->n;

@@ -135,7 +135,7 @@ static double effect_least (const pw_direction_copy *d) {
 /* The two differences become the extrapolated one and its error, as in pw_direction_weight, to which round-off is added. */
 static void effect_extrapolate (const pw_variation *x, pw_direction_copy *d) {
   double *one = d->effect[0], *two = d->effect[1], all = 0;
-  double round = 2 * DBL_EPSILON * fabs (effect_weight (&d->given, 0, 1));
+  double round = 4 * DBL_EPSILON * fabs (effect_weight (&d->given, 0, 1));
   for (int i = 0; i < x->n + 3 * x->m; i++) {
     double error = (one[i] - two[i]) / 3, part = effect_part (x, i);
     one[i] += error;
