@@ -1,18 +1,19 @@
-/* Implicit steps of the derivatives, for stiff motions, by the Radau IIA method of order 5 (Hairer & Wanner 1996, Solving
- * Ordinary Differential Equations II, section IV.8).
+/* Implicit steps of the derivatives, for stiff motions, by the Radau IIA method of order 5 with the coefficients a_ij, c_i
+ * (Hairer & Wanner 1996, Solving Ordinary Differential Equations II, section IV.8).
  *
- * Stages are projected onto the linearised constraints (projected collocation, Ascher & Petzold 1991).  With the projection
- * p_i of the derivative Y at t, and the directions N_i of minimal coordinates (linear_variation.c), both at the state of
- * the run at t_i = t + c_i h,
+ * Stages are projected onto the linearised constraints (projected collocation, Ascher & Petzold 1991).  At the state of
+ * the run at t_i = t + c_i h let p_i be the solution of these nearest to 0, N_i the tangent vectors of the minimal
+ * coordinates (linear_variation.c), and N_i^+ a left inverse of N_i.  With Y at t, the stages satisfy
  *
  *     Y_i = p_i + N_i z_i,   N_i^+ (Y_i - Y - h sum_j a_ij F_j) = 0,   F_j = F_j (p_j) + A_j z_j,
  *
- * with the derivative F_j of Y_j and its response A_j to N_j: linear equations for the z_i of all columns.  The last stage is
- * the new derivative.  The error estimate, of order h^4,
+ * where F_j is the time derivative of Y_j, an affine function of z_j with the matrix A_j: linear equations for the z_i of
+ * all columns.  The last stage is Y at the end of the step.  The error estimate, of order h^4,
  *
  *     err = N_3 (gamma/h - N_3^+ A_3)^-1 N_3^+ (F + sum_i e_i (Y_i - Y)/h),
  *
- * is e = err/|Y|; (10 e)^(3/2) is about the error of the method, of order h^6, as in RADAU5. */
+ * has gamma, the real eigenvalue of the inverse of (a_ij), and e_i from there.  With r = |err|/|Y|, (10 r)^(3/2) is about the
+ * error of the method, of order h^6 (step_sharpen), as in RADAU5. */
 #include <lapacke.h>
 #include <math.h>
 #include <stdlib.h>
@@ -21,10 +22,10 @@
 #include "util.h"
 #include "variation_parts.h"
 
-enum { STAGES = PW_VARIATION_STAGES };
+enum { STAGES = PW_VARIATION_STAGES, RATE = 1, STATE = RATE + STAGES }; /* F_i in K[RATE + i], Y_i in K[STATE + i] */
 
 static const double implicit_c[STAGES] = { 0.15505102572168219018, 0.64494897427831780982, 1 };
-static const double implicit_A[STAGES][STAGES] = {
+static const double implicit_a[STAGES][STAGES] = {
   { 0.19681547722366042587, -0.06553542585019838811, 0.02377097434822015242 },
   { 0.39442431473908727700, 0.29207341166522846302, -0.04154875212599793020 },
   { 0.37640306270046727505, 0.51248582618842161384, 0.11111111111111111111 },
@@ -34,12 +35,12 @@ static const double implicit_e[STAGES] = { -10.04880939982741556, 1.382142733160
 
 struct pw_variation_implicit {
   int size;          /* minimal coordinates */
-  double *N[STAGES]; /* size x 2n: N_i */
+  double *N[STAGES]; /* size x 2n: N_i, a row for each coordinate */
   double *A[STAGES]; /* size x 2n: A_i */
-  double *D[STAGES]; /* size x n: N_i^+, which maps positions and velocities separately */
+  double *D[STAGES]; /* size x n: N_i^+; of dq for coordinates of position, of dv for those of velocity */
   double *matrix;    /* 3 size x 3 size, by columns */
   double *filter;    /* size x size, by columns: gamma/h - N_3^+ A_3 */
-  double *z;         /* 3 size for each column of the directions */
+  double *z;         /* 3 size for each column of pw_variation */
   lapack_int *pivot; /* 3 size, then size of the filter */
   char *memory;
 };
@@ -75,10 +76,6 @@ static double implicit_dot (const double *a, const double *b, int n) {
   return sum;
 }
 
-static void implicit_add (double *restrict to, const double *restrict from, double weight, int n) {
-  for (int j = 0; j < n; j++) to[j] += weight * from[j];
-}
-
 /* ---- Stages ---- */
 
 /* N_i, A_i, N_i^+ of minimal coordinate c at the state evaluated. */
@@ -91,8 +88,8 @@ static void implicit_direction (pw_variation *x, int i, int c) {
   pw_linear_tangent (l, c);
   memcpy (N, l->x, 2 * half);
   for (int j = 0; j < x->n; j++) {
-    double length = pw_as_length (x->r->s, j) * T;
-    D[j] = N[velocity ? x->n + j : j] * length * length;
+    double scale = pw_as_length (x->r->s, j) * T;
+    D[j] = N[velocity ? x->n + j : j] * scale * scale;
   }
   pw_linear_vary (l);
   memcpy (A, N + n, half);
@@ -108,7 +105,7 @@ static void implicit_particular (pw_variation *x, pw_variation_column *c) {
   if (depends) pw_variation_project (x, c);
 }
 
-/* Stage i: p_i into K[4 + i], F_i (p_i) into K[1 + i]. */
+/* Stage i: N_i, A_i, N_i^+; p_i, in place of Y_i; F_i (p_i); the run's accelerations into a[1 + i]. */
 static int implicit_stage (pw_variation *x, int i, double h, double t1, pw_error *error) {
   size_t bytes = 2 * (size_t)x->n * sizeof (double);
   int status = pw_variation_evaluate_at (x, i + 1 < STAGES ? x->t + implicit_c[i] * h : t1, error);
@@ -116,10 +113,10 @@ static int implicit_stage (pw_variation *x, int i, double h, double t1, pw_error
   memcpy (x->a[1 + i], x->linear.a, bytes / 2);
   PW_EACH_COLUMN (c, x) {
     implicit_particular (x, c);
-    memcpy (c->K[4 + i], c->trial, bytes);
+    memcpy (c->K[STATE + i], c->trial, bytes);
   }
-  pw_variation_accelerate (x, 0, 1 + i);
-  pw_variation_accelerate (x, 1, 1 + i);
+  pw_variation_accelerate (x, 0, RATE + i);
+  pw_variation_accelerate (x, 1, RATE + i);
   pw_linear_bases (&x->linear);
   for (int c = 0; c < x->linear.size; c++) implicit_direction (x, i, c);
   return PW_OK;
@@ -127,14 +124,15 @@ static int implicit_stage (pw_variation *x, int i, double h, double t1, pw_error
 
 /* ---- Equations ---- */
 
-/* Minimal coordinates of a vector in the directions of stage i, into z. */
+/* z = N_i^+ vector */
 static void implicit_coordinates (const pw_variation *x, int i, const double *vector, double *z) {
   int n = x->n, positions = x->linear.positions;
   const double *D = x->implicit->D[i];
   for (int k = 0; k < x->implicit->size; k++, D += n) z[k] = implicit_dot (D, k < positions ? vector : vector + n, n);
 }
 
-/* Factorises the matrix of the z_i and the filter.  A singular one gives derivatives that are not finite. */
+/* Factorises the matrix of the z_i and the filter.  A singular one gives derivatives that are not
+ * finite, and the step is repeated. */
 static void implicit_factor (pw_variation *x, double h) {
   pw_variation_implicit *p = x->implicit;
   int size = p->size, rows = STAGES * size;
@@ -144,9 +142,10 @@ static void implicit_factor (pw_variation *x, double h) {
     for (int i = 0; i < STAGES; i++) {
       double *part = column + i * size;
       implicit_coordinates (x, i, A, part);
-      for (int k = 0; k < size && i + 1 == STAGES && j >= 2 * size; k++)
-        p->filter[(j - 2 * size) * size + k] = (i * size + k == j) * implicit_gamma / h - part[k];
-      for (int k = 0; k < size; k++) part[k] = (i * size + k == j) - h * implicit_A[i][j / size] * part[k];
+      if (i == STAGES - 1 && j >= i * size)
+        for (int k = 0; k < size; k++)
+          p->filter[(j - i * size) * size + k] = (i * size + k == j) * implicit_gamma / h - part[k];
+      for (int k = 0; k < size; k++) part[k] = (i * size + k == j) - h * implicit_a[i][j / size] * part[k];
     }
   }
   LAPACKE_dgetrf_work (LAPACK_COL_MAJOR, rows, rows, p->matrix, rows, p->pivot);
@@ -154,26 +153,27 @@ static void implicit_factor (pw_variation *x, double h) {
 }
 
 /* The right-hand sides of a column. */
-static void implicit_right (pw_variation *x, const pw_variation_column *c, double h, double *z) {
+static void implicit_rhs (pw_variation *x, const pw_variation_column *c, double h, double *z) {
   int length = 2 * x->n;
   double *sum = x->values;
   for (int i = 0; i < STAGES; i++, z += x->implicit->size) {
-    for (int j = 0; j < length; j++) sum[j] = c->Y[j] - c->K[4 + i][j];
-    for (int k = 0; k < STAGES; k++) implicit_add (sum, c->K[1 + k], h * implicit_A[i][k], length);
+    for (int j = 0; j < length; j++) sum[j] = c->Y[j] - c->K[STATE + i][j];
+    for (int k = 0; k < STAGES; k++) pw_variation_add (sum, c->K[RATE + k], h * implicit_a[i][k], length);
     implicit_coordinates (x, i, sum, z);
   }
 }
 
-/* Solves for the stages: Y_i into K[4 + i]. */
+/* Solves for the stages Y_i. */
 static void implicit_solve (pw_variation *x, double h) {
   pw_variation_implicit *p = x->implicit;
   int rows = STAGES * p->size, columns = 0, length = 2 * x->n;
-  PW_EACH_COLUMN (c, x) implicit_right (x, c, h, p->z + rows * columns++);
+  PW_EACH_COLUMN (c, x) implicit_rhs (x, c, h, p->z + rows * columns++);
   LAPACKE_dgetrs_work (LAPACK_COL_MAJOR, 'N', rows, columns, p->matrix, rows, p->pivot, p->z, rows);
   const double *z = p->z;
   PW_EACH_COLUMN (c, x)
   for (int i = 0; i < STAGES; i++)
-    for (int k = 0; k < p->size; k++, z++) implicit_add (c->K[4 + i], p->N[i] + (size_t)k * (size_t)length, *z, length);
+    for (int k = 0; k < p->size; k++, z++)
+      pw_variation_add (c->K[STATE + i], p->N[i] + (size_t)k * (size_t)length, *z, length);
 }
 
 /* Powers at the stages. */
@@ -181,17 +181,18 @@ static int implicit_powers (pw_variation *x, double h, double t1, pw_error *erro
   for (int i = 0; x->ledger && i < STAGES; i++) {
     int status = pw_variation_evaluate_at (x, i + 1 < STAGES ? x->t + implicit_c[i] * h : t1, error);
     if (status != PW_OK) return status;
-    PW_EACH_COLUMN (c, x) memcpy (c->trial, c->K[4 + i], 2 * (size_t)x->n * sizeof *c->trial);
-    pw_variation_accelerate (x, 0, 1 + i);
-    pw_variation_accelerate (x, 1, 1 + i);
-    if (pw_variation_ledger_rates (x, 1 + i) != PW_OK) return pw_fail_signal (x->at, error);
+    PW_EACH_COLUMN (c, x) memcpy (c->trial, c->K[STATE + i], 2 * (size_t)x->n * sizeof *c->trial);
+    pw_variation_accelerate (x, 0, RATE + i);
+    pw_variation_accelerate (x, 1, RATE + i);
+    if (pw_variation_ledger_rates (x, RATE + i) != PW_OK) return pw_fail_signal (x->at, error);
   }
-  PW_EACH_COLUMN (c, x)
-  for (int i = 0; i < STAGES; i++)
-    for (int j = 2 * x->n; j < x->size; j++) {
-      c->K[4 + i][j] = c->Y[j];
-      for (int k = 0; k < STAGES; k++) c->K[4 + i][j] += h * implicit_A[i][k] * c->K[1 + k][j];
-    }
+  PW_EACH_COLUMN (c, x) {
+    for (int i = 0; i < STAGES; i++)
+      for (int j = 2 * x->n; j < x->size; j++) {
+        c->K[STATE + i][j] = c->Y[j];
+        for (int k = 0; k < STAGES; k++) c->K[STATE + i][j] += h * implicit_a[i][k] * c->K[RATE + k][j];
+      }
+  }
   return PW_OK;
 }
 
@@ -204,7 +205,7 @@ static void implicit_filter (pw_variation *x, double *e) {
   implicit_coordinates (x, 2, e, p->z);
   LAPACKE_dgetrs_work (LAPACK_COL_MAJOR, 'N', size, 1, p->filter, size, p->pivot + STAGES * size, p->z, size);
   memset (e, 0, (size_t)length * sizeof *e);
-  for (int k = 0; k < size; k++) implicit_add (e, p->N[2] + (size_t)k * (size_t)length, p->z[k], length);
+  for (int k = 0; k < size; k++) pw_variation_add (e, p->N[2] + (size_t)k * (size_t)length, p->z[k], length);
 }
 
 /* The errors of the derivatives. */
@@ -213,13 +214,13 @@ static void implicit_errors (pw_variation *x, double h) {
     const pw_variation_column *c = d->column;
     memcpy (d->local, c->K[0], (size_t)x->size * sizeof *d->local);
     for (int i = 0; i < STAGES; i++)
-      for (int j = 0; j < x->size; j++) d->local[j] += implicit_e[i] / h * (c->K[4 + i][j] - c->Y[j]);
+      for (int j = 0; j < x->size; j++) d->local[j] += implicit_e[i] / h * (c->K[STATE + i][j] - c->Y[j]);
     implicit_filter (x, d->local);
     for (int j = 2 * x->n; j < x->size; j++) d->local[j] *= h / implicit_gamma;
   }
 }
 
-/* The same for the velocities of the run; the defect of the integral of its accelerations. */
+/* Estimates the error of the run's velocities likewise, into `motion`; filters `defect`. */
 static void implicit_motion (pw_variation *x, double h) {
   int n = x->n;
   double *e = x->values, *defect = e + 2 * n;
@@ -227,8 +228,8 @@ static void implicit_motion (pw_variation *x, double h) {
   memcpy (e + n, x->a[0], (size_t)n * sizeof *e);
   memcpy (defect + n, x->defect, (size_t)n * sizeof *e);
   for (int k = 0; k < STAGES; k++) {
-    for (int i = 0; i < STAGES; i++) implicit_add (e + n, x->a[1 + k], implicit_e[i] * implicit_A[i][k], n);
-    implicit_add (defect + n, x->a[1 + k], h * implicit_A[2][k], n);
+    for (int i = 0; i < STAGES; i++) pw_variation_add (e + n, x->a[1 + k], implicit_e[i] * implicit_a[i][k], n);
+    pw_variation_add (defect + n, x->a[1 + k], h * implicit_a[2][k], n);
   }
   implicit_filter (x, e);
   implicit_filter (x, defect);
@@ -246,6 +247,6 @@ int pw_variation_implicit_stages (pw_variation *x, double h, double t1, pw_error
   if (status != PW_OK) return status;
   implicit_errors (x, h);
   implicit_motion (x, h);
-  PW_EACH_COLUMN (c, x) memcpy (c->trial, c->K[3 + STAGES], (size_t)x->size * sizeof *c->trial);
+  PW_EACH_COLUMN (c, x) memcpy (c->trial, c->K[STATE + STAGES - 1], (size_t)x->size * sizeof *c->trial);
   return PW_OK;
 }

@@ -17,7 +17,7 @@ enum {
 typedef struct {
   const struct pw_direction_copy *direction;
   double *Y;                     /* size: dq, dv, d ledger, the latter only with `ledger` */
-  double *K[PW_VARIATION_RATES]; /* size: time derivatives of Y at the stages */
+  double *K[PW_VARIATION_RATES]; /* size: time derivatives of Y at the stages; implicit steps: F_i, then Y_i */
   double *lambda;                /* m: d lambda at the state last evaluated */
   double *trial;                 /* size: Y at a stage, or at the end of a step */
   double slope;                  /* derivative of the breakpoint being passed */
@@ -99,7 +99,7 @@ typedef struct {
   int held; /* 1: not those of the run */
 } pw_variation_place;
 
-static inline void pw_variation_add (double *to, const double *from, double weight, int n) {
+static inline void pw_variation_add (double *restrict to, const double *restrict from, double weight, int n) {
   for (int i = 0; i < n; i++) to[i] += weight * from[i];
 }
 

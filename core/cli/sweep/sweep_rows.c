@@ -40,7 +40,8 @@ typedef struct {
   pthread_cond_t compiled;
   row_system *latest;
   row_code *codes;
-  long next; /* the next row to compute, as in pw_grid_ordered */
+  long next;    /* the next row to compute, as in pw_grid_ordered */
+  long missing; /* rows to compute at the beginning */
   pw_journal *journal;
   pw_progress progress;
   pw_error *error;
@@ -55,13 +56,14 @@ typedef struct {
   row_system *system; /* NULL: no run */
   pw_run *run;
   pw_limit limit;
-  int status; /* while it is not PW_OK, the run has ended */
+  int status; /* other than PW_OK: the run has ended */
   pw_error error;
 } row_run;
 
 /* ---- Specialised code ---- */
 
-/* The code of a text, compiled by the first thread that needs it; the caller holds the lock. */
+/* The code of a text, of which it takes ownership, compiled by the first thread that needs it.  The caller holds the lock,
+ * which is released meanwhile. */
 static const pw_specialised *rows_code (sweep_rows *x, char *text, const pw_system *s, pw_error *error) {
   row_code *c = x->codes;
   while (c && strcmp (c->text, text) != 0) c = c->next;
@@ -85,7 +87,8 @@ static const pw_specialised *rows_code (sweep_rows *x, char *text, const pw_syst
   return pw_scene_code_table (c->code);
 }
 
-/* The code of a new system: that of the first row, or of its own text, so that it does not depend on the order of runs. */
+/* Chooses the code of a new system, independently of the order of runs: that of the plan's engine if it fits, else code that is
+ * generated for this system. */
 static void rows_specialise (sweep_rows *x, row_system *s) {
   const pw_specialised *first = pw_cli_engine_code (&x->plan->engine);
   pw_error own = { 0 };
@@ -187,7 +190,8 @@ static int run_ended (const row_run *x, const pw_plan *p) {
   return x->status != PW_OK || !(pw_run_time (x->run) < p->t_end);
 }
 
-/* Appends the cells of a row: nan where there is no sample at the end, or no run. */
+/* Appends the cells of a row: NaN where there is no sample at the end, or no run.  The last ones: kinetic energy, residuals of
+ * positions and velocities, steps, evaluations, processor time (0 without a run). */
 static void run_cells (const row_run *x, const pw_plan *p, const pw_sample *last, pw_text *t) {
   static const char *const word[] = { "ok", "machine", "input", "start", "method" };
   double cell[] = { NAN, NAN, NAN, NAN, NAN, 0 };
@@ -210,7 +214,8 @@ static void run_cells (const row_run *x, const pw_plan *p, const pw_sample *last
 }
 
 /* Appends the cells of the row, without the end of the line.  Returns the status of the run, which has a row even if it
- * failed; PW_RETRY if pw_stop became non-zero; PW_RESOURCE with the error if the run was impossible. */
+ * failed; without cells: PW_RETRY if a request to stop ended the run, PW_RESOURCE with the error if memory or a file was
+ * missing. */
 static int run_close (row_run *x, const pw_plan *p, pw_text *text) {
   pw_sample sample, *last = NULL;
   pw_error own = { 0 };
@@ -220,7 +225,9 @@ static int run_close (row_run *x, const pw_plan *p, pw_text *text) {
   if (x->status > 0 && pw_stop == 0) x->status = pw_fail (&x->error, PW_METHOD, "the method gave up");
   if (x->status != PW_RETRY && x->status != PW_RESOURCE) run_cells (x, p, last, text);
   pw_run_close (x->run);
-  return text->failed ? pw_fail (&x->error, PW_RESOURCE, "out of memory") : x->status;
+  if (!text->failed) return x->status;
+  x->error = (pw_error){ 0 };
+  return pw_fail (&x->error, PW_RESOURCE, "out of memory");
 }
 
 /* ---- Rows; the caller holds the lock ---- */
@@ -271,8 +278,7 @@ static int worker_begin (sweep_rows *x, row_run *r) {
   char text[PW_CHANGE_TEXT];
   long row = rows_take (x);
   if (row < 0) return 0;
-  r->row = row;
-  r->system = system_of (x, row);
+  *r = (row_run){ .row = row, .system = system_of (x, row) };
   if (r->system == NULL) {
     rows_keep (x, r, pw_fail (&r->error, PW_RESOURCE, "out of memory"), NULL);
     return 0;
@@ -281,7 +287,7 @@ static int worker_begin (sweep_rows *x, row_run *r) {
   run_open (r, x->plan);
   double change = r->run ? pw_cli_change (r->run, r->system->m.system, text) : 0;
   pthread_mutex_lock (&x->lock);
-  rows_change (x, change, text);
+  if (r->run) rows_change (x, change, text);
   return 1;
 }
 
@@ -297,7 +303,7 @@ static void worker_end (worker *w, row_run *r) {
   r->system = NULL;
 }
 
-/* Advances the runs, those with the first system's code in lanes, until one of them ends. */
+/* Advances the runs until one of them ends: in lanes if all use the code of the plan's engine, else one after the other. */
 static void worker_advance (worker *w) {
   const pw_plan *p = w->x->plan;
   row_run *of[ROWS_LANES];
@@ -324,9 +330,9 @@ static int worker_thread (void *context, int i, pw_error *error) {
   (void)i, (void)error;
   if (w.code && (w.memory = pw_specialised_lanes_memory (w.code)) != NULL)
     w.width = pw_specialised_lanes_count (w.code);
-  if (w.width > ROWS_LANES) w.width = 1;
-  while (w.width > 1 && x->journal->rows < (long)w.width * x->jobs) w.width--; /* work for all threads */
+  if (w.width > ROWS_LANES) w.width = 1; /* no code is wider today */
   pthread_mutex_lock (&x->lock);
+  while (w.width > 1 && x->missing < (long)w.width * x->jobs) w.width--; /* work for all threads */
   for (int runs = 1; runs > 0;) {
     for (int k = runs = 0; k < w.width; k++) runs += w.run[k].system != NULL || worker_begin (x, &w.run[k]);
     pthread_mutex_unlock (&x->lock);
@@ -354,7 +360,10 @@ static void rows_close (sweep_rows *x) {
 }
 
 int pw_sweep_rows (const pw_plan *p, pw_journal *j, int jobs, pw_error *error) {
-  sweep_rows x = { .plan = p, .journal = j, .jobs = jobs < j->rows ? jobs : (int)j->rows, .error = error };
+  const long missing = j->rows - j->done;
+  sweep_rows x = {
+    .plan = p, .journal = j, .missing = missing, .jobs = jobs < missing ? jobs : (int)missing, .error = error
+  };
   pthread_mutex_init (&x.lock, NULL);
   pthread_cond_init (&x.compiled, NULL);
   pw_stop_catch ();
