@@ -1,4 +1,4 @@
-/* A point of body 1, a point of body 2 and the vector d between them, which pin, weld, rod and spring share.
+/* Kinematics of a point of body 1 and a point of body 2, shared by pin, weld, rod and spring.
  *
  *   d     = r1 + R(phi1) s1 - r2 - R(phi2) s2                     from point 2 to point 1
  *   D     = dd/dq = [ 1 0 -Y1 | -1 0  Y2 ]       with (X, Y) = R(phi) s, the arm in world axes
@@ -10,7 +10,6 @@
 #define PW_POINTS_H
 
 #include <math.h>
-#include <string.h>
 #include "batch.h"
 
 typedef struct {
@@ -20,7 +19,7 @@ typedef struct {
 /* Two points in the current state. */
 typedef struct {
   const pw_configuration *A, *B;
-  const double *w;
+  const double *w;      /* the vector w of jw_q, else NULL */
   double S1[2], S2[2];  /* arms in world axes */
   double d[2], rate[2]; /* d, d' */
 } points_state;
@@ -60,9 +59,9 @@ PER_ELEMENT (points_J, points, 12) {
 }
 
 PER_ELEMENT (points_gamma, points, 2) {
-  double w1 = x.A->omega * x.A->omega, w2 = x.B->omega * x.B->omega;
-  out[0] = x.S1[0] * w1 - x.S2[0] * w2;
-  out[1] = x.S1[1] * w1 - x.S2[1] * w2;
+  double square1 = x.A->omega * x.A->omega, square2 = x.B->omega * x.B->omega;
+  out[0] = x.S1[0] * square1 - x.S2[0] * square2;
+  out[1] = x.S1[1] * square1 - x.S2[1] * square2;
 }
 
 /* Sets the two angle columns of a 2 x 6 block, the others to zero. */
@@ -77,13 +76,13 @@ PER_ELEMENT (points_jw_q, points, 12) {
 }
 
 PER_ELEMENT (points_gamma_q, points, 12) {
-  double w1 = x.A->omega * x.A->omega, w2 = x.B->omega * x.B->omega;
-  points_angles (out, -x.S1[1] * w1, x.S1[0] * w1, x.S2[1] * w2, -x.S2[0] * w2);
+  double square1 = x.A->omega * x.A->omega, square2 = x.B->omega * x.B->omega;
+  points_angles (out, -x.S1[1] * square1, x.S1[0] * square1, x.S2[1] * square2, -x.S2[0] * square2);
 }
 
 PER_ELEMENT (points_gamma_v, points, 12) {
-  double w1 = 2 * x.A->omega, w2 = 2 * x.B->omega;
-  points_angles (out, x.S1[0] * w1, x.S1[1] * w1, -x.S2[0] * w2, -x.S2[1] * w2);
+  double twice1 = 2 * x.A->omega, twice2 = 2 * x.B->omega;
+  points_angles (out, x.S1[0] * twice1, x.S1[1] * twice1, -x.S2[0] * twice2, -x.S2[1] * twice2);
 }
 
 #endif

@@ -47,7 +47,8 @@ void pw_probe_update (pw_probe *x, pw_probe_move move, double h) {
     x->q_now[j] = x->q[j] + step * (x->v[j] + step * x->a[j] / 2) + (move == PW_PROBE_Q ? h * x->dq[j] : 0);
     x->v_now[j] = x->v[j] + step * x->a[j] + (move == PW_PROBE_V ? h * x->dv[j] : 0);
   }
-  pw_update_kinematics (x->work, move >= PW_PROBE_TIME ? x->t + h * x->tau : x->t, x->q_now, x->v_now);
+  pw_update_kinematics (x->work, move == PW_PROBE_TIME || move == PW_PROBE_MOTION ? x->t + h * x->tau : x->t, x->q_now,
+                        x->v_now);
 }
 
 /* ---- Functions ---- */
@@ -56,7 +57,7 @@ void pw_probe_evaluate (pw_probe *x, pw_batch_function *f, const char *name, int
   for (int i = 0; i < n + PW_PROBE_GUARD; i++) out[i] = f ? NAN : 0;
   if (f == NULL) return;
   f (&x->k->b, out);
-  if (!x->counts) return;
+  if (!x->check_sizes) return;
   char where[120];
   int untouched = 0, beyond = 0;
   for (int i = 0; i < n; i++) untouched += !isfinite (out[i]);

@@ -11,7 +11,7 @@ enum {
   PW_PROBE_GUARD = 8                                         /* guard numbers after an array, which must not change */
 };
 
-/* Moves in the directions dq, dv; in time; along the motion q + v tau + a tau^2 / 2. */
+/* Moves by h: along dq; along dv; in time, by h tau; in time and along the motion q + v s + a s^2 / 2, s = h tau. */
 typedef enum { PW_PROBE_Q, PW_PROBE_V, PW_PROBE_TIME, PW_PROBE_MOTION } pw_probe_move;
 
 typedef struct {
@@ -23,11 +23,11 @@ typedef struct {
   double t, tau;               /* the time, and the unit of its changes */
   double *q, *v, *a, *dq, *dv; /* coords: the state and its motion; directions */
   double *q_now, *v_now;       /* coords: the current state */
-  double *w, *lambda;          /* elements x cols, elements x rows: those of the batch */
+  double *w, *lambda;          /* elements x cols, elements x rows: the vector w of jw_q, the multipliers */
   double *J, *eta;             /* at the current state */
-  int counts;                  /* 1: that functions fill exactly their arrays is a check of its own */
+  int check_sizes;             /* 1: also checks that each function fills exactly its array */
   pw_selftest_report *report;
-  char *memory; /* frees all arrays */
+  char *memory; /* of all arrays; the caller frees it in every case */
 } pw_probe;
 
 /* Computes numbers at the current state; `out` has room for PW_PROBE_GUARD more. */
@@ -52,7 +52,7 @@ void pw_probe_multiply (const pw_probe *x, const double *block, int rows, const 
 void pw_probe_multiply_J (pw_probe *x, const double *vector, double *out); /* out = J vector */
 
 int pw_probe_ground (const pw_probe *x, int e, int c); /* 1: local column c of element e belongs to the ground */
-/* Its entry in a vector over all coordinates; 0 for the ground. */
+/* The entry of local column c of element e in a vector over all coordinates; 0 for the ground. */
 double pw_probe_local (const pw_probe *x, const double *vector, int e, int c);
 
 /* Records the result of a check, keeping the worst. */

@@ -337,7 +337,7 @@ int pw_selftest (const pw_kind *kind, unsigned seed, pw_selftest_report *report,
     pw_probe_record (report, "table", "", !(s->mass[j] >= 0 && isfinite (s->mass[j])), 0, "exact",
                      "inertia of an internal coordinate");
   pw_workspace *w = pw_workspace_new (s, error);
-  pw_probe x = { .s = s, .work = w, .k = w ? w->batch : NULL, .counts = 1, .report = report };
+  pw_probe x = { .s = s, .work = w, .k = w ? w->batch : NULL, .check_sizes = 1, .report = report };
   int status = w ? pw_probe_open (&x, error) : PW_RESOURCE;
   if (status == PW_OK) {
     selftest_randomise (&x, &random);

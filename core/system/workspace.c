@@ -15,14 +15,14 @@ static void workspace_batch (pw_layout *l, const pw_element_batch *from, const p
                              pw_element_batch *k) {
   const pw_kind *kind = from->kind;
   size_t n = (size_t)from->b.count, cols = (size_t)from->b.cols;
-  size_t block = kind->saturation ? 2 * cols : cols > 3 ? cols : 3;
+  size_t block = kind->saturation ? 2 * cols : cols > 3 ? cols : 3; /* saturation; force; contact */
   int scratch = kind->force || kind->energy || kind->power || kind->loss || kind->contact;
   double *space = pw_layout_alloc (l, scratch ? n * block : 0, sizeof *space);
   if (l->base == NULL) return;
   *k = *from;
   k->J = J, k->block = space, k->b.u = k->u = u;
   k->b.configuration = w->configuration;
-  k->b.q = w->s->q0 + k->internal, k->b.v = w->s->v0 + k->internal;
+  k->b.q = w->s->q0 + k->internal, k->b.v = w->s->v0 + k->internal; /* until kinematics are updated */
   k->source = w->source + (from->source - w->s->source);
 }
 
@@ -45,13 +45,14 @@ static void workspace_layout (pw_layout *l, pw_workspace *w) {
     J += (size_t)k->b.count * (size_t)(k->kind->rows * k->b.cols);
   }
   double *x = pw_layout_alloc (l, 2 * (size_t)s->reads, sizeof *x);
-  for (int i = 0; l->base && i < s->sources; x += 2 * s->source[i++].reads) {
+  for (int i = 0; l->base && i < s->sources; i++) {
     w->source[i] = s->source[i];
     w->source[i].x = x;
+    x += 2 * s->source[i].reads; /* values, gradient */
   }
 }
 
-/* Opens a context of this workspace for each function signal with `open`. */
+/* Sets where signals are evaluated to; opens a context of this workspace for each function signal with `open`. */
 static int workspace_open_signals (pw_workspace *w) {
   int status = PW_OK;
   for (pw_element_batch *k = w->batch; k < w->batch + w->s->batches; k++)
@@ -60,7 +61,9 @@ static int workspace_open_signals (pw_workspace *w) {
       k->source[i].u = k->u + 3 * i;
       if (k->source[i].signal.type != PW_FUNCTION || f->open == NULL) continue;
       f->context = status == PW_OK ? f->open (f->context) : NULL;
-      if (f->context == NULL) status = PW_RESOURCE, f->close = NULL; /* closes neither this nor the following ones */
+      if (f->context == NULL)
+        status = PW_RESOURCE,
+        f->close = NULL; /* this one, and the following ones, which are not opened, will not be closed */
     }
   return status;
 }

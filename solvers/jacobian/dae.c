@@ -8,7 +8,7 @@ int pw_dae_open (pw_dae *x, pw_run *r) {
   size_t n = (size_t)s->coords + 3, rows = (size_t)s->rows;
   const pw_stabilisation_kind kind = r->method->stabilisations[r->stabilisation].kind;
   *x = (pw_dae){ .impulses = kind == PW_SI1, .n = s->coords };
-  x->positions = kind == PW_GGL || kind == PW_SI1 || kind == PW_STABILISED_OTHERWISE;
+  x->positions = kind == PW_GGL || kind == PW_SI1 || kind == PW_STABILISED_OTHERWISE; /* index3, rattle */
   x->velocities = kind == PW_GGL || kind == PW_SI1 || kind == PW_INDEX2;
   const pw_array array[] = { { &x->pull, n }, { &x->f, n }, { &x->jv, rows }, { &x->other, rows } };
   x->memory = pw_alloc_arrays (array, sizeof array / sizeof *array);

@@ -65,8 +65,8 @@ static void order_graph (order_search *x, int rank) {
   }
 }
 
-/* Passes through the rows of L: row i has entries in the columns on the paths of the elimination tree from those of K
- * to i (Davis 2005, Algorithm 849: LDL).  The first pass counts them in first[column + 2], the second one lists them.
+/* Passes through the rows of L: row i has entries in the columns on the elimination tree's paths to i from the columns in which
+ * the same row of the matrix has entries (Davis 2005, Algorithm 849: LDL).  The first pass counts them in first[column + 2], the second one lists them.
  * PW_RETRY if there are more than `most`. */
 static int order_pass (const order_search *x, int most, const order_variant *v) {
   long count = 0;
@@ -107,7 +107,7 @@ static const order_variant *order_choose (order_search *x) {
   order_graph (x, 0);
   if (x->nodes > 0 && amd_order (x->nodes, x->first, x->list, x->by_degree.order, NULL, NULL) < 0) return NULL;
   for (int n = 0; n < x->nodes; n++) x->natural.order[n] = n;
-  order_graph (x, PW_BLOCK_RANKS);
+  order_graph (x, PW_BLOCK_RANKS - 1);
   if (order_fill (x, INT_MAX / 2, &x->by_degree) != PW_OK) return NULL;
   int status = order_fill (x, x->by_degree.first[x->nodes], &x->natural);
   return status == PW_OK ? &x->natural : status == PW_RETRY ? &x->by_degree : NULL;
@@ -146,7 +146,8 @@ static size_t order_count_targets (int nodes, const order_variant *v) {
   return count;
 }
 
-/* Column by column: rows q of a column are visited once, each finding its targets by walking down column q. */
+/* For each column: for its q-th row below, walks once down the column of that row, where the targets of the rows p > q are found
+ * in ascending order. */
 static void order_place_targets (pw_block_ldl *l) {
   int *target = l->target;
   for (const pw_column *c = l->column; c < l->column + l->nodes; c++) {
@@ -157,7 +158,7 @@ static void order_place_targets (pw_block_ldl *l) {
       int at = d->at + pw_block_diagonal (d->size), i = d->first;
       for (int p = q + 1; p < n; p++, i++) {
         for (; l->below[i] != below[p]; i++) at += d->size * l->column[l->below[i]].size;
-        /* rows p descending: before row p there are those of n - 1 .. p + 1 */
+        /* rows p descending, each with p entries: those of rows n - 1 .. p + 1 come first */
         target[(n - 1 - p) * (n + p) / 2 + q] = at;
         at += d->size * l->column[below[p]].size;
       }

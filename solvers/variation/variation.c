@@ -68,7 +68,7 @@ static int variation_arrays (pw_variation *x) {
     pw_direction_copy *d = &x->direction[i];
     pw_array own[10 + 2 * (3 + PW_VARIATION_RATES)], *a = own;
     *a++ = (pw_array){ &d->local, size };
-    *a++ = (pw_array){ &d->size, n + 3 * m };
+    *a++ = (pw_array){ &d->terms, n + 3 * m };
     for (int c = 0; c < 2; c++) {
       pw_variation_column *k = &d->column[c];
       *k = (pw_variation_column){ .direction = d };

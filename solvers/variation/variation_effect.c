@@ -24,15 +24,15 @@ double pw_direction_offset (const pw_direction *d, int i) {
 
 /* ---- Effects of parameters ---- */
 
-/* One of the differences: of f - M a - J^T lambda (n), of gamma - J a, g, J v - eta (m each); the sizes of what is summed. */
+/* A difference of f - M a - J^T lambda (n) and of gamma - J a, g, J v - eta (m each) in progress: a neighbour adds `weight` times
+ * these to `sum` and, unless it is NULL, the magnitudes of their terms to `terms`. */
 typedef struct {
-  double *sum, weight;
-  double *size; /* or NULL */
+  double *sum, weight, *terms;
 } effect_difference;
 
 static void effect_term (const effect_difference *to, int i, double value, double size) {
   to->sum[i] += to->weight * value;
-  if (to->size) to->size[i] += size;
+  if (to->terms) to->terms[i] += size;
 }
 
 /* The rows of a batch of a neighbour. */
@@ -89,7 +89,6 @@ static void effect_add_to (pw_variation *x, const pw_direction_copy *d, const ef
   }
 }
 
-/* Between the breakpoints of the neighbours, of which one may be passed slightly before that of the run; likewise at jumps. */
 pw_variation_place pw_variation_place_of (const pw_variation *x, const pw_direction_copy *d) {
   for (const pw_variation_hold *h = x->hold; h < x->hold + 2; h++)
     if (h->from <= x->at && x->at <= h->to) return (pw_variation_place){ h->t, h->state, h->state + x->n, 1 };
@@ -113,15 +112,16 @@ static int effect_neighbour (pw_variation *x, pw_direction_copy *d, int i) {
   pw_workspace *w = d->given.neighbour[i]->w;
   if (effect_kinematics (x, d, w) != PW_OK) return PW_METHOD;
   for (int which = 0; which < 2; which++) {
-    double *size = which == 0 && i == 1 ? d->size : NULL; /* it has the largest weight */
-    const effect_difference to = { d->effect[which], effect_weight (&d->given, which, i), size };
+    double *terms = which == 0 && i == 1 ? d->terms : NULL; /* this neighbour has the largest weight */
+    const effect_difference to = { d->effect[which], effect_weight (&d->given, which, i), terms };
     if (to.weight != 0) effect_add_to (x, d, &to, w);
   }
   return PW_OK;
 }
 
-/* Acceleration, in units of the scene, that an effect causes by itself. */
-static double effect_part (const pw_variation *x, int i) {
+/* The factor that makes entry i of an effect dimensionless: of forces, in units of the accelerations that they cause; of
+ * residuals, in units of the scene. */
+static double effect_unit (const pw_variation *x, int i) {
   double T = x->r->w->scale.time;
   if (i < x->n) return x->r->s->mass[i] > 0 ? T * T / x->r->s->mass[i] / pw_unit (x->r->s, i) : 0;
   return (i < x->n + x->m ? T * T : i < x->n + 2 * x->m ? 1 : T) / x->r->s->scale.length;
@@ -137,21 +137,21 @@ static void effect_extrapolate (const pw_variation *x, pw_direction_copy *d) {
   double *one = d->effect[0], *two = d->effect[1], all = 0;
   double round = 4 * DBL_EPSILON * fabs (effect_weight (&d->given, 0, 1));
   for (int i = 0; i < x->n + 3 * x->m; i++) {
-    double error = (one[i] - two[i]) / 3, part = effect_part (x, i);
+    double error = (one[i] - two[i]) / 3, part = effect_unit (x, i);
     one[i] += error;
-    two[i] = error + copysign (round * d->size[i], error);
+    two[i] = error + copysign (round * d->terms[i], error);
     all += fabs (one[i]) * part;
     d->effects.error += fabs (two[i]) * part;
-    d->effects.round += round * d->size[i] * part;
+    d->effects.round += round * d->terms[i] * part;
   }
   d->effects.all += fmax (all, effect_least (d));
 }
 
-/* Relative errors of differences that are sufficiently small, and a tenth of them, which is aimed at with another step: of round-off,
- * and of the remainder of each difference, whose square is about that of the extrapolated one. */
+/* Relative errors of differences up to which a step is kept, and the part of them aimed at with a better one: errors by round-off,
+ * and by the remainder of each difference, whose square is about that of the extrapolated one. */
 static const double EFFECT_ROUND = 1e-7, EFFECT_REST = 1e-4, EFFECT_AIM = 0.1;
 
-/* A step below which an effect of exactly 0 may be one that numbers of the order of 1 do not show. */
+/* With a smaller step an effect may be 0 only because the step is lost in the rounding of numbers of the order of 1. */
 static const double EFFECT_LOST = 1e-10;
 
 /* The factor of the step with which differences are accurate. */
@@ -176,7 +176,7 @@ static int effect_direction (pw_variation *x, pw_direction_copy *d) {
   if (d->given.initial) return PW_OK;
   memset (d->effect[0], 0, bytes);
   memset (d->effect[1], 0, bytes);
-  memset (d->size, 0, bytes);
+  memset (d->terms, 0, bytes);
   for (int i = 0; i < PW_VARIATION_NEAR && status == PW_OK; i++) status = effect_neighbour (x, d, i);
   effect_extrapolate (x, d);
   return status;
@@ -185,6 +185,7 @@ static int effect_direction (pw_variation *x, pw_direction_copy *d) {
 int pw_variation_evaluate (pw_variation *x, double t, pw_error *error) {
   pw_statistics before = x->r->statistics;
   int near = x->r->near_singular, status = pw_linear_evaluate (&x->linear, t, x->q, x->v);
+  pw_evaluate_energies (x->r->w, x->energy);
   x->at = t;
   for (int i = 0; i < x->count && status == PW_OK; i++) status = effect_direction (x, &x->direction[i]);
   x->r->statistics = before;
@@ -212,7 +213,7 @@ double pw_variation_norm (const pw_variation *x, const double *Y) {
   return most;
 }
 
-/* d a and d lambda of a column with the derivatives Y of the state. */
+/* d a, and d lambda into c->lambda, of a column at its `trial`. */
 static void effect_accelerations (pw_variation *x, const pw_variation_column *c, double *da) {
   pw_linearisation *l = &x->linear;
   const double *effect = c->direction->effect[pw_variation_index (c)];

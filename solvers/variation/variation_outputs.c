@@ -22,7 +22,7 @@ static double output_kinetic (const pw_variation *x, const pw_variation_column *
   return sum;
 }
 
-/* The sum over the elements of their potential energies minus those in x->energy, which are close: the energies of elements on
+/* The sum over the elements of their potential energies minus those at the state evaluated, which are close: the energies of elements on
  * which a derivative does not depend must not contribute round-off. */
 static double output_potential (pw_variation *x, pw_workspace *w) {
   double sum = 0;
@@ -31,7 +31,7 @@ static double output_potential (pw_variation *x, pw_workspace *w) {
   return sum;
 }
 
-/* Round-off of a difference of the energies between those in x->energy and the ones last evaluated. */
+/* Round-off of a difference of the energies that have changed between the state evaluated and the one last used. */
 static double output_round (const pw_variation *x) {
   double sum = 0;
   for (int i = 0; i < x->energies; i++)
@@ -59,7 +59,7 @@ double pw_variation_step_along (const pw_variation_column *c) {
   return 1e-5 / (c->largest > 0 ? c->largest : 1);
 }
 
-/* By the state: central differences. */
+/* Adds the part that is due to the derivative Y of the state, by central differences along it. */
 static int output_by_state (pw_variation *x, const pw_variation_column *c, pw_variation_place at, const double *Y,
                             double *out) {
   int n = x->n, m = x->m, status = PW_OK;
@@ -71,7 +71,7 @@ static int output_by_state (pw_variation *x, const pw_variation_column *c, pw_va
     status = output_values (x, x->r, at.held ? at.t : x->at, q, v, lambda);
     pw_variation_add (out, x->values, side / (2 * step), 2 + x->entries + m);
   }
-  if (pw_variation_index (c) == 1)
+  if (pw_variation_index (c) == 1) /* round-off of the differences of the derivative itself */
     out[1] += copysign (output_round (x) / pw_variation_step_along (c->direction->column), out[1]);
   return status;
 }
@@ -81,7 +81,6 @@ int pw_variation_outputs (pw_variation *x, const pw_variation_column *c, const d
   pw_variation_place at = pw_variation_place_of (x, d);
   int length = 2 + x->entries + x->m, status = PW_OK;
   memset (out, 0, (size_t)length * sizeof *out);
-  pw_evaluate_energies (x->r->w, x->energy);
   for (int i = 0; i < PW_VARIATION_NEAR && status == PW_OK && d->given.initial == NULL; i++) {
     double weight = pw_direction_weight (&d->given, pw_variation_index (c), i);
     if (weight == 0) continue;

@@ -36,13 +36,14 @@ typedef struct pw_direction_copy {
   pw_variation_column column[2];
   double breakpoint[PW_VARIATION_NEAR]; /* of the neighbours: the next one */
   double first, last;                   /* times between which no neighbour has a breakpoint */
-  /* of each column: */
-  double *effect[2]; /* n + 3 m: derivatives of f - M a - J^T lambda, gamma - J a, g, J v - eta by the parameter */
-  double *size;      /* n + 3 m: sizes of the terms of which these are differences */
+  double *effect
+      [2]; /* of each column, n + 3 m: derivatives of f - M a - J^T lambda, gamma - J a, g, J v - eta by the parameter */
+  double *terms;                     /* n + 3 m: magnitudes of the terms of these differences */
   pw_difference_sums start, effects; /* of the initial state; of the effects at all evaluations */
   double *local;                     /* size: error of the derivative in the last step */
   int signals;                       /* 1: some signals differ in the neighbours */
-  unsigned char *changes; /* of batches: 1 if it differs in the neighbours; then 1 for masses and constant forces */
+  unsigned char
+      *changes; /* batches + 1: 1 if the batch differs in the neighbours; the last one: masses or constant forces */
   char *memory;
 } pw_direction_copy;
 
@@ -132,6 +133,8 @@ double pw_variation_norm (const pw_variation *x, const double *Y);
 void pw_variation_accelerate (pw_variation *x, int c, int k);
 /* Projects a column's `trial` onto the linearised constraints at the state evaluated. */
 void pw_variation_project (pw_variation *x, pw_variation_column *c);
+/* Where to evaluate neighbours: at the state evaluated, at a time between their breakpoints, one of which they may pass slightly
+ * before the run; near a jump, at the state held. */
 pw_variation_place pw_variation_place_of (const pw_variation *x, const pw_direction_copy *d);
 
 /* ---- variation_outputs.c ---- */

@@ -363,10 +363,10 @@ static int sensitivity_independent (const pw_sensitivity *x, pw_error *error) {
 static int sensitivity_runs (pw_sensitivity *x, pw_error *error) {
   int count = 0;
   while (x->of[count]) count++;
-  int status = pw_unknown_open (&x->base, &x->unknowns, x->at, error);
+  int status = pw_unknown_run_open (&x->base, &x->unknowns, x->at, error);
   if (status == PW_OK) status = pw_outcomes_open (&x->outcomes, x->base.m.system, "--of", x->of, count, error);
   if (status == PW_OK) status = sensitivity_ledger (x, error);
-  if (status == PW_OK) status = pw_unknown_directions (x->direction, &x->unknowns, x->at, &x->base, x->near, error);
+  if (status == PW_OK) status = pw_unknowns_directions (x->direction, &x->unknowns, x->at, &x->base, x->near, error);
   for (int p = 0; p < x->unknowns.count; p++) x->direction[p].no_error = x->no_error;
   return status == PW_OK && !x->no_error ? sensitivity_independent (x, error) : status;
 }
@@ -391,8 +391,8 @@ void pw_sensitivity_close (pw_sensitivity *x) {
   pw_variation_close (x->variation);
   pw_run_close (x->sampled);
   if (x->outcomes.system) pw_outcomes_close (&x->outcomes);
-  for (int i = 0; x->near && i < 4 * x->unknowns.count; i++) pw_unknown_close (&x->near[i]);
-  pw_unknown_close (&x->base);
+  for (int i = 0; x->near && i < 4 * x->unknowns.count; i++) pw_unknown_run_close (&x->near[i]);
+  pw_unknown_run_close (&x->base);
   free (x->near);
   free (x->direction);
   free (x->at);

@@ -131,14 +131,14 @@ int pw_unknowns_system (pw_cli_model *m, const pw_unknowns *u, const double *x, 
   return m->system ? PW_OK : error->status;
 }
 
-int pw_unknown_open (pw_unknown_run *to, const pw_unknowns *u, const double *x, pw_error *error) {
+int pw_unknown_run_open (pw_unknown_run *to, const pw_unknowns *u, const double *x, pw_error *error) {
   *to = (pw_unknown_run){ .settings = u->settings };
   if (pw_unknowns_system (&to->m, u, x, error) != PW_OK) return error->status;
   to->run = pw_run_open (to->m.system, u->method, &to->settings, error);
   return to->run ? PW_OK : error->status;
 }
 
-int pw_unknown_prepare (pw_unknown_run *to, const pw_unknowns *u, const double *x, pw_error *error) {
+int pw_unknown_run_prepare (pw_unknown_run *to, const pw_unknowns *u, const double *x, pw_error *error) {
   const pw_specialised *code = pw_cli_engine_code (&u->engine);
   *to = (pw_unknown_run){ .settings = u->settings, .limit = { .most = u->limit } };
   if (pw_unknowns_system (&to->m, u, x, error) != PW_OK) return error->status;
@@ -149,7 +149,7 @@ int pw_unknown_prepare (pw_unknown_run *to, const pw_unknowns *u, const double *
   return PW_OK;
 }
 
-void pw_unknown_close (pw_unknown_run *x) {
+void pw_unknown_run_close (pw_unknown_run *x) {
   pw_run_close (x->run);
   pw_workspace_free (x->workspace);
   pw_cli_close_model (&x->m);
@@ -159,17 +159,18 @@ void pw_unknown_close (pw_unknown_run *x) {
 void pw_unknowns_report (const pw_unknowns *u, const double *x) {
   char text[PW_CHANGE_TEXT];
   pw_unknown_run r;
-  if (pw_unknown_prepare (&r, u, x, &(pw_error){ 0 }) == PW_OK)
+  if (pw_unknown_run_prepare (&r, u, x, &(pw_error){ 0 }) == PW_OK)
     r.run = pw_run_open (r.m.system, u->method, &r.settings, NULL);
   if (r.run && pw_cli_change (r.run, r.m.system, text) > 0)
     pw_cli_say ("pinwheel: the constraints changed given initial values of this result, at worst %s\n", text);
-  pw_unknown_close (&r);
+  pw_unknown_run_close (&r);
 }
 
 /* ---- Directions ---- */
 
-/* 1e-5 of the number's size: the error of extrapolated differences is then about 1e-10, mostly round-off.  Angles count
- * as at least 0.1 rad, an initial value as at least that of the scene, an unknown of a search as a thousandth of its scale. */
+/* 1e-5 of the number's size: the error of extrapolated differences is then about 1e-10, mostly round-off.  It is at
+ * least 0.1 for angles, the scene's unit for initial values, 1e-3 of its scale for an unknown of a search; that of a parameter
+ * that is 0 is its default, else 1. */
 static double unknown_step (const pw_unknown *u, double value, const pw_run *r) {
   if (u->step > 0) return u->step;
   double size = fabs (value), length = pw_run_scale (r)->length, time = pw_run_scale (r)->time;
@@ -179,8 +180,8 @@ static double unknown_step (const pw_unknown *u, double value, const pw_run *r) 
   return 1e-5 * fmax (size > 0 ? size : 1, 1e-3 * u->scale);
 }
 
-/* At the end of its domain a parameter varies to one side; it remains positive. */
-static void unknown_domain (const pw_unknown *u, double value, pw_direction *d) {
+/* Keeps the neighbours within the domain: a positive parameter gets a smaller step, at a closed end they are on one side. */
+static void unknown_stay_inside (const pw_unknown *u, double value, pw_direction *d) {
   pw_domain domain = u->parameter ? u->parameter->domain : PW_REAL;
   if (domain == PW_POSITIVE) d->step = fmin (d->step, value / 4);
   d->one_sided = (domain == PW_NONNEGATIVE || domain == PW_FRACTION) && value - 2 * d->step < 0;
@@ -189,7 +190,7 @@ static void unknown_domain (const pw_unknown *u, double value, pw_direction *d) 
   d->step = -d->step;
 }
 
-static int unknown_same (const pw_system *a, const pw_system *b) {
+static int unknown_same_size (const pw_system *a, const pw_system *b) {
   return pw_system_elements (a) == pw_system_elements (b) && pw_system_coordinates (a) == pw_system_coordinates (b) &&
          pw_system_rows (a) == pw_system_rows (b);
 }
@@ -199,11 +200,11 @@ static int unknown_direction (pw_direction *d, const pw_unknowns *u, int i, doub
   double value = x[i];
   int status = PW_OK;
   *d = (pw_direction){ .step = unknown_step (&u->list[i], value, run->run) };
-  unknown_domain (&u->list[i], value, d);
+  unknown_stay_inside (&u->list[i], value, d);
   for (int k = 0; k < 4 && status == PW_OK; k++) {
     x[i] = value + pw_direction_offset (d, k);
-    status = pw_unknown_open (near + k, u, x, error);
-    if (status == PW_OK && !unknown_same (run->m.system, near[k].m.system))
+    status = pw_unknown_run_open (near + k, u, x, error);
+    if (status == PW_OK && !unknown_same_size (run->m.system, near[k].m.system))
       status = pw_fail (error, PW_INPUT,
                         "%s changes the number of bodies or elements: derivatives with respect to it do not exist",
                         u->list[i].name);
@@ -213,8 +214,8 @@ static int unknown_direction (pw_direction *d, const pw_unknowns *u, int i, doub
   return status;
 }
 
-int pw_unknown_directions (pw_direction *d, const pw_unknowns *u, double *x, pw_unknown_run *run, pw_unknown_run *near,
-                           pw_error *error) {
+int pw_unknowns_directions (pw_direction *d, const pw_unknowns *u, double *x, pw_unknown_run *run, pw_unknown_run *near,
+                            pw_error *error) {
   pw_unknowns plain = *u;
   int status = PW_OK;
   plain.settings.specialised = NULL;

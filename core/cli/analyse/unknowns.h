@@ -53,23 +53,23 @@ int pw_unknowns_system (pw_cli_model *m, const pw_unknowns *u, const double *x, 
 typedef struct {
   pw_cli_model m;
   pw_settings settings;
-  pw_limit limit; /* of pw_unknown_prepare */
+  pw_limit limit; /* of pw_unknown_run_prepare */
   pw_run *run;
   pw_workspace *workspace; /* for contact points; NULL: not needed yet */
 } pw_unknown_run;
 /* Opens a run with u->settings.  Close it in every case. */
-int pw_unknown_open (pw_unknown_run *to, const pw_unknowns *u, const double *x, pw_error *error);
+int pw_unknown_run_open (pw_unknown_run *to, const pw_unknowns *u, const double *x, pw_error *error);
 /* The same with the engine and a limit of its own, whose clock starts; the run itself is opened by the caller. */
-int pw_unknown_prepare (pw_unknown_run *to, const pw_unknowns *u, const double *x, pw_error *error);
-void pw_unknown_close (pw_unknown_run *x);
+int pw_unknown_run_prepare (pw_unknown_run *to, const pw_unknowns *u, const double *x, pw_error *error);
+void pw_unknown_run_close (pw_unknown_run *x);
 
-/* Directions of the run along all unknowns, with their neighbours; x is used for these and restored.  near: room for 4
- * runs of each unknown, without specialised code.  Close all of them also after an error. */
-int pw_unknown_directions (pw_direction *d, const pw_unknowns *u, double *x, pw_unknown_run *run, pw_unknown_run *near,
-                           pw_error *error);
+/* Directions of the run along all unknowns, with their neighbours; x is used for these and restored.  near: 4
+ * runs of each unknown, zero before, which are opened without specialised code.  Close all of them, also after an error. */
+int pw_unknowns_directions (pw_direction *d, const pw_unknowns *u, double *x, pw_unknown_run *run, pw_unknown_run *near,
+                            pw_error *error);
 
 /* Points where searches begin, `count` x unknowns: the values at the beginning, then Sobol's sequence between the
- * user's bounds, otherwise within a scale of the values, displaced by the seed.  Several starts: at most
+ * user's bounds, otherwise within a scale of the values, shifted modulo 1 by random numbers from the seed.  Several starts: at most
  * PW_UNKNOWNS_STARTED unknowns, the limit of the sequence.  NULL if out of memory; free it. */
 enum { PW_UNKNOWNS_STARTED = 40 };
 double *pw_unknowns_starts (const pw_unknowns *u, int count, double seed);

@@ -31,14 +31,14 @@ int pw_fit_run (const pw_fit *x, const double *unknowns, double *out, pw_error *
   pw_unknown_run r;
   double *row = calloc ((size_t)x->columns, sizeof *row);
   if (row == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
-  int status = pw_unknown_prepare (&r, &x->unknowns, unknowns, error);
+  int status = pw_unknown_run_prepare (&r, &x->unknowns, unknowns, error);
   if (status == PW_OK) status = pw_outcomes_open (&o, r.m.system, "--columns", x->name, x->columns, error);
   r.settings.ledger = o.ledger;
   if (status == PW_OK) r.run = pw_run_open (r.m.system, x->unknowns.method, &r.settings, error);
   if (status == PW_OK) status = r.run ? fit_sample (x, &o, r.run, out, row, error) : error->status;
   if (status == PW_STOPPED) status = pw_limit_fail (&r.limit, pw_run_time (r.run), error);
   pw_outcomes_close (&o);
-  pw_unknown_close (&r);
+  pw_unknown_run_close (&r);
   free (row);
   return status;
 }

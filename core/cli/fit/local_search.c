@@ -45,7 +45,7 @@ static int search_run (const search *p, pw_error *error) {
   pw_outcomes o = { .system = NULL };
   pw_unknown_run r;
   char number[32];
-  int status = pw_unknown_prepare (&r, u, p->at, error);
+  int status = pw_unknown_run_prepare (&r, u, p->at, error);
   if (status == PW_OK) status = pw_outcomes_open (&o, r.m.system, "output", p->x->text, p->x->outputs, error);
   r.settings.ledger = o.ledger;
   if (status == PW_OK) status = pw_outcomes_run (&o, u->method, &r.settings, u->t_end, error);
@@ -55,7 +55,7 @@ static int search_run (const search *p, pw_error *error) {
       status = pw_fail (error, PW_METHOD, "%s is %s", p->x->text[i], pw_format (number, p->value[i], 9));
   }
   pw_outcomes_close (&o);
-  pw_unknown_close (&r);
+  pw_unknown_run_close (&r);
   return status;
 }
 

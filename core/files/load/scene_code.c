@@ -25,7 +25,7 @@ typedef struct {
   const pw_system *system;
   const char *text;
   int lanes;      /* 0: for single runs */
-  char how[2000]; /* versions, compiler and options */
+  char how[2000]; /* what determines the object: versions, compiler, options, checksum of the header */
   char key[17];   /* checksum of text and how, in hexadecimal */
   char *folder, *source, *log, *part, *object;
   pw_scene_code *code;
@@ -50,7 +50,7 @@ static void code_add (code_job *x, const char *text) {
   snprintf (x->how + used, sizeof x->how - used, "%s\n", text);
 }
 
-/* The words of the compiler; of programs among them ("ccache gcc") also size and date. */
+/* The words of the compiler; of programs among them ("ccache gcc") also size, date and inode. */
 static int code_add_compiler (code_job *x) {
   char text[200], *copy = strdup (pw_compiler ()), *rest = NULL;
   for (char *w = copy ? strtok_r (copy, " \t", &rest) : NULL; w; w = strtok_r (NULL, " \t", &rest)) {
@@ -62,9 +62,10 @@ static int code_add_compiler (code_job *x) {
     code_add (x, text);
   }
   free (copy);
-  return copy && strlen (x->how) < sizeof x->how - 50 ? PW_OK : PW_RESOURCE;
+  return copy && strlen (x->how) < sizeof x->how - 50 ? PW_OK : PW_RESOURCE; /* room for the checksum */
 }
 
+/* PW_RETRY: the file does not exist. */
 static int code_read (const char *path, char **text, size_t *size, pw_error *error) {
   int status = pw_read_file ("cannot read", path, CODE_MAX_BYTES, "the limit for an object", text, size, error);
   return status == PW_INPUT && *text == NULL && errno == ENOENT ? PW_RETRY : status;
@@ -151,10 +152,9 @@ static int code_load_cached (code_job *x) {
 static int code_complete (const code_job *x, pw_error *error) {
   char *bytes;
   size_t size, text = strlen (x->text), how = strlen (x->how);
-  if (code_read (x->part, &bytes, &size, NULL) != PW_OK) {
-    free (bytes);
-    return pw_fail (error, PW_RESOURCE, "the compiler has written no object");
-  }
+  int status = code_read (x->part, &bytes, &size, error);
+  if (status == PW_RETRY) *error = (pw_error){ 0 }, pw_fail (error, PW_RESOURCE, "the compiler has written no object");
+  if (status != PW_OK) return free (bytes), PW_RESOURCE;
   unsigned long long check =
       pw_check_sum (pw_check_sum (pw_check_sum (PW_CHECK, bytes, size), x->text, text), x->how, how);
   free (bytes);

@@ -5,6 +5,7 @@
  *
  * points.h has the derivatives of the first two equations.  The force -lambda(1, 2) in world axes, at the common point, and
  * the moment -lambda(3) act on body 1; the opposites act on body 2. */
+#include <string.h>
 #include "points.h"
 
 typedef struct {
