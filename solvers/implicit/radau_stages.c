@@ -1,4 +1,4 @@
-/* The stages of a step of radau: equations, matrices, Newton's iteration, error estimates; see radau.c.  A, T and the
+/* The stages of a step of radau: equations, matrices, Newton's iteration, error estimates; see radau.c.  T and the complex
  * eigenvalues of A^-1 were computed with 60 digits from the nodes c. */
 #include <float.h>
 #include <math.h>
@@ -8,12 +8,6 @@
 
 enum { STAGES = PW_RADAU_STAGES };
 
-static const double radau_c[STAGES] = { 0.15505102572168219018, 0.64494897427831780982, 1 };
-static const double radau_A[STAGES][STAGES] = {
-  { 0.19681547722366042587, -0.06553542585019838811, 0.02377097434822015242 },
-  { 0.39442431473908727700, 0.29207341166522846302, -0.04154875212599793020 },
-  { 0.37640306270046727505, 0.51248582618842161384, 0.11111111111111111111 },
-};
 static const double radau_T[STAGES][STAGES] = {
   { 0.09443876248897524149, -0.14125529502095420843, -0.03002919410514742449 },
   { 0.25021312296533331138, 0.20412935229379993200, 0.38294211275726193780 },
@@ -24,9 +18,7 @@ static const double radau_inverse_T[STAGES][STAGES] = {
   { -4.17871859155190472735, -0.32768282076106238708, 0.47662355450055045196 },
   { -0.50287263494578687595, 2.57192694985560542919, -0.59603920482822492497 },
 };
-static const double radau_gamma = 3.63783425274449573221, radau_alpha = 2.68108287362775213390,
-                    radau_beta = 3.05043019924741056943;
-static const double radau_e[STAGES] = { -10.04880939982741556, 1.38214273316074889, -1. / 3 };
+static const double radau_alpha = 2.68108287362775213390, radau_beta = 3.05043019924741056943;
 
 /* ---- Equations ---- */
 

@@ -3,8 +3,7 @@
 #define PW_RADAU_STATE_H
 
 #include "implicit.h"
-
-enum { PW_RADAU_STAGES = 3 };
+#include "radau_coefficients.h"
 
 /* A step from y at t; of the last one, the polynomial through its stages. */
 typedef struct {

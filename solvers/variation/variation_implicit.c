@@ -18,20 +18,12 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
+#include "radau_coefficients.h"
 #include "rank.h"
 #include "util.h"
 #include "variation_parts.h"
 
 enum { STAGES = PW_VARIATION_STAGES, RATE = 1, STATE = RATE + STAGES }; /* F_i in K[RATE + i], Y_i in K[STATE + i] */
-
-static const double implicit_c[STAGES] = { 0.15505102572168219018, 0.64494897427831780982, 1 };
-static const double implicit_a[STAGES][STAGES] = {
-  { 0.19681547722366042587, -0.06553542585019838811, 0.02377097434822015242 },
-  { 0.39442431473908727700, 0.29207341166522846302, -0.04154875212599793020 },
-  { 0.37640306270046727505, 0.51248582618842161384, 0.11111111111111111111 },
-};
-static const double implicit_gamma = 3.63783425274449573221;
-static const double implicit_e[STAGES] = { -10.04880939982741556, 1.38214273316074889, -1. / 3 };
 
 struct pw_variation_implicit {
   int size;          /* minimal coordinates */
@@ -108,7 +100,7 @@ static void implicit_particular (pw_variation *x, pw_variation_column *c) {
 /* Stage i: N_i, A_i, N_i^+; p_i, in place of Y_i; F_i (p_i); the run's accelerations into a[1 + i]. */
 static int implicit_stage (pw_variation *x, int i, double h, double t1, pw_error *error) {
   size_t bytes = 2 * (size_t)x->n * sizeof (double);
-  int status = pw_variation_evaluate_at (x, i + 1 < STAGES ? x->t + implicit_c[i] * h : t1, error);
+  int status = pw_variation_evaluate_at (x, i + 1 < STAGES ? x->t + radau_c[i] * h : t1, error);
   if (status != PW_OK) return status;
   memcpy (x->a[1 + i], x->linear.a, bytes / 2);
   PW_EACH_COLUMN (c, x) {
@@ -144,8 +136,8 @@ static void implicit_factor (pw_variation *x, double h) {
       implicit_coordinates (x, i, A, part);
       if (i == STAGES - 1 && j >= i * size)
         for (int k = 0; k < size; k++)
-          p->filter[(j - i * size) * size + k] = (i * size + k == j) * implicit_gamma / h - part[k];
-      for (int k = 0; k < size; k++) part[k] = (i * size + k == j) - h * implicit_a[i][j / size] * part[k];
+          p->filter[(j - i * size) * size + k] = (i * size + k == j) * radau_gamma / h - part[k];
+      for (int k = 0; k < size; k++) part[k] = (i * size + k == j) - h * radau_A[i][j / size] * part[k];
     }
   }
   LAPACKE_dgetrf_work (LAPACK_COL_MAJOR, rows, rows, p->matrix, rows, p->pivot);
@@ -158,7 +150,7 @@ static void implicit_rhs (pw_variation *x, const pw_variation_column *c, double 
   double *sum = x->values;
   for (int i = 0; i < STAGES; i++, z += x->implicit->size) {
     for (int j = 0; j < length; j++) sum[j] = c->Y[j] - c->K[STATE + i][j];
-    for (int k = 0; k < STAGES; k++) pw_variation_add (sum, c->K[RATE + k], h * implicit_a[i][k], length);
+    for (int k = 0; k < STAGES; k++) pw_variation_add (sum, c->K[RATE + k], h * radau_A[i][k], length);
     implicit_coordinates (x, i, sum, z);
   }
 }
@@ -179,7 +171,7 @@ static void implicit_solve (pw_variation *x, double h) {
 /* Powers at the stages. */
 static int implicit_powers (pw_variation *x, double h, double t1, pw_error *error) {
   for (int i = 0; x->ledger && i < STAGES; i++) {
-    int status = pw_variation_evaluate_at (x, i + 1 < STAGES ? x->t + implicit_c[i] * h : t1, error);
+    int status = pw_variation_evaluate_at (x, i + 1 < STAGES ? x->t + radau_c[i] * h : t1, error);
     if (status != PW_OK) return status;
     PW_EACH_COLUMN (c, x) memcpy (c->trial, c->K[STATE + i], 2 * (size_t)x->n * sizeof *c->trial);
     pw_variation_accelerate (x, 0, RATE + i);
@@ -190,7 +182,7 @@ static int implicit_powers (pw_variation *x, double h, double t1, pw_error *erro
     for (int i = 0; i < STAGES; i++)
       for (int j = 2 * x->n; j < x->size; j++) {
         c->K[STATE + i][j] = c->Y[j];
-        for (int k = 0; k < STAGES; k++) c->K[STATE + i][j] += h * implicit_a[i][k] * c->K[RATE + k][j];
+        for (int k = 0; k < STAGES; k++) c->K[STATE + i][j] += h * radau_A[i][k] * c->K[RATE + k][j];
       }
   }
   return PW_OK;
@@ -214,9 +206,9 @@ static void implicit_errors (pw_variation *x, double h) {
     const pw_variation_column *c = d->column;
     memcpy (d->local, c->K[0], (size_t)x->size * sizeof *d->local);
     for (int i = 0; i < STAGES; i++)
-      for (int j = 0; j < x->size; j++) d->local[j] += implicit_e[i] / h * (c->K[STATE + i][j] - c->Y[j]);
+      for (int j = 0; j < x->size; j++) d->local[j] += radau_e[i] / h * (c->K[STATE + i][j] - c->Y[j]);
     implicit_filter (x, d->local);
-    for (int j = 2 * x->n; j < x->size; j++) d->local[j] *= h / implicit_gamma;
+    for (int j = 2 * x->n; j < x->size; j++) d->local[j] *= h / radau_gamma;
   }
 }
 
@@ -228,13 +220,13 @@ static void implicit_motion (pw_variation *x, double h) {
   memcpy (e + n, x->a[0], (size_t)n * sizeof *e);
   memcpy (defect + n, x->defect, (size_t)n * sizeof *e);
   for (int k = 0; k < STAGES; k++) {
-    for (int i = 0; i < STAGES; i++) pw_variation_add (e + n, x->a[1 + k], implicit_e[i] * implicit_a[i][k], n);
-    pw_variation_add (defect + n, x->a[1 + k], h * implicit_a[2][k], n);
+    for (int i = 0; i < STAGES; i++) pw_variation_add (e + n, x->a[1 + k], radau_e[i] * radau_A[i][k], n);
+    pw_variation_add (defect + n, x->a[1 + k], h * radau_A[2][k], n);
   }
   implicit_filter (x, e);
   implicit_filter (x, defect);
   memcpy (x->motion, e + n, (size_t)n * sizeof *e);
-  for (int j = 0; j < n; j++) x->defect[j] = defect[n + j] * implicit_gamma / h;
+  for (int j = 0; j < n; j++) x->defect[j] = defect[n + j] * radau_gamma / h;
 }
 
 int pw_variation_implicit_stages (pw_variation *x, double h, double t1, pw_error *error) {
