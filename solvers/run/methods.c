@@ -146,12 +146,6 @@ int pw_method_parse (const char *text, const pw_method **method, int *stabilisat
   return pw_parse_options (text, NULL, method, stabilisation, values, error);
 }
 
-double pw_run_option (const pw_run *r, const char *name) {
-  int i = 0;
-  while (r->method->options[i].name && strcmp (r->method->options[i].name, name) != 0) i++;
-  return r->method->options[i].name ? r->option[i] : 0;
-}
-
 #define METHODS_STEP_RATIO 20. /* typical ratio of an adaptive step at rtol 1e-6 to the model's fixed step */
 #define METHODS_ORDER 6.       /* typical order of the error of such a step */
 
