@@ -95,7 +95,8 @@ static int rk_stages_specialised (pw_run *r, double h) {
       r, &(pw_scene_step){ d->tableau->stages, d->row, h, t, r->q, d->V, d->A, d->R, d->q, d->v, d->lambda });
 }
 
-/* Evaluates stages 1, 2, ...; stage 0 is the current state.  Their sum is the new state.  Returns as pw_run_accelerate. */
+/* Evaluates stages 1, 2, ...; stage 0 is the current state.  Then combines them to the new
+ * state.  Returns what pw_run_accelerate returns. */
 static int rk_stages (pw_run *r, double h) {
   struct pw_method_data *d = r->data;
   const pw_tableau *b = d->tableau;

@@ -154,7 +154,8 @@ static int watchdog_unresolved (pw_run *r, double off, double part) {
          row < r->s->holonomic;
 }
 
-/* Such a turn is a rounded corner, the wider the larger the residual: its accelerations need not jump. */
+/* Fails where accelerations jump, or residuals are large, while they may decide the branch.  Such a turn is a corner whose radius
+ * grows with the residual, so that its accelerations need not jump. */
 static int watchdog_check_turn (pw_run *r, double now, pw_error *error) {
   const pw_watchdog *limit = &r->limits;
   double off = watchdog_residual (r), before = fmax (r->previous_norm, limit->least_turn);
@@ -162,17 +163,17 @@ static int watchdog_check_turn (pw_run *r, double now, pw_error *error) {
     return pw_fail (error, PW_METHOD,
                     "t = %.6g s: lost at a singular configuration: constraint residuals of %.2g (scaled) may lead to "
                     "another branch, with accelerations %.3g times those before; methods with projection pass",
-                    r->t, r->residuals.position, now / before);
+                    r->t, off, now / before);
   if (!(off <= limit->drift_far) && watchdog_unresolved (r, off, limit->drift_any))
     return pw_fail (
         error, PW_METHOD,
         "t = %.6g s: lost at a singular configuration: constraint residuals of %.2g (scaled) do not tell one branch "
         "from another; methods with projection pass",
-        r->t, r->residuals.position);
+        r->t, off);
   return PW_OK;
 }
 
-/* 1 near a singular configuration of nonholonomic rows, or if the state is not finite. */
+/* Near a singular configuration: 1 if the dependent row is nonholonomic, or accelerations are not finite. */
 static int watchdog_near_rows (pw_run *r, double norm) {
   int row;
   if (!r->near_singular) return 0;

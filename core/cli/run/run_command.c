@@ -2,6 +2,7 @@
  *
  * Steps are taken in batches that end where a sample is due, so that between samples only the method runs, and only its
  * time is measured. */
+#include <float.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -140,13 +141,13 @@ static int run_open (run *x, pw_error *error) {
 
 /* ---- The run ---- */
 
-/* The time of the next row: computed as a multiple, not accumulated; the last one may differ from the end by
- * round-off. */
+/* The time of the next row: computed as a multiple, not accumulated; one that differs from the end by round-off only is the end.
+ * 0: a row is due after every step. */
 static double run_next_row (const run *x) {
   if (x->csv == NULL) return INFINITY;
   if (x->every == 0) return 0;
   double t = (double)x->row * x->every;
-  return fabs (t - x->t_end) <= 1e-9 * x->every ? x->t_end : t;
+  return fabs (t - x->t_end) <= fmax (1e-9 * x->every, 4 * DBL_EPSILON * x->t_end) ? x->t_end : t;
 }
 
 /* Writes rows and stores samples up to the time reached. */
@@ -232,12 +233,12 @@ static void run_close_table (run *x, int good, pw_error *error) {
   *o = NULL;
 }
 
-/* The run's own failure decides the exit status. */
-static void run_add_error (pw_error *error, const pw_error *own) {
+/* The first error decides the exit status; later ones are only printed. */
+static void run_add_error (pw_error *error, const pw_error *later) {
   if (error->status == PW_OK)
-    *error = *own;
-  else if (own->status != PW_OK)
-    pw_cli_say ("pinwheel: %s\n", own->text);
+    *error = *later;
+  else if (later->status != PW_OK)
+    pw_cli_say ("pinwheel: %s\n", later->text);
 }
 
 /* The JSON summary, written however the run has ended, except that a failed resumption does not replace the previous

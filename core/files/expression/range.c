@@ -5,9 +5,13 @@
 #include "expression_parts.h"
 #include "pinwheel.h"
 
-static const pw_range range_nan = { INFINITY, -INFINITY, 0, 0, 1 };
+static const pw_range range_nan = { .lo = INFINITY, .hi = -INFINITY, .nan = 1 };
 
-static const pw_range range_all = { -INFINITY, INFINITY, 0, 0, 1 };
+static const pw_range range_all = { .lo = -INFINITY, .hi = INFINITY, .nan = 1 };
+
+static pw_range range_constant (double value) {
+  return isnan (value) ? range_nan : (pw_range){ value, value, 0, 0, 0 };
+}
 
 static int range_contains (const pw_range *x, double value) {
   return x->lo <= value && value <= x->hi;
@@ -21,7 +25,7 @@ static int range_unbounded (const pw_range *x) {
   return x->lo == -INFINITY || x->hi == INFINITY;
 }
 
-/* Round-off of an operation: a few units in the last place, also of infinite bounds. */
+/* Outward rounding by a few units in the last place; infinite bounds stay infinite. */
 static pw_range range_rounded (double lo, double hi) {
   if (isnan (lo) || isnan (hi)) return range_all;
   return (pw_range){ lo - fmin (4 * DBL_EPSILON * fabs (lo), DBL_MAX) - DBL_MIN,
@@ -127,9 +131,10 @@ static pw_range range_integer_power (const pw_range *x, double n) {
   return range_corners (pow, &b, &(pw_range){ n, n, 0, 0, 0 });
 }
 
-/* Powers of negative numbers are NaN unless the exponent is an integer. */
+/* Powers of negative numbers are NaN unless the exponent is an integer.  Infinite powers jump at -1 and 1. */
 static pw_range range_power (const pw_range *x, const pw_range *y) {
-  if (range_is (y, rint (y->lo))) return range_integer_power (x, y->lo);
+  if (isinf (y->lo) || isinf (y->hi)) return (pw_range){ .lo = 0, .hi = INFINITY, .breaks = 1, .nan = 1 };
+  if (y->lo == y->hi && y->lo == rint (y->lo)) return range_integer_power (x, y->lo);
   if (x->lo < 0 && y->lo < y->hi) return range_all;
   if (x->hi < 0) return range_nan;
   pw_range r = range_corners (pow, &(pw_range){ fmax (0, x->lo), x->hi, 0, 0, 0 }, y);
@@ -139,7 +144,7 @@ static pw_range range_power (const pw_range *x, const pw_range *y) {
 
 /* The angle of (x, y) jumps on the negative x axis. */
 static pw_range range_atan2 (const pw_range *y, const pw_range *x) {
-  if (x->lo <= 0 && y->lo <= 0 && y->hi >= 0) return (pw_range){ -PW_PI, PW_PI, 1, 0, 0 };
+  if (x->lo <= 0 && y->lo <= 0 && y->hi >= 0) return (pw_range){ .lo = -PW_PI, .hi = PW_PI, .breaks = 1 };
   return range_corners (atan2, y, x);
 }
 
@@ -167,7 +172,7 @@ static pw_range range_integer (int op, const pw_range *x) {
 
 /* The sign of NaN is 0. */
 static pw_range range_sign (const pw_range *x) {
-  if (x->lo > x->hi) return (pw_range){ .nan = 0 };
+  if (x->lo > x->hi) return range_constant (0);
   return (pw_range){ x->lo > 0 ? 1 - x->nan : -1, x->hi < 0 ? x->nan - 1 : 1, range_contains (x, 0) || x->nan, 0, 0 };
 }
 
@@ -269,10 +274,6 @@ static pw_range range_operation (const pw_expression_code *c, const pw_range *x)
   }
 }
 
-static pw_range range_constant (double value) {
-  return isnan (value) ? range_nan : (pw_range){ value, value, 0, 0, 0 };
-}
-
 /* The result of an operation of one or two operands without their breaks.  Degenerate intervals are evaluated exactly,
  * so that equal numbers stay equal.  NaN stays NaN, except in comparisons, in sign, and in x^0 and 1^y. */
 static pw_range range_result (const pw_expression_code *c, const pw_range *x, int operands) {
@@ -287,7 +288,8 @@ static pw_range range_result (const pw_expression_code *c, const pw_range *x, in
   return r;
 }
 
-/* Ignores breaks whose time depends on states; a constant value has no breaks. */
+/* Ignores breaks whose time depends on states.  An operation that jumps has no breaks where it has one value; mod and atan2 also
+ * vary between their jumps. */
 static pw_range range_apply (const pw_expression_code *c, const pw_range *x, int operands) {
   if (c->op == PW_OP_AND || c->op == PW_OP_OR) return range_logical (c->op, x, x + 1);
   if (c->op == PW_OP_MIN || c->op == PW_OP_MAX) return (c->op == PW_OP_MIN ? range_min : range_max) (x, x + 1);
@@ -312,7 +314,8 @@ pw_range pw_expression_range (const pw_expression *x, const unsigned char *noisy
     else if (c->op == PW_OP_CONSTANT)
       *top = range_constant (c->value);
     else
-      *top = c->which == 0 ? (pw_range){ lo, hi, 0, 0, 0 } : (pw_range){ -DBL_MAX, DBL_MAX, 0, 1, 0 };
+      *top = c->which == 0 ? (pw_range){ .lo = lo, .hi = hi } /* time */
+                           : (pw_range){ .lo = -DBL_MAX, .hi = DBL_MAX, .states = 1 };
     if (noisy[c - x->code]) top->breaks &= before;
     top++;
   }

@@ -3,8 +3,8 @@
  *   sigma = v_n / R,  R = sqrt (v_e^2 + v0^2)      v_e, v_n: speed of P along the heading and to its left
  *   F     = -C sigma                                              (linear: no limit)
  *   F     = -mu N tanh (C sigma / (mu N))                         (saturating)
- *   f     = F S,  S = [ -sin(theta)  cos(theta)  l ]              theta = phi + psi, l: the arm along the heading;
- *   v_n   = S v,  v_e = [ cos(theta)  sin(theta)  -m ] v          as in contact.h
+ *   f     = F S,  S = [ -sin(theta)  cos(theta)  l ]              theta = phi + psi, psi: the heading in the body;
+ *   v_n   = S v,  v_e = [ cos(theta)  sin(theta)  -m ] v          l, m: coordinates of P along it, and to its left
  *   loss  = -F v_n >= 0
  *
  * (Pacejka 2012, Tire and Vehicle Dynamics, chapter 1, for slip and cornering stiffness; the regularising v0 keeps the
