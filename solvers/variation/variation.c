@@ -142,6 +142,7 @@ static void variation_round (const pw_variation *x, pw_direction_copy *d) {
     error[j] += copysign (round, error[j]);
     d->start.all += part * fabs (Y[j]), d->start.error += part * fabs (error[j]), d->start.round += part * round;
   }
+  d->start.all = fmax (d->start.all, pw_variation_least_effect (d));
 }
 
 /* Initial derivatives. */

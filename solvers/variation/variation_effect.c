@@ -128,7 +128,7 @@ static double effect_unit (const pw_variation *x, int i) {
 }
 
 /* Effects below one unit of the scene per unit of p, or per p (about 1e5 steps) if that is larger, count as that large. */
-static double effect_least (const pw_direction_copy *d) {
+double pw_variation_least_effect (const pw_direction_copy *d) {
   return fmin (1, 1e-5 / fabs (d->given.step));
 }
 
@@ -139,12 +139,13 @@ static void effect_extrapolate (const pw_variation *x, pw_direction_copy *d) {
   for (int i = 0; i < x->n + 3 * x->m; i++) {
     double error = (one[i] - two[i]) / 3, part = effect_unit (x, i);
     one[i] += error;
-    two[i] = error + copysign (round * d->terms[i], error);
+    double noise = one[i] != 0 || error != 0 ? round * d->terms[i] : 0; /* 0: no effect */
+    two[i] = error + copysign (noise, error);
     all += fabs (one[i]) * part;
     d->effects.error += fabs (two[i]) * part;
-    d->effects.round += round * d->terms[i] * part;
+    d->effects.round += noise * part;
   }
-  d->effects.all += fmax (all, effect_least (d));
+  d->effects.all += fmax (all, pw_variation_least_effect (d));
 }
 
 /* Relative errors of differences up to which a step is kept, and the part of them aimed at with a better one: errors by round-off,

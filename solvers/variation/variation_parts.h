@@ -137,6 +137,9 @@ void pw_variation_project (pw_variation *x, pw_variation_column *c);
  * before the run; near a jump, at the state held. */
 pw_variation_place pw_variation_place_of (const pw_variation *x, const pw_direction_copy *d);
 
+/* The least effect of a unit of p that counts, in units of the scene. */
+double pw_variation_least_effect (const pw_direction_copy *d);
+
 /* ---- variation_outputs.c ---- */
 
 /* The step of differences along a column: the state changes by at most 1e-5 in units of the scene. */

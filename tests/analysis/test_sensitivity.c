@@ -304,6 +304,28 @@ static void test_steps (void **state) {
   }
 }
 
+/* A mass on which initial velocities depend by round-off only, which no longer step would show better; a parameter without effect
+ * on a stiff motion, whose error must not grow. */
+static void test_no_effect (void **state) {
+  double x[2], error[2];
+  (void)state;
+  cli_write ("mass.yaml",
+             "pinwheel: 1\nrun: {t_end: 0.3, method: erk8, rtol: 1e-9}\nparameters: [{name: m, value: 1}]\n"
+             "bodies: [{name: A, mass: m, inertia: 0.1, start: {phi: 0.5}, rate: {omega: 1}}]\n"
+             "elements:\n  - {pin: a, body: [ground, A], at: [[0, 0], [-0.4, 0]]}\n"
+             "  - {gravity: g, acceleration: [0, -9.81]}\n");
+  cli_shell ("pinwheel sensitivity @/mass.yaml --of A.phi --by m -o @/sens");
+  assert_int_equal (sensitivity_json ("\"derivative\": ", x), 1);
+  check_close ("mass", x[0], -0.239878189, 1e-8, "differences of DOP853 in another program");
+  cli_write ("none.yaml", "pinwheel: 1\nrun: {t_end: 2, method: erk8, rtol: 1e-9}\nparameters: [{name: p, value: 3}]\n"
+                          "bodies: [{name: B, mass: 1, inertia: 0.1, rate: {vx: 1}}]\n"
+                          "elements:\n  - {force: F, body: B, fx: '-1e6*(B.x - t) - 1e3*(B.vx - 1)', fy: '0*p'}\n");
+  cli_shell ("pinwheel sensitivity @/none.yaml --of B.x --of B.y --by p -o @/sens");
+  assert_int_equal (sensitivity_json ("\"derivative\": ", x), 2);
+  assert_int_equal (sensitivity_json ("\"error\": ", error), 2);
+  for (int i = 0; i < 2; i++) assert_true (x[i] == 0 && error[i] == 0);
+}
+
 /* A fast or heavy body whose energy does not depend on the parameter. */
 static void test_energies (void **state) {
   double x[2];
@@ -346,19 +368,13 @@ static void test_refusals (void **state) {
 
 int main (void) {
   const struct CMUnitTest tests[] = {
-    cmocka_unit_test (test_sleigh),
-    cmocka_unit_test (test_pendulum),
-    cmocka_unit_test (test_incline),
-    cmocka_unit_test (test_outputs),
-    cmocka_unit_test (test_pulse),
-    cmocka_unit_test (test_files),
-    cmocka_unit_test (test_steps),
-    cmocka_unit_test (test_energies),
-    cmocka_unit_test (test_refusals),
-    cmocka_unit_test (test_parameters),
-    cmocka_unit_test (test_chaos),
-    cmocka_unit_test (test_oscillation),
-    cmocka_unit_test (test_jumping_integrals),
+    cmocka_unit_test (test_sleigh),      cmocka_unit_test (test_pendulum),
+    cmocka_unit_test (test_incline),     cmocka_unit_test (test_outputs),
+    cmocka_unit_test (test_pulse),       cmocka_unit_test (test_files),
+    cmocka_unit_test (test_steps),       cmocka_unit_test (test_no_effect),
+    cmocka_unit_test (test_energies),    cmocka_unit_test (test_refusals),
+    cmocka_unit_test (test_parameters),  cmocka_unit_test (test_chaos),
+    cmocka_unit_test (test_oscillation), cmocka_unit_test (test_jumping_integrals),
   };
   return cmocka_run_group_tests (tests, cli_setup, cli_teardown);
 }

@@ -255,6 +255,7 @@ static int sensitivity_steps (pw_sensitivity *x) {
   int better = 0;
   for (int p = 0; p < x->unknowns.count && !x->stopped; p++) {
     double step = pw_variation_better_step (x->variation, p);
+    x->unknowns.list[p].last_step = fabs (x->direction[p].step);
     if (x->unknowns.list[p].parameter == NULL || step == x->direction[p].step) continue;
     x->unknowns.list[p].step = fabs (step);
     better = 1;
@@ -284,8 +285,14 @@ static int sensitivity_compute (pw_sensitivity *x, pw_error *error) {
   pw_stop_catch ();
   pw_progress_start (&progress, pw_file_name (x->m.file), x->unknowns.t_end, 1);
   int status = pw_sensitivity_compute (x, &progress, error);
-  for (int i = 0; i < SENSITIVITY_REPEATED && status == PW_OK && sensitivity_steps (x); i++)
+  for (int i = 0; i < SENSITIVITY_REPEATED && status == PW_OK && sensitivity_steps (x); i++) {
     status = sensitivity_again (x, &progress, error);
+    if (status == PW_OK || status == PW_RESOURCE) continue;
+    for (int p = 0; p < x->unknowns.count; p++) x->unknowns.list[p].step = x->unknowns.list[p].last_step;
+    *error = (pw_error){ 0 }; /* a model may refuse a longer step */
+    status = sensitivity_again (x, &progress, error);
+    break;
+  }
   pw_progress_end (&progress);
   pw_stop_release ();
   x->cpu = pw_cpu_clock () - begun;

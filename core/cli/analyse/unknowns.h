@@ -11,7 +11,7 @@ typedef struct {
   int state;                     /* its number; -1 for a parameter */
   double value;                  /* at the beginning */
   char unit[16];
-  double step; /* of differences; 0: the usual one */
+  double step, last_step; /* of differences; 0: the usual one; that of the computation before */
   /* for searches: */
   double low, high; /* bounds; infinite without one */
   double scale;     /* size of typical changes: the distance of the bounds, else |value|, else 1 */
