@@ -107,13 +107,13 @@ static inline void to_world (const pw_configuration *A, const double s[2], doubl
 }
 
 /* The force of the torque T on body 1 and -T on body 2. */
-static inline void opposite_torques (double T, double *out) {
+static inline void opposite_moments (double T, double *out) {
   out[0] = out[1] = out[3] = out[4] = 0, out[2] = T, out[5] = -T;
 }
 
 /* Its derivative by the angles, or by the angular velocities, if T decreases with those of body 1 relative to body 2 by
  * `slope`: 6 x 6. */
-static inline void opposite_torques_block (double slope, double *out) {
+static inline void opposite_moments_block (double slope, double *out) {
   for (int i = 0; i < 36; i++) out[i] = 0;
   out[14] = out[35] = -slope, out[17] = out[32] = slope;
 }

@@ -21,11 +21,11 @@ PREPARE (friction_prepare, pw_friction, coulomb) {
 }
 
 PER_ELEMENT (friction_force, friction, 6) {
-  opposite_torques (-coulomb_force (x.k, x.w), out);
+  opposite_moments (-coulomb_force (x.k, x.w), out);
 }
 
 PER_ELEMENT (friction_force_v, friction, 36) {
-  opposite_torques_block (coulomb_slope (x.k, x.w), out);
+  opposite_moments_block (coulomb_slope (x.k, x.w), out);
 }
 
 PER_ELEMENT (friction_saturation, friction, 12) {

@@ -38,7 +38,7 @@ PREPARE (motor_prepare, pw_motor, motor) {
 }
 
 PER_ELEMENT (motor_force, motor, 6) {
-  opposite_torques (x.T, out);
+  opposite_moments (x.T, out);
 }
 
 PER_ELEMENT (motor_force_u, motor, 12) {
@@ -48,11 +48,11 @@ PER_ELEMENT (motor_force_u, motor, 12) {
 }
 
 PER_ELEMENT (motor_force_q, motor, 36) {
-  opposite_torques_block (x.slope * x.k->k, out);
+  opposite_moments_block (x.slope * x.k->k, out);
 }
 
 PER_ELEMENT (motor_force_v, motor, 36) {
-  opposite_torques_block (x.slope * x.k->c, out);
+  opposite_moments_block (x.slope * x.k->c, out);
 }
 
 PER_ELEMENT (motor_saturation, motor, 12) {

@@ -30,15 +30,15 @@ PREPARE (twist_prepare, pw_rotational_spring, twist) {
 }
 
 PER_ELEMENT (twist_force, twist, 6) {
-  opposite_torques (-(x.k->k * x.angle + x.k->c * x.rate), out);
+  opposite_moments (-(x.k->k * x.angle + x.k->c * x.rate), out);
 }
 
 PER_ELEMENT (twist_force_q, twist, 36) {
-  opposite_torques_block (x.k->k, out);
+  opposite_moments_block (x.k->k, out);
 }
 
 PER_ELEMENT (twist_force_v, twist, 36) {
-  opposite_torques_block (x.k->c, out);
+  opposite_moments_block (x.k->c, out);
 }
 
 PER_ELEMENT (twist_energy, twist, 1) {

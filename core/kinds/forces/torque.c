@@ -4,11 +4,11 @@
 #include "batch.h"
 
 static void torque_force (const pw_batch *b, double *out) {
-  for (int e = 0; e < b->count; e++) opposite_torques (b->u[3 * e], out + 6 * e);
+  for (int e = 0; e < b->count; e++) opposite_moments (b->u[3 * e], out + 6 * e);
 }
 
 static void torque_force_u (const pw_batch *b, double *out) {
-  for (int e = 0; e < b->count; e++) opposite_torques (1, out + 6 * e);
+  for (int e = 0; e < b->count; e++) opposite_moments (1, out + 6 * e);
 }
 
 static void torque_power (const pw_batch *b, double *out) {
