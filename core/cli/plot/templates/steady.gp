@@ -31,7 +31,7 @@ do for [form in forms] {
   set format x
   set xlabel label_of_x noenhanced
   set ylabel 'frequency [Hz]'
-  top_of_z = max(z_max, -z_min) > 1e-9*max(1, max(y_max, -y_min)) ? max(z_max, -z_min) : 0.1
+  top_of_z = max(z_max, -z_min) > 1e-9*max(1, max(y_max, -y_min)) ? max(z_max, -z_min) : 2*pi
   set yrange [0:1.08*top_of_z/(2*pi)]
   eval panel(left, width - right, top + part + 10, top + 2*part + 10)
   plot data index 0 using 1:($3 > 1e-12 ? $3 : NaN) with lines lw 1.1 dt 1 lc rgb '#004488' title '', \
