@@ -340,6 +340,11 @@ static void test_energies (void **state) {
   check_close ("kinetic", x[0], (0.001 - 9.81) * 4, 1e-8, "F - m g, by t^2, and the error of the run");
   check_close ("potential", x[1], 9.81 * 2, 1e-5,
                "m g t^2 / 2, and round-off of 9.81e7 J in differences along the state");
+  cli_write ("flight.yaml", "pinwheel: 1\nrun: {t_end: 1}\nparameters: [{name: m, value: 2}]\n"
+                            "bodies: [{name: b, mass: m, inertia: 1, rate: {vx: 3}}]\n");
+  cli_shell ("pinwheel sensitivity @/flight.yaml --of kinetic --by m -o @/sens");
+  assert_int_equal (sensitivity_json ("\"derivative\": ", x), 1);
+  check_close ("kinetic by mass", x[0], 4.5, 1e-9, "v^2 / 2, and round-off of differences");
 }
 
 static void test_refusals (void **state) {
