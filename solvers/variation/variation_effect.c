@@ -127,7 +127,7 @@ static double effect_unit (const pw_variation *x, int i) {
   return (i < x->n + x->m ? T * T : i < x->n + 2 * x->m ? 1 : T) / x->r->s->scale.length;
 }
 
-/* Effects below one unit of the scene per unit of p, or per p (about 1e5 steps) if that is larger, count as that large. */
+/* Effects below one unit of the scene per unit of p, or per p (about 1e5 steps) if that is smaller, count as that large. */
 double pw_variation_least_effect (const pw_direction_copy *d) {
   return fmin (1, 1e-5 / fabs (d->given.step));
 }
