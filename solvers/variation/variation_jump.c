@@ -217,10 +217,10 @@ static double jump_along (const pw_variation_column *c, jump_neighbour k) {
 /* The derivative of t_s, or its error. */
 static double jump_slope (const pw_variation_column *c, jump_neighbour k) {
   const pw_direction *d = &c->direction->given;
-  int index = pw_variation_index (c);
+  int index = pw_variation_column_index (c);
   double slope = d->initial || index == 1 ? jump_along (c, k) : 0;
   k.dy = c->direction->column[0].Y;
-  for (int i = 0; i < PW_VARIATION_NEAR && d->initial == NULL; i++) {
+  for (int i = 0; i < PW_VARIATION_NEIGHBOURS && d->initial == NULL; i++) {
     double weight = pw_direction_weight (d, index, i);
     k.r = d->neighbour[i];
     k.step = pw_direction_offset (d, i);
@@ -258,7 +258,7 @@ static double jump_width (pw_variation *x, jump_neighbour k) {
   }
   k.dy = k.before, k.step = 0;
   for (pw_direction_copy *d = x->direction; d < x->direction + x->count; d++)
-    for (int i = 0; i < PW_VARIATION_NEAR && d->given.initial == NULL; i++) {
+    for (int i = 0; i < PW_VARIATION_NEIGHBOURS && d->given.initial == NULL; i++) {
       k.r = d->given.neighbour[i];
       most = pw_larger_or_nan (most, fabs (jump_time (&k)));
     }
@@ -283,7 +283,7 @@ int pw_variation_approach_jump (pw_variation *x, pw_error *error) {
   if (x->t < x->hold[0].from) return PW_OK;
   PW_EACH_COLUMN (c, x) memcpy (c->trial, c->Y, (size_t)x->size * sizeof *c->Y);
   int status = pw_variation_evaluate_at (x, x->t, error);
-  return status == PW_OK ? pw_variation_begin (x, error) : status;
+  return status == PW_OK ? pw_variation_restart (x, error) : status;
 }
 
 int pw_variation_pass_jump (pw_variation *x, pw_error *error) {

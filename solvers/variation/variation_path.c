@@ -33,7 +33,7 @@ void pw_variation_state (const pw_variation *x, double t, double *out) {
     memcpy (out, x->point[x->points > 1 ? i + 1 : 0].x, 2 * (size_t)x->n * sizeof *out);
 }
 
-void pw_variation_forget (pw_variation *x) {
+void pw_variation_discard_points (pw_variation *x) {
   int gone = 0;
   while (gone + 1 < x->points && x->point[gone + 1].t <= x->t) gone++;
   x->points -= gone;
@@ -108,7 +108,7 @@ int pw_variation_append (pw_variation *x, double t, pw_error *error) {
 }
 
 /* 1 if interpolation between points i and i + 1 gives the last point to a tenth of the run's tolerance. */
-static int path_good (const pw_variation *x, int i) {
+static int path_is_accurate (const pw_variation *x, int i) {
   const pw_variation_point *at = x->point + x->points - 1;
   double *guess = x->scratch;
   path_interpolate (x, x->point + i, at->t, guess);
@@ -125,7 +125,7 @@ static int path_refine (pw_variation *x, int i, int depth, pw_error *error) {
   if (pw_fixed_steps (x->r) || depth == 0 || !(t0 < middle && middle < t1)) return PW_OK;
   int status = pw_variation_append (x, middle, error);
   if (status != PW_OK) return status;
-  int good = path_good (x, i);
+  int good = path_is_accurate (x, i);
   pw_variation_point kept = x->point[x->points - 1];
   memmove (x->point + i + 2, x->point + i + 1, (size_t)(x->points - i - 2) * sizeof kept);
   x->point[i + 1] = kept;
