@@ -85,8 +85,8 @@ typedef struct {
 
 /* A signal computed by the caller.  `eval` stores the value in value[0] and, for a signal of a constraint, its time
  * derivatives in value[1] and value[2].  x contains the states named in `reads`; gradient, unless NULL, receives the
- * derivatives of value[0] with respect to them.  A non-zero return stops the run.  Equal t and x must give equal values;
- * if they change between steps (a controller sets a new torque), call pw_run_restart. */
+ * derivatives of value[0] with respect to them.  A non-zero return stops the run.  Equal t and x must give equal
+ * values; if they change between steps (a controller sets a new torque), call pw_run_restart. */
 typedef struct {
   int (*eval) (void *context, double t, const double *x, double value[3], double *gradient);
   void *context;            /* passed to eval and breakpoint; must outlive the systems, unless open replaces it */
@@ -248,8 +248,8 @@ int pw_model_refuse (pw_model *m, const char *format, ...);
 double pw_jacobi_am (double u, double m);
 double pw_elliptic_K (double m);
 
-/* Sine and cosine of an angle [rad] to 1 ulp, with the same bits on every machine for |x| < 1e6; for larger |x| those of
- * the C library. */
+/* Sine and cosine of an angle [rad] to 1 ulp, with the same bits on every machine for |x| < 1e6; for larger |x| those
+ * of the C library. */
 void pw_sin_cos (double x, double *sine, double *cosine);
 double pw_sin (double x);
 double pw_cos (double x);
@@ -777,8 +777,8 @@ const double *pw_system_initial_v (const pw_system *s);
 int pw_system_jumps (const pw_system *s, double t);
 
 /* C code for this scene alone, which evaluates and projects it faster than the library (pw_settings.specialised).
- * independent: rows, 0 for redundant constraint equations (pw_run_source); NULL: none is redundant.  NULL and the error if
- * there is no such code, as for too many constraint equations.  Free the text. */
+ * independent: rows, 0 for redundant constraint equations (pw_run_source); NULL: none is redundant.  NULL and the error
+ * if there is no such code, as for too many constraint equations.  Free the text. */
 char *pw_system_source (const pw_system *s, const unsigned char *independent, pw_error *error);
 
 /* Whether compiled code is of this version and of a system with the same structure: parameters and initial values may
@@ -792,9 +792,11 @@ int pw_specialised_lanes_fit (const pw_specialised_lanes *code, const pw_system 
 int pw_specialised_lanes_count (const pw_specialised_lanes *code);
 /* Memory for the runs of one thread; NULL if out of memory.  Free it. */
 void *pw_specialised_lanes_memory (const pw_specialised_lanes *code);
-/* 0 if there are element types of the user's, or signals that depend on the state; redundant equations count as such, too. */
+/* 0 if there are element types of the user's, or signals that depend on the state; redundant equations count as such,
+ * too. */
 int pw_system_has_lanes (const pw_system *s);
-/* 1 if accelerations may jump with the state: the system has element types of the user's, or signals that depend on it. */
+/* 1 if accelerations may jump with the state: the system has element types of the user's, or signals that depend on
+ * it. */
 int pw_system_may_jump (const pw_system *s);
 
 /* ---- Elements of a system, in the order of its constraint equations ---- */

@@ -18,7 +18,8 @@ typedef struct {
 /* How to integrate; zeros select the defaults. */
 typedef struct {
   double t; /* initial time [s] */
-  /* Approximate duration of the run [s]: for the scale of time if the scene is initially at rest, and that of energy. */
+  /* Approximate duration of the run [s]: for the scale of time if the scene is initially at rest, and that of
+   * energy. */
   double span;
   double step; /* fixed-step methods: step size [s]; default 1e-3 */
   double rtol; /* adaptive methods: relative tolerance; default 1e-6 */

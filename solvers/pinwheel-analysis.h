@@ -112,9 +112,10 @@ double pw_variation_jump_slope (const pw_variation *x, int i);
 /* The size of the next step of the derivatives [s], over which they are smooth. */
 double pw_variation_step_size (const pw_variation *x);
 
-/* The step of direction i with which its differences would be more accurate; its own if they are accurate to 1e-7, relative to
- * the effects of p up to the time reached.  A step below 1e-10 that changes nothing is too small.  Larger ones reduce round-off, which is proportional to 1 / step, smaller ones
- * the remainder, whose estimate is proportional to its square. */
+/* The step of direction i with which its differences would be more accurate; its own if they are accurate to 1e-7,
+ * relative to the effects of p up to the time reached.  A step below 1e-10 that changes nothing is too small.  Larger
+ * ones reduce round-off, which is proportional to 1 / step, smaller ones the remainder, whose estimate is proportional
+ * to its square. */
 double pw_variation_better_step (const pw_variation *x, int i);
 
 void pw_variation_close (pw_variation *x);

@@ -87,8 +87,8 @@ static void branch_extend (pw_branch *b, int n, int extra, const double *c, doub
   }
 }
 
-/* du = the shortest least-squares solution of J du = right and c du = value, where c is a row over x and p.  Without c, p is
- * constant, and damping^2 |du|^2 is added to the squares.  J is destroyed. */
+/* du = the shortest least-squares solution of J du = right and c du = value, where c is a row over x and p.  Without c,
+ * p is constant, and damping^2 |du|^2 is added to the squares.  J is destroyed. */
 static int branch_least_squares (pw_branch *b, const double *right, const double *c, double value, double damping) {
   int m = b->problem.equations, n = b->problem.unknowns + (c != NULL), extra = c ? 1 : damping > 0 ? n : 0;
   int rows = m + extra, large = rows > n ? rows : n;
@@ -105,7 +105,8 @@ static int branch_least_squares (pw_branch *b, const double *right, const double
   return PW_OK;
 }
 
-/* Moves u along du by the largest of the factors 1, 1/2, ... with which |F| decreases by a tenth of its linear prediction. */
+/* Moves u along du by the largest of the factors 1, 1/2, ... with which |F| decreases by a tenth of its linear
+ * prediction. */
 static int branch_descend (pw_branch *b, double *u, pw_error *error) {
   int n = b->problem.unknowns + 1;
   double before = branch_norm (b->problem.equations, b->F), factor = 1;
@@ -209,8 +210,8 @@ static double branch_distance (const pw_branch *b, const double *x, const double
   return sqrt (sum);
 }
 
-/* Corrects to->u on the plane perpendicular to a tangent, or with NULL at constant p; then sets to->tangent.  PW_RETRY if the
- * correction is longer than max_distance. */
+/* Corrects to->u on the plane perpendicular to a tangent, or with NULL at constant p; then sets to->tangent.  PW_RETRY
+ * if the correction is longer than max_distance. */
 static int branch_correct (pw_branch *b, const double *tangent, double max_distance, pw_branch_point *to,
                            pw_error *error) {
   size_t bytes = ((size_t)b->problem.unknowns + 1) * sizeof *tangent;
@@ -223,7 +224,8 @@ static int branch_correct (pw_branch *b, const double *tangent, double max_dista
   return branch_tangent (b, to->u, b->condition, to->tangent, error);
 }
 
-/* Whether two points are on one smooth branch: the chord between them has the direction of the sum of their tangents. */
+/* Whether two points are on one smooth branch: the chord between them has the direction of the sum of their
+ * tangents. */
 static int branch_smooth (const pw_branch *b, const pw_branch_point *from, const pw_branch_point *to) {
   double chord = branch_distance (b, to->u, from->u), dot = 0, off = 0;
   for (int j = 0; j <= b->problem.unknowns; j++) dot += from->tangent[j] * to->tangent[j];
@@ -232,8 +234,8 @@ static int branch_smooth (const pw_branch *b, const pw_branch_point *from, const
   return dot >= BRANCH_TURN && sqrt (off) <= BRANCH_BENT;
 }
 
-/* Whether the step to b->next passes an end of the range, or p of the first point, perhaps twice beside a fold: a shorter one
- * comes so near that branch_step_to_end ends there. */
+/* Whether the step to b->next passes an end of the range, or p of the first point, perhaps twice beside a fold: a
+ * shorter one comes so near that branch_step_to_end ends there. */
 static int branch_passes_end (const pw_branch *b) {
   int n = b->problem.unknowns;
   double from = b->reached.u[n] - b->first.u[n], to = b->next.u[n] - b->first.u[n], slope = b->reached.tangent[n];
@@ -265,8 +267,8 @@ static double branch_longest_step (const pw_branch *b) {
   return b->max_change / fmax (fabs (b->reached.tangent[b->problem.unknowns]), BRANCH_STEEP);
 }
 
-/* Moves to the end of the range, or to p of the first point, if the next step would pass it: without evaluations beyond the
- * end, where the parameter may not be admissible.  PW_RETRY if it would not, or no point is found there. */
+/* Moves to the end of the range, or to p of the first point, if the next step would pass it: without evaluations beyond
+ * the end, where the parameter may not be admissible.  PW_RETRY if it would not, or no point is found there. */
 static int branch_step_to_end (pw_branch *b, pw_error *error) {
   int n = b->problem.unknowns;
   double slope = b->reached.tangent[n], p = b->reached.u[n], first = b->first.u[n];
@@ -291,8 +293,8 @@ int pw_branch_step (pw_branch *b, pw_error *error) {
   return PW_OK;
 }
 
-/* The point at a fraction s of the way between two points: that of the cubic Hermite interpolation, corrected by Newton's method
- * if this converges nearby. */
+/* The point at a fraction s of the way between two points: that of the cubic Hermite interpolation, corrected by
+ * Newton's method if this converges nearby. */
 static int branch_between (pw_branch *b, const pw_branch_point *from, const pw_branch_point *to, double s,
                            pw_branch_point *point, pw_error *error) {
   size_t bytes = ((size_t)b->problem.unknowns + 1) * sizeof *point->u;
@@ -309,9 +311,9 @@ static int branch_between (pw_branch *b, const pw_branch_point *from, const pw_b
   return status;
 }
 
-/* The Illinois variant of regula falsi (Dowell & Jarratt 1971), every fourth step a bisection.  The bracket s[0], s[1] consists
- * of fractions of a cubic.  Points to which Newton's method converges become ends of this cubic; `scale`: its length, relative to
- * the step. */
+/* The Illinois variant of regula falsi (Dowell & Jarratt 1971), every fourth step a bisection.  The bracket s[0], s[1]
+ * consists of fractions of a cubic.  Points to which Newton's method converges become ends of this cubic; `scale`: its
+ * length, relative to the step. */
 int pw_branch_locate (pw_branch *b, pw_branch_test *test, void *context, pw_error *error) {
   pw_branch_point *point = &b->found;
   double s[2] = { 0, 1 }, f[2], middle, value, scale = 1;

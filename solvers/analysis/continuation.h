@@ -1,10 +1,11 @@
 /* Newton's method for underdetermined or degenerate equations, and continuation of their solutions in a parameter by
  * pseudo-arclength.
  *
- * The equations are F (x, p) = 0 with u = (x, p); the caller scales them so that all entries of u and F are of comparable
- * size.  A linear system is solved by its least-squares solution of smallest norm with a decision on the rank, so that F
- * may have redundant equations, and solutions need not be isolated.  To continue a branch, solutions at constant p should be
- * isolated: add for each symmetry an equation with residual 0 whose derivatives make corrections orthogonal to it.
+ * The equations are F (x, p) = 0 with u = (x, p); the caller scales them so that all entries of u and F are of
+ * comparable size.  A linear system is solved by its least-squares solution of smallest norm with a decision on the
+ * rank, so that F may have redundant equations, and solutions need not be isolated.  To continue a branch, solutions at
+ * constant p should be isolated: add for each symmetry an equation with residual 0 whose derivatives make corrections
+ * orthogonal to it.
  *
  * (Keller 1977, Numerical solution of bifurcation and nonlinear eigenvalue problems; Allgower & Georg 1990, Numerical
  * Continuation Methods.) */
@@ -85,22 +86,23 @@ void pw_branch_close (pw_branch *b);
  * PW_RETRY if it does not converge: u is where it stopped. */
 int pw_branch_solve (pw_branch *b, double *u, pw_error *error);
 
-/* Starts a branch at a solution, the first point: p increases along the tangent if direction > 0.  PW_RETRY at a fold. */
+/* Starts a branch at a solution, the first point: p increases along the tangent if direction > 0.  PW_RETRY at a
+ * fold. */
 int pw_branch_start (pw_branch *b, const double *u, double direction, pw_error *error);
 
-/* Moves to the next point.  The step length adapts to the curvature of the branch.  PW_RETRY if no step of length min_step
- * converges to a point nearby on a smooth branch.  Branches that bifurcate from it are not followed. */
+/* Moves to the next point.  The step length adapts to the curvature of the branch.  PW_RETRY if no step of length
+ * min_step converges to a point nearby on a smooth branch.  Branches that bifurcate from it are not followed. */
 int pw_branch_step (pw_branch *b, pw_error *error);
 
 /* The next point or event of the branch in p = 0 to 1, or NULL after its last one: at an end of the range or, with the
- * reason in *why, at the first point of a closed branch, or where no step succeeds; evaluations may leave their reason in
- * *why.  find_events is called with problem.context. */
+ * reason in *why, at the first point of a closed branch, or where no step succeeds; evaluations may leave their reason
+ * in *why.  find_events is called with problem.context. */
 int pw_branch_next (pw_branch *b, pw_branch_find_events *find_events, pw_error *why, const pw_branch_event **next,
                     pw_error *error);
 
 /* Sets b->found to the point between the last two points where a test changes its sign; interpolated if Newton's method
- * does not converge nearby, as at bifurcations.  Where the test or F cannot be evaluated, as at singular points, neighbouring
- * points are tried. */
+ * does not converge nearby, as at bifurcations.  Where the test or F cannot be evaluated, as at singular points,
+ * neighbouring points are tried. */
 int pw_branch_locate (pw_branch *b, pw_branch_test *test, void *context, pw_error *error);
 /* Where a point between the last two is: pw_branch_event.fraction. */
 double pw_branch_fraction (const pw_branch *b, const pw_branch_point *point);

@@ -188,8 +188,8 @@ int pw_periodic_follow (pw_periodic *x, int direction, pw_error *error) {
   return status == PW_RETRY ? pw_fail (error, PW_METHOD, "the branch cannot be followed from here") : status;
 }
 
-/* pw_branch_test: the distance of multiplier number `sought` from the unit circle, positive outside; +-1 if it moves on the circle
- * before. */
+/* pw_branch_test: the distance of multiplier number `sought` from the unit circle, positive outside; +-1 if it moves on
+ * the circle before. */
 static int periodic_test (void *periodic, const pw_branch_point *point, double *value, pw_error *error) {
   pw_periodic *x = periodic;
   pw_periodic_orbit o;
@@ -199,7 +199,8 @@ static int periodic_test (void *periodic, const pw_branch_point *point, double *
   return status;
 }
 
-/* Locates where multiplier number `sought` crosses the unit circle between the last two points; it is inside at one of them. */
+/* Locates where multiplier number `sought` crosses the unit circle between the last two points; it is inside at one of
+ * them. */
 static int periodic_crossing (pw_periodic *x, const pw_branch_point *inside, pw_periodic_event *event,
                               pw_error *error) {
   pw_branch *b = &x->branch;
@@ -215,8 +216,8 @@ static int periodic_crossing (pw_periodic *x, const pw_branch_point *inside, pw_
   return status;
 }
 
-/* pw_branch_find_events: the k-th largest multiplier crosses the unit circle.  At a fold, one that passes 1 is no event of its
- * own. */
+/* pw_branch_find_events: the k-th largest multiplier crosses the unit circle.  At a fold, one that passes 1 is no event
+ * of its own. */
 static int periodic_events (void *periodic, pw_error *error) {
   pw_periodic *x = periodic;
   pw_branch *b = &x->branch;

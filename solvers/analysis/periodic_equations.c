@@ -1,16 +1,18 @@
 /* Equations of relative periodic motions, by single shooting; multipliers.
  *
- * P (y) is the consistent state nearest to y, phi (y) the state one period after y, and D (s) y the state y displaced by the
- * symmetries of the system, s times the rates of each.  The unknowns are y, s and, if it is free, the period:
+ * P (y) is the consistent state nearest to y, phi (y) the state one period after y, and D (s) y the state y displaced
+ * by the symmetries of the system, s times the rates of each.  The unknowns are y, s and, if it is free, the period:
  *
  *     phi (P (y)) - D (s) P (y) = 0,    y - P (y) = 0,
  *
  * and corrections are orthogonal to symmetries and, with a free period, to the motion.  Derivatives of phi are those of
- * the variational equations (variation.c), along a basis B of perturbations on the constraints (x->basis).  P' = B B^+ (x->dual:
- * B^+) is exact for such perturbations; on branches, whose tangents need all others, P' is computed by differences.
+ * the variational equations (variation.c), along a basis B of perturbations on the constraints (x->basis).  P' = B B^+
+ * (x->dual: B^+) is exact for such perturbations; on branches, whose tangents need all others, P' is computed by
+ * differences.
  *
- * Multipliers are the eigenvalues of the monodromy matrix D (s)^-1 phi' in minimal coordinates of perturbations, in the frame that
- * has moved with the whole.  (Wulff & Schebesch 2008, Numerical continuation of symmetric periodic orbits.) */
+ * Multipliers are the eigenvalues of the monodromy matrix D (s)^-1 phi' in minimal coordinates of perturbations, in
+ * the frame that has moved with the whole.  (Wulff & Schebesch 2008, Numerical continuation of symmetric periodic
+ * orbits.) */
 #include <lapacke.h>
 #include <math.h>
 #include <stdlib.h>
@@ -23,8 +25,8 @@ static const double EQUATIONS_STEADY = 1e-4;
 
 /* ---- Displacements ---- */
 
-/* The state y displaced by unit time at these rates: the whole translates by t and rotates by w about the origin at the same time,
- * p -> R p + V t, with R the rotation by w and V its mean over the way. */
+/* The state y displaced by unit time at these rates: the whole translates by t and rotates by w about the origin at the
+ * same time, p -> R p + V t, with R the rotation by w and V its mean over the way. */
 static void equations_displace (const pw_periodic *x, const double *rates, const double *y, double *out) {
   int n = x->n, bodies = x->s->bodies;
   double w = rates[2], c = pw_cos (w), s = pw_sin (w), half = pw_sin (w / 2);

@@ -45,8 +45,8 @@ double pw_system_period (const pw_system *s) {
   return period;
 }
 
-/* Sets the period, unless it is free, to that given or that of the signals, and verifies that they repeat after it; if it is
- * free, that they are constant. */
+/* Sets the period, unless it is free, to that given or that of the signals, and verifies that they repeat after it; if
+ * it is free, that they are constant. */
 static int flow_signals (pw_periodic *x, pw_place place, pw_run *r) {
   double signals = pw_system_period (r->s), period = x->settings.period;
   char name[200];
@@ -103,7 +103,8 @@ pw_run *pw_periodic_run (pw_periodic *x, pw_place place, double value, double rt
 
 /* ---- The flow ---- */
 
-/* x->change = the derivative of the consistent state nearest to x->state with respect to its entry j in its unit, by differences. */
+/* x->change = the derivative of the consistent state nearest to x->state with respect to its entry j in its unit, by
+ * differences. */
 static int flow_nearest (pw_periodic *x, pw_run *r, int j) {
   const double h = 1e-5, initial = x->state[j];
   int n = x->n, status = PW_OK;
@@ -120,8 +121,8 @@ static int flow_nearest (pw_periodic *x, pw_run *r, int j) {
   return status;
 }
 
-/* Sets x->basis and x->dual at the initial state of the run.  nearest: those of any change of x->state are the minimal coordinates
- * of the change of the nearest consistent state; otherwise the change is taken to be on the constraints. */
+/* Sets x->basis and x->dual at the initial state of the run.  nearest: those of any change of x->state are the minimal
+ * coordinates of the change of the nearest consistent state; otherwise the change is taken to be on the constraints. */
 static int flow_basis (pw_periodic *x, pw_run *r, int nearest) {
   pw_linearisation l;
   int n = x->n, status = pw_linear_open (&l, r, 0, n);
@@ -225,7 +226,8 @@ static int flow_distance (pw_periodic *x, pw_run *r, double t, double *y, double
   return PW_OK;
 }
 
-/* Sets x->last_period to the time after which the run first returns near its state, up to symmetries: a minimum of the distance. */
+/* Sets x->last_period to the time after which the run first returns near its state, up to symmetries: a minimum of the
+ * distance. */
 static int flow_return (pw_periodic *x, pw_run *r) {
   double t0 = pw_run_time (r), step = x->T / RETURN_STEPS, d[3] = { 0, 0, 0 }, far = 0;
   int status = flow_distance (x, r, t0, x->y0, d);

@@ -55,11 +55,11 @@ static inline double pw_periodic_parameter (const pw_periodic *x, const double *
 
 /* ---- periodic_flow.c ---- */
 
-/* Opens a run at a value of the parameter from the consistent state nearest to y (NULL: the initial one), and determines the
- * period of x->system[place].  NULL, with x->why, if it fails. */
+/* Opens a run at a value of the parameter from the consistent state nearest to y (NULL: the initial one), and
+ * determines the period of x->system[place].  NULL, with x->why, if it fails. */
 pw_run *pw_periodic_run (pw_periodic *x, pw_place place, double value, double rtol, const double *y);
-/* Integrates one period from the state of u: sets y0, y1, a0, a1, or with derivatives y0, a0, basis, Phi, dual.  A status;
- * PW_RETRY with x->why. */
+/* Integrates one period from the state of u: sets y0, y1, a0, a1, or with derivatives y0, a0, basis, Phi, dual.  A
+ * status; PW_RETRY with x->why. */
 int pw_periodic_flow (pw_periodic *x, const double *u, pw_flow_accuracy accuracy, pw_place place, pw_error *error);
 /* Sets x->state to that after some periods, and a free period that is not given to a guess.  PW_RETRY with x->why. */
 int pw_periodic_settle (pw_periodic *x, double value, int periods);

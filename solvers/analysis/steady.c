@@ -9,13 +9,11 @@
 
 enum {
   STEADY_POINTS = 50,       /* of a branch, by default */
-  SIGNAL_TIMES = 16,        /* times at which signals are compared, and as many between breakpoints */
-  SIGNAL_BREAKPOINTS = 1000 /* that are followed to find the last one */
+  STEADY_BREAKPOINTS = 1000 /* that are followed to find the last one */
 };
 static const double STEADY_EXACT = 1e-9, /* largest residual of a solution, in units of the scene */
     STEADY_SLOW = 1e-4,                  /* rates that may be round-off at a double root, the root of STEADY_EXACT */
-    SUGGEST_CHANGE = 1e-8, SUGGEST_LEFT = 1e-6, /* least square of a change, and its part that is not held already */
-    SIGNAL_SAME = 1e-8; /* difference of signals, relative to their largest value, that counts as 0 */
+    SUGGEST_CHANGE = 1e-8, SUGGEST_LEFT = 1e-6; /* least square of a change, and its part that is not held already */
 
 /* ---- Opening ---- */
 
@@ -49,70 +47,10 @@ static int steady_arrays (pw_steady *x) {
   return PW_OK;
 }
 
-typedef struct {
-  pw_run *r;
-  double *state;                /* 2 n: q, v */
-  double *values;               /* count: at the first of two times */
-  double *largest, *difference; /* count: largest magnitude and difference so far */
-  int count;                    /* value and two derivatives of each signal */
-} signal_comparison;
-
-/* Compares signals at two times, in the run's state (number 0) or in one near it, since a signal may be multiplied by a state that
- * is 0.  A status; signals may fail in other states than the run's. */
-static int signals_compare (signal_comparison *x, int number, double t0, double t1) {
-  pw_run *r = x->r;
-  pw_workspace *w = r->w;
-  int n = r->s->coords;
-  double *q = x->state, *v = q + n;
-  for (int j = 0; j < n; j++) {
-    double unit = number > 0 ? pw_unit (r->s, j) : 0;
-    q[j] = r->q[j] + unit * pw_irregular (1.7 + number, j + 1);
-    v[j] = r->v[j] + unit / w->scale.time * pw_irregular (2.9 + number, j + 1);
-  }
-  int status = pw_update_kinematics (w, t0, q, v);
-  if (status == PW_OK && x->count) memcpy (x->values, w->u, (size_t)x->count * sizeof *w->u);
-  if (status == PW_OK) status = pw_update_kinematics (w, t1, q, v);
-  for (int i = 0; status == PW_OK && i < x->count; i++) {
-    x->difference[i] = pw_larger_or_nan (x->difference[i], fabs (w->u[i] - x->values[i]));
-    x->largest[i] = fmax (x->largest[i], fmax (fabs (x->values[i]), fabs (w->u[i])));
-  }
-  return number > 0 ? PW_OK : status;
-}
-
-/* The middle between the first two breakpoints after *t, or the first one and t1; INFINITY without one before t1.  Moves *t to the
- * first one. */
-static double signals_next_interval (pw_workspace *w, double *t, double t1) {
-  *t = pw_next_breakpoint (w, 1, *t);
-  return *t < t1 ? *t + (fmin (pw_next_breakpoint (w, 1, *t), t1) - *t) / 2 : INFINITY;
-}
-
-int pw_signals_change (pw_run *r, double t, double period, double span, int *changed, pw_error *error) {
-  signal_comparison x = { .r = r, .count = 3 * r->s->sources };
-  size_t count = (size_t)x.count;
-  double at = t, breakpoint = t;
-  int status = PW_OK;
-  x.values = calloc (3 * count + 2 * (size_t)r->s->coords + 1, sizeof *x.values);
-  if (x.values == NULL) return pw_fail_memory (r->s, error);
-  x.largest = x.values + count, x.difference = x.largest + count, x.state = x.difference + count;
-  for (int k = 1; status == PW_OK && k <= 2 * SIGNAL_TIMES && isfinite (at); k++) {
-    double part = k / (double)SIGNAL_TIMES;
-    at = k > SIGNAL_TIMES ? signals_next_interval (r->w, &breakpoint, t + span)
-         : period > 0     ? t + span * fmod (0.618034 * k, 1)
-                          : t + span * part * part;
-    for (int number = 0; number < 2 && status == PW_OK && isfinite (at); number++)
-      status = signals_compare (&x, number, period > 0 ? at : t, period > 0 ? at + period : at);
-  }
-  *changed = -1;
-  for (int i = x.count; i-- > 0;)
-    if (!(x.difference[i] <= SIGNAL_SAME * x.largest[i])) *changed = i / 3;
-  free (x.values);
-  return status == PW_OK ? PW_OK : pw_run_annotate_error (r, pw_fail_signal (at, error), error);
-}
-
 /* The last breakpoint of signals within the span. */
-static double signals_last_breakpoint (pw_workspace *w, double t, double span) {
+static double steady_last_breakpoint (pw_workspace *w, double t, double span) {
   double end = t + span, next = t;
-  for (int i = 0; i < SIGNAL_BREAKPOINTS && next <= end; i++) t = next, next = pw_next_breakpoint (w, 1, t);
+  for (int i = 0; i < STEADY_BREAKPOINTS && next <= end; i++) t = next, next = pw_next_breakpoint (w, 1, t);
   return t;
 }
 
@@ -123,7 +61,7 @@ static int steady_constant (pw_steady *x, pw_error *error) {
   int changed, later, status = pw_signals_change (r, x->settings.t, 0, x->settings.span, &changed, error);
   if (status != PW_OK || changed < 0) return status;
   pw_system_signal_name (x->s, changed, name, sizeof name);
-  double last = signals_last_breakpoint (r->w, x->settings.t, x->settings.span);
+  double last = steady_last_breakpoint (r->w, x->settings.t, x->settings.span);
   status = pw_signals_change (r, last, 0, x->settings.span, &later, error);
   if (status != PW_OK) return status;
   snprintf (text, sizeof text, "%.9g", last);
@@ -246,8 +184,8 @@ int pw_steady_motion_at (pw_steady *x, const double *u, pw_steady_motion *out, p
   return PW_OK;
 }
 
-/* Sets x->null_space to the directions in which solutions form a family, without those of free symmetries.  Returns their number,
- * or a status < 0. */
+/* Sets x->null_space to the directions in which solutions form a family, without those of free symmetries.  Returns
+ * their number, or a status < 0. */
 static int steady_family (pw_steady *x) {
   int unknowns = pw_steady_unknowns (x), equations = pw_steady_equations (x);
   pw_error none = { 0 };
@@ -261,14 +199,14 @@ static int steady_family (pw_steady *x) {
 
 /* Replaces rates below the accuracy of a double root by rest, if that is a solution, too. */
 static void steady_rest (pw_steady *x) {
+  size_t bytes = ((size_t)pw_steady_unknowns (x) + 1) * sizeof *x->u;
   pw_error none = { 0 };
   double most = 0;
   for (int k = x->n; k < pw_steady_unknowns (x); k++) most = fmax (most, fabs (x->u[k]));
   if (most == 0 || most > STEADY_SLOW) return;
-  memcpy (x->null_space, x->u, ((size_t)pw_steady_unknowns (x) + 1) * sizeof *x->u);
+  memcpy (x->null_space, x->u, bytes);
   memset (x->u + x->n, 0, (size_t)x->symmetries * sizeof *x->u);
-  if (pw_branch_solve (&x->branch, x->u, &none) != PW_OK)
-    memcpy (x->u, x->null_space, ((size_t)pw_steady_unknowns (x) + 1) * sizeof *x->u);
+  if (pw_branch_solve (&x->branch, x->u, &none) != PW_OK) memcpy (x->u, x->null_space, bytes);
 }
 
 int pw_steady_solve (pw_steady *x, int attempt, double parameter, pw_steady_motion *out, pw_error *error) {
@@ -305,11 +243,11 @@ static double suggest_change (pw_steady *x, const pw_initial_value *hold, int re
   pw_steady_velocities (x, x->combined, x->q, dv);
   for (int j = 0; j < x->n; j++) dq[j] = z[j] * pw_unit (x->s, j);
   pw_linear_turn (&x->system[PW_HERE].linearisation, x->rates[2], dq, dv);
-  return pw_hold_change (x->s, hold, x->q, x->v, dq, dv) / pw_hold_unit (x, hold) - (relative ? dq[2] : 0);
+  return pw_hold_change (x, hold, dq, dv) - (relative ? dq[2] : 0);
 }
 
-/* Whether holding a quantity makes the family smaller.  `basis` has `count` orthonormal rows of length `family`, the changes of
- * what is held already along the family; that of this quantity becomes the next row. */
+/* Whether holding a quantity makes the family smaller.  `basis` has `count` orthonormal rows of length `family`, the
+ * changes of what is held already along the family; that of this quantity becomes the next row. */
 static int suggest_helps (pw_steady *x, const pw_initial_value *hold, int relative, int family, double *basis,
                           int count) {
   double *row = basis + count * family, norm = 0, before = 0;
@@ -336,7 +274,7 @@ static int suggest_candidate (const pw_steady *x, int c) {
 }
 
 int pw_steady_suggest (pw_steady *x, pw_initial_value *hold, int most) {
-  int family = steady_family (x), count = 0, held = 0, turns = 0, anchored = 0;
+  int family = steady_family (x), count = 0, held = 0, turns = 0 /* 1: the whole can turn */, anchored = 0;
   if (family < 0) return family;
   double *basis = calloc ((size_t)family * ((size_t)family + 1) + 1, sizeof *basis);
   if (basis == NULL) return PW_RESOURCE;
@@ -345,8 +283,8 @@ int pw_steady_suggest (pw_steady *x, pw_initial_value *hold, int most) {
       turns |= x->free_symmetry[k * x->symmetries + i] * x->symmetry[i * pw_steady_rate_count (x->s) + 2] != 0;
   for (int c = 0; c < 2 + x->n + 2 * x->s->bodies && held < family && count < most; c++) {
     pw_initial_value try = { .state = suggest_candidate (x, c) };
-    int angle = try.state < 3 * x->s->bodies && try.state % 3 == 2, relative = turns && angle;
-    if (turns && try.state < 3 * x->s->bodies && !angle) continue;
+    int of_body = try.state < 3 * x->s->bodies, relative = turns && of_body && try.state % 3 == 2;
+    if (turns && of_body && !relative) continue;
     if (try.state < x->n && x->cyclic[try.state]) continue;
     if (!suggest_helps (x, &try, relative, family, basis, held)) continue;
     if (relative && !anchored && count < most)

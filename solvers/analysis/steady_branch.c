@@ -27,14 +27,15 @@ int pw_steady_follow (pw_steady *x, const double *q, const double *v, double par
   x->unstable = motion.unstable;
   x->branch.max_change = 1.0 / x->settings.points;
   x->branch.step = x->branch.max_change / 4;
-  x->branch.min_step = BRANCH_MIN_STEP, x->branch.event_accuracy = BRANCH_ACCURACY,
+  x->branch.min_step = BRANCH_MIN_STEP, x->branch.event_accuracy = BRANCH_ACCURACY;
   x->branch.max_points = BRANCH_MAX_POINTS * x->settings.points;
   return PW_OK;
 }
 
 /* ---- Events ---- */
 
-/* The real part of eigenvalue number `sought` of those that are neither 0 nor of rigid displacements, and its imaginary part. */
+/* The real part of eigenvalue number `sought` of those that are neither 0 nor of rigid displacements, and its imaginary
+ * part. */
 static double branch_eigenvalue (const pw_steady *x, int sought, double *im) {
   const pw_linear *l = &x->linear;
   for (int i = 0; i < l->unknowns; i++) {
@@ -44,8 +45,8 @@ static double branch_eigenvalue (const pw_steady *x, int sought, double *im) {
   return *im = 0, -1;
 }
 
-/* pw_branch_test: the real part that changes its sign, where as many eigenvalues have real part 0 as at both ends of the step
- * (x->compare; -1: these differ); 0 where more have; otherwise +-1 by the number of growing modes. */
+/* pw_branch_test: the real part that changes its sign, where as many eigenvalues have real part 0 as at both ends of
+ * the step (x->neutral_at_ends; -1: these differ); 0 where more have; otherwise +-1 by the number of growing modes. */
 static int branch_test (void *steady, const pw_branch_point *point, double *value, pw_error *error) {
   pw_steady *x = steady;
   pw_steady_motion motion;
@@ -53,8 +54,8 @@ static int branch_test (void *steady, const pw_branch_point *point, double *valu
   int status = pw_steady_motion_at (x, point->u, &motion, error);
   if (status != PW_OK) return status;
   *value = motion.unstable > x->sought ? 1 : -1;
-  if (x->compare == x->neutral) *value = branch_eigenvalue (x, x->sought, &im);
-  if (x->compare >= 0 && x->compare < x->neutral) *value = 0;
+  if (x->neutral_at_ends == x->neutral) *value = branch_eigenvalue (x, x->sought, &im);
+  if (x->neutral_at_ends >= 0 && x->neutral_at_ends < x->neutral) *value = 0;
   return PW_OK;
 }
 
@@ -62,8 +63,8 @@ static int branch_test (void *steady, const pw_branch_point *point, double *valu
 static int branch_pair (const pw_steady *x, int changing) {
   double im;
   branch_eigenvalue (x, x->sought, &im);
-  if (x->compare < 0) return im != 0 || changing == 2;
-  return x->neutral > x->compare ? x->neutral - x->compare >= 2 : im != 0;
+  if (x->neutral_at_ends < 0) return im != 0 || changing == 2;
+  return x->neutral > x->neutral_at_ends ? x->neutral - x->neutral_at_ends >= 2 : im != 0;
 }
 
 /* Sets the tag of a fold, the number of other growing modes there. */
@@ -72,10 +73,10 @@ static void branch_tag_fold (pw_branch *b, int growing) {
     if (b->queue[i].event == PW_BRANCH_FOLD) b->queue[i].tag = growing;
 }
 
-/* Locates each change of sign of a real part from `before` to `now` growing modes, with the number of the others as tag.  That
- * of a real eigenvalue at a fold is no event of its own. */
-static int branch_changes (pw_steady *x, int before, int now, pw_error *error) {
-  int least = before < now ? before : now, most = before < now ? now : before, pair = 0;
+/* Locates each change of sign of a real part between `least` and `most` growing modes, with the number of the others as
+ * tag.  That of a real eigenvalue at a fold is no event of its own. */
+static int branch_changes (pw_steady *x, int least, int most, pw_error *error) {
+  int pair = 0;
   pw_branch *b = &x->branch;
   double fold = b->queued ? b->queue[0].fraction : -1; /* -1: none */
   for (x->sought = least; x->sought < most && b->queued < PW_BRANCH_QUEUE - 1; x->sought += 1 + pair) {
@@ -96,12 +97,11 @@ static int branch_events (void *steady, pw_error *error) {
   pw_steady_motion motion;
   int before = x->unstable, neutral = x->neutral, status = pw_steady_motion_at (x, x->branch.reached.u, &motion, error);
   if (status != PW_OK) return status;
-  int changing = before > motion.unstable ? before - motion.unstable : motion.unstable - before;
-  x->compare = neutral == x->neutral ? neutral : -1;
+  int now = x->unstable = motion.unstable, least = before < now ? before : now, most = before < now ? now : before;
+  x->neutral_at_ends = neutral == x->neutral ? neutral : -1;
   neutral = x->neutral;
-  x->unstable = motion.unstable;
-  branch_tag_fold (&x->branch, before < motion.unstable ? before : motion.unstable);
-  if (changing > x->branch.folded) status = branch_changes (x, before, motion.unstable, error);
+  branch_tag_fold (&x->branch, least);
+  if (most - least > x->branch.folded) status = branch_changes (x, least, most, error);
   x->neutral = neutral;
   return status;
 }

@@ -1,17 +1,17 @@
 /* The equations of steady motions.
  *
- * The system has symmetries: displacements of the whole, and of angles on which nothing depends.  S_k (q) is the velocity of
- * a displacement along the k-th one at unit rate.  A steady motion has the velocities v = xi_1 S_1 (q) + xi_2 S_2 (q) + ... with
- * constant xi.  In the frame that moves with it its velocities are constant: with the angular velocity w of the whole and
- * W (x, y, phi) = w (-y, x, 0) for each body,
+ * The system has symmetries: displacements of the whole, and of angles on which nothing depends.  S_k (q) is the
+ * velocity of a displacement along the k-th one at unit rate.  A steady motion has the velocities v = xi_1 S_1 (q) +
+ * xi_2 S_2 (q) + ... with constant xi.  In the frame that moves with it its velocities are constant: with the angular
+ * velocity w of the whole and W (x, y, phi) = w (-y, x, 0) for each body,
  *
  *     g (q, t) = 0,   J v = eta,   a (q, v) = W v,   A - value B = 0 for what is held (steady_hold.c).
  *
- * The unknowns are u = (q, xi), both scaled by units of the scene, and on a branch the parameter.  There are more equations than
- * unknowns, and they depend on each other, since symmetries and conservation laws make steady motions families;
- * continuation.h solves them by least squares.  Their exact derivatives are those of the linearisation (linear_variation.c) for
- * the variations dq, dv = W dq + dxi_k S_k.  On a branch, corrections are orthogonal to the symmetries that leave what is held
- * unchanged.
+ * The unknowns are u = (q, xi), both scaled by units of the scene, and on a branch the parameter.  There are more
+ * equations than unknowns, and they depend on each other, since symmetries and conservation laws make steady motions
+ * families; continuation.h solves them by least squares.  Their exact derivatives are those of the linearisation
+ * (linear_variation.c) for the variations dq, dv = W dq + dxi_k S_k.  On a branch, corrections are orthogonal to the
+ * symmetries that leave what is held unchanged.
  *
  * (Relative equilibria: Marsden & Ratiu 1999, Introduction to Mechanics and Symmetry.) */
 #include <lapacke.h>
@@ -20,8 +20,8 @@
 #include "rank.h"
 #include "steady_parts.h"
 
-/* Step of central differences by a parameter of the model, relative to its range: its round-off is 1e-11, its truncation error
- * 1e-10 of the third derivative. */
+/* Step of central differences by a parameter of the model, relative to its range: its round-off is 1e-11, its
+ * truncation error 1e-10 of the third derivative. */
 static const double STEADY_DIFFERENCE = 1e-5;
 
 double pw_steady_parameter (const pw_steady *x, const double *u) {
@@ -65,7 +65,8 @@ int pw_steady_nearest (pw_steady *x, const double *q, const double *v, double *u
 
 /* ---- Residuals ---- */
 
-/* Those of x->system[place] in the state x->q, x->v, at which its accelerations are evaluated: g, J v - eta, a - W v. */
+/* Those of x->system[place] in the state x->q, x->v, at which its accelerations are evaluated: g, J v - eta, a - W
+ * v. */
 static void steady_residual (pw_steady *x, pw_place place, double *F) {
   pw_linearisation *l = &x->system[place].linearisation;
   pw_workspace *w = x->system[place].run->w;
@@ -97,8 +98,7 @@ static void steady_change (pw_steady *x, double dw, double *F) {
   pw_linear_turn (l, -x->rates[2], dv, l->da);
   pw_linear_turn (l, -dw, x->v, l->da);
   for (int j = 0; j < n; j++) *F++ = l->da[j] * pw_as_length (x->s, j) * x->T * x->T / x->L;
-  for (int i = 0; i < x->settings.holds; i++)
-    *F++ = pw_hold_change (x->s, x->hold + i, x->q, x->v, dq, dv) / pw_hold_unit (x, x->hold + i);
+  for (int i = 0; i < x->settings.holds; i++) *F++ = pw_hold_change (x, x->hold + i, dq, dv);
 }
 
 /* The conditions that dq is orthogonal to the free symmetries. */
@@ -132,7 +132,8 @@ static void steady_columns (pw_steady *x, double *dF) {
   }
 }
 
-/* Derivatives with respect to a parameter of the model by central differences, at the end of its domain by one-sided ones. */
+/* Derivatives with respect to a parameter of the model by central differences, at the end of its domain by one-sided
+ * ones. */
 static int steady_by_parameter (pw_steady *x, double value, const double *F, double *dF) {
   double h = STEADY_DIFFERENCE * (x->settings.last - x->settings.first), distance = 0;
   int length = x->holonomic + x->m + x->n, sides = 0;
@@ -170,15 +171,12 @@ int pw_steady_evaluate (void *steady, const double *u, double *F, double *dF, pw
     return PW_RETRY;
   }
   steady_residual (x, PW_HERE, F);
-  for (int i = 0; i < x->settings.holds; i++)
-    F[first_held + i] = pw_hold_residual (x->s, x->hold + i, x->q, x->v) / pw_hold_unit (x, x->hold + i);
+  for (int i = 0; i < x->settings.holds; i++) F[first_held + i] = pw_hold_residual (x, x->hold + i);
   if (dF == NULL) return PW_OK;
   steady_columns (x, dF);
   steady_conditions (x, dF);
   dF += (size_t)unknowns * (size_t)equations;
-  if (vary >= 0)
-    dF[first_held + vary] = pw_hold_slope (x->s, x->hold + vary, x->q, x->v) * (x->settings.last - x->settings.first) /
-                            pw_hold_unit (x, x->hold + vary);
+  if (vary >= 0) dF[first_held + vary] = pw_hold_slope (x, x->hold + vary) * (x->settings.last - x->settings.first);
   status = x->settings.compile ? steady_by_parameter (x, value, F, dF) : PW_OK;
   if (status < 0) *error = x->why;
   return status;

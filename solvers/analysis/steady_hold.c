@@ -64,26 +64,26 @@ static hold_pair hold_terms (const pw_system *s, int held, const double *q, cons
 }
 
 double pw_system_held_value (const pw_system *s, int held, const double *q, const double *v) {
-  const hold_pair x = hold_terms (s, held, q, v, NULL, NULL);
-  return x.A / x.B;
+  const hold_pair pair = hold_terms (s, held, q, v, NULL, NULL);
+  return pair.A / pair.B;
 }
 
-double pw_hold_unit (const pw_steady *x, const pw_initial_value *hold) {
-  int index = hold->state - 2 * x->n;
-  if (index < 0) return hold->state < x->n ? pw_unit (x->s, hold->state) : pw_unit (x->s, hold->state - x->n) / x->T;
+/* The unit of A, a product of units of the scene. */
+static double hold_unit (const pw_steady *x, int held) {
+  int n = x->n, index = held - 2 * n;
+  if (index < 0) return held < n ? pw_unit (x->s, held) : pw_unit (x->s, held - n) / x->T;
   return (index % HOLD_OF_BODY == HOLD_CURVATURE ? 1 : x->L) / x->T;
 }
 
-double pw_hold_residual (const pw_system *s, const pw_initial_value *hold, const double *q, const double *v) {
-  return pw_hold_change (s, hold, q, v, NULL, NULL);
+double pw_hold_residual (const pw_steady *x, const pw_initial_value *hold) {
+  return pw_hold_change (x, hold, NULL, NULL);
 }
 
-double pw_hold_change (const pw_system *s, const pw_initial_value *hold, const double *q, const double *v,
-                       const double *dq, const double *dv) {
-  const hold_pair x = hold_terms (s, hold->state, q, v, dq, dv);
-  return x.A - hold->value * x.B;
+double pw_hold_change (const pw_steady *x, const pw_initial_value *hold, const double *dq, const double *dv) {
+  const hold_pair pair = hold_terms (x->s, hold->state, x->q, x->v, dq, dv);
+  return (pair.A - hold->value * pair.B) / hold_unit (x, hold->state);
 }
 
-double pw_hold_slope (const pw_system *s, const pw_initial_value *hold, const double *q, const double *v) {
-  return -hold_terms (s, hold->state, q, v, NULL, NULL).B;
+double pw_hold_slope (const pw_steady *x, const pw_initial_value *hold) {
+  return -hold_terms (x->s, hold->state, x->q, x->v, NULL, NULL).B / hold_unit (x, hold->state);
 }

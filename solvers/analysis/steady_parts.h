@@ -1,7 +1,7 @@
 /* The search for steady motions; for steady*.c and the search for periodic ones.
  *
- * Names: n coordinates, m constraint equations, u the unknowns (steady_equations.c).  "Units of the scene" are L for lengths,
- * 1 rad for angles, T for times (pw_scale); pw_unit is that of a coordinate. */
+ * Names: n coordinates, m constraint equations, u the unknowns (steady_equations.c).  "Units of the scene" are L for
+ * lengths, 1 rad for angles, T for times (pw_scale); pw_unit is that of a coordinate. */
 #ifndef PW_STEADY_H
 #define PW_STEADY_H
 
@@ -45,7 +45,8 @@ struct pw_steady {
   pw_error why;     /* the last reason why a system could not be evaluated */
 
   int unstable, neutral; /* eigenvalues at the point reached: growing, with real part 0 */
-  int sought, compare;   /* for branch_test */
+  int sought;            /* index of the eigenvalue whose change of sign is located */
+  int neutral_at_ends;   /* `neutral` at both ends of the step; -1: they differ */
   char *memory;
 };
 
@@ -60,15 +61,17 @@ static inline int pw_steady_rate_count (const pw_system *s) {
 void pw_steady_combine (const pw_steady *x, const double *coefficient, double unit, double *rates);
 /* The velocities that rates cause at a configuration. */
 void pw_steady_velocities (const pw_steady *x, const double *rates, const double *q, double *v);
-/* Orthonormal rows that span the null space of M (rows x n, by columns, destroyed; rows >= n).  Singular values up to the
- * tolerance, or up to round-off, count as 0.  Returns the number of rows, or a status < 0. */
+/* Orthonormal rows that span the null space of M (rows x n, by columns, destroyed; rows >= n).  Singular values up to
+ * the tolerance, or up to round-off, count as 0.  Returns the number of rows, or a status < 0. */
 int pw_null_space (int rows, int n, double *M, double tolerance, double *out);
+/* A state at a distance from the run's in every coordinate, in units of the scene, in irregular direction `number`. */
+void pw_irregular_state (const pw_run *r, double distance, int number, double *q, double *v);
 /* Finds the symmetries of the system.  PW_OK, PW_RESOURCE or PW_RETRY. */
 int pw_steady_find_symmetries (pw_steady *x);
 /* Finds the symmetries that leave what is held unchanged, at the state x->q, x->v. */
 int pw_steady_find_free_symmetries (pw_steady *x);
-/* The largest difference of two states up to symmetries and whole turns, in units of the scene; of numbers above 1 in these
- * units, relative to them. */
+/* The largest difference of two states up to symmetries and whole turns, in units of the scene; of numbers above 1 in
+ * these units, relative to them. */
 double pw_steady_distance (pw_steady *x, const double *q1, const double *v1, const double *q2, const double *v2);
 /* Displaces a state by symmetries, to the same state for all that differ by symmetries only. */
 void pw_steady_canonical (const pw_steady *x, double *q, double *v);
@@ -103,27 +106,27 @@ void pw_steady_close_system (pw_steady *x, pw_place place);
 
 /* ---- steady_hold.c ---- */
 
-/* The unit of A, a product of units of the scene. */
-double pw_hold_unit (const pw_steady *x, const pw_initial_value *hold);
-/* The residual A - value B of what is held (steady_hold.c), and its change by a variation (dq, dv). */
-double pw_hold_residual (const pw_system *s, const pw_initial_value *hold, const double *q, const double *v);
-double pw_hold_change (const pw_system *s, const pw_initial_value *hold, const double *q, const double *v,
-                       const double *dq, const double *dv);
-/* The derivative of the residual with respect to its value. */
-double pw_hold_slope (const pw_system *s, const pw_initial_value *hold, const double *q, const double *v);
+/* The residual A - value B of what is held (steady_hold.c) in the state x->q, x->v, its change by a variation (dq, dv),
+ * and its derivative with respect to the value; all divided by the unit of A. */
+double pw_hold_residual (const pw_steady *x, const pw_initial_value *hold);
+double pw_hold_change (const pw_steady *x, const pw_initial_value *hold, const double *dq, const double *dv);
+double pw_hold_slope (const pw_steady *x, const pw_initial_value *hold);
 
 /* ---- steady_start.c ---- */
 
-/* The unknowns with which an attempt begins: 0, the initial state; 1, a state to which forces lead from there; then random
- * states, even attempts near the initial one, odd ones anywhere.  Of four in a row the first two need not be consistent, and
- * from the third one forces lead elsewhere as in attempt 1. */
+/* The unknowns with which an attempt begins: 0, the initial state; 1, a state to which forces lead from there; then
+ * random states, even attempts near the initial one, odd ones anywhere.  Of four in a row the first two need not be
+ * consistent, and from the third one forces lead elsewhere as in attempt 1. */
 int pw_steady_start (pw_steady *x, int attempt, double *u, pw_error *error);
 
-/* ---- steady.c ---- */
+/* ---- signal_change.c ---- */
 
-/* *changed: the first signal whose value changes within the span after time t, or if period > 0, that differs between times in
- * this span and one period later; -1: none.  Signals are compared in the run's state and in one near it.  A status. */
+/* *changed: the first signal whose value changes within the span after time t, or if period > 0, that differs between
+ * times in this span and one period later; -1: none.  Signals are compared in the run's state and in one near it.  A
+ * status. */
 int pw_signals_change (pw_run *r, double t, double period, double span, int *changed, pw_error *error);
+
+/* ---- steady.c ---- */
 
 /* Opens only scales and symmetries at time t, for other searches: signals may change with time. */
 pw_steady *pw_steady_open_symmetries (const pw_system *s, double t, double span, pw_error *error);

@@ -8,7 +8,8 @@ enum { START_STEPS = 300 };          /* of a relaxation, at most */
 static const double START_FAR = 0.2, /* longest of its steps, in units of the scene */
     START_GROW = 1.1, START_SHRINK = 0.4;
 
-/* A random number between -1 and 1: SplitMix64 (Steele, Lea & Flood 2014, Fast splittable pseudorandom number generators). */
+/* A random number between -1 and 1: SplitMix64 (Steele, Lea & Flood 2014, Fast splittable pseudorandom number
+ * generators). */
 static double start_random (uint64_t *state) {
   uint64_t z = *state += 0x9e3779b97f4a7c15;
   z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9;
@@ -24,8 +25,8 @@ static int start_assemble (pw_steady *x, pw_projector *p) {
   return status;
 }
 
-/* The accelerations in the moving frame at x->q, x->rates; returns the largest in units of the scene, NaN if they are not
- * determined. */
+/* The accelerations in the moving frame at x->q, x->rates; returns the largest in units of the scene, NaN if they are
+ * not determined. */
 static double start_accelerate (pw_steady *x, double *a) {
   pw_linearisation *l = &x->system[PW_HERE].linearisation;
   double most = 0;
@@ -37,8 +38,8 @@ static double start_accelerate (pw_steady *x, double *a) {
   return most;
 }
 
-/* Moves positions along the accelerations, at constant rates: towards a minimum of the potential, if forces have one.  Steps
- * become longer while the direction of the accelerations changes by less than 90 degrees, otherwise shorter. */
+/* Moves positions along the accelerations, at constant rates: towards a minimum of the potential, if forces have one.
+ * Steps become longer while the direction of the accelerations changes by less than 90 degrees, otherwise shorter. */
 static void start_relax (pw_steady *x, pw_projector *p) {
   double *a = x->q0, *before = x->v0, most = start_accelerate (x, a), step = START_FAR / most;
   for (int i = 0; i < START_STEPS && most > 0 && isfinite (step); i++) {

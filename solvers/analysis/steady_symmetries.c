@@ -1,6 +1,6 @@
-/* Symmetries of a system: displacements under which its equations are invariant.  Besides displacements of the whole these are
- * changes of angles on which nothing depends, such as that of a wheel that rolls.  They span the null space of the derivatives of
- * the equations along all displacements, at states in general position. */
+/* Symmetries of a system: displacements under which its equations are invariant.  Besides displacements of the whole
+ * these are changes of angles on which nothing depends, such as that of a wheel that rolls.  They span the null space
+ * of the derivatives of the equations along all displacements, at states in general position. */
 #include <lapacke.h>
 #include <math.h>
 #include <stdlib.h>
@@ -57,8 +57,8 @@ static double symmetry_largest_change (pw_steady *x) {
   return most;
 }
 
-/* Reduced row echelon form of `rows` independent rows of n rates.  Pivots are chosen from the last column on, so that angles of
- * single bodies stand alone in their rows. */
+/* Reduced row echelon form of `rows` independent rows of n rates.  Pivots are chosen from the last column on, so that
+ * angles of single bodies stand alone in their rows. */
 static void symmetry_reduce (int rows, int n, double *row) {
   for (int i = 0, c = n - 1; i < rows && c >= 0; c--) {
     int best = i;
@@ -98,15 +98,20 @@ int pw_null_space (int rows, int n, double *M, double tolerance, double *out) {
   return left;
 }
 
-/* Evaluates derivatives at state `number` near the initial one, in general position, but on the constraints: off them residuals
- * rotate with the whole. */
+void pw_irregular_state (const pw_run *r, double distance, int number, double *q, double *v) {
+  for (int j = 0; j < r->s->coords; j++) {
+    double unit = distance * pw_unit (r->s, j);
+    q[j] = r->q[j] + unit * pw_irregular (1.7 + number, j + 1);
+    v[j] = r->v[j] + unit / r->w->scale.time * pw_irregular (2.9 + number, j + 1);
+  }
+}
+
+/* Evaluates derivatives at state `number` near the initial one, in general position, but on the constraints: off them
+ * residuals rotate with the whole. */
 static int symmetry_evaluate (pw_steady *x, double distance, int number) {
   pw_run *r = x->system[PW_HERE].run;
   pw_projector p;
-  for (int j = 0; j < x->n; j++) {
-    x->q[j] = r->q[j] + distance * pw_unit (x->s, j) * pw_irregular (1.7 + number, j + 1);
-    x->v[j] = r->v[j] + distance * pw_unit (x->s, j) / x->T * pw_irregular (2.9 + number, j + 1);
-  }
+  pw_irregular_state (r, distance, number, x->q, x->v);
   if (pw_projector_open (&p, r, x->s->metric, x->s->metric, &x->why) != PW_OK) return PW_RESOURCE;
   int status = pw_project_positions (&p, r, x->settings.t, x->q, x->v);
   if (status == PW_OK) status = pw_project_velocities (&p, r, x->v);
@@ -116,8 +121,9 @@ static int symmetry_evaluate (pw_steady *x, double distance, int number) {
   return status;
 }
 
-/* Makes combinations that displace nothing, such as a rotation of the whole about the centre of a pinned disc less one of its
- * angle, vanish from the basis of symmetries.  Returns their number, or a status < 0.  x->q is in general position. */
+/* Makes combinations that displace nothing, such as a rotation of the whole about the centre of a pinned disc less one
+ * of its angle, vanish from the basis of symmetries.  Returns their number, or a status < 0.  x->q is in general
+ * position. */
 static int symmetry_remove_idle (pw_steady *x, int rates) {
   int n = x->n + 3, symmetries = x->symmetries; /* at least as many rows as columns */
   double *F = calloc ((size_t)(n + symmetries + rates) * (size_t)symmetries + 1, sizeof *F), *c = F + n * symmetries,
@@ -194,8 +200,7 @@ int pw_steady_find_free_symmetries (pw_steady *x) {
     pw_steady_velocities (x, axis, x->q, x->dq);
     memset (x->dv, 0, (size_t)x->n * sizeof *x->dv);
     pw_linear_turn (&x->system[PW_HERE].linearisation, axis[2], x->v, x->dv);
-    for (int i = 0; i < holds; i++)
-      M[k * rows + i] = pw_hold_change (x->s, x->hold + i, x->q, x->v, x->dq, x->dv) / pw_hold_unit (x, x->hold + i);
+    for (int i = 0; i < holds; i++) M[k * rows + i] = pw_hold_change (x, x->hold + i, x->dq, x->dv);
   }
   x->free_symmetries = symmetries ? pw_null_space (rows, symmetries, M, 1e-9, x->free_symmetry) : 0;
   free (M);
