@@ -17,13 +17,13 @@ static const double NEWTON_EXACT = 1e-4, /* |F| relative to the tolerance that n
     NEWTON_DAMPING = 0.1,                /* factor of |F| in the square of the damping */
     BRANCH_STEEP = 1e-3,                 /* smallest slope of p along a branch that limits steps by max_change */
     BRANCH_GROW = 1.5,                   /* of the next step, after half of the iterations at most */
-    BRANCH_TURN = 0.96, /* cosine of the largest angle between the tangents of successive points, 16 degrees */
-    BRANCH_BENT =
-        0.02, /* largest distance between the directions of a chord and of the sum of the tangents at its ends,
-                             which is of second order on a smooth branch, but not from one branch to another */
+    BRANCH_TURN = 0.96,   /* cosine of the largest angle between the tangents of successive points, 16 degrees */
     BRANCH_APART = 0.3,   /* largest correction of a predictor, relative to the step */
     BRANCH_ASIDE = 0.002, /* largest correction of an interpolated point, relative to the distance of the two points */
-    BRANCH_FINE = 1e-3;   /* of max_change: a step so short may pass p of the first point twice beside a fold */
+    BRANCH_FINE = 1e-3,   /* of max_change: a step so short may pass p of the first point twice beside a fold */
+    /* Largest distance between the directions of a chord and of the sum of the tangents at its ends: it is of second
+     * order on a smooth branch, but not from one branch to another. */
+    BRANCH_BENT = 0.02;
 
 int pw_branch_open (pw_branch *b, const pw_branch_problem *problem, pw_error *error) {
   size_t n = (size_t)problem->unknowns + 1, m = (size_t)problem->equations + n, large = n > m ? n : m;

@@ -7,13 +7,16 @@
 
 enum {
   FLOW_MULTIPLES = 24, /* of the period of a signal, that are tried as a common period */
-  FLOW_STEPS =
-      20, /* largest ratio of the steps of a trial of Newton's method to those of the motion that it is to improve:
-                             one far away, with enormous velocities, would take millions */
+  FLOW_PERIODS = 3,    /* in which signals are compared; without a period: FLOW_TIMES T */
+  FLOW_TIMES = 20,
+  /* Largest ratio of the steps of a trial of Newton's method to those of the motion that it is to improve: a trial far
+   * away, with enormous velocities, would take millions. */
+  FLOW_STEPS = 20,
   RETURN_SAMPLES = 20000, /* of a run that seeks a return */
   RETURN_STEPS = 20       /* samples per scale of time T */
 };
-static const double FLOW_FAR = 4, /* largest ratio of a free period to the last one known */
+static const double FLOW_SETTLED = 1e-9, /* relative tolerance of the run that settles */
+    FLOW_FAR = 4,                        /* largest ratio of a free period to the last one known */
     RETURN_NEAR = 0.2,   /* distance of a return from the first state, relative to the largest one on the way */
     RETURN_LEAST = 1e-6; /* largest distance that counts as rest, in units of the scene */
 
@@ -22,7 +25,7 @@ static const double flow_min_rtol[] = { [PW_FLOW] = 0, [PW_FLOW_DERIVATIVES] = 1
 
 /* ---- The period of signals ---- */
 
-/* 0: it has none. */
+/* The period of a signal [s]; 0: none. */
 static double signal_period (const pw_signal *s) {
   if (s->type == PW_HARMONIC && s->harmonic.amplitude != 0 && s->harmonic.omega != 0)
     return 2 * PW_PI / fabs (s->harmonic.omega);
@@ -57,8 +60,8 @@ static int flow_signals (pw_periodic *x, pw_place place, pw_run *r) {
                     isnan (signals) ? "model %s: the periods of its signals have no common multiple: a period is needed"
                                     : "model %s: no signal has a known period: a period is needed",
                     x->s->model);
-  status = x->settings.free ? pw_signals_change (r, x->settings.t, 0, 20 * x->T, &changed, &x->why)
-                            : pw_signals_change (r, x->settings.t, period, 3 * period, &changed, &x->why);
+  status = x->settings.free ? pw_signals_change (r, x->settings.t, 0, FLOW_TIMES * x->T, &changed, &x->why)
+                            : pw_signals_change (r, x->settings.t, period, FLOW_PERIODS * period, &changed, &x->why);
   if (status != PW_OK) return status;
   x->system[place].period = period;
   if (changed < 0) return PW_OK;
@@ -248,7 +251,7 @@ static int flow_return (pw_periodic *x, pw_run *r) {
 
 int pw_periodic_settle (pw_periodic *x, double value, int periods) {
   pw_sample sample;
-  pw_run *r = pw_periodic_run (x, PW_HERE, value, 1e-9, NULL);
+  pw_run *r = pw_periodic_run (x, PW_HERE, value, FLOW_SETTLED, NULL);
   if (r == NULL) return x->why.status;
   double end = r->t + periods * (x->settings.free ? x->last_period : x->system[PW_HERE].period);
   int status = pw_run_advance_to (r, end, end, &x->why);
