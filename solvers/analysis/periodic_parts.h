@@ -23,7 +23,7 @@ struct pw_periodic {
   pw_branch branch;
   double *u;          /* 2 n, symmetries, 1, 1: state, displacement in a period, free period, parameter; scaled */
   double last_period; /* the free period last known [s] */
-  /* Of the last flow: state at its begin and end, with accelerations there. */
+  /* Of the last flow: state at its beginning and end, with accelerations there. */
   double *y0, *y1, *a0, *a1; /* 2 n, 2 n, n, n */
   double *state, *change;    /* 2 n: a state that a run begins with, a change of a state; scratch */
   int size;                  /* number of minimal coordinates of changes of the state */
