@@ -139,7 +139,7 @@ static int periodic_orbit (pw_periodic *x, const double *u, pw_periodic_orbit *o
   int status = pw_periodic_flow (x, u, PW_FLOW_MULTIPLIERS, PW_HERE, error);
   if (status == PW_OK) status = pw_periodic_multipliers (x, u, &out->trivial);
   if (status == PW_METHOD) return pw_fail (error, status, "model %s: no multipliers: LAPACK failed", x->s->model);
-  out->rotation = x->work[2];
+  out->rotation = x->work[PW_RATE_TURN];
   if (status == PW_OK) status = pw_periodic_flow (x, u, PW_FLOW, PW_HERE, error);
   if (status == PW_OK) status = periodic_turns (x);
   if (status != PW_OK) return status;

@@ -29,18 +29,18 @@ static const double EQUATIONS_STEADY = 1e-4;
  * same time, p -> R p + V t, with R the rotation by w and V its mean over the way. */
 static void equations_displace (const pw_periodic *x, const double *rates, const double *y, double *out) {
   int n = x->n, bodies = x->s->bodies;
-  double w = rates[2], c = pw_cos (w), s = pw_sin (w), half = pw_sin (w / 2);
+  double w = rates[PW_RATE_TURN], c = pw_cos (w), s = pw_sin (w), half = pw_sin (w / 2);
   double p = fabs (w) > 1e-8 ? s / w : 1, r = fabs (w) > 1e-8 ? 2 * half * half / w : w / 2; /* V = [ p -r ; r p ] */
-  const double *o = x->steady->origin, t[2] = { x->L * rates[0], x->L * rates[1] };
+  const double *o = x->steady->origin, t[2] = { x->L * rates[PW_RATE_X], x->L * rates[PW_RATE_Y] };
   memcpy (out, y, 2 * (size_t)n * sizeof *out);
   for (int b = 0; b < bodies; b++) {
     double *q = out + 3 * b, *v = out + n + 3 * b, dx = q[0] - o[0], dy = q[1] - o[1], vx = v[0], vy = v[1];
     q[0] = o[0] + c * dx - s * dy + p * t[0] - r * t[1];
     q[1] = o[1] + s * dx + c * dy + r * t[0] + p * t[1];
-    q[2] += w + rates[3 + b];
+    q[2] += w + rates[PW_RATE_ANGLES + b];
     v[0] = c * vx - s * vy, v[1] = s * vx + c * vy;
   }
-  for (int j = 3 * bodies; j < n; j++) out[j] += rates[3 + bodies + j - 3 * bodies];
+  for (int j = 3 * bodies; j < n; j++) out[j] += rates[PW_RATE_ANGLES + bodies + j - 3 * bodies];
 }
 
 /* The change of a state along symmetry k. */
@@ -48,7 +48,7 @@ static void equations_symmetry (const pw_periodic *x, int k, const double *y, do
   const double *symmetry = x->steady->symmetry + k * pw_steady_rate_count (x->s);
   pw_steady_velocities (x->steady, symmetry, y, out);
   memset (out + x->n, 0, (size_t)x->n * sizeof *out);
-  pw_linear_turn (&x->steady->system[PW_HERE].linearisation, symmetry[2], y + x->n, out + x->n);
+  pw_linear_turn (&x->steady->system[PW_HERE].linearisation, symmetry[PW_RATE_TURN], y + x->n, out + x->n);
 }
 
 /* ---- Equations ---- */
@@ -90,7 +90,7 @@ static void equations_by_state (pw_periodic *x, const double *u, int rows, doubl
   pw_steady_combine (x->steady, u + states, 1, x->work);
   for (int c = 0; c < size; c++) {
     const double *B = x->basis + states * c, *Phi = x->Phi + states * c;
-    equations_rotate (x, x->work[2], B, x->state);
+    equations_rotate (x, x->work[PW_RATE_TURN], B, x->state);
     for (int i = 0; i < states; i++) {
       double unit = pw_periodic_unit (x, i), by = (Phi[i] - x->state[i]) / unit, own = B[i] / unit;
       for (int j = 0; j < states; j++) {
@@ -221,7 +221,7 @@ int pw_periodic_multipliers (pw_periodic *x, const double *u, int *trivial) {
   int k = *trivial = equations_shifts (x, S);
   pw_steady_combine (x->steady, u + 2 * n, 1, x->work);
   for (int c = 0; c < size; c++) {
-    equations_rotate (x, -x->work[2], x->Phi + 2 * n * c, x->change);
+    equations_rotate (x, -x->work[PW_RATE_TURN], x->Phi + 2 * n * c, x->change);
     equations_coordinates (x, x->change, x->monodromy + c * size);
   }
   LAPACKE_dgeqrf_work (LAPACK_COL_MAJOR, size, k, S, size, tau, work, lwork);

@@ -212,7 +212,8 @@ int pw_periodic_flow (pw_periodic *x, const double *u, pw_flow_accuracy accuracy
 double pw_periodic_difference (const pw_periodic *x, int j, double a, double b) {
   int rates = pw_steady_rate_count (x->s), changes = j >= 3 * x->s->bodies || j % 3 != 2;
   for (int k = 0; k < x->symmetries && !changes; k++)
-    changes = x->steady->symmetry[k * rates + 2] != 0 || x->steady->symmetry[k * rates + 3 + j / 3] != 0;
+    changes = x->steady->symmetry[k * rates + PW_RATE_TURN] != 0 ||
+              x->steady->symmetry[k * rates + PW_RATE_ANGLES + j / 3] != 0;
   return changes ? a - b : remainder (a - b, 2 * PW_PI);
 }
 

@@ -242,7 +242,7 @@ static double suggest_change (pw_steady *x, const pw_initial_value *hold, int re
   pw_steady_combine (x, z + x->n, x->T, x->combined);
   pw_steady_velocities (x, x->combined, x->q, dv);
   for (int j = 0; j < x->n; j++) dq[j] = z[j] * pw_unit (x->s, j);
-  pw_linear_turn (&x->system[PW_HERE].linearisation, x->rates[2], dq, dv);
+  pw_linear_turn (&x->system[PW_HERE].linearisation, x->rates[PW_RATE_TURN], dq, dv);
   return pw_hold_change (x, hold, dq, dv) - (relative ? dq[2] : 0);
 }
 
@@ -280,7 +280,8 @@ int pw_steady_suggest (pw_steady *x, pw_initial_value *hold, int most) {
   if (basis == NULL) return PW_RESOURCE;
   for (int k = 0; k < x->free_symmetries; k++)
     for (int i = 0; i < x->symmetries; i++)
-      turns |= x->free_symmetry[k * x->symmetries + i] * x->symmetry[i * pw_steady_rate_count (x->s) + 2] != 0;
+      turns |=
+          x->free_symmetry[k * x->symmetries + i] * x->symmetry[i * pw_steady_rate_count (x->s) + PW_RATE_TURN] != 0;
   for (int c = 0; c < 2 + x->n + 2 * x->s->bodies && held < family && count < most; c++) {
     pw_initial_value try = { .state = suggest_candidate (x, c) };
     int of_body = try.state < 3 * x->s->bodies, relative = turns && of_body && try.state % 3 == 2;

@@ -79,7 +79,7 @@ static void steady_residual (pw_steady *x, pw_place place, double *F) {
   for (int i = 0; i < x->m; i++) F[i] = (F[i] - (x->s->rheonomic ? l->c[i] : 0)) * x->T / (x->norm[i] * x->L);
   F += x->m;
   memcpy (F, l->a, (size_t)x->n * sizeof *F);
-  pw_linear_turn (l, -x->rates[2], x->v, F);
+  pw_linear_turn (l, -x->rates[PW_RATE_TURN], x->v, F);
   for (int j = 0; j < x->n; j++) F[j] *= pw_as_length (x->s, j) * acceleration;
 }
 
@@ -95,7 +95,7 @@ static void steady_change (pw_steady *x, double dw, double *F) {
   pw_linear_vary (l);
   pw_mul_J (x->system[PW_HERE].run->w, dv, l->c);
   for (int i = 0; i < x->m; i++) *F++ = (l->c[i] + l->y[n + x->m + i]) * x->T / (x->norm[i] * x->L);
-  pw_linear_turn (l, -x->rates[2], dv, l->da);
+  pw_linear_turn (l, -x->rates[PW_RATE_TURN], dv, l->da);
   pw_linear_turn (l, -dw, x->v, l->da);
   for (int j = 0; j < n; j++) *F++ = l->da[j] * pw_as_length (x->s, j) * x->T * x->T / x->L;
   for (int i = 0; i < x->settings.holds; i++) *F++ = pw_hold_change (x, x->hold + i, dq, dv);
@@ -119,16 +119,16 @@ static void steady_columns (pw_steady *x, double *dF) {
   pw_linearisation *l = &x->system[PW_HERE].linearisation;
   int n = x->n, equations = pw_steady_equations (x);
   for (int c = 0; c < pw_steady_unknowns (x); c++, dF += equations) {
-    const double *axis = x->symmetry + (c - n) * pw_steady_rate_count (x->s);
+    const double *symmetry = x->symmetry + (c - n) * pw_steady_rate_count (x->s);
     memset (l->x, 0, 2 * (size_t)n * sizeof *l->x);
     if (c < n) {
       l->x[c] = pw_unit (x->s, c);
-      pw_linear_turn (l, x->rates[2], l->x, l->x + n);
+      pw_linear_turn (l, x->rates[PW_RATE_TURN], l->x, l->x + n);
     } else {
-      pw_steady_velocities (x, axis, x->q, l->x + n);
+      pw_steady_velocities (x, symmetry, x->q, l->x + n);
       for (int j = n; j < 2 * n; j++) l->x[j] /= x->T;
     }
-    steady_change (x, c < n ? 0 : axis[2] / x->T, dF);
+    steady_change (x, c < n ? 0 : symmetry[PW_RATE_TURN] / x->T, dF);
   }
 }
 

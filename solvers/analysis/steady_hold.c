@@ -7,6 +7,7 @@
 #include "steady_parts.h"
 #include "util.h"
 
+/* What can be held is numbered: the states, then HOLD_OF_BODY quantities of each body. */
 enum { HOLD_SPEED, HOLD_RADIUS, HOLD_CURVATURE, HOLD_OF_BODY };
 static const struct {
   const char *name, *unit;
@@ -54,8 +55,9 @@ typedef struct {
 static hold_pair hold_terms (const pw_system *s, int held, const double *q, const double *v, const double *dq,
                              const double *dv) {
   int index = held - 2 * s->coords, b = 3 * (index / HOLD_OF_BODY);
-  const double *state = held < s->coords ? dq ? dq : q : dq ? dv : v, one = dq ? 0 : 1;
-  if (index < 0) return (hold_pair){ state[held % s->coords], one };
+  double one = dq ? 0 : 1;
+  if (held < s->coords) return (hold_pair){ dq ? dq[held] : q[held], one };
+  if (index < 0) return (hold_pair){ dq ? dv[held - s->coords] : v[held - s->coords], one };
   double c = pw_cos (q[b + 2]), sine = pw_sin (q[b + 2]), speed = c * v[b] + sine * v[b + 1], omega = v[b + 2];
   if (dq) speed = c * dv[b] + sine * dv[b + 1] + (c * v[b + 1] - sine * v[b]) * dq[b + 2], omega = dv[b + 2];
   return index % HOLD_OF_BODY == HOLD_SPEED    ? (hold_pair){ speed, one }

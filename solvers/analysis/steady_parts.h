@@ -52,10 +52,11 @@ struct pw_steady {
 
 /* ---- steady_symmetries.c ---- */
 
-/* Rates of displacements: x and y [L], rotation about the origin, of the whole; then the angle of each body; then each
- * internal coordinate. */
+/* The rates of a displacement [L/s, rad/s]: of the whole along x and y, its rotation about the origin; then of the
+ * angle of each body alone; then of each internal coordinate. */
+enum { PW_RATE_X, PW_RATE_Y, PW_RATE_TURN, PW_RATE_ANGLES };
 static inline int pw_steady_rate_count (const pw_system *s) {
-  return 3 + s->bodies + s->coords - 3 * s->bodies;
+  return PW_RATE_ANGLES + s->bodies + s->coords - 3 * s->bodies;
 }
 /* The rates of a combination of symmetries, from their coefficients divided by a unit. */
 void pw_steady_combine (const pw_steady *x, const double *coefficient, double unit, double *rates);

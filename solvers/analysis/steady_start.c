@@ -33,7 +33,7 @@ static double start_accelerate (pw_steady *x, double *a) {
   pw_steady_velocities (x, x->rates, x->q, x->v);
   if (pw_run_accelerate (x->system[PW_HERE].run, x->settings.t, x->q, x->v, l->a, l->lambda) != PW_OK) return NAN;
   memcpy (a, l->a, (size_t)x->n * sizeof *a);
-  pw_linear_turn (l, -x->rates[2], x->v, a);
+  pw_linear_turn (l, -x->rates[PW_RATE_TURN], x->v, a);
   for (int j = 0; j < x->n; j++) most = pw_larger_or_nan (most, fabs (a[j]) / pw_unit (x->s, j));
   return most;
 }
@@ -62,7 +62,7 @@ int pw_steady_start (pw_steady *x, int attempt, double *u, pw_error *error) {
     u[j] += wide * start_random (&state) * (j >= x->n ? 2 : pw_is_angle (x->s, j) ? PW_PI : 1);
   if (status != PW_OK || (attempt != 1 && attempt % 4 < 2)) return status;
   pw_steady_state (x, u);
-  if (pw_evaluate_J_at (x->system[PW_HERE].run->w, x->settings.t, x->q, x->v) != PW_OK) return PW_OK;
+  if (pw_evaluate_J_at (x->system[PW_HERE].run->w, x->settings.t, x->q, x->v) != PW_OK) return PW_OK; /* as it is */
   if (pw_projector_open (&p, x->system[PW_HERE].run, x->s->metric, x->s->metric, &x->why) != PW_OK)
     return pw_fail_memory (x->s, error);
   if (start_assemble (x, &p) == PW_OK && attempt % 4 < 3) start_relax (x, &p);

@@ -25,11 +25,11 @@ void pw_steady_combine (const pw_steady *x, const double *coefficient, double un
 void pw_steady_velocities (const pw_steady *x, const double *rates, const double *q, double *v) {
   int bodies = 3 * x->s->bodies;
   for (int j = 0; j < bodies; j += 3) {
-    v[j] = x->L * rates[0] - rates[2] * (q[j + 1] - x->origin[1]);
-    v[j + 1] = x->L * rates[1] + rates[2] * (q[j] - x->origin[0]);
-    v[j + 2] = rates[2] + rates[3 + j / 3];
+    v[j] = x->L * rates[PW_RATE_X] - rates[PW_RATE_TURN] * (q[j + 1] - x->origin[1]);
+    v[j + 1] = x->L * rates[PW_RATE_Y] + rates[PW_RATE_TURN] * (q[j] - x->origin[0]);
+    v[j + 2] = rates[PW_RATE_TURN] + rates[PW_RATE_ANGLES + j / 3];
   }
-  for (int j = bodies; j < x->n; j++) v[j] = rates[3 + x->s->bodies + j - bodies];
+  for (int j = bodies; j < x->n; j++) v[j] = rates[PW_RATE_ANGLES + x->s->bodies + j - bodies];
 }
 
 /* The change of the equations by rate of displacement c, in units of the scene. */
@@ -39,8 +39,8 @@ static void symmetry_violation (pw_steady *x, int c, double *rates, double *out)
   rates[c] = 1;
   memset (l->x, 0, 2 * (size_t)x->n * sizeof *l->x);
   pw_steady_velocities (x, rates, x->q, l->x);
-  if (c == 2) pw_linear_turn (l, 1, x->v, l->x + x->n);
-  pw_linear_asymmetry (l, c == 2, out);
+  if (c == PW_RATE_TURN) pw_linear_turn (l, 1, x->v, l->x + x->n);
+  pw_linear_asymmetry (l, c == PW_RATE_TURN, out);
 }
 
 /* The largest change of an acceleration by a single coordinate, in units of the scene. */
@@ -126,8 +126,8 @@ static int symmetry_evaluate (pw_steady *x, double distance, int number) {
  * position. */
 static int symmetry_remove_idle (pw_steady *x, int rates) {
   int n = x->n + 3, symmetries = x->symmetries; /* at least as many rows as columns */
-  double *F = calloc ((size_t)(n + symmetries + rates) * (size_t)symmetries + 1, sizeof *F), *c = F + n * symmetries,
-         *w = c + symmetries * symmetries;
+  double *F = calloc ((size_t)(n + symmetries + rates) * (size_t)symmetries + 1, sizeof *F);
+  double *c = F + n * symmetries, *idle_rates = c + symmetries * symmetries; /* combinations, and their rates */
   if (F == NULL) return PW_RESOURCE;
   for (int k = 0; k < symmetries; k++) {
     pw_steady_velocities (x, x->symmetry + k * rates, x->q, F + k * n);
@@ -135,23 +135,24 @@ static int symmetry_remove_idle (pw_steady *x, int rates) {
   }
   int idle = symmetries ? pw_null_space (n, symmetries, F, 1e-9, c) : 0;
   for (int i = 0; i < idle * symmetries; i++)
-    for (int j = 0; j < rates; j++) w[i / symmetries * rates + j] += c[i] * x->symmetry[i % symmetries * rates + j];
-  symmetry_reduce (idle, rates, w);
+    for (int j = 0; j < rates; j++)
+      idle_rates[i / symmetries * rates + j] += c[i] * x->symmetry[i % symmetries * rates + j];
+  symmetry_reduce (idle, rates, idle_rates);
   for (int i = 0; i < idle; i++) {
-    int last = rates - 1;
-    while (last > 0 && w[i * rates + last] == 0) last--;
+    int last = rates - 1; /* the pivot */
+    while (last > 0 && idle_rates[i * rates + last] == 0) last--;
     for (int k = 0; k < symmetries; k++) {
       double factor = x->symmetry[k * rates + last];
-      for (int j = 0; j < rates; j++) x->symmetry[k * rates + j] -= factor * w[i * rates + j];
+      for (int j = 0; j < rates; j++) x->symmetry[k * rates + j] -= factor * idle_rates[i * rates + j];
     }
   }
   free (F);
   return idle;
 }
 
-/* The coordinate that rate c > 2 changes. */
+/* The coordinate that rate c >= PW_RATE_ANGLES changes. */
 static int symmetry_coordinate (const pw_steady *x, int c) {
-  return c < 3 + x->s->bodies ? 3 * (c - 3) + 2 : 2 * x->s->bodies + c - 3;
+  return c < PW_RATE_ANGLES + x->s->bodies ? 3 * (c - PW_RATE_ANGLES) + 2 : 2 * x->s->bodies + c - 3;
 }
 
 /* Finds the angles whose change is a symmetry by itself. */
@@ -161,7 +162,7 @@ static void symmetry_find_cyclic (pw_steady *x) {
     int last = 0, count = 0;
     for (int c = 0; c < rates; c++)
       if (x->symmetry[k * rates + c] != 0) last = c, count++;
-    if (count == 1 && last > 2) x->cyclic[symmetry_coordinate (x, last)] = 1;
+    if (count == 1 && last >= PW_RATE_ANGLES) x->cyclic[symmetry_coordinate (x, last)] = 1;
   }
 }
 
@@ -179,7 +180,7 @@ int pw_steady_find_symmetries (pw_steady *x) {
       symmetry_violation (x, c, M + rows * rates, M + c * rows + k * (length + 3));
     if (status == PW_OK) size = fmax (size, symmetry_largest_change (x));
   }
-  double tolerance = PW_LINEAR_SYMMETRIC * (1 + 1e-4 * size);
+  double tolerance = PW_LINEAR_SYMMETRIC * (1 + 1e-4 * size); /* round-off of larger derivatives is larger */
   if (status == PW_OK) x->symmetries = x->s->bodies ? pw_null_space (rows, rates, M, tolerance, x->symmetry) : 0;
   free (M);
   if (status != PW_OK || x->symmetries < 0) return status != PW_OK ? status : x->symmetries;
@@ -196,10 +197,10 @@ int pw_steady_find_free_symmetries (pw_steady *x) {
   double *M = calloc ((size_t)rows * (size_t)symmetries + 1, sizeof *M);
   if (M == NULL) return PW_RESOURCE;
   for (int k = 0; k < symmetries; k++) {
-    const double *axis = x->symmetry + k * pw_steady_rate_count (x->s);
-    pw_steady_velocities (x, axis, x->q, x->dq);
+    const double *symmetry = x->symmetry + k * pw_steady_rate_count (x->s);
+    pw_steady_velocities (x, symmetry, x->q, x->dq);
     memset (x->dv, 0, (size_t)x->n * sizeof *x->dv);
-    pw_linear_turn (&x->system[PW_HERE].linearisation, axis[2], x->v, x->dv);
+    pw_linear_turn (&x->system[PW_HERE].linearisation, symmetry[PW_RATE_TURN], x->v, x->dv);
     for (int i = 0; i < holds; i++) M[k * rows + i] = pw_hold_change (x, x->hold + i, x->dq, x->dv);
   }
   x->free_symmetries = symmetries ? pw_null_space (rows, symmetries, M, 1e-9, x->free_symmetry) : 0;
@@ -208,6 +209,11 @@ int pw_steady_find_free_symmetries (pw_steady *x) {
 }
 
 /* ---- Comparison ---- */
+
+/* Whether it displaces the whole. */
+static int symmetry_of_whole (const double *symmetry) {
+  return symmetry[PW_RATE_X] != 0 || symmetry[PW_RATE_Y] != 0 || symmetry[PW_RATE_TURN] != 0;
+}
 
 /* Rotates positions and velocities by an angle about a point. */
 static void symmetry_rotate (const pw_steady *x, double angle, const double *about, double *q, double *v) {
@@ -232,33 +238,32 @@ static double symmetry_angle (const pw_steady *x, const double centre[2], const 
 void pw_steady_canonical (const pw_steady *x, double *q, double *v) {
   int rates = pw_steady_rate_count (x->s);
   for (int k = 0; k < x->symmetries; k++) {
-    const double *axis = x->symmetry + k * rates;
+    const double *symmetry = x->symmetry + k * rates;
     int c = rates - 1;
-    while (c > 2 && axis[c] == 0) c--;
-    if (c > 2 && axis[0] == 0 && axis[1] == 0 && axis[2] == 0) {
-      double by = -q[symmetry_coordinate (x, c)] / axis[c];
-      for (int b = 0; b < x->s->bodies; b++) q[3 * b + 2] += by * axis[3 + b];
-      for (int j = 3 * x->s->bodies; j < x->n; j++) q[j] += by * axis[3 - 2 * x->s->bodies + j];
+    while (c >= PW_RATE_ANGLES && symmetry[c] == 0) c--;
+    if (c >= PW_RATE_ANGLES && !symmetry_of_whole (symmetry)) {
+      double by = -q[symmetry_coordinate (x, c)] / symmetry[c];
+      for (int b = 0; b < x->s->bodies; b++) q[3 * b + 2] += by * symmetry[PW_RATE_ANGLES + b];
+      for (int j = 3 * x->s->bodies; j < x->n; j++) q[j] += by * symmetry[PW_RATE_ANGLES - 2 * x->s->bodies + j];
     }
-    if (axis[2] == 0) continue;
-    double centre[2] = { x->origin[0] - x->L * axis[1] / axis[2], x->origin[1] + x->L * axis[0] / axis[2] };
+    if (symmetry[PW_RATE_TURN] == 0) continue;
+    double centre[2] = { x->origin[0] - x->L * symmetry[PW_RATE_Y] / symmetry[PW_RATE_TURN],
+                         x->origin[1] + x->L * symmetry[PW_RATE_X] / symmetry[PW_RATE_TURN] };
     symmetry_rotate (x, -symmetry_angle (x, centre, q), centre, q, v);
   }
   for (int k = 0; k < x->symmetries; k++) {
-    const double *axis = x->symmetry + k * rates;
-    double square = axis[0] * axis[0] + axis[1] * axis[1];
-    if (axis[2] != 0 || !(square > 0)) continue;
-    double by = (axis[0] * q[0] + axis[1] * q[1]) / square;
-    for (int j = 0; j < 3 * x->s->bodies; j += 3) q[j] -= by * axis[0], q[j + 1] -= by * axis[1];
+    const double *symmetry = x->symmetry + k * rates;
+    double square = symmetry[PW_RATE_X] * symmetry[PW_RATE_X] + symmetry[PW_RATE_Y] * symmetry[PW_RATE_Y];
+    if (symmetry[PW_RATE_TURN] != 0 || !(square > 0)) continue;
+    double by = (symmetry[PW_RATE_X] * q[0] + symmetry[PW_RATE_Y] * q[1]) / square;
+    for (int j = 0; j < 3 * x->s->bodies; j += 3)
+      q[j] -= by * symmetry[PW_RATE_X], q[j + 1] -= by * symmetry[PW_RATE_Y];
   }
 }
 
 void pw_steady_move_to_start (const pw_steady *x, double *q, double *v) {
-  int whole = 0;
-  for (int k = 0; k < x->symmetries; k++) {
-    const double *axis = x->symmetry + k * pw_steady_rate_count (x->s);
-    whole += axis[0] != 0 || axis[1] != 0 || axis[2] != 0;
-  }
+  int whole = 0, count = pw_steady_rate_count (x->s);
+  for (int k = 0; k < x->symmetries; k++) whole += symmetry_of_whole (x->symmetry + k * count);
   if (x->free_symmetries < x->symmetries || whole < 3) return;
   double dx = x->start[0] - q[0], dy = x->start[1] - q[1];
   symmetry_rotate (x, x->start[2] - q[2], q, q, v);

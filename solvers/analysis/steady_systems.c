@@ -34,19 +34,15 @@ static int steady_open_run (pw_steady *x, pw_place place, const pw_system *s) {
 
 int pw_steady_open_system (pw_steady *x, pw_place place, double value) {
   const pw_system *s = x->s;
-  int status;
   if (x->system[place].run && (x->settings.compile == NULL || x->system[place].value == value)) return PW_OK;
   pw_steady_close_system (x, place);
   x->why = (pw_error){ 0 };
   x->system[place].value = value;
   if (x->settings.compile) s = x->system[place].own = x->settings.compile (x->settings.context, value, &x->why);
-  if (s == NULL)
-    status = x->why.status;
-  else if (!steady_fits (x, s))
+  if (s && !steady_fits (x, s))
     return pw_fail (&x->why, PW_INPUT, "model %s: the parameter changes the number of bodies or constraint equations",
                     s->model);
-  else
-    status = steady_open_run (x, place, s);
+  int status = s ? steady_open_run (x, place, s) : x->why.status;
   if (status != PW_OK) pw_steady_close_system (x, place);
   return status == PW_OK || status == PW_RESOURCE ? status : PW_RETRY;
 }
