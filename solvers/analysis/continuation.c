@@ -224,6 +224,15 @@ static int branch_correct (pw_branch *b, const double *tangent, double max_dista
   return branch_tangent (b, to->u, b->condition, to->tangent, error);
 }
 
+/* Whether p changes by the mean of its slopes between two points around a fold: noise of solutions at a cusp does not.
+ * A solution is accurate to about NEWTON_EXACT tolerances. */
+static int branch_parabolic (const pw_branch *b, const pw_branch_point *from, const pw_branch_point *to, double chord) {
+  int p = b->problem.unknowns;
+  double slope = from->tangent[p], end = to->tangent[p], change = (to->u[p] - from->u[p]) / chord;
+  double error = BRANCH_BENT * (fabs (slope) + fabs (end)) / 2 + NEWTON_EXACT * b->problem.tolerance / chord;
+  return slope * end >= 0 || fabs (change - (slope + end) / 2) <= error;
+}
+
 /* Whether two points are on one smooth branch: the chord between them has the direction of the sum of their
  * tangents. */
 static int branch_smooth (const pw_branch *b, const pw_branch_point *from, const pw_branch_point *to) {
@@ -231,7 +240,7 @@ static int branch_smooth (const pw_branch *b, const pw_branch_point *from, const
   for (int j = 0; j <= b->problem.unknowns; j++) dot += from->tangent[j] * to->tangent[j];
   for (int j = 0; j <= b->problem.unknowns; j++)
     off += pow ((to->u[j] - from->u[j]) / chord - (to->tangent[j] + from->tangent[j]) / sqrt (2 + 2 * dot), 2);
-  return dot >= BRANCH_TURN && sqrt (off) <= BRANCH_BENT;
+  return dot >= BRANCH_TURN && sqrt (off) <= BRANCH_BENT && branch_parabolic (b, from, to, chord);
 }
 
 /* Whether the step to b->next passes an end of the range, or p of the first point, perhaps twice beside a fold: a

@@ -66,7 +66,8 @@ static void test_folds (void **state) {
   pw_branch_close (&b);
 }
 
-/* Pitchforks at p = *context on the curved branch x = 3 sin p: other branches leave it at (x - 3 sin p)^2 = p - *context. */
+/* Pitchforks at p = *context on the curved branch x = 3 sin p: other branches leave it at (x - 3 sin p)^2 = p -
+ * *context. */
 static int pitchfork (void *context, const double *u, double *F, double *dF, pw_error *error) {
   double off = u[0] - 3 * sin (u[1]), p = u[1] - *(double *)context;
   (void)error;
@@ -262,8 +263,8 @@ static int wave_same (void *context, const double *u, const double *other) {
   return fabs (remainder (u[0] - other[0], 2 * PW_PI)) < 1e-6;
 }
 
-/* A branch is closed after a whole turn, also if it begins beside a fold, from one point to the same; but not if p increases
- * from turn to turn. */
+/* A branch is closed after a whole turn, also if it begins beside a fold, from one point to the same; but not if p
+ * increases from turn to turn. */
 static void test_turns (void **state) {
   static const double begin[] = { 0.3, 2, PW_PI / 2 - 1e-3, PW_PI / 2 + 1e-2, -PW_PI / 2 + 2e-3 };
   double climb;
@@ -337,12 +338,43 @@ static void test_damping (void **state) {
   pw_branch_close (&b);
 }
 
+/* x^3 = (p - 0.5)^2 */
+static int cusp (void *context, const double *u, double *F, double *dF, pw_error *error) {
+  double x = u[0], p = u[1] - 0.5;
+  (void)context, (void)error;
+  F[0] = x * x * x - p * p;
+  if (dF) dF[0] = 3 * x * x, dF[1] = -2 * p;
+  return PW_OK;
+}
+
+/* A branch ends at a cusp, where solutions within the tolerance are noise of 1e-3 in x: none of it is taken for a
+ * fold. */
+static void test_cusp (void **state) {
+  const pw_branch_problem problem = { .unknowns = 1, .equations = 1, .tolerance = 1e-9, .evaluate = cusp };
+  pw_error error = { 0 }, why;
+  (void)state;
+  for (int k = 0; k < 100; k++) {
+    double u[2] = { cbrt (0.25), 0 };
+    pw_branch b;
+    const pw_branch_event *next;
+    continuation_open (&b, &problem);
+    b.max_change = 0.01 + 6e-4 * k, b.step = b.max_change / 4, b.min_step = 1e-7, b.event_accuracy = 1e-9;
+    b.max_points = 1000;
+    check_ok (pw_branch_start (&b, u, 1, &error), &error);
+    while (pw_branch_next (&b, no_events, &why, &next, &error) == PW_OK && next)
+      assert_int_equal (next->event, PW_BRANCH_POINT);
+    assert_string_equal (why.text, "Newton's method fails at the smallest step");
+    check_close ("x", b.reached.u[0], 0, 1e-3, "the third root of the tolerance");
+    pw_branch_close (&b);
+  }
+}
+
 int main (void) {
   const struct CMUnitTest tests[] = { cmocka_unit_test (test_folds),         cmocka_unit_test (test_pitchforks),
                                       cmocka_unit_test (test_interpolated),  cmocka_unit_test (test_direction),
                                       cmocka_unit_test (test_start_at_fold), cmocka_unit_test (test_end),
                                       cmocka_unit_test (test_range),         cmocka_unit_test (test_without_solution),
                                       cmocka_unit_test (test_damping),       cmocka_unit_test (test_punctured),
-                                      cmocka_unit_test (test_turns) };
+                                      cmocka_unit_test (test_turns),         cmocka_unit_test (test_cusp) };
   return cmocka_run_group_tests (tests, NULL, NULL);
 }
