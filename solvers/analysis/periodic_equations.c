@@ -53,6 +53,7 @@ static void equations_symmetry (const pw_periodic *x, int k, const double *y, do
 
 /* ---- Equations ---- */
 
+/* After a flow from the state of u. */
 static void equations_residual (pw_periodic *x, const double *u, double *F) {
   int states = 2 * x->n;
   pw_steady_combine (x->steady, u + states, 1, x->work);
