@@ -26,11 +26,13 @@ static const char *sensitivity_unit (const pw_sensitivity *x, int o, int p, char
 /* Relative changes beyond this one are those of an output that is 0 but for round-off. */
 static const double SENSITIVITY_ELASTIC = 1e12;
 
-/* The derivative of an output, its error, and the relative change for a relative change of the unknown. */
+/* The derivative of an output; its error: of the differences and of the derivatives' integration, and of the run, by the change
+ * with its tolerances; the relative change for a relative change of the unknown. */
 static void sensitivity_result (const pw_sensitivity *x, int o, int p, double result[3]) {
   double by = x->unknowns.list[p].value;
   result[0] = pw_sensitivity_derivative (x, o, p, x->end_slope);
   result[1] = fabs (pw_sensitivity_derivative (x, o, p, x->end_error));
+  if (x->loose) result[1] += fabs (result[0] - x->loose[o * x->unknowns.count + p]);
   result[2] = result[0] * by / pw_outcome_value (&x->outcomes, o, NULL);
   if (by == 0 || !(fabs (result[2]) < SENSITIVITY_ELASTIC)) result[2] = NAN;
 }
@@ -263,20 +265,57 @@ static int sensitivity_steps (pw_sensitivity *x) {
   return better;
 }
 
+/* The same problem without results. */
+static pw_sensitivity sensitivity_copy (const pw_sensitivity *x) {
+  return (pw_sensitivity){ .line = x->line,
+                           .of = x->of,
+                           .by = x->by,
+                           .every = x->every,
+                           .folder = x->folder,
+                           .m = x->m,
+                           .files = x->files,
+                           .unknowns = x->unknowns,
+                           .dt = x->dt };
+}
+
 /* Computes all derivatives anew. */
 static int sensitivity_again (pw_sensitivity *x, pw_progress *progress, pw_error *error) {
   pw_sensitivity_close (x);
-  *x = (pw_sensitivity){ .line = x->line,
-                         .of = x->of,
-                         .by = x->by,
-                         .every = x->every,
-                         .folder = x->folder,
-                         .m = x->m,
-                         .files = x->files,
-                         .unknowns = x->unknowns,
-                         .dt = x->dt };
+  *x = sensitivity_copy (x);
   int status = pw_sensitivity_open (x, NULL, error);
   return status == PW_OK ? pw_sensitivity_compute (x, progress, error) : status;
+}
+
+/* Tolerances with which the derivatives of a run that controls its error are repeated, in its own ones. */
+static const double SENSITIVITY_LOOSE = 10;
+
+static int sensitivity_loose (pw_sensitivity *x, pw_progress *progress, pw_error *error) {
+  int outputs = x->outcomes.outcomes, unknowns = x->unknowns.count;
+  pw_sensitivity y = sensitivity_copy (x);
+  y.no_error = 1;
+  y.dt = 0;
+  y.unknowns.settings.rtol = fmin (0.1, SENSITIVITY_LOOSE * x->unknowns.settings.rtol);
+  y.unknowns.settings.atol *= SENSITIVITY_LOOSE;
+  x->loose = malloc ((size_t)(outputs * unknowns) * sizeof *x->loose);
+  int status = x->loose ? pw_sensitivity_open (&y, NULL, error) : pw_fail (error, PW_RESOURCE, "out of memory");
+  if (status == PW_OK) status = pw_sensitivity_compute (&y, progress, error);
+  x->stopped |= y.stopped;
+  for (int o = 0; o < outputs && status == PW_OK && !y.stopped; o++)
+    for (int p = 0; p < unknowns; p++) x->loose[o * unknowns + p] = pw_sensitivity_derivative (&y, o, p, y.end_slope);
+  pw_sensitivity_close (&y);
+  return status;
+}
+
+/* Estimates the part of the errors that the run's own error causes. */
+static int sensitivity_run_error (pw_sensitivity *x, pw_progress *progress, pw_error *error) {
+  if (x->stopped || pw_cli_adaptive (x->unknowns.method) == 0) return PW_OK;
+  int status = sensitivity_loose (x, progress, error);
+  if (status == PW_OK || status == PW_RESOURCE) return status;
+  for (int i = 0; i < x->outcomes.outcomes * x->unknowns.count; i++) x->loose[i] = NAN;
+  pw_cli_say ("pinwheel: errors are unknown: the run with %g times the tolerances fails: %s\n", SENSITIVITY_LOOSE,
+              error->text);
+  *error = (pw_error){ 0 };
+  return PW_OK;
 }
 
 static int sensitivity_compute (pw_sensitivity *x, pw_error *error) {
@@ -293,6 +332,7 @@ static int sensitivity_compute (pw_sensitivity *x, pw_error *error) {
     status = sensitivity_again (x, &progress, error);
     break;
   }
+  if (status == PW_OK) status = sensitivity_run_error (x, &progress, error);
   pw_progress_end (&progress);
   pw_stop_release ();
   x->cpu = pw_cpu_clock () - begun;

@@ -28,6 +28,7 @@ typedef struct {
   double *value;         /* 2 F: values; the gradient of an output (scratch) */
   double *slope, *error; /* F x P: derivatives, and their errors */
   double *end_slope, *end_error;
+  double *loose;  /* outputs x P: derivatives with larger tolerances; NULL: not computed */
   double *before; /* F + F P: values and derivatives before a jump */
   int rows;       /* the table: t, then each output and its derivatives */
   double *row;    /* rows x columns */

@@ -397,5 +397,6 @@ void pw_sensitivity_close (pw_sensitivity *x) {
   free (x->direction);
   free (x->at);
   free (x->value);
+  free (x->loose);
   free (x->row);
 }
