@@ -85,8 +85,8 @@ typedef struct {
 
 /* A signal computed by the caller.  `eval` stores the value in value[0] and, for a signal of a constraint, its time
  * derivatives in value[1] and value[2].  x contains the states named in `reads`; gradient, unless NULL, receives the
- * derivatives of value[0] with respect to them.  A non-zero return stops the run.  Equal t and x must give equal values;
- * if they change between steps (a controller sets a new torque), call pw_run_restart. */
+ * derivatives of value[0] with respect to them.  A non-zero return stops the run.  Equal t and x must give equal
+ * values; if they change between steps (a controller sets a new torque), call pw_run_restart. */
 typedef struct {
   int (*eval) (void *context, double t, const double *x, double value[3], double *gradient);
   void *context;            /* passed to eval and breakpoint; must outlive the systems, unless open replaces it */
@@ -248,8 +248,8 @@ int pw_model_refuse (pw_model *m, const char *format, ...);
 double pw_jacobi_am (double u, double m);
 double pw_elliptic_K (double m);
 
-/* Sine and cosine of an angle [rad] to 1 ulp, with the same bits on every machine for |x| < 1e6; for larger |x| those of
- * the C library. */
+/* Sine and cosine of an angle [rad] to 1 ulp, with the same bits on every machine for |x| < 1e6; for larger |x| those
+ * of the C library. */
 void pw_sin_cos (double x, double *sine, double *cosine);
 double pw_sin (double x);
 double pw_cos (double x);
@@ -524,7 +524,7 @@ typedef struct {
   double vx, vy, omega; /* [m/s], [rad/s] */
 } pw_configuration;
 
-/* All elements of one type in a scene, the argument of its functions.  The `cols` local coordinates of an element
+/* All elements of one type in a system, the argument of its functions.  The `cols` local coordinates of an element
  * are (x, y, phi) of each of its bodies, then its internal coordinates.  Arrays are row-major, one element after the
  * other. */
 typedef struct {
@@ -532,7 +532,7 @@ typedef struct {
   int cols;                              /* 3 kind->bodies + kind->internal */
   const void *element;                   /* count structures of kind->element bytes, made by kind->prepare */
   const int *body;                       /* count x kind->bodies indices into configuration */
-  const pw_configuration *configuration; /* of all bodies of the scene and the ground */
+  const pw_configuration *configuration; /* of all bodies of the system and the ground */
   const double *q;                       /* count x kind->internal: internal coordinates */
   const double *v;                       /* count x kind->internal: their velocities */
   const double *u;      /* count x kind->signals x 3: value, first and second time derivative of each signal */
@@ -566,7 +566,7 @@ struct pw_kind {
   int rows;               /* constraint equations */
   int signals;    /* signals, in the order of the fields; of its force if force_u is set, else of its constraints */
   int each_body;  /* 1: names no body; acts on every body with mass */
-  int constant;   /* 1: its force is constant and evaluated once, when the scene is compiled */
+  int constant;   /* 1: its force is constant and evaluated once, when the system is compiled */
   pw_level level; /* of its constraint equations */
   const pw_quantity *reaction;                                 /* rows: meaning of each -lambda */
   const pw_quantity *coordinate;                               /* internal: the internal coordinates */
@@ -776,13 +776,13 @@ const double *pw_system_initial_v (const pw_system *s);
  * jumps there. */
 int pw_system_jumps (const pw_system *s, double t);
 
-/* C code for this scene alone, which evaluates and projects it faster than the library (pw_settings.specialised).
- * independent: rows, 0 for redundant constraint equations (pw_run_source); NULL: none is redundant.  NULL and the error if
- * there is no such code, as for too many constraint equations.  Free the text. */
+/* Specialised code: C code for this system alone, which evaluates and projects it faster than the library
+ * (pw_settings.specialised).  independent: for each constraint equation, 0 if it is redundant (pw_run_source); NULL:
+ * none is.  NULL and the error if there is no such code, as for too many constraint equations.  Free the text. */
 char *pw_system_source (const pw_system *s, const unsigned char *independent, pw_error *error);
 
-/* Whether compiled code is of this version and of a system with the same structure: parameters and initial values may
- * differ. */
+/* Whether compiled code is of this version of Pinwheel and of a system with the same structure: parameters and initial
+ * values may differ. */
 typedef struct pw_specialised pw_specialised;
 int pw_specialised_fits (const pw_specialised *code, const pw_system *s);
 
@@ -792,9 +792,10 @@ int pw_specialised_lanes_fit (const pw_specialised_lanes *code, const pw_system 
 int pw_specialised_lanes_count (const pw_specialised_lanes *code);
 /* Memory for the runs of one thread; NULL if out of memory.  Free it. */
 void *pw_specialised_lanes_memory (const pw_specialised_lanes *code);
-/* 0 if there are element types of the user's, or signals that depend on the state; redundant equations count as such, too. */
+/* 1 if the code can be compiled for several runs at once: built-in element types and signals of time alone, and not too
+ * many constraint equations.  The runs must not have redundant ones. */
 int pw_system_has_lanes (const pw_system *s);
-/* 1 if accelerations may jump with the state: the system has element types of the user's, or signals that depend on it. */
+/* 1 if accelerations may jump with the state: there are element types of a plug-in, or signals that depend on it. */
 int pw_system_may_jump (const pw_system *s);
 
 /* ---- Elements of a system, in the order of its constraint equations ---- */
@@ -824,9 +825,8 @@ int pw_system_contacts (const pw_system *s);
 int pw_workspace_contact_points (pw_workspace *w, double t, const double *q, const double *v, double (*out)[3],
                                  pw_error *error);
 
-/* The force (Fx, Fy [N], M [N m] about the centre of mass) of each element on each of its bodies: -J^T lambda plus
- * the applied force, for holonomic and nonholonomic constraint equations alike.  Entries of the ground are
- * meaningless. */
+/* The force (Fx, Fy [N], M [N m] about the centre of mass) of each element on each of its bodies: -J^T lambda plus the
+ * applied force.  Entries of the ground are meaningless. */
 int pw_system_force_size (const pw_system *s);
 int pw_workspace_forces (pw_workspace *w, double t, const double *q, const double *v, const double *lambda, double *out,
                          pw_error *error);

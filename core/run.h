@@ -18,12 +18,12 @@ typedef struct {
 /* How to integrate; zeros select the defaults. */
 typedef struct {
   double t; /* initial time [s] */
-  /* Approximate duration of the run [s]: for the scale of time if the scene is initially at rest, and that of energy. */
+  /* Approximate duration of the run [s]: for the scale of energy, and for that of time if all is initially at rest. */
   double span;
   double step; /* fixed-step methods: step size [s]; default 1e-3 */
   double rtol; /* adaptive methods: relative tolerance; default 1e-6 */
   double atol; /* absolute tolerance of every state; default rtol x (L, 1 rad, L/T, 1/T), see pw_scale */
-  int ledger;  /* 1: samples contain the ledger's entries and the energy added by projections */
+  int ledger;  /* 1: samples contain the work or loss of each element, and the energy added by projections */
 
   /* Limits of long runs. */
   long max_steps; /* adaptive methods: attempted steps, including rejected ones; default PW_MAX_STEPS */
@@ -43,13 +43,14 @@ typedef struct {
   const struct pw_method *const *methods; /* methods besides the built-in ones, ending with NULL; or NULL */
 } pw_settings;
 
-/* Scales of a scene, from its description and initial state; the units of absolute thresholds. */
+/* Scales of a system in its initial state.  "Units of the scene", in which thresholds and scaled numbers are given, are
+ * L for lengths, 1 rad for angles, T for times. */
 typedef struct {
   double length; /* L: largest distance of an attachment from its body's centre of mass, else radius of gyration [m] */
   double time; /* T: 1 / max (1 / span, largest velocity, square root of the largest acceleration), in units of L [s] */
 } pw_scale;
 
-/* Cost of a run, and its worst constraint residuals at accepted steps. */
+/* Cost of a run, and its worst constraint residuals at accepted steps; for scaled ones see docs/theory.md. */
 typedef struct {
   long steps;          /* accepted */
   long rejected;       /* repeated with another step size */
@@ -75,14 +76,14 @@ typedef struct {
   double kinetic;       /* [J] */
   double potential;     /* [J] */
   const double *ledger; /* pw_system_ledger_entries: work or loss of each entry [J]; NULL without pw_settings.ledger */
-  double work;          /* supplied by active elements and drives since the initial time [J] */
+  double work;          /* supplied by torques, forces, motors and drives since the initial time [J] */
   double loss;          /* dissipated since the initial time [J] */
   double projection;    /* energy added by projections after steps [J]; 0 without pw_settings.ledger */
   double balance;       /* change of (kinetic + potential) - work + loss - projection [J] */
 } pw_sample;
 
-/* Entries of the ledger.  Their names are like "rider.work", "damper.loss"; "drag.frame.loss" for an element that
- * acts on every body. */
+/* Entries of the energy ledger: work or loss of an element.  Their names are like "rider.work", "damper.loss";
+ * "drag.frame.loss" for an element that acts on every body. */
 int pw_system_ledger_entries (const pw_system *s);
 char *pw_system_ledger_name (const pw_system *s, int entry, char *buffer, size_t size);
 

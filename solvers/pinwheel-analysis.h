@@ -16,9 +16,9 @@ typedef enum {
   PW_CHANGING     /* no: the equations depend on time, or change along the motion, within the run's span */
 } pw_steadiness;
 
-/* Mobility and linearisation.  Singular values are those of the independent rows of J, each of length 1, angles in
- * units of the length scale.  Minimal coordinates x of a perturbation, in a frame that moves with the motion, obey
- * x' = A x. */
+/* Mobility and linearisation.  Singular values are those of the independent rows of J, each scaled to length 1, angles
+ * multiplied by the length scale.  Minimal coordinates x [m] of a perturbation, in a frame that moves with the motion,
+ * obey x' = A x; those of velocities are multiplied by the time scale. */
 typedef struct {
   int coordinates;
   int positions;   /* degrees of freedom of configuration: coordinates less independent holonomic rows */
@@ -33,12 +33,12 @@ typedef struct {
   int symmetries;       /* number of symmetry directions among x, y, phi */
   pw_steadiness steady;
   double twist[3];     /* velocity of the frame [m/s, m/s, rad/s] */
-  double acceleration; /* the largest in that frame; angles in units of the length scale [m/s^2] */
+  double acceleration; /* the largest in that frame; angles multiplied by the length scale [m/s^2] */
   /* Of pw_run_linear_modes, otherwise NULL; axes are those of the frame, which are the world's at this moment. */
   double *B;     /* unknowns x signals, by rows: x' = A x + B u, u added to the signals of forces [1/s m per unit of the
                     signal]; NaN for signals of constraints, which enter with their derivatives */
-  double *basis; /* 2 coordinates x unknowns, by rows: perturbation of the states, numbered as in pw_system_find_state,
-                    per m of x (angles in units of L, velocities of 1/T times that) */
+  double *basis; /* 2 coordinates x unknowns, by rows: change of each state, numbered as in pw_system_find_state, by
+                    each x [1, rad/m, 1/s, rad/(m s)] */
   double *shape; /* unknowns x 2 coordinates complex numbers (re, im): the perturbation of the states in each mode; the
                     largest of the positions, angles times L, is 1 m; 0 for rigid displacements and for eigenvalues 0,
                     of which it is not unique */
@@ -112,9 +112,10 @@ double pw_variation_jump_slope (const pw_variation *x, int i);
 /* The size of the next step of the derivatives [s], over which they are smooth. */
 double pw_variation_step_size (const pw_variation *x);
 
-/* The step of direction i with which its differences would be more accurate; its own if they are accurate to 1e-7, relative to
- * the effects of p up to the time reached.  A step below 1e-10 that changes nothing is too small.  Larger ones reduce round-off, which is proportional to 1 / step, smaller ones
- * the remainder, whose estimate is proportional to its square. */
+/* The step of direction i with which its differences would be more accurate; its own if their error is below 1e-7,
+ * relative to the effects of p up to the time reached.  A step below 1e-10 without any effect counts as too small.
+ * Larger ones reduce round-off, which is proportional to 1 / step, smaller ones the remainder, whose estimate is
+ * proportional to its square. */
 double pw_variation_better_step (const pw_variation *x, int i);
 
 void pw_variation_close (pw_variation *x);
@@ -158,9 +159,9 @@ typedef enum {
 typedef struct {
   double parameter;
   const double *q, *v; /* pw_system_coordinates */
-  double residual;     /* the largest, in units of the scene: L, L/T, L/T^2 */
+  double residual;     /* the largest, in units of the scene (pw_scale): L, L/T, L/T^2 */
   int iterations;
-  int family;   /* further quantities to hold to make it isolated, up to symmetries */
+  int family;   /* number of further quantities to hold so that it is isolated, up to symmetries */
   int unstable; /* growing modes; at an event, without those that change */
   pw_steady_event event;
   const pw_linear *linear; /* NULL if it is not a solution */
@@ -187,9 +188,9 @@ int pw_steady_same (pw_steady *x, const double *q1, const double *v1, const doub
  * at most `most`, or a status; the motion stays in a family if they are not enough. */
 int pw_steady_suggest (pw_steady *x, pw_initial_value *hold, int most);
 
-/* Follows the branch of a solution, initially towards the end of the range (direction 1) or its begin (-1); then
- * returns its points, the first one included, and events in between, until PW_STEADY_END: at the end of the range, the
- * start of a closed branch, or where Newton's method fails at the least step (then with the reason in the error). */
+/* Follows the branch of a solution, initially towards the end of the range (direction 1) or its beginning (-1).
+ * pw_steady_next returns its points, the first one included, and events in between, then PW_STEADY_END: at an end of
+ * the range, the start of a closed branch, or where Newton's method fails at the smallest step (pw_steady_reason). */
 int pw_steady_follow (pw_steady *x, const double *q, const double *v, double parameter, int direction, pw_error *error);
 int pw_steady_next (pw_steady *x, pw_steady_motion *out, pw_error *error);
 
@@ -220,7 +221,7 @@ typedef enum {
   PW_PERIODIC_REAL,  /* a multiplier passes 1 elsewhere: branches cross */
   PW_PERIODIC_FLIP,  /* a multiplier passes -1: period doubling */
   PW_PERIODIC_TORUS, /* a conjugate pair crosses the unit circle (Neimark-Sacker) */
-  PW_PERIODIC_END    /* the end of the range, of a closed branch, or where Newton's method fails at the least step */
+  PW_PERIODIC_END    /* the end of the range, of a closed branch, or where Newton's method fails at the smallest step */
 } pw_periodic_event;
 
 /* A relative periodic motion: after one period the state is the initial one, displaced by symmetries of the system: the
@@ -231,7 +232,7 @@ typedef struct {
   const double *q, *v; /* initial state: pw_system_coordinates */
   const double *end;   /* state after one period: 2 x coordinates */
   double rotation;     /* of the whole in one period, without spins [rad] */
-  double residual;     /* the largest, in units of the scene: L, L/T */
+  double residual;     /* the largest, in units of the scene (pw_scale): L, L/T */
   int iterations;
   int multipliers; /* Floquet multipliers: those that are not trivial, the largest first, then `trivial` ones */
   int trivial;     /* of symmetries and, with a free period, of a shift in time */
@@ -256,9 +257,9 @@ const char *pw_periodic_reason (const pw_periodic *x);
 /* Number of symmetries, as pw_steady_symmetries. */
 int pw_periodic_symmetries (const pw_periodic *x);
 
-/* Follows the branch of the motion last found towards the end of the range (direction 1) or its begin (-1); then
- * returns its points, the first one included, and events in between, until PW_PERIODIC_END (then perhaps with a
- * reason). */
+/* Follows the branch of the motion last found towards the end of the range (direction 1) or its beginning (-1).
+ * pw_periodic_next returns its points, the first one included, and events in between, then PW_PERIODIC_END (perhaps
+ * with pw_periodic_reason). */
 int pw_periodic_follow (pw_periodic *x, int direction, pw_error *error);
 int pw_periodic_next (pw_periodic *x, pw_periodic_orbit *out, pw_error *error);
 

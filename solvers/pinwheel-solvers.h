@@ -84,20 +84,21 @@ int pw_method_adaptive (const pw_method *integrator, const char *method);
 enum { PW_SPECIALISE_STEPS = 1000000 };
 double pw_method_steps (const char *method, const pw_settings *s, double step, double t_end);
 
-/* One accepted step that does not pass t_end; to an end or a discontinuity that is the time reached up to round-off,
- * none but that the time becomes this one.  PW_STOPPED, without an error, if settings.stop requested it: the run stays
+/* Makes one accepted step that does not pass t_end.  If t_end or a discontinuity equals the time reached up to
+ * round-off, only the time is set to it.  PW_STOPPED, without an error, if settings.stop requested it: the run stays
  * where it was, and the next call continues.  Errors: PW_INPUT if t_end is not a number; PW_METHOD with the time
  * reached and the reason, such as max_steps; PW_RESOURCE. */
 int pw_run_advance (pw_run *r, double t_end, pw_error *error);
 
-/* One step, or several of a fixed size if specialised code is in use, which end where single steps would, none of them
- * beyond the first that reaches t.  Returns as pw_run_advance. */
+/* The same, or with specialised code several steps of a fixed size: they end where single ones would, and none is made
+ * after the first that reaches t.  Returns as pw_run_advance. */
 int pw_run_advance_towards (pw_run *r, double t, double t_end, pw_error *error);
 
-/* Advances each run by one or several steps, those of fixed size at once in the lanes of `code` (NULL, or few runs for
- * them, or too many: one run after the other); `memory` as the code requires.  The runs' systems have the structure of
- * the code's.  Results are those of pw_run_advance_towards, bit for bit, and do not depend on the other runs.  status,
- * error: of each run. */
+/* Advances each run by one or several steps.  With `code`, steps of fixed size are made at once, one run in each of its
+ * lanes, unless half of the lanes or more would be empty or there are more runs than lanes; otherwise, or with NULL,
+ * one run after the other.  memory: pw_specialised_lanes_memory.  The runs' systems have the structure of the code's.
+ * Results are those of pw_run_advance_towards, bit for bit, and do not depend on the other runs.  status, error: of
+ * each run. */
 void pw_runs_advance (pw_run *const *runs, int count, double t_end, const pw_specialised_lanes *code, void *memory,
                       int *status, pw_error *error);
 
@@ -122,8 +123,8 @@ double pw_run_energy_defect (const pw_run *r, const pw_sample *sample);
 /* Advice against an energy defect of this size, as pw_run_energy_defect returns it. */
 const char *pw_run_energy_advice (const pw_run *r, double defect);
 
-/* The largest velocity in units of L/T (lengths) or 1/T (angles), the initial scale of the scene, if it exceeds 1e3 and
- * still grows; else 0.  *state: that velocity; *power: exponent p of its growth as t^p. */
+/* The largest velocity in units of L/T (lengths) or 1/T (angles), see pw_scale, if it exceeds 1e3 and still grows; else
+ * 0.  *state: that velocity; *power: exponent p of its growth as t^p. */
 double pw_run_growth (const pw_run *r, int *state, double *power);
 
 /* Restarts from a state at the time reached, after the caller has changed something.  The state is made consistent
@@ -158,11 +159,11 @@ int pw_run_saturation (pw_run *r, double *least, char *element, size_t size);
 
 /* ---- Cost of an evaluation of the accelerations (timing.c) ---- */
 
-/* Processor times [ns] of all elements of a type: signals, J and gamma, forces; g.  0: not applicable. */
+/* Processor times [ns] of all elements of a type.  0: not applicable. */
 typedef struct {
   const pw_kind *kind;
   int elements;
-  double signals, constraints, force, positions;
+  double signals, constraints /* J, gamma */, force, positions /* g */;
 } pw_profile_kind;
 
 /* Processor times [ns] of an evaluation and of its stages; medians. */
@@ -175,7 +176,7 @@ typedef struct {
   double stabilisation;  /* Baumgarte's terms */
   double factorisation, solution;
   double evaluation;  /* in one call */
-  double evaluations; /* per step, without those after projections; 0: not applicable to this method */
+  double evaluations; /* per step, without those that projections contain; 0: not applicable to this method */
   double projection;  /* with the evaluation after it */
   double projections; /* per step */
   double iterations;  /* position iterations in each */

@@ -41,26 +41,30 @@ void hard_print (const hard_matrix *m, FILE *out) {
 static void matrix_page_head (const hard_matrix *m, FILE *out) {
   int count[HARD_VERDICTS], all = m->count * m->methods;
   matrix_count (m, -1, count);
-  fprintf (out,
-           "# Hard cases\n\n"
-           "`make hard` runs %d cases by all %d methods at the same step (fixed-step methods) or relative tolerance\n"
-           "(adaptive methods), and writes this page and [hard-cases.csv](hard-cases.csv): one line per cell with the\n"
-           "settings, the measured values, the message, and the reason where a method does not pass. The cases with\n"
-           "their reference solutions and bounds are in `benchmarks/hard/cases`.\n\n"
-           "| | verdict | meaning | cells |\n|---|---|---|---|\n"
-           "| P | pass | every measure is within its first bound; if no motion exists: stopped for that reason | %d of "
-           "%d |\n"
-           "| l | limited | bounded and stable, but less accurate: within the second bound | %d |\n"
-           "| R | refused | stopped with a reason and the time reached | %d |\n"
-           "| s | slow | stopped at the limit of processor time | %d |\n",
-           m->count, m->methods, count[HARD_PASS], all, count[HARD_LIMITED], count[HARD_REFUSE], count[HARD_SLOW]);
+  fprintf (
+      out,
+      "# Hard cases\n\n"
+      "`make hard` runs %d cases by all %d methods at the same step (fixed-step methods) or relative tolerance\n"
+      "(adaptive methods), and writes this page and [hard-cases.csv](hard-cases.csv): one line per case and\n"
+      "method with settings, measured values, message, and the reason where a method does not pass. The cases with\n"
+      "their reference solutions and bounds are in `benchmarks/hard/cases`.\n\n"
+      "| | verdict | meaning | cells |\n|---|---|---|---|\n"
+      "| P | pass | every measure is within its first bound; if no motion exists: stopped for that reason | %d of "
+      "%d |\n"
+      "| l | limited | bounded and stable, but less accurate: within the second bound | %d |\n"
+      "| R | refused | stopped with a reason and the time reached | %d |\n"
+      "| s | slow | stopped at the limit of processor time | %d |\n",
+      m->count, m->methods, count[HARD_PASS], all, count[HARD_LIMITED], count[HARD_REFUSE], count[HARD_SLOW]);
   if (count[HARD_WRONG] + count[HARD_CRASH])
     fprintf (out, "| **W C** | **wrong, crash** | never allowed | %d |\n", count[HARD_WRONG] + count[HARD_CRASH]);
   fputs ("\nThe measures are:\n\n"
-         "- *error* of the states at the end, relative to the reference solution or to the scene's unit,\n"
-         "- *balance*: the largest energy defect, relative to the largest kinetic energy, work or dissipation,\n"
+         "- *error* of the states at the end, relative to the reference solution or, if larger, to its\n"
+         "  [scale](theory.md#residuals-and-scales),\n"
+         "- *balance*: the largest [energy defect](theory.md#energy-ledger), relative to the largest kinetic energy,\n"
+         "  work or dissipation,\n"
          "- *residual*: the largest scaled residual of the constraints after an accepted step,\n"
-         "- *equations*: the scaled residual of the equations of motion at the end, by the independent verifier.\n",
+         "- *equations*: the scaled residual of the equations of motion at the end, by the\n"
+         "  [verifier](design.md#verification).\n",
          out);
 }
 

@@ -1,3 +1,4 @@
+/* Newton's method by least squares, pseudo-arclength steps along a branch, and the location of events. */
 #include "continuation.h"
 #include <lapacke.h>
 #include <math.h>
@@ -5,30 +6,41 @@
 #include <string.h>
 #include "util.h"
 
-/* NEWTON_MOST: iterations of a solution, of a point of a branch.  BRANCH_TURN: cosine of the largest angle between the
- * tangents of successive points; BRANCH_BENT: largest distance between the directions of a chord and of the sum of the
- * tangents at its ends, which is of second order on a smooth branch, but not from one branch to another.  BRANCH_APART and
- * BRANCH_ASIDE: largest correction of a predictor and of an interpolated point, relative to the step.  BRANCH_FINE: a step
- * that may pass p of the first point twice beside a fold, relative to the longest. */
-enum { NEWTON_MOST = 60, BRANCH_MOST = 8, NEWTON_HALVINGS = 10, LOCATE_MOST = 60 };
-static const double BRANCH_FINE = 1e-3, BRANCH_TURN = 0.96, BRANCH_APART = 0.3, BRANCH_BENT = 0.02,
-                    BRANCH_ASIDE = 0.002, BRANCH_GROW = 1.5, NEWTON_DAMPING = 0.1;
+enum {
+  NEWTON_MOST = 60,     /* iterations of a solution */
+  BRANCH_MOST = 8,      /* iterations of a point of a branch: a shorter step is the better remedy */
+  NEWTON_HALVINGS = 10, /* of a correction */
+  NEWTON_SLOW = 4,      /* an iteration that reduces |F| by less has reached round-off, below the tolerance */
+  LOCATE_MOST = 60      /* iterations that locate an event */
+};
+static const double NEWTON_EXACT = 1e-4, /* |F| relative to the tolerance that needs no further iteration */
+    NEWTON_DAMPING = 0.1,                /* factor of |F| in the square of the damping */
+    BRANCH_STEEP = 1e-3,                 /* smallest slope of p along a branch that limits steps by max_change */
+    BRANCH_GROW = 1.5,                   /* of the next step, after half of the iterations at most */
+    BRANCH_TURN = 0.96,   /* cosine of the largest angle between the tangents of successive points, 16 degrees */
+    BRANCH_APART = 0.3,   /* largest correction of a predictor, relative to the step */
+    BRANCH_ASIDE = 0.002, /* largest correction of an interpolated point, relative to the distance of the two points */
+    BRANCH_FINE = 1e-3,   /* of max_change: a step so short may pass p of the first point twice beside a fold */
+    /* Largest distance between the directions of a chord and of the sum of the tangents at its ends: it is of second
+     * order on a smooth branch, but not from one branch to another. */
+    BRANCH_BENT = 0.02;
 
-int pw_branch_open (pw_branch *b, const pw_branch_equations *of, pw_error *error) {
-  size_t n = (size_t)of->unknowns + 1, m = (size_t)of->equations + n, large = n > m ? n : m;
-  *b = (pw_branch){ .of = *of, .room = (int)(8 * large + 200) };
-  if (!(b->of.rank > 0)) b->of.rank = 1e-9;
-  pw_branch_point *const point[] = { &b->at, &b->before, &b->found, &b->first, &b->next, &b->side[0], &b->side[1] };
+int pw_branch_open (pw_branch *b, const pw_branch_problem *problem, pw_error *error) {
+  size_t n = (size_t)problem->unknowns + 1, m = (size_t)problem->equations + n, large = n > m ? n : m;
+  *b = (pw_branch){ .problem = *problem, .work_size = (int)(42 * large + 200) }; /* dgelsy: blocks of 32 */
+  if (!(b->problem.rank_tolerance > 0)) b->problem.rank_tolerance = 1e-9;
+  pw_branch_point *const point[] = {
+    &b->reached, &b->previous, &b->found, &b->first, &b->next, &b->side[0], &b->side[1]
+  };
   enum { OWN = sizeof point / sizeof *point, POINTS = OWN + PW_BRANCH_QUEUE };
   pw_array array[2 * POINTS + 7] = { { &b->F, large },    { &b->J, m * n },
-                                     { &b->du, large },   { &b->work, (size_t)b->room + 34 * large },
+                                     { &b->du, large },   { &b->work, (size_t)b->work_size },
                                      { &b->trial, n },    { &b->condition, n },
                                      { &b->predicted, n } };
   for (int i = 0; i < POINTS; i++) {
     pw_branch_point *p = i < OWN ? point[i] : &b->queue[i - OWN].point;
     array[2 * i + 7] = (pw_array){ &p->u, n }, array[2 * i + 8] = (pw_array){ &p->tangent, n };
   }
-  b->room += (int)(34 * large);
   b->memory = pw_alloc_arrays (array, sizeof array / sizeof *array);
   b->pivot = malloc (n * sizeof *b->pivot);
   return b->memory && b->pivot ? PW_OK : pw_fail (error, PW_RESOURCE, "out of memory");
@@ -44,9 +56,9 @@ void pw_branch_close (pw_branch *b) {
 /* ---- Newton's method ---- */
 
 /* The largest |F_i|; NaN if one is not finite. */
-static double branch_size (const pw_branch *b) {
+static double branch_residual (const pw_branch *b) {
   double most = 0;
-  for (int i = 0; i < b->of.equations; i++)
+  for (int i = 0; i < b->problem.equations; i++)
     if (fabs (b->F[i]) > most || isnan (b->F[i])) most = fabs (b->F[i]);
   return most;
 }
@@ -58,15 +70,15 @@ static double branch_norm (int n, const double *x) {
 }
 
 static int branch_evaluate (pw_branch *b, const double *u, int derivatives, pw_error *error) {
-  size_t m = (size_t)b->of.equations, n = (size_t)b->of.unknowns + 1;
+  size_t m = (size_t)b->problem.equations, n = (size_t)b->problem.unknowns + 1;
   memset (b->F, 0, m * sizeof *b->F);
   if (derivatives) memset (b->J, 0, m * n * sizeof *b->J);
-  return b->of.evaluate (b->of.context, u, b->F, derivatives ? b->J : NULL, error);
+  return b->problem.evaluate (b->problem.context, u, b->F, derivatives ? b->J : NULL, error);
 }
 
-/* Adds `extra` rows to J, 0 except for c in the first one or `diagonal` on the diagonal. */
+/* Adds rows to J below the equations: one with c, or without c `extra` rows with `diagonal` on their diagonal. */
 static void branch_extend (pw_branch *b, int n, int extra, const double *c, double diagonal) {
-  size_t m = (size_t)b->of.equations, rows = m + (size_t)extra;
+  size_t m = (size_t)b->problem.equations, rows = m + (size_t)extra;
   for (size_t j = (size_t)n; j-- > 0;) {
     double *column = b->J + j * rows;
     memmove (column, b->J + j * m, m * sizeof *column);
@@ -75,57 +87,58 @@ static void branch_extend (pw_branch *b, int n, int extra, const double *c, doub
   }
 }
 
-/* du = the shortest least-squares solution of J du = right (equations), and c du = last, where c is a row over all n + 1
- * unknowns; without c, p is constant, and damping^2 |du|^2 is added to the squares.  J is destroyed. */
-static int branch_linear (pw_branch *b, const double *right, const double *c, double last, double damping) {
-  int m = b->of.equations, n = b->of.unknowns + (c != NULL), extra = c ? 1 : damping > 0 ? n : 0;
+/* du = the shortest least-squares solution of J du = right and c du = value, where c is a row over x and p.  Without c,
+ * p is constant, and damping^2 |du|^2 is added to the squares.  J is destroyed. */
+static int branch_least_squares (pw_branch *b, const double *right, const double *c, double value, double damping) {
+  int m = b->problem.equations, n = b->problem.unknowns + (c != NULL), extra = c ? 1 : damping > 0 ? n : 0;
   int rows = m + extra, large = rows > n ? rows : n;
   if (extra) branch_extend (b, n, extra, c, damping);
   for (int i = 0; i < large; i++) b->du[i] = i < m ? right[i] : 0;
-  if (c) b->du[m] = last;
+  if (c) b->du[m] = value;
   for (int i = 0; i < rows * n; i++)
     if (!isfinite (b->J[i])) return PW_RETRY;
   memset (b->pivot, 0, (size_t)n * sizeof *b->pivot);
-  if (LAPACKE_dgelsy_work (LAPACK_COL_MAJOR, rows, n, 1, b->J, rows, b->du, large, b->pivot, b->of.rank, &b->rank,
-                           b->work, b->room))
+  if (LAPACKE_dgelsy_work (LAPACK_COL_MAJOR, rows, n, 1, b->J, rows, b->du, large, b->pivot, b->problem.rank_tolerance,
+                           &b->rank, b->work, b->work_size))
     return PW_RETRY;
   if (!c) b->du[n] = 0;
   return PW_OK;
 }
 
-/* Moves u along du, by the largest of the factors 1, 1/2, ... with which F decreases. */
+/* Moves u along du by the largest of the factors 1, 1/2, ... with which |F| decreases by a tenth of its linear
+ * prediction. */
 static int branch_descend (pw_branch *b, double *u, pw_error *error) {
-  int n = b->of.unknowns + 1;
-  double before = branch_norm (b->of.equations, b->F), factor = 1;
+  int n = b->problem.unknowns + 1;
+  double before = branch_norm (b->problem.equations, b->F), factor = 1;
   for (int i = 0; i < NEWTON_HALVINGS; i++, factor /= 2) {
     for (int j = 0; j < n; j++) b->trial[j] = u[j] + factor * b->du[j];
     int status = branch_evaluate (b, b->trial, 0, error);
     if (status != PW_OK && status != PW_RETRY) return status;
-    if (status != PW_OK || !(branch_norm (b->of.equations, b->F) < before * (1 - factor / 10))) continue;
+    if (status != PW_OK || !(branch_norm (b->problem.equations, b->F) < before * (1 - factor / 10))) continue;
     memcpy (u, b->trial, (size_t)n * sizeof *u);
     return PW_OK;
   }
   return PW_RETRY;
 }
 
-/* Iterates at constant c u, or constant p, with steps shortened by `damping` in proportion to |F| (Levenberg &
- * Marquardt), which leads to the nearest of solutions that are not isolated (Yamashita & Fukushima 2001).  Damped only
- * without c: on a branch a short step is the better remedy. */
+/* Newton's method at constant c u, or without c at constant p, there with the damping sqrt (damping |F|) of Levenberg &
+ * Marquardt, which leads to the nearest of solutions that are not isolated (Yamashita & Fukushima 2001). */
 static int branch_iterate (pw_branch *b, double *u, const double *c, double damping, pw_error *error) {
-  int n = b->of.unknowns + 1, status;
+  int n = b->problem.unknowns + 1, status;
   double before = INFINITY;
   for (b->iterations = 0;; b->iterations++) {
     status = branch_evaluate (b, u, 1, error);
     if (status != PW_OK) return status;
-    b->residual = branch_size (b);
-    int stalled = b->residual > before / 4;
-    if (b->residual <= b->of.tolerance && (stalled || b->residual <= b->of.tolerance * 1e-4)) return PW_OK;
+    b->residual = branch_residual (b);
+    int slow = b->residual > before / NEWTON_SLOW;
+    if (b->residual <= b->problem.tolerance && (slow || b->residual <= b->problem.tolerance * NEWTON_EXACT))
+      return PW_OK;
     if (b->iterations >= (c ? BRANCH_MOST : NEWTON_MOST) || !isfinite (b->residual)) return PW_RETRY;
     before = b->residual;
-    for (int i = 0; i < b->of.equations; i++) b->F[i] = -b->F[i];
-    status = branch_linear (b, b->F, c, 0, sqrt (damping * fmin (b->residual, 1)));
+    for (int i = 0; i < b->problem.equations; i++) b->F[i] = -b->F[i];
+    status = branch_least_squares (b, b->F, c, 0, sqrt (damping * fmin (b->residual, 1)));
     if (status != PW_OK) return status;
-    if (!c && b->residual > b->of.tolerance)
+    if (!c && b->residual > b->problem.tolerance)
       status = branch_descend (b, u, error);
     else
       for (int j = 0; j < n; j++) u[j] += b->du[j];
@@ -134,7 +147,7 @@ static int branch_iterate (pw_branch *b, double *u, const double *c, double damp
 }
 
 int pw_branch_solve (pw_branch *b, double *u, pw_error *error) {
-  size_t bytes = ((size_t)b->of.unknowns + 1) * sizeof *u;
+  size_t bytes = ((size_t)b->problem.unknowns + 1) * sizeof *u;
   memcpy (b->next.u, u, bytes);
   int status = branch_iterate (b, u, NULL, NEWTON_DAMPING, error);
   if (status != PW_RETRY) return status;
@@ -144,14 +157,14 @@ int pw_branch_solve (pw_branch *b, double *u, pw_error *error) {
 
 /* ---- Branches ---- */
 
-/* The unit tangent at u in the direction of c. */
+/* The unit tangent t at u with c t > 0.  PW_RETRY if c is orthogonal to the branch, where c t = 1 has no solution. */
 static int branch_tangent (pw_branch *b, const double *u, const double *c, double *tangent, pw_error *error) {
-  int n = b->of.unknowns + 1;
+  int n = b->problem.unknowns + 1;
   double dot = 0;
   int status = branch_evaluate (b, u, 1, error);
   if (status != PW_OK) return status;
-  memset (b->F, 0, (size_t)b->of.equations * sizeof *b->F);
-  status = branch_linear (b, b->F, c, 1, 0);
+  memset (b->F, 0, (size_t)b->problem.equations * sizeof *b->F);
+  status = branch_least_squares (b, b->F, c, 1, 0);
   if (status != PW_OK) return status;
   double norm = branch_norm (n, b->du);
   for (int j = 0; j < n; j++) tangent[j] = b->du[j] / norm, dot += b->du[j] * c[j];
@@ -159,127 +172,143 @@ static int branch_tangent (pw_branch *b, const double *u, const double *c, doubl
 }
 
 static void branch_copy (const pw_branch *b, const pw_branch_point *from, pw_branch_point *to) {
-  size_t bytes = ((size_t)b->of.unknowns + 1) * sizeof *from->u;
+  size_t bytes = ((size_t)b->problem.unknowns + 1) * sizeof *from->u;
   memcpy (to->u, from->u, bytes);
   memcpy (to->tangent, from->tangent, bytes);
   to->residual = from->residual, to->interpolated = from->interpolated;
 }
 
 /* Queues a point before those that are farther along. */
-static void branch_put (pw_branch *b, const pw_branch_point *point, int event, double along, int note) {
+static void branch_insert (pw_branch *b, const pw_branch_point *point, int event, double fraction, int tag) {
   int i = b->queued++;
-  for (; i > 0 && b->queue[i - 1].along > along; i--) {
+  for (; i > 0 && b->queue[i - 1].fraction > fraction; i--) {
     pw_branch_event last = b->queue[i];
     b->queue[i] = b->queue[i - 1];
     b->queue[i - 1] = last;
   }
-  b->queue[i].event = event, b->queue[i].along = along, b->queue[i].note = note;
+  b->queue[i].event = event, b->queue[i].fraction = fraction, b->queue[i].tag = tag;
   branch_copy (b, point, &b->queue[i].point);
 }
 
 int pw_branch_start (pw_branch *b, const double *u, double direction, pw_error *error) {
-  size_t n = (size_t)b->of.unknowns + 1;
+  size_t n = (size_t)b->problem.unknowns + 1;
   memset (b->condition, 0, n * sizeof *b->condition);
   b->condition[n - 1] = direction > 0 ? 1 : -1;
   b->folded = b->steps = b->ended = b->queued = b->returned = 0;
-  b->at.residual = b->residual, b->at.interpolated = 0;
-  memmove (b->at.u, u, n * sizeof *u);
-  int status = branch_tangent (b, b->at.u, b->condition, b->at.tangent, error);
+  b->reached.residual = b->residual, b->reached.interpolated = 0;
+  memmove (b->reached.u, u, n * sizeof *u);
+  int status = branch_tangent (b, b->reached.u, b->condition, b->reached.tangent, error);
   if (status != PW_OK) return status;
-  branch_copy (b, &b->at, &b->first);
-  branch_put (b, &b->at, PW_BRANCH_POINT, 0, 0);
+  branch_copy (b, &b->reached, &b->first);
+  branch_insert (b, &b->reached, PW_BRANCH_POINT, 0, 0);
   return PW_OK;
 }
 
 static double branch_distance (const pw_branch *b, const double *x, const double *y) {
   double sum = 0;
-  for (int j = 0; j <= b->of.unknowns; j++) sum += pow (x[j] - y[j], 2);
+  for (int j = 0; j <= b->problem.unknowns; j++) sum += pow (x[j] - y[j], 2);
   return sqrt (sum);
 }
 
-/* Corrects to->u on the plane perpendicular to a tangent, or without one at constant p, which least squares with p among the
- * unknowns would change; sets its own tangent.  PW_RETRY farther than `most` away. */
-static int branch_correct (pw_branch *b, const double *tangent, double most, pw_branch_point *to, pw_error *error) {
-  size_t bytes = ((size_t)b->of.unknowns + 1) * sizeof *tangent;
-  memcpy (b->condition, tangent ? tangent : b->at.tangent, bytes);
+/* Corrects to->u on the plane perpendicular to a tangent, or with NULL at constant p; then sets to->tangent.  PW_RETRY
+ * if the correction is longer than max_distance. */
+static int branch_correct (pw_branch *b, const double *tangent, double max_distance, pw_branch_point *to,
+                           pw_error *error) {
+  size_t bytes = ((size_t)b->problem.unknowns + 1) * sizeof *tangent;
+  memcpy (b->condition, tangent ? tangent : b->reached.tangent, bytes);
   memcpy (b->predicted, to->u, bytes);
   int status = branch_iterate (b, to->u, tangent ? b->condition : NULL, 0, error);
   if (status != PW_OK) return status;
-  if (branch_distance (b, to->u, b->predicted) > most) return PW_RETRY;
+  if (branch_distance (b, to->u, b->predicted) > max_distance) return PW_RETRY;
   to->residual = b->residual, to->interpolated = 0;
   return branch_tangent (b, to->u, b->condition, to->tangent, error);
 }
 
-/* Whether two points are on one smooth branch: the chord between them has the direction of the sum of their tangents. */
-static int branch_smooth (const pw_branch *b, const pw_branch_point *from, const pw_branch_point *to) {
-  double chord = branch_distance (b, to->u, from->u), dot = 0, off = 0;
-  for (int j = 0; j <= b->of.unknowns; j++) dot += from->tangent[j] * to->tangent[j];
-  for (int j = 0; j <= b->of.unknowns; j++)
-    off += pow ((to->u[j] - from->u[j]) / chord - (to->tangent[j] + from->tangent[j]) / sqrt (2 + 2 * dot), 2);
-  return dot >= BRANCH_TURN && sqrt (off) <= BRANCH_BENT;
+/* Whether p changes by the mean of its slopes between two points around a fold: noise of solutions at a cusp does not.
+ * A solution is accurate to about NEWTON_EXACT tolerances. */
+static int branch_parabolic (const pw_branch *b, const pw_branch_point *from, const pw_branch_point *to, double chord) {
+  int p = b->problem.unknowns;
+  double slope = from->tangent[p], end = to->tangent[p], change = (to->u[p] - from->u[p]) / chord;
+  double error = BRANCH_BENT * (fabs (slope) + fabs (end)) / 2 + NEWTON_EXACT * b->problem.tolerance / chord;
+  return slope * end >= 0 || fabs (change - (slope + end) / 2) <= error;
 }
 
-/* Whether the step would pass an end of the range, or p of the first point, perhaps twice beside a fold: branch_reach moves
- * there. */
-static int branch_passes (const pw_branch *b) {
-  int n = b->of.unknowns;
-  double from = b->at.u[n] - b->first.u[n], to = b->next.u[n] - b->first.u[n], slope = b->at.tangent[n];
-  int folded = slope * b->next.tangent[n] < 0 && b->step > BRANCH_FINE * b->most;
+/* Whether two points are on one smooth branch: the chord between them has the direction of the sum of their
+ * tangents. */
+static int branch_smooth (const pw_branch *b, const pw_branch_point *from, const pw_branch_point *to) {
+  double chord = branch_distance (b, to->u, from->u), dot = 0, off = 0;
+  for (int j = 0; j <= b->problem.unknowns; j++) dot += from->tangent[j] * to->tangent[j];
+  for (int j = 0; j <= b->problem.unknowns; j++)
+    off += pow ((to->u[j] - from->u[j]) / chord - (to->tangent[j] + from->tangent[j]) / sqrt (2 + 2 * dot), 2);
+  return dot >= BRANCH_TURN && sqrt (off) <= BRANCH_BENT && branch_parabolic (b, from, to, chord);
+}
+
+/* Whether the step to b->next passes an end of the range, or p of the first point, perhaps twice beside a fold: a
+ * shorter one comes so near that branch_step_to_end ends there. */
+static int branch_passes_end (const pw_branch *b) {
+  int n = b->problem.unknowns;
+  double from = b->reached.u[n] - b->first.u[n], to = b->next.u[n] - b->first.u[n], slope = b->reached.tangent[n];
+  int folded = slope * b->next.tangent[n] < 0 && b->step > BRANCH_FINE * b->max_change;
   if (!(b->next.u[n] >= 0 && b->next.u[n] <= 1)) return 1;
   if (from == 0) return folded && slope * to < 0;
   return from * to < 0 || (folded && from * (from + b->step * slope) < 0);
 }
 
+/* A step of length b->step to b->next. */
 static int branch_try (pw_branch *b, pw_error *error) {
-  for (int j = 0; j <= b->of.unknowns; j++) b->next.u[j] = b->at.u[j] + b->step * b->at.tangent[j];
-  int status = branch_correct (b, b->at.tangent, BRANCH_APART * b->step, &b->next, error);
+  for (int j = 0; j <= b->problem.unknowns; j++) b->next.u[j] = b->reached.u[j] + b->step * b->reached.tangent[j];
+  int status = branch_correct (b, b->reached.tangent, BRANCH_APART * b->step, &b->next, error);
   if (status != PW_OK) return status;
-  return (b->bounded && branch_passes (b)) || !branch_smooth (b, &b->at, &b->next) ? PW_RETRY : PW_OK;
+  return (b->bounded && branch_passes_end (b)) || !branch_smooth (b, &b->reached, &b->next) ? PW_RETRY : PW_OK;
 }
 
 /* Makes b->next the point reached. */
 static void branch_accept (pw_branch *b) {
-  int n = b->of.unknowns;
-  pw_branch_point oldest = b->before;
-  b->before = b->at;
-  b->at = b->next;
+  int n = b->problem.unknowns;
+  pw_branch_point oldest = b->previous;
+  b->previous = b->reached;
+  b->reached = b->next;
   b->next = oldest;
-  b->folded = b->before.tangent[n] * b->at.tangent[n] < 0;
+  b->folded = b->previous.tangent[n] * b->reached.tangent[n] < 0;
 }
 
-/* Moves to the end of the range, or to p of the first point, if the next step would pass it: without evaluations beyond the
- * end, where the parameter may not be admissible.  PW_RETRY if it would not, or no point is found there. */
-static int branch_reach (pw_branch *b, pw_error *error) {
-  int n = b->of.unknowns;
-  double slope = b->at.tangent[n], p = b->at.u[n], first = b->first.u[n];
+static double branch_longest_step (const pw_branch *b) {
+  return b->max_change / fmax (fabs (b->reached.tangent[b->problem.unknowns]), BRANCH_STEEP);
+}
+
+/* Moves to the end of the range, or to p of the first point, if the next step would pass it: without evaluations beyond
+ * the end, where the parameter may not be admissible.  PW_RETRY if it would not, or no point is found there. */
+static int branch_step_to_end (pw_branch *b, pw_error *error) {
+  int n = b->problem.unknowns;
+  double slope = b->reached.tangent[n], p = b->reached.u[n], first = b->first.u[n];
   double end = (first - p) * slope > 0 ? first : slope > 0, step = (end - p) / slope;
-  if (!(step > 0 && step <= fmin (b->step, b->most / fmax (fabs (slope), 1e-3)))) return PW_RETRY;
-  for (int j = 0; j < n; j++) b->next.u[j] = b->at.u[j] + step * b->at.tangent[j];
+  if (!(step > 0 && step <= fmin (b->step, branch_longest_step (b)))) return PW_RETRY;
+  for (int j = 0; j < n; j++) b->next.u[j] = b->reached.u[j] + step * b->reached.tangent[j];
   b->next.u[n] = end;
   int status = branch_correct (b, NULL, BRANCH_APART * step, &b->next, error);
   if (status != PW_OK) return status;
-  if (!branch_smooth (b, &b->at, &b->next)) return PW_RETRY;
+  if (!branch_smooth (b, &b->reached, &b->next)) return PW_RETRY;
   branch_accept (b);
   b->ended = end == 0 || end == 1;
   return PW_OK;
 }
 
 int pw_branch_step (pw_branch *b, pw_error *error) {
-  b->step = fmin (b->step, b->most / fmax (fabs (b->at.tangent[b->of.unknowns]), 1e-3));
+  b->step = fmin (b->step, branch_longest_step (b));
   for (int status; (status = branch_try (b, error)) != PW_OK; b->step /= 2)
-    if (status != PW_RETRY || b->step < 2 * b->least) return status;
+    if (status != PW_RETRY || b->step < 2 * b->min_step) return status;
   branch_accept (b);
   if (b->iterations <= BRANCH_MOST / 2) b->step *= BRANCH_GROW;
   return PW_OK;
 }
 
-/* The point at fraction s (0 to 1) of the distance between two points; that of the cubic through both if Newton's method
- * does not converge nearby, as at bifurcations. */
+/* The point at a fraction s of the way between two points: that of the cubic Hermite interpolation, corrected by
+ * Newton's method if this converges nearby. */
 static int branch_between (pw_branch *b, const pw_branch_point *from, const pw_branch_point *to, double s,
                            pw_branch_point *point, pw_error *error) {
-  size_t bytes = ((size_t)b->of.unknowns + 1) * sizeof *point->u;
+  size_t bytes = ((size_t)b->problem.unknowns + 1) * sizeof *point->u;
   double chord = branch_distance (b, to->u, from->u), r = 1 - s;
-  for (int j = 0; j <= b->of.unknowns; j++)
+  for (int j = 0; j <= b->problem.unknowns; j++)
     point->u[j] = r * r * ((1 + 2 * s) * from->u[j] + s * chord * from->tangent[j]) +
                   s * s * ((1 + 2 * r) * to->u[j] - r * chord * to->tangent[j]);
   int status = branch_correct (b, from->tangent, BRANCH_ASIDE * chord, point, error);
@@ -287,27 +316,26 @@ static int branch_between (pw_branch *b, const pw_branch_point *from, const pw_b
   memcpy (point->u, b->predicted, bytes);
   memcpy (point->tangent, from->tangent, bytes);
   status = branch_evaluate (b, point->u, 0, error);
-  point->residual = branch_size (b), point->interpolated = 1;
+  point->residual = branch_residual (b), point->interpolated = 1;
   return status;
 }
 
-/* The Illinois variant of regula falsi (Dowell & Jarratt 1971), every fourth step a bisection.  Points to which Newton's
- * method converges become ends of the cubic, which s in [0, 1] measures; `scale`: its length, relative to the step. */
-int pw_branch_locate (pw_branch *b,
-                      int (*test) (void *context, const pw_branch_point *point, double *value, pw_error *error),
-                      void *context, pw_error *error) {
+/* The Illinois variant of regula falsi (Dowell & Jarratt 1971), every fourth step a bisection.  The bracket s[0], s[1]
+ * consists of fractions of a cubic.  Points to which Newton's method converges become ends of this cubic; `scale`: its
+ * length, relative to the step. */
+int pw_branch_locate (pw_branch *b, pw_branch_test *test, void *context, pw_error *error) {
   pw_branch_point *point = &b->found;
   double s[2] = { 0, 1 }, f[2], middle, value, scale = 1;
-  int status = test (context, &b->before, &f[0], error), last = -1, failed = 0;
-  if (status == PW_OK) status = test (context, &b->at, &f[1], error);
+  int status = test (context, &b->previous, &f[0], error), last = -1, failed = 0;
+  if (status == PW_OK) status = test (context, &b->reached, &f[1], error);
   if (status != PW_OK) return status;
-  branch_copy (b, &b->before, &b->side[0]);
-  branch_copy (b, &b->at, &b->side[1]);
-  branch_copy (b, fabs (f[0]) < fabs (f[1]) ? &b->before : &b->at, point);
-  for (int i = 0; i < LOCATE_MOST && (s[1] - s[0]) * scale > b->accuracy; i++) {
+  branch_copy (b, &b->previous, &b->side[0]);
+  branch_copy (b, &b->reached, &b->side[1]);
+  branch_copy (b, fabs (f[0]) < fabs (f[1]) ? &b->previous : &b->reached, point);
+  for (int i = 0; i < LOCATE_MOST && (s[1] - s[0]) * scale > b->event_accuracy; i++) {
     middle = s[1] - f[1] * (s[1] - s[0]) / (f[1] - f[0]);
     if (i % 4 == 3 || !(middle > s[0] && middle < s[1])) middle = (s[0] + s[1]) / 2;
-    if (failed) middle = s[0] + (s[1] - s[0]) * fmod (0.618034 * i, 1); /* other places */
+    if (failed) middle = s[0] + (s[1] - s[0]) * fmod (0.618034 * i, 1); /* equidistributed */
     status = branch_between (b, &b->side[0], &b->side[1], middle, &b->next, error);
     if (status == PW_OK) status = test (context, &b->next, &value, error);
     failed |= status == PW_RETRY;
@@ -330,60 +358,61 @@ int pw_branch_locate (pw_branch *b,
 
 /* ---- Events and ends ---- */
 
-double pw_branch_along (const pw_branch *b, const pw_branch_point *point) {
+double pw_branch_fraction (const pw_branch *b, const pw_branch_point *point) {
   double part = 0, whole = 0;
-  for (int j = 0; j <= b->of.unknowns; j++) {
-    part += (point->u[j] - b->before.u[j]) * b->before.tangent[j];
-    whole += (b->at.u[j] - b->before.u[j]) * b->before.tangent[j];
+  for (int j = 0; j <= b->problem.unknowns; j++) {
+    part += (point->u[j] - b->previous.u[j]) * b->previous.tangent[j];
+    whole += (b->reached.u[j] - b->previous.u[j]) * b->previous.tangent[j];
   }
   return fmin (part / whole, 1);
 }
 
-void pw_branch_queue (pw_branch *b, int event, int note) {
-  branch_put (b, &b->found, event, pw_branch_along (b, &b->found), note);
+void pw_branch_queue (pw_branch *b, int event, int tag) {
+  branch_insert (b, &b->found, event, pw_branch_fraction (b, &b->found), tag);
 }
 
-static int branch_fold (void *branch, const pw_branch_point *point, double *value, pw_error *error) {
+/* pw_branch_test for folds. */
+static int branch_slope_of_p (void *branch, const pw_branch_point *point, double *value, pw_error *error) {
   const pw_branch *b = branch;
   (void)error;
-  *value = point->tangent[b->of.unknowns];
+  *value = point->tangent[b->problem.unknowns];
   return PW_OK;
 }
 
 /* Whether the last step has led to the first point again. */
 static int branch_closed (const pw_branch *b) {
-  if (b->at.u[b->of.unknowns] != b->first.u[b->of.unknowns]) return 0;
-  return branch_distance (b, b->at.u, b->first.u) <= PW_BRANCH_SAME ||
-         (b->of.same && b->of.same (b->of.context, b->first.u, b->at.u));
+  if (b->reached.u[b->problem.unknowns] != b->first.u[b->problem.unknowns]) return 0;
+  return branch_distance (b, b->reached.u, b->first.u) <= PW_BRANCH_SAME ||
+         (b->problem.same && b->problem.same (b->problem.context, b->first.u, b->reached.u));
 }
 
-/* A step in the range of p, with its events. */
-static int branch_advance (pw_branch *b, int (*events) (void *context, pw_error *error), pw_error *why,
-                           pw_error *error) {
+/* A step in the range of p; queues its events and the point reached. */
+static int branch_advance (pw_branch *b, pw_branch_find_events *find_events, pw_error *why, pw_error *error) {
   *why = (pw_error){ 0 };
   b->bounded = 1;
-  if (b->steps++ > b->limit) return pw_fail (why, PW_METHOD, "the branch has more than %d points", b->limit), PW_RETRY;
-  int status = branch_reach (b, error);
+  if (b->steps++ > b->max_points)
+    return pw_fail (why, PW_METHOD, "the branch has more than %d points", b->max_points), PW_RETRY;
+  int status = branch_step_to_end (b, error);
   if (status == PW_RETRY) status = pw_branch_step (b, error);
   if (status == PW_OK && b->folded) {
-    status = pw_branch_locate (b, branch_fold, b, error);
+    status = pw_branch_locate (b, branch_slope_of_p, b, error);
     if (status == PW_OK) pw_branch_queue (b, PW_BRANCH_FOLD, 0);
   }
-  if (status == PW_OK) status = events (b->of.context, error);
+  if (status == PW_OK) status = find_events (b->problem.context, error);
   if (status == PW_RETRY && !*why->text) pw_fail (why, PW_METHOD, "Newton's method fails at the smallest step");
   if (status != PW_OK) return status;
-  *why = (pw_error){ 0 }; /* of shorter steps */
-  branch_put (b, &b->at, PW_BRANCH_POINT, 1, 0);
+  *why = (pw_error){ 0 }; /* it may be that of longer steps that were refused */
+  branch_insert (b, &b->reached, PW_BRANCH_POINT, 1, 0);
   if (branch_closed (b)) b->ended = 1, pw_fail (why, PW_METHOD, "it has returned to its first point");
   return PW_OK;
 }
 
-int pw_branch_next (pw_branch *b, int (*events) (void *context, pw_error *error), pw_error *why,
-                    const pw_branch_event **next, pw_error *error) {
+int pw_branch_next (pw_branch *b, pw_branch_find_events *find_events, pw_error *why, const pw_branch_event **next,
+                    pw_error *error) {
   *next = NULL;
   if (b->returned == b->queued && !b->ended) {
     b->queued = b->returned = 0;
-    int status = branch_advance (b, events, why, error);
+    int status = branch_advance (b, find_events, why, error);
     if (status == PW_RETRY) return b->ended = 1, PW_OK;
     if (status != PW_OK) return status;
   }

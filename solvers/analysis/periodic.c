@@ -6,48 +6,48 @@
 #include "util.h"
 
 enum {
-  PERIODIC_MOST = 100,  /* coordinates, since the cost is cubic */
-  PERIODIC_POINTS = 20, /* of a branch, by default */
-  PERIODIC_LIMIT = 50   /* points of a branch at most, as a multiple of those asked for */
+  PERIODIC_MAX_COORDINATES = 100, /* since the cost is cubic */
+  PERIODIC_POINTS = 20,           /* of a branch, by default */
+  PERIODIC_MAX_POINTS = 50        /* of a branch, as a multiple of those that the settings ask for */
 };
-static const double PERIODIC_EXACT = 1e-9, /* residual of a solution, in units of the scene */
-    PERIODIC_RANK = 1e-7,                  /* of derivatives */
+static const double PERIODIC_EXACT = 1e-9, /* largest residual of a solution, in units of the scene */
+    PERIODIC_RANK = 1e-7,                  /* smaller singular values of the derivatives count as 0 */
     PERIODIC_CIRCLE = 1e-6,                /* distance from the unit circle that is not round-off */
-    PERIODIC_LEAST = 1e-5,                 /* smallest step, relative to the range of the parameter */
+    PERIODIC_MIN_STEP = 1e-5,              /* relative to the range of the parameter */
     PERIODIC_EVENT = 1e-7,                 /* accuracy of events, relative to the step */
     PERIODIC_FOLD = 1e-3, /* largest distance of a fold from the crossing of a multiplier there, relative to the step */
     PERIODIC_REAL = 1e-3; /* imaginary part, after location, of a pair that is about to become real */
 
-/* Whether two solutions are the same, for pw_branch_equations: but for a shift in time. */
-static int periodic_again (void *periodic, const double *u, const double *other) {
+/* pw_branch_problem.same: up to symmetries, but not up to a shift in time. */
+static int periodic_same (void *periodic, const double *u, const double *other) {
   pw_periodic *x = periodic;
   for (int j = 0; j < 2 * x->n; j++) {
-    x->moved[j] = u[j] * pw_periodic_unit (x, j);
+    x->state[j] = u[j] * pw_periodic_unit (x, j);
     x->change[j] = other[j] * pw_periodic_unit (x, j);
   }
-  return pw_steady_distance (x->scene, x->moved, x->moved + x->n, x->change, x->change + x->n) <= PW_BRANCH_SAME;
+  return pw_steady_distance (x->steady, x->state, x->state + x->n, x->change, x->change + x->n) <= PW_BRANCH_SAME;
 }
 
 /* ---- Opening ---- */
 
 static int periodic_arrays (pw_periodic *x) {
-  size_t n = (size_t)x->n, states = 2 * n, most = states + (size_t)x->group + 2;
+  size_t n = (size_t)x->n, states = 2 * n, most = states + (size_t)x->symmetries + 2;
   const pw_array array[] = {
     { &x->u, most },
     { &x->y0, states },
     { &x->y1, states },
     { &x->a0, n },
     { &x->a1, n },
-    { &x->moved, states },
+    { &x->state, states },
     { &x->change, states },
     { &x->Phi, states * states },
     { &x->basis, states * states },
     { &x->dual, states * states },
-    { &x->M, 2 * states * states + 40 * states },
+    { &x->monodromy, 2 * states * states + 40 * states },
     { &x->re, states },
     { &x->im, states },
-    { &x->work, (size_t)pw_steady_rates (x->s) + most },
-    { &x->there, most + 2 * states },
+    { &x->work, (size_t)pw_steady_rate_count (x->s) + most },
+    { &x->beside, most + 2 * states },
   };
   x->memory = pw_alloc_arrays (array, sizeof array / sizeof *array);
   return x->memory ? PW_OK : PW_RESOURCE;
@@ -57,31 +57,31 @@ static int periodic_open (pw_periodic *x, pw_error *error) {
   const pw_system *s = x->s;
   const pw_method *integrator;
   int stabilisation;
-  if (pw_method_parse (x->set.method, &integrator, &stabilisation, error) != PW_OK) return error->status;
-  if (!pw_method_adaptive (integrator, x->set.method))
+  if (pw_method_parse (x->settings.method, &integrator, &stabilisation, error) != PW_OK) return error->status;
+  if (!pw_method_adaptive (integrator, x->settings.method))
     return pw_fail (error, PW_INPUT,
                     "method %s: periodic motions need one that controls its steps, such as erk8+projection",
-                    x->set.method);
-  if (x->n > PERIODIC_MOST)
+                    x->settings.method);
+  if (x->n > PERIODIC_MAX_COORDINATES)
     return pw_fail (error, PW_INPUT, "model %s has %d coordinates; periodic motions are sought with at most %d",
-                    s->model, x->n, PERIODIC_MOST);
-  /* Symmetries at a time that is not special. */
-  double signals = pw_system_period (s), period = x->set.period > 0 ? x->set.period : signals;
+                    s->model, x->n, PERIODIC_MAX_COORDINATES);
+  /* At a time at which no signal is likely to vanish: then the system would have more symmetries. */
+  double signals = pw_system_period (s), period = x->settings.period > 0 ? x->settings.period : signals;
   if (!(period >= 0)) period = 0;
-  x->scene = pw_steady_open_scene (s, x->set.t + 0.317 * period, period > 0 ? period : 1, error);
-  if (x->scene == NULL) return error->status;
-  x->group = x->scene->gauge = x->scene->group, x->L = x->scene->L, x->T = x->scene->T;
-  const pw_branch_equations of = { .unknowns = pw_periodic_unknowns (x),
-                                   .equations = pw_periodic_unknowns (x) + 2 * x->n,
-                                   .tolerance = PERIODIC_EXACT,
-                                   .rank = PERIODIC_RANK,
-                                   .evaluate = pw_periodic_evaluate,
-                                   .same = periodic_again,
-                                   .context = x };
+  x->steady = pw_steady_open_symmetries (s, x->settings.t + 0.317 * period, period > 0 ? period : 1, error);
+  if (x->steady == NULL) return error->status;
+  x->symmetries = x->steady->free_symmetries = x->steady->symmetries, x->L = x->steady->L, x->T = x->steady->T;
+  const pw_branch_problem problem = { .unknowns = pw_periodic_unknowns (x),
+                                      .equations = pw_periodic_unknowns (x) + 2 * x->n,
+                                      .tolerance = PERIODIC_EXACT,
+                                      .rank_tolerance = PERIODIC_RANK,
+                                      .evaluate = pw_periodic_evaluate,
+                                      .same = periodic_same,
+                                      .context = x };
   if (periodic_arrays (x) != PW_OK) return pw_fail_memory (s, error);
-  int status = pw_branch_open (&x->branch, &of, error);
+  int status = pw_branch_open (&x->branch, &problem, error);
   if (status != PW_OK) return status;
-  pw_run *r = pw_periodic_run (x, 0, x->set.first, 0, NULL); /* verifies the signals */
+  pw_run *r = pw_periodic_run (x, PW_HERE, x->settings.first, 0, NULL); /* verifies the signals */
   if (r == NULL) return *error = x->why, error->status;
   pw_run_close (r);
   return PW_OK;
@@ -90,11 +90,11 @@ static int periodic_open (pw_periodic *x, pw_error *error) {
 pw_periodic *pw_periodic_open (const pw_system *s, const pw_periodic_settings *settings, pw_error *error) {
   pw_periodic *x = pw_require (s, "a system", error) == PW_OK ? calloc (1, sizeof *x) : NULL;
   if (x == NULL) return s ? (pw_fail_memory (s, error), NULL) : NULL;
-  x->s = s, x->set = *settings, x->n = s->coords;
-  if (x->set.method == NULL) x->set.method = "erk8+projection";
-  if (x->set.rtol <= 0) x->set.rtol = 1e-12;
-  if (x->set.points <= 0) x->set.points = PERIODIC_POINTS;
-  if (x->set.periods <= 0) x->set.periods = 1;
+  x->s = s, x->settings = *settings, x->n = s->coords;
+  if (x->settings.method == NULL) x->settings.method = "erk8+projection";
+  if (x->settings.rtol <= 0) x->settings.rtol = 1e-12;
+  if (x->settings.points <= 0) x->settings.points = PERIODIC_POINTS;
+  if (x->settings.periods <= 0) x->settings.periods = 1;
   if (periodic_open (x, error) == PW_OK) return x;
   pw_periodic_close (x);
   return NULL;
@@ -102,9 +102,9 @@ pw_periodic *pw_periodic_open (const pw_system *s, const pw_periodic_settings *s
 
 void pw_periodic_close (pw_periodic *x) {
   if (x == NULL) return;
-  for (int k = 0; k < 2; k++) pw_system_free (x->at[k].own);
+  for (pw_place place = PW_HERE; place < PW_PLACES; place++) pw_system_free (x->system[place].own);
   pw_branch_close (&x->branch);
-  pw_steady_close (x->scene);
+  pw_steady_close (x->steady);
   free (x->memory);
   free (x);
 }
@@ -114,12 +114,12 @@ const char *pw_periodic_reason (const pw_periodic *x) {
 }
 
 int pw_periodic_symmetries (const pw_periodic *x) {
-  return x->group;
+  return x->symmetries;
 }
 
 /* ---- Motions ---- */
 
-/* PW_RETRY if forces depend on the whole turns of a body in a period: then the accelerations do not repeat. */
+/* PW_RETRY if forces depend on the number of whole turns of a body: then the accelerations do not repeat. */
 static int periodic_turns (pw_periodic *x) {
   double off = 0, most = 0;
   int turns = 0;
@@ -136,15 +136,15 @@ static int periodic_turns (pw_periodic *x) {
 
 /* The motion of u, with its multipliers. */
 static int periodic_orbit (pw_periodic *x, const double *u, pw_periodic_orbit *out, pw_error *error) {
-  int status = pw_periodic_flow (x, u, PW_FLOW_MULTIPLIERS, 0, error);
+  int status = pw_periodic_flow (x, u, PW_FLOW_MULTIPLIERS, PW_HERE, error);
   if (status == PW_OK) status = pw_periodic_multipliers (x, u, &out->trivial);
   if (status == PW_METHOD) return pw_fail (error, status, "model %s: no multipliers: LAPACK failed", x->s->model);
-  out->rotation = x->work[2];
-  if (status == PW_OK) status = pw_periodic_flow (x, u, PW_FLOW, 0, error);
+  out->rotation = x->work[PW_RATE_TURN];
+  if (status == PW_OK) status = pw_periodic_flow (x, u, PW_FLOW, PW_HERE, error);
   if (status == PW_OK) status = periodic_turns (x);
   if (status != PW_OK) return status;
   out->parameter = pw_periodic_parameter (x, u);
-  out->period = x->about = x->set.free ? u[pw_periodic_unknowns (x) - 1] * x->T : x->at[0].period;
+  out->period = x->last_period = x->settings.free ? u[pw_periodic_unknowns (x) - 1] * x->T : x->system[PW_HERE].period;
   out->q = x->y0, out->v = x->y0 + x->n, out->end = x->y1;
   out->multipliers = x->size;
   out->re = x->re, out->im = x->im;
@@ -153,22 +153,23 @@ static int periodic_orbit (pw_periodic *x, const double *u, pw_periodic_orbit *o
   return PW_OK;
 }
 
-/* The unknowns at the state of x->moved. */
-static void periodic_unknowns (pw_periodic *x, double parameter) {
+/* Sets x->u to the unknowns at x->state. */
+static void periodic_set_unknowns (pw_periodic *x, double parameter) {
   int unknowns = pw_periodic_unknowns (x);
   memset (x->u, 0, ((size_t)unknowns + 1) * sizeof *x->u);
-  for (int j = 0; j < 2 * x->n; j++) x->u[j] = x->moved[j] / pw_periodic_unit (x, j);
-  if (x->set.free) x->u[unknowns - 1] = x->about / x->T;
-  if (x->set.last != x->set.first) x->u[unknowns] = (parameter - x->set.first) / (x->set.last - x->set.first);
+  for (int j = 0; j < 2 * x->n; j++) x->u[j] = x->state[j] / pw_periodic_unit (x, j);
+  if (x->settings.free) x->u[unknowns - 1] = x->last_period / x->T;
+  if (x->settings.last != x->settings.first)
+    x->u[unknowns] = (parameter - x->settings.first) / (x->settings.last - x->settings.first);
 }
 
 int pw_periodic_solve (pw_periodic *x, int settle, double parameter, pw_periodic_orbit *out, pw_error *error) {
   *out = (pw_periodic_orbit){ .residual = INFINITY };
-  if (x->set.free) x->about = x->set.period > 0 ? x->set.period : 2 * PW_PI * x->T;
+  if (x->settings.free) x->last_period = x->settings.period > 0 ? x->settings.period : 2 * PW_PI * x->T;
   int status = pw_periodic_settle (x, parameter, settle);
   if (status < 0) return *error = x->why, status;
   if (status != PW_OK) return status;
-  periodic_unknowns (x, parameter);
+  periodic_set_unknowns (x, parameter);
   status = pw_branch_solve (&x->branch, x->u, error);
   if (status == PW_OK) status = periodic_orbit (x, x->u, out, error);
   out->residual = x->branch.residual;
@@ -180,31 +181,33 @@ int pw_periodic_solve (pw_periodic *x, int settle, double parameter, pw_periodic
 
 int pw_periodic_follow (pw_periodic *x, int direction, pw_error *error) {
   pw_branch *b = &x->branch;
-  b->most = 1.0 / x->set.points, b->step = b->most / 4, b->least = PERIODIC_LEAST;
-  b->accuracy = PERIODIC_EVENT, b->limit = PERIODIC_LIMIT * x->set.points;
+  b->max_change = 1.0 / x->settings.points, b->step = b->max_change / 4, b->min_step = PERIODIC_MIN_STEP;
+  b->event_accuracy = PERIODIC_EVENT, b->max_points = PERIODIC_MAX_POINTS * x->settings.points;
   x->unstable = -1;
   int status = pw_branch_start (b, x->u, direction, error);
   return status == PW_RETRY ? pw_fail (error, PW_METHOD, "the branch cannot be followed from here") : status;
 }
 
-/* For pw_branch_locate: how far multiplier number `sought` is outside the unit circle. */
+/* pw_branch_test: the distance of multiplier number `sought` from the unit circle, positive outside; +-1 if it moves on
+ * the circle before. */
 static int periodic_test (void *periodic, const pw_branch_point *point, double *value, pw_error *error) {
   pw_periodic *x = periodic;
   pw_periodic_orbit o;
   int status = periodic_orbit (x, point->u, &o, error);
   *value = hypot (x->re[x->sought], x->im[x->sought]) - 1;
-  if (x->along) *value = *value > PERIODIC_CIRCLE ? 1 : -1;
+  if (x->on_circle) *value = *value > PERIODIC_CIRCLE ? 1 : -1;
   return status;
 }
 
-/* Locates where multiplier number `sought` crosses the unit circle between the last two points, from *inside. */
+/* Locates where multiplier number `sought` crosses the unit circle between the last two points; it is inside at one of
+ * them. */
 static int periodic_crossing (pw_periodic *x, const pw_branch_point *inside, pw_periodic_event *event,
                               pw_error *error) {
   pw_branch *b = &x->branch;
   double value;
-  x->along = 0;
+  x->on_circle = 0;
   int status = periodic_test (x, inside, &value, error);
-  x->along = fabs (value) < PERIODIC_CIRCLE;
+  x->on_circle = fabs (value) < PERIODIC_CIRCLE;
   if (status == PW_OK) status = pw_branch_locate (b, periodic_test, x, error);
   if (status == PW_OK) status = periodic_test (x, &b->found, &value, error);
   *event = fabs (x->im[x->sought]) > PERIODIC_REAL ? PW_PERIODIC_TORUS
@@ -213,23 +216,23 @@ static int periodic_crossing (pw_periodic *x, const pw_branch_point *inside, pw_
   return status;
 }
 
-/* Queues the events between the last two points: the k-th largest multiplier crosses the unit circle.  At a fold, one that
- * passes 1 is no event of its own. */
+/* pw_branch_find_events: the k-th largest multiplier crosses the unit circle.  At a fold, one that passes 1 is no event
+ * of its own. */
 static int periodic_events (void *periodic, pw_error *error) {
   pw_periodic *x = periodic;
   pw_branch *b = &x->branch;
   pw_periodic_orbit o;
-  int before = x->unstable, status = periodic_orbit (x, b->at.u, &o, error);
+  int before = x->unstable, status = periodic_orbit (x, b->reached.u, &o, error);
   if (status != PW_OK) return status;
   x->unstable = o.unstable;
   int least = before < o.unstable ? before : o.unstable, most = before < o.unstable ? o.unstable : before;
-  double fold = b->folded ? b->queue[0].along : -1;
+  double fold = b->folded ? b->queue[0].fraction : -1; /* -1: none */
   if (before < 0 || most - least <= b->folded) return PW_OK;
   for (x->sought = least; x->sought < most && b->queued < PW_BRANCH_QUEUE - 1; x->sought++) {
     pw_periodic_event event;
-    status = periodic_crossing (x, before > x->unstable ? &b->at : &b->before, &event, error);
+    status = periodic_crossing (x, before > x->unstable ? &b->reached : &b->previous, &event, error);
     if (status != PW_OK) return status;
-    if (event != PW_PERIODIC_REAL || fabs (pw_branch_along (b, &b->found) - fold) > PERIODIC_FOLD)
+    if (event != PW_PERIODIC_REAL || fabs (pw_branch_fraction (b, &b->found) - fold) > PERIODIC_FOLD)
       pw_branch_queue (b, (int)event, 0);
     x->sought += event == PW_PERIODIC_TORUS;
   }

@@ -1,16 +1,18 @@
 /* Equations of relative periodic motions, by single shooting; multipliers.
  *
- * With P (y) the consistent state nearest to y, phi its motion after one period, and D (s) a displacement by the symmetries
- * of the system, the unknowns are y, s and, if it is free, the period:
+ * P (y) is the consistent state nearest to y, phi (y) the state one period after y, and D (s) y the state y displaced
+ * by the symmetries of the system, s times the rates of each.  The unknowns are y, s and, if it is free, the period:
  *
  *     phi (P (y)) - D (s) P (y) = 0,    y - P (y) = 0,
  *
  * and corrections are orthogonal to symmetries and, with a free period, to the motion.  Derivatives of phi are those of
- * the variational equations (variation.c), along a basis B of perturbations on the constraints.  P' = B B^+, which is
- * exact for such perturbations; on branches, whose tangents need all others, P' is a difference.
+ * the variational equations (variation.c), along a basis B of perturbations on the constraints (x->basis).  P' = B B^+
+ * (x->dual: B^+) is exact for such perturbations; on branches, whose tangents need all others, P' is computed by
+ * differences.
  *
- * Multipliers are the eigenvalues of D (s)^-1 phi' in minimal coordinates: of changes of shape and velocity in the frame of
- * the vehicle.  (Wulff & Schebesch 2008, Numerical continuation of symmetric periodic orbits.) */
+ * Multipliers are the eigenvalues of the monodromy matrix D (s)^-1 phi' in minimal coordinates of perturbations, in
+ * the frame that has moved with the whole.  (Wulff & Schebesch 2008, Numerical continuation of symmetric periodic
+ * orbits.) */
 #include <lapacke.h>
 #include <math.h>
 #include <stdlib.h>
@@ -23,72 +25,75 @@ static const double EQUATIONS_STEADY = 1e-4;
 
 /* ---- Displacements ---- */
 
-/* A state displaced by rates: a translation t and a rotation w about the origin, at the same time: p -> R p + V t. */
+/* The state y displaced by unit time at these rates: the whole translates by t and rotates by w about the origin at the
+ * same time, p -> R p + V t, with R the rotation by w and V its mean over the way. */
 static void equations_displace (const pw_periodic *x, const double *rates, const double *y, double *out) {
   int n = x->n, bodies = x->s->bodies;
-  double w = rates[2], c = pw_cos (w), s = pw_sin (w), half = pw_sin (w / 2);
-  double p = fabs (w) > 1e-8 ? s / w : 1, r = fabs (w) > 1e-8 ? 2 * half * half / w : w / 2;
-  const double *o = x->scene->origin, t[2] = { x->L * rates[0], x->L * rates[1] };
+  double w = rates[PW_RATE_TURN], c = pw_cos (w), s = pw_sin (w), half = pw_sin (w / 2);
+  double p = fabs (w) > 1e-8 ? s / w : 1, r = fabs (w) > 1e-8 ? 2 * half * half / w : w / 2; /* V = [ p -r ; r p ] */
+  const double *o = x->steady->origin, t[2] = { x->L * rates[PW_RATE_X], x->L * rates[PW_RATE_Y] };
   memcpy (out, y, 2 * (size_t)n * sizeof *out);
   for (int b = 0; b < bodies; b++) {
     double *q = out + 3 * b, *v = out + n + 3 * b, dx = q[0] - o[0], dy = q[1] - o[1], vx = v[0], vy = v[1];
     q[0] = o[0] + c * dx - s * dy + p * t[0] - r * t[1];
     q[1] = o[1] + s * dx + c * dy + r * t[0] + p * t[1];
-    q[2] += w + rates[3 + b];
+    q[2] += w + rates[PW_RATE_ANGLES + b];
     v[0] = c * vx - s * vy, v[1] = s * vx + c * vy;
   }
-  for (int j = 3 * bodies; j < n; j++) out[j] += rates[3 + bodies + j - 3 * bodies];
+  for (int j = 3 * bodies; j < n; j++) out[j] += rates[PW_RATE_ANGLES + bodies + j - 3 * bodies];
 }
 
 /* The change of a state along symmetry k. */
 static void equations_symmetry (const pw_periodic *x, int k, const double *y, double *out) {
-  const double *axis = x->scene->axis + k * pw_steady_rates (x->s);
-  pw_steady_field (x->scene, axis, y, out);
+  const double *symmetry = x->steady->symmetry + k * pw_steady_rate_count (x->s);
+  pw_steady_velocities (x->steady, symmetry, y, out);
   memset (out + x->n, 0, (size_t)x->n * sizeof *out);
-  pw_linear_turn (&x->scene->at[0].x, axis[2], y + x->n, out + x->n);
+  pw_linear_turn (&x->steady->system[PW_HERE].linearisation, symmetry[PW_RATE_TURN], y + x->n, out + x->n);
 }
 
 /* ---- Equations ---- */
 
+/* After a flow from the state of u. */
 static void equations_residual (pw_periodic *x, const double *u, double *F) {
   int states = 2 * x->n;
-  pw_steady_combine (x->scene, u + states, 1, x->work);
-  equations_displace (x, x->work, x->y0, x->moved);
+  pw_steady_combine (x->steady, u + states, 1, x->work);
+  equations_displace (x, x->work, x->y0, x->state);
   for (int j = 0; j < states; j++) {
-    F[j] = pw_periodic_difference (x, j, x->y1[j], x->moved[j]) / pw_periodic_unit (x, j);
+    F[j] = pw_periodic_difference (x, j, x->y1[j], x->state[j]) / pw_periodic_unit (x, j);
     F[states + j] = u[j] - x->y0[j] / pw_periodic_unit (x, j);
   }
 }
 
-/* Minus the derivative of D (s) y by differences, in units of the scene. */
+/* Adds the derivatives of -D (s) y with respect to s, by differences. */
 static void equations_by_displacement (pw_periodic *x, const double *u, int rows, double *column) {
   const double h = 1e-6;
   int states = 2 * x->n;
-  double *s = x->work + pw_steady_rates (x->s);
-  for (int k = 0; k < x->group; k++, column += rows)
+  double *s = x->work + pw_steady_rate_count (x->s);
+  for (int k = 0; k < x->symmetries; k++, column += rows)
     for (int side = -1; side <= 1; side += 2) {
-      memcpy (s, u + states, (size_t)x->group * sizeof *s);
+      memcpy (s, u + states, (size_t)x->symmetries * sizeof *s);
       s[k] += side * h;
-      pw_steady_combine (x->scene, s, 1, x->work);
-      equations_displace (x, x->work, x->y0, x->moved);
-      for (int j = 0; j < states; j++) column[j] -= side * x->moved[j] / (2 * h) / pw_periodic_unit (x, j);
+      pw_steady_combine (x->steady, s, 1, x->work);
+      equations_displace (x, x->work, x->y0, x->state);
+      for (int j = 0; j < states; j++) column[j] -= side * x->state[j] / (2 * h) / pw_periodic_unit (x, j);
     }
 }
 
-/* The change of D (s) y by a change of y: positions and velocities are rotated. */
+/* The change of D (s) y by a change of y: positions and velocities rotate by the angle w. */
 static void equations_rotate (const pw_periodic *x, double w, const double *in, double *out) {
-  pw_linear_rotate (&x->scene->at[0].x, w, in, out);
-  pw_linear_rotate (&x->scene->at[0].x, w, in + x->n, out + x->n);
+  pw_linear_rotate (&x->steady->system[PW_HERE].linearisation, w, in, out);
+  pw_linear_rotate (&x->steady->system[PW_HERE].linearisation, w, in + x->n, out + x->n);
 }
 
+/* Adds the derivatives with respect to y. */
 static void equations_by_state (pw_periodic *x, const double *u, int rows, double *dF) {
   int states = 2 * x->n, size = x->size;
-  pw_steady_combine (x->scene, u + states, 1, x->work);
+  pw_steady_combine (x->steady, u + states, 1, x->work);
   for (int c = 0; c < size; c++) {
     const double *B = x->basis + states * c, *Phi = x->Phi + states * c;
-    equations_rotate (x, x->work[2], B, x->moved);
+    equations_rotate (x, x->work[PW_RATE_TURN], B, x->state);
     for (int i = 0; i < states; i++) {
-      double unit = pw_periodic_unit (x, i), by = (Phi[i] - x->moved[i]) / unit, own = B[i] / unit;
+      double unit = pw_periodic_unit (x, i), by = (Phi[i] - x->state[i]) / unit, own = B[i] / unit;
       for (int j = 0; j < states; j++) {
         dF[j * rows + i] += by * x->dual[j * size + c];
         dF[j * rows + states + i] -= own * x->dual[j * size + c];
@@ -101,7 +106,7 @@ static void equations_by_state (pw_periodic *x, const double *u, int rows, doubl
 /* Direction k in which solutions can be shifted, along symmetries and in time, into x->change. */
 static void equations_shift (pw_periodic *x, int k) {
   size_t n = (size_t)x->n;
-  if (k < x->group) {
+  if (k < x->symmetries) {
     equations_symmetry (x, k, x->y0, x->change);
     return;
   }
@@ -109,10 +114,10 @@ static void equations_shift (pw_periodic *x, int k) {
   memcpy (x->change + n, x->a0, n * sizeof *x->change);
 }
 
-/* Corrections are orthogonal to these. */
+/* The conditions that corrections are orthogonal to these directions. */
 static void equations_orthogonal (pw_periodic *x, int rows, double *dF) {
   int states = 2 * x->n;
-  for (int k = 0; k < x->group + x->set.free; k++) {
+  for (int k = 0; k < x->symmetries + x->settings.free; k++) {
     double sum = 0;
     equations_shift (x, k);
     for (int j = 0; j < states; j++) sum += pow (x->change[j] / pw_periodic_unit (x, j), 2);
@@ -121,6 +126,7 @@ static void equations_orthogonal (pw_periodic *x, int rows, double *dF) {
   }
 }
 
+/* The derivatives with respect to the period. */
 static void equations_by_period (pw_periodic *x, double *column) {
   for (int j = 0; j < x->n; j++) {
     column[j] = x->y1[x->n + j] * x->T / pw_periodic_unit (x, j);
@@ -128,23 +134,23 @@ static void equations_by_period (pw_periodic *x, double *column) {
   }
 }
 
-/* By central differences over the parameter, of the flow from the same state, or on one side at the end of its domain. */
+/* The derivatives with respect to the parameter by central differences, at the end of its domain by one-sided ones. */
 static int equations_by_parameter (pw_periodic *x, const double *u, double *column, pw_error *error) {
   const double h = 1e-5;
   int unknowns = pw_periodic_unknowns (x), rows = 4 * x->n;
-  double *there = x->there, *F = there + unknowns + 1, distance = 0;
-  memcpy (there, u, ((size_t)unknowns + 1) * sizeof *u);
+  double *beside = x->beside, *F = beside + unknowns + 1, distance = 0;
+  memcpy (beside, u, ((size_t)unknowns + 1) * sizeof *u);
   for (int side = -1; side <= 1; side += 2) {
-    there[unknowns] = u[unknowns] + side * h;
-    int status = pw_periodic_flow (x, there, PW_FLOW, 1, error);
+    beside[unknowns] = u[unknowns] + side * h;
+    int status = pw_periodic_flow (x, beside, PW_FLOW, PW_BESIDE, error);
     if (status == PW_OK)
       distance += h;
     else if (status == PW_RETRY) {
-      there[unknowns] = u[unknowns];
-      status = pw_periodic_flow (x, there, PW_FLOW, 1, error);
+      beside[unknowns] = u[unknowns];
+      status = pw_periodic_flow (x, beside, PW_FLOW, PW_BESIDE, error);
     }
     if (status != PW_OK) return status;
-    equations_residual (x, there, F);
+    equations_residual (x, beside, F);
     for (int i = 0; i < rows; i++) column[i] += side * F[i];
   }
   for (int i = 0; i < rows; i++) column[i] /= distance;
@@ -153,16 +159,16 @@ static int equations_by_parameter (pw_periodic *x, const double *u, double *colu
 
 int pw_periodic_evaluate (void *periodic, const double *u, double *F, double *dF, pw_error *error) {
   pw_periodic *x = periodic;
-  int rows = x->branch.of.equations, states = 2 * x->n, unknowns = pw_periodic_unknowns (x), status = PW_OK;
-  if (dF && x->set.compile) status = equations_by_parameter (x, u, dF + (size_t)unknowns * (size_t)rows, error);
-  if (status == PW_OK && dF) status = pw_periodic_flow (x, u, PW_FLOW_DERIVATIVES, 0, error);
-  if (status == PW_OK) status = pw_periodic_flow (x, u, PW_FLOW, 0, error);
+  int rows = x->branch.problem.equations, states = 2 * x->n, unknowns = pw_periodic_unknowns (x), status = PW_OK;
+  if (dF && x->settings.compile) status = equations_by_parameter (x, u, dF + (size_t)unknowns * (size_t)rows, error);
+  if (status == PW_OK && dF) status = pw_periodic_flow (x, u, PW_FLOW_DERIVATIVES, PW_HERE, error);
+  if (status == PW_OK) status = pw_periodic_flow (x, u, PW_FLOW, PW_HERE, error);
   if (status != PW_OK) return status;
   equations_residual (x, u, F);
   if (dF == NULL) return PW_OK;
   equations_by_state (x, u, rows, dF);
   equations_by_displacement (x, u, rows, dF + states * rows);
-  if (x->set.free) equations_by_period (x, dF + (unknowns - 1) * rows);
+  if (x->settings.free) equations_by_period (x, dF + (unknowns - 1) * rows);
   equations_orthogonal (x, rows, dF);
   return PW_OK;
 }
@@ -176,7 +182,7 @@ static void equations_coordinates (const pw_periodic *x, const double *change, d
     for (int c = 0; c < x->size; c++) out[c] += x->dual[j * x->size + c] * change[j] / pw_periodic_unit (x, j);
 }
 
-/* By size, the largest first; of a pair that with im > 0. */
+/* Sorts multipliers by modulus, the largest first; of a pair that with im > 0 first. */
 static void equations_sort (int count, double *re, double *im) {
   for (int i = 1; i < count; i++)
     for (int k = i; k > 0; k--) {
@@ -191,17 +197,17 @@ static void equations_sort (int count, double *re, double *im) {
 /* The shifts in minimal coordinates, by columns of S.  Returns their number. */
 static int equations_shifts (pw_periodic *x, double *S) {
   int k = 0;
-  for (; k < x->group + x->set.free && k < x->size; k++) {
+  for (; k < x->symmetries + x->settings.free && k < x->size; k++) {
     equations_shift (x, k);
     equations_coordinates (x, x->change, S + k * x->size);
   }
   return k;
 }
 
-/* The eigenvalues of a block on the diagonal of x->M into x->re, x->im from entry `to`. */
+/* The eigenvalues of the diagonal block from row `first` of x->monodromy, into x->re and x->im from entry `to`. */
 static int equations_block (pw_periodic *x, int first, int count, int to, double *block, double *work) {
   for (int c = 0; c < count; c++)
-    memcpy (block + c * count, x->M + (first + c) * x->size + first, (size_t)count * sizeof *block);
+    memcpy (block + c * count, x->monodromy + (first + c) * x->size + first, (size_t)count * sizeof *block);
   if (count && LAPACKE_dgeev_work (LAPACK_COL_MAJOR, 'N', 'N', count, block, count, x->re + to, x->im + to, NULL, 1,
                                    NULL, 1, work, 34 * x->size))
     return PW_METHOD;
@@ -209,23 +215,23 @@ static int equations_block (pw_periodic *x, int first, int count, int to, double
   return PW_OK;
 }
 
-/* In coordinates whose first ones span the shifts the matrix is block triangular. */
+/* In coordinates whose first ones span the shifts, the monodromy matrix is block triangular. */
 int pw_periodic_multipliers (pw_periodic *x, const double *u, int *trivial) {
   int n = x->n, size = x->size, lwork = 34 * size;
-  double *S = x->M + size * size, *tau = S + size * size, *work = tau + size;
+  double *S = x->monodromy + size * size, *tau = S + size * size, *work = tau + size;
   int k = *trivial = equations_shifts (x, S);
-  pw_steady_combine (x->scene, u + 2 * n, 1, x->work);
+  pw_steady_combine (x->steady, u + 2 * n, 1, x->work);
   for (int c = 0; c < size; c++) {
-    equations_rotate (x, -x->work[2], x->Phi + 2 * n * c, x->change);
-    equations_coordinates (x, x->change, x->M + c * size);
+    equations_rotate (x, -x->work[PW_RATE_TURN], x->Phi + 2 * n * c, x->change);
+    equations_coordinates (x, x->change, x->monodromy + c * size);
   }
   LAPACKE_dgeqrf_work (LAPACK_COL_MAJOR, size, k, S, size, tau, work, lwork);
-  if (x->set.free && k > x->group && fabs (S[(k - 1) * size + k - 1]) * x->T < EQUATIONS_STEADY) {
+  if (x->settings.free && k > x->symmetries && fabs (S[(k - 1) * size + k - 1]) * x->T < EQUATIONS_STEADY) {
     pw_fail (&x->why, PW_METHOD, "Newton's method leads to a steady motion or an equilibrium");
     return PW_RETRY;
   }
-  LAPACKE_dormqr_work (LAPACK_COL_MAJOR, 'L', 'T', size, size, k, S, size, tau, x->M, size, work, lwork);
-  LAPACKE_dormqr_work (LAPACK_COL_MAJOR, 'R', 'N', size, size, k, S, size, tau, x->M, size, work, lwork);
+  LAPACKE_dormqr_work (LAPACK_COL_MAJOR, 'L', 'T', size, size, k, S, size, tau, x->monodromy, size, work, lwork);
+  LAPACKE_dormqr_work (LAPACK_COL_MAJOR, 'R', 'N', size, size, k, S, size, tau, x->monodromy, size, work, lwork);
   int status = equations_block (x, k, size - k, 0, S, work);
   return status == PW_OK ? equations_block (x, 0, k, size - k, S, work) : status;
 }

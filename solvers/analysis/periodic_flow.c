@@ -5,26 +5,35 @@
 #include "periodic_parts.h"
 #include "util.h"
 
-/* FLOW_MULTIPLES: of one signal's period that are tried for a common one.  FLOW_FAR: ratio of a free period to the last
- * one known.  RETURN_SAMPLES: of a run that seeks a return, RETURN_STEPS per scale of time; RETURN_NEAR: distance of a
- * return, relative to the largest on the way.  FLOW_STEPS: of a trial of Newton's method, relative to those of the motion
- * that it is to improve; a trial far away, with enormous velocities, would take millions. */
-enum { FLOW_MULTIPLES = 24, FLOW_FAR = 4, FLOW_STEPS = 20, RETURN_SAMPLES = 20000, RETURN_STEPS = 20 };
-static const double RETURN_NEAR = 0.2, RETURN_LEAST = 1e-6;
+enum {
+  FLOW_MULTIPLES = 24, /* of the period of a signal, that are tried as a common period */
+  FLOW_PERIODS = 3,    /* in which signals are compared; without a period: FLOW_TIMES T */
+  FLOW_TIMES = 20,
+  /* Largest ratio of the steps of a trial of Newton's method to those of the motion that it is to improve: a trial far
+   * away, with enormous velocities, would take millions. */
+  FLOW_STEPS = 20,
+  RETURN_SAMPLES = 20000, /* of a run that seeks a return */
+  RETURN_STEPS = 20       /* samples per scale of time T */
+};
+static const double FLOW_SETTLED = 1e-9, /* relative tolerance of the run that settles */
+    FLOW_FAR = 4,                        /* largest ratio of a free period to the last one known */
+    RETURN_NEAR = 0.2,   /* distance of a return from the first state, relative to the largest one on the way */
+    RETURN_LEAST = 1e-6; /* largest distance that counts as rest, in units of the scene */
 
-/* Derivatives need fewer digits than states: Newton's method converges all the same. */
-static const double flow_rtol[] = { [PW_FLOW] = 0, [PW_FLOW_DERIVATIVES] = 1e-6, [PW_FLOW_MULTIPLIERS] = 1e-8 };
+/* Least relative tolerances.  Derivatives need fewer digits than states: Newton's method converges all the same. */
+static const double flow_min_rtol[] = { [PW_FLOW] = 0, [PW_FLOW_DERIVATIVES] = 1e-6, [PW_FLOW_MULTIPLIERS] = 1e-8 };
 
 /* ---- The period of signals ---- */
 
-static double flow_of_signal (const pw_signal *s) {
+/* The period of a signal [s]; 0: none. */
+static double signal_period (const pw_signal *s) {
   if (s->type == PW_HARMONIC && s->harmonic.amplitude != 0 && s->harmonic.omega != 0)
     return 2 * PW_PI / fabs (s->harmonic.omega);
   return s->type == PW_PULSE && s->pulse.period > 0 && s->pulse.height != 0 ? s->pulse.period : 0;
 }
 
-/* The least multiple of a that is one of b. */
-static double flow_common (double a, double b) {
+/* The least common multiple of two periods, of which 0 is none; NaN if it is not found. */
+static double common_period (double a, double b) {
   if (a == 0 || b == 0 || isnan (a)) return a + b;
   for (int i = 1; i <= FLOW_MULTIPLES; i++)
     if (i * a > b / 2 && fabs (i * a / b - round (i * a / b)) < 1e-9 * i) return i * a;
@@ -35,28 +44,29 @@ double pw_system_period (const pw_system *s) {
   double period = 0;
   for (int k = 0; k < s->batches; k++)
     for (int i = 0; i < s->batch[k].b.count * s->batch[k].kind->signals; i++)
-      period = flow_common (period, flow_of_signal (&s->batch[k].source[i].signal));
+      period = common_period (period, signal_period (&s->batch[k].source[i].signal));
   return period;
 }
 
-/* Verifies that the signals have the period, or none if it is free. */
-static int flow_signals (pw_periodic *x, int which, pw_run *r) {
-  double signals = pw_system_period (r->s), period = x->set.period;
+/* Sets the period, unless it is free, to that given or that of the signals, and verifies that they repeat after it; if
+ * it is free, that they are constant. */
+static int flow_signals (pw_periodic *x, pw_place place, pw_run *r) {
+  double signals = pw_system_period (r->s), period = x->settings.period;
   char name[200];
   int changed, status;
-  if (!x->set.free && period <= 0) period = x->set.periods * signals;
-  if (!x->set.free && !(period > 0))
+  if (!x->settings.free && period <= 0) period = x->settings.periods * signals;
+  if (!x->settings.free && !(period > 0))
     return pw_fail (&x->why, PW_INPUT,
                     isnan (signals) ? "model %s: the periods of its signals have no common multiple: a period is needed"
                                     : "model %s: no signal has a known period: a period is needed",
                     x->s->model);
-  status = x->set.free ? pw_signals_change (r, x->set.t, 0, 20 * x->T, &changed, &x->why)
-                       : pw_signals_change (r, x->set.t, period, 3 * period, &changed, &x->why);
+  status = x->settings.free ? pw_signals_change (r, x->settings.t, 0, FLOW_TIMES * x->T, &changed, &x->why)
+                            : pw_signals_change (r, x->settings.t, period, FLOW_PERIODS * period, &changed, &x->why);
   if (status != PW_OK) return status;
-  x->at[which].period = period;
+  x->system[place].period = period;
   if (changed < 0) return PW_OK;
   pw_system_signal_name (r->s, changed, name, sizeof name);
-  if (x->set.free)
+  if (x->settings.free)
     return pw_fail (&x->why, PW_INPUT, "model %s: signal %s changes with time, so that the period is not free",
                     x->s->model, name);
   return pw_fail (&x->why, PW_INPUT, "model %s: signal %s does not repeat after %.12g s", x->s->model, name, period);
@@ -64,30 +74,30 @@ static int flow_signals (pw_periodic *x, int which, pw_run *r) {
 
 /* ---- Runs ---- */
 
-/* The system at a value of the parameter. */
-static const pw_system *flow_system (pw_periodic *x, int k, double value) {
-  if (x->set.compile == NULL) return x->s;
-  if (x->at[k].own && x->at[k].value == value) return x->at[k].own;
-  pw_system_free (x->at[k].own);
-  x->at[k].value = value, x->at[k].period = 0;
-  x->at[k].own = x->set.compile (x->set.context, value, &x->why);
-  const pw_system *s = x->at[k].own;
+/* The system at a value of the parameter.  NULL, with x->why, if there is none. */
+static const pw_system *flow_system (pw_periodic *x, pw_place place, double value) {
+  if (x->settings.compile == NULL) return x->s;
+  if (x->system[place].own && x->system[place].value == value) return x->system[place].own;
+  pw_system_free (x->system[place].own);
+  x->system[place].value = value, x->system[place].period = 0;
+  x->system[place].own = x->settings.compile (x->settings.context, value, &x->why);
+  const pw_system *s = x->system[place].own;
   if (s == NULL || (s->coords == x->n && s->rows == x->s->rows && s->bodies == x->s->bodies)) return s;
   pw_fail (&x->why, PW_INPUT, "model %s: the parameter changes the number of bodies or constraint equations", s->model);
   return NULL;
 }
 
-pw_run *pw_periodic_run (pw_periodic *x, int which, double value, double rtol, const double *y) {
-  const pw_settings settings = { .t = x->set.t,
-                                 .span = x->set.period > 0 ? x->set.period : x->T,
+pw_run *pw_periodic_run (pw_periodic *x, pw_place place, double value, double rtol, const double *y) {
+  const pw_settings settings = { .t = x->settings.t,
+                                 .span = x->settings.period > 0 ? x->settings.period : x->T,
                                  .rtol = rtol,
-                                 .stop = x->set.stop,
-                                 .stop_context = x->set.stop_context };
+                                 .stop = x->settings.stop,
+                                 .stop_context = x->settings.stop_context };
   x->why = (pw_error){ 0 };
-  const pw_system *s = flow_system (x, which, value);
-  pw_run *r = s ? pw_run_open (s, x->set.method, &settings, &x->why) : NULL;
+  const pw_system *s = flow_system (x, place, value);
+  pw_run *r = s ? pw_run_open (s, x->settings.method, &settings, &x->why) : NULL;
   int status = r ? PW_OK : x->why.status;
-  if (status == PW_OK && x->at[which].period <= 0) status = flow_signals (x, which, r);
+  if (status == PW_OK && x->system[place].period <= 0) status = flow_signals (x, place, r);
   if (status == PW_OK && y) status = pw_run_restart (r, y, y + x->n, &x->why);
   if (status == PW_OK) return r;
   if (r) pw_run_close (r);
@@ -96,25 +106,26 @@ pw_run *pw_periodic_run (pw_periodic *x, int which, double value, double rtol, c
 
 /* ---- The flow ---- */
 
-/* x->change = the change of the consistent state nearest to x->moved with entry j, in units of the scene, by differences. */
+/* x->change = the derivative of the consistent state nearest to x->state with respect to its entry j in its unit, by
+ * differences. */
 static int flow_nearest (pw_periodic *x, pw_run *r, int j) {
-  const double h = 1e-5, initial = x->moved[j];
+  const double h = 1e-5, initial = x->state[j];
   int n = x->n, status = PW_OK;
   memset (x->change, 0, 2 * (size_t)n * sizeof *x->change);
   for (int side = -1; side <= 1 && status == PW_OK; side += 2) {
-    x->moved[j] = initial + side * h * pw_periodic_unit (x, j);
-    status = pw_run_restart (r, x->moved, x->moved + n, &x->why);
+    x->state[j] = initial + side * h * pw_periodic_unit (x, j);
+    status = pw_run_restart (r, x->state, x->state + n, &x->why);
     for (int i = 0; i < n; i++) {
       x->change[i] += side * r->q[i] / (2 * h);
       x->change[n + i] += side * r->v[i] / (2 * h);
     }
   }
-  x->moved[j] = initial;
+  x->state[j] = initial;
   return status;
 }
 
-/* Bases at the initial state of the run, for perturbations on the constraints and their minimal coordinates: of such
- * perturbations, or of changes of the consistent state nearest to x->moved. */
+/* Sets x->basis and x->dual at the initial state of the run.  nearest: those of any change of x->state are the minimal
+ * coordinates of the change of the nearest consistent state; otherwise the change is taken to be on the constraints. */
 static int flow_basis (pw_periodic *x, pw_run *r, int nearest) {
   pw_linearisation l;
   int n = x->n, status = pw_linear_open (&l, r, 0, n);
@@ -132,7 +143,7 @@ static int flow_basis (pw_periodic *x, pw_run *r, int nearest) {
     pw_linear_coordinates (&l, x->change, x->change + n, 1, x->dual + j * l.size);
   }
   pw_linear_close (&l);
-  return status == PW_OK && nearest ? pw_run_restart (r, x->moved, x->moved + n, &x->why) : status;
+  return status == PW_OK && nearest ? pw_run_restart (r, x->state, x->state + n, &x->why) : status;
 }
 
 static void flow_state (const pw_periodic *x, const pw_sample *sample, double *y) {
@@ -140,7 +151,8 @@ static void flow_state (const pw_periodic *x, const pw_sample *sample, double *y
   memcpy (y + x->n, sample->v, (size_t)x->n * sizeof *y);
 }
 
-static int flow_vary (pw_periodic *x, pw_run *r, double end) {
+/* Integrates the derivatives of the state along x->basis to the end of the period, into x->Phi. */
+static int flow_derivatives (pw_periodic *x, pw_run *r, double end) {
   int size = x->size, n = x->n;
   pw_direction *d = calloc ((size_t)size + 1, sizeof *d);
   pw_sample sample;
@@ -157,18 +169,18 @@ static int flow_vary (pw_periodic *x, pw_run *r, double end) {
   return status;
 }
 
-/* Advances a run, at its initial state, by one period. */
+/* Advances a run from its initial state by one period: pw_periodic_flow. */
 static int flow_run (pw_periodic *x, pw_run *r, double period, pw_flow_accuracy accuracy) {
   size_t bytes = (size_t)x->n * sizeof *r->q;
-  double end = x->set.t + period;
+  double end = x->settings.t + period;
   pw_sample sample;
-  int branch = x->set.compile != NULL; /* whose tangents need the exact derivatives */
+  int branch = x->settings.compile != NULL; /* whose tangents need derivatives along changes off the constraints, too */
   int status = accuracy == PW_FLOW ? PW_OK : flow_basis (x, r, branch && accuracy == PW_FLOW_DERIVATIVES);
   if (status != PW_OK) return status == PW_RETRY ? pw_fail_singular (r, r->t, &x->why) : status;
   status = pw_run_sample (r, r->t, &sample, &x->why);
   if (status != PW_OK) return status;
   flow_state (x, &sample, x->y0), memcpy (x->a0, sample.a, bytes);
-  if (accuracy != PW_FLOW) return x->steps = 0, flow_vary (x, r, end);
+  if (accuracy != PW_FLOW) return x->steps = 0, flow_derivatives (x, r, end);
   while (status == PW_OK && pw_run_time (r) < end) {
     status = pw_run_advance (r, end, &x->why);
     if (x->steps > 0 && pw_run_statistics (r)->steps > FLOW_STEPS * x->steps) return PW_RETRY;
@@ -180,17 +192,17 @@ static int flow_run (pw_periodic *x, pw_run *r, double period, pw_flow_accuracy 
   return PW_OK;
 }
 
-int pw_periodic_flow (pw_periodic *x, const double *u, pw_flow_accuracy accuracy, int which, pw_error *error) {
-  double value = pw_periodic_parameter (x, u), rtol = fmax (x->set.rtol, flow_rtol[accuracy]);
-  double period = x->set.free ? u[pw_periodic_unknowns (x) - 1] * x->T : 1;
+int pw_periodic_flow (pw_periodic *x, const double *u, pw_flow_accuracy accuracy, pw_place place, pw_error *error) {
+  double value = pw_periodic_parameter (x, u), rtol = fmax (x->settings.rtol, flow_min_rtol[accuracy]);
+  double period = x->settings.free ? u[pw_periodic_unknowns (x) - 1] * x->T : 1;
   x->why = (pw_error){ 0 };
-  if (x->set.free && !(period * FLOW_FAR > x->about && period < FLOW_FAR * x->about)) return PW_RETRY;
-  for (int j = 0; j < 2 * x->n; j++) x->moved[j] = u[j] * pw_periodic_unit (x, j);
-  pw_run *r = pw_periodic_run (x, which, value, rtol, x->moved);
-  int status = r ? flow_run (x, r, x->set.free ? period : x->at[which].period, accuracy) : x->why.status;
+  if (x->settings.free && !(period * FLOW_FAR > x->last_period && period < FLOW_FAR * x->last_period)) return PW_RETRY;
+  for (int j = 0; j < 2 * x->n; j++) x->state[j] = u[j] * pw_periodic_unit (x, j);
+  pw_run *r = pw_periodic_run (x, place, value, rtol, x->state);
+  int status = r ? flow_run (x, r, x->settings.free ? period : x->system[place].period, accuracy) : x->why.status;
   if (r) pw_run_close (r);
   if (status == PW_OK) return PW_OK;
-  int refused = x->set.compile && x->at[which].own == NULL; /* the value of the parameter, by the model */
+  int refused = x->settings.compile && x->system[place].own == NULL; /* the model refused the value of the parameter */
   if (status == PW_RESOURCE || (status == PW_INPUT && r == NULL && !refused)) return *error = x->why, status;
   return PW_RETRY;
 }
@@ -198,26 +210,28 @@ int pw_periodic_flow (pw_periodic *x, const double *u, pw_flow_accuracy accuracy
 /* ---- Where the search begins ---- */
 
 double pw_periodic_difference (const pw_periodic *x, int j, double a, double b) {
-  int rates = pw_steady_rates (x->s), changes = j >= 3 * x->s->bodies || j % 3 != 2;
-  for (int k = 0; k < x->group && !changes; k++)
-    changes = x->scene->axis[k * rates + 2] != 0 || x->scene->axis[k * rates + 3 + j / 3] != 0;
+  int rates = pw_steady_rate_count (x->s), changes = j >= 3 * x->s->bodies || j % 3 != 2;
+  for (int k = 0; k < x->symmetries && !changes; k++)
+    changes = x->steady->symmetry[k * rates + PW_RATE_TURN] != 0 ||
+              x->steady->symmetry[k * rates + PW_RATE_ANGLES + j / 3] != 0;
   return changes ? a - b : remainder (a - b, 2 * PW_PI);
 }
 
-/* The distance of a run's state from that of x->y0, both up to symmetries, in units of the scene. */
+/* Sets y to a run's state displaced by symmetries to a unique one; its distance from x->y0 in units of the scene. */
 static int flow_distance (pw_periodic *x, pw_run *r, double t, double *y, double *distance) {
   pw_sample sample;
   int n = x->n, status = pw_run_sample (r, t, &sample, &x->why);
   if (status != PW_OK) return status;
   flow_state (x, &sample, y);
-  pw_steady_canonical (x->scene, y, y + n);
+  pw_steady_canonical (x->steady, y, y + n);
   *distance = 0;
   for (int j = 0; j < 2 * n; j++)
     *distance = hypot (*distance, pw_periodic_difference (x, j, y[j], x->y0[j]) / pw_periodic_unit (x, j));
   return PW_OK;
 }
 
-/* The time of the first return to the state of the run, into x->about. */
+/* Sets x->last_period to the time after which the run first returns near its state, up to symmetries: a minimum of the
+ * distance. */
 static int flow_return (pw_periodic *x, pw_run *r) {
   double t0 = pw_run_time (r), step = x->T / RETURN_STEPS, d[3] = { 0, 0, 0 }, far = 0;
   int status = flow_distance (x, r, t0, x->y0, d);
@@ -229,7 +243,7 @@ static int flow_return (pw_periodic *x, pw_run *r) {
     if (status == PW_OK) status = flow_distance (x, r, t, x->y1, &d[2]);
     far = fmax (far, d[2]);
     if (i > 2 && far > RETURN_LEAST && d[1] < RETURN_NEAR * far && d[1] < d[0] && d[1] <= d[2])
-      return x->about = t - step - t0, PW_OK;
+      return x->last_period = t - step - t0, PW_OK;
   }
   if (status == PW_OK)
     pw_fail (&x->why, PW_METHOD, "the motion does not return to a state: a guess of the period is needed");
@@ -238,17 +252,17 @@ static int flow_return (pw_periodic *x, pw_run *r) {
 
 int pw_periodic_settle (pw_periodic *x, double value, int periods) {
   pw_sample sample;
-  pw_run *r = pw_periodic_run (x, 0, value, 1e-9, NULL);
+  pw_run *r = pw_periodic_run (x, PW_HERE, value, FLOW_SETTLED, NULL);
   if (r == NULL) return x->why.status;
-  double end = r->t + periods * (x->set.free ? x->about : x->at[0].period);
+  double end = r->t + periods * (x->settings.free ? x->last_period : x->system[PW_HERE].period);
   int status = pw_run_advance_to (r, end, end, &x->why);
   if (status == PW_OK && pw_run_stop_requested (r)) status = PW_STOPPED;
   if (status == PW_OK) status = pw_run_sample (r, pw_run_time (r), &sample, &x->why);
   if (status == PW_OK) {
-    flow_state (x, &sample, x->moved);
-    pw_steady_home (x->scene, x->moved, x->moved + x->n);
+    flow_state (x, &sample, x->state);
+    pw_steady_move_to_start (x->steady, x->state, x->state + x->n);
   }
-  if (status == PW_OK && x->set.free && x->set.period <= 0) status = flow_return (x, r);
+  if (status == PW_OK && x->settings.free && x->settings.period <= 0) status = flow_return (x, r);
   pw_run_close (r);
   return status == PW_OK || status == PW_RESOURCE ? status : PW_RETRY;
 }

@@ -9,106 +9,46 @@
 
 enum {
   STEADY_POINTS = 50,       /* of a branch, by default */
-  STEADY_TIMES = 16,        /* times at which signals are compared, and as many between breakpoints */
-  STEADY_BREAKPOINTS = 1000 /* of signals, that may be the last */
+  STEADY_BREAKPOINTS = 1000 /* that are followed to find the last one */
 };
-static const double STEADY_EXACT = 1e-9, /* residual of a solution, in units of the scene */
-    STEADY_SLOW = 1e-4,                  /* rates that may be round-off at a double root */
-    SIGNAL_SAME = 1e-8;                  /* difference of signals, relative to their largest value, that counts as 0 */
+static const double STEADY_EXACT = 1e-9, /* largest residual of a solution, in units of the scene */
+    STEADY_SLOW = 1e-4,                  /* rates that may be round-off at a double root, the root of STEADY_EXACT */
+    SUGGEST_CHANGE = 1e-8, SUGGEST_LEFT = 1e-6; /* least square of a change, and its part that is not held already */
 
 /* ---- Opening ---- */
 
 static int steady_arrays (pw_steady *x) {
-  size_t n = (size_t)x->n, m = (size_t)x->m, rates = (size_t)pw_steady_rates (x->s), most = n + rates;
-  size_t holds = (size_t)x->set.holds, equations = (size_t)x->holonomic + m + n + holds + rates;
+  size_t n = (size_t)x->n, m = (size_t)x->m, rates = (size_t)pw_steady_rate_count (x->s), most = n + rates;
+  size_t holds = (size_t)x->settings.holds, equations = (size_t)x->holonomic + m + n + holds + rates;
   const pw_array array[] = {
-    { &x->axis, rates * rates },
-    { &x->fixed, rates * rates },
+    { &x->symmetry, rates * rates },
+    { &x->free_symmetry, rates * rates },
     { &x->norm, m },
     { &x->start, 2 * n },
     { &x->q, n + 3 },
     { &x->v, n + 3 },
     { &x->rates, rates },
-    { &x->sum, rates },
+    { &x->combined, rates },
     { &x->u, most + 1 },
     { &x->F, equations + n * rates + 41 * most },
     { &x->q0, n },
     { &x->v0, n },
     { &x->dq, n },
     { &x->dv, n },
-    { &x->null, (most + 1) * (most + 1) },
+    { &x->null_space, (most + 1) * (most + 1) },
   };
   x->memory = pw_alloc_arrays (array, sizeof array / sizeof *array);
   x->cyclic = calloc (n + 1, 1);
-  x->known = calloc (2 * n + 1, sizeof *x->known);
+  x->solution = calloc (2 * n + 1, sizeof *x->solution);
   x->hold = calloc (holds + 1, sizeof *x->hold);
-  if (!x->memory || !x->cyclic || !x->known || !x->hold) return PW_RESOURCE;
-  if (holds) memcpy (x->hold, x->set.hold, holds * sizeof *x->hold);
-  for (int j = 0; j < 2 * x->n; j++) x->known[j].state = j;
+  if (!x->memory || !x->cyclic || !x->solution || !x->hold) return PW_RESOURCE;
+  if (holds) memcpy (x->hold, x->settings.hold, holds * sizeof *x->hold);
+  for (int j = 0; j < 2 * x->n; j++) x->solution[j].state = j;
   return PW_OK;
 }
 
-typedef struct {
-  pw_run *r;
-  double *state;         /* 2 n: q, v */
-  double *values;        /* count: at the first of two times */
-  double *largest, *off; /* count: magnitude, difference */
-  int count;             /* numbers of signals */
-} signal_times;
-
-/* Compares signals at two times, in the run's state (number = 0) or one near it: a factor may be 0 in the run's.  A status;
- * signals may fail in other states. */
-static int signals_compare (signal_times *x, int number, double t0, double t1) {
-  pw_run *r = x->r;
-  pw_workspace *w = r->w;
-  int n = r->s->coords;
-  double *q = x->state, *v = q + n;
-  for (int j = 0; j < n; j++) {
-    double unit = number > 0 ? pw_unit (r->s, j) : 0;
-    q[j] = r->q[j] + unit * pw_irregular (1.7 + number, j + 1);
-    v[j] = r->v[j] + unit / w->scale.time * pw_irregular (2.9 + number, j + 1);
-  }
-  int status = pw_update_kinematics (w, t0, q, v);
-  if (status == PW_OK && x->count) memcpy (x->values, w->u, (size_t)x->count * sizeof *w->u);
-  if (status == PW_OK) status = pw_update_kinematics (w, t1, q, v);
-  for (int i = 0; status == PW_OK && i < x->count; i++) {
-    x->off[i] = pw_larger_or_nan (x->off[i], fabs (w->u[i] - x->values[i]));
-    x->largest[i] = fmax (x->largest[i], fmax (fabs (x->values[i]), fabs (w->u[i])));
-  }
-  return number > 0 ? PW_OK : status;
-}
-
-/* The middle between the first two breakpoints after t, up to t1; INFINITY without one.  *t: the first of them. */
-static double signals_between (pw_workspace *w, double *t, double t1) {
-  *t = pw_next_breakpoint (w, 1, *t);
-  return *t < t1 ? *t + (fmin (pw_next_breakpoint (w, 1, *t), t1) - *t) / 2 : INFINITY;
-}
-
-int pw_signals_change (pw_run *r, double t, double period, double span, int *changed, pw_error *error) {
-  signal_times x = { .r = r, .count = 3 * r->s->sources };
-  size_t count = (size_t)x.count;
-  double at = t, breakpoint = t;
-  int status = PW_OK;
-  x.values = calloc (3 * count + 2 * (size_t)r->s->coords + 1, sizeof *x.values);
-  if (x.values == NULL) return pw_fail_memory (r->s, error);
-  x.largest = x.values + count, x.off = x.largest + count, x.state = x.off + count;
-  for (int k = 1; status == PW_OK && k <= 2 * STEADY_TIMES && isfinite (at); k++) {
-    double part = k / (double)STEADY_TIMES;
-    at = k > STEADY_TIMES ? signals_between (r->w, &breakpoint, t + span)
-         : period > 0     ? t + span * fmod (0.618034 * k, 1)
-                          : t + span * part * part;
-    for (int number = 0; number < 2 && status == PW_OK && isfinite (at); number++)
-      status = signals_compare (&x, number, period > 0 ? at : t, period > 0 ? at + period : at);
-  }
-  *changed = -1;
-  for (int i = x.count; i-- > 0;)
-    if (!(x.off[i] <= SIGNAL_SAME * x.largest[i])) *changed = i / 3;
-  free (x.values);
-  return status == PW_OK ? PW_OK : pw_run_annotate_error (r, pw_fail_signal (at, error), error);
-}
-
 /* The last breakpoint of signals within the span. */
-static double signals_last (pw_workspace *w, double t, double span) {
+static double steady_last_breakpoint (pw_workspace *w, double t, double span) {
   double end = t + span, next = t;
   for (int i = 0; i < STEADY_BREAKPOINTS && next <= end; i++) t = next, next = pw_next_breakpoint (w, 1, t);
   return t;
@@ -116,13 +56,13 @@ static double signals_last (pw_workspace *w, double t, double span) {
 
 /* PW_INPUT with the first signal that changes with time, in the initial state, within the span. */
 static int steady_constant (pw_steady *x, pw_error *error) {
-  pw_run *r = x->at[0].r;
+  pw_run *r = x->system[PW_HERE].run;
   char name[200], text[32];
-  int changed, later, status = pw_signals_change (r, x->set.t, 0, x->set.span, &changed, error);
+  int changed, later, status = pw_signals_change (r, x->settings.t, 0, x->settings.span, &changed, error);
   if (status != PW_OK || changed < 0) return status;
   pw_system_signal_name (x->s, changed, name, sizeof name);
-  double last = signals_last (r->w, x->set.t, x->set.span);
-  status = pw_signals_change (r, last, 0, x->set.span, &later, error);
+  double last = steady_last_breakpoint (r->w, x->settings.t, x->settings.span);
+  status = pw_signals_change (r, last, 0, x->settings.span, &later, error);
   if (status != PW_OK) return status;
   snprintf (text, sizeof text, "%.9g", last);
   if (strtod (text, NULL) < last) snprintf (text, sizeof text, "%.9g", last * (1 + 1e-8));
@@ -137,43 +77,49 @@ static int steady_constant (pw_steady *x, pw_error *error) {
       x->s->model, name);
 }
 
-/* Scales and symmetries at the initial state; forced: signals may change with time. */
-static int steady_begin (pw_steady *x, int forced, pw_error *error) {
-  pw_run *r = x->at[0].r;
+/* What signals must be. */
+typedef enum { SIGNALS_CONSTANT, SIGNALS_OF_TIME } signal_rule;
+
+/* Determines scales and symmetries at the initial state. */
+static int steady_begin (pw_steady *x, signal_rule signals, pw_error *error) {
+  pw_run *r = x->system[PW_HERE].run;
   x->L = x->s->scale.length;
   x->T = r->w->scale.time;
   memcpy (x->start, r->q, (size_t)x->n * sizeof *r->q);
   memcpy (x->start + x->n, r->v, (size_t)x->n * sizeof *r->v);
   if (x->s->bodies) memcpy (x->origin, r->q, sizeof x->origin);
-  int status = forced ? PW_OK : steady_constant (x, error);
+  int status = signals == SIGNALS_CONSTANT ? steady_constant (x, error) : PW_OK;
   if (status != PW_OK) return status;
-  status = pw_steady_find_group (x);
+  status = pw_steady_find_symmetries (x);
   if (status == PW_RESOURCE) return pw_fail_memory (x->s, error);
-  if (status != PW_OK) return pw_fail_singular (r, x->set.t, error);
-  for (int i = 0; i < x->m; i++) x->norm[i] = x->at[0].x.norm[i] > 0 ? x->at[0].x.norm[i] : 1;
+  if (status != PW_OK) return pw_fail_singular (r, x->settings.t, error);
+  for (int i = 0; i < x->m; i++)
+    x->norm[i] = x->system[PW_HERE].linearisation.norm[i] > 0 ? x->system[PW_HERE].linearisation.norm[i] : 1;
   return PW_OK;
 }
 
-static pw_steady *steady_open (const pw_system *s, const pw_steady_settings *settings, int forced, pw_error *error) {
+static pw_steady *steady_open (const pw_system *s, const pw_steady_settings *settings, signal_rule signals,
+                               pw_error *error) {
   pw_steady *x = calloc (1, sizeof *x);
   if (x == NULL) return pw_fail_memory (s, error), NULL;
-  x->s = s, x->set = *settings;
+  x->s = s, x->settings = *settings;
   x->n = s->coords, x->m = s->rows, x->holonomic = s->holonomic;
-  if (x->set.points <= 0) x->set.points = STEADY_POINTS;
+  if (x->settings.points <= 0) x->settings.points = STEADY_POINTS;
   int status = PW_OK;
-  if (x->n > PW_STEADY_MOST)
+  if (x->n > PW_STEADY_MAX_COORDINATES)
     status = pw_fail (error, PW_INPUT, "model %s has %d coordinates; steady motions are sought with at most %d",
-                      s->model, x->n, PW_STEADY_MOST);
+                      s->model, x->n, PW_STEADY_MAX_COORDINATES);
   if (status == PW_OK && steady_arrays (x) != PW_OK) status = pw_fail_memory (s, error);
-  if (status == PW_OK && pw_steady_at (x, 0, x->set.first) != PW_OK) *error = x->why, status = error->status;
-  if (status == PW_OK) status = steady_begin (x, forced, error);
-  const pw_branch_equations of = { .unknowns = pw_steady_unknowns (x),
-                                   .equations = pw_steady_equations (x),
-                                   .tolerance = STEADY_EXACT,
-                                   .evaluate = pw_steady_evaluate,
-                                   .same = pw_steady_again,
-                                   .context = x };
-  if (status == PW_OK) status = pw_branch_open (&x->branch, &of, error);
+  if (status == PW_OK && pw_steady_open_system (x, PW_HERE, x->settings.first) != PW_OK)
+    *error = x->why, status = error->status;
+  if (status == PW_OK) status = steady_begin (x, signals, error);
+  const pw_branch_problem problem = { .unknowns = pw_steady_unknowns (x),
+                                      .equations = pw_steady_equations (x),
+                                      .tolerance = STEADY_EXACT,
+                                      .evaluate = pw_steady_evaluate,
+                                      .same = pw_steady_same_motion,
+                                      .context = x };
+  if (status == PW_OK) status = pw_branch_open (&x->branch, &problem, error);
   if (status == PW_OK) return x;
   pw_steady_close (x);
   return NULL;
@@ -181,20 +127,20 @@ static pw_steady *steady_open (const pw_system *s, const pw_steady_settings *set
 
 pw_steady *pw_steady_open (const pw_system *s, const pw_steady_settings *settings, pw_error *error) {
   if (pw_require (s, "a system", error) != PW_OK || pw_require (settings, "settings", error) != PW_OK) return NULL;
-  return steady_open (s, settings, 0, error);
+  return steady_open (s, settings, SIGNALS_CONSTANT, error);
 }
 
-pw_steady *pw_steady_open_scene (const pw_system *s, double t, double span, pw_error *error) {
-  return steady_open (s, &(pw_steady_settings){ .t = t, .span = span, .vary = -1 }, 1, error);
+pw_steady *pw_steady_open_symmetries (const pw_system *s, double t, double span, pw_error *error) {
+  return steady_open (s, &(pw_steady_settings){ .t = t, .span = span, .vary = -1 }, SIGNALS_OF_TIME, error);
 }
 
 void pw_steady_close (pw_steady *x) {
   if (x == NULL) return;
-  for (int k = 0; k < 2; k++) pw_steady_leave (x, k);
+  for (pw_place place = PW_HERE; place < PW_PLACES; place++) pw_steady_close_system (x, place);
   pw_branch_close (&x->branch);
   pw_linear_free (&x->linear);
   free (x->cyclic);
-  free (x->known);
+  free (x->solution);
   free (x->hold);
   free (x->memory);
   free (x);
@@ -205,27 +151,27 @@ const char *pw_steady_reason (const pw_steady *x) {
 }
 
 int pw_steady_symmetries (const pw_steady *x) {
-  return x->group;
+  return x->symmetries;
 }
 
 /* ---- Solutions ---- */
 
 /* Remembers a solution, where later runs are opened. */
-static void steady_solved (pw_steady *x) {
+static void steady_remember (pw_steady *x) {
   x->solved = 1;
-  for (int j = 0; j < x->n; j++) x->known[j].value = x->q[j], x->known[x->n + j].value = x->v[j];
+  for (int j = 0; j < x->n; j++) x->solution[j].value = x->q[j], x->solution[x->n + j].value = x->v[j];
 }
 
 int pw_steady_motion_at (pw_steady *x, const double *u, pw_steady_motion *out, pw_error *error) {
-  int status = pw_steady_at (x, 0, pw_steady_parameter (x, u));
+  int status = pw_steady_open_system (x, PW_HERE, pw_steady_parameter (x, u));
   if (status != PW_OK) return *error = x->why, error->status;
-  pw_run *r = x->at[0].r;
+  pw_run *r = x->system[PW_HERE].run;
   pw_steady_state (x, u);
-  steady_solved (x);
+  steady_remember (x);
   memcpy (r->q, x->q, (size_t)x->n * sizeof *r->q);
   memcpy (r->v, x->v, (size_t)x->n * sizeof *r->v);
   pw_linear_free (&x->linear);
-  status = pw_run_linearise (r, PW_STEADY_MOST, &x->linear, error);
+  status = pw_run_linearise (r, PW_STEADY_MAX_COORDINATES, &x->linear, error);
   if (status != PW_OK) return status;
   out->parameter = pw_steady_parameter (x, u);
   out->q = x->q, out->v = x->v;
@@ -238,40 +184,40 @@ int pw_steady_motion_at (pw_steady *x, const double *u, pw_steady_motion *out, p
   return PW_OK;
 }
 
-/* Fills x->null with the directions in which u can change without change of the equations, up to symmetries.  Returns their
- * number, or a status. */
+/* Sets x->null_space to the directions in which solutions form a family, without those of free symmetries.  Returns
+ * their number, or a status < 0. */
 static int steady_family (pw_steady *x) {
   int unknowns = pw_steady_unknowns (x), equations = pw_steady_equations (x);
   pw_error none = { 0 };
-  int status = pw_steady_find_gauge (x);
+  int status = pw_steady_find_free_symmetries (x);
   if (status != PW_OK) return status;
   memset (x->branch.J, 0, (size_t)equations * ((size_t)unknowns + 1) * sizeof *x->branch.J);
   status = pw_steady_evaluate (x, x->u, x->branch.F, x->branch.J, &none);
   if (status != PW_OK) return PW_METHOD;
-  return pw_steady_null (equations, unknowns, x->branch.J, 1e-9, x->null);
+  return pw_null_space (equations, unknowns, x->branch.J, 1e-9, x->null_space);
 }
 
-/* Rest in place of velocities below the accuracy of a double root, if that is a solution, too. */
+/* Replaces rates below the accuracy of a double root by rest, if that is a solution, too. */
 static void steady_rest (pw_steady *x) {
+  size_t bytes = ((size_t)pw_steady_unknowns (x) + 1) * sizeof *x->u;
   pw_error none = { 0 };
   double most = 0;
   for (int k = x->n; k < pw_steady_unknowns (x); k++) most = fmax (most, fabs (x->u[k]));
   if (most == 0 || most > STEADY_SLOW) return;
-  memcpy (x->null, x->u, ((size_t)pw_steady_unknowns (x) + 1) * sizeof *x->u);
-  memset (x->u + x->n, 0, (size_t)x->group * sizeof *x->u);
-  if (pw_branch_solve (&x->branch, x->u, &none) != PW_OK)
-    memcpy (x->u, x->null, ((size_t)pw_steady_unknowns (x) + 1) * sizeof *x->u);
+  memcpy (x->null_space, x->u, bytes);
+  memset (x->u + x->n, 0, (size_t)x->symmetries * sizeof *x->u);
+  if (pw_branch_solve (&x->branch, x->u, &none) != PW_OK) memcpy (x->u, x->null_space, bytes);
 }
 
 int pw_steady_solve (pw_steady *x, int attempt, double parameter, pw_steady_motion *out, pw_error *error) {
   *out = (pw_steady_motion){ .parameter = parameter, .residual = INFINITY };
   if (pw_require (x, "a search", error) != PW_OK) return PW_INPUT;
-  double range = x->set.last - x->set.first;
-  x->gauge = 0;
-  if (pw_steady_at (x, 0, parameter) != PW_OK) return *error = x->why, error->status;
+  double range = x->settings.last - x->settings.first;
+  x->free_symmetries = 0;
+  if (pw_steady_open_system (x, PW_HERE, parameter) != PW_OK) return *error = x->why, error->status;
   int status = pw_steady_start (x, attempt, x->u, error);
   if (status != PW_OK) return status;
-  x->u[pw_steady_unknowns (x)] = range != 0 ? (parameter - x->set.first) / range : 0;
+  x->u[pw_steady_unknowns (x)] = range != 0 ? (parameter - x->settings.first) / range : 0;
   status = pw_branch_solve (&x->branch, x->u, error);
   if (status == PW_OK) steady_rest (x);
   out->iterations = x->branch.iterations;
@@ -282,26 +228,26 @@ int pw_steady_solve (pw_steady *x, int attempt, double parameter, pw_steady_moti
   out->family = steady_family (x);
   if (out->family == PW_RESOURCE) return pw_fail_memory (x->s, error);
   if (out->family < 0) return pw_fail (error, PW_METHOD, "the family of the steady motion cannot be determined");
-  pw_steady_home (x, x->q, x->v);
-  status = pw_steady_guess (x, x->q, x->v, x->u, error);
+  pw_steady_move_to_start (x, x->q, x->v);
+  status = pw_steady_nearest (x, x->q, x->v, x->u, error);
   return status == PW_OK ? pw_steady_motion_at (x, x->u, out, error) : status;
 }
 
 /* ---- Suggestions ---- */
 
-/* Change of what is held along direction i of the family, angles relative to the first body if the whole can turn. */
+/* The change of a quantity along direction i of the family; relative: less that of the angle of the first body. */
 static double suggest_change (pw_steady *x, const pw_initial_value *hold, int relative, int i) {
-  const double *z = x->null + (size_t)i * (size_t)pw_steady_unknowns (x);
+  const double *z = x->null_space + (size_t)i * (size_t)pw_steady_unknowns (x);
   double *dq = x->dq, *dv = x->dv;
-  pw_steady_combine (x, z + x->n, x->T, x->sum);
-  pw_steady_field (x, x->sum, x->q, dv);
+  pw_steady_combine (x, z + x->n, x->T, x->combined);
+  pw_steady_velocities (x, x->combined, x->q, dv);
   for (int j = 0; j < x->n; j++) dq[j] = z[j] * pw_unit (x->s, j);
-  pw_linear_turn (&x->at[0].x, x->rates[2], dq, dv);
-  return pw_hold_change (x->s, hold, x->q, x->v, dq, dv) / pw_hold_unit (x, hold) - (relative ? dq[2] : 0);
+  pw_linear_turn (&x->system[PW_HERE].linearisation, x->rates[PW_RATE_TURN], dq, dv);
+  return pw_hold_change (x, hold, dq, dv) - (relative ? dq[2] : 0);
 }
 
-/* Whether holding it makes the family smaller: then directions along which it changes go.  `basis` has `count` orthonormal
- * rows of length `family`, of what is held already. */
+/* Whether holding a quantity makes the family smaller.  `basis` has `count` orthonormal rows of length `family`, the
+ * changes of what is held already along the family; that of this quantity becomes the next row. */
 static int suggest_helps (pw_steady *x, const pw_initial_value *hold, int relative, int family, double *basis,
                           int count) {
   double *row = basis + count * family, norm = 0, before = 0;
@@ -313,10 +259,10 @@ static int suggest_helps (pw_steady *x, const pw_initial_value *hold, int relati
   }
   for (int i = 0; i < family; i++) norm += row[i] * row[i];
   for (int i = 0; i < family; i++) row[i] /= sqrt (norm);
-  return norm > 1e-8 && norm > 1e-6 * before;
+  return norm > SUGGEST_CHANGE && norm > SUGGEST_LEFT * before;
 }
 
-/* Candidate c: speed and angular velocity of the first body, angles, positions, then velocities of other bodies. */
+/* Candidate c to hold: speed and angular velocity of the first body; angles; positions; velocities of all bodies. */
 static int suggest_candidate (const pw_steady *x, int c) {
   int n = x->n, bodies = x->s->bodies;
   if (c < 2) return c == 0 ? 2 * n : n + 2;
@@ -328,17 +274,18 @@ static int suggest_candidate (const pw_steady *x, int c) {
 }
 
 int pw_steady_suggest (pw_steady *x, pw_initial_value *hold, int most) {
-  int family = steady_family (x), count = 0, held = 0, turns = 0, anchored = 0;
+  int family = steady_family (x), count = 0, held = 0, turns = 0 /* 1: the whole can turn */, anchored = 0;
   if (family < 0) return family;
   double *basis = calloc ((size_t)family * ((size_t)family + 1) + 1, sizeof *basis);
   if (basis == NULL) return PW_RESOURCE;
-  for (int k = 0; k < x->gauge; k++)
-    for (int i = 0; i < x->group; i++)
-      turns |= x->fixed[k * x->group + i] * x->axis[i * pw_steady_rates (x->s) + 2] != 0;
+  for (int k = 0; k < x->free_symmetries; k++)
+    for (int i = 0; i < x->symmetries; i++)
+      turns |=
+          x->free_symmetry[k * x->symmetries + i] * x->symmetry[i * pw_steady_rate_count (x->s) + PW_RATE_TURN] != 0;
   for (int c = 0; c < 2 + x->n + 2 * x->s->bodies && held < family && count < most; c++) {
     pw_initial_value try = { .state = suggest_candidate (x, c) };
-    int angle = try.state < 3 * x->s->bodies && try.state % 3 == 2, relative = turns && angle;
-    if (turns && try.state < 3 * x->s->bodies && !angle) continue;
+    int of_body = try.state < 3 * x->s->bodies, relative = turns && of_body && try.state % 3 == 2;
+    if (turns && of_body && !relative) continue;
     if (try.state < x->n && x->cyclic[try.state]) continue;
     if (!suggest_helps (x, &try, relative, family, basis, held)) continue;
     if (relative && !anchored && count < most)

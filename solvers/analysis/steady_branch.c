@@ -4,37 +4,38 @@
 #include "steady_parts.h"
 #include "util.h"
 
-/* BRANCH_LEAST: smallest step, relative to the range of the parameter.  BRANCH_ACCURACY: of events, relative to the step.
- * BRANCH_FOLD: largest distance of a fold from the change of an eigenvalue there, relative to the step.
- * BRANCH_LIMIT: points at most, as a multiple of those asked for. */
-static const double BRANCH_LEAST = 1e-7, BRANCH_ACCURACY = 1e-9, BRANCH_FOLD = 1e-3;
-enum { BRANCH_LIMIT = 100 };
+static const double BRANCH_MIN_STEP = 1e-7, /* relative to the range of the parameter */
+    BRANCH_ACCURACY = 1e-9,                 /* of events, relative to the step */
+    BRANCH_FOLD = 1e-3; /* largest distance of a fold from the change of an eigenvalue there, relative to the step */
+enum { BRANCH_MAX_POINTS = 100 /* as a multiple of those that the settings ask for */ };
 
 int pw_steady_follow (pw_steady *x, const double *q, const double *v, double parameter, int direction,
                       pw_error *error) {
   if (pw_require (x, "a search", error) != PW_OK) return PW_INPUT;
   int unknowns = pw_steady_unknowns (x);
-  double range = x->set.last - x->set.first;
+  double range = x->settings.last - x->settings.first;
   pw_steady_motion motion;
-  x->gauge = 0;
-  int status = pw_steady_guess (x, q, v, x->u, error);
-  x->u[unknowns] = (parameter - x->set.first) / range;
+  x->free_symmetries = 0;
+  int status = pw_steady_nearest (x, q, v, x->u, error);
+  x->u[unknowns] = (parameter - x->settings.first) / range;
   if (status == PW_OK) status = pw_branch_solve (&x->branch, x->u, error);
   if (status == PW_OK) status = pw_steady_motion_at (x, x->u, &motion, error);
-  if (status == PW_OK) status = pw_steady_find_gauge (x);
+  if (status == PW_OK) status = pw_steady_find_free_symmetries (x);
   if (status == PW_OK) status = pw_branch_start (&x->branch, x->u, direction, error);
   if (status != PW_OK)
     return status < 0 && error->status ? status : pw_fail (error, PW_METHOD, "the branch cannot be followed from here");
   x->unstable = motion.unstable;
-  x->branch.most = 1.0 / x->set.points;
-  x->branch.step = x->branch.most / 4;
-  x->branch.least = BRANCH_LEAST, x->branch.accuracy = BRANCH_ACCURACY, x->branch.limit = BRANCH_LIMIT * x->set.points;
+  x->branch.max_change = 1.0 / x->settings.points;
+  x->branch.step = x->branch.max_change / 4;
+  x->branch.min_step = BRANCH_MIN_STEP, x->branch.event_accuracy = BRANCH_ACCURACY;
+  x->branch.max_points = BRANCH_MAX_POINTS * x->settings.points;
   return PW_OK;
 }
 
 /* ---- Events ---- */
 
-/* Real part of eigenvalue number `sought` of those that are not 0; its imaginary part goes to *im. */
+/* The real part of eigenvalue number `sought` of those that are neither 0 nor of rigid displacements, and its imaginary
+ * part. */
 static double branch_eigenvalue (const pw_steady *x, int sought, double *im) {
   const pw_linear *l = &x->linear;
   for (int i = 0; i < l->unknowns; i++) {
@@ -44,8 +45,8 @@ static double branch_eigenvalue (const pw_steady *x, int sought, double *im) {
   return *im = 0, -1;
 }
 
-/* For pw_branch_locate: the real part that changes its sign, or if those on the imaginary axis leave it, +-1 by the number
- * of growing modes. */
+/* pw_branch_test: the real part that changes its sign, where as many eigenvalues have real part 0 as at both ends of
+ * the step (x->neutral_at_ends; -1: these differ); 0 where more have; otherwise +-1 by the number of growing modes. */
 static int branch_test (void *steady, const pw_branch_point *point, double *value, pw_error *error) {
   pw_steady *x = steady;
   pw_steady_motion motion;
@@ -53,55 +54,54 @@ static int branch_test (void *steady, const pw_branch_point *point, double *valu
   int status = pw_steady_motion_at (x, point->u, &motion, error);
   if (status != PW_OK) return status;
   *value = motion.unstable > x->sought ? 1 : -1;
-  if (x->compare == x->neutral) *value = branch_eigenvalue (x, x->sought, &im);
-  if (x->compare >= 0 && x->compare < x->neutral) *value = 0;
+  if (x->neutral_at_ends == x->neutral) *value = branch_eigenvalue (x, x->sought, &im);
+  if (x->neutral_at_ends >= 0 && x->neutral_at_ends < x->neutral) *value = 0;
   return PW_OK;
 }
 
-/* Whether a pair changes its sign at the point located, of `apart` modes that do between the last two points. */
-static int branch_pair (const pw_steady *x, int apart) {
+/* Whether it is a pair whose real part changes its sign at the point located; `changing` modes do in the step. */
+static int branch_pair (const pw_steady *x, int changing) {
   double im;
   branch_eigenvalue (x, x->sought, &im);
-  if (x->compare < 0) return im != 0 || apart == 2;
-  return x->neutral > x->compare ? x->neutral - x->compare >= 2 : im != 0;
+  if (x->neutral_at_ends < 0) return im != 0 || changing == 2;
+  return x->neutral > x->neutral_at_ends ? x->neutral - x->neutral_at_ends >= 2 : im != 0;
 }
 
-/* Notes the number of other growing modes at a fold. */
-static void branch_fold (pw_branch *b, int growing) {
+/* Sets the tag of a fold, the number of other growing modes there. */
+static void branch_tag_fold (pw_branch *b, int growing) {
   for (int i = 0; i < b->queued; i++)
-    if (b->queue[i].event == PW_BRANCH_FOLD) b->queue[i].note = growing;
+    if (b->queue[i].event == PW_BRANCH_FOLD) b->queue[i].tag = growing;
 }
 
-/* Locates each change from `before` to `now` growing modes: the k-th largest real part changes its sign.  At a fold, a
- * real one is no event of its own. */
-static int branch_changes (pw_steady *x, int before, int now, pw_error *error) {
-  int least = before < now ? before : now, most = before < now ? now : before, pair = 0;
+/* Locates each change of sign of a real part between `least` and `most` growing modes, with the number of the others as
+ * tag.  That of a real eigenvalue at a fold is no event of its own. */
+static int branch_changes (pw_steady *x, int least, int most, pw_error *error) {
+  int pair = 0;
   pw_branch *b = &x->branch;
-  double fold = b->queued ? b->queue[0].along : -1;
+  double fold = b->queued ? b->queue[0].fraction : -1; /* -1: none */
   for (x->sought = least; x->sought < most && b->queued < PW_BRANCH_QUEUE - 1; x->sought += 1 + pair) {
     int status = pw_branch_locate (b, branch_test, x, error);
     if (status != PW_OK) return status;
     pair = branch_pair (x, most - least);
-    if (pair || fabs (pw_branch_along (b, &b->found) - fold) > BRANCH_FOLD)
+    if (pair || fabs (pw_branch_fraction (b, &b->found) - fold) > BRANCH_FOLD)
       pw_branch_queue (b, pair ? PW_STEADY_OSCILLATION : PW_STEADY_REAL, x->sought);
     else
-      branch_fold (b, x->sought);
+      branch_tag_fold (b, x->sought);
   }
   return PW_OK;
 }
 
-/* Queues the events between the last two points.  At a fold a real eigenvalue changes its sign. */
+/* pw_branch_find_events.  At a fold a real eigenvalue changes its sign. */
 static int branch_events (void *steady, pw_error *error) {
   pw_steady *x = steady;
   pw_steady_motion motion;
-  int before = x->unstable, neutral = x->neutral, status = pw_steady_motion_at (x, x->branch.at.u, &motion, error);
+  int before = x->unstable, neutral = x->neutral, status = pw_steady_motion_at (x, x->branch.reached.u, &motion, error);
   if (status != PW_OK) return status;
-  int apart = before > motion.unstable ? before - motion.unstable : motion.unstable - before;
-  x->compare = neutral == x->neutral ? neutral : -1;
+  int now = x->unstable = motion.unstable, least = before < now ? before : now, most = before < now ? now : before;
+  x->neutral_at_ends = neutral == x->neutral ? neutral : -1;
   neutral = x->neutral;
-  x->unstable = motion.unstable;
-  branch_fold (&x->branch, before < motion.unstable ? before : motion.unstable);
-  if (apart > x->branch.folded) status = branch_changes (x, before, motion.unstable, error);
+  branch_tag_fold (&x->branch, least);
+  if (most - least > x->branch.folded) status = branch_changes (x, least, most, error);
   x->neutral = neutral;
   return status;
 }
@@ -118,7 +118,7 @@ int pw_steady_next (pw_steady *x, pw_steady_motion *out, pw_error *error) {
   out->iterations = x->branch.iterations;
   out->residual = next->point.residual;
   status = pw_steady_motion_at (x, next->point.u, out, error);
-  if (next->event != PW_BRANCH_POINT) out->unstable = next->note;
+  if (next->event != PW_BRANCH_POINT) out->unstable = next->tag;
   x->neutral = neutral;
   return status;
 }

@@ -1,13 +1,15 @@
 /* The equations of steady motions.
  *
- * With the symmetries S_k (q) of the system, displacements of the whole and of angles on which nothing depends, a steady
- * motion has the velocities v = xi_1 S_1 (q) + xi_2 S_2 (q) + ... with constant xi, which in the frame that moves with it
- * is at rest: with the angular velocity w of the whole and W (x, y, phi) = w (-y, x, 0) for each body,
+ * The system has symmetries: displacements of the whole, and of angles on which nothing depends.  S_k (q) is the
+ * velocity of a displacement along the k-th one at unit rate.  A steady motion has the velocities v = xi_1 S_1 (q) +
+ * xi_2 S_2 (q) + ... with constant xi.  In the frame that moves with it its velocities are constant: with the angular
+ * velocity w of the whole and W (x, y, phi) = w (-y, x, 0) for each body,
  *
- *     g (q, t) = 0,   J v = eta,   a (q, v) = W v,   and what is held.
+ *     g (q, t) = 0,   J v = eta,   a (q, v) = W v,   A - value B = 0 for what is held (steady_hold.c).
  *
- * These are more equations than the unknowns q, xi and depend on each other, since symmetries and conservation laws make
- * steady motions families; continuation.h solves them by least squares.  Exact derivatives are those of the linearisation
+ * The unknowns are u = (q, xi), both scaled by units of the scene, and on a branch the parameter.  There are more
+ * equations than unknowns, and they depend on each other, since symmetries and conservation laws make steady motions
+ * families; continuation.h solves them by least squares.  Their exact derivatives are those of the linearisation
  * (linear_variation.c) for the variations dq, dv = W dq + dxi_k S_k.  On a branch, corrections are orthogonal to the
  * symmetries that leave what is held unchanged.
  *
@@ -18,53 +20,56 @@
 #include "rank.h"
 #include "steady_parts.h"
 
-/* STEADY_DIFFERENCE: half the distance of differences by a parameter of the model, relative to its range: round-off of
- * 1e-11, and an error of 1e-10 for an effect of that size in the third derivative. */
+/* Step of central differences by a parameter of the model, relative to its range: its round-off is 1e-11, its
+ * truncation error 1e-10 of the third derivative. */
 static const double STEADY_DIFFERENCE = 1e-5;
 
 double pw_steady_parameter (const pw_steady *x, const double *u) {
-  return x->set.first + (x->set.last - x->set.first) * u[x->n + x->group];
+  return x->settings.first + (x->settings.last - x->settings.first) * u[x->n + x->symmetries];
 }
 
 void pw_steady_state (pw_steady *x, const double *u) {
   for (int j = 0; j < x->n; j++) x->q[j] = u[j] * pw_unit (x->s, j);
   pw_steady_combine (x, u + x->n, x->T, x->rates);
-  pw_steady_field (x, x->rates, x->q, x->v);
-  if (x->set.vary >= 0) x->hold[x->set.vary].value = pw_steady_parameter (x, u);
+  pw_steady_velocities (x, x->rates, x->q, x->v);
+  if (x->settings.vary >= 0) x->hold[x->settings.vary].value = pw_steady_parameter (x, u);
 }
 
-int pw_steady_again (void *steady, const double *u, const double *other) {
+int pw_steady_same_motion (void *steady, const double *u, const double *other) {
   pw_steady *x = steady;
   size_t n = (size_t)x->n;
-  double *q = x->null, *v = q + n;
+  double *q = x->null_space, *v = q + n;
   pw_steady_state (x, u);
   memcpy (q, x->q, n * sizeof *q), memcpy (v, x->v, n * sizeof *v);
   pw_steady_state (x, other);
   return pw_steady_distance (x, q, v, x->q, x->v) <= PW_BRANCH_SAME;
 }
 
-int pw_steady_guess (pw_steady *x, const double *q, const double *v, double *u, pw_error *error) {
-  int n = x->n, group = x->group, rank;
-  double *S = x->F, *right = S + n * group, *work = right + n + group; /* enough: see steady_arrays */
-  memset (x->branch.pivot, 0, (size_t)group * sizeof *x->branch.pivot);
+int pw_steady_nearest (pw_steady *x, const double *q, const double *v, double *u, pw_error *error) {
+  int n = x->n, symmetries = x->symmetries, rank;
+  double *S = x->F, *right = S + n * symmetries,
+         *work = right + n + symmetries; /* x->F is long enough: steady_arrays */
+  memset (x->branch.pivot, 0, (size_t)symmetries * sizeof *x->branch.pivot);
   for (int j = 0; j < n; j++) u[j] = q[j] / pw_unit (x->s, j), right[j] = v[j] / pw_unit (x->s, j) * x->T;
-  for (int k = 0; k < group; k++) {
-    pw_steady_field (x, x->axis + k * pw_steady_rates (x->s), q, S + k * n);
+  for (int k = 0; k < symmetries; k++) {
+    pw_steady_velocities (x, x->symmetry + k * pw_steady_rate_count (x->s), q, S + k * n);
     for (int j = 0; j < n; j++) S[k * n + j] /= pw_unit (x->s, j);
   }
-  if (group && LAPACKE_dgelsy_work (LAPACK_COL_MAJOR, n, group, 1, S, n, right, n > group ? n : group, x->branch.pivot,
-                                    1e-9, &rank, work, 40 * (n + group)))
+  if (symmetries &&
+      LAPACKE_dgelsy_work (LAPACK_COL_MAJOR, n, symmetries, 1, S, n, right, n > symmetries ? n : symmetries,
+                           x->branch.pivot, 1e-9, &rank, work, 40 * (n + symmetries)))
     return pw_fail (error, PW_METHOD, "the symmetries cannot be separated");
-  memcpy (u + n, right, (size_t)group * sizeof *u);
+  memcpy (u + n, right, (size_t)symmetries * sizeof *u);
   return PW_OK;
 }
 
 /* ---- Residuals ---- */
 
-/* Those of the system at[k] in the state x->q, x->v, whose accelerations are evaluated: g, J v - eta, a - W v. */
-static void steady_residual (pw_steady *x, int k, double *F) {
-  pw_linearisation *l = &x->at[k].x;
-  pw_workspace *w = x->at[k].r->w;
+/* Those of x->system[place] in the state x->q, x->v, at which its accelerations are evaluated: g, J v - eta, a - W
+ * v. */
+static void steady_residual (pw_steady *x, pw_place place, double *F) {
+  pw_linearisation *l = &x->system[place].linearisation;
+  pw_workspace *w = x->system[place].run->w;
   double acceleration = x->T * x->T / x->L;
   pw_evaluate_g (w, F);
   for (int i = 0; i < x->holonomic; i++) F[i] /= x->norm[i] * x->L;
@@ -74,69 +79,72 @@ static void steady_residual (pw_steady *x, int k, double *F) {
   for (int i = 0; i < x->m; i++) F[i] = (F[i] - (x->s->rheonomic ? l->c[i] : 0)) * x->T / (x->norm[i] * x->L);
   F += x->m;
   memcpy (F, l->a, (size_t)x->n * sizeof *F);
-  pw_linear_turn (l, -x->rates[2], x->v, F);
+  pw_linear_turn (l, -x->rates[PW_RATE_TURN], x->v, F);
   for (int j = 0; j < x->n; j++) F[j] *= pw_as_length (x->s, j) * acceleration;
 }
 
 /* ---- Derivatives ---- */
 
-/* The change by (dq, dv) and the angular velocity dw. */
+/* The change of the residuals by the variation (dq, dv) in the linearisation and that of the angular velocity, dw. */
 static void steady_change (pw_steady *x, double dw, double *F) {
-  pw_linearisation *l = &x->at[0].x;
+  pw_linearisation *l = &x->system[PW_HERE].linearisation;
   int n = x->n;
   double *dq = l->x, *dv = l->x + n;
-  pw_mul_J (x->at[0].r->w, dq, l->c);
+  pw_mul_J (x->system[PW_HERE].run->w, dq, l->c);
   for (int i = 0; i < x->holonomic; i++) *F++ = l->c[i] / (x->norm[i] * x->L);
   pw_linear_vary (l);
-  pw_mul_J (x->at[0].r->w, dv, l->c);
+  pw_mul_J (x->system[PW_HERE].run->w, dv, l->c);
   for (int i = 0; i < x->m; i++) *F++ = (l->c[i] + l->y[n + x->m + i]) * x->T / (x->norm[i] * x->L);
-  pw_linear_turn (l, -x->rates[2], dv, l->da);
+  pw_linear_turn (l, -x->rates[PW_RATE_TURN], dv, l->da);
   pw_linear_turn (l, -dw, x->v, l->da);
   for (int j = 0; j < n; j++) *F++ = l->da[j] * pw_as_length (x->s, j) * x->T * x->T / x->L;
-  for (int i = 0; i < x->set.holds; i++)
-    *F++ = pw_hold_change (x->s, x->hold + i, x->q, x->v, dq, dv) / pw_hold_unit (x, x->hold + i);
+  for (int i = 0; i < x->settings.holds; i++) *F++ = pw_hold_change (x, x->hold + i, dq, dv);
 }
 
-/* The conditions that dq is orthogonal to symmetries. */
+/* The conditions that dq is orthogonal to the free symmetries. */
 static void steady_conditions (pw_steady *x, double *dF) {
   int equations = pw_steady_equations (x);
-  dF += equations - x->group;
-  for (int i = 0; i < x->gauge; i++) {
+  dF += equations - x->symmetries;
+  for (int i = 0; i < x->free_symmetries; i++) {
     double square = 0;
-    pw_steady_combine (x, x->fixed + i * x->group, 1, x->sum);
-    pw_steady_field (x, x->sum, x->q, x->dq);
+    pw_steady_combine (x, x->free_symmetry + i * x->symmetries, 1, x->combined);
+    pw_steady_velocities (x, x->combined, x->q, x->dq);
     for (int j = 0; j < x->n; j++) x->dq[j] /= pw_unit (x->s, j), square += x->dq[j] * x->dq[j];
     for (int j = 0; j < x->n; j++) dF[j * equations + i] = x->dq[j] / sqrt (square);
   }
 }
 
+/* Derivatives with respect to q and xi. */
 static void steady_columns (pw_steady *x, double *dF) {
-  pw_linearisation *l = &x->at[0].x;
+  pw_linearisation *l = &x->system[PW_HERE].linearisation;
   int n = x->n, equations = pw_steady_equations (x);
   for (int c = 0; c < pw_steady_unknowns (x); c++, dF += equations) {
-    const double *axis = x->axis + (c - n) * pw_steady_rates (x->s);
+    const double *symmetry = x->symmetry + (c - n) * pw_steady_rate_count (x->s);
     memset (l->x, 0, 2 * (size_t)n * sizeof *l->x);
     if (c < n) {
       l->x[c] = pw_unit (x->s, c);
-      pw_linear_turn (l, x->rates[2], l->x, l->x + n);
+      pw_linear_turn (l, x->rates[PW_RATE_TURN], l->x, l->x + n);
     } else {
-      pw_steady_field (x, axis, x->q, l->x + n);
+      pw_steady_velocities (x, symmetry, x->q, l->x + n);
       for (int j = n; j < 2 * n; j++) l->x[j] /= x->T;
     }
-    steady_change (x, c < n ? 0 : axis[2] / x->T, dF);
+    steady_change (x, c < n ? 0 : symmetry[PW_RATE_TURN] / x->T, dF);
   }
 }
 
-/* Column of a parameter of the model, by central differences, or on one side at the end of its domain. */
+/* Derivatives with respect to a parameter of the model by central differences, at the end of its domain by one-sided
+ * ones. */
 static int steady_by_parameter (pw_steady *x, double value, const double *F, double *dF) {
-  double h = STEADY_DIFFERENCE * (x->set.last - x->set.first), distance = 0;
+  double h = STEADY_DIFFERENCE * (x->settings.last - x->settings.first), distance = 0;
   int length = x->holonomic + x->m + x->n, sides = 0;
   for (int side = 1; side >= -1; side -= 2) {
-    int status = pw_steady_at (x, 1, value + side * h);
+    int status = pw_steady_open_system (x, PW_BESIDE, value + side * h);
     if (status < 0) return status;
-    pw_linearisation *l = &x->at[1].x;
-    if (status != PW_OK || pw_run_accelerate (x->at[1].r, x->set.t, x->q, x->v, l->a, l->lambda) != PW_OK) continue;
-    steady_residual (x, 1, x->F);
+    pw_linearisation *l = &x->system[PW_BESIDE].linearisation;
+    if (status != PW_OK ||
+        pw_run_accelerate (x->system[PW_BESIDE].run, x->settings.t, x->q, x->v, l->a, l->lambda) != PW_OK)
+      continue;
+    steady_residual (x, PW_BESIDE, x->F);
     for (int i = 0; i < length; i++) dF[i] += side * x->F[i];
     distance += STEADY_DIFFERENCE;
     sides += side;
@@ -148,31 +156,28 @@ static int steady_by_parameter (pw_steady *x, double value, const double *F, dou
 int pw_steady_evaluate (void *steady, const double *u, double *F, double *dF, pw_error *error) {
   pw_steady *x = steady;
   int equations = pw_steady_equations (x), unknowns = pw_steady_unknowns (x);
-  double value = pw_steady_parameter (x, u), *held = F + equations - x->group - x->set.holds;
-  int status = pw_steady_at (x, 0, value);
+  int first_held = equations - x->symmetries - x->settings.holds, vary = x->settings.vary;
+  double value = pw_steady_parameter (x, u);
+  int status = pw_steady_open_system (x, PW_HERE, value);
   if (status < 0) *error = x->why;
   if (status != PW_OK) return status;
-  pw_linearisation *l = &x->at[0].x;
+  pw_linearisation *l = &x->system[PW_HERE].linearisation;
   pw_steady_state (x, u);
-  status = dF ? pw_linear_evaluate (l, x->set.t, x->q, x->v)
-              : pw_run_accelerate (x->at[0].r, x->set.t, x->q, x->v, l->a, l->lambda);
+  status = dF ? pw_linear_evaluate (l, x->settings.t, x->q, x->v)
+              : pw_run_accelerate (x->system[PW_HERE].run, x->settings.t, x->q, x->v, l->a, l->lambda);
   if (status != PW_OK) {
     x->why = (pw_error){ 0 };
-    if (status > 0) pw_fail_singular (x->at[0].r, x->set.t, &x->why);
+    if (status > 0) pw_fail_singular (x->system[PW_HERE].run, x->settings.t, &x->why);
     return PW_RETRY;
   }
-  steady_residual (x, 0, F);
-  for (int i = 0; i < x->set.holds; i++)
-    held[i] = pw_hold_residual (x->s, x->hold + i, x->q, x->v) / pw_hold_unit (x, x->hold + i);
+  steady_residual (x, PW_HERE, F);
+  for (int i = 0; i < x->settings.holds; i++) F[first_held + i] = pw_hold_residual (x, x->hold + i);
   if (dF == NULL) return PW_OK;
   steady_columns (x, dF);
   steady_conditions (x, dF);
   dF += (size_t)unknowns * (size_t)equations;
-  if (x->set.vary >= 0)
-    dF[equations - x->group - x->set.holds + x->set.vary] = pw_hold_slope (x->s, x->hold + x->set.vary, x->q, x->v) *
-                                                            (x->set.last - x->set.first) /
-                                                            pw_hold_unit (x, x->hold + x->set.vary);
-  status = x->set.compile ? steady_by_parameter (x, value, F, dF) : PW_OK;
+  if (vary >= 0) dF[first_held + vary] = pw_hold_slope (x, x->hold + vary) * (x->settings.last - x->settings.first);
+  status = x->settings.compile ? steady_by_parameter (x, value, F, dF) : PW_OK;
   if (status < 0) *error = x->why;
   return status;
 }

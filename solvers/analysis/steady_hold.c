@@ -7,15 +7,16 @@
 #include "steady_parts.h"
 #include "util.h"
 
-enum { HOLD_SPEED, HOLD_RADIUS, HOLD_CURVATURE, HOLD_OTHERS };
+/* What can be held is numbered: the states, then HOLD_OF_BODY quantities of each body. */
+enum { HOLD_SPEED, HOLD_RADIUS, HOLD_CURVATURE, HOLD_OF_BODY };
 static const struct {
   const char *name, *unit;
-} hold_other[HOLD_OTHERS] = { { "speed", "m/s" }, { "radius", "m" }, { "curvature", "1/m" } };
+} hold_of_body[HOLD_OF_BODY] = { { "speed", "m/s" }, { "radius", "m" }, { "curvature", "1/m" } };
 
-static int hold_fail (const pw_system *s, const char *name, pw_error *error) {
+static int hold_unknown (const pw_system *s, const char *name, pw_error *error) {
   pw_nearest near = { .sought = name };
   char known[300];
-  for (int i = 0; i < 2 * s->coords + HOLD_OTHERS * s->bodies; i++)
+  for (int i = 0; i < 2 * s->coords + HOLD_OF_BODY * s->bodies; i++)
     pw_nearest_try (&near, pw_system_held_name (s, i, known, sizeof known));
   return pw_fail (error, PW_INPUT, "model %s has no state \"%s\"%s", s->model, name, pw_nearest_text (&near));
 }
@@ -24,66 +25,67 @@ int pw_system_find_held (const pw_system *s, const char *name, pw_error *error) 
   const char *dot = strrchr (name, '.');
   char body[300];
   pw_error none = { 0 };
-  for (int k = 0; dot && k < HOLD_OTHERS; k++) {
-    if (strcmp (dot + 1, hold_other[k].name) != 0) continue;
+  for (int k = 0; dot && k < HOLD_OF_BODY; k++) {
+    if (strcmp (dot + 1, hold_of_body[k].name) != 0) continue;
     snprintf (body, sizeof body, "%.*s", (int)(dot - name), name);
     int b = pw_system_find_body (s, body);
-    if (b >= 0) return 2 * s->coords + b * HOLD_OTHERS + k;
+    if (b >= 0) return 2 * s->coords + b * HOLD_OF_BODY + k;
   }
   int state = pw_system_find_state (s, name, &none);
-  return state >= 0 ? state : hold_fail (s, name, error);
+  return state >= 0 ? state : hold_unknown (s, name, error);
 }
 
 char *pw_system_held_name (const pw_system *s, int held, char *buffer, size_t size) {
-  int other = held - 2 * s->coords;
-  if (other < 0) return pw_system_state_name (s, held, buffer, size);
-  snprintf (buffer, size, "%s.%s", s->body_name[other / HOLD_OTHERS], hold_other[other % HOLD_OTHERS].name);
+  int index = held - 2 * s->coords;
+  if (index < 0) return pw_system_state_name (s, held, buffer, size);
+  snprintf (buffer, size, "%s.%s", s->body_name[index / HOLD_OF_BODY], hold_of_body[index % HOLD_OF_BODY].name);
   return buffer;
 }
 
 const char *pw_system_held_unit (const pw_system *s, int held) {
-  int other = held - 2 * s->coords;
-  return other < 0 ? pw_system_state_unit (s, held) : hold_other[other % HOLD_OTHERS].unit;
+  int index = held - 2 * s->coords;
+  return index < 0 ? pw_system_state_unit (s, held) : hold_of_body[index % HOLD_OF_BODY].unit;
 }
 
 typedef struct {
   double A, B;
 } hold_pair;
 
-/* A and B, or with (dq, dv) their changes. */
+/* A and B, or if dq is not NULL, their changes by the variation (dq, dv). */
 static hold_pair hold_terms (const pw_system *s, int held, const double *q, const double *v, const double *dq,
                              const double *dv) {
-  int other = held - 2 * s->coords, b = 3 * (other / HOLD_OTHERS);
-  const double *state = held < s->coords ? dq ? dq : q : dq ? dv : v, one = dq ? 0 : 1;
-  if (other < 0) return (hold_pair){ state[held % s->coords], one };
+  int index = held - 2 * s->coords, b = 3 * (index / HOLD_OF_BODY);
+  double one = dq ? 0 : 1;
+  if (held < s->coords) return (hold_pair){ dq ? dq[held] : q[held], one };
+  if (index < 0) return (hold_pair){ dq ? dv[held - s->coords] : v[held - s->coords], one };
   double c = pw_cos (q[b + 2]), sine = pw_sin (q[b + 2]), speed = c * v[b] + sine * v[b + 1], omega = v[b + 2];
   if (dq) speed = c * dv[b] + sine * dv[b + 1] + (c * v[b + 1] - sine * v[b]) * dq[b + 2], omega = dv[b + 2];
-  return other % HOLD_OTHERS == HOLD_SPEED    ? (hold_pair){ speed, one }
-         : other % HOLD_OTHERS == HOLD_RADIUS ? (hold_pair){ speed, omega }
-                                              : (hold_pair){ omega, speed };
+  return index % HOLD_OF_BODY == HOLD_SPEED    ? (hold_pair){ speed, one }
+         : index % HOLD_OF_BODY == HOLD_RADIUS ? (hold_pair){ speed, omega }
+                                               : (hold_pair){ omega, speed };
 }
 
 double pw_system_held_value (const pw_system *s, int held, const double *q, const double *v) {
-  const hold_pair x = hold_terms (s, held, q, v, NULL, NULL);
-  return x.A / x.B;
+  const hold_pair pair = hold_terms (s, held, q, v, NULL, NULL);
+  return pair.A / pair.B;
 }
 
-double pw_hold_unit (const pw_steady *x, const pw_initial_value *hold) {
-  int other = hold->state - 2 * x->n;
-  if (other < 0) return hold->state < x->n ? pw_unit (x->s, hold->state) : pw_unit (x->s, hold->state - x->n) / x->T;
-  return (other % HOLD_OTHERS == HOLD_CURVATURE ? 1 : x->L) / x->T;
+/* The unit of A, a product of units of the scene. */
+static double hold_unit (const pw_steady *x, int held) {
+  int n = x->n, index = held - 2 * n;
+  if (index < 0) return held < n ? pw_unit (x->s, held) : pw_unit (x->s, held - n) / x->T;
+  return (index % HOLD_OF_BODY == HOLD_CURVATURE ? 1 : x->L) / x->T;
 }
 
-double pw_hold_residual (const pw_system *s, const pw_initial_value *hold, const double *q, const double *v) {
-  return pw_hold_change (s, hold, q, v, NULL, NULL);
+double pw_hold_residual (const pw_steady *x, const pw_initial_value *hold) {
+  return pw_hold_change (x, hold, NULL, NULL);
 }
 
-double pw_hold_change (const pw_system *s, const pw_initial_value *hold, const double *q, const double *v,
-                       const double *dq, const double *dv) {
-  const hold_pair x = hold_terms (s, hold->state, q, v, dq, dv);
-  return x.A - hold->value * x.B;
+double pw_hold_change (const pw_steady *x, const pw_initial_value *hold, const double *dq, const double *dv) {
+  const hold_pair pair = hold_terms (x->s, hold->state, x->q, x->v, dq, dv);
+  return (pair.A - hold->value * pair.B) / hold_unit (x, hold->state);
 }
 
-double pw_hold_slope (const pw_system *s, const pw_initial_value *hold, const double *q, const double *v) {
-  return -hold_terms (s, hold->state, q, v, NULL, NULL).B;
+double pw_hold_slope (const pw_steady *x, const pw_initial_value *hold) {
+  return -hold_terms (x->s, hold->state, x->q, x->v, NULL, NULL).B / hold_unit (x, hold->state);
 }

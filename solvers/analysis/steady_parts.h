@@ -1,123 +1,136 @@
-/* The search for steady motions; for steady*.c only.  Index names: n coordinates, m constraint equations, `group`
- * symmetries; equations in steady_equations.c. */
+/* The search for steady motions; for steady*.c and the search for periodic ones.
+ *
+ * Names: n coordinates, m constraint equations, u the unknowns (steady_equations.c).  "Units of the scene" are L for
+ * lengths, 1 rad for angles, T for times (pw_scale); pw_unit is that of a coordinate. */
 #ifndef PW_STEADY_H
 #define PW_STEADY_H
 
 #include "continuation.h"
 #include "linear.h"
 
+/* The system at the value of the parameter in question, and that beside it, for differences. */
+typedef enum { PW_HERE, PW_BESIDE, PW_PLACES } pw_place;
+
 struct pw_steady {
   const pw_system *s; /* as described */
-  pw_steady_settings set;
-  pw_initial_value *hold; /* those of the settings */
-  int n, m, holonomic, group;
-  double L, T;             /* scales at the initial state */
-  double origin[2], *axis; /* group x pw_steady_rates: symmetries as rates (steady_group.c) */
-  unsigned char *cyclic;   /* n: 1 for angles on which nothing depends */
-  int gauge;               /* symmetries that leave what is held unchanged; 0 before a solution is found */
-  double *fixed;           /* gauge x group: combinations of symmetries */
-  double *norm;            /* m: lengths of the rows of J */
+  pw_steady_settings settings;
+  pw_initial_value *hold; /* those of the settings, with the value that varies */
+  int n, m, holonomic;
+  double L, T;           /* scales at the initial state [m, s] */
+  double *start;         /* 2 n: initial state */
+  unsigned char *cyclic; /* n: 1 for angles on which nothing depends */
+  double *norm;          /* m: lengths of the rows of J */
 
-  /* [0]: the system at a value of the parameter, a run, and its linearisation; [1]: the same, for differences. */
+  /* Displacements are given by their rates: pw_steady_rate_count. */
+  int symmetries;
+  double origin[2];      /* about which rates of rotation turn the whole [m] */
+  double *symmetry;      /* symmetries x rates: a basis of the symmetries */
+  int free_symmetries;   /* those that leave what is held unchanged; 0 before a solution is found */
+  double *free_symmetry; /* free_symmetries x symmetries: their coefficients in that basis */
+
   struct {
-    double value;
-    pw_system *own; /* by settings.compile */
-    pw_run *r;      /* NULL: none */
-    pw_linearisation x;
-  } at[2];
-  pw_initial_value *known; /* 2 n: the last solution, where runs are opened */
-  int solved;              /* 1: there is one */
+    double value;   /* of the parameter */
+    pw_system *own; /* by settings.compile; NULL: s serves */
+    pw_run *run;    /* NULL: not open */
+    pw_linearisation linearisation;
+  } system[PW_PLACES];
+  pw_initial_value *solution; /* 2 n: the last solution, where runs are opened */
+  int solved;                 /* 1: there is one */
 
-  double *start;                              /* 2 n: initial state */
-  double *q, *v, *rates, *u;                  /* the state of u; rates of displacement */
-  double *F, *q0, *v0, *dq, *dv, *sum, *null; /* scratch; null: unknowns x unknowns */
+  double *q, *v, *rates, *u;                /* unknowns u, their state q, v, and its rates of displacement [1/s] */
+  double *F, *q0, *v0, *dq, *dv, *combined; /* scratch */
+  double *null_space;                       /* unknowns x unknowns: directions of a family; scratch */
   pw_branch branch;
   pw_linear linear; /* of the state q, v */
   pw_error why;     /* the last reason why a system could not be evaluated */
 
   int unstable, neutral; /* eigenvalues at the point reached: growing, with real part 0 */
-  int sought, compare;   /* for branch_test */
+  int sought;            /* index of the eigenvalue whose change of sign is located */
+  int neutral_at_ends;   /* `neutral` at both ends of the step; -1: they differ */
   char *memory;
 };
 
-/* ---- steady_group.c ---- */
+/* ---- steady_symmetries.c ---- */
 
-/* Rates of displacements: x and y [L], rotation about the origin, of the whole; then the angle of each body; then each
- * internal coordinate. */
-static inline int pw_steady_rates (const pw_system *s) {
-  return 3 + s->bodies + s->coords - 3 * s->bodies;
+/* The rates of a displacement [L/s, rad/s]: of the whole along x and y, its rotation about the origin; then of the
+ * angle of each body alone; then of each internal coordinate. */
+enum { PW_RATE_X, PW_RATE_Y, PW_RATE_TURN, PW_RATE_ANGLES };
+static inline int pw_steady_rate_count (const pw_system *s) {
+  return PW_RATE_ANGLES + s->bodies + s->coords - 3 * s->bodies;
 }
-/* The rates of a combination of symmetries: `group` numbers, divided by a unit. */
-void pw_steady_combine (const pw_steady *x, const double *part, double unit, double *rates);
+/* The rates of a combination of symmetries, from their coefficients divided by a unit. */
+void pw_steady_combine (const pw_steady *x, const double *coefficient, double unit, double *rates);
 /* The velocities that rates cause at a configuration. */
-void pw_steady_field (const pw_steady *x, const double *rates, const double *q, double *v);
-/* Orthonormal rows of the null space of M (rows x n, by columns, destroyed; rows >= n), within a tolerance, at least
- * round-off.  Returns their number, or a status. */
-int pw_steady_null (int rows, int n, double *M, double tolerance, double *out);
+void pw_steady_velocities (const pw_steady *x, const double *rates, const double *q, double *v);
+/* Orthonormal rows that span the null space of M (rows x n, by columns, destroyed; rows >= n).  Singular values up to
+ * the tolerance, or up to round-off, count as 0.  Returns the number of rows, or a status < 0. */
+int pw_null_space (int rows, int n, double *M, double tolerance, double *out);
+/* A state at a distance from the run's in every coordinate, in units of the scene, in irregular direction `number`. */
+void pw_irregular_state (const pw_run *r, double distance, int number, double *q, double *v);
 /* Finds the symmetries of the system.  PW_OK, PW_RESOURCE or PW_RETRY. */
-int pw_steady_find_group (pw_steady *x);
-/* Finds those that what is held leaves free, at the state u. */
-int pw_steady_find_gauge (pw_steady *x);
-/* The largest difference of two states in units of the scene, or relative to large numbers; but for symmetries and whole
- * turns. */
+int pw_steady_find_symmetries (pw_steady *x);
+/* Finds the symmetries that leave what is held unchanged, at the state x->q, x->v. */
+int pw_steady_find_free_symmetries (pw_steady *x);
+/* The largest difference of two states up to symmetries and whole turns, in units of the scene; of numbers above 1 in
+ * these units, relative to them. */
 double pw_steady_distance (pw_steady *x, const double *q1, const double *v1, const double *q2, const double *v2);
-/* Displaces a state by symmetries to one that equivalent states share. */
+/* Displaces a state by symmetries, to the same state for all that differ by symmetries only. */
 void pw_steady_canonical (const pw_steady *x, double *q, double *v);
 /* Displaces a state so that the first body is where it was initially, if the whole can be displaced freely. */
-void pw_steady_home (const pw_steady *x, double *q, double *v);
+void pw_steady_move_to_start (const pw_steady *x, double *q, double *v);
 
 /* ---- steady_equations.c ---- */
 
-/* Numbers of unknowns without the parameter, and of equations. */
+/* Numbers of unknowns, without the parameter, and of equations. */
 static inline int pw_steady_unknowns (const pw_steady *x) {
-  return x->n + x->group;
+  return x->n + x->symmetries;
 }
 static inline int pw_steady_equations (const pw_steady *x) {
-  return x->holonomic + x->m + x->n + x->set.holds + x->group;
+  return x->holonomic + x->m + x->n + x->settings.holds + x->symmetries;
 }
-/* For pw_branch_equations. */
+/* pw_branch_problem.evaluate, .same. */
 int pw_steady_evaluate (void *steady, const double *u, double *F, double *dF, pw_error *error);
-/* The same: whether u and other are the same motion. */
-int pw_steady_again (void *steady, const double *u, const double *other);
-/* The state q, v of unknowns u. */
+int pw_steady_same_motion (void *steady, const double *u, const double *other);
+/* Sets x->q, x->v and x->rates to those of unknowns u, and what varies among what is held to its value there. */
 void pw_steady_state (pw_steady *x, const double *u);
 /* The unknowns of the steady motion nearest to the velocities v at q.  PW_METHOD if LAPACK fails. */
-int pw_steady_guess (pw_steady *x, const double *q, const double *v, double *u, pw_error *error);
+int pw_steady_nearest (pw_steady *x, const double *q, const double *v, double *u, pw_error *error);
 double pw_steady_parameter (const pw_steady *x, const double *u);
 
 /* ---- steady_systems.c ---- */
 
-enum { PW_STEADY_MOST = 400 }; /* coordinates, since the cost is cubic */
+enum { PW_STEADY_MAX_COORDINATES = 400 }; /* since the cost is cubic */
 
-/* Opens at[k] for a parameter value.  A status; PW_RETRY with x->why. */
-int pw_steady_at (pw_steady *x, int k, double value);
-void pw_steady_leave (pw_steady *x, int k); /* frees it */
+/* Opens x->system[place] for a value of the parameter, unless it is open.  A status; PW_RETRY with x->why. */
+int pw_steady_open_system (pw_steady *x, pw_place place, double value);
+void pw_steady_close_system (pw_steady *x, pw_place place);
 
 /* ---- steady_hold.c ---- */
 
-/* The unit of A in terms of those of the scene. */
-double pw_hold_unit (const pw_steady *x, const pw_initial_value *hold);
-/* A - value B, of what is held (steady_hold.c), and its change by a variation (dq, dv). */
-double pw_hold_residual (const pw_system *s, const pw_initial_value *hold, const double *q, const double *v);
-double pw_hold_change (const pw_system *s, const pw_initial_value *hold, const double *q, const double *v,
-                       const double *dq, const double *dv);
-/* The derivative of the residual with respect to its value. */
-double pw_hold_slope (const pw_system *s, const pw_initial_value *hold, const double *q, const double *v);
+/* The residual A - value B of what is held (steady_hold.c) in the state x->q, x->v, its change by a variation (dq, dv),
+ * and its derivative with respect to the value; all divided by the unit of A. */
+double pw_hold_residual (const pw_steady *x, const pw_initial_value *hold);
+double pw_hold_change (const pw_steady *x, const pw_initial_value *hold, const double *dq, const double *dv);
+double pw_hold_slope (const pw_steady *x, const pw_initial_value *hold);
 
 /* ---- steady_start.c ---- */
 
-/* The unknowns with which attempt k begins: 0, those of the initial state; 1, of a state to which forces lead from there;
- * then random states, near and far, every other pair of them consistent, half of these relaxed. */
-int pw_steady_start (pw_steady *x, int k, double *u, pw_error *error);
+/* The unknowns with which an attempt begins: 0, the initial state; 1, a state to which forces lead from there; then
+ * random states, even attempts near the initial one, odd ones anywhere.  Of four in a row the first two need not be
+ * consistent, and from the third one forces lead elsewhere as in attempt 1. */
+int pw_steady_start (pw_steady *x, int attempt, double *u, pw_error *error);
+
+/* ---- signal_change.c ---- */
+
+/* *changed: the first signal whose value changes within the span after time t, or if period > 0, that differs between
+ * times in this span and one period later; -1: none.  Signals are compared in the run's state and in one near it.  A
+ * status. */
+int pw_signals_change (pw_run *r, double t, double period, double span, int *changed, pw_error *error);
 
 /* ---- steady.c ---- */
 
-/* *changed: the first signal that differs, in the run's state or one near it, between times t and t + part of the span; with
- * a period, between times in the span after t and one period later.  -1: none.  A status. */
-int pw_signals_change (pw_run *r, double t, double period, double span, int *changed, pw_error *error);
-
-/* Scales and symmetries at time t of a system whose signals may change with time; for other searches. */
-pw_steady *pw_steady_open_scene (const pw_system *s, double t, double span, pw_error *error);
+/* Opens only scales and symmetries at time t, for other searches: signals may change with time. */
+pw_steady *pw_steady_open_symmetries (const pw_system *s, double t, double span, pw_error *error);
 
 /* The motion of the unknowns u, a solution, with its linearisation. */
 int pw_steady_motion_at (pw_steady *x, const double *u, pw_steady_motion *out, pw_error *error);

@@ -3,48 +3,46 @@
 #include "steady_parts.h"
 #include "util.h"
 
-void pw_steady_leave (pw_steady *x, int k) {
-  pw_linear_close (&x->at[k].x);
-  if (x->at[k].r) pw_run_close (x->at[k].r);
-  pw_system_free (x->at[k].own);
-  memset (&x->at[k], 0, sizeof x->at[k]);
+void pw_steady_close_system (pw_steady *x, pw_place place) {
+  pw_linear_close (&x->system[place].linearisation);
+  if (x->system[place].run) pw_run_close (x->system[place].run);
+  pw_system_free (x->system[place].own);
+  memset (&x->system[place], 0, sizeof x->system[place]);
 }
 
+/* Whether a system has the unknowns and equations of the search. */
 static int steady_fits (const pw_steady *x, const pw_system *s) {
   return s->coords == x->n && s->rows == x->m && s->holonomic == x->holonomic && s->bodies == x->s->bodies;
 }
 
-/* Opens a run at the last solution, of which it keeps what it can: without its velocities where all of them vanish. */
-static int steady_open_run (pw_steady *x, int k, const pw_system *s) {
+/* Opens a run at the last solution, or if that cannot be made consistent, at rest in its configuration. */
+static int steady_open_run (pw_steady *x, pw_place place, const pw_system *s) {
   const pw_settings settings = {
-    .t = x->set.t, .span = x->set.span, .initial = x->known, .initials = x->solved ? 2 * x->n : 0
+    .t = x->settings.t, .span = x->settings.span, .initial = x->solution, .initials = x->solved ? 2 * x->n : 0
   };
-  x->at[k].r = pw_run_open (s, "rk4+projection", &settings, &x->why);
-  if (x->at[k].r == NULL && x->why.status == PW_INITIAL && x->solved) {
-    for (int j = x->n; j < 2 * x->n; j++) x->known[j].value = 0;
+  x->system[place].run = pw_run_open (s, "rk4+projection", &settings, &x->why);
+  if (x->system[place].run == NULL && x->why.status == PW_INITIAL && x->solved) {
+    for (int j = x->n; j < 2 * x->n; j++) x->solution[j].value = 0;
     x->why = (pw_error){ 0 };
-    x->at[k].r = pw_run_open (s, "rk4+projection", &settings, &x->why);
+    x->system[place].run = pw_run_open (s, "rk4+projection", &settings, &x->why);
   }
-  if (x->at[k].r == NULL) return x->why.status;
-  if (pw_linear_open (&x->at[k].x, x->at[k].r, 0, PW_STEADY_MOST) == PW_OK) return PW_OK;
+  if (x->system[place].run == NULL) return x->why.status;
+  if (pw_linear_open (&x->system[place].linearisation, x->system[place].run, 0, PW_STEADY_MAX_COORDINATES) == PW_OK)
+    return PW_OK;
   return pw_fail_memory (s, &x->why);
 }
 
-int pw_steady_at (pw_steady *x, int k, double value) {
+int pw_steady_open_system (pw_steady *x, pw_place place, double value) {
   const pw_system *s = x->s;
-  int status;
-  if (x->at[k].r && (x->set.compile == NULL || x->at[k].value == value)) return PW_OK;
-  pw_steady_leave (x, k);
+  if (x->system[place].run && (x->settings.compile == NULL || x->system[place].value == value)) return PW_OK;
+  pw_steady_close_system (x, place);
   x->why = (pw_error){ 0 };
-  x->at[k].value = value;
-  if (x->set.compile) s = x->at[k].own = x->set.compile (x->set.context, value, &x->why);
-  if (s == NULL)
-    status = x->why.status;
-  else if (!steady_fits (x, s))
+  x->system[place].value = value;
+  if (x->settings.compile) s = x->system[place].own = x->settings.compile (x->settings.context, value, &x->why);
+  if (s && !steady_fits (x, s))
     return pw_fail (&x->why, PW_INPUT, "model %s: the parameter changes the number of bodies or constraint equations",
                     s->model);
-  else
-    status = steady_open_run (x, k, s);
-  if (status != PW_OK) pw_steady_leave (x, k);
+  int status = s ? steady_open_run (x, place, s) : x->why.status;
+  if (status != PW_OK) pw_steady_close_system (x, place);
   return status == PW_OK || status == PW_RESOURCE ? status : PW_RETRY;
 }

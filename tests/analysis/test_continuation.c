@@ -21,14 +21,14 @@ static int cubic (void *context, const double *u, double *F, double *dF, pw_erro
 }
 
 static int cubic_calls;
-static const pw_branch_equations cubic_equations = {
+static const pw_branch_problem cubic_equations = {
   .unknowns = 2, .equations = 3, .tolerance = 1e-12, .evaluate = cubic, .context = &cubic_calls
 };
 
-static void continuation_open (pw_branch *b, const pw_branch_equations *of) {
+static void continuation_open (pw_branch *b, const pw_branch_problem *problem) {
   pw_error error = { 0 };
-  check_ok (pw_branch_open (b, of, &error), &error);
-  b->step = 0.05, b->most = 0.1, b->least = 1e-6;
+  check_ok (pw_branch_open (b, problem, &error), &error);
+  b->step = 0.05, b->max_change = 0.1, b->min_step = 1e-6;
 }
 
 static int slope_of_p (void *context, const pw_branch_point *point, double *value, pw_error *error) {
@@ -49,14 +49,14 @@ static void test_folds (void **state) {
   check_close ("x", u[0] * u[0] * u[0] - u[0], -5, 1e-12, "the tolerance");
   check_close ("z", u[1], 0.7, 1e-15, "it stays by its condition");
   check_ok (pw_branch_start (&b, u, 1, &error), &error);
-  for (; b.at.u[2] < 1 || b.at.u[0] < 1; points++) {
+  for (; b.reached.u[2] < 1 || b.reached.u[0] < 1; points++) {
     assert_true (points < 1000);
     check_ok (pw_branch_step (&b, &error), &error);
-    check_close ("p", b.at.u[2], pow (b.at.u[0], 3) - b.at.u[0], 1e-12, "the tolerance");
-    assert_true (fabs (b.at.u[2] - b.before.u[2]) < 0.2); /* predicted: 0.1 */
-    assert_true (b.at.u[0] > b.before.u[0]);
+    check_close ("p", b.reached.u[2], pow (b.reached.u[0], 3) - b.reached.u[0], 1e-12, "the tolerance");
+    assert_true (fabs (b.reached.u[2] - b.previous.u[2]) < 0.2); /* predicted: 0.1 */
+    assert_true (b.reached.u[0] > b.previous.u[0]);
     if (!b.folded) continue;
-    b.accuracy = 1e-10;
+    b.event_accuracy = 1e-10;
     check_ok (pw_branch_locate (&b, slope_of_p, NULL, &error), &error);
     check_close ("x", b.found.u[0], -next / sqrt (3), 1e-9, "10 times the accuracy asked, steps < 1");
     check_close ("p", b.found.u[2], next * 2 / sqrt (27), 1e-12, "quadratic at the fold");
@@ -66,7 +66,8 @@ static void test_folds (void **state) {
   pw_branch_close (&b);
 }
 
-/* Pitchforks at p = *context on the curved branch x = 3 sin p: other branches leave it at (x - 3 sin p)^2 = p - *context. */
+/* Pitchforks at p = *context on the curved branch x = 3 sin p: other branches leave it at (x - 3 sin p)^2 = p -
+ * *context. */
 static int pitchfork (void *context, const double *u, double *F, double *dF, pw_error *error) {
   double off = u[0] - 3 * sin (u[1]), p = u[1] - *(double *)context;
   (void)error;
@@ -85,8 +86,8 @@ static int pitchfork_sign (void *context, const pw_branch_point *point, double *
 /* Steps of any length pass pitchforks on the same branch, and the pitchfork is located. */
 static void test_pitchforks (void **state) {
   double where, F;
-  const pw_branch_equations of = {
-    .unknowns = 1, .equations = 1, .tolerance = 1e-9, .rank = 1e-7, .evaluate = pitchfork, .context = &where
+  const pw_branch_problem problem = {
+    .unknowns = 1, .equations = 1, .tolerance = 1e-9, .rank_tolerance = 1e-7, .evaluate = pitchfork, .context = &where
   };
   pw_error error = { 0 };
   (void)state;
@@ -94,14 +95,16 @@ static void test_pitchforks (void **state) {
     double u[2] = { 0, 0 };
     int passed = 0;
     pw_branch b;
-    check_ok (pw_branch_open (&b, &of, &error), &error);
-    b.most = 0.05 + 0.001 * k, b.step = b.most / 4, b.least = 1e-6, b.accuracy = 1e-7, where = 0.8 + 0.01 * (k % 17);
+    check_ok (pw_branch_open (&b, &problem, &error), &error);
+    b.max_change = 0.05 + 0.001 * k, b.step = b.max_change / 4, b.min_step = 1e-6, b.event_accuracy = 1e-7,
+    where = 0.8 + 0.01 * (k % 17);
     check_ok (pw_branch_start (&b, u, 1, &error), &error);
-    while (b.at.u[1] < 1.5) {
+    while (b.reached.u[1] < 1.5) {
       check_ok (pw_branch_step (&b, &error), &error);
-      check_close ("x", b.at.u[0], 3 * sin (b.at.u[1]), 1e-4, "the tolerance over the distance from the pitchfork");
+      check_close ("x", b.reached.u[0], 3 * sin (b.reached.u[1]), 1e-4,
+                   "the tolerance over the distance from the pitchfork");
       assert_false (b.folded);
-      if (passed || b.at.u[1] < where) continue;
+      if (passed || b.reached.u[1] < where) continue;
       check_ok (pw_branch_locate (&b, pitchfork_sign, &where, &error), &error);
       check_close ("p", b.found.u[1], where, 1e-7, "a cubic between points nearby");
       check_ok (pitchfork (&where, b.found.u, &F, NULL, &error), &error);
@@ -129,15 +132,15 @@ static int gap_middle (void *context, const pw_branch_point *point, double *valu
 
 /* Where Newton's method fails, events are interpolated from the nearest points. */
 static void test_interpolated (void **state) {
-  const pw_branch_equations of = { .unknowns = 1, .equations = 1, .tolerance = 1e-12, .evaluate = gap };
+  const pw_branch_problem problem = { .unknowns = 1, .equations = 1, .tolerance = 1e-12, .evaluate = gap };
   double u[2] = { 0, 0 };
   pw_error error = { 0 };
   pw_branch b;
   (void)state;
-  check_ok (pw_branch_open (&b, &of, &error), &error);
-  b.most = b.step = 0.2, b.least = 1e-6, b.accuracy = 1e-9;
+  check_ok (pw_branch_open (&b, &problem, &error), &error);
+  b.max_change = b.step = 0.2, b.min_step = 1e-6, b.event_accuracy = 1e-9;
   check_ok (pw_branch_start (&b, u, 1, &error), &error);
-  while (b.at.u[1] < 1) check_ok (pw_branch_step (&b, &error), &error);
+  while (b.reached.u[1] < 1) check_ok (pw_branch_step (&b, &error), &error);
   check_ok (pw_branch_locate (&b, gap_middle, NULL, &error), &error);
   assert_int_equal (b.found.interpolated, 1);
   check_close ("p", b.found.u[1], 1, 1e-9, "the accuracy asked, steps < 1");
@@ -153,16 +156,16 @@ static int puncture (void *context, const double *u, double *F, double *dF, pw_e
 
 /* An event where the equations cannot be evaluated is located all the same, though the secant leads there at once. */
 static void test_punctured (void **state) {
-  const pw_branch_equations of = { .unknowns = 1, .equations = 1, .tolerance = 1e-12, .evaluate = puncture };
+  const pw_branch_problem problem = { .unknowns = 1, .equations = 1, .tolerance = 1e-12, .evaluate = puncture };
   pw_error error = { 0 };
   (void)state;
   for (int k = 0; k < 20; k++) {
     double u[2] = { sin (0.01 * k), 0.01 * k };
     pw_branch b;
-    check_ok (pw_branch_open (&b, &of, &error), &error);
-    b.most = b.step = 0.2, b.least = 1e-6, b.accuracy = 1e-9;
+    check_ok (pw_branch_open (&b, &problem, &error), &error);
+    b.max_change = b.step = 0.2, b.min_step = 1e-6, b.event_accuracy = 1e-9;
     check_ok (pw_branch_start (&b, u, 1, &error), &error);
-    while (b.at.u[1] < 1) check_ok (pw_branch_step (&b, &error), &error);
+    while (b.reached.u[1] < 1) check_ok (pw_branch_step (&b, &error), &error);
     check_ok (pw_branch_locate (&b, gap_middle, NULL, &error), &error);
     check_close ("p", b.found.u[1], 1, 1e-9, "the accuracy asked, steps < 1");
     pw_branch_close (&b);
@@ -178,7 +181,7 @@ static void test_direction (void **state) {
   continuation_open (&b, &cubic_equations);
   check_ok (pw_branch_start (&b, u, -1, &error), &error);
   check_ok (pw_branch_step (&b, &error), &error);
-  assert_true (b.at.u[2] < -6 && b.at.u[0] < -2);
+  assert_true (b.reached.u[2] < -6 && b.reached.u[0] < -2);
   pw_branch_close (&b);
 }
 
@@ -201,11 +204,11 @@ static void test_end (void **state) {
   int status = PW_OK;
   (void)state;
   continuation_open (&b, &cubic_equations);
-  b.most = 100;
+  b.max_change = 100;
   check_ok (pw_branch_start (&b, u, 1, &error), &error);
   while (status == PW_OK) status = pw_branch_step (&b, &error);
   assert_int_equal (status, PW_RETRY);
-  check_close ("x", b.at.u[0], 5, 1e-6, "the least step, of which x has a part");
+  check_close ("x", b.reached.u[0], 5, 1e-6, "the least step, of which x has a part");
   pw_branch_close (&b);
 }
 
@@ -224,7 +227,7 @@ static int no_events (void *context, pw_error *error) {
 
 /* From p = 0.5 through the fold up to p = 1, which no point exceeds though tangents predict too little. */
 static void test_range (void **state) {
-  const pw_branch_equations of = { .unknowns = 1, .equations = 1, .tolerance = 1e-12, .evaluate = parabola };
+  const pw_branch_problem problem = { .unknowns = 1, .equations = 1, .tolerance = 1e-12, .evaluate = parabola };
   pw_error error = { 0 }, why;
   (void)state;
   for (int k = 0; k < 100; k++) {
@@ -232,8 +235,8 @@ static void test_range (void **state) {
     int folds = 0;
     pw_branch b;
     const pw_branch_event *next;
-    continuation_open (&b, &of);
-    b.most = b.step = 0.2 + 0.003 * k, b.accuracy = 1e-9, b.limit = 1000;
+    continuation_open (&b, &problem);
+    b.max_change = b.step = 0.2 + 0.003 * k, b.event_accuracy = 1e-9, b.max_points = 1000;
     check_ok (pw_branch_start (&b, u, -1, &error), &error);
     while (pw_branch_next (&b, no_events, &why, &next, &error) == PW_OK && next) {
       p = next->point.u[1], folds += next->event == PW_BRANCH_FOLD;
@@ -241,7 +244,7 @@ static void test_range (void **state) {
     }
     assert_int_equal (folds, 1);
     check_close ("p", p, 1, 0, "the end of the range");
-    check_close ("x", b.at.u[0], sqrt (2), 1e-12, "the tolerance");
+    check_close ("x", b.reached.u[0], sqrt (2), 1e-12, "the tolerance");
     pw_branch_close (&b);
   }
 }
@@ -260,12 +263,12 @@ static int wave_same (void *context, const double *u, const double *other) {
   return fabs (remainder (u[0] - other[0], 2 * PW_PI)) < 1e-6;
 }
 
-/* A branch is closed after a whole turn, also if it begins beside a fold, from one point to the same; but not if p increases
- * from turn to turn. */
+/* A branch is closed after a whole turn, also if it begins beside a fold, from one point to the same; but not if p
+ * increases from turn to turn. */
 static void test_turns (void **state) {
   static const double begin[] = { 0.3, 2, PW_PI / 2 - 1e-3, PW_PI / 2 + 1e-2, -PW_PI / 2 + 2e-3 };
   double climb;
-  const pw_branch_equations of = {
+  const pw_branch_problem problem = {
     .unknowns = 1, .equations = 1, .tolerance = 1e-12, .evaluate = wave, .same = wave_same, .context = &climb
   };
   pw_error error = { 0 }, why;
@@ -277,18 +280,18 @@ static void test_turns (void **state) {
     const pw_branch_event *next;
     climb = k % 2 ? 0.01 : 0;
     u[0] = x, u[1] = 0.5 + 0.3 * sin (x) + climb * (x - PW_PI);
-    continuation_open (&b, &of);
-    b.most = b.step = 0.1, b.accuracy = 1e-9, b.limit = 1000;
+    continuation_open (&b, &problem);
+    b.max_change = b.step = 0.1, b.event_accuracy = 1e-9, b.max_points = 1000;
     check_ok (pw_branch_start (&b, u, 0.3 * cos (x) + climb, &error), &error);
     while (pw_branch_next (&b, no_events, &why, &next, &error) == PW_OK && next) folds += next->event == PW_BRANCH_FOLD;
     assert_string_equal (why.text, climb > 0 ? "" : "it has returned to its first point");
     if (climb > 0) {
       assert_true (folds > 5);
-      check_close ("p", b.at.u[1], 1, 0, "the end of the range");
+      check_close ("p", b.reached.u[1], 1, 0, "the end of the range");
     } else {
       assert_int_equal (folds, 2);
-      check_close ("p", b.at.u[1], u[1], 0, "that of the first point");
-      check_close ("x", b.at.u[0], x + 2 * PW_PI, 1e-8, "the tolerance over the slope");
+      check_close ("p", b.reached.u[1], u[1], 0, "that of the first point");
+      check_close ("x", b.reached.u[0], x + 2 * PW_PI, 1e-8, "the tolerance over the slope");
     }
     pw_branch_close (&b);
   }
@@ -303,12 +306,12 @@ static int without_solution (void *context, const double *u, double *F, double *
 
 /* No solution: the residual where it stopped is that of the nearest miss. */
 static void test_without_solution (void **state) {
-  const pw_branch_equations of = { .unknowns = 1, .equations = 1, .tolerance = 1e-12, .evaluate = without_solution };
+  const pw_branch_problem problem = { .unknowns = 1, .equations = 1, .tolerance = 1e-12, .evaluate = without_solution };
   double u[2] = { 3, 0 };
   pw_error error = { 0 };
   pw_branch b;
   (void)state;
-  continuation_open (&b, &of);
+  continuation_open (&b, &problem);
   assert_int_equal (pw_branch_solve (&b, u, &error), PW_RETRY);
   assert_true (b.residual >= 1 && b.residual < 2);
   pw_branch_close (&b);
@@ -324,15 +327,46 @@ static int steep (void *context, const double *u, double *F, double *dF, pw_erro
 }
 
 static void test_damping (void **state) {
-  const pw_branch_equations of = { .unknowns = 1, .equations = 1, .tolerance = 1e-12, .evaluate = steep };
+  const pw_branch_problem problem = { .unknowns = 1, .equations = 1, .tolerance = 1e-12, .evaluate = steep };
   double u[2] = { 5, 0.5 };
   pw_error error = { 0 };
   pw_branch b;
   (void)state;
-  continuation_open (&b, &of);
+  continuation_open (&b, &problem);
   check_ok (pw_branch_solve (&b, u, &error), &error);
   check_close ("x", u[0], 0.5, 1e-12, "the tolerance; slope 1");
   pw_branch_close (&b);
+}
+
+/* x^3 = (p - 0.5)^2 */
+static int cusp (void *context, const double *u, double *F, double *dF, pw_error *error) {
+  double x = u[0], p = u[1] - 0.5;
+  (void)context, (void)error;
+  F[0] = x * x * x - p * p;
+  if (dF) dF[0] = 3 * x * x, dF[1] = -2 * p;
+  return PW_OK;
+}
+
+/* A branch ends at a cusp, where solutions within the tolerance are noise of 1e-3 in x: none of it is taken for a
+ * fold. */
+static void test_cusp (void **state) {
+  const pw_branch_problem problem = { .unknowns = 1, .equations = 1, .tolerance = 1e-9, .evaluate = cusp };
+  pw_error error = { 0 }, why;
+  (void)state;
+  for (int k = 0; k < 100; k++) {
+    double u[2] = { cbrt (0.25), 0 };
+    pw_branch b;
+    const pw_branch_event *next;
+    continuation_open (&b, &problem);
+    b.max_change = 0.01 + 6e-4 * k, b.step = b.max_change / 4, b.min_step = 1e-7, b.event_accuracy = 1e-9;
+    b.max_points = 1000;
+    check_ok (pw_branch_start (&b, u, 1, &error), &error);
+    while (pw_branch_next (&b, no_events, &why, &next, &error) == PW_OK && next)
+      assert_int_equal (next->event, PW_BRANCH_POINT);
+    assert_string_equal (why.text, "Newton's method fails at the smallest step");
+    check_close ("x", b.reached.u[0], 0, 1e-3, "the third root of the tolerance");
+    pw_branch_close (&b);
+  }
 }
 
 int main (void) {
@@ -341,6 +375,6 @@ int main (void) {
                                       cmocka_unit_test (test_start_at_fold), cmocka_unit_test (test_end),
                                       cmocka_unit_test (test_range),         cmocka_unit_test (test_without_solution),
                                       cmocka_unit_test (test_damping),       cmocka_unit_test (test_punctured),
-                                      cmocka_unit_test (test_turns) };
+                                      cmocka_unit_test (test_turns),         cmocka_unit_test (test_cusp) };
   return cmocka_run_group_tests (tests, NULL, NULL);
 }

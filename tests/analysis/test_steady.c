@@ -141,24 +141,24 @@ static void test_family (void **state) {
 static void test_held (void **state) {
   static const char *const names[] = { "trailer1.speed", "trailer1.radius", "trailer1.curvature", "trailer1.vx" };
   const double step = 1e-6;
-  double q[9], v[9], dq[9], dv[9], r[2];
+  double dq[9], dv[9], r[3];
   (void)state;
-  pw_system *s = gallery_open ("n-trailer", NULL);
-  for (int j = 0; j < 9; j++) q[j] = sin (j), v[j] = cos (2 * j), dq[j] = cos (3 * j), dv[j] = sin (4 * j + 1);
+  steady t = { .s = gallery_open ("n-trailer", NULL), .set.vary = -1 };
+  steady_open (&t);
+  pw_steady *x = t.x;
+  for (int j = 0; j < 9; j++) dq[j] = cos (3 * j), dv[j] = sin (4 * j + 1);
   for (size_t k = 0; k < sizeof names / sizeof *names; k++) {
-    pw_initial_value hold = { held (s, names[k]), 0.7 };
-    for (int side = 0; side < 2; side++) {
-      double h = side ? step : -step, at[9], rate[9];
-      for (int j = 0; j < 9; j++) at[j] = q[j] + h * dq[j], rate[j] = v[j] + h * dv[j];
-      r[side] = pw_hold_residual (s, &hold, at, rate);
+    pw_initial_value hold = { held (t.s, names[k]), 0.7 };
+    for (int side = 0; side < 3; side++) {
+      double h = side < 2 ? (2 * side - 1) * step : 0;
+      for (int j = 0; j < 9; j++) x->q[j] = sin (j) + h * dq[j], x->v[j] = cos (2 * j) + h * dv[j];
+      r[side] = pw_hold_residual (x, &hold);
     }
-    check_close (names[k], pw_hold_change (s, &hold, q, v, dq, dv), (r[1] - r[0]) / (2 * step), 1e-9, "differences");
-    r[0] = pw_hold_residual (s, &hold, q, v);
+    check_close (names[k], pw_hold_change (x, &hold, dq, dv), (r[1] - r[0]) / (2 * step), 1e-9, "differences");
     hold.value += 0.5;
-    check_close (names[k], pw_hold_slope (s, &hold, q, v), (pw_hold_residual (s, &hold, q, v) - r[0]) / 0.5, 1e-14,
-                 "linear");
+    check_close (names[k], pw_hold_slope (x, &hold), (pw_hold_residual (x, &hold) - r[2]) / 0.5, 1e-14, "linear");
   }
-  pw_system_free (s);
+  steady_close (&t);
 }
 
 /* Mirrored turns differ; displaced ones do not. */

@@ -1,0 +1,291 @@
+/* Symmetries of a system: displacements under which its equations are invariant.  Besides displacements of the whole
+ * these are changes of angles on which nothing depends, such as that of a wheel that rolls.  They span the null space
+ * of the derivatives of the equations along all displacements, at states in general position. */
+#include <lapacke.h>
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+#include "rank.h"
+#include "steady_parts.h"
+#include "util.h"
+
+enum { SYMMETRY_STATES = 2 }; /* more than one, since a body alone has more displacements than equations */
+static const double SYMMETRY_DISTANCE = 0.02,    /* of these states from the initial one, in units of the scene */
+    SYMMETRY_ROUND_OFF = 1e-12,                  /* of singular values, relative to the largest one */
+    SYMMETRY_PIVOT = 1e-6, SYMMETRY_ZERO = 1e-7, /* rates below these cannot be pivots; count as 0 */
+    SYMMETRY_SAME = 1e-4; /* of equal states: a double root moves by the root of the residual, 3e-5, with a margin */
+
+void pw_steady_combine (const pw_steady *x, const double *coefficient, double unit, double *rates) {
+  int count = pw_steady_rate_count (x->s);
+  memset (rates, 0, (size_t)count * sizeof *rates);
+  for (int k = 0; k < x->symmetries; k++)
+    for (int c = 0; c < count; c++) rates[c] += coefficient[k] / unit * x->symmetry[k * count + c];
+}
+
+void pw_steady_velocities (const pw_steady *x, const double *rates, const double *q, double *v) {
+  int bodies = 3 * x->s->bodies;
+  for (int j = 0; j < bodies; j += 3) {
+    v[j] = x->L * rates[PW_RATE_X] - rates[PW_RATE_TURN] * (q[j + 1] - x->origin[1]);
+    v[j + 1] = x->L * rates[PW_RATE_Y] + rates[PW_RATE_TURN] * (q[j] - x->origin[0]);
+    v[j + 2] = rates[PW_RATE_TURN] + rates[PW_RATE_ANGLES + j / 3];
+  }
+  for (int j = bodies; j < x->n; j++) v[j] = rates[PW_RATE_ANGLES + x->s->bodies + j - bodies];
+}
+
+/* The change of the equations by rate of displacement c, in units of the scene. */
+static void symmetry_violation (pw_steady *x, int c, double *rates, double *out) {
+  pw_linearisation *l = &x->system[PW_HERE].linearisation;
+  memset (rates, 0, (size_t)pw_steady_rate_count (x->s) * sizeof *rates);
+  rates[c] = 1;
+  memset (l->x, 0, 2 * (size_t)x->n * sizeof *l->x);
+  pw_steady_velocities (x, rates, x->q, l->x);
+  if (c == PW_RATE_TURN) pw_linear_turn (l, 1, x->v, l->x + x->n);
+  pw_linear_asymmetry (l, c == PW_RATE_TURN, out);
+}
+
+/* The largest change of an acceleration by a single coordinate, in units of the scene. */
+static double symmetry_largest_change (pw_steady *x) {
+  pw_linearisation *l = &x->system[PW_HERE].linearisation;
+  double most = 0;
+  for (int c = 0; c < x->n; c++) {
+    memset (l->x, 0, 2 * (size_t)x->n * sizeof *l->x);
+    l->x[c] = pw_unit (x->s, c);
+    pw_linear_vary (l);
+    for (int j = 0; j < x->n; j++)
+      most = pw_larger_or_nan (most, fabs (l->da[j]) * pw_as_length (x->s, j) * x->T * x->T / x->L);
+  }
+  return most;
+}
+
+/* Reduced row echelon form of `rows` independent rows of n rates.  Pivots are chosen from the last column on, so that
+ * angles of single bodies stand alone in their rows. */
+static void symmetry_reduce (int rows, int n, double *row) {
+  for (int i = 0, c = n - 1; i < rows && c >= 0; c--) {
+    int best = i;
+    for (int k = i; k < rows; k++)
+      if (fabs (row[k * n + c]) > fabs (row[best * n + c])) best = k;
+    double pivot = row[best * n + c];
+    if (fabs (pivot) < SYMMETRY_PIVOT) continue;
+    for (int j = 0; j < n; j++) {
+      double kept = row[best * n + j];
+      row[best * n + j] = row[i * n + j];
+      row[i * n + j] = kept / pivot;
+    }
+    for (int k = 0; k < rows; k++) {
+      double factor = row[k * n + c];
+      for (int j = 0; k != i && j < n; j++) row[k * n + j] -= factor * row[i * n + j];
+    }
+    i++;
+  }
+  for (int k = 0; k < rows * n; k++)
+    if (fabs (row[k]) < SYMMETRY_ZERO) row[k] = 0;
+}
+
+int pw_null_space (int rows, int n, double *M, double tolerance, double *out) {
+  double *work = malloc (((size_t)n * (size_t)n + 8 * (size_t)(rows + n)) * sizeof *work), *sigma = work,
+         *V = sigma + n;
+  int left = 0;
+  if (work == NULL) return PW_RESOURCE;
+  if (LAPACKE_dgesvd_work (LAPACK_COL_MAJOR, 'N', 'A', rows, n, M, rows, sigma, NULL, 1, V, n, V + n * n,
+                           8 * (rows + n) - n))
+    left = PW_METHOD;
+  tolerance = fmax (tolerance, SYMMETRY_ROUND_OFF * sigma[0]);
+  while (left >= 0 && left < n && sigma[n - 1 - left] <= tolerance) {
+    for (int j = 0; j < n; j++) out[left * n + j] = V[j * n + n - 1 - left];
+    left++;
+  }
+  free (work);
+  return left;
+}
+
+void pw_irregular_state (const pw_run *r, double distance, int number, double *q, double *v) {
+  for (int j = 0; j < r->s->coords; j++) {
+    double unit = distance * pw_unit (r->s, j);
+    q[j] = r->q[j] + unit * pw_irregular (1.7 + number, j + 1);
+    v[j] = r->v[j] + unit / r->w->scale.time * pw_irregular (2.9 + number, j + 1);
+  }
+}
+
+/* Evaluates derivatives at state `number` near the initial one, in general position, but on the constraints: off them
+ * residuals rotate with the whole. */
+static int symmetry_evaluate (pw_steady *x, double distance, int number) {
+  pw_run *r = x->system[PW_HERE].run;
+  pw_projector p;
+  pw_irregular_state (r, distance, number, x->q, x->v);
+  if (pw_projector_open (&p, r, x->s->metric, x->s->metric, &x->why) != PW_OK) return PW_RESOURCE;
+  int status = pw_project_positions (&p, r, x->settings.t, x->q, x->v);
+  if (status == PW_OK) status = pw_project_velocities (&p, r, x->v);
+  pw_projector_close (&p);
+  if (status == PW_OK) status = pw_linear_evaluate (&x->system[PW_HERE].linearisation, x->settings.t, x->q, x->v);
+  if (status == PW_OK) pw_rank_rows (r->w, x->system[PW_HERE].linearisation.R, x->system[PW_HERE].linearisation.norm);
+  return status;
+}
+
+/* Makes combinations that displace nothing, such as a rotation of the whole about the centre of a pinned disc less one
+ * of its angle, vanish from the basis of symmetries.  Returns their number, or a status < 0.  x->q is in general
+ * position. */
+static int symmetry_remove_idle (pw_steady *x, int rates) {
+  int n = x->n + 3, symmetries = x->symmetries; /* at least as many rows as columns */
+  double *F = calloc ((size_t)(n + symmetries + rates) * (size_t)symmetries + 1, sizeof *F);
+  double *c = F + n * symmetries, *idle_rates = c + symmetries * symmetries; /* combinations, and their rates */
+  if (F == NULL) return PW_RESOURCE;
+  for (int k = 0; k < symmetries; k++) {
+    pw_steady_velocities (x, x->symmetry + k * rates, x->q, F + k * n);
+    for (int j = 0; j < x->n; j++) F[k * n + j] /= pw_unit (x->s, j);
+  }
+  int idle = symmetries ? pw_null_space (n, symmetries, F, 1e-9, c) : 0;
+  for (int i = 0; i < idle * symmetries; i++)
+    for (int j = 0; j < rates; j++)
+      idle_rates[i / symmetries * rates + j] += c[i] * x->symmetry[i % symmetries * rates + j];
+  symmetry_reduce (idle, rates, idle_rates);
+  for (int i = 0; i < idle; i++) {
+    int last = rates - 1; /* the pivot */
+    while (last > 0 && idle_rates[i * rates + last] == 0) last--;
+    for (int k = 0; k < symmetries; k++) {
+      double factor = x->symmetry[k * rates + last];
+      for (int j = 0; j < rates; j++) x->symmetry[k * rates + j] -= factor * idle_rates[i * rates + j];
+    }
+  }
+  free (F);
+  return idle;
+}
+
+/* The coordinate that rate c >= PW_RATE_ANGLES changes. */
+static int symmetry_coordinate (const pw_steady *x, int c) {
+  return c < PW_RATE_ANGLES + x->s->bodies ? 3 * (c - PW_RATE_ANGLES) + 2 : 2 * x->s->bodies + c - 3;
+}
+
+/* Finds the angles whose change is a symmetry by itself. */
+static void symmetry_find_cyclic (pw_steady *x) {
+  int rates = pw_steady_rate_count (x->s);
+  for (int k = 0; k < x->symmetries; k++) {
+    int last = 0, count = 0;
+    for (int c = 0; c < rates; c++)
+      if (x->symmetry[k * rates + c] != 0) last = c, count++;
+    if (count == 1 && last >= PW_RATE_ANGLES) x->cyclic[symmetry_coordinate (x, last)] = 1;
+  }
+}
+
+int pw_steady_find_symmetries (pw_steady *x) {
+  pw_linearisation *l = &x->system[PW_HERE].linearisation;
+  int rates = pw_steady_rate_count (x->s), length = l->holonomic + l->rank + x->n,
+      rows = SYMMETRY_STATES * (length + 3);
+  int status = PW_OK;
+  double *M = calloc ((size_t)rows * (size_t)rates + (size_t)rates, sizeof *M), size = 0;
+  if (M == NULL) return PW_RESOURCE;
+  for (int k = 0; k < SYMMETRY_STATES && status == PW_OK; k++) {
+    status = symmetry_evaluate (x, SYMMETRY_DISTANCE, k);
+    if (status == PW_RETRY) status = symmetry_evaluate (x, SYMMETRY_DISTANCE / 100, k);
+    for (int c = 0; c < rates && status == PW_OK; c++)
+      symmetry_violation (x, c, M + rows * rates, M + c * rows + k * (length + 3));
+    if (status == PW_OK) size = fmax (size, symmetry_largest_change (x));
+  }
+  double tolerance = PW_LINEAR_SYMMETRIC * (1 + 1e-4 * size); /* round-off of larger derivatives is larger */
+  if (status == PW_OK) x->symmetries = x->s->bodies ? pw_null_space (rows, rates, M, tolerance, x->symmetry) : 0;
+  free (M);
+  if (status != PW_OK || x->symmetries < 0) return status != PW_OK ? status : x->symmetries;
+  int idle = symmetry_remove_idle (x, rates);
+  if (idle < 0) return idle;
+  symmetry_reduce (x->symmetries, rates, x->symmetry);
+  x->symmetries -= idle;
+  symmetry_find_cyclic (x);
+  return PW_OK;
+}
+
+int pw_steady_find_free_symmetries (pw_steady *x) {
+  int symmetries = x->symmetries, holds = x->settings.holds, rows = holds > symmetries ? holds : symmetries;
+  double *M = calloc ((size_t)rows * (size_t)symmetries + 1, sizeof *M);
+  if (M == NULL) return PW_RESOURCE;
+  for (int k = 0; k < symmetries; k++) {
+    const double *symmetry = x->symmetry + k * pw_steady_rate_count (x->s);
+    pw_steady_velocities (x, symmetry, x->q, x->dq);
+    memset (x->dv, 0, (size_t)x->n * sizeof *x->dv);
+    pw_linear_turn (&x->system[PW_HERE].linearisation, symmetry[PW_RATE_TURN], x->v, x->dv);
+    for (int i = 0; i < holds; i++) M[k * rows + i] = pw_hold_change (x, x->hold + i, x->dq, x->dv);
+  }
+  x->free_symmetries = symmetries ? pw_null_space (rows, symmetries, M, 1e-9, x->free_symmetry) : 0;
+  free (M);
+  return x->free_symmetries < 0 ? x->free_symmetries : PW_OK;
+}
+
+/* ---- Comparison ---- */
+
+/* Whether it displaces the whole. */
+static int symmetry_of_whole (const double *symmetry) {
+  return symmetry[PW_RATE_X] != 0 || symmetry[PW_RATE_Y] != 0 || symmetry[PW_RATE_TURN] != 0;
+}
+
+/* Rotates positions and velocities by an angle about a point. */
+static void symmetry_rotate (const pw_steady *x, double angle, const double *about, double *q, double *v) {
+  double c = pw_cos (angle), s = pw_sin (angle), centre[2] = { about[0], about[1] };
+  for (int j = 0; j < 3 * x->s->bodies; j += 3) {
+    double dx = q[j] - centre[0], dy = q[j + 1] - centre[1], vx = v[j], vy = v[j + 1];
+    q[j] = centre[0] + c * dx - s * dy, q[j + 1] = centre[1] + s * dx + c * dy, q[j + 2] += angle;
+    v[j] = c * vx - s * vy, v[j + 1] = s * vx + c * vy;
+  }
+}
+
+/* The angle of the whole: that of the first body on whose angle something depends; if there is none, of the line from
+ * the centre to the last body. */
+static double symmetry_angle (const pw_steady *x, const double centre[2], const double *q) {
+  int last = 3 * (x->s->bodies - 1);
+  for (int b = 0; b < x->s->bodies; b++)
+    if (!x->cyclic[3 * b + 2]) return q[3 * b + 2];
+  return atan2 (q[last + 1] - centre[1], q[last] - centre[0]);
+}
+
+/* Angles of bodies first: rotations of the whole change them, too. */
+void pw_steady_canonical (const pw_steady *x, double *q, double *v) {
+  int rates = pw_steady_rate_count (x->s);
+  for (int k = 0; k < x->symmetries; k++) {
+    const double *symmetry = x->symmetry + k * rates;
+    int c = rates - 1;
+    while (c >= PW_RATE_ANGLES && symmetry[c] == 0) c--;
+    if (c >= PW_RATE_ANGLES && !symmetry_of_whole (symmetry)) {
+      double by = -q[symmetry_coordinate (x, c)] / symmetry[c];
+      for (int b = 0; b < x->s->bodies; b++) q[3 * b + 2] += by * symmetry[PW_RATE_ANGLES + b];
+      for (int j = 3 * x->s->bodies; j < x->n; j++) q[j] += by * symmetry[PW_RATE_ANGLES - 2 * x->s->bodies + j];
+    }
+    if (symmetry[PW_RATE_TURN] == 0) continue;
+    double centre[2] = { x->origin[0] - x->L * symmetry[PW_RATE_Y] / symmetry[PW_RATE_TURN],
+                         x->origin[1] + x->L * symmetry[PW_RATE_X] / symmetry[PW_RATE_TURN] };
+    symmetry_rotate (x, -symmetry_angle (x, centre, q), centre, q, v);
+  }
+  for (int k = 0; k < x->symmetries; k++) {
+    const double *symmetry = x->symmetry + k * rates;
+    double square = symmetry[PW_RATE_X] * symmetry[PW_RATE_X] + symmetry[PW_RATE_Y] * symmetry[PW_RATE_Y];
+    if (symmetry[PW_RATE_TURN] != 0 || !(square > 0)) continue;
+    double by = (symmetry[PW_RATE_X] * q[0] + symmetry[PW_RATE_Y] * q[1]) / square;
+    for (int j = 0; j < 3 * x->s->bodies; j += 3)
+      q[j] -= by * symmetry[PW_RATE_X], q[j + 1] -= by * symmetry[PW_RATE_Y];
+  }
+}
+
+void pw_steady_move_to_start (const pw_steady *x, double *q, double *v) {
+  int whole = 0, count = pw_steady_rate_count (x->s);
+  for (int k = 0; k < x->symmetries; k++) whole += symmetry_of_whole (x->symmetry + k * count);
+  if (x->free_symmetries < x->symmetries || whole < 3) return;
+  double dx = x->start[0] - q[0], dy = x->start[1] - q[1];
+  symmetry_rotate (x, x->start[2] - q[2], q, q, v);
+  for (int j = 0; j < 3 * x->s->bodies; j += 3) q[j] += dx, q[j + 1] += dy;
+}
+
+double pw_steady_distance (pw_steady *x, const double *q1, const double *v1, const double *q2, const double *v2) {
+  size_t bytes = (size_t)x->n * sizeof *q1;
+  double *a = x->q0, *va = x->v0, *b = x->dq, *vb = x->dv, most = 0;
+  memcpy (a, q1, bytes), memcpy (va, v1, bytes), memcpy (b, q2, bytes), memcpy (vb, v2, bytes);
+  pw_steady_canonical (x, a, va);
+  pw_steady_canonical (x, b, vb);
+  for (int j = 0; j < x->n; j++) {
+    double unit = pw_unit (x->s, j), off = (a[j] - b[j]) / unit, size = fmax (1, fabs (b[j] / unit));
+    if (j < 3 * x->s->bodies && j % 3 == 2) off = remainder (off, 2 * PW_PI), size = 1;
+    if (!x->cyclic[j]) most = pw_larger_or_nan (most, fabs (off) / size);
+    off = (va[j] - vb[j]) / unit * x->T;
+    most = pw_larger_or_nan (most, fabs (off) / fmax (1, fabs (vb[j] / unit * x->T)));
+  }
+  return most;
+}
+
+int pw_steady_same (pw_steady *x, const double *q1, const double *v1, const double *q2, const double *v2) {
+  return pw_steady_distance (x, q1, v1, q2, v2) <= SYMMETRY_SAME;
+}
