@@ -265,6 +265,9 @@ void pw_cli_print (FILE *f, const char *format, ...) PW_PRINTF (2, 3);
 /* Prints text broken into lines of `width` characters; the first line continues at column `indent`. */
 void pw_cli_wrap (const char *text, int indent, int width);
 
+/* The word for a status PW_OK to PW_METHOD in tables and summaries: "ok", "machine", "input", "start" or "method". */
+const char *pw_cli_status_word (int status);
+
 /* Prints an error, if there is one, as "pinwheel: TEXT" on standard error, without "pinwheel:" if TEXT begins with a
  * file and line; returns the exit status. */
 int pw_cli_end (const pw_error *error);

@@ -53,6 +53,11 @@ static int say_pipe_closed (void) {
   return poll (&out, 1, 0) == 1 && out.revents & POLLERR;
 }
 
+const char *pw_cli_status_word (int status) {
+  static const char *const word[] = { "ok", "machine", "input", "start", "method" };
+  return word[-status];
+}
+
 int pw_cli_end (const pw_error *error) {
   if (error->status == PW_OK) return 0;
   if (error->status == PW_RESOURCE && say_pipe_closed ()) return PW_CLOSED_PIPE;
