@@ -167,9 +167,9 @@ static int run_take_samples (run *x, pw_error *error) {
     status = pw_run_sample (x->r, pw_plots_next (x->plots), &sample, error);
     if (status == PW_OK) pw_plots_add (x->plots, &sample);
   }
-  while (status == PW_OK && pw_motion_next (&x->comparison.motion) <= now) {
-    status = pw_run_sample (x->r, pw_motion_next (&x->comparison.motion), &sample, error);
-    if (status == PW_OK) pw_motion_take (&x->comparison.motion, x->m.system, &sample);
+  while (status == PW_OK && pw_motion_next_time (&x->comparison.motion) <= now) {
+    status = pw_run_sample (x->r, pw_motion_next_time (&x->comparison.motion), &sample, error);
+    if (status == PW_OK) pw_motion_add (&x->comparison.motion, x->m.system, &sample);
   }
   return status;
 }
@@ -178,7 +178,7 @@ static int run_take_samples (run *x, pw_error *error) {
 static int run_batch (run *x, pw_error *error) {
   double due =
       fmin (fmin (run_next_row (x), x->plots ? pw_plots_next (x->plots) : INFINITY), fmin (x->check.due, x->t_end));
-  due = fmin (due, pw_motion_next (&x->comparison.motion));
+  due = fmin (due, pw_motion_next_time (&x->comparison.motion));
   double start = pw_cpu_clock ();
   int status;
   long n = 0;

@@ -156,7 +156,8 @@ static int journal_begin (pw_journal *journal, const pw_plan *plan, pw_error *er
 }
 
 int pw_journal_open (pw_journal *journal, const pw_plan *plan, const char *path, pw_error *error) {
-  *journal = (pw_journal){ .descriptor = -1, .rows = pw_plan_rows (plan) };
+  long rows = plan->grid.rows / plan->parts + (plan->grid.rows % plan->parts >= plan->part);
+  *journal = (pw_journal){ .descriptor = -1, .rows = rows };
   journal->table_path = pw_output_path (path, error);
   if (journal->table_path == NULL) return error->status;
   if (asprintf (&journal->part_path, "%s.part", journal->table_path) < 0) journal->part_path = NULL;

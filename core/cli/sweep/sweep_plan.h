@@ -46,11 +46,6 @@ typedef struct {
 int pw_plan_open (pw_plan *plan, const char **ranges, pw_error *error);
 void pw_plan_close (pw_plan *plan);
 
-/* The number of rows of the plan's part. */
-static inline long pw_plan_rows (const pw_plan *plan) {
-  return plan->grid.rows / plan->parts + (plan->grid.rows % plan->parts >= plan->part);
-}
-
 /* Builds and compiles the model of a row; compiled->file stays NULL.  Close it in every case.  May be called by several
  * threads at once. */
 int pw_plan_compile (const pw_plan *plan, long row, pw_cli_model *compiled, pw_error *error);
