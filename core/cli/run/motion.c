@@ -66,31 +66,6 @@ int pw_motion_unit (const pw_system *system, int state) {
   return (rate ? MOTION_SPEED : MOTION_LENGTH) + angle;
 }
 
-/* Raises a maximum.  Once it is NaN it remains so: the error is unknown at one time, and so its maximum is too. */
-static void motion_raise_largest (double *largest, double value) {
-  if (value > *largest || isnan (value)) *largest = value;
-}
-
-/* Errors of coordinates and velocities: NaN for a unit of which the reference has no value. */
-static void motion_states (const pw_system *system, const pw_motion *reference, const pw_motion *motion,
-                           double *error) {
-  int last = motion->samples - 1, known[MOTION_UNITS] = { 0 }, at_end[MOTION_UNITS] = { 0 };
-  for (int j = 0; j < 2 * pw_system_coordinates (system); j++) {
-    int unit = pw_motion_unit (system, j);
-    for (int k = 0; k < motion->samples; k++) {
-      double exact = pw_motion_at (reference, k)[j];
-      if (isnan (exact)) continue; /* not compared */
-      double difference = fabs (pw_motion_at (motion, k)[j] - exact);
-      motion_raise_largest (&error[MOTION_LARGEST + unit], difference), known[unit] = 1;
-      if (k == last) motion_raise_largest (&error[MOTION_END + unit], difference), at_end[unit] = 1;
-    }
-  }
-  for (int i = 0; i < MOTION_UNITS; i++) {
-    if (!known[i]) error[MOTION_LARGEST + i] = NAN;
-    if (!at_end[i]) error[MOTION_END + i] = NAN;
-  }
-}
-
 /* The largest |multiplier| of the constraint equations whose reaction has the same unit as that of this row, since forces
  * and moments cannot be compared with each other; 1 N or N m if all are zero or unknown. */
 static double motion_largest_multiplier (const pw_system *system, const pw_motion *reference, int row) {
@@ -102,32 +77,33 @@ static double motion_largest_multiplier (const pw_system *system, const pw_motio
   return largest > 0 ? largest : 1;
 }
 
-static void motion_multipliers (const pw_system *system, const pw_motion *reference, const pw_motion *motion,
-                                double *error) {
-  const char *unit = NULL; /* neighbours mostly have the same unit */
-  double largest = 1;
-  int jumps[MOTION_SAMPLES], compared = 0;
-  /* At a jump multipliers have two values, and methods differ in which one they report. */
-  for (int k = 0; k < motion->samples; k++) jumps[k] = pw_system_jumps (system, reference->t[k]);
-  for (int row = 0; row < pw_system_rows (system); row++) {
-    if (unit == NULL || strcmp (unit, pw_system_reaction_unit (system, row)) != 0) {
-      unit = pw_system_reaction_unit (system, row);
-      largest = motion_largest_multiplier (system, reference, row);
-    }
-    int j = 2 * pw_system_coordinates (system) + row;
-    for (int k = 0; k < motion->samples; k++) {
-      double exact = pw_motion_at (reference, k)[j];
-      if (isnan (exact) || jumps[k]) continue;
-      motion_raise_largest (&error[MOTION_MULTIPLIERS], fabs (pw_motion_at (motion, k)[j] - exact) / largest);
-      compared = 1;
-    }
-  }
-  if (!compared) error[MOTION_MULTIPLIERS] = NAN;
+/* Raises an error, NaN at first; one that is unknown at one time remains NaN, since it has no maximum. */
+static void motion_raise (double *error, int *compared, double difference) {
+  if (!*compared || difference > *error || isnan (difference)) *error = difference;
+  *compared = 1;
 }
 
 void pw_motion_distance (const pw_system *system, const pw_motion *reference, const pw_motion *motion,
                          double error[MOTION_ERRORS]) {
-  for (int i = 0; i < MOTION_ERRORS; i++) error[i] = 0;
-  motion_states (system, reference, motion, error);
-  motion_multipliers (system, reference, motion, error);
+  int states = 2 * pw_system_coordinates (system), last = motion->samples - 1;
+  int compared[MOTION_ERRORS] = { 0 }, jumps[MOTION_SAMPLES];
+  const char *unit = ""; /* of the last multiplier: neighbours mostly have the same */
+  double scale = 1;
+  for (int i = 0; i < MOTION_ERRORS; i++) error[i] = NAN;
+  for (int k = 0; k <= last; k++) jumps[k] = pw_system_jumps (system, reference->t[k]);
+  for (int j = 0; j < motion->width; j++) {
+    int is_state = j < states, end = is_state ? MOTION_END + pw_motion_unit (system, j) : 0;
+    int largest = is_state ? end + MOTION_LARGEST : MOTION_MULTIPLIERS;
+    if (!is_state && strcmp (unit, pw_system_reaction_unit (system, j - states)) != 0) {
+      unit = pw_system_reaction_unit (system, j - states);
+      scale = motion_largest_multiplier (system, reference, j - states);
+    }
+    for (int k = 0; k <= last; k++) {
+      double exact = pw_motion_at (reference, k)[j], difference = fabs (pw_motion_at (motion, k)[j] - exact) / scale;
+      /* at a jump multipliers have two values, and methods differ in which one they report */
+      if (isnan (exact) || (!is_state && jumps[k])) continue;
+      motion_raise (&error[largest], &compared[largest], difference);
+      if (is_state && k == last) motion_raise (&error[end], &compared[end], difference);
+    }
+  }
 }
