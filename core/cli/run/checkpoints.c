@@ -11,18 +11,14 @@
 /* keys of the fingerprint that are also read */
 static const char checkpoints_interval_key[] = "checkpoint-every", checkpoints_engine_key[] = "engine";
 
-/* The value of a key in the fingerprint of the checkpoint that is resumed, its size in *size; NULL if there is none. */
-static const char *checkpoints_value (const pw_checkpoints *checkpoints, const char *key, size_t *size) {
-  return pw_fingerprint_value (checkpoints->resumed.text, checkpoints->resumed.head_end, key, size);
-}
-
 /* ---- Before the run ---- */
 
 /* The interval of the checkpoint that is resumed. */
 static void checkpoints_read_interval (pw_checkpoints *checkpoints) {
   char text[40];
   size_t size;
-  const char *value = checkpoints_value (checkpoints, checkpoints_interval_key, &size);
+  const pw_checkpoint *resumed = &checkpoints->resumed;
+  const char *value = pw_fingerprint_value (resumed->text, resumed->head_end, checkpoints_interval_key, &size);
   if (value == NULL || size >= sizeof text) return;
   memcpy (text, value, size);
   text[size] = 0;
@@ -49,8 +45,9 @@ int pw_checkpoints_open (pw_run_cli *command, pw_specialise *specialise, pw_erro
   size_t size;
   int status = checkpoints_read_options (checkpoints, command->t_end, error);
   if (status == PW_OK && checkpoints->resume_path && *specialise == PW_SPECIALISE_AUTO) {
-    int is_specialised = checkpoints_value (checkpoints, checkpoints_engine_key, &size) != NULL;
-    *specialise = is_specialised ? PW_SPECIALISE_ALWAYS : PW_SPECIALISE_NEVER;
+    const pw_checkpoint *resumed = &checkpoints->resumed;
+    const char *engine = pw_fingerprint_value (resumed->text, resumed->head_end, checkpoints_engine_key, &size);
+    *specialise = engine ? PW_SPECIALISE_ALWAYS : PW_SPECIALISE_NEVER;
   }
   return status;
 }
@@ -134,8 +131,8 @@ void pw_checkpoints_close (pw_checkpoints *checkpoints) {
 
 /* ---- Saving and resuming ---- */
 
-/* The next checkpoint is due at the first multiple of the interval after t; after every step if t has 2^53 intervals, since
- * then n + 1 is n in double precision. */
+/* The next checkpoint is due at the first multiple of the interval after t; after every step if t has 2^53 intervals,
+ * since then n + 1 is n in double precision. */
 static void checkpoints_schedule (pw_checkpoints *checkpoints, double t) {
   if (checkpoints->interval == 0) return;
   double n = fmin (floor (t / checkpoints->interval), 0x1p53);
@@ -156,9 +153,9 @@ static void checkpoints_serialise (pw_run_cli *command, pw_archive *archive) {
 /* 1 if the checkpoint that was loaded lies within the run and has the rows up to its time. */
 static int checkpoints_plausible (const pw_run_cli *command) {
   double t = pw_run_time (command->run), rows = (double)command->rows, expected = rows;
+  double cpu = command->cpu;
   if (command->table && command->row_interval > 0) expected = floor (t / command->row_interval) + 1;
-  return t <= command->t_end && rows >= 0 && fabs (rows - expected) <= 1 && isfinite (command->cpu) &&
-         command->cpu >= 0;
+  return t <= command->t_end && rows >= 0 && fabs (rows - expected) <= 1 && isfinite (cpu) && cpu >= 0;
 }
 
 int pw_checkpoints_resume (pw_run_cli *command, pw_error *error) {

@@ -12,7 +12,7 @@ int pw_comparison_open (pw_comparison *comparison, const pw_cli_model *compiled,
         "computed\n");
     return PW_OK;
   }
-  int status = pw_motion_open_reference (&comparison->reference, compiled, path, &t_end, MOTION_ANY_ROWS, error);
+  int status = pw_motion_open_reference (&comparison->reference, compiled, path, &t_end, error);
   if (status != PW_OK) return status;
   return pw_motion_open_at (&comparison->motion, compiled->system, &comparison->reference, error);
 }

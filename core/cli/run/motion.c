@@ -55,8 +55,8 @@ static int motion_of_model (pw_motion *motion, const pw_cli_model *compiled, dou
 }
 
 int pw_motion_open_reference (pw_motion *motion, const pw_cli_model *compiled, const char *path, double *t_end,
-                              pw_motion_rows required, pw_error *error) {
-  return path ? pw_motion_read (motion, compiled->system, path, t_end, required, error)
+                              pw_error *error) {
+  return path ? pw_motion_read (motion, compiled->system, path, t_end, error)
               : motion_of_model (motion, compiled, *t_end, error);
 }
 
@@ -66,8 +66,8 @@ int pw_motion_unit (const pw_system *system, int state) {
   return (rate ? MOTION_SPEED : MOTION_LENGTH) + angle;
 }
 
-/* The largest |multiplier| of the constraint equations whose reaction has the same unit as that of this row, since forces
- * and moments cannot be compared with each other; 1 N or N m if all are zero or unknown. */
+/* The largest |multiplier| of the constraint equations whose reaction has the same unit as that of this row, since
+ * forces and moments cannot be compared with each other; 1 N or N m if all are zero or unknown. */
 static double motion_largest_multiplier (const pw_system *system, const pw_motion *reference, int row) {
   double largest = 0;
   for (int j = 0; j < pw_system_rows (system); j++)

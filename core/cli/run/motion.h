@@ -42,18 +42,14 @@ void pw_motion_distance (const pw_system *system, const pw_motion *reference, co
 /* The unit of a state: MOTION_LENGTH to MOTION_RATE. */
 int pw_motion_unit (const pw_system *system, int state);
 
-/* Whether a table must have a row at the final time. */
-typedef enum { MOTION_ANY_ROWS, MOTION_LAST_ROW } pw_motion_rows;
-
-/* Opens a reference, to be closed in every case: the table at `path`, or if it is NULL the model's own reference solution up
- * to *t_end. */
+/* Opens a reference, to be closed in every case: the table at `path`, or if it is NULL the model's own reference
+ * solution up to *t_end. */
 int pw_motion_open_reference (pw_motion *motion, const pw_cli_model *compiled, const char *path, double *t_end,
-                              pw_motion_rows required, pw_error *error);
+                              pw_error *error);
 
 /* Reads a table with columns as `pinwheel run -o` writes them: of its rows after t = 0 and up to *t_end, at most
  * MOTION_SAMPLES.  *t_end = 0 becomes the time of the last row.  Errors: PW_INPUT with the line, PW_RESOURCE. */
-int pw_motion_read (pw_motion *motion, const pw_system *system, const char *path, double *t_end,
-                    pw_motion_rows required, pw_error *error);
+int pw_motion_read (pw_motion *motion, const pw_system *system, const char *path, double *t_end, pw_error *error);
 
 /* ---- A run compared with a reference ---- */
 
@@ -62,8 +58,8 @@ typedef struct {
   pw_reference_error errors;
 } pw_comparison;
 
-/* Opens the reference of a run up to t_end: the table at `path`, otherwise the model's reference solution unless the run
- * has other initial values (`started`).  The run takes the samples of `motion`.  Close it in every case.  Errors: PW_INPUT,
+/* Opens the reference of a run up to t_end: the table at `path`, or the model's reference solution unless the run has
+ * other initial values (`started`).  The samples of the run go to `motion`.  Close it in every case.  Errors: PW_INPUT,
  * PW_RESOURCE. */
 int pw_comparison_open (pw_comparison *comparison, const pw_cli_model *compiled, const char *path, int started,
                         double t_end, pw_error *error);

@@ -1,4 +1,4 @@
-/* Reads a reference from a file: a table with the columns of `pinwheel run -o`, of which some may be missing or unknown. */
+/* Reads a reference from a file: a table with the columns of `pinwheel run -o`, some of which may be missing. */
 #include <errno.h>
 #include <math.h>
 #include <stdlib.h>
@@ -148,24 +148,10 @@ static int file_read_time (file_reader *reader, char **rest, double *t, pw_error
   return status;
 }
 
-/* Refuses a table without rows up to the final time, or whose last one is not at it if that is required. */
-static int file_check_end (const file_reader *reader, int rows, double last, double t_end, pw_motion_rows required,
-                           pw_error *error) {
-  char end[32], reached[32];
-  if (rows > 0 && (required == MOTION_ANY_ROWS || fabs (last - t_end) <= FILE_SAME * t_end)) return PW_OK;
-  pw_format (end, t_end, 9);
-  if (required == MOTION_ANY_ROWS)
-    return pw_fail (error, PW_INPUT, "--reference %s: no row between 0 and the final time, t = %s s", reader->path,
-                    end);
-  return pw_fail (error, PW_INPUT,
-                  "--reference %s: no row at the final time, t = %s s; the last one before it is at %s s", reader->path,
-                  end, pw_format (reached, last, 9));
-}
-
 /* Counts the rows after 0 and up to *t_end, which becomes the time of the last row if it is 0. */
-static int file_count_rows (file_reader *reader, double *t_end, pw_motion_rows required, int *rows, pw_error *error) {
+static int file_count_rows (file_reader *reader, double *t_end, int *rows, pw_error *error) {
   double t, last = 0, before = -INFINITY;
-  char *rest;
+  char *rest, end[32];
   int status;
   for (*rows = 0; (status = file_read_time (reader, &rest, &t, error)) == PW_OK;) {
     if (!(t > before) || isinf (t))
@@ -178,7 +164,9 @@ static int file_count_rows (file_reader *reader, double *t_end, pw_motion_rows r
   }
   if (status != PW_RETRY) return status;
   if (*t_end == 0) *t_end = last;
-  return file_check_end (reader, *rows, last, *t_end, required, error);
+  if (*rows > 0) return PW_OK;
+  return pw_fail (error, PW_INPUT, "--reference %s: no row between 0 and the final time, t = %s s", reader->path,
+                  pw_format (end, *t_end, 9));
 }
 
 /* Reads the cells after the time into a sample of `width` numbers; NaN where there is no column. */
@@ -211,10 +199,9 @@ static int file_read_samples (file_reader *reader, int rows, double t_end, pw_mo
 }
 
 /* Reads the file twice: rows are selected once their number is known. */
-static int file_read (file_reader *reader, pw_motion *motion, const pw_system *system, double *t_end,
-                      pw_motion_rows required, pw_error *error) {
+static int file_read (file_reader *reader, pw_motion *motion, const pw_system *system, double *t_end, pw_error *error) {
   int rows, status = file_read_columns (reader, system, error);
-  if (status == PW_OK) status = file_count_rows (reader, t_end, required, &rows, error);
+  if (status == PW_OK) status = file_count_rows (reader, t_end, &rows, error);
   if (status != PW_OK) return status;
   rewind (reader->f);
   reader->line_number = 0;
@@ -224,8 +211,7 @@ static int file_read (file_reader *reader, pw_motion *motion, const pw_system *s
   return status == PW_OK ? file_read_samples (reader, rows, *t_end, motion, error) : status;
 }
 
-int pw_motion_read (pw_motion *motion, const pw_system *system, const char *path, double *t_end,
-                    pw_motion_rows required, pw_error *error) {
+int pw_motion_read (pw_motion *motion, const pw_system *system, const char *path, double *t_end, pw_error *error) {
   const char *why;
   file_reader reader = { .path = path, .f = pw_open_input (path, &why), .line = malloc (FILE_LINE + 1) };
   int status = PW_OK;
@@ -233,7 +219,7 @@ int pw_motion_read (pw_motion *motion, const pw_system *system, const char *path
     status = pw_fail (error, pw_open_input_status (), "--reference %s: cannot be read: %s", path, why);
   else if (reader.line == NULL)
     status = pw_fail (error, PW_RESOURCE, "--reference %s: out of memory", path);
-  if (status == PW_OK) status = file_read (&reader, motion, system, t_end, required, error);
+  if (status == PW_OK) status = file_read (&reader, motion, system, t_end, error);
   if (status == PW_RETRY) status = file_unreadable (&reader, "another program has changed it", error);
   if (reader.f) fclose (reader.f);
   free (reader.line);

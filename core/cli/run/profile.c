@@ -27,24 +27,24 @@ static void profile_counts (pw_table *table, const char *name, int elements, int
   for (int i = 0; i < 3; i++) pw_cell_number (table, 7, count[i], 15);
 }
 
-static void profile_kind (pw_table *table, const pw_profile_kind *kind_profile, double whole) {
-  int rows = kind_profile->elements * kind_profile->kind->rows;
-  double sum = kind_profile->signals + kind_profile->constraints + kind_profile->force;
-  profile_counts (table, kind_profile->kind->name, kind_profile->elements, rows,
-                  rows + kind_profile->elements * kind_profile->kind->internal);
-  profile_cell (table, kind_profile->kind->signals > 0 ? kind_profile->signals : NAN);
-  profile_cell (table, rows > 0 ? kind_profile->constraints : NAN);
-  profile_cell (table, kind_profile->kind->force && !kind_profile->kind->constant ? kind_profile->force : NAN);
+static void profile_kind (pw_table *table, const pw_profile_kind *cost, double evaluation) {
+  const pw_kind *kind = cost->kind;
+  int rows = cost->elements * kind->rows;
+  double sum = cost->signals + cost->constraints + cost->force;
+  profile_counts (table, kind->name, cost->elements, rows, rows + cost->elements * kind->internal);
+  profile_cell (table, kind->signals > 0 ? cost->signals : NAN);
+  profile_cell (table, rows > 0 ? cost->constraints : NAN);
+  profile_cell (table, kind->force && !kind->constant ? cost->force : NAN);
   profile_cell (table, sum);
-  profile_share (table, sum, whole);
-  if (kind_profile->kind->g) profile_cell (table, kind_profile->positions);
+  profile_share (table, sum, evaluation);
+  if (kind->g) profile_cell (table, cost->positions);
   pw_row_end (table);
 }
 
-static void profile_kinds (const pw_profile *profile, int bodies, FILE *out) {
+static void profile_kinds (const pw_profile *profile, int bodies, FILE *f) {
   static const char *const head[] = { "type",  "elements", "rows",  "unknowns", "signals", "J, gamma",
                                       "force", "sum",      "share", "g",        NULL };
-  for (pw_table table = { .f = out }; pw_table_pass (&table);) {
+  for (pw_table table = { .f = f }; pw_table_pass (&table);) {
     profile_head (&table, head);
     profile_counts (&table, "(bodies)", bodies, 0, 3 * bodies);
     for (int i = 0; i < 3; i++) pw_cell (&table, 8, "");
@@ -55,20 +55,19 @@ static void profile_kinds (const pw_profile *profile, int bodies, FILE *out) {
   }
 }
 
-/* A row of the stages, omitted unless its time is positive: the time of a stage, how often a step has it; and of which
- * times of an evaluation and a step the shares are, 0: their columns are empty. */
-static void profile_stage (pw_table *table, const char *name, double ns, double per_step, double evaluation,
-                           double step) {
+/* A row of the stages, omitted unless its time is positive: the time of a stage, how often a step has it.  `whole`,
+ * `step`: the times of an evaluation and of a step, for the shares; 0 leaves their columns empty. */
+static void profile_stage (pw_table *table, const char *name, double ns, double per_step, double whole, double step) {
   if (!(ns > 0)) return;
   pw_cell (table, -14, name);
-  profile_cell (table, evaluation > 0 ? ns : NAN);
-  profile_share (table, ns, evaluation);
+  profile_cell (table, whole > 0 ? ns : NAN);
+  profile_share (table, ns, whole);
   if (step > 0) profile_cell (table, ns * per_step);
   if (step > 0) profile_share (table, ns * per_step, step);
   pw_row_end (table);
 }
 
-static void profile_stages (const pw_profile *profile, FILE *out) {
+static void profile_stages (const pw_profile *profile, FILE *f) {
   static const char *const head[] = { "stage", "per evaluation", "share", "per step", "share", NULL },
                            *const no_steps[] = { "stage", "per evaluation", "share", NULL };
   const struct {
@@ -78,8 +77,8 @@ static void profile_stages (const pw_profile *profile, FILE *out) {
                 { "stabilisation", profile->stabilisation }, { "factorisation", profile->factorisation },
                 { "solution", profile->solution },           { "together", profile->evaluation } };
   double step = profile->evaluations * profile->evaluation + profile->projections * profile->projection;
-  fputc ('\n', out);
-  for (pw_table table = { .f = out }; pw_table_pass (&table);) {
+  fputc ('\n', f);
+  for (pw_table table = { .f = f }; pw_table_pass (&table);) {
     profile_head (&table, step > 0 ? head : no_steps);
     for (size_t i = 0; i < sizeof stage / sizeof *stage; i++)
       profile_stage (&table, stage[i].name, stage[i].ns, profile->evaluations, profile->evaluation, step);
@@ -88,29 +87,28 @@ static void profile_stages (const pw_profile *profile, FILE *out) {
   }
 }
 
-static void profile_print (const pw_system *system, const pw_run *run, const pw_profile *profile, double cpu,
-                           FILE *out) {
+static void profile_print (const pw_system *system, const pw_run *run, const pw_profile *profile, double cpu, FILE *f) {
   char t[32], evaluations[32], iterations[32];
   double steps = (double)pw_run_statistics (run)->steps;
-  fprintf (out, "\n  what an evaluation of the accelerations costs at t = %s s [ns]\n\n",
+  fprintf (f, "\n  what an evaluation of the accelerations costs at t = %s s [ns]\n\n",
            pw_format (t, pw_run_time (run), 8));
-  profile_kinds (profile, pw_system_bodies (system), out);
-  profile_stages (profile, out);
+  profile_kinds (profile, pw_system_bodies (system), f);
+  profile_stages (profile, f);
   if (steps == 0) return;
   pw_format (evaluations, (double)pw_run_statistics (run)->rhs / steps, 3);
   pw_format (iterations, profile->iterations, 2);
-  fprintf (out, "\n  a step of the run took %.0f ns, %s evaluations%s", 1e9 * cpu / steps, evaluations,
+  fprintf (f, "\n  a step of the run took %.0f ns, %s evaluations%s", 1e9 * cpu / steps, evaluations,
            profile->evaluations > 0 ? "" : " of residuals, and matrices of the method's own");
   if (profile->projections > 0)
-    fprintf (out, " (that after a projection is part of it), %s iterations to project", iterations);
-  fprintf (out, "\n");
+    fprintf (f, " (that after a projection is part of it), %s iterations to project", iterations);
+  fprintf (f, "\n");
 }
 
-int pw_print_profile (const pw_system *system, pw_run *run, double cpu, FILE *out, pw_error *error) {
+int pw_print_profile (const pw_system *system, pw_run *run, double cpu, FILE *f, pw_error *error) {
   pw_profile profile;
   int status = pw_run_profile (run, &profile, error);
-  if (status == PW_OK) profile_print (system, run, &profile, cpu, out);
-  if (status == PW_RETRY) fprintf (out, "\n  no profile: the run ended in a singular configuration\n");
+  if (status == PW_OK) profile_print (system, run, &profile, cpu, f);
+  if (status == PW_RETRY) fprintf (f, "\n  no profile: the run ended in a singular configuration\n");
   pw_profile_free (&profile);
   return status == PW_RETRY ? PW_OK : status;
 }

@@ -19,12 +19,11 @@ enum { RUN_BATCH = 4096 }; /* steps of a batch, at most */
 /* Refuses files used twice: called before the model is open, and again with the tables that it reads. */
 static int run_check_paths (pw_run_cli *command, pw_error *error) {
   const pw_checkpoints *checkpoints = &command->checkpoints;
-  int same_file =
-      checkpoints->resume_path && checkpoints->path && strcmp (checkpoints->resume_path, checkpoints->path) == 0;
+  const char *resumed = checkpoints->resume_path;
+  if (resumed && checkpoints->path && strcmp (resumed, checkpoints->path) == 0) resumed = NULL; /* the same file */
   pw_use use[] = { PW_CLI_MODEL_USE,
                    { "--reference", command->reference_path, PW_READS, NULL },
-                   { "--resume", same_file ? NULL : checkpoints->resume_path, checkpoints->path ? PW_READS : PW_WRITES,
-                     NULL },
+                   { "--resume", resumed, checkpoints->path ? PW_READS : PW_WRITES, NULL },
                    { "--checkpoint", checkpoints->path, PW_WRITES, NULL },
                    { "-o", command->table_path, PW_WRITES, NULL },
                    { "--json", command->summary_path, PW_WRITES, NULL },
@@ -48,11 +47,10 @@ static int run_open_outputs (pw_run_cli *command, pw_error *error) {
   if (ending && strcmp (ending, ".npz") == 0 && (command->checkpoints.path || command->checkpoints.resume_path))
     return pw_fail (error, PW_INPUT, "-o %s: an .npz archive cannot be continued after a checkpoint: write a .csv",
                     command->table_path);
+  int has_plots = command->plots_path != NULL;
   int status = pw_cli_only ("--every", command->row_interval_text, "-o FILE", command->table_path != NULL, error);
-  if (status == PW_OK)
-    status = pw_cli_only ("--width", command->line.width, "--plots DIR", command->plots_path != NULL, error);
-  if (status == PW_OK)
-    status = pw_cli_only ("--colour", command->colour, "--plots DIR", command->plots_path != NULL, error);
+  if (status == PW_OK) status = pw_cli_only ("--width", command->line.width, "--plots DIR", has_plots, error);
+  if (status == PW_OK) status = pw_cli_only ("--colour", command->colour, "--plots DIR", has_plots, error);
   if (status == PW_OK && command->page_path) status = pw_animation_check ("--animate", command->page_path, error);
   if (status == PW_OK) status = run_check_paths (command, error);
   if (status == PW_OK) status = run_open_output (command, PW_RUN_SUMMARY, &command->summary_path, error);
@@ -104,8 +102,8 @@ static int run_choose_engine (pw_run_cli *command, pw_error *error) {
   int status = pw_cli_specialise (command->line.specialise, &when, error);
   if (status == PW_OK) status = pw_checkpoints_open (command, &when, error);
   if (status != PW_OK) return status;
-  int general =
-      command->profile && when == PW_SPECIALISE_AUTO; /* the stages of --profile are those of the general engine */
+  /* the stages of --profile are those of the general engine */
+  int general = command->profile && when == PW_SPECIALISE_AUTO;
   pw_cli_engine_open (&command->engine, command->compiled.system, general ? PW_SPECIALISE_NEVER : when,
                       pw_method_steps (command->method, &command->settings, defaults.step, command->t_end));
   if (general) strcpy (command->engine.why, "--profile");
@@ -116,9 +114,8 @@ static int run_choose_engine (pw_run_cli *command, pw_error *error) {
 /* Why the general engine was used; "": it was not. */
 static const char *run_general_reason (const pw_run_cli *command) {
   if (command->engine.code == NULL) return command->engine.why;
-  return pw_run_statistics (command->run)->specialised
-             ? ""
-             : "the method, its options or redundant drives do not permit specialised code";
+  if (pw_run_statistics (command->run)->specialised) return "";
+  return "the method, its options or redundant drives do not permit specialised code";
 }
 
 static int run_open (pw_run_cli *command, pw_error *error) {
@@ -153,15 +150,14 @@ static int run_open (pw_run_cli *command, pw_error *error) {
 
 /* ---- The run ---- */
 
-/* The time of the next row [s], which is a multiple of the interval, or the end if it differs from that by round-off only;
- * 0 if a row is due after every step. */
+/* The time of the next row [s]: a multiple of the interval, or the end if it differs from that by round-off only; 0 if a
+ * row is due after every step. */
 static double run_next_row_time (const pw_run_cli *command) {
   if (command->table == NULL) return INFINITY;
   if (command->row_interval == 0) return 0;
   double t = (double)command->rows * command->row_interval;
-  return fabs (t - command->t_end) <= fmax (1e-9 * command->row_interval, 4 * DBL_EPSILON * command->t_end)
-             ? command->t_end
-             : t;
+  double round_off = fmax (1e-9 * command->row_interval, 4 * DBL_EPSILON * command->t_end);
+  return fabs (t - command->t_end) <= round_off ? command->t_end : t;
 }
 
 /* Writes rows and stores samples up to the time reached. */
@@ -222,11 +218,15 @@ static int run_steps (pw_run_cli *command, pw_error *error) {
   return status;
 }
 
+static int run_is_stdout (const char *path) {
+  return path && strcmp (path, "-") == 0;
+}
+
 static int run_integrate (pw_run_cli *command, pw_error *error) {
-  int table_on_screen = command->table_path && strcmp (command->table_path, "-") == 0;
   command->batch = 1;
   pw_stop_catch ();
-  pw_progress_start (&command->progress, pw_file_name (command->compiled.file), command->t_end, !table_on_screen);
+  pw_progress_start (&command->progress, pw_file_name (command->compiled.file), command->t_end,
+                     !run_is_stdout (command->table_path));
   command->progress.from = pw_run_time (command->run);
   int status = run_steps (command, error);
   pw_progress_end (&command->progress);
@@ -277,8 +277,8 @@ static void run_write_json (pw_run_cli *command, const pw_summary *summary, cons
   run_add_error (error, &write_error);
 }
 
-/* Gives table, summary and page their final names together; after a failure to write they all keep their temporary ones.
- * The summary of a failed run reports that the table is incomplete. */
+/* Gives table, summary and page their final names together; after a failure to write all keep their temporary ones.  The
+ * summary of a failed run reports that the table is incomplete. */
 static void run_name_files (pw_run_cli *command, pw_error *error) {
   pw_error finish_error = { 0 };
   for (int i = 0; command->write_failed && i < PW_RUN_OUTPUTS; i++) {
@@ -319,12 +319,6 @@ static void run_finish_figures (pw_run_cli *command, const char *reason, pw_erro
   run_add_error (error, &draw_error);
 }
 
-/* 1 if an output file is standard output. */
-static int run_prints_file (const pw_run_cli *command) {
-  return (command->table_path && strcmp (command->table_path, "-") == 0) ||
-         (command->summary_path && strcmp (command->summary_path, "-") == 0);
-}
-
 /* Everything after the last step, however it came about: table, summary, figures, messages.  Returns the exit status. */
 static int run_finish (pw_run_cli *command, pw_error *error) {
   const pw_system *system = command->compiled.system;
@@ -332,6 +326,7 @@ static int run_finish (pw_run_cli *command, pw_error *error) {
   static const char *const output_name[PW_RUN_OUTPUTS] = { "the table so far", "the page", "the summary" };
   char reason[80] = "", t[32];
   int interrupted = error->status == PW_OK && pw_stop;
+  int prints_file = run_is_stdout (command->table_path) || run_is_stdout (command->summary_path);
   pw_sample sample, *last = NULL;
   if (run && pw_run_sample (run, pw_run_time (run), &sample, NULL) == PW_OK) last = &sample;
   run_close_table (command, error->status == PW_OK && !interrupted, error);
@@ -346,7 +341,7 @@ static int run_finish (pw_run_cli *command, pw_error *error) {
   run_finish_figures (command, summary.reason, error);
   run_name_files (command, error);
   if (command->profile && last && error->status == PW_OK && !interrupted)
-    pw_print_profile (system, run, command->cpu, run_prints_file (command) ? stderr : stdout, error);
+    pw_print_profile (system, run, command->cpu, prints_file ? stderr : stdout, error);
   if (interrupted) pw_cli_say ("pinwheel: %s\n", reason);
   int status = pw_cli_end (error);
   error->status = PW_OK;

@@ -51,7 +51,7 @@ static const char *compare_ladder_name (const pw_row *row) {
 }
 
 static const char *compare_upper_bounds (const pw_row *row) {
-  return row->upper_bound_names;
+  return row->bound_names;
 }
 
 static const pw_study_column compare_columns[] = {
@@ -85,8 +85,8 @@ static const pw_study_column compare_columns[] = {
   { .name = "repeats" },
 };
 
-/* Coordinates of a row's point in the figures. */
-enum { POINT_LEVEL, POINT_CPU, POINT_RHS, POINT_LENGTH, POINT_ANGLE };
+/* Coordinates of a row's point in the figures; the last two are errors. */
+enum { POINT_LEVEL, POINT_CPU, POINT_RHS, POINT_LENGTH, POINT_ANGLE, POINT_COORDINATES };
 
 /* ---- Ladders: the tolerances or step sizes of a method ---- */
 
@@ -170,8 +170,7 @@ static void compare_set_errors (const pw_compare *compare, const pw_motion *moti
     if (!(error[i] <= reference->uncertainty[i])) continue;
     error[i] = reference->uncertainty[i];
     row->upper_bounds |= 1u << (COLUMN_ERROR + i);
-    strcat (strcat (row->upper_bound_names, *row->upper_bound_names ? " " : ""),
-            compare_columns[COLUMN_ERROR + i].name);
+    strcat (strcat (row->bound_names, *row->bound_names ? " " : ""), compare_columns[COLUMN_ERROR + i].name);
   }
 }
 
@@ -267,11 +266,8 @@ static int compare_measure (pw_study *study, pw_row *row, pw_error *error) {
   row->value[COLUMN_BALANCE] = row->balance;
   row->value[COLUMN_CPU] = row->cpu;
   const double *largest = &row->value[COLUMN_ERROR + MOTION_LARGEST];
-  const double point[STUDY_COORDINATES] = { [POINT_LEVEL] = row->level,
-                                            [POINT_CPU] = row->cpu,
-                                            [POINT_RHS] = (double)row->statistics.rhs,
-                                            [POINT_LENGTH] = largest[MOTION_LENGTH],
-                                            [POINT_ANGLE] = largest[MOTION_ANGLE] };
+  const double point[] = { row->level, row->cpu, (double)row->statistics.rhs, largest[MOTION_LENGTH],
+                           largest[MOTION_ANGLE] };
   if (row->state == ROW_DONE) memcpy (row->point, point, sizeof point);
   return status;
 }
@@ -305,7 +301,7 @@ static int compare_figures (pw_study *study, pw_error *error) {
   int status = pw_study_write_data (study, COMPARE_GROUP, name[0],
                                     "tolerance or step, CPU time [s], right-hand side evaluations, largest error of "
                                     "lengths [m] and angles [rad]",
-                                    STUDY_COORDINATES, error);
+                                    POINT_COORDINATES, error);
   for (int unit = 0; status == PW_OK && unit < 2; unit++) {
     char variables[100];
     snprintf (variables, sizeof variables, "uncertainty = %.9g\nsize_of_motion = %.9g\n",

@@ -174,7 +174,7 @@ static int drift_plan (pw_study *study, pw_error *error) {
 /* ---- Runs ---- */
 
 typedef struct {
-  pw_study_visitor base;
+  pw_visitor base;
   double first_half[DRIFT_QUANTITIES]; /* largest values up to t_end / 2 */
 } drift_visitor;
 
@@ -190,7 +190,7 @@ static int drift_part (const pw_study *study, double t) {
 }
 
 /* Called after every accepted step: samples inside a step of a method with projection show no drift. */
-static int drift_visit (pw_study_visitor *visitor, pw_run *run, pw_error *error) {
+static int drift_visit (pw_visitor *visitor, pw_run *run, pw_error *error) {
   pw_row *row = visitor->row;
   pw_sample sample;
   int status = pw_run_sample (run, pw_run_time (run), &sample, error);

@@ -13,12 +13,12 @@
 /* ---- Runs ---- */
 
 typedef struct {
-  pw_study_visitor base;
+  pw_visitor base;
   pw_motion *motion;
 } sampler;
 
 /* Stores the samples up to the time reached. */
-static int sampler_visit (pw_study_visitor *visitor, pw_run *run, pw_error *error) {
+static int sampler_visit (pw_visitor *visitor, pw_run *run, pw_error *error) {
   pw_motion *motion = ((sampler *)visitor)->motion;
   pw_sample sample;
   while ((visitor->due = pw_motion_next_time (motion)) <= pw_run_time (run)) {
@@ -123,36 +123,33 @@ static int reference_same_integrator (const reference_candidate *a, const refere
   return strncmp (a->row.method, b->row.method, n + 1) == 0;
 }
 
-/* The two candidates with the smallest distance, with different integrators if possible; 0 if fewer than two have
- * finished. */
+/* The two candidates with the smallest distance, with different integrators if possible; 0 if there are none. */
 static int reference_pair (const pw_system *system, const reference_candidate *candidates, int *first, int *second) {
   double least = INFINITY;
-  int least_same = 2; /* as `same`, of the pair found; no pair yet */
-  for (int i = 0; i < REFERENCE_CANDIDATES; i++)
-    for (int j = i + 1; j < REFERENCE_CANDIDATES; j++) {
-      const reference_candidate *a = &candidates[i], *b = &candidates[j];
-      if (!a->finished || !b->finished) continue;
-      int same = reference_same_integrator (a, b);
-      double distance = reference_distance (system, &a->motion, &b->motion);
-      if (!isfinite (distance) || same > least_same || (same == least_same && distance >= least)) continue;
-      least = distance, least_same = same, *first = i, *second = j;
-    }
-  return least_same < 2;
+  for (int same = 0; same < 2 && isinf (least); same++)
+    for (int i = 0; i < REFERENCE_CANDIDATES; i++)
+      for (int j = i + 1; j < REFERENCE_CANDIDATES; j++) {
+        const reference_candidate *a = &candidates[i], *b = &candidates[j];
+        if (!a->finished || !b->finished || reference_same_integrator (a, b) != same) continue;
+        double distance = reference_distance (system, &a->motion, &b->motion);
+        if (distance < least) least = distance, *first = i, *second = j;
+      }
+  return isfinite (least);
 }
 
 static void reference_add_partner (pw_reference *reference, const pw_system *system, const reference_candidate *best,
                                    const reference_candidate *partner) {
   int i = reference->partners++;
-  reference_name (partner, reference->partner[i].description, sizeof reference->partner[i].description);
+  reference_name (partner, reference->partner[i].name, sizeof reference->partner[i].name);
   pw_motion_distance (system, &best->motion, &partner->motion, reference->partner[i].error);
 }
 
 /* Selects the reference: the first of the two candidates that agree best.  The second is its first partner. */
 static void reference_choose (pw_reference *reference, const pw_system *system, reference_candidate *candidates) {
-  int best, second;
+  int best = -1, second = -1;
   if (!reference_pair (system, candidates, &best, &second)) return;
   reference->known = 1;
-  reference_name (&candidates[best], reference->description, sizeof reference->description);
+  reference_name (&candidates[best], reference->name, sizeof reference->name);
   reference_add_partner (reference, system, &candidates[best], &candidates[second]);
   memcpy (reference->uncertainty, reference->partner[0].error, sizeof reference->uncertainty);
   for (int i = 0; i < REFERENCE_CANDIDATES; i++)
@@ -182,14 +179,19 @@ static int reference_compute (pw_reference *reference, pw_study *study, double s
 
 int pw_reference_find (pw_reference *reference, pw_study *study, double step, pw_error *error) {
   const char *path = study->reference_path;
+  char end[32], reached[32];
   double t_end = path && study->line.t_end == NULL ? 0 : study->t_end; /* 0: that of the table */
   /* the model's solution holds only for its own initial values */
   if (path == NULL && (study->line.starts || !pw_system_has_reference (study->compiled.model)))
     return reference_compute (reference, study, step, error);
-  int status = pw_motion_open_reference (&reference->motion, &study->compiled, path, &t_end, MOTION_LAST_ROW, error);
+  int status = pw_motion_open_reference (&reference->motion, &study->compiled, path, &t_end, error);
   if (status != PW_OK) return status;
-  snprintf (reference->description, sizeof reference->description, "%s",
-            path ? path : "the exact solution of the model");
+  double last = reference->motion.t[reference->motion.samples - 1];
+  if (last < t_end)
+    return pw_fail (error, PW_INPUT,
+                    "--reference %s: no row at the final time, t = %s s; the last one before it is at %s s", path,
+                    pw_format (end, t_end, 9), pw_format (reached, last, 9));
+  snprintf (reference->name, sizeof reference->name, "%s", path ? path : "the exact solution of the model");
   study->t_end = t_end;
   reference->known = 1;
   reference->from_table = path != NULL;
@@ -204,10 +206,10 @@ void pw_reference_print (const pw_reference *reference, int partners) {
     puts ("no two methods reach the end, so errors are unknown; --reference FILE.csv provides a reference\n");
     return;
   }
-  pw_cli_print (stdout, "errors are measured against %s%s\n", reference->description,
+  pw_cli_print (stdout, "errors are measured against %s%s\n", reference->name,
                 reference->from_table ? ", as if it were exact" : "");
   for (int i = 0; i < partners && i < reference->partners; i++)
-    printf ("  %s agrees with it to %.1e m, %.1e rad%s\n", reference->partner[i].description,
+    printf ("  %s agrees with it to %.1e m, %.1e rad%s\n", reference->partner[i].name,
             reference->partner[i].error[MOTION_LARGEST + MOTION_LENGTH],
             reference->partner[i].error[MOTION_LARGEST + MOTION_ANGLE],
             i == 0 ? ": the uncertainty of the reference" : "");
@@ -224,8 +226,8 @@ int pw_reference_write (const pw_reference *reference, const char *folder, const
   for (int k = 0; k < MOTION_ERRORS; k++) pw_text_name (&line, error_columns[k].name, error_columns[k].unit);
   int status = pw_text_line (&line, f, folder, error);
   for (int i = -1; status == PW_OK && reference->known && i < reference->partners; i++) {
-    pw_text_quoted (&line, reference->description);
-    pw_text_quoted (&line, i < 0 ? "uncertainty" : reference->partner[i].description);
+    pw_text_quoted (&line, reference->name);
+    pw_text_quoted (&line, i < 0 ? "uncertainty" : reference->partner[i].name);
     for (int k = 0; k < MOTION_ERRORS; k++)
       pw_text_number (&line, i < 0 ? reference->uncertainty[k] : reference->partner[i].error[k]);
     status = pw_text_line (&line, f, folder, error);

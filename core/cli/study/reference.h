@@ -14,10 +14,10 @@ typedef struct {
   int from_table;
   double uncertainty[MOTION_ERRORS]; /* 0 where nothing is compared */
   double size[MOTION_UNITS];         /* largest coordinate or velocity */
-  char description[300];             /* "erk8+projection, rtol 3e-14" or the file's name */
+  char name[300];                    /* "erk8+projection, rtol 3e-14" or the file's name */
   int partners;                      /* other computed solutions, and their errors relative to this one */
   struct {
-    char description[100];
+    char name[100];
     double error[MOTION_ERRORS];
   } partner[REFERENCE_CANDIDATES - 1];
 } pw_reference;

@@ -25,11 +25,17 @@ static int methods_add (pw_study *study, const char *name, pw_error *error) {
   return PW_OK;
 }
 
-/* Adds an integrator, or all of them (NULL), with a stabilisation, or all of them (NULL). */
-static int methods_add_all (pw_study *study, const pw_method *integrator, const char *stabilisation, pw_error *error) {
-  char name[STUDY_NAME];
+/* Adds the methods of "all", "INTEGRATOR+all", "all+STABILISATION", or a method. */
+static int methods_add_pattern (pw_study *study, char *pattern, pw_error *error) {
+  char name[STUDY_NAME], *plus = pattern + strcspn (pattern, "+:");
+  int any_integrator = strncmp (pattern, "all+", 4) == 0 || strcmp (pattern, "all") == 0;
+  const char *stabilisation = any_integrator && *plus && strcmp (plus, "+all") != 0 ? plus + 1 : NULL; /* NULL: all */
+  const pw_method *integrator = NULL;                                                                  /* NULL: all */
   pw_nearest near = { .sought = stabilisation };
-  int status = PW_OK, found = 0;
+  int index, status = PW_OK, found = 0;
+  if (!any_integrator && strcmp (plus, "+all") != 0) return methods_add (study, pattern, error);
+  *plus = 0;
+  if (!any_integrator) status = pw_method_parse (pattern, &integrator, &index, error);
   for (int i = 0; pw_methods[i]; i++)
     for (const pw_stabilisation *s = pw_methods[i]->stabilisations; status == PW_OK && s->name; s++) {
       if (integrator && integrator != pw_methods[i]) continue;
@@ -42,20 +48,6 @@ static int methods_add_all (pw_study *study, const pw_method *integrator, const 
   if (status != PW_OK || found) return status;
   return pw_fail (error, PW_INPUT, "--methods all+%.60s: no integrator has this stabilisation%s", stabilisation,
                   pw_nearest_text (&near));
-}
-
-/* Adds the methods of "all", "INTEGRATOR+all", "all+STABILISATION", or a method. */
-static int methods_add_pattern (pw_study *study, char *pattern, pw_error *error) {
-  const pw_method *integrator;
-  int stabilisation;
-  char *plus = pattern + strcspn (pattern, "+:");
-  if (strcmp (pattern, "all") == 0 || strcmp (pattern, "all+all") == 0)
-    return methods_add_all (study, NULL, NULL, error);
-  if (strncmp (pattern, "all+", 4) == 0) return methods_add_all (study, NULL, pattern + 4, error);
-  if (strcmp (plus, "+all") != 0) return methods_add (study, pattern, error);
-  *plus = 0;
-  int status = pw_method_parse (pattern, &integrator, &stabilisation, error);
-  return status == PW_OK ? methods_add_all (study, integrator, NULL, error) : status;
 }
 
 int pw_study_read_methods (pw_study *study, const char *text, pw_error *error) {
@@ -87,6 +79,7 @@ pw_row *pw_study_add (pw_study *study, int group, int curve, const char *method,
   row += study->rows++;
   *row = (pw_row){ .group = group, .curve = curve, .points = points, .point = point };
   snprintf (row->method, sizeof row->method, "%s", method);
+  snprintf (row->label, sizeof row->label, "%s", method);
   for (int i = 0; i < STUDY_COLUMNS; i++) row->value[i] = NAN;
   for (int k = 0; k < points; k++)
     for (int i = 0; i < STUDY_COORDINATES; i++) row->point[k][i] = NAN;
@@ -107,7 +100,7 @@ void pw_study_progress (pw_study *study, pw_row *row, double part) {
 }
 
 /* Advances to the end in batches of steps, so that clocks are read rarely. */
-static int study_steps (pw_study *study, pw_row *row, pw_run *run, const pw_limit *limit, pw_study_visitor *visitor,
+static int study_steps (pw_study *study, pw_row *row, pw_run *run, const pw_limit *limit, pw_visitor *visitor,
                         pw_error *error) {
   int status = PW_OK;
   long batch = STUDY_FIRST_BATCH;
@@ -133,8 +126,7 @@ static int study_steps (pw_study *study, pw_row *row, pw_run *run, const pw_limi
   return status;
 }
 
-int pw_study_run (pw_study *study, pw_row *row, const pw_settings *settings, pw_study_visitor *visitor,
-                  pw_error *error) {
+int pw_study_run (pw_study *study, pw_row *row, const pw_settings *settings, pw_visitor *visitor, pw_error *error) {
   pw_settings run_settings = *settings;
   pw_limit limit = study->limit;
   row->cpu = 0;

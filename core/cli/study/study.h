@@ -22,25 +22,25 @@ typedef enum { ROW_DONE, ROW_FAILED, ROW_REFUSED, ROW_STOPPED, ROW_SKIPPED } pw_
 
 typedef struct {
   char method[STUDY_NAME]; /* with options */
-  char label[STUDY_NAME];  /* of its curve in the figure; "": the method */
+  char label[STUDY_NAME];  /* of its curve in the figure: at first the method */
   int group;               /* of rows in the table; each has a figure */
   int curve;               /* of the group's figure that has its points */
   int adaptive;            /* 1: the step size follows a tolerance */
   double level;            /* of compare: tolerance, or step size [s] */
   int coarser_levels;      /* number of rows of its method before it */
   pw_row_state state;
-  int measured;                       /* 1: all is known */
-  int runs;                           /* finished */
-  double progress;                    /* part of its runs that is done, 0 to 1 */
-  double t;                           /* time reached [s] */
-  double cpu;                         /* of the last run [s] */
-  double balance;                     /* largest |energy balance| of the samples [J] */
-  pw_statistics statistics;           /* of the last run */
-  char reason[500];                   /* of a failure */
-  double value[STUDY_COLUMNS];        /* NaN: unknown */
-  unsigned upper_bounds;              /* bit i: value i is an upper bound */
-  char upper_bound_names[STUDY_NAME]; /* columns of these values */
-  int points;                         /* number of points in the figure; undefined ones are NaN */
+  int measured;                 /* 1: all is known */
+  int runs;                     /* finished */
+  double progress;              /* part of its runs that is done, 0 to 1 */
+  double t;                     /* time reached [s] */
+  double cpu;                   /* of the last run [s] */
+  double balance;               /* largest |energy balance| of the samples [J] */
+  pw_statistics statistics;     /* of the last run */
+  char reason[500];             /* of a failure */
+  double value[STUDY_COLUMNS];  /* NaN: unknown */
+  unsigned upper_bounds;        /* bit i: value i is an upper bound */
+  char bound_names[STUDY_NAME]; /* columns of these values */
+  int points;                   /* number of points in the figure; undefined ones are NaN */
   double (*point)[STUDY_COORDINATES];
 } pw_row;
 
@@ -132,17 +132,16 @@ int pw_study_read_methods (pw_study *study, const char *text, pw_error *error);
 pw_row *pw_study_add (pw_study *study, int group, int curve, const char *method, int points, pw_error *error);
 
 /* Called after each step of a run that reaches time `due`, which it may change. */
-typedef struct pw_study_visitor {
+typedef struct pw_visitor {
   double due;
-  int (*visit) (struct pw_study_visitor *visitor, pw_run *run, pw_error *error);
+  int (*visit) (struct pw_visitor *visitor, pw_run *run, pw_error *error);
   const pw_study *study;
   pw_row *row;
-} pw_study_visitor;
+} pw_visitor;
 
 /* One run of a row to the end or a limit: fills t, statistics, cpu, and state if it is stopped by cpu_limit; the visitor may
  * be NULL.  Runs of different rows may be concurrent.  PW_RETRY: stopped, or interrupted. */
-int pw_study_run (pw_study *study, pw_row *row, const pw_settings *settings, pw_study_visitor *visitor,
-                  pw_error *error);
+int pw_study_run (pw_study *study, pw_row *row, const pw_settings *settings, pw_visitor *visitor, pw_error *error);
 /* Performs tasks as pw_parallel does, those of a study that is timed as pw_parallel_timed, and ends their progress. */
 int pw_study_parallel (pw_study *study, int count, pw_task *task, void *context, pw_error *error);
 /* Begins to show the progress of `rows` rows, called `unit`, of `what`. */

@@ -114,10 +114,6 @@ int pw_study_positive (const pw_study *study, int group, int coordinate) {
   return 0;
 }
 
-static const char *table_label (const pw_row *row) {
-  return *row->label ? row->label : row->method;
-}
-
 int pw_study_write_data (const pw_study *study, int group, const char *name, const char *heading, int count,
                          pw_error *error) {
   char file[40], text[32];
@@ -129,7 +125,7 @@ int pw_study_write_data (const pw_study *study, int group, const char *name, con
   const double *point;
   fprintf (f, "# %s\n", heading);
   for (int k = -1, curve = -1; (point = table_next_point (study, group, &row, &k)) != NULL; curve = row->curve) {
-    if (row->curve != curve) fprintf (f, "%s# %s\n", curve < 0 ? "" : "\n\n", table_label (row));
+    if (row->curve != curve) fprintf (f, "%s# %s\n", curve < 0 ? "" : "\n\n", row->label);
     for (int i = 0; i < count; i++) /* only positive numbers have logarithms */
       fprintf (f, "%s%s", i ? " " : "", point[i] > 0 ? pw_format (text, point[i], 9) : "NaN");
     fputc ('\n', f);
@@ -147,8 +143,8 @@ static int table_write_labels (const pw_study *study, int group, FILE *f) {
     if (row->curve == curve) continue;
     curves++;
     if (f == NULL) continue;
-    int known = pw_method_parse (table_label (row), &integrator, &stabilisation, NULL) == PW_OK;
-    pw_figure_element (f, "label", curves, table_label (row));
+    int known = pw_method_parse (row->label, &integrator, &stabilisation, NULL) == PW_OK;
+    pw_figure_element (f, "label", curves, row->label);
     pw_figure_element (f, "stabilisation", curves, known ? integrator->stabilisations[stabilisation].name : "");
   }
   return curves;

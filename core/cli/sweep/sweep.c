@@ -10,9 +10,8 @@
 typedef struct {
   /* as given */
   pw_cli_line line;
-  const char *path; /* -o */
-  const char *part_text, *jobs_text, *lanes_text;
-  const char **ranges; /* --vary */
+  const char *path, *part_text, *jobs_text, *lanes_text; /* path: -o */
+  const char **ranges;                                   /* --vary */
   int merge, with_cpu;
   /* as understood */
   pw_plan plan;

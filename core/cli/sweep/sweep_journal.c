@@ -168,11 +168,10 @@ int pw_journal_open (pw_journal *journal, const pw_plan *plan, const char *path,
   return journal->descriptor >= 0 ? journal_begin (journal, plan, error) : error->status;
 }
 
-int pw_journal_add (pw_journal *journal, const pw_plan *plan, long row, int status, const char *cells,
-                    pw_error *error) {
+int pw_journal_add (pw_journal *journal, const pw_plan *plan, long row, int status, const char *text, pw_error *error) {
   off_t at = journal->size;
   pw_text_clear (&journal->line);
-  journal_line_format (&journal->line, row, status, cells);
+  journal_line_format (&journal->line, row, status, text);
   if (journal->line.failed) return pw_fail (error, PW_RESOURCE, "out of memory");
   if (journal_write (journal, journal->line.at, journal->line.used, error) != PW_OK) return error->status;
   journal->offset[row / plan->parts] = at;

@@ -23,7 +23,7 @@ typedef struct {
 int pw_journal_open (pw_journal *journal, const pw_plan *plan, const char *path, pw_error *error);
 /* Appends a row of the grid with the status of its run, 0 to 4 as an exit status.  One thread at a time.  PW_RESOURCE: the
  * journal is unchanged. */
-int pw_journal_add (pw_journal *journal, const pw_plan *plan, long row, int status, const char *cells, pw_error *error);
+int pw_journal_add (pw_journal *journal, const pw_plan *plan, long row, int status, const char *text, pw_error *error);
 /* Closes the journal; removes it if it was created here and has no rows. */
 void pw_journal_close (pw_journal *journal);
 

@@ -11,7 +11,7 @@
 #include "progress.h"
 #include "sweep_journal.h"
 
-enum { ROWS_LANES = 8 }; /* runs that a thread advances at once, at most */
+enum { ROWS_LANES = 8 }; /* runs that a thread advances at once, at most: the largest --lanes */
 
 /* A compiled system, shared by the rows with the same parameters. */
 typedef struct {
@@ -65,8 +65,7 @@ typedef struct {
 
 /* The code of a text, of which it takes ownership, compiled by the first thread that needs it.  The caller holds the lock,
  * which is released meanwhile. */
-static const pw_specialised *rows_compile_code (sweep_rows *sweep, char *text, const pw_system *system,
-                                                pw_error *error) {
+static const pw_specialised *rows_compile (sweep_rows *sweep, char *text, const pw_system *system, pw_error *error) {
   row_code *c = sweep->codes;
   while (c && strcmp (c->text, text) != 0) c = c->next;
   if (c) free (text);
@@ -102,7 +101,7 @@ static void rows_specialise (sweep_rows *sweep, row_system *system) {
   char *text = pw_cli_source (system->compiled.system, NULL);
   if (text == NULL) return;
   pthread_mutex_lock (&sweep->lock);
-  system->code = rows_compile_code (sweep, text, system->compiled.system, &code_error);
+  system->code = rows_compile (sweep, text, system->compiled.system, &code_error);
   pthread_mutex_unlock (&sweep->lock);
   if (code_error.status != PW_OK && pw_stop == 0) pw_cli_say ("pinwheel: general engine: %s\n", code_error.text);
   if (system->code == NULL && pw_stop) system->error.status = PW_RETRY; /* Ctrl-C has stopped the compiler too */
@@ -330,7 +329,6 @@ static int worker_thread (void *context, int i, pw_error *error) {
   (void)i, (void)error;
   if (worker.lanes_code && (worker.lanes_memory = pw_specialised_lanes_memory (worker.lanes_code)) != NULL)
     worker.width = pw_specialised_lanes_count (worker.lanes_code);
-  if (worker.width > ROWS_LANES) worker.width = 1; /* there is no such code: --lanes is at most 8 */
   pthread_mutex_lock (&sweep->lock);
   while (worker.width > 1 && sweep->missing_at_start < (long)worker.width * sweep->jobs)
     worker.width--; /* rows for all threads */
