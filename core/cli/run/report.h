@@ -27,8 +27,8 @@ enum { PW_STATE_NAME = 300 };
 void pw_report_state (const pw_system *system, const pw_initial_report *initial, int state, char name[PW_STATE_NAME],
                       double *given, double *consistent);
 
-/* Descriptions of the redundant constraint equations, ended by NULL; release them with one free.  NULL if there are none
- * or memory is exhausted. */
+/* Descriptions of the redundant constraint equations, ended by NULL; release them with one free.  NULL if there are
+ * none or memory is exhausted. */
 const char **pw_report_redundancies (pw_run *run);
 
 /* A table on standard output: last state, reactions, residuals, energies, cost. */

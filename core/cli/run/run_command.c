@@ -150,8 +150,8 @@ static int run_open (pw_run_cli *command, pw_error *error) {
 
 /* ---- The run ---- */
 
-/* The time of the next row [s]: a multiple of the interval, or the end if it differs from that by round-off only; 0 if a
- * row is due after every step. */
+/* The time of the next row [s]: a multiple of the interval, or the end if it differs from that by round-off only; 0 if
+ * a row is due after every step. */
 static double run_next_row_time (const pw_run_cli *command) {
   if (command->table == NULL) return INFINITY;
   if (command->row_interval == 0) return 0;
@@ -277,8 +277,8 @@ static void run_write_json (pw_run_cli *command, const pw_summary *summary, cons
   run_add_error (error, &write_error);
 }
 
-/* Gives table, summary and page their final names together; after a failure to write all keep their temporary ones.  The
- * summary of a failed run reports that the table is incomplete. */
+/* Gives table, summary and page their final names together; after a failure to write all keep their temporary ones.
+ * The summary of a failed run reports that the table is incomplete. */
 static void run_name_files (pw_run_cli *command, pw_error *error) {
   pw_error finish_error = { 0 };
   for (int i = 0; command->write_failed && i < PW_RUN_OUTPUTS; i++) {
@@ -319,7 +319,7 @@ static void run_finish_figures (pw_run_cli *command, const char *reason, pw_erro
   run_add_error (error, &draw_error);
 }
 
-/* Everything after the last step, however it came about: table, summary, figures, messages.  Returns the exit status. */
+/* Everything after the last step, however that came about: table, summary, figures, messages.  Returns an exit status. */
 static int run_finish (pw_run_cli *command, pw_error *error) {
   const pw_system *system = command->compiled.system;
   pw_run *run = command->run;

@@ -1,5 +1,5 @@
-/* pinwheel compare: accuracy and cost of methods.  A row is a method with a tolerance or step size: one run with samples
- * and energies for the errors, then timed runs without them. */
+/* pinwheel compare: accuracy and cost of methods.  A row is a method with a tolerance or step size: one run with
+ * samples and energies for the errors, then timed runs without them. */
 #include <gsl/gsl_sort.h>
 #include <gsl/gsl_statistics.h>
 #include <math.h>
@@ -111,7 +111,7 @@ static int compare_read_ladder (const char *option, const char *text, compare_la
   return PW_OK;
 }
 
-/* Level i of a ladder, or 0 after its end; steps are halved, tolerances divided by ten and rounded to 12 digits: 1e-6. */
+/* Level i of a ladder, or 0 after its end; steps are halved, tolerances divided by ten and rounded to 12 digits. */
 static double compare_level (compare_ladder ladder, int adaptive, int i) {
   char text[32];
   double level = ldexp (ladder.from, -i);
@@ -119,8 +119,10 @@ static double compare_level (compare_ladder ladder, int adaptive, int i) {
   return level >= ladder.to * (1 - 1e-9) ? level : 0;
 }
 
-/* Adds a row for each level of each method; the rows are one group, and those of a method a curve with a point each. */
+/* All rows are one group; those of a method are a curve, with a point each. */
 enum { COMPARE_GROUP = 0, COMPARE_POINTS = 1 };
+
+/* Adds a row for each level of each method. */
 static int compare_plan_rows (pw_study *study, const compare_ladder ladders[2], pw_error *error) {
   for (int i = 0; i < study->methods; i++) {
     int adaptive = pw_cli_adaptive (study->method[i]);
@@ -216,8 +218,9 @@ static int compare_measure_times (pw_compare *compare, pw_row *row, pw_error *er
   return PW_OK;
 }
 
-/* The processor time [s] of a row, predicted from the coarser levels of its method: a halved step doubles it; a tolerance
- * divided by ten costs the factor that the last one did, at first COMPARE_DECADE.  INFINITY after a run that was stopped. */
+/* The processor time [s] of a row, predicted from the coarser levels of its method: a halved step doubles it; a
+ * tolerance divided by ten costs the factor that the last one did, at first COMPARE_DECADE.  INFINITY after a run that
+ * was stopped. */
 static double compare_predicted_time (const pw_row *row) {
   const pw_row *coarser = row - 1;
   if (row->coarser_levels == 0 || coarser->state == ROW_FAILED || coarser->state == ROW_REFUSED) return 0;

@@ -1,5 +1,5 @@
-/* Prints the conclusion of a comparison: the processor time of each method for 3, 6 and 9 correct digits, interpolated on
- * its work-precision curve and relative to the cheapest method; then the runs that failed or were stopped. */
+/* Prints the conclusion of a comparison: the processor time of each method for 3, 6 and 9 correct digits, interpolated
+ * on its work-precision curve and relative to the cheapest method; then the runs that failed or were stopped. */
 #include <math.h>
 #include <string.h>
 #include "reference.h"
@@ -34,8 +34,8 @@ static double conclusion_scale (const pw_reference *reference, int unit) {
   return unit == MOTION_ANGLE ? fmin (size, 1) : size;
 }
 
-/* The larger of the relative errors of lengths and angles, as far as they are compared; NaN if one is unknown.  `errors`:
- * of lengths [m] and angles [rad]. */
+/* The larger of the relative errors of lengths and angles, as far as they are compared; NaN if one is unknown.
+ * `errors`: of lengths [m] and angles [rad]. */
 static double conclusion_error (const pw_reference *reference, const double *errors) {
   double largest = 0;
   for (int unit = MOTION_LENGTH; unit <= MOTION_ANGLE; unit++) {
@@ -53,8 +53,8 @@ static double conclusion_required (int k) {
 /* ---- Costs ---- */
 
 /* The least processor time of a method for the required error, interpolated between neighbouring runs on logarithmic
- * scales.  It is an upper bound if it is that of a run without a less accurate one before it, or interpolated to an error
- * that is only known to be below the uncertainty. */
+ * scales.  It is an upper bound if it is that of a run without a less accurate one before it, or interpolated to an
+ * error that is only known to be below the uncertainty. */
 static conclusion_cost conclusion_least_cost (const pw_conclusion *conclusion, int method, double required) {
   conclusion_cost least = { NAN, 0 };
   double error_before = NAN;

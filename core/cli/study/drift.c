@@ -10,8 +10,8 @@
 #define DRIFT_RTOL 1e-6                         /* of adaptive methods, unless the model or --rtol says otherwise */
 enum { DRIFT_PARTS = 200, DRIFT_ROWS = 10000 }; /* parts of a run, each a point in the figures; rows at most */
 
-/* What is measured: the scaled residuals of positions and velocities, |energy balance| [J]; and three values of each: the
- * largest of all steps and of the last part, and the growth. */
+/* What is measured: the scaled residuals of positions and velocities, |energy balance| [J]; and three values of each:
+ * the largest of all steps and of the last part, and the growth. */
 enum { DRIFT_POSITION, DRIFT_VELOCITY, DRIFT_BALANCE, DRIFT_QUANTITIES };
 enum { DRIFT_LARGEST, DRIFT_LAST, DRIFT_GROWTH, DRIFT_VALUES };
 
@@ -207,8 +207,8 @@ static int drift_visit (pw_visitor *visitor, pw_run *run, pw_error *error) {
   return PW_OK;
 }
 
-/* The growth of a quantity from the largest value of the first half to that of the run, as the exponent of t: 0 if it is
- * bounded; NaN if there is only round-off.  A row of an option has the largest value in its figure. */
+/* The growth of a quantity from the largest value of the first half to that of the run, as the exponent of t: 0 if it
+ * is bounded; NaN if there is only round-off.  A row of an option has the largest value in its figure. */
 static void drift_finish (pw_row *row, int quantity, double first_half) {
   double *value = &row->value[COLUMN_QUANTITY + DRIFT_VALUES * quantity], largest = value[DRIFT_LARGEST];
   int known = quantity == DRIFT_BALANCE || largest > DRIFT_ROUND_OFF;

@@ -1,6 +1,6 @@
-/* Studies: runs of one model by several methods, a row of a table for each, failures included.  This part opens the model
- * and the folder, performs the runs, and writes the table and the CSV file as rows are finished.  The commands compare
- * and drift (compare.c, drift.c) provide the rows, what is measured, the columns and the figures. */
+/* Studies: runs of one model by several methods, a row of a table for each, failures included.  This part opens the
+ * model and the folder, performs the runs, and writes the table and the CSV file as rows are finished.  The commands
+ * compare and drift (compare.c, drift.c) provide the rows, what is measured, the columns and the figures. */
 #ifndef PW_STUDY_H
 #define PW_STUDY_H
 
@@ -17,7 +17,7 @@ enum {
   STUDY_COORDINATES = 5 /* of a point in a figure, at most */
 };
 
-/* Done; failed; refused when the run was opened; stopped at the time limit; not run, since it would exceed the limit. */
+/* Done; failed; refused when the run was opened; stopped at the limit; not run, since it would exceed the limit. */
 typedef enum { ROW_DONE, ROW_FAILED, ROW_REFUSED, ROW_STOPPED, ROW_SKIPPED } pw_row_state;
 
 typedef struct {
@@ -38,9 +38,9 @@ typedef struct {
   pw_statistics statistics;     /* of the last run */
   char reason[500];             /* of a failure */
   double value[STUDY_COLUMNS];  /* NaN: unknown */
-  unsigned upper_bounds;        /* bit i: value i is an upper bound */
+  unsigned upper_bounds;        /* bit i: value[i] is an upper bound */
   char bound_names[STUDY_NAME]; /* columns of these values */
-  int points;                   /* number of points in the figure; undefined ones are NaN */
+  int points;                   /* in the figure; their coordinates are NaN if undefined */
   double (*point)[STUDY_COORDINATES];
 } pw_row;
 
@@ -49,7 +49,7 @@ typedef struct pw_study pw_study;
 /* A column of the table, which is in the CSV file, on the terminal, or both. */
 typedef struct {
   const char *name, *unit;                 /* in the CSV file; name NULL: not there; unit NULL: none */
-  const char *head;                        /* on the terminal; NULL: not there */
+  const char *head;                        /* heading on the terminal; NULL: not there */
   int width;                               /* on the terminal, including spaces before it */
   const char *format;                      /* of numbers on the terminal: "%.1e" */
   const char *(*text) (const pw_row *row); /* the text; NULL: the column contains numbers */
@@ -69,7 +69,7 @@ typedef struct {
   const char *table_names[2];    /* CSV files in the folder: of the rows, and a further one or NULL */
   const char *row_noun;          /* in messages: "rows" */
   const char *const *group;      /* headings of the groups */
-  const char *heading_above;     /* line above the heads of columns */
+  const char *heading_above;     /* line above the headings of columns */
   const pw_study_column *column; /* those up to "status" are printed for every row */
   int columns;
   int runs_per_row;       /* approximately */
@@ -80,7 +80,7 @@ typedef struct {
   /* Before the first row, with signals caught: prints the text above the table. */
   int (*begin) (pw_study *study, pw_error *error);
   int timed; /* 1: processor times are measured: rows of a method one after the other, methods on different cores */
-  /* Measures a row by pw_study_run; pw_study_outcome records a failure of the method in the row. */
+  /* Measures a row by pw_study_run; pw_study_record_run records a failure of the method in the row. */
   int (*measure) (pw_study *study, pw_row *row, pw_error *error);
   /* After the last row: prints the conclusion; NULL: none. */
   void (*conclude) (const pw_study *study);
@@ -139,8 +139,8 @@ typedef struct pw_visitor {
   pw_row *row;
 } pw_visitor;
 
-/* One run of a row to the end or a limit: fills t, statistics, cpu, and state if it is stopped by cpu_limit; the visitor may
- * be NULL.  Runs of different rows may be concurrent.  PW_RETRY: stopped, or interrupted. */
+/* One run of a row to the end or a limit: fills t, statistics, cpu, and state if it is stopped by cpu_limit; the
+ * visitor may be NULL.  Runs of different rows may be concurrent.  PW_RETRY: stopped, or interrupted. */
 int pw_study_run (pw_study *study, pw_row *row, const pw_settings *settings, pw_visitor *visitor, pw_error *error);
 /* Performs tasks as pw_parallel does, those of a study that is timed as pw_parallel_timed, and ends their progress. */
 int pw_study_parallel (pw_study *study, int count, pw_task *task, void *context, pw_error *error);
@@ -148,8 +148,8 @@ int pw_study_parallel (pw_study *study, int count, pw_task *task, void *context,
 void pw_study_begin_progress (pw_study *study, const char *what, const char *unit, int rows);
 /* Shows that a part of a row is done, 0 to 1. */
 void pw_study_progress (pw_study *study, pw_row *row, double part);
-/* Fills the row's values of the time reached and of the counts, and the failure if pw_study_run has returned this status
- * and `run_error`.  Returns PW_OK, or the status that ends the study. */
+/* Fills the row's values of the time reached and of the counts, and the failure if pw_study_run has returned this
+ * status and `run_error`.  Returns PW_OK, or the status that ends the study. */
 int pw_study_record_run (const pw_study *study, pw_row *row, int status, const pw_error *run_error, pw_error *error);
 
 /* ---- Tables and figures (study_table.c) ---- */

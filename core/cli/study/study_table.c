@@ -96,8 +96,8 @@ int pw_study_write_row (pw_study *study, const pw_row *row, pw_error *error) {
 
 /* ---- Figures ---- */
 
-/* The coordinates of the next defined point of a group, after point *point of *row; NULL after the last one.  Coordinate 0
- * may be set in advance, the others are set together. */
+/* The coordinates of the next defined point of a group, after point *point of *row; NULL after the last one.
+ * Coordinate 0 may be set in advance, the others are set together. */
 static const double *table_next_point (const pw_study *study, int group, const pw_row **row, int *point) {
   for (; *row < study->row + study->rows; ++*row, *point = -1)
     while ((*row)->group == group && ++*point < (*row)->points)
@@ -133,8 +133,8 @@ int pw_study_write_data (const pw_study *study, int group, const char *name, con
   return pw_output_finish (output, error);
 }
 
-/* Writes the labels of the curves that have points, with stabilisations if they are methods, unless f is NULL; returns the
- * number of these curves. */
+/* Writes the labels of the curves that have points, with stabilisations if they are methods, unless f is NULL; returns
+ * the number of these curves. */
 static int table_write_labels (const pw_study *study, int group, FILE *f) {
   const pw_row *row = study->row;
   const pw_method *integrator;

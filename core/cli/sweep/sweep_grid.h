@@ -31,7 +31,8 @@ int pw_axis_read (pw_axis *axis, const char *text, pw_error *error);
 void pw_axis_free (pw_axis *axis);
 double pw_axis_value (const pw_axis *axis, long i); /* i from 0 */
 
-/* Reads a NULL-terminated list of "NAME=RANGE".  PW_INPUT also if there are too many rows.  Free the grid in every case. */
+/* Reads a NULL-terminated list of "NAME=RANGE".  PW_INPUT also if there are too many rows.  Free the grid in every
+ * case. */
 int pw_grid_read (pw_grid *grid, const char *const *ranges, pw_error *error);
 void pw_grid_free (pw_grid *grid);
 double pw_grid_value (const pw_grid *grid, int i, long row); /* of axis i */

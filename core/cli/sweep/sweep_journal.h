@@ -5,7 +5,8 @@
 #include <sys/types.h>
 #include "sweep_plan.h"
 
-/* The rows done, in the order of completion, in a file next to the table, from which a sweep that was stopped continues. */
+/* The rows done, in the order of completion, in a file next to the table, from which a sweep that was stopped
+ * continues. */
 typedef struct {
   char *table_path; /* links followed */
   char *part_path;  /* of the journal: table_path.part */
@@ -21,8 +22,8 @@ typedef struct {
  * Errors: PW_RESOURCE if it cannot be written, PW_INPUT if it belongs to another sweep or is in use by another
  * process. */
 int pw_journal_open (pw_journal *journal, const pw_plan *plan, const char *path, pw_error *error);
-/* Appends a row of the grid with the status of its run, 0 to 4 as an exit status.  One thread at a time.  PW_RESOURCE: the
- * journal is unchanged. */
+/* Appends a row of the grid with the status of its run, 0 to 4 as an exit status.  One thread at a time.  PW_RESOURCE:
+ * the journal is unchanged. */
 int pw_journal_add (pw_journal *journal, const pw_plan *plan, long row, int status, const char *text, pw_error *error);
 /* Closes the journal; removes it if it was created here and has no rows. */
 void pw_journal_close (pw_journal *journal);

@@ -41,8 +41,8 @@ typedef struct {
   pw_text fingerprint; /* the first lines of a journal or part: everything that determines the rows */
 } pw_plan;
 
-/* Matches the ranges ("NAME=RANGE") to the model, whose file is open in plan->file and stays the caller's, and finds the
- * columns by compiling models of the grid.  Errors: PW_INPUT, PW_RESOURCE.  Close the plan in every case. */
+/* Matches the ranges ("NAME=RANGE") to the model, whose file is open in plan->file and stays the caller's, and finds
+ * the columns by compiling models of the grid.  Errors: PW_INPUT, PW_RESOURCE.  Close the plan in every case. */
 int pw_plan_open (pw_plan *plan, const char **ranges, pw_error *error);
 void pw_plan_close (pw_plan *plan);
 

@@ -18,8 +18,8 @@ typedef struct {
   long parameters;            /* pw_grid_parameter_index of these rows */
   int users;                  /* number of runs that use it, and one more while it is the latest system */
   int ready;                  /* 0: a thread is compiling it */
-  pw_cli_model compiled;      /* compiled.file is NULL */
-  int *state;                 /* of each column of the table; -1: the system does not have it */
+  pw_cli_model model;         /* model.file is NULL */
+  int *state;                 /* index of the state in each column of the table; -1: the system does not have it */
   const pw_specialised *code; /* NULL: the general engine */
   pw_error error;             /* why it could not be compiled */
 } row_system;
@@ -34,7 +34,7 @@ typedef struct row_code {
 
 typedef struct {
   const pw_plan *plan;
-  int jobs;
+  int jobs; /* threads */
   /* accessed by the thread that holds the lock */
   pthread_mutex_t lock;
   pthread_cond_t compiled;
@@ -63,45 +63,45 @@ typedef struct {
 
 /* ---- Specialised code ---- */
 
-/* The code of a text, of which it takes ownership, compiled by the first thread that needs it.  The caller holds the lock,
- * which is released meanwhile. */
+/* The code of a text, of which it takes ownership, compiled by the first thread that needs it.  The caller holds the
+ * lock, which is released meanwhile. */
 static const pw_specialised *rows_compile (sweep_rows *sweep, char *text, const pw_system *system, pw_error *error) {
-  row_code *c = sweep->codes;
-  while (c && strcmp (c->text, text) != 0) c = c->next;
-  if (c) free (text);
-  if (c) {
-    while (!c->ready) pthread_cond_wait (&sweep->compiled, &sweep->lock);
-    return pw_scene_code_table (c->code);
+  row_code *entry = sweep->codes;
+  while (entry && strcmp (entry->text, text) != 0) entry = entry->next;
+  if (entry) {
+    free (text);
+    while (!entry->ready) pthread_cond_wait (&sweep->compiled, &sweep->lock);
+    return pw_scene_code_table (entry->code);
   }
-  if ((c = malloc (sizeof *c)) == NULL) {
+  if ((entry = malloc (sizeof *entry)) == NULL) {
     free (text);
     pw_fail (error, PW_RESOURCE, "out of memory");
     return NULL;
   }
-  *c = (row_code){ .text = text, .next = sweep->codes };
-  sweep->codes = c;
+  *entry = (row_code){ .text = text, .next = sweep->codes };
+  sweep->codes = entry;
   pthread_mutex_unlock (&sweep->lock);
-  c->code = pw_scene_code_open (text, system, error);
+  entry->code = pw_scene_code_open (text, system, error);
   pthread_mutex_lock (&sweep->lock);
-  c->ready = 1;
+  entry->ready = 1;
   pthread_cond_broadcast (&sweep->compiled);
-  return pw_scene_code_table (c->code);
+  return pw_scene_code_table (entry->code);
 }
 
-/* Chooses the code of a new system, independently of the order of runs: that of the plan's engine if it fits, else code that is
+/* Chooses the code of a new system, independently of the order of runs: that of the plan's engine if it fits, else code
  * generated for this system. */
 static void rows_specialise (sweep_rows *sweep, row_system *system) {
   const pw_specialised *plan_code = pw_cli_engine_code (&sweep->plan->engine);
   pw_error code_error = { 0 };
   if (plan_code == NULL) return;
-  if (pw_specialised_fits (plan_code, system->compiled.system)) {
+  if (pw_specialised_fits (plan_code, system->model.system)) {
     system->code = plan_code;
     return;
   }
-  char *text = pw_cli_source (system->compiled.system, NULL);
+  char *text = pw_cli_source (system->model.system, NULL);
   if (text == NULL) return;
   pthread_mutex_lock (&sweep->lock);
-  system->code = rows_compile (sweep, text, system->compiled.system, &code_error);
+  system->code = rows_compile (sweep, text, system->model.system, &code_error);
   pthread_mutex_unlock (&sweep->lock);
   if (code_error.status != PW_OK && pw_stop == 0) pw_cli_say ("pinwheel: general engine: %s\n", code_error.text);
   if (system->code == NULL && pw_stop) system->error.status = PW_RETRY; /* Ctrl-C has stopped the compiler too */
@@ -109,14 +109,15 @@ static void rows_specialise (sweep_rows *sweep, row_system *system) {
 
 /* ---- Compiled systems ---- */
 
+/* Compiles the system of a row, and finds the states of the table in it. */
 static int system_open (row_system *system, const pw_plan *plan, long row, pw_error *error) {
   char name[300];
-  if (pw_plan_compile (plan, row, &system->compiled, error) != PW_OK) return error->status;
+  if (pw_plan_compile (plan, row, &system->model, error) != PW_OK) return error->status;
   system->state = malloc ((size_t)plan->columns * sizeof *system->state);
   if (system->state == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
   for (int i = 0; i < plan->columns; i++) system->state[i] = -1;
-  for (int i = 0; i < 2 * pw_system_coordinates (system->compiled.system); i++) {
-    int column = pw_names_find (&plan->column_of, pw_system_state_name (system->compiled.system, i, name, sizeof name));
+  for (int i = 0; i < 2 * pw_system_coordinates (system->model.system); i++) {
+    int column = pw_names_find (&plan->column_of, pw_system_state_name (system->model.system, i, name, sizeof name));
     if (column < 0)
       return pw_fail (error, PW_INPUT,
                       "%s has no column: the number of bodies may only depend on parameters that are counts", name);
@@ -128,7 +129,7 @@ static int system_open (row_system *system, const pw_plan *plan, long row, pw_er
 /* Ends the use of a system; the last user frees it.  The caller holds the lock. */
 static void system_release (row_system *system) {
   if (system == NULL || --system->users > 0) return;
-  pw_cli_close_model (&system->compiled);
+  pw_cli_close_model (&system->model);
   free (system->state);
   free (system);
 }
@@ -163,7 +164,7 @@ static pw_initial_value *row_initial (const pw_plan *plan, const sweep_row *row,
   for (int i = 0; initial && i < plan->grid.axes; i++)
     if (plan->grid.axis[i].parameter == NULL)
       initial[(*count)++] =
-          (pw_initial_value){ pw_system_find_state (row->system->compiled.system, plan->grid.axis[i].name, NULL),
+          (pw_initial_value){ pw_system_find_state (row->system->model.system, plan->grid.axis[i].name, NULL),
                               pw_grid_value (&plan->grid, i, row->number) };
   return initial;
 }
@@ -181,7 +182,7 @@ static void row_open (sweep_row *row, const pw_plan *plan) {
   settings.initial = initial;
   pw_limit_start (&row->limit);
   if (initial)
-    row->run = pw_run_open (row->system->compiled.system, plan->method, &settings, &row->error);
+    row->run = pw_run_open (row->system->model.system, plan->method, &settings, &row->error);
   else
     pw_fail (&row->error, PW_RESOURCE, "out of memory");
   row->status = row->error.status;
@@ -196,7 +197,7 @@ static int row_ended (const sweep_row *row, const pw_plan *plan) {
 static void row_cells (const sweep_row *row, const pw_plan *plan, const pw_sample *last, pw_text *text) {
   const pw_statistics *statistics = row->run ? pw_run_statistics (row->run) : NULL;
   double cpu = row->run ? pw_seconds (CLOCK_THREAD_CPUTIME_ID) - row->limit.start : 0;
-  int n = last ? pw_system_coordinates (row->system->compiled.system) : 0;
+  int n = last ? pw_system_coordinates (row->system->model.system) : 0;
   for (int i = 0; i < plan->grid.axes; i++) pw_text_number (text, pw_grid_value (&plan->grid, i, row->number));
   pw_text_cell (text, pw_cli_status_word (row->status));
   pw_text_number (text, row->run ? pw_run_time (row->run) : NAN);
@@ -284,7 +285,7 @@ static int worker_begin (sweep_rows *sweep, sweep_row *row) {
   }
   pthread_mutex_unlock (&sweep->lock);
   row_open (row, sweep->plan);
-  double change = row->run ? pw_cli_change (row->run, row->system->compiled.system, text) : 0;
+  double change = row->run ? pw_cli_change (row->run, row->system->model.system, text) : 0;
   pthread_mutex_lock (&sweep->lock);
   if (row->run) rows_count_change (sweep, change, text);
   return 1;
@@ -302,7 +303,8 @@ static void worker_end (sweep_worker *worker, sweep_row *row) {
   row->system = NULL;
 }
 
-/* Advances the runs until one of them ends: in lanes if all use the code of the plan's engine, else one after the other. */
+/* Advances the runs until one of them ends: in lanes if all use the code of the plan's engine, else one after the
+ * other. */
 static void worker_advance (sweep_worker *worker) {
   const pw_plan *plan = worker->sweep->plan;
   sweep_row *running[ROWS_LANES];
@@ -348,11 +350,11 @@ static int worker_thread (void *context, int i, pw_error *error) {
 }
 
 static void rows_close (sweep_rows *sweep) {
-  for (row_code *c = sweep->codes, *next; c; c = next) {
-    next = c->next;
-    pw_scene_code_close (c->code);
-    free (c->text);
-    free (c);
+  for (row_code *entry = sweep->codes, *next; entry; entry = next) {
+    next = entry->next;
+    pw_scene_code_close (entry->code);
+    free (entry->text);
+    free (entry);
   }
   system_release (sweep->latest);
   pthread_cond_destroy (&sweep->compiled);
