@@ -58,14 +58,14 @@ static int linearise_advance (pw_linearise *x, pw_error *error) {
   pw_progress progress;
   int status = PW_OK;
   pw_stop_catch ();
-  pw_progress_start (&progress, pw_file_name (x->m.file), x->t, 1);
+  pw_progress_start (&progress, pw_file_name (x->m.file), x->t);
   while (status == PW_OK && pw_run_time (x->r) < x->t) {
     status = pw_run_advance (x->r, x->t, error);
     pw_progress_at (&progress, pw_run_time (x->r));
   }
   pw_progress_end (&progress);
   pw_stop_release ();
-  return status == PW_STOPPED ? pw_limit_fail (&x->limit, pw_run_time (x->r), error) : status;
+  return status == PW_STOPPED ? pw_limit_status (&x->limit, pw_run_time (x->r), error) : status;
 }
 
 /* Finds the steady motion nearest to the initial state. */
@@ -212,9 +212,9 @@ const pw_command pw_cli_linearise = {
   .help = "Linearise the equations of motion in minimal coordinates on the constraints, in a frame that moves with the "
           "motion: x' = A x + B u, y = C x + D u. Prints eigenvalues with frequency, damping and time to double or "
           "halve, and mode shapes.",
-  .least = 1,
-  .most = 1,
-  .size = sizeof (pw_linearise),
+  .min_arguments = 1,
+  .max_arguments = 1,
+  .options_size = sizeof (pw_linearise),
   .function = linearise_command,
   .options = linearise_options,
 };

@@ -217,7 +217,7 @@ void pw_linearise_json (const pw_linearise *x, pw_json *j) {
 int pw_linearise_csv (const pw_linearise *x, FILE *f, pw_error *error) {
   const pw_system *s = x->m.system;
   int n = x->linear.unknowns, rows = n + x->outputs, columns = n + x->inputs;
-  pw_text t = { .at = NULL };
+  pw_text t = { .chars = NULL };
   char name[300];
   pw_text_cell (&t, "row");
   for (int c = 0; c < n; c++) snprintf (name, sizeof name, "x%d", c + 1), pw_text_name (&t, name, "m");
@@ -257,8 +257,8 @@ int pw_linearise_npz (const pw_linearise *x, FILE *f, pw_error *error) {
 
 /* ---- The page of mode shapes: displacements eps Re (shape exp (i im t)), without growth; real modes with it ---- */
 
-/* Of pairs, periods are shown; of real modes, growth by exp (PAGE_TIMES).  PAGE_SIZE: largest displacement, in units of the
- * scene's length. */
+/* Of pairs, periods are shown; of real modes, growth by exp (PAGE_TIMES).  PAGE_SIZE: largest displacement, in units
+ * of the scene's length. */
 enum { PAGE_SAMPLES = 180, PAGE_PERIODS = 3, PAGE_TIMES = 3 };
 #define PAGE_SIZE 0.1
 

@@ -121,7 +121,7 @@ static int periodic_fail (const pw_periodic_cli *x, pw_error *error) {
 /* Follows the branch to the end of the range. */
 static int periodic_branch (pw_periodic_cli *x, pw_error *error) {
   pw_periodic_orbit o;
-  pw_progress progress = { .t_end = 0 };
+  pw_progress progress = { .title = NULL };
   pw_vary_progress (&x->vary, &progress, x->set.first, x->set.first, x->set.last);
   int status = pw_periodic_follow (x->search, 1, error);
   while (status == PW_OK && !periodic_stop (x)) {
@@ -193,9 +193,9 @@ const pw_command pw_cli_periodic = {
   .help = "Find a motion that repeats after one period but for a displacement in the plane, such as a gait, with the "
           "displacement per period and Floquet multipliers, which say how perturbations change in one period; with "
           "--vary, follow it over a parameter.",
-  .least = 1,
-  .most = 1,
-  .size = sizeof (pw_periodic_cli),
+  .min_arguments = 1,
+  .max_arguments = 1,
+  .options_size = sizeof (pw_periodic_cli),
   .function = periodic_command,
   .options = periodic_options_table,
 };

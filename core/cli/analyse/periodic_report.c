@@ -179,7 +179,7 @@ static int periodic_csv (const void *context, FILE *f, pw_error *error) {
   const pw_periodic_cli *x = context;
   const pw_system *s = x->m.system;
   int states = 2 * pw_system_coordinates (s), most = x->point->orbit.multipliers;
-  pw_text t = { .at = NULL };
+  pw_text t = { .chars = NULL };
   char name[300];
   pw_text_name (&t, x->vary_text ? x->vary.name : "parameter", x->vary.unit);
   pw_text_cell (&t, "event,period [s],displacement [m],rotation [rad],growing,residual");

@@ -62,8 +62,8 @@ static void sensitivity_print (const pw_sensitivity *x) {
   }
 }
 
-/* 1 if the error exceeds 1 % of the derivative, and of the output (1e-6 at least, in SI units) for a change of the unknown by its
- * size, of which direction.step is 1e-5. */
+/* 1 if the error exceeds 1 % of the derivative, and of the output (1e-6 at least, in SI units) for a change of the
+ * unknown by its size, of which direction.step is 1e-5. */
 static int sensitivity_is_uncertain (const pw_sensitivity *x, int o, int p) {
   double result[3], value = pw_outcome_value (&x->outcomes, o, NULL), size = 1e5 * fabs (x->direction[p].step);
   sensitivity_result (x, o, p, result);
@@ -241,7 +241,7 @@ static int sensitivity_open (pw_sensitivity *x, pw_error *error) {
   pw_unknowns_engine (&x->unknowns, 1);
   x->unknowns.settings.specialised = pw_cli_engine_code (&x->unknowns.engine);
   if (x->folder) x->dt = x->unknowns.t_end / SENSITIVITY_ROWS;
-  status = pw_cli_only ("--every", x->every, "-o DIR", x->folder != NULL, error);
+  status = pw_cli_requires ("--every", x->every, "-o DIR", x->folder != NULL, error);
   if (status == PW_OK) status = pw_cli_number ("--every", x->every, PW_POSITIVE, &x->dt, error);
   if (status == PW_OK) status = sensitivity_unknowns (x, error);
   return status == PW_OK ? pw_sensitivity_open (x, NULL, error) : status;
@@ -283,7 +283,7 @@ static int sensitivity_compute (pw_sensitivity *x, pw_error *error) {
   pw_progress progress;
   double begun = pw_cpu_clock ();
   pw_stop_catch ();
-  pw_progress_start (&progress, pw_file_name (x->m.file), x->unknowns.t_end, 1);
+  pw_progress_start (&progress, pw_file_name (x->m.file), x->unknowns.t_end);
   int status = pw_sensitivity_compute (x, &progress, error);
   for (int i = 0; i < SENSITIVITY_REPEATED && status == PW_OK && sensitivity_steps (x); i++) {
     status = sensitivity_again (x, &progress, error);
@@ -315,7 +315,7 @@ static int sensitivity_command (void *options, pw_error *error) {
   if (status == PW_OK) status = sensitivity_check (x, error);
   if (status == PW_OK) sensitivity_print (x), sensitivity_warn (x);
   if (status == PW_OK && x->folder) status = sensitivity_write (x, error);
-  if (status == PW_OK && x->stopped) status = pw_limit_fail (&x->limit, pw_run_time (x->base.run), error);
+  if (status == PW_OK && x->stopped) status = pw_limit_status (&x->limit, pw_run_time (x->base.run), error);
   pw_files_close (&x->files);
   pw_sensitivity_close (x);
   pw_unknowns_close (&x->unknowns);
@@ -348,9 +348,9 @@ const pw_command pw_cli_sensitivity = {
   .help = "Differentiate outputs of a run with respect to parameters and initial values, at the end and along the run, "
           "by the variational equations: exact in the states, by differences of compiled models in the parameters, "
           "with the error of these.",
-  .least = 1,
-  .most = 1,
-  .size = sizeof (pw_sensitivity),
+  .min_arguments = 1,
+  .max_arguments = 1,
+  .options_size = sizeof (pw_sensitivity),
   .function = sensitivity_command,
   .options = sensitivity_options,
 };

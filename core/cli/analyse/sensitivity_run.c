@@ -1,9 +1,9 @@
 /* Derivatives of outputs along a run.
  *
- * An output is a function of functionals of columns.  At a time, the derivative of a column is that of the sample.  That
- * of an extremum is the column's at its time, since inside a step the effect of a shift of time vanishes; that of an
- * integral is the integral of the column's, by Gauss' formula with 5 nodes over a few steps of the derivatives, up to rows
- * of the table and breakpoints. */
+ * An output is a function of functionals of columns.  At a time, the derivative of a column is that of the sample.
+ * That of an extremum is the column's at its time, since inside a step the effect of a shift of time vanishes; that
+ * of an integral is the integral of the column's, by Gauss' formula with 5 nodes over a few steps of the derivatives,
+ * up to rows of the table and breakpoints. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -46,8 +46,8 @@ static int sensitivity_contact (const pw_sensitivity *x, pw_workspace *w, int in
   return status;
 }
 
-/* Contact points are functions of positions and parameters: differences in both, with the derivatives of positions and their
- * errors. */
+/* Contact points are functions of positions and parameters: differences in both, with the derivatives of positions
+ * and their errors. */
 static int sensitivity_contact_slope (const pw_sensitivity *x, int unknown, int index, const pw_sample *s,
                                       const double *dq, const double *eq, double *slope, double *error_of,
                                       pw_error *error) {
@@ -129,20 +129,20 @@ static void sensitivity_keep (pw_sensitivity *x, int i) {
     if (!isnan (x->end_slope[at])) x->end_slope[at] = x->slope[at], x->end_error[at] = x->error[at];
 }
 
-/* Keeps those of an extremum; at a breakpoint that moves, and just after it, they do not exist.  reached: 1 if the extremum is at
- * a breakpoint that is not passed yet. */
+/* Keeps those of an extremum; at a breakpoint that moves, and just after it, they do not exist.  reached: 1 if the
+ * extremum is at a breakpoint that is not passed yet. */
 static void sensitivity_keep_extremum (pw_sensitivity *x, int i, int reached) {
   const pw_functional *f = &x->outcomes.functional[i];
   double slope, next = pw_variation_breakpoint (x->variation, 0, &slope);
   int before = reached || fabs (f->t - next) < 1e-9 * (1 + fabs (next)),
-      after = f->t - x->passed <= 2 * PW_FUNCTIONAL_BEFORE * f->step;
+      after = f->t - x->passed <= 2 * PW_FUNCTIONAL_INSET * f->step;
   sensitivity_keep (x, i);
   for (int p = 0; p < x->unknowns.count && (before || after); p++)
     if (sensitivity_moves (x, p, !before) != 0) x->end_slope[i * x->unknowns.count + p] = NAN;
 }
 
-/* Drops derivatives of extrema in the step of the run that passes a jump with the state at t, if those of the column jump there
- * from `before`: they do not exist. */
+/* Drops derivatives of extrema in the step of the run that passes a jump with the state at t, if those of the column
+ * jump there from `before`: they do not exist. */
 static void sensitivity_drop (pw_sensitivity *x, double t, const double *before) {
   for (int i = 0; i < x->outcomes.functionals; i++) {
     const pw_functional *f = &x->outcomes.functional[i];
@@ -210,8 +210,8 @@ static int sensitivity_interval (pw_sensitivity *x, double t0, double t1, sensit
   return status == PW_OK ? pw_sensitivity_at (x, t1, error) : status;
 }
 
-/* Past a breakpoint t_b, or a jump with the state, from just before it.  The integral of a column that jumps there from x- to x+
- * has the derivative (x- - x+) dt_b/dp.  A breakpoint at the end of the run is only reached. */
+/* Past a breakpoint t_b, or a jump with the state, from just before it.  The integral of a column that jumps there
+ * from x- to x+ has the derivative (x- - x+) dt_b/dp.  A breakpoint at the end of the run is only reached. */
 static int sensitivity_jump (pw_sensitivity *x, double t0, double t, int with_state, pw_error *error) {
   int passed = with_state || t > x->passed;
   size_t F = (size_t)x->outcomes.functionals, P = (size_t)x->unknowns.count;
@@ -233,8 +233,8 @@ static int sensitivity_jump (pw_sensitivity *x, double t0, double t, int with_st
   return status;
 }
 
-/* The end of the next interval, in which derivatives are smooth, unless it ends at a jump.  *jump: 0, or 1 at a breakpoint, 2
- * at a jump with the state.  NAN and the error. */
+/* The end of the next interval, in which derivatives are smooth, unless it ends at a jump.  *jump: 0, or 1 at a
+ * breakpoint, 2 at a jump with the state.  NAN and the error. */
 static double sensitivity_next (pw_sensitivity *x, double t, double to, int *jump, pw_error *error) {
   double slope, breakpoint = pw_variation_breakpoint (x->variation, 0, &slope);
   *jump = 0;
@@ -294,7 +294,7 @@ static int sensitivity_integrate (pw_sensitivity *x, pw_progress *progress, pw_e
 int pw_sensitivity_open (pw_sensitivity *x, const double *at, pw_error *error) {
   size_t P = (size_t)x->unknowns.count;
   if (x->dt == 0) x->dt = x->unknowns.t_end / SENSITIVITY_PARTS;
-  x->limit.most = x->unknowns.limit;
+  x->limit.seconds = x->unknowns.limit;
   x->unknowns.settings.stop = pw_limit_over;
   x->unknowns.settings.stop_context = &x->limit;
   x->at = malloc (P * sizeof *x->at);

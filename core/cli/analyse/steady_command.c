@@ -33,11 +33,11 @@ static int steady_vary (pw_steady_cli *x, pw_error *error) {
 static int steady_options (pw_steady_cli *x, pw_error *error) {
   double starts = STEADY_STARTS;
   int status = pw_cli_number ("--at", x->at_text, PW_NONNEGATIVE, &x->set.t, error);
-  x->limit.most = INFINITY;
+  x->limit.seconds = INFINITY;
   x->set.span = pw_cli_defaults (pw_file_table (x->m.file)).t_end;
   x->set.vary = -1;
   x->set.hold = x->hold;
-  if (status == PW_OK) status = pw_cli_number ("--limit", x->line.limit, PW_POSITIVE, &x->limit.most, error);
+  if (status == PW_OK) status = pw_cli_number ("--limit", x->line.limit, PW_POSITIVE, &x->limit.seconds, error);
   if (status == PW_OK) status = pw_cli_number ("--starts", x->starts_text, PW_REAL, &starts, error);
   if (status == PW_OK && !(starts >= 0 && starts <= 1e9 && starts == floor (starts)))
     status = pw_fail (error, PW_INPUT, "--starts %s: expected a whole number >= 0", x->starts_text);
@@ -148,7 +148,7 @@ static int steady_branch (pw_steady_cli *x, const pw_steady_point *from, int dir
   x->end = more;
   char *end = x->end[x->branches++];
   pw_steady_motion m = { 0 };
-  pw_progress progress = { .t_end = 0 };
+  pw_progress progress = { .title = NULL };
   const double begin = from->motion.parameter;
   int status = pw_steady_follow (x->steady, from->motion.q, from->motion.v, begin, direction, error);
   while (status == PW_OK && !steady_stop (x)) {
@@ -171,8 +171,8 @@ static int steady_seen (const pw_steady_cli *x, const pw_steady_motion *m, int f
   return seen;
 }
 
-/* Follows the solutions that are on no branch yet: from one end of the range, or in between in both directions unless the
- * branch returns. */
+/* Follows the solutions that are on no branch yet: from one end of the range, or in between in both directions unless
+ * the branch returns. */
 static int steady_from (pw_steady_cli *x, double parameter, int direction, pw_error *error) {
   int known = x->points, status = steady_search (x, parameter, error), found = x->points - known;
   int inside = parameter != x->set.first && parameter != x->set.last;
@@ -296,9 +296,9 @@ const pw_command pw_cli_steady = {
       "Find steady motions, in which every body moves with one frame at constant speed and angular velocity, and "
       "equilibria; with --vary, follow them over a parameter, through folds, with eigenvalues and the values at which "
       "stability changes.",
-  .least = 1,
-  .most = 1,
-  .size = sizeof (pw_steady_cli),
+  .min_arguments = 1,
+  .max_arguments = 1,
+  .options_size = sizeof (pw_steady_cli),
   .function = steady_command,
   .options = steady_options_table,
 };

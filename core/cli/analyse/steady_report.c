@@ -198,7 +198,7 @@ static int steady_csv (const void *context, FILE *f, pw_error *error) {
   const pw_steady_cli *x = context;
   const pw_system *s = x->m.system;
   int states = 2 * pw_system_coordinates (s), most = steady_eigenvalues (x);
-  pw_text t = { .at = NULL };
+  pw_text t = { .chars = NULL };
   char name[300];
   pw_text_cell (&t, "branch,event");
   pw_text_name (&t, x->vary_text ? x->vary.name : "parameter", x->vary.unit);

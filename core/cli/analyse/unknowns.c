@@ -42,8 +42,8 @@ int pw_unknowns_open (pw_unknowns *u, const pw_cli_line *line, const pw_cli_mode
   if (status == PW_OK) status = pw_cli_specialise (line->specialise, &u->when, error);
   if (status != PW_OK) return status;
   u->settings.stop = NULL;
-  u->limit = limit.most;
-  pw_cli_unused (u->method, line);
+  u->limit = limit.seconds;
+  pw_cli_report_unused (u->method, line);
   return PW_OK;
 }
 
@@ -140,7 +140,7 @@ int pw_unknown_run_open (pw_unknown_run *to, const pw_unknowns *u, const double 
 
 int pw_unknown_run_prepare (pw_unknown_run *to, const pw_unknowns *u, const double *x, pw_error *error) {
   const pw_specialised *code = pw_cli_engine_code (&u->engine);
-  *to = (pw_unknown_run){ .settings = u->settings, .limit = { .most = u->limit } };
+  *to = (pw_unknown_run){ .settings = u->settings, .limit = { .seconds = u->limit } };
   if (pw_unknowns_system (&to->m, u, x, error) != PW_OK) return error->status;
   to->settings.stop = pw_limit_over;
   to->settings.stop_context = &to->limit;
@@ -161,7 +161,7 @@ void pw_unknowns_report (const pw_unknowns *u, const double *x) {
   pw_unknown_run r;
   if (pw_unknown_run_prepare (&r, u, x, &(pw_error){ 0 }) == PW_OK)
     r.run = pw_run_open (r.m.system, u->method, &r.settings, NULL);
-  if (r.run && pw_cli_change (r.run, r.m.system, text) > 0)
+  if (r.run && pw_cli_largest_change (r.run, r.m.system, text) > 0)
     pw_cli_say ("pinwheel: the constraints changed given initial values of this result, at worst %s\n", text);
   pw_unknown_run_close (&r);
 }
@@ -169,8 +169,8 @@ void pw_unknowns_report (const pw_unknowns *u, const double *x) {
 /* ---- Directions ---- */
 
 /* 1e-5 of the number's size: the error of extrapolated differences is then about 1e-10, mostly round-off.  It is at
- * least 0.1 for angles, the scene's unit for initial values, 1e-3 of its scale for an unknown of a search; that of a parameter
- * that is 0 is its default, else 1. */
+ * least 0.1 for angles, the scene's unit for initial values, 1e-3 of its scale for an unknown of a search; that of a
+ * parameter that is 0 is its default, else 1. */
 static double unknown_step (const pw_unknown *u, double value, const pw_run *r) {
   if (u->step > 0) return u->step;
   double size = fabs (value), length = pw_run_scale (r)->length, time = pw_run_scale (r)->time;
@@ -180,7 +180,8 @@ static double unknown_step (const pw_unknown *u, double value, const pw_run *r) 
   return 1e-5 * fmax (size > 0 ? size : 1, 1e-3 * u->scale);
 }
 
-/* Keeps the neighbours within the domain: a positive parameter gets a smaller step, at a closed end they are on one side. */
+/* Keeps the neighbours within the domain: a positive parameter gets a smaller step, at a closed end they are on one
+ * side. */
 static void unknown_stay_inside (const pw_unknown *u, double value, pw_direction *d) {
   pw_domain domain = u->parameter ? u->parameter->domain : PW_REAL;
   if (domain == PW_POSITIVE) d->step = fmin (d->step, value / 4);

@@ -63,14 +63,14 @@ int pw_unknown_run_open (pw_unknown_run *to, const pw_unknowns *u, const double 
 int pw_unknown_run_prepare (pw_unknown_run *to, const pw_unknowns *u, const double *x, pw_error *error);
 void pw_unknown_run_close (pw_unknown_run *x);
 
-/* Directions of the run along all unknowns, with their neighbours; x is used for these and restored.  near: 4
- * runs of each unknown, zero before, which are opened without specialised code.  Close all of them, also after an error. */
+/* Directions of the run along all unknowns, with their neighbours; x is used for these and restored.  near: 4 runs of
+ * each unknown, zero before, which are opened without specialised code.  Close all of them, also after an error. */
 int pw_unknowns_directions (pw_direction *d, const pw_unknowns *u, double *x, pw_unknown_run *run, pw_unknown_run *near,
                             pw_error *error);
 
 /* Points where searches begin, `count` x unknowns: the values at the beginning, then Sobol's sequence between the
- * user's bounds, otherwise within a scale of the values, shifted modulo 1 by random numbers from the seed.  Several starts: at most
- * PW_UNKNOWNS_STARTED unknowns, the limit of the sequence.  NULL if out of memory; free it. */
+ * user's bounds, otherwise within a scale of the values, shifted modulo 1 by random numbers from the seed.  Several
+ * starts: at most PW_UNKNOWNS_STARTED unknowns, the limit of the sequence.  NULL if out of memory; free it. */
 enum { PW_UNKNOWNS_STARTED = 40 };
 double *pw_unknowns_starts (const pw_unknowns *u, int count, double seed);
 

@@ -66,7 +66,7 @@ static int search_differentiate (search *p, pw_error *error) {
   pw_sensitivity s = { .of = p->x->text, .unknowns = *u, .no_error = 1 };
   int status = pw_sensitivity_open (&s, p->at, error);
   if (status == PW_OK) status = pw_sensitivity_compute (&s, &silent, error);
-  if (status == PW_OK && s.stopped) status = pw_limit_fail (&s.limit, pw_run_time (s.base.run), error);
+  if (status == PW_OK && s.stopped) status = pw_limit_status (&s.limit, pw_run_time (s.base.run), error);
   for (int i = 0; i < p->x->outputs && status == PW_OK; i++) {
     p->value[i] = pw_outcome_value (&s.outcomes, i, NULL);
     for (int j = 0; j < u->count && status == PW_OK; j++) {

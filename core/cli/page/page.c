@@ -141,7 +141,7 @@ static int page_open (page *x, pw_error *error) {
   if (x->path == NULL) return pw_fail (error, PW_INPUT, "-o FILE.html is missing: the page to write");
   int status = pw_animation_check ("-o", x->path, error);
   if (status == PW_OK) status = pw_cli_open (&x->m, &x->line, error);
-  if (status == PW_OK) status = pw_cli_uses (&x->line, x->m.file, use, 2, error);
+  if (status == PW_OK) status = pw_cli_check_uses (&x->line, x->m.file, use, 2, error);
   if (status != PW_OK) return status;
   pw_run_defaults d = pw_cli_defaults (pw_file_table (x->m.file));
   status = pw_cli_settings (&x->line, &d, &x->t_end, &x->settings, &x->limit, error);
@@ -176,9 +176,9 @@ const pw_command pw_cli_page = {
           "for parameters, initial values, tolerance and final time, the animation, curves, and the error of the run "
           "next to its cost. The options set what the page begins with. A model in C is compiled to WebAssembly by "
           "clang.",
-  .least = 1,
-  .most = 1,
-  .size = sizeof (page),
+  .min_arguments = 1,
+  .max_arguments = 1,
+  .options_size = sizeof (page),
   .function = page_command,
   .options = page_options,
 };

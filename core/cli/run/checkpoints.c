@@ -60,8 +60,8 @@ static int checkpoints_head (pw_run_command *x, pw_error *error) {
   char numbers[60];
   pw_text *t = &x->check.head;
   const pw_model *m = x->m.model;
-  if (pw_fingerprint_run (t, PW_CHECKPOINT_MAGIC, x->m.file, pw_check_tables (0, m), x->method, &x->settings, error) !=
-      PW_OK)
+  if (pw_fingerprint_run (t, PW_CHECKPOINT_MAGIC, x->m.file, pw_fingerprint_tables (0, m), x->method, &x->settings,
+                          error) != PW_OK)
     return error->status;
   if (x->engine.code) pw_fingerprint_line (t, checkpoints_engine, NULL, "specialised");
   for (const pw_parameter *q = pw_model_table (m)->parameters; q && q->name; q++)
@@ -86,10 +86,10 @@ static int checkpoints_head (pw_run_command *x, pw_error *error) {
 
 /* Refuses a checkpoint of another run. */
 static int checkpoints_match (const pw_checkpoints *c, pw_error *error) {
-  static const char *words[2] = { "there", "here" };
+  const pw_fingerprint there = { c->from.text, c->from.head_end, "there" },
+                       here = { c->head.chars, c->head.chars + c->head.length, "here" };
   char what[300];
-  if (c->resume && pw_fingerprint_differ (c->from.text, c->from.head_end, c->head.at, c->head.at + c->head.used, 1,
-                                          words, what, sizeof what))
+  if (c->resume && pw_fingerprint_differ (there, here, NULL, what, sizeof what))
     return pw_fail (error, PW_INPUT, "the checkpoint %.100s belongs to another run: %.300s", c->resume, what);
   return PW_OK;
 }
@@ -133,8 +133,8 @@ static void checkpoints_next (pw_checkpoints *c, double t) {
 static void checkpoints_serialise (pw_run_command *x, pw_archive *a) {
   pw_archive_bytes (a, &x->row, sizeof x->row);
   pw_archive_bytes (a, &x->cpu, sizeof x->cpu);
-  pw_archive_bytes (a, x->engine.why, sizeof x->engine.why);
-  x->engine.why[sizeof x->engine.why - 1] = 0;
+  pw_archive_bytes (a, x->engine.reason, sizeof x->engine.reason);
+  x->engine.reason[sizeof x->engine.reason - 1] = 0;
   if (x->plots) pw_plots_serialise (x->plots, a);
   pw_comparison_serialise (&x->comparison, a);
 }
@@ -177,7 +177,7 @@ int pw_checkpoints_save (pw_run_command *x, pw_error *error) {
   checkpoints_next (c, t);
   if (c->state.failed) return pw_fail (error, PW_RESOURCE, "out of memory while saving a checkpoint");
   pw_output *o = pw_output_open_as (c->path, ".next", error);
-  status = o ? pw_checkpoint_put (o, c->head.at, &c->state, error) : error->status;
+  status = o ? pw_checkpoint_put (o, c->head.chars, &c->state, error) : error->status;
   if (status == PW_OK) c->saved = t;
   return status;
 }

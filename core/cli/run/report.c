@@ -43,7 +43,7 @@ static void report_atol (pw_run *r, const pw_system *s, double atol) {
 
 void pw_report_settings (pw_run *r, const pw_system *s, const char *method, const pw_cli_line *l,
                          const pw_settings *settings) {
-  pw_cli_unused (method, l);
+  pw_cli_report_unused (method, l);
   if (pw_cli_adaptive (method) == 1)
     report_atol (r, s, settings->atol);
   else

@@ -30,7 +30,7 @@ static int run_uses (run *x, pw_error *error) {
                    { "--json", x->json_path, PW_WRITES, NULL },
                    { "--animate", x->animate_path, PW_WRITES, NULL },
                    { "--plots", x->plots_path, PW_WRITES_INTO, pw_figure_endings } };
-  return pw_cli_uses (&x->line, x->m.file, use, sizeof use / sizeof *use, error);
+  return pw_cli_check_uses (&x->line, x->m.file, use, sizeof use / sizeof *use, error);
 }
 
 /* Opens an output file; a path of standard output becomes "-". */
@@ -48,9 +48,9 @@ static int run_open_outputs (run *x, pw_error *error) {
   if (ending && strcmp (ending, ".npz") == 0 && (x->check.path || x->check.resume))
     return pw_fail (error, PW_INPUT, "-o %s: an .npz archive cannot be continued after a checkpoint: write a .csv",
                     x->csv_path);
-  int status = pw_cli_only ("--every", x->every_text, "-o FILE", x->csv_path != NULL, error);
-  if (status == PW_OK) status = pw_cli_only ("--width", x->line.width, "--plots DIR", x->plots_path != NULL, error);
-  if (status == PW_OK) status = pw_cli_only ("--colour", x->colour, "--plots DIR", x->plots_path != NULL, error);
+  int status = pw_cli_requires ("--every", x->every_text, "-o FILE", x->csv_path != NULL, error);
+  if (status == PW_OK) status = pw_cli_requires ("--width", x->line.width, "--plots DIR", x->plots_path != NULL, error);
+  if (status == PW_OK) status = pw_cli_requires ("--colour", x->colour, "--plots DIR", x->plots_path != NULL, error);
   if (status == PW_OK && x->animate_path) status = pw_animation_check ("--animate", x->animate_path, error);
   if (status == PW_OK) status = run_uses (x, error);
   if (status == PW_OK) status = run_open_output (x, PW_RUN_SUMMARY, &x->json_path, error);
@@ -102,14 +102,14 @@ static int run_engine (run *x, pw_error *error) {
   int general = x->profile && when == PW_SPECIALISE_AUTO; /* the stages of --profile are those of the general engine */
   pw_cli_engine_open (&x->engine, x->m.system, general ? PW_SPECIALISE_NEVER : when,
                       pw_method_steps (x->method, &x->settings, d.step, x->t_end));
-  if (general) strcpy (x->engine.why, "--profile");
+  if (general) strcpy (x->engine.reason, "--profile");
   x->settings.specialised = pw_cli_engine_code (&x->engine);
   return PW_OK;
 }
 
 /* Reports why a run does not use the compiled code. */
 static const char *run_unspecialised (const run *x) {
-  if (x->engine.code == NULL) return x->engine.why;
+  if (x->engine.code == NULL) return x->engine.reason;
   return pw_run_statistics (x->r)->specialised
              ? ""
              : "the method, its options or redundant drives do not permit specialised code";
@@ -207,14 +207,15 @@ static int run_integrate (run *x, pw_error *error) {
   int table_on_screen = x->csv_path && strcmp (x->csv_path, "-") == 0;
   x->batch = 1;
   pw_stop_catch ();
-  pw_progress_start (&x->progress, pw_file_name (x->m.file), x->t_end, !table_on_screen);
-  x->progress.from = pw_run_time (x->r);
+  pw_progress_start (&x->progress, pw_file_name (x->m.file), x->t_end);
+  x->progress.no_bar = table_on_screen;
+  x->progress.first = pw_run_time (x->r);
   int status = run_steps (x, error);
   pw_progress_end (&x->progress);
   pw_stop_release ();
   const pw_statistics *s = pw_run_statistics (x->r);
   x->limited = status == PW_STOPPED || (status == PW_METHOD && s->steps + s->rejected >= x->settings.max_steps);
-  if (status == PW_STOPPED) status = pw_limit_fail (&x->limit, pw_run_time (x->r), error);
+  if (status == PW_STOPPED) status = pw_limit_status (&x->limit, pw_run_time (x->r), error);
   return status;
 }
 
@@ -228,7 +229,7 @@ static void run_close_table (run *x, int good, pw_error *error) {
   int is_file = *o ? pw_output_is_file (*o) : x->csv_path != NULL;
   if (*o && good && pw_output_ready (*o, error) == PW_OK) return;
   x->lost = is_file && error->status == PW_RESOURCE;
-  if (*o) pw_text_abandon (*o, x->check.resume ? 1 : x->row, x->part[PW_RUN_TABLE], sizeof *x->part);
+  if (*o) pw_cli_abandon_table (*o, x->check.resume ? 1 : x->row, x->part[PW_RUN_TABLE], sizeof *x->part);
   if (good) *x->part[PW_RUN_TABLE] = 0; /* the error names it */
   *o = NULL;
 }
@@ -321,7 +322,7 @@ static int run_finish (run *x, pw_error *error) {
   if (x->profile && last && error->status == PW_OK && !interrupted)
     pw_print_profile (x->m.system, x->r, x->cpu, run_prints_file (x) ? stderr : stdout, error);
   if (interrupted) pw_cli_say ("pinwheel: %s\n", reason);
-  int status = pw_cli_end (error);
+  int status = pw_cli_report_error (error);
   error->status = PW_OK;
   for (int i = 0; i < PW_RUN_OUTPUTS; i++)
     if (*x->part[i]) pw_cli_say ("pinwheel: %s is kept in %s\n", what[i], x->part[i]);
@@ -380,9 +381,9 @@ const pw_command pw_cli_run = {
   .summary = "integrate a model; write a table, a summary, figures, an animation",
   .help = "Integrate the equations of motion of a model and show the final state, reactions and constraint residuals. "
           "Options that are not given have the model's own defaults, see `pinwheel show MODEL`.",
-  .least = 1,
-  .most = 1,
-  .size = sizeof (run),
+  .min_arguments = 1,
+  .max_arguments = 1,
+  .options_size = sizeof (run),
   .function = run_command,
   .options = run_options,
 };

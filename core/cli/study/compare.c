@@ -136,7 +136,7 @@ static int compare_plan (pw_study *s, pw_error *error) {
   pw_compare *x = (pw_compare *)s;
   ladder of[2] = { { 0.1, 1e-4 }, { 1e-3, 1e-12 } }; /* steps, tolerances */
   s->t_end = pw_cli_defaults (pw_file_table (s->m.file)).t_end;
-  s->limit.most = INFINITY; /* the clock is read between batches of steps only: timed runs are not slowed down */
+  s->limit.seconds = INFINITY; /* the clock is read between batches of steps only: timed runs are not slowed down */
   s->cpu_end = 10;
   x->repeats = 9;
   int status = pw_cli_number ("--t-end", s->line.t_end, PW_POSITIVE, &s->t_end, error);
@@ -363,9 +363,9 @@ const pw_command pw_cli_compare = {
   .summary = "compare the accuracy and cost of methods against a reference solution",
   .help = "Run a model by several methods, each with a ladder of tolerances or step sizes, and compare their errors "
           "against a reference solution with their processor times.",
-  .least = 1,
-  .most = 1,
-  .size = sizeof (pw_compare),
+  .min_arguments = 1,
+  .max_arguments = 1,
+  .options_size = sizeof (pw_compare),
   .function = compare_command,
   .options = compare_options,
 };

@@ -233,7 +233,7 @@ static int drift_begin (pw_study *x, pw_error *error) {
 static int drift_write_times (const pw_study *x, pw_error *error) {
   pw_output *o = pw_figure_open (x->folder, "drift-time.csv", error);
   if (o == NULL) return error->status;
-  pw_text t = { .at = NULL };
+  pw_text t = { .chars = NULL };
   pw_text_cell (&t, "method,t [s],position,velocity,balance [J]");
   int status = pw_text_line (&t, pw_output_stream (o), x->folder, error);
   for (const pw_row *r = x->row; r < x->row + x->rows; r++)
@@ -243,7 +243,7 @@ static int drift_write_times (const pw_study *x, pw_error *error) {
       for (int i = 0; i <= DRIFT_QUANTITIES; i++) pw_text_number (&t, r->point[k][i]);
       status = pw_text_line (&t, pw_output_stream (o), x->folder, error);
     }
-  return pw_text_end (o, status, error);
+  return pw_cli_close_table (o, status, error);
 }
 
 /* A panel for each quantity that is not always zero, against time, alpha, or the interval between projections. */
@@ -310,9 +310,9 @@ const pw_command pw_cli_drift = {
   .help =
       "Compare how constraint residuals and the energy defect grow during a long run, by method and stabilisation, and "
       "how they depend on the parameters of Baumgarte stabilisation and projection.",
-  .least = 1,
-  .most = 1,
-  .size = sizeof (pw_drift),
+  .min_arguments = 1,
+  .max_arguments = 1,
+  .options_size = sizeof (pw_drift),
   .function = drift_command,
   .options = drift_options,
 };

@@ -198,7 +198,7 @@ int pw_reference_write (const pw_reference *ref, const char *folder, const pw_st
   pw_output *o = pw_figure_open (folder, "truth.csv", error);
   if (o == NULL) return error->status;
   FILE *f = pw_output_stream (o);
-  pw_text t = { .at = NULL };
+  pw_text t = { .chars = NULL };
   pw_text_cell (&t, "truth,against");
   for (int k = 0; k < MOTION_ERRORS; k++) pw_text_name (&t, of[k].name, of[k].unit);
   int status = pw_text_line (&t, f, folder, error);
@@ -208,5 +208,5 @@ int pw_reference_write (const pw_reference *ref, const char *folder, const pw_st
     for (int k = 0; k < MOTION_ERRORS; k++) pw_text_number (&t, i < 0 ? ref->uncertainty[k] : ref->partner[i].error[k]);
     status = pw_text_line (&t, f, folder, error);
   }
-  return pw_text_end (o, status, error);
+  return pw_cli_close_table (o, status, error);
 }

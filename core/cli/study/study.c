@@ -121,7 +121,7 @@ static int study_steps (pw_study *x, pw_row *r, pw_run *run, const pw_limit *lim
     if (used < STUDY_SHORT && n == batch && batch < 65536) batch *= 2;
     if (used > STUDY_LONG && batch > 1) batch /= 2;
     pw_study_part (x, r, x->share * (r->runs + pw_run_time (run) / x->t_end));
-    if (status == PW_STOPPED) return pw_limit_fail (limit, pw_run_time (run), error);
+    if (status == PW_STOPPED) return pw_limit_status (limit, pw_run_time (run), error);
     if (status == PW_OK && r->cpu > x->cpu_end && pw_run_time (run) < x->t_end) {
       r->state = ROW_STOPPED;
       return PW_RETRY;
@@ -176,9 +176,9 @@ static int study_open_folder (pw_study *x, pw_error *error) {
   pw_use use[] = { PW_CLI_MODEL_USE,
                    { "--reference", x->reference_path, PW_READS, NULL },
                    { "-o", x->folder, PW_WRITES_INTO, names } };
-  if (x->folder == NULL) return pw_cli_only ("--width", x->line.width, "-o DIR", 0, error);
+  if (x->folder == NULL) return pw_cli_requires ("--width", x->line.width, "-o DIR", 0, error);
   if (pw_figures_of (&x->figures, &x->line, &x->m, x->folder, error) != PW_OK) return error->status;
-  if (pw_cli_uses (&x->line, x->m.file, use, sizeof use / sizeof *use, error) != PW_OK) return error->status;
+  if (pw_cli_check_uses (&x->line, x->m.file, use, sizeof use / sizeof *use, error) != PW_OK) return error->status;
   x->lock = pw_cli_folder (x->folder, error);
   return x->lock < 0 ? error->status : pw_study_open_table (x, error);
 }
@@ -247,7 +247,7 @@ static int study_rows (pw_study *x, pw_error *error) {
   pw_stop_catch ();
   int status = x->type->begin (x, error);
   if (status == PW_OK && x->engine.code) puts ("all runs use code specialised for this scene where the method can\n");
-  if (status == PW_OK && x->engine.code == NULL) printf ("all runs use the general engine: %s\n\n", x->engine.why);
+  if (status == PW_OK && x->engine.code == NULL) printf ("all runs use the general engine: %s\n\n", x->engine.reason);
   pw_study_show (x, pw_file_name (x->m.file), x->type->unit, x->rows);
   if (status == PW_OK && x->type->timed)
     status = pw_study_parallel (x, x->methods, study_method, x, error);
@@ -265,7 +265,7 @@ static int study_finish (pw_study *x, int status, pw_error *error) {
   if (x->csv && status == PW_OK)
     status = pw_output_finish (x->csv, error);
   else if (x->csv)
-    pw_text_abandon (x->csv, x->done, part, sizeof part);
+    pw_cli_abandon_table (x->csv, x->done, part, sizeof part);
   if (status == PW_RETRY && pw_stop) {
     pw_cli_say ("pinwheel: interrupted; %d of %d %s are done%s%s\n", x->done, x->rows, x->type->unit,
                 *part ? ", and kept in " : "", part);

@@ -20,7 +20,7 @@ static int table_is_end (const pw_study_column *c) {
 
 /* Rows are written as they finish, to NAME.part, which remains if the study is stopped. */
 int pw_study_open_table (pw_study *x, pw_error *error) {
-  pw_text t = { .at = NULL };
+  pw_text t = { .chars = NULL };
   x->csv = pw_figure_open (x->folder, x->type->tables[0], error);
   if (x->csv == NULL) return error->status;
   for (const pw_study_column *c = x->type->column; !table_is_end (c); c++)
@@ -30,7 +30,7 @@ int pw_study_open_table (pw_study *x, pw_error *error) {
 }
 
 static int table_write (const pw_study *x, const pw_row *r, pw_error *error) {
-  pw_text t = { .at = NULL };
+  pw_text t = { .chars = NULL };
   for (const pw_study_column *c = x->type->column; !table_is_end (c); c++)
     if (c->text)
       pw_text_cell (&t, c->text (r));

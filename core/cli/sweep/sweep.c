@@ -72,7 +72,7 @@ static int sweep_settings (sweep *x, pw_error *error) {
   p->method = x->line.method ? x->line.method : d.method;
   p->cpu = x->cpu;
   int status = pw_cli_settings (&x->line, &d, &p->t_end, &p->settings, &p->limit, error);
-  if (status == PW_OK) pw_cli_unused (p->method, &x->line);
+  if (status == PW_OK) pw_cli_report_unused (p->method, &x->line);
   if (status == PW_OK) status = pw_cli_specialise (x->line.specialise, &p->specialise, error);
   if (status == PW_OK) status = sweep_lanes (x, error);
   if (status == PW_OK) status = pw_parallel_jobs (x->jobs_text, &x->jobs, error);
@@ -87,7 +87,7 @@ static int sweep_open (sweep *x, pw_error *error) {
   if (status == PW_OK) status = pw_plan_open (&x->plan, x->ranges, error);
   if (status == PW_OK && x->plan.parts > x->plan.grid.rows)
     status = pw_fail (error, PW_INPUT, "--part %s: the grid has only %ld rows", x->part_text, x->plan.grid.rows);
-  if (status == PW_OK) status = pw_cli_uses (&x->line, x->plan.file, use, sizeof use / sizeof *use, error);
+  if (status == PW_OK) status = pw_cli_check_uses (&x->line, x->plan.file, use, sizeof use / sizeof *use, error);
   if (status == PW_OK) status = pw_journal_open (&x->journal, &x->plan, x->path, error);
   if (status != PW_OK) return status;
   if (x->journal.done > 0)
@@ -178,7 +178,7 @@ const pw_command pw_cli_sweep = {
       "Run a model for all combinations of varied parameters and initial values, and write a table with one row per "
       "run. A sweep that was interrupted is continued by the same command. A sweep may be divided into parts, which "
       "`pinwheel sweep --merge PART... -o FILE.csv` puts together.",
-  .size = sizeof (sweep),
+  .options_size = sizeof (sweep),
   .function = sweep_command,
   .options = sweep_options,
 };

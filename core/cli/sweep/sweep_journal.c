@@ -119,17 +119,17 @@ static void journal_rows (pw_journal *j, const pw_plan *p, const journal_map *ma
 }
 
 static int journal_read (pw_journal *j, const pw_plan *p, const journal_map *map, pw_error *error) {
-  static const char *words[2] = { "there", "here" };
   char what[400];
   size_t size = (size_t)(map->end - map->at), magic = strlen (PW_SWEEP_MAGIC);
-  const char *rows = pw_fingerprint_end (PW_SWEEP_MAGIC, map->at, map->end), *own = p->fingerprint.at;
+  const char *rows = pw_fingerprint_end (PW_SWEEP_MAGIC, map->at, map->end), *own = p->fingerprint.chars;
   j->size = 0;
   if (rows == NULL) { /* with an incomplete fingerprint there are no rows */
     if (memcmp (map->at, PW_SWEEP_MAGIC, size < magic ? size : magic) == 0) return PW_OK;
     return pw_fail (error, PW_INPUT, "%s exists and is not the journal of a sweep: remove it if it is not needed",
                     j->part);
   }
-  if (pw_fingerprint_differ (map->at, rows, own, own + p->fingerprint.used, 1, words, what, sizeof what))
+  const pw_fingerprint there = { map->at, rows, "there" }, here = { own, own + p->fingerprint.length, "here" };
+  if (pw_fingerprint_differ (there, here, NULL, what, sizeof what))
     return pw_fail (error, PW_INPUT,
                     "%.80s belongs to another sweep: %.300s; finish that one with its own command, or remove the file",
                     j->part, what);
@@ -148,7 +148,7 @@ static int journal_begin (pw_journal *j, const pw_plan *p, pw_error *error) {
   if (there > j->size && ftruncate (j->file, j->size) != 0)
     return pw_fail (error, PW_RESOURCE, "cannot write %s: %s", j->part, strerror (errno));
   j->created = j->size == 0;
-  return j->created ? journal_write (j, p->fingerprint.at, p->fingerprint.used, error) : PW_OK;
+  return j->created ? journal_write (j, p->fingerprint.chars, p->fingerprint.length, error) : PW_OK;
 }
 
 int pw_journal_open (pw_journal *j, const pw_plan *p, const char *path, pw_error *error) {
@@ -168,7 +168,7 @@ int pw_journal_add (pw_journal *j, const pw_plan *p, long row, int status, const
   pw_text_clear (&j->text);
   journal_line_add (&j->text, row, status, cells);
   if (j->text.failed) return pw_fail (error, PW_RESOURCE, "out of memory");
-  if (journal_write (j, j->text.at, j->text.used, error) != PW_OK) return error->status;
+  if (journal_write (j, j->text.chars, j->text.length, error) != PW_OK) return error->status;
   j->line[row / p->parts] = at;
   j->done++;
   return PW_OK;
@@ -220,7 +220,7 @@ static int table_close (pw_output *o, pw_error *error) {
 static int table_write (const pw_journal *j, const pw_plan *p, const journal_map *map, FILE *stream, pw_tally *tally,
                         pw_error *error) {
   int is_part = p->parts > 1;
-  fputs (is_part ? p->fingerprint.at : p->head.at, stream);
+  fputs (is_part ? p->fingerprint.chars : p->head.chars, stream);
   if (!is_part) putc ('\n', stream);
   for (long k = 0; k < j->rows; k++)
     if (!table_row (stream, map->at + j->line[k], map->end, p->part - 1 + k * p->parts, is_part, tally))
@@ -283,8 +283,9 @@ static int table_by_part (const void *a, const void *b) {
 static int table_match (table_part *x, int count, pw_error *error) {
   char what[400];
   for (int i = 1; i < count; i++) {
-    const char *words[2] = { "in the first", "in the second" };
-    if (pw_fingerprint_differ (x->map.at, x->rows, x[i].map.at, x[i].rows, 0, words, what, sizeof what))
+    const pw_fingerprint first = { x->map.at, x->rows, "in the first" },
+                         second = { x[i].map.at, x[i].rows, "in the second" };
+    if (pw_fingerprint_differ (first, second, "part", what, sizeof what))
       return pw_fail (error, PW_INPUT, "%.80s and %.80s are parts of different sweeps: %.300s", x->path, x[i].path,
                       what);
     if (x[i].parts != x->parts)

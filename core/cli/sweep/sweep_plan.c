@@ -102,9 +102,9 @@ static void plan_engine (pw_plan *p, const pw_system *s) {
   pw_run_defaults d = pw_cli_defaults (pw_file_table (p->file));
   double steps = (double)p->grid.rows * pw_method_steps (p->method, &p->settings, d.step, p->t_end);
   pw_cli_engine_open (&p->engine, s, p->specialise, steps);
-  const char *why = p->cpu                     ? "--cpu measures each run"
-                    : isfinite (p->limit.most) ? "--limit stops each run by itself"
-                                               : NULL;
+  const char *why = p->cpu                        ? "--cpu measures each run"
+                    : isfinite (p->limit.seconds) ? "--limit stops each run by itself"
+                                                  : NULL;
   if (why == NULL) p->code = pw_cli_engine_lanes (&p->engine, s, p->method, p->lanes, steps);
   if (why && p->lanes > 1) pw_cli_say ("pinwheel: one run after the other: %s\n", why);
 }
@@ -113,7 +113,7 @@ static int plan_scan_row (pw_plan *p, long row, plan_scan *scan, pw_error *error
   pw_cli_model m;
   pw_error own = { 0 };
   int status = pw_plan_compile (p, row, &m, &own);
-  if (status == PW_OK) p->tables = pw_check_tables (p->tables, m.model);
+  if (status == PW_OK) p->tables = pw_fingerprint_tables (p->tables, m.model);
   if (status == PW_OK) status = plan_columns_of (p, m.system, &own);
   if (status == PW_OK && !scan->built) plan_engine (p, m.system);
   pw_cli_close_model (&m);
@@ -167,13 +167,13 @@ static void plan_parameters (pw_plan *p, const pw_model *m) {
 
 static void plan_grid (pw_plan *p) {
   pw_fingerprint_initial (&p->fingerprint, p->line->starts);
-  pw_text order = { .at = NULL };
+  pw_text order = { .chars = NULL };
   for (int i = 0; i < p->grid.axes; i++) {
     pw_fingerprint_line (&p->fingerprint, "vary", p->grid.axis[i].name, p->grid.axis[i].range);
     pw_text_cell (&order, p->grid.axis[i].name);
   }
   p->fingerprint.failed |= order.failed;
-  pw_fingerprint_line (&p->fingerprint, "order", NULL, order.at ? order.at : "");
+  pw_fingerprint_line (&p->fingerprint, "order", NULL, order.chars ? order.chars : "");
   pw_text_free (&order);
 }
 
@@ -183,12 +183,12 @@ static int plan_fingerprint (pw_plan *p, const pw_model *m, pw_error *error) {
     return error->status;
   if (p->settings.max_steps != PW_MAX_STEPS)
     pw_fingerprint_number (&p->fingerprint, "max-steps", NULL, (double)p->settings.max_steps);
-  if (isfinite (p->limit.most)) pw_fingerprint_number (&p->fingerprint, "limit", NULL, p->limit.most);
+  if (isfinite (p->limit.seconds)) pw_fingerprint_number (&p->fingerprint, "limit", NULL, p->limit.seconds);
   if (p->engine.code) pw_fingerprint_line (&p->fingerprint, "engine", NULL, "specialised");
   plan_parameters (p, m);
   plan_grid (p);
   pw_fingerprint_number (&p->fingerprint, "rows", NULL, (double)p->grid.rows);
-  pw_fingerprint_line (&p->fingerprint, "columns", NULL, p->head.at ? p->head.at : "");
+  pw_fingerprint_line (&p->fingerprint, "columns", NULL, p->head.chars ? p->head.chars : "");
   snprintf (part, sizeof part, "%d/%d", p->part, p->parts);
   pw_fingerprint_line (&p->fingerprint, "part", NULL, part);
   pw_text_add (&p->fingerprint, "end\n");

@@ -219,7 +219,7 @@ static void run_cells (const row_run *x, const pw_plan *p, const pw_sample *last
 static int run_close (row_run *x, const pw_plan *p, pw_text *text) {
   pw_sample sample, *last = NULL;
   pw_error own = { 0 };
-  if (x->status == PW_STOPPED) x->status = pw_limit_fail (&x->limit, pw_run_time (x->run), &x->error);
+  if (x->status == PW_STOPPED) x->status = pw_limit_status (&x->limit, pw_run_time (x->run), &x->error);
   if (x->run && pw_run_sample (x->run, pw_run_time (x->run), &sample, &own) == PW_OK) last = &sample;
   if (x->status == PW_OK && last == NULL) x->status = own.status, x->error = own;
   if (x->status > 0 && pw_stop == 0) x->status = pw_fail (&x->error, PW_METHOD, "the method gave up");
@@ -237,7 +237,7 @@ static void rows_keep (sweep_rows *x, const row_run *r, int status, const pw_tex
   if (status == PW_RETRY || x->error->status != PW_OK) return;
   if (status == PW_RESOURCE)
     pw_fail (x->error, PW_RESOURCE, "row %ld of the grid: %s", r->row + 1, r->error.text);
-  else if (pw_journal_add (x->journal, x->plan, r->row, -status, text->at, x->error) == PW_OK)
+  else if (pw_journal_add (x->journal, x->plan, r->row, -status, text->chars, x->error) == PW_OK)
     pw_progress_at (&x->progress, (double)x->journal->done);
   if (x->error->status != PW_OK && pw_stop == 0) pw_stop = 1;
 }
@@ -285,7 +285,7 @@ static int worker_begin (sweep_rows *x, row_run *r) {
   }
   pthread_mutex_unlock (&x->lock);
   run_open (r, x->plan);
-  double change = r->run ? pw_cli_change (r->run, r->system->m.system, text) : 0;
+  double change = r->run ? pw_cli_largest_change (r->run, r->system->m.system, text) : 0;
   pthread_mutex_lock (&x->lock);
   if (r->run) rows_change (x, change, text);
   return 1;
