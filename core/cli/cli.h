@@ -178,6 +178,11 @@ pw_file *pw_cli_file (const pw_cli_line *line, pw_error *error);
 int pw_cli_open (pw_cli_model *m, const pw_cli_line *line, pw_error *error);
 void pw_cli_close_model (pw_cli_model *m);
 
+/* Reads "NAME=VALUE" of an option.  PW_INPUT if it does not have this form, which messages call `form`. */
+enum { PW_ASSIGNED_NAME = 200 }; /* longest name, its end included */
+int pw_cli_assignment (const char *option, const char *text, const char *form, char name[PW_ASSIGNED_NAME],
+                       double *value, pw_error *error);
+
 /* Calls `set`, which is pw_model_set or pw_model_set_initial, with every "NAME=VALUE" of a list ended by NULL;
  * `option` is "--set" or "--start".  PW_INPUT. */
 int pw_cli_apply (pw_model *m, const char *option, const char **list,

@@ -19,18 +19,23 @@ static int model_check_name (const pw_model *m, const char *option, const char *
   return PW_OK;
 }
 
+int pw_cli_assignment (const char *option, const char *text, const char *form, char name[PW_ASSIGNED_NAME],
+                       double *value, pw_error *error) {
+  const char *equals = strchr (text, '=');
+  if (equals == NULL || equals == text || equals - text >= PW_ASSIGNED_NAME)
+    return pw_fail (error, PW_INPUT, "%s %s: expected %s", option, text, form);
+  snprintf (name, PW_ASSIGNED_NAME, "%.*s", (int)(equals - text), text);
+  if (pw_read_expression (equals + 1, value) == PW_OK) return PW_OK;
+  return pw_fail (error, PW_INPUT, "%s %s: \"%s\" is not a number", option, text, equals + 1);
+}
+
 int pw_cli_apply (pw_model *m, const char *option, const char **list,
                   int (*set) (pw_model *m, const char *name, double value, pw_error *error), pw_error *error) {
   for (; list && *list; list++) {
-    char name[200];
+    char name[PW_ASSIGNED_NAME];
     double value;
-    const char *equals = strchr (*list, '=');
-    if (equals == NULL || equals == *list || (size_t)(equals - *list) >= sizeof name)
-      return pw_fail (error, PW_INPUT, "%s %s: expected NAME=VALUE", option, *list);
-    snprintf (name, sizeof name, "%.*s", (int)(equals - *list), *list);
-    if (pw_read_expression (equals + 1, &value) != PW_OK)
-      return pw_fail (error, PW_INPUT, "%s %s: \"%s\" is not a number", option, *list, equals + 1);
-    int status = model_check_name (m, option, *list, name, error);
+    int status = pw_cli_assignment (option, *list, "NAME=VALUE", name, &value, error);
+    if (status == PW_OK) status = model_check_name (m, option, *list, name, error);
     if (status == PW_OK) status = set (m, name, value, error);
     if (status != PW_OK) return status;
   }

@@ -80,67 +80,67 @@ void pw_fingerprint_initial (pw_text *t, const char **starts) {
 
 static const char fingerprint_last[] = "end\n", fingerprint_equals[] = " = ";
 
-/* The beginning of the line after `at`; NULL at the end, or if the line at `at` has no end. */
-static const char *fingerprint_next (const char *at, const char *end) {
-  const char *newline = at < end ? memchr (at, '\n', (size_t)(end - at)) : NULL;
-  return newline ? newline + 1 : NULL;
-}
-
-const char *pw_fingerprint_end (const char *magic, const char *at, const char *end) {
-  size_t n = strlen (magic), last = sizeof fingerprint_last - 1;
-  if ((size_t)(end - at) < n || memcmp (at, magic, n) != 0) return NULL;
-  for (const char *next; (next = fingerprint_next (at, end)) != NULL; at = next)
-    if ((size_t)(next - at) == last && memcmp (at, fingerprint_last, last) == 0) return next;
-  return NULL;
-}
-
-/* Key and value of a line; the key is NULL if the line has none. */
+/* A line: key and value, the key NULL if it has none. */
 typedef struct {
   const char *key, *value;
   size_t key_size, value_size;
 } fingerprint_entry;
 
-/* Reads the line from `line` to `next`, its line end included. */
-static fingerprint_entry fingerprint_read (const char *line, const char *next) {
+/* Reads the line at *at, which moves to the next one; 0 at the end, or if the line has no end. */
+static int fingerprint_read (const char **at, const char *end, fingerprint_entry *e) {
+  const char *line = *at, *newline = line < end ? memchr (line, '\n', (size_t)(end - line)) : NULL;
   const size_t size = sizeof fingerprint_equals - 1;
-  for (const char *c = line; c + size < next; c++)
-    if (memcmp (c, fingerprint_equals, size) == 0)
-      return (fingerprint_entry){ line, c + size, (size_t)(c - line), (size_t)(next - 1 - (c + size)) };
-  return (fingerprint_entry){ .key = NULL };
+  *e = (fingerprint_entry){ .key = NULL };
+  if (newline == NULL) return 0;
+  *at = newline + 1;
+  const char *equals = line;
+  while (equals + size <= newline && memcmp (equals, fingerprint_equals, size) != 0) equals++;
+  if (equals + size <= newline)
+    *e = (fingerprint_entry){ line, equals + size, (size_t)(equals - line), (size_t)(newline - equals) - size };
+  return 1;
+}
+
+const char *pw_fingerprint_end (const char *magic, const char *at, const char *end) {
+  size_t n = strlen (magic), last = sizeof fingerprint_last - 1;
+  fingerprint_entry e;
+  if ((size_t)(end - at) < n || memcmp (at, magic, n) != 0) return NULL;
+  for (const char *line = at; fingerprint_read (&at, end, &e); line = at)
+    if ((size_t)(at - line) == last && memcmp (line, fingerprint_last, last) == 0) return at;
+  return NULL;
 }
 
 static int fingerprint_is_key (const fingerprint_entry *e, const char *key, size_t size) {
-  return e->key_size == size && memcmp (e->key, key, size) == 0;
+  return e->key && e->key_size == size && memcmp (e->key, key, size) == 0;
 }
 
-static fingerprint_entry fingerprint_find (const char *at, const char *end, const char *key, size_t size) {
-  for (const char *next; (next = fingerprint_next (at, end)) != NULL; at = next) {
-    fingerprint_entry e = fingerprint_read (at, next);
-    if (e.key && fingerprint_is_key (&e, key, size)) return e;
-  }
-  return (fingerprint_entry){ .key = NULL };
+/* Finds a key; 0 if there is none. */
+static int fingerprint_find (const char *at, const char *end, const char *key, size_t size, fingerprint_entry *e) {
+  while (fingerprint_read (&at, end, e))
+    if (fingerprint_is_key (e, key, size)) return 1;
+  return 0;
 }
 
 const char *pw_fingerprint_value (const char *at, const char *end, const char *key, size_t *size) {
-  fingerprint_entry e = fingerprint_find (at, end, key, strlen (key));
+  fingerprint_entry e;
+  if (!fingerprint_find (at, end, key, strlen (key), &e)) return NULL;
   *size = e.value_size;
   return e.value;
 }
 
 /* Describes the first entry of `a` that `b` does not have. */
 static int fingerprint_missing (pw_fingerprint a, pw_fingerprint b, const char *ignored, char *text, size_t size) {
-  enum { SHOWN = 120 }; /* characters of a value */
-  for (const char *at = a.begin, *next; (next = fingerprint_next (at, a.end)) != NULL; at = next) {
-    fingerprint_entry own = fingerprint_read (at, next);
+  enum { SHOWN = 120 }; /* characters of a value, at most */
+  fingerprint_entry own, other;
+  for (const char *at = a.begin; fingerprint_read (&at, a.end, &own);) {
     if (own.key == NULL || (ignored && fingerprint_is_key (&own, ignored, strlen (ignored)))) continue;
-    fingerprint_entry other = fingerprint_find (b.begin, b.end, own.key, own.key_size);
-    if (other.key == NULL)
+    if (!fingerprint_find (b.begin, b.end, own.key, own.key_size, &other))
       other.value = "not set", other.value_size = strlen (other.value);
     else if (other.value_size == own.value_size && memcmp (other.value, own.value, own.value_size) == 0)
       continue;
-    snprintf (text, size, "%.*s is %.*s %s and %.*s %s", (int)own.key_size, own.key,
-              own.value_size < SHOWN ? (int)own.value_size : SHOWN, own.value, a.where,
-              other.value_size < SHOWN ? (int)other.value_size : SHOWN, other.value, b.where);
+    int shown = own.value_size < SHOWN ? (int)own.value_size : SHOWN,
+        other_shown = other.value_size < SHOWN ? (int)other.value_size : SHOWN;
+    snprintf (text, size, "%.*s is %.*s %s and %.*s %s", (int)own.key_size, own.key, shown, own.value, a.where,
+              other_shown, other.value, b.where);
     return 1;
   }
   return 0;

@@ -37,19 +37,19 @@ typedef struct {
   int stopped; /* 1: stopped before t_end */
 } pw_sensitivity;
 
-/* Prepares derivatives of the outputs x->of, ended by NULL, with respect to x->unknowns at these values; NULL: their
- * own.  Close it in every case. */
-int pw_sensitivity_open (pw_sensitivity *x, const double *at, pw_error *error);
+/* Prepares derivatives of the outputs sens->of, ended by NULL, with respect to sens->unknowns at these values; NULL:
+ * their own.  Close it in every case. */
+int pw_sensitivity_open (pw_sensitivity *sens, const double *at, pw_error *error);
 /* Begins a run with derivatives; then advances to a time, and sets value, slope and error of all columns there.  A
  * status. */
-int pw_sensitivity_start (pw_sensitivity *x, pw_error *error);
-int pw_sensitivity_at (pw_sensitivity *x, double t, pw_error *error);
+int pw_sensitivity_start (pw_sensitivity *sens, pw_error *error);
+int pw_sensitivity_at (pw_sensitivity *sens, double t, pw_error *error);
 /* All of it, with extrema, integrals and the table.  A status. */
-int pw_sensitivity_compute (pw_sensitivity *x, pw_progress *progress, pw_error *error);
-void pw_sensitivity_close (pw_sensitivity *x);
+int pw_sensitivity_compute (pw_sensitivity *sens, pw_progress *progress, pw_error *error);
+void pw_sensitivity_close (pw_sensitivity *sens);
 /* 1 if an output has columns in the table: it is a function of columns at one time, without extrema and integrals. */
-int pw_sensitivity_in_table (const pw_sensitivity *x, int output);
+int pw_sensitivity_in_table (const pw_sensitivity *sens, int output);
 /* The derivative of an output by an unknown from those of the functionals, and its error. */
-double pw_sensitivity_derivative (const pw_sensitivity *x, int output, int unknown, const double *slope);
+double pw_sensitivity_derivative (const pw_sensitivity *sens, int output, int unknown, const double *slope);
 
 #endif
