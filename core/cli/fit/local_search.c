@@ -71,7 +71,7 @@ static int search_differentiate (search *p, pw_error *error) {
     p->value[i] = pw_outcome_value (&s.outcomes, i, NULL);
     for (int j = 0; j < u->count && status == PW_OK; j++) {
       double *slope = p->slope + i * u->count + j;
-      *slope = u->list[j].scale * pw_sensitivity_derivative (&s, i, j, s.end_slope);
+      *slope = u->list[j].scale * pw_sensitivity_derivative (&s, i, j, s.run_slope);
       if (!isfinite (p->value[i] + *slope)) status = pw_fail (error, PW_METHOD, "%s has no derivative", p->x->text[i]);
     }
   }
