@@ -135,8 +135,7 @@ int pw_cli_main (const pw_command *command, int argc, const char **argv);
 /* Refuses more than `most` arguments. */
 int pw_cli_at_most (const pw_command *command, const pw_cli_line *line, int most, pw_error *error);
 
-/* PW_INPUT if an option ("--every") is given, so that its value is not NULL, without another option that it requires
- * ("-o DIR"). */
+/* PW_INPUT if an option ("--every") is given (its value is not NULL) without the one that it requires ("-o DIR"). */
 int pw_cli_requires (const char *option, const char *value, const char *required, int is_given, pw_error *error);
 
 /* Reads the value of an option ("--step") in any locale; a NULL text leaves *value unchanged.  PW_INPUT if it is not a
@@ -146,8 +145,7 @@ int pw_cli_number (const char *option, const char *text, pw_domain domain, doubl
 /* Reads a range "FIRST:LAST".  PW_INPUT, without an error, if it is not two finite numbers. */
 int pw_cli_range (const char *text, double *first, double *last);
 
-/* The settings of a run, without the ledger, from options and the defaults of the model.  They refer to the limit,
- * which must outlive the run. */
+/* The settings of a run, without the ledger, from options and defaults.  The limit must outlive the run. */
 int pw_cli_settings (const pw_cli_line *line, const pw_run_defaults *defaults, double *t_end, pw_settings *settings,
                      pw_limit *limit, pw_error *error);
 
@@ -157,8 +155,7 @@ int pw_cli_incomplete (const pw_cli_line *line, pw_error *error);
 
 /* 1 if the step size of a method follows a tolerance, 0 if it is fixed; -1 if there is no such method. */
 int pw_cli_adaptive (const char *method);
-/* Prints notices of options without effect on a method, but not if both step and tolerances are given, as scripts that
- * compare methods do. */
+/* Prints notices of options without effect on a method; steps with tolerances, common in scripts, are not reported. */
 void pw_cli_report_unused (const char *method, const pw_cli_line *line);
 
 /* ---- Models ---- */
@@ -199,8 +196,7 @@ double pw_cli_largest_change (const pw_run *r, const pw_system *s, char text[PW_
 /* A path, relative to the current directory if that contains it; the result may be in `buffer`. */
 const char *pw_cli_short_path (const char *path, char *buffer, size_t size);
 
-/* The default settings of a model for runs; those that it does not set are 10 s of rk4+projection with steps of 1e-3
- * s.  rtol is 0 if the model does not set it. */
+/* The default run settings of a model, completed by 10 s of rk4+projection with steps of 1e-3 s; rtol 0 if not set. */
 pw_run_defaults pw_cli_defaults (const pw_plugin_table *table);
 
 /* ---- The engine of runs (engine.c): what evaluates the equations of motion ---- */
@@ -221,7 +217,6 @@ char *pw_cli_source (const pw_system *s, pw_error *error);
 /* Chooses the engine for runs with `steps` steps in total; loads or compiles the code, and prints notices. */
 void pw_cli_engine_open (pw_cli_engine *e, const pw_system *s, pw_specialise when, double steps);
 void pw_cli_engine_close (pw_cli_engine *e);
-const pw_specialised *pw_cli_engine_code (const pw_cli_engine *e); /* for pw_settings.specialised */
 
 /* The code that advances `lanes` runs at once, by a method of fixed step size; NULL: one run after the other.  With
  * `lanes` 0, as many as fill a vector register, but only if all runs together have PW_LANES_STEPS steps or more, which
@@ -240,8 +235,7 @@ pw_scene_code *pw_cli_engine_lanes (const pw_cli_engine *e, const pw_system *s, 
  * for the model of the command line and, if its file is open (`file` is not NULL), for the tables that it reads. */
 int pw_cli_check_uses (const pw_cli_line *line, const pw_file *file, pw_use *use, int count, pw_error *error);
 
-/* Makes a folder and those above it, and locks it until the descriptor that is returned is closed.  -1 and the error,
- * PW_INPUT or PW_RESOURCE. */
+/* Makes a folder and those above it, and locks it until the returned descriptor is closed.  -1 and the error. */
 int pw_cli_folder (const char *folder, pw_error *error);
 
 /* The files that a command writes, and the lock of the folder that it writes into. */
@@ -261,14 +255,12 @@ int pw_files_finish (pw_files *files, pw_error *error);
 /* Unlocks the folder, and removes files that have not been completed. */
 void pw_files_close (pw_files *files);
 
-/* PW_INPUT if the path of -o (NULL: not given) ends in .npz: for commands whose tables contain texts, so that they
- * cannot be NumPy archives. */
+/* PW_INPUT if the path of -o (NULL: none) ends in .npz: NumPy archives cannot contain the texts of some tables. */
 int pw_cli_csv (const char *path, pw_error *error);
 
 /* ---- Messages ---- */
 
-/* Print to a stream, and to standard error.  On a terminal control characters are escaped, since names of files may
- * contain them. */
+/* Print to a stream, and to standard error; on a terminal control characters, as in names of files, are escaped. */
 void pw_cli_print (FILE *f, const char *format, ...) PW_PRINTF (2, 3);
 #define pw_cli_say(...) pw_cli_print (stderr, __VA_ARGS__)
 

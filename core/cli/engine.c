@@ -56,10 +56,6 @@ void pw_cli_engine_open (pw_cli_engine *e, const pw_system *s, pw_specialise whe
     engine_open_code (e, s, when);
 }
 
-const pw_specialised *pw_cli_engine_code (const pw_cli_engine *e) {
-  return pw_scene_code_table (e->code);
-}
-
 /* Why runs cannot be in lanes; NULL if they can. */
 static const char *engine_lanes_obstacle (const pw_cli_engine *e, const pw_system *s, const char *method,
                                           const pw_run *r) {

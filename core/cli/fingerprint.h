@@ -35,8 +35,7 @@ typedef struct {
   const char *where; /* in messages: "here", "there" */
 } pw_fingerprint;
 
-/* 0 if two fingerprints agree, but for the key `ignored` (which may be NULL).  1 if they differ: the text is the first
- * difference, "step is 0.001 there and 0.002 here". */
+/* 1 if fingerprints differ, not only in the key `ignored` (or NULL): text is "step is 0.001 there and 0.002 here". */
 int pw_fingerprint_differ (pw_fingerprint a, pw_fingerprint b, const char *ignored, char *text, size_t size);
 
 #endif

@@ -48,8 +48,7 @@ typedef struct {
   const parallel_cores *cores; /* NULL: threads run on any processor */
 } parallel;
 
-/* Binds the calling thread to every `threads`-th core, so that each thread has cores of its own; with several it can
- * avoid those that other programs use. */
+/* Binds the calling thread to cores of its own; with several it can avoid those that other programs use. */
 static void parallel_bind (const parallel_cores *c, int thread, int threads) {
   cpu_set_t own;
   CPU_ZERO (&own);
@@ -76,8 +75,7 @@ static void *parallel_thread (void *argument) {
   return NULL;
 }
 
-/* Calls the tasks in all threads, of which the caller is one.  The tasks wait for the lock until all threads are
- * started. */
+/* Calls the tasks in all threads, of which the caller is one; the lock keeps them waiting until all are started. */
 static int parallel_run (parallel *p) {
   if (p->threads > p->count) p->threads = p->count;
   pthread_t *thread = calloc ((size_t)p->threads + 1, sizeof *thread);

@@ -4,8 +4,7 @@
 
 #include "cli.h"
 
-/* The number of concurrent tasks: the value `text` of --jobs; if it is NULL, OMP_NUM_THREADS; without that, the
- * number of processors that this process may use. */
+/* The number of concurrent tasks: the value of --jobs, else OMP_NUM_THREADS, else that of available processors. */
 int pw_parallel_jobs (const char *text, int *jobs, pw_error *error);
 
 /* Task number i; returns a status. */

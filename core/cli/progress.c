@@ -17,10 +17,6 @@ double pw_seconds (clockid_t id) {
   return (double)now.tv_sec + 1e-9 * (double)now.tv_nsec;
 }
 
-double pw_cpu_clock (void) {
-  return pw_seconds (CLOCK_PROCESS_CPUTIME_ID);
-}
-
 void pw_progress_count (pw_progress *p, const char *title, const char *unit, double first, double last) {
   double now = pw_seconds (CLOCK_MONOTONIC);
   int lines = !isatty (STDERR_FILENO);
@@ -46,7 +42,7 @@ static void progress_duration (double seconds, char *text, size_t size) {
 }
 
 void pw_progress_at (pw_progress *p, double reached) {
-  if (p->no_bar && !p->lines) return;
+  if (p->title == NULL || (p->no_bar && !p->lines)) return;
   double now = pw_seconds (CLOCK_MONOTONIC);
   if (now < p->next) return;
   p->next = now + (p->lines ? PROGRESS_LINE_INTERVAL : PROGRESS_BAR_INTERVAL);

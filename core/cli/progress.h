@@ -4,6 +4,7 @@
 
 #include <time.h>
 
+/* Zero-initialised, it shows nothing. */
 typedef struct {
   const char *title; /* printed before the bar */
   const char *unit;  /* "s" for time; else what is counted; "": a fraction of 1 */
@@ -19,8 +20,6 @@ typedef struct {
 
 /* The time of a clock [s]. */
 double pw_seconds (clockid_t id);
-/* The processor time of the program [s]. */
-double pw_cpu_clock (void);
 
 /* Starts the progress of a run from time 0 to t_end. */
 void pw_progress_start (pw_progress *p, const char *title, double t_end);

@@ -37,19 +37,14 @@ void pw_text_add (pw_text *t, const char *text) {
   pw_text_add_bytes (t, text, strlen (text));
 }
 
-static void text_comma (pw_text *t) {
+void pw_text_cell (pw_text *t, const char *text) {
   if (t->length) pw_text_add (t, ",");
+  pw_text_add (t, text);
 }
 
 void pw_text_number (pw_text *t, double value) {
   char number[32];
-  text_comma (t);
-  pw_text_add (t, isfinite (value) ? pw_format (number, value, 17) : "nan");
-}
-
-void pw_text_cell (pw_text *t, const char *text) {
-  text_comma (t);
-  pw_text_add (t, text);
+  pw_text_cell (t, isfinite (value) ? pw_format (number, value, 17) : "nan");
 }
 
 void pw_text_name (pw_text *t, const char *name, const char *unit) {

@@ -30,8 +30,7 @@ int pw_text_line (pw_text *t, FILE *f, const char *folder, pw_error *error);
 /* Closes an incomplete table: it remains as NAME.part, whose path goes to the buffer; without rows it is removed, and
  * the path is "". */
 void pw_cli_abandon_table (pw_output *o, long rows, char *part, size_t size);
-/* Closes a table with the status of writing it: PW_OK renames it to NAME, else it remains as NAME.part.  Returns a
- * status. */
+/* Closes a table that was written with this status: with PW_OK as NAME, else as NAME.part.  Returns a status. */
 int pw_cli_close_table (pw_output *o, int status, pw_error *error);
 
 #endif

@@ -18,12 +18,10 @@
 #include "cli.h"
 #include "outcome.h"
 
-/* Tolerances of these criteria. */
 #define FUNCTIONAL_PARABOLA 1e-4
 #define FUNCTIONAL_LINEAR 0.2
 #define FUNCTIONAL_AGREE 1e-3
-/* Brent's method ends when the interval that contains an extremum is this part of the first one: nearer to it the
- * values differ by round-off only. */
+/* Brent's method ends with an interval of this part of the first one: nearer to an extremum all is round-off. */
 #define FUNCTIONAL_WIDTH 1e-8
 enum {
   FUNCTIONAL_MIDDLE = 4,                    /* index of the time in the middle of a step, see functional_times */
@@ -130,8 +128,7 @@ static double functional_signed (double t, void *context) {
   return search->f->type == PW_MAX ? -value : value;
 }
 
-/* Refines an extremum between the first and the last of three times; value: what is minimised, least at the second
- * one. */
+/* Refines an extremum between three times; value: what is minimised there, least at the second one. */
 static void functional_refine (functional_step *step, pw_functional *f, const double t[3], const double value[3]) {
   functional_search search = { step, f, t[1] };
   gsl_function minimised = { functional_signed, &search };
@@ -183,8 +180,7 @@ static int functional_begin (pw_outcomes *set, pw_run *r, pw_error *error) {
   return status;
 }
 
-/* Times in a step, increasing: its beginning, just after it, the nodes of Gauss' formula, just before the end, the
- * end. */
+/* Times in a step: its beginning, just after it, the nodes of Gauss' formula, just before the end, the end. */
 static void functional_times (const functional_step *step, double t[PW_FUNCTIONAL_TIMES]) {
   const double h = step->t1 - step->t0;
   t[0] = step->t0, t[1] = step->t0 + PW_FUNCTIONAL_INSET * h;
@@ -210,7 +206,6 @@ static int functional_needs_nodes (const pw_functional *f) {
   return pw_is_extremum (f->type) && bend > FUNCTIONAL_LINEAR * fabs (x1 - x0) && lead + bend + fabs (x1 - x0) > 0;
 }
 
-/* Adds the integral by Simpson's formula. */
 static void functional_simpson (const functional_step *step, pw_functional *f) {
   static const int time[] = { 0, FUNCTIONAL_MIDDLE, FUNCTIONAL_END };
   const double h = step->t1 - step->t0;

@@ -92,9 +92,7 @@ static int linearise_solve_steady (pw_linearise_command *cmd, pw_steady *steady,
 static int linearise_find_steady (pw_linearise_command *cmd, double span, pw_error *error) {
   pw_initial_value hold[PW_HOLDS];
   pw_steady_settings set = { .hold = hold, .t = cmd->t, .span = span, .vary = -1 };
-  int status = PW_OK;
-  for (const char **text = cmd->hold_texts; status == PW_OK && text && *text; text++)
-    status = pw_hold_read (cmd->m.system, "--hold", *text, hold, &set.holds, error);
+  int status = pw_hold_read (cmd->m.system, cmd->hold_texts, hold, &set.holds, error);
   if (status != PW_OK) return status;
   pw_steady *steady = pw_steady_open (cmd->m.system, &set, error);
   status = linearise_solve_steady (cmd, steady, error);
@@ -102,8 +100,7 @@ static int linearise_find_steady (pw_linearise_command *cmd, double span, pw_err
   return status;
 }
 
-/* Runs the model with its default method to the time of --at, and makes the state there consistent; or opens a run at
- * the steady motion. */
+/* Runs the model to the time of --at, and makes the state there consistent; or opens a run at the steady motion. */
 static int linearise_run (pw_linearise_command *cmd, pw_error *error) {
   pw_run_defaults d = pw_cli_defaults (pw_file_table (cmd->m.file));
   pw_settings settings;

@@ -26,8 +26,7 @@ typedef struct {
 
 /* Prints eigenvalues and mode shapes. */
 void pw_linearise_print (const pw_linearise_command *cmd);
-/* Write everything as JSON; [ A B ; C D ] as a table; A, B, C, D and the eigenvalues as a NumPy archive; an HTML page
- * in which the modes are animated.  Return a status. */
+/* Write all as JSON; [ A B ; C D ] as a table; matrices and eigenvalues for NumPy; a page of modes.  Statuses. */
 void pw_linearise_json (const pw_linearise_command *cmd, pw_json *j);
 int pw_linearise_csv (const pw_linearise_command *cmd, FILE *f, pw_error *error);
 int pw_linearise_page (const pw_linearise_command *cmd, FILE *f, pw_error *error);

@@ -26,8 +26,7 @@ static double linearise_damping (const pw_linear *l, int i) {
   return modulus > 0 ? -l->re[i] / modulus + 0 : NAN; /* + 0 turns -0 into 0 */
 }
 
-/* Time in which exp (rate t) doubles [s]; NaN if it does not grow.  For a decay: with -rate, the time in which it
- * halves. */
+/* Time in which exp (rate t) doubles, or with -rate halves [s]; NaN if it does not grow. */
 static double linearise_doubling_time (double rate) {
   return rate > 0 ? log (2) / rate : NAN;
 }

@@ -1,5 +1,4 @@
-/* Outputs of analyses: columns of the table of `run` by name, and the texts of outputs.  functional.c evaluates them.
- * */
+/* Outputs of analyses: columns of the table of `run` by name, and texts of outputs; functional.c has the values. */
 #define _POSIX_C_SOURCE 200809L
 #include <math.h>
 #include <stddef.h>
@@ -26,7 +25,6 @@ static const struct {
   [PW_COLUMN_LOSS] = { "loss", "J", offsetof (pw_sample, loss) },
 };
 
-/* The number of columns of a type. */
 static int outcome_count_columns (const pw_system *s, pw_column_type type) {
   if (type == PW_COLUMN_STATE) return 2 * pw_system_coordinates (s);
   if (type == PW_COLUMN_CONTACT) return 2 * pw_system_contacts (s);
@@ -104,8 +102,7 @@ static int outcome_add_functional (pw_outcomes *set, pw_functional_type type, pw
   return set->functionals++;
 }
 
-/* Name of the variable of term i in a formula, "column1".  The language of formulas does not permit the dots of
- * columns. */
+/* The variable of term i in a formula, "column1": names in formulas have no dots. */
 enum { OUTCOME_VARIABLE = 20 };
 static const char *outcome_variable (char name[OUTCOME_VARIABLE], int i) {
   snprintf (name, OUTCOME_VARIABLE, "column%d", i + 1);

@@ -45,8 +45,7 @@ double pw_column_value (const pw_system *s, pw_column c, const pw_sample *sample
 typedef enum { PW_FINAL, PW_MAX, PW_MIN, PW_MEAN, PW_INTEGRAL, PW_RMS } pw_functional_type;
 
 enum { PW_FUNCTIONAL_TIMES = 9 }; /* at which a step of the run is sampled, at most */
-/* Distance from the ends of a step, as a fraction of it, of the times that show on which side of the end of a step an
- * extremum is: columns may jump there. */
+/* Times beside the ends of a step, where columns may jump, have this distance from them, as a fraction of the step. */
 #define PW_FUNCTIONAL_INSET 1e-6
 
 static inline int pw_is_integral (pw_functional_type type) {
@@ -99,12 +98,11 @@ void pw_outcomes_close (pw_outcomes *set);
 
 /* The columns of all functionals in a sample. */
 int pw_outcomes_read (pw_outcomes *set, const pw_sample *s, double *value, pw_error *error);
-/* Evaluates the functionals along a run to t_end.  settings.stop_context is a pw_limit: the status of a run that it
- * stops is that of pw_limit_status. */
+/* Evaluates the functionals along a run to t_end; settings.stop_context is a pw_limit.  Returns a status, as of
+ * pw_limit_status if it stops the run. */
 int pw_outcomes_run (pw_outcomes *set, const char *method, const pw_settings *settings, double t_end, pw_error *error);
 
-/* The value of an output from those of the functionals.  gradient, unless NULL, receives its derivatives with respect
- * to all functionals. */
+/* The value of an output.  gradient, unless NULL, receives its derivatives with respect to all functionals. */
 double pw_outcome_value (const pw_outcomes *set, int outcome, double *gradient);
 /* Its unit, in the buffer; "" of expressions. */
 const char *pw_outcome_unit (const pw_outcomes *set, int outcome, char *buffer, size_t size);

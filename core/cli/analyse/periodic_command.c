@@ -15,7 +15,6 @@ static const int periodic_settling[PW_PERIODIC_ATTEMPTS] = { 0, 10, 100 };
 
 /* ---- Options ---- */
 
-/* Reads the options that determine the period. */
 static int periodic_read_period (pw_periodic_command *cmd, pw_error *error) {
   double periods = 1;
   cmd->settings.free = cmd->period_text && strcmp (cmd->period_text, "free") == 0;
@@ -65,19 +64,10 @@ static int periodic_read_options (pw_periodic_command *cmd, pw_error *error) {
 
 /* ---- The search ---- */
 
-/* 1 if the search is to stop, by Ctrl-C or --limit. */
 static int periodic_is_stopped (pw_periodic_command *cmd) {
   return cmd->stopped |= pw_limit_over (&cmd->limit) != 0;
 }
 
-/* Copies numbers to *at, which moves behind them; returns the copy. */
-static const double *periodic_copy (double **at, const double *from, size_t count) {
-  const double *copy = memcpy (*at, from, count * sizeof *from);
-  *at += count;
-  return copy;
-}
-
-/* Adds a copy of a motion to the points. */
 static int periodic_add (pw_periodic_command *cmd, const pw_periodic_orbit *o, pw_error *error) {
   const size_t n = (size_t)pw_system_coordinates (cmd->m.system), multipliers = (size_t)o->multipliers;
   int status = pw_grow (&cmd->point, (size_t)cmd->points, &cmd->room, sizeof *cmd->point);
@@ -85,9 +75,11 @@ static int periodic_add (pw_periodic_command *cmd, const pw_periodic_orbit *o, p
   if (at == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
   pw_periodic_point *p = cmd->point + cmd->points++;
   *p = (pw_periodic_point){ .orbit = *o, .state = at };
-  p->orbit.q = periodic_copy (&at, o->q, n), p->orbit.v = periodic_copy (&at, o->v, n);
-  p->orbit.end = periodic_copy (&at, o->end, 2 * n);
-  p->orbit.re = periodic_copy (&at, o->re, multipliers), p->orbit.im = periodic_copy (&at, o->im, multipliers);
+  p->orbit.q = memcpy (at, o->q, n * sizeof *at);
+  p->orbit.v = memcpy (at += n, o->v, n * sizeof *at);
+  p->orbit.end = memcpy (at += n, o->end, 2 * n * sizeof *at);
+  p->orbit.re = memcpy (at += 2 * n, o->re, multipliers * sizeof *at);
+  p->orbit.im = memcpy (at + multipliers, o->im, multipliers * sizeof *at);
   return PW_OK;
 }
 
@@ -108,7 +100,6 @@ static int periodic_find (pw_periodic_command *cmd, pw_periodic_orbit *o, pw_err
   return status;
 }
 
-/* Reports that no motion was found, and why. */
 static int periodic_fail (const pw_periodic_command *cmd, pw_error *error) {
   char period[60] = "a free period", tried[200] = "";
   double T = cmd->settings.period > 0 ? cmd->settings.period : cmd->settings.periods * pw_system_period (cmd->m.system);

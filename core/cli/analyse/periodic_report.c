@@ -54,7 +54,6 @@ static void periodic_print_multipliers (const pw_periodic_orbit *o, int symmetri
           o->trivial > symmetries ? ", of a shift in time" : "");
 }
 
-/* A sentence on the stability. */
 static const char *periodic_stability (const pw_periodic_orbit *o, char *text, size_t size) {
   double largest = periodic_largest (o);
   if (o->multipliers == o->trivial) return "no perturbations but shifts along symmetries";
@@ -268,7 +267,6 @@ static void periodic_write_multipliers (const pw_periodic_command *cmd, FILE *f,
   fputs ("nan nan nan\n\n\n", f);
 }
 
-/* Writes the data of the figure: its template names the blocks by number. */
 static int periodic_data (const void *context, FILE *f, pw_error *error) {
   const pw_periodic_command *cmd = context;
   int status = PW_OK;
@@ -290,7 +288,6 @@ static int periodic_data (const void *context, FILE *f, pw_error *error) {
   return status;
 }
 
-/* Writes the variables of the template: ranges of the axes, labels, names of bodies. */
 static void periodic_variables (const void *context, FILE *f) {
   const pw_periodic_command *cmd = context;
   int bodies = pw_system_bodies (cmd->m.system);

@@ -265,7 +265,7 @@ static int sensitivity_open (sensitivity *cmd, pw_error *error) {
   if (status == PW_OK) status = pw_unknowns_open (&sens->unknowns, &cmd->line, &cmd->m, error);
   if (status != PW_OK) return status;
   pw_unknowns_engine (&sens->unknowns, runs);
-  sens->unknowns.settings.specialised = pw_cli_engine_code (&sens->unknowns.engine);
+  sens->unknowns.settings.specialised = pw_scene_code_table (sens->unknowns.engine.code);
   if (cmd->folder) sens->row_interval = sens->unknowns.t_end / SENSITIVITY_ROWS;
   status = pw_cli_requires ("--every", cmd->every, "-o DIR", cmd->folder != NULL, error);
   if (status == PW_OK) status = pw_cli_number ("--every", cmd->every, PW_POSITIVE, &sens->row_interval, error);
@@ -325,9 +325,9 @@ static int sensitivity_command (void *options, pw_error *error) {
   int status = sensitivity_open (cmd, error);
   if (status == PW_OK) status = pw_figure_results (&cmd->line, &cmd->m, cmd->folder, "sensitivity", &cmd->files, error);
   if (status == PW_OK) pw_report_model (cmd->m.model);
-  const double start = pw_cpu_clock ();
+  const double start = pw_seconds (CLOCK_PROCESS_CPUTIME_ID);
   if (status == PW_OK) status = sensitivity_compute (sens, error);
-  cmd->cpu = pw_cpu_clock () - start;
+  cmd->cpu = pw_seconds (CLOCK_PROCESS_CPUTIME_ID) - start;
   if (status == PW_OK) status = sensitivity_check (sens, error);
   if (status == PW_OK) sensitivity_print (sens), sensitivity_warn (sens);
   if (status == PW_OK && cmd->folder) status = sensitivity_write (cmd, error);

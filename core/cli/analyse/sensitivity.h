@@ -31,6 +31,8 @@ typedef struct {
   int along_run;          /* 1: there are extrema or integrals */
   double last_breakpoint; /* before the time last evaluated [s] */
   double *before;         /* F + F P: values and derivatives before a jump */
+  double *q;              /* scratch */
+  char *memory;           /* of these arrays */
   size_t room;
 } pw_sensitivity;
 

@@ -35,25 +35,18 @@ double pw_sensitivity_derivative (const pw_sensitivity *sens, int output, int un
 
 enum { OF_DERIVATIVE, OF_ERROR }; /* arguments of pw_direction_weight */
 
-/* Coordinate `index` (2 i for x of wheel i) of the contact points in the system of a workspace, at the positions
- * q + factor dq. */
-static int sensitivity_contact (const pw_sensitivity *sens, pw_workspace *w, int index, const pw_sample *s,
-                                const double *dq, double factor, double *value, pw_error *error) {
-  const pw_system *system = sens->base.m.system;
-  int n = pw_system_coordinates (system), contacts = pw_system_contacts (system), status;
-  double *q = malloc ((size_t)n * sizeof *q), (*at)[3] = malloc (((size_t)contacts + 1) * sizeof *at);
-  for (int j = 0; q && j < n; j++) q[j] = s->q[j] + factor * dq[j];
-  status = q && at ? pw_workspace_contact_points (w, s->t, q, s->v, at, error)
-                   : pw_fail (error, PW_RESOURCE, "out of memory");
-  if (status == PW_OK) *value = at[index / 2][index % 2];
-  free (q);
-  free (at);
+/* Coordinate `index` (2 i for x of wheel i) of contact points in a workspace's system, at q + factor dq. */
+static int sensitivity_contact (pw_sensitivity *sens, pw_workspace *w, int index, const pw_sample *s, const double *dq,
+                                double factor, double *value, pw_error *error) {
+  for (int j = 0; j < pw_system_coordinates (sens->base.m.system); j++) sens->q[j] = s->q[j] + factor * dq[j];
+  int status = pw_workspace_contact_points (w, s->t, sens->q, s->v, sens->outcomes.contact, error);
+  if (status == PW_OK) *value = sens->outcomes.contact[index / 2][index % 2];
   return status;
 }
 
 /* The derivative of a contact point, which is a function of positions and parameters: differences in both at once.
  * dq, eq: derivatives of the positions, and their errors. */
-static int sensitivity_contact_slope (const pw_sensitivity *sens, int unknown, int index, const pw_sample *s,
+static int sensitivity_contact_slope (pw_sensitivity *sens, int unknown, int index, const pw_sample *s,
                                       const double *dq, const double *eq, double *slope, double *slope_error,
                                       pw_error *error) {
   const pw_direction *d = &sens->direction[unknown];
@@ -104,8 +97,7 @@ int pw_sensitivity_at (pw_sensitivity *sens, double t, pw_error *error) {
 
 /* ---- Functionals ---- */
 
-/* Derivatives before and after a jump are the same if their relative difference is smaller: that is due to their
- * errors. */
+/* Derivatives before and after a jump whose relative difference is smaller are the same. */
 #define SENSITIVITY_SAME 1e-5
 
 /* Adds the current derivatives of columns, times the weight of a node, to those of integrals. */
@@ -323,16 +315,19 @@ int pw_sensitivity_open (pw_sensitivity *sens, const double *values, pw_error *e
 }
 
 static int sensitivity_arrays (pw_sensitivity *sens, pw_error *error) {
-  size_t F = (size_t)sens->outcomes.functionals, P = (size_t)sens->unknowns.count;
-  sens->value = calloc (3 * F + 5 * F * P + 1, sizeof *sens->value);
+  const size_t F = (size_t)sens->outcomes.functionals, P = (size_t)sens->unknowns.count;
+  const pw_array array[] = { { &sens->value, 2 * F },
+                             { &sens->slope, F * P },
+                             { &sens->slope_error, F * P },
+                             { &sens->run_slope, F * P },
+                             { &sens->run_slope_error, F * P },
+                             { &sens->before, F + F * P },
+                             { &sens->q, (size_t)pw_system_coordinates (sens->base.m.system) } };
   sens->columns = 1;
   for (int o = 0; o < sens->outcomes.outcomes; o++)
     if (pw_sensitivity_in_table (sens, o)) sens->columns += 1 + sens->unknowns.count;
-  if (sens->value == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
-  sens->slope = sens->value + 2 * F, sens->slope_error = sens->slope + F * P;
-  sens->run_slope = sens->slope_error + F * P, sens->run_slope_error = sens->run_slope + F * P;
-  sens->before = sens->run_slope_error + F * P;
-  return PW_OK;
+  sens->memory = pw_alloc_arrays (array, sizeof array / sizeof *array);
+  return sens->memory ? PW_OK : pw_fail (error, PW_RESOURCE, "out of memory");
 }
 
 /* Opens the run again with the ledger if outputs need it. */
@@ -378,7 +373,6 @@ static int sensitivity_check_independence (const pw_sensitivity *sens, pw_error 
   return PW_OK;
 }
 
-/* Opens the run and its neighbours. */
 static int sensitivity_open_runs (pw_sensitivity *sens, pw_error *error) {
   int count = 0;
   while (sens->of[count]) count++;
@@ -418,6 +412,6 @@ void pw_sensitivity_close (pw_sensitivity *sens) {
   free (sens->neighbours);
   free (sens->direction);
   free (sens->values);
-  free (sens->value);
+  free (sens->memory);
   free (sens->row);
 }

@@ -16,15 +16,17 @@ int pw_hold_add (const pw_system *s, const char *option, const char *text, const
   return PW_OK;
 }
 
-int pw_hold_read (const pw_system *s, const char *option, const char *text, pw_initial_value *hold, int *holds,
-                  pw_error *error) {
-  char name[PW_ASSIGNED_NAME];
-  double value;
-  int status = pw_cli_assignment (option, text, "STATE=VALUE", name, &value, error);
-  if (status == PW_OK && !isfinite (value))
-    status = pw_fail (error, PW_INPUT, "%s %s: the value is not finite", option, text);
-  if (status != PW_OK) return status;
-  return pw_hold_add (s, option, text, name, value, hold, holds, error);
+int pw_hold_read (const pw_system *s, const char **texts, pw_initial_value *hold, int *holds, pw_error *error) {
+  int status = PW_OK;
+  for (; status == PW_OK && texts && *texts; texts++) {
+    char name[PW_ASSIGNED_NAME];
+    double value;
+    status = pw_cli_assignment ("--hold", *texts, "STATE=VALUE", name, &value, error);
+    if (status == PW_OK && !isfinite (value))
+      status = pw_fail (error, PW_INPUT, "--hold %s: the value is not finite", *texts);
+    if (status == PW_OK) status = pw_hold_add (s, "--hold", *texts, name, value, hold, holds, error);
+  }
+  return status;
 }
 
 void pw_states_print (const pw_system *s, const double *q, const double *v, int digits, double smallest) {

@@ -13,13 +13,11 @@ enum { PW_HOLDS = 40 }; /* values that are held, at most */
   PW_LIST_OPTION (type, member, "hold", 0, "STATE=VALUE", \
                   "Seek motions with this value of a state, or of BODY.speed, .radius or .curvature; repeatable")
 
-/* Adds a value to be held to the list, which has room for PW_HOLDS; `option` ("--hold") and its text are for messages.
- * PW_INPUT. */
+/* Adds a value to be held to a list with room for PW_HOLDS; `option` and `text` are for messages.  PW_INPUT. */
 int pw_hold_add (const pw_system *s, const char *option, const char *text, const char *name, double value,
                  pw_initial_value *hold, int *holds, pw_error *error);
-/* The same with the name and value of a text "STATE=VALUE". */
-int pw_hold_read (const pw_system *s, const char *option, const char *text, pw_initial_value *hold, int *holds,
-                  pw_error *error);
+/* Adds the values of each --hold "STATE=VALUE" of a list that ends with NULL; NULL: there are none. */
+int pw_hold_read (const pw_system *s, const char **texts, pw_initial_value *hold, int *holds, pw_error *error);
 
 /* 0 in place of a number that is smaller, and due to round-off. */
 static inline double pw_rounded (double value, double smallest) {

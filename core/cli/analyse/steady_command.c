@@ -48,8 +48,7 @@ static int steady_read_options (pw_steady_command *cmd, pw_error *error) {
   if (status == PW_OK) status = pw_cli_number ("--starts", cmd->starts_text, PW_REAL, &starts, error);
   if (status == PW_OK && !(starts >= 0 && starts <= 1e9 && starts == floor (starts)))
     status = pw_fail (error, PW_INPUT, "--starts %s: expected a whole number >= 0", cmd->starts_text);
-  for (const char **text = cmd->hold_texts; status == PW_OK && text && *text; text++)
-    status = pw_hold_read (cmd->m.system, "--hold", *text, cmd->hold, &cmd->settings.holds, error);
+  if (status == PW_OK) status = pw_hold_read (cmd->m.system, cmd->hold_texts, cmd->hold, &cmd->settings.holds, error);
   if (status == PW_OK && cmd->vary_text) status = steady_read_vary (cmd, error);
   cmd->random_attempts = (int)starts;
   return status;
@@ -57,7 +56,6 @@ static int steady_read_options (pw_steady_command *cmd, pw_error *error) {
 
 /* ---- Points ---- */
 
-/* Adds a copy of a motion to the points; NULL and PW_RESOURCE. */
 static pw_steady_point *steady_add (pw_steady_command *cmd, const pw_steady_motion *m, int attempt, pw_error *error) {
   size_t coordinates = (size_t)pw_system_coordinates (cmd->m.system), n = (size_t)m->linear->unknowns;
   int status = pw_grow (&cmd->point, (size_t)cmd->points, &cmd->room, sizeof *cmd->point);
@@ -93,15 +91,13 @@ static int steady_same (const pw_steady_command *cmd, const pw_steady_motion *a,
          pw_steady_same (cmd->search, a->q, a->v, b->q, b->v);
 }
 
-/* 1 if the search is to stop, by Ctrl-C or --limit. */
 static int steady_is_stopped (pw_steady_command *cmd) {
   return cmd->stopped |= pw_limit_over (&cmd->limit) != 0;
 }
 
 /* ---- The search ---- */
 
-/* Adds a solution that differs from those found; of families with the same dimension and number of growing modes only
- * one. */
+/* Adds a solution unless it is known; of families of the same dimension and stability only one. */
 static int steady_found (pw_steady_command *cmd, const pw_steady_motion *m, int attempt, pw_error *error) {
   if (m->linear->steady == PW_CHANGING) return cmd->changing++, PW_OK;
   for (int i = 0; i < cmd->points; i++) {
@@ -136,7 +132,6 @@ static int steady_search (pw_steady_command *cmd, double parameter, pw_error *er
   return status;
 }
 
-/* Reports that no motion was found, and why. */
 static int steady_fail (pw_steady_command *cmd, pw_error *error) {
   char initial[60], random[100] = "", reason[300] = "";
   if (cmd->changing)
@@ -155,7 +150,6 @@ static int steady_fail (pw_steady_command *cmd, pw_error *error) {
 
 /* ---- Branches ---- */
 
-/* Follows the branch of a point in a direction, and adds its points. */
 static int steady_follow (pw_steady_command *cmd, const pw_steady_point *from, int direction, pw_error *error) {
   char (*ends)[PW_STEADY_REASON] = realloc (cmd->end, ((size_t)cmd->branches + 1) * sizeof *ends);
   if (ends == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
@@ -220,8 +214,7 @@ static double steady_model_value (const pw_steady_command *cmd) {
                                pw_system_initial_v (s));
 }
 
-/* If what is held leaves a family of motions, holds further values, those of the motion nearest to the initial state.
- * */
+/* Where what is held leaves a family of motions, holds more, as in the motion nearest to the initial state. */
 static int steady_hold_more (pw_steady_command *cmd, pw_error *error) {
   const pw_system *s = cmd->m.system;
   pw_steady_motion m;

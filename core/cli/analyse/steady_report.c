@@ -23,8 +23,7 @@ static void steady_cell (pw_table *t, double value) {
   pw_cell_number (t, 12, pw_rounded (value, STEADY_SMALL), STEADY_DIGITS);
 }
 
-/* Prints real part and frequency of the rightmost eigenvalue, or at an event of the one that crosses the imaginary
- * axis. */
+/* Prints real part and frequency of the rightmost eigenvalue, or at an event of the one that crosses the axis. */
 static void steady_cells_rightmost (pw_table *t, const pw_steady_point *p) {
   const pw_linear *l = &p->linear;
   int best = -1, crossing = p->motion.event != PW_STEADY_POINT;
@@ -55,7 +54,6 @@ static void steady_cell_name (pw_table *t, const pw_steady_command *cmd, const c
   pw_cell_unit (t, 12, name, unit);
 }
 
-/* Prints a row for each motion. */
 static void steady_print_motions (const pw_steady_command *cmd) {
   for (pw_table t = { 0 }; pw_table_pass (&t);) {
     pw_cell (&t, 6, "motion");
@@ -229,8 +227,7 @@ static int steady_csv (const void *context, FILE *f, pw_error *error) {
 
 /* ---- The figure ---- */
 
-/* Whether the part of a branch from p to the next point is stable.  An event does not count the modes that change
- * there, so that the next point decides. */
+/* Whether the branch is stable from p to the next point, which decides after an event: that omits what changes. */
 static int steady_is_stable (const pw_steady_point *p) {
   return (p->motion.event == PW_STEADY_POINT ? p : p + 1)->motion.unstable == 0;
 }
@@ -252,8 +249,7 @@ static double steady_ranked (const pw_linear *l, steady_part part, int k) {
   return NAN;
 }
 
-/* Writes the k-th real part and frequency along the stable or unstable parts of a branch, each followed by a blank
- * line. */
+/* Writes the k-th real part and frequency on the stable or unstable parts of a branch, with a blank line after each. */
 static void steady_write_parts (FILE *f, const pw_steady_point *first, int count, int k, int stable) {
   int inside = 0; /* a part that is written */
   for (const pw_steady_point *p = first; p < first + count; p++) {
@@ -266,7 +262,6 @@ static void steady_write_parts (FILE *f, const pw_steady_point *first, int count
   }
 }
 
-/* Writes the data of the figure: its template names the blocks by number. */
 static int steady_data (const void *context, FILE *f, pw_error *error) {
   const pw_steady_command *cmd = context;
   fprintf (f, "# %s, real part [1/s], frequency [Hz]: stable parts; unstable ones; events; eigenvalues [1/s]\n",
@@ -290,7 +285,6 @@ static int steady_data (const void *context, FILE *f, pw_error *error) {
   return PW_OK;
 }
 
-/* Writes the variables of the template: ranges of the axes, labels. */
 static void steady_variables (const void *context, FILE *f) {
   const pw_steady_command *cmd = context;
   double low[2] = { INFINITY, INFINITY }, high[2] = { -INFINITY, -INFINITY };

@@ -60,7 +60,6 @@ void pw_unknowns_close (pw_unknowns *u) {
 
 /* ---- Unknowns of --free ---- */
 
-/* Reads the bounds "LOW:HIGH" of an unknown. */
 static int free_bounds (pw_unknown *u, const char *text, pw_error *error) {
   double bounds[2];
   if (pw_cli_range (text, &bounds[0], &bounds[1]) != PW_OK || !(bounds[0] < bounds[1]))
@@ -140,7 +139,7 @@ int pw_unknown_run_open (pw_unknown_run *to, const pw_unknowns *u, const double 
 }
 
 int pw_unknown_run_prepare (pw_unknown_run *to, const pw_unknowns *u, const double *x, pw_error *error) {
-  const pw_specialised *code = pw_cli_engine_code (&u->engine);
+  const pw_specialised *code = pw_scene_code_table (u->engine.code);
   *to = (pw_unknown_run){ .settings = u->settings, .limit = { .seconds = u->limit } };
   if (pw_unknowns_system (&to->m, u, x, error) != PW_OK) return error->status;
   to->settings.stop = pw_limit_over;

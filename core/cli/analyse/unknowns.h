@@ -1,5 +1,4 @@
-/* Unknowns: parameters and initial values that `sensitivity`, `fit`, `optimise`, `steady` and `periodic` vary, and
- * runs with given values of them. */
+/* Unknowns: parameters and initial values that analyses and searches vary, and runs with given values of them. */
 #ifndef PW_UNKNOWNS_H
 #define PW_UNKNOWNS_H
 
@@ -40,8 +39,7 @@ typedef struct {
   pw_cli_engine engine;
 } pw_unknowns;
 
-/* Reads the options; the list of unknowns is empty.  The line and the open model must outlive it.  Close it in every
- * case. */
+/* Reads the options; there are no unknowns yet.  Line and model must outlive it.  Close it in every case. */
 int pw_unknowns_open (pw_unknowns *u, const pw_cli_line *line, const pw_cli_model *m, pw_error *error);
 void pw_unknowns_close (pw_unknowns *u);
 /* Reads unknowns from a list of "NAME" or "NAME=LOW:HIGH" of --free, ended by NULL.  PW_INPUT for an unknown name, a
@@ -81,8 +79,7 @@ int pw_unknowns_directions (pw_direction *d, const pw_unknowns *u, double *x, pw
 enum { PW_UNKNOWNS_STARTED = 40 };
 double *pw_unknowns_starts (const pw_unknowns *u, int count, double seed);
 
-/* Prints a notice if making the initial state consistent changes initial values that are given, with these values of
- * the unknowns. */
+/* Prints a notice if, with these values, making the initial state consistent changes given initial values. */
 void pw_unknowns_report (const pw_unknowns *u, const double *x);
 
 /* Writes the options that set the values, "--set a=1 --start frame.vx=2", to a text.  0 if its size is too small. */

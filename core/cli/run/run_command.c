@@ -103,7 +103,7 @@ static int run_engine (run *x, pw_error *error) {
   pw_cli_engine_open (&x->engine, x->m.system, general ? PW_SPECIALISE_NEVER : when,
                       pw_method_steps (x->method, &x->settings, d.step, x->t_end));
   if (general) strcpy (x->engine.reason, "--profile");
-  x->settings.specialised = pw_cli_engine_code (&x->engine);
+  x->settings.specialised = pw_scene_code_table (x->engine.code);
   return PW_OK;
 }
 
@@ -179,13 +179,13 @@ static int run_batch (run *x, pw_error *error) {
   double due =
       fmin (fmin (run_next_row (x), x->plots ? pw_plots_next (x->plots) : INFINITY), fmin (x->check.due, x->t_end));
   due = fmin (due, pw_motion_next (&x->comparison.motion));
-  double start = pw_cpu_clock ();
+  double start = pw_seconds (CLOCK_PROCESS_CPUTIME_ID);
   int status;
   long n = 0;
   do {
     status = pw_run_advance_towards (x->r, due, x->t_end, error);
   } while (status == PW_OK && ++n < x->batch && pw_run_time (x->r) < due && !pw_stop);
-  double used = pw_cpu_clock () - start;
+  double used = pw_seconds (CLOCK_PROCESS_CPUTIME_ID) - start;
   x->cpu += used;
   if (used < RUN_SHORT && n == x->batch && x->batch < RUN_BATCH) x->batch *= 2;
   if (used > RUN_LONG && x->batch > 1) x->batch /= 2;

@@ -137,7 +137,7 @@ int pw_study_run (pw_study *x, pw_row *r, const pw_settings *settings, pw_study_
   pw_limit_start (&limit);
   own.stop = pw_limit_over;
   own.stop_context = &limit;
-  own.specialised = pw_cli_engine_code (&x->engine);
+  own.specialised = pw_scene_code_table (x->engine.code);
   pw_run *run = pw_run_open (x->m.system, r->method, &own, error);
   if (run == NULL) return error->status;
   int status = study_steps (x, r, run, &limit, v, error);

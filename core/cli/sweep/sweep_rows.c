@@ -90,7 +90,7 @@ static const pw_specialised *rows_code (sweep_rows *x, char *text, const pw_syst
 /* Chooses the code of a new system, independently of the order of runs: that of the plan's engine if it fits, else code that is
  * generated for this system. */
 static void rows_specialise (sweep_rows *x, row_system *s) {
-  const pw_specialised *first = pw_cli_engine_code (&x->plan->engine);
+  const pw_specialised *first = pw_scene_code_table (x->plan->engine.code);
   pw_error own = { 0 };
   if (first == NULL) return;
   if (pw_specialised_fits (first, s->m.system)) {
@@ -313,7 +313,7 @@ static void worker_advance (worker *w) {
   for (row_run *r = w->run; r < w->run + w->width; r++) {
     if (r->system == NULL) continue;
     if (run_ended (r, p)) return;
-    same &= r->system->code == pw_cli_engine_code (&p->engine);
+    same &= r->system->code == pw_scene_code_table (p->engine.code);
     of[n] = r, error[n] = (pw_error){ 0 }, run[n++] = r->run;
   }
   while (!ended) {
