@@ -66,7 +66,7 @@ static int checkpoints_fingerprint (pw_run_cli *command, pw_error *error) {
   char numbers[60];
   pw_text *text = &command->checkpoints.fingerprint;
   const pw_model *model = command->compiled.model;
-  if (pw_fingerprint_run (text, PW_CHECKPOINT_MAGIC, command->compiled.file, pw_check_tables (0, model),
+  if (pw_fingerprint_run (text, PW_CHECKPOINT_MAGIC, command->compiled.file, pw_fingerprint_tables (0, model),
                           command->method, &command->settings, error) != PW_OK)
     return error->status;
   if (command->engine.code) pw_fingerprint_line (text, checkpoints_engine_key, NULL, "specialised");
@@ -92,12 +92,11 @@ static int checkpoints_fingerprint (pw_run_cli *command, pw_error *error) {
 
 /* Refuses a checkpoint of another run. */
 static int checkpoints_check_fingerprint (const pw_checkpoints *checkpoints, pw_error *error) {
-  static const char *words[2] = { "there", "here" };
-  const pw_checkpoint *resumed = &checkpoints->resumed;
   const pw_text *own = &checkpoints->fingerprint;
+  const pw_fingerprint there = { checkpoints->resumed.text, checkpoints->resumed.head_end, "there" };
+  const pw_fingerprint here = { own->chars, own->chars + own->length, "here" };
   char difference[300];
-  if (checkpoints->resume_path && pw_fingerprint_differ (resumed->text, resumed->head_end, own->at, own->at + own->used,
-                                                         1, words, difference, sizeof difference))
+  if (checkpoints->resume_path && pw_fingerprint_differ (there, here, NULL, difference, sizeof difference))
     return pw_fail (error, PW_INPUT, "the checkpoint %.100s belongs to another run: %.300s", checkpoints->resume_path,
                     difference);
   return PW_OK;
@@ -144,8 +143,8 @@ static void checkpoints_schedule (pw_checkpoints *checkpoints, double t) {
 static void checkpoints_serialise (pw_run_cli *command, pw_archive *archive) {
   pw_archive_bytes (archive, &command->rows, sizeof command->rows);
   pw_archive_bytes (archive, &command->cpu, sizeof command->cpu);
-  pw_archive_bytes (archive, command->engine.why, sizeof command->engine.why);
-  command->engine.why[sizeof command->engine.why - 1] = 0;
+  pw_archive_bytes (archive, command->engine.reason, sizeof command->engine.reason);
+  command->engine.reason[sizeof command->engine.reason - 1] = 0;
   if (command->plots) pw_plots_serialise (command->plots, archive);
   pw_comparison_serialise (&command->comparison, archive);
 }
@@ -191,7 +190,8 @@ int pw_checkpoints_save (pw_run_cli *command, pw_error *error) {
   checkpoints_schedule (checkpoints, t);
   if (checkpoints->state.failed) return pw_fail (error, PW_RESOURCE, "out of memory while saving a checkpoint");
   pw_output *output = pw_output_open_as (checkpoints->path, ".next", error);
-  status = output ? pw_checkpoint_put (output, checkpoints->fingerprint.at, &checkpoints->state, error) : error->status;
+  status =
+      output ? pw_checkpoint_put (output, checkpoints->fingerprint.chars, &checkpoints->state, error) : error->status;
   if (status == PW_OK) checkpoints->saved_time = t;
   return status;
 }

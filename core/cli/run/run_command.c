@@ -29,7 +29,7 @@ static int run_check_paths (pw_run_cli *command, pw_error *error) {
                    { "--json", command->summary_path, PW_WRITES, NULL },
                    { "--animate", command->page_path, PW_WRITES, NULL },
                    { "--plots", command->plots_path, PW_WRITES_INTO, pw_figure_endings } };
-  return pw_cli_uses (&command->line, command->compiled.file, use, sizeof use / sizeof *use, error);
+  return pw_cli_check_uses (&command->line, command->compiled.file, use, sizeof use / sizeof *use, error);
 }
 
 /* Opens an output file; a path of standard output becomes "-". */
@@ -48,9 +48,9 @@ static int run_open_outputs (pw_run_cli *command, pw_error *error) {
     return pw_fail (error, PW_INPUT, "-o %s: an .npz archive cannot be continued after a checkpoint: write a .csv",
                     command->table_path);
   int has_plots = command->plots_path != NULL;
-  int status = pw_cli_only ("--every", command->row_interval_text, "-o FILE", command->table_path != NULL, error);
-  if (status == PW_OK) status = pw_cli_only ("--width", command->line.width, "--plots DIR", has_plots, error);
-  if (status == PW_OK) status = pw_cli_only ("--colour", command->colour, "--plots DIR", has_plots, error);
+  int status = pw_cli_requires ("--every", command->row_interval_text, "-o FILE", command->table_path != NULL, error);
+  if (status == PW_OK) status = pw_cli_requires ("--width", command->line.width, "--plots DIR", has_plots, error);
+  if (status == PW_OK) status = pw_cli_requires ("--colour", command->colour, "--plots DIR", has_plots, error);
   if (status == PW_OK && command->page_path) status = pw_animation_check ("--animate", command->page_path, error);
   if (status == PW_OK) status = run_check_paths (command, error);
   if (status == PW_OK) status = run_open_output (command, PW_RUN_SUMMARY, &command->summary_path, error);
@@ -106,14 +106,14 @@ static int run_choose_engine (pw_run_cli *command, pw_error *error) {
   int general = command->profile && when == PW_SPECIALISE_AUTO;
   pw_cli_engine_open (&command->engine, command->compiled.system, general ? PW_SPECIALISE_NEVER : when,
                       pw_method_steps (command->method, &command->settings, defaults.step, command->t_end));
-  if (general) strcpy (command->engine.why, "--profile");
-  command->settings.specialised = pw_cli_engine_code (&command->engine);
+  if (general) strcpy (command->engine.reason, "--profile");
+  command->settings.specialised = pw_scene_code_table (command->engine.code);
   return PW_OK;
 }
 
 /* Why the general engine was used; "": it was not. */
 static const char *run_general_reason (const pw_run_cli *command) {
-  if (command->engine.code == NULL) return command->engine.why;
+  if (command->engine.code == NULL) return command->engine.reason;
   if (pw_run_statistics (command->run)->specialised) return "";
   return "the method, its options or redundant drives do not permit specialised code";
 }
@@ -192,13 +192,13 @@ static int run_batch (pw_run_cli *command, pw_error *error) {
   due = fmin (due, run_next_row_time (command));
   due = fmin (due, pw_motion_next_time (&command->comparison.motion));
   if (command->plots) due = fmin (due, pw_plots_next (command->plots));
-  double start = pw_cpu_clock ();
+  double start = pw_seconds (CLOCK_PROCESS_CPUTIME_ID);
   int status;
   long steps = 0;
   do {
     status = pw_run_advance_towards (command->run, due, command->t_end, error);
   } while (status == PW_OK && ++steps < command->batch && pw_run_time (command->run) < due && !pw_stop);
-  double cpu = pw_cpu_clock () - start;
+  double cpu = pw_seconds (CLOCK_PROCESS_CPUTIME_ID) - start;
   command->cpu += cpu;
   if (cpu < RUN_SHORT && steps == command->batch && command->batch < RUN_BATCH) command->batch *= 2;
   if (cpu > RUN_LONG && command->batch > 1) command->batch /= 2;
@@ -225,16 +225,16 @@ static int run_is_stdout (const char *path) {
 static int run_integrate (pw_run_cli *command, pw_error *error) {
   command->batch = 1;
   pw_stop_catch ();
-  pw_progress_start (&command->progress, pw_file_name (command->compiled.file), command->t_end,
-                     !run_is_stdout (command->table_path));
-  command->progress.from = pw_run_time (command->run);
+  pw_progress_start (&command->progress, pw_file_name (command->compiled.file), command->t_end);
+  command->progress.no_bar = run_is_stdout (command->table_path);
+  command->progress.first = pw_run_time (command->run);
   int status = run_steps (command, error);
   pw_progress_end (&command->progress);
   pw_stop_release ();
   const pw_statistics *statistics = pw_run_statistics (command->run);
   int too_many_steps = status == PW_METHOD && statistics->steps + statistics->rejected >= command->settings.max_steps;
   command->limited = status == PW_STOPPED || too_many_steps;
-  if (status == PW_STOPPED) status = pw_limit_fail (&command->limit, pw_run_time (command->run), error);
+  if (status == PW_STOPPED) status = pw_limit_status (&command->limit, pw_run_time (command->run), error);
   return status;
 }
 
@@ -250,7 +250,7 @@ static void run_close_table (pw_run_cli *command, int complete, pw_error *error)
   if (*output && complete && pw_output_ready (*output, error) == PW_OK) return;
   command->write_failed = is_file && error->status == PW_RESOURCE;
   int has_rows = command->rows > 0 || command->checkpoints.resume_path != NULL; /* a table that is continued has rows */
-  if (*output) pw_text_abandon (*output, has_rows, kept_path, sizeof *command->kept_path);
+  if (*output) pw_cli_abandon_table (*output, has_rows, kept_path, sizeof *command->kept_path);
   if (complete) *kept_path = 0; /* the error names it */
   *output = NULL;
 }
@@ -343,7 +343,7 @@ static int run_finish (pw_run_cli *command, pw_error *error) {
   if (command->profile && last && error->status == PW_OK && !interrupted)
     pw_print_profile (system, run, command->cpu, prints_file ? stderr : stdout, error);
   if (interrupted) pw_cli_say ("pinwheel: %s\n", reason);
-  int status = pw_cli_end (error);
+  int status = pw_cli_report_error (error);
   error->status = PW_OK;
   for (int i = 0; i < PW_RUN_OUTPUTS; i++)
     if (*command->kept_path[i]) pw_cli_say ("pinwheel: %s is kept in %s\n", output_name[i], command->kept_path[i]);
@@ -406,9 +406,9 @@ const pw_command pw_cli_run = {
   .summary = "integrate a model; write a table, a summary, figures, an animation",
   .help = "Integrate the equations of motion of a model and show the final state, reactions and constraint residuals. "
           "Options that are not given have the model's own defaults, see `pinwheel show MODEL`.",
-  .least = 1,
-  .most = 1,
-  .size = sizeof (pw_run_cli),
+  .min_arguments = 1,
+  .max_arguments = 1,
+  .options_size = sizeof (pw_run_cli),
   .function = run_command,
   .options = run_options,
 };

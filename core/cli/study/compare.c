@@ -143,7 +143,7 @@ static int compare_plan (pw_study *study, pw_error *error) {
   pw_compare *compare = (pw_compare *)study;
   compare_ladder ladders[2] = { { 0.1, 1e-4 }, { 1e-3, 1e-12 } }; /* steps, tolerances */
   study->t_end = pw_cli_defaults (pw_file_table (study->compiled.file)).t_end;
-  study->limit.most = INFINITY; /* the clock is read between batches of steps only: timed runs are not slowed down */
+  study->limit.seconds = INFINITY; /* the clock is read between batches of steps only: timed runs are not slowed down */
   study->cpu_limit = 10;
   compare->repeats = 9;
   int status = pw_cli_number ("--t-end", study->line.t_end, PW_POSITIVE, &study->t_end, error);
@@ -379,9 +379,9 @@ const pw_command pw_cli_compare = {
   .summary = "compare the accuracy and cost of methods against a reference solution",
   .help = "Run a model by several methods, each with a ladder of tolerances or step sizes, and compare their errors "
           "against a reference solution with their processor times.",
-  .least = 1,
-  .most = 1,
-  .size = sizeof (pw_compare),
+  .min_arguments = 1,
+  .max_arguments = 1,
+  .options_size = sizeof (pw_compare),
   .function = compare_command,
   .options = compare_options,
 };

@@ -243,7 +243,7 @@ static int drift_begin (pw_study *study, pw_error *error) {
 static int drift_write_times (const pw_study *study, pw_error *error) {
   pw_output *output = pw_figure_open (study->folder, "drift-time.csv", error);
   if (output == NULL) return error->status;
-  pw_text line = { .at = NULL };
+  pw_text line = { .chars = NULL };
   pw_text_cell (&line, "method,t [s],position,velocity,balance [J]");
   int status = pw_text_line (&line, pw_output_stream (output), study->folder, error);
   for (const pw_row *row = study->row; row < study->row + study->rows; row++)
@@ -253,7 +253,7 @@ static int drift_write_times (const pw_study *study, pw_error *error) {
       for (int i = 0; i <= DRIFT_QUANTITIES; i++) pw_text_number (&line, row->point[k][i]);
       status = pw_text_line (&line, pw_output_stream (output), study->folder, error);
     }
-  return pw_text_end (output, status, error);
+  return pw_cli_close_table (output, status, error);
 }
 
 /* A panel for each quantity that is not always zero, against time, alpha, or the interval between projections. */
@@ -322,9 +322,9 @@ const pw_command pw_cli_drift = {
   .help =
       "Compare how constraint residuals and the energy defect grow during a long run, by method and stabilisation, and "
       "how they depend on the parameters of Baumgarte stabilisation and projection.",
-  .least = 1,
-  .most = 1,
-  .size = sizeof (pw_drift),
+  .min_arguments = 1,
+  .max_arguments = 1,
+  .options_size = sizeof (pw_drift),
   .function = drift_command,
   .options = drift_options,
 };

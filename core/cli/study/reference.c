@@ -221,7 +221,7 @@ int pw_reference_write (const pw_reference *reference, const char *folder, const
   pw_output *output = pw_figure_open (folder, "truth.csv", error);
   if (output == NULL) return error->status;
   FILE *f = pw_output_stream (output);
-  pw_text line = { .at = NULL };
+  pw_text line = { .chars = NULL };
   pw_text_cell (&line, "truth,against");
   for (int k = 0; k < MOTION_ERRORS; k++) pw_text_name (&line, error_columns[k].name, error_columns[k].unit);
   int status = pw_text_line (&line, f, folder, error);
@@ -232,5 +232,5 @@ int pw_reference_write (const pw_reference *reference, const char *folder, const
       pw_text_number (&line, i < 0 ? reference->uncertainty[k] : reference->partner[i].error[k]);
     status = pw_text_line (&line, f, folder, error);
   }
-  return pw_text_end (output, status, error);
+  return pw_cli_close_table (output, status, error);
 }

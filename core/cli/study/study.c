@@ -117,7 +117,7 @@ static int study_steps (pw_study *study, pw_row *row, pw_run *run, const pw_limi
     if (used < STUDY_SHORT && n == batch && batch < STUDY_LONGEST_BATCH) batch *= 2;
     if (used > STUDY_LONG && batch > 1) batch /= 2;
     pw_study_progress (study, row, study->run_share * (row->runs + pw_run_time (run) / study->t_end));
-    if (status == PW_STOPPED) return pw_limit_fail (limit, pw_run_time (run), error);
+    if (status == PW_STOPPED) return pw_limit_status (limit, pw_run_time (run), error);
     if (status == PW_OK && row->cpu > study->cpu_limit && pw_run_time (run) < study->t_end) {
       row->state = ROW_STOPPED;
       return PW_RETRY;
@@ -133,7 +133,7 @@ int pw_study_run (pw_study *study, pw_row *row, const pw_settings *settings, pw_
   pw_limit_start (&limit);
   run_settings.stop = pw_limit_over;
   run_settings.stop_context = &limit;
-  run_settings.specialised = pw_cli_engine_code (&study->engine);
+  run_settings.specialised = pw_scene_code_table (study->engine.code);
   pw_run *run = pw_run_open (study->compiled.system, row->method, &run_settings, error);
   if (run == NULL) return error->status;
   int status = study_steps (study, row, run, &limit, visitor, error);
@@ -173,10 +173,11 @@ static int study_open_folder (pw_study *study, pw_error *error) {
   pw_use use[] = { PW_CLI_MODEL_USE,
                    { "--reference", study->reference_path, PW_READS, NULL },
                    { "-o", study->folder, PW_WRITES_INTO, names } };
-  if (study->folder == NULL) return pw_cli_only ("--width", study->line.width, "-o DIR", study->folder != NULL, error);
+  if (study->folder == NULL)
+    return pw_cli_requires ("--width", study->line.width, "-o DIR", study->folder != NULL, error);
   if (pw_figures_of (&study->figures, &study->line, &study->compiled, study->folder, error) != PW_OK)
     return error->status;
-  if (pw_cli_uses (&study->line, study->compiled.file, use, sizeof use / sizeof *use, error) != PW_OK)
+  if (pw_cli_check_uses (&study->line, study->compiled.file, use, sizeof use / sizeof *use, error) != PW_OK)
     return error->status;
   study->lock = pw_cli_folder (study->folder, error);
   return study->lock < 0 ? error->status : pw_study_open_table (study, error);
@@ -250,7 +251,7 @@ static int study_perform (pw_study *study, pw_error *error) {
   if (status == PW_OK && study->engine.code)
     puts ("all runs use code specialised for this scene where the method can\n");
   if (status == PW_OK && study->engine.code == NULL)
-    printf ("all runs use the general engine: %s\n\n", study->engine.why);
+    printf ("all runs use the general engine: %s\n\n", study->engine.reason);
   pw_study_begin_progress (study, pw_file_name (study->compiled.file), study->type->row_noun, study->rows);
   if (status == PW_OK && study->type->timed)
     status = pw_study_parallel (study, study->methods, study_measure_method, study, error);
@@ -268,7 +269,7 @@ static int study_finish (pw_study *study, int status, pw_error *error) {
   if (study->csv && status == PW_OK)
     status = pw_output_finish (study->csv, error);
   else if (study->csv)
-    pw_text_abandon (study->csv, study->written, part_path, sizeof part_path);
+    pw_cli_abandon_table (study->csv, study->written, part_path, sizeof part_path);
   if (status == PW_RETRY && pw_stop) {
     pw_cli_say ("pinwheel: interrupted; %d of %d %s are done%s%s\n", study->written, study->rows, study->type->row_noun,
                 *part_path ? ", and kept in " : "", part_path);

@@ -17,7 +17,7 @@ const char *pw_study_status (const pw_row *row) {
 /* Rows are written as they finish, to NAME.part, which remains if the study is stopped. */
 int pw_study_open_table (pw_study *study, pw_error *error) {
   const pw_study_column *column = study->type->column;
-  pw_text line = { .at = NULL };
+  pw_text line = { .chars = NULL };
   study->csv = pw_figure_open (study->folder, study->type->table_names[0], error);
   if (study->csv == NULL) return error->status;
   for (int i = 0; i < study->type->columns; i++)
@@ -28,7 +28,7 @@ int pw_study_open_table (pw_study *study, pw_error *error) {
 
 static int table_write_csv (const pw_study *study, const pw_row *row, pw_error *error) {
   const pw_study_column *column = study->type->column;
-  pw_text line = { .at = NULL };
+  pw_text line = { .chars = NULL };
   for (int i = 0; i < study->type->columns; i++)
     if (column[i].text)
       pw_text_cell (&line, column[i].text (row));

@@ -75,7 +75,7 @@ static int sweep_read_settings (pw_sweep *sweep, pw_error *error) {
   plan->method = sweep->line.method ? sweep->line.method : defaults.method;
   plan->with_cpu = sweep->with_cpu;
   int status = pw_cli_settings (&sweep->line, &defaults, &plan->t_end, &plan->settings, &plan->limit, error);
-  if (status == PW_OK) pw_cli_unused (plan->method, &sweep->line);
+  if (status == PW_OK) pw_cli_report_unused (plan->method, &sweep->line);
   if (status == PW_OK) status = pw_cli_specialise (sweep->line.specialise, &plan->specialise, error);
   if (status == PW_OK) status = sweep_read_lanes (sweep, error);
   if (status == PW_OK) status = pw_parallel_jobs (sweep->jobs_text, &sweep->jobs, error);
@@ -91,7 +91,8 @@ static int sweep_open (pw_sweep *sweep, pw_error *error) {
   if (status == PW_OK && sweep->plan.parts > sweep->plan.grid.rows)
     status =
         pw_fail (error, PW_INPUT, "--part %s: the grid has only %ld rows", sweep->part_text, sweep->plan.grid.rows);
-  if (status == PW_OK) status = pw_cli_uses (&sweep->line, sweep->plan.file, use, sizeof use / sizeof *use, error);
+  if (status == PW_OK)
+    status = pw_cli_check_uses (&sweep->line, sweep->plan.file, use, sizeof use / sizeof *use, error);
   if (status == PW_OK) status = pw_journal_open (&sweep->journal, &sweep->plan, sweep->path, error);
   if (status != PW_OK) return status;
   if (sweep->journal.done > 0)
@@ -191,7 +192,7 @@ const pw_command pw_cli_sweep = {
       "Run a model for all combinations of varied parameters and initial values, and write a table with one row per "
       "run. A sweep that was interrupted is continued by the same command. A sweep may be divided into parts, which "
       "`pinwheel sweep --merge PART... -o FILE.csv` puts together.",
-  .size = sizeof (pw_sweep),
+  .options_size = sizeof (pw_sweep),
   .function = sweep_command,
   .options = sweep_options,
 };

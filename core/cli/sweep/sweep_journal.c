@@ -122,18 +122,18 @@ static void journal_read_rows (pw_journal *journal, const pw_plan *plan, const j
 
 /* Verifies that the journal is one of this sweep, and reads its rows; journal->size is where the next row goes. */
 static int journal_read (pw_journal *journal, const pw_plan *plan, const journal_map *map, pw_error *error) {
-  static const char *words[2] = { "there", "here" };
   char difference[400];
   size_t size = (size_t)(map->end - map->begin), magic_size = strlen (PW_SWEEP_MAGIC);
-  const char *rows = pw_fingerprint_end (PW_SWEEP_MAGIC, map->begin, map->end), *fingerprint = plan->fingerprint.at;
+  const char *rows = pw_fingerprint_end (PW_SWEEP_MAGIC, map->begin, map->end), *fingerprint = plan->fingerprint.chars;
   journal->size = 0;
   if (rows == NULL) { /* with an incomplete fingerprint there are no rows */
     if (memcmp (map->begin, PW_SWEEP_MAGIC, size < magic_size ? size : magic_size) == 0) return PW_OK;
     return pw_fail (error, PW_INPUT, "%s exists and is not the journal of a sweep: remove it if it is not needed",
                     journal->part_path);
   }
-  if (pw_fingerprint_differ (map->begin, rows, fingerprint, fingerprint + plan->fingerprint.used, 1, words, difference,
-                             sizeof difference))
+  const pw_fingerprint there = { map->begin, rows, "there" };
+  const pw_fingerprint here = { fingerprint, fingerprint + plan->fingerprint.length, "here" };
+  if (pw_fingerprint_differ (there, here, NULL, difference, sizeof difference))
     return pw_fail (error, PW_INPUT,
                     "%.80s belongs to another sweep: %.300s; finish that one with its own command, or remove the file",
                     journal->part_path, difference);
@@ -152,7 +152,7 @@ static int journal_begin (pw_journal *journal, const pw_plan *plan, pw_error *er
   if (file_size > journal->size && ftruncate (journal->descriptor, journal->size) != 0)
     return pw_fail (error, PW_RESOURCE, "cannot write %s: %s", journal->part_path, strerror (errno));
   journal->created = journal->size == 0;
-  return journal->created ? journal_write (journal, plan->fingerprint.at, plan->fingerprint.used, error) : PW_OK;
+  return journal->created ? journal_write (journal, plan->fingerprint.chars, plan->fingerprint.length, error) : PW_OK;
 }
 
 int pw_journal_open (pw_journal *journal, const pw_plan *plan, const char *path, pw_error *error) {
@@ -173,7 +173,7 @@ int pw_journal_add (pw_journal *journal, const pw_plan *plan, long row, int stat
   pw_text_clear (&journal->line);
   journal_line_format (&journal->line, row, status, text);
   if (journal->line.failed) return pw_fail (error, PW_RESOURCE, "out of memory");
-  if (journal_write (journal, journal->line.at, journal->line.used, error) != PW_OK) return error->status;
+  if (journal_write (journal, journal->line.chars, journal->line.length, error) != PW_OK) return error->status;
   journal->offset[row / plan->parts] = at;
   journal->done++;
   return PW_OK;
@@ -223,7 +223,7 @@ static int table_close (pw_output *output, pw_error *error) {
 static int table_write (const pw_journal *journal, const pw_plan *plan, const journal_map *map, FILE *stream,
                         pw_tally *tally, pw_error *error) {
   int is_part = plan->parts > 1;
-  fputs (is_part ? plan->fingerprint.at : plan->heading.at, stream);
+  fputs (is_part ? plan->fingerprint.chars : plan->heading.chars, stream);
   if (!is_part) putc ('\n', stream);
   for (long k = 0; k < journal->rows; k++) {
     const char *at = map->begin + journal->offset[k];
@@ -292,9 +292,9 @@ static int table_by_part (const void *a, const void *b) {
 static int table_match_parts (table_part *part, int count, pw_error *error) {
   char difference[400];
   for (int i = 1; i < count; i++) {
-    const char *words[2] = { "in the first", "in the second" };
-    if (pw_fingerprint_differ (part[0].map.begin, part[0].first_row, part[i].map.begin, part[i].first_row, 0, words,
-                               difference, sizeof difference))
+    const pw_fingerprint first = { part[0].map.begin, part[0].first_row, "in the first" };
+    const pw_fingerprint second = { part[i].map.begin, part[i].first_row, "in the second" };
+    if (pw_fingerprint_differ (first, second, "part", difference, sizeof difference))
       return pw_fail (error, PW_INPUT, "%.80s and %.80s are parts of different sweeps: %.300s", part[0].path,
                       part[i].path, difference);
     if (part[i].parts != part[0].parts)

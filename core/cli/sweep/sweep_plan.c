@@ -109,9 +109,9 @@ static void plan_open_engines (pw_plan *plan, const pw_system *system) {
   pw_run_defaults defaults = pw_cli_defaults (pw_file_table (plan->file));
   double steps = (double)plan->grid.rows * pw_method_steps (plan->method, &plan->settings, defaults.step, plan->t_end);
   pw_cli_engine_open (&plan->engine, system, plan->specialise, steps);
-  const char *no_lanes = plan->with_cpu                ? "--cpu measures each run"
-                         : isfinite (plan->limit.most) ? "--limit stops each run by itself"
-                                                       : NULL;
+  const char *no_lanes = plan->with_cpu                   ? "--cpu measures each run"
+                         : isfinite (plan->limit.seconds) ? "--limit stops each run by itself"
+                                                          : NULL;
   if (no_lanes == NULL)
     plan->lanes_code = pw_cli_engine_lanes (&plan->engine, system, plan->method, plan->lanes, steps);
   if (no_lanes && plan->lanes > 1) pw_cli_say ("pinwheel: one run after the other: %s\n", no_lanes);
@@ -121,7 +121,7 @@ static int plan_scan_row (pw_plan *plan, long row, plan_scan *scan, pw_error *er
   pw_cli_model compiled;
   pw_error row_error = { 0 };
   int status = pw_plan_compile (plan, row, &compiled, &row_error);
-  if (status == PW_OK) plan->tables_sum = pw_check_tables (plan->tables_sum, compiled.model);
+  if (status == PW_OK) plan->tables_sum = pw_fingerprint_tables (plan->tables_sum, compiled.model);
   if (status == PW_OK) status = plan_add_columns (plan, compiled.system, &row_error);
   if (status == PW_OK && !scan->built) plan_open_engines (plan, compiled.system);
   pw_cli_close_model (&compiled);
@@ -179,13 +179,13 @@ static void plan_fingerprint_parameters (pw_plan *plan, const pw_model *model) {
 static void plan_fingerprint_grid (pw_plan *plan) {
   pw_text *text = &plan->fingerprint;
   pw_fingerprint_initial (text, plan->line->starts);
-  pw_text order = { .at = NULL };
+  pw_text order = { .chars = NULL };
   for (int i = 0; i < plan->grid.axes; i++) {
     pw_fingerprint_line (text, "vary", plan->grid.axis[i].name, plan->grid.axis[i].range);
     pw_text_cell (&order, plan->grid.axis[i].name);
   }
   text->failed |= order.failed;
-  pw_fingerprint_line (text, "order", NULL, order.at ? order.at : "");
+  pw_fingerprint_line (text, "order", NULL, order.chars ? order.chars : "");
   pw_text_free (&order);
 }
 
@@ -197,12 +197,12 @@ static int plan_fingerprint (pw_plan *plan, const pw_model *model, pw_error *err
     return error->status;
   if (plan->settings.max_steps != PW_MAX_STEPS)
     pw_fingerprint_number (text, "max-steps", NULL, (double)plan->settings.max_steps);
-  if (isfinite (plan->limit.most)) pw_fingerprint_number (text, "limit", NULL, plan->limit.most);
+  if (isfinite (plan->limit.seconds)) pw_fingerprint_number (text, "limit", NULL, plan->limit.seconds);
   if (plan->engine.code) pw_fingerprint_line (text, "engine", NULL, "specialised");
   plan_fingerprint_parameters (plan, model);
   plan_fingerprint_grid (plan);
   pw_fingerprint_number (text, "rows", NULL, (double)plan->grid.rows);
-  pw_fingerprint_line (text, "columns", NULL, plan->heading.at ? plan->heading.at : "");
+  pw_fingerprint_line (text, "columns", NULL, plan->heading.chars ? plan->heading.chars : "");
   snprintf (part_text, sizeof part_text, "%d/%d", plan->part, plan->parts);
   pw_fingerprint_line (text, "part", NULL, part_text);
   pw_text_add (text, "end\n");

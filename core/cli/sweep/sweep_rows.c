@@ -47,7 +47,7 @@ typedef struct {
   pw_error *error;
   long opened_runs;
   long changed_runs;     /* those whose given initial values the constraints have changed */
-  double largest_change; /* pw_cli_change */
+  double largest_change; /* pw_cli_largest_change */
   char largest_change_text[PW_CHANGE_TEXT];
 } sweep_rows;
 
@@ -91,7 +91,7 @@ static const pw_specialised *rows_compile (sweep_rows *sweep, char *text, const 
 /* Chooses the code of a new system, independently of the order of runs: that of the plan's engine if it fits, else code
  * generated for this system. */
 static void rows_specialise (sweep_rows *sweep, row_system *system) {
-  const pw_specialised *plan_code = pw_cli_engine_code (&sweep->plan->engine);
+  const pw_specialised *plan_code = pw_scene_code_table (sweep->plan->engine.code);
   pw_error code_error = { 0 };
   if (plan_code == NULL) return;
   if (pw_specialised_fits (plan_code, system->model.system)) {
@@ -219,7 +219,7 @@ static void row_cells (const sweep_row *row, const pw_plan *plan, const pw_sampl
 static int row_close (sweep_row *row, const pw_plan *plan, pw_text *text) {
   pw_sample sample, *last = NULL;
   pw_error sample_error = { 0 };
-  if (row->status == PW_STOPPED) row->status = pw_limit_fail (&row->limit, pw_run_time (row->run), &row->error);
+  if (row->status == PW_STOPPED) row->status = pw_limit_status (&row->limit, pw_run_time (row->run), &row->error);
   if (row->run && pw_run_sample (row->run, pw_run_time (row->run), &sample, &sample_error) == PW_OK) last = &sample;
   if (row->status == PW_OK && last == NULL) row->status = sample_error.status, row->error = sample_error;
   if (row->status > 0 && pw_stop == 0) row->status = pw_fail (&row->error, PW_METHOD, "the method gave up");
@@ -237,7 +237,7 @@ static void rows_store (sweep_rows *sweep, const sweep_row *row, int status, con
   if (status == PW_RETRY || sweep->error->status != PW_OK) return;
   if (status == PW_RESOURCE)
     pw_fail (sweep->error, PW_RESOURCE, "row %ld of the grid: %s", row->number + 1, row->error.text);
-  else if (pw_journal_add (sweep->journal, sweep->plan, row->number, -status, text->at, sweep->error) == PW_OK)
+  else if (pw_journal_add (sweep->journal, sweep->plan, row->number, -status, text->chars, sweep->error) == PW_OK)
     pw_progress_at (&sweep->progress, (double)sweep->journal->done);
   if (sweep->error->status != PW_OK && pw_stop == 0) pw_stop = 1;
 }
@@ -285,7 +285,7 @@ static int worker_begin (sweep_rows *sweep, sweep_row *row) {
   }
   pthread_mutex_unlock (&sweep->lock);
   row_open (row, sweep->plan);
-  double change = row->run ? pw_cli_change (row->run, row->system->model.system, text) : 0;
+  double change = row->run ? pw_cli_largest_change (row->run, row->system->model.system, text) : 0;
   pthread_mutex_lock (&sweep->lock);
   if (row->run) rows_count_change (sweep, change, text);
   return 1;
@@ -314,7 +314,7 @@ static void worker_advance (sweep_worker *worker) {
   for (sweep_row *row = worker->row; row < worker->row + worker->width; row++) {
     if (row->system == NULL) continue;
     if (row_ended (row, plan)) return; /* it could not be opened, and is stored first */
-    same_code &= row->system->code == pw_cli_engine_code (&plan->engine);
+    same_code &= row->system->code == pw_scene_code_table (plan->engine.code);
     running[n] = row, error[n] = (pw_error){ 0 }, run[n++] = row->run;
   }
   while (!ended) {
