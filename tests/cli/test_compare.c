@@ -477,6 +477,7 @@ static void test_bad (void **state) {
     { "ezyroller --reference @/x.csv", "--reference @/x.csv: the first column is \"x\", expected \"t [s]\"" },
     { "ezyroller --reference @/y.csv", "--reference @/y.csv: no column is a state of this model, such as \"frame.x\"" },
     { "ezyroller --reference @/z.csv", "--reference @/z.csv: line 2: \"one\" is not a number" },
+    { "ezyroller --reference @/twice.csv", "--reference @/twice.csv: columns 2 and 4 are both named \"frame.x\"" },
     { "ezyroller --reference @/back.csv", "--reference @/back.csv: line 3: times must be finite and increase" },
     { "ezyroller --reference @/inf.csv", "--reference @/inf.csv: line 3: times must be finite and increase" },
     { "ezyroller --reference @/short.csv --t-end 2",
@@ -486,6 +487,7 @@ static void test_bad (void **state) {
   cli_write ("x.csv", "x,t\n0,0\n");
   cli_write ("y.csv", "t,y\n0,0\n");
   cli_write ("z.csv", "t,frame.x\n1,one\n");
+  cli_write ("twice.csv", "t,frame.x [m],a,frame.x [mm]\n1,0,0,0\n");
   cli_write ("back.csv", "t,frame.x\n1,0\n0.5,0\n");
   cli_write ("inf.csv", "t,frame.x\n1,0\ninf,0\n");
   cli_write ("short.csv", "t,frame.x\n1,0\n");

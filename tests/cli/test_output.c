@@ -285,7 +285,8 @@ static void test_bounded (void **state) {
       "head -c 5000000 /dev/zero | tr '\\0' '[' >@/deep.yaml; (printf 'x: ['; head -c 5000000 /dev/zero | tr '\\0' "
       "'[') "
       ">@/key.yaml; (printf '['; yes '0,' | head -n 2000000 | tr -d '\\n'; echo '0]') >@/wide.yaml; "
-      "head -c 200000000 /dev/zero | tr '\\0' 1 >@/line.csv; (echo 't,frame.x'; head -c 9 /dev/zero) >@/zero.csv");
+      "head -c 200000000 /dev/zero | tr '\\0' 1 >@/line.csv; (echo 't,frame.x'; head -c 9 /dev/zero) >@/zero.csv; "
+      "printf 't,frame.x\\n1,2\\000\\n' >@/zero2.csv");
 #define OUTPUT_LESS "ulimit -v 700000; pinwheel "
   assert_int_equal (cli_run (OUTPUT_LESS "show @/deep.yaml"), 2);
   assert_non_null (strstr (cli_err, "nested too deeply"));
@@ -297,6 +298,8 @@ static void test_bounded (void **state) {
            "--reference @/line.csv: cannot be read: line 1 has more than 16 MB");
   cli_bad ("pinwheel run ezyroller --reference @/zero.csv", 2,
            "--reference @/zero.csv: cannot be read: a table is text, and this has a byte 0");
+  cli_bad ("pinwheel run ezyroller --reference @/zero2.csv", 2,
+           "--reference @/zero2.csv: cannot be read: a table is text, and this has a byte 0");
   cli_bad ("ulimit -v 2000000; pinwheel sweep pendulum -t 0.1 --vary l=lin:1:2:9999 --jobs 9999 -o @/many.csv "
            "2>@/err9; s=$?; "
            "sed 's/only [0-9]*/only N/; s/jobs [0-9]*/jobs N/; s/N: .*;/N;/' @/err9 >&2; exit $s",

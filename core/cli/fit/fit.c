@@ -142,7 +142,7 @@ static int fit_options (pw_fit *x, pw_error *error) {
   if (status == PW_OK && starts > 1e5) status = pw_fail (error, PW_INPUT, "--starts: at most 100000");
   x->starts = (int)starts;
   if (status == PW_OK) status = pw_cli_csv (x->path, error);
-  if (status == PW_OK) status = pw_cli_only ("--width", x->line.width, "--plots DIR", x->plots_path != NULL, error);
+  if (status == PW_OK) status = pw_cli_requires ("--width", x->line.width, "--plots DIR", x->plots_path != NULL, error);
   return status == PW_OK ? pw_parallel_jobs (x->jobs_text, &x->jobs, error) : status;
 }
 
@@ -270,9 +270,9 @@ const pw_command pw_cli_fit = {
           "Prints "
           "estimates with standard errors, confidence intervals and correlations, and unknowns that the data do not "
           "determine.",
-  .least = 1,
-  .most = 1,
-  .size = sizeof (pw_fit),
+  .min_arguments = 1,
+  .max_arguments = 1,
+  .options_size = sizeof (pw_fit),
   .function = fit_command,
   .options = fit_options_table,
 };

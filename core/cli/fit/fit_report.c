@@ -264,7 +264,7 @@ void pw_fit_json (const pw_fit *x, const char *status, FILE *f) {
 
 int pw_fit_table (const pw_fit *x, FILE *f, pw_error *error) {
   static const char *const part[] = { "", ".model", ".residual", ".sigma" };
-  pw_text t = { .at = NULL };
+  pw_text t = { .chars = NULL };
   char name[300];
   pw_text_name (&t, "t", "s");
   for (int i = 0; i < x->columns; i++)

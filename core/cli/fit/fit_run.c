@@ -36,7 +36,7 @@ int pw_fit_run (const pw_fit *x, const double *unknowns, double *out, pw_error *
   r.settings.ledger = o.ledger;
   if (status == PW_OK) r.run = pw_run_open (r.m.system, x->unknowns.method, &r.settings, error);
   if (status == PW_OK) status = r.run ? fit_sample (x, &o, r.run, out, row, error) : error->status;
-  if (status == PW_STOPPED) status = pw_limit_fail (&r.limit, pw_run_time (r.run), error);
+  if (status == PW_STOPPED) status = pw_limit_status (&r.limit, pw_run_time (r.run), error);
   pw_outcomes_close (&o);
   pw_unknown_run_close (&r);
   free (row);
@@ -146,7 +146,7 @@ static int jacobian_by_variation (const pw_fit *x, const double *at, double *jac
   int status = pw_sensitivity_open (&s, at, error);
   if (status == PW_OK) status = pw_sensitivity_start (&s, error);
   for (int row = 0; row < x->rows && status == PW_OK; row++) status = jacobian_row (&s, x, row, jacobian, error);
-  if (status == PW_STOPPED) status = pw_limit_fail (&s.limit, pw_run_time (s.base.run), error);
+  if (status == PW_STOPPED) status = pw_limit_status (&s.limit, pw_run_time (s.base.run), error);
   pw_sensitivity_close (&s);
   return status;
 }

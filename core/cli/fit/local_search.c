@@ -66,12 +66,12 @@ static int search_differentiate (search *p, pw_error *error) {
   pw_sensitivity s = { .of = p->x->text, .unknowns = *u, .no_error = 1 };
   int status = pw_sensitivity_open (&s, p->at, error);
   if (status == PW_OK) status = pw_sensitivity_compute (&s, &silent, error);
-  if (status == PW_OK && s.stopped) status = pw_limit_fail (&s.limit, pw_run_time (s.base.run), error);
+  if (status == PW_OK && s.stopped) status = pw_limit_status (&s.limit, pw_run_time (s.base.run), error);
   for (int i = 0; i < p->x->outputs && status == PW_OK; i++) {
     p->value[i] = pw_outcome_value (&s.outcomes, i, NULL);
     for (int j = 0; j < u->count && status == PW_OK; j++) {
       double *slope = p->slope + i * u->count + j;
-      *slope = u->list[j].scale * pw_sensitivity_derivative (&s, i, j, s.end_slope);
+      *slope = u->list[j].scale * pw_sensitivity_derivative (&s, i, j, s.run_slope);
       if (!isfinite (p->value[i] + *slope)) status = pw_fail (error, PW_METHOD, "%s has no derivative", p->x->text[i]);
     }
   }

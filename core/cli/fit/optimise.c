@@ -133,7 +133,7 @@ static int optimise_read (pw_optimise *x, pw_error *error) {
   if (status == PW_OK) status = pw_cli_number ("--seed", x->seed_text, PW_COUNT, &x->seed, error);
   if (status == PW_OK) status = pw_parallel_jobs (x->jobs_text, &x->jobs, error);
   if (status == PW_OK && starts > 1e5) status = pw_fail (error, PW_INPUT, "--starts: at most 100000");
-  if (status == PW_OK) status = pw_cli_only ("--width", x->line.width, "--plots DIR", x->plots_path != NULL, error);
+  if (status == PW_OK) status = pw_cli_requires ("--width", x->line.width, "--plots DIR", x->plots_path != NULL, error);
   x->starts = (int)starts;
   return status == PW_OK ? optimise_texts (x, error) : status;
 }
@@ -250,9 +250,9 @@ const pw_command pw_cli_optimise = {
   .summary = "find the parameters for which an output is largest or smallest",
   .help = "Vary parameters and initial values of a model until an output of its runs is largest or smallest, by local "
           "searches from several starts. Runs that fail count as infeasible.",
-  .least = 1,
-  .most = 1,
-  .size = sizeof (pw_optimise),
+  .min_arguments = 1,
+  .max_arguments = 1,
+  .options_size = sizeof (pw_optimise),
   .function = optimise_command,
   .options = optimise_options,
 };

@@ -187,7 +187,7 @@ static void check_close (pw_check *x) {
 static int check_open_json (pw_check *x, pw_output **o, pw_error *error) {
   pw_use use[] = { PW_CLI_MODEL_USE, { "--json", x->json, PW_WRITES, NULL } };
   if (x->json == NULL) return PW_OK;
-  if (pw_cli_uses (&x->line, x->m.file, use, sizeof use / sizeof *use, error) != PW_OK) return error->status;
+  if (pw_cli_check_uses (&x->line, x->m.file, use, sizeof use / sizeof *use, error) != PW_OK) return error->status;
   *o = pw_output_open (x->json, error);
   return *o ? PW_OK : error->status;
 }
@@ -224,9 +224,9 @@ const pw_command pw_cli_check = {
       "Check a model before running it: degrees of freedom, redundant constraint equations, massless bodies, "
       "consistency of the initial conditions, derivatives of every element type in use (against differences), and the "
       "eigenvalues of the linearised equations of motion. The exit status is non-zero if there is a problem.",
-  .least = 1,
-  .most = 1,
-  .size = sizeof (pw_check),
+  .min_arguments = 1,
+  .max_arguments = 1,
+  .options_size = sizeof (pw_check),
   .function = check_command,
   .options = check_options,
 };

@@ -280,7 +280,7 @@ const pw_command pw_cli_list = {
   .help =
       "List the names of models, integration methods, element types (kinds) and forms of signals, or describe "
       "those of one sort. With a NAME or \"all\", describe the options of a method or the fields of an element type.",
-  .size = sizeof (pw_cli_line),
+  .options_size = sizeof (pw_cli_line),
   .function = list_command,
   .options = (const struct poptOption[]){ POPT_TABLEEND },
 };

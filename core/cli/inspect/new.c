@@ -60,9 +60,9 @@ const pw_command pw_cli_new = {
   .synopsis = "NAME.c|NAME.yaml",
   .summary = "write a small commented model to start from",
   .help = "Write a small commented model, in C or as text, to start from. Existing files are never overwritten.",
-  .least = 1,
-  .most = 1,
-  .size = sizeof (pw_cli_line),
+  .min_arguments = 1,
+  .max_arguments = 1,
+  .options_size = sizeof (pw_cli_line),
   .function = new_command,
   .options = (const struct poptOption[]){ POPT_TABLEEND },
 };

@@ -53,7 +53,7 @@ int pw_figure_results (const pw_cli_line *l, const pw_cli_model *m, const char *
   const char *names[ENDINGS + 1] = { NULL };
   for (int i = 0; i < ENDINGS; i++) snprintf (text[i], sizeof text[i], "%s%s", name, ending[i]), names[i] = text[i];
   pw_use use[] = { PW_CLI_MODEL_USE, { "-o", folder, PW_WRITES_INTO, names } };
-  if (folder == NULL) return pw_cli_only ("--width", l->width, "-o DIR", 0, error);
+  if (folder == NULL) return pw_cli_requires ("--width", l->width, "-o DIR", 0, error);
   return pw_files_open (files, l, m, use, 2, error);
 }
 
