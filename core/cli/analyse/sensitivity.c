@@ -55,7 +55,11 @@ static sensitivity_result sensitivity_of (const pw_sensitivity *sens, int output
 
 static void sensitivity_print (const pw_sensitivity *sens) {
   char value[32], unit[SENSITIVITY_UNIT], digits[32];
-  static const char *const head[] = { "value", "derivative", "unit", "error", "elasticity", NULL };
+  static const struct {
+    int width;
+    const char *name;
+  } head[] = { { -14, "by" },  { 12, "value" }, { 12, "derivative" },
+               { -8, "unit" }, { 12, "error" }, { 12, "elasticity" } };
   printf ("%s by %s to t = %.9g s\n", pw_file_name (sens->unknowns.m->file), sens->unknowns.method,
           pw_run_time (sens->base.run));
   for (int o = 0; o < sens->outcomes.outcomes && !sens->stopped; o++) {
@@ -63,13 +67,13 @@ static void sensitivity_print (const pw_sensitivity *sens) {
     pw_cli_print (stdout, "\n%s = %s %s\n", sens->of[o],
                   pw_format (value, pw_outcome_value (&sens->outcomes, o, NULL), 12), unit);
     for (pw_table table = { 0 }; pw_table_pass (&table);) {
-      pw_cell (&table, -14, "by");
-      for (const char *const *h = head; *h; h++) pw_cell (&table, *h == head[2] ? -8 : 12, *h);
+      for (int k = 0; k < 6; k++) pw_cell (&table, head[k].width, head[k].name);
       pw_row_end (&table);
       for (int p = 0; p < sens->unknowns.count; p++) {
         const sensitivity_result result = sensitivity_of (sens, o, p);
-        pw_cell_unit (&table, -14, sens->unknowns.list[p].name, sens->unknowns.list[p].unit);
-        pw_cell_number (&table, 12, sens->unknowns.list[p].value, SENSITIVITY_DIGITS);
+        const pw_unknown *u = &sens->unknowns.list[p];
+        pw_cell_unit (&table, -14, u->name, u->unit);
+        pw_cell_number (&table, 12, u->value, SENSITIVITY_DIGITS);
         pw_cell (&table, 12,
                  isnan (result.derivative) ? "none" : pw_format (digits, result.derivative, SENSITIVITY_DIGITS));
         pw_cell (&table, -8, sensitivity_unit (sens, o, p, unit));

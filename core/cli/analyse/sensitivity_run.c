@@ -129,12 +129,15 @@ static void sensitivity_keep (pw_sensitivity *sens, int i) {
       sens->run_slope[at] = sens->slope[at], sens->run_slope_error[at] = sens->slope_error[at];
 }
 
+/* Where an extremum is: inside an interval, or at a breakpoint that is not passed yet. */
+typedef enum { INSIDE, AT_BREAKPOINT } sensitivity_place;
+
 /* The same for an extremum.  Derivatives do not exist at a breakpoint whose time depends on the unknown, and just
- * after it. reached: 1 if the extremum is at a breakpoint that is not passed yet. */
-static void sensitivity_keep_extremum (pw_sensitivity *sens, int i, int reached) {
+ * after it. */
+static void sensitivity_keep_extremum (pw_sensitivity *sens, int i, sensitivity_place place) {
   const pw_functional *f = &sens->outcomes.functional[i];
   double slope, next = pw_variation_breakpoint (sens->variation, 0, &slope);
-  int before = reached || fabs (f->t - next) < 1e-9 * (1 + fabs (next)),
+  int before = place == AT_BREAKPOINT || fabs (f->t - next) < 1e-9 * (1 + fabs (next)),
       after = f->t - sens->last_breakpoint <= 2 * PW_FUNCTIONAL_INSET * f->step;
   sensitivity_keep (sens, i);
   for (int p = 0; p < sens->unknowns.count && (before || after); p++)
@@ -200,13 +203,9 @@ static int sensitivity_points (const pw_sensitivity *sens, double t0, double t1,
 static int sensitivity_interval (pw_sensitivity *sens, double t0, double t1, sensitivity_point *list, pw_error *error) {
   int count = sensitivity_points (sens, t0, t1, list), status = PW_OK;
   for (int i = 0; i < count && status == PW_OK; i++) {
-    double t = list[i].t;
-    status = pw_sensitivity_at (sens, t, error);
-    if (status != PW_OK) break;
-    if (list[i].extremum < 0)
-      sensitivity_add_node (sens, list[i].weight);
-    else
-      sensitivity_keep_extremum (sens, list[i].extremum, 0);
+    status = pw_sensitivity_at (sens, list[i].t, error);
+    if (status == PW_OK && list[i].extremum < 0) sensitivity_add_node (sens, list[i].weight);
+    if (status == PW_OK && list[i].extremum >= 0) sensitivity_keep_extremum (sens, list[i].extremum, INSIDE);
   }
   return status == PW_OK ? pw_sensitivity_at (sens, t1, error) : status;
 }
@@ -225,7 +224,8 @@ static int sensitivity_jump (pw_sensitivity *sens, double t0, double t, int with
   for (int i = 0; i < sens->outcomes.functionals && status == PW_OK; i++) {
     const pw_functional *f = &sens->outcomes.functional[i];
     double jump = sens->before[i] - sens->value[i];
-    if (pw_is_extremum (f->type) && f->t > t0 && f->t <= t) sensitivity_keep_extremum (sens, i, !passed);
+    if (pw_is_extremum (f->type) && f->t > t0 && f->t <= t)
+      sensitivity_keep_extremum (sens, i, passed ? INSIDE : AT_BREAKPOINT);
     if (!pw_is_integral (f->type) || jump == 0) continue;
     if (f->type != PW_INTEGRAL) jump /= sens->unknowns.t_end;
     if (f->type == PW_RMS) jump *= (sens->before[i] + sens->value[i]) / (2 * f->value);

@@ -179,7 +179,7 @@ static int study_open_folder (pw_study *x, pw_error *error) {
   if (x->folder == NULL) return pw_cli_requires ("--width", x->line.width, "-o DIR", 0, error);
   if (pw_figures_of (&x->figures, &x->line, &x->m, x->folder, error) != PW_OK) return error->status;
   if (pw_cli_check_uses (&x->line, x->m.file, use, sizeof use / sizeof *use, error) != PW_OK) return error->status;
-  x->lock = pw_cli_folder (x->folder, error);
+  x->lock = pw_cli_lock_folder (x->folder, error);
   return x->lock < 0 ? error->status : pw_study_open_table (x, error);
 }
 

@@ -28,7 +28,7 @@ static int sweep_read (const sweep *x, pw_error *error) {
   if (x->path == NULL || *x->path == 0) return pw_fail (error, PW_INPUT, "nowhere to write the table: add -o FILE.csv");
   if (strcmp (x->path, "-") == 0)
     return pw_fail (error, PW_INPUT, "-o -: a sweep needs a file, next to which it keeps what it has done");
-  if (pw_cli_csv (x->path, error) != PW_OK) return PW_INPUT;
+  if (pw_cli_check_csv (x->path, error) != PW_OK) return PW_INPUT;
   if (!x->merge && x->ranges == NULL)
     return pw_fail (error, PW_INPUT, "nothing is varied: add --vary NAME=lin:FIRST:LAST:COUNT, log:..., or V1,V2,...");
   return x->merge ? PW_OK : pw_cli_at_most (&pw_cli_sweep, &x->line, 1, error);
