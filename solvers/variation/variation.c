@@ -181,10 +181,11 @@ static int variation_blocks (const pw_variation *x, pw_error *error) {
       x->r->s->model, block);
 }
 
-/* Appends the last step of the run, from time t0, to its states.  A step across a jump is not refined: samples in it, each an own step of a Runge-Kutta method, are not continuous in time and
- * might seem to cross it several times. */
+/* Appends the last step of the run, from time t0, to its states.  A step across a jump is not refined: samples in it, each an
+ * own step of a Runge-Kutta method, are not continuous in time and might seem to cross it several times. */
 static int variation_record (pw_variation *x, double t0, pw_error *error) {
   int last = x->points - 1, points;
+  x->begun = t0;
   int status = pw_variation_append (x, last < 0 ? t0 : x->r->t, error);
   if (status != PW_OK || last < 0) return status;
   points = x->points;

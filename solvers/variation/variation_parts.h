@@ -82,6 +82,7 @@ struct pw_variation {
   double *energy;    /* 2 energies: of the elements, at two states */
   double *sample[2]; /* 3 n + m + entries: results */
   int may_jump;      /* 1: accelerations may jump with the state */
+  double begun;      /* the beginning of the run's last step */
   int points, room;
   pw_variation_point *point; /* room: states of the run from t on */
   double passed;             /* the last breakpoint that the derivatives have passed */

@@ -347,6 +347,68 @@ static void test_energies (void **state) {
   check_close ("kinetic by mass", x[0], 4.5, 1e-9, "v^2 / 2, and round-off of differences");
 }
 
+/* x (1) of m x'' + c x' + k x = sin 3t, x (0) = 0.1, x' (0) = 0, for the numbers of test_run_error: a particular solution and
+ * C_1 exp (r_1 t) + C_2 exp (r_2 t). */
+static double damped_position (double m) {
+  const double c = 31.1, k = 350.7, d = sqrt (c * c - 4 * k * m), r1 = (d - c) / (2 * m), r2 = -(d + c) / (2 * m);
+  const double e = k - 9 * m, f = 3 * c, size = e * e + f * f; /* particular solution: (e sin 3t - f cos 3t) / size */
+  const double x = 0.1 + f / size, v = -3 * e / size, C1 = (v - r2 * x) / (r1 - r2), C2 = x - C1;
+  return (e * sin (3) - f * cos (3)) / size + C1 * exp (r1) + C2 * exp (r2);
+}
+
+/* The error contains that of the run: mass and stiffness act through the run's accelerations, whose errors stiffness magnifies. */
+static void test_run_error (void **state) {
+  static const char *const method[] = { "bdf+projection --rtol 1e-6", "bdf --rtol 1e-5", "radau+ggl --rtol 1e-8",
+                                        "ida+ggl --rtol 1e-6", "erk5 --rtol 1e-4" };
+  const double m = 0.3, h = 1e-4 * m;
+  double expected = (8 * (damped_position (m + h) - damped_position (m - h)) -
+                     (damped_position (m + 2 * h) - damped_position (m - 2 * h))) /
+                    (12 * h);
+  char command[200];
+  (void)state;
+  cli_write (
+      "damped.yaml",
+      "pinwheel: 1\nrun: {t_end: 1}\nparameters: [{name: m, value: 0.3}]\n"
+      "bodies: [{name: B, mass: m, inertia: 1, start: {x: 0.1}}]\n"
+      "elements:\n  - {slider: R, body: [B, ground], at: [[0, 0], [0, 0]]}\n  - {force: F, body: B, fx: sin (3*t)}\n"
+      "  - {spring: S, body: [ground, B], at: [[-10, 0], [0, 0]], stiffness: 350.7, damping: 31.1, length: 10}\n");
+  for (size_t i = 0; i < sizeof method / sizeof *method; i++) {
+    double x, error;
+    snprintf (command, sizeof command, "pinwheel sensitivity @/damped.yaml --of B.x --by m -o @/sens --method %s",
+              method[i]);
+    cli_shell (command);
+    sensitivity_json ("\"derivative\": ", &x);
+    sensitivity_json ("\"error\": ", &error);
+    check_close (method[i], x, expected, error, "the claim");
+    check_below (method[i], error, 2000 * fabs (x - expected) + 1e-9, "the order of the real one");
+  }
+  cli_run ("pinwheel sensitivity pendulum --method erk5 --rtol 1e-4 --of max:kinetic --by m -o @/sens");
+  assert_non_null (strstr (cli_err, "errors are unknown: the run with 10 times the tolerances fails: t = "));
+  assert_non_null (strstr (cli_file ("sens/sensitivity.json"), "\"error\": null"));
+}
+
+/* A light body that follows its force within 1e-5 s, as the derivative (2 x 9 / k^2 at most) shows: by accelerations of the equations
+ * instead of those of the run it would be 0.004 at rtol 1e-6, 0.06 at 1e-4. */
+static void test_light_body (void **state) {
+  static const char *const method[] = { "bdf --rtol 1e-6", "bdf --rtol 1e-4", "radau+ggl --rtol 1e-8" };
+  char command[200];
+  (void)state;
+  cli_write (
+      "light.yaml",
+      "pinwheel: 1\nrun: {t_end: 1}\nparameters: [{name: m, value: 0.0286}]\n"
+      "bodies: [{name: B, mass: m, inertia: 1}]\n"
+      "elements:\n  - {slider: R, body: [B, ground], at: [[0, 0], [0, 0]]}\n  - {force: F, body: B, fx: sin (3*t)}\n"
+      "  - {spring: S, body: [ground, B], at: [[-10, 0], [0, 0]], stiffness: 1.9e5, damping: 4430, length: 10}\n");
+  for (size_t i = 0; i < sizeof method / sizeof *method; i++) {
+    double x;
+    snprintf (command, sizeof command, "pinwheel sensitivity @/light.yaml --of B.x --by m -o @/sens --method %s",
+              method[i]);
+    cli_shell (command);
+    sensitivity_json ("\"derivative\": ", &x);
+    check_below (method[i], fabs (x), 1e-4, "the error of the run's velocities, over m");
+  }
+}
+
 static void test_refusals (void **state) {
   static const cli_wrong each[] = {
     { "pendulum --by l", "--of is missing: expected an output, such as frame.x" },
@@ -380,6 +442,7 @@ int main (void) {
     cmocka_unit_test (test_energies),    cmocka_unit_test (test_refusals),
     cmocka_unit_test (test_parameters),  cmocka_unit_test (test_chaos),
     cmocka_unit_test (test_oscillation), cmocka_unit_test (test_jumping_integrals),
+    cmocka_unit_test (test_run_error),   cmocka_unit_test (test_light_body),
   };
   return cmocka_run_group_tests (tests, cli_setup, cli_teardown);
 }

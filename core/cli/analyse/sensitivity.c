@@ -43,12 +43,15 @@ typedef struct {
   double elasticity; /* relative change of the output per relative change of the unknown; NaN: there is none */
 } sensitivity_result;
 
+/* The derivative; its error: that of the differences and of the integration of derivatives, and that of the run,
+ * which is estimated by the change with its tolerances; the elasticity. */
 static sensitivity_result sensitivity_of (const pw_sensitivity *sens, int output, int unknown) {
   const double largest = 1e12; /* elasticities above it are those of an output that is 0 but for round-off */
   double derivative = pw_sensitivity_derivative (sens, output, unknown, sens->run_slope),
          error = fabs (pw_sensitivity_derivative (sens, output, unknown, sens->run_slope_error)),
          value = sens->unknowns.list[unknown].value,
          elasticity = derivative * value / pw_outcome_value (&sens->outcomes, output, NULL);
+  if (sens->loose) error += fabs (derivative - sens->loose[output * sens->unknowns.count + unknown]);
   if (value == 0 || !(fabs (elasticity) < largest)) elasticity = NAN;
   return (sensitivity_result){ derivative, error, elasticity };
 }
@@ -290,12 +293,51 @@ static int sensitivity_improve_steps (pw_sensitivity *sens) {
   return better;
 }
 
+/* The same problem without results. */
+static pw_sensitivity sensitivity_copy (const pw_sensitivity *sens) {
+  return (pw_sensitivity){ .of = sens->of, .unknowns = sens->unknowns, .row_interval = sens->row_interval };
+}
+
 /* Computes all derivatives again, with the steps now set. */
 static int sensitivity_repeat (pw_sensitivity *sens, pw_progress *progress, pw_error *error) {
   pw_sensitivity_close (sens);
-  *sens = (pw_sensitivity){ .of = sens->of, .unknowns = sens->unknowns, .row_interval = sens->row_interval };
+  *sens = sensitivity_copy (sens);
   int status = pw_sensitivity_open (sens, NULL, error);
   return status == PW_OK ? pw_sensitivity_compute (sens, progress, error) : status;
+}
+
+/* Factor of the tolerances with which the derivatives of a run that controls its error are repeated. */
+#define SENSITIVITY_LOOSE 10.0
+
+/* Computes the derivatives with larger tolerances. */
+static int sensitivity_loosen (pw_sensitivity *sens, pw_progress *progress, pw_error *error) {
+  int outputs = sens->outcomes.outcomes, unknowns = sens->unknowns.count;
+  pw_sensitivity other = sensitivity_copy (sens);
+  other.no_error = 1;
+  other.row_interval = 0;
+  other.unknowns.settings.rtol = fmin (0.1, SENSITIVITY_LOOSE * sens->unknowns.settings.rtol);
+  other.unknowns.settings.atol *= SENSITIVITY_LOOSE;
+  sens->loose = malloc ((size_t)(outputs * unknowns) * sizeof *sens->loose);
+  int status = sens->loose ? pw_sensitivity_open (&other, NULL, error) : pw_fail (error, PW_RESOURCE, "out of memory");
+  if (status == PW_OK) status = pw_sensitivity_compute (&other, progress, error);
+  sens->stopped |= other.stopped;
+  for (int o = 0; o < outputs && status == PW_OK && !other.stopped; o++)
+    for (int p = 0; p < unknowns; p++)
+      sens->loose[o * unknowns + p] = pw_sensitivity_derivative (&other, o, p, other.run_slope);
+  pw_sensitivity_close (&other);
+  return status;
+}
+
+/* Estimates the part of the errors that the error of the run causes. */
+static int sensitivity_estimate_run_error (pw_sensitivity *sens, pw_progress *progress, pw_error *error) {
+  if (sens->stopped || pw_cli_adaptive (sens->unknowns.method) == 0) return PW_OK;
+  int status = sensitivity_loosen (sens, progress, error);
+  if (status == PW_OK || status == PW_RESOURCE) return status;
+  for (int i = 0; i < sens->outcomes.outcomes * sens->unknowns.count; i++) sens->loose[i] = NAN;
+  pw_cli_say ("pinwheel: errors are unknown: the run with %g times the tolerances fails: %s\n", SENSITIVITY_LOOSE,
+              error->text);
+  *error = (pw_error){ 0 };
+  return PW_OK;
 }
 
 static int sensitivity_compute (pw_sensitivity *sens, pw_error *error) {
@@ -311,6 +353,7 @@ static int sensitivity_compute (pw_sensitivity *sens, pw_error *error) {
     status = sensitivity_repeat (sens, &progress, error);
     break;
   }
+  if (status == PW_OK) status = sensitivity_estimate_run_error (sens, &progress, error);
   pw_progress_end (&progress);
   pw_stop_release ();
   return status;

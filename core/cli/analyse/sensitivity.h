@@ -14,6 +14,7 @@ typedef struct {
   /* results */
   pw_outcomes outcomes;                /* of the run */
   double *run_slope, *run_slope_error; /* F x P: derivatives of the functionals of the run, and their errors */
+  double *loose;                       /* outputs x P: derivatives with larger tolerances; NULL: not computed */
   int rows, columns;                   /* of the table: t, then each output and its derivatives */
   double *row;                         /* rows x columns */
   int stopped;                         /* 1: stopped before t_end, by Ctrl-C or the limit */
@@ -24,7 +25,7 @@ typedef struct {
   double *value;               /* 2 F: values; scratch: the gradient of an output */
   double *slope, *slope_error; /* F x P: derivatives, and their errors */
   /* private */
-  double *values;             /* P: of the unknowns */
+  double *unknown_value;      /* P: of the unknowns */
   pw_unknown_run *neighbours; /* 4 of each unknown */
   pw_variation *variation;
   pw_run *sampled;        /* the run of which samples are taken; NULL: base.run */

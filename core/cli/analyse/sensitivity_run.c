@@ -307,11 +307,13 @@ int pw_sensitivity_open (pw_sensitivity *sens, const double *values, pw_error *e
   sens->limit.seconds = sens->unknowns.limit;
   sens->unknowns.settings.stop = pw_limit_over;
   sens->unknowns.settings.stop_context = &sens->limit;
-  sens->values = malloc (P * sizeof *sens->values);
+  sens->unknown_value = malloc (P * sizeof *sens->unknown_value);
   sens->neighbours = calloc (4 * P, sizeof *sens->neighbours);
   sens->direction = calloc (P, sizeof *sens->direction);
-  for (size_t p = 0; p < P && sens->values; p++) sens->values[p] = values ? values[p] : sens->unknowns.list[p].value;
-  return sens->values && sens->neighbours && sens->direction ? PW_OK : pw_fail (error, PW_RESOURCE, "out of memory");
+  for (size_t p = 0; p < P && sens->unknown_value; p++)
+    sens->unknown_value[p] = values ? values[p] : sens->unknowns.list[p].value;
+  return sens->unknown_value && sens->neighbours && sens->direction ? PW_OK
+                                                                    : pw_fail (error, PW_RESOURCE, "out of memory");
 }
 
 static int sensitivity_arrays (pw_sensitivity *sens, pw_error *error) {
@@ -363,7 +365,7 @@ static int sensitivity_check_independence (const pw_sensitivity *sens, pw_error 
     if (u->state < 0) continue;
     const pw_initial_report *initial = pw_run_initial (d->neighbour[0]);
     double value = u->state < n ? initial->q[u->state] : initial->v[u->state - n];
-    if (fabs (value - sens->values[p] - pw_direction_offset (d, 0)) > 0.01 * fabs (d->step))
+    if (fabs (value - sens->unknown_value[p] - pw_direction_offset (d, 0)) > 0.01 * fabs (d->step))
       return pw_fail (
           error, PW_INPUT,
           "--by %s: it cannot change while the other initial values of --by and --start are kept: constraints "
@@ -376,12 +378,12 @@ static int sensitivity_check_independence (const pw_sensitivity *sens, pw_error 
 static int sensitivity_open_runs (pw_sensitivity *sens, pw_error *error) {
   int count = 0;
   while (sens->of[count]) count++;
-  int status = pw_unknown_run_open (&sens->base, &sens->unknowns, sens->values, error);
+  int status = pw_unknown_run_open (&sens->base, &sens->unknowns, sens->unknown_value, error);
   if (status == PW_OK) status = pw_outcomes_open (&sens->outcomes, sens->base.m.system, "--of", sens->of, count, error);
   if (status == PW_OK) status = sensitivity_open_ledger (sens, error);
   if (status == PW_OK)
-    status =
-        pw_unknowns_directions (sens->direction, &sens->unknowns, sens->values, &sens->base, sens->neighbours, error);
+    status = pw_unknowns_directions (sens->direction, &sens->unknowns, sens->unknown_value, &sens->base,
+                                     sens->neighbours, error);
   for (int p = 0; p < sens->unknowns.count; p++) sens->direction[p].no_error = sens->no_error;
   return status == PW_OK && !sens->no_error ? sensitivity_check_independence (sens, error) : status;
 }
@@ -411,7 +413,8 @@ void pw_sensitivity_close (pw_sensitivity *sens) {
   pw_unknown_run_close (&sens->base);
   free (sens->neighbours);
   free (sens->direction);
-  free (sens->values);
+  free (sens->unknown_value);
   free (sens->memory);
+  free (sens->loose);
   free (sens->row);
 }
