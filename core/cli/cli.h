@@ -99,7 +99,7 @@ PW_COMMANDS (PW_COMMAND)
 #define PW_OPTION_GROUP(title) \
   { NULL, 0, POPT_ARG_NONE, NULL, 0, title, NULL }
 
-/* Options of all commands that open a model; of those that integrate; of those that integrate with one method. */
+/* Options of commands that open a model (MODEL), that integrate (STEP, with ENGINE), also with one method (METHOD). */
 #define PW_MODEL_OPTIONS                                                                                       \
   PW_OPTION_GROUP ("Model"),                                                                                   \
       PW_LIST_OPTION (pw_cli_line, sets, "set", 0, "PARAM=VALUE",                                              \
@@ -236,7 +236,7 @@ pw_scene_code *pw_cli_engine_lanes (const pw_cli_engine *e, const pw_system *s, 
 int pw_cli_check_uses (const pw_cli_line *line, const pw_file *file, pw_use *use, int count, pw_error *error);
 
 /* Makes a folder and those above it, and locks it until the returned descriptor is closed.  -1 and the error. */
-int pw_cli_folder (const char *folder, pw_error *error);
+int pw_cli_lock_folder (const char *folder, pw_error *error);
 
 /* The files that a command writes, and the lock of the folder that it writes into. */
 enum { PW_FILES = 6 };
@@ -256,7 +256,7 @@ int pw_files_finish (pw_files *files, pw_error *error);
 void pw_files_close (pw_files *files);
 
 /* PW_INPUT if the path of -o (NULL: none) ends in .npz: NumPy archives cannot contain the texts of some tables. */
-int pw_cli_csv (const char *path, pw_error *error);
+int pw_cli_check_csv (const char *path, pw_error *error);
 
 /* ---- Messages ---- */
 
@@ -265,7 +265,7 @@ void pw_cli_print (FILE *f, const char *format, ...) PW_PRINTF (2, 3);
 #define pw_cli_say(...) pw_cli_print (stderr, __VA_ARGS__)
 
 /* Prints text broken into lines of `width` characters; the first line continues at column `indent`. */
-void pw_cli_wrap (const char *text, int indent, int width);
+void pw_cli_print_wrapped (const char *text, int indent, int width);
 
 /* The word for a status PW_OK to PW_METHOD in tables and summaries: "ok", "machine", "input", "start" or "method". */
 const char *pw_cli_status_word (int status);

@@ -37,7 +37,7 @@ int pw_cli_check_uses (const pw_cli_line *line, const pw_file *file, pw_use *use
   return status;
 }
 
-int pw_cli_csv (const char *path, pw_error *error) {
+int pw_cli_check_csv (const char *path, pw_error *error) {
   const char *ending = path ? strrchr (path, '.') : NULL;
   if (ending == NULL || strcmp (ending, ".npz") != 0) return PW_OK;
   return pw_fail (error, PW_INPUT, "-o %s: this command writes no NumPy archives: expected a name that ends in .csv",
@@ -62,7 +62,7 @@ static int files_make_folder (const char *folder, pw_error *error) {
   return PW_OK;
 }
 
-int pw_cli_folder (const char *folder, pw_error *error) {
+int pw_cli_lock_folder (const char *folder, pw_error *error) {
   return files_make_folder (folder, error) == PW_OK ? pw_lock_folder (folder, error) : -1;
 }
 
@@ -76,7 +76,7 @@ int pw_files_open (pw_files *files, const pw_cli_line *line, const pw_cli_model 
     if (use[i].how == PW_WRITES)
       status = (files->output[i] = pw_output_open (use[i].path, error)) ? PW_OK : error->status;
     else
-      status = (files->lock = pw_cli_folder (use[i].path, error)) >= 0 ? PW_OK : error->status;
+      status = (files->lock = pw_cli_lock_folder (use[i].path, error)) >= 0 ? PW_OK : error->status;
     files->locked |= use[i].how == PW_WRITES_INTO && status == PW_OK;
   }
   return status;

@@ -68,12 +68,12 @@ static void command_option_help (const struct poptOption *o) {
     printf ("%s\n%*s", left, COLUMN, "");
   else
     printf ("%-*s", COLUMN, left);
-  pw_cli_wrap (o->descrip, COLUMN, COMMAND_WIDTH);
+  pw_cli_print_wrapped (o->descrip, COLUMN, COMMAND_WIDTH);
 }
 
 static void command_help (const pw_command *command) {
   printf ("Usage: pinwheel %s %s\n", command->name, command->synopsis);
-  pw_cli_wrap (command->help, 0, COMMAND_WIDTH);
+  pw_cli_print_wrapped (command->help, 0, COMMAND_WIDTH);
   for (const struct poptOption *o = command->options; !command_is_end (o); o++)
     if (o->longName == NULL)
       printf ("\n%s:\n", o->descrip);

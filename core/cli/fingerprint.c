@@ -1,5 +1,6 @@
 /* Fingerprints: lines "KEY = VALUE" with everything that determines the results of a run or a sweep.  Checkpoints and
  * journals of sweeps begin with one, so that results of different runs are never mixed. */
+#define _GNU_SOURCE /* memmem */
 #include <errno.h>
 #include <stdint.h>
 #include <stdio.h>
@@ -93,9 +94,8 @@ static int fingerprint_read (const char **at, const char *end, fingerprint_entry
   *e = (fingerprint_entry){ .key = NULL };
   if (newline == NULL) return 0;
   *at = newline + 1;
-  const char *equals = line;
-  while (equals + size <= newline && memcmp (equals, fingerprint_equals, size) != 0) equals++;
-  if (equals + size <= newline)
+  const char *equals = memmem (line, (size_t)(newline - line), fingerprint_equals, size);
+  if (equals)
     *e = (fingerprint_entry){ line, equals + size, (size_t)(equals - line), (size_t)(newline - equals) - size };
   return 1;
 }

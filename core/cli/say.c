@@ -35,7 +35,7 @@ void pw_cli_print (FILE *f, const char *format, ...) {
     fputs (text, f);
 }
 
-void pw_cli_wrap (const char *text, int indent, int width) {
+void pw_cli_print_wrapped (const char *text, int indent, int width) {
   int longest = width - indent > 40 ? width - indent : 40; /* of a line */
   while ((int)strlen (text) > longest) {
     int n = longest;

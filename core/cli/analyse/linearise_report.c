@@ -33,22 +33,22 @@ static double linearise_doubling_time (double rate) {
 
 /* A row for each real eigenvalue and conjugate pair. */
 static void linearise_print_eigenvalues (const pw_linear *l) {
-  static const char *const head[] = { "imaginary [1/s]", "frequency [Hz]", "damping",
-                                      "doubles in [s]",  "halves in [s]",  NULL };
+  static const char *const head[] = { "mode",    "real [1/s]",     "imaginary [1/s]", "frequency [Hz]",
+                                      "damping", "doubles in [s]", "halves in [s]" };
   puts ("\nEigenvalues, rightmost first");
   for (pw_table t = { 0 }; pw_table_pass (&t);) {
-    pw_cell (&t, 4, "mode");
-    pw_cell (&t, 12, "real [1/s]");
-    for (const char *const *h = head; *h; h++) pw_cell (&t, 12, *h);
+    for (int k = 0; k < 7; k++) pw_cell (&t, k ? 12 : 4, head[k]);
     pw_row_end (&t);
     for (int i = 0; i < l->unknowns; i++) {
-      const double im = l->im[i],
-                   value[] = { im != 0 ? im : NAN, im != 0 ? im / (2 * PW_PI) : NAN, linearise_damping (l, i),
-                               linearise_doubling_time (l->re[i]), linearise_doubling_time (-l->re[i]) };
+      const double im = l->im[i], value[] = { l->re[i],
+                                              im != 0 ? im : NAN,
+                                              im != 0 ? im / (2 * PW_PI) : NAN,
+                                              linearise_damping (l, i),
+                                              linearise_doubling_time (l->re[i]),
+                                              linearise_doubling_time (-l->re[i]) };
       if (im < 0) continue;
       pw_cell_number (&t, 4, i + 1, 9);
-      pw_cell_number (&t, 12, l->re[i], LINEARISE_DIGITS);
-      for (int k = 0; k < 5; k++) pw_cell_number (&t, 12, value[k], LINEARISE_DIGITS);
+      for (int k = 0; k < 6; k++) pw_cell_number (&t, 12, value[k], LINEARISE_DIGITS);
       if (l->rigid[i]) pw_cell (&t, -1, "rigid displacement");
       pw_row_end (&t);
     }
@@ -275,8 +275,8 @@ int pw_linearise_npz (const pw_linearise_command *cmd, FILE *f, pw_error *error)
 
 /* ---- The page of mode shapes ----
  *
- * The displacement of a mode with the eigenvalue re + i im is size Re (shape exp (i im t)), an oscillation without growth;
- * with im = 0 it is size shape exp (re t), which grows to size or decays from it. */
+ * The displacement of a mode with the eigenvalue re + i im is size Re (shape exp (i im t)), without growth; with im = 0
+ * it is size shape exp (re t), which grows to size or decays from it. */
 
 enum {
   PAGE_SAMPLES = 180,     /* of each mode */

@@ -20,10 +20,14 @@ static const char *const periodic_events[] = { "point", "fold", "branch point", 
 
 /* ---- Quantities ---- */
 
-/* Displacement of the first body [m]: along its initial direction, to the left of it, and in total. */
-static void periodic_displacement (const pw_periodic_orbit *o, double d[3]) {
+/* Displacement of the first body in one period [m]: along its initial direction, to the left of that, and in total. */
+typedef struct {
+  double along, left, total;
+} periodic_displacement;
+
+static periodic_displacement periodic_displace (const pw_periodic_orbit *o) {
   double x = o->end[0] - o->q[0], y = o->end[1] - o->q[1], c = cos (o->q[2]), s = sin (o->q[2]);
-  d[0] = c * x + s * y, d[1] = c * y - s * x, d[2] = hypot (x, y);
+  return (periodic_displacement){ c * x + s * y, c * y - s * x, hypot (x, y) };
 }
 
 /* The largest modulus of a multiplier that is not trivial; NaN if there is none. */
@@ -38,18 +42,14 @@ static double periodic_round (double value) {
 /* ---- Text ---- */
 
 static void periodic_print_multipliers (const pw_periodic_orbit *o, int symmetries) {
-  int nontrivial = o->multipliers - o->trivial, shown = 0, more = 0;
+  int nontrivial = o->multipliers - o->trivial, shown = 0;
   printf ("  Floquet multipliers          ");
   for (int i = 0; i < nontrivial; i++) {
-    if (o->im[i] < 0) continue;
-    if (shown == PERIODIC_SHOWN) {
-      more = 1;
-      break;
-    }
-    if (shown++) printf ("\n                               ");
+    if (o->im[i] < 0 || shown++ >= PERIODIC_SHOWN) continue;
+    if (shown > 1) printf ("\n                               ");
     printf (o->im[i] > 0 ? "%.6g +- %.6g i, modulus %.6g" : "%.6g", o->re[i], o->im[i], hypot (o->re[i], o->im[i]));
   }
-  puts (nontrivial == 0 ? "none" : more ? " ..." : "");
+  puts (nontrivial == 0 ? "none" : shown > PERIODIC_SHOWN ? " ..." : "");
   printf ("  trivial multipliers          %d%s%s\n", o->trivial, symmetries ? ", of symmetries" : "",
           o->trivial > symmetries ? ", of a shift in time" : "");
 }
@@ -67,17 +67,16 @@ static const char *periodic_stability (const pw_periodic_orbit *o, char *text, s
 }
 
 static void periodic_print_motion (const pw_periodic_command *cmd, const pw_periodic_orbit *o) {
-  double d[3];
+  const periodic_displacement d = periodic_displace (o);
   char text[200];
-  periodic_displacement (o, d);
   printf ("%s: a periodic motion%s\n\n", pw_file_name (cmd->m.file),
           pw_states_symmetries (pw_periodic_symmetries (cmd->search), text));
   printf ("  period                       %.9g s, %s\n", o->period, cmd->source);
-  printf ("  displacement per period      %.6g m", periodic_round (d[2]));
-  printf (periodic_round (d[2]) > 0 ? ": %.6g m along %s, %.6g m to its left\n" : "\n", periodic_round (d[0]),
-          pw_system_body_name (cmd->m.system, 0), periodic_round (d[1]));
+  printf ("  displacement per period      %.6g m", periodic_round (d.total));
+  printf (periodic_round (d.total) > 0 ? ": %.6g m along %s, %.6g m to its left\n" : "\n", periodic_round (d.along),
+          pw_system_body_name (cmd->m.system, 0), periodic_round (d.left));
   printf ("  rotation per period          %.6g rad\n", periodic_round (o->rotation));
-  printf ("  mean speed                   %.6g m/s\n", periodic_round (d[2] / o->period));
+  printf ("  mean speed                   %.6g m/s\n", periodic_round (d.total / o->period));
   periodic_print_multipliers (o, pw_periodic_symmetries (cmd->search));
   printf ("  stability                    %s\n", periodic_stability (o, text, sizeof text));
   printf ("  residual                     %.1e after %d iterations\n", o->residual, o->iterations);
@@ -87,24 +86,22 @@ static void periodic_print_motion (const pw_periodic_command *cmd, const pw_peri
 
 /* Prints a row for each event and about PERIODIC_SHOWN other points. */
 static void periodic_print_branch (const pw_periodic_command *cmd) {
+  static const char *const head[] = { "period [s]", "displacement [m]", "rotation [rad]", "growing",
+                                      "largest multiplier" };
   char text[40];
   printf ("%s: a branch of periodic motions%s, %s from %.9g to %.9g, %d points\n\n", pw_file_name (cmd->m.file),
           pw_states_symmetries (pw_periodic_symmetries (cmd->search), text), cmd->vary.name, cmd->settings.first,
           cmd->settings.last, cmd->points);
   for (pw_table t = { 0 }; pw_table_pass (&t);) {
     pw_cell (&t, -15, "event");
-    *cmd->vary.unit ? pw_cell_unit (&t, 12, cmd->vary.name, cmd->vary.unit) : pw_cell (&t, 12, cmd->vary.name);
-    for (int k = 0; k < 5; k++)
-      pw_cell (
-          &t, 12,
-          (const char *[]){ "period [s]", "displacement [m]", "rotation [rad]", "growing", "largest multiplier" }[k]);
+    pw_cell_unit (&t, 12, cmd->vary.name, cmd->vary.unit);
+    for (int k = 0; k < 5; k++) pw_cell (&t, 12, head[k]);
     pw_row_end (&t);
     for (int i = 0; i < cmd->points; i++) {
       const pw_periodic_orbit *o = &cmd->point[i].orbit;
       int stride = cmd->points / PERIODIC_SHOWN + 1;
-      double d[3];
+      const periodic_displacement d = periodic_displace (o);
       if (o->event == PW_PERIODIC_POINT && i % stride && i + 1 < cmd->points) continue;
-      periodic_displacement (o, d);
       pw_cell (&t, -15,
                o->event != PW_PERIODIC_POINT ? periodic_events[o->event]
                : i == 0                      ? "begins"
@@ -112,7 +109,7 @@ static void periodic_print_branch (const pw_periodic_command *cmd) {
                                              : "ends");
       pw_cell_number (&t, 12, o->parameter, 9);
       pw_cell_number (&t, 12, o->period, 7);
-      pw_cell_number (&t, 12, periodic_round (d[2]), 6);
+      pw_cell_number (&t, 12, periodic_round (d.total), 6);
       pw_cell_number (&t, 12, periodic_round (o->rotation), 6);
       pw_cell_number (&t, 7, o->unstable, 3);
       pw_cell_number (&t, 12, periodic_largest (o), 6);
@@ -135,16 +132,15 @@ void pw_periodic_print (const pw_periodic_command *cmd) {
 
 static void periodic_point_json (const pw_periodic_command *cmd, const pw_periodic_orbit *o, pw_json *j) {
   int n = pw_system_coordinates (cmd->m.system);
-  double d[3];
-  periodic_displacement (o, d);
+  const periodic_displacement d = periodic_displace (o);
   j->line = 1;
   pw_json_open (j, NULL, '{');
   if (cmd->vary_text) pw_json_number (j, "parameter", o->parameter);
   if (cmd->vary_text) pw_json_text (j, "event", periodic_events[o->event]);
   pw_json_number (j, "period", o->period);
-  pw_json_number (j, "displacement", d[2]);
-  pw_json_number (j, "along", d[0]);
-  pw_json_number (j, "left", d[1]);
+  pw_json_number (j, "displacement", d.total);
+  pw_json_number (j, "along", d.along);
+  pw_json_number (j, "left", d.left);
   pw_json_number (j, "rotation", o->rotation);
   pw_json_number (j, "residual", o->residual);
   pw_json_number (j, "iterations", o->iterations);
@@ -194,11 +190,10 @@ static int periodic_csv (const void *context, FILE *f, pw_error *error) {
   int status = pw_text_line (&t, f, cmd->folder, error);
   for (const pw_periodic_point *p = cmd->point; status == PW_OK && p < cmd->point + cmd->points; p++) {
     const pw_periodic_orbit *o = &p->orbit;
-    double d[3];
-    periodic_displacement (o, d);
+    const periodic_displacement d = periodic_displace (o);
     pw_text_number (&t, cmd->vary_text ? o->parameter : NAN);
     pw_text_cell (&t, periodic_events[o->event]);
-    const double number[] = { o->period, d[2], o->rotation, o->unstable, o->residual };
+    const double number[] = { o->period, d.total, o->rotation, o->unstable, o->residual };
     for (int k = 0; k < 5; k++) pw_text_number (&t, number[k]);
     for (int i = 0; i < states; i++) pw_text_number (&t, p->state[i]);
     pw_complex_cells (&t, o->re, o->im, o->multipliers, most);
@@ -235,9 +230,8 @@ static int periodic_write_motion (const pw_periodic_command *cmd, const pw_perio
 
 /* Curve k over the parameter: displacement [m], largest multiplier, period [s]. */
 static double periodic_curve (const pw_periodic_orbit *o, int k) {
-  double d[3];
-  periodic_displacement (o, d);
-  return k == 0 ? periodic_round (d[2]) : k == 1 ? periodic_largest (o) : o->period;
+  const periodic_displacement d = periodic_displace (o);
+  return k == 0 ? periodic_round (d.total) : k == 1 ? periodic_largest (o) : o->period;
 }
 
 /* Writes the stable or unstable parts of the branch, each followed by a blank line.  A point belongs to the part

@@ -39,12 +39,12 @@ static const char *sensitivity_unit (const pw_sensitivity *sens, int output, int
 }
 
 typedef struct {
-  double derivative;
-  double
-      error; /* of differences and of the derivatives' integration; and of the run, from the change with its tolerances */
+  double derivative, error;
   double elasticity; /* relative change of the output per relative change of the unknown; NaN: there is none */
 } sensitivity_result;
 
+/* The derivative; its error: that of the differences and of the integration of derivatives, and that of the run,
+ * which is estimated by the change with its tolerances; the elasticity. */
 static sensitivity_result sensitivity_of (const pw_sensitivity *sens, int output, int unknown) {
   const double largest = 1e12; /* elasticities above it are those of an output that is 0 but for round-off */
   double derivative = pw_sensitivity_derivative (sens, output, unknown, sens->run_slope),
@@ -58,7 +58,11 @@ static sensitivity_result sensitivity_of (const pw_sensitivity *sens, int output
 
 static void sensitivity_print (const pw_sensitivity *sens) {
   char value[32], unit[SENSITIVITY_UNIT], digits[32];
-  static const char *const head[] = { "value", "derivative", "unit", "error", "elasticity", NULL };
+  static const struct {
+    int width;
+    const char *name;
+  } head[] = { { -14, "by" },  { 12, "value" }, { 12, "derivative" },
+               { -8, "unit" }, { 12, "error" }, { 12, "elasticity" } };
   printf ("%s by %s to t = %.9g s\n", pw_file_name (sens->unknowns.m->file), sens->unknowns.method,
           pw_run_time (sens->base.run));
   for (int o = 0; o < sens->outcomes.outcomes && !sens->stopped; o++) {
@@ -66,13 +70,13 @@ static void sensitivity_print (const pw_sensitivity *sens) {
     pw_cli_print (stdout, "\n%s = %s %s\n", sens->of[o],
                   pw_format (value, pw_outcome_value (&sens->outcomes, o, NULL), 12), unit);
     for (pw_table table = { 0 }; pw_table_pass (&table);) {
-      pw_cell (&table, -14, "by");
-      for (const char *const *h = head; *h; h++) pw_cell (&table, *h == head[2] ? -8 : 12, *h);
+      for (int k = 0; k < 6; k++) pw_cell (&table, head[k].width, head[k].name);
       pw_row_end (&table);
       for (int p = 0; p < sens->unknowns.count; p++) {
         const sensitivity_result result = sensitivity_of (sens, o, p);
-        pw_cell_unit (&table, -14, sens->unknowns.list[p].name, sens->unknowns.list[p].unit);
-        pw_cell_number (&table, 12, sens->unknowns.list[p].value, SENSITIVITY_DIGITS);
+        const pw_unknown *u = &sens->unknowns.list[p];
+        pw_cell_unit (&table, -14, u->name, u->unit);
+        pw_cell_number (&table, 12, u->value, SENSITIVITY_DIGITS);
         pw_cell (&table, 12,
                  isnan (result.derivative) ? "none" : pw_format (digits, result.derivative, SENSITIVITY_DIGITS));
         pw_cell (&table, -8, sensitivity_unit (sens, o, p, unit));
@@ -289,36 +293,43 @@ static int sensitivity_improve_steps (pw_sensitivity *sens) {
   return better;
 }
 
+/* The same problem without results. */
+static pw_sensitivity sensitivity_copy (const pw_sensitivity *sens) {
+  return (pw_sensitivity){ .of = sens->of, .unknowns = sens->unknowns, .row_interval = sens->row_interval };
+}
+
 /* Computes all derivatives again, with the steps now set. */
 static int sensitivity_repeat (pw_sensitivity *sens, pw_progress *progress, pw_error *error) {
   pw_sensitivity_close (sens);
-  *sens = (pw_sensitivity){ .of = sens->of, .unknowns = sens->unknowns, .row_interval = sens->row_interval };
+  *sens = sensitivity_copy (sens);
   int status = pw_sensitivity_open (sens, NULL, error);
   return status == PW_OK ? pw_sensitivity_compute (sens, progress, error) : status;
 }
 
-/* Tolerances of the repetition that estimates the error of the run, in those of the run. */
-static const double SENSITIVITY_LOOSE = 10;
+/* Factor of the tolerances with which the derivatives of a run that controls its error are repeated. */
+#define SENSITIVITY_LOOSE 10.0
 
 /* Computes the derivatives with larger tolerances. */
 static int sensitivity_loosen (pw_sensitivity *sens, pw_progress *progress, pw_error *error) {
   int outputs = sens->outcomes.outcomes, unknowns = sens->unknowns.count;
-  pw_sensitivity other = { .of = sens->of, .unknowns = sens->unknowns, .no_error = 1 };
+  pw_sensitivity other = sensitivity_copy (sens);
+  other.no_error = 1;
+  other.row_interval = 0;
   other.unknowns.settings.rtol = fmin (0.1, SENSITIVITY_LOOSE * sens->unknowns.settings.rtol);
   other.unknowns.settings.atol *= SENSITIVITY_LOOSE;
   sens->loose = malloc ((size_t)(outputs * unknowns) * sizeof *sens->loose);
-  if (sens->loose == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
-  int status = pw_sensitivity_open (&other, NULL, error);
+  int status = sens->loose ? pw_sensitivity_open (&other, NULL, error) : pw_fail (error, PW_RESOURCE, "out of memory");
   if (status == PW_OK) status = pw_sensitivity_compute (&other, progress, error);
   sens->stopped |= other.stopped;
-  for (int i = 0; i < outputs * unknowns && status == PW_OK && !other.stopped; i++)
-    sens->loose[i] = pw_sensitivity_derivative (&other, i / unknowns, i % unknowns, other.run_slope);
+  for (int o = 0; o < outputs && status == PW_OK && !other.stopped; o++)
+    for (int p = 0; p < unknowns; p++)
+      sens->loose[o * unknowns + p] = pw_sensitivity_derivative (&other, o, p, other.run_slope);
   pw_sensitivity_close (&other);
   return status;
 }
 
-/* Estimates the part of the errors that is due to the error of the run, if the method controls it. */
-static int sensitivity_run_error (pw_sensitivity *sens, pw_progress *progress, pw_error *error) {
+/* Estimates the part of the errors that the error of the run causes. */
+static int sensitivity_estimate_run_error (pw_sensitivity *sens, pw_progress *progress, pw_error *error) {
   if (sens->stopped || pw_cli_adaptive (sens->unknowns.method) == 0) return PW_OK;
   int status = sensitivity_loosen (sens, progress, error);
   if (status == PW_OK || status == PW_RESOURCE) return status;
@@ -342,7 +353,7 @@ static int sensitivity_compute (pw_sensitivity *sens, pw_error *error) {
     status = sensitivity_repeat (sens, &progress, error);
     break;
   }
-  if (status == PW_OK) status = sensitivity_run_error (sens, &progress, error);
+  if (status == PW_OK) status = sensitivity_estimate_run_error (sens, &progress, error);
   pw_progress_end (&progress);
   pw_stop_release ();
   return status;

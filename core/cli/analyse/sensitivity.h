@@ -25,7 +25,7 @@ typedef struct {
   double *value;               /* 2 F: values; scratch: the gradient of an output */
   double *slope, *slope_error; /* F x P: derivatives, and their errors */
   /* private */
-  double *values;             /* P: of the unknowns */
+  double *unknown_value;      /* P: of the unknowns */
   pw_unknown_run *neighbours; /* 4 of each unknown */
   pw_variation *variation;
   pw_run *sampled;        /* the run of which samples are taken; NULL: base.run */

@@ -129,12 +129,15 @@ static void sensitivity_keep (pw_sensitivity *sens, int i) {
       sens->run_slope[at] = sens->slope[at], sens->run_slope_error[at] = sens->slope_error[at];
 }
 
+/* Where an extremum is: inside an interval, or at a breakpoint that is not passed yet. */
+typedef enum { INSIDE, AT_BREAKPOINT } sensitivity_place;
+
 /* The same for an extremum.  Derivatives do not exist at a breakpoint whose time depends on the unknown, and just
- * after it. reached: 1 if the extremum is at a breakpoint that is not passed yet. */
-static void sensitivity_keep_extremum (pw_sensitivity *sens, int i, int reached) {
+ * after it. */
+static void sensitivity_keep_extremum (pw_sensitivity *sens, int i, sensitivity_place place) {
   const pw_functional *f = &sens->outcomes.functional[i];
   double slope, next = pw_variation_breakpoint (sens->variation, 0, &slope);
-  int before = reached || fabs (f->t - next) < 1e-9 * (1 + fabs (next)),
+  int before = place == AT_BREAKPOINT || fabs (f->t - next) < 1e-9 * (1 + fabs (next)),
       after = f->t - sens->last_breakpoint <= 2 * PW_FUNCTIONAL_INSET * f->step;
   sensitivity_keep (sens, i);
   for (int p = 0; p < sens->unknowns.count && (before || after); p++)
@@ -200,13 +203,9 @@ static int sensitivity_points (const pw_sensitivity *sens, double t0, double t1,
 static int sensitivity_interval (pw_sensitivity *sens, double t0, double t1, sensitivity_point *list, pw_error *error) {
   int count = sensitivity_points (sens, t0, t1, list), status = PW_OK;
   for (int i = 0; i < count && status == PW_OK; i++) {
-    double t = list[i].t;
-    status = pw_sensitivity_at (sens, t, error);
-    if (status != PW_OK) break;
-    if (list[i].extremum < 0)
-      sensitivity_add_node (sens, list[i].weight);
-    else
-      sensitivity_keep_extremum (sens, list[i].extremum, 0);
+    status = pw_sensitivity_at (sens, list[i].t, error);
+    if (status == PW_OK && list[i].extremum < 0) sensitivity_add_node (sens, list[i].weight);
+    if (status == PW_OK && list[i].extremum >= 0) sensitivity_keep_extremum (sens, list[i].extremum, INSIDE);
   }
   return status == PW_OK ? pw_sensitivity_at (sens, t1, error) : status;
 }
@@ -225,7 +224,8 @@ static int sensitivity_jump (pw_sensitivity *sens, double t0, double t, int with
   for (int i = 0; i < sens->outcomes.functionals && status == PW_OK; i++) {
     const pw_functional *f = &sens->outcomes.functional[i];
     double jump = sens->before[i] - sens->value[i];
-    if (pw_is_extremum (f->type) && f->t > t0 && f->t <= t) sensitivity_keep_extremum (sens, i, !passed);
+    if (pw_is_extremum (f->type) && f->t > t0 && f->t <= t)
+      sensitivity_keep_extremum (sens, i, passed ? INSIDE : AT_BREAKPOINT);
     if (!pw_is_integral (f->type) || jump == 0) continue;
     if (f->type != PW_INTEGRAL) jump /= sens->unknowns.t_end;
     if (f->type == PW_RMS) jump *= (sens->before[i] + sens->value[i]) / (2 * f->value);
@@ -307,11 +307,13 @@ int pw_sensitivity_open (pw_sensitivity *sens, const double *values, pw_error *e
   sens->limit.seconds = sens->unknowns.limit;
   sens->unknowns.settings.stop = pw_limit_over;
   sens->unknowns.settings.stop_context = &sens->limit;
-  sens->values = malloc (P * sizeof *sens->values);
+  sens->unknown_value = malloc (P * sizeof *sens->unknown_value);
   sens->neighbours = calloc (4 * P, sizeof *sens->neighbours);
   sens->direction = calloc (P, sizeof *sens->direction);
-  for (size_t p = 0; p < P && sens->values; p++) sens->values[p] = values ? values[p] : sens->unknowns.list[p].value;
-  return sens->values && sens->neighbours && sens->direction ? PW_OK : pw_fail (error, PW_RESOURCE, "out of memory");
+  for (size_t p = 0; p < P && sens->unknown_value; p++)
+    sens->unknown_value[p] = values ? values[p] : sens->unknowns.list[p].value;
+  return sens->unknown_value && sens->neighbours && sens->direction ? PW_OK
+                                                                    : pw_fail (error, PW_RESOURCE, "out of memory");
 }
 
 static int sensitivity_arrays (pw_sensitivity *sens, pw_error *error) {
@@ -363,7 +365,7 @@ static int sensitivity_check_independence (const pw_sensitivity *sens, pw_error 
     if (u->state < 0) continue;
     const pw_initial_report *initial = pw_run_initial (d->neighbour[0]);
     double value = u->state < n ? initial->q[u->state] : initial->v[u->state - n];
-    if (fabs (value - sens->values[p] - pw_direction_offset (d, 0)) > 0.01 * fabs (d->step))
+    if (fabs (value - sens->unknown_value[p] - pw_direction_offset (d, 0)) > 0.01 * fabs (d->step))
       return pw_fail (
           error, PW_INPUT,
           "--by %s: it cannot change while the other initial values of --by and --start are kept: constraints "
@@ -376,12 +378,12 @@ static int sensitivity_check_independence (const pw_sensitivity *sens, pw_error 
 static int sensitivity_open_runs (pw_sensitivity *sens, pw_error *error) {
   int count = 0;
   while (sens->of[count]) count++;
-  int status = pw_unknown_run_open (&sens->base, &sens->unknowns, sens->values, error);
+  int status = pw_unknown_run_open (&sens->base, &sens->unknowns, sens->unknown_value, error);
   if (status == PW_OK) status = pw_outcomes_open (&sens->outcomes, sens->base.m.system, "--of", sens->of, count, error);
   if (status == PW_OK) status = sensitivity_open_ledger (sens, error);
   if (status == PW_OK)
-    status =
-        pw_unknowns_directions (sens->direction, &sens->unknowns, sens->values, &sens->base, sens->neighbours, error);
+    status = pw_unknowns_directions (sens->direction, &sens->unknowns, sens->unknown_value, &sens->base,
+                                     sens->neighbours, error);
   for (int p = 0; p < sens->unknowns.count; p++) sens->direction[p].no_error = sens->no_error;
   return status == PW_OK && !sens->no_error ? sensitivity_check_independence (sens, error) : status;
 }
@@ -411,7 +413,7 @@ void pw_sensitivity_close (pw_sensitivity *sens) {
   pw_unknown_run_close (&sens->base);
   free (sens->neighbours);
   free (sens->direction);
-  free (sens->values);
+  free (sens->unknown_value);
   free (sens->memory);
   free (sens->loose);
   free (sens->row);

@@ -68,17 +68,12 @@ void pw_states_header (const pw_system *s, pw_text *t) {
 
 void pw_complex_header (pw_text *t, int most, const char *unit) {
   char name[32];
-  for (int i = 0; i < 2 * most; i++) {
-    snprintf (name, sizeof name, "%s%d", i % 2 ? "im" : "re", i / 2 + 1);
-    pw_text_name (t, name, unit);
-  }
+  for (int i = 0; i < 2 * most; i++)
+    snprintf (name, sizeof name, "%s%d", i % 2 ? "im" : "re", i / 2 + 1), pw_text_name (t, name, unit);
 }
 
 void pw_complex_cells (pw_text *t, const double *re, const double *im, int count, int most) {
-  for (int i = 0; i < most; i++) {
-    pw_text_number (t, i < count ? re[i] : NAN);
-    pw_text_number (t, i < count ? im[i] : NAN);
-  }
+  for (int i = 0; i < 2 * most; i++) pw_text_number (t, i / 2 < count ? (i % 2 ? im : re)[i / 2] : NAN);
 }
 
 const char *pw_states_symmetries (int count, char text[40]) {

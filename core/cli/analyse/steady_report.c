@@ -84,7 +84,7 @@ static void steady_print_branches (const pw_steady_command *cmd) {
     events = 0;
     pw_cell (&t, 6, "branch");
     pw_cell (&t, -15, "event");
-    *cmd->vary.unit ? pw_cell_unit (&t, 12, cmd->vary.name, cmd->vary.unit) : pw_cell (&t, 12, cmd->vary.name);
+    pw_cell_unit (&t, 12, cmd->vary.name, cmd->vary.unit);
     for (int k = 0; k < 3; k++) pw_cell (&t, 7, (const char *[]){ "growing", "rightmost [1/s]", "frequency [Hz]" }[k]);
     pw_row_end (&t);
     for (const pw_steady_point *p = cmd->point; p < cmd->point + cmd->points; p++) {

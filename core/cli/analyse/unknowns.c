@@ -15,8 +15,8 @@ int pw_unknown_find (pw_unknown *u, const pw_cli_model *m, const char *name, pw_
     snprintf (u->unit, sizeof u->unit, "%s", u->parameter->unit);
     return PW_OK;
   }
-  if (strchr (name, '.') == NULL) {                  /* fails with the nearest name */
-    pw_model *copy = pw_file_model (m->file, error); /* m->model is built */
+  if (strchr (name, '.') == NULL) {
+    pw_model *copy = pw_file_model (m->file, error); /* of m->model before it was built: fails with the nearest name */
     if (copy) pw_model_set (copy, name, 0, error);
     pw_model_free (copy);
     return error->status;
@@ -71,7 +71,7 @@ static int free_bounds (pw_unknown *u, const char *text, pw_error *error) {
       return pw_fail (error, PW_INPUT, "--free %s: the %s bound is %g, expected %s", u->name, i ? "upper" : "lower",
                       bounds[i], expected);
   }
-  u->low = bounds[0], u->high = bounds[1], u->given = 1;
+  u->low = bounds[0], u->high = bounds[1], u->has_bounds = 1;
   if (u->low <= u->value && u->value <= u->high) return PW_OK;
   return pw_fail (error, PW_INPUT, "--free %s: its initial value %.9g is not between %.9g and %.9g; set it by %s",
                   u->name, u->value, u->low, u->high, u->parameter ? "--set" : "--start");
@@ -93,7 +93,7 @@ static int free_add (pw_unknowns *u, const char *text, pw_error *error) {
   if (domain == PW_COUNT)
     status = pw_fail (error, PW_INPUT, "--free %s: it is a count, and only continuous parameters can be free", name);
   if (status == PW_OK && text[size]) status = free_bounds (added, text + size + 1, error);
-  added->scale = added->given ? added->high - added->low : added->value != 0 ? fabs (added->value) : 1;
+  added->scale = added->has_bounds ? added->high - added->low : added->value != 0 ? fabs (added->value) : 1;
   return status;
 }
 
@@ -228,7 +228,7 @@ int pw_unknowns_directions (pw_direction *d, const pw_unknowns *u, double *x, pw
 
 /* The value at a fraction, from 0 to 1, of the range in which searches begin. */
 static double unknowns_between (const pw_unknown *u, double fraction) {
-  double value = u->given ? u->low + fraction * u->scale : u->value + (2 * fraction - 1) * u->scale;
+  double value = u->has_bounds ? u->low + fraction * u->scale : u->value + (2 * fraction - 1) * u->scale;
   return fmin (fmax (value, u->low), u->high);
 }
 

@@ -16,7 +16,7 @@ typedef struct {
   /* for searches: */
   double low, high; /* bounds; infinite without one */
   double scale;     /* size of typical changes: the distance of the bounds, else |value|, else 1 */
-  int given;        /* 1: the bounds are the user's */
+  int has_bounds;   /* 1: the bounds are those of --free, which are finite */
 } pw_unknown;
 
 #define PW_UNKNOWN_STEP 1e-5 /* leaves an error of about 1e-10 in extrapolated differences, mostly round-off */

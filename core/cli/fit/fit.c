@@ -141,7 +141,7 @@ static int fit_options (pw_fit *x, pw_error *error) {
   if (status == PW_OK) status = pw_cli_number ("--starts", x->starts_text, PW_COUNT, &starts, error);
   if (status == PW_OK && starts > 1e5) status = pw_fail (error, PW_INPUT, "--starts: at most 100000");
   x->starts = (int)starts;
-  if (status == PW_OK) status = pw_cli_csv (x->path, error);
+  if (status == PW_OK) status = pw_cli_check_csv (x->path, error);
   if (status == PW_OK) status = pw_cli_requires ("--width", x->line.width, "--plots DIR", x->plots_path != NULL, error);
   return status == PW_OK ? pw_parallel_jobs (x->jobs_text, &x->jobs, error) : status;
 }

@@ -32,11 +32,11 @@ typedef struct {
 
 /* The value of an unknown: u is from 0 to 1 between the user's bounds, otherwise in units of its scale. */
 static double search_unknown (const pw_unknown *k, double u) {
-  return fmin (fmax (k->given ? k->low + u * k->scale : u * k->scale, k->low), k->high);
+  return fmin (fmax (k->has_bounds ? k->low + u * k->scale : u * k->scale, k->low), k->high);
 }
 
 static double search_scaled (const pw_unknown *k, double x) {
-  return k->given ? (x - k->low) / k->scale : x / k->scale;
+  return k->has_bounds ? (x - k->low) / k->scale : x / k->scale;
 }
 
 /* A status; outputs that are not finite count as failed. */

@@ -176,7 +176,7 @@ static int optimise_converged (const pw_optimise *x, pw_error *error) {
   double most = 0;
   for (int i = 0; i < x->unknowns.count; i++) {
     const pw_unknown *k = x->unknowns.list + i;
-    if (!k->given && fabs (s->best[i]) >= most * k->scale) far = k, most = fabs (s->best[i]) / k->scale;
+    if (!k->has_bounds && fabs (s->best[i]) >= most * k->scale) far = k, most = fabs (s->best[i]) / k->scale;
   }
   if (s->converged && most < OPTIMISE_FAR) return PW_OK;
   if (far == NULL) return pw_fail (error, PW_METHOD, "the search did not converge in %ld runs", s->runs);

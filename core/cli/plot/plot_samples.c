@@ -73,7 +73,7 @@ static void plot_choose (pw_plots *p) {
 
 /* Reports a folder that cannot be written before the run. */
 static int plot_try_folder (pw_plots *p, pw_error *error) {
-  p->lock = pw_cli_folder (p->figures.folder, error);
+  p->lock = pw_cli_lock_folder (p->figures.folder, error);
   pw_output *probe = p->lock < 0 ? NULL : pw_figure_data (&p->figures, "motion.dat", error);
   if (probe) pw_output_discard (probe);
   return probe ? PW_OK : error->status;

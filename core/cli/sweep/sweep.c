@@ -30,7 +30,7 @@ static int sweep_check_options (const pw_sweep *sweep, pw_error *error) {
     return pw_fail (error, PW_INPUT, "nowhere to write the table: add -o FILE.csv");
   if (strcmp (sweep->path, "-") == 0)
     return pw_fail (error, PW_INPUT, "-o -: a sweep needs a file, next to which it keeps what it has done");
-  if (pw_cli_csv (sweep->path, error) != PW_OK) return PW_INPUT;
+  if (pw_cli_check_csv (sweep->path, error) != PW_OK) return PW_INPUT;
   if (!sweep->merge && sweep->ranges == NULL)
     return pw_fail (error, PW_INPUT, "nothing is varied: add --vary NAME=lin:FIRST:LAST:COUNT, log:..., or V1,V2,...");
   return sweep->merge ? PW_OK : pw_cli_at_most (&pw_cli_sweep, &sweep->line, 1, error);
