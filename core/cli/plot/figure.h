@@ -21,8 +21,8 @@ typedef struct {
 /* Endings of a folder's data files, scripts and pictures, ended by NULL. */
 extern const char *const pw_figure_endings[];
 
-/* The option of commands that draw figures, and its value [mm] of "85mm", "8.5cm" or "3.3in"; NULL leaves *width unchanged.
- * PW_INPUT unless it is between 50 and 500 mm. */
+/* The option of commands that draw figures, and its value [mm] of "85mm", "8.5cm" or "3.3in"; NULL leaves *width
+ * unchanged.  PW_INPUT unless it is between 50 and 500 mm. */
 #define PW_WIDTH_OPTION                                    \
   PW_TEXT_OPTION (pw_cli_line, width, "width", 0, "WIDTH", \
                   "Width of figures, such as 85mm for one column (default 170mm)")

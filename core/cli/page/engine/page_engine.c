@@ -168,7 +168,7 @@ static void page_write_scene (pw_json *j) {
   const struct {
     const char *key;
     double value;
-  } number[] = { { "samples", page_plots->samples },      { "width", page_plots->width }, { "steps", (double)s->steps },
+  } number[] = { { "samples", page_plots->samples },      { "width", page_plots->sample_size }, { "steps", (double)s->steps },
                  { "rejected", (double)s->rejected },     { "g", s->g },                  { "jv", s->jv },
                  { "evaluations", (double)s->rhs },       { "energy_defect", page_energy } };
   pw_json_open (j, NULL, '{');
