@@ -284,8 +284,8 @@ static int report_data (const void *context, FILE *f, pw_error *error) {
 static void report_variables (const void *context, FILE *f) {
   const pw_optimise *problem = context;
   int panels = problem->unknowns.count < REPORT_PANELS ? problem->unknowns.count : REPORT_PANELS;
-  fprintf (f, "constraints = %d\npanels = %d\nunknowns = %d\narray label[%d]\narray best[%d]\n", problem->outputs - 1,
-           panels, problem->unknowns.count, panels, panels);
+  fprintf (f, "panels = %d\nunknowns = %d\narray label[%d]\narray best[%d]\n", panels, problem->unknowns.count, panels,
+           panels);
   for (int i = 0; i < panels; i++) {
     pw_figure_label (f, "label", i + 1, problem->unknowns.list[i].name, problem->unknowns.list[i].unit);
     fprintf (f, "best[%d] = %.12g\n", i + 1, problem->best->to[i]);

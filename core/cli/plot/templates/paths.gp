@@ -16,6 +16,5 @@ do for [form in forms] {
     eval place(i)
     eval draw(2, 3, 0, i == 1)
   }
-  unset multiplot
-  unset output
+  eval finish
 }
