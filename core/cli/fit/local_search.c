@@ -92,14 +92,21 @@ static double search_factor (const pw_optimise *problem, int i) {
   return problem->sign[i] / (problem->bound[i] != 0 ? fabs (problem->bound[i]) : 1);
 }
 
-double pw_search_violation (const pw_optimise *problem, int i, const double *output) {
+/* By how much the outputs violate constraint i; <= 0: not at all. */
+static double search_violation (const pw_optimise *problem, int i, const double *output) {
   return search_factor (problem, i) * (output[i] - problem->bound[i]);
 }
 
-int pw_search_feasible (const pw_optimise *problem, const double *output) {
+double pw_search_violation (const pw_optimise *problem, const double *output, int *constraint) {
+  double most = -INFINITY;
   for (int i = 1; i < problem->outputs; i++)
-    if (pw_search_violation (problem, i, output) > SEARCH_ALLOWED) return 0;
-  return 1;
+    if (search_violation (problem, i, output) > most) most = search_violation (problem, i, output), *constraint = i;
+  return most;
+}
+
+int pw_search_feasible (const pw_optimise *problem, const double *output) {
+  int constraint;
+  return pw_search_violation (problem, output, &constraint) <= SEARCH_ALLOWED;
 }
 
 /* Appends the last run to those of the search. */
@@ -205,7 +212,7 @@ static void search_constraints (unsigned count, double *violation, unsigned unkn
   local_search *local = context;
   search_evaluate (local, scaled, gradient != NULL);
   for (int i = 1; i <= (int)count; i++) {
-    violation[i - 1] = local->failed ? 1 : pw_search_violation (local->problem, i, local->output);
+    violation[i - 1] = local->failed ? 1 : search_violation (local->problem, i, local->output);
     search_gradient (local, i, search_factor (local->problem, i),
                      gradient ? gradient + (unsigned)(i - 1) * unknowns : NULL);
   }

@@ -176,24 +176,16 @@ static int optimise_open (pw_optimise *problem, pw_error *error) {
 
 /* ---- After the search ---- */
 
-/* The constraint that these outputs violate most. */
-static int optimise_most_violated (const pw_optimise *problem, const double *output) {
-  int most = 1;
-  for (int i = 2; i < problem->outputs; i++)
-    if (pw_search_violation (problem, i, output) > pw_search_violation (problem, most, output)) most = i;
-  return most;
-}
-
-/* Outputs of the run that violates its most violated constraint least. */
-static const double *optimise_nearest (const pw_optimise *problem) {
+/* Outputs of the run that violates its most violated constraint least, and that constraint. */
+static const double *optimise_nearest (const pw_optimise *problem, int *constraint) {
   const double *nearest = NULL;
   double least = INFINITY;
-  int n = problem->unknowns.count, width = n + problem->outputs;
+  int n = problem->unknowns.count, width = n + problem->outputs, i = 0;
   for (const pw_search *search = problem->search; search < problem->search + problem->starts; search++)
     for (long k = 0; k < search->runs; k++) {
       const double *output = search->trials + k * width + n;
-      double violation = pw_search_violation (problem, optimise_most_violated (problem, output), output);
-      if (violation <= least) least = violation, nearest = output;
+      double violation = isnan (output[0]) ? NAN : pw_search_violation (problem, output, &i);
+      if (violation <= least) least = violation, nearest = output, *constraint = i;
     }
   return nearest;
 }
@@ -201,11 +193,11 @@ static const double *optimise_nearest (const pw_optimise *problem) {
 /* The error if no run satisfies the constraints: the first one if every run failed. */
 static int optimise_infeasible (const pw_optimise *problem, pw_error *error) {
   char value[32], bound[32], unit[90] = "";
+  int i = 0;
   if (problem->failed == problem->runs && problem->first_error)
     return pw_fail (error, problem->first_error->status, "none of %ld runs succeeded, the first one: %s", problem->runs,
                     problem->first_error->text);
-  const double *output = optimise_nearest (problem);
-  int i = optimise_most_violated (problem, output);
+  const double *output = optimise_nearest (problem, &i);
   if (*problem->unit[i]) snprintf (unit, sizeof unit, " %s", problem->unit[i]);
   return pw_fail (error, PW_METHOD,
                   "no run from %d starts satisfies --subject-to; in the nearest one %s is %s%s and must be at %s %s%s",

@@ -54,8 +54,8 @@ typedef struct {
 
 /* 1 if the outputs of a run satisfy the constraints, with an allowance for round-off on the boundary. */
 int pw_search_feasible (const pw_optimise *problem, const double *output);
-/* By how much the outputs of a run violate constraint i, relative to its bound if that is not 0; <= 0: not at all. */
-double pw_search_violation (const pw_optimise *problem, int i, const double *output);
+/* The constraint that the outputs of a run violate most, and by how much, relative to its bound if that is not 0. */
+double pw_search_violation (const pw_optimise *problem, const double *output, int *constraint);
 
 /* Tasks of pw_parallel: the search from start i; refinement i.  The context is the pw_optimise. */
 int pw_search_rough (void *context, int i, pw_error *error);

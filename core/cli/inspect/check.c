@@ -187,30 +187,25 @@ static void check_close (pw_check *check) {
   pw_cli_close_model (&check->model);
 }
 
-/* Opens the output file before anything is computed. */
-static int check_open_json (pw_check *check, pw_output **o, pw_error *error) {
-  pw_use use[] = { PW_CLI_MODEL_USE, { "--json", check->json_path, PW_WRITES, NULL } };
-  if (check->json_path == NULL) return PW_OK;
-  if (pw_cli_uses (&check->line, check->model.file, use, sizeof use / sizeof *use, error) != PW_OK)
-    return error->status;
-  *o = pw_output_open (check->json_path, error);
-  return *o ? PW_OK : error->status;
-}
+enum { CHECK_JSON = 1 }; /* index in the list of files of check_command */
 
 static int check_command (void *options, pw_error *error) {
   pw_check *check = options;
-  pw_output *o = NULL;
-  if (pw_cli_open (&check->model, &check->line, error) == PW_OK && check_open_json (check, &o, error) == PW_OK &&
-      check_model (check, error) == PW_OK) {
-    if (o == NULL || pw_output_stream (o) != stdout) pw_check_report (check, NULL);
-    if (o) pw_check_report (check, &(pw_json){ .f = pw_output_stream (o) });
-    if (o) pw_output_finish (o, error);
-    o = NULL;
+  pw_files files = { .locked = 0 };
+  pw_use use[] = { PW_CLI_MODEL_USE, { "--json", check->json_path, PW_WRITES, NULL } };
+  int status = pw_cli_open (&check->model, &check->line, error);
+  if (status == PW_OK) status = pw_files_open (&files, &check->line, &check->model, use, 2, error);
+  if (status == PW_OK) status = check_model (check, error);
+  if (status == PW_OK) {
+    FILE *json = pw_files_stream (&files, CHECK_JSON);
+    if (json != stdout) pw_check_report (check, NULL);
+    if (json) pw_check_report (check, &(pw_json){ .f = json });
+    pw_files_finish (&files, error);
     if (check->problem.count) /* the exit status is that of a failed initialisation, otherwise that of bad input */
       pw_fail (error, check->run_error.status ? check->run_error.status : PW_INPUT, "%s%s", check->problem.text[0],
                check->problem.count > 1 ? "; and more, see above" : "");
   }
-  if (o) pw_output_discard (o);
+  pw_files_close (&files);
   check_close (check);
   return error->status;
 }
