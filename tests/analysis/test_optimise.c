@@ -86,7 +86,7 @@ static void test_bound (void **state) {
   assert_non_null (strstr (cli_out, "at its upper bound"));
   assert_non_null (strstr (cli_out, "--set a=0.5 --start p.vy="));
   char run[300];
-  cli_expand ("# pinwheel run @/point.yaml --set a=0.5 --start p.vy=", run, sizeof run);
+  cli_expand ("# pinwheel run '@/point.yaml' --set a=0.5 --start p.vy=", run, sizeof run);
   const char *yaml = cli_file ("o.yaml");
   assert_int_equal (strncmp (yaml, run, strlen (run)), 0);
   assert_non_null (strstr (yaml, "set:\n  a: 0.5\nstart:\n  p.vy: "));
@@ -96,21 +96,21 @@ static void test_bound (void **state) {
 static void test_command (void **state) {
   (void)state;
   cli_shell ("pinwheel optimise pendulum --maximise bob.vx --free g=5:8 --set g=6 --set 'l=1*2' -t 0.5 -o @/o.yaml");
-  static const char given[] = "# pinwheel run pendulum --set g=6 --set 'l=1*2' --t-end 0.5 --set g=";
+  static const char given[] = "# pinwheel run 'pendulum' --set 'g=6' --set 'l=1*2' --t-end '0.5' --set g=";
   assert_int_equal (strncmp (cli_file ("o.yaml"), given, sizeof given - 1), 0);
   cli_write ("a point's model.yaml", model);
   cli_shell (
       "pinwheel optimise \"@/a point's model.yaml\" --maximise p.x --free a=-2:0.5 --max-file 1 -m erk5 --rtol 1e-4 "
       "--atol 1e-5 --max-steps 1000 --specialise never --limit 100 --starts 1 -o @/o.yaml");
   char run[300];
-  cli_expand ("# pinwheel run '@/a point'\\''s model.yaml' --max-file 1 --method erk5 --rtol 1e-4 --atol 1e-5 "
-              "--max-steps 1000 --specialise never --set a=0.5\n",
+  cli_expand ("# pinwheel run '@/a point'\\''s model.yaml' --max-file '1' --method 'erk5' --rtol '1e-4' --atol '1e-5' "
+              "--max-steps '1000' --specialise 'never' --set a=0.5\n",
               run, sizeof run);
   assert_int_equal (strncmp (cli_file ("o.yaml"), run, strlen (run)), 0);
   cli_good ("eval \"$(sed -n '1s/^# //p' @/o.yaml)\"");
   /* enough steps for specialised code, but not in the run of the result alone */
   cli_shell ("pinwheel optimise pendulum --maximise bob.vx --free g=5:10 -t 0.05 --step 1e-6 --starts 1 -o @/o.yaml");
-  assert_non_null (strstr (cli_file ("o.yaml"), " --step 1e-6 --specialise always --set g="));
+  assert_non_null (strstr (cli_file ("o.yaml"), " --step '1e-6' --specialise 'always' --set g="));
 }
 
 /* Beyond p.x = 0.3 every run fails. */

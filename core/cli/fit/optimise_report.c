@@ -206,14 +206,10 @@ static void report_quoted (FILE *f, const char *text, const char *quote) {
   fputc ('\'', f);
 }
 
-/* A word of a shell command, in quotes if the shell would read it otherwise. */
+/* A word of a shell command. */
 static void report_word (FILE *f, const char *word) {
-  static const char plain[] = "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_.:,+-/=";
   fputc (' ', f);
-  if (word[strspn (word, plain)] == 0)
-    fputs (word, f);
-  else
-    report_quoted (f, word, "'\\''");
+  report_quoted (f, word, "'\\''");
 }
 
 /* The run of the result, as a comment: with the options given that have an effect on it, then with the values found. */

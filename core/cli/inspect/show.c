@@ -125,6 +125,14 @@ static void matrices_head (pw_table *t, const char *const *head) {
   pw_row_end (t);
 }
 
+/* A row of numbers; "-" in place of NaN. */
+static void matrices_row (pw_table *t, const char *name, const char *unit, const double *value, int count) {
+  pw_cell_unit (t, -22, name, unit);
+  for (int i = 0; i < count; i++)
+    isnan (value[i]) ? pw_cell (t, 13, "-") : pw_cell_number (t, 13, value[i], MATRICES_DIGITS);
+  pw_row_end (t);
+}
+
 static void matrices_coordinates (const pw_system *s, const pw_equations *equations, const pw_sample *sample) {
   static const char *const head[] = { "M", "f", "q", "v", "a", NULL };
   char name[300];
@@ -133,29 +141,23 @@ static void matrices_coordinates (const pw_system *s, const pw_equations *equati
     matrices_head (&t, head);
     for (int j = 0; j < equations->coordinates; j++) {
       const double value[] = { equations->mass[j], equations->force[j], sample->q[j], sample->v[j], sample->a[j] };
-      pw_cell_unit (&t, -22, pw_system_state_name (s, j, name, sizeof name), pw_system_state_unit (s, j));
-      for (int i = 0; i < 5; i++) pw_cell_number (&t, 13, value[i], MATRICES_DIGITS);
-      pw_row_end (&t);
+      pw_system_state_name (s, j, name, sizeof name);
+      matrices_row (&t, name, pw_system_state_unit (s, j), value, 5);
     }
   }
 }
 
-static void matrices_rows (const pw_system *s, const pw_equations *equations, const pw_sample *sample) {
+static void matrices_constraints (const pw_system *s, const pw_equations *equations, const pw_sample *sample) {
   static const char *const head[] = { "gamma", "eta", "g", "lambda", NULL };
   char name[300];
   puts ("\ngamma, eta, g and lambda by constraint equation, named after its reaction, which is -lambda");
   for (pw_table t = { 0 }; pw_table_pass (&t);) {
     matrices_head (&t, head);
     for (int i = 0; i < equations->rows; i++) {
-      pw_cell_unit (&t, -22, pw_system_reaction_name (s, i, name, sizeof name), pw_system_reaction_unit (s, i));
-      pw_cell_number (&t, 13, equations->gamma[i], MATRICES_DIGITS);
-      pw_cell_number (&t, 13, equations->eta[i], MATRICES_DIGITS);
-      if (i < equations->holonomic)
-        pw_cell_number (&t, 13, equations->g[i], MATRICES_DIGITS);
-      else
-        pw_cell (&t, 13, "-");
-      pw_cell_number (&t, 13, sample->lambda[i], MATRICES_DIGITS);
-      pw_row_end (&t);
+      const double g = i < equations->holonomic ? equations->g[i] : NAN,
+                   value[] = { equations->gamma[i], equations->eta[i], g, sample->lambda[i] };
+      pw_system_reaction_name (s, i, name, sizeof name);
+      matrices_row (&t, name, pw_system_reaction_unit (s, i), value, 4);
     }
   }
 }
@@ -178,9 +180,7 @@ static void matrices_panel (const pw_system *s, const pw_equations *equations, i
         shown |= row[c] != 0;
       }
       if (!shown) continue;
-      pw_cell (&t, -22, pw_system_reaction_name (s, i, name, sizeof name));
-      for (int c = 0; c < columns; c++) pw_cell_number (&t, 13, row[c], MATRICES_DIGITS);
-      pw_row_end (&t);
+      matrices_row (&t, pw_system_reaction_name (s, i, name, sizeof name), NULL, row, columns);
     }
   }
 }
@@ -191,7 +191,7 @@ static void matrices_print (const pw_cli_model *m, const pw_equations *equations
   printf ("%s at t = %s s\n", pw_file_name (m->file), pw_format (t, sample->t, MATRICES_DIGITS));
   matrices_coordinates (s, equations, sample);
   if (equations->rows == 0) puts ("\nThe model has no constraints: no J, no gamma");
-  if (equations->rows > 0) matrices_rows (s, equations, sample);
+  if (equations->rows > 0) matrices_constraints (s, equations, sample);
   if (equations->rows > 0 && equations->coordinates > 2 * MATRICES_PANEL)
     puts ("\nRows of J that are zero in the columns shown are left out");
   for (int j = 0; equations->rows > 0 && j < equations->coordinates; j += MATRICES_PANEL)

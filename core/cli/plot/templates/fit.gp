@@ -3,11 +3,9 @@
 # ---- Data and model of each column, below them the residuals ----
 
 title = 'data and fitted model'
-panel_columns = narrow ? 1 : min(panels, 2)
-panel_rows = (panels + panel_columns - 1)/panel_columns
 left = 58.0 # for the digits of residuals
 gap = 64.0
-panel_width = (width - left - right + gap)/panel_columns - gap
+eval two_columns
 panel_height = panel_width*(panel_columns == 1 ? 0.5 : 0.6)
 residual_height = max(0.6*panel_height, 66.0)
 block_height = panel_height + 8 + residual_height + 40

@@ -73,6 +73,10 @@ panel(x0, x1, y0, y1) = sprintf('set lmargin at screen %.6f; set rmargin at scre
   sprintf('set tmargin at screen %.6f; set bmargin at screen %.6f', 1 - y0/height, 1 - y1/height)
 key(y, columns) = sprintf('set key noenhanced at screen 0.5,screen %.6f center top ', 1 - (y - lift)/height). \
   sprintf('horizontal maxcols %d samplen 3 spacing %g', columns, pitch)
+# Panels in two columns, if there is room, with a gap between them.
+two_columns = "panel_columns = narrow ? 1 : min(panels, 2); ". \
+  "panel_rows = (panels + panel_columns - 1)/panel_columns; ". \
+  "panel_width = (width - left - right + gap)/panel_columns - gap"
 bare_x = "set format x ''; set xlabel ''" # the axis of a panel above another one
 # A panel of the legend alone, at legend_top.
 begin_legend(columns) = key(legend_top, columns)."; set tics scale 0; set format ''; set border 0; unset grid; ". \

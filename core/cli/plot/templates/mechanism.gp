@@ -40,9 +40,7 @@ do for [i = 1:by_time ? 0 : bodies] {
 }
 do for [form in forms] {
   eval page(form)
-  set xlabel 'x [m]'
-  set ylabel 'y [m]'
-  unset xzeroaxis
+  eval axes
   if (by_time) { set cblabel 't [s]' } else { unset colorbox }
   do for [i = 1:panels] {
     if (i == 1 && strlen(names)) { eval key(legend_top, per_row) } else { unset key }

@@ -3,10 +3,8 @@
 # ---- Output of every run against each unknown, the best one marked ----
 
 title = 'runs of the optimisation'
-panel_columns = narrow ? 1 : min(panels, 2)
-panel_rows = (panels + panel_columns - 1)/panel_columns
 gap = 40.0
-panel_width = (width - left - right + gap)/panel_columns - gap
+eval two_columns
 panel_height = panel_width*(panel_columns == 1 ? 0.6 : 0.7)
 legend_top = top
 top = top + 13
@@ -22,13 +20,11 @@ do for [form in forms] {
   set format '%g'
   set xzeroaxis lt 1 lw 0.5 lc rgb '#999999'
   do for [i = 1:panels] {
-    place = (i - 1) % panel_columns
-    row = (i - 1)/panel_columns
-    x = left + place*(panel_width + gap)
-    y = top + row*(panel_height + gap)
+    x = left + ((i - 1) % panel_columns)*(panel_width + gap)
+    y = top + ((i - 1)/panel_columns)*(panel_height + gap)
     eval panel(x, x + panel_width, y, y + panel_height)
     set xlabel label[i] noenhanced
-    set ylabel (place == 0 ? short(objective) : '') noenhanced
+    set ylabel (x == left ? short(objective) : '') noenhanced
     plot 'optimise.dat' using 1 + i:(column(3 + unknowns) == 0 ? column(2 + unknowns) : NaN) with points ls 2 notitle, \
       '' using 1 + i:(column(3 + unknowns) == 1 ? column(2 + unknowns) : NaN) with points ls 1 notitle, \
       '+' using (best[i]):(value) every 100000 with points ls 3 notitle

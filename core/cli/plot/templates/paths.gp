@@ -8,9 +8,7 @@ title = 'paths of the '.(what eq 'body' ? 'centres of mass' : words(markers) == 
   words(markers) < curves ? 'wheels and markers' : 'markers')
 do for [form in forms] {
   eval page(form)
-  set xlabel 'x [m]'
-  set ylabel 'y [m]'
-  unset xzeroaxis
+  eval axes
   do for [i = 1:panels] {
     eval legend(i == panels)
     eval place(i)

@@ -90,6 +90,7 @@ do for [i = 1:panels] {
   y0[i] = y - 0.5*high
   y1[i] = y + 0.5*high
 }
+axes = "set xlabel 'x [m]'; set ylabel 'y [m]'; unset xzeroaxis"
 place(i) = panel(px0[i], px1[i], py0[i], py1[i]). \
   sprintf('; set xrange [%.9g:%.9g]; set yrange [%.9g:%.9g]', x0[i], x1[i], y0[i], y1[i]). \
   (panels == 1 ? '' : i == 1 ? "; set title 'whole run'" : sprintf("; set title 'the first %.3g s'", t_detail))
