@@ -180,7 +180,7 @@ static void matrices_panel (const pw_system *s, const pw_equations *equations, i
         shown |= row[c] != 0;
       }
       if (!shown) continue;
-      matrices_row (&t, pw_system_reaction_name (s, i, name, sizeof name), NULL, row, columns);
+      matrices_row (&t, pw_system_reaction_name (s, i, name, sizeof name), "", row, columns);
     }
   }
 }
