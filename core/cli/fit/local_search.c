@@ -14,7 +14,7 @@
 
 enum {
   SEARCH_SLOPES = 3,  /* fewest unknowns for derivatives, which cost as much as several runs */
-  SEARCH_RESTARTS = 7 /* of SLSQP, at most: each one so far has improved the result */
+  SEARCH_RESTARTS = 7 /* of SLSQP, at most */
 };
 
 /* ---- Runs ---- */
@@ -251,7 +251,8 @@ static void search_point (const pw_unknowns *unknowns, const double *value, doub
   for (int i = 0; i < unknowns->count; i++) scaled[i] = search_scaled (unknowns->list + i, value[i]);
 }
 
-/* Searches from a point.  SLSQP may end early where derivatives change much: it is restarted at its result. */
+/* Searches from a point.  SLSQP may end early where derivatives change much: it is restarted at its result as long as
+ * this improves. */
 static int search_minimise (local_search *local, double *scaled) {
   pw_search *search = local->search;
   for (int left = local->slope ? 1 + SEARCH_RESTARTS : 1;

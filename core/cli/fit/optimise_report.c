@@ -195,21 +195,10 @@ void pw_optimise_json (const pw_optimise *problem, const char *status, FILE *f) 
 
 /* ---- YAML ---- */
 
-/* A text between single quotes, in which those of the text are replaced. */
-static void report_quoted (FILE *f, const char *text, const char *quote) {
-  fputc ('\'', f);
-  for (; *text; text++)
-    if (*text == '\'')
-      fputs (quote, f);
-    else
-      fputc ((unsigned char)*text < ' ' ? ' ' : *text, f);
-  fputc ('\'', f);
-}
-
 /* A word of a shell command. */
 static void report_word (FILE *f, const char *word) {
   fputc (' ', f);
-  report_quoted (f, word, "'\\''");
+  pw_figure_quoted (f, word, "'\\''");
 }
 
 /* The run of the result, as a comment: with the options given that have an effect on it, then with the values found. */
@@ -234,7 +223,7 @@ static void report_command (const pw_optimise *problem, const char *values, FILE
 
 static void report_yaml_text (FILE *f, const char *key, const char *text) {
   fprintf (f, "%s: ", key);
-  report_quoted (f, text, "''");
+  pw_figure_quoted (f, text, "''");
   fputc ('\n', f);
 }
 

@@ -6,13 +6,14 @@
 
 enum { REPORT_LISTED = 8, REPORT_EIGENVALUES = 60 }; /* items of a list; lines of eigenvalues: in the text, at most */
 
-/* ---- Entries: in JSON, or in the text if j is NULL ---- */
+/* ---- Entries: in JSON, or in the text if j is NULL; pw_json_* do nothing then ---- */
 
 /* Begins a line of JSON for the next item. */
 static void report_line (pw_json *j) {
   if (j) j->line = 1;
 }
 
+/* Begins an object or a list. */
 static void report_section (pw_json *j, const char *key, char bracket, const char *title) {
   if (j == NULL && title) printf ("\n%s\n", title);
   report_line (j);
@@ -278,21 +279,23 @@ static void report_fastest (pw_json *j, const pw_check *check) {
   double re = found ? linear->re[check->fastest] : 0, im = found ? fabs (linear->im[check->fastest]) : 0,
          size = hypot (re, im);
   double damping = !found ? NAN : re != 0 ? -re / size : 0;
-  char text[100], a[32], b[32];
+  char text[100], first[32], second[32];
   if (found) report_text (j, "fastest eigenvalue", "%s", report_eigenvalue (linear, check->fastest, text));
   report_entry (j, "frequency_hz", im / (2 * PW_PI), im != 0 ? "its frequency" : NULL,
-                "%s Hz, undamped it would be %s Hz", pw_format (a, im / (2 * PW_PI), CHECK_DIGITS),
-                pw_format (b, size / (2 * PW_PI), CHECK_DIGITS));
+                "%s Hz, undamped it would be %s Hz", pw_format (first, im / (2 * PW_PI), CHECK_DIGITS),
+                pw_format (second, size / (2 * PW_PI), CHECK_DIGITS));
   report_entry (j, "damping", damping, im != 0 ? "its damping" : NULL, "%s of critical",
-                pw_format (a, damping, CHECK_DIGITS));
+                pw_format (first, damping, CHECK_DIGITS));
   if (found && im == 0)
-    report_text (j, re < 0 ? "it decays by e in" : "it grows by e in", "%s s", pw_format (a, 1 / size, CHECK_DIGITS));
+    report_text (j, re < 0 ? "it decays by a factor e in" : "it grows by a factor e in", "%s s",
+                 pw_format (first, 1 / size, CHECK_DIGITS));
   if (isinf (check->rk4_limit))
     report_entry (j, "rk4_step", check->rk4_limit, found ? "RK4 is stable" : NULL,
                   "with any step: the fast modes grow");
   else
     report_entry (j, "rk4_step", check->rk4_limit, found ? "RK4 is stable up to a step of" : NULL,
-                  "%s s; the model's step is %s s", pw_format (a, check->rk4_limit, 3), pw_format (b, check->step, 6));
+                  "%s s; the model's step is %s s", pw_format (first, check->rk4_limit, 3),
+                  pw_format (second, check->step, 6));
 }
 
 static void report_linear (pw_json *j, const pw_check *check) {

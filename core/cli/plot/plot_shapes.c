@@ -4,8 +4,8 @@
 #include <string.h>
 #include "plot.h"
 
-#define SHAPES_UNIT \
-  0.035 /* the unit of symbols, relative to the size of the mechanism or 4 times the reach of its bodies */
+/* The unit of symbols, relative to the size of the mechanism or, if that is less, 4 times the reach of its bodies. */
+#define SHAPES_UNIT 0.035
 
 /* ---- Outlines ---- */
 
