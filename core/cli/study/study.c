@@ -173,8 +173,7 @@ static int study_open_folder (pw_study *study, pw_error *error) {
   pw_use use[] = { PW_CLI_MODEL_USE,
                    { "--reference", study->reference_path, PW_READS, NULL },
                    { "-o", study->folder, PW_WRITES_INTO, names } };
-  if (study->folder == NULL)
-    return pw_cli_requires ("--width", study->line.width, "-o DIR", 0, error);
+  if (study->folder == NULL) return pw_cli_requires ("--width", study->line.width, "-o DIR", 0, error);
   if (pw_figures_of (&study->figures, &study->line, &study->compiled, study->folder, error) != PW_OK)
     return error->status;
   if (pw_cli_check_uses (&study->line, study->compiled.file, use, sizeof use / sizeof *use, error) != PW_OK)

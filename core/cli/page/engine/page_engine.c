@@ -170,7 +170,7 @@ static void page_write_scene (pw_json *j) {
     const char *key;
     double value;
   } number[] = { { "samples", page_plots->samples },
-                 { "width", page_plots->width },
+                 { "width", page_plots->sample_size },
                  { "steps", (double)s->steps },
                  { "rejected", (double)s->rejected },
                  { "g", s->g },
