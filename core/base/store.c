@@ -1,4 +1,4 @@
-/* Tables of names, arenas, and arrays in one allocation. */
+/* Checksums, arrays that grow, tables of names, arenas, and arrays in one allocation. */
 #include <stdlib.h>
 #include <string.h>
 #include "util.h"
@@ -104,7 +104,7 @@ void *pw_layout_alloc (pw_layout *l, size_t count, size_t size) {
 
 int pw_layout_pass (pw_layout *l, char **memory) {
   if (l->base) return 0;
-  if (l->used == 0) { /* the first pass; counts on from here, so that the second one differs even for no arrays */
+  if (l->used == 0) { /* the first pass; it counts from 1, so that the second one is recognised even without arrays */
     *memory = NULL;
     l->used = 1;
     return 1;
@@ -121,7 +121,7 @@ char *pw_alloc_arrays (const pw_array *array, size_t arrays) {
   return l.base;
 }
 
-int pw_reserve (size_t bytes) {
+int pw_check_memory (size_t bytes) {
   void *volatile p = malloc (bytes); /* volatile: keeps the compiler from removing the allocation */
   int status = p ? PW_OK : PW_RESOURCE;
   free (p);

@@ -79,9 +79,9 @@ double pw_expression_mod (double x, double y) {
  *   d am/du = dn,   d am/dm = -dn (N - sin cos / dn) / (2 (1 - m))
  *   dN/dm = (dn d am/dm + u/2 - N/2) / m        with constant u */
 
-static double partials_R (double m, int steps, const double part[PW_ELLIPTIC_STEPS]) {
+static double partials_R (double m, int steps, const double c_by_m[PW_ELLIPTIC_STEPS]) {
   double R = 0;
-  for (int n = 0; n < steps; n++) R += ldexp (m * part[n] * part[n], n);
+  for (int n = 0; n < steps; n++) R += ldexp (m * c_by_m[n] * c_by_m[n], n);
   return R;
 }
 
@@ -97,22 +97,22 @@ static double partials_K_series (double m) {
 }
 
 static pw_partials partials_elliptic_K (double m, double y, double K) {
-  double a, ratio[PW_ELLIPTIC_STEPS], part[PW_ELLIPTIC_STEPS];
+  double a, c_by_a[PW_ELLIPTIC_STEPS], c_by_m[PW_ELLIPTIC_STEPS];
   (void)y;
-  int n = pw_elliptic_mean (m, &a, ratio, part);
-  double first = K * (0.5 - partials_R (m, n, part)) / (2 * (1 - m));
+  int n = pw_elliptic_mean (m, &a, c_by_a, c_by_m);
+  double first = K * (0.5 - partials_R (m, n, c_by_m)) / (2 * (1 - m));
   return partials_of_one (first,
                           fabs (m) < 0.2 ? partials_K_series (m) : (K / 4 - (1 - 2 * m) * first) / (m * (1 - m)));
 }
 
 static pw_partials partials_jacobi_am (double u, double m, double phi) {
-  double a, ratio[PW_ELLIPTIC_STEPS], part[PW_ELLIPTIC_STEPS];
+  double a, c_by_a[PW_ELLIPTIC_STEPS], c_by_m[PW_ELLIPTIC_STEPS];
   double s = pw_sin (phi), c = pw_cos (phi), dn = sqrt (1 - m * s * s);
-  int n = pw_elliptic_mean (m, &a, ratio, part);
-  double N = u * (0.5 - partials_R (m, n, part)), angle = ldexp (a * u, n), rest = 1 - m;
+  int n = pw_elliptic_mean (m, &a, c_by_a, c_by_m);
+  double N = u * (0.5 - partials_R (m, n, c_by_m)), angle = ldexp (a * u, n), rest = 1 - m;
   for (; n > 0; n--) {
-    N += part[n - 1] * pw_sin (angle);
-    angle = (angle + asin (ratio[n - 1] * pw_sin (angle))) / 2;
+    N += c_by_m[n - 1] * pw_sin (angle);
+    angle = (angle + asin (c_by_a[n - 1] * pw_sin (angle))) / 2;
   }
   double F = N / (2 * rest) - s * c / (2 * rest * dn), by_m = -dn * F;
   double dn_m = -(s * s + 2 * m * s * c * by_m) / (2 * dn), N_m = (dn * by_m + u / 2 - N / 2) / m;

@@ -250,7 +250,7 @@ int pw_yaml_read_tree (pw_yaml *y, pw_error *error) {
   fy_diag_cfg_default (&quiet);
   quiet.fp = NULL;
   errno = 0;
-  x.diag = pw_reserve (TREE_RESERVE) == PW_OK ? fy_diag_create (&quiet) : NULL;
+  x.diag = pw_check_memory (TREE_RESERVE) == PW_OK ? fy_diag_create (&quiet) : NULL;
   if (x.diag) {
     fy_diag_set_collect_errors (x.diag, true); /* prints nothing */
     struct fy_parse_cfg how = { .flags = FYPCF_ALLOW_DUPLICATE_KEYS, .diag = x.diag };
