@@ -46,8 +46,8 @@ typedef int pw_object_user (void *context, const char *object, pw_error *error);
 int pw_compile_file (const char *path, const char *engine, pw_object_user *use, void *context, pw_error *error);
 #define PW_PAGE_TOOLS "clang, lld, wasi-libc and libclang-rt-14-dev-wasm32 (make deps TOOLS=page)"
 
-/* Compiles generated code with all messages in a log, for `lanes` runs at once; 0: for single runs.  PW_INPUT if there is
- * no compiler; PW_METHOD if it does not compile; PW_RESOURCE. */
+/* Compiles generated code with all messages in a log, for `lanes` runs at once; 0: for single runs.  PW_INPUT if there
+ * is no compiler; PW_METHOD if it does not compile; PW_RESOURCE. */
 int pw_compile_scene (const char *path, const char *object, const char *log, int lanes, pw_error *error);
 /* The compiler's options for generated code, ending with NULL: the instructions of this processor, except fused
  * multiply-add, so that results have the same bits. */
@@ -61,8 +61,8 @@ char *pw_temporary_folder (pw_error *error);
 
 /* ---- The cache (cache.c) ---- */
 
-/* Creates the cache's folder if it does not exist, and returns its path, malloced; NULL if there is none, with a notice in
- * the buffer if one exists but others could have written to it, or it cannot be used. */
+/* Creates the cache's folder if it does not exist, and returns its path, malloced; NULL if there is none, with a
+ * notice in the buffer if one exists but others could have written to it, or it cannot be used. */
 char *pw_cache_folder (char *notice, size_t size);
 /* Deletes the least recently used files until the rest is within the limit. */
 void pw_cache_trim (const char *folder);
@@ -86,10 +86,12 @@ const pw_yaml *pw_file_yaml (const pw_file *f);
 
 /* ---- Tables of numbers (columns.c) ---- */
 
-/* As pw_read_columns, from a stream; `shown` is its path in messages, "SHOWN:LINE: REASON".  Without `gaps`, gaps are
- * errors. */
+/* Whether empty cells and nan are errors, or become NaN. */
+typedef enum { PW_GAPS_REFUSED, PW_GAPS_ALLOWED } pw_gaps;
+
+/* As pw_read_columns, from a stream; `shown` is its path in messages, "SHOWN:LINE: REASON". */
 double *pw_columns_from_stream (FILE *f, const char *shown, const char *const *column, const char *const *unit,
-                                int width, int gaps, int *rows, pw_error *error);
+                                int width, pw_gaps gaps, int *rows, pw_error *error);
 
 /* ---- Units (units.c) ---- */
 
@@ -142,8 +144,8 @@ typedef enum {
   PW_LOCK_EXISTING /* the existing file; ENOENT if there is none */
 } pw_lock_how;
 
-/* Opens a regular file for reading and writing and locks it until it is closed; a symbolic link is not followed.  -1 and
- * errno, for pw_lock_reason. */
+/* Opens a regular file for reading and writing and locks it until it is closed; a symbolic link is not followed.  -1
+ * and errno, for pw_lock_reason. */
 int pw_lock_file (const char *path, pw_lock_how how);
 const char *pw_lock_reason (int code);
 

@@ -6,7 +6,7 @@
 #include <string.h>
 #include "model.h"
 
-/* An object that is freed with the model. */
+/* An object that the model owns. */
 struct pw_kept {
   void *object;
   void (*free_object) (void *object);

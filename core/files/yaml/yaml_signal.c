@@ -84,7 +84,7 @@ static int table_file (pw_reader *r, const char *what, const pw_node *node, cons
   FILE *f = table_open (r->y, name, &reason);
   if (f == NULL && errno == ENOMEM) return pw_yaml_no_memory (r);
   if (f == NULL) return pw_yaml_fail (r, node->at, "%s: cannot read \"%.60s\": %s", what, name, reason);
-  double *t = pw_columns_from_stream (f, name, column, unit, 2, 0, &s->table.count, &cause);
+  double *t = pw_columns_from_stream (f, name, column, unit, 2, PW_GAPS_REFUSED, &s->table.count, &cause);
   fclose (f);
   if (cause.status == PW_INPUT) return pw_yaml_fail (r, node->at, "%s: %s", what, cause.text);
   if (t == NULL || pw_model_keep (r->m, t, free) != PW_OK) return pw_yaml_no_memory (r);
