@@ -114,11 +114,10 @@ int pw_layout_pass (pw_layout *l, char **memory) {
 }
 
 char *pw_alloc_arrays (const pw_array *array, size_t arrays) {
-  pw_layout l = { NULL, 0 };
-  for (size_t i = 0; i < arrays; i++) pw_layout_alloc (&l, array[i].count, sizeof (double));
-  l = (pw_layout){ calloc (1, l.used + 1), 0 };
-  for (size_t i = 0; i < arrays && l.base; i++) *array[i].at = pw_layout_alloc (&l, array[i].count, sizeof (double));
-  return l.base;
+  char *memory;
+  for (pw_layout l = { 0 }; pw_layout_pass (&l, &memory);)
+    for (size_t i = 0; i < arrays; i++) *array[i].at = pw_layout_alloc (&l, array[i].count, sizeof (double));
+  return memory;
 }
 
 int pw_check_memory (size_t bytes) {

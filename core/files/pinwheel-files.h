@@ -102,12 +102,12 @@ int pw_read_expression (const char *text, double *value);
 
 typedef struct pw_formula pw_formula;
 
-/* Reads an expression of the names, which end with NULL, at most PW_FORMULA_NAMES.  NULL and PW_INPUT with the reason, or
- * PW_RESOURCE. */
+/* Reads an expression of the names, which end with NULL, at most PW_FORMULA_NAMES.  NULL and PW_INPUT with the reason,
+ * or PW_RESOURCE. */
 #define PW_FORMULA_NAMES 32
 pw_formula *pw_formula_open (const char *text, const char *const *names, pw_error *error);
-/* The value for values of the names, and its derivative with respect to name `by`; both may be non-finite.  At a jump or
- * kink, the derivative is the one on the right. */
+/* The value for values of the names, and its derivative with respect to name `by`; both may be non-finite.  At a jump
+ * or kink, the derivative is the one on the right. */
 double pw_formula_value (const pw_formula *f, const double *value);
 double pw_formula_derivative (const pw_formula *f, const double *value, int by);
 void pw_formula_close (pw_formula *f);
@@ -125,9 +125,9 @@ size_t pw_unit_split (const char *cell, char *unit, size_t size);
 /* The factor of a column by its header's cell, 1 without a unit.  PW_INPUT with column, unit and reason. */
 int pw_unit_check (const char *cell, const char *wanted, double *factor, char *why, size_t size);
 
-/* Reads columns of a table by their names or numbers, in SI units: `unit` of each, or NULL for any.  The first one is the
- * time, which increases; in the others empty cells and nan are gaps, NaN.  Returns `width` arrays of *rows numbers, one
- * after the other; free it.  NULL and PW_INPUT with file, line and nearest name, or PW_RESOURCE. */
+/* Reads columns of a table by their names or numbers, in SI units: `unit` of each, or NULL for any.  The first one is
+ * the time, which increases; in the others empty cells and nan are gaps, NaN.  Returns `width` arrays of *rows
+ * numbers, one after the other; free it.  NULL and PW_INPUT with file, line and nearest name, or PW_RESOURCE. */
 double *pw_read_columns (const char *path, const char *const *column, const char *const *unit, int width, int *rows,
                          pw_error *error);
 
@@ -175,8 +175,8 @@ int pw_output_ready (pw_output *o, pw_error *error);
 int pw_output_finish (pw_output *o, pw_error *error);
 /* The same for several outputs, some of which may be NULL: completes all, or leaves all under their temporary names. */
 int pw_output_finish_all (pw_output *const *o, int count, pw_error *error);
-/* Gives up and frees: NAME.part remains, of a text with complete lines.  Its path is written to the buffer, which is returned;
- * NULL, and "" in the buffer, if there is no such file (standard output, a device). */
+/* Gives up and frees: NAME.part remains, of a text with complete lines.  Its path is written to the buffer, which is
+ * returned; NULL, and "" in the buffer, if there is no such file (standard output, a device). */
 char *pw_output_abandon (pw_output *o, char *buffer, size_t size);
 /* Gives up and frees, and removes NAME.part. */
 void pw_output_discard (pw_output *o);
@@ -240,8 +240,8 @@ typedef struct {
   unsigned long at; /* bytes written */
 } pw_npz;
 
-/* Adds rows x columns numbers, by rows, each of `parts` doubles: 1, or 2 for complex ones; with 0 columns a vector.  The
- * name has at most 300 bytes. */
+/* Adds rows x columns numbers, by rows, each of `parts` doubles: 1, or 2 for complex ones; with 0 columns a vector.
+ * The name has at most 300 bytes. */
 void pw_npz_add (pw_npz *z, const char *name, long rows, long columns, int parts, const double *value);
 /* Completes the archive, and frees what it needs in every case; errors of the stream stay there.  PW_RESOURCE. */
 int pw_npz_end (pw_npz *z, pw_error *error);
@@ -249,9 +249,9 @@ int pw_npz_end (pw_npz *z, pw_error *error);
 /* ---- Tables ---- */
 
 /* A table of samples: states, contact points, reactions (-lambda), scaled residuals, and energies if the run keeps a
- * ledger.  As CSV it has a header line "t [s],frame.x [m],...", then a line per sample with 17 digits; non-finite is nan.
- * If the output is named .npz, it is a NumPy archive with a vector per column, named without unit, which is written when the
- * table is closed.  Errors: PW_RESOURCE; PW_METHOD if a signal of the model fails. */
+ * ledger.  As CSV it has a header line "t [s],frame.x [m],...", then a line per sample with 17 digits; non-finite is
+ * nan.  If the output is named .npz, it is a NumPy archive with a vector per column, named without unit, which is
+ * written when the table is closed.  Errors: PW_RESOURCE; PW_METHOD if a signal of the model fails. */
 typedef struct pw_csv pw_csv;
 pw_csv *pw_csv_open (const pw_system *s, int ledger, pw_output *o, pw_error *error);
 int pw_csv_write (pw_csv *c, const pw_system *s, const pw_sample *sample, pw_error *error);
@@ -259,8 +259,9 @@ int pw_csv_close (pw_csv *c, pw_error *error); /* c may be NULL */
 
 /* ---- JSON ---- */
 
-/* Writes JSON to a stream: numbers with 17 digits unless `digits` is set, null for what is not finite; text contains no
- * "<", so that it may be part of a script in HTML.  Begin with { .f = stream } and open one container.  A key is NULL in lists and for the outermost container.  A NULL pw_json writes nothing. */
+/* Writes JSON to a stream: numbers with 17 digits unless `digits` is set, null for what is not finite; text contains
+ * no "<", so that it may be part of a script in HTML.  Begin with { .f = stream } and open one container.  A key is
+ * NULL in lists and for the outermost container.  A NULL pw_json writes nothing. */
 typedef struct {
   FILE *f;
   int lines;        /* levels whose items have separate lines */
@@ -276,8 +277,9 @@ void pw_json_flag (pw_json *j, const char *key, int value);
 
 /* ---- Summaries ---- */
 
-/* The errors of a run against the reference, at the end and the largest: of lengths, angles, velocities [m/s] and angular
- * velocities; the largest one of reactions, relative to the largest reaction of the same unit.  NaN: unknown. */
+/* The errors of a run against the reference, at the end and the largest: of lengths, angles, velocities [m/s] and
+ * angular velocities; the largest one of reactions, relative to the largest reaction of the same unit.  NaN:
+ * unknown. */
 typedef struct {
   const char *source; /* "the model", or the path of a table */
   int samples;        /* compared */

@@ -18,20 +18,11 @@ int pw_kind_is_built_in (const pw_kind *kind) {
 }
 
 size_t pw_field_bytes (pw_field_type type) {
-  switch (type) {
-  case PW_NUMBER:
-    return sizeof (double);
-  case PW_POINT:
-  case PW_VECTOR:
-    return 2 * sizeof (double);
-  case PW_BODY:
-    return sizeof (char *);
-  case PW_SIGNAL:
-    return sizeof (pw_signal);
-  case PW_CHOICE:
-    return sizeof (int);
-  }
-  return 0;
+  static const size_t bytes[] = {
+    [PW_NUMBER] = sizeof (double), [PW_POINT] = sizeof (double[2]),  [PW_VECTOR] = sizeof (double[2]),
+    [PW_BODY] = sizeof (char *),   [PW_SIGNAL] = sizeof (pw_signal), [PW_CHOICE] = sizeof (int)
+  };
+  return (size_t)type < sizeof bytes / sizeof *bytes ? bytes[type] : 0;
 }
 
 const void *pw_field_at (const pw_kind *kind, const void *definition, pw_field_type type, int index) {

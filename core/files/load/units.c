@@ -58,6 +58,7 @@ const pw_unit_name pw_unit_names[] = {
 
 enum { UNITS_BASE = 4 }; /* base units, first in the list */
 
+/* A unit: its factor to SI units, and its dimension as powers of the base units. */
 typedef struct {
   double factor;
   int power[UNITS_BASE];
@@ -65,8 +66,8 @@ typedef struct {
 
 static int units_read (const char *text, units_value *u);
 
-/* Multiplies by a power of the unit whose name has n bytes. */
-static int units_name (const char *name, size_t n, int power, units_value *u) {
+/* Multiplies *u by a power of the unit whose name has n bytes. */
+static int units_multiply (const char *name, size_t n, int power, units_value *u) {
   units_value one = { .factor = 1 };
   const pw_unit_name *unit = pw_unit_names;
   while (unit->name && !(strlen (unit->name) == n && memcmp (unit->name, name, n) == 0)) unit++;
@@ -84,7 +85,7 @@ static int units_name (const char *name, size_t n, int power, units_value *u) {
   return PW_OK;
 }
 
-/* The power after a name: "^2", "²", "2"; 1 if there is none. */
+/* Stores the power at p, after a name: "^2", "²", "2"; 1 if there is none, 0 if it is refused.  Returns its end. */
 static const char *units_power (const char *p, int *power) {
   static const char square[] = "\xC2\xB2", cube[] = "\xC2\xB3";
   char *end;
@@ -100,7 +101,7 @@ static const char *units_power (const char *p, int *power) {
 static int units_read (const char *text, units_value *u) {
   static const char ends[] = " */^0123456789-\xC2"; /* the last begins a raised digit or a middle dot */
   static const char dot[] = "\xC2\xB7";
-  int over = 0;
+  int divide = 0;
   *u = (units_value){ .factor = 1 };
   for (const char *p = text; *p;) {
     int power;
@@ -109,19 +110,19 @@ static int units_read (const char *text, units_value *u) {
     if (n == 0 && *p == '1') n = 1;
     if (n > 0) {
       const char *after = units_power (p + n, &power);
-      if (power == 0 || units_name (p, n, over ? -power : power, u) != PW_OK) return PW_INPUT;
-      over = 0;
+      if (power == 0 || units_multiply (p, n, divide ? -power : power, u) != PW_OK) return PW_INPUT;
+      divide = 0;
       p = after;
     }
     n = strspn (p, " *");
-    if (*(p += n) == '/' && !over)
-      over = 1, p++, n++;
+    if (*(p += n) == '/' && !divide)
+      divide = 1, p++, n++;
     else if (strncmp (p, dot, 2) == 0)
       p += 2, n++;
     p += strspn (p, " ");
     if (n == 0 && *p) return PW_INPUT;
   }
-  return over || *text == 0 ? PW_INPUT : PW_OK;
+  return divide || *text == 0 ? PW_INPUT : PW_OK;
 }
 
 int pw_unit_factor (const char *unit, const char *wanted, double *factor) {

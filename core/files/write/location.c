@@ -1,4 +1,4 @@
-/* Opens inputs; follows links, also to files that do not exist yet; detects names of the same file. */
+/* Opens files for reading; follows links, also to files that do not exist yet; detects names of the same file. */
 #include <errno.h>
 #include <fcntl.h>
 #include <stdlib.h>
@@ -11,10 +11,10 @@ FILE *pw_open_input (const char *path, const char **why) {
   int file = open (path, O_RDONLY | O_NONBLOCK | O_NOCTTY | O_CLOEXEC); /* does not block on a FIFO */
   FILE *f = file >= 0 && fstat (file, &info) == 0 && S_ISREG (info.st_mode) ? fdopen (file, "rb") : NULL;
   if (f) return f;
-  int number = S_ISREG (info.st_mode) ? errno : 0;
-  *why = number ? strerror (number) : pw_not_regular (info.st_mode);
+  int code = S_ISREG (info.st_mode) ? errno : 0;
+  *why = code ? strerror (code) : pw_not_regular (info.st_mode);
   if (file >= 0) close (file);
-  errno = number;
+  errno = code; /* for pw_open_input_status */
   return NULL;
 }
 
@@ -94,7 +94,7 @@ typedef struct {
   const pw_use *use;
   pw_location location;
   struct stat folder; /* that contains it */
-  int known;          /* 1: the folder was found */
+  int known;          /* 1: `folder` was found */
 } location_use;
 
 /* Ignores files that cannot be located, since opening them reports it.  PW_RESOURCE if out of memory. */
@@ -121,7 +121,7 @@ static int location_ends (const char *name, const char *before, const char *cons
 
 /* Whether writing `a` affects `b`: the same file, a temporary file, or a file written into a folder. */
 static int location_conflicts (const location_use *a, const location_use *b) {
-  static const char *const temporary[] = { ".part", ".sorted", ".next", NULL };
+  static const char *const temporary[] = { ".part", ".sorted", ".next", NULL }; /* of tables, sweeps, checkpoints */
   struct stat null;
   if (a->use->how == PW_READS || !a->known || !b->known) return 0;
   const char *name = location_base (b->location.path);
