@@ -1,4 +1,4 @@
-/* Utilities: nearest names, texts, streams into memory, name tables, union-find, arenas, layouts. */
+/* Utilities of all parts of Pinwheel: suggestions of names, checks of texts, streams into memory, tables, memory. */
 #ifndef PW_UTIL_H
 #define PW_UTIL_H
 
@@ -10,6 +10,8 @@
 static inline int pw_require (const void *object, const char *type, pw_error *error) {
   return object ? PW_OK : pw_fail (error, PW_INPUT, "%s is missing", type);
 }
+
+/* ---- Nearest names, domains of numbers (nearest.c) ---- */
 
 enum { PW_HINT = 140 }; /* "; did you mean \"...\"?" with the longest name */
 
@@ -57,6 +59,8 @@ FILE *pw_stream_open (pw_stream *t); /* NULL if out of memory */
 /* Closes f, which may be NULL.  PW_RESOURCE if any part of the text is missing: t->text is NULL then.  Free it. */
 int pw_stream_close (FILE *f, pw_stream *t);
 
+/* ---- Checksums, tables of names, memory (store.c) ---- */
+
 /* Continues the FNV-1a hash (Fowler, Noll, Vo) with more bytes; begin with PW_CHECK. */
 #define PW_CHECK 14695981039346656037u
 unsigned long long pw_check_sum (unsigned long long sum, const void *bytes, size_t count);
@@ -89,12 +93,12 @@ static inline int pw_root (int *parent, int i) {
 typedef struct {
   struct pw_chunk *chunk;
 } pw_arena;
-void *pw_arena_alloc (pw_arena *a, size_t bytes); /* zeroed, or NULL */
-char *pw_arena_copy (pw_arena *a, const char *text);
+void *pw_arena_alloc (pw_arena *a, size_t bytes);    /* zeroed, or NULL */
+char *pw_arena_copy (pw_arena *a, const char *text); /* or NULL */
 void pw_arena_free (pw_arena *a);
 
-/* Lays out arrays in one allocation: the same calls of pw_layout_alloc are made twice, first with base NULL, which
- * computes the size. */
+/* Lays out arrays in one allocation: the same calls of pw_layout_alloc are made twice; with base NULL, the first time,
+ * they only add up the size, and return NULL. */
 typedef struct {
   char *base;
   size_t used;

@@ -12,23 +12,23 @@
 #include "expression_parts.h"
 #include "pinwheel.h"
 
-#define LATEST 1e18         /* breakpoints after it are not found [s] */
-#define FIRST_WIDTH 1e-9    /* of the first interval, over 1 s + |t|; each next one is twice as wide */
-#define LEAST_WIDTH 0x1p-36 /* over |t|, at first */
-#define GREATEST_LEAST_WIDTH 0x1p-10
-#define SMALLEST_INTERVAL 1e-18 /* [s]: not bisected either, for t near 0 */
-enum { NOISE_CHANGES = 8 };     /* an operation with more changes in an interval of the least width is noisy */
-enum { NOISE_SAMPLES = 256 };   /* at which they are counted, in the interval, and as many after it */
-#define NOISE_WIDTH 1e-6        /* of the time after the interval, over 1 s + |t| */
-#define NOISE_DURATION 1e-2     /* for which changes of a noisy operation are ignored, over 1 s + |t| */
+#define LATEST 1e18                  /* breakpoints after it are not found [s] */
+#define FIRST_WIDTH 1e-9             /* of the first interval, relative to 1 s + |t|; each next one is twice as wide */
+#define LEAST_WIDTH 0x1p-36          /* of bisected intervals, at first, relative to |t| */
+#define GREATEST_LEAST_WIDTH 0x1p-10 /* to which it grows */
+#define SMALLEST_INTERVAL 1e-18      /* [s]: not bisected either, for t near 0 */
+enum { NOISE_CHANGES = 8 };          /* an operation with more changes in an interval of the least width is noisy */
+enum { NOISE_SAMPLES = 256 };        /* at which they are counted, in the interval, and as many after it */
+#define NOISE_WIDTH 1e-6             /* of the time after the interval, relative to 1 s + |t| */
+#define NOISE_DURATION 1e-2          /* for which changes of a noisy operation are ignored, relative to 1 s + |t| */
 
 typedef struct {
   const pw_expression *expression;
-  double from;
+  double from;                              /* time at which the search begins */
   int remaining;                            /* intervals that may still be tested */
-  int equal;                                /* intervals of the least width without a change */
+  int equal;                                /* intervals of the least width without a change so far */
   int max_equal;                            /* number of these after which the least width doubles */
-  double least_width;                       /* over |t| */
+  double least_width;                       /* relative to |t| */
   double noise_end;                         /* time until which noisy operations are ignored; INFINITY without any */
   unsigned char noisy[PW_EXPRESSION_CODES]; /* 1: this operation is noisy */
 } search;

@@ -206,6 +206,7 @@ static jet jet_atan2 (const pw_expression_code *c, const jet *y, const jet *x, d
   return r;
 }
 
+/* Not && and ||, whose operands are 1 or 0 and have no derivatives. */
 static jet jet_binary (const pw_expression_code *c, const jet *x, const jet *y, double *discrete) {
   /* At a pole, the denominator or base 0 has the sign of its value just after the current time. */
   jet after = c->op == PW_OP_DIVIDE ? *y : *x;
@@ -229,10 +230,6 @@ static jet jet_binary (const pw_expression_code *c, const jet *x, const jet *y, 
     return jet_atan2 (c, x, y, discrete);
   case PW_OP_MOD:
     return jet_mod (x, y, discrete);
-  case PW_OP_AND:
-    return (jet){ .v = x->v != 0 && y->v != 0 };
-  case PW_OP_OR:
-    return (jet){ .v = x->v != 0 || y->v != 0 };
   }
   pw_order order = jet_order (x, y);
   *discrete = order;

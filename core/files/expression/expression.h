@@ -26,7 +26,7 @@ typedef struct {
   int names;
   const char **name; /* names */
   double *value;     /* names */
-  pw_names index;    /* of each name */
+  pw_names index;    /* the index of each name */
 } pw_scope;
 
 /* Opens a scope with room for `room` names, in an arena.  PW_OK or PW_RESOURCE. */
@@ -82,8 +82,8 @@ int pw_expression_is_name (const char *text);
 /* Whether a function or constant has this name. */
 int pw_expression_is_reserved (const char *text);
 
-/* Copies the next name in an expression, also that of a function or constant, to the buffer, cut to its size, and moves
- * *rest after it.  Returns its position, or NULL after the last name. */
+/* Copies the next name in the text of an expression, also that of a function or constant, to the buffer, cut to its
+ * size, and moves *rest after it.  Returns its position, or NULL after the last name. */
 enum { PW_EXPRESSION_NAME = 100 };
 const char *pw_expression_next_name (const char **rest, char name[PW_EXPRESSION_NAME]);
 

@@ -125,7 +125,7 @@ static pw_partials partials_jacobi_am (double u, double m, double phi) {
   double F_m = (N_m - sc_m) / (2 * m1) + F / m1;
   pw_partials r = { dn, am_m, -m * s * c, dn_m, -(dn_m * F + dn * F_m) };
   if (fabs (m) >= 1e-5) return r;
-  const double h = 1e-4; /* dN/dm cancels: its error would be 1e-15 / m, that of this difference is 1e-9 */
+  const double h = 1e-4; /* N_m cancels: its error would be 1e-15 / m, that of this difference is 1e-9 */
   r.yy = (partials_jacobi_am (u, m + h, pw_jacobi_am (u, m + h)).y -
           partials_jacobi_am (u, m - h, pw_jacobi_am (u, m - h)).y) /
          (2 * h);
@@ -134,6 +134,7 @@ static pw_partials partials_jacobi_am (double u, double m, double phi) {
 
 /* ---- List of functions and constants ---- */
 
+/* The entries are pw_expression_function. */
 #define FUNCTION_OF_ONE(name, f, trend, from, to) \
   { #name, PW_OP_FUNCTION_OF_ONE, 1, 1, f, NULL, partials_##name, trend, from, to }
 #define FUNCTION_OF_TWO(name, op, f) \

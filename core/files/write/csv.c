@@ -140,10 +140,7 @@ static int csv_line (pw_csv *c, csv_content content, const pw_sample *x, pw_erro
   return pw_output_check (c->output, error);
 }
 
-static int csv_line_of_names (pw_csv *c, pw_error *error) {
-  static const pw_sample none = { 0 };
-  return csv_line (c, CSV_NAMES, &none, error);
-}
+static const pw_sample csv_no_sample = { 0 };
 
 /* ---- The table ---- */
 
@@ -169,7 +166,7 @@ pw_csv *pw_csv_open (const pw_system *s, int ledger, pw_output *o, pw_error *err
     c->workspace = contacts > 0 ? pw_workspace_new (s, error) : NULL;
   }
   int complete = c && c->contact && (c->workspace || contacts == 0);
-  if (complete && (is_archive || continued || csv_line_of_names (c, error) == PW_OK)) return c;
+  if (complete && (is_archive || continued || csv_line (c, CSV_NAMES, &csv_no_sample, error) == PW_OK)) return c;
   pw_fail (error, PW_RESOURCE, "out of memory while writing a table");
   csv_free (c);
   return NULL;
@@ -186,7 +183,7 @@ int pw_csv_write (pw_csv *c, const pw_system *s, const pw_sample *sample, pw_err
 int pw_csv_close (pw_csv *c, pw_error *error) {
   int status = PW_OK;
   if (c && c->is_archive) {
-    status = csv_line_of_names (c, error);
+    status = csv_line (c, CSV_NAMES, &csv_no_sample, error);
     int end = pw_npz_end (&c->npz, error);
     if (status == PW_OK) status = end == PW_OK ? pw_output_check (c->output, error) : end;
   }
