@@ -272,6 +272,6 @@ double pw_expression_value (const pw_expression *expression, const double *varia
   int may_jump = 0;
   double u[3], value = pw_expression_run (expression->code, expression->codes, variable, &may_jump);
   if (!may_jump || !expression->breaks) return value;
-  pw_expression_run_jet (expression->code, expression->codes, variable, 0, u, NULL);
+  pw_expression_run_jet (expression->code, expression->codes, variable, PW_EXPRESSION_TIME, u, NULL);
   return u[0];
 }

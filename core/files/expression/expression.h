@@ -19,6 +19,9 @@ typedef struct {
   char text[240];
 } pw_expression_error;
 
+/* The time among the variables. */
+enum { PW_EXPRESSION_TIME = 0 };
+
 /* ---- Reading ---- */
 
 /* Named numbers. */

@@ -121,7 +121,7 @@ static parser_part parser_begin (const parser *p) {
 /* A constant or variable, the current token. */
 static parser_part parser_leaf (parser *p, int op, int index, double value) {
   parser_part part = parser_begin (p);
-  if (op == PW_OP_VARIABLE) part.depends = index == 0 ? DEPENDS_ON_TIME : DEPENDS_ON_STATES;
+  if (op == PW_OP_VARIABLE) part.depends = index == PW_EXPRESSION_TIME ? DEPENDS_ON_TIME : DEPENDS_ON_STATES;
   parser_push (p, op, index, value);
   parser_next (p);
   return part;

@@ -348,8 +348,8 @@ pw_range pw_expression_range (const pw_expression *expression, const unsigned ch
     else if (c->op == PW_OP_CONSTANT)
       *top = range_constant (c->value);
     else
-      *top = c->index == 0 ? range_between (lo, hi) /* time */
-                           : (pw_range){ .lo = -DBL_MAX, .hi = DBL_MAX, .of_states = 1 };
+      *top = c->index == PW_EXPRESSION_TIME ? range_between (lo, hi)
+                                            : (pw_range){ .lo = -DBL_MAX, .hi = DBL_MAX, .of_states = 1 };
     if (noisy[c - expression->code]) top->breaks &= operands_break;
     top++;
   }

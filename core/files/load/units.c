@@ -98,15 +98,16 @@ static const char *units_power (const char *p, int *power) {
   return end;
 }
 
+/* Reads a product of names with powers; a slash divides by the next name only.  PW_INPUT if the text is none. */
 static int units_read (const char *text, units_value *u) {
-  static const char ends[] = " */^0123456789-\xC2"; /* the last begins a raised digit or a middle dot */
+  static const char ends[] = " */^0123456789-\xC2"; /* of a name; the last begins a raised digit or a middle dot */
   static const char dot[] = "\xC2\xB7";
   int divide = 0;
   *u = (units_value){ .factor = 1 };
   for (const char *p = text; *p;) {
     int power;
-    size_t sign = strncmp (p, "°", 2) == 0 || strncmp (p, "µ", 2) == 0 ? 2 : 0;
-    size_t n = sign + strcspn (p + sign, ends);
+    size_t symbol = strncmp (p, "°", 2) == 0 || strncmp (p, "µ", 2) == 0 ? 2 : 0; /* begins with \xC2, too */
+    size_t n = symbol + strcspn (p + symbol, ends);
     if (n == 0 && *p == '1') n = 1;
     if (n > 0) {
       const char *after = units_power (p + n, &power);
@@ -114,24 +115,25 @@ static int units_read (const char *text, units_value *u) {
       divide = 0;
       p = after;
     }
-    n = strspn (p, " *");
-    if (*(p += n) == '/' && !divide)
-      divide = 1, p++, n++;
+    size_t separators = strspn (p, " *");
+    p += separators;
+    if (*p == '/' && !divide)
+      divide = 1, p++, separators++;
     else if (strncmp (p, dot, 2) == 0)
-      p += 2, n++;
+      p += 2, separators++;
     p += strspn (p, " ");
-    if (n == 0 && *p) return PW_INPUT;
+    if (separators == 0 && *p) return PW_INPUT;
   }
   return divide || *text == 0 ? PW_INPUT : PW_OK;
 }
 
 int pw_unit_factor (const char *unit, const char *wanted, double *factor) {
-  units_value u, w;
+  units_value given, expected;
   *factor = 1;
-  if (units_read (unit, &u) != PW_OK) return PW_INPUT;
-  *factor = u.factor;
-  if (wanted == NULL || units_read (wanted, &w) != PW_OK) return PW_OK;
-  return memcmp (u.power, w.power, sizeof u.power) == 0 ? PW_OK : PW_RETRY;
+  if (units_read (unit, &given) != PW_OK) return PW_INPUT;
+  *factor = given.factor;
+  if (wanted == NULL || units_read (wanted, &expected) != PW_OK) return PW_OK;
+  return memcmp (given.power, expected.power, sizeof given.power) == 0 ? PW_OK : PW_RETRY;
 }
 
 size_t pw_unit_split (const char *cell, char *unit, size_t size) {

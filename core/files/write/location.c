@@ -110,27 +110,30 @@ static int location_use_find (location_use *u, const pw_use *use) {
 
 /* Whether a name is `before` (NULL: any name) followed by one of the endings. */
 static int location_ends (const char *name, const char *before, const char *const *ending) {
-  size_t n = before ? strlen (before) : 0, m = strlen (name);
+  size_t size = strlen (name);
   for (; *ending; ending++) {
-    size_t e = strlen (*ending);
-    if (m >= e && strcmp (name + m - e, *ending) == 0 && (before == NULL || (m == n + e && !memcmp (name, before, n))))
-      return 1;
+    size_t ending_size = strlen (*ending), rest = size - ending_size;
+    if (size < ending_size || strcmp (name + rest, *ending) != 0) continue;
+    if (before == NULL || (strlen (before) == rest && memcmp (name, before, rest) == 0)) return 1;
   }
   return 0;
+}
+
+static int location_is_null_device (const struct stat *info) {
+  struct stat null;
+  return S_ISCHR (info->st_mode) && stat ("/dev/null", &null) == 0 && null.st_rdev == info->st_rdev;
 }
 
 /* Whether writing `a` affects `b`: the same file, a temporary file, or a file written into a folder. */
 static int location_conflicts (const location_use *a, const location_use *b) {
   static const char *const temporary[] = { ".part", ".sorted", ".next", NULL }; /* of tables, sweeps, checkpoints */
-  struct stat null;
+  const struct stat *info = &a->location.info;
   if (a->use->how == PW_READS || !a->known || !b->known) return 0;
   const char *name = location_base (b->location.path);
   if (a->use->how == PW_WRITES_INTO)
-    return a->location.exists && location_same (&a->location.info, &b->folder) &&
-           location_ends (name, NULL, a->use->names);
-  if (a->location.exists && b->location.exists && location_same (&a->location.info, &b->location.info))
-    return !(S_ISCHR (a->location.info.st_mode) && stat ("/dev/null", &null) == 0 &&
-             null.st_rdev == a->location.info.st_rdev);
+    return a->location.exists && location_same (info, &b->folder) && location_ends (name, NULL, a->use->names);
+  if (a->location.exists && b->location.exists && location_same (info, &b->location.info))
+    return !location_is_null_device (info);
   if (a->location.descriptor >= 0 || b->location.descriptor >= 0 || !location_same (&a->folder, &b->folder)) return 0;
   return strcmp (name, location_base (a->location.path)) == 0 ||
          location_ends (name, location_base (a->location.path), temporary);

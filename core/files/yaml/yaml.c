@@ -74,7 +74,7 @@ static int yaml_parameter (const pw_reader *r, const pw_node *node, pw_names *na
   static const char *const key[] = { "name", "value", "unit", "about", "domain", "min", NULL };
   const pw_node *v[sizeof key / sizeof *key];
   char label[100];
-  if (pw_yaml_keys (r, node, 0, key, "a parameter", v) != PW_OK) return r->error->status;
+  if (pw_yaml_keys (r, node, key, "a parameter", v) != PW_OK) return r->error->status;
   const pw_node *name = v[0], *value = v[1], *unit = v[2], *about = v[3], *domain = v[4], *min = v[5];
   if (name == NULL) return pw_yaml_fail (r, node->at, "a parameter needs a name");
   if (yaml_new_name (r, name, "parameter", names) != PW_OK) return r->error->status;
@@ -89,7 +89,7 @@ static int yaml_parameter (const pw_reader *r, const pw_node *node, pw_names *na
 }
 
 static int yaml_parameters (pw_yaml *y, const pw_reader *r, const pw_node *list, pw_names *names) {
-  if (pw_yaml_list (r, list, "parameters", -1, "") != PW_OK) return r->error->status;
+  if (pw_yaml_list (r, list, "parameters") != PW_OK) return r->error->status;
   int count = list ? list->count : 0;
   pw_parameter *p = y->parameter = pw_arena_alloc (&y->arena, ((size_t)count + 1) * sizeof *p);
   if (p == NULL) return pw_yaml_no_memory (r);
@@ -108,7 +108,7 @@ static void yaml_run (pw_yaml *y, const pw_reader *r, const pw_node *run) {
   static const char *const key[] = { "t_end", "step", "rtol", "method", NULL };
   const pw_node *v[sizeof key / sizeof *key];
   double *number[] = { &y->table.run.t_end, &y->table.run.step, &y->table.run.rtol };
-  pw_yaml_keys (r, run, 0, key, "run", v);
+  pw_yaml_keys (r, run, key, "run", v);
   for (int i = 0; i < 3; i++) pw_yaml_number (r, v[i], key[i], PW_POSITIVE, number[i]);
   pw_yaml_text (r, v[3], key[3], &y->table.run.method);
 }
@@ -133,7 +133,7 @@ static int yaml_head (pw_yaml *y, const pw_reader *r) {
   const pw_node *v[sizeof key / sizeof *key];
   pw_names names = { .size = 0 };
   if (y->root == NULL) return pw_yaml_fail (r, 0, "the file is empty; a model begins with \"pinwheel: 1\"");
-  if (pw_yaml_keys (r, y->root, 0, key, "a model", v) != PW_OK) return r->error->status;
+  if (pw_yaml_keys (r, y->root, key, "a model", v) != PW_OK) return r->error->status;
   yaml_version (r, v[0]);
   pw_yaml_text (r, v[1], "about", &y->table.about);
   yaml_run (y, r, v[2]);

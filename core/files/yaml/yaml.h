@@ -93,16 +93,19 @@ int pw_yaml_load_tree (pw_yaml *y, const char *bytes, size_t size, pw_error *err
 
 enum { PW_YAML_MAX_KEYS = 40 }; /* most known keys of a map */
 
-/* Finds known keys (ending with NULL) in a map: value[i] becomes the value of key[i], or NULL.  The first `skip` pairs
- * are skipped.  Other keys, repeated keys and empty values are refused; `owner` ("a body") is for messages. */
-int pw_yaml_keys (const pw_reader *r, const pw_node *map, int skip, const char *const *key, const char *owner,
+/* Finds known keys (ending with NULL) in a map, or in the pairs from a node on: value[i] becomes the value of key[i],
+ * or NULL.  Other keys, repeated keys and empty values are refused; `owner` ("a body") is for messages. */
+int pw_yaml_keys (const pw_reader *r, const pw_node *map, const char *const *key, const char *owner,
                   const pw_node **value);
+int pw_yaml_keys_from (const pw_reader *r, const pw_node *first, const char *const *key, const char *owner,
+                       const pw_node **value);
 
 /* What a node is, for messages: "a list", "a map", "text". */
 const char *pw_yaml_found (const pw_node *node);
 
-/* Refuses anything but a list; if `count` >= 0, a list of `count` entries, `items` ("bodies"). */
-int pw_yaml_list (const pw_reader *r, const pw_node *node, const char *label, int count, const char *items);
+/* Refuses anything but a list, or a list of `count` entries, which are `items` ("bodies"). */
+int pw_yaml_list (const pw_reader *r, const pw_node *node, const char *label);
+int pw_yaml_list_of (const pw_reader *r, const pw_node *node, const char *label, int count, const char *items);
 
 /* A scalar's text, not empty. */
 int pw_yaml_text (const pw_reader *r, const pw_node *node, const char *label, const char **text);

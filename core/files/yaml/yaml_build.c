@@ -31,7 +31,7 @@ static void build_triple (const pw_reader *r, const pw_node *node, const char *l
                           double value[3], unsigned *specified, int first_bit) {
   const pw_node *v[4];
   char name[200];
-  pw_yaml_keys (r, node, 0, key, label, v);
+  pw_yaml_keys (r, node, key, label, v);
   for (int i = 0; i < 3; i++) {
     if (v[i] == NULL) continue;
     snprintf (name, sizeof name, "%s: %s", label, key[i]);
@@ -47,7 +47,7 @@ static int build_body (pw_reader *r, const pw_node *node) {
   pw_body body = { .specified = PW_SPECIFIES_NOTHING };
   pw_error cause = { 0 };
   char label[160];
-  if (pw_yaml_keys (r, node, 0, key, "a body", v) != PW_OK) return r->error->status;
+  if (pw_yaml_keys (r, node, key, "a body", v) != PW_OK) return r->error->status;
   const pw_node *name = v[0];
   if (name == NULL) return pw_yaml_fail (r, node->at, "a body needs a name");
   if (build_name (r, name, "body", &body.name) != PW_OK) return r->error->status;
@@ -107,7 +107,7 @@ static int build_field (pw_reader *r, const pw_kind *kind, const pw_field *f, co
   int count = pw_field_count (f);
   snprintf (label, sizeof label, "%s %.60s: %s", kind->name, element, f->name);
   if (count == 1) return build_value (r, kind, f, node, label, at);
-  if (pw_yaml_list (r, node, label, count, plural[f->type]) != PW_OK) return r->error->status;
+  if (pw_yaml_list_of (r, node, label, count, plural[f->type]) != PW_OK) return r->error->status;
   for (const pw_node *n = node->first; n; n = n->next, at += pw_field_bytes (f->type))
     build_value (r, kind, f, n, label, at);
   return r->error->status;
@@ -161,7 +161,7 @@ static int build_fields (pw_reader *r, const pw_kind *kind, const pw_node *node,
   for (const pw_field *f = kind->fields; f->name && n < PW_YAML_MAX_KEYS; f++) key[n++] = f->name;
   key[n] = NULL;
   snprintf (label, sizeof label, "a %s", kind->name);
-  if (pw_yaml_keys (r, node, 1, key, label, v) != PW_OK) return r->error->status;
+  if (pw_yaml_keys_from (r, node->first->next->next, key, label, v) != PW_OK) return r->error->status;
   for (int i = 0; i < n && r->error->status == PW_OK; i++) {
     const pw_field *f = r->field = &kind->fields[i];
     if (v[i])
@@ -240,9 +240,8 @@ void pw_yaml_build (pw_model *m, const void *parameters) {
   const void *table = pw_model_table (m);
   pw_scope scope = { 0 };
   pw_reader r = { .y = table, .model = m, .scope = &scope, .error = pw_model_error (m) };
-  pw_yaml_list (&r, r.y->bodies, "bodies", -1, "");
-  if (pw_yaml_list (&r, r.y->elements, "elements", -1, "") == PW_OK && build_open (&r) == PW_OK)
-    build_all (&r, parameters);
+  pw_yaml_list (&r, r.y->bodies, "bodies");
+  if (pw_yaml_list (&r, r.y->elements, "elements") == PW_OK && build_open (&r) == PW_OK) build_all (&r, parameters);
   pw_scope_close (&scope);
   pw_names_close (&r.bodies);
   pw_names_close (&r.names);

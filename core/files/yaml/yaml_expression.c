@@ -104,11 +104,11 @@ static int state_check (const reading *e, const char *name, size_t at) {
 
 /* Value and derivatives u; those not given are derivatives of the highest one given. */
 static void time_derivatives (const time_function *f, const double *variable, double u[3]) {
-  pw_expression_derivatives (f->expression[0], variable, 0, u);
+  pw_expression_derivatives (f->expression[0], variable, PW_EXPRESSION_TIME, u);
   for (int i = 1; i <= f->derivatives; i++) {
     double given[3];
     if (f->expression[i] == NULL) continue;
-    pw_expression_derivatives (f->expression[i], variable, 0, given);
+    pw_expression_derivatives (f->expression[i], variable, PW_EXPRESSION_TIME, given);
     u[i] = given[0];
     if (i == 1) u[2] = given[1]; /* the derivative of the given rate, unless the acceleration is given, too */
   }
@@ -206,7 +206,7 @@ static int time_check (const reading *e, int i, const char *name) {
   double given[3], exact[3][3], size = 0;
   for (int k = 0; k < 3; k++) {
     given[k] = pw_expression_value (e->f->expression[i], &time[k]);
-    pw_expression_derivatives (e->f->expression[i - 1], &time[k], 0, exact[k]);
+    pw_expression_derivatives (e->f->expression[i - 1], &time[k], PW_EXPRESSION_TIME, exact[k]);
     if (isfinite (given[k]) && isfinite (exact[k][1]))
       size = fmax (size, fabs (given[k]) + fabs (exact[k][1]) + 1e-6 * fabs (exact[k][0]));
   }

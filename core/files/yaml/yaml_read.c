@@ -37,27 +37,35 @@ static int read_key (const pw_reader *r, const pw_node *node, const char *const 
   return pw_yaml_fail (r, node->at, "%s has no \"%.60s\"%s", owner, node->text, *hint ? hint : pw_nearest_text (&near));
 }
 
-int pw_yaml_keys (const pw_reader *r, const pw_node *map, int skip, const char *const *key, const char *owner,
-                  const pw_node **value) {
+int pw_yaml_keys_from (const pw_reader *r, const pw_node *first, const char *const *key, const char *owner,
+                       const pw_node **value) {
   for (int i = 0; key[i]; i++) value[i] = NULL;
+  for (const pw_node *n = first; n && r->error->status == PW_OK; n = n->next->next) read_key (r, n, key, owner, value);
+  return r->error->status;
+}
+
+int pw_yaml_keys (const pw_reader *r, const pw_node *map, const char *const *key, const char *owner,
+                  const pw_node **value) {
   if (map && map->type != PW_YAML_MAP) {
     char form[100] = "{";
     for (size_t i = 0, n = 1; key[i]; i++, n = strlen (form))
       snprintf (form + n, sizeof form - n, "%s: ..%s", key[i], key[i + 1] ? ", " : "}");
     return pw_yaml_fail (r, map->at, "expected a map %s for %s, found %s", form, owner, pw_yaml_found (map));
   }
-  for (const pw_node *n = map ? map->first : NULL; n && r->error->status == PW_OK; n = n->next->next)
-    if (skip-- <= 0) read_key (r, n, key, owner, value);
+  return pw_yaml_keys_from (r, map ? map->first : NULL, key, owner, value);
+}
+
+int pw_yaml_list (const pw_reader *r, const pw_node *node, const char *label) {
+  if (node && node->type != PW_YAML_LIST)
+    pw_yaml_fail (r, node->at, "%s: expected a list, found %s", label, pw_yaml_found (node));
   return r->error->status;
 }
 
-int pw_yaml_list (const pw_reader *r, const pw_node *node, const char *label, int count, const char *items) {
-  char number[100] = "", found[40] = "one";
-  if (count >= 0) snprintf (number, sizeof number, " of %d %s", count, items);
-  if (node && node->type == PW_YAML_LIST) snprintf (found, sizeof found, "one of %d", node->count);
-  if (node && (node->type != PW_YAML_LIST || (count >= 0 && node->count != count)))
-    pw_yaml_fail (r, node->at, "%s: expected a list%s, found %s", label, number,
-                  node->type == PW_YAML_LIST ? found : pw_yaml_found (node));
+int pw_yaml_list_of (const pw_reader *r, const pw_node *node, const char *label, int count, const char *items) {
+  if (node && node->type != PW_YAML_LIST)
+    pw_yaml_fail (r, node->at, "%s: expected a list of %d %s, found %s", label, count, items, pw_yaml_found (node));
+  else if (node && node->count != count)
+    pw_yaml_fail (r, node->at, "%s: expected a list of %d %s, found one of %d", label, count, items, node->count);
   return r->error->status;
 }
 
@@ -105,7 +113,7 @@ int pw_yaml_number (const pw_reader *r, const pw_node *node, const char *label, 
 /* ---- Pairs, choices, bodies ---- */
 
 int pw_yaml_pair (const pw_reader *r, const pw_node *node, const char *label, const char *items, double *value) {
-  if (node == NULL || pw_yaml_list (r, node, label, 2, items) != PW_OK) return r->error->status;
+  if (node == NULL || pw_yaml_list_of (r, node, label, 2, items) != PW_OK) return r->error->status;
   pw_yaml_number (r, node->first, label, PW_REAL, value);
   return pw_yaml_number (r, node->first->next, label, PW_REAL, value + 1);
 }

@@ -16,7 +16,7 @@
 
 static int table_list (pw_reader *r, const char *label, const pw_node *list, pw_signal *s) {
   char text[240];
-  if (pw_yaml_list (r, list, label, -1, "") != PW_OK) return r->error->status;
+  if (pw_yaml_list (r, list, label) != PW_OK) return r->error->status;
   size_t bytes = (size_t)list->count * sizeof (double);
   double *t = pw_arena_alloc (r->arena, bytes), *value = pw_arena_alloc (r->arena, bytes);
   if (t == NULL || value == NULL) return pw_yaml_no_memory (r);
@@ -76,7 +76,7 @@ static int table_file (pw_reader *r, const char *label, const pw_node *node, con
   pw_error cause = { 0 };
   char text[240];
   snprintf (text, sizeof text, "%s: columns", label);
-  if (pw_yaml_list (r, columns, text, 2, "columns, [time, value]") != PW_OK) return r->error->status;
+  if (pw_yaml_list_of (r, columns, text, 2, "columns, [time, value]") != PW_OK) return r->error->status;
   pw_yaml_text (r, columns ? columns->first : NULL, text, &column[0]);
   pw_yaml_text (r, columns ? columns->first->next : NULL, text, &column[1]);
   if (pw_yaml_text (r, node, label, &name) != PW_OK) return r->error->status;
@@ -150,7 +150,7 @@ static int signal_form (pw_reader *r, const pw_kind *kind, const pw_signal_form 
   for (n = fields; is_table && n < fields + 3; n++) key[n] = table[n - fields];
   key[n] = NULL;
   snprintf (about, sizeof about, "a %s", form->name);
-  if (pw_yaml_keys (r, node, 0, key, about, v) != PW_OK || signal_fields (r, form, label, node, v, signal) != PW_OK ||
+  if (pw_yaml_keys (r, node, key, about, v) != PW_OK || signal_fields (r, form, label, node, v, signal) != PW_OK ||
       (is_table && table_points (r, label, node, v + fields, signal) != PW_OK))
     return r->error->status;
   return signal_check (r, kind, label, node, is_table ? v[fields] : NULL, signal);
@@ -174,7 +174,7 @@ static int signal_map (pw_reader *r, const pw_kind *kind, const char *label, con
   int n = SIGNAL_FORMS, given = 0, form = -1;
   for (const pw_signal_form *f = pw_signal_forms; f->name; f++) key[n++] = f->name;
   key[n] = NULL;
-  if (pw_yaml_keys (r, node, 0, key, "a signal", v) != PW_OK) return r->error->status;
+  if (pw_yaml_keys (r, node, key, "a signal", v) != PW_OK) return r->error->status;
   for (int i = 0; i < n; i++) {
     given += v[i] != NULL && i != SIGNAL_RATE && i != SIGNAL_ACCELERATION;
     if (v[i] && i >= SIGNAL_FORMS) form = i;
