@@ -50,7 +50,8 @@ int pw_yaml_keys (const pw_reader *r, const pw_node *map, const char *const *key
     char form[100] = "{";
     for (size_t i = 0, n = 1; key[i]; i++, n = strlen (form))
       snprintf (form + n, sizeof form - n, "%s: ..%s", key[i], key[i + 1] ? ", " : "}");
-    return pw_yaml_fail (r, map->at, "expected a map %s for %s, found %s", form, owner, pw_yaml_found (map));
+    pw_yaml_fail (r, map->at, "expected a map %s for %s, found %s", form, owner, pw_yaml_found (map));
+    map = NULL;
   }
   return pw_yaml_keys_from (r, map ? map->first : NULL, key, owner, value);
 }
