@@ -1,5 +1,4 @@
-/* Checks of external texts: UTF-8 without control characters, which could move a terminal's cursor or change its
- * colours. */
+/* Checks of external texts: UTF-8 without control characters, which could move a terminal's cursor. */
 #include <string.h>
 #include "util.h"
 

@@ -2,7 +2,7 @@
  *
  *     a' = (a + b) / 2,   b' = sqrt (a b),   c' = (a - b) / 2 = c^2 / (4 a')
  *
- * from a = 1, b = sqrt (1 - m), c = sqrt (m); the prime marks the next step (Abramowitz & Stegun 1964, section 17.6). */
+ * from a = 1, b = sqrt (1 - m), c = sqrt (m); a prime marks the next step (Abramowitz & Stegun 1964, 17.6). */
 #ifndef PW_ELLIPTIC_H
 #define PW_ELLIPTIC_H
 

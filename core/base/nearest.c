@@ -4,8 +4,7 @@
 #include <string.h>
 #include "util.h"
 
-/* Edit distance (Levenshtein 1966), keeping one row of the table; a candidate longer than the row has its length as
- * distance. */
+/* Edit distance (Levenshtein 1966), keeping one row of the table; of a candidate longer than the row, its length. */
 static size_t nearest_distance (const char *a, const char *b) {
   size_t row[64], n = strlen (b);
   if (n >= sizeof row / sizeof *row) return n;

@@ -66,8 +66,7 @@ static inline void pw_sin_cos_lanes (pw_lanes x, pw_lanes *sine, pw_lanes *cosin
   pw_lanes shifted = x * two_by_pi + integers, n = shifted - integers;
   pw_lanes y1 = x - n * half_pi_1, part2 = n * half_pi_2, part3 = n * half_pi_3;
   pw_lanes y2 = y1 - part2, y = y2 - part3;
-  /* A difference that is smaller than what is subtracted is exact; else these are exactly its round-off (Dekker
-   * 1971). */
+  /* The round-off of both differences, exactly: one that is smaller than what is subtracted has none (Dekker 1971). */
   pw_lanes lo = (((y1 - y2) - part2) + ((y2 - y) - part3)) - n * half_pi_tail;
   /* In odd quadrants sine and cosine are exchanged; the second last bits of n and n + 1 are their signs. */
   pw_lane_bits quadrant = pw_sine_bits (shifted), odd = 0 - (quadrant & 1);

@@ -79,8 +79,8 @@ void pw_names_close (pw_names *n);
 int pw_names_add (pw_names *n, const char *name, int value);
 int pw_names_find (const pw_names *n, const char *name); /* -1 if absent */
 
-/* Makes room for more than `count` entries of `size` bytes in an array, *(void **)array, which has *room entries.
- * PW_OK or PW_RESOURCE. */
+/* Makes room for more than `count` entries of `size` bytes in an array, *(void **)array, with *room allocated.  PW_OK
+ * or PW_RESOURCE. */
 int pw_grow (void *array, size_t count, size_t *room, size_t size);
 
 /* The root of member i of a union-find structure, in which a root is its own parent; halves the path. */
@@ -116,8 +116,7 @@ typedef struct {
 /* Lays out arrays in one zeroed allocation and returns it; NULL if out of memory. */
 char *pw_alloc_arrays (const pw_array *array, size_t arrays);
 
-/* PW_OK if `bytes` could be allocated now, else PW_RESOURCE.  Called before functions of libraries that crash when an
- * allocation fails. */
+/* PW_OK if `bytes` could be allocated now, else PW_RESOURCE.  For libraries that crash if an allocation fails. */
 int pw_check_memory (size_t bytes);
 
 #endif

@@ -4,8 +4,7 @@
 
 #include "util.h"
 
-/* Limits of an element, also for types from plug-ins: bodies, internal coordinates, constraint equations, signals; its
- * local coordinates. */
+/* Limits of an element, also for types from plug-ins; `rows` are constraint equations, `cols` local coordinates. */
 enum {
   PW_MAX_BODIES = 4,
   PW_MAX_INTERNAL = 4,
@@ -44,8 +43,7 @@ enum { PW_NAME_MAX = 50 };
 /* Checks every body and element: names, numbers, names of bodies (against the table of all of them), signals. */
 int pw_check_model (const pw_model *m, const pw_names *bodies, pw_error *error);
 
-/* Returns what is wrong with an element type's table (in the buffer, or a constant), or "".  Other functions may crash
- * on an inconsistent table. */
+/* Returns what is wrong with an element type's table (in the buffer, or a constant), or "".  Others may crash on it. */
 const char *pw_kind_check (const pw_kind *kind, char *buffer, size_t size);
 
 /* 1 for the library's own element types, 0 for those of plug-ins. */

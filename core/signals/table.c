@@ -33,8 +33,8 @@ static double table_extrapolate (double t0, double t1, double t2, double M1, dou
   return M1 + (M1 - M2) * ((t1 - t0) / (t2 - t1));
 }
 
-/* Solves the tridiagonal equations for M without pivoting; they are diagonally dominant.  `upper`: n scratch
- * numbers. */
+/* Solves the tridiagonal equations for M without pivoting; they are diagonally dominant.  `upper`: n numbers of
+ * memory. */
 static void table_second_derivatives (const double *t, const double *y, int n, int ends, double *M, double *upper) {
   int first = ends == PW_ENDS_REST ? 0 : 1, last = n - 1 - first;
   double row[4];

@@ -5,9 +5,8 @@
  *   f' = f_x x' + f_y y',   f'' = f_xx x'^2 + 2 f_xy x' y' + f_yy y'^2 + f_x x'' + f_y y''
  *
  * where f_x is the partial derivative with respect to operand x, and the prime the derivative with respect to the
- * chosen variable (Griewank & Walther 2008, Evaluating Derivatives, chapter 13).  Where a comparison or the like is
- * about to change at the current time, derivatives with respect to the time decide it: the value is that just after
- * the jump. */
+ * chosen variable (Griewank & Walther 2008, Evaluating Derivatives, chapter 13).  Derivatives with respect to the time
+ * decide comparisons of equal numbers, so that an expression has the value just after a jump. */
 #include <math.h>
 #include "expression_parts.h"
 #include "pinwheel.h"
@@ -103,8 +102,8 @@ typedef struct {
   int varies;      /* 1: depends on the variable */
 } jet;
 
-/* The chain rule, with the value f.  Operands independent of the variable contribute nothing, even where a partial
- * derivative is infinite. */
+/* The chain rule, with the value f. Independent operands contribute nothing, even where a partial derivative is
+ * infinite. */
 static jet jet_chain (double f, const pw_partials *s, const jet *x, const jet *y) {
   jet r = { f, 0, 0, x->varies | y->varies };
   if (x->varies) r.d += s->x * x->d, r.dd += s->xx * x->d * x->d + s->x * x->dd;

@@ -58,8 +58,8 @@ typedef struct {
 /* Size of an expression in bytes, by which it may be copied. */
 size_t pw_expression_size (const pw_expression *expression);
 
-/* Reads an expression over a scope and variables, an array of names that ends with NULL, into an arena.  PW_INPUT with
- * the error; PW_RESOURCE. */
+/* Reads an expression of a scope and variables, names ending with NULL, into an arena.  PW_INPUT, with the error;
+ * PW_RESOURCE. */
 int pw_expression_read (const pw_scope *s, const char *const *variable, const char *text, pw_arena *arena,
                         const pw_expression **expression, pw_expression_error *error);
 

@@ -1,6 +1,5 @@
-/* Enclosures of the values of an expression over an interval of time, by interval arithmetic, with its possible jumps
- * and kinks (Moore, Kearfott & Cloud 2009, Introduction to Interval Analysis, chapter 5).  Bounds are infinite where
- * the range is not known. */
+/* Enclosures of the values of an expression over an interval of time, and its possible jumps and kinks, by interval
+ * arithmetic (Moore, Kearfott & Cloud 2009, Introduction to Interval Analysis, chapter 5). */
 #include <float.h>
 #include <math.h>
 #include "expression_parts.h"

@@ -1,5 +1,4 @@
-/* Compiles C to a shared object: runs the user's compiler without a shell, in a folder that only the user can write
- * to. */
+/* Compiles C to a shared object: runs the user's compiler without a shell, in a private folder. */
 #include <errno.h>
 #include <fcntl.h>
 #include <signal.h>
@@ -150,8 +149,7 @@ const char *const *pw_scene_options (int lanes) {
   return known[i].option;
 }
 
-/* Defers SIGINT (Ctrl-C, which also reaches the compiler), SIGTERM and SIGHUP until the caller has removed its
- * files. */
+/* Defers SIGINT (Ctrl-C, which also reaches the compiler), SIGTERM, SIGHUP until the caller's files are removed. */
 static void build_defer (sigset_t *before) {
   sigset_t stop;
   sigemptyset (&stop);

@@ -58,8 +58,7 @@ char *pw_cache_folder (char *notice, size_t size) {
 
 /* ---- Size ---- */
 
-/* Returns the size of all files [bytes], and the path of the one that was used least recently, malloced; NULL if there
- * is none. */
+/* The size of all files [bytes], and the path of the least recently used one, malloced; NULL if there is none. */
 static long long cache_size (const char *folder, char **oldest) {
   long long size = 0;
   struct timespec used = { 0 };

@@ -2,7 +2,7 @@
  *
  * The separator is the first of , ; and tab that the first line contains outside quotes.  A cell in double quotes may
  * contain it, and "" for a quote (RFC 4180), but no line end.  A first line without numbers names the columns, "NAME"
- * or "NAME [unit]"; a column in another unit than requested is converted.  Blank lines and lines that begin with # are
+ * or "NAME [unit]"; a column in another unit than requested is converted.  Blank lines and those that begin with # are
  * skipped. */
 #include <math.h>
 #include <stdarg.h>
@@ -108,8 +108,7 @@ static int columns_are_names (const columns *c, const char *line) {
 
 /* ---- Selection of columns ---- */
 
-/* Finds a column from its name in the first line, with or without its unit, or from its number.  named: 1 if the first
- * line names the columns. */
+/* Finds a column from its number, or its name, with or without unit, if the first line names the columns (named: 1). */
 static int columns_find (const columns *c, const char *first, int named, const char *name, int *index) {
   char cell[100], unit[100], *end;
   pw_nearest near = { .sought = name };

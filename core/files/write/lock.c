@@ -1,7 +1,6 @@
 /* Files and folders that are locked while a process uses them.
  *
- * The lock counts, not the existence of the file: a lock ends with its process, so files left by a killed process do
- * not block others. */
+ * The lock counts, not the existence of the file: a lock ends with its process, so a file that one left is no lock. */
 #include <errno.h>
 #include <fcntl.h>
 #include <string.h>
@@ -27,8 +26,8 @@ const char *pw_lock_reason (int code) {
                              : strerror (code);
 }
 
-/* Opens the file, never through a symbolic link, and creates it unless `mode` is PW_LOCK_EXISTING; *created is 1 only
- * if it did not exist. */
+/* Opens the file, never through a symbolic link, and creates it unless `mode` is PW_LOCK_EXISTING; *created: it is
+ * new. */
 static int lock_open_file (const char *path, pw_lock_mode mode, int *created) {
   int file = mode == PW_LOCK_EXISTING ? -1 : open (path, O_RDWR | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC, 0666);
   *created = file >= 0;

@@ -1,5 +1,5 @@
-/* NumPy archives (.npz): a zip file without compression, of one .npy file for each array (numpy.lib.format, version
- * 1.0; PKWARE's APPNOTE). */
+/* NumPy archives (.npz): a zip file (PKWARE's APPNOTE) without compression, of a .npy file (numpy.lib.format 1.0) per
+ * array. */
 #include <stdlib.h>
 #include <string.h>
 #include "files.h"
@@ -18,8 +18,7 @@ struct pw_npz_entry {
   unsigned long check, size, offset;
 };
 
-/* CRC-32 with the polynomial 0xedb88320, as in zip files, continued from `check`, four bits at a time; begins with
- * 0. */
+/* CRC-32 with the polynomial 0xedb88320, as in zip files, four bits at a time, continued from `check`, at first 0. */
 static unsigned long npz_crc (unsigned long check, const void *data, size_t size) {
   static const unsigned long part[16] = { 0x00000000, 0x1db71064, 0x3b6e20c8, 0x26d930ac, 0x76dc4190, 0x6b6b51f4,
                                           0x4db26158, 0x5005713c, 0xedb88320, 0xf00f9344, 0xd6d6a3e8, 0xcb61b38c,

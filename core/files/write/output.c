@@ -63,8 +63,7 @@ static int output_stream_of (pw_output *o, int file, const char *mode) {
   return code;
 }
 
-/* Opens a descriptor of the process or a file that is not regular.  A FIFO blocks until it has a reader or a signal
- * arrives. */
+/* Opens a descriptor of the process or a file that is not regular.  A FIFO blocks until it has a reader or a signal. */
 static int output_open_direct (pw_output *o, const pw_location *p) {
   int flags = p->descriptor < 0 ? O_WRONLY : fcntl (p->descriptor, F_GETFL);
   if (flags < 0) return errno;
@@ -78,8 +77,7 @@ static int output_open_direct (pw_output *o, const pw_location *p) {
   return output_stream_of (o, file, "w");
 }
 
-/* Gives the new file the mode and, if permitted, the owner and group of the old one, which it will replace; without
- * them, no set-user-ID bits. */
+/* Gives the new file owner and group of the old one, if permitted, and its mode, else without set-user-ID bits. */
 static int output_inherit (int file, const struct stat *old) {
   struct stat now;
   mode_t mode = old->st_mode & 07777;

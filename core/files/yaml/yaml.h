@@ -10,8 +10,7 @@
  *   yaml.c             the head of a model: parameters and default run settings, stored in a plug-in's table
  *
  * Functions with a reader return the status of its first error; after an error they do nothing, so that a sequence of
- * calls needs one check.  `label` ("torque T: value") begins their messages.  A NULL node is absent: nothing is
- * read. */
+ * calls needs one check.  `label` ("torque T: value") begins their messages.  A NULL node is absent. */
 #ifndef PW_YAML_H
 #define PW_YAML_H
 

@@ -1,6 +1,5 @@
 /* Bodies and elements: fills the definition structures through the field tables of their types, and passes them to
- * pw_add_body and pw_add, like a build function in C.  The core checks numbers, names and elements; this file adds a
- * position to its messages. */
+ * pw_add_body and pw_add, like a build function in C.  The core checks them; its messages get a position. */
 #include <stdlib.h>
 #include <string.h>
 #include "yaml.h"
@@ -217,8 +216,7 @@ static void build_free (void *arena) {
   free (arena);
 }
 
-/* Allocates the memory for building and the arena of the model: named numbers, expressions, points of tables, the
- * reference solution. */
+/* Allocates the memory for building, and the arena for what lives as long as the model. */
 static int build_open (pw_reader *r) {
   const pw_yaml *y = r->y;
   size_t largest = 1, bodies = y->bodies ? (size_t)y->bodies->count : 0, lets = y->let ? (size_t)y->let->count : 0;

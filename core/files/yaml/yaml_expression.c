@@ -199,8 +199,7 @@ static int time_expression (reading *e, int i) {
   return jump ? PW_OK : pw_yaml_no_memory (r);
 }
 
-/* Compares given derivative i, 1 or 2, with that of expression i - 1 at some times; it may differ by 1e-6 of the
- * largest values. */
+/* Compares given derivative i, 1 or 2, with that of expression i - 1 at some times, to 1e-6 of the largest ones. */
 static int time_check (const reading *e, int i, const char *name) {
   static const double time[] = { 0.3, 1.7, 4.1 }; /* [s], arbitrary */
   double given[3], exact[3][3], size = 0;

@@ -93,8 +93,7 @@ static int table_file (pw_reader *r, const char *label, const pw_node *node, con
   return PW_OK;
 }
 
-/* Reads a list of points, or columns of a file.  Limits the total number of points, since many tables may read one
- * file. */
+/* Reads a list of points, or columns of a file.  Limits the points of all tables together: many may read one file. */
 static int table_points (pw_reader *r, const char *label, const pw_node *node, const pw_node *const v[3],
                          pw_signal *s) {
   const pw_node *points = v[0], *file = v[1], *columns = v[2]; /* in the order of signal_form */
