@@ -39,8 +39,7 @@ typedef struct {
   const char *const *variable;
   const char *text;
   size_t at, size;               /* of the current token */
-  size_t before;                 /* start of the previous token */
-  size_t end;                    /* end of the previous token */
+  size_t previous, previous_end; /* start and end of the token before it */
   char type;                     /* 'n' name, '0' number, 'o' operator, 0 the end; or ( ) , ? : itself */
   const parser_operator *symbol; /* of a token of type 'o'; else NULL */
   int depth, stacked;            /* of the recursion; operands on the stack */
@@ -79,8 +78,8 @@ PW_PRINTF (3, 4) static parser_part parser_fail (parser *p, size_t at, const cha
 /* Advances to the next token. */
 static void parser_next (parser *p) {
   const char *word = p->text + p->at + p->size;
-  p->before = p->at;
-  p->end = p->at + p->size;
+  p->previous = p->at;
+  p->previous_end = p->at + p->size;
   word += strspn (word, " \t\r\n");
   p->at = (size_t)(word - p->text);
   p->symbol = NULL;
@@ -144,7 +143,7 @@ static parser_part parser_operation (parser *p, parser_part part, int depends, i
   int at_one_point = op == PW_OP_EQUAL || op == PW_OP_UNEQUAL; /* jumps, and back at once */
   if (pw_expression_jumps (op) && !at_one_point && part.depends & DEPENDS_ON_STATES && p->jump == NULL) {
     p->jump = p->text + part.from;
-    p->jump_size = (int)(p->end - part.from);
+    p->jump_size = (int)(p->previous_end - part.from);
   }
   return part;
 }
@@ -182,10 +181,10 @@ static parser_part parser_unexpected (parser *p, char open, size_t at) {
 static parser_part parser_missing (parser *p) {
   char last[PW_EXPRESSION_NAME];
   if (p->status != PW_OK) return parser_nothing;
-  snprintf (last, sizeof last, "%.*s", (int)(p->end - p->before), p->text + p->before);
-  if (p->type == 0 && p->end == 0) return parser_fail (p, 0, "an expression is missing");
-  if (p->type == 0 || (p->type == ')' && p->end))
-    return parser_fail (p, p->before, "something is missing after \"%s\"", last);
+  snprintf (last, sizeof last, "%.*s", (int)(p->previous_end - p->previous), p->text + p->previous);
+  if (p->type == 0 && p->previous_end == 0) return parser_fail (p, 0, "an expression is missing");
+  if (p->type == 0 || (p->type == ')' && p->previous_end))
+    return parser_fail (p, p->previous, "something is missing after \"%s\"", last);
   return parser_fail (p, p->at, "this does not belong here");
 }
 

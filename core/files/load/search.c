@@ -21,6 +21,7 @@ static int search_no_memory (pw_error *error) {
   return pw_fail (error, PW_RESOURCE, "out of memory while looking for models");
 }
 
+/* Where the search for folders begins: at the program, at this library. */
 typedef enum { SEARCH_PROGRAM, SEARCH_LIBRARY, SEARCH_ANCHORS } search_anchor;
 
 /* The folder of the running program or of this library, malloced; NULL if unknown. */
