@@ -51,7 +51,7 @@ PW_INLINE int kinematics_evaluate_signals (pw_workspace *w, int state_dependent,
   for (pw_source *x = w->source, *end = x + w->s->sources; x < end; x++) {
     if ((x->reads > 0) != state_dependent || (w->hold && x->of_force)) continue;
     if (state_dependent && kinematics_copy_states (w, x, q, v) == 0) continue;
-    if (pw_signal_eval (x, t, !x->of_force, x->u) == 0) continue;
+    if (pw_signal_eval (x, t, x->of_force ? PW_SIGNAL_VALUE : PW_SIGNAL_DERIVATIVES, x->u) == 0) continue;
     w->failed = x;
     return PW_METHOD;
   }
@@ -92,7 +92,7 @@ void pw_hold_signals (pw_workspace *w, int hold) {
 double pw_next_breakpoint (pw_workspace *w, int knots, double t) {
   double next = INFINITY;
   for (const pw_source *x = w->source, *end = x + w->s->sources; x < end; x++) {
-    double breakpoint = pw_signal_breakpoint (&x->signal, knots && !x->of_force, t);
+    double breakpoint = pw_signal_breakpoint (&x->signal, knots && !x->of_force ? PW_JUMPS_AND_KINKS : PW_JUMPS, t);
     if (breakpoint < next) next = breakpoint;
     if (breakpoint > t) continue;
     w->failed = x;

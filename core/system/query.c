@@ -52,7 +52,7 @@ int pw_system_jumps (const pw_system *s, double t) {
   double near = 8 * DBL_EPSILON * fabs (t);
   for (const pw_source *x = s->source, *end = x + s->sources; x < end; x++)
     if (!x->of_force || x->signal.type == PW_PULSE || x->signal.type == PW_FUNCTION)
-      if (pw_signal_breakpoint (&x->signal, 0, t - near) <= t + near) return 1;
+      if (pw_signal_breakpoint (&x->signal, PW_JUMPS, t - near) <= t + near) return 1;
   return 0;
 }
 

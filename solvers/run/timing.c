@@ -49,7 +49,8 @@ static void profile_elements (profile *p, profile_work work) {
   const pw_kind *kind = k->kind;
   if (work == PROFILE_SIGNALS)
     for (int i = 0; i < k->b.count * kind->signals; i++)
-      pw_signal_eval (&k->source[i], p->t, !pw_kind_signals_force (kind), k->u + 3 * i);
+      pw_signal_eval (&k->source[i], p->t, pw_kind_signals_force (kind) ? PW_SIGNAL_VALUE : PW_SIGNAL_DERIVATIVES,
+                      k->u + 3 * i);
   else if (work == PROFILE_J_GAMMA) {
     kind->J (&k->b, k->J);
     if (kind->gamma) kind->gamma (&k->b, p->gamma + k->row);

@@ -22,7 +22,7 @@ static_assert (CV_ERR_FAILURE == IDA_ERR_FAIL && CV_CONV_FAILURE == IDA_CONV_FAI
 int pw_sun_open (pw_sun *x, pw_run *r, int unknowns) {
   enum { VECTORS = 60, TABLE = 1024, REST = 1 << 17 };
   x->run = r;
-  if (pw_reserve (VECTORS * (TABLE + (size_t)unknowns * sizeof (double)) + REST) != PW_OK ||
+  if (pw_check_memory (VECTORS * (TABLE + (size_t)unknowns * sizeof (double)) + REST) != PW_OK ||
       SUNContext_Create (NULL, &x->context) != 0)
     return PW_RESOURCE;
   x->y = pw_sun_vector (unknowns, x->context);

@@ -97,7 +97,7 @@ void free (void *p) {
 
 /* ---- What may happen ---- */
 
-/* Calls of libraries that crash when they are refused memory.  Each is made only when there is enough (pw_reserve), so that
+/* Calls of libraries that crash when they are refused memory.  Each is made only when there is enough (pw_check_memory), so that
  * they crash if one allocation fails where the memory is not exhausted, as here; docs/design.md lists them. */
 static int memory_is_fenced (const char *function) {
   static const char *const fenced[] = { "fy_parser_set_input_callback", "SUNContext_Create", "N_VClone", "CVodeInit" };

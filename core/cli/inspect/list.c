@@ -21,7 +21,7 @@ static void list_row (pw_table *t, const char *name, const char *type, const cha
   pw_cell (t, -1, name);
   pw_cell (t, -1, type);
   pw_cell (t, 0, value);
-  if (pw_cell (t, 0, "")) pw_cli_wrap (about, t->indent, LIST_WIDTH);
+  if (pw_cell (t, 0, "")) pw_cli_print_wrapped (about, t->indent, LIST_WIDTH);
   t->column = t->pad = 0;
 }
 
