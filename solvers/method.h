@@ -109,14 +109,34 @@ static inline double pw_tolerance (const pw_run *r, int state, double value) {
 static inline int pw_fixed_steps (const pw_run *r) {
   return r->fixed_steps;
 }
-/* End of the next fixed-size step, `count` steps after the time `base`: a multiple of the size, t_end or a breakpoint,
- * whichever is first; *whole = 1 for the first.  Times within 1e-9 h of each other differ by round-off only. */
-static inline double pw_step_end (const pw_run *r, double base, long count, double t_end, int *whole) {
-  double h = r->settings.step, t1 = base + (double)(count + 1) * h,
-         stop = t_end < r->breakpoint ? t_end : r->breakpoint;
+
+/* ---- Fixed steps, which end at multiples of the step size after a time `base` ---- */
+
+typedef struct {
+  double base;
+  long count; /* steps since then */
+} pw_step_counter;
+
+/* End of the next step of size h: the next multiple of h, or t_end or a breakpoint if one of them is earlier; *whole: 1
+ * if it is the multiple.  Times within 1e-9 h of each other differ by round-off only. */
+static inline double pw_step_end (const pw_run *r, const pw_step_counter *c, double t_end, int *whole) {
+  double h = r->settings.step, t1 = c->base + (double)(c->count + 1) * h, stop = fmin (t_end, r->breakpoint);
   *whole = t1 < stop + 1e-9 * h;
   return t1 > stop - 1e-9 * h ? stop : t1;
 }
+static inline void pw_count_steps_from (pw_step_counter *c, double t) {
+  *c = (pw_step_counter){ .base = t };
+}
+/* Counts a step to t1; after one that is not whole, steps are counted from t1. */
+static inline void pw_count_step (pw_step_counter *c, int whole, double t1) {
+  c->count++;
+  if (!whole) pw_count_steps_from (c, t1);
+}
+static inline void pw_serialise_counter (pw_step_counter *c, pw_archive *a) {
+  pw_archive_bytes (a, &c->base, sizeof c->base);
+  pw_archive_count (a, &c->count);
+}
+
 /* 1 if the run's stabilisation is of this kind. */
 static inline int pw_stabilised_by (const pw_run *r, pw_stabilisation_kind kind) {
   return r->method->stabilisations[r->stabilisation].kind == kind;

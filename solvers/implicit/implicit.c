@@ -41,8 +41,8 @@ void pw_implicit_close (pw_run *r) {
 int pw_implicit_restart (pw_run *r, pw_error *error) {
   pw_implicit *x = implicit_of (r);
   (void)error;
-  x->base = x->last.t0 = r->t;
-  x->count = 0;
+  pw_count_steps_from (&x->counter, r->t);
+  x->last.t0 = r->t;
   x->h = 0;
   return PW_OK;
 }
@@ -96,7 +96,7 @@ static int implicit_step_around (pw_run *r, pw_implicit_step *step, double h, do
 int pw_implicit_advance (pw_run *r, double t_end, pw_implicit_step *step, void (*accept) (pw_run *r), pw_error *error) {
   pw_implicit *x = implicit_of (r);
   int whole;
-  const double end = pw_step_end (r, x->base, x->count, t_end, &whole);
+  const double end = pw_step_end (r, &x->counter, t_end, &whole);
   double h = whole ? r->settings.step : end - r->t, t1 = end;
   size_t n = (size_t)r->s->coords * sizeof (double);
   r->near_singular = 0;
@@ -111,8 +111,7 @@ int pw_implicit_advance (pw_run *r, double t_end, pw_implicit_step *step, void (
   x->h = h;
   pw_dense_output_count (&x->last, r);
   r->statistics.steps++;
-  x->count++;
-  if (!whole) x->base = t1, x->count = 0;
+  pw_count_step (&x->counter, whole, t1);
   return PW_OK;
 }
 

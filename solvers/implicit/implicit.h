@@ -9,8 +9,7 @@
 
 /* The data of each of these methods begin with this. */
 typedef struct {
-  double base;      /* time from which steps are counted */
-  long count;       /* steps since then */
+  pw_step_counter counter;
   double h;         /* size of the last step; 0: the next one is the first */
   double *q1, *v1;  /* the new state: coords + 3 */
   pw_dae dae;       /* its scatter map has recorded the matrix; leapfrog uses only its tangent */

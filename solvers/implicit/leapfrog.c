@@ -269,9 +269,7 @@ static int leapfrog_open (pw_run *r, pw_error *error) {
 }
 
 static void leapfrog_serialise (pw_run *r, pw_archive *a) {
-  leapfrog *d = r->data;
-  pw_archive_bytes (a, &d->work.base, sizeof d->work.base);
-  pw_archive_count (a, &d->work.count);
+  pw_serialise_counter (&r->data->work.counter, a);
 }
 
 /* ---- Advancing ---- */

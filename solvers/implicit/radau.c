@@ -45,8 +45,8 @@ static int radau_restart (pw_run *r, pw_error *error) {
   radau *d = r->data;
   double T = r->w->scale.time;
   (void)error;
-  d->base = d->last.t = r->t;
-  d->count = 0;
+  pw_count_steps_from (&d->counter, r->t);
+  d->last.t = r->t;
   d->last_h = d->last.h = 0;
   d->left = 1;
   d->outdated = 1;
@@ -114,7 +114,6 @@ static int radau_open (pw_run *r, pw_error *error) {
   if (status == PW_OK) status = radau_allocate (r);
   if (status == PW_OK) status = pw_radau_open_matrices (r);
   if (status != PW_OK) return pw_fail_memory (r->s, error);
-  d->fixed = pw_fixed_steps (r);
   radau_constants (r);
   status = pw_projector_open (&d->projector, r, NULL, NULL, error);
   return status == PW_OK ? radau_restart (r, error) : status;
@@ -140,7 +139,7 @@ static int radau_fail (pw_run *r, int status, double h, pw_error *error) {
   if (status == PW_RESOURCE) return pw_fail (error, PW_RESOURCE, "t = %.6g s: out of memory in KLU", r->t);
   if (r->near_singular || pw_watchdog_near_state (r)) return pw_fail_singular (r, r->t, error);
   if (status == PW_INPUT) return pw_fail (error, PW_METHOD, "t = %.6g s: the Newton matrix is singular", r->t);
-  if (r->data->fixed)
+  if (pw_fixed_steps (r))
     return pw_fail (error, PW_METHOD,
                     "t = %.6g s: the iteration does not converge; the step of %.6g s may be too large", r->t, h);
   return pw_fail (error, PW_METHOD, "t = %.6g s: %s however small the step (rtol %.3g)", r->t,
@@ -210,20 +209,20 @@ static int radau_try (pw_run *r, double h, double t1, int again, double *error) 
   *error = INFINITY;
   r->near_singular = 0;
   int status = pw_radau_solve (r, h, t1);
-  if (status == PW_OK && !r->data->fixed) status = pw_radau_estimate (r, h, again, error);
-  if (status == PW_OK && r->s->entries > 0 && (*error < 1 || r->data->fixed)) status = pw_radau_work (r, h, t1, error);
+  if (status == PW_OK && !pw_fixed_steps (r)) status = pw_radau_estimate (r, h, again, error);
+  if (status == PW_OK && r->s->entries > 0 && (*error < 1 || pw_fixed_steps (r)))
+    status = pw_radau_work (r, h, t1, error);
   return status;
 }
 
 static int radau_advance_fixed (pw_run *r, double t_end, pw_error *error) {
   radau *d = r->data;
   int whole;
-  double err, t1 = pw_step_end (r, d->base, d->count, t_end, &whole), h = whole ? r->settings.step : t1 - r->t;
+  double err, t1 = pw_step_end (r, &d->counter, t_end, &whole), h = whole ? r->settings.step : t1 - r->t;
   int status = radau_try (r, h, t1, 0, &err);
   if (status == PW_OK) status = radau_accept (r, h, t1);
   if (status != PW_OK) return radau_fail (r, status, h, error);
-  d->count++;
-  if (!whole) d->base = t1, d->count = 0;
+  pw_count_step (&d->counter, whole, t1);
   return PW_OK;
 }
 
@@ -251,7 +250,7 @@ static void radau_project_start (pw_run *r) {
 
 static int radau_advance (pw_run *r, double t_end, pw_error *error) {
   radau *d = r->data;
-  if (d->fixed) return radau_advance_fixed (r, t_end, error);
+  if (pw_fixed_steps (r)) return radau_advance_fixed (r, t_end, error);
   double stop = fmin (t_end, r->breakpoint), least = 16 * DBL_EPSILON * fmax (fabs (r->t), 1e-6 * r->w->scale.time),
          err;
   for (int rejected = 0, status = PW_OK;; rejected++) {
@@ -293,7 +292,7 @@ static int radau_resolved (const pw_run *r, const double *q, const double *v) {
   double sum = 0;
   for (int i = 0; i < 2 * d->dae.n; i++) {
     double off = i < d->dae.n ? q[i] - r->q_at[i] : v[i - d->dae.n] - r->v_at[i - d->dae.n], allowed = d->tolerance[i];
-    if (d->fixed) {
+    if (pw_fixed_steps (r)) {
       allowed = d->floor[i];
       for (int k = 0; k < STAGES; k++) allowed = fmax (allowed, 0.1 * fabs (d->last.Z[k][i]));
     }

@@ -133,7 +133,7 @@ static void radau_weigh (pw_run *r, double h) {
     double unit = third && i >= n ? fmax (d->unit[i], large * d->unit[i - n] / h) : d->unit[i];
     d->tolerance[i] = fmin (rtol * (size + least), r->saturation[i]);
     d->floor[i] = fmin (8 * DBL_EPSILON * (size + unit), 0.1 * r->saturation[i]);
-    d->enough[i] = d->fixed ? d->floor[i] : fmax (newton * d->tolerance[i], d->floor[i]);
+    d->enough[i] = pw_fixed_steps (r) ? d->floor[i] : fmax (newton * d->tolerance[i], d->floor[i]);
   }
 }
 
@@ -214,12 +214,12 @@ static int radau_correct (pw_run *r, double h, double t1, double *size, double *
  * units of round-off.  The tests are those of Hairer & Wanner 1996, section IV.8, and one for round-off. */
 static int radau_converged (pw_run *r, int done, double size, double before, double rough) {
   radau *d = r->data;
-  const int most = d->fixed ? 50 : 7;
+  const int most = pw_fixed_steps (r) ? 50 : 7;
   d->shorter = 0.5;
   if (!isfinite (size)) return -1;
   if (size == 0) return 1;
   if (done == 0) {
-    if (d->fixed || r->s->saturates) return 0;
+    if (pw_fixed_steps (r) || r->s->saturates) return 0;
     d->left = pow (fmax (d->left, DBL_EPSILON), 0.8);
     return d->left * size <= 1;
   }
@@ -228,7 +228,7 @@ static int radau_converged (pw_run *r, int done, double size, double before, dou
   if (rate > 0.3 && rough <= (d->near ? 1e7 : 64)) return 1;
   d->left = d->rate < 0.99 ? d->rate / (1 - d->rate) : 100;
   if (d->left * size <= 1) return 1;
-  if (d->fixed && done < most && (done < 4 || d->rate < 1)) return 0;
+  if (pw_fixed_steps (r) && done < most && (done < 4 || d->rate < 1)) return 0;
   if (!(d->rate < 0.99)) return -1;
   double end = d->left * size * pow (d->rate, most - 1 - done);
   if (done < most && end < 1) return 0;

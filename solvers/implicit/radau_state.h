@@ -14,7 +14,6 @@ typedef struct {
 } radau_step;
 
 struct pw_method_data {
-  int fixed; /* 1: fixed steps */
   pw_dae dae;
   pw_sparse real, complex;
   double *matrix;                                          /* -F_y */
@@ -28,8 +27,7 @@ struct pw_method_data {
   double *rates;                                           /* entries */
   radau_step now, last;
   double *a1;                /* coords: accelerations at the end of the last step */
-  double base;               /* fixed steps: time from which they are counted */
-  long count;                /* steps since then */
+  pw_step_counter counter;   /* of fixed steps */
   double h;                  /* the next step */
   double last_h, last_error; /* size and error of the last one, 0: none */
   double factored;           /* step for which the matrices are factorised; 0: none */

@@ -111,7 +111,7 @@ static int fixed_step_around (pw_run *r, int status, int lands, double t1, doubl
 int pw_rk_advance_fixed (pw_run *r, double t_end, pw_error *error) {
   struct pw_method_data *d = r->data;
   int whole, project = d->projects && (r->statistics.steps + 1) % d->every == 0;
-  double added = 0, t1 = pw_step_end (r, d->base, d->count, t_end, &whole),
+  double added = 0, t1 = pw_step_end (r, &d->counter, t_end, &whole),
          h = whole && !d->split ? r->settings.step : t1 - r->t;
   const int split = d->split;
   r->near_singular = 0;
@@ -127,11 +127,10 @@ int pw_rk_advance_fixed (pw_run *r, double t_end, pw_error *error) {
   if (status != PW_OK) return pw_rk_fail (r, status, r->settings.step, error);
   r->statistics.steps++;
   if (d->split) {
-    if (t > t1) d->count = (long)floor ((t - d->base) / r->settings.step);
+    if (t > t1) d->counter.count = (long)floor ((t - d->counter.base) / r->settings.step);
     return PW_OK;
   }
   pw_rk_accept (r, h, t1, added);
-  d->count++;
-  if (!whole) d->base = t1, d->count = 0;
+  pw_count_step (&d->counter, whole, t1);
   return PW_OK;
 }

@@ -80,7 +80,6 @@ int pw_rk_open (pw_run *r, const pw_tableau *tableau, pw_error *error) {
   if (d == NULL) return pw_fail_memory (r->s, error);
   d->tableau = tableau;
   rk_list_weights (d);
-  d->adaptive = tableau->e != NULL && pw_run_option (r, "steps") == 0;
   d->held = pw_run_option (r, "inputs") != 0;
   d->projects = pw_stabilised_by (r, PW_PROJECTION);
   d->null_space = pw_stabilised_by (r, PW_NULLSPACE);
@@ -102,18 +101,16 @@ void pw_rk_close (pw_run *r) {
 int pw_rk_restart (pw_run *r, pw_error *error) {
   struct pw_method_data *d = r->data;
   (void)error;
-  d->base = r->t;
-  d->count = 0;
+  pw_count_steps_from (&d->counter, r->t);
   d->split = 0;
-  if (d->adaptive) pw_rk_begin_adaptive (r);
+  if (!pw_fixed_steps (r)) pw_rk_begin_adaptive (r);
   pw_rk_keep (r);
   return PW_OK;
 }
 
 void pw_rk_serialise (pw_run *r, pw_archive *a) {
   struct pw_method_data *d = r->data;
-  pw_archive_bytes (a, &d->base, sizeof d->base);
-  pw_archive_count (a, &d->count);
+  pw_serialise_counter (&d->counter, a);
   pw_archive_bytes (a, &d->split, sizeof d->split);
   pw_archive_bytes (a, &d->h, sizeof d->h);
   pw_archive_bytes (a, &d->last_error, sizeof d->last_error);
@@ -122,5 +119,5 @@ void pw_rk_serialise (pw_run *r, pw_archive *a) {
 /* ---- Advancing ---- */
 
 int pw_rk_advance (pw_run *r, double t_end, pw_error *error) {
-  return r->data->adaptive ? pw_rk_advance_adaptive (r, t_end, error) : pw_rk_advance_fixed (r, t_end, error);
+  return pw_fixed_steps (r) ? pw_rk_advance_fixed (r, t_end, error) : pw_rk_advance_adaptive (r, t_end, error);
 }

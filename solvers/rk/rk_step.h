@@ -31,14 +31,12 @@ struct pw_method_data {
   const pw_tableau *tableau;
   pw_rk_row row[PW_RK_STAGES];        /* [i] stage i > 0; [0] the new state, as stage 0 needs no weights */
   pw_rk_row estimate[3];              /* e, e3, e6; the last weight is that of the new state's derivative */
-  int adaptive;                       /* 1: step-size control; 0: fixed steps */
   int projects, held, every;          /* projection; signals constant over the step; steps between projections */
   int null_space, projects_positions; /* stabilisation nullspace; it projects positions too */
   pw_projector projector;
   pw_nullspace nullspace;
-  double base; /* time from which fixed steps are counted */
-  long count;  /* steps since then */
-  int split;   /* 1: the last step ended between their ends */
+  pw_step_counter counter; /* of fixed steps */
+  int split;               /* 1: the last step ended between their ends */
   /* velocities, accelerations and ledger rates of the stages */
   double *V[PW_RK_STAGES], *A[PW_RK_STAGES], *R[PW_RK_STAGES];
   double *q, *v, *a, *lambda; /* state of a stage, then the new state: one block, as in the run */

@@ -11,7 +11,8 @@
  * one by one (ledger.c). */
 static int several_suits (const pw_run *r) {
   const struct pw_method_data *d = r->data;
-  if (r->method->advance != pw_rk_advance || d == NULL || d->adaptive || d->held || d->null_space || d->split) return 0;
+  if (r->method->advance != pw_rk_advance || d == NULL || !pw_fixed_steps (r) || d->held || d->null_space || d->split)
+    return 0;
   if (d->projects && !(d->every == 1 && d->projector.by_mass && !d->projector.alone)) return 0;
   return pw_specialised_suits (r) && r->redundant == 0 && r->alpha + r->beta == 0 && !r->settings.ledger &&
          !r->interrupted && r->stalled == 0 && !(r->geometry.saddle && r->geometry.alert) &&
@@ -27,7 +28,7 @@ static int several_count (const pw_run *r, double t, double t_end) {
   int most = PW_CHECK_INTERVAL - (int)(r->statistics.steps % PW_CHECK_INTERVAL), n = 0;
   double reached = r->t;
   while (n < most && reached < t && reached < t_end && reached - r->settings.t < 2 * r->mark_time) {
-    double next = d->base + (double)(d->count + n + 1) * h;
+    double next = d->counter.base + (double)(d->counter.count + n + 1) * h;
     if (!(next <= stop && h > tiny * fabs (next))) break;
     reached = next, n++;
   }
@@ -63,7 +64,7 @@ static void several_report (pw_run *r, const pw_scene_steps *x) {
   pw_geometry *g = &r->geometry;
   r->t = x->t;
   d->last.t = x->t0, d->last.projected = r->projected;
-  d->count += x->done;
+  d->counter.count += x->done;
   r->near_singular = 0, r->w->failed = NULL;
   r->reference_level = x->watch.reference, r->previous_norm = x->watch.norm;
   s->steps += x->done;
@@ -89,8 +90,8 @@ static int several_plan (pw_run *r, double t, double t_end, pw_scene_steps *x) {
                          .row = d->row,
                          .c = d->tableau->c,
                          .h = r->settings.step,
-                         .base = d->base,
-                         .number = d->count,
+                         .base = d->counter.base,
+                         .number = d->counter.count,
                          .t = r->t,
                          .state = r->q,
                          .state0 = d->last.q,

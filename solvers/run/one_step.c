@@ -8,9 +8,8 @@
 
 struct pw_method_data {
   pw_dense_output last;
-  int projects;       /* with the projector of `last` */
-  double base;        /* time from which steps are counted */
-  long count;         /* steps since then */
+  int projects; /* with the projector of `last` */
+  pw_step_counter counter;
   double end;         /* of the step whose size was last requested */
   int whole;          /* 1: it has the full step size */
   size_t length;      /* of an array */
@@ -32,8 +31,8 @@ double pw_stage_time (const pw_run *r, double t) {
 int pw_step_restart (pw_run *r, pw_error *error) {
   struct pw_method_data *d = r->data;
   (void)error;
-  d->base = d->last.t0 = r->t;
-  d->count = 0;
+  pw_count_steps_from (&d->counter, r->t);
+  d->last.t0 = r->t;
   return PW_OK;
 }
 
@@ -56,8 +55,7 @@ void pw_step_close (pw_run *r) {
 }
 
 void pw_step_serialise (pw_run *r, pw_archive *a) {
-  pw_archive_bytes (a, &r->data->base, sizeof r->data->base);
-  pw_archive_count (a, &r->data->count);
+  pw_serialise_counter (&r->data->counter, a);
 }
 
 double *pw_step_array (pw_run *r, int i) {
@@ -68,7 +66,7 @@ double *pw_step_array (pw_run *r, int i) {
 
 double pw_step_size (pw_run *r, double t_end) {
   struct pw_method_data *d = r->data;
-  d->end = pw_step_end (r, d->base, d->count, t_end, &d->whole);
+  d->end = pw_step_end (r, &d->counter, t_end, &d->whole);
   return d->end - r->t;
 }
 
@@ -110,8 +108,7 @@ int pw_step_accept (pw_run *r, int status, double h, double *q, double *v, pw_er
   memcpy (r->lambda, d->lambda, (size_t)r->s->rows * sizeof *r->lambda);
   pw_dense_output_count (&d->last, r);
   r->statistics.steps++;
-  d->count++;
-  if (!requested || !d->whole) d->base = t1, d->count = 0;
+  pw_count_step (&d->counter, requested && d->whole, t1);
   return PW_OK;
 }
 
