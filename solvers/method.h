@@ -213,6 +213,13 @@ static inline int pw_fail_signal (double t, pw_error *error) {
   return pw_fail (error, PW_METHOD, "t = %.6g s: a signal failed", t);
 }
 
+/* 1 if the sum of the squares of a state's numbers does not overflow: no number is NaN, infinite or too large. */
+static inline int pw_is_finite_state (const pw_run *r, const double *q, const double *v) {
+  double sum = 0;
+  for (int j = 0; j < r->s->coords; j++) sum += q[j] * q[j] + v[j] * v[j];
+  return sum < 1e300;
+}
+
 /* Updates kinematics and evaluates J at a state; returns as pw_update_kinematics. */
 static inline int pw_evaluate_J_at (pw_workspace *w, double t, const double *q, const double *v) {
   int status = pw_update_kinematics (w, t, q, v);
@@ -250,6 +257,11 @@ enum { PW_CHECK_INTERVAL = 16 };
 int pw_run_check_resolution (pw_run *r, pw_error *error);
 
 /* ---- Energy (ledger.c) ---- */
+
+/* Kinetic and potential energy [J] at the velocities v; kinematics must be up to date. */
+static inline double pw_energy (const pw_run *r, const double *v) {
+  return pw_kinetic (r->s, v) + pw_potential (r->w);
+}
 
 /* Record the initial energies, and those of the state reached; kinematics must be up to date. */
 void pw_ledger_begin (pw_run *r);
@@ -334,6 +346,10 @@ int pw_project_velocities (pw_projector *p, pw_run *r, double *v);
 /* Both, then accelerations and multipliers of the projected state, with the run's saddle factorised there.
  * Velocities that satisfy J v = eta to round-off may stay unchanged. */
 int pw_project_state (pw_projector *p, pw_run *r, double t, double *q, double *v, double *a, double *lambda);
+
+/* The same; *added_energy, unless it is NULL, grows by the energy [J] that the projection adds (ledger.c). */
+int pw_project_with_energy (pw_projector *p, pw_run *r, double t, double *q, double *v, double *a, double *lambda,
+                            double *added_energy);
 
 /* Removes from an error of positions or velocities the part that a projection onto the first `rows` equations
  * removes, in the metric of the saddle `k` (all rows), which must be factorised at the current configuration. */

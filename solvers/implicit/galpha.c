@@ -192,7 +192,8 @@ static int galpha_open (pw_run *r, pw_error *error) {
     galpha_fill (d, 1);
     status = pw_implicit_lay_out (&d->work, x->size);
   }
-  return pw_implicit_complete (r, status, x->velocities, error);
+  pw_dense_projection projection = x->velocities ? PW_DENSE_POSITIONS_AND_VELOCITIES : PW_DENSE_POSITIONS;
+  return pw_implicit_complete (r, status, projection, error);
 }
 
 /* ---- Initialisation ---- */

@@ -22,9 +22,9 @@ int pw_implicit_lay_out (pw_implicit *x, int size) {
   return x->value ? pw_sparse_open (&x->sparse, 0, size, t->colptr, t->rowind) : PW_RESOURCE;
 }
 
-int pw_implicit_complete (pw_run *r, int status, int velocities, pw_error *error) {
+int pw_implicit_complete (pw_run *r, int status, pw_dense_projection projection, pw_error *error) {
   if (status != PW_OK) return pw_fail_memory (r->s, error);
-  status = pw_dense_output_open (&implicit_of (r)->last, r, velocities, error);
+  status = pw_dense_output_open (&implicit_of (r)->last, r, projection, error);
   return status == PW_OK ? pw_implicit_restart (r, error) : status;
 }
 
@@ -42,7 +42,7 @@ int pw_implicit_restart (pw_run *r, pw_error *error) {
   pw_implicit *x = implicit_of (r);
   (void)error;
   pw_count_steps_from (&x->counter, r->t);
-  x->last.t0 = r->t;
+  x->last.start.t = r->t;
   x->h = 0;
   return PW_OK;
 }
@@ -103,13 +103,13 @@ int pw_implicit_advance (pw_run *r, double t_end, pw_implicit_step *step, void (
   int status = whole ? implicit_step_around (r, step, h, fmin (t_end, r->breakpoint), &t1) : step (r, h, t1);
   if (t1 > end) h = t1 - r->t, whole = 0;
   if (status != PW_OK) return implicit_fail (r, status, h, error);
-  pw_dense_output_keep (&x->last, r);
+  pw_store_start (&x->last.start, r);
   memcpy (r->q, x->q1, n);
   memcpy (r->v, x->v1, n);
   accept (r);
   r->t = t1;
   x->h = h;
-  pw_dense_output_count (&x->last, r);
+  pw_dense_output_integrate_ledger (&x->last, r);
   r->statistics.steps++;
   pw_count_step (&x->counter, whole, t1);
   return PW_OK;

@@ -25,9 +25,9 @@ int pw_implicit_open (pw_implicit *x, pw_run *r, const pw_array *array, size_t c
 /* Allocates the recorded matrix of this size: PW_OK or PW_RESOURCE. */
 int pw_implicit_lay_out (pw_implicit *x, int size);
 
-/* Completes the opening, or reports that memory is exhausted if `status` is not PW_OK; velocities: 1 if the method
- * enforces J v = eta. */
-int pw_implicit_complete (pw_run *r, int status, int velocities, pw_error *error);
+/* Completes the opening with a dense output of this projection; if `status` is not PW_OK, reports that memory is
+ * exhausted. */
+int pw_implicit_complete (pw_run *r, int status, pw_dense_projection projection, pw_error *error);
 
 /* Scales of the rows and columns of a Newton matrix whose derivatives by q' and a have the coefficients c and e, so
  * that all entries are of the same size for every step. */

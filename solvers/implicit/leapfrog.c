@@ -265,7 +265,7 @@ static int leapfrog_open (pw_run *r, pw_error *error) {
                              { &d->eta, rows }, { &d->z, n + rows } };
   int status = pw_implicit_open (&d->work, r, array, sizeof array / sizeof *array);
   if (status == PW_OK) status = drift_open_matrix (r);
-  return pw_implicit_complete (r, status, 1, error);
+  return pw_implicit_complete (r, status, PW_DENSE_POSITIONS_AND_VELOCITIES, error);
 }
 
 static void leapfrog_serialise (pw_run *r, pw_archive *a) {

@@ -301,7 +301,7 @@ static int radau_resolved (const pw_run *r, const double *q, const double *v) {
   return sum <= 2 * d->dae.n;
 }
 
-static void radau_interpolate (pw_run *r, double x) {
+static void radau_blend (pw_run *r, double x) {
   radau *d = r->data;
   const radau_step *p = &d->last;
   int n = d->dae.n;
@@ -320,10 +320,10 @@ static void radau_interpolate (pw_run *r, double x) {
 }
 
 /* Projects the sample onto the constraints that the steps satisfy, with accelerations and multipliers from there. */
-static int radau_inside (pw_run *r, double t) {
-  radau *d = r->data;
+static int radau_interpolate (void *method, pw_run *r, double t) {
+  radau *d = method;
   int status;
-  radau_interpolate (r, (t - d->last.t) / d->last.h);
+  radau_blend (r, (t - d->last.t) / d->last.h);
   if (d->dae.mus > 0 || !d->dae.velocities)
     status = pw_project_positions (&d->projector, r, t, r->q_at, r->v_at);
   else
@@ -336,19 +336,7 @@ static int radau_inside (pw_run *r, double t) {
 
 static int radau_at (pw_run *r, double t, pw_error *error) {
   radau *d = r->data;
-  if (t > r->t || t < d->last.t) return pw_fail_outside (r, d->last.t, t, error);
-  if (t == r->t) {
-    pw_show_reached (r);
-    return PW_OK;
-  }
-  pw_statistics keep = r->statistics;
-  int status = radau_inside (r, t);
-  r->statistics = keep;
-  r->projected_at = r->projected;
-  if (status == PW_OK) return PW_OK;
-  if (status == PW_METHOD) return pw_fail_signal (t, error);
-  if (r->near_singular) return pw_fail_singular (r, t, error);
-  return pw_fail (error, PW_METHOD, "t = %.6g s: no state near the interpolated one satisfies the constraints", t);
+  return pw_sample_last_step (r, d->last.t, t, radau_interpolate, d, error);
 }
 
 static const pw_stabilisation radau_stabilisations[] = {

@@ -200,21 +200,19 @@ int pw_nullspace_accelerate (pw_run *r, const double *v, double *a, double *lamb
 
 /* The energy at (t, q) with the null-space velocities of w. */
 static int nullspace_energy (pw_nullspace *b, pw_run *r, double t, const double *q, const double *w, double *energy) {
-  const pw_system *s = r->s;
-  memcpy (b->v, w, (size_t)s->coords * sizeof *w);
+  memcpy (b->v, w, (size_t)r->s->coords * sizeof *w);
   int status = pw_nullspace_velocities (b, r, t, q, b->v);
-  if (status == PW_OK) *energy = pw_kinetic (s, b->v) + pw_potential (r->w);
+  if (status == PW_OK) *energy = pw_energy (r, b->v);
   return status;
 }
 
 int pw_nullspace_finalise (pw_nullspace *b, pw_projector *p, pw_run *r, double t, double *q, double *v, double *added) {
-  const pw_system *s = r->s;
   int status = PW_OK;
   double before = 0;
-  if (p == NULL || s->holonomic == 0) return pw_nullspace_velocities (b, r, t, q, v);
+  if (p == NULL || r->s->holonomic == 0) return pw_nullspace_velocities (b, r, t, q, v);
   if (added) status = nullspace_energy (b, r, t, q, v, &before);
   if (status == PW_OK) status = pw_project_positions (p, r, t, q, v);
   if (status == PW_OK) status = nullspace_correct_velocities (b, r, v);
-  if (status == PW_OK && added) *added += pw_kinetic (s, v) + pw_potential (r->w) - before;
+  if (status == PW_OK && added) *added += pw_energy (r, v) - before;
   return status;
 }

@@ -78,13 +78,6 @@ static int rk_hold (pw_run *r) {
   return status;
 }
 
-/* 1 if the squares of all entries are finite. */
-static int rk_finite (const pw_run *r, const double *q, const double *v) {
-  double sum = 0;
-  for (int j = 0; j < r->s->coords; j++) sum += q[j] * q[j] + v[j] * v[j];
-  return sum < 1e300;
-}
-
 /* The same as rk_stages, by specialised code: 1; 0 if there is none, or it refuses a stage. */
 static int rk_stages_specialised (pw_run *r, double h) {
   struct pw_method_data *d = r->data;
@@ -111,22 +104,7 @@ static int rk_stages (pw_run *r, double h) {
   if (d->held) pw_hold_signals (r->w, 0);
   if (status != PW_OK) return status;
   rk_combine (r, d->q, d->v, &d->row[0], h);
-  return rk_finite (r, d->q, d->v) ? PW_OK : PW_RETRY;
-}
-
-/* Projects the new state and evaluates its accelerations; *added grows by the energy this adds. */
-static int rk_project (pw_run *r, double t, double *added) {
-  struct pw_method_data *d = r->data;
-  const pw_system *s = r->s;
-  int status = PW_OK;
-  double before = 0;
-  if (added) {
-    status = pw_update_kinematics (r->w, t, d->q, d->v);
-    before = pw_kinetic (s, d->v) + pw_potential (r->w);
-  }
-  if (status == PW_OK) status = pw_project_state (&d->projector, r, t, d->q, d->v, d->a, d->lambda);
-  if (status == PW_OK && added) *added += pw_kinetic (s, d->v) + pw_potential (r->w) - before;
-  return status;
+  return pw_is_finite_state (r, d->q, d->v) ? PW_OK : PW_RETRY;
 }
 
 /* From the state reached to its successor at t1 = t + h, in d->q, d->v, d->a, d->lambda. */
@@ -135,7 +113,7 @@ int pw_rk_step (pw_run *r, double h, double t1, int project, double *added) {
   int status = d->null_space ? pw_nullspace_begin (&d->nullspace, r) : PW_OK;
   if (status == PW_OK) status = rk_stages (r, h);
   if (status != PW_OK) return status;
-  if (project) return rk_project (r, t1, added);
+  if (project) return pw_project_with_energy (&d->projector, r, t1, d->q, d->v, d->a, d->lambda, added);
   if (!d->null_space) return pw_run_accelerate (r, t1, d->q, d->v, d->a, d->lambda);
   status =
       pw_nullspace_finalise (&d->nullspace, d->projects_positions ? &d->projector : NULL, r, t1, d->q, d->v, added);
@@ -173,7 +151,7 @@ double pw_rk_distance (const pw_run *r) {
 }
 
 int pw_rk_fail (pw_run *r, int status, double h, pw_error *error) {
-  int finite = rk_finite (r, r->data->q, r->data->v) && rk_finite (r, r->q, r->v);
+  int finite = pw_is_finite_state (r, r->data->q, r->data->v) && pw_is_finite_state (r, r->q, r->v);
   int against = (r->data->projects || r->data->projects_positions) && finite ? r->data->projector.against : -1;
   char element[120];
   if (status < 0) return pw_fail_signal (r->t, error);

@@ -64,6 +64,16 @@ void pw_ledger_rates (pw_run *r, const double *lambda, double *rate) {
   pw_evaluate_ledger (r->w, lambda, rate);
 }
 
+int pw_project_with_energy (pw_projector *p, pw_run *r, double t, double *q, double *v, double *a, double *lambda,
+                            double *added_energy) {
+  int status = added_energy ? pw_update_kinematics (r->w, t, q, v) : PW_OK;
+  if (status != PW_OK) return status;
+  double before = added_energy ? pw_energy (r, v) : 0;
+  status = pw_project_state (p, r, t, q, v, a, lambda);
+  if (status == PW_OK && added_energy) *added_energy += pw_energy (r, v) - before;
+  return status;
+}
+
 int pw_ledger_reacts (const pw_system *s) {
   int reacts = 0;
   for (int i = 0; i < s->entries; i++) reacts |= s->batch[s->entry[i].batch].kind->rows > 0;

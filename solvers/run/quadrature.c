@@ -36,7 +36,7 @@ static void quadrature_keep (pw_quadrature *x, const pw_run *r) {
 
 void pw_quadrature_restart (pw_quadrature *x, pw_run *r) {
   x->points = 1;
-  x->energy = pw_kinetic (r->s, r->v) + pw_potential (r->w);
+  x->energy = pw_energy (r, r->v);
   quadrature_keep (x, r);
 }
 
@@ -118,7 +118,7 @@ static int quadrature_leaps (const pw_quadrature *x) {
 /* Energy defect of a step: change of energy, less work, plus losses.  Keeps the energy for the next step. */
 static double quadrature_defect (pw_quadrature *x, pw_run *r) {
   double before = x->energy, off;
-  x->energy = pw_kinetic (r->s, r->v) + pw_potential (r->w);
+  x->energy = pw_energy (r, r->v);
   off = x->energy - before;
   for (int e = 0; e < r->s->entries; e++) off -= r->s->entry[e].type == PW_WORK ? x->sum[e] : -x->sum[e];
   return fabs (off);

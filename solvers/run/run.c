@@ -244,7 +244,7 @@ static int run_select (pw_run *r, pw_error *error) {
 
 static int run_energy (pw_run *r, double *energy, pw_error *error) {
   if (pw_update_kinematics (r->w, r->t, r->q, r->v) != PW_OK) return pw_fail_signal (r->t, error);
-  *energy = pw_kinetic (r->s, r->v) + pw_potential (r->w);
+  *energy = pw_energy (r, r->v);
   return PW_OK;
 }
 
