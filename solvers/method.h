@@ -40,7 +40,7 @@ struct pw_run {
   int scene_ready;        /* 1: its constants have been computed */
   pw_watchdog limits;     /* thresholds */
   pw_geometry geometry;   /* distance of the constraints from a singular configuration */
-  double refuse;          /* sine at which an evaluation is refused */
+  double refused_sine;    /* sine at which an evaluation is refused */
   int near_singular;      /* 1 after an evaluation near a singular configuration */
   double reference_level; /* largest acceleration norm away from singular configurations, in units of L / T^2; >= 1 */
   double previous_norm;   /* acceleration norm of the last such state */
@@ -176,6 +176,11 @@ extern const char *const pw_metrics[];
 /* Initial step size for methods that begin with order 1: the error h^2 / T^2 is a quarter of the tolerance; states that
  * saturating forces depend on change by at most their tolerance, unless that takes less than 1e-9 T. */
 double pw_first_step (const pw_run *r);
+
+/* Step size of an adaptive method below which steps vanish in the round-off of the time. */
+static inline double pw_least_step (const pw_run *r) {
+  return 16 * DBL_EPSILON * fmax (fabs (r->t), 1e-6 * r->w->scale.time);
+}
 
 /* ---- Parts of opening and advancing a run (run.c) ---- */
 

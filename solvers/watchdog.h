@@ -26,7 +26,7 @@ typedef struct {
   double unresolved, low, stride, progress; /* walks past a change point */
   double floor, crossing, straight;         /* sines where branches cross; cosine of the angle of a straight passage */
   double resolved;                          /* step over the distance of branches */
-  double lands;                             /* sine at the end of a step over that at its beginning */
+  double ends_singular;                     /* sine at the end of a step over that at its beginning */
   double agree, agree_best;                 /* difference between two divisions of a step */
   double sample, sample_best;               /* the same for a sample inside a step */
   double loosened, loose;                   /* independence of the active rows */

@@ -65,7 +65,7 @@ static inline int dynamics_solve (pw_run *r, const double *v, double *a, double 
   int status = pw_saddle_factor (r->saddle);
   if (status == PW_OK) pw_saddle_solve (r->saddle, f, lambda, a, lambda);
   *near = pw_watchdog_near (r);
-  if (*near && r->geometry.sine <= r->refuse) return PW_RETRY;
+  if (*near && r->geometry.sine <= r->refused_sine) return PW_RETRY;
   if (status == PW_OK && pw_saddle_below (r->saddle, r->limits.refine)) dynamics_refine (r, v, a, lambda);
   return status;
 }

@@ -17,8 +17,8 @@
  *
  *   err = (gamma/h B - F_y)^-1 (F (t, y) + B sum_i e_i Z_i / h)            of order h^4
  *
- * in units of tolerances of 0.05 rtol^(2/3), which makes the error of order 5 about proportional to rtol.  Multipliers are
- * not tested.  The step follows from the errors of this and the previous step (Gustafsson 1994).
+ * in units of tolerances of 0.05 rtol^(2/3), which makes the error of order 5 about proportional to rtol.  Multipliers
+ * are not tested.  The step follows from the errors of this and the previous step (Gustafsson 1994).
  *
  * Accelerations and multipliers at the ends of steps and in samples are computed from positions and velocities, which
  * are more accurate than the multipliers of the stages.  Work and losses are integrated with the stages. */
@@ -204,7 +204,8 @@ static double radau_next (const radau *d, double h, double error, int rejected) 
   return d->rate <= RADAU_KEEP && next >= h && next <= RADAU_LONGER * h ? h : next;
 }
 
-/* A step of size h; *error: in units of the tolerances, INFINITY if its equations could not be solved or it is fixed. */
+/* A step of size h; *error: in units of the tolerances, INFINITY if its equations could not be solved or it is
+ * fixed. */
 static int radau_try (pw_run *r, double h, double t1, int again, double *error) {
   *error = INFINITY;
   r->near_singular = 0;
@@ -238,8 +239,8 @@ static int radau_accept_adaptive (pw_run *r, double h, double t1, double error, 
   return PW_OK;
 }
 
-/* In index3 the state reached violates g = 0 and J v = eta within the tolerances.  A step of size h corrects positions by
- * velocities of that size over h: no step, however small, has a smaller error, unless the state is projected. */
+/* In index3 the state reached violates g = 0 and J v = eta within the tolerances.  A step of size h corrects positions
+ * by velocities of that size over h: no step, however small, has a smaller error, unless the state is projected. */
 static void radau_project_start (pw_run *r) {
   radau *d = r->data;
   double *q = d->now.y, *v = q + d->dae.n;
@@ -251,12 +252,11 @@ static void radau_project_start (pw_run *r) {
 static int radau_advance (pw_run *r, double t_end, pw_error *error) {
   radau *d = r->data;
   if (pw_fixed_steps (r)) return radau_advance_fixed (r, t_end, error);
-  double stop = fmin (t_end, r->breakpoint), least = 16 * DBL_EPSILON * fmax (fabs (r->t), 1e-6 * r->w->scale.time),
-         err;
+  double stop = fmin (t_end, r->breakpoint), err;
   for (int rejected = 0, status = PW_OK;; rejected++) {
     int cut = r->t + d->h > stop - 0.01 * d->h;
     double h = cut ? stop - r->t : d->h, t1 = cut ? stop : r->t + h;
-    if (!cut && !(h > least)) return radau_fail (r, status, h, error);
+    if (!cut && !(h > pw_least_step (r))) return radau_fail (r, status, h, error);
     if (rejected > 0 && (status = pw_run_check_limits (r, error)) != PW_OK) return status;
     status = radau_try (r, h, t1, rejected > 0 || d->last_h == 0, &err);
     if (status == PW_OK && err < 1) status = radau_accept_adaptive (r, h, t1, err, rejected, cut);

@@ -1,5 +1,5 @@
-/* Coefficients of the Radau IIA method of order 5 (Hairer & Wanner 1996, section IV.8), for radau and for derivatives of runs;
- * A and gamma were computed with 60 digits from the nodes c. */
+/* Coefficients of the Radau IIA method of order 5 (Hairer & Wanner 1996, section IV.8), for radau and for derivatives
+ * of runs; A and gamma were computed with 60 digits from the nodes c. */
 #ifndef PW_RADAU_COEFFICIENTS_H
 #define PW_RADAU_COEFFICIENTS_H
 

@@ -1,5 +1,5 @@
-/* The stages of a step of radau: equations, matrices, Newton's iteration, error estimates; see radau.c.  T and the complex
- * eigenvalues of A^-1 were computed with 60 digits from the nodes c. */
+/* The stages of a step of radau: equations, matrices, Newton's iteration, error estimates; see radau.c.  T and the
+ * complex eigenvalues of A^-1 were computed with 60 digits from the nodes c. */
 #include <float.h>
 #include <math.h>
 #include <stdlib.h>
@@ -210,8 +210,8 @@ static int radau_correct (pw_run *r, double h, double t1, double *size, double *
   return PW_OK;
 }
 
-/* 1: converged; 0: continue; -1: it will not converge in time.  size: of the correction, before: of the previous one; rough: in
- * units of round-off.  The tests are those of Hairer & Wanner 1996, section IV.8, and one for round-off. */
+/* 1: converged; 0: continue; -1: it will not converge in time.  size: of the correction, before: of the previous one;
+ * rough: in units of round-off.  The tests are those of Hairer & Wanner 1996, section IV.8, and one for round-off. */
 static int radau_converged (pw_run *r, int done, double size, double before, double rough) {
   radau *d = r->data;
   const int most = pw_fixed_steps (r) ? 50 : 7;

@@ -11,7 +11,8 @@
  * one by one (ledger.c). */
 static int several_suits (const pw_run *r) {
   const struct pw_method_data *d = r->data;
-  if (r->method->advance != pw_rk_advance || d == NULL || !pw_fixed_steps (r) || d->held || d->null_space || d->split)
+  if (r->method->advance != pw_rk_advance || d == NULL || !pw_fixed_steps (r) || d->holds_signals ||
+      d->uses_nullspace || d->off_grid)
     return 0;
   if (d->projects && !(d->every == 1 && d->projector.by_mass && !d->projector.alone)) return 0;
   return pw_specialised_suits (r) && r->redundant == 0 && r->alpha + r->beta == 0 && !r->settings.ledger &&
@@ -99,9 +100,9 @@ static int several_plan (pw_run *r, double t, double t_end, pw_scene_steps *x) {
                          .ledger0 = d->last.ledger,
                          .rate = r->rate,
                          .rate0 = d->last.rate,
-                         .V = d->V,
-                         .A = d->A,
-                         .R = d->R,
+                         .V = d->stage_v,
+                         .A = d->stage_a,
+                         .R = d->stage_rate,
                          .configuration = r->w->configuration,
                          .J = r->w->J,
                          .watch = several_watch (r) };

@@ -156,7 +156,7 @@ static int run_open (pw_run *r, const char *method, const pw_settings *settings,
   const pw_settings none = { 0 };
   if (settings == NULL) settings = &none;
   r->limits = pw_watchdog_limits;
-  r->refuse = r->limits.rank;
+  r->refused_sine = r->limits.rank;
   if (run_allocate (r) != PW_OK) return pw_fail_memory (r->s, error);
   if (run_initial_values (r, settings, error) != PW_OK ||
       pw_parse_options (method, settings->methods, &r->method, &r->stabilisation, r->option, error) != PW_OK)

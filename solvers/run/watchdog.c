@@ -154,8 +154,8 @@ static int watchdog_unresolved (pw_run *r, double off, double part) {
          row < r->s->holonomic;
 }
 
-/* Fails where accelerations jump, or residuals are large, while they may decide the branch.  Such a turn is a corner whose radius
- * grows with the residual, so that its accelerations need not jump. */
+/* Fails where accelerations jump, or residuals are large, while they may decide the branch.  Such a turn is a corner
+ * whose radius grows with the residual, so that its accelerations need not jump. */
 static int watchdog_check_turn (pw_run *r, double now, pw_error *error) {
   const pw_watchdog *limit = &r->limits;
   double off = watchdog_residual (r), before = fmax (r->previous_norm, limit->least_turn);

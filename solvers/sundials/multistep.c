@@ -86,10 +86,10 @@ static int multistep_complete (multistep_data *d, double t, int project, double 
   pw_run *r = d->sun.run;
   int near = r->near_singular;
   pw_statistics keep = r->statistics;
-  r->refuse = 0;
+  r->refused_sine = 0;
   int status = project ? multistep_project (d, t, q, v) : PW_OK;
   if (status == PW_OK) status = pw_run_accelerate (r, t, q, v, a, lambda);
-  r->refuse = r->limits.rank;
+  r->refused_sine = r->limits.rank;
   r->statistics = keep;
   r->near_singular = near;
   return status;
@@ -213,10 +213,10 @@ static int multistep_fail (multistep_data *d, int flag, pw_error *error) {
 static void multistep_evaluate (multistep_data *d) {
   pw_run *r = d->sun.run;
   pw_statistics keep = r->statistics;
-  r->refuse = 0;
+  r->refused_sine = 0;
   d->evaluated = pw_run_accelerate_evaluated (r, r->v, r->a, r->lambda) == PW_OK;
   if (!d->evaluated) memcpy (r->lambda, d->lambda, (size_t)r->s->rows * sizeof *r->lambda);
-  r->refuse = r->limits.rank;
+  r->refused_sine = r->limits.rank;
   r->statistics = keep;
 }
 
