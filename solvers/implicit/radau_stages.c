@@ -296,7 +296,7 @@ int pw_radau_estimate (pw_run *r, double h, int again, double *error) {
 
 int pw_radau_work (pw_run *r, double h, double t1, double *error) {
   radau *d = r->data;
-  int entries = r->s->entries, again = !d->dae.velocities && pw_ledger_reacts (r->s);
+  int entries = r->s->entries, again = !d->dae.velocities && pw_ledger_uses_multipliers (r->s);
   double sum = 0;
   for (int k = 0; k < STAGES; k++) memset (d->now.w[k], 0, (size_t)entries * sizeof (double));
   for (int k = 0; k < STAGES; k++) {

@@ -43,7 +43,7 @@ static int divide (pw_run *r, const pw_step_start *from, int status, double t1, 
   static const double part[] = { 0.382, 0.681, 0.209, 0.847, 0.127, 0.541, 0.943, 0.302, 0.764, 0.891 };
   const struct pw_method_data *d = r->data;
   const size_t bytes = pw_state_length (r->s) * sizeof *d->q;
-  double least = INFINITY, energy = fmax (r->energy_scene, r->exchanged);
+  double least = INFINITY, energy = fmax (r->scene_energy, r->exchanged);
   int has_result = status == PW_OK, is_step = from->q == r->q; /* otherwise it is a sample */
   const double best = is_step ? r->limits.agree_best : r->limits.sample_best;
   const double acceptable = is_step ? r->limits.agree : r->limits.sample;
@@ -72,7 +72,7 @@ int pw_rk_at (pw_run *r, double t, pw_error *error) {
   const pw_step_start *from = &d->last;
   if (t > r->t || t < from->t) return pw_fail_outside (r, from->t, t, error);
   if (t == r->t) {
-    pw_show_reached (r);
+    pw_sample_reached (r);
     return PW_OK;
   }
   const pw_statistics statistics = r->statistics;

@@ -150,7 +150,7 @@ double pw_rk_distance (const pw_run *r) {
 int pw_rk_fail (pw_run *r, int status, double h, pw_error *error) {
   int finite = pw_is_finite_state (r, r->data->q, r->data->v) && pw_is_finite_state (r, r->q, r->v);
   int has_projector = r->data->projects || r->data->projects_positions;
-  int contradictory = has_projector && finite ? r->data->projector.against : -1;
+  int contradictory = has_projector && finite ? r->data->projector.contradictory_row : -1;
   char element[120];
   if (status < 0) return pw_fail_signal (r->t, error);
   if (contradictory >= 0)

@@ -26,7 +26,7 @@ struct pw_method_data {
   const pw_tableau *tableau;
   pw_rk_row row[PW_RK_STAGES];            /* [i] stage i > 0; [0] the new state, as stage 0 needs no weights */
   pw_rk_row estimate[3];                  /* e, e3, e6; the last weight is that of the new state's derivative */
-  int projects, every;                    /* 1: coordinate projection, after every so many steps */
+  int projects, every;                    /* 1: coordinate projection; steps from one to the next */
   int uses_nullspace, projects_positions; /* 1: stabilisation nullspace; it also projects positions */
   int holds_signals;                      /* 1: signals of forces are constant over a step */
   pw_projector projector;

@@ -14,7 +14,7 @@ static int several_suits (const pw_run *r) {
   if (r->method->advance != pw_rk_advance || d == NULL || !pw_fixed_steps (r) || d->holds_signals ||
       d->uses_nullspace || d->off_grid)
     return 0;
-  if (d->projects && !(d->every == 1 && d->projector.by_mass && !d->projector.alone)) return 0;
+  if (d->projects && !(d->every == 1 && d->projector.by_mass && !d->projector.ignores_inactive)) return 0;
   return pw_specialised_suits (r) && r->redundant == 0 && r->alpha + r->beta == 0 && !r->settings.ledger &&
          !r->interrupted && r->stalled == 0 && !(r->geometry.saddle && r->geometry.alert) &&
          r->statistics.steps >= PW_CHECK_INTERVAL;
@@ -28,7 +28,7 @@ static int several_count (const pw_run *r, double t, double t_end) {
   const double h = r->settings.step, stop = fmin (t_end, r->breakpoint) - 1e-9 * h, tiny = 128 * DBL_EPSILON;
   int most = PW_CHECK_INTERVAL - (int)(r->statistics.steps % PW_CHECK_INTERVAL), n = 0;
   double reached = r->t;
-  while (n < most && reached < t && reached < t_end && reached - r->settings.t < 2 * r->mark_time) {
+  while (n < most && reached < t && reached < t_end && reached - r->settings.t < 2 * r->speed_record.time) {
     double next = d->counter.base + (double)(d->counter.count + n + 1) * h;
     if (!(next <= stop && h > tiny * fabs (next))) break;
     reached = next, n++;
@@ -122,7 +122,7 @@ static int several_finish (pw_run *r, const pw_scene_steps *x, pw_error *error) 
   if (x->done < x->count && pw_evaluate_J_at (r->w, r->t, r->q, r->v) != PW_OK) status = pw_fail_signal (r->t, error);
   if (x->done > 0 && status == PW_OK) {
     status = pw_run_check_resolution (r, error);
-    if (status == PW_OK) pw_ledger_note (r);
+    if (status == PW_OK) pw_ledger_record (r);
   }
   return pw_run_annotate_error (r, status, error);
 }

@@ -74,7 +74,7 @@ int pw_fail_outside (const pw_run *r, double t0, double t, pw_error *error) {
 int pw_sample_last_step (pw_run *r, double t0, double t, pw_interpolate *interpolate, void *method, pw_error *error) {
   if (t > r->t || t < t0) return pw_fail_outside (r, t0, t, error);
   if (t == r->t) {
-    pw_show_reached (r);
+    pw_sample_reached (r);
     return PW_OK;
   }
   const pw_statistics statistics = r->statistics;

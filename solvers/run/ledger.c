@@ -40,13 +40,13 @@ void pw_ledger_begin (pw_run *r) {
   r->potential0 = pw_potential (r->w);
   r->exchanged = pw_kinetic (r->s, r->v);
   r->energy0 = r->exchanged + r->potential0;
-  r->energy_scene = ledger_scene_energy (r);
-  if (r->energy_scene == 0 && r->s->entries > 0) r->energy_scene = ledger_massless_energy (r);
+  r->scene_energy = ledger_scene_energy (r);
+  if (r->scene_energy == 0 && r->s->entries > 0) r->scene_energy = ledger_massless_energy (r);
 }
 
 /* Samples the first PW_CHECK_INTERVAL steps and every PW_CHECK_INTERVAL-th: sufficient for a scale, at negligible
  * cost. */
-void pw_ledger_note (pw_run *r) {
+void pw_ledger_record (pw_run *r) {
   double power = 0;
   if (r->statistics.steps > PW_CHECK_INTERVAL && r->statistics.steps % PW_CHECK_INTERVAL != 0) return;
   double exchanged = fmax (pw_kinetic (r->s, r->v), fabs (pw_potential (r->w) - r->potential0));
@@ -74,7 +74,7 @@ int pw_project_with_energy (pw_projector *p, pw_run *r, double t, double *q, dou
   return status;
 }
 
-int pw_ledger_reacts (const pw_system *s) {
+int pw_ledger_uses_multipliers (const pw_system *s) {
   int reacts = 0;
   for (int i = 0; i < s->entries; i++) reacts |= s->batch[s->entry[i].batch].kind->rows > 0;
   return reacts;
@@ -88,7 +88,7 @@ double pw_ledger_tolerance (const pw_run *r, double h) {
   const pw_settings *set = &r->settings;
   double work = 0, rtol = fmax (set->rtol, set->atol > 0 ? set->atol / fmax (r->s->scale.length, 1) : 0);
   for (int i = 0; i < r->s->entries; i++) work += fabs (r->ledger[i]);
-  double energy = fmax (fmax (r->energy_scene, r->exchanged), fmin (work, r->power * r->w->scale.time));
+  double energy = fmax (fmax (r->scene_energy, r->exchanged), fmin (work, r->power * r->w->scale.time));
   double tolerance = share * rtol * energy + round_off * fabs (h) * r->power + 16 * DBL_EPSILON * work;
   return tolerance > 0 && isfinite (tolerance) ? tolerance : DBL_MAX;
 }

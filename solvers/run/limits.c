@@ -31,7 +31,9 @@ static double limits_speed (const pw_run *r, int *state) {
 
 double pw_run_growth (const pw_run *r, int *state, double *power) {
   double now = limits_speed (r, state), span = r->t - r->settings.t;
-  *power = r->before_time > 0 && r->before_speed > 0 ? log (now / r->before_speed) / log (span / r->before_time) : 0;
+  *power = r->earlier_record.time > 0 && r->earlier_record.speed > 0
+               ? log (now / r->earlier_record.speed) / log (span / r->earlier_record.time)
+               : 0;
   return now > LIMITS_FAST && *power > LIMITS_GROWTH ? now : 0;
 }
 
@@ -39,9 +41,9 @@ double pw_run_growth (const pw_run *r, int *state, double *power) {
 static int limits_mark (pw_run *r) {
   int state;
   double span = r->t - r->settings.t;
-  if (span < 2 * r->mark_time) return 0;
-  r->before_time = r->mark_time, r->before_speed = r->mark_speed;
-  r->mark_time = span, r->mark_speed = limits_speed (r, &state);
+  if (span < 2 * r->speed_record.time) return 0;
+  r->earlier_record.time = r->speed_record.time, r->earlier_record.speed = r->speed_record.speed;
+  r->speed_record.time = span, r->speed_record.speed = limits_speed (r, &state);
   return 1;
 }
 

@@ -90,11 +90,11 @@ static int run_restart_method (pw_run *r, pw_error *error) {
   return status == PW_OK ? r->method->restart (r, error) : status;
 }
 
-int pw_run_renew (pw_run *r, int fresh, pw_error *error) {
+int pw_run_renew (pw_run *r, pw_references references, pw_error *error) {
   int status = pw_run_open_saddle (r, error);
   r->geometry.alert = 1;
   if (status == PW_OK) status = pw_run_evaluate (r, error);
-  if (status == PW_OK && fresh)
+  if (status == PW_OK && references == PW_NEW_REFERENCES)
     pw_run_set_references (r);
   else if (status == PW_OK)
     pw_watchdog_begin (r);
@@ -120,7 +120,7 @@ static int run_reselect (pw_run *r, pw_error *error) {
   if (pw_evaluate_J_at (r->w, r->t, r->q, r->v) != PW_OK) return pw_fail_signal (r->t, error);
   int other = pw_rank_reselect (r);
   if (other < 0) return pw_fail_memory (r->s, error);
-  return other ? pw_run_renew (r, 1, error) : PW_OK;
+  return other ? pw_run_renew (r, PW_NEW_REFERENCES, error) : PW_OK;
 }
 
 /* Computes r->independence with the J last evaluated. */
@@ -168,7 +168,7 @@ int pw_run_advance (pw_run *r, double t_end, pw_error *error) {
   if (status == PW_STOPPED) return status;
   if (status == PW_OK) status = pw_run_watchdog (r, error);
   if (status == PW_OK) status = pw_run_check_resolution (r, error);
-  if (status == PW_OK) pw_ledger_note (r);
+  if (status == PW_OK) pw_ledger_record (r);
   if (status == PW_OK) status = run_check_progress (r, before, error);
   if (status != PW_OK) return pw_run_annotate_error (r, status, error);
   run_check_rows (r);

@@ -31,11 +31,22 @@ static void checkpoint_statistics (pw_statistics *s, pw_archive *a) {
 
 static void checkpoint_state (pw_run *r, pw_archive *a) {
   size_t n = (size_t)r->s->coords * sizeof (double), entries = (size_t)r->s->entries * sizeof (double);
-  double *const number[] = {
-    &r->t,         &r->breakpoint,      &r->projected,     &r->energy0,      &r->potential0,     &r->exchanged,
-    &r->power,     &r->reference_level, &r->previous_norm, &r->independence, &r->reselect_below, &r->geometry.typical,
-    &r->mark_time, &r->mark_speed,      &r->before_time,   &r->before_speed
-  };
+  double *const number[] = { &r->t,
+                             &r->breakpoint,
+                             &r->projected,
+                             &r->energy0,
+                             &r->potential0,
+                             &r->exchanged,
+                             &r->power,
+                             &r->reference_level,
+                             &r->previous_norm,
+                             &r->independence,
+                             &r->reselect_below,
+                             &r->geometry.typical,
+                             &r->speed_record.time,
+                             &r->speed_record.speed,
+                             &r->earlier_record.time,
+                             &r->earlier_record.speed };
   for (size_t i = 0; i < sizeof number / sizeof *number; i++) pw_archive_bytes (a, number[i], sizeof (double));
   pw_archive_bytes (a, r->q, n);
   pw_archive_bytes (a, r->v, n);
@@ -56,7 +67,7 @@ static int checkpoint_continue (pw_run *r, pw_archive *a, pw_error *error) {
   if (pw_evaluate_J_at (r->w, r->t, r->q, r->v) != PW_OK) return pw_fail_signal (r->t, error);
   r->near_singular = 0;
   if (r->method->serialise == NULL) r->statistics.restarts++;
-  int status = pw_run_renew (r, 0, error);
+  int status = pw_run_renew (r, PW_KEEP_REFERENCES, error);
   if (status == PW_OK && r->method->serialise) r->method->serialise (r, a);
   if (status == PW_OK && a->failed) return pw_fail (error, PW_INPUT, "the saved state is not of this run");
   return status;

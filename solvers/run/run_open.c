@@ -142,7 +142,7 @@ static int run_check_finite (pw_run *r, pw_error *error) {
 /* A missing derivative of an element type would give a method that uses it a wrong matrix. */
 static int run_check_derivatives (pw_run *r, const char *method, pw_error *error) {
   char block[200];
-  if (!r->differentiates) return PW_OK;
+  if (!r->uses_derivatives) return PW_OK;
   int found = pw_find_missing_block (r->w, r->t, r->q, r->v, block, sizeof block);
   if (found == PW_RESOURCE) return pw_fail_memory (r->s, error);
   if (found == 0) return pw_update_kinematics (r->w, r->t, r->q, r->v) == PW_OK ? PW_OK : pw_fail_signal (r->t, error);
@@ -177,7 +177,7 @@ static int run_open (pw_run *r, const char *method, const pw_settings *settings,
   pw_run_set_reference_level (r);
   pw_ledger_begin (r);
   pw_forget_residuals (r);
-  pw_note_residuals (r);
+  pw_record_residuals (r);
   status = pw_run_look_ahead (r, error);
   if (status != PW_OK) return status;
   if (pw_stabilised_by (r, PW_BAUMGARTE)) r->alpha = pw_run_option (r, "alpha"), r->beta = pw_run_option (r, "beta");

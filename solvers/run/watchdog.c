@@ -197,7 +197,7 @@ static int watchdog_check_jump (pw_run *r, pw_error *error) {
 
 int pw_run_watchdog (pw_run *r, pw_error *error) {
   const pw_statistics *s = &r->statistics;
-  pw_note_residuals (r);
+  pw_record_residuals (r);
   double lost = pw_stabilised_by (r, PW_UNSTABILISED) ? r->limits.lost_unstabilised : r->limits.lost;
   if (watchdog_exceeds (s->position, s->velocity, lost) || (r->redundant && watchdog_contradicts (r)))
     return watchdog_fail_lost (r, error);

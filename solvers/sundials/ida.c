@@ -170,7 +170,7 @@ static int ida_work (ida_data *d, int status) {
   pw_run *r = d->sun.run;
   int order = 1;
   const double *lambda = r->lambda;
-  if (status == PW_OK && d->dae.velocities && pw_ledger_reacts (r->s)) {
+  if (status == PW_OK && d->dae.velocities && pw_ledger_uses_multipliers (r->s)) {
     pw_run_accelerate_updated (r, r->v, r->a_at, r->lambda_at);
     lambda = r->lambda_at;
   }

@@ -199,9 +199,9 @@ static int multistep_fail (multistep_data *d, int flag, pw_error *error) {
   char element[120];
   int singular = flag == CV_FIRST_RHSFUNC_ERR || flag == CV_REPTD_RHSFUNC_ERR || flag == CV_UNREC_RHSFUNC_ERR;
   if (!r->stopped) multistep_count (d);
-  if (!r->stopped && flag == CV_REPTD_PROJFUNC_ERR && d->projector.against >= 0)
+  if (!r->stopped && flag == CV_REPTD_PROJFUNC_ERR && d->projector.contradictory_row >= 0)
     return pw_fail (error, PW_METHOD, "t = %.6g s: %s contradicts the other constraints", r->t,
-                    pw_system_row_name (r->s, d->projector.against, element, sizeof element));
+                    pw_system_row_name (r->s, d->projector.contradictory_row, element, sizeof element));
   if (flag == CV_PROJFUNC_FAIL) flag = CV_RHSFUNC_FAIL; /* a signal failed */
   return pw_sun_fail (&d->sun, flag, singular,
                       flag == CV_REPTD_PROJFUNC_ERR ? "the projection does not converge however small the step" : NULL,
@@ -225,7 +225,7 @@ static void multistep_evaluate (multistep_data *d) {
 static int multistep_work (multistep_data *d) {
   pw_run *r = d->sun.run;
   int order = 1;
-  if (d->sun.klu && pw_ledger_reacts (r->s)) multistep_evaluate (d);
+  if (d->sun.klu && pw_ledger_uses_multipliers (r->s)) multistep_evaluate (d);
   pw_ledger_rates (r, r->lambda, r->rate);
   CVodeGetLastOrder (d->cvode, &order);
   if (!pw_quadrature_step (&d->sun.quadrature, r, order)) return PW_OK;
@@ -268,7 +268,7 @@ static int multistep_at (pw_run *r, double t, pw_error *error) {
   if (t == r->t) {
     if (!d->evaluated) status = multistep_complete (d, pw_before_breakpoint (r, t), 0, r->q, r->v, r->a, r->lambda);
     d->evaluated = status == PW_OK;
-    if (status == PW_OK) pw_show_reached (r);
+    if (status == PW_OK) pw_sample_reached (r);
   } else {
     if (t < r->t && r->s->entries > 0) pw_quadrature_at (&d->sun.quadrature, r, t);
     int flag = multistep_interpolate (d, t);

@@ -100,7 +100,7 @@ static double step_size (const pw_variation *x, const pw_direction_copy *d) {
 
 static double step_size_energy (const pw_variation *x, const pw_direction_copy *d) {
   double energy = fmax (d->column->energy, step_energy (x, d->column->trial));
-  return fmax (energy, STEP_LEAST_ENERGY * fmax (x->r->exchanged, x->r->energy_scene) * step_size (x, d));
+  return fmax (energy, STEP_LEAST_ENERGY * fmax (x->r->exchanged, x->r->scene_energy) * step_size (x, d));
 }
 
 /* The largest relative error of all derivatives. */
