@@ -115,7 +115,8 @@ PW_INLINE int nullspace_eliminate (double *restrict K, double *restrict mu, int 
   return 1;
 }
 
-/* The same by LAPACK, with scaled rows and pivoting.  PW_RETRY if a pivot is round-off: dependent constraint equations. */
+/* The same by LAPACK, with scaled rows and pivoting.  PW_RETRY if a pivot is round-off: dependent constraint
+ * equations. */
 static int nullspace_eliminate_pivoted (pw_nullspace *b) {
   const double least = 1e-13; /* some 500 eps; the largest entry of a row is 1 */
   int m = b->rows;

@@ -75,7 +75,7 @@ static double adapt_mean_square (const pw_run *r, const double *eq, const double
   return sum / (2 * coords);
 }
 
-/* Mean square of an estimate before projection, divided by h^2; its errors go to r->q_at and r->v_at. */
+/* Mean square of an estimate before a projection, divided by h^2; stores its errors in r->q_at and r->v_at. */
 static double adapt_whole (pw_run *r, const pw_rk_row *e) {
   struct pw_method_data *d = r->data;
   adapt_estimate (e, d->stage_v, r->s->coords, r->q_at);
@@ -205,7 +205,7 @@ static int adapt_fail (pw_run *r, int status, double h, pw_error *error) {
 int pw_rk_advance_adaptive (pw_run *r, double t_end, pw_error *error) {
   struct pw_method_data *d = r->data;
   double stop = fmin (t_end, r->breakpoint), most_growth = ADAPT_GROWTH;
-  int status = PW_OK, project = d->projects && (r->statistics.steps + 1) % d->every == 0;
+  int status = PW_OK, project = pw_rk_projects_next (r);
   for (;;) {
     double t1 = r->t + d->h, added_energy = 0, err;
     int shortened = t1 > stop - 0.01 * d->h;

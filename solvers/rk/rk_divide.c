@@ -117,7 +117,7 @@ static int fixed_step_around (pw_run *r, int status, int ends_singular, double t
 
 int pw_rk_advance_fixed (pw_run *r, double t_end, pw_error *error) {
   struct pw_method_data *d = r->data;
-  int whole, project = d->projects && (r->statistics.steps + 1) % d->every == 0;
+  int whole, project = pw_rk_projects_next (r);
   const int was_off_grid = d->off_grid;
   double added_energy = 0, t1 = pw_step_end (r, &d->counter, t_end, &whole);
   double h = whole && !was_off_grid ? r->settings.step : t1 - r->t;

@@ -1,5 +1,5 @@
-/* Private to Runge-Kutta methods: stages and steps (rk_step.c), step-size control (rk_adapt.c), fixed steps and samples
- * (rk_divide.c), null-space method (nullspace.c). */
+/* Private to the explicit Runge-Kutta methods: stages and steps (rk_step.c), step-size control (rk_adapt.c), fixed
+ * steps and samples (rk_divide.c), null-space velocities (nullspace.c). */
 #ifndef PW_RK_STEP_H
 #define PW_RK_STEP_H
 
@@ -47,6 +47,11 @@ struct pw_method_data {
  * PW_RETRY: a smaller step may succeed. */
 int pw_rk_step (pw_run *r, double h, double t1, int project, double *added_energy);
 
+/* 1 if the next step ends with a projection. */
+static inline int pw_rk_projects_next (const pw_run *r) {
+  return r->data->projects && (r->statistics.steps + 1) % r->data->every == 0;
+}
+
 /* Makes the new state the state reached. */
 void pw_rk_accept (pw_run *r, double h, double t1, double added_energy);
 
@@ -67,7 +72,7 @@ void pw_rk_reset_step_size (pw_run *r);
 
 /* ---- Null-space velocities of a step, which satisfy the constraints by construction (nullspace.c) ---- */
 
-/* PW_INPUT if the scene has more than PW_NULLSPACE_MOST independent constraint equations; PW_RESOURCE. */
+/* Errors: PW_INPUT if the scene has more than PW_NULLSPACE_MOST independent constraint equations; PW_RESOURCE. */
 int pw_nullspace_open (pw_nullspace *b, pw_run *r, pw_error *error);
 void pw_nullspace_close (pw_nullspace *b);
 

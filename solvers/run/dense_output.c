@@ -35,7 +35,8 @@ void pw_dense_output_integrate_ledger (pw_dense_output *b, pw_run *r) {
   for (int i = 0; i < r->s->entries; i++) r->ledger[i] += 0.5 * (r->t - b->start.t) * (b->start.rate[i] + r->rate[i]);
 }
 
-/* Cubic Hermite interpolation at x in [0, 1] in a step of size h: values y0, y1 and derivatives dy0, dy1 at its ends. */
+/* Cubic Hermite interpolation at x in [0, 1] in a step of size h: values y0, y1 and derivatives dy0, dy1 at its
+ * ends. */
 static double dense_hermite (double x, double h, double y0, double dy0, double y1, double dy1) {
   double blend = x * x * (3 - 2 * x);
   return y0 + blend * (y1 - y0) + h * x * (1 - x) * ((1 - x) * dy0 - x * dy1);

@@ -27,7 +27,8 @@ typedef struct {
 int pw_dense_output_open (pw_dense_output *b, pw_run *r, pw_dense_projection projection, pw_error *error);
 void pw_dense_output_close (pw_dense_output *b);
 
-/* Integrates the ledger over the last step by the trapezoidal rule; kinematics and r->lambda must be those of its end. */
+/* Integrates the ledger over the last step by the trapezoidal rule; kinematics and r->lambda must be those of its
+ * end. */
 void pw_dense_output_integrate_ledger (pw_dense_output *b, pw_run *r);
 
 /* Reports that t is outside the last step, which begins at t0 (NaN: unknown).  PW_INPUT. */
