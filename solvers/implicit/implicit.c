@@ -1,4 +1,4 @@
-/* The driver of methods with an implicit step; see implicit.h. */
+/* The implicit methods with a fixed step: opening, scaling of the Newton matrix, steps; see implicit.h. */
 #include "implicit.h"
 #include <math.h>
 #include <stdlib.h>
@@ -47,23 +47,25 @@ int pw_implicit_restart (pw_run *r, pw_error *error) {
   return PW_OK;
 }
 
-void pw_implicit_scale (const pw_dae *x, double c, double e, double *row, double *column) {
+void pw_implicit_scale (const pw_dae *x, double c, double e, double *row_factor, double *column_factor) {
   const pw_system *s = x->tangent.run->s;
-  int n = x->n, third = x->velocities ? 0 : x->tangent.holonomic; /* rows of lambda that enforce positions */
+  int n = x->n,
+      g_rows = x->velocities ? 0 : x->tangent.holonomic; /* rows of lambda in which g = 0 replaces J v = eta */
   double mass = 0;
   for (int j = 0; j < n; j++) mass = fmax (mass, s->mass[j]);
   if (mass == 0) mass = 1;
   for (int j = 0; j < n; j++) {
-    row[j] = 1 / c, column[j] = 1;
-    row[n + j] = 1 / (c * e * mass), column[n + j] = c;
+    row_factor[j] = 1 / c, column_factor[j] = 1;
+    row_factor[n + j] = 1 / (c * e * mass), column_factor[n + j] = c;
   }
-  for (int i = 0; i < x->rows; i++) row[2 * n + i] = i < third ? 1 : 1 / c, column[2 * n + i] = c * e * mass;
-  for (int i = 2 * n + x->rows; i < x->size; i++) row[i] = 1, column[i] = c;
+  for (int i = 2 * n; i < 2 * n + x->rows; i++)
+    row_factor[i] = i - 2 * n < g_rows ? 1 : 1 / c, column_factor[i] = c * e * mass;
+  for (int i = 2 * n + x->rows; i < x->size; i++) row_factor[i] = 1, column_factor[i] = c;
 }
 
 /* ---- Advancing ---- */
 
-void pw_implicit_fill (pw_implicit *x, int size) {
+void pw_implicit_begin_matrix (pw_implicit *x, int size) {
   memset (x->value, 0, (size_t)x->dae.tangent.colptr[size] * sizeof *x->value);
   pw_scatter_begin (&x->dae.tangent.scatter, x->value);
 }
@@ -77,8 +79,8 @@ static int implicit_fail (pw_run *r, int status, double h, pw_error *error) {
                   status == PW_INPUT ? "the Newton matrix is singular" : "the iteration does not converge", h);
 }
 
-/* A whole step whose end lands on a singular configuration, where Newton's matrix is singular, is made longer, up to
- * `stop`.  Makes the step of size h to *t1, which it changes. */
+/* Makes a step of size h to *t1.  If it fails since its end is near a singular configuration, where Newton's matrix is
+ * singular, longer ones are tried, up to `stop`; *t1: the end of the step made. */
 static int implicit_step_around (pw_run *r, pw_implicit_step *step, double h, double stop, double *t1) {
   static const double longer[] = { 1.38, 1.76, 2.62 }; /* no multiples of each other, since configurations may recur */
   int status = step (r, h, *t1);

@@ -142,7 +142,7 @@ int pw_run_advance_towards (pw_run *r, double t, double t_end, pw_error *error) 
 
 /* ---- Several runs ---- */
 
-/* 0 if so many lanes are empty that the runs are faster one after the other: half of them or more. */
+/* 1 if the lanes used make up for the empty ones: with half of them empty, the runs are faster one after the other. */
 static int several_lanes_pay (int used, int lanes) {
   return 2 * used > lanes;
 }
