@@ -158,17 +158,11 @@ static inline int pw_stabilised_by (const pw_run *r, pw_stabilisation_kind kind)
   }
 
 /* Baumgarte's options, the same for all integrators. */
-#define PW_BAUMGARTE_OPTIONS                                                                   \
-  { .name = "alpha",                                                                           \
-    .with = "baumgarte",                                                                       \
-    .value = 10,                                                                               \
-    .domain = PW_NONNEGATIVE,                                                                  \
-    .unit = "1/s",                                                                             \
-    .about = "damping of the residuals" },                                                     \
-  {                                                                                            \
-    .name = "beta", .with = "baumgarte", .value = 10, .domain = PW_NONNEGATIVE, .unit = "1/s", \
-    .about = "stiffness of the position residuals"                                             \
-  }
+#define PW_BAUMGARTE_OPTION(NAME, ABOUT) \
+  { .name = NAME, .with = "baumgarte", .value = 10, .domain = PW_NONNEGATIVE, .unit = "1/s", .about = ABOUT }
+#define PW_BAUMGARTE_OPTIONS                                 \
+  PW_BAUMGARTE_OPTION ("alpha", "damping of the residuals"), \
+      PW_BAUMGARTE_OPTION ("beta", "stiffness of the position residuals")
 
 /* Options of the projection; pw_projector_open_by_options reads all but `every`. */
 #define PW_PROJECTION_OPTIONS                                                                         \

@@ -70,13 +70,18 @@ void pw_implicit_begin_matrix (pw_implicit *x, int size) {
   pw_scatter_begin (&x->dae.tangent.scatter, x->value);
 }
 
-/* Reports a failed step; the reason may be a singular configuration at its beginning. */
-static int implicit_fail (pw_run *r, int status, double h, pw_error *error) {
+int pw_implicit_fail (pw_run *r, int status, double h, pw_error *error) {
   if (status == PW_METHOD) return pw_fail_signal (r->t, error);
   if (status == PW_RESOURCE) return pw_fail (error, PW_RESOURCE, "t = %.6g s: out of memory in KLU", r->t);
   if (r->near_singular || pw_watchdog_near_state (r)) return pw_fail_singular (r, r->t, error);
-  return pw_fail (error, PW_METHOD, "t = %.6g s: %s; the step of %.6g s may be too large", r->t,
-                  status == PW_INPUT ? "the Newton matrix is singular" : "the iteration does not converge", h);
+  const char *reason = status == PW_INPUT ? "the Newton matrix is singular"
+                       : status == PW_OK  ? "the error test fails"
+                                          : "the iteration does not converge";
+  if (pw_fixed_steps (r))
+    return pw_fail (error, PW_METHOD, "t = %.6g s: %s; the step of %.6g s may be too large", r->t, reason, h);
+  if (status == PW_INPUT) return pw_fail (error, PW_METHOD, "t = %.6g s: %s", r->t, reason);
+  return pw_fail (error, PW_METHOD, "t = %.6g s: %s however small the step (rtol %.3g)", r->t, reason,
+                  r->settings.rtol);
 }
 
 /* Makes a step of size h to *t1.  If it fails since its end is near a singular configuration, where Newton's matrix is
@@ -104,7 +109,7 @@ int pw_implicit_advance (pw_run *r, double t_end, pw_implicit_step *step, void (
   r->near_singular = 0;
   int status = whole ? implicit_step_around (r, step, h, fmin (t_end, r->breakpoint), &t1) : step (r, h, t1);
   if (t1 > end) h = t1 - r->t, whole = 0;
-  if (status != PW_OK) return implicit_fail (r, status, h, error);
+  if (status != PW_OK) return pw_implicit_fail (r, status, h, error);
   pw_store_start (&x->last.start, r);
   memcpy (r->q, x->q1, n);
   memcpy (r->v, x->v1, n);

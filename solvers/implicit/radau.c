@@ -60,37 +60,29 @@ static int radau_restart (pw_run *r, pw_error *error) {
   return PW_OK;
 }
 
+static void radau_lay_out (pw_layout *l, double **const *array, size_t arrays, size_t length) {
+  for (size_t i = 0; i < arrays; i++) *array[i] = pw_layout_alloc (l, length, sizeof (double));
+}
+
 static int radau_allocate (pw_run *r) {
   radau *d = r->data;
-  size_t n = (size_t)d->dae.n + 3, size = (size_t)d->dae.size, entries = (size_t)r->s->entries;
-  enum { SINGLE = 17 };
-  pw_array array[SINGLE + 6 * STAGES] = { { &d->B, 2 * n },
-                                          { &d->unit, size },
-                                          { &d->tolerance, size },
-                                          { &d->newton_tolerance, size },
-                                          { &d->round_off, size },
-                                          { &d->row_factor, size },
-                                          { &d->column_factor, size },
-                                          { &d->complex_x, 2 * size },
-                                          { &d->Y, size },
-                                          { &d->rate, entries },
-                                          { &d->a_end, n },
-                                          { &d->now.y, size },
-                                          { &d->last.y, size },
-                                          { &d->now.a, n },
-                                          { &d->last.a, n },
-                                          { &d->now.ledger, entries },
-                                          { &d->last.ledger, entries } };
-  size_t count = SINGLE;
-  for (int k = 0; k < STAGES; k++) {
-    array[count++] = (pw_array){ &d->now.Z[k], size };
-    array[count++] = (pw_array){ &d->last.Z[k], size };
-    array[count++] = (pw_array){ &d->now.ledger_change[k], entries };
-    array[count++] = (pw_array){ &d->last.ledger_change[k], entries };
-    array[count++] = (pw_array){ &d->W[k], size };
-    array[count++] = (pw_array){ &d->F[k], size };
+  size_t length = (size_t)d->dae.size + 6; /* of all arrays of unknowns, with room for three more coordinates */
+  double **const of_unknowns[] = { &d->B,         &d->unit,       &d->tolerance,     &d->newton_tolerance,
+                                   &d->round_off, &d->row_factor, &d->column_factor, &d->Y,
+                                   &d->a_end,     &d->now.y,      &d->last.y,        &d->now.a,
+                                   &d->last.a };
+  double **const of_entries[] = { &d->rate, &d->now.ledger, &d->last.ledger };
+  for (pw_layout l = { 0 }; pw_layout_pass (&l, &d->memory);) {
+    radau_lay_out (&l, of_unknowns, sizeof of_unknowns / sizeof *of_unknowns, length);
+    radau_lay_out (&l, of_entries, sizeof of_entries / sizeof *of_entries, (size_t)r->s->entries);
+    for (int k = 0; k < STAGES; k++) {
+      double **const stage[] = { &d->now.Z[k], &d->last.Z[k], &d->W[k], &d->F[k] };
+      double **const ledger[] = { &d->now.ledger_change[k], &d->last.ledger_change[k] };
+      radau_lay_out (&l, stage, sizeof stage / sizeof *stage, length);
+      radau_lay_out (&l, ledger, sizeof ledger / sizeof *ledger, (size_t)r->s->entries);
+    }
+    d->complex_x = pw_layout_alloc (&l, 2 * length, sizeof (double));
   }
-  d->memory = pw_alloc_arrays (array, count);
   return d->memory ? PW_OK : PW_RESOURCE;
 }
 
@@ -132,18 +124,6 @@ static void radau_close (pw_run *r) {
 }
 
 /* ---- Advancing ---- */
-
-static int radau_fail (pw_run *r, int status, double h, pw_error *error) {
-  if (status == PW_METHOD) return pw_fail_signal (r->t, error);
-  if (status == PW_RESOURCE) return pw_fail (error, PW_RESOURCE, "t = %.6g s: out of memory in KLU", r->t);
-  if (r->near_singular || pw_watchdog_near_state (r)) return pw_fail_singular (r, r->t, error);
-  if (status == PW_INPUT) return pw_fail (error, PW_METHOD, "t = %.6g s: the Newton matrix is singular", r->t);
-  if (pw_fixed_steps (r))
-    return pw_fail (error, PW_METHOD,
-                    "t = %.6g s: the iteration does not converge; the step of %.6g s may be too large", r->t, h);
-  return pw_fail (error, PW_METHOD, "t = %.6g s: %s however small the step (rtol %.3g)", r->t,
-                  status == PW_OK ? "the error test fails" : "the iteration does not converge", r->settings.rtol);
-}
 
 /* Accelerations and multipliers at the state reached, where J is evaluated: from the state, or in singular
  * configurations those of the last stage. */
@@ -222,7 +202,7 @@ static int radau_advance_fixed (pw_run *r, double t_end, pw_error *error) {
   double err, t1 = pw_step_end (r, &d->counter, t_end, &whole), h = whole ? r->settings.step : t1 - r->t;
   int status = radau_try (r, h, t1, 0, &err);
   if (status == PW_OK) status = radau_accept (r, h, t1);
-  if (status != PW_OK) return radau_fail (r, status, h, error);
+  if (status != PW_OK) return pw_implicit_fail (r, status, h, error);
   pw_count_step (&d->counter, whole, t1);
   return PW_OK;
 }
@@ -256,13 +236,13 @@ static int radau_advance (pw_run *r, double t_end, pw_error *error) {
   for (int rejected = 0, status = PW_OK;; rejected++) {
     int shortened = r->t + d->h > stop - 0.01 * d->h;
     double h = shortened ? stop - r->t : d->h, t1 = shortened ? stop : r->t + h;
-    if (!shortened && !(h > pw_least_step (r))) return radau_fail (r, status, h, error);
+    if (!shortened && !(h > pw_least_step (r))) return pw_implicit_fail (r, status, h, error);
     if (rejected > 0 && (status = pw_run_check_limits (r, error)) != PW_OK) return status;
     status = radau_try (r, h, t1, rejected > 0 || d->previous_h == 0, &err);
     if (status == PW_OK && err < 1) status = radau_accept_adaptive (r, h, t1, err, rejected, shortened);
     if (status == PW_OK && err < 1) return PW_OK;
     int signal_fails = status == PW_METHOD && h < RADAU_SIGNAL_STEP * r->w->scale.time;
-    if (status == PW_RESOURCE || status == PW_INPUT || signal_fails) return radau_fail (r, status, h, error);
+    if (status == PW_RESOURCE || status == PW_INPUT || signal_fails) return pw_implicit_fail (r, status, h, error);
     r->statistics.rejected++;
     d->F_y_outdated = !d->F_y_current;
     if (status == PW_OK && rejected > 0) radau_project_start (r);

@@ -129,7 +129,7 @@ int pw_quadrature_step (pw_quadrature *x, pw_run *r, int order) {
   int entries = r->s->entries, last = PW_QUADRATURE_POINTS - 1;
   double *oldest = x->rate[last], h = r->t - x->t[0];
   memcpy (x->ledger0, r->ledger, (size_t)entries * sizeof (double));
-  if (!(h > 0)) return 0;
+  if (!(h > 0)) return PW_OK;
   memmove (x->t + 1, x->t, (size_t)last * sizeof *x->t);
   memmove (x->rate + 1, x->rate, (size_t)last * sizeof *x->rate);
   x->rate[0] = oldest;
@@ -142,7 +142,7 @@ int pw_quadrature_step (pw_quadrature *x, pw_run *r, int order) {
   x->refined = defect > of_method * tolerance || off > tolerance || quadrature_leaps (x);
   if (x->refined) quadrature_refine (x, r, x->t[1], x->t[0], tolerance);
   for (int e = 0; e < entries; e++) r->ledger[e] += x->sum[e];
-  return x->refined;
+  return x->refined ? pw_evaluate_J_at (r->w, pw_before_breakpoint (r, r->t), r->q, r->v) : PW_OK;
 }
 
 void pw_quadrature_at (pw_quadrature *x, pw_run *r, double t) {

@@ -29,8 +29,8 @@ void pw_quadrature_close (pw_quadrature *x);
 /* Restarts at the state reached; kinematics, the ledger and its rates must be up to date. */
 void pw_quadrature_restart (pw_quadrature *x, pw_run *r);
 
-/* Integrates the ledger over the step, of this order, to the state reached, where kinematics and r->rate must be up
- * to date.  Returns 1 if the kinematics were changed. */
+/* Integrates the ledger over the step, of this order, to the state reached, where kinematics, J and r->rate must be up to
+ * date, and stay so.  Returns as pw_update_kinematics. */
 int pw_quadrature_step (pw_quadrature *x, pw_run *r, int order);
 
 /* Stores the ledger at a time inside the last step in r->ledger_at. */

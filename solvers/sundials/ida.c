@@ -176,8 +176,7 @@ static int ida_work (ida_data *d, int status) {
   }
   pw_ledger_rates (r, lambda, r->rate);
   IDAGetLastOrder (d->memory, &order);
-  if (!pw_quadrature_step (&d->sun.quadrature, r, order)) return PW_OK;
-  return pw_evaluate_J_at (r->w, pw_before_breakpoint (r, r->t), r->q, r->v);
+  return pw_quadrature_step (&d->sun.quadrature, r, order);
 }
 
 /* ---- Opening ---- */

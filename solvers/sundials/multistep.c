@@ -228,8 +228,7 @@ static int multistep_work (multistep_data *d) {
   if (d->sun.klu && pw_ledger_uses_multipliers (r->s)) multistep_evaluate (d);
   pw_ledger_rates (r, r->lambda, r->rate);
   CVodeGetLastOrder (d->cvode, &order);
-  if (!pw_quadrature_step (&d->sun.quadrature, r, order)) return PW_OK;
-  return pw_evaluate_J_at (r->w, pw_before_breakpoint (r, r->t), r->q, r->v);
+  return pw_quadrature_step (&d->sun.quadrature, r, order);
 }
 
 /* Reads the current state from y and updates the ledger.  Its accelerations are those of the last iterate until
