@@ -1,4 +1,4 @@
-/* The energy of a run: energy exchanged, tolerance of work and losses, energy defect.  Every run keeps a ledger,
+/* The energy of a run and its ledger of work and losses: scales, tolerance, energy defect.  Every run keeps a ledger,
  * since its error takes part in step-size control. */
 #include <float.h>
 #include <math.h>
@@ -6,7 +6,7 @@
 #include "method.h"
 #include "rank.h"
 
-/* Kinetic energy of the scene moving by L and turning by 1 rad in the span of the run. */
+/* Kinetic energy [J] of the scene moving by L and turning by 1 rad in the span of the run. */
 static double ledger_scene_energy (const pw_run *r) {
   const pw_system *s = r->s;
   double sum = 0;
@@ -14,16 +14,16 @@ static double ledger_scene_energy (const pw_run *r) {
   return sum / (r->settings.span * r->settings.span);
 }
 
-/* Energy scale of a massless scene: work and losses in a time T at arbitrary velocities of about L / T and 1 / T, and
- * the change of potential energy by arbitrary displacements of about L and 1 rad.  Afterwards kinematics are those of
- * the state reached. */
+/* Energy scale [J] of a massless scene: work and losses in a time T at arbitrary velocities of about L / T and 1 / T,
+ * and the change of potential energy by arbitrary displacements of about L and 1 rad.  Afterwards kinematics are those
+ * of the state reached. */
 static double ledger_massless_energy (pw_run *r) {
   const pw_system *s = r->s;
   double *q = r->scratch, *v = q + s->coords + 3, *lambda = v + s->coords + 3, T = r->w->scale.time, sum = 0;
   for (int j = 0; j < s->coords; j++) {
-    double unit = pw_unit (s, j) * (1 + 0.37 * (j % 5)) / 2;
-    q[j] = r->q[j] + unit;
-    v[j] = unit / T;
+    double displacement = pw_unit (s, j) * (1 + 0.37 * (j % 5)) / 2;
+    q[j] = r->q[j] + displacement;
+    v[j] = displacement / T;
   }
   memset (lambda, 0, (size_t)s->rows * sizeof *lambda);
   if (pw_update_kinematics (r->w, r->t, q, v) == PW_OK) {
@@ -80,8 +80,8 @@ int pw_ledger_uses_multipliers (const pw_system *s) {
   return reacts;
 }
 
-/* If kinetic and potential energies are negligible, as for light bodies against friction, the scale is the work
- * done, limited to that of a time T since it grows without bound. */
+/* If kinetic and potential energies are negligible, as for light bodies against friction, the scale is the work done.
+ * This grows without bound, so it is limited to that of a time T. */
 double pw_ledger_tolerance (const pw_run *r, double h) {
   const double share = 5;         /* sqrt (25): as strict as for one state of 25 in a root mean square */
   const double round_off = 1e-11; /* of powers, due to multipliers */
@@ -94,23 +94,23 @@ double pw_ledger_tolerance (const pw_run *r, double h) {
 }
 
 double pw_run_energy_defect (const pw_run *r, const pw_sample *sample) {
-  double off = sample->kinetic + sample->potential - r->energy0 - sample->work + sample->loss;
+  double defect = sample->kinetic + sample->potential - r->energy0 - sample->work + sample->loss;
   double scale = fmax (r->exchanged, fmax (sample->kinetic, fabs (sample->potential - r->potential0)));
   scale = fmax (scale, ledger_scene_energy (r));
   if (scale == 0) scale = fmax (fabs (sample->work), sample->loss); /* no masses, no stored energy */
-  return off == 0 ? 0 : fabs (off) / scale;
+  return defect == 0 ? 0 : fabs (defect) / scale;
 }
 
 const char *pw_run_energy_advice (const pw_run *r, double defect) {
-  const double least = 1e-12; /* rtol that round-off allows */
-  const double of_step = 10;  /* times rtol: acceptable defect per step */
+  const double least_rtol = 1e-12; /* that round-off allows */
+  const double per_step = 10;      /* acceptable defect of a step over rtol */
   const pw_statistics *s = &r->statistics;
   int projects = pw_stabilised_by (r, PW_PROJECTION);
   if (!projects && fmax (s->position, s->velocity) > 0.1 * defect)
     return "the constraints have drifted; a method with projection satisfies them";
   if (pw_fixed_steps (r)) return "a smaller step, or another method, follows the motion better";
-  if (r->settings.rtol <= least) return "the tolerance cannot be much smaller; compare with another method";
-  if (defect > of_step * r->settings.rtol * (double)s->steps)
+  if (r->settings.rtol <= least_rtol) return "the tolerance cannot be much smaller; compare with another method";
+  if (defect > per_step * r->settings.rtol * (double)s->steps)
     return "that is more than the tolerance explains; compare with another method";
   return "a smaller tolerance, or another method, follows the motion better";
 }

@@ -1,4 +1,4 @@
-/* Building blocks of user-defined one-step methods (pinwheel-method.h). */
+/* The functions of pinwheel-method.h, for one-step methods of users. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -11,10 +11,10 @@ struct pw_method_data {
   int projects; /* with the projector of `last` */
   pw_step_counter counter;
   double end;         /* of the step whose size was last requested */
-  int whole;          /* 1: it has the full step size */
-  size_t length;      /* of an array */
+  int whole;          /* 1: that end is a multiple of the step size */
   double *a, *lambda; /* of the new state */
-  double *array;
+  size_t length;      /* of each of the method's arrays */
+  double *array;      /* all of them, one after the other */
   char *memory;
 };
 

@@ -8,17 +8,17 @@
 #include "rank.h"
 #include "util.h"
 
-/* 1 if the archive is from a run of these sizes. */
+/* Saves the sizes of the run, or reads those of a saved one; 1 if they are the same. */
 static int checkpoint_sizes (pw_run *r, pw_archive *a) {
   const int own[] = { r->s->coords, r->s->rows, r->s->entries, r->redundant };
   enum { SIZES = sizeof own / sizeof *own };
-  int good = 1;
+  int same = 1;
   for (int i = 0; i < SIZES; i++) {
     int size = own[i];
     pw_archive_bytes (a, &size, sizeof size);
-    good &= size == own[i];
+    same &= size == own[i];
   }
-  return good;
+  return same;
 }
 
 static void checkpoint_statistics (pw_statistics *s, pw_archive *a) {
@@ -55,11 +55,11 @@ static void checkpoint_state (pw_run *r, pw_archive *a) {
   pw_rank_serialise (r, a);
 }
 
-/* A file may be intact and yet not have been written by a run. */
+/* 1 if a run can have reached the state: a file may be intact and yet not have been written by a run. */
 static int checkpoint_plausible (const pw_run *r) {
-  int good = isfinite (r->t) && r->t >= r->settings.t;
-  for (int i = 0; i < r->s->coords; i++) good &= isfinite (r->q[i]) && isfinite (r->v[i]);
-  return good;
+  int plausible = isfinite (r->t) && r->t >= r->settings.t;
+  for (int i = 0; i < r->s->coords; i++) plausible &= isfinite (r->q[i]) && isfinite (r->v[i]);
+  return plausible;
 }
 
 /* Continues from the state in the run, after saving or loading; `a` is loading, at the method's own data, if any. */
@@ -81,19 +81,19 @@ int pw_run_save (pw_run *r, pw_archive *a, pw_error *error) {
   if (status != PW_OK) return status;
   checkpoint_sizes (r, a);
   checkpoint_state (r, a);
-  pw_archive own = { .used = a->used, .loading = 1 };
+  pw_archive saved = { .used = a->used, .loading = 1 }; /* to load what the method saves next */
   if (r->method->serialise) r->method->serialise (r, a);
   if (a->failed) return pw_fail_memory (r->s, error);
-  own.at = a->at;
-  own.size = a->used;
-  return checkpoint_continue (r, &own, error);
+  saved.at = a->at;
+  saved.size = a->used;
+  return checkpoint_continue (r, &saved, error);
 }
 
 int pw_run_load (pw_run *r, pw_archive *a, pw_error *error) {
   if (pw_require (r, "a run", error) != PW_OK) return PW_INPUT;
-  int good = checkpoint_sizes (r, a);
-  if (good) checkpoint_state (r, a);
-  if (!good || a->failed) return pw_fail (error, PW_INPUT, "the saved state is not of this run");
+  int same_sizes = checkpoint_sizes (r, a);
+  if (same_sizes) checkpoint_state (r, a);
+  if (!same_sizes || a->failed) return pw_fail (error, PW_INPUT, "the saved state is not of this run");
   if (!checkpoint_plausible (r))
     return pw_fail (
         error, PW_INPUT,

@@ -8,9 +8,10 @@
 #include "method.h"
 #include "util.h"
 
-#define RUN_LEAST_RTOL (100 * DBL_EPSILON)
-#define RUN_MOST_STEPS 1e15 /* of a fixed size: shorter ones vanish in the round-off of the time */
+#define RUN_LEAST_RTOL (100 * DBL_EPSILON) /* round-off exceeds smaller tolerances */
+#define RUN_MOST_STEPS 1e15                /* of a fixed size: shorter ones vanish in the round-off of the time */
 
+/* Checks the settings of a run and fills in defaults. */
 static int run_settings (pw_settings *to, const pw_settings *from, const pw_method *method, pw_error *error) {
   const struct {
     const char *name;
@@ -110,9 +111,9 @@ static int run_first_evaluation (pw_run *r, pw_error *error) {
   int large = (double)r->s->rows * r->s->coords > PW_RANK_MOST;
   if (sine < (large ? r->limits.dependent : r->limits.suspect)) {
     if (large) return pw_fail_singular (r, r->t, error);
-    int chosen = pw_rank_open (r, error);
-    if (chosen == PW_OK && r->redundant) chosen = pw_run_open_saddle (r, error);
-    if (chosen != PW_OK) return chosen;
+    status = pw_rank_open (r, error);
+    if (status == PW_OK && r->redundant) status = pw_run_open_saddle (r, error);
+    if (status != PW_OK) return status;
   }
   r->geometry.alert = 1;
   status = pw_run_evaluate (r, error);
@@ -125,21 +126,21 @@ static int run_first_evaluation (pw_run *r, pw_error *error) {
 static int run_check_finite (pw_run *r, pw_error *error) {
   char element[200];
   double sum = 0;
-  int bad = -1;
+  int infinite = -1; /* the first such acceleration */
   for (int j = 0; j < r->s->coords; j++) {
     sum += fabs (r->a[j]);
-    if (bad < 0 && !isfinite (r->a[j])) bad = j;
+    if (infinite < 0 && !isfinite (r->a[j])) infinite = j;
   }
   for (int i = 0; i < r->s->rows; i++) sum += fabs (r->lambda[i]);
   if (isfinite (sum) || pw_update_kinematics (r->w, r->t, r->q, r->v) != PW_OK) return PW_OK;
   if (pw_find_nonfinite (r->w, element, sizeof element))
     return pw_fail (error, PW_METHOD, "t = %.6g s: %s is not finite", r->t, element);
-  if (bad < 0) return PW_OK;
+  if (infinite < 0) return PW_OK;
   return pw_fail (error, PW_METHOD, "t = %.6g s: the acceleration of %s is not finite", r->t,
-                  pw_system_state_name (r->s, bad, element, sizeof element));
+                  pw_system_state_name (r->s, infinite, element, sizeof element));
 }
 
-/* A missing derivative of an element type would give a method that uses it a wrong matrix. */
+/* Refuses a method that needs a derivative that an element type lacks: its matrix would be wrong. */
 static int run_check_derivatives (pw_run *r, const char *method, pw_error *error) {
   char block[200];
   if (!r->uses_derivatives) return PW_OK;
