@@ -22,9 +22,8 @@ typedef struct {
   double regular;          /* sine that counts as regular, relative to the largest */
   double turn, least_turn; /* growth of the accelerations where a branch turns; least value before it */
   double drift_turn, drift_near; /* residual over squared sine: where accelerations grow; where they are no reference */
-  double drift_far,
-      drift_any;            /* residual above which a turn is suspected whatever the growth; then over squared sine */
-  double jump;              /* growth of the accelerations in a jump */
+  double drift_far, drift_any;   /* residual that is suspect without such growth; it over the squared sine */
+  double jump;                   /* growth of the accelerations in a jump */
   double lipschitz, growth; /* largest change of the sine per unit of motion; of step sizes, from one to the next */
   double unresolved, low;   /* sine within a step over those at its ends: corner not resolved; to be examined */
   double stride, progress;  /* of walks past a change point: length over the sine; least gain of a stride */

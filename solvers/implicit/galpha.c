@@ -330,7 +330,5 @@ const pw_method pw_method_galpha = {
   .options = galpha_options,
   .open = galpha_open,
   .advance = galpha_advance,
-  .at = pw_implicit_at,
-  .restart = pw_implicit_restart,
-  .close = pw_implicit_close,
+  PW_IMPLICIT_FUNCTIONS,
 };

@@ -51,9 +51,10 @@ int pw_implicit_advance (pw_run *r, double t_end, pw_implicit_step *step, void (
  * may be a singular configuration at its beginning. */
 int pw_implicit_fail (pw_run *r, int status, double h, pw_error *error);
 
-/* For the table of the method. */
+/* For the table of the method: PW_IMPLICIT_FUNCTIONS. */
 int pw_implicit_at (pw_run *r, double t, pw_error *error);
 int pw_implicit_restart (pw_run *r, pw_error *error);
 void pw_implicit_close (pw_run *r);
+#define PW_IMPLICIT_FUNCTIONS .at = pw_implicit_at, .restart = pw_implicit_restart, .close = pw_implicit_close
 
 #endif

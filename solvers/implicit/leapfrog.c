@@ -305,8 +305,6 @@ const pw_method pw_method_leapfrog = {
   .options = leapfrog_options,
   .open = leapfrog_open,
   .advance = leapfrog_advance,
-  .at = pw_implicit_at,
-  .restart = pw_implicit_restart,
-  .close = pw_implicit_close,
+  PW_IMPLICIT_FUNCTIONS,
   .serialise = leapfrog_serialise,
 };

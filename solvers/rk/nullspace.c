@@ -195,20 +195,16 @@ int pw_nullspace_accelerate (pw_run *r, const double *v, double *a, double *lamb
   return status;
 }
 
-/* The energy at (t, q) with the null-space velocities of w. */
-static int nullspace_energy (pw_nullspace *b, pw_run *r, double t, const double *q, const double *w, double *energy) {
-  memcpy (b->v, w, (size_t)r->s->coords * sizeof *w);
-  int status = pw_nullspace_velocities (b, r, t, q, b->v);
-  if (status == PW_OK) *energy = pw_energy (r, b->v);
-  return status;
-}
-
 int pw_nullspace_finalise (pw_nullspace *b, pw_projector *p, pw_run *r, double t, double *q, double *v,
                            double *added_energy) {
   int status = PW_OK;
   double before = 0;
   if (p == NULL || r->s->holonomic == 0) return pw_nullspace_velocities (b, r, t, q, v);
-  if (added_energy) status = nullspace_energy (b, r, t, q, v, &before);
+  if (added_energy) { /* before the projection, with the same null-space velocities */
+    memcpy (b->v, v, (size_t)r->s->coords * sizeof *v);
+    status = pw_nullspace_velocities (b, r, t, q, b->v);
+    if (status == PW_OK) before = pw_energy (r, b->v);
+  }
   if (status == PW_OK) status = pw_project_positions (p, r, t, q, v);
   if (status == PW_OK) status = nullspace_correct_velocities (b, r, v);
   if (status == PW_OK && added_energy) *added_energy += pw_energy (r, v) - before;

@@ -29,20 +29,14 @@ void pw_rk_serialise (pw_run *r, pw_archive *a);
 extern const pw_stabilisation pw_rk_stabilisations[];
 extern const pw_option pw_rk_options[]; /* the first one, `steps`, is only for tableaus with an error estimate */
 
-/* Defines pw_method_NAME with this tableau; the remaining arguments initialise the members that methods do not
- * share. */
-#define PW_RK_METHOD(NAME, tableau, ...)                                       \
-  static int NAME##_open (pw_run *r, pw_error *error) {                        \
-    return pw_rk_open (r, &tableau, error);                                    \
-  }                                                                            \
-  const pw_method pw_method_##NAME = { .name = #NAME,                          \
-                                       .stabilisations = pw_rk_stabilisations, \
-                                       .open = NAME##_open,                    \
-                                       .advance = pw_rk_advance,               \
-                                       .at = pw_rk_at,                         \
-                                       .restart = pw_rk_restart,               \
-                                       .close = pw_rk_close,                   \
-                                       .serialise = pw_rk_serialise,           \
-                                       __VA_ARGS__ }
+/* Defines pw_method_NAME with this tableau; the remaining arguments initialise the members that methods do not share. */
+#define PW_RK_METHOD(NAME, tableau, ...)                \
+  static int NAME##_open (pw_run *r, pw_error *error) { \
+    return pw_rk_open (r, &tableau, error);             \
+  }                                                     \
+  const pw_method pw_method_##NAME = { .name = #NAME, .open = NAME##_open, PW_RK_MEMBERS, __VA_ARGS__ }
+#define PW_RK_MEMBERS                                                                                         \
+  .stabilisations = pw_rk_stabilisations, .advance = pw_rk_advance, .at = pw_rk_at, .restart = pw_rk_restart, \
+  .close = pw_rk_close, .serialise = pw_rk_serialise
 
 #endif

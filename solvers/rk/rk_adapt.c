@@ -197,11 +197,6 @@ static void adapt_accept (pw_run *r, double h, double t1, double added_energy, d
   r->statistics.steps++;
 }
 
-static int adapt_fail (pw_run *r, int status, double h, pw_error *error) {
-  if (status != PW_OK) return pw_rk_fail (r, status, h, error);
-  return pw_fail (error, PW_METHOD, "t = %.6g s: the tolerances require a step below %.3g s", r->t, h);
-}
-
 int pw_rk_advance_adaptive (pw_run *r, double t_end, pw_error *error) {
   struct pw_method_data *d = r->data;
   double stop = fmin (t_end, r->breakpoint), most_growth = ADAPT_GROWTH;
@@ -211,7 +206,10 @@ int pw_rk_advance_adaptive (pw_run *r, double t_end, pw_error *error) {
     int shortened = t1 > stop - 0.01 * d->h;
     if (shortened) t1 = stop;
     double h = t1 - r->t;
-    if (!shortened && !(h > pw_least_step (r))) return adapt_fail (r, status, h, error);
+    if (!shortened && !(h > pw_least_step (r)))
+      return status != PW_OK
+                 ? pw_rk_fail (r, status, h, error)
+                 : pw_fail (error, PW_METHOD, "t = %.6g s: the tolerances require a step below %.3g s", r->t, h);
     if (most_growth < ADAPT_GROWTH && (status = pw_run_check_limits (r, error)) != PW_OK) return status;
     status = adapt_step (r, h, t1, project, r->settings.ledger ? &added_energy : NULL, &err);
     if (status < 0) return pw_rk_fail (r, status, h, error);

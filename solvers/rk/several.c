@@ -40,24 +40,16 @@ static int several_count (const pw_run *r, double t, double t_end) {
 static pw_scene_watch several_watchdog (const pw_run *r) {
   const pw_watchdog *limit = &r->limits;
   const pw_geometry *g = &r->geometry;
-  const int watched = g->saddle != NULL; /* a tree of holonomic joints is never singular */
   const double length = r->s->scale.length, time_squared = r->w->scale.time * r->w->scale.time;
-  return (pw_scene_watch){
-    .lost = pw_stabilised_by (r, PW_UNSTABILISED) ? limit->lost_unstabilised : limit->lost,
-    .sine = watched ? g->state_sine : INFINITY,
-    .reach = watched ? limit->lipschitz * g->typical : 0,
-    .near_sine = watched ? limit->near * g->typical : 0,
-    .growth = limit->growth,
-    .rank = limit->rank,
-    .regular = limit->regular * g->typical,
-    .drift = limit->drift_near,
-    .no_branch = 0.5 * limit->drift_near * limit->rank * limit->rank, /* 0.5: a margin for round-off */
-    .length = length,
-    .per_length = time_squared / length,
-    .per_angle = time_squared,
-    .moved = g->moved,
-    .reference = r->reference_level,
-  };
+  pw_scene_watch x = { .sine = INFINITY, .moved = g->moved, .reference = r->reference_level };
+  x.lost = pw_stabilised_by (r, PW_UNSTABILISED) ? limit->lost_unstabilised : limit->lost;
+  if (g->saddle) /* else a tree of holonomic joints, never singular */
+    x.sine = g->state_sine, x.reach = limit->lipschitz * g->typical, x.near_sine = limit->near * g->typical;
+  x.growth = limit->growth, x.rank = limit->rank, x.regular = limit->regular * g->typical;
+  x.drift = limit->drift_near;
+  x.no_branch = 0.5 * limit->drift_near * limit->rank * limit->rank; /* 0.5: a margin for round-off */
+  x.length = length, x.per_length = time_squared / length, x.per_angle = time_squared;
+  return x;
 }
 
 /* Updates the run's data after the steps taken. */
@@ -87,27 +79,13 @@ static int several_plan (pw_run *r, double t, double t_end, pw_scene_steps *x) {
   struct pw_method_data *d = r->data;
   int count = several_possible (r) ? several_count (r, t, t_end) : 0;
   if (count < 2) return 0;
-  *x = (pw_scene_steps){ .count = count,
-                         .project = d->projects,
-                         .stages = d->tableau->stages,
-                         .row = d->row,
-                         .c = d->tableau->c,
-                         .h = r->settings.step,
-                         .base = d->counter.base,
-                         .number = d->counter.count,
-                         .t = r->t,
-                         .state = r->q,
-                         .state0 = d->last.q,
-                         .ledger = r->ledger,
-                         .ledger0 = d->last.ledger,
-                         .rate = r->rate,
-                         .rate0 = d->last.rate,
-                         .V = d->stage_v,
-                         .A = d->stage_a,
-                         .R = d->stage_rate,
-                         .configuration = r->w->configuration,
-                         .J = r->w->J,
-                         .watch = several_watchdog (r) };
+  *x = (pw_scene_steps){ .count = count, .project = d->projects, .watch = several_watchdog (r) };
+  x->stages = d->tableau->stages, x->row = d->row, x->c = d->tableau->c;
+  x->h = r->settings.step, x->base = d->counter.base, x->number = d->counter.count;
+  x->t = r->t, x->state = r->q, x->ledger = r->ledger, x->rate = r->rate;
+  x->state0 = d->last.q, x->ledger0 = d->last.ledger, x->rate0 = d->last.rate;
+  x->V = d->stage_v, x->A = d->stage_a, x->R = d->stage_rate;
+  x->configuration = r->w->configuration, x->J = r->w->J;
   pw_specialised_scale (r);
   return count;
 }
@@ -141,11 +119,6 @@ int pw_run_advance_towards (pw_run *r, double t, double t_end, pw_error *error) 
 }
 
 /* ---- Several runs ---- */
-
-/* 1 if the lanes used make up for the empty ones: with half of them empty, the runs are faster one after the other. */
-static int several_lanes_pay (int used, int lanes) {
-  return 2 * used > lanes;
-}
 
 /* Runs whose next steps can be taken together: those with the step size and method of the first. */
 typedef struct {
@@ -186,7 +159,7 @@ void pw_runs_advance (pw_run *const *runs, int count, double t_end, const pw_spe
     else
       several_add (&x, i, t_end);
   }
-  if (x.used > 0 && several_lanes_pay (x.used, code->lanes)) {
+  if (x.used > 0 && 2 * x.used > code->lanes) { /* with half of them empty, one run after the other is faster */
     several_take (&x, code, memory);
     for (int k = 0; k < x.used; k++) {
       int i = x.index[k];

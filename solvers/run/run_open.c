@@ -46,19 +46,11 @@ static int run_check_step (const pw_settings *x, pw_error *error) {
 static int run_allocate (pw_run *r) {
   const pw_system *s = r->s;
   size_t n = (size_t)s->coords + 3, rows = (size_t)s->rows, entries = (size_t)s->entries;
-  size_t states = s->saturates ? 2 * n : 0;
+  size_t state = pw_state_length (s), scratch = 2 * n + 3 * rows, matrix = s->saturates ? 2 * n : 0;
   const pw_array array[] = {
-    { &r->q, pw_state_length (s) },
-    { &r->ledger, entries },
-    { &r->rate, entries },
-    { &r->q_at, pw_state_length (s) },
-    { &r->ledger_at, entries },
-    { &r->scratch, 2 * n + 3 * rows },
-    { &r->q_given, n },
-    { &r->v_given, n },
-    { &r->saturation, 2 * n },
-    { &r->matrix_state, states },
-    { &r->matrix_range, states },
+    { &r->q, state },           { &r->ledger, entries },      { &r->rate, entries },       { &r->q_at, state },
+    { &r->ledger_at, entries }, { &r->scratch, scratch },     { &r->q_given, n },          { &r->v_given, n },
+    { &r->saturation, 2 * n },  { &r->matrix_state, matrix }, { &r->matrix_range, matrix }
   };
   r->memory = pw_alloc_arrays (array, sizeof array / sizeof *array);
   r->origin = malloc (2 * n);
@@ -66,7 +58,7 @@ static int run_allocate (pw_run *r) {
   r->v = r->q + n, r->a = r->v + n, r->lambda = r->a + n;
   r->v_at = r->q_at + n, r->a_at = r->v_at + n, r->lambda_at = r->a_at + n;
   for (size_t j = 0; j < 2 * n; j++) r->saturation[j] = INFINITY;
-  for (size_t j = 0; j < states; j++) r->matrix_range[j] = INFINITY;
+  for (size_t j = 0; j < matrix; j++) r->matrix_range[j] = INFINITY;
   return PW_OK;
 }
 

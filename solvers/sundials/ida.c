@@ -318,10 +318,7 @@ static const pw_stabilisation ida_stabilisations[] = {
   { .name = NULL },
 };
 
-static const pw_option ida_options[] = {
-  PW_BAUMGARTE_OPTIONS,
-  { .name = NULL },
-};
+static const pw_option ida_options[] = { PW_BAUMGARTE_OPTIONS, { .name = NULL } };
 
 const pw_method pw_method_ida = {
   .name = "ida",

@@ -19,20 +19,18 @@ PW_INLINE void vectors_sum (sunindextype n, double a, const double *x, double b,
   for (; i < n; i++) z[i] = a * x[i] + b * y[i];
 }
 
-/* The same; the inlined copies have no multiplications by 1. */
-static void vectors_sum_any (sunindextype n, double a, const double *x, double b, const double *y, double *z) {
+/* The inlined copies have no multiplications by 1. */
+static void vectors_linear_sum (realtype a, N_Vector vx, realtype b, N_Vector vy, N_Vector vz) {
+  const double *x = NV_DATA_S (vx), *y = NV_DATA_S (vy);
+  double *z = NV_DATA_S (vz);
   if (a == 1 && b == 1)
-    vectors_sum (n, 1, x, 1, y, z);
+    vectors_sum (NV_LENGTH_S (vz), 1, x, 1, y, z);
   else if (b == 1)
-    vectors_sum (n, a, x, 1, y, z);
+    vectors_sum (NV_LENGTH_S (vz), a, x, 1, y, z);
   else if (a == 1)
-    vectors_sum (n, 1, x, b, y, z);
+    vectors_sum (NV_LENGTH_S (vz), 1, x, b, y, z);
   else
-    vectors_sum (n, a, x, b, y, z);
-}
-
-static void vectors_linear_sum (realtype a, N_Vector x, realtype b, N_Vector y, N_Vector z) {
-  vectors_sum_any (NV_LENGTH_S (z), a, NV_DATA_S (x), b, NV_DATA_S (y), NV_DATA_S (z));
+    vectors_sum (NV_LENGTH_S (vz), a, x, b, y, z);
 }
 
 static void vectors_scale (realtype c, N_Vector vx, N_Vector vz) {
