@@ -13,12 +13,6 @@ enum { PW_MAX_OPTIONS = 12 };
 
 struct pw_scene_step;
 
-/* The largest speed of a run at some time (limits.c). */
-typedef struct {
-  double time;  /* since the start [s] */
-  double speed; /* in units of the scene */
-} pw_speed_record;
-
 /* Lengths of arrays: coords and rows are the numbers of coordinates and of constraint equations, entries that of the
  * ledger, which holds the work or loss of each element that exchanges energy. */
 struct pw_run {
@@ -29,7 +23,7 @@ struct pw_run {
   double option[PW_MAX_OPTIONS]; /* one per method->options */
   pw_settings settings;
   int fixed_steps;             /* 1: fixed step size */
-  pw_saddle *saddle;           /* of the mass matrix and all active rows: accelerations, impulses */
+  pw_saddle *saddle;           /* matrix of M and all active rows: for accelerations, impulses */
   const unsigned char *active; /* rows: 0 for redundant ones; NULL: none is redundant */
   int redundant;               /* number of redundant rows; the following only if there are any */
   int redundant_moves;         /* 1: one of them is driven, so that work depends on its multiplier */
@@ -46,7 +40,7 @@ struct pw_run {
   struct pw_scene *scene;                   /* data of that code */
   char *scene_memory;
   int scene_ready;        /* 1: its constants have been computed */
-  pw_watchdog limits;     /* thresholds */
+  pw_watchdog limits;     /* thresholds of the watchdog */
   pw_geometry geometry;   /* distance of the constraints from a singular configuration */
   double refused_sine;    /* sine below which an evaluation is refused */
   int near_singular;      /* 1 after an evaluation near a singular configuration */
@@ -70,9 +64,11 @@ struct pw_run {
   double *q_at, *v_at, *a_at, *lambda_at, *ledger_at; /* same layout */
   double projected_at;
 
-  int stopped;                                  /* 1: settings.stop has requested it */
-  int interrupted;                              /* 1: inside a step of SUNDIALS, which must be restarted */
-  pw_speed_record speed_record, earlier_record; /* the last one; the one at half its time */
+  int stopped;     /* 1: settings.stop has requested it */
+  int interrupted; /* 1: inside a step of SUNDIALS, which must be restarted */
+  struct {
+    double time, speed; /* time since the start [s]; the largest speed then, in units of the scene (limits.c) */
+  } speed_record, earlier_record; /* the last record; the one at half its time */
 
   double energy0, potential0; /* initial kinetic + potential energy; initial potential energy [J] */
   double exchanged;           /* the largest kinetic energy or change of potential energy so far [J] (ledger.c) */
@@ -131,20 +127,15 @@ static inline double pw_step_end (const pw_run *r, const pw_step_counter *c, dou
   *whole = t1 < stop + 1e-9 * h;
   return t1 > stop - 1e-9 * h ? stop : t1;
 }
-static inline void pw_count_steps_from (pw_step_counter *c, double t) {
-  *c = (pw_step_counter){ .base = t };
-}
 /* Counts a step to t1; after one that is not whole, steps are counted from t1. */
 static inline void pw_count_step (pw_step_counter *c, int whole, double t1) {
   c->count++;
-  if (!whole) pw_count_steps_from (c, t1);
+  if (!whole) *c = (pw_step_counter){ .base = t1 };
 }
 static inline void pw_serialise_counter (pw_step_counter *c, pw_archive *a) {
   pw_archive_bytes (a, &c->base, sizeof c->base);
   pw_archive_count (a, &c->count);
 }
-
-/* ---- Options ---- */
 
 /* 1 if the run's stabilisation is of this kind. */
 static inline int pw_stabilised_by (const pw_run *r, pw_stabilisation_kind kind) {
@@ -175,8 +166,6 @@ static inline int pw_stabilised_by (const pw_run *r, pw_stabilisation_kind kind)
     .about = "steps from one projection to the next"                                                  \
   }
 extern const char *const pw_metrics[];
-
-/* ---- Step sizes ---- */
 
 /* Initial step size for methods that begin with order 1: the error h^2 / T^2 is a quarter of the tolerance; states that
  * saturating forces depend on change by at most their tolerance, unless that takes less than 1e-9 T. */
@@ -293,15 +282,13 @@ double pw_ledger_tolerance (const pw_run *r, double h);
 
 /* ---- Dynamics ---- */
 
-/* pw_run_accelerate leaves J evaluated and the saddle factorised. */
-
 /* A step that ends at a discontinuity evaluates signals just before it. */
 static inline double pw_before_breakpoint (const pw_run *r, double t) {
   return t < r->breakpoint ? t : nextafter (r->breakpoint, -INFINITY);
 }
 
-/* pw_run_accelerate where J is evaluated and the saddle factorised at this configuration, and velocities are up to
- * date. */
+/* pw_run_accelerate, which leaves J evaluated and the saddle factorised, where they are so already, and velocities are
+ * up to date. */
 void pw_run_accelerate_updated (pw_run *r, const double *v, double *a, double *lambda);
 
 /* The same where the saddle is not factorised. */

@@ -9,8 +9,9 @@
  *   index3    g = 0,              S v' = b   (nonholonomic rows),   mu = 0
  *   ggl       g = 0,              J v' = eta                        stabilised index 2 (Gear, Gupta & Leimkuhler 1985)
  *
- * The acceleration-like variable w approximates the acceleration at t + shift h, shift = alpha_m - alpha_f, with an
- * error of order h^2; D as in ida.  The coefficients follow from the spectral radius rho at infinite frequency.
+ * with G and S the holonomic and the nonholonomic rows of J, D as in dae.h.  The acceleration-like variable w
+ * approximates the acceleration at t + shift h, shift = alpha_m - alpha_f, with an error of order h^2.  The
+ * coefficients follow from the spectral radius rho at infinite frequency.
  *
  * For order 2 from the first step, the initial w is a + shift h a-dot.  In index3, where g = 0 requires a velocity
  * error dv with G dv = C h^2 G a-dot, C = 1/6 - beta - shift/2, the initial v includes that error; otherwise the first
@@ -40,15 +41,12 @@ struct pw_method_data {
   pw_implicit common; /* first; its q1 and v1 are the first unknowns */
   double alpha_m, alpha_f, beta, gamma;
   double *v, *a, *w;                  /* coords: velocities, accelerations and w at the beginning of the next step */
-  double *y;                          /* unknowns: q', v', lambda', mu */
   double *a1, *w1;                    /* coords: accelerations and w of the new state */
-  double *z;                          /* unknowns: residual, then correction */
+  double *y, *z;                      /* unknowns: q', v', lambda', mu; residual, then correction */
   double *row_factor, *column_factor; /* unknowns: by which rows and columns of the matrix are multiplied */
 };
 
 typedef struct pw_method_data galpha;
-
-enum { GALPHA_MOST = 20 }; /* Newton iterations */
 
 /* The coefficients c and e. */
 static double galpha_c (const galpha *d, double h) {
@@ -150,12 +148,13 @@ static int galpha_correct (pw_run *r, double h, double *correction, double *roun
  * 1/h^2 times that of positions, must be small against the method's own, which is of order h^2: hence the target of
  * order h^4.  Where corrections stall at a few times their round-off, they are accepted. */
 static int galpha_solve (pw_run *r, double h, double t1) {
+  const int most = 20; /* iterations */
   galpha *d = r->data;
   double before = INFINITY, size, round_off, target = fmin (1e-9, 1e-3 * pow (h / r->w->scale.time, 4)), rate = 1;
   if (h != d->common.h)
     pw_implicit_scale (&d->common.dae, galpha_c (d, h), galpha_e (d, h), d->row_factor, d->column_factor);
   galpha_predict (r, h);
-  for (int i = 0, refactor = 1; i < GALPHA_MOST; i++) {
+  for (int i = 0, refactor = 1; i < most; i++) {
     int status = galpha_residual (r, h, t1);
     if (status == PW_OK && refactor) status = galpha_factor (r, h);
     if (status == PW_OK) status = galpha_correct (r, h, &size, &round_off);

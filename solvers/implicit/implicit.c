@@ -41,7 +41,7 @@ void pw_implicit_close (pw_run *r) {
 int pw_implicit_restart (pw_run *r, pw_error *error) {
   pw_implicit *x = implicit_of (r);
   (void)error;
-  pw_count_steps_from (&x->counter, r->t);
+  x->counter = (pw_step_counter){ .base = r->t };
   x->last.start.t = r->t;
   x->h = 0;
   return PW_OK;

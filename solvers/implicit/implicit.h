@@ -47,8 +47,8 @@ typedef int pw_implicit_step (pw_run *r, double h, double t1);
  * multipliers. */
 int pw_implicit_advance (pw_run *r, double t_end, pw_implicit_step *step, void (*accept) (pw_run *r), pw_error *error);
 
-/* Reports a failed step of size h, also of radau; status: what it returned, PW_OK if its error is too large.  The reason
- * may be a singular configuration at its beginning. */
+/* Reports a failed step of size h, also of radau; status: what it returned, PW_OK if its error is too large.  The
+ * reason may be a singular configuration at its beginning. */
 int pw_implicit_fail (pw_run *r, int status, double h, pw_error *error);
 
 /* For the table of the method: PW_IMPLICIT_FUNCTIONS. */

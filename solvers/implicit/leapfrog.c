@@ -5,13 +5,13 @@
  *   q' - q     = h u
  *   M (v' - u) = h/2 (f (t', q', v') - J (q')^T lambda-)     J (t', q') v' = eta (t', q')
  *
- * For holonomic constraints this is RATTLE (Andersen 1983, Rattle: a "velocity" version of the Shake algorithm for
- * molecular dynamics calculations); for nonholonomic constraints the discrete Lagrange-d'Alembert principle (Cortés &
- * Martínez 2001, Non-holonomic integrators) with a discrete constraint that is symmetric in both ends, which makes the
- * method reversible (McLachlan & Perlmutter 2006, Integrators for nonholonomic mechanical systems).  Exchanging both
- * ends and h with -h gives the same equations: the method is symmetric, hence of order 2, and with forces even in the
- * velocities it retraces the motion when they are reversed.  lambda+ and lambda- are internal to the step; the reported
- * accelerations and multipliers solve the equations of motion at its end.
+ * with S the nonholonomic rows of J.  For holonomic constraints this is RATTLE (Andersen 1983, Rattle: a "velocity"
+ * version of the Shake algorithm for molecular dynamics calculations); for nonholonomic constraints the discrete
+ * Lagrange-d'Alembert principle (Cortés & Martínez 2001, Non-holonomic integrators) with a discrete constraint that is
+ * symmetric in both ends, which makes the method reversible (McLachlan & Perlmutter 2006, Integrators for nonholonomic
+ * mechanical systems).  Exchanging both ends and h with -h gives the same equations: the method is symmetric, hence of
+ * order 2, and with forces even in the velocities it retraces the motion when they are reversed.  lambda+ and lambda-
+ * are internal to the step; the reported accelerations and multipliers solve the equations of motion at its end.
  *
  * All equations are solved to round-off: for u and q' by Newton's iteration, for v' and velocity-dependent forces by
  * fixed-point iteration.  M^-1 is not needed: massless coordinates follow from their constraint equations. */
@@ -204,17 +204,6 @@ static int drift_solve (pw_run *r, double h, double t1) {
 
 /* ---- Second half (kick): v', by fixed-point iteration ---- */
 
-/* Kinematics and factors of the saddle-point matrix at (t, q, v); sets r->near_singular near a singular
- * configuration. */
-static int kick_factor (pw_run *r, double t, const double *q, const double *v) {
-  int status = pw_evaluate_J_at (r->w, t, q, v);
-  if (status != PW_OK) return status;
-  r->statistics.factorisations++;
-  status = pw_saddle_factor (r->saddle);
-  if (status != PW_OK || pw_watchdog_near (r)) r->near_singular = 1;
-  return status;
-}
-
 /* One correction of v', for the change of the forces since the last one; d->f holds the forces.  PW_METHOD if a signal
  * failed. */
 static int kick_correct (pw_run *r, double h, leapfrog_progress *p) {
@@ -243,7 +232,11 @@ static int kick_correct (pw_run *r, double h, leapfrog_progress *p) {
 static int kick_solve (pw_run *r, double h, double t1) {
   leapfrog *d = r->data;
   leapfrog_progress p = { 0 };
-  int status = kick_factor (r, pw_before_breakpoint (r, t1), d->common.q1, d->u);
+  int status = pw_evaluate_J_at (r->w, pw_before_breakpoint (r, t1), d->common.q1, d->u);
+  if (status != PW_OK) return status;
+  r->statistics.factorisations++;
+  status = pw_saddle_factor (r->saddle);
+  if (status != PW_OK || pw_watchdog_near (r)) r->near_singular = 1;
   if (status != PW_OK) return status;
   memcpy (d->common.v1, d->u, (size_t)r->s->coords * sizeof *d->common.v1);
   memset (d->f, 0, (size_t)r->s->coords * sizeof *d->f);

@@ -2,7 +2,7 @@
  * Ordinary Differential Equations II, section IV.8; in index 2 and 3: chapter VII, and Hairer, Lubich & Roche 1989).
  * With y = (q, v, lambda, mu) the equations B y' = F (t, y) are
  *
- *   q' = v - D G^T mu,   M v' = f - J^T lambda,   D as in ida
+ *   q' = v - D G^T mu,   M v' = f - J^T lambda,   G, S: holonomic, nonholonomic rows of J;  D as in dae.h
  *   ggl       0 = eta - J v,   0 = -g
  *   index2    0 = eta - J v,                                               mu = 0
  *   index3    0 = -g,   0 = b - S v   (nonholonomic rows)                  mu = 0
@@ -45,7 +45,7 @@ static int radau_restart (pw_run *r, pw_error *error) {
   radau *d = r->data;
   double T = r->w->scale.time;
   (void)error;
-  pw_count_steps_from (&d->counter, r->t);
+  d->counter = (pw_step_counter){ .base = r->t };
   d->last.t = r->t;
   d->previous_h = d->last.h = 0;
   d->remaining = 1;

@@ -20,8 +20,6 @@ static const double radau_inverse_T[STAGES][STAGES] = {
 };
 static const double radau_alpha = 2.68108287362775213390, radau_beta = 3.05043019924741056943;
 
-enum { RADAU_MOST_FIXED = 50 }; /* Newton iterations of a step of fixed size */
-
 /* ---- Equations ---- */
 
 /* F (t, y): the equations of dae.h without B y', with the opposite sign; leaves kinematics and J there. */
@@ -220,7 +218,7 @@ static int radau_correct (pw_run *r, double h, double t1, double *size, double *
  * Hairer & Wanner 1996, section IV.8, and one for round-off, which a singular configuration magnifies. */
 static pw_convergence radau_test (pw_run *r, int done, double size, double before, double round_offs) {
   radau *d = r->data;
-  const int fixed = pw_fixed_steps (r), most = fixed ? RADAU_MOST_FIXED : PW_RADAU_MOST;
+  const int fixed = pw_fixed_steps (r), most = fixed ? 50 : PW_RADAU_MOST; /* a fixed step cannot be made shorter */
   d->reduction = 0.5;
   if (!isfinite (size)) return PW_DIVERGED;
   if (size == 0) return PW_CONVERGED;

@@ -26,7 +26,6 @@ struct pw_method_data {
   double factored_h;                  /* step size for which both are factorised; 0: none */
   int choose_pivots;                  /* 1: select pivots anew */
   int F_y_current, F_y_outdated;      /* 1: F_y was evaluated at the state reached; it must be evaluated again */
-
   double *W[PW_RADAU_STAGES], *F[PW_RADAU_STAGES];  /* unknowns: transformed stages, residuals and corrections */
   double *Y, *complex_x;                            /* unknowns: at a stage; complex, in pairs: scratch */
   double *rate;                                     /* entries: scratch */
@@ -36,13 +35,12 @@ struct pw_method_data {
   double remaining;                                 /* remaining error over the last correction */
   int iterations;                                   /* of the last step */
   double reduction;                                 /* of the step size if the iteration does not converge */
-
-  radau_step now, last;              /* the step being made; the last one */
-  double *a_end;                     /* coords: accelerations at the end of the last step */
-  int near_singular;                 /* 1: the state reached is near a singular configuration */
-  pw_step_counter counter;           /* of fixed steps */
-  double h;                          /* adaptive: size of the next step */
-  double previous_h, previous_error; /* adaptive: size and error of the last step; 0: there is none */
+  radau_step now, last;                             /* the step being made; the last one */
+  double *a_end;                                    /* coords: accelerations at the end of the last step */
+  int near_singular;                                /* 1: the state reached is near a singular configuration */
+  pw_step_counter counter;                          /* of fixed steps */
+  double h;                                         /* adaptive: size of the next step */
+  double previous_h, previous_error;                /* adaptive: size and error of the last step; 0: there is none */
   pw_projector projector;
   char *memory;
 };

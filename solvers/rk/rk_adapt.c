@@ -98,7 +98,7 @@ static double adapt_tangential (pw_run *r, const pw_rk_row *e, int projected) {
   return adapt_remaining (r, adapt_whole (r, e), projected);
 }
 
-/* The combined errors, and the one that guards both, at the top of this file; from the squares of e3, e5, e6. */
+/* The two errors of which the larger one counts (see the top of this file), from the squares of e3, e5, e6. */
 static double adapt_combine (double e5, double e3) {
   return e5 == 0 ? 0 : e5 / sqrt (e5 + 0.01 * e3);
 }
@@ -206,10 +206,10 @@ int pw_rk_advance_adaptive (pw_run *r, double t_end, pw_error *error) {
     int shortened = t1 > stop - 0.01 * d->h;
     if (shortened) t1 = stop;
     double h = t1 - r->t;
-    if (!shortened && !(h > pw_least_step (r)))
-      return status != PW_OK
-                 ? pw_rk_fail (r, status, h, error)
-                 : pw_fail (error, PW_METHOD, "t = %.6g s: the tolerances require a step below %.3g s", r->t, h);
+    if (!shortened && !(h > pw_least_step (r))) {
+      if (status != PW_OK) return pw_rk_fail (r, status, h, error);
+      return pw_fail (error, PW_METHOD, "t = %.6g s: the tolerances require a step below %.3g s", r->t, h);
+    }
     if (most_growth < ADAPT_GROWTH && (status = pw_run_check_limits (r, error)) != PW_OK) return status;
     status = adapt_step (r, h, t1, project, r->settings.ledger ? &added_energy : NULL, &err);
     if (status < 0) return pw_rk_fail (r, status, h, error);

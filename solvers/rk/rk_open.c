@@ -107,7 +107,7 @@ void pw_rk_close (pw_run *r) {
 int pw_rk_restart (pw_run *r, pw_error *error) {
   struct pw_method_data *d = r->data;
   (void)error;
-  pw_count_steps_from (&d->counter, r->t);
+  d->counter = (pw_step_counter){ .base = r->t };
   d->off_grid = 0;
   if (!pw_fixed_steps (r)) pw_rk_reset_step_size (r);
   pw_store_start (&d->last, r);

@@ -7,9 +7,9 @@
 #include "rk.h"
 #include "specialised.h"
 
-/* Null-space velocities (nullspace.c). */
 enum { PW_NULLSPACE_MOST = 256 }; /* constraint equations: their matrix is dense */
 
+/* Null-space velocities, named as at the top of nullspace.c. */
 typedef struct {
   int rows;          /* active constraint equations */
   int *active_index; /* all equations: index among the active ones, or -1 */

@@ -7,11 +7,9 @@
 #include "util.h"
 
 int pw_dense_output_open (pw_dense_output *b, pw_run *r, pw_dense_projection projection, pw_error *error) {
-  size_t entries = (size_t)r->s->entries;
+  size_t state = pw_state_length (r->s), entries = (size_t)r->s->entries;
   *b = (pw_dense_output){ .start.t = r->t, .projection = projection };
-  const pw_array array[] = { { &b->start.q, pw_state_length (r->s) },
-                             { &b->start.ledger, entries },
-                             { &b->start.rate, entries } };
+  const pw_array array[] = { { &b->start.q, state }, { &b->start.ledger, entries }, { &b->start.rate, entries } };
   b->memory = pw_alloc_arrays (array, sizeof array / sizeof *array);
   if (b->memory == NULL) return pw_fail_memory (r->s, error);
   return projection == PW_DENSE_UNPROJECTED ? PW_OK : pw_projector_open (&b->projector, r, NULL, NULL, error);

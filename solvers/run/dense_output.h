@@ -1,4 +1,4 @@
-/* Dense output of a one-step method: states inside the last step, from its two ends. */
+/* Dense output of the one-step methods: states inside the last step, from the states at its ends. */
 #ifndef PW_DENSE_OUTPUT_H
 #define PW_DENSE_OUTPUT_H
 
@@ -27,8 +27,7 @@ typedef struct {
 int pw_dense_output_open (pw_dense_output *b, pw_run *r, pw_dense_projection projection, pw_error *error);
 void pw_dense_output_close (pw_dense_output *b);
 
-/* Integrates the ledger over the last step by the trapezoidal rule; kinematics and r->lambda must be those of its
- * end. */
+/* Integrates the ledger over the last step by the trapezoidal rule, with kinematics and r->lambda of its end. */
 void pw_dense_output_integrate_ledger (pw_dense_output *b, pw_run *r);
 
 /* Reports that t is outside the last step, which begins at t0 (NaN: unknown).  PW_INPUT. */

@@ -43,7 +43,7 @@ static int limits_record_speed (pw_run *r) {
   double span = r->t - r->settings.t;
   if (span < 2 * r->speed_record.time) return 0;
   r->earlier_record = r->speed_record;
-  r->speed_record = (pw_speed_record){ .time = span, .speed = limits_speed (r, &state) };
+  r->speed_record.time = span, r->speed_record.speed = limits_speed (r, &state);
   return 1;
 }
 

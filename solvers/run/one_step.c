@@ -31,7 +31,7 @@ double pw_stage_time (const pw_run *r, double t) {
 int pw_step_restart (pw_run *r, pw_error *error) {
   struct pw_method_data *d = r->data;
   (void)error;
-  pw_count_steps_from (&d->counter, r->t);
+  d->counter = (pw_step_counter){ .base = r->t };
   d->last.start.t = r->t;
   return PW_OK;
 }

@@ -12,7 +12,8 @@
 #define RUN_MOST_STEPS 1e15                /* of a fixed size: shorter ones vanish in the round-off of the time */
 
 /* Checks the settings of a run and fills in defaults. */
-static int run_settings (pw_settings *to, const pw_settings *from, const pw_method *method, pw_error *error) {
+static int run_settings (pw_settings *to, const pw_settings *from, const pw_method *method, int fixed_steps,
+                         pw_error *error) {
   const struct {
     const char *name;
     double value;
@@ -33,14 +34,10 @@ static int run_settings (pw_settings *to, const pw_settings *from, const pw_meth
   if (to->rtol == 0) to->rtol = 1e-6;
   if (to->max_steps == 0) to->max_steps = PW_MAX_STEPS;
   if (to->span == 0) to->span = method->adaptive ? 1 : 1000 * to->step;
-  return PW_OK;
-}
-
-static int run_check_step (const pw_settings *x, pw_error *error) {
-  double end = fabs (x->t) + x->span;
-  if (x->step * RUN_MOST_STEPS >= end) return PW_OK;
-  return pw_fail (error, PW_INPUT, "setting step = %g: expected at least %g for a run to t = %g", x->step,
-                  end / RUN_MOST_STEPS, x->t + x->span);
+  double least_step = (fabs (to->t) + to->span) / RUN_MOST_STEPS;
+  if (!fixed_steps || to->step >= least_step) return PW_OK;
+  return pw_fail (error, PW_INPUT, "setting step = %g: expected at least %g for a run to t = %g", to->step, least_step,
+                  to->t + to->span);
 }
 
 static int run_allocate (pw_run *r) {
@@ -155,8 +152,7 @@ static int run_open (pw_run *r, const char *method, const pw_settings *settings,
       pw_parse_options (method, settings->methods, &r->method, &r->stabilisation, r->option, error) != PW_OK)
     return PW_INPUT;
   r->fixed_steps = !r->method->adaptive || pw_run_option (r, "steps") != 0;
-  int status = run_settings (&r->settings, settings, r->method, error);
-  if (status == PW_OK && pw_fixed_steps (r)) status = run_check_step (&r->settings, error);
+  int status = run_settings (&r->settings, settings, r->method, r->fixed_steps, error);
   if (status != PW_OK) return status;
   r->t = r->settings.t;
   pw_hold_signals (r->w, 0);

@@ -47,12 +47,12 @@ static void newton_fill_matrix (pw_bdf_newton *w, int n) {
 /* Called by CVODES: evaluates T unless the last one is still valid, which CVODES proposes by `reuse`, then forms the
  * matrix with gamma.  *evaluated: whether it evaluated T. */
 static int newton_set_up (realtype t, N_Vector y, N_Vector derivative, SUNMatrix matrix, booleantype reuse,
-                          booleantype *evaluated, realtype gamma, void *data, N_Vector temporary1, N_Vector temporary2,
-                          N_Vector temporary3) {
+                          booleantype *evaluated, realtype gamma, void *data, N_Vector tmp1, N_Vector tmp2,
+                          N_Vector tmp3) {
   multistep_data *d = data;
   pw_bdf_newton *w = &d->newton;
   const pw_tangent *x = &w->tangent;
-  (void)derivative, (void)temporary1, (void)temporary2, (void)temporary3;
+  (void)derivative, (void)tmp1, (void)tmp2, (void)tmp3;
   *evaluated = !reuse || d->sun.run->outdated;
   if (*evaluated) {
     int columns = 3 * d->n + x->rows, status = pw_multistep_accelerate (d, t, N_VGetArrayPointer (y));

@@ -47,11 +47,11 @@ static int ida_residual (realtype t, N_Vector vy, N_Vector vyp, N_Vector out, vo
 
 /* Called by IDA: dF/dy + c dF/dy'. */
 static int ida_matrix (realtype t, realtype c, N_Vector vy, N_Vector vyp, N_Vector residual, SUNMatrix matrix,
-                       void *data, N_Vector t1, N_Vector t2, N_Vector t3) {
+                       void *data, N_Vector tmp1, N_Vector tmp2, N_Vector tmp3) {
   ida_data *d = data;
   pw_tangent *x = &d->dae.tangent;
   const double *y = N_VGetArrayPointer (vy), *yp = N_VGetArrayPointer (vyp), *v = y + d->dae.n;
-  (void)residual, (void)t1, (void)t2, (void)t3;
+  (void)residual, (void)tmp1, (void)tmp2, (void)tmp3;
   if (ida_update (d, t, y) != PW_OK) return -1;
   pw_sun_clear (matrix, x->colptr, x->rowind);
   pw_scatter_begin (&x->scatter, SUNSparseMatrix_Data (matrix));

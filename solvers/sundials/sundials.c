@@ -97,13 +97,13 @@ int pw_sun_open_solver (pw_sun *x, N_Vector right, void *content, pw_sun_solve *
  * convergence; data: size of the previous correction. */
 static int sun_test_convergence (SUNNonlinearSolver newton, N_Vector y, N_Vector correction, realtype tolerance,
                                  N_Vector weights, void *data) {
-  const double slow = 0.9; /* rate of convergence beyond which the iteration is given up */
   double *previous = data, size = N_VWrmsNorm (correction, weights), rate = size / *previous;
   int iteration = 0;
   (void)y;
   SUNNonlinSolGetCurIter (newton, &iteration);
   *previous = size;
-  if (iteration > 0 && !(rate < slow)) return size <= tolerance ? SUN_NLS_SUCCESS : SUN_NLS_CONV_RECVR;
+  if (iteration > 0 && !(rate < 0.9)) /* too slow */
+    return size <= tolerance ? SUN_NLS_SUCCESS : SUN_NLS_CONV_RECVR;
   double remaining = iteration == 0 ? 1 : rate / (1 - rate); /* error, over the size of this correction */
   return size * fmin (1, remaining) <= tolerance ? SUN_NLS_SUCCESS : SUN_NLS_CONTINUE;
 }
