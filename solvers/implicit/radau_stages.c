@@ -74,8 +74,8 @@ static void radau_fill_matrix (radau *d, int parts, double re, double im) {
   const int64_t *colptr = d->dae.tangent.colptr, *rowind = d->dae.tangent.rowind;
   for (int c = 0; c < d->dae.size; c++)
     for (int64_t i = colptr[c]; i < colptr[c + 1]; i++) {
-      double scale = d->row_factor[rowind[i]] * d->column_factor[c],
-             b = c < 2 * d->dae.n && i == d->diagonal[c] ? d->B[c] : 0;
+      double scale = d->row_factor[rowind[i]] * d->column_factor[c];
+      double b = c < 2 * d->dae.n && i == d->diagonal[c] ? d->B[c] : 0;
       d->value[parts * i] = scale * (d->minus_F_y[i] + re * b);
       if (parts == 2) d->value[2 * i + 1] = scale * im * b;
     }
@@ -125,13 +125,13 @@ double pw_radau_rtol (const pw_run *r) {
  * velocities in index3 is that of positions over h. */
 static void radau_set_tolerances (pw_run *r, double h) {
   radau *d = r->data;
-  const pw_settings *set = &r->settings;
+  const pw_settings *settings = &r->settings;
   int n = d->dae.n, index3 = !d->dae.velocities && d->dae.tangent.holonomic > 0;
-  double rtol = pw_radau_rtol (r), newton = fmax (10 * DBL_EPSILON / rtol, fmin (0.03, sqrt (rtol)));
+  double rtol = pw_radau_rtol (r), newton = fmax (10 * DBL_EPSILON / rtol, fmin (0.03, sqrt (rtol))); /* RADAU5's */
   double largest = 1; /* the largest coordinate in units of the scene: its round-off may affect others */
   for (int j = 0; j < n; j++) largest = fmax (largest, fabs (d->now.y[j]) / d->unit[j]);
   for (int i = 0; i < 2 * n; i++) {
-    double size = fabs (d->now.y[i]), least = set->atol > 0 ? set->atol / set->rtol : d->unit[i];
+    double size = fabs (d->now.y[i]), least = settings->atol > 0 ? settings->atol / settings->rtol : d->unit[i];
     double unit = index3 && i >= n ? fmax (d->unit[i], largest * d->unit[i - n] / h) : d->unit[i];
     d->tolerance[i] = fmin (rtol * (size + least), r->saturation[i]);
     d->round_off[i] = fmin (8 * DBL_EPSILON * (size + unit), 0.1 * r->saturation[i]);

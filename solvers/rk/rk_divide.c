@@ -133,7 +133,7 @@ int pw_rk_advance_fixed (pw_run *r, double t_end, pw_error *error) {
   }
   if (status != PW_OK) return pw_rk_fail (r, status, r->settings.step, error);
   r->statistics.steps++;
-  if (d->off_grid) {
+  if (d->off_grid) { /* counted with the next step, which ends at the next multiple */
     if (t > t1) d->counter.count = (long)floor ((t - d->counter.base) / r->settings.step);
     return PW_OK;
   }
