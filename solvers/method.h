@@ -191,16 +191,16 @@ int pw_run_evaluate (pw_run *r, pw_error *error);
  * reference for later states. */
 void pw_run_set_references (pw_run *r);
 
-/* Finds the next discontinuity after the state reached. */
+/* Finds the next discontinuity after the state reached, r->breakpoint. */
 int pw_run_look_ahead (pw_run *r, pw_error *error);
 
 /* Makes the norm of the accelerations at the state reached the reference level for later ones. */
 void pw_run_set_reference_level (pw_run *r);
 
-/* The independence of the active rows with which that of later states is compared (pw_run_set_references). */
+/* Whether pw_run_renew sets the references anew or keeps them (pw_run_set_references). */
 typedef enum { PW_KEEP_REFERENCES, PW_NEW_REFERENCES } pw_references;
 
-/* Plans the linear algebra at the state reached, where J is evaluated, and reopens the method. */
+/* Opens the saddle and the method anew at the state reached, where J is evaluated. */
 int pw_run_renew (pw_run *r, pw_references references, pw_error *error);
 
 /* Numbers in q, v, a and lambda of a state. */
@@ -230,8 +230,8 @@ static inline int pw_evaluate_J_at (pw_workspace *w, double t, const double *q, 
 }
 
 /* The larger of two values; NaN if either is NaN, unlike pw_larger. */
-static inline double pw_larger_or_nan (double most, double x) {
-  return x > most || isnan (x) ? x : most;
+static inline double pw_larger_or_nan (double x, double y) {
+  return y > x || isnan (y) ? y : x;
 }
 
 /* Norm of the accelerations at the state reached, in units of L / T^2 (watchdog.c). */

@@ -187,15 +187,10 @@ static int galpha_open (pw_run *r, pw_error *error) {
   const pw_system *s = r->s;
   size_t n = (size_t)s->coords + 3, most = 2 * (n + (size_t)s->rows);
   if (d == NULL) return pw_fail_memory (s, error);
-  const pw_array array[] = { { &d->v, n },
-                             { &d->a, n },
-                             { &d->w, n },
-                             { &d->y, most },
-                             { &d->a1, n },
-                             { &d->w1, n },
-                             { &d->z, most },
-                             { &d->row_factor, most },
-                             { &d->column_factor, most } };
+  const pw_array array[] = {
+    { &d->v, n },  { &d->a, n },    { &d->row_factor, most }, { &d->column_factor, most }, { &d->w, n }, { &d->a1, n },
+    { &d->w1, n }, { &d->y, most }, { &d->z, most }
+  };
   int status = pw_implicit_open (&d->common, r, array, sizeof array / sizeof *array);
   pw_dae *x = &d->common.dae;
   if (status == PW_OK) {

@@ -43,7 +43,7 @@ static const double radau_derivative_at_end[STAGES] = { 5.53197264742180826186, 
 
 static int radau_restart (pw_run *r, pw_error *error) {
   radau *d = r->data;
-  double T = r->w->scale.time;
+  double time_scale = r->w->scale.time;
   (void)error;
   d->counter = (pw_step_counter){ .base = r->t };
   d->last.t = r->t;
@@ -52,7 +52,8 @@ static int radau_restart (pw_run *r, pw_error *error) {
   d->F_y_outdated = 1;
   d->F_y_current = 0;
   d->h = pw_first_step (r);
-  if (d->h >= 0.5 * T * sqrt (r->settings.rtol)) d->h = fmax (d->h, 0.1 * T * sqrt (sqrt (pw_radau_rtol (r))));
+  if (d->h >= 0.5 * time_scale * sqrt (r->settings.rtol)) /* saturating forces do not limit it */
+    d->h = fmax (d->h, 0.1 * time_scale * sqrt (sqrt (pw_radau_rtol (r))));
   memcpy (d->now.y, r->q, (size_t)d->dae.n * sizeof (double));
   memcpy (d->now.y + d->dae.n, r->v, (size_t)d->dae.n * sizeof (double));
   memset (d->now.y + 2 * d->dae.n, 0, (size_t)(d->dae.rows + d->dae.mus) * sizeof (double));
@@ -185,7 +186,7 @@ static double radau_next_h (const radau *d, double h, double error, int rejected
 }
 
 /* A step of size h; *error: in units of the tolerances, INFINITY if its equations could not be solved or steps are
- * fixed. filter_twice: as in pw_radau_estimate. */
+ * fixed.  filter_twice: as in pw_radau_estimate. */
 static int radau_try (pw_run *r, double h, double t1, int filter_twice, double *error) {
   *error = INFINITY;
   r->near_singular = 0;
@@ -246,8 +247,8 @@ static int radau_advance (pw_run *r, double t_end, pw_error *error) {
     r->statistics.rejected++;
     d->F_y_outdated = !d->F_y_current;
     if (status == PW_OK && rejected > 0) radau_project_start (r);
-    d->h =
-        status == PW_OK ? fmin (0.9 * h, radau_next_h (d, h, err, 1)) : h * (status == PW_RETRY ? d->reduction : 0.25);
+    double reduction = status == PW_RETRY ? d->reduction : 0.25;
+    d->h = status == PW_OK ? fmin (0.9 * h, radau_next_h (d, h, err, 1)) : h * reduction;
   }
 }
 

@@ -36,8 +36,7 @@ const pw_option pw_rk_options[] = {
 
 /* ---- Opening ---- */
 
-/* The nonzero weights of a row. */
-static pw_rk_row rk_list_row (const double *weight, int stages) {
+static pw_rk_row rk_nonzero_weights (const double *weight, int stages) {
   pw_rk_row row = { 0 };
   for (int j = 0; j < stages; j++)
     if (weight[j] != 0) {
@@ -50,30 +49,25 @@ static pw_rk_row rk_list_row (const double *weight, int stages) {
 static void rk_list_weights (struct pw_method_data *d) {
   const pw_tableau *tableau = d->tableau;
   const double *A = tableau->A, *const estimate[] = { tableau->e, tableau->e3, tableau->e6 };
-  d->row[0] = rk_list_row (tableau->b, tableau->stages);
-  for (int i = 1; i < tableau->stages; A += i++) d->row[i] = rk_list_row (A, i); /* row i has i entries */
+  d->row[0] = rk_nonzero_weights (tableau->b, tableau->stages);
+  for (int i = 1; i < tableau->stages; A += i++) d->row[i] = rk_nonzero_weights (A, i); /* row i has i entries */
   for (int k = 0; k < 3; k++)
-    if (estimate[k]) d->estimate[k] = rk_list_row (estimate[k], tableau->stages + 1);
+    if (estimate[k]) d->estimate[k] = rk_nonzero_weights (estimate[k], tableau->stages + 1);
 }
 
 static int rk_allocate (struct pw_method_data *d, const pw_system *s) {
-  enum { SINGLE = 9 };
+  enum { SINGLE = 8 };
   size_t n = (size_t)s->coords + 3, state = pw_state_length (s), entries = (size_t)s->entries, count = SINGLE;
   int stages = d->tableau->stages;
-  pw_array array[SINGLE + 3 * PW_RK_STAGES] = { { &d->stage_rate[stages],
-                                                  entries }, /* at the new state, for the error */
-                                                { &d->q, state },
-                                                { &d->weight, 2 * n },
-                                                { &d->last.q, state },
-                                                { &d->last.ledger, entries },
-                                                { &d->last.rate, entries },
-                                                { &d->second.q, state },
-                                                { &d->second.ledger, entries },
-                                                { &d->second.rate, entries } };
-  for (int i = 1; i < stages; i++) {
+  pw_array array[SINGLE + 3 * PW_RK_STAGES] = {
+    { &d->q, state },           { &d->weight, 2 * n },   { &d->last.q, state },          { &d->last.ledger, entries },
+    { &d->last.rate, entries }, { &d->second.q, state }, { &d->second.ledger, entries }, { &d->second.rate, entries }
+  };
+  for (int i = 1; i <= stages; i++) {
+    array[count++] = (pw_array){ &d->stage_rate[i], entries };
+    if (i == stages) break; /* velocities and accelerations of the new state are in d->v, d->a */
     array[count++] = (pw_array){ &d->stage_v[i], n };
     array[count++] = (pw_array){ &d->stage_a[i], n };
-    array[count++] = (pw_array){ &d->stage_rate[i], entries };
   }
   d->memory = pw_alloc_arrays (array, count);
   if (d->memory == NULL) return PW_RESOURCE;

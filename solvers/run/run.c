@@ -243,7 +243,6 @@ static int run_select_rows (pw_run *r, pw_error *error) {
   return run_reselect (r, error);
 }
 
-/* The energy of the state reached. */
 static int run_energy (pw_run *r, double *energy, pw_error *error) {
   if (pw_update_kinematics (r->w, r->t, r->q, r->v) != PW_OK) return pw_fail_signal (r->t, error);
   *energy = pw_energy (r, r->v);
