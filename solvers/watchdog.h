@@ -1,8 +1,10 @@
-/* The watchdog checks that the computed states still follow the motion of the mechanism.
+/* The watchdog checks that the computed states still follow the motion of the mechanism, for all methods.
  *
  * All thresholds are dimensionless and in one table: positions in units of the scene's length L, angles in radians.
  * Singular configurations are a property of J alone, with rows of length 1 and columns of angles divided by L: neither
- * masses nor the initial configuration matter. */
+ * masses nor the initial configuration matter.  The distance from them is measured by the smallest sine of the angle
+ * between a row of J and the space of those before it, called the sine below.  Branches are the motions between which a
+ * closed loop can change in a singular configuration, a change point. */
 #ifndef PW_WATCHDOG_H
 #define PW_WATCHDOG_H
 
@@ -13,32 +15,33 @@ struct pw_run;
 /* The thresholds; a run has a copy.  Values and derivations are in singular.c. */
 typedef struct {
   double lost, lost_unstabilised;  /* residuals above which constraints count as lost */
-  double follows, magnified;       /* residual of a redundant row: round-off; ratio to those of the others */
+  double follows, magnified;       /* residual with which a redundant row follows; its ratio to those of the others */
   double rank, suspect, dependent; /* sines: rank lost; rank is examined; refused if the scene is too large for that */
   double independent;              /* sine above which a row counts as independent */
   double near, refine;     /* sines: near a singular configuration, relative to the largest; solutions are refined */
   double regular;          /* sine that counts as regular, relative to the largest */
-  double turn, least_turn; /* growth of the accelerations in a turn; least reference level */
-  double drift_turn, drift_near;            /* residual over squared sine */
-  double drift_far, drift_any;              /* the same, above the residual drift_far: drift_any */
-  double jump;                              /* growth of the accelerations in a jump */
-  double lipschitz, growth;                 /* change of the sine per unit of motion; of step sizes */
-  double unresolved, low, stride, progress; /* walks past a change point */
-  double floor, crossing, straight;         /* sines where branches cross; cosine of the angle of a straight passage */
-  double resolved;                          /* step over the distance of branches */
-  double lands;                             /* sine at the end of a step over that at its beginning */
-  double agree, agree_best;                 /* difference between two divisions of a step */
-  double sample, sample_best;               /* the same for a sample inside a step */
-  double loosened, loose;                   /* independence of the active rows */
-  double extreme; /* the largest mass, and one over the smallest [kg]; the largest initial value */
-  double stalled; /* consecutive steps that do not advance */
+  double turn, least_turn; /* growth of the accelerations where a branch turns; least value before it */
+  double drift_turn, drift_near; /* residual over squared sine: where accelerations grow; where they are no reference */
+  double drift_far, drift_any;   /* residual that is suspect without such growth; it over the squared sine */
+  double jump;                   /* growth of the accelerations in a jump */
+  double lipschitz, growth; /* largest change of the sine per unit of motion; of step sizes, from one to the next */
+  double unresolved, low;   /* sine within a step over those at its ends: corner not resolved; to be examined */
+  double stride, progress;  /* of walks past a change point: length over the sine; least gain of a stride */
+  double floor, crossing, straight; /* sines where branches cross; cosine of the angle of a straight passage */
+  double resolved;                  /* step over the distance of branches */
+  double ends_singular;             /* sine at the end of a step over that at its beginning */
+  double agree, agree_best;         /* acceptable and best difference between two divisions of a step */
+  double sample, sample_best;       /* the same for a sample inside a step */
+  double loosened, loose; /* independence below which other active rows are tried: over the reference; in all cases */
+  double extreme;         /* the largest mass, and one over the smallest [kg]; the largest initial value */
+  double stalled;         /* consecutive steps that do not advance */
 } pw_watchdog;
 
 extern const pw_watchdog pw_watchdog_limits;
 
 /* Geometry of the constraints along a run. */
 typedef struct {
-  pw_saddle *saddle; /* weights 1 and L^2: its pivots are the sines; NULL: a tree of holonomic joints, never singular */
+  pw_saddle *saddle; /* of weights 1 and L^2: its pivots are sines; NULL: a tree of holonomic joints, never singular */
   int loops;         /* 1: bodies form closed loops, whose branches can meet */
   double sine, typical; /* the last sine computed; the largest at a state reached */
   double state_sine;    /* the sine at the last accepted state for which it was computed */
@@ -58,8 +61,7 @@ void pw_watchdog_close (struct pw_run *r);
 /* Restarts at the state reached, where J is evaluated. */
 void pw_watchdog_begin (struct pw_run *r);
 
-/* The smallest sine of the angle between a row of J and those before it, with the J last evaluated; *row (if not
- * NULL): that row, or -1. */
+/* The sine with the J last evaluated; *row (if not NULL): the row that forms this angle, or -1. */
 double pw_watchdog_sine (struct pw_run *r, int *row);
 
 /* pw_watchdog_near at the state reached, which it evaluates. */

@@ -65,7 +65,7 @@ static inline int dynamics_solve (pw_run *r, const double *v, double *a, double 
   int status = pw_saddle_factor (r->saddle);
   if (status == PW_OK) pw_saddle_solve (r->saddle, f, lambda, a, lambda);
   *near = pw_watchdog_near (r);
-  if (*near && r->geometry.sine <= r->refuse) return PW_RETRY;
+  if (*near && r->geometry.sine <= r->refused_sine) return PW_RETRY;
   if (status == PW_OK && pw_saddle_below (r->saddle, r->limits.refine)) dynamics_refine (r, v, a, lambda);
   return status;
 }
@@ -84,14 +84,14 @@ int pw_run_accelerate (pw_run *r, double t, const double *q, const double *v, do
   return status;
 }
 
-void pw_show_reached (pw_run *r) {
+void pw_sample_reached (pw_run *r) {
   memcpy (r->q_at, r->q, pw_state_length (r->s) * sizeof *r->q);
   memcpy (r->ledger_at, r->ledger, (size_t)r->s->entries * sizeof (double));
   r->projected_at = r->projected;
   (void)pw_evaluate_J_at (r->w, r->t, r->q_at, r->v_at);
 }
 
-void pw_note_residuals (pw_run *r) {
+void pw_record_residuals (pw_run *r) {
   pw_residuals *now = &r->residuals;
   pw_statistics *s = &r->statistics;
   pw_specialised_residuals (r);

@@ -40,7 +40,7 @@ static int independent_nearby (pw_run *r, pw_row_basis *b, int number, double *q
   const unsigned char *before = r->active;
   r->active = b->active;
   if (pw_projector_open (&p, r, s->metric, NULL, &none) == PW_OK) {
-    p.alone = 1;
+    p.ignores_inactive = 1;
     if (pw_project_positions (&p, r, r->t, q, r->v) == PW_OK) away = independent_rank (r, b);
     pw_projector_close (&p);
   }

@@ -56,9 +56,9 @@ static void initial_weights (const pw_system *s, const double *metric, const uns
 static int initial_positions (pw_projector *p, pw_run *r, initial_failure *failure) {
   int status = pw_project_positions (p, r, r->t, r->q, r->v);
   if (status == PW_OK) return PW_OK;
-  if (pw_update_kinematics (r->w, r->t, r->q, r->v) == PW_OK && p->row >= 0) {
+  if (pw_update_kinematics (r->w, r->t, r->q, r->v) == PW_OK && p->worst_row >= 0) {
     pw_evaluate_g (r->w, r->scratch);
-    *failure = (initial_failure){ p->row, 0, fabs (r->scratch[p->row]), 0 };
+    *failure = (initial_failure){ p->worst_row, 0, fabs (r->scratch[p->worst_row]), 0 };
   }
   return status;
 }
@@ -68,13 +68,13 @@ static int initial_positions (pw_projector *p, pw_run *r, initial_failure *failu
 static int initial_velocities (pw_projector *p, pw_run *r, double *v, initial_failure *failure) {
   pw_residuals now;
   pw_evaluate_residuals (r->w, NULL, &now);
-  for (int i = 0; i < 2 && !(now.velocity <= PW_RESIDUAL_GOOD); i++) {
+  for (int i = 0; i < 2 && !(now.velocity <= PW_RESIDUAL_CONVERGED); i++) {
     int status = pw_project_velocities (p, r, v);
     if (status < 0) return status;
     if (status != PW_OK) break;
     pw_evaluate_residuals (r->w, NULL, &now);
   }
-  if (now.velocity <= PW_RESIDUAL_ENOUGH) return PW_OK;
+  if (now.velocity <= PW_RESIDUAL_ACCEPTED) return PW_OK;
   *failure = (initial_failure){ now.row_velocity, 1, now.jv, 1 };
   return PW_RETRY;
 }
@@ -118,7 +118,7 @@ static int initial_stage (pw_projector *p, pw_run *r, int velocities, const unsi
     status = initial_project (&own, r, velocities, &unused);
     pw_projector_close (&own);
     pw_evaluate_residuals (r->w, NULL, &now);
-    if (status == PW_OK && !(now.position <= PW_RESIDUAL_ENOUGH)) status = PW_RETRY;
+    if (status == PW_OK && !(now.position <= PW_RESIDUAL_ACCEPTED)) status = PW_RETRY;
   }
   free (start);
   return status;
@@ -334,7 +334,7 @@ int pw_run_make_consistent (pw_run *r, const unsigned char *origin, pw_error *er
   int status = pw_evaluate_J_at (r->w, r->t, r->q, r->v);
   if (status != PW_OK) return pw_fail_signal (r->t, error);
   pw_evaluate_residuals (r->w, NULL, &before);
-  if (!(before.position <= 2 * PW_RESIDUAL_GOOD && before.velocity <= 2 * PW_RESIDUAL_GOOD))
+  if (!(before.position <= 2 * PW_RESIDUAL_CONVERGED && before.velocity <= 2 * PW_RESIDUAL_CONVERGED))
     status = initial_try (r, origin, &failure, &released, error);
   r->initial = (pw_initial_report){ .q_given = r->q_given,
                                     .v_given = r->v_given,

@@ -26,8 +26,8 @@ int pw_projector_open (pw_projector *p, pw_run *r, const double *weight_q, const
   *p = (pw_projector){ .own_velocity = weight_v != NULL,
                        .velocity = weight_v ? NULL : r->saddle,
                        .active = r->active,
-                       .row = -1,
-                       .against = -1,
+                       .worst_row = -1,
+                       .contradictory_row = -1,
                        .by_mass = weight_q == NULL && weight_v == NULL };
   p->position = weight_q ? pw_saddle_open (r->w, weight_q, s->holonomic, r->active, error) : project_by_mass (r, error);
   p->own_position = p->position != r->saddle;
@@ -61,14 +61,14 @@ void pw_projector_close (pw_projector *p) {
 static int project_check_redundant (pw_projector *p, const pw_system *s, double follows, const double *g,
                                     const double *size) {
   double most = follows;
-  p->against = -1;
-  if (p->active == NULL || p->alone) return PW_OK;
+  p->contradictory_row = -1;
+  if (p->active == NULL || p->ignores_inactive) return PW_OK;
   for (int i = 0; i < s->holonomic; i++) {
     double off = p->active[i] ? 0 : fabs (g[i]) / size[i];
-    if (off > most || isnan (off)) most = off, p->against = i;
+    if (off > most || isnan (off)) most = off, p->contradictory_row = i;
   }
-  if (p->against < 0) return PW_OK;
-  p->row = p->against;
+  if (p->contradictory_row < 0) return PW_OK;
+  p->worst_row = p->contradictory_row;
   return PW_RETRY;
 }
 
@@ -84,9 +84,9 @@ int pw_project_positions (pw_projector *p, pw_run *r, double t, double *q, const
     pw_evaluate_g (r->w, g);
     if (!(before < slight)) pw_evaluate_g_size (r->w, size);
     pw_worst_position (s, g, size, p->active, &now);
-    p->row = now.row_position;
+    p->worst_row = now.row_position;
     int stalled = now.position > before / 4; /* at round-off, since convergence is quadratic */
-    if (now.position <= PW_RESIDUAL_GOOD || (stalled && now.position <= PW_RESIDUAL_ENOUGH)) break;
+    if (now.position <= PW_RESIDUAL_CONVERGED || (stalled && now.position <= PW_RESIDUAL_ACCEPTED)) break;
     if (p->iterations >= most || !isfinite (now.position)) return PW_RETRY;
     before = now.position;
     pw_evaluate_J (r->w);
@@ -128,14 +128,14 @@ static int project_is_good (const pw_projector *p, pw_run *r) {
   if (p->own_velocity || p->active || r->near_singular) return 0;
   pw_residuals now;
   pw_evaluate_velocity_residual (r->w, NULL, &now);
-  if (!(now.velocity <= PW_RESIDUAL_GOOD)) return 0;
+  if (!(now.velocity <= PW_RESIDUAL_CONVERGED)) return 0;
   r->residuals.velocity = now.velocity, r->residuals.jv = now.jv;
   return 1;
 }
 
 int pw_project_state (pw_projector *p, pw_run *r, double t, double *q, double *v, double *a, double *lambda) {
   if (pw_specialised_project (p, r, t, q, v, a, lambda)) {
-    p->iterations = r->scene->iterations, p->against = -1;
+    p->iterations = r->scene->iterations, p->contradictory_row = -1;
     return PW_OK;
   }
   int status = pw_project_positions (p, r, t, q, v);

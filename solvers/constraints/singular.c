@@ -79,7 +79,7 @@ const pw_watchdog pw_watchdog_limits = {
 
   /* A step that ends within a tenth of its length from a singular configuration: the accelerations, whose error is that
    * of the state over the sine, are ten times less accurate than at its beginning. */
-  .lands = 0.1,
+  .ends_singular = 0.1,
 
   /* A sample does not affect the next step: an error of a hundredth is acceptable. */
   .sample = 1e-2,

@@ -105,7 +105,7 @@ static void specialised_note (pw_run *r) {
 int pw_specialised_project (const pw_projector *p, pw_run *r, double t, double *q, double *v, double *a,
                             double *lambda) {
   pw_scene *s = r->scene;
-  if (!p->by_mass || p->alone || !pw_specialised_suits (r)) return 0;
+  if (!p->by_mass || p->ignores_inactive || !pw_specialised_suits (r)) return 0;
   pw_specialised_scale (r);
   if (r->specialised->project (s, t, q, v, a, lambda, r->w->configuration, r->w->J)) return 0;
   specialised_evaluated (r, q, v, s->iterations);

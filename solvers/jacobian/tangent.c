@@ -17,7 +17,7 @@ static void tangent_number_rows (pw_tangent *x) {
 
 int pw_tangent_open (pw_tangent *x, pw_run *r) {
   *x = (pw_tangent){ .run = r };
-  r->differentiates = 1;
+  r->uses_derivatives = 1;
   const pw_system *s = r->s;
   for (pw_layout l = { 0 }; pw_layout_pass (&l, &x->memory);) {
     x->map = pw_layout_alloc (&l, (size_t)s->rows, sizeof *x->map);

@@ -101,7 +101,7 @@ static double step_norm (const pw_variation *x, const pw_direction_copy *d) {
 
 static double step_energy_norm (const pw_variation *x, const pw_direction_copy *d) {
   double energy = fmax (d->column->energy, step_largest_energy (x, d->column->trial));
-  return fmax (energy, STEP_LEAST_ENERGY * fmax (x->r->exchanged, x->r->energy_scene) * step_norm (x, d));
+  return fmax (energy, STEP_LEAST_ENERGY * fmax (x->r->exchanged, x->r->scene_energy) * step_norm (x, d));
 }
 
 /* The largest relative error of all derivatives. */

@@ -34,7 +34,7 @@ static const struct {
   { WATCHDOG_LIMIT (growth), 0, WATCHDOG_FEWER, "n-four-bar", NULL, 0, "rk4+projection", 1e-2, 2 },
   { WATCHDOG_LIMIT (agree_best), 1e5, WATCHDOG_FEWER, "n-four-bar", NULL, 0, "rk4+projection", 1e-3, 4 },
   { WATCHDOG_LIMIT (agree), 1e-6, WATCHDOG_EARLIER, "n-four-bar", NULL, 0, "rk4+projection", 1e-3, 4 },
-  { WATCHDOG_LIMIT (lands), 0, WATCHDOG_EARLIER, "n-four-bar", NULL, 0, "rk4+projection", 7.842e-4, 4 },
+  { WATCHDOG_LIMIT (ends_singular), 0, WATCHDOG_EARLIER, "n-four-bar", NULL, 0, "rk4+projection", 7.842e-4, 4 },
   { WATCHDOG_LIMIT (regular), 0, WATCHDOG_LATER, "n-four-bar", "N", 1, "erk8+none", 1e-5, 4 },
   { WATCHDOG_LIMIT (turn), 4, WATCHDOG_LATER, "n-four-bar", "N", 1, "bdf+none", 1e-5, 4 },
   { WATCHDOG_LIMIT (least_turn), 1e4, WATCHDOG_LATER, "n-four-bar", "N", 1, "bdf+none", 1e-5, 4 },
@@ -136,10 +136,10 @@ static void test_evaluations (void **state) {
   r->limits.refine = 0;
   check_below ("projected", projected, 0.1 * watchdog_projected (r, angle), "eps / s instead of eps / s^2");
   check_below ("refined", refined, 0.1 * watchdog_residual (r, angle), "eps / s instead of eps / s^2");
-  r->refuse = 2 * sine;
+  r->refused_sine = 2 * sine;
   watchdog_bend (r, angle);
   assert_int_equal (pw_run_accelerate (r, 0, r->q, r->v, r->a, r->lambda), PW_RETRY);
-  r->refuse = 0.5 * sine;
+  r->refused_sine = 0.5 * sine;
   assert_int_equal (pw_run_accelerate (r, 0, r->q, r->v, r->a, r->lambda), PW_OK);
   assert_true (r->limits.rank == pw_watchdog_limits.rank);
   pw_run_close (r);
