@@ -6,7 +6,7 @@
 #include "contact.h"
 
 PREPARE (marker_prepare, pw_marker, contact) {
-  *k = contact_along (d->at, 0);
+  *element = contact_along (definition->at, 0);
   return PW_OK;
 }
 

@@ -6,7 +6,7 @@
 #include "points.h"
 
 PREPARE (pin_prepare, pw_pin, points) {
-  *k = points_make (d->at);
+  *element = points_make (definition->at);
   return PW_OK;
 }
 

@@ -22,12 +22,12 @@ typedef struct {
   double L;
 } rod_state;
 
-static inline rod_state rod_at (const pw_batch *b, int e) {
-  const rod *k = (const rod *)b->element + e;
-  rod_state x = { .p = points_of (&k->points, b, e), .L = k->length };
-  points_J_one (x.p, x.D);
-  x.w1 = x.p.A->omega, x.w2 = x.p.B->omega;
-  return x;
+static inline rod_state rod_at (const pw_batch *batch, int e) {
+  const rod *element = (const rod *)batch->element + e;
+  rod_state now = { .p = points_of (&element->points, batch, e), .L = element->length };
+  points_J_one (now.p, now.D);
+  now.w1 = now.p.body1->omega, now.w2 = now.p.body2->omega;
+  return now;
 }
 
 static inline double rod_dot (const double *a, const double *b) {
@@ -35,58 +35,58 @@ static inline double rod_dot (const double *a, const double *b) {
 }
 
 /* out = y^T D / L */
-static inline void rod_through (const rod_state *x, const double y[2], double *out) {
-  for (int j = 0; j < 6; j++) out[j] = (y[0] * x->D[j] + y[1] * x->D[6 + j]) / x->L;
+static inline void rod_multiply_D (const rod_state *now, const double y[2], double *out) {
+  for (int j = 0; j < 6; j++) out[j] = (y[0] * now->D[j] + y[1] * now->D[6 + j]) / now->L;
 }
 
 PREPARE (rod_prepare, pw_rod, rod) {
-  *k = (rod){ points_make (d->at), d->length };
+  *element = (rod){ points_make (definition->at), definition->length };
   return PW_OK;
 }
 
 PER_ELEMENT (rod_g, rod, 1) {
-  *out = (rod_dot (x.p.d, x.p.d) - x.L * x.L) / (2 * x.L);
+  *out = (rod_dot (now.p.d, now.p.d) - now.L * now.L) / (2 * now.L);
 }
 
 PER_ELEMENT (rod_g_size, rod, 1) {
   double size[2];
-  points_g_size_one (x.p, size);
-  *out = (fabs (x.p.d[0]) * size[0] + fabs (x.p.d[1]) * size[1]) / x.L + x.L / 2;
+  points_g_size_one (now.p, size);
+  *out = (fabs (now.p.d[0]) * size[0] + fabs (now.p.d[1]) * size[1]) / now.L + now.L / 2;
 }
 
 PER_ELEMENT (rod_J, rod, 6) {
-  rod_through (&x, x.p.d, out);
+  rod_multiply_D (&now, now.p.d, out);
 }
 
 PER_ELEMENT (rod_gamma, rod, 1) {
-  double turn = x.w1 * x.w1 * rod_dot (x.p.d, x.p.S1) - x.w2 * x.w2 * rod_dot (x.p.d, x.p.S2);
-  *out = (turn - rod_dot (x.p.rate, x.p.rate)) / x.L;
+  double centripetal = now.w1 * now.w1 * rod_dot (now.p.d, now.p.S1) - now.w2 * now.w2 * rod_dot (now.p.d, now.p.S2);
+  *out = (centripetal - rod_dot (now.p.rate, now.p.rate)) / now.L;
 }
 
 /* ((D w)^T D + d^T d(D w)/dq) / L with d(D w)/dphi1 = -(X1, Y1) w_2, d(D w)/dphi2 = (X2, Y2) w_5. */
 PER_ELEMENT (rod_jw_q, rod, 6) {
   double Dw[2] = { 0, 0 };
-  for (int j = 0; j < 6; j++) Dw[0] += x.D[j] * x.p.w[j], Dw[1] += x.D[6 + j] * x.p.w[j];
-  rod_through (&x, Dw, out);
-  out[2] -= rod_dot (x.p.d, x.p.S1) * x.p.w[2] / x.L;
-  out[5] += rod_dot (x.p.d, x.p.S2) * x.p.w[5] / x.L;
+  for (int j = 0; j < 6; j++) Dw[0] += now.D[j] * now.p.w[j], Dw[1] += now.D[6 + j] * now.p.w[j];
+  rod_multiply_D (&now, Dw, out);
+  out[2] -= rod_dot (now.p.d, now.p.S1) * now.p.w[2] / now.L;
+  out[5] += rod_dot (now.p.d, now.p.S2) * now.p.w[5] / now.L;
 }
 
 /* dd'/dphi1 = -w1 (X1, Y1), dd'/dphi2 = w2 (X2, Y2); derivatives of the arms are columns of D, for arm 2 negated. */
 PER_ELEMENT (rod_gamma_q, rod, 6) {
-  const double square1 = x.w1 * x.w1, square2 = x.w2 * x.w2, *d = x.p.d;
-  double turn[2];
-  points_gamma_one (x.p, turn);
-  rod_through (&x, turn, out);
-  out[2] += (square1 * (d[0] * x.D[2] + d[1] * x.D[8]) + 2 * x.w1 * rod_dot (x.p.rate, x.p.S1)) / x.L;
-  out[5] += (square2 * (d[0] * x.D[5] + d[1] * x.D[11]) - 2 * x.w2 * rod_dot (x.p.rate, x.p.S2)) / x.L;
+  const double square1 = now.w1 * now.w1, square2 = now.w2 * now.w2, *d = now.p.d;
+  double centripetal[2];
+  points_gamma_one (now.p, centripetal);
+  rod_multiply_D (&now, centripetal, out);
+  out[2] += (square1 * (d[0] * now.D[2] + d[1] * now.D[8]) + 2 * now.w1 * rod_dot (now.p.rate, now.p.S1)) / now.L;
+  out[5] += (square2 * (d[0] * now.D[5] + d[1] * now.D[11]) - 2 * now.w2 * rod_dot (now.p.rate, now.p.S2)) / now.L;
 }
 
 PER_ELEMENT (rod_gamma_v, rod, 6) {
-  const double minus_twice[2] = { -2 * x.p.rate[0], -2 * x.p.rate[1] };
-  rod_through (&x, minus_twice, out);
-  out[2] += 2 * x.w1 * rod_dot (x.p.d, x.p.S1) / x.L;
-  out[5] -= 2 * x.w2 * rod_dot (x.p.d, x.p.S2) / x.L;
+  const double minus_twice[2] = { -2 * now.p.rate[0], -2 * now.p.rate[1] };
+  rod_multiply_D (&now, minus_twice, out);
+  out[2] += 2 * now.w1 * rod_dot (now.p.d, now.p.S1) / now.L;
+  out[5] -= 2 * now.w2 * rod_dot (now.p.d, now.p.S2) / now.L;
 }
 
 static const pw_field rod_fields[] = {

@@ -8,43 +8,43 @@
 #include "line.h"
 
 PREPARE (slider_prepare, pw_slider, line) {
-  *k = line_make (d->at, d->heading);
-  k->angle = d->angle;
+  *element = line_make (definition->at, definition->heading);
+  element->angle = definition->angle;
   return PW_OK;
 }
 
 PER_ELEMENT (slider_g, line, 2) {
-  line_g_one (x, out);
-  out[1] = x.A->phi - x.B->phi - x.k->angle;
+  line_g_one (now, out);
+  out[1] = now.body1->phi - now.body2->phi - now.constants->angle;
 }
 
 PER_ELEMENT (slider_g_size, line, 2) {
-  line_g_size_one (x, out);
-  out[1] = fabs (x.A->phi) + fabs (x.B->phi) + fabs (x.k->angle);
+  line_g_size_one (now, out);
+  out[1] = fabs (now.body1->phi) + fabs (now.body2->phi) + fabs (now.constants->angle);
 }
 
 PER_ELEMENT (slider_J, line, 12) {
-  line_J_one (x, out);
+  line_J_one (now, out);
   out[6] = out[7] = out[9] = out[10] = 0, out[8] = 1, out[11] = -1;
 }
 
 PER_ELEMENT (slider_gamma, line, 2) {
-  line_gamma_one (x, out);
+  line_gamma_one (now, out);
   out[1] = 0;
 }
 
 PER_ELEMENT (slider_jw_q, line, 12) {
-  line_jw_q_one (x, out);
+  line_jw_q_one (now, out);
   memset (out + 6, 0, 6 * sizeof *out);
 }
 
 PER_ELEMENT (slider_gamma_q, line, 12) {
-  line_gamma_q_one (x, out);
+  line_gamma_q_one (now, out);
   memset (out + 6, 0, 6 * sizeof *out);
 }
 
 PER_ELEMENT (slider_gamma_v, line, 12) {
-  line_gamma_v_one (x, out);
+  line_gamma_v_one (now, out);
   memset (out + 6, 0, 6 * sizeof *out);
 }
 

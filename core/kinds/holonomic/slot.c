@@ -6,7 +6,7 @@
 #include "line.h"
 
 PREPARE (slot_prepare, pw_slot, line) {
-  *k = line_make (d->at, d->heading);
+  *element = line_make (definition->at, definition->heading);
   return PW_OK;
 }
 

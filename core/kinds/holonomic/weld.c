@@ -3,14 +3,14 @@
  *   g     = ( d,  phi1 - phi2 + beta ) = 0,  d = r1 + R(phi1) s1 - r2 - R(phi2) s2     (3 holonomic equations)
  *   gamma = ( as in points.h,  0 )
  *
- * points.h has the derivatives of the first two equations.  The force -lambda(1, 2) in world axes, at the common point, and
- * the moment -lambda(3) act on body 1; the opposites act on body 2. */
+ * points.h has the derivatives of the first two equations.  The force -lambda(1, 2) in world axes, at the common point,
+ * and the moment -lambda(3) act on body 1; the opposites act on body 2. */
 #include <string.h>
 #include "points.h"
 
 typedef struct {
   points points;
-  double beta; /* phi2 - phi1 [rad] */
+  double beta; /* [rad] */
 } weld;
 
 /* A weld in the current state. */
@@ -19,48 +19,48 @@ typedef struct {
   double beta;
 } weld_state;
 
-static inline weld_state weld_at (const pw_batch *b, int e) {
-  const weld *k = (const weld *)b->element + e;
-  return (weld_state){ points_of (&k->points, b, e), k->beta };
+static inline weld_state weld_at (const pw_batch *batch, int e) {
+  const weld *element = (const weld *)batch->element + e;
+  return (weld_state){ points_of (&element->points, batch, e), element->beta };
 }
 
 PREPARE (weld_prepare, pw_weld, weld) {
-  *k = (weld){ points_make (d->at), d->angle };
+  *element = (weld){ points_make (definition->at), definition->angle };
   return PW_OK;
 }
 
 PER_ELEMENT (weld_g, weld, 3) {
-  points_g_one (x.p, out);
-  out[2] = x.p.A->phi - x.p.B->phi + x.beta;
+  points_g_one (now.p, out);
+  out[2] = now.p.body1->phi - now.p.body2->phi + now.beta;
 }
 
 PER_ELEMENT (weld_g_size, weld, 3) {
-  points_g_size_one (x.p, out);
-  out[2] = fabs (x.p.A->phi) + fabs (x.p.B->phi) + fabs (x.beta);
+  points_g_size_one (now.p, out);
+  out[2] = fabs (now.p.body1->phi) + fabs (now.p.body2->phi) + fabs (now.beta);
 }
 
 PER_ELEMENT (weld_J, weld, 18) {
-  points_J_one (x.p, out);
+  points_J_one (now.p, out);
   out[12] = out[13] = out[15] = out[16] = 0, out[14] = 1, out[17] = -1;
 }
 
 PER_ELEMENT (weld_gamma, weld, 3) {
-  points_gamma_one (x.p, out);
+  points_gamma_one (now.p, out);
   out[2] = 0;
 }
 
 PER_ELEMENT (weld_jw_q, weld, 18) {
-  points_jw_q_one (x.p, out);
+  points_jw_q_one (now.p, out);
   memset (out + 12, 0, 6 * sizeof *out);
 }
 
 PER_ELEMENT (weld_gamma_q, weld, 18) {
-  points_gamma_q_one (x.p, out);
+  points_gamma_q_one (now.p, out);
   memset (out + 12, 0, 6 * sizeof *out);
 }
 
 PER_ELEMENT (weld_gamma_v, weld, 18) {
-  points_gamma_v_one (x.p, out);
+  points_gamma_v_one (now.p, out);
   memset (out + 12, 0, 6 * sizeof *out);
 }
 

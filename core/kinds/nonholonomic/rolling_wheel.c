@@ -21,68 +21,72 @@ typedef struct {
   double radius;
 } rolling_state;
 
-static inline rolling_state rolling_at (const pw_batch *b, int e) {
-  const rolling *k = (const rolling *)b->element + e;
-  return (rolling_state){ contact_of (k->across, b, e), contact_of (k->along, b, e), k->radius };
+static inline rolling_state rolling_at (const pw_batch *batch, int e) {
+  const rolling *element = (const rolling *)batch->element + e;
+  return (rolling_state){ contact_of (element->across, batch, e), contact_of (element->along, batch, e),
+                          element->radius };
 }
 
 /* The spin rate for rolling at the initial velocity of the body. */
-static double rolling_spin_rate (const rolling *k, const pw_body *body) {
-  double angle = body->start[2] + k->along.heading;
-  return (pw_cos (angle) * body->rate[0] + pw_sin (angle) * body->rate[1] + k->along.arm * body->rate[2]) / k->radius;
+static double rolling_spin_rate (const rolling *element, const pw_body *body) {
+  double angle = body->start[2] + element->along.heading;
+  return (pw_cos (angle) * body->rate[0] + pw_sin (angle) * body->rate[1] + element->along.arm * body->rate[2]) /
+         element->radius;
 }
 
 PREPARE (rolling_prepare, pw_rolling_wheel, rolling) {
-  *k = (rolling){ contact_across (d->at, d->heading), contact_along (d->at, d->heading), d->radius };
-  internal[0] = (pw_internal){
-    d->inertia, d->start, d->rate != 0 ? d->rate : rolling_spin_rate (k, bodies[0]), { d->start != 0, d->rate != 0 }
-  };
+  *element = (rolling){ contact_across (definition->at, definition->heading),
+                        contact_along (definition->at, definition->heading), definition->radius };
+  internal[0] = (pw_internal){ definition->inertia,
+                               definition->start,
+                               definition->rate != 0 ? definition->rate : rolling_spin_rate (element, bodies[0]),
+                               { definition->start != 0, definition->rate != 0 } };
   return PW_OK;
 }
 
 PER_ELEMENT (rolling_J, rolling, 8) {
-  contact_J_one (x.across, out);
-  contact_J_one (x.along, out + 4);
-  out[3] = 0, out[7] = -x.radius;
+  contact_J_one (now.across, out);
+  contact_J_one (now.along, out + 4);
+  out[3] = 0, out[7] = -now.radius;
 }
 
 PER_ELEMENT (rolling_gamma, rolling, 2) {
-  contact_gamma_one (x.across, out);
-  contact_gamma_one (x.along, out + 1);
+  contact_gamma_one (now.across, out);
+  contact_gamma_one (now.along, out + 1);
 }
 
 PER_ELEMENT (rolling_jw_q, rolling, 8) {
-  contact_jw_q_one (x.across, out);
-  contact_jw_q_one (x.along, out + 4);
+  contact_jw_q_one (now.across, out);
+  contact_jw_q_one (now.along, out + 4);
   out[3] = out[7] = 0;
 }
 
 PER_ELEMENT (rolling_gamma_q, rolling, 8) {
-  contact_gamma_q_one (x.across, out);
-  contact_gamma_q_one (x.along, out + 4);
+  contact_gamma_q_one (now.across, out);
+  contact_gamma_q_one (now.along, out + 4);
   out[3] = out[7] = 0;
 }
 
 PER_ELEMENT (rolling_gamma_v, rolling, 8) {
-  contact_gamma_v_one (x.across, out);
-  contact_gamma_v_one (x.along, out + 4);
+  contact_gamma_v_one (now.across, out);
+  contact_gamma_v_one (now.along, out + 4);
   out[3] = out[7] = 0;
 }
 
-static void rolling_force (const pw_batch *b, double *out) {
-  for (int e = 0; e < b->count; e++, out += 4) out[0] = out[1] = out[2] = 0, out[3] = b->u[3 * e];
+static void rolling_force (const pw_batch *batch, double *out) {
+  for (int e = 0; e < batch->count; e++, out += 4) out[0] = out[1] = out[2] = 0, out[3] = batch->u[3 * e];
 }
 
-static void rolling_force_u (const pw_batch *b, double *out) {
-  for (int e = 0; e < b->count; e++, out += 4) out[0] = out[1] = out[2] = 0, out[3] = 1;
+static void rolling_force_u (const pw_batch *batch, double *out) {
+  for (int e = 0; e < batch->count; e++, out += 4) out[0] = out[1] = out[2] = 0, out[3] = 1;
 }
 
-static void rolling_power (const pw_batch *b, double *out) {
-  for (int e = 0; e < b->count; e++) out[e] = b->u[3 * e] * b->v[e];
+static void rolling_power (const pw_batch *batch, double *out) {
+  for (int e = 0; e < batch->count; e++) out[e] = batch->u[3 * e] * batch->v[e];
 }
 
 PER_ELEMENT (rolling_contact, rolling, 3) {
-  contact_place_one (x.along, out);
+  contact_place_one (now.along, out);
 }
 
 static const pw_field rolling_fields[] = {

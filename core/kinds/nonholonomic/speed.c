@@ -9,13 +9,13 @@
 #include "contact.h"
 
 PREPARE (speed_prepare, pw_speed, contact) {
-  *k = contact_along (d->at, d->heading);
+  *element = contact_along (definition->at, definition->heading);
   return PW_OK;
 }
 
-static void speed_gamma (const pw_batch *b, double *out) {
-  contact_gamma (b, out);
-  for (int e = 0; e < b->count; e++) out[e] += b->u[3 * e + 1];
+static void speed_gamma (const pw_batch *batch, double *out) {
+  contact_gamma (batch, out);
+  for (int e = 0; e < batch->count; e++) out[e] += batch->u[3 * e + 1];
 }
 
 static const pw_field speed_fields[] = {
@@ -40,7 +40,7 @@ const pw_kind pw_kind_speed = {
   .signals = 1,
   .level = PW_NONHOLONOMIC,
   .reaction = speed_reaction,
-  .eta = batch_signal,
+  .eta = batch_eta_of_signal,
   .J = contact_J,
   .gamma = speed_gamma,
   .jw_q = contact_jw_q,

@@ -1,14 +1,14 @@
 /* wheel: a knife edge; the contact point P has no velocity perpendicular to the heading (contact.h).
  *
  *   n . v_P = 0,  n = (-sin, cos)(phi + psi)                      (1 nonholonomic equation)
- *   S     = [ -sin(theta)  cos(theta)  l ]      theta = phi + psi, l = s . (cos psi, sin psi): the arm along the heading
+ *   S     = [ -sin(theta)  cos(theta)  l ]      theta = phi + psi; l = s . (cos psi, sin psi): arm along the heading
  *   gamma = w (cos(theta) vx + sin(theta) vy)                     so that S a = gamma
  *
  * The lateral force on the body, along n, is N = -lambda. */
 #include "contact.h"
 
 PREPARE (wheel_prepare, pw_wheel, contact) {
-  *k = contact_across (d->at, d->heading);
+  *element = contact_across (definition->at, definition->heading);
   return PW_OK;
 }
 
