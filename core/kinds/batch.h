@@ -57,8 +57,8 @@ LIBM (libm_hypot (libm_lanes x, libm_lanes y)) {
 #endif
 
 /* PER_ELEMENT (rod_J, rod, 6) { ... } defines the batch function rod_J, and rod_J_one, the same for one element.  The
- * braces contain the body of the latter: it fills `out`, the 6 numbers of the element, from `now`, a rod_state, which is
- * the element in the current state of the scene, as rod_at (batch, e) returns it. */
+ * braces contain the body of the latter: it fills `out`, the 6 numbers of the element, from `now`, a rod_state: the
+ * element in the current state of the scene, as rod_at (batch, e) returns it. */
 #define PER_ELEMENT(function, type, size)                                                           \
   static inline void function##_one (type##_state now, double *out);                                \
   FLATTEN static inline void function (const pw_batch *batch, double *out) {                        \

@@ -1,5 +1,5 @@
-/* Viscous friction and regularised Coulomb friction, which oppose a relative velocity v; v may be an angular velocity and
- * F a torque.
+/* Viscous friction and regularised Coulomb friction, which oppose a relative velocity v.  If v is an angular velocity,
+ * F is a torque.
  *
  *   F = c v + L tanh (v / v0),  dF/dv = c + (L / v0) (1 - tanh^2 (v / v0)),  loss = F v >= 0
  *
@@ -40,8 +40,8 @@ static inline double coulomb_saturation (const coulomb *law, double v, double de
   return derivative != 0 && law->inverse > 0 ? (1 / law->inverse + fabs (v)) / fabs (derivative) : INFINITY;
 }
 
-/* COULOMB (friction, 6) defines friction_force, friction_force_v, friction_saturation and friction_loss for elements of 6
- * coordinates with f = -F S, v = S (their velocities).  friction_state has the members law, v, S[6] and v_q[6] = dv/dq. */
+/* COULOMB (friction, 6) defines friction_force, friction_force_v, friction_saturation and friction_loss for elements of
+ * 6 coordinates q with f = -F S, v = S q'.  friction_state has the members law, v, S[6] and v_q[6] = dv/dq. */
 #define COULOMB(type, cols)                                                                    \
   PER_ELEMENT (type##_force, type, cols) {                                                     \
     double F = coulomb_force (now.law, now.v);                                                 \

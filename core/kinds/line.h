@@ -26,9 +26,9 @@ typedef struct {
 typedef struct {
   const line *constants;
   const pw_configuration *body1, *body2;
-  const double *w, *u; /* the vector w of jw_q, else NULL; the signal of a drive, with two time derivatives */
-  double nx, ny, tx, ty, X, Y, Dx, Dy; /* n, t, a = (X, Y) and D, in world axes */
-  double na, nD, ta, tD;               /* n.a, n.D, t.a, t.D */
+  const double *w, *u;           /* the vector w of jw_q, else NULL; the signal of a drive, with two time derivatives */
+  double n[2], t[2], a[2], D[2]; /* in world axes */
+  double na, nD, ta, tD;         /* n.a, n.D, t.a, t.D */
 } line_state;
 
 static inline line line_make (const double at[2][2], double heading) {
@@ -40,18 +40,14 @@ static inline line line_make (const double at[2][2], double heading) {
 /* A line of element e of a batch of elements with two bodies and at most one signal. */
 static inline line_state line_of (const line *constants, const pw_batch *batch, int e) {
   const pw_configuration *body1 = batch_body1 (batch, e), *body2 = batch_body2 (batch, e);
-  line_state s = {
-    .constants = constants, .body1 = body1, .body2 = body2, .w = batch_w (batch, e), .u = batch->u + 3 * e
-  };
-  s.nx = body2->cos * constants->n[0] - body2->sin * constants->n[1],
-  s.ny = body2->sin * constants->n[0] + body2->cos * constants->n[1];
-  s.tx = s.ny, s.ty = -s.nx;
-  s.X = body1->cos * constants->s1[0] - body1->sin * constants->s1[1],
-  s.Y = body1->sin * constants->s1[0] + body1->cos * constants->s1[1];
-  s.Dx = body1->x + s.X - body2->x, s.Dy = body1->y + s.Y - body2->y;
-  s.na = s.nx * s.X + s.ny * s.Y, s.nD = s.nx * s.Dx + s.ny * s.Dy;
-  s.ta = s.tx * s.X + s.ty * s.Y, s.tD = s.tx * s.Dx + s.ty * s.Dy;
-  return s;
+  line_state now = { constants, body1, body2, .w = batch_w (batch, e), .u = batch->u + 3 * e };
+  to_world (body2, constants->n, now.n);
+  to_world (body1, constants->s1, now.a);
+  now.t[0] = now.n[1], now.t[1] = -now.n[0];
+  now.D[0] = body1->x + now.a[0] - body2->x, now.D[1] = body1->y + now.a[1] - body2->y;
+  now.na = now.n[0] * now.a[0] + now.n[1] * now.a[1], now.nD = now.n[0] * now.D[0] + now.n[1] * now.D[1];
+  now.ta = now.t[0] * now.a[0] + now.t[1] * now.a[1], now.tD = now.t[0] * now.D[0] + now.t[1] * now.D[1];
+  return now;
 }
 
 static inline line_state line_at (const pw_batch *batch, int e) {
@@ -63,36 +59,36 @@ PER_ELEMENT (line_g, line, 1) {
 }
 
 PER_ELEMENT (line_g_size, line, 1) {
-  *out = fabs (now.nx) * (fabs (now.body1->x) + fabs (now.X) + fabs (now.body2->x)) +
-         fabs (now.ny) * (fabs (now.body1->y) + fabs (now.Y) + fabs (now.body2->y)) + fabs (now.constants->c);
+  *out = fabs (now.n[0]) * (fabs (now.body1->x) + fabs (now.a[0]) + fabs (now.body2->x)) +
+         fabs (now.n[1]) * (fabs (now.body1->y) + fabs (now.a[1]) + fabs (now.body2->y)) + fabs (now.constants->c);
 }
 
 PER_ELEMENT (line_J, line, 6) {
-  out[0] = now.nx, out[1] = now.ny, out[2] = now.ta, out[3] = -now.nx, out[4] = -now.ny, out[5] = -now.tD;
+  out[0] = now.n[0], out[1] = now.n[1], out[2] = now.ta, out[3] = -now.n[0], out[4] = -now.n[1], out[5] = -now.tD;
 }
 
 PER_ELEMENT (line_gamma, line, 1) {
   double w1 = now.body1->omega, w2 = now.body2->omega,
-         tV = now.tx * (now.body1->vx - now.body2->vx) + now.ty * (now.body1->vy - now.body2->vy);
+         tV = now.t[0] * (now.body1->vx - now.body2->vx) + now.t[1] * (now.body1->vy - now.body2->vy);
   *out = 2 * w2 * tV + w1 * (w1 - 2 * w2) * now.na + w2 * w2 * now.nD;
 }
 
 /* out = factor H w */
-static inline void line_multiply_H (const line_state *s, double factor, const double w[6], double *out) {
-  out[0] = -factor * s->tx * w[5];
-  out[1] = -factor * s->ty * w[5];
-  out[2] = factor * s->na * (w[5] - w[2]);
+static inline void line_multiply_H (const line_state *now, double factor, const double w[6], double *out) {
+  out[0] = -factor * now->t[0] * w[5];
+  out[1] = -factor * now->t[1] * w[5];
+  out[2] = factor * now->na * (w[5] - w[2]);
   out[3] = -out[0];
   out[4] = -out[1];
-  out[5] = factor * (s->na * w[2] - s->nD * w[5] - s->tx * (w[0] - w[3]) - s->ty * (w[1] - w[4]));
+  out[5] = factor * (now->na * w[2] - now->nD * w[5] - now->t[0] * (w[0] - w[3]) - now->t[1] * (w[1] - w[4]));
 }
 
 /* out = factor H, 6 x 6 */
-static inline void line_scaled_H (const line_state *s, double factor, double *out) {
+static inline void line_scaled_H (const line_state *now, double factor, double *out) {
   memset (out, 0, 36 * sizeof *out);
-  out[5] = out[30] = -factor * s->tx, out[11] = out[31] = -factor * s->ty;
-  out[23] = out[33] = factor * s->tx, out[29] = out[34] = factor * s->ty;
-  out[14] = -factor * s->na, out[17] = out[32] = factor * s->na, out[35] = -factor * s->nD;
+  out[5] = out[30] = -factor * now->t[0], out[11] = out[31] = -factor * now->t[1];
+  out[23] = out[33] = factor * now->t[0], out[29] = out[34] = factor * now->t[1];
+  out[14] = -factor * now->na, out[17] = out[32] = factor * now->na, out[35] = -factor * now->nD;
 }
 
 PER_ELEMENT (line_jw_q, line, 6) {
@@ -101,9 +97,9 @@ PER_ELEMENT (line_jw_q, line, 6) {
 
 PER_ELEMENT (line_gamma_q, line, 6) {
   double w1 = now.body1->omega, w2 = now.body2->omega,
-         nV = now.nx * (now.body1->vx - now.body2->vx) + now.ny * (now.body1->vy - now.body2->vy);
-  out[0] = w2 * w2 * now.nx;
-  out[1] = w2 * w2 * now.ny;
+         nV = now.n[0] * (now.body1->vx - now.body2->vx) + now.n[1] * (now.body1->vy - now.body2->vy);
+  out[0] = w2 * w2 * now.n[0];
+  out[1] = w2 * w2 * now.n[1];
   out[2] = (w1 - w2) * (w1 - w2) * now.ta;
   out[3] = -out[0];
   out[4] = -out[1];

@@ -136,7 +136,8 @@ static void test_refused (void **state) {
   (void)state;
   tyre_refused (5, 0,
                 "model scene: tyre T: friction = 0: expected > 0, since a load limits the force to friction x load");
-  tyre_refused (0, 0.4, "model scene: tyre T: load = 0: expected > 0, since friction limits the force to friction x load");
+  tyre_refused (0, 0.4,
+                "model scene: tyre T: load = 0: expected > 0, since friction limits the force to friction x load");
 }
 
 /* ---- A car that brakes away at the rear: both laws, a load that is reached, arms, headings ---- */

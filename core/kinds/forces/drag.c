@@ -35,7 +35,8 @@ PREPARE (drag_prepare, pw_drag, drag) {
 }
 
 PER_ELEMENT (drag_force, drag, 3) {
-  out[0] = -now.force_per_speed * now.body->vx, out[1] = -now.force_per_speed * now.body->vy,
+  out[0] = -now.force_per_speed * now.body->vx;
+  out[1] = -now.force_per_speed * now.body->vy;
   out[2] = -now.moment_per_omega * now.body->omega;
 }
 

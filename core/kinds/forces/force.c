@@ -17,8 +17,9 @@ typedef struct {
 typedef struct {
   const force *element;
   const pw_configuration *body;
-  double cos, sin;        /* of the angle of the axes along which it is given */
-  double X, Y, Fx, Fy, M; /* arm, components in the world, moment */
+  double cos, sin;  /* of the angle of the axes along which it is given */
+  double arm[2];    /* (X, Y) */
+  double Fx, Fy, M; /* components in the world, moment */
 } force_state;
 
 static inline force_state force_at (const pw_batch *batch, int e) {
@@ -27,10 +28,9 @@ static inline force_state force_at (const pw_batch *batch, int e) {
   const double *ux = batch->u + 6 * e, *uy = ux + 3; /* the signals, each with two time derivatives */
   force_state now = { element, body, .cos = element->body_axes > 0 ? body->cos : 1,
                       .sin = element->body_axes > 0 ? body->sin : 0 };
-  now.X = body->cos * element->at[0] - body->sin * element->at[1],
-  now.Y = body->sin * element->at[0] + body->cos * element->at[1];
+  to_world (body, element->at, now.arm);
   now.Fx = now.cos * ux[0] - now.sin * uy[0], now.Fy = now.sin * ux[0] + now.cos * uy[0];
-  now.M = now.X * now.Fy - now.Y * now.Fx;
+  now.M = now.arm[0] * now.Fy - now.arm[1] * now.Fx;
   return now;
 }
 
@@ -46,7 +46,7 @@ PER_ELEMENT (force_force, force, 3) {
 PER_ELEMENT (force_force_u, force, 6) {
   out[0] = now.cos, out[1] = -now.sin;
   out[2] = now.sin, out[3] = now.cos;
-  out[4] = now.X * now.sin - now.Y * now.cos, out[5] = now.X * now.cos + now.Y * now.sin;
+  out[4] = now.arm[0] * now.sin - now.arm[1] * now.cos, out[5] = now.arm[0] * now.cos + now.arm[1] * now.sin;
 }
 
 /* A force that turns with the body has a constant moment. */
@@ -55,7 +55,7 @@ PER_ELEMENT (force_force_q, force, 9) {
   if (now.element->body_axes > 0)
     out[2] = -now.Fy, out[5] = now.Fx;
   else
-    out[8] = -now.X * now.Fx - now.Y * now.Fy;
+    out[8] = -now.arm[0] * now.Fx - now.arm[1] * now.Fy;
 }
 
 PER_ELEMENT (force_power, force, 1) {

@@ -1,6 +1,6 @@
 /* friction: a torque opposing the rotation of body 1 relative to body 2, as in a pin.
  *
- *   f = (0, 0, -T | 0, 0, T) = -T S,  S = [ 0 0 1 | 0 0 -1 ],  loss = T w >= 0,  w = w1 - w2      T(w): F(v) of coulomb.h
+ *   f = (0, 0, -T | 0, 0, T) = -T S,  S = [ 0 0 1 | 0 0 -1 ],  loss = T w >= 0,  w = w1 - w2    T(w): F(v) of coulomb.h
  *
  * The limit is the friction coefficient times radius times load. */
 #include "coulomb.h"

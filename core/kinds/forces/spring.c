@@ -20,7 +20,7 @@ typedef struct {
 /* A spring in the current state. */
 typedef struct {
   const spring *element;
-  points_state p;
+  points_state ends;
   double D[12];            /* 2 x 6 */
   double e[2], l, inverse; /* e, l, 1 / l; e and 1 / l are 0 for l <= SPRING_SHORTEST */
   double speed;            /* l' */
@@ -29,12 +29,12 @@ typedef struct {
 
 static inline spring_state spring_at (const pw_batch *batch, int e) {
   const spring *element = (const spring *)batch->element + e;
-  spring_state now = { .element = element, .p = points_of (&element->points, batch, e) };
-  points_J_one (now.p, now.D);
-  now.l = hypot (now.p.d[0], now.p.d[1]);
+  spring_state now = { .element = element, .ends = points_of (&element->points, batch, e) };
+  points_J_one (now.ends, now.D);
+  now.l = hypot (now.ends.d[0], now.ends.d[1]);
   now.inverse = now.l > SPRING_SHORTEST ? 1 / now.l : 0;
-  now.e[0] = now.p.d[0] * now.inverse, now.e[1] = now.p.d[1] * now.inverse;
-  now.speed = now.e[0] * now.p.rate[0] + now.e[1] * now.p.rate[1];
+  now.e[0] = now.ends.d[0] * now.inverse, now.e[1] = now.ends.d[1] * now.inverse;
+  now.speed = now.e[0] * now.ends.rate[0] + now.e[1] * now.ends.rate[1];
   double pull = element->stiffness * (now.l - element->free_length) + element->damping * now.speed;
   now.F[0] = pull * now.e[0], now.F[1] = pull * now.e[1];
   return now;
@@ -46,8 +46,8 @@ PREPARE (spring_prepare, pw_spring, spring) {
 }
 
 PER_ELEMENT (spring_force, spring, 6) {
-  out[0] = -now.F[0], out[1] = -now.F[1], out[2] = now.F[0] * now.p.S1[1] - now.F[1] * now.p.S1[0];
-  out[3] = now.F[0], out[4] = now.F[1], out[5] = now.F[1] * now.p.S2[0] - now.F[0] * now.p.S2[1];
+  out[0] = -now.F[0], out[1] = -now.F[1], out[2] = now.F[0] * now.ends.S1[1] - now.F[1] * now.ends.S1[0];
+  out[3] = now.F[0], out[4] = now.F[1], out[5] = now.F[1] * now.ends.S2[0] - now.F[0] * now.ends.S2[1];
 }
 
 /* out = -D^T K D, 6 x 6; K = dF/dd or dF/dd'. */
@@ -63,12 +63,12 @@ static inline void spring_product (const spring_state *s, double K[2][2], double
  * K = dF/dd = (k (1 - l0/l) + c l'/l) (1 - e e^T) + k e e^T + (c/l) e (d' - l' e)^T */
 PER_ELEMENT (spring_force_q, spring, 36) {
   const double k = now.element->stiffness, c = now.element->damping, l0 = now.element->free_length;
-  const double *S1 = now.p.S1, *S2 = now.p.S2, w1 = now.p.body1->omega, w2 = now.p.body2->omega;
+  const double *S1 = now.ends.S1, *S2 = now.ends.S2, w1 = now.ends.body1->omega, w2 = now.ends.body2->omega;
   double across = now.inverse > 0 ? k * (1 - l0 * now.inverse) + c * now.speed * now.inverse : k, K[2][2];
   for (int i = 0; i < 2; i++)
     for (int j = 0; j < 2; j++)
       K[i][j] = across * (i == j) + (k - across) * now.e[i] * now.e[j] +
-                c * now.inverse * now.e[i] * (now.p.rate[j] - now.speed * now.e[j]);
+                c * now.inverse * now.e[i] * (now.ends.rate[j] - now.speed * now.e[j]);
   spring_product (&now, K, out);
   double speed_phi1 = -w1 * (now.e[0] * S1[0] + now.e[1] * S1[1]);
   double speed_phi2 = w2 * (now.e[0] * S2[0] + now.e[1] * S2[1]);

@@ -16,7 +16,7 @@ typedef struct {
 
 /* A rod in the current state. */
 typedef struct {
-  points_state p;
+  points_state ends;
   double D[12];  /* 2 x 6 */
   double w1, w2; /* angular velocities of the bodies */
   double L;
@@ -24,9 +24,9 @@ typedef struct {
 
 static inline rod_state rod_at (const pw_batch *batch, int e) {
   const rod *element = (const rod *)batch->element + e;
-  rod_state now = { .p = points_of (&element->points, batch, e), .L = element->length };
-  points_J_one (now.p, now.D);
-  now.w1 = now.p.body1->omega, now.w2 = now.p.body2->omega;
+  rod_state now = { .ends = points_of (&element->points, batch, e), .L = element->length };
+  points_J_one (now.ends, now.D);
+  now.w1 = now.ends.body1->omega, now.w2 = now.ends.body2->omega;
   return now;
 }
 
@@ -45,48 +45,50 @@ PREPARE (rod_prepare, pw_rod, rod) {
 }
 
 PER_ELEMENT (rod_g, rod, 1) {
-  *out = (rod_dot (now.p.d, now.p.d) - now.L * now.L) / (2 * now.L);
+  *out = (rod_dot (now.ends.d, now.ends.d) - now.L * now.L) / (2 * now.L);
 }
 
 PER_ELEMENT (rod_g_size, rod, 1) {
   double size[2];
-  points_g_size_one (now.p, size);
-  *out = (fabs (now.p.d[0]) * size[0] + fabs (now.p.d[1]) * size[1]) / now.L + now.L / 2;
+  points_g_size_one (now.ends, size);
+  *out = (fabs (now.ends.d[0]) * size[0] + fabs (now.ends.d[1]) * size[1]) / now.L + now.L / 2;
 }
 
 PER_ELEMENT (rod_J, rod, 6) {
-  rod_multiply_D (&now, now.p.d, out);
+  rod_multiply_D (&now, now.ends.d, out);
 }
 
 PER_ELEMENT (rod_gamma, rod, 1) {
-  double centripetal = now.w1 * now.w1 * rod_dot (now.p.d, now.p.S1) - now.w2 * now.w2 * rod_dot (now.p.d, now.p.S2);
-  *out = (centripetal - rod_dot (now.p.rate, now.p.rate)) / now.L;
+  double centripetal =
+      now.w1 * now.w1 * rod_dot (now.ends.d, now.ends.S1) - now.w2 * now.w2 * rod_dot (now.ends.d, now.ends.S2);
+  *out = (centripetal - rod_dot (now.ends.rate, now.ends.rate)) / now.L;
 }
 
 /* ((D w)^T D + d^T d(D w)/dq) / L with d(D w)/dphi1 = -(X1, Y1) w_2, d(D w)/dphi2 = (X2, Y2) w_5. */
 PER_ELEMENT (rod_jw_q, rod, 6) {
   double Dw[2] = { 0, 0 };
-  for (int j = 0; j < 6; j++) Dw[0] += now.D[j] * now.p.w[j], Dw[1] += now.D[6 + j] * now.p.w[j];
+  for (int j = 0; j < 6; j++) Dw[0] += now.D[j] * now.ends.w[j], Dw[1] += now.D[6 + j] * now.ends.w[j];
   rod_multiply_D (&now, Dw, out);
-  out[2] -= rod_dot (now.p.d, now.p.S1) * now.p.w[2] / now.L;
-  out[5] += rod_dot (now.p.d, now.p.S2) * now.p.w[5] / now.L;
+  out[2] -= rod_dot (now.ends.d, now.ends.S1) * now.ends.w[2] / now.L;
+  out[5] += rod_dot (now.ends.d, now.ends.S2) * now.ends.w[5] / now.L;
 }
 
 /* dd'/dphi1 = -w1 (X1, Y1), dd'/dphi2 = w2 (X2, Y2); derivatives of the arms are columns of D, for arm 2 negated. */
 PER_ELEMENT (rod_gamma_q, rod, 6) {
-  const double square1 = now.w1 * now.w1, square2 = now.w2 * now.w2, *d = now.p.d;
+  const double square1 = now.w1 * now.w1, square2 = now.w2 * now.w2, *d = now.ends.d;
   double centripetal[2];
-  points_gamma_one (now.p, centripetal);
+  points_gamma_one (now.ends, centripetal);
   rod_multiply_D (&now, centripetal, out);
-  out[2] += (square1 * (d[0] * now.D[2] + d[1] * now.D[8]) + 2 * now.w1 * rod_dot (now.p.rate, now.p.S1)) / now.L;
-  out[5] += (square2 * (d[0] * now.D[5] + d[1] * now.D[11]) - 2 * now.w2 * rod_dot (now.p.rate, now.p.S2)) / now.L;
+  out[2] += (square1 * (d[0] * now.D[2] + d[1] * now.D[8]) + 2 * now.w1 * rod_dot (now.ends.rate, now.ends.S1)) / now.L;
+  out[5] +=
+      (square2 * (d[0] * now.D[5] + d[1] * now.D[11]) - 2 * now.w2 * rod_dot (now.ends.rate, now.ends.S2)) / now.L;
 }
 
 PER_ELEMENT (rod_gamma_v, rod, 6) {
-  const double minus_twice[2] = { -2 * now.p.rate[0], -2 * now.p.rate[1] };
+  const double minus_twice[2] = { -2 * now.ends.rate[0], -2 * now.ends.rate[1] };
   rod_multiply_D (&now, minus_twice, out);
-  out[2] += 2 * now.w1 * rod_dot (now.p.d, now.p.S1) / now.L;
-  out[5] -= 2 * now.w2 * rod_dot (now.p.d, now.p.S2) / now.L;
+  out[2] += 2 * now.w1 * rod_dot (now.ends.d, now.ends.S1) / now.L;
+  out[5] -= 2 * now.w2 * rod_dot (now.ends.d, now.ends.S2) / now.L;
 }
 
 static const pw_field rod_fields[] = {

@@ -15,7 +15,7 @@ typedef struct {
 
 /* A weld in the current state. */
 typedef struct {
-  points_state p;
+  points_state points;
   double beta;
 } weld_state;
 
@@ -30,37 +30,37 @@ PREPARE (weld_prepare, pw_weld, weld) {
 }
 
 PER_ELEMENT (weld_g, weld, 3) {
-  points_g_one (now.p, out);
-  out[2] = now.p.body1->phi - now.p.body2->phi + now.beta;
+  points_g_one (now.points, out);
+  out[2] = now.points.body1->phi - now.points.body2->phi + now.beta;
 }
 
 PER_ELEMENT (weld_g_size, weld, 3) {
-  points_g_size_one (now.p, out);
-  out[2] = fabs (now.p.body1->phi) + fabs (now.p.body2->phi) + fabs (now.beta);
+  points_g_size_one (now.points, out);
+  out[2] = fabs (now.points.body1->phi) + fabs (now.points.body2->phi) + fabs (now.beta);
 }
 
 PER_ELEMENT (weld_J, weld, 18) {
-  points_J_one (now.p, out);
+  points_J_one (now.points, out);
   out[12] = out[13] = out[15] = out[16] = 0, out[14] = 1, out[17] = -1;
 }
 
 PER_ELEMENT (weld_gamma, weld, 3) {
-  points_gamma_one (now.p, out);
+  points_gamma_one (now.points, out);
   out[2] = 0;
 }
 
 PER_ELEMENT (weld_jw_q, weld, 18) {
-  points_jw_q_one (now.p, out);
+  points_jw_q_one (now.points, out);
   memset (out + 12, 0, 6 * sizeof *out);
 }
 
 PER_ELEMENT (weld_gamma_q, weld, 18) {
-  points_gamma_q_one (now.p, out);
+  points_gamma_q_one (now.points, out);
   memset (out + 12, 0, 6 * sizeof *out);
 }
 
 PER_ELEMENT (weld_gamma_v, weld, 18) {
-  points_gamma_v_one (now.p, out);
+  points_gamma_v_one (now.points, out);
   memset (out + 12, 0, 6 * sizeof *out);
 }
 

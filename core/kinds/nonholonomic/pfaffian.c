@@ -19,20 +19,16 @@ typedef struct {
 typedef struct {
   const pfaffian *element;
   const pw_configuration *body1, *body2;
-  const double *w, *u;   /* the vector w of jw_q, else NULL; the signal with its time derivatives */
-  double Ax, Ay, Bx, By; /* A, B */
+  const double *w, *u; /* the vector w of jw_q, else NULL; the signal with its time derivatives */
+  double A[2], B[2];
 } pfaffian_state;
 
 static inline pfaffian_state pfaffian_at (const pw_batch *batch, int e) {
   const pfaffian *element = (const pfaffian *)batch->element + e;
   const pw_configuration *body1 = batch_body1 (batch, e), *body2 = batch_body2 (batch, e);
-  pfaffian_state now = {
-    .element = element, .body1 = body1, .body2 = body2, .w = batch_w (batch, e), .u = batch->u + 3 * e
-  };
-  now.Ax = body1->cos * element->a[0] - body1->sin * element->a[1],
-  now.Ay = body1->sin * element->a[0] + body1->cos * element->a[1];
-  now.Bx = body1->cos * element->b[0] - body1->sin * element->b[1],
-  now.By = body1->sin * element->b[0] + body1->cos * element->b[1];
+  pfaffian_state now = { element, body1, body2, .w = batch_w (batch, e), .u = batch->u + 3 * e };
+  to_world (body1, element->a, now.A);
+  to_world (body1, element->b, now.B);
   return now;
 }
 
@@ -46,31 +42,31 @@ PREPARE (pfaffian_prepare, pw_pfaffian, pfaffian) {
 }
 
 PER_ELEMENT (pfaffian_J, pfaffian, 6) {
-  out[0] = now.Ax, out[1] = now.Ay, out[2] = now.element->a[2], out[3] = now.Bx, out[4] = now.By,
-  out[5] = now.element->b[2];
+  out[0] = now.A[0], out[1] = now.A[1], out[2] = now.element->a[2];
+  out[3] = now.B[0], out[4] = now.B[1], out[5] = now.element->b[2];
 }
 
 PER_ELEMENT (pfaffian_gamma, pfaffian, 1) {
-  *out = now.u[1] - now.body1->omega * (now.Ax * now.body1->vy - now.Ay * now.body1->vx + now.Bx * now.body2->vy -
-                                        now.By * now.body2->vx);
+  *out = now.u[1] - now.body1->omega * (now.A[0] * now.body1->vy - now.A[1] * now.body1->vx + now.B[0] * now.body2->vy -
+                                        now.B[1] * now.body2->vx);
 }
 
 PER_ELEMENT (pfaffian_jw_q, pfaffian, 6) {
   memset (out, 0, 6 * sizeof *out);
-  out[2] = now.Ax * now.w[1] - now.Ay * now.w[0] + now.Bx * now.w[4] - now.By * now.w[3];
+  out[2] = now.A[0] * now.w[1] - now.A[1] * now.w[0] + now.B[0] * now.w[4] - now.B[1] * now.w[3];
 }
 
 PER_ELEMENT (pfaffian_gamma_q, pfaffian, 6) {
   memset (out, 0, 6 * sizeof *out);
   out[2] = now.body1->omega *
-           (now.Ax * now.body1->vx + now.Ay * now.body1->vy + now.Bx * now.body2->vx + now.By * now.body2->vy);
+           (now.A[0] * now.body1->vx + now.A[1] * now.body1->vy + now.B[0] * now.body2->vx + now.B[1] * now.body2->vy);
 }
 
 PER_ELEMENT (pfaffian_gamma_v, pfaffian, 6) {
   double w = now.body1->omega;
-  out[0] = w * now.Ay, out[1] = -w * now.Ax,
-  out[2] = now.Ay * now.body1->vx - now.Ax * now.body1->vy + now.By * now.body2->vx - now.Bx * now.body2->vy;
-  out[3] = w * now.By, out[4] = -w * now.Bx, out[5] = 0;
+  out[0] = w * now.A[1], out[1] = -w * now.A[0],
+  out[2] = now.A[1] * now.body1->vx - now.A[0] * now.body1->vy + now.B[1] * now.body2->vx - now.B[0] * now.body2->vy;
+  out[3] = w * now.B[1], out[4] = -w * now.B[0], out[5] = 0;
 }
 
 static const pw_field pfaffian_fields[] = {
