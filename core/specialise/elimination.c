@@ -83,8 +83,8 @@ static void elimination_update (pw_elimination *ldl, pw_emitter *emitter, int i,
 }
 
 /* Subtracts the terms of both velocities vx, vy of a body, which have the same mass, from the diagonal entry of
- * equation i, if their entries there are the components of a vector of constant length.  Call it for p = vx, then for p = vy.
- * Returns 1 if this equation is done, 0 if its entry for p is still to be subtracted. */
+ * equation i, if their entries there are the components of a vector of constant length.  Call it for p = vx, then for
+ * p = vy.  Returns 1 if this equation is done, 0 if its entry for p is still to be subtracted. */
 static int elimination_constant_length (pw_elimination *ldl, pw_emitter *emitter, int i, int p) {
   if (i < ldl->coordinates || p >= 3 * ldl->s->bodies || p % 3 == 2) return 0;
   int first = p - p % 3;
