@@ -78,9 +78,10 @@ LIBM (libm_hypot (libm_lanes x, libm_lanes y)) {
   static inline int function##_one (const definition_type *definition, MAYBE_UNUSED const pw_body *const *bodies,   \
                                     type *element, MAYBE_UNUSED pw_internal *internal, MAYBE_UNUSED pw_error *error)
 
-/* Members of a type's table; functions that have the names of their members: weld_J, weld_gamma, ... */
-#define DEFINITION(type, table) .definition = sizeof (type), .fields = table
-#define ELEMENT(type, function) .element = sizeof (type), .prepare = function
+/* Members of a type's table, whose values have their names: weld_fields, weld_prepare, weld_J, ... */
+#define TYPE(type, definition_type, element_type)                                                    \
+  .definition = sizeof (definition_type), .fields = type##_fields, .element = sizeof (element_type), \
+  .prepare = type##_prepare
 #define POSITION(type) .g = type##_g, .g_size = type##_g_size
 #define CONSTRAINT(type) \
   .J = type##_J, .gamma = type##_gamma, .jw_q = type##_jw_q, .gamma_q = type##_gamma_q, .gamma_v = type##_gamma_v

@@ -55,6 +55,11 @@ static inline double contact_speed (const contact_state *now) {
   return now->dx * now->body->vx + now->dy * now->body->vy + now->constants.arm * now->body->omega;
 }
 
+/* Its derivative with respect to the angle of the body. */
+static inline double contact_speed_phi (const contact_state *now) {
+  return now->dx * now->body->vy - now->dy * now->body->vx;
+}
+
 PER_ELEMENT (contact_J, contact, 3) {
   out[0] = now.dx, out[1] = now.dy, out[2] = now.constants.arm;
 }

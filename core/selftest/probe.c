@@ -81,21 +81,15 @@ void pw_probe_evaluate (pw_probe *probe, pw_batch_function *f, const char *name,
   pw_probe_record (probe->report, PW_CHECK_size, untouched + beyond, 0, "exact", where);
 }
 
-void pw_probe_g (pw_probe *probe, double *out) {
-  pw_probe_evaluate (probe, probe->kind->g, "g", probe->elements * probe->rows, out);
-}
-
-void pw_probe_eta (pw_probe *probe, double *out) {
-  pw_probe_evaluate (probe, probe->kind->eta, "eta", probe->elements * probe->rows, out);
-}
-
-void pw_probe_gamma (pw_probe *probe, double *out) {
-  pw_probe_evaluate (probe, probe->kind->gamma, "gamma", probe->elements * probe->rows, out);
-}
-
-void pw_probe_force (pw_probe *probe, double *out) {
-  pw_probe_evaluate (probe, probe->kind->force, "force", probe->elements * probe->cols, out);
-}
+/* pw_probe_g, ...: the function of this name, which fills `size` numbers per element. */
+#define PROBE_FUNCTION(function, size)                                                               \
+  void pw_probe_##function (pw_probe *probe, double *out) {                                          \
+    pw_probe_evaluate (probe, probe->kind->function, #function, probe->elements * probe->size, out); \
+  }
+PROBE_FUNCTION (g, rows)
+PROBE_FUNCTION (eta, rows)
+PROBE_FUNCTION (gamma, rows)
+PROBE_FUNCTION (force, cols)
 
 void pw_probe_Jw (pw_probe *probe, double *out) {
   pw_probe_evaluate (probe, probe->kind->J, "J", probe->elements * probe->rows * probe->cols, probe->J);

@@ -70,8 +70,7 @@ static const pw_field drag_fields[] = {
 const pw_kind pw_kind_drag = {
   .name = "drag",
   .about = "linear and quadratic resistance of still air to the translation and rotation of a body",
-  DEFINITION (pw_drag, drag_fields),
-  ELEMENT (drag, drag_prepare),
+  TYPE (drag, pw_drag, drag),
   .bodies = 1,
   .force = drag_force,
   .force_v = drag_force_v,

@@ -77,8 +77,7 @@ static const pw_field force_fields[] = {
 const pw_kind pw_kind_force = {
   .name = "force",
   .about = "an external force on a point of a body, given along world or body axes",
-  DEFINITION (pw_force, force_fields),
-  ELEMENT (force, force_prepare),
+  TYPE (force, pw_force, force),
   .bodies = 1,
   .signals = 2,
   .force = force_force,

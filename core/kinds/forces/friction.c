@@ -35,8 +35,7 @@ static const pw_field friction_fields[] = {
 const pw_kind pw_kind_friction = {
   .name = "friction",
   .about = "a viscous and a Coulomb torque that oppose the rotation of one body relative to another",
-  DEFINITION (pw_friction, friction_fields),
-  ELEMENT (coulomb, friction_prepare),
+  TYPE (friction, pw_friction, coulomb),
   .bodies = 2,
   .force = friction_force,
   .force_v = friction_force_v,

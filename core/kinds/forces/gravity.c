@@ -39,8 +39,7 @@ static const pw_field gravity_fields[] = {
 const pw_kind pw_kind_gravity = {
   .name = "gravity",
   .about = "the same acceleration for every body that has mass",
-  DEFINITION (pw_gravity, gravity_fields),
-  ELEMENT (gravity, gravity_prepare),
+  TYPE (gravity, pw_gravity, gravity),
   .bodies = 1,
   .each_body = 1,
   .constant = 1,

@@ -20,8 +20,7 @@ const pw_kind pw_kind_marker = {
   .name = "marker",
   .about = "a point of a body whose path is shown in tables, figures and animations",
   .symbol = "o 0 0 0 .3",
-  DEFINITION (pw_marker, marker_fields),
-  ELEMENT (contact, marker_prepare),
+  TYPE (marker, pw_marker, contact),
   .bodies = 1,
   .contact = contact_place,
 };

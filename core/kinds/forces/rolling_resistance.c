@@ -26,7 +26,7 @@ static inline resistance_state resistance_at (const pw_batch *batch, int e) {
   contact_state along = contact_of (element->along, batch, e);
   resistance_state now = { &element->law, .v = contact_speed (&along) };
   contact_J_one (along, now.S);
-  now.v_q[2] = now.S[0] * along.body->vy - now.S[1] * along.body->vx;
+  now.v_q[2] = contact_speed_phi (&along);
   return now;
 }
 
@@ -62,8 +62,7 @@ static const pw_field resistance_fields[] = {
 const pw_kind pw_kind_rolling_resistance = {
   .name = "rolling-resistance",
   .about = "a force of given magnitude that opposes the motion of a point along a heading",
-  DEFINITION (pw_rolling_resistance, resistance_fields),
-  ELEMENT (resistance, resistance_prepare),
+  TYPE (resistance, pw_rolling_resistance, resistance),
   .bodies = 1,
   FORCE (resistance),
   .saturation = resistance_saturation,

@@ -62,8 +62,7 @@ static const pw_field sliding_fields[] = {
 const pw_kind pw_kind_sliding_friction = {
   .name = "sliding-friction",
   .about = "a viscous and a Coulomb force that oppose the motion of a point along a line of another body",
-  DEFINITION (pw_sliding_friction, sliding_fields),
-  ELEMENT (sliding, sliding_prepare),
+  TYPE (sliding, pw_sliding_friction, sliding),
   .bodies = 2,
   FORCE (sliding),
   .saturation = sliding_saturation,

@@ -114,8 +114,7 @@ const pw_kind pw_kind_spring = {
             ".59 0 .7 .65 0 -.7 .71 0 .7 .77 0 -.7 .8 0 0 1 0 0; "
             "damping: 0 0 0 .1 0 0 .1 0 -1.2 .35 0 -1.2 .35 0 -.7 .7 0 -.7 .35 0 -.7 .35 0 -1.7 .7 0 -1.7; "
             "damping: .5 0 -.8 .5 0 -1.6 .5 0 -1.2 .9 0 -1.2 .9 0 0 1 0 0",
-  DEFINITION (pw_spring, spring_fields),
-  ELEMENT (spring, spring_prepare),
+  TYPE (spring, pw_spring, spring),
   .bodies = 2,
   FORCE (spring),
   .energy = spring_energy,

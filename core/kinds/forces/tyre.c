@@ -56,18 +56,9 @@ PER_ELEMENT (tyre_force, tyre, 3) {
   out[0] = now.F * now.across.dx, out[1] = now.F * now.across.dy, out[2] = now.F * now.element->across.arm;
 }
 
-/* The derivatives of v_t and v_n with respect to phi. */
-static inline double tyre_along_phi (const tyre_state *now) {
-  return now->across.dx * now->across.body->vx + now->across.dy * now->across.body->vy;
-}
-
-static inline double tyre_across_phi (const tyre_state *now) {
-  return -now->along.dx * now->along.body->vx - now->along.dy * now->along.body->vy;
-}
-
 /* d(F S_n)/dphi with dS_n/dphi = -(cos(theta), sin(theta), 0). */
 PER_ELEMENT (tyre_force_q, tyre, 9) {
-  double F_phi = now.F_across * tyre_across_phi (&now) + now.F_along * tyre_along_phi (&now);
+  double F_phi = now.F_across * contact_speed_phi (&now.across) + now.F_along * contact_speed_phi (&now.along);
   memset (out, 0, 9 * sizeof *out);
   out[2] = -now.F * now.along.dx + F_phi * now.across.dx;
   out[5] = -now.F * now.along.dy + F_phi * now.across.dy;
@@ -85,7 +76,7 @@ PER_ELEMENT (tyre_force_v, tyre, 9) {
  * a limit.  They are divided by the derivatives of v_t and v_n with respect to coordinates and velocities. */
 PER_ELEMENT (tyre_saturation, tyre, 6) {
   double change = now.element->limit / now.element->stiffness * now.R + fabs (now.v_across);
-  double along[6] = { [2] = tyre_along_phi (&now) }, across[6] = { [2] = tyre_across_phi (&now) };
+  double along[6] = { [2] = contact_speed_phi (&now.along) }, across[6] = { [2] = contact_speed_phi (&now.across) };
   contact_J_one (now.along, along + 3);
   contact_J_one (now.across, across + 3);
   for (int i = 0; i < 6; i++) {
@@ -122,8 +113,7 @@ const pw_kind pw_kind_tyre = {
   .name = "tyre",
   .symbol = "0 -1.6 -.5 0 1.6 -.5 0 1.6 .5 0 -1.6 .5 0 -1.6 -.5",
   .about = "a wheel with lateral slip; the lateral force increases with the slip",
-  DEFINITION (pw_tyre, tyre_fields),
-  ELEMENT (tyre, tyre_prepare),
+  TYPE (tyre, pw_tyre, tyre),
   .bodies = 1,
   FORCE (tyre),
   .saturation = tyre_saturation,

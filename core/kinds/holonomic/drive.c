@@ -73,8 +73,7 @@ const pw_kind pw_kind_drive = {
   .symbol = "what=0: 0 .6 0 0 2.2 0 0 1.7 .3 0 2.2 0 0 1.7 -.3; "
             "what=1: 0 0 .6 0 0 2.2 0 .3 1.7 0 0 2.2 0 -.3 1.7; "
             "what=2: 0 .9 -.5 0 1 0 0 .7 .7 0 0 1 0 -.7 .7 0 -.2 .8 0 -.7 .7 0 -.6 1.2",
-  DEFINITION (pw_drive, drive_fields),
-  ELEMENT (line, drive_prepare),
+  TYPE (drive, pw_drive, line),
   .bodies = 2,
   .rows = 1,
   .signals = 1,

@@ -33,20 +33,15 @@ PER_ELEMENT (slider_gamma, line, 2) {
   out[1] = 0;
 }
 
-PER_ELEMENT (slider_jw_q, line, 12) {
-  line_jw_q_one (now, out);
-  memset (out + 6, 0, 6 * sizeof *out);
-}
-
-PER_ELEMENT (slider_gamma_q, line, 12) {
-  line_gamma_q_one (now, out);
-  memset (out + 6, 0, 6 * sizeof *out);
-}
-
-PER_ELEMENT (slider_gamma_v, line, 12) {
-  line_gamma_v_one (now, out);
-  memset (out + 6, 0, 6 * sizeof *out);
-}
+/* A derivative of the first row, and 0 for the second: slider_jw_q, ... */
+#define SLIDER_DERIVATIVE(member)           \
+  PER_ELEMENT (slider_##member, line, 12) { \
+    line_##member##_one (now, out);         \
+    memset (out + 6, 0, 6 * sizeof *out);   \
+  }
+SLIDER_DERIVATIVE (jw_q)
+SLIDER_DERIVATIVE (gamma_q)
+SLIDER_DERIVATIVE (gamma_v)
 
 static const pw_field slider_fields[] = {
   { PW_AT (pw_slider, body), PW_BODY, .count = 2, .required = 1,
@@ -68,8 +63,7 @@ const pw_kind pw_kind_slider = {
   .name = "slider",
   .about = "a body slides along a line of another without rotating relative to it (prismatic joint)",
   .symbol = "1 -inf 0 1 inf 0; 0 -1.2 -.7 0 1.2 -.7 0 1.2 .7 0 -1.2 .7 0 -1.2 -.7",
-  DEFINITION (pw_slider, slider_fields),
-  ELEMENT (line, slider_prepare),
+  TYPE (slider, pw_slider, line),
   .bodies = 2,
   .rows = 2,
   .level = PW_HOLONOMIC,

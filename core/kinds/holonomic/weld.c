@@ -49,20 +49,15 @@ PER_ELEMENT (weld_gamma, weld, 3) {
   out[2] = 0;
 }
 
-PER_ELEMENT (weld_jw_q, weld, 18) {
-  points_jw_q_one (now.points, out);
-  memset (out + 12, 0, 6 * sizeof *out);
-}
-
-PER_ELEMENT (weld_gamma_q, weld, 18) {
-  points_gamma_q_one (now.points, out);
-  memset (out + 12, 0, 6 * sizeof *out);
-}
-
-PER_ELEMENT (weld_gamma_v, weld, 18) {
-  points_gamma_v_one (now.points, out);
-  memset (out + 12, 0, 6 * sizeof *out);
-}
+/* A derivative of the first two rows, and 0 for the third: weld_jw_q, ... */
+#define WELD_DERIVATIVE(member)              \
+  PER_ELEMENT (weld_##member, weld, 18) {    \
+    points_##member##_one (now.points, out); \
+    memset (out + 12, 0, 6 * sizeof *out);   \
+  }
+WELD_DERIVATIVE (jw_q)
+WELD_DERIVATIVE (gamma_q)
+WELD_DERIVATIVE (gamma_v)
 
 static const pw_field weld_fields[] = {
   { PW_AT (pw_weld, body), PW_BODY, .count = 2, .required = 1, .about = "the two bodies; one may be ground" },
@@ -82,8 +77,7 @@ const pw_kind pw_kind_weld = {
   .name = "weld",
   .about = "two bodies are fixed to each other",
   .symbol = "0 -.4 -.4 0 .4 -.4 0 .4 .4 0 -.4 .4 0 -.4 -.4",
-  DEFINITION (pw_weld, weld_fields),
-  ELEMENT (weld, weld_prepare),
+  TYPE (weld, pw_weld, weld),
   .bodies = 2,
   .rows = 3,
   .level = PW_HOLONOMIC,

@@ -86,8 +86,7 @@ static const pw_quantity pfaffian_reaction[] = {
 const pw_kind pw_kind_pfaffian = {
   .name = "pfaffian",
   .about = "a linear relation, given by its coefficients, between the velocities of one or two bodies",
-  DEFINITION (pw_pfaffian, pfaffian_fields),
-  ELEMENT (pfaffian, pfaffian_prepare),
+  TYPE (pfaffian, pw_pfaffian, pfaffian),
   .bodies = 2,
   .rows = 1,
   .signals = 1,

@@ -55,23 +55,16 @@ PER_ELEMENT (rolling_gamma, rolling, 2) {
   contact_gamma_one (now.along, out + 1);
 }
 
-PER_ELEMENT (rolling_jw_q, rolling, 8) {
-  contact_jw_q_one (now.across, out);
-  contact_jw_q_one (now.along, out + 4);
-  out[3] = out[7] = 0;
-}
-
-PER_ELEMENT (rolling_gamma_q, rolling, 8) {
-  contact_gamma_q_one (now.across, out);
-  contact_gamma_q_one (now.along, out + 4);
-  out[3] = out[7] = 0;
-}
-
-PER_ELEMENT (rolling_gamma_v, rolling, 8) {
-  contact_gamma_v_one (now.across, out);
-  contact_gamma_v_one (now.along, out + 4);
-  out[3] = out[7] = 0;
-}
+/* A derivative of both rows, which is 0 with respect to the spin angle: rolling_jw_q, ... */
+#define ROLLING_DERIVATIVE(member)               \
+  PER_ELEMENT (rolling_##member, rolling, 8) {   \
+    contact_##member##_one (now.across, out);    \
+    contact_##member##_one (now.along, out + 4); \
+    out[3] = out[7] = 0;                         \
+  }
+ROLLING_DERIVATIVE (jw_q)
+ROLLING_DERIVATIVE (gamma_q)
+ROLLING_DERIVATIVE (gamma_v)
 
 static void rolling_force (const pw_batch *batch, double *out) {
   for (int e = 0; e < batch->count; e++, out += 4) out[0] = out[1] = out[2] = 0, out[3] = batch->u[3 * e];
@@ -119,8 +112,7 @@ const pw_kind pw_kind_rolling_wheel = {
   .name = "rolling-wheel",
   .about = "a wheel that rolls without slip, free or driven by a torque about its axle",
   .symbol = "0 -1.6 -.5 0 1.6 -.5 0 1.6 .5 0 -1.6 .5 0 -1.6 -.5",
-  DEFINITION (pw_rolling_wheel, rolling_fields),
-  ELEMENT (rolling, rolling_prepare),
+  TYPE (rolling, pw_rolling_wheel, rolling),
   .bodies = 1,
   .internal = 1,
   .rows = 2,
