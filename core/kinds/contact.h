@@ -88,4 +88,10 @@ PER_ELEMENT (contact_place, contact, 3) {
   out[2] = now.body->phi + now.constants.heading;
 }
 
+/* Fields of the definition of a wheel: its contact point and its heading. */
+#define CONTACT_FIELDS(type)                                                                                          \
+  { PW_AT (type, at), PW_POINT, .unit = "m", .required = 1, .about = "contact point in the body's frame" }, {         \
+    PW_AT (type, heading), PW_NUMBER, .unit = "rad", .about = "rolling direction in the body's frame; 0: along its x" \
+  }
+
 #endif

@@ -113,4 +113,13 @@ PER_ELEMENT (line_gamma_v, line, 6) {
   line_multiply_H (&now, -2, v, out);
 }
 
+/* Fields of a definition: the two points and the heading of line_make. */
+#define LINE_FIELDS(type)                                                                                         \
+  { PW_AT (type, at), PW_POINT,      .count = 2,                                                                  \
+    .unit = "m",      .required = 1, .about = "the point, and a point of the line, in each body's frame" },       \
+  {                                                                                                               \
+    PW_AT (type, heading), PW_NUMBER, .unit = "rad",                                                              \
+                                      .about = "direction of the line in the second body's frame; 0: along its x" \
+  }
+
 #endif

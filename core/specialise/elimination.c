@@ -9,6 +9,11 @@ static const pw_term elimination_one = { PW_TERM_ONE, 1, "1", 1 };
 #define AT(p, q) ldl->K[(size_t)(p) * (size_t)ldl->n + (size_t)(q)]
 #define FACTOR(p, q) ldl->L[(size_t)(p) * (size_t)ldl->n + (size_t)(q)]
 
+/* Loops over the unknowns eliminated after the m-th one. */
+#define EACH_LATER(i, m)           \
+  for (int i = 0; i < ldl->n; i++) \
+    if (ldl->step[i] > (m) && ldl->step[i] <= ldl->n)
+
 static int elimination_is_zero (pw_term a) {
   return a.type == PW_TERM_ZERO;
 }
@@ -204,8 +209,7 @@ static int elimination_keep_all (pw_elimination *ldl, pw_emitter *emitter) {
   for (int m = 0; m < ldl->pivots; m++) {
     int p = ldl->order[m], r = ldl->partner[m];
     elimination_keep (ldl, emitter, slot, &ldl->inverse[p]);
-    for (int i = 0; i < ldl->n; i++) {
-      if (ldl->step[i] <= m || ldl->step[i] > ldl->n) continue;
+    EACH_LATER (i, m) {
       if (p < ldl->coordinates && r < 0)
         elimination_keep (ldl, emitter, slot, &AT (i, p));
       else
@@ -258,8 +262,7 @@ static void elimination_forward (const pw_elimination *ldl, pw_emitter *emitter,
   int p = ldl->order[m], r = ldl->partner[m];
   if (r >= 0) {
     pw_term f = pw_emit_product (emitter, y[p], ldl->inverse[p]), gamma = y[r];
-    for (int i = 0; i < ldl->n; i++) {
-      if (ldl->step[i] <= m || ldl->step[i] > ldl->n) continue;
+    EACH_LATER (i, m) {
       y[i] = pw_emit_difference (emitter, y[i], AT (i, r), f);
       y[i] = pw_emit_difference (emitter, y[i], FACTOR (i, p), gamma);
     }
@@ -268,8 +271,7 @@ static void elimination_forward (const pw_elimination *ldl, pw_emitter *emitter,
     return;
   }
   pw_term z = pw_emit_product (emitter, y[p], ldl->inverse[p]);
-  for (int i = 0; i < ldl->n; i++) {
-    if (ldl->step[i] <= m || ldl->step[i] > ldl->n) continue;
+  EACH_LATER (i, m) {
     y[i] = p < ldl->coordinates ? pw_emit_difference (emitter, y[i], AT (i, p), z)
                                 : pw_emit_difference (emitter, y[i], FACTOR (i, p), y[p]);
   }
@@ -279,8 +281,7 @@ static void elimination_forward (const pw_elimination *ldl, pw_emitter *emitter,
 static void elimination_backward (const pw_elimination *ldl, pw_emitter *emitter, pw_term *y, int m) {
   int p = ldl->order[m], r = ldl->partner[m];
   pw_term sum = r >= 0 ? y[p] : pw_term_zero ();
-  for (int i = 0; i < ldl->n; i++) {
-    if (ldl->step[i] <= m || ldl->step[i] > ldl->n) continue;
+  EACH_LATER (i, m) {
     if (r >= 0) {
       y[r] = pw_emit_difference (emitter, y[r], FACTOR (i, p), y[i]);
       sum = pw_emit_difference (emitter, sum, AT (i, r), y[i]);

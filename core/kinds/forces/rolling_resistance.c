@@ -48,10 +48,7 @@ COULOMB (resistance, 3)
 
 static const pw_field resistance_fields[] = {
   { PW_AT (pw_rolling_resistance, body), PW_BODY, .required = 1, .about = "the body that rolls" },
-  { PW_AT (pw_rolling_resistance, at), PW_POINT, .unit = "m", .required = 1,
-    .about = "contact point in the body's frame" },
-  { PW_AT (pw_rolling_resistance, heading), PW_NUMBER, .unit = "rad",
-    .about = "rolling direction in the body's frame; 0: along its x" },
+  CONTACT_FIELDS (pw_rolling_resistance),
   { PW_AT (pw_rolling_resistance, limit), PW_NUMBER, .unit = "N", .required = 1, .domain = PW_NONNEGATIVE,
     .about = "the force while rolling: coefficient times normal load" },
   { PW_AT (pw_rolling_resistance, speed), PW_NUMBER, .unit = "m/s", .required = 1, .domain = PW_POSITIVE,

@@ -47,10 +47,7 @@ COULOMB (sliding, 6)
 static const pw_field sliding_fields[] = {
   { PW_AT (pw_sliding_friction, body), PW_BODY, .count = 2, .required = 1,
     .about = "the sliding body and the body with the line; one may be ground" },
-  { PW_AT (pw_sliding_friction, at), PW_POINT, .count = 2, .unit = "m", .required = 1,
-    .about = "the point, and a point of the line, in each body's frame" },
-  { PW_AT (pw_sliding_friction, heading), PW_NUMBER, .unit = "rad",
-    .about = "direction of the line in the second body's frame; 0: along its x" },
+  LINE_FIELDS (pw_sliding_friction),
   { PW_AT (pw_sliding_friction, viscous), PW_NUMBER, .unit = "N s/m", .domain = PW_NONNEGATIVE,
     .about = "force per speed" },
   { PW_AT (pw_sliding_friction, limit), PW_NUMBER, .unit = "N", .domain = PW_NONNEGATIVE, .about = "Coulomb force" },

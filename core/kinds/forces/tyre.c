@@ -95,9 +95,7 @@ PER_ELEMENT (tyre_contact, tyre, 3) {
 
 static const pw_field tyre_fields[] = {
   { PW_AT (pw_tyre, body), PW_BODY, .required = 1, .about = "the body with the tyre" },
-  { PW_AT (pw_tyre, at), PW_POINT, .unit = "m", .required = 1, .about = "contact point in the body's frame" },
-  { PW_AT (pw_tyre, heading), PW_NUMBER, .unit = "rad",
-    .about = "rolling direction in the body's frame; 0: along its x" },
+  CONTACT_FIELDS (pw_tyre),
   { PW_AT (pw_tyre, stiffness), PW_NUMBER, .unit = "N", .required = 1, .domain = PW_POSITIVE,
     .about = "cornering stiffness: lateral force per slip" },
   { PW_AT (pw_tyre, speed), PW_NUMBER, .unit = "m/s", .required = 1, .domain = PW_POSITIVE,

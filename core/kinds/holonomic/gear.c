@@ -16,9 +16,8 @@ typedef struct {
 } gear;
 
 PREPARE (gear_prepare, pw_gear, gear) {
-  double phi[3];
-  for (int n = 0; n < 3; n++) phi[n] = bodies[n]->start[2];
-  double initial = phi[0] - phi[2] - definition->ratio * (phi[1] - phi[2]);
+  double phi3 = bodies[2]->start[2];
+  double initial = bodies[0]->start[2] - phi3 - definition->ratio * (bodies[1]->start[2] - phi3);
   *element = (gear){ definition->ratio, definition->from == PW_GEAR_START ? initial : definition->offset };
   if (definition->ratio == 0)
     return pw_fail (error, PW_INPUT, "ratio = 0: expected another number, positive or negative");

@@ -46,10 +46,7 @@ SLIDER_DERIVATIVE (gamma_v)
 static const pw_field slider_fields[] = {
   { PW_AT (pw_slider, body), PW_BODY, .count = 2, .required = 1,
     .about = "the sliding body and the body with the line; one may be ground" },
-  { PW_AT (pw_slider, at), PW_POINT, .count = 2, .unit = "m", .required = 1,
-    .about = "the point, and a point of the line, in each body's frame" },
-  { PW_AT (pw_slider, heading), PW_NUMBER, .unit = "rad",
-    .about = "direction of the line in the second body's frame; 0: along its x" },
+  LINE_FIELDS (pw_slider),
   { PW_AT (pw_slider, angle), PW_NUMBER, .unit = "rad", .about = "of the first body relative to the second" },
   { .name = NULL },
 };

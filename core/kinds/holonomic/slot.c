@@ -13,10 +13,7 @@ PREPARE (slot_prepare, pw_slot, line) {
 static const pw_field slot_fields[] = {
   { PW_AT (pw_slot, body), PW_BODY, .count = 2, .required = 1,
     .about = "the body with the point and the body with the line; one may be ground" },
-  { PW_AT (pw_slot, at), PW_POINT, .count = 2, .unit = "m", .required = 1,
-    .about = "the point, and a point of the line, in each body's frame" },
-  { PW_AT (pw_slot, heading), PW_NUMBER, .unit = "rad",
-    .about = "direction of the line in the second body's frame; 0: along its x" },
+  LINE_FIELDS (pw_slot),
   { .name = NULL },
 };
 

@@ -84,9 +84,7 @@ PER_ELEMENT (rolling_contact, rolling, 3) {
 
 static const pw_field rolling_fields[] = {
   { PW_AT (pw_rolling_wheel, body), PW_BODY, .required = 1, .about = "the body with the wheel" },
-  { PW_AT (pw_rolling_wheel, at), PW_POINT, .unit = "m", .required = 1, .about = "contact point in the body's frame" },
-  { PW_AT (pw_rolling_wheel, heading), PW_NUMBER, .unit = "rad",
-    .about = "rolling direction in the body's frame; 0: along its x" },
+  CONTACT_FIELDS (pw_rolling_wheel),
   { PW_AT (pw_rolling_wheel, radius), PW_NUMBER, .unit = "m", .required = 1, .domain = PW_POSITIVE,
     .about = "radius of the wheel" },
   { PW_AT (pw_rolling_wheel, inertia), PW_NUMBER, .unit = "kg m^2", .domain = PW_NONNEGATIVE,

@@ -14,9 +14,7 @@ PREPARE (wheel_prepare, pw_wheel, contact) {
 
 static const pw_field wheel_fields[] = {
   { PW_AT (pw_wheel, body), PW_BODY, .required = 1, .about = "the body with the wheel" },
-  { PW_AT (pw_wheel, at), PW_POINT, .unit = "m", .required = 1, .about = "contact point in the body's frame" },
-  { PW_AT (pw_wheel, heading), PW_NUMBER, .unit = "rad",
-    .about = "rolling direction in the body's frame; 0: along its x" },
+  CONTACT_FIELDS (pw_wheel),
   { .name = NULL },
 };
 
