@@ -30,9 +30,9 @@ const char *pw_system_body_name (const pw_system *s, int body) {
 
 int pw_system_jumps (const pw_system *s, double t) {
   double near = 8 * DBL_EPSILON * fabs (t);
-  for (const pw_source *x = s->source, *end = x + s->sources; x < end; x++)
-    if (!x->of_force || x->signal.type == PW_PULSE || x->signal.type == PW_FUNCTION)
-      if (pw_signal_breakpoint (&x->signal, 0, t - near) <= t + near) return 1;
+  for (const pw_source *source = s->source, *end = source + s->sources; source < end; source++)
+    if (!source->of_force || source->signal.type == PW_PULSE || source->signal.type == PW_FUNCTION)
+      if (pw_signal_breakpoint (&source->signal, 0, t - near) <= t + near) return 1;
   return 0;
 }
 
@@ -83,14 +83,14 @@ static int query_body_state (const pw_system *s, const char *name, pw_nearest *n
   while (b < s->bodies && (strncmp (s->body_name[b], name, (size_t)(dot - name)) != 0 || s->body_name[b][dot - name]))
     b++;
   if (b == s->bodies) return -1;
-  pw_nearest what = { .sought = dot + 1 };
+  pw_nearest state = { .sought = dot + 1 };
   for (int i = 0; i < 6; i++) {
     if (strcmp (dot + 1, query_names[i]) == 0) return i < 3 ? 3 * b + i : s->coords + 3 * b + i - 3;
-    pw_nearest_try (&what, query_names[i]);
+    pw_nearest_try (&state, query_names[i]);
   }
-  what.sought = name;
-  *near = what;
-  snprintf (near->best, sizeof near->best, "%s.%.10s", s->body_name[b], what.best);
+  state.sought = name;
+  *near = state;
+  snprintf (near->best, sizeof near->best, "%s.%.10s", s->body_name[b], state.best);
   return -1;
 }
 
