@@ -83,9 +83,15 @@ LIBM (libm_hypot (libm_lanes x, libm_lanes y)) {
   .definition = sizeof (definition_type), .fields = type##_fields, .element = sizeof (element_type), \
   .prepare = type##_prepare
 #define POSITION(type) .g = type##_g, .g_size = type##_g_size
-#define CONSTRAINT(type) \
-  .J = type##_J, .gamma = type##_gamma, .jw_q = type##_jw_q, .gamma_q = type##_gamma_q, .gamma_v = type##_gamma_v
+#define DERIVATIVES(type) .jw_q = type##_jw_q, .gamma_q = type##_gamma_q, .gamma_v = type##_gamma_v
+#define CONSTRAINT(type) .J = type##_J, .gamma = type##_gamma, DERIVATIVES (type)
 #define FORCE(type) .force = type##_force, .force_q = type##_force_q, .force_v = type##_force_v
+
+/* The only reaction of a type. */
+#define REACTION(name, unit, about)  \
+  .reaction = &(const pw_quantity) { \
+    name, unit, NULL, about          \
+  }
 
 /* The vector w of an element; NULL where the batch has none. */
 static inline const double *batch_w (const pw_batch *batch, int e) {

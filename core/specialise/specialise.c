@@ -57,6 +57,12 @@ static void specialise_coordinates (FILE *out, int n) {
   fputc ('\n', out);
 }
 
+static void specialise_comment (FILE *out, const char *what, int number, const char *name) {
+  fprintf (out, "/* %s %d: ", what, number);
+  pw_emit_name (out, name);
+  fputs (" */\n", out);
+}
+
 static void specialise_constants (const pw_generator *scene) {
   const pw_system *s = scene->s;
   fprintf (scene->out,
@@ -71,17 +77,10 @@ static void specialise_constants (const pw_generator *scene) {
   pw_specialise_list (scene->out, "HOLONOMIC", s->holonomic);
   pw_specialise_list (scene->out, "INTERNAL", s->coords - 3 * s->bodies);
   specialise_coordinates (scene->out, s->coords);
-  for (int b = 0; b < s->bodies; b++) {
-    fprintf (scene->out, "/* body %d: ", b);
-    pw_emit_name (scene->out, s->body_name[b]);
-    fputs (" */\n", scene->out);
-  }
-  for (int i = 0; i < s->rows; i++) {
-    char name[120];
-    fprintf (scene->out, "/* equation %d: ", i);
-    pw_emit_name (scene->out, pw_system_reaction_name (s, i, name, sizeof name));
-    fputs (" */\n", scene->out);
-  }
+  char name[120];
+  for (int b = 0; b < s->bodies; b++) specialise_comment (scene->out, "body", b, s->body_name[b]);
+  for (int i = 0; i < s->rows; i++)
+    specialise_comment (scene->out, "equation", i, pw_system_reaction_name (s, i, name, sizeof name));
   fputs ("\nstatic const unsigned char independent[] = { ", scene->out);
   for (int i = 0; i < s->rows; i++) fprintf (scene->out, "%d, ", pw_specialise_is_independent (scene, i));
   fputs ("0 };\n", scene->out);

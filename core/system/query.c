@@ -211,13 +211,13 @@ int pw_system_find_signal (const pw_system *s, const char *name, pw_error *error
 
 char *pw_failed_signal (const pw_workspace *w, char *buffer, size_t size) {
   buffer[0] = 0;
-  for (const pw_element_batch *k = w->batch; k < w->batch + w->s->batches; k++) {
-    int signals = k->kind->signals;
-    if (w->failed == NULL || w->failed < k->source || w->failed >= k->source + k->b.count * signals) continue;
-    int i = (int)(w->failed - k->source), n = i % signals;
-    const pw_field *f = query_signal_field (k->kind, &n);
-    snprintf (buffer, size, "%s %.60s: %s", k->kind->name, k->name[i / signals], f->name ? f->name : "signal");
-  }
+  if (w->failed == NULL) return buffer;
+  int signal = (int)(w->failed - w->source);
+  const pw_element_batch *k = query_signal (w->s, &signal);
+  int n = signal % k->kind->signals;
+  const pw_field *f = query_signal_field (k->kind, &n);
+  snprintf (buffer, size, "%s %.60s: %s", k->kind->name, k->name[signal / k->kind->signals],
+            f->name ? f->name : "signal");
   return buffer;
 }
 

@@ -61,7 +61,7 @@ struct pw_workspace {
   const pw_system *s;
   pw_element_batch *batch;         /* batches: copies of the system's, with arrays of this workspace */
   pw_element_batch **force;        /* those with a force that is not constant */
-  pw_source *source;               /* sources */
+  pw_source *source;               /* sources, in the order of the system's */
   double *u, *J;                   /* those of all batches: sources x 3; entries of J, element by element */
   pw_configuration *configuration; /* bodies + 1; the last is the ground */
   double *scratch;                 /* rows x 3 + coords + 3 */

@@ -58,10 +58,6 @@ static const pw_field drive_fields[] = {
   { .name = NULL },
 };
 
-static const pw_quantity drive_reaction[] = {
-  { "F", "N or N m", NULL, "force on the first body at its point along the prescribed coordinate, or moment on it" },
-};
-
 static const char *drive_unit (const void *element, int row) {
   (void)row;
   return ((const line *)element)->prescribes_angle != 0 ? "N m" : "N";
@@ -78,13 +74,11 @@ const pw_kind pw_kind_drive = {
   .rows = 1,
   .signals = 1,
   .level = PW_HOLONOMIC,
-  .reaction = drive_reaction,
+  REACTION ("F", "N or N m", "force on the first body at its point along the prescribed coordinate, or moment on it"),
   .reaction_unit = drive_unit,
   POSITION (drive),
   .eta = drive_eta,
   .J = drive_J,
   .gamma = drive_gamma,
-  .jw_q = line_jw_q,
-  .gamma_q = line_gamma_q,
-  .gamma_v = line_gamma_v,
+  DERIVATIVES (line),
 };

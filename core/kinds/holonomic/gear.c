@@ -64,8 +64,6 @@ static const pw_field gear_fields[] = {
   { .name = NULL },
 };
 
-static const pw_quantity gear_reaction[] = { { "M", "N m", NULL, "moment on the first body" } };
-
 const pw_kind pw_kind_gear = {
   .name = "gear",
   .about = "the angles of two bodies relative to a third have a fixed ratio",
@@ -74,7 +72,7 @@ const pw_kind pw_kind_gear = {
   .bodies = 3,
   .rows = 1,
   .level = PW_HOLONOMIC,
-  .reaction = gear_reaction,
+  REACTION ("M", "N m", "moment on the first body"),
   POSITION (gear),
   .J = gear_J,
 };

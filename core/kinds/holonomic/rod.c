@@ -100,10 +100,6 @@ static const pw_field rod_fields[] = {
   { .name = NULL },
 };
 
-static const pw_quantity rod_reaction[] = {
-  { "F", "N", NULL, "force on the first body, away from the second; negative: tension" },
-};
-
 const pw_kind pw_kind_rod = {
   .name = "rod",
   .about = "a massless bar keeps a point of one body at a fixed distance from a point of another",
@@ -112,7 +108,7 @@ const pw_kind pw_kind_rod = {
   .bodies = 2,
   .rows = 1,
   .level = PW_HOLONOMIC,
-  .reaction = rod_reaction,
+  REACTION ("F", "N", "force on the first body, away from the second; negative: tension"),
   POSITION (rod),
   CONSTRAINT (rod),
 };

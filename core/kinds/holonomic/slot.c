@@ -17,10 +17,6 @@ static const pw_field slot_fields[] = {
   { .name = NULL },
 };
 
-static const pw_quantity slot_reaction[] = {
-  { "N", "N", NULL, "force on the first body, to the left of the line's heading" },
-};
-
 const pw_kind pw_kind_slot = {
   .name = "slot",
   .about = "a point of one body stays on a line of another",
@@ -29,7 +25,7 @@ const pw_kind pw_kind_slot = {
   .bodies = 2,
   .rows = 1,
   .level = PW_HOLONOMIC,
-  .reaction = slot_reaction,
+  REACTION ("N", "N", "force on the first body, to the left of the line's heading"),
   POSITION (line),
   CONSTRAINT (line),
 };

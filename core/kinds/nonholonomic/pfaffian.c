@@ -79,10 +79,6 @@ static const pw_field pfaffian_fields[] = {
   { .name = NULL },
 };
 
-static const pw_quantity pfaffian_reaction[] = {
-  { "F", "N", NULL, "F a and F b are force and moment on the two bodies, in the frame of the first" },
-};
-
 const pw_kind pw_kind_pfaffian = {
   .name = "pfaffian",
   .about = "a linear relation, given by its coefficients, between the velocities of one or two bodies",
@@ -91,7 +87,7 @@ const pw_kind pw_kind_pfaffian = {
   .rows = 1,
   .signals = 1,
   .level = PW_NONHOLONOMIC,
-  .reaction = pfaffian_reaction,
+  REACTION ("F", "N", "F a and F b are force and moment on the two bodies, in the frame of the first"),
   .eta = batch_eta_of_signal,
   CONSTRAINT (pfaffian),
 };

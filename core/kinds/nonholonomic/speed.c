@@ -27,8 +27,6 @@ static const pw_field speed_fields[] = {
   { .name = NULL },
 };
 
-static const pw_quantity speed_reaction[] = { { "F", "N", NULL, "force on the body along the direction" } };
-
 const pw_kind pw_kind_speed = {
   .name = "speed",
   .symbol = "0 .6 0 0 2.2 0 0 1.7 .3 0 2.2 0 0 1.7 -.3",
@@ -38,11 +36,9 @@ const pw_kind pw_kind_speed = {
   .rows = 1,
   .signals = 1,
   .level = PW_NONHOLONOMIC,
-  .reaction = speed_reaction,
+  REACTION ("F", "N", "force on the body along the direction"),
   .eta = batch_eta_of_signal,
   .J = contact_J,
   .gamma = speed_gamma,
-  .jw_q = contact_jw_q,
-  .gamma_q = contact_gamma_q,
-  .gamma_v = contact_gamma_v,
+  DERIVATIVES (contact),
 };

@@ -66,10 +66,6 @@ static const pw_field steered_fields[] = {
   { .name = NULL },
 };
 
-static const pw_quantity steered_reaction[] = {
-  { "N", "N", NULL, "lateral force on the body, to the left of the heading" },
-};
-
 const pw_kind pw_kind_steered_wheel = {
   .name = "steered-wheel",
   .about = "a knife edge whose heading in the body follows a signal of time",
@@ -79,7 +75,7 @@ const pw_kind pw_kind_steered_wheel = {
   .rows = 1,
   .signals = 1,
   .level = PW_NONHOLONOMIC,
-  .reaction = steered_reaction,
+  REACTION ("N", "N", "lateral force on the body, to the left of the heading"),
   CONSTRAINT (steered),
   .contact = steered_contact,
 };

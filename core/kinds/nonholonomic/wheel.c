@@ -18,9 +18,6 @@ static const pw_field wheel_fields[] = {
   { .name = NULL },
 };
 
-static const pw_quantity wheel_reaction[] = { { "N", "N", NULL,
-                                                "lateral force on the body, to the left of the heading" } };
-
 const pw_kind pw_kind_wheel = {
   .name = "wheel",
   .about = "a knife edge: a point of the body moves only along a heading fixed in the body",
@@ -29,7 +26,7 @@ const pw_kind pw_kind_wheel = {
   .bodies = 1,
   .rows = 1,
   .level = PW_NONHOLONOMIC,
-  .reaction = wheel_reaction,
+  REACTION ("N", "N", "lateral force on the body, to the left of the heading"),
   CONSTRAINT (contact),
   .contact = contact_place,
 };
