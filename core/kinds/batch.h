@@ -1,4 +1,9 @@
-/* Batch functions and `prepare` functions of element types, written for one element; members of their tables. */
+/* Batch functions and `prepare` functions of element types, written for one element; members of their tables.
+ *
+ * Notation in the files of element types: r = (x, y), phi: centre of mass and angle of a body; w = phi'; R(phi): its
+ * rotation matrix; s: a point in its frame; indices 1, 2: of body 1, 2.  a: accelerations (r'', w') of the element's
+ * bodies; f: its generalised force; G, S: its rows of J, of position and velocity constraints; u: its signal; V: its
+ * potential energy. */
 #ifndef PW_BATCH_H
 #define PW_BATCH_H
 
@@ -87,7 +92,7 @@ LIBM (libm_hypot (libm_lanes x, libm_lanes y)) {
 #define CONSTRAINT(type) .J = type##_J, .gamma = type##_gamma, DERIVATIVES (type)
 #define FORCE(type) .force = type##_force, .force_q = type##_force_q, .force_v = type##_force_v
 
-/* The only reaction of a type. */
+/* The only reaction of a type: its name, unit and meaning. */
 #define REACTION(name, unit, about)  \
   .reaction = &(const pw_quantity) { \
     name, unit, NULL, about          \

@@ -1,7 +1,7 @@
 /* rolling-resistance: a force along a heading that opposes the velocity of the contact point P in that direction.
  *
  *   F = L tanh (v / v0),  v = S (vx, vy, w)                        v: speed of P along the heading (coulomb.h)
- *   S = [ cos(theta)  sin(theta)  -m ]          theta = phi + psi; m: the arm of P to the left of the heading
+ *   S = [ cos(theta)  sin(theta)  -m ]          theta = phi + psi, psi: heading in the body; m: arm of P to its left
  *   f = -F S,  loss = F v >= 0
  *
  * (Wong 2008, Theory of Ground Vehicles, section 1.2.)

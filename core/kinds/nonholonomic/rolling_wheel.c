@@ -1,7 +1,7 @@
 /* rolling-wheel: a wheel of radius R that rolls without slip; its spin angle chi is an internal coordinate.
  *
  *   n . v_P = 0,  e . v_P - R chi' = 0,  e = (cos, sin)(phi + psi), n = (-sin, cos)(phi + psi)    (2 nonholonomic)
- *   S     = [ -s  c   l   0 ]      (c, s) = e; l and m are the components of the contact point's arm along e and n
+ *   S     = [ -s  c   l   0 ]      psi: heading in the body; (c, s) = e; l, m: arm of the contact point P along e, n
  *           [  c  s  -m  -R ]
  *   gamma = ( w (c vx + s vy),  w (s vx - c vy) )                 so that S a = gamma; both rows as in contact.h
  *   f     = u on chi, power = u chi'                              u: torque about the axle

@@ -1,6 +1,6 @@
 /* speed: the speed of a point P along a direction fixed in its body follows a signal u (contact.h).
  *
- *   e . v_P = u,  e = (cos, sin)(phi + psi)                       (1 nonholonomic equation)
+ *   e . v_P = u,  e = (cos, sin)(phi + psi)           psi: heading in the body          (1 nonholonomic equation)
  *   S     = [ cos(theta)  sin(theta)  -m ]      theta = phi + psi; m: the arm of P to the left of e
  *   eta   = u
  *   gamma = u' + w (sin(theta) vx - cos(theta) vy)                so that S a = gamma
