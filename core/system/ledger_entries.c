@@ -28,10 +28,6 @@ int pw_ledger_list (const pw_system *s, pw_entry *entry) {
   return count;
 }
 
-int pw_system_ledger_entries (const pw_system *s) {
-  return s->entries;
-}
-
 char *pw_system_ledger_name (const pw_system *s, int entry, char *buffer, size_t size) {
   const pw_entry *listed = &s->entry[entry];
   const pw_element_batch *k = &s->batch[listed->batch];

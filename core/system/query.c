@@ -8,7 +8,6 @@
 static const char *const query_names[] = { "x", "y", "phi", "vx", "vy", "omega" };
 static const char *const query_units[] = { "m", "m", "rad", "m/s", "m/s", "rad/s" };
 
-/* The value of a member. */
 #define MEMBER(type, function, member) \
   type function (const pw_system *s) { \
     return s->member;                  \
@@ -18,6 +17,7 @@ MEMBER (int, pw_system_coordinates, coords)
 MEMBER (int, pw_system_rows, rows)
 MEMBER (int, pw_system_holonomic, holonomic)
 MEMBER (int, pw_system_signals, sources)
+MEMBER (int, pw_system_ledger_entries, entries)
 MEMBER (const char *, pw_system_name, model)
 MEMBER (const double *, pw_system_mass, mass)
 MEMBER (double, pw_system_length, scale.length)
