@@ -34,13 +34,13 @@ typedef struct {
 
 /* ---- Identity ---- */
 
-/* Finds the file of a command on PATH. */
+/* Finds the file of a command on PATH, of which an empty entry is the current folder. */
 static int code_find_program (const char *word, struct stat *info) {
-  const char *list = getenv ("PATH");
   if (strchr (word, '/')) return stat (word, info) == 0;
-  for (const char *p = list; p && *p; p += strcspn (p, ":"), p += *p == ':') {
+  for (const char *entry = getenv ("PATH"), *end; entry; entry = *end ? end + 1 : NULL) {
     char path[1000];
-    snprintf (path, sizeof path, "%.*s/%s", (int)strcspn (p, ":"), p, word);
+    end = entry + strcspn (entry, ":");
+    snprintf (path, sizeof path, "%.*s%s%s", (int)(end - entry), entry, end > entry ? "/" : "", word);
     if (stat (path, info) == 0 && S_ISREG (info->st_mode) && access (path, X_OK) == 0) return 1;
   }
   return 0;
