@@ -38,7 +38,7 @@ struct pw_run {
   struct pw_scene *scene;                   /* data of that code */
   char *scene_memory;
   int scene_ready;        /* 1: its constants have been computed */
-  pw_watchdog limits;     /* thresholds */
+  pw_thresholds limits;   /* thresholds */
   pw_geometry geometry;   /* distance of the constraints from a singular configuration */
   double refuse;          /* sine at which an evaluation is refused */
   int near_singular;      /* 1 after an evaluation near a singular configuration */

@@ -53,7 +53,7 @@ void pw_run_accelerate_updated (pw_run *r, const double *v, double *a, double *l
   const double *f = dynamics_right_side (r, v, r->scratch, lambda);
   r->statistics.rhs++;
   pw_saddle_solve (r->saddle, f, lambda, a, lambda);
-  if (pw_saddle_below (r->saddle, r->limits.refine)) dynamics_refine (r, v, a, lambda);
+  if (pw_saddle_sine_below (r->saddle, r->limits.refine)) dynamics_refine (r, v, a, lambda);
 }
 
 /* Factorises and solves; *near = 1 near a singular configuration. */
@@ -65,8 +65,8 @@ static inline int dynamics_solve (pw_run *r, const double *v, double *a, double 
   int status = pw_saddle_factor (r->saddle);
   if (status == PW_OK) pw_saddle_solve (r->saddle, f, lambda, a, lambda);
   *near = pw_watchdog_near (r);
-  if (*near && r->geometry.sine <= r->refuse) return PW_RETRY;
-  if (status == PW_OK && pw_saddle_below (r->saddle, r->limits.refine)) dynamics_refine (r, v, a, lambda);
+  if (*near && r->geometry.evaluated_sine <= r->refuse) return PW_RETRY;
+  if (status == PW_OK && pw_saddle_sine_below (r->saddle, r->limits.refine)) dynamics_refine (r, v, a, lambda);
   return status;
 }
 

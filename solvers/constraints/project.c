@@ -97,7 +97,7 @@ int pw_project_positions (pw_projector *p, pw_run *r, double t, double *q, const
     for (int j = 0; j < s->coords; j++) q[j] += dq[j];
   }
   if (p->active == NULL) r->residuals.position = now.position, r->residuals.g = now.g;
-  int status = project_check_redundant (p, s, r->limits.follows, g, size);
+  int status = project_check_redundant (p, s, r->limits.redundant_residual, g, size);
   if (status == PW_OK) pw_evaluate_J (r->w);
   return status;
 }
@@ -117,7 +117,7 @@ int pw_project_velocities (pw_projector *p, pw_run *r, double *v) {
   r->statistics.factorisations++;
   if (pw_saddle_factor (p->velocity) != PW_OK) return PW_RETRY;
   project_once (p, r, v);
-  if (pw_saddle_below (p->velocity, r->limits.refine)) project_once (p, r, v);
+  if (pw_saddle_sine_below (p->velocity, r->limits.refine)) project_once (p, r, v);
   return pw_update_velocities (r->w, v);
 }
 

@@ -45,7 +45,7 @@ int pw_specialised_open (pw_run *r, pw_error *error) {
   if (!pw_specialised_fits (code, r->s))
     return pw_fail (error, PW_INPUT, "model %s: the specialised code belongs to another scene", r->s->model);
   if (specialised_allocate (r, code->constants) != PW_OK) return pw_fail_memory (r->s, error);
-  r->scene->follows = r->limits.follows;
+  r->scene->follows = r->limits.redundant_residual;
   r->scene->alpha = r->alpha, r->scene->beta = r->beta;
   r->scene_ready = code->prepare (r->scene) == 0;
   pw_specialised_select (r);
@@ -63,8 +63,8 @@ void pw_specialised_select (pw_run *r) {
  * adaptive methods ask for it only below the pivots that the specialised code accepts. */
 int pw_specialised_suits (const pw_run *r) {
   const pw_geometry *g = &r->geometry;
-  return r->specialised && !r->redundant_moves && !(g->alert && g->saddle && pw_fixed_steps (r)) && !r->near_singular &&
-         !r->w->hold;
+  return r->specialised && !r->redundant_moves && !(g->singular_ahead && g->saddle && pw_fixed_steps (r)) &&
+         !r->near_singular && !r->w->hold;
 }
 
 void pw_specialised_scale (pw_run *r) {

@@ -60,13 +60,13 @@ int pw_saddle_factor (pw_saddle *k) {
   return k->pivot > SADDLE_ROUND_OFF ? PW_OK : PW_RETRY;
 }
 
-int pw_saddle_below (pw_saddle *k, double sine) {
+int pw_saddle_sine_below (pw_saddle *k, double sine) {
   if (sine * sine <= k->postponed) return 0;
   if (k->postponed > 0) pw_saddle_factor (k);
   return !(k->pivot >= sine * sine);
 }
 
-double pw_saddle_pivot (pw_saddle *k, int *row) {
+double pw_saddle_sine (pw_saddle *k, int *row) {
   if (k->postponed > 0) pw_saddle_factor (k);
   *row = k->pivot_row;
   return k->pivot > 0 ? sqrt (fmin (k->pivot, 1)) : 0;

@@ -32,10 +32,10 @@ void pw_saddle_postpone (pw_saddle *k, double pivot);
 void pw_saddle_solve (pw_saddle *k, const double *f, const double *gamma, double *a, double *lambda);
 
 /* 1 if the smallest pivot of the last factorisation is below this sine. */
-int pw_saddle_below (pw_saddle *k, double sine);
+int pw_saddle_sine_below (pw_saddle *k, double sine);
 
 /* The smallest pivot of the last factorisation, as the sine of the angle between a row and those before it: small near
  * a singular configuration; *row: that row, or -1 for one of coordinates without weight. */
-double pw_saddle_pivot (pw_saddle *k, int *row);
+double pw_saddle_sine (pw_saddle *k, int *row);
 
 #endif

@@ -116,7 +116,7 @@ int pw_rk_advance_fixed (pw_run *r, double t_end, pw_error *error) {
   const int split = d->split;
   r->near_singular = 0;
   int status = pw_rk_step (r, h, t1, project, r->settings.ledger ? &added : NULL);
-  int lands = r->near_singular && r->geometry.sine < r->limits.lands * r->geometry.state_sine;
+  int lands = r->near_singular && r->geometry.evaluated_sine < r->limits.lands * r->geometry.checked_sine;
   d->split = r->near_singular && !d->split;
   double stop = whole ? fmin (t_end, r->breakpoint) : t1, t = t1;
   if (d->split) status = fixed_step_around (r, status, lands, t1, stop, project, &t);

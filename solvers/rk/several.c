@@ -14,7 +14,7 @@ static int several_suits (const pw_run *r) {
   if (r->method->advance != pw_rk_advance || d == NULL || d->adaptive || d->held || d->null_space || d->split) return 0;
   if (d->projects && !(d->every == 1 && d->projector.by_mass && !d->projector.alone)) return 0;
   return pw_specialised_suits (r) && r->redundant == 0 && r->alpha + r->beta == 0 && !r->settings.ledger &&
-         !r->interrupted && r->stalled == 0 && !(r->geometry.saddle && r->geometry.alert) &&
+         !r->interrupted && r->stalled == 0 && !(r->geometry.saddle && r->geometry.singular_ahead) &&
          r->statistics.steps >= PW_CHECK_INTERVAL;
 }
 
@@ -35,20 +35,20 @@ static int several_count (const pw_run *r, double t, double t_end) {
 }
 
 static pw_scene_watch several_watch (const pw_run *r) {
-  const pw_watchdog *limit = &r->limits;
+  const pw_thresholds *limit = &r->limits;
   const pw_geometry *g = &r->geometry;
   const int watched = g->saddle != NULL; /* a tree of holonomic joints is never singular */
   const double length = r->s->scale.length, per = r->w->scale.time * r->w->scale.time;
   return (pw_scene_watch){
     .lost = pw_stabilised_by (r, PW_UNSTABILISED) ? limit->lost_unstabilised : limit->lost,
-    .sine = watched ? g->state_sine : INFINITY,
-    .reach = watched ? limit->lipschitz * g->typical : 0,
-    .near_sine = watched ? limit->near * g->typical : 0,
-    .growth = limit->growth,
-    .rank = limit->rank,
-    .regular = limit->regular * g->typical,
+    .sine = watched ? g->checked_sine : INFINITY,
+    .reach = watched ? limit->lipschitz * g->largest_sine : 0,
+    .near_sine = watched ? limit->near * g->largest_sine : 0,
+    .growth = limit->step_growth,
+    .rank = limit->rank_lost,
+    .regular = limit->regular * g->largest_sine,
     .drift = limit->drift_near,
-    .no_branch = 0.5 * limit->drift_near * limit->rank * limit->rank, /* 0.5: a margin for round-off */
+    .no_branch = 0.5 * limit->drift_near * limit->rank_lost * limit->rank_lost, /* 0.5: a margin for round-off */
     .length = length,
     .per_length = per / length,
     .per_angle = per,
@@ -71,10 +71,10 @@ static void several_report (pw_run *r, const pw_scene_steps *x) {
   s->velocity = pw_larger (s->velocity, x->watch.velocity), s->jv = pw_larger (s->jv, x->watch.jv);
   pw_specialised_count (r, (long)x->stages * x->done, x->iterations);
   if (g->saddle == NULL) return; /* else as watchdog_follow leaves it where the sine need not be computed */
-  g->step = x->watch.step, g->moved = x->watch.moved, g->alert = 0;
-  g->before = NAN, g->slope = 0, g->crossed = 0;
-  g->t = r->t, g->start_sine = NAN;
-  memcpy (g->q, r->q, (size_t)r->s->coords * sizeof *g->q);
+  g->step_length = x->watch.step, g->moved = x->watch.moved, g->singular_ahead = 0;
+  g->sine_before_checked = NAN, g->sine_slope = 0, g->crossed = 0;
+  g->previous_t = r->t, g->previous_sine = NAN;
+  memcpy (g->previous_q, r->q, (size_t)r->s->coords * sizeof *g->previous_q);
 }
 
 /* Fills x for the next steps up to t and before t_end, two at least, and returns their number; 0: single steps have to

@@ -31,11 +31,22 @@ static void checkpoint_statistics (pw_statistics *s, pw_archive *a) {
 
 static void checkpoint_state (pw_run *r, pw_archive *a) {
   size_t n = (size_t)r->s->coords * sizeof (double), entries = (size_t)r->s->entries * sizeof (double);
-  double *const number[] = {
-    &r->t,         &r->breakpoint,      &r->projected,     &r->energy0,      &r->potential0,     &r->exchanged,
-    &r->power,     &r->reference_level, &r->previous_norm, &r->independence, &r->reselect_below, &r->geometry.typical,
-    &r->mark_time, &r->mark_speed,      &r->before_time,   &r->before_speed
-  };
+  double *const number[] = { &r->t,
+                             &r->breakpoint,
+                             &r->projected,
+                             &r->energy0,
+                             &r->potential0,
+                             &r->exchanged,
+                             &r->power,
+                             &r->reference_level,
+                             &r->previous_norm,
+                             &r->independence,
+                             &r->reselect_below,
+                             &r->geometry.largest_sine,
+                             &r->mark_time,
+                             &r->mark_speed,
+                             &r->before_time,
+                             &r->before_speed };
   for (size_t i = 0; i < sizeof number / sizeof *number; i++) pw_archive_bytes (a, number[i], sizeof (double));
   pw_archive_bytes (a, r->q, n);
   pw_archive_bytes (a, r->v, n);

@@ -89,7 +89,7 @@ static int multistep_complete (multistep_data *d, double t, int project, double 
   r->refuse = 0;
   int status = project ? multistep_project (d, t, q, v) : PW_OK;
   if (status == PW_OK) status = pw_run_accelerate (r, t, q, v, a, lambda);
-  r->refuse = r->limits.rank;
+  r->refuse = r->limits.rank_lost;
   r->statistics = keep;
   r->near_singular = near;
   return status;
@@ -216,7 +216,7 @@ static void multistep_evaluate (multistep_data *d) {
   r->refuse = 0;
   d->evaluated = pw_run_accelerate_evaluated (r, r->v, r->a, r->lambda) == PW_OK;
   if (!d->evaluated) memcpy (r->lambda, d->lambda, (size_t)r->s->rows * sizeof *r->lambda);
-  r->refuse = r->limits.rank;
+  r->refuse = r->limits.rank_lost;
   r->statistics = keep;
 }
 
