@@ -285,15 +285,15 @@ static inline void pw_forget_residuals (pw_run *r) {
 
 typedef struct {
   pw_saddle *position;         /* position metric, holonomic rows; or the run's saddle */
-  int own_position;            /* position is not the run's saddle */
-  pw_saddle *velocity;         /* all rows */
-  int own_velocity;            /* velocity is not the run's saddle */
+  int owns_position;           /* 1: position is not the run's saddle */
+  pw_saddle *velocity;         /* velocity metric, all rows */
+  int owns_velocity;           /* 1: velocity is not the run's saddle */
   int iterations;              /* of the last position projection */
   const unsigned char *active; /* rows that are enforced; NULL: all */
-  int alone;                   /* 1: inactive rows are not checked */
-  int by_mass;                 /* 1: both metrics are the mass matrix */
-  int row;                     /* worst row of the last position projection */
-  int against;                 /* redundant row violated after it, or -1 */
+  int ignores_inactive;        /* 1: inactive rows are not checked */
+  int mass_metric;             /* 1: both metrics are the mass matrix */
+  int worst_row;               /* row with the largest residual in the last position projection */
+  int contradicting_row;       /* redundant row violated after it, or -1 */
 } pw_projector;
 
 /* Position metric `weight_q` and velocity metric `weight_v` (NULL: the mass matrix).  J must be evaluated at a typical
@@ -316,8 +316,8 @@ int pw_project_velocities (pw_projector *p, pw_run *r, double *v);
 int pw_project_state (pw_projector *p, pw_run *r, double t, double *q, double *v, double *a, double *lambda);
 
 /* Removes from an error of positions or velocities the part that a projection onto the first `rows` equations
- * removes, in the metric of the saddle `k` (all rows), which must be factorised at the current configuration. */
-void pw_project_error (pw_run *r, pw_saddle *k, double *e, int rows);
+ * removes, in the metric of `saddle` (all rows), which must be factorised at the current configuration. */
+void pw_project_error (pw_run *r, pw_saddle *saddle, double *e, int rows);
 
 /* ---- Specialised code (specialised.c) ---- */
 

@@ -75,7 +75,7 @@ static void steady_residual (pw_steady *x, int k, double *F) {
   F += x->m;
   memcpy (F, l->a, (size_t)x->n * sizeof *F);
   pw_linear_turn (l, -x->rates[2], x->v, F);
-  for (int j = 0; j < x->n; j++) F[j] *= pw_as_length (x->s, j) * acceleration;
+  for (int j = 0; j < x->n; j++) F[j] *= pw_length_factor (x->s, j) * acceleration;
 }
 
 /* ---- Derivatives ---- */
@@ -92,7 +92,7 @@ static void steady_change (pw_steady *x, double dw, double *F) {
   for (int i = 0; i < x->m; i++) *F++ = (l->c[i] + l->y[n + x->m + i]) * x->T / (x->norm[i] * x->L);
   pw_linear_turn (l, -x->rates[2], dv, l->da);
   pw_linear_turn (l, -dw, x->v, l->da);
-  for (int j = 0; j < n; j++) *F++ = l->da[j] * pw_as_length (x->s, j) * x->T * x->T / x->L;
+  for (int j = 0; j < n; j++) *F++ = l->da[j] * pw_length_factor (x->s, j) * x->T * x->T / x->L;
   for (int i = 0; i < x->set.holds; i++)
     *F++ = pw_hold_change (x->s, x->hold + i, x->q, x->v, dq, dv) / pw_hold_unit (x, x->hold + i);
 }

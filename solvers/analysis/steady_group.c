@@ -53,7 +53,7 @@ static double group_size (pw_steady *x) {
     l->x[c] = pw_unit (x->s, c);
     pw_linear_vary (l);
     for (int j = 0; j < x->n; j++)
-      most = pw_larger_or_nan (most, fabs (l->da[j]) * pw_as_length (x->s, j) * x->T * x->T / x->L);
+      most = pw_larger_or_nan (most, fabs (l->da[j]) * pw_length_factor (x->s, j) * x->T * x->T / x->L);
   }
   return most;
 }

@@ -145,7 +145,7 @@ static change_verdict change_walk_step (pw_run *r, change_walk *w, pw_error *err
     return verdict;
   }
   w->q = memory, w->next = w->q + n, w->target = w->next + n, w->entry = w->target + n;
-  pw_rank_weights (s, w->entry);
+  pw_length_weights (s, w->entry);
   if (pw_projector_open (&w->projector, r, w->entry, NULL, error) == PW_OK) {
     verdict = change_follow (w);
     pw_projector_close (&w->projector);

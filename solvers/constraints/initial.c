@@ -35,7 +35,7 @@ typedef struct {
 static double initial_massless_scale (const pw_system *s) {
   double least = INFINITY, most = 0, massless = 0;
   for (int j = 0; j < s->coords; j++) {
-    double length = pw_as_length (s, j), entry = s->metric[j] / (length * length);
+    double length = pw_length_factor (s, j), entry = s->metric[j] / (length * length);
     if (s->mass[j] > 0)
       least = fmin (least, entry), most = fmax (most, entry);
     else
@@ -56,9 +56,9 @@ static void initial_weights (const pw_system *s, const double *metric, const uns
 static int initial_positions (pw_projector *p, pw_run *r, initial_failure *failure) {
   int status = pw_project_positions (p, r, r->t, r->q, r->v);
   if (status == PW_OK) return PW_OK;
-  if (pw_update_kinematics (r->w, r->t, r->q, r->v) == PW_OK && p->row >= 0) {
+  if (pw_update_kinematics (r->w, r->t, r->q, r->v) == PW_OK && p->worst_row >= 0) {
     pw_evaluate_g (r->w, r->scratch);
-    *failure = (initial_failure){ p->row, 0, fabs (r->scratch[p->row]), 0 };
+    *failure = (initial_failure){ p->worst_row, 0, fabs (r->scratch[p->worst_row]), 0 };
   }
   return status;
 }
@@ -205,7 +205,7 @@ static int initial_ranked (pw_run *r, const unsigned char *prescribed, int seek,
   size_t n = (size_t)s->coords, m = (size_t)s->rows;
   initial_failure later = { .row = -1 };
   int status = initial_attempt (r, prescribed, seek, r->q_given, failure, error), rank = s->rows;
-  if (status != PW_RETRY || r->active || (double)s->rows * s->coords > PW_RANK_MOST) return status;
+  if (status != PW_RETRY || r->active || (double)s->rows * s->coords > PW_RANK_MAX_ENTRIES) return status;
   double *at = malloc (2 * n * sizeof *at + m);
   if (at == NULL) return pw_fail_memory (s, error);
   double *from = at + n;
@@ -310,7 +310,7 @@ static int initial_try (pw_run *r, const unsigned char *origin, initial_failure 
     if (!initial_mask (s, origin, set, mask)) continue;
     int ranked = small || !((set->q | set->v) & PW_SPECIFIED);
     if (ranked == before && memcmp (mask, last, assembled ? 2 * n : n) == 0) continue;
-    int seek = small || (ranked && given && (double)s->rows * s->coords <= PW_RANK_MOST);
+    int seek = small || (ranked && given && (double)s->rows * s->coords <= PW_RANK_MAX_ENTRIES);
     initial_failure now = { .row = -1 };
     status =
         ranked ? initial_ranked (r, mask, seek, &now, error) : initial_attempt (r, mask, seek, r->q_given, &now, error);

@@ -140,7 +140,7 @@ int pw_watchdog_open (pw_run *r, pw_error *error) {
   double *weight = malloc (n * sizeof *weight);
   g->saddle = NULL;
   if (g->previous_q && weight) {
-    pw_rank_weights (s, weight);
+    pw_length_weights (s, weight);
     g->saddle = pw_saddle_open (r->w, weight, s->rows, r->active, error);
   }
   free (weight);
@@ -211,7 +211,7 @@ int pw_watchdog_check_values (const pw_run *r, pw_error *error) {
                       s->model, pw_system_state_name (s, i, name, sizeof name), value, extreme);
   }
   for (int j = 0; s->rows > 0 && j < s->coords; j++) {
-    double mass = s->mass[j] / (pw_as_length (s, j) * pw_as_length (s, j));
+    double mass = s->mass[j] / (pw_length_factor (s, j) * pw_length_factor (s, j));
     if (mass != 0 && !(mass < extreme && mass > 1 / extreme))
       return pw_fail (
           error, PW_INPUT,

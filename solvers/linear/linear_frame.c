@@ -117,7 +117,7 @@ void pw_linear_asymmetry (pw_linearisation *x, int turns, double *out) {
   pw_linear_vary (x);
   out = linear_violation (x, out);
   if (turns) pw_linear_turn (x, -1, x->a, x->da);
-  for (int j = 0; j < x->n; j++) out[j] = x->da[j] * pw_as_length (x->r->s, j) / linear_unit (x);
+  for (int j = 0; j < x->n; j++) out[j] = x->da[j] * pw_length_factor (x->r->s, j) / linear_unit (x);
 }
 
 /* Tolerance of symmetries: round-off grows with the derivatives of the accelerations, by 1e-4 of their size. */
@@ -171,7 +171,7 @@ static void linear_later (const pw_linearisation *x, double time, double *q, dou
 static int linear_agree (const pw_linearisation *x, const double *a, const double *b) {
   double off = 0, most = linear_unit (x);
   for (int j = 0; j < x->n; j++) {
-    double unit = pw_as_length (x->r->s, j);
+    double unit = pw_length_factor (x->r->s, j);
     off = pw_larger_or_nan (off, fabs (a[j] - b[j]) * unit);
     most = fmax (most, fabs (b[j]) * unit);
   }

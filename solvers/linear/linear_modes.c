@@ -104,7 +104,7 @@ static void modes_scale (const pw_linearisation *x, double complex *shape) {
   double complex most = 0;
   for (int part = 0; part < 2 && cabs (most) <= 0; part++)
     for (int j = 0; j < x->n; j++) {
-      double complex value = shape[part * x->n + j] * pw_as_length (x->r->s, j) * (part ? x->r->w->scale.time : 1);
+      double complex value = shape[part * x->n + j] * pw_length_factor (x->r->s, j) * (part ? x->r->w->scale.time : 1);
       if (cabs (value) > cabs (most) * (1 + 1e-9)) most = value;
     }
   for (int j = 0; cabs (most) > 0 && j < 2 * x->n; j++) shape[j] /= most;

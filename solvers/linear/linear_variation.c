@@ -140,7 +140,7 @@ static void linear_follow (pw_linearisation *x) {
   for (int i = 0; i < x->rank; i++) b[i] = x->y[x->n + x->m + x->row[i]] / x->norm[x->row[i]];
   LAPACKE_dtrtrs_work (LAPACK_COL_MAJOR, 'U', 'T', 'N', x->rank, 1, x->R, stride, b, stride);
   for (int i = 0; i < x->rank; i++)
-    for (int j = 0; j < x->n; j++) x->x[x->n + j] -= b[i] * linear_column (x, i)[j] / pw_as_length (x->r->s, j);
+    for (int j = 0; j < x->n; j++) x->x[x->n + j] -= b[i] * linear_column (x, i)[j] / pw_length_factor (x->r->s, j);
 }
 
 void pw_linear_tangent (pw_linearisation *x, int c) {
@@ -148,7 +148,7 @@ void pw_linear_tangent (pw_linearisation *x, int c) {
   double T = x->r->w->scale.time;
   memset (x->x, 0, 2 * (size_t)x->n * sizeof *x->x);
   for (int j = 0; j < x->n; j++)
-    x->x[velocity ? x->n + j : j] = linear_column (x, column)[j] / pw_as_length (x->r->s, j) / (velocity ? T : 1);
+    x->x[velocity ? x->n + j : j] = linear_column (x, column)[j] / pw_length_factor (x->r->s, j) / (velocity ? T : 1);
   if (velocity) return;
   pw_linear_multiply (x);
   linear_follow (x);
@@ -157,7 +157,7 @@ void pw_linear_tangent (pw_linearisation *x, int c) {
 /* Component of a vector over the coordinates along a column of Q. */
 static double linear_along (const pw_linearisation *x, int column, const double *vector) {
   double sum = 0;
-  for (int j = 0; j < x->n; j++) sum += linear_column (x, column)[j] * vector[j] * pw_as_length (x->r->s, j);
+  for (int j = 0; j < x->n; j++) sum += linear_column (x, column)[j] * vector[j] * pw_length_factor (x->r->s, j);
   return sum;
 }
 

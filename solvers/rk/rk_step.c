@@ -174,7 +174,8 @@ double pw_rk_distance (const pw_run *r) {
 
 int pw_rk_fail (pw_run *r, int status, double h, pw_error *error) {
   int finite = rk_finite (r, r->data->q, r->data->v) && rk_finite (r, r->q, r->v);
-  int against = (r->data->projects || r->data->projects_positions) && finite ? r->data->projector.against : -1;
+  int against =
+      (r->data->projects || r->data->projects_positions) && finite ? r->data->projector.contradicting_row : -1;
   char element[120];
   if (status < 0) return pw_fail_signal (r->t, error);
   if (against >= 0) /* a redundant equation contradicts the others */

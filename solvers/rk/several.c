@@ -12,7 +12,7 @@
 static int several_suits (const pw_run *r) {
   const struct pw_method_data *d = r->data;
   if (r->method->advance != pw_rk_advance || d == NULL || d->adaptive || d->held || d->null_space || d->split) return 0;
-  if (d->projects && !(d->every == 1 && d->projector.by_mass && !d->projector.alone)) return 0;
+  if (d->projects && !(d->every == 1 && d->projector.mass_metric && !d->projector.ignores_inactive)) return 0;
   return pw_specialised_suits (r) && r->redundant == 0 && r->alpha + r->beta == 0 && !r->settings.ledger &&
          !r->interrupted && r->stalled == 0 && !(r->geometry.saddle && r->geometry.singular_ahead) &&
          r->statistics.steps >= PW_CHECK_INTERVAL;

@@ -107,7 +107,7 @@ static int run_first_evaluation (pw_run *r, pw_error *error) {
   int status = pw_run_open_saddle (r, error);
   if (status != PW_OK) return status;
   double sine = pw_watchdog_sine (r, NULL);
-  int large = (double)r->s->rows * r->s->coords > PW_RANK_MOST;
+  int large = (double)r->s->rows * r->s->coords > PW_RANK_MAX_ENTRIES;
   if (sine < (large ? r->limits.rank_refused : r->limits.rank_suspect)) {
     if (large) return pw_fail_singular (r, r->t, error);
     int chosen = pw_rank_open (r, error);

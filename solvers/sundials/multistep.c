@@ -199,9 +199,9 @@ static int multistep_fail (multistep_data *d, int flag, pw_error *error) {
   char element[120];
   int singular = flag == CV_FIRST_RHSFUNC_ERR || flag == CV_REPTD_RHSFUNC_ERR || flag == CV_UNREC_RHSFUNC_ERR;
   if (!r->stopped) multistep_count (d);
-  if (!r->stopped && flag == CV_REPTD_PROJFUNC_ERR && d->projector.against >= 0)
+  if (!r->stopped && flag == CV_REPTD_PROJFUNC_ERR && d->projector.contradicting_row >= 0)
     return pw_fail (error, PW_METHOD, "t = %.6g s: %s contradicts the other constraints", r->t,
-                    pw_system_row_name (r->s, d->projector.against, element, sizeof element));
+                    pw_system_row_name (r->s, d->projector.contradicting_row, element, sizeof element));
   if (flag == CV_PROJFUNC_FAIL) flag = CV_RHSFUNC_FAIL; /* a signal failed */
   return pw_sun_fail (&d->sun, flag, singular,
                       flag == CV_REPTD_PROJFUNC_ERR ? "the projection does not converge however small the step" : NULL,

@@ -80,7 +80,7 @@ static void implicit_direction (pw_variation *x, int i, int c) {
   pw_linear_tangent (l, c);
   memcpy (N, l->x, 2 * half);
   for (int j = 0; j < x->n; j++) {
-    double scale = pw_as_length (x->r->s, j) * T;
+    double scale = pw_length_factor (x->r->s, j) * T;
     D[j] = N[velocity ? x->n + j : j] * scale * scale;
   }
   pw_linear_vary (l);
