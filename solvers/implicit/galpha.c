@@ -160,7 +160,7 @@ static int galpha_solve (pw_run *r, double h, double t1) {
     if (size <= enough || stalled || (rate < 1 && size * rate / (1 - rate) <= enough)) return galpha_update (r, t1);
     if (rate > 2 && i > 3) return PW_RETRY;
     fresh = i > 0 && rate > 0.02;
-    if (fresh) pw_sparse_forget (&d->work.sparse);
+    if (fresh) pw_sparse_forget_pivots (&d->work.sparse);
     before = size;
   }
   return PW_RETRY;
@@ -188,11 +188,11 @@ static int galpha_open (pw_run *r, pw_error *error) {
   if (status == PW_OK) {
     galpha_coefficients (d, pw_run_option (r, "rho"));
     d->work.q1 = d->y, d->work.v1 = d->y + x->n;
-    pw_scatter_record (&x->tangent.scatter);
+    pw_scatter_begin_record (&x->tangent.scatter);
     galpha_fill (d, 1);
     status = pw_implicit_lay_out (&d->work, x->size);
   }
-  return pw_implicit_complete (r, status, x->velocities, error);
+  return pw_implicit_complete (r, status, x->enforces_velocities, error);
 }
 
 /* ---- Initialisation ---- */
@@ -207,7 +207,7 @@ static int galpha_jerk (pw_run *r, double h, double *jerk) {
     d->work.v1[j] = d->v[j] + s * d->a[j];
   }
   int status =
-      pw_run_accelerate (r, pw_before_breakpoint (r, r->t + s), d->work.q1, d->work.v1, jerk, d->work.dae.other);
+      pw_run_accelerate (r, pw_before_breakpoint (r, r->t + s), d->work.q1, d->work.v1, jerk, d->work.dae.scratch);
   for (int j = 0; j < d->work.dae.n; j++) jerk[j] = (jerk[j] - d->a[j]) / s;
   return status;
 }
@@ -240,11 +240,11 @@ static int galpha_displace (pw_run *r, double h, const double *jerk) {
   double C = 1. / 6 - d->beta - 0.5 * (d->alpha_m - d->alpha_f), *dv = d->work.v1;
   int status = pw_evaluate_J_at (r->w, r->t, r->q, d->v);
   if (status != PW_OK) return status;
-  pw_mul_J (r->w, jerk, d->work.dae.jv);
-  for (int i = 0; i < s->rows; i++) d->work.dae.jv[i] *= i < s->holonomic ? C * h * h : 0;
+  pw_mul_J (r->w, jerk, d->work.dae.residual);
+  for (int i = 0; i < s->rows; i++) d->work.dae.residual[i] *= i < s->holonomic ? C * h * h : 0;
   status = pw_saddle_factor (r->saddle);
   if (status != PW_OK) return status;
-  pw_saddle_solve (r->saddle, NULL, d->work.dae.jv, dv, d->work.dae.other);
+  pw_saddle_solve (r->saddle, NULL, d->work.dae.residual, dv, d->work.dae.scratch);
   for (int j = 0; j < d->work.dae.n; j++) d->v[j] += dv[j];
   return PW_OK;
 }
@@ -255,16 +255,16 @@ static int galpha_begin (pw_run *r, double h) {
   double *jerk = d->w1;
   int status = PW_OK;
   memcpy (d->v, r->v, (size_t)d->work.dae.n * sizeof *d->v);
-  if (!d->work.dae.velocities) { /* velocities include the error of the steps before */
+  if (!d->work.dae.enforces_velocities) { /* velocities include the error of the steps before */
     status = pw_evaluate_J_at (r->w, r->t, r->q, d->v);
     if (status == PW_OK) status = pw_project_velocities (&d->work.last.projector, r, d->v);
   }
-  if (status == PW_OK) status = pw_run_accelerate (r, r->t, r->q, d->v, d->a, d->work.dae.other);
+  if (status == PW_OK) status = pw_run_accelerate (r, r->t, r->q, d->v, d->a, d->work.dae.scratch);
   if (status == PW_OK) status = galpha_jerk (r, h, jerk);
   if (status == PW_OK && galpha_fast (r, h, jerk)) status = galpha_try (r, h, jerk);
   if (status != PW_OK) return status;
   for (int j = 0; j < d->work.dae.n; j++) d->w[j] = d->a[j] + (d->alpha_m - d->alpha_f) * h * jerk[j];
-  return d->work.dae.velocities || r->s->holonomic == 0 ? PW_OK : galpha_displace (r, h, jerk);
+  return d->work.dae.enforces_velocities || r->s->holonomic == 0 ? PW_OK : galpha_displace (r, h, jerk);
 }
 
 /* ---- Advancing ---- */
@@ -281,7 +281,7 @@ static void galpha_accept (pw_run *r) {
   memcpy (d->v, r->v, n);
   memcpy (d->a, d->a1, n);
   memcpy (d->w, d->w1, n);
-  pw_tangent_store (&d->work.dae.tangent, d->y + 2 * d->work.dae.n, r->lambda);
+  pw_tangent_expand (&d->work.dae.tangent, d->y + 2 * d->work.dae.n, r->lambda);
 }
 
 static int galpha_advance (pw_run *r, double t_end, pw_error *error) {

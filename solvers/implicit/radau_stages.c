@@ -48,8 +48,8 @@ int pw_radau_open_matrices (pw_run *r) {
   if (!d->matrix || !d->value || !d->diagonal) return PW_RESOURCE;
   for (int j = 0; j < 2 * d->dae.n; j++)
     for (d->diagonal[j] = x->colptr[j]; x->rowind[d->diagonal[j]] != j;) d->diagonal[j]++;
-  int status = pw_sparse_open (&d->real, 0, d->dae.size, x->colptr, x->rowind);
-  return status == PW_OK ? pw_sparse_open (&d->complex, 1, d->dae.size, x->colptr, x->rowind) : status;
+  int status = pw_sparse_open (&d->real, PW_SPARSE_REAL, d->dae.size, x->colptr, x->rowind);
+  return status == PW_OK ? pw_sparse_open (&d->complex, PW_SPARSE_COMPLEX, d->dae.size, x->colptr, x->rowind) : status;
 }
 
 /* Evaluates F_y at the beginning of the step. */
@@ -59,7 +59,7 @@ static int radau_linearise (pw_run *r) {
   int status = pw_evaluate_J_at (r->w, r->t, y, y + d->dae.n);
   if (status != PW_OK) return status;
   memset (d->matrix, 0, (size_t)d->dae.tangent.colptr[d->dae.size] * sizeof *d->matrix);
-  pw_scatter_begin (&d->dae.tangent.scatter, d->matrix);
+  pw_scatter_begin_fill (&d->dae.tangent.scatter, d->matrix);
   pw_dae_matrix (&d->dae, y + d->dae.n, NULL, y + 2 * d->dae.n, 0, 0);
   pw_matrix_evaluated (r, y, y + d->dae.n);
   r->statistics.jacobians++;
@@ -84,7 +84,7 @@ static int radau_factor (pw_run *r, double h) {
   radau *d = r->data;
   if (d->factored == h) return PW_OK;
   d->factored = 0;
-  if (d->forget) pw_sparse_forget (&d->real), pw_sparse_forget (&d->complex);
+  if (d->forget) pw_sparse_forget_pivots (&d->real), pw_sparse_forget_pivots (&d->complex);
   d->forget = 0;
   pw_implicit_scale (&d->dae, radau_gamma / h, radau_gamma / h, d->row, d->column);
   radau_shift (d, 1, radau_gamma / h, 0);
@@ -124,7 +124,7 @@ double pw_radau_rtol (const pw_run *r) {
 static void radau_weigh (pw_run *r, double h) {
   radau *d = r->data;
   const pw_settings *set = &r->settings;
-  int n = d->dae.n, third = !d->dae.velocities && d->dae.tangent.holonomic > 0;
+  int n = d->dae.n, third = !d->dae.enforces_velocities && d->dae.tangent.holonomic > 0;
   double rtol = pw_radau_rtol (r), newton = fmax (10 * DBL_EPSILON / rtol, fmin (0.03, sqrt (rtol)));
   double large = 1; /* the largest coordinate: its round-off may affect others */
   for (int j = 0; j < n; j++) large = fmax (large, fabs (d->now.y[j]) / d->unit[j]);
@@ -296,7 +296,7 @@ int pw_radau_estimate (pw_run *r, double h, int again, double *error) {
 
 int pw_radau_work (pw_run *r, double h, double t1, double *error) {
   radau *d = r->data;
-  int entries = r->s->entries, again = !d->dae.velocities && pw_ledger_reacts (r->s);
+  int entries = r->s->entries, again = !d->dae.enforces_velocities && pw_ledger_reacts (r->s);
   double sum = 0;
   for (int k = 0; k < STAGES; k++) memset (d->now.w[k], 0, (size_t)entries * sizeof (double));
   for (int k = 0; k < STAGES; k++) {
@@ -304,7 +304,7 @@ int pw_radau_work (pw_run *r, double h, double t1, double *error) {
     double t = pw_before_breakpoint (r, radau_time (r, k, h, t1));
     int status = pw_evaluate_J_at (r->w, t, d->Y, d->Y + d->dae.n);
     if (status != PW_OK) return status;
-    const double *lambda = pw_tangent_lambda (&d->dae.tangent, d->Y + 2 * d->dae.n);
+    const double *lambda = pw_tangent_expand_lambda (&d->dae.tangent, d->Y + 2 * d->dae.n);
     if (again && pw_saddle_factor (r->saddle) == PW_OK) {
       pw_run_accelerate_updated (r, d->Y + d->dae.n, r->a_at, r->lambda_at);
       lambda = r->lambda_at;

@@ -41,7 +41,7 @@ typedef struct {
   double *residual;              /* 3 x (2 m + n): violations by rigid displacements; then scratch, 2 m + n + 15 */
   double *a0, *along, *response; /* n, 2 n, n: accelerations, a variation and its da at the current state */
   double *there;                 /* 2 n: a later state */
-  pw_newton newton;
+  pw_newton_scratch newton;
   pw_scatter_map scatter;
   int64_t *colptr, *rowind; /* the derivatives: columns q, v; rows as y */
   double *value;

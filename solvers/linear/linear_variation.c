@@ -42,20 +42,20 @@ static void linear_put (pw_linearisation *x, const double *v) {
                { PW_GAMMA_Q, n, 0, 1, NULL }, { PW_GAMMA_V, n, n, 1, NULL },  { PW_JW_Q, n, 0, -1, x->a },
                { PW_JW_Q, of_J, 0, 1, v },    { PW_ETA_Q, of_J, 0, -1, NULL } };
   for (size_t i = 0; i < sizeof part / sizeof *part; i++)
-    pw_newton_block (&x->newton, x->r->w, &x->scatter, part[i].block,
-                     &(pw_placement){ .row = part[i].row,
-                                      .col = part[i].col,
-                                      .rows = x->m,
-                                      .factor = part[i].factor,
-                                      .factor_nonholonomic = part[i].factor,
-                                      .w = part[i].w,
-                                      .lambda = x->lambda });
-  pw_newton_signals (&x->newton, x->r->w, &x->scatter, 0, 0, n);
+    pw_newton_add_block (&x->newton, x->r->w, &x->scatter, part[i].block,
+                         &(pw_placement){ .row = part[i].row,
+                                          .col = part[i].col,
+                                          .rows = x->m,
+                                          .factor = part[i].factor,
+                                          .factor_nonholonomic = part[i].factor,
+                                          .direction = part[i].w,
+                                          .lambda = x->lambda });
+  pw_newton_add_signals (&x->newton, x->r->w, &x->scatter, 0, 0, n);
 }
 
 int pw_linear_derivatives (pw_linearisation *x) {
   if (pw_newton_open (&x->newton, x->r->s) != PW_OK) return PW_RESOURCE;
-  pw_scatter_record (&x->scatter);
+  pw_scatter_begin_record (&x->scatter);
   linear_put (x, x->r->v);
   int size = 2 * x->n > x->n + 2 * x->m ? 2 * x->n : x->n + 2 * x->m;
   if (pw_scatter_lay_out (&x->scatter, size, &x->colptr, &x->rowind) != PW_OK) return PW_RESOURCE;
@@ -76,7 +76,7 @@ int pw_linear_evaluate (pw_linearisation *x, double t, const double *q, const do
   int status = pw_run_accelerate (x->r, t, q, v, x->a, x->lambda);
   if (status != PW_OK) return status;
   memset (x->value, 0, ((size_t)x->colptr[2 * x->n] + 1) * sizeof *x->value);
-  pw_scatter_begin (&x->scatter, x->value);
+  pw_scatter_begin_fill (&x->scatter, x->value);
   linear_put (x, v);
   linear_pack (x);
   return PW_OK;
