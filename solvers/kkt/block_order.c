@@ -116,9 +116,9 @@ static const order_variant *order_choose (order_search *x) {
 /* ---- Layout ---- */
 
 int pw_block_find (const pw_block_ldl *l, int p, int q) {
-  const pw_column *c = &l->column[q];
-  int at = c->at + pw_block_diagonal (c->size);
-  for (int i = c->first; l->below[i] != p; i++) at += c->size * l->column[l->below[i]].size;
+  const pw_block_column *c = &l->column[q];
+  int at = c->first_value + pw_block_diagonal (c->size);
+  for (int i = c->first_below; l->below[i] != p; i++) at += c->size * l->column[l->below[i]].size;
   return at;
 }
 
@@ -126,14 +126,14 @@ int pw_block_find (const pw_block_ldl *l, int p, int q) {
 static int order_place_columns (pw_block_ldl *l) {
   size_t at = 0;
   for (int j = 0; j < l->nodes; j++) {
-    pw_column *c = &l->column[j];
-    c->at = (int)at;
+    pw_block_column *c = &l->column[j];
+    c->first_value = (int)at;
     if (c->in_chain) continue;
     at += (size_t)pw_block_diagonal (c->size);
-    for (int i = c->first; i < c[1].first; i++) at += (size_t)(c->size * l->column[l->below[i]].size);
+    for (int i = c->first_below; i < c[1].first_below; i++) at += (size_t)(c->size * l->column[l->below[i]].size);
     if (at > INT_MAX) return PW_RESOURCE;
   }
-  l->column[l->nodes].at = l->values = (int)at;
+  l->column[l->nodes].first_value = l->values = (int)at;
   return PW_OK;
 }
 
@@ -150,12 +150,12 @@ static size_t order_count_targets (int nodes, const order_variant *v) {
  * in ascending order. */
 static void order_place_targets (pw_block_ldl *l) {
   int *target = l->target;
-  for (const pw_column *c = l->column; c < l->column + l->nodes; c++) {
-    int n = c[1].first - c->first;
-    const int *below = l->below + c->first;
+  for (const pw_block_column *c = l->column; c < l->column + l->nodes; c++) {
+    int n = c[1].first_below - c->first_below;
+    const int *below = l->below + c->first_below;
     for (int q = 0; q < n; q++) {
-      const pw_column *d = &l->column[below[q]];
-      int at = d->at + pw_block_diagonal (d->size), i = d->first;
+      const pw_block_column *d = &l->column[below[q]];
+      int at = d->first_value + pw_block_diagonal (d->size), i = d->first_below;
       for (int p = q + 1; p < n; p++, i++) {
         for (; l->below[i] != below[p]; i++) at += d->size * l->column[l->below[i]].size;
         /* rows p descending, each with p entries: those of rows n - 1 .. p + 1 come first */
@@ -173,16 +173,17 @@ static int order_store (pw_block_ldl *l, const pw_plan_node *node, const order_v
     l->column = pw_layout_alloc (&lay, n + 1, sizeof *l->column);
     l->below = pw_layout_alloc (&lay, below, sizeof *l->below);
     l->target = pw_layout_alloc (&lay, targets, sizeof *l->target);
-    l->place = pw_layout_alloc (&lay, n, sizeof *l->place);
+    l->column_of_node = pw_layout_alloc (&lay, n, sizeof *l->column_of_node);
   }
   if (l->pattern == NULL) return PW_RESOURCE;
   memcpy (l->below, v->below, below * sizeof *l->below);
-  memcpy (l->place, v->place, n * sizeof *l->place);
+  memcpy (l->column_of_node, v->place, n * sizeof *l->column_of_node);
   for (int j = 0; j < l->nodes; j++) {
     const pw_plan_node *own = &node[v->order[j]];
-    l->column[j] = (pw_column){ .y = own->y, .first = v->first[j], .size = (unsigned char)own->size };
+    l->column[j] =
+        (pw_block_column){ .unknown = own->unknown, .first_below = v->first[j], .size = (unsigned char)own->size };
   }
-  l->column[l->nodes] = (pw_column){ .first = v->first[l->nodes] };
+  l->column[l->nodes] = (pw_block_column){ .first_below = v->first[l->nodes] };
   return PW_OK;
 }
 
