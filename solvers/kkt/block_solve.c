@@ -24,6 +24,7 @@ PW_INLINE block_row block_scatter (int size, int width, const double *y, const d
   return z;
 }
 
+/* y -= J W^-1 f for a body. */
 PW_INLINE void block_right_of (const pw_block_ldl *l, const pw_body_block *p, const double *f, double *y, int width) {
   const block_row z = block_weigh (width, f + p->j, l->inverse_weight + p->j);
   for (const pw_contribution *a = l->contribution + p->first_contribution;
@@ -31,6 +32,7 @@ PW_INLINE void block_right_of (const pw_block_ldl *l, const pw_body_block *p, co
     BLOCK_SIZE (a->size, block_gather, width, y + a->unknown, a->J, a->row_stride, z);
 }
 
+/* a = W^-1 (f - J^T y) for a body. */
 PW_INLINE void block_accelerate (const pw_block_ldl *l, const pw_body_block *p, const double *f, const double *y,
                                  double *a, int width) {
   const double *w = l->inverse_weight + p->j;
@@ -45,7 +47,7 @@ PW_INLINE void block_accelerate (const pw_block_ldl *l, const pw_body_block *p, 
 
 /* ---- Columns ---- */
 
-/* to -= L from, L ki x kj */
+/* to -= L from, L: ki x kj */
 PW_INLINE void block_forward (int ki, double *to, const double *L, const double *from, int kj) {
   to[0] -= block_dot (kj, from[0], from[kj - 1], L);
   if (ki == 2) to[1] -= block_dot (kj, from[0], from[kj - 1], L + kj);
@@ -80,7 +82,7 @@ PW_INLINE void block_backward_column (int kj, const pw_block_ldl *l, const pw_bl
   if (kj == 2) to[1] = sum[1];
 }
 
-/* ---- Both ---- */
+/* ---- All bodies and columns ---- */
 
 static void block_right (const pw_block_ldl *l, const double *f, double *y) {
   for (const pw_body_block *p = l->body, *last = p + l->bodies; p < last; p++)

@@ -1,4 +1,4 @@
-/* Planning of the condensed matrix: its nodes; see condense.h. */
+/* Plans the condensed matrix: its nodes, and the bodies that are not condensed; see condense.h. */
 #include <math.h>
 #include <stdlib.h>
 #include "condense.h"
@@ -13,6 +13,7 @@ static void condense_add_node (pw_plan *plan, pw_plan_node node) {
   if (!plan->failed) plan->node[plan->nodes++] = node;
 }
 
+/* Adds the columns of the last node at the group that begins with coordinate j. */
 static void condense_contribute (pw_plan *plan, const double *J, int step, int j, int is_pin) {
   int moves = 0, prescribed = 0;
   for (int n = 0; n < pw_group_width (plan->saddle->s, j); n++)
@@ -26,7 +27,7 @@ static void condense_contribute (pw_plan *plan, const double *J, int step, int j
     plan->contribution[plan->contributions++] = (pw_plan_contribution){ J, plan->nodes - 1, step, j, is_pin };
 }
 
-/* The node of `size` rows from row n of a batch on. */
+/* Adds the node of `size` rows from row n of a batch on. */
 static void condense_element (pw_plan *plan, const pw_element_batch *b, int n, int size) {
   const int e = n / b->kind->rows, is_pin = b->kind == &pw_kind_pin && size == 2;
   condense_add_node (
@@ -62,7 +63,7 @@ static int condense_joins (const pw_element_batch *b, int n) {
   return 1;
 }
 
-/* Groups such rows that follow one another into nodes; others that are in no massless component are inactive. */
+/* Groups such rows that follow one another into nodes; others are inactive unless they are in a massless component. */
 static void condense_elements (pw_plan *plan, const unsigned char *active) {
   struct pw_saddle *saddle = plan->saddle;
   for (const pw_element_batch *b = saddle->w->batch;
@@ -77,23 +78,23 @@ static void condense_elements (pw_plan *plan, const unsigned char *active) {
     }
 }
 
-/* 1 for an unmatched row that becomes a node: it has massive coordinates, and not only prescribed ones. */
+/* 1 for an unmatched row i that becomes a node: it has massive coordinates, and not only prescribed ones. */
 static int condense_remains (const pw_plan *plan, const pw_component *p, int i) {
   int prescribed = 0;
   for (int n = 0; n < p->cols; n++) {
     if (plan->saddle->inverse_weight[p->global[n]] > 0 && pw_massless_is_entry (p, i, n)) return 1;
-    prescribed |= !p->massless[n] && plan->saddle->inverse_weight[p->global[n]] == 0;
+    prescribed |= !p->is_massless[n] && plan->saddle->inverse_weight[p->global[n]] == 0;
   }
   return p->massives > 0 && !prescribed;
 }
 
-/* Adds the unmatched rows; the multiplier of one that does not become a node is 0. */
+/* Adds the unmatched rows of the massless components; the multiplier of one that does not become a node is 0. */
 static void condense_components (pw_plan *plan) {
   for (pw_component *p = plan->saddle->massless.component; p < plan->saddle->massless.end; p++)
     for (int i = p->pivots; i < p->rows; i++) {
-      p->y[i] = condense_remains (plan, p, i) ? p->row[i].row : -1;
-      if (p->y[i] < 0) continue;
-      condense_add_node (plan, (pw_plan_node){ .size = 1, .unknown = p->y[i], .grounded = p->grounded });
+      p->unknown[i] = condense_remains (plan, p, i) ? p->row[i].row : -1;
+      if (p->unknown[i] < 0) continue;
+      condense_add_node (plan, (pw_plan_node){ .size = 1, .unknown = p->unknown[i], .grounded = p->grounded });
       for (int g = 0; g < p->groups; g++)
         condense_contribute (plan, p->A + i * p->stride + p->group[g].column, p->stride, p->group[g].j, 0);
     }
@@ -116,11 +117,11 @@ static int condense_sort (pw_plan *plan) {
 /* A body at which more nodes than this meet is not condensed, if its weights are finite: n nodes have n (n - 1) / 2
  * couplings, but only 2 n with an uncondensed body, fewer from n = 6.  Measured: 0.6 to 0.9 of the time with 7 nodes,
  * 0.7 to 1.0 with 6. */
-enum { CONDENSE_MEET = 6 };
+enum { CONDENSE_NODES = 6 };
 
 static int condense_is_crowded (const pw_plan *plan, int b) {
   const double *w = plan->saddle->inverse_weight + 3 * b;
-  return plan->start[3 * b + 1] - plan->start[3 * b] > CONDENSE_MEET && w[0] > 0 && w[1] > 0 && w[2] > 0;
+  return plan->start[3 * b + 1] - plan->start[3 * b] > CONDENSE_NODES && w[0] > 0 && w[1] > 0 && w[2] > 0;
 }
 
 /* Adds two nodes for every body that is not condensed, and ranks the others. */

@@ -1,4 +1,4 @@
-/* Planning of the block L D L^T: the pattern of S, body blocks, uncondensed bodies; see condense.h and block_ldl.h. */
+/* Plans the block L D L^T: the pattern of S and the body blocks; see condense.h and block_ldl.h. */
 #include <limits.h>
 #include <stdlib.h>
 #include <string.h>
@@ -7,8 +7,8 @@
 
 /* ---- Pattern ---- */
 
-/* The first of the two nodes of an uncondensed body, or -1. */
-static int condense_own_nodes (const pw_plan *plan, int j) {
+/* The first of the two nodes of the body that begins with coordinate j, or -1 if it is condensed. */
+static int condense_body_node (const pw_plan *plan, int j) {
   return j < 3 * plan->saddle->s->bodies ? plan->uncondensed[j / 3] : -1;
 }
 
@@ -22,7 +22,7 @@ static void condense_add_pair (pw_plan *plan, int a, int b) {
 /* Pairs of nodes that meet in a group, or with an uncondensed body. */
 static void condense_pairs (pw_plan *plan) {
   for (int n = 0; n < plan->groups; n++) {
-    int j = pw_group_first (plan->saddle->s, n), own = condense_own_nodes (plan, j);
+    int j = pw_group_first (plan->saddle->s, n), own = condense_body_node (plan, j);
     for (int x = plan->start[j]; x < plan->start[j + 1]; x++) {
       int a = plan->contribution[plan->list[x]].node;
       if (own >= 0) condense_add_pair (plan, a, own), condense_add_pair (plan, a, own + 1);
@@ -48,6 +48,7 @@ static void condense_sort_columns (const pw_plan *plan, const int *place) {
 
 /* ---- Body blocks ---- */
 
+/* Position of the block of two nodes. */
 static int condense_coupling (const pw_block_ldl *l, int a, int b) {
   int p = l->column_of_node[a], q = l->column_of_node[b];
   return p > q ? pw_block_find (l, p, q) : pw_block_find (l, q, p);
@@ -56,7 +57,7 @@ static int condense_coupling (const pw_block_ldl *l, int a, int b) {
 /* Fills the block of a group; *contributions and *couplings count. */
 static void condense_body (const pw_plan *plan, pw_block_ldl *l, int j, pw_body_block *p, int *contributions,
                            int *couplings) {
-  int own = condense_own_nodes (plan, j);
+  int own = condense_body_node (plan, j);
   *p = (pw_body_block){ .j = j,
                         .first_contribution = *contributions,
                         .first_coupling = *couplings,
@@ -87,6 +88,7 @@ static int condense_has_block (const pw_plan *plan, int n) {
   return has_weight && !plan->is_linked[n];
 }
 
+/* Allocates and fills the body blocks. */
 static int condense_fill (const pw_plan *plan, pw_block_ldl *l) {
   int contributions = 0, couplings = 0, body = 0, uncondensed = plan->saddle->extra / 3;
   l->inverse_weight = plan->saddle->inverse_weight;
@@ -106,7 +108,7 @@ static int condense_fill (const pw_plan *plan, pw_block_ldl *l) {
   for (int last = 0; last < 2; last++) /* uncondensed bodies last: they add to diagonals that the others store */
     for (int n = 0; n < plan->groups; n++) {
       int first = pw_group_first (plan->saddle->s, n);
-      if (condense_has_block (plan, n) && (condense_own_nodes (plan, first) >= 0) == last)
+      if (condense_has_block (plan, n) && (condense_body_node (plan, first) >= 0) == last)
         condense_body (plan, l, first, &l->body[body++], &contributions, &couplings);
     }
   l->body[body] = (pw_body_block){ .first_contribution = contributions, .first_coupling = couplings };

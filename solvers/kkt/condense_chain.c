@@ -1,15 +1,15 @@
-/* Finding the chains of a scene; see condense.h and block_ldl.h. */
+/* Finds the chains of a scene; see condense.h and block_ldl.h. */
 #include <stdlib.h>
 #include "condense.h"
 
-/* The block of a column and the next one: the number of bodies and eliminated columns that add to it, and the body, if
- * it can be in a chain. */
+/* The block between a column and the next one: the number of bodies and eliminated columns that add to it, and one of
+ * these bodies as a chain of one, if it can be in a chain (else link.bodies is 0). */
 typedef struct {
   int sources;
   pw_chain link;
 } chain_between;
 
-/* A body that links a column to the next one, which alone is below it; returns the column, or -1. */
+/* Fills link for a body that links a column to the next one, which alone is below it; returns the column, or -1. */
 static int chain_link (const pw_plan *plan, const pw_block_ldl *l, int body, pw_chain *link) {
   int j = pw_group_first (plan->saddle->s, body);
   const int *list = plan->list + plan->start[j];
@@ -42,8 +42,8 @@ static int chain_add (pw_chain *chain, const pw_chain *last, const pw_chain *lin
   return 1;
 }
 
-/* Joins links to chains.  meet: columns: the contributions to each, 2 inside a chain. */
-static void chain_join (pw_plan *plan, pw_block_ldl *l, const chain_between *between, const int *meet) {
+/* Joins links to chains.  contributions: columns: how many there are to each, 2 inside a chain. */
+static void chain_join (pw_plan *plan, pw_block_ldl *l, const chain_between *between, const int *contributions) {
   plan->chains = plan->linked = 0;
   for (int p = 0; p < l->nodes;) {
     const chain_between *b = &between[p++];
@@ -52,7 +52,7 @@ static void chain_join (pw_plan *plan, pw_block_ldl *l, const chain_between *bet
     *chain = b->link;
     chain->first_factor = 3 * (plan->linked + plan->chains - 1);
     plan->is_linked[b->link.j / 3] = 1;
-    for (; p < l->nodes && between[p].sources == 1 && meet[p] == 2; p++) {
+    for (; p < l->nodes && between[p].sources == 1 && contributions[p] == 2; p++) {
       if (between[p].link.bodies == 0) break;
       if (!chain_add (chain, &between[p - 1].link, &between[p].link)) break;
       plan->is_linked[between[p].link.j / 3] = 1;
@@ -64,14 +64,14 @@ static void chain_join (pw_plan *plan, pw_block_ldl *l, const chain_between *bet
   }
 }
 
-/* Counts fill-in between a column and the next one from columns eliminated earlier, which have both below them. */
+/* Counts as sources the columns eliminated earlier that have both a column and the next one below them: fill-in. */
 static void chain_fill (const pw_block_ldl *l, chain_between *between) {
   for (int p = 0; p < l->nodes; p++)
     for (int i = l->column[p].first_below + 1; i < l->column[p + 1].first_below; i++)
       if (l->below[i] == l->below[i - 1] + 1) between[l->below[i - 1]].sources++;
 }
 
-/* Counts a body; its contributions are in the order of their columns. */
+/* Counts a body as a source; its contributions are in the order of their columns. */
 static void chain_count (const pw_plan *plan, const pw_block_ldl *l, int body, chain_between *between) {
   int j = pw_group_first (plan->saddle->s, body);
   for (int x = plan->start[j] + 1; x < plan->start[j + 1]; x++) {
@@ -83,12 +83,12 @@ static void chain_count (const pw_plan *plan, const pw_block_ldl *l, int body, c
 int pw_condense_chains (pw_plan *plan, pw_block_ldl *l) {
   size_t nodes = (size_t)l->nodes + 1;
   chain_between *between = calloc (nodes, sizeof *between);
-  int *meet = calloc (nodes, sizeof *meet);
+  int *contributions = calloc (nodes, sizeof *contributions);
   plan->chain = malloc (nodes * sizeof *plan->chain);
   plan->is_linked = calloc ((size_t)plan->groups + 1, 1);
-  int status = between && meet && plan->chain && plan->is_linked ? PW_OK : PW_RESOURCE;
+  int status = between && contributions && plan->chain && plan->is_linked ? PW_OK : PW_RESOURCE;
   for (int p = 0; p < plan->contributions && status == PW_OK; p++)
-    meet[l->column_of_node[plan->contribution[p].node]]++;
+    contributions[l->column_of_node[plan->contribution[p].node]]++;
   for (int body = 0; body < plan->saddle->s->bodies && status == PW_OK; body++) {
     pw_chain link;
     int column = chain_link (plan, l, body, &link);
@@ -96,8 +96,8 @@ int pw_condense_chains (pw_plan *plan, pw_block_ldl *l) {
     chain_count (plan, l, body, between);
   }
   if (status == PW_OK) chain_fill (l, between);
-  if (status == PW_OK) chain_join (plan, l, between, meet);
+  if (status == PW_OK) chain_join (plan, l, between, contributions);
   free (between);
-  free (meet);
+  free (contributions);
   return status;
 }

@@ -1,20 +1,19 @@
-/* Ranks of the nodes in a scene with uncondensed bodies; see condense.h and block_ldl.h.
+/* Ranks the nodes of a scene with uncondensed bodies; see condense.h and block_ldl.h.
  *
  * Nodes of rank 0 are eliminated before the uncondensed bodies, as if these were at rest; those of rank 2 after them.
- * The former must be regular wherever the mechanism is.  With a leg between an uncondensed body and the ground, or
- * another uncondensed body, they are not: at rest at both ends, it is singular where it is stretched.  So the nodes at
- * one end have rank 2. Then multipliers of rank 0 without force on the bodies of a leg exert none on the body at its
- * end either, since joints exert no resultant force and moment: dependent equations of rank 0 are dependent in the
- * whole mechanism.
- *
- * A leg is a set of bodies joined by nodes that touch neither uncondensed bodies nor the ground. */
+ * The matrix of rank 0 must be regular wherever the mechanism is.  A leg is a set of bodies joined by nodes that touch
+ * neither uncondensed bodies nor the ground.  If a leg joins an uncondensed body to the ground, or to another
+ * uncondensed body, and both its ends were at rest, the matrix would be singular where the leg is stretched.  So the
+ * nodes at one end have rank 2.  Then multipliers of rank 0 without force on the bodies of a leg exert none on the body
+ * at its end either, since joints exert no resultant force and moment: dependent equations of rank 0 are dependent in
+ * the whole mechanism. */
 #include <stdlib.h>
 #include "condense.h"
 #include "util.h"
 
 typedef struct {
   pw_plan *plan;
-  int *parent;  /* groups, the ground: union-find; uncondensed bodies and the ground are roots */
+  int *parent;  /* groups and the ground: union-find; uncondensed bodies and the ground are roots */
   int *leg;     /* groups: the leg's root */
   int *surplus; /* legs: equations at uncondensed bodies less those at the ground */
 } rank_plan;
@@ -27,7 +26,7 @@ static int rank_is_uncondensed (const pw_plan *plan, int group) {
   return group < plan->saddle->s->bodies && plan->uncondensed[group] >= 0;
 }
 
-/* The end of the contributions of node n. */
+/* The end of the range of contributions of node n. */
 static int rank_end (const pw_plan *plan, int n) {
   return n + 1 < plan->nodes ? plan->node[n + 1].first_contribution : plan->contributions;
 }
