@@ -38,9 +38,9 @@ static void group_change (pw_steady *x, int c, double *rates, double *out) {
   pw_linearisation *l = &x->at[0].x;
   memset (rates, 0, (size_t)pw_steady_rates (x->s) * sizeof *rates);
   rates[c] = 1;
-  memset (l->x, 0, 2 * (size_t)x->n * sizeof *l->x);
-  pw_steady_field (x, rates, x->q, l->x);
-  if (c == 2) pw_linear_turn (l, 1, x->v, l->x + x->n);
+  memset (l->dx, 0, 2 * (size_t)x->n * sizeof *l->dx);
+  pw_steady_field (x, rates, x->q, l->dx);
+  if (c == 2) pw_linear_turn (l, 1, x->v, l->dx + x->n);
   pw_linear_asymmetry (l, c == 2, out);
 }
 
@@ -49,8 +49,8 @@ static double group_size (pw_steady *x) {
   pw_linearisation *l = &x->at[0].x;
   double most = 0;
   for (int c = 0; c < x->n; c++) {
-    memset (l->x, 0, 2 * (size_t)x->n * sizeof *l->x);
-    l->x[c] = pw_unit (x->s, c);
+    memset (l->dx, 0, 2 * (size_t)x->n * sizeof *l->dx);
+    l->dx[c] = pw_unit (x->s, c);
     pw_linear_vary (l);
     for (int j = 0; j < x->n; j++)
       most = pw_larger_or_nan (most, fabs (l->da[j]) * pw_length_factor (x->s, j) * x->T * x->T / x->L);

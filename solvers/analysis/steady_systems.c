@@ -26,7 +26,7 @@ static int steady_open_run (pw_steady *x, int k, const pw_system *s) {
     x->at[k].r = pw_run_open (s, "rk4+projection", &settings, &x->why);
   }
   if (x->at[k].r == NULL) return x->why.status;
-  if (pw_linear_open (&x->at[k].x, x->at[k].r, 0, PW_STEADY_MOST) == PW_OK) return PW_OK;
+  if (pw_linear_open (&x->at[k].x, x->at[k].r, PW_WITHOUT_MODES, PW_STEADY_MOST) == PW_OK) return PW_OK;
   return pw_fail_memory (s, &x->why);
 }
 

@@ -83,14 +83,15 @@ int pw_linear_evaluate (pw_linearisation *x, double t, const double *q, const do
 }
 
 void pw_linear_multiply (pw_linearisation *x) {
-  memset (x->y, 0, ((size_t)x->n + 2 * (size_t)x->m) * sizeof *x->y);
-  for (const pw_linear_entry *e = x->entry; e < x->entry + x->entries; e++) x->y[e->row] += e->value * x->x[e->column];
+  memset (x->product, 0, ((size_t)x->n + 2 * (size_t)x->m) * sizeof *x->product);
+  for (const pw_linear_entry *e = x->entry; e < x->entry + x->entries; e++)
+    x->product[e->row] += e->value * x->dx[e->column];
 }
 
 void pw_linear_vary (pw_linearisation *x) {
   pw_linear_multiply (x);
-  for (int j = 0; j < x->n; j++) x->da[j] = -x->y[j];
-  pw_saddle_solve (x->r->saddle, x->da, x->y + x->n, x->da, x->z);
+  for (int j = 0; j < x->n; j++) x->da[j] = -x->product[j];
+  pw_saddle_solve (x->r->saddle, x->da, x->product + x->n, x->da, x->scratch);
 }
 
 /* ---- Bases ---- */
@@ -115,9 +116,9 @@ double pw_linear_least (pw_linearisation *x) {
   int n = x->n, rank = x->rank;
   double least = INFINITY;
   linear_independent (x);
-  int failed = rank && LAPACKE_dgesvj_work (LAPACK_COL_MAJOR, 'G', 'N', 'N', n, rank, x->Q, n, x->c, 0, NULL, 1, x->z,
-                                            n + x->m + 3) != 0;
-  for (int k = 0; k < rank; k++) least = fmin (least, x->z[0] * x->c[k]);
+  int failed = rank && LAPACKE_dgesvj_work (LAPACK_COL_MAJOR, 'G', 'N', 'N', n, rank, x->Q, n, x->row_scratch, 0, NULL,
+                                            1, x->scratch, n + x->m + 3) != 0;
+  for (int k = 0; k < rank; k++) least = fmin (least, x->scratch[0] * x->row_scratch[k]);
   return rank && !failed ? least : NAN;
 }
 
@@ -125,30 +126,30 @@ void pw_linear_bases (pw_linearisation *x) {
   int n = x->n, rank = x->rank;
   double *tau = x->da;
   linear_independent (x);
-  LAPACKE_dgeqrf_work (LAPACK_COL_MAJOR, n, rank, x->Q, n, tau, x->z, n);
+  LAPACKE_dgeqrf_work (LAPACK_COL_MAJOR, n, rank, x->Q, n, tau, x->scratch, n);
   for (int k = 0; k < rank; k++)
     memcpy (x->R + (size_t)k * (size_t)rank, linear_column (x, k), (size_t)(k + 1) * sizeof *x->R);
-  LAPACKE_dorgqr_work (LAPACK_COL_MAJOR, n, n, rank, x->Q, n, tau, x->z, n);
+  LAPACKE_dorgqr_work (LAPACK_COL_MAJOR, n, n, rank, x->Q, n, tau, x->scratch, n);
 }
 
 /* ---- The reduced system ---- */
 
 /* dv -= J^+ B dq: solves R^T b = B dq, dv -= Q b. */
 static void linear_follow (pw_linearisation *x) {
-  double *b = x->c;
+  double *b = x->row_scratch;
   int stride = linear_stride (x->rank);
-  for (int i = 0; i < x->rank; i++) b[i] = x->y[x->n + x->m + x->row[i]] / x->norm[x->row[i]];
+  for (int i = 0; i < x->rank; i++) b[i] = x->product[x->n + x->m + x->row[i]] / x->norm[x->row[i]];
   LAPACKE_dtrtrs_work (LAPACK_COL_MAJOR, 'U', 'T', 'N', x->rank, 1, x->R, stride, b, stride);
   for (int i = 0; i < x->rank; i++)
-    for (int j = 0; j < x->n; j++) x->x[x->n + j] -= b[i] * linear_column (x, i)[j] / pw_length_factor (x->r->s, j);
+    for (int j = 0; j < x->n; j++) x->dx[x->n + j] -= b[i] * linear_column (x, i)[j] / pw_length_factor (x->r->s, j);
 }
 
 void pw_linear_tangent (pw_linearisation *x, int c) {
   int velocity = c >= x->positions, column = velocity ? x->rank + c - x->positions : x->holonomic + c;
   double T = x->r->w->scale.time;
-  memset (x->x, 0, 2 * (size_t)x->n * sizeof *x->x);
+  memset (x->dx, 0, 2 * (size_t)x->n * sizeof *x->dx);
   for (int j = 0; j < x->n; j++)
-    x->x[velocity ? x->n + j : j] = linear_column (x, column)[j] / pw_length_factor (x->r->s, j) / (velocity ? T : 1);
+    x->dx[velocity ? x->n + j : j] = linear_column (x, column)[j] / pw_length_factor (x->r->s, j) / (velocity ? T : 1);
   if (velocity) return;
   pw_linear_multiply (x);
   linear_follow (x);
