@@ -1,9 +1,9 @@
-/* The watchdog checks that the states of a run follow the motion of the mechanism: constraints are not lost, and
- * the motion does not jump to another branch at a singular configuration.
+/* The watchdog checks that the states of a run follow the motion of the mechanism: constraints are not lost, and the
+ * motion does not jump to another branch at a singular configuration.
  *
- * Thresholds are dimensionless: positions in units of the scene's length L, angles in radians.  Singular
- * configurations are a property of J alone, with rows of length 1 and columns of angles divided by L: neither masses
- * nor the initial configuration matter. */
+ * Thresholds are dimensionless: positions in units of the scene's length L, angles in radians.  Singular configurations
+ * are a property of J alone, with rows of length 1 and columns of angles divided by L: neither masses nor the initial
+ * configuration matter. */
 #ifndef PW_WATCHDOG_H
 #define PW_WATCHDOG_H
 

@@ -1,16 +1,15 @@
 /* Change points: configurations at which branches of a motion cross, or nearly do.
  *
  * In suitable coordinates the constraints near one are x y = e; the sine of the smallest angle between their rows
- * (watchdog.h) is |(x, y)|.  For e = 0 the branches cross and the motion goes straight on; for e != 0 it turns within
- * a distance of sqrt (e), and a step that is longer than that can go straight on to the other branch, where all
+ * (watchdog.h) is |(x, y)|.  For e = 0 the branches cross and the motion goes straight on; for e != 0 it turns within a
+ * distance of sqrt (e), and a step that is longer than that can go straight on to the other branch, where all
  * constraints hold again.  Neither residuals nor energies reveal this.
  *
- * So where the sine may have had a minimum within a step, a walk on the constraint manifold leads from its beginning
- * to its end, in strides proportional to the sine, each followed by a projection.  If the walk does not get closer to
- * the end, that is on another branch.  Where the sine falls below the threshold `floor`, the branches cross to
- * round-off: the walk steps over such a point, and the motion must continue straight on.  (Following a solution curve
- * by predictor and projection: Allgower & Georg 2003, Introduction to numerical continuation methods, chapters 2 and
- * 8.) */
+ * So where the sine may have had a minimum within a step, a walk on the constraint manifold leads from its beginning to
+ * its end, in strides proportional to the sine, each followed by a projection.  If the walk does not get closer to the
+ * end, that is on another branch.  Where the sine falls below the threshold `floor`, the branches cross to round-off:
+ * the walk steps over such a point, and the motion must continue straight on.  (Following a solution curve by predictor
+ * and projection: Allgower & Georg 2003, Introduction to numerical continuation methods, chapters 2 and 8.) */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -161,7 +160,8 @@ static double change_sine_at (pw_run *r, double t, const double *q) {
   return pw_watchdog_sine (r, NULL);
 }
 
-/* 1 if the sine is low somewhere on the straight line between the ends of a long step.  The sample arrays are scratch. */
+/* 1 if the sine is low somewhere on the straight line between the ends of a long step.  The sample arrays are
+ * scratch. */
 static int change_low_between (pw_run *r, double length) {
   const pw_geometry *g = &r->geometry;
   int parts = (int)fmin (length / r->limits.stride, CHANGE_STRIDES) + 1;

@@ -20,8 +20,8 @@ static void dynamics_stabilise (pw_run *r, const double *v, double *gamma) {
   for (int i = 0; i < s->holonomic; i++) gamma[i] -= r->beta * r->beta * g[i];
 }
 
-/* Stabilises gamma and returns the forces at the current configuration: those computed into f, or the system's array
- * of constant forces if there are no others. */
+/* Stabilises gamma and returns the forces at the current configuration: those computed into f, or the system's array of
+ * constant forces if there are no others. */
 static inline const double *dynamics_right_side (pw_run *r, const double *v, double *f, double *gamma) {
   if (r->alpha + r->beta > 0) dynamics_stabilise (r, v, gamma);
   if (r->s->forces == 0) return r->s->constant;
@@ -29,8 +29,8 @@ static inline const double *dynamics_right_side (pw_run *r, const double *v, dou
   return f;
 }
 
-/* Iterative refinement (Wilkinson 1963): near a singular configuration, with s the sine of the smallest angle
- * between rows, the factorisation has an error of eps / s^2; refinement reduces it to eps / s. */
+/* Iterative refinement (Wilkinson 1963): near a singular configuration, with s the sine of the smallest angle between
+ * rows, the factorisation has an error of eps / s^2; refinement reduces it to eps / s. */
 static void dynamics_refine (pw_run *r, const double *v, double *a, double *lambda) {
   const pw_system *s = r->s;
   double *f = r->scratch, *gamma = f + s->coords + 3;                                  /* residuals */

@@ -32,8 +32,8 @@ typedef struct {
 } initial_failure;
 
 /* Factor of the metric of massless coordinates, by which it becomes 1e-6 of the least entry of the mass matrix (angles
- * in units of L), limited by round-off of the largest.  (In the system's metric it refers to their mean, which unrelated
- * massive bodies may determine.) */
+ * in units of L), limited by round-off of the largest.  (In the system's metric it refers to their mean, which
+ * unrelated massive bodies may determine.) */
 static double initial_massless_scale (const pw_system *s) {
   double least = INFINITY, most = 0, massless = 0;
   for (int j = 0; j < s->coords; j++) {

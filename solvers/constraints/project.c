@@ -60,8 +60,8 @@ void pw_projector_close (pw_projector *p) {
   *p = (pw_projector){ 0 };
 }
 
-/* Redundant equations follow from the others up to this scaled residual; PW_RETRY if one does not: it contradicts
- * them.  g, size: their values and the sizes of their terms. */
+/* Redundant equations follow from the others up to this scaled residual; PW_RETRY if one does not: it contradicts them.
+ * g, size: their values and the sizes of their terms. */
 static int project_check_redundant (pw_projector *p, const pw_system *s, double tolerance, const double *g,
                                     const double *size) {
   double largest = tolerance;

@@ -74,8 +74,8 @@ static int rank_pivot (const pw_row_basis *b, int first, int end) {
 }
 
 /* Keeps independent rows among first .. end - 1, until max_rank rows are kept.  Each is orthogonalised whenever another
- * one is kept, and once more before it is kept itself (Giraud, Langou & Rozloznik 2005, The loss of orthogonality in the
- * Gram-Schmidt orthogonalization process). */
+ * one is kept, and once more before it is kept itself (Giraud, Langou & Rozloznik 2005, The loss of orthogonality in
+ * the Gram-Schmidt orthogonalization process). */
 static void rank_keep (pw_row_basis *b, double tol, int max_rank, int first, int end) {
   for (int i = first; i < end; i++) b->norm[i] = pw_row_basis_orthogonalise (b, rank_row (b, i), 0);
   for (int next; b->rank < max_rank && (next = rank_pivot (b, first, end)) >= 0;) {

@@ -42,10 +42,10 @@ int pw_row_basis_open (pw_row_basis *b, const pw_system *s); /* PW_OK or PW_RESO
 void pw_row_basis_close (pw_row_basis *b);
 
 /* Selects at most `max_holonomic` holonomic equations, and at most `max_rows` in all, by Gram-Schmidt on the J last
- * evaluated, rows of length 1: those of which a part longer than tol is independent of the ones kept before.
- * Holonomic equations come first, since a nonholonomic one must not replace a holonomic one; of these the most
- * independent ones, in order where they are about equal.  fixed (coords, or NULL): 1 for coordinates that are left
- * out.  Returns the rank. */
+ * evaluated, rows of length 1: those of which a part longer than tol is independent of the ones kept before.  Holonomic
+ * equations come first, since a nonholonomic one must not replace a holonomic one; of these the most independent ones,
+ * in order where they are about equal.  fixed (coords, or NULL): 1 for coordinates that are left out.  Returns the
+ * rank. */
 int pw_row_basis_select (pw_row_basis *b, const pw_workspace *w, double tol, const unsigned char *fixed,
                          int max_holonomic, int max_rows);
 

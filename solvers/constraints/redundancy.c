@@ -1,9 +1,9 @@
 /* Redundant equations as combinations of the active ones: least-norm multipliers, and a description for the user.
  *
- * A redundant row of J is J_i = sum_a c_ia J_a over active rows a.  Its coefficients come from the saddle-point
- * system: with f = J_i^T and gamma = 0 the multipliers are c_i.  The vectors n_i = e_i - sum_a c_ia e_a, with unit
- * vectors e, span the multipliers without force, J^T n_i = 0, so the least-norm ones are lambda + sum_i z_i n_i with z
- * from a small least-squares problem. */
+ * A redundant row of J is J_i = sum_a c_ia J_a over active rows a.  Its coefficients come from the saddle-point system:
+ * with f = J_i^T and gamma = 0 the multipliers are c_i.  The vectors n_i = e_i - sum_a c_ia e_a, with unit vectors e,
+ * span the multipliers without force, J^T n_i = 0, so the least-norm ones are lambda + sum_i z_i n_i with z from a
+ * small least-squares problem. */
 #include <lapacke.h>
 #include <math.h>
 #include <stdio.h>

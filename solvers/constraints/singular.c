@@ -7,8 +7,8 @@
 #include "util.h"
 
 /* s: the sine over the largest one of the run; d: the scaled constraint residual; eps: the machine precision.  Where
- * branches cross, the constraints are x y = 0 in suitable coordinates, and s = |(x, y)|; with a residual d they are
- * x y = d, whose branches turn where s^2 = 2 d. */
+ * branches cross, the constraints are x y = 0 in suitable coordinates, and s = |(x, y)|; with a residual d, x y = d,
+ * whose branches turn where s^2 = 2 d. */
 const pw_thresholds pw_watchdog_limits = {
   /* A motion with residuals of 1 % is wrong; without stabilisation some drift is expected. */
   .lost = 1e-2,
@@ -64,9 +64,9 @@ const pw_thresholds pw_watchdog_limits = {
   .stride = 0.3,
   .progress = 0.1,
 
-  /* The projection leaves residuals of 1e-14, which leave an error of 1e-7 in the sine: below `floor`, ten times
-   * that, it cannot be distinguished from 0 (`crossing`: with the tolerance of a stride).  Such a point must be left
-   * straight on, within 60 degrees of the direction in which it was entered. */
+  /* The projection leaves residuals of 1e-14, which leave an error of 1e-7 in the sine: below `floor`, ten times that,
+   * it cannot be distinguished from 0 (`crossing`: with the tolerance of a stride).  Such a point must be left straight
+   * on, within 60 degrees of the direction in which it was entered. */
   .floor = 1e-6,
   .crossing = 2e-6,
   .straight = 0.5,
@@ -74,8 +74,8 @@ const pw_thresholds pw_watchdog_limits = {
   /* Methods of order 2 have an error of (0.4)^2 / 12 = 1 % at a turn that takes 1 / 0.4 steps. */
   .resolved = 0.4,
 
-  /* Divisions of a step near a singular configuration mostly agree to 1e-11; those that differ by more than the
-   * error of a good step, 1e-7, do not agree. */
+  /* Divisions of a step near a singular configuration mostly agree to 1e-11; those that differ by more than the error
+   * of a good step, 1e-7, do not agree. */
   .agree = 1e-7,
   .agree_best = 1e-11,
 
@@ -156,12 +156,10 @@ void pw_watchdog_close (pw_run *r) {
 /* ---- Sines ---- */
 
 double pw_watchdog_sine (pw_run *r, int *row) {
-  int which;
-  pw_saddle *k = r->geometry.saddle;
-  if (k == NULL) return 1;
-  int status = pw_saddle_factor (k);
-  double sine = pw_saddle_sine (k, &which);
-  if (row) *row = which;
+  pw_saddle *saddle = r->geometry.saddle;
+  if (saddle == NULL) return 1;
+  int status = pw_saddle_factor (saddle);
+  double sine = pw_saddle_sine (saddle, row);
   return status == PW_OK ? sine : 0;
 }
 

@@ -1,5 +1,5 @@
-/* Use of specialised code, compiled for one scene, in place of the general evaluation and projection.  It refuses states
- * at which a pivot is small or a value extreme; the general functions evaluate these. */
+/* Use of specialised code, compiled for one scene, in place of the general evaluation and projection.  It refuses
+ * states at which a pivot is small or a value extreme; the general functions evaluate these. */
 #include <math.h>
 #include "method.h"
 #include "specialised.h"

@@ -10,7 +10,7 @@
 typedef enum { PW_SPARSE_REAL, PW_SPARSE_COMPLEX } pw_sparse_numbers;
 
 typedef struct {
-  const struct pw_klu_functions *klu; /* KLU's functions for real or complex numbers */
+  pw_sparse_numbers numbers;
   klu_l_common common;
   klu_l_symbolic *symbolic;
   klu_l_numeric *factors;   /* NULL: none, or forgotten */

@@ -57,8 +57,7 @@ const double *pw_tangent_expand_mu (const pw_tangent *x, const double *active, i
 }
 
 void pw_tangent_expand (const pw_tangent *x, const double *active, double *all) {
-  memset (all, 0, (size_t)x->run->s->rows * sizeof *all);
-  for (int i = 0; i < x->rows; i++) all[x->row[i]] = active[i];
+  memcpy (all, pw_tangent_expand_lambda (x, active), (size_t)x->run->s->rows * sizeof *all);
 }
 
 void pw_tangent_multiply_JT (const pw_tangent *x, const double *active, int count, double *out) {

@@ -55,8 +55,8 @@ typedef struct {
   double multiplier_factor; /* of those with respect to lambda and mu */
 } pw_tangent_layout;
 
-/* Add the rows of one part at the current configuration, where J is evaluated; lambda and mu (NULL: there are none): all
- * equations, v and a: coords. */
+/* Add the rows of one part at the current configuration, where J is evaluated; lambda and mu (NULL: there are none):
+ * all equations, v and a: coords. */
 void pw_tangent_add_momentum (pw_tangent *x, const pw_tangent_layout *to, const double *lambda);
 void pw_tangent_add_kinematics (pw_tangent *x, const pw_tangent_layout *to, const double *mu);
 void pw_tangent_add_accelerations (pw_tangent *x, const pw_tangent_layout *to, const double *v, const double *a);

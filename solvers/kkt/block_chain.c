@@ -84,16 +84,8 @@ PW_INLINE void chain_store (double *a, double *b, ptrdiff_t i, chain_lanes value
   a[i] = value[0], b[i] = value[1];
 }
 
-PW_INLINE chain_arm chain_read (const double *a, const double *b, ptrdiff_t row_stride) {
-  return (chain_arm){ chain_load (a, b, 0), chain_load (a, b, 2), chain_load (a, b, row_stride + 2) };
-}
-
-PW_INLINE chain_arm chain_arm_eliminated (const chain_sweep *s) {
-  return chain_read (s->first.J_eliminated, s->second.J_eliminated, s->row_stride);
-}
-
-PW_INLINE chain_arm chain_arm_next (const chain_sweep *s) {
-  return chain_read (s->first.J_next, s->second.J_next, s->row_stride);
+PW_INLINE chain_arm chain_read (const chain_sweep *s, const double *a, const double *b) {
+  return (chain_arm){ chain_load (a, b, 0), chain_load (a, b, 2), chain_load (a, b, s->row_stride + 2) };
 }
 
 PW_INLINE chain_inverse chain_inverse_of (const pw_block_ldl *l, const chain_sweep *s) {
@@ -137,17 +129,6 @@ PW_INLINE chain_pair chain_divide_stored (const chain_sweep *s, chain_lanes x, c
   return chain_divide (chain_load (a, b, 0), chain_load (a, b, 1), chain_load (a, b, 2), x, y);
 }
 
-/* Eliminations from both ends at once, and those from the first pin on, which follow: along the chain to the next
- * column; or, if it includes_last, to the pin in the middle, which of an odd number of bodies is that after the body in
- * the middle. */
-static int chain_from_ends (const pw_chain *c) {
-  return c->includes_last ? c->bodies / 2 : 0;
-}
-
-static int chain_from_first (const pw_chain *c) {
-  return c->includes_last ? c->bodies % 2 : c->bodies;
-}
-
 /* ---- Factorisation ---- */
 
 /* D: a diagonal block of either lane, as in pw_block_column: xx, yx, yy, then xx and yy before elimination.  Factorises
@@ -167,7 +148,8 @@ PW_INLINE void chain_pivot (chain_lanes *D, pw_block_ldl *l, const chain_sweep *
 
 /* Eliminates the pins with the diagonal blocks D, which become those of the next ones. */
 PW_INLINE void chain_eliminate (pw_block_ldl *l, chain_sweep *s, int sign, chain_lanes *D) {
-  const chain_arm a = chain_arm_eliminated (s), b = chain_arm_next (s);
+  const chain_arm a = chain_read (s, s->first.J_eliminated, s->second.J_eliminated);
+  const chain_arm b = chain_read (s, s->first.J_next, s->second.J_next);
   const chain_inverse w = chain_inverse_of (l, s);
   const chain_square K = chain_coupling (a, b, w);
   const chain_lanes ax = w.i * a.x, ay = w.i * a.y, xx = w.m + ax * a.x, yy = w.m + ay * a.y;
@@ -184,20 +166,24 @@ PW_INLINE void chain_eliminate (pw_block_ldl *l, chain_sweep *s, int sign, chain
   chain_move (s, 1, sign);
 }
 
+/* Eliminates `pairs` of pins from both ends at once, then `singles` from the first pin on: along the chain to the next
+ * column; or, if it includes_last, to the pin in the middle, which of an odd number of bodies is that after the body in
+ * the middle. */
 void pw_chain_factor (pw_block_ldl *l, const pw_chain *c) {
+  const int pairs = c->includes_last ? c->bodies / 2 : 0, singles = c->bodies - 2 * pairs;
   const double *first = l->value + l->column[c->first_column].first_value;
   double *last = l->value + l->column[c->first_column + c->bodies].first_value;
   chain_sweep s = chain_begin (l, c, c->includes_last ? -1 : 1);
   chain_lanes D[CHAIN_BLOCK];
   double other[CHAIN_BLOCK]; /* of the pin in the middle, from the second lane */
   for (int n = 0; n < CHAIN_BLOCK; n++) D[n] = (chain_lanes){ first[n], c->includes_last ? last[n] : first[n] };
-  for (int n = chain_from_ends (c); n > 0; n--) {
+  for (int n = pairs; n > 0; n--) {
     chain_eliminate (l, &s, -1, D);
     if (!(l->least_pivot > 0)) return;
   }
   for (int n = 0; n < CHAIN_BLOCK && c->includes_last; n++) other[n] = D[n][1], D[n][1] = D[n][0];
   if (c->includes_last) s.second = s.first;
-  for (int n = chain_from_first (c); n > 0; n--) {
+  for (int n = singles; n > 0; n--) {
     chain_eliminate (l, &s, 1, D);
     if (!(l->least_pivot > 0)) return;
   }
@@ -215,7 +201,8 @@ void pw_chain_factor (pw_block_ldl *l, const pw_chain *c) {
 /* y_(c+1) -= J W^-1 f, then K D^-1 y_c; at: y of the pins that are eliminated.  Returns that of the next ones. */
 PW_INLINE chain_pair chain_forward (const pw_block_ldl *l, chain_sweep *s, int sign, const double *f, double *y,
                                     chain_pair at) {
-  const chain_arm a = chain_arm_eliminated (s), b = chain_arm_next (s);
+  const chain_arm a = chain_read (s, s->first.J_eliminated, s->second.J_eliminated);
+  const chain_arm b = chain_read (s, s->first.J_next, s->second.J_next);
   const chain_inverse w = chain_inverse_of (l, s);
   const chain_lanes mass = w.m * a.sign * b.sign;
   const double *first = y + s->first.unknown + s->unknown_stride,
@@ -237,16 +224,17 @@ PW_INLINE chain_pair chain_forward (const pw_block_ldl *l, chain_sweep *s, int s
 }
 
 void pw_chain_forward (const pw_block_ldl *l, const pw_chain *c, const double *f, double *y) {
+  const int pairs = c->includes_last ? c->bodies / 2 : 0, singles = c->bodies - 2 * pairs;
   chain_sweep s = chain_begin (l, c, c->includes_last ? -1 : 1);
   chain_pair at = chain_unknowns (&s, y);
   double change_x = 0, change_y = 0; /* of the pin in the middle, by the second lane */
   if (c->includes_last) {
-    for (int n = chain_from_ends (c); n > 0; n--) at = chain_forward (l, &s, -1, f, y, at);
+    for (int n = pairs; n > 0; n--) at = chain_forward (l, &s, -1, f, y, at);
     change_x = at.x[1] - y[s.second.unknown], change_y = at.y[1] - y[s.second.unknown + 1];
     s.second = s.first;
     at.x[1] = at.x[0], at.y[1] = at.y[0];
   }
-  for (int n = chain_from_first (c); n > 0; n--) at = chain_forward (l, &s, 1, f, y, at);
+  for (int n = singles; n > 0; n--) at = chain_forward (l, &s, 1, f, y, at);
   y[s.first.unknown] = at.x[0] + change_x;
   y[s.first.unknown + 1] = at.y[0] + change_y;
 }
@@ -255,7 +243,8 @@ void pw_chain_forward (const pw_block_ldl *l, const pw_chain *c, const double *f
 PW_INLINE chain_pair chain_backward (const pw_block_ldl *l, chain_sweep *s, int sign, const double *f, double *y,
                                      double *acceleration, chain_pair next) {
   chain_move (s, -1, sign);
-  const chain_arm a = chain_arm_eliminated (s), b = chain_arm_next (s);
+  const chain_arm a = chain_read (s, s->first.J_eliminated, s->second.J_eliminated);
+  const chain_arm b = chain_read (s, s->first.J_next, s->second.J_next);
   const chain_inverse w = chain_inverse_of (l, s);
   const chain_square K = chain_coupling (a, b, w);
   const chain_pair own = chain_unknowns (s, y);
@@ -278,12 +267,13 @@ PW_INLINE chain_pair chain_backward (const pw_block_ldl *l, chain_sweep *s, int 
 }
 
 void pw_chain_backward (const pw_block_ldl *l, const pw_chain *c, const double *f, double *y, double *a) {
+  const int pairs = c->includes_last ? c->bodies / 2 : 0, singles = c->bodies - 2 * pairs;
   chain_sweep ends = chain_begin (l, c, c->includes_last ? -1 : 1),
               middle; /* where the sweeps of pw_chain_forward ended */
-  chain_move (&ends, chain_from_ends (c), -1);
+  chain_move (&ends, pairs, -1);
   middle = ends;
   middle.second = middle.first;
-  chain_move (&middle, chain_from_first (c), 1);
+  chain_move (&middle, singles, 1);
   chain_pair at = chain_unknowns (&middle, y);
   if (c->includes_last) {
     const chain_pair z = chain_divide_stored (&middle, at.x, at.y);
@@ -291,7 +281,7 @@ void pw_chain_backward (const pw_block_ldl *l, const pw_chain *c, const double *
     y[middle.first.unknown] = at.x[0], y[middle.first.unknown + 1] = at.y[0];
   }
   const chain_pair lambda = at;
-  for (int n = chain_from_first (c); n > 0; n--) at = chain_backward (l, &middle, 1, f, y, a, at);
+  for (int n = singles; n > 0; n--) at = chain_backward (l, &middle, 1, f, y, a, at);
   at.x[1] = lambda.x[1], at.y[1] = lambda.y[1];
-  for (int n = chain_from_ends (c); n > 0; n--) at = chain_backward (l, &ends, -1, f, y, a, at);
+  for (int n = pairs; n > 0; n--) at = chain_backward (l, &ends, -1, f, y, a, at);
 }

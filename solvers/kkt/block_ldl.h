@@ -12,12 +12,12 @@
  *     [ S    J_k ] [ lambda ]   [ J W^-1 f - gamma ]
  *     [ J_k^T -M ] [ -a_k   ] = [ f_k              ]      with S of all other bodies,
  *
- * quasi-definite, so that L D L^T needs no pivoting (Vanderbei 1995, Symmetric quasi-definite matrices), with the nodes of -a_k (rank 1) after the
- * equations of rank 0 and before those of rank 2 (condense_rank.c).
+ * quasi-definite, so that L D L^T needs no pivoting (Vanderbei 1995, Symmetric quasi-definite matrices), with the nodes
+ * of -a_k (rank 1) after the equations of rank 0 and before those of rank 2 (condense_rank.c).
  *
- * Chains are bodies one after another, each pinned to the one before and the one after.  Nothing else touches the
- * pins inside a chain, so their part of the matrix is block tridiagonal and need not be stored: with a body's arms a
- * and b to the pins c and c + 1 and the inverses m of its mass and i of its inertia
+ * Chains are bodies one after another, each pinned to the one before and the one after.  Nothing else touches the pins
+ * inside a chain, so their part of the matrix is block tridiagonal and need not be stored: with a body's arms a and b
+ * to the pins c and c + 1 and the inverses m of its mass and i of its inertia
  *
  *   K_cc += m 1 + i a a^T,   K_(c+1)c = +-m 1 + i b a^T = K,   K_(c+1)(c+1) += m 1 + i b b^T
  *   L = K D_c^-1,   D_(c+1) = K_(c+1)(c+1) - L K^T,   y_(c+1) -= L y_c
@@ -133,8 +133,8 @@ void pw_block_factor (pw_block_ldl *l);
 /* y, which holds gamma, becomes lambda; a = W^-1 (f - J^T lambda).  f and a may be the same; f NULL: zero. */
 void pw_block_solve (const pw_block_ldl *l, const double *f, double *y, double *a);
 
-/* The same for a chain, called in the order of its columns: elimination, which stops at a pivot that is not
- * positive; the right-hand side forwards; and backwards, with accelerations. */
+/* The same for a chain, called in the order of its columns: elimination, which stops at a pivot that is not positive;
+ * the right-hand side forwards; and backwards, with accelerations. */
 void pw_chain_factor (pw_block_ldl *l, const pw_chain *c);
 void pw_chain_forward (const pw_block_ldl *l, const pw_chain *c, const double *f, double *y);
 void pw_chain_backward (const pw_block_ldl *l, const pw_chain *c, const double *f, double *y, double *a);

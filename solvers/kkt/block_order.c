@@ -8,8 +8,8 @@
 
 /* ---- Pattern ---- */
 
-/* An order of elimination, and the rows below the diagonal of each column c: below[first[c]] to below[first[c + 1] - 1],
- * ascending. */
+/* An order of elimination, and the rows below the diagonal of each column c, ascending: below[first[c]] to
+ * below[first[c + 1] - 1]. */
 typedef struct {
   int *node, *column; /* node of each column; column of each node */
   int *first, *below;

@@ -64,8 +64,8 @@ int pw_condense_rank (pw_plan *plan);
 /* Makes the saddle's block L D L^T.  Errors: PW_RESOURCE. */
 int pw_condense_block (pw_plan *plan);
 
-/* Finds the chains, and marks their inner columns; the contributions of each group are in the order of their
- * columns.  PW_OK or PW_RESOURCE. */
+/* Finds the chains, and marks their inner columns; the contributions of each group are in the order of their columns.
+ * PW_OK or PW_RESOURCE. */
 int pw_condense_chains (pw_plan *plan, pw_block_ldl *l);
 
 #endif

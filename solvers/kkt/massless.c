@@ -75,8 +75,8 @@ static int massless_select_pivot (pw_component *c, int p) {
   return 1;
 }
 
-/* Subtracts row p from those after it, by pairs of columns.  squared_terms of an unmatched row grows by the square of what is
- * subtracted. */
+/* Subtracts row p from those after it, by pairs of columns.  squared_terms of an unmatched row grows by the square of
+ * what is subtracted. */
 PW_INLINE void massless_eliminate (pw_component *c, int p, int pivots) {
   const int pivot = c->row[p].pivot, cols = c->cols;
   double *P = c->A + p * c->stride, inverse = 1 / P[pivot];

@@ -1,14 +1,14 @@
 /* Elimination of coordinates without weight (saddle.h), called massless: each is matched to a constraint row and
  * substituted out of the others.
  *
- * The rows and coordinates concerned form independent components (a massless body and its joints).  In each,
- * Gaussian elimination of the massless columns, with the matched rows p as pivot rows, leaves
+ * The rows and coordinates concerned form independent components (a massless body and its joints).  In each, Gaussian
+ * elimination of the massless columns, with the matched rows p as pivot rows, leaves
  *
  *     [ P H ]   [ L 0 ] [ U H' ]       P, H: matched rows in the massless and in the massive columns
  *     [ K Z ] = [ R 1 ] [ 0 Z' ]       K, Z: unmatched rows i
  *
- * With  f_P  the forces at the massless coordinates,  w = U^-T f_P,  f~ = f - H'^T w,  gamma~ = [ L 0 ; R 1 ]^-1 gamma,  the rows Z' and the massive coordinates form
- * a system without the massless ones.  Its solution yields
+ * With  f_P  the forces at the massless coordinates,  w = U^-T f_P,  f~ = f - H'^T w,  gamma~ = [ L 0 ; R 1 ]^-1 gamma,
+ * the rows Z' and the massive coordinates form a system without the massless ones.  Its solution yields
  *
  *     a_P = U^-1 (gamma~_p - H' a),       lambda_p = L^-T (w - R^T lambda_i). */
 #ifndef PW_MASSLESS_H
@@ -103,16 +103,17 @@ int pw_massless_match (pw_component *c);
 /* 1 if an entry of the row i of Z' is larger than what round-off leaves of its terms. */
 int pw_massless_is_entry (const pw_component *c, int i, int column);
 
-/* Eliminates with the J last evaluated, and matches again if a pivot has become much smaller than when it was
- * matched.  Returns the smallest pivot squared, relative to its row, or of an unmatched row its remainder, if smaller;
- * 0 if singular. */
+/* Eliminates with the J last evaluated, and matches again if a pivot has become much smaller than when it was matched.
+ * Returns the smallest pivot squared, relative to its row, or of an unmatched row its remainder, if smaller; 0 if
+ * singular. */
 double pw_massless_factor (pw_massless *m);
 
-/* First half of a solve: f becomes f~ at the massive coordinates, gamma becomes gamma~ at `unknown` of unmatched rows. */
+/* First half of a solve: f becomes f~ at the massive coordinates, gamma becomes gamma~ at `unknown` of unmatched
+ * rows. */
 void pw_massless_forward (pw_massless *m, double *f, double *gamma);
 
-/* Second half, from a of the massive coordinates and lambda at `unknown` of unmatched rows: a of the massless coordinates,
- * and lambda of all rows. */
+/* Second half, from a of the massive coordinates and lambda at `unknown` of unmatched rows: a of the massless
+ * coordinates, and lambda of all rows. */
 void pw_massless_backward (pw_massless *m, double *a, double *lambda);
 
 #endif

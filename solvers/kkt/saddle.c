@@ -68,7 +68,7 @@ int pw_saddle_sine_below (pw_saddle *saddle, double sine) {
 
 double pw_saddle_sine (pw_saddle *saddle, int *row) {
   if (saddle->postponed > 0) pw_saddle_factor (saddle);
-  *row = saddle->pivot_row;
+  if (row) *row = saddle->pivot_row;
   return saddle->pivot > 0 ? sqrt (fmin (saddle->pivot, 1)) : 0;
 }
 

@@ -13,8 +13,8 @@
 typedef struct pw_saddle pw_saddle;
 
 /* rows: number of rows of J included (all, or the holonomic ones); of these only those with active[i] != 0 if active is
- * given.  J must be evaluated at a typical configuration.  weight: coords, copied.
- * Errors: PW_RESOURCE; PW_INPUT if a coordinate without weight is determined by no row. */
+ * given.  J must be evaluated at a typical configuration.  weight: coords, copied.  Errors: PW_RESOURCE; PW_INPUT if a
+ * coordinate without weight is determined by no row. */
 pw_saddle *pw_saddle_open (pw_workspace *w, const double *weight, int rows, const unsigned char *active,
                            pw_error *error);
 void pw_saddle_close (pw_saddle *saddle);
@@ -34,8 +34,8 @@ void pw_saddle_solve (pw_saddle *saddle, const double *f, const double *gamma, d
 /* 1 if pw_saddle_sine is below this sine. */
 int pw_saddle_sine_below (pw_saddle *saddle, double sine);
 
-/* The square root of the smallest pivot of the last factorisation, which is the sine of the angle between a row and those
- * before it: small near a singular configuration; *row: that row, or -1 for one of coordinates without weight. */
+/* The square root of the smallest pivot of the last factorisation, which is the sine of the angle between a row and
+ * those before it: small near a singular configuration; *row (unless NULL): that row, or -1 for one of coordinates without weight. */
 double pw_saddle_sine (pw_saddle *saddle, int *row);
 
 #endif

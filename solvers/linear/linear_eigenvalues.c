@@ -115,8 +115,8 @@ static void eigen_sort (pw_linear *l) {
     }
 }
 
-/* Transforms B, stored by rows as A, by reflections that map the first k vectors of x->symmetry to the first k unit vectors.  Returns 1
- * if they span an invariant subspace: the lower left block is then 0. */
+/* Transforms B, stored by rows as A, by reflections that map the first k vectors of x->symmetry to the first k unit
+ * vectors.  Returns 1 if they span an invariant subspace: the lower left block is then 0. */
 static int eigen_split (pw_linearisation *x, int k, double *B) {
   int n = x->size;
   double off = 0, *tau = x->tau, *work = x->dx; /* at least n */

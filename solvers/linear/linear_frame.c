@@ -1,9 +1,10 @@
 /* The co-moving frame of a linearisation, symmetries of the system, steadiness of the motion.
  *
- * In a frame with the origin r, the velocity u and the angular velocity w, a body at (x, y) with the velocity v is at rest
- * if v = u + w (-(y - r_y), x - r_x), and its acceleration is W v = w (-v_y, v_x, 0).  A motion relative to the frame with constant
- * velocity d is also steady if the equations do not depend on it: the spin of a balanced rotor, bodies that drift
- * apart.  In a rotating frame d rotates with it unless it belongs to an angle, so W d counts as an acceleration. */
+ * In a frame with the origin r, the velocity u and the angular velocity w, a body at (x, y) with the velocity v is at
+ * rest if v = u + w (-(y - r_y), x - r_x), and its acceleration is W v = w (-v_y, v_x, 0).  A motion relative to the
+ * frame with constant velocity d is also steady if the equations do not depend on it: the spin of a balanced rotor,
+ * bodies that drift apart.  In a rotating frame d rotates with it unless it belongs to an angle, so W d counts as an
+ * acceleration. */
 #include <lapacke.h>
 #include <math.h>
 #include <string.h>

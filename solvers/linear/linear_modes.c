@@ -81,8 +81,8 @@ static void modes_rigid_part (const pw_linearisation *x, int k, double complex m
   LAPACKE_zgesv_work (LAPACK_COL_MAJOR, k, 1, M, k, pivot, y, k);
 }
 
-/* Sets y, after its first k entries, to the eigenvector j of A22.  LAPACK has computed its conjugate, a left eigenvector
- * of A22^T, since A22 is stored by rows. */
+/* Sets y, after its first k entries, to the eigenvector j of A22.  LAPACK has computed its conjugate, a left
+ * eigenvector of A22^T, since A22 is stored by rows. */
 static void modes_vector (const pw_linearisation *x, int k, int j, double complex *y) {
   int n = x->size - k;
   double im = x->left_vectors[n * n + j];
