@@ -66,26 +66,54 @@ void pw_dae_residual (pw_dae *x, const double *v, const double *a, const double 
 
 /* ---- Matrix ---- */
 
+/* The kinematics, with multipliers mu of all equations: q_dot_factor I + D (G^T mu)_q; -I; D G^T times mu_factor: the
+ * derivatives with respect to q, v, mu. */
+static void dae_add_kinematics (pw_dae *x, const double *mu, double q_dot_factor, double mu_factor) {
+  pw_tangent *t = &x->tangent;
+  for (int j = 0; j < x->n; j++) {
+    pw_scatter_add (&t->scatter, j, j, q_dot_factor);
+    pw_scatter_add (&t->scatter, j, x->n + j, -1);
+  }
+  if (mu == NULL) return;
+  pw_placement put = {
+    .rows = t->run->s->holonomic, .factor = 1, .row_scale = t->D, .row_index = t->row_index, .lambda = mu
+  };
+  pw_newton_add_block (&t->newton, t->run->w, &t->scatter, PW_JTL_Q, &put);
+  put.col = 2 * x->n + x->rows;
+  put.factor = mu_factor;
+  pw_newton_add_JT (t->run->w, &t->scatter, &put);
+}
+
+/* Where they are enforced, J v - eta: (J v)_q - eta_q; J; and g: G. */
+static void dae_add_constraints (pw_dae *x, const double *v) {
+  pw_tangent *t = &x->tangent;
+  const pw_system *s = t->run->s;
+  const int n = x->n, g_row = x->enforces_velocities ? 2 * n + x->rows : 2 * n;
+  const double holonomic = x->enforces_velocities ? 1 : 0; /* 0: g replaces their J v - eta */
+  pw_tangent_add_equations (t, PW_JW_Q, 2 * n, 0, v, holonomic, 1);
+  pw_tangent_add_equations (t, PW_ETA_Q, 2 * n, 0, NULL, -holonomic, -1);
+  pw_tangent_add_J (t, s->rows, 2 * n, n, holonomic, 1);
+  if (x->enforces_positions) pw_tangent_add_J (t, s->holonomic, g_row, 0, 1, 0);
+}
+
 void pw_dae_matrix (pw_dae *x, const double *v, const double *a, const double *lambda, double q_dot_factor,
                     double v_dot_factor) {
-  int n = x->n, mu = 2 * n + x->rows;
+  const int n = x->n;
   pw_tangent *t = &x->tangent;
+  const double multiplier_factor = x->integrates_multipliers ? v_dot_factor : 1;
   const pw_tangent_layout to = { .momentum = n,
                                  .constraint = 2 * n,
                                  .v = n,
                                  .a = n,
                                  .lambda = 2 * n,
-                                 .mu = mu,
-                                 .q_dot_factor = q_dot_factor,
                                  .a_factor = v_dot_factor,
-                                 .multiplier_factor = x->integrates_multipliers ? v_dot_factor : 1 };
-  pw_tangent_add_kinematics (t, &to, pw_tangent_expand_mu (t, lambda + x->rows, x->mu_count));
+                                 .lambda_factor = multiplier_factor };
+  dae_add_kinematics (x, pw_tangent_expand_mu (t, lambda + x->rows, x->mu_count), q_dot_factor, multiplier_factor);
   pw_tangent_add_momentum (t, &to, pw_tangent_expand_lambda (t, lambda));
   if (x->enforces_velocities || x->enforces_positions)
-    pw_tangent_add_velocities (t, &to, v, x->enforces_velocities);
+    dae_add_constraints (x, v);
   else
     pw_tangent_add_accelerations (t, &to, v, a);
-  if (x->enforces_positions) pw_tangent_add_positions (t, &to, x->enforces_velocities ? mu : 2 * n);
 }
 
 int pw_dae_lay_out (pw_dae *x, const double *v, const double *a, const double *lambda) {

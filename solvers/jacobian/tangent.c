@@ -69,50 +69,19 @@ void pw_tangent_compress (const pw_tangent *x, const double *all, int count, dou
   for (int i = 0; i < count; i++) active[i] = all[x->row[i]];
 }
 
-/* Adds a block of the constraint equations, with factors of holonomic and nonholonomic ones; w: direction of jw_q. */
-static void tangent_equations (pw_tangent *x, pw_block block, int row, int col, const double *w, double holonomic,
+void pw_tangent_add_equations (pw_tangent *x, pw_block block, int row, int col, const double *w, double holonomic,
                                double nonholonomic) {
   const pw_placement put = { row,           col, x->run->s->rows, holonomic, nonholonomic, .row_index = x->row_index,
                              .direction = w };
   pw_newton_add_block (&x->newton, x->run->w, &x->scatter, block, &put);
 }
 
-/* Adds J of the first `rows` equations, with factors of holonomic and nonholonomic ones. */
-static void tangent_J (pw_tangent *x, int rows, int row, int col, double holonomic, double nonholonomic) {
+void pw_tangent_add_J (pw_tangent *x, int rows, int row, int col, double holonomic, double nonholonomic) {
   pw_newton_add_J (x->run->w, &x->scatter,
                    &(pw_placement){ row, col, rows, holonomic, nonholonomic, .row_index = x->row_index });
 }
 
-/* q_dot_factor I + D (G^T mu)_q; -I; D G^T.  Here and below: the derivatives with respect to q, v, ... */
-void pw_tangent_add_kinematics (pw_tangent *x, const pw_tangent_layout *to, const double *mu) {
-  const pw_system *s = x->run->s;
-  for (int j = 0; j < s->coords; j++) {
-    pw_scatter_add (&x->scatter, j, to->q + j, to->q_dot_factor);
-    pw_scatter_add (&x->scatter, j, to->v + j, -1);
-  }
-  if (mu == NULL) return;
-  pw_placement put = {
-    .col = to->q, .rows = s->holonomic, .factor = 1, .row_scale = x->D, .row_index = x->row_index, .lambda = mu
-  };
-  pw_newton_add_block (&x->newton, x->run->w, &x->scatter, PW_JTL_Q, &put);
-  put.col = to->mu;
-  put.factor = to->multiplier_factor;
-  pw_newton_add_JT (x->run->w, &x->scatter, &put);
-}
-
-/* (J v)_q - eta_q; J */
-void pw_tangent_add_velocities (pw_tangent *x, const pw_tangent_layout *to, const double *v, double holonomic_factor) {
-  tangent_equations (x, PW_JW_Q, to->constraint, to->q, v, holonomic_factor, 1);
-  tangent_equations (x, PW_ETA_Q, to->constraint, to->q, NULL, -holonomic_factor, -1);
-  tangent_J (x, x->run->s->rows, to->constraint, to->v, holonomic_factor, 1);
-}
-
-/* G */
-void pw_tangent_add_positions (pw_tangent *x, const pw_tangent_layout *to, int first_row) {
-  tangent_J (x, x->run->s->holonomic, first_row, to->q, 1, 0);
-}
-
-/* (J^T lambda)_q - f_q; -f_v; M; J^T */
+/* (J^T lambda)_q - f_q; -f_v; M; J^T: the derivatives with respect to q, v, a, lambda */
 void pw_tangent_add_momentum (pw_tangent *x, const pw_tangent_layout *to, const double *lambda) {
   const pw_system *s = x->run->s;
   pw_placement put = {
@@ -126,7 +95,7 @@ void pw_tangent_add_momentum (pw_tangent *x, const pw_tangent_layout *to, const 
   pw_newton_add_signals (&x->newton, x->run->w, &x->scatter, to->momentum, to->q, to->v);
   for (int j = 0; j < s->coords; j++)
     pw_scatter_add (&x->scatter, to->momentum + j, to->a + j, to->a_factor * s->mass[j]);
-  put.factor = put.factor_nonholonomic = to->multiplier_factor;
+  put.factor = put.factor_nonholonomic = to->lambda_factor;
   put.col = to->lambda;
   pw_newton_add_JT (x->run->w, &x->scatter, &put);
 }
@@ -136,12 +105,12 @@ void pw_tangent_add_accelerations (pw_tangent *x, const pw_tangent_layout *to, c
   const pw_run *r = x->run;
   const int rows = r->s->rows, row = to->constraint;
   const double alpha = r->alpha, a_in_v = to->a == to->v ? to->a_factor : 0; /* what a adds to the columns of v */
-  tangent_equations (x, PW_JW_Q, row, to->q, a, 1, 1);
-  tangent_equations (x, PW_JW_Q, row, to->q, v, 2 * alpha, alpha);
-  tangent_equations (x, PW_ETA_Q, row, to->q, NULL, -2 * alpha, -alpha);
-  tangent_equations (x, PW_GAMMA_Q, row, to->q, NULL, -1, -1);
-  tangent_equations (x, PW_GAMMA_V, row, to->v, NULL, -1, -1);
-  tangent_J (x, rows, row, to->v, a_in_v + 2 * alpha, a_in_v + alpha);
-  tangent_J (x, r->s->holonomic, row, to->q, r->beta * r->beta, 0);
-  if (to->a != to->v) tangent_J (x, rows, row, to->a, to->a_factor, to->a_factor);
+  pw_tangent_add_equations (x, PW_JW_Q, row, to->q, a, 1, 1);
+  pw_tangent_add_equations (x, PW_JW_Q, row, to->q, v, 2 * alpha, alpha);
+  pw_tangent_add_equations (x, PW_ETA_Q, row, to->q, NULL, -2 * alpha, -alpha);
+  pw_tangent_add_equations (x, PW_GAMMA_Q, row, to->q, NULL, -1, -1);
+  pw_tangent_add_equations (x, PW_GAMMA_V, row, to->v, NULL, -1, -1);
+  pw_tangent_add_J (x, rows, row, to->v, a_in_v + 2 * alpha, a_in_v + alpha);
+  pw_tangent_add_J (x, r->s->holonomic, row, to->q, r->beta * r->beta, 0);
+  if (to->a != to->v) pw_tangent_add_J (x, rows, row, to->a, to->a_factor, to->a_factor);
 }

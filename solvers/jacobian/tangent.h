@@ -1,14 +1,10 @@
 /* Derivatives of the equations of motion with the active constraint equations, shared by the Newton matrices of
- * implicit methods.
+ * implicit methods:
  *
- *   kinematics      q' - v + D G^T mu                                       with respect to q, v, mu
- *   momentum        M a + J^T lambda - f                                    q, v, a, lambda
- *   velocities      J v - eta                                               q, v
- *   positions       g                                                       q
- *   accelerations   J a - gamma + 2 alpha (J v - eta) + beta^2 g            q, v, a
- *                   (nonholonomic: + alpha (J v - eta))
+ *   momentum        M a + J^T lambda - f
+ *   accelerations   J a - gamma + 2 alpha (J v - eta) + beta^2 g   (nonholonomic: + alpha (J v - eta))
  *
- * with G the holonomic rows of J, and alpha and beta of Baumgarte's stabilisation. */
+ * with Baumgarte's alpha and beta. */
 #ifndef PW_TANGENT_H
 #define PW_TANGENT_H
 
@@ -46,23 +42,23 @@ void pw_tangent_compress (const pw_tangent *x, const double *all, int count, dou
 
 /* ---- Adding to the matrix ---- */
 
+/* Adds a block of the constraint equations at a row and column, with factors of holonomic and nonholonomic ones;
+ * w: that of (J w)_q. */
+void pw_tangent_add_equations (pw_tangent *x, pw_block block, int row, int col, const double *w, double holonomic,
+                               double nonholonomic);
+/* Adds J of the first `rows` equations in the same way. */
+void pw_tangent_add_J (pw_tangent *x, int rows, int row, int col, double holonomic, double nonholonomic);
+
 /* Positions of the parts in the matrix, and factors of derivatives. */
 typedef struct {
-  int momentum, constraint; /* first row of each; that of the kinematics is 0 */
-  int q, v, a, lambda, mu;  /* first column of each; a may share its columns with v */
-  double q_dot_factor;      /* of those with respect to q', added to the columns of q */
-  double a_factor;          /* of those with respect to a */
-  double multiplier_factor; /* of those with respect to lambda and mu */
+  int momentum, constraint; /* first row of each */
+  int q, v, a, lambda;      /* first column of each; a may share its columns with v */
+  double a_factor;          /* of derivatives with respect to a */
+  double lambda_factor;     /* of those with respect to lambda */
 } pw_tangent_layout;
 
-/* Add the rows of one part at the current configuration, where J is evaluated; lambda and mu (NULL: there are none):
- * all equations, v and a: coords. */
+/* Add the rows of one part at the current configuration, where J is evaluated; lambda: all equations. */
 void pw_tangent_add_momentum (pw_tangent *x, const pw_tangent_layout *to, const double *lambda);
-void pw_tangent_add_kinematics (pw_tangent *x, const pw_tangent_layout *to, const double *mu);
 void pw_tangent_add_accelerations (pw_tangent *x, const pw_tangent_layout *to, const double *v, const double *a);
-/* Holonomic rows are multiplied by a factor: 0 leaves them to pw_tangent_add_positions. */
-void pw_tangent_add_velocities (pw_tangent *x, const pw_tangent_layout *to, const double *v, double holonomic_factor);
-/* first_row: of the holonomic equations. */
-void pw_tangent_add_positions (pw_tangent *x, const pw_tangent_layout *to, int first_row);
 
 #endif

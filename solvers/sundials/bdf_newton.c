@@ -25,7 +25,7 @@ int pw_multistep_accelerate (multistep_data *d, double t, const double *y) {
 static void newton_fill (multistep_data *d) {
   int n = d->n;
   const pw_tangent_layout to = {
-    .momentum = 0, .constraint = n, .q = 0, .v = n, .a = 2 * n, .lambda = 3 * n, .a_factor = 1, .multiplier_factor = 1
+    .momentum = 0, .constraint = n, .q = 0, .v = n, .a = 2 * n, .lambda = 3 * n, .a_factor = 1, .lambda_factor = 1
   };
   pw_tangent_add_momentum (&d->newton.tangent, &to, d->lambda);
   pw_tangent_add_accelerations (&d->newton.tangent, &to, d->v, d->a);
