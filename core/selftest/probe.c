@@ -47,8 +47,8 @@ void pw_probe_update (pw_probe *x, pw_probe_move move, double h) {
     x->q_now[j] = x->q[j] + step * (x->v[j] + step * x->a[j] / 2) + (move == PW_PROBE_Q ? h * x->dq[j] : 0);
     x->v_now[j] = x->v[j] + step * x->a[j] + (move == PW_PROBE_V ? h * x->dv[j] : 0);
   }
-  pw_update_kinematics (x->work, move == PW_PROBE_TIME || move == PW_PROBE_MOTION ? x->t + h * x->tau : x->t, x->q_now,
-                        x->v_now);
+  const double t = move == PW_PROBE_TIME || move == PW_PROBE_MOTION ? x->t + h * x->tau : x->t;
+  x->failed |= pw_update_kinematics (x->work, t, x->q_now, x->v_now) != PW_OK;
 }
 
 /* ---- Functions ---- */

@@ -174,6 +174,14 @@ static int scene_open (scene *x, pw_error *error) {
   return x->memory ? PW_OK : pw_fail (error, PW_RESOURCE, "model %s: out of memory", x->p.s->model);
 }
 
+/* Reports the signal, and no checks, which have compared its last values. */
+static int scene_fail_signal (scene *x, pw_error *error) {
+  char signal[160];
+  *x->p.report = (pw_selftest_report){ 0 };
+  return pw_fail (error, PW_METHOD, "t = %.6g s: a signal failed: %s is not a finite number", x->p.t,
+                  pw_failed_signal (x->p.work, signal, sizeof signal));
+}
+
 int pw_selftest_scene (const pw_system *s, double T, const pw_kind *kind, double t, const double *q, const double *v,
                        unsigned seed, pw_selftest_report *report, pw_error *error) {
   pw_random random = { seed };
@@ -186,6 +194,7 @@ int pw_selftest_scene (const pw_system *s, double T, const pw_kind *kind, double
   if (used && status == PW_OK) {
     scene_randomise (&x.p, q, v, &random);
     scene_all (&x);
+    if (x.p.failed) status = scene_fail_signal (&x, error);
   }
   free (x.memory);
   free (x.p.memory);
