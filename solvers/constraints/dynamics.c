@@ -20,9 +20,10 @@ static void dynamics_stabilise (pw_run *r, const double *v, double *gamma) {
   for (int i = 0; i < s->holonomic; i++) gamma[i] -= r->beta * r->beta * g[i];
 }
 
-/* Stabilises gamma and returns the forces at the current configuration: those computed into f, or the system's array of
+/* Computes gamma and returns the forces at the current configuration: those computed into f, or the system's array of
  * constant forces if there are no others. */
 static inline const double *dynamics_right_side (pw_run *r, const double *v, double *f, double *gamma) {
+  pw_evaluate_gamma (r->w, gamma);
   if (r->alpha + r->beta > 0) dynamics_stabilise (r, v, gamma);
   if (r->s->forces == 0) return r->s->constant;
   pw_evaluate_force (r->w, f);
@@ -35,7 +36,6 @@ static void dynamics_refine (pw_run *r, const double *v, double *a, double *lamb
   const pw_system *s = r->s;
   double *f = r->scratch, *gamma = f + s->coords + 3;                                  /* residuals */
   double *da = r->w->scratch, *dlambda = da + s->coords + 3, *Jda = dlambda + s->rows; /* corrections */
-  pw_evaluate_gamma (r->w, gamma);
   if (dynamics_right_side (r, v, f, gamma) != f) pw_evaluate_force (r->w, f);
   for (int j = 0; j < s->coords; j++) da[j] = a[j];
   for (int i = 0; i < s->rows; i++) dlambda[i] = lambda[i];
@@ -52,7 +52,6 @@ static void dynamics_refine (pw_run *r, const double *v, double *a, double *lamb
 }
 
 void pw_run_accelerate_updated (pw_run *r, const double *v, double *a, double *lambda) {
-  pw_evaluate_gamma (r->w, lambda);
   const double *f = dynamics_right_side (r, v, r->scratch, lambda);
   r->statistics.rhs++;
   pw_saddle_solve (r->saddle, f, lambda, a, lambda);
@@ -61,7 +60,6 @@ void pw_run_accelerate_updated (pw_run *r, const double *v, double *a, double *l
 
 /* Factorises and solves, with gamma in the array of lambda; *near = 1 near a singular configuration. */
 static inline int dynamics_solve (pw_run *r, const double *v, double *a, double *lambda, int *near) {
-  pw_evaluate_gamma (r->w, lambda);
   const double *f = dynamics_right_side (r, v, r->scratch, lambda);
   r->statistics.rhs++;
   r->statistics.factorisations++;

@@ -6,8 +6,9 @@
 #include <math.h>
 #include "block_ldl.h"
 
-/* Calls f with a constant in place of a size that is 1 or 2. */
+/* Calls f with a constant in place of a size that is 1 or 2, or of a width that is 1 or 3. */
 #define BLOCK_SIZE(size, f, ...) ((size) == 2 ? f (2, __VA_ARGS__) : f (1, __VA_ARGS__))
+#define BLOCK_WIDTH(width, f, ...) ((width) == 3 ? f (3, __VA_ARGS__) : f (1, __VA_ARGS__))
 
 /* Of a body: x, y and angle; of an internal coordinate: x alone. */
 typedef struct {

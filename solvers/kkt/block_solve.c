@@ -25,7 +25,7 @@ PW_INLINE block_row block_scatter (int size, int width, const double *y, const d
 }
 
 /* y -= J W^-1 f for a body. */
-PW_INLINE void block_right_of (const pw_block_ldl *l, const pw_body_block *p, const double *f, double *y, int width) {
+PW_INLINE void block_right_of (int width, const pw_block_ldl *l, const pw_body_block *p, const double *f, double *y) {
   const block_row z = block_weigh (width, f + p->j, l->inverse_weight + p->j);
   for (const pw_contribution *a = l->contribution + p->first_contribution;
        a < l->contribution + p[1].first_contribution; a++)
@@ -33,8 +33,8 @@ PW_INLINE void block_right_of (const pw_block_ldl *l, const pw_body_block *p, co
 }
 
 /* a = W^-1 (f - J^T y) for a body. */
-PW_INLINE void block_accelerate (const pw_block_ldl *l, const pw_body_block *p, const double *f, const double *y,
-                                 double *a, int width) {
+PW_INLINE void block_accelerate (int width, const pw_block_ldl *l, const pw_body_block *p, const double *f,
+                                 const double *y, double *a) {
   const double *w = l->inverse_weight + p->j;
   block_row z = { 0 };
   if (f) z = width == 3 ? (block_row){ f[p->j], f[p->j + 1], f[p->j + 2] } : (block_row){ .x = f[p->j] };
@@ -88,20 +88,16 @@ static void block_right (const pw_block_ldl *l, const double *f, double *y) {
   for (const pw_body_block *p = l->body, *last = p + l->bodies; p < last; p++)
     if (p->uncondensed)
       for (int n = 0; n < 3; n++) y[l->contribution[p[1].first_contribution - 2].unknown + n] -= f[p->j + n];
-    else if (p->width == 3)
-      block_right_of (l, p, f, y, 3);
     else
-      block_right_of (l, p, f, y, 1);
+      BLOCK_WIDTH (p->width, block_right_of, l, p, f, y);
 }
 
 static void block_accelerations (const pw_block_ldl *l, const double *f, const double *y, double *a) {
   for (const pw_body_block *p = l->body, *last = p + l->bodies; p < last; p++)
     if (p->uncondensed)
       for (int n = 0; n < 3; n++) a[p->j + n] = -y[l->contribution[p[1].first_contribution - 2].unknown + n];
-    else if (p->width == 3)
-      block_accelerate (l, p, f, y, a, 3);
     else
-      block_accelerate (l, p, f, y, a, 1);
+      BLOCK_WIDTH (p->width, block_accelerate, l, p, f, y, a);
 }
 
 void pw_block_solve (const pw_block_ldl *l, const double *f, double *y, double *a) {

@@ -22,25 +22,25 @@ static void condense_add_pair (pw_plan *plan, int a, int b) {
 /* Pairs of nodes that meet in a group, or with an uncondensed body. */
 static void condense_pairs (pw_plan *plan) {
   for (int n = 0; n < plan->groups; n++) {
-    int j = pw_group_first (plan->saddle->s, n), own = condense_body_node (plan, j);
+    int j = pw_group_first (plan->saddle->s, n), body = condense_body_node (plan, j);
     for (int x = plan->start[j]; x < plan->start[j + 1]; x++) {
       int a = plan->contribution[plan->list[x]].node;
-      if (own >= 0) condense_add_pair (plan, a, own), condense_add_pair (plan, a, own + 1);
-      for (int y = plan->start[j]; y < x && own < 0; y++)
+      if (body >= 0) condense_add_pair (plan, a, body), condense_add_pair (plan, a, body + 1);
+      for (int y = plan->start[j]; y < x && body < 0; y++)
         condense_add_pair (plan, a, plan->contribution[plan->list[y]].node);
     }
   }
 }
 
 /* The contributions of each group in the order of their columns (few: by insertion). */
-static void condense_sort_columns (const pw_plan *plan, const int *place) {
+static void condense_sort_columns (const pw_plan *plan, const int *column_of_node) {
   for (int n = 0; n < plan->groups; n++) {
     int j = pw_group_first (plan->saddle->s, n), *list = plan->list + plan->start[j],
         count = plan->start[j + 1] - plan->start[j];
     for (int x = 1; x < count; x++)
       for (int y = x; y > 0; y--) {
         int a = list[y - 1], b = list[y];
-        if (place[plan->contribution[a].node] <= place[plan->contribution[b].node]) break;
+        if (column_of_node[plan->contribution[a].node] <= column_of_node[plan->contribution[b].node]) break;
         list[y - 1] = b, list[y] = a;
       }
   }
@@ -57,31 +57,31 @@ static int condense_coupling (const pw_block_ldl *l, int a, int b) {
 /* Fills the block of a group; *contributions and *couplings count. */
 static void condense_body (const pw_plan *plan, pw_block_ldl *l, int j, pw_body_block *p, int *contributions,
                            int *couplings) {
-  int own = condense_body_node (plan, j);
+  int body = condense_body_node (plan, j);
   *p = (pw_body_block){ .j = j,
                         .first_contribution = *contributions,
                         .first_coupling = *couplings,
                         .width = (unsigned char)pw_group_width (plan->saddle->s, j),
-                        .uncondensed = own >= 0 };
+                        .uncondensed = body >= 0 };
   for (int x = plan->start[j]; x < plan->start[j + 1]; x++) {
     const pw_plan_contribution *a = &plan->contribution[plan->list[x]];
     const pw_plan_node *n = &plan->node[a->node];
     l->contribution[(*contributions)++] =
         (pw_contribution){ a->J, n->unknown, l->column[l->column_of_node[a->node]].first_value, a->row_stride,
                            (short)n->size };
-    if (own >= 0)
-      for (int i = 0; i < 2; i++) l->coupling[(*couplings)++] = condense_coupling (l, a->node, own + i);
+    if (body >= 0)
+      for (int i = 0; i < 2; i++) l->coupling[(*couplings)++] = condense_coupling (l, a->node, body + i);
     else
       for (int y = x + 1; y < plan->start[j + 1]; y++)
         l->coupling[(*couplings)++] = condense_coupling (l, a->node, plan->contribution[plan->list[y]].node);
   }
-  for (int i = own; own >= 0 && i < own + 2; i++)
+  for (int i = body; body >= 0 && i < body + 2; i++)
     l->contribution[(*contributions)++] = (pw_contribution){ .unknown = plan->node[i].unknown,
                                                              .diagonal = l->column[l->column_of_node[i]].first_value,
                                                              .size = (short)plan->node[i].size };
 }
 
-/* 0 for a body of a chain, and for a group without mass, whose accelerations massless.plan computes. */
+/* 0 for a body of a chain, and for a group without mass, whose accelerations massless.c computes. */
 static int condense_has_block (const pw_plan *plan, int n) {
   int j = pw_group_first (plan->saddle->s, n), width = pw_group_width (plan->saddle->s, j), has_weight = 0;
   for (int i = 0; i < width; i++) has_weight |= plan->weight[j + i] != 0;

@@ -18,6 +18,7 @@
  * chosen. */
 static const double LINEAR_STEADY = 1e-6, LINEAR_EXACT = 1e-13;
 
+/* The unit of accelerations. */
 static double linear_unit (const pw_linearisation *x) {
   const pw_scale *s = &x->r->w->scale;
   return s->length / (s->time * s->time);
@@ -30,10 +31,10 @@ static void linear_set_residual (const pw_linearisation *x, pw_linear_frame *f) 
   const double *q = x->r->q, *v = x->r->v, *a = x->a, w = f->twist[2];
   double most = 0;
   for (int j = 0; j < 3 * x->r->s->bodies; j += 3) {
-    double dx = v[j] - f->twist[0] + w * (q[j + 1] - f->origin[1]);
-    double dy = v[j + 1] - f->twist[1] - w * (q[j] - f->origin[0]);
+    double relative_x = v[j] - f->twist[0] + w * (q[j + 1] - f->origin[1]);
+    double relative_y = v[j + 1] - f->twist[1] - w * (q[j] - f->origin[0]);
     most = pw_larger_or_nan (most, hypot (a[j] + w * v[j + 1], a[j + 1] - w * v[j]));
-    most = pw_larger_or_nan (most, fabs (w) * hypot (dx, dy));
+    most = pw_larger_or_nan (most, fabs (w) * hypot (relative_x, relative_y));
     most = pw_larger_or_nan (most, fabs (a[j + 2]) * x->r->s->scale.length);
   }
   for (int j = 3 * x->r->s->bodies; j < x->n; j++) most = pw_larger_or_nan (most, fabs (a[j]) * x->r->s->scale.length);
@@ -41,10 +42,10 @@ static void linear_set_residual (const pw_linearisation *x, pw_linear_frame *f) 
   f->residual = most / linear_unit (x);
 }
 
-/* The frame at body b, with its velocity; turning: with its angular velocity, too. */
-static pw_linear_frame linear_try (const pw_linearisation *x, int b, int turning) {
+/* The frame at body b, with its velocity and the angular velocity w. */
+static pw_linear_frame linear_frame_at (const pw_linearisation *x, int b, double w) {
   const double *q = x->r->q + 3 * b, *v = x->r->v + 3 * b;
-  pw_linear_frame f = { .origin = { q[0], q[1] }, .twist = { v[0], v[1], turning ? v[2] : 0 } };
+  pw_linear_frame f = { .origin = { q[0], q[1] }, .twist = { v[0], v[1], w } };
   linear_set_residual (x, &f);
   return f;
 }
@@ -71,9 +72,9 @@ static pw_linear_frame linear_fit (const pw_linearisation *x) {
 
 void pw_linear_choose_frame (pw_linearisation *x) {
   if (x->r->s->bodies == 0) return;
-  x->frame = linear_try (x, 0, 0);
+  x->frame = linear_frame_at (x, 0, 0);
   for (int b = 0; b < x->r->s->bodies && x->frame.residual > LINEAR_EXACT; b++) {
-    pw_linear_frame f = linear_try (x, b, 1);
+    pw_linear_frame f = linear_frame_at (x, b, x->r->v[3 * b + 2]);
     if (f.residual < x->frame.residual / 2) x->frame = f;
   }
   pw_linear_frame f = linear_fit (x);

@@ -30,6 +30,7 @@ static void modes_input (pw_linearisation *x, const pw_element_batch *k, int e, 
   pw_linear_coordinates (x, x->dx, x->da, x->r->s->sources, column);
 }
 
+/* Fills B; NAN for signals of constraints. */
 static void modes_inputs (pw_linearisation *x, double *B) {
   pw_workspace *w = x->r->w;
   int inputs = x->r->s->sources;
