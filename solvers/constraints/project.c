@@ -81,18 +81,18 @@ int pw_project_positions (pw_projector *p, pw_run *r, double t, double *q, const
   const int max_iterations = 30; /* quadratic convergence needs some 5; a bad start needs more */
   const pw_system *s = r->s;
   pw_residuals now = { 0 };
-  double *g = r->scratch, *size = g + s->rows, *mu = size + s->rows, *dq = mu + s->rows, before = INFINITY;
+  double *g = r->scratch, *size = g + s->rows, *mu = size + s->rows, *dq = mu + s->rows, previous = INFINITY;
   for (p->iterations = 0;; p->iterations++) {
     int status = pw_update_kinematics (r->w, t, q, v);
     if (status != PW_OK) return status;
     pw_evaluate_g (r->w, g);
-    if (!(before < small)) pw_evaluate_g_size (r->w, size);
+    if (!(previous < small)) pw_evaluate_g_size (r->w, size);
     pw_worst_position (s, g, size, p->active, &now);
     p->worst_row = now.row_position;
-    int stalled = now.position > before / 4; /* at round-off, since convergence is quadratic */
+    int stalled = now.position > previous / 4; /* at round-off, since convergence is quadratic */
     if (now.position <= PW_RESIDUAL_GOOD || (stalled && now.position <= PW_RESIDUAL_ENOUGH)) break;
     if (p->iterations >= max_iterations || !isfinite (now.position)) return PW_RETRY;
-    before = now.position;
+    previous = now.position;
     pw_evaluate_J (r->w);
     r->statistics.factorisations++;
     if (pw_saddle_factor (p->position) != PW_OK) return PW_RETRY;

@@ -142,6 +142,7 @@ double pw_massless_factor (pw_massless *m) {
 
 /* ---- Solving ---- */
 
+/* gamma~, then w in place of lambda, then f~. */
 PW_INLINE void massless_forward (pw_component *c, double *f, double *gamma, int pivots) {
   pw_massless_row *row = c->row;
   for (int i = 0; i < c->rows; i++) {
@@ -168,6 +169,7 @@ void pw_massless_forward (pw_massless *m, double *f, double *gamma) {
     c->pivots == 3 ? massless_forward (c, f, gamma, 3) : massless_forward (c, f, gamma, c->pivots);
 }
 
+/* gamma~ - H' a, then a_P and lambda_p from the last pivot to the first. */
 PW_INLINE void massless_backward (pw_component *c, double *a, double *lambda, int pivots) {
   pw_massless_row *row = c->row;
   for (const int *column = c->massive; column < c->massive + c->massives; column++) {

@@ -68,7 +68,8 @@ typedef struct {
 } pw_massless_row;
 
 typedef struct {
-  int rows, cols, pivots, groups;
+  int rows, cols, groups;
+  int pivots;   /* matched rows */
   int grounded; /* 1: one of its elements is (pw_is_grounded) */
   pw_massless_group *group;
   int *global;                   /* cols: global coordinate */

@@ -8,7 +8,7 @@
 #include "pinwheel-analysis.h"
 #include "newton.h"
 
-/* The co-moving frame, at a reference body, at rest or with the twist of the body. */
+/* The co-moving frame (linear_frame.c). */
 typedef struct {
   double origin[2];    /* of the frame [m] */
   double twist[3];     /* velocity of the origin, angular velocity [m/s, rad/s] */
@@ -36,7 +36,7 @@ typedef struct {
   double *A;                     /* size x size, by rows: in the result */
   double *symmetry;              /* 3 x size: symmetry directions in minimal coordinates */
   double *dx;                    /* 2 n: a variation */
-  double *product;               /* n + 2 m: derivatives of -F, gamma - J a, J v - eta, times dx */
+  double *product;               /* n + 2 m: derivatives of J^T lambda - f, gamma - J a, J v - eta, times dx */
   double *da;                    /* n + 3: the resulting variation of accelerations */
   double *scratch, *row_scratch; /* n + 3 m + 3, m */
   double *residual;              /* 3 x (2 m + n): violations by rigid displacements; then scratch, 2 m + n + 15 */

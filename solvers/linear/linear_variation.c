@@ -30,7 +30,7 @@
 
 /* ---- Derivatives ---- */
 
-/* Rows of the derivatives: -F = (J^T lambda)_q - f_q, -f_v; gamma_q - (J a)_q, gamma_v; B. */
+/* Adds the derivatives with respect to q; v: (J^T lambda)_q - f_q; -f_v; gamma_q - (J a)_q; gamma_v; B. */
 static void linear_put (pw_linearisation *x, const double *v) {
   const int n = x->n, of_J = n + x->m;
   const struct {
