@@ -40,7 +40,7 @@ struct pw_run {
   struct pw_scene *scene;                   /* data of that code */
   char *scene_memory;
   int scene_ready;        /* 1: its constants have been computed */
-  pw_watchdog limits;     /* thresholds of the watchdog */
+  pw_thresholds limits;   /* thresholds of the watchdog */
   pw_geometry geometry;   /* distance of the constraints from a singular configuration */
   double refused_sine;    /* sine below which an evaluation is refused */
   int near_singular;      /* 1 after an evaluation near a singular configuration */
@@ -317,13 +317,13 @@ static inline void pw_forget_residuals (pw_run *r) {
 
 typedef struct {
   pw_saddle *position;         /* of the metric of positions and the holonomic rows; or the run's saddle */
-  int own_position;            /* 1: position is not the run's saddle */
+  int owns_position;           /* 1: position is not the run's saddle */
   pw_saddle *velocity;         /* of the metric of velocities and all rows */
-  int own_velocity;            /* 1: velocity is not the run's saddle */
+  int owns_velocity;           /* 1: velocity is not the run's saddle */
   int iterations;              /* of the last projection of positions */
   const unsigned char *active; /* rows that are enforced; NULL: all */
   int ignores_inactive;        /* 1: the residuals of the other rows are not checked */
-  int by_mass;                 /* 1: both metrics are the mass matrix */
+  int mass_metric;             /* 1: both metrics are the mass matrix */
   int worst_row;               /* with the largest residual in the last projection of positions */
   int contradictory_row;       /* redundant row that is violated after it, or -1 */
 } pw_projector;
@@ -352,8 +352,8 @@ int pw_project_with_energy (pw_projector *p, pw_run *r, double t, double *q, dou
                             double *added_energy);
 
 /* Removes from an error e of positions or velocities the part that a projection onto the first `rows` equations
- * removes, in the metric of the saddle `k` (all rows), which must be factorised at the current configuration. */
-void pw_project_error (pw_run *r, pw_saddle *k, double *e, int rows);
+ * removes, in the metric of `saddle` (all rows), which must be factorised at the current configuration. */
+void pw_project_error (pw_run *r, pw_saddle *saddle, double *e, int rows);
 
 /* ---- Specialised code (specialised.c) ---- */
 

@@ -60,9 +60,8 @@ void pw_probe_update (pw_probe *probe, pw_probe_move move, double h) {
         probe->q[j] + step * (probe->v[j] + step * probe->a[j] / 2) + (move == PW_PROBE_Q ? h * probe->dq[j] : 0);
     probe->v_now[j] = probe->v[j] + step * probe->a[j] + (move == PW_PROBE_V ? h * probe->dv[j] : 0);
   }
-  pw_update_kinematics (probe->workspace,
-                        move == PW_PROBE_TIME || move == PW_PROBE_MOTION ? probe->t + h * probe->tau : probe->t,
-                        probe->q_now, probe->v_now);
+  const double t = move == PW_PROBE_TIME || move == PW_PROBE_MOTION ? probe->t + h * probe->tau : probe->t;
+  probe->failed |= pw_update_kinematics (probe->workspace, t, probe->q_now, probe->v_now) != PW_OK;
 }
 
 /* ---- Functions ---- */

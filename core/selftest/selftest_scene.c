@@ -180,6 +180,14 @@ static int scene_open (scene_test *test, pw_error *error) {
   return test->memory ? PW_OK : pw_fail (error, PW_RESOURCE, "model %s: out of memory", test->probe.s->model);
 }
 
+/* Reports the signal, and no checks, which have compared its last values. */
+static int scene_fail_signal (scene_test *test, pw_error *error) {
+  char signal[160];
+  *test->probe.report = (pw_selftest_report){ 0 };
+  return pw_fail (error, PW_METHOD, "t = %.6g s: a signal failed: %s is not a finite number", test->probe.t,
+                  pw_failed_signal (test->probe.workspace, signal, sizeof signal));
+}
+
 int pw_selftest_scene (const pw_system *s, double T, const pw_kind *kind, double t, const double *q, const double *v,
                        unsigned seed, pw_selftest_report *report, pw_error *error) {
   pw_random random = { seed };
@@ -194,6 +202,7 @@ int pw_selftest_scene (const pw_system *s, double T, const pw_kind *kind, double
   if (used && status == PW_OK) {
     scene_randomise (probe, q, v, &random);
     scene_all (&test);
+    if (probe->failed) status = scene_fail_signal (&test, error);
   }
   free (test.memory);
   free (probe->memory);

@@ -166,7 +166,7 @@ static int galpha_solve (pw_run *r, double h, double t1) {
     if (size <= enough || stalled || (rate < 1 && size * rate / (1 - rate) <= enough)) return galpha_update (r, t1);
     if (rate > 2 && i > 3) return PW_RETRY;
     refactor = i > 0 && rate > 0.02;
-    if (refactor) pw_sparse_forget (&d->common.sparse);
+    if (refactor) pw_sparse_forget_pivots (&d->common.sparse);
     before = size;
   }
   return PW_RETRY;
@@ -196,11 +196,11 @@ static int galpha_open (pw_run *r, pw_error *error) {
   if (status == PW_OK) {
     galpha_coefficients (d, pw_run_option (r, "rho"));
     d->common.q1 = d->y, d->common.v1 = d->y + x->n;
-    pw_scatter_record (&x->tangent.scatter);
+    pw_scatter_begin_record (&x->tangent.scatter);
     galpha_fill (d, 1);
     status = pw_implicit_lay_out (&d->common, x->size);
   }
-  pw_dense_projection projection = x->velocities ? PW_DENSE_POSITIONS_AND_VELOCITIES : PW_DENSE_POSITIONS;
+  pw_dense_projection projection = x->enforces_velocities ? PW_DENSE_POSITIONS_AND_VELOCITIES : PW_DENSE_POSITIONS;
   return pw_implicit_complete (r, status, projection, error);
 }
 
@@ -215,8 +215,8 @@ static int galpha_jerk (pw_run *r, double h, double *jerk) {
     d->common.q1[j] = r->q[j] + dt * (d->v[j] + 0.5 * dt * d->a[j]);
     d->common.v1[j] = d->v[j] + dt * d->a[j];
   }
-  int status =
-      pw_run_accelerate (r, pw_before_breakpoint (r, r->t + dt), d->common.q1, d->common.v1, jerk, d->common.dae.other);
+  int status = pw_run_accelerate (r, pw_before_breakpoint (r, r->t + dt), d->common.q1, d->common.v1, jerk,
+                                  d->common.dae.scratch);
   for (int j = 0; j < d->common.dae.n; j++) jerk[j] = (jerk[j] - d->a[j]) / dt;
   return status;
 }
@@ -251,11 +251,11 @@ static int galpha_add_velocity_error (pw_run *r, double h, const double *jerk) {
   double C = 1. / 6 - d->beta - 0.5 * (d->alpha_m - d->alpha_f), *dv = d->common.v1;
   int status = pw_evaluate_J_at (r->w, r->t, r->q, d->v);
   if (status != PW_OK) return status;
-  pw_mul_J (r->w, jerk, d->common.dae.jv);
-  for (int i = 0; i < s->rows; i++) d->common.dae.jv[i] *= i < s->holonomic ? C * h * h : 0;
+  pw_mul_J (r->w, jerk, d->common.dae.residual);
+  for (int i = 0; i < s->rows; i++) d->common.dae.residual[i] *= i < s->holonomic ? C * h * h : 0;
   status = pw_saddle_factor (r->saddle);
   if (status != PW_OK) return status;
-  pw_saddle_solve (r->saddle, NULL, d->common.dae.jv, dv, d->common.dae.other);
+  pw_saddle_solve (r->saddle, NULL, d->common.dae.residual, dv, d->common.dae.scratch);
   for (int j = 0; j < d->common.dae.n; j++) d->v[j] += dv[j];
   return PW_OK;
 }
@@ -266,16 +266,16 @@ static int galpha_begin (pw_run *r, double h) {
   double *jerk = d->w1;
   int status = PW_OK;
   memcpy (d->v, r->v, (size_t)d->common.dae.n * sizeof *d->v);
-  if (!d->common.dae.velocities) { /* velocities include the error of the steps before */
+  if (!d->common.dae.enforces_velocities) { /* velocities include the error of the steps before */
     status = pw_evaluate_J_at (r->w, r->t, r->q, d->v);
     if (status == PW_OK) status = pw_project_velocities (&d->common.last.projector, r, d->v);
   }
-  if (status == PW_OK) status = pw_run_accelerate (r, r->t, r->q, d->v, d->a, d->common.dae.other);
+  if (status == PW_OK) status = pw_run_accelerate (r, r->t, r->q, d->v, d->a, d->common.dae.scratch);
   if (status == PW_OK) status = galpha_jerk (r, h, jerk);
   if (status == PW_OK && galpha_vibrates (r, h, jerk)) status = galpha_trial_jerk (r, h, jerk);
   if (status != PW_OK) return status;
   for (int j = 0; j < d->common.dae.n; j++) d->w[j] = d->a[j] + (d->alpha_m - d->alpha_f) * h * jerk[j];
-  return d->common.dae.velocities || r->s->holonomic == 0 ? PW_OK : galpha_add_velocity_error (r, h, jerk);
+  return d->common.dae.enforces_velocities || r->s->holonomic == 0 ? PW_OK : galpha_add_velocity_error (r, h, jerk);
 }
 
 /* ---- Advancing ---- */
@@ -292,7 +292,7 @@ static void galpha_accept (pw_run *r) {
   memcpy (d->v, r->v, n);
   memcpy (d->a, d->a1, n);
   memcpy (d->w, d->w1, n);
-  pw_tangent_store (&d->common.dae.tangent, d->y + 2 * d->common.dae.n, r->lambda);
+  pw_tangent_expand (&d->common.dae.tangent, d->y + 2 * d->common.dae.n, r->lambda);
 }
 
 static int galpha_advance (pw_run *r, double t_end, pw_error *error) {

@@ -19,7 +19,7 @@ int pw_implicit_lay_out (pw_implicit *x, int size) {
   pw_tangent *t = &x->dae.tangent;
   if (pw_scatter_lay_out (&t->scatter, size, &t->colptr, &t->rowind) != PW_OK) return PW_RESOURCE;
   x->value = malloc (((size_t)t->colptr[size] + 1) * sizeof *x->value);
-  return x->value ? pw_sparse_open (&x->sparse, 0, size, t->colptr, t->rowind) : PW_RESOURCE;
+  return x->value ? pw_sparse_open (&x->sparse, PW_SPARSE_REAL, size, t->colptr, t->rowind) : PW_RESOURCE;
 }
 
 int pw_implicit_complete (pw_run *r, int status, pw_dense_projection projection, pw_error *error) {
@@ -50,7 +50,7 @@ int pw_implicit_restart (pw_run *r, pw_error *error) {
 void pw_implicit_scale (const pw_dae *x, double c, double e, double *row_factor, double *column_factor) {
   const pw_system *s = x->tangent.run->s;
   int n = x->n,
-      g_rows = x->velocities ? 0 : x->tangent.holonomic; /* rows of lambda in which g = 0 replaces J v = eta */
+      g_rows = x->enforces_velocities ? 0 : x->tangent.holonomic; /* rows of lambda in which g = 0 replaces J v = eta */
   double mass = 0;
   for (int j = 0; j < n; j++) mass = fmax (mass, s->mass[j]);
   if (mass == 0) mass = 1;
@@ -67,7 +67,7 @@ void pw_implicit_scale (const pw_dae *x, double c, double e, double *row_factor,
 
 void pw_implicit_begin_matrix (pw_implicit *x, int size) {
   memset (x->value, 0, (size_t)x->dae.tangent.colptr[size] * sizeof *x->value);
-  pw_scatter_begin (&x->dae.tangent.scatter, x->value);
+  pw_scatter_begin_fill (&x->dae.tangent.scatter, x->value);
 }
 
 int pw_implicit_fail (pw_run *r, int status, double h, pw_error *error) {

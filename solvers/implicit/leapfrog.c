@@ -91,35 +91,39 @@ static void drift_put_momentum (pw_run *r) {
   pw_tangent *x = &r->data->common.dae.tangent;
   const pw_system *s = r->s;
   for (int j = 0; j < s->coords; j++) pw_scatter_add (&x->scatter, j, j, s->mass[j]);
-  pw_newton_J (
-      r->w, &x->scatter, 1,
-      &(pw_placement){ .col = s->coords, .rows = s->rows, .factor = 1, .factor_nonholonomic = 1, .map = x->map });
+  pw_newton_add_JT (
+      r->w, &x->scatter,
+      &(pw_placement){
+          .col = s->coords, .rows = s->rows, .factor = 1, .factor_nonholonomic = 1, .row_index = x->row_index });
 }
 
 /* S + h/2 ((S u)_q - b_q) at the middle; kinematics must be those of the middle. */
 static void drift_put_middle (pw_run *r, double h) {
   pw_tangent *x = &r->data->common.dae.tangent;
   const pw_system *s = r->s;
-  pw_placement put = {
-    .row = s->coords, .rows = s->rows, .factor_nonholonomic = 0.5 * h, .map = x->map, .w = r->data->u
-  };
-  pw_newton_block (&x->newton, r->w, &x->scatter, PW_JW_Q, &put);
+  pw_placement put = { .row = s->coords,
+                       .rows = s->rows,
+                       .factor_nonholonomic = 0.5 * h,
+                       .row_index = x->row_index,
+                       .direction = r->data->u };
+  pw_newton_add_block (&x->newton, r->w, &x->scatter, PW_JW_Q, &put);
   put.factor_nonholonomic = -0.5 * h;
-  pw_newton_block (&x->newton, r->w, &x->scatter, PW_ETA_Q, &put);
+  pw_newton_add_block (&x->newton, r->w, &x->scatter, PW_ETA_Q, &put);
   put.factor_nonholonomic = 1;
-  pw_newton_J (r->w, &x->scatter, 0, &put);
+  pw_newton_add_J (r->w, &x->scatter, &put);
 }
 
 /* G at the end; kinematics must be those of the end. */
 static void drift_put_end (pw_run *r) {
   pw_tangent *x = &r->data->common.dae.tangent;
-  pw_newton_J (r->w, &x->scatter, 0,
-               &(pw_placement){ .row = r->s->coords, .rows = r->s->holonomic, .factor = 1, .map = x->map });
+  pw_newton_add_J (
+      r->w, &x->scatter,
+      &(pw_placement){ .row = r->s->coords, .rows = r->s->holonomic, .factor = 1, .row_index = x->row_index });
 }
 
 static int drift_open_matrix (pw_run *r) {
   leapfrog *d = r->data;
-  pw_scatter_record (&d->common.dae.tangent.scatter);
+  pw_scatter_begin_record (&d->common.dae.tangent.scatter);
   drift_put_momentum (r);
   drift_put_middle (r, 1);
   drift_put_end (r);

@@ -56,7 +56,7 @@ static int radau_restart (pw_run *r, pw_error *error) {
     d->h = fmax (d->h, 0.1 * time_scale * sqrt (sqrt (pw_radau_rtol (r))));
   memcpy (d->now.y, r->q, (size_t)d->dae.n * sizeof (double));
   memcpy (d->now.y + d->dae.n, r->v, (size_t)d->dae.n * sizeof (double));
-  memset (d->now.y + 2 * d->dae.n, 0, (size_t)(d->dae.rows + d->dae.mus) * sizeof (double));
+  memset (d->now.y + 2 * d->dae.n, 0, (size_t)(d->dae.rows + d->dae.mu_count) * sizeof (double));
   pw_tangent_compress (&d->dae.tangent, r->lambda, d->dae.rows, d->now.y + 2 * d->dae.n);
   return PW_OK;
 }
@@ -138,7 +138,7 @@ static void radau_evaluate_reached (pw_run *r, double h) {
   else
     for (int j = 0, i = d->dae.n; j < d->dae.n; j++, i++)
       r->a[j] = pw_radau_sum (0, radau_derivative_at_end, d->last.Z, i) / h;
-  if (status != PW_OK) pw_tangent_store (&d->dae.tangent, lambda, r->lambda);
+  if (status != PW_OK) pw_tangent_expand (&d->dae.tangent, lambda, r->lambda);
   pw_tangent_compress (&d->dae.tangent, r->lambda, d->dae.rows, lambda);
   memcpy (d->a_end, r->a, (size_t)d->dae.n * sizeof *d->a_end);
   pw_bound_tolerances (r);
@@ -159,7 +159,7 @@ static int radau_accept (pw_run *r, double h, double t1) {
   d->now = d->last;
   d->last = done;
   memcpy (d->now.y, d->Y, (size_t)d->dae.size * sizeof (double));
-  memset (d->now.y + 2 * d->dae.n + d->dae.rows, 0, (size_t)d->dae.mus * sizeof (double));
+  memset (d->now.y + 2 * d->dae.n + d->dae.rows, 0, (size_t)d->dae.mu_count * sizeof (double));
   memcpy (r->q, d->Y, n);
   memcpy (r->v, d->Y + d->dae.n, n);
   r->t = t1;
@@ -225,7 +225,7 @@ static int radau_accept_adaptive (pw_run *r, double h, double t1, double error, 
 static void radau_project_start (pw_run *r) {
   radau *d = r->data;
   double *q = d->now.y, *v = q + d->dae.n;
-  if (d->dae.velocities || pw_project_positions (&d->projector, r, r->t, q, v) != PW_OK) return;
+  if (d->dae.enforces_velocities || pw_project_positions (&d->projector, r, r->t, q, v) != PW_OK) return;
   (void)pw_project_velocities (&d->projector, r, v);
   pw_forget_residuals (r);
 }
@@ -294,7 +294,7 @@ static void radau_fill_sample (pw_run *r, double x) {
   for (int i = 0; i < d->dae.size; i++) y[i] = pw_radau_sum (p->y[i], weight, p->Z, i);
   memcpy (r->q_at, y, (size_t)n * sizeof *y);
   memcpy (r->v_at, y + n, (size_t)n * sizeof *y);
-  pw_tangent_store (&d->dae.tangent, y + 2 * n, r->lambda_at);
+  pw_tangent_expand (&d->dae.tangent, y + 2 * n, r->lambda_at);
   for (int j = 0; j < n; j++) r->a_at[j] = (1 - x) * p->a[j] + x * d->a_end[j];
   for (int e = 0; e < r->s->entries; e++) r->ledger_at[e] = pw_radau_sum (p->ledger[e], weight, p->ledger_change, e);
   radau_quintic (r, x, q, v);
@@ -309,11 +309,11 @@ static int radau_interpolate (void *method, pw_run *r, double t) {
   radau *d = method;
   int status;
   radau_fill_sample (r, (t - d->last.t) / d->last.h);
-  if (d->dae.mus > 0 || !d->dae.velocities)
+  if (d->dae.mu_count > 0 || !d->dae.enforces_velocities)
     status = pw_project_positions (&d->projector, r, t, r->q_at, r->v_at);
   else
     status = pw_evaluate_J_at (r->w, t, r->q_at, r->v_at);
-  if (status == PW_OK && d->dae.velocities) status = pw_project_velocities (&d->projector, r, r->v_at);
+  if (status == PW_OK && d->dae.enforces_velocities) status = pw_project_velocities (&d->projector, r, r->v_at);
   if (status == PW_OK && pw_saddle_factor (r->saddle) == PW_OK)
     pw_run_accelerate_updated (r, r->v_at, r->a_at, r->lambda_at);
   return status;

@@ -48,8 +48,8 @@ int pw_radau_open_matrices (pw_run *r) {
   if (!d->minus_F_y || !d->value || !d->diagonal) return PW_RESOURCE;
   for (int j = 0; j < 2 * d->dae.n; j++)
     for (d->diagonal[j] = x->colptr[j]; x->rowind[d->diagonal[j]] != j;) d->diagonal[j]++;
-  int status = pw_sparse_open (&d->real, 0, d->dae.size, x->colptr, x->rowind);
-  return status == PW_OK ? pw_sparse_open (&d->complex, 1, d->dae.size, x->colptr, x->rowind) : status;
+  int status = pw_sparse_open (&d->real, PW_SPARSE_REAL, d->dae.size, x->colptr, x->rowind);
+  return status == PW_OK ? pw_sparse_open (&d->complex, PW_SPARSE_COMPLEX, d->dae.size, x->colptr, x->rowind) : status;
 }
 
 /* Evaluates F_y at the state reached. */
@@ -59,7 +59,7 @@ static int radau_linearise (pw_run *r) {
   int status = pw_evaluate_J_at (r->w, r->t, y, y + d->dae.n);
   if (status != PW_OK) return status;
   memset (d->minus_F_y, 0, (size_t)d->dae.tangent.colptr[d->dae.size] * sizeof *d->minus_F_y);
-  pw_scatter_begin (&d->dae.tangent.scatter, d->minus_F_y);
+  pw_scatter_begin_fill (&d->dae.tangent.scatter, d->minus_F_y);
   pw_dae_matrix (&d->dae, y + d->dae.n, NULL, y + 2 * d->dae.n, 0, 0);
   pw_matrix_evaluated (r, y, y + d->dae.n);
   r->statistics.jacobians++;
@@ -85,7 +85,7 @@ static int radau_factor (pw_run *r, double h) {
   radau *d = r->data;
   if (d->factored_h == h) return PW_OK;
   d->factored_h = 0;
-  if (d->choose_pivots) pw_sparse_forget (&d->real), pw_sparse_forget (&d->complex);
+  if (d->choose_pivots) pw_sparse_forget_pivots (&d->real), pw_sparse_forget_pivots (&d->complex);
   d->choose_pivots = 0;
   pw_implicit_scale (&d->dae, radau_gamma / h, radau_gamma / h, d->row_factor, d->column_factor);
   radau_fill_matrix (d, 1, radau_gamma / h, 0);
@@ -126,7 +126,7 @@ double pw_radau_rtol (const pw_run *r) {
 static void radau_set_tolerances (pw_run *r, double h) {
   radau *d = r->data;
   const pw_settings *settings = &r->settings;
-  int n = d->dae.n, index3 = !d->dae.velocities && d->dae.tangent.holonomic > 0;
+  int n = d->dae.n, index3 = !d->dae.enforces_velocities && d->dae.tangent.holonomic > 0;
   double rtol = pw_radau_rtol (r), newton = fmax (10 * DBL_EPSILON / rtol, fmin (0.03, sqrt (rtol))); /* RADAU5's */
   double largest = 1; /* the largest coordinate in units of the scene: its round-off may affect others */
   for (int j = 0; j < n; j++) largest = fmax (largest, fabs (d->now.y[j]) / d->unit[j]);
@@ -301,7 +301,7 @@ int pw_radau_estimate (pw_run *r, double h, int filter_twice, double *error) {
 int pw_radau_work (pw_run *r, double h, double t1, double *error) {
   radau *d = r->data;
   /* the multipliers of the stages are not accurate enough in index3 */
-  int entries = r->s->entries, recomputes = !d->dae.velocities && pw_ledger_uses_multipliers (r->s);
+  int entries = r->s->entries, recomputes = !d->dae.enforces_velocities && pw_ledger_uses_multipliers (r->s);
   double sum = 0;
   for (int k = 0; k < STAGES; k++) memset (d->now.ledger_change[k], 0, (size_t)entries * sizeof (double));
   for (int k = 0; k < STAGES; k++) {
@@ -309,7 +309,7 @@ int pw_radau_work (pw_run *r, double h, double t1, double *error) {
     double t = pw_before_breakpoint (r, radau_time (r, k, h, t1));
     int status = pw_evaluate_J_at (r->w, t, d->Y, d->Y + d->dae.n);
     if (status != PW_OK) return status;
-    const double *lambda = pw_tangent_lambda (&d->dae.tangent, d->Y + 2 * d->dae.n);
+    const double *lambda = pw_tangent_expand_lambda (&d->dae.tangent, d->Y + 2 * d->dae.n);
     if (recomputes && pw_saddle_factor (r->saddle) == PW_OK) {
       pw_run_accelerate_updated (r, d->Y + d->dae.n, r->a_at, r->lambda_at);
       lambda = r->lambda_at;

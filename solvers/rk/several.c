@@ -14,9 +14,9 @@ static int several_possible (const pw_run *r) {
   if (r->method->advance != pw_rk_advance || d == NULL || !pw_fixed_steps (r) || d->holds_signals ||
       d->uses_nullspace || d->off_grid)
     return 0;
-  if (d->projects && !(d->every == 1 && d->projector.by_mass && !d->projector.ignores_inactive)) return 0;
+  if (d->projects && !(d->every == 1 && d->projector.mass_metric && !d->projector.ignores_inactive)) return 0;
   return pw_specialised_suits (r) && r->redundant == 0 && r->alpha + r->beta == 0 && !r->settings.ledger &&
-         !r->interrupted && r->stalled == 0 && !(r->geometry.saddle && r->geometry.alert) &&
+         !r->interrupted && r->stalled == 0 && !(r->geometry.saddle && r->geometry.singular_ahead) &&
          r->statistics.steps >= PW_CHECK_INTERVAL;
 }
 
@@ -38,16 +38,16 @@ static int several_count (const pw_run *r, double t, double t_end) {
 
 /* The watchdog's data in the form that specialised code uses. */
 static pw_scene_watch several_watchdog (const pw_run *r) {
-  const pw_watchdog *limit = &r->limits;
+  const pw_thresholds *limit = &r->limits;
   const pw_geometry *g = &r->geometry;
   const double length = r->s->scale.length, time_squared = r->w->scale.time * r->w->scale.time;
   pw_scene_watch x = { .sine = INFINITY, .moved = g->moved, .reference = r->reference_level };
   x.lost = pw_stabilised_by (r, PW_UNSTABILISED) ? limit->lost_unstabilised : limit->lost;
   if (g->saddle) /* else a tree of holonomic joints, never singular */
-    x.sine = g->state_sine, x.reach = limit->lipschitz * g->typical, x.near_sine = limit->near * g->typical;
-  x.growth = limit->growth, x.rank = limit->rank, x.regular = limit->regular * g->typical;
+    x.sine = g->checked_sine, x.reach = limit->lipschitz * g->largest_sine, x.near_sine = limit->near * g->largest_sine;
+  x.growth = limit->step_growth, x.rank = limit->rank_lost, x.regular = limit->regular * g->largest_sine;
   x.drift = limit->drift_near;
-  x.no_branch = 0.5 * limit->drift_near * limit->rank * limit->rank; /* 0.5: a margin for round-off */
+  x.no_branch = 0.5 * limit->drift_near * limit->rank_lost * limit->rank_lost; /* 0.5: a margin for round-off */
   x.length = length, x.per_length = time_squared / length, x.per_angle = time_squared;
   return x;
 }
@@ -67,10 +67,10 @@ static void several_record (pw_run *r, const pw_scene_steps *x) {
   s->velocity = pw_larger (s->velocity, x->watch.velocity), s->jv = pw_larger (s->jv, x->watch.jv);
   pw_specialised_count (r, (long)x->stages * x->done, x->iterations);
   if (g->saddle == NULL) return; /* else as watchdog_follow leaves it where the sine need not be computed */
-  g->step = x->watch.step, g->moved = x->watch.moved, g->alert = 0;
-  g->before = NAN, g->slope = 0, g->crossed = 0;
-  g->t = r->t, g->start_sine = NAN;
-  memcpy (g->q, r->q, (size_t)r->s->coords * sizeof *g->q);
+  g->step_length = x->watch.step, g->moved = x->watch.moved, g->singular_ahead = 0;
+  g->sine_before_checked = NAN, g->sine_slope = 0, g->crossed = 0;
+  g->previous_t = r->t, g->previous_sine = NAN;
+  memcpy (g->previous_q, r->q, (size_t)r->s->coords * sizeof *g->previous_q);
 }
 
 /* Fills x for the next steps, up to the first that reaches t, and returns their number; 0: fewer than two can be taken

@@ -40,7 +40,7 @@ void pw_run_set_references (pw_run *r) {
   pw_watchdog_begin (r);
   if (r->redundant == 0) return;
   r->independence = pw_rank_independence (r);
-  r->reselect_below = fmin (r->limits.loosened * r->independence, r->limits.loose);
+  r->reselect_below = fmin (r->limits.reselect_ratio * r->independence, r->limits.reselect_below);
 }
 
 int pw_run_look_ahead (pw_run *r, pw_error *error) {
@@ -92,7 +92,7 @@ static int run_restart_method (pw_run *r, pw_error *error) {
 
 int pw_run_renew (pw_run *r, pw_references references, pw_error *error) {
   int status = pw_run_open_saddle (r, error);
-  r->geometry.alert = 1;
+  r->geometry.singular_ahead = 1;
   if (status == PW_OK) status = pw_run_evaluate (r, error);
   if (status == PW_OK && references == PW_NEW_REFERENCES)
     pw_run_set_references (r);
@@ -264,7 +264,7 @@ int pw_run_restart (pw_run *r, const double *q, const double *v, pw_error *error
   r->w->t_signal = NAN;
   run_exchange (r, q, v);
   r->near_singular = 0;
-  r->geometry.alert = 1;
+  r->geometry.singular_ahead = 1;
   status = run_select_rows (r, error);
   if (status == PW_OK) status = pw_run_make_consistent (r, NULL, error);
   if (status == PW_OK) status = pw_run_evaluate (r, error);

@@ -97,14 +97,14 @@ static int run_first_evaluation (pw_run *r, pw_error *error) {
   int status = pw_run_open_saddle (r, error);
   if (status != PW_OK) return status;
   double sine = pw_watchdog_sine (r, NULL);
-  int large = (double)r->s->rows * r->s->coords > PW_RANK_MOST;
-  if (sine < (large ? r->limits.dependent : r->limits.suspect)) {
+  int large = (double)r->s->rows * r->s->coords > PW_RANK_MAX_ENTRIES;
+  if (sine < (large ? r->limits.rank_refused : r->limits.rank_suspect)) {
     if (large) return pw_fail_singular (r, r->t, error);
     status = pw_rank_open (r, error);
     if (status == PW_OK && r->redundant) status = pw_run_open_saddle (r, error);
     if (status != PW_OK) return status;
   }
-  r->geometry.alert = 1;
+  r->geometry.singular_ahead = 1;
   status = pw_run_evaluate (r, error);
   if (status == PW_OK) pw_run_set_references (r);
   return status;
@@ -146,7 +146,7 @@ static int run_open (pw_run *r, const char *method, const pw_settings *settings,
   const pw_settings none = { 0 };
   if (settings == NULL) settings = &none;
   r->limits = pw_watchdog_limits;
-  r->refused_sine = r->limits.rank;
+  r->refused_sine = r->limits.rank_lost;
   if (run_allocate (r) != PW_OK) return pw_fail_memory (r->s, error);
   if (run_initial_values (r, settings, error) != PW_OK ||
       pw_parse_options (method, settings->methods, &r->method, &r->stabilisation, r->option, error) != PW_OK)

@@ -165,7 +165,7 @@ static void profile_stages (profile *p, pw_profile *x) {
 static void profile_projection (profile *p, pw_profile *x) {
   double steps = (double)p->of_run.steps, none, some;
   x->projections = 1 / fmax (1, pw_run_option (p->r, "every"));
-  double others = (double)p->of_run.rhs + (p->projector.own_velocity ? x->projections * steps : 0);
+  double others = (double)p->of_run.rhs + (p->projector.owns_velocity ? x->projections * steps : 0);
   x->iterations = fmax (0, (double)p->of_run.factorisations - others) / (x->projections * steps);
   p->from = p->r->q;
   none = profile_time (p, PROFILE_PROJECT);

@@ -27,10 +27,10 @@ int pw_multistep_accelerate (multistep_data *d, double t, const double *y) {
 static void newton_fill_T (multistep_data *d) {
   int n = d->n;
   const pw_tangent_layout to = {
-    .momentum = 0, .constraint = n, .q = 0, .v = n, .a = 2 * n, .lambda = 3 * n, .of_a = 1, .of_lambda = 1
+    .momentum = 0, .constraint = n, .q = 0, .v = n, .a = 2 * n, .lambda = 3 * n, .a_factor = 1, .lambda_factor = 1
   };
-  pw_tangent_momentum (&d->newton.tangent, &to, d->lambda);
-  pw_tangent_accelerations (&d->newton.tangent, &to, d->v, d->a);
+  pw_tangent_add_momentum (&d->newton.tangent, &to, d->lambda);
+  pw_tangent_add_accelerations (&d->newton.tangent, &to, d->v, d->a);
 }
 
 /* Adds all entries of the matrix, from those of T. */
@@ -59,14 +59,14 @@ static int newton_set_up (realtype t, N_Vector y, N_Vector derivative, SUNMatrix
     if (status != 0) return status;
     memcpy (d->v, N_VGetArrayPointer (y) + d->n, (size_t)d->n * sizeof *d->v);
     memset (w->value, 0, (size_t)x->colptr[columns] * sizeof *w->value);
-    pw_scatter_begin (&w->tangent.scatter, w->value);
+    pw_scatter_begin_fill (&w->tangent.scatter, w->value);
     newton_fill_T (d);
     pw_matrix_evaluated (d->sun.run, N_VGetArrayPointer (y), d->v);
     d->sun.run->statistics.jacobians++;
   }
   w->gamma = gamma;
   pw_sun_clear (matrix, w->colptr, w->rowind);
-  pw_scatter_begin (&w->scatter, SUNSparseMatrix_Data (matrix));
+  pw_scatter_begin_fill (&w->scatter, SUNSparseMatrix_Data (matrix));
   newton_fill_matrix (w, d->n);
   d->sun.run->statistics.factorisations++; /* CVODES factorises next */
   return 0;
@@ -110,10 +110,10 @@ static int newton_lay_out (multistep_data *d) {
   pw_bdf_newton *w = &d->newton;
   pw_tangent *x = &w->tangent;
   int columns = 3 * d->n + x->rows, size = d->n + x->rows;
-  pw_scatter_record (&x->scatter);
+  pw_scatter_begin_record (&x->scatter);
   newton_fill_T (d);
   if (pw_scatter_lay_out (&x->scatter, columns, &x->colptr, &x->rowind) != PW_OK) return PW_RESOURCE;
-  pw_scatter_record (&w->scatter);
+  pw_scatter_begin_record (&w->scatter);
   newton_fill_matrix (w, d->n);
   if (pw_scatter_lay_out (&w->scatter, size, &w->colptr, &w->rowind) != PW_OK) return PW_RESOURCE;
   w->value = calloc ((size_t)x->colptr[columns] + 1, sizeof *w->value);

@@ -30,7 +30,7 @@ static int ida_update (ida_data *d, double t, const double *y) {
 
 /* The multipliers of the independent equations, among the unknowns or among their derivatives. */
 static const double *ida_lambda (const ida_data *d, const double *y, const double *yp) {
-  return (d->dae.impulses ? yp : y) + 2 * d->dae.n;
+  return (d->dae.integrates_multipliers ? yp : y) + 2 * d->dae.n;
 }
 
 /* Called by IDA: F (t, y, y'). */
@@ -54,7 +54,7 @@ static int ida_matrix (realtype t, realtype c, N_Vector vy, N_Vector vyp, N_Vect
   (void)residual, (void)tmp1, (void)tmp2, (void)tmp3;
   if (ida_update (d, t, y) != PW_OK) return -1;
   pw_sun_clear (matrix, x->colptr, x->rowind);
-  pw_scatter_begin (&x->scatter, SUNSparseMatrix_Data (matrix));
+  pw_scatter_begin_fill (&x->scatter, SUNSparseMatrix_Data (matrix));
   pw_dae_matrix (&d->dae, v, yp + d->dae.n, ida_lambda (d, y, yp), c, c);
   pw_matrix_evaluated (d->sun.run, y, v);
   return 0;
@@ -98,16 +98,17 @@ static int ida_weigh (N_Vector vy, N_Vector weights, void *data) {
   const pw_run *r = d->sun.run;
   const pw_settings *set = &r->settings;
   const double *y = N_VGetArrayPointer (vy);
-  int relaxed = d->dae.velocities && !d->dae.impulses;
+  int relaxed = d->dae.enforces_velocities && !d->dae.integrates_multipliers;
   double *w = N_VGetArrayPointer (weights), force = ida_force_scale (r);
   double L = r->s->scale.length, T = r->w->scale.time, c = relaxed ? ida_leading_coefficient (d) : 1 / T;
-  double relax = d->dae.impulses ? T : c * T, mu = (set->atol > 0 ? set->atol : set->rtol * L / T) * relax;
+  double relax = d->dae.integrates_multipliers ? T : c * T,
+         mu = (set->atol > 0 ? set->atol : set->rtol * L / T) * relax;
   pw_sun_weigh (&d->sun, y, w);
   for (int i = 0; i < d->dae.rows; i++) {
-    double lambda = d->dae.impulses ? r->lambda[d->dae.tangent.row[i]] : y[2 * d->dae.n + i];
+    double lambda = d->dae.integrates_multipliers ? r->lambda[d->dae.tangent.row[i]] : y[2 * d->dae.n + i];
     w[2 * d->dae.n + i] = 1 / (relax * set->rtol * (fabs (lambda) + force * d->unit[i]));
   }
-  for (int i = 0; i < d->dae.mus; i++) w[2 * d->dae.n + d->dae.rows + i] = 1 / (mu * d->unit[i]);
+  for (int i = 0; i < d->dae.mu_count; i++) w[2 * d->dae.n + d->dae.rows + i] = 1 / (mu * d->unit[i]);
   return 0;
 }
 
@@ -122,7 +123,7 @@ static void ida_fill_vectors (ida_data *d) {
   memset (yp, 0, (size_t)d->dae.size * sizeof *y);
   memcpy (y, r->q, n * sizeof *y);
   memcpy (y + n, r->v, n * sizeof *y);
-  pw_tangent_compress (&d->dae.tangent, r->lambda, d->dae.rows, (d->dae.impulses ? yp : y) + 2 * n);
+  pw_tangent_compress (&d->dae.tangent, r->lambda, d->dae.rows, (d->dae.integrates_multipliers ? yp : y) + 2 * n);
   memcpy (yp, r->v, n * sizeof *y);
   memcpy (yp + n, r->a, n * sizeof *y);
 }
@@ -134,7 +135,7 @@ static void ida_read (const ida_data *d, double *q, double *v, double *a, double
   memcpy (q, y, n * sizeof *q);
   memcpy (v, y + n, n * sizeof *v);
   memcpy (a, yp + n, n * sizeof *a);
-  pw_tangent_store (&d->dae.tangent, ida_lambda (d, y, yp), lambda);
+  pw_tangent_expand (&d->dae.tangent, ida_lambda (d, y, yp), lambda);
 }
 
 /* Interpolates the state at t into the sample arrays and updates kinematics.  Accelerations and multipliers are
@@ -171,7 +172,7 @@ static int ida_work (ida_data *d, int factorised) {
   pw_run *r = d->sun.run;
   int order = 1;
   const double *lambda = r->lambda;
-  if (factorised && d->dae.velocities && pw_ledger_uses_multipliers (r->s)) {
+  if (factorised && d->dae.enforces_velocities && pw_ledger_uses_multipliers (r->s)) {
     pw_run_accelerate_updated (r, r->v, r->a_at, r->lambda_at);
     lambda = r->lambda_at;
   }
@@ -189,7 +190,8 @@ static int ida_open_vectors (ida_data *d, pw_run *r) {
   d->unit = calloc ((size_t)d->dae.rows + 1, sizeof *d->unit);
   if (!d->yp || !d->id || !d->unit) return PW_RESOURCE;
   for (int i = 0; i < d->dae.rows; i++) d->unit[i] = pw_rank_multiplier_unit (d->sun.run->w, d->dae.tangent.row[i]);
-  for (int i = 0; i < d->dae.size; i++) N_VGetArrayPointer (d->id)[i] = i < 2 * d->dae.n || d->dae.impulses;
+  for (int i = 0; i < d->dae.size; i++)
+    N_VGetArrayPointer (d->id)[i] = i < 2 * d->dae.n || d->dae.integrates_multipliers;
   ida_fill_vectors (d);
   return PW_OK;
 }
@@ -282,7 +284,7 @@ static int ida_reach (ida_data *d) {
   pw_bound_tolerances (r);
   status = pw_saddle_factor (r->saddle);
   if (status < 0) return status;
-  if (status == PW_OK && !d->dae.velocities) pw_run_accelerate_updated (r, r->v, r->a_at, r->lambda);
+  if (status == PW_OK && !d->dae.enforces_velocities) pw_run_accelerate_updated (r, r->v, r->a_at, r->lambda);
   r->near_singular = status != PW_OK || pw_watchdog_near (r);
   return r->s->entries > 0 ? ida_work (d, status == PW_OK) : PW_OK;
 }

@@ -38,10 +38,15 @@ static const double VARIATION_AHEAD = 1e-4;
 static int variation_linear (pw_variation *x) {
   pw_linearisation *l = &x->linear;
   size_t n = (size_t)x->n, m = (size_t)x->m;
-  int status = pw_linear_open (l, x->r, 0, PW_VARIATION_DENSE);
+  int status = pw_linear_open (l, x->r, PW_WITHOUT_MODES, PW_VARIATION_DENSE);
   if (status != PW_OK || x->n <= PW_VARIATION_DENSE) return status;
-  const pw_array array[] = { { &l->a, n + 3 },  { &l->lambda, m }, { &l->x, 2 * n },        { &l->y, n + 2 * m },
-                             { &l->da, n + 3 }, { &l->c, m },      { &l->z, n + 3 * m + 3 } };
+  const pw_array array[] = { { &l->a, n + 3 },
+                             { &l->lambda, m },
+                             { &l->dx, 2 * n },
+                             { &l->product, n + 2 * m },
+                             { &l->da, n + 3 },
+                             { &l->row_scratch, m },
+                             { &l->scratch, n + 3 * m + 3 } };
   l->memory = pw_alloc_arrays (array, sizeof array / sizeof *array);
   return l->memory ? pw_linear_derivatives (l) : PW_RESOURCE;
 }

@@ -39,7 +39,7 @@ static void effect_add_term (const effect_difference *to, int i, double value, d
 static void effect_rows (pw_variation *x, const effect_difference *to, pw_element_batch *k) {
   const pw_linearisation *l = &x->linear;
   int rows = k->kind->rows, n = x->n, m = x->m;
-  double *gamma = l->z, *g = gamma + m, *eta = g + m;
+  double *gamma = l->scratch, *g = gamma + m, *eta = g + m;
   memset (gamma, 0, 3 * (size_t)m * sizeof *gamma);
   k->kind->J (&k->b, k->J);
   if (k->kind->gamma) k->kind->gamma (&k->b, gamma);
@@ -219,11 +219,11 @@ double pw_variation_norm (const pw_variation *x, const double *Y) {
 static void effect_accelerations (pw_variation *x, const pw_variation_column *c, double *da) {
   pw_linearisation *l = &x->linear;
   const double *effect = c->direction->effect[pw_variation_column_index (c)];
-  memcpy (l->x, c->trial, 2 * (size_t)x->n * sizeof *l->x);
+  memcpy (l->dx, c->trial, 2 * (size_t)x->n * sizeof *l->dx);
   pw_linear_multiply (l);
-  for (int j = 0; j < x->n; j++) l->da[j] = effect[j] - l->y[j];
-  for (int i = 0; i < x->m; i++) l->z[i] = effect[x->n + i] + l->y[x->n + i];
-  pw_saddle_solve (x->r->saddle, l->da, l->z, l->da, c->lambda);
+  for (int j = 0; j < x->n; j++) l->da[j] = effect[j] - l->product[j];
+  for (int i = 0; i < x->m; i++) l->scratch[i] = effect[x->n + i] + l->product[x->n + i];
+  pw_saddle_solve (x->r->saddle, l->da, l->scratch, l->da, c->lambda);
   memcpy (da, l->da, (size_t)x->n * sizeof *da);
 }
 
@@ -241,14 +241,14 @@ void pw_variation_project (pw_variation *x, pw_variation_column *c) {
   pw_linearisation *l = &x->linear;
   int n = x->n, m = x->m, holonomic = x->r->s->holonomic;
   const double *row = c->direction->effect[pw_variation_column_index (c)] + n + m;
-  pw_mul_J (x->r->w, c->trial, l->z);
-  for (int i = 0; i < m; i++) l->z[i] = i < holonomic ? -l->z[i] - row[i] : 0;
-  pw_saddle_solve (x->r->saddle, NULL, l->z, l->da, l->z);
+  pw_mul_J (x->r->w, c->trial, l->scratch);
+  for (int i = 0; i < m; i++) l->scratch[i] = i < holonomic ? -l->scratch[i] - row[i] : 0;
+  pw_saddle_solve (x->r->saddle, NULL, l->scratch, l->da, l->scratch);
   pw_variation_add (c->trial, l->da, 1, n);
-  memcpy (l->x, c->trial, 2 * (size_t)n * sizeof *l->x);
+  memcpy (l->dx, c->trial, 2 * (size_t)n * sizeof *l->dx);
   pw_linear_multiply (l);
-  pw_mul_J (x->r->w, c->trial + n, l->z);
-  for (int i = 0; i < m; i++) l->z[i] = -l->z[i] - l->y[n + m + i] - row[m + i];
-  pw_saddle_solve (x->r->saddle, NULL, l->z, l->da, l->z);
+  pw_mul_J (x->r->w, c->trial + n, l->scratch);
+  for (int i = 0; i < m; i++) l->scratch[i] = -l->scratch[i] - l->product[n + m + i] - row[m + i];
+  pw_saddle_solve (x->r->saddle, NULL, l->scratch, l->da, l->scratch);
   pw_variation_add (c->trial + n, l->da, 1, n);
 }

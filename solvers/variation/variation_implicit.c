@@ -78,9 +78,9 @@ static void implicit_direction (pw_variation *x, int i, int c) {
   int velocity = c >= l->positions;
   double T = velocity ? x->r->w->scale.time : 1, *N = p->N[i] + 2 * row, *A = p->A[i] + 2 * row, *D = p->D[i] + row;
   pw_linear_tangent (l, c);
-  memcpy (N, l->x, 2 * half);
+  memcpy (N, l->dx, 2 * half);
   for (int j = 0; j < x->n; j++) {
-    double scale = pw_as_length (x->r->s, j) * T;
+    double scale = pw_length_factor (x->r->s, j) * T;
     D[j] = N[velocity ? x->n + j : j] * scale * scale;
   }
   pw_linear_vary (l);

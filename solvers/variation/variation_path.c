@@ -65,7 +65,7 @@ int pw_variation_accelerations (pw_variation *x, double t, const double *q, cons
                                 pw_error *error) {
   pw_run *r = x->r;
   pw_statistics before = r->statistics;
-  int near = r->near_singular, status = pw_run_accelerate (r, pw_before_breakpoint (r, t), q, v, a, x->linear.z);
+  int near = r->near_singular, status = pw_run_accelerate (r, pw_before_breakpoint (r, t), q, v, a, x->linear.scratch);
   r->statistics = before;
   if (status > 0) return pw_fail_singular (r, t, error);
   r->near_singular = near;

@@ -124,7 +124,7 @@ static solution platform_solve (double mass, int last, int feet) {
   for (int j = 0; j < coords; j++) f[(j + first) % coords] = cos (j);
   for (int i = 0; i < s->rows; i++) gamma[i] = sin (3 * i);
   x.status = pw_saddle_factor (k);
-  x.sine = pw_saddle_pivot (k, &x.row);
+  x.sine = pw_saddle_sine (k, &x.row);
   if (x.status == PW_OK) pw_saddle_solve (k, f, gamma, a, x.lambda);
   for (int j = 0; j < coords; j++) x.a[j] = a[(j + first) % coords];
   pw_saddle_close (k);
@@ -190,7 +190,7 @@ static void test_stretched_leg (void **state) {
   assert_int_equal (pw_update_kinematics (w, 0, q, s->v0), PW_OK);
   pw_evaluate_J (w);
   assert_int_equal (pw_saddle_factor (k), PW_OK);
-  assert_true (pw_saddle_pivot (k, &row) > 0.05);
+  assert_true (pw_saddle_sine (k, &row) > 0.05);
   free (q);
   pw_saddle_close (k);
   pw_workspace_free (w);
