@@ -459,7 +459,8 @@ format:
 
 format-check:
 	@bad=0; for f in $(SOURCES); do \
-	  clang-format "$$f" | cmp -s - "$$f" || { echo "not formatted: $$f"; bad=1; }; done; exit $$bad
+	  clang-format "$$f" | cmp -s - "$$f" || { echo "not formatted: $$f"; bad=1; }; \
+	  LC_ALL=C.UTF-8 grep -HnE '^.{121,}' "$$f" && bad=1; done; exit $$bad
 
 # ---- Installing ----
 

@@ -1,11 +1,11 @@
 /* The watchdog checks that the states of a run follow the motion of the mechanism: constraints are not lost, and the
  * motion does not jump to another branch at a singular configuration.
  *
- * Thresholds are dimensionless: positions in units of the scene's length L, angles in radians.  Singular configurations
- * are a property of J alone, with rows of length 1 and columns of angles divided by L: neither masses nor the initial
- * configuration matter.  The distance from them is measured by the smallest sine of the angle between a row of J and the
- * space of those before it, called the sine below.  Branches are the motions between which a closed loop can change in
- * a singular configuration, a change point. */
+ * Thresholds are dimensionless: positions in units of the scene's length L, angles in radians.  Singular
+ * configurations are a property of J alone, with rows of length 1 and columns of angles divided by L: neither masses
+ * nor the initial configuration matter.  The distance from them is measured by the smallest sine of the angle between
+ * a row of J and the space of those before it, called the sine below.  Branches are the motions between which a closed
+ * loop can change in a singular configuration, a change point. */
 #ifndef PW_WATCHDOG_H
 #define PW_WATCHDOG_H
 

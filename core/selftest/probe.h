@@ -70,8 +70,8 @@ void pw_probe_evaluate (pw_probe *probe, pw_batch_function *f, const char *name,
 /* Functions of the type: g, eta, gamma, force; J w; J v - eta. */
 pw_probe_function pw_probe_g, pw_probe_eta, pw_probe_gamma, pw_probe_force, pw_probe_Jw, pw_probe_drift;
 
-/* out += factor x block x vector, element by element, where the block has `rows` rows per element and the vector is over
- * all coordinates; terms, unless NULL, += absolute values of the terms. */
+/* out += factor x block x vector, element by element, where the block has `rows` rows per element and the vector is
+ * over all coordinates; terms, unless NULL, += absolute values of the terms. */
 void pw_probe_multiply (const pw_probe *probe, const double *block, int rows, const double *vector, double factor,
                         double *out, double *terms);
 void pw_probe_multiply_J (pw_probe *probe, const double *vector, double *out); /* out = J vector */

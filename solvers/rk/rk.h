@@ -29,7 +29,8 @@ void pw_rk_serialise (pw_run *r, pw_archive *a);
 extern const pw_stabilisation pw_rk_stabilisations[];
 extern const pw_option pw_rk_options[]; /* the first one, `steps`, is only for tableaus with an error estimate */
 
-/* Defines pw_method_NAME with this tableau; the remaining arguments initialise the members that methods do not share. */
+/* Defines pw_method_NAME with this tableau; the remaining arguments initialise the members that methods do not
+ * share. */
 #define PW_RK_METHOD(NAME, tableau, ...)                \
   static int NAME##_open (pw_run *r, pw_error *error) { \
     return pw_rk_open (r, &tableau, error);             \

@@ -1,12 +1,14 @@
 /* adams, bdf: the multistep methods of CVODES, an integrator of SUNDIALS, on the accelerations.
  *
- *   y = (q, v),   y' = (v, a (t, q, v)),   a from  M a + J^T lambda = f,  J a = gamma, with Baumgarte's terms if selected
+ *   y = (q, v),   y' = (v, a (t, q, v)),   a from  M a + J^T lambda = f,  J a = gamma,
  *
- * adams: Adams-Moulton formulas of orders 1 to 12, for non-stiff scenes.  The fixed-point iteration needs no matrix and
- * converges only if the step resolves every motion.  bdf: backward differentiation formulas of orders 1 to 5, for stiff
- * scenes (Curtiss & Hirschfelder 1952; Gear 1971).  It uses Newton's iteration with an exact matrix (bdf_newton.c);
- * steps and their errors may be projected (Eich 1993).  (Hindmarsh et al. 2005, SUNDIALS: Suite of nonlinear and
- * differential/algebraic equation solvers.) */
+ * with Baumgarte's terms if selected.
+ *
+ * adams: Adams-Moulton formulas of orders 1 to 12, for non-stiff scenes.  The fixed-point iteration needs no matrix
+ * and converges only if the step resolves every motion.  bdf: backward differentiation formulas of orders 1 to 5, for
+ * stiff scenes (Curtiss & Hirschfelder 1952; Gear 1971).  It uses Newton's iteration with an exact matrix
+ * (bdf_newton.c); steps and their errors may be projected (Eich 1993).  (Hindmarsh et al. 2005, SUNDIALS: Suite of
+ * nonlinear and differential/algebraic equation solvers.) */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>

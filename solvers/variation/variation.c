@@ -6,17 +6,17 @@
  *     [ M J^T ; J 0 ] (da, dlambda) = ( (f_q - (J^T lambda)_q) dq + f_v dv, (gamma_q - (J a)_q) dq + gamma_v dv )
  *                                     + d/dp ( f - M a - J^T lambda, gamma - J a ),
  *
- * the first part by the exact blocks of the element types (linear_variation.c), the second by differences of the systems
- * of neighbouring runs, at the state of this one (variation_effect.c).  Initial values of dq and dv are differences of
- * the neighbours' consistent initial states.  Differences with two steps of p give both the extrapolated ones (Richardson)
- * and their error.  The error of the result obeys the same equations, with the error of the differences in place of the
- * effects of p, and after each step with the error of the step added.
+ * the first part by the exact blocks of the element types (linear_variation.c), the second by differences of the
+ * systems of neighbouring runs, at the state of this one (variation_effect.c).  Initial values of dq and dv are
+ * differences of the neighbours' consistent initial states.  Differences with two steps of p give both the
+ * extrapolated ones (Richardson) and their error.  The error of the result obeys the same equations, with the error of
+ * the differences in place of the effects of p, and after each step with the error of the step added.
  *
- * Steps are explicit (variation_explicit.c), or implicit if the motion is stiff (variation_implicit.c), for runs by all
- * methods: along the states that the run has reached, with steps of their own, which end at samples and breakpoints.  Steps
- * of a run with a fixed step are usually much smaller; a linearisation costs about 6 evaluations of the accelerations.  The
- * result is therefore the derivative of the motion that the run follows, to 1e-10 or the accuracy of its states, not that of
- * its discretisation error.
+ * Steps are explicit (variation_explicit.c), or implicit if the motion is stiff (variation_implicit.c), for runs by
+ * all methods: along the states that the run has reached, with steps of their own, which end at samples and
+ * breakpoints.  Steps of a run with a fixed step are usually much smaller; a linearisation costs about 6 evaluations
+ * of the accelerations.  The result is therefore the derivative of the motion that the run follows, to 1e-10 or the
+ * accuracy of its states, not that of its discretisation error.
  *
  * After each step dq and dv are projected onto the tangent of the constraints,
  *
@@ -30,7 +30,8 @@
 #include "util.h"
 #include "variation_parts.h"
 
-/* Several times the movement of neighbours, in units of the scene: their accelerations may jump so much before the run's. */
+/* Several times the movement of neighbours, in units of the scene: their accelerations may jump so much before the
+ * run's. */
 static const double VARIATION_AHEAD = 1e-4;
 
 /* ---- Opening ---- */
@@ -186,8 +187,8 @@ static int variation_check_blocks (const pw_variation *x, pw_error *error) {
       x->r->s->model, block);
 }
 
-/* Appends the last step of the run, from time t0, to its states.  A step across a jump is not refined: samples in it, each an
- * own step of a Runge-Kutta method, are not continuous in time and might seem to cross it several times. */
+/* Appends the last step of the run, from time t0, to its states.  A step across a jump is not refined: samples in it,
+ * each an own step of a Runge-Kutta method, are not continuous in time and might seem to cross it several times. */
 static int variation_record (pw_variation *x, double t0, pw_error *error) {
   int last = x->points - 1, points;
   x->begun = t0;

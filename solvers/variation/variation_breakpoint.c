@@ -1,11 +1,10 @@
-/* Breakpoints that move with a parameter.  At a breakpoint t_b the accelerations jump from a- to a+ and the states do not;
- * the derivatives of the states at constant time therefore jump by
+/* Breakpoints that move with a parameter.  At a breakpoint t_b the accelerations jump from a- to a+ and the states do
+ * not; the derivatives of the states at constant time therefore jump by
  *
  *     dv+ = dv- + (a- - a+) dt_b/dp,
  *
- * and those of work and losses by (P- - P+) dt_b/dp, with their powers P
- * (Rozenvasser 1967; Hairer, Norsett & Wanner 1993, section I.14, for smooth problems).  dt_b/dp comes from the breakpoints
- * of the neighbouring runs. */
+ * and those of work and losses by (P- - P+) dt_b/dp, with their powers P (Rozenvasser 1967; Hairer, Norsett & Wanner
+ * 1993, section I.14, for smooth problems).  dt_b/dp comes from the breakpoints of the neighbouring runs. */
 #include <float.h>
 #include <math.h>
 #include <string.h>

@@ -24,8 +24,8 @@ double pw_direction_offset (const pw_direction *d, int i) {
 
 /* ---- Effects of parameters ---- */
 
-/* A difference of f - M a - J^T lambda (n) and of gamma - J a, g, J v - eta (m each) in progress: a neighbour adds `weight` times
- * these to `sum` and, unless it is NULL, the magnitudes of their terms to `terms`. */
+/* A difference of f - M a - J^T lambda (n) and of gamma - J a, g, J v - eta (m each) in progress: a neighbour adds
+ * `weight` times these to `sum` and, unless it is NULL, the magnitudes of their terms to `terms`. */
 typedef struct {
   double *sum, weight, *terms;
 } effect_difference;
@@ -120,20 +120,22 @@ static int effect_neighbour (pw_variation *x, pw_direction_copy *d, int i) {
   return PW_OK;
 }
 
-/* The factor that makes entry i of an effect dimensionless: of forces, in units of the accelerations that they cause; of
- * residuals, in units of the scene. */
+/* The factor that makes entry i of an effect dimensionless: of forces, in units of the accelerations that they cause;
+ * of residuals, in units of the scene. */
 static double effect_unit (const pw_variation *x, int i) {
   double T = x->r->w->scale.time;
   if (i < x->n) return x->r->s->mass[i] > 0 ? T * T / x->r->s->mass[i] / pw_unit (x->r->s, i) : 0;
   return (i < x->n + x->m ? T * T : i < x->n + 2 * x->m ? 1 : T) / x->r->s->scale.length;
 }
 
-/* Effects below one unit of the scene per unit of p, or per p (about 1e5 steps) if that is smaller, count as that large. */
+/* Effects below one unit of the scene per unit of p, or per p (about 1e5 steps) if that is smaller, count as that
+ * large. */
 double pw_variation_least_effect (const pw_direction_copy *d) {
   return fmin (1, 1e-5 / fabs (d->given.step));
 }
 
-/* The two differences become the extrapolated one and its error, as in pw_direction_weight, to which round-off is added. */
+/* The two differences become the extrapolated one and its error, as in pw_direction_weight, to which round-off is
+ * added. */
 static void effect_extrapolate (const pw_variation *x, pw_direction_copy *d) {
   double *one = d->effect[0], *two = d->effect[1], all = 0;
   double round = 4 * DBL_EPSILON * fabs (effect_weight (&d->given, 0, 1));
@@ -149,8 +151,8 @@ static void effect_extrapolate (const pw_variation *x, pw_direction_copy *d) {
   d->effects.all += fmax (all, pw_variation_least_effect (d));
 }
 
-/* Relative errors of differences up to which a step is kept, and the part of them aimed at with a better one: errors by round-off,
- * and by the remainder of each difference, whose square is about that of the extrapolated one. */
+/* Relative errors of differences up to which a step is kept, and the part of them aimed at with a better one: errors
+ * by round-off, and by the remainder of each difference, whose square is about that of the extrapolated one. */
 static const double EFFECT_ROUND = 1e-7, EFFECT_REMAINDER = 1e-4, EFFECT_AIM = 0.1;
 
 /* With a smaller step an effect may be 0 only because the step is lost in the rounding of numbers of the order of 1. */

@@ -1,19 +1,19 @@
-/* Implicit steps of the derivatives, for stiff motions, by the Radau IIA method of order 5 with the coefficients a_ij, c_i
- * (Hairer & Wanner 1996, Solving Ordinary Differential Equations II, section IV.8).
+/* Implicit steps of the derivatives, for stiff motions, by the Radau IIA method of order 5 with the coefficients a_ij,
+ * c_i (Hairer & Wanner 1996, Solving Ordinary Differential Equations II, section IV.8).
  *
- * Stages are projected onto the linearised constraints (projected collocation, Ascher & Petzold 1991).  At the state of
- * the run at t_i = t + c_i h let p_i be the solution of these nearest to 0, N_i the tangent vectors of the minimal
+ * Stages are projected onto the linearised constraints (projected collocation, Ascher & Petzold 1991).  At the state
+ * of the run at t_i = t + c_i h let p_i be the solution of these nearest to 0, N_i the tangent vectors of the minimal
  * coordinates (linear_variation.c), and N_i^+ a left inverse of N_i.  With Y at t, the stages satisfy
  *
  *     Y_i = p_i + N_i z_i,   N_i^+ (Y_i - Y - h sum_j a_ij F_j) = 0,   F_j = F_j (p_j) + A_j z_j,
  *
- * where F_j is the time derivative of Y_j, an affine function of z_j with the matrix A_j: linear equations for the z_i of
- * all columns.  The last stage is Y at the end of the step.  The error estimate, of order h^4,
+ * where F_j is the time derivative of Y_j, an affine function of z_j with the matrix A_j: linear equations for the z_i
+ * of all columns.  The last stage is Y at the end of the step.  The error estimate, of order h^4,
  *
  *     err = N_3 (gamma/h - N_3^+ A_3)^-1 N_3^+ (F + sum_i e_i (Y_i - Y)/h),
  *
- * has gamma, the real eigenvalue of the inverse of (a_ij), and e_i from there.  With r = |err|/|Y|, (10 r)^(3/2) is about the
- * error of the method, of order h^6 (step_scale_error), as in RADAU5. */
+ * has gamma, the real eigenvalue of the inverse of (a_ij), and e_i from there.  With r = |err|/|Y|, (10 r)^(3/2) is
+ * about the error of the method, of order h^6 (step_scale_error), as in RADAU5. */
 #include <lapacke.h>
 #include <math.h>
 #include <stdlib.h>

@@ -1,4 +1,5 @@
-/* Derivatives of energies, powers and multipliers along a column: exact, or by differences along the derivative of the state. */
+/* Derivatives of energies, powers and multipliers along a column: exact, or by differences along the derivative of the
+ * state. */
 #include <float.h>
 #include <math.h>
 #include <string.h>
@@ -22,8 +23,8 @@ static double output_kinetic (const pw_variation *x, const pw_variation_column *
   return sum;
 }
 
-/* The sum over the elements of their potential energies minus those at the state evaluated, which are close: the energies of elements on
- * which a derivative does not depend must not contribute round-off. */
+/* The sum over the elements of their potential energies minus those at the state evaluated, which are close: the
+ * energies of elements on which a derivative does not depend must not contribute round-off. */
 static double output_potential (pw_variation *x, pw_workspace *w) {
   double sum = 0;
   pw_evaluate_energies (w, x->element_energy + x->elements);

@@ -53,8 +53,9 @@ typedef struct {
   int jumps;    /* 1: accelerations jump between this state and the next one, at the same time but for round-off */
 } pw_variation_point;
 
-/* Times on one side of a jump at which neighbours of the state of the run may be on the other side.  They are evaluated near
- * the state of another time instead; the interval is so short that this changes their effect by round-off. */
+/* Times on one side of a jump at which neighbours of the state of the run may be on the other side.  They are
+ * evaluated near the state of another time instead; the interval is so short that this changes their effect by
+ * round-off. */
 typedef struct {
   double from, to;
   double t, *state; /* q, v */
@@ -74,7 +75,8 @@ struct pw_variation {
   struct pw_variation_implicit *implicit; /* implicit steps; NULL: explicit ones */
   double *q, *v;                          /* n + 3: the state last evaluated */
   double *a[PW_VARIATION_RATES];          /* n: accelerations of the run at the stages */
-  /* n: errors of the run's velocities in the last step: the estimate of the method, and the difference from the run's own */
+  /* n: errors of the run's velocities in the last step: the estimate of the method, and the difference from the run's
+   * own */
   double *motion_error, *motion_defect;
   double speed;             /* largest velocity of the run so far, in units of the scene */
   double reversal;          /* change of a velocity over which a force reverses, at most 1, in units of the scene */
@@ -111,8 +113,8 @@ static inline void pw_variation_add (double *restrict to, const double *restrict
 
 /* Appends the state of the run at time t, in its last step.  A status. */
 int pw_variation_append (pw_variation *x, double t, pw_error *error);
-/* Inserts states between point i and the last one, in the last step of a run that adapts its steps, until interpolation is as
- * good as a tenth of its tolerance.  A status. */
+/* Inserts states between point i and the last one, in the last step of a run that adapts its steps, until
+ * interpolation is as good as a tenth of its tolerance.  A status. */
 int pw_variation_refine (pw_variation *x, int i, pw_error *error);
 /* A new last point, without a state. */
 int pw_variation_add_point (pw_variation *x, pw_error *error);
@@ -136,8 +138,8 @@ double pw_variation_norm (const pw_variation *x, const double *Y);
 void pw_variation_accelerate (pw_variation *x, int c, int k);
 /* Projects a column's `trial` onto the linearised constraints at the state evaluated. */
 void pw_variation_project (pw_variation *x, pw_variation_column *c);
-/* Where to evaluate neighbours: at the state evaluated, at a time between their breakpoints, one of which they may pass slightly
- * before the run; near a jump, at the state held. */
+/* Where to evaluate neighbours: at the state evaluated, at a time between their breakpoints, one of which they may
+ * pass slightly before the run; near a jump, at the state held. */
 pw_variation_place pw_variation_place_of (const pw_variation *x, const pw_direction_copy *d);
 
 /* The least effect of a unit of p that counts, in units of the scene. */
@@ -147,8 +149,8 @@ double pw_variation_least_effect (const pw_direction_copy *d);
 
 /* The step of differences along a column: the state changes by at most 1e-5 in units of the scene. */
 double pw_variation_step_along (const pw_variation_column *c);
-/* Derivatives of kinetic and potential energy, the ledger's rates, least-norm multipliers along a column: 2 + entries + m
- * numbers.  Non-zero if a signal fails. */
+/* Derivatives of kinetic and potential energy, the ledger's rates, least-norm multipliers along a column: 2 + entries
+ * + m numbers.  Non-zero if a signal fails. */
 int pw_variation_outputs (pw_variation *x, const pw_variation_column *c, const double *Y, double *out);
 /* Time derivatives of the columns' ledgers into K[k].  Non-zero if a signal fails. */
 int pw_variation_ledger_rates (pw_variation *x, int k);
@@ -164,8 +166,8 @@ int pw_variation_step (pw_variation *x, double t1, pw_error *error);
 
 /* ---- variation_explicit.c ---- */
 
-/* The columns after a step from x->t to t1 = x->t + h into `trial`, with the state there evaluated; `motion_error`; adds the
- * integral of accelerations to `motion_defect`. */
+/* The columns after a step from x->t to t1 = x->t + h into `trial`, with the state there evaluated; `motion_error`;
+ * adds the integral of accelerations to `motion_defect`. */
 int pw_variation_explicit_stages (pw_variation *x, double h, double t1, pw_error *error);
 /* Entries from `first` to `end` - 1 of `local_error`, when the last time derivatives are known. */
 void pw_variation_explicit_errors (pw_variation *x, double h, int first, int end);
@@ -192,8 +194,8 @@ static inline int pw_variation_column_index (const pw_variation_column *c) {
 int pw_variation_look_ahead (pw_variation *x, pw_direction_copy *d, double next, pw_error *error);
 /* Passes the breakpoint at which run and derivatives have arrived. */
 int pw_variation_pass_breakpoint (pw_variation *x, pw_error *error);
-/* To the state q, v at time t, at which accelerations jump from those at the state evaluated: `trial` becomes every column
- * after the jump, whose time has the derivative `slope`. */
+/* To the state q, v at time t, at which accelerations jump from those at the state evaluated: `trial` becomes every
+ * column after the jump, whose time has the derivative `slope`. */
 int pw_variation_jump (pw_variation *x, double t, const double *state, pw_error *error);
 
 /* ---- variation_jump.c ---- */

@@ -3,8 +3,9 @@
 #include <string.h>
 #include "variation_parts.h"
 
-/* Permitted error of a step, relative to the largest derivative.  The loose one applies where the other would need more than
- * one linearisation per step of a run with fixed steps: the motion is so fast that these are large for it, too. */
+/* Permitted error of a step, relative to the largest derivative.  The loose one applies where the other would need
+ * more than one linearisation per step of a run with fixed steps: the motion is so fast that these are large for it,
+ * too. */
 static const double STEP_TOLERANCE = 1e-9, STEP_LOOSE = 1e-7;
 enum { STEP_RATIO = 5 }; /* linearisations in a step of the derivatives */
 
@@ -15,9 +16,9 @@ static const double STEP_MOTION = 1e-8;
  * velocities. */
 static const double STEP_ROUND = 1e-14;
 
-/* Derivatives by p below this part of the scene's unit per p are computed to the same absolute error; p is estimated from the
- * step of its differences, usually STEP_OF_PARAMETER times p.  Derivatives of work and losses: below this part of the energy exchanged
- * per unit of the scene. */
+/* Derivatives by p below this part of the scene's unit per p are computed to the same absolute error; p is estimated
+ * from the step of its differences, usually STEP_OF_PARAMETER times p.  Derivatives of work and losses: below this
+ * part of the energy exchanged per unit of the scene. */
 static const double STEP_LEAST_DERIVATIVE = 0.1, STEP_OF_PARAMETER = 1e-5, STEP_LEAST_ENERGY = 1e-3;
 
 /* The smallest step, in units of the scene. */
@@ -26,8 +27,8 @@ static const double STEP_SMALLEST = 1e-12;
 /* Sine between constraint equations below which the round-off of accelerations prevents steps. */
 static const double STEP_SINGULAR = 0.01;
 
-/* The motion is stiff if that many steps were longer than this part of the time in which its fastest component decays.  A
- * tolerance of 1e-9 alone permits about 0.2; stability limits it to 3.3 (Hairer & Wanner 1996, section IV.2). */
+/* The motion is stiff if that many steps were longer than this part of the time in which its fastest component decays.
+ * A tolerance of 1e-9 alone permits about 0.2; stability limits it to 3.3 (Hairer & Wanner 1996, section IV.2). */
 enum { STEP_STIFF = 100 };
 static const double STEP_FAST = 1;
 
@@ -45,8 +46,8 @@ static double step_largest_velocity (const pw_variation *x, const double *v) {
   return most;
 }
 
-/* The error of the method for the velocities of the run, relative to the largest: derivatives alone may not see that a step
- * passes over a short phase of the motion, such as the reversal of friction. */
+/* The error of the method for the velocities of the run, relative to the largest: derivatives alone may not see that a
+ * step passes over a short phase of the motion, such as the reversal of friction. */
 static double step_motion_error (const pw_variation *x) {
   return step_largest_velocity (x, x->motion_error) / fmax (1, x->speed);
 }
@@ -60,18 +61,19 @@ static double step_noise (const pw_variation *x) {
   return STEP_ROUND * most * x->r->w->scale.time / fmin (x->r->settings.step, x->r->w->scale.time);
 }
 
-/* The permitted one: STEP_MOTION, or the run's own if that is small compared with the change over which forces reverse. */
+/* The permitted one: STEP_MOTION, or the run's own if that is small compared with the change over which forces
+ * reverse. */
 static double step_motion_tolerance (const pw_variation *x) {
   return fmax (STEP_MOTION, step_noise (x) * x->reversal / fmax (1, x->speed));
 }
 
-/* Changes of velocities below this part of the largest, or this multiple of the run's tolerance, count as that large: the error
- * of a body in free flight, which does not accelerate, is no large part of its motion. */
+/* Changes of velocities below this part of the largest, or this multiple of the run's tolerance, count as that large:
+ * the error of a body in free flight, which does not accelerate, is no large part of its motion. */
 static const double STEP_CHANGE = 1e-6, STEP_CHANGE_RTOL = 1000;
 
-/* The difference between a step of the run's velocities and the integral of its accelerations, relative to the latter: large
- * where the run does not resolve the motion.  Errors of the method, and of the velocities if they are small compared with
- * the change over which forces reverse, do not count. */
+/* The difference between a step of the run's velocities and the integral of its accelerations, relative to the latter:
+ * large where the run does not resolve the motion.  Errors of the method, and of the velocities if they are small
+ * compared with the change over which forces reverse, do not count. */
 static double step_defect (const pw_variation *x, double h) {
   int stages = x->implicit ? 1 + PW_VARIATION_STAGES : PW_VARIATION_RATES - 1;
   double most =
@@ -188,9 +190,9 @@ static double step_tolerance (const pw_run *r) {
   return pw_fixed_steps (r) ? STEP_TOLERANCE : fmax (STEP_TOLERANCE, 0.1 * r->settings.rtol);
 }
 
-/* The factor of the next step for a tolerance.  It depends on the error of the last accepted step, too (at least 1e-4 of the
- * tolerance: the first step has none), which damps oscillations of the step at the limit of stability (Hairer & Wanner 1996,
- * section IV.2: exponents 1 / order - 0.75 b and b, b = 0.04). */
+/* The factor of the next step for a tolerance.  It depends on the error of the last accepted step, too (at least 1e-4
+ * of the tolerance: the first step has none), which damps oscillations of the step at the limit of stability (Hairer &
+ * Wanner 1996, section IV.2: exponents 1 / order - 0.75 b and b, b = 0.04). */
 static double step_factor (const pw_variation *x, double off, double tolerance) {
   double factor = 0.9 * pow (off / tolerance, -0.17) * pow (fmax (x->last_error, 1e-4 * tolerance) / tolerance, 0.04);
   return fmin (5, fmax (0.2, factor));

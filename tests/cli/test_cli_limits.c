@@ -1,4 +1,5 @@
-/* Limits on the command line: --max-steps, --limit, signals that come while rows are written, progress without a terminal. */
+/* Limits on the command line: --max-steps, --limit, signals that come while rows are written, progress without a
+ * terminal. */
 #define _XOPEN_SOURCE 700
 #include <fcntl.h>
 #include <stdio.h>

@@ -1,5 +1,5 @@
-/* Files that a command writes: each by one process and for one use, complete or under a temporary name, wherever their names
- * lead; and files of the wrong type that it is asked to read. */
+/* Files that a command writes: each by one process and for one use, complete or under a temporary name, wherever their
+ * names lead; and files of the wrong type that it is asked to read. */
 #define _GNU_SOURCE
 #include <errno.h>
 #include <fcntl.h>
@@ -274,8 +274,8 @@ static void test_types (void **state) {
   }
 }
 
-/* Five megabytes that open brackets, in less memory than the 340 bytes that libfyaml keeps for each; as many entries of a
- * list that may be a key; a line without an end.  An address sanitizer needs more by itself. */
+/* Five megabytes that open brackets, in less memory than the 340 bytes that libfyaml keeps for each; as many entries
+ * of a list that may be a key; a line without an end.  An address sanitizer needs more by itself. */
 static void test_bounded (void **state) {
   (void)state;
 #ifdef __SANITIZE_ADDRESS__
@@ -320,8 +320,8 @@ static double *output_find (const pw_checkpoint *c, double value) {
   return NULL;
 }
 
-/* A checkpoint with a good check sum whose state no run has written: of its numbers one, counted from the time or, if it is
- * negative, from the two before the run's own, the number of rows and the processor time. */
+/* A checkpoint with a good check sum whose state no run has written: of its numbers one, counted from the time or, if
+ * it is negative, from the two before the run's own, the number of rows and the processor time. */
 static void output_forge (int number, double value) {
   pw_checkpoint c;
   pw_error error = { 0 };

@@ -299,7 +299,8 @@ static void test_sweep_engine (void **state) {
 
 /* ---- Results ---- */
 
-/* Compares the states of two tables, the columns before forces; *most is the largest difference relative to 1 + |value|. */
+/* Compares the states of two tables, the columns before forces; *most is the largest difference relative to 1 +
+ * |value|. */
 static int specialise_compare (const char *a, const char *b, double *most) {
   char x[200000], *line = x, *rest, *other;
   const char *text = cli_file (a);
@@ -335,8 +336,8 @@ static void specialise_agree (const char *model, const char *method, double boun
   assert_true (most <= bound);
 }
 
-/* Every model of the gallery, a short time, in which round-off does not grow to the bound.  Steps of adaptive methods amplify
- * it up to the errors they allow, those of multistep methods to about 1000 tolerances. */
+/* Every model of the gallery, a short time, in which round-off does not grow to the bound.  Steps of adaptive methods
+ * amplify it up to the errors they allow, those of multistep methods to about 1000 tolerances. */
 static void test_gallery (void **state) {
   static const struct {
     const char *name;
@@ -362,7 +363,8 @@ static void test_gallery (void **state) {
 
 /* ---- The text ---- */
 
-/* Names in the text end no comment and are no code; those of bodies and elements have no such characters to begin with. */
+/* Names in the text end no comment and are no code; those of bodies and elements have no such characters to begin
+ * with. */
 static void test_names (void **state) {
   static const char *const name[] = { "*/ int x; /*", "\\n#include <y>",    "x\\",
                                       "?\?/",         "gr\xC3\xBC\xC3\x9F", "a\" \"%s%n" };

@@ -206,8 +206,8 @@ static void test_no_change_point (void **state) {
 enum { WATCHDOG_BARS = 9 };
 static const double watchdog_bar = 2.5;
 
-/* A parallelogram with cranks of 1 m at this angle; crossed: on the other branch, its pin C is reflected at the line from
- * pin B to pin D. */
+/* A parallelogram with cranks of 1 m at this angle; crossed: on the other branch, its pin C is reflected at the line
+ * from pin B to pin D. */
 static void watchdog_bars_at (double phi, int crossed, double *q) {
   const double b = watchdog_bar, x = cos (phi), y = sin (phi);
   const double part = crossed ? 2 * b * (b - x) / ((b - x) * (b - x) + y * y) : 0;

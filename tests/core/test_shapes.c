@@ -190,8 +190,8 @@ static void test_rest (void **state) {
 
 /* ---- What may use which ---- */
 
-/* A car that is steered along a ramp and a table, keeps a speed along a table, tows a trailer by a motor whose target is
- * a train of pulses, and carries a wheel turned by smooth steps. */
+/* A car that is steered along a ramp and a table, keeps a speed along a table, tows a trailer by a motor whose target
+ * is a train of pulses, and carries a wheel turned by smooth steps. */
 static void shapes_car (pw_model *m, const void *parameters) {
   static const double t[] = { 0.15, 0.8, 1.3 }, y[] = { 1, 1.6, 1.2 };
   (void)parameters;

@@ -34,8 +34,8 @@ static const pw_plugin_table condense_arm_table = { .abi = PW_ABI,
                                                     .size = sizeof (pw_plugin_table),
                                                     .build = condense_arm };
 
-/* The equation that remains after the elimination of the arm contains the position of the disc only, not its angle.  It has
- * no multiplier, also after the arm has turned so far that another equation remains. */
+/* The equation that remains after the elimination of the arm contains the position of the disc only, not its angle.
+ * It has no multiplier, also after the arm has turned so far that another equation remains. */
 static void test_prescribed_centre (void **state) {
   (void)state;
   pw_system *s = scene_system (&condense_arm_table, NULL);
@@ -76,8 +76,8 @@ static const pw_parameter platform_list[] = {
   { .name = NULL },
 };
 
-/* A platform with legs.  In the coordinates of a leg that stands on the ground its two pins are dependent; the second one is
- * therefore eliminated after the platform. */
+/* A platform with legs.  In the coordinates of a leg that stands on the ground its two pins are dependent; the second
+ * one is therefore eliminated after the platform. */
 static void platform_build (pw_model *m, const void *parameters) {
   const platform *p = parameters;
   char leg[20], pin[20];

@@ -319,7 +319,8 @@ static void run_finish_figures (pw_run_cli *command, const char *reason, pw_erro
   run_add_error (error, &draw_error);
 }
 
-/* Everything after the last step, however that came about: table, summary, figures, messages.  Returns an exit status. */
+/* Everything after the last step, however that came about: table, summary, figures, messages.  Returns an exit
+ * status. */
 static int run_finish (pw_run_cli *command, pw_error *error) {
   const pw_system *system = command->compiled.system;
   pw_run *run = command->run;
