@@ -92,9 +92,9 @@ static void sensitivity_print (const pw_sensitivity *sens) {
  * 1e-6 in SI units of one that is near 0. */
 static int sensitivity_is_uncertain (const pw_sensitivity *sens, int output, int unknown) {
   const sensitivity_result result = sensitivity_of (sens, output, unknown);
-  double value = pw_outcome_value (&sens->outcomes, output, NULL),
-         size = fabs (sens->direction[unknown].step) / PW_UNKNOWN_STEP;
-  return result.error > 0.01 * fabs (result.derivative) && result.error * size > fmax (0.01 * fabs (value), 1e-6);
+  double change = result.error * sens->unknowns.list[unknown].size;
+  return result.error > 0.01 * fabs (result.derivative) &&
+         change > fmax (0.01 * fabs (pw_outcome_value (&sens->outcomes, output, NULL)), 1e-6);
 }
 
 static void sensitivity_warn (const pw_sensitivity *sens) {
@@ -284,10 +284,12 @@ static int sensitivity_open (sensitivity *cmd, pw_error *error) {
 static int sensitivity_improve_steps (pw_sensitivity *sens) {
   int better = 0;
   for (int p = 0; p < sens->unknowns.count && !sens->stopped; p++) {
-    double step = pw_variation_better_step (sens->variation, p);
-    sens->unknowns.list[p].last_step = fabs (sens->direction[p].step);
-    if (sens->unknowns.list[p].parameter == NULL || step == sens->direction[p].step) continue;
-    sens->unknowns.list[p].step = fabs (step);
+    pw_unknown *u = &sens->unknowns.list[p];
+    double used = sens->direction[p].step, step = pw_variation_better_step (sens->variation, p);
+    u->last_step = fabs (used);
+    if (u->size == 0) u->size = u->last_step / PW_UNKNOWN_STEP;
+    if (u->parameter == NULL || step == used) continue;
+    u->step = fabs (step);
     better = 1;
   }
   return better;

@@ -13,6 +13,7 @@ typedef struct {
   char unit[16];
   double step;      /* of differences; 0: PW_UNKNOWN_STEP times the size of the unknown */
   double last_step; /* of the differences computed last */
+  double size;      /* of the number, as the first step has it; 0: not computed yet */
   /* for searches: */
   double low, high; /* bounds; infinite without one */
   double scale;     /* size of typical changes: the distance of the bounds, else |value|, else 1 */
