@@ -1,5 +1,5 @@
-/* Analyses the car with a trailer of analysis.md: critical speed, growth in reverse, what parameters change.  Compile it as
- * embed.c, and run it with the model:  ./analyse ./car-trailer.yaml */
+/* Analyses the car with a trailer of analysis.md: critical speed, growth in reverse, what parameters change.
+ * Compile it as embed.c, and run it with the model:  ./analyse ./car-trailer.yaml */
 #include <stdio.h>
 #include "pinwheel-analysis.h"
 #include "pinwheel-files.h"

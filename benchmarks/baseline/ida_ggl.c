@@ -1,8 +1,8 @@
-/* The EzyRoller by IDA as one would write it for this vehicle alone: stabilised index 2, KLU, analytic Jacobian.
+/* The EzyRoller by IDA, programmed for this vehicle alone: stabilised index 2, KLU, analytic Jacobian.
  *
  *   q' = v - G^T mu,   M v' + J^T lambda = f,   J v = 0,   g = 0          y = (q, v, lambda, mu), 18 unknowns
  *
- * (Gear, Gupta & Leimkuhler 1985.)  lambda and mu are kept out of the error test. */
+ * (Gear, Gupta & Leimkuhler 1985.)  lambda and mu are excluded from the error test. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -53,7 +53,7 @@ static int ggl_residual (double t, N_Vector vy, N_Vector vyp, N_Vector vr, void 
   return 0;
 }
 
-/* The pattern, column by column; IDA clears it before each Jacobian. */
+/* The sparsity pattern, column by column: row indices, starts of columns.  IDA clears it before each Jacobian. */
 static const sunindextype ggl_rows[] = {
   0, 16,                             /* x1 */
   1, 17,                             /* y1 */
@@ -74,8 +74,8 @@ static const sunindextype ggl_rows[] = {
   0, 2,  3,  5,                      /* mu x */
   1, 2,  4,  5,                      /* mu y */
 };
-static const sunindextype ggl_columns[GGL_SIZE + 1] = { 0,  2,  4,  13, 15, 17, 26, 30, 34, 39,
-                                                        43, 47, 52, 56, 60, 63, 66, 70, 74 };
+static const sunindextype ggl_starts[GGL_SIZE + 1] = { 0,  2,  4,  13, 15, 17, 26, 30, 34, 39,
+                                                       43, 47, 52, 56, 60, 63, 66, 70, 74 };
 
 static int ggl_jacobian (double t, double c, N_Vector vy, N_Vector vyp, N_Vector vr, SUNMatrix matrix, void *user,
                          N_Vector t1, N_Vector t2, N_Vector t3) {
@@ -159,8 +159,9 @@ static int ggl_jacobian (double t, double c, N_Vector vy, N_Vector vyp, N_Vector
     -1,
     d2,
   };
-  _Static_assert(sizeof value / sizeof *value == sizeof ggl_rows / sizeof *ggl_rows, "a value for each place");
-  memcpy (SUNSparseMatrix_IndexPointers (matrix), ggl_columns, sizeof ggl_columns);
+  _Static_assert(sizeof value / sizeof *value == sizeof ggl_rows / sizeof *ggl_rows,
+                 "one value per entry of the pattern");
+  memcpy (SUNSparseMatrix_IndexPointers (matrix), ggl_starts, sizeof ggl_starts);
   memcpy (SUNSparseMatrix_IndexValues (matrix), ggl_rows, sizeof ggl_rows);
   memcpy (SUNSparseMatrix_Data (matrix), value, sizeof value);
   (void)t, (void)vyp, (void)vr, (void)t1, (void)t2, (void)t3;
@@ -198,7 +199,7 @@ static int ggl_open (ezy_ida *d, double rtol) {
   flag |= IDASetMaxNumSteps (d->ida, -1);
   flag |= IDASetStopTime (d->ida, d->t_end);
   d->matrix = SUNSparseMatrix (GGL_SIZE, GGL_SIZE, sizeof ggl_rows / sizeof *ggl_rows, CSC_MAT, d->context);
-  memcpy (SUNSparseMatrix_IndexPointers (d->matrix), ggl_columns, sizeof ggl_columns);
+  memcpy (SUNSparseMatrix_IndexPointers (d->matrix), ggl_starts, sizeof ggl_starts);
   memcpy (SUNSparseMatrix_IndexValues (d->matrix), ggl_rows, sizeof ggl_rows);
   d->solver = SUNLinSol_KLU (d->y, d->matrix, d->context);
   flag |= IDASetLinearSolver (d->ida, d->solver, d->matrix);
@@ -231,7 +232,7 @@ int ezy_ida_step (ezy_ida *d) {
   return flag < 0 ? flag : flag == IDA_TSTOP_RETURN;
 }
 
-void ezy_ida_look (const ezy_ida *d, long *steps, long *residuals, double q[6]) {
+void ezy_ida_result (const ezy_ida *d, long *steps, long *residuals, double q[6]) {
   IDAGetNumSteps (d->ida, steps);
   IDAGetNumResEvals (d->ida, residuals);
   memcpy (q, N_VGetArrayPointer (d->y), 6 * sizeof *q);

@@ -1,4 +1,4 @@
-/* The pendulum chain against its hand-written program, and how the cost of large scenes grows. */
+/* Comparisons of the pendulum chain with the program by hand, and the cost of large scenes against their size. */
 #include <stdlib.h>
 #include <string.h>
 #include "engine.h"
@@ -35,7 +35,7 @@ void engine_open_chain (engine_case *c) {
   for (size_t i = 0; i < sizeof array / sizeof *array; i++) *array[i] = chain_array (c->links);
   d->system = engine_chain (c->links);
   d->run = engine_open (d->system, "rk4+none", &(pw_settings){ .step = 1e-3, .span = 1 });
-  engine_bend (c->links, 0, d->q, d->v);
+  engine_bend (c->links, ENGINE_PINNED_CHAIN, d->q, d->v);
   c->data = d;
   c->base = (timing_work){ chain_hand, d };
   c->ours = (timing_work){ chain_ours, d };
@@ -64,8 +64,9 @@ struct engine_cost {
   pw_system *system;
   pw_run *run;
   pw_projector projector;
-  double *q, *v, *q1, *v1, *lambda;
-  long batch;
+  double *q, *v;               /* the state */
+  double *q1, *v1, *lambda;    /* results */
+  long batch;                  /* repetitions of the work per batch */
   double ns[TIMING_PAIRS_MAX]; /* per body */
   int batches;
 };
@@ -76,7 +77,7 @@ static long cost_evaluation (void *context, long n) {
   return n * d->system->bodies;
 }
 
-/* From a state whose bodies are off by up to 1e-8: positions, then rates. */
+/* Positions, then velocities, of a state that is off by up to 1e-8 [m], [rad], [m/s], [rad/s]. */
 static long cost_projection (void *context, long n) {
   engine_cost *d = context;
   for (long i = 0; i < n; i++) {
@@ -91,7 +92,7 @@ static long cost_projection (void *context, long n) {
   return n * d->system->bodies;
 }
 
-/* The first steps of a run; opening it is not part of the time. */
+/* Time per step and body [ns] of the first steps of a run, without its opening. */
 static double cost_ida (engine_cost *d) {
   const int steps = 40;
   pw_error error = { 0 };
@@ -118,14 +119,14 @@ static void cost_open_run (engine_cost *d) {
   d->batch = timing_calibrate (&w, 0.01);
 }
 
-engine_cost *engine_cost_open (pw_system *s, engine_task task, int bent, int free) {
+engine_cost *engine_cost_open (pw_system *s, engine_task task, engine_shape shape) {
   size_t n = (size_t)s->coords + 3;
   engine_cost *d = calloc (1, sizeof *d);
   if (d) *d = (engine_cost){ .task = task, .system = s, .q = calloc (4 * n + (size_t)s->rows, sizeof *d->q) };
   if (d == NULL || d->q == NULL) engine_die ("engine", "out of memory");
   d->v = d->q + n, d->q1 = d->v + n, d->v1 = d->q1 + n, d->lambda = d->v1 + n;
   memcpy (d->q, s->q0, (size_t)s->coords * sizeof *d->q);
-  if (bent) engine_bend (s->bodies, free, d->q, d->v);
+  if (shape != ENGINE_DESCRIBED) engine_bend (s->bodies, shape, d->q, d->v);
   if (task != ENGINE_IDA) cost_open_run (d);
   return d;
 }

@@ -1,4 +1,4 @@
-/* A step of ida+ggl on the massless EzyRoller against IDA programmed for it by hand: runs of 100 s. */
+/* Comparison of a step of ida+ggl on the massless EzyRoller with IDA programmed for it by hand, in runs of 100 s. */
 #include <stdlib.h>
 #include "engine.h"
 
@@ -25,7 +25,7 @@ static long ida_hand (void *context, long n) {
     if (r == NULL) engine_die ("ida by hand", "cannot be opened");
     while ((flag = ezy_ida_step (r)) == 0) continue;
     if (flag < 0) engine_die ("ida by hand", "fails");
-    ezy_ida_look (r, &steps, &d->residuals[0], d->q[0]);
+    ezy_ida_result (r, &steps, &d->residuals[0], d->q[0]);
     ezy_ida_close (r);
     all += steps;
   }

@@ -14,8 +14,8 @@ pw_run *gallery_run (pw_system *s, double step, double t);
 
 void gallery_close (pw_run *r, pw_system *s);
 
-/* Checks that energy is work less losses, and constant if the scene is not driven.  The bound is h^4 times a power of the
- * fastest rate of the motion: about 1/s for a snakeboard, 10/s for a chain, 30/s for light parts with motors. */
+/* Checks that energy is work less losses, and constant if the scene is not driven.  The bound is h^4 times a power
+ * of the fastest rate of the motion: about 1/s for a snakeboard, 10/s for a chain, 30/s for light parts with motors. */
 void gallery_energy (pw_system *s, double step, double t, double bound, int driven);
 
 /* A point of a body in the world. */

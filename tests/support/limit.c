@@ -1,4 +1,5 @@
-/* A time limit for every test program: after LIMIT seconds (1200 by default) it ends its children, says its name and fails.
+/* A time limit for every test program: after LIMIT seconds (1200 by default) it ends its children, says its name and
+ * fails.
  *
  * So that they can be found, a test program and its children are a process group of their own. */
 #define _GNU_SOURCE /* program_invocation_short_name */

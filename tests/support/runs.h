@@ -9,7 +9,8 @@ pw_run *runs_open (pw_system *s, const char *method, const pw_settings *settings
 /* Advances to t and samples the state there. */
 pw_sample runs_to (pw_run *r, double t);
 
-/* The i-th of every integrator with each of its stabilisations, "rk4+none" first: writes its name; NULL after the last. */
+/* The i-th of every integrator with each of its stabilisations, "rk4+none" first: writes its name; NULL after the
+ * last. */
 const pw_method *runs_method (int i, char name[40]);
 
 /* The state at t after a run of its own: q and v, coordinates each; the statistics may be NULL. */
