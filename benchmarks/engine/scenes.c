@@ -116,7 +116,7 @@ static pw_model *scene_describe (const char *name, void (*build) (pw_model *, co
                             .parameters = scene_parameters,
                             .parameters_size = sizeof (scene),
                             .build = build };
-  pw_plugin_table *keep = malloc (sizeof *keep); /* must outlive the model: never freed */
+  pw_plugin_table *keep = malloc (sizeof *keep); /* never deallocated: the model refers to it */
   pw_error error = { 0 };
   if (keep == NULL) engine_die (name, "out of memory");
   *keep = table;
