@@ -1,6 +1,6 @@
-"""Digits of the problems in benchmarks/scenes, computed twice: from minimal equations derived by hand, with 30 digits, and
-from a closed form, other equations, published digits or the simulator of this folder.  Prints the states that
-tests/methods/test_problems.c has, and how far both are apart; takes minutes and needs mpmath and yaml.
+"""Reference digits of the problems in benchmarks/scenes, computed twice: from minimal equations derived by hand, with
+30 digits, and from a closed form, other equations, published digits or the simulator of this folder.  Prints the
+states for tests/methods/test_problems.c, and their differences; takes minutes and needs mpmath and yaml.
 
   problems.py [PART OF A NAME]                    from the top folder"""
 import re
@@ -90,7 +90,7 @@ def caster_shimmy(t):
 
 
 def car_axis(t):
-    """The angles of the road (given) and of the axle, and the distance of the left mass from the wheel: two freedoms."""
+    """Degrees of freedom: the distance of the left mass from its wheel and the angle of the axle; the road is given."""
     m, L, r, W = d("0.0005"), one, d("0.1"), 10 * one
 
     def road(t):
@@ -192,12 +192,13 @@ def slider_crank(t, other=False):
     return {"crank.phi": mp.findroot(lambda a: time(a) - t, (2.3, 2.5), solver="secant", tol=d("1e-24"))}
 
 
-# ---- The same problems, computed otherwise ----
+# ---- The same problems, by other computations ----
 
 
 def simulated(name, t):
-    """By the simulator of this folder, from the text model with its parameters put in: about 9 digits."""
-    text = subprocess.run(["build/pinwheel", "show", "--yaml", FOLDER + name], capture_output=True, text=True, check=True)
+    """By the simulator of this folder, from the text model with values for its parameters: about 9 digits."""
+    text = subprocess.run(["build/pinwheel", "show", "--yaml", FOLDER + name], capture_output=True, text=True,
+                          check=True)
     model = yaml.safe_load(text.stdout)
     for e in model["elements"]:
         for signal in [x for x in e.values() if isinstance(x, dict) and "expression" in x]:
