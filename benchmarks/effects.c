@@ -14,11 +14,6 @@
 
 enum { EFFECTS_POOL = 64, EFFECTS_SPACING = 200, EFFECTS_ROUNDS = 10 };
 
-_Noreturn void engine_die (const char *what, const char *why) {
-  fprintf (stderr, "%s: %s\n", what, why);
-  exit (2);
-}
-
 /* ---- Scenes ---- */
 
 static void effects_add (pw_model *m, const char *kind, const void *definition) {
@@ -36,10 +31,6 @@ static void effects_wheel (pw_model *m) {
 
 static void effects_seat (pw_model *m) {
   pw_add_body (m, &(pw_body){ .name = "seat", .mass = 0.2, .inertia = 0.01, .start = { 0.1, 0, 0 } });
-}
-
-static void effects_none (pw_model *m) {
-  effects_wheel (m);
 }
 
 static void effects_gravity (pw_model *m) {
@@ -105,7 +96,7 @@ static const struct {
   const char *key, *what;
   void (*add) (pw_model *m);
 } effects_scene[] = {
-  { "none", "the EzyRoller alone", effects_none },
+  { "none", "the EzyRoller alone", effects_wheel },
   { "gravity", "gravity along a slope", effects_gravity },
   { "torque", "a second torque, constant", effects_torque },
   { "spring", "a spring with a damper", effects_spring },

@@ -47,18 +47,13 @@ void ezy_massless_step (const ezy *e, double h, ezy_state *s);
 /* Projects positions, then velocities, and computes the accelerations; overwrites q and v. */
 void ezy_project (const ezy *e, double t, double q[6], double v[6], ezy_state *s);
 
-/* A step to t1 by an explicit Runge-Kutta method: stages by `rate`, then `project`, with the arguments of ezy_massive
- * and ezy_project.  c and b have `stages` entries; A has its rows below the diagonal, one after the other. */
+/* A step to t1 by an explicit Runge-Kutta method, with a projection, of the massive EzyRoller.  c and b have `stages`
+ * entries; A has its rows below the diagonal, one after the other. */
 typedef struct {
   int stages;
   const double *c, *A, *b;
 } ezy_tableau;
-typedef struct {
-  void (*rate) (void *context, double t, const double *q, const double *v, double *a, double *lambda);
-  void (*project) (void *context, double t, double *q, double *v, ezy_state *s);
-  void *context;
-} ezy_dynamics;
-void ezy_step (const ezy_tableau *tableau, const ezy_dynamics *d, double t1, ezy_state *s);
+void ezy_step (const ezy *e, const ezy_tableau *tableau, double t1, ezy_state *s);
 
 /* Minimal coordinates (A.x, A.y, phi1, phi2, speed u of A along the frame, phi1'): their rates, for any mass. */
 void ezy_minimal (const ezy *e, double t, const double y[6], double rate[6]);

@@ -14,14 +14,6 @@ static const ezy_tableau by_hand_tableau = { 12, erk8_c, erk8_A, erk8_b };
 
 /* ---- EzyRoller ---- */
 
-static void by_hand_rate (void *context, double t, const double *q, const double *v, double *a, double *lambda) {
-  ezy_massive (context, t, q, v, a, lambda);
-}
-
-static void by_hand_project (void *context, double t, double *q, double *v, ezy_state *s) {
-  ezy_project (context, t, q, v, s);
-}
-
 double by_hand_eighth (void *scene, const ladder *self, double h, double *q) {
   long steps = lround (BY_HAND_SECONDS / h);
   ezy e;
@@ -29,9 +21,7 @@ double by_hand_eighth (void *scene, const ladder *self, double h, double *q) {
   (void)scene, (void)self;
   ezy_open (&e, &by_hand_model);
   ezy_start (&e, &s);
-  for (long i = 1; i <= steps; i++)
-    ezy_step (&by_hand_tableau, &(ezy_dynamics){ by_hand_rate, by_hand_project, &e },
-              BY_HAND_SECONDS * (double)i / (double)steps, &s);
+  for (long i = 1; i <= steps; i++) ezy_step (&e, &by_hand_tableau, BY_HAND_SECONDS * (double)i / (double)steps, &s);
   memcpy (q, s.q, sizeof s.q);
   return 12.0 * (double)steps + 1;
 }

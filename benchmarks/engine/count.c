@@ -5,6 +5,11 @@
 #include <unistd.h>
 #include "engine.h"
 
+_Noreturn void engine_die (const char *what, const char *why) {
+  fprintf (stderr, "%s: %s\n", what, why);
+  exit (2);
+}
+
 long engine_counted (const timing_work *w, long n) {
   return w->run (w->context, n);
 }

@@ -31,7 +31,7 @@ struct engine_case {
   void *data;
 };
 
-/* Ends the program with a message. */
+/* Ends the program with a message; exit status 2. */
 _Noreturn void engine_die (const char *what, const char *why);
 
 /* ---- Scenes ---- */
@@ -43,8 +43,9 @@ pw_system *engine_grid (int cells);  /* cells x cells squares of pinned bars, 2 
 pw_run *engine_open (pw_system *s, const char *method, const pw_settings *settings);
 pw_model *engine_describe_chain (int links); /* the chain's description, built */
 
-/* Steps of a fixed size. */
+/* Steps of a fixed size; in rounds, a run restarts from (q, v) after every `round` steps, and `done` counts them. */
 void engine_steps (pw_run *r, long n);
+void engine_rounds (pw_run *r, long *done, long round, const double *q, const double *v, long n);
 
 /* Specialised code of a system. */
 struct pw_scene_code *engine_specialise (const pw_system *s);

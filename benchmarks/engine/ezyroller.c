@@ -76,20 +76,11 @@ void engine_close_ezy (engine_case *c) {
 
 /* ---- One evaluation ---- */
 
-static long ezy_hand_massive (void *context, long n) {
+static long ezy_hand (void *context, long n) {
   ezy_side *d = context;
   for (long i = 0; i < n; i++) {
     int k = (int)(i % EZY_POOL);
-    ezy_massive (&d->hand, d->t[k], d->q[k], d->v[k], d->a, d->lambda);
-  }
-  return n;
-}
-
-static long ezy_hand_massless (void *context, long n) {
-  ezy_side *d = context;
-  for (long i = 0; i < n; i++) {
-    int k = (int)(i % EZY_POOL);
-    ezy_massless (&d->hand, d->t[k], d->q[k], d->v[k], d->a, d->lambda);
+    (d->hand.p.m2 > 0 ? ezy_massive : ezy_massless) (&d->hand, d->t[k], d->q[k], d->v[k], d->a, d->lambda);
   }
   return n;
 }
@@ -127,7 +118,7 @@ static double ezy_compare (engine_case *c, const ezy_data *d) {
 
 void engine_open_rhs (engine_case *c) {
   ezy_data *d = ezy_open_sides (c, c->massless, c->massless, "rk4+none");
-  c->base.run = c->massless ? ezy_hand_massless : ezy_hand_massive;
+  c->base.run = ezy_hand;
   c->ours.run = ezy_ours;
   c->base_function = c->massless ? "ezy_massless" : "ezy_massive";
   c->our_function = "pw_run_accelerate";
@@ -173,12 +164,7 @@ static long ezy_our_step (void *context, long n) {
   ezy_side *d = context;
   ezy_state start;
   ezy_start (&d->hand, &start);
-  for (long i = 0, count; i < n; i += count, d->steps += count) {
-    long left = EZY_ROUND - d->steps % EZY_ROUND;
-    count = n - i < left ? n - i : left;
-    if (left == EZY_ROUND) pw_run_restart (d->run, start.q, start.v, NULL);
-    engine_steps (d->run, count);
-  }
+  engine_rounds (d->run, &d->steps, EZY_ROUND, start.q, start.v, n);
   return n;
 }
 

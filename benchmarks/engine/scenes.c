@@ -5,11 +5,6 @@
 #include <string.h>
 #include "engine.h"
 
-_Noreturn void engine_die (const char *what, const char *why) {
-  fprintf (stderr, "%s: %s\n", what, why);
-  exit (1);
-}
-
 double engine_difference (const double *a, const double *b, int n) {
   double worst = 0, size = 0;
   for (int i = 0; i < n; i++) {

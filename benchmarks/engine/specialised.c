@@ -42,6 +42,15 @@ void engine_steps (pw_run *r, long n) {
     engine_die (r->s->model, error.text);
 }
 
+void engine_rounds (pw_run *r, long *done, long round, const double *q, const double *v, long n) {
+  for (long i = 0, count; i < n; i += count, *done += count) {
+    long left = round - *done % round;
+    count = n - i < left ? n - i : left;
+    if (left == round) pw_run_restart (r, q, v, NULL);
+    engine_steps (r, count);
+  }
+}
+
 /* Compiles a model; `step` takes its default step. */
 static pw_system *specialised_system (const char *name, double *step) {
   pw_error error = { 0 };
@@ -80,12 +89,7 @@ static long specialised_evaluate (void *context, long n) {
 
 static long specialised_step (void *context, long n) {
   specialised_side *x = context;
-  for (long i = 0, count; i < n; i += count, x->steps += count) {
-    long left = SPECIALISED_STEPS - x->steps % SPECIALISED_STEPS;
-    count = n - i < left ? n - i : left;
-    if (left == SPECIALISED_STEPS) pw_run_restart (x->d->run[x->side], x->d->q, x->d->v, NULL);
-    engine_steps (x->d->run[x->side], count);
-  }
+  engine_rounds (x->d->run[x->side], &x->steps, SPECIALISED_STEPS, x->d->q, x->d->v, n);
   return n;
 }
 

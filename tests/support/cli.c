@@ -94,17 +94,21 @@ void cli_write (const char *name, const char *text) {
 
 /* ---- Reading summaries ---- */
 
+/* The value of the first such key; NULL if there is none. */
+static const char *cli_value (const char *json, const char *key) {
+  char quoted[300];
+  snprintf (quoted, sizeof quoted, "\"%s\"", key);
+  json = strstr (json, quoted);
+  return json ? json + strlen (quoted) + strspn (json + strlen (quoted), " \n:") : NULL;
+}
+
 double cli_number (const char *json, ...) {
   va_list keys;
   va_start (keys, json);
   for (const char *key = va_arg (keys, const char *); key; key = va_arg (keys, const char *)) {
-    char quoted[60];
-    snprintf (quoted, sizeof quoted, "\"%s\"", key);
-    json = strstr (json, quoted);
-    if (json == NULL) print_error ("no key %s\n", quoted);
+    json = cli_value (json, key);
+    if (json == NULL) print_error ("no key \"%s\"\n", key);
     assert_non_null (json);
-    json += strlen (quoted);
-    json += strspn (json, " \n:");
   }
   va_end (keys);
   return strtod (json, NULL);
@@ -112,13 +116,9 @@ double cli_number (const char *json, ...) {
 
 int cli_says (const char *json, const char *key, const char *value) {
   char quoted[300];
-  snprintf (quoted, sizeof quoted, "\"%s\"", key);
-  json = strstr (json, quoted);
-  if (json == NULL) return 0;
-  json += strlen (quoted);
-  json += strspn (json, " \n:");
-  snprintf (quoted, sizeof quoted, "\"%s\"", value);
-  return strncmp (json, quoted, strlen (quoted)) == 0;
+  int length = snprintf (quoted, sizeof quoted, "\"%s\"", value);
+  json = cli_value (json, key);
+  return json && strncmp (json, quoted, (size_t)length) == 0;
 }
 
 int cli_setup (void **state) {

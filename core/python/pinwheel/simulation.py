@@ -267,7 +267,7 @@ class Simulation:
         with self._used() as run:
             t_end = self._later(run, t_end, "t_end")
             times = self._times(lib.core.pw_run_time(run), t_end, every, times)
-            status, reason, rows = "ok", "", _Rows(self._width(run), 4096 if times is None else len(times))
+            status, reason, rows = "ok", "", _Rows(lib.core.pw_run_record_width(run), 4096 if times is None else len(times))
             cause: BaseException | None = None
             try:
                 self._record(run, times, t_end, rows, progress)
@@ -282,10 +282,6 @@ class Simulation:
                         {"method": self.method, "t_end": t_end, **self._given})
         result.cause, result.changed = cause, self.changed
         return result
-
-    @staticmethod
-    def _width(run):
-        return lib.core.pw_run_record_width(run)
 
     @staticmethod
     def _times(start, t_end, every, times):
@@ -310,7 +306,7 @@ class Simulation:
 
     def _record(self, run, times, t_end, rows=None, progress=False):
         """Adds the samples at these times, or after every step (None), to the rows."""
-        rows = rows or _Rows(self._width(run), len(times))
+        rows = rows or _Rows(lib.core.pw_run_record_width(run), len(times))
         start, now, error = lib.core.pw_run_time(run), lib.core.pw_run_time, lib.pw_error()
         if self._restart:
             lib.core.pw_run_restart(run, None, None, c.byref(error))
