@@ -1,18 +1,23 @@
-/* effects: the cost of a physical effect in a scene that has it, and a check that it costs nothing in a scene without
- * it.
+/* effects: measures what a physical effect costs in a scene, and checks that effects cost nothing in a scene without
+ * them.
  *
  *   effects [FOLDER]     instructions per evaluation of the EzyRoller, counted by callgrind
  *
  * First the EzyRoller alone, with the libpinwheel to which this program is linked and with the one in FOLDER, which
  * has only the element types of the EzyRoller: the counts must be equal, otherwise the exit status is 1.  Then the
- * EzyRoller with one further effect at a time.  Element types are found by name, so that this program runs with both
+ * EzyRoller with one further effect at a time.  Element types are found by name, so that the program runs with both
  * libraries. */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include "engine/engine.h"
 
-enum { EFFECTS_POOL = 64, EFFECTS_SPACING = 200, EFFECTS_ROUNDS = 10 };
+enum {
+  EFFECTS_POOL = 64,     /* states that are evaluated */
+  EFFECTS_SPACING = 200, /* steps between them */
+  EFFECTS_ROUNDS = 10,   /* evaluations of each */
+  EFFECTS_COORDS = 12    /* at most 3 bodies or 2 with a spin angle, and 3 entries of the ground */
+};
 
 /* ---- Scenes ---- */
 
@@ -147,7 +152,8 @@ static const char *const effects_steering[] = { "massive", "massless" };
 typedef struct {
   pw_system *system;
   pw_run *run;
-  double t[EFFECTS_POOL], q[EFFECTS_POOL][12], v[EFFECTS_POOL][12], a[12], lambda[8];
+  double t[EFFECTS_POOL], q[EFFECTS_POOL][EFFECTS_COORDS], v[EFFECTS_POOL][EFFECTS_COORDS];
+  double a[EFFECTS_COORDS], lambda[8]; /* at most 4 rows and 3 of a weld or a drive */
 } effects_data;
 
 static long effects_evaluate (void *context, long n) {

@@ -119,28 +119,28 @@ static void engine_target (char *buffer, size_t size, double low, double high) {
     snprintf (buffer, size, "<= %g", high);
 }
 
-/* A line of the table and of the file.  Values of 0 are left out; the ratio must be between low and high, if high >
- * 0. */
+/* A line of the table and of the file.  Values of 0 are left out; if high > 0, the ratio must be in [low, high]. */
 typedef struct {
   const char *what, *unit;
   double base, ours, ratio, base_count, our_count, low, high, difference;
 } engine_line;
 
 static void engine_put (engine_report *r, const engine_line *l) {
-  char t[7][40];
+  enum { WIDTH = 40 };
+  char target[WIDTH], base[WIDTH], ours[WIDTH], ratio_text[WIDTH], counts[2][WIDTH], agreement[WIDTH] = "";
   const char *verdict = engine_verdict (r, l->ratio, l->low, l->high);
-  const char *ratio = engine_number (t[6], sizeof t[6], l->ratio, 3);
-  engine_target (t[0], sizeof t[0], l->low, l->high);
-  printf ("%-58s %10s %10s %8s %10s %10s  %-10s %-6s %s\n", l->what, engine_number (t[1], sizeof t[1], l->base, 1),
-          engine_number (t[2], sizeof t[2], l->ours, 1), ratio, engine_number (t[3], sizeof t[3], l->base_count, 1),
-          engine_number (t[4], sizeof t[4], l->our_count, 1), t[0], verdict,
-          l->difference > 0 ? (snprintf (t[5], sizeof t[5], "agree to %.0e", l->difference), t[5]) : "");
+  const char *ratio = engine_number (ratio_text, WIDTH, l->ratio, 3);
+  engine_target (target, WIDTH, l->low, l->high);
+  if (l->difference > 0) snprintf (agreement, WIDTH, "agree to %.0e", l->difference);
+  printf ("%-58s %10s %10s %8s %10s %10s  %-10s %-6s %s\n", l->what, engine_number (base, WIDTH, l->base, 1),
+          engine_number (ours, WIDTH, l->ours, 1), ratio, engine_number (counts[0], WIDTH, l->base_count, 1),
+          engine_number (counts[1], WIDTH, l->our_count, 1), target, verdict, agreement);
   fflush (stdout);
   if (r->csv == NULL) return;
   fprintf (r->csv, "\"%s\",%s,%s,%s,%s,%s,%s,%s,%s\n", l->what + strspn (l->what, " "), l->unit,
-           engine_number (t[1], sizeof t[1], l->base, 2), engine_number (t[2], sizeof t[2], l->ours, 2), ratio,
-           engine_number (t[3], sizeof t[3], l->base_count, 2), engine_number (t[4], sizeof t[4], l->our_count, 2),
-           t[0], verdict);
+           engine_number (base, WIDTH, l->base, 2), engine_number (ours, WIDTH, l->ours, 2), ratio,
+           engine_number (counts[0], WIDTH, l->base_count, 2), engine_number (counts[1], WIDTH, l->our_count, 2),
+           target, verdict);
 }
 
 static void engine_title (const char *title) {
@@ -184,8 +184,7 @@ static double engine_time_sincos (void) {
   return timing_alone (&work, ENGINE_PAIRS, engine_batch);
 }
 
-/* Checks a program by hand itself: `known` [ns] is its time on a machine where sin and cos take 15 ns; 30 % more is
- * met. */
+/* Checks a program by hand: `known` [ns] is its time where a sin and a cos take 15 ns; 30 % more is accepted. */
 static void engine_units (engine_report *r, double sincos, const char *what, double ns, double known) {
   engine_put (r, &(engine_line){ what, "sin+cos pair", sincos, ns, ns / sincos, .high = 1.3 * known / 15 });
 }
@@ -247,22 +246,10 @@ static void engine_grow (engine_report *r, const engine_growth *g) {
 
 static void engine_grow_all (engine_report *r) {
   static const engine_growth all[] = {
-    { "chain, evaluation",
-      engine_chain,
-      ENGINE_PINNED_CHAIN,
-      ENGINE_EVALUATION,
-      1,
-      5,
-      { 10, 100, 1000, 10000, 100000 } },
-    { "chain, projection",
-      engine_chain,
-      ENGINE_PINNED_CHAIN,
-      ENGINE_PROJECTION,
-      1,
-      5,
-      { 10, 100, 1000, 10000, 100000 } },
-    { "chain, step of ida+ggl", engine_chain, ENGINE_PINNED_CHAIN, ENGINE_IDA, 1, 4, { 10, 100, 1000, 10000 } },
-    { "snake, evaluation", engine_snake, ENGINE_FREE_CHAIN, ENGINE_EVALUATION, 1, 4, { 10, 100, 1000, 10000 } },
+    { "chain, evaluation", engine_chain, ENGINE_PINNED, ENGINE_EVALUATION, 1, 5, { 10, 100, 1000, 10000, 100000 } },
+    { "chain, projection", engine_chain, ENGINE_PINNED, ENGINE_PROJECTION, 1, 5, { 10, 100, 1000, 10000, 100000 } },
+    { "chain, step of ida+ggl", engine_chain, ENGINE_PINNED, ENGINE_IDA, 1, 4, { 10, 100, 1000, 10000 } },
+    { "snake, evaluation", engine_snake, ENGINE_FREE, ENGINE_EVALUATION, 1, 4, { 10, 100, 1000, 10000 } },
     { "grid, evaluation", engine_grid, ENGINE_DESCRIBED, ENGINE_EVALUATION, 0, 4, { 2, 7, 22, 70 } },
   };
   for (size_t i = 0; i < sizeof all / sizeof *all; i++) engine_grow (r, &all[i]);

@@ -22,6 +22,7 @@ static long chain_ours (void *context, long n) {
   return n * d->hand.links;
 }
 
+/* Room for accelerations: 3 per link, 3 of the ground. */
 static double *chain_array (int links) {
   double *x = calloc ((size_t)(3 * links + 3), sizeof *x);
   if (x == NULL) engine_die ("chain", "out of memory");
@@ -35,7 +36,7 @@ void engine_open_chain (engine_case *c) {
   for (size_t i = 0; i < sizeof array / sizeof *array; i++) *array[i] = chain_array (c->links);
   d->system = engine_chain (c->links);
   d->run = engine_open (d->system, "rk4+none", &(pw_settings){ .step = 1e-3, .span = 1 });
-  engine_bend (c->links, ENGINE_PINNED_CHAIN, d->q, d->v);
+  engine_bend (c->links, ENGINE_PINNED, d->q, d->v);
   c->data = d;
   c->base = (timing_work){ chain_hand, d };
   c->ours = (timing_work){ chain_ours, d };

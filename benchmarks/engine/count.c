@@ -14,8 +14,8 @@ long engine_counted (const timing_work *w, long n) {
   return w->run (w->context, n);
 }
 
-/* The instructions of all calls of a function.  A call is three lines: "cfn=NAME", "calls=COUNT ...", "LINE
- * INSTRUCTIONS". COUNT is not used: it includes calls made while nothing is collected. */
+/* The instructions of all calls of a function.  The file has three lines for a call: "cfn=NAME", "calls=COUNT ..." and
+ * "LINE INSTRUCTIONS".  COUNT is not used: it includes calls made while nothing is collected. */
 static double count_read (FILE *file, const char *function) {
   char line[1000];
   double sum = 0, instructions;

@@ -1,6 +1,5 @@
-/* Shared by the parts of the program engine, and by effects and peers: comparisons of two pieces of work, scenes,
- * cost against size, instructions, memory.  They include the internal header method.h to call an evaluation of a
- * run. */
+/* Shared by the parts of the program engine, and by effects and peers: comparisons of two pieces of work, scenes, cost
+ * against size, instructions, memory.  The internal header method.h is for evaluations outside of a step. */
 #ifndef ENGINE_H
 #define ENGINE_H
 
@@ -43,16 +42,16 @@ pw_system *engine_grid (int cells);  /* cells x cells squares of pinned bars, 2 
 pw_run *engine_open (pw_system *s, const char *method, const pw_settings *settings);
 pw_model *engine_describe_chain (int links); /* the chain's description, built */
 
-/* Steps of a fixed size; in rounds, a run restarts from (q, v) after every `round` steps, and `done` counts them. */
+/* n steps of a fixed size. */
 void engine_steps (pw_run *r, long n);
+/* The same, where the run restarts from (q, v) after every `round` steps; `done` counts the steps of all calls. */
 void engine_rounds (pw_run *r, long *done, long round, const double *q, const double *v, long n);
 
 /* Specialised code of a system. */
 struct pw_scene_code *engine_specialise (const pw_system *s);
 
-/* States in which scenes are evaluated: as described, or with bent joints: a chain pinned to the ground, or a free
- * one. */
-typedef enum { ENGINE_DESCRIBED, ENGINE_PINNED_CHAIN, ENGINE_FREE_CHAIN } engine_shape;
+/* States for evaluations: the described one, or bent joints of a chain that is pinned to the ground or free. */
+typedef enum { ENGINE_DESCRIBED, ENGINE_PINNED, ENGINE_FREE } engine_shape;
 
 /* Consistent positions and velocities of a bent chain, 3 links each. */
 void engine_bend (int links, engine_shape shape, double *q, double *v);

@@ -21,8 +21,10 @@ typedef struct {
   pw_system *system;
   pw_run *run;
   pw_scene_code *code; /* or NULL */
-  double t[EZY_POOL], q[EZY_POOL][9], v[EZY_POOL][9], y[EZY_POOL][6];
-  double a[9], lambda[4];
+  double t[EZY_POOL], q[EZY_POOL][6], v[EZY_POOL][6];
+  double y[EZY_POOL][6]; /* the same states in minimal coordinates */
+  double a[9];           /* 3 of the ground */
+  double lambda[4];
 } ezy_side;
 
 typedef struct {

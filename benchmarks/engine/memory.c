@@ -36,7 +36,7 @@ static double memory_touch (pw_run *r, int links) {
   size_t n = (size_t)(3 * links + 3);
   double *q = calloc (5 * n, sizeof *q), *v = q + n, *a = v + n, *lambda = a + n, touched = 0;
   if (q == NULL) engine_die ("memory", "out of memory");
-  engine_bend (links, ENGINE_PINNED_CHAIN, q, v);
+  engine_bend (links, ENGINE_PINNED, q, v);
   pw_run_accelerate (r, 0, q, v, a, lambda);
   if (memory_forget ()) {
     pw_run_accelerate (r, 0, q, v, a, lambda);

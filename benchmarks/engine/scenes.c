@@ -159,7 +159,7 @@ pw_run *engine_open (pw_system *s, const char *method, const pw_settings *settin
 }
 
 void engine_bend (int links, engine_shape shape, double *q, double *v) {
-  int moves = shape == ENGINE_FREE_CHAIN; /* its first end */
+  int moves = shape == ENGINE_FREE; /* its first end */
   double x = 0, y = 0, vx = moves ? 1 : 0, vy = moves ? 0.5 : 0;
   for (int i = 0; i < links; i++) {
     double phi = 0.4 * sin (0.7 * i), w = 0.3 * cos (1.1 * i), c = cos (phi) / 2, s = sin (phi) / 2;

@@ -150,13 +150,14 @@ enum { LANES_MOST = 8, LANES_WARM_UP = 1600 /* steps, in all runs together */ };
 /* Runs that start with slightly different velocities: by the general engine, one after the other; in lanes. */
 typedef struct {
   pw_system *system;
-  pw_scene_code *code, *lanes;
+  pw_scene_code *code, *lanes; /* for one run, for all at once */
   void *memory;
   int n;       /* runs */
   double step; /* [s] */
   pw_run *general[LANES_MOST], *run[LANES_MOST];
 } lanes_data;
 
+/* Restarts the k-th run from the initial state, with its own velocity. */
 static void lanes_restart (pw_run *r, const pw_system *s, int k) {
   double v[SPECIALISED_COORDS];
   memcpy (v, s->v0, (size_t)s->coords * sizeof *v);

@@ -21,8 +21,8 @@ typedef struct {
 
 /* Specialised code, if the scene has one, and a run that uses it. */
 static void run_specialise (run_cell *x, const char *method, pw_settings *settings, pw_error *error) {
-  pw_error none = { 0 };
-  char *text = pw_run_source (x->run, &none);
+  pw_error ignored = { 0 }; /* the scene has no code */
+  char *text = pw_run_source (x->run, &ignored);
   if (text) x->code = pw_scene_code_open (text, x->system, error);
   free (text);
   if (x->code == NULL) return;

@@ -26,7 +26,7 @@ FAILURES = 0.002  # largest fraction of runs that may fail: these mechanisms are
 
 
 class Refused(Exception):
-    """A run that Pinwheel ends with a status other than 0."""
+    """A run that ends with a status other than 0, or takes too long."""
 
 
 def methods(program):
@@ -112,7 +112,7 @@ def setting(integrator, refine):
 # the tolerance, the final velocities are 78 times as sensitive to the length of a rod, and their error is 9370 times
 # the tolerance (with projection 1350).  An error above the bound must be below it at a finer tolerance.
 FACTOR = {"erk5": 1e3, "erk8": 3e2, "adams": 3e3, "bdf": 5e3, "ida": 3e3, "radau": 1e3}
-FLOOR = 1e-8  # of the reference, at rtol 1e-11
+FLOOR = 1e-8  # above the error of the reference, which has rtol 1e-11
 
 
 def floor(method, group, m, refine):

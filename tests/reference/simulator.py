@@ -410,11 +410,11 @@ class Mechanism:
         after = [b for b in self.breaks if b > t]
         return (t + after[0]) / 2 if after else t + 1
 
-    def project(self, q, v, t=0.0):
-        """The consistent state next to (q, v): Gauss-Newton on positions, then velocities."""
-        middle = self.middle(t)
+    def project(self, q, v):
+        """The consistent state next to (q, v) at t = 0: Gauss-Newton on positions, then velocities."""
+        middle = self.middle(0.0)
         for _ in range(20):
-            state = State(self, t, middle, q, v)
+            state = State(self, 0.0, middle, q, v)
             held = [i for i, (_, _, g) in enumerate(state.rows) if g is not None]
             if not held:
                 break
@@ -422,7 +422,7 @@ class Mechanism:
             if max(abs(g)) < 1e-14:
                 break
             q = q - np.linalg.lstsq(self.constraints(state)[0][held], g, rcond=1e-9)[0]
-        state = State(self, t, middle, q, v)
+        state = State(self, 0.0, middle, q, v)
         J, residual, _ = self.constraints(state)
         return q, v - np.linalg.lstsq(J, residual, rcond=1e-9)[0] if len(J) else v
 
@@ -444,9 +444,9 @@ class Mechanism:
 
     # ---- Runs ----
 
-    def run(self, q, v, times, rtol=1e-11, check=True):
+    def run(self, q, v, times, check=True):
         """States at the times [s]: a list of dicts of columns, as a table of `pinwheel run --energy` has them.  Raises
-        Failure where the motion comes near a singular configuration, or is too fast to be compared."""
+        Failure where the motion fails; check: or comes near a singular configuration, or is too fast to be compared."""
         t, k = 0.0, len(self.powers(State(self, 0, self.middle(0), q, v), np.zeros(1000)))
         y = np.concatenate([q, v, np.zeros(k)])
         rank = None
@@ -455,11 +455,11 @@ class Mechanism:
         for stop in [0.0] + stops:
             middle = (t + stop) / 2 if stop > 0 else self.middle(0)
             if stop > 0:
-                solver = DOP853(lambda s, z: self.derivative(s, middle, z), t, y, stop, rtol=rtol, atol=rtol * 0.1)
+                solver = DOP853(lambda s, z: self.derivative(s, middle, z), t, y, stop, rtol=1e-11, atol=1e-12)
                 steps = 0
                 while solver.status == "running":
                     if solver.step() is not None or steps > 3000:
-                        raise Failure("the reference needs more than 3000 steps")
+                        raise Failure("the reference fails, or needs more than 3000 steps")
                     steps += 1
                     if check:
                         self.watch(solver.t, middle, solver.y, rank)

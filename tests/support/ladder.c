@@ -49,9 +49,9 @@ ladder_error ladder_run (const char *model, const char *method, double step, dou
 }
 
 ladder_error ladder_solve (const char *model, const char *method, const pw_settings *settings, double t) {
-  pw_system *s = ladder_open (model), *S = ladder_open (model);
+  pw_system *s = ladder_open (model), *same = ladder_open (model);
   pw_run *r = runs_open (s, method, settings);
-  pw_run *exact = runs_open (S, "erk8+projection", &(pw_settings){ .rtol = 3e-14, .span = t });
+  pw_run *exact = runs_open (same, "erk8+projection", &(pw_settings){ .rtol = 3e-14, .span = t });
   pw_sample x = runs_to (r, t), y = runs_to (exact, t);
   ladder_error e = { .cost = *pw_run_statistics (r) };
   double largest = 0, time = pw_run_scale (exact)->time;
@@ -67,7 +67,7 @@ ladder_error ladder_solve (const char *model, const char *method, const pw_setti
   pw_run_close (r);
   pw_run_close (exact);
   pw_system_free (s);
-  pw_system_free (S);
+  pw_system_free (same);
   return e;
 }
 

@@ -35,8 +35,8 @@ void limit_begin (void) {
   signal (SIGALRM, limit_end);
   signal (SIGTERM, limit_end);
 #ifdef __linux__
-  prctl (PR_SET_PDEATHSIG,
-         SIGTERM); /* Ctrl-C reaches only the group of the parent process, whose end then ends this program */
+  /* Ctrl-C reaches only the group of the parent process: its end must end this program. */
+  prctl (PR_SET_PDEATHSIG, SIGTERM);
 #endif
   alarm (seconds > 0 ? (unsigned)seconds : 1200);
 }
