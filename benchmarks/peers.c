@@ -55,6 +55,7 @@ static double peers_ours (void *scene, const ladder *self, double level, double 
   PEERS_LADDER (method, method, first, factor, count, peers_ours, "pw_run_advance")
 #define PEERS_CHAIN(name) PEERS_LADDER (name, "", 0.04, 0.8, 18, by_hand_chain, "by_hand_chain_step")
 
+/* The EzyRoller, then the chains. */
 static peers_scene peers_scenes[] = {
   { 0, BY_HAND_SECONDS, NULL, NULL }, { 10, 1, NULL, NULL }, { 100, 1, NULL, NULL }, { PEERS_LINKS, 1, NULL, NULL }
 };
@@ -104,14 +105,18 @@ static ladder *peers_ladder (int k) {
 
 static peers_scene *peers_scene_of (int k) {
   int hand = k < PEERS_HANDS ? k : peers_pairs[k - PEERS_HANDS].hand;
-  return &peers_scenes[hand < CHAIN ? 0 : hand - CHAIN + 1];
+  return &peers_scenes[hand < CHAIN ? 0 : 1 + hand - CHAIN];
+}
+
+static void peers_open_scene (peers_scene *s) {
+  s->system = s->links ? engine_chain (s->links) : engine_ezyroller (0);
 }
 
 static void peers_open (void) {
   static double reference[PEERS_SCENES][3 * PEERS_LINKS];
   for (int i = 0; i < PEERS_SCENES; i++) {
     peers_scene *s = &peers_scenes[i];
-    s->system = s->links ? engine_chain (s->links) : engine_ezyroller (0);
+    peers_open_scene (s);
     s->reference = s->links ? reference[i] : peers_exact;
     if (s->links) by_hand_chain (&s->links, NULL, 2e-4, reference[i]);
   }
@@ -178,7 +183,7 @@ static void peers_report (const char *program, FILE *csv) {
   double instructions[PEERS_HANDS];
   for (int k = 0; k < PEERS_HANDS; k++) instructions[k] = peers_instructions (program, k);
   printf ("%-27s %-36s %5s  %9s %9s %6s  %7s %7s  %6s %6s %6s  %6s\n", "method", "by hand", "error", "hand[ms]",
-          "ours[ms]", "instruction_ratio", "evals", "ours", "instr", "ours", "instruction_ratio", "target");
+          "ours[ms]", "ratio", "evals", "ours", "instr", "ours", "ratio", "target");
   if (csv)
     fputs ("method,hand,error_m,hand_ms,our_ms,hand_evaluations,our_evaluations,hand_instructions,our_instructions,"
            "target_ms\n",
@@ -192,8 +197,7 @@ static void peers_report (const char *program, FILE *csv) {
 int main (int argc, char **argv) {
   if (argc == 4 && strcmp (argv[1], "--count") == 0) {
     peers_job job = { atoi (argv[2]), atof (argv[3]) };
-    peers_scene *s = peers_scene_of (job.ladder);
-    s->system = s->links ? engine_chain (s->links) : engine_ezyroller (0);
+    peers_open_scene (peers_scene_of (job.ladder));
     engine_counted (&(timing_work){ peers_once, &job }, 1);
     return 0;
   }

@@ -58,7 +58,8 @@ static inline void ezy_transpose (const ezy_model *p, const ezy_directions *x, c
 void ezy_open (ezy *e, const ezy_model *model) {
   const ezy_model *p = model;
   int massive = p->m2 > 0;
-  double light = 1e-6 * (massive ? p->m2 : p->m1), size = fmax (fmax (p->a, p->b), fmax (p->c, p->d));
+  double light = 1e-6 * p->m1; /* a massless body 2 moves in place of body 1 */
+  double size = fmax (fmax (p->a, p->b), fmax (p->c, p->d));
   *e = (ezy){ .p = *p, .i1 = 1 / p->m1, .k1 = 1 / p->I1, .ih = 1 / (p->c + p->d) };
   e->move1 = e->i1, e->turn1 = e->k1;
   e->move2 = 1 / light, e->turn2 = 1 / (light * size * size);
@@ -108,7 +109,8 @@ static inline void ezy_solve (const ezy *e, const ezy_factor *f, const double *r
 static inline void ezy_massive_solve (const ezy *e, const ezy_directions *x, const ezy_factor *f, double T,
                                       const double *v, double *a, double *lambda) {
   const ezy_model *p = &e->p;
-  double A1 = e->k1 * T, A2 = -e->k2 * T, r[4], force[6];
+  double A1 = e->k1 * T, A2 = -e->k2 * T; /* angular accelerations without constraints */
+  double r[4], force[6];
   ezy_gamma (p, x, v, r);
   r[0] = -p->b * x->s1 * A1 - p->d * x->s2 * A2 - r[0];
   r[1] = p->b * x->c1 * A1 + p->d * x->c2 * A2 - r[1];

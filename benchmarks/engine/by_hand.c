@@ -9,7 +9,9 @@
 #include "erk8.c"
 #undef pw_method_erk8
 
-const ezy_model by_hand_model = { 0.5, 0.5, 0.125, 0.125, 1, 0.1, 0.1, 0.01, 0.1, PW_PI };
+const ezy_model by_hand_model = {
+  .a = 0.5, .b = 0.5, .c = 0.125, .d = 0.125, .m1 = 1, .I1 = 0.1, .m2 = 0.1, .I2 = 0.01, .M0 = 0.1, .omega = PW_PI
+};
 static const ezy_tableau by_hand_tableau = { 12, erk8_c, erk8_A, erk8_b };
 
 /* ---- EzyRoller ---- */

@@ -7,7 +7,7 @@
 
 enum { BY_HAND_SECONDS = 100 }; /* time of a run of the EzyRoller */
 
-/* The EzyRoller with a massive steering assembly, from rest. */
+/* The EzyRoller with a massive steering assembly, from rest; `scene` is not used. */
 extern const ezy_model by_hand_model;
 double by_hand_minimal (void *scene, const ladder *self, double h, double *q);   /* 8th order, minimal coordinates */
 double by_hand_eighth (void *scene, const ladder *self, double h, double *q);    /* 8th order and projection */

@@ -2,16 +2,13 @@
  * projection. */
 #include <stdlib.h>
 #include <string.h>
+#include "by_hand.h"
 #include "engine.h"
 #include "pinwheel-files.h"
 
 enum { EZY_POOL = 64, EZY_SPACING = 200 /* steps between states of the pool */ };
 enum { EZY_ROUND = 100000 };              /* steps after which a run starts again */
 static const double ezy_step_size = 1e-3; /* [s] */
-
-static const ezy_model ezy_parameters = {
-  .a = 0.5, .b = 0.5, .c = 0.125, .d = 0.125, .m1 = 1, .I1 = 0.1, .m2 = 0.1, .I2 = 0.01, .M0 = 0.1, .omega = PW_PI
-};
 
 /* One side of a comparison: the vehicle by hand and by Pinwheel, and a pool of states of its motion to evaluate. */
 typedef struct {
@@ -32,7 +29,7 @@ typedef struct {
 } ezy_data;
 
 static void ezy_open_side (ezy_side *d, int massless, int specialised, const char *method) {
-  ezy_model p = ezy_parameters;
+  ezy_model p = by_hand_model;
   if (massless) p.m2 = p.I2 = 0;
   ezy_open (&d->hand, &p);
   ezy_start (&d->hand, &d->state);

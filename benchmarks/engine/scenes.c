@@ -91,12 +91,12 @@ static void scene_grid (pw_model *m, const void *parameters) {
   snprintf (first[0], sizeof first[0], "ground");
   for (int j = 0; j < side; j++)
     for (int i = 0; i < side; i++)
-      for (int up = 0; up < 2; up++) {
-        if ((up ? j : i) == n) continue;
-        snprintf (bar, sizeof bar, "%c%d-%d", up ? 'v' : 'h', i, j);
-        scene_bar (m, bar, i + (up ? 0 : 0.5), j + (up ? 0.5 : 0), up ? PW_PI / 2 : 0);
+      for (int vertical = 0; vertical < 2; vertical++) {
+        if ((vertical ? j : i) == n) continue;
+        snprintf (bar, sizeof bar, "%c%d-%d", vertical ? 'v' : 'h', i, j);
+        scene_bar (m, bar, i + (vertical ? 0 : 0.5), j + (vertical ? 0.5 : 0), vertical ? PW_PI / 2 : 0);
         scene_node (m, first, first_at, j * side + i, bar, -0.5);
-        scene_node (m, first, first_at, up ? (j + 1) * side + i : j * side + i + 1, bar, 0.5);
+        scene_node (m, first, first_at, vertical ? (j + 1) * side + i : j * side + i + 1, bar, 0.5);
       }
   free (first);
   free (first_at);

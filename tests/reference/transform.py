@@ -128,8 +128,7 @@ def mirrored(model, r):
             e["at"] = [[x, -y] for x, y in e["at"]] if isinstance(e["body"], list) else [e["at"][0], -e["at"][1]]
         for field in list(e):
             odd = (kind, field) in (("steered-wheel", "heading"), ("torque", "value"), ("force", "fy"),
-                                    ("motor", "angle"),
-                                    ("motor", "rate")) or (kind, field) == ("drive", "value") and e["what"] != "x"
+                                    ("motor", "angle"), ("motor", "rate")) or (kind, field) == ("drive", "value") and e["what"] != "x"
             if is_signal(kind, field):
                 e[field] = signal(e[field], -1.0 if odd else 1.0, states=flip)
             elif field in ("heading", "angle", "offset"):
@@ -151,7 +150,7 @@ def displaced(model, r):
     d = [r.uniform(-50, 50), r.uniform(-50, 50)]
     new = copy.deepcopy(model)
     states = {"x": "(%%s - %r)" % d[0], "y": "(%%s - %r)" % d[1]}
-    fall = 0.0
+    constant = 0.0  # that is added to the potential energy
     for b in new["bodies"]:
         b["start"]["x"] += d[0]
         b["start"]["y"] += d[1]
@@ -162,11 +161,11 @@ def displaced(model, r):
         e.update({f: signal(e[f], states=states) for f in list(e) if is_signal(kind, f)})
         if kind == "gravity":
             a = e["acceleration"]
-            fall -= sum(b.get("mass", 0) for b in model["bodies"]) * (d[0] * a[0] + d[1] * a[1])
+            constant -= sum(b.get("mass", 0) for b in model["bodies"]) * (d[0] * a[0] + d[1] * a[1])
 
     def back(row):
         moved = {k: x - d["xy".index(k[-1])] for k, x in row.items() if re.fullmatch(r"b\d+\.[xy]", k)}
-        return {**row, **moved, "potential": row["potential"] - fall}
+        return {**row, **moved, "potential": row["potential"] - constant}
     return new, back, 1.0
 
 
@@ -185,7 +184,7 @@ def turned(model, r):
         v = turn * complex(b["rate"]["vx"], b["rate"]["vy"])
         b["start"] = {"x": p.real, "y": p.imag, "phi": b["start"]["phi"] + angle}
         b["rate"] = {"vx": v.real, "vy": v.imag, "omega": b["rate"]["omega"]}
-    constant = 0.0
+    constant = 0.0  # that is added to the potential energy
     for e in new["elements"]:
         kind = kind_of(e)
         if isinstance(e.get("body"), list):

@@ -4,8 +4,8 @@
 
 #include "runs.h"
 
-/* Runs a scene to t_end by rk4+projection and implicit methods.  They agree, the ledger's balance closes, the
- * final state obeys the equations as the independent verifier sees them, and Newton's iteration hardly ever fails. */
+/* Runs a scene to t_end by rk4+projection and by implicit methods.  Checks that they agree, that the energy balance
+ * closes, that the final state satisfies the equations of the independent verifier, and that few steps are rejected. */
 void trial (const pw_plugin_table *table, double t_end);
 
 /* Checks the scaled residuals of the equations in a sample, by the independent verifier. */
