@@ -7,7 +7,7 @@ typedef struct {
   chain hand;
   pw_system *system;
   pw_run *run;
-  double *q, *v, *a[2], *lambda[2];
+  double *q, *v, *a[2], *lambda[2]; /* one block; results by hand and of Pinwheel */
 } chain_data;
 
 static long chain_hand (void *context, long n) {
@@ -22,18 +22,13 @@ static long chain_ours (void *context, long n) {
   return n * d->hand.links;
 }
 
-/* Room for accelerations: 3 per link, 3 of the ground. */
-static double *chain_array (int links) {
-  double *x = calloc ((size_t)(3 * links + 3), sizeof *x);
-  if (x == NULL) engine_die ("chain", "out of memory");
-  return x;
-}
-
 void engine_open_chain (engine_case *c) {
   chain_data *d = calloc (1, sizeof *d);
-  if (d == NULL || chain_open (&d->hand, c->links) != 0) engine_die (c->key, "out of memory");
-  double **const array[] = { &d->q, &d->v, &d->a[0], &d->a[1], &d->lambda[0], &d->lambda[1] };
-  for (size_t i = 0; i < sizeof array / sizeof *array; i++) *array[i] = chain_array (c->links);
+  size_t n = (size_t)(3 * c->links + 3); /* accelerations: 3 per link, 3 of the ground */
+  if (d) d->q = calloc (6 * n, sizeof *d->q);
+  if (d == NULL || d->q == NULL || chain_open (&d->hand, c->links) != 0) engine_die (c->key, "out of memory");
+  d->v = d->q + n;
+  for (size_t i = 0; i < 2; i++) d->a[i] = d->v + (1 + i) * n, d->lambda[i] = d->v + (3 + i) * n;
   d->system = engine_chain (c->links);
   d->run = engine_open (d->system, "rk4+none", &(pw_settings){ .step = 1e-3, .span = 1 });
   engine_bend (c->links, ENGINE_PINNED, d->q, d->v);
@@ -50,11 +45,10 @@ void engine_open_chain (engine_case *c) {
 
 void engine_close_chain (engine_case *c) {
   chain_data *d = c->data;
-  double *const array[] = { d->q, d->v, d->a[0], d->a[1], d->lambda[0], d->lambda[1] };
-  for (size_t i = 0; i < sizeof array / sizeof *array; i++) free (array[i]);
   pw_run_close (d->run);
   pw_system_free (d->system);
   chain_close (&d->hand);
+  free (d->q);
   free (d);
 }
 

@@ -493,13 +493,9 @@ class Mechanism:
         return row
 
 
-def read(path):
-    with open(path) as f:
-        return Mechanism(json.load(f))
-
-
 if __name__ == "__main__":
-    m = read(sys.argv[1])
+    with open(sys.argv[1]) as f:
+        m = Mechanism(json.load(f))
     end = float(sys.argv[2]) if len(sys.argv) > 2 else m.model["run"]["t_end"]
     for row in m.run(*m.project(m.q, m.v), [end], check=False):
         print(json.dumps(row, indent=1))
