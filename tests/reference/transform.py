@@ -128,7 +128,8 @@ def mirrored(model, r):
             e["at"] = [[x, -y] for x, y in e["at"]] if isinstance(e["body"], list) else [e["at"][0], -e["at"][1]]
         for field in list(e):
             odd = (kind, field) in (("steered-wheel", "heading"), ("torque", "value"), ("force", "fy"),
-                                    ("motor", "angle"), ("motor", "rate")) or (kind, field) == ("drive", "value") and e["what"] != "x"
+                                    ("motor", "angle"), ("motor", "rate")) or \
+                (kind, field) == ("drive", "value") and e["what"] != "x"
             if is_signal(kind, field):
                 e[field] = signal(e[field], -1.0 if odd else 1.0, states=flip)
             elif field in ("heading", "angle", "offset"):
