@@ -62,7 +62,7 @@ step () {
     printf '%4d s, %d s in all\n' $(($(date +%s) - from)) $(($(date +%s) - begun))
   else
     status=$?
-    [ $status = 130 ] && { echo 'interrupted; make bench goes on from here'; exit 130; }
+    [ $status = 130 ] && { echo 'interrupted; make bench continues here'; exit 130; }
     echo "FAILED, status $status: $(tail -1 "$work/$name/errors")"
     failed="$failed $name"
   fi

@@ -9,9 +9,9 @@
 /* Largest numbers of entries, and of characters of a name. */
 enum { HARD_VALUES = 24, HARD_EXPECTATIONS = 24, HARD_CASES = 100, HARD_METHODS = 60, HARD_NAME = 48 };
 
-/* Worst first: of several bounds the worst verdict counts. */
+/* Verdicts, the worst first; the worst one over all measures counts. */
 typedef enum {
-  HARD_CRASH,   /* ended by a signal */
+  HARD_CRASH,   /* the process ended abnormally */
   HARD_WRONG,   /* reports success outside all bounds, or stops without a reason: never allowed */
   HARD_SLOW,    /* stopped at the limit of processor time */
   HARD_REFUSE,  /* stops with a reason */
@@ -22,12 +22,12 @@ typedef enum {
 
 extern const char *const hard_verdict_name[HARD_VERDICTS];
 
-/* What is measured of a run, and compared with the bounds of the case. */
+/* Measures of a run, which are compared with the bounds of the case. */
 typedef enum {
-  HARD_ERROR,     /* of the states at the end, relative to the reference or to the scene's unit, whichever is larger */
-  HARD_BALANCE,   /* of the energy, at worst, relative to the largest energy, work or loss */
-  HARD_RESIDUAL,  /* scaled, of g = 0 and J v = eta, at worst over the accepted steps */
-  HARD_EQUATIONS, /* scaled, of J a = gamma and M a + J^T lambda = f, by the independent verifier, at the end */
+  HARD_ERROR,     /* largest error of a state at the end, relative to the reference, but at least to its scale */
+  HARD_BALANCE,   /* largest energy defect, relative to the largest kinetic energy, work or loss */
+  HARD_RESIDUAL,  /* largest scaled residual of g = 0 and J v = eta after an accepted step */
+  HARD_EQUATIONS, /* scaled residual of J a = gamma and M a + J^T lambda = f at the end, by the independent verifier */
   HARD_MEASURES
 } hard_measure;
 
@@ -52,7 +52,7 @@ typedef struct {
   char model[300];
   hard_value set[HARD_VALUES], initial[HARD_VALUES], reference[HARD_VALUES];
   int sets, initials, references;
-  double t_end, step, rtol;       /* [s]; step of fixed-step methods [s]; rtol of adaptive ones */
+  double t_end, step, rtol;       /* [s]; of fixed-step methods [s]; of adaptive methods */
   double seconds;                 /* limit of processor time per cell [s] */
   char stops[80];                 /* if not empty, the run must stop, with this text in its message */
   double stop_time[2];            /* latest time of the stop: pass, limited [s] */

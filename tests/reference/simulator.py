@@ -21,7 +21,7 @@ np.seterr(all="ignore")  # a motion that is not finite is rejected later
 
 
 class Failure(Exception):
-    """A mechanism for which the reference has no trustworthy solution: what is wrong with it."""
+    """A mechanism for which the reference has no reliable solution; the text has the reason."""
 
 
 class Frame:

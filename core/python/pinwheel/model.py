@@ -151,8 +151,8 @@ class Model:
     Parameters
     ----------
     model : str or path
-        A name ("snakeboard"), or the path of a .yaml, .c or .so file.  Models in C are programs: open only files that you
-        trust.
+        A name ("snakeboard"), or the path of a .yaml, .c or .so file.  Models in C are programs: open only files
+        that you trust.
     start : dict, optional
         Initial values of states [m, rad, m/s, rad/s], such as ``{"frame.vx": 1}``.
     signals : dict, optional
@@ -299,8 +299,8 @@ class Model:
         inputs : dict, optional
             Signals that the caller sets between steps, and their initial values: ``{"rider": 0.0}``.
         specialise : {"auto", "always", "never"}
-            Use code compiled for this model alone, if possible: from 1e6 expected steps on, as the program does; always;
-            never.  ``statistics["specialised"]`` counts its evaluations.
+            Use code compiled for this model alone, if possible: from 1e6 expected steps on, as the program does;
+            always; never.  ``statistics["specialised"]`` counts its evaluations.
 
         Returns
         -------
