@@ -100,9 +100,11 @@ def errors(m, table, rows, states_only=False):
     return out
 
 
-def setting(integrator, refine):
+def setting(method, refine, unit=1.0):
+    """The option for the step or the tolerance; unit: the unit of time [s]."""
+    integrator = method.split("+")[0]
     if integrator in STEP:
-        return ["--step", repr(STEP[integrator] / 2**refine)]
+        return ["--step", repr(STEP[integrator] / 2**refine * unit)]
     return ["--rtol", repr(RTOL[integrator] / 10**refine)]
 
 
@@ -197,7 +199,7 @@ class Case:
 
     def check(self, method):
         return converges(self.m, self.table, method, lambda refine: run(
-            self.program, self.path, method, SPAN, SPAN / 2, setting(method.split("+")[0], refine), self.options)[0])
+            self.program, self.path, method, SPAN, SPAN / 2, setting(method, refine), self.options)[0])
 
 
 def reason_of(text):

@@ -19,14 +19,6 @@ METHODS = ["erk8+projection", "rk4+projection", "bdf+projection", "ida+ggl", "ga
            "leapfrog+rattle", "erk5+nullspace", "adams+baumgarte"]
 
 
-def settings(method, s, refine):
-    """Options; s: unit of time [s]."""
-    integrator = method.split("+")[0]
-    if integrator in compare.STEP:
-        return ["--step", repr(compare.STEP[integrator] / 2**refine * s)]
-    return ["--rtol", repr(compare.RTOL[integrator] / 10**refine)]
-
-
 class Check:
     """A mechanism with its reference, and the comparisons of its transformations; counts: results by transformation."""
 
@@ -55,7 +47,8 @@ class Check:
         def rows(refine):
             # Baumgarte's coefficients are rates.
             scaled = method + (":alpha=%r:beta=%r" % (10 / s, 10 / s) if method.endswith("baumgarte") else "")
-            out, _ = compare.run(self.args.program, path, scaled, SPAN * s, SPAN * s / 2, settings(method, s, refine))
+            out, _ = compare.run(self.args.program, path, scaled, SPAN * s, SPAN * s / 2,
+                                 compare.setting(method, refine, s))
             return [back(row) for row in out]
         states_only = name.startswith("equivalent")
         self.attempt(name, method, lambda: compare.converges(self.m, self.table, method, rows, states_only))
@@ -87,10 +80,10 @@ class Check:
         first, second = self.write("first", self.m.model), self.write("second", transform.later(self.m.model, half))
 
         def rows(refine):
-            a, _ = compare.run(self.args.program, first, method, half, half, settings(method, 1, refine))
+            a, _ = compare.run(self.args.program, first, method, half, half, compare.setting(method, refine))
             positions, velocities = self.m.names()
             start = [x for k in positions + velocities for x in ("--start", "%s=%r" % (k, a[-1][k]))]
-            b, _ = compare.run(self.args.program, second, method, half, half, settings(method, 1, refine), start)
+            b, _ = compare.run(self.args.program, second, method, half, half, compare.setting(method, refine), start)
             before = {k: x for k, x in a[-1].items() if k.endswith((".work", ".loss"))}
             whole = {**b[-1], **{k: b[-1][k] + x for k, x in before.items()}, "t": SPAN}
             return [a[0], a[-1], whole]
