@@ -33,7 +33,7 @@ int pw_selftest (const pw_kind *kind, unsigned seed, pw_selftest_report *report,
 
 /* Tests an element type in a scene that uses it: its derivatives along a random motion near the state q, v at time
  * t, with the scene's elements and signals, in units of its length scale and the time T.  Use a separate report.
- * Errors: PW_RESOURCE. */
+ * Errors: PW_RESOURCE; PW_METHOD if a signal fails along this motion. */
 int pw_selftest_scene (const pw_system *s, double T, const pw_kind *kind, double t, const double *q, const double *v,
                        unsigned seed, pw_selftest_report *report, pw_error *error);
 

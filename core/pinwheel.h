@@ -369,7 +369,7 @@ typedef struct {
   double stiffness; /* cornering stiffness: lateral force per slip [N], > 0 */
   double speed;     /* below about this rolling speed the slip is regularised [m/s], > 0 */
   double load;      /* normal load, which limits the force [N]; 0: linear, no limit */
-  double friction;  /* friction coefficient, force limit over load; > 0 if load > 0 */
+  double friction;  /* friction coefficient, force limit over load; > 0 if and only if load > 0 */
 } pw_tyre;
 
 /* Rolling resistance: a force along the heading that opposes the motion of its point. */

@@ -18,7 +18,7 @@ static const pw_parameter parameters[] = {
   { .name = NULL },
 };
 
-/* Lengths [m] */
+/* Points and lengths [m], by the letters of the test set */
 static const double xa = -.06934, ya = -.00227, xb = -.03635, yb = .03273, xc = .014, yc = .072;
 static const double d = .028, da = .0115, e = .02, ea = .01421, rr = .007, ra = .00092, ss = .035, sa = .01874,
                     sb = .01043, sc = .018, sd = .02, ta = .02308, tb = .00916, u = .04, ua = .01228, ub = .00449,
@@ -39,16 +39,17 @@ static void pin (pw_model *m, const char *name, const char *one, double x1, doub
   pw_add_pin (m, &(pw_pin){ .name = name, .body = { one, two }, .at = { { x1, y1 }, { x2, y2 } } });
 }
 
+/* At the initial angles of the test set. */
 static void bodies (pw_model *m) {
-  const double beta = -0.0617138900142764496, gamma = 0.455279819163070380, Ph = 0.222668390165885885,
+  const double beta = -0.0617138900142764496, gamma = 0.455279819163070380, Phi = 0.222668390165885885,
                delta = 0.487364979543842550, epsilon = 1.23054744454982119;
   double xf = rr * cos (beta), yf = rr * sin (beta), xe = xf - d * cos (beta), ye = yf - d * sin (beta);
   add_part (m, "K1", .04325, 2.194e-6, 0, 0, beta, (double[]){ -ra, 0 });
   add_part (m, "K2", .00365, 4.410e-7, xf, yf, beta, (double[]){ da, 0 });
   add_part (m, "K3", .02373, 5.255e-6, xb, yb, gamma, (double[]){ -sb, sa });
-  add_part (m, "K4", .00706, 5.667e-7, xe, ye, Ph + delta, (double[]){ 0, -ea });
+  add_part (m, "K4", .00706, 5.667e-7, xe, ye, Phi + delta, (double[]){ 0, -ea });
   add_part (m, "K5", .07050, 1.169e-5, xa, ya, delta, (double[]){ -ta, -tb });
-  add_part (m, "K6", .00706, 5.667e-7, xe, ye, epsilon - Ph, (double[]){ fa, 0 });
+  add_part (m, "K6", .00706, 5.667e-7, xe, ye, epsilon - Phi, (double[]){ fa, 0 });
   add_part (m, "K7", .05498, 1.912e-5, xa, ya, epsilon, (double[]){ ub, ua });
 }
 

@@ -32,23 +32,25 @@ static int attraction_prepare (const void *definition, const pw_body *const *bod
   return PW_OK;
 }
 
-static double attraction_distance (const pw_batch *b, int e, double d[2]) {
-  const pw_configuration *A = &b->configuration[b->body[2 * e]], *B = &b->configuration[b->body[2 * e + 1]];
-  d[0] = A->x - B->x, d[1] = A->y - B->y;
+static double attraction_distance (const pw_batch *batch, int e, double d[2]) {
+  const pw_configuration *body1 = &batch->configuration[batch->body[2 * e]],
+                         *body2 = &batch->configuration[batch->body[2 * e + 1]];
+  d[0] = body1->x - body2->x, d[1] = body1->y - body2->y;
   return hypot (d[0], d[1]);
 }
 
-static void attraction_force (const pw_batch *b, double *out) {
-  for (int e = 0; e < b->count; e++, out += 6) {
-    double d[2], r = attraction_distance (b, e, d), pull = -((const double *)b->element)[e] / (r * r * r);
+static void attraction_force (const pw_batch *batch, double *out) {
+  for (int e = 0; e < batch->count; e++, out += 6) {
+    double d[2], r = attraction_distance (batch, e, d), pull = -((const double *)batch->element)[e] / (r * r * r);
     out[0] = pull * d[0], out[1] = pull * d[1], out[2] = 0;
     out[3] = -out[0], out[4] = -out[1], out[5] = 0;
   }
 }
 
-static void attraction_energy (const pw_batch *b, double *out) {
+static void attraction_energy (const pw_batch *batch, double *out) {
   double d[2];
-  for (int e = 0; e < b->count; e++) out[e] = -((const double *)b->element)[e] / attraction_distance (b, e, d);
+  for (int e = 0; e < batch->count; e++)
+    out[e] = -((const double *)batch->element)[e] / attraction_distance (batch, e, d);
 }
 
 static const pw_kind attraction_kind = {
@@ -88,9 +90,9 @@ static const pw_field wire_fields[] = {
 static const pw_quantity wire_reaction[] = { { "N", "N", NULL,
                                                "times (X/a, Y a/b^2): the force on the body, outwards" } };
 
-/* Parameters of a wire: centre, a, and the factors 1/a and a/b^2 of G. */
+/* Parameters of a wire: centre, a, 1/a and a/b^2. */
 typedef struct {
-  double x, y, a, p, r;
+  double x, y, a, factor_x, factor_y;
 } wire_element;
 
 static int wire_prepare (const void *definition, const pw_body *const *bodies, void *element, pw_internal *internal,
@@ -102,56 +104,57 @@ static int wire_prepare (const void *definition, const pw_body *const *bodies, v
   return PW_OK;
 }
 
-/* Element e: position relative to the centre, velocity, parameters. */
+/* A wire in the current state: position of the body relative to the centre, its velocity; parameters. */
 typedef struct {
-  double X, Y, vx, vy, a, p, r;
+  double X, Y, vx, vy, a, factor_x, factor_y;
 } wire_state;
 
-static wire_state wire_at (const pw_batch *b, int e) {
-  const wire_element *k = (const wire_element *)b->element + e;
-  const pw_configuration *A = &b->configuration[b->body[e]];
-  return (wire_state){ A->x - k->x, A->y - k->y, A->vx, A->vy, k->a, k->p, k->r };
+static wire_state wire_at (const pw_batch *batch, int e) {
+  const wire_element *element = (const wire_element *)batch->element + e;
+  const pw_configuration *body = &batch->configuration[batch->body[e]];
+  return (wire_state){ body->x - element->x, body->y - element->y, body->vx,         body->vy,
+                       element->a,           element->factor_x,    element->factor_y };
 }
 
-static void wire_g (const pw_batch *b, double *out) {
-  for (int e = 0; e < b->count; e++) {
-    wire_state s = wire_at (b, e);
-    out[e] = (s.p * s.X * s.X + s.r * s.Y * s.Y - s.a) / 2;
+static void wire_g (const pw_batch *batch, double *out) {
+  for (int e = 0; e < batch->count; e++) {
+    wire_state now = wire_at (batch, e);
+    out[e] = (now.factor_x * now.X * now.X + now.factor_y * now.Y * now.Y - now.a) / 2;
   }
 }
 
-static void wire_g_size (const pw_batch *b, double *out) {
-  for (int e = 0; e < b->count; e++) {
-    wire_state s = wire_at (b, e);
-    out[e] = (s.p * s.X * s.X + s.r * s.Y * s.Y + s.a) / 2;
+static void wire_g_size (const pw_batch *batch, double *out) {
+  for (int e = 0; e < batch->count; e++) {
+    wire_state now = wire_at (batch, e);
+    out[e] = (now.factor_x * now.X * now.X + now.factor_y * now.Y * now.Y + now.a) / 2;
   }
 }
 
-static void wire_J (const pw_batch *b, double *out) {
-  for (int e = 0; e < b->count; e++, out += 3) {
-    wire_state s = wire_at (b, e);
-    out[0] = s.p * s.X, out[1] = s.r * s.Y, out[2] = 0;
+static void wire_J (const pw_batch *batch, double *out) {
+  for (int e = 0; e < batch->count; e++, out += 3) {
+    wire_state now = wire_at (batch, e);
+    out[0] = now.factor_x * now.X, out[1] = now.factor_y * now.Y, out[2] = 0;
   }
 }
 
-static void wire_gamma (const pw_batch *b, double *out) {
-  for (int e = 0; e < b->count; e++) {
-    wire_state s = wire_at (b, e);
-    out[e] = -(s.p * s.vx * s.vx + s.r * s.vy * s.vy);
+static void wire_gamma (const pw_batch *batch, double *out) {
+  for (int e = 0; e < batch->count; e++) {
+    wire_state now = wire_at (batch, e);
+    out[e] = -(now.factor_x * now.vx * now.vx + now.factor_y * now.vy * now.vy);
   }
 }
 
-static void wire_jw_q (const pw_batch *b, double *out) {
-  for (int e = 0; e < b->count; e++, out += 3) {
-    wire_state s = wire_at (b, e);
-    out[0] = s.p * b->w[3 * e], out[1] = s.r * b->w[3 * e + 1], out[2] = 0;
+static void wire_jw_q (const pw_batch *batch, double *out) {
+  for (int e = 0; e < batch->count; e++, out += 3) {
+    wire_state now = wire_at (batch, e);
+    out[0] = now.factor_x * batch->w[3 * e], out[1] = now.factor_y * batch->w[3 * e + 1], out[2] = 0;
   }
 }
 
-static void wire_gamma_v (const pw_batch *b, double *out) {
-  for (int e = 0; e < b->count; e++, out += 3) {
-    wire_state s = wire_at (b, e);
-    out[0] = -2 * s.p * s.vx, out[1] = -2 * s.r * s.vy, out[2] = 0;
+static void wire_gamma_v (const pw_batch *batch, double *out) {
+  for (int e = 0; e < batch->count; e++, out += 3) {
+    wire_state now = wire_at (batch, e);
+    out[0] = -2 * now.factor_x * now.vx, out[1] = -2 * now.factor_y * now.vy, out[2] = 0;
   }
 }
 

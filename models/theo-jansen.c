@@ -18,7 +18,7 @@ static const pw_parameter parameters[] = {
   { .name = NULL },
 };
 
-/* Lengths in units of size. */
+/* Lengths in units of size, by the letters of the links. */
 static const double a = 38, b = 41.5, c = 39.3, d = 40.1, e = 55.8, f = 39.4, g = 36.7, h = 65.7, i = 49, j = 50,
                     k = 61.9, l = 7.8, crank = 15;
 
@@ -29,13 +29,13 @@ typedef struct {
 
 /* The point at distances r from P and s from Q, to the left of the line from P to Q, with its velocity. */
 static point intersection (point P, double r, point Q, double s) {
-  double x = Q.x - P.x, y = Q.y - P.y, D = x * x + y * y, along = (D + r * r - s * s) / (2 * D);
-  double aside = sqrt (r * r / D - along * along);
+  double x = Q.x - P.x, y = Q.y - P.y, square = x * x + y * y, along = (square + r * r - s * s) / (2 * square);
+  double aside = sqrt (r * r / square - along * along);
   point X = { P.x + along * x - aside * y, P.y + along * y + aside * x, 0, 0 };
-  double px = X.x - P.x, py = X.y - P.y, qx = X.x - Q.x, qy = X.y - Q.y, area = px * qy - py * qx;
+  double px = X.x - P.x, py = X.y - P.y, qx = X.x - Q.x, qy = X.y - Q.y, cross = px * qy - py * qx;
   double vp = px * P.vx + py * P.vy, vq = qx * Q.vx + qy * Q.vy;
-  X.vx = (vp * qy - vq * py) / area;
-  X.vy = (vq * px - vp * qx) / area;
+  X.vx = (vp * qy - vq * py) / cross;
+  X.vy = (vq * px - vp * qx) / cross;
   return X;
 }
 

@@ -24,11 +24,6 @@ static const pw_parameter parameters[] = {
   { .name = NULL },
 };
 
-/* The angle of joint i: the link behind it relative to the one ahead. */
-static double joint_angle (const snake *p, int i) {
-  return p->amplitude * cos (-p->lag * i);
-}
-
 static void motor (pw_model *m, const snake *p, int i, const char *link, const char *ahead) {
   char name[24];
   snprintf (name, sizeof name, "motor%d", i);
@@ -48,7 +43,7 @@ static void build (pw_model *m, const void *parameter) {
   double x = 0, y = 0, phi = 0; /* front end and angle of a link */
   char link[24], ahead[24] = "", name[24];
   for (int i = 0; i < (int)p->n; i++) {
-    phi += i ? joint_angle (p, i) : 0;
+    if (i > 0) phi += p->amplitude * cos (p->lag * i); /* of the joint with the link ahead */
     double c = p->l * cos (phi), s = p->l * sin (phi);
     snprintf (link, sizeof link, "link%d", i + 1);
     pw_add_body (m, &(pw_body){ .name = link,

@@ -1,4 +1,4 @@
-/* Internals of a run, shared by the integrators.  For solvers/ only. */
+/* The data of a run and the functions that the integrators share.  For solvers/ only. */
 #ifndef PW_METHOD_H
 #define PW_METHOD_H
 
@@ -13,38 +13,40 @@ enum { PW_MAX_OPTIONS = 12 };
 
 struct pw_scene_step;
 
+/* Lengths of arrays: coords and rows are the numbers of coordinates and of constraint equations, entries that of the
+ * ledger, which holds the work or loss of each element that exchanges energy. */
 struct pw_run {
   const pw_system *s;
-  pw_workspace *w;
+  pw_workspace *w; /* results of evaluations of s */
   const pw_method *method;
   int stabilisation;             /* index in method->stabilisations */
   double option[PW_MAX_OPTIONS]; /* one per method->options */
   pw_settings settings;
   int fixed_steps;             /* 1: fixed step size */
-  pw_saddle *saddle;           /* mass matrix, all constraint equations: accelerations, impulses */
+  pw_saddle *saddle;           /* matrix of M and all active rows: for accelerations, impulses */
   const unsigned char *active; /* rows: 0 for redundant ones; NULL: none is redundant */
   int redundant;               /* number of redundant rows; the following only if there are any */
-  int redundant_moves;         /* 1: one of them has an eta, so that work depends on its multiplier */
+  int redundant_moves;         /* 1: one of them is driven, so that work depends on its multiplier */
   int *redundant_row;          /* redundant: their indices */
-  unsigned char *independent;  /* rows: the run's own `active` */
+  unsigned char *independent;  /* rows: what `active` points to */
   double *coefficient;         /* redundant x rows: each redundant row as a combination of active rows */
   double *normal;              /* redundant x (redundant + 1): normal equations of least-norm multipliers */
-  double *row_force, *zero;    /* coords + 3, rows: right-hand sides */
+  double *row_force, *zero;    /* coords + 3, rows: right-hand sides for the coefficients of a redundant row */
   double *least_norm;          /* rows: least-norm multipliers for the ledger */
   char *rank_memory;
   double independence;                      /* of the active rows at the state reached (rank.h) */
-  double reselect_below;                    /* independence below which other rows are tried */
+  double reselect_below;                    /* independence below which other active rows are tried */
   const struct pw_specialised *specialised; /* compiled code of the scene in use, or NULL */
   struct pw_scene *scene;                   /* data of that code */
   char *scene_memory;
   int scene_ready;        /* 1: its constants have been computed */
-  pw_watchdog limits;     /* thresholds */
+  pw_thresholds limits;   /* thresholds of the watchdog */
   pw_geometry geometry;   /* distance of the constraints from a singular configuration */
-  double refuse;          /* sine at which an evaluation is refused */
+  double refused_sine;    /* sine below which an evaluation is refused */
   int near_singular;      /* 1 after an evaluation near a singular configuration */
   double reference_level; /* largest acceleration norm away from singular configurations, in units of L / T^2; >= 1 */
   double previous_norm;   /* acceleration norm of the last such state */
-  int differentiates;     /* 1: the method uses the derivatives of the equations (tangent.h) */
+  int uses_derivatives;   /* 1: the method uses the derivatives of the equations (tangent.h) */
   double alpha, beta;     /* Baumgarte's, used by pw_run_accelerate; 0: none */
   double breakpoint;      /* first discontinuity of a signal after t */
   int stalled;            /* consecutive steps that did not advance */
@@ -62,28 +64,30 @@ struct pw_run {
   double *q_at, *v_at, *a_at, *lambda_at, *ledger_at; /* same layout */
   double projected_at;
 
-  int stopped;     /* 1: settings.stop requested it */
+  int stopped;     /* 1: settings.stop has requested it */
   int interrupted; /* 1: inside a step of SUNDIALS, which must be restarted */
-  double mark_time,
-      mark_speed; /* last record of the largest speed: elapsed time [s], doubled each time; speed (limits.c) */
-  double before_time, before_speed; /* the same of the record before */
+  struct {
+    double time, speed; /* time since the start [s]; the largest speed then, in units of the scene (limits.c) */
+  } speed_record, earlier_record; /* the last record; the one at half its time */
 
-  double energy0, potential0; /* initial kinetic + potential energy; initial potential energy */
-  double exchanged;           /* the largest kinetic energy or change of potential energy so far (ledger.c) */
-  double power;               /* the largest sum of the ledger's rates so far */
-  double energy_scene; /* kinetic energy at the velocities L and 1 rad per span; for a massless scene see ledger.c */
-  double *scratch;     /* 2 (coords + 3) + 3 rows, for projections and evaluations */
-  double *saturation;  /* 2 coords: upper bounds of tolerances; INFINITY: unbounded */
-  double *matrix_state, *matrix_range; /* 2 coords: state at which the Newton matrix was evaluated; its
-                                           valid range; only if the system `saturates` */
+  double energy0, potential0; /* initial kinetic + potential energy; initial potential energy [J] */
+  double exchanged;           /* the largest kinetic energy or change of potential energy so far [J] (ledger.c) */
+  double power;               /* the largest sum of the ledger's rates so far [W] */
+  double scene_energy;        /* kinetic energy [J] of a motion by L or 1 rad in the span; if massless: see ledger.c */
+  double *scratch;            /* 2 (coords + 3) + 3 rows, for projections and evaluations */
+  double *saturation;         /* 2 coords: upper bounds of tolerances; INFINITY: unbounded */
+  double *matrix_state, *matrix_range; /* 2 coords: state at which the Newton matrix was evaluated, range around it
+                                        * in which it is valid; only if the system `saturates` */
   int outdated;                        /* 1: the state reached is outside that range */
-  double *q_given, *v_given;
-  unsigned char *origin; /* 2 coords: of initial values, as in pw_system */
+  double *q_given, *v_given;           /* coords + 3: initial values before they were made consistent */
+  unsigned char *origin;               /* 2 coords: of initial values, as in pw_system */
   pw_initial_report initial;
   pw_statistics statistics;
   pw_method_data *data; /* private to the integrator */
   char *memory;
 };
+
+/* ---- Tolerances ---- */
 
 /* Absolute tolerance of a state, numbered as in pw_system_find_state: the user's atol, or rtol in units of the
  * scene. */
@@ -93,10 +97,10 @@ static inline double pw_atol (const pw_run *r, int state) {
   double atol = r->settings.rtol * pw_unit (r->s, state < n ? state : state - n);
   return state < n ? atol : atol / r->w->scale.time;
 }
-/* Updates r->saturation, the change of state that reverses a saturating force, and r->outdated, at the state
- * reached, whose kinematics must be up to date (tolerances.c). */
+/* Updates r->saturation, the bounds of tolerances due to saturating forces, and r->outdated at the state reached, whose
+ * kinematics must be up to date (tolerances.c). */
 void pw_bound_tolerances (pw_run *r);
-/* Change of a state (numbered as in pw_system_find_state) from the state reached that reverses a force. */
+/* Change of a state (numbered as in pw_system_find_state) from the state reached that reverses a saturating force. */
 double pw_saturation_range (const pw_run *r, int state);
 /* Records the state at which the Newton matrix was evaluated; kinematics must be up to date there. */
 void pw_matrix_evaluated (pw_run *r, const double *q, const double *v);
@@ -105,18 +109,34 @@ void pw_matrix_evaluated (pw_run *r, const double *q, const double *v);
 static inline double pw_tolerance (const pw_run *r, int state, double value) {
   return fmin (r->settings.rtol * fabs (value) + pw_atol (r, state), r->saturation[state]);
 }
-/* 1 if the step size is fixed. */
 static inline int pw_fixed_steps (const pw_run *r) {
   return r->fixed_steps;
 }
-/* End of the next fixed-size step, `count` steps after the time `base`: a multiple of the size, t_end or a breakpoint,
- * whichever is first; *whole = 1 for the first.  Times within 1e-9 h of each other differ by round-off only. */
-static inline double pw_step_end (const pw_run *r, double base, long count, double t_end, int *whole) {
-  double h = r->settings.step, t1 = base + (double)(count + 1) * h,
-         stop = t_end < r->breakpoint ? t_end : r->breakpoint;
+
+/* ---- Fixed steps, which end at multiples of the step size after a time `base` ---- */
+
+typedef struct {
+  double base;
+  long count; /* steps since then */
+} pw_step_counter;
+
+/* End of the next step of size h: the next multiple of h, or t_end or a breakpoint if one of them is earlier; *whole: 1
+ * if it is the multiple.  Times within 1e-9 h of each other differ by round-off only. */
+static inline double pw_step_end (const pw_run *r, const pw_step_counter *c, double t_end, int *whole) {
+  double h = r->settings.step, t1 = c->base + (double)(c->count + 1) * h, stop = fmin (t_end, r->breakpoint);
   *whole = t1 < stop + 1e-9 * h;
   return t1 > stop - 1e-9 * h ? stop : t1;
 }
+/* Counts a step to t1; after one that is not whole, steps are counted from t1. */
+static inline void pw_count_step (pw_step_counter *c, int whole, double t1) {
+  c->count++;
+  if (!whole) *c = (pw_step_counter){ .base = t1 };
+}
+static inline void pw_serialise_counter (pw_step_counter *c, pw_archive *a) {
+  pw_archive_bytes (a, &c->base, sizeof c->base);
+  pw_archive_count (a, &c->count);
+}
+
 /* 1 if the run's stabilisation is of this kind. */
 static inline int pw_stabilised_by (const pw_run *r, pw_stabilisation_kind kind) {
   return r->method->stabilisations[r->stabilisation].kind == kind;
@@ -129,17 +149,11 @@ static inline int pw_stabilised_by (const pw_run *r, pw_stabilisation_kind kind)
   }
 
 /* Baumgarte's options, the same for all integrators. */
-#define PW_BAUMGARTE_OPTIONS                                                                   \
-  { .name = "alpha",                                                                           \
-    .with = "baumgarte",                                                                       \
-    .value = 10,                                                                               \
-    .domain = PW_NONNEGATIVE,                                                                  \
-    .unit = "1/s",                                                                             \
-    .about = "damping of the residuals" },                                                     \
-  {                                                                                            \
-    .name = "beta", .with = "baumgarte", .value = 10, .domain = PW_NONNEGATIVE, .unit = "1/s", \
-    .about = "stiffness of the position residuals"                                             \
-  }
+#define PW_BAUMGARTE_OPTION(NAME, ABOUT) \
+  { .name = NAME, .with = "baumgarte", .value = 10, .domain = PW_NONNEGATIVE, .unit = "1/s", .about = ABOUT }
+#define PW_BAUMGARTE_OPTIONS                                 \
+  PW_BAUMGARTE_OPTION ("alpha", "damping of the residuals"), \
+      PW_BAUMGARTE_OPTION ("beta", "stiffness of the position residuals")
 
 /* Options of the projection; pw_projector_open_by_options reads all but `every`. */
 #define PW_PROJECTION_OPTIONS                                                                         \
@@ -157,6 +171,11 @@ extern const char *const pw_metrics[];
  * saturating forces depend on change by at most their tolerance, unless that takes less than 1e-9 T. */
 double pw_first_step (const pw_run *r);
 
+/* Step size of an adaptive method below which steps vanish in the round-off of the time. */
+static inline double pw_least_step (const pw_run *r) {
+  return 16 * DBL_EPSILON * fmax (fabs (r->t), 1e-6 * r->w->scale.time);
+}
+
 /* ---- Parts of opening and advancing a run (run.c) ---- */
 
 /* Adds the name of the signal that failed in the last attempted step, if any, to the error.  Returns status. */
@@ -168,18 +187,21 @@ int pw_run_open_saddle (pw_run *r, pw_error *error);
 /* Evaluates accelerations, multipliers and the ledger's powers at the state reached; errors contain the reason. */
 int pw_run_evaluate (pw_run *r, pw_error *error);
 
-/* Sets the reference values of the watchdog at the state reached, which must be regular. */
+/* Restarts the watchdog at the state reached, which must be regular, and makes the independence of its active rows the
+ * reference for later states. */
 void pw_run_set_references (pw_run *r);
 
-/* Finds the next discontinuity after the state reached. */
+/* Finds the next discontinuity after the state reached, r->breakpoint. */
 int pw_run_look_ahead (pw_run *r, pw_error *error);
 
-/* Makes the accelerations of this state the reference level for later ones. */
+/* Makes the norm of the accelerations at the state reached the reference level for later ones. */
 void pw_run_set_reference_level (pw_run *r);
 
-/* Plans the linear algebra at the state reached, where J is evaluated, and reopens the method.  fresh: reference
- * pivots are those of this state; otherwise they are unchanged. */
-int pw_run_renew (pw_run *r, int fresh, pw_error *error);
+/* Whether pw_run_renew sets the references anew or keeps them (pw_run_set_references). */
+typedef enum { PW_KEEP_REFERENCES, PW_NEW_REFERENCES } pw_references;
+
+/* Opens the saddle and the method anew at the state reached, where J is evaluated. */
+int pw_run_renew (pw_run *r, pw_references references, pw_error *error);
 
 /* Numbers in q, v, a and lambda of a state. */
 static inline size_t pw_state_length (const pw_system *s) {
@@ -193,6 +215,13 @@ static inline int pw_fail_signal (double t, pw_error *error) {
   return pw_fail (error, PW_METHOD, "t = %.6g s: a signal failed", t);
 }
 
+/* 1 if the sum of the squares of a state's numbers does not overflow: no number is NaN, infinite or too large. */
+static inline int pw_is_finite_state (const pw_run *r, const double *q, const double *v) {
+  double sum = 0;
+  for (int j = 0; j < r->s->coords; j++) sum += q[j] * q[j] + v[j] * v[j];
+  return sum < 1e300;
+}
+
 /* Updates kinematics and evaluates J at a state; returns as pw_update_kinematics. */
 static inline int pw_evaluate_J_at (pw_workspace *w, double t, const double *q, const double *v) {
   int status = pw_update_kinematics (w, t, q, v);
@@ -201,8 +230,8 @@ static inline int pw_evaluate_J_at (pw_workspace *w, double t, const double *q, 
 }
 
 /* The larger of two values; NaN if either is NaN, unlike pw_larger. */
-static inline double pw_larger_or_nan (double most, double x) {
-  return x > most || isnan (x) ? x : most;
+static inline double pw_larger_or_nan (double x, double y) {
+  return y > x || isnan (y) ? y : x;
 }
 
 /* Norm of the accelerations at the state reached, in units of L / T^2 (watchdog.c). */
@@ -231,16 +260,21 @@ int pw_run_check_resolution (pw_run *r, pw_error *error);
 
 /* ---- Energy (ledger.c) ---- */
 
-/* Record the initial energies, and those of the state reached; kinematics must be up to date. */
+/* Kinetic and potential energy [J] at the velocities v; kinematics must be up to date. */
+static inline double pw_energy (const pw_run *r, const double *v) {
+  return pw_kinetic (r->s, v) + pw_potential (r->w);
+}
+
+/* Record the energies of the initial state, and of the state reached; kinematics must be up to date. */
 void pw_ledger_begin (pw_run *r);
-void pw_ledger_note (pw_run *r);
+void pw_ledger_record (pw_run *r);
 
 /* Powers of the ledger's entries [W] from the multipliers of the active rows, where kinematics are up to date and J is
  * evaluated.  Work is divided between redundant drives like their least-norm reactions. */
 void pw_ledger_rates (pw_run *r, const double *lambda, double *rate);
 
 /* 1 if work or losses depend on multipliers. */
-int pw_ledger_reacts (const pw_system *s);
+int pw_ledger_uses_multipliers (const pw_system *s);
 
 /* Tolerance of the total work and loss of a step of size h [J]: rtol times the energy exchanged so far, at least
  * that of the scene at L per span; not below the round-off of their rates. */
@@ -248,22 +282,20 @@ double pw_ledger_tolerance (const pw_run *r, double h);
 
 /* ---- Dynamics ---- */
 
-/* pw_run_accelerate leaves J evaluated and the saddle factorised. */
-
 /* A step that ends at a discontinuity evaluates signals just before it. */
 static inline double pw_before_breakpoint (const pw_run *r, double t) {
   return t < r->breakpoint ? t : nextafter (r->breakpoint, -INFINITY);
 }
 
-/* pw_run_accelerate where J is evaluated and the saddle factorised at this configuration, and velocities are up to
- * date. */
+/* pw_run_accelerate, which leaves J evaluated and the saddle factorised, where they are so already, and velocities are
+ * up to date. */
 void pw_run_accelerate_updated (pw_run *r, const double *v, double *a, double *lambda);
 
 /* The same where the saddle is not factorised. */
 int pw_run_accelerate_evaluated (pw_run *r, const double *v, double *a, double *lambda);
 
-/* Copies the state reached to the sample arrays; updates kinematics and J there. */
-void pw_show_reached (pw_run *r);
+/* Makes the state reached the sample; updates kinematics and J there. */
+void pw_sample_reached (pw_run *r);
 
 /* Reports why the J last evaluated is unusable at time t: rank lost or nearly lost, or values too extreme
  * (singular.c). */
@@ -271,29 +303,29 @@ int pw_fail_singular (pw_run *r, double t, pw_error *error);
 
 /* Adds the residuals of the state just evaluated to r->residuals and the statistics; those that a projection has
  * computed are reused. */
-void pw_note_residuals (pw_run *r);
+void pw_record_residuals (pw_run *r);
 static inline void pw_forget_residuals (pw_run *r) {
   r->residuals.position = r->residuals.velocity = NAN;
 }
 
 /* ---- Projection ---- */
 
-/* Scaled residuals to which an iteration converges, the round-off of the few terms of a row; accepted where it
- * stalls. */
-#define PW_RESIDUAL_GOOD (4 * DBL_EPSILON)
-#define PW_RESIDUAL_ENOUGH (64 * DBL_EPSILON)
+/* Scaled residuals: the round-off of the few terms of a row, to which an iteration converges; the largest that is
+ * accepted where it stalls. */
+#define PW_RESIDUAL_CONVERGED (4 * DBL_EPSILON)
+#define PW_RESIDUAL_ACCEPTED (64 * DBL_EPSILON)
 
 typedef struct {
-  pw_saddle *position;         /* position metric, holonomic rows; or the run's saddle */
-  int own_position;            /* position is not the run's saddle */
-  pw_saddle *velocity;         /* all rows */
-  int own_velocity;            /* velocity is not the run's saddle */
-  int iterations;              /* of the last position projection */
+  pw_saddle *position;         /* of the metric of positions and the holonomic rows; or the run's saddle */
+  int owns_position;           /* 1: position is not the run's saddle */
+  pw_saddle *velocity;         /* of the metric of velocities and all rows */
+  int owns_velocity;           /* 1: velocity is not the run's saddle */
+  int iterations;              /* of the last projection of positions */
   const unsigned char *active; /* rows that are enforced; NULL: all */
-  int alone;                   /* 1: inactive rows are not checked */
-  int by_mass;                 /* 1: both metrics are the mass matrix */
-  int row;                     /* worst row of the last position projection */
-  int against;                 /* redundant row violated after it, or -1 */
+  int ignores_inactive;        /* 1: the residuals of the other rows are not checked */
+  int mass_metric;             /* 1: both metrics are the mass matrix */
+  int worst_row;               /* with the largest residual in the last projection of positions */
+  int contradictory_row;       /* redundant row that is violated after it, or -1 */
 } pw_projector;
 
 /* Position metric `weight_q` and velocity metric `weight_v` (NULL: the mass matrix).  J must be evaluated at a typical
@@ -315,9 +347,13 @@ int pw_project_velocities (pw_projector *p, pw_run *r, double *v);
  * Velocities that satisfy J v = eta to round-off may stay unchanged. */
 int pw_project_state (pw_projector *p, pw_run *r, double t, double *q, double *v, double *a, double *lambda);
 
-/* Removes from an error of positions or velocities the part that a projection onto the first `rows` equations
- * removes, in the metric of the saddle `k` (all rows), which must be factorised at the current configuration. */
-void pw_project_error (pw_run *r, pw_saddle *k, double *e, int rows);
+/* The same; *added_energy, unless it is NULL, grows by the energy [J] that the projection adds (ledger.c). */
+int pw_project_with_energy (pw_projector *p, pw_run *r, double t, double *q, double *v, double *a, double *lambda,
+                            double *added_energy);
+
+/* Removes from an error e of positions or velocities the part that a projection onto the first `rows` equations
+ * removes, in the metric of `saddle` (all rows), which must be factorised at the current configuration. */
+void pw_project_error (pw_run *r, pw_saddle *saddle, double *e, int rows);
 
 /* ---- Specialised code (specialised.c) ---- */
 
@@ -336,7 +372,7 @@ int pw_specialised_stages (pw_run *r, const struct pw_scene_step *x);
 /* Residuals of the state reached, unless they are known or the general engine has to evaluate them. */
 void pw_specialised_residuals (pw_run *r);
 
-/* 1 if specialised code may do the run's next evaluation. */
+/* 1 if specialised code can do the run's next evaluation. */
 int pw_specialised_suits (const pw_run *r);
 /* Passes the scales of residuals to specialised code. */
 void pw_specialised_scale (pw_run *r);
@@ -348,7 +384,7 @@ void pw_specialised_count (pw_run *r, long evaluations, long iterations);
 /* Makes r->q, r->v consistent at r->t and fills the report; origin (or NULL): origins of states, of which those given
  * or specified are kept if possible.  Errors: PW_INITIAL. */
 int pw_run_make_consistent (pw_run *r, const unsigned char *origin, pw_error *error);
-/* Counts the states that moved, in the report; needs the scales. */
+/* Counts in the report the states that differ from the given ones; needs the scales. */
 void pw_run_count_moved (pw_run *r);
 
 #endif

@@ -1,4 +1,5 @@
-/* The list of integrators: a new file in solvers/ needs one line here. */
+/* The list of integrators, for which a new one needs a line here, and the reading of method names with their
+ * options. */
 #ifndef PW_METHODS_H
 #define PW_METHODS_H
 
@@ -17,8 +18,8 @@
   PW_METHOD (leapfrog)
 #endif
 
-/* pw_method_parse that also returns the options, in values (PW_MAX_OPTIONS), and searches the caller's `own` methods
- * (NULL: none), too. */
+/* pw_method_parse that also returns the values of the options (PW_MAX_OPTIONS numbers), and also searches the caller's
+ * `own` methods (NULL: none). */
 int pw_parse_options (const char *text, const pw_method *const *own, const pw_method **method, int *stabilisation,
                       double *values, pw_error *error);
 

@@ -1,4 +1,4 @@
-/* Integration methods of your own, compiled against the installed headers (docs/method.c is one).
+/* Integration methods of your own, compiled against the installed headers (docs/method.c is an example).
  *
  * A method is a const pw_method table (pinwheel-solvers.h).  A program passes its tables in pw_settings.methods;
  * their names then work in pw_run_open like those of built-in methods, with stabilisations and options.  The run
@@ -6,7 +6,7 @@
  * next discontinuity.  It evaluates the state reached, monitors constraints and energy, and calls `restart` after a
  * discontinuity.
  *
- * The functions below turn a formula for the new state into a one-step method:
+ * The functions below turn a formula for the new state into a one-step method, here the semi-implicit Euler method:
  *
  *     static int euler_open (pw_run *r, pw_error *error) { return pw_step_open (r, 2, error); }
  *
@@ -26,7 +26,7 @@
 
 PW_BEGIN
 
-/* The state reached.  The arrays belong to the run and change when a step is accepted. */
+/* The state reached, the end of the last step.  The arrays belong to the run and change when a step is accepted. */
 typedef struct {
   const pw_system *system;
   const pw_settings *settings; /* with defaults filled in */

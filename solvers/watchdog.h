@@ -1,8 +1,11 @@
-/* The watchdog checks that the computed states still follow the motion of the mechanism.
+/* The watchdog checks that the states of a run follow the motion of the mechanism: constraints are not lost, and the
+ * motion does not jump to another branch at a singular configuration.
  *
- * All thresholds are dimensionless and in one table: positions in units of the scene's length L, angles in radians.
- * Singular configurations are a property of J alone, with rows of length 1 and columns of angles divided by L: neither
- * masses nor the initial configuration matter. */
+ * Thresholds are dimensionless: positions in units of the scene's length L, angles in radians.  Singular
+ * configurations are a property of J alone, with rows of length 1 and columns of angles divided by L: neither masses
+ * nor the initial configuration matter.  The distance from them is measured by the smallest sine of the angle between
+ * a row of J and the space of those before it, called the sine below.  Branches are the motions between which a closed
+ * loop can change in a singular configuration, a change point. */
 #ifndef PW_WATCHDOG_H
 #define PW_WATCHDOG_H
 
@@ -10,46 +13,54 @@
 
 struct pw_run;
 
-/* The thresholds; a run has a copy.  Values and derivations are in singular.c. */
+/* The thresholds; a run has a copy.  Values and derivations are in singular.c.  A sine is that of the smallest angle
+ * between a row of J and those before it; a ratio is the sine over the largest one of the run. */
 typedef struct {
-  double lost, lost_unstabilised;  /* residuals above which constraints count as lost */
-  double follows, magnified;       /* residual of a redundant row: round-off; ratio to those of the others */
-  double rank, suspect, dependent; /* sines: rank lost; rank is examined; refused if the scene is too large for that */
-  double independent;              /* sine above which a row counts as independent */
-  double near, refine;     /* sines: near a singular configuration, relative to the largest; solutions are refined */
-  double regular;          /* sine that counts as regular, relative to the largest */
-  double turn, least_turn; /* growth of the accelerations in a turn; least reference level */
-  double drift_turn, drift_near;            /* residual over squared sine */
-  double drift_far, drift_any;              /* the same, above the residual drift_far: drift_any */
-  double jump;                              /* growth of the accelerations in a jump */
-  double lipschitz, growth;                 /* change of the sine per unit of motion; of step sizes */
-  double unresolved, low, stride, progress; /* walks past a change point */
-  double floor, crossing, straight;         /* sines where branches cross; cosine of the angle of a straight passage */
-  double resolved;                          /* step over the distance of branches */
-  double lands;                             /* sine at the end of a step over that at its beginning */
-  double agree, agree_best;                 /* difference between two divisions of a step */
-  double sample, sample_best;               /* the same for a sample inside a step */
-  double loosened, loose;                   /* independence of the active rows */
+  double lost, lost_unstabilised;     /* residuals above which constraints count as lost */
+  double redundant_residual;          /* residual of a redundant row that is round-off */
+  double redundant_ratio;             /* ratio of its residual to those of the active rows */
+  double rank_lost;                   /* sine below which J has lost rank */
+  double rank_suspect, rank_refused;  /* sines: the rank is computed; too small where the scene is too large for that */
+  double independent;                 /* sine above which a row counts as independent */
+  double near, refine;                /* ratio near a singular configuration; sine below which solutions are refined */
+  double regular;                     /* ratio of a regular configuration */
+  double turn_growth, turn_reference; /* growth of the accelerations in a turn; least accelerations it refers to */
+  /* constraint residual over squared sine: where accelerations grow; where there are none to refer to */
+  double drift_turn, drift_near;
+  double drift_far, drift_any;      /* constraint residual; the same over squared sine, where it exceeds drift_far */
+  double jump_growth;               /* growth of the accelerations in a jump */
+  double lipschitz, step_growth;    /* change of the sine per unit of motion; ratio of a step size to the last one */
+  double unresolved, low;           /* sine within a step over those at its ends: corner not resolved; to be examined */
+  double stride, progress;          /* of walks past a change point: length over the sine; least gain of a stride */
+  double floor, crossing, straight; /* sines where branches cross; cosine of the angle of a straight passage */
+  double resolved;                  /* step over the distance of branches */
+  double ends_singular;             /* sine at the end of a step over that at its beginning */
+  double agree, agree_best;         /* difference between two divisions of a step: acceptable; aimed at */
+  double sample, sample_best;       /* the same for a sample inside a step */
+  double reselect_ratio, reselect_below; /* independence of the active rows, over the initial value, and itself */
   double extreme; /* the largest mass, and one over the smallest [kg]; the largest initial value */
   double stalled; /* consecutive steps that do not advance */
-} pw_watchdog;
+} pw_thresholds;
 
-extern const pw_watchdog pw_watchdog_limits;
+extern const pw_thresholds pw_watchdog_limits;
 
-/* Geometry of the constraints along a run. */
+/* The sine along a run, at the states reached. */
 typedef struct {
-  pw_saddle *saddle; /* weights 1 and L^2: its pivots are the sines; NULL: a tree of holonomic joints, never singular */
-  int loops;         /* 1: bodies form closed loops, whose branches can meet */
-  double sine, typical; /* the last sine computed; the largest at a state reached */
-  double state_sine;    /* the sine at the last accepted state for which it was computed */
-  double moved;         /* motion since then [units of L, rad] */
-  int alert;            /* 1: a singular configuration may be within the next step */
-  double step;          /* length of the last step, in the units of `moved` */
-  double t, start_sine; /* the previous state: time, sine (NaN: not computed) */
-  double *q;            /* and coordinates */
-  double before, slope; /* the sine one state before `state_sine`, or NaN; its fastest recent change */
-  int row;              /* the row that is most nearly dependent */
-  int crossed;          /* 1: a point where branches cross was passed recently */
+  pw_saddle *saddle;          /* of weights 1 and L^2, as in rank.h; NULL: a tree of holonomic joints, never singular */
+  int loops;                  /* 1: bodies form closed loops, whose branches can meet */
+  double evaluated_sine;      /* of the J last checked by pw_watchdog_near, perhaps of a stage */
+  double largest_sine;        /* 0: not known yet */
+  double checked_sine;        /* at the last state for which it was computed */
+  double moved;               /* motion since then [units of L, rad] */
+  double sine_before_checked; /* one state before that; NaN: not computed */
+  double sine_slope;          /* fastest recent change of the sine per unit of motion */
+  int dependent_row;          /* the row that is most nearly dependent */
+  int singular_ahead;         /* 1: a singular configuration may be within the next step */
+  int crossed;                /* 1: a point where branches cross was passed recently */
+  double step_length;         /* of the last step, in the units of `moved` */
+  double previous_t;          /* where the last step began: the time, */
+  double *previous_q;         /* the coordinates, */
+  double previous_sine;       /* and the sine; NaN: not computed */
 } pw_geometry;
 
 int pw_watchdog_open (struct pw_run *r, pw_error *error);
@@ -58,8 +69,8 @@ void pw_watchdog_close (struct pw_run *r);
 /* Restarts at the state reached, where J is evaluated. */
 void pw_watchdog_begin (struct pw_run *r);
 
-/* The smallest sine of the angle between a row of J and those before it, with the J last evaluated; *row (if not
- * NULL): that row, or -1. */
+/* The smallest sine of the angle between a row of the J last evaluated and those before it; *row (unless NULL): that
+ * row, or -1. */
 double pw_watchdog_sine (struct pw_run *r, int *row);
 
 /* pw_watchdog_near at the state reached, which it evaluates. */
@@ -69,14 +80,15 @@ int pw_watchdog_near_state (struct pw_run *r);
  * PW_INPUT. */
 int pw_watchdog_check_values (const struct pw_run *r, pw_error *error);
 
-/* 1 if the J last evaluated is near a singular configuration; geometry.sine is then its sine. */
+/* 1 if the J last evaluated is near a singular configuration; geometry.evaluated_sine is then its sine. */
 int pw_watchdog_near (struct pw_run *r);
 
-/* Checks that the motion has come from geometry.q to the state reached without leaving its branch (change_point.c). */
+/* Checks that the motion has come from geometry.previous_q to the state reached without leaving its branch; sine: that
+ * at the state reached (change_point.c). */
 int pw_change_point_check (struct pw_run *r, double sine, pw_error *error);
 
-/* Checks that a step of fixed size resolves a change point that the motion has passed at a small distance; `last`:
- * the sine one state earlier.  Adaptive methods have error control instead. */
-int pw_change_point_resolve (struct pw_run *r, double last, pw_error *error);
+/* Checks that a step of fixed size resolves a change point that the motion has passed at a small distance; last_sine:
+ * that one state earlier, NaN if it was not computed.  Adaptive methods have error control instead. */
+int pw_change_point_resolve (struct pw_run *r, double last_sine, pw_error *error);
 
 #endif

@@ -1,4 +1,4 @@
-/* Buffers that a state is saved to and loaded from. */
+/* Buffers that the state of a run is saved to and loaded from. */
 #include <limits.h>
 #include <stdlib.h>
 #include <string.h>
@@ -16,6 +16,7 @@ void pw_archive_bytes (pw_archive *a, void *bytes, size_t count) {
   a->used += count;
 }
 
+/* Half of what a long can be: the caller may add to it. */
 void pw_archive_count (pw_archive *a, long *count) {
   pw_archive_bytes (a, count, sizeof *count);
   if (a->loading && (*count < 0 || *count > LONG_MAX / 2)) a->failed = 1;

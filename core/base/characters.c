@@ -1,19 +1,21 @@
-/* Checks of external texts: UTF-8 without control characters, which could move a terminal's cursor or change its
- * colours. */
+/* Checks of external texts: UTF-8 without control characters, which could move a terminal's cursor. */
 #include <string.h>
 #include "util.h"
 
 int pw_utf8_size (const char *text) {
-  static const unsigned least[] = { 0, 0x80, 0x800, 0x10000 };
+  static const unsigned least[] = { 0, 0x80, 0x800,
+                                    0x10000 }; /* code by the number of following bytes; below, it is overlong */
   const unsigned char *p = (const unsigned char *)text;
-  int more = p[0] < 0x80 ? 0 : p[0] >> 5 == 6 ? 1 : p[0] >> 4 == 14 ? 2 : p[0] >> 3 == 30 ? 3 : -1;
-  if (more < 0) return 0;
-  unsigned c = more ? p[0] & (0x3Fu >> more) : p[0];
-  for (int i = 1; i <= more; i++) {
+  /* The first byte is 0xxxxxxx, 110xxxxx, 1110xxxx or 11110xxx, the following ones are 10xxxxxx. */
+  int following = p[0] < 0x80 ? 0 : p[0] >> 5 == 6 ? 1 : p[0] >> 4 == 14 ? 2 : p[0] >> 3 == 30 ? 3 : -1;
+  if (following < 0) return 0;
+  unsigned code = following ? p[0] & (0x3Fu >> following) : p[0];
+  for (int i = 1; i <= following; i++) {
     if (p[i] >> 6 != 2) return 0;
-    c = c << 6 | (p[i] & 0x3Fu);
+    code = code << 6 | (p[i] & 0x3Fu);
   }
-  return c < least[more] || c > 0x10FFFF || (c >= 0xD800 && c < 0xE000) ? 0 : more + 1;
+  int surrogate = code >= 0xD800 && code < 0xE000;
+  return code < least[following] || code > 0x10FFFF || surrogate ? 0 : following + 1;
 }
 
 int pw_control (const char *text) {
@@ -31,8 +33,8 @@ int pw_is_text (const char *text) {
 void pw_text_sanitise (char *text) {
   for (int n; *text; text += n) {
     n = pw_utf8_size (text);
-    int bad = n == 0 || pw_control (text);
+    int replace = n == 0 || pw_control (text);
     if (n == 0) n = 1;
-    if (bad) memset (text, '?', (size_t)n);
+    if (replace) memset (text, '?', (size_t)n);
   }
 }

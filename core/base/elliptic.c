@@ -1,23 +1,25 @@
-/* Jacobi's elliptic functions (the exact motion of a pendulum) from the arithmetic-geometric mean a after N steps:
+/* The complete elliptic integral K and Jacobi's amplitude am, which give the exact motion of a pendulum, from the
+ * arithmetic-geometric mean a_N of N steps:
  *
- *     K (m) = pi / (2 a),   am (u) from phi = 2^N a u by N steps of  2 phi = phi' + asin (c' sin phi' / a')
+ *     K (m) = pi / (2 a_N),   am (u | m) = phi_0,
+ *     phi_N = 2^N a_N u,      2 phi_(n-1) = phi_n + asin (c_n sin phi_n / a_n)
  *
  * (Abramowitz & Stegun 1964, sections 16.4 and 17.6.) */
 #include "elliptic.h"
 #include "pinwheel.h"
 
 double pw_elliptic_K (double m) {
-  double a, ratio[PW_ELLIPTIC_STEPS], part[PW_ELLIPTIC_STEPS];
+  double a, c_by_a[PW_ELLIPTIC_STEPS], c_by_m[PW_ELLIPTIC_STEPS];
   if (!(m < 1)) return m == 1 ? INFINITY : NAN;
-  pw_elliptic_mean (m, &a, ratio, part);
+  pw_elliptic_mean (m, &a, c_by_a, c_by_m);
   return PW_PI / (2 * a);
 }
 
 double pw_jacobi_am (double u, double m) {
-  double a, ratio[PW_ELLIPTIC_STEPS], part[PW_ELLIPTIC_STEPS];
+  double a, c_by_a[PW_ELLIPTIC_STEPS], c_by_m[PW_ELLIPTIC_STEPS];
   if (!(m < 1)) return m == 1 ? 2 * atan (tanh (u / 2)) : NAN;
-  int n = pw_elliptic_mean (m, &a, ratio, part);
+  int n = pw_elliptic_mean (m, &a, c_by_a, c_by_m);
   double phi = ldexp (a * u, n);
-  while (n-- > 0) phi = (phi + asin (ratio[n] * pw_sin (phi))) / 2;
+  while (n-- > 0) phi = (phi + asin (c_by_a[n] * pw_sin (phi))) / 2;
   return phi;
 }

@@ -1,4 +1,4 @@
-/* Recording of errors. */
+/* Records errors: a pw_error keeps the first one, with its text cut to fit and made printable. */
 #include <stdarg.h>
 #include <stdio.h>
 #include "util.h"

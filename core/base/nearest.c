@@ -1,11 +1,10 @@
-/* Suggestions of valid names, and domains of numbers. */
+/* Suggestions of valid names for unknown ones, and the domains of numbers, for messages. */
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
 #include "util.h"
 
-/* Edit distance (Levenshtein 1966), keeping one row of the table; a candidate longer than the row has its length as
- * distance. */
+/* Edit distance (Levenshtein 1966), keeping one row of the table; of a candidate longer than the row, its length. */
 static size_t nearest_distance (const char *a, const char *b) {
   size_t row[64], n = strlen (b);
   if (n >= sizeof row / sizeof *row) return n;
@@ -69,10 +68,10 @@ const char *pw_nearest_text (pw_nearest *n) {
   return n->hint;
 }
 
-int pw_find_name (const void *table, size_t entry, const char *name, char hint[PW_HINT]) {
+int pw_find_name (const void *table, size_t entry_size, const char *name, char hint[PW_HINT]) {
   pw_nearest near = { .sought = name };
   const char *known;
-  for (int i = 0; table && (known = *(const char *const *)(const void *)((const char *)table + (size_t)i * entry));
+  for (int i = 0; table && (known = *(const char *const *)(const void *)((const char *)table + (size_t)i * entry_size));
        i++) {
     if (strcmp (known, name) == 0) return i;
     pw_nearest_try (&near, known);

@@ -1,4 +1,4 @@
-/* Sine and cosine of one angle; beyond PW_SINE_LIMIT, and for what is not finite, those of the C library. */
+/* Sine and cosine of one angle [rad]; from PW_SINE_LIMIT on, and for infinity and NaN, those of the C library. */
 #include <math.h>
 #include "pinwheel.h"
 #include "sine.h"

@@ -1,9 +1,10 @@
-/* Sine and cosine, to 0.8 ulp for |x| < PW_SINE_LIMIT, in lanes of vector registers.
+/* Sine and cosine of angles x, to 0.8 ulp for |x| < PW_SINE_LIMIT, in all lanes of a vector register at once.
  *
- * x = n pi/2 + y with pi/2 in three parts of 33 bits, whose products with n are exact, and a tail (Cody & Waite 1980).  The
- * differences keep their round-off, so that y + lo is accurate next to multiples of pi/2 too.  Sine and cosine of y are the
- * polynomials of fdlibm (Sun Microsystems 1993, k_sin.c and k_cos.c).  There are no branches, and nothing is fused, so
- * that the bits do not depend on the C library, the compiler or the processor. */
+ * x = n pi/2 + y + lo, where n is an integer, |y| <= pi/4 and lo is below the round-off of y: pi/2 is the sum of three
+ * parts of 33 bits, whose products with n are exact, and a tail (Cody & Waite 1980), and lo collects the tail and the
+ * round-off of the differences, so that y + lo is accurate next to multiples of pi/2 too.  Sine and cosine of y + lo
+ * are the polynomials of fdlibm (Sun Microsystems 1993, k_sin.c and k_cos.c).  There are no branches, and nothing is
+ * fused, so that the bits do not depend on the C library, the compiler or the processor. */
 #ifndef PW_SINE_H
 #define PW_SINE_H
 
@@ -15,12 +16,12 @@
 #endif
 
 enum { PW_SINE_LANES = 2 };
-#define PW_SINE_LIMIT 1e6
+#define PW_SINE_LIMIT 1e6 /* [rad]: n has at most 20 bits, and its product with 33 bits fits into 53 */
 
-#ifndef PW_LANES /* GNU C's vectors: operations work on all lanes */
+#ifndef PW_LANES /* vectors of GNU C, whose operators act on each lane */
 typedef double pw_lanes __attribute__ ((vector_size (8 * PW_SINE_LANES)));
 typedef uint64_t pw_lane_bits __attribute__ ((vector_size (8 * PW_SINE_LANES)));
-#else /* part of a loop over runs that the compiler vectorises */
+#else /* in code specialised for several runs at once: one of them, in a loop that the compiler vectorises */
 typedef double pw_lanes;
 typedef uint64_t pw_lane_bits;
 #endif
@@ -38,12 +39,12 @@ static inline pw_lanes pw_sine_value (pw_lane_bits bits) {
 }
 
 static inline pw_lanes pw_sine_polynomial (pw_lanes y, pw_lanes lo) {
-  pw_lanes z = y * y, v = z * y;
+  pw_lanes z = y * y, y3 = z * y;
   pw_lanes r =
       8.33333333332248946124e-03 +
       z * (-1.98412698298579493134e-04 +
            z * (2.75573137070700676789e-06 + z * (-2.50507602534068634195e-08 + z * 1.58969099521155010221e-10)));
-  return y - ((z * (0.5 * lo - v * r) - lo) + v * 1.66666666666666324348e-01);
+  return y - ((z * (0.5 * lo - y3 * r) - lo) + y3 * 1.66666666666666324348e-01);
 }
 
 static inline pw_lanes pw_cosine_polynomial (pw_lanes y, pw_lanes lo) {
@@ -58,17 +59,21 @@ static inline pw_lanes pw_cosine_polynomial (pw_lanes y, pw_lanes lo) {
 
 /* For |x| < PW_SINE_LIMIT in all lanes. */
 static inline void pw_sin_cos_lanes (pw_lanes x, pw_lanes *sine, pw_lanes *cosine) {
+  const double two_by_pi = 6.36619772367581382433e-01;
+  const double half_pi_1 = 1.57079632673412561417e+00, half_pi_2 = 6.07710050630396597660e-11,
+               half_pi_3 = 2.02226624871116645580e-21, half_pi_tail = 8.47842766036889956997e-32;
   const double integers = 6755399441055744.0; /* 1.5 x 2^52: a sum with it is rounded to an integer, its last bits */
-  pw_lanes shifted = x * 6.36619772367581382433e-01 + integers, n = shifted - integers;
-  /* Where a difference is smaller than what is subtracted, it is exact; else its round-off is (Dekker 1971). */
-  pw_lanes a = x - n * 1.57079632673412561417e+00, b = n * 6.07710050630396597660e-11,
-           c = n * 2.02226624871116645580e-21;
-  pw_lanes d = a - b, y = d - c, lo = (((a - d) - b) + ((d - y) - c)) - n * 8.47842766036889956997e-32;
+  pw_lanes shifted = x * two_by_pi + integers, n = shifted - integers;
+  pw_lanes y1 = x - n * half_pi_1, part2 = n * half_pi_2, part3 = n * half_pi_3;
+  pw_lanes y2 = y1 - part2, y = y2 - part3;
+  /* The round-off of both differences, exactly: one that is smaller than what is subtracted has none (Dekker 1971). */
+  pw_lanes lo = (((y1 - y2) - part2) + ((y2 - y) - part3)) - n * half_pi_tail;
+  /* In odd quadrants sine and cosine are exchanged; the second last bits of n and n + 1 are their signs. */
   pw_lane_bits quadrant = pw_sine_bits (shifted), odd = 0 - (quadrant & 1);
-  pw_lane_bits s = pw_sine_bits (pw_sine_polynomial (y, lo)), k = pw_sine_bits (pw_cosine_polynomial (y, lo)),
-               swap = (s ^ k) & odd;
-  *sine = pw_sine_value (s ^ swap ^ (quadrant >> 1 << 63));
-  *cosine = pw_sine_value (k ^ swap ^ ((quadrant + 1) >> 1 << 63));
+  pw_lane_bits sine_bits = pw_sine_bits (pw_sine_polynomial (y, lo)),
+               cosine_bits = pw_sine_bits (pw_cosine_polynomial (y, lo)), swap = (sine_bits ^ cosine_bits) & odd;
+  *sine = pw_sine_value (sine_bits ^ swap ^ (quadrant >> 1 << 63));
+  *cosine = pw_sine_value (cosine_bits ^ swap ^ ((quadrant + 1) >> 1 << 63));
 }
 
 #endif

@@ -1,4 +1,4 @@
-/* Tables of names, arenas, and arrays in one allocation. */
+/* Checksums, arrays that grow, tables of names, arenas, and arrays in one allocation. */
 #include <stdlib.h>
 #include <string.h>
 #include "util.h"
@@ -104,7 +104,7 @@ void *pw_layout_alloc (pw_layout *l, size_t count, size_t size) {
 
 int pw_layout_pass (pw_layout *l, char **memory) {
   if (l->base) return 0;
-  if (l->used == 0) { /* the first pass; counts on from here, so that the second one differs even for no arrays */
+  if (l->used == 0) { /* the first pass; it counts from 1, so that the second one is recognised even without arrays */
     *memory = NULL;
     l->used = 1;
     return 1;
@@ -114,14 +114,13 @@ int pw_layout_pass (pw_layout *l, char **memory) {
 }
 
 char *pw_alloc_arrays (const pw_array *array, size_t arrays) {
-  pw_layout l = { NULL, 0 };
-  for (size_t i = 0; i < arrays; i++) pw_layout_alloc (&l, array[i].count, sizeof (double));
-  l = (pw_layout){ calloc (1, l.used + 1), 0 };
-  for (size_t i = 0; i < arrays && l.base; i++) *array[i].at = pw_layout_alloc (&l, array[i].count, sizeof (double));
-  return l.base;
+  char *memory;
+  for (pw_layout l = { 0 }; pw_layout_pass (&l, &memory);)
+    for (size_t i = 0; i < arrays; i++) *array[i].at = pw_layout_alloc (&l, array[i].count, sizeof (double));
+  return memory;
 }
 
-int pw_reserve (size_t bytes) {
+int pw_check_memory (size_t bytes) {
   void *volatile p = malloc (bytes); /* volatile: keeps the compiler from removing the allocation */
   int status = p ? PW_OK : PW_RESOURCE;
   free (p);

@@ -1,5 +1,5 @@
-/* Streams into memory.  Those of open_memstream lose what does not fit into memory without setting the error indicator
- * (glibc 2.36), so a text could lack a part. */
+/* Streams into memory that report if any part of the text is missing.  open_memstream of glibc 2.36 does not: out of
+ * memory, it drops what is written without setting the error indicator. */
 #define _GNU_SOURCE /* fopencookie */
 #include <stdlib.h>
 #include <string.h>

@@ -12,8 +12,7 @@
 /* Replaces `static` of such a function. */
 #define PW_INLINE static inline __attribute__ ((always_inline))
 
-/* Replaces `static` of a rarely called function, so that the frequent path of its caller need not save its
- * registers. */
+/* Replaces `static` of a rarely called function, so that the frequent path of its caller saves no registers. */
 #define PW_NOINLINE static __attribute__ ((noinline))
 
 /* At the top of a file that reads pairs of numbers shortly after storing them one by one: a vector load would stall

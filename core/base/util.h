@@ -1,4 +1,4 @@
-/* Utilities: nearest names, texts, streams into memory, name tables, union-find, arenas, layouts. */
+/* Utilities of all parts of Pinwheel: suggestions of names, checks of texts, streams into memory, tables, memory. */
 #ifndef PW_UTIL_H
 #define PW_UTIL_H
 
@@ -6,10 +6,12 @@
 #include <stdio.h>
 #include "pinwheel.h"
 
-/* PW_INPUT if object is NULL, the result of an earlier call that failed; what: "a system". */
-static inline int pw_require (const void *object, const char *what, pw_error *error) {
-  return object ? PW_OK : pw_fail (error, PW_INPUT, "%s is missing", what);
+/* PW_INPUT if object is NULL, the result of an earlier call that failed; type: "a system". */
+static inline int pw_require (const void *object, const char *type, pw_error *error) {
+  return object ? PW_OK : pw_fail (error, PW_INPUT, "%s is missing", type);
 }
+
+/* ---- Nearest names, domains of numbers (nearest.c) ---- */
 
 enum { PW_HINT = 140 }; /* "; did you mean \"...\"?" with the longest name */
 
@@ -20,7 +22,7 @@ typedef struct {
   char best[120];          /* "" before the first candidate */
   size_t distance, length; /* distance of best from sought; length of the longer of the two */
   int near;                /* 1: best is near enough to suggest */
-  int overflow;            /* 1: `all` is too small for the valid names */
+  int overflow;            /* 1: the valid names do not fit into `all` */
   char all[88];            /* the valid names, separated by commas */
   char hint[PW_HINT];
 } pw_nearest;
@@ -28,9 +30,9 @@ void pw_nearest_try (pw_nearest *n, const char *candidate);
 /* The hint: "; did you mean \"steer\"?"; "; valid are x, y, z" if no name is near and all fit; else "". */
 const char *pw_nearest_text (pw_nearest *n);
 
-/* The index of a name in a table whose entries, of this size, begin with a name and whose last name is NULL; -1, with
- * the hint of pw_nearest_text, if it is not there.  The table may be NULL: it has no entries. */
-int pw_find_name (const void *table, size_t entry, const char *name, char hint[PW_HINT]);
+/* The index of a name in a table whose entries, of `entry_size` bytes, begin with a name and whose last name is NULL;
+ * -1, with the hint of pw_nearest_text, if it is not there.  The table may be NULL: it has no entries. */
+int pw_find_name (const void *table, size_t entry_size, const char *name, char hint[PW_HINT]);
 /* "", ">= 0", "> 0", "1, 2, ...", "0 to 1" */
 const char *pw_domain_text (pw_domain domain);
 /* "" if a value lies in the domain, else the expected one ("a number >= 0"). */
@@ -50,12 +52,14 @@ void pw_text_sanitise (char *text);
 /* ---- Streams into memory (stream.c) ---- */
 
 typedef struct {
-  char *text; /* zero-terminated; up to date after fflush */
-  size_t size, room;
+  char *text;        /* zero-terminated; up to date after fflush */
+  size_t size, room; /* bytes of the text; allocated */
 } pw_stream;
 FILE *pw_stream_open (pw_stream *t); /* NULL if out of memory */
 /* Closes f, which may be NULL.  PW_RESOURCE if any part of the text is missing: t->text is NULL then.  Free it. */
 int pw_stream_close (FILE *f, pw_stream *t);
+
+/* ---- Checksums, tables of names, memory (store.c) ---- */
 
 /* Continues the FNV-1a hash (Fowler, Noll, Vo) with more bytes; begin with PW_CHECK. */
 #define PW_CHECK 14695981039346656037u
@@ -71,10 +75,12 @@ typedef struct {
 } pw_names;
 int pw_names_open (pw_names *n, size_t entries); /* PW_OK or PW_RESOURCE */
 void pw_names_close (pw_names *n);
-int pw_names_add (pw_names *n, const char *name, int value); /* -1, or the value the name already has */
-int pw_names_find (const pw_names *n, const char *name);     /* -1 if absent */
+/* -1 if the name is new, else its value, which does not change. */
+int pw_names_add (pw_names *n, const char *name, int value);
+int pw_names_find (const pw_names *n, const char *name); /* -1 if absent */
 
-/* Makes room for more than `count` entries of an array, *(void **)array.  PW_OK or PW_RESOURCE. */
+/* Makes room for more than `count` entries of `size` bytes in an array, *(void **)array, with *room allocated.  PW_OK
+ * or PW_RESOURCE. */
 int pw_grow (void *array, size_t count, size_t *room, size_t size);
 
 /* The root of member i of a union-find structure, in which a root is its own parent; halves the path. */
@@ -87,18 +93,19 @@ static inline int pw_root (int *parent, int i) {
 typedef struct {
   struct pw_chunk *chunk;
 } pw_arena;
-void *pw_arena_alloc (pw_arena *a, size_t bytes); /* zeroed, or NULL */
-char *pw_arena_copy (pw_arena *a, const char *text);
+void *pw_arena_alloc (pw_arena *a, size_t bytes);    /* zeroed, or NULL */
+char *pw_arena_copy (pw_arena *a, const char *text); /* or NULL */
 void pw_arena_free (pw_arena *a);
 
-/* Lays out one allocation: make the same calls of pw_layout_alloc twice, first with base NULL to compute the size. */
+/* Lays out arrays in one allocation: the same calls of pw_layout_alloc are made twice; with base NULL, the first time,
+ * they only add up the size, and return NULL. */
 typedef struct {
   char *base;
   size_t used;
 } pw_layout;
 void *pw_layout_alloc (pw_layout *l, size_t count, size_t size);
-/* Passes over these calls, as in  for (pw_layout l = { 0 }; pw_layout_pass (&l, &memory);)  with zeroed memory in the
- * second one.  Afterwards memory is NULL if there was not enough. */
+/* Begins each of the two passes of  for (pw_layout l = { 0 }; pw_layout_pass (&l, &memory);) { calls }.  Zeroed memory
+ * is allocated for the second one; *memory is NULL if that failed. */
 int pw_layout_pass (pw_layout *l, char **memory);
 
 /* An array of numbers: where its address is stored, and its length. */
@@ -109,8 +116,7 @@ typedef struct {
 /* Lays out arrays in one zeroed allocation and returns it; NULL if out of memory. */
 char *pw_alloc_arrays (const pw_array *array, size_t arrays);
 
-/* PW_OK if `bytes` can be allocated now, else PW_RESOURCE.  Used before calls of libraries that crash when an
- * allocation fails. */
-int pw_reserve (size_t bytes);
+/* PW_OK if `bytes` could be allocated now, else PW_RESOURCE.  For libraries that crash if an allocation fails. */
+int pw_check_memory (size_t bytes);
 
 #endif

@@ -1,8 +1,8 @@
 /* The program's commands and their common functions.
  *
- * A command is one file with one table, named in the list below.  Its function returns PW_OK, a negative status with
- * the error set, or a positive exit status if it has reported everything.  Exit statuses are 0 success, 1 resource
- * error, 2 input, 3 initial conditions, 4 method, 130 interrupted, 141 closed pipe. */
+ * A command is a table pw_cli_NAME in a file of its own; PW_COMMANDS lists them.  Its function returns PW_OK, a
+ * negative status with the error set, or a positive exit status if it has reported everything.  Exit statuses are
+ * 0 success, 1 resource error, 2 input, 3 initial conditions, 4 method, 130 interrupted, 141 closed pipe. */
 #ifndef PW_CLI_H
 #define PW_CLI_H
 
@@ -12,14 +12,12 @@
 #include "pinwheel-solvers.h"
 #include "progress.h"
 
-enum {
-  PW_INTERRUPTED = 130,
-  PW_CLOSED_PIPE = 141
-}; /* exit statuses after Ctrl-C, and when the output pipe is closed */
+/* Exit statuses after SIGINT and SIGPIPE, as shells report them: 128 and the number of the signal. */
+enum { PW_INTERRUPTED = 130, PW_CLOSED_PIPE = 141 };
 
-/* ---- Requests to stop, by Ctrl-C or a limit of processor time; commands check them between steps (stop.c) ---- */
+/* ---- Requests to stop, by a signal or a limit of processor time; commands check them between steps (stop.c) ---- */
 
-extern volatile sig_atomic_t pw_stop; /* requests so far */
+extern volatile sig_atomic_t pw_stop; /* number of signals SIGINT or SIGTERM since pw_stop_catch */
 
 /* Counts signals from now on.  The first requests a stop after the current step.  The third ends the program, in case
  * that step never ends; the second does not, since some senders signal a program and its group as well. */
@@ -29,22 +27,23 @@ void pw_stop_release (void);
 
 /* A limit of the processor time of a run, measured by the clock of its thread. */
 typedef struct {
-  double most;  /* [s]; INFINITY: no limit */
-  double start; /* of the thread's clock [s] */
-  double read;  /* coarse clock when the thread's clock was last read [s] */
+  double seconds; /* INFINITY: no limit */
+  /* private */
+  double start;      /* the thread's clock at the start [s] */
+  double last_check; /* the coarse clock when the thread's clock was last read [s] */
 } pw_limit;
 
 /* Starts the clock; call it when the run begins. */
-void pw_limit_start (pw_limit *l);
-/* 1 if the limit is exceeded or a signal has requested a stop.  For pw_settings.stop; the context is the limit. */
-int pw_limit_over (void *limit);
-/* The status of a run that was stopped (PW_STOPPED) at time t: PW_RETRY after a signal; else PW_METHOD with the
- * limit. */
-int pw_limit_fail (const pw_limit *l, double t, pw_error *error);
+void pw_limit_start (pw_limit *limit);
+/* 1 if the limit is exceeded or a signal has requested a stop.  For pw_settings.stop; the context is the pw_limit. */
+int pw_limit_over (void *context);
+/* The status of a command whose run returned PW_STOPPED at time t: PW_RETRY, without an error, after a signal; else
+ * PW_METHOD with the limit. */
+int pw_limit_status (const pw_limit *limit, double t, pw_error *error);
 
 /* ---- Commands ---- */
 
-/* All commands, in the order of `pinwheel --help`; the table of `list` is pw_cli_list. */
+/* All commands, in the order of `pinwheel --help`. */
 #define PW_COMMANDS(X) \
   X (list)             \
   X (show)             \
@@ -61,7 +60,7 @@ int pw_limit_fail (const pw_limit *l, double t, pw_error *error);
 typedef struct {
   const char **argument; /* ended by NULL */
   int arguments;
-  const char **sets, **starts; /* "NAME=VALUE"; ended by NULL */
+  const char **sets, **starts; /* "NAME=VALUE" of each --set and --start; ended by NULL */
   const char *max_file;
   const char *method, *t_end, *step, *rtol, *atol, *max_steps, *limit, *specialise, *width;
   /* private */
@@ -71,12 +70,12 @@ typedef struct {
 } pw_cli_line;
 
 typedef struct {
-  const char *name;     /* "run" */
-  const char *synopsis; /* "MODEL [OPTION...]" */
-  const char *summary;  /* one line, for `pinwheel --help` */
-  const char *help;     /* sentences for `pinwheel run --help` */
-  int least, most;      /* smallest and largest number of arguments; most 0: any number */
-  size_t size;          /* of the structure of options */
+  const char *name;                 /* "run" */
+  const char *synopsis;             /* "MODEL [OPTION...]" */
+  const char *summary;              /* one line, for `pinwheel --help` */
+  const char *help;                 /* sentences for `pinwheel run --help` */
+  int min_arguments, max_arguments; /* max_arguments 0: any number */
+  size_t options_size;              /* of the structure of options, which begins with a pw_cli_line */
   int (*function) (void *options, pw_error *error);
   const struct poptOption *options; /* entries defined below, ended by POPT_TABLEEND */
 } pw_command;
@@ -84,9 +83,9 @@ typedef struct {
 #define PW_COMMAND(name) extern const pw_command pw_cli_##name;
 PW_COMMANDS (PW_COMMAND)
 
-/* Entries of a table of options: a text, a list of texts (the option may be repeated), a flag (an int).  They are zero
- * if the option is not given, and released with the command line.  `type` is the structure, `name` "every", `letter`
- * 'e' or 0. */
+/* Entries of a table of options: a text, a list of texts (the option may be repeated), a flag (an int).  The member
+ * of the structure `type` is zero if the option is not given; texts are released with the command line.  `name`:
+ * "every"; `letter`: 'e', or 0 without a short form; `value`: its name in the help, "DT". */
 #define PW_TEXT_OPTION(type, member, name, letter, value, help) \
   { name, letter, POPT_ARG_STRING, (void *)offsetof (type, member), 0, help, value }
 #define PW_LIST_OPTION(type, member, name, letter, value, help) \
@@ -100,7 +99,7 @@ PW_COMMANDS (PW_COMMAND)
 #define PW_OPTION_GROUP(title) \
   { NULL, 0, POPT_ARG_NONE, NULL, 0, title, NULL }
 
-/* Options of all commands that open a model; of those that integrate; of those that integrate with one method. */
+/* Options of commands that open a model (MODEL), that integrate (STEP, with ENGINE), also with one method (METHOD). */
 #define PW_MODEL_OPTIONS                                                                                       \
   PW_OPTION_GROUP ("Model"),                                                                                   \
       PW_LIST_OPTION (pw_cli_line, sets, "set", 0, "PARAM=VALUE",                                              \
@@ -131,33 +130,33 @@ PW_COMMANDS (PW_COMMAND)
                       "Absolute tolerance of every state (default rtol times its scale)")
 
 /* Reads the command line (argv[0] is not read), runs the command and reports its error; returns the exit status. */
-int pw_cli_main (const pw_command *c, int argc, const char **argv);
+int pw_cli_main (const pw_command *command, int argc, const char **argv);
 
 /* Refuses more than `most` arguments. */
-int pw_cli_at_most (const pw_command *c, const pw_cli_line *l, int most, pw_error *error);
+int pw_cli_at_most (const pw_command *command, const pw_cli_line *line, int most, pw_error *error);
 
-/* Refuses an option that is given (`text` is not NULL) without the one that it belongs to: `with`, if that is `has`. */
-int pw_cli_only (const char *option, const char *text, const char *with, int has, pw_error *error);
+/* PW_INPUT if an option ("--every") is given (its value is not NULL) without the one that it requires ("-o DIR"). */
+int pw_cli_requires (const char *option, const char *value, const char *required, int is_given, pw_error *error);
 
 /* Reads the value of an option ("--step") in any locale; a NULL text leaves *value unchanged.  PW_INPUT if it is not a
  * number in the domain. */
 int pw_cli_number (const char *option, const char *text, pw_domain domain, double *value, pw_error *error);
 
-/* Reads a range "FIRST:LAST"; PW_INPUT if it is not two finite numbers. */
+/* Reads a range "FIRST:LAST".  PW_INPUT, without an error, if it is not two finite numbers. */
 int pw_cli_range (const char *text, double *first, double *last);
 
-/* The model's defaults overridden by options: t_end, settings except the ledger, and the limit, which stops the run. */
-int pw_cli_settings (const pw_cli_line *l, const pw_run_defaults *model, double *t_end, pw_settings *settings,
+/* The settings of a run, without the ledger, from options and defaults.  The limit must outlive the run. */
+int pw_cli_settings (const pw_cli_line *line, const pw_run_defaults *defaults, double *t_end, pw_settings *settings,
                      pw_limit *limit, pw_error *error);
 
-/* The status of a command with incomplete results: PW_INTERRUPTED and a message after a signal; else PW_METHOD with
- * --limit. */
-int pw_cli_incomplete (const pw_cli_line *l, pw_error *error);
+/* The status of a command that has been stopped: PW_INTERRUPTED after a signal, with a message that results are
+ * incomplete; else PW_METHOD with --limit. */
+int pw_cli_incomplete (const pw_cli_line *line, pw_error *error);
 
 /* 1 if the step size of a method follows a tolerance, 0 if it is fixed; -1 if there is no such method. */
 int pw_cli_adaptive (const char *method);
-/* Notices of options without effect on a method.  Steps together with tolerances, common in scripts, are not reported. */
-void pw_cli_unused (const char *method, const pw_cli_line *l);
+/* Prints notices of options without effect on a method; steps with tolerances, common in scripts, are not reported. */
+void pw_cli_report_unused (const char *method, const pw_cli_line *line);
 
 /* ---- Models ---- */
 
@@ -169,15 +168,20 @@ typedef struct {
 } pw_cli_model;
 
 /* Opens the model file of a command line, whose first argument is its name or path. */
-pw_file *pw_cli_file (const pw_cli_line *l, pw_error *error);
+pw_file *pw_cli_file (const pw_cli_line *line, pw_error *error);
 
 /* Opens, builds and compiles the model of a command line with its --set and --start.  Returns a status; close the model
  * in every case. */
-int pw_cli_open (pw_cli_model *m, const pw_cli_line *l, pw_error *error);
+int pw_cli_open (pw_cli_model *m, const pw_cli_line *line, pw_error *error);
 void pw_cli_close_model (pw_cli_model *m);
 
-/* Applies every "NAME=VALUE" of a NULL-terminated list to a model by pw_model_set or pw_model_set_initial; `option` is the
- * list's, "--set" or "--start".  PW_INPUT. */
+/* Reads "NAME=VALUE" of an option.  PW_INPUT if it does not have this form, which messages call `form`. */
+enum { PW_ASSIGNED_NAME = 200 }; /* longest name, its end included */
+int pw_cli_assignment (const char *option, const char *text, const char *form, char name[PW_ASSIGNED_NAME],
+                       double *value, pw_error *error);
+
+/* Calls `set`, which is pw_model_set or pw_model_set_initial, with every "NAME=VALUE" of a list ended by NULL;
+ * `option` is "--set" or "--start".  PW_INPUT. */
 int pw_cli_apply (pw_model *m, const char *option, const char **list,
                   int (*set) (pw_model *m, const char *name, double value, pw_error *error), pw_error *error);
 
@@ -185,88 +189,89 @@ int pw_cli_apply (pw_model *m, const char *option, const char **list,
 const pw_parameter *pw_cli_parameter (const pw_model *m, const char *name);
 
 enum { PW_CHANGE_TEXT = 400 };
-/* The given initial value that the consistent initialisation of a run at its beginning has changed most: the change, and
- * a text such as "frame.vy from 1 to 1.2 m/s".  0: all are as given. */
-double pw_cli_change (const pw_run *r, const pw_system *s, char text[PW_CHANGE_TEXT]);
+/* Making the initial state consistent may change values that the user has given.  The largest change, in SI units,
+ * and a text such as "frame.vy from 1 to 1.2 m/s"; 0 if all are as given. */
+double pw_cli_largest_change (const pw_run *r, const pw_system *s, char text[PW_CHANGE_TEXT]);
 
 /* A path, relative to the current directory if that contains it; the result may be in `buffer`. */
 const char *pw_cli_short_path (const char *path, char *buffer, size_t size);
 
-/* A model's own run settings, else 10 s of rk4+projection with steps of 1e-3 s; rtol is 0 if the model does not set
- * it. */
+/* The default run settings of a model, completed by 10 s of rk4+projection with steps of 1e-3 s; rtol 0 if not set. */
 pw_run_defaults pw_cli_defaults (const pw_plugin_table *table);
 
-/* ---- The engine of runs (engine.c) ---- */
+/* ---- The engine of runs (engine.c): what evaluates the equations of motion ---- */
 
 typedef enum { PW_SPECIALISE_AUTO, PW_SPECIALISE_ALWAYS, PW_SPECIALISE_NEVER } pw_specialise;
 
 typedef struct {
   pw_scene_code *code; /* NULL: the general engine */
-  char why[200];       /* reason for the general engine */
+  char reason[200];    /* for the general engine */
 } pw_cli_engine;
 
 /* Reads the value of --specialise, NULL if it is not given. */
 int pw_cli_specialise (const char *text, pw_specialise *when, pw_error *error);
 
-/* The text of specialised code, without the constraint equations that are redundant at the initial state.  NULL and the
- * error if there is none.  Free it. */
+/* The C text of the code specialised for a system, without the constraint equations that are redundant at the initial
+ * state.  NULL and the error if there can be none.  Free it. */
 char *pw_cli_source (const pw_system *s, pw_error *error);
-/* Chooses the engine for runs with this total number of steps; loads or compiles the code, and prints notices. */
+/* Chooses the engine for runs with `steps` steps in total; loads or compiles the code, and prints notices. */
 void pw_cli_engine_open (pw_cli_engine *e, const pw_system *s, pw_specialise when, double steps);
 void pw_cli_engine_close (pw_cli_engine *e);
-const pw_specialised *pw_cli_engine_code (const pw_cli_engine *e); /* for pw_settings.specialised */
 
-/* The code for `lanes` runs at once, by a method of fixed step size; NULL: one run after the other.  With `lanes` 0, as many
- * as fill a vector register if all runs together have PW_LANES_STEPS, so that they repay the compilation. */
+/* The code that advances `lanes` runs at once, by a method of fixed step size; NULL: one run after the other.  With
+ * `lanes` 0, as many as fill a vector register, but only if all runs together have PW_LANES_STEPS steps or more, which
+ * repay the compilation. */
 #define PW_LANES_STEPS 1e7
 pw_scene_code *pw_cli_engine_lanes (const pw_cli_engine *e, const pw_system *s, const char *method, int lanes,
                                     double steps);
 
 /* ---- Files ---- */
 
-/* First entry of the list of files passed to pw_cli_uses. */
+/* First entry of the list of files passed to pw_cli_check_uses; that fills in the path. */
 #define PW_CLI_MODEL_USE \
   { "the model", NULL, PW_READS, NULL }
 
-/* Refuses files that a command would read and write, or write twice.  The list begins with PW_CLI_MODEL_USE: the model
- * of the command line and, if its file is open (`file` is not NULL), the tables that it reads. */
-int pw_cli_uses (const pw_cli_line *l, const pw_file *file, pw_use *use, int count, pw_error *error);
+/* Refuses files that a command would both read and write, or write twice.  The first entry, PW_CLI_MODEL_USE, stands
+ * for the model of the command line and, if its file is open (`file` is not NULL), for the tables that it reads. */
+int pw_cli_check_uses (const pw_cli_line *line, const pw_file *file, pw_use *use, int count, pw_error *error);
 
-/* Makes a folder and those above it, and locks it until the descriptor that is returned is closed.  -1 and PW_INPUT or
- * PW_RESOURCE. */
-int pw_cli_folder (const char *folder, pw_error *error);
+/* Makes a folder and those above it, and locks it until the returned descriptor is closed.  -1 and the error. */
+int pw_cli_lock_folder (const char *folder, pw_error *error);
 
-/* The files that a command writes, at their places in the list of pw_cli_uses, which has at most PW_FILES entries, and
- * the lock of a folder. */
+/* The files that a command writes, and the lock of the folder that it writes into. */
 enum { PW_FILES = 6 };
 typedef struct {
-  pw_output *file[PW_FILES]; /* NULL: not wanted */
-  int locked, lock;          /* 1: there is a folder; its descriptor */
+  pw_output *output[PW_FILES]; /* NULL: not requested */
+  int locked, lock;            /* 1: a folder is locked; the descriptor of the lock */
 } pw_files;
 
-/* Opens them after the checks of pw_cli_uses, before anything is computed.  Close them in every case. */
-int pw_files_open (pw_files *x, const pw_cli_line *l, const pw_cli_model *m, pw_use *use, int count, pw_error *error);
-FILE *pw_files_stream (const pw_files *x, int i); /* NULL: not wanted */
-/* Gives all of them their names (pw_output_finish_all). */
-int pw_files_finish (pw_files *x, pw_error *error);
-/* Unlocks the folder, and removes files that have not been finished. */
-void pw_files_close (pw_files *x);
+/* Checks a list of at most PW_FILES uses (pw_cli_check_uses) and opens what it writes, before anything is computed:
+ * use[i] is output[i].  Close them in every case. */
+int pw_files_open (pw_files *files, const pw_cli_line *line, const pw_cli_model *m, pw_use *use, int count,
+                   pw_error *error);
+FILE *pw_files_stream (const pw_files *files, int i); /* NULL: not requested */
+/* Completes all of them (pw_output_finish_all). */
+int pw_files_finish (pw_files *files, pw_error *error);
+/* Unlocks the folder, and removes files that have not been completed. */
+void pw_files_close (pw_files *files);
 
-/* PW_INPUT if the path of -o names a NumPy archive (.npz); for tables that contain texts and are CSV. */
-int pw_cli_csv (const char *path, pw_error *error);
+/* PW_INPUT if the path of -o (NULL: none) ends in .npz: NumPy archives cannot contain the texts of some tables. */
+int pw_cli_check_csv (const char *path, pw_error *error);
 
 /* ---- Messages ---- */
 
-/* Print to a stream, and to standard error; on a terminal control characters are escaped, since names may contain
- * them. */
+/* Print to a stream, and to standard error; on a terminal control characters, as in names of files, are escaped. */
 void pw_cli_print (FILE *f, const char *format, ...) PW_PRINTF (2, 3);
 #define pw_cli_say(...) pw_cli_print (stderr, __VA_ARGS__)
 
 /* Prints text broken into lines of `width` characters; the first line continues at column `indent`. */
-void pw_cli_wrap (const char *text, int indent, int width);
+void pw_cli_print_wrapped (const char *text, int indent, int width);
+
+/* The word for a status PW_OK to PW_METHOD in tables and summaries: "ok", "machine", "input", "start" or "method". */
+const char *pw_cli_status_word (int status);
 
 /* Prints an error, if there is one, as "pinwheel: TEXT" on standard error, without "pinwheel:" if TEXT begins with a
  * file and line; returns the exit status. */
-int pw_cli_end (const pw_error *error);
+int pw_cli_report_error (const pw_error *error);
 
 #endif

@@ -1,4 +1,4 @@
-/* The model of a command line. */
+/* The model of a command line: opened with its --set and --start, and its parameters and initial values. */
 #define _POSIX_C_SOURCE 200809L
 #include <math.h>
 #include <stdlib.h>
@@ -7,29 +7,35 @@
 #include "cli.h"
 #include "util.h"
 
-/* Refuses a parameter among initial values, and the reverse: names of states have a dot, those of parameters have none. */
-static int model_confused (const pw_model *m, const char *option, const char *text, const char *name, pw_error *error) {
-  int parameter = pw_cli_parameter (m, name) != NULL;
-  if (parameter && strcmp (option, "--start") == 0)
+/* Refuses a parameter in --start, and a state in --set: names of states have a dot, those of parameters have none. */
+static int model_check_name (const pw_model *m, const char *option, const char *text, const char *name,
+                             pw_error *error) {
+  int is_parameter = pw_cli_parameter (m, name) != NULL;
+  if (is_parameter && strcmp (option, "--start") == 0)
     return pw_fail (error, PW_INPUT, "--start %s: %s is a parameter, expected a state; use --set", text, name);
-  if (!parameter && strcmp (option, "--set") == 0 && strchr (name, '.'))
+  if (!is_parameter && strcmp (option, "--set") == 0 && strchr (name, '.'))
     return pw_fail (error, PW_INPUT, "--set %s: expected a parameter; initial values of states are given by --start",
                     text);
   return PW_OK;
 }
 
+int pw_cli_assignment (const char *option, const char *text, const char *form, char name[PW_ASSIGNED_NAME],
+                       double *value, pw_error *error) {
+  const char *equals = strchr (text, '=');
+  if (equals == NULL || equals == text || equals - text >= PW_ASSIGNED_NAME)
+    return pw_fail (error, PW_INPUT, "%s %s: expected %s", option, text, form);
+  snprintf (name, PW_ASSIGNED_NAME, "%.*s", (int)(equals - text), text);
+  if (pw_read_expression (equals + 1, value) == PW_OK) return PW_OK;
+  return pw_fail (error, PW_INPUT, "%s %s: \"%s\" is not a number", option, text, equals + 1);
+}
+
 int pw_cli_apply (pw_model *m, const char *option, const char **list,
                   int (*set) (pw_model *m, const char *name, double value, pw_error *error), pw_error *error) {
   for (; list && *list; list++) {
-    char name[200];
+    char name[PW_ASSIGNED_NAME];
     double value;
-    const char *equals = strchr (*list, '=');
-    if (equals == NULL || equals == *list || (size_t)(equals - *list) >= sizeof name)
-      return pw_fail (error, PW_INPUT, "%s %s: expected NAME=VALUE", option, *list);
-    snprintf (name, sizeof name, "%.*s", (int)(equals - *list), *list);
-    if (pw_read_expression (equals + 1, &value) != PW_OK)
-      return pw_fail (error, PW_INPUT, "%s %s: \"%s\" is not a number", option, *list, equals + 1);
-    int status = model_confused (m, option, *list, name, error);
+    int status = pw_cli_assignment (option, *list, "NAME=VALUE", name, &value, error);
+    if (status == PW_OK) status = model_check_name (m, option, *list, name, error);
     if (status == PW_OK) status = set (m, name, value, error);
     if (status != PW_OK) return status;
   }
@@ -42,20 +48,20 @@ const pw_parameter *pw_cli_parameter (const pw_model *m, const char *name) {
   return p && p->name ? p : NULL;
 }
 
-pw_file *pw_cli_file (const pw_cli_line *l, pw_error *error) {
-  const double most = PW_FILE_MAX_BYTES >> 20;
+pw_file *pw_cli_file (const pw_cli_line *line, pw_error *error) {
+  const double largest = PW_FILE_MAX_BYTES >> 20; /* [MB] */
   double size = PW_FILE_DEFAULT_BYTES >> 20;
-  if (pw_cli_number ("--max-file", l->max_file, PW_POSITIVE, &size, error) != PW_OK) return NULL;
-  if (size <= most) return pw_file_open_limited (l->argument[0], (size_t)(size * (1 << 20)), error);
-  pw_fail (error, PW_INPUT, "--max-file %s: expected at most %g MB", l->max_file, most);
+  if (pw_cli_number ("--max-file", line->max_file, PW_POSITIVE, &size, error) != PW_OK) return NULL;
+  if (size <= largest) return pw_file_open_limited (line->argument[0], (size_t)(size * (1 << 20)), error);
+  pw_fail (error, PW_INPUT, "--max-file %s: expected at most %g MB", line->max_file, largest);
   return NULL;
 }
 
-int pw_cli_open (pw_cli_model *m, const pw_cli_line *l, pw_error *error) {
-  *m = (pw_cli_model){ .file = pw_cli_file (l, error) };
+int pw_cli_open (pw_cli_model *m, const pw_cli_line *line, pw_error *error) {
+  *m = (pw_cli_model){ .file = pw_cli_file (line, error) };
   if (m->file) m->model = pw_file_model (m->file, error);
-  if (m->model && pw_cli_apply (m->model, "--set", l->sets, pw_model_set, error) == PW_OK &&
-      pw_cli_apply (m->model, "--start", l->starts, pw_model_set_initial, error) == PW_OK &&
+  if (m->model && pw_cli_apply (m->model, "--set", line->sets, pw_model_set, error) == PW_OK &&
+      pw_cli_apply (m->model, "--start", line->starts, pw_model_set_initial, error) == PW_OK &&
       pw_model_build (m->model, error) == PW_OK)
     m->system = pw_system_compile (m->model, error);
   return m->system ? PW_OK : error->status;
@@ -68,19 +74,20 @@ void pw_cli_close_model (pw_cli_model *m) {
   *m = (pw_cli_model){ .file = NULL };
 }
 
-double pw_cli_change (const pw_run *r, const pw_system *s, char text[PW_CHANGE_TEXT]) {
-  const pw_initial_report *x = pw_run_initial (r);
+double pw_cli_largest_change (const pw_run *r, const pw_system *s, char text[PW_CHANGE_TEXT]) {
+  const pw_initial_report *report = pw_run_initial (r);
   int n = pw_system_coordinates (s);
-  double most = 0;
-  char name[300], a[32], b[32];
+  double largest = 0;
+  char name[300], given_text[32], after_text[32];
   for (int i = 0; i < 2 * n; i++) {
-    double from = i < n ? x->q_given[i] : x->v_given[i - n], to = i < n ? x->q[i] : x->v[i - n];
-    if (!pw_initial_given (x, i) || !pw_initial_moved (s, x, i) || !(fabs (to - from) > most)) continue;
-    most = fabs (to - from);
+    double given = i < n ? report->q_given[i] : report->v_given[i - n], after = i < n ? report->q[i] : report->v[i - n];
+    if (!pw_initial_given (report, i) || !pw_initial_moved (s, report, i)) continue;
+    if (!(fabs (after - given) > largest)) continue;
+    largest = fabs (after - given);
     snprintf (text, PW_CHANGE_TEXT, "%s from %s to %s %s", pw_system_state_name (s, i, name, sizeof name),
-              pw_format (a, from, 10), pw_format (b, to, 10), pw_system_state_unit (s, i));
+              pw_format (given_text, given, 10), pw_format (after_text, after, 10), pw_system_state_unit (s, i));
   }
-  return most;
+  return largest;
 }
 
 const char *pw_cli_short_path (const char *path, char *buffer, size_t size) {

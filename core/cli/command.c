@@ -1,4 +1,4 @@
-/* Command lines: options bound to a command's structure, help, values of options. */
+/* Command lines: reads the options of a command into its structure, prints help, and checks values. */
 #define _POSIX_C_SOURCE 200809L
 #include <errno.h>
 #include <gsl/gsl_errno.h>
@@ -11,9 +11,9 @@
 #include "util.h"
 
 enum {
-  COMMAND_HELP = 1000,
-  COMMAND_WIDTH = 80
-}; /* popt's value for --help (for other options 1, 2, ...); columns of help */
+  COMMAND_HELP = 1000, /* number of --help, which poptGetNextOpt returns; those of other options are 1, 2, ... */
+  COMMAND_WIDTH = 80   /* characters of a line of help */
+};
 
 static const struct poptOption command_help_option = { "help", '?',          POPT_ARG_NONE,
                                                        NULL,   COMMAND_HELP, "Show this help and exit",
@@ -23,154 +23,157 @@ static int command_is_end (const struct poptOption *o) {
   return o->longName == NULL && o->descrip == NULL;
 }
 
-/* The command's options, each pointing into its structure, and help. */
-static int command_table (pw_cli_line *l, const struct poptOption *options) {
+/* Makes popt's table: the command's options, each pointing into its structure, and --help.  PW_OK or PW_RESOURCE. */
+static int command_bind (pw_cli_line *line, const struct poptOption *options) {
   size_t n = 0;
   while (!command_is_end (options + n)) n++;
-  l->table = calloc (n + 2, sizeof *l->table);
-  l->text = calloc (n + 2, sizeof *l->text);
-  if (l->table == NULL || l->text == NULL) return PW_RESOURCE;
+  line->table = calloc (n + 2, sizeof *line->table);
+  line->text = calloc (n + 2, sizeof *line->text);
+  if (line->table == NULL || line->text == NULL) return PW_RESOURCE;
   n = 0;
   for (const struct poptOption *o = options; !command_is_end (o); o++) {
     if (o->longName == NULL) continue; /* a heading */
-    l->table[n] = *o;
-    l->table[n].arg = (char *)l + (size_t)o->arg;
-    l->table[n].val = (int)n + 1;
+    line->table[n] = *o;
+    line->table[n].arg = (char *)line + (size_t)o->arg;
+    line->table[n].val = (int)n + 1;
     n++;
   }
-  l->table[n] = command_help_option;
+  line->table[n] = command_help_option;
   return PW_OK;
 }
 
-/* Records the text or list that popt has allocated for an option, to release it even if the variable changes.  If an
- * option is repeated, a list grows; a text is refused, under either name of the option. */
-static int command_note (const pw_command *c, pw_cli_line *l, int i, pw_error *error) {
-  const struct poptOption *o = l->table + i;
+/* Keeps the text or list that popt has allocated for option i, to release it even if the member of the structure
+ * changes.  If an option is repeated, a list grows; a text is refused, under either name of the option. */
+static int command_keep (const pw_command *command, pw_cli_line *line, int i, pw_error *error) {
+  const struct poptOption *o = line->table + i;
   unsigned type = o->argInfo & POPT_ARG_MASK;
   int given = 0;
-  for (int j = 0; l->table[j].longName; j++) given |= l->table[j].arg == o->arg && l->text[j] != NULL;
-  if (type == POPT_ARG_STRING) free (l->text[i]);
-  if (type == POPT_ARG_STRING || type == POPT_ARG_ARGV) l->text[i] = *(void **)o->arg;
+  for (int j = 0; line->table[j].longName; j++) given |= line->table[j].arg == o->arg && line->text[j] != NULL;
+  if (type == POPT_ARG_STRING) free (line->text[i]);
+  if (type == POPT_ARG_STRING || type == POPT_ARG_ARGV) line->text[i] = *(void **)o->arg;
   if (type != POPT_ARG_STRING || !given) return PW_OK;
-  return pw_fail (error, PW_INPUT, "%s: option --%s is given twice", c->name, o->longName);
+  return pw_fail (error, PW_INPUT, "%s: option --%s is given twice", command->name, o->longName);
 }
 
 /* ---- Help ---- */
 
-static void command_option (const struct poptOption *o) {
+static void command_option_help (const struct poptOption *o) {
   enum { COLUMN = 28 };
   char left[80], letter[8] = "   ";
-  int list = (o->argInfo & POPT_ARG_MASK) == POPT_ARG_ARGV;
+  int is_list = (o->argInfo & POPT_ARG_MASK) == POPT_ARG_ARGV;
   if (o->shortName) snprintf (letter, sizeof letter, "-%c,", o->shortName);
-  snprintf (left, sizeof left, "  %s --%s%s%s", letter, o->longName, o->argDescrip ? list ? " " : "=" : "",
+  snprintf (left, sizeof left, "  %s --%s%s%s", letter, o->longName, o->argDescrip ? is_list ? " " : "=" : "",
             o->argDescrip ? o->argDescrip : "");
   if (strlen (left) > COLUMN - 2)
     printf ("%s\n%*s", left, COLUMN, "");
   else
     printf ("%-*s", COLUMN, left);
-  pw_cli_wrap (o->descrip, COLUMN, COMMAND_WIDTH);
+  pw_cli_print_wrapped (o->descrip, COLUMN, COMMAND_WIDTH);
 }
 
-static void command_help (const pw_command *c) {
-  printf ("Usage: pinwheel %s %s\n", c->name, c->synopsis);
-  pw_cli_wrap (c->help, 0, COMMAND_WIDTH);
-  for (const struct poptOption *o = c->options; !command_is_end (o); o++)
+static void command_help (const pw_command *command) {
+  printf ("Usage: pinwheel %s %s\n", command->name, command->synopsis);
+  pw_cli_print_wrapped (command->help, 0, COMMAND_WIDTH);
+  for (const struct poptOption *o = command->options; !command_is_end (o); o++)
     if (o->longName == NULL)
       printf ("\n%s:\n", o->descrip);
     else if (o->descrip)
-      command_option (o);
+      command_option_help (o);
   puts ("\nOther:");
-  command_option (&command_help_option);
+  command_option_help (&command_help_option);
 }
 
 /* ---- Reading ---- */
 
-static int command_unknown (const pw_command *c, const pw_cli_line *l, const char *bad, pw_error *error) {
+static int command_unknown (const pw_command *command, const pw_cli_line *line, const char *option, pw_error *error) {
   char sought[100], hint[140];
-  const char *name = bad + strspn (bad, "-");
+  const char *name = option + strspn (option, "-");
   snprintf (sought, sizeof sought, "%.*s", (int)strcspn (name, "="), name);
   pw_nearest near = { .sought = sought };
-  for (const struct poptOption *o = l->table; o->longName; o++)
+  for (const struct poptOption *o = line->table; o->longName; o++)
     if (o->descrip) pw_nearest_try (&near, o->longName);
   if (near.near)
     snprintf (hint, sizeof hint, "did you mean \"--%s\"?", near.best);
   else
-    snprintf (hint, sizeof hint, "see pinwheel %s --help", c->name);
-  return pw_fail (error, PW_INPUT, "%s has no option \"%.*s\"; %s", c->name, (int)strcspn (bad, "="), bad, hint);
+    snprintf (hint, sizeof hint, "see pinwheel %s --help", command->name);
+  return pw_fail (error, PW_INPUT, "%s has no option \"%.*s\"; %s", command->name, (int)strcspn (option, "="), option,
+                  hint);
 }
 
-static int command_bad (const pw_command *c, const pw_cli_line *l, int why, pw_error *error) {
-  const char *bad = poptBadOption (l->popt, POPT_BADOPTION_NOALIAS);
-  if (why == POPT_ERROR_BADOPT) return command_unknown (c, l, bad, error);
-  if (why == POPT_ERROR_NOARG) return pw_fail (error, PW_INPUT, "%s: option %s needs a value", c->name, bad);
-  return pw_fail (error, PW_INPUT, "%s: option %s: %s", c->name, bad, poptStrerror (why));
+/* Reports the option that popt has refused with this error code. */
+static int command_refuse (const pw_command *command, const pw_cli_line *line, int code, pw_error *error) {
+  const char *option = poptBadOption (line->popt, POPT_BADOPTION_NOALIAS);
+  if (code == POPT_ERROR_BADOPT) return command_unknown (command, line, option, error);
+  if (code == POPT_ERROR_NOARG) return pw_fail (error, PW_INPUT, "%s: option %s needs a value", command->name, option);
+  return pw_fail (error, PW_INPUT, "%s: option %s: %s", command->name, option, poptStrerror (code));
 }
 
-int pw_cli_at_most (const pw_command *c, const pw_cli_line *l, int most, pw_error *error) {
-  if (l->arguments <= most) return PW_OK;
-  return pw_fail (error, PW_INPUT, "unexpected argument \"%s\"; usage: pinwheel %s %s", l->argument[most], c->name,
-                  c->synopsis);
+int pw_cli_at_most (const pw_command *command, const pw_cli_line *line, int most, pw_error *error) {
+  if (line->arguments <= most) return PW_OK;
+  return pw_fail (error, PW_INPUT, "unexpected argument \"%s\"; usage: pinwheel %s %s", line->argument[most],
+                  command->name, command->synopsis);
 }
 
-/* Returns 1 if help was requested and has been printed. */
-static int command_read (const pw_command *c, pw_cli_line *l, int argc, const char **argv, pw_error *error) {
+/* Reads the command line.  PW_OK; 1 if help was requested and has been printed; or a negative status. */
+static int command_read (const pw_command *command, pw_cli_line *line, int argc, const char **argv, pw_error *error) {
   errno = 0;
-  if (command_table (l, c->options) == PW_OK) l->popt = poptGetContext (argv[0], argc, argv, l->table, 0);
-  if (l->popt == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
-  int got = poptGetNextOpt (l->popt);
-  for (; got > 0 && got != COMMAND_HELP; got = poptGetNextOpt (l->popt))
-    if (command_note (c, l, got - 1, error) != PW_OK) return error->status;
+  if (command_bind (line, command->options) == PW_OK) line->popt = poptGetContext (argv[0], argc, argv, line->table, 0);
+  if (line->popt == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
+  int number = poptGetNextOpt (line->popt);
+  for (; number > 0 && number != COMMAND_HELP; number = poptGetNextOpt (line->popt))
+    if (command_keep (command, line, number - 1, error) != PW_OK) return error->status;
   if (errno == ENOMEM)
     return pw_fail (error, PW_RESOURCE, "out of memory"); /* popt omits texts that it cannot allocate */
-  if (got == COMMAND_HELP) {
-    command_help (c);
+  if (number == COMMAND_HELP) {
+    command_help (command);
     return 1;
   }
-  if (got < -1) return command_bad (c, l, got, error);
-  l->argument = poptGetArgs (l->popt);
-  while (l->argument && l->argument[l->arguments]) l->arguments++;
-  if (l->arguments < c->least)
-    return pw_fail (error, PW_INPUT, "missing argument; usage: pinwheel %s %s", c->name, c->synopsis);
-  return c->most ? pw_cli_at_most (c, l, c->most, error) : PW_OK;
+  if (number < -1) return command_refuse (command, line, number, error); /* -1: no more options */
+  line->argument = poptGetArgs (line->popt);
+  while (line->argument && line->argument[line->arguments]) line->arguments++;
+  if (line->arguments < command->min_arguments)
+    return pw_fail (error, PW_INPUT, "missing argument; usage: pinwheel %s %s", command->name, command->synopsis);
+  return command->max_arguments ? pw_cli_at_most (command, line, command->max_arguments, error) : PW_OK;
 }
 
-static void command_close (pw_cli_line *l) {
-  for (size_t i = 0; l->table && l->text && l->table[i].longName; i++) {
-    char **list = (l->table[i].argInfo & POPT_ARG_MASK) == POPT_ARG_ARGV ? l->text[i] : NULL;
+static void command_close (pw_cli_line *line) {
+  for (size_t i = 0; line->table && line->text && line->table[i].longName; i++) {
+    char **list = (line->table[i].argInfo & POPT_ARG_MASK) == POPT_ARG_ARGV ? line->text[i] : NULL;
     for (; list && *list; list++) free (*list);
-    free (l->text[i]);
+    free (line->text[i]);
   }
-  if (l->popt) poptFreeContext (l->popt);
-  free (l->text);
-  free (l->table);
-  free (l);
+  if (line->popt) poptFreeContext (line->popt);
+  free (line->text);
+  free (line->table);
+  free (line);
 }
 
-int pw_cli_main (const pw_command *c, int argc, const char **argv) {
+int pw_cli_main (const pw_command *command, int argc, const char **argv) {
   gsl_set_error_handler_off (); /* the default handler ends the program */
   pw_error error = { 0 };
-  pw_cli_line *l = calloc (1, c->size);
-  int status = l ? command_read (c, l, argc, argv, &error) : pw_fail (&error, PW_RESOURCE, "out of memory");
-  status = status == PW_OK ? c->function (l, &error) : 0; /* 0 after help */
-  if (l) command_close (l);
-  return status > 0 ? status : pw_cli_end (&error);
+  int exit_status = 0; /* that of errors follows from `error` */
+  pw_cli_line *line = calloc (1, command->options_size);
+  int status = line ? command_read (command, line, argc, argv, &error) : pw_fail (&error, PW_RESOURCE, "out of memory");
+  if (status == PW_OK) exit_status = command->function (line, &error);
+  if (line) command_close (line);
+  return exit_status > 0 ? exit_status : pw_cli_report_error (&error);
 }
 
 /* ---- Values ---- */
 
-int pw_cli_only (const char *option, const char *text, const char *with, int has, pw_error *error) {
-  if (text == NULL || has) return PW_OK;
-  return pw_fail (error, PW_INPUT, "%s %s: only with %s", option, text, with);
+int pw_cli_requires (const char *option, const char *value, const char *required, int is_given, pw_error *error) {
+  if (value == NULL || is_given) return PW_OK;
+  return pw_fail (error, PW_INPUT, "%s %s: only with %s", option, value, required);
 }
 
 int pw_cli_number (const char *option, const char *text, pw_domain domain, double *value, pw_error *error) {
   if (text == NULL) return PW_OK;
-  double x;
-  if (pw_read_expression (text, &x) != PW_OK)
+  double number;
+  if (pw_read_expression (text, &number) != PW_OK)
     return pw_fail (error, PW_INPUT, "%s: \"%s\" is not a number", option, text);
-  const char *expected = pw_domain_check (domain, x);
+  const char *expected = pw_domain_check (domain, number);
   if (*expected) return pw_fail (error, PW_INPUT, "%s %s: expected %s", option, text, expected);
-  *value = x;
+  *value = number;
   return PW_OK;
 }
 
@@ -183,30 +186,31 @@ int pw_cli_range (const char *text, double *first, double *last) {
   return isfinite (*last - *first) ? PW_OK : PW_INPUT;
 }
 
-int pw_cli_settings (const pw_cli_line *l, const pw_run_defaults *model, double *t_end, pw_settings *settings,
+int pw_cli_settings (const pw_cli_line *line, const pw_run_defaults *model, double *t_end, pw_settings *settings,
                      pw_limit *limit, pw_error *error) {
-  double most = PW_MAX_STEPS;
+  double max_steps = PW_MAX_STEPS;
   *t_end = model->t_end;
-  *limit = (pw_limit){ .most = INFINITY };
+  *limit = (pw_limit){ .seconds = INFINITY };
   *settings = (pw_settings){ .step = model->step, .rtol = model->rtol, .stop = pw_limit_over, .stop_context = limit };
   const struct {
     const char *option, *text;
     double *value;
-  } number[] = { { "--t-end", l->t_end, t_end },
-                 { "--step", l->step, &settings->step },
-                 { "--rtol", l->rtol, &settings->rtol },
-                 { "--atol", l->atol, &settings->atol },
-                 { "--limit", l->limit, &limit->most } };
-  for (size_t i = 0; i < sizeof number / sizeof *number; i++)
-    if (pw_cli_number (number[i].option, number[i].text, PW_POSITIVE, number[i].value, error) != PW_OK) return PW_INPUT;
-  int status = pw_cli_number ("--max-steps", l->max_steps, PW_COUNT, &most, error);
-  settings->max_steps = most < 9e18 ? (long)most : LONG_MAX;
+  } options[] = { { "--t-end", line->t_end, t_end },
+                  { "--step", line->step, &settings->step },
+                  { "--rtol", line->rtol, &settings->rtol },
+                  { "--atol", line->atol, &settings->atol },
+                  { "--limit", line->limit, &limit->seconds } };
+  for (size_t i = 0; i < sizeof options / sizeof *options; i++)
+    if (pw_cli_number (options[i].option, options[i].text, PW_POSITIVE, options[i].value, error) != PW_OK)
+      return PW_INPUT;
+  int status = pw_cli_number ("--max-steps", line->max_steps, PW_COUNT, &max_steps, error);
+  settings->max_steps = max_steps < (double)LONG_MAX ? (long)max_steps : LONG_MAX;
   settings->span = *t_end;
   return status;
 }
 
-int pw_cli_incomplete (const pw_cli_line *l, pw_error *error) {
-  if (!pw_stop) return pw_fail (error, PW_METHOD, "--limit %s: stopped; results are incomplete", l->limit);
+int pw_cli_incomplete (const pw_cli_line *line, pw_error *error) {
+  if (!pw_stop) return pw_fail (error, PW_METHOD, "--limit %s: stopped; results are incomplete", line->limit);
   pw_cli_say ("pinwheel: interrupted; results are incomplete\n");
   return PW_INTERRUPTED;
 }
@@ -218,12 +222,12 @@ int pw_cli_adaptive (const char *method) {
   return pw_method_adaptive (integrator, method);
 }
 
-void pw_cli_unused (const char *method, const pw_cli_line *l) {
+void pw_cli_report_unused (const char *method, const pw_cli_line *line) {
   int adaptive = pw_cli_adaptive (method);
-  if (adaptive == 1 && l->step && !l->rtol && !l->atol)
+  if (adaptive == 1 && line->step && !line->rtol && !line->atol)
     pw_cli_say ("pinwheel: --step has no effect: %s chooses its steps by --rtol, --atol\n", method);
-  if (adaptive == 0 && l->max_steps)
+  if (adaptive == 0 && line->max_steps)
     pw_cli_say ("pinwheel: --max-steps has no effect: %s takes as many steps as --step requires\n", method);
-  if (adaptive == 0 && (l->rtol || l->atol) && !l->step)
-    pw_cli_say ("pinwheel: --%s has no effect: %s takes steps of --step\n", l->rtol ? "rtol" : "atol", method);
+  if (adaptive == 0 && (line->rtol || line->atol) && !line->step)
+    pw_cli_say ("pinwheel: --%s has no effect: %s takes steps of --step\n", line->rtol ? "rtol" : "atol", method);
 }

@@ -1,4 +1,4 @@
-/* Choice of the engine of runs: general, or code compiled for the scene. */
+/* Chooses what evaluates the equations of runs: the general engine, or code compiled for the scene. */
 #include <stdlib.h>
 #include <string.h>
 #include "cli.h"
@@ -13,16 +13,17 @@ int pw_cli_specialise (const char *text, pw_specialise *when, pw_error *error) {
   return PW_OK;
 }
 
-/* A short reason for the general engine. */
-static void engine_general (pw_cli_engine *e, const pw_system *s, int has_text, const pw_error *why) {
+/* Stores a short reason for the general engine: the error, which does not repeat the model; once the text of the code
+ * has been generated (`has_text`), what its status means. */
+static void engine_keep_reason (pw_cli_engine *e, const pw_system *s, int has_text, const pw_error *error) {
   char model[300];
   size_t n = (size_t)snprintf (model, sizeof model, "model %s: ", pw_system_name (s));
-  const char *text = why->text + (strncmp (why->text, model, n) == 0 ? n : 0);
+  const char *reason = error->text + (strncmp (error->text, model, n) == 0 ? n : 0);
   if (has_text)
-    text = why->status == PW_INPUT    ? "no C compiler"
-           : why->status == PW_METHOD ? "the generated code does not compile"
-                                      : "the compiled code cannot be loaded";
-  snprintf (e->why, sizeof e->why, "%.190s", text);
+    reason = error->status == PW_INPUT    ? "no C compiler"
+             : error->status == PW_METHOD ? "the generated code does not compile"
+                                          : "the compiled code cannot be loaded";
+  snprintf (e->reason, sizeof e->reason, "%.190s", reason);
 }
 
 char *pw_cli_source (const pw_system *s, pw_error *error) {
@@ -32,8 +33,8 @@ char *pw_cli_source (const pw_system *s, pw_error *error) {
   return text;
 }
 
-/* Loads code for the system. */
-static void engine_load (pw_cli_engine *e, const pw_system *s, pw_specialise when) {
+/* Loads or compiles code for the system; without it, reports why the general engine is used. */
+static void engine_open_code (pw_cli_engine *e, const pw_system *s, pw_specialise when) {
   pw_error own = { 0 };
   char *text = pw_cli_source (s, &own);
   int has_text = text != NULL;
@@ -41,26 +42,23 @@ static void engine_load (pw_cli_engine *e, const pw_system *s, pw_specialise whe
   free (text);
   if (e->code && *pw_scene_code_notice (e->code)) pw_cli_say ("pinwheel: %s\n", pw_scene_code_notice (e->code));
   if (e->code) return;
-  engine_general (e, s, has_text, &own);
+  engine_keep_reason (e, s, has_text, &own);
   if (has_text || when == PW_SPECIALISE_ALWAYS) pw_cli_say ("pinwheel: general engine: %s\n", own.text);
 }
 
 void pw_cli_engine_open (pw_cli_engine *e, const pw_system *s, pw_specialise when, double steps) {
   *e = (pw_cli_engine){ .code = NULL };
   if (when == PW_SPECIALISE_NEVER)
-    strcpy (e->why, "--specialise never");
+    strcpy (e->reason, "--specialise never");
   else if (when == PW_SPECIALISE_AUTO && !(steps >= PW_SPECIALISE_STEPS))
-    strcpy (e->why, "short run"); /* independent of the cache: the same command has the same result */
+    strcpy (e->reason, "short run"); /* even if the cache has the code: the same command has the same result */
   else
-    engine_load (e, s, when);
+    engine_open_code (e, s, when);
 }
 
-const pw_specialised *pw_cli_engine_code (const pw_cli_engine *e) {
-  return pw_scene_code_table (e->code);
-}
-
-/* Why there are no lanes; NULL if there may be. */
-static const char *engine_no_lanes (const pw_cli_engine *e, const pw_system *s, const char *method, const pw_run *r) {
+/* Why runs cannot be in lanes; NULL if they can. */
+static const char *engine_lanes_obstacle (const pw_cli_engine *e, const pw_system *s, const char *method,
+                                          const pw_run *r) {
   if (e->code == NULL) return "the general engine is in use, see --specialise";
   if (pw_cli_adaptive (method) != 0) return "the method controls its step size";
   if (r == NULL || pw_run_redundant (r) > 0) return "the scene has redundant constraint equations";
@@ -69,20 +67,21 @@ static const char *engine_no_lanes (const pw_cli_engine *e, const pw_system *s, 
 
 pw_scene_code *pw_cli_engine_lanes (const pw_cli_engine *e, const pw_system *s, const char *method, int lanes,
                                     double steps) {
-  const int chosen = lanes > 1;
+  const int requested = lanes > 1;
   pw_error own = { 0 };
   if (lanes == 0 && steps >= PW_LANES_STEPS) lanes = pw_processor_lanes ();
   if (lanes <= 1) return NULL;
   pw_run *r = pw_run_open (s, "rk4+none", NULL, NULL);
-  const char *why = engine_no_lanes (e, s, method, r);
-  char *text = why ? NULL : pw_run_source (r, &own);
+  const char *reason = engine_lanes_obstacle (e, s, method, r);
+  char *text = reason ? NULL : pw_run_source (r, &own);
   pw_scene_code *code = text ? pw_scene_lanes_open (text, s, lanes, &own) : NULL;
-  if (code == NULL && why == NULL) why = own.text;
+  const int failed = reason == NULL && code == NULL;
+  if (failed) reason = own.text;
   if (code && pw_scene_code_lanes (code) == NULL) {
     pw_scene_code_close (code);
-    code = NULL, why = "clang does not vectorise loops over runs; gcc does";
+    code = NULL, reason = "clang does not vectorise loops over runs; gcc does";
   }
-  if (why && (chosen || why == own.text) && pw_stop == 0) pw_cli_say ("pinwheel: one run after the other: %s\n", why);
+  if (reason && (requested || failed) && pw_stop == 0) pw_cli_say ("pinwheel: one run after the other: %s\n", reason);
   free (text);
   pw_run_close (r);
   return code;

@@ -48,7 +48,7 @@ static int main_unknown (const char *word) {
   else
     pw_fail (&error, PW_INPUT, "there is no %s \"%s\"%s", word[0] == '-' ? "option" : "command", word,
              pw_nearest_text (&near));
-  return pw_cli_end (&error);
+  return pw_cli_report_error (&error);
 }
 
 /* Runs a command; argv begins with its name. */
@@ -77,5 +77,5 @@ int main (int argc, char **argv) {
   pw_error error = { 0 };
   if ((fflush (stdout) != 0 || ferror (stdout)) && status == 0)
     pw_fail (&error, PW_RESOURCE, "cannot write to standard output: %s", strerror (errno));
-  return status ? status : pw_cli_end (&error);
+  return status ? status : pw_cli_report_error (&error);
 }

@@ -1,6 +1,7 @@
-/* Independent tasks on several processors. */
+/* Independent tasks in several threads, for sweeps, studies and searches. */
 #define _GNU_SOURCE /* sched_getaffinity, sched_setaffinity */
 #include <errno.h>
+#include <math.h>
 #include <pthread.h>
 #include <sched.h>
 #include <stdio.h>
@@ -8,6 +9,8 @@
 #include <string.h>
 #include <unistd.h>
 #include "parallel.h"
+
+enum { PARALLEL_JOBS = 10000 }; /* at most; more threads than any machine runs at once */
 
 /* OMP_NUM_THREADS, or the processors that this process may use. */
 static long parallel_processors (void) {
@@ -21,9 +24,9 @@ static long parallel_processors (void) {
 }
 
 int pw_parallel_jobs (const char *text, int *jobs, pw_error *error) {
-  double n = (double)parallel_processors ();
-  int status = pw_cli_number ("--jobs", text, PW_COUNT, &n, error);
-  *jobs = n < 10000 ? (int)n : 10000;
+  double count = (double)parallel_processors ();
+  int status = pw_cli_number ("--jobs", text, PW_COUNT, &count, error);
+  *jobs = (int)fmin (count, PARALLEL_JOBS);
   return status;
 }
 
@@ -31,25 +34,25 @@ int pw_parallel_jobs (const char *text, int *jobs, pw_error *error) {
 
 typedef struct {
   cpu_set_t all;                /* processors that this process may use */
-  int core[CPU_SETSIZE], cores; /* one of them on each physical core */
+  int core[CPU_SETSIZE], count; /* one of these processors on each physical core */
 } parallel_cores;
 
 typedef struct {
   pthread_mutex_t lock;
-  int next, count; /* tasks */
+  int next, count; /* the task to be called next; number of tasks */
   pw_task *task;
   void *context;
   int status; /* of the first task that failed */
   pw_error *error;
-  int threads, begun;          /* threads; those that have begun */
+  int threads, begun;          /* number of threads; of those that have begun */
   const parallel_cores *cores; /* NULL: threads run on any processor */
 } parallel;
 
-/* The cores of each thread are its own; there may be several, so that it can avoid other programs. */
+/* Binds the calling thread to cores of its own; with several it can avoid those that other programs use. */
 static void parallel_bind (const parallel_cores *c, int thread, int threads) {
   cpu_set_t own;
   CPU_ZERO (&own);
-  for (int i = thread; i < c->cores; i += threads) CPU_SET ((size_t)c->core[i], &own);
+  for (int i = thread; i < c->count; i += threads) CPU_SET ((size_t)c->core[i], &own);
   sched_setaffinity (0, sizeof own, &own);
 }
 
@@ -72,19 +75,19 @@ static void *parallel_thread (void *argument) {
   return NULL;
 }
 
-/* Starts all threads but one, which is the caller. */
+/* Calls the tasks in all threads, of which the caller is one; the lock keeps them waiting until all are started. */
 static int parallel_run (parallel *p) {
   if (p->threads > p->count) p->threads = p->count;
   pthread_t *thread = calloc ((size_t)p->threads + 1, sizeof *thread);
-  int started = 1, why = thread ? 0 : ENOMEM;
+  int started = 1, code = thread ? 0 : ENOMEM; /* the caller is thread 0 */
   pthread_mutex_init (&p->lock, NULL);
   pthread_mutex_lock (&p->lock);
-  while (why == 0 && started < p->threads && (why = pthread_create (thread + started, NULL, parallel_thread, p)) == 0)
+  while (code == 0 && started < p->threads && (code = pthread_create (thread + started, NULL, parallel_thread, p)) == 0)
     started++;
-  if (why) {
+  if (code) {
     p->next = p->count;
     p->status = pw_fail (p->error, PW_RESOURCE, "cannot start %d runs at a time, only %d: %s; try --jobs %d",
-                         p->threads, started, strerror (why), started);
+                         p->threads, started, strerror (code), started);
   }
   pthread_mutex_unlock (&p->lock);
   parallel_thread (p);
@@ -101,8 +104,8 @@ int pw_parallel (int jobs, int count, pw_task *task, void *context, pw_error *er
 
 /* ---- Timed tasks ---- */
 
-/* The lowest processor on the same physical core; the processor itself if that is unknown. */
-static int parallel_sibling (int processor) {
+/* The first processor on the same physical core; the processor itself if that is unknown. */
+static int parallel_first_sibling (int processor) {
   char name[80];
   int first = processor;
   snprintf (name, sizeof name, "/sys/devices/system/cpu/cpu%d/topology/thread_siblings_list", processor);
@@ -113,21 +116,22 @@ static int parallel_sibling (int processor) {
   return first;
 }
 
-static void parallel_find (parallel_cores *c) {
-  unsigned char known[CPU_SETSIZE] = { 0 };
-  c->cores = 0;
+/* Finds the cores; none if the processors are unknown. */
+static void parallel_find_cores (parallel_cores *c) {
+  unsigned char found[CPU_SETSIZE] = { 0 };
+  c->count = 0;
   if (sched_getaffinity (0, sizeof c->all, &c->all) != 0) return;
   for (int i = 0; i < CPU_SETSIZE; i++)
-    if (CPU_ISSET ((size_t)i, &c->all) && !known[parallel_sibling (i)]++) c->core[c->cores++] = i;
+    if (CPU_ISSET ((size_t)i, &c->all) && !found[parallel_first_sibling (i)]++) c->core[c->count++] = i;
 }
 
 int pw_parallel_timed (int jobs, int count, pw_task *task, void *context, pw_error *error) {
-  parallel_cores c;
-  parallel_find (&c);
-  parallel p = { .count = count, .task = task, .context = context, .error = error, .threads = jobs, .cores = &c };
-  if (jobs > c.cores) p.threads = c.cores;
+  parallel_cores cores;
+  parallel_find_cores (&cores);
+  parallel p = { .count = count, .task = task, .context = context, .error = error, .threads = jobs, .cores = &cores };
+  if (jobs > cores.count) p.threads = cores.count;
   if (p.threads < 2) return pw_parallel (1, count, task, context, error);
   int status = parallel_run (&p);
-  sched_setaffinity (0, sizeof c.all, &c.all);
+  sched_setaffinity (0, sizeof cores.all, &cores.all);
   return status;
 }

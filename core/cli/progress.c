@@ -1,4 +1,4 @@
-/* The progress bar, or lines of text without a terminal. */
+/* The progress bar of commands, or lines of text without a terminal. */
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
@@ -6,10 +6,10 @@
 #include <unistd.h>
 #include "progress.h"
 
-#define PROGRESS_FIRST 0.5 /* time before the bar appears [s], so that short runs show none */
-#define PROGRESS_EVERY 0.1 /* interval of updates [s] */
-#define PROGRESS_LINES 60  /* interval of lines without a terminal [s] */
-#define PROGRESS_WIDTH 30  /* characters of a full bar */
+#define PROGRESS_DELAY 0.5        /* time before the bar appears [s], so that short runs show none */
+#define PROGRESS_BAR_INTERVAL 0.1 /* between drawings of the bar [s] */
+#define PROGRESS_LINE_INTERVAL 60 /* between lines without a terminal [s] */
+#define PROGRESS_WIDTH 30         /* characters of a full bar */
 
 double pw_seconds (clockid_t id) {
   struct timespec now;
@@ -17,29 +17,18 @@ double pw_seconds (clockid_t id) {
   return (double)now.tv_sec + 1e-9 * (double)now.tv_nsec;
 }
 
-double pw_cpu_clock (void) {
-  return pw_seconds (CLOCK_PROCESS_CPUTIME_ID);
-}
-
-void pw_progress_start (pw_progress *p, const char *what, double t_end, int on) {
+void pw_progress_count (pw_progress *p, const char *title, const char *unit, double first, double last) {
   double now = pw_seconds (CLOCK_MONOTONIC);
   int lines = !isatty (STDERR_FILENO);
-  *p = (pw_progress){ .what = what,
-                      .unit = "s",
-                      .t_end = t_end,
-                      .start = now,
-                      .next = now + (lines ? PROGRESS_LINES : PROGRESS_FIRST),
-                      .on = on || lines,
-                      .lines = lines };
+  *p = (pw_progress){ .title = title, .unit = unit, .first = first, .last = last, .start = now, .lines = lines };
+  p->next = now + (lines ? PROGRESS_LINE_INTERVAL : PROGRESS_DELAY);
 }
 
-void pw_progress_count (pw_progress *p, const char *what, const char *unit, double from, double count) {
-  pw_progress_start (p, what, count, 1);
-  p->unit = unit;
-  p->from = from;
+void pw_progress_start (pw_progress *p, const char *title, double t_end) {
+  pw_progress_count (p, title, "s", 0, t_end);
 }
 
-/* "0:07", "12:30", "3:05:00"; "-" if unknown. */
+/* "0:07", "12:30", "3:05:00"; "-" if it is unknown or 1000 hours or more. */
 static void progress_duration (double seconds, char *text, size_t size) {
   if (!(seconds < 3600.0 * 1000)) {
     snprintf (text, size, "-");
@@ -52,32 +41,32 @@ static void progress_duration (double seconds, char *text, size_t size) {
     snprintf (text, size, "%d:%02d", s / 60, s % 60);
 }
 
-void pw_progress_at (pw_progress *p, double t) {
-  if (!p->on) return;
+void pw_progress_at (pw_progress *p, double reached) {
+  if (p->title == NULL || (p->no_bar && !p->lines)) return;
   double now = pw_seconds (CLOCK_MONOTONIC);
   if (now < p->next) return;
-  p->next = now + (p->lines ? PROGRESS_LINES : PROGRESS_EVERY);
-  double part = fmin (fmax (t / p->t_end, 0), 1);
-  char left[24], bar[PROGRESS_WIDTH + 1];
-  progress_duration ((now - p->start) / (t - p->from) * (p->t_end - t), left, sizeof left);
-  int full = (int)(part * PROGRESS_WIDTH);
+  p->next = now + (p->lines ? PROGRESS_LINE_INTERVAL : PROGRESS_BAR_INTERVAL);
+  double fraction = fmin (fmax (reached / p->last, 0), 1);
+  char remaining[24], bar[PROGRESS_WIDTH + 1];
+  progress_duration ((now - p->start) / (reached - p->first) * (p->last - reached), remaining, sizeof remaining);
+  int full = (int)(fraction * PROGRESS_WIDTH);
   for (int i = 0; i < PROGRESS_WIDTH; i++) bar[i] = i < full ? '#' : '.';
   bar[PROGRESS_WIDTH] = 0;
   if (p->lines)
-    fprintf (stderr, "pinwheel: %s: ", p->what);
+    fprintf (stderr, "pinwheel: %s: ", p->title);
   else
-    fprintf (stderr, "\r%.16s [%s] ", p->what, bar);
-  fprintf (stderr, "%*.0f %%  ", p->lines ? 0 : 3, floor (100 * part));
+    fprintf (stderr, "\r%.16s [%s] ", p->title, bar);
+  fprintf (stderr, "%*.0f %%  ", p->lines ? 0 : 3, floor (100 * fraction));
   if (strcmp (p->unit, "s") == 0)
-    fprintf (stderr, "t = %.4g of %.4g s  ", t, p->t_end);
+    fprintf (stderr, "t = %.4g of %.4g s  ", reached, p->last);
   else if (*p->unit)
-    fprintf (stderr, "%.9g of %.9g %s  ", floor (t), p->t_end, p->unit);
-  fprintf (stderr, "%s to go%s%s%s", left, *p->note ? "  " : "", p->note, p->lines ? "\n" : "\033[K");
+    fprintf (stderr, "%.9g of %.9g %s  ", floor (reached), p->last, p->unit);
+  fprintf (stderr, "%s to go%s%s%s", remaining, *p->note ? "  " : "", p->note, p->lines ? "\n" : "\033[K");
   fflush (stderr);
-  p->shown = !p->lines;
+  p->drawn = !p->lines;
 }
 
 void pw_progress_end (pw_progress *p) {
-  if (p->shown) fputs ("\r\033[K", stderr);
-  p->shown = 0;
+  if (p->drawn) fputs ("\r\033[K", stderr);
+  p->drawn = 0;
 }

@@ -4,30 +4,29 @@
 
 #include <time.h>
 
+/* Zero-initialised, it shows nothing. */
 typedef struct {
-  const char *what; /* shown in front */
-  const char *unit; /* "s" for time; else what is counted; "": t is a part of 1 */
-  double from;      /* initial value; not 0 if a run or sweep is resumed */
-  double t_end;     /* final value: time [s] or count */
-  double start;     /* clock when it started [s] */
-  double next;      /* clock when it may be drawn or written again [s] */
-  int shown;        /* 1: there is a bar to erase */
-  int on;           /* 0: draws nothing */
-  char note[40];    /* shown at the end; "" at first */
-  int lines;        /* 1: no terminal: lines in place of the bar */
+  const char *title; /* printed before the bar */
+  const char *unit;  /* "s" for time; else what is counted; "": a fraction of 1 */
+  double first;      /* initial time or count; not 0 if a run or sweep is resumed */
+  double last;       /* final time [s] or count */
+  double start;      /* clock when the work started [s] */
+  double next;       /* clock before which nothing is drawn or written [s] */
+  int drawn;         /* 1: there is a bar to erase */
+  int no_bar;        /* 1: no bar on a terminal, as the results are printed there; set after the start */
+  int lines;         /* 1: no terminal: lines in place of the bar */
+  char note[40];     /* printed at the end; "" at first */
 } pw_progress;
 
 /* The time of a clock [s]. */
 double pw_seconds (clockid_t id);
-/* The processor time of the program [s]. */
-double pw_cpu_clock (void);
 
-/* `on` 0 suppresses the bar, but not the lines. */
-void pw_progress_start (pw_progress *p, const char *what, double t_end, int on);
-/* The same for work that is counted in `unit` ("runs"): `from` of `count` are done already. */
-void pw_progress_count (pw_progress *p, const char *what, const char *unit, double from, double count);
-/* Draws the bar for the time or count t, at most ten times a second, or writes a line. */
-void pw_progress_at (pw_progress *p, double t);
+/* Starts the progress of a run from time 0 to t_end. */
+void pw_progress_start (pw_progress *p, const char *title, double t_end);
+/* The same for work that is counted in `unit` ("runs"): `first` of `last` are done already. */
+void pw_progress_count (pw_progress *p, const char *title, const char *unit, double first, double last);
+/* Draws the bar for the time or count reached, at most ten times a second, or writes a line. */
+void pw_progress_at (pw_progress *p, double reached);
 /* Erases the bar. */
 void pw_progress_end (pw_progress *p);
 

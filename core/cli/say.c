@@ -1,4 +1,4 @@
-/* Messages and other text that contains names; the last message of a command. */
+/* Messages and other text that contains names, and the error with which a command ends. */
 #define _POSIX_C_SOURCE 200809L
 #include <poll.h>
 #include <stdarg.h>
@@ -8,8 +8,8 @@
 #include "cli.h"
 #include "util.h"
 
-/* Control characters are written as \\xNN. */
-static void say_text (FILE *f, const char *text) {
+/* Writes control characters and invalid bytes as \\xNN. */
+static void say_escaped (FILE *f, const char *text) {
   for (int n; *text; text += n) {
     n = pw_utf8_size (text);
     int escaped = n == 0 || pw_control (text);
@@ -24,21 +24,21 @@ static void say_text (FILE *f, const char *text) {
 }
 
 void pw_cli_print (FILE *f, const char *format, ...) {
-  char text[12000];
+  char text[12000]; /* two paths of 4096 bytes and a sentence; the rest is cut off */
   va_list arguments;
   va_start (arguments, format);
   vsnprintf (text, sizeof text, format, arguments);
   va_end (arguments);
   if (isatty (fileno (f)))
-    say_text (f, text);
+    say_escaped (f, text);
   else
     fputs (text, f);
 }
 
-void pw_cli_wrap (const char *text, int indent, int width) {
-  int room = width - indent > 40 ? width - indent : 40;
-  while ((int)strlen (text) > room) {
-    int n = room;
+void pw_cli_print_wrapped (const char *text, int indent, int width) {
+  int longest = width - indent > 40 ? width - indent : 40; /* of a line */
+  while ((int)strlen (text) > longest) {
+    int n = longest;
     while (n > 0 && text[n] != ' ') n--;
     if (n == 0) break;
     printf ("%.*s\n%*s", n, text, indent, "");
@@ -53,11 +53,16 @@ static int say_pipe_closed (void) {
   return poll (&out, 1, 0) == 1 && out.revents & POLLERR;
 }
 
-int pw_cli_end (const pw_error *error) {
+const char *pw_cli_status_word (int status) {
+  static const char *const word[] = { "ok", "machine", "input", "start", "method" };
+  return word[-status];
+}
+
+int pw_cli_report_error (const pw_error *error) {
   if (error->status == PW_OK) return 0;
   if (error->status == PW_RESOURCE && say_pipe_closed ()) return PW_CLOSED_PIPE;
   fflush (stdout);
-  int placed = strstr (error->text, ": error: ") != NULL; /* the format of compilers, which editors recognise */
-  pw_cli_say ("%s%s\n", placed ? "" : "pinwheel: ", error->text);
+  int has_location = strstr (error->text, ": error: ") != NULL; /* the format of compilers, which editors recognise */
+  pw_cli_say ("%s%s\n", has_location ? "" : "pinwheel: ", error->text);
   return -error->status;
 }

@@ -1,5 +1,5 @@
-/* Requests to stop. */
-#define _DEFAULT_SOURCE /* clocks of Linux */
+/* Requests to stop a command, by a signal or a limit of processor time, which it checks between steps. */
+#define _DEFAULT_SOURCE /* CLOCK_MONOTONIC_COARSE */
 #include <math.h>
 #include <time.h>
 #include "cli.h"
@@ -7,19 +7,20 @@
 volatile sig_atomic_t pw_stop;
 
 static void stop_on_signal (int number) {
-  if (++pw_stop < 3) return;
+  if (++pw_stop < 3) return; /* see pw_stop_catch */
   signal (number, SIG_DFL);
   raise (number);
 }
 
-/* Handles SIGINT and SIGTERM; a signal that the program was started to ignore, by nohup or in the background of a script,
- * stays ignored. */
+/* Handles SIGINT and SIGTERM; a signal that the program was started to ignore, by nohup or in the background of a
+ * script, stays ignored. */
 static void stop_set (void (*handler) (int)) {
-  static const int number[] = { SIGINT, SIGTERM };
+  static const int numbers[] = { SIGINT, SIGTERM };
   struct sigaction action = { .sa_handler = handler }, before;
   sigemptyset (&action.sa_mask);
   for (int i = 0; i < 2; i++)
-    if (sigaction (number[i], NULL, &before) == 0 && before.sa_handler != SIG_IGN) sigaction (number[i], &action, NULL);
+    if (sigaction (numbers[i], NULL, &before) == 0 && before.sa_handler != SIG_IGN)
+      sigaction (numbers[i], &action, NULL);
 }
 
 void pw_stop_catch (void) {
@@ -32,25 +33,25 @@ void pw_stop_release (void) {
 
 /* ---- Limits ---- */
 
-void pw_limit_start (pw_limit *l) {
-  l->start = pw_seconds (CLOCK_THREAD_CPUTIME_ID);
+void pw_limit_start (pw_limit *limit) {
+  limit->start = pw_seconds (CLOCK_THREAD_CPUTIME_ID);
 }
 
-/* Reading the thread's clock takes a system call, so it is read only when a coarse clock has advanced: about 250 times
- * a second. */
-int pw_limit_over (void *limit) {
-  pw_limit *l = limit;
+/* Reading the thread's clock takes a system call, so it is read only when a coarse clock, which does not, has advanced:
+ * about 250 times a second. */
+int pw_limit_over (void *context) {
+  pw_limit *limit = context;
   if (pw_stop) return 1;
-  if (isinf (l->most)) return 0;
+  if (isinf (limit->seconds)) return 0;
   double now = pw_seconds (CLOCK_MONOTONIC_COARSE);
-  if (now == l->read) return 0;
-  l->read = now;
-  return pw_seconds (CLOCK_THREAD_CPUTIME_ID) - l->start > l->most;
+  if (now == limit->last_check) return 0;
+  limit->last_check = now;
+  return pw_seconds (CLOCK_THREAD_CPUTIME_ID) - limit->start > limit->seconds;
 }
 
-int pw_limit_fail (const pw_limit *l, double t, pw_error *error) {
-  char limit[32], reached[32];
+int pw_limit_status (const pw_limit *limit, double t, pw_error *error) {
+  char seconds[32], reached[32];
   if (pw_stop) return PW_RETRY;
   return pw_fail (error, PW_METHOD, "t = %s s: the limit of %s s of processor time is reached (--limit)",
-                  pw_format (reached, t, 6), pw_format (limit, l->most, 6));
+                  pw_format (reached, t, 6), pw_format (seconds, limit->seconds, 6));
 }

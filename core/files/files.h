@@ -18,7 +18,7 @@ typedef struct {
   pw_arena arena;
   pw_found *found;
   int count;
-  size_t room;       /* entries allocated */
+  size_t room;       /* entries of `found` allocated */
   char folders[400]; /* the folders searched, "/first:/second", also for messages */
   char unread[160];  /* folders of PINWHEEL_MODELS that cannot be searched: "/nowhere (No such file or directory)" */
 } pw_search;
@@ -27,7 +27,7 @@ typedef struct {
 int pw_search_open (pw_search *s, pw_error *error);
 void pw_search_close (pw_search *s);
 
-/* The path of the pinwheel.h that belongs to this library, or of a file of the engine of interactive pages; malloced,
+/* Finds the pinwheel.h that belongs to this library, or a file of the engine of interactive pages; *path is malloced,
  * NULL if there is none.  PW_OK or PW_RESOURCE. */
 int pw_search_header (char **path, pw_error *error);
 int pw_search_page_file (const char *file, char **path, pw_error *error);
@@ -37,7 +37,7 @@ int pw_ends_with (const char *name, const char *ending);
 
 /* ---- Model files in C (build.c) ---- */
 
-/* Uses a shared object, which may be deleted afterwards. */
+/* What is done with a compiled object, which is deleted afterwards. */
 typedef int pw_object_user (void *context, const char *object, pw_error *error);
 
 /* Compiles a C file in a private temporary folder to a shared object or, unless `engine` is NULL, to WebAssembly linked
@@ -46,8 +46,8 @@ typedef int pw_object_user (void *context, const char *object, pw_error *error);
 int pw_compile_file (const char *path, const char *engine, pw_object_user *use, void *context, pw_error *error);
 #define PW_PAGE_TOOLS "clang, lld, wasi-libc and libclang-rt-14-dev-wasm32 (make deps TOOLS=page)"
 
-/* Compiles generated code with all messages in a log, for `lanes` runs at once; 0: for single runs.  PW_INPUT if there is
- * no compiler; PW_METHOD if it does not compile; PW_RESOURCE. */
+/* Compiles generated code with all messages in a log, for `lanes` runs at once; 0: for single runs.  PW_INPUT if there
+ * is no compiler; PW_METHOD if it does not compile; PW_RESOURCE. */
 int pw_compile_scene (const char *path, const char *object, const char *log, int lanes, pw_error *error);
 /* The compiler's options for generated code, ending with NULL: the instructions of this processor, except fused
  * multiply-add, so that results have the same bits. */
@@ -61,8 +61,8 @@ char *pw_temporary_folder (pw_error *error);
 
 /* ---- The cache (cache.c) ---- */
 
-/* Creates the cache's folder if it does not exist, and returns its path, malloced; NULL if there is none, with a notice in
- * the buffer if one exists but others could have written to it, or it cannot be used. */
+/* Creates the cache's folder if it does not exist, and returns its path, malloced; NULL if there is none, with a
+ * notice in the buffer if one exists but others could have written to it, or it cannot be used. */
 char *pw_cache_folder (char *notice, size_t size);
 /* Deletes the least recently used files until the rest is within the limit. */
 void pw_cache_trim (const char *folder);
@@ -86,10 +86,12 @@ const pw_yaml *pw_file_yaml (const pw_file *f);
 
 /* ---- Tables of numbers (columns.c) ---- */
 
-/* As pw_read_columns, from a stream; `shown` is its path in messages, "SHOWN:LINE: REASON".  Without `gaps`, gaps are
- * errors. */
+/* Whether empty cells and nan are errors, or become NaN. */
+typedef enum { PW_GAPS_REFUSED, PW_GAPS_ALLOWED } pw_gaps;
+
+/* As pw_read_columns, from a stream; `shown` is its path in messages, "SHOWN:LINE: REASON". */
 double *pw_columns_from_stream (FILE *f, const char *shown, const char *const *column, const char *const *unit,
-                                int width, int gaps, int *rows, pw_error *error);
+                                int width, pw_gaps gaps, int *rows, pw_error *error);
 
 /* ---- Units (units.c) ---- */
 
@@ -105,19 +107,19 @@ extern const pw_unit_name pw_unit_names[]; /* ends with a NULL name */
 /* folder + "/" + name + ending, malloced; NULL if out of memory. */
 char *pw_path_join (const char *folder, const char *name, const char *ending);
 
-/* As pw_read_rest, of the regular file at a path; a failure to open it is "CANNOT PATH: REASON". */
-int pw_read_file (const char *cannot, const char *path, size_t max_bytes, const char *what, char **text, size_t *size,
+/* As pw_read_rest, of the regular file at a path.  If it cannot be opened, the error is "FAILURE PATH: REASON". */
+int pw_read_file (const char *failure, const char *path, size_t max_bytes, const char *limit, char **text, size_t *size,
                   pw_error *error);
 
 /* Reads the rest of a file of at most `max_bytes` bytes into *text, malloced, zero-terminated; free it in every case.
- * `what` explains the limit in messages: "the limit for a table".  PW_INPUT if the file is larger or cannot be read;
+ * `limit` explains the limit in messages: "the limit for a table".  PW_INPUT if the file is larger or cannot be read;
  * PW_RESOURCE. */
-int pw_read_rest (FILE *f, size_t max_bytes, const char *path, const char *what, char **text, size_t *size,
+int pw_read_rest (FILE *f, size_t max_bytes, const char *path, const char *limit, char **text, size_t *size,
                   pw_error *error);
 
 /* ---- Names of files (location.c) ---- */
 
-/* "it is a directory, not a regular file" */
+/* Why a file is refused: "it is a directory, not a regular file". */
 const char *pw_not_regular (mode_t mode);
 
 /* The folder of the file at a path, malloced; NULL if out of memory. */
@@ -137,15 +139,15 @@ int pw_locate (pw_location *p, const char *path);
 /* ---- Locks (lock.c) ---- */
 
 typedef enum {
-  PW_LOCK_NEW,     /* an empty file; removes one left by a killed process */
-  PW_LOCK_KEEP,    /* the existing file, or an empty one */
+  PW_LOCK_NEW,     /* a new file; removes one left by a killed process */
+  PW_LOCK_KEEP,    /* the existing file, or a new one */
   PW_LOCK_EXISTING /* the existing file; ENOENT if there is none */
-} pw_lock_how;
+} pw_lock_mode;
 
-/* Opens a regular file for reading and writing and locks it until it is closed; a symbolic link is not followed.  -1 and
- * errno, for pw_lock_reason. */
-int pw_lock_file (const char *path, pw_lock_how how);
-const char *pw_lock_reason (int code);
+/* Opens a regular file for reading and writing and locks it until it is closed; a symbolic link is not followed.  -1
+ * and errno, for pw_lock_reason. */
+int pw_lock_file (const char *path, pw_lock_mode mode);
+const char *pw_lock_reason (int code); /* of an errno value, for messages */
 
 /* ---- Outputs (output.c) ---- */
 

@@ -1,4 +1,4 @@
-/* Numbers as text, the same in every locale. */
+/* Numbers as text, with a decimal point in every locale. */
 #define __STDC_WANT_IEC_60559_BFP_EXT__ 1 /* strfromd */
 #include <ctype.h>
 #include <locale.h>
@@ -8,7 +8,7 @@
 #include <string.h>
 #include "pinwheel-files.h"
 
-/* printf takes a slower path once LAPACK has loaded libquadmath. */
+/* strfromd, since printf takes a slower path once LAPACK has loaded libquadmath. */
 #ifndef __GLIBC__
 #define strfromd snprintf
 #endif
@@ -23,24 +23,24 @@ static void number_point (char *text) {
 }
 
 char *pw_format (char buffer[32], double value, int digits) {
-  static const char format[][8] = { "%.1g",  "%.2g",  "%.3g",  "%.4g",  "%.5g",  "%.6g",  "%.7g",  "%.8g", "%.9g",
-                                    "%.10g", "%.11g", "%.12g", "%.13g", "%.14g", "%.15g", "%.16g", "%.17g" };
+  int precision = digits < 1 ? 1 : digits > 17 ? 17 : digits;
+  const char format[] = { '%', '.', (char)('0' + precision / 10), (char)('0' + precision % 10), 'g', 0 }; /* "%.17g" */
   if (isnan (value)) return strcpy (buffer, "nan");
   if (isinf (value)) return strcpy (buffer, value > 0 ? "inf" : "-inf");
-  strfromd (buffer, 32, format[digits < 1 ? 0 : digits > 17 ? 16 : digits - 1], value);
+  strfromd (buffer, 32, format, value);
   number_point (buffer);
   return buffer;
 }
 
 int pw_read_number (const char *text, double *value) {
   if (*text == 0 || isspace ((unsigned char)*text)) return PW_INPUT;
-  locale_t c = newlocale (LC_ALL_MASK, "C", (locale_t)0);
-  if (c == (locale_t)0) return PW_RESOURCE;
-  locale_t before = uselocale (c);
+  locale_t standard = newlocale (LC_ALL_MASK, "C", (locale_t)0);
+  if (standard == (locale_t)0) return PW_RESOURCE;
+  locale_t before = uselocale (standard);
   char *end;
   double x = strtod (text, &end);
   uselocale (before);
-  freelocale (c);
+  freelocale (standard);
   if (*end) return PW_INPUT;
   *value = x;
   return PW_OK;

@@ -1,4 +1,4 @@
-/* Pinwheel's files: finds models, writes tables and summaries. */
+/* Files of Pinwheel: finds and loads models, reads tables, writes tables, summaries and checkpoints. */
 #ifndef PINWHEEL_FILES_H
 #define PINWHEEL_FILES_H
 
@@ -37,7 +37,7 @@ const pw_plugin_table *pw_file_table (const pw_file *f);
 const char *pw_file_name (const pw_file *f); /* "ezyroller" */
 const char *pw_file_path (const pw_file *f);
 
-/* The path of the file that a model's name or path means, malloced; NULL and an error as from pw_file_open. */
+/* The path of the file that a model's name or path refers to, malloced; NULL and an error as from pw_file_open. */
 char *pw_file_find (const char *model, pw_error *error);
 
 /* Calls `each` with the path of every table that a text model reads, until it returns non-zero, which is returned. */
@@ -79,7 +79,7 @@ pw_scene_code *pw_scene_code_open (const char *text, const pw_system *s, pw_erro
 pw_scene_code *pw_scene_lanes_open (const char *text, const pw_system *s, int lanes, pw_error *error);
 const pw_specialised_lanes *
 pw_scene_code_lanes (const pw_scene_code *c); /* NULL if it is for single runs, or compiled by clang */
-/* The number of runs whose lanes fill a vector register of this processor; 1 if lanes do not pay. */
+/* The number of runs whose lanes fill a vector register of this processor; 1 if several runs at once are not faster. */
 int pw_processor_lanes (void);
 /* For pw_settings.specialised; NULL if c is NULL. */
 const pw_specialised *pw_scene_code_table (const pw_scene_code *c);
@@ -102,17 +102,17 @@ int pw_read_expression (const char *text, double *value);
 
 typedef struct pw_formula pw_formula;
 
-/* Reads an expression of the names, which end with NULL, at most PW_FORMULA_NAMES.  NULL and PW_INPUT with the reason, or
- * PW_RESOURCE. */
+/* Reads an expression of the names, which end with NULL, at most PW_FORMULA_NAMES.  NULL and PW_INPUT with the reason,
+ * or PW_RESOURCE. */
 #define PW_FORMULA_NAMES 32
 pw_formula *pw_formula_open (const char *text, const char *const *names, pw_error *error);
-/* The value for values of the names, and its derivative with respect to name `by`; both may be non-finite.  At a jump or
- * kink, the derivative is the one on the right. */
+/* The value for values of the names, and its derivative with respect to name `by`; both may be non-finite.  At a jump
+ * or kink, the derivative is the one on the right. */
 double pw_formula_value (const pw_formula *f, const double *value);
 double pw_formula_derivative (const pw_formula *f, const double *value, int by);
 void pw_formula_close (pw_formula *f);
 
-/* ---- Units in the headers of tables, "NAME [UNIT]" (units.c) ---- */
+/* ---- Tables of numbers: units in their headers, "NAME [UNIT]" (units.c), and columns (columns.c) ---- */
 
 /* Finds the factor from a unit to SI units; PW_INPUT if it is unknown, PW_RETRY if its dimension is not that of
  * `wanted` (NULL: any). */
@@ -125,11 +125,13 @@ size_t pw_unit_split (const char *cell, char *unit, size_t size);
 /* The factor of a column by its header's cell, 1 without a unit.  PW_INPUT with column, unit and reason. */
 int pw_unit_check (const char *cell, const char *wanted, double *factor, char *why, size_t size);
 
-/* Reads columns of a table by their names or numbers, in SI units: `unit` of each, or NULL for any.  The first one is the
- * time, which increases; in the others empty cells and nan are gaps, NaN.  Returns `width` arrays of *rows numbers, one
- * after the other; free it.  NULL and PW_INPUT with file, line and nearest name, or PW_RESOURCE. */
+/* Reads columns of a table by their names or numbers, in SI units: `unit` of each, or NULL for any.  The first one is
+ * the time, which increases; in the others empty cells and nan are gaps, NaN.  Returns `width` arrays of *rows
+ * numbers, one after the other; free it.  NULL and PW_INPUT with file, line and nearest name, or PW_RESOURCE. */
 double *pw_read_columns (const char *path, const char *const *column, const char *const *unit, int width, int *rows,
                          pw_error *error);
+
+/* ---- Reading ---- */
 
 /* Opens a regular file for reading, without waiting (a FIFO is refused).  NULL, with the reason in *why, if that fails
  * or it is another type of file. */
@@ -175,8 +177,8 @@ int pw_output_ready (pw_output *o, pw_error *error);
 int pw_output_finish (pw_output *o, pw_error *error);
 /* The same for several outputs, some of which may be NULL: completes all, or leaves all under their temporary names. */
 int pw_output_finish_all (pw_output *const *o, int count, pw_error *error);
-/* Gives up and frees: NAME.part remains, of a text with complete lines.  Its path is written to the buffer, which is returned;
- * NULL, and "" in the buffer, if there is no such file (standard output, a device). */
+/* Gives up and frees: NAME.part remains, of a text with complete lines.  Its path is written to the buffer, which is
+ * returned; NULL, and "" in the buffer, if there is no such file (standard output, a device). */
 char *pw_output_abandon (pw_output *o, char *buffer, size_t size);
 /* Gives up and frees, and removes NAME.part. */
 void pw_output_discard (pw_output *o);
@@ -203,7 +205,7 @@ pw_output *pw_output_continue (const char *path, const pw_mark *mark, pw_error *
 
 /* ---- Checkpoints ----
  *
- *     pinwheel checkpoint 1      lines "KEY = VALUE": what run it is of
+ *     pinwheel checkpoint 1      lines "KEY = VALUE": the run it belongs to
  *     ...
  *     end
  *     state = 812 bytes, check sum 0123456789abcdef
@@ -240,8 +242,8 @@ typedef struct {
   unsigned long at; /* bytes written */
 } pw_npz;
 
-/* Adds rows x columns numbers, by rows, each of `parts` doubles: 1, or 2 for complex ones; with 0 columns a vector.  The
- * name has at most 300 bytes. */
+/* Adds rows x columns numbers, by rows, each of `parts` doubles: 1, or 2 for complex ones; with 0 columns a vector.
+ * The name has at most 300 bytes. */
 void pw_npz_add (pw_npz *z, const char *name, long rows, long columns, int parts, const double *value);
 /* Completes the archive, and frees what it needs in every case; errors of the stream stay there.  PW_RESOURCE. */
 int pw_npz_end (pw_npz *z, pw_error *error);
@@ -249,9 +251,9 @@ int pw_npz_end (pw_npz *z, pw_error *error);
 /* ---- Tables ---- */
 
 /* A table of samples: states, contact points, reactions (-lambda), scaled residuals, and energies if the run keeps a
- * ledger.  As CSV it has a header line "t [s],frame.x [m],...", then a line per sample with 17 digits; non-finite is nan.
- * If the output is named .npz, it is a NumPy archive with a vector per column, named without unit, which is written when the
- * table is closed.  Errors: PW_RESOURCE; PW_METHOD if a signal of the model fails. */
+ * ledger.  As CSV it has a header line "t [s],frame.x [m],...", then a line per sample with 17 digits; non-finite is
+ * nan.  If the output is named .npz, it is a NumPy archive with a vector per column, named without unit, which is
+ * written when the table is closed.  Errors: PW_RESOURCE; PW_METHOD if a signal of the model fails. */
 typedef struct pw_csv pw_csv;
 pw_csv *pw_csv_open (const pw_system *s, int ledger, pw_output *o, pw_error *error);
 int pw_csv_write (pw_csv *c, const pw_system *s, const pw_sample *sample, pw_error *error);
@@ -259,12 +261,13 @@ int pw_csv_close (pw_csv *c, pw_error *error); /* c may be NULL */
 
 /* ---- JSON ---- */
 
-/* Writes JSON to a stream: numbers with 17 digits unless `digits` is set, null for what is not finite; text contains no
- * "<", so that it may be part of a script in HTML.  Begin with { .f = stream } and open one container.  A key is NULL in lists and for the outermost container.  A NULL pw_json writes nothing. */
+/* Writes JSON to a stream: numbers with 17 digits unless `digits` is set, null for what is not finite; text contains
+ * no "<", so that it may be part of a script in HTML.  Begin with { .f = stream } and open one container.  A key is
+ * NULL in lists and for the outermost container.  A NULL pw_json writes nothing. */
 typedef struct {
   FILE *f;
-  int lines;        /* levels whose items have separate lines */
-  int line;         /* 1: so has the next item, or the end of the container */
+  int lines;        /* outermost levels whose items have separate lines */
+  int line;         /* 1: the next item, or the end of the container, begins a line */
   int depth, items; /* containers that are open; items of the innermost so far */
   int digits;       /* of numbers; 0: 17 */
 } pw_json;
@@ -276,13 +279,14 @@ void pw_json_flag (pw_json *j, const char *key, int value);
 
 /* ---- Summaries ---- */
 
-/* The errors of a run against the reference, at the end and the largest: of lengths, angles, velocities [m/s] and angular
- * velocities; the largest one of reactions, relative to the largest reaction of the same unit.  NaN: unknown. */
+/* The errors of a run against the reference.  NaN: unknown. */
 typedef struct {
   const char *source; /* "the model", or the path of a table */
   int samples;        /* compared */
   double t;           /* of the last one [s] */
-  double end[4], most[4], reactions;
+  double end[4];      /* at t: of lengths [m], angles [rad], velocities [m/s], angular velocities [rad/s] */
+  double most[4];     /* the largest of the run, in the same order */
+  double reactions;   /* the largest, relative to the largest reaction of the same unit */
 } pw_reference_error;
 
 /* What a run was and how it ended; `reason` is "" when the status is ok. */

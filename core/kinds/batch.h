@@ -1,11 +1,16 @@
-/* Batch functions and `prepare` functions of element types, written for one element; members of their tables. */
+/* Batch functions and `prepare` functions of element types, written for one element; members of their tables.
+ *
+ * Notation in the files of element types: r = (x, y), phi: centre of mass and angle of a body; w = phi'; R(phi): its
+ * rotation matrix; s: a point in its frame; indices 1, 2: of body 1, 2.  a: accelerations (r'', w') of the element's
+ * bodies; f: its generalised force; G, S: its rows of J, of position and velocity constraints; u: its signal; V: its
+ * potential energy. */
 #ifndef PW_BATCH_H
 #define PW_BATCH_H
 
 #include <math.h>
 #include "pinwheel.h"
 
-/* Inlines all calls in a function, so that it computes no more of a state than it uses. */
+/* Inlines all calls in a function, so that it computes no part of a state that it does not use. */
 #if defined(__GNUC__)
 #define FLATTEN __attribute__ ((flatten))
 #define MAYBE_UNUSED __attribute__ ((unused))
@@ -39,6 +44,7 @@ extern double tanh (double x);
 extern double hypot (double x, double y);
 LIBM (libm_tanh (libm_lanes x) __asm__(LIBM_NAME "_tanh"));
 LIBM (libm_hypot (libm_lanes x, libm_lanes y) __asm__(LIBM_NAME "v_hypot"));
+/* Not inlined: the compiler would turn the loops over lanes into calls of the very functions that they define. */
 __attribute__ ((noinline)) static double one_tanh (double x) {
   return tanh (x);
 }
@@ -55,64 +61,84 @@ LIBM (libm_hypot (libm_lanes x, libm_lanes y)) {
 }
 #endif
 
-/* PER_ELEMENT (rod_J, rod, 6) { ... } defines the batch function rod_J and rod_J_one, the same for one element.  The body
- * fills `out`, the 6 numbers of the element, from `x`, a rod_state: the element in its current state, as rod_at (b, e)
- * returns it. */
-#define PER_ELEMENT(function, type, size)                                                   \
-  static inline void function##_one (type##_state x, double *out);                          \
-  FLATTEN static inline void function (const pw_batch *b, double *out) {                    \
-    for (int e = 0; e < b->count; e++, out += size) function##_one (type##_at (b, e), out); \
-  }                                                                                         \
-  static inline void function##_one (type##_state x, double *out)
+/* PER_ELEMENT (rod_J, rod, 6) { ... } defines the batch function rod_J, and rod_J_one, the same for one element.  The
+ * braces contain the body of the latter: it fills `out`, the 6 numbers of the element, from `now`, a rod_state: the
+ * element in the current state of the scene, as rod_at (batch, e) returns it. */
+#define PER_ELEMENT(function, type, size)                                                           \
+  static inline void function##_one (type##_state now, double *out);                                \
+  FLATTEN static inline void function (const pw_batch *batch, double *out) {                        \
+    for (int e = 0; e < batch->count; e++, out += size) function##_one (type##_at (batch, e), out); \
+  }                                                                                                 \
+  static inline void function##_one (type##_state now, double *out)
 
-/* PREPARE (gear_prepare, pw_gear, gear) { ... } defines a `prepare`: it fills `k`, a gear, from the definition `d`, may
- * use its other parameters `bodies`, `internal` and `error`, and returns a status. */
-#define PREPARE(function, definition_type, type)                                                                   \
-  static inline int function##_one (const definition_type *d, const pw_body *const *bodies, type *k,               \
-                                    pw_internal *internal, pw_error *error);                                       \
-  static int function (const void *definition, const pw_body *const *bodies, void *element, pw_internal *internal, \
-                       pw_error *error) {                                                                          \
-    return function##_one (definition, bodies, element, internal, error);                                          \
-  }                                                                                                                \
-  static inline int function##_one (const definition_type *d, MAYBE_UNUSED const pw_body *const *bodies, type *k,  \
-                                    MAYBE_UNUSED pw_internal *internal, MAYBE_UNUSED pw_error *error)
+/* PREPARE (gear_prepare, pw_gear, gear) { ... } defines a `prepare`: it fills `element`, a gear, from `definition`, a
+ * pw_gear, may use its other parameters `bodies`, `internal` and `error`, and returns a status. */
+#define PREPARE(function, definition_type, type)                                                                    \
+  static inline int function##_one (const definition_type *definition, const pw_body *const *bodies, type *element, \
+                                    pw_internal *internal, pw_error *error);                                        \
+  static int function (const void *definition, const pw_body *const *bodies, void *element, pw_internal *internal,  \
+                       pw_error *error) {                                                                           \
+    return function##_one (definition, bodies, element, internal, error);                                           \
+  }                                                                                                                 \
+  static inline int function##_one (const definition_type *definition, MAYBE_UNUSED const pw_body *const *bodies,   \
+                                    type *element, MAYBE_UNUSED pw_internal *internal, MAYBE_UNUSED pw_error *error)
 
-/* Members of a type's table; functions that have the names of their members: weld_J, weld_gamma, ... */
-#define DEFINITION(type, table) .definition = sizeof (type), .fields = table
-#define ELEMENT(type, function) .element = sizeof (type), .prepare = function
+/* Members of a type's table, whose values have their names: weld_fields, weld_prepare, weld_J, ... */
+#define TYPE(type, definition_type, element_type)                                                    \
+  .definition = sizeof (definition_type), .fields = type##_fields, .element = sizeof (element_type), \
+  .prepare = type##_prepare
 #define POSITION(type) .g = type##_g, .g_size = type##_g_size
-#define CONSTRAINT(type) \
-  .J = type##_J, .gamma = type##_gamma, .jw_q = type##_jw_q, .gamma_q = type##_gamma_q, .gamma_v = type##_gamma_v
+#define DERIVATIVES(type) .jw_q = type##_jw_q, .gamma_q = type##_gamma_q, .gamma_v = type##_gamma_v
+#define CONSTRAINT(type) .J = type##_J, .gamma = type##_gamma, DERIVATIVES (type)
 #define FORCE(type) .force = type##_force, .force_q = type##_force_q, .force_v = type##_force_v
 
+/* The only reaction of a type: its name, unit and meaning. */
+#define REACTION(name, unit, about)  \
+  .reaction = &(const pw_quantity) { \
+    name, unit, NULL, about          \
+  }
+
 /* The vector w of an element; NULL where the batch has none. */
-static inline const double *batch_w (const pw_batch *b, int e) {
-  return b->w ? b->w + e * b->cols : NULL;
+static inline const double *batch_w (const pw_batch *batch, int e) {
+  return batch->w ? batch->w + e * batch->cols : NULL;
 }
 
-/* Body n of element e, in its current state. */
-static inline const pw_configuration *batch_body (const pw_batch *b, int e, int bodies, int n) {
-  return &b->configuration[b->body[bodies * e + n]];
+/* The body of element e in its current state, if elements have one body; bodies 1 and 2, if they have two. */
+static inline const pw_configuration *batch_only_body (const pw_batch *batch, int e) {
+  return &batch->configuration[batch->body[e]];
+}
+static inline const pw_configuration *batch_body1 (const pw_batch *batch, int e) {
+  return &batch->configuration[batch->body[2 * e]];
+}
+static inline const pw_configuration *batch_body2 (const pw_batch *batch, int e) {
+  return &batch->configuration[batch->body[2 * e + 1]];
 }
 
 /* eta of a velocity constraint whose right-hand side is the element's only signal. */
-static inline void batch_signal (const pw_batch *b, double *out) {
-  for (int e = 0; e < b->count; e++) out[e] = b->u[3 * e];
+static inline void batch_eta_of_signal (const pw_batch *batch, double *out) {
+  for (int e = 0; e < batch->count; e++) out[e] = batch->u[3 * e];
 }
 
-/* A vector in a body's frame, in world axes. */
-static inline void to_world (const pw_configuration *A, const double s[2], double out[2]) {
-  out[0] = A->cos * s[0] - A->sin * s[1];
-  out[1] = A->sin * s[0] + A->cos * s[1];
+/* A vector given in a body's frame, in world axes. */
+static inline void to_world (const pw_configuration *body, const double s[2], double out[2]) {
+  out[0] = body->cos * s[0] - body->sin * s[1];
+  out[1] = body->sin * s[0] + body->cos * s[1];
 }
 
-/* The force of the torque T on body 1 and -T on body 2. */
+/* F limited smoothly to L tanh (F / L); F itself if L = 0.  *slope: derivative with respect to F. */
+static inline double limited_force (double F, double L, double *slope) {
+  double y = WHERE (L > 0, tanh (F / L));
+  *slope = L > 0 ? 1 - y * y : 1;
+  return L > 0 ? L * y : F;
+}
+
+/* The generalised force of a torque T on body 1 and -T on body 2. */
 static inline void opposite_moments (double T, double *out) {
   out[0] = out[1] = out[3] = out[4] = 0, out[2] = T, out[5] = -T;
 }
 
-/* Its derivative by the angles, or by the angular velocities, if T decreases with those of body 1 relative to body 2 by
- * `slope`: 6 x 6. */
+/* Its derivative with respect to the positions or to the velocities, 6 x 6, if -slope is that of T with respect to the
+ * relative angle or angular velocity, body 1 minus body 2. */
 static inline void opposite_moments_block (double slope, double *out) {
   for (int i = 0; i < 36; i++) out[i] = 0;
   out[14] = out[35] = -slope, out[17] = out[32] = slope;

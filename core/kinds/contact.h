@@ -12,18 +12,18 @@
 #include "batch.h"
 
 typedef struct {
-  double a, b;    /* components of the direction in the body's frame */
+  double a, b;    /* the direction in the body's frame */
   double arm;     /* l [m] */
   double at[2];   /* P in the body's frame [m] */
   double heading; /* of the wheel in the body's frame [rad] */
 } contact;
 
-/* A contact in the current state: its direction (dx, dy) in the world. */
+/* A contact in the current state. */
 typedef struct {
-  contact k;
-  const pw_configuration *A;
-  const double *w;
-  double dx, dy;
+  contact constants;
+  const pw_configuration *body;
+  const double *w; /* the vector w of jw_q, else NULL */
+  double dx, dy;   /* the direction in world axes */
 } contact_state;
 
 static inline contact contact_make (const double at[2], double heading, double a, double b) {
@@ -39,46 +39,59 @@ static inline contact contact_across (const double at[2], double heading) {
   return contact_make (at, heading, -pw_sin (heading), pw_cos (heading));
 }
 
-/* The contact k of element e of a batch of elements with one body. */
-static inline contact_state contact_of (contact k, const pw_batch *b, int e) {
-  const pw_configuration *A = batch_body (b, e, 1, 0);
-  return (contact_state){ k, A, batch_w (b, e), A->cos * k.a - A->sin * k.b, A->sin * k.a + A->cos * k.b };
+/* A contact of element e of a batch of elements with one body. */
+static inline contact_state contact_of (contact constants, const pw_batch *batch, int e) {
+  const pw_configuration *body = batch_only_body (batch, e);
+  return (contact_state){ constants, body, batch_w (batch, e), body->cos * constants.a - body->sin * constants.b,
+                          body->sin * constants.a + body->cos * constants.b };
 }
 
-static inline contact_state contact_at (const pw_batch *b, int e) {
-  return contact_of (((const contact *)b->element)[e], b, e);
+static inline contact_state contact_at (const pw_batch *batch, int e) {
+  return contact_of (((const contact *)batch->element)[e], batch, e);
 }
 
 /* The velocity component S v. */
-static inline double contact_speed (const contact_state *x) {
-  return x->dx * x->A->vx + x->dy * x->A->vy + x->k.arm * x->A->omega;
+static inline double contact_speed (const contact_state *now) {
+  return now->dx * now->body->vx + now->dy * now->body->vy + now->constants.arm * now->body->omega;
+}
+
+/* Its derivative with respect to the angle of the body. */
+static inline double contact_speed_phi (const contact_state *now) {
+  return now->dx * now->body->vy - now->dy * now->body->vx;
 }
 
 PER_ELEMENT (contact_J, contact, 3) {
-  out[0] = x.dx, out[1] = x.dy, out[2] = x.k.arm;
+  out[0] = now.dx, out[1] = now.dy, out[2] = now.constants.arm;
 }
 
 PER_ELEMENT (contact_gamma, contact, 1) {
-  *out = x.A->omega * (x.dy * x.A->vx - x.dx * x.A->vy);
+  *out = now.body->omega * (now.dy * now.body->vx - now.dx * now.body->vy);
 }
 
 PER_ELEMENT (contact_jw_q, contact, 3) {
-  out[0] = out[1] = 0, out[2] = x.dx * x.w[1] - x.dy * x.w[0];
+  out[0] = out[1] = 0, out[2] = now.dx * now.w[1] - now.dy * now.w[0];
 }
 
 PER_ELEMENT (contact_gamma_q, contact, 3) {
-  out[0] = out[1] = 0, out[2] = x.A->omega * (x.dx * x.A->vx + x.dy * x.A->vy);
+  out[0] = out[1] = 0, out[2] = now.body->omega * (now.dx * now.body->vx + now.dy * now.body->vy);
 }
 
 PER_ELEMENT (contact_gamma_v, contact, 3) {
-  out[0] = x.A->omega * x.dy, out[1] = -x.A->omega * x.dx, out[2] = x.dy * x.A->vx - x.dx * x.A->vy;
+  out[0] = now.body->omega * now.dy, out[1] = -now.body->omega * now.dx,
+  out[2] = now.dy * now.body->vx - now.dx * now.body->vy;
 }
 
 /* Contact point and heading (x, y, angle) in the world, for output and figures. */
 PER_ELEMENT (contact_place, contact, 3) {
-  out[0] = x.A->x + x.A->cos * x.k.at[0] - x.A->sin * x.k.at[1];
-  out[1] = x.A->y + x.A->sin * x.k.at[0] + x.A->cos * x.k.at[1];
-  out[2] = x.A->phi + x.k.heading;
+  out[0] = now.body->x + now.body->cos * now.constants.at[0] - now.body->sin * now.constants.at[1];
+  out[1] = now.body->y + now.body->sin * now.constants.at[0] + now.body->cos * now.constants.at[1];
+  out[2] = now.body->phi + now.constants.heading;
 }
+
+/* Fields of the definition of a wheel: its contact point and its heading. */
+#define CONTACT_FIELDS(type)                                                                                          \
+  { PW_AT (type, at), PW_POINT, .unit = "m", .required = 1, .about = "contact point in the body's frame" }, {         \
+    PW_AT (type, heading), PW_NUMBER, .unit = "rad", .about = "rolling direction in the body's frame; 0: along its x" \
+  }
 
 #endif

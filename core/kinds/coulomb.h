@@ -1,10 +1,11 @@
-/* Viscous friction and regularised Coulomb friction, opposing a relative velocity w.
+/* Viscous friction and regularised Coulomb friction, which oppose a relative velocity v.  If v is an angular velocity,
+ * F is a torque.
  *
- *   F = c w + L tanh (w / w0),  dF/dw = c + (L / w0) (1 - tanh^2 (w / w0)),  loss = F w >= 0
+ *   F = c v + L tanh (v / v0),  dF/dv = c + (L / v0) (1 - tanh^2 (v / v0)),  loss = F v >= 0
  *
  * (Andersson, Soderberg & Bjorklund 2007, Tribology International 40, 580-587, for the smoothing by tanh.)
  * The limit L (friction coefficient times normal load) is constant, since forces cannot depend on multipliers.  The
- * regularised law cannot stick: under a load M < L it creeps at w0 atanh (M / L). */
+ * regularised law cannot stick: under a load M < L it creeps at v0 atanh (M / L). */
 #ifndef PW_COULOMB_H
 #define PW_COULOMB_H
 
@@ -13,28 +14,51 @@
 
 typedef struct {
   double viscous, limit; /* c, L */
-  double inverse;        /* 1 / w0; 0 without a limit */
+  double inverse;        /* 1 / v0; 0 without a limit */
 } coulomb;
 
-static inline int coulomb_make (double viscous, double limit, double speed, coulomb *k, pw_error *error) {
-  *k = (coulomb){ viscous, limit, limit > 0 ? 1 / speed : 0 };
+static inline int coulomb_make (double viscous, double limit, double speed, coulomb *law, pw_error *error) {
+  *law = (coulomb){ viscous, limit, limit > 0 ? 1 / speed : 0 };
   if (limit > 0 && !(speed > 0))
     return pw_fail (error, PW_INPUT, "speed = %g: expected > 0, since below it the limit is smoothed", speed);
   return PW_OK;
 }
 
-static inline double coulomb_force (const coulomb *k, double w) {
-  return k->viscous * w + k->limit * tanh (w * k->inverse);
+static inline double coulomb_force (const coulomb *law, double v) {
+  return law->viscous * v + law->limit * tanh (v * law->inverse);
 }
 
-static inline double coulomb_slope (const coulomb *k, double w) {
-  double y = tanh (w * k->inverse);
-  return k->viscous + k->limit * k->inverse * (1 - y * y);
+/* dF/dv */
+static inline double coulomb_slope (const coulomb *law, double v) {
+  double y = tanh (v * law->inverse);
+  return law->viscous + law->limit * law->inverse * (1 - y * y);
 }
 
-/* The change of a variable that reverses the force, `per` being dw/d(variable); INFINITY without a limit. */
-static inline double coulomb_saturation (const coulomb *k, double w, double per) {
-  return per != 0 && k->inverse > 0 ? (1 / k->inverse + fabs (w)) / fabs (per) : INFINITY;
+/* The change of a variable that reverses the force, given v and its derivative with respect to that variable; INFINITY
+ * without a limit. */
+static inline double coulomb_saturation (const coulomb *law, double v, double derivative) {
+  return derivative != 0 && law->inverse > 0 ? (1 / law->inverse + fabs (v)) / fabs (derivative) : INFINITY;
 }
+
+/* COULOMB (friction, 6) defines friction_force, friction_force_v, friction_saturation and friction_loss for elements of
+ * 6 coordinates q with f = -F S, v = S q'.  friction_state has the members law, v, S[6] and v_q[6] = dv/dq. */
+#define COULOMB(type, cols)                                                                    \
+  PER_ELEMENT (type##_force, type, cols) {                                                     \
+    double F = coulomb_force (now.law, now.v);                                                 \
+    for (int i = 0; i < cols; i++) out[i] = -F * now.S[i];                                     \
+  }                                                                                            \
+  PER_ELEMENT (type##_force_v, type, cols *cols) {                                             \
+    double slope = coulomb_slope (now.law, now.v);                                             \
+    for (int i = 0; i < cols * cols; i++) out[i] = -slope * now.S[i / cols] * now.S[i % cols]; \
+  }                                                                                            \
+  PER_ELEMENT (type##_saturation, type, 2 * cols) {                                            \
+    for (int i = 0; i < cols; i++) {                                                           \
+      out[i] = coulomb_saturation (now.law, now.v, now.v_q[i]);                                \
+      out[cols + i] = coulomb_saturation (now.law, now.v, now.S[i]);                           \
+    }                                                                                          \
+  }                                                                                            \
+  PER_ELEMENT (type##_loss, type, 1) {                                                         \
+    *out = coulomb_force (now.law, now.v) * now.v;                                             \
+  }
 
 #endif

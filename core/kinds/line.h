@@ -15,97 +15,111 @@
 #include "batch.h"
 
 typedef struct {
-  double s1[2]; /* the point in body 1's frame [m] */
-  double n[2];  /* normal of the line in body 2's frame */
-  double c;     /* offset of the line along n [m] */
-  double angle; /* slider: phi1 - phi2 [rad]; drive: 1 if it prescribes an angle (then n = 0), else 0 */
+  double s1[2];            /* the point in body 1's frame [m] */
+  double n[2];             /* normal of the line in body 2's frame */
+  double c;                /* offset of the line along n [m] */
+  double angle;            /* of a slider: phi1 - phi2 [rad] */
+  double prescribes_angle; /* of a drive: 1 if it prescribes phi1 - phi2, and n is 0; else 0 */
 } line;
 
-/* A line in the current state: n, t, the arm a = (X, Y) and D in world axes, and their dot products. */
+/* A line in the current state. */
 typedef struct {
-  const line *k;
-  const pw_configuration *A, *B;
-  const double *w, *u;
-  double nx, ny, tx, ty, X, Y, Dx, Dy;
-  double na, nD, ta, tD;
+  const line *constants;
+  const pw_configuration *body1, *body2;
+  const double *w, *u;           /* the vector w of jw_q, else NULL; the signal of a drive, with two time derivatives */
+  double n[2], t[2], a[2], D[2]; /* in world axes */
+  double na, nD, ta, tD;         /* n.a, n.D, t.a, t.D */
 } line_state;
 
 static inline line line_make (const double at[2][2], double heading) {
-  line k = { { at[0][0], at[0][1] }, { -pw_sin (heading), pw_cos (heading) }, 0, 0 };
-  k.c = k.n[0] * at[1][0] + k.n[1] * at[1][1];
-  return k;
+  line out = { { at[0][0], at[0][1] }, { -pw_sin (heading), pw_cos (heading) }, .c = 0 };
+  out.c = out.n[0] * at[1][0] + out.n[1] * at[1][1];
+  return out;
 }
 
-/* The line k of element e of a batch of elements with two bodies and at most one signal. */
-static inline line_state line_of (const line *k, const pw_batch *b, int e) {
-  const pw_configuration *A = batch_body (b, e, 2, 0), *B = batch_body (b, e, 2, 1);
-  line_state s = { .k = k, .A = A, .B = B, .w = batch_w (b, e), .u = b->u + 3 * e };
-  s.nx = B->cos * k->n[0] - B->sin * k->n[1], s.ny = B->sin * k->n[0] + B->cos * k->n[1];
-  s.tx = s.ny, s.ty = -s.nx;
-  s.X = A->cos * k->s1[0] - A->sin * k->s1[1], s.Y = A->sin * k->s1[0] + A->cos * k->s1[1];
-  s.Dx = A->x + s.X - B->x, s.Dy = A->y + s.Y - B->y;
-  s.na = s.nx * s.X + s.ny * s.Y, s.nD = s.nx * s.Dx + s.ny * s.Dy;
-  s.ta = s.tx * s.X + s.ty * s.Y, s.tD = s.tx * s.Dx + s.ty * s.Dy;
-  return s;
+/* A line of element e of a batch of elements with two bodies and at most one signal. */
+static inline line_state line_of (const line *constants, const pw_batch *batch, int e) {
+  const pw_configuration *body1 = batch_body1 (batch, e), *body2 = batch_body2 (batch, e);
+  line_state now = { constants, body1, body2, .w = batch_w (batch, e), .u = batch->u + 3 * e };
+  to_world (body2, constants->n, now.n);
+  to_world (body1, constants->s1, now.a);
+  now.t[0] = now.n[1], now.t[1] = -now.n[0];
+  now.D[0] = body1->x + now.a[0] - body2->x, now.D[1] = body1->y + now.a[1] - body2->y;
+  now.na = now.n[0] * now.a[0] + now.n[1] * now.a[1], now.nD = now.n[0] * now.D[0] + now.n[1] * now.D[1];
+  now.ta = now.t[0] * now.a[0] + now.t[1] * now.a[1], now.tD = now.t[0] * now.D[0] + now.t[1] * now.D[1];
+  return now;
 }
 
-static inline line_state line_at (const pw_batch *b, int e) {
-  return line_of ((const line *)b->element + e, b, e);
+static inline line_state line_at (const pw_batch *batch, int e) {
+  return line_of ((const line *)batch->element + e, batch, e);
 }
 
 PER_ELEMENT (line_g, line, 1) {
-  *out = x.nD - x.k->c;
+  *out = now.nD - now.constants->c;
 }
 
 PER_ELEMENT (line_g_size, line, 1) {
-  *out = fabs (x.nx) * (fabs (x.A->x) + fabs (x.X) + fabs (x.B->x)) +
-         fabs (x.ny) * (fabs (x.A->y) + fabs (x.Y) + fabs (x.B->y)) + fabs (x.k->c);
+  *out = fabs (now.n[0]) * (fabs (now.body1->x) + fabs (now.a[0]) + fabs (now.body2->x)) +
+         fabs (now.n[1]) * (fabs (now.body1->y) + fabs (now.a[1]) + fabs (now.body2->y)) + fabs (now.constants->c);
 }
 
 PER_ELEMENT (line_J, line, 6) {
-  out[0] = x.nx, out[1] = x.ny, out[2] = x.ta, out[3] = -x.nx, out[4] = -x.ny, out[5] = -x.tD;
+  out[0] = now.n[0], out[1] = now.n[1], out[2] = now.ta, out[3] = -now.n[0], out[4] = -now.n[1], out[5] = -now.tD;
 }
 
 PER_ELEMENT (line_gamma, line, 1) {
-  double w1 = x.A->omega, w2 = x.B->omega, tV = x.tx * (x.A->vx - x.B->vx) + x.ty * (x.A->vy - x.B->vy);
-  *out = 2 * w2 * tV + w1 * (w1 - 2 * w2) * x.na + w2 * w2 * x.nD;
+  double w1 = now.body1->omega, w2 = now.body2->omega,
+         tV = now.t[0] * (now.body1->vx - now.body2->vx) + now.t[1] * (now.body1->vy - now.body2->vy);
+  *out = 2 * w2 * tV + w1 * (w1 - 2 * w2) * now.na + w2 * w2 * now.nD;
 }
 
 /* out = factor H w */
-static inline void line_multiply_H (const line_state *s, double factor, const double w[6], double *out) {
-  out[0] = -factor * s->tx * w[5];
-  out[1] = -factor * s->ty * w[5];
-  out[2] = factor * s->na * (w[5] - w[2]);
+static inline void line_multiply_H (const line_state *now, double factor, const double w[6], double *out) {
+  out[0] = -factor * now->t[0] * w[5];
+  out[1] = -factor * now->t[1] * w[5];
+  out[2] = factor * now->na * (w[5] - w[2]);
   out[3] = -out[0];
   out[4] = -out[1];
-  out[5] = factor * (s->na * w[2] - s->nD * w[5] - s->tx * (w[0] - w[3]) - s->ty * (w[1] - w[4]));
+  out[5] = factor * (now->na * w[2] - now->nD * w[5] - now->t[0] * (w[0] - w[3]) - now->t[1] * (w[1] - w[4]));
 }
 
-/* out = l H, 6 x 6 */
-static inline void line_jtl_q (const line_state *s, double l, double *out) {
+/* out = factor H, 6 x 6 */
+static inline void line_scaled_H (const line_state *now, double factor, double *out) {
   memset (out, 0, 36 * sizeof *out);
-  out[5] = out[30] = -l * s->tx, out[11] = out[31] = -l * s->ty;
-  out[23] = out[33] = l * s->tx, out[29] = out[34] = l * s->ty;
-  out[14] = -l * s->na, out[17] = out[32] = l * s->na, out[35] = -l * s->nD;
+  out[5] = out[30] = -factor * now->t[0], out[11] = out[31] = -factor * now->t[1];
+  out[23] = out[33] = factor * now->t[0], out[29] = out[34] = factor * now->t[1];
+  out[14] = -factor * now->na, out[17] = out[32] = factor * now->na, out[35] = -factor * now->nD;
 }
 
 PER_ELEMENT (line_jw_q, line, 6) {
-  line_multiply_H (&x, 1, x.w, out);
+  line_multiply_H (&now, 1, now.w, out);
 }
 
 PER_ELEMENT (line_gamma_q, line, 6) {
-  double w1 = x.A->omega, w2 = x.B->omega, nV = x.nx * (x.A->vx - x.B->vx) + x.ny * (x.A->vy - x.B->vy);
-  out[0] = w2 * w2 * x.nx;
-  out[1] = w2 * w2 * x.ny;
-  out[2] = (w1 - w2) * (w1 - w2) * x.ta;
+  double w1 = now.body1->omega, w2 = now.body2->omega,
+         nV = now.n[0] * (now.body1->vx - now.body2->vx) + now.n[1] * (now.body1->vy - now.body2->vy);
+  out[0] = w2 * w2 * now.n[0];
+  out[1] = w2 * w2 * now.n[1];
+  out[2] = (w1 - w2) * (w1 - w2) * now.ta;
   out[3] = -out[0];
   out[4] = -out[1];
-  out[5] = 2 * w2 * nV - w1 * (w1 - 2 * w2) * x.ta - w2 * w2 * x.tD;
+  out[5] = 2 * w2 * nV - w1 * (w1 - 2 * w2) * now.ta - w2 * w2 * now.tD;
 }
 
 PER_ELEMENT (line_gamma_v, line, 6) {
-  const double v[6] = { x.A->vx, x.A->vy, x.A->omega, x.B->vx, x.B->vy, x.B->omega };
-  line_multiply_H (&x, -2, v, out);
+  const double v[6] = {
+    now.body1->vx, now.body1->vy, now.body1->omega, now.body2->vx, now.body2->vy, now.body2->omega
+  };
+  line_multiply_H (&now, -2, v, out);
 }
+
+/* Fields of a definition: the two points and the heading of line_make. */
+#define LINE_FIELDS(type)                                                                                         \
+  { PW_AT (type, at), PW_POINT,      .count = 2,                                                                  \
+    .unit = "m",      .required = 1, .about = "the point, and a point of the line, in each body's frame" },       \
+  {                                                                                                               \
+    PW_AT (type, heading), PW_NUMBER, .unit = "rad",                                                              \
+                                      .about = "direction of the line in the second body's frame; 0: along its x" \
+  }
 
 #endif

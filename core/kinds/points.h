@@ -16,11 +16,11 @@ typedef struct {
   double s1[2], s2[2]; /* the points in the bodies' frames [m] */
 } points;
 
-/* Two points in the current state. */
+/* Two points in the current state; vectors in world axes. */
 typedef struct {
-  const pw_configuration *A, *B;
+  const pw_configuration *body1, *body2;
   const double *w;      /* the vector w of jw_q, else NULL */
-  double S1[2], S2[2];  /* arms in world axes */
+  double S1[2], S2[2];  /* arms (X1, Y1), (X2, Y2) */
   double d[2], rate[2]; /* d, d' */
 } points_state;
 
@@ -28,40 +28,40 @@ static inline points points_make (const double at[2][2]) {
   return (points){ { at[0][0], at[0][1] }, { at[1][0], at[1][1] } };
 }
 
-/* The points k of element e of a batch of elements with two bodies. */
-static inline points_state points_of (const points *k, const pw_batch *b, int e) {
-  const pw_configuration *A = batch_body (b, e, 2, 0), *B = batch_body (b, e, 2, 1);
-  points_state x = { .A = A, .B = B, .w = batch_w (b, e) };
-  to_world (A, k->s1, x.S1);
-  to_world (B, k->s2, x.S2);
-  x.d[0] = A->x + x.S1[0] - B->x - x.S2[0], x.d[1] = A->y + x.S1[1] - B->y - x.S2[1];
-  x.rate[0] = A->vx - A->omega * x.S1[1] - B->vx + B->omega * x.S2[1];
-  x.rate[1] = A->vy + A->omega * x.S1[0] - B->vy - B->omega * x.S2[0];
-  return x;
+/* The points of element e of a batch of elements with two bodies. */
+static inline points_state points_of (const points *constants, const pw_batch *batch, int e) {
+  const pw_configuration *body1 = batch_body1 (batch, e), *body2 = batch_body2 (batch, e);
+  points_state now = { .body1 = body1, .body2 = body2, .w = batch_w (batch, e) };
+  to_world (body1, constants->s1, now.S1);
+  to_world (body2, constants->s2, now.S2);
+  now.d[0] = body1->x + now.S1[0] - body2->x - now.S2[0], now.d[1] = body1->y + now.S1[1] - body2->y - now.S2[1];
+  now.rate[0] = body1->vx - body1->omega * now.S1[1] - body2->vx + body2->omega * now.S2[1];
+  now.rate[1] = body1->vy + body1->omega * now.S1[0] - body2->vy - body2->omega * now.S2[0];
+  return now;
 }
 
-static inline points_state points_at (const pw_batch *b, int e) {
-  return points_of ((const points *)b->element + e, b, e);
+static inline points_state points_at (const pw_batch *batch, int e) {
+  return points_of ((const points *)batch->element + e, batch, e);
 }
 
 PER_ELEMENT (points_g, points, 2) {
-  out[0] = x.d[0], out[1] = x.d[1];
+  out[0] = now.d[0], out[1] = now.d[1];
 }
 
 PER_ELEMENT (points_g_size, points, 2) {
-  out[0] = fabs (x.A->x) + fabs (x.S1[0]) + fabs (x.B->x) + fabs (x.S2[0]);
-  out[1] = fabs (x.A->y) + fabs (x.S1[1]) + fabs (x.B->y) + fabs (x.S2[1]);
+  out[0] = fabs (now.body1->x) + fabs (now.S1[0]) + fabs (now.body2->x) + fabs (now.S2[0]);
+  out[1] = fabs (now.body1->y) + fabs (now.S1[1]) + fabs (now.body2->y) + fabs (now.S2[1]);
 }
 
 PER_ELEMENT (points_J, points, 12) {
-  out[0] = 1, out[1] = 0, out[2] = -x.S1[1], out[3] = -1, out[4] = 0, out[5] = x.S2[1];
-  out[6] = 0, out[7] = 1, out[8] = x.S1[0], out[9] = 0, out[10] = -1, out[11] = -x.S2[0];
+  out[0] = 1, out[1] = 0, out[2] = -now.S1[1], out[3] = -1, out[4] = 0, out[5] = now.S2[1];
+  out[6] = 0, out[7] = 1, out[8] = now.S1[0], out[9] = 0, out[10] = -1, out[11] = -now.S2[0];
 }
 
 PER_ELEMENT (points_gamma, points, 2) {
-  double square1 = x.A->omega * x.A->omega, square2 = x.B->omega * x.B->omega;
-  out[0] = x.S1[0] * square1 - x.S2[0] * square2;
-  out[1] = x.S1[1] * square1 - x.S2[1] * square2;
+  double square1 = now.body1->omega * now.body1->omega, square2 = now.body2->omega * now.body2->omega;
+  out[0] = now.S1[0] * square1 - now.S2[0] * square2;
+  out[1] = now.S1[1] * square1 - now.S2[1] * square2;
 }
 
 /* Sets the two angle columns of a 2 x 6 block, the others to zero. */
@@ -71,18 +71,18 @@ static inline void points_angles (double *out, double x1, double y1, double x2, 
 }
 
 PER_ELEMENT (points_jw_q, points, 12) {
-  double w1 = x.w[2], w2 = x.w[5];
-  points_angles (out, -x.S1[0] * w1, -x.S1[1] * w1, x.S2[0] * w2, x.S2[1] * w2);
+  double w1 = now.w[2], w2 = now.w[5];
+  points_angles (out, -now.S1[0] * w1, -now.S1[1] * w1, now.S2[0] * w2, now.S2[1] * w2);
 }
 
 PER_ELEMENT (points_gamma_q, points, 12) {
-  double square1 = x.A->omega * x.A->omega, square2 = x.B->omega * x.B->omega;
-  points_angles (out, -x.S1[1] * square1, x.S1[0] * square1, x.S2[1] * square2, -x.S2[0] * square2);
+  double square1 = now.body1->omega * now.body1->omega, square2 = now.body2->omega * now.body2->omega;
+  points_angles (out, -now.S1[1] * square1, now.S1[0] * square1, now.S2[1] * square2, -now.S2[0] * square2);
 }
 
 PER_ELEMENT (points_gamma_v, points, 12) {
-  double twice1 = 2 * x.A->omega, twice2 = 2 * x.B->omega;
-  points_angles (out, x.S1[0] * twice1, x.S1[1] * twice1, -x.S2[0] * twice2, -x.S2[1] * twice2);
+  double twice1 = 2 * now.body1->omega, twice2 = 2 * now.body2->omega;
+  points_angles (out, now.S1[0] * twice1, now.S1[1] * twice1, -now.S2[0] * twice2, -now.S2[1] * twice2);
 }
 
 #endif

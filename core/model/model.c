@@ -6,6 +6,7 @@
 #include <string.h>
 #include "model.h"
 
+/* An object that the model owns. */
 struct pw_kept {
   void *object;
   void (*free_object) (void *object);
@@ -16,6 +17,7 @@ static int model_no_memory (pw_model *m) {
   return pw_fail (&m->error, PW_RESOURCE, "model %s: out of memory", m->name ? m->name : "");
 }
 
+/* Copies the first error of the model, if there is one, to the caller's. */
 static int model_status (const pw_model *m, pw_error *error) {
   return m->error.status == PW_OK ? PW_OK : pw_fail (error, m->error.status, "%s", m->error.text);
 }
@@ -229,8 +231,7 @@ int pw_model_set_signal (pw_model *m, const char *element, const char *field, co
   if (f->name == NULL)
     return pw_fail (error, PW_INPUT, "model %s: %s %s has no signal \"%s\"%s", m->name, e->kind->name, element, field,
                     pw_nearest_text (&fields));
-  void *at = memcpy ((char *)e->definition + f->offset, signal, sizeof *signal);
-  model_copy_table (m, at);
+  model_copy_table (m, memcpy ((char *)e->definition + f->offset, signal, sizeof *signal));
   return model_status (m, error);
 }
 
@@ -261,7 +262,8 @@ int pw_system_reference (const pw_model *m, const pw_system *s, double t, double
   for (int i = 0; i < text->states; i++) {
     int state = pw_system_find_state (s, text->state[i], error);
     if (state < 0) return state;
-    *(state < n ? q + state : v + state - n) = text->eval (text->context, i, t);
+    double *entry = state < n ? &q[state] : &v[state - n];
+    *entry = text->eval (text->context, i, t);
   }
   return PW_OK;
 }

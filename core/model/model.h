@@ -1,10 +1,10 @@
-/* The model, as pw_system_compile reads it. */
+/* A model: what a build function adds and pw_system_compile reads. */
 #ifndef PW_MODEL_H
 #define PW_MODEL_H
 
 #include "util.h"
 
-/* Limits of an element, also for types from plug-ins. */
+/* Limits of an element, also for types from plug-ins; `rows` are constraint equations, `cols` local coordinates. */
 enum {
   PW_MAX_BODIES = 4,
   PW_MAX_INTERNAL = 4,
@@ -13,8 +13,9 @@ enum {
   PW_MAX_COLS = 3 * PW_MAX_BODIES + PW_MAX_INTERNAL
 };
 
+/* A value set by pw_model_set_initial. */
 typedef struct {
-  const char *state;
+  const char *state; /* "frame.vx" */
   double value;
 } pw_initial_setting;
 
@@ -32,26 +33,25 @@ struct pw_model {
   size_t body_room, element_room, initial_room; /* entries allocated */
   const pw_reference_text *reference;
   struct pw_kept *kept; /* released with the model */
-  int built;
-  pw_error error; /* the first error */
+  int built;            /* 1: pw_model_build has been called */
+  pw_error error;       /* the first error */
 };
 
 /* The longest name [bytes]: "KIND ELEMENT" and "ELEMENT.REACTION" fit in a buffer of 120. */
 enum { PW_NAME_MAX = 50 };
 
-/* Checks every body and element: names, numbers, names of bodies, signals. */
+/* Checks every body and element: names, numbers, names of bodies (against the table of all of them), signals. */
 int pw_check_model (const pw_model *m, const pw_names *bodies, pw_error *error);
 
-/* Returns the fault of an element type's table (the buffer or a constant), or "".  Other functions may crash on an
- * inconsistent table. */
+/* Returns what is wrong with an element type's table (in the buffer, or a constant), or "".  Others may crash on it. */
 const char *pw_kind_check (const pw_kind *kind, char *buffer, size_t size);
 
 /* 1 for the library's own element types, 0 for those of plug-ins. */
 int pw_kind_is_built_in (const pw_kind *kind);
 
 /* As pw_field_at, for a definition that will be modified. */
-static inline void *pw_field_mutable (const pw_kind *kind, void *definition, pw_field_type type, int k) {
-  const char *at = pw_field_at (kind, definition, type, k);
+static inline void *pw_field_mutable (const pw_kind *kind, void *definition, pw_field_type type, int index) {
+  const char *at = pw_field_at (kind, definition, type, index);
   return at ? (char *)definition + (at - (const char *)definition) : NULL;
 }
 

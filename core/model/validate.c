@@ -1,9 +1,10 @@
-/* Checks a description against the field tables, before anything is compiled. */
+/* Checks the table of a plug-in and, before a model is compiled, its bodies and elements against their field tables. */
 #include <ctype.h>
 #include <string.h>
 #include "model.h"
 #include "signal.h"
 
+/* Texts must be UTF-8 without control characters, since they are printed and written to JSON. */
 static int check_parameter (const pw_plugin_table *t, const pw_parameter *p, const char *what, pw_error *error) {
   const char *expected = pw_domain_check (p->domain, p->value);
   if (!pw_is_text (p->name) || (p->unit && !pw_is_text (p->unit)) || (p->about && !pw_is_text (p->about)))
@@ -19,7 +20,6 @@ static int check_parameter (const pw_plugin_table *t, const pw_parameter *p, con
                   expected);
 }
 
-/* Texts must be UTF-8 without control characters, since they are printed and written to JSON. */
 int pw_plugin_check (const pw_plugin_table *t, const char *what, pw_error *error) {
   if (t->abi != PW_ABI || t->size != sizeof *t)
     return pw_fail (error, PW_INPUT,
@@ -35,17 +35,18 @@ int pw_plugin_check (const pw_plugin_table *t, const char *what, pw_error *error
   return PW_OK;
 }
 
-static int check_name (const pw_model *m, const char *what, const char *name, pw_error *error) {
-  if (name == NULL || *name == 0) return pw_fail (error, PW_INPUT, "model %s: a %s without a name", m->name, what);
+/* `type`: "body" or an element type, for messages. */
+static int check_name (const pw_model *m, const char *type, const char *name, pw_error *error) {
+  if (name == NULL || *name == 0) return pw_fail (error, PW_INPUT, "model %s: a %s without a name", m->name, type);
   if (strlen (name) > PW_NAME_MAX)
     return pw_fail (error, PW_INPUT, "model %s: %s \"%.*s...\": a name has at most %d bytes, this one %zu", m->name,
-                    what, PW_NAME_MAX, name, PW_NAME_MAX, strlen (name));
+                    type, PW_NAME_MAX, name, PW_NAME_MAX, strlen (name));
   if (strcmp (name, "ground") == 0)
-    return pw_fail (error, PW_INPUT, "model %s: %s \"ground\": this name is reserved for the ground", m->name, what);
+    return pw_fail (error, PW_INPUT, "model %s: %s \"ground\": this name is reserved for the ground", m->name, type);
   int valid = pw_is_text (name);
   for (const char *c = name; *c; c++) valid &= isalnum ((unsigned char)*c) || *c == '_' || *c == '-' || *c & 0x80;
   if (valid) return PW_OK;
-  return pw_fail (error, PW_INPUT, "model %s: %s \"%s\": a name consists of letters, digits, _ and -", m->name, what,
+  return pw_fail (error, PW_INPUT, "model %s: %s \"%s\": a name consists of letters, digits, _ and -", m->name, type,
                   name);
 }
 

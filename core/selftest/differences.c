@@ -45,17 +45,13 @@ static int differences_test (const pw_workspace *w, pw_element_batch *k, char *b
   return 0;
 }
 
-static void differences_random (pw_random *random, double *x, int n) {
-  for (int i = 0; i < n; i++) x[i] = pw_random_between (random, -1, 1);
-}
-
 /* Searches a batch, with random w, multipliers and signals. */
 static int differences_search (pw_workspace *w, pw_element_batch *k, pw_random *random, char *buffer, size_t size) {
   int cols = k->b.count * k->b.cols, rows = k->b.count * k->kind->rows;
   double *x = malloc (((size_t)cols + (size_t)rows + 1) * sizeof *x);
   if (x == NULL) return PW_RESOURCE;
-  differences_random (random, x, cols + rows);
-  differences_random (random, k->u, 3 * k->b.count * k->kind->signals);
+  for (int i = 0; i < cols + rows; i++) x[i] = pw_random_between (random, -1, 1);
+  for (int i = 0; i < 3 * k->b.count * k->kind->signals; i++) k->u[i] = pw_random_between (random, -1, 1);
   k->b.w = x, k->b.lambda = x + cols;
   int found = differences_test (w, k, buffer, size);
   k->b.w = k->b.lambda = NULL;

@@ -7,56 +7,82 @@
 #include "random_scene.h"
 
 enum {
-  PW_PROBE_OUT = PW_SCENE_BATCH * PW_MAX_COLS * PW_MAX_COLS, /* most numbers of a function in a random scene */
+  PW_PROBE_OUT = PW_SCENE_BATCH * PW_MAX_COLS * PW_MAX_COLS, /* most numbers that a function fills in a random scene */
   PW_PROBE_GUARD = 8                                         /* guard numbers after an array, which must not change */
 };
 
 /* Moves by h: along dq; along dv; in time, by h tau; in time and along the motion q + v s + a s^2 / 2, s = h tau. */
 typedef enum { PW_PROBE_Q, PW_PROBE_V, PW_PROBE_TIME, PW_PROBE_MOTION } pw_probe_move;
 
+/* The checks of both self-tests: names, and identities checked. */
+#define PW_PROBE_CHECKS                                                    \
+  PW_PROBE_CHECK (table, "consistent sizes, fields and functions")         \
+  PW_PROBE_CHECK (size, "each function fills exactly its array")           \
+  PW_PROBE_CHECK (J, "J = dg/dq")                                          \
+  PW_PROBE_CHECK (eta, "eta = -dg/dt")                                     \
+  PW_PROBE_CHECK (g_size, "g_size >= |g|")                                 \
+  PW_PROBE_CHECK (gamma, "J a - gamma = d(J v - eta)/dt")                  \
+  PW_PROBE_CHECK (force_u, "force_u = d force/du")                         \
+  PW_PROBE_CHECK (constant, "a constant force does not change")            \
+  PW_PROBE_CHECK (jw_q, "jw_q = d(J w)/dq")                                \
+  PW_PROBE_CHECK (eta_q, "eta_q = d eta/dq")                               \
+  PW_PROBE_CHECK (gamma_q, "gamma_q = d gamma/dq")                         \
+  PW_PROBE_CHECK (gamma_v, "gamma_v = d gamma/dv")                         \
+  PW_PROBE_CHECK (force_q, "force_q = d force/dq")                         \
+  PW_PROBE_CHECK (force_v, "force_v = d force/dv")                         \
+  PW_PROBE_CHECK (saturation, "saturation velocity of a saturating force") \
+  PW_PROBE_CHECK (power, "force . v = power - loss - d energy/dt")         \
+  PW_PROBE_CHECK (loss, "loss >= 0")                                       \
+  PW_PROBE_CHECK (gradient, "gradient = d signal/d state")
+#define PW_PROBE_CHECK(name, about) PW_CHECK_##name,
+typedef enum { PW_PROBE_CHECKS } pw_check;
+#undef PW_PROBE_CHECK
+
 typedef struct {
   const pw_kind *kind;
   const pw_system *s;
-  pw_workspace *work;
-  pw_element_batch *k;
+  pw_workspace *workspace;
+  pw_element_batch *batch;     /* of the element type, in the workspace */
   int elements, rows, cols;    /* rows and cols per element */
   double t, tau;               /* the time, and the unit of its changes */
   double *q, *v, *a, *dq, *dv; /* coords: the state and its motion; directions */
   double *q_now, *v_now;       /* coords: the current state */
   double *w, *lambda;          /* elements x cols, elements x rows: the vector w of jw_q, the multipliers */
   double *J, *eta;             /* at the current state */
+  int failed;                  /* 1: a signal failed in an update */
   int check_sizes;             /* 1: also checks that each function fills exactly its array */
   pw_selftest_report *report;
   char *memory; /* of all arrays; the caller frees it in every case */
 } pw_probe;
 
 /* Computes numbers at the current state; `out` has room for PW_PROBE_GUARD more. */
-typedef void pw_probe_function (pw_probe *x, double *out);
+typedef void pw_probe_function (pw_probe *probe, double *out);
 
-/* Allocates the arrays of a probe with s, work, k and report.  PW_OK or PW_RESOURCE. */
-int pw_probe_open (pw_probe *x, pw_error *error);
+/* Allocates the arrays of a probe with s, workspace, batch and report.  PW_OK or PW_RESOURCE. */
+int pw_probe_open (pw_probe *probe, pw_error *error);
 
 /* Updates the kinematics to the state moved by h. */
-void pw_probe_update (pw_probe *x, pw_probe_move move, double h);
+void pw_probe_update (pw_probe *probe, pw_probe_move move, double h);
 
 /* Calls a function that fills n numbers; NULL gives zeros. */
-void pw_probe_evaluate (pw_probe *x, pw_batch_function *f, const char *name, int n, double *out);
+void pw_probe_evaluate (pw_probe *probe, pw_batch_function *f, const char *name, int n, double *out);
 
 /* Functions of the type: g, eta, gamma, force; J w; J v - eta. */
 pw_probe_function pw_probe_g, pw_probe_eta, pw_probe_gamma, pw_probe_force, pw_probe_Jw, pw_probe_drift;
 
-/* out += factor x block x vector, element by element, where the block has `rows` rows per element and the vector is over all
- * coordinates; terms, unless NULL, += absolute values of the terms. */
-void pw_probe_multiply (const pw_probe *x, const double *block, int rows, const double *vector, double factor,
+/* out += factor x block x vector, element by element, where the block has `rows` rows per element and the vector is
+ * over all coordinates; terms, unless NULL, += absolute values of the terms. */
+void pw_probe_multiply (const pw_probe *probe, const double *block, int rows, const double *vector, double factor,
                         double *out, double *terms);
-void pw_probe_multiply_J (pw_probe *x, const double *vector, double *out); /* out = J vector */
+void pw_probe_multiply_J (pw_probe *probe, const double *vector, double *out); /* out = J vector */
 
-int pw_probe_ground (const pw_probe *x, int e, int c); /* 1: local column c of element e belongs to the ground */
+int pw_probe_ground (const pw_probe *probe, int e, int c); /* 1: local column c of element e belongs to the ground */
 /* The entry of local column c of element e in a vector over all coordinates; 0 for the ground. */
-double pw_probe_local (const pw_probe *x, const double *vector, int e, int c);
+double pw_probe_local (const pw_probe *probe, const double *vector, int e, int c);
 
 /* Records the result of a check, keeping the worst. */
-void pw_probe_record (pw_selftest_report *r, const char *name, const char *about, double error, double bound,
-                      const char *reason, const char *where);
+void pw_probe_record (pw_selftest_report *r, pw_check check, double error, double bound, const char *reason,
+                      const char *where);
+const char *pw_check_name (pw_check check);
 
 #endif

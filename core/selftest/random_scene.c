@@ -56,12 +56,13 @@ static void scene_value (pw_random *r, const pw_field *f, void *at) {
   for (int i = 0; i < 2 && f->type == PW_VECTOR; i++) ((double *)at)[i] = scene_number (r, PW_REAL);
 }
 
+static const char *const scene_bodies[PW_SCENE_BODIES] = { "b0", "b1", "b2", "b3" };
+
 /* Element e acts on bodies e, e + 1, ...; the last element also on the ground, if it has several bodies. */
 static const char *scene_body (const random_scene *x, int e, int n) {
-  static const char *const name[PW_SCENE_BODIES] = { "b0", "b1", "b2", "b3" };
   int last = e == PW_SCENE_ELEMENTS - 1;
   if (last && x->kind->bodies > 1 && n == (int)(x->random->state % (unsigned)x->kind->bodies)) return "ground";
-  return name[(e + n) % PW_SCENE_BODIES];
+  return scene_bodies[(e + n) % PW_SCENE_BODIES];
 }
 
 static void scene_element (pw_model *m, const random_scene *x, int e) {
@@ -81,10 +82,9 @@ static void scene_element (pw_model *m, const random_scene *x, int e) {
 }
 
 static void scene_build (pw_model *m, const void *parameters) {
-  static const char *const name[PW_SCENE_BODIES] = { "b0", "b1", "b2", "b3" };
   const random_scene *x = parameters;
   for (int b = 0; b < PW_SCENE_BODIES; b++)
-    pw_add_body (m, &(pw_body){ .name = name[b],
+    pw_add_body (m, &(pw_body){ .name = scene_bodies[b],
                                 .mass = pw_random_between (x->random, 0.5, 2),
                                 .inertia = pw_random_between (x->random, 0.1, 1) });
   for (int e = 0; e < (x->kind->each_body ? 1 : PW_SCENE_ELEMENTS); e++) scene_element (m, x, e);

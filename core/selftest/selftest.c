@@ -9,8 +9,8 @@
 #include "probe.h"
 
 /* Central differences with a step of about eps^(1/3) = 6e-6 have an error of the order eps^(2/3) times the function's
- * size, from truncation and from round-off alike (Dennis & Schnabel 1983, section 5.6).  All numbers in the scene are of
- * the order 1, so the sizes of a function and of its third derivative are about the same. */
+ * size, from truncation and from round-off alike (Dennis & Schnabel 1983, section 5.6).  All numbers in the scene are
+ * of the order 1, so the sizes of a function and of its third derivative are about the same. */
 #define SELFTEST_STEP 0x1p-17
 static const char selftest_reason[] = "100 eps^(2/3) of the largest term: central differences";
 
@@ -28,201 +28,204 @@ static double selftest_largest (int n, const double *y) {
 }
 
 /* The derivatives of n values of f along a move.  Returns the largest value. */
-static double selftest_derivative (pw_probe *x, pw_probe_function *f, pw_probe_move move, int n, double *derivative) {
+static double selftest_derivative (pw_probe *probe, pw_probe_function *f, pw_probe_move move, int n,
+                                   double *derivative) {
   selftest_numbers plus, minus;
-  pw_probe_update (x, move, SELFTEST_STEP);
-  f (x, plus);
-  pw_probe_update (x, move, -SELFTEST_STEP);
-  f (x, minus);
-  pw_probe_update (x, move, 0);
+  pw_probe_update (probe, move, SELFTEST_STEP);
+  f (probe, plus);
+  pw_probe_update (probe, move, -SELFTEST_STEP);
+  f (probe, minus);
+  pw_probe_update (probe, move, 0);
   for (int i = 0; i < n; i++) derivative[i] = (plus[i] - minus[i]) / (2 * SELFTEST_STEP);
   return selftest_largest (n, plus);
 }
 
 /* Compares elements x rows x cols entries, except the meaningless columns of the ground, relative to 1 + size or the
  * largest reference. */
-static void selftest_compare (pw_probe *x, const char *name, const char *about, int rows, int cols, double size,
-                              const double *value, const double *reference) {
-  int n = x->elements * rows * cols, at = 0;
+static void selftest_compare (pw_probe *probe, pw_check check, int rows, int cols, double size, const double *value,
+                              const double *reference) {
+  int n = probe->elements * rows * cols, at = 0;
   double worst = -1, scale = fmax (1 + size, selftest_largest (n, reference));
   for (int i = 0; i < n; i++) {
-    if (cols == x->cols && pw_probe_ground (x, i / (rows * cols), i % cols)) continue;
+    if (cols == probe->cols && pw_probe_ground (probe, i / (rows * cols), i % cols)) continue;
     double error = fabs (value[i] - reference[i]) / scale;
     if (isnan (error)) error = INFINITY;
     if (error > worst) worst = error, at = i;
   }
   char where[120];
-  snprintf (where, sizeof where, "%s, row %d, column %d: %.9g, expected %.9g", x->k->name[at / (rows * cols)],
+  snprintf (where, sizeof where, "%s, row %d, column %d: %.9g, expected %.9g", probe->batch->name[at / (rows * cols)],
             at / cols % rows, at % cols, value[at], reference[at]);
-  pw_probe_record (x->report, name, about, worst, selftest_bound (), selftest_reason, where);
+  pw_probe_record (probe->report, check, worst, selftest_bound (), selftest_reason, where);
 }
 
 /* ---- First-order checks ---- */
 
-static void selftest_holonomic (pw_probe *x) {
+static void selftest_holonomic (pw_probe *probe) {
   selftest_numbers value, reference = { 0 }, derivative;
   double size = 0;
-  int n = x->elements * x->rows;
-  for (int j = 0; j < x->s->coords; j++) {
-    for (int i = 0; i < x->s->coords; i++) x->dq[i] = i == j;
-    size = selftest_derivative (x, pw_probe_g, PW_PROBE_Q, n, derivative);
-    for (int i = 0; i < n * x->cols; i++)
-      if (pw_global (x->k, i / (x->rows * x->cols), i % x->cols) == j) reference[i] = derivative[i / x->cols];
+  int n = probe->elements * probe->rows;
+  for (int j = 0; j < probe->s->coords; j++) {
+    for (int i = 0; i < probe->s->coords; i++) probe->dq[i] = i == j;
+    size = selftest_derivative (probe, pw_probe_g, PW_PROBE_Q, n, derivative);
+    for (int i = 0; i < n * probe->cols; i++)
+      if (pw_global (probe->batch, i / (probe->rows * probe->cols), i % probe->cols) == j)
+        reference[i] = derivative[i / probe->cols];
   }
-  pw_probe_evaluate (x, x->kind->J, "J", n * x->cols, value);
-  selftest_compare (x, "J", "J = dg/dq", x->rows, x->cols, size, value, reference);
+  pw_probe_evaluate (probe, probe->kind->J, "J", n * probe->cols, value);
+  selftest_compare (probe, PW_CHECK_J, probe->rows, probe->cols, size, value, reference);
 
-  size = selftest_derivative (x, pw_probe_g, PW_PROBE_TIME, n, reference);
+  size = selftest_derivative (probe, pw_probe_g, PW_PROBE_TIME, n, reference);
   for (int i = 0; i < n; i++) reference[i] = -reference[i];
-  pw_probe_eta (x, value);
-  selftest_compare (x, "eta", "eta = -dg/dt", x->rows, 1, size, value, reference);
+  pw_probe_eta (probe, value);
+  selftest_compare (probe, PW_CHECK_eta, probe->rows, 1, size, value, reference);
 
-  pw_probe_g (x, reference);
-  pw_probe_evaluate (x, x->kind->g_size, "g_size", n, value);
+  pw_probe_g (probe, reference);
+  pw_probe_evaluate (probe, probe->kind->g_size, "g_size", n, value);
   for (int i = 0; i < n; i++) { /* a sufficient g_size is its own reference */
     double least = fabs (reference[i]);
     reference[i] = fmax (value[i], least);
   }
-  selftest_compare (x, "g_size", "g_size >= |g|", x->rows, 1, size, value, reference);
+  selftest_compare (probe, PW_CHECK_g_size, probe->rows, 1, size, value, reference);
 }
 
-static void selftest_gamma (pw_probe *x) {
+static void selftest_gamma (pw_probe *probe) {
   selftest_numbers value, gamma, reference;
-  int n = x->elements * x->rows;
-  double size = selftest_derivative (x, pw_probe_drift, PW_PROBE_MOTION, n, reference);
-  pw_probe_multiply_J (x, x->a, value);
-  pw_probe_gamma (x, gamma);
+  int n = probe->elements * probe->rows;
+  double size = selftest_derivative (probe, pw_probe_drift, PW_PROBE_MOTION, n, reference);
+  pw_probe_multiply_J (probe, probe->a, value);
+  pw_probe_gamma (probe, gamma);
   for (int i = 0; i < n; i++) value[i] -= gamma[i];
-  selftest_compare (x, "gamma", "J a - gamma = d(J v - eta)/dt", x->rows, 1, size, value, reference);
+  selftest_compare (probe, PW_CHECK_gamma, probe->rows, 1, size, value, reference);
 }
 
 /* Adds h to signal u of each element. */
-static void selftest_shift (pw_probe *x, int u, double h) {
-  for (int e = 0; e < x->elements; e++) x->k->u[3 * (e * x->kind->signals + u)] += h;
+static void selftest_shift (pw_probe *probe, int u, double h) {
+  for (int e = 0; e < probe->elements; e++) probe->batch->u[3 * (e * probe->kind->signals + u)] += h;
 }
 
-static void selftest_force_u (pw_probe *x) {
+static void selftest_force_u (pw_probe *probe) {
   selftest_numbers value, reference, plus, minus;
-  int signals = x->kind->signals, n = x->elements * x->cols;
+  int signals = probe->kind->signals, n = probe->elements * probe->cols;
   for (int u = 0; u < signals; u++) {
-    selftest_shift (x, u, SELFTEST_STEP);
-    pw_probe_force (x, plus);
-    selftest_shift (x, u, -2 * SELFTEST_STEP);
-    pw_probe_force (x, minus);
-    selftest_shift (x, u, SELFTEST_STEP);
+    selftest_shift (probe, u, SELFTEST_STEP);
+    pw_probe_force (probe, plus);
+    selftest_shift (probe, u, -2 * SELFTEST_STEP);
+    pw_probe_force (probe, minus);
+    selftest_shift (probe, u, SELFTEST_STEP);
     for (int i = 0; i < n; i++) reference[i * signals + u] = (plus[i] - minus[i]) / (2 * SELFTEST_STEP);
   }
-  pw_probe_evaluate (x, x->kind->force_u, "force_u", n * signals, value);
-  selftest_compare (x, "force_u", "force_u = d force/du", x->cols * signals, 1, selftest_largest (n, plus), value,
-                    reference);
+  pw_probe_evaluate (probe, probe->kind->force_u, "force_u", n * signals, value);
+  selftest_compare (probe, PW_CHECK_force_u, probe->cols * signals, 1, selftest_largest (n, plus), value, reference);
 }
 
 /* A force declared constant does not change with time and state. */
-static void selftest_constant (pw_probe *x) {
+static void selftest_constant (pw_probe *probe) {
   selftest_numbers before, after;
-  int n = x->elements * x->cols, changed = 0;
-  pw_probe_force (x, before);
-  pw_probe_update (x, PW_PROBE_MOTION, 1);
-  pw_probe_force (x, after);
-  pw_probe_update (x, PW_PROBE_MOTION, 0);
+  int n = probe->elements * probe->cols, changed = 0;
+  pw_probe_force (probe, before);
+  pw_probe_update (probe, PW_PROBE_MOTION, 1);
+  pw_probe_force (probe, after);
+  pw_probe_update (probe, PW_PROBE_MOTION, 0);
   for (int i = 0; i < n; i++) changed += before[i] != after[i];
-  pw_probe_record (x->report, "constant", "a constant force does not change", changed, 0, "exact", "");
+  pw_probe_record (probe->report, PW_CHECK_constant, changed, 0, "exact", "");
 }
 
 /* ---- Second-order blocks ---- */
 
-static void selftest_block (pw_probe *x, pw_block block, const char *name, const char *about, double size) {
+static void selftest_block (pw_probe *probe, pw_block block, pw_check check, double size) {
   selftest_numbers value, reference;
-  int rows = pw_block_rows (x->kind, block);
-  pw_batch_function *function = pw_block_function (x->kind, block);
+  int rows = pw_block_rows (probe->kind, block);
+  pw_batch_function *function = pw_block_function (probe->kind, block);
   if (function == pw_by_differences)
-    pw_evaluate_block (x->work, x->k, block, value);
+    pw_evaluate_block (probe->workspace, probe->batch, block, value);
   else
-    pw_probe_evaluate (x, function, name, x->elements * rows * x->cols, value);
-  for (int e = 0; e < x->elements; e++) pw_difference (x->work, x->k, e, block, reference + e * rows * x->cols);
-  selftest_compare (x, name, about, rows, x->cols, size, value, reference);
+    pw_probe_evaluate (probe, function, pw_check_name (check), probe->elements * rows * probe->cols, value);
+  for (int e = 0; e < probe->elements; e++)
+    pw_difference (probe->workspace, probe->batch, e, block, reference + e * rows * probe->cols);
+  selftest_compare (probe, check, rows, probe->cols, size, value, reference);
 }
 
-static void selftest_blocks (pw_probe *x) {
+static void selftest_blocks (pw_probe *probe) {
   selftest_numbers J, gamma, force;
-  int n = x->elements * x->rows;
-  pw_probe_update (x, PW_PROBE_TIME, 0);
-  pw_probe_evaluate (x, x->kind->J, "J", n * x->cols, J);
-  pw_probe_gamma (x, gamma);
-  pw_probe_force (x, force);
-  double size_J = selftest_largest (n * x->cols, J), size_gamma = selftest_largest (n, gamma);
-  if (x->rows > 0) {
-    selftest_block (x, PW_JW_Q, "jw_q", "jw_q = d(J w)/dq", size_J);
-    selftest_block (x, PW_ETA_Q, "eta_q", "eta_q = d eta/dq", 0);
-    selftest_block (x, PW_GAMMA_Q, "gamma_q", "gamma_q = d gamma/dq", size_gamma);
-    selftest_block (x, PW_GAMMA_V, "gamma_v", "gamma_v = d gamma/dv", size_gamma);
+  int n = probe->elements * probe->rows;
+  pw_probe_update (probe, PW_PROBE_TIME, 0);
+  pw_probe_evaluate (probe, probe->kind->J, "J", n * probe->cols, J);
+  pw_probe_gamma (probe, gamma);
+  pw_probe_force (probe, force);
+  double size_J = selftest_largest (n * probe->cols, J), size_gamma = selftest_largest (n, gamma);
+  if (probe->rows > 0) {
+    selftest_block (probe, PW_JW_Q, PW_CHECK_jw_q, size_J);
+    selftest_block (probe, PW_ETA_Q, PW_CHECK_eta_q, 0);
+    selftest_block (probe, PW_GAMMA_Q, PW_CHECK_gamma_q, size_gamma);
+    selftest_block (probe, PW_GAMMA_V, PW_CHECK_gamma_v, size_gamma);
   }
-  double size_force = selftest_largest (x->elements * x->cols, force);
-  selftest_block (x, PW_FORCE_Q, "force_q", "force_q = d force/dq", size_force);
-  selftest_block (x, PW_FORCE_V, "force_v", "force_v = d force/dv", size_force);
+  double size_force = selftest_largest (probe->elements * probe->cols, force);
+  selftest_block (probe, PW_FORCE_Q, PW_CHECK_force_q, size_force);
+  selftest_block (probe, PW_FORCE_V, PW_CHECK_force_v, size_force);
 }
 
 /* Makes a check at velocities multiplied by a factor. */
-static void selftest_at_speed (pw_probe *x, double factor, void (*check) (pw_probe *x)) {
-  memcpy (x->dv, x->v, (size_t)x->s->coords * sizeof *x->v);
-  for (int j = 0; j < x->s->coords; j++) x->v[j] *= factor;
-  pw_probe_update (x, PW_PROBE_TIME, 0);
-  check (x);
-  memcpy (x->v, x->dv, (size_t)x->s->coords * sizeof *x->v);
+static void selftest_at_speed (pw_probe *probe, double factor, void (*check) (pw_probe *probe)) {
+  memcpy (probe->dv, probe->v, (size_t)probe->s->coords * sizeof *probe->v);
+  for (int j = 0; j < probe->s->coords; j++) probe->v[j] *= factor;
+  pw_probe_update (probe, PW_PROBE_TIME, 0);
+  check (probe);
+  memcpy (probe->v, probe->dv, (size_t)probe->s->coords * sizeof *probe->v);
 }
 
 /* Near rest, squares of velocities underflow to 0 and their inverses are infinite; results must still be finite. */
-static void selftest_rest (pw_probe *x) {
+static void selftest_rest (pw_probe *probe) {
   static const pw_block blocks[] = { PW_GAMMA_Q, PW_GAMMA_V, PW_FORCE_Q, PW_FORCE_V };
   selftest_numbers out;
-  pw_probe_evaluate (x, x->kind->gamma, "gamma near rest", x->elements * x->rows, out);
-  pw_probe_evaluate (x, x->kind->force, "force near rest", x->elements * x->cols, out);
-  pw_probe_evaluate (x, x->kind->loss, "loss near rest", x->elements, out);
+  pw_probe_evaluate (probe, probe->kind->gamma, "gamma near rest", probe->elements * probe->rows, out);
+  pw_probe_evaluate (probe, probe->kind->force, "force near rest", probe->elements * probe->cols, out);
+  pw_probe_evaluate (probe, probe->kind->loss, "loss near rest", probe->elements, out);
   for (size_t i = 0; i < sizeof blocks / sizeof *blocks; i++) {
-    pw_batch_function *function = pw_block_function (x->kind, blocks[i]);
-    int n = x->elements * pw_block_rows (x->kind, blocks[i]) * x->cols;
-    if (function != pw_by_differences) pw_probe_evaluate (x, function, "a derivative near rest", n, out);
+    pw_batch_function *function = pw_block_function (probe->kind, blocks[i]);
+    int n = probe->elements * pw_block_rows (probe->kind, blocks[i]) * probe->cols;
+    if (function != pw_by_differences) pw_probe_evaluate (probe, function, "a derivative near rest", n, out);
   }
 }
 
 /* ---- Saturation ---- */
 
 /* The change of the force of element e from `rest` when local velocity c changes from 0 to v. */
-static double selftest_change (pw_probe *x, int e, int c, double v, const double *rest) {
+static double selftest_change (pw_probe *probe, int e, int c, double v, const double *rest) {
   selftest_numbers force;
   double change = 0;
-  int j = pw_global (x->k, e, c);
-  x->v[j] = v;
-  pw_probe_update (x, PW_PROBE_TIME, 0);
-  pw_probe_force (x, force);
-  x->v[j] = 0;
-  for (int i = e * x->cols; i < (e + 1) * x->cols; i++) change = fmax (change, fabs (force[i] - rest[i]));
+  int j = pw_global (probe->batch, e, c);
+  probe->v[j] = v;
+  pw_probe_update (probe, PW_PROBE_TIME, 0);
+  pw_probe_force (probe, force);
+  probe->v[j] = 0;
+  for (int i = e * probe->cols; i < (e + 1) * probe->cols; i++) change = fmax (change, fabs (force[i] - rest[i]));
   return change;
 }
 
 /* From rest, a hundredth of the declared saturation velocity, or of a large velocity if none is declared, must
  * change the force by less than half of what the whole velocity does. */
-static void selftest_saturation (pw_probe *x) {
+static void selftest_saturation (pw_probe *probe) {
   const double large = 1000;
   selftest_numbers out, rest;
-  pw_probe_force (x, rest);
-  for (int i = 0; i < x->elements * 2 * x->cols; i++) out[i] = INFINITY;
-  if (x->kind->saturation) x->kind->saturation (&x->k->b, out);
-  for (int i = 0; i < x->elements * x->cols; i++) {
-    int e = i / x->cols, c = i % x->cols;
-    if (pw_probe_ground (x, e, c)) continue;
-    double far = out[i + (e + 1) * x->cols], all = selftest_change (x, e, c, isfinite (far) ? far : large, rest);
-    double part = selftest_change (x, e, c, (isfinite (far) ? far : large) / 100, rest);
-    if (all < 1e-9 * (1 + selftest_largest (x->elements * x->cols, rest))) continue;
-    pw_probe_record (x->report, "saturation", "saturation velocity of a saturating force", part / all, 0.5,
-                     "a hundredth of the velocity, half of the change", x->k->name[e]);
+  pw_probe_force (probe, rest);
+  for (int i = 0; i < probe->elements * 2 * probe->cols; i++) out[i] = INFINITY;
+  if (probe->kind->saturation) probe->kind->saturation (&probe->batch->b, out);
+  for (int i = 0; i < probe->elements * probe->cols; i++) {
+    int e = i / probe->cols, c = i % probe->cols;
+    if (pw_probe_ground (probe, e, c)) continue;
+    double far = out[i + (e + 1) * probe->cols],
+           all = selftest_change (probe, e, c, isfinite (far) ? far : large, rest);
+    double part = selftest_change (probe, e, c, (isfinite (far) ? far : large) / 100, rest);
+    if (all < 1e-9 * (1 + selftest_largest (probe->elements * probe->cols, rest))) continue;
+    pw_probe_record (probe->report, PW_CHECK_saturation, part / all, 0.5,
+                     "a hundredth of the velocity, half of the change", probe->batch->name[e]);
   }
 }
 
 /* ---- Energy ---- */
 
-static void selftest_energy (pw_probe *x, double *out) {
-  pw_probe_evaluate (x, x->kind->energy, "energy", x->elements, out);
+static void selftest_energy (pw_probe *probe, double *out) {
+  pw_probe_evaluate (probe, probe->kind->energy, "energy", probe->elements, out);
 }
 
 /* x . y of n numbers */
@@ -232,17 +235,17 @@ static double selftest_dot (int n, const double *x, const double *y) {
   return sum;
 }
 
-/* Changes v by the least norm to satisfy J v = eta of element e, by rows made orthogonal (Gram & Schmidt).  Returns 0 if
- * its constraint equations are dependent. */
-static int selftest_satisfy (pw_probe *x, int e) {
+/* Satisfies J v = eta of element e by the change of v of least norm: its rows of J are made orthogonal (Gram-Schmidt).
+ * Returns 0 if they are dependent. */
+static int selftest_satisfy (pw_probe *probe, int e) {
   double row[PW_MAX_ROWS][PW_MAX_COLS + 1], square[PW_MAX_ROWS]; /* row: of J, and of J v - eta */
-  const int n = x->cols;
+  const int n = probe->cols;
   selftest_numbers off;
-  pw_probe_update (x, PW_PROBE_TIME, 0);
-  pw_probe_drift (x, off);
-  for (int r = 0; r < x->rows; r++) {
-    for (int c = 0; c < n; c++) row[r][c] = pw_probe_ground (x, e, c) ? 0 : x->J[(e * x->rows + r) * n + c];
-    row[r][n] = off[e * x->rows + r];
+  pw_probe_update (probe, PW_PROBE_TIME, 0);
+  pw_probe_drift (probe, off);
+  for (int r = 0; r < probe->rows; r++) {
+    for (int c = 0; c < n; c++) row[r][c] = pw_probe_ground (probe, e, c) ? 0 : probe->J[(e * probe->rows + r) * n + c];
+    row[r][n] = off[e * probe->rows + r];
     for (int p = 0; p < r; p++) {
       double along = selftest_dot (n, row[p], row[r]) / square[p];
       for (int c = 0; c <= n; c++) row[r][c] -= along * row[p][c];
@@ -250,100 +253,100 @@ static int selftest_satisfy (pw_probe *x, int e) {
     square[r] = selftest_dot (n, row[r], row[r]);
     if (!(square[r] > 1e-6)) return 0;
     for (int c = 0; c < n; c++)
-      if (!pw_probe_ground (x, e, c)) x->v[pw_global (x->k, e, c)] -= row[r][c] * row[r][n] / square[r];
+      if (!pw_probe_ground (probe, e, c)) probe->v[pw_global (probe->batch, e, c)] -= row[r][c] * row[r][n] / square[r];
   }
   return 1;
 }
 
 /* The power of the forces of element e, including constraint forces -J^T lambda, must equal the supplied power minus
  * losses and the rate of its potential energy. */
-static void selftest_power_of (pw_probe *x, int e) {
+static void selftest_power_of (pw_probe *probe, int e) {
   selftest_numbers derivative, force, power, loss, drift;
-  double fed = 0, size = selftest_derivative (x, selftest_energy, PW_PROBE_MOTION, x->elements, derivative);
-  pw_probe_force (x, force);
-  pw_probe_evaluate (x, x->kind->power, "power", x->elements, power);
-  pw_probe_evaluate (x, x->kind->loss, "loss", x->elements, loss);
+  double fed = 0, size = selftest_derivative (probe, selftest_energy, PW_PROBE_MOTION, probe->elements, derivative);
+  pw_probe_force (probe, force);
+  pw_probe_evaluate (probe, probe->kind->power, "power", probe->elements, power);
+  pw_probe_evaluate (probe, probe->kind->loss, "loss", probe->elements, loss);
   size = fmax (size, fmax (fabs (power[e]), fabs (loss[e])));
-  for (int c = 0; c < x->cols; c++) fed += force[e * x->cols + c] * pw_probe_local (x, x->v, e, c);
-  if (x->rows > 0) {
-    pw_probe_multiply_J (x, x->v, drift);
-    pw_probe_eta (x, x->eta);
+  for (int c = 0; c < probe->cols; c++) fed += force[e * probe->cols + c] * pw_probe_local (probe, probe->v, e, c);
+  if (probe->rows > 0) {
+    pw_probe_multiply_J (probe, probe->v, drift);
+    pw_probe_eta (probe, probe->eta);
   }
-  for (int r = e * x->rows; r < (e + 1) * x->rows; r++) {
-    fed -= x->lambda[r] * drift[r];
-    if (x->kind->power == NULL) power[e] -= x->lambda[r] * x->eta[r];
+  for (int r = e * probe->rows; r < (e + 1) * probe->rows; r++) {
+    fed -= probe->lambda[r] * drift[r];
+    if (probe->kind->power == NULL) power[e] -= probe->lambda[r] * probe->eta[r];
   }
   double error = fabs (fed + derivative[e] - power[e] + loss[e]) / (1 + size + fabs (fed));
   char where[120];
-  snprintf (where, sizeof where, "%s: %.9g, expected %.9g", x->k->name[e], fed, power[e] - loss[e] - derivative[e]);
-  pw_probe_record (x->report, "power", "force . v = power - loss - d energy/dt", error, selftest_bound (),
-                   selftest_reason, where);
-  if (x->kind->loss) pw_probe_record (x->report, "loss", "loss >= 0", fmax (-loss[e], 0), 0, "exact", where);
+  snprintf (where, sizeof where, "%s: %.9g, expected %.9g", probe->batch->name[e], fed,
+            power[e] - loss[e] - derivative[e]);
+  pw_probe_record (probe->report, PW_CHECK_power, error, selftest_bound (), selftest_reason, where);
+  if (probe->kind->loss) pw_probe_record (probe->report, PW_CHECK_loss, fmax (-loss[e], 0), 0, "exact", where);
 }
 
-static void selftest_power (pw_probe *x) {
-  if (!x->kind->force && !x->kind->energy && !x->kind->power && !x->kind->loss) return;
-  for (int e = 0; e < x->elements; e++) {
-    memcpy (x->dv, x->v, (size_t)x->s->coords * sizeof *x->v);
-    if (x->rows == 0 || selftest_satisfy (x, e)) selftest_power_of (x, e);
-    memcpy (x->v, x->dv, (size_t)x->s->coords * sizeof *x->v);
+static void selftest_power (pw_probe *probe) {
+  if (!probe->kind->force && !probe->kind->energy && !probe->kind->power && !probe->kind->loss) return;
+  for (int e = 0; e < probe->elements; e++) {
+    memcpy (probe->dv, probe->v, (size_t)probe->s->coords * sizeof *probe->v);
+    if (probe->rows == 0 || selftest_satisfy (probe, e)) selftest_power_of (probe, e);
+    memcpy (probe->v, probe->dv, (size_t)probe->s->coords * sizeof *probe->v);
   }
 }
 
 /* ---- */
 
 /* Bodies near the corners of a square, everything else at random. */
-static void selftest_randomise (pw_probe *x, pw_random *r) {
+static void selftest_randomise (pw_probe *probe, pw_random *r) {
   static const double corner[PW_SCENE_BODIES][2] = { { 2, 2 }, { -2, 2 }, { -2, -2 }, { 2, -2 } };
-  x->t = pw_random_between (r, 0.1, 3);
-  x->tau = 1;
-  for (int j = 0; j < x->s->coords; j++) {
-    x->q[j] = pw_random_between (r, -0.5, 0.5);
-    if (pw_is_angle (x->s, j))
-      x->q[j] = pw_random_between (r, -3, 3);
+  probe->t = pw_random_between (r, 0.1, 3);
+  probe->tau = 1;
+  for (int j = 0; j < probe->s->coords; j++) {
+    probe->q[j] = pw_random_between (r, -0.5, 0.5);
+    if (pw_is_angle (probe->s, j))
+      probe->q[j] = pw_random_between (r, -3, 3);
     else
-      x->q[j] += corner[j / 3][j % 3];
-    x->v[j] = pw_random_between (r, -1.5, 1.5);
-    x->a[j] = pw_random_between (r, -1.5, 1.5);
+      probe->q[j] += corner[j / 3][j % 3];
+    probe->v[j] = pw_random_between (r, -1.5, 1.5);
+    probe->a[j] = pw_random_between (r, -1.5, 1.5);
   }
-  for (int i = 0; i < x->elements * x->cols; i++) x->w[i] = pw_random_between (r, -1.5, 1.5);
-  for (int i = 0; i < x->elements * x->rows; i++) x->lambda[i] = pw_random_between (r, -1.5, 1.5);
+  for (int i = 0; i < probe->elements * probe->cols; i++) probe->w[i] = pw_random_between (r, -1.5, 1.5);
+  for (int i = 0; i < probe->elements * probe->rows; i++) probe->lambda[i] = pw_random_between (r, -1.5, 1.5);
 }
 
-static void selftest_all (pw_probe *x) {
+static void selftest_all (pw_probe *probe) {
   selftest_numbers out;
-  pw_probe_update (x, PW_PROBE_TIME, 0);
-  if (x->kind->level == PW_HOLONOMIC) selftest_holonomic (x);
-  if (x->rows > 0) selftest_gamma (x);
-  if (x->kind->signals > 0) selftest_force_u (x);
-  if (x->kind->constant) selftest_constant (x);
-  selftest_blocks (x);
-  selftest_at_speed (x, 1e-310, selftest_rest);
-  if (x->kind->force && !x->kind->constant) selftest_at_speed (x, 0, selftest_saturation);
-  selftest_power (x);
-  pw_probe_evaluate (x, x->kind->contact, "contact", 3 * x->elements, out);
+  pw_probe_update (probe, PW_PROBE_TIME, 0);
+  if (probe->kind->level == PW_HOLONOMIC) selftest_holonomic (probe);
+  if (probe->rows > 0) selftest_gamma (probe);
+  if (probe->kind->signals > 0) selftest_force_u (probe);
+  if (probe->kind->constant) selftest_constant (probe);
+  selftest_blocks (probe);
+  selftest_at_speed (probe, 1e-310, selftest_rest);
+  if (probe->kind->force && !probe->kind->constant) selftest_at_speed (probe, 0, selftest_saturation);
+  selftest_power (probe);
+  pw_probe_evaluate (probe, probe->kind->contact, "contact", 3 * probe->elements, out);
 }
 
 int pw_selftest (const pw_kind *kind, unsigned seed, pw_selftest_report *report, pw_error *error) {
   char buffer[200];
   const char *fault = pw_kind_check (kind, buffer, sizeof buffer);
-  pw_probe_record (report, "table", "consistent sizes, fields and functions", *fault != 0, 0, "exact", fault);
+  pw_probe_record (report, PW_CHECK_table, *fault != 0, 0, "exact", fault);
   if (*fault) return PW_OK;
   pw_random random = { seed };
   pw_error cause = { 0 };
   pw_system *s = pw_random_scene (kind, &random, &cause);
   if (s == NULL) return pw_fail (error, cause.status, "%s", cause.text);
   for (int j = 3 * s->bodies; j < s->coords; j++)
-    pw_probe_record (report, "table", "", !(s->mass[j] >= 0 && isfinite (s->mass[j])), 0, "exact",
+    pw_probe_record (report, PW_CHECK_table, !(s->mass[j] >= 0 && isfinite (s->mass[j])), 0, "exact",
                      "inertia of an internal coordinate");
   pw_workspace *w = pw_workspace_new (s, error);
-  pw_probe x = { .s = s, .work = w, .k = w ? w->batch : NULL, .check_sizes = 1, .report = report };
-  int status = w ? pw_probe_open (&x, error) : PW_RESOURCE;
+  pw_probe probe = { .s = s, .workspace = w, .batch = w ? w->batch : NULL, .check_sizes = 1, .report = report };
+  int status = w ? pw_probe_open (&probe, error) : PW_RESOURCE;
   if (status == PW_OK) {
-    selftest_randomise (&x, &random);
-    selftest_all (&x);
+    selftest_randomise (&probe, &random);
+    selftest_all (&probe);
   }
-  free (x.memory);
+  free (probe.memory);
   pw_workspace_free (w);
   pw_system_free (s);
   return status;

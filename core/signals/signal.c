@@ -1,4 +1,4 @@
-/* Signals: prescribed functions of time, with their first two derivatives; tables are in table.c. */
+/* Signals: values, first two time derivatives and breakpoints of each form; tables are in table.c. */
 #include <math.h>
 #include "signal.h"
 
@@ -36,7 +36,7 @@ static double signal_rise_breakpoint (const pw_signal *s, double t) {
 }
 
 /* The beginning of the pulse period that contains t, and of the next one, for t >= start. */
-static void signal_pulses (const pw_signal *s, double t, double *begin, double *next) {
+static void signal_pulse_period (const pw_signal *s, double t, double *begin, double *next) {
   double start = s->pulse.start, period = s->pulse.period;
   *begin = start;
   *next = INFINITY;
@@ -56,14 +56,14 @@ static void signal_pulse (const pw_signal *s, double t, double u[3]) {
   double begin, next;
   u[0] = s->pulse.offset;
   if (t < s->pulse.start) return;
-  signal_pulses (s, t, &begin, &next);
+  signal_pulse_period (s, t, &begin, &next);
   if (t < signal_pulse_end (s, begin)) u[0] += s->pulse.height;
 }
 
 static double signal_pulse_breakpoint (const pw_signal *s, double t) {
   double begin, next;
   if (t < s->pulse.start) return s->pulse.start;
-  signal_pulses (s, t, &begin, &next);
+  signal_pulse_period (s, t, &begin, &next);
   double end = signal_pulse_end (s, begin);
   return t < end ? end : next > t ? next : INFINITY; /* next == t if the period is below the resolution of t */
 }
@@ -71,32 +71,32 @@ static double signal_pulse_breakpoint (const pw_signal *s, double t) {
 /* ---- All signals ---- */
 
 /* A value that is not finite is a failure. */
-static int signal_function (const pw_source *source, double t, int derivatives, double u[3]) {
+static int signal_function (const pw_source *source, double t, pw_signal_order order, double u[3]) {
   const pw_function *f = &source->signal.function;
   int status = f->eval (f->context, t, source->x, u, source->reads ? source->x + source->reads : NULL);
   if (status != 0) return status;
-  return !isfinite (u[0]) || (derivatives && !(isfinite (u[1]) && isfinite (u[2])));
+  return !isfinite (u[0]) || (order == PW_SIGNAL_DERIVATIVES && !(isfinite (u[1]) && isfinite (u[2])));
 }
 
-/* offset + A cos (w t + p), -A w sin (w t + p), -A w^2 cos (w t + p); forces need only the value */
-static void signal_harmonic (const pw_signal *s, double t, int derivatives, double u[3]) {
-  double A = s->harmonic.amplitude, w = s->harmonic.omega, sine, cosine;
-  pw_sin_cos (w * t + s->harmonic.phase, &sine, &cosine);
+/* offset + A cos (omega t + phase) and its derivatives, A the amplitude */
+static void signal_harmonic (const pw_signal *s, double t, pw_signal_order order, double u[3]) {
+  double A = s->harmonic.amplitude, omega = s->harmonic.omega, sine, cosine;
+  pw_sin_cos (omega * t + s->harmonic.phase, &sine, &cosine);
   u[0] = s->harmonic.offset + A * cosine;
-  if (!derivatives) return;
-  u[1] = -A * w * sine;
-  u[2] = -w * w * (A * cosine);
+  if (order == PW_SIGNAL_VALUE) return;
+  u[1] = -A * omega * sine;
+  u[2] = -omega * omega * (A * cosine);
 }
 
-int pw_signal_eval (const pw_source *source, double t, int derivatives, double u[3]) {
+int pw_signal_eval (const pw_source *source, double t, pw_signal_order order, double u[3]) {
   const pw_signal *s = &source->signal;
   u[0] = u[1] = u[2] = 0;
   if (s->type == PW_HARMONIC)
-    signal_harmonic (s, t, derivatives, u);
+    signal_harmonic (s, t, order, u);
   else if (s->type == PW_CONSTANT)
     u[0] = s->constant;
   else if (s->type == PW_FUNCTION)
-    return signal_function (source, t, derivatives, u);
+    return signal_function (source, t, order, u);
   else if (s->type == PW_TABLE)
     pw_table_eval (s, source->spline, t, u);
   else if (s->type == PW_PULSE)
@@ -106,7 +106,7 @@ int pw_signal_eval (const pw_source *source, double t, int derivatives, double u
   return 0;
 }
 
-double pw_signal_breakpoint (const pw_signal *s, int knots, double t) {
+double pw_signal_breakpoint (const pw_signal *s, pw_breakpoints which, double t) {
   switch (s->type) {
   case PW_RAMP:
   case PW_SMOOTH_STEP:
@@ -114,7 +114,7 @@ double pw_signal_breakpoint (const pw_signal *s, int knots, double t) {
   case PW_PULSE:
     return signal_pulse_breakpoint (s, t);
   case PW_TABLE:
-    return pw_table_breakpoint (s, knots, t);
+    return pw_table_breakpoint (s, which, t);
   case PW_FUNCTION:
     return s->function.breakpoint ? s->function.breakpoint (s->function.context, t) : INFINITY;
   default:

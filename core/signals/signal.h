@@ -1,4 +1,4 @@
-/* Evaluation of signals. */
+/* Signals of a compiled system: values, time derivatives and breakpoints. */
 #ifndef PW_SIGNAL_H
 #define PW_SIGNAL_H
 
@@ -10,18 +10,25 @@ typedef struct {
   int reads;        /* number of states a function signal reads */
   const int *state; /* their indices: coordinate j, or coordinates + j for a velocity */
   double *x;        /* 2 reads: values of these states, then the gradient */
-  double *spline;   /* of a table, 2 count: first derivative at each point, then second (table.c) */
+  double *spline;   /* of a table: see pw_table_spline */
   double *u;        /* 3: destination of its values */
   int of_force;     /* 1: belongs to a force, which needs no derivatives */
 } pw_source;
 
-/* Value and, if `derivatives`, first and second time derivative at time t; the states a function reads are in
- * source->x.  Returns non-zero, which stops the run, if the user's function did or if its values are not finite. */
-int pw_signal_eval (const pw_source *source, double t, int derivatives, double u[3]);
+/* Which of value, first and second time derivative are needed. */
+typedef enum { PW_SIGNAL_VALUE, PW_SIGNAL_DERIVATIVES } pw_signal_order;
 
-/* First time after t at which the signal or its first or second derivative jumps, or INFINITY; with `knots` also
- * where the second derivative of a cubic table has a kink. */
-double pw_signal_breakpoint (const pw_signal *s, int knots, double t);
+/* Stores value, first and second time derivative at time t in u; u[1] and u[2] are meaningless for PW_SIGNAL_VALUE.
+ * The states a function reads are in source->x.  Returns non-zero, which stops the run, if the user's function did or
+ * if its values are not finite. */
+int pw_signal_eval (const pw_source *source, double t, pw_signal_order order, double u[3]);
+
+/* Times at which a step must end: jumps of the signal or of its first or second derivative; these and the kinks of the
+ * second derivative of a cubic table, at its points. */
+typedef enum { PW_JUMPS, PW_JUMPS_AND_KINKS } pw_breakpoints;
+
+/* The first such time after t, or INFINITY. */
+double pw_signal_breakpoint (const pw_signal *s, pw_breakpoints which, double t);
 
 /* ---- Tables (table.c) ---- */
 
@@ -31,9 +38,9 @@ static inline double pw_table_value (const pw_signal *s, int i) {
   return s->table.offset + scale * s->table.value[i];
 }
 
-/* Fills 2 count numbers: the spline of a checked table. */
+/* Computes the spline of a checked table: first derivatives at the points, then second ones, 2 count numbers. */
 void pw_table_spline (const pw_signal *s, double *spline);
 void pw_table_eval (const pw_signal *s, const double *spline, double t, double u[3]);
-double pw_table_breakpoint (const pw_signal *s, int knots, double t);
+double pw_table_breakpoint (const pw_signal *s, pw_breakpoints which, double t);
 
 #endif

@@ -1,4 +1,4 @@
-/* The forms of a signal: their fields and checks. */
+/* The forms of a signal, as text models and lists use them: their fields, and checks of a whole signal. */
 #include <math.h>
 #include <stdio.h>
 #include "signal.h"
@@ -32,8 +32,8 @@ static const pw_field form_pulse[] = {
   { .name = NULL },
 };
 
-static const char *const form_interpolation[] = { "linear", "cubic", NULL }, *const form_ends[] = { "free", "rest",
-                                                                                                    NULL };
+static const char *const form_interpolation[] = { [PW_LINEAR] = "linear", [PW_CUBIC] = "cubic", NULL };
+static const char *const form_ends[] = { [PW_ENDS_FREE] = "free", [PW_ENDS_REST] = "rest", NULL };
 
 static const pw_field form_table[] = {
   { FORM_AT (table, interpolation), PW_CHOICE, .choices = form_interpolation,
@@ -64,7 +64,8 @@ const pw_signal_form *pw_signal_form_of (const pw_signal *s) {
 
 /* ---- Checks: each writes the fault to `text`, or leaves it empty ---- */
 
-static void form_numbers (const pw_signal *s, const pw_signal_form *form, char *text, size_t size) {
+/* The number of each field, and its choice, of which there are two. */
+static void form_check_fields (const pw_signal *s, const pw_signal_form *form, char *text, size_t size) {
   for (const pw_field *f = form->fields; f->name && !*text; f++) {
     const void *at = (const char *)s + f->offset;
     const char *expected = f->type == PW_NUMBER ? pw_domain_check (f->domain, *(const double *)at) : "";
@@ -74,13 +75,13 @@ static void form_numbers (const pw_signal *s, const pw_signal_form *form, char *
   }
 }
 
-static void form_pulses (const pw_signal *s, char *text, size_t size) {
+static void form_check_pulse (const pw_signal *s, char *text, size_t size) {
   double width = s->pulse.width, period = s->pulse.period;
   if (period > 0 && !(width > 0 && width < period))
     snprintf (text, size, "a pulse every %g s: expected a width > 0 and < %g s, found %g s", period, period, width);
 }
 
-static void form_points (const pw_signal *s, int *point, char *text, size_t size) {
+static void form_check_points (const pw_signal *s, int *point, char *text, size_t size) {
   const double *t = s->table.t;
   int cubic = s->table.interpolation == PW_CUBIC, least = cubic && s->table.ends == PW_ENDS_FREE ? 4 : 2;
   if (s->table.count < least || t == NULL || s->table.value == NULL) {
@@ -103,33 +104,35 @@ static void form_points (const pw_signal *s, int *point, char *text, size_t size
   if (!*text) *point = -1;
 }
 
-/* Highest continuous time derivative of a signal, at most 2; -1: the signal jumps. */
-static int form_smoothness (const pw_signal *s, const char **what) {
-  *what = "";
-  if (s->type == PW_PULSE) return *what = "a pulse", -1;
-  if (s->type == PW_RAMP) return *what = "a ramp", 0;
-  if (s->type != PW_TABLE) return 2;
-  if (s->table.interpolation == PW_LINEAR) return *what = "a linear table", 0;
-  if (s->table.ends == PW_ENDS_FREE) return *what = "a cubic table with free ends", 0;
-  return 1;
+typedef enum { FORM_JUMPS, FORM_KINKS, FORM_SMOOTH } form_continuity;
+
+/* Whether a signal jumps, or has kinks, and the name of its form in messages. */
+static form_continuity form_continuity_of (const pw_signal *s, const char **form) {
+  *form = s->type == PW_PULSE                   ? "a pulse"
+          : s->type == PW_RAMP                  ? "a ramp"
+          : s->type != PW_TABLE                 ? ""
+          : s->table.interpolation == PW_LINEAR ? "a linear table"
+          : s->table.ends == PW_ENDS_FREE       ? "a cubic table with free ends"
+                                                : "";
+  return s->type == PW_PULSE ? FORM_JUMPS : **form ? FORM_KINKS : FORM_SMOOTH;
 }
 
 /* Kinks of prescribed positions and jumps of prescribed velocities would require infinite forces. */
-static void form_level (const pw_signal *s, const pw_kind *kind, char *text, size_t size) {
-  const char *what;
-  int smoothness = form_smoothness (s, &what);
+static void form_check_continuity (const pw_signal *s, const pw_kind *kind, char *text, size_t size) {
+  const char *form;
+  form_continuity continuity = form_continuity_of (s, &form);
   if (pw_kind_signals_force (kind)) return;
-  if (kind->level == PW_HOLONOMIC && smoothness < 1)
+  if (kind->level == PW_HOLONOMIC && continuity != FORM_SMOOTH)
     snprintf (text, size,
               "%s has %s, and a prescribed position must not: use a smooth-step, a cubic table with ends at rest, a "
               "harmonic",
-              what, smoothness < 0 ? "jumps" : "kinks");
-  else if (smoothness < 0)
+              form, continuity == FORM_JUMPS ? "jumps" : "kinks");
+  else if (continuity == FORM_JUMPS)
     snprintf (text, size, "%s jumps, and the signal of a velocity constraint must not: use a ramp or smooth-step",
-              what);
+              form);
 }
 
-static void form_function (const pw_signal *s, const pw_kind *kind, char *text, size_t size) {
+static void form_check_function (const pw_signal *s, const pw_kind *kind, char *text, size_t size) {
   if (s->function.eval == NULL)
     snprintf (text, size, "a function signal without eval");
   else if (s->function.reads && !pw_kind_signals_force (kind))
@@ -141,15 +144,15 @@ char *pw_signal_check (const pw_signal *s, const pw_kind *kind, int *point, char
   *buffer = 0;
   *point = -1;
   if (s->type == PW_FUNCTION)
-    form_function (s, kind, buffer, size);
+    form_check_function (s, kind, buffer, size);
   else if (s->type == PW_CONSTANT && !isfinite (s->constant))
     snprintf (buffer, size, "%g: expected a finite number", s->constant);
   else if (form)
-    form_numbers (s, form, buffer, size);
+    form_check_fields (s, form, buffer, size);
   else if (s->type != PW_CONSTANT)
     snprintf (buffer, size, "signal type %d does not exist", (int)s->type);
-  if (!*buffer && s->type == PW_PULSE) form_pulses (s, buffer, size);
-  if (!*buffer && s->type == PW_TABLE) form_points (s, point, buffer, size);
-  if (!*buffer) form_level (s, kind, buffer, size);
+  if (!*buffer && s->type == PW_PULSE) form_check_pulse (s, buffer, size);
+  if (!*buffer && s->type == PW_TABLE) form_check_points (s, point, buffer, size);
+  if (!*buffer) form_check_continuity (s, kind, buffer, size);
   return buffer;
 }

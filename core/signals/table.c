@@ -1,19 +1,21 @@
 /* Tables: signals that interpolate points (t_i, y_i).
  *
- *   u = y_i + b_i s + M_i s^2 / 2 + (M_j - M_i) s^3 / (6 h),   s = t - t_i,  j = i + 1,  h = t_j - t_i
+ *   u = y_i + b_i x + M_i x^2 / 2 + (M_j - M_i) x^3 / (6 h_i),   x = t - t_i,  j = i + 1,  h_i = t_j - t_i
  *
- * between two points; outside, the signal is constant.  In a cubic table the second derivatives M_i make the first
- * derivative continuous (de Boor 2001, A Practical Guide to Splines, chapter IV):
+ * between two points; outside, the signal is constant.  b_i and M_i are the first and second derivative at point i.
+ * In a cubic table the M_i make the first derivative continuous (de Boor 2001, A Practical Guide to Splines, chapter
+ * IV):
  *
  *   h_k M_k + 2 (h_k + h_i) M_i + h_i M_j = 6 ((y_j - y_i) / h_i - (y_i - y_k) / h_k),   k = i - 1
  *
- * With free ends the first two intervals share one cubic, and so do the last two ("not a knot"); with ends at rest
- * the first derivative is 0 at both.  A linear table has M = 0. */
+ * With free ends the first two intervals share one cubic, and so do the last two ("not a knot"); with ends at rest the
+ * first derivative is 0 at both.  A linear table has M = 0. */
 #include <math.h>
 #include <string.h>
 #include "signal.h"
 
-/* Row i of the equations for M: coefficients of M_k, M_i and M_j, and the right-hand side. */
+/* Row i of the equations for M: coefficients of M_k, M_i and M_j, and the right-hand side.  M at a free end is
+ * eliminated by table_extrapolate. */
 static void table_row (const double *t, const double *y, int n, int ends, int i, double row[4]) {
   double before = i > 0 ? t[i] - t[i - 1] : 0, after = i < n - 1 ? t[i + 1] - t[i] : 0;
   double slope_before = i > 0 ? (y[i] - y[i - 1]) / before : 0, slope_after = i < n - 1 ? (y[i + 1] - y[i]) / after : 0;
@@ -27,11 +29,12 @@ static void table_row (const double *t, const double *y, int n, int ends, int i,
 }
 
 /* M at a free end, extrapolated linearly from the next two points. */
-static double table_end (double t0, double t1, double t2, double M1, double M2) {
+static double table_extrapolate (double t0, double t1, double t2, double M1, double M2) {
   return M1 + (M1 - M2) * ((t1 - t0) / (t2 - t1));
 }
 
-/* Solves the tridiagonal equations for M without pivoting; they are diagonally dominant.  `upper`: n scratch numbers. */
+/* Solves the tridiagonal equations for M without pivoting; they are diagonally dominant.  `upper`: n numbers of
+ * memory. */
 static void table_second_derivatives (const double *t, const double *y, int n, int ends, double *M, double *upper) {
   int first = ends == PW_ENDS_REST ? 0 : 1, last = n - 1 - first;
   double row[4];
@@ -43,8 +46,8 @@ static void table_second_derivatives (const double *t, const double *y, int n, i
   }
   for (int i = last - 1; i >= first; i--) M[i] -= upper[i] * M[i + 1];
   if (ends == PW_ENDS_REST) return;
-  M[0] = table_end (t[0], t[1], t[2], M[1], M[2]);
-  M[n - 1] = table_end (t[n - 1], t[n - 2], t[n - 3], M[n - 2], M[n - 3]);
+  M[0] = table_extrapolate (t[0], t[1], t[2], M[1], M[2]);
+  M[n - 1] = table_extrapolate (t[n - 1], t[n - 2], t[n - 3], M[n - 2], M[n - 3]);
 }
 
 void pw_table_spline (const pw_signal *s, double *spline) {
@@ -78,16 +81,17 @@ void pw_table_eval (const pw_signal *s, const double *spline, double t, double u
   u[1] = u[2] = 0;
   if (passed == 0 || passed == n) return;
   double x = t - s->table.t[i], b = spline[i], M = spline[n + i];
-  double third = (spline[n + i + 1] - M) / (s->table.t[i + 1] - s->table.t[i]);
-  u[0] += x * (b + x * (M / 2 + x * (third / 6)));
-  u[1] = b + x * (M + x * (third / 2));
-  u[2] = M + x * third;
+  double third_derivative = (spline[n + i + 1] - M) / (s->table.t[i + 1] - s->table.t[i]);
+  u[0] += x * (b + x * (M / 2 + x * (third_derivative / 6)));
+  u[1] = b + x * (M + x * (third_derivative / 2));
+  u[2] = M + x * third_derivative;
 }
 
-/* A linear table has a kink at each point; a cubic one has a kink at its ends, or with ends at rest a jump of the second
- * derivative, and between them kinks of the second derivative. */
-double pw_table_breakpoint (const pw_signal *s, int knots, double t) {
+/* At each point of a linear table, and at the ends of a cubic one, the first or the second derivative jumps; at the
+ * other points of a cubic table the second derivative has a kink. */
+double pw_table_breakpoint (const pw_signal *s, pw_breakpoints which, double t) {
   int n = s->table.count, next = table_passed (s, t);
   if (next == n) return INFINITY;
-  return s->table.t[next > 0 && s->table.interpolation == PW_CUBIC && !knots ? n - 1 : next];
+  int only_kinks_inside = s->table.interpolation == PW_CUBIC && next > 0;
+  return s->table.t[only_kinks_inside && which == PW_JUMPS ? n - 1 : next];
 }

@@ -23,11 +23,11 @@ typedef struct {
  * entries of equation i for the velocities vx, vy of body b form a vector of constant length; takes_part[i] = 0 for an
  * equation that is ignored.  Writes the statements of the factorisation, which end with what the solution needs in F.
  * PW_RETRY if a massless coordinate is determined by no equation, or an equation has no pivot.  Errors: PW_RESOURCE. */
-int pw_elimination_open (pw_elimination *x, const pw_system *s, const pw_term *K, const unsigned char *length,
-                         const unsigned char *takes_part, pw_emitter *e);
-void pw_elimination_close (pw_elimination *x);
+int pw_elimination_open (pw_elimination *ldl, const pw_system *s, const pw_term *K, const unsigned char *length,
+                         const unsigned char *takes_part, pw_emitter *emitter);
+void pw_elimination_close (pw_elimination *ldl);
 
 /* Writes the statements that solve it; right: n terms, replaced by those of the solution. */
-void pw_elimination_solve (const pw_elimination *x, pw_emitter *e, pw_term *right);
+void pw_elimination_solve (const pw_elimination *ldl, pw_emitter *emitter, pw_term *right);
 
 #endif

@@ -6,30 +6,32 @@
 
 enum { SPARSITY_SCENES = 12, SPARSITY_STATES = 4 };
 
-static unsigned char sparsity_first (double value) {
+static unsigned char sparsity_of_value (double value) {
   return value == 0 ? PW_ENTRY_ZERO : value == 1 ? PW_ENTRY_ONE : value == -1 ? PW_ENTRY_MINUS_ONE : PW_ENTRY_CONSTANT;
 }
 
 /* Updates an entry with its value at a state; `first` is its value at the first state of the scene. */
 static unsigned char sparsity_merge (unsigned char type, double value, double first) {
   if (value != first || type == PW_ENTRY_VARIABLE) return PW_ENTRY_VARIABLE;
-  return sparsity_first (value) == type ? type : PW_ENTRY_CONSTANT;
+  return sparsity_of_value (value) == type ? type : PW_ENTRY_CONSTANT;
 }
 
-/* Elements of the scene that touch the ground have entries that are constant there only. */
+/* 1 for an element on the ground: it has entries that are constant only there. */
 static int sparsity_is_grounded (const pw_system *s, const pw_element_batch *k, int e) {
   for (int n = 0; n < k->kind->bodies; n++)
     if (k->column[e * k->kind->bodies + n] >= s->coords) return 1;
   return 0;
 }
 
-/* Merges the entries of J and of the force at one state; `first` has those of the scene's first state. */
-static void sparsity_state (const pw_element_batch *k, int e, int fresh, int known, double *first, pw_sparsity *out) {
+/* Merges the entries of element e at one state.  first: those of J at the scene's first state, stored if this is it;
+ * known: 1 if `out` has entries already. */
+static void sparsity_state (const pw_element_batch *k, int e, int is_first, int known, double *first,
+                            pw_sparsity *out) {
   int n = k->kind->rows * k->b.cols;
   for (int i = 0; i < n; i++) {
     double value = k->J[e * n + i];
-    if (fresh) first[i] = value;
-    out->J[i] = known ? sparsity_merge (out->J[i], value, first[i]) : sparsity_first (value);
+    if (is_first) first[i] = value;
+    out->J[i] = known ? sparsity_merge (out->J[i], value, first[i]) : sparsity_of_value (value);
   }
   for (int i = 0; i < k->kind->rows * k->kind->bodies; i++) {
     int at = i / k->kind->bodies * k->b.cols + i % k->kind->bodies * 3;

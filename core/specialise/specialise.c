@@ -1,5 +1,5 @@
-/* Writes a compiled system as C code for this scene alone: the sources of its element types, called for one element at a
- * time with constant indices, and a factorisation without loops. */
+/* Writes a compiled system as C code for this scene alone: the sources of its element types, called for one element at
+ * a time with constant indices, and a factorisation without loops. */
 #define _POSIX_C_SOURCE 200809L
 #include <stdlib.h>
 #include <string.h>
@@ -14,7 +14,7 @@ static const pw_source_text *specialise_find_source (const char *name) {
   return NULL;
 }
 
-enum { SPECIALISE_SOURCES = 64 };
+enum { SPECIALISE_SOURCES = 64 }; /* more than there are in pw_source_texts */
 
 /* Writes a source once, after the headers of element types that it includes. */
 static void specialise_source (FILE *out, const char *name, const pw_source_text **done, int *count) {
@@ -31,22 +31,22 @@ static void specialise_source (FILE *out, const char *name, const pw_source_text
     if (strncmp (*line, "#include \"", 10) != 0) fputs (*line, out);
 }
 
-static void specialise_sources (const pw_specialise_scene *x) {
+static void specialise_sources (const pw_generator *scene) {
   const pw_source_text *done[SPECIALISE_SOURCES];
   char name[80], file[90];
   int count = 0;
-  fputs ("#include <math.h>\n#include <string.h>\n#include \"pinwheel.h\"\n", x->out);
-  specialise_source (x->out, "specialised.h", done, &count);
-  specialise_source (x->out, "sine.h", done, &count);
-  specialise_source (x->out, "batch.h", done, &count);
-  for (int k = 0; k < x->s->batches; k++) {
-    if (!pw_kind_is_built_in (x->s->batch[k].kind)) continue;
-    snprintf (file, sizeof file, "%s.c", pw_specialise_identifier (x->s->batch[k].kind, name, sizeof name));
-    specialise_source (x->out, file, done, &count);
+  fputs ("#include <math.h>\n#include <string.h>\n#include \"pinwheel.h\"\n", scene->out);
+  specialise_source (scene->out, "specialised.h", done, &count);
+  specialise_source (scene->out, "sine.h", done, &count);
+  specialise_source (scene->out, "batch.h", done, &count);
+  for (int k = 0; k < scene->s->batches; k++) {
+    if (!pw_kind_is_built_in (scene->s->batch[k].kind)) continue;
+    snprintf (file, sizeof file, "%s.c", pw_specialise_identifier (scene->s->batch[k].kind, name, sizeof name));
+    specialise_source (scene->out, file, done, &count);
   }
 }
 
-/* ---- The whole ---- */
+/* ---- The file ---- */
 
 /* Coordinates by pairs, X (0, pair) X (2, pair) X (4, one), and one by one. */
 static void specialise_coordinates (FILE *out, int n) {
@@ -57,81 +57,80 @@ static void specialise_coordinates (FILE *out, int n) {
   fputc ('\n', out);
 }
 
-static void specialise_constants (const pw_specialise_scene *x) {
-  const pw_system *s = x->s;
-  fprintf (x->out,
-           "\n/* ---- The scene ---- */\n\nenum { BODIES = %d, N = %d, ROWS = %d, HOLONOMIC = %d, INTERNAL = %d,\n"
-           "  ENTRIES = %d, REDUNDANT = %d, LEDGER = %d, RHEONOMIC = %d, READERS = %d };\n",
-           s->bodies, s->coords, s->rows, s->holonomic, s->coords - 3 * s->bodies, x->entries, x->independent != NULL,
-           s->entries, s->rheonomic > 0, s->state_dependent > 0);
-  fprintf (x->out, "#define INLINE static inline%s\n",
-           s->rows <= SPECIALISE_INLINE ? " __attribute__ ((always_inline))" : "");
-  pw_specialise_list (x->out, "BODY", s->bodies);
-  pw_specialise_list (x->out, "ROW", s->rows);
-  pw_specialise_list (x->out, "HOLONOMIC", s->holonomic);
-  pw_specialise_list (x->out, "INTERNAL", s->coords - 3 * s->bodies);
-  specialise_coordinates (x->out, s->coords);
-  for (int b = 0; b < s->bodies; b++) {
-    fprintf (x->out, "/* body %d: ", b);
-    pw_emit_name (x->out, s->body_name[b]);
-    fputs (" */\n", x->out);
-  }
-  for (int i = 0; i < s->rows; i++) {
-    char name[120];
-    fprintf (x->out, "/* equation %d: ", i);
-    pw_emit_name (x->out, pw_system_reaction_name (s, i, name, sizeof name));
-    fputs (" */\n", x->out);
-  }
-  fputs ("\nstatic const unsigned char independent[] = { ", x->out);
-  for (int i = 0; i < s->rows; i++) fprintf (x->out, "%d, ", pw_specialise_is_independent (x, i));
-  fputs ("0 };\n", x->out);
+static void specialise_comment (FILE *out, const char *what, int number, const char *name) {
+  fprintf (out, "/* %s %d: ", what, number);
+  pw_emit_name (out, name);
+  fputs (" */\n", out);
 }
 
-static int specialise_write (pw_specialise_scene *x) {
+static void specialise_constants (const pw_generator *scene) {
+  const pw_system *s = scene->s;
+  fprintf (scene->out,
+           "\n/* ---- The scene ---- */\n\nenum { BODIES = %d, N = %d, ROWS = %d, HOLONOMIC = %d, INTERNAL = %d,\n"
+           "  ENTRIES = %d, REDUNDANT = %d, LEDGER = %d, RHEONOMIC = %d, READERS = %d };\n",
+           s->bodies, s->coords, s->rows, s->holonomic, s->coords - 3 * s->bodies, scene->entries,
+           scene->independent != NULL, s->entries, s->rheonomic > 0, s->state_dependent > 0);
+  fprintf (scene->out, "#define INLINE static inline%s\n",
+           s->rows <= SPECIALISE_INLINE ? " __attribute__ ((always_inline))" : "");
+  pw_specialise_list (scene->out, "BODY", s->bodies);
+  pw_specialise_list (scene->out, "ROW", s->rows);
+  pw_specialise_list (scene->out, "HOLONOMIC", s->holonomic);
+  pw_specialise_list (scene->out, "INTERNAL", s->coords - 3 * s->bodies);
+  specialise_coordinates (scene->out, s->coords);
+  char name[120];
+  for (int b = 0; b < s->bodies; b++) specialise_comment (scene->out, "body", b, s->body_name[b]);
+  for (int i = 0; i < s->rows; i++)
+    specialise_comment (scene->out, "equation", i, pw_system_reaction_name (s, i, name, sizeof name));
+  fputs ("\nstatic const unsigned char independent[] = { ", scene->out);
+  for (int i = 0; i < s->rows; i++) fprintf (scene->out, "%d, ", pw_specialise_is_independent (scene, i));
+  fputs ("0 };\n", scene->out);
+}
+
+static int specialise_write (pw_generator *scene) {
   const pw_source_text *done[SPECIALISE_SOURCES];
   int count = 0;
-  fputs ("/* Generated by Pinwheel for the scene \"", x->out);
-  pw_emit_name (x->out, x->s->model);
-  fputs ("\".  Compile with: cc -std=c11 -O2 -ffp-contract=off -fPIC -shared */\n", x->out);
-  specialise_sources (x);
-  specialise_constants (x);
-  specialise_source (x->out, "scene_head.inc", done, &count);
-  pw_specialise_elements (x);
-  int status = pw_specialise_algebra (x);
-  pw_specialise_data (x);
-  pw_specialise_signals (x);
-  specialise_source (x->out, "scene_both.inc", done, &count);
-  fputs ("\n#ifdef PW_LANES\n", x->out);
-  specialise_source (x->out, "scene_lanes.inc", done, &count);
-  fprintf (x->out,
+  fputs ("/* Generated by Pinwheel for the scene \"", scene->out);
+  pw_emit_name (scene->out, scene->s->model);
+  fputs ("\".  Compile with: cc -std=c11 -O2 -ffp-contract=off -fPIC -shared */\n", scene->out);
+  specialise_sources (scene);
+  specialise_constants (scene);
+  specialise_source (scene->out, "scene_head.inc", done, &count);
+  pw_specialise_elements (scene);
+  int status = pw_specialise_algebra (scene);
+  pw_specialise_data (scene);
+  pw_specialise_signals (scene);
+  specialise_source (scene->out, "scene_both.inc", done, &count);
+  fputs ("\n#ifdef PW_LANES\n", scene->out);
+  specialise_source (scene->out, "scene_lanes.inc", done, &count);
+  fprintf (scene->out,
            "\nPW_EXPORT const pw_specialised_lanes pw_specialised_scene_lanes = {\n"
            "  PW_SCENE_ABI, LANES_SERVED, %luu, sizeof (run_lanes), lanes_steps\n};\n#else\n",
-           pw_system_shape (x->s));
-  specialise_source (x->out, "scene_tail.inc", done, &count);
+           pw_system_shape (scene->s));
+  specialise_source (scene->out, "scene_tail.inc", done, &count);
 
-  fprintf (x->out,
+  fprintf (scene->out,
            "\nstatic int prepare (pw_scene *s) {\n  const double *const M = s->mass;\n  double *const C = s->constant, "
            "J[ENTRIES + 1];\n"
            "  reference_jacobian (s, J);\n  (void)M, (void)C, (void)J;\n%s  return 0;\n}\n",
-           x->prepare.text ? x->prepare.text : "");
-  fprintf (x->out,
+           scene->prepare.text ? scene->prepare.text : "");
+  fprintf (scene->out,
            "\nPW_EXPORT const pw_specialised pw_specialised_scene = {\n"
            "  PW_SCENE_ABI, %d, %luu, independent, prepare, evaluate, project, stages, residuals, steps\n};\n#endif\n",
-           x->constants + 1, pw_system_shape (x->s));
+           scene->constants + 1, pw_system_shape (scene->s));
   return status;
 }
 
-static int specialise_open (pw_specialise_scene *x) {
-  const pw_system *s = x->s;
+static int specialise_open (pw_generator *scene) {
+  const pw_system *s = scene->s;
   size_t n = (size_t)s->batches + 1;
-  x->sparsity = malloc (n * sizeof *x->sparsity);
-  x->w = pw_workspace_new (s, NULL);
-  if (x->sparsity == NULL || x->w == NULL) return PW_RESOURCE;
-  if (pw_update_kinematics (x->w, 0, s->q0, s->v0) == PW_OK) pw_evaluate_J (x->w);
+  scene->sparsity = malloc (n * sizeof *scene->sparsity);
+  scene->w = pw_workspace_new (s, NULL);
+  if (scene->sparsity == NULL || scene->w == NULL) return PW_RESOURCE;
+  if (pw_update_kinematics (scene->w, 0, s->q0, s->v0) == PW_OK) pw_evaluate_J (scene->w);
   int status = PW_OK;
   for (int k = 0; k < s->batches && status == PW_OK; k++) {
-    x->entries += s->batch[k].b.count * s->batch[k].kind->rows * s->batch[k].b.cols;
-    status = pw_sparsity_find (s->batch[k].kind, &x->sparsity[k]);
+    scene->entries += s->batch[k].b.count * s->batch[k].kind->rows * s->batch[k].b.cols;
+    status = pw_sparsity_find (s->batch[k].kind, &scene->sparsity[k]);
   }
   return status;
 }
@@ -144,10 +143,11 @@ unsigned long pw_system_shape (const pw_system *s) {
   h = pw_check_sum (h, counts, sizeof counts);
   for (int j = 0; j < s->coords; j++) h = pw_check_sum (h, &(char){ s->mass[j] > 0 }, 1);
   for (int k = 0; k < s->batches; k++) {
-    const pw_element_batch *b = &s->batch[k];
-    h = pw_check_sum (h, b->kind->name, strlen (b->kind->name) + 1);
-    h = pw_check_sum (h, b->b.body, (size_t)(b->b.count * b->kind->bodies) * sizeof *b->b.body);
-    const int sizes[] = { b->b.count, (int)b->kind->element, b->kind->rows, b->kind->internal, b->kind->signals };
+    const pw_element_batch *batch = &s->batch[k];
+    h = pw_check_sum (h, batch->kind->name, strlen (batch->kind->name) + 1);
+    h = pw_check_sum (h, batch->b.body, (size_t)(batch->b.count * batch->kind->bodies) * sizeof *batch->b.body);
+    const int sizes[] = { batch->b.count, (int)batch->kind->element, batch->kind->rows, batch->kind->internal,
+                          batch->kind->signals };
     h = pw_check_sum (h, sizes, sizeof sizes);
   }
   for (int i = 0; i < s->sources; i++)
@@ -182,13 +182,13 @@ char *pw_system_source (const pw_system *s, const unsigned char *independent, pw
              SPECIALISE_ROWS);
     return NULL;
   }
-  pw_specialise_scene x = { .s = s, .independent = independent, .out = pw_stream_open (&text) };
-  int status = x.out ? specialise_open (&x) : PW_RESOURCE;
-  if (status == PW_OK) status = specialise_write (&x);
-  if (pw_stream_close (x.out, &text) != PW_OK) status = PW_RESOURCE;
-  pw_workspace_free (x.w);
-  free (x.sparsity);
-  free (x.prepare.text);
+  pw_generator scene = { .s = s, .independent = independent, .out = pw_stream_open (&text) };
+  int status = scene.out ? specialise_open (&scene) : PW_RESOURCE;
+  if (status == PW_OK) status = specialise_write (&scene);
+  if (pw_stream_close (scene.out, &text) != PW_OK) status = PW_RESOURCE;
+  pw_workspace_free (scene.w);
+  free (scene.sparsity);
+  free (scene.prepare.text);
   if (status == PW_OK) return text.text;
   free (text.text);
   if (status == PW_RETRY)

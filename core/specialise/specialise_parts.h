@@ -21,38 +21,38 @@ typedef struct {
   int entries;           /* of J */
   pw_stream prepare;     /* prepare's statements */
   int constants;
-} pw_specialise_scene;
+} pw_generator;
 
 /* "rolling_wheel", in the buffer, which is returned. */
 char *pw_specialise_identifier (const pw_kind *kind, char *buffer, size_t size);
 /* The first entry of J and the first signal of an element. */
-static inline int pw_specialise_J (const pw_specialise_scene *x, int k, int e) {
-  const pw_element_batch *b = &x->w->batch[k];
-  return (int)(b->J - x->w->J) + e * b->kind->rows * b->b.cols;
+static inline int pw_specialise_J (const pw_generator *scene, int k, int e) {
+  const pw_element_batch *batch = &scene->w->batch[k];
+  return (int)(batch->J - scene->w->J) + e * batch->kind->rows * batch->b.cols;
 }
-static inline int pw_specialise_u (const pw_specialise_scene *x, int k, int e) {
-  return (int)(x->s->batch[k].source - x->s->source) + e * x->s->batch[k].kind->signals;
+static inline int pw_specialise_u (const pw_generator *scene, int k, int e) {
+  return (int)(scene->s->batch[k].source - scene->s->source) + e * scene->s->batch[k].kind->signals;
 }
-static inline int pw_specialise_is_independent (const pw_specialise_scene *x, int row) {
-  return x->independent == NULL || x->independent[row];
+static inline int pw_specialise_is_independent (const pw_generator *scene, int row) {
+  return scene->independent == NULL || scene->independent[row];
 }
 
-/* Which forces act on a coordinate. */
+/* The forces that act on a coordinate: a sum of these. */
 enum { SPECIALISE_CONSTANT = 1, SPECIALISE_CHANGING = 2 };
-int pw_specialise_force (const pw_specialise_scene *x, int j);
+int pw_specialise_force (const pw_generator *scene, int j);
 
 /* Write the functions of elements: Jacobian, right-hand sides, forces, ledger; and that of the signals. */
-void pw_specialise_elements (const pw_specialise_scene *x);
-void pw_specialise_signals (const pw_specialise_scene *x);
+void pw_specialise_elements (const pw_generator *scene);
+void pw_specialise_signals (const pw_generator *scene);
 
 /* #define EACH_name(X) X (0) X (1) ...: a loop without a counter, so that arrays stay in registers. */
 void pw_specialise_list (FILE *out, const char *name, int n);
 
 /* Lists what lanes load for each run. */
-void pw_specialise_data (const pw_specialise_scene *x);
+void pw_specialise_data (const pw_generator *scene);
 
 /* Writes products with J, factorisations and solutions; prepare's statements are collected.  PW_RETRY if there is no
  * fixed order of elimination; PW_RESOURCE. */
-int pw_specialise_algebra (pw_specialise_scene *x);
+int pw_specialise_algebra (pw_generator *scene);
 
 #endif

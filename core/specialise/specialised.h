@@ -6,7 +6,7 @@
 #include "pinwheel.h"
 
 #define PW_SCENE_ABI 4
-enum { PW_LANES_MOST = 8 };
+enum { PW_LANES_MOST = 8, PW_STAGES_MOST = 16 }; /* lanes; stages of a Runge-Kutta method */
 #define PW_SCENE_PIVOT 4e-4 /* least pivot of a constraint equation relative to its diagonal entry: a squared sine */
 
 /* A run's data for specialised code.  Arrays over coordinates have `coordinates` entries, those over constraint
@@ -33,8 +33,8 @@ typedef struct pw_scene {
 
 /* The nonzero weights of a row of a Runge-Kutta tableau. */
 typedef struct {
-  int count, stage[16];
-  double weight[16];
+  int count, stage[PW_STAGES_MOST];
+  double weight[PW_STAGES_MOST];
 } pw_rk_row;
 
 /* The stages of a step of size h.  Arrays over coordinates have room for three more entries. */

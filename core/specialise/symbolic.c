@@ -16,30 +16,30 @@ const char *pw_term_text (pw_term a, char buffer[24]) {
 }
 
 /* The number of the constant with this statement's right-hand side, or -1. */
-static int emit_find (const pw_emitter *e, const char *text) {
+static int emit_find (const pw_emitter *emitter, const char *text) {
   int i = -1;
-  fflush (e->prepare);
-  const char *at = strstr (*e->prepared, text);
-  while (at && at > *e->prepared && at[-1] != '[') at--;
+  fflush (emitter->prepare);
+  const char *at = strstr (*emitter->prepared, text);
+  while (at && at > *emitter->prepared && at[-1] != '[') at--;
   if (at) sscanf (at, "%d", &i);
   return i;
 }
 
 /* A new constant or variable, or a constant that exists already, equal to `a op b`. */
-static pw_term emit_define (pw_emitter *e, int constant, int sign, double value, const char *a, char op,
+static pw_term emit_define (pw_emitter *emitter, int constant, int sign, double value, const char *a, char op,
                             const char *b) {
   pw_term out = { PW_TERM_VARIABLE, sign, "", value };
   char text[80];
   snprintf (text, sizeof text, " = %s %c %s;\n", a, op, b);
   if (!constant) {
-    snprintf (out.name, sizeof out.name, "x%d", e->variables++);
-    fprintf (e->code, "  const double %s%s", out.name, text);
+    snprintf (out.name, sizeof out.name, "x%d", emitter->variables++);
+    fprintf (emitter->code, "  const double %s%s", out.name, text);
     return out;
   }
-  int known = emit_find (e, text);
-  out = pw_term_named (PW_TERM_CONSTANT, "C", known < 0 ? e->constants++ : known, value);
+  int known = emit_find (emitter, text);
+  out = pw_term_named (PW_TERM_CONSTANT, "C", known < 0 ? emitter->constants++ : known, value);
   out.sign = sign;
-  if (known < 0) fprintf (e->prepare, "  %s%s", out.name, text);
+  if (known < 0) fprintf (emitter->prepare, "  %s%s", out.name, text);
   return out;
 }
 
@@ -47,20 +47,20 @@ static int emit_is_constant (pw_term a) {
   return a.type != PW_TERM_VARIABLE;
 }
 
-pw_term pw_emit_product (pw_emitter *e, pw_term a, pw_term b) {
+pw_term pw_emit_product (pw_emitter *emitter, pw_term a, pw_term b) {
   if (a.type == PW_TERM_ZERO || b.type == PW_TERM_ZERO) return pw_term_zero ();
   if (a.type == PW_TERM_ONE) return a.sign < 0 ? pw_term_negative (b) : b;
   if (b.type == PW_TERM_ONE) return b.sign < 0 ? pw_term_negative (a) : a;
-  return emit_define (e, emit_is_constant (a) && emit_is_constant (b), a.sign * b.sign, a.value * b.value, a.name, '*',
-                      b.name);
+  return emit_define (emitter, emit_is_constant (a) && emit_is_constant (b), a.sign * b.sign, a.value * b.value, a.name,
+                      '*', b.name);
 }
 
-pw_term pw_emit_difference (pw_emitter *e, pw_term a, pw_term b, pw_term c) {
+pw_term pw_emit_difference (pw_emitter *emitter, pw_term a, pw_term b, pw_term c) {
   char text[60];
   if (b.type == PW_TERM_ZERO || c.type == PW_TERM_ZERO) return a;
-  if (a.type == PW_TERM_ZERO) return pw_term_negative (pw_emit_product (e, b, c));
+  if (a.type == PW_TERM_ZERO) return pw_term_negative (pw_emit_product (emitter, b, c));
   if (emit_is_constant (b) && emit_is_constant (c) && !emit_is_constant (a)) { /* the product once and for all */
-    b = pw_emit_product (e, b, c);
+    b = pw_emit_product (emitter, b, c);
     c = (pw_term){ PW_TERM_ONE, 1, "1", 1 };
   }
   int constant = emit_is_constant (a) && emit_is_constant (b) && emit_is_constant (c);
@@ -68,14 +68,14 @@ pw_term pw_emit_difference (pw_emitter *e, pw_term a, pw_term b, pw_term c) {
     snprintf (text, sizeof text, "%s", b.type == PW_TERM_ONE ? (c.type == PW_TERM_ONE ? "1" : c.name) : b.name);
   else
     snprintf (text, sizeof text, "%s * %s", b.name, c.name);
-  return emit_define (e, constant, a.sign, a.value - b.value * c.value, a.name,
+  return emit_define (emitter, constant, a.sign, a.value - b.value * c.value, a.name,
                       b.sign * c.sign * a.sign > 0 ? '-' : '+', text);
 }
 
-pw_term pw_emit_quotient (pw_emitter *e, pw_term a, pw_term b) {
+pw_term pw_emit_quotient (pw_emitter *emitter, pw_term a, pw_term b) {
   if (b.type == PW_TERM_ONE) return b.sign < 0 ? pw_term_negative (a) : a;
-  return emit_define (e, emit_is_constant (a) && emit_is_constant (b), a.sign * b.sign, a.value / b.value, a.name, '/',
-                      b.name);
+  return emit_define (emitter, emit_is_constant (a) && emit_is_constant (b), a.sign * b.sign, a.value / b.value, a.name,
+                      '/', b.name);
 }
 
 void pw_emit_name (FILE *out, const char *name) {

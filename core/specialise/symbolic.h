@@ -31,9 +31,9 @@ static inline pw_term pw_term_negative (pw_term a) {
 }
 pw_term pw_term_named (pw_term_type type, const char *array, int i, double value); /* array[i] */
 
-pw_term pw_emit_product (pw_emitter *e, pw_term a, pw_term b);               /* a b */
-pw_term pw_emit_difference (pw_emitter *e, pw_term a, pw_term b, pw_term c); /* a - b c */
-pw_term pw_emit_quotient (pw_emitter *e, pw_term a, pw_term b);              /* a / b */
+pw_term pw_emit_product (pw_emitter *emitter, pw_term a, pw_term b);               /* a b */
+pw_term pw_emit_difference (pw_emitter *emitter, pw_term a, pw_term b, pw_term c); /* a - b c */
+pw_term pw_emit_quotient (pw_emitter *emitter, pw_term a, pw_term b);              /* a / b */
 
 /* A name as part of a comment. */
 void pw_emit_name (FILE *out, const char *name);

@@ -100,7 +100,7 @@ static double blocks_unit (const pw_workspace *w, const pw_kind *kind, int c, in
   return velocity ? unit / w->scale.time : unit;
 }
 
-/* An exactly representable step that balances truncation, h^2 / unit^2, against the round-off of x, eps x / h. */
+/* An exactly representable step h that balances truncation, h^2 / unit^2, against the round-off eps x / h of x. */
 static double blocks_step (const pw_workspace *w, const pw_kind *kind, int c, int velocity, double x) {
   double unit = blocks_unit (w, kind, c, velocity);
   volatile double moved = x + unit * cbrt (2.3e-16 * fmax (1, fabs (x) / unit));

@@ -7,7 +7,7 @@
 #include <string.h>
 #include "system.h"
 
-/* Guard bytes after an element; prepare must not change them. */
+/* Bytes after an element, and their value, which `prepare` must not change. */
 enum { COMPILE_GUARD = 64, COMPILE_MARK = 0xa5 };
 
 /* The most elements, coordinates and constraint equations: products with numbers of one element (columns, signals) are
@@ -27,44 +27,45 @@ typedef struct {
   unsigned char *prepared; /* bytes: memory in which an element is prepared */
 } compilation;
 
-static int compile_no_memory (const compilation *c) {
-  return pw_fail (c->error, PW_RESOURCE, "model %s: out of memory", c->m->name);
+static int compile_no_memory (const compilation *job) {
+  return pw_fail (job->error, PW_RESOURCE, "model %s: out of memory", job->m->name);
 }
 
-static int compile_too_large (const compilation *c) {
-  return pw_fail (c->error, PW_INPUT, "model %s is too large", c->m->name);
+static int compile_too_large (const compilation *job) {
+  return pw_fail (job->error, PW_INPUT, "model %s is too large", job->m->name);
 }
 
 /* Memory that belongs to the system.  NULL and the error if out of memory. */
-static void *compile_alloc (const compilation *c, size_t count, size_t size) {
-  void *p = pw_arena_alloc (&c->s->arena, count * size);
-  if (p == NULL) compile_no_memory (c);
+static void *compile_alloc (const compilation *job, size_t count, size_t size) {
+  void *p = pw_arena_alloc (&job->s->arena, count * size);
+  if (p == NULL) compile_no_memory (job);
   return p;
 }
 
-static const char *compile_text (const compilation *c, const char *text) {
-  const char *copy = pw_arena_copy (&c->s->arena, text);
-  if (copy == NULL) compile_no_memory (c);
+static const char *compile_text (const compilation *job, const char *text) {
+  const char *copy = pw_arena_copy (&job->s->arena, text);
+  if (copy == NULL) compile_no_memory (job);
   return copy;
 }
 
 /* ---- Counting ---- */
 
-static int compile_names (compilation *c) {
-  const pw_model *m = c->m;
-  if (pw_names_open (&c->body, (size_t)m->bodies) != PW_OK || pw_names_open (&c->element, (size_t)m->elements) != PW_OK)
-    return compile_no_memory (c);
+static int compile_names (compilation *job) {
+  const pw_model *m = job->m;
+  if (pw_names_open (&job->body, (size_t)m->bodies) != PW_OK ||
+      pw_names_open (&job->element, (size_t)m->elements) != PW_OK)
+    return compile_no_memory (job);
   for (int i = 0; i < m->bodies; i++)
-    if (m->body[i].name && pw_names_add (&c->body, m->body[i].name, i) >= 0)
-      return pw_fail (c->error, PW_INPUT, "model %s: two bodies are named \"%s\"", m->name, m->body[i].name);
+    if (m->body[i].name && pw_names_add (&job->body, m->body[i].name, i) >= 0)
+      return pw_fail (job->error, PW_INPUT, "model %s: two bodies are named \"%s\"", m->name, m->body[i].name);
   for (int i = 0; i < m->elements; i++) {
     const char *name = pw_element_name (&m->element[i]);
     if (name == NULL) continue;
-    if (pw_names_find (&c->body, name) >= 0)
-      return pw_fail (c->error, PW_INPUT, "model %s: a body and a %s are both named \"%s\"", m->name,
+    if (pw_names_find (&job->body, name) >= 0)
+      return pw_fail (job->error, PW_INPUT, "model %s: a body and a %s are both named \"%s\"", m->name,
                       m->element[i].kind->name, name);
-    if (pw_names_add (&c->element, name, i) >= 0)
-      return pw_fail (c->error, PW_INPUT, "model %s: two elements are named \"%s\"", m->name, name);
+    if (pw_names_add (&job->element, name, i) >= 0)
+      return pw_fail (job->error, PW_INPUT, "model %s: two elements are named \"%s\"", m->name, name);
   }
   return PW_OK;
 }
@@ -78,65 +79,65 @@ static int compile_copies (const pw_model *m, const pw_kind *kind) {
 }
 
 /* Batches: holonomic types in order of appearance, then nonholonomic ones, then forces. */
-static int compile_types (compilation *c) {
+static int compile_types (compilation *job) {
   static const pw_level order[] = { PW_HOLONOMIC, PW_NONHOLONOMIC, PW_FORCE };
-  const pw_model *m = c->m;
+  const pw_model *m = job->m;
   size_t types = (size_t)m->elements + 1;
   double elements = 0;
-  c->kind = pw_arena_alloc (&c->scratch, types * sizeof *c->kind);
-  c->count = pw_arena_alloc (&c->scratch, types * sizeof *c->count);
-  c->batch_of = pw_arena_alloc (&c->scratch, types * sizeof *c->batch_of);
-  if (c->kind == NULL || c->count == NULL || c->batch_of == NULL) return compile_no_memory (c);
+  job->kind = pw_arena_alloc (&job->scratch, types * sizeof *job->kind);
+  job->count = pw_arena_alloc (&job->scratch, types * sizeof *job->count);
+  job->batch_of = pw_arena_alloc (&job->scratch, types * sizeof *job->batch_of);
+  if (job->kind == NULL || job->count == NULL || job->batch_of == NULL) return compile_no_memory (job);
   for (int l = 0; l < 3; l++)
     for (int i = 0; i < m->elements; i++) {
       const pw_kind *kind = m->element[i].kind;
       if (kind->level != order[l]) continue;
       int k = 0;
-      while (k < c->s->batches && c->kind[k] != kind) k++;
-      if (k == c->s->batches) c->kind[c->s->batches++] = kind;
+      while (k < job->s->batches && job->kind[k] != kind) k++;
+      if (k == job->s->batches) job->kind[job->s->batches++] = kind;
       int copies = compile_copies (m, kind);
       elements += copies;
-      if (elements > COMPILE_MOST) return compile_too_large (c);
-      c->count[k] += copies;
-      c->batch_of[i] = k;
-      if (c->bytes < kind->element + COMPILE_GUARD) c->bytes = kind->element + COMPILE_GUARD;
+      if (elements > COMPILE_MOST) return compile_too_large (job);
+      job->count[k] += copies;
+      job->batch_of[i] = k;
+      if (job->bytes < kind->element + COMPILE_GUARD) job->bytes = kind->element + COMPILE_GUARD;
     }
-  c->prepared = pw_arena_alloc (&c->scratch, c->bytes);
-  return c->prepared ? PW_OK : compile_no_memory (c);
+  job->prepared = pw_arena_alloc (&job->scratch, job->bytes);
+  return job->prepared ? PW_OK : compile_no_memory (job);
 }
 
-static int compile_count (const compilation *c) {
-  const pw_model *m = c->m;
-  pw_system *s = c->s;
+static int compile_count (const compilation *job) {
+  const pw_model *m = job->m;
+  pw_system *s = job->s;
   double coords = 3.0 * m->bodies, rows = 0;
-  if (m->bodies == 0) return pw_fail (c->error, PW_INPUT, "model %s has no body", m->name);
+  if (m->bodies == 0) return pw_fail (job->error, PW_INPUT, "model %s has no body", m->name);
   for (int k = 0; k < s->batches; k++) {
-    coords += (double)c->count[k] * c->kind[k]->internal;
-    rows += (double)c->count[k] * c->kind[k]->rows;
+    coords += (double)job->count[k] * job->kind[k]->internal;
+    rows += (double)job->count[k] * job->kind[k]->rows;
   }
-  if (coords > COMPILE_MOST || rows > COMPILE_MOST) return compile_too_large (c);
+  if (coords > COMPILE_MOST || rows > COMPILE_MOST) return compile_too_large (job);
   s->bodies = m->bodies;
   s->coords = (int)coords;
   s->rows = (int)rows;
   for (int k = 0; k < s->batches; k++) {
-    if (c->kind[k]->level == PW_HOLONOMIC) s->holonomic += c->count[k] * c->kind[k]->rows;
-    s->sources += c->count[k] * c->kind[k]->signals;
+    if (job->kind[k]->level == PW_HOLONOMIC) s->holonomic += job->count[k] * job->kind[k]->rows;
+    s->sources += job->count[k] * job->kind[k]->signals;
   }
   return PW_OK;
 }
 
-static int compile_arrays (const compilation *c) {
-  pw_system *s = c->s;
+static int compile_arrays (const compilation *job) {
+  pw_system *s = job->s;
   size_t coords = (size_t)s->coords, bodies = (size_t)s->bodies;
-  s->batch = compile_alloc (c, (size_t)s->batches, sizeof *s->batch);
-  s->source = compile_alloc (c, (size_t)s->sources, sizeof *s->source);
-  s->body_name = compile_alloc (c, bodies, sizeof *s->body_name);
-  s->mass = compile_alloc (c, coords, sizeof *s->mass);
-  s->metric = compile_alloc (c, coords, sizeof *s->metric);
-  s->constant = compile_alloc (c, coords + 3, sizeof *s->constant);
-  s->q0 = compile_alloc (c, coords, sizeof *s->q0);
-  s->v0 = compile_alloc (c, coords, sizeof *s->v0);
-  s->origin = compile_alloc (c, 2 * coords, 1);
+  s->batch = compile_alloc (job, (size_t)s->batches, sizeof *s->batch);
+  s->source = compile_alloc (job, (size_t)s->sources, sizeof *s->source);
+  s->body_name = compile_alloc (job, bodies, sizeof *s->body_name);
+  s->mass = compile_alloc (job, coords, sizeof *s->mass);
+  s->metric = compile_alloc (job, coords, sizeof *s->metric);
+  s->constant = compile_alloc (job, coords + 3, sizeof *s->constant);
+  s->q0 = compile_alloc (job, coords, sizeof *s->q0);
+  s->v0 = compile_alloc (job, coords, sizeof *s->v0);
+  s->origin = compile_alloc (job, 2 * coords, 1);
   int complete = s->batch && s->source && s->body_name && s->mass && s->metric && s->constant && s->q0 && s->v0;
   return complete && s->origin ? PW_OK : PW_RESOURCE;
 }
@@ -149,12 +150,12 @@ static unsigned char compile_origin (const pw_body *b, double value, int state, 
   return value != 0 ? PW_SPECIFIED : zero;
 }
 
-static int compile_bodies (const compilation *c) {
-  pw_system *s = c->s;
-  s->model = compile_text (c, c->m->name);
+static int compile_bodies (const compilation *job) {
+  pw_system *s = job->s;
+  s->model = compile_text (job, job->m->name);
   for (int i = 0; i < s->bodies; i++) {
-    const pw_body *b = &c->m->body[i];
-    s->body_name[i] = compile_text (c, b->name);
+    const pw_body *b = &job->m->body[i];
+    s->body_name[i] = compile_text (job, b->name);
     if (s->body_name[i] == NULL) return PW_RESOURCE;
     s->mass[3 * i] = s->mass[3 * i + 1] = b->mass;
     s->mass[3 * i + 2] = b->inertia;
@@ -169,22 +170,22 @@ static int compile_bodies (const compilation *c) {
 }
 
 /* Prepares an element in scratch memory, checks that `prepare` stays within its size, and copies it. */
-static int compile_prepare (const compilation *c, const pw_element *from, const pw_body *const *bodies,
+static int compile_prepare (const compilation *job, const pw_element *from, const pw_body *const *bodies,
                             pw_internal *internal, void *element) {
   const pw_kind *kind = from->kind;
   size_t size = kind->element;
   pw_error cause = { 0 };
-  memset (c->prepared, 0, size);
-  memset (c->prepared + size, COMPILE_MARK, COMPILE_GUARD);
-  if (kind->prepare (from->definition, bodies, c->prepared, internal, &cause) != PW_OK)
-    return pw_fail (c->error, PW_INPUT, "model %s: %s %s: %s", c->m->name, kind->name, pw_element_name (from),
+  memset (job->prepared, 0, size);
+  memset (job->prepared + size, COMPILE_MARK, COMPILE_GUARD);
+  if (kind->prepare (from->definition, bodies, job->prepared, internal, &cause) != PW_OK)
+    return pw_fail (job->error, PW_INPUT, "model %s: %s %s: %s", job->m->name, kind->name, pw_element_name (from),
                     cause.text);
   for (size_t i = 0; i < COMPILE_GUARD; i++)
-    if (c->prepared[size + i] != COMPILE_MARK)
-      return pw_fail (c->error, PW_INPUT,
-                      "model %s: element type %s: prepare writes more than the %zu bytes of .element", c->m->name,
+    if (job->prepared[size + i] != COMPILE_MARK)
+      return pw_fail (job->error, PW_INPUT,
+                      "model %s: element type %s: prepare writes more than the %zu bytes of .element", job->m->name,
                       kind->name, size);
-  memcpy (element, c->prepared, size);
+  memcpy (element, job->prepared, size);
   return PW_OK;
 }
 
@@ -197,23 +198,23 @@ typedef struct {
 
 /* Stores element e of a batch: bodies, columns, prepared element, internal coordinates.  body: the one an each_body
  * type acts on, or -1. */
-static int compile_element (const compilation *c, const pw_element_batch *k, const batch_arrays *a, int e,
+static int compile_element (const compilation *job, const pw_element_batch *k, const batch_arrays *a, int e,
                             const pw_element *from, int body) {
   static const pw_body ground = { .name = "ground" };
   const pw_kind *kind = k->kind;
-  pw_system *s = c->s;
+  pw_system *s = job->s;
   const pw_body *bodies[PW_MAX_BODIES];
   for (int n = 0; n < kind->bodies; n++) {
-    int index = body >= 0
-                    ? body
-                    : pw_names_find (&c->body, *(const char *const *)pw_field_at (kind, from->definition, PW_BODY, n));
-    bodies[n] = index < 0 ? &ground : &c->m->body[index];
+    int index =
+        body >= 0 ? body
+                  : pw_names_find (&job->body, *(const char *const *)pw_field_at (kind, from->definition, PW_BODY, n));
+    bodies[n] = index < 0 ? &ground : &job->m->body[index];
     a->body[e * kind->bodies + n] = index < 0 ? s->bodies : index;
     a->column[e * kind->bodies + n] = index < 0 ? s->coords : 3 * index;
   }
   if (kind->prepare == NULL) return PW_OK;
   pw_internal internal[PW_MAX_INTERNAL] = { { 0 } };
-  if (compile_prepare (c, from, bodies, internal, a->element + (size_t)e * kind->element) != PW_OK) return PW_INPUT;
+  if (compile_prepare (job, from, bodies, internal, a->element + (size_t)e * kind->element) != PW_OK) return PW_INPUT;
   for (int n = 0, j = k->internal + e * kind->internal; n < kind->internal; n++, j++) {
     s->mass[j] = internal[n].mass;
     s->q0[j] = internal[n].start;
@@ -225,42 +226,42 @@ static int compile_element (const compilation *c, const pw_element_batch *k, con
 }
 
 /* Stores the elements of batch i, those of an each_body type once for every body with mass. */
-static int compile_batch (const compilation *c, int i, const batch_arrays *a) {
-  const pw_element_batch *k = &c->s->batch[i];
+static int compile_batch (const compilation *job, int i, const batch_arrays *a) {
+  const pw_element_batch *k = &job->s->batch[i];
   int e = 0;
-  for (int n = 0; n < c->m->elements; n++) {
-    if (c->batch_of[n] != i) continue;
-    const pw_element *from = &c->m->element[n];
-    const char *name = compile_text (c, pw_element_name (from));
+  for (int n = 0; n < job->m->elements; n++) {
+    if (job->batch_of[n] != i) continue;
+    const pw_element *from = &job->m->element[n];
+    const char *name = compile_text (job, pw_element_name (from));
     if (name == NULL) return PW_RESOURCE;
-    for (int b = k->kind->each_body ? 0 : -1; b < (k->kind->each_body ? c->s->bodies : 0); b++) {
-      if (b >= 0 && !(c->m->body[b].mass > 0)) continue;
+    for (int b = k->kind->each_body ? 0 : -1; b < (k->kind->each_body ? job->s->bodies : 0); b++) {
+      if (b >= 0 && !(job->m->body[b].mass > 0)) continue;
       a->name[e] = name;
-      if (compile_element (c, k, a, e++, from, b) != PW_OK) return PW_INPUT;
+      if (compile_element (job, k, a, e++, from, b) != PW_OK) return PW_INPUT;
     }
   }
   return PW_OK;
 }
 
-static int compile_batches (const compilation *c) {
-  pw_system *s = c->s;
+static int compile_batches (const compilation *job) {
+  pw_system *s = job->s;
   int row = 0, internal = 3 * s->bodies;
   pw_source *source = s->source;
   for (int i = 0; i < s->batches; i++) {
-    const pw_kind *kind = c->kind[i];
-    size_t n = (size_t)c->count[i], bodies = n * (size_t)kind->bodies;
-    batch_arrays a = { compile_alloc (c, n, kind->element), compile_alloc (c, bodies, sizeof (int)),
-                       compile_alloc (c, bodies, sizeof (int)), compile_alloc (c, n, sizeof (char *)) };
+    const pw_kind *kind = job->kind[i];
+    size_t n = (size_t)job->count[i], bodies = n * (size_t)kind->bodies;
+    batch_arrays a = { compile_alloc (job, n, kind->element), compile_alloc (job, bodies, sizeof (int)),
+                       compile_alloc (job, bodies, sizeof (int)), compile_alloc (job, n, sizeof (char *)) };
     if (!a.element || !a.body || !a.column || !a.name) return PW_RESOURCE;
     pw_element_batch *k = &s->batch[i];
     *k = (pw_element_batch){
       .kind = kind, .row = row, .internal = internal, .column = a.column, .name = a.name, .source = source
     };
-    k->b = (pw_batch){ c->count[i], 3 * kind->bodies + kind->internal, .element = a.element, .body = a.body };
-    row += c->count[i] * kind->rows;
-    internal += c->count[i] * kind->internal;
-    source += c->count[i] * kind->signals;
-    if (compile_batch (c, i, &a) != PW_OK) return PW_INPUT;
+    k->b = (pw_batch){ job->count[i], 3 * kind->bodies + kind->internal, .element = a.element, .body = a.body };
+    row += job->count[i] * kind->rows;
+    internal += job->count[i] * kind->internal;
+    source += job->count[i] * kind->signals;
+    if (compile_batch (job, i, &a) != PW_OK) return PW_INPUT;
   }
   return PW_OK;
 }
@@ -268,10 +269,10 @@ static int compile_batches (const compilation *c) {
 /* ---- Signals ---- */
 
 /* Copies the points of a table and computes its spline. */
-static int compile_table (const compilation *c, pw_source *source) {
+static int compile_table (const compilation *job, pw_source *source) {
   pw_signal *s = &source->signal;
   size_t n = (size_t)s->table.count;
-  double *t = compile_alloc (c, 4 * n, sizeof *t), *value = t + n;
+  double *t = compile_alloc (job, 4 * n, sizeof *t), *value = t + n;
   if (t == NULL) return PW_RESOURCE;
   memcpy (t, s->table.t, n * sizeof *t);
   for (size_t i = 0; i < n; i++) value[i] = pw_table_value (s, (int)i);
@@ -284,48 +285,49 @@ static int compile_table (const compilation *c, pw_source *source) {
 }
 
 /* Converts the names of states a function reads to indices. */
-static int compile_reads (const compilation *c, pw_source *source, const char *element) {
+static int compile_reads (const compilation *job, pw_source *source, const char *element) {
   const char *const *reads = source->signal.function.reads;
   int count = 0;
   while (reads && reads[count]) count++;
-  int *state = compile_alloc (c, (size_t)count, sizeof *state);
+  int *state = compile_alloc (job, (size_t)count, sizeof *state);
   if (state == NULL) return PW_RESOURCE;
   for (int i = 0; i < count; i++) {
     pw_error cause = { 0 };
-    state[i] = pw_system_find_state (c->s, reads[i], &cause);
+    state[i] = pw_system_find_state (job->s, reads[i], &cause);
     if (state[i] < 0)
-      return pw_fail (c->error, PW_INPUT, "model %s: element %s reads a state: %s", c->m->name, element, cause.text);
+      return pw_fail (job->error, PW_INPUT, "model %s: element %s reads a state: %s", job->m->name, element,
+                      cause.text);
   }
   source->state = state;
   source->reads = count;
-  c->s->reads += count;
-  c->s->state_dependent += count > 0;
+  job->s->reads += count;
+  job->s->state_dependent += count > 0;
   return PW_OK;
 }
 
-static int compile_source (const compilation *c, pw_source *source, const pw_signal *signal, const char *element) {
+static int compile_source (const compilation *job, pw_source *source, const pw_signal *signal, const char *element) {
   void *context =
       signal->type == PW_FUNCTION && signal->function.open ? signal->function.open (signal->function.context) : NULL;
-  if (signal->type == PW_FUNCTION && signal->function.open && context == NULL) return compile_no_memory (c);
+  if (signal->type == PW_FUNCTION && signal->function.open && context == NULL) return compile_no_memory (job);
   source->signal = *signal;
   if (context) source->signal.function.context = context;
-  if (signal->type == PW_TABLE) return compile_table (c, source);
-  return signal->type == PW_FUNCTION ? compile_reads (c, source, element) : PW_OK;
+  if (signal->type == PW_TABLE) return compile_table (job, source);
+  return signal->type == PW_FUNCTION ? compile_reads (job, source, element) : PW_OK;
 }
 
 /* Runs after all elements are stored, because signals may read their internal coordinates. */
-static int compile_signals (const compilation *c) {
-  int *next = c->count; /* reused: counts the elements visited in each batch */
-  memset (next, 0, (size_t)c->s->batches * sizeof *next);
-  for (int n = 0; n < c->m->elements; n++) {
-    const pw_element *from = &c->m->element[n];
-    const pw_element_batch *k = &c->s->batch[c->batch_of[n]];
-    for (int copy = compile_copies (c->m, k->kind); copy > 0; copy--) {
-      int e = next[c->batch_of[n]]++;
+static int compile_signals (const compilation *job) {
+  int *next = job->count; /* reused: counts the elements visited in each batch */
+  memset (next, 0, (size_t)job->s->batches * sizeof *next);
+  for (int n = 0; n < job->m->elements; n++) {
+    const pw_element *from = &job->m->element[n];
+    const pw_element_batch *k = &job->s->batch[job->batch_of[n]];
+    for (int copy = compile_copies (job->m, k->kind); copy > 0; copy--) {
+      int e = next[job->batch_of[n]]++;
       for (int u = 0; u < k->kind->signals; u++) {
         pw_source *source = &k->source[e * k->kind->signals + u];
         source->of_force = pw_kind_signals_force (k->kind);
-        if (compile_source (c, source, pw_field_at (k->kind, from->definition, PW_SIGNAL, u), k->name[e]) != PW_OK)
+        if (compile_source (job, source, pw_field_at (k->kind, from->definition, PW_SIGNAL, u), k->name[e]) != PW_OK)
           return PW_INPUT;
       }
     }
@@ -336,21 +338,21 @@ static int compile_signals (const compilation *c) {
 /* ---- Initial values, scales ---- */
 
 /* Values of pw_model_set_initial. */
-static int compile_initial (const compilation *c) {
-  pw_system *s = c->s;
-  for (int i = 0; i < c->m->initials; i++) {
-    int state = pw_system_find_state (s, c->m->initial[i].state, c->error);
+static int compile_initial (const compilation *job) {
+  pw_system *s = job->s;
+  for (int i = 0; i < job->m->initials; i++) {
+    int state = pw_system_find_state (s, job->m->initial[i].state, job->error);
     if (state < 0) return PW_INPUT;
     s->origin[state] |= PW_GIVEN;
-    *(state < s->coords ? s->q0 + state : s->v0 + state - s->coords) = c->m->initial[i].value;
+    *(state < s->coords ? s->q0 + state : s->v0 + state - s->coords) = job->m->initial[i].value;
   }
   return PW_OK;
 }
 
-/* The largest distance of an element's point from the origin of its body; without any, the radius of gyration of the first
- * body that has one, or 1 m. */
-static double compile_length (const compilation *c) {
-  const pw_model *m = c->m;
+/* The largest distance of an element's point from the origin of its body; without any, the radius of gyration of the
+ * first body that has one, or 1 m. */
+static double compile_length (const compilation *job) {
+  const pw_model *m = job->m;
   double L = 0;
   for (int i = 0; i < m->elements; i++) {
     const pw_element *e = &m->element[i];
@@ -379,11 +381,11 @@ static void compile_metric (pw_system *s) {
 }
 
 /* Counts the batches that have a property, lists the ledger's entries, and evaluates the constant forces. */
-static int compile_totals (const compilation *c) {
-  pw_system *s = c->s;
+static int compile_totals (const compilation *job) {
+  pw_system *s = job->s;
   int constant = 0;
   s->entries = pw_ledger_list (s, NULL);
-  s->entry = compile_alloc (c, (size_t)s->entries, sizeof *s->entry);
+  s->entry = compile_alloc (job, (size_t)s->entries, sizeof *s->entry);
   if (s->entry == NULL) return PW_RESOURCE;
   pw_ledger_list (s, s->entry);
   for (int i = 0; i < s->batches; i++) {
@@ -395,46 +397,46 @@ static int compile_totals (const compilation *c) {
     s->saturates |= kind->saturation != NULL;
   }
   if (!constant) return PW_OK;
-  pw_workspace *w = pw_workspace_new (s, c->error);
+  pw_workspace *w = pw_workspace_new (s, job->error);
   if (w == NULL) return PW_RESOURCE;
   pw_evaluate_constant (w, s->constant);
   pw_workspace_free (w);
   return PW_OK;
 }
 
-/* ---- */
+/* ---- All steps ---- */
 
-static int compile_all (compilation *c) {
-  int status = compile_names (c);
-  if (status == PW_OK) status = pw_check_model (c->m, &c->body, c->error);
-  if (status == PW_OK) status = compile_types (c);
-  if (status == PW_OK) status = compile_count (c);
-  if (status == PW_OK) status = compile_arrays (c);
-  if (status == PW_OK) status = compile_bodies (c);
-  if (status == PW_OK) status = compile_batches (c);
-  if (status == PW_OK) status = compile_signals (c);
-  if (status == PW_OK) status = compile_initial (c);
+static int compile_all (compilation *job) {
+  int status = compile_names (job);
+  if (status == PW_OK) status = pw_check_model (job->m, &job->body, job->error);
+  if (status == PW_OK) status = compile_types (job);
+  if (status == PW_OK) status = compile_count (job);
+  if (status == PW_OK) status = compile_arrays (job);
+  if (status == PW_OK) status = compile_bodies (job);
+  if (status == PW_OK) status = compile_batches (job);
+  if (status == PW_OK) status = compile_signals (job);
+  if (status == PW_OK) status = compile_initial (job);
   if (status != PW_OK) return status;
-  c->s->scale = (pw_scale){ compile_length (c), 1 };
-  compile_metric (c->s);
-  return compile_totals (c);
+  job->s->scale = (pw_scale){ compile_length (job), 1 };
+  compile_metric (job->s);
+  return compile_totals (job);
 }
 
 pw_system *pw_system_compile (const pw_model *m, pw_error *error) {
   if (pw_require (m, "a model", error) != PW_OK) return NULL;
-  compilation c = { .m = m, .s = calloc (1, sizeof *c.s), .error = error };
+  compilation job = { .m = m, .s = calloc (1, sizeof *job.s), .error = error };
   int status = PW_OK;
   if (!m->built)
     status = pw_fail (error, PW_INPUT, "model %s: pw_system_compile before pw_model_build", m->name);
   else if (m->error.status != PW_OK) /* from something added after pw_model_build */
     status = pw_fail (error, m->error.status, "%s", m->error.text);
   else
-    status = c.s ? compile_all (&c) : compile_no_memory (&c);
-  pw_names_close (&c.body);
-  pw_names_close (&c.element);
-  pw_arena_free (&c.scratch);
-  if (status == PW_OK) return c.s;
-  pw_system_free (c.s);
+    status = job.s ? compile_all (&job) : compile_no_memory (&job);
+  pw_names_close (&job.body);
+  pw_names_close (&job.element);
+  pw_arena_free (&job.scratch);
+  if (status == PW_OK) return job.s;
+  pw_system_free (job.s);
   return NULL;
 }
 

@@ -10,20 +10,20 @@ int pw_system_elements (const pw_system *s) {
 }
 
 pw_element_info pw_system_element (const pw_system *s, int element) {
-  pw_element_info x = { .contact = 0 };
+  pw_element_info info = { .contact = 0 };
   const pw_element_batch *k = s->batch;
   for (; element >= k->b.count; element -= k++->b.count) {
-    x.contact += k->kind->contact ? k->b.count : 0;
-    x.force += 3 * k->b.count * k->kind->bodies;
+    info.contact += k->kind->contact ? k->b.count : 0;
+    info.force += 3 * k->b.count * k->kind->bodies;
   }
-  x.kind = k->kind;
-  x.name = k->name[element];
-  x.body = k->b.body + element * k->kind->bodies;
-  x.row = k->row + element * k->kind->rows;
-  x.coordinate = k->internal + element * k->kind->internal;
-  x.contact = k->kind->contact ? x.contact + element : -1;
-  x.force += 3 * element * k->kind->bodies;
-  return x;
+  info.kind = k->kind;
+  info.name = k->name[element];
+  info.body = k->b.body + element * k->kind->bodies;
+  info.row = k->row + element * k->kind->rows;
+  info.coordinate = k->internal + element * k->kind->internal;
+  info.contact = k->kind->contact ? info.contact + element : -1;
+  info.force += 3 * element * k->kind->bodies;
+  return info;
 }
 
 int pw_system_row_element (const pw_system *s, int row) {

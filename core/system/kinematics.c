@@ -48,11 +48,12 @@ static int kinematics_copy_states (const pw_workspace *w, const pw_source *sourc
  * time. */
 PW_INLINE int kinematics_evaluate_signals (pw_workspace *w, int state_dependent, double t, const double *q,
                                            const double *v) {
-  for (pw_source *x = w->source, *end = x + w->s->sources; x < end; x++) {
-    if ((x->reads > 0) != state_dependent || (w->hold && x->of_force)) continue;
-    if (state_dependent && kinematics_copy_states (w, x, q, v) == 0) continue;
-    if (pw_signal_eval (x, t, !x->of_force, x->u) == 0) continue;
-    w->failed = x;
+  for (pw_source *source = w->source, *end = source + w->s->sources; source < end; source++) {
+    if ((source->reads > 0) != state_dependent || (w->hold && source->of_force)) continue;
+    if (state_dependent && kinematics_copy_states (w, source, q, v) == 0) continue;
+    if (pw_signal_eval (source, t, source->of_force ? PW_SIGNAL_VALUE : PW_SIGNAL_DERIVATIVES, source->u) == 0)
+      continue;
+    w->failed = source;
     return PW_METHOD;
   }
   return PW_OK;
@@ -91,11 +92,12 @@ void pw_hold_signals (pw_workspace *w, int hold) {
 
 double pw_next_breakpoint (pw_workspace *w, int knots, double t) {
   double next = INFINITY;
-  for (const pw_source *x = w->source, *end = x + w->s->sources; x < end; x++) {
-    double breakpoint = pw_signal_breakpoint (&x->signal, knots && !x->of_force, t);
+  for (const pw_source *source = w->source, *end = source + w->s->sources; source < end; source++) {
+    double breakpoint =
+        pw_signal_breakpoint (&source->signal, knots && !source->of_force ? PW_JUMPS_AND_KINKS : PW_JUMPS, t);
     if (breakpoint < next) next = breakpoint;
     if (breakpoint > t) continue;
-    w->failed = x;
+    w->failed = source;
     return NAN;
   }
   return next;

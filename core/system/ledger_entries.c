@@ -28,18 +28,14 @@ int pw_ledger_list (const pw_system *s, pw_entry *entry) {
   return count;
 }
 
-int pw_system_ledger_entries (const pw_system *s) {
-  return s->entries;
-}
-
 char *pw_system_ledger_name (const pw_system *s, int entry, char *buffer, size_t size) {
-  const pw_entry *x = &s->entry[entry];
-  const pw_element_batch *k = &s->batch[x->batch];
-  const char *what = x->type == PW_WORK ? "work" : "loss";
+  const pw_entry *listed = &s->entry[entry];
+  const pw_element_batch *k = &s->batch[listed->batch];
+  const char *what = listed->type == PW_WORK ? "work" : "loss";
   if (k->kind->each_body)
-    snprintf (buffer, size, "%s.%s.%s", k->name[x->element], s->body_name[k->b.body[x->element]], what);
+    snprintf (buffer, size, "%s.%s.%s", k->name[listed->element], s->body_name[k->b.body[listed->element]], what);
   else
-    snprintf (buffer, size, "%s.%s", k->name[x->element], what);
+    snprintf (buffer, size, "%s.%s", k->name[listed->element], what);
   return buffer;
 }
 
@@ -50,14 +46,16 @@ void pw_evaluate_ledger (pw_workspace *w, const double *lambda, double *rate) {
   for (int i = 0; i < w->s->entries; i++) {
     const pw_entry *entry = &w->s->entry[i];
     pw_element_batch *k = &w->batch[entry->batch];
-    int drive = k->kind->rows > 0 && entry->type == PW_WORK && k->kind->power == NULL;
+    int by_eta = k->kind->rows > 0 && entry->type == PW_WORK && k->kind->power == NULL; /* see the end of the loop */
     if (k != last || (int)entry->type != type) {
       k->b.lambda = lambda + k->row;
-      (drive ? k->kind->eta : entry->type == PW_WORK ? k->kind->power : k->kind->loss) (&k->b, drive ? eta : k->block);
+      (by_eta                   ? k->kind->eta
+       : entry->type == PW_WORK ? k->kind->power
+                                : k->kind->loss) (&k->b, by_eta ? eta : k->block);
       last = k;
       type = (int)entry->type;
     }
-    if (!drive) {
+    if (!by_eta) {
       rate[i] = k->block[entry->element];
       continue;
     }

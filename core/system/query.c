@@ -8,51 +8,31 @@
 static const char *const query_names[] = { "x", "y", "phi", "vx", "vy", "omega" };
 static const char *const query_units[] = { "m", "m", "rad", "m/s", "m/s", "rad/s" };
 
-int pw_system_bodies (const pw_system *s) {
-  return s->bodies;
-}
-
-int pw_system_coordinates (const pw_system *s) {
-  return s->coords;
-}
-
-int pw_system_rows (const pw_system *s) {
-  return s->rows;
-}
-
-int pw_system_holonomic (const pw_system *s) {
-  return s->holonomic;
-}
-
-const char *pw_system_name (const pw_system *s) {
-  return s->model;
-}
+#define MEMBER(type, function, member) \
+  type function (const pw_system *s) { \
+    return s->member;                  \
+  }
+MEMBER (int, pw_system_bodies, bodies)
+MEMBER (int, pw_system_coordinates, coords)
+MEMBER (int, pw_system_rows, rows)
+MEMBER (int, pw_system_holonomic, holonomic)
+MEMBER (int, pw_system_signals, sources)
+MEMBER (int, pw_system_ledger_entries, entries)
+MEMBER (const char *, pw_system_name, model)
+MEMBER (const double *, pw_system_mass, mass)
+MEMBER (double, pw_system_length, scale.length)
+MEMBER (const double *, pw_system_initial_q, q0)
+MEMBER (const double *, pw_system_initial_v, v0)
 
 const char *pw_system_body_name (const pw_system *s, int body) {
   return s->body_name[body];
 }
 
-const double *pw_system_mass (const pw_system *s) {
-  return s->mass;
-}
-
-double pw_system_length (const pw_system *s) {
-  return s->scale.length;
-}
-
-const double *pw_system_initial_q (const pw_system *s) {
-  return s->q0;
-}
-
-const double *pw_system_initial_v (const pw_system *s) {
-  return s->v0;
-}
-
 int pw_system_jumps (const pw_system *s, double t) {
   double near = 8 * DBL_EPSILON * fabs (t);
-  for (const pw_source *x = s->source, *end = x + s->sources; x < end; x++)
-    if (!x->of_force || x->signal.type == PW_PULSE || x->signal.type == PW_FUNCTION)
-      if (pw_signal_breakpoint (&x->signal, 0, t - near) <= t + near) return 1;
+  for (const pw_source *source = s->source, *end = source + s->sources; source < end; source++)
+    if (!source->of_force || source->signal.type == PW_PULSE || source->signal.type == PW_FUNCTION)
+      if (pw_signal_breakpoint (&source->signal, PW_JUMPS, t - near) <= t + near) return 1;
   return 0;
 }
 
@@ -103,26 +83,36 @@ static int query_body_state (const pw_system *s, const char *name, pw_nearest *n
   while (b < s->bodies && (strncmp (s->body_name[b], name, (size_t)(dot - name)) != 0 || s->body_name[b][dot - name]))
     b++;
   if (b == s->bodies) return -1;
-  pw_nearest what = { .sought = dot + 1 };
+  pw_nearest state = { .sought = dot + 1 };
   for (int i = 0; i < 6; i++) {
     if (strcmp (dot + 1, query_names[i]) == 0) return i < 3 ? 3 * b + i : s->coords + 3 * b + i - 3;
-    pw_nearest_try (&what, query_names[i]);
+    pw_nearest_try (&state, query_names[i]);
   }
-  what.sought = name;
-  *near = what;
-  snprintf (near->best, sizeof near->best, "%s.%.10s", s->body_name[b], what.best);
+  state.sought = name;
+  *near = state;
+  snprintf (near->best, sizeof near->best, "%s.%.10s", s->body_name[b], state.best);
   return -1;
 }
 
 typedef char *query_name (const pw_system *s, int i, char *buffer, size_t size);
 
 /* Fails with the nearest of `count` names, unless it is known already. */
-static int query_missing (const pw_system *s, const char *what, int count, query_name *name, pw_nearest *near,
+static int query_missing (const pw_system *s, const char *what, int count, query_name *name_of, pw_nearest *near,
                           pw_error *error) {
   char text[120];
   for (int i = 0, search = *near->best == 0; search && i < count; i++)
-    pw_nearest_try (near, name (s, i, text, sizeof text));
+    pw_nearest_try (near, name_of (s, i, text, sizeof text));
   return pw_fail (error, PW_INPUT, "model %s has no %s \"%s\"%s", s->model, what, near->sought, pw_nearest_text (near));
+}
+
+/* The index of one of `count` names. */
+static int query_find (const pw_system *s, const char *what, int count, query_name *name_of, const char *name,
+                       pw_error *error) {
+  char text[120];
+  if (name == NULL) return pw_fail (error, PW_INPUT, "model %s: the name of a %s is missing", s->model, what);
+  for (int i = 0; i < count; i++)
+    if (strcmp (name_of (s, i, text, sizeof text), name) == 0) return i;
+  return query_missing (s, what, count, name_of, &(pw_nearest){ .sought = name }, error);
 }
 
 int pw_system_find_state (const pw_system *s, const char *name, pw_error *error) {
@@ -163,11 +153,7 @@ const char *pw_system_reaction_unit (const pw_system *s, int row) {
 }
 
 int pw_system_find_reaction (const pw_system *s, const char *name, pw_error *error) {
-  if (name == NULL) return pw_fail (error, PW_INPUT, "model %s: the name of a reaction is missing", s->model);
-  char text[120];
-  for (int i = 0; i < s->rows; i++)
-    if (strcmp (pw_system_reaction_name (s, i, text, sizeof text), name) == 0) return i;
-  return query_missing (s, "reaction", s->rows, pw_system_reaction_name, &(pw_nearest){ .sought = name }, error);
+  return query_find (s, "reaction", s->rows, pw_system_reaction_name, name, error);
 }
 
 char *pw_system_row_name (const pw_system *s, int row, char *buffer, size_t size) {
@@ -195,10 +181,6 @@ static const pw_element_batch *query_signal (const pw_system *s, int *n) {
   return k;
 }
 
-int pw_system_signals (const pw_system *s) {
-  return s->sources;
-}
-
 int pw_system_signal_forced (const pw_system *s, int signal) {
   return pw_kind_signals_force (query_signal (s, &signal)->kind);
 }
@@ -220,30 +202,22 @@ const char *pw_system_signal_unit (const pw_system *s, int signal) {
   return f->name && f->unit ? f->unit : "";
 }
 
-/* 1 if the signal has this name, or is the only one of the element of this name. */
-static int query_is_signal (const pw_system *s, int signal, const char *name) {
-  char text[120];
-  if (strcmp (pw_system_signal_name (s, signal, text, sizeof text), name) == 0) return 1;
-  const pw_element_batch *k = query_signal (s, &signal);
-  return k->kind->signals == 1 && strcmp (k->name[signal], name) == 0;
-}
-
 int pw_system_find_signal (const pw_system *s, const char *name, pw_error *error) {
-  if (name == NULL) return pw_fail (error, PW_INPUT, "model %s: the name of a signal is missing", s->model);
-  for (int i = 0; i < s->sources; i++)
-    if (query_is_signal (s, i, name)) return i;
-  return query_missing (s, "signal", s->sources, pw_system_signal_name, &(pw_nearest){ .sought = name }, error);
+  for (const pw_element_batch *k = s->batch; name && k < s->batch + s->batches; k++)
+    for (int e = 0; k->kind->signals == 1 && e < k->b.count; e++)
+      if (strcmp (k->name[e], name) == 0) return (int)(k->source - s->source) + e;
+  return query_find (s, "signal", s->sources, pw_system_signal_name, name, error);
 }
 
 char *pw_failed_signal (const pw_workspace *w, char *buffer, size_t size) {
   buffer[0] = 0;
-  for (const pw_element_batch *k = w->batch; k < w->batch + w->s->batches; k++) {
-    int signals = k->kind->signals;
-    if (w->failed == NULL || w->failed < k->source || w->failed >= k->source + k->b.count * signals) continue;
-    int i = (int)(w->failed - k->source), n = i % signals;
-    const pw_field *f = query_signal_field (k->kind, &n);
-    snprintf (buffer, size, "%s %.60s: %s", k->kind->name, k->name[i / signals], f->name ? f->name : "signal");
-  }
+  if (w->failed == NULL) return buffer;
+  int signal = (int)(w->failed - w->source);
+  const pw_element_batch *k = query_signal (w->s, &signal);
+  int n = signal % k->kind->signals;
+  const pw_field *f = query_signal_field (k->kind, &n);
+  snprintf (buffer, size, "%s %.60s: %s", k->kind->name, k->name[signal / k->kind->signals],
+            f->name ? f->name : "signal");
   return buffer;
 }
 

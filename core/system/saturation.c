@@ -17,24 +17,27 @@ static int saturation_state (const pw_system *s, const pw_element_batch *k, int 
   return j >= s->coords ? -1 : c < cols ? j : s->coords + j;
 }
 
+/* Loops over the entries i of the blocks of saturating batches *k. */
+#define EACH_SATURATION(k, i, w)                                                    \
+  for (pw_element_batch **k = (w)->force, **end = k + (w)->s->forces; k < end; k++) \
+    for (int i = 0, n = (*k)->kind->saturation ? saturation_fill (*k) : 0; i < n; i++)
+
 void pw_evaluate_saturation (pw_workspace *w, double *least) {
   for (int j = 0; j < 2 * w->s->coords; j++) least[j] = INFINITY;
-  for (pw_element_batch **k = w->force, **end = k + w->s->forces; k < end; k++)
-    for (int i = 0, n = (*k)->kind->saturation ? saturation_fill (*k) : 0; i < n; i++) {
-      int state = saturation_state (w->s, *k, i);
-      if (state >= 0) least[state] = fmin (least[state], (*k)->block[i]);
-    }
+  EACH_SATURATION (k, i, w) {
+    int state = saturation_state (w->s, *k, i);
+    if (state >= 0) least[state] = fmin (least[state], (*k)->block[i]);
+  }
 }
 
 int pw_find_saturation (pw_workspace *w, double *least, char *element, size_t size) {
   int found = -1;
   *least = INFINITY;
-  for (pw_element_batch **k = w->force, **end = k + w->s->forces; k < end; k++)
-    for (int i = 0, n = (*k)->kind->saturation ? saturation_fill (*k) : 0; i < n; i++) {
-      int state = saturation_state (w->s, *k, i);
-      if (state < w->s->coords || !((*k)->block[i] < *least)) continue;
-      *least = (*k)->block[i], found = state;
-      snprintf (element, size, "%s %s", (*k)->kind->name, (*k)->name[i / (2 * (*k)->b.cols)]);
-    }
+  EACH_SATURATION (k, i, w) {
+    int state = saturation_state (w->s, *k, i);
+    if (state < w->s->coords || !((*k)->block[i] < *least)) continue;
+    *least = (*k)->block[i], found = state;
+    snprintf (element, size, "%s %s", (*k)->kind->name, (*k)->name[i / (2 * (*k)->b.cols)]);
+  }
   return found;
 }

@@ -1,8 +1,8 @@
 /* The compiled system and the workspace of a run, for core/ and solvers/, not for models.
  *
- * Index names: body b, batch k, element e of a batch, local column c of an element, global
- * coordinate j, constraint equation (row) i.  Arrays that elements add to have three additional entries after the
- * coordinates: those of the ground, which are never read. */
+ * Names: system s, workspace w; body b, batch k, element e of a batch, local column c of an element, global coordinate
+ * j, constraint equation (row) i.  Arrays that elements add to have three additional entries after the coordinates:
+ * those of the ground, which are never read. */
 #ifndef PW_SYSTEM_H
 #define PW_SYSTEM_H
 
@@ -61,7 +61,7 @@ struct pw_workspace {
   const pw_system *s;
   pw_element_batch *batch;         /* batches: copies of the system's, with arrays of this workspace */
   pw_element_batch **force;        /* those with a force that is not constant */
-  pw_source *source;               /* sources */
+  pw_source *source;               /* sources, in the order of the system's */
   double *u, *J;                   /* those of all batches: sources x 3; entries of J, element by element */
   pw_configuration *configuration; /* bodies + 1; the last is the ground */
   double *scratch;                 /* rows x 3 + coords + 3 */
@@ -154,8 +154,8 @@ typedef struct {
 /* Only equations with enforced[i] != 0, unless enforced is NULL. */
 void pw_evaluate_residuals (pw_workspace *w, const unsigned char *enforced, pw_residuals *r);
 void pw_evaluate_position_residual (pw_workspace *w, const unsigned char *enforced, pw_residuals *r); /* g = 0 only */
-void pw_evaluate_velocity_residual (pw_workspace *w, const unsigned char *enforced,
-                                    pw_residuals *r); /* J v = eta only */
+/* J v = eta only */
+void pw_evaluate_velocity_residual (pw_workspace *w, const unsigned char *enforced, pw_residuals *r);
 /* Sets the position part of r from given g and sizes. */
 void pw_worst_position (const pw_system *s, const double *g, const double *size, const unsigned char *enforced,
                         pw_residuals *r);

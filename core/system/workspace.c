@@ -3,6 +3,7 @@
 #include <stdlib.h>
 #include "system.h"
 
+/* The number of entries of J of all elements, zeros included. */
 static size_t workspace_entries (const pw_system *s) {
   size_t entries = 0;
   for (int i = 0; i < s->batches; i++)
@@ -11,14 +12,14 @@ static size_t workspace_entries (const pw_system *s) {
 }
 
 /* Copies a batch of the system, with arrays of the workspace. */
-static void workspace_batch (pw_layout *l, const pw_element_batch *from, const pw_workspace *w, double *u, double *J,
-                             pw_element_batch *k) {
+static void workspace_batch (pw_layout *layout, const pw_element_batch *from, const pw_workspace *w, double *u,
+                             double *J, pw_element_batch *k) {
   const pw_kind *kind = from->kind;
   size_t n = (size_t)from->b.count, cols = (size_t)from->b.cols;
   size_t block = kind->saturation ? 2 * cols : cols > 3 ? cols : 3; /* saturation; force; contact */
   int scratch = kind->force || kind->energy || kind->power || kind->loss || kind->contact;
-  double *space = pw_layout_alloc (l, scratch ? n * block : 0, sizeof *space);
-  if (l->base == NULL) return;
+  double *space = pw_layout_alloc (layout, scratch ? n * block : 0, sizeof *space);
+  if (layout->base == NULL) return;
   *k = *from;
   k->J = J, k->block = space, k->b.u = k->u = u;
   k->b.configuration = w->configuration;
@@ -26,26 +27,26 @@ static void workspace_batch (pw_layout *l, const pw_element_batch *from, const p
   k->source = w->source + (from->source - w->s->source);
 }
 
-static void workspace_layout (pw_layout *l, pw_workspace *w) {
+static void workspace_layout (pw_layout *layout, pw_workspace *w) {
   const pw_system *s = w->s;
-  pw_layout_alloc (l, 1, sizeof *w);
-  w->batch = pw_layout_alloc (l, (size_t)s->batches, sizeof *w->batch);
-  w->force = pw_layout_alloc (l, (size_t)s->forces, sizeof *w->force);
-  w->source = pw_layout_alloc (l, (size_t)s->sources, sizeof *w->source);
-  w->configuration = pw_layout_alloc (l, (size_t)s->bodies + 1, sizeof *w->configuration);
-  w->scratch = pw_layout_alloc (l, (size_t)(3 * s->rows + s->coords) + 3, sizeof *w->scratch);
-  w->u = pw_layout_alloc (l, 3 * (size_t)s->sources, sizeof *w->u);
-  w->J = pw_layout_alloc (l, workspace_entries (s), sizeof *w->J);
+  pw_layout_alloc (layout, 1, sizeof *w);
+  w->batch = pw_layout_alloc (layout, (size_t)s->batches, sizeof *w->batch);
+  w->force = pw_layout_alloc (layout, (size_t)s->forces, sizeof *w->force);
+  w->source = pw_layout_alloc (layout, (size_t)s->sources, sizeof *w->source);
+  w->configuration = pw_layout_alloc (layout, (size_t)s->bodies + 1, sizeof *w->configuration);
+  w->scratch = pw_layout_alloc (layout, (size_t)(3 * s->rows + s->coords) + 3, sizeof *w->scratch);
+  w->u = pw_layout_alloc (layout, 3 * (size_t)s->sources, sizeof *w->u);
+  w->J = pw_layout_alloc (layout, workspace_entries (s), sizeof *w->J);
   double *u = w->u, *J = w->J;
   for (int i = 0; i < s->batches; i++) {
     const pw_element_batch *k = &s->batch[i];
-    workspace_batch (l, k, w, u, J, l->base ? &w->batch[i] : NULL);
-    if (l->base == NULL) continue;
+    workspace_batch (layout, k, w, u, J, layout->base ? &w->batch[i] : NULL);
+    if (layout->base == NULL) continue;
     u += 3 * k->b.count * k->kind->signals;
     J += (size_t)k->b.count * (size_t)(k->kind->rows * k->b.cols);
   }
-  double *x = pw_layout_alloc (l, 2 * (size_t)s->reads, sizeof *x);
-  for (int i = 0; l->base && i < s->sources; i++) {
+  double *x = pw_layout_alloc (layout, 2 * (size_t)s->reads, sizeof *x);
+  for (int i = 0; layout->base && i < s->sources; i++) {
     w->source[i] = s->source[i];
     w->source[i].x = x;
     x += 2 * s->source[i].reads; /* values, gradient */
@@ -77,9 +78,9 @@ void pw_close_signals (const pw_source *source, int count) {
 }
 
 pw_workspace *pw_workspace_new (const pw_system *s, pw_error *error) {
-  pw_layout l = { NULL, 0 };
-  workspace_layout (&l, &(pw_workspace){ .s = s });
-  pw_workspace *w = calloc (1, l.used);
+  pw_layout layout = { NULL, 0 };
+  workspace_layout (&layout, &(pw_workspace){ .s = s });
+  pw_workspace *w = calloc (1, layout.used);
   if (w) {
     w->s = s;
     w->scale = s->scale;

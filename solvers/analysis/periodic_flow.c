@@ -128,13 +128,13 @@ static int flow_nearest (pw_periodic *x, pw_run *r, int j) {
  * coordinates of the change of the nearest consistent state; otherwise the change is taken to be on the constraints. */
 static int flow_basis (pw_periodic *x, pw_run *r, int nearest) {
   pw_linearisation l;
-  int n = x->n, status = pw_linear_open (&l, r, 0, n);
+  int n = x->n, status = pw_linear_open (&l, r, PW_WITHOUT_MODES, n);
   if (status == PW_OK) status = pw_linear_evaluate (&l, r->t, r->q, r->v);
   if (status == PW_OK) pw_linear_bases (&l);
   x->size = l.size;
   for (int c = 0; status == PW_OK && c < l.size; c++) {
     pw_linear_tangent (&l, c);
-    memcpy (x->basis + 2 * n * c, l.x, 2 * (size_t)n * sizeof *l.x);
+    memcpy (x->basis + 2 * n * c, l.dx, 2 * (size_t)n * sizeof *l.dx);
   }
   for (int j = 0; status == PW_OK && j < 2 * n; j++) {
     memset (x->change, 0, 2 * (size_t)n * sizeof *x->change);

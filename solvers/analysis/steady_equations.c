@@ -75,12 +75,12 @@ static void steady_residual (pw_steady *x, pw_place place, double *F) {
   for (int i = 0; i < x->holonomic; i++) F[i] /= x->norm[i] * x->L;
   F += x->holonomic;
   pw_mul_J (w, x->v, F);
-  if (x->s->rheonomic) pw_evaluate_eta (w, l->c);
-  for (int i = 0; i < x->m; i++) F[i] = (F[i] - (x->s->rheonomic ? l->c[i] : 0)) * x->T / (x->norm[i] * x->L);
+  if (x->s->rheonomic) pw_evaluate_eta (w, l->row_scratch);
+  for (int i = 0; i < x->m; i++) F[i] = (F[i] - (x->s->rheonomic ? l->row_scratch[i] : 0)) * x->T / (x->norm[i] * x->L);
   F += x->m;
   memcpy (F, l->a, (size_t)x->n * sizeof *F);
   pw_linear_turn (l, -x->rates[PW_RATE_TURN], x->v, F);
-  for (int j = 0; j < x->n; j++) F[j] *= pw_as_length (x->s, j) * acceleration;
+  for (int j = 0; j < x->n; j++) F[j] *= pw_length_factor (x->s, j) * acceleration;
 }
 
 /* ---- Derivatives ---- */
@@ -89,15 +89,15 @@ static void steady_residual (pw_steady *x, pw_place place, double *F) {
 static void steady_change (pw_steady *x, double dw, double *F) {
   pw_linearisation *l = &x->system[PW_HERE].linearisation;
   int n = x->n;
-  double *dq = l->x, *dv = l->x + n;
-  pw_mul_J (x->system[PW_HERE].run->w, dq, l->c);
-  for (int i = 0; i < x->holonomic; i++) *F++ = l->c[i] / (x->norm[i] * x->L);
+  double *dq = l->dx, *dv = l->dx + n;
+  pw_mul_J (x->system[PW_HERE].run->w, dq, l->row_scratch);
+  for (int i = 0; i < x->holonomic; i++) *F++ = l->row_scratch[i] / (x->norm[i] * x->L);
   pw_linear_vary (l);
-  pw_mul_J (x->system[PW_HERE].run->w, dv, l->c);
-  for (int i = 0; i < x->m; i++) *F++ = (l->c[i] + l->y[n + x->m + i]) * x->T / (x->norm[i] * x->L);
+  pw_mul_J (x->system[PW_HERE].run->w, dv, l->row_scratch);
+  for (int i = 0; i < x->m; i++) *F++ = (l->row_scratch[i] + l->product[n + x->m + i]) * x->T / (x->norm[i] * x->L);
   pw_linear_turn (l, -x->rates[PW_RATE_TURN], dv, l->da);
   pw_linear_turn (l, -dw, x->v, l->da);
-  for (int j = 0; j < n; j++) *F++ = l->da[j] * pw_as_length (x->s, j) * x->T * x->T / x->L;
+  for (int j = 0; j < n; j++) *F++ = l->da[j] * pw_length_factor (x->s, j) * x->T * x->T / x->L;
   for (int i = 0; i < x->settings.holds; i++) *F++ = pw_hold_change (x, x->hold + i, dq, dv);
 }
 
@@ -120,13 +120,13 @@ static void steady_columns (pw_steady *x, double *dF) {
   int n = x->n, equations = pw_steady_equations (x);
   for (int c = 0; c < pw_steady_unknowns (x); c++, dF += equations) {
     const double *symmetry = x->symmetry + (c - n) * pw_steady_rate_count (x->s);
-    memset (l->x, 0, 2 * (size_t)n * sizeof *l->x);
+    memset (l->dx, 0, 2 * (size_t)n * sizeof *l->dx);
     if (c < n) {
-      l->x[c] = pw_unit (x->s, c);
-      pw_linear_turn (l, x->rates[PW_RATE_TURN], l->x, l->x + n);
+      l->dx[c] = pw_unit (x->s, c);
+      pw_linear_turn (l, x->rates[PW_RATE_TURN], l->dx, l->dx + n);
     } else {
-      pw_steady_velocities (x, symmetry, x->q, l->x + n);
-      for (int j = n; j < 2 * n; j++) l->x[j] /= x->T;
+      pw_steady_velocities (x, symmetry, x->q, l->dx + n);
+      for (int j = n; j < 2 * n; j++) l->dx[j] /= x->T;
     }
     steady_change (x, c < n ? 0 : symmetry[PW_RATE_TURN] / x->T, dF);
   }

@@ -37,9 +37,9 @@ static void symmetry_violation (pw_steady *x, int c, double *rates, double *out)
   pw_linearisation *l = &x->system[PW_HERE].linearisation;
   memset (rates, 0, (size_t)pw_steady_rate_count (x->s) * sizeof *rates);
   rates[c] = 1;
-  memset (l->x, 0, 2 * (size_t)x->n * sizeof *l->x);
-  pw_steady_velocities (x, rates, x->q, l->x);
-  if (c == PW_RATE_TURN) pw_linear_turn (l, 1, x->v, l->x + x->n);
+  memset (l->dx, 0, 2 * (size_t)x->n * sizeof *l->dx);
+  pw_steady_velocities (x, rates, x->q, l->dx);
+  if (c == PW_RATE_TURN) pw_linear_turn (l, 1, x->v, l->dx + x->n);
   pw_linear_asymmetry (l, c == PW_RATE_TURN, out);
 }
 
@@ -48,11 +48,11 @@ static double symmetry_largest_change (pw_steady *x) {
   pw_linearisation *l = &x->system[PW_HERE].linearisation;
   double most = 0;
   for (int c = 0; c < x->n; c++) {
-    memset (l->x, 0, 2 * (size_t)x->n * sizeof *l->x);
-    l->x[c] = pw_unit (x->s, c);
+    memset (l->dx, 0, 2 * (size_t)x->n * sizeof *l->dx);
+    l->dx[c] = pw_unit (x->s, c);
     pw_linear_vary (l);
     for (int j = 0; j < x->n; j++)
-      most = pw_larger_or_nan (most, fabs (l->da[j]) * pw_as_length (x->s, j) * x->T * x->T / x->L);
+      most = pw_larger_or_nan (most, fabs (l->da[j]) * pw_length_factor (x->s, j) * x->T * x->T / x->L);
   }
   return most;
 }

@@ -1,5 +1,6 @@
-/* Accelerations and multipliers, with Baumgarte's terms if selected.
+/* Accelerations a and multipliers lambda of a run, with Baumgarte's terms if selected:
  *
+ *   M a + J^T lambda = f
  *   J a = gamma - 2 alpha (J v - eta) - beta^2 g     for holonomic rows
  *   J a = gamma - alpha (J v - eta)                  for nonholonomic ones
  *
@@ -8,65 +9,65 @@
 #include <string.h>
 #include "method.h"
 
+/* Subtracts Baumgarte's terms from gamma.  The first coords + 3 + rows numbers of r->scratch stay free for callers. */
 static void dynamics_stabilise (pw_run *r, const double *v, double *gamma) {
   const pw_system *s = r->s;
-  double *jv = r->scratch + s->coords + 3 + s->rows, *other = jv + s->rows;
-  pw_mul_J (r->w, v, jv);
-  pw_evaluate_eta (r->w, other);
-  for (int i = 0; i < s->rows; i++) gamma[i] -= (i < s->holonomic ? 2 : 1) * r->alpha * (jv[i] - other[i]);
-  pw_evaluate_g (r->w, other);
-  for (int i = 0; i < s->holonomic; i++) gamma[i] -= r->beta * r->beta * other[i];
+  double *Jv = r->scratch + s->coords + 3 + s->rows, *eta = Jv + s->rows, *g = eta;
+  pw_mul_J (r->w, v, Jv);
+  pw_evaluate_eta (r->w, eta);
+  for (int i = 0; i < s->rows; i++) gamma[i] -= (i < s->holonomic ? 2 : 1) * r->alpha * (Jv[i] - eta[i]);
+  pw_evaluate_g (r->w, g);
+  for (int i = 0; i < s->holonomic; i++) gamma[i] -= r->beta * r->beta * g[i];
 }
 
-/* Stabilises gamma and returns the forces at the current configuration: f, or the constant ones if there are no
- * others. */
+/* Computes gamma and returns the forces at the current configuration: those computed into f, or the system's array of
+ * constant forces if there are no others. */
 static inline const double *dynamics_right_side (pw_run *r, const double *v, double *f, double *gamma) {
+  pw_evaluate_gamma (r->w, gamma);
   if (r->alpha + r->beta > 0) dynamics_stabilise (r, v, gamma);
   if (r->s->forces == 0) return r->s->constant;
   pw_evaluate_force (r->w, f);
   return f;
 }
 
-/* Iterative refinement (Wilkinson 1963): near a singular configuration, with s the sine of the smallest angle
- * between rows, the factorisation has an error of eps / s^2; refinement reduces it to eps / s. */
+/* Iterative refinement (Wilkinson 1963): near a singular configuration, with s the sine of the smallest angle between
+ * rows, the factorisation has an error of eps / s^2; refinement reduces it to eps / s. */
 static void dynamics_refine (pw_run *r, const double *v, double *a, double *lambda) {
   const pw_system *s = r->s;
-  double *f = r->scratch, *gamma = f + s->coords + 3, *da = r->w->scratch, *dl = da + s->coords + 3, *Ja = dl + s->rows;
-  pw_evaluate_gamma (r->w, gamma);
+  double *f = r->scratch, *gamma = f + s->coords + 3;                                  /* residuals */
+  double *da = r->w->scratch, *dlambda = da + s->coords + 3, *Jda = dlambda + s->rows; /* corrections */
   if (dynamics_right_side (r, v, f, gamma) != f) pw_evaluate_force (r->w, f);
   for (int j = 0; j < s->coords; j++) da[j] = a[j];
-  for (int i = 0; i < s->rows; i++) dl[i] = lambda[i];
-  for (int pass = 0; pass < 3; pass++) {
+  for (int i = 0; i < s->rows; i++) dlambda[i] = lambda[i];
+  for (int pass = 0; pass < 3; pass++) { /* the first solution counts as a correction of 0 */
     for (int j = 0; j < s->coords; j++) f[j] -= s->mass[j] * da[j];
-    for (int i = 0; i < s->rows; i++) dl[i] = -dl[i];
-    pw_add_JT (r->w, dl, f);
-    pw_mul_J (r->w, da, Ja);
-    for (int i = 0; i < s->rows; i++) gamma[i] -= Ja[i];
-    pw_saddle_solve (r->saddle, f, gamma, da, dl);
+    for (int i = 0; i < s->rows; i++) dlambda[i] = -dlambda[i];
+    pw_add_JT (r->w, dlambda, f);
+    pw_mul_J (r->w, da, Jda);
+    for (int i = 0; i < s->rows; i++) gamma[i] -= Jda[i];
+    pw_saddle_solve (r->saddle, f, gamma, da, dlambda);
     for (int j = 0; j < s->coords; j++) a[j] += da[j];
-    for (int i = 0; i < s->rows; i++) lambda[i] += dl[i];
+    for (int i = 0; i < s->rows; i++) lambda[i] += dlambda[i];
   }
 }
 
 void pw_run_accelerate_updated (pw_run *r, const double *v, double *a, double *lambda) {
-  pw_evaluate_gamma (r->w, lambda);
   const double *f = dynamics_right_side (r, v, r->scratch, lambda);
   r->statistics.rhs++;
   pw_saddle_solve (r->saddle, f, lambda, a, lambda);
-  if (pw_saddle_below (r->saddle, r->limits.refine)) dynamics_refine (r, v, a, lambda);
+  if (pw_saddle_sine_below (r->saddle, r->limits.refine)) dynamics_refine (r, v, a, lambda);
 }
 
-/* Factorises and solves; *near = 1 near a singular configuration. */
+/* Factorises and solves, with gamma in the array of lambda; *near = 1 near a singular configuration. */
 static inline int dynamics_solve (pw_run *r, const double *v, double *a, double *lambda, int *near) {
-  pw_evaluate_gamma (r->w, lambda);
   const double *f = dynamics_right_side (r, v, r->scratch, lambda);
   r->statistics.rhs++;
   r->statistics.factorisations++;
   int status = pw_saddle_factor (r->saddle);
   if (status == PW_OK) pw_saddle_solve (r->saddle, f, lambda, a, lambda);
   *near = pw_watchdog_near (r);
-  if (*near && r->geometry.sine <= r->refuse) return PW_RETRY;
-  if (status == PW_OK && pw_saddle_below (r->saddle, r->limits.refine)) dynamics_refine (r, v, a, lambda);
+  if (*near && r->geometry.evaluated_sine <= r->refused_sine) return PW_RETRY;
+  if (status == PW_OK && pw_saddle_sine_below (r->saddle, r->limits.refine)) dynamics_refine (r, v, a, lambda);
   return status;
 }
 
@@ -84,21 +85,21 @@ int pw_run_accelerate (pw_run *r, double t, const double *q, const double *v, do
   return status;
 }
 
-void pw_show_reached (pw_run *r) {
+void pw_sample_reached (pw_run *r) {
   memcpy (r->q_at, r->q, pw_state_length (r->s) * sizeof *r->q);
   memcpy (r->ledger_at, r->ledger, (size_t)r->s->entries * sizeof (double));
   r->projected_at = r->projected;
   (void)pw_evaluate_J_at (r->w, r->t, r->q_at, r->v_at);
 }
 
-void pw_note_residuals (pw_run *r) {
+void pw_record_residuals (pw_run *r) {
   pw_residuals *now = &r->residuals;
-  pw_statistics *s = &r->statistics;
+  pw_statistics *largest = &r->statistics;
   pw_specialised_residuals (r);
   if (isnan (now->position)) pw_evaluate_position_residual (r->w, NULL, now);
   if (isnan (now->velocity)) pw_evaluate_velocity_residual (r->w, NULL, now);
-  s->position = pw_larger (s->position, now->position);
-  s->velocity = pw_larger (s->velocity, now->velocity);
-  s->g = pw_larger (s->g, now->g);
-  s->jv = pw_larger (s->jv, now->jv);
+  largest->position = pw_larger (largest->position, now->position);
+  largest->velocity = pw_larger (largest->velocity, now->velocity);
+  largest->g = pw_larger (largest->g, now->g);
+  largest->jv = pw_larger (largest->jv, now->jv);
 }

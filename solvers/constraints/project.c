@@ -1,7 +1,9 @@
-/* Coordinate projection: the nearest positions with g = 0, the nearest velocities with J v = eta.
+/* Coordinate projection: the nearest positions with g = 0, the nearest velocities with J v = eta, in the metric W.
  *
  *   [ W G^T ] [ dq ]   [  0 ]          [ W J^T ] [ dv ]   [     0     ]
  *   [ G  0  ] [ mu ] = [ -g ]          [ J  0  ] [ mu ] = [ eta - J v ]
+ *
+ * G: the holonomic rows of J; mu: multipliers of the projection.
  *
  * (Lubich 1991, Extrapolation integrators for constrained multibody systems; Eich 1993, Convergence results for a
  * coordinate projection method applied to mechanical systems with algebraic constraints.) */
@@ -10,28 +12,29 @@
 #include "method.h"
 #include "specialised.h"
 
-/* With the mass matrix as metric, massless coordinates do not contribute to the norm: the constraint equations
- * determine them, as in the accelerations, and coordinates with mass do not move because of them.  If the holonomic
- * equations do not determine all of them, all equations are used: the change of positions then satisfies the
- * nonholonomic ones, too. */
-static pw_saddle *project_by_mass (pw_run *r, pw_error *error) {
-  pw_error none = { 0 };
-  pw_saddle *k = pw_saddle_open (r->w, r->s->mass, r->s->holonomic, r->active, &none);
-  if (none.status == PW_RESOURCE) pw_fail (error, PW_RESOURCE, "%s", none.text);
-  return k || none.status == PW_RESOURCE ? k : r->saddle;
+/* The saddle of the position projection with the mass matrix as metric.  Massless coordinates do not contribute to the
+ * norm: the constraint equations determine them, as in the accelerations, and coordinates with mass do not move because
+ * of them.  If the holonomic equations do not determine all of them, the run's saddle is used, which contains all
+ * equations: the change of positions then satisfies the nonholonomic ones, too. */
+static pw_saddle *project_open_mass_metric (pw_run *r, pw_error *error) {
+  pw_error cause = { 0 };
+  pw_saddle *saddle = pw_saddle_open (r->w, r->s->mass, r->s->holonomic, r->active, &cause);
+  if (cause.status == PW_RESOURCE) pw_fail (error, PW_RESOURCE, "%s", cause.text);
+  return saddle || cause.status == PW_RESOURCE ? saddle : r->saddle;
 }
 
 int pw_projector_open (pw_projector *p, pw_run *r, const double *weight_q, const double *weight_v, pw_error *error) {
   const pw_system *s = r->s;
-  *p = (pw_projector){ .own_velocity = weight_v != NULL,
+  *p = (pw_projector){ .owns_velocity = weight_v != NULL,
                        .velocity = weight_v ? NULL : r->saddle,
                        .active = r->active,
-                       .row = -1,
-                       .against = -1,
-                       .by_mass = weight_q == NULL && weight_v == NULL };
-  p->position = weight_q ? pw_saddle_open (r->w, weight_q, s->holonomic, r->active, error) : project_by_mass (r, error);
-  p->own_position = p->position != r->saddle;
-  if (p->own_velocity) p->velocity = pw_saddle_open (r->w, weight_v, s->rows, r->active, error);
+                       .worst_row = -1,
+                       .contradictory_row = -1,
+                       .mass_metric = weight_q == NULL && weight_v == NULL };
+  p->position =
+      weight_q ? pw_saddle_open (r->w, weight_q, s->holonomic, r->active, error) : project_open_mass_metric (r, error);
+  p->owns_position = p->position != r->saddle;
+  if (p->owns_velocity) p->velocity = pw_saddle_open (r->w, weight_v, s->rows, r->active, error);
   if (p->position && p->velocity) return PW_OK;
   pw_projector_close (p);
   return PW_RESOURCE;
@@ -43,52 +46,53 @@ const char *const pw_metrics[] = { "mass", "identity", NULL };
 int pw_projector_open_by_options (pw_projector *p, pw_run *r, pw_error *error) {
   const pw_system *s = r->s;
   if (pw_run_option (r, "metric") == 0) return pw_projector_open (p, r, NULL, NULL, error);
-  double *one = malloc ((size_t)s->coords * sizeof *one);
-  if (one == NULL) return pw_fail_memory (s, error);
-  for (int j = 0; j < s->coords; j++) one[j] = 1;
-  int status = pw_projector_open (p, r, one, one, error);
-  free (one);
+  double *ones = malloc ((size_t)s->coords * sizeof *ones);
+  if (ones == NULL) return pw_fail_memory (s, error);
+  for (int j = 0; j < s->coords; j++) ones[j] = 1;
+  int status = pw_projector_open (p, r, ones, ones, error);
+  free (ones);
   return status;
 }
 
 void pw_projector_close (pw_projector *p) {
-  if (p->own_position) pw_saddle_close (p->position);
-  if (p->own_velocity) pw_saddle_close (p->velocity);
+  if (p->owns_position) pw_saddle_close (p->position);
+  if (p->owns_velocity) pw_saddle_close (p->velocity);
   *p = (pw_projector){ 0 };
 }
 
-/* Redundant equations follow from the others to round-off; PW_RETRY if one does not: it contradicts them. */
-static int project_check_redundant (pw_projector *p, const pw_system *s, double follows, const double *g,
+/* Redundant equations follow from the others up to this scaled residual; PW_RETRY if one does not: it contradicts them.
+ * g, size: their values and the sizes of their terms. */
+static int project_check_redundant (pw_projector *p, const pw_system *s, double tolerance, const double *g,
                                     const double *size) {
-  double most = follows;
-  p->against = -1;
-  if (p->active == NULL || p->alone) return PW_OK;
+  double largest = tolerance;
+  p->contradictory_row = -1;
+  if (p->active == NULL || p->ignores_inactive) return PW_OK;
   for (int i = 0; i < s->holonomic; i++) {
-    double off = p->active[i] ? 0 : fabs (g[i]) / size[i];
-    if (off > most || isnan (off)) most = off, p->against = i;
+    double residual = p->active[i] ? 0 : fabs (g[i]) / size[i];
+    if (residual > largest || isnan (residual)) largest = residual, p->contradictory_row = i;
   }
-  if (p->against < 0) return PW_OK;
-  p->row = p->against;
+  if (p->contradictory_row < 0) return PW_OK;
+  p->worst_row = p->contradictory_row;
   return PW_RETRY;
 }
 
 int pw_project_positions (pw_projector *p, pw_run *r, double t, double *q, const double *v) {
-  const double slight = 1e-6; /* residuals whose correction changes the sizes of the terms by no more than this part */
-  const int most = 30;        /* quadratic convergence needs some 5; a bad start needs more */
+  const double small = 1e-6;     /* below this residual, a correction hardly changes the sizes of the terms */
+  const int max_iterations = 30; /* quadratic convergence needs some 5; a bad start needs more */
   const pw_system *s = r->s;
   pw_residuals now = { 0 };
-  double *g = r->scratch, *size = g + s->rows, *mu = size + s->rows, *dq = mu + s->rows, before = INFINITY;
+  double *g = r->scratch, *size = g + s->rows, *mu = size + s->rows, *dq = mu + s->rows, previous = INFINITY;
   for (p->iterations = 0;; p->iterations++) {
-    int failed = pw_update_kinematics (r->w, t, q, v);
-    if (failed) return failed;
+    int status = pw_update_kinematics (r->w, t, q, v);
+    if (status != PW_OK) return status;
     pw_evaluate_g (r->w, g);
-    if (!(before < slight)) pw_evaluate_g_size (r->w, size);
+    if (!(previous < small)) pw_evaluate_g_size (r->w, size);
     pw_worst_position (s, g, size, p->active, &now);
-    p->row = now.row_position;
-    int stalled = now.position > before / 4; /* at round-off, since convergence is quadratic */
-    if (now.position <= PW_RESIDUAL_GOOD || (stalled && now.position <= PW_RESIDUAL_ENOUGH)) break;
-    if (p->iterations >= most || !isfinite (now.position)) return PW_RETRY;
-    before = now.position;
+    p->worst_row = now.row_position;
+    int stalled = now.position > previous / 4; /* at round-off, since convergence is quadratic */
+    if (now.position <= PW_RESIDUAL_CONVERGED || (stalled && now.position <= PW_RESIDUAL_ACCEPTED)) break;
+    if (p->iterations >= max_iterations || !isfinite (now.position)) return PW_RETRY;
+    previous = now.position;
     pw_evaluate_J (r->w);
     r->statistics.factorisations++;
     if (pw_saddle_factor (p->position) != PW_OK) return PW_RETRY;
@@ -97,13 +101,13 @@ int pw_project_positions (pw_projector *p, pw_run *r, double t, double *q, const
     for (int j = 0; j < s->coords; j++) q[j] += dq[j];
   }
   if (p->active == NULL) r->residuals.position = now.position, r->residuals.g = now.g;
-  int status = project_check_redundant (p, s, r->limits.follows, g, size);
+  int status = project_check_redundant (p, s, r->limits.redundant_residual, g, size);
   if (status == PW_OK) pw_evaluate_J (r->w);
   return status;
 }
 
-/* v += dv with J (v + dv) = eta. */
-static void project_once (pw_projector *p, pw_run *r, double *v) {
+/* v += dv with J (v + dv) = eta; p->velocity must be factorised. */
+static void project_correct_velocities (pw_projector *p, pw_run *r, double *v) {
   const pw_system *s = r->s;
   double *right = r->scratch, *eta = right + s->rows, *mu = eta + s->rows, *dv = mu + s->rows;
   pw_mul_J (r->w, v, right);
@@ -116,34 +120,34 @@ static void project_once (pw_projector *p, pw_run *r, double *v) {
 int pw_project_velocities (pw_projector *p, pw_run *r, double *v) {
   r->statistics.factorisations++;
   if (pw_saddle_factor (p->velocity) != PW_OK) return PW_RETRY;
-  project_once (p, r, v);
-  if (pw_saddle_below (p->velocity, r->limits.refine)) project_once (p, r, v);
+  project_correct_velocities (p, r, v);
+  if (pw_saddle_sine_below (p->velocity, r->limits.refine)) project_correct_velocities (p, r, v);
   return pw_update_velocities (r->w, v);
 }
 
 /* 1 if the velocities satisfy J v = eta to round-off and need no correction; J must be evaluated.  Near a singular
- * configuration, or with redundant equations, that is not sufficient. */
-static int project_is_good (const pw_projector *p, pw_run *r) {
+ * configuration, or with redundant equations, that is not sufficient: 0. */
+static int project_accepts_velocities (const pw_projector *p, pw_run *r) {
   r->residuals.velocity = NAN;
-  if (p->own_velocity || p->active || r->near_singular) return 0;
+  if (p->owns_velocity || p->active || r->near_singular) return 0;
   pw_residuals now;
   pw_evaluate_velocity_residual (r->w, NULL, &now);
-  if (!(now.velocity <= PW_RESIDUAL_GOOD)) return 0;
+  if (!(now.velocity <= PW_RESIDUAL_CONVERGED)) return 0;
   r->residuals.velocity = now.velocity, r->residuals.jv = now.jv;
   return 1;
 }
 
 int pw_project_state (pw_projector *p, pw_run *r, double t, double *q, double *v, double *a, double *lambda) {
   if (pw_specialised_project (p, r, t, q, v, a, lambda)) {
-    p->iterations = r->scene->iterations, p->against = -1;
+    p->iterations = r->scene->iterations, p->contradictory_row = -1;
     return PW_OK;
   }
   int status = pw_project_positions (p, r, t, q, v);
   if (status != PW_OK) return status;
-  if (!project_is_good (p, r)) {
+  if (!project_accepts_velocities (p, r)) {
     status = pw_project_velocities (p, r, v);
     if (status != PW_OK) return status;
-    if (!p->own_velocity) {
+    if (!p->owns_velocity) {
       pw_run_accelerate_updated (r, v, a, lambda);
       return PW_OK;
     }
@@ -151,12 +155,12 @@ int pw_project_state (pw_projector *p, pw_run *r, double t, double *q, double *v
   return pw_run_accelerate_evaluated (r, v, a, lambda);
 }
 
-/* e += W^-1 J^T ..., J e = 0 */
-void pw_project_error (pw_run *r, pw_saddle *k, double *e, int rows) {
+/* e += de with W de + J^T mu = 0 and J (e + de) = 0; J de = 0 for the equations after the first `rows`. */
+void pw_project_error (pw_run *r, pw_saddle *saddle, double *e, int rows) {
   const pw_system *s = r->s;
   double *right = r->scratch, *mu = right + s->rows, *de = mu + s->rows;
   pw_mul_J (r->w, e, right);
   for (int i = 0; i < s->rows; i++) right[i] = i < rows ? -right[i] : 0;
-  pw_saddle_solve (k, NULL, right, de, mu);
+  pw_saddle_solve (saddle, NULL, right, de, mu);
   for (int j = 0; j < s->coords; j++) e[j] += de[j];
 }

@@ -1,4 +1,5 @@
-/* Independent constraint equations, and the redundant ones as combinations of them. */
+/* Independent constraint equations (rank.c, independent.c), and the redundant ones as combinations of them
+ * (redundancy.c). */
 #ifndef PW_RANK_H
 #define PW_RANK_H
 
@@ -7,30 +8,32 @@
 
 struct pw_run;
 
-/* Limit of rows x coordinates for dense matrices: 320 MB. */
-#define PW_RANK_MOST 4e7
+/* Most entries, rows x coordinates, of a dense matrix: 320 MB. */
+#define PW_RANK_MAX_ENTRIES 4e7
 
-/* All rows of the evaluated J, dense (rows x coords), as derivatives with respect to lengths, normalised to length 1;
- * `norm` (rows, or NULL): their former lengths; empty rows stay 0. */
+/* The factor by which coordinate j becomes a length: 1, or L for an angle.  (pw_unit is the scene's unit of a
+ * coordinate.) */
+double pw_length_factor (const pw_system *s, int j);
+
+/* All rows of the J last evaluated, dense (rows x coords), as derivatives with respect to these lengths, normalised to
+ * length 1; `norm` (rows, or NULL): their former lengths; empty rows stay 0. */
 void pw_rank_rows (const pw_workspace *w, double *rows, double *norm);
 
-/* The factor that makes coordinate j a length: 1, or L for an angle.  (pw_unit is the scene's unit of a coordinate.) */
-double pw_as_length (const pw_system *s, int j);
-
 /* Weights of a metric of lengths: the squares of these factors. */
-void pw_rank_weights (const pw_system *s, double *weight);
+void pw_length_weights (const pw_system *s, double *weight);
 
-/* The n-th of a sequence of irregular numbers in [-1, 1]: sines of multiples of the golden angle. */
+/* The n-th of a sequence of irregular numbers in [-1, 1], without symmetries that a scene could share: sines of
+ * multiples of the golden angle.  Each phase, an arbitrary number, is another sequence. */
 static inline double pw_irregular (double phase, int n) {
   return pw_sin (phase + 2.39996 * n);
 }
 
-/* Independent rows of J. */
+/* Independent rows of J, kept as an orthonormal basis of the range of J^T. */
 typedef struct {
-  int rank;
+  int rank;              /* number of rows kept */
   int *kept;             /* rank: their indices */
-  unsigned char *active; /* rows: 1 for these */
-  double *rows;          /* rows x coords: these are an orthonormal basis of the range of J^T */
+  unsigned char *active; /* rows: 1 for those kept */
+  double *rows;          /* rows x coords: those kept are the basis, the others scratch */
   double *norm;          /* rows: scratch */
   int coords;
   char *memory;
@@ -38,31 +41,33 @@ typedef struct {
 int pw_row_basis_open (pw_row_basis *b, const pw_system *s); /* PW_OK or PW_RESOURCE */
 void pw_row_basis_close (pw_row_basis *b);
 
-/* Selects at most `holonomic` holonomic and `all` equations by Gram-Schmidt on the evaluated J, rows of length 1: those
- * whose part independent of the ones kept before exceeds tol.  Holonomic equations come first, since a nonholonomic one
- * must not replace a holonomic one; of these the most independent ones, in order where they are about equal.  fixed
- * (coords, or NULL): 1 for coordinates that are left out.  Returns the rank. */
-int pw_row_basis_select (pw_row_basis *b, const pw_workspace *w, double tol, const unsigned char *fixed, int holonomic,
-                         int all);
+/* Selects at most `max_holonomic` holonomic equations, and at most `max_rows` in all, by Gram-Schmidt on the J last
+ * evaluated, rows of length 1: those of which a part longer than tol is independent of the ones kept before.  Holonomic
+ * equations come first, since a nonholonomic one must not replace a holonomic one; of these the most independent ones,
+ * in order where they are about equal.  fixed (coords, or NULL): 1 for coordinates that are left out.  Returns the
+ * rank. */
+int pw_row_basis_select (pw_row_basis *b, const pw_workspace *w, double tol, const unsigned char *fixed,
+                         int max_holonomic, int max_rows);
 
-/* Orthogonalises a row against those kept, from number `first` on; returns its norm afterwards. */
-double pw_row_basis_orthogonalise (const pw_row_basis *b, double *row, int first);
+/* Orthogonalises a vector against the rows kept, from number `first` of them on; returns its norm afterwards. */
+double pw_row_basis_orthogonalise (const pw_row_basis *b, double *vector, int first);
 
-/* Selects as many as there are; only active[i] = 1 is stored.  Returns the rank, or PW_RESOURCE. */
+/* Sets active[i] to 1 for a maximal set of independent equations, selected as by pw_row_basis_select, else to 0.
+ * Returns the rank, or PW_RESOURCE. */
 int pw_rank_select (const pw_workspace *w, double tol, const unsigned char *fixed, unsigned char *active);
 
-/* Selects r->active for the run at its consistent initial state: rows dependent there and at up to three configurations
- * nearby. It stays NULL if all equations are independent.  Errors: PW_RESOURCE, PW_INITIAL (the initial configuration
- * is singular). */
+/* Selects r->active, a maximal set of independent rows, for the run at its consistent initial state.  It stays NULL if
+ * all rows are independent.  Errors: PW_RESOURCE; PW_INITIAL if the rank is higher nearby: the initial configuration is
+ * singular. */
 int pw_rank_open (struct pw_run *r, pw_error *error);
 
-/* Selects r->active again with the J last evaluated.  Returns 1 if another set has the same rank, else 0.  Saddle and
- * method of the run still use the previous set.  Errors: PW_RESOURCE. */
+/* Selects r->active again with the J last evaluated.  Returns 1 if another set of the same rank is now active, else 0.
+ * Saddle and method of the run still use the previous set.  Errors: PW_RESOURCE. */
 int pw_rank_reselect (struct pw_run *r);
 
 /* Conditioning of the active equations: 1 over their largest coefficient in a sum of the redundant ones with irregular
- * weights (rows of length 1).  Residuals of the redundant equations are those of the active ones divided by this.  J
- * must be evaluated and the run's saddle factorised at the configuration. */
+ * weights (rows of length 1).  Residuals of the redundant equations are about those of the active ones divided by this.
+ * J must be evaluated and the run's saddle factorised at the configuration. */
 double pw_rank_independence (struct pw_run *r);
 
 /* Saves or loads r->active; the number of redundant equations must not change.  Saddle and method still use the

@@ -1,9 +1,9 @@
-/* Redundant equations as combinations of the active ones, least-norm multipliers, and their description.
+/* Redundant equations as combinations of the active ones: least-norm multipliers, and a description for the user.
  *
- * A redundant equation is J_i = sum_a c_ia J_a over active equations a.  Its coefficients come from the saddle
- * point: with f = J_i^T and gamma = 0 the multipliers are c_i.  The vectors n_i = e_i - sum c_ia e_a span the
- * multipliers without force, J^T n_i = 0, so the least-norm ones are lambda + sum z_i n_i with z from a small
- * least-squares problem. */
+ * A redundant row of J is J_i = sum_a c_ia J_a over active rows a.  Its coefficients come from the saddle-point system:
+ * with f = J_i^T and gamma = 0 the multipliers are c_i.  The vectors n_i = e_i - sum_a c_ia e_a, with unit vectors e,
+ * span the multipliers without force, J^T n_i = 0, so the least-norm ones are lambda + sum_i z_i n_i with z from a
+ * small least-squares problem. */
 #include <lapacke.h>
 #include <math.h>
 #include <stdio.h>
@@ -28,13 +28,14 @@ double pw_rank_multiplier_unit (const pw_workspace *w, int row) {
   return w->scale.length;
 }
 
+/* The length of a row as a derivative with respect to lengths (pw_length_factor). */
 static double redundancy_length (const pw_workspace *w, int row) {
   int n;
   double square = 0;
   const pw_element_batch *k = redundancy_find (w, row, &n);
   for (int c = 0; c < k->b.cols; c++) {
     int j = pw_global (k, n / k->kind->rows, c);
-    double x = j < w->s->coords ? k->J[n * k->b.cols + c] / pw_as_length (w->s, j) : 0;
+    double x = j < w->s->coords ? k->J[n * k->b.cols + c] / pw_length_factor (w->s, j) : 0;
     square += x * x;
   }
   return sqrt (square);
@@ -56,7 +57,7 @@ static void redundancy_solve (pw_run *r, double *c) {
   memset (r->row_force, 0, (size_t)r->s->coords * sizeof *r->row_force);
 }
 
-/* Coefficients of the i-th redundant row in the active ones, where J is evaluated and the saddle factorised. */
+/* Computes c of the i-th redundant row, where J is evaluated and the saddle factorised. */
 static void redundancy_coefficients (pw_run *r, int i) {
   redundancy_add_row (r->w, r->redundant_row[i], 1, r->row_force);
   redundancy_solve (r, r->coefficient + i * r->s->rows);
@@ -68,7 +69,8 @@ double pw_rank_independence (pw_run *r) {
   for (int i = 0; i < r->redundant; i++) {
     int row = r->redundant_row[i];
     double x = pw_irregular (0, row + 1), length = redundancy_length (r->w, row);
-    if (length > 0) redundancy_add_row (r->w, row, (x + copysign (1, x)) / 2 / length, r->row_force);
+    double weight = (x + copysign (1, x)) / 2; /* of modulus 1/2 to 1 */
+    if (length > 0) redundancy_add_row (r->w, row, weight / length, r->row_force);
   }
   redundancy_solve (r, c);
   for (int row = 0; row < r->s->rows; row++)
@@ -76,22 +78,29 @@ double pw_rank_independence (pw_run *r) {
   return isnan (most) ? 0 : 1 / most;
 }
 
+/* Component `row` of n_i for the i-th redundant row. */
+static inline double redundancy_null (const pw_run *r, int i, int row) {
+  return (r->redundant_row[i] == row) - r->coefficient[i * r->s->rows + row];
+}
+
+/* Minimises sum ((lambda + N z) / unit)^2 over the rows, N = [n_1 n_2 ...], by the normal equations A z = b. */
 void pw_rank_least_norm (pw_run *r, double *lambda) {
-  int m = r->s->rows, k = r->redundant;
-  double *c = r->coefficient, *A = r->normal, *z = A + k * k;
-  for (int i = 0; i < k; i++) redundancy_coefficients (r, i);
-  memset (A, 0, (size_t)(k * k + k) * sizeof *A);
-  for (int row = 0; row < m; row++) { /* minimise sum ((lambda + N z) / size)^2, N = [e_i - c_i] */
-    double size = pw_rank_multiplier_unit (r->w, row), weight = 1 / (size * size);
-    for (int i = 0; i < k; i++) {
-      double n = (r->redundant_row[i] == row) - c[i * m + row];
+  int rows = r->s->rows, redundant = r->redundant;
+  double *A = r->normal, *z = A + redundant * redundant; /* z: b, then the solution */
+  for (int i = 0; i < redundant; i++) redundancy_coefficients (r, i);
+  memset (A, 0, (size_t)(redundant * (redundant + 1)) * sizeof *A);
+  for (int row = 0; row < rows; row++) {
+    double unit = pw_rank_multiplier_unit (r->w, row), weight = 1 / (unit * unit);
+    for (int i = 0; i < redundant; i++) {
+      double n = redundancy_null (r, i, row);
       z[i] -= weight * n * lambda[row];
-      for (int j = 0; j <= i; j++) A[i * k + j] += weight * n * ((r->redundant_row[j] == row) - c[j * m + row]);
+      for (int j = 0; j <= i; j++) A[i * redundant + j] += weight * n * redundancy_null (r, j, row);
     }
   }
-  if (LAPACKE_dposv_work (LAPACK_COL_MAJOR, 'U', k, 1, A, k, z, k) != 0) z[0] = NAN; /* multipliers become NaN */
-  for (int row = 0; row < m; row++)
-    for (int i = 0; i < k; i++) lambda[row] += z[i] * ((r->redundant_row[i] == row) - c[i * m + row]);
+  if (LAPACKE_dposv_work (LAPACK_COL_MAJOR, 'U', redundant, 1, A, redundant, z, redundant) != 0)
+    z[0] = NAN; /* multipliers become NaN */
+  for (int row = 0; row < rows; row++)
+    for (int i = 0; i < redundant; i++) lambda[row] += z[i] * redundancy_null (r, i, row);
 }
 
 /* ---- Description ---- */
@@ -101,36 +110,37 @@ static void redundancy_append (char *buffer, size_t size, const char *text) {
   snprintf (buffer + n, size - n, "%s", text);
 }
 
-/* The common direction of two rows with the same reaction: "lateral ", or "". */
-static const char *redundancy_direction (const char *a, const char *b) {
-  static const char *const word[][2] = {
-    { "N", "lateral " }, { "T", "rolling " }, { "Fx", "x " }, { "Fy", "y " }, { "M", "angular " }
-  };
-  const char *x = strrchr (a, '.') + 1, *y = strrchr (b, '.') + 1;
-  for (size_t i = 0; i < sizeof word / sizeof *word; i++)
-    if (strcmp (x, word[i][0]) == 0 && strcmp (y, word[i][0]) == 0) return word[i][1];
+/* The common direction of two reactions "ELEMENT.N" or the like: "lateral ", or "". */
+static const char *redundancy_direction (const char *one, const char *two) {
+  static const struct {
+    const char *reaction, *direction;
+  } known[] = { { "N", "lateral " }, { "T", "rolling " }, { "Fx", "x " }, { "Fy", "y " }, { "M", "angular " } };
+  const char *a = strrchr (one, '.') + 1, *b = strrchr (two, '.') + 1;
+  for (size_t i = 0; i < sizeof known / sizeof *known; i++)
+    if (strcmp (a, known[i].reaction) == 0 && strcmp (b, known[i].reaction) == 0) return known[i].direction;
   return "";
 }
 
-/* "wheels left and right: the same lateral constraint" */
+/* Describes two rows that are multiples of each other: "wheels left and right: the same lateral constraint". */
 static void redundancy_describe_pair (const pw_system *s, int one, int two, char *buffer, size_t size) {
-  char a[120], b[120], x[120], y[120];
+  char a[120], b[120], reaction_a[120], reaction_b[120];
   pw_system_row_name (s, one, a, sizeof a);
   pw_system_row_name (s, two, b, sizeof b);
-  const char *word = redundancy_direction (pw_system_reaction_name (s, one, x, sizeof x),
-                                           pw_system_reaction_name (s, two, y, sizeof y));
-  size_t kind = strcspn (a, " ");
+  pw_system_reaction_name (s, one, reaction_a, sizeof reaction_a);
+  pw_system_reaction_name (s, two, reaction_b, sizeof reaction_b);
+  const char *direction = redundancy_direction (reaction_a, reaction_b);
+  size_t kind = strcspn (a, " "); /* length of the element's type, with which its name begins */
   if (strcmp (a, b) == 0)
-    snprintf (buffer, size, "%s: %s and %s are the same constraint", a, x, y);
+    snprintf (buffer, size, "%s: %s and %s are the same constraint", a, reaction_a, reaction_b);
   else if (kind == strcspn (b, " ") && strncmp (a, b, kind) == 0)
-    snprintf (buffer, size, "%.*ss%s and%s: the same %sconstraint", (int)kind, a, a + kind, b + kind, word);
+    snprintf (buffer, size, "%.*ss%s and%s: the same %sconstraint", (int)kind, a, a + kind, b + kind, direction);
   else
-    snprintf (buffer, size, "%s and %s: the same %sconstraint", a, b, word);
+    snprintf (buffer, size, "%s and %s: the same %sconstraint", a, b, direction);
 }
 
 char *pw_run_redundancy (pw_run *r, int i, char *buffer, size_t size) {
-  enum { MOST = 6 };
-  const double none = 1e-8; /* round-off of a coefficient: eps / s^2 at a sine of 1.5e-4 */
+  enum { MAX_ELEMENTS = 6 };
+  const double round_off = 1e-8; /* of a coefficient: eps / s^2 at a sine s of 1.5e-4 */
   const pw_system *s = r->s;
   int row = r->redundant_row[i], partners = 0, last = -1, elements = 0;
   char element[120], own[120], before[120] = "", reaction[120];
@@ -141,13 +151,13 @@ char *pw_run_redundancy (pw_run *r, int i, char *buffer, size_t size) {
   redundancy_coefficients (r, i);
   const double *c = r->coefficient + i * s->rows;
   for (int a = 0; a < s->rows; a++) {
-    if (fabs (c[a]) < none) continue;
+    if (fabs (c[a]) < round_off) continue;
     partners++, last = a;
     pw_system_row_name (s, a, element, sizeof element);
-    if (elements > MOST || strcmp (element, own) == 0 || strcmp (element, before) == 0) continue;
+    if (elements > MAX_ELEMENTS || strcmp (element, own) == 0 || strcmp (element, before) == 0) continue;
     strcpy (before, element);
-    redundancy_append (buffer, size, elements == MOST ? " and others" : elements > 0 ? ", " : " follows from ");
-    if (elements++ < MOST) redundancy_append (buffer, size, element);
+    redundancy_append (buffer, size, elements == MAX_ELEMENTS ? " and others" : elements > 0 ? ", " : " follows from ");
+    if (elements++ < MAX_ELEMENTS) redundancy_append (buffer, size, element);
   }
   if (partners == 0) redundancy_append (buffer, size, " has no effect in this configuration");
   if (partners == 1) redundancy_describe_pair (s, last, row, buffer, size);

@@ -1,36 +1,38 @@
-/* The watchdog's thresholds, and the distance of the constraints from singular configurations; see watchdog.h. */
+/* The watchdog's thresholds, and the sine that measures how far the constraints are from a singular configuration; see
+ * watchdog.h. */
 #include <math.h>
 #include <stdlib.h>
 #include "method.h"
 #include "rank.h"
 #include "util.h"
 
-/* Residuals are scaled, sines are of angles between rows. s: the sine over the largest one; d: the constraint
- * residual.  Where branches cross, the constraints are x y = 0 in suitable coordinates, and s = |(x, y)|; with a
- * residual d they are x y = d, whose branches turn where s^2 = 2 d. */
-const pw_watchdog pw_watchdog_limits = {
+/* s: the sine over the largest one of the run; d: the scaled constraint residual; eps: the machine precision.  Where
+ * branches cross, the constraints are x y = 0 in suitable coordinates, and s = |(x, y)|; with a residual d, x y = d,
+ * whose branches turn where s^2 = 2 d. */
+const pw_thresholds pw_watchdog_limits = {
   /* A motion with residuals of 1 % is wrong; without stabilisation some drift is expected. */
   .lost = 1e-2,
   .lost_unstabilised = 0.1,
 
   /* A redundant row follows from the others up to a round-off of some 1e6 eps, or up to their residuals divided by a
    * sine as small as 1e-4. */
-  .follows = 1e-9,
-  .magnified = 1e4,
+  .redundant_residual = 1e-9,
+  .redundant_ratio = 1e4,
 
   /* Round-off leaves sqrt (eps) = 1.5e-8 of a row that depends on others; below the sine 1e-6 accelerations, with an
    * error of eps / s after refinement, are wrong by more than 1e-10.  After rows that are nearly dependent themselves,
-   * round-off leaves up to 1e-5: `dependent`, which is refused where a scene is too large for its rank to be computed.
-   * Below a hundred times that, `suspect`, the rank is computed. */
-  .rank = 1e-6,
-  .suspect = 1e-3,
-  .dependent = 1e-5,
+   * round-off leaves up to 1e-5, which is refused where a scene is too large for its rank to be computed.  Elsewhere
+   * the rank is computed below a hundred times that. */
+  .rank_lost = 1e-6,
+  .rank_suspect = 1e-3,
+  .rank_refused = 1e-5,
 
   /* Residuals of 1e-16 leave an error of 1e-8 in a sine; ten times that. */
   .independent = 1e-7,
 
-  /* A stage of a step h has a residual of about h^2 / 8, which decides on the branch unless s^2 is much larger: at
-   * 1e-3 s and a few rad/s for s of 0.02.  A factorisation has an error of eps / s^2, 5e-13 at 0.02. */
+  /* A stage of a step by an angle h has a residual of about h^2 / 8, which decides on the branch unless s^2 is much
+   * larger: with steps of 1e-3 s at a few rad/s, up to s of 0.02.  A factorisation has an error of eps / s^2, 5e-13 at
+   * 0.02. */
   .near = 0.02,
   .refine = 0.02,
 
@@ -38,8 +40,8 @@ const pw_watchdog pw_watchdog_limits = {
    * accelerations have grown by a factor of 3 when it is 0.02 to 0.07.  Above `regular` a configuration is not
    * singular, however large the drift. */
   .regular = 0.6,
-  .turn = 3,
-  .least_turn = 0.1,
+  .turn_growth = 3,
+  .turn_reference = 0.1,
   .drift_turn = 0.02,
   .drift_near = 0.01,
   .drift_far = 1e-2,
@@ -47,39 +49,39 @@ const pw_watchdog pw_watchdog_limits = {
 
   /* Nonholonomic rows: accelerations do not grow when the motion passes a singular configuration; in a jump at the sine
    * s they reach 1 / s: 100 at half of `near`. */
-  .jump = 100,
+  .jump_growth = 100,
 
-  /* The direction of a row of length 1 turns by at most an angle of 1 per rad, that of the others too; step sizes of
-   * one step to the next. */
+  /* The direction of a row of length 1 turns by at most an angle of 1 per rad, and that of the rows before it, too.  No
+   * step is taken to be more than twice as long as the last one. */
   .lipschitz = 2,
-  .growth = 2,
+  .step_growth = 2,
 
-  /* Change points (change_point.c): a sine within a step below an eighth of those at its ends belongs to a corner
-   * that the step cannot resolve; half of them indicates that there may be one.  Strides of 0.3 s stay on a curve
-   * whose radius is s.  A stride that gains less than a tenth of its length leads elsewhere. */
+  /* Change points (change_point.c): a sine within a step below an eighth of those at its ends belongs to a turn that
+   * the step cannot resolve; half of them indicates that there may be one.  Strides of 0.3 s stay on a curve whose
+   * radius is s.  A stride that approaches its destination by less than a tenth of its length leads elsewhere. */
   .unresolved = 0.125,
   .low = 0.5,
   .stride = 0.3,
   .progress = 0.1,
 
-  /* The projection leaves residuals of 1e-14, which leave an error of 1e-7 in the sine: below `floor`, ten times
-   * that, it cannot be distinguished from 0 (`crossing`: with the tolerance of a stride).  Such a point must be left
-   * straight on, within 60 degrees of the direction in which it was entered. */
+  /* The projection leaves residuals of 1e-14, which leave an error of 1e-7 in the sine: below `floor`, ten times that,
+   * it cannot be distinguished from 0 (`crossing`: with the tolerance of a stride).  Such a point must be left straight
+   * on, within 60 degrees of the direction in which it was entered. */
   .floor = 1e-6,
   .crossing = 2e-6,
   .straight = 0.5,
 
-  /* Methods of order 2 leave (0.4)^2 / 12 = 1 % at a corner as long as 1 / 0.4 steps. */
+  /* Methods of order 2 have an error of (0.4)^2 / 12 = 1 % at a turn that takes 1 / 0.4 steps. */
   .resolved = 0.4,
 
-  /* Divisions of a step near a singular configuration mostly agree to 1e-11; those that differ by more than the
-   * error of a good step, 1e-7, do not agree. */
+  /* Divisions of a step near a singular configuration mostly agree to 1e-11; those that differ by more than the error
+   * of a good step, 1e-7, do not agree. */
   .agree = 1e-7,
   .agree_best = 1e-11,
 
   /* A step that ends within a tenth of its length from a singular configuration: the accelerations, whose error is that
    * of the state over the sine, are ten times less accurate than at its beginning. */
-  .lands = 0.1,
+  .ends_singular = 0.1,
 
   /* A sample does not affect the next step: an error of a hundredth is acceptable. */
   .sample = 1e-2,
@@ -87,8 +89,8 @@ const pw_watchdog pw_watchdog_limits = {
 
   /* Conditioning of the active rows: another set is sought at 0.6 of the initial value, and where a coefficient exceeds
    * 1 / 0.7. */
-  .loosened = 0.6,
-  .loose = 0.7,
+  .reselect_ratio = 0.6,
+  .reselect_below = 0.7,
 
   /* Products of three masses must neither overflow nor underflow. */
   .extreme = 1e100,
@@ -100,7 +102,7 @@ const pw_watchdog pw_watchdog_limits = {
 
 /* ---- Opening ---- */
 
-/* The n-th body of an element; s->bodies: the ground. */
+/* The index of the n-th body of element e; that of the ground is s->bodies. */
 static int singular_body (const pw_system *s, const pw_element_batch *k, int e, int n) {
   int j = k->column[e * k->kind->bodies + n];
   return j < s->coords ? j / 3 : s->bodies;
@@ -134,11 +136,11 @@ int pw_watchdog_open (pw_run *r, pw_error *error) {
   if (g->loops < 0) return pw_fail_memory (s, error);
   if (g->loops == 0 && s->rows == s->holonomic) return PW_OK;
   pw_saddle_close (g->saddle);
-  if (g->q == NULL) g->q = malloc (n * sizeof *g->q);
+  if (g->previous_q == NULL) g->previous_q = malloc (n * sizeof *g->previous_q);
   double *weight = malloc (n * sizeof *weight);
   g->saddle = NULL;
-  if (g->q && weight) {
-    pw_rank_weights (s, weight);
+  if (g->previous_q && weight) {
+    pw_length_weights (s, weight);
     g->saddle = pw_saddle_open (r->w, weight, s->rows, r->active, error);
   }
   free (weight);
@@ -147,42 +149,40 @@ int pw_watchdog_open (pw_run *r, pw_error *error) {
 
 void pw_watchdog_close (pw_run *r) {
   pw_saddle_close (r->geometry.saddle);
-  free (r->geometry.q);
+  free (r->geometry.previous_q);
   r->geometry = (pw_geometry){ 0 };
 }
 
 /* ---- Sines ---- */
 
 double pw_watchdog_sine (pw_run *r, int *row) {
-  int which;
-  pw_saddle *k = r->geometry.saddle;
-  if (k == NULL) return 1;
-  int status = pw_saddle_factor (k);
-  double sine = pw_saddle_pivot (k, &which);
-  if (row) *row = which;
+  pw_saddle *saddle = r->geometry.saddle;
+  if (saddle == NULL) return 1;
+  int status = pw_saddle_factor (saddle);
+  double sine = pw_saddle_sine (saddle, row);
   return status == PW_OK ? sine : 0;
 }
 
 int pw_watchdog_near (pw_run *r) {
   pw_geometry *g = &r->geometry;
-  if (!g->alert || g->saddle == NULL) return 0;
-  if (!pw_fixed_steps (r) && !pw_saddle_below (r->saddle, r->limits.refine)) return 0;
-  g->sine = pw_watchdog_sine (r, NULL);
-  return g->sine < r->limits.near * g->typical;
+  if (!g->singular_ahead || g->saddle == NULL) return 0;
+  if (!pw_fixed_steps (r) && !pw_saddle_sine_below (r->saddle, r->limits.refine)) return 0;
+  g->evaluated_sine = pw_watchdog_sine (r, NULL);
+  return g->evaluated_sine < r->limits.near * g->largest_sine;
 }
 
 int pw_fail_singular (pw_run *r, double t, pw_error *error) {
   char element[120] = "a constraint";
   int row = -1;
   double sine = pw_watchdog_sine (r, &row);
-  if (sine > r->limits.dependent && sine > r->limits.near * r->geometry.typical) /* typical is 0 at opening */
+  if (sine > r->limits.rank_refused && sine > r->limits.near * r->geometry.largest_sine) /* 0 at opening */
     return pw_fail (
         error, PW_METHOD,
         "t = %.6g s: values too extreme: masses and inertias differ by so much that the equations of motion "
         "cannot be solved; the configuration is not singular",
         t);
   if (row >= 0) pw_system_row_name (r->s, row, element, sizeof element);
-  if (sine <= r->limits.rank)
+  if (sine <= r->limits.rank_lost)
     return pw_fail (error, PW_METHOD, "t = %.6g s: singular configuration: %s depends on other constraints", t,
                     element);
   return pw_fail (
@@ -194,7 +194,7 @@ int pw_fail_singular (pw_run *r, double t, pw_error *error) {
 
 int pw_watchdog_near_state (pw_run *r) {
   if (pw_evaluate_J_at (r->w, r->t, r->q, r->v) != PW_OK) return 0;
-  r->geometry.alert = 1;
+  r->geometry.singular_ahead = 1;
   return pw_watchdog_near (r);
 }
 
@@ -209,7 +209,7 @@ int pw_watchdog_check_values (const pw_run *r, pw_error *error) {
                       s->model, pw_system_state_name (s, i, name, sizeof name), value, extreme);
   }
   for (int j = 0; s->rows > 0 && j < s->coords; j++) {
-    double mass = s->mass[j] / (pw_as_length (s, j) * pw_as_length (s, j));
+    double mass = s->mass[j] / (pw_length_factor (s, j) * pw_length_factor (s, j));
     if (mass != 0 && !(mass < extreme && mass > 1 / extreme))
       return pw_fail (
           error, PW_INPUT,

@@ -1,21 +1,22 @@
-/* Specialised code in place of the general evaluation and projection.  It refuses states at which a pivot is small or a
- * value extreme; the general engine evaluates these. */
+/* Use of specialised code, compiled for one scene, in place of the general evaluation and projection.  It refuses
+ * states at which a pivot is small or a value extreme; the general functions evaluate these. */
 #include <math.h>
 #include "method.h"
 #include "specialised.h"
 #include "util.h"
 
+/* Updates signals, for the compiled code. */
 static int specialised_update (void *workspace, double t, const double *q, const double *v) {
   return pw_update_signals (workspace, t, q, v);
 }
 
-/* The scene's data, with pointers to elements, types and signals, and the constants. */
+/* Makes r->scene, the data of the compiled code; PW_OK or PW_RESOURCE. */
 static int specialised_allocate (pw_run *r, int constants) {
   const pw_system *s = r->s;
   const void **element = NULL;
   const pw_kind **kind = NULL;
   const pw_signal **signal = NULL;
-  double *constant = NULL;
+  double *constant = NULL; /* filled by the code's `prepare` */
   for (pw_layout l = { 0 }; pw_layout_pass (&l, &r->scene_memory);) {
     r->scene = pw_layout_alloc (&l, 1, sizeof *r->scene);
     element = pw_layout_alloc (&l, (size_t)s->batches, sizeof *element);
@@ -45,7 +46,7 @@ int pw_specialised_open (pw_run *r, pw_error *error) {
   if (!pw_specialised_fits (code, r->s))
     return pw_fail (error, PW_INPUT, "model %s: the specialised code belongs to another scene", r->s->model);
   if (specialised_allocate (r, code->constants) != PW_OK) return pw_fail_memory (r->s, error);
-  r->scene->follows = r->limits.follows;
+  r->scene->follows = r->limits.redundant_residual;
   r->scene->alpha = r->alpha, r->scene->beta = r->beta;
   r->scene_ready = code->prepare (r->scene) == 0;
   pw_specialised_select (r);
@@ -54,17 +55,18 @@ int pw_specialised_open (pw_run *r, pw_error *error) {
 
 void pw_specialised_select (pw_run *r) {
   const pw_specialised *code = r->settings.specialised;
-  int same = r->scene_ready;
-  for (int i = 0; same && i < r->s->rows; i++) same = code->independent[i] == (r->active == NULL || r->active[i]);
-  r->specialised = same ? code : NULL;
+  int suits = r->scene_ready;
+  for (int i = 0; suits && i < r->s->rows; i++) suits = code->independent[i] == (r->active == NULL || r->active[i]);
+  r->specialised = suits ? code : NULL;
 }
 
-/* 0 where the general engine has more to do than to evaluate: with fixed steps it watches the sine of every stage;
- * adaptive methods ask for it only below the pivots that the specialised code accepts. */
+/* 0 where the general functions have more to do than to evaluate: with fixed steps they compute the sine of every stage
+ * where a singular configuration may be ahead; adaptive methods need it only below the pivots that the specialised code
+ * accepts. */
 int pw_specialised_suits (const pw_run *r) {
   const pw_geometry *g = &r->geometry;
-  return r->specialised && !r->redundant_moves && !(g->alert && g->saddle && pw_fixed_steps (r)) && !r->near_singular &&
-         !r->w->hold;
+  return r->specialised && !r->redundant_moves && !(g->singular_ahead && g->saddle && pw_fixed_steps (r)) &&
+         !r->near_singular && !r->w->hold;
 }
 
 void pw_specialised_scale (pw_run *r) {
@@ -78,7 +80,8 @@ void pw_specialised_count (pw_run *r, long evaluations, long iterations) {
   r->statistics.factorisations += evaluations + iterations;
 }
 
-static void specialised_evaluated (pw_run *r, const double *q, const double *v, long iterations) {
+/* After an evaluation at (q, v): makes the workspace and the saddle consistent with it, and counts it. */
+static void specialised_finish (pw_run *r, const double *q, const double *v, long iterations) {
   if (r->s->coords > 3 * r->s->bodies) pw_point_to_internal (r->w, q, v);
   pw_saddle_postpone (r->saddle, PW_SCENE_PIVOT);
   pw_specialised_count (r, 1, iterations);
@@ -87,17 +90,18 @@ static void specialised_evaluated (pw_run *r, const double *q, const double *v, 
 int pw_specialised_evaluate (pw_run *r, double t, const double *q, const double *v, double *a, double *lambda) {
   if (!pw_specialised_suits (r)) return 0;
   if (r->specialised->evaluate (r->scene, t, q, v, a, lambda, r->w->configuration, r->w->J)) return 0;
-  specialised_evaluated (r, q, v, 0);
+  specialised_finish (r, q, v, 0);
   return 1;
 }
 
+/* The first stage of a step is the state reached, which has been evaluated. */
 int pw_specialised_stages (pw_run *r, const pw_scene_step *x) {
   if (!pw_specialised_suits (r) || r->specialised->stages (r->scene, x)) return 0;
   pw_specialised_count (r, x->stages - 1, 0);
   return 1;
 }
 
-static void specialised_note (pw_run *r) {
+static void specialised_copy_residuals (pw_run *r) {
   const pw_scene *s = r->scene;
   r->residuals = (pw_residuals){ .position = s->position, .g = s->g, .velocity = s->velocity, .jv = s->jv };
 }
@@ -105,14 +109,14 @@ static void specialised_note (pw_run *r) {
 int pw_specialised_project (const pw_projector *p, pw_run *r, double t, double *q, double *v, double *a,
                             double *lambda) {
   pw_scene *s = r->scene;
-  if (!p->by_mass || p->alone || !pw_specialised_suits (r)) return 0;
+  if (!p->mass_metric || p->ignores_inactive || !pw_specialised_suits (r)) return 0;
   pw_specialised_scale (r);
   if (r->specialised->project (s, t, q, v, a, lambda, r->w->configuration, r->w->J)) return 0;
-  specialised_evaluated (r, q, v, s->iterations);
+  specialised_finish (r, q, v, s->iterations);
   if (r->active)
     pw_forget_residuals (r);
   else
-    specialised_note (r);
+    specialised_copy_residuals (r);
   return 1;
 }
 
@@ -121,5 +125,5 @@ void pw_specialised_residuals (pw_run *r) {
     return;
   pw_specialised_scale (r);
   r->specialised->residuals (r->scene, r->q, r->v, r->w->configuration, r->w->J);
-  specialised_note (r);
+  specialised_copy_residuals (r);
 }

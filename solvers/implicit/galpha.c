@@ -9,22 +9,24 @@
  *   index3    g = 0,              S v' = b   (nonholonomic rows),   mu = 0
  *   ggl       g = 0,              J v' = eta                        stabilised index 2 (Gear, Gupta & Leimkuhler 1985)
  *
- * The acceleration-like variable w approximates the acceleration at t + shift h, shift = alpha_m - alpha_f, with an
- * error of order h^2; D as in ida.  The coefficients follow from the spectral radius rho at infinite frequency.
+ * with G and S the holonomic and the nonholonomic rows of J, D as in dae.h.  The acceleration-like variable w
+ * approximates the acceleration at t + shift h, shift = alpha_m - alpha_f, with an error of order h^2.  The
+ * coefficients follow from the spectral radius rho at infinite frequency.
  *
  * For order 2 from the first step, the initial w is a + shift h a-dot.  In index3, where g = 0 requires a velocity
- * error C h^2 G a-dot, C = 1/6 - beta - shift/2, the initial v includes that error; otherwise the first multipliers
- * have an error of order h (Arnold, Brüls & Cardona 2015, Error analysis of generalized-alpha Lie group time
- * integration methods for constrained mechanical systems).  A change of step size and a discontinuity require a new
- * initialisation, from velocities projected onto J v = eta.  If vibrations too fast for the step dominate a-dot, this
- * would amplify them a hundredfold; then a-dot is the change of a in a trial step from w = a.
+ * error dv with G dv = C h^2 G a-dot, C = 1/6 - beta - shift/2, the initial v includes that error; otherwise the first
+ * multipliers have an error of order h (Arnold, Brüls & Cardona 2015, Error analysis of generalized-alpha Lie group
+ * time integration methods for constrained mechanical systems).  A change of step size and a discontinuity require a
+ * new initialisation, from velocities projected onto J v = eta.  If vibrations too fast for the step dominate a-dot,
+ * this would amplify them a hundredfold; then a-dot is the change of a in a trial step from w = a.
  *
  * Newton's iteration has the unknowns q', v', lambda', mu; w' and a' follow from v'.  With c = gamma / (h beta) and
- * e = (1 - alpha_m) / ((1 - alpha_f) h gamma) the equations are those of dae.h, with
+ * e = (1 - alpha_m) / ((1 - alpha_f) h gamma) the equations are those of dae.h, in which
  *
- *   c (q' - q - h v - h^2 (1/2 - beta) w - h^2 beta w')  for q' - v,   dw' = dv' / (h gamma),   da' = e dv'
+ *   c (q' - q - h v - h^2 (1/2 - beta) w - h^2 beta w')
  *
- * so that c and e are the coefficients of dF/dy'.  Corrections of v', lambda', mu are in units of c, c e m, c, and the
+ * stands for the derivative of q less v.  Corrections satisfy dw' = dv' / (h gamma), da' = e dv', so that c
+ * and e are the coefficients of dF/dy'.  Corrections of v', lambda', mu are in units of c, c e m, c, and the
  * equations are divided by c, c e m, c, with m a mass: then all entries of the matrix are of the same size for every
  * step, and its condition number does not depend on the step (Bottasso, Bauchau & Cardona 2007,
  * Time-step-size-independent conditioning and sensitivity to perturbations in the numerical solution of index three
@@ -36,30 +38,31 @@
 #include "implicit.h"
 
 struct pw_method_data {
-  pw_implicit work; /* first; its q1 and v1 are the first unknowns */
+  pw_implicit common; /* first; its q1 and v1 are the first unknowns */
   double alpha_m, alpha_f, beta, gamma;
-  double *v, *a, *w;        /* velocities, accelerations and w at the beginning of the next step */
-  double *y, *a1, *w1;      /* unknowns; accelerations and w of the new state */
-  double *z, *row, *column; /* unknowns: residual, then correction; scales of the matrix */
+  double *v, *a, *w;                  /* coords: velocities, accelerations and w at the beginning of the next step */
+  double *a1, *w1;                    /* coords: accelerations and w of the new state */
+  double *y, *z;                      /* unknowns: q', v', lambda', mu; residual, then correction */
+  double *row_factor, *column_factor; /* unknowns: by which rows and columns of the matrix are multiplied */
 };
 
 typedef struct pw_method_data galpha;
 
-/* Coefficients of the derivatives by q' and a'. */
-static double galpha_of_q (const galpha *d, double h) {
+/* The coefficients c and e. */
+static double galpha_c (const galpha *d, double h) {
   return d->gamma / (h * d->beta);
 }
-static double galpha_of_a (const galpha *d, double h) {
+static double galpha_e (const galpha *d, double h) {
   return (1 - d->alpha_m) / ((1 - d->alpha_f) * h * d->gamma);
 }
 
 /* ---- Newton's iteration ---- */
 
 static int galpha_update (pw_run *r, double t1) {
-  return pw_evaluate_J_at (r->w, pw_before_breakpoint (r, t1), r->data->work.q1, r->data->work.v1);
+  return pw_evaluate_J_at (r->w, pw_before_breakpoint (r, t1), r->data->common.q1, r->data->common.v1);
 }
 
-/* The new velocity of coordinate j; its displacement in the step, less that by mu. */
+/* The new velocity of coordinate j, from w'; its displacement in the step, without that by mu. */
 static double galpha_velocity (const galpha *d, double h, int j) {
   return d->v[j] + h * ((1 - d->gamma) * d->w[j] + d->gamma * d->w1[j]);
 }
@@ -69,98 +72,101 @@ static double galpha_displacement (const galpha *d, double h, int j) {
 
 static int galpha_residual (pw_run *r, double h, double t1) {
   galpha *d = r->data;
-  pw_dae *x = &d->work.dae;
+  pw_dae *x = &d->common.dae;
   int status = galpha_update (r, t1);
   if (status != PW_OK) return status;
-  pw_dae_residual (x, d->work.v1, d->a1, d->y + 2 * x->n, d->z);
+  pw_dae_residual (x, d->common.v1, d->a1, d->y + 2 * x->n, d->z);
   for (int j = 0; j < x->n; j++)
-    d->z[j] += galpha_of_q (d, h) * (d->work.q1[j] - r->q[j] - galpha_displacement (d, h, j));
+    d->z[j] += galpha_c (d, h) * (d->common.q1[j] - r->q[j] - galpha_displacement (d, h, j));
   r->statistics.rhs++;
   return PW_OK;
 }
 
+/* Adds all entries of the Newton matrix. */
 static void galpha_fill (galpha *d, double h) {
-  pw_dae *x = &d->work.dae;
-  pw_dae_matrix (x, d->work.v1, d->a1, d->y + 2 * x->n, galpha_of_q (d, h), galpha_of_a (d, h));
+  pw_dae *x = &d->common.dae;
+  pw_dae_matrix (x, d->common.v1, d->a1, d->y + 2 * x->n, galpha_c (d, h), galpha_e (d, h));
 }
 
 static int galpha_factor (pw_run *r, double h) {
   galpha *d = r->data;
-  const pw_dae *x = &d->work.dae;
+  const pw_dae *x = &d->common.dae;
   const int64_t *colptr = x->tangent.colptr, *rowind = x->tangent.rowind;
-  pw_implicit_fill (&d->work, x->size);
+  pw_implicit_begin_matrix (&d->common, x->size);
   galpha_fill (d, h);
   for (int c = 0; c < x->size; c++)
-    for (int64_t i = colptr[c]; i < colptr[c + 1]; i++) d->work.value[i] *= d->row[rowind[i]] * d->column[c];
+    for (int64_t i = colptr[c]; i < colptr[c + 1]; i++)
+      d->common.value[i] *= d->row_factor[rowind[i]] * d->column_factor[c];
   r->statistics.jacobians++;
   r->statistics.factorisations++;
-  return pw_sparse_factor (&d->work.sparse, d->work.value);
+  return pw_sparse_factor (&d->common.sparse, d->common.value);
 }
 
 /* The prediction: the accelerations stay constant. */
 static void galpha_predict (pw_run *r, double h) {
   galpha *d = r->data;
-  const pw_dae *x = &d->work.dae;
+  const pw_dae *x = &d->common.dae;
   memset (d->y, 0, (size_t)x->size * sizeof *d->y);
   for (int j = 0; j < x->n; j++) {
     d->a1[j] = d->a[j];
     d->w1[j] = (d->a[j] - d->alpha_m * d->w[j]) / (1 - d->alpha_m);
-    d->work.v1[j] = galpha_velocity (d, h, j);
-    d->work.q1[j] = r->q[j] + galpha_displacement (d, h, j);
+    d->common.v1[j] = galpha_velocity (d, h, j);
+    d->common.q1[j] = r->q[j] + galpha_displacement (d, h, j);
   }
   pw_tangent_compress (&x->tangent, r->lambda, x->rows, d->y + 2 * x->n);
 }
 
-/* Solves for the correction and applies it.  *most: its size, the largest of q and h v in units of the scene; *floor:
- * their round-off.  PW_OK or PW_RESOURCE. */
-static int galpha_correct (pw_run *r, double h, double *most, double *floor) {
+/* Solves for the correction and applies it.  *correction: its size, the largest of those of q and v / c in units of the
+ * scene; *round_off: that of q and h v.  PW_OK or PW_RESOURCE. */
+static int galpha_correct (pw_run *r, double h, double *correction, double *round_off) {
   galpha *d = r->data;
-  int n = d->work.dae.n, size = d->work.dae.size;
-  double large = 1;
-  for (int i = 0; i < size; i++) d->z[i] *= -d->row[i];
-  if (pw_sparse_solve (&d->work.sparse, d->z) != PW_OK) return PW_RESOURCE;
-  *most = 0;
+  int n = d->common.dae.n, size = d->common.dae.size;
+  double largest = 1;
+  for (int i = 0; i < size; i++) d->z[i] *= -d->row_factor[i];
+  if (pw_sparse_solve (&d->common.sparse, d->z) != PW_OK) return PW_RESOURCE;
+  *correction = 0;
   for (int j = 0; j < n; j++) {
-    double most_j = pw_larger_or_nan (fabs (d->z[j]), fabs (d->z[n + j]));
-    *most = pw_larger_or_nan (*most, most_j / pw_unit (r->s, j));
+    double larger = pw_larger_or_nan (fabs (d->z[j]), fabs (d->z[n + j]));
+    *correction = pw_larger_or_nan (*correction, larger / pw_unit (r->s, j));
   }
-  for (int i = 0; i < size; i++) d->y[i] += d->column[i] * d->z[i];
+  for (int i = 0; i < size; i++) d->y[i] += d->column_factor[i] * d->z[i];
   for (int j = 0; j < n; j++) {
-    double dv = d->column[n + j] * d->z[n + j];
+    double dv = d->column_factor[n + j] * d->z[n + j];
     d->w1[j] += dv / (h * d->gamma);
-    d->a1[j] += galpha_of_a (d, h) * dv;
-    d->work.v1[j] = galpha_velocity (d, h, j);
-    large = fmax (large, fmax (fabs (d->work.q1[j]), h * fabs (d->work.v1[j])) / pw_unit (r->s, j));
+    d->a1[j] += galpha_e (d, h) * dv;
+    d->common.v1[j] = galpha_velocity (d, h, j);
+    largest = fmax (largest, fmax (fabs (d->common.q1[j]), h * fabs (d->common.v1[j])) / pw_unit (r->s, j));
   }
-  *floor = 4 * DBL_EPSILON * large;
+  *round_off = 4 * DBL_EPSILON * largest;
   return PW_OK;
 }
 
 /* Computes the new state at t1 = t + h with its accelerations and multipliers; kinematics and J are left there.
  * PW_RETRY if the iteration does not converge, PW_INPUT if its matrix is singular, PW_METHOD if a signal failed.
  *
- * The matrix is evaluated at the prediction, and again while convergence is slow.  The remaining error must be small
- * against the method's error in multipliers, which is of order h^2; a correction changes the multipliers by 1/h^2 times
- * its size. */
+ * The matrix is evaluated at the prediction, and again while convergence is slow.  The remaining error in multipliers,
+ * 1/h^2 times that of positions, must be small against the method's own, which is of order h^2: hence the target of
+ * order h^4.  Where corrections stall at a few times their round-off, they are accepted. */
 static int galpha_solve (pw_run *r, double h, double t1) {
-  const int most = 20;
+  const int most = 20; /* iterations */
   galpha *d = r->data;
-  double before = INFINITY, size, floor, good = fmin (1e-9, 1e-3 * pow (h / r->w->scale.time, 4)), rate = 1;
-  if (h != d->work.h) pw_implicit_scale (&d->work.dae, galpha_of_q (d, h), galpha_of_a (d, h), d->row, d->column);
+  double before = INFINITY, size, round_off, target = fmin (1e-9, 1e-3 * pow (h / r->w->scale.time, 4)), rate = 1;
+  if (h != d->common.h)
+    pw_implicit_scale (&d->common.dae, galpha_c (d, h), galpha_e (d, h), d->row_factor, d->column_factor);
   galpha_predict (r, h);
-  for (int i = 0, fresh = 1; i < most; i++) {
+  for (int i = 0, refactor = 1; i < most; i++) {
     int status = galpha_residual (r, h, t1);
-    if (status == PW_OK && fresh) status = galpha_factor (r, h);
-    if (status == PW_OK) status = galpha_correct (r, h, &size, &floor);
+    if (status == PW_OK && refactor) status = galpha_factor (r, h);
+    if (status == PW_OK) status = galpha_correct (r, h, &size, &round_off);
     if (status != PW_OK) return status;
-    double enough = fmax (good, floor);
+    double enough = fmax (target, round_off);
     if (!isfinite (size)) return PW_RETRY;
     if (i > 0) rate = size / before;
-    int stalled = rate > 0.25 && size <= 32 * floor;
+    int stalled = rate > 0.25 && size <= 32 * round_off;
     if (size <= enough || stalled || (rate < 1 && size * rate / (1 - rate) <= enough)) return galpha_update (r, t1);
     if (rate > 2 && i > 3) return PW_RETRY;
-    fresh = i > 0 && rate > 0.02;
-    if (fresh) pw_sparse_forget (&d->work.sparse);
+    refactor = i > 0 && rate > 0.02;
+    if (refactor) pw_sparse_forget_pivots (&d->common.sparse);
     before = size;
   }
   return PW_RETRY;
@@ -168,7 +174,7 @@ static int galpha_solve (pw_run *r, double h, double t1) {
 
 /* ---- Opening ---- */
 
-/* Order 2 with the least damping of low frequencies for a given rho. */
+/* Order 2 with the least damping of low frequencies for a given spectral radius rho at infinite frequency. */
 static void galpha_coefficients (galpha *d, double rho) {
   d->alpha_m = (2 * rho - 1) / (rho + 1);
   d->alpha_f = rho / (rho + 1);
@@ -181,42 +187,46 @@ static int galpha_open (pw_run *r, pw_error *error) {
   const pw_system *s = r->s;
   size_t n = (size_t)s->coords + 3, most = 2 * (n + (size_t)s->rows);
   if (d == NULL) return pw_fail_memory (s, error);
-  const pw_array array[] = { { &d->v, n },  { &d->a, n },    { &d->w, n },      { &d->y, most },     { &d->a1, n },
-                             { &d->w1, n }, { &d->z, most }, { &d->row, most }, { &d->column, most } };
-  int status = pw_implicit_open (&d->work, r, array, sizeof array / sizeof *array);
-  pw_dae *x = &d->work.dae;
+  const pw_array array[] = {
+    { &d->v, n },  { &d->a, n },    { &d->row_factor, most }, { &d->column_factor, most }, { &d->w, n }, { &d->a1, n },
+    { &d->w1, n }, { &d->y, most }, { &d->z, most }
+  };
+  int status = pw_implicit_open (&d->common, r, array, sizeof array / sizeof *array);
+  pw_dae *x = &d->common.dae;
   if (status == PW_OK) {
     galpha_coefficients (d, pw_run_option (r, "rho"));
-    d->work.q1 = d->y, d->work.v1 = d->y + x->n;
-    pw_scatter_record (&x->tangent.scatter);
+    d->common.q1 = d->y, d->common.v1 = d->y + x->n;
+    pw_scatter_begin_record (&x->tangent.scatter);
     galpha_fill (d, 1);
-    status = pw_implicit_lay_out (&d->work, x->size);
+    status = pw_implicit_lay_out (&d->common, x->size);
   }
-  return pw_implicit_complete (r, status, x->velocities, error);
+  pw_dense_projection projection = x->enforces_velocities ? PW_DENSE_POSITIONS_AND_VELOCITIES : PW_DENSE_POSITIONS;
+  return pw_implicit_complete (r, status, projection, error);
 }
 
 /* ---- Initialisation ---- */
 
-/* a-dot at the current state: a difference quotient over 1e-3 of the step, short enough for stiff forces, long enough
+/* a-dot at the state reached: a difference quotient over 1e-3 of the step, short enough for stiff forces, long enough
  * for round-off. */
 static int galpha_jerk (pw_run *r, double h, double *jerk) {
   galpha *d = r->data;
-  double s = 1e-3 * h;
-  for (int j = 0; j < d->work.dae.n; j++) {
-    d->work.q1[j] = r->q[j] + s * (d->v[j] + 0.5 * s * d->a[j]);
-    d->work.v1[j] = d->v[j] + s * d->a[j];
+  double dt = 1e-3 * h;
+  for (int j = 0; j < d->common.dae.n; j++) {
+    d->common.q1[j] = r->q[j] + dt * (d->v[j] + 0.5 * dt * d->a[j]);
+    d->common.v1[j] = d->v[j] + dt * d->a[j];
   }
-  int status =
-      pw_run_accelerate (r, pw_before_breakpoint (r, r->t + s), d->work.q1, d->work.v1, jerk, d->work.dae.other);
-  for (int j = 0; j < d->work.dae.n; j++) jerk[j] = (jerk[j] - d->a[j]) / s;
+  int status = pw_run_accelerate (r, pw_before_breakpoint (r, r->t + dt), d->common.q1, d->common.v1, jerk,
+                                  d->common.dae.scratch);
+  for (int j = 0; j < d->common.dae.n; j++) jerk[j] = (jerk[j] - d->a[j]) / dt;
   return status;
 }
 
-/* 1 if a-dot would change the accelerations by several times their size in a step: the scene has faster vibrations. */
-static int galpha_fast (const pw_run *r, double h, const double *jerk) {
+/* 1 if a-dot would change the accelerations by several times their size in a step: the scene has vibrations that are
+ * too fast for the step. */
+static int galpha_vibrates (const pw_run *r, double h, const double *jerk) {
   const galpha *d = r->data;
   double change = 0, size = 0;
-  for (int j = 0; j < d->work.dae.n; j++) {
+  for (int j = 0; j < d->common.dae.n; j++) {
     change += r->s->metric[j] * jerk[j] * jerk[j];
     size += r->s->metric[j] * d->a[j] * d->a[j];
   }
@@ -225,63 +235,64 @@ static int galpha_fast (const pw_run *r, double h, const double *jerk) {
 
 /* a-dot as the change of a in a trial step from w = a, which does not amplify vibrations that the step does not
  * resolve. */
-static int galpha_try (pw_run *r, double h, double *jerk) {
+static int galpha_trial_jerk (pw_run *r, double h, double *jerk) {
   galpha *d = r->data;
-  memcpy (d->w, d->a, (size_t)d->work.dae.n * sizeof *d->w);
+  memcpy (d->w, d->a, (size_t)d->common.dae.n * sizeof *d->w);
   int status = galpha_solve (r, h, r->t + h);
-  for (int j = 0; j < d->work.dae.n; j++) jerk[j] = status == PW_OK ? (d->a1[j] - d->a[j]) / h : 0;
+  for (int j = 0; j < d->common.dae.n; j++) jerk[j] = status == PW_OK ? (d->a1[j] - d->a[j]) / h : 0;
   return status > 0 ? PW_OK : status; /* the step itself may still succeed */
 }
 
-/* Adds to the velocities the part of C h^2 a-dot normal to the holonomic constraints, least in the metric of M. */
-static int galpha_displace (pw_run *r, double h, const double *jerk) {
+/* Adds to the velocities the error with which the method starts without loss of order in index3: the dv with
+ * G dv = C h^2 G a-dot that is least in the metric of M. */
+static int galpha_add_velocity_error (pw_run *r, double h, const double *jerk) {
   galpha *d = r->data;
   const pw_system *s = r->s;
-  double C = 1. / 6 - d->beta - 0.5 * (d->alpha_m - d->alpha_f), *dv = d->work.v1;
+  double C = 1. / 6 - d->beta - 0.5 * (d->alpha_m - d->alpha_f), *dv = d->common.v1;
   int status = pw_evaluate_J_at (r->w, r->t, r->q, d->v);
   if (status != PW_OK) return status;
-  pw_mul_J (r->w, jerk, d->work.dae.jv);
-  for (int i = 0; i < s->rows; i++) d->work.dae.jv[i] *= i < s->holonomic ? C * h * h : 0;
+  pw_mul_J (r->w, jerk, d->common.dae.residual);
+  for (int i = 0; i < s->rows; i++) d->common.dae.residual[i] *= i < s->holonomic ? C * h * h : 0;
   status = pw_saddle_factor (r->saddle);
   if (status != PW_OK) return status;
-  pw_saddle_solve (r->saddle, NULL, d->work.dae.jv, dv, d->work.dae.other);
-  for (int j = 0; j < d->work.dae.n; j++) d->v[j] += dv[j];
+  pw_saddle_solve (r->saddle, NULL, d->common.dae.residual, dv, d->common.dae.scratch);
+  for (int j = 0; j < d->common.dae.n; j++) d->v[j] += dv[j];
   return PW_OK;
 }
 
-/* Initialises v, a and w for the first step of size h. */
+/* Initialises v, a and w for the first step of this size. */
 static int galpha_begin (pw_run *r, double h) {
   galpha *d = r->data;
   double *jerk = d->w1;
   int status = PW_OK;
-  memcpy (d->v, r->v, (size_t)d->work.dae.n * sizeof *d->v);
-  if (!d->work.dae.velocities) { /* velocities include the error of the steps before */
+  memcpy (d->v, r->v, (size_t)d->common.dae.n * sizeof *d->v);
+  if (!d->common.dae.enforces_velocities) { /* velocities include the error of the steps before */
     status = pw_evaluate_J_at (r->w, r->t, r->q, d->v);
-    if (status == PW_OK) status = pw_project_velocities (&d->work.last.projector, r, d->v);
+    if (status == PW_OK) status = pw_project_velocities (&d->common.last.projector, r, d->v);
   }
-  if (status == PW_OK) status = pw_run_accelerate (r, r->t, r->q, d->v, d->a, d->work.dae.other);
+  if (status == PW_OK) status = pw_run_accelerate (r, r->t, r->q, d->v, d->a, d->common.dae.scratch);
   if (status == PW_OK) status = galpha_jerk (r, h, jerk);
-  if (status == PW_OK && galpha_fast (r, h, jerk)) status = galpha_try (r, h, jerk);
+  if (status == PW_OK && galpha_vibrates (r, h, jerk)) status = galpha_trial_jerk (r, h, jerk);
   if (status != PW_OK) return status;
-  for (int j = 0; j < d->work.dae.n; j++) d->w[j] = d->a[j] + (d->alpha_m - d->alpha_f) * h * jerk[j];
-  return d->work.dae.velocities || r->s->holonomic == 0 ? PW_OK : galpha_displace (r, h, jerk);
+  for (int j = 0; j < d->common.dae.n; j++) d->w[j] = d->a[j] + (d->alpha_m - d->alpha_f) * h * jerk[j];
+  return d->common.dae.enforces_velocities || r->s->holonomic == 0 ? PW_OK : galpha_add_velocity_error (r, h, jerk);
 }
 
 /* ---- Advancing ---- */
 
 static int galpha_step (pw_run *r, double h, double t1) {
-  int status = h != r->data->work.h ? galpha_begin (r, h) : PW_OK;
+  int status = h != r->data->common.h ? galpha_begin (r, h) : PW_OK;
   return status == PW_OK ? galpha_solve (r, h, t1) : status;
 }
 
 static void galpha_accept (pw_run *r) {
   galpha *d = r->data;
-  size_t n = (size_t)d->work.dae.n * sizeof (double);
+  size_t n = (size_t)d->common.dae.n * sizeof (double);
   memcpy (r->a, d->a1, n);
   memcpy (d->v, r->v, n);
   memcpy (d->a, d->a1, n);
   memcpy (d->w, d->w1, n);
-  pw_tangent_store (&d->work.dae.tangent, d->y + 2 * d->work.dae.n, r->lambda);
+  pw_tangent_expand (&d->common.dae.tangent, d->y + 2 * d->common.dae.n, r->lambda);
 }
 
 static int galpha_advance (pw_run *r, double t_end, pw_error *error) {
@@ -313,7 +324,5 @@ const pw_method pw_method_galpha = {
   .options = galpha_options,
   .open = galpha_open,
   .advance = galpha_advance,
-  .at = pw_implicit_at,
-  .restart = pw_implicit_restart,
-  .close = pw_implicit_close,
+  PW_IMPLICIT_FUNCTIONS,
 };

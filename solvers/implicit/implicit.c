@@ -1,4 +1,4 @@
-/* The driver of methods with an implicit step; see implicit.h. */
+/* The implicit methods with a fixed step: opening, scaling of the Newton matrix, steps; see implicit.h. */
 #include "implicit.h"
 #include <math.h>
 #include <stdlib.h>
@@ -19,12 +19,12 @@ int pw_implicit_lay_out (pw_implicit *x, int size) {
   pw_tangent *t = &x->dae.tangent;
   if (pw_scatter_lay_out (&t->scatter, size, &t->colptr, &t->rowind) != PW_OK) return PW_RESOURCE;
   x->value = malloc (((size_t)t->colptr[size] + 1) * sizeof *x->value);
-  return x->value ? pw_sparse_open (&x->sparse, 0, size, t->colptr, t->rowind) : PW_RESOURCE;
+  return x->value ? pw_sparse_open (&x->sparse, PW_SPARSE_REAL, size, t->colptr, t->rowind) : PW_RESOURCE;
 }
 
-int pw_implicit_complete (pw_run *r, int status, int velocities, pw_error *error) {
+int pw_implicit_complete (pw_run *r, int status, pw_dense_projection projection, pw_error *error) {
   if (status != PW_OK) return pw_fail_memory (r->s, error);
-  status = pw_dense_output_open (&implicit_of (r)->last, r, velocities, error);
+  status = pw_dense_output_open (&implicit_of (r)->last, r, projection, error);
   return status == PW_OK ? pw_implicit_restart (r, error) : status;
 }
 
@@ -41,44 +41,51 @@ void pw_implicit_close (pw_run *r) {
 int pw_implicit_restart (pw_run *r, pw_error *error) {
   pw_implicit *x = implicit_of (r);
   (void)error;
-  x->base = x->last.t0 = r->t;
-  x->count = 0;
+  x->counter = (pw_step_counter){ .base = r->t };
+  x->last.start.t = r->t;
   x->h = 0;
   return PW_OK;
 }
 
-void pw_implicit_scale (const pw_dae *x, double c, double e, double *row, double *column) {
+void pw_implicit_scale (const pw_dae *x, double c, double e, double *row_factor, double *column_factor) {
   const pw_system *s = x->tangent.run->s;
-  int n = x->n, third = x->velocities ? 0 : x->tangent.holonomic; /* rows of lambda that enforce positions */
+  int n = x->n,
+      g_rows = x->enforces_velocities ? 0 : x->tangent.holonomic; /* rows of lambda in which g = 0 replaces J v = eta */
   double mass = 0;
   for (int j = 0; j < n; j++) mass = fmax (mass, s->mass[j]);
   if (mass == 0) mass = 1;
   for (int j = 0; j < n; j++) {
-    row[j] = 1 / c, column[j] = 1;
-    row[n + j] = 1 / (c * e * mass), column[n + j] = c;
+    row_factor[j] = 1 / c, column_factor[j] = 1;
+    row_factor[n + j] = 1 / (c * e * mass), column_factor[n + j] = c;
   }
-  for (int i = 0; i < x->rows; i++) row[2 * n + i] = i < third ? 1 : 1 / c, column[2 * n + i] = c * e * mass;
-  for (int i = 2 * n + x->rows; i < x->size; i++) row[i] = 1, column[i] = c;
+  for (int i = 2 * n; i < 2 * n + x->rows; i++)
+    row_factor[i] = i - 2 * n < g_rows ? 1 : 1 / c, column_factor[i] = c * e * mass;
+  for (int i = 2 * n + x->rows; i < x->size; i++) row_factor[i] = 1, column_factor[i] = c;
 }
 
 /* ---- Advancing ---- */
 
-void pw_implicit_fill (pw_implicit *x, int size) {
+void pw_implicit_begin_matrix (pw_implicit *x, int size) {
   memset (x->value, 0, (size_t)x->dae.tangent.colptr[size] * sizeof *x->value);
-  pw_scatter_begin (&x->dae.tangent.scatter, x->value);
+  pw_scatter_begin_fill (&x->dae.tangent.scatter, x->value);
 }
 
-/* Reports a failed step; the reason may be a singular configuration at its beginning. */
-static int implicit_fail (pw_run *r, int status, double h, pw_error *error) {
+int pw_implicit_fail (pw_run *r, int status, double h, pw_error *error) {
   if (status == PW_METHOD) return pw_fail_signal (r->t, error);
   if (status == PW_RESOURCE) return pw_fail (error, PW_RESOURCE, "t = %.6g s: out of memory in KLU", r->t);
   if (r->near_singular || pw_watchdog_near_state (r)) return pw_fail_singular (r, r->t, error);
-  return pw_fail (error, PW_METHOD, "t = %.6g s: %s; the step of %.6g s may be too large", r->t,
-                  status == PW_INPUT ? "the Newton matrix is singular" : "the iteration does not converge", h);
+  const char *reason = status == PW_INPUT ? "the Newton matrix is singular"
+                       : status == PW_OK  ? "the error test fails"
+                                          : "the iteration does not converge";
+  if (pw_fixed_steps (r))
+    return pw_fail (error, PW_METHOD, "t = %.6g s: %s; the step of %.6g s may be too large", r->t, reason, h);
+  if (status == PW_INPUT) return pw_fail (error, PW_METHOD, "t = %.6g s: %s", r->t, reason);
+  return pw_fail (error, PW_METHOD, "t = %.6g s: %s however small the step (rtol %.3g)", r->t, reason,
+                  r->settings.rtol);
 }
 
-/* A whole step whose end lands on a singular configuration, where Newton's matrix is singular, is made longer, up to
- * `stop`.  Makes the step of size h to *t1, which it changes. */
+/* Makes a step of size h to *t1.  If it fails since its end is near a singular configuration, where Newton's matrix is
+ * singular, longer ones are tried, up to `stop`; *t1: the end of the step made. */
 static int implicit_step_around (pw_run *r, pw_implicit_step *step, double h, double stop, double *t1) {
   static const double longer[] = { 1.38, 1.76, 2.62 }; /* no multiples of each other, since configurations may recur */
   int status = step (r, h, *t1);
@@ -96,23 +103,22 @@ static int implicit_step_around (pw_run *r, pw_implicit_step *step, double h, do
 int pw_implicit_advance (pw_run *r, double t_end, pw_implicit_step *step, void (*accept) (pw_run *r), pw_error *error) {
   pw_implicit *x = implicit_of (r);
   int whole;
-  const double end = pw_step_end (r, x->base, x->count, t_end, &whole);
+  const double end = pw_step_end (r, &x->counter, t_end, &whole);
   double h = whole ? r->settings.step : end - r->t, t1 = end;
   size_t n = (size_t)r->s->coords * sizeof (double);
   r->near_singular = 0;
   int status = whole ? implicit_step_around (r, step, h, fmin (t_end, r->breakpoint), &t1) : step (r, h, t1);
   if (t1 > end) h = t1 - r->t, whole = 0;
-  if (status != PW_OK) return implicit_fail (r, status, h, error);
-  pw_dense_output_keep (&x->last, r);
+  if (status != PW_OK) return pw_implicit_fail (r, status, h, error);
+  pw_store_start (&x->last.start, r);
   memcpy (r->q, x->q1, n);
   memcpy (r->v, x->v1, n);
   accept (r);
   r->t = t1;
   x->h = h;
-  pw_dense_output_count (&x->last, r);
+  pw_dense_output_integrate_ledger (&x->last, r);
   r->statistics.steps++;
-  x->count++;
-  if (!whole) x->base = t1, x->count = 0;
+  pw_count_step (&x->counter, whole, t1);
   return PW_OK;
 }
 

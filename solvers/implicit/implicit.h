@@ -1,4 +1,4 @@
-/* The driver of galpha and leapfrog, implicit methods with a fixed step: Newton matrix, last step, dense output. */
+/* What galpha and leapfrog, the implicit methods with a fixed step, share: Newton matrix, steps, dense output. */
 #ifndef PW_IMPLICIT_H
 #define PW_IMPLICIT_H
 
@@ -7,46 +7,54 @@
 #include "sparse.h"
 #include "util.h"
 
+/* What a test of convergence decides; radau uses it, too. */
+typedef enum { PW_ITERATE, PW_CONVERGED, PW_DIVERGED } pw_convergence;
+
 /* The data of each of these methods begin with this. */
 typedef struct {
-  double base;      /* time from which steps are counted */
-  long count;       /* steps since then */
-  double h;         /* size of the last step; 0: the next one is the first */
-  double *q1, *v1;  /* the new state: coords + 3 */
-  pw_dae dae;       /* its scatter map has recorded the matrix; leapfrog uses only its tangent */
-  pw_sparse sparse; /* its factors */
-  double *value;    /* of the matrix */
-  pw_dense_output last;
-  char *memory; /* of the method's arrays */
+  pw_step_counter counter;
+  double h;             /* size of the last step; 0: the next one is the first */
+  double *q1, *v1;      /* coords + 3: the new state */
+  pw_dae dae;           /* the equations and the pattern of the Newton matrix; leapfrog uses only its tangent */
+  double *value;        /* nonzero values of the matrix */
+  pw_sparse sparse;     /* its factors */
+  pw_dense_output last; /* of the last step */
+  char *memory;         /* of the method's arrays */
 } pw_implicit;
 
 /* Allocates the method's arrays, `count` of them, and the equations: PW_OK or PW_RESOURCE. */
 int pw_implicit_open (pw_implicit *x, pw_run *r, const pw_array *array, size_t count);
 
-/* Allocates the recorded matrix of this size: PW_OK or PW_RESOURCE. */
+/* Allocates the Newton matrix, of this size, whose pattern has been recorded: PW_OK or PW_RESOURCE. */
 int pw_implicit_lay_out (pw_implicit *x, int size);
 
-/* Completes the opening, or reports that memory is exhausted if `status` is not PW_OK; velocities: 1 if the method
- * enforces J v = eta. */
-int pw_implicit_complete (pw_run *r, int status, int velocities, pw_error *error);
+/* Completes the opening with a dense output of this projection; if `status` is not PW_OK, reports that memory is
+ * exhausted. */
+int pw_implicit_complete (pw_run *r, int status, pw_dense_projection projection, pw_error *error);
 
-/* Scales of the rows and columns of a Newton matrix whose derivatives by q' and a have the coefficients c and e, so
- * that all entries are of the same size for every step. */
-void pw_implicit_scale (const pw_dae *x, double c, double e, double *row, double *column);
+/* Factors of the rows and columns of a Newton matrix whose derivatives by q' and a have the coefficients c and e: with
+ * them all its entries are of the same size, whatever the step size. */
+void pw_implicit_scale (const pw_dae *x, double c, double e, double *row_factor, double *column_factor);
 
 /* Sets the matrix to 0 and begins to fill it. */
-void pw_implicit_fill (pw_implicit *x, int size);
+void pw_implicit_begin_matrix (pw_implicit *x, int size);
 
-/* A step from the current state to the new state q1, v1 at t1 = t + h; kinematics are left there.  Returns PW_RETRY if
+/* A step from the state reached to the new state q1, v1 at t1 = t + h; kinematics are left there.  Returns PW_RETRY if
  * the iteration does not converge, PW_INPUT if its matrix is singular, PW_METHOD if a signal failed, PW_RESOURCE. */
 typedef int pw_implicit_step (pw_run *r, double h, double t1);
 
-/* One step; makes q1 and v1 the current state, and `accept` the accelerations and multipliers. */
+/* Advances by one step: makes q1, v1 the state reached, and calls `accept`, which sets its accelerations and
+ * multipliers. */
 int pw_implicit_advance (pw_run *r, double t_end, pw_implicit_step *step, void (*accept) (pw_run *r), pw_error *error);
 
-/* For the table of the method. */
+/* Reports a failed step of size h, also of radau; status: what it returned, PW_OK if its error is too large.  The
+ * reason may be a singular configuration at its beginning. */
+int pw_implicit_fail (pw_run *r, int status, double h, pw_error *error);
+
+/* For the table of the method: PW_IMPLICIT_FUNCTIONS. */
 int pw_implicit_at (pw_run *r, double t, pw_error *error);
 int pw_implicit_restart (pw_run *r, pw_error *error);
 void pw_implicit_close (pw_run *r);
+#define PW_IMPLICIT_FUNCTIONS .at = pw_implicit_at, .restart = pw_implicit_restart, .close = pw_implicit_close
 
 #endif

@@ -5,13 +5,13 @@
  *   q' - q     = h u
  *   M (v' - u) = h/2 (f (t', q', v') - J (q')^T lambda-)     J (t', q') v' = eta (t', q')
  *
- * For holonomic constraints this is RATTLE (Andersen 1983, Rattle: a "velocity" version of the Shake algorithm for
- * molecular dynamics calculations); for nonholonomic constraints the discrete Lagrange-d'Alembert principle (Cortés &
- * Martínez 2001, Non-holonomic integrators) with a discrete constraint that is symmetric in both ends, which makes the
- * method reversible (McLachlan & Perlmutter 2006, Integrators for nonholonomic mechanical systems).  Exchanging both
- * ends and h with -h gives the same equations: the method is symmetric, hence of order 2, and with forces even in the
- * velocities it retraces the motion when they are reversed.  lambda+ and lambda- are internal to the step; the reported
- * accelerations and multipliers solve the equations of motion at its end.
+ * with S the nonholonomic rows of J.  For holonomic constraints this is RATTLE (Andersen 1983, Rattle: a "velocity"
+ * version of the Shake algorithm for molecular dynamics calculations); for nonholonomic constraints the discrete
+ * Lagrange-d'Alembert principle (Cortés & Martínez 2001, Non-holonomic integrators) with a discrete constraint that is
+ * symmetric in both ends, which makes the method reversible (McLachlan & Perlmutter 2006, Integrators for nonholonomic
+ * mechanical systems).  Exchanging both ends and h with -h gives the same equations: the method is symmetric, hence of
+ * order 2, and with forces even in the velocities it retraces the motion when they are reversed.  lambda+ and lambda-
+ * are internal to the step; the reported accelerations and multipliers solve the equations of motion at its end.
  *
  * All equations are solved to round-off: for u and q' by Newton's iteration, for v' and velocity-dependent forces by
  * fixed-point iteration.  M^-1 is not needed: massless coordinates follow from their constraint equations. */
@@ -20,65 +20,66 @@
 #include <stdlib.h>
 #include <string.h>
 #include "implicit.h"
-#include "util.h"
 
-enum { DRIFT_MOST = 30, LEAPFROG_MOST = 100 }; /* Newton iterations for u; fixed-point iterations for v' */
+enum { DRIFT_MOST = 30, KICK_MOST = 100 }; /* Newton iterations for u; fixed-point iterations for v' */
 
 struct pw_method_data {
-  pw_implicit work;        /* first */
-  double *u;               /* velocities at half the step; coords + 3, as in the next line */
-  double *middle, *dv, *f; /* mean of positions, a correction of velocities, forces */
-  double *off, *mu, *eta;  /* all equations: residuals, multipliers of a correction, right-hand side */
-  double *z;               /* coords and independent equations: a correction of u and its multipliers */
+  pw_implicit common;          /* first */
+  double *u;                   /* coords + 3: velocities at half the step */
+  double *middle, *dv, *f;     /* coords + 3: q* or a change of impulses, a correction of velocities, forces */
+  double *residual, *mu, *eta; /* all equations: multipliers of a correction, right-hand side */
+  double *z;                   /* coords and independent equations: a correction of u and its multipliers */
 };
 
 typedef struct pw_method_data leapfrog;
 
 /* Convergence of an iteration, from the sizes of its corrections. */
 typedef struct {
-  double size;   /* of the last correction: the largest relative change of a coordinate */
-  double large;  /* the largest coordinate in units of the scene: its round-off may affect others */
-  double before; /* size of the previous correction */
-  double rate;   /* ratio of the last size to the previous one */
-  int done;      /* corrections before the last one */
+  double size;    /* of the last correction: the largest relative change of a coordinate */
+  double largest; /* the largest coordinate in units of the scene: its round-off may affect others */
+  double before;  /* size of the previous correction */
+  double rate;    /* ratio of the last size to the previous one */
+  int done;       /* corrections before the last one */
 } leapfrog_progress;
 
-/* Updates size and large, initially 0 and 1, for the correction of one coordinate; `value` stays the same in all
- * iterations, so that divergence is detected. */
+/* Updates size and largest, initially 0 and 1, for the correction of one coordinate.  Its size is relative to `value`,
+ * which is the same in all iterations: relative to a growing value, corrections that diverge would stay small. */
 static inline void leapfrog_measure (leapfrog_progress *p, double correction, double value, double unit) {
   double size = fabs (correction) / (fabs (value) + unit);
   if (!(size <= p->size)) p->size = size;
-  p->large = fmax (p->large, fabs (value) / unit);
+  p->largest = fmax (p->largest, fabs (value) / unit);
 }
 
 /* ---- Iterations ---- */
 
-/* 1: converged to round-off, or the next correction would be below it; 0: continue; -1: diverged. */
-static int leapfrog_converged (leapfrog_progress *p) {
+/* Converged: to round-off, or the next correction would be below it. */
+static pw_convergence leapfrog_test (leapfrog_progress *p) {
   const double round_off = 2 * DBL_EPSILON, magnified = 1e4 * DBL_EPSILON; /* by small masses or lengths */
   p->rate = p->done > 0 ? p->size / p->before : 1;
-  if (!isfinite (p->size)) return -1;
-  if (p->size <= round_off || (p->rate < 1 && p->size * p->rate / (1 - p->rate) <= 0.25 * round_off)) return 1;
-  if (p->rate > 0.5 && p->size <= magnified * p->large) return 1;
-  if (p->done > 3 && p->rate > 2) return -1;
+  if (!isfinite (p->size)) return PW_DIVERGED;
+  if (p->size <= round_off || (p->rate < 1 && p->size * p->rate / (1 - p->rate) <= 0.25 * round_off))
+    return PW_CONVERGED;
+  if (p->rate > 0.5 && p->size <= magnified * p->largest) return PW_CONVERGED;
+  if (p->done > 3 && p->rate > 2) return PW_DIVERGED;
   p->before = p->size;
   p->done++;
-  return 0;
+  return PW_ITERATE;
 }
 
-/* ---- First half: u and q', by Newton's iteration ----
+/* ---- First half (drift): u and q', by Newton's iteration ----
  *
- *  The unknowns are u and L = h/2 (lambda+ - lambda):
+ * The unknowns are u and L = h/2 (lambda+ - lambda):
  *
  *   M (u - v - h/2 a) + J (q)^T L = 0        a, lambda: accelerations and multipliers at (t, q, v)
  *   g (t', q + h u) / h = 0                  S (t*, q*) u - b (t*, q*) = 0,   q* = q + h/2 u
  *
  * The first line is linear: it holds for the initial u = v + h/2 a, L = 0, and after every correction. */
 
+/* q' and q* from u. */
 static void drift_positions (pw_run *r, double h) {
   leapfrog *d = r->data;
   for (int j = 0; j < r->s->coords; j++) {
-    d->work.q1[j] = r->q[j] + h * d->u[j];
+    d->common.q1[j] = r->q[j] + h * d->u[j];
     d->middle[j] = r->q[j] + 0.5 * h * d->u[j];
   }
 }
@@ -87,60 +88,64 @@ static void drift_positions (pw_run *r, double h) {
 
 /* M and J^T at the beginning; kinematics must be those of the beginning. */
 static void drift_put_momentum (pw_run *r) {
-  pw_tangent *x = &r->data->work.dae.tangent;
+  pw_tangent *x = &r->data->common.dae.tangent;
   const pw_system *s = r->s;
   for (int j = 0; j < s->coords; j++) pw_scatter_add (&x->scatter, j, j, s->mass[j]);
-  pw_newton_J (
-      r->w, &x->scatter, 1,
-      &(pw_placement){ .col = s->coords, .rows = s->rows, .factor = 1, .factor_nonholonomic = 1, .map = x->map });
+  pw_newton_add_JT (
+      r->w, &x->scatter,
+      &(pw_placement){
+          .col = s->coords, .rows = s->rows, .factor = 1, .factor_nonholonomic = 1, .row_index = x->row_index });
 }
 
 /* S + h/2 ((S u)_q - b_q) at the middle; kinematics must be those of the middle. */
 static void drift_put_middle (pw_run *r, double h) {
-  pw_tangent *x = &r->data->work.dae.tangent;
+  pw_tangent *x = &r->data->common.dae.tangent;
   const pw_system *s = r->s;
-  pw_placement put = {
-    .row = s->coords, .rows = s->rows, .factor_nonholonomic = 0.5 * h, .map = x->map, .w = r->data->u
-  };
-  pw_newton_block (&x->newton, r->w, &x->scatter, PW_JW_Q, &put);
+  pw_placement put = { .row = s->coords,
+                       .rows = s->rows,
+                       .factor_nonholonomic = 0.5 * h,
+                       .row_index = x->row_index,
+                       .direction = r->data->u };
+  pw_newton_add_block (&x->newton, r->w, &x->scatter, PW_JW_Q, &put);
   put.factor_nonholonomic = -0.5 * h;
-  pw_newton_block (&x->newton, r->w, &x->scatter, PW_ETA_Q, &put);
+  pw_newton_add_block (&x->newton, r->w, &x->scatter, PW_ETA_Q, &put);
   put.factor_nonholonomic = 1;
-  pw_newton_J (r->w, &x->scatter, 0, &put);
+  pw_newton_add_J (r->w, &x->scatter, &put);
 }
 
 /* G at the end; kinematics must be those of the end. */
 static void drift_put_end (pw_run *r) {
-  pw_tangent *x = &r->data->work.dae.tangent;
-  pw_newton_J (r->w, &x->scatter, 0,
-               &(pw_placement){ .row = r->s->coords, .rows = r->s->holonomic, .factor = 1, .map = x->map });
+  pw_tangent *x = &r->data->common.dae.tangent;
+  pw_newton_add_J (
+      r->w, &x->scatter,
+      &(pw_placement){ .row = r->s->coords, .rows = r->s->holonomic, .factor = 1, .row_index = x->row_index });
 }
 
 static int drift_open_matrix (pw_run *r) {
   leapfrog *d = r->data;
-  pw_scatter_record (&d->work.dae.tangent.scatter);
+  pw_scatter_begin_record (&d->common.dae.tangent.scatter);
   drift_put_momentum (r);
   drift_put_middle (r, 1);
   drift_put_end (r);
-  return pw_implicit_lay_out (&d->work, r->s->coords + d->work.dae.tangent.rows);
+  return pw_implicit_lay_out (&d->common, r->s->coords + d->common.dae.tangent.rows);
 }
 
 static int drift_factor (pw_run *r, double h, double t1) {
   leapfrog *d = r->data;
-  pw_tangent *x = &d->work.dae.tangent;
-  pw_implicit_fill (&d->work, r->s->coords + x->rows);
+  pw_tangent *x = &d->common.dae.tangent;
+  pw_implicit_begin_matrix (&d->common, r->s->coords + x->rows);
   int status = pw_evaluate_J_at (r->w, r->t, r->q, r->v);
   if (status != PW_OK) return status;
   drift_put_momentum (r);
   status = pw_evaluate_J_at (r->w, r->t + 0.5 * h, d->middle, d->u);
   if (status != PW_OK) return status;
   drift_put_middle (r, h);
-  status = pw_evaluate_J_at (r->w, pw_before_breakpoint (r, t1), d->work.q1, d->u);
+  status = pw_evaluate_J_at (r->w, pw_before_breakpoint (r, t1), d->common.q1, d->u);
   if (status != PW_OK) return status;
   drift_put_end (r);
   r->statistics.jacobians++;
   r->statistics.factorisations++;
-  return pw_sparse_factor (&d->work.sparse, d->work.value);
+  return pw_sparse_factor (&d->common.sparse, d->common.value);
 }
 
 /* ---- Iteration ---- */
@@ -153,15 +158,15 @@ static int drift_residual (pw_run *r, double h, double t1) {
   if (s->rows > s->holonomic) {
     status = pw_evaluate_J_at (r->w, r->t + 0.5 * h, d->middle, d->u);
     if (status != PW_OK) return status;
-    pw_mul_J (r->w, d->u, d->off);
+    pw_mul_J (r->w, d->u, d->residual);
     pw_evaluate_eta (r->w, d->eta);
-    for (int i = s->holonomic; i < s->rows; i++) d->off[i] -= d->eta[i];
+    for (int i = s->holonomic; i < s->rows; i++) d->residual[i] -= d->eta[i];
   }
   if (s->holonomic > 0) {
-    status = pw_update_kinematics (r->w, pw_before_breakpoint (r, t1), d->work.q1, d->u);
+    status = pw_update_kinematics (r->w, pw_before_breakpoint (r, t1), d->common.q1, d->u);
     if (status != PW_OK) return status;
     pw_evaluate_g (r->w, d->eta);
-    for (int i = 0; i < s->holonomic; i++) d->off[i] = d->eta[i] / h;
+    for (int i = 0; i < s->holonomic; i++) d->residual[i] = d->eta[i] / h;
   }
   r->statistics.rhs++;
   return PW_OK;
@@ -172,10 +177,10 @@ static int drift_correct (pw_run *r, double h, leapfrog_progress *p) {
   leapfrog *d = r->data;
   int n = r->s->coords;
   memset (d->z, 0, (size_t)n * sizeof *d->z);
-  for (int i = 0; i < r->s->rows; i++) d->off[i] = -d->off[i];
-  pw_tangent_compress (&d->work.dae.tangent, d->off, d->work.dae.tangent.rows, d->z + n);
-  if (pw_sparse_solve (&d->work.sparse, d->z) != PW_OK) return PW_RESOURCE;
-  p->size = 0, p->large = 1;
+  for (int i = 0; i < r->s->rows; i++) d->residual[i] = -d->residual[i];
+  pw_tangent_compress (&d->common.dae.tangent, d->residual, d->common.dae.tangent.rows, d->z + n);
+  if (pw_sparse_solve (&d->common.sparse, d->z) != PW_OK) return PW_RESOURCE;
+  p->size = 0, p->largest = 1;
   for (int j = 0; j < n; j++) {
     d->u[j] += d->z[j];
     leapfrog_measure (p, h * d->z[j], r->q[j], pw_unit (r->s, j));
@@ -190,35 +195,25 @@ static int drift_solve (pw_run *r, double h, double t1) {
   leapfrog_progress p = { .rate = 1 };
   for (int j = 0; j < r->s->coords; j++) d->u[j] = r->v[j] + 0.5 * h * r->a[j];
   drift_positions (r, h);
-  for (int i = 0, good = r->s->rows == 0; !good; i++) {
-    int fresh = i == 0 || (i > 1 && p.rate > 0.02), status = fresh ? drift_factor (r, h, t1) : PW_OK;
+  pw_convergence convergence = r->s->rows == 0 ? PW_CONVERGED : PW_ITERATE;
+  for (int i = 0; convergence == PW_ITERATE; i++) {
+    int refactor = i == 0 || (i > 1 && p.rate > 0.02), status = refactor ? drift_factor (r, h, t1) : PW_OK;
     if (status == PW_OK) status = drift_residual (r, h, t1);
     if (status == PW_OK) status = drift_correct (r, h, &p);
     if (status != PW_OK) return status;
-    good = i < DRIFT_MOST ? leapfrog_converged (&p) : -1;
-    if (good < 0) return PW_RETRY;
+    convergence = i < DRIFT_MOST ? leapfrog_test (&p) : PW_DIVERGED;
   }
-  return PW_OK;
+  return convergence == PW_CONVERGED ? PW_OK : PW_RETRY;
 }
 
-/* ---- Second half: v' ---- */
-
-/* Kinematics and factors of the saddle-point matrix at (t, q, v); sets r->near_singular in a singular configuration. */
-static int leapfrog_factor (pw_run *r, double t, const double *q, const double *v) {
-  int status = pw_evaluate_J_at (r->w, t, q, v);
-  if (status != PW_OK) return status;
-  r->statistics.factorisations++;
-  status = pw_saddle_factor (r->saddle);
-  if (status != PW_OK || pw_watchdog_near (r)) r->near_singular = 1;
-  return status;
-}
+/* ---- Second half (kick): v', by fixed-point iteration ---- */
 
 /* One correction of v', for the change of the forces since the last one; d->f holds the forces.  PW_METHOD if a signal
  * failed. */
-static int leapfrog_kick (pw_run *r, double h, leapfrog_progress *p) {
+static int kick_correct (pw_run *r, double h, leapfrog_progress *p) {
   leapfrog *d = r->data;
   const pw_system *s = r->s;
-  int status = pw_update_velocities (r->w, d->work.v1);
+  int status = pw_update_velocities (r->w, d->common.v1);
   if (status != PW_OK) return status;
   pw_evaluate_force (r->w, d->middle);
   for (int j = 0; j < s->coords; j++) {
@@ -226,32 +221,36 @@ static int leapfrog_kick (pw_run *r, double h, leapfrog_progress *p) {
     d->middle[j] = 0.5 * h * (f - d->f[j]);
     d->f[j] = f;
   }
-  pw_mul_J (r->w, d->work.v1, d->off);
+  pw_mul_J (r->w, d->common.v1, d->residual);
   pw_evaluate_eta (r->w, d->eta);
-  for (int i = 0; i < s->rows; i++) d->off[i] = d->eta[i] - d->off[i];
-  pw_saddle_solve (r->saddle, d->middle, d->off, d->dv, d->mu);
-  p->size = 0, p->large = 1;
+  for (int i = 0; i < s->rows; i++) d->residual[i] = d->eta[i] - d->residual[i];
+  pw_saddle_solve (r->saddle, d->middle, d->residual, d->dv, d->mu);
+  p->size = 0, p->largest = 1;
   for (int j = 0; j < s->coords; j++) {
-    d->work.v1[j] += d->dv[j];
+    d->common.v1[j] += d->dv[j];
     leapfrog_measure (p, d->dv[j], d->u[j], pw_unit (s, j) / r->w->scale.time);
   }
   return PW_OK;
 }
 
-static int leapfrog_finish (pw_run *r, double h, double t1) {
+static int kick_solve (pw_run *r, double h, double t1) {
   leapfrog *d = r->data;
   leapfrog_progress p = { 0 };
-  int status = leapfrog_factor (r, pw_before_breakpoint (r, t1), d->work.q1, d->u);
+  int status = pw_evaluate_J_at (r->w, pw_before_breakpoint (r, t1), d->common.q1, d->u);
   if (status != PW_OK) return status;
-  memcpy (d->work.v1, d->u, (size_t)r->s->coords * sizeof *d->work.v1);
+  r->statistics.factorisations++;
+  status = pw_saddle_factor (r->saddle);
+  if (status != PW_OK || pw_watchdog_near (r)) r->near_singular = 1;
+  if (status != PW_OK) return status;
+  memcpy (d->common.v1, d->u, (size_t)r->s->coords * sizeof *d->common.v1);
   memset (d->f, 0, (size_t)r->s->coords * sizeof *d->f);
-  for (int good = 0; !good;) {
-    status = leapfrog_kick (r, h, &p);
+  for (pw_convergence convergence = PW_ITERATE; convergence != PW_CONVERGED;) {
+    status = kick_correct (r, h, &p);
     if (status != PW_OK) return status;
-    good = p.done < LEAPFROG_MOST ? leapfrog_converged (&p) : -1;
-    if (good < 0) return PW_RETRY;
+    convergence = p.done < KICK_MOST ? leapfrog_test (&p) : PW_DIVERGED;
+    if (convergence == PW_DIVERGED) return PW_RETRY;
   }
-  return pw_update_velocities (r->w, d->work.v1);
+  return pw_update_velocities (r->w, d->common.v1);
 }
 
 /* ---- Opening ---- */
@@ -260,25 +259,23 @@ static int leapfrog_open (pw_run *r, pw_error *error) {
   leapfrog *d = r->data = calloc (1, sizeof *d);
   size_t n = (size_t)r->s->coords + 3, rows = (size_t)r->s->rows;
   if (d == NULL) return pw_fail_memory (r->s, error);
-  const pw_array array[] = { { &d->u, n },      { &d->work.q1, n }, { &d->work.v1, n }, { &d->middle, n },
-                             { &d->dv, n },     { &d->f, n },       { &d->off, rows },  { &d->mu, rows },
+  const pw_array array[] = { { &d->u, n },      { &d->common.q1, n }, { &d->common.v1, n },   { &d->middle, n },
+                             { &d->dv, n },     { &d->f, n },         { &d->residual, rows }, { &d->mu, rows },
                              { &d->eta, rows }, { &d->z, n + rows } };
-  int status = pw_implicit_open (&d->work, r, array, sizeof array / sizeof *array);
+  int status = pw_implicit_open (&d->common, r, array, sizeof array / sizeof *array);
   if (status == PW_OK) status = drift_open_matrix (r);
-  return pw_implicit_complete (r, status, 1, error);
+  return pw_implicit_complete (r, status, PW_DENSE_POSITIONS_AND_VELOCITIES, error);
 }
 
 static void leapfrog_serialise (pw_run *r, pw_archive *a) {
-  leapfrog *d = r->data;
-  pw_archive_bytes (a, &d->work.base, sizeof d->work.base);
-  pw_archive_count (a, &d->work.count);
+  pw_serialise_counter (&r->data->common.counter, a);
 }
 
 /* ---- Advancing ---- */
 
 static int leapfrog_step (pw_run *r, double h, double t1) {
   int status = drift_solve (r, h, t1);
-  return status == PW_OK ? leapfrog_finish (r, h, t1) : status;
+  return status == PW_OK ? kick_solve (r, h, t1) : status;
 }
 
 static void leapfrog_accept (pw_run *r) {
@@ -305,8 +302,6 @@ const pw_method pw_method_leapfrog = {
   .options = leapfrog_options,
   .open = leapfrog_open,
   .advance = leapfrog_advance,
-  .at = pw_implicit_at,
-  .restart = pw_implicit_restart,
-  .close = pw_implicit_close,
+  PW_IMPLICIT_FUNCTIONS,
   .serialise = leapfrog_serialise,
 };

@@ -2,7 +2,7 @@
  * Ordinary Differential Equations II, section IV.8; in index 2 and 3: chapter VII, and Hairer, Lubich & Roche 1989).
  * With y = (q, v, lambda, mu) the equations B y' = F (t, y) are
  *
- *   q' = v - D G^T mu,   M v' = f - J^T lambda,   D as in ida
+ *   q' = v - D G^T mu,   M v' = f - J^T lambda,   G, S: holonomic, nonholonomic rows of J;  D as in dae.h
  *   ggl       0 = eta - J v,   0 = -g
  *   index2    0 = eta - J v,                                               mu = 0
  *   index3    0 = -g,   0 = b - S v   (nonholonomic rows)                  mu = 0
@@ -12,13 +12,13 @@
  *
  *   (gamma/h B - F_y) dW_1 = r_1,    ((alpha + i beta)/h B - F_y) (dW_2 + i dW_3) = r_2 + i r_3
  *
- * with F_y at y: a real and a complex sparse matrix.  F_y is kept while the iteration contracts by a factor below 1e-2,
- * the factors while in addition the step size nearly stays the same.
+ * with F_y at y: a real and a complex sparse matrix.  F_y is reused while each correction is less than a hundredth of
+ * the previous one, its factors while in addition the step size stays the same.  The error estimate is
  *
  *   err = (gamma/h B - F_y)^-1 (F (t, y) + B sum_i e_i Z_i / h)            of order h^4
  *
- * in units of tolerances of 0.05 rtol^(2/3), which makes the error of order 5 about proportional to rtol.  Multipliers are
- * not tested.  The step follows from the errors of this and the previous step (Gustafsson 1994).
+ * in units of tolerances of 0.05 rtol^(2/3), which makes the error of order 5 about proportional to rtol.  Multipliers
+ * are not tested.  The step follows from the errors of this and the previous step (Gustafsson 1994).
  *
  * Accelerations and multipliers at the ends of steps and in samples are computed from positions and velocities, which
  * are more accurate than the multipliers of the stages.  Work and losses are integrated with the stages. */
@@ -32,66 +32,58 @@
 
 enum { STAGES = PW_RADAU_STAGES };
 
-#define RADAU_KEEP 1e-2   /* contraction rate below which F_y is reused */
-#define RADAU_SIGNAL 1e-4 /* of the time scale: step below which a signal that fails ends the run */
-#define RADAU_LONGER 1.2  /* factor of the step below which the matrices are kept */
+#define RADAU_REUSE_CONTRACTION 1e-2 /* up to which F_y is reused */
+#define RADAU_REUSE_GROWTH 1.2 /* of the step size up to which it is not changed, so that the factors are reused */
+#define RADAU_SIGNAL_STEP 1e-4 /* step in units of the time scale below which a signal that fails ends the run */
 
 /* The last row of A^-1: derivatives at the end of a step. */
-static const double radau_end[STAGES] = { 5.53197264742180826186, -7.53197264742180826186, 5 };
+static const double radau_derivative_at_end[STAGES] = { 5.53197264742180826186, -7.53197264742180826186, 5 };
 
 /* ---- Opening ---- */
 
 static int radau_restart (pw_run *r, pw_error *error) {
   radau *d = r->data;
-  double T = r->w->scale.time;
+  double time_scale = r->w->scale.time;
   (void)error;
-  d->base = d->last.t = r->t;
-  d->count = 0;
-  d->last_h = d->last.h = 0;
-  d->left = 1;
-  d->outdated = 1;
-  d->current = 0;
+  d->counter = (pw_step_counter){ .base = r->t };
+  d->last.t = r->t;
+  d->previous_h = d->last.h = 0;
+  d->remaining = 1;
+  d->F_y_outdated = 1;
+  d->F_y_current = 0;
   d->h = pw_first_step (r);
-  if (d->h >= 0.5 * T * sqrt (r->settings.rtol)) d->h = fmax (d->h, 0.1 * T * sqrt (sqrt (pw_radau_rtol (r))));
+  if (d->h >= 0.5 * time_scale * sqrt (r->settings.rtol)) /* saturating forces do not limit it */
+    d->h = fmax (d->h, 0.1 * time_scale * sqrt (sqrt (pw_radau_rtol (r))));
   memcpy (d->now.y, r->q, (size_t)d->dae.n * sizeof (double));
   memcpy (d->now.y + d->dae.n, r->v, (size_t)d->dae.n * sizeof (double));
-  memset (d->now.y + 2 * d->dae.n, 0, (size_t)(d->dae.rows + d->dae.mus) * sizeof (double));
+  memset (d->now.y + 2 * d->dae.n, 0, (size_t)(d->dae.rows + d->dae.mu_count) * sizeof (double));
   pw_tangent_compress (&d->dae.tangent, r->lambda, d->dae.rows, d->now.y + 2 * d->dae.n);
   return PW_OK;
 }
 
+static void radau_lay_out (pw_layout *l, double **const *array, size_t arrays, size_t length) {
+  for (size_t i = 0; i < arrays; i++) *array[i] = pw_layout_alloc (l, length, sizeof (double));
+}
+
 static int radau_allocate (pw_run *r) {
   radau *d = r->data;
-  size_t n = (size_t)d->dae.n + 3, size = (size_t)d->dae.size, entries = (size_t)r->s->entries;
-  pw_array array[64] = {
-    { &d->B, 2 * n },
-    { &d->unit, size },
-    { &d->tolerance, size },
-    { &d->enough, size },
-    { &d->floor, size },
-    { &d->row, size },
-    { &d->column, size },
-    { &d->x, 2 * size },
-    { &d->Y, size },
-    { &d->rates, entries },
-    { &d->a1, n },
-    { &d->now.y, size },
-    { &d->last.y, size },
-    { &d->now.a, n },
-    { &d->last.a, n },
-    { &d->now.ledger, entries },
-    { &d->last.ledger, entries },
-  };
-  size_t count = 17;
-  for (int k = 0; k < STAGES; k++) {
-    array[count++] = (pw_array){ &d->now.Z[k], size };
-    array[count++] = (pw_array){ &d->last.Z[k], size };
-    array[count++] = (pw_array){ &d->now.w[k], entries };
-    array[count++] = (pw_array){ &d->last.w[k], entries };
-    array[count++] = (pw_array){ &d->W[k], size };
-    array[count++] = (pw_array){ &d->F[k], size };
+  size_t length = (size_t)d->dae.size + 6; /* of all arrays of unknowns, with room for three more coordinates */
+  double **const of_unknowns[] = { &d->B,         &d->unit,       &d->tolerance,     &d->newton_tolerance,
+                                   &d->round_off, &d->row_factor, &d->column_factor, &d->Y,
+                                   &d->a_end,     &d->now.y,      &d->last.y,        &d->now.a,
+                                   &d->last.a };
+  double **const of_entries[] = { &d->rate, &d->now.ledger, &d->last.ledger };
+  for (pw_layout l = { 0 }; pw_layout_pass (&l, &d->memory);) {
+    radau_lay_out (&l, of_unknowns, sizeof of_unknowns / sizeof *of_unknowns, length);
+    radau_lay_out (&l, of_entries, sizeof of_entries / sizeof *of_entries, (size_t)r->s->entries);
+    for (int k = 0; k < STAGES; k++) {
+      double **const stage[] = { &d->now.Z[k], &d->last.Z[k], &d->W[k], &d->F[k] };
+      double **const ledger[] = { &d->now.ledger_change[k], &d->last.ledger_change[k] };
+      radau_lay_out (&l, stage, sizeof stage / sizeof *stage, length);
+      radau_lay_out (&l, ledger, sizeof ledger / sizeof *ledger, (size_t)r->s->entries);
+    }
+    d->complex_x = pw_layout_alloc (&l, 2 * length, sizeof (double));
   }
-  d->memory = pw_alloc_arrays (array, count);
   return d->memory ? PW_OK : PW_RESOURCE;
 }
 
@@ -114,7 +106,6 @@ static int radau_open (pw_run *r, pw_error *error) {
   if (status == PW_OK) status = radau_allocate (r);
   if (status == PW_OK) status = pw_radau_open_matrices (r);
   if (status != PW_OK) return pw_fail_memory (r->s, error);
-  d->fixed = pw_fixed_steps (r);
   radau_constants (r);
   status = pw_projector_open (&d->projector, r, NULL, NULL, error);
   return status == PW_OK ? radau_restart (r, error) : status;
@@ -126,7 +117,7 @@ static void radau_close (pw_run *r) {
   pw_sparse_close (&d->real);
   pw_sparse_close (&d->complex);
   pw_dae_close (&d->dae);
-  free (d->matrix);
+  free (d->minus_F_y);
   free (d->value);
   free (d->diagonal);
   free (d->memory);
@@ -135,32 +126,21 @@ static void radau_close (pw_run *r) {
 
 /* ---- Advancing ---- */
 
-static int radau_fail (pw_run *r, int status, double h, pw_error *error) {
-  if (status == PW_METHOD) return pw_fail_signal (r->t, error);
-  if (status == PW_RESOURCE) return pw_fail (error, PW_RESOURCE, "t = %.6g s: out of memory in KLU", r->t);
-  if (r->near_singular || pw_watchdog_near_state (r)) return pw_fail_singular (r, r->t, error);
-  if (status == PW_INPUT) return pw_fail (error, PW_METHOD, "t = %.6g s: the Newton matrix is singular", r->t);
-  if (r->data->fixed)
-    return pw_fail (error, PW_METHOD,
-                    "t = %.6g s: the iteration does not converge; the step of %.6g s may be too large", r->t, h);
-  return pw_fail (error, PW_METHOD, "t = %.6g s: %s however small the step (rtol %.3g)", r->t,
-                  status == PW_OK ? "the error test fails" : "the iteration does not converge", r->settings.rtol);
-}
-
 /* Accelerations and multipliers at the state reached, where J is evaluated: from the state, or in singular
  * configurations those of the last stage. */
-static void radau_finish (pw_run *r, double h) {
+static void radau_evaluate_reached (pw_run *r, double h) {
   radau *d = r->data;
-  double *end = d->now.y + 2 * d->dae.n;
+  double *lambda = d->now.y + 2 * d->dae.n;
   int status = pw_saddle_factor (r->saddle);
-  d->near = r->near_singular = status != PW_OK || pw_watchdog_near (r);
+  d->near_singular = r->near_singular = status != PW_OK || pw_watchdog_near (r);
   if (status == PW_OK)
     pw_run_accelerate_updated (r, r->v, r->a, r->lambda);
   else
-    for (int j = 0, i = d->dae.n; j < d->dae.n; j++, i++) r->a[j] = pw_radau_sum (0, radau_end, d->last.Z, i) / h;
-  if (status != PW_OK) pw_tangent_store (&d->dae.tangent, end, r->lambda);
-  pw_tangent_compress (&d->dae.tangent, r->lambda, d->dae.rows, end);
-  memcpy (d->a1, r->a, (size_t)d->dae.n * sizeof *d->a1);
+    for (int j = 0, i = d->dae.n; j < d->dae.n; j++, i++)
+      r->a[j] = pw_radau_sum (0, radau_derivative_at_end, d->last.Z, i) / h;
+  if (status != PW_OK) pw_tangent_expand (&d->dae.tangent, lambda, r->lambda);
+  pw_tangent_compress (&d->dae.tangent, r->lambda, d->dae.rows, lambda);
+  memcpy (d->a_end, r->a, (size_t)d->dae.n * sizeof *d->a_end);
   pw_bound_tolerances (r);
   pw_ledger_rates (r, r->lambda, r->rate);
 }
@@ -179,95 +159,96 @@ static int radau_accept (pw_run *r, double h, double t1) {
   d->now = d->last;
   d->last = done;
   memcpy (d->now.y, d->Y, (size_t)d->dae.size * sizeof (double));
-  memset (d->now.y + 2 * d->dae.n + d->dae.rows, 0, (size_t)d->dae.mus * sizeof (double));
+  memset (d->now.y + 2 * d->dae.n + d->dae.rows, 0, (size_t)d->dae.mu_count * sizeof (double));
   memcpy (r->q, d->Y, n);
   memcpy (r->v, d->Y + d->dae.n, n);
   r->t = t1;
-  for (size_t e = 0; e < entries; e++) r->ledger[e] += done.w[STAGES - 1][e];
-  radau_finish (r, h);
+  for (size_t e = 0; e < entries; e++) r->ledger[e] += done.ledger_change[STAGES - 1][e];
+  radau_evaluate_reached (r, h);
   r->statistics.steps++;
-  d->current = 0;
-  d->outdated = r->outdated || d->rate > RADAU_KEEP;
+  d->F_y_current = 0;
+  d->F_y_outdated = r->outdated || d->contraction > RADAU_REUSE_CONTRACTION;
   return PW_OK;
 }
 
-/* The size of the next step, from the errors of this and the last one; constants as in RADAU5. */
-static double radau_next (const radau *d, double h, double error, int rejected) {
-  const int most = 7;
-  double safety = 0.9 * fmin (1, (1. + 2 * most) / (d->iterations + 2 * most));
+/* The size of the next step, from the errors of this and the previous one; constants as in RADAU5.  rejected: 1 if this
+ * one was rejected at least once. */
+static double radau_next_h (const radau *d, double h, double error, int rejected) {
+  double safety = 0.9 * fmin (1, (1. + 2 * PW_RADAU_MOST) / (d->iterations + 2 * PW_RADAU_MOST));
   double quotient = fmin (5, fmax (1. / 8, pow (error, 0.25) / safety));
-  if (error < 1 && d->last_h > 0) {
-    double trend = h / d->last_h * pow (d->last_error / (error * error), 0.25) * 0.9;
+  if (error < 1 && d->previous_h > 0) {
+    double trend = h / d->previous_h * pow (d->previous_error / (error * error), 0.25) * 0.9;
     quotient = fmax (quotient, fmin (5, fmax (1. / 8, 1 / trend)));
   }
   double next = h / quotient;
   if (rejected) next = fmin (next, h);
-  return d->rate <= RADAU_KEEP && next >= h && next <= RADAU_LONGER * h ? h : next;
+  return d->contraction <= RADAU_REUSE_CONTRACTION && next >= h && next <= RADAU_REUSE_GROWTH * h ? h : next;
 }
 
-/* A step of size h; *error: in units of the tolerances, INFINITY if its equations could not be solved or it is fixed. */
-static int radau_try (pw_run *r, double h, double t1, int again, double *error) {
+/* A step of size h; *error: in units of the tolerances, INFINITY if its equations could not be solved or steps are
+ * fixed.  filter_twice: as in pw_radau_estimate. */
+static int radau_try (pw_run *r, double h, double t1, int filter_twice, double *error) {
   *error = INFINITY;
   r->near_singular = 0;
   int status = pw_radau_solve (r, h, t1);
-  if (status == PW_OK && !r->data->fixed) status = pw_radau_estimate (r, h, again, error);
-  if (status == PW_OK && r->s->entries > 0 && (*error < 1 || r->data->fixed)) status = pw_radau_work (r, h, t1, error);
+  if (status == PW_OK && !pw_fixed_steps (r)) status = pw_radau_estimate (r, h, filter_twice, error);
+  if (status == PW_OK && r->s->entries > 0 && (*error < 1 || pw_fixed_steps (r)))
+    status = pw_radau_work (r, h, t1, error);
   return status;
 }
 
 static int radau_advance_fixed (pw_run *r, double t_end, pw_error *error) {
   radau *d = r->data;
   int whole;
-  double err, t1 = pw_step_end (r, d->base, d->count, t_end, &whole), h = whole ? r->settings.step : t1 - r->t;
+  double err, t1 = pw_step_end (r, &d->counter, t_end, &whole), h = whole ? r->settings.step : t1 - r->t;
   int status = radau_try (r, h, t1, 0, &err);
   if (status == PW_OK) status = radau_accept (r, h, t1);
-  if (status != PW_OK) return radau_fail (r, status, h, error);
-  d->count++;
-  if (!whole) d->base = t1, d->count = 0;
+  if (status != PW_OK) return pw_implicit_fail (r, status, h, error);
+  pw_count_step (&d->counter, whole, t1);
   return PW_OK;
 }
 
-/* A shortened step does not reduce the next one. */
-static int radau_accept_adaptive (pw_run *r, double h, double t1, double error, int rejected, int cut) {
+/* A step that was shortened to end at t_end or a breakpoint does not reduce the next one. */
+static int radau_accept_adaptive (pw_run *r, double h, double t1, double error, int rejected, int shortened) {
   radau *d = r->data;
-  double next = radau_next (d, h, error, rejected);
+  double next = radau_next_h (d, h, error, rejected);
   int status = radau_accept (r, h, t1);
   if (status != PW_OK) return status;
-  d->last_h = h;
-  d->last_error = fmax (1e-2, error);
-  d->h = cut ? fmax (next, d->h) : next;
+  d->previous_h = h;
+  d->previous_error = fmax (1e-2, error);
+  d->h = shortened ? fmax (next, d->h) : next;
   return PW_OK;
 }
 
-/* In index3 the state reached violates g = 0 and J v = eta within the tolerances.  A step of size h corrects positions by
- * velocities of that size over h: no step, however small, has a smaller error, unless the state is projected. */
+/* In index3 the state reached violates g = 0 and J v = eta within the tolerances.  A step of size h corrects positions
+ * by velocities of that size over h: no step, however small, has a smaller error, unless the state is projected. */
 static void radau_project_start (pw_run *r) {
   radau *d = r->data;
   double *q = d->now.y, *v = q + d->dae.n;
-  if (d->dae.velocities || pw_project_positions (&d->projector, r, r->t, q, v) != PW_OK) return;
+  if (d->dae.enforces_velocities || pw_project_positions (&d->projector, r, r->t, q, v) != PW_OK) return;
   (void)pw_project_velocities (&d->projector, r, v);
   pw_forget_residuals (r);
 }
 
 static int radau_advance (pw_run *r, double t_end, pw_error *error) {
   radau *d = r->data;
-  if (d->fixed) return radau_advance_fixed (r, t_end, error);
-  double stop = fmin (t_end, r->breakpoint), least = 16 * DBL_EPSILON * fmax (fabs (r->t), 1e-6 * r->w->scale.time),
-         err;
+  if (pw_fixed_steps (r)) return radau_advance_fixed (r, t_end, error);
+  double stop = fmin (t_end, r->breakpoint), err;
   for (int rejected = 0, status = PW_OK;; rejected++) {
-    int cut = r->t + d->h > stop - 0.01 * d->h;
-    double h = cut ? stop - r->t : d->h, t1 = cut ? stop : r->t + h;
-    if (!cut && !(h > least)) return radau_fail (r, status, h, error);
+    int shortened = r->t + d->h > stop - 0.01 * d->h;
+    double h = shortened ? stop - r->t : d->h, t1 = shortened ? stop : r->t + h;
+    if (!shortened && !(h > pw_least_step (r))) return pw_implicit_fail (r, status, h, error);
     if (rejected > 0 && (status = pw_run_check_limits (r, error)) != PW_OK) return status;
-    status = radau_try (r, h, t1, rejected > 0 || d->last_h == 0, &err);
-    if (status == PW_OK && err < 1) status = radau_accept_adaptive (r, h, t1, err, rejected, cut);
+    status = radau_try (r, h, t1, rejected > 0 || d->previous_h == 0, &err);
+    if (status == PW_OK && err < 1) status = radau_accept_adaptive (r, h, t1, err, rejected, shortened);
     if (status == PW_OK && err < 1) return PW_OK;
-    int signal = status == PW_METHOD && h < RADAU_SIGNAL * r->w->scale.time;
-    if (status == PW_RESOURCE || status == PW_INPUT || signal) return radau_fail (r, status, h, error);
+    int signal_fails = status == PW_METHOD && h < RADAU_SIGNAL_STEP * r->w->scale.time;
+    if (status == PW_RESOURCE || status == PW_INPUT || signal_fails) return pw_implicit_fail (r, status, h, error);
     r->statistics.rejected++;
-    d->outdated = !d->current;
+    d->F_y_outdated = !d->F_y_current;
     if (status == PW_OK && rejected > 0) radau_project_start (r);
-    d->h = status == PW_OK ? fmin (0.9 * h, radau_next (d, h, err, 1)) : h * (status == PW_RETRY ? d->shorter : 0.25);
+    double reduction = status == PW_RETRY ? d->reduction : 0.25;
+    d->h = status == PW_OK ? fmin (0.9 * h, radau_next_h (d, h, err, 1)) : h * reduction;
   }
 }
 
@@ -279,7 +260,7 @@ static void radau_quintic (const pw_run *r, double x, double *q, double *v) {
   double h = d->last.h;
   for (int j = 0; j < d->dae.n; j++) {
     double q0 = d->last.y[j], v0 = h * d->last.y[d->dae.n + j], a0 = 0.5 * h * h * d->last.a[j];
-    double dq = r->q[j] - q0 - v0 - a0, dv = h * r->v[j] - v0 - 2 * a0, da = 0.5 * h * h * (d->a1[j] - d->last.a[j]);
+    double dq = r->q[j] - q0 - v0 - a0, dv = h * r->v[j] - v0 - 2 * a0, da = 0.5 * h * h * (d->a_end[j] - d->last.a[j]);
     double c3 = 10 * dq - 4 * dv + da, c4 = -15 * dq + 7 * dv - 2 * da, c5 = 6 * dq - 3 * dv + da;
     q[j] = q0 + x * (v0 + x * (a0 + x * (c3 + x * (c4 + x * c5))));
     v[j] = (v0 + x * (2 * a0 + x * (3 * c3 + x * (4 * c4 + x * 5 * c5)))) / h;
@@ -288,21 +269,23 @@ static void radau_quintic (const pw_run *r, double x, double *q, double *v) {
 
 /* The quintic is more accurate than the polynomial through the stages, unless the step does not resolve the motion:
  * then they differ by more than the tolerances, or in fixed steps by more than a tenth of the changes in the step. */
-static int radau_resolved (const pw_run *r, const double *q, const double *v) {
+static int radau_quintic_agrees (const pw_run *r, const double *q, const double *v) {
   const radau *d = r->data;
   double sum = 0;
   for (int i = 0; i < 2 * d->dae.n; i++) {
-    double off = i < d->dae.n ? q[i] - r->q_at[i] : v[i - d->dae.n] - r->v_at[i - d->dae.n], allowed = d->tolerance[i];
-    if (d->fixed) {
-      allowed = d->floor[i];
+    double difference = i < d->dae.n ? q[i] - r->q_at[i] : v[i - d->dae.n] - r->v_at[i - d->dae.n];
+    double allowed = d->tolerance[i];
+    if (pw_fixed_steps (r)) {
+      allowed = d->round_off[i];
       for (int k = 0; k < STAGES; k++) allowed = fmax (allowed, 0.1 * fabs (d->last.Z[k][i]));
     }
-    sum += off * off / (allowed * allowed);
+    sum += difference * difference / (allowed * allowed);
   }
   return sum <= 2 * d->dae.n;
 }
 
-static void radau_interpolate (pw_run *r, double x) {
+/* The sample inside the last step at x in [0, 1]. */
+static void radau_fill_sample (pw_run *r, double x) {
   radau *d = r->data;
   const radau_step *p = &d->last;
   int n = d->dae.n;
@@ -311,25 +294,26 @@ static void radau_interpolate (pw_run *r, double x) {
   for (int i = 0; i < d->dae.size; i++) y[i] = pw_radau_sum (p->y[i], weight, p->Z, i);
   memcpy (r->q_at, y, (size_t)n * sizeof *y);
   memcpy (r->v_at, y + n, (size_t)n * sizeof *y);
-  pw_tangent_store (&d->dae.tangent, y + 2 * n, r->lambda_at);
-  for (int j = 0; j < n; j++) r->a_at[j] = (1 - x) * p->a[j] + x * d->a1[j];
-  for (int e = 0; e < r->s->entries; e++) r->ledger_at[e] = pw_radau_sum (p->ledger[e], weight, p->w, e);
+  pw_tangent_expand (&d->dae.tangent, y + 2 * n, r->lambda_at);
+  for (int j = 0; j < n; j++) r->a_at[j] = (1 - x) * p->a[j] + x * d->a_end[j];
+  for (int e = 0; e < r->s->entries; e++) r->ledger_at[e] = pw_radau_sum (p->ledger[e], weight, p->ledger_change, e);
   radau_quintic (r, x, q, v);
-  if (!radau_resolved (r, q, v)) return;
+  if (!radau_quintic_agrees (r, q, v)) return;
   memcpy (r->q_at, q, (size_t)n * sizeof *q);
   memcpy (r->v_at, v, (size_t)n * sizeof *v);
 }
 
-/* Projects the sample onto the constraints that the steps satisfy, with accelerations and multipliers from there. */
-static int radau_inside (pw_run *r, double t) {
-  radau *d = r->data;
+/* Projects the sample onto the constraints that the steps satisfy, and computes accelerations and multipliers from
+ * it. */
+static int radau_interpolate (void *method, pw_run *r, double t) {
+  radau *d = method;
   int status;
-  radau_interpolate (r, (t - d->last.t) / d->last.h);
-  if (d->dae.mus > 0 || !d->dae.velocities)
+  radau_fill_sample (r, (t - d->last.t) / d->last.h);
+  if (d->dae.mu_count > 0 || !d->dae.enforces_velocities)
     status = pw_project_positions (&d->projector, r, t, r->q_at, r->v_at);
   else
     status = pw_evaluate_J_at (r->w, t, r->q_at, r->v_at);
-  if (status == PW_OK && d->dae.velocities) status = pw_project_velocities (&d->projector, r, r->v_at);
+  if (status == PW_OK && d->dae.enforces_velocities) status = pw_project_velocities (&d->projector, r, r->v_at);
   if (status == PW_OK && pw_saddle_factor (r->saddle) == PW_OK)
     pw_run_accelerate_updated (r, r->v_at, r->a_at, r->lambda_at);
   return status;
@@ -337,19 +321,7 @@ static int radau_inside (pw_run *r, double t) {
 
 static int radau_at (pw_run *r, double t, pw_error *error) {
   radau *d = r->data;
-  if (t > r->t || t < d->last.t) return pw_fail_outside (r, d->last.t, t, error);
-  if (t == r->t) {
-    pw_show_reached (r);
-    return PW_OK;
-  }
-  pw_statistics keep = r->statistics;
-  int status = radau_inside (r, t);
-  r->statistics = keep;
-  r->projected_at = r->projected;
-  if (status == PW_OK) return PW_OK;
-  if (status == PW_METHOD) return pw_fail_signal (t, error);
-  if (r->near_singular) return pw_fail_singular (r, t, error);
-  return pw_fail (error, PW_METHOD, "t = %.6g s: no state near the interpolated one satisfies the constraints", t);
+  return pw_sample_last_step (r, d->last.t, t, radau_interpolate, d, error);
 }
 
 static const pw_stabilisation radau_stabilisations[] = {

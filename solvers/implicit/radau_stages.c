@@ -1,5 +1,5 @@
-/* The stages of a step of radau: equations, matrices, Newton's iteration, error estimates; see radau.c.  T and the complex
- * eigenvalues of A^-1 were computed with 60 digits from the nodes c. */
+/* The stages of a step of radau: equations, matrices, Newton's iteration, error estimates; see radau.c.  T and the
+ * complex eigenvalues of A^-1 were computed with 60 digits from the nodes c. */
 #include <float.h>
 #include <math.h>
 #include <stdlib.h>
@@ -22,7 +22,7 @@ static const double radau_alpha = 2.68108287362775213390, radau_beta = 3.0504301
 
 /* ---- Equations ---- */
 
-/* F (t, y) = B y' - (the equations of dae.h); leaves kinematics and J there. */
+/* F (t, y): the equations of dae.h without B y', with the opposite sign; leaves kinematics and J there. */
 static int radau_evaluate (pw_run *r, double t, const double *y, double *F) {
   radau *d = r->data;
   int n = d->dae.n;
@@ -42,74 +42,76 @@ int pw_radau_open_matrices (pw_run *r) {
   const double *y = d->now.y;
   if (pw_dae_lay_out (&d->dae, y + d->dae.n, NULL, y + 2 * d->dae.n) != PW_OK) return PW_RESOURCE;
   size_t nonzeros = (size_t)x->colptr[d->dae.size] + 1;
-  d->matrix = malloc (nonzeros * sizeof *d->matrix);
+  d->minus_F_y = malloc (nonzeros * sizeof *d->minus_F_y);
   d->value = malloc (2 * nonzeros * sizeof *d->value);
   d->diagonal = malloc (((size_t)(2 * d->dae.n) + 1) * sizeof *d->diagonal);
-  if (!d->matrix || !d->value || !d->diagonal) return PW_RESOURCE;
+  if (!d->minus_F_y || !d->value || !d->diagonal) return PW_RESOURCE;
   for (int j = 0; j < 2 * d->dae.n; j++)
     for (d->diagonal[j] = x->colptr[j]; x->rowind[d->diagonal[j]] != j;) d->diagonal[j]++;
-  int status = pw_sparse_open (&d->real, 0, d->dae.size, x->colptr, x->rowind);
-  return status == PW_OK ? pw_sparse_open (&d->complex, 1, d->dae.size, x->colptr, x->rowind) : status;
+  int status = pw_sparse_open (&d->real, PW_SPARSE_REAL, d->dae.size, x->colptr, x->rowind);
+  return status == PW_OK ? pw_sparse_open (&d->complex, PW_SPARSE_COMPLEX, d->dae.size, x->colptr, x->rowind) : status;
 }
 
-/* Evaluates F_y at the beginning of the step. */
+/* Evaluates F_y at the state reached. */
 static int radau_linearise (pw_run *r) {
   radau *d = r->data;
   const double *y = d->now.y;
   int status = pw_evaluate_J_at (r->w, r->t, y, y + d->dae.n);
   if (status != PW_OK) return status;
-  memset (d->matrix, 0, (size_t)d->dae.tangent.colptr[d->dae.size] * sizeof *d->matrix);
-  pw_scatter_begin (&d->dae.tangent.scatter, d->matrix);
+  memset (d->minus_F_y, 0, (size_t)d->dae.tangent.colptr[d->dae.size] * sizeof *d->minus_F_y);
+  pw_scatter_begin_fill (&d->dae.tangent.scatter, d->minus_F_y);
   pw_dae_matrix (&d->dae, y + d->dae.n, NULL, y + 2 * d->dae.n, 0, 0);
   pw_matrix_evaluated (r, y, y + d->dae.n);
   r->statistics.jacobians++;
-  d->current = 1;
-  d->outdated = 0;
-  d->factored = 0;
+  d->F_y_current = 1;
+  d->F_y_outdated = 0;
+  d->factored_h = 0;
   return PW_OK;
 }
 
-/* Stores -F_y + re B in every stride-th value, scaled, and im B in the value after it. */
-static void radau_shift (radau *d, int stride, double re, double im) {
+/* Fills `value` with the real (parts: 1) or complex (parts: 2) matrix (re + i im) B - F_y, scaled. */
+static void radau_fill_matrix (radau *d, int parts, double re, double im) {
   const int64_t *colptr = d->dae.tangent.colptr, *rowind = d->dae.tangent.rowind;
   for (int c = 0; c < d->dae.size; c++)
     for (int64_t i = colptr[c]; i < colptr[c + 1]; i++) {
-      double scale = d->row[rowind[i]] * d->column[c], b = c < 2 * d->dae.n && i == d->diagonal[c] ? d->B[c] : 0;
-      d->value[stride * i] = scale * (d->matrix[i] + re * b);
-      if (stride == 2) d->value[2 * i + 1] = scale * im * b;
+      double scale = d->row_factor[rowind[i]] * d->column_factor[c];
+      double b = c < 2 * d->dae.n && i == d->diagonal[c] ? d->B[c] : 0;
+      d->value[parts * i] = scale * (d->minus_F_y[i] + re * b);
+      if (parts == 2) d->value[2 * i + 1] = scale * im * b;
     }
 }
 
 static int radau_factor (pw_run *r, double h) {
   radau *d = r->data;
-  if (d->factored == h) return PW_OK;
-  d->factored = 0;
-  if (d->forget) pw_sparse_forget (&d->real), pw_sparse_forget (&d->complex);
-  d->forget = 0;
-  pw_implicit_scale (&d->dae, radau_gamma / h, radau_gamma / h, d->row, d->column);
-  radau_shift (d, 1, radau_gamma / h, 0);
+  if (d->factored_h == h) return PW_OK;
+  d->factored_h = 0;
+  if (d->choose_pivots) pw_sparse_forget_pivots (&d->real), pw_sparse_forget_pivots (&d->complex);
+  d->choose_pivots = 0;
+  pw_implicit_scale (&d->dae, radau_gamma / h, radau_gamma / h, d->row_factor, d->column_factor);
+  radau_fill_matrix (d, 1, radau_gamma / h, 0);
   int status = pw_sparse_factor (&d->real, d->value);
-  radau_shift (d, 2, radau_alpha / h, radau_beta / h);
+  radau_fill_matrix (d, 2, radau_alpha / h, radau_beta / h);
   if (status == PW_OK) status = pw_sparse_factor (&d->complex, d->value);
   r->statistics.factorisations += 2;
-  if (status == PW_OK) d->factored = h;
+  if (status == PW_OK) d->factored_h = h;
   return status;
 }
 
-/* x = (gamma/h B - F_y)^-1 x */
+/* x = (gamma/h B - F_y)^-1 x.  PW_OK or PW_RESOURCE. */
 static int radau_solve_real (radau *d, double *x) {
-  for (int i = 0; i < d->dae.size; i++) x[i] *= d->row[i];
+  for (int i = 0; i < d->dae.size; i++) x[i] *= d->row_factor[i];
   int status = pw_sparse_solve (&d->real, x);
-  for (int i = 0; i < d->dae.size; i++) x[i] *= d->column[i];
+  for (int i = 0; i < d->dae.size; i++) x[i] *= d->column_factor[i];
   return status;
 }
 
-/* The same with the complex matrix, for re + i im. */
+/* The same with the complex matrix and re + i im for x. */
 static int radau_solve_complex (radau *d, double *re, double *im) {
-  double *x = d->x;
-  for (int i = 0; i < d->dae.size; i++) x[2 * i] = d->row[i] * re[i], x[2 * i + 1] = d->row[i] * im[i];
+  double *x = d->complex_x;
+  for (int i = 0; i < d->dae.size; i++) x[2 * i] = d->row_factor[i] * re[i], x[2 * i + 1] = d->row_factor[i] * im[i];
   int status = pw_sparse_solve (&d->complex, x);
-  for (int i = 0; i < d->dae.size; i++) re[i] = d->column[i] * x[2 * i], im[i] = d->column[i] * x[2 * i + 1];
+  for (int i = 0; i < d->dae.size; i++)
+    re[i] = d->column_factor[i] * x[2 * i], im[i] = d->column_factor[i] * x[2 * i + 1];
   return status;
 }
 
@@ -119,21 +121,21 @@ double pw_radau_rtol (const pw_run *r) {
   return 0.05 * cbrt (r->settings.rtol * r->settings.rtol);
 }
 
-/* Sets the tolerances for a step of size h: of the error test, of Newton's corrections, and their round-off, which in
- * index3 is that of positions over h. */
-static void radau_weigh (pw_run *r, double h) {
+/* Sets the tolerances for a step of size h: of the error test, of Newton's corrections, and their round-off, which for
+ * velocities in index3 is that of positions over h. */
+static void radau_set_tolerances (pw_run *r, double h) {
   radau *d = r->data;
-  const pw_settings *set = &r->settings;
-  int n = d->dae.n, third = !d->dae.velocities && d->dae.tangent.holonomic > 0;
-  double rtol = pw_radau_rtol (r), newton = fmax (10 * DBL_EPSILON / rtol, fmin (0.03, sqrt (rtol)));
-  double large = 1; /* the largest coordinate: its round-off may affect others */
-  for (int j = 0; j < n; j++) large = fmax (large, fabs (d->now.y[j]) / d->unit[j]);
+  const pw_settings *settings = &r->settings;
+  int n = d->dae.n, index3 = !d->dae.enforces_velocities && d->dae.tangent.holonomic > 0;
+  double rtol = pw_radau_rtol (r), newton = fmax (10 * DBL_EPSILON / rtol, fmin (0.03, sqrt (rtol))); /* RADAU5's */
+  double largest = 1; /* the largest coordinate in units of the scene: its round-off may affect others */
+  for (int j = 0; j < n; j++) largest = fmax (largest, fabs (d->now.y[j]) / d->unit[j]);
   for (int i = 0; i < 2 * n; i++) {
-    double size = fabs (d->now.y[i]), least = set->atol > 0 ? set->atol / set->rtol : d->unit[i];
-    double unit = third && i >= n ? fmax (d->unit[i], large * d->unit[i - n] / h) : d->unit[i];
+    double size = fabs (d->now.y[i]), least = settings->atol > 0 ? settings->atol / settings->rtol : d->unit[i];
+    double unit = index3 && i >= n ? fmax (d->unit[i], largest * d->unit[i - n] / h) : d->unit[i];
     d->tolerance[i] = fmin (rtol * (size + least), r->saturation[i]);
-    d->floor[i] = fmin (8 * DBL_EPSILON * (size + unit), 0.1 * r->saturation[i]);
-    d->enough[i] = d->fixed ? d->floor[i] : fmax (newton * d->tolerance[i], d->floor[i]);
+    d->round_off[i] = fmin (8 * DBL_EPSILON * (size + unit), 0.1 * r->saturation[i]);
+    d->newton_tolerance[i] = pw_fixed_steps (r) ? d->round_off[i] : fmax (newton * d->tolerance[i], d->round_off[i]);
   }
 }
 
@@ -147,10 +149,11 @@ void pw_radau_basis (double x, double *weight) {
   }
 }
 
-static void radau_combine (radau *d, const double by[STAGES][STAGES], double *const *from, double *const *to) {
+/* to = factor from, of the values at the stages; `to` may be `from`. */
+static void radau_combine (radau *d, const double factor[STAGES][STAGES], double *const *from, double *const *to) {
   for (int i = 0; i < d->dae.size; i++) {
     double a = from[0][i], b = from[1][i], c = from[2][i];
-    for (int k = 0; k < STAGES; k++) to[k][i] = by[k][0] * a + by[k][1] * b + by[k][2] * c;
+    for (int k = 0; k < STAGES; k++) to[k][i] = factor[k][0] * a + factor[k][1] * b + factor[k][2] * c;
   }
 }
 
@@ -181,8 +184,8 @@ static double radau_time (const pw_run *r, int k, double h, double t1) {
   return k == STAGES - 1 ? t1 : r->t + radau_c[k] * h;
 }
 
-/* One correction; *size, *rough: the largest in units of `enough` and of round-off. */
-static int radau_correct (pw_run *r, double h, double t1, double *size, double *rough) {
+/* One correction; *size, *round_offs: the largest of a state in units of its tolerance, and of its round-off. */
+static int radau_correct (pw_run *r, double h, double t1, double *size, double *round_offs) {
   radau *d = r->data;
   double *const *W = d->W, *const *F = d->F;
   for (int k = 0; k < STAGES; k++) {
@@ -198,11 +201,11 @@ static int radau_correct (pw_run *r, double h, double t1, double *size, double *
     F[2][i] -= b * (radau_beta * W[1][i] + radau_alpha * W[2][i]);
   }
   if (radau_solve_real (d, F[0]) != PW_OK || radau_solve_complex (d, F[1], F[2]) != PW_OK) return PW_RESOURCE;
-  *size = *rough = 0;
+  *size = *round_offs = 0;
   for (int i = 0; i < 2 * d->dae.n; i++) {
     double most = pw_larger_or_nan (pw_larger_or_nan (fabs (F[0][i]), fabs (F[1][i])), fabs (F[2][i]));
-    *size = pw_larger_or_nan (*size, most / d->enough[i]);
-    *rough = pw_larger_or_nan (*rough, most / d->floor[i]);
+    *size = pw_larger_or_nan (*size, most / d->newton_tolerance[i]);
+    *round_offs = pw_larger_or_nan (*round_offs, most / d->round_off[i]);
   }
   for (int k = 0; k < STAGES; k++)
     for (int i = 0; i < d->dae.size; i++) W[k][i] += F[k][i];
@@ -210,58 +213,59 @@ static int radau_correct (pw_run *r, double h, double t1, double *size, double *
   return PW_OK;
 }
 
-/* 1: converged; 0: continue; -1: it will not converge in time.  size: of the correction, before: of the previous one; rough: in
- * units of round-off.  The tests are those of Hairer & Wanner 1996, section IV.8, and one for round-off. */
-static int radau_converged (pw_run *r, int done, double size, double before, double rough) {
+/* Tests convergence after a correction with `done` ones before it; size, before: of this correction and the previous
+ * one in units of the tolerances, round_offs: in units of round-off.  Diverged: or too slow.  The tests are those of
+ * Hairer & Wanner 1996, section IV.8, and one for round-off, which a singular configuration magnifies. */
+static pw_convergence radau_test (pw_run *r, int done, double size, double before, double round_offs) {
   radau *d = r->data;
-  const int most = d->fixed ? 50 : 7;
-  d->shorter = 0.5;
-  if (!isfinite (size)) return -1;
-  if (size == 0) return 1;
+  const int fixed = pw_fixed_steps (r), most = fixed ? 50 : PW_RADAU_MOST; /* a fixed step cannot be made shorter */
+  d->reduction = 0.5;
+  if (!isfinite (size)) return PW_DIVERGED;
+  if (size == 0) return PW_CONVERGED;
   if (done == 0) {
-    if (d->fixed || r->s->saturates) return 0;
-    d->left = pow (fmax (d->left, DBL_EPSILON), 0.8);
-    return d->left * size <= 1;
+    if (fixed || r->s->saturates) return PW_ITERATE;
+    d->remaining = pow (fmax (d->remaining, DBL_EPSILON), 0.8);
+    return d->remaining * size <= 1 ? PW_CONVERGED : PW_ITERATE;
   }
   double rate = size / before;
-  d->rate = done == 1 ? rate : sqrt (rate * d->rate);
-  if (rate > 0.3 && rough <= (d->near ? 1e7 : 64)) return 1;
-  d->left = d->rate < 0.99 ? d->rate / (1 - d->rate) : 100;
-  if (d->left * size <= 1) return 1;
-  if (d->fixed && done < most && (done < 4 || d->rate < 1)) return 0;
-  if (!(d->rate < 0.99)) return -1;
-  double end = d->left * size * pow (d->rate, most - 1 - done);
-  if (done < most && end < 1) return 0;
-  d->shorter = 0.8 * pow (fmax (1e-4, fmin (20, end)), -1. / (most + 3 - done));
-  return -1;
+  d->contraction = done == 1 ? rate : sqrt (rate * d->contraction);
+  if (rate > 0.3 && round_offs <= (d->near_singular ? 1e7 : 64)) return PW_CONVERGED;
+  d->remaining = d->contraction < 0.99 ? d->contraction / (1 - d->contraction) : 100;
+  if (d->remaining * size <= 1) return PW_CONVERGED;
+  if (fixed && done < most && (done < 4 || d->contraction < 1)) return PW_ITERATE;
+  if (!(d->contraction < 0.99)) return PW_DIVERGED;
+  double expected = d->remaining * size * pow (d->contraction, most - 1 - done); /* the error after all iterations */
+  if (done < most && expected < 1) return PW_ITERATE;
+  d->reduction = 0.8 * pow (fmax (1e-4, fmin (20, expected)), -1. / (most + 3 - done));
+  return PW_DIVERGED;
 }
 
 static int radau_iterate (pw_run *r, double h, double t1) {
   radau *d = r->data;
-  double size = 0, before, rough;
+  double size = 0, before, round_offs;
   radau_predict (r, h);
   for (int done = 0;; done++) {
     before = size;
-    int status = radau_correct (r, h, t1, &size, &rough);
+    int status = radau_correct (r, h, t1, &size, &round_offs);
     if (status != PW_OK) return status;
-    int good = radau_converged (r, done, size, before, rough);
+    pw_convergence convergence = radau_test (r, done, size, before, round_offs);
     d->iterations = done + 1;
-    if (good) return good > 0 ? PW_OK : PW_RETRY;
+    if (convergence != PW_ITERATE) return convergence == PW_CONVERGED ? PW_OK : PW_RETRY;
   }
 }
 
 int pw_radau_solve (pw_run *r, double h, double t1) {
   radau *d = r->data;
-  if (!d->current && d->outdated) d->factored = 0;
-  radau_weigh (r, h);
-  d->shorter = 0.5;
+  if (!d->F_y_current && d->F_y_outdated) d->factored_h = 0;
+  radau_set_tolerances (r, h);
+  d->reduction = 0.5;
   for (;;) {
-    int status = d->outdated ? radau_linearise (r) : PW_OK;
+    int status = d->F_y_outdated ? radau_linearise (r) : PW_OK;
     if (status == PW_OK) status = radau_factor (r, h);
     if (status == PW_OK) status = radau_iterate (r, h, t1);
-    d->forget = status == PW_RETRY && d->near;
-    if (status != PW_RETRY || d->current) return status;
-    d->outdated = 1;
+    d->choose_pivots = status == PW_RETRY && d->near_singular;
+    if (status != PW_RETRY || d->F_y_current) return status;
+    d->F_y_outdated = 1;
   }
 }
 
@@ -274,21 +278,21 @@ static double radau_norm (const radau *d, const double *e) {
   return sqrt (sum / (2 * d->dae.n));
 }
 
-int pw_radau_estimate (pw_run *r, double h, int again, double *error) {
+int pw_radau_estimate (pw_run *r, double h, int filter_twice, double *error) {
   radau *d = r->data;
   int n = d->dae.n;
-  double *e = d->F[0], *rest = d->F[1];
+  double *e = d->F[0], *from_stages = d->F[1];
   double *const *Z = d->now.Z;
   for (int i = 0; i < d->dae.size; i++) {
-    rest[i] = i < 2 * n ? d->B[i] / h * pw_radau_sum (0, radau_e, Z, i) : 0;
-    e[i] = rest[i] + (i < n ? d->now.y[n + i] : i < 2 * n ? d->B[i] * r->a[i - n] : 0);
+    from_stages[i] = i < 2 * n ? d->B[i] / h * pw_radau_sum (0, radau_e, Z, i) : 0;
+    e[i] = from_stages[i] + (i < n ? d->now.y[n + i] : i < 2 * n ? d->B[i] * r->a[i - n] : 0);
   }
   if (radau_solve_real (d, e) != PW_OK) return PW_RESOURCE;
   *error = radau_norm (d, e);
-  if (!again || *error < 1) return PW_OK;
+  if (!filter_twice || *error < 1) return PW_OK;
   for (int i = 0; i < d->dae.size; i++) d->Y[i] = d->now.y[i] + e[i];
   if (radau_evaluate (r, r->t, d->Y, e) != PW_OK) return PW_OK;
-  for (int i = 0; i < d->dae.size; i++) e[i] += rest[i];
+  for (int i = 0; i < d->dae.size; i++) e[i] += from_stages[i];
   if (radau_solve_real (d, e) != PW_OK) return PW_RESOURCE;
   *error = radau_norm (d, e);
   return PW_OK;
@@ -296,26 +300,27 @@ int pw_radau_estimate (pw_run *r, double h, int again, double *error) {
 
 int pw_radau_work (pw_run *r, double h, double t1, double *error) {
   radau *d = r->data;
-  int entries = r->s->entries, again = !d->dae.velocities && pw_ledger_reacts (r->s);
+  /* the multipliers of the stages are not accurate enough in index3 */
+  int entries = r->s->entries, recomputes = !d->dae.enforces_velocities && pw_ledger_uses_multipliers (r->s);
   double sum = 0;
-  for (int k = 0; k < STAGES; k++) memset (d->now.w[k], 0, (size_t)entries * sizeof (double));
+  for (int k = 0; k < STAGES; k++) memset (d->now.ledger_change[k], 0, (size_t)entries * sizeof (double));
   for (int k = 0; k < STAGES; k++) {
     pw_radau_stage (d, k);
     double t = pw_before_breakpoint (r, radau_time (r, k, h, t1));
     int status = pw_evaluate_J_at (r->w, t, d->Y, d->Y + d->dae.n);
     if (status != PW_OK) return status;
-    const double *lambda = pw_tangent_lambda (&d->dae.tangent, d->Y + 2 * d->dae.n);
-    if (again && pw_saddle_factor (r->saddle) == PW_OK) {
+    const double *lambda = pw_tangent_expand_lambda (&d->dae.tangent, d->Y + 2 * d->dae.n);
+    if (recomputes && pw_saddle_factor (r->saddle) == PW_OK) {
       pw_run_accelerate_updated (r, d->Y + d->dae.n, r->a_at, r->lambda_at);
       lambda = r->lambda_at;
     }
-    pw_ledger_rates (r, lambda, d->rates);
+    pw_ledger_rates (r, lambda, d->rate);
     for (int i = 0; i < STAGES; i++)
-      for (int e = 0; e < entries; e++) d->now.w[i][e] += h * radau_A[i][k] * d->rates[e];
+      for (int e = 0; e < entries; e++) d->now.ledger_change[i][e] += h * radau_A[i][k] * d->rate[e];
   }
   for (int e = 0; e < entries; e++) {
-    double off = pw_radau_sum (h * r->rate[e], radau_e, d->now.w, e);
-    sum += off * off;
+    double err = pw_radau_sum (h * r->rate[e], radau_e, d->now.ledger_change, e);
+    sum += err * err;
   }
   double tolerance = pw_ledger_tolerance (r, h) * fmax (1, pw_radau_rtol (r) / r->settings.rtol);
   *error = fmax (*error, sqrt (sum) / radau_gamma / tolerance);

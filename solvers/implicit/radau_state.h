@@ -1,51 +1,53 @@
-/* Private to radau: the method (radau.c), the stages of a step (radau_stages.c). */
+/* Private to radau: the data that the method (radau.c) and the stages of a step (radau_stages.c) share. */
 #ifndef PW_RADAU_STATE_H
 #define PW_RADAU_STATE_H
 
 #include "implicit.h"
 #include "radau_coefficients.h"
 
-/* A step from y at t; of the last one, the polynomial through its stages. */
+enum { PW_RADAU_MOST = 7 }; /* Newton iterations of an adaptive step, as in RADAU5 */
+
+/* A step from y at t, with the values at its stages, which define a polynomial. */
 typedef struct {
-  double t, h;                         /* h = 0: there is none */
-  double *y, *Z[PW_RADAU_STAGES];      /* unknowns */
-  double *ledger, *w[PW_RADAU_STAGES]; /* entries: at t; their changes up to the stages */
-  double *a;                           /* coords: accelerations at t */
+  double t, h;                                     /* h = 0: there is no step */
+  double *y, *Z[PW_RADAU_STAGES];                  /* unknowns: at t; their changes up to the stages */
+  double *ledger, *ledger_change[PW_RADAU_STAGES]; /* entries: the same of work and losses */
+  double *a;                                       /* coords: accelerations at t */
 } radau_step;
 
 struct pw_method_data {
-  int fixed; /* 1: fixed steps */
   pw_dae dae;
-  pw_sparse real, complex;
-  double *matrix;                                          /* -F_y */
-  double *value;                                           /* of the real matrix; of the complex one, in pairs */
-  int64_t *diagonal;                                       /* 2 n: where B is added */
-  double *B;                                               /* 2 n: diagonal of B */
-  double *unit;                                            /* 2 n: units of the states */
-  double *tolerance, *enough, *floor;                      /* 2 n: of the error test, of corrections; round-off */
-  double *row, *column;                                    /* scales of the matrices */
-  double *W[PW_RADAU_STAGES], *F[PW_RADAU_STAGES], *x, *Y; /* unknowns; x: twice */
-  double *rates;                                           /* entries */
-  radau_step now, last;
-  double *a1;                /* coords: accelerations at the end of the last step */
-  double base;               /* fixed steps: time from which they are counted */
-  long count;                /* steps since then */
-  double h;                  /* the next step */
-  double last_h, last_error; /* size and error of the last one, 0: none */
-  double factored;           /* step for which the matrices are factorised; 0: none */
-  int forget;                /* 1: select pivots anew */
-  int current, outdated;     /* F_y was evaluated at y; it must be evaluated again */
-  double rate, left;         /* of the last iteration: contraction rate, remaining error over the last correction */
-  double shorter;            /* factor of the step if the iteration does not converge */
-  int iterations;
-  int near; /* 1: the state reached is near a singular configuration */
+  pw_sparse real, complex;            /* factors of gamma/h B - F_y and (alpha + i beta)/h B - F_y */
+  double *minus_F_y;                  /* nonzero values of -F_y */
+  double *value;                      /* of the real matrix; of the complex one, in pairs */
+  double *row_factor, *column_factor; /* unknowns: by which rows and columns of both are multiplied */
+  int64_t *diagonal;                  /* 2 coords: index of the value to which B is added */
+  double *B;                          /* 2 coords: diagonal of B */
+  double factored_h;                  /* step size for which both are factorised; 0: none */
+  int choose_pivots;                  /* 1: select pivots anew */
+  int F_y_current, F_y_outdated;      /* 1: F_y was evaluated at the state reached; it must be evaluated again */
+  double *W[PW_RADAU_STAGES], *F[PW_RADAU_STAGES];  /* unknowns: transformed stages, residuals and corrections */
+  double *Y, *complex_x;                            /* unknowns: at a stage; complex, in pairs: scratch */
+  double *rate;                                     /* entries: scratch */
+  double *unit;                                     /* 2 coords: units of the states */
+  double *tolerance, *newton_tolerance, *round_off; /* 2 coords: of the error test, of corrections; their round-off */
+  double contraction;                               /* ratio of successive corrections in the last iteration */
+  double remaining;                                 /* remaining error over the last correction */
+  int iterations;                                   /* of the last step */
+  double reduction;                                 /* of the step size if the iteration does not converge */
+  radau_step now, last;                             /* the step being made; the last one */
+  double *a_end;                                    /* coords: accelerations at the end of the last step */
+  int near_singular;                                /* 1: the state reached is near a singular configuration */
+  pw_step_counter counter;                          /* of fixed steps */
+  double h;                                         /* adaptive: size of the next step */
+  double previous_h, previous_error;                /* adaptive: size and error of the last step; 0: there is none */
   pw_projector projector;
   char *memory;
 };
 
 typedef struct pw_method_data radau;
 
-/* Records the pattern of F_y at the initial conditions and opens both matrices.  PW_OK or PW_RESOURCE. */
+/* Records the pattern of F_y at the initial state and opens both matrices.  PW_OK or PW_RESOURCE. */
 int pw_radau_open_matrices (pw_run *r);
 
 /* The relative tolerance of the error estimate, whose order is 3. */
@@ -55,7 +57,7 @@ double pw_radau_rtol (const pw_run *r);
  * matrix is singular, PW_METHOD if a signal failed, PW_RESOURCE. */
 int pw_radau_solve (pw_run *r, double h, double t1);
 
-/* y + the weighted sum of the values of entry i at the stages. */
+/* y + the weighted sum of entry i of Z at the stages. */
 static inline double pw_radau_sum (double y, const double *weight, double *const *Z, int i) {
   return y + weight[0] * Z[0][i] + weight[1] * Z[1][i] + weight[2] * Z[2][i];
 }
@@ -63,15 +65,15 @@ static inline double pw_radau_sum (double y, const double *weight, double *const
 /* Stores the unknowns at stage k in d->Y. */
 void pw_radau_stage (const radau *d, int k);
 
-/* Weights of the values at the nodes c_i in the polynomial that is 0 at 0, at x. */
+/* Weights of the values at the nodes c_i in the value at x of the polynomial that is 0 at 0. */
 void pw_radau_basis (double x, double *weight);
 
-/* The error of the states in units of their tolerances.  again: filtered twice if it is too large, as is needed in
- * initial transients.  PW_OK or PW_RESOURCE. */
-int pw_radau_estimate (pw_run *r, double h, int again, double *error);
+/* The error of the states in units of their tolerances.  filter_twice: 1 to filter an error that is too large a second
+ * time, as is needed in initial transients (Hairer & Wanner 1996, section IV.8).  PW_OK or PW_RESOURCE. */
+int pw_radau_estimate (pw_run *r, double h, int filter_twice, double *error);
 
-/* Work and losses up to the stages; *error grows to theirs, in units of their tolerance.  Returns as
- * pw_update_kinematics. */
+/* Work and losses up to the stages; if their error, in units of their tolerance, is larger than *error, it is stored
+ * there.  Returns as pw_update_kinematics. */
 int pw_radau_work (pw_run *r, double h, double t1, double *error);
 
 #endif

@@ -1,4 +1,4 @@
-/* The equations of motion as differential-algebraic equations; see dae.h. */
+/* Residual and Newton matrix of the equations of motion as differential-algebraic equations; see dae.h. */
 #include <stdlib.h>
 #include "dae.h"
 #include "util.h"
@@ -7,15 +7,15 @@ int pw_dae_open (pw_dae *x, pw_run *r) {
   const pw_system *s = r->s;
   size_t n = (size_t)s->coords + 3, rows = (size_t)s->rows;
   const pw_stabilisation_kind kind = r->method->stabilisations[r->stabilisation].kind;
-  *x = (pw_dae){ .impulses = kind == PW_SI1, .n = s->coords };
-  x->positions = kind == PW_GGL || kind == PW_SI1 || kind == PW_STABILISED_OTHERWISE; /* index3, rattle */
-  x->velocities = kind == PW_GGL || kind == PW_SI1 || kind == PW_INDEX2;
-  const pw_array array[] = { { &x->pull, n }, { &x->f, n }, { &x->jv, rows }, { &x->other, rows } };
+  *x = (pw_dae){ .integrates_multipliers = kind == PW_SI1, .n = s->coords };
+  x->enforces_positions = kind == PW_GGL || kind == PW_SI1 || kind == PW_STABILISED_OTHERWISE; /* index3, rattle */
+  x->enforces_velocities = kind == PW_GGL || kind == PW_SI1 || kind == PW_INDEX2;
+  const pw_array array[] = { { &x->reaction, n }, { &x->force, n }, { &x->residual, rows }, { &x->scratch, rows } };
   x->memory = pw_alloc_arrays (array, sizeof array / sizeof *array);
   if (x->memory == NULL || pw_tangent_open (&x->tangent, r) != PW_OK) return PW_RESOURCE;
   x->rows = x->tangent.rows;
-  x->mus = x->positions && x->velocities ? x->tangent.holonomic : 0;
-  x->size = 2 * x->n + x->rows + x->mus;
+  x->mu_count = x->enforces_positions && x->enforces_velocities ? x->tangent.holonomic : 0;
+  x->size = 2 * x->n + x->rows + x->mu_count;
   return PW_OK;
 }
 
@@ -26,68 +26,99 @@ void pw_dae_close (pw_dae *x) {
 
 /* ---- Residual ---- */
 
-/* jv becomes J a - gamma + 2 alpha jv + beta^2 g, of nonholonomic equations J a - gamma + alpha jv. */
+/* The residual J v - eta becomes J a - gamma + 2 alpha (J v - eta) + beta^2 g, of nonholonomic equations
+ * J a - gamma + alpha (J v - eta). */
 static void dae_stabilise (pw_dae *x, const double *a) {
   const pw_run *r = x->tangent.run;
   const pw_system *s = r->s;
-  for (int i = 0; i < s->rows; i++) x->jv[i] *= (i < s->holonomic ? 2 : 1) * r->alpha;
-  pw_mul_J (r->w, a, x->other);
-  for (int i = 0; i < s->rows; i++) x->jv[i] += x->other[i];
-  pw_evaluate_gamma (r->w, x->other);
-  for (int i = 0; i < s->rows; i++) x->jv[i] -= x->other[i];
+  for (int i = 0; i < s->rows; i++) x->residual[i] *= (i < s->holonomic ? 2 : 1) * r->alpha;
+  pw_mul_J (r->w, a, x->scratch);
+  for (int i = 0; i < s->rows; i++) x->residual[i] += x->scratch[i];
+  pw_evaluate_gamma (r->w, x->scratch);
+  for (int i = 0; i < s->rows; i++) x->residual[i] -= x->scratch[i];
   if (r->beta == 0) return;
-  pw_evaluate_g (r->w, x->other);
-  for (int i = 0; i < s->holonomic; i++) x->jv[i] += r->beta * r->beta * x->other[i];
+  pw_evaluate_g (r->w, x->scratch);
+  for (int i = 0; i < s->holonomic; i++) x->residual[i] += r->beta * r->beta * x->scratch[i];
 }
 
+/* The constraint equations: those of lambda into `residual`; g, if it is enforced by mu, into `scratch`. */
 static void dae_constraints (pw_dae *x, const double *v, const double *a, double *F) {
   pw_workspace *w = x->tangent.run->w;
-  pw_mul_J (w, v, x->jv);
-  pw_evaluate_eta (w, x->other);
-  for (int i = 0; i < x->tangent.run->s->rows; i++) x->jv[i] -= x->other[i];
-  if (!x->velocities && !x->positions) dae_stabilise (x, a);
-  if (x->positions) pw_evaluate_g (w, x->velocities ? x->other : x->jv);
-  pw_tangent_compress (&x->tangent, x->jv, x->rows, F);
-  pw_tangent_compress (&x->tangent, x->other, x->mus, F + x->rows);
+  pw_mul_J (w, v, x->residual);
+  pw_evaluate_eta (w, x->scratch);
+  for (int i = 0; i < x->tangent.run->s->rows; i++) x->residual[i] -= x->scratch[i];
+  if (!x->enforces_velocities && !x->enforces_positions) dae_stabilise (x, a);
+  if (x->enforces_positions) pw_evaluate_g (w, x->enforces_velocities ? x->scratch : x->residual);
+  pw_tangent_compress (&x->tangent, x->residual, x->rows, F);
+  pw_tangent_compress (&x->tangent, x->scratch, x->mu_count, F + x->rows);
 }
 
 void pw_dae_residual (pw_dae *x, const double *v, const double *a, const double *lambda, double *F) {
   const pw_run *r = x->tangent.run;
   int n = x->n;
-  pw_tangent_pull (&x->tangent, lambda + x->rows, x->mus, x->pull);
-  for (int j = 0; j < n; j++) F[j] = x->tangent.D[j] * x->pull[j];
-  pw_tangent_pull (&x->tangent, lambda, x->rows, x->pull);
-  pw_evaluate_force (r->w, x->f);
-  for (int j = 0; j < n; j++) F[n + j] = (a ? r->s->mass[j] * a[j] : 0) + x->pull[j] - x->f[j];
+  pw_tangent_multiply_JT (&x->tangent, lambda + x->rows, x->mu_count, x->reaction);
+  for (int j = 0; j < n; j++) F[j] = x->tangent.D[j] * x->reaction[j];
+  pw_tangent_multiply_JT (&x->tangent, lambda, x->rows, x->reaction);
+  pw_evaluate_force (r->w, x->force);
+  for (int j = 0; j < n; j++) F[n + j] = (a ? r->s->mass[j] * a[j] : 0) + x->reaction[j] - x->force[j];
   dae_constraints (x, v, a, F + 2 * n);
 }
 
 /* ---- Matrix ---- */
 
-void pw_dae_matrix (pw_dae *x, const double *v, const double *a, const double *lambda, double of_q, double of_a) {
-  int n = x->n, mu = 2 * n + x->rows;
+/* The kinematics, with multipliers mu of all equations: q_dot_factor I + D (G^T mu)_q; -I; D G^T times mu_factor: the
+ * derivatives with respect to q, v, mu. */
+static void dae_add_kinematics (pw_dae *x, const double *mu, double q_dot_factor, double mu_factor) {
   pw_tangent *t = &x->tangent;
+  for (int j = 0; j < x->n; j++) {
+    pw_scatter_add (&t->scatter, j, j, q_dot_factor);
+    pw_scatter_add (&t->scatter, j, x->n + j, -1);
+  }
+  if (mu == NULL) return;
+  pw_placement put = {
+    .rows = t->run->s->holonomic, .factor = 1, .row_scale = t->D, .row_index = t->row_index, .lambda = mu
+  };
+  pw_newton_add_block (&t->newton, t->run->w, &t->scatter, PW_JTL_Q, &put);
+  put.col = 2 * x->n + x->rows;
+  put.factor = mu_factor;
+  pw_newton_add_JT (t->run->w, &t->scatter, &put);
+}
+
+/* Where they are enforced, J v - eta: (J v)_q - eta_q; J; and g: G. */
+static void dae_add_constraints (pw_dae *x, const double *v) {
+  pw_tangent *t = &x->tangent;
+  const pw_system *s = t->run->s;
+  const int n = x->n, g_row = x->enforces_velocities ? 2 * n + x->rows : 2 * n;
+  const double holonomic = x->enforces_velocities ? 1 : 0; /* 0: g replaces their J v - eta */
+  pw_tangent_add_equations (t, PW_JW_Q, 2 * n, 0, v, holonomic, 1);
+  pw_tangent_add_equations (t, PW_ETA_Q, 2 * n, 0, NULL, -holonomic, -1);
+  pw_tangent_add_J (t, s->rows, 2 * n, n, holonomic, 1);
+  if (x->enforces_positions) pw_tangent_add_J (t, s->holonomic, g_row, 0, 1, 0);
+}
+
+void pw_dae_matrix (pw_dae *x, const double *v, const double *a, const double *lambda, double q_dot_factor,
+                    double v_dot_factor) {
+  const int n = x->n;
+  pw_tangent *t = &x->tangent;
+  const double multiplier_factor = x->integrates_multipliers ? v_dot_factor : 1;
   const pw_tangent_layout to = { .momentum = n,
                                  .constraint = 2 * n,
                                  .v = n,
                                  .a = n,
                                  .lambda = 2 * n,
-                                 .mu = mu,
-                                 .of_q = of_q,
-                                 .of_a = of_a,
-                                 .of_lambda = x->impulses ? of_a : 1 };
-  pw_tangent_kinematics (t, &to, pw_tangent_mu (t, lambda + x->rows, x->mus));
-  pw_tangent_momentum (t, &to, pw_tangent_lambda (t, lambda));
-  if (x->velocities || x->positions)
-    pw_tangent_velocities (t, &to, v, x->velocities);
+                                 .a_factor = v_dot_factor,
+                                 .lambda_factor = multiplier_factor };
+  dae_add_kinematics (x, pw_tangent_expand_mu (t, lambda + x->rows, x->mu_count), q_dot_factor, multiplier_factor);
+  pw_tangent_add_momentum (t, &to, pw_tangent_expand_lambda (t, lambda));
+  if (x->enforces_velocities || x->enforces_positions)
+    dae_add_constraints (x, v);
   else
-    pw_tangent_accelerations (t, &to, v, a);
-  if (x->positions) pw_tangent_positions (t, &to, x->velocities ? mu : 2 * n);
+    pw_tangent_add_accelerations (t, &to, v, a);
 }
 
 int pw_dae_lay_out (pw_dae *x, const double *v, const double *a, const double *lambda) {
   pw_tangent *t = &x->tangent;
-  pw_scatter_record (&t->scatter);
+  pw_scatter_begin_record (&t->scatter);
   pw_dae_matrix (x, v, a, lambda, 1, 1);
   return pw_scatter_lay_out (&t->scatter, x->size, &t->colptr, &t->rowind);
 }

@@ -1,4 +1,5 @@
-/* The equations of motion as differential-algebraic equations F (t, y, y') = 0, y = (q, v, lambda, mu):
+/* The equations of motion as differential-algebraic equations F (t, y, y') = 0, y = (q, v, lambda, mu), for implicit
+ * methods:
  *
  *   kinematics    q' - v + D G^T mu
  *   momentum      M a + J^T lambda - f,   a = v'
@@ -18,13 +19,12 @@
 
 typedef struct {
   pw_tangent tangent;
-  int velocities; /* 1: J v = eta is enforced */
-  int positions;  /* 1: g = 0 is enforced, by mu if `velocities`, else in place of the holonomic J v = eta; both 0: the
-                     constraints on acceleration level are */
-  int impulses;   /* 1: si1 */
-  int n, rows, mus, size; /* coordinates, independent equations, multipliers mu, unknowns */
-  double *pull, *f;       /* coords + 3: J^T lambda or G^T mu; applied forces */
-  double *jv, *other;     /* all constraint equations: residuals, J v - eta and what is added; g, or one term */
+  int enforces_velocities;     /* 1: index2, ggl, si1 */
+  int enforces_positions;      /* 1: index3, ggl, si1; both are 0 for none and baumgarte */
+  int integrates_multipliers;  /* 1: si1 */
+  int n, rows, mu_count, size; /* coordinates, independent equations, multipliers mu, unknowns */
+  double *reaction, *force;    /* coords + 3: J^T lambda or G^T mu; applied forces */
+  double *residual, *scratch;  /* all constraint equations */
   char *memory;
 } pw_dae;
 
@@ -32,13 +32,14 @@ typedef struct {
 int pw_dae_open (pw_dae *x, pw_run *r);
 void pw_dae_close (pw_dae *x);
 
-/* F without q' - v.  Kinematics and J must be up to date.  lambda: the multipliers of the independent equations, mu after
- * them; a may be NULL, which is 0, except for constraints on acceleration level. */
+/* F without q' - v.  Kinematics and J must be up to date.  lambda: the multipliers of the independent equations, mu
+ * after them; a may be NULL, which is 0, except for constraints on acceleration level. */
 void pw_dae_residual (pw_dae *x, const double *v, const double *a, const double *lambda, double *F);
 
-/* Adds dF/dy + of_q dF/dq' + of_a dF/dv' to the matrix of x->tangent; columns of the multipliers of si1, of whose derivatives
- * F is a function, times of_a. */
-void pw_dae_matrix (pw_dae *x, const double *v, const double *a, const double *lambda, double of_q, double of_a);
+/* Adds dF/dy + q_dot_factor dF/dq' + v_dot_factor dF/dv' to the matrix of x->tangent.  In si1, F depends on the
+ * derivatives of the unknowns lambda and mu: their columns are those times v_dot_factor. */
+void pw_dae_matrix (pw_dae *x, const double *v, const double *a, const double *lambda, double q_dot_factor,
+                    double v_dot_factor);
 
 /* Determines the pattern of this matrix, in x->tangent.  PW_OK or PW_RESOURCE. */
 int pw_dae_lay_out (pw_dae *x, const double *v, const double *a, const double *lambda);

@@ -1,56 +1,59 @@
-/* Assembly of second-order blocks into sparse matrices; see newton.h. */
+/* Assembly of J and second-order blocks into sparse matrices; see newton.h. */
 #include <stdlib.h>
 #include "newton.h"
 
-int pw_newton_open (pw_newton *n, const pw_system *s) {
-  size_t block = 1, w = 1;
+int pw_newton_open (pw_newton_scratch *n, const pw_system *s) {
+  size_t block = 1, direction = 1;
   for (const pw_element_batch *k = s->batch; k < s->batch + s->batches; k++) {
     const size_t columns = (size_t)k->b.count * (size_t)k->b.cols,
                  widths[] = { (size_t)k->b.cols, (size_t)k->kind->rows, PW_MAX_SIGNALS };
-    if (columns > w) w = columns;
+    if (columns > direction) direction = columns;
     for (int i = 0; i < 3; i++)
       if (columns * widths[i] > block) block = columns * widths[i];
   }
-  n->block = malloc ((block + w) * sizeof *n->block);
-  n->w = n->block ? n->block + block : NULL;
+  n->block = malloc ((block + direction) * sizeof *n->block);
+  n->direction = n->block ? n->block + block : NULL;
   return n->block ? PW_OK : PW_RESOURCE;
 }
 
-void pw_newton_close (pw_newton *n) {
+void pw_newton_close (pw_newton_scratch *n) {
   free (n->block);
 }
 
-static void newton_gather (const pw_system *s, const pw_element_batch *k, const double *w, double *local) {
+/* Copies a vector over the coordinates to the columns of each element; the ground's are 0. */
+static void newton_gather (const pw_system *s, const pw_element_batch *k, const double *vector, double *local) {
   for (int e = 0; e < k->b.count; e++)
     for (int c = 0; c < k->b.cols; c++) {
       int j = pw_global (k, e, c);
-      *local++ = j < s->coords ? w[j] : 0;
+      *local++ = j < s->coords ? vector[j] : 0;
     }
 }
 
-/* What a batch adds: its rows of J; blocks whose rows are its constraint equations, or its coordinates. */
-typedef enum { NEWTON_J, NEWTON_EQUATIONS, NEWTON_COORDINATES } newton_part;
+/* What a batch adds: its rows of J, or their transpose; blocks whose rows are its constraint equations, or its
+ * coordinates. */
+typedef enum { NEWTON_J, NEWTON_JT, NEWTON_EQUATIONS, NEWTON_COORDINATES } newton_part;
 
+/* 1 for a column of x or y, 0 for one of an angle. */
 static inline int newton_is_length (int c) {
   return c % 3 != 2;
 }
 
-/* 1 for an entry of a pin that is always zero: its rows of J are unit vectors in x and y columns. */
+/* 1 for an entry of a pin that is always zero: its rows of J are multiples of unit vectors in x and y columns. */
 static inline int newton_is_zero (newton_part part, int r, int c) {
-  if (part == NEWTON_J) return newton_is_length (c) && c % 3 == 1 - r;
+  if (part == NEWTON_J || part == NEWTON_JT) return newton_is_length (c) && c % 3 == 1 - r;
   return newton_is_length (c) || (part == NEWTON_COORDINATES && newton_is_length (r));
 }
 
 /* Adds the values of a batch, rows x columns of each element. */
-static void newton_add (const pw_system *s, const pw_element_batch *k, newton_part part, int transposed,
-                        const double *value, pw_scatter_map *t, const pw_placement *put) {
+static void newton_add (const pw_system *s, const pw_element_batch *k, newton_part part, const double *value,
+                        pw_scatter_map *t, const pw_placement *put) {
   const int of_coordinates = part == NEWTON_COORDINATES, rows = of_coordinates ? k->b.cols : k->kind->rows,
-            is_pin = k->kind == &pw_kind_pin;
+            transposed = part == NEWTON_JT, is_pin = k->kind == &pw_kind_pin;
   const double factor = !of_coordinates && k->row >= s->holonomic ? put->factor_nonholonomic : put->factor;
   for (int e = 0; e < k->b.count; e++)
     for (int r = 0; r < rows; r++) {
       int i = of_coordinates ? pw_global (k, e, r) : k->row + e * rows + r;
-      if (!of_coordinates && put->map) i = put->map[i];
+      if (!of_coordinates && put->row_index) i = put->row_index[i];
       for (int c = 0; c < k->b.cols; c++, value++) {
         int j = pw_global (k, e, c), row = transposed ? j : i;
         if (j >= s->coords || i < 0 || (of_coordinates && i >= s->coords)) continue;
@@ -61,27 +64,36 @@ static void newton_add (const pw_system *s, const pw_element_batch *k, newton_pa
     }
 }
 
-void pw_newton_block (pw_newton *n, pw_workspace *w, pw_scatter_map *t, pw_block block, const pw_placement *put) {
+void pw_newton_add_block (pw_newton_scratch *n, pw_workspace *w, pw_scatter_map *t, pw_block block,
+                          const pw_placement *put) {
   const pw_system *s = w->s;
   for (pw_element_batch *k = w->batch; k < w->batch + s->batches; k++) {
     int of_equations = block == PW_JW_Q || block == PW_ETA_Q || block == PW_GAMMA_Q || block == PW_GAMMA_V;
     if ((of_equations || block == PW_JTL_Q) && (k->kind->rows == 0 || k->row >= put->rows)) continue;
     if (pw_block_function (k->kind, block) == NULL) continue;
-    if (put->w) newton_gather (s, k, put->w, n->w);
-    k->b.w = n->w;
+    if (put->direction) newton_gather (s, k, put->direction, n->direction);
+    k->b.w = n->direction;
     k->b.lambda = put->lambda ? put->lambda + k->row : NULL;
     if (!t->recording) pw_evaluate_block (w, k, block, n->block);
-    newton_add (s, k, of_equations ? NEWTON_EQUATIONS : NEWTON_COORDINATES, 0, n->block, t, put);
+    newton_add (s, k, of_equations ? NEWTON_EQUATIONS : NEWTON_COORDINATES, n->block, t, put);
   }
 }
 
-void pw_newton_J (const pw_workspace *w, pw_scatter_map *t, int transposed, const pw_placement *put) {
+static void newton_add_J (const pw_workspace *w, pw_scatter_map *t, newton_part part, const pw_placement *put) {
   const pw_system *s = w->s;
   for (const pw_element_batch *k = w->batch; k < w->batch + s->constraints && k->row < put->rows; k++)
-    newton_add (s, k, NEWTON_J, transposed, k->J, t, put);
+    newton_add (s, k, part, k->J, t, put);
 }
 
-void pw_newton_signals (pw_newton *n, pw_workspace *w, pw_scatter_map *t, int row, int col, int col_v) {
+void pw_newton_add_J (const pw_workspace *w, pw_scatter_map *t, const pw_placement *put) {
+  newton_add_J (w, t, NEWTON_J, put);
+}
+
+void pw_newton_add_JT (const pw_workspace *w, pw_scatter_map *t, const pw_placement *put) {
+  newton_add_J (w, t, NEWTON_JT, put);
+}
+
+void pw_newton_add_signals (pw_newton_scratch *n, pw_workspace *w, pw_scatter_map *t, int row, int col_q, int col_v) {
   const pw_system *s = w->s;
   for (pw_element_batch *k = w->batch; s->state_dependent > 0 && k < w->batch + s->batches; k++) {
     int signals = k->kind->signals, cols = k->b.cols;
@@ -90,13 +102,13 @@ void pw_newton_signals (pw_newton *n, pw_workspace *w, pw_scatter_map *t, int ro
     for (int e = 0; e < k->b.count; e++)
       for (int u = 0; u < signals; u++) {
         const pw_source *source = &k->source[e * signals + u];
-        for (int x = 0; x < source->reads; x++) {
-          int j = source->state[x], to = j < s->coords ? col + j : col_v + j - s->coords;
+        for (int x = 0; x < source->reads; x++) { /* source->x: the values of the states read, then derivatives */
+          int j = source->state[x], col = j < s->coords ? col_q + j : col_v + j - s->coords;
+          double slope = source->x[source->reads + x];
           for (int c = 0; c < cols; c++) {
             int i = pw_global (k, e, c);
             if (i >= s->coords) continue;
-            pw_scatter_add (t, row + i, to,
-                            t->recording ? 0 : -n->block[(e * cols + c) * signals + u] * source->x[source->reads + x]);
+            pw_scatter_add (t, row + i, col, t->recording ? 0 : -n->block[(e * cols + c) * signals + u] * slope);
           }
         }
       }

@@ -1,5 +1,5 @@
-/* Assembles the second-order blocks of a scene into a sparse matrix; shared by the Newton matrices of implicit
- * methods. */
+/* Adds J and the second-order blocks of a scene's elements to a sparse matrix, for the Newton matrices of implicit
+ * methods and the linearisation. */
 #ifndef PW_NEWTON_H
 #define PW_NEWTON_H
 
@@ -8,31 +8,36 @@
 
 /* Scratch for the blocks of one system. */
 typedef struct {
-  double *block; /* largest count x rows x cols of any batch */
-  double *w;     /* largest count x cols */
-} pw_newton;
+  double *block;     /* largest count x rows x cols of any batch */
+  double *direction; /* largest count x cols */
+} pw_newton_scratch;
 
-int pw_newton_open (pw_newton *n, const pw_system *s); /* PW_OK or PW_RESOURCE */
-void pw_newton_close (pw_newton *n);
+int pw_newton_open (pw_newton_scratch *n, const pw_system *s); /* PW_OK or PW_RESOURCE */
+void pw_newton_close (pw_newton_scratch *n);
 
-/* Where a block is added, and how: factor x block of every batch, rows from `row` on (constraint equations or
- * coordinates; row_scale, if given, multiplies each), columns from `col` on.  w: direction of jw_q (coords); lambda:
- * multipliers of jtl_q (rows); `rows`: number of constraint equations included. */
+/* Where and how a block is added: rows of the matrix from `row` on (coordinates or constraint equations), columns from
+ * `col` on. */
 typedef struct {
-  int row, col, rows;
-  double factor; /* of holonomic equations, and of coordinates */
-  double factor_nonholonomic;
-  const double *row_scale;
-  const int *map; /* rows: index of each constraint row in the matrix, or -1: omitted; NULL: unchanged indices */
-  const double *w, *lambda;
+  int row, col;
+  int rows;                   /* only the first `rows` constraint equations are included */
+  double factor;              /* of blocks of forces, and of those of holonomic equations */
+  double factor_nonholonomic; /* of those of nonholonomic equations */
+  const double *row_scale;    /* further factors, one for each row from `row` on; NULL: 1 */
+  const int *row_index;       /* rows: index of each constraint equation, or -1: omitted; NULL: unchanged indices */
+  const double *direction;    /* coords: w of the block (J w)_q */
+  const double *lambda;       /* rows: multipliers of the block (J^T lambda)_q */
 } pw_placement;
-void pw_newton_block (pw_newton *n, pw_workspace *w, pw_scatter_map *t, pw_block block, const pw_placement *put);
 
-/* Adds factor x J, or `transposed`, with the J last evaluated. */
-void pw_newton_J (const pw_workspace *w, pw_scatter_map *t, int transposed, const pw_placement *put);
+/* Adds a block of every batch. */
+void pw_newton_add_block (pw_newton_scratch *n, pw_workspace *w, pw_scatter_map *t, pw_block block,
+                          const pw_placement *put);
+
+/* Add the J last evaluated, with constraint equations as rows, and J^T, with these as columns. */
+void pw_newton_add_J (const pw_workspace *w, pw_scatter_map *t, const pw_placement *put);
+void pw_newton_add_JT (const pw_workspace *w, pw_scatter_map *t, const pw_placement *put);
 
 /* Adds -(derivative of the force by signals) x (derivative of signals by states): rows from `row` on, q in columns from
- * `col` on, v in columns from `col_v` on. */
-void pw_newton_signals (pw_newton *n, pw_workspace *w, pw_scatter_map *t, int row, int col, int col_v);
+ * col_q on, v in columns from col_v on. */
+void pw_newton_add_signals (pw_newton_scratch *n, pw_workspace *w, pw_scatter_map *t, int row, int col_q, int col_v);
 
 #endif

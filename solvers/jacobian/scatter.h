@@ -1,5 +1,5 @@
 /* Repeated assembly of a sparse matrix by the same sequence of contributions: the sequence is recorded once and laid
- * out in compressed columns; from then on the number of a contribution determines its position. */
+ * out in compressed columns; from then on the number of a contribution in the sequence determines where it is added. */
 #ifndef PW_SCATTER_H
 #define PW_SCATTER_H
 
@@ -8,33 +8,37 @@
 
 typedef struct {
   int recording;
-  size_t count, room; /* number of contributions; allocated number while recording */
+  size_t count, room; /* number of contributions; number that `entry` has room for */
   struct pw_scatter_entry {
     int row, col;
     size_t number;
   } * entry;     /* while recording */
-  size_t *place; /* index in `value` of each contribution */
-  size_t next;   /* number of the next contribution */
-  double *value; /* while filling */
+  size_t *place; /* of each contribution: the index in `value` to which it is added */
+  size_t next;   /* while filling: number of the next contribution */
+  double *value; /* while filling: the matrix */
   int failed;    /* out of memory while recording */
 } pw_scatter_map;
 
-void pw_scatter_record (pw_scatter_map *t);
-/* Ends the recording: colptr (n + 1) and rowind (nonzeros) are allocated with malloc for the caller.  PW_RESOURCE. */
+/* From now on contributions are recorded; their values are ignored. */
+void pw_scatter_begin_record (pw_scatter_map *t);
+
+/* Ends the recording for n columns; colptr (n + 1) and rowind (nonzeros) are allocated with malloc for the caller.
+ * PW_OK or PW_RESOURCE. */
 int pw_scatter_lay_out (pw_scatter_map *t, int n, int64_t **colptr, int64_t **rowind);
 void pw_scatter_close (pw_scatter_map *t);
 
-/* Begins filling the values, which the caller has zeroed. */
-static inline void pw_scatter_begin (pw_scatter_map *t, double *value) {
+/* From now on contributions are added to these values, which the caller has zeroed. */
+static inline void pw_scatter_begin_fill (pw_scatter_map *t, double *value) {
   t->next = 0;
   t->value = value;
 }
 
-void pw_scatter_note (pw_scatter_map *t, int row, int col);
+void pw_scatter_record_entry (pw_scatter_map *t, int row, int col);
 
+/* The next contribution. */
 static inline void pw_scatter_add (pw_scatter_map *t, int row, int col, double value) {
   if (t->recording)
-    pw_scatter_note (t, row, col);
+    pw_scatter_record_entry (t, row, col);
   else
     t->value[t->place[t->next++]] += value;
 }

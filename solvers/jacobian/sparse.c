@@ -2,51 +2,43 @@
 #include "pinwheel.h"
 #include "sparse.h"
 
-struct pw_sparse_field {
-  klu_l_numeric *(*factor) (int64_t *, int64_t *, double *, klu_l_symbolic *, klu_l_common *);
-  int64_t (*refactor) (int64_t *, int64_t *, double *, klu_l_symbolic *, klu_l_numeric *, klu_l_common *);
-  int64_t (*rcond) (klu_l_symbolic *, klu_l_numeric *, klu_l_common *);
-  int64_t (*solve) (klu_l_symbolic *, klu_l_numeric *, int64_t, int64_t, double *, klu_l_common *);
-  int64_t (*release) (klu_l_numeric **, klu_l_common *);
-};
-static const struct pw_sparse_field sparse_real = { klu_l_factor, klu_l_refactor, klu_l_rcond, klu_l_solve,
-                                                    klu_l_free_numeric };
-static const struct pw_sparse_field sparse_complex = { klu_zl_factor, klu_zl_refactor, klu_zl_rcond, klu_zl_solve,
-                                                       klu_zl_free_numeric };
+/* A function of KLU for the numbers of x. */
+#define SPARSE_KLU(x, function, ...) \
+  ((x)->numbers == PW_SPARSE_REAL ? klu_l_##function (__VA_ARGS__) : klu_zl_##function (__VA_ARGS__))
 
-int pw_sparse_open (pw_sparse *k, int complex, int n, int64_t *colptr, int64_t *rowind) {
-  *k = (pw_sparse){ .field = complex ? &sparse_complex : &sparse_real, .colptr = colptr, .rowind = rowind };
-  if (!klu_l_defaults (&k->common)) return PW_RESOURCE;
-  k->order = klu_l_analyze (n, colptr, rowind, &k->common);
-  return k->order ? PW_OK : PW_RESOURCE;
+int pw_sparse_open (pw_sparse *x, pw_sparse_numbers numbers, int n, int64_t *colptr, int64_t *rowind) {
+  *x = (pw_sparse){ .numbers = numbers, .colptr = colptr, .rowind = rowind };
+  if (!klu_l_defaults (&x->common)) return PW_RESOURCE;
+  x->symbolic = klu_l_analyze (n, colptr, rowind, &x->common);
+  return x->symbolic ? PW_OK : PW_RESOURCE;
 }
 
-void pw_sparse_forget (pw_sparse *k) {
-  if (k->factors) k->field->release (&k->factors, &k->common);
+void pw_sparse_forget_pivots (pw_sparse *x) {
+  if (x->factors) SPARSE_KLU (x, free_numeric, &x->factors, &x->common);
 }
 
-void pw_sparse_close (pw_sparse *k) {
-  pw_sparse_forget (k);
-  if (k->order) klu_l_free_symbolic (&k->order, &k->common);
+void pw_sparse_close (pw_sparse *x) {
+  pw_sparse_forget_pivots (x);
+  if (x->symbolic) klu_l_free_symbolic (&x->symbolic, &x->common);
 }
 
-/* Refactorises with the present pivots, if they are still good. */
-static int sparse_refactor (pw_sparse *k, double *value) {
-  if (k->factors == NULL) return 0;
-  if (!k->field->refactor (k->colptr, k->rowind, value, k->order, k->factors, &k->common)) return 0;
-  return k->field->rcond (k->order, k->factors, &k->common) && k->common.rcond > k->least;
+/* Factorises with the previous pivots; returns 0 if there are none, or if they have become inaccurate. */
+static int sparse_refactor (pw_sparse *x, double *value) {
+  if (x->factors == NULL) return 0;
+  if (!SPARSE_KLU (x, refactor, x->colptr, x->rowind, value, x->symbolic, x->factors, &x->common)) return 0;
+  return SPARSE_KLU (x, rcond, x->symbolic, x->factors, &x->common) && x->common.rcond > x->least_rcond;
 }
 
-int pw_sparse_factor (pw_sparse *k, double *value) {
-  if (sparse_refactor (k, value)) return PW_OK;
-  pw_sparse_forget (k);
-  k->factors = k->field->factor (k->colptr, k->rowind, value, k->order, &k->common);
-  if (k->factors == NULL) return k->common.status == KLU_OUT_OF_MEMORY ? PW_RESOURCE : PW_INPUT;
-  if (!k->field->rcond (k->order, k->factors, &k->common)) return PW_RESOURCE;
-  k->least = 0.01 * k->common.rcond; /* two digits may be lost */
-  return k->common.rcond > 0 ? PW_OK : PW_INPUT;
+int pw_sparse_factor (pw_sparse *x, double *value) {
+  if (sparse_refactor (x, value)) return PW_OK;
+  pw_sparse_forget_pivots (x);
+  x->factors = SPARSE_KLU (x, factor, x->colptr, x->rowind, value, x->symbolic, &x->common);
+  if (x->factors == NULL) return x->common.status == KLU_OUT_OF_MEMORY ? PW_RESOURCE : PW_INPUT;
+  if (!SPARSE_KLU (x, rcond, x->symbolic, x->factors, &x->common)) return PW_RESOURCE;
+  x->least_rcond = 0.01 * x->common.rcond; /* two digits may be lost */
+  return x->common.rcond > 0 ? PW_OK : PW_INPUT;
 }
 
-int pw_sparse_solve (pw_sparse *k, double *x) {
-  return k->field->solve (k->order, k->factors, k->order->n, 1, x, &k->common) ? PW_OK : PW_RESOURCE;
+int pw_sparse_solve (pw_sparse *x, double *right) {
+  return SPARSE_KLU (x, solve, x->symbolic, x->factors, x->symbolic->n, 1, right, &x->common) ? PW_OK : PW_RESOURCE;
 }

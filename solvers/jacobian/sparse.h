@@ -1,31 +1,34 @@
-/* A square sparse matrix, real or complex, factorised again and again (KLU: Davis & Palamadai Natarajan 2010): ordered
- * once, its pivots kept while they are good.  Complex numbers are pairs of doubles. */
+/* A square sparse matrix, real or complex, that is factorised repeatedly (KLU: Davis & Palamadai Natarajan 2010,
+ * Algorithm 907): its columns are ordered once, its pivots kept while they remain accurate. */
 #ifndef PW_SPARSE_H
 #define PW_SPARSE_H
 
 #include <stdint.h>
 #include <klu.h>
 
+/* Complex numbers are pairs of doubles. */
+typedef enum { PW_SPARSE_REAL, PW_SPARSE_COMPLEX } pw_sparse_numbers;
+
 typedef struct {
-  const struct pw_sparse_field *field; /* KLU's functions for real or complex numbers */
+  pw_sparse_numbers numbers;
   klu_l_common common;
-  klu_l_symbolic *order;
-  klu_l_numeric *factors;
+  klu_l_symbolic *symbolic;
+  klu_l_numeric *factors;   /* NULL: none, or forgotten */
   int64_t *colptr, *rowind; /* the pattern, the caller's */
-  double least;             /* ratio of pivots below which they are selected again */
+  double least_rcond;       /* reciprocal condition number below which pivots are selected again */
 } pw_sparse;
 
-/* n columns in compressed form; complex: 1 for complex numbers.  PW_OK or PW_RESOURCE. */
-int pw_sparse_open (pw_sparse *k, int complex, int n, int64_t *colptr, int64_t *rowind);
-void pw_sparse_close (pw_sparse *k);
+/* n columns in compressed form.  PW_OK or PW_RESOURCE. */
+int pw_sparse_open (pw_sparse *x, pw_sparse_numbers numbers, int n, int64_t *colptr, int64_t *rowind);
+void pw_sparse_close (pw_sparse *x);
 
 /* PW_OK, PW_INPUT if the matrix is singular, PW_RESOURCE. */
-int pw_sparse_factor (pw_sparse *k, double *value);
+int pw_sparse_factor (pw_sparse *x, double *value);
 
-/* The next factorisation chooses its pivots again. */
-void pw_sparse_forget (pw_sparse *k);
+/* The next factorisation selects its pivots again. */
+void pw_sparse_forget_pivots (pw_sparse *x);
 
-/* x = A^-1 x.  PW_OK or PW_RESOURCE. */
-int pw_sparse_solve (pw_sparse *k, double *x);
+/* Solves A x = b; `right` contains b, then x.  PW_OK or PW_RESOURCE. */
+int pw_sparse_solve (pw_sparse *x, double *right);
 
 #endif

@@ -1,11 +1,10 @@
-/* Derivatives of the equations of motion with the active rows, shared by the Newton matrices of implicit methods.
+/* Derivatives of the equations of motion with the active constraint equations, shared by the Newton matrices of
+ * implicit methods:
  *
- *   kinematics      q' - v + D G^T mu                                       by (q, v, mu)
- *   momentum        M a + J^T lambda - f                                    by (q, v, a, lambda)
- *   velocities      J v - eta                                               by (q, v)
- *   positions       g                                                       by q
- *   accelerations   J a - gamma + 2 alpha (J v - eta) + beta^2 g            by (q, v, a)
- *                   (nonholonomic: + alpha (J v - eta)) */
+ *   momentum        M a + J^T lambda - f
+ *   accelerations   J a - gamma + 2 alpha (J v - eta) + beta^2 g   (nonholonomic: + alpha (J v - eta))
+ *
+ * with Baumgarte's alpha and beta. */
 #ifndef PW_TANGENT_H
 #define PW_TANGENT_H
 
@@ -14,12 +13,12 @@
 
 typedef struct {
   pw_run *run;
-  int rows, holonomic; /* active equations */
-  int *map;            /* all equations: index among the active ones, or -1 */
+  int rows, holonomic; /* active equations; holonomic ones */
+  int *row_index;      /* all equations: index among the active ones, or -1 */
   int *row;            /* rows: index among all equations */
-  double *lambda, *mu; /* all equations: values of the unknowns last expanded */
-  double *D;           /* coords: 1 for lengths, 1/L^2 for angles, so that mu has one unit */
-  pw_newton newton;
+  double *lambda, *mu; /* all equations: multipliers last expanded, 0 for those that are not active */
+  double *D;           /* coords: diagonal; 1 for lengths, 1/L^2 for angles, so that mu has one unit */
+  pw_newton_scratch newton;
   pw_scatter_map scatter;
   int64_t *colptr, *rowind; /* the pattern, in compressed columns */
   char *memory;
@@ -28,32 +27,38 @@ typedef struct {
 int pw_tangent_open (pw_tangent *x, pw_run *r); /* PW_OK or PW_RESOURCE */
 void pw_tangent_close (pw_tangent *x);
 
-/* Multipliers of all equations from those of the active ones, valid until the next call: lambda; the first `count` of
- * mu, NULL if there are none. */
-const double *pw_tangent_lambda (const pw_tangent *x, const double *used);
-const double *pw_tangent_mu (const pw_tangent *x, const double *used, int count);
-/* The same lambda in an array of all equations. */
-void pw_tangent_store (const pw_tangent *x, const double *used, double *all);
-/* out (coords + 3) = J^T times the multipliers of the first `count` active equations, with the J last evaluated. */
-void pw_tangent_pull (const pw_tangent *x, const double *used, int count, double *out);
-/* Values of the first `count` active equations from those of all. */
-void pw_tangent_compress (const pw_tangent *x, const double *all, int count, double *used);
+/* ---- From values of the active equations to those of all, and back ---- */
 
-/* Positions of the parts in the matrix. a may share its columns with v: derivatives with respect to a are multiplied by
- * `of_a`, those by q' by `of_q` in the columns of q, those by lambda and mu by `of_lambda`. */
+/* Multipliers of all equations, valid until the next call: lambda; mu, of which there are `count` active ones, NULL if
+ * there are none. */
+const double *pw_tangent_expand_lambda (const pw_tangent *x, const double *active);
+const double *pw_tangent_expand_mu (const pw_tangent *x, const double *active, int count);
+/* The same lambda in an array of all equations. */
+void pw_tangent_expand (const pw_tangent *x, const double *active, double *all);
+/* out (coords + 3) = J^T times the multipliers of the first `count` active equations, with the J last evaluated. */
+void pw_tangent_multiply_JT (const pw_tangent *x, const double *active, int count, double *out);
+/* Values of the first `count` active equations from those of all. */
+void pw_tangent_compress (const pw_tangent *x, const double *all, int count, double *active);
+
+/* ---- Adding to the matrix ---- */
+
+/* Adds a block of the constraint equations at a row and column, with factors of holonomic and nonholonomic ones;
+ * w: that of (J w)_q. */
+void pw_tangent_add_equations (pw_tangent *x, pw_block block, int row, int col, const double *w, double holonomic,
+                               double nonholonomic);
+/* Adds J of the first `rows` equations in the same way. */
+void pw_tangent_add_J (pw_tangent *x, int rows, int row, int col, double holonomic, double nonholonomic);
+
+/* Positions of the parts in the matrix, and factors of derivatives. */
 typedef struct {
-  int momentum, constraint; /* first row of each; that of the kinematics is 0 */
-  int q, v, a, lambda, mu;  /* first column of each */
-  double of_q, of_a, of_lambda;
+  int momentum, constraint; /* first row of each */
+  int q, v, a, lambda;      /* first column of each; a may share its columns with v */
+  double a_factor;          /* of derivatives with respect to a */
+  double lambda_factor;     /* of those with respect to lambda */
 } pw_tangent_layout;
 
-/* Adds these rows at the current configuration with J evaluated; lambda and mu (NULL: there are none): all equations,
- * v and a: coords. */
-void pw_tangent_momentum (pw_tangent *x, const pw_tangent_layout *to, const double *lambda);
-void pw_tangent_kinematics (pw_tangent *x, const pw_tangent_layout *to, const double *mu);
-void pw_tangent_accelerations (pw_tangent *x, const pw_tangent_layout *to, const double *v, const double *a);
-/* Holonomic rows are multiplied by a factor: 0 leaves their rows to pw_tangent_positions, which starts at `row`. */
-void pw_tangent_velocities (pw_tangent *x, const pw_tangent_layout *to, const double *v, double of_holonomic);
-void pw_tangent_positions (pw_tangent *x, const pw_tangent_layout *to, int row);
+/* Add the rows of one part at the current configuration, where J is evaluated; lambda: all equations. */
+void pw_tangent_add_momentum (pw_tangent *x, const pw_tangent_layout *to, const double *lambda);
+void pw_tangent_add_accelerations (pw_tangent *x, const pw_tangent_layout *to, const double *v, const double *a);
 
 #endif

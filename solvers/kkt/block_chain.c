@@ -1,6 +1,6 @@
-/* Chains; see block_ldl.h.  Each elimination waits for the one before it.  A chain from whose both ends it can proceed
- * is therefore swept in the two lanes of vector registers, from either end to the middle; any other chain in both lanes
- * alike, from the first pin to the last. */
+/* Factorisation and solution along chains; see block_ldl.h.  Each elimination waits for the one before it.  A chain
+ * from both of whose ends it can proceed is therefore swept in the two lanes of vector registers, from the ends to the
+ * middle; in any other chain both lanes do the same, from the first pin to the last. */
 #include <stddef.h>
 #include "block_parts.h"
 #include "unroll.h"
@@ -12,26 +12,37 @@ enum { CHAIN_BLOCK = 5 }; /* values of a diagonal block of 2 unknowns */
 /* GNU C's vectors: operations work on both lanes. */
 typedef double chain_lanes __attribute__ ((vector_size (2 * sizeof (double))));
 
-/* A body: J at the pin that is eliminated and at the next one, factors of the former. */
+/* A body of the chain, one of whose pins is eliminated. */
 typedef struct {
-  const double *from, *to;
-  double *keep;
-  ptrdiff_t j, y; /* first coordinate; of the pin eliminated in the right-hand side */
+  const double *J_eliminated, *J_next; /* J at this pin, and at the next one */
+  double *factor;                      /* of this pin's diagonal block */
+  ptrdiff_t j;                         /* first coordinate of the body */
+  ptrdiff_t unknown;                   /* of this pin in y */
 } chain_lane;
 
 typedef struct {
-  chain_lane a, b;
-  ptrdiff_t next_J, next_j, next_y, step; /* those of b are the same times `sign`, an argument */
+  chain_lane first, second;
+  ptrdiff_t J_stride, j_stride, unknown_stride; /* from body to body; of the second lane times `sign`, an argument */
+  ptrdiff_t row_stride;                         /* from row to row of J */
 } chain_sweep;
 
-/* Two rows of a body: the unit matrix times s, then the angle's column. */
+/* J of a pin in a body's columns: the unit matrix times `sign`, then the angle's column (x, y). */
 typedef struct {
-  chain_lanes s, x, y;
+  chain_lanes sign, x, y;
 } chain_arm;
+
+/* The inverses of a body's mass and inertia. */
+typedef struct {
+  chain_lanes m, i;
+} chain_inverse;
 
 typedef struct {
   chain_lanes x, y;
-} chain_point;
+} chain_pair;
+
+typedef struct {
+  chain_lanes x, y, angle;
+} chain_vector;
 
 typedef struct {
   chain_lanes xx, xy, yx, yy;
@@ -40,28 +51,31 @@ typedef struct {
 /* ---- Lanes ---- */
 
 PW_INLINE void chain_advance (chain_lane *x, const chain_sweep *s, ptrdiff_t bodies) {
-  x->from += bodies * s->next_J, x->to += bodies * s->next_J, x->keep += 3 * bodies;
-  x->j += bodies * s->next_j, x->y += bodies * s->next_y;
+  x->J_eliminated += bodies * s->J_stride, x->J_next += bodies * s->J_stride, x->factor += 3 * bodies;
+  x->j += bodies * s->j_stride, x->unknown += bodies * s->unknown_stride;
 }
 
-/* sign: 1, both lanes from the first pin; -1, the second one from the last. */
+/* sign: 1, both lanes from the first pin; -1, the second lane from the last pin. */
 static chain_sweep chain_begin (const pw_block_ldl *l, const pw_chain *c, int sign) {
-  chain_sweep s = { .next_J = c->next_J, .next_j = c->next_j, .next_y = c->next_y, .step = c->step };
-  s.a = s.b = (chain_lane){ c->A, c->B, l->chain_factor + c->factor, c->j, c->y };
+  chain_sweep s = {
+    .J_stride = c->J_stride, .j_stride = c->j_stride, .unknown_stride = c->unknown_stride, .row_stride = c->row_stride
+  };
+  s.first = s.second = (chain_lane){ c->J_first, c->J_second, l->chain_factor + c->first_factor, c->j, c->unknown };
   if (sign > 0) return s;
-  chain_advance (&s.b, &s, c->bodies - 1);
-  const double *B = s.b.from;
-  s.b.from = s.b.to, s.b.to = B;
-  s.b.keep += 3, s.b.y += s.next_y;
+  chain_advance (&s.second, &s, c->bodies - 1);
+  const double *J = s.second.J_eliminated;
+  s.second.J_eliminated = s.second.J_next, s.second.J_next = J;
+  s.second.factor += 3, s.second.unknown += s.unknown_stride;
   return s;
 }
 
+/* Moves both lanes on by some bodies. */
 PW_INLINE void chain_move (chain_sweep *s, ptrdiff_t bodies, int sign) {
-  chain_advance (&s->a, s, bodies);
-  chain_advance (&s->b, s, sign * bodies);
+  chain_advance (&s->first, s, bodies);
+  chain_advance (&s->second, s, sign * bodies);
 }
 
-/* Entries of arrays. */
+/* Entry i of two arrays, one for each lane. */
 PW_INLINE chain_lanes chain_load (const double *a, const double *b, ptrdiff_t i) {
   return (chain_lanes){ a[i], b[i] };
 }
@@ -70,38 +84,63 @@ PW_INLINE void chain_store (double *a, double *b, ptrdiff_t i, chain_lanes value
   a[i] = value[0], b[i] = value[1];
 }
 
-PW_INLINE chain_arm chain_read (const double *a, const double *b, ptrdiff_t step) {
-  return (chain_arm){ chain_load (a, b, 0), chain_load (a, b, 2), chain_load (a, b, step + 2) };
+PW_INLINE chain_arm chain_read (const chain_sweep *s, const double *a, const double *b) {
+  return (chain_arm){ chain_load (a, b, 0), chain_load (a, b, 2), chain_load (a, b, s->row_stride + 2) };
+}
+
+PW_INLINE chain_inverse chain_inverse_of (const pw_block_ldl *l, const chain_sweep *s) {
+  const double *first = l->inverse_weight + s->first.j, *second = l->inverse_weight + s->second.j;
+  return (chain_inverse){ chain_load (first, second, 0), chain_load (first, second, 2) };
+}
+
+/* y of the pins that are eliminated. */
+PW_INLINE chain_pair chain_unknowns (const chain_sweep *s, const double *y) {
+  const double *first = y + s->first.unknown, *second = y + s->second.unknown;
+  return (chain_pair){ chain_load (first, second, 0), chain_load (first, second, 1) };
+}
+
+PW_INLINE void chain_store_unknowns (const chain_sweep *s, double *y, chain_pair value) {
+  double *first = y + s->first.unknown, *second = y + s->second.unknown;
+  chain_store (first, second, 0, value.x);
+  chain_store (first, second, 1, value.y);
+}
+
+/* The forces on the bodies. */
+PW_INLINE chain_vector chain_forces (const chain_sweep *s, const double *f) {
+  const double *first = f + s->first.j, *second = f + s->second.j;
+  return (chain_vector){ chain_load (first, second, 0), chain_load (first, second, 1), chain_load (first, second, 2) };
 }
 
 /* K, rows of the pin b, columns of the pin a. */
-PW_INLINE chain_square chain_coupling (chain_arm a, chain_arm b, chain_lanes m, chain_lanes i) {
-  const chain_lanes mass = m * a.s * b.s, x = i * b.x, y = i * b.y;
+PW_INLINE chain_square chain_coupling (chain_arm a, chain_arm b, chain_inverse w) {
+  const chain_lanes mass = w.m * a.sign * b.sign, x = w.i * b.x, y = w.i * b.y;
   return (chain_square){ mass + x * a.x, x * a.y, y * a.x, mass + y * a.y };
 }
 
-/* (x, y) divided by a factorised block. */
-PW_INLINE chain_point chain_divide (chain_lanes d, chain_lanes e, chain_lanes f, chain_lanes x, chain_lanes y) {
+/* (x, y) divided by a block with the factors d, e, f, as block_divide (block_parts.h). */
+PW_INLINE chain_pair chain_divide (chain_lanes d, chain_lanes e, chain_lanes f, chain_lanes x, chain_lanes y) {
   const chain_lanes z = (y - e * x) * f;
-  return (chain_point){ x * d - e * z, z };
+  return (chain_pair){ x * d - e * z, z };
 }
 
-PW_INLINE chain_point chain_divide_kept (const chain_sweep *s, chain_lanes x, chain_lanes y) {
-  const double *a = s->a.keep, *b = s->b.keep;
+/* The same by the stored factors of the pins that are eliminated. */
+PW_INLINE chain_pair chain_divide_stored (const chain_sweep *s, chain_lanes x, chain_lanes y) {
+  const double *a = s->first.factor, *b = s->second.factor;
   return chain_divide (chain_load (a, b, 0), chain_load (a, b, 1), chain_load (a, b, 2), x, y);
 }
 
 /* ---- Factorisation ---- */
 
-/* As block_pivot (block_factor.c); the smallest pivot changes rarely. */
+/* D: a diagonal block of either lane, as in pw_block_column: xx, yx, yy, then xx and yy before elimination.  Factorises
+ * it as block_pivot (block_factor.c); the smallest pivot changes rarely. */
 PW_INLINE void chain_pivot (chain_lanes *D, pw_block_ldl *l, const chain_sweep *s) {
-  const chain_lanes a = D[0], minor = a * D[2] - D[1] * D[1], least = { l->pivot, l->pivot };
-  const chain_lanes first = least * D[3], second = least * a * D[4];
-  const int good = a[0] > first[0] && a[1] > first[1] && minor[0] > second[0] && minor[1] > second[1];
-  for (int k = 0; k < 2 && !good; k++) {
-    const int y = (int)(k ? s->b.y : s->a.y);
-    block_track_pivot (l, a[k], D[3][k], y);
-    block_track_pivot (l, minor[k], fabs (a[k]) * D[4][k], y + 1);
+  const chain_lanes a = D[0], minor = a * D[2] - D[1] * D[1], least = { l->least_pivot, l->least_pivot };
+  const chain_lanes bound = least * D[3], minor_bound = least * a * D[4];
+  const int larger = a[0] > bound[0] && a[1] > bound[1] && minor[0] > minor_bound[0] && minor[1] > minor_bound[1];
+  for (int k = 0; k < 2 && !larger; k++) {
+    const int unknown = (int)(k ? s->second.unknown : s->first.unknown);
+    block_track_pivot (l, a[k], D[3][k], unknown);
+    block_track_pivot (l, minor[k], fabs (a[k]) * D[4][k], unknown + 1);
   }
   D[0] = 1 / a;
   D[1] = D[1] * D[0], D[2] = a / minor;
@@ -109,133 +148,140 @@ PW_INLINE void chain_pivot (chain_lanes *D, pw_block_ldl *l, const chain_sweep *
 
 /* Eliminates the pins with the diagonal blocks D, which become those of the next ones. */
 PW_INLINE void chain_eliminate (pw_block_ldl *l, chain_sweep *s, int sign, chain_lanes *D) {
-  const chain_arm a = chain_read (s->a.from, s->b.from, s->step), b = chain_read (s->a.to, s->b.to, s->step);
-  const double *one = l->inverse + s->a.j, *other = l->inverse + s->b.j;
-  const chain_lanes m = chain_load (one, other, 0), i = chain_load (one, other, 2);
-  const chain_square K = chain_coupling (a, b, m, i);
-  const chain_lanes x = i * a.x, y = i * a.y, xx = m + x * a.x, yy = m + y * a.y;
-  D[0] += xx, D[1] += x * a.y, D[2] += yy, D[3] += xx, D[4] += yy;
+  const chain_arm a = chain_read (s, s->first.J_eliminated, s->second.J_eliminated);
+  const chain_arm b = chain_read (s, s->first.J_next, s->second.J_next);
+  const chain_inverse w = chain_inverse_of (l, s);
+  const chain_square K = chain_coupling (a, b, w);
+  const chain_lanes ax = w.i * a.x, ay = w.i * a.y, xx = w.m + ax * a.x, yy = w.m + ay * a.y;
+  D[0] += xx, D[1] += ax * a.y, D[2] += yy, D[3] += xx, D[4] += yy;
   chain_pivot (D, l, s);
-  for (int n = 0; n < 3; n++) chain_store (s->a.keep, s->b.keep, n, D[n]);
-  const chain_point p = chain_divide (D[0], D[1], D[2], K.xx, K.xy), q = chain_divide (D[0], D[1], D[2], K.yx, K.yy);
-  const chain_lanes u = i * b.x, v = i * b.y;
-  D[3] = m + u * b.x, D[4] = m + v * b.y;
-  D[0] = D[3] - (p.x * K.xx + p.y * K.xy);
-  D[1] = u * b.y - (q.x * K.xx + q.y * K.xy);
-  D[2] = D[4] - (q.x * K.yx + q.y * K.yy);
+  for (int n = 0; n < 3; n++) chain_store (s->first.factor, s->second.factor, n, D[n]);
+  /* The rows of L = K D^-1. */
+  const chain_pair x = chain_divide (D[0], D[1], D[2], K.xx, K.xy), y = chain_divide (D[0], D[1], D[2], K.yx, K.yy);
+  const chain_lanes bx = w.i * b.x, by = w.i * b.y;
+  D[3] = w.m + bx * b.x, D[4] = w.m + by * b.y;
+  D[0] = D[3] - (x.x * K.xx + x.y * K.xy);
+  D[1] = bx * b.y - (y.x * K.xx + y.y * K.xy);
+  D[2] = D[4] - (y.x * K.yx + y.y * K.yy);
   chain_move (s, 1, sign);
 }
 
-/* Along the chain to the next column; or, if it is `whole`, from both ends to the pin in the middle, which of an odd
- * number of bodies is that after the body in the middle. */
+/* Eliminates `pairs` of pins from both ends at once, then `singles` from the first pin on: along the chain to the next
+ * column; or, if it includes_last, to the pin in the middle, which of an odd number of bodies is that after the body in
+ * the middle. */
 void pw_chain_factor (pw_block_ldl *l, const pw_chain *c) {
-  const double *first = l->value + l->column[c->column].at;
-  double *last = l->value + l->column[c->column + c->bodies].at;
-  chain_sweep s = chain_begin (l, c, c->whole ? -1 : 1);
+  const int pairs = c->includes_last ? c->bodies / 2 : 0, singles = c->bodies - 2 * pairs;
+  const double *first = l->value + l->column[c->first_column].first_value;
+  double *last = l->value + l->column[c->first_column + c->bodies].first_value;
+  chain_sweep s = chain_begin (l, c, c->includes_last ? -1 : 1);
   chain_lanes D[CHAIN_BLOCK];
   double other[CHAIN_BLOCK]; /* of the pin in the middle, from the second lane */
-  for (int n = 0; n < CHAIN_BLOCK; n++) D[n] = (chain_lanes){ first[n], c->whole ? last[n] : first[n] };
-  for (int n = c->whole ? c->bodies / 2 : 0; n > 0; n--) {
+  for (int n = 0; n < CHAIN_BLOCK; n++) D[n] = (chain_lanes){ first[n], c->includes_last ? last[n] : first[n] };
+  for (int n = pairs; n > 0; n--) {
     chain_eliminate (l, &s, -1, D);
-    if (!(l->pivot > 0)) return;
+    if (!(l->least_pivot > 0)) return;
   }
-  for (int n = 0; n < CHAIN_BLOCK && c->whole; n++) other[n] = D[n][1], D[n][1] = D[n][0];
-  if (c->whole) s.b = s.a;
-  for (int n = c->whole ? c->bodies % 2 : c->bodies; n > 0; n--) {
+  for (int n = 0; n < CHAIN_BLOCK && c->includes_last; n++) other[n] = D[n][1], D[n][1] = D[n][0];
+  if (c->includes_last) s.second = s.first;
+  for (int n = singles; n > 0; n--) {
     chain_eliminate (l, &s, 1, D);
-    if (!(l->pivot > 0)) return;
+    if (!(l->least_pivot > 0)) return;
   }
-  if (!c->whole) {
+  if (!c->includes_last) {
     for (int n = 0; n < CHAIN_BLOCK; n++) last[n] += D[n][0];
     return;
   }
   for (int n = 0; n < CHAIN_BLOCK; n++) D[n] += other[n];
   chain_pivot (D, l, &s);
-  for (int n = 0; n < 3; n++) s.a.keep[n] = D[n][0];
+  for (int n = 0; n < 3; n++) s.first.factor[n] = D[n][0];
 }
 
 /* ---- Solution ---- */
 
-/* y_(c+1) -= K D^-1 y_c; at: y of the pins that are eliminated, then of the next ones. */
-PW_INLINE chain_point chain_forward (const pw_block_ldl *l, chain_sweep *s, int sign, const double *f, double *y,
-                                     chain_point at) {
-  const chain_arm a = chain_read (s->a.from, s->b.from, s->step), b = chain_read (s->a.to, s->b.to, s->step);
-  const double *one = l->inverse + s->a.j, *other = l->inverse + s->b.j;
-  const chain_lanes m = chain_load (one, other, 0), i = chain_load (one, other, 2), mass = m * a.s * b.s;
-  double *p = y + s->a.y, *q = y + s->b.y;
-  const double *next_p = p + s->next_y, *next_q = q + sign * s->next_y;
-  chain_point to = { chain_load (next_p, next_q, 0), chain_load (next_p, next_q, 1) };
+/* y_(c+1) -= J W^-1 f, then K D^-1 y_c; at: y of the pins that are eliminated.  Returns that of the next ones. */
+PW_INLINE chain_pair chain_forward (const pw_block_ldl *l, chain_sweep *s, int sign, const double *f, double *y,
+                                    chain_pair at) {
+  const chain_arm a = chain_read (s, s->first.J_eliminated, s->second.J_eliminated);
+  const chain_arm b = chain_read (s, s->first.J_next, s->second.J_next);
+  const chain_inverse w = chain_inverse_of (l, s);
+  const chain_lanes mass = w.m * a.sign * b.sign;
+  const double *first = y + s->first.unknown + s->unknown_stride,
+               *second = y + s->second.unknown + sign * s->unknown_stride;
+  chain_pair next = { chain_load (first, second, 0), chain_load (first, second, 1) };
   if (f) {
-    const double *g = f + s->a.j, *h = f + s->b.j;
-    const chain_lanes X = m * chain_load (g, h, 0), Y = m * chain_load (g, h, 1), T = i * chain_load (g, h, 2);
-    at.x -= a.s * X + a.x * T, at.y -= a.s * Y + a.y * T;
-    to.x -= b.s * X + b.x * T, to.y -= b.s * Y + b.y * T;
+    const chain_vector force = chain_forces (s, f);
+    const chain_lanes ax = w.m * force.x, ay = w.m * force.y, angular = w.i * force.angle;
+    at.x -= a.sign * ax + a.x * angular, at.y -= a.sign * ay + a.y * angular;
+    next.x -= b.sign * ax + b.x * angular, next.y -= b.sign * ay + b.y * angular;
   }
-  chain_store (p, q, 0, at.x);
-  chain_store (p, q, 1, at.y);
-  const chain_point z = chain_divide_kept (s, at.x, at.y);
-  const chain_lanes turn = i * (a.x * z.x + a.y * z.y);
-  to.x -= mass * z.x + turn * b.x;
-  to.y -= mass * z.y + turn * b.y;
+  chain_store_unknowns (s, y, at);
+  const chain_pair z = chain_divide_stored (s, at.x, at.y);
+  const chain_lanes turn = w.i * (a.x * z.x + a.y * z.y);
+  next.x -= mass * z.x + turn * b.x;
+  next.y -= mass * z.y + turn * b.y;
   chain_move (s, 1, sign);
-  return to;
-}
-
-PW_INLINE chain_point chain_point_at (const chain_sweep *s, const double *y) {
-  return (chain_point){ chain_load (y + s->a.y, y + s->b.y, 0), chain_load (y + s->a.y, y + s->b.y, 1) };
+  return next;
 }
 
 void pw_chain_forward (const pw_block_ldl *l, const pw_chain *c, const double *f, double *y) {
-  chain_sweep s = chain_begin (l, c, c->whole ? -1 : 1);
-  chain_point at = chain_point_at (&s, y);
-  double x = 0, z = 0; /* changes by the second lane */
-  if (c->whole) {
-    for (int n = 0; n < c->bodies / 2; n++) at = chain_forward (l, &s, -1, f, y, at);
-    x = at.x[1] - y[s.b.y], z = at.y[1] - y[s.b.y + 1];
-    s.b = s.a;
+  const int pairs = c->includes_last ? c->bodies / 2 : 0, singles = c->bodies - 2 * pairs;
+  chain_sweep s = chain_begin (l, c, c->includes_last ? -1 : 1);
+  chain_pair at = chain_unknowns (&s, y);
+  double change_x = 0, change_y = 0; /* of the pin in the middle, by the second lane */
+  if (c->includes_last) {
+    for (int n = pairs; n > 0; n--) at = chain_forward (l, &s, -1, f, y, at);
+    change_x = at.x[1] - y[s.second.unknown], change_y = at.y[1] - y[s.second.unknown + 1];
+    s.second = s.first;
     at.x[1] = at.x[0], at.y[1] = at.y[0];
   }
-  for (int n = c->whole ? c->bodies % 2 : c->bodies; n > 0; n--) at = chain_forward (l, &s, 1, f, y, at);
-  y[s.a.y] = at.x[0] + x;
-  y[s.a.y + 1] = at.y[0] + z;
+  for (int n = singles; n > 0; n--) at = chain_forward (l, &s, 1, f, y, at);
+  y[s.first.unknown] = at.x[0] + change_x;
+  y[s.first.unknown + 1] = at.y[0] + change_y;
 }
 
-/* lambda of the pins before, from `at` of the next ones, and the accelerations of the bodies between them. */
-PW_INLINE chain_point chain_backward (const pw_block_ldl *l, chain_sweep *s, int sign, const double *f, double *y,
-                                      double *a, chain_point at) {
+/* lambda of the pins before, from `next` of the next ones, and the accelerations of the bodies between them. */
+PW_INLINE chain_pair chain_backward (const pw_block_ldl *l, chain_sweep *s, int sign, const double *f, double *y,
+                                     double *acceleration, chain_pair next) {
   chain_move (s, -1, sign);
-  const chain_arm u = chain_read (s->a.from, s->b.from, s->step), v = chain_read (s->a.to, s->b.to, s->step);
-  const double *one = l->inverse + s->a.j, *other = l->inverse + s->b.j;
-  const chain_lanes m = chain_load (one, other, 0), i = chain_load (one, other, 2);
-  const chain_square K = chain_coupling (u, v, m, i);
-  const chain_point own = chain_point_at (s, y);
-  chain_lanes X = v.s * at.x, Y = v.s * at.y, T = v.x * at.x + v.y * at.y;
-  const chain_point z = chain_divide_kept (s, own.x + (K.xx * at.x + K.yx * at.y), own.y + (K.xy * at.x + K.yy * at.y));
-  at = (chain_point){ -z.x, -z.y };
-  chain_store (y + s->a.y, y + s->b.y, 0, at.x);
-  chain_store (y + s->a.y, y + s->b.y, 1, at.y);
-  X += u.s * at.x, Y += u.s * at.y, T += u.x * at.x + u.y * at.y;
-  const double *g = f ? f + s->a.j : NULL, *h = f ? f + s->b.j : NULL;
-  chain_store (a + s->a.j, a + s->b.j, 0, m * (f ? chain_load (g, h, 0) - X : -X));
-  chain_store (a + s->a.j, a + s->b.j, 1, m * (f ? chain_load (g, h, 1) - Y : -Y));
-  chain_store (a + s->a.j, a + s->b.j, 2, i * (f ? chain_load (g, h, 2) - T : -T));
+  const chain_arm a = chain_read (s, s->first.J_eliminated, s->second.J_eliminated);
+  const chain_arm b = chain_read (s, s->first.J_next, s->second.J_next);
+  const chain_inverse w = chain_inverse_of (l, s);
+  const chain_square K = chain_coupling (a, b, w);
+  const chain_pair own = chain_unknowns (s, y);
+  const chain_pair z =
+      chain_divide_stored (s, own.x + (K.xx * next.x + K.yx * next.y), own.y + (K.xy * next.x + K.yy * next.y));
+  const chain_pair at = { -z.x, -z.y };
+  chain_store_unknowns (s, y, at);
+  /* f - J^T lambda */
+  chain_vector net = { -(b.sign * next.x + a.sign * at.x), -(b.sign * next.y + a.sign * at.y),
+                       -(b.x * next.x + b.y * next.y + (a.x * at.x + a.y * at.y)) };
+  if (f) {
+    const chain_vector force = chain_forces (s, f);
+    net.x += force.x, net.y += force.y, net.angle += force.angle;
+  }
+  double *first = acceleration + s->first.j, *second = acceleration + s->second.j;
+  chain_store (first, second, 0, w.m * net.x);
+  chain_store (first, second, 1, w.m * net.y);
+  chain_store (first, second, 2, w.i * net.angle);
   return at;
 }
 
 void pw_chain_backward (const pw_block_ldl *l, const pw_chain *c, const double *f, double *y, double *a) {
-  chain_sweep s = chain_begin (l, c, c->whole ? -1 : 1), along;
-  chain_move (&s, c->whole ? c->bodies / 2 : 0, -1);
-  along = s;
-  along.b = along.a;
-  chain_move (&along, c->whole ? c->bodies % 2 : c->bodies, 1);
-  chain_point at = chain_point_at (&along, y);
-  if (c->whole) {
-    const chain_point z = chain_divide_kept (&along, at.x, at.y);
-    at = (chain_point){ -z.x, -z.y };
-    y[along.a.y] = at.x[0], y[along.a.y + 1] = at.y[0];
+  const int pairs = c->includes_last ? c->bodies / 2 : 0, singles = c->bodies - 2 * pairs;
+  chain_sweep ends = chain_begin (l, c, c->includes_last ? -1 : 1),
+              middle; /* where the sweeps of pw_chain_forward ended */
+  chain_move (&ends, pairs, -1);
+  middle = ends;
+  middle.second = middle.first;
+  chain_move (&middle, singles, 1);
+  chain_pair at = chain_unknowns (&middle, y);
+  if (c->includes_last) {
+    const chain_pair z = chain_divide_stored (&middle, at.x, at.y);
+    at = (chain_pair){ -z.x, -z.y };
+    y[middle.first.unknown] = at.x[0], y[middle.first.unknown + 1] = at.y[0];
   }
-  const chain_point middle = at;
-  for (int n = c->whole ? c->bodies % 2 : c->bodies; n > 0; n--) at = chain_backward (l, &along, 1, f, y, a, at);
-  at.x[1] = middle.x[1], at.y[1] = middle.y[1];
-  for (int n = c->whole ? c->bodies / 2 : 0; n > 0; n--) at = chain_backward (l, &s, -1, f, y, a, at);
+  const chain_pair lambda = at;
+  for (int n = singles; n > 0; n--) at = chain_backward (l, &middle, 1, f, y, a, at);
+  at.x[1] = lambda.x[1], at.y[1] = lambda.y[1];
+  for (int n = pairs; n > 0; n--) at = chain_backward (l, &ends, -1, f, y, a, at);
 }

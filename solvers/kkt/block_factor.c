@@ -1,55 +1,57 @@
-/* Assembly and elimination; see block_ldl.h.
+/* Assembly and elimination of the block L D L^T; see block_ldl.h.
  *
- *   for each body:      K_ab += J_a W^-1 J_b^T
+ *   for each body:      K_ba += J_b W^-1 J_a^T  for its contributions a and those after a, b
  *   for each column j:  D = K_jj,  L_pj = K_pj D^-1,  K_pq -= L_pj K_qj^T  for all p >= q below j
  *
- * Right-looking, with all positions known in advance.  D is stored as its factors. */
+ * The elimination is right-looking, with all positions known in advance.  D is stored as its factors. */
 #include <string.h>
 #include "block_parts.h"
 #include "unroll.h"
 
 /* ---- Assembly ---- */
 
-/* K += R B^T: rows of R, those of B ka x kb. */
-PW_INLINE void block_couple (int kb, int ka, int width, double *K, const block_row *R, const double *B, int step) {
+/* K += B R^T, kb x ka: B is J_b, its rows row_stride apart, and R is J_a W^-1. */
+PW_INLINE void block_couple (int kb, int ka, int width, double *K, const block_row *R, const double *B,
+                             int row_stride) {
   K[0] += block_product (width, R[0], B);
   if (ka == 2) K[1] += block_product (width, R[1], B);
-  if (kb == 2) K[ka] += block_product (width, R[0], B + step);
-  if (ka == 2 && kb == 2) K[3] += block_product (width, R[1], B + step);
+  if (kb == 2) K[ka] += block_product (width, R[0], B + row_stride);
+  if (ka == 2 && kb == 2) K[3] += block_product (width, R[1], B + row_stride);
 }
 
-/* Products of a contribution of ka rows with itself and with those after it; coupling: where the latter go. */
+/* Adds the products of a contribution of ka rows with itself and with those after it; coupling: positions of the
+ * latter. */
 PW_INLINE void block_contribute (int ka, int width, const pw_block_ldl *l, const pw_body_block *p,
                                  const pw_contribution *a, const int *coupling) {
-  const double *A = a->J, *w = l->inverse + p->j;
-  double *D = l->value + a->D;
+  const double *A = a->J, *w = l->inverse_weight + p->j;
+  double *D = l->value + a->diagonal;
   block_row R[2] = { block_weigh (width, A, w) };
-  if (ka == 2) R[1] = block_weigh (width, A + a->step, w);
+  if (ka == 2) R[1] = block_weigh (width, A + a->row_stride, w);
   D[0] += block_product (width, R[0], A);
-  if (ka == 2) D[1] += block_product (width, R[1], A), D[2] += block_product (width, R[1], A + a->step);
+  if (ka == 2) D[1] += block_product (width, R[1], A), D[2] += block_product (width, R[1], A + a->row_stride);
   D[ka == 2 ? 3 : 1] = D[0];
   if (ka == 2) D[4] = D[2];
-  for (const pw_contribution *b = a + 1; b < l->contribution + p[1].first; b++)
-    BLOCK_SIZE (b->size, block_couple, ka, width, l->value + *coupling++, R, b->J, b->step);
+  for (const pw_contribution *b = a + 1; b < l->contribution + p[1].first_contribution; b++)
+    BLOCK_SIZE (b->size, block_couple, ka, width, l->value + *coupling++, R, b->J, b->row_stride);
 }
 
-/* An uncondensed body: its mass, its columns of J, and the diagonal that later equations would have if it were
- * condensed. */
+/* Adds an uncondensed body: its mass, its columns of J, and to the original diagonal entries of the equations
+ * eliminated after it what they would have if it were condensed. */
 static void block_uncondensed (const pw_block_ldl *l, const pw_body_block *p) {
-  const pw_contribution *own = l->contribution + p[1].first - 2;
-  const double *w = l->inverse + p->j;
-  const int *coupling = l->coupling + p->coupling;
-  double *D = l->value + own[0].D, *turn = l->value + own[1].D;
-  D[0] = D[3] = -1 / w[0], D[2] = D[4] = -1 / w[1], turn[0] = turn[1] = -1 / w[2];
-  for (const pw_contribution *a = l->contribution + p->first; a < own; a++)
+  const pw_contribution *own = l->contribution + p[1].first_contribution - 2;
+  const double *w = l->inverse_weight + p->j;
+  const int *coupling = l->coupling + p->first_coupling;
+  double *D = l->value + own[0].diagonal, *inertia = l->value + own[1].diagonal;
+  D[0] = D[3] = -1 / w[0], D[2] = D[4] = -1 / w[1], inertia[0] = inertia[1] = -1 / w[2];
+  for (const pw_contribution *a = l->contribution + p->first_contribution; a < own; a++)
     for (int n = 0; n < 3; n += 2) { /* its first node has the columns 0 and 1, its second one column 2 */
-      double *K = l->value + *coupling++, *was = l->value + a->D + a->size * (a->size + 1) / 2;
-      int later = a->D > own->D, size = n == 0 ? 2 : 1;
+      double *K = l->value + *coupling++, *original = l->value + a->diagonal + a->size * (a->size + 1) / 2;
+      int later = a->diagonal > own->diagonal, size = n == 0 ? 2 : 1;
       for (int i = 0; i < a->size; i++)
         for (int c = 0; c < size; c++) {
-          double J = a->J[i * a->step + n + c];
+          double J = a->J[i * a->row_stride + n + c];
           K[later ? i * size + c : c * a->size + i] = J;
-          if (later) was[i] += J * w[n + c] * J;
+          if (later) original[i] += J * w[n + c] * J;
         }
     }
 }
@@ -57,8 +59,9 @@ static void block_uncondensed (const pw_block_ldl *l, const pw_body_block *p) {
 static void block_assemble (const pw_block_ldl *l) {
   memset (l->value, 0, (size_t)l->values * sizeof *l->value);
   for (const pw_body_block *p = l->body, *last = p + l->bodies; p < last; p++) {
-    const int *coupling = l->coupling + p->coupling;
-    const pw_contribution *a = l->contribution + p->first, *end = l->contribution + p[1].first;
+    const int *coupling = l->coupling + p->first_coupling;
+    const pw_contribution *a = l->contribution + p->first_contribution,
+                          *end = l->contribution + p[1].first_contribution;
     if (p->uncondensed)
       block_uncondensed (l, p);
     else if (p->width == 3)
@@ -74,13 +77,13 @@ typedef struct {
   double xx, xy, yx, yy;
 } block_square;
 
-/* A diagonal block L D L^T in place of its lower triangle: 1 / d_1, l, 1 / d_2. */
-static inline void block_pivot (int k, double *D, pw_block_ldl *l, int y) {
+/* Replaces the lower triangle of a diagonal block of k unknowns by its factors L D L^T: 1 / d_1, l_21, 1 / d_2. */
+static inline void block_pivot (int k, double *D, pw_block_ldl *l, int unknown) {
   double a = D[0], b = D[1], minor = k == 2 ? a * D[2] - b * b : 0;
-  block_track_pivot (l, a, D[k == 2 ? 3 : 1], y);
+  block_track_pivot (l, a, D[k == 2 ? 3 : 1], unknown);
   D[0] = 1 / a;
   if (k == 1) return;
-  block_track_pivot (l, minor, fabs (a) * D[4], y + 1);
+  block_track_pivot (l, minor, fabs (a) * D[4], unknown + 1);
   D[1] = b * D[0], D[2] = a / minor;
 }
 
@@ -91,7 +94,7 @@ static inline block_square block_scale (int ki, int kj, const double *A, const d
   return (block_square){ x.x, x.y, y.x, y.y };
 }
 
-/* D -= L A^T, of a diagonal block, of which there is the lower triangle: L ki x kj, A ki x kj. */
+/* D -= L A^T for the lower triangle of a diagonal block: L ki x kj, A ki x kj. */
 static inline void block_subtract_diagonal (int ki, double *D, block_square L, const double *A, int kj) {
   D[0] -= block_dot (kj, L.xx, L.xy, A);
   if (ki == 2) D[1] -= block_dot (kj, L.yx, L.yy, A), D[2] -= block_dot (kj, L.yx, L.yy, A + kj);
@@ -105,28 +108,29 @@ static inline void block_subtract (int kq, double *T, block_square L, const doub
   if (ki == 2 && kq == 2) T[3] -= block_dot (kj, L.yx, L.yy, A + kj);
 }
 
-/* Row p of a column: its updates, then L in place of K.  A: its block; B: the column's first block. */
-PW_INLINE void block_eliminate_row (int ki, const pw_block_ldl *l, const pw_column *c, int p, double *A,
+/* Eliminates row p of a column: subtracts its products from the blocks K_pq, then replaces K_pj by L_pj.  A: its block;
+ * B: the column's first block; target: positions of K_pq. */
+PW_INLINE void block_eliminate_row (int ki, const pw_block_ldl *l, const pw_block_column *c, int p, double *A,
                                     const double *B, const double *D, const int *target, int kj) {
-  const pw_column *column = l->column;
+  const pw_block_column *column = l->column;
   block_square L = block_scale (ki, kj, A, D);
-  for (int q = c->first; q < p; q++) {
+  for (int q = c->first_below; q < p; q++) {
     int kq = column[l->below[q]].size;
     BLOCK_SIZE (kq, block_subtract, l->value + *target++, L, B, ki, kj);
     B += kq * kj;
   }
-  block_subtract_diagonal (ki, l->value + column[l->below[p]].at, L, A, kj);
+  block_subtract_diagonal (ki, l->value + column[l->below[p]].first_value, L, A, kj);
   A[0] = L.xx;
   if (kj == 2) A[1] = L.xy;
   if (ki == 2) A[kj] = L.yx;
   if (ki == 2 && kj == 2) A[3] = L.yy;
 }
 
-/* A column of kj unknowns; returns the next column's targets. */
-PW_INLINE const int *block_eliminate (int kj, pw_block_ldl *l, const pw_column *c, const int *target) {
-  double *D = l->value + c->at, *B = D + pw_block_diagonal (kj), *A = l->value + c[1].at;
-  block_pivot (kj, D, l, c->y);
-  for (int p = c[1].first - 1; p >= c->first; target += p-- - c->first) {
+/* Eliminates a column of kj unknowns; returns the next column's targets. */
+PW_INLINE const int *block_eliminate (int kj, pw_block_ldl *l, const pw_block_column *c, const int *target) {
+  double *D = l->value + c->first_value, *B = D + pw_block_diagonal (kj), *A = l->value + c[1].first_value;
+  block_pivot (kj, D, l, c->unknown);
+  for (int p = c[1].first_below - 1; p >= c->first_below; target += p-- - c->first_below) {
     int ki = l->column[l->below[p]].size;
     A -= ki * kj;
     BLOCK_SIZE (ki, block_eliminate_row, l, c, p, A, B, D, target, kj);
@@ -137,16 +141,16 @@ PW_INLINE const int *block_eliminate (int kj, pw_block_ldl *l, const pw_column *
 void pw_block_factor (pw_block_ldl *l) {
   const pw_chain *chain = l->chain;
   const int *target = l->target;
-  l->pivot = INFINITY;
-  l->row = -1;
+  l->least_pivot = INFINITY;
+  l->least_unknown = -1;
   block_assemble (l);
-  for (int j = 0; j < l->nodes && l->pivot > 0;)
-    if (chain->column == j) {
+  for (int j = 0; j < l->nodes && l->least_pivot > 0;)
+    if (chain->first_column == j) {
       pw_chain_factor (l, chain);
-      j += chain->bodies + chain->whole;
+      j += chain->bodies + chain->includes_last;
       chain++;
     } else {
-      const pw_column *c = &l->column[j++];
+      const pw_block_column *c = &l->column[j++];
       target = BLOCK_SIZE (c->size, block_eliminate, l, c, target);
     }
 }

@@ -1,4 +1,4 @@
-/* Order and layout of a block L D L^T; see block_ldl.h. */
+/* Elimination order and layout of a block L D L^T; see block_ldl.h. */
 #include <limits.h>
 #include <stdlib.h>
 #include <string.h>
@@ -8,10 +8,10 @@
 
 /* ---- Pattern ---- */
 
-/* An order of elimination, and the rows below the diagonal of each column: below[first[c]] to below[first[c + 1] - 1],
- * ascending. */
+/* An order of elimination, and the rows below the diagonal of each column c, ascending: below[first[c]] to
+ * below[first[c + 1] - 1]. */
 typedef struct {
-  int *order, *place; /* node at each place; place of each node */
+  int *node, *column; /* node of each column; column of each node */
   int *first, *below;
 } order_variant;
 
@@ -21,22 +21,23 @@ typedef struct {
   long pairs;
   const int *pair;
   int *first, *list; /* neighbours of node n, with repetition: list[first[n]] to list[first[n + 1] - 1] */
-  int *parent, *mark;
-  order_variant by_degree, natural;
+  int *parent;       /* of each column in the elimination tree, or -1 */
+  int *visited;      /* the last row whose paths in this tree have visited the column */
+  order_variant minimum_degree, natural;
   char *memory;
 } order_search;
 
 static int order_open (order_search *x) {
   size_t n = (size_t)x->nodes + 2;
-  order_variant *const variant[] = { &x->by_degree, &x->natural };
+  order_variant *const variant[] = { &x->minimum_degree, &x->natural };
   for (pw_layout l = { 0 }; pw_layout_pass (&l, &x->memory);) {
     x->first = pw_layout_alloc (&l, n, sizeof *x->first);
     x->list = pw_layout_alloc (&l, (size_t)(2 * x->pairs), sizeof *x->list);
     x->parent = pw_layout_alloc (&l, n, sizeof *x->parent);
-    x->mark = pw_layout_alloc (&l, n, sizeof *x->mark);
+    x->visited = pw_layout_alloc (&l, n, sizeof *x->visited);
     for (int i = 0; i < 2; i++) {
-      variant[i]->order = pw_layout_alloc (&l, n, sizeof (int));
-      variant[i]->place = pw_layout_alloc (&l, n, sizeof (int));
+      variant[i]->node = pw_layout_alloc (&l, n, sizeof (int));
+      variant[i]->column = pw_layout_alloc (&l, n, sizeof (int));
       variant[i]->first = pw_layout_alloc (&l, n, sizeof (int));
     }
   }
@@ -44,13 +45,13 @@ static int order_open (order_search *x) {
 }
 
 static void order_close (order_search *x) {
-  free (x->by_degree.below);
+  free (x->minimum_degree.below);
   free (x->natural.below);
   free (x->memory);
 }
 
-/* Lists the neighbours of the nodes of at most this rank. */
-static void order_graph (order_search *x, int rank) {
+/* Lists the neighbours of each node, of nodes of at most this rank only. */
+static void order_list_neighbours (order_search *x, int rank) {
   memset (x->first, 0, ((size_t)x->nodes + 2) * sizeof *x->first);
   for (int pass = 0; pass < 2; pass++) { /* counts node c in first[c + 2], then fills through first[c + 1] */
     for (long i = 0; i < 2 * x->pairs; i++) {
@@ -65,19 +66,19 @@ static void order_graph (order_search *x, int rank) {
   }
 }
 
-/* Passes through the rows of L: row i has entries in the columns on the elimination tree's paths to i from the columns in which
- * the same row of the matrix has entries (Davis 2005, Algorithm 849: LDL).  The first pass counts them in first[column + 2], the second one lists them.
- * PW_RETRY if there are more than `most`. */
+/* Passes through the rows of L.  Row i has entries in the columns on the paths to i in the elimination tree that begin
+ * at the columns in which row i of the matrix has entries (Davis 2005, Algorithm 849: LDL).  The first pass counts them
+ * in first[column + 2], the second one lists them.  PW_RETRY if there are more than `most`. */
 static int order_pass (const order_search *x, int most, const order_variant *v) {
   long count = 0;
-  for (int i = 0; i < x->nodes; i++) x->mark[i] = x->parent[i] = -1;
+  for (int i = 0; i < x->nodes; i++) x->visited[i] = x->parent[i] = -1;
   for (int i = 0; i < x->nodes && count <= most; i++) {
-    int node = v->order[i];
-    x->mark[i] = i;
+    int node = v->node[i];
+    x->visited[i] = i;
     for (int k = x->first[node]; k < x->first[node + 1]; k++)
-      for (int j = v->place[x->list[k]]; j < i && x->mark[j] != i; j = x->parent[j]) {
+      for (int j = v->column[x->list[k]]; j < i && x->visited[j] != i; j = x->parent[j]) {
         if (x->parent[j] < 0) x->parent[j] = i;
-        x->mark[j] = i;
+        x->visited[j] = i;
         count++;
         if (v->below)
           v->below[v->first[j + 1]++] = i;
@@ -88,55 +89,57 @@ static int order_pass (const order_search *x, int most, const order_variant *v) 
   return count <= most ? PW_OK : PW_RETRY;
 }
 
-/* Moves nodes of higher rank to the end, otherwise in the same order, and lists the rows of each column. */
+/* Moves nodes of higher rank to the end, otherwise in the same order, and lists the rows of each column, fill-in
+ * included.  PW_RETRY if there are more than `most`. */
 static int order_fill (const order_search *x, int most, order_variant *v) {
   int at = 0;
   for (int rank = 0; rank < PW_BLOCK_RANKS; rank++)
     for (int j = 0; j < x->nodes; j++)
-      if (x->node[v->order[j]].rank == rank) v->place[v->order[j]] = at++;
-  for (int n = 0; n < x->nodes; n++) v->order[v->place[n]] = n;
+      if (x->node[v->node[j]].rank == rank) v->column[v->node[j]] = at++;
+  for (int n = 0; n < x->nodes; n++) v->node[v->column[n]] = n;
   if (order_pass (x, most, v) != PW_OK) return PW_RETRY;
   for (int j = 0; j < x->nodes; j++) v->first[j + 2] += v->first[j + 1];
   v->below = malloc (((size_t)v->first[x->nodes + 1] + 1) * sizeof *v->below);
   return v->below ? order_pass (x, most, v) : PW_RESOURCE;
 }
 
-/* The order with less fill-in, of minimum degree or the natural one; NULL if out of memory. */
+/* The order with less fill-in, that of minimum degree or the natural one; NULL if out of memory. */
 static const order_variant *order_choose (order_search *x) {
   if (order_open (x) != PW_OK) return NULL;
-  order_graph (x, 0);
-  if (x->nodes > 0 && amd_order (x->nodes, x->first, x->list, x->by_degree.order, NULL, NULL) < 0) return NULL;
-  for (int n = 0; n < x->nodes; n++) x->natural.order[n] = n;
-  order_graph (x, PW_BLOCK_RANKS - 1);
-  if (order_fill (x, INT_MAX / 2, &x->by_degree) != PW_OK) return NULL;
-  int status = order_fill (x, x->by_degree.first[x->nodes], &x->natural);
-  return status == PW_OK ? &x->natural : status == PW_RETRY ? &x->by_degree : NULL;
+  order_list_neighbours (x, 0);
+  if (x->nodes > 0 && amd_order (x->nodes, x->first, x->list, x->minimum_degree.node, NULL, NULL) < 0) return NULL;
+  for (int n = 0; n < x->nodes; n++) x->natural.node[n] = n;
+  order_list_neighbours (x, PW_BLOCK_RANKS - 1);
+  if (order_fill (x, INT_MAX / 2, &x->minimum_degree) != PW_OK) return NULL;
+  int status = order_fill (x, x->minimum_degree.first[x->nodes], &x->natural);
+  return status == PW_OK ? &x->natural : status == PW_RETRY ? &x->minimum_degree : NULL;
 }
 
 /* ---- Layout ---- */
 
 int pw_block_find (const pw_block_ldl *l, int p, int q) {
-  const pw_column *c = &l->column[q];
-  int at = c->at + pw_block_diagonal (c->size);
-  for (int i = c->first; l->below[i] != p; i++) at += c->size * l->column[l->below[i]].size;
+  const pw_block_column *c = &l->column[q];
+  int at = c->first_value + pw_block_diagonal (c->size);
+  for (int i = c->first_below; l->below[i] != p; i++) at += c->size * l->column[l->below[i]].size;
   return at;
 }
 
-/* Assigns the positions of the blocks.  Returns PW_RESOURCE if there are too many values. */
+/* Assigns the positions of the blocks in the values.  Returns PW_RESOURCE if there are too many values. */
 static int order_place_columns (pw_block_ldl *l) {
   size_t at = 0;
   for (int j = 0; j < l->nodes; j++) {
-    pw_column *c = &l->column[j];
-    c->at = (int)at;
+    pw_block_column *c = &l->column[j];
+    c->first_value = (int)at;
     if (c->in_chain) continue;
     at += (size_t)pw_block_diagonal (c->size);
-    for (int i = c->first; i < c[1].first; i++) at += (size_t)(c->size * l->column[l->below[i]].size);
+    for (int i = c->first_below; i < c[1].first_below; i++) at += (size_t)(c->size * l->column[l->below[i]].size);
     if (at > INT_MAX) return PW_RESOURCE;
   }
-  l->column[l->nodes].at = l->values = (int)at;
+  l->column[l->nodes].first_value = l->values = (int)at;
   return PW_OK;
 }
 
+/* The pairs of rows below the diagonal in all columns. */
 static size_t order_count_targets (int nodes, const order_variant *v) {
   size_t count = 0;
   for (int j = 0; j < nodes; j++) {
@@ -146,16 +149,16 @@ static size_t order_count_targets (int nodes, const order_variant *v) {
   return count;
 }
 
-/* For each column: for its q-th row below, walks once down the column of that row, where the targets of the rows p > q are found
- * in ascending order. */
+/* For each column: for its q-th row below, walks once down the column of that row, where the targets of the rows p > q
+ * are found in ascending order. */
 static void order_place_targets (pw_block_ldl *l) {
   int *target = l->target;
-  for (const pw_column *c = l->column; c < l->column + l->nodes; c++) {
-    int n = c[1].first - c->first;
-    const int *below = l->below + c->first;
+  for (const pw_block_column *c = l->column; c < l->column + l->nodes; c++) {
+    int n = c[1].first_below - c->first_below;
+    const int *below = l->below + c->first_below;
     for (int q = 0; q < n; q++) {
-      const pw_column *d = &l->column[below[q]];
-      int at = d->at + pw_block_diagonal (d->size), i = d->first;
+      const pw_block_column *d = &l->column[below[q]];
+      int at = d->first_value + pw_block_diagonal (d->size), i = d->first_below;
       for (int p = q + 1; p < n; p++, i++) {
         for (; l->below[i] != below[p]; i++) at += d->size * l->column[l->below[i]].size;
         /* rows p descending, each with p entries: those of rows n - 1 .. p + 1 come first */
@@ -173,16 +176,17 @@ static int order_store (pw_block_ldl *l, const pw_plan_node *node, const order_v
     l->column = pw_layout_alloc (&lay, n + 1, sizeof *l->column);
     l->below = pw_layout_alloc (&lay, below, sizeof *l->below);
     l->target = pw_layout_alloc (&lay, targets, sizeof *l->target);
-    l->place = pw_layout_alloc (&lay, n, sizeof *l->place);
+    l->column_of_node = pw_layout_alloc (&lay, n, sizeof *l->column_of_node);
   }
   if (l->pattern == NULL) return PW_RESOURCE;
   memcpy (l->below, v->below, below * sizeof *l->below);
-  memcpy (l->place, v->place, n * sizeof *l->place);
+  memcpy (l->column_of_node, v->column, n * sizeof *l->column_of_node);
   for (int j = 0; j < l->nodes; j++) {
-    const pw_plan_node *own = &node[v->order[j]];
-    l->column[j] = (pw_column){ .y = own->y, .first = v->first[j], .size = (unsigned char)own->size };
+    const pw_plan_node *own = &node[v->node[j]];
+    l->column[j] =
+        (pw_block_column){ .unknown = own->unknown, .first_below = v->first[j], .size = (unsigned char)own->size };
   }
-  l->column[l->nodes] = (pw_column){ .first = v->first[l->nodes] };
+  l->column[l->nodes] = (pw_block_column){ .first_below = v->first[l->nodes] };
   return PW_OK;
 }
 

@@ -1,46 +1,49 @@
-/* Rows of a body's columns and blocks of up to 2 x 2; see block_ldl.h.  Sizes are constants where these functions are
- * inlined. */
+/* Operations on blocks of up to 2 x 2 and on rows of a body's columns, for block_*.c; see block_ldl.h.  Sizes are
+ * constants where these functions are inlined. */
 #ifndef PW_BLOCK_PARTS_H
 #define PW_BLOCK_PARTS_H
 
 #include <math.h>
 #include "block_ldl.h"
 
-/* Calls f with a constant in place of a size that is 1 or 2. */
+/* Calls f with a constant in place of a size that is 1 or 2, or of a width that is 1 or 3. */
 #define BLOCK_SIZE(size, f, ...) ((size) == 2 ? f (2, __VA_ARGS__) : f (1, __VA_ARGS__))
+#define BLOCK_WIDTH(width, f, ...) ((width) == 3 ? f (3, __VA_ARGS__) : f (1, __VA_ARGS__))
 
+/* Of a body: x, y and angle; of an internal coordinate: x alone. */
 typedef struct {
-  double x, y, z;
+  double x, y, angle;
 } block_row;
 
-/* A row of J W^-1 of 3 columns, or 1. */
+/* A row of J W^-1 of 3 columns, or 1; w: diagonal of W^-1. */
 static inline block_row block_weigh (int width, const double *J, const double *w) {
   return width == 3 ? (block_row){ J[0] * w[0], J[1] * w[1], J[2] * w[2] } : (block_row){ .x = J[0] * w[0] };
 }
 
 static inline double block_product (int width, block_row a, const double *b) {
-  return width == 3 ? a.x * b[0] + a.y * b[1] + a.z * b[2] : a.x * b[0];
+  return width == 3 ? a.x * b[0] + a.y * b[1] + a.angle * b[2] : a.x * b[0];
 }
 
-/* Updates the smallest pivot relative to its diagonal entry `was`, dividing only if it is smaller; NaN and 0 / 0
- * count as smaller.  `was` is negative only for uncondensed bodies, which do not count. */
-static inline void block_track_pivot (pw_block_ldl *l, double pivot, double was, int y) {
-  if (pivot > l->pivot * was || was < 0) return;
-  l->pivot = pivot / was;
-  l->row = y;
+/* Updates the smallest pivot relative to its original diagonal entry, dividing only if it is smaller; NaN and 0 / 0
+ * count as smaller.  The entry is negative only for uncondensed bodies, which do not count. */
+static inline void block_track_pivot (pw_block_ldl *l, double pivot, double original, int unknown) {
+  if (pivot > l->least_pivot * original || original < 0) return;
+  l->least_pivot = pivot / original;
+  l->least_unknown = unknown;
 }
 
 typedef struct {
   double x, y;
 } block_pair;
 
-/* (x, y) divided by a diagonal block of k unknowns, factorised by block_pivot: 1 / d_1, l, 1 / d_2. */
+/* (x, y) divided by a diagonal block of k unknowns, factorised by block_pivot: D = 1 / d_1, l_21, 1 / d_2. */
 static inline block_pair block_divide (int k, const double *D, double x, double y) {
   if (k == 1) return (block_pair){ .x = x * D[0] };
   double z = (y - D[1] * x) * D[2];
   return (block_pair){ x * D[0] - D[1] * z, z };
 }
 
+/* A row of kj entries times (x, y). */
 static inline double block_dot (int kj, double x, double y, const double *A) {
   return kj == 2 ? x * A[0] + y * A[1] : x * A[0];
 }

@@ -1,4 +1,4 @@
-/* Planning of the condensed matrix: its nodes; see condense.h. */
+/* Plans the condensed matrix: its nodes, and the bodies that are not condensed; see condense.h. */
 #include <math.h>
 #include <stdlib.h>
 #include "condense.h"
@@ -7,44 +7,47 @@
 /* ---- Nodes ---- */
 
 /* Begins a node: the contributions that follow are its own. */
-static void condense_add_node (pw_plan *c, pw_plan_node node) {
-  c->failed |= pw_grow (&c->node, (size_t)c->nodes, &c->node_room, sizeof *c->node) != PW_OK;
-  node.first = c->contributions;
-  if (!c->failed) c->node[c->nodes++] = node;
+static void condense_add_node (pw_plan *plan, pw_plan_node node) {
+  plan->failed |= pw_grow (&plan->node, (size_t)plan->nodes, &plan->node_room, sizeof *plan->node) != PW_OK;
+  node.first_contribution = plan->contributions;
+  if (!plan->failed) plan->node[plan->nodes++] = node;
 }
 
-static void condense_contribute (pw_plan *c, const double *J, int step, int j, int is_pin) {
+/* Adds the columns of the last node at the group that begins with coordinate j. */
+static void condense_contribute (pw_plan *plan, const double *J, int step, int j, int is_pin) {
   int moves = 0, prescribed = 0;
-  for (int n = 0; n < pw_group_width (c->k->s, j); n++)
-    moves |= c->k->inverse[j + n] > 0, prescribed |= isinf (c->weight[j + n]) != 0;
-  if (c->failed) return;
-  c->node[c->nodes - 1].grounded |= prescribed;
+  for (int n = 0; n < pw_group_width (plan->saddle->s, j); n++)
+    moves |= plan->saddle->inverse_weight[j + n] > 0, prescribed |= isinf (plan->weight[j + n]) != 0;
+  if (plan->failed) return;
+  plan->node[plan->nodes - 1].grounded |= prescribed;
   if (!moves) return;
-  c->failed =
-      pw_grow (&c->contribution, (size_t)c->contributions, &c->contribution_room, sizeof *c->contribution) != PW_OK;
-  if (!c->failed) c->contribution[c->contributions++] = (pw_plan_contribution){ J, c->nodes - 1, step, j, is_pin };
+  plan->failed = pw_grow (&plan->contribution, (size_t)plan->contributions, &plan->contribution_room,
+                          sizeof *plan->contribution) != PW_OK;
+  if (!plan->failed)
+    plan->contribution[plan->contributions++] = (pw_plan_contribution){ J, plan->nodes - 1, step, j, is_pin };
 }
 
-/* The node of `size` rows from row n of a batch on. */
-static void condense_element (pw_plan *c, const pw_element_batch *b, int n, int size) {
+/* Adds the node of `size` rows from row n of a batch on. */
+static void condense_element (pw_plan *plan, const pw_element_batch *b, int n, int size) {
   const int e = n / b->kind->rows, is_pin = b->kind == &pw_kind_pin && size == 2;
-  condense_add_node (c, (pw_plan_node){ .size = size, .y = b->row + n, .grounded = pw_is_grounded (c->k->s, b, e) });
+  condense_add_node (
+      plan, (pw_plan_node){ .size = size, .unknown = b->row + n, .grounded = pw_is_grounded (plan->saddle->s, b, e) });
   for (int x = 0; x < b->b.cols; x += pw_group_columns (b->kind, x)) {
     int j = pw_global (b, e, x);
-    if (j < c->k->s->coords) condense_contribute (c, b->J + n * b->b.cols + x, b->b.cols, j, is_pin);
+    if (j < plan->saddle->s->coords) condense_contribute (plan, b->J + n * b->b.cols + x, b->b.cols, j, is_pin);
   }
 }
 
 /* 1 for row n of a batch that becomes part of a node: active, not in a massless component, and not a function of
  * prescribed coordinates alone. */
-static int condense_takes_part (const pw_plan *c, const pw_element_batch *b, int n, const unsigned char *active) {
-  const double *J = b->J + n * b->b.cols, *inverse = c->k->inverse;
+static int condense_takes_part (const pw_plan *plan, const pw_element_batch *b, int n, const unsigned char *active) {
+  const double *J = b->J + n * b->b.cols, *inverse = plan->saddle->inverse_weight;
   int i = b->row + n, prescribed = 0;
-  if ((active && !active[i]) || c->k->massless.component_of_row[i] >= 0) return 0;
+  if ((active && !active[i]) || plan->saddle->massless.component_of_row[i] >= 0) return 0;
   for (int x = 0; x < b->b.cols; x++) {
     int j = pw_global (b, n / b->kind->rows, x);
-    if (j < c->k->s->coords && inverse[j] > 0 && J[x] != 0) return 1;
-    prescribed |= j < c->k->s->coords && inverse[j] == 0;
+    if (j < plan->saddle->s->coords && inverse[j] > 0 && J[x] != 0) return 1;
+    prescribed |= j < plan->saddle->s->coords && inverse[j] == 0;
   }
   return !prescribed;
 }
@@ -60,51 +63,52 @@ static int condense_joins (const pw_element_batch *b, int n) {
   return 1;
 }
 
-/* Groups such rows that follow one another into nodes; others that are in no massless component are inactive. */
-static void condense_elements (pw_plan *c, const unsigned char *active) {
-  struct pw_saddle *k = c->k;
-  for (const pw_element_batch *b = k->w->batch; b < k->w->batch + k->s->constraints && b->row < k->rows; b++)
+/* Groups such rows that follow one another into nodes; others are inactive unless they are in a massless component. */
+static void condense_elements (pw_plan *plan, const unsigned char *active) {
+  struct pw_saddle *saddle = plan->saddle;
+  for (const pw_element_batch *b = saddle->w->batch;
+       b < saddle->w->batch + saddle->s->constraints && b->row < saddle->rows; b++)
     for (int n = 0, end = b->b.count * b->kind->rows, size; n < end; n += size ? size : 1) {
       for (size = 0; n + size < end && size < PW_BLOCK_NODE; size++)
-        if (!condense_takes_part (c, b, n + size, active) || (size > 0 && !condense_joins (b, n))) break;
+        if (!condense_takes_part (plan, b, n + size, active) || (size > 0 && !condense_joins (b, n))) break;
       if (size > 0)
-        condense_element (c, b, n, size);
-      else if (k->massless.component_of_row[b->row + n] < 0)
-        k->inactive[k->inactives++] = b->row + n;
+        condense_element (plan, b, n, size);
+      else if (saddle->massless.component_of_row[b->row + n] < 0)
+        saddle->inactive[saddle->inactive_count++] = b->row + n;
     }
 }
 
-/* 1 for an unmatched row that becomes a node: it has massive coordinates, and not only prescribed ones. */
-static int condense_remains (const pw_plan *c, const pw_component *p, int i) {
+/* 1 for an unmatched row i that becomes a node: it has massive coordinates, and not only prescribed ones. */
+static int condense_remains (const pw_plan *plan, const pw_component *p, int i) {
   int prescribed = 0;
   for (int n = 0; n < p->cols; n++) {
-    if (c->k->inverse[p->global[n]] > 0 && pw_massless_is_entry (p, i, n)) return 1;
-    prescribed |= !p->massless[n] && c->k->inverse[p->global[n]] == 0;
+    if (plan->saddle->inverse_weight[p->global[n]] > 0 && pw_massless_is_entry (p, i, n)) return 1;
+    prescribed |= !p->is_massless[n] && plan->saddle->inverse_weight[p->global[n]] == 0;
   }
   return p->massives > 0 && !prescribed;
 }
 
-/* Adds the unmatched rows; the multiplier of one that does not become a node is 0. */
-static void condense_components (pw_plan *c) {
-  for (pw_component *p = c->k->massless.component; p < c->k->massless.end; p++)
+/* Adds the unmatched rows of the massless components; the multiplier of one that does not become a node is 0. */
+static void condense_components (pw_plan *plan) {
+  for (pw_component *p = plan->saddle->massless.component; p < plan->saddle->massless.end; p++)
     for (int i = p->pivots; i < p->rows; i++) {
-      p->y[i] = condense_remains (c, p, i) ? p->row[i].row : -1;
-      if (p->y[i] < 0) continue;
-      condense_add_node (c, (pw_plan_node){ .size = 1, .y = p->y[i], .grounded = p->grounded });
+      p->unknown[i] = condense_remains (plan, p, i) ? p->row[i].row : -1;
+      if (p->unknown[i] < 0) continue;
+      condense_add_node (plan, (pw_plan_node){ .size = 1, .unknown = p->unknown[i], .grounded = p->grounded });
       for (int g = 0; g < p->groups; g++)
-        condense_contribute (c, p->A + i * p->stride + p->group[g].column, p->stride, p->group[g].j, 0);
+        condense_contribute (plan, p->A + i * p->stride + p->group[g].column, p->stride, p->group[g].j, 0);
     }
 }
 
 /* Sorts the contributions by coordinate. */
-static int condense_sort (pw_plan *c) {
-  const int coords = c->k->s->coords;
-  c->start = calloc ((size_t)coords + 2, sizeof *c->start);
-  c->list = malloc (((size_t)c->contributions + 1) * sizeof *c->list);
-  if (c->failed || c->start == NULL || c->list == NULL) return PW_RESOURCE;
-  for (int p = 0; p < c->contributions; p++) c->start[c->contribution[p].j + 2]++;
-  for (int j = 0; j < coords; j++) c->start[j + 2] += c->start[j + 1];
-  for (int p = 0; p < c->contributions; p++) c->list[c->start[c->contribution[p].j + 1]++] = p;
+static int condense_sort (pw_plan *plan) {
+  const int coords = plan->saddle->s->coords;
+  plan->start = calloc ((size_t)coords + 2, sizeof *plan->start);
+  plan->list = malloc (((size_t)plan->contributions + 1) * sizeof *plan->list);
+  if (plan->failed || plan->start == NULL || plan->list == NULL) return PW_RESOURCE;
+  for (int p = 0; p < plan->contributions; p++) plan->start[plan->contribution[p].j + 2]++;
+  for (int j = 0; j < coords; j++) plan->start[j + 2] += plan->start[j + 1];
+  for (int p = 0; p < plan->contributions; p++) plan->list[plan->start[plan->contribution[p].j + 1]++] = p;
   return PW_OK;
 }
 
@@ -113,59 +117,59 @@ static int condense_sort (pw_plan *c) {
 /* A body at which more nodes than this meet is not condensed, if its weights are finite: n nodes have n (n - 1) / 2
  * couplings, but only 2 n with an uncondensed body, fewer from n = 6.  Measured: 0.6 to 0.9 of the time with 7 nodes,
  * 0.7 to 1.0 with 6. */
-enum { CONDENSE_MEET = 6 };
+enum { CONDENSE_NODES = 6 };
 
-static int condense_is_crowded (const pw_plan *c, int b) {
-  const double *w = c->k->inverse + 3 * b;
-  return c->start[3 * b + 1] - c->start[3 * b] > CONDENSE_MEET && w[0] > 0 && w[1] > 0 && w[2] > 0;
+static int condense_is_crowded (const pw_plan *plan, int b) {
+  const double *w = plan->saddle->inverse_weight + 3 * b;
+  return plan->start[3 * b + 1] - plan->start[3 * b] > CONDENSE_NODES && w[0] > 0 && w[1] > 0 && w[2] > 0;
 }
 
 /* Adds two nodes for every body that is not condensed, and ranks the others. */
-static int condense_uncondensed (pw_plan *c) {
-  struct pw_saddle *k = c->k;
-  c->uncondensed = malloc (((size_t)k->s->bodies + 1) * sizeof *c->uncondensed);
-  if (c->uncondensed == NULL) return PW_RESOURCE;
-  for (int b = 0; b < k->s->bodies; b++) {
-    c->uncondensed[b] = -1;
-    if (!condense_is_crowded (c, b)) continue;
-    c->uncondensed[b] = c->nodes;
-    condense_add_node (c, (pw_plan_node){ .size = 2, .rank = 1, .y = k->s->rows + k->more });
-    condense_add_node (c, (pw_plan_node){ .size = 1, .rank = 1, .y = k->s->rows + k->more + 2 });
-    k->more += 3;
+static int condense_uncondensed (pw_plan *plan) {
+  struct pw_saddle *saddle = plan->saddle;
+  plan->uncondensed = malloc (((size_t)saddle->s->bodies + 1) * sizeof *plan->uncondensed);
+  if (plan->uncondensed == NULL) return PW_RESOURCE;
+  for (int b = 0; b < saddle->s->bodies; b++) {
+    plan->uncondensed[b] = -1;
+    if (!condense_is_crowded (plan, b)) continue;
+    plan->uncondensed[b] = plan->nodes;
+    condense_add_node (plan, (pw_plan_node){ .size = 2, .rank = 1, .unknown = saddle->s->rows + saddle->extra });
+    condense_add_node (plan, (pw_plan_node){ .size = 1, .rank = 1, .unknown = saddle->s->rows + saddle->extra + 2 });
+    saddle->extra += 3;
   }
-  if (k->more == 0) return PW_OK;
-  k->y = malloc ((size_t)(k->s->rows + k->more) * sizeof *k->y);
-  return c->failed || k->y == NULL ? PW_RESOURCE : pw_condense_rank (c);
+  if (saddle->extra == 0) return PW_OK;
+  saddle->y = malloc ((size_t)(saddle->s->rows + saddle->extra) * sizeof *saddle->y);
+  return plan->failed || saddle->y == NULL ? PW_RESOURCE : pw_condense_rank (plan);
 }
 
 /* ---- Opening ---- */
 
-static int condense_plan (pw_plan *c, const unsigned char *active) {
-  condense_elements (c, active);
-  condense_components (c);
-  int status = condense_sort (c);
-  if (status == PW_OK) status = condense_uncondensed (c);
-  return status == PW_OK ? pw_condense_block (c) : status;
+static int condense_plan (pw_plan *plan, const unsigned char *active) {
+  condense_elements (plan, active);
+  condense_components (plan);
+  int status = condense_sort (plan);
+  if (status == PW_OK) status = condense_uncondensed (plan);
+  return status == PW_OK ? pw_condense_block (plan) : status;
 }
 
-int pw_condense (struct pw_saddle *k, const double *weight, const unsigned char *active) {
-  size_t n = (size_t)k->s->coords;
-  pw_plan c = { .k = k, .weight = weight, .groups = pw_groups (k->s) };
-  for (pw_layout l = { 0 }; pw_layout_pass (&l, &k->memory);) {
-    k->inverse = pw_layout_alloc (&l, n + 3, sizeof *k->inverse);
-    k->force = pw_layout_alloc (&l, k->massless.components ? n : 0, sizeof *k->force);
-    k->inactive = pw_layout_alloc (&l, (size_t)k->rows, sizeof *k->inactive);
+int pw_condense (struct pw_saddle *saddle, const double *weight, const unsigned char *active) {
+  size_t n = (size_t)saddle->s->coords;
+  pw_plan plan = { .saddle = saddle, .weight = weight, .groups = pw_groups (saddle->s) };
+  for (pw_layout l = { 0 }; pw_layout_pass (&l, &saddle->memory);) {
+    saddle->inverse_weight = pw_layout_alloc (&l, n + 3, sizeof *saddle->inverse_weight);
+    saddle->force = pw_layout_alloc (&l, saddle->massless.components ? n : 0, sizeof *saddle->force);
+    saddle->inactive = pw_layout_alloc (&l, (size_t)saddle->rows, sizeof *saddle->inactive);
   }
-  if (k->memory == NULL) return PW_RESOURCE;
-  for (size_t j = 0; j < n; j++) k->inverse[j] = weight[j] > 0 ? 1 / weight[j] : 0;
-  int status = condense_plan (&c, active);
-  free (c.node);
-  free (c.contribution);
-  free (c.pair);
-  free (c.start);
-  free (c.list);
-  free (c.uncondensed);
-  free (c.chain);
-  free (c.is_linked);
+  if (saddle->memory == NULL) return PW_RESOURCE;
+  for (size_t j = 0; j < n; j++) saddle->inverse_weight[j] = weight[j] > 0 ? 1 / weight[j] : 0;
+  int status = condense_plan (&plan, active);
+  free (plan.node);
+  free (plan.contribution);
+  free (plan.pair);
+  free (plan.start);
+  free (plan.list);
+  free (plan.uncondensed);
+  free (plan.chain);
+  free (plan.is_linked);
   return status;
 }

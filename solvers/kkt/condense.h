@@ -1,4 +1,4 @@
-/* Condensation of a scene's constraint equations, planned by condense*.c and executed by saddle.c.
+/* Condensation of a saddle-point system to its constraint equations: planned by condense*.c, carried out by saddle.c.
  *
  * Equations are grouped into nodes of 1 or 2 with the same columns; a node contributes to the bodies and internal
  * coordinates with weight in its equations.  Two contributions to the same one make a block of S = J W^-1 J^T. */
@@ -14,32 +14,34 @@ struct pw_saddle {
   int rows;              /* of J: all, or the holonomic ones */
   double postponed;      /* > 0: J has been evaluated but not factorised; lower bound of its pivots */
   pw_massless massless;
-  double *inverse; /* coords + 3: 1 / weight; 0 for prescribed ones and those without weight; the ground's 0 */
-  double *force;   /* coords: forces changed by `massless` */
-  int more;        /* unknowns besides the multipliers of rows: 3 for each uncondensed body */
-  double *y;       /* s->rows and `more`: right-hand side and solution if there are such unknowns */
+  double *inverse_weight; /* coords + 3: 1 / weight; 0 for prescribed ones and those without weight, and the ground's */
+  double *force;          /* coords: forces changed by `massless` */
+  int extra;              /* unknowns besides the multipliers of rows: 3 for each uncondensed body */
+  double *y;              /* s->rows + extra: right-hand side and solution; NULL without extra unknowns */
   pw_block_ldl *block;
   int *inactive; /* rows that are not enforced */
-  int inactives;
-  double pivot; /* squared, of `massless` and of `block` when last factorised */
-  int pivot_row;
+  int inactive_count;
+  double pivot;  /* smallest pivot of `massless` and `block` when last factorised, a squared sine */
+  int pivot_row; /* its row; -1: none, or of a massless component */
   char *memory;
 };
 
 /* Plans everything but `massless`, which must be open.  Errors: PW_RESOURCE. */
-int pw_condense (struct pw_saddle *k, const double *weight, const unsigned char *active);
+int pw_condense (struct pw_saddle *saddle, const double *weight, const unsigned char *active);
 
 /* ---- Planning ---- */
 
 /* A node's columns at a body or internal coordinate, whose first coordinate is j. */
 typedef struct {
   const double *J;
-  int node, step, j; /* step: from row to row of J */
-  int is_pin;        /* 1: both rows of a pin, whose x and y columns are a multiple of the unit matrix */
+  int node;
+  int row_stride; /* from row to row of J */
+  int j;
+  int is_pin; /* 1: both rows of a pin, whose x and y columns are a multiple of the unit matrix */
 } pw_plan_contribution;
 
 typedef struct {
-  struct pw_saddle *k;
+  struct pw_saddle *saddle;
   const double *weight;
   pw_plan_node *node;
   pw_plan_contribution *contribution; /* those of a node follow one another */
@@ -57,13 +59,13 @@ typedef struct {
 } pw_plan;
 
 /* Ranks the nodes of a scene with uncondensed bodies.  PW_OK or PW_RESOURCE. */
-int pw_condense_rank (pw_plan *c);
+int pw_condense_rank (pw_plan *plan);
 
-/* Makes k->block.  Errors: PW_RESOURCE. */
-int pw_condense_block (pw_plan *c);
+/* Makes the saddle's block L D L^T.  Errors: PW_RESOURCE. */
+int pw_condense_block (pw_plan *plan);
 
-/* Finds the chains, and marks their inner columns; the contributions of each group are in the order of their
- * columns.  PW_OK or PW_RESOURCE. */
-int pw_condense_chains (pw_plan *c, pw_block_ldl *l);
+/* Finds the chains, and marks their inner columns; the contributions of each group are in the order of their columns.
+ * PW_OK or PW_RESOURCE. */
+int pw_condense_chains (pw_plan *plan, pw_block_ldl *l);
 
 #endif

@@ -1,4 +1,4 @@
-/* Planning of the block L D L^T: the pattern of S, body blocks, uncondensed bodies; see condense.h and block_ldl.h. */
+/* Plans the block L D L^T: the pattern of S and the body blocks; see condense.h and block_ldl.h. */
 #include <limits.h>
 #include <stdlib.h>
 #include <string.h>
@@ -7,38 +7,40 @@
 
 /* ---- Pattern ---- */
 
-/* The first of the two nodes of an uncondensed body, or -1. */
-static int condense_own_nodes (const pw_plan *c, int j) {
-  return j < 3 * c->k->s->bodies ? c->uncondensed[j / 3] : -1;
+/* The first of the two nodes of the body that begins with coordinate j, or -1 if it is condensed. */
+static int condense_body_node (const pw_plan *plan, int j) {
+  return j < 3 * plan->saddle->s->bodies ? plan->uncondensed[j / 3] : -1;
 }
 
-static void condense_add_pair (pw_plan *c, int a, int b) {
-  c->failed |= pw_grow (&c->pair, (size_t)c->pairs, &c->pair_room, 2 * sizeof *c->pair) != PW_OK;
-  if (c->failed) return;
-  c->pair[2 * c->pairs] = a, c->pair[2 * c->pairs + 1] = b;
-  c->pairs++;
+static void condense_add_pair (pw_plan *plan, int a, int b) {
+  plan->failed |= pw_grow (&plan->pair, (size_t)plan->pairs, &plan->pair_room, 2 * sizeof *plan->pair) != PW_OK;
+  if (plan->failed) return;
+  plan->pair[2 * plan->pairs] = a, plan->pair[2 * plan->pairs + 1] = b;
+  plan->pairs++;
 }
 
 /* Pairs of nodes that meet in a group, or with an uncondensed body. */
-static void condense_pairs (pw_plan *c) {
-  for (int n = 0; n < c->groups; n++) {
-    int j = pw_group_first (c->k->s, n), own = condense_own_nodes (c, j);
-    for (int x = c->start[j]; x < c->start[j + 1]; x++) {
-      int a = c->contribution[c->list[x]].node;
-      if (own >= 0) condense_add_pair (c, a, own), condense_add_pair (c, a, own + 1);
-      for (int y = c->start[j]; y < x && own < 0; y++) condense_add_pair (c, a, c->contribution[c->list[y]].node);
+static void condense_pairs (pw_plan *plan) {
+  for (int n = 0; n < plan->groups; n++) {
+    int j = pw_group_first (plan->saddle->s, n), body = condense_body_node (plan, j);
+    for (int x = plan->start[j]; x < plan->start[j + 1]; x++) {
+      int a = plan->contribution[plan->list[x]].node;
+      if (body >= 0) condense_add_pair (plan, a, body), condense_add_pair (plan, a, body + 1);
+      for (int y = plan->start[j]; y < x && body < 0; y++)
+        condense_add_pair (plan, a, plan->contribution[plan->list[y]].node);
     }
   }
 }
 
 /* The contributions of each group in the order of their columns (few: by insertion). */
-static void condense_sort_columns (const pw_plan *c, const int *place) {
-  for (int n = 0; n < c->groups; n++) {
-    int j = pw_group_first (c->k->s, n), *list = c->list + c->start[j], count = c->start[j + 1] - c->start[j];
+static void condense_sort_columns (const pw_plan *plan, const int *column_of_node) {
+  for (int n = 0; n < plan->groups; n++) {
+    int j = pw_group_first (plan->saddle->s, n), *list = plan->list + plan->start[j],
+        count = plan->start[j + 1] - plan->start[j];
     for (int x = 1; x < count; x++)
       for (int y = x; y > 0; y--) {
         int a = list[y - 1], b = list[y];
-        if (place[c->contribution[a].node] <= place[c->contribution[b].node]) break;
+        if (column_of_node[plan->contribution[a].node] <= column_of_node[plan->contribution[b].node]) break;
         list[y - 1] = b, list[y] = a;
       }
   }
@@ -46,78 +48,82 @@ static void condense_sort_columns (const pw_plan *c, const int *place) {
 
 /* ---- Body blocks ---- */
 
+/* Position of the block of two nodes. */
 static int condense_coupling (const pw_block_ldl *l, int a, int b) {
-  int p = l->place[a], q = l->place[b];
+  int p = l->column_of_node[a], q = l->column_of_node[b];
   return p > q ? pw_block_find (l, p, q) : pw_block_find (l, q, p);
 }
 
 /* Fills the block of a group; *contributions and *couplings count. */
-static void condense_body (const pw_plan *c, pw_block_ldl *l, int j, pw_body_block *p, int *contributions,
+static void condense_body (const pw_plan *plan, pw_block_ldl *l, int j, pw_body_block *p, int *contributions,
                            int *couplings) {
-  int own = condense_own_nodes (c, j);
+  int body = condense_body_node (plan, j);
   *p = (pw_body_block){ .j = j,
-                        .first = *contributions,
-                        .coupling = *couplings,
-                        .width = (unsigned char)pw_group_width (c->k->s, j),
-                        .uncondensed = own >= 0 };
-  for (int x = c->start[j]; x < c->start[j + 1]; x++) {
-    const pw_plan_contribution *a = &c->contribution[c->list[x]];
-    const pw_plan_node *n = &c->node[a->node];
+                        .first_contribution = *contributions,
+                        .first_coupling = *couplings,
+                        .width = (unsigned char)pw_group_width (plan->saddle->s, j),
+                        .uncondensed = body >= 0 };
+  for (int x = plan->start[j]; x < plan->start[j + 1]; x++) {
+    const pw_plan_contribution *a = &plan->contribution[plan->list[x]];
+    const pw_plan_node *n = &plan->node[a->node];
     l->contribution[(*contributions)++] =
-        (pw_contribution){ a->J, n->y, l->column[l->place[a->node]].at, a->step, (short)n->size };
-    if (own >= 0)
-      for (int i = 0; i < 2; i++) l->coupling[(*couplings)++] = condense_coupling (l, a->node, own + i);
+        (pw_contribution){ a->J, n->unknown, l->column[l->column_of_node[a->node]].first_value, a->row_stride,
+                           (short)n->size };
+    if (body >= 0)
+      for (int i = 0; i < 2; i++) l->coupling[(*couplings)++] = condense_coupling (l, a->node, body + i);
     else
-      for (int y = x + 1; y < c->start[j + 1]; y++)
-        l->coupling[(*couplings)++] = condense_coupling (l, a->node, c->contribution[c->list[y]].node);
+      for (int y = x + 1; y < plan->start[j + 1]; y++)
+        l->coupling[(*couplings)++] = condense_coupling (l, a->node, plan->contribution[plan->list[y]].node);
   }
-  for (int i = own; own >= 0 && i < own + 2; i++)
-    l->contribution[(*contributions)++] =
-        (pw_contribution){ .y = c->node[i].y, .D = l->column[l->place[i]].at, .size = (short)c->node[i].size };
+  for (int i = body; body >= 0 && i < body + 2; i++)
+    l->contribution[(*contributions)++] = (pw_contribution){ .unknown = plan->node[i].unknown,
+                                                             .diagonal = l->column[l->column_of_node[i]].first_value,
+                                                             .size = (short)plan->node[i].size };
 }
 
 /* 0 for a body of a chain, and for a group without mass, whose accelerations massless.c computes. */
-static int condense_has_block (const pw_plan *c, int n) {
-  int j = pw_group_first (c->k->s, n), width = pw_group_width (c->k->s, j), has_weight = 0;
-  for (int i = 0; i < width; i++) has_weight |= c->weight[j + i] != 0;
-  return has_weight && !c->is_linked[n];
+static int condense_has_block (const pw_plan *plan, int n) {
+  int j = pw_group_first (plan->saddle->s, n), width = pw_group_width (plan->saddle->s, j), has_weight = 0;
+  for (int i = 0; i < width; i++) has_weight |= plan->weight[j + i] != 0;
+  return has_weight && !plan->is_linked[n];
 }
 
-static int condense_fill (const pw_plan *c, pw_block_ldl *l) {
-  int contributions = 0, couplings = 0, body = 0, uncondensed = c->k->more / 3;
-  l->inverse = c->k->inverse;
-  for (int n = 0; n < c->groups; n++) l->bodies += condense_has_block (c, n);
-  l->chains = c->chains;
+/* Allocates and fills the body blocks. */
+static int condense_fill (const pw_plan *plan, pw_block_ldl *l) {
+  int contributions = 0, couplings = 0, body = 0, uncondensed = plan->saddle->extra / 3;
+  l->inverse_weight = plan->saddle->inverse_weight;
+  for (int n = 0; n < plan->groups; n++) l->bodies += condense_has_block (plan, n);
+  l->chains = plan->chains;
   for (pw_layout lay = { 0 }; pw_layout_pass (&lay, &l->memory);) {
     l->body = pw_layout_alloc (&lay, (size_t)l->bodies + 1, sizeof *l->body);
-    l->contribution =
-        pw_layout_alloc (&lay, (size_t)(c->contributions - 2 * c->linked + 2 * uncondensed), sizeof *l->contribution);
-    l->coupling = pw_layout_alloc (&lay, (size_t)(c->pairs - c->linked), sizeof *l->coupling);
-    l->chain = pw_layout_alloc (&lay, (size_t)c->chains + 1, sizeof *l->chain);
-    l->chain_factor = pw_layout_alloc (&lay, 3 * (size_t)(c->linked + c->chains), sizeof *l->chain_factor);
+    l->contribution = pw_layout_alloc (&lay, (size_t)(plan->contributions - 2 * plan->linked + 2 * uncondensed),
+                                       sizeof *l->contribution);
+    l->coupling = pw_layout_alloc (&lay, (size_t)(plan->pairs - plan->linked), sizeof *l->coupling);
+    l->chain = pw_layout_alloc (&lay, (size_t)plan->chains + 1, sizeof *l->chain);
+    l->chain_factor = pw_layout_alloc (&lay, 3 * (size_t)(plan->linked + plan->chains), sizeof *l->chain_factor);
   }
   if (l->memory == NULL) return PW_RESOURCE;
-  memcpy (l->chain, c->chain, (size_t)c->chains * sizeof *l->chain);
-  l->chain[l->chains] = (pw_chain){ .column = l->nodes + 1 };
+  memcpy (l->chain, plan->chain, (size_t)plan->chains * sizeof *l->chain);
+  l->chain[l->chains] = (pw_chain){ .first_column = l->nodes + 1 };
   for (int last = 0; last < 2; last++) /* uncondensed bodies last: they add to diagonals that the others store */
-    for (int n = 0; n < c->groups; n++) {
-      int first = pw_group_first (c->k->s, n);
-      if (condense_has_block (c, n) && (condense_own_nodes (c, first) >= 0) == last)
-        condense_body (c, l, first, &l->body[body++], &contributions, &couplings);
+    for (int n = 0; n < plan->groups; n++) {
+      int first = pw_group_first (plan->saddle->s, n);
+      if (condense_has_block (plan, n) && (condense_body_node (plan, first) >= 0) == last)
+        condense_body (plan, l, first, &l->body[body++], &contributions, &couplings);
     }
-  l->body[body] = (pw_body_block){ .first = contributions, .coupling = couplings };
+  l->body[body] = (pw_body_block){ .first_contribution = contributions, .first_coupling = couplings };
   return PW_OK;
 }
 
 /* ---- Opening ---- */
 
-int pw_condense_block (pw_plan *c) {
-  condense_pairs (c);
-  if (c->failed || c->pairs >= INT_MAX / 2) return PW_RESOURCE;
-  pw_block_ldl *l = c->k->block = pw_block_open (c->nodes, c->node, c->pairs, c->pair);
+int pw_condense_block (pw_plan *plan) {
+  condense_pairs (plan);
+  if (plan->failed || plan->pairs >= INT_MAX / 2) return PW_RESOURCE;
+  pw_block_ldl *l = plan->saddle->block = pw_block_open (plan->nodes, plan->node, plan->pairs, plan->pair);
   if (l == NULL) return PW_RESOURCE;
-  condense_sort_columns (c, l->place);
-  int status = pw_condense_chains (c, l);
+  condense_sort_columns (plan, l->column_of_node);
+  int status = pw_condense_chains (plan, l);
   if (status == PW_OK) status = pw_block_lay_out (l);
-  return status == PW_OK ? condense_fill (c, l) : status;
+  return status == PW_OK ? condense_fill (plan, l) : status;
 }

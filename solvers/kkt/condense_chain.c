@@ -1,100 +1,103 @@
-/* Finding the chains of a scene; see condense.h and block_ldl.h. */
+/* Finds the chains of a scene; see condense.h and block_ldl.h. */
 #include <stdlib.h>
 #include "condense.h"
 
-/* The block of a column and the next one: the number of bodies and eliminated columns that add to it, and the body, if
- * it can be in a chain. */
+/* The block between a column and the next one: the number of bodies and eliminated columns that add to it, and one of
+ * these bodies as a chain of one, if it can be in a chain (else link.bodies is 0). */
 typedef struct {
   int sources;
   pw_chain link;
 } chain_between;
 
-/* A body that links a column to the next one, which alone is below it; returns the column, or -1. */
-static int chain_link (const pw_plan *c, const pw_block_ldl *l, int body, pw_chain *link) {
-  int j = pw_group_first (c->k->s, body);
-  const int *list = c->list + c->start[j];
-  if (c->start[j + 1] - c->start[j] != 2) return -1;
-  const pw_plan_contribution *a = &c->contribution[list[0]], *b = &c->contribution[list[1]];
-  int column = l->place[a->node];
-  if (!a->is_pin || !b->is_pin || c->k->inverse[j] != c->k->inverse[j + 1]) return -1;
-  if (l->place[b->node] != column + 1 || l->column[column + 1].first - l->column[column].first != 1) return -1;
-  *link = (pw_chain){ .column = column,
+/* Fills link for a body that links a column to the next one, which alone is below it; returns the column, or -1. */
+static int chain_link (const pw_plan *plan, const pw_block_ldl *l, int body, pw_chain *link) {
+  int j = pw_group_first (plan->saddle->s, body);
+  const int *list = plan->list + plan->start[j];
+  if (plan->start[j + 1] - plan->start[j] != 2) return -1;
+  const pw_plan_contribution *a = &plan->contribution[list[0]], *b = &plan->contribution[list[1]];
+  int column = l->column_of_node[a->node];
+  if (!a->is_pin || !b->is_pin || plan->saddle->inverse_weight[j] != plan->saddle->inverse_weight[j + 1]) return -1;
+  if (l->column_of_node[b->node] != column + 1 ||
+      l->column[column + 1].first_below - l->column[column].first_below != 1)
+    return -1;
+  *link = (pw_chain){ .first_column = column,
                       .bodies = 1,
-                      .A = a->J,
-                      .B = b->J,
-                      .step = a->step,
-                      .y = c->node[a->node].y,
+                      .J_first = a->J,
+                      .J_second = b->J,
+                      .row_stride = a->row_stride,
+                      .unknown = plan->node[a->node].unknown,
                       .j = j,
-                      .next_y = c->node[b->node].y - c->node[a->node].y };
+                      .unknown_stride = plan->node[b->node].unknown - plan->node[a->node].unknown };
   return column;
 }
 
 /* Appends the next body if its positions continue at the same strides. */
 static int chain_add (pw_chain *chain, const pw_chain *last, const pw_chain *link) {
-  int next_J = (int)(link->A - last->A), next_j = link->j - last->j;
-  if (link->B - last->B != next_J || link->next_y != chain->next_y) return 0;
-  if (chain->bodies > 1 && (next_J != chain->next_J || next_j != chain->next_j)) return 0;
-  chain->next_J = next_J;
-  chain->next_j = next_j;
+  int next_J = (int)(link->J_first - last->J_first), next_j = link->j - last->j;
+  if (link->J_second - last->J_second != next_J || link->unknown_stride != chain->unknown_stride) return 0;
+  if (chain->bodies > 1 && (next_J != chain->J_stride || next_j != chain->j_stride)) return 0;
+  chain->J_stride = next_J;
+  chain->j_stride = next_j;
   chain->bodies++;
   return 1;
 }
 
-/* Joins links to chains.  meet: columns: the contributions to each, 2 inside a chain. */
-static void chain_join (pw_plan *c, pw_block_ldl *l, const chain_between *between, const int *meet) {
-  c->chains = c->linked = 0;
+/* Joins links to chains.  contributions: columns: how many there are to each, 2 inside a chain. */
+static void chain_join (pw_plan *plan, pw_block_ldl *l, const chain_between *between, const int *contributions) {
+  plan->chains = plan->linked = 0;
   for (int p = 0; p < l->nodes;) {
     const chain_between *b = &between[p++];
     if (b->sources != 1 || b->link.bodies == 0) continue;
-    pw_chain *chain = &c->chain[c->chains++];
+    pw_chain *chain = &plan->chain[plan->chains++];
     *chain = b->link;
-    chain->factor = 3 * (c->linked + c->chains - 1);
-    c->is_linked[b->link.j / 3] = 1;
-    for (; p < l->nodes && between[p].sources == 1 && meet[p] == 2; p++) {
+    chain->first_factor = 3 * (plan->linked + plan->chains - 1);
+    plan->is_linked[b->link.j / 3] = 1;
+    for (; p < l->nodes && between[p].sources == 1 && contributions[p] == 2; p++) {
       if (between[p].link.bodies == 0) break;
       if (!chain_add (chain, &between[p - 1].link, &between[p].link)) break;
-      c->is_linked[between[p].link.j / 3] = 1;
+      plan->is_linked[between[p].link.j / 3] = 1;
       l->column[p].in_chain = 1;
     }
-    const pw_column *last = &l->column[chain->column + chain->bodies];
-    chain->whole = chain->bodies > 1 && last[1].first == last->first;
-    c->linked += chain->bodies;
+    const pw_block_column *last = &l->column[chain->first_column + chain->bodies];
+    chain->includes_last = chain->bodies > 1 && last[1].first_below == last->first_below;
+    plan->linked += chain->bodies;
   }
 }
 
-/* Counts fill-in between a column and the next one from columns eliminated earlier, which have both below them. */
+/* Counts as sources the columns eliminated earlier that have both a column and the next one below them: fill-in. */
 static void chain_fill (const pw_block_ldl *l, chain_between *between) {
   for (int p = 0; p < l->nodes; p++)
-    for (int i = l->column[p].first + 1; i < l->column[p + 1].first; i++)
+    for (int i = l->column[p].first_below + 1; i < l->column[p + 1].first_below; i++)
       if (l->below[i] == l->below[i - 1] + 1) between[l->below[i - 1]].sources++;
 }
 
-/* Counts a body; its contributions are in the order of their columns. */
-static void chain_count (const pw_plan *c, const pw_block_ldl *l, int body, chain_between *between) {
-  int j = pw_group_first (c->k->s, body);
-  for (int x = c->start[j] + 1; x < c->start[j + 1]; x++) {
-    int column = l->place[c->contribution[c->list[x - 1]].node];
-    if (l->place[c->contribution[c->list[x]].node] == column + 1) between[column].sources++;
+/* Counts a body as a source; its contributions are in the order of their columns. */
+static void chain_count (const pw_plan *plan, const pw_block_ldl *l, int body, chain_between *between) {
+  int j = pw_group_first (plan->saddle->s, body);
+  for (int x = plan->start[j] + 1; x < plan->start[j + 1]; x++) {
+    int column = l->column_of_node[plan->contribution[plan->list[x - 1]].node];
+    if (l->column_of_node[plan->contribution[plan->list[x]].node] == column + 1) between[column].sources++;
   }
 }
 
-int pw_condense_chains (pw_plan *c, pw_block_ldl *l) {
+int pw_condense_chains (pw_plan *plan, pw_block_ldl *l) {
   size_t nodes = (size_t)l->nodes + 1;
   chain_between *between = calloc (nodes, sizeof *between);
-  int *meet = calloc (nodes, sizeof *meet);
-  c->chain = malloc (nodes * sizeof *c->chain);
-  c->is_linked = calloc ((size_t)c->groups + 1, 1);
-  int status = between && meet && c->chain && c->is_linked ? PW_OK : PW_RESOURCE;
-  for (int p = 0; p < c->contributions && status == PW_OK; p++) meet[l->place[c->contribution[p].node]]++;
-  for (int body = 0; body < c->k->s->bodies && status == PW_OK; body++) {
+  int *contributions = calloc (nodes, sizeof *contributions);
+  plan->chain = malloc (nodes * sizeof *plan->chain);
+  plan->is_linked = calloc ((size_t)plan->groups + 1, 1);
+  int status = between && contributions && plan->chain && plan->is_linked ? PW_OK : PW_RESOURCE;
+  for (int p = 0; p < plan->contributions && status == PW_OK; p++)
+    contributions[l->column_of_node[plan->contribution[p].node]]++;
+  for (int body = 0; body < plan->saddle->s->bodies && status == PW_OK; body++) {
     pw_chain link;
-    int column = chain_link (c, l, body, &link);
+    int column = chain_link (plan, l, body, &link);
     if (column >= 0) between[column].link = link;
-    chain_count (c, l, body, between);
+    chain_count (plan, l, body, between);
   }
   if (status == PW_OK) chain_fill (l, between);
-  if (status == PW_OK) chain_join (c, l, between, meet);
+  if (status == PW_OK) chain_join (plan, l, between, contributions);
   free (between);
-  free (meet);
+  free (contributions);
   return status;
 }

@@ -1,17 +1,18 @@
-/* Elimination of coordinates without weight; see massless.h. */
+/* Elimination of coordinates without weight, and their solution; see massless.h. */
 #include <math.h>
 #include "massless.h"
 #include "unroll.h"
 
-/* n: the number of pivots, a constant 3 in most calls, so that loops are unrolled. */
+/* `pivots` is c->pivots: an argument, since it is the constant 3 in most calls, so that loops are unrolled. */
 
 /* ---- Elimination ---- */
 
+/* Copies J to A. */
 PW_INLINE void massless_copy (pw_component *c) {
   const pw_massless_group *end = c->group + c->groups;
   double *row = c->A;
   for (const pw_massless_row *r = c->row; r < c->row + c->rows; r++, row += c->stride) {
-    const double **from = r->from;
+    const double **from = r->source;
     for (const pw_massless_group *g = c->group; g < end; g++) {
       const double *J = *from++;
       double *A = row + g->column;
@@ -29,6 +30,7 @@ static double massless_square (const pw_component *c, int i, const double *weigh
   return sum;
 }
 
+/* Exchanges two rows. */
 static void massless_swap (pw_component *c, int a, int b) {
   if (a == b) return;
   pw_massless_row row = c->row[a];
@@ -45,139 +47,148 @@ static void massless_swap (pw_component *c, int a, int b) {
 #define MASSLESS_ROUND_OFF 1e-12
 
 int pw_massless_is_entry (const pw_component *c, int i, int column) {
-  return fabs (c->A[i * c->stride + column]) * sqrt (c->square[column]) > MASSLESS_ROUND_OFF * sqrt (c->row[i].terms);
+  return fabs (c->A[i * c->stride + column]) * sqrt (c->squared_scale[column]) >
+         MASSLESS_ROUND_OFF * sqrt (c->row[i].squared_terms);
 }
 
-/* Moves the row with the largest entry in a massless column to p, each row scaled by its largest original entry, so
- * that the remainder of a dependent row is small.  Returns 0 if all are round-off; the component is then matched again
- * at the next factorisation. */
+/* Matches the row with the largest entry in a massless column, each row scaled by its largest original entry (so that
+ * the remainder of a dependent row is small), and moves it to p.  Returns 0 if all entries are round-off; the component
+ * is then matched again at the next factorisation. */
 static int massless_select_pivot (pw_component *c, int p) {
   const double guard = 0.1; /* a pivot may lose one digit until the component is matched again */
   int row = -1, column = -1;
   double best = MASSLESS_ROUND_OFF;
   for (int i = p; i < c->rows; i++)
     for (int n = 0; n < c->cols; n++) {
-      double scaled = c->massless[n] ? sqrt (c->square[n]) * fabs (c->A[i * c->stride + n]) / c->row[i].size : 0;
+      if (!c->is_massless[n]) continue;
+      double scaled = sqrt (c->squared_scale[n]) * fabs (c->A[i * c->stride + n]) / c->row[i].largest;
       if (scaled > best) best = scaled, row = i, column = n;
     }
   if (row < 0) {
-    for (int i = 0; i < c->pivots; i++) c->row[i].least = NAN;
+    for (int i = 0; i < c->pivots; i++) c->row[i].rematch_below = NAN;
     return 0;
   }
   massless_swap (c, p, row);
   c->row[p].pivot = column;
-  c->row[p].scale = sqrt (c->square[column]) / c->row[p].size;
-  c->row[p].least = guard * best;
+  c->row[p].pivot_scale = sqrt (c->squared_scale[column]) / c->row[p].largest;
+  c->row[p].rematch_below = guard * best;
   return 1;
 }
 
-/* Subtracts row p from those after it, by pairs of columns.  `terms` of an unmatched row grows by the square of what is
- * subtracted. */
-PW_INLINE void massless_eliminate (pw_component *c, int p, int n) {
+/* Subtracts row p from those after it, by pairs of columns.  squared_terms of an unmatched row grows by the square of
+ * what is subtracted. */
+PW_INLINE void massless_eliminate (pw_component *c, int p, int pivots) {
   const int pivot = c->row[p].pivot, cols = c->cols;
   double *P = c->A + p * c->stride, inverse = 1 / P[pivot];
-  double square = c->rows > n ? massless_square (c, p, c->massive_square) : 0;
+  double square = c->rows > pivots ? massless_square (c, p, c->massive_squared_scale) : 0;
   for (int i = p + 1; i < c->rows; i++) {
     double *A = c->A + i * c->stride, l = A[pivot] * inverse;
-    A[c->lower + p] = l;
+    A[c->first_L_column + p] = l;
     if (l == 0) continue;
     for (int k = 0; k < cols; k += 2) {
       double even = A[k] - l * P[k], odd = A[k + 1] - l * P[k + 1];
       A[k] = even, A[k + 1] = odd;
     }
     A[pivot] = 0;
-    c->row[i].terms += l * l * square;
+    c->row[i].squared_terms += l * l * square;
   }
   P[pivot] = inverse;
 }
 
-/* Eliminates with the pivots matched before, or matches them (with `search`).  Returns the number of pivots that are
- * large enough. */
-PW_INLINE int massless_reduce (pw_component *c, int search, int n) {
+typedef enum { MASSLESS_AS_MATCHED, MASSLESS_MATCH } massless_mode;
+
+/* Eliminates with the pivots matched before, or matches them.  Returns the number of pivots that are large enough. */
+PW_INLINE int massless_reduce (pw_component *c, massless_mode mode, int pivots) {
+  const int matches = mode == MASSLESS_MATCH;
   massless_copy (c);
-  c->least = INFINITY;
-  for (int i = search ? 0 : n; i < c->rows; i++) c->row[i].terms = massless_square (c, i, c->square);
-  for (int i = 0; search && i < c->rows; i++) {
-    c->row[i].size = 0;
+  c->least_pivot = INFINITY;
+  for (int i = matches ? 0 : pivots; i < c->rows; i++)
+    c->row[i].squared_terms = massless_square (c, i, c->squared_scale);
+  for (int i = 0; matches && i < c->rows; i++) {
+    c->row[i].largest = 0;
     for (int k = 0; k < c->cols; k++)
-      c->row[i].size = fmax (c->row[i].size, sqrt (c->square[k]) * fabs (c->A[i * c->stride + k]));
+      c->row[i].largest = fmax (c->row[i].largest, sqrt (c->squared_scale[k]) * fabs (c->A[i * c->stride + k]));
   }
-  PW_UNROLL for (int p = 0; p < n; p++) {
-    if (search && !massless_select_pivot (c, p)) return p;
+  PW_UNROLL for (int p = 0; p < pivots; p++) {
+    if (matches && !massless_select_pivot (c, p)) return p;
     const pw_massless_row *row = &c->row[p];
-    double pivot = fabs (c->A[p * c->stride + row->pivot]) * row->scale;
-    if (!(pivot >= c->least)) c->least = pivot;
-    if (!search && !(pivot >= row->least)) return p;
-    massless_eliminate (c, p, n);
+    double pivot = fabs (c->A[p * c->stride + row->pivot]) * row->pivot_scale;
+    if (!(pivot >= c->least_pivot)) c->least_pivot = pivot;
+    if (!matches && !(pivot >= row->rematch_below)) return p;
+    massless_eliminate (c, p, pivots);
   }
-  return n;
+  return pivots;
 }
 
 int pw_massless_match (pw_component *c) {
-  return massless_reduce (c, 1, c->pivots);
+  return massless_reduce (c, MASSLESS_MATCH, c->pivots);
 }
 
-double pw_massless_factor (pw_massless *r) {
+double pw_massless_factor (pw_massless *m) {
   double least = INFINITY;
-  for (pw_component *c = r->component; c < r->end; c++) {
-    if ((c->pivots == 3 ? massless_reduce (c, 0, 3) : massless_reduce (c, 0, c->pivots)) < c->pivots)
-      if (pw_massless_match (c) < c->pivots) return 0;
+  for (pw_component *c = m->component; c < m->end; c++) {
+    int found = c->pivots == 3 ? massless_reduce (c, MASSLESS_AS_MATCHED, 3)
+                               : massless_reduce (c, MASSLESS_AS_MATCHED, c->pivots);
+    if (found < c->pivots && pw_massless_match (c) < c->pivots) return 0;
     for (int i = c->pivots; i < c->rows; i++) {
-      double remainder = c->row[i].terms > 0 ? sqrt (massless_square (c, i, c->massive_square) / c->row[i].terms) : 0;
-      if (!(remainder >= c->least)) c->least = remainder;
+      double terms = c->row[i].squared_terms, square = massless_square (c, i, c->massive_squared_scale);
+      double remainder = terms > 0 ? sqrt (square / terms) : 0;
+      if (!(remainder >= c->least_pivot)) c->least_pivot = remainder;
     }
-    if (!(c->least >= least)) least = c->least;
+    if (!(c->least_pivot >= least)) least = c->least_pivot;
   }
   return least > 1 ? 1 : least * least;
 }
 
 /* ---- Solving ---- */
 
-PW_INLINE void massless_forward (pw_component *c, double *f, double *gamma, int n) {
+/* gamma~, then w in place of lambda, then f~. */
+PW_INLINE void massless_forward (pw_component *c, double *f, double *gamma, int pivots) {
   pw_massless_row *row = c->row;
   for (int i = 0; i < c->rows; i++) {
-    const double *L = c->A + i * c->stride + c->lower;
+    const double *L = c->A + i * c->stride + c->first_L_column;
     row[i].gamma = gamma[row[i].row];
-    PW_UNROLL for (int p = 0; p < n; p++) row[i].gamma -= p < i ? L[p] * row[p].gamma : 0;
+    PW_UNROLL for (int p = 0; p < pivots; p++) row[i].gamma -= p < i ? L[p] * row[p].gamma : 0;
   }
-  for (int i = n; i < c->rows; i++)
-    if (c->y[i] >= 0) gamma[c->y[i]] = row[i].gamma;
-  PW_UNROLL for (int p = 0; p < n; p++) {
+  for (int i = pivots; i < c->rows; i++)
+    if (c->unknown[i] >= 0) gamma[c->unknown[i]] = row[i].gamma;
+  PW_UNROLL for (int p = 0; p < pivots; p++) {
     double w = f[c->global[row[p].pivot]];
     PW_UNROLL for (int q = 0; q < p; q++) w -= c->A[q * c->stride + row[p].pivot] * row[q].lambda;
     row[p].lambda = w * c->A[p * c->stride + row[p].pivot];
   }
-  for (const int *m = c->massive; m < c->massive + c->massives; m++) {
+  for (const int *column = c->massive; column < c->massive + c->massives; column++) {
     double change = 0;
-    PW_UNROLL for (int p = 0; p < n; p++) change += c->A[p * c->stride + *m] * row[p].lambda;
-    f[c->global[*m]] -= change;
+    PW_UNROLL for (int p = 0; p < pivots; p++) change += c->A[p * c->stride + *column] * row[p].lambda;
+    f[c->global[*column]] -= change;
   }
 }
 
-void pw_massless_forward (pw_massless *r, double *f, double *gamma) {
-  for (pw_component *c = r->component; c < r->end; c++)
+void pw_massless_forward (pw_massless *m, double *f, double *gamma) {
+  for (pw_component *c = m->component; c < m->end; c++)
     c->pivots == 3 ? massless_forward (c, f, gamma, 3) : massless_forward (c, f, gamma, c->pivots);
 }
 
-PW_INLINE void massless_backward (pw_component *c, double *a, double *lambda, int n) {
+/* gamma~ - H' a, then a_P and lambda_p from the last pivot to the first. */
+PW_INLINE void massless_backward (pw_component *c, double *a, double *lambda, int pivots) {
   pw_massless_row *row = c->row;
-  for (const int *m = c->massive; m < c->massive + c->massives; m++) {
-    double x = a[c->global[*m]];
-    PW_UNROLL for (int p = 0; p < n; p++) row[p].gamma -= c->A[p * c->stride + *m] * x;
+  for (const int *column = c->massive; column < c->massive + c->massives; column++) {
+    double x = a[c->global[*column]];
+    PW_UNROLL for (int p = 0; p < pivots; p++) row[p].gamma -= c->A[p * c->stride + *column] * x;
   }
-  for (int i = n; i < c->rows; i++) row[i].lambda = c->y[i] < 0 ? 0 : lambda[c->y[i]];
-  for (int i = n; i < c->rows; i++) lambda[row[i].row] = row[i].lambda;
-  PW_UNROLL for (int p = n - 1; p >= 0; p--) {
+  for (int i = pivots; i < c->rows; i++) row[i].lambda = c->unknown[i] < 0 ? 0 : lambda[c->unknown[i]];
+  for (int i = pivots; i < c->rows; i++) lambda[row[i].row] = row[i].lambda;
+  PW_UNROLL for (int p = pivots - 1; p >= 0; p--) {
     const double *A = c->A + p * c->stride;
     double x = row[p].gamma;
-    PW_UNROLL for (int q = p + 1; q < n; q++) x -= A[row[q].pivot] * a[c->global[row[q].pivot]];
+    PW_UNROLL for (int q = p + 1; q < pivots; q++) x -= A[row[q].pivot] * a[c->global[row[q].pivot]];
     a[c->global[row[p].pivot]] = x * A[row[p].pivot];
-    for (int i = p + 1; i < c->rows; i++) row[p].lambda -= c->A[i * c->stride + c->lower + p] * row[i].lambda;
+    for (int i = p + 1; i < c->rows; i++) row[p].lambda -= c->A[i * c->stride + c->first_L_column + p] * row[i].lambda;
     lambda[row[p].row] = row[p].lambda;
   }
 }
 
-void pw_massless_backward (pw_massless *r, double *a, double *lambda) {
-  for (pw_component *c = r->component; c < r->end; c++)
+void pw_massless_backward (pw_massless *m, double *a, double *lambda) {
+  for (pw_component *c = m->component; c < m->end; c++)
     c->pivots == 3 ? massless_backward (c, a, lambda, 3) : massless_backward (c, a, lambda, c->pivots);
 }

@@ -1,13 +1,14 @@
-/* Elimination of coordinates without weight: each is matched to a constraint row and substituted out of the others.
+/* Elimination of coordinates without weight (saddle.h), called massless: each is matched to a constraint row and
+ * substituted out of the others.
  *
- * The rows and coordinates concerned form independent components (a massless body and its joints).  In each,
- * Gaussian elimination of the massless columns, with the matched rows p as pivot rows, leaves
+ * The rows and coordinates concerned form independent components (a massless body and its joints).  In each, Gaussian
+ * elimination of the massless columns, with the matched rows p as pivot rows, leaves
  *
  *     [ P H ]   [ L 0 ] [ U H' ]       P, H: matched rows in the massless and in the massive columns
  *     [ K Z ] = [ R 1 ] [ 0 Z' ]       K, Z: unmatched rows i
  *
- * With  w = U^-T f_P,  f~ = f - H'^T w,  gamma~ = [ L 0 ; R 1 ]^-1 gamma,  the rows Z' and the massive coordinates form
- * a system without the massless ones.  Its solution yields
+ * With  f_P  the forces at the massless coordinates,  w = U^-T f_P,  f~ = f - H'^T w,  gamma~ = [ L 0 ; R 1 ]^-1 gamma,
+ * the rows Z' and the massive coordinates form a system without the massless ones.  Its solution yields
  *
  *     a_P = U^-1 (gamma~_p - H' a),       lambda_p = L^-T (w - R^T lambda_i). */
 #ifndef PW_MASSLESS_H
@@ -17,17 +18,19 @@
 
 enum { PW_MASSLESS_GROUPS = PW_MAX_BODIES + PW_MAX_INTERNAL }; /* most groups of one element */
 
-/* Groups of coordinates: bodies, then internal coordinates.  The number of groups; the group of a coordinate; the
- * first coordinate of a group; the number of coordinates in the group that begins with coordinate j. */
+/* Groups of coordinates: each body's three, then each internal coordinate alone.  Their number. */
 static inline int pw_groups (const pw_system *s) {
   return s->coords - 2 * s->bodies;
 }
+/* The group of coordinate j. */
 static inline int pw_group_of (const pw_system *s, int j) {
   return j < 3 * s->bodies ? j / 3 : j - 2 * s->bodies;
 }
-static inline int pw_group_first (const pw_system *s, int n) {
-  return n < s->bodies ? 3 * n : n + 2 * s->bodies;
+/* The first coordinate of a group. */
+static inline int pw_group_first (const pw_system *s, int group) {
+  return group < s->bodies ? 3 * group : group + 2 * s->bodies;
 }
+/* The number of coordinates in the group that begins with coordinate j. */
 static inline int pw_group_width (const pw_system *s, int j) {
   return j < 3 * s->bodies ? 3 : 1;
 }
@@ -45,37 +48,40 @@ static inline int pw_is_grounded (const pw_system *s, const pw_element_batch *k,
   return grounded;
 }
 
+/* A group of a component. */
 typedef struct {
   int j, width; /* first global coordinate; 3 of a body, or 1 */
   int column;   /* first local column */
 } pw_massless_group;
 
+/* A row of a component.  Entries of columns of angles are multiplied by 1 / L before they are compared with others. */
 typedef struct {
-  int row;             /* global */
-  int pivot;           /* matched rows: the local column of the coordinate */
-  double size;         /* largest entry when last matched, angles in units of length */
-  double scale;        /* matched rows: factor of the pivot that makes it relative to `size` */
-  double least;        /* matched rows: the pivot, relative to `size`, below which the component is matched again */
-  double terms;        /* unmatched rows: sum of squares: entries, and what is subtracted from the massive ones */
-  double gamma;        /* gamma~ */
-  double lambda;       /* matched rows: w; then the multiplier */
-  const double **from; /* groups: its entries in the batch, or zeros */
+  int row;               /* global */
+  int pivot;             /* matched rows: the local column of the coordinate */
+  double largest;        /* largest entry when last matched */
+  double pivot_scale;    /* matched rows: factor of the pivot that makes it relative to `largest` */
+  double rematch_below;  /* matched rows: the relative pivot below which the component is matched again */
+  double squared_terms;  /* unmatched rows: sum of squares: entries, and what is subtracted from the massive ones */
+  double gamma;          /* gamma~ */
+  double lambda;         /* matched rows: w; then the multiplier */
+  const double **source; /* groups: its entries in the batch, or zeros */
 } pw_massless_row;
 
 typedef struct {
-  int rows, cols, pivots, groups;
+  int rows, cols, groups;
+  int pivots;   /* matched rows */
   int grounded; /* 1: one of its elements is (pw_is_grounded) */
   pw_massless_group *group;
-  int *global;             /* cols: global coordinate */
-  unsigned char *massless; /* cols: 1 for a coordinate without weight */
-  int *massive, massives;  /* local columns of the others */
-  double *square;          /* cols: 1, or for an angle 1 / L^2 */
-  double *massive_square;  /* cols: the same, 0 for a massless coordinate */
-  pw_massless_row *row;    /* the matched ones first, in the order of elimination */
-  int *y;                  /* rows: where unmatched row i has its gamma~ and multiplier; -1: its multiplier is 0 */
-  double *A;               /* rows x stride: U, with inverses on its diagonal, and H', or 0 and Z'; then L, or R */
-  int lower, stride;       /* first column of L and R: cols rounded up to an even number; distance between rows of A */
-  double least;            /* smallest pivot relative to its row, or row of Z' relative to its terms */
+  int *global;                   /* cols: global coordinate */
+  unsigned char *is_massless;    /* cols: 1 for a coordinate without weight */
+  int *massive, massives;        /* local columns of the others */
+  double *squared_scale;         /* cols: 1, or for an angle 1 / L^2 */
+  double *massive_squared_scale; /* cols: the same, 0 for a massless coordinate */
+  pw_massless_row *row;          /* the matched ones first, in the order of elimination */
+  int *unknown; /* rows: index at which gamma~ and the multiplier of an unmatched row are; -1: its multiplier is 0 */
+  double *A;    /* rows x stride: U, with inverses on its diagonal, and H', or 0 and Z'; then L, or R */
+  int first_L_column, stride; /* of L and R: cols rounded up to an even number; distance between rows of A */
+  double least_pivot;         /* smallest pivot relative to its row, or row of Z' relative to its terms */
 } pw_component;
 
 typedef struct {
@@ -87,9 +93,9 @@ typedef struct {
 
 /* Finds the components and matches them with the J last evaluated.  PW_OK, PW_RESOURCE, or PW_INPUT with the error: the
  * name of a coordinate that no row determines.  Close it in every case. */
-int pw_massless_open (pw_massless *r, pw_workspace *w, const double *weight, int rows, const unsigned char *active,
+int pw_massless_open (pw_massless *m, pw_workspace *w, const double *weight, int rows, const unsigned char *active,
                       pw_error *error);
-void pw_massless_close (pw_massless *r);
+void pw_massless_close (pw_massless *m);
 
 /* Matches a component's massless coordinates to rows at the J last evaluated, with complete pivoting over their
  * columns, and eliminates them.  Returns the number of pivots found. */
@@ -98,16 +104,17 @@ int pw_massless_match (pw_component *c);
 /* 1 if an entry of the row i of Z' is larger than what round-off leaves of its terms. */
 int pw_massless_is_entry (const pw_component *c, int i, int column);
 
-/* Eliminates with the J last evaluated, and matches again if a pivot has become much smaller than when it was
- * matched.  Returns the smallest pivot squared, relative to its row, or of an unmatched row its remainder, if smaller;
- * 0 if singular. */
-double pw_massless_factor (pw_massless *r);
+/* Eliminates with the J last evaluated, and matches again if a pivot has become much smaller than when it was matched.
+ * Returns the smallest pivot squared, relative to its row, or of an unmatched row its remainder, if smaller; 0 if
+ * singular. */
+double pw_massless_factor (pw_massless *m);
 
-/* First half of a solve: f becomes f~ at the massive coordinates, gamma becomes gamma~ at `y` of unmatched rows. */
-void pw_massless_forward (pw_massless *r, double *f, double *gamma);
+/* First half of a solve: f becomes f~ at the massive coordinates, gamma becomes gamma~ at `unknown` of unmatched
+ * rows. */
+void pw_massless_forward (pw_massless *m, double *f, double *gamma);
 
-/* Second half, from a of the massive coordinates and lambda at `y` of unmatched rows: a of the massless coordinates,
- * and lambda of all rows. */
-void pw_massless_backward (pw_massless *r, double *a, double *lambda);
+/* Second half, from a of the massive coordinates and lambda at `unknown` of unmatched rows: a of the massless
+ * coordinates, and lambda of all rows. */
+void pw_massless_backward (pw_massless *m, double *a, double *lambda);
 
 #endif

@@ -1,11 +1,11 @@
-/* Components of rows and massless coordinates, found by union-find; see massless.h. */
+/* Finds the components of rows and massless coordinates by union-find; see massless.h. */
 #include <stdlib.h>
 #include "massless.h"
 #include "util.h"
 
 /* ---- Components ---- */
 
-/* Union-find over the groups (bodies, internal coordinates) that contain massless coordinates. */
+/* Union-find over the groups that contain massless coordinates. */
 typedef struct {
   const pw_system *s;
   const pw_workspace *w;
@@ -16,20 +16,21 @@ typedef struct {
   int *member; /* groups: at a root, the number of its component; -1: in no active row */
 } massless_plan;
 
-static int massless_contains (const massless_plan *p, int g) {
-  int j = pw_group_first (p->s, g);
+/* 1 if a group contains a massless coordinate. */
+static int massless_is_group (const massless_plan *p, int group) {
+  int j = pw_group_first (p->s, group);
   for (int n = 0; n < pw_group_width (p->s, j); n++)
     if (p->weight[j + n] == 0) return 1;
   return 0;
 }
 
 /* The groups of an element's coordinates, without the ground, and their first local columns. */
-static int massless_element_groups (const pw_system *s, const pw_element_batch *k, int e, int *group, int *at) {
+static int massless_element_groups (const pw_system *s, const pw_element_batch *k, int e, int *group, int *column) {
   int n = 0;
   for (int x = 0; x < k->b.cols; x += pw_group_columns (k->kind, x)) {
     int j = pw_global (k, e, x);
     if (j >= s->coords) continue;
-    at[n] = x;
+    column[n] = x;
     group[n++] = pw_group_of (s, j);
   }
   return n;
@@ -41,13 +42,13 @@ static int massless_is_active (const massless_plan *p, int row) {
 
 /* Unites massless groups that share an active row, and marks them as members. */
 static void massless_unite (massless_plan *p) {
-  int group[PW_MASSLESS_GROUPS], at[PW_MASSLESS_GROUPS];
+  int group[PW_MASSLESS_GROUPS], column[PW_MASSLESS_GROUPS];
   for (const pw_element_batch *k = p->w->batch; k < p->w->batch + p->s->constraints; k++)
     for (int e = 0; e < k->b.count; e++) {
-      int any = 0, last = -1, n = massless_element_groups (p->s, k, e, group, at);
-      for (int i = 0; i < k->kind->rows; i++) any |= massless_is_active (p, k->row + e * k->kind->rows + i);
-      for (int i = 0; any && i < n; i++) {
-        if (!massless_contains (p, group[i])) continue;
+      int active = 0, last = -1, n = massless_element_groups (p->s, k, e, group, column);
+      for (int i = 0; i < k->kind->rows; i++) active |= massless_is_active (p, k->row + e * k->kind->rows + i);
+      for (int i = 0; active && i < n; i++) {
+        if (!massless_is_group (p, group[i])) continue;
         p->member[group[i]] = 0;
         if (last >= 0) p->parent[pw_root (p->parent, group[i])] = pw_root (p->parent, last);
         last = group[i];
@@ -66,28 +67,28 @@ static int massless_add_group (const pw_system *s, pw_component *c, int g) {
 }
 
 /* Adds a row and its groups to a component. */
-static void massless_add_row (const pw_system *s, pw_component *c, int row, int n, const int *group, const int *at,
+static void massless_add_row (const pw_system *s, pw_component *c, int row, int n, const int *group, const int *column,
                               const double *J) {
   pw_massless_row *to = &c->row[c->rows++];
   to->row = row;
-  for (int i = 0; i < n; i++) to->from[massless_add_group (s, c, group[i])] = J + at[i];
+  for (int i = 0; i < n; i++) to->source[massless_add_group (s, c, group[i])] = J + column[i];
 }
 
 /* Adds each active row with a massless group to the component of this group; before the layout it only counts rows, and
  * groups with repetition. */
-static void massless_add_rows (massless_plan *p, pw_massless *r) {
-  int group[PW_MASSLESS_GROUPS], at[PW_MASSLESS_GROUPS];
+static void massless_add_rows (massless_plan *p, pw_massless *m) {
+  int group[PW_MASSLESS_GROUPS], column[PW_MASSLESS_GROUPS];
   for (const pw_element_batch *k = p->w->batch; k < p->w->batch + p->s->constraints; k++)
     for (int e = 0; e < k->b.count; e++) {
-      int n = massless_element_groups (p->s, k, e, group, at), first = 0;
-      while (first < n && !massless_contains (p, group[first])) first++;
+      int n = massless_element_groups (p->s, k, e, group, column), first = 0;
+      while (first < n && !massless_is_group (p, group[first])) first++;
       for (int i = e * k->kind->rows; first < n && i < (e + 1) * k->kind->rows; i++) {
         if (!massless_is_active (p, k->row + i)) continue;
-        int component = r->component_of_row[k->row + i] = p->member[pw_root (p->parent, group[first])];
-        pw_component *c = &r->component[component];
+        int component = m->component_of_row[k->row + i] = p->member[pw_root (p->parent, group[first])];
+        pw_component *c = &m->component[component];
         c->grounded |= pw_is_grounded (p->s, k, e);
         if (c->row)
-          massless_add_row (p->s, c, k->row + i, n, group, at, k->J + i * k->b.cols);
+          massless_add_row (p->s, c, k->row + i, n, group, column, k->J + i * k->b.cols);
         else
           c->rows++, c->groups += n;
       }
@@ -98,28 +99,28 @@ static void massless_add_rows (massless_plan *p, pw_massless *r) {
 
 /* Allocates the components.  The number of groups is bounded by that counted with repetition, and by that of the scene;
  * the number of pivots by that of rows. */
-static int massless_lay_out (pw_massless *r, const massless_plan *p) {
+static int massless_lay_out (pw_massless *m, const massless_plan *p) {
   static const double zero[3] = { 0 };
-  for (pw_layout l = { 0 }; pw_layout_pass (&l, &r->memory);)
-    for (pw_component *c = r->component; c < r->end; c++) {
+  for (pw_layout l = { 0 }; pw_layout_pass (&l, &m->memory);)
+    for (pw_component *c = m->component; c < m->end; c++) {
       size_t rows = (size_t)c->rows, groups = (size_t)(c->groups < p->groups ? c->groups : p->groups),
              cols = 3 * groups;
       c->group = pw_layout_alloc (&l, groups, sizeof *c->group);
       c->global = pw_layout_alloc (&l, cols, sizeof *c->global);
-      c->massless = pw_layout_alloc (&l, cols, 1);
+      c->is_massless = pw_layout_alloc (&l, cols, 1);
       c->massive = pw_layout_alloc (&l, cols, sizeof *c->massive);
-      c->square = pw_layout_alloc (&l, cols, sizeof *c->square);
-      c->massive_square = pw_layout_alloc (&l, cols, sizeof *c->massive_square);
+      c->squared_scale = pw_layout_alloc (&l, cols, sizeof *c->squared_scale);
+      c->massive_squared_scale = pw_layout_alloc (&l, cols, sizeof *c->massive_squared_scale);
       c->row = pw_layout_alloc (&l, rows, sizeof *c->row);
-      c->y = pw_layout_alloc (&l, rows, sizeof *c->y);
+      c->unknown = pw_layout_alloc (&l, rows, sizeof *c->unknown);
       c->A = pw_layout_alloc (&l, rows * (cols + rows + 1), sizeof *c->A);
       const double **from = pw_layout_alloc (&l, rows * groups, sizeof *from);
       if (l.base == NULL) continue;
-      for (size_t i = 0; i < rows; i++) c->row[i].from = from + i * groups;
+      for (size_t i = 0; i < rows; i++) c->row[i].source = from + i * groups;
       for (size_t i = 0; i < rows * groups; i++) from[i] = zero;
       c->rows = c->groups = 0;
     }
-  return r->memory ? PW_OK : PW_RESOURCE;
+  return m->memory ? PW_OK : PW_RESOURCE;
 }
 
 /* ---- Opening ---- */
@@ -133,78 +134,78 @@ static int massless_undetermined (const pw_system *s, int j, pw_error *error) {
 }
 
 /* Marks the massless columns and matches them; reports a column that no row determines. */
-static int massless_check (pw_massless *r, const massless_plan *p, pw_error *error) {
+static int massless_check (pw_massless *m, const massless_plan *p, pw_error *error) {
   const pw_system *s = p->s;
-  for (pw_component *c = r->component; c < r->end; c++) {
+  for (pw_component *c = m->component; c < m->end; c++) {
     int massless = 0;
     for (int n = 0; n < c->cols; n++) {
       int j = c->global[n];
-      c->square[n] = pw_is_angle (s, j) ? 1 / (s->scale.length * s->scale.length) : 1;
-      c->massless[n] = p->weight[j] == 0;
-      c->massive_square[n] = c->massless[n] ? 0 : c->square[n];
-      if (!c->massless[n]) c->massive[c->massives++] = n;
-      massless += c->massless[n];
+      c->squared_scale[n] = pw_is_angle (s, j) ? 1 / (s->scale.length * s->scale.length) : 1;
+      c->is_massless[n] = p->weight[j] == 0;
+      c->massive_squared_scale[n] = c->is_massless[n] ? 0 : c->squared_scale[n];
+      if (!c->is_massless[n]) c->massive[c->massives++] = n;
+      massless += c->is_massless[n];
     }
     c->pivots = massless < c->rows ? massless : c->rows;
-    c->lower = c->cols + c->cols % 2;
-    c->stride = c->lower + c->pivots;
+    c->first_L_column = c->cols + c->cols % 2;
+    c->stride = c->first_L_column + c->pivots;
     int found = pw_massless_match (c);
     if (found == massless) continue;
     for (int n = 0; n < c->cols; n++) {
       int used = 0;
       for (int q = 0; q < found; q++) used |= c->row[q].pivot == n;
-      if (c->massless[n] && !used) return massless_undetermined (s, c->global[n], error);
+      if (c->is_massless[n] && !used) return massless_undetermined (s, c->global[n], error);
     }
   }
   return PW_OK;
 }
 
 /* Numbers the components; a massless group in no active row is an error. */
-static int massless_number_components (pw_massless *r, massless_plan *p, pw_error *error) {
+static int massless_number_components (pw_massless *m, massless_plan *p, pw_error *error) {
   for (int g = 0; g < p->groups; g++) {
-    if (!massless_contains (p, g)) continue;
+    if (!massless_is_group (p, g)) continue;
     int j = pw_group_first (p->s, g);
     while (p->weight[j] != 0) j++;
     if (p->member[g] < 0) return massless_undetermined (p->s, j, error);
-    if (pw_root (p->parent, g) == g) p->member[g] = r->components++;
+    if (pw_root (p->parent, g) == g) p->member[g] = m->components++;
   }
   return PW_OK;
 }
 
-static int massless_build (pw_massless *r, massless_plan *p, pw_error *error) {
+static int massless_build (pw_massless *m, massless_plan *p, pw_error *error) {
   massless_unite (p);
-  int status = massless_number_components (r, p, error);
-  if (status != PW_OK || r->components == 0) return status;
-  r->component = calloc ((size_t)r->components, sizeof *r->component);
-  if (r->component == NULL) return PW_RESOURCE;
-  r->end = r->component + r->components;
-  massless_add_rows (p, r);
-  if (massless_lay_out (r, p) != PW_OK) return PW_RESOURCE;
-  massless_add_rows (p, r);
-  return massless_check (r, p, error);
+  int status = massless_number_components (m, p, error);
+  if (status != PW_OK || m->components == 0) return status;
+  m->component = calloc ((size_t)m->components, sizeof *m->component);
+  if (m->component == NULL) return PW_RESOURCE;
+  m->end = m->component + m->components;
+  massless_add_rows (p, m);
+  if (massless_lay_out (m, p) != PW_OK) return PW_RESOURCE;
+  massless_add_rows (p, m);
+  return massless_check (m, p, error);
 }
 
-int pw_massless_open (pw_massless *r, pw_workspace *w, const double *weight, int rows, const unsigned char *active,
+int pw_massless_open (pw_massless *m, pw_workspace *w, const double *weight, int rows, const unsigned char *active,
                       pw_error *error) {
   const pw_system *s = w->s;
   int groups = pw_groups (s), status = PW_RESOURCE;
-  *r = (pw_massless){ 0 };
+  *m = (pw_massless){ 0 };
   massless_plan p = { .s = s, .w = w, .weight = weight, .active = active, .rows = rows, .groups = groups };
   p.parent = malloc (((size_t)groups + 1) * sizeof *p.parent);
   p.member = malloc (((size_t)groups + 1) * sizeof *p.member);
-  r->component_of_row = malloc (((size_t)s->rows + 1) * sizeof *r->component_of_row);
-  if (p.parent && p.member && r->component_of_row) {
+  m->component_of_row = malloc (((size_t)s->rows + 1) * sizeof *m->component_of_row);
+  if (p.parent && p.member && m->component_of_row) {
     for (int g = 0; g < groups; g++) p.parent[g] = g, p.member[g] = -1;
-    for (int i = 0; i < s->rows; i++) r->component_of_row[i] = -1;
-    status = massless_build (r, &p, error);
+    for (int i = 0; i < s->rows; i++) m->component_of_row[i] = -1;
+    status = massless_build (m, &p, error);
   }
   free (p.parent);
   free (p.member);
   return status;
 }
 
-void pw_massless_close (pw_massless *r) {
-  free (r->memory);
-  free (r->component);
-  free (r->component_of_row);
+void pw_massless_close (pw_massless *m) {
+  free (m->memory);
+  free (m->component);
+  free (m->component_of_row);
 }

@@ -7,7 +7,7 @@
 
 /* Column c of A: the effect of a variation along minimal coordinate c. */
 static void linear_column_of_A (pw_linearisation *x, int c) {
-  double *dq = x->x, *dv = x->x + x->n, w = x->frame.twist[2];
+  double *dq = x->dx, *dv = x->dx + x->n, w = x->frame.twist[2];
   pw_linear_tangent (x, c);
   pw_linear_vary (x);
   pw_linear_turn (x, -w, dv, x->da);
@@ -23,19 +23,19 @@ static int linear_arrays (pw_linearisation *x) {
     { &x->norm, m },
     { &x->R, m * n },
     { &x->Q, n * n },
-    { &x->x, 2 * n },
-    { &x->y, n + 2 * m },
+    { &x->dx, 2 * n },
+    { &x->product, n + 2 * m },
     { &x->da, n + 3 },
-    { &x->z, n + 3 * m + 3 },
-    { &x->c, m },
-    { &x->S, 3 * size },
-    { &x->a0, n },
-    { &x->there, 2 * n + 6 },
-    { &x->along, 2 * n },
-    { &x->response, n },
+    { &x->scratch, n + 3 * m + 3 },
+    { &x->row_scratch, m },
+    { &x->symmetry, 3 * size },
+    { &x->probe_a, n },
+    { &x->later, 2 * n + 6 },
+    { &x->probe, 2 * n },
+    { &x->probe_da, n },
     { &x->residual, 4 * (2 * m + n) + 15 },
-    { &x->left, x->modes ? size * size + size : 0 },
-    { &x->top, 4 * size },
+    { &x->left_vectors, x->modes ? size * size + size : 0 },
+    { &x->upper_rows, 4 * size },
   };
   x->memory = pw_alloc_arrays (array, sizeof array / sizeof *array);
   return x->memory ? PW_OK : PW_RESOURCE;
@@ -77,8 +77,8 @@ static int linear_results (pw_linearisation *x, pw_linear *l) {
   return PW_OK;
 }
 
-int pw_linear_open (pw_linearisation *x, pw_run *r, int modes, int most) {
-  *x = (pw_linearisation){ .r = r, .n = r->s->coords, .m = r->s->rows, .modes = modes };
+int pw_linear_open (pw_linearisation *x, pw_run *r, pw_linear_extent extent, int most) {
+  *x = (pw_linearisation){ .r = r, .n = r->s->coords, .m = r->s->rows, .modes = extent == PW_WITH_MODES };
   int status = linear_rows (x);
   if (status == PW_OK && x->n <= most) status = linear_arrays (x);
   if (status == PW_OK && x->n <= most) status = pw_linear_derivatives (x);
@@ -92,11 +92,11 @@ static const double LINEAR_FAR = 1e-6, LINEAR_NEAR = 1e-8, LINEAR_JUMP = 1e-6;
 static double linear_change (pw_linearisation *x, int j, double part) {
   pw_run *r = x->r;
   int n = x->n;
-  double T = r->w->scale.time, most = 0, *q = x->x, *v = q + n;
+  double T = r->w->scale.time, most = 0, *q = x->dx, *v = q + n;
   memcpy (q, r->q, (size_t)n * sizeof *q);
   memcpy (v, r->v, (size_t)n * sizeof *v);
   *(j < n ? q + j : v + j - n) += part * pw_unit (r->s, j % n) / (j < n ? 1 : T);
-  if (pw_run_accelerate (r, r->t, q, v, x->da, x->z) != PW_OK) return 0;
+  if (pw_run_accelerate (r, r->t, q, v, x->da, x->scratch) != PW_OK) return 0;
   for (int i = 0; i < n; i++) most = fmax (most, fabs (x->da[i] - x->a[i]) * T * T / pw_unit (r->s, i));
   return most;
 }
@@ -140,12 +140,12 @@ static int linear_compute (pw_linearisation *x, pw_linear *l, pw_error *error) {
   return status;
 }
 
-static int linear_run (pw_run *r, int most, int modes, pw_linear *l, pw_error *error) {
+static int linear_run (pw_run *r, int most, pw_linear_extent extent, pw_linear *l, pw_error *error) {
   pw_linearisation x;
   *l = (pw_linear){ .least = NAN };
   if (pw_require (r, "a run", error) != PW_OK) return PW_INPUT;
   pw_statistics before = r->statistics;
-  int near = r->near_singular, status = pw_linear_open (&x, r, modes, most);
+  int near = r->near_singular, status = pw_linear_open (&x, r, extent, most);
   l->coordinates = x.n;
   l->rank = x.rank;
   l->positions = x.positions;
@@ -159,11 +159,11 @@ static int linear_run (pw_run *r, int most, int modes, pw_linear *l, pw_error *e
 }
 
 int pw_run_linearise (pw_run *r, int most, pw_linear *l, pw_error *error) {
-  return linear_run (r, most, 0, l, error);
+  return linear_run (r, most, PW_WITHOUT_MODES, l, error);
 }
 
 int pw_run_linear_modes (pw_run *r, int most, pw_linear *l, pw_error *error) {
-  return linear_run (r, most, 1, l, error);
+  return linear_run (r, most, PW_WITH_MODES, l, error);
 }
 
 void pw_linear_free (pw_linear *l) {

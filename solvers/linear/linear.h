@@ -1,5 +1,6 @@
-/* A linearisation in progress; for linear*.c only.  Index names: n coordinates, m constraint equations; a variation of
- * the state is x = (dq, dv), and has `size` minimal coordinates: first those of positions, then those of velocities. */
+/* A linearisation in progress, for linear*.c and for analyses that need its parts.  The system has n coordinates and m
+ * constraint equations; a variation of the state is dx = (dq, dv), and has `size` minimal coordinates: first those of
+ * positions, then those of velocities (equations in linear_variation.c). */
 #ifndef PW_LINEAR_H
 #define PW_LINEAR_H
 
@@ -7,7 +8,7 @@
 #include "pinwheel-analysis.h"
 #include "newton.h"
 
-/* The co-moving frame, at a reference body, at rest or with the twist of the body. */
+/* The co-moving frame (linear_frame.c). */
 typedef struct {
   double origin[2];    /* of the frame [m] */
   double twist[3];     /* velocity of the origin, angular velocity [m/s, rad/s] */
@@ -24,34 +25,35 @@ typedef struct {
 typedef struct {
   pw_run *r;
   int n, m;
-  int holonomic, rank; /* independent constraint equations, those of positions first */
-  int positions, velocities, size;
-  int *row; /* rank: indices of these equations */
+  int holonomic, rank;             /* independent constraint equations: holonomic ones; all, those first */
+  int positions, velocities, size; /* minimal coordinates: of positions, of velocities, all */
+  int *row;                        /* rank: indices of the independent equations */
   pw_linear_frame frame;
   double *a, *lambda;            /* n + 3, m: at the state last evaluated */
   double *norm;                  /* m: lengths of the rows of J in units of the scene */
   double *R;                     /* rank x rank: J^T = Q R, by columns; before that the rows of J, n long each */
   double *Q;                     /* n x n, by columns */
   double *A;                     /* size x size, by rows: in the result */
-  double *S;                     /* 3 x size: symmetry directions in minimal coordinates */
-  double *x;                     /* 2 n: a variation */
-  double *y;                     /* n + 2 m: derivatives times x: those of -F, gamma - J a, J v - eta */
+  double *symmetry;              /* 3 x size: symmetry directions in minimal coordinates */
+  double *dx;                    /* 2 n: a variation */
+  double *product;               /* n + 2 m: derivatives of J^T lambda - f, gamma - J a, J v - eta, times dx */
   double *da;                    /* n + 3: the resulting variation of accelerations */
-  double *z, *c;                 /* n + 3 m + 3, m: scratch */
+  double *scratch, *row_scratch; /* n + 3 m + 3, m */
   double *residual;              /* 3 x (2 m + n): violations by rigid displacements; then scratch, 2 m + n + 15 */
-  double *a0, *along, *response; /* n, 2 n, n: accelerations, a variation and its da at the current state */
-  double *there;                 /* 2 n: a later state */
-  pw_newton newton;
+  double *probe, *probe_da;      /* 2 n, n: a variation at the current state, and its da (linear_frame.c) */
+  double *probe_a;               /* n: accelerations at the current state */
+  double *later;                 /* 2 n: a later state */
+  pw_newton_scratch newton;
   pw_scatter_map scatter;
-  int64_t *colptr, *rowind; /* the derivatives: columns q, v; rows as y */
+  int64_t *colptr, *rowind; /* the derivatives: columns q, v; rows as `product` */
   double *value;
   pw_linear_entry *entry; /* entries: those that are not 0 */
   int entries;
   char *memory;
-  int modes; /* 1: with B, basis, shapes */
-  double *left, *top,
-      tau[3]; /* size^2 + size: eigenvectors of the split matrix, then imaginary parts; 4 x size: its upper
-                                 rows; scalars of the reflections in S */
+  int modes;            /* 1: PW_WITH_MODES, which needs the following */
+  double *left_vectors; /* size^2 + size: eigenvectors of the split matrix, then imaginary parts of its eigenvalues */
+  double *upper_rows;   /* 3 x size: of the split matrix; then scratch, size */
+  double tau[3];        /* scalars of the reflections in `symmetry` */
 } pw_linearisation;
 
 /* Round-off of derivatives of moderate size, relative to them. */
@@ -59,9 +61,11 @@ typedef struct {
 
 /* ---- linear.c ---- */
 
-/* Opens a linearisation of the run's system; only counts if there are more than `most` coordinates.  PW_OK or PW_RESOURCE;
+typedef enum { PW_WITHOUT_MODES, PW_WITH_MODES /* B, basis, shapes */ } pw_linear_extent;
+
+/* Opens a linearisation of the run's system; with more than `most` coordinates it only counts.  PW_OK or PW_RESOURCE;
  * close it in every case. */
-int pw_linear_open (pw_linearisation *x, pw_run *r, int modes, int most);
+int pw_linear_open (pw_linearisation *x, pw_run *r, pw_linear_extent extent, int most);
 void pw_linear_close (pw_linearisation *x);
 
 /* ---- linear_variation.c ---- */
@@ -74,14 +78,14 @@ double pw_linear_least (pw_linearisation *x);
 void pw_linear_bases (pw_linearisation *x);
 /* Evaluates accelerations and derivatives at a state; kinematics are left there.  Returns as pw_run_accelerate. */
 int pw_linear_evaluate (pw_linearisation *x, double t, const double *q, const double *v);
-/* Computes y from the variation x; y and da. */
+/* Compute `product` from the variation dx; `product` and da. */
 void pw_linear_multiply (pw_linearisation *x);
 void pw_linear_vary (pw_linearisation *x);
-/* Sets x to the variation along minimal coordinate c. */
+/* Sets dx to the variation along minimal coordinate c. */
 void pw_linear_tangent (pw_linearisation *x, int c);
 /* The minimal coordinates of a variation, `stride` apart. */
 void pw_linear_coordinates (const pw_linearisation *x, const double *dq, const double *dv, int stride, double *out);
-/* out += W in: (x, y) of each body, times w and rotated by 90 degrees. */
+/* out += W in: (x, y) of each body, rotated by 90 degrees and times w. */
 void pw_linear_turn (const pw_linearisation *x, double w, const double *in, double *out);
 /* out = in with (x, y) of each body rotated by an angle. */
 void pw_linear_rotate (const pw_linearisation *x, double angle, const double *in, double *out);
@@ -104,11 +108,11 @@ int pw_linear_shapes (pw_linearisation *x, int k, pw_linear *l);
 
 /* Chooses the frame in which the accelerations of the evaluated state are smallest. */
 void pw_linear_choose_frame (pw_linearisation *x);
-/* What the variation x changes, in units of the scene, 0 for a symmetry: violations, then `n` accelerations; turns: 1 if it is a
- * rotation of the whole by 1 rad, with which accelerations rotate. */
+/* What the variation dx changes, in units of the scene, 0 for a symmetry: residuals of the constraints, then n
+ * accelerations; turns: 1 if it is a rotation of the whole by 1 rad, with which accelerations rotate. */
 void pw_linear_asymmetry (pw_linearisation *x, int turns, double *out);
 /* Number of rigid displacements of the whole (x, y, phi) under which the equations are invariant to first order; their
- * directions go to S. */
+ * directions go to `symmetry`. */
 int pw_linear_symmetries (pw_linearisation *x);
 /* Determines whether A is constant along the motion; see pw_linear.  Leaves the workspace at the current state. */
 pw_steadiness pw_linear_steady (pw_linearisation *x);

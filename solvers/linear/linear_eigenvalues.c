@@ -1,4 +1,4 @@
-/* The eigenvalues of a linearisation, their uncertainty, and the largest step with which RK4 is stable. */
+/* The eigenvalues of a linearisation, with uncertain parts set to 0, and the largest step with which RK4 is stable. */
 #include <float.h>
 #include <lapacke.h>
 #include <math.h>
@@ -7,13 +7,13 @@
 #include "linear.h"
 #include "rank.h"
 
-/* EIGEN_ROUND: size of the trial errors, relative to the terms of an entry of A and to the largest entry of the
- * balanced matrix: a hundred times round-off, the loss in derivatives and QR algorithm.  EIGEN_CERTAIN: an eigenvalue
- * counts as nonzero if it exceeds this multiple of the shift they cause. */
-static const double EIGEN_ROUND = 100 * DBL_EPSILON, EIGEN_CERTAIN = 10;
+/* EIGEN_ROUND_OFF: size of the perturbations of A that estimate the uncertainty of its eigenvalues, relative to the
+ * largest entry of its row, then to that of the balanced matrix: a hundred times round-off, the loss in derivatives and
+ * QR algorithm.  EIGEN_CERTAIN: an eigenvalue counts as nonzero if it exceeds this multiple of the shift they cause. */
+static const double EIGEN_ROUND_OFF = 100 * DBL_EPSILON, EIGEN_CERTAIN = 10;
 
-/* The n eigenvalues of A (destroyed), conjugate pairs adjacent, im > 0 first, and its left eigenvectors unless `left` is
- * NULL; `work` has 4 n entries. */
+/* The n eigenvalues of A (destroyed), conjugate pairs adjacent, im > 0 first, and its left eigenvectors unless `left`
+ * is NULL; `work` has 4 n entries. */
 static int eigen_values (int n, double *A, double *re, double *im, double *left, double *work) {
   for (int i = 0; i < n * n; i++)
     if (!isfinite (A[i])) return PW_RETRY;
@@ -22,12 +22,12 @@ static int eigen_values (int n, double *A, double *re, double *im, double *left,
   return failed ? PW_RETRY : PW_OK;
 }
 
-/* Adds errors of EIGEN_ROUND times the largest entry of each row, at least `least`, to B. */
-static void eigen_disturb (int n, double least, double *B) {
+/* Adds perturbations of EIGEN_ROUND_OFF times the largest entry of each row, at least `least`, to B. */
+static void eigen_perturb (int n, double least, double *B) {
   for (int i = 0; i < n; i++, B += n) {
     double most = least;
     for (int k = 0; k < n; k++) most = fmax (most, fabs (B[k]));
-    for (int k = 0; k < n; k++) B[k] += EIGEN_ROUND * most * pw_irregular (1.7, i * n + k + 1);
+    for (int k = 0; k < n; k++) B[k] += EIGEN_ROUND_OFF * most * pw_irregular (1.7, i * n + k + 1);
   }
 }
 
@@ -36,9 +36,9 @@ static int eigen_ascending (const void *a, const void *b) {
   return (x > y) - (x < y);
 }
 
-/* The shift of each eigenvalue: the distance to the nearest one of the perturbed matrix, or the difference to the
- * modulus of the same rank if that is larger (the nearest is not meaningful among many defective ones); at least
- * `least`.  re2 becomes the sorted moduli of the perturbed ones. */
+/* The shift of each eigenvalue by the perturbation: the distance to the nearest one of the perturbed matrix (re2, im2);
+ * with moduli in ascending order, the difference to the modulus of the same rank if that is larger, since the nearest
+ * one is not meaningful among many defective ones; at least `least`.  re2 becomes the sorted moduli. */
 static void eigen_shift (int n, const double *re, const double *im, double *re2, const double *im2, double least,
                          double *shift) {
   for (int i = 0; i < n; i++) {
@@ -70,18 +70,18 @@ static void eigen_clean (int n, double *re, double *im, const double *shift) {
 
 /* The eigenvalues of B; those of the perturbed matrix give their uncertainty.  B has room for 2 n^2 + 7 n entries. */
 static int eigen_certain (const pw_linearisation *x, int n, double *B, double *re, double *im) {
-  int cells = n * n, first, last;
-  double *other = B + cells, *re2 = other + cells, *im2 = re2 + n, *shift = im2 + n, *work = shift + n;
+  int cells = n * n, unused, also_unused;
+  double *perturbed = B + cells, *re2 = perturbed + cells, *im2 = re2 + n, *shift = im2 + n, *work = shift + n;
   double most = 1 / x->r->w->scale.time;
-  memcpy (other, B, (size_t)cells * sizeof *B);
-  eigen_disturb (n, most, other);
-  if (n) LAPACKE_dgebal_work (LAPACK_COL_MAJOR, 'S', n, other, n, &first, &last, work);
-  for (int i = 0; i < cells; i++) most = fmax (most, fabs (other[i]));
-  eigen_disturb (n, most, other);
-  if (eigen_values (n, B, re, im, x->modes ? x->left : NULL, work) != PW_OK) return PW_RETRY;
-  if (x->modes) memcpy (x->left + cells, im, (size_t)n * sizeof *im);
-  if (eigen_values (n, other, re2, im2, NULL, work) != PW_OK) return PW_RETRY;
-  eigen_shift (n, re, im, re2, im2, EIGEN_ROUND * most, shift);
+  memcpy (perturbed, B, (size_t)cells * sizeof *B);
+  eigen_perturb (n, most, perturbed);
+  if (n) LAPACKE_dgebal_work (LAPACK_COL_MAJOR, 'S', n, perturbed, n, &unused, &also_unused, work);
+  for (int i = 0; i < cells; i++) most = fmax (most, fabs (perturbed[i]));
+  eigen_perturb (n, most, perturbed);
+  if (eigen_values (n, B, re, im, x->modes ? x->left_vectors : NULL, work) != PW_OK) return PW_RETRY;
+  if (x->modes) memcpy (x->left_vectors + cells, im, (size_t)n * sizeof *im);
+  if (eigen_values (n, perturbed, re2, im2, NULL, work) != PW_OK) return PW_RETRY;
+  eigen_shift (n, re, im, re2, im2, EIGEN_ROUND_OFF * most, shift);
   eigen_clean (n, re, im, shift);
   return PW_OK;
 }
@@ -115,16 +115,16 @@ static void eigen_sort (pw_linear *l) {
     }
 }
 
-/* Transforms B, stored as A, by reflections that map the first k vectors of S to the first k unit vectors.  Returns 1
- * if they span an invariant subspace: the lower left block is then 0. */
+/* Transforms B, stored by rows as A, by reflections that map the first k vectors of x->symmetry to the first k unit
+ * vectors.  Returns 1 if they span an invariant subspace: the lower left block is then 0. */
 static int eigen_split (pw_linearisation *x, int k, double *B) {
   int n = x->size;
-  double off = 0, *tau = x->tau, *work = x->x; /* at least n */
+  double off = 0, *tau = x->tau, *work = x->dx; /* at least n */
   if (k == 0 || k > n) return k == 0;
   double size = LAPACKE_dlange_work (LAPACK_COL_MAJOR, 'F', n, n, B, n, work);
-  LAPACKE_dgeqrf_work (LAPACK_COL_MAJOR, n, k, x->S, n, tau, work, n);
-  LAPACKE_dormqr_work (LAPACK_COL_MAJOR, 'L', 'T', n, n, k, x->S, n, tau, B, n, work, n);
-  LAPACKE_dormqr_work (LAPACK_COL_MAJOR, 'R', 'N', n, n, k, x->S, n, tau, B, n, work, n);
+  LAPACKE_dgeqrf_work (LAPACK_COL_MAJOR, n, k, x->symmetry, n, tau, work, n);
+  LAPACKE_dormqr_work (LAPACK_COL_MAJOR, 'L', 'T', n, n, k, x->symmetry, n, tau, B, n, work, n);
+  LAPACKE_dormqr_work (LAPACK_COL_MAJOR, 'R', 'N', n, n, k, x->symmetry, n, tau, B, n, work, n);
   for (int i = k; i < n; i++)
     for (int c = 0; c < k; c++) off = pw_larger_or_nan (off, fabs (B[i * n + c]));
   return off <= PW_LINEAR_SYMMETRIC * size;
@@ -140,7 +140,7 @@ int pw_linear_eigenvalues (pw_linearisation *x, pw_linear *l, pw_error *error) {
     memcpy (B, x->A, cells * sizeof *B);
     k = l->symmetries = 0;
   }
-  memcpy (x->top, B, (size_t)(k * n) * sizeof *B);
+  memcpy (x->upper_rows, B, (size_t)(k * n) * sizeof *B);
   for (int i = k; k > 0 && i < n; i++)
     memmove (B + (size_t)(i - k) * (size_t)(n - k), B + (size_t)i * (size_t)n + k, (size_t)(n - k) * sizeof *B);
   memset (l->rigid, 1, (size_t)k);
@@ -156,8 +156,8 @@ int pw_linear_eigenvalues (pw_linearisation *x, pw_linear *l, pw_error *error) {
 
 /* ---- RK4 ---- */
 
-/* |1 + z + z^2/2 + z^3/6 + z^4/24| <= 1 for z = h mu, a region within |z| < 4 (Hairer & Wanner 1996, section IV.2).  For a
- * growing solution only its frequency counts. */
+/* |1 + z + z^2/2 + z^3/6 + z^4/24| <= 1 for z = h mu, a region within |z| < 4 (Hairer & Wanner 1996, section IV.2).
+ * For a growing solution only its frequency counts. */
 static int rk4_stable (double re, double im, double h) {
   double x = h * fmin (re, 0), y = h * im, u = 1, v = 0;
   for (int k = 4; k > 0; k--) { /* u + i v = 1 + z (u + i v) / k */

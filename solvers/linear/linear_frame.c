@@ -1,9 +1,10 @@
 /* The co-moving frame of a linearisation, symmetries of the system, steadiness of the motion.
  *
- * A frame with the origin r, the velocity u and the angular velocity w sees a body at rest if its velocity is u + w
- * (-(y - r_y), x - r_x) and its acceleration W v = w (-v_y, v_x, 0).  A motion relative to the frame with constant
- * velocity d is also steady if the equations do not depend on it: the spin of a balanced rotor, bodies that drift
- * apart.  In a rotating frame d rotates with it unless it belongs to an angle, so W d counts as an acceleration. */
+ * In a frame with the origin r, the velocity u and the angular velocity w, a body at (x, y) with the velocity v is at
+ * rest if v = u + w (-(y - r_y), x - r_x), and its acceleration is W v = w (-v_y, v_x, 0).  A motion relative to the
+ * frame with constant velocity d is also steady if the equations do not depend on it: the spin of a balanced rotor,
+ * bodies that drift apart.  In a rotating frame d rotates with it unless it belongs to an angle, so W d counts as an
+ * acceleration. */
 #include <lapacke.h>
 #include <math.h>
 #include <string.h>
@@ -17,6 +18,7 @@
  * chosen. */
 static const double LINEAR_STEADY = 1e-6, LINEAR_EXACT = 1e-13;
 
+/* The unit of accelerations. */
 static double linear_unit (const pw_linearisation *x) {
   const pw_scale *s = &x->r->w->scale;
   return s->length / (s->time * s->time);
@@ -24,15 +26,15 @@ static double linear_unit (const pw_linearisation *x) {
 
 /* ---- The frame ---- */
 
-/* Sets the frame's residual: the largest |a - W v| and, for motions relative to the frame, |W d|. */
-static void linear_judge (const pw_linearisation *x, pw_linear_frame *f) {
+/* Computes the frame's residual: the largest |a - W v| and, for motions relative to the frame, |W d|. */
+static void linear_set_residual (const pw_linearisation *x, pw_linear_frame *f) {
   const double *q = x->r->q, *v = x->r->v, *a = x->a, w = f->twist[2];
   double most = 0;
   for (int j = 0; j < 3 * x->r->s->bodies; j += 3) {
-    double dx = v[j] - f->twist[0] + w * (q[j + 1] - f->origin[1]);
-    double dy = v[j + 1] - f->twist[1] - w * (q[j] - f->origin[0]);
+    double relative_x = v[j] - f->twist[0] + w * (q[j + 1] - f->origin[1]);
+    double relative_y = v[j + 1] - f->twist[1] - w * (q[j] - f->origin[0]);
     most = pw_larger_or_nan (most, hypot (a[j] + w * v[j + 1], a[j + 1] - w * v[j]));
-    most = pw_larger_or_nan (most, fabs (w) * hypot (dx, dy));
+    most = pw_larger_or_nan (most, fabs (w) * hypot (relative_x, relative_y));
     most = pw_larger_or_nan (most, fabs (a[j + 2]) * x->r->s->scale.length);
   }
   for (int j = 3 * x->r->s->bodies; j < x->n; j++) most = pw_larger_or_nan (most, fabs (a[j]) * x->r->s->scale.length);
@@ -40,16 +42,16 @@ static void linear_judge (const pw_linearisation *x, pw_linear_frame *f) {
   f->residual = most / linear_unit (x);
 }
 
-/* The frame at body b, at rest or with its twist. */
-static pw_linear_frame linear_try (const pw_linearisation *x, int b, int turning) {
+/* The frame at body b, with its velocity and the angular velocity w. */
+static pw_linear_frame linear_frame_at (const pw_linearisation *x, int b, double w) {
   const double *q = x->r->q + 3 * b, *v = x->r->v + 3 * b;
-  pw_linear_frame f = { .origin = { q[0], q[1] }, .twist = { v[0], v[1], turning ? v[2] : 0 } };
-  linear_judge (x, &f);
+  pw_linear_frame f = { .origin = { q[0], q[1] }, .twist = { v[0], v[1], w } };
+  linear_set_residual (x, &f);
   return f;
 }
 
-/* The frame that turns with the positions of all bodies, if not with one of them: at their mean, with its velocity and the
- * angular velocity that fits theirs. */
+/* The frame that rotates with the positions of all bodies: at their mean, with its velocity and the angular velocity
+ * that fits theirs best. */
 static pw_linear_frame linear_fit (const pw_linearisation *x) {
   const double *q = x->r->q, *v = x->r->v;
   int bodies = x->r->s->bodies;
@@ -64,15 +66,15 @@ static pw_linear_frame linear_fit (const pw_linearisation *x) {
   }
   if (!(square > 0)) return f;
   f.twist[2] = moment / square;
-  linear_judge (x, &f);
+  linear_set_residual (x, &f);
   return f;
 }
 
 void pw_linear_choose_frame (pw_linearisation *x) {
   if (x->r->s->bodies == 0) return;
-  x->frame = linear_try (x, 0, 0);
+  x->frame = linear_frame_at (x, 0, 0);
   for (int b = 0; b < x->r->s->bodies && x->frame.residual > LINEAR_EXACT; b++) {
-    pw_linear_frame f = linear_try (x, b, 1);
+    pw_linear_frame f = linear_frame_at (x, b, x->r->v[3 * b + 2]);
     if (f.residual < x->frame.residual / 2) x->frame = f;
   }
   pw_linear_frame f = linear_fit (x);
@@ -81,34 +83,34 @@ void pw_linear_choose_frame (pw_linearisation *x) {
 
 /* ---- Symmetries ---- */
 
-/* x = the variation by a rigid displacement of the whole: by L along x (k = 0) or y (1), or by 1 rad about the frame's
+/* dx = the variation by a rigid displacement of the whole: by L along x (k = 0) or y (1), or by 1 rad about the frame's
  * origin (2). */
 static void linear_displace (pw_linearisation *x, int k) {
   const pw_system *s = x->r->s;
   const double *q = x->r->q, *v = x->r->v;
-  memset (x->x, 0, 2 * (size_t)x->n * sizeof *x->x);
+  memset (x->dx, 0, 2 * (size_t)x->n * sizeof *x->dx);
   for (int j = 0; j < 3 * s->bodies; j += 3) {
     if (k < 2) {
-      x->x[j + k] = s->scale.length;
+      x->dx[j + k] = s->scale.length;
       continue;
     }
-    x->x[j] = x->frame.origin[1] - q[j + 1];
-    x->x[j + 1] = q[j] - x->frame.origin[0];
-    x->x[j + 2] = 1;
+    x->dx[j] = x->frame.origin[1] - q[j + 1];
+    x->dx[j + 1] = q[j] - x->frame.origin[0];
+    x->dx[j + 2] = 1;
   }
-  if (k == 2) pw_linear_turn (x, 1, v, x->x + x->n);
+  if (k == 2) pw_linear_turn (x, 1, v, x->dx + x->n);
 }
 
-/* The scaled residuals of G dq = 0 and J dv + B dq = 0 for the variation x: `holonomic` + `rank` numbers; y and J must be
- * up to date.  Returns the end of the numbers. */
+/* The scaled residuals of G dq = 0 and J dv + B dq = 0 for the variation dx: `holonomic` + `rank` numbers; `product`
+ * and J must be up to date.  Returns the end of the numbers. */
 static double *linear_violation (pw_linearisation *x, double *out) {
   const pw_system *s = x->r->s;
-  pw_mul_J (x->r->w, x->x, x->c);
-  for (int k = 0; k < x->holonomic; k++) *out++ = x->c[x->row[k]] / x->norm[x->row[k]] / s->scale.length;
-  pw_mul_J (x->r->w, x->x + x->n, x->c);
+  pw_mul_J (x->r->w, x->dx, x->row_scratch);
+  for (int k = 0; k < x->holonomic; k++) *out++ = x->row_scratch[x->row[k]] / x->norm[x->row[k]] / s->scale.length;
+  pw_mul_J (x->r->w, x->dx + x->n, x->row_scratch);
   for (int k = 0; k < x->rank; k++) {
     int i = x->row[k];
-    *out++ = (x->c[i] + x->y[x->n + x->m + i]) / x->norm[i] * x->r->w->scale.time / s->scale.length;
+    *out++ = (x->row_scratch[i] + x->product[x->n + x->m + i]) / x->norm[i] * x->r->w->scale.time / s->scale.length;
   }
   return out;
 }
@@ -117,7 +119,7 @@ void pw_linear_asymmetry (pw_linearisation *x, int turns, double *out) {
   pw_linear_vary (x);
   out = linear_violation (x, out);
   if (turns) pw_linear_turn (x, -1, x->a, x->da);
-  for (int j = 0; j < x->n; j++) out[j] = x->da[j] * pw_as_length (x->r->s, j) / linear_unit (x);
+  for (int j = 0; j < x->n; j++) out[j] = x->da[j] * pw_length_factor (x->r->s, j) / linear_unit (x);
 }
 
 /* Tolerance of symmetries: round-off grows with the derivatives of the accelerations, by 1e-4 of their size. */
@@ -128,14 +130,14 @@ static double linear_tolerance (const pw_linearisation *x) {
   return PW_LINEAR_SYMMETRIC + 1e-4 * PW_LINEAR_SYMMETRIC * most;
 }
 
-/* The null space of the changes, from their singular value decomposition; S becomes a basis of it. */
+/* The null space of the asymmetries, from their singular value decomposition; x->symmetry becomes a basis of it. */
 int pw_linear_symmetries (pw_linearisation *x) {
-  int length = x->holonomic + x->rank + x->n, left = 0;
+  int length = x->holonomic + x->rank + x->n, symmetries = 0;
   double tolerance = linear_tolerance (x), sigma[3], V[9], *work = x->residual + 3 * length;
   if (x->r->s->bodies == 0) return 0;
   for (int k = 0; k < 3; k++) {
     linear_displace (x, k);
-    pw_linear_coordinates (x, x->x, x->x + x->n, 1, x->S + k * x->size);
+    pw_linear_coordinates (x, x->dx, x->dx + x->n, 1, x->symmetry + k * x->size);
     pw_linear_asymmetry (x, k == 2, x->residual + k * length);
   }
   for (int i = 0; i < 3 * length; i++)
@@ -143,12 +145,13 @@ int pw_linear_symmetries (pw_linearisation *x) {
   if (LAPACKE_dgesvd_work (LAPACK_COL_MAJOR, 'N', 'A', length, 3, x->residual, length, sigma, NULL, 1, V, 3, work,
                            15 + length))
     return 0;
-  while (left < 3 && sigma[2 - left] <= tolerance) left++;
+  while (symmetries < 3 && sigma[2 - symmetries] <= tolerance) symmetries++;
   for (int c = 0; c < x->size; c++) {
-    double S[3] = { x->S[c], x->S[x->size + c], x->S[2 * x->size + c] };
-    for (int k = 0; k < left; k++) x->S[k * x->size + c] = V[2 - k] * S[0] + V[5 - k] * S[1] + V[8 - k] * S[2];
+    double S[3] = { x->symmetry[c], x->symmetry[x->size + c], x->symmetry[2 * x->size + c] };
+    for (int k = 0; k < symmetries; k++)
+      x->symmetry[k * x->size + c] = V[2 - k] * S[0] + V[5 - k] * S[1] + V[8 - k] * S[2];
   }
-  return left;
+  return symmetries;
 }
 
 /* ---- Steadiness ---- */
@@ -171,7 +174,7 @@ static void linear_later (const pw_linearisation *x, double time, double *q, dou
 static int linear_agree (const pw_linearisation *x, const double *a, const double *b) {
   double off = 0, most = linear_unit (x);
   for (int j = 0; j < x->n; j++) {
-    double unit = pw_as_length (x->r->s, j);
+    double unit = pw_length_factor (x->r->s, j);
     off = pw_larger_or_nan (off, fabs (a[j] - b[j]) * unit);
     most = fmax (most, fabs (b[j]) * unit);
   }
@@ -180,36 +183,36 @@ static int linear_agree (const pw_linearisation *x, const double *a, const doubl
 
 /* Whether the equations and their linearisation are the same after a time, except for the rotation. */
 static int linear_same (pw_linearisation *x, double time) {
-  double angle = x->frame.twist[2] * time, *q = x->there, *v = q + x->n, *expected = x->z;
+  double angle = x->frame.twist[2] * time, *q = x->later, *v = q + x->n, *expected = x->scratch;
   pw_residuals now;
   linear_later (x, time, q, v);
   if (pw_linear_evaluate (x, x->r->t + time, q, v) != PW_OK) return 0;
   pw_evaluate_residuals (x->r->w, x->r->active, &now);
   if (!(now.position <= LINEAR_STEADY && now.velocity <= LINEAR_STEADY)) return 0;
-  pw_linear_rotate (x, angle, x->a0, expected);
+  pw_linear_rotate (x, angle, x->probe_a, expected);
   if (!linear_agree (x, x->a, expected)) return 0;
-  pw_linear_rotate (x, angle, x->along, x->x);
-  pw_linear_rotate (x, angle, x->along + x->n, x->x + x->n);
+  pw_linear_rotate (x, angle, x->probe, x->dx);
+  pw_linear_rotate (x, angle, x->probe + x->n, x->dx + x->n);
   pw_linear_vary (x);
   double *end = linear_violation (x, x->residual);
   for (double *i = x->residual; i < end; i++)
     if (!(fabs (*i) <= LINEAR_STEADY)) return 0;
-  pw_linear_rotate (x, angle, x->response, expected);
+  pw_linear_rotate (x, angle, x->probe_da, expected);
   return linear_agree (x, x->da, expected);
 }
 
 /* A variation with components along all minimal coordinates, and its accelerations. */
-static void linear_probe (pw_linearisation *x) {
-  memset (x->along, 0, 2 * (size_t)x->n * sizeof *x->along);
+static void linear_set_probe (pw_linearisation *x) {
+  memset (x->probe, 0, 2 * (size_t)x->n * sizeof *x->probe);
   for (int c = 0; c < x->size; c++) {
     double weight = x->r->s->scale.length * pw_irregular (1.7, c + 1);
     pw_linear_tangent (x, c);
-    for (int j = 0; j < 2 * x->n; j++) x->along[j] += weight * x->x[j];
+    for (int j = 0; j < 2 * x->n; j++) x->probe[j] += weight * x->dx[j];
   }
-  memcpy (x->x, x->along, 2 * (size_t)x->n * sizeof *x->x);
+  memcpy (x->dx, x->probe, 2 * (size_t)x->n * sizeof *x->dx);
   pw_linear_vary (x);
-  memcpy (x->response, x->da, (size_t)x->n * sizeof *x->da);
-  memcpy (x->a0, x->a, (size_t)x->n * sizeof *x->a);
+  memcpy (x->probe_da, x->da, (size_t)x->n * sizeof *x->da);
+  memcpy (x->probe_a, x->a, (size_t)x->n * sizeof *x->a);
 }
 
 /* Times at irregular fractions of the span and of T, so that a periodic change is not sampled at its period. */
@@ -219,7 +222,7 @@ pw_steadiness pw_linear_steady (pw_linearisation *x) {
   double span = r->settings.span > 0 ? r->settings.span : r->w->scale.time;
   if (!(x->frame.residual <= LINEAR_STEADY)) return PW_ACCELERATED;
   if (!(pw_next_breakpoint (r->w, 0, r->t) > r->t + span)) return PW_CHANGING;
-  linear_probe (x);
+  linear_set_probe (x);
   int same = linear_same (x, 0.137 * fmin (r->w->scale.time, span));
   for (size_t i = 0; same && i < sizeof fraction / sizeof *fraction; i++) same = linear_same (x, fraction[i] * span);
   return pw_linear_evaluate (x, r->t, r->q, r->v) == PW_OK && same ? PW_STEADY : PW_CHANGING;

@@ -13,7 +13,8 @@
 #include "linear.h"
 #include "rank.h"
 
-/* Eigenvalues closer than this, in units of 1/T, to that of a rigid displacement: its part of the mode is not unique. */
+/* In units of 1/T: if an eigenvalue is closer than this to that of a rigid displacement, the rigid part of its mode is
+ * not unique. */
 static const double MODES_APART = 1e-6;
 
 /* ---- Matrices ---- */
@@ -21,14 +22,15 @@ static const double MODES_APART = 1e-6;
 /* The column of B of signal u of element e of a batch, whose force_u is evaluated in the scratch block. */
 static void modes_input (pw_linearisation *x, const pw_element_batch *k, int e, int u, double *column) {
   const int signals = k->kind->signals, cols = k->b.cols;
-  memset (x->x, 0, 2 * (size_t)x->n * sizeof *x->x);
+  memset (x->dx, 0, 2 * (size_t)x->n * sizeof *x->dx);
   memset (x->da, 0, ((size_t)x->n + 3) * sizeof *x->da);
-  memset (x->c, 0, (size_t)x->m * sizeof *x->c);
+  memset (x->row_scratch, 0, (size_t)x->m * sizeof *x->row_scratch);
   for (int c = 0; c < cols; c++) x->da[pw_global (k, e, c)] += x->newton.block[(e * cols + c) * signals + u];
-  pw_saddle_solve (x->r->saddle, x->da, x->c, x->da, x->z);
-  pw_linear_coordinates (x, x->x, x->da, x->r->s->sources, column);
+  pw_saddle_solve (x->r->saddle, x->da, x->row_scratch, x->da, x->scratch);
+  pw_linear_coordinates (x, x->dx, x->da, x->r->s->sources, column);
 }
 
+/* Fills B; NAN for signals of constraints. */
 static void modes_inputs (pw_linearisation *x, double *B) {
   pw_workspace *w = x->r->w;
   int inputs = x->r->s->sources;
@@ -52,7 +54,7 @@ int pw_linear_matrices (pw_linearisation *x, pw_linear *l) {
   modes_inputs (x, l->B);
   for (int c = 0; c < x->size; c++) {
     pw_linear_tangent (x, c);
-    for (size_t j = 0; j < states; j++) l->basis[j * size + (size_t)c] = x->x[j];
+    for (size_t j = 0; j < states; j++) l->basis[j * size + (size_t)c] = x->dx[j];
   }
   return PW_OK;
 }
@@ -74,27 +76,28 @@ static void modes_rigid_part (const pw_linearisation *x, int k, double complex m
   for (int i = 0; i < k; i++)
     for (int c = 0; c < x->size; c++)
       if (c < k)
-        M[c * k + i] = x->top[i * x->size + c] - (c == i ? mu : 0);
+        M[c * k + i] = x->upper_rows[i * x->size + c] - (c == i ? mu : 0);
       else
-        y[i] -= x->top[i * x->size + c] * y[c];
+        y[i] -= x->upper_rows[i * x->size + c] * y[c];
   LAPACKE_zgesv_work (LAPACK_COL_MAJOR, k, 1, M, k, pivot, y, k);
 }
 
-/* y, after k entries, = the eigenvector j of A22: LAPACK has the conjugate, a left eigenvector of A22^T, since A22 is stored by
- * rows. */
+/* Sets y, after its first k entries, to the eigenvector j of A22.  LAPACK has computed its conjugate, a left
+ * eigenvector of A22^T, since A22 is stored by rows. */
 static void modes_vector (const pw_linearisation *x, int k, int j, double complex *y) {
   int n = x->size - k;
-  double im = x->left[n * n + j];
-  const double *re = x->left + (size_t)(im < 0 ? j - 1 : j) * (size_t)n;
+  double im = x->left_vectors[n * n + j];
+  const double *re = x->left_vectors + (size_t)(im < 0 ? j - 1 : j) * (size_t)n;
   for (int i = 0; i < n; i++) y[k + i] = im == 0 ? re[i] : re[i] - I * (im > 0 ? re[n + i] : -re[n + i]);
 }
 
-/* Transforms y to minimal coordinates by the reflections in S. */
+/* Transforms y to minimal coordinates by the reflections in x->symmetry. */
 static void modes_reflect (pw_linearisation *x, int k, double complex *y) {
-  double work[1], *part = x->top + 3 * (size_t)x->size; /* size */
+  double work[1], *part = x->upper_rows + 3 * (size_t)x->size; /* size */
   for (int imaginary = 0; k > 0 && imaginary < 2; imaginary++) {
     for (int i = 0; i < x->size; i++) part[i] = imaginary ? cimag (y[i]) : creal (y[i]);
-    LAPACKE_dormqr_work (LAPACK_COL_MAJOR, 'L', 'N', x->size, 1, k, x->S, x->size, x->tau, part, x->size, work, 1);
+    LAPACKE_dormqr_work (LAPACK_COL_MAJOR, 'L', 'N', x->size, 1, k, x->symmetry, x->size, x->tau, part, x->size, work,
+                         1);
     for (int i = 0; i < x->size; i++) y[i] = imaginary ? creal (y[i]) + I * part[i] : part[i] + I * cimag (y[i]);
   }
 }
@@ -104,7 +107,7 @@ static void modes_scale (const pw_linearisation *x, double complex *shape) {
   double complex most = 0;
   for (int part = 0; part < 2 && cabs (most) <= 0; part++)
     for (int j = 0; j < x->n; j++) {
-      double complex value = shape[part * x->n + j] * pw_as_length (x->r->s, j) * (part ? x->r->w->scale.time : 1);
+      double complex value = shape[part * x->n + j] * pw_length_factor (x->r->s, j) * (part ? x->r->w->scale.time : 1);
       if (cabs (value) > cabs (most) * (1 + 1e-9)) most = value;
     }
   for (int j = 0; cabs (most) > 0 && j < 2 * x->n; j++) shape[j] /= most;

@@ -30,7 +30,7 @@
 
 /* ---- Derivatives ---- */
 
-/* Rows of the derivatives: -F = (J^T lambda)_q - f_q, -f_v; gamma_q - (J a)_q, gamma_v; B. */
+/* Adds the derivatives with respect to q; v: (J^T lambda)_q - f_q; -f_v; gamma_q - (J a)_q; gamma_v; B. */
 static void linear_put (pw_linearisation *x, const double *v) {
   const int n = x->n, of_J = n + x->m;
   const struct {
@@ -42,20 +42,20 @@ static void linear_put (pw_linearisation *x, const double *v) {
                { PW_GAMMA_Q, n, 0, 1, NULL }, { PW_GAMMA_V, n, n, 1, NULL },  { PW_JW_Q, n, 0, -1, x->a },
                { PW_JW_Q, of_J, 0, 1, v },    { PW_ETA_Q, of_J, 0, -1, NULL } };
   for (size_t i = 0; i < sizeof part / sizeof *part; i++)
-    pw_newton_block (&x->newton, x->r->w, &x->scatter, part[i].block,
-                     &(pw_placement){ .row = part[i].row,
-                                      .col = part[i].col,
-                                      .rows = x->m,
-                                      .factor = part[i].factor,
-                                      .factor_nonholonomic = part[i].factor,
-                                      .w = part[i].w,
-                                      .lambda = x->lambda });
-  pw_newton_signals (&x->newton, x->r->w, &x->scatter, 0, 0, n);
+    pw_newton_add_block (&x->newton, x->r->w, &x->scatter, part[i].block,
+                         &(pw_placement){ .row = part[i].row,
+                                          .col = part[i].col,
+                                          .rows = x->m,
+                                          .factor = part[i].factor,
+                                          .factor_nonholonomic = part[i].factor,
+                                          .direction = part[i].w,
+                                          .lambda = x->lambda });
+  pw_newton_add_signals (&x->newton, x->r->w, &x->scatter, 0, 0, n);
 }
 
 int pw_linear_derivatives (pw_linearisation *x) {
   if (pw_newton_open (&x->newton, x->r->s) != PW_OK) return PW_RESOURCE;
-  pw_scatter_record (&x->scatter);
+  pw_scatter_begin_record (&x->scatter);
   linear_put (x, x->r->v);
   int size = 2 * x->n > x->n + 2 * x->m ? 2 * x->n : x->n + 2 * x->m;
   if (pw_scatter_lay_out (&x->scatter, size, &x->colptr, &x->rowind) != PW_OK) return PW_RESOURCE;
@@ -76,21 +76,22 @@ int pw_linear_evaluate (pw_linearisation *x, double t, const double *q, const do
   int status = pw_run_accelerate (x->r, t, q, v, x->a, x->lambda);
   if (status != PW_OK) return status;
   memset (x->value, 0, ((size_t)x->colptr[2 * x->n] + 1) * sizeof *x->value);
-  pw_scatter_begin (&x->scatter, x->value);
+  pw_scatter_begin_fill (&x->scatter, x->value);
   linear_put (x, v);
   linear_pack (x);
   return PW_OK;
 }
 
 void pw_linear_multiply (pw_linearisation *x) {
-  memset (x->y, 0, ((size_t)x->n + 2 * (size_t)x->m) * sizeof *x->y);
-  for (const pw_linear_entry *e = x->entry; e < x->entry + x->entries; e++) x->y[e->row] += e->value * x->x[e->column];
+  memset (x->product, 0, ((size_t)x->n + 2 * (size_t)x->m) * sizeof *x->product);
+  for (const pw_linear_entry *e = x->entry; e < x->entry + x->entries; e++)
+    x->product[e->row] += e->value * x->dx[e->column];
 }
 
 void pw_linear_vary (pw_linearisation *x) {
   pw_linear_multiply (x);
-  for (int j = 0; j < x->n; j++) x->da[j] = -x->y[j];
-  pw_saddle_solve (x->r->saddle, x->da, x->y + x->n, x->da, x->z);
+  for (int j = 0; j < x->n; j++) x->da[j] = -x->product[j];
+  pw_saddle_solve (x->r->saddle, x->da, x->product + x->n, x->da, x->scratch);
 }
 
 /* ---- Bases ---- */
@@ -115,9 +116,9 @@ double pw_linear_least (pw_linearisation *x) {
   int n = x->n, rank = x->rank;
   double least = INFINITY;
   linear_independent (x);
-  int failed = rank && LAPACKE_dgesvj_work (LAPACK_COL_MAJOR, 'G', 'N', 'N', n, rank, x->Q, n, x->c, 0, NULL, 1, x->z,
-                                            n + x->m + 3) != 0;
-  for (int k = 0; k < rank; k++) least = fmin (least, x->z[0] * x->c[k]);
+  int failed = rank && LAPACKE_dgesvj_work (LAPACK_COL_MAJOR, 'G', 'N', 'N', n, rank, x->Q, n, x->row_scratch, 0, NULL,
+                                            1, x->scratch, n + x->m + 3) != 0;
+  for (int k = 0; k < rank; k++) least = fmin (least, x->scratch[0] * x->row_scratch[k]);
   return rank && !failed ? least : NAN;
 }
 
@@ -125,30 +126,30 @@ void pw_linear_bases (pw_linearisation *x) {
   int n = x->n, rank = x->rank;
   double *tau = x->da;
   linear_independent (x);
-  LAPACKE_dgeqrf_work (LAPACK_COL_MAJOR, n, rank, x->Q, n, tau, x->z, n);
+  LAPACKE_dgeqrf_work (LAPACK_COL_MAJOR, n, rank, x->Q, n, tau, x->scratch, n);
   for (int k = 0; k < rank; k++)
     memcpy (x->R + (size_t)k * (size_t)rank, linear_column (x, k), (size_t)(k + 1) * sizeof *x->R);
-  LAPACKE_dorgqr_work (LAPACK_COL_MAJOR, n, n, rank, x->Q, n, tau, x->z, n);
+  LAPACKE_dorgqr_work (LAPACK_COL_MAJOR, n, n, rank, x->Q, n, tau, x->scratch, n);
 }
 
 /* ---- The reduced system ---- */
 
 /* dv -= J^+ B dq: solves R^T b = B dq, dv -= Q b. */
 static void linear_follow (pw_linearisation *x) {
-  double *b = x->c;
+  double *b = x->row_scratch;
   int stride = linear_stride (x->rank);
-  for (int i = 0; i < x->rank; i++) b[i] = x->y[x->n + x->m + x->row[i]] / x->norm[x->row[i]];
+  for (int i = 0; i < x->rank; i++) b[i] = x->product[x->n + x->m + x->row[i]] / x->norm[x->row[i]];
   LAPACKE_dtrtrs_work (LAPACK_COL_MAJOR, 'U', 'T', 'N', x->rank, 1, x->R, stride, b, stride);
   for (int i = 0; i < x->rank; i++)
-    for (int j = 0; j < x->n; j++) x->x[x->n + j] -= b[i] * linear_column (x, i)[j] / pw_as_length (x->r->s, j);
+    for (int j = 0; j < x->n; j++) x->dx[x->n + j] -= b[i] * linear_column (x, i)[j] / pw_length_factor (x->r->s, j);
 }
 
 void pw_linear_tangent (pw_linearisation *x, int c) {
   int velocity = c >= x->positions, column = velocity ? x->rank + c - x->positions : x->holonomic + c;
   double T = x->r->w->scale.time;
-  memset (x->x, 0, 2 * (size_t)x->n * sizeof *x->x);
+  memset (x->dx, 0, 2 * (size_t)x->n * sizeof *x->dx);
   for (int j = 0; j < x->n; j++)
-    x->x[velocity ? x->n + j : j] = linear_column (x, column)[j] / pw_as_length (x->r->s, j) / (velocity ? T : 1);
+    x->dx[velocity ? x->n + j : j] = linear_column (x, column)[j] / pw_length_factor (x->r->s, j) / (velocity ? T : 1);
   if (velocity) return;
   pw_linear_multiply (x);
   linear_follow (x);
@@ -157,7 +158,7 @@ void pw_linear_tangent (pw_linearisation *x, int c) {
 /* Component of a vector over the coordinates along a column of Q. */
 static double linear_along (const pw_linearisation *x, int column, const double *vector) {
   double sum = 0;
-  for (int j = 0; j < x->n; j++) sum += linear_column (x, column)[j] * vector[j] * pw_as_length (x->r->s, j);
+  for (int j = 0; j < x->n; j++) sum += linear_column (x, column)[j] * vector[j] * pw_length_factor (x->r->s, j);
   return sum;
 }
 

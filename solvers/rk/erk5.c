@@ -1,4 +1,5 @@
-/* erk5: the pair of orders 5 and 4 of Dormand & Prince 1980 (Hairer, Norsett & Wanner 1993, table II.5.2).
+/* erk5: the method of order 5 of Dormand & Prince 1980 with an error estimate of order 4 (Hairer, Norsett & Wanner
+ * 1993, table II.5.2).
  *
  * The seventh stage is the derivative at the new state, evaluated after the projection; it is also the first stage of
  * the next step. */

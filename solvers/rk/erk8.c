@@ -1,12 +1,13 @@
 /* erk8: the method of order 8 of Dormand & Prince with error estimates of orders 5 and 3, DOP853 (Hairer, Norsett &
  * Wanner 1993, Solving Ordinary Differential Equations I, section II.5; coefficients as in their code of that name).
  *
- * Where stability limits the step, these two estimates are not enough.  The estimate of order 5 is blind to a damped
- * motion at h lambda = -5.65 (the stability limit is -6.39), and the estimate of order 3, which divides it, is large
- * for smooth motions too.  Hence a third estimate of order 6, which is the smallest of the three on a smooth motion.
+ * Where stability limits the step, these two estimates are not enough.  With lambda the eigenvalue of a damped motion,
+ * the estimate of order 5 vanishes at h lambda = -5.65 (the stability limit is -6.39), and the estimate of order 3, by
+ * which it is divided, is large for smooth motions too.  Hence a third estimate of order 6, which is the smallest of
+ * the three on a smooth motion.
  *
- * The step control uses the previous error as well: a periodic drive makes errors rise and fall.  On the EzyRoller one
- * step in five is rejected without this memory, about one in a hundred with it. */
+ * The step-size control uses the previous error as well: a periodic drive makes errors rise and fall.  On the EzyRoller
+ * one step in five is rejected without this memory, about one in a hundred with it. */
 #include "rk.h"
 
 /* clang-format off */

@@ -11,10 +11,10 @@
  *   v = w + W^-1 J0^T mu,    K mu = eta - J w,    K = J W^-1 J0^T
  *
  * The next step uses another basis; v, and with it the motion, does not change.  With this W a body made of two welded
- * parts moves like one body, up to round-off, and massless coordinates follow the massive ones.  (Kim & Vanderploeg 1986,
- * QR decomposition for state space representation of constrained mechanical dynamic systems: a basis kept while it is
- * well conditioned; Mani, Haug & Atkinson 1985, Application of singular value decomposition for analysis of mechanical
- * system dynamics.)
+ * parts moves like one body, up to round-off, and massless coordinates follow the massive ones.  (Kim & Vanderploeg
+ * 1986, QR decomposition for state space representation of constrained mechanical dynamic systems: a basis kept while
+ * it is well conditioned; Mani, Haug & Atkinson 1985, Application of singular value decomposition for analysis of
+ * mechanical system dynamics.)
  *
  * At the beginning of the step K is symmetric positive definite, and its factorisation needs no pivoting; it is
  * repeated with pivoting if a pivot becomes small. */
@@ -31,12 +31,12 @@
 static int nullspace_allocate (pw_nullspace *b, const pw_system *s) {
   size_t m = (size_t)b->rows, all = (size_t)s->rows, n = (size_t)s->coords;
   const pw_array array[] = {
-    { &b->reference, n * m }, { &b->K, m * m }, { &b->mu, m }, { &b->eta, all }, { &b->v, n + 3 }
+    { &b->W_inv_J0T, n * m }, { &b->K, m * m }, { &b->mu, m }, { &b->eta, all }, { &b->v, n + 3 }
   };
   b->memory = pw_alloc_arrays (array, sizeof array / sizeof *array);
-  b->place = malloc ((2 * all + 1) * sizeof *b->place);
-  if (b->memory == NULL || b->place == NULL) return PW_RESOURCE;
-  b->pivot = b->place + all;
+  b->active_index = malloc ((2 * all + 1) * sizeof *b->active_index);
+  if (b->memory == NULL || b->active_index == NULL) return PW_RESOURCE;
+  b->pivot = b->active_index + all;
   return PW_OK;
 }
 
@@ -49,13 +49,13 @@ int pw_nullspace_open (pw_nullspace *b, pw_run *r, pw_error *error) {
                     "this scene has %d; use %s+projection",
                     s->model, PW_NULLSPACE_MOST, b->rows, r->method->name);
   if (nullspace_allocate (b, s) != PW_OK) return pw_fail_memory (s, error);
-  for (int i = 0, n = 0; i < s->rows; i++) b->place[i] = r->active && !r->active[i] ? -1 : n++;
+  for (int i = 0, n = 0; i < s->rows; i++) b->active_index[i] = r->active && !r->active[i] ? -1 : n++;
   return PW_OK;
 }
 
 void pw_nullspace_close (pw_nullspace *b) {
   free (b->memory);
-  free (b->place);
+  free (b->active_index);
   *b = (pw_nullspace){ 0 };
 }
 
@@ -64,53 +64,46 @@ void pw_nullspace_close (pw_nullspace *b) {
 /* K_i += J_i (W^-1 J0^T), mu_i -= J_i w, for the entries of row i in columns j to j + width - 1: 3 of a body, or 1. */
 PW_INLINE void nullspace_gather (pw_nullspace *b, int i, int j, int width, const double *J, const double *w, int m) {
   double *restrict K = b->K + i * m;
-  const double *restrict x = b->reference + (size_t)j * (size_t)m, *restrict y = x + m, *restrict z = y + m, a = J[0];
+  const double *restrict x = b->W_inv_J0T + (size_t)j * (size_t)m, *restrict y = x + m, *restrict phi = y + m;
   if (width == 1) {
-    PW_UNROLL for (int n = 0; n < m; n++) K[n] += a * x[n];
-    b->mu[i] -= a * w[j];
+    PW_UNROLL for (int n = 0; n < m; n++) K[n] += J[0] * x[n];
+    b->mu[i] -= J[0] * w[j];
   } else {
-    const double c = J[1], d = J[2];
-    PW_UNROLL for (int n = 0; n < m; n++) K[n] += a * x[n] + c * y[n] + d * z[n];
-    b->mu[i] -= a * w[j] + c * w[j + 1] + d * w[j + 2];
+    const double J_x = J[0], J_y = J[1], J_phi = J[2];
+    PW_UNROLL for (int n = 0; n < m; n++) K[n] += J_x * x[n] + J_y * y[n] + J_phi * phi[n];
+    b->mu[i] -= J_x * w[j] + J_y * w[j + 1] + J_phi * w[j + 2];
   }
 }
 
-/* Assembles K and the right-hand side, or, without w, W^-1 J0^T, from the J last evaluated. */
-PW_INLINE void nullspace_assemble (pw_nullspace *b, const pw_run *r, const double *w, int m) {
+/* Assembles K and mu = eta - J w with the J last evaluated. */
+PW_INLINE void nullspace_assemble (pw_nullspace *b, pw_run *r, const double *w, int m) {
   const pw_system *s = r->s;
+  memset (b->K, 0, (size_t)(m * m) * sizeof *b->K);
+  if (s->rheonomic) pw_evaluate_eta (r->w, b->eta); /* else it stays 0 */
+  for (int i = 0; i < s->rows; i++)
+    if (b->active_index[i] >= 0) b->mu[b->active_index[i]] = b->eta[i];
   for (const pw_element_batch *k = r->w->batch; k < r->w->batch + s->constraints; k++) {
     const int cols = k->b.cols, of_bodies = 3 * k->kind->bodies;
     const double *J = k->J;
     for (int n = 0; n < k->b.count * k->kind->rows; n++, J += cols)
-      for (int i = b->place[k->row + n], c = i < 0 ? cols : 0, width; c < cols; c += width) {
+      for (int i = b->active_index[k->row + n], c = i < 0 ? cols : 0, width; c < cols; c += width) {
         int j = pw_global (k, n / k->kind->rows, c);
         width = c < of_bodies ? 3 : 1;
-        if (w && j < s->coords) nullspace_gather (b, i, j, width, J + c, w, m);
-        for (int x = 0; w == NULL && j < s->coords && x < width; x++)
-          b->reference[(size_t)(j + x) * (size_t)m + (size_t)i] = J[c + x] / s->metric[j + x];
+        if (j < s->coords) nullspace_gather (b, i, j, width, J + c, w, m); /* else: the ground */
       }
   }
 }
 
-/* Sets K to 0 and mu to eta, and assembles. */
-PW_INLINE void nullspace_assemble_system (pw_nullspace *b, pw_run *r, const double *w, int m) {
-  memset (b->K, 0, (size_t)(m * m) * sizeof *b->K);
-  if (r->s->rheonomic) pw_evaluate_eta (r->w, b->eta); /* else it stays 0 */
-  for (int i = 0; i < r->s->rows; i++)
-    if (b->place[i] >= 0) b->mu[b->place[i]] = b->eta[i];
-  nullspace_assemble (b, r, w, m);
-}
-
-/* mu = K^-1 mu without pivoting; K is factorised in place.  Returns 0 if a pivot is not positive, or smaller than `least`
- * times its diagonal entry. */
+/* mu = K^-1 mu without pivoting; K is factorised in place.  Returns 0 if a pivot is not positive, or smaller than
+ * `least` times its diagonal entry. */
 PW_INLINE int nullspace_eliminate (double *restrict K, double *restrict mu, int m) {
-  const double least = 0.01; /* two digits are lost */
+  const double least = 0.01; /* two decimal digits are lost */
   PW_UNROLL for (int p = 0; p < m; p++) {
     double diagonal = K[p * m + p];
     PW_UNROLL for (int i = 0; i < p; i++) {
-      double f = K[p * m + i] * K[i * m + i];
-      PW_UNROLL for (int j = i + 1; j < m; j++) K[p * m + j] -= f * K[i * m + j];
-      mu[p] -= f * mu[i];
+      double factor = K[p * m + i] * K[i * m + i];
+      PW_UNROLL for (int j = i + 1; j < m; j++) K[p * m + j] -= factor * K[i * m + j];
+      mu[p] -= factor * mu[i];
     }
     if (!(K[p * m + p] > least * fabs (diagonal))) return 0;
     K[p * m + p] = 1 / K[p * m + p];
@@ -122,7 +115,8 @@ PW_INLINE int nullspace_eliminate (double *restrict K, double *restrict mu, int 
   return 1;
 }
 
-/* The same by LAPACK, with scaled rows and pivoting.  PW_RETRY if a pivot is round-off: dependent constraint equations. */
+/* The same by LAPACK, with scaled rows and pivoting.  PW_RETRY if a pivot is round-off: dependent constraint
+ * equations. */
 static int nullspace_eliminate_pivoted (pw_nullspace *b) {
   const double least = 1e-13; /* some 500 eps; the largest entry of a row is 1 */
   int m = b->rows;
@@ -136,8 +130,8 @@ static int nullspace_eliminate_pivoted (pw_nullspace *b) {
   }
   for (int i = 0; i < m; i++) /* transpose: LAPACK stores columns */
     for (int j = 0; j < i; j++) {
-      double x = K[i * m + j];
-      K[i * m + j] = K[j * m + i], K[j * m + i] = x;
+      double below = K[i * m + j];
+      K[i * m + j] = K[j * m + i], K[j * m + i] = below;
     }
   LAPACKE_dgetrf_work (LAPACK_COL_MAJOR, m, m, K, m, b->pivot);
   for (int p = 0; p < m; p++)
@@ -148,10 +142,10 @@ static int nullspace_eliminate_pivoted (pw_nullspace *b) {
 
 /* v += W^-1 J0^T mu */
 PW_INLINE void nullspace_add (const pw_nullspace *b, int coords, double *v, int m) {
-  const double *reference = b->reference;
-  for (int j = 0; j < coords; j++, reference += m) {
+  const double *row = b->W_inv_J0T;
+  for (int j = 0; j < coords; j++, row += m) {
     double sum = 0;
-    PW_UNROLL for (int n = 0; n < m; n++) sum += reference[n] * b->mu[n];
+    PW_UNROLL for (int n = 0; n < m; n++) sum += row[n] * b->mu[n];
     v[j] += sum;
   }
 }
@@ -159,16 +153,21 @@ PW_INLINE void nullspace_add (const pw_nullspace *b, int coords, double *v, int 
 /* ---- A step ---- */
 
 int pw_nullspace_begin (pw_nullspace *b, pw_run *r) {
-  int status = pw_update_kinematics (r->w, r->t, r->q, r->v);
+  const pw_system *s = r->s;
+  int status = pw_evaluate_J_at (r->w, r->t, r->q, r->v);
   if (status != PW_OK) return status;
-  pw_evaluate_J (r->w);
-  nullspace_assemble (b, r, NULL, b->rows);
+  for (const pw_element_batch *k = r->w->batch; k < r->w->batch + s->constraints; k++)
+    for (int n = 0; n < k->b.count * k->kind->rows; n++)
+      for (int i = b->active_index[k->row + n], c = i < 0 ? k->b.cols : 0; c < k->b.cols; c++) {
+        int j = pw_global (k, n / k->kind->rows, c);
+        if (j < s->coords) b->W_inv_J0T[j * b->rows + i] = k->J[n * k->b.cols + c] / s->metric[j];
+      }
   return PW_OK;
 }
 
 /* v += W^-1 J0^T mu, with mu found without pivoting; returns 0 if a pivot is too small. */
 PW_INLINE int nullspace_solve (pw_nullspace *b, pw_run *r, double *v, int m) {
-  nullspace_assemble_system (b, r, v, m);
+  nullspace_assemble (b, r, v, m);
   if (!nullspace_eliminate (b->K, b->mu, m)) return 0;
   nullspace_add (b, r->s->coords, v, m);
   return 1;
@@ -178,7 +177,7 @@ PW_INLINE int nullspace_solve (pw_nullspace *b, pw_run *r, double *v, int m) {
 static int nullspace_correct_velocities (pw_nullspace *b, pw_run *r, double *v) {
   const int m = b->rows;
   if (!(m == 4 ? nullspace_solve (b, r, v, 4) : nullspace_solve (b, r, v, m))) {
-    nullspace_assemble_system (b, r, v, m);
+    nullspace_assemble (b, r, v, m);
     if (nullspace_eliminate_pivoted (b) != PW_OK) return PW_RETRY;
     nullspace_add (b, r->s->coords, v, m);
   }
@@ -186,10 +185,8 @@ static int nullspace_correct_velocities (pw_nullspace *b, pw_run *r, double *v) 
 }
 
 int pw_nullspace_velocities (pw_nullspace *b, pw_run *r, double t, const double *q, double *v) {
-  int status = pw_update_kinematics (r->w, t, q, v);
-  if (status != PW_OK) return status;
-  pw_evaluate_J (r->w);
-  return nullspace_correct_velocities (b, r, v);
+  int status = pw_evaluate_J_at (r->w, t, q, v);
+  return status == PW_OK ? nullspace_correct_velocities (b, r, v) : status;
 }
 
 int pw_nullspace_accelerate (pw_run *r, const double *v, double *a, double *lambda) {
@@ -198,23 +195,18 @@ int pw_nullspace_accelerate (pw_run *r, const double *v, double *a, double *lamb
   return status;
 }
 
-/* The energy at (t, q) with the null-space velocities of w. */
-static int nullspace_energy (pw_nullspace *b, pw_run *r, double t, const double *q, const double *w, double *energy) {
-  const pw_system *s = r->s;
-  memcpy (b->v, w, (size_t)s->coords * sizeof *w);
-  int status = pw_nullspace_velocities (b, r, t, q, b->v);
-  if (status == PW_OK) *energy = pw_kinetic (s, b->v) + pw_potential (r->w);
-  return status;
-}
-
-int pw_nullspace_finalise (pw_nullspace *b, pw_projector *p, pw_run *r, double t, double *q, double *v, double *added) {
-  const pw_system *s = r->s;
+int pw_nullspace_finalise (pw_nullspace *b, pw_projector *p, pw_run *r, double t, double *q, double *v,
+                           double *added_energy) {
   int status = PW_OK;
   double before = 0;
-  if (p == NULL || s->holonomic == 0) return pw_nullspace_velocities (b, r, t, q, v);
-  if (added) status = nullspace_energy (b, r, t, q, v, &before);
+  if (p == NULL || r->s->holonomic == 0) return pw_nullspace_velocities (b, r, t, q, v);
+  if (added_energy) { /* before the projection, with the same null-space velocities */
+    memcpy (b->v, v, (size_t)r->s->coords * sizeof *v);
+    status = pw_nullspace_velocities (b, r, t, q, b->v);
+    if (status == PW_OK) before = pw_energy (r, b->v);
+  }
   if (status == PW_OK) status = pw_project_positions (p, r, t, q, v);
   if (status == PW_OK) status = nullspace_correct_velocities (b, r, v);
-  if (status == PW_OK && added) *added += pw_kinetic (s, v) + pw_potential (r->w) - before;
+  if (status == PW_OK && added_energy) *added_energy += pw_energy (r, v) - before;
   return status;
 }

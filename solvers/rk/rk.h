@@ -1,4 +1,4 @@
-/* Explicit Runge-Kutta methods: one driver, a tableau for each. */
+/* Explicit Runge-Kutta methods: functions and options that all of them share, and the coefficients of each. */
 #ifndef PW_RK_H
 #define PW_RK_H
 
@@ -6,15 +6,16 @@
 
 enum { PW_RK_STAGES = 16 };
 
-/* c and b have `stages` entries; A holds the rows of the lower triangle, one after the other. */
+/* The coefficients of a method, named as by Hairer, Norsett & Wanner 1993. */
 typedef struct {
   int stages;
-  const double *c, *A, *b;
-  const double *e;  /* stages + 1: of the error estimate, the last for the new state; NULL: none */
-  const double *e3; /* as e: of a second, cruder estimate, combined as in DOP853; NULL: none */
-  const double *e6; /* as e: of a third, sharper one, with e3 only */
-  double exponent;  /* of the error in the step size: 1 / (order of the estimate + 1) */
-  double memory;    /* of the previous error in the step size (Gustafsson 1991) */
+  const double *c, *b; /* stages: nodes, weights */
+  const double *A;     /* the rows of the lower triangle, one after the other */
+  const double *e;     /* stages + 1: of the error estimate, the last for the new state; NULL: none */
+  const double *e3;    /* as e: of a second, cruder estimate, combined as in DOP853; NULL: none */
+  const double *e6;    /* as e: of a third, sharper one (rk_adapt.c), together with e3 only */
+  double exponent;     /* of the error in the next step size: 1 / (order of the estimate + 1) */
+  double memory;       /* of the previous error in the step size (Gustafsson 1991) */
 } pw_tableau;
 
 extern const pw_tableau pw_erk5_tableau;
@@ -26,21 +27,17 @@ int pw_rk_restart (pw_run *r, pw_error *error);
 void pw_rk_close (pw_run *r);
 void pw_rk_serialise (pw_run *r, pw_archive *a);
 extern const pw_stabilisation pw_rk_stabilisations[];
-extern const pw_option pw_rk_options[]; /* the first one only for tableaus with an error estimate */
+extern const pw_option pw_rk_options[]; /* the first one, `steps`, is only for tableaus with an error estimate */
 
-/* Defines the table of a method with this tableau; then follow the members that methods do not share. */
-#define PW_RK_METHOD(method, tableau, ...)                                       \
-  static int method##_open (pw_run *r, pw_error *error) {                        \
-    return pw_rk_open (r, &tableau, error);                                      \
-  }                                                                              \
-  const pw_method pw_method_##method = { .name = #method,                        \
-                                         .stabilisations = pw_rk_stabilisations, \
-                                         .open = method##_open,                  \
-                                         .advance = pw_rk_advance,               \
-                                         .at = pw_rk_at,                         \
-                                         .restart = pw_rk_restart,               \
-                                         .close = pw_rk_close,                   \
-                                         .serialise = pw_rk_serialise,           \
-                                         __VA_ARGS__ }
+/* Defines pw_method_NAME with this tableau; the remaining arguments initialise the members that methods do not
+ * share. */
+#define PW_RK_METHOD(NAME, tableau, ...)                \
+  static int NAME##_open (pw_run *r, pw_error *error) { \
+    return pw_rk_open (r, &tableau, error);             \
+  }                                                     \
+  const pw_method pw_method_##NAME = { .name = #NAME, .open = NAME##_open, PW_RK_MEMBERS, __VA_ARGS__ }
+#define PW_RK_MEMBERS                                                                                         \
+  .stabilisations = pw_rk_stabilisations, .advance = pw_rk_advance, .at = pw_rk_at, .restart = pw_rk_restart, \
+  .close = pw_rk_close, .serialise = pw_rk_serialise
 
 #endif

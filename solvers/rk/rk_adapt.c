@@ -22,34 +22,38 @@
  *
  * At the stability limit of a damped motion e5 may be blind to the instability while e3 is large for other reasons:
  * without e6 the error may then be many times the tolerances and remain undetected. */
-#include <float.h>
 #include <math.h>
 #include "rk_step.h"
 
-void pw_rk_begin_adaptive (pw_run *r) {
+#define ADAPT_SAFETY 0.9       /* of the factor from one step size to the next */
+#define ADAPT_GROWTH 5.        /* its upper bound */
+#define ADAPT_REDUCTION 0.2    /* its lower bound */
+#define ADAPT_LEAST_ERROR 1e-4 /* remembered: smaller ones are accidental and would predict too large a step */
+
+void pw_rk_reset_step_size (pw_run *r) {
   struct pw_method_data *d = r->data;
   d->h = 0.1 * r->w->scale.time * pow (r->settings.rtol, d->tableau->exponent);
-  d->last_error = 1e-4;
+  d->last_error = ADAPT_LEAST_ERROR;
 }
 
-/* out = sum_j w_j K_j, two entries at a time. */
-static void adapt_estimate (const pw_rk_row *w, double *const *K, int n, double *out) {
+/* out = sum_j weight_j slope_j, two entries at a time: an error estimate from n derivatives at the stages, over h. */
+static void adapt_estimate (const pw_rk_row *e, double *const *slope, int n, double *out) {
   int i = 0;
   for (; i + 1 < n; i += 2) {
     double even = 0, odd = 0;
-    for (int j = 0; j < w->count; j++) {
-      const double *k = K[w->stage[j]];
-      even += w->weight[j] * k[i];
-      odd += w->weight[j] * k[i + 1];
+    for (int j = 0; j < e->count; j++) {
+      const double *from = slope[e->stage[j]];
+      even += e->weight[j] * from[i];
+      odd += e->weight[j] * from[i + 1];
     }
     out[i] = even, out[i + 1] = odd;
   }
   if (i == n) return;
   out[i] = 0;
-  for (int j = 0; j < w->count; j++) out[i] += w->weight[j] * K[w->stage[j]][i];
+  for (int j = 0; j < e->count; j++) out[i] += e->weight[j] * slope[e->stage[j]][i];
 }
 
-/* Reciprocal tolerances of positions and velocities for the step from the current to the new state. */
+/* Reciprocal tolerances of positions and velocities for the step from the state reached to the new state. */
 static void adapt_weigh (const pw_run *r) {
   const struct pw_method_data *d = r->data;
   double *w = d->weight, rtol = r->settings.rtol;
@@ -71,29 +75,30 @@ static double adapt_mean_square (const pw_run *r, const double *eq, const double
   return sum / (2 * coords);
 }
 
-/* Mean square of an estimate before projection, divided by h^2; its errors go to r->q_at and r->v_at. */
+/* Mean square of an estimate before a projection, divided by h^2; stores its errors in r->q_at and r->v_at. */
 static double adapt_whole (pw_run *r, const pw_rk_row *e) {
   struct pw_method_data *d = r->data;
-  adapt_estimate (e, d->V, r->s->coords, r->q_at);
-  adapt_estimate (e, d->A, r->s->coords, r->v_at);
+  adapt_estimate (e, d->stage_v, r->s->coords, r->q_at);
+  adapt_estimate (e, d->stage_a, r->s->coords, r->v_at);
   return adapt_mean_square (r, r->q_at, r->v_at);
 }
 
-/* Mean square of what a projection leaves of the errors in r->q_at and r->v_at, with the share of the whole. */
+/* Mean square of what a projection leaves of the errors in r->q_at and r->v_at, plus a small part of that before the
+ * projection, `whole`; projected: 1 if the new state was. */
 static double adapt_remaining (pw_run *r, double whole, int projected) {
   struct pw_method_data *d = r->data;
-  if (!projected && !d->null_space) return whole;
+  if (!projected && !d->uses_nullspace) return whole;
   if (projected || d->projects_positions) pw_project_error (r, r->saddle, r->q_at, r->s->holonomic);
   pw_project_error (r, r->saddle, r->v_at, r->s->rows);
   return adapt_mean_square (r, r->q_at, r->v_at) + sqrt (r->settings.rtol) * whole;
 }
 
-/* Both for one estimate. */
-static double adapt_one (pw_run *r, const pw_rk_row *e, int projected) {
+/* Mean square of an estimate, without the part that a projection removes, divided by h^2. */
+static double adapt_tangential (pw_run *r, const pw_rk_row *e, int projected) {
   return adapt_remaining (r, adapt_whole (r, e), projected);
 }
 
-/* From the mean squares of estimates to an error; see the top of this file. */
+/* The two errors of which the larger one counts (see the top of this file), from the squares of e3, e5, e6. */
 static double adapt_combine (double e5, double e3) {
   return e5 == 0 ? 0 : e5 / sqrt (e5 + 0.01 * e3);
 }
@@ -105,29 +110,29 @@ static double adapt_guard (double e6, double e5) {
 /* The error of the new state, divided by h. */
 static double adapt_state (pw_run *r, int projected) {
   struct pw_method_data *d = r->data;
-  const pw_tableau *b = d->tableau;
-  d->V[b->stages] = d->v, d->A[b->stages] = d->a;
+  const pw_tableau *tableau = d->tableau;
+  d->stage_v[tableau->stages] = d->v, d->stage_a[tableau->stages] = d->a;
   adapt_weigh (r);
-  double e = adapt_one (r, &d->estimate[0], projected);
-  if (b->e3 == NULL) return sqrt (e);
-  double err = adapt_combine (e, adapt_one (r, &d->estimate[1], projected));
+  double e5 = adapt_tangential (r, &d->estimate[0], projected);
+  if (tableau->e3 == NULL) return sqrt (e5);
+  double err = adapt_combine (e5, adapt_tangential (r, &d->estimate[1], projected));
   double e6 = adapt_whole (r, &d->estimate[2]);
-  if (adapt_guard (e6, e) > err) /* otherwise its projection, which mostly reduces e6, is not needed */
-    err = fmax (err, adapt_guard (adapt_remaining (r, e6, projected), e));
+  if (adapt_guard (e6, e5) > err) /* otherwise its projection, which mostly reduces e6, is not needed */
+    err = fmax (err, adapt_guard (adapt_remaining (r, e6, projected), e5));
   return err;
 }
 
 /* The error of work and losses, which projections do not change, divided by h. */
 static double adapt_ledger (pw_run *r, double h) {
   struct pw_method_data *d = r->data;
-  const pw_tableau *b = d->tableau;
-  double e[3] = { 0 }, tolerance = pw_ledger_tolerance (r, h);
-  pw_ledger_rates (r, d->lambda, d->R[b->stages]);
-  for (int k = 0; k < (b->e3 ? 3 : 1); k++) {
-    adapt_estimate (&d->estimate[k], d->R, r->s->entries, r->ledger_at);
+  const pw_tableau *tableau = d->tableau;
+  double e[3] = { 0 }, tolerance = pw_ledger_tolerance (r, h); /* e: squares of e5, e3, e6 */
+  pw_ledger_rates (r, d->lambda, d->stage_rate[tableau->stages]);
+  for (int k = 0; k < (tableau->e3 ? 3 : 1); k++) {
+    adapt_estimate (&d->estimate[k], d->stage_rate, r->s->entries, r->ledger_at);
     for (int i = 0; i < r->s->entries; i++) e[k] += r->ledger_at[i] * r->ledger_at[i] / (tolerance * tolerance);
   }
-  double err = b->e3 ? fmax (adapt_combine (e[0], e[1]), adapt_guard (e[2], e[0])) : sqrt (e[0]);
+  double err = tableau->e3 ? fmax (adapt_combine (e[0], e[1]), adapt_guard (e[2], e[0])) : sqrt (e[0]);
   return isfinite (err) ? err : 0;
 }
 
@@ -137,8 +142,8 @@ static double adapt_error (pw_run *r, double h, int projected) {
   return r->s->entries > 0 && state <= 1 ? fmax (state, h * adapt_ledger (r, h)) : state;
 }
 
-/* Root mean square of the changes of those accelerations whose velocity changes, at one of the stages, by more than the
- * range in which a force saturates. */
+/* Half the root mean square of the largest changes of accelerations at the stages, in units of the tolerances: of those
+ * accelerations whose velocity changes, at one of the stages, by more than the range in which a force saturates. */
 static double adapt_reversal (const pw_run *r) {
   const struct pw_method_data *d = r->data;
   int n = r->s->coords, stages = d->tableau->stages;
@@ -146,8 +151,8 @@ static double adapt_reversal (const pw_run *r) {
   for (int j = 0; j < n; j++) {
     double range = pw_saturation_range (r, n + j), moved = 0, change = 0;
     for (int i = 1; i <= stages && isfinite (range); i++) {
-      moved = fmax (moved, fabs (d->V[i][j] - r->v[j]));
-      change = fmax (change, fabs (d->A[i][j] - r->a[j]));
+      moved = fmax (moved, fabs (d->stage_v[i][j] - r->v[j]));
+      change = fmax (change, fabs (d->stage_a[i][j] - r->a[j]));
     }
     change *= moved > range ? 0.5 * d->weight[2 * j + 1] : 0;
     sum += change * change;
@@ -155,21 +160,22 @@ static double adapt_reversal (const pw_run *r) {
   return sqrt (sum / (2 * n));
 }
 
-/* The factor of the step size, 0.2 to 5. */
+/* The factor from this step size to the next; see the top of this file. */
 static double adapt_factor (const struct pw_method_data *d, double err) {
-  const pw_tableau *b = d->tableau;
-  if (err == 0) return 5;
-  double f = 0.9 * pow (err, -(b->exponent - 0.75 * b->memory)) * pow (d->last_error, b->memory);
-  return fmin (5, fmax (0.2, f));
+  const pw_tableau *tableau = d->tableau;
+  if (err == 0) return ADAPT_GROWTH;
+  double exponent = tableau->exponent - 0.75 * tableau->memory;
+  double factor = ADAPT_SAFETY * pow (err, -exponent) * pow (d->last_error, tableau->memory);
+  return fmin (ADAPT_GROWTH, fmax (ADAPT_REDUCTION, factor));
 }
 
-/* The step to t1, its error in *err.  If a signal jumps at t1, the estimate uses the derivative just before t1, since the
- * jump is not an error of the step. */
-static int adapt_step (pw_run *r, double h, double t1, int project, double *added, double *err) {
+/* The step to t1; *err: its error, INFINITY if it fails.  If a signal jumps at t1, the estimate uses the derivative
+ * just before t1, since the jump is not an error of the step. */
+static int adapt_step (pw_run *r, double h, double t1, int project, double *added_energy, double *err) {
   struct pw_method_data *d = r->data;
   double before = pw_before_breakpoint (r, t1);
   r->near_singular = 0;
-  int status = pw_rk_step (r, h, t1, project, added);
+  int status = pw_rk_step (r, h, t1, project, added_energy);
   if (status == PW_OK && before < t1) status = pw_run_accelerate (r, before, d->q, d->v, d->a, d->lambda);
   *err = status == PW_OK ? adapt_error (r, h, project) : INFINITY;
   if (r->s->saturates && *err <= 1) *err = hypot (*err, pow (r->settings.rtol, 0.25) * h * adapt_reversal (r));
@@ -178,43 +184,41 @@ static int adapt_step (pw_run *r, double h, double t1, int project, double *adde
   return status;
 }
 
-/* After a step shortened by the requested end, the next one has at least the size planned before; its error is remembered if
- * it was long enough to predict that of the next one. */
-static void adapt_accept (pw_run *r, double h, double t1, double added, double err, double most, int cut) {
+/* After a step that was shortened to end at t_end or a breakpoint, the next one has at least the size planned before;
+ * its error is remembered if it was long enough to predict that of the next one. */
+static void adapt_accept (pw_run *r, double h, double t1, double added_energy, double err, double most_growth,
+                          int shortened) {
   struct pw_method_data *d = r->data;
-  double next = h * fmin (most, adapt_factor (d, err));
-  pw_rk_accept (r, h, t1, added);
+  double next = h * fmin (most_growth, adapt_factor (d, err));
+  pw_rk_accept (r, h, t1, added_energy);
   pw_bound_tolerances (r);
-  d->h = cut ? fmax (next, d->h) : next;
-  if (!cut || h > 0.5 * d->h) d->last_error = fmax (err, 1e-4);
+  d->h = shortened ? fmax (next, d->h) : next;
+  if (!shortened || h > 0.5 * d->h) d->last_error = fmax (err, ADAPT_LEAST_ERROR);
   r->statistics.steps++;
-}
-
-static int adapt_fail (pw_run *r, int status, double h, pw_error *error) {
-  if (status != PW_OK) return pw_rk_fail (r, status, h, error);
-  return pw_fail (error, PW_METHOD, "t = %.6g s: the tolerances require a step below %.3g s", r->t, h);
 }
 
 int pw_rk_advance_adaptive (pw_run *r, double t_end, pw_error *error) {
   struct pw_method_data *d = r->data;
-  double stop = fmin (t_end, r->breakpoint), most = 5;
-  double least = 16 * DBL_EPSILON * fmax (fabs (r->t), 1e-6 * r->w->scale.time);
-  int status = PW_OK, project = d->projects && (r->statistics.steps + 1) % d->every == 0;
+  double stop = fmin (t_end, r->breakpoint), most_growth = ADAPT_GROWTH;
+  int status = PW_OK, project = pw_rk_projects_next (r);
   for (;;) {
-    double t1 = r->t + d->h, added = 0, err;
-    int cut = t1 > stop - 0.01 * d->h;
-    if (cut) t1 = stop;
+    double t1 = r->t + d->h, added_energy = 0, err;
+    int shortened = t1 > stop - 0.01 * d->h;
+    if (shortened) t1 = stop;
     double h = t1 - r->t;
-    if (!cut && !(h > least)) return adapt_fail (r, status, h, error);
-    if (most < 5 && (status = pw_run_check_limits (r, error)) != PW_OK) return status;
-    status = adapt_step (r, h, t1, project, r->settings.ledger ? &added : NULL, &err);
+    if (!shortened && !(h > pw_least_step (r))) {
+      if (status != PW_OK) return pw_rk_fail (r, status, h, error);
+      return pw_fail (error, PW_METHOD, "t = %.6g s: the tolerances require a step below %.3g s", r->t, h);
+    }
+    if (most_growth < ADAPT_GROWTH && (status = pw_run_check_limits (r, error)) != PW_OK) return status;
+    status = adapt_step (r, h, t1, project, r->settings.ledger ? &added_energy : NULL, &err);
     if (status < 0) return pw_rk_fail (r, status, h, error);
     if (err <= 1) {
-      adapt_accept (r, h, t1, added, err, most, cut);
+      adapt_accept (r, h, t1, added_energy, err, most_growth, shortened);
       return PW_OK;
     }
     r->statistics.rejected++;
-    d->h = h * (isfinite (err) ? fmin (0.9, adapt_factor (d, err)) : 0.2);
-    most = 1; /* no growth right after a rejection */
+    d->h = h * (isfinite (err) ? fmin (0.9, adapt_factor (d, err)) : ADAPT_REDUCTION);
+    most_growth = 1; /* no growth right after a rejection */
   }
 }

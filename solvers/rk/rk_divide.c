@@ -1,137 +1,144 @@
 /* Runge-Kutta methods: fixed steps, and samples inside the last step.
  *
  * Fixed steps end at multiples of the step size, at t_end and at breakpoints.  A sample is a step from the beginning of
- * the last one, as accurate as the method.  A stage that lands on a singular configuration spoils either of them.  Then
- * several divisions in two parts are tried until the results of two of them agree. */
+ * the last one, as accurate as the method.  If a stage of a step or sample lands near a singular configuration, its
+ * accelerations are inaccurate.  Then the step is divided in two parts, at several times, until two results agree. */
 #include <math.h>
 #include <string.h>
 #include "dense_output.h"
 #include "rk_step.h"
 
-/* A step to t: state in d->q, ledger in ledger_at; energy: 1 to compute projected_at. */
-static int divide_step (pw_run *r, const pw_rk_begin *from, double t, int project, int energy) {
-  const double h = t - from->t, reached = r->t;
-  double *const q = r->q, *const v = r->v, *const a = r->a, *const rate = r->rate, added = 0;
+/* A step to t from another state than the one reached, in whose place it is put meanwhile: the new state, with the
+ * ledger in ledger_at; with_energy: 1 to compute projected_at. */
+static int divide_step (pw_run *r, const pw_step_start *from, double t, int project, int with_energy) {
+  const double h = t - from->t, t_reached = r->t;
+  double *const q = r->q, *const v = r->v, *const a = r->a, *const rate = r->rate, added_energy = 0;
   const size_t n = (size_t)r->s->coords + 3;
   r->t = from->t, r->q = from->q, r->v = from->q + n, r->a = from->q + 2 * n, r->rate = from->rate;
-  int status = pw_rk_step (r, h, t, project, energy ? &added : NULL);
-  r->t = reached, r->q = q, r->v = v, r->a = a, r->rate = rate;
+  int status = pw_rk_step (r, h, t, project, with_energy ? &added_energy : NULL);
+  r->t = t_reached, r->q = q, r->v = v, r->a = a, r->rate = rate;
   pw_rk_ledger (r, r->ledger_at, from->ledger, h);
-  r->projected_at = from->projected + added;
+  r->projected_at = from->projected + added_energy;
   return status;
 }
 
-/* The same in two parts, by way of the time `by`. */
-static int divide_two_parts (pw_run *r, const pw_rk_begin *from, double by, double t, int project) {
+/* The same in two parts, the first one up to the time `between`. */
+static int divide_two_parts (pw_run *r, const pw_step_start *from, double between, double t, int project) {
   struct pw_method_data *d = r->data;
-  int status = divide_step (r, from, by, project, 1);
+  int status = divide_step (r, from, between, project, 1);
   if (status != PW_OK) return status;
-  d->middle.t = by, d->middle.projected = r->projected_at;
-  memcpy (d->middle.q, d->q, pw_rk_block (r, 0));
-  memcpy (d->middle.ledger, r->ledger_at, (size_t)r->s->entries * sizeof (double));
-  pw_ledger_rates (r, d->lambda, d->middle.rate);
-  return divide_step (r, &d->middle, t, project, 1);
+  d->second.t = between, d->second.projected = r->projected_at;
+  memcpy (d->second.q, d->q, pw_state_length (r->s) * sizeof *d->q);
+  memcpy (d->second.ledger, r->ledger_at, (size_t)r->s->entries * sizeof (double));
+  pw_ledger_rates (r, d->lambda, d->second.rate);
+  return divide_step (r, &d->second, t, project, 1);
 }
 
-/* Tries divisions of the step to t1 in two parts of irregular sizes, the first one longer than to `least`, until two
- * results are closer than `best`; *by: that of the closest, which must be closer than `enough`.  status: of the undivided
- * step, whose result is in d->q.  In a step from the state reached, energy added by projections is an error, too. */
-static int divide (pw_run *r, const pw_rk_begin *from, int status, double t1, int project, double least, double *by) {
+/* Divides the step to t1 at several times after `earliest`, until two successive results differ by less than `best`;
+ * *between: the division with the least difference, which must be below `acceptable`.  status: of the undivided step,
+ * whose result is in d->q.  In a step from the state reached, energy added by projections is an error, too. */
+static int divide (pw_run *r, const pw_step_start *from, int status, double t1, int project, double earliest,
+                   double *between) {
+  /* irregular, since configurations may recur */
   static const double part[] = { 0.382, 0.681, 0.209, 0.847, 0.127, 0.541, 0.943, 0.302, 0.764, 0.891 };
   const struct pw_method_data *d = r->data;
-  double closest = INFINITY, energy = fmax (r->energy_scene, r->exchanged);
-  int known = status == PW_OK, is_step = from->q == r->q; /* otherwise it is a sample */
+  const size_t bytes = pw_state_length (r->s) * sizeof *d->q;
+  double least = INFINITY, energy = fmax (r->scene_energy, r->exchanged);
+  int has_result = status == PW_OK, is_step = from->q == r->q; /* otherwise it is a sample */
   const double best = is_step ? r->limits.agree_best : r->limits.sample_best;
-  const double enough = is_step ? r->limits.agree : r->limits.sample;
-  if (known) memcpy (r->q_at, d->q, pw_rk_block (r, 1));
-  for (size_t i = 0; i < sizeof part / sizeof *part && closest > best; i++) {
+  const double acceptable = is_step ? r->limits.agree : r->limits.sample;
+  if (has_result) memcpy (r->q_at, d->q, bytes);
+  for (size_t i = 0; i < sizeof part / sizeof *part && least > best; i++) {
     double t = from->t + part[i] * (t1 - from->t);
-    if (t <= least) continue;
+    if (t <= earliest) continue;
     if (is_step && pw_run_stop_requested (r)) return PW_STOPPED;
     status = divide_two_parts (r, from, t, t1, project);
     r->statistics.rejected++;
     if (status < 0) return status;
     if (status != PW_OK) continue;
-    double off = pw_rk_distance (r);
-    if (is_step) off = fmax (off, fabs (r->projected_at - from->projected) / energy);
-    if (known && off < closest) closest = off, *by = t;
-    memcpy (r->q_at, d->q, pw_rk_block (r, 1));
-    known = 1;
+    double difference = pw_rk_distance (r);
+    if (is_step) difference = fmax (difference, fabs (r->projected_at - from->projected) / energy);
+    if (has_result && difference < least) least = difference, *between = t;
+    memcpy (r->q_at, d->q, bytes);
+    has_result = 1;
   }
-  return closest <= enough ? PW_OK : PW_RETRY;
+  return least <= acceptable ? PW_OK : PW_RETRY;
 }
 
 /* ---- Samples ---- */
 
 int pw_rk_at (pw_run *r, double t, pw_error *error) {
   struct pw_method_data *d = r->data;
-  const pw_rk_begin *from = &d->last;
+  const pw_step_start *from = &d->last;
   if (t > r->t || t < from->t) return pw_fail_outside (r, from->t, t, error);
   if (t == r->t) {
-    pw_show_reached (r);
+    pw_sample_reached (r);
     return PW_OK;
   }
   const pw_statistics statistics = r->statistics;
-  const double refuse = r->refuse;
-  const int near = r->near_singular;
-  double by;
+  const double refused_sine = r->refused_sine;
+  const int near_singular = r->near_singular;
+  double between;
   r->near_singular = 0;
-  r->refuse = 0;
+  r->refused_sine = 0;
   int status = divide_step (r, from, t, d->projects, r->settings.ledger);
   if (r->near_singular && status >= 0) {
-    status = divide (r, from, status, t, d->projects, from->t, &by);
-    if (status == PW_OK) status = divide_two_parts (r, from, by, t, d->projects);
+    status = divide (r, from, status, t, d->projects, from->t, &between);
+    if (status == PW_OK) status = divide_two_parts (r, from, between, t, d->projects);
   }
-  memcpy (r->q_at, d->q, pw_rk_block (r, 1));
-  r->statistics = statistics, r->refuse = refuse, r->near_singular = near;
+  memcpy (r->q_at, d->q, pw_state_length (r->s) * sizeof *d->q);
+  r->statistics = statistics, r->refused_sine = refused_sine, r->near_singular = near_singular;
   if (status < 0) return pw_fail_signal (t, error);
   return status == PW_OK ? PW_OK : pw_rk_fail (r, status, t - from->t, error);
 }
 
 /* ---- Fixed steps ---- */
 
-/* If the end of the step to t1 lands on a singular configuration, a longer one, up to `stop`, is divided so that the
- * first part ends after t1.  The error of the accelerations there, with which the next step would begin, is that of the
- * state over the sine: `lands` 1: the step to t1 is used only if no longer one can be.  Accepts the first part, which ends at
- * *t. */
-static int fixed_step_around (pw_run *r, int status, int lands, double t1, double stop, int project, double *t) {
-  static const double beyond[] = { 0.62, 2.62, 7.62 };
-  const pw_rk_begin from = { r->t, r->q, r->ledger, r->rate, r->projected };
-  double added = 0;
-  if (!lands) status = divide (r, &from, status, t1, project, r->t, t);
-  if (lands && status == PW_OK) status = PW_RETRY;
+/* Replaces a step to t1 near a singular configuration, which returned `status`, by the first part of a divided one, and
+ * accepts it; *t: its end.
+ *
+ * Accelerations at the end of a step, with which the next one begins, have the error of the state over the sine.  So if
+ * the step ends at the singular configuration (ends_singular: 1), longer ones, up to `stop`, are tried first, whose
+ * first part ends after t1; otherwise they are tried if no division of the step to t1 is accurate. */
+static int fixed_step_around (pw_run *r, int status, int ends_singular, double t1, double stop, int project,
+                              double *t) {
+  static const double beyond[] = { 0.62, 2.62, 7.62 }; /* steps; irregular, since configurations may recur */
+  const pw_step_start from = { .t = r->t, .projected = r->projected, .q = r->q, .ledger = r->ledger, .rate = r->rate };
+  double added_energy = 0;
+  if (!ends_singular) status = divide (r, &from, status, t1, project, r->t, t);
+  if (ends_singular && status == PW_OK) status = PW_RETRY;
   for (size_t i = 0; i < sizeof beyond / sizeof *beyond && status == PW_RETRY && t1 < stop; i++)
     status = divide (r, &from, status, fmin (t1 + beyond[i] * r->settings.step, stop), project, t1, t);
-  if (lands && status == PW_RETRY) status = divide (r, &from, status, t1, project, r->t, t);
-  if (status == PW_OK) status = pw_rk_step (r, *t - r->t, *t, project, &added);
-  if (status == PW_OK) pw_rk_accept (r, *t - r->t, *t, r->settings.ledger ? added : 0);
+  if (ends_singular && status == PW_RETRY) status = divide (r, &from, status, t1, project, r->t, t);
+  if (status == PW_OK) status = pw_rk_step (r, *t - r->t, *t, project, &added_energy);
+  if (status == PW_OK) pw_rk_accept (r, *t - r->t, *t, r->settings.ledger ? added_energy : 0);
   return status;
 }
 
 int pw_rk_advance_fixed (pw_run *r, double t_end, pw_error *error) {
   struct pw_method_data *d = r->data;
-  int whole, project = d->projects && (r->statistics.steps + 1) % d->every == 0;
-  double added = 0, t1 = pw_step_end (r, d->base, d->count, t_end, &whole),
-         h = whole && !d->split ? r->settings.step : t1 - r->t;
-  const int split = d->split;
+  int whole, project = pw_rk_projects_next (r);
+  const int was_off_grid = d->off_grid;
+  double added_energy = 0, t1 = pw_step_end (r, &d->counter, t_end, &whole);
+  double h = whole && !was_off_grid ? r->settings.step : t1 - r->t;
   r->near_singular = 0;
-  int status = pw_rk_step (r, h, t1, project, r->settings.ledger ? &added : NULL);
-  int lands = r->near_singular && r->geometry.sine < r->limits.lands * r->geometry.state_sine;
-  d->split = r->near_singular && !d->split;
+  int status = pw_rk_step (r, h, t1, project, r->settings.ledger ? &added_energy : NULL);
+  int ends_singular =
+      r->near_singular && r->geometry.evaluated_sine < r->limits.ends_singular * r->geometry.checked_sine;
+  d->off_grid = r->near_singular && !was_off_grid;
   double stop = whole ? fmin (t_end, r->breakpoint) : t1, t = t1;
-  if (d->split) status = fixed_step_around (r, status, lands, t1, stop, project, &t);
+  if (d->off_grid) status = fixed_step_around (r, status, ends_singular, t1, stop, project, &t);
   if (r->stopped) {
-    d->split = split;
+    d->off_grid = was_off_grid;
     return PW_STOPPED;
   }
   if (status != PW_OK) return pw_rk_fail (r, status, r->settings.step, error);
   r->statistics.steps++;
-  if (d->split) {
-    if (t > t1) d->count = (long)floor ((t - d->base) / r->settings.step);
+  if (d->off_grid) { /* counted with the next step, which ends at the next multiple */
+    if (t > t1) d->counter.count = (long)floor ((t - d->counter.base) / r->settings.step);
     return PW_OK;
   }
-  pw_rk_accept (r, h, t1, added);
-  d->count++;
-  if (!whole) d->base = t1, d->count = 0;
+  pw_rk_accept (r, h, t1, added_energy);
+  pw_count_step (&d->counter, whole, t1);
   return PW_OK;
 }

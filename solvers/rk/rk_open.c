@@ -36,7 +36,7 @@ const pw_option pw_rk_options[] = {
 
 /* ---- Opening ---- */
 
-static pw_rk_row rk_list_row (const double *weight, int stages) {
+static pw_rk_row rk_nonzero_weights (const double *weight, int stages) {
   pw_rk_row row = { 0 };
   for (int j = 0; j < stages; j++)
     if (weight[j] != 0) {
@@ -47,27 +47,27 @@ static pw_rk_row rk_list_row (const double *weight, int stages) {
 }
 
 static void rk_list_weights (struct pw_method_data *d) {
-  const double *A = d->tableau->A;
-  d->row[0] = rk_list_row (d->tableau->b, d->tableau->stages);
-  for (int i = 1; i < d->tableau->stages; A += i++) d->row[i] = rk_list_row (A, i);
-  if (d->tableau->e) d->estimate[0] = rk_list_row (d->tableau->e, d->tableau->stages + 1);
-  if (d->tableau->e3) d->estimate[1] = rk_list_row (d->tableau->e3, d->tableau->stages + 1);
-  if (d->tableau->e6) d->estimate[2] = rk_list_row (d->tableau->e6, d->tableau->stages + 1);
+  const pw_tableau *tableau = d->tableau;
+  const double *A = tableau->A, *const estimate[] = { tableau->e, tableau->e3, tableau->e6 };
+  d->row[0] = rk_nonzero_weights (tableau->b, tableau->stages);
+  for (int i = 1; i < tableau->stages; A += i++) d->row[i] = rk_nonzero_weights (A, i); /* row i has i entries */
+  for (int k = 0; k < 3; k++)
+    if (estimate[k]) d->estimate[k] = rk_nonzero_weights (estimate[k], tableau->stages + 1);
 }
 
 static int rk_allocate (struct pw_method_data *d, const pw_system *s) {
-  size_t n = (size_t)s->coords + 3, entries = (size_t)s->entries, count = 9;
+  enum { SINGLE = 8 };
+  size_t n = (size_t)s->coords + 3, state = pw_state_length (s), entries = (size_t)s->entries, count = SINGLE;
   int stages = d->tableau->stages;
-  pw_array array[9 + 3 * PW_RK_STAGES] = {
-    { &d->R[stages], entries }, /* at the new state, for the error */
-    { &d->q, 3 * n + (size_t)s->rows }, { &d->weight, 2 * n },       { &d->last.q, 3 * n },
-    { &d->last.ledger, entries },       { &d->last.rate, entries },  { &d->middle.q, 3 * n },
-    { &d->middle.ledger, entries },     { &d->middle.rate, entries }
+  pw_array array[SINGLE + 3 * PW_RK_STAGES] = {
+    { &d->q, state },           { &d->weight, 2 * n },   { &d->last.q, state },          { &d->last.ledger, entries },
+    { &d->last.rate, entries }, { &d->second.q, state }, { &d->second.ledger, entries }, { &d->second.rate, entries }
   };
-  for (int i = 1; i < stages; i++) {
-    array[count++] = (pw_array){ &d->V[i], n };
-    array[count++] = (pw_array){ &d->A[i], n };
-    array[count++] = (pw_array){ &d->R[i], entries };
+  for (int i = 1; i <= stages; i++) {
+    array[count++] = (pw_array){ &d->stage_rate[i], entries };
+    if (i == stages) break; /* velocities and accelerations of the new state are in d->v, d->a */
+    array[count++] = (pw_array){ &d->stage_v[i], n };
+    array[count++] = (pw_array){ &d->stage_a[i], n };
   }
   d->memory = pw_alloc_arrays (array, count);
   if (d->memory == NULL) return PW_RESOURCE;
@@ -80,15 +80,14 @@ int pw_rk_open (pw_run *r, const pw_tableau *tableau, pw_error *error) {
   if (d == NULL) return pw_fail_memory (r->s, error);
   d->tableau = tableau;
   rk_list_weights (d);
-  d->adaptive = tableau->e != NULL && pw_run_option (r, "steps") == 0;
-  d->held = pw_run_option (r, "inputs") != 0;
+  d->holds_signals = pw_run_option (r, "inputs") != 0;
   d->projects = pw_stabilised_by (r, PW_PROJECTION);
-  d->null_space = pw_stabilised_by (r, PW_NULLSPACE);
-  d->projects_positions = d->null_space && pw_run_option (r, "positions") == 0;
+  d->uses_nullspace = pw_stabilised_by (r, PW_NULLSPACE);
+  d->projects_positions = d->uses_nullspace && pw_run_option (r, "positions") == 0;
   d->every = (int)pw_run_option (r, "every");
   if (rk_allocate (d, r->s) != PW_OK) return pw_fail_memory (r->s, error);
   int status = d->projects || d->projects_positions ? pw_projector_open_by_options (&d->projector, r, error) : PW_OK;
-  if (status == PW_OK && d->null_space) status = pw_nullspace_open (&d->nullspace, r, error);
+  if (status == PW_OK && d->uses_nullspace) status = pw_nullspace_open (&d->nullspace, r, error);
   return status == PW_OK ? pw_rk_restart (r, error) : status;
 }
 
@@ -102,19 +101,17 @@ void pw_rk_close (pw_run *r) {
 int pw_rk_restart (pw_run *r, pw_error *error) {
   struct pw_method_data *d = r->data;
   (void)error;
-  d->base = r->t;
-  d->count = 0;
-  d->split = 0;
-  if (d->adaptive) pw_rk_begin_adaptive (r);
-  pw_rk_keep (r);
+  d->counter = (pw_step_counter){ .base = r->t };
+  d->off_grid = 0;
+  if (!pw_fixed_steps (r)) pw_rk_reset_step_size (r);
+  pw_store_start (&d->last, r);
   return PW_OK;
 }
 
 void pw_rk_serialise (pw_run *r, pw_archive *a) {
   struct pw_method_data *d = r->data;
-  pw_archive_bytes (a, &d->base, sizeof d->base);
-  pw_archive_count (a, &d->count);
-  pw_archive_bytes (a, &d->split, sizeof d->split);
+  pw_serialise_counter (&d->counter, a);
+  pw_archive_bytes (a, &d->off_grid, sizeof d->off_grid);
   pw_archive_bytes (a, &d->h, sizeof d->h);
   pw_archive_bytes (a, &d->last_error, sizeof d->last_error);
 }
@@ -122,5 +119,5 @@ void pw_rk_serialise (pw_run *r, pw_archive *a) {
 /* ---- Advancing ---- */
 
 int pw_rk_advance (pw_run *r, double t_end, pw_error *error) {
-  return r->data->adaptive ? pw_rk_advance_adaptive (r, t_end, error) : pw_rk_advance_fixed (r, t_end, error);
+  return pw_fixed_steps (r) ? pw_rk_advance_fixed (r, t_end, error) : pw_rk_advance_adaptive (r, t_end, error);
 }

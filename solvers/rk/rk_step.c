@@ -1,66 +1,73 @@
-/* Explicit Runge-Kutta on q' = v, v' = a(t, q, v).
+/* A step of an explicit Runge-Kutta method with the coefficients A, b on q' = v, v' = a (t, q, v).
  *
- *   q_i = q + h sum_j A_ij v_j,   v_i = v + h sum_j A_ij a_j,   j < i;   new: with b in place of A
+ *   stage i      q_i = q + h sum_j A_ij v_j,   v_i = v + h sum_j A_ij a_j,   j < i
+ *   new state    q + h sum_j b_j v_j,          v + h sum_j b_j a_j
  *
- * The ledger's rates are integrated with the same stages.  After each step the state may be projected; its
- * accelerations are evaluated immediately, as the first stage of the next step, so that they are always available. */
+ * The rates of work and losses are integrated with the same stages.  The new state may be projected.  Its accelerations
+ * are evaluated immediately, as stage 0 of the next step, so that they are always available. */
 #include <math.h>
 #include <string.h>
 #include "rk_step.h"
 #include "unroll.h"
 
-/* Entries i and i + 1 of y + sum_j f_j k_j. */
-PW_INLINE void rk_two (double *restrict out, const double *y, double *const *k, const double *f, int m, long i) {
-  double a = y[i], b = y[i + 1];
-  PW_UNROLL for (int j = 0; j < m; j++) {
-    a += f[j] * k[j][i];
-    b += f[j] * k[j][i + 1];
+/* Entries i and i + 1 of  out = y + sum_j factor_j slope_j. */
+PW_INLINE void rk_two (double *restrict out, const double *y, double *const *slope, const double *factor, int count,
+                       long i) {
+  double sum0 = y[i], sum1 = y[i + 1];
+  PW_UNROLL for (int j = 0; j < count; j++) {
+    sum0 += factor[j] * slope[j][i];
+    sum1 += factor[j] * slope[j][i + 1];
   }
-  out[i] = a;
-  out[i + 1] = b;
+  out[i] = sum0;
+  out[i + 1] = sum1;
 }
 
-/* The current state + h sum_j w_j (V_j, A_j); the arrays have room for one more entry.  m, the number of weights, is a
- * constant in the inlined copies. */
-PW_INLINE void rk_combine_by (const pw_run *r, double *q, double *v, const pw_rk_row *w, double h, int m) {
+/* (q, v) = the state reached + h sum_j weight_j (v_j, a_j), with the weights of a row of the tableau.  Two coordinates
+ * are combined at a time, so the arrays have room for one more.  `count`, that of the weights, is a constant in the
+ * inlined copies. */
+PW_INLINE void rk_combine_by (const pw_run *r, double *q, double *v, const pw_rk_row *row, double h, int count) {
   const struct pw_method_data *d = r->data;
   const double *q0 = r->q, *v0 = r->v;
-  double *V[PW_RK_STAGES], *A[PW_RK_STAGES], f[PW_RK_STAGES];
-  PW_UNROLL for (int j = 0; j < m; j++) V[j] = d->V[w->stage[j]], A[j] = d->A[w->stage[j]], f[j] = h * w->weight[j];
+  double *stage_v[PW_RK_STAGES], *stage_a[PW_RK_STAGES], factor[PW_RK_STAGES];
+  PW_UNROLL for (int j = 0; j < count; j++) {
+    stage_v[j] = d->stage_v[row->stage[j]], stage_a[j] = d->stage_a[row->stage[j]];
+    factor[j] = h * row->weight[j];
+  }
   for (long i = 0, n = r->s->coords; i < n; i += 2) {
-    rk_two (q, q0, V, f, m, i);
-    rk_two (v, v0, A, f, m, i);
+    rk_two (q, q0, stage_v, factor, count, i);
+    rk_two (v, v0, stage_a, factor, count, i);
   }
 }
 
-PW_NOINLINE void rk_combine_any (const pw_run *r, double *q, double *v, const pw_rk_row *w, double h) {
-  rk_combine_by (r, q, v, w, h, w->count);
+PW_NOINLINE void rk_combine_any (const pw_run *r, double *q, double *v, const pw_rk_row *row, double h) {
+  rk_combine_by (r, q, v, row, h, row->count);
 }
 
-static void rk_combine (const pw_run *r, double *q, double *v, const pw_rk_row *w, double h) {
-  if (w->count == 1)
-    rk_combine_by (r, q, v, w, h, 1);
-  else if (w->count == 4)
-    rk_combine_by (r, q, v, w, h, 4);
+static void rk_combine (const pw_run *r, double *q, double *v, const pw_rk_row *row, double h) {
+  if (row->count == 1)
+    rk_combine_by (r, q, v, row, h, 1);
+  else if (row->count == 4)
+    rk_combine_by (r, q, v, row, h, 4);
   else
-    rk_combine_any (r, q, v, w, h);
+    rk_combine_any (r, q, v, row, h);
 }
 
-void pw_rk_ledger (const pw_run *r, double *out, const double *y, double h) {
+void pw_rk_ledger (const pw_run *r, double *end, const double *beginning, double h) {
   const struct pw_method_data *d = r->data;
-  const pw_rk_row *w = &d->row[0];
+  const pw_rk_row *b = &d->row[0];
   for (int i = 0; i < r->s->entries; i++) {
-    double sum = y[i];
-    for (int j = 0; j < w->count; j++) sum += h * w->weight[j] * d->R[w->stage[j]][i];
-    out[i] = sum;
+    double sum = beginning[i];
+    for (int j = 0; j < b->count; j++) sum += h * b->weight[j] * d->stage_rate[b->stage[j]][i];
+    end[i] = sum;
   }
 }
 
-/* Accelerations and rates of the ledger of a stage at the positions d->q. */
-static inline int rk_stage (pw_run *r, double t, double *v, double *a, double *rate) {
+/* Accelerations of a stage at the positions d->q and the velocities v, which the null-space method replaces, and the
+ * rates of the ledger. */
+static inline int rk_evaluate_stage (pw_run *r, double t, double *v, double *a, double *rate) {
   struct pw_method_data *d = r->data;
   int status;
-  if (d->null_space) {
+  if (d->uses_nullspace) {
     status = pw_nullspace_velocities (&d->nullspace, r, t, d->q, v);
     if (status == PW_OK) status = pw_nullspace_accelerate (r, v, a, d->lambda);
   } else {
@@ -78,86 +85,54 @@ static int rk_hold (pw_run *r) {
   return status;
 }
 
-/* 1 if the squares of all entries are finite. */
-static int rk_finite (const pw_run *r, const double *q, const double *v) {
-  double sum = 0;
-  for (int j = 0; j < r->s->coords; j++) sum += q[j] * q[j] + v[j] * v[j];
-  return sum < 1e300;
-}
-
-/* The same as rk_stages, by specialised code: 1; 0 if there is none, or it refuses a stage. */
+/* What rk_stages does, by specialised code: 1; 0 if there is none, or it refuses a stage. */
 static int rk_stages_specialised (pw_run *r, double h) {
   struct pw_method_data *d = r->data;
   double t[PW_RK_STAGES];
-  if (r->specialised == NULL || d->held || d->null_space) return 0;
+  if (r->specialised == NULL || d->holds_signals || d->uses_nullspace) return 0;
   for (int i = 1; i < d->tableau->stages; i++) t[i] = pw_before_breakpoint (r, r->t + d->tableau->c[i] * h);
-  return pw_specialised_stages (
-      r, &(pw_scene_step){ d->tableau->stages, d->row, h, t, r->q, d->V, d->A, d->R, d->q, d->v, d->lambda });
+  return pw_specialised_stages (r, &(pw_scene_step){ d->tableau->stages, d->row, h, t, r->q, d->stage_v, d->stage_a,
+                                                     d->stage_rate, d->q, d->v, d->lambda });
 }
 
-/* Evaluates stages 1, 2, ...; stage 0 is the current state.  Then combines them to the new
- * state.  Returns what pw_run_accelerate returns. */
+/* Evaluates stages 1, 2, ...; stage 0 is the state reached.  Then combines them to the new state.  Returns as
+ * pw_run_accelerate. */
 static int rk_stages (pw_run *r, double h) {
   struct pw_method_data *d = r->data;
-  const pw_tableau *b = d->tableau;
-  d->V[0] = r->v, d->A[0] = r->a, d->R[0] = r->rate;
+  const pw_tableau *tableau = d->tableau;
+  d->stage_v[0] = r->v, d->stage_a[0] = r->a, d->stage_rate[0] = r->rate;
   if (rk_stages_specialised (r, h)) return PW_OK;
-  int status = d->held ? rk_hold (r) : PW_OK;
-  for (int i = 1; i < b->stages && status == PW_OK; i++) {
-    rk_combine (r, d->q, d->V[i], &d->row[i], h);
-    double t = pw_before_breakpoint (r, r->t + b->c[i] * h);
-    status = rk_stage (r, t, d->V[i], d->A[i], d->R[i]);
+  int status = d->holds_signals ? rk_hold (r) : PW_OK;
+  for (int i = 1; i < tableau->stages && status == PW_OK; i++) {
+    rk_combine (r, d->q, d->stage_v[i], &d->row[i], h);
+    double t = pw_before_breakpoint (r, r->t + tableau->c[i] * h);
+    status = rk_evaluate_stage (r, t, d->stage_v[i], d->stage_a[i], d->stage_rate[i]);
   }
-  if (d->held) pw_hold_signals (r->w, 0);
+  if (d->holds_signals) pw_hold_signals (r->w, 0);
   if (status != PW_OK) return status;
   rk_combine (r, d->q, d->v, &d->row[0], h);
-  return rk_finite (r, d->q, d->v) ? PW_OK : PW_RETRY;
+  return pw_is_finite_state (r, d->q, d->v) ? PW_OK : PW_RETRY;
 }
 
-/* Projects the new state and evaluates its accelerations; *added grows by the energy this adds. */
-static int rk_project (pw_run *r, double t, double *added) {
+int pw_rk_step (pw_run *r, double h, double t1, int project, double *added_energy) {
   struct pw_method_data *d = r->data;
-  const pw_system *s = r->s;
-  int status = PW_OK;
-  double before = 0;
-  if (added) {
-    status = pw_update_kinematics (r->w, t, d->q, d->v);
-    before = pw_kinetic (s, d->v) + pw_potential (r->w);
-  }
-  if (status == PW_OK) status = pw_project_state (&d->projector, r, t, d->q, d->v, d->a, d->lambda);
-  if (status == PW_OK && added) *added += pw_kinetic (s, d->v) + pw_potential (r->w) - before;
-  return status;
-}
-
-/* From the state reached to its successor at t1 = t + h, in d->q, d->v, d->a, d->lambda. */
-int pw_rk_step (pw_run *r, double h, double t1, int project, double *added) {
-  struct pw_method_data *d = r->data;
-  int status = d->null_space ? pw_nullspace_begin (&d->nullspace, r) : PW_OK;
+  int status = d->uses_nullspace ? pw_nullspace_begin (&d->nullspace, r) : PW_OK;
   if (status == PW_OK) status = rk_stages (r, h);
   if (status != PW_OK) return status;
-  if (project) return rk_project (r, t1, added);
-  if (!d->null_space) return pw_run_accelerate (r, t1, d->q, d->v, d->a, d->lambda);
-  status =
-      pw_nullspace_finalise (&d->nullspace, d->projects_positions ? &d->projector : NULL, r, t1, d->q, d->v, added);
+  if (project) return pw_project_with_energy (&d->projector, r, t1, d->q, d->v, d->a, d->lambda, added_energy);
+  if (!d->uses_nullspace) return pw_run_accelerate (r, t1, d->q, d->v, d->a, d->lambda);
+  status = pw_nullspace_finalise (&d->nullspace, d->projects_positions ? &d->projector : NULL, r, t1, d->q, d->v,
+                                  added_energy);
   return status == PW_OK ? pw_nullspace_accelerate (r, d->v, d->a, d->lambda) : status;
 }
 
-void pw_rk_keep (pw_run *r) {
-  pw_rk_begin *last = &r->data->last;
-  size_t entries = (size_t)r->s->entries * sizeof (double);
-  last->t = r->t, last->projected = r->projected;
-  memcpy (last->q, r->q, pw_rk_block (r, 0));
-  memcpy (last->ledger, r->ledger, entries);
-  memcpy (last->rate, r->rate, entries);
-}
-
-void pw_rk_accept (pw_run *r, double h, double t1, double added) {
+void pw_rk_accept (pw_run *r, double h, double t1, double added_energy) {
   struct pw_method_data *d = r->data;
-  pw_rk_keep (r);
-  memcpy (r->q, d->q, pw_rk_block (r, 1));
+  pw_store_start (&d->last, r);
+  memcpy (r->q, d->q, pw_state_length (r->s) * sizeof *r->q);
   r->t = t1;
   pw_rk_ledger (r, r->ledger, d->last.ledger, h);
-  r->projected += added;
+  r->projected += added_energy;
   pw_ledger_rates (r, r->lambda, r->rate);
 }
 
@@ -173,20 +148,21 @@ double pw_rk_distance (const pw_run *r) {
 }
 
 int pw_rk_fail (pw_run *r, int status, double h, pw_error *error) {
-  int finite = rk_finite (r, r->data->q, r->data->v) && rk_finite (r, r->q, r->v);
-  int against = (r->data->projects || r->data->projects_positions) && finite ? r->data->projector.against : -1;
+  int finite = pw_is_finite_state (r, r->data->q, r->data->v) && pw_is_finite_state (r, r->q, r->v);
+  int has_projector = r->data->projects || r->data->projects_positions;
+  int contradictory = has_projector && finite ? r->data->projector.contradictory_row : -1;
   char element[120];
   if (status < 0) return pw_fail_signal (r->t, error);
-  if (against >= 0) /* a redundant equation contradicts the others */
+  if (contradictory >= 0)
     return pw_fail (error, PW_METHOD, "t = %.6g s: %s contradicts the other constraints", r->t,
-                    pw_system_row_name (r->s, against, element, sizeof element));
+                    pw_system_row_name (r->s, contradictory, element, sizeof element));
   if (finite && pw_watchdog_near_state (r)) return pw_fail_singular (r, r->t, error);
-  if (!finite && h < 1e-12 * fabs (r->t))
+  if (!finite && h < 1e-12 * fabs (r->t)) /* some 4000 eps */
     return pw_fail (error, PW_METHOD, "t = %.6g s: the next state is not finite, however small the step", r->t);
   return pw_fail (error, PW_METHOD, "t = %.6g s: the step of %.6g s is too large: %s", r->t, h,
-                  r->data->split        ? "near a singular configuration no two divisions of it agree"
-                  : !finite             ? "the state is no longer finite"
-                  : r->data->null_space ? "the basis of the velocities does not stay valid"
-                  : r->data->projects   ? "the projection does not converge"
-                                        : "a stage of it lands in a singular configuration");
+                  r->data->off_grid         ? "near a singular configuration no two divisions of it agree"
+                  : !finite                 ? "the state is no longer finite"
+                  : r->data->uses_nullspace ? "the basis of the velocities does not stay valid"
+                  : r->data->projects       ? "the projection does not converge"
+                                            : "a stage of it lands in a singular configuration");
 }

@@ -7,63 +7,59 @@
 #include <string.h>
 #include "rk_step.h"
 
-/* 1 if the specialised function `steps` does everything that a step of this run needs.  The first steps are recorded
- * one by one (ledger.c). */
-static int several_suits (const pw_run *r) {
+/* 1 if the specialised function `steps` does everything that a step of this run needs.  The ledger records the first
+ * steps one by one (ledger.c). */
+static int several_possible (const pw_run *r) {
   const struct pw_method_data *d = r->data;
-  if (r->method->advance != pw_rk_advance || d == NULL || d->adaptive || d->held || d->null_space || d->split) return 0;
-  if (d->projects && !(d->every == 1 && d->projector.by_mass && !d->projector.alone)) return 0;
+  if (r->method->advance != pw_rk_advance || d == NULL || !pw_fixed_steps (r) || d->holds_signals ||
+      d->uses_nullspace || d->off_grid)
+    return 0;
+  if (d->projects && !(d->every == 1 && d->projector.mass_metric && !d->projector.ignores_inactive)) return 0;
   return pw_specialised_suits (r) && r->redundant == 0 && r->alpha + r->beta == 0 && !r->settings.ledger &&
-         !r->interrupted && r->stalled == 0 && !(r->geometry.saddle && r->geometry.alert) &&
+         !r->interrupted && r->stalled == 0 && !(r->geometry.saddle && r->geometry.singular_ahead) &&
          r->statistics.steps >= PW_CHECK_INTERVAL;
 }
 
-/* The number of whole steps that can be taken at once: before t_end and breakpoints, with the tolerance of pw_step_end;
- * up to the first that reaches t; up to a multiple of PW_CHECK_INTERVAL and the next record of speeds (limits.c); each
- * longer than what counts as stalled (run.c). */
+/* The number of whole steps that can be taken at once: up to t_end and the next breakpoint, with the tolerance of
+ * pw_step_end; up to the first that reaches t; up to a multiple of PW_CHECK_INTERVAL and the next record of speeds
+ * (limits.c); each twice as long as a step that counts as stalled (run.c). */
 static int several_count (const pw_run *r, double t, double t_end) {
   const struct pw_method_data *d = r->data;
-  const double h = r->settings.step, stop = fmin (t_end, r->breakpoint) - 1e-9 * h, tiny = 128 * DBL_EPSILON;
+  const double h = r->settings.step, stop = fmin (t_end, r->breakpoint) - 1e-9 * h, shortest = 128 * DBL_EPSILON;
   int most = PW_CHECK_INTERVAL - (int)(r->statistics.steps % PW_CHECK_INTERVAL), n = 0;
   double reached = r->t;
-  while (n < most && reached < t && reached < t_end && reached - r->settings.t < 2 * r->mark_time) {
-    double next = d->base + (double)(d->count + n + 1) * h;
-    if (!(next <= stop && h > tiny * fabs (next))) break;
+  while (n < most && reached < t && reached < t_end && reached - r->settings.t < 2 * r->speed_record.time) {
+    double next = d->counter.base + (double)(d->counter.count + n + 1) * h;
+    if (!(next <= stop && h > shortest * fabs (next))) break;
     reached = next, n++;
   }
   return n;
 }
 
-static pw_scene_watch several_watch (const pw_run *r) {
-  const pw_watchdog *limit = &r->limits;
+/* The watchdog's data in the form that specialised code uses. */
+static pw_scene_watch several_watchdog (const pw_run *r) {
+  const pw_thresholds *limit = &r->limits;
   const pw_geometry *g = &r->geometry;
-  const int watched = g->saddle != NULL; /* a tree of holonomic joints is never singular */
-  const double length = r->s->scale.length, per = r->w->scale.time * r->w->scale.time;
-  return (pw_scene_watch){
-    .lost = pw_stabilised_by (r, PW_UNSTABILISED) ? limit->lost_unstabilised : limit->lost,
-    .sine = watched ? g->state_sine : INFINITY,
-    .reach = watched ? limit->lipschitz * g->typical : 0,
-    .near_sine = watched ? limit->near * g->typical : 0,
-    .growth = limit->growth,
-    .rank = limit->rank,
-    .regular = limit->regular * g->typical,
-    .drift = limit->drift_near,
-    .no_branch = 0.5 * limit->drift_near * limit->rank * limit->rank, /* 0.5: a margin for round-off */
-    .length = length,
-    .per_length = per / length,
-    .per_angle = per,
-    .moved = g->moved,
-    .reference = r->reference_level,
-  };
+  const double length = r->s->scale.length, time_squared = r->w->scale.time * r->w->scale.time;
+  pw_scene_watch x = { .sine = INFINITY, .moved = g->moved, .reference = r->reference_level };
+  x.lost = pw_stabilised_by (r, PW_UNSTABILISED) ? limit->lost_unstabilised : limit->lost;
+  if (g->saddle) /* else a tree of holonomic joints, never singular */
+    x.sine = g->checked_sine, x.reach = limit->lipschitz * g->largest_sine, x.near_sine = limit->near * g->largest_sine;
+  x.growth = limit->step_growth, x.rank = limit->rank_lost, x.regular = limit->regular * g->largest_sine;
+  x.drift = limit->drift_near;
+  x.no_branch = 0.5 * limit->drift_near * limit->rank_lost * limit->rank_lost; /* 0.5: a margin for round-off */
+  x.length = length, x.per_length = time_squared / length, x.per_angle = time_squared;
+  return x;
 }
 
-static void several_report (pw_run *r, const pw_scene_steps *x) {
+/* Updates the run's data after the steps taken. */
+static void several_record (pw_run *r, const pw_scene_steps *x) {
   struct pw_method_data *d = r->data;
   pw_statistics *s = &r->statistics;
   pw_geometry *g = &r->geometry;
   r->t = x->t;
   d->last.t = x->t0, d->last.projected = r->projected;
-  d->count += x->done;
+  d->counter.count += x->done;
   r->near_singular = 0, r->w->failed = NULL;
   r->reference_level = x->watch.reference, r->previous_norm = x->watch.norm;
   s->steps += x->done;
@@ -71,56 +67,42 @@ static void several_report (pw_run *r, const pw_scene_steps *x) {
   s->velocity = pw_larger (s->velocity, x->watch.velocity), s->jv = pw_larger (s->jv, x->watch.jv);
   pw_specialised_count (r, (long)x->stages * x->done, x->iterations);
   if (g->saddle == NULL) return; /* else as watchdog_follow leaves it where the sine need not be computed */
-  g->step = x->watch.step, g->moved = x->watch.moved, g->alert = 0;
-  g->before = NAN, g->slope = 0, g->crossed = 0;
-  g->t = r->t, g->start_sine = NAN;
-  memcpy (g->q, r->q, (size_t)r->s->coords * sizeof *g->q);
+  g->step_length = x->watch.step, g->moved = x->watch.moved, g->singular_ahead = 0;
+  g->sine_before_checked = NAN, g->sine_slope = 0, g->crossed = 0;
+  g->previous_t = r->t, g->previous_sine = NAN;
+  memcpy (g->previous_q, r->q, (size_t)r->s->coords * sizeof *g->previous_q);
 }
 
-/* Fills x for the next steps up to t and before t_end, two at least, and returns their number; 0: single steps have to
- * be taken. */
+/* Fills x for the next steps, up to the first that reaches t, and returns their number; 0: fewer than two can be taken
+ * at once. */
 static int several_plan (pw_run *r, double t, double t_end, pw_scene_steps *x) {
   struct pw_method_data *d = r->data;
-  int count = several_suits (r) ? several_count (r, t, t_end) : 0;
+  int count = several_possible (r) ? several_count (r, t, t_end) : 0;
   if (count < 2) return 0;
-  *x = (pw_scene_steps){ .count = count,
-                         .project = d->projects,
-                         .stages = d->tableau->stages,
-                         .row = d->row,
-                         .c = d->tableau->c,
-                         .h = r->settings.step,
-                         .base = d->base,
-                         .number = d->count,
-                         .t = r->t,
-                         .state = r->q,
-                         .state0 = d->last.q,
-                         .ledger = r->ledger,
-                         .ledger0 = d->last.ledger,
-                         .rate = r->rate,
-                         .rate0 = d->last.rate,
-                         .V = d->V,
-                         .A = d->A,
-                         .R = d->R,
-                         .configuration = r->w->configuration,
-                         .J = r->w->J,
-                         .watch = several_watch (r) };
+  *x = (pw_scene_steps){ .count = count, .project = d->projects, .watch = several_watchdog (r) };
+  x->stages = d->tableau->stages, x->row = d->row, x->c = d->tableau->c;
+  x->h = r->settings.step, x->base = d->counter.base, x->number = d->counter.count;
+  x->t = r->t, x->state = r->q, x->ledger = r->ledger, x->rate = r->rate;
+  x->state0 = d->last.q, x->ledger0 = d->last.ledger, x->rate0 = d->last.rate;
+  x->V = d->stage_v, x->A = d->stage_a, x->R = d->stage_rate;
+  x->configuration = r->w->configuration, x->J = r->w->J;
   pw_specialised_scale (r);
   return count;
 }
 
-/* Makes the result the state reached.  Errors: PW_METHOD. */
+/* Makes the result of the steps the state reached.  Errors: PW_METHOD. */
 static int several_finish (pw_run *r, const pw_scene_steps *x, pw_error *error) {
   int status = PW_OK;
   if (r->s->coords > 3 * r->s->bodies) pw_point_to_internal (r->w, r->q, r->v);
   if (x->done > 0) {
-    several_report (r, x);
+    several_record (r, x);
     pw_saddle_postpone (r->saddle, PW_SCENE_PIVOT);
   }
   /* A step that was refused has left its own configurations and J. */
   if (x->done < x->count && pw_evaluate_J_at (r->w, r->t, r->q, r->v) != PW_OK) status = pw_fail_signal (r->t, error);
   if (x->done > 0 && status == PW_OK) {
     status = pw_run_check_resolution (r, error);
-    if (status == PW_OK) pw_ledger_note (r);
+    if (status == PW_OK) pw_ledger_record (r);
   }
   return pw_run_annotate_error (r, status, error);
 }
@@ -138,34 +120,29 @@ int pw_run_advance_towards (pw_run *r, double t, double t_end, pw_error *error) 
 
 /* ---- Several runs ---- */
 
-/* If half of the lanes are empty, runs are faster one after the other. */
-static int several_lanes_pay (int used, int lanes) {
-  return 2 * used > lanes;
-}
-
-/* Runs whose next steps can be in lanes together: those with the step size and method of the first. */
+/* Runs whose next steps can be taken together: those with the step size and method of the first. */
 typedef struct {
   pw_run *const *run;
-  int n, which[PW_LANES_MOST];
-  pw_scene_steps steps[PW_LANES_MOST];
+  int used, index[PW_LANES_MOST];      /* lanes with a run; the index of each lane's run */
+  pw_scene_steps steps[PW_LANES_MOST]; /* of each lane */
 } several_lanes;
 
 /* Plans the next steps of run i, if it can share lanes with the first. */
 static void several_add (several_lanes *x, int i, double t_end) {
-  const pw_run *first = x->n > 0 ? x->run[x->which[0]] : NULL, *r = x->run[i];
+  const pw_run *first = x->used > 0 ? x->run[x->index[0]] : NULL, *r = x->run[i];
   if (first && (r->method != first->method || r->stabilisation != first->stabilisation ||
                 r->settings.step != first->settings.step))
     return;
-  if (several_plan (x->run[i], t_end, t_end, &x->steps[x->n]) > 0) x->which[x->n++] = i;
+  if (several_plan (x->run[i], t_end, t_end, &x->steps[x->used]) > 0) x->index[x->used++] = i;
 }
 
-/* Empty lanes repeat the first run. */
+/* Takes the steps of all lanes; empty lanes repeat the first run. */
 static void several_take (several_lanes *x, const pw_specialised_lanes *code, void *memory) {
   pw_scene_steps *steps[PW_LANES_MOST];
   pw_scene *scene[PW_LANES_MOST];
   for (int k = 0; k < code->lanes; k++) {
-    if (k >= x->n) x->steps[k] = x->steps[0], x->which[k] = x->which[0];
-    steps[k] = &x->steps[k], scene[k] = x->run[x->which[k]]->scene;
+    if (k >= x->used) x->steps[k] = x->steps[0], x->index[k] = x->index[0];
+    steps[k] = &x->steps[k], scene[k] = x->run[x->index[k]]->scene;
   }
   code->steps (scene, steps, memory);
 }
@@ -182,10 +159,10 @@ void pw_runs_advance (pw_run *const *runs, int count, double t_end, const pw_spe
     else
       several_add (&x, i, t_end);
   }
-  if (x.n > 0 && several_lanes_pay (x.n, code->lanes)) {
+  if (x.used > 0 && 2 * x.used > code->lanes) { /* with half of them empty, one run after the other is faster */
     several_take (&x, code, memory);
-    for (int k = 0; k < x.n; k++) {
-      int i = x.which[k];
+    for (int k = 0; k < x.used; k++) {
+      int i = x.index[k];
       status[i] = several_finish (runs[i], &x.steps[k], &error[i]);
       done[i] = x.steps[k].done > 0 || status[i] != PW_OK;
     }

@@ -1,4 +1,4 @@
-/* For programs in other languages: samples in rows of an array, an input that they set, layouts of structures. */
+/* For programs in other languages: samples in rows of an array, signals whose value they set, layouts of structures. */
 #include <string.h>
 #include "method.h"
 #include "pinwheel-analysis.h"
@@ -15,16 +15,16 @@ static int record_sample (pw_run *r, double t, double *rows, long *recorded, pw_
   pw_sample x;
   int status = pw_run_sample (r, t, &x, error);
   if (status != PW_OK) return status;
-  const double head[PW_RECORD_STATES] = { x.t,    x.position, x.velocity,   x.kinetic, x.potential,
-                                          x.work, x.loss,     x.projection, x.balance };
+  const double before_states[PW_RECORD_STATES] = { x.t,    x.position, x.velocity,   x.kinetic, x.potential,
+                                                   x.work, x.loss,     x.projection, x.balance };
   double *row = rows + (*recorded)++ * pw_run_record_width (r);
-  memcpy (row, head, sizeof head);
+  memcpy (row, before_states, sizeof before_states);
   row += PW_RECORD_STATES;
   memcpy (row, x.q, n * sizeof *row);
   memcpy (row + n, x.v, n * sizeof *row);
   memcpy (row + 2 * n, x.a, n * sizeof *row);
   row += 3 * n;
-  for (int i = 0; i < r->s->rows; i++) row[i] = 0 - x.lambda[i];
+  for (int i = 0; i < r->s->rows; i++) row[i] = 0 - x.lambda[i]; /* reactions; no negative zeros */
   if (x.ledger) memcpy (row + r->s->rows, x.ledger, (size_t)r->s->entries * sizeof *row);
   return PW_OK;
 }

@@ -6,13 +6,13 @@
 #include "dense_output.h"
 #include "util.h"
 
-int pw_dense_output_open (pw_dense_output *b, pw_run *r, int velocities, pw_error *error) {
-  size_t entries = (size_t)r->s->entries;
-  *b = (pw_dense_output){ .t0 = r->t, .velocities = velocities };
-  const pw_array array[] = { { &b->q0, pw_state_length (r->s) }, { &b->ledger0, entries }, { &b->rate0, entries } };
+int pw_dense_output_open (pw_dense_output *b, pw_run *r, pw_dense_projection projection, pw_error *error) {
+  size_t state = pw_state_length (r->s), entries = (size_t)r->s->entries;
+  *b = (pw_dense_output){ .start.t = r->t, .projection = projection };
+  const pw_array array[] = { { &b->start.q, state }, { &b->start.ledger, entries }, { &b->start.rate, entries } };
   b->memory = pw_alloc_arrays (array, sizeof array / sizeof *array);
   if (b->memory == NULL) return pw_fail_memory (r->s, error);
-  return velocities < 0 ? PW_OK : pw_projector_open (&b->projector, r, NULL, NULL, error);
+  return projection == PW_DENSE_UNPROJECTED ? PW_OK : pw_projector_open (&b->projector, r, NULL, NULL, error);
 }
 
 void pw_dense_output_close (pw_dense_output *b) {
@@ -20,29 +20,32 @@ void pw_dense_output_close (pw_dense_output *b) {
   free (b->memory);
 }
 
-void pw_dense_output_keep (pw_dense_output *b, const pw_run *r) {
+void pw_store_start (pw_step_start *x, const pw_run *r) {
   size_t entries = (size_t)r->s->entries * sizeof (double);
-  b->t0 = r->t;
-  memcpy (b->q0, r->q, pw_state_length (r->s) * sizeof *r->q);
-  memcpy (b->ledger0, r->ledger, entries);
-  memcpy (b->rate0, r->rate, entries);
+  x->t = r->t, x->projected = r->projected;
+  memcpy (x->q, r->q, pw_state_length (r->s) * sizeof *r->q);
+  memcpy (x->ledger, r->ledger, entries);
+  memcpy (x->rate, r->rate, entries);
 }
 
-void pw_dense_output_count (pw_dense_output *b, pw_run *r) {
+void pw_dense_output_integrate_ledger (pw_dense_output *b, pw_run *r) {
   pw_ledger_rates (r, r->lambda, r->rate);
-  for (int i = 0; i < r->s->entries; i++) r->ledger[i] += 0.5 * (r->t - b->t0) * (b->rate0[i] + r->rate[i]);
+  for (int i = 0; i < r->s->entries; i++) r->ledger[i] += 0.5 * (r->t - b->start.t) * (b->start.rate[i] + r->rate[i]);
 }
 
-/* Cubic Hermite interpolation of y with slopes s at x in [0, 1], for a step of size h. */
-static double dense_hermite (double x, double h, double y0, double s0, double y1, double s1) {
-  double up = x * x * (3 - 2 * x);
-  return y0 + up * (y1 - y0) + h * x * (1 - x) * ((1 - x) * s0 - x * s1);
+/* Cubic Hermite interpolation at x in [0, 1] in a step of size h: values y0, y1 and derivatives dy0, dy1 at its
+ * ends. */
+static double dense_hermite (double x, double h, double y0, double dy0, double y1, double dy1) {
+  double blend = x * x * (3 - 2 * x);
+  return y0 + blend * (y1 - y0) + h * x * (1 - x) * ((1 - x) * dy0 - x * dy1);
 }
 
-static int dense_inside (pw_dense_output *b, pw_run *r, double t) {
+static int dense_interpolate (void *dense_output, pw_run *r, double t) {
+  pw_dense_output *b = dense_output;
+  const pw_step_start *start = &b->start;
   const pw_system *s = r->s;
-  const double *q0 = b->q0, *v0 = q0 + (r->v - r->q), *a0 = q0 + (r->a - r->q), *lambda0 = q0 + (r->lambda - r->q);
-  double h = r->t - b->t0, x = (t - b->t0) / h;
+  const double *q0 = start->q, *v0 = q0 + (r->v - r->q), *a0 = q0 + (r->a - r->q), *lambda0 = q0 + (r->lambda - r->q);
+  double h = r->t - start->t, x = (t - start->t) / h;
   for (int j = 0; j < s->coords; j++) {
     r->q_at[j] = dense_hermite (x, h, q0[j], v0[j], r->q[j], r->v[j]);
     r->v_at[j] = dense_hermite (x, h, v0[j], a0[j], r->v[j], r->a[j]);
@@ -50,10 +53,15 @@ static int dense_inside (pw_dense_output *b, pw_run *r, double t) {
   }
   for (int i = 0; i < s->rows; i++) r->lambda_at[i] = (1 - x) * lambda0[i] + x * r->lambda[i];
   for (int i = 0; i < s->entries; i++)
-    r->ledger_at[i] = b->ledger0[i] + h * x * (b->rate0[i] + 0.5 * x * (r->rate[i] - b->rate0[i]));
-  if (b->velocities < 0) return pw_evaluate_J_at (r->w, t, r->q_at, r->v_at);
+    r->ledger_at[i] = start->ledger[i] + h * x * (start->rate[i] + 0.5 * x * (r->rate[i] - start->rate[i]));
+  if (b->projection == PW_DENSE_UNPROJECTED) return pw_evaluate_J_at (r->w, t, r->q_at, r->v_at);
   int status = pw_project_positions (&b->projector, r, t, r->q_at, r->v_at);
-  return status == PW_OK && b->velocities ? pw_project_velocities (&b->projector, r, r->v_at) : status;
+  if (status != PW_OK || b->projection == PW_DENSE_POSITIONS) return status;
+  return pw_project_velocities (&b->projector, r, r->v_at);
+}
+
+int pw_dense_output_at (pw_dense_output *b, pw_run *r, double t, pw_error *error) {
+  return pw_sample_last_step (r, b->start.t, t, dense_interpolate, b, error);
 }
 
 int pw_fail_outside (const pw_run *r, double t0, double t, pw_error *error) {
@@ -62,20 +70,21 @@ int pw_fail_outside (const pw_run *r, double t0, double t, pw_error *error) {
   return pw_fail (error, PW_INPUT, "t = %.17g s lies outside the last step, %.17g to %.17g s", t, t0, r->t);
 }
 
-int pw_dense_output_at (pw_dense_output *b, pw_run *r, double t, pw_error *error) {
-  if (t > r->t || t < b->t0) return pw_fail_outside (r, b->t0, t, error);
+int pw_sample_last_step (pw_run *r, double t0, double t, pw_interpolate *interpolate, void *method, pw_error *error) {
+  if (t > r->t || t < t0) return pw_fail_outside (r, t0, t, error);
   if (t == r->t) {
-    pw_show_reached (r);
+    pw_sample_reached (r);
     return PW_OK;
   }
-  pw_statistics keep = r->statistics;
-  int status = dense_inside (b, r, t);
-  r->statistics = keep;
+  const pw_statistics statistics = r->statistics;
+  int status = interpolate (method, r, t);
+  r->statistics = statistics;
+  r->projected_at = r->projected;
   if (status == PW_OK) return PW_OK;
   if (status == PW_METHOD) return pw_fail_signal (t, error);
   if (r->near_singular) return pw_fail_singular (r, t, error);
   return pw_fail (error, PW_METHOD,
                   "t = %.6g s: no state near the interpolated one satisfies the constraints; "
                   "the step of %.6g s may be too large",
-                  t, r->t - b->t0);
+                  t, r->t - t0);
 }

@@ -1,32 +1,45 @@
-/* Dense output of a one-step method: states inside the last step, from its two ends. */
+/* Dense output of the one-step methods: states inside the last step, from the states at its ends. */
 #ifndef PW_DENSE_OUTPUT_H
 #define PW_DENSE_OUTPUT_H
 
 #include "method.h"
 
+/* The state at the beginning of a step. */
 typedef struct {
-  double t0;                    /* the beginning of the last step */
-  double *q0, *ledger0, *rate0; /* the state there, laid out as in pw_run */
-  int velocities;               /* 1: project velocities; 0: positions only; -1: neither */
-  pw_projector projector;       /* unless velocities is -1 */
+  double t, projected;       /* as in pw_run */
+  double *q, *ledger, *rate; /* as in pw_run, too: v, a and lambda follow q at the same distances */
+} pw_step_start;
+
+/* Stores the state reached. */
+void pw_store_start (pw_step_start *x, const pw_run *r);
+
+/* What is projected onto the constraints inside a step. */
+typedef enum { PW_DENSE_UNPROJECTED, PW_DENSE_POSITIONS, PW_DENSE_POSITIONS_AND_VELOCITIES } pw_dense_projection;
+
+typedef struct {
+  pw_step_start start; /* of the last step */
+  pw_dense_projection projection;
+  pw_projector projector; /* unless the projection is PW_DENSE_UNPROJECTED */
   char *memory;
 } pw_dense_output;
 
-/* velocities: as in pw_dense_output.  Errors: PW_RESOURCE. */
-int pw_dense_output_open (pw_dense_output *b, pw_run *r, int velocities, pw_error *error);
+/* Errors: PW_RESOURCE. */
+int pw_dense_output_open (pw_dense_output *b, pw_run *r, pw_dense_projection projection, pw_error *error);
 void pw_dense_output_close (pw_dense_output *b);
 
-/* Stores the state reached as the beginning of a step. */
-void pw_dense_output_keep (pw_dense_output *b, const pw_run *r);
-
-/* Integrates the ledger to the end of the step by the trapezoidal rule; kinematics and r->lambda must be up to date
- * there. */
-void pw_dense_output_count (pw_dense_output *b, pw_run *r);
+/* Integrates the ledger over the last step by the trapezoidal rule, with kinematics and r->lambda of its end. */
+void pw_dense_output_integrate_ledger (pw_dense_output *b, pw_run *r);
 
 /* Reports that t is outside the last step, which begins at t0 (NaN: unknown).  PW_INPUT. */
 int pw_fail_outside (const pw_run *r, double t0, double t, pw_error *error);
 
-/* A method's `at`: the state at t in the run's sample arrays, with kinematics and J evaluated. */
+/* Computes the state at t inside the last step, in the run's sample arrays, with kinematics and J evaluated.  Returns
+ * as pw_project_positions. */
+typedef int pw_interpolate (void *method, pw_run *r, double t);
+
+/* A method's `at`: the state at t in the sample arrays; inside the last step, which begins at t0, by `interpolate`,
+ * whose evaluations do not count in the statistics. */
+int pw_sample_last_step (pw_run *r, double t0, double t, pw_interpolate *interpolate, void *method, pw_error *error);
 int pw_dense_output_at (pw_dense_output *b, pw_run *r, double t, pw_error *error);
 
 #endif

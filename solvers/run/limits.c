@@ -1,9 +1,9 @@
 /* Limits that end a run: the caller's request, the number of attempted steps, coordinates too large for double
  * precision to resolve the scene.  Unbounded growth of velocities is reported.
  *
- * With the unit u of a coordinate (L, or 1 rad) and the round-off eps, q has an error of eps |q|.  From eps |q| =
- * 0.01 u on, round-off alone violates a constraint by the residual that counts as lost (1e-2, scaled), and turns
- * forces as much.
+ * With the unit u of a coordinate (L, or 1 rad) and the round-off eps, q has an error of eps |q|.  From eps |q| = 0.01
+ * u on, round-off alone violates a constraint by a residual with which it counts as lost (1e-2, scaled), and changes
+ * directions of forces by 0.01 rad.
  *
  * A constant torque or force that nothing opposes accelerates a scene from rest to the speed N u/T in the time N T (T:
  * the time scale of its initial accelerations), and turns it by N^2/2.  Growth beyond N = 1e3, some 80,000 turns,
@@ -13,11 +13,11 @@
 #include <stdio.h>
 #include "method.h"
 
-#define LIMITS_RESOLVED 1e-2 /* of the unit: eps |q| beyond which a run fails */
+#define LIMITS_RESOLVED 1e-2 /* in u: error eps |q| beyond which a run fails */
 #define LIMITS_FAST 1e3      /* in u / T: speeds beyond which growth is reported */
 #define LIMITS_GROWTH 0.25   /* exponent p of t^p above which a velocity counts as growing */
 
-/* The largest velocity at the state reached, in units of the scene; *state: index of that velocity. */
+/* The largest velocity at the state reached, in u / T; *state: its index among the states. */
 static double limits_speed (const pw_run *r, int *state) {
   const pw_system *s = r->s;
   double most = 0;
@@ -31,17 +31,19 @@ static double limits_speed (const pw_run *r, int *state) {
 
 double pw_run_growth (const pw_run *r, int *state, double *power) {
   double now = limits_speed (r, state), span = r->t - r->settings.t;
-  *power = r->before_time > 0 && r->before_speed > 0 ? log (now / r->before_speed) / log (span / r->before_time) : 0;
+  *power = r->earlier_record.time > 0 && r->earlier_record.speed > 0
+               ? log (now / r->earlier_record.speed) / log (span / r->earlier_record.time)
+               : 0;
   return now > LIMITS_FAST && *power > LIMITS_GROWTH ? now : 0;
 }
 
 /* Records the largest speed whenever the elapsed time has doubled.  Returns 1 at such a time. */
-static int limits_mark (pw_run *r) {
+static int limits_record_speed (pw_run *r) {
   int state;
   double span = r->t - r->settings.t;
-  if (span < 2 * r->mark_time) return 0;
-  r->before_time = r->mark_time, r->before_speed = r->mark_speed;
-  r->mark_time = span, r->mark_speed = limits_speed (r, &state);
+  if (span < 2 * r->speed_record.time) return 0;
+  r->earlier_record = r->speed_record;
+  r->speed_record.time = span, r->speed_record.speed = limits_speed (r, &state);
   return 1;
 }
 
@@ -69,10 +71,10 @@ int pw_run_check_limits (pw_run *r, pw_error *error) {
 int pw_run_check_resolution (pw_run *r, pw_error *error) {
   const pw_system *s = r->s;
   char name[120];
-  if (!limits_mark (r) && r->statistics.steps % PW_CHECK_INTERVAL != 0) return PW_OK;
+  if (!limits_record_speed (r) && r->statistics.steps % PW_CHECK_INTERVAL != 0) return PW_OK;
   for (int j = 0; j < s->coords; j++) {
-    double known = fabs (r->q[j]) * DBL_EPSILON;
-    if (!(known > LIMITS_RESOLVED * pw_unit (s, j))) continue;
+    double round_off = fabs (r->q[j]) * DBL_EPSILON;
+    if (!(round_off > LIMITS_RESOLVED * pw_unit (s, j))) continue;
     if (pw_fixed_steps (r) && fabs (r->v[j]) * r->settings.step > 0.1 * fabs (r->q[j])) /* within a few steps */
       return pw_fail (error, PW_METHOD,
                       "t = %.6g s: the step of %.6g s is too large: the state grows beyond all bounds", r->t,
@@ -80,7 +82,7 @@ int pw_run_check_resolution (pw_run *r, pw_error *error) {
     pw_system_state_name (s, j, name, sizeof name);
     return pw_fail (error, PW_METHOD,
                     "t = %.6g s: the motion has grown beyond what numbers resolve: %s = %.3g %s, known to %.2g only",
-                    r->t, name, r->q[j], pw_system_state_unit (s, j), known);
+                    r->t, name, r->q[j], pw_system_state_unit (s, j), round_off);
   }
   return PW_OK;
 }

@@ -1,4 +1,4 @@
-/* The table of integrators, and method names: integrator[+stabilisation][:option=value]... */
+/* The table of integrators; reading the names of methods: integrator[+stabilisation][:option=value]... */
 #include <assert.h>
 #include <locale.h>
 #include <math.h>
@@ -19,20 +19,20 @@ const pw_method *const pw_methods[] = {
       NULL
 };
 
-enum { METHODS_PART = 80 };
+enum { METHODS_PART = 80 }; /* characters of a part of a method, with the final 0 */
 
-/* Reads one part of the method, up to one of the characters `end`; what: "a name". */
-static int methods_part (char part[METHODS_PART], const char **text, const char *end, const char *what,
+/* Reads one part of the method, up to one of the characters `ends`; for errors, is_a: "a name", whole: the method. */
+static int methods_part (char part[METHODS_PART], const char **text, const char *ends, const char *is_a,
                          const char *whole, pw_error *error) {
-  size_t n = strcspn (*text, end);
-  if (n >= METHODS_PART) return pw_fail (error, PW_INPUT, "method \"%.80s\": %s is too long", whole, what);
+  size_t n = strcspn (*text, ends);
+  if (n >= METHODS_PART) return pw_fail (error, PW_INPUT, "method \"%.80s\": %s is too long", whole, is_a);
   memcpy (part, *text, n);
   part[n] = 0;
   *text += n;
   return PW_OK;
 }
 
-/* Describes what a table lacks; "" if it is complete. */
+/* Describes what the table of a method lacks; "" if it is complete. */
 static const char *methods_lack (const pw_method *m) {
   int options = 0;
   while (m->options && m->options[options].name) options++;
@@ -76,22 +76,22 @@ static int methods_choice (const pw_option *o, const char *text, double *value, 
   return *value < 0 ? pw_fail (error, PW_INPUT, "method option %s cannot be \"%s\"%s", o->name, text, hint) : PW_OK;
 }
 
-/* Decimal numbers, whatever the locale. */
+/* Reads a decimal number, with a point whatever the locale. */
 static int methods_number (const pw_option *o, const char *text, double *value, pw_error *error) {
-  locale_t c = newlocale (LC_ALL_MASK, "C", (locale_t)0);
-  if (c == (locale_t)0) return pw_fail (error, PW_RESOURCE, "method option %s: out of memory", o->name);
-  locale_t before = uselocale (c);
+  locale_t c_locale = newlocale (LC_ALL_MASK, "C", (locale_t)0);
+  if (c_locale == (locale_t)0) return pw_fail (error, PW_RESOURCE, "method option %s: out of memory", o->name);
+  locale_t before = uselocale (c_locale);
   char *end;
   *value = strtod (text, &end);
   uselocale (before);
-  freelocale (c);
+  freelocale (c_locale);
   int decimal = end > text && *end == 0 && text[strspn (text, "+-.0123456789eE")] == 0;
   const char *expected = decimal ? pw_domain_check (o->domain, *value) : "a number";
   return *expected ? pw_fail (error, PW_INPUT, "method option %s=%s: expected %s", o->name, text, expected) : PW_OK;
 }
 
-/* Reads an option, which must exist for the integrator and this stabilisation; `given`: one bit for each option
- * read. */
+/* Reads an option, which must exist for the integrator and this stabilisation; *given: one bit for each option that has
+ * been read. */
 static int methods_option (const pw_method *method, int stabilisation, char *part, double *values, unsigned *given,
                            pw_error *error) {
   char *equals = strchr (part, '=');

@@ -1,4 +1,4 @@
-/* Building blocks of user-defined one-step methods (pinwheel-method.h). */
+/* The functions of pinwheel-method.h, for one-step methods of users. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -8,14 +8,13 @@
 
 struct pw_method_data {
   pw_dense_output last;
-  int projects;       /* with the projector of `last` */
-  double base;        /* time from which steps are counted */
-  long count;         /* steps since then */
+  int projects; /* with the projector of `last` */
+  pw_step_counter counter;
   double end;         /* of the step whose size was last requested */
-  int whole;          /* 1: it has the full step size */
-  size_t length;      /* of an array */
+  int whole;          /* 1: that end is a multiple of the step size */
   double *a, *lambda; /* of the new state */
-  double *array;
+  size_t length;      /* of each of the method's arrays */
+  double *array;      /* all of them, one after the other */
   char *memory;
 };
 
@@ -32,8 +31,8 @@ double pw_stage_time (const pw_run *r, double t) {
 int pw_step_restart (pw_run *r, pw_error *error) {
   struct pw_method_data *d = r->data;
   (void)error;
-  d->base = d->last.t0 = r->t;
-  d->count = 0;
+  d->counter = (pw_step_counter){ .base = r->t };
+  d->last.start.t = r->t;
   return PW_OK;
 }
 
@@ -45,7 +44,8 @@ int pw_step_open (pw_run *r, int arrays, pw_error *error) {
   if (d) d->memory = pw_alloc_arrays (array, sizeof array / sizeof *array);
   if (d == NULL || d->memory == NULL) return pw_fail_memory (r->s, error);
   d->projects = pw_stabilised_by (r, PW_PROJECTION);
-  int status = pw_dense_output_open (&d->last, r, d->projects ? 1 : -1, error);
+  pw_dense_projection projection = d->projects ? PW_DENSE_POSITIONS_AND_VELOCITIES : PW_DENSE_UNPROJECTED;
+  int status = pw_dense_output_open (&d->last, r, projection, error);
   return status == PW_OK ? pw_step_restart (r, error) : status;
 }
 
@@ -56,8 +56,7 @@ void pw_step_close (pw_run *r) {
 }
 
 void pw_step_serialise (pw_run *r, pw_archive *a) {
-  pw_archive_bytes (a, &r->data->base, sizeof r->data->base);
-  pw_archive_count (a, &r->data->count);
+  pw_serialise_counter (&r->data->counter, a);
 }
 
 double *pw_step_array (pw_run *r, int i) {
@@ -68,23 +67,17 @@ double *pw_step_array (pw_run *r, int i) {
 
 double pw_step_size (pw_run *r, double t_end) {
   struct pw_method_data *d = r->data;
-  d->end = pw_step_end (r, d->base, d->count, t_end, &d->whole);
+  d->end = pw_step_end (r, &d->counter, t_end, &d->whole);
   return d->end - r->t;
 }
 
 /* Projects the new state if the method does, and evaluates its accelerations. */
 static int step_evaluate (pw_run *r, double t, double *q, double *v) {
   struct pw_method_data *d = r->data;
-  const pw_system *s = r->s;
-  double size = 0;
-  for (int j = 0; j < s->coords; j++) size += q[j] * q[j] + v[j] * v[j];
-  if (!(size < 1e300)) return PW_RETRY; /* too large, or not a number */
+  if (!pw_is_finite_state (r, q, v)) return PW_RETRY;
   if (!d->projects) return pw_run_accelerate (r, t, q, v, d->a, d->lambda);
-  int status = pw_update_kinematics (r->w, t, q, v);
-  double before = pw_kinetic (s, v) + pw_potential (r->w);
-  if (status == PW_OK) status = pw_project_state (&d->last.projector, r, t, q, v, d->a, d->lambda);
-  if (status == PW_OK && r->settings.ledger) r->projected += pw_kinetic (s, v) + pw_potential (r->w) - before;
-  return status;
+  double *added_energy = r->settings.ledger ? &r->projected : NULL;
+  return pw_project_with_energy (&d->last.projector, r, t, q, v, d->a, d->lambda, added_energy);
 }
 
 static int step_fail (pw_run *r, int status, double h, pw_error *error) {
@@ -102,20 +95,18 @@ int pw_step_accept (pw_run *r, int status, double h, double *q, double *v, pw_er
   double t1 = requested ? d->end : r->t + h;
   if (status == PW_OK) status = step_evaluate (r, t1, q, v);
   if (status != PW_OK) return step_fail (r, status, h, error);
-  pw_dense_output_keep (&d->last, r);
+  pw_store_start (&d->last.start, r);
   r->t = t1;
   memcpy (r->q, q, n);
   memcpy (r->v, v, n);
   memcpy (r->a, d->a, n);
   memcpy (r->lambda, d->lambda, (size_t)r->s->rows * sizeof *r->lambda);
-  pw_dense_output_count (&d->last, r);
+  pw_dense_output_integrate_ledger (&d->last, r);
   r->statistics.steps++;
-  d->count++;
-  if (!requested || !d->whole) d->base = t1, d->count = 0;
+  pw_count_step (&d->counter, requested && d->whole, t1);
   return PW_OK;
 }
 
 int pw_step_at (pw_run *r, double t, pw_error *error) {
-  r->projected_at = r->projected;
   return pw_dense_output_at (&r->data->last, r, t, error);
 }

@@ -15,7 +15,7 @@
 int pw_quadrature_open (pw_quadrature *x, pw_run *r, pw_rates_at *rates) {
   size_t entries = (size_t)r->s->entries;
   pw_array array[PW_QUADRATURE_POINTS + 4] = {
-    { &x->ledger0, entries }, { &x->sum, entries }, { &x->finer, entries }, { &x->node, entries }
+    { &x->ledger0, entries }, { &x->integral, entries }, { &x->finer, entries }, { &x->node, entries }
   };
   for (int i = 0; i < PW_QUADRATURE_POINTS; i++) array[4 + i] = (pw_array){ &x->rate[i], entries };
   x->rates = rates;
@@ -29,23 +29,23 @@ void pw_quadrature_close (pw_quadrature *x) {
   free (x->memory);
 }
 
-static void quadrature_keep (pw_quadrature *x, const pw_run *r) {
+static void quadrature_store_rates (pw_quadrature *x, const pw_run *r) {
   x->t[0] = r->t;
   memcpy (x->rate[0], r->rate, (size_t)r->s->entries * sizeof (double));
 }
 
 void pw_quadrature_restart (pw_quadrature *x, pw_run *r) {
   x->points = 1;
-  x->energy = pw_kinetic (r->s, r->v) + pw_potential (r->w);
-  quadrature_keep (x, r);
+  x->energy = pw_energy (r, r->v);
+  quadrature_store_rates (x, r);
 }
 
 /* ---- The polynomial ---- */
 
-/* The integrals of prod_(i < j) (s - s_i), j <= k, from 0 to `end`, with s = 0 at the beginning of the step and 1 at
- * its end. */
+/* w_j: the integrals of prod_(i < j) (s - s_i), j <= k, from 0 to `end`, with s = 0 at the beginning of the step and 1
+ * at its end. */
 static void quadrature_weights (const double *s, int k, double end, double *w) {
-  double p[PW_QUADRATURE_POINTS + 1] = { 1 };
+  double p[PW_QUADRATURE_POINTS + 1] = { 1 }; /* coefficients of the product, by powers of s */
   for (int j = 0; j <= k; j++) {
     double power = end;
     w[j] = 0;
@@ -55,17 +55,18 @@ static void quadrature_weights (const double *s, int k, double end, double *w) {
   }
 }
 
-/* Stores the integrals up to `end` in x->sum; returns the norm of their last terms. */
+/* Stores the integrals of the polynomials of degree k up to `end` in x->integral; returns the norm of their last
+ * terms. */
 static double quadrature_polynomial (pw_quadrature *x, int entries, int k, double end) {
   double s[PW_QUADRATURE_POINTS], w[PW_QUADRATURE_POINTS], c[PW_QUADRATURE_POINTS], h = x->t[0] - x->t[1], last = 0;
   for (int i = 0; i <= k; i++) s[i] = (x->t[i] - x->t[1]) / h;
   quadrature_weights (s, k, end, w);
   for (int e = 0; e < entries; e++) {
-    for (int i = 0; i <= k; i++) c[i] = x->rate[i][e];
+    for (int i = 0; i <= k; i++) c[i] = x->rate[i][e]; /* divided differences replace them */
     for (int j = 1; j <= k; j++)
       for (int i = k; i >= j; i--) c[i] = (c[i] - c[i - 1]) / (s[i] - s[i - j]);
-    x->sum[e] = 0;
-    for (int j = 0; j <= k; j++) x->sum[e] += h * c[j] * w[j];
+    x->integral[e] = 0;
+    for (int j = 0; j <= k; j++) x->integral[e] += h * c[j] * w[j];
     last += c[k] * c[k];
   }
   return fabs (h * w[k]) * sqrt (last);
@@ -73,8 +74,8 @@ static double quadrature_polynomial (pw_quadrature *x, int entries, int k, doubl
 
 /* ---- Nodes inside the step ---- */
 
-/* Stores the integrals over equal parts of a step in x->finer, by Gauss quadrature of order 8. */
-static int quadrature_parts (pw_quadrature *x, pw_run *r, double from, double to, int parts) {
+/* Stores the integrals over equal parts of a step in x->finer, by Gauss quadrature with four nodes in each part. */
+static int quadrature_gauss (pw_quadrature *x, pw_run *r, double from, double to, int parts) {
   static const double node[] = { 0.8611363115940526, 0.3399810435848563 },
                       weight[] = { 0.3478548451374538, 0.6521451548625461 };
   int entries = r->s->entries;
@@ -89,60 +90,59 @@ static int quadrature_parts (pw_quadrature *x, pw_run *r, double from, double to
   return PW_OK;
 }
 
-/* Halves the parts until the integrals, in x->sum, converge; stops if powers cannot be evaluated. */
+/* Halves the parts until the integrals, in x->integral, converge; stops if powers cannot be evaluated. */
 static void quadrature_refine (pw_quadrature *x, pw_run *r, double from, double to, double tolerance) {
   const int most = 64; /* 256 nodes */
-  double off = INFINITY;
-  for (int parts = 1; parts <= most && off > tolerance; parts *= 2) {
-    if (quadrature_parts (x, r, from, to, parts) != PW_OK) return;
-    off = 0;
-    for (int e = 0; e < r->s->entries; e++) off += (x->finer[e] - x->sum[e]) * (x->finer[e] - x->sum[e]);
-    off = sqrt (off);
-    memcpy (x->sum, x->finer, (size_t)r->s->entries * sizeof *x->sum);
+  double change = INFINITY;
+  for (int parts = 1; parts <= most && change > tolerance; parts *= 2) {
+    if (quadrature_gauss (x, r, from, to, parts) != PW_OK) return;
+    change = 0;
+    for (int e = 0; e < r->s->entries; e++) change += (x->finer[e] - x->integral[e]) * (x->finer[e] - x->integral[e]);
+    change = sqrt (change);
+    memcpy (x->integral, x->finer, (size_t)r->s->entries * sizeof *x->integral);
   }
 }
 
-/* ---- */
+/* ---- Steps ---- */
 
 static int quadrature_degree (const pw_quadrature *x, int order) {
   return order + 1 < x->points ? order + 1 : x->points - 1;
 }
 
-/* 1 if the step is much longer than all previous ones since the restart: its polynomial then depends on its ends
- * only. */
-static int quadrature_leaps (const pw_quadrature *x) {
-  const double leap = 10;
-  return x->points > 2 && x->t[0] - x->t[1] > leap * (x->t[1] - x->t[x->points - 1]);
+/* 1 if the step is much longer than all previous ones since the restart together: its polynomial then depends on its
+ * ends only. */
+static int quadrature_is_long (const pw_quadrature *x) {
+  const double ratio = 10;
+  return x->points > 2 && x->t[0] - x->t[1] > ratio * (x->t[1] - x->t[x->points - 1]);
 }
 
-/* Energy defect of a step: change of energy, less work, plus losses.  Keeps the energy for the next step. */
+/* Energy defect of a step: change of energy, less work, plus losses.  Stores the energy for the next step. */
 static double quadrature_defect (pw_quadrature *x, pw_run *r) {
-  double before = x->energy, off;
-  x->energy = pw_kinetic (r->s, r->v) + pw_potential (r->w);
-  off = x->energy - before;
-  for (int e = 0; e < r->s->entries; e++) off -= r->s->entry[e].type == PW_WORK ? x->sum[e] : -x->sum[e];
-  return fabs (off);
+  double before = x->energy;
+  x->energy = pw_energy (r, r->v);
+  double defect = x->energy - before;
+  for (int e = 0; e < r->s->entries; e++) defect -= r->s->entry[e].type == PW_WORK ? x->integral[e] : -x->integral[e];
+  return fabs (defect);
 }
 
 int pw_quadrature_step (pw_quadrature *x, pw_run *r, int order) {
-  const double of_method = 100; /* energy error that the method itself may make in a step, in tolerances */
+  const double method_defect = 100; /* energy defect that the method itself may cause in a step, in tolerances */
   int entries = r->s->entries, last = PW_QUADRATURE_POINTS - 1;
   double *oldest = x->rate[last], h = r->t - x->t[0];
   memcpy (x->ledger0, r->ledger, (size_t)entries * sizeof (double));
-  if (!(h > 0)) return 0;
+  if (!(h > 0)) return PW_OK;
   memmove (x->t + 1, x->t, (size_t)last * sizeof *x->t);
   memmove (x->rate + 1, x->rate, (size_t)last * sizeof *x->rate);
   x->rate[0] = oldest;
-  quadrature_keep (x, r);
+  quadrature_store_rates (x, r);
   if (x->points <= last) x->points++;
   x->order = order;
-  double tolerance = pw_ledger_tolerance (r, h),
-         off = quadrature_polynomial (x, entries, quadrature_degree (x, order), 1);
-  double defect = quadrature_defect (x, r);
-  x->refined = defect > of_method * tolerance || off > tolerance || quadrature_leaps (x);
+  double tolerance = pw_ledger_tolerance (r, h);
+  double error = quadrature_polynomial (x, entries, quadrature_degree (x, order), 1), defect = quadrature_defect (x, r);
+  x->refined = defect > method_defect * tolerance || error > tolerance || quadrature_is_long (x);
   if (x->refined) quadrature_refine (x, r, x->t[1], x->t[0], tolerance);
-  for (int e = 0; e < entries; e++) r->ledger[e] += x->sum[e];
-  return x->refined;
+  for (int e = 0; e < entries; e++) r->ledger[e] += x->integral[e];
+  return x->refined ? pw_evaluate_J_at (r->w, pw_before_breakpoint (r, r->t), r->q, r->v) : PW_OK;
 }
 
 void pw_quadrature_at (pw_quadrature *x, pw_run *r, double t) {
@@ -154,5 +154,5 @@ void pw_quadrature_at (pw_quadrature *x, pw_run *r, double t) {
   double h = x->t[0] - x->t[1];
   quadrature_polynomial (x, entries, quadrature_degree (x, x->order), (t - x->t[1]) / h);
   if (x->refined) quadrature_refine (x, r, x->t[1], t, pw_ledger_tolerance (r, h));
-  for (int e = 0; e < entries; e++) r->ledger_at[e] = x->ledger0[e] + x->sum[e];
+  for (int e = 0; e < entries; e++) r->ledger_at[e] = x->ledger0[e] + x->integral[e];
 }

@@ -4,7 +4,7 @@
 
 #include "method.h"
 
-enum { PW_QUADRATURE_POINTS = 7 }; /* at most; beyond, the polynomial costs more than nodes inside the step */
+enum { PW_QUADRATURE_POINTS = 7 }; /* at most: a polynomial through more would cost more than nodes inside the step */
 
 /* The rates of the ledger's entries at a time inside the last step, by the method's interpolation; changes only the
  * run's sample arrays and the kinematics.  Returns as pw_update_kinematics. */
@@ -12,13 +12,15 @@ typedef int pw_rates_at (pw_run *r, double t, double *rate);
 
 typedef struct {
   pw_rates_at *rates;
-  int points, order;                  /* since the last restart; of the last step */
+  int points;                         /* states whose rates are known: at most those since the last restart */
+  int order;                          /* of the last step */
   int refined;                        /* 1: the last step was integrated by nodes inside it */
-  double t[PW_QUADRATURE_POINTS];     /* newest first */
-  double *rate[PW_QUADRATURE_POINTS]; /* entries */
+  double t[PW_QUADRATURE_POINTS];     /* times of these states, newest first */
+  double *rate[PW_QUADRATURE_POINTS]; /* entries: rates there */
   double *ledger0;                    /* entries: at the beginning of the last step */
-  double *sum, *finer, *node;         /* entries: scratch */
-  double energy;                      /* kinetic + potential of the state reached */
+  double *integral;                   /* entries: over the last step, or a part of it */
+  double *finer, *node;               /* entries: scratch: the same with more nodes; rates at a node */
+  double energy;                      /* kinetic + potential energy of the state reached [J] */
   char *memory;
 } pw_quadrature;
 
@@ -29,8 +31,8 @@ void pw_quadrature_close (pw_quadrature *x);
 /* Restarts at the state reached; kinematics, the ledger and its rates must be up to date. */
 void pw_quadrature_restart (pw_quadrature *x, pw_run *r);
 
-/* Integrates the ledger over the step, of this order, to the state reached, where kinematics and r->rate must be up
- * to date.  Returns 1 if the kinematics were changed. */
+/* Integrates the ledger over the step, of this order, to the state reached, where kinematics, J and r->rate must be up
+ * to date, and stay so.  Returns as pw_update_kinematics. */
 int pw_quadrature_step (pw_quadrature *x, pw_run *r, int order);
 
 /* Stores the ledger at a time inside the last step in r->ledger_at. */

@@ -1,4 +1,4 @@
-/* A run: advance, sample, restart, close. */
+/* A run: its steps, samples, restarts and end; for its opening see run_open.c. */
 #include <float.h>
 #include <math.h>
 #include <stdio.h>
@@ -13,9 +13,9 @@ int pw_run_annotate_error (const pw_run *r, int status, pw_error *error) {
   if (status == PW_OK || error == NULL || *pw_failed_signal (r->w, signal, sizeof signal) == 0) return status;
   if (strstr (error->text, signal)) return status;
   size_t n = strlen (error->text);
-  const char *glue = strstr (error->text, "a signal failed") ? ":" : "; in the attempted step,";
-  const char *either = r->w->failed->of_force ? "" : ", or a derivative of it,";
-  snprintf (error->text + n, sizeof error->text - n, "%s %s%s is not a finite number", glue, signal, either);
+  const char *link = strstr (error->text, "a signal failed") ? ":" : "; in the attempted step,";
+  const char *derivative = r->w->failed->of_force ? "" : ", or a derivative of it,"; /* forces need no derivatives */
+  snprintf (error->text + n, sizeof error->text - n, "%s %s%s is not a finite number", link, signal, derivative);
   return status;
 }
 
@@ -40,7 +40,7 @@ void pw_run_set_references (pw_run *r) {
   pw_watchdog_begin (r);
   if (r->redundant == 0) return;
   r->independence = pw_rank_independence (r);
-  r->reselect_below = fmin (r->limits.loosened * r->independence, r->limits.loose);
+  r->reselect_below = fmin (r->limits.reselect_ratio * r->independence, r->limits.reselect_below);
 }
 
 int pw_run_look_ahead (pw_run *r, pw_error *error) {
@@ -61,7 +61,7 @@ void pw_run_set_reference_level (pw_run *r) {
   r->reference_level = fmax (1, r->previous_norm);
 }
 
-static void run_drop_method (pw_run *r) {
+static void run_close_method (pw_run *r) {
   if (r->data) r->method->close (r);
   r->data = NULL;
 }
@@ -72,7 +72,7 @@ char *pw_run_source (const pw_run *r, pw_error *error) {
 
 void pw_run_close (pw_run *r) {
   if (r == NULL) return;
-  run_drop_method (r);
+  run_close_method (r);
   pw_saddle_close (r->saddle);
   pw_watchdog_close (r);
   free (r->rank_memory);
@@ -83,25 +83,25 @@ void pw_run_close (pw_run *r) {
   free (r);
 }
 
-/* After a discontinuity, where accelerations change, or a step that was interrupted. */
+/* Restarts the method after a discontinuity, where accelerations change, or a step that was interrupted. */
 static int run_restart_method (pw_run *r, pw_error *error) {
   int status = pw_run_look_ahead (r, error);
   if (status == PW_OK) status = pw_run_evaluate (r, error);
   return status == PW_OK ? r->method->restart (r, error) : status;
 }
 
-int pw_run_renew (pw_run *r, int fresh, pw_error *error) {
+int pw_run_renew (pw_run *r, pw_references references, pw_error *error) {
   int status = pw_run_open_saddle (r, error);
-  r->geometry.alert = 1;
+  r->geometry.singular_ahead = 1;
   if (status == PW_OK) status = pw_run_evaluate (r, error);
-  if (status == PW_OK && fresh)
+  if (status == PW_OK && references == PW_NEW_REFERENCES)
     pw_run_set_references (r);
   else if (status == PW_OK)
     pw_watchdog_begin (r);
-  run_drop_method (r); /* it may use the previous saddle */
+  run_close_method (r); /* it may use the previous saddle */
   if (status == PW_RESOURCE) return status;
   int opened = r->method->open (r, error);
-  if (opened != PW_OK) run_drop_method (r);
+  if (opened != PW_OK) run_close_method (r);
   return status == PW_OK ? opened : status;
 }
 
@@ -112,24 +112,24 @@ static int run_has_no_method (const pw_run *r, pw_error *error) {
   return 1;
 }
 
-/* If the active rows have become nearly dependent, looks for another set that is not, with which the method restarts.
- * This is done before the next step, since the last one can still be sampled, whether or not it is. */
+/* If the active rows have become nearly dependent, looks for another set that is not, with which the method is
+ * reopened. This is done only before the next step, since until then the last one may be sampled. */
 static int run_reselect (pw_run *r, pw_error *error) {
   if (r->redundant == 0 || r->independence >= r->reselect_below) return PW_OK;
   r->reselect_below = r->independence / 2;
   if (pw_evaluate_J_at (r->w, r->t, r->q, r->v) != PW_OK) return pw_fail_signal (r->t, error);
   int other = pw_rank_reselect (r);
   if (other < 0) return pw_fail_memory (r->s, error);
-  return other ? pw_run_renew (r, 1, error) : PW_OK;
+  return other ? pw_run_renew (r, PW_NEW_REFERENCES, error) : PW_OK;
 }
 
 /* Computes r->independence with the J last evaluated. */
-static void run_check_rows (pw_run *r) {
+static void run_measure_independence (pw_run *r) {
   if (r->redundant) r->independence = pw_saddle_factor (r->saddle) == PW_OK ? pw_rank_independence (r) : 0;
 }
 
-/* 1 if t is the time reached, up to round-off.  No step is made to such a time, since methods divide by its length:
- * between discontinuities that are meant to coincide, at 0.3 and 0.1 + 0.2. */
+/* 1 if t is the time reached, up to round-off.  No step is made to such a time, since methods divide by its length.  It
+ * may be that of a discontinuity meant to coincide with another one, at 0.3 and 0.1 + 0.2. */
 static int run_is_at (const pw_run *r, double t) {
   return t - r->t <= 8 * DBL_EPSILON * fmax (fabs (r->t), r->w->scale.time);
 }
@@ -168,10 +168,10 @@ int pw_run_advance (pw_run *r, double t_end, pw_error *error) {
   if (status == PW_STOPPED) return status;
   if (status == PW_OK) status = pw_run_watchdog (r, error);
   if (status == PW_OK) status = pw_run_check_resolution (r, error);
-  if (status == PW_OK) pw_ledger_note (r);
+  if (status == PW_OK) pw_ledger_record (r);
   if (status == PW_OK) status = run_check_progress (r, before, error);
   if (status != PW_OK) return pw_run_annotate_error (r, status, error);
-  run_check_rows (r);
+  run_measure_independence (r);
   return PW_OK;
 }
 
@@ -179,8 +179,8 @@ double pw_run_time (const pw_run *r) {
   return r->t;
 }
 
-/* Energies and ledger of the sample; kinematics must be those of the sample. */
-static void run_account (pw_run *r, pw_sample *sample) {
+/* Energies and ledger of the sample, at which kinematics must be evaluated. */
+static void run_fill_energies (pw_run *r, pw_sample *sample) {
   const pw_system *s = r->s;
   sample->kinetic = pw_kinetic (s, r->v_at);
   sample->potential = pw_potential (r->w);
@@ -204,7 +204,7 @@ int pw_run_sample (pw_run *r, double t, pw_sample *sample, pw_error *error) {
   if (status != PW_OK) return status;
   *sample = (pw_sample){ .t = t, .q = r->q_at, .v = r->v_at, .a = r->a_at, .lambda = r->lambda_at };
   if (r->redundant && pw_saddle_factor (r->saddle) == PW_OK) pw_rank_least_norm (r, r->lambda_at);
-  run_account (r, sample);
+  run_fill_energies (r, sample);
   pw_evaluate_residuals (r->w, NULL, &now);
   sample->position = now.position;
   sample->velocity = now.velocity;
@@ -213,12 +213,13 @@ int pw_run_sample (pw_run *r, double t, pw_sample *sample, pw_error *error) {
 
 /* ---- Restart ---- */
 
-static int run_check_state (const pw_run *r, const double *x, int velocities, pw_error *error) {
+/* Checks given positions or velocities x, whose states begin at `first`; NULL: none are given. */
+static int run_check_given (const pw_run *r, const double *x, int first, pw_error *error) {
   char name[120];
   for (int j = 0, n = r->s->coords; x && j < n; j++)
     if (!(fabs (x[j]) < r->limits.extreme))
       return pw_fail (error, PW_INPUT, "model %s: restart with %s = %g: expected a finite number", r->s->model,
-                      pw_system_state_name (r->s, j + velocities * n, name, sizeof name), x[j]);
+                      pw_system_state_name (r->s, first + j, name, sizeof name), x[j]);
   return PW_OK;
 }
 
@@ -226,25 +227,25 @@ static int run_check_state (const pw_run *r, const double *x, int velocities, pw
  * unchanged. */
 static void run_exchange (pw_run *r, const double *q, const double *v) {
   size_t n = (size_t)r->s->coords, bytes = n * sizeof *q;
-  double *other = r->scratch;
-  memcpy (other, q ? q : r->q, bytes);
-  memcpy (other + n, v ? v : r->v, bytes);
+  double *given = r->scratch;
+  memcpy (given, q ? q : r->q, bytes);
+  memcpy (given + n, v ? v : r->v, bytes);
   memcpy (r->q_at, r->q, pw_state_length (r->s) * sizeof *q);
-  memcpy (r->q, other, bytes);
-  memcpy (r->v, other + n, bytes);
+  memcpy (r->q, given, bytes);
+  memcpy (r->v, given + n, bytes);
 }
 
-/* Rows that are independent at the state reached. */
-static int run_select (pw_run *r, pw_error *error) {
+/* Makes rows active that are independent at the state reached. */
+static int run_select_rows (pw_run *r, pw_error *error) {
   if (r->redundant == 0) return PW_OK;
   if (pw_evaluate_J_at (r->w, r->t, r->q, r->v) != PW_OK) return pw_fail_signal (r->t, error);
-  run_check_rows (r);
+  run_measure_independence (r);
   return run_reselect (r, error);
 }
 
 static int run_energy (pw_run *r, double *energy, pw_error *error) {
   if (pw_update_kinematics (r->w, r->t, r->q, r->v) != PW_OK) return pw_fail_signal (r->t, error);
-  *energy = pw_kinetic (r->s, r->v) + pw_potential (r->w);
+  *energy = pw_energy (r, r->v);
   return PW_OK;
 }
 
@@ -254,16 +255,17 @@ int pw_run_restart (pw_run *r, const double *q, const double *v, pw_error *error
   if (pw_require (r, "a run", error) != PW_OK) return PW_INPUT;
   double before = 0, after = 0;
   if (run_has_no_method (r, error)) return PW_RESOURCE;
-  if (run_check_state (r, q, 0, error) != PW_OK || run_check_state (r, v, 1, error) != PW_OK) return PW_INPUT;
+  if (run_check_given (r, q, 0, error) != PW_OK || run_check_given (r, v, r->s->coords, error) != PW_OK)
+    return PW_INPUT;
   int status = run_energy (r, &before, error);
   if (status == PW_OK) status = pw_run_look_ahead (r, error);
   if (status != PW_OK) return status;
-  const double below = r->reselect_below;
+  const double reselect_below = r->reselect_below;
   r->w->t_signal = NAN;
   run_exchange (r, q, v);
   r->near_singular = 0;
-  r->geometry.alert = 1;
-  status = run_select (r, error);
+  r->geometry.singular_ahead = 1;
+  status = run_select_rows (r, error);
   if (status == PW_OK) status = pw_run_make_consistent (r, NULL, error);
   if (status == PW_OK) status = pw_run_evaluate (r, error);
   if (status == PW_OK) status = run_energy (r, &after, error);
@@ -276,8 +278,8 @@ int pw_run_restart (pw_run *r, const double *q, const double *v, pw_error *error
     return r->method->restart (r, error);
   }
   memcpy (r->q, r->q_at, pw_state_length (r->s) * sizeof *r->q);
-  r->reselect_below = below;
-  if (run_select (r, NULL) == PW_OK) pw_run_evaluate (r, NULL);
+  r->reselect_below = reselect_below;
+  if (run_select_rows (r, NULL) == PW_OK) pw_run_evaluate (r, NULL);
   return status;
 }
 

@@ -8,17 +8,17 @@
 #include "rank.h"
 #include "util.h"
 
-/* 1 if the archive is from a run of these sizes. */
+/* Saves the sizes of the run, or reads those of a saved one; 1 if they are the same. */
 static int checkpoint_sizes (pw_run *r, pw_archive *a) {
   const int own[] = { r->s->coords, r->s->rows, r->s->entries, r->redundant };
   enum { SIZES = sizeof own / sizeof *own };
-  int good = 1;
+  int same = 1;
   for (int i = 0; i < SIZES; i++) {
     int size = own[i];
     pw_archive_bytes (a, &size, sizeof size);
-    good &= size == own[i];
+    same &= size == own[i];
   }
-  return good;
+  return same;
 }
 
 static void checkpoint_statistics (pw_statistics *s, pw_archive *a) {
@@ -32,11 +32,12 @@ static void checkpoint_statistics (pw_statistics *s, pw_archive *a) {
 static void checkpoint_state (pw_run *r, pw_archive *a) {
   size_t n = (size_t)r->s->coords * sizeof (double), entries = (size_t)r->s->entries * sizeof (double);
   double *const number[] = {
-    &r->t,         &r->breakpoint,      &r->projected,     &r->energy0,      &r->potential0,     &r->exchanged,
-    &r->power,     &r->reference_level, &r->previous_norm, &r->independence, &r->reselect_below, &r->geometry.typical,
-    &r->mark_time, &r->mark_speed,      &r->before_time,   &r->before_speed
+    &r->t,     &r->breakpoint,      &r->projected,     &r->energy0,      &r->potential0,     &r->exchanged,
+    &r->power, &r->reference_level, &r->previous_norm, &r->independence, &r->reselect_below, &r->geometry.largest_sine
   };
   for (size_t i = 0; i < sizeof number / sizeof *number; i++) pw_archive_bytes (a, number[i], sizeof (double));
+  pw_archive_bytes (a, &r->speed_record, sizeof r->speed_record);
+  pw_archive_bytes (a, &r->earlier_record, sizeof r->earlier_record);
   pw_archive_bytes (a, r->q, n);
   pw_archive_bytes (a, r->v, n);
   pw_archive_bytes (a, r->ledger, entries);
@@ -44,11 +45,11 @@ static void checkpoint_state (pw_run *r, pw_archive *a) {
   pw_rank_serialise (r, a);
 }
 
-/* A file may be intact and yet not have been written by a run. */
+/* 1 if a run can have reached the state: a file may be intact and yet not have been written by a run. */
 static int checkpoint_plausible (const pw_run *r) {
-  int good = isfinite (r->t) && r->t >= r->settings.t;
-  for (int i = 0; i < r->s->coords; i++) good &= isfinite (r->q[i]) && isfinite (r->v[i]);
-  return good;
+  int plausible = isfinite (r->t) && r->t >= r->settings.t;
+  for (int i = 0; i < r->s->coords; i++) plausible &= isfinite (r->q[i]) && isfinite (r->v[i]);
+  return plausible;
 }
 
 /* Continues from the state in the run, after saving or loading; `a` is loading, at the method's own data, if any. */
@@ -56,7 +57,7 @@ static int checkpoint_continue (pw_run *r, pw_archive *a, pw_error *error) {
   if (pw_evaluate_J_at (r->w, r->t, r->q, r->v) != PW_OK) return pw_fail_signal (r->t, error);
   r->near_singular = 0;
   if (r->method->serialise == NULL) r->statistics.restarts++;
-  int status = pw_run_renew (r, 0, error);
+  int status = pw_run_renew (r, PW_KEEP_REFERENCES, error);
   if (status == PW_OK && r->method->serialise) r->method->serialise (r, a);
   if (status == PW_OK && a->failed) return pw_fail (error, PW_INPUT, "the saved state is not of this run");
   return status;
@@ -70,19 +71,19 @@ int pw_run_save (pw_run *r, pw_archive *a, pw_error *error) {
   if (status != PW_OK) return status;
   checkpoint_sizes (r, a);
   checkpoint_state (r, a);
-  pw_archive own = { .used = a->used, .loading = 1 };
+  pw_archive saved = { .used = a->used, .loading = 1 }; /* to load what the method saves next */
   if (r->method->serialise) r->method->serialise (r, a);
   if (a->failed) return pw_fail_memory (r->s, error);
-  own.at = a->at;
-  own.size = a->used;
-  return checkpoint_continue (r, &own, error);
+  saved.at = a->at;
+  saved.size = a->used;
+  return checkpoint_continue (r, &saved, error);
 }
 
 int pw_run_load (pw_run *r, pw_archive *a, pw_error *error) {
   if (pw_require (r, "a run", error) != PW_OK) return PW_INPUT;
-  int good = checkpoint_sizes (r, a);
-  if (good) checkpoint_state (r, a);
-  if (!good || a->failed) return pw_fail (error, PW_INPUT, "the saved state is not of this run");
+  int same_sizes = checkpoint_sizes (r, a);
+  if (same_sizes) checkpoint_state (r, a);
+  if (!same_sizes || a->failed) return pw_fail (error, PW_INPUT, "the saved state is not of this run");
   if (!checkpoint_plausible (r))
     return pw_fail (
         error, PW_INPUT,

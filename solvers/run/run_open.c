@@ -8,10 +8,12 @@
 #include "method.h"
 #include "util.h"
 
-#define RUN_LEAST_RTOL (100 * DBL_EPSILON)
-#define RUN_MOST_STEPS 1e15 /* of a fixed size: shorter ones vanish in the round-off of the time */
+#define RUN_LEAST_RTOL (100 * DBL_EPSILON) /* round-off exceeds smaller tolerances */
+#define RUN_MOST_STEPS 1e15                /* of a fixed size: shorter ones vanish in the round-off of the time */
 
-static int run_settings (pw_settings *to, const pw_settings *from, const pw_method *method, pw_error *error) {
+/* Checks the settings of a run and fills in defaults. */
+static int run_settings (pw_settings *to, const pw_settings *from, const pw_method *method, int fixed_steps,
+                         pw_error *error) {
   const struct {
     const char *name;
     double value;
@@ -32,32 +34,20 @@ static int run_settings (pw_settings *to, const pw_settings *from, const pw_meth
   if (to->rtol == 0) to->rtol = 1e-6;
   if (to->max_steps == 0) to->max_steps = PW_MAX_STEPS;
   if (to->span == 0) to->span = method->adaptive ? 1 : 1000 * to->step;
-  return PW_OK;
-}
-
-static int run_check_step (const pw_settings *x, pw_error *error) {
-  double end = fabs (x->t) + x->span;
-  if (x->step * RUN_MOST_STEPS >= end) return PW_OK;
-  return pw_fail (error, PW_INPUT, "setting step = %g: expected at least %g for a run to t = %g", x->step,
-                  end / RUN_MOST_STEPS, x->t + x->span);
+  double least_step = (fabs (to->t) + to->span) / RUN_MOST_STEPS;
+  if (!fixed_steps || to->step >= least_step) return PW_OK;
+  return pw_fail (error, PW_INPUT, "setting step = %g: expected at least %g for a run to t = %g", to->step, least_step,
+                  to->t + to->span);
 }
 
 static int run_allocate (pw_run *r) {
   const pw_system *s = r->s;
   size_t n = (size_t)s->coords + 3, rows = (size_t)s->rows, entries = (size_t)s->entries;
-  size_t states = s->saturates ? 2 * n : 0;
+  size_t state = pw_state_length (s), scratch = 2 * n + 3 * rows, matrix = s->saturates ? 2 * n : 0;
   const pw_array array[] = {
-    { &r->q, pw_state_length (s) },
-    { &r->ledger, entries },
-    { &r->rate, entries },
-    { &r->q_at, pw_state_length (s) },
-    { &r->ledger_at, entries },
-    { &r->scratch, 2 * n + 3 * rows },
-    { &r->q_given, n },
-    { &r->v_given, n },
-    { &r->saturation, 2 * n },
-    { &r->matrix_state, states },
-    { &r->matrix_range, states },
+    { &r->q, state },           { &r->ledger, entries },      { &r->rate, entries },       { &r->q_at, state },
+    { &r->ledger_at, entries }, { &r->scratch, scratch },     { &r->q_given, n },          { &r->v_given, n },
+    { &r->saturation, 2 * n },  { &r->matrix_state, matrix }, { &r->matrix_range, matrix }
   };
   r->memory = pw_alloc_arrays (array, sizeof array / sizeof *array);
   r->origin = malloc (2 * n);
@@ -65,7 +55,7 @@ static int run_allocate (pw_run *r) {
   r->v = r->q + n, r->a = r->v + n, r->lambda = r->a + n;
   r->v_at = r->q_at + n, r->a_at = r->v_at + n, r->lambda_at = r->a_at + n;
   for (size_t j = 0; j < 2 * n; j++) r->saturation[j] = INFINITY;
-  for (size_t j = 0; j < states; j++) r->matrix_range[j] = INFINITY;
+  for (size_t j = 0; j < matrix; j++) r->matrix_range[j] = INFINITY;
   return PW_OK;
 }
 
@@ -107,14 +97,14 @@ static int run_first_evaluation (pw_run *r, pw_error *error) {
   int status = pw_run_open_saddle (r, error);
   if (status != PW_OK) return status;
   double sine = pw_watchdog_sine (r, NULL);
-  int large = (double)r->s->rows * r->s->coords > PW_RANK_MOST;
-  if (sine < (large ? r->limits.dependent : r->limits.suspect)) {
+  int large = (double)r->s->rows * r->s->coords > PW_RANK_MAX_ENTRIES;
+  if (sine < (large ? r->limits.rank_refused : r->limits.rank_suspect)) {
     if (large) return pw_fail_singular (r, r->t, error);
-    int chosen = pw_rank_open (r, error);
-    if (chosen == PW_OK && r->redundant) chosen = pw_run_open_saddle (r, error);
-    if (chosen != PW_OK) return chosen;
+    status = pw_rank_open (r, error);
+    if (status == PW_OK && r->redundant) status = pw_run_open_saddle (r, error);
+    if (status != PW_OK) return status;
   }
-  r->geometry.alert = 1;
+  r->geometry.singular_ahead = 1;
   status = pw_run_evaluate (r, error);
   if (status == PW_OK) pw_run_set_references (r);
   return status;
@@ -125,24 +115,24 @@ static int run_first_evaluation (pw_run *r, pw_error *error) {
 static int run_check_finite (pw_run *r, pw_error *error) {
   char element[200];
   double sum = 0;
-  int bad = -1;
+  int infinite = -1; /* the first such acceleration */
   for (int j = 0; j < r->s->coords; j++) {
     sum += fabs (r->a[j]);
-    if (bad < 0 && !isfinite (r->a[j])) bad = j;
+    if (infinite < 0 && !isfinite (r->a[j])) infinite = j;
   }
   for (int i = 0; i < r->s->rows; i++) sum += fabs (r->lambda[i]);
   if (isfinite (sum) || pw_update_kinematics (r->w, r->t, r->q, r->v) != PW_OK) return PW_OK;
   if (pw_find_nonfinite (r->w, element, sizeof element))
     return pw_fail (error, PW_METHOD, "t = %.6g s: %s is not finite", r->t, element);
-  if (bad < 0) return PW_OK;
+  if (infinite < 0) return PW_OK;
   return pw_fail (error, PW_METHOD, "t = %.6g s: the acceleration of %s is not finite", r->t,
-                  pw_system_state_name (r->s, bad, element, sizeof element));
+                  pw_system_state_name (r->s, infinite, element, sizeof element));
 }
 
-/* A missing derivative of an element type would give a method that uses it a wrong matrix. */
+/* Refuses a method that needs a derivative that an element type lacks: its matrix would be wrong. */
 static int run_check_derivatives (pw_run *r, const char *method, pw_error *error) {
   char block[200];
-  if (!r->differentiates) return PW_OK;
+  if (!r->uses_derivatives) return PW_OK;
   int found = pw_find_missing_block (r->w, r->t, r->q, r->v, block, sizeof block);
   if (found == PW_RESOURCE) return pw_fail_memory (r->s, error);
   if (found == 0) return pw_update_kinematics (r->w, r->t, r->q, r->v) == PW_OK ? PW_OK : pw_fail_signal (r->t, error);
@@ -156,14 +146,13 @@ static int run_open (pw_run *r, const char *method, const pw_settings *settings,
   const pw_settings none = { 0 };
   if (settings == NULL) settings = &none;
   r->limits = pw_watchdog_limits;
-  r->refuse = r->limits.rank;
+  r->refused_sine = r->limits.rank_lost;
   if (run_allocate (r) != PW_OK) return pw_fail_memory (r->s, error);
   if (run_initial_values (r, settings, error) != PW_OK ||
       pw_parse_options (method, settings->methods, &r->method, &r->stabilisation, r->option, error) != PW_OK)
     return PW_INPUT;
   r->fixed_steps = !r->method->adaptive || pw_run_option (r, "steps") != 0;
-  int status = run_settings (&r->settings, settings, r->method, error);
-  if (status == PW_OK && pw_fixed_steps (r)) status = run_check_step (&r->settings, error);
+  int status = run_settings (&r->settings, settings, r->method, r->fixed_steps, error);
   if (status != PW_OK) return status;
   r->t = r->settings.t;
   pw_hold_signals (r->w, 0);
@@ -177,7 +166,7 @@ static int run_open (pw_run *r, const char *method, const pw_settings *settings,
   pw_run_set_reference_level (r);
   pw_ledger_begin (r);
   pw_forget_residuals (r);
-  pw_note_residuals (r);
+  pw_record_residuals (r);
   status = pw_run_look_ahead (r, error);
   if (status != PW_OK) return status;
   if (pw_stabilised_by (r, PW_BAUMGARTE)) r->alpha = pw_run_option (r, "alpha"), r->beta = pw_run_option (r, "beta");

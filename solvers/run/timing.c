@@ -1,4 +1,4 @@
-/* The cost of an evaluation of the accelerations.
+/* The cost of an evaluation of the accelerations and its parts: pw_run_profile.
  *
  * Measurements are made after the run: each part of an evaluation is repeated at the last state, often enough for the
  * clock.  So a profile changes neither the results nor the cost of the run. */
@@ -9,22 +9,22 @@
 #include "method.h"
 #include "util.h"
 
-enum { PROFILE_BATCHES = 5 };
-#define PROFILE_BATCH 0.005    /* minimum processor time of a batch [s] */
+enum { PROFILE_REPETITIONS = 5 }; /* of a measurement, of which the median counts */
+#define PROFILE_MEASUREMENT 0.005 /* minimum processor time of a measurement [s] */
 #define PROFILE_DISTANCE 1e-10 /* displacement off the constraints before a projection, in units of the length scale */
 
-/* What is measured: stages of an evaluation, then others. */
+/* What is measured: PROFILE_STAGES stages of an evaluation, then others. */
 typedef enum {
   PROFILE_KINEMATICS,
   PROFILE_EQUATIONS,
-  PROFILE_STABILISE, /* the work for Baumgarte's terms */
+  PROFILE_STABILISE, /* Baumgarte's terms */
   PROFILE_FACTOR,
   PROFILE_SOLVE,
   PROFILE_EVALUATION,
   PROFILE_STAGES,
   PROFILE_CONFIGURATIONS,
   PROFILE_PROJECT, /* a projection from p->from and the evaluation after it, which reuses J and its factors */
-  PROFILE_SIGNALS, /* the following: of one batch */
+  PROFILE_SIGNALS, /* this and the following: of one batch of elements */
   PROFILE_J_GAMMA,
   PROFILE_FORCE,
   PROFILE_G
@@ -34,22 +34,23 @@ typedef struct {
   pw_run *r;
   pw_projector projector;    /* if the method projects */
   const pw_element_batch *k; /* the batch being measured */
-  pw_statistics done;        /* counts of the run, before the measurements */
-  double t, before;          /* two times, so that signals are evaluated each time */
-  double *far;               /* coords: positions off the constraints */
-  const double *from;        /* positions before a projection: of the run, or far */
+  pw_statistics of_run;      /* counts before the measurements */
+  double t, earlier;         /* times that alternate, so that signals are evaluated each time */
+  double *off;               /* coords: positions off the constraints */
+  const double *from;        /* positions before a projection: of the run, or off */
   double *q, *v, *f;         /* coords + 3: results; accelerations and multipliers go to the run's sample arrays */
   double *gamma, *eta, *jv;  /* rows: results */
   char *memory;
 } profile;
 
-/* Work on one batch of elements. */
-static void profile_elements (profile *p, profile_work work) {
+/* Does work on the batch p->k. */
+static void profile_do_batch (profile *p, profile_work work) {
   const pw_element_batch *k = p->k;
   const pw_kind *kind = k->kind;
   if (work == PROFILE_SIGNALS)
     for (int i = 0; i < k->b.count * kind->signals; i++)
-      pw_signal_eval (&k->source[i], p->t, !pw_kind_signals_force (kind), k->u + 3 * i);
+      pw_signal_eval (&k->source[i], p->t, pw_kind_signals_force (kind) ? PW_SIGNAL_VALUE : PW_SIGNAL_DERIVATIVES,
+                      k->u + 3 * i);
   else if (work == PROFILE_J_GAMMA) {
     kind->J (&k->b, k->J);
     if (kind->gamma) kind->gamma (&k->b, p->gamma + k->row);
@@ -95,13 +96,13 @@ static void profile_do (profile *p, profile_work work, double t) {
     pw_project_state (&p->projector, r, t, p->q, p->v, r->a_at, r->lambda_at);
     break;
   default:
-    profile_elements (p, work);
+    profile_do_batch (p, work);
   }
 }
 
 /* ---- The clock ---- */
 
-static int profile_order (const void *a, const void *b) {
+static int profile_compare (const void *a, const void *b) {
   double x = *(const double *)a, y = *(const double *)b;
   return (x > y) - (x < y);
 }
@@ -112,24 +113,25 @@ static double profile_clock (void) {
   return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
 }
 
-static double profile_batch (profile *p, profile_work work, long n) {
-  double begun = profile_clock ();
-  for (; n > 0; n--) profile_do (p, work, n % 2 ? p->t : p->before);
-  return profile_clock () - begun;
+/* Processor time [s] of doing the work `count` times. */
+static double profile_repeat (profile *p, profile_work work, long count) {
+  double start = profile_clock ();
+  for (; count > 0; count--) profile_do (p, work, count % 2 ? p->t : p->earlier);
+  return profile_clock () - start;
 }
 
-/* The median time [ns] of each kind of work from `first` on; the kinds take turns, so that a temporary slowdown of the
- * machine affects all of them. */
-static void profile_times (profile *p, profile_work first, int count, double *ns) {
-  double time[PROFILE_STAGES][PROFILE_BATCHES];
+/* The median time [ns] of each of the `kinds` kinds of work from `first` on.  They take turns, so that a temporary
+ * slowdown of the machine affects all of them. */
+static void profile_times (profile *p, profile_work first, int kinds, double *ns) {
+  double time[PROFILE_STAGES][PROFILE_REPETITIONS];
   long n[PROFILE_STAGES];
-  for (int i = 0; i < count; i++)
-    for (n[i] = 1; profile_batch (p, first + (profile_work)i, n[i]) < PROFILE_BATCH;) n[i] *= 2;
-  for (int j = 0; j < PROFILE_BATCHES; j++)
-    for (int i = 0; i < count; i++) time[i][j] = profile_batch (p, first + (profile_work)i, n[i]);
-  for (int i = 0; i < count; i++) {
-    qsort (time[i], PROFILE_BATCHES, sizeof **time, profile_order);
-    ns[i] = 1e9 * time[i][PROFILE_BATCHES / 2] / (double)n[i];
+  for (int i = 0; i < kinds; i++)
+    for (n[i] = 1; profile_repeat (p, first + (profile_work)i, n[i]) < PROFILE_MEASUREMENT;) n[i] *= 2;
+  for (int j = 0; j < PROFILE_REPETITIONS; j++)
+    for (int i = 0; i < kinds; i++) time[i][j] = profile_repeat (p, first + (profile_work)i, n[i]);
+  for (int i = 0; i < kinds; i++) {
+    qsort (time[i], PROFILE_REPETITIONS, sizeof **time, profile_compare);
+    ns[i] = 1e9 * time[i][PROFILE_REPETITIONS / 2] / (double)n[i];
   }
 }
 
@@ -161,13 +163,13 @@ static void profile_stages (profile *p, pw_profile *x) {
 
 /* The cost of a projection with the average number of iterations of the run, interpolated between none and some. */
 static void profile_projection (profile *p, pw_profile *x) {
-  double steps = (double)p->done.steps, none, some;
+  double steps = (double)p->of_run.steps, none, some;
   x->projections = 1 / fmax (1, pw_run_option (p->r, "every"));
-  double others = (double)p->done.rhs + (p->projector.own_velocity ? x->projections * steps : 0);
-  x->iterations = fmax (0, (double)p->done.factorisations - others) / (x->projections * steps);
+  double others = (double)p->of_run.rhs + (p->projector.owns_velocity ? x->projections * steps : 0);
+  x->iterations = fmax (0, (double)p->of_run.factorisations - others) / (x->projections * steps);
   p->from = p->r->q;
   none = profile_time (p, PROFILE_PROJECT);
-  p->from = p->far;
+  p->from = p->off;
   some = profile_time (p, PROFILE_PROJECT);
   int count = p->projector.iterations;
   x->projection = none + (count > 0 ? fmax (0, some - none) / count * x->iterations : 0);
@@ -176,9 +178,9 @@ static void profile_projection (profile *p, pw_profile *x) {
 static void profile_measure (profile *p, pw_profile *x) {
   profile_stages (p, x);
   /* explicit methods only: their steps consist of these evaluations */
-  if (p->done.jacobians == 0 && p->done.steps > 0) {
+  if (p->of_run.jacobians == 0 && p->of_run.steps > 0) {
     if (p->projector.position) profile_projection (p, x);
-    x->evaluations = (double)p->done.rhs / (double)p->done.steps - x->projections;
+    x->evaluations = (double)p->of_run.rhs / (double)p->of_run.steps - x->projections;
   }
   x->configurations = profile_time (p, PROFILE_CONFIGURATIONS);
   for (; x->kinds < p->r->s->batches; x->kinds++) {
@@ -192,11 +194,11 @@ static void profile_measure (profile *p, pw_profile *x) {
 static int profile_open (profile *p, pw_error *error) {
   const pw_run *r = p->r;
   size_t n = (size_t)r->s->coords + 3, rows = (size_t)r->s->rows;
-  const pw_array array[] = { { &p->far, n },      { &p->q, n },      { &p->v, n },    { &p->f, n },
+  const pw_array array[] = { { &p->off, n },      { &p->q, n },      { &p->v, n },    { &p->f, n },
                              { &p->gamma, rows }, { &p->eta, rows }, { &p->jv, rows } };
   p->memory = pw_alloc_arrays (array, sizeof array / sizeof *array);
   if (p->memory == NULL) return pw_fail_memory (r->s, error);
-  for (int j = 0; j < r->s->coords; j++) p->far[j] = r->q[j] + PROFILE_DISTANCE * r->s->scale.length * pw_sin (j + 1);
+  for (int j = 0; j < r->s->coords; j++) p->off[j] = r->q[j] + PROFILE_DISTANCE * r->s->scale.length * pw_sin (j + 1);
   (void)pw_evaluate_J_at (r->w, p->t, r->q, r->v);
   return pw_stabilised_by (r, PW_PROJECTION) ? pw_projector_open_by_options (&p->projector, p->r, error) : PW_OK;
 }
@@ -204,12 +206,12 @@ static int profile_open (profile *p, pw_error *error) {
 int pw_run_profile (pw_run *r, pw_profile *x, pw_error *error) {
   *x = (pw_profile){ .kinds = 0 };
   if (pw_require (r, "a run", error) != PW_OK) return PW_INPUT;
-  profile p = { .r = r, .done = r->statistics, .t = r->t, .before = nextafter (r->t, -INFINITY) };
+  profile p = { .r = r, .of_run = r->statistics, .t = r->t, .earlier = nextafter (r->t, -INFINITY) };
   x->kind = calloc ((size_t)r->s->batches + 1, sizeof *x->kind);
   int status = x->kind ? profile_open (&p, error) : pw_fail_memory (r->s, error);
   if (status == PW_OK && pw_run_accelerate (r, r->t, r->q, r->v, r->a_at, r->lambda_at) != PW_OK) status = PW_RETRY;
   if (status == PW_OK) profile_measure (&p, x);
-  r->statistics = p.done;
+  r->statistics = p.of_run;
   pw_projector_close (&p.projector);
   free (p.memory);
   return status;

@@ -1,17 +1,18 @@
-/* Saturating forces, such as friction: bounds on tolerances and on the use of Newton matrices.
+/* Saturating forces, such as friction, which reverse within a small range of velocities: bounds on tolerances and on
+ * the use of Newton matrices.
  *
- * A Newton matrix evaluated where such a force is steep, at rest, and used where it has saturated, makes corrections
- * about as small as the range of saturation, however large the residual is: the iteration would seem to converge
- * with the force of another state.  So tolerances stay below that range, and a matrix is reused only while no state
- * has moved by more than the range where it was evaluated. */
+ * With a Newton matrix evaluated inside that range, at rest, where the force is steep, and used where it has saturated,
+ * corrections are about as small as the range, however large the residual is: the iteration would seem to converge with
+ * the force of another state.  So tolerances stay below the range, and a matrix is reused only while no state has moved
+ * by more than the range of the state where it was evaluated. */
 #include <math.h>
 #include <string.h>
 #include "method.h"
 
-#define TOLERANCES_PART 0.1
+#define TOLERANCES_PART 0.1 /* of the change of a state that reverses a force: the largest error of that state */
 
-/* A tenth of the change that reverses a force, as the error of a single state: the norm of n errors equal to their
- * tolerances is 1, so a single one may be sqrt (n) times its tolerance. */
+/* The root mean square of n errors in units of their tolerances may be 1, so a single error may be sqrt (n) times its
+ * tolerance. */
 void pw_bound_tolerances (pw_run *r) {
   int coords = r->s->coords, n = 2 * coords;
   if (!r->s->saturates) return;
@@ -47,10 +48,10 @@ double pw_first_step (const pw_run *r) {
 
 int pw_run_saturation (pw_run *r, double *least, char *element, size_t size) {
   const pw_system *s = r->s;
-  double *rest = r->scratch;
+  double *at_rest = r->scratch;
   int state = -1;
-  for (int j = 0; j < s->coords; j++) rest[j] = 0;
-  if (s->saturates && pw_update_kinematics (r->w, r->t, r->q, rest) == PW_OK)
+  for (int j = 0; j < s->coords; j++) at_rest[j] = 0;
+  if (s->saturates && pw_update_kinematics (r->w, r->t, r->q, at_rest) == PW_OK)
     state = pw_find_saturation (r->w, least, element, size);
   if (s->saturates) (void)pw_update_kinematics (r->w, r->t, r->q, r->v);
   return state;

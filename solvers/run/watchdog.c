@@ -1,5 +1,5 @@
-/* Checks that the state reached is still on the motion: constraints lost or contradictory, a jump to another branch
- * at a singular configuration.
+/* Checks after each step that the run still follows the motion: that constraints are neither lost nor contradictory,
+ * and that the motion has not jumped to another branch at a singular configuration.
  *
  * The sine of the smallest angle between a row and those before it changes by at most about the motion of the
  * bodies, so it is computed again only when the motion since could have brought it to 0. */
@@ -11,18 +11,18 @@
 double pw_run_acceleration_norm (const pw_run *r) {
   const pw_system *s = r->s;
   const double *a = r->a, *internal = a + 3 * s->bodies;
-  double linear = 0, angular = 0, per = r->w->scale.time * r->w->scale.time;
+  double linear = 0, angular = 0, time_squared = r->w->scale.time * r->w->scale.time;
   for (; a < internal; a += 3) {
     linear = pw_larger_or_nan (pw_larger_or_nan (linear, fabs (a[0])), fabs (a[1]));
     angular = pw_larger_or_nan (angular, fabs (a[2]));
   }
   for (; a < r->a + s->coords; a++) angular = pw_larger_or_nan (angular, fabs (*a));
-  return pw_larger_or_nan (linear * (per / s->scale.length), angular * per);
+  return pw_larger_or_nan (linear * (time_squared / s->scale.length), angular * time_squared);
 }
 
-/* The largest change of a body's coordinate in the last step, scaled. */
+/* The largest change of a body's coordinate in the last step, in units of the scene. */
 static double watchdog_step_length (const pw_run *r) {
-  const double *last = r->geometry.q, *q = r->q;
+  const double *last = r->geometry.previous_q, *q = r->q;
   double length = 0, angle = 0;
   for (int j = 0; j < 3 * r->s->bodies; j += 3) {
     length = pw_larger (fabs (q[j] - last[j]), pw_larger (fabs (q[j + 1] - last[j + 1]), length));
@@ -36,25 +36,26 @@ static double watchdog_step_length (const pw_run *r) {
 /* Records the sine at the state reached. */
 static void watchdog_record_sine (pw_run *r, double sine) {
   pw_geometry *g = &r->geometry;
-  g->state_sine = sine;
+  g->checked_sine = sine;
   g->moved = 0;
-  g->typical = fmax (g->typical, sine);
+  g->largest_sine = fmax (g->largest_sine, sine);
 }
 
 /* 1 if the sine may be below this value at the state reached or after a motion of this length from there. */
 static int watchdog_reaches (const pw_run *r, double sine, double length) {
   const pw_geometry *g = &r->geometry;
-  return g->saddle && !(g->state_sine - r->limits.lipschitz * g->typical * (g->moved + length) > sine);
+  return g->saddle && !(g->checked_sine - r->limits.lipschitz * g->largest_sine * (g->moved + length) > sine);
 }
 
-/* Typical sines: at scattered configurations, which need not satisfy the constraints. */
+/* The typical sine: the largest at a few irregular configurations, which need not satisfy the constraints. */
 static void watchdog_sample_sines (pw_run *r) {
   const pw_system *s = r->s;
   pw_geometry *g = &r->geometry;
   for (int n = 1; n <= 4; n++) {
-    for (int j = 0; j < s->coords; j++) g->q[j] = r->q[j] + 0.5 * pw_unit (s, j) * pw_irregular (n, (j + 1) * n);
-    if (pw_evaluate_J_at (r->w, r->t, g->q, r->v) != PW_OK) break;
-    g->typical = fmax (g->typical, pw_watchdog_sine (r, NULL));
+    for (int j = 0; j < s->coords; j++)
+      g->previous_q[j] = r->q[j] + 0.5 * pw_unit (s, j) * pw_irregular (n, (j + 1) * n);
+    if (pw_evaluate_J_at (r->w, r->t, g->previous_q, r->v) != PW_OK) break;
+    g->largest_sine = fmax (g->largest_sine, pw_watchdog_sine (r, NULL));
   }
   (void)pw_evaluate_J_at (r->w, r->t, r->q, r->v);
 }
@@ -62,15 +63,15 @@ static void watchdog_sample_sines (pw_run *r) {
 void pw_watchdog_begin (pw_run *r) {
   pw_geometry *g = &r->geometry;
   if (g->saddle == NULL) return;
-  if (g->typical == 0) watchdog_sample_sines (r);
+  if (g->largest_sine == 0) watchdog_sample_sines (r);
   watchdog_record_sine (r, pw_watchdog_sine (r, NULL));
-  g->t = r->t;
-  g->start_sine = g->state_sine;
-  g->step = g->slope = 0;
-  g->before = NAN;
+  g->previous_t = r->t;
+  g->previous_sine = g->checked_sine;
+  g->step_length = g->sine_slope = 0;
+  g->sine_before_checked = NAN;
   g->crossed = 0;
-  g->alert = 1;
-  memcpy (g->q, r->q, (size_t)r->s->coords * sizeof *g->q);
+  g->singular_ahead = 1;
+  memcpy (g->previous_q, r->q, (size_t)r->s->coords * sizeof *g->previous_q);
 }
 
 /* Checks the step to the state reached, where J is evaluated.  PW_METHOD if it has passed a change point without
@@ -79,23 +80,23 @@ static int watchdog_follow (pw_run *r, pw_error *error) {
   pw_geometry *g = &r->geometry;
   int status = PW_OK;
   if (g->saddle == NULL) return PW_OK;
-  g->step = watchdog_step_length (r);
-  g->moved += g->step;
-  double near = r->limits.near * g->typical, ahead = r->limits.growth * g->step;
-  int now = watchdog_reaches (r, near, ahead);
-  if (now) {
-    double last = g->moved == g->step ? g->state_sine : NAN;
-    watchdog_record_sine (r, pw_watchdog_sine (r, &g->row));
-    status = pw_change_point_check (r, g->state_sine, error);
+  g->step_length = watchdog_step_length (r);
+  g->moved += g->step_length;
+  double near = r->limits.near * g->largest_sine, ahead = r->limits.step_growth * g->step_length;
+  int may_be_near = watchdog_reaches (r, near, ahead);
+  if (may_be_near) {
+    double last = g->moved == g->step_length ? g->checked_sine : NAN;
+    watchdog_record_sine (r, pw_watchdog_sine (r, &g->dependent_row));
+    status = pw_change_point_check (r, g->checked_sine, error);
     if (status == PW_OK) status = pw_change_point_resolve (r, last, error);
-    g->before = last;
+    g->sine_before_checked = last;
   } else
-    g->before = NAN, g->slope = 0, g->crossed = 0;
-  if (now && g->state_sine < near) r->near_singular = 1;
-  g->alert = now && watchdog_reaches (r, near, ahead);
-  g->t = r->t;
-  g->start_sine = now ? g->state_sine : NAN;
-  memcpy (g->q, r->q, (size_t)r->s->coords * sizeof *g->q);
+    g->sine_before_checked = NAN, g->sine_slope = 0, g->crossed = 0;
+  if (may_be_near && g->checked_sine < near) r->near_singular = 1;
+  g->singular_ahead = may_be_near && watchdog_reaches (r, near, ahead);
+  g->previous_t = r->t;
+  g->previous_sine = may_be_near ? g->checked_sine : NAN;
+  memcpy (g->previous_q, r->q, (size_t)r->s->coords * sizeof *g->previous_q);
   return status;
 }
 
@@ -128,53 +129,54 @@ static int watchdog_exceeds (double position, double velocity, double limit) {
 static int watchdog_contradicts (pw_run *r) {
   pw_residuals all, enforced;
   pw_evaluate_residuals (r->w, NULL, &all);
-  if (!watchdog_exceeds (all.position, all.velocity, r->limits.follows)) return 0;
+  if (!watchdog_exceeds (all.position, all.velocity, r->limits.redundant_residual)) return 0;
   pw_evaluate_residuals (r->w, r->active, &enforced);
-  double explained = r->limits.follows + r->limits.magnified * fmax (enforced.position, enforced.velocity);
+  double explained =
+      r->limits.redundant_residual + r->limits.redundant_ratio * fmax (enforced.position, enforced.velocity);
   return watchdog_exceeds (all.position, all.velocity, explained);
 }
 
 /* ---- Branches ---- */
 
-/* The constraint residual, in units of the scene. */
+/* The residual of positions, in units of the scene. */
 static double watchdog_residual (const pw_run *r) {
   return pw_larger (r->residuals.position, r->residuals.g / r->s->scale.length);
 }
 
-/* 1 if a constraint residual `off` may decide which branch is followed: if the sine s of the smallest angle between
- * rows, below its regular value, is not much larger than the square root of the residual.
+/* 1 if a constraint residual may decide which branch is followed: if the sine s of the smallest angle between rows is
+ * below its regular value, and s^2 below residual / ratio.
  *
  * Where two branches of a motion cross, the constraints are x y = 0 in suitable coordinates, and s = |(x, y)|.  With
  * a residual d they are x y = d: the branches do not cross but turn into each other, where s^2 is about 2 d.  A
  * method that follows the drifted constraints follows the turn, however small its steps. */
-static int watchdog_unresolved (pw_run *r, double off, double part) {
+static int watchdog_unresolved (pw_run *r, double residual, double ratio) {
   int row;
-  double bound = fmin (sqrt (off / part), r->limits.regular * r->geometry.typical);
-  return bound > r->limits.rank && watchdog_reaches (r, bound, 0) && pw_watchdog_sine (r, &row) < bound &&
+  double bound = fmin (sqrt (residual / ratio), r->limits.regular * r->geometry.largest_sine);
+  return bound > r->limits.rank_lost && watchdog_reaches (r, bound, 0) && pw_watchdog_sine (r, &row) < bound &&
          row < r->s->holonomic;
 }
 
-/* Fails where accelerations jump, or residuals are large, while they may decide the branch.  Such a turn is a corner whose radius
- * grows with the residual, so that its accelerations need not jump. */
-static int watchdog_check_turn (pw_run *r, double now, pw_error *error) {
-  const pw_watchdog *limit = &r->limits;
-  double off = watchdog_residual (r), before = fmax (r->previous_norm, limit->least_turn);
-  if (!(now <= limit->turn * before) && watchdog_unresolved (r, off, limit->drift_turn))
+/* Fails where accelerations jump, or residuals are large, while they may decide the branch.  Such a turn is a corner
+ * whose radius grows with the residual, so that its accelerations need not jump. */
+static int watchdog_check_turn (pw_run *r, double norm, pw_error *error) {
+  const pw_thresholds *limit = &r->limits;
+  double residual = watchdog_residual (r), before = fmax (r->previous_norm, limit->turn_reference);
+  if (!(norm <= limit->turn_growth * before) && watchdog_unresolved (r, residual, limit->drift_turn))
     return pw_fail (error, PW_METHOD,
                     "t = %.6g s: lost at a singular configuration: constraint residuals of %.2g (scaled) may lead to "
                     "another branch, with accelerations %.3g times those before; methods with projection pass",
-                    r->t, off, now / before);
-  if (!(off <= limit->drift_far) && watchdog_unresolved (r, off, limit->drift_any))
+                    r->t, residual, norm / before);
+  if (!(residual <= limit->drift_far) && watchdog_unresolved (r, residual, limit->drift_any))
     return pw_fail (
         error, PW_METHOD,
         "t = %.6g s: lost at a singular configuration: constraint residuals of %.2g (scaled) do not tell one branch "
         "from another; methods with projection pass",
-        r->t, off);
+        r->t, residual);
   return PW_OK;
 }
 
-/* Near a singular configuration: 1 if the dependent row is nonholonomic, or accelerations are not finite. */
-static int watchdog_near_rows (pw_run *r, double norm) {
+/* 1 near a singular configuration whose dependent row is nonholonomic, or where accelerations are not finite. */
+static int watchdog_may_jump (pw_run *r, double norm) {
   int row;
   if (!r->near_singular) return 0;
   pw_watchdog_sine (r, &row);
@@ -183,21 +185,21 @@ static int watchdog_near_rows (pw_run *r, double norm) {
 
 /* Accelerations of the physical motion do not grow at a singular configuration; in a jump to another branch they do. */
 static int watchdog_check_jump (pw_run *r, pw_error *error) {
-  double now = pw_run_acceleration_norm (r);
-  if (watchdog_near_rows (r, now) && !(now <= r->limits.jump * r->reference_level))
+  double norm = pw_run_acceleration_norm (r);
+  if (watchdog_may_jump (r, norm) && !(norm <= r->limits.jump_growth * r->reference_level))
     return pw_fail (error, PW_METHOD,
                     "t = %.6g s: lost at a singular configuration: the accelerations are %.3g times those before", r->t,
-                    now / r->reference_level);
+                    norm / r->reference_level);
   if (r->near_singular || watchdog_unresolved (r, watchdog_residual (r), r->limits.drift_near))
-    return watchdog_check_turn (r, now, error);
-  r->reference_level = pw_larger (now, r->reference_level);
-  r->previous_norm = now;
+    return watchdog_check_turn (r, norm, error);
+  r->reference_level = pw_larger (norm, r->reference_level);
+  r->previous_norm = norm;
   return PW_OK;
 }
 
 int pw_run_watchdog (pw_run *r, pw_error *error) {
   const pw_statistics *s = &r->statistics;
-  pw_note_residuals (r);
+  pw_record_residuals (r);
   double lost = pw_stabilised_by (r, PW_UNSTABILISED) ? r->limits.lost_unstabilised : r->limits.lost;
   if (watchdog_exceeds (s->position, s->velocity, lost) || (r->redundant && watchdog_contradicts (r)))
     return watchdog_fail_lost (r, error);

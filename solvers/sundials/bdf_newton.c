@@ -1,10 +1,12 @@
 /* Newton's iteration for BDF: (I - gamma df/dy) x = b without forming the dense df/dy.
  *
- * The equations of motion differentiated are  T (dq, dv, da, dlambda) = 0,  sparse (tangent.c).  With
+ * y = (q, v), y' = (v, a), and gamma is CVODES' coefficient of the step.  With T = (T_q, T_v, T_a, T_lambda), the
+ * sparse derivatives of the equations of motion (tangent.c), a change of the state changes a and lambda so that T (dq,
+ * dv, da, dlambda) = 0.  With
  *
  *   x_q = b_q + gamma x_v,   x_v = b_v + gamma da
  *
- * only da and dlambda remain, with a matrix like that of the accelerations:
+ * only da and dlambda are unknown, with a matrix like that of the accelerations:
  *
  *   (T_a + gamma T_v + gamma^2 T_q) da + T_lambda dlambda = - T_q (b_q + gamma b_v) - T_v b_v
  *
@@ -21,65 +23,66 @@ int pw_multistep_accelerate (multistep_data *d, double t, const double *y) {
   return status == PW_OK ? 0 : status > 0 ? 1 : -1;
 }
 
-/* Columns of T: q, v, a, lambda. */
-static void newton_fill (multistep_data *d) {
+/* Adds all entries of T, in the columns q, v, a, lambda. */
+static void newton_fill_T (multistep_data *d) {
   int n = d->n;
   const pw_tangent_layout to = {
-    .momentum = 0, .constraint = n, .q = 0, .v = n, .a = 2 * n, .lambda = 3 * n, .of_a = 1, .of_lambda = 1
+    .momentum = 0, .constraint = n, .q = 0, .v = n, .a = 2 * n, .lambda = 3 * n, .a_factor = 1, .lambda_factor = 1
   };
-  pw_tangent_momentum (&d->newton.tangent, &to, d->lambda);
-  pw_tangent_accelerations (&d->newton.tangent, &to, d->v, d->a);
+  pw_tangent_add_momentum (&d->newton.tangent, &to, d->lambda);
+  pw_tangent_add_accelerations (&d->newton.tangent, &to, d->v, d->a);
 }
 
-/* The matrix from T. */
-static void newton_combine (pw_bdf_newton *w, int n) {
+/* Adds all entries of the matrix, from those of T. */
+static void newton_fill_matrix (pw_bdf_newton *w, int n) {
   const pw_tangent *x = &w->tangent;
   const double power[] = { w->gamma * w->gamma, w->gamma, 1 };
   for (int c = 0; c < 3 * n + x->rows; c++) {
-    int part = c < 2 * n ? c / n : 2, to = c < 2 * n ? c % n : c - 2 * n;
+    int part = c < 2 * n ? c / n : 2, column = c < 2 * n ? c % n : c - 2 * n; /* parts: q; v; a and lambda */
     for (int64_t i = x->colptr[c]; i < x->colptr[c + 1]; i++)
-      pw_scatter_add (&w->scatter, (int)x->rowind[i], to, w->value ? power[part] * w->value[i] : 0);
+      pw_scatter_add (&w->scatter, (int)x->rowind[i], column, w->value ? power[part] * w->value[i] : 0);
   }
 }
 
-/* Called by CVODES: evaluates T unless the current one is still valid, then forms the matrix with gamma. */
-static int newton_set_up (realtype t, N_Vector y, N_Vector derivative, SUNMatrix matrix, booleantype good,
-                          booleantype *fresh, realtype gamma, void *data, N_Vector t1, N_Vector t2, N_Vector t3) {
+/* Called by CVODES: evaluates T unless the last one is still valid, which CVODES proposes by `reuse`, then forms the
+ * matrix with gamma.  *evaluated: whether it evaluated T. */
+static int newton_set_up (realtype t, N_Vector y, N_Vector derivative, SUNMatrix matrix, booleantype reuse,
+                          booleantype *evaluated, realtype gamma, void *data, N_Vector tmp1, N_Vector tmp2,
+                          N_Vector tmp3) {
   multistep_data *d = data;
   pw_bdf_newton *w = &d->newton;
   const pw_tangent *x = &w->tangent;
-  (void)derivative, (void)t1, (void)t2, (void)t3;
-  good = good && !d->sun.run->outdated;
-  *fresh = !good;
-  if (!good) {
+  (void)derivative, (void)tmp1, (void)tmp2, (void)tmp3;
+  *evaluated = !reuse || d->sun.run->outdated;
+  if (*evaluated) {
     int columns = 3 * d->n + x->rows, status = pw_multistep_accelerate (d, t, N_VGetArrayPointer (y));
     if (status != 0) return status;
     memcpy (d->v, N_VGetArrayPointer (y) + d->n, (size_t)d->n * sizeof *d->v);
     memset (w->value, 0, (size_t)x->colptr[columns] * sizeof *w->value);
-    pw_scatter_begin (&w->tangent.scatter, w->value);
-    newton_fill (d);
+    pw_scatter_begin_fill (&w->tangent.scatter, w->value);
+    newton_fill_T (d);
     pw_matrix_evaluated (d->sun.run, N_VGetArrayPointer (y), d->v);
     d->sun.run->statistics.jacobians++;
   }
   w->gamma = gamma;
   pw_sun_clear (matrix, w->colptr, w->rowind);
-  pw_scatter_begin (&w->scatter, SUNSparseMatrix_Data (matrix));
-  newton_combine (w, d->n);
+  pw_scatter_begin_fill (&w->scatter, SUNSparseMatrix_Data (matrix));
+  newton_fill_matrix (w, d->n);
   d->sun.run->statistics.factorisations++; /* CVODES factorises next */
   return 0;
 }
 
-/* ---- The linear solver of CVODES ---- */
+/* ---- Solving for x ---- */
 
 /* right = - T_q (b_q + gamma b_v) - T_v b_v */
-static void newton_right (const multistep_data *d, const double *b, double *right) {
+static void newton_right_side (const multistep_data *d, const double *b, double *right) {
   const pw_bdf_newton *w = &d->newton;
   const pw_tangent *x = &w->tangent;
   int n = d->n;
   memset (right, 0, (size_t)(n + x->rows) * sizeof *right);
   for (int c = 0; c < 2 * n; c++) {
-    double by = c < n ? b[c] + w->gamma * b[n + c] : b[c];
-    for (int64_t i = x->colptr[c]; i < x->colptr[c + 1]; i++) right[x->rowind[i]] -= w->value[i] * by;
+    double factor = c < n ? b[c] + w->gamma * b[n + c] : b[c];
+    for (int64_t i = x->colptr[c]; i < x->colptr[c + 1]; i++) right[x->rowind[i]] -= w->value[i] * factor;
   }
 }
 
@@ -90,7 +93,7 @@ static int newton_solve (SUNLinearSolver solver, SUNMatrix matrix, N_Vector vx, 
   double *x = N_VGetArrayPointer (vx);
   int n = d->n;
   if (d->sun.run->outdated) return SUNLS_PACKAGE_FAIL_REC; /* CVODES then requests a new matrix */
-  newton_right (d, b, N_VGetArrayPointer (w->right));
+  newton_right_side (d, b, N_VGetArrayPointer (w->right));
   int flag = SUNLinSolSolve (d->sun.klu, matrix, w->change, w->right, tolerance);
   if (flag != SUNLS_SUCCESS) return flag;
   for (int j = 0; j < n; j++) {
@@ -107,11 +110,11 @@ static int newton_lay_out (multistep_data *d) {
   pw_bdf_newton *w = &d->newton;
   pw_tangent *x = &w->tangent;
   int columns = 3 * d->n + x->rows, size = d->n + x->rows;
-  pw_scatter_record (&x->scatter);
-  newton_fill (d);
+  pw_scatter_begin_record (&x->scatter);
+  newton_fill_T (d);
   if (pw_scatter_lay_out (&x->scatter, columns, &x->colptr, &x->rowind) != PW_OK) return PW_RESOURCE;
-  pw_scatter_record (&w->scatter);
-  newton_combine (w, d->n);
+  pw_scatter_begin_record (&w->scatter);
+  newton_fill_matrix (w, d->n);
   if (pw_scatter_lay_out (&w->scatter, size, &w->colptr, &w->rowind) != PW_OK) return PW_RESOURCE;
   w->value = calloc ((size_t)x->colptr[columns] + 1, sizeof *w->value);
   return w->value ? PW_OK : PW_RESOURCE;

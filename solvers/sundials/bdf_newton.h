@@ -1,37 +1,37 @@
-/* Newton matrix of BDF, and the data it shares with the driver of CVODES, multistep.c. */
+/* The data that the multistep methods (multistep.c) share with Newton's iteration of bdf (bdf_newton.c). */
 #ifndef PW_BDF_NEWTON_H
 #define PW_BDF_NEWTON_H
 
 #include "sundials.h"
 #include "tangent.h"
 
-/* Newton's iteration; see bdf_newton.c. */
+/* Named as at the top of bdf_newton.c. */
 typedef struct {
-  pw_tangent tangent;     /* its matrix is T */
-  double *value;          /* of T */
-  double gamma;           /* of the matrix last set up */
-  pw_scatter_map scatter; /* from the entries of T, in order, to the matrix */
-  int64_t *colptr, *rowind;
-  N_Vector right, change; /* coords and independent equations */
+  pw_tangent tangent;       /* its pattern is that of T */
+  double *value;            /* nonzero values of T */
+  double gamma;             /* of the matrix last set up */
+  pw_scatter_map scatter;   /* from the entries of T, in order, to the matrix */
+  int64_t *colptr, *rowind; /* pattern of the matrix, in compressed columns */
+  N_Vector right, change;   /* coords and active rows: right-hand side; da, dlambda */
 } pw_bdf_newton;
 
 struct pw_method_data {
   pw_sun sun; /* first */
   void *cvode;
-  int n; /* coordinates */
-  int projects;
+  int n;        /* coordinates */
+  int projects; /* 1: coordinate projection, by `projector` */
   pw_projector projector;
-  pw_bdf_newton newton;       /* BDF */
-  double *q, *v, *a, *lambda; /* scratch: coords + 3 each, rows */
-  double *error;              /* scratch: 2 coords */
-  int evaluated;              /* 1: the accelerations of the current state have been evaluated */
+  pw_bdf_newton newton;       /* only of bdf */
+  double *q, *v, *a, *lambda; /* coords + 3 each, rows: scratch; a, lambda: of the last evaluation */
+  double *error;              /* 2 coords: scratch */
+  int evaluated;              /* 1: r->a, r->lambda are those of the state reached, not of the last iterate */
   char *memory;
 };
 
 typedef struct pw_method_data multistep_data;
 
-/* Accelerations and multipliers at y, into d->a and d->lambda.  0; > 0: a smaller step may succeed; < 0: a signal
- * failed. */
+/* Stores accelerations and multipliers at y in d->a and d->lambda.  Returns as functions that CVODES calls: 0; > 0: a
+ * smaller step may succeed; < 0: a signal failed. */
 int pw_multistep_accelerate (multistep_data *d, double t, const double *y);
 
 /* Opens the Newton matrix and attaches it to CVODES.  PW_OK or PW_RESOURCE. */

@@ -12,25 +12,25 @@
 #include "sundials.h"
 
 struct pw_method_data {
-  pw_sun sun;   /* first */
-  void *memory; /* IDA's */
+  pw_sun sun; /* first */
+  void *ida;
   pw_dae dae;
-  N_Vector yp, id;
-  double *unit; /* rows: 1 for a force, L for a moment */
+  N_Vector yp, id; /* y'; 1 for unknowns that are in the error test */
+  double *unit;    /* active rows: 1 for a force, L for a moment */
 };
 
 typedef struct pw_method_data ida_data;
 
 /* ---- Equations ---- */
 
-/* Updates kinematics and J at the unknowns. */
+/* Updates kinematics and J at the unknowns y. */
 static int ida_update (ida_data *d, double t, const double *y) {
   return pw_evaluate_J_at (d->sun.run->w, pw_before_breakpoint (d->sun.run, t), y, y + d->dae.n);
 }
 
 /* The multipliers of the independent equations, among the unknowns or among their derivatives. */
 static const double *ida_lambda (const ida_data *d, const double *y, const double *yp) {
-  return (d->dae.impulses ? yp : y) + 2 * d->dae.n;
+  return (d->dae.integrates_multipliers ? yp : y) + 2 * d->dae.n;
 }
 
 /* Called by IDA: F (t, y, y'). */
@@ -47,14 +47,14 @@ static int ida_residual (realtype t, N_Vector vy, N_Vector vyp, N_Vector out, vo
 
 /* Called by IDA: dF/dy + c dF/dy'. */
 static int ida_matrix (realtype t, realtype c, N_Vector vy, N_Vector vyp, N_Vector residual, SUNMatrix matrix,
-                       void *data, N_Vector t1, N_Vector t2, N_Vector t3) {
+                       void *data, N_Vector tmp1, N_Vector tmp2, N_Vector tmp3) {
   ida_data *d = data;
   pw_tangent *x = &d->dae.tangent;
   const double *y = N_VGetArrayPointer (vy), *yp = N_VGetArrayPointer (vyp), *v = y + d->dae.n;
-  (void)residual, (void)t1, (void)t2, (void)t3;
+  (void)residual, (void)tmp1, (void)tmp2, (void)tmp3;
   if (ida_update (d, t, y) != PW_OK) return -1;
   pw_sun_clear (matrix, x->colptr, x->rowind);
-  pw_scatter_begin (&x->scatter, SUNSparseMatrix_Data (matrix));
+  pw_scatter_begin_fill (&x->scatter, SUNSparseMatrix_Data (matrix));
   pw_dae_matrix (&d->dae, v, yp + d->dae.n, ida_lambda (d, y, yp), c, c);
   pw_matrix_evaluated (d->sun.run, y, v);
   return 0;
@@ -69,16 +69,16 @@ static int ida_open_matrix (ida_data *d) {
 
 /* ---- Error weights ---- */
 
-/* The coefficient c of the current step, 1 / h before the first; at least 1 / T. */
-static double ida_leading (const ida_data *d) {
+/* The coefficient c of y' in the matrix of the current step, 1 / h before the first; at least 1 / T. */
+static double ida_leading_coefficient (const ida_data *d) {
   const pw_run *r = d->sun.run;
   realtype c = 0;
-  if (r->t == d->sun.t0 || IDAGetCurrentCj (d->memory, &c) != IDA_SUCCESS || c == 0) c = 1 / pw_first_step (r);
+  if (r->t == d->sun.t0 || IDAGetCurrentCj (d->ida, &c) != IDA_SUCCESS || c == 0) c = 1 / pw_first_step (r);
   return fmax (c, 1 / r->w->scale.time);
 }
 
-/* The scale of forces: from the masses, else from the multipliers, else 1. */
-static double ida_force (const pw_run *r) {
+/* The scale of forces [N]: from the masses, else from the multipliers, else 1. */
+static double ida_force_scale (const pw_run *r) {
   const pw_system *s = r->s;
   double L = s->scale.length, T = r->w->scale.time, force = 0;
   for (int j = 0; j < s->coords; j++) force = fmax (force, s->mass[j] / (T * T) * (pw_is_angle (s, j) ? 1 / L : L));
@@ -87,32 +87,34 @@ static double ida_force (const pw_run *r) {
   return force > 0 ? force : 1;
 }
 
-/* Error weights.  Those of the multipliers use the scales of forces and velocities, times L for moments and angles.
+/* Called by IDA: error weights.  Those of the multipliers use the scales of forces and velocities, times L for moments
+ * and angles.
  *
- * As unknowns the multipliers are not in the error test, and their corrections are those of v or q divided by the step:
- * with J v = eta their weights are divided by c for the convergence test.  As derivatives, their integrals over T are
- * weighted, with lambda of the previous step. */
-static int ida_weigh (N_Vector vy, N_Vector weights, void *user) {
-  ida_data *d = user;
+ * As unknowns, lambda and mu are not in the error test, and their corrections are those of v or q divided by the step:
+ * with J v = eta, their tolerances are multiplied by c T for the test of convergence.  In si1 the unknowns are their
+ * integrals, whose tolerances are those of the multipliers times T, with lambda of the previous step. */
+static int ida_weigh (N_Vector vy, N_Vector weights, void *data) {
+  ida_data *d = data;
   const pw_run *r = d->sun.run;
   const pw_settings *set = &r->settings;
   const double *y = N_VGetArrayPointer (vy);
-  int stiff = d->dae.velocities && !d->dae.impulses;
-  double *w = N_VGetArrayPointer (weights), force = ida_force (r);
-  double L = r->s->scale.length, T = r->w->scale.time, c = stiff ? ida_leading (d) : 1 / T;
-  double relax = d->dae.impulses ? T : c * T, mu = (set->atol > 0 ? set->atol : set->rtol * L / T) * relax;
+  int relaxed = d->dae.enforces_velocities && !d->dae.integrates_multipliers;
+  double *w = N_VGetArrayPointer (weights), force = ida_force_scale (r);
+  double L = r->s->scale.length, T = r->w->scale.time, c = relaxed ? ida_leading_coefficient (d) : 1 / T;
+  double relax = d->dae.integrates_multipliers ? T : c * T,
+         mu = (set->atol > 0 ? set->atol : set->rtol * L / T) * relax;
   pw_sun_weigh (&d->sun, y, w);
   for (int i = 0; i < d->dae.rows; i++) {
-    double lambda = d->dae.impulses ? r->lambda[d->dae.tangent.row[i]] : y[2 * d->dae.n + i];
+    double lambda = d->dae.integrates_multipliers ? r->lambda[d->dae.tangent.row[i]] : y[2 * d->dae.n + i];
     w[2 * d->dae.n + i] = 1 / (relax * set->rtol * (fabs (lambda) + force * d->unit[i]));
   }
-  for (int i = 0; i < d->dae.mus; i++) w[2 * d->dae.n + d->dae.rows + i] = 1 / (mu * d->unit[i]);
+  for (int i = 0; i < d->dae.mu_count; i++) w[2 * d->dae.n + d->dae.rows + i] = 1 / (mu * d->unit[i]);
   return 0;
 }
 
 /* ---- States ---- */
 
-/* Fills IDA's vectors with the current state. */
+/* Fills IDA's vectors with the state reached. */
 static void ida_fill_vectors (ida_data *d) {
   const pw_run *r = d->sun.run;
   size_t n = (size_t)d->dae.n;
@@ -121,7 +123,7 @@ static void ida_fill_vectors (ida_data *d) {
   memset (yp, 0, (size_t)d->dae.size * sizeof *y);
   memcpy (y, r->q, n * sizeof *y);
   memcpy (y + n, r->v, n * sizeof *y);
-  pw_tangent_compress (&d->dae.tangent, r->lambda, d->dae.rows, (d->dae.impulses ? yp : y) + 2 * n);
+  pw_tangent_compress (&d->dae.tangent, r->lambda, d->dae.rows, (d->dae.integrates_multipliers ? yp : y) + 2 * n);
   memcpy (yp, r->v, n * sizeof *y);
   memcpy (yp + n, r->a, n * sizeof *y);
 }
@@ -133,7 +135,7 @@ static void ida_read (const ida_data *d, double *q, double *v, double *a, double
   memcpy (q, y, n * sizeof *q);
   memcpy (v, y + n, n * sizeof *v);
   memcpy (a, yp + n, n * sizeof *a);
-  pw_tangent_store (&d->dae.tangent, ida_lambda (d, y, yp), lambda);
+  pw_tangent_expand (&d->dae.tangent, ida_lambda (d, y, yp), lambda);
 }
 
 /* Interpolates the state at t into the sample arrays and updates kinematics.  Accelerations and multipliers are
@@ -142,17 +144,17 @@ static void ida_read (const ida_data *d, double *q, double *v, double *a, double
 static int ida_interpolate (ida_data *d, double t) {
   pw_run *r = d->sun.run;
   long steps = 0;
-  int flag = IDAGetNumSteps (d->memory, &steps);
+  int flag = IDAGetNumSteps (d->ida, &steps);
   if (flag == IDA_SUCCESS && (steps == 0 ? t != r->t : t > r->t)) flag = IDA_BAD_T;
   if (steps == 0) ida_fill_vectors (d);
-  if (flag == IDA_SUCCESS && steps > 0) flag = IDAGetDky (d->memory, t, 1, d->yp);
-  if (flag == IDA_SUCCESS && steps > 0) flag = IDAGetDky (d->memory, t, 0, d->sun.y);
+  if (flag == IDA_SUCCESS && steps > 0) flag = IDAGetDky (d->ida, t, 1, d->yp);
+  if (flag == IDA_SUCCESS && steps > 0) flag = IDAGetDky (d->ida, t, 0, d->sun.y);
   if (flag != IDA_SUCCESS) return flag;
   ida_read (d, r->q_at, r->v_at, r->a_at, r->lambda_at);
   if (ida_update (d, t, N_VGetArrayPointer (d->sun.y)) != PW_OK) return IDA_RES_FAIL;
-  pw_statistics keep = r->statistics;
+  const pw_statistics statistics = r->statistics;
   if (pw_saddle_factor (r->saddle) == PW_OK) pw_run_accelerate_updated (r, r->v_at, r->a_at, r->lambda_at);
-  r->statistics = keep;
+  r->statistics = statistics;
   return IDA_SUCCESS;
 }
 
@@ -164,20 +166,19 @@ static int ida_power (pw_run *r, double t, double *rate) {
   return flag == IDA_SUCCESS ? PW_OK : PW_RETRY;
 }
 
-/* Work and losses up to the current state; the saddle-point matrix is factorised if `status` is PW_OK.  Multipliers
+/* Work and losses up to the state reached; factorised: 1 if the saddle-point matrix is factorised there.  Multipliers
  * outside the error test are not accurate enough and are recomputed.  PW_METHOD if a signal failed. */
-static int ida_work (ida_data *d, int status) {
+static int ida_work (ida_data *d, int factorised) {
   pw_run *r = d->sun.run;
   int order = 1;
   const double *lambda = r->lambda;
-  if (status == PW_OK && d->dae.velocities && pw_ledger_reacts (r->s)) {
+  if (factorised && d->dae.enforces_velocities && pw_ledger_uses_multipliers (r->s)) {
     pw_run_accelerate_updated (r, r->v, r->a_at, r->lambda_at);
     lambda = r->lambda_at;
   }
   pw_ledger_rates (r, lambda, r->rate);
-  IDAGetLastOrder (d->memory, &order);
-  if (!pw_quadrature_step (&d->sun.quadrature, r, order)) return PW_OK;
-  return pw_evaluate_J_at (r->w, pw_before_breakpoint (r, r->t), r->q, r->v);
+  IDAGetLastOrder (d->ida, &order);
+  return pw_quadrature_step (&d->sun.quadrature, r, order);
 }
 
 /* ---- Opening ---- */
@@ -189,7 +190,8 @@ static int ida_open_vectors (ida_data *d, pw_run *r) {
   d->unit = calloc ((size_t)d->dae.rows + 1, sizeof *d->unit);
   if (!d->yp || !d->id || !d->unit) return PW_RESOURCE;
   for (int i = 0; i < d->dae.rows; i++) d->unit[i] = pw_rank_multiplier_unit (d->sun.run->w, d->dae.tangent.row[i]);
-  for (int i = 0; i < d->dae.size; i++) N_VGetArrayPointer (d->id)[i] = i < 2 * d->dae.n || d->dae.impulses;
+  for (int i = 0; i < d->dae.size; i++)
+    N_VGetArrayPointer (d->id)[i] = i < 2 * d->dae.n || d->dae.integrates_multipliers;
   ida_fill_vectors (d);
   return PW_OK;
 }
@@ -200,7 +202,7 @@ static int ida_initialise (SUNLinearSolver solver) {
 
 static int ida_open_solver (ida_data *d) {
   pw_sun *x = &d->sun;
-  void *m = d->memory = IDACreate (x->context);
+  void *m = d->ida = IDACreate (x->context);
   if (m == NULL || pw_sun_open_solver (x, x->y, d, NULL) != PW_OK) return PW_RESOURCE;
   x->solver->ops->initialize = ida_initialise;
   if (IDASetErrHandlerFn (m, pw_sun_message, x) || IDASetUserData (m, d) ||
@@ -228,7 +230,7 @@ static int ida_open (pw_run *r, pw_error *error) {
 
 static void ida_close (pw_run *r) {
   ida_data *d = r->data;
-  if (d->memory) IDAFree (&d->memory);
+  if (d->ida) IDAFree (&d->ida);
   if (d->yp) N_VDestroy (d->yp);
   if (d->id) N_VDestroy (d->id);
   pw_sun_close (&d->sun);
@@ -242,13 +244,13 @@ static void ida_close (pw_run *r) {
 static void ida_statistics (ida_data *d) {
   pw_statistics *s = &d->sun.run->statistics, now = { 0 };
   const pw_statistics *before = &d->sun.before;
-  long tests = 0, newton = 0;
-  IDAGetNumSteps (d->memory, &now.steps);
-  IDAGetNumErrTestFails (d->memory, &tests);
-  IDAGetNumNonlinSolvConvFails (d->memory, &newton);
-  IDAGetNumResEvals (d->memory, &now.rhs);
-  IDAGetNumJacEvals (d->memory, &now.jacobians);
-  IDAGetNumLinSolvSetups (d->memory, &now.factorisations);
+  long tests = 0, newton = 0; /* failed */
+  IDAGetNumSteps (d->ida, &now.steps);
+  IDAGetNumErrTestFails (d->ida, &tests);
+  IDAGetNumNonlinSolvConvFails (d->ida, &newton);
+  IDAGetNumResEvals (d->ida, &now.rhs);
+  IDAGetNumJacEvals (d->ida, &now.jacobians);
+  IDAGetNumLinSolvSetups (d->ida, &now.factorisations);
   s->steps = before->steps + now.steps;
   s->rejected = before->rejected + tests + newton;
   s->rhs = before->rhs + now.rhs;
@@ -266,12 +268,12 @@ static int ida_restart (pw_run *r, pw_error *error) {
   pw_quadrature_restart (&d->sun.quadrature, r);
   pw_sun_restart (&d->sun);
   ida_fill_vectors (d);
-  int flag = IDASetInitStep (d->memory, pw_first_step (r));
-  if (flag == IDA_SUCCESS) flag = IDAReInit (d->memory, r->t, d->sun.y, d->yp);
+  int flag = IDASetInitStep (d->ida, pw_first_step (r));
+  if (flag == IDA_SUCCESS) flag = IDAReInit (d->ida, r->t, d->sun.y, d->yp);
   return flag == IDA_SUCCESS ? PW_OK : pw_sun_fail_restart (&d->sun, flag, error);
 }
 
-/* Reads the current state from y and updates the ledger.  IDA's multipliers are accurate if it solves J v = eta.  On
+/* Makes (y, y') the state reached and updates the ledger.  IDA's multipliers are accurate if it solves J v = eta.  On
  * acceleration level, only the Newton iteration determines those of prescribed motions, and they may drift without
  * effect on the motion: there they are recomputed.  PW_METHOD if a signal failed. */
 static int ida_reach (ida_data *d) {
@@ -282,16 +284,16 @@ static int ida_reach (ida_data *d) {
   pw_bound_tolerances (r);
   status = pw_saddle_factor (r->saddle);
   if (status < 0) return status;
-  if (status == PW_OK && !d->dae.velocities) pw_run_accelerate_updated (r, r->v, r->a_at, r->lambda);
+  if (status == PW_OK && !d->dae.enforces_velocities) pw_run_accelerate_updated (r, r->v, r->a_at, r->lambda);
   r->near_singular = status != PW_OK || pw_watchdog_near (r);
-  return r->s->entries > 0 ? ida_work (d, status) : PW_OK;
+  return r->s->entries > 0 ? ida_work (d, status == PW_OK) : PW_OK;
 }
 
 static int ida_advance (pw_run *r, double t_end, pw_error *error) {
   ida_data *d = r->data;
   double stop = fmin (t_end, r->breakpoint), t = r->t;
-  int flag = IDASetStopTime (d->memory, stop);
-  if (flag >= 0) flag = IDASolve (d->memory, stop, &t, d->sun.y, d->yp, IDA_ONE_STEP);
+  int flag = IDASetStopTime (d->ida, stop);
+  if (flag >= 0) flag = IDASolve (d->ida, stop, &t, d->sun.y, d->yp, IDA_ONE_STEP);
   if (flag < 0) return ida_fail (d, flag, error);
   r->t = flag == IDA_TSTOP_RETURN ? stop : t;
   if (ida_reach (d) != PW_OK) return ida_fail (d, IDA_RES_FAIL, error);
@@ -318,10 +320,7 @@ static const pw_stabilisation ida_stabilisations[] = {
   { .name = NULL },
 };
 
-static const pw_option ida_options[] = {
-  PW_BAUMGARTE_OPTIONS,
-  { .name = NULL },
-};
+static const pw_option ida_options[] = { PW_BAUMGARTE_OPTIONS, { .name = NULL } };
 
 const pw_method pw_method_ida = {
   .name = "ida",

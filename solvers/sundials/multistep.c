@@ -1,12 +1,14 @@
-/* adams, bdf: the multistep methods of CVODES on the accelerations, one driver for both formulas.
+/* adams, bdf: the multistep methods of CVODES, an integrator of SUNDIALS, on the accelerations.
  *
- *   y = (q, v),   y' = (v, a (t, q, v)),   a from  M a + J^T lambda = f,  J a = gamma, with Baumgarte's terms if selected
+ *   y = (q, v),   y' = (v, a (t, q, v)),   a from  M a + J^T lambda = f,  J a = gamma,
  *
- * adams: Adams-Moulton formulas of orders 1 to 12, for non-stiff scenes.  The fixed-point iteration needs no matrix and
- * converges only if the step resolves every motion.  bdf: backward differentiation formulas of orders 1 to 5, for stiff
- * scenes (Curtiss & Hirschfelder 1952; Gear 1971).  It uses Newton's iteration with an exact matrix (bdf_newton.c);
- * steps and their errors may be projected (Eich 1993).  (Hindmarsh et al. 2005, SUNDIALS: Suite of nonlinear and
- * differential/algebraic equation solvers.) */
+ * with Baumgarte's terms if selected.
+ *
+ * adams: Adams-Moulton formulas of orders 1 to 12, for non-stiff scenes.  The fixed-point iteration needs no matrix
+ * and converges only if the step resolves every motion.  bdf: backward differentiation formulas of orders 1 to 5, for
+ * stiff scenes (Curtiss & Hirschfelder 1952; Gear 1971).  It uses Newton's iteration with an exact matrix
+ * (bdf_newton.c); steps and their errors may be projected (Eich 1993).  (Hindmarsh et al. 2005, SUNDIALS: Suite of
+ * nonlinear and differential/algebraic equation solvers.) */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -16,11 +18,11 @@
 #include "dense_output.h"
 #include "util.h"
 
-/* Convergence coefficient of the Newton iteration if the error test sees only the projected error, or forces saturate:
- * less than CVODES' default of 0.1, since under stiff damping the remaining error is energy. */
-#define MULTISTEP_ITERATED 0.01
+/* Error that may remain after Newton's iteration, in units of that of the error test, if only the projected error is
+ * tested or forces saturate: less than CVODES' default of 0.1, since with stiff damping it changes the energy. */
+#define MULTISTEP_CONVERGENCE 0.01
 
-/* ---- Callbacks ---- */
+/* ---- Functions that CVODES calls ---- */
 
 static int multistep_derivative (realtype t, N_Vector vy, N_Vector derivative, void *data) {
   multistep_data *d = data;
@@ -52,20 +54,21 @@ static int multistep_project (multistep_data *d, double t, double *q, double *v)
  * tangential effects that the estimate misses: the accelerations of the step are those of the displaced state. */
 static void multistep_project_error (multistep_data *d, double *e) {
   pw_run *r = d->sun.run;
-  double *whole = d->error, little = sqrt (sqrt (r->settings.rtol));
+  double *whole = d->error, share = sqrt (sqrt (r->settings.rtol));
   memcpy (whole, e, 2 * (size_t)d->n * sizeof *e);
   pw_project_error (r, d->projector.velocity, e, r->s->holonomic);
   pw_project_error (r, d->projector.velocity, e + d->n, r->s->rows);
-  for (int j = 0; j < 2 * d->n; j++) e[j] += little * (whole[j] - e[j]);
+  for (int j = 0; j < 2 * d->n; j++) e[j] += share * (whole[j] - e[j]);
 }
 
-/* The projection function of CVODES. */
-static int multistep_correct (realtype t, N_Vector vy, N_Vector change, realtype enough, N_Vector error, void *data) {
+/* Called by CVODES: the change of y by the projection; projects the error estimate, too, unless it is NULL. */
+static int multistep_correct (realtype t, N_Vector vy, N_Vector change, realtype tolerance, N_Vector error,
+                              void *data) {
   multistep_data *d = data;
   const double *y = N_VGetArrayPointer (vy);
   double *out = N_VGetArrayPointer (change);
   size_t bytes = (size_t)d->n * sizeof *y;
-  (void)enough; /* projects to round-off whatever the tolerance */
+  (void)tolerance; /* projections are accurate to round-off */
   memcpy (d->q, y, bytes);
   memcpy (d->v, y + d->n, bytes);
   int status = multistep_project (d, t, d->q, d->v);
@@ -79,19 +82,19 @@ static int multistep_correct (realtype t, N_Vector vy, N_Vector change, realtype
 
 /* ---- Inside the last step ---- */
 
-/* Accelerations and multipliers at q, v, projected before if `project` is 1; near singular configurations, too, and not
- * counted in the statistics. */
+/* Accelerations and multipliers at (t, q, v), which are projected first if `project` is 1: also near singular
+ * configurations, and without effect on the statistics. */
 static int multistep_complete (multistep_data *d, double t, int project, double *q, double *v, double *a,
                                double *lambda) {
   pw_run *r = d->sun.run;
-  int near = r->near_singular;
-  pw_statistics keep = r->statistics;
-  r->refuse = 0;
+  const int near_singular = r->near_singular;
+  const pw_statistics statistics = r->statistics;
+  r->refused_sine = 0;
   int status = project ? multistep_project (d, t, q, v) : PW_OK;
   if (status == PW_OK) status = pw_run_accelerate (r, t, q, v, a, lambda);
-  r->refuse = r->limits.rank;
-  r->statistics = keep;
-  r->near_singular = near;
+  r->refused_sine = r->limits.rank_lost;
+  r->statistics = statistics;
+  r->near_singular = near_singular;
   return status;
 }
 
@@ -151,7 +154,7 @@ static int multistep_open_solver (multistep_data *d, int formula) {
       CVodeSetMaxNumSteps (m, -1) || CVodeSetMaxConvFails (m, PW_SUN_ATTEMPTS) ||
       CVodeSetMaxErrTestFails (m, PW_SUN_ATTEMPTS) || CVodeSetInitStep (m, pw_first_step (r)))
     return PW_RESOURCE;
-  if ((d->projects || r->s->saturates) && CVodeSetNonlinConvCoef (m, MULTISTEP_ITERATED)) return PW_RESOURCE;
+  if ((d->projects || r->s->saturates) && CVodeSetNonlinConvCoef (m, MULTISTEP_CONVERGENCE)) return PW_RESOURCE;
   if (d->projects &&
       (CVodeSetProjFn (m, multistep_correct) || CVodeSetProjFrequency (m, (long)pw_run_option (r, "every"))))
     return PW_RESOURCE;
@@ -185,7 +188,7 @@ static void multistep_close (pw_run *r) {
 
 static void multistep_count (multistep_data *d) {
   pw_statistics *s = &d->sun.run->statistics;
-  long steps = 0, tests = 0, iterations = 0, projections = 0;
+  long steps = 0, tests = 0, iterations = 0, projections = 0; /* the last three: failed */
   CVodeGetNumSteps (d->cvode, &steps);
   CVodeGetNumErrTestFails (d->cvode, &tests);
   CVodeGetNumNonlinSolvConvFails (d->cvode, &iterations);
@@ -199,41 +202,40 @@ static int multistep_fail (multistep_data *d, int flag, pw_error *error) {
   char element[120];
   int singular = flag == CV_FIRST_RHSFUNC_ERR || flag == CV_REPTD_RHSFUNC_ERR || flag == CV_UNREC_RHSFUNC_ERR;
   if (!r->stopped) multistep_count (d);
-  if (!r->stopped && flag == CV_REPTD_PROJFUNC_ERR && d->projector.against >= 0)
+  if (!r->stopped && flag == CV_REPTD_PROJFUNC_ERR && d->projector.contradictory_row >= 0)
     return pw_fail (error, PW_METHOD, "t = %.6g s: %s contradicts the other constraints", r->t,
-                    pw_system_row_name (r->s, d->projector.against, element, sizeof element));
+                    pw_system_row_name (r->s, d->projector.contradictory_row, element, sizeof element));
   if (flag == CV_PROJFUNC_FAIL) flag = CV_RHSFUNC_FAIL; /* a signal failed */
   return pw_sun_fail (&d->sun, flag, singular,
                       flag == CV_REPTD_PROJFUNC_ERR ? "the projection does not converge however small the step" : NULL,
                       error);
 }
 
-/* Accelerations and multipliers of the current state, whose kinematics and J are up to date; not counted in the
+/* Accelerations and multipliers of the state reached, whose kinematics and J are up to date, without effect on the
  * statistics.  In a singular configuration the multipliers of the last iterate remain. */
 static void multistep_evaluate (multistep_data *d) {
   pw_run *r = d->sun.run;
-  pw_statistics keep = r->statistics;
-  r->refuse = 0;
+  const pw_statistics statistics = r->statistics;
+  r->refused_sine = 0;
   d->evaluated = pw_run_accelerate_evaluated (r, r->v, r->a, r->lambda) == PW_OK;
   if (!d->evaluated) memcpy (r->lambda, d->lambda, (size_t)r->s->rows * sizeof *r->lambda);
-  r->refuse = r->limits.rank;
-  r->statistics = keep;
+  r->refused_sine = r->limits.rank_lost;
+  r->statistics = statistics;
 }
 
-/* Work and losses up to the current state.  The multipliers of Newton's last iterate, which may be the first, are not
+/* Work and losses up to the state reached.  The multipliers of Newton's last iterate, which may be its first, are not
  * accurate enough. */
 static int multistep_work (multistep_data *d) {
   pw_run *r = d->sun.run;
   int order = 1;
-  if (d->sun.klu && pw_ledger_reacts (r->s)) multistep_evaluate (d);
+  if (d->sun.klu && pw_ledger_uses_multipliers (r->s)) multistep_evaluate (d);
   pw_ledger_rates (r, r->lambda, r->rate);
   CVodeGetLastOrder (d->cvode, &order);
-  if (!pw_quadrature_step (&d->sun.quadrature, r, order)) return PW_OK;
-  return pw_evaluate_J_at (r->w, pw_before_breakpoint (r, r->t), r->q, r->v);
+  return pw_quadrature_step (&d->sun.quadrature, r, order);
 }
 
-/* Reads the current state from y and updates the ledger.  Its accelerations are those of the last iterate until
- * multistep_at needs them, which saves one evaluation in three. */
+/* Makes y the state reached and updates the ledger.  Accelerations remain those of the last iterate until multistep_at
+ * evaluates them, which saves one evaluation in three. */
 static int multistep_reach (multistep_data *d, double t, pw_error *error) {
   pw_run *r = d->sun.run;
   const double *y = N_VGetArrayPointer (d->sun.y);
@@ -268,7 +270,7 @@ static int multistep_at (pw_run *r, double t, pw_error *error) {
   if (t == r->t) {
     if (!d->evaluated) status = multistep_complete (d, pw_before_breakpoint (r, t), 0, r->q, r->v, r->a, r->lambda);
     d->evaluated = status == PW_OK;
-    if (status == PW_OK) pw_show_reached (r);
+    if (status == PW_OK) pw_sample_reached (r);
   } else {
     if (t < r->t && r->s->entries > 0) pw_quadrature_at (&d->sun.quadrature, r, t);
     int flag = multistep_interpolate (d, t);
@@ -309,8 +311,8 @@ static const pw_stabilisation bdf_stabilisations[] = {
 
 static const pw_stabilisation adams_stabilisations[] = { PW_ACCELERATION_STABILISATIONS, { .name = NULL } };
 
-/* Measured on the EzyRoller at rtol 1e-6: restarting after each projection takes 100 times the steps.  Projecting only
- * within evaluations does not stop the drift of y, and made errors 7 times larger on a pendulum. */
+/* Measured on the EzyRoller at rtol 1e-6: with a restart after each projection there are 100 times as many steps.
+ * Projections only within evaluations do not stop the drift of y, and made errors 7 times larger on a pendulum. */
 static const pw_stabilisation adams_refused[] = {
   { .name = "projection",
     .about = "CVODES projects with bdf only, and restarts after each projection would leave order 1; "

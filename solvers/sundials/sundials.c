@@ -1,4 +1,4 @@
-/* Common parts of the SUNDIALS integrators; see sundials.h. */
+/* What adams, bdf and ida share: vectors, linear solver, test of convergence, messages of SUNDIALS; see sundials.h. */
 #include <assert.h>
 #include <cvodes/cvodes.h>
 #include <idas/idas.h>
@@ -22,7 +22,7 @@ static_assert (CV_ERR_FAILURE == IDA_ERR_FAIL && CV_CONV_FAILURE == IDA_CONV_FAI
 int pw_sun_open (pw_sun *x, pw_run *r, int unknowns) {
   enum { VECTORS = 60, TABLE = 1024, REST = 1 << 17 };
   x->run = r;
-  if (pw_reserve (VECTORS * (TABLE + (size_t)unknowns * sizeof (double)) + REST) != PW_OK ||
+  if (pw_check_memory (VECTORS * (TABLE + (size_t)unknowns * sizeof (double)) + REST) != PW_OK ||
       SUNContext_Create (NULL, &x->context) != 0)
     return PW_RESOURCE;
   x->y = pw_sun_vector (unknowns, x->context);
@@ -93,21 +93,23 @@ int pw_sun_open_solver (pw_sun *x, N_Vector right, void *content, pw_sun_solve *
 
 /* ---- Newton's iteration, error weights ---- */
 
-/* Tests the size of the correction, or of the error that remains after it at the current rate of convergence. */
-static int sun_converged (SUNNonlinearSolver newton, N_Vector y, N_Vector change, realtype enough, N_Vector weights,
-                          void *data) {
-  double *before = data, size = N_VWrmsNorm (change, weights), rate = size / *before;
+/* Called by SUNDIALS: tests the size of the correction, or of the error that remains after it at the current rate of
+ * convergence; data: size of the previous correction. */
+static int sun_test_convergence (SUNNonlinearSolver newton, N_Vector y, N_Vector correction, realtype tolerance,
+                                 N_Vector weights, void *data) {
+  double *previous = data, size = N_VWrmsNorm (correction, weights), rate = size / *previous;
   int iteration = 0;
   (void)y;
   SUNNonlinSolGetCurIter (newton, &iteration);
-  *before = size;
-  if (iteration > 0 && !(rate < 0.9)) return size <= enough ? SUN_NLS_SUCCESS : SUN_NLS_CONV_RECVR;
-  double left = iteration == 0 ? 1 : rate / (1 - rate);
-  return size * fmin (1, left) <= enough ? SUN_NLS_SUCCESS : SUN_NLS_CONTINUE;
+  *previous = size;
+  if (iteration > 0 && !(rate < 0.9)) /* too slow */
+    return size <= tolerance ? SUN_NLS_SUCCESS : SUN_NLS_CONV_RECVR;
+  double remaining = iteration == 0 ? 1 : rate / (1 - rate); /* error, over the size of this correction */
+  return size * fmin (1, remaining) <= tolerance ? SUN_NLS_SUCCESS : SUN_NLS_CONTINUE;
 }
 
 int pw_sun_test_newton (SUNNonlinearSolver newton, double *size) {
-  return SUNNonlinSolSetConvTestFn (newton, sun_converged, size);
+  return SUNNonlinSolSetConvTestFn (newton, sun_test_convergence, size);
 }
 
 void pw_sun_weigh (const pw_sun *x, const double *y, double *w) {
@@ -119,9 +121,10 @@ void pw_sun_weigh (const pw_sun *x, const double *y, double *w) {
 
 /* ---- Errors ---- */
 
-void pw_sun_message (int code, const char *module, const char *function, char *text, void *x) {
+void pw_sun_message (int code, const char *module, const char *function, char *text, void *sun) {
+  pw_sun *x = sun;
   (void)code, (void)module, (void)function;
-  snprintf (((pw_sun *)x)->message, sizeof ((pw_sun *)x)->message, "%s", text);
+  snprintf (x->message, sizeof x->message, "%s", text);
 }
 
 /* The integrator's message, or the flag if there was none. */

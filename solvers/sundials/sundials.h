@@ -1,4 +1,4 @@
-/* Common parts of the SUNDIALS integrators, for version 6 (tested with 6.4). */
+/* What adams, bdf and ida share, the methods that use integrators of SUNDIALS: version 6 (tested with 6.4). */
 #ifndef PW_SUNDIALS_H
 #define PW_SUNDIALS_H
 
@@ -11,8 +11,8 @@
 #include <sunnonlinsol/sunnonlinsol_newton.h>
 #include "quadrature.h"
 
-/* Attempts at a step, each about a quarter of the previous one, if the Newton iteration does not converge or the error
- * is too large: from 1 s down to the round-off of time.  SUNDIALS' default of 10, a millionth of the step, does not
+/* Attempts at a step, each about a quarter of the previous one, if Newton's iteration does not converge or the error is
+ * too large: from 1 s down to the round-off of the time.  SUNDIALS' default of 10, a millionth of the step, does not
  * resolve the moment at which friction stops a body. */
 enum { PW_SUN_ATTEMPTS = 27 };
 
@@ -21,27 +21,29 @@ typedef struct {
   SUNContext context;
   N_Vector y;                   /* unknowns: q, v, then those of the method */
   SUNMatrix matrix;             /* of Newton's iteration */
-  SUNLinearSolver klu, solver;  /* KLU; the wrapper that the integrator calls */
+  SUNLinearSolver klu, solver;  /* KLU; the solver that the integrator calls, which calls KLU */
   SUNNonlinearSolver iteration; /* NULL: the default of the integrator */
   double correction;            /* size of the last Newton correction */
   pw_quadrature quadrature;     /* of work and losses */
-  double t0;                    /* of the initial conditions or the last restart */
+  double t0;                    /* of the initial state or the last restart */
   pw_statistics before;         /* counts at t0, where those of the integrator begin */
   char message[256];            /* the last message of the integrator */
 } pw_sun;
 
-/* Opens context and unknowns, filled with the current state.  PW_OK or PW_RESOURCE, as all functions that open. */
+/* Opens the context and the unknowns, of which q and v are those of the state reached.  Returns PW_OK or PW_RESOURCE,
+ * as all functions here that open. */
 int pw_sun_open (pw_sun *x, pw_run *r, int unknowns);
 void pw_sun_close (pw_sun *x);
 
-/* Restarts at the current state. */
+/* Restarts at the state reached. */
 void pw_sun_restart (pw_sun *x);
 
 /* A vector with the operations of vectors.c, as have its clones; NULL: out of memory. */
 N_Vector pw_sun_vector (sunindextype length, SUNContext context);
 
-/* A matrix of this pattern, in compressed columns, and a linear solver that refuses an outdated matrix, so that the
- * integrator requests a new one; otherwise it calls `solve` (NULL: that of KLU) with `content`. */
+/* A matrix of this pattern, in compressed columns, and a linear solver, which refuses an outdated matrix (tolerances.c)
+ * so that the integrator requests a new one.  `solve` (NULL: that of KLU) finds the data `content` in its solver;
+ * `content` begins with x; `right` is a vector of the size of the matrix. */
 typedef int pw_sun_solve (SUNLinearSolver solver, SUNMatrix matrix, N_Vector x, N_Vector b, realtype tolerance);
 int pw_sun_open_matrix (pw_sun *x, int size, const int64_t *colptr, const int64_t *rowind);
 int pw_sun_open_solver (pw_sun *x, N_Vector right, void *content, pw_sun_solve *solve);
@@ -57,8 +59,8 @@ int pw_sun_test_newton (SUNNonlinearSolver newton, double *size);
 /* Error weights of q and v, from their tolerances. */
 void pw_sun_weigh (const pw_sun *x, const double *y, double *w);
 
-/* Collects the messages of an integrator: `x` is a pw_sun. */
-void pw_sun_message (int code, const char *module, const char *function, char *text, void *x);
+/* Called by an integrator: stores its message in `sun`, a pw_sun. */
+void pw_sun_message (int code, const char *module, const char *function, char *text, void *sun);
 
 /* Report why the integrator failed with this flag, or cannot restart.  singular: 1 if the configuration is singular;
  * why: the meaning of a flag specific to the integrator, or NULL. */

@@ -6,17 +6,17 @@
  *     [ M J^T ; J 0 ] (da, dlambda) = ( (f_q - (J^T lambda)_q) dq + f_v dv, (gamma_q - (J a)_q) dq + gamma_v dv )
  *                                     + d/dp ( f - M a - J^T lambda, gamma - J a ),
  *
- * the first part by the exact blocks of the element types (linear_variation.c), the second by differences of the systems
- * of neighbouring runs, at the state of this one (variation_effect.c).  Initial values of dq and dv are differences of
- * the neighbours' consistent initial states.  Differences with two steps of p give both the extrapolated ones (Richardson)
- * and their error.  The error of the result obeys the same equations, with the error of the differences in place of the
- * effects of p, and after each step with the error of the step added.
+ * the first part by the exact blocks of the element types (linear_variation.c), the second by differences of the
+ * systems of neighbouring runs, at the state of this one (variation_effect.c).  Initial values of dq and dv are
+ * differences of the neighbours' consistent initial states.  Differences with two steps of p give both the
+ * extrapolated ones (Richardson) and their error.  The error of the result obeys the same equations, with the error of
+ * the differences in place of the effects of p, and after each step with the error of the step added.
  *
- * Steps are explicit (variation_explicit.c), or implicit if the motion is stiff (variation_implicit.c), for runs by all
- * methods: along the states that the run has reached, with steps of their own, which end at samples and breakpoints.  Steps
- * of a run with a fixed step are usually much smaller; a linearisation costs about 6 evaluations of the accelerations.  The
- * result is therefore the derivative of the motion that the run follows, to 1e-10 or the accuracy of its states, not that of
- * its discretisation error.
+ * Steps are explicit (variation_explicit.c), or implicit if the motion is stiff (variation_implicit.c), for runs by
+ * all methods: along the states that the run has reached, with steps of their own, which end at samples and
+ * breakpoints.  Steps of a run with a fixed step are usually much smaller; a linearisation costs about 6 evaluations
+ * of the accelerations.  The result is therefore the derivative of the motion that the run follows, to 1e-10 or the
+ * accuracy of its states, not that of its discretisation error.
  *
  * After each step dq and dv are projected onto the tangent of the constraints,
  *
@@ -30,18 +30,24 @@
 #include "util.h"
 #include "variation_parts.h"
 
-/* Several times the movement of neighbours, in units of the scene: their accelerations may jump so much before the run's. */
-static const double VARIATION_NEAR = 1e-4;
+/* Several times the movement of neighbours, in units of the scene: their accelerations may jump so much before the
+ * run's. */
+static const double VARIATION_AHEAD = 1e-4;
 
 /* ---- Opening ---- */
 
 static int variation_linear (pw_variation *x) {
   pw_linearisation *l = &x->linear;
   size_t n = (size_t)x->n, m = (size_t)x->m;
-  int status = pw_linear_open (l, x->r, 0, PW_VARIATION_DENSE);
+  int status = pw_linear_open (l, x->r, PW_WITHOUT_MODES, PW_VARIATION_DENSE);
   if (status != PW_OK || x->n <= PW_VARIATION_DENSE) return status;
-  const pw_array array[] = { { &l->a, n + 3 },  { &l->lambda, m }, { &l->x, 2 * n },        { &l->y, n + 2 * m },
-                             { &l->da, n + 3 }, { &l->c, m },      { &l->z, n + 3 * m + 3 } };
+  const pw_array array[] = { { &l->a, n + 3 },
+                             { &l->lambda, m },
+                             { &l->dx, 2 * n },
+                             { &l->product, n + 2 * m },
+                             { &l->da, n + 3 },
+                             { &l->row_scratch, m },
+                             { &l->scratch, n + 3 * m + 3 } };
   l->memory = pw_alloc_arrays (array, sizeof array / sizeof *array);
   return l->memory ? pw_linear_derivatives (l) : PW_RESOURCE;
 }
@@ -57,9 +63,9 @@ static int variation_arrays (pw_variation *x) {
                              { &x->sample[0], sample },
                              { &x->sample[1], sample },
                              { &x->a[0], PW_VARIATION_RATES * n },
-                             { &x->energy, 2 * (size_t)x->energies },
-                             { &x->motion, n },
-                             { &x->defect, n },
+                             { &x->element_energy, 2 * (size_t)x->elements },
+                             { &x->motion_error, n },
+                             { &x->motion_defect, n },
                              { &x->hold[0].state, 2 * n },
                              { &x->hold[1].state, 2 * n } };
   x->memory = pw_alloc_arrays (array, sizeof array / sizeof *array);
@@ -67,7 +73,7 @@ static int variation_arrays (pw_variation *x) {
   for (int i = 0; x->memory && i < x->count; i++) {
     pw_direction_copy *d = &x->direction[i];
     pw_array own[10 + 2 * (3 + PW_VARIATION_RATES)], *a = own;
-    *a++ = (pw_array){ &d->local, size };
+    *a++ = (pw_array){ &d->local_error, size };
     *a++ = (pw_array){ &d->terms, n + 3 * m };
     for (int c = 0; c < 2; c++) {
       pw_variation_column *k = &d->column[c];
@@ -85,10 +91,10 @@ static int variation_arrays (pw_variation *x) {
 }
 
 /* A neighbour has the same elements, whose constraint equations are the same ones. */
-static int variation_check (const pw_variation *x, const pw_direction *d, int i, pw_error *error) {
+static int variation_check_neighbours (const pw_variation *x, const pw_direction *d, int i, pw_error *error) {
   const pw_system *s = x->r->s;
   if (d->initial) return PW_OK;
-  for (int k = 0; k < PW_VARIATION_NEAR; k++) {
+  for (int k = 0; k < PW_VARIATION_NEIGHBOURS; k++) {
     const pw_system *other = d->neighbour[k] ? d->neighbour[k]->s : NULL;
     if (other == NULL || d->step == 0 || !isfinite (d->step))
       return pw_fail (error, PW_INPUT, "direction %d: expected neighbours and a step that is not 0, or `initial`",
@@ -101,7 +107,7 @@ static int variation_check (const pw_variation *x, const pw_direction *d, int i,
 }
 
 /* 1 if the signals of a batch may differ; those that point to tables or functions are not compared. */
-static int variation_signals (const pw_element_batch *a, const pw_element_batch *b) {
+static int variation_signals_differ (const pw_element_batch *a, const pw_element_batch *b) {
   for (int i = 0; i < a->b.count * a->kind->signals; i++) {
     const pw_signal *one = &a->source[i].signal, *other = &b->source[i].signal;
     if (one->type == PW_FUNCTION || one->type == PW_TABLE || memcmp (one, other, sizeof *one) != 0) return 1;
@@ -110,17 +116,17 @@ static int variation_signals (const pw_element_batch *a, const pw_element_batch 
 }
 
 /* Finds what differs between the neighbours and the run.  PW_RESOURCE; PW_INPUT if that is other elements. */
-static int variation_changes (const pw_variation *x, pw_direction_copy *d) {
+static int variation_find_changes (const pw_variation *x, pw_direction_copy *d) {
   const pw_system *s = x->r->s;
   size_t bytes = (size_t)s->coords * sizeof (double);
   d->changes = calloc ((size_t)s->batches + 1, 1);
   if (d->changes == NULL) return PW_RESOURCE;
-  for (int i = 0; i < PW_VARIATION_NEAR && d->given.initial == NULL; i++) {
+  for (int i = 0; i < PW_VARIATION_NEIGHBOURS && d->given.initial == NULL; i++) {
     const pw_system *other = d->given.neighbour[i]->s;
     for (int k = 0; k < s->batches; k++) {
       const pw_element_batch *a = &s->batch[k], *b = &other->batch[k];
       if (a->kind != b->kind || a->b.count != b->b.count) return PW_INPUT;
-      int signals = variation_signals (a, b);
+      int signals = variation_signals_differ (a, b);
       d->changes[k] |= signals || memcmp (a->b.element, b->b.element, (size_t)a->b.count * a->kind->element) != 0;
       d->signals |= signals;
     }
@@ -131,7 +137,7 @@ static int variation_changes (const pw_variation *x, pw_direction_copy *d) {
 }
 
 /* Adds round-off of the differences of the initial states to their error. */
-static void variation_round (const pw_variation *x, pw_direction_copy *d) {
+static void variation_add_round_off (const pw_variation *x, pw_direction_copy *d) {
   const pw_run *near = d->given.neighbour[1], *r = x->r;
   const double by = 4 * DBL_EPSILON * fabs (pw_direction_weight (&d->given, 0, 1)), *Y = d->column[0].trial;
   double *error = d->column[1].trial;
@@ -150,26 +156,26 @@ static int variation_start (pw_variation *x, pw_direction_copy *d, const pw_dire
   int n = x->n;
   d->given = *given;
   d->columns = given->no_error ? 1 : 2;
-  int status = variation_changes (x, d);
+  int status = variation_find_changes (x, d);
   if (status == PW_INPUT)
     return pw_fail (error, PW_INPUT, "direction %d: the elements change", (int)(d - x->direction) + 1);
   if (status != PW_OK) return pw_fail_memory (x->r->s, error);
   for (int c = 0; c < d->columns; c++) {
     double *Y = d->column[c].trial;
     if (given->initial && c == 0) memcpy (Y, given->initial, 2 * (size_t)n * sizeof *Y);
-    for (int i = 0; i < PW_VARIATION_NEAR && given->initial == NULL; i++) {
+    for (int i = 0; i < PW_VARIATION_NEIGHBOURS && given->initial == NULL; i++) {
       const pw_run *r = given->neighbour[i];
       double weight = pw_direction_weight (given, c, i);
       for (int j = 0; j < n; j++) Y[j] += weight * (r->q[j] - x->r->q[j]), Y[n + j] += weight * (r->v[j] - x->r->v[j]);
     }
   }
-  if (d->columns > 1 && given->initial == NULL) variation_round (x, d);
-  for (int i = 0; i < PW_VARIATION_NEAR; i++) d->breakpoint[i] = x->t;
+  if (d->columns > 1 && given->initial == NULL) variation_add_round_off (x, d);
+  for (int i = 0; i < PW_VARIATION_NEIGHBOURS; i++) d->breakpoint[i] = x->t;
   return pw_variation_look_ahead (x, d, x->r->breakpoint, error);
 }
 
 /* A missing derivative of an element type would give wrong results. */
-static int variation_blocks (const pw_variation *x, pw_error *error) {
+static int variation_check_blocks (const pw_variation *x, pw_error *error) {
   char block[200];
   int found = pw_find_missing_block (x->r->w, x->r->t, x->r->q, x->r->v, block, sizeof block);
   if (found == 0) return PW_OK;
@@ -181,8 +187,8 @@ static int variation_blocks (const pw_variation *x, pw_error *error) {
       x->r->s->model, block);
 }
 
-/* Appends the last step of the run, from time t0, to its states.  A step across a jump is not refined: samples in it, each an
- * own step of a Runge-Kutta method, are not continuous in time and might seem to cross it several times. */
+/* Appends the last step of the run, from time t0, to its states.  A step across a jump is not refined: samples in it,
+ * each an own step of a Runge-Kutta method, are not continuous in time and might seem to cross it several times. */
 static int variation_record (pw_variation *x, double t0, pw_error *error) {
   int last = x->points - 1, points;
   x->begun = t0;
@@ -207,8 +213,8 @@ static int variation_open (pw_variation *x, const pw_direction *d, pw_error *err
   if (pw_run_option (r, "inputs") != 0)
     return pw_fail (error, PW_INPUT, "derivatives need inputs=stage: held inputs depend on the steps");
   for (int i = 0; i < x->count; i++)
-    if (variation_check (x, &d[i], i, error) != PW_OK) return PW_INPUT;
-  int status = variation_blocks (x, error);
+    if (variation_check_neighbours (x, &d[i], i, error) != PW_OK) return PW_INPUT;
+  int status = variation_check_blocks (x, error);
   if (status != PW_OK) return status;
   x->reversal = variation_reversal (r);
   x->direction = calloc ((size_t)x->count + 1, sizeof *x->direction);
@@ -220,7 +226,7 @@ static int variation_open (pw_variation *x, const pw_direction *d, pw_error *err
   memcpy (x->q, r->q, (size_t)x->n * sizeof *x->q);
   memcpy (x->v, r->v, (size_t)x->n * sizeof *x->v);
   status = pw_variation_evaluate (x, x->t, error);
-  return status == PW_OK ? pw_variation_begin (x, error) : status;
+  return status == PW_OK ? pw_variation_restart (x, error) : status;
 }
 
 pw_variation *pw_variation_open (pw_run *r, const pw_direction *d, int count, int ledger, pw_error *error) {
@@ -234,7 +240,7 @@ pw_variation *pw_variation_open (pw_run *r, const pw_direction *d, int count, in
     .r = r, .n = r->s->coords, .m = r->s->rows, .entries = r->s->entries, .count = count, .ledger = ledger
   };
   x->size = 2 * x->n + (ledger ? x->entries : 0);
-  for (int i = 0; i < r->s->batches; i++) x->energies += r->s->batch[i].b.count;
+  for (int i = 0; i < r->s->batches; i++) x->elements += r->s->batch[i].b.count;
   x->t = r->t;
   x->passed = -INFINITY;
   x->may_jump = pw_system_may_jump (r->s);
@@ -267,7 +273,7 @@ double pw_variation_step_size (const pw_variation *x) {
 /* ---- Advancing ---- */
 
 /* Advances the run until its states reach time `to`, a breakpoint, or are too many. */
-static int variation_lead (pw_variation *x, double to, double t_end, pw_error *error) {
+static int variation_advance_run (pw_variation *x, double to, double t_end, pw_error *error) {
   pw_run *r = x->r;
   int status = PW_OK;
   while (status == PW_OK && r->t < to && x->points < PW_VARIATION_POINTS && (r->t < r->breakpoint || r->t == x->t)) {
@@ -279,14 +285,14 @@ static int variation_lead (pw_variation *x, double to, double t_end, pw_error *e
 }
 
 /* The time that the run must reach for the next step. */
-static double variation_ahead (const pw_variation *x, double t, double t_end) {
-  double near = x->may_jump ? VARIATION_NEAR * x->r->w->scale.time : 0;
+static double variation_run_time (const pw_variation *x, double t, double t_end) {
+  double near = x->may_jump ? VARIATION_AHEAD * x->r->w->scale.time : 0;
   return fmin (fmin (t, x->t + x->h) + near, t_end);
 }
 
 static int variation_pass (pw_variation *x, int (*pass) (pw_variation *x, pw_error *error), pw_error *error) {
   int status = pass (x, error);
-  return status == PW_OK ? pw_variation_begin (x, error) : status;
+  return status == PW_OK ? pw_variation_restart (x, error) : status;
 }
 
 int pw_variation_advance (pw_variation *x, double t, double t_end, pw_error *error) {
@@ -297,21 +303,21 @@ int pw_variation_advance (pw_variation *x, double t, double t_end, pw_error *err
     if (x->t == pw_variation_recorded_jump (x))
       status = variation_pass (x, pw_variation_pass_jump, error);
     else if (x->t == r->breakpoint && x->passed < x->t)
-      status = variation_pass (x, pw_variation_pass, error);
+      status = variation_pass (x, pw_variation_pass_breakpoint, error);
     else {
-      status = variation_lead (x, variation_ahead (x, t, t_end), t_end, error);
+      status = variation_advance_run (x, variation_run_time (x, t, t_end), t_end, error);
       if (status == PW_OK && pw_run_stop_requested (r)) return PW_STOPPED;
       double to = fmin (fmin (t, r->breakpoint), pw_variation_recorded_jump (x));
       if (status == PW_OK) status = pw_variation_approach_jump (x, error);
       if (status == PW_OK) status = pw_variation_step (x, to, error);
     }
-    pw_variation_forget (x);
+    pw_variation_discard_points (x);
   }
   return pw_run_annotate_error (r, status, error);
 }
 
 double pw_variation_next_jump (pw_variation *x, double t, double t_end, pw_error *error) {
-  int status = x->may_jump ? variation_lead (x, t, t_end, error) : PW_OK;
+  int status = x->may_jump ? variation_advance_run (x, t, t_end, error) : PW_OK;
   double jump = pw_variation_recorded_jump (x);
   for (int i = 0; i + 1 < x->points && status == PW_OK; i++)
     if (x->point[i].jumps && x->point[i].t == jump) return x->point[i + 1].t;
@@ -325,7 +331,7 @@ double pw_variation_jump_slope (const pw_variation *x, int i) {
 /* ---- Samples ---- */
 
 /* A column as a sample; zeros without a column. */
-static int variation_fill (pw_variation *x, const pw_direction_copy *d, int c, pw_sample *sample) {
+static int variation_column_sample (pw_variation *x, const pw_direction_copy *d, int c, pw_sample *sample) {
   int n = x->n, m = x->m, entries = x->entries;
   const pw_variation_column *from = &d->column[c];
   double *out = x->sample[c], *ledger = out + 3 * n + m;
@@ -346,8 +352,8 @@ static int variation_fill (pw_variation *x, const pw_direction_copy *d, int c, p
 
 int pw_variation_sample (pw_variation *x, int i, pw_sample *derivative, pw_sample *error_of, pw_error *error) {
   if (pw_require (x, "derivatives", error) != PW_OK) return PW_INPUT;
-  int status = variation_fill (x, &x->direction[i], 0, derivative);
-  if (status == PW_OK && error_of) status = variation_fill (x, &x->direction[i], 1, error_of);
+  int status = variation_column_sample (x, &x->direction[i], 0, derivative);
+  if (status == PW_OK && error_of) status = variation_column_sample (x, &x->direction[i], 1, error_of);
   (void)pw_evaluate_J_at (x->r->w, x->at, x->q, x->v);
   return pw_run_annotate_error (x->r, status == PW_OK ? PW_OK : pw_fail_signal (x->t, error), error);
 }

@@ -1,11 +1,10 @@
-/* Breakpoints that move with a parameter.  At a breakpoint t_b the accelerations jump from a- to a+ and the states do not;
- * the derivatives of the states at constant time therefore jump by
+/* Breakpoints that move with a parameter.  At a breakpoint t_b the accelerations jump from a- to a+ and the states do
+ * not; the derivatives of the states at constant time therefore jump by
  *
  *     dv+ = dv- + (a- - a+) dt_b/dp,
  *
- * and those of work and losses by (P- - P+) dt_b/dp, with their powers P
- * (Rozenvasser 1967; Hairer, Norsett & Wanner 1993, section I.14, for smooth problems).  dt_b/dp comes from the breakpoints
- * of the neighbouring runs. */
+ * and those of work and losses by (P- - P+) dt_b/dp, with their powers P (Rozenvasser 1967; Hairer, Norsett & Wanner
+ * 1993, section I.14, for smooth problems).  dt_b/dp comes from the breakpoints of the neighbouring runs. */
 #include <float.h>
 #include <math.h>
 #include <string.h>
@@ -17,7 +16,7 @@ static const double BREAKPOINT_SMOOTH = 1e-3;
 /* The derivative of a breakpoint, or its error (c = 1); without round-off where it does not move. */
 static double breakpoint_derivative (const pw_direction_copy *d, int c) {
   double sum = 0;
-  for (int i = 0; i < PW_VARIATION_NEAR; i++)
+  for (int i = 0; i < PW_VARIATION_NEIGHBOURS; i++)
     sum += pw_direction_weight (&d->given, c, i) * (d->breakpoint[i] - d->breakpoint[1]);
   return sum;
 }
@@ -25,9 +24,9 @@ static double breakpoint_derivative (const pw_direction_copy *d, int c) {
 /* 1 if the neighbours' breakpoints lie smoothly around the run's. */
 static int breakpoint_smooth (const pw_direction_copy *d, double next) {
   double most = 0, mean = 0, step = fabs (d->given.step), round = 64 * DBL_EPSILON * (1 + fabs (next));
-  for (int i = 0; i < PW_VARIATION_NEAR; i++) {
+  for (int i = 0; i < PW_VARIATION_NEIGHBOURS; i++) {
     most = fmax (most, fabs (d->breakpoint[i] - next));
-    mean += (d->breakpoint[i] - next) / PW_VARIATION_NEAR;
+    mean += (d->breakpoint[i] - next) / PW_VARIATION_NEIGHBOURS;
   }
   double allowed = BREAKPOINT_SMOOTH * most + round;
   if (!d->given.one_sided && !(fabs (mean) <= allowed)) return 0;
@@ -37,7 +36,7 @@ static int breakpoint_smooth (const pw_direction_copy *d, double next) {
 int pw_variation_look_ahead (pw_variation *x, pw_direction_copy *d, double next, pw_error *error) {
   int infinite = 0;
   d->first = d->last = d->given.initial ? -INFINITY : d->breakpoint[0];
-  for (int i = 0; i < PW_VARIATION_NEAR && d->given.initial == NULL; i++) {
+  for (int i = 0; i < PW_VARIATION_NEIGHBOURS && d->given.initial == NULL; i++) {
     pw_run *r = d->given.neighbour[i];
     d->first = fmax (d->first, d->breakpoint[i]);
     d->breakpoint[i] = pw_next_breakpoint (r->w, r->method->order > 2, d->breakpoint[i]);
@@ -45,8 +44,9 @@ int pw_variation_look_ahead (pw_variation *x, pw_direction_copy *d, double next,
     infinite += isinf (d->breakpoint[i]) != 0;
   }
   d->last = INFINITY;
-  for (int i = 0; i < PW_VARIATION_NEAR && d->given.initial == NULL; i++) d->last = fmin (d->last, d->breakpoint[i]);
-  if (d->given.initial || (infinite == PW_VARIATION_NEAR && isinf (next))) return PW_OK;
+  for (int i = 0; i < PW_VARIATION_NEIGHBOURS && d->given.initial == NULL; i++)
+    d->last = fmin (d->last, d->breakpoint[i]);
+  if (d->given.initial || (infinite == PW_VARIATION_NEIGHBOURS && isinf (next))) return PW_OK;
   if (infinite == 0 && isfinite (next) && breakpoint_smooth (d, next)) return PW_OK;
   return pw_fail (error, PW_METHOD,
                   "t = %.6g s: the order of breakpoints changes with the parameter of direction %d: the motion is not "
@@ -96,10 +96,10 @@ int pw_variation_jump (pw_variation *x, double t, const double *state, pw_error 
   return PW_OK;
 }
 
-int pw_variation_pass (pw_variation *x, pw_error *error) {
+int pw_variation_pass_breakpoint (pw_variation *x, pw_error *error) {
   double next = pw_next_breakpoint (x->r->w, x->r->method->order > 2, x->t), residual = breakpoint_residual (x);
   int status = PW_OK;
-  PW_EACH_COLUMN (c, x) c->slope = d->given.initial ? 0 : breakpoint_derivative (d, pw_variation_index (c));
+  PW_EACH_COLUMN (c, x) c->slope = d->given.initial ? 0 : breakpoint_derivative (d, pw_variation_column_index (c));
   for (int i = 0; i < x->count && status == PW_OK; i++) {
     pw_direction_copy *d = &x->direction[i];
     status = pw_variation_look_ahead (x, d, next, error);

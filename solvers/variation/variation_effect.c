@@ -8,8 +8,8 @@
 
 /* Weight of neighbour i in the difference with `step` (which = 0) or twice that. */
 static double effect_weight (const pw_direction *d, int which, int i) {
-  static const double central[2][PW_VARIATION_NEAR] = { { 0, -0.5, 0.5, 0 }, { -0.25, 0, 0, 0.25 } };
-  static const double one_sided[2][PW_VARIATION_NEAR] = { { -1.5, 2, -0.5, 0 }, { -0.75, 0, 1, -0.25 } };
+  static const double central[2][PW_VARIATION_NEIGHBOURS] = { { 0, -0.5, 0.5, 0 }, { -0.25, 0, 0, 0.25 } };
+  static const double one_sided[2][PW_VARIATION_NEIGHBOURS] = { { -1.5, 2, -0.5, 0 }, { -0.75, 0, 1, -0.25 } };
   return (d->one_sided ? one_sided : central)[which][i] / d->step;
 }
 
@@ -18,19 +18,19 @@ double pw_direction_weight (const pw_direction *d, int of_error, int i) {
 }
 
 double pw_direction_offset (const pw_direction *d, int i) {
-  static const double offset[2][PW_VARIATION_NEAR] = { { -2, -1, 1, 2 }, { 0, 1, 2, 4 } };
+  static const double offset[2][PW_VARIATION_NEIGHBOURS] = { { -2, -1, 1, 2 }, { 0, 1, 2, 4 } };
   return offset[d->one_sided][i] * d->step;
 }
 
 /* ---- Effects of parameters ---- */
 
-/* A difference of f - M a - J^T lambda (n) and of gamma - J a, g, J v - eta (m each) in progress: a neighbour adds `weight` times
- * these to `sum` and, unless it is NULL, the magnitudes of their terms to `terms`. */
+/* A difference of f - M a - J^T lambda (n) and of gamma - J a, g, J v - eta (m each) in progress: a neighbour adds
+ * `weight` times these to `sum` and, unless it is NULL, the magnitudes of their terms to `terms`. */
 typedef struct {
   double *sum, weight, *terms;
 } effect_difference;
 
-static void effect_term (const effect_difference *to, int i, double value, double size) {
+static void effect_add_term (const effect_difference *to, int i, double value, double size) {
   to->sum[i] += to->weight * value;
   if (to->terms) to->terms[i] += size;
 }
@@ -39,7 +39,7 @@ static void effect_term (const effect_difference *to, int i, double value, doubl
 static void effect_rows (pw_variation *x, const effect_difference *to, pw_element_batch *k) {
   const pw_linearisation *l = &x->linear;
   int rows = k->kind->rows, n = x->n, m = x->m;
-  double *gamma = l->z, *g = gamma + m, *eta = g + m;
+  double *gamma = l->scratch, *g = gamma + m, *eta = g + m;
   memset (gamma, 0, 3 * (size_t)m * sizeof *gamma);
   k->kind->J (&k->b, k->J);
   if (k->kind->gamma) k->kind->gamma (&k->b, gamma);
@@ -55,11 +55,11 @@ static void effect_rows (pw_variation *x, const effect_difference *to, pw_elemen
       acceleration -= *J * l->a[j];
       velocity += *J * x->v[j];
       size[0] += fabs (*J * l->a[j]), size[1] += fabs (*J * x->q[j]), size[2] += fabs (*J * x->v[j]);
-      effect_term (to, j, -*J * l->lambda[i], fabs (*J * l->lambda[i]));
+      effect_add_term (to, j, -*J * l->lambda[i], fabs (*J * l->lambda[i]));
     }
-    effect_term (to, n + i, acceleration, size[0]);
-    effect_term (to, n + m + i, g[r], size[1]);
-    effect_term (to, n + 2 * m + i, velocity, size[2]);
+    effect_add_term (to, n + i, acceleration, size[0]);
+    effect_add_term (to, n + m + i, g[r], size[1]);
+    effect_add_term (to, n + 2 * m + i, velocity, size[2]);
   }
 }
 
@@ -69,13 +69,14 @@ static void effect_force (pw_variation *x, const effect_difference *to, pw_eleme
   for (int e = 0; e < k->b.count; e++)
     for (int c = 0; c < k->b.cols; c++, f++) {
       int j = pw_global (k, e, c);
-      if (j < x->n) effect_term (to, j, *f, fabs (*f));
+      if (j < x->n) effect_add_term (to, j, *f, fabs (*f));
     }
 }
 
 /* Adds f - M a - J^T lambda, gamma - J a; g and J v - eta of a neighbour's system at the state of the run to one of the
  * differences, without the elements that are the same in all neighbours. */
-static void effect_add_to (pw_variation *x, const pw_direction_copy *d, const effect_difference *to, pw_workspace *w) {
+static void effect_add_system (pw_variation *x, const pw_direction_copy *d, const effect_difference *to,
+                               pw_workspace *w) {
   const pw_system *s = w->s;
   for (int i = 0; i < s->batches; i++) {
     const pw_kind *kind = w->batch[i].kind;
@@ -85,7 +86,7 @@ static void effect_add_to (pw_variation *x, const pw_direction_copy *d, const ef
   }
   for (int j = 0; j < x->n && d->changes[s->batches]; j++) {
     double inertial = s->mass[j] * x->linear.a[j];
-    effect_term (to, j, s->constant[j] - inertial, fabs (s->constant[j]) + fabs (inertial));
+    effect_add_term (to, j, s->constant[j] - inertial, fabs (s->constant[j]) + fabs (inertial));
   }
 }
 
@@ -114,25 +115,27 @@ static int effect_neighbour (pw_variation *x, pw_direction_copy *d, int i) {
   for (int which = 0; which < 2; which++) {
     double *terms = which == 0 && i == 1 ? d->terms : NULL; /* this neighbour has the largest weight */
     const effect_difference to = { d->effect[which], effect_weight (&d->given, which, i), terms };
-    if (to.weight != 0) effect_add_to (x, d, &to, w);
+    if (to.weight != 0) effect_add_system (x, d, &to, w);
   }
   return PW_OK;
 }
 
-/* The factor that makes entry i of an effect dimensionless: of forces, in units of the accelerations that they cause; of
- * residuals, in units of the scene. */
+/* The factor that makes entry i of an effect dimensionless: of forces, in units of the accelerations that they cause;
+ * of residuals, in units of the scene. */
 static double effect_unit (const pw_variation *x, int i) {
   double T = x->r->w->scale.time;
   if (i < x->n) return x->r->s->mass[i] > 0 ? T * T / x->r->s->mass[i] / pw_unit (x->r->s, i) : 0;
   return (i < x->n + x->m ? T * T : i < x->n + 2 * x->m ? 1 : T) / x->r->s->scale.length;
 }
 
-/* Effects below one unit of the scene per unit of p, or per p (about 1e5 steps) if that is smaller, count as that large. */
+/* Effects below one unit of the scene per unit of p, or per p (about 1e5 steps) if that is smaller, count as that
+ * large. */
 double pw_variation_least_effect (const pw_direction_copy *d) {
   return fmin (1, 1e-5 / fabs (d->given.step));
 }
 
-/* The two differences become the extrapolated one and its error, as in pw_direction_weight, to which round-off is added. */
+/* The two differences become the extrapolated one and its error, as in pw_direction_weight, to which round-off is
+ * added. */
 static void effect_extrapolate (const pw_variation *x, pw_direction_copy *d) {
   double *one = d->effect[0], *two = d->effect[1], all = 0;
   double round = 4 * DBL_EPSILON * fabs (effect_weight (&d->given, 0, 1));
@@ -148,9 +151,9 @@ static void effect_extrapolate (const pw_variation *x, pw_direction_copy *d) {
   d->effects.all += fmax (all, pw_variation_least_effect (d));
 }
 
-/* Relative errors of differences up to which a step is kept, and the part of them aimed at with a better one: errors by round-off,
- * and by the remainder of each difference, whose square is about that of the extrapolated one. */
-static const double EFFECT_ROUND = 1e-7, EFFECT_REST = 1e-4, EFFECT_AIM = 0.1;
+/* Relative errors of differences up to which a step is kept, and the part of them aimed at with a better one: errors
+ * by round-off, and by the remainder of each difference, whose square is about that of the extrapolated one. */
+static const double EFFECT_ROUND = 1e-7, EFFECT_REMAINDER = 1e-4, EFFECT_AIM = 0.1;
 
 /* With a smaller step an effect may be 0 only because the step is lost in the rounding of numbers of the order of 1. */
 static const double EFFECT_LOST = 1e-10;
@@ -158,7 +161,7 @@ static const double EFFECT_LOST = 1e-10;
 /* The factor of the step with which differences are accurate. */
 static double effect_factor (const pw_difference_sums *s) {
   int rounds = s->round > 0.1 * s->error;
-  double off = s->all > 0 ? s->error / s->all / (rounds ? EFFECT_ROUND : EFFECT_REST) : 0;
+  double off = s->all > 0 ? s->error / s->all / (rounds ? EFFECT_ROUND : EFFECT_REMAINDER) : 0;
   if (off <= 1) return 1;
   return rounds ? fmin (1000, off / EFFECT_AIM) : fmax (0.001, sqrt (EFFECT_AIM / off));
 }
@@ -178,7 +181,7 @@ static int effect_direction (pw_variation *x, pw_direction_copy *d) {
   memset (d->effect[0], 0, bytes);
   memset (d->effect[1], 0, bytes);
   memset (d->terms, 0, bytes);
-  for (int i = 0; i < PW_VARIATION_NEAR && status == PW_OK; i++) status = effect_neighbour (x, d, i);
+  for (int i = 0; i < PW_VARIATION_NEIGHBOURS && status == PW_OK; i++) status = effect_neighbour (x, d, i);
   effect_extrapolate (x, d);
   return status;
 }
@@ -186,7 +189,7 @@ static int effect_direction (pw_variation *x, pw_direction_copy *d) {
 int pw_variation_evaluate (pw_variation *x, double t, pw_error *error) {
   pw_statistics before = x->r->statistics;
   int near = x->r->near_singular, status = pw_linear_evaluate (&x->linear, t, x->q, x->v);
-  pw_evaluate_energies (x->r->w, x->energy);
+  pw_evaluate_energies (x->r->w, x->element_energy);
   x->at = t;
   for (int i = 0; i < x->count && status == PW_OK; i++) status = effect_direction (x, &x->direction[i]);
   x->r->statistics = before;
@@ -217,12 +220,12 @@ double pw_variation_norm (const pw_variation *x, const double *Y) {
 /* d a, and d lambda into c->lambda, of a column at its `trial`. */
 static void effect_accelerations (pw_variation *x, const pw_variation_column *c, double *da) {
   pw_linearisation *l = &x->linear;
-  const double *effect = c->direction->effect[pw_variation_index (c)];
-  memcpy (l->x, c->trial, 2 * (size_t)x->n * sizeof *l->x);
+  const double *effect = c->direction->effect[pw_variation_column_index (c)];
+  memcpy (l->dx, c->trial, 2 * (size_t)x->n * sizeof *l->dx);
   pw_linear_multiply (l);
-  for (int j = 0; j < x->n; j++) l->da[j] = effect[j] - l->y[j];
-  for (int i = 0; i < x->m; i++) l->z[i] = effect[x->n + i] + l->y[x->n + i];
-  pw_saddle_solve (x->r->saddle, l->da, l->z, l->da, c->lambda);
+  for (int j = 0; j < x->n; j++) l->da[j] = effect[j] - l->product[j];
+  for (int i = 0; i < x->m; i++) l->scratch[i] = effect[x->n + i] + l->product[x->n + i];
+  pw_saddle_solve (x->r->saddle, l->da, l->scratch, l->da, c->lambda);
   memcpy (da, l->da, (size_t)x->n * sizeof *da);
 }
 
@@ -239,15 +242,15 @@ void pw_variation_accelerate (pw_variation *x, int c, int k) {
 void pw_variation_project (pw_variation *x, pw_variation_column *c) {
   pw_linearisation *l = &x->linear;
   int n = x->n, m = x->m, holonomic = x->r->s->holonomic;
-  const double *row = c->direction->effect[pw_variation_index (c)] + n + m;
-  pw_mul_J (x->r->w, c->trial, l->z);
-  for (int i = 0; i < m; i++) l->z[i] = i < holonomic ? -l->z[i] - row[i] : 0;
-  pw_saddle_solve (x->r->saddle, NULL, l->z, l->da, l->z);
+  const double *row = c->direction->effect[pw_variation_column_index (c)] + n + m;
+  pw_mul_J (x->r->w, c->trial, l->scratch);
+  for (int i = 0; i < m; i++) l->scratch[i] = i < holonomic ? -l->scratch[i] - row[i] : 0;
+  pw_saddle_solve (x->r->saddle, NULL, l->scratch, l->da, l->scratch);
   pw_variation_add (c->trial, l->da, 1, n);
-  memcpy (l->x, c->trial, 2 * (size_t)n * sizeof *l->x);
+  memcpy (l->dx, c->trial, 2 * (size_t)n * sizeof *l->dx);
   pw_linear_multiply (l);
-  pw_mul_J (x->r->w, c->trial + n, l->z);
-  for (int i = 0; i < m; i++) l->z[i] = -l->z[i] - l->y[n + m + i] - row[m + i];
-  pw_saddle_solve (x->r->saddle, NULL, l->z, l->da, l->z);
+  pw_mul_J (x->r->w, c->trial + n, l->scratch);
+  for (int i = 0; i < m; i++) l->scratch[i] = -l->scratch[i] - l->product[n + m + i] - row[m + i];
+  pw_saddle_solve (x->r->saddle, NULL, l->scratch, l->da, l->scratch);
   pw_variation_add (c->trial + n, l->da, 1, n);
 }

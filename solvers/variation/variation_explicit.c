@@ -27,17 +27,17 @@ int pw_variation_explicit_stages (pw_variation *x, double h, double t1, pw_error
   for (int k = 1; k < b->stages && status == PW_OK; weight += k++) {
     explicit_stage (x, weight, k, h);
     status = pw_variation_evaluate_at (x, k + 1 < b->stages ? x->t + b->c[k] * h : t1, error);
-    if (status == PW_OK) status = pw_variation_rates (x, k, error);
+    if (status == PW_OK) status = pw_variation_time_derivatives (x, k, error);
   }
   if (status != PW_OK) return status;
   explicit_stage (x, b->b, b->stages, h); /* at the state of the last stage */
   PW_EACH_COLUMN (c, x) pw_variation_project (x, c);
-  memset (x->motion, 0, (size_t)x->n * sizeof *x->motion);
+  memset (x->motion_error, 0, (size_t)x->n * sizeof *x->motion_error);
   for (int k = 0; k < PW_VARIATION_RATES; k++) {
     const double *a = k < b->stages ? x->a[k] : x->linear.a;
     for (int j = 0; j < x->n; j++) {
-      x->motion[j] += h * b->e[k] * a[j];
-      if (k < b->stages) x->defect[j] += h * b->b[k] * a[j];
+      x->motion_error[j] += h * b->e[k] * a[j];
+      if (k < b->stages) x->motion_defect[j] += h * b->b[k] * a[j];
     }
   }
   return PW_OK;
@@ -45,8 +45,8 @@ int pw_variation_explicit_stages (pw_variation *x, double h, double t1, pw_error
 
 void pw_variation_explicit_errors (pw_variation *x, double h, int first, int end) {
   for (pw_direction_copy *d = x->direction; d < x->direction + x->count; d++) {
-    memset (d->local + first, 0, (size_t)(end - first) * sizeof *d->local);
-    explicit_combine (&d->column[0], pw_erk5_tableau.e, PW_VARIATION_RATES, h, first, end, d->local);
+    memset (d->local_error + first, 0, (size_t)(end - first) * sizeof *d->local_error);
+    explicit_combine (&d->column[0], pw_erk5_tableau.e, PW_VARIATION_RATES, h, first, end, d->local_error);
   }
 }
 

@@ -1,19 +1,19 @@
-/* Implicit steps of the derivatives, for stiff motions, by the Radau IIA method of order 5 with the coefficients a_ij, c_i
- * (Hairer & Wanner 1996, Solving Ordinary Differential Equations II, section IV.8).
+/* Implicit steps of the derivatives, for stiff motions, by the Radau IIA method of order 5 with the coefficients a_ij,
+ * c_i (Hairer & Wanner 1996, Solving Ordinary Differential Equations II, section IV.8).
  *
- * Stages are projected onto the linearised constraints (projected collocation, Ascher & Petzold 1991).  At the state of
- * the run at t_i = t + c_i h let p_i be the solution of these nearest to 0, N_i the tangent vectors of the minimal
+ * Stages are projected onto the linearised constraints (projected collocation, Ascher & Petzold 1991).  At the state
+ * of the run at t_i = t + c_i h let p_i be the solution of these nearest to 0, N_i the tangent vectors of the minimal
  * coordinates (linear_variation.c), and N_i^+ a left inverse of N_i.  With Y at t, the stages satisfy
  *
  *     Y_i = p_i + N_i z_i,   N_i^+ (Y_i - Y - h sum_j a_ij F_j) = 0,   F_j = F_j (p_j) + A_j z_j,
  *
- * where F_j is the time derivative of Y_j, an affine function of z_j with the matrix A_j: linear equations for the z_i of
- * all columns.  The last stage is Y at the end of the step.  The error estimate, of order h^4,
+ * where F_j is the time derivative of Y_j, an affine function of z_j with the matrix A_j: linear equations for the z_i
+ * of all columns.  The last stage is Y at the end of the step.  The error estimate, of order h^4,
  *
  *     err = N_3 (gamma/h - N_3^+ A_3)^-1 N_3^+ (F + sum_i e_i (Y_i - Y)/h),
  *
- * has gamma, the real eigenvalue of the inverse of (a_ij), and e_i from there.  With r = |err|/|Y|, (10 r)^(3/2) is about the
- * error of the method, of order h^6 (step_sharpen), as in RADAU5. */
+ * has gamma, the real eigenvalue of the inverse of (a_ij), and e_i from there.  With r = |err|/|Y|, (10 r)^(3/2) is
+ * about the error of the method, of order h^6 (step_scale_error), as in RADAU5. */
 #include <lapacke.h>
 #include <math.h>
 #include <stdlib.h>
@@ -78,9 +78,9 @@ static void implicit_direction (pw_variation *x, int i, int c) {
   int velocity = c >= l->positions;
   double T = velocity ? x->r->w->scale.time : 1, *N = p->N[i] + 2 * row, *A = p->A[i] + 2 * row, *D = p->D[i] + row;
   pw_linear_tangent (l, c);
-  memcpy (N, l->x, 2 * half);
+  memcpy (N, l->dx, 2 * half);
   for (int j = 0; j < x->n; j++) {
-    double scale = pw_as_length (x->r->s, j) * T;
+    double scale = pw_length_factor (x->r->s, j) * T;
     D[j] = N[velocity ? x->n + j : j] * scale * scale;
   }
   pw_linear_vary (l);
@@ -90,7 +90,7 @@ static void implicit_direction (pw_variation *x, int i, int c) {
 
 /* p_i of a column into `trial`: 0 if the constraints do not depend on the parameter. */
 static void implicit_particular (pw_variation *x, pw_variation_column *c) {
-  const double *row = c->direction->effect[pw_variation_index (c)] + x->n + x->m;
+  const double *row = c->direction->effect[pw_variation_column_index (c)] + x->n + x->m;
   int depends = 0;
   for (int i = 0; i < 2 * x->m; i++) depends |= row[i] != 0;
   memset (c->trial, 0, 2 * (size_t)x->n * sizeof *c->trial);
@@ -204,29 +204,29 @@ static void implicit_filter (pw_variation *x, double *e) {
 static void implicit_errors (pw_variation *x, double h) {
   for (pw_direction_copy *d = x->direction; d < x->direction + x->count; d++) {
     const pw_variation_column *c = d->column;
-    memcpy (d->local, c->K[0], (size_t)x->size * sizeof *d->local);
+    memcpy (d->local_error, c->K[0], (size_t)x->size * sizeof *d->local_error);
     for (int i = 0; i < STAGES; i++)
-      for (int j = 0; j < x->size; j++) d->local[j] += radau_e[i] / h * (c->K[STATE + i][j] - c->Y[j]);
-    implicit_filter (x, d->local);
-    for (int j = 2 * x->n; j < x->size; j++) d->local[j] *= h / radau_gamma;
+      for (int j = 0; j < x->size; j++) d->local_error[j] += radau_e[i] / h * (c->K[STATE + i][j] - c->Y[j]);
+    implicit_filter (x, d->local_error);
+    for (int j = 2 * x->n; j < x->size; j++) d->local_error[j] *= h / radau_gamma;
   }
 }
 
-/* Estimates the error of the run's velocities likewise, into `motion`; filters `defect`. */
+/* Estimates the error of the run's velocities likewise, into `motion_error`; filters `motion_defect`. */
 static void implicit_motion (pw_variation *x, double h) {
   int n = x->n;
   double *e = x->values, *defect = e + 2 * n;
   memset (e, 0, 4 * (size_t)n * sizeof *e);
   memcpy (e + n, x->a[0], (size_t)n * sizeof *e);
-  memcpy (defect + n, x->defect, (size_t)n * sizeof *e);
+  memcpy (defect + n, x->motion_defect, (size_t)n * sizeof *e);
   for (int k = 0; k < STAGES; k++) {
     for (int i = 0; i < STAGES; i++) pw_variation_add (e + n, x->a[1 + k], radau_e[i] * radau_A[i][k], n);
     pw_variation_add (defect + n, x->a[1 + k], h * radau_A[2][k], n);
   }
   implicit_filter (x, e);
   implicit_filter (x, defect);
-  memcpy (x->motion, e + n, (size_t)n * sizeof *e);
-  for (int j = 0; j < n; j++) x->defect[j] = defect[n + j] * radau_gamma / h;
+  memcpy (x->motion_error, e + n, (size_t)n * sizeof *e);
+  for (int j = 0; j < n; j++) x->motion_defect[j] = defect[n + j] * radau_gamma / h;
 }
 
 int pw_variation_implicit_stages (pw_variation *x, double h, double t1, pw_error *error) {

@@ -5,9 +5,9 @@
  *     dy+ = dy- + (y'- - y'+) dt_s/dp
  *
  * as at breakpoints (variation_breakpoint.c), with the time t_s at which the motion meets the surface (Aizerman &
- * Gantmakher 1958; Leine & Nijmeijer 2004).  Neither the surface nor its gradient is known; bisection finds t_s
- * of the run, and that of neighbours along y + (p_i - p) dy + (t - t_s) y'-, by the accelerations, which are nearer to one
- * or to the other of the two sides. */
+ * Gantmakher 1958; Leine & Nijmeijer 2004).  Neither the surface nor its gradient is known; bisection finds t_s of the
+ * run, and that of neighbours along y + (p_i - p) dy + (t - t_s) y'-, by the accelerations, which are nearer to one or
+ * to the other of the two sides. */
 #include <math.h>
 #include <string.h>
 #include "util.h"
@@ -15,12 +15,12 @@
 
 enum { JUMP_MANY = 8 }; /* jumps in one step of a run: more are chatter */
 
-/* A jump: between times that do not differ, accelerations change by at least this part of their change in the interval that
- * was searched, and by JUMP_LEAST in units of the scene. */
+/* A jump: between times that do not differ, accelerations change by at least this part of their change in the interval
+ * that was searched, and by JUMP_LEAST in units of the scene. */
 static const double JUMP_PART = 0.25, JUMP_LEAST = 1e-6;
 
-/* An interval is searched if accelerations at its middle differ from the mean of those at its ends by more than this part of
- * their change. */
+/* An interval is searched if accelerations at its middle differ from the mean of those at its ends by more than this
+ * part of their change. */
 static const double JUMP_BEND = 0.1;
 
 /* The first and the largest interval of time in which a neighbour meets the surface, in units of the scene. */
@@ -56,8 +56,8 @@ static int jump_insert (pw_variation *x, int i, double t, const double *state, p
   return PW_OK;
 }
 
-/* Bisects the interval from t0 to t1, with the states `left` and `right`, towards the larger change of the accelerations.
- * *found: 1 if they jump between the times t0 and t1 that remain. */
+/* Bisects the interval from t0 to t1, with the states `left` and `right`, towards the larger change of the
+ * accelerations. *found: 1 if they jump between the times t0 and t1 that remain. */
 static int jump_bisect (pw_variation *x, double *t0, double *t1, double *left, double *right, int *found,
                         pw_error *error) {
   double *middle = x->scratch, first = jump_distance (x, left + 2 * x->n, right + 2 * x->n), t;
@@ -217,10 +217,10 @@ static double jump_along (const pw_variation_column *c, jump_neighbour k) {
 /* The derivative of t_s, or its error. */
 static double jump_slope (const pw_variation_column *c, jump_neighbour k) {
   const pw_direction *d = &c->direction->given;
-  int index = pw_variation_index (c);
+  int index = pw_variation_column_index (c);
   double slope = d->initial || index == 1 ? jump_along (c, k) : 0;
   k.dy = c->direction->column[0].Y;
-  for (int i = 0; i < PW_VARIATION_NEAR && d->initial == NULL; i++) {
+  for (int i = 0; i < PW_VARIATION_NEIGHBOURS && d->initial == NULL; i++) {
     double weight = pw_direction_weight (d, index, i);
     k.r = d->neighbour[i];
     k.step = pw_direction_offset (d, i);
@@ -238,7 +238,8 @@ static int jump_leaves (jump_neighbour k) {
   return jump_side (&k, k.step, &side) == PW_OK && side;
 }
 
-/* 1 if the motion has come from another state, where accelerations were those before the jump, instead of starting at it. */
+/* 1 if the motion has come from another state, where accelerations were those before the jump, instead of starting at
+ * it. */
 static int jump_arrives (jump_neighbour k) {
   int n = k.x->n, side;
   double t = -JUMP_NEAR * k.x->r->w->scale.time, *a = k.x->scratch + 2 * (n + 3);
@@ -247,8 +248,8 @@ static int jump_arrives (jump_neighbour k) {
          jump_distance (k.x, a, k.before + 2 * n) < JUMP_PART * jump_distance (k.x, k.before + 2 * n, k.after + 2 * n);
 }
 
-/* The largest difference between t_s and the times at which neighbours pass the surface, those at the state of the run and
- * those near it, at which powers are differentiated. */
+/* The largest difference between t_s and the times at which neighbours pass the surface, those at the state of the run
+ * and those near it, at which powers are differentiated. */
 static double jump_width (pw_variation *x, jump_neighbour k) {
   double most = 0;
   PW_EACH_COLUMN (c, x)
@@ -258,7 +259,7 @@ static double jump_width (pw_variation *x, jump_neighbour k) {
   }
   k.dy = k.before, k.step = 0;
   for (pw_direction_copy *d = x->direction; d < x->direction + x->count; d++)
-    for (int i = 0; i < PW_VARIATION_NEAR && d->given.initial == NULL; i++) {
+    for (int i = 0; i < PW_VARIATION_NEIGHBOURS && d->given.initial == NULL; i++) {
       k.r = d->given.neighbour[i];
       most = pw_larger_or_nan (most, fabs (jump_time (&k)));
     }
@@ -283,7 +284,7 @@ int pw_variation_approach_jump (pw_variation *x, pw_error *error) {
   if (x->t < x->hold[0].from) return PW_OK;
   PW_EACH_COLUMN (c, x) memcpy (c->trial, c->Y, (size_t)x->size * sizeof *c->Y);
   int status = pw_variation_evaluate_at (x, x->t, error);
-  return status == PW_OK ? pw_variation_begin (x, error) : status;
+  return status == PW_OK ? pw_variation_restart (x, error) : status;
 }
 
 int pw_variation_pass_jump (pw_variation *x, pw_error *error) {

@@ -1,4 +1,5 @@
-/* Derivatives of energies, powers and multipliers along a column: exact, or by differences along the derivative of the state. */
+/* Derivatives of energies, powers and multipliers along a column: exact, or by differences along the derivative of the
+ * state. */
 #include <float.h>
 #include <math.h>
 #include <string.h>
@@ -14,28 +15,28 @@ static double output_kinetic (const pw_variation *x, const pw_variation_column *
   const double *mass = x->r->s->mass;
   double sum = 0;
   for (int j = 0; j < x->n; j++) sum += mass[j] * v[j] * dv[j];
-  for (int i = 0; i < PW_VARIATION_NEAR && d->initial == NULL; i++) {
-    double weight = pw_direction_weight (d, pw_variation_index (c), i);
+  for (int i = 0; i < PW_VARIATION_NEIGHBOURS && d->initial == NULL; i++) {
+    double weight = pw_direction_weight (d, pw_variation_column_index (c), i);
     const double *other = d->neighbour[i]->s->mass;
     for (int j = 0; j < x->n; j++) sum += weight * (other[j] - mass[j]) * v[j] * v[j] / 2;
   }
   return sum;
 }
 
-/* The sum over the elements of their potential energies minus those at the state evaluated, which are close: the energies of elements on
- * which a derivative does not depend must not contribute round-off. */
+/* The sum over the elements of their potential energies minus those at the state evaluated, which are close: the
+ * energies of elements on which a derivative does not depend must not contribute round-off. */
 static double output_potential (pw_variation *x, pw_workspace *w) {
   double sum = 0;
-  pw_evaluate_energies (w, x->energy + x->energies);
-  for (int i = 0; i < x->energies; i++) sum += x->energy[x->energies + i] - x->energy[i];
+  pw_evaluate_energies (w, x->element_energy + x->elements);
+  for (int i = 0; i < x->elements; i++) sum += x->element_energy[x->elements + i] - x->element_energy[i];
   return sum;
 }
 
 /* Round-off of a difference of the energies that have changed between the state evaluated and the one last used. */
 static double output_round (const pw_variation *x) {
   double sum = 0;
-  for (int i = 0; i < x->energies; i++)
-    if (x->energy[x->energies + i] != x->energy[i]) sum += DBL_EPSILON * fabs (x->energy[i]);
+  for (int i = 0; i < x->elements; i++)
+    if (x->element_energy[x->elements + i] != x->element_energy[i]) sum += DBL_EPSILON * fabs (x->element_energy[i]);
   return sum;
 }
 
@@ -71,7 +72,7 @@ static int output_by_state (pw_variation *x, const pw_variation_column *c, pw_va
     status = output_values (x, x->r, at.held ? at.t : x->at, q, v, lambda);
     pw_variation_add (out, x->values, side / (2 * step), 2 + x->entries + m);
   }
-  if (pw_variation_index (c) == 1) /* round-off of the differences of the derivative itself */
+  if (pw_variation_column_index (c) == 1) /* round-off of the differences of the derivative itself */
     out[1] += copysign (output_round (x) / pw_variation_step_along (c->direction->column), out[1]);
   return status;
 }
@@ -81,8 +82,8 @@ int pw_variation_outputs (pw_variation *x, const pw_variation_column *c, const d
   pw_variation_place at = pw_variation_place_of (x, d);
   int length = 2 + x->entries + x->m, status = PW_OK;
   memset (out, 0, (size_t)length * sizeof *out);
-  for (int i = 0; i < PW_VARIATION_NEAR && status == PW_OK && d->given.initial == NULL; i++) {
-    double weight = pw_direction_weight (&d->given, pw_variation_index (c), i);
+  for (int i = 0; i < PW_VARIATION_NEIGHBOURS && status == PW_OK && d->given.initial == NULL; i++) {
+    double weight = pw_direction_weight (&d->given, pw_variation_column_index (c), i);
     if (weight == 0) continue;
     status = output_values (x, d->given.neighbour[i], at.t, at.q, at.v, x->linear.lambda);
     pw_variation_add (out, x->values, weight, length);
@@ -105,7 +106,7 @@ int pw_variation_ledger_rates (pw_variation *x, int k) {
   return status;
 }
 
-int pw_variation_rates (pw_variation *x, int k, pw_error *error) {
+int pw_variation_time_derivatives (pw_variation *x, int k, pw_error *error) {
   memcpy (x->a[k], x->linear.a, (size_t)x->n * sizeof *x->q);
   pw_variation_accelerate (x, 0, k);
   pw_variation_accelerate (x, 1, k);

@@ -7,9 +7,9 @@
 
 enum { PATH_DEPTH = 6 }; /* of bisection */
 
-/* Hermite interpolation between two points, t_0 + u h: q of degree 5 from q, v, a at both ends.  v is its derivative for a
- * run with fixed steps.  Otherwise the errors of a run in q and v may differ, and v is of degree 3 from v and a; the points
- * are dense enough. */
+/* Hermite interpolation between two points, t_0 + u h: q of degree 5 from q, v, a at both ends.  v is its derivative
+ * for a run with fixed steps.  Otherwise the errors of a run in q and v may differ, and v is of degree 3 from v and a;
+ * the points are dense enough. */
 static void path_interpolate (const pw_variation *x, const pw_variation_point *p, double t, double *out) {
   int n = x->n, fixed = pw_fixed_steps (x->r);
   double h = p[1].t - p[0].t, u = (t - p[0].t) / h, up = u * u * (3 - 2 * u), w = u * (1 - u);
@@ -33,7 +33,7 @@ void pw_variation_state (const pw_variation *x, double t, double *out) {
     memcpy (out, x->point[x->points > 1 ? i + 1 : 0].x, 2 * (size_t)x->n * sizeof *out);
 }
 
-void pw_variation_forget (pw_variation *x) {
+void pw_variation_discard_points (pw_variation *x) {
   int gone = 0;
   while (gone + 1 < x->points && x->point[gone + 1].t <= x->t) gone++;
   x->points -= gone;
@@ -65,7 +65,7 @@ int pw_variation_accelerations (pw_variation *x, double t, const double *q, cons
                                 pw_error *error) {
   pw_run *r = x->r;
   pw_statistics before = r->statistics;
-  int near = r->near_singular, status = pw_run_accelerate (r, pw_before_breakpoint (r, t), q, v, a, x->linear.z);
+  int near = r->near_singular, status = pw_run_accelerate (r, pw_before_breakpoint (r, t), q, v, a, x->linear.scratch);
   r->statistics = before;
   if (status > 0) return pw_fail_singular (r, t, error);
   r->near_singular = near;
@@ -75,8 +75,8 @@ int pw_variation_accelerations (pw_variation *x, double t, const double *q, cons
 /* Part of the run's step over which its velocities are differentiated. */
 static const double PATH_PART = 1e-3;
 
-/* Accelerations of a point in the run's last step, of size h, as the derivative of its dense output: in stiff motions those of
- * the equations magnify the errors of the states. */
+/* Accelerations of a point in the run's last step, of size h, as the derivative of its dense output: in stiff motions
+ * those of the equations magnify the errors of the states. */
 static int path_differentiate (pw_variation *x, const pw_variation_point *p, double h, pw_error *error) {
   double d = PATH_PART * h, *a = p->x + 2 * x->n;
   int inside = p->t + d <= x->r->t, status = PW_OK;
@@ -108,7 +108,7 @@ int pw_variation_append (pw_variation *x, double t, pw_error *error) {
 }
 
 /* 1 if interpolation between points i and i + 1 gives the last point to a tenth of the run's tolerance. */
-static int path_good (const pw_variation *x, int i) {
+static int path_is_accurate (const pw_variation *x, int i) {
   const pw_variation_point *at = x->point + x->points - 1;
   double *guess = x->scratch;
   path_interpolate (x, x->point + i, at->t, guess);
@@ -119,13 +119,14 @@ static int path_good (const pw_variation *x, int i) {
   return 1;
 }
 
-/* Inserts states between points i and i + 1 until interpolation is good, which is tested at the midpoint; that is kept. */
+/* Inserts states between points i and i + 1 until interpolation is good, which is tested at the midpoint; that is
+ * kept. */
 static int path_refine (pw_variation *x, int i, int depth, pw_error *error) {
   double t0 = x->point[i].t, t1 = x->point[i + 1].t, middle = t0 + (t1 - t0) / 2;
   if (pw_fixed_steps (x->r) || depth == 0 || !(t0 < middle && middle < t1)) return PW_OK;
   int status = pw_variation_append (x, middle, error);
   if (status != PW_OK) return status;
-  int good = path_good (x, i);
+  int good = path_is_accurate (x, i);
   pw_variation_point kept = x->point[x->points - 1];
   memmove (x->point + i + 2, x->point + i + 1, (size_t)(x->points - i - 2) * sizeof kept);
   x->point[i + 1] = kept;

@@ -3,8 +3,9 @@
 #include <string.h>
 #include "variation_parts.h"
 
-/* Permitted error of a step, relative to the largest derivative.  The loose one applies where the other would need more than
- * one linearisation per step of a run with fixed steps: the motion is so fast that these are large for it, too. */
+/* Permitted error of a step, relative to the largest derivative.  The loose one applies where the other would need
+ * more than one linearisation per step of a run with fixed steps: the motion is so fast that these are large for it,
+ * too. */
 static const double STEP_TOLERANCE = 1e-9, STEP_LOOSE = 1e-7;
 enum { STEP_RATIO = 5 }; /* linearisations in a step of the derivatives */
 
@@ -15,10 +16,10 @@ static const double STEP_MOTION = 1e-8;
  * velocities. */
 static const double STEP_ROUND = 1e-14;
 
-/* Derivatives by p below this part of the scene's unit per p are computed to the same absolute error; p is estimated from the
- * step of its differences, usually STEP_OF_P times p.  Derivatives of work and losses: below this part of the energy exchanged
- * per unit of the scene. */
-static const double STEP_LEAST = 0.1, STEP_OF_P = 1e-5, STEP_LEAST_ENERGY = 1e-3;
+/* Derivatives by p below this part of the scene's unit per p are computed to the same absolute error; p is estimated
+ * from the step of its differences, usually STEP_OF_PARAMETER times p.  Derivatives of work and losses: below this
+ * part of the energy exchanged per unit of the scene. */
+static const double STEP_LEAST_DERIVATIVE = 0.1, STEP_OF_PARAMETER = 1e-5, STEP_LEAST_ENERGY = 1e-3;
 
 /* The smallest step, in units of the scene. */
 static const double STEP_SMALLEST = 1e-12;
@@ -26,29 +27,29 @@ static const double STEP_SMALLEST = 1e-12;
 /* Sine between constraint equations below which the round-off of accelerations prevents steps. */
 static const double STEP_SINGULAR = 0.01;
 
-/* The motion is stiff if that many steps were longer than this part of the time in which its fastest component decays.  A
- * tolerance of 1e-9 alone permits about 0.2; stability limits it to 3.3 (Hairer & Wanner 1996, section IV.2). */
+/* The motion is stiff if that many steps were longer than this part of the time in which its fastest component decays.
+ * A tolerance of 1e-9 alone permits about 0.2; stability limits it to 3.3 (Hairer & Wanner 1996, section IV.2). */
 enum { STEP_STIFF = 100 };
 static const double STEP_FAST = 1;
 
 /* Largest derivative of work and losses. */
-static double step_energy (const pw_variation *x, const double *Y) {
+static double step_largest_energy (const pw_variation *x, const double *Y) {
   double most = 0;
   for (int i = 2 * x->n; i < x->size; i++) most = pw_larger_or_nan (most, fabs (Y[i]));
   return most;
 }
 
 /* Largest of velocities in units of the scene. */
-static double step_speed (const pw_variation *x, const double *v) {
+static double step_largest_velocity (const pw_variation *x, const double *v) {
   double most = 0;
   for (int j = 0; j < x->n; j++) most = fmax (most, fabs (v[j]) * x->r->w->scale.time / pw_unit (x->r->s, j));
   return most;
 }
 
-/* The error of the method for the velocities of the run, relative to the largest: derivatives alone may not see that a step
- * passes over a short phase of the motion, such as the reversal of friction. */
+/* The error of the method for the velocities of the run, relative to the largest: derivatives alone may not see that a
+ * step passes over a short phase of the motion, such as the reversal of friction. */
 static double step_motion_error (const pw_variation *x) {
-  return step_speed (x, x->motion) / fmax (1, x->speed);
+  return step_largest_velocity (x, x->motion_error) / fmax (1, x->speed);
 }
 
 /* Errors of the run's velocities between its steps, in units of the scene; estimated as a fifth of the tolerance if it
@@ -60,24 +61,26 @@ static double step_noise (const pw_variation *x) {
   return STEP_ROUND * most * x->r->w->scale.time / fmin (x->r->settings.step, x->r->w->scale.time);
 }
 
-/* The permitted one: STEP_MOTION, or the run's own if that is small compared with the change over which forces reverse. */
+/* The permitted one: STEP_MOTION, or the run's own if that is small compared with the change over which forces
+ * reverse. */
 static double step_motion_tolerance (const pw_variation *x) {
   return fmax (STEP_MOTION, step_noise (x) * x->reversal / fmax (1, x->speed));
 }
 
-/* Changes of velocities below this part of the largest, or this multiple of the run's tolerance, count as that large: the error
- * of a body in free flight, which does not accelerate, is no large part of its motion. */
+/* Changes of velocities below this part of the largest, or this multiple of the run's tolerance, count as that large:
+ * the error of a body in free flight, which does not accelerate, is no large part of its motion. */
 static const double STEP_CHANGE = 1e-6, STEP_CHANGE_RTOL = 1000;
 
-/* The difference between a step of the run's velocities and the integral of its accelerations, relative to the latter: large
- * where the run does not resolve the motion.  Errors of the method, and of the velocities if they are small compared with
- * the change over which forces reverse, do not count. */
+/* The difference between a step of the run's velocities and the integral of its accelerations, relative to the latter:
+ * large where the run does not resolve the motion.  Errors of the method, and of the velocities if they are small
+ * compared with the change over which forces reverse, do not count. */
 static double step_defect (const pw_variation *x, double h) {
   int stages = x->implicit ? 1 + PW_VARIATION_STAGES : PW_VARIATION_RATES - 1;
   double most =
       fmax (STEP_CHANGE, pw_fixed_steps (x->r) ? 0 : STEP_CHANGE_RTOL * x->r->settings.rtol) * fmax (1, x->speed);
-  for (int k = 0; k < stages; k++) most = fmax (most, h * step_speed (x, x->a[k]));
-  double defect = step_speed (x, x->defect) - step_noise (x) * x->reversal - step_motion_error (x) * fmax (1, x->speed);
+  for (int k = 0; k < stages; k++) most = fmax (most, h * step_largest_velocity (x, x->a[k]));
+  double defect = step_largest_velocity (x, x->motion_defect) - step_noise (x) * x->reversal -
+                  step_motion_error (x) * fmax (1, x->speed);
   return defect > 0 ? fmin (1, defect / most) : 0;
 }
 
@@ -93,23 +96,23 @@ static void step_add_defect (pw_variation *x, double h) {
 }
 
 /* What errors of a derivative are relative to; likewise of those of work and losses. */
-static double step_size (const pw_variation *x, const pw_direction_copy *d) {
+static double step_norm (const pw_variation *x, const pw_direction_copy *d) {
   double size = fmax (d->column->largest, pw_variation_norm (x, d->column->trial));
-  return d->given.initial ? size : fmax (size, STEP_LEAST * STEP_OF_P / fabs (d->given.step));
+  return d->given.initial ? size : fmax (size, STEP_LEAST_DERIVATIVE * STEP_OF_PARAMETER / fabs (d->given.step));
 }
 
-static double step_size_energy (const pw_variation *x, const pw_direction_copy *d) {
-  double energy = fmax (d->column->energy, step_energy (x, d->column->trial));
-  return fmax (energy, STEP_LEAST_ENERGY * fmax (x->r->exchanged, x->r->energy_scene) * step_size (x, d));
+static double step_energy_norm (const pw_variation *x, const pw_direction_copy *d) {
+  double energy = fmax (d->column->energy, step_largest_energy (x, d->column->trial));
+  return fmax (energy, STEP_LEAST_ENERGY * fmax (x->r->exchanged, x->r->scene_energy) * step_norm (x, d));
 }
 
 /* The largest relative error of all derivatives. */
 static double step_error (const pw_variation *x) {
   double most = 0;
   for (const pw_direction_copy *d = x->direction; d < x->direction + x->count; d++) {
-    double size = step_size (x, d), energy = step_size_energy (x, d);
-    if (size > 0) most = pw_larger_or_nan (most, pw_variation_norm (x, d->local) / size);
-    if (energy > 0) most = pw_larger_or_nan (most, step_energy (x, d->local) / energy);
+    double size = step_norm (x, d), energy = step_energy_norm (x, d);
+    if (size > 0) most = pw_larger_or_nan (most, pw_variation_norm (x, d->local_error) / size);
+    if (energy > 0) most = pw_larger_or_nan (most, step_largest_energy (x, d->local_error) / energy);
   }
   return most;
 }
@@ -117,21 +120,22 @@ static double step_error (const pw_variation *x) {
 /* Adds the errors of the step to the errors of derivatives: entries from `first` to `end` - 1. */
 static void step_add_errors (pw_variation *x, int first, int end) {
   for (pw_direction_copy *d = x->direction; d < x->direction + x->count; d++)
-    for (int j = first; j < end && d->columns > 1; j++) d->column[1].trial[j] += d->local[j];
+    for (int j = first; j < end && d->columns > 1; j++) d->column[1].trial[j] += d->local_error[j];
 }
 
 /* Scales an estimate of order h^4, relative to `size`, to the error of the implicit step. */
-static void step_sharpen (double *error, double relative, int n) {
+static void step_scale_error (double *error, double relative, int n) {
   double factor = fmin (1, sqrt (1000 * relative));
   for (int j = 0; j < n && relative > 0; j++) error[j] *= factor;
 }
 
 static void step_implicit_errors (pw_variation *x) {
   for (pw_direction_copy *d = x->direction; d < x->direction + x->count; d++) {
-    step_sharpen (d->local, pw_variation_norm (x, d->local) / step_size (x, d), 2 * x->n);
-    step_sharpen (d->local + 2 * x->n, step_energy (x, d->local) / step_size_energy (x, d), x->size - 2 * x->n);
+    step_scale_error (d->local_error, pw_variation_norm (x, d->local_error) / step_norm (x, d), 2 * x->n);
+    step_scale_error (d->local_error + 2 * x->n, step_largest_energy (x, d->local_error) / step_energy_norm (x, d),
+                      x->size - 2 * x->n);
   }
-  step_sharpen (x->motion, step_motion_error (x), x->n);
+  step_scale_error (x->motion_error, step_motion_error (x), x->n);
 }
 
 /* The stages, the new derivatives in `trial`, their time derivatives and errors. */
@@ -139,7 +143,7 @@ static int step_stages (pw_variation *x, double h, double t1, pw_error *error) {
   int last = PW_VARIATION_RATES - 1, status;
   pw_variation_state (x, x->t, x->scratch);
   pw_variation_state (x, t1, x->values);
-  for (int j = x->n; j < 2 * x->n; j++) x->defect[j - x->n] = x->scratch[j] - x->values[j];
+  for (int j = x->n; j < 2 * x->n; j++) x->motion_defect[j - x->n] = x->scratch[j] - x->values[j];
   status =
       x->implicit ? pw_variation_implicit_stages (x, h, t1, error) : pw_variation_explicit_stages (x, h, t1, error);
   if (status != PW_OK) return status;
@@ -160,23 +164,23 @@ static int step_stages (pw_variation *x, double h, double t1, pw_error *error) {
 
 static void step_accept (pw_variation *x) {
   memcpy (x->a[0], x->a[PW_VARIATION_RATES - 1], (size_t)x->n * sizeof *x->q);
-  x->speed = fmax (x->speed, step_speed (x, x->v));
+  x->speed = fmax (x->speed, step_largest_velocity (x, x->v));
   PW_EACH_COLUMN (c, x) {
     double *first = c->K[0];
     memcpy (c->Y, c->trial, (size_t)x->size * sizeof *c->Y);
     c->K[0] = c->K[PW_VARIATION_RATES - 1];
     c->K[PW_VARIATION_RATES - 1] = first;
     c->largest = fmax (c->largest, pw_variation_norm (x, c->Y));
-    c->energy = fmax (c->energy, step_energy (x, c->Y));
+    c->energy = fmax (c->energy, step_largest_energy (x, c->Y));
   }
 }
 
-int pw_variation_begin (pw_variation *x, pw_error *error) {
+int pw_variation_restart (pw_variation *x, pw_error *error) {
   PW_EACH_COLUMN (c, x) {
     pw_variation_project (x, c);
     c->largest = fmax (c->largest, pw_variation_norm (x, c->trial));
   }
-  int status = pw_variation_rates (x, PW_VARIATION_RATES - 1, error);
+  int status = pw_variation_time_derivatives (x, PW_VARIATION_RATES - 1, error);
   if (status == PW_OK) step_accept (x);
   return status;
 }
@@ -186,16 +190,16 @@ static double step_tolerance (const pw_run *r) {
   return pw_fixed_steps (r) ? STEP_TOLERANCE : fmax (STEP_TOLERANCE, 0.1 * r->settings.rtol);
 }
 
-/* The factor of the next step for a tolerance.  It depends on the error of the last accepted step, too (at least 1e-4 of the
- * tolerance: the first step has none), which damps oscillations of the step at the limit of stability (Hairer & Wanner 1996,
- * section IV.2: exponents 1 / order - 0.75 b and b, b = 0.04). */
+/* The factor of the next step for a tolerance.  It depends on the error of the last accepted step, too (at least 1e-4
+ * of the tolerance: the first step has none), which damps oscillations of the step at the limit of stability (Hairer &
+ * Wanner 1996, section IV.2: exponents 1 / order - 0.75 b and b, b = 0.04). */
 static double step_factor (const pw_variation *x, double off, double tolerance) {
-  double factor = 0.9 * pow (off / tolerance, -0.17) * pow (fmax (x->off, 1e-4 * tolerance) / tolerance, 0.04);
+  double factor = 0.9 * pow (off / tolerance, -0.17) * pow (fmax (x->last_error, 1e-4 * tolerance) / tolerance, 0.04);
   return fmin (5, fmax (0.2, factor));
 }
 
 /* The next step by the error of one of size h: for the strict tolerance, or the loose one up to `fine`. */
-static double step_next (const pw_variation *x, double h, double off, double tolerance, double fine) {
+static double step_next_size (const pw_variation *x, double h, double off, double tolerance, double fine) {
   if (!isfinite (off)) return h / 10;
   return fmax (h * step_factor (x, off, tolerance), fmin (h * step_factor (x, off, STEP_LOOSE), fine));
 }
@@ -238,11 +242,11 @@ int pw_variation_step (pw_variation *x, double t1, pw_error *error) {
   int status = step_stages (x, h, end, error);
   if (status != PW_OK) return status;
   double off = pw_larger_or_nan (step_error (x), step_motion_error (x) * allowed / step_motion_tolerance (x));
-  double next = step_next (x, h, off, tolerance, fine);
+  double next = step_next_size (x, h, off, tolerance, fine);
   if (off <= allowed) {
     status = step_check_stiffness (x, h, error);
     x->h = h < x->h ? fmax (x->h, next) : next;
-    x->t = end, x->off = off;
+    x->t = end, x->last_error = off;
     step_accept (x);
   } else
     x->h = fmin (next, 0.9 * h);

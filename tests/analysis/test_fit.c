@@ -21,7 +21,8 @@ static const char model[] =
 enum { FIT_ROWS = 80, FIT_DRAWS = 100 };
 static const double fit_k = 5, fit_c = 0.4, fit_sigma = 0.02;
 
-/* A number of mean 0 and variance 1: twelve uniform ones (the sum differs from a normal one beyond three deviations). */
+/* A number of mean 0 and variance 1: twelve uniform ones (the sum differs from a normal one beyond three
+ * deviations). */
 static double fit_noise (void) {
   static unsigned long long x = 88172645463325252ULL; /* xorshift, Marsaglia 2003 */
   double sum = -6;
@@ -159,8 +160,8 @@ static void test_errors (void **state) {
                "in proportion to those given");
 }
 
-/* The true value lies in the 95 % interval in about 95 of 100 draws: with this probability, 88 or fewer have the binomial
- * probability 0.004, all 100 have 0.006. */
+/* The true value lies in the 95 % interval in about 95 of 100 draws: with this probability, 88 or fewer have the
+ * binomial probability 0.004, all 100 have 0.006. */
 static void test_coverage (void **state) {
   (void)state;
   int covered[2] = { 0 };
@@ -214,8 +215,8 @@ static void test_undetermined (void **state) {
   }
 }
 
-/* Runs fail with k < 4.95: steps into that region are shortened.  With k < 5.3 they do so at the minimum, too: the fit ends
- * at the edge, and says that it has not converged. */
+/* Runs fail with k < 4.95: steps into that region are shortened.  With k < 5.3 they do so at the minimum, too: the fit
+ * ends at the edge, and says that it has not converged. */
 static void test_failing (void **state) {
   char text[1000];
   (void)state;
@@ -288,7 +289,8 @@ static void test_bad (void **state) {
   }
 }
 
-/* A frequency has many minima: from k = 60 the search ends at another one than k = 5, of several searches some end there. */
+/* A frequency has many minima: from k = 60 the search ends at another one than k = 5, of several searches some end
+ * there. */
 static void test_starts (void **state) {
   (void)state;
   fit_write (0);

@@ -1,5 +1,5 @@
-/* Bodies with many elements: a carousel's hub, a table on many legs, a platform on casters.  In large scenes such a body
- * is not condensed.  Results satisfy the independent verifier, and do not depend on the index of that body. */
+/* Bodies with many elements: a carousel's hub, a table on many legs, a platform on casters.  In large scenes such a
+ * body is not condensed.  Results satisfy the independent verifier, and do not depend on the index of that body. */
 #include <math.h>
 #include <stdio.h>
 #include "check.h"

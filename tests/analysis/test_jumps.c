@@ -1,5 +1,5 @@
-/* Derivatives of motions that pass states where accelerations jump, or change within a short time: closed forms, differences
- * of runs, refusals. */
+/* Derivatives of motions that pass states where accelerations jump, or change within a short time: closed forms,
+ * differences of runs, refusals. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -54,8 +54,8 @@ static void test_extremum (void **state) {
   assert_non_null (strstr (cli_out, "none"));
 }
 
-/* A reaction that is largest just after a breakpoint that moves, and a velocity with a kink there, have no derivative, by
- * methods of every family, some of which leave residuals in the velocities; another extremum has. */
+/* A reaction that is largest just after a breakpoint that moves, and a velocity with a kink there, have no derivative,
+ * by methods of every family, some of which leave residuals in the velocities; another extremum has. */
 static void test_breakpoint (void **state) {
   static const char *const methods[] = { "rk4", "erk8", "adams", "bdf", "ida", "radau", "galpha" };
   double x[JUMPS_MOST];
@@ -100,8 +100,8 @@ static void jumps_compare (const char *file, const char *outputs, const char *by
   }
 }
 
-/* A vehicle whose steering torque switches; a block with friction by sign (vx), at rest at the start; a bouncing ball, of
- * which only the derivative of the force jumps. */
+/* A vehicle whose steering torque switches; a block with friction by sign (vx), at rest at the start; a bouncing ball,
+ * of which only the derivative of the force jumps. */
 static void test_differences (void **state) {
   static const char outputs[] = "--of b.y --of t.work --of mean:p.Fx --of rms:a.vx --of max:a.vx --of kinetic";
   (void)state;
@@ -183,8 +183,8 @@ static void test_refusals (void **state) {
   check_close ("da.x/dF", x, 2, 1e-4, "t^2/2, and the error of the run");
 }
 
-/* A motion that turns around twice, from many initial velocities and with steps of many sizes: whether a state lies on the
- * surface, or samples near it are accurate, must not matter. */
+/* A motion that turns around twice, from many initial velocities and with steps of many sizes: whether a state lies on
+ * the surface, or samples near it are accurate, must not matter. */
 static void test_crossings (void **state) {
   static const char *const methods[] = { "erk8 --rtol 1e-9", "erk8 --rtol 1e-6", "erk5 --rtol 1e-4",
                                          "bdf --rtol 1e-7" };

@@ -1,5 +1,5 @@
-/* The matrices and mode shapes of a linearisation against runs with small perturbations and harmonic torques, and closed
- * forms. */
+/* The matrices and mode shapes of a linearisation against runs with small perturbations and harmonic torques, and
+ * closed forms. */
 #include <complex.h>
 #include <math.h>
 #include <stdlib.h>
@@ -93,8 +93,8 @@ static void modes_compare (const modes *x, const double *plus, const double *min
 
 /* ---- Scenes ---- */
 
-/* A tractor with a trailer hitched on its axle, and a torque between them.  In the steady turn the trailer's axle has no
- * lateral velocity: u sin (heading) = -w L. */
+/* A tractor with a trailer hitched on its axle, and a torque between them.  In the steady turn the trailer's axle has
+ * no lateral velocity: u sin (heading) = -w L. */
 typedef struct {
   double amplitude, w, stiffness;
 } modes_parameters;
@@ -222,13 +222,13 @@ static double complex modes_transfer (const pw_linear *l, double omega, int j) {
 }
 
 /* A damped compound pendulum with a torque: phi = tau / (k - J w^2 + i d w), k = m g l, J = I + m l^2. */
-/* A rotor of inertia I that turns at 1 rad/s about its centre, and on it at r = 0.5 m a pendulum, 1 kg at a = 1 m.  The
- * perturbations u of the rotor's angle and b of the pendulum's obey
+/* A rotor of inertia I that turns at 1 rad/s about its centre, and on it at r = 0.5 m a pendulum, 1 kg at a = 1 m.
+ * The perturbations u of the rotor's angle and b of the pendulum's obey
  *
  *     (I + r^2) u'' + r a b'' - r a (b - u) = 0,   a^2 b'' + r a u'' + r a (b - u) = 0.
  *
- * With I = 2.25 kg m^2 they oscillate at 1 rad/s, as fast as the rotor turns, with u = -b/2.  That is no eigenvalue of a rigid
- * rotation, which is the only symmetry. */
+ * With I = 2.25 kg m^2 they oscillate at 1 rad/s, as fast as the rotor turns, with u = -b/2.  That is no eigenvalue of
+ * a rigid rotation, which is the only symmetry. */
 static void modes_rotor (pw_model *m, const void *parameters) {
   (void)parameters;
   pw_add_body (m, &(pw_body){ .name = "rotor", .mass = 1, .inertia = 2.25, .rate = { 0, 0, 1 } });

@@ -92,8 +92,8 @@ static void test_times (void **state) {
   linearise_shows ("the eigenvalues are not stability exponents\n");
 }
 
-/* Two masses on a spring that whirl at W = 1.5 rad/s, neither of which turns: the frame is that of their positions, and the
- * frequency of the only mode is (3 W^2 + k/mu)^(1/2), k/mu = 15 1/s^2. */
+/* Two masses on a spring that whirl at W = 1.5 rad/s, neither of which turns: the frame is that of their positions,
+ * and the frequency of the only mode is (3 W^2 + k/mu)^(1/2), k/mu = 15 1/s^2. */
 static void test_whirl (void **state) {
   (void)state;
   cli_write ("whirl.yaml",

@@ -86,14 +86,31 @@ static void test_bound (void **state) {
   assert_non_null (strstr (cli_out, "at its upper bound"));
   assert_non_null (strstr (cli_out, "--set a=0.5 --start p.vy="));
   char run[300];
-  cli_expand ("# pinwheel run @/point.yaml --set a=0.5 --start p.vy=", run, sizeof run);
+  cli_expand ("# pinwheel run '@/point.yaml' --set a=0.5 --start p.vy=", run, sizeof run);
   const char *yaml = cli_file ("o.yaml");
   assert_int_equal (strncmp (yaml, run, strlen (run)), 0);
   assert_non_null (strstr (yaml, "set:\n  a: 0.5\nstart:\n  p.vy: "));
+}
+
+/* The run of a result repeats all options that have an effect on it, in words for a shell. */
+static void test_command (void **state) {
+  (void)state;
   cli_shell ("pinwheel optimise pendulum --maximise bob.vx --free g=5:8 --set g=6 --set 'l=1*2' -t 0.5 -o @/o.yaml");
-  yaml = cli_file ("o.yaml");
-  static const char given[] = "# pinwheel run pendulum --set 'g=6' --set 'l=1*2' --t-end '0.5' --set g=";
-  assert_int_equal (strncmp (yaml, given, sizeof given - 1), 0);
+  static const char given[] = "# pinwheel run 'pendulum' --set 'g=6' --set 'l=1*2' --t-end '0.5' --set g=";
+  assert_int_equal (strncmp (cli_file ("o.yaml"), given, sizeof given - 1), 0);
+  cli_write ("a point's model.yaml", model);
+  cli_shell (
+      "pinwheel optimise \"@/a point's model.yaml\" --maximise p.x --free a=-2:0.5 --max-file 1 -m erk5 --rtol 1e-4 "
+      "--atol 1e-5 --max-steps 1000 --specialise never --limit 100 --starts 1 -o @/o.yaml");
+  char run[300];
+  cli_expand ("# pinwheel run '@/a point'\\''s model.yaml' --max-file '1' --method 'erk5' --rtol '1e-4' --atol '1e-5' "
+              "--max-steps '1000' --specialise 'never' --set a=0.5\n",
+              run, sizeof run);
+  assert_int_equal (strncmp (cli_file ("o.yaml"), run, strlen (run)), 0);
+  cli_good ("eval \"$(sed -n '1s/^# //p' @/o.yaml)\"");
+  /* enough steps for specialised code, but not in the run of the result alone */
+  cli_shell ("pinwheel optimise pendulum --maximise bob.vx --free g=5:10 -t 0.05 --step 1e-6 --starts 1 -o @/o.yaml");
+  assert_non_null (strstr (cli_file ("o.yaml"), " --step '1e-6' --specialise 'always' --set g="));
 }
 
 /* Beyond p.x = 0.3 every run fails. */
@@ -212,7 +229,11 @@ static void test_bad (void **state) {
   cli_bad ("pinwheel optimise @/point.yaml --free a=-2:-1 --maximise 'sqrt(p.x)' --starts 2", 4,
            "none of 2 runs succeeded, the first one: sqrt(p.x) is nan");
   cli_bad ("pinwheel optimise @/point.yaml --free a=-2:0 --maximise p.x --subject-to 'p.x>=1' --starts 2", 4,
-           "no run from 2 starts satisfies --subject-to");
+           "no run from 2 starts satisfies --subject-to; in the nearest one p.x is 0 m and must be at least 1 m");
+  cli_bad (
+      "pinwheel optimise @/point.yaml --free a=-2:0 --maximise p.x --subject-to 'p.x>=-1' --subject-to '3*p.y <= -6' "
+      "--starts 2 --set b=0.5",
+      4, "no run from 2 starts satisfies --subject-to; in the nearest one 3*p.y is 1.5 and must be at most -6");
 }
 
 /* Outputs without a largest value: linear in an unknown without bounds. */
@@ -252,11 +273,11 @@ static void test_changed_values (void **state) {
 
 int main (void) {
   const struct CMUnitTest tests[] = {
-    cmocka_unit_test (test_valley),         cmocka_unit_test (test_derivatives), cmocka_unit_test (test_constraint),
-    cmocka_unit_test (test_bound),          cmocka_unit_test (test_failing),     cmocka_unit_test (test_sweep),
-    cmocka_unit_test (test_edge),           cmocka_unit_test (test_starts),      cmocka_unit_test (test_jobs),
-    cmocka_unit_test (test_interrupt),      cmocka_unit_test (test_bad),         cmocka_unit_test (test_unbounded),
-    cmocka_unit_test (test_changed_values), cmocka_unit_test (test_no_effect)
+    cmocka_unit_test (test_valley),    cmocka_unit_test (test_derivatives),    cmocka_unit_test (test_constraint),
+    cmocka_unit_test (test_bound),     cmocka_unit_test (test_command),        cmocka_unit_test (test_failing),
+    cmocka_unit_test (test_sweep),     cmocka_unit_test (test_edge),           cmocka_unit_test (test_starts),
+    cmocka_unit_test (test_jobs),      cmocka_unit_test (test_interrupt),      cmocka_unit_test (test_bad),
+    cmocka_unit_test (test_unbounded), cmocka_unit_test (test_changed_values), cmocka_unit_test (test_no_effect)
   };
   return cmocka_run_group_tests (tests, optimise_setup, cli_teardown);
 }

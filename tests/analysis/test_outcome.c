@@ -1,11 +1,13 @@
-/* Outputs of analyses: functionals of columns against closed forms, with methods of short and long steps; their texts. */
+/* Outputs of analyses: functionals of columns against closed forms, with methods of short and long steps; their
+ * texts. */
 #include <math.h>
 #include "check.h"
 #include "cli.h"
 #include "outcome.h"
 
-/* A wheel turned by cos (w t): phi = (1 - cos (w t)) / w^2, omega = sin (w t) / w.  A slider on which a force acts that
- * grows and drops: (t, t + 1) until t = 0.7, then (0, 1.699), a small drop.  Another one shaken faster than steps follow. */
+/* A wheel turned by cos (w t): phi = (1 - cos (w t)) / w^2, omega = sin (w t) / w.  A slider on which a force acts
+ * that grows and drops: (t, t + 1) until t = 0.7, then (0, 1.699), a small drop.  Another one shaken faster than steps
+ * follow. */
 static const char model[] = "pinwheel: 1\n"
                             "about: functionals with closed forms\n"
                             "parameters: [{name: w, value: 3}]\n"

@@ -33,8 +33,8 @@ static int sensitivity_json (const char *key, double *value) {
 
 /* ---- Closed forms ---- */
 
-/* theta = (k/a) (gd (s t + c) - gd (c)), k^2 = I/m + a^2, A^2 = u0^2 + k^2 w0^2, s = a A/k^2, c = artanh (u0/A), at t = 20,
- * differentiated with 30 digits. */
+/* theta = (k/a) (gd (s t + c) - gd (c)), k^2 = I/m + a^2, A^2 = u0^2 + k^2 w0^2, s = a A/k^2, c = artanh (u0/A), at t
+ * = 20, differentiated with 30 digits. */
 static void test_sleigh (void **state) {
   static const double expected[] = { -2.19064940477924161196941078323, 4.38129880955848322393882156646,
                                      -23.1682436429820667965804011701, -3.52690525296758368801569681518,
@@ -116,8 +116,8 @@ static void test_outputs (void **state) {
   sensitivity_compare ("frame.phi", "start=frame.phi", 0, 1e-3);
 }
 
-/* phi = exp (s - 40 + z) t^2 / 2: differences are extrapolated, on both sides of s, and on one side of z = 0, the end of its
- * domain.  A drive along cos t does the work I sin^2 (t) / 2: by the derivative of its multiplier. */
+/* phi = exp (s - 40 + z) t^2 / 2: differences are extrapolated, on both sides of s, and on one side of z = 0, the end
+ * of its domain.  A drive along cos t does the work I sin^2 (t) / 2: by the derivative of its multiplier. */
 static void test_parameters (void **state) {
   double x[SENSITIVITY_MOST], error[SENSITIVITY_MOST];
   (void)state;
@@ -266,8 +266,8 @@ static void test_files (void **state) {
 
 /* ---- Bad input ---- */
 
-/* A parameter that is small compared with what it is added to, in a force or a length, and one over whose usual step the force
- * is not linear: other steps are found, and the error contains what remains. */
+/* A parameter that is small compared with what it is added to, in a force or a length, and one over whose usual step
+ * the force is not linear: other steps are found, and the error contains what remains. */
 static void test_steps (void **state) {
   static const char *const value[] = { "1e-6", "1e-8", "1e-10", "1e-12" }, *const place[] = { "1e3", "1e4", "1e5" };
   char command[300], text[600];
@@ -304,8 +304,8 @@ static void test_steps (void **state) {
   }
 }
 
-/* A mass on which initial velocities depend by round-off only, which no longer step would show better; a parameter without effect
- * on a stiff motion, whose error must not grow. */
+/* A mass on which initial velocities depend by round-off only, which no longer step would show better; a parameter
+ * without effect on a stiff motion, whose error must not grow. */
 static void test_no_effect (void **state) {
   double x[2], error[2];
   (void)state;
@@ -347,8 +347,8 @@ static void test_energies (void **state) {
   check_close ("kinetic by mass", x[0], 4.5, 1e-9, "v^2 / 2, and round-off of differences");
 }
 
-/* x (1) of m x'' + c x' + k x = sin 3t, x (0) = 0.1, x' (0) = 0, for the numbers of test_run_error: a particular solution and
- * C_1 exp (r_1 t) + C_2 exp (r_2 t). */
+/* x (1) of m x'' + c x' + k x = sin 3t, x (0) = 0.1, x' (0) = 0, for the numbers of test_run_error: a particular
+ * solution and C_1 exp (r_1 t) + C_2 exp (r_2 t). */
 static double damped_position (double m) {
   const double c = 31.1, k = 350.7, d = sqrt (c * c - 4 * k * m), r1 = (d - c) / (2 * m), r2 = -(d + c) / (2 * m);
   const double e = k - 9 * m, f = 3 * c, size = e * e + f * f; /* particular solution: (e sin 3t - f cos 3t) / size */
@@ -356,7 +356,8 @@ static double damped_position (double m) {
   return (e * sin (3) - f * cos (3)) / size + C1 * exp (r1) + C2 * exp (r2);
 }
 
-/* The error contains that of the run: mass and stiffness act through the run's accelerations, whose errors stiffness magnifies. */
+/* The error contains that of the run: mass and stiffness act through the run's accelerations, whose errors stiffness
+ * magnifies. */
 static void test_run_error (void **state) {
   static const char *const method[] = { "bdf+projection --rtol 1e-6", "bdf --rtol 1e-5", "radau+ggl --rtol 1e-8",
                                         "ida+ggl --rtol 1e-6", "erk5 --rtol 1e-4" };
@@ -387,8 +388,8 @@ static void test_run_error (void **state) {
   assert_non_null (strstr (cli_file ("sens/sensitivity.json"), "\"error\": null"));
 }
 
-/* A light body that follows its force within 1e-5 s, as the derivative (2 x 9 / k^2 at most) shows: by accelerations of the equations
- * instead of those of the run it would be 0.004 at rtol 1e-6, 0.06 at 1e-4. */
+/* A light body that follows its force within 1e-5 s, as the derivative (2 x 9 / k^2 at most) shows: by accelerations
+ * of the equations instead of those of the run it would be 0.004 at rtol 1e-6, 0.06 at 1e-4. */
 static void test_light_body (void **state) {
   static const char *const method[] = { "bdf --rtol 1e-6", "bdf --rtol 1e-4", "radau+ggl --rtol 1e-8" };
   char command[200];

@@ -183,7 +183,8 @@ static void stability_car (pw_model *m, const void *parameters) {
   pw_add_tyre (m, &(pw_tyre){ .name = "rear", .body = "car", .at = { -car_b, 0 }, .stiffness = car_C, .speed = 1e-3 });
 }
 
-/* Sideslip and yaw: the eigenvalues of a 2 x 2 matrix.  The tyre's regularising speed changes them by (1e-3 / v)^2 = 4e-9. */
+/* Sideslip and yaw: the eigenvalues of a 2 x 2 matrix.  The tyre's regularising speed changes them by (1e-3 / v)^2 =
+ * 4e-9. */
 static void test_car (void **state) {
   double L = car_a + car_b, moment = car_C * (car_a - car_b);
   double critical = sqrt (car_C * car_C * L * L / (car_m * moment));

@@ -252,8 +252,8 @@ static const pw_parameter whirl_parameters[] = { { PW_AT (whirl, W), 2, "rad/s",
                                                  { PW_AT (whirl, beta), 0.1, "rad", "", PW_REAL },
                                                  { .name = NULL } };
 
-/* The rod (m = 2, I = 0.1, l = 0.3) points inwards from its hinge at d = 0.5, with a torsion spring (k = 3, c = 0.3): with
- * the angle theta from there,  (I + m l^2) theta'' = -c theta' - k (theta - beta) + m d l W^2 sin theta. */
+/* The rod (m = 2, I = 0.1, l = 0.3) points inwards from its hinge at d = 0.5, with a torsion spring (k = 3, c = 0.3):
+ * with the angle theta from there,  (I + m l^2) theta'' = -c theta' - k (theta - beta) + m d l W^2 sin theta. */
 static void whirl_build (pw_model *m, const void *parameters) {
   const whirl *p = parameters;
   pw_add_body (m, &(pw_body){ .name = "hub", .mass = 1, .inertia = 1, .rate = { 0, 0, p->W } });
@@ -338,8 +338,8 @@ static void test_two_changes (void **state) {
   steady_close (&t);
 }
 
-/* With it: a branch that turns where tan theta = theta - beta.  AUTO-07p, on the equation above as two of first order, has
- * its limit point at W = 3.5200604503, theta = -0.631659. */
+/* With it: a branch that turns where tan theta = theta - beta.  AUTO-07p, on the equation above as two of first order,
+ * has its limit point at W = 3.5200604503, theta = -0.631659. */
 static void test_fold (void **state) {
   double beta = 0.1, W, theta;
   pw_steady_motion m;
@@ -382,9 +382,9 @@ static const pw_parameter caster_parameters[] = { { PW_AT (caster, c), 0.5, "N s
                                                   { PW_AT (caster, y), 0, "m", "", PW_REAL },
                                                   { .name = NULL } };
 
-/* A cart with constant speed V draws a caster (m = 1, J = 0.01) whose kingpin (mass 0.2) gives way sideways (k = 100, c);
- * its wheel is l = 0.1 after the kingpin, its centre of mass e = 0.02.  With A = (l - e) m + l 0.2 and
- * I = J + (l - e)^2 m + l^2 0.2, small motions have
+/* A cart with constant speed V draws a caster (m = 1, J = 0.01) whose kingpin (mass 0.2) gives way sideways (k = 100,
+ * c); its wheel is l = 0.1 after the kingpin, its centre of mass e = 0.02.  With A = (l - e) m + l 0.2 and I = J + (l
+ * - e)^2 m + l^2 0.2, small motions have
  *
  *     I mu^3 + (A V + l^2 c) mu^2 + (l^2 k + l c V) mu + l k V = 0. */
 static void caster_build (pw_model *m, const void *parameters) {

@@ -125,9 +125,9 @@ static int steady_lines (const char *start) {
   return count;
 }
 
-/* Branches are closed though the vehicle has moved, or a body turned, in a circuit; all motions at the value in the model are on
- * the same one.  A trailer of 1 m behind an axle: tan steer = 0.5 at the folds.  Where a spring winds up, none is
- * closed, and it is followed in both directions. */
+/* Branches are closed though the vehicle has moved, or a body turned, in a circuit; all motions at the value in the
+ * model are on the same one.  A trailer of 1 m behind an axle: tan steer = 0.5 at the folds.  Where a spring winds up,
+ * none is closed, and it is followed in both directions. */
 static void test_turned_branch (void **state) {
   (void)state;
   cli_write ("turned.yaml", "pinwheel: 1\nparameters: [{name: steer, value: 0}]\nbodies:\n"
@@ -158,8 +158,8 @@ static void test_turned_branch (void **state) {
   steady_shows ("       2  ends                        -3 ");
 }
 
-/* Where the speed is 0, any angle of the trailer is an equilibrium, and no velocities are left: there the eigenvalue -u/1.3 of
- * the trailer changes its sign, and -m a u/(I + m a^2) of the sleigh, whatever the range. */
+/* Where the speed is 0, any angle of the trailer is an equilibrium, and no velocities are left: there the eigenvalue
+ * -u/1.3 of the trailer changes its sign, and -m a u/(I + m a^2) of the sleigh, whatever the range. */
 static void test_standstill (void **state) {
   static const char *const each[] = { "trailer.yaml --vary u=-3:3", "trailer.yaml --vary u=3:-2",
                                       "trailer.yaml --vary u=-5:1", "sleigh.yaml --vary u=-1:2",
@@ -244,7 +244,8 @@ static void test_ramp (void **state) {
   steady_shows ("     1          1.96413           0.442387 ");
 }
 
-/* The ends of branches are those of the range to the last bit; the motion is found once, whatever angle it is found at. */
+/* The ends of branches are those of the range to the last bit; the motion is found once, whatever angle it is found
+ * at. */
 static void test_ends (void **state) {
   (void)state;
   cli_good ("pinwheel steady pendulum --vary l=0.7:1.3 --starts 0 -o @/ends");
@@ -318,8 +319,8 @@ static void test_limit (void **state) {
   cli_bad ("pinwheel steady n-trailer --limit 1e-9 -o @/limit", 4, "--limit 1e-9: stopped; results are incomplete");
 }
 
-/* One body on two springs, the truss of von Mises: it has fewer equations than a plane has displacements, and no symmetry.  With
- * k = 100 N/m, h = 3 m: fold and zero eigenvalues in closed form. */
+/* One body on two springs, the truss of von Mises: it has fewer equations than a plane has displacements, and no
+ * symmetry.  With k = 100 N/m, h = 3 m: fold and zero eigenvalues in closed form. */
 static void test_one_body (void **state) {
   (void)state;
   cli_write (

@@ -1,4 +1,5 @@
-/* Derivatives of runs by the variational equations: closed forms; every model of the gallery against differences of runs. */
+/* Derivatives of runs by the variational equations: closed forms; every model of the gallery against differences of
+ * runs. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -169,8 +170,8 @@ static void test_stiff (void **state) {
   }
 }
 
-/* Differences with a step that changes nothing, or little: their errors contain the result, and a few better steps lead to an
- * accurate one. */
+/* Differences with a step that changes nothing, or little: their errors contain the result, and a few better steps
+ * lead to an accurate one. */
 static void test_steps (void **state) {
   const double t = 3, steps[] = { 1e-19, 1e-15 };
   (void)state;

@@ -3,8 +3,8 @@
 #include "check.h"
 #include "cli.h"
 
-/* Evaluations of a run of a stiff scene to the end.  At a loose tolerance what tyres lose is not resolved where stability
- * decides on the steps, and the run says so. */
+/* Evaluations of a run of a stiff scene to the end.  At a loose tolerance what tyres lose is not resolved where
+ * stability decides on the steps, and the run says so. */
 static double bench_evaluations (const char *scene, const char *method, const char *rtol) {
   char command[300];
   snprintf (command, sizeof command,

@@ -7,6 +7,7 @@
 #include "probe.h"
 #include "scene.h"
 #include "toys.h"
+#include "trial.h"
 
 static void check_shows (const char *text) {
   if (strstr (cli_out, text) == NULL) fail_msg ("\"%s\" is not in\n%s", text, cli_out);
@@ -218,12 +219,44 @@ static void test_scene (void **state) {
   check_scene_expect (&halved, "force_v");
 }
 
+/* A signal that fails at a time at which the self-test evaluates it is not an error of the element type. */
+
+static int check_ends (void *context, double t, const double *x, double value[3], double *gradient) {
+  (void)context, (void)x, (void)gradient;
+  value[0] = t < 0.25 ? 1 : NAN;
+  return 0;
+}
+
+static void check_build_ending (pw_model *m, const void *parameters) {
+  (void)parameters;
+  pw_add_body (m, &(pw_body){ .name = "rotor", .mass = 1, .inertia = 1 });
+  pw_add_torque (m, &(pw_torque){ .name = "T",
+                                  .body = { "rotor", "ground" },
+                                  .value = { PW_FUNCTION, .function = { .eval = check_ends } } });
+}
+
+static const pw_plugin_table check_ending_table = TRIAL_TABLE (check_build_ending);
+
+static void test_failing_signal (void **state) {
+  (void)state;
+  const double q[3] = { 0 }, v[3] = { 0 };
+  pw_error error = { 0 };
+  pw_selftest_report report = { 0 };
+  pw_system *s = scene_system (&check_ending_table, NULL);
+  assert_int_equal (pw_selftest_scene (s, 1, &pw_kind_torque, 0, q, v, 1, &report, &error), PW_METHOD);
+  check_error (&error, PW_METHOD, "t = 0.5 s: a signal failed: torque T: value is not a finite number");
+  assert_int_equal (report.failed, 0);
+  pw_system_free (s);
+}
+
 int main (void) {
   const struct CMUnitTest tests[] = {
-    cmocka_unit_test (test_ezyroller),   cmocka_unit_test (test_pendulum),        cmocka_unit_test (test_spring),
-    cmocka_unit_test (test_redundant),   cmocka_unit_test (test_start),           cmocka_unit_test (test_singular),
-    cmocka_unit_test (test_broken_kind), cmocka_unit_test (test_broken_gradient), cmocka_unit_test (test_large),
-    cmocka_unit_test (test_bad_options), cmocka_unit_test (test_scene),
+    cmocka_unit_test (test_ezyroller),   cmocka_unit_test (test_pendulum),
+    cmocka_unit_test (test_spring),      cmocka_unit_test (test_redundant),
+    cmocka_unit_test (test_start),       cmocka_unit_test (test_singular),
+    cmocka_unit_test (test_broken_kind), cmocka_unit_test (test_broken_gradient),
+    cmocka_unit_test (test_large),       cmocka_unit_test (test_bad_options),
+    cmocka_unit_test (test_scene),       cmocka_unit_test (test_failing_signal),
   };
   return cmocka_run_group_tests (tests, cli_setup, cli_teardown);
 }

@@ -324,7 +324,8 @@ static void test_one_voice (void **state) {
   }
 }
 
-/* Nothing stays of what was compiled, whether that works, fails or is interrupted: Ctrl-C waits until the folder is gone. */
+/* Nothing stays of what was compiled, whether that works, fails or is interrupted: Ctrl-C waits until the folder is
+ * gone. */
 static void test_compiled (void **state) {
   (void)state;
   cli_good ("mkdir @/tmp && TMPDIR=@/tmp pinwheel run models/ezyroller.c -t 0.1 --json @/compiled.json && ls @/tmp");

@@ -32,7 +32,8 @@ enum {
   REASON
 };
 
-/* Rows are run once on the clock, and errors taken against the table that compare_setup makes, where neither matters. */
+/* Rows are run once on the clock, and errors taken against the table that compare_setup makes, where neither
+ * matters. */
 #define ONCE " --repeats 1 --reference @/known.csv "
 #define SHORT "--repeats 1 --t-end 2 --step-ladder 0.1:0.02 --rtol-ladder 1e-5:1e-7"
 
@@ -112,7 +113,8 @@ static void test_no_order (void **state) {
   for (int row = 0; row < 3; row++) assert_string_equal (compare_cell ("round/compare.csv", row, ORDER), "nan");
 }
 
-/* The last row knows the reference's uncertainty only: what is not ten times that has no order, however well it fits. */
+/* The last row knows the reference's uncertainty only: what is not ten times that has no order, however well it
+ * fits. */
 static void test_uncertain_order (void **state) {
   (void)state;
   cli_good ("pinwheel compare ezyroller --methods rk4+projection --t-end 2 --step-ladder 0.02:0.0003 --repeats 1 "
@@ -162,7 +164,8 @@ static void test_row_is_run (void **state) {
   }
 }
 
-/* A run's own table as reference: the same method and level has no error but round-off; another one has that between them. */
+/* A run's own table as reference: the same method and level has no error but round-off; another one has that between
+ * them. */
 static void test_reference (void **state) {
   (void)state;
   cli_good ("pinwheel compare ezyroller --methods rk4+projection --reference @/known.csv --repeats 1 --step-ladder "
@@ -186,8 +189,8 @@ static void test_reference (void **state) {
   assert_string_equal (compare_cell ("few/compare.csv", 0, MULTIPLIER), "nan");
 }
 
-/* Where a signal jumps multipliers have two values.  Runge-Kutta methods show that behind, others that before: such a sample
- * is no error of theirs, and does not keep the reference from telling those at the other samples. */
+/* Where a signal jumps multipliers have two values.  Runge-Kutta methods show that behind, others that before: such a
+ * sample is no error of theirs, and does not keep the reference from telling those at the other samples. */
 static void test_jump (void **state) {
   (void)state;
   cli_good ("pinwheel compare tests/scenes/shove.yaml --methods rk4+projection,ida+ggl --step-ladder 0.01 "
@@ -260,7 +263,8 @@ static void test_conclusion (void **state) {
   assert_non_null (strstr (cli_out, "\ncheapest "));
 }
 
-/* Nothing is extrapolated: a cost below the loosest level is a bound, and what the limit ends keeps the levels before. */
+/* Nothing is extrapolated: a cost below the loosest level is a bound, and what the limit ends keeps the levels
+ * before. */
 static void test_conclusion_bounds (void **state) {
   (void)state;
   cli_good ("pinwheel compare pendulum --methods rk4+projection --t-end 1 --step-ladder 0.01:1e-9 --limit 0.05 "
@@ -477,6 +481,7 @@ static void test_bad (void **state) {
     { "ezyroller --reference @/x.csv", "--reference @/x.csv: the first column is \"x\", expected \"t [s]\"" },
     { "ezyroller --reference @/y.csv", "--reference @/y.csv: no column is a state of this model, such as \"frame.x\"" },
     { "ezyroller --reference @/z.csv", "--reference @/z.csv: line 2: \"one\" is not a number" },
+    { "ezyroller --reference @/twice.csv", "--reference @/twice.csv: columns 2 and 4 are both named \"frame.x\"" },
     { "ezyroller --reference @/back.csv", "--reference @/back.csv: line 3: times must be finite and increase" },
     { "ezyroller --reference @/inf.csv", "--reference @/inf.csv: line 3: times must be finite and increase" },
     { "ezyroller --reference @/short.csv --t-end 2",
@@ -486,6 +491,7 @@ static void test_bad (void **state) {
   cli_write ("x.csv", "x,t\n0,0\n");
   cli_write ("y.csv", "t,y\n0,0\n");
   cli_write ("z.csv", "t,frame.x\n1,one\n");
+  cli_write ("twice.csv", "t,frame.x [m],a,frame.x [mm]\n1,0,0,0\n");
   cli_write ("back.csv", "t,frame.x\n1,0\n0.5,0\n");
   cli_write ("inf.csv", "t,frame.x\n1,0\ninf,0\n");
   cli_write ("short.csv", "t,frame.x\n1,0\n");

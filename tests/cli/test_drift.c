@@ -46,8 +46,8 @@ static double drift_number (const char *file, const char *method, int column) {
   return strtod (drift_cell (file, method, column), NULL);
 }
 
-/* A conservative pendulum's accelerations alone: velocities drift linearly, positions quadratically; projected they stay at
- * round-off, and with feedback within bounds. */
+/* A conservative pendulum's accelerations alone: velocities drift linearly, positions quadratically; projected they
+ * stay at round-off, and with feedback within bounds. */
 static void test_growth (void **state) {
   (void)state;
   cli_good ("pinwheel drift pendulum --t-end 40 --step 0.005 --methods rk4+none,rk4+baumgarte,rk4+projection "

@@ -1,5 +1,5 @@
-/* Files that a command writes: each by one process and for one use, complete or under a temporary name, wherever their names
- * lead; and files of the wrong type that it is asked to read. */
+/* Files that a command writes: each by one process and for one use, complete or under a temporary name, wherever their
+ * names lead; and files of the wrong type that it is asked to read. */
 #define _GNU_SOURCE
 #include <errno.h>
 #include <fcntl.h>
@@ -274,8 +274,8 @@ static void test_types (void **state) {
   }
 }
 
-/* Five megabytes that open brackets, in less memory than the 340 bytes that libfyaml keeps for each; as many entries of a
- * list that may be a key; a line without an end.  An address sanitizer needs more by itself. */
+/* Five megabytes that open brackets, in less memory than the 340 bytes that libfyaml keeps for each; as many entries
+ * of a list that may be a key; a line without an end.  An address sanitizer needs more by itself. */
 static void test_bounded (void **state) {
   (void)state;
 #ifdef __SANITIZE_ADDRESS__
@@ -285,7 +285,8 @@ static void test_bounded (void **state) {
       "head -c 5000000 /dev/zero | tr '\\0' '[' >@/deep.yaml; (printf 'x: ['; head -c 5000000 /dev/zero | tr '\\0' "
       "'[') "
       ">@/key.yaml; (printf '['; yes '0,' | head -n 2000000 | tr -d '\\n'; echo '0]') >@/wide.yaml; "
-      "head -c 200000000 /dev/zero | tr '\\0' 1 >@/line.csv; (echo 't,frame.x'; head -c 9 /dev/zero) >@/zero.csv");
+      "head -c 200000000 /dev/zero | tr '\\0' 1 >@/line.csv; (echo 't,frame.x'; head -c 9 /dev/zero) >@/zero.csv; "
+      "printf 't,frame.x\\n1,2\\000\\n' >@/zero2.csv");
 #define OUTPUT_LESS "ulimit -v 700000; pinwheel "
   assert_int_equal (cli_run (OUTPUT_LESS "show @/deep.yaml"), 2);
   assert_non_null (strstr (cli_err, "nested too deeply"));
@@ -297,6 +298,8 @@ static void test_bounded (void **state) {
            "--reference @/line.csv: cannot be read: line 1 has more than 16 MB");
   cli_bad ("pinwheel run ezyroller --reference @/zero.csv", 2,
            "--reference @/zero.csv: cannot be read: a table is text, and this has a byte 0");
+  cli_bad ("pinwheel run ezyroller --reference @/zero2.csv", 2,
+           "--reference @/zero2.csv: cannot be read: a table is text, and this has a byte 0");
   cli_bad ("ulimit -v 2000000; pinwheel sweep pendulum -t 0.1 --vary l=lin:1:2:9999 --jobs 9999 -o @/many.csv "
            "2>@/err9; s=$?; "
            "sed 's/only [0-9]*/only N/; s/jobs [0-9]*/jobs N/; s/N: .*;/N;/' @/err9 >&2; exit $s",
@@ -317,8 +320,8 @@ static double *output_find (const pw_checkpoint *c, double value) {
   return NULL;
 }
 
-/* A checkpoint with a good check sum whose state no run has written: of its numbers one, counted from the time or, if it is
- * negative, from the two before the run's own, the number of rows and the processor time. */
+/* A checkpoint with a good check sum whose state no run has written: of its numbers one, counted from the time or, if
+ * it is negative, from the two before the run's own, the number of rows and the processor time. */
 static void output_forge (int number, double value) {
   pw_checkpoint c;
   pw_error error = { 0 };

@@ -191,7 +191,8 @@ static void test_style (void **state) {
   cli_bad ("pinwheel compare ezyroller -o @/style --width xmm", 2, "--width: \"x\" is not a number");
 }
 
-/* In a narrow figure the legend of eleven methods, whose last one is galpha+ggl, ends above the frame of the first panel. */
+/* In a narrow figure the legend of eleven methods, whose last one is galpha+ggl, ends above the frame of the first
+ * panel. */
 static void test_legend (void **state) {
   (void)state;
   static const char *const width[] = { "85mm", "120mm", "170mm" };

@@ -66,7 +66,7 @@ static void test_unbound (void **state) {
   reports_shows ("\nThe model has no constraints: no J, no gamma\n");
   cli_good ("pinwheel check @/free.yaml");
   reports_shows ("  fastest eigenvalue                 2 1/s\n");
-  reports_shows ("  it grows by e in                   0.5 s\n");
+  reports_shows ("  it grows by a factor e in          0.5 s\n");
   reports_shows ("  RK4 is stable                      with any step: the fast modes grow\n");
   cli_good ("sed '/elements/,$d' @/free.yaml >@/alone.yaml && pinwheel show @/alone.yaml --yaml");
   reports_shows ("about: \"says \\\"so\\\", \\\\ and a\\x09tab\"\n");

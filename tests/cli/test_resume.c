@@ -1,5 +1,5 @@
-/* pinwheel run --checkpoint, --resume: a run that is killed and resumed writes the same bytes; a file that does not belong
- * to the run, or is not whole, is refused. */
+/* pinwheel run --checkpoint, --resume: a run that is killed and resumed writes the same bytes; a file that does not
+ * belong to the run, or is not whole, is refused. */
 #include <stdio.h>
 #include <string.h>
 #include "check.h"
@@ -64,7 +64,8 @@ static void test_short_interval (void **state) {
   cli_good ("timeout -s KILL 20 " RESUME_PROGRAM "run ezyroller -t 0.02 --checkpoint-every 1e-20 --checkpoint @/s.ck");
 }
 
-/* With a row for every step, too, none is there twice; a run that had ended already, but for its checkpoint, goes on. */
+/* With a row for every step, too, none is there twice; a run that had ended already, but for its checkpoint, goes
+ * on. */
 static void test_every_step (void **state) {
   static const char *const left[] = { "cp @/one.csv @/two.csv.part", "cp @/one.csv @/two.csv", NULL };
   (void)state;

@@ -36,6 +36,14 @@ static void test_cached (void **state) {
   assert_true (cli_number (cli_file ("2.json"), "statistics", "specialised", NULL) > 300);
 }
 
+/* A compiler that has changed makes a new object; it is found in the current folder if PATH has an empty entry. */
+static void test_changed_compiler (void **state) {
+  (void)state;
+  cli_good (FRESH "mv @/cc @/counting; export CC=counting PATH=:$PATH p=$(realpath ${PINWHEEL:-build/pinwheel}); cd @\n"
+                  "pinwheel () { $p $*; }\n" RUN ">/dev/null; echo >>counting\n" RUN ">/dev/null; " CALLS);
+  assert_string_equal (cli_out, "2\n");
+}
+
 /* An object that is not what was written is replaced; the run has its code all the same. */
 static void test_damaged (void **state) {
   static const char *const damage[] = {
@@ -291,7 +299,8 @@ static void test_sweep_engine (void **state) {
 
 /* ---- Results ---- */
 
-/* Compares the states of two tables, the columns before forces; *most is the largest difference relative to 1 + |value|. */
+/* Compares the states of two tables, the columns before forces; *most is the largest difference relative to 1 +
+ * |value|. */
 static int specialise_compare (const char *a, const char *b, double *most) {
   char x[200000], *line = x, *rest, *other;
   const char *text = cli_file (a);
@@ -327,8 +336,8 @@ static void specialise_agree (const char *model, const char *method, double boun
   assert_true (most <= bound);
 }
 
-/* Every model of the gallery, a short time, in which round-off does not grow to the bound.  Steps of adaptive methods amplify
- * it up to the errors they allow, those of multistep methods to about 1000 tolerances. */
+/* Every model of the gallery, a short time, in which round-off does not grow to the bound.  Steps of adaptive methods
+ * amplify it up to the errors they allow, those of multistep methods to about 1000 tolerances. */
 static void test_gallery (void **state) {
   static const struct {
     const char *name;
@@ -354,7 +363,8 @@ static void test_gallery (void **state) {
 
 /* ---- The text ---- */
 
-/* Names in the text end no comment and are no code; those of bodies and elements have no such characters to begin with. */
+/* Names in the text end no comment and are no code; those of bodies and elements have no such characters to begin
+ * with. */
 static void test_names (void **state) {
   static const char *const name[] = { "*/ int x; /*", "\\n#include <y>",    "x\\",
                                       "?\?/",         "gr\xC3\xBC\xC3\x9F", "a\" \"%s%n" };
@@ -398,25 +408,16 @@ static void test_show (void **state) {
 
 int main (void) {
   const struct CMUnitTest tests[] = {
-    cmocka_unit_test (test_cached),
-    cmocka_unit_test (test_damaged),
-    cmocka_unit_test (test_foreign_object),
-    cmocka_unit_test (test_unusable),
-    cmocka_unit_test (test_deleted),
-    cmocka_unit_test (test_concurrent),
-    cmocka_unit_test (test_killed),
-    cmocka_unit_test (test_size),
-    cmocka_unit_test (test_no_compiler),
-    cmocka_unit_test (test_bad_compiler),
-    cmocka_unit_test (test_strange_compiler),
-    cmocka_unit_test (test_when),
-    cmocka_unit_test (test_not_possible),
-    cmocka_unit_test (test_studies),
-    cmocka_unit_test (test_sweep),
-    cmocka_unit_test (test_sweep_killed),
-    cmocka_unit_test (test_sweep_engine),
-    cmocka_unit_test (test_gallery),
-    cmocka_unit_test (test_names),
+    cmocka_unit_test (test_cached),       cmocka_unit_test (test_changed_compiler),
+    cmocka_unit_test (test_damaged),      cmocka_unit_test (test_foreign_object),
+    cmocka_unit_test (test_unusable),     cmocka_unit_test (test_deleted),
+    cmocka_unit_test (test_concurrent),   cmocka_unit_test (test_killed),
+    cmocka_unit_test (test_size),         cmocka_unit_test (test_no_compiler),
+    cmocka_unit_test (test_bad_compiler), cmocka_unit_test (test_strange_compiler),
+    cmocka_unit_test (test_when),         cmocka_unit_test (test_not_possible),
+    cmocka_unit_test (test_studies),      cmocka_unit_test (test_sweep),
+    cmocka_unit_test (test_sweep_killed), cmocka_unit_test (test_sweep_engine),
+    cmocka_unit_test (test_gallery),      cmocka_unit_test (test_names),
     cmocka_unit_test (test_show),
   };
   return cmocka_run_group_tests (tests, cli_setup, cli_teardown);

@@ -1,4 +1,5 @@
-/* Methods without projection at every tolerance, through singular configurations: correct, or stopped with a message. */
+/* Methods without projection at every tolerance, through singular configurations: correct, or stopped with a
+ * message. */
 #include "check.h"
 #include "turns.h"
 

@@ -64,8 +64,8 @@ static void start_chain (pw_model *m, const void *parameters) {
   pw_add_gear (m, &(pw_gear){ .name = "gear", .body = { "link0", "link2", "ground" }, .ratio = 1 });
 }
 
-/* Given values are kept if they satisfy a constraint without other coordinates, in scenes of any size: all coordinates of
- * a body pinned to the ground, both angles of a gear. */
+/* Given values are kept if they satisfy a constraint without other coordinates, in scenes of any size: all coordinates
+ * of a body pinned to the ground, both angles of a gear. */
 static void test_given_satisfied_rows (void **state) {
   static const char *const name[] = { "link0.x", "link0.y", "link0.phi", "link2.phi" };
   static const double value[] = { 0.5, 0, 0, 0 };
@@ -89,8 +89,8 @@ static void test_given_satisfied_rows (void **state) {
   }
 }
 
-/* Discs on massless arms.  Position and velocity of a disc's centre are given: with its arm's pins they leave one equation that
- * they satisfy, in scenes of any size. */
+/* Discs on massless arms.  Position and velocity of a disc's centre are given: with its arm's pins they leave one
+ * equation that they satisfy, in scenes of any size. */
 static void start_arms (pw_model *m, const void *parameters) {
   static char disc[40][16], arm[40][16], pin[80][16];
   for (int i = 0; i < *(const double *)parameters; i++) {

@@ -1,5 +1,5 @@
-/* Projection of states: consistent states are unchanged, others are corrected, and accelerations are those of the projected
- * state. */
+/* Projection of states: consistent states are unchanged, others are corrected, and accelerations are those of the
+ * projected state. */
 #include <math.h>
 #include <string.h>
 #include "check.h"

@@ -1,5 +1,5 @@
-/* Redundant constraint equations: the motion is that of the scene without them, reactions have the least norm, and messages
- * name the elements. */
+/* Redundant constraint equations: the motion is that of the scene without them, reactions have the least norm, and
+ * messages name the elements. */
 #include <math.h>
 #include "check.h"
 #include "redundant.h"
@@ -12,7 +12,8 @@
 
 /* ---- Three cranks with one coupler ---- */
 
-/* The third crank only adds a force along x: the others determine y.  Independent while the cranks are not horizontal. */
+/* The third crank only adds a force along x: the others determine y.  Independent while the cranks are not
+ * horizontal. */
 static void redundant_slotted (pw_model *m, const void *parameter) {
   (void)parameter;
   double c = cos (-PW_PI / 4), s = sin (-PW_PI / 4);
@@ -212,8 +213,8 @@ static void test_names (void **state) {
 
 /* ---- Selection of independent rows ---- */
 
-/* A disc on a rod and a drive cannot move.  The wheel's row has a larger angle to the drive's row than the rod's row has,
- * but holonomic rows are selected first. */
+/* A disc on a rod and a drive cannot move.  The wheel's row has a larger angle to the drive's row than the rod's row
+ * has, but holonomic rows are selected first. */
 static void redundant_fixed_disc (pw_model *m, const void *parameter) {
   (void)parameter;
   pw_add_body (m, &(pw_body){ .name = "disc", .mass = 1, .inertia = 1, .start = { 1, 1, 0 }, .rate = { 0, 0, 1 } });
@@ -242,8 +243,8 @@ static void test_kept (void **state) {
   redundant_expect_reports (&oblique, of_oblique);
 }
 
-/* A body with a weld at its centre and a pin at the distance d.  The pin has the part p of the weight W that minimises p^2
- * + (W - p)^2 + (d p / L)^2, moments in units of force times the scene's length. */
+/* A body with a weld at its centre and a pin at the distance d.  The pin has the part p of the weight W that minimises
+ * p^2 + (W - p)^2 + (d p / L)^2, moments in units of force times the scene's length. */
 static void redundant_hung (pw_model *m, const void *parameter) {
   (void)parameter;
   pw_add_body (m, &(pw_body){ .name = "sign", .mass = 3, .inertia = 2 });

@@ -221,8 +221,8 @@ static void start_axles (pw_model *m, const void *parameters) {
   pw_add_pin (m, &(pw_pin){ .name = "H", .body = { "car", "arm" } });
 }
 
-/* Given values that satisfy the constraints are kept, though they leave two equations for one unknown: with y, or vy, only
- * the angle, or omega, of the car is left. */
+/* Given values that satisfy the constraints are kept, though they leave two equations for one unknown: with y, or vy,
+ * only the angle, or omega, of the car is left. */
 static void test_given_consistent (void **state) {
   static const pw_plugin_table table = {
     .abi = PW_ABI, .size = sizeof table, .parameters = start_rod_list, .parameters_size = 40, .build = start_axles

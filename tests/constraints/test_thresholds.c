@@ -13,7 +13,7 @@
 /* Effect of a changed threshold on a run. */
 typedef enum { WATCHDOG_EARLIER, WATCHDOG_LATER, WATCHDOG_FEWER, WATCHDOG_MORE } watchdog_effect;
 
-#define WATCHDOG_LIMIT(x) #x, offsetof(pw_watchdog, x)
+#define WATCHDOG_LIMIT(x) #x, offsetof(pw_thresholds, x)
 
 /* EARLIER, LATER: time at which the run stops; FEWER, MORE: rejected steps. */
 static const struct {
@@ -28,16 +28,17 @@ static const struct {
 } watchdog_limit[] = {
   { WATCHDOG_LIMIT (lost), 4, WATCHDOG_LATER, "slider-crank", NULL, 0, "ida+ggl", 1e-2, 4 },
   { WATCHDOG_LIMIT (lost_unstabilised), 0.5, WATCHDOG_EARLIER, "pendulum", NULL, 0, "ida+none", 1e-3, 100 },
-  { WATCHDOG_LIMIT (magnified), 0, WATCHDOG_EARLIER, "redundant-parallelogram", NULL, 0, "adams+none", 1e-4, 2 },
-  { WATCHDOG_LIMIT (follows), 0, WATCHDOG_EARLIER, "redundant-parallelogram", NULL, 0, "rk4+projection", 1e-2, 2 },
+  { WATCHDOG_LIMIT (redundant_ratio), 0, WATCHDOG_EARLIER, "redundant-parallelogram", NULL, 0, "adams+none", 1e-4, 2 },
+  { WATCHDOG_LIMIT (redundant_residual), 0, WATCHDOG_EARLIER, "redundant-parallelogram", NULL, 0, "rk4+projection",
+    1e-2, 2 },
   { WATCHDOG_LIMIT (near), 2, WATCHDOG_MORE, "n-four-bar", NULL, 0, "rk4+projection", 1e-3, 2 },
-  { WATCHDOG_LIMIT (growth), 0, WATCHDOG_FEWER, "n-four-bar", NULL, 0, "rk4+projection", 1e-2, 2 },
+  { WATCHDOG_LIMIT (step_growth), 0, WATCHDOG_FEWER, "n-four-bar", NULL, 0, "rk4+projection", 1e-2, 2 },
   { WATCHDOG_LIMIT (agree_best), 1e5, WATCHDOG_FEWER, "n-four-bar", NULL, 0, "rk4+projection", 1e-3, 4 },
   { WATCHDOG_LIMIT (agree), 1e-6, WATCHDOG_EARLIER, "n-four-bar", NULL, 0, "rk4+projection", 1e-3, 4 },
-  { WATCHDOG_LIMIT (lands), 0, WATCHDOG_EARLIER, "n-four-bar", NULL, 0, "rk4+projection", 7.842e-4, 4 },
+  { WATCHDOG_LIMIT (ends_singular), 0, WATCHDOG_EARLIER, "n-four-bar", NULL, 0, "rk4+projection", 7.842e-4, 4 },
   { WATCHDOG_LIMIT (regular), 0, WATCHDOG_LATER, "n-four-bar", "N", 1, "erk8+none", 1e-5, 4 },
-  { WATCHDOG_LIMIT (turn), 4, WATCHDOG_LATER, "n-four-bar", "N", 1, "bdf+none", 1e-5, 4 },
-  { WATCHDOG_LIMIT (least_turn), 1e4, WATCHDOG_LATER, "n-four-bar", "N", 1, "bdf+none", 1e-5, 4 },
+  { WATCHDOG_LIMIT (turn_growth), 4, WATCHDOG_LATER, "n-four-bar", "N", 1, "bdf+none", 1e-5, 4 },
+  { WATCHDOG_LIMIT (turn_reference), 1e4, WATCHDOG_LATER, "n-four-bar", "N", 1, "bdf+none", 1e-5, 4 },
   { WATCHDOG_LIMIT (drift_turn), 1e3, WATCHDOG_LATER, "n-four-bar", "N", 1, "bdf+none", 1e-5, 4 },
   { WATCHDOG_LIMIT (drift_near), 1e3, WATCHDOG_LATER, "n-four-bar", "N", 1, "bdf+none", 1e-5, 4 },
   { WATCHDOG_LIMIT (drift_far), 0.5, WATCHDOG_EARLIER, "n-four-bar", "N", 1, "adams+none", 1e-3, 4 },
@@ -96,7 +97,7 @@ static void watchdog_bend (pw_run *r, double angle) {
   const double v[] = { -0.5 * n, 0.5 * c, 1, -n, c, 0, -0.5 * n, 0.5 * c, 1 };
   memcpy (r->q, q, sizeof q);
   memcpy (r->v, v, sizeof v);
-  r->geometry.alert = 1;
+  r->geometry.singular_ahead = 1;
 }
 
 /* Residual |J a - gamma| of accelerations evaluated at this angle. */
@@ -132,16 +133,17 @@ static void test_evaluations (void **state) {
   pw_system *s = scene_system (&bars_table, NULL);
   pw_run *r = runs_open (s, "rk4+projection", NULL);
   const double angle = 1e-4;
-  double refined = watchdog_residual (r, angle), sine = r->geometry.sine, projected = watchdog_projected (r, angle);
+  double refined = watchdog_residual (r, angle), sine = r->geometry.evaluated_sine,
+         projected = watchdog_projected (r, angle);
   r->limits.refine = 0;
   check_below ("projected", projected, 0.1 * watchdog_projected (r, angle), "eps / s instead of eps / s^2");
   check_below ("refined", refined, 0.1 * watchdog_residual (r, angle), "eps / s instead of eps / s^2");
-  r->refuse = 2 * sine;
+  r->refused_sine = 2 * sine;
   watchdog_bend (r, angle);
   assert_int_equal (pw_run_accelerate (r, 0, r->q, r->v, r->a, r->lambda), PW_RETRY);
-  r->refuse = 0.5 * sine;
+  r->refused_sine = 0.5 * sine;
   assert_int_equal (pw_run_accelerate (r, 0, r->q, r->v, r->a, r->lambda), PW_OK);
-  assert_true (r->limits.rank == pw_watchdog_limits.rank);
+  assert_true (r->limits.rank_lost == pw_watchdog_limits.rank_lost);
   pw_run_close (r);
   pw_system_free (s);
 }
@@ -152,10 +154,10 @@ static void test_jump (void **state) {
   pw_run *r = runs_open (s, "rk4+projection", NULL);
   pw_error error = { 0 };
   r->near_singular = 1;
-  r->a[0] = 1.5 * r->limits.jump * r->reference_level * s->scale.length / (r->w->scale.time * r->w->scale.time);
+  r->a[0] = 1.5 * r->limits.jump_growth * r->reference_level * s->scale.length / (r->w->scale.time * r->w->scale.time);
   assert_int_equal (pw_run_watchdog (r, &error), PW_METHOD);
   assert_non_null (strstr (error.text, "lost at a singular configuration: the accelerations are 150 times"));
-  r->limits.jump *= 2;
+  r->limits.jump_growth *= 2;
   error = (pw_error){ 0 };
   r->near_singular = 1;
   check_ok (pw_run_watchdog (r, &error), &error);

@@ -101,7 +101,7 @@ static void test_sine (void **state) {
     pw_system *s = scene_named ("slider-crank", "ms", mass[i]);
     pw_run *r = runs_open (s, "rk4+projection", NULL);
     sine[i] = pw_watchdog_sine (r, NULL);
-    check_close ("largest", r->geometry.typical, sine[i], 0.3, "at any configuration but a singular one");
+    check_close ("largest", r->geometry.largest_sine, sine[i], 0.3, "at any configuration but a singular one");
     pw_run_close (r);
     pw_system_free (s);
   }
@@ -206,8 +206,8 @@ static void test_no_change_point (void **state) {
 enum { WATCHDOG_BARS = 9 };
 static const double watchdog_bar = 2.5;
 
-/* A parallelogram with cranks of 1 m at this angle; crossed: on the other branch, its pin C is reflected at the line from
- * pin B to pin D. */
+/* A parallelogram with cranks of 1 m at this angle; crossed: on the other branch, its pin C is reflected at the line
+ * from pin B to pin D. */
 static void watchdog_bars_at (double phi, int crossed, double *q) {
   const double b = watchdog_bar, x = cos (phi), y = sin (phi);
   const double part = crossed ? 2 * b * (b - x) / ((b - x) * (b - x) + y * y) : 0;
@@ -226,8 +226,8 @@ static void test_two_crossings (void **state) {
     pw_error error = { 0 };
     pw_system *s = scene_system (&bars_table, "b", watchdog_bar, "d", watchdog_bar, NULL);
     pw_run *r = runs_open (s, "rk4+projection", &(pw_settings){ .step = 1e-3, .span = 1 });
-    r->geometry.start_sine = NAN;
-    watchdog_bars_at (-0.3, 0, r->geometry.q);
+    r->geometry.previous_sine = NAN;
+    watchdog_bars_at (-0.3, 0, r->geometry.previous_q);
     watchdog_bars_at (PW_PI + 0.3, crossed, r->q);
     assert_int_equal (pw_evaluate_J_at (r->w, r->t, r->q, r->v), PW_OK);
     double sine = pw_watchdog_sine (r, NULL);

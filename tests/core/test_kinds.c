@@ -216,7 +216,7 @@ static void test_wheel_contact (void **state) {
     pw_system *s = pw_random_scene (&pw_kind_wheel, &random, &error);
     assert_non_null (s);
     pw_workspace *w = pw_workspace_new (s, NULL);
-    pw_probe x = { .s = s, .work = w, .k = w->batch, .tau = 1 };
+    pw_probe x = { .s = s, .workspace = w, .batch = w->batch, .tau = 1 };
     double plus[9 + PW_PROBE_GUARD], minus[9], contact[9], speed[3];
     const double h = 0x1p-17; /* near eps^(1/3) */
     assert_int_equal (pw_probe_open (&x, &error), PW_OK);
@@ -225,12 +225,12 @@ static void test_wheel_contact (void **state) {
       x.v[j] = pw_random_between (&random, -1.5, 1.5), x.a[j] = pw_random_between (&random, -1.5, 1.5);
     }
     pw_probe_update (&x, PW_PROBE_MOTION, h);
-    x.kind->contact (&x.k->b, plus);
+    x.kind->contact (&x.batch->b, plus);
     pw_probe_update (&x, PW_PROBE_MOTION, -h);
-    x.kind->contact (&x.k->b, minus);
+    x.kind->contact (&x.batch->b, minus);
     pw_probe_update (&x, PW_PROBE_MOTION, 0);
-    x.kind->contact (&x.k->b, contact);
-    x.kind->J (&x.k->b, x.k->J);
+    x.kind->contact (&x.batch->b, contact);
+    x.kind->J (&x.batch->b, x.batch->J);
     pw_mul_J (w, x.v, speed);
     for (int e = 0; e < 3; e++) {
       double vx = (plus[3 * e] - minus[3 * e]) / (2 * h), vy = (plus[3 * e + 1] - minus[3 * e + 1]) / (2 * h);

@@ -43,8 +43,8 @@ static void queries_close (queries *k) {
   pw_file_close (k->file);
 }
 
-/* M a = sum of the forces of all elements, for each body (Newton, Euler): with reactions and applied forces apart from the
- * solver's sums. */
+/* M a = sum of the forces of all elements, for each body (Newton, Euler): with reactions and applied forces apart from
+ * the solver's sums. */
 static void test_forces (void **state) {
   (void)state;
   for (int i = 0; i < SCENES; i++) {

@@ -36,7 +36,7 @@ static pw_source shapes_source (const pw_signal *s) {
 }
 
 static void shapes_at (const pw_source *source, double t, double u[3]) {
-  assert_int_equal (pw_signal_eval (source, t, 1, u), 0);
+  assert_int_equal (pw_signal_eval (source, t, PW_SIGNAL_DERIVATIVES, u), 0);
 }
 
 /* Between breakpoints rate and acceleration are derivatives of the value. */
@@ -45,7 +45,7 @@ static void shapes_derivatives (const pw_signal *s) {
   pw_source source = shapes_source (s);
   for (double t = 0.033; t < 5; t += 0.1) {
     double u[3], up[3], down[3];
-    if (pw_signal_breakpoint (s, 0, t - 2 * h) < t + 2 * h) continue;
+    if (pw_signal_breakpoint (s, PW_JUMPS, t - 2 * h) < t + 2 * h) continue;
     shapes_at (&source, t, u);
     shapes_at (&source, t + h, up);
     shapes_at (&source, t - h, down);
@@ -60,7 +60,7 @@ static void shapes_breaks (const pw_signal *s, int count, int smooth) {
   pw_source source = shapes_source (s);
   double t = 0, u[3], before[3], after[3];
   for (int i = 0; i < count; i++) {
-    double next = pw_signal_breakpoint (s, 0, t);
+    double next = pw_signal_breakpoint (s, PW_JUMPS, t);
     assert_true (next > t && isfinite (next));
     int jumps = 0;
     shapes_at (&source, next, u);
@@ -74,7 +74,7 @@ static void shapes_breaks (const pw_signal *s, int count, int smooth) {
     assert_true (jumps || smooth == 2);
     t = next;
   }
-  if (s->pulse.period == 0 || s->type != PW_PULSE) assert_true (isinf (pw_signal_breakpoint (s, 0, t)));
+  if (s->pulse.period == 0 || s->type != PW_PULSE) assert_true (isinf (pw_signal_breakpoint (s, PW_JUMPS, t)));
 }
 
 static void test_forms (void **state) {
@@ -130,7 +130,7 @@ static void test_many_pulses (void **state) {
   double t = 0, u[3];
   (void)state;
   for (int i = 0; i < 20000; i++) {
-    t = pw_signal_breakpoint (&s, 0, t);
+    t = pw_signal_breakpoint (&s, PW_JUMPS, t);
     shapes_at (&source, t, u);
     assert_true (u[0] == (i % 2 == 0));
     shapes_at (&source, nextafter (t, 0), u);
@@ -145,11 +145,11 @@ static void test_many_pulses (void **state) {
 static void test_knots (void **state) {
   (void)state;
   for (int i = 0; i < SHAPES_POINTS - 1; i++) {
-    assert_true (pw_signal_breakpoint (&shapes_rest, 1, shapes_t[i]) == shapes_t[i + 1]);
-    assert_true (pw_signal_breakpoint (&shapes_rest, 0, shapes_t[i]) == shapes_t[SHAPES_POINTS - 1]);
+    assert_true (pw_signal_breakpoint (&shapes_rest, PW_JUMPS_AND_KINKS, shapes_t[i]) == shapes_t[i + 1]);
+    assert_true (pw_signal_breakpoint (&shapes_rest, PW_JUMPS, shapes_t[i]) == shapes_t[SHAPES_POINTS - 1]);
   }
-  assert_true (pw_signal_breakpoint (&shapes_rest, 1, shapes_t[0] - 1) == shapes_t[0]);
-  assert_true (isinf (pw_signal_breakpoint (&shapes_rest, 1, shapes_t[SHAPES_POINTS - 1])));
+  assert_true (pw_signal_breakpoint (&shapes_rest, PW_JUMPS_AND_KINKS, shapes_t[0] - 1) == shapes_t[0]);
+  assert_true (isinf (pw_signal_breakpoint (&shapes_rest, PW_JUMPS_AND_KINKS, shapes_t[SHAPES_POINTS - 1])));
 }
 
 /* A spline with free ends through points of a cubic is that cubic. */
@@ -190,8 +190,8 @@ static void test_rest (void **state) {
 
 /* ---- What may use which ---- */
 
-/* A car that is steered along a ramp and a table, keeps a speed along a table, tows a trailer by a motor whose target is
- * a train of pulses, and carries a wheel turned by smooth steps. */
+/* A car that is steered along a ramp and a table, keeps a speed along a table, tows a trailer by a motor whose target
+ * is a train of pulses, and carries a wheel turned by smooth steps. */
 static void shapes_car (pw_model *m, const void *parameters) {
   static const double t[] = { 0.15, 0.8, 1.3 }, y[] = { 1, 1.6, 1.2 };
   (void)parameters;

@@ -9,8 +9,8 @@
 
 enum { SINE_RANDOM = 200000 };
 
-/* Of the doubles as written, by bc with 90 digits: common angles, and those next to multiples of pi/2, where the reduction
- * cancels. */
+/* Of the doubles as written, by bc with 90 digits: common angles, and those next to multiples of pi/2, where the
+ * reduction cancels. */
 static const struct {
   double x;
   long double sine, cosine;

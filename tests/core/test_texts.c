@@ -1,4 +1,5 @@
-/* External texts that are not valid UTF-8 or contain control characters: they reach neither the terminal nor a summary. */
+/* External texts that are not valid UTF-8 or contain control characters: they reach neither the terminal nor a
+ * summary. */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>

@@ -1,7 +1,7 @@
 /* Allocations that are counted, remembered, and fail on demand.
  *
- * For programs linked with --wrap for malloc, calloc, realloc, strdup and free: what Pinwheel allocates goes through here,
- * what the libraries below it allocate does not. */
+ * For programs linked with --wrap for malloc, calloc, realloc, strdup and free: what Pinwheel allocates goes through
+ * here, what the libraries below it allocate does not. */
 #ifndef ALLOC_H
 #define ALLOC_H
 

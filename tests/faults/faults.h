@@ -1,7 +1,7 @@
 /* Commands of the program called from inside while something fails, and what is to be said of the files they leave.
  *
- * For programs linked with the program's commands.  A command writes into @/o (@ is the folder of cli.h); what it leaves
- * there when nothing fails is kept in @/whole; what is there before it begins, in @/start. */
+ * For programs linked with the program's commands.  A command writes into @/o (@ is the folder of cli.h); what it
+ * leaves there when nothing fails is kept in @/whole; what is there before it begins, in @/start. */
 #ifndef FAULTS_H
 #define FAULTS_H
 
@@ -15,11 +15,12 @@ void faults_begin (const char *start, const char *command);
 /* Makes @/o what it was before the command. */
 void faults_prepare (void);
 
-/* Runs a command as far as it gets, with what it prints in @/printed and what it says of errors in @/log; its status. */
+/* Runs a command as far as it gets, with what it prints in @/printed and what it says of errors in @/log; its
+ * status. */
 int faults_run (const char *command);
 
-/* The first file of @/o that looks whole and is not, or NULL.  A file is whole by what it holds, or if it has as many lines
- * as the one in @/whole: times make others differ. */
+/* The first file of @/o that looks whole and is not, or NULL.  A file is whole by what it holds, or if it has as many
+ * lines as the one in @/whole: times make others differ. */
 const char *faults_broken (void);
 
 #endif

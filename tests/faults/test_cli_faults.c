@@ -1,5 +1,5 @@
-/* Every allocation of a command, and every call of its that has to do with files, is made to fail in turn: an error in words
- * and status 1, nothing left behind in memory, no file that looks whole and is not.
+/* Every allocation of a command, and every call of its that has to do with files, is made to fail in turn: an error in
+ * words and status 1, nothing left behind in memory, no file that looks whole and is not.
  *
  * The commands are called from inside; linked with --wrap for the functions of calls.c and alloc.c. */
 #define _POSIX_C_SOURCE 200809L

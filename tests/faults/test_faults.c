@@ -1,5 +1,5 @@
-/* Every call of SUNDIALS, KLU and AMD is made to fail in turn: each is an error in words, nothing is printed, and (make san)
- * nothing is left behind.  Linked with --wrap for the functions listed here; the Makefile reads the list. */
+/* Every call of SUNDIALS, KLU and AMD is made to fail in turn: each is an error in words, nothing is printed, and
+ * (make san) nothing is left behind.  Linked with --wrap for the functions listed here; the Makefile reads the list. */
 #include <amd.h>
 #include <cvodes/cvodes.h>
 #include <idas/idas.h>

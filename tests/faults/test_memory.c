@@ -1,9 +1,10 @@
-/* Every allocation of the process is refused in turn, those of the libraries below Pinwheel and of the C library among them:
- * an error in words and status 1, or the whole result if it could be done without; no file that looks whole and is not.  Then
- * there is only so much memory, less and less: the same.
+/* Every allocation of the process is refused in turn, those of the libraries below Pinwheel and of the C library among
+ * them: an error in words and status 1, or the whole result if it could be done without; no file that looks whole and
+ * is not.  Then there is only so much memory, less and less: the same.
  *
- * malloc, calloc, realloc and free of this program are those that all of its libraries use.  Each attempt is a process of its
- * own, so that a crash is one attempt that failed.  Here some allocations are left out; slow_memory.c has all of them. */
+ * malloc, calloc, realloc and free of this program are those that all of its libraries use.  Each attempt is a process
+ * of its own, so that a crash is one attempt that failed.  Here some allocations are left out; slow_memory.c has all
+ * of them. */
 #define _GNU_SOURCE /* dladdr */
 #include <dlfcn.h>
 #include <errno.h>
@@ -97,8 +98,9 @@ void free (void *p) {
 
 /* ---- What may happen ---- */
 
-/* Calls of libraries that crash when they are refused memory.  Each is made only when there is enough (pw_reserve), so that
- * they crash if one allocation fails where the memory is not exhausted, as here; docs/design.md lists them. */
+/* Calls of libraries that crash when they are refused memory.  Each is made only when there is enough
+ * (pw_check_memory), so that they crash if one allocation fails where the memory is not exhausted, as here;
+ * docs/design.md lists them. */
 static int memory_is_fenced (const char *function) {
   static const char *const fenced[] = { "fy_parser_set_input_callback", "SUNContext_Create", "N_VClone", "CVodeInit" };
   for (size_t i = 0; i < sizeof fenced / sizeof *fenced; i++)

@@ -150,7 +150,8 @@ static void test_no_derivative (void **state) {
   }
 }
 
-/* Constraints take what is continuous where it breaks, however fast it changes; what is not is refused (tests/bad-models). */
+/* Constraints take what is continuous where it breaks, however fast it changes; what is not is refused
+ * (tests/bad-models). */
 static void test_continuous (void **state) {
   static const char *const value[] = { "t < 1 ? t^3 : 3*t - 2",        "abs(sin(3*t))^3",           "max(0, t - 1)^2",
                                        "sin(1e9*t) + max(0, t - 1)^2", "1e8*max(0, t - 1)^3 + 1e8", "t > 5 || 1" };

@@ -174,7 +174,8 @@ static void test_table (void **state) {
            "--reference @/none.csv: cannot be read: No such file or directory");
 }
 
-/* Models of the gallery, with parameters of their own as well: what they know is what they do, to the method's order. */
+/* Models of the gallery, with parameters of their own as well: what they know is what they do, to the method's
+ * order. */
 static void test_gallery (void **state) {
   static const struct {
     const char *model;

@@ -427,7 +427,8 @@ static void test_breakpoints (void **state) {
   }
 }
 
-/* Numbers that ought to be equal differ by round-off again and again: no breakpoints, and none of the others is lost. */
+/* Numbers that ought to be equal differ by round-off again and again: no breakpoints, and none of the others is
+ * lost. */
 #define TEN_TIMES(x) x x x x x x x x x x
 static void test_round_off (void **state) {
   static const char *const noisy[] = { "min(sin(t)^2 + cos(t)^2, 1)",
@@ -454,7 +455,8 @@ static void test_round_off (void **state) {
   }
 }
 
-/* (t - 1)/(2 t) is a whole number at t = 1/(2 k + 1): too many of these lie just after 0, none after 0.01 may be missed. */
+/* (t - 1)/(2 t) is a whole number at t = 1/(2 k + 1): too many of these lie just after 0, none after 0.01 may be
+ * missed. */
 static void test_accumulating (void **state) {
   const pw_expression *x = expression_of ("mod(t - 1, t ? 2*t : 1)");
   (void)state;

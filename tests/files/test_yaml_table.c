@@ -68,6 +68,9 @@ static void test_forms (void **state) {
   table_good ("t\ta\t\n0\t1\t\n0.5\t-2\t\n2\t3e-1\t\n\t\t\n", "{file: data.csv}");
   table_good ("\xEF\xBB\xBF# by hand\n\nt [s], \"M [N m]\" ,t2\n 0 , 1,5\n#\n0.5,-2,5\n\n2,3e-1,5\n",
               "{file: data.csv, columns: [t, M]}");
+  table_good ("t,\"M, left\",c\n0,1,\"a,b\"\n\"0.5\",-2,\"\"\n2,\"3e-1\",\" \"\"c\"\", \"\n",
+              "{file: data.csv, columns: [t, \"M, left\"]}");
+  table_good ("t;\"M \"\"1\"\", 2\"\n0;1\n0.5;-2\n2;3e-1\n", "{file: data.csv, columns: [t, 'M \"1\", 2']}");
   table_good ("x,t [s],M [N m]\n9,0,1\n9,0.5,-2\n9,2,3e-1\n", "{file: data.csv, columns: [2, \"M [N m]\"]}");
 }
 

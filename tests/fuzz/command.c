@@ -1,5 +1,6 @@
-/* The program itself: all commands with any options in any environment, in a folder that is emptied after each.  Words that
- * lead out of it, and models in C, are left out; what would take longer than a second of processor time is interrupted. */
+/* The program itself: all commands with any options in any environment, in a folder that is emptied after each.  Words
+ * that lead out of it, and models in C, are left out; what would take longer than a second of processor time is
+ * interrupted. */
 #define _GNU_SOURCE
 #include <dirent.h>
 #include <fcntl.h>

@@ -286,8 +286,8 @@ static void expression_value (const pw_expression *x, const char *text, const do
   expression_differs ("value", variable, 0, value, e.tie ? after : expected);
 }
 
-/* A derivative by differences of three widths; 0 if they disagree, as they do near kinks, and where jumps of a rounded value
- * look like a slope. */
+/* A derivative by differences of three widths; 0 if they disagree, as they do near kinks, and where jumps of a rounded
+ * value look like a slope. */
 static int expression_difference (const char *text, const double *variable, int by, int order, long double *d,
                                   long double *error) {
   long double u[3];

@@ -101,7 +101,8 @@ static void fuzz_piece (const uint8_t *data, size_t size, unsigned at, const cha
   while (*to < size && (data[*to] == 0 || strchr (stops, data[*to]) == NULL)) ++*to;
 }
 
-/* Puts `size` bytes, so many times as there is room for but at most `times`, in the place of those from `from` to `to`. */
+/* Puts `size` bytes, so many times as there is room for but at most `times`, in the place of those from `from` to
+ * `to`. */
 static size_t fuzz_put (uint8_t *data, size_t total, size_t most, size_t from, size_t to, const uint8_t *piece,
                         size_t size, size_t times) {
   size_t rest = total - (to - from);

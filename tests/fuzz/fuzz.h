@@ -17,16 +17,16 @@ char *fuzz_text (const uint8_t *data, size_t size);
 /* Cuts a text at its line ends into at most `most` pieces; a list ended by NULL. */
 int fuzz_lines (char *text, const char **line, int most);
 
-/* What a mutator adds to texts: rules, each a letter, a colon and alternatives between backticks, in which $e stands for
- * a text by rule e.  The first alternative ends: it is taken where the text gets too deep.  Ended by NULL; the first rule is
- * that of whole texts. */
+/* What a mutator adds to texts: rules, each a letter, a colon and alternatives between backticks, in which $e stands
+ * for a text by rule e.  The first alternative ends: it is taken where the text gets too deep.  Ended by NULL; the
+ * first rule is that of whole texts. */
 typedef const char *const fuzz_grammar;
 
 /* Writes a text by the first rule, without NUL; returns its size. */
 size_t fuzz_grow (fuzz_grammar *rules, unsigned seed, int depth, uint8_t *text, size_t most);
 
-/* A mutation for LLVMFuzzerCustomMutator: by bytes, a new text by the grammar, a piece by one of its rules, or pieces of the
- * text copied, moved, removed or repeated. */
+/* A mutation for LLVMFuzzerCustomMutator: by bytes, a new text by the grammar, a piece by one of its rules, or pieces
+ * of the text copied, moved, removed or repeated. */
 size_t fuzz_mutate (fuzz_grammar *rules, uint8_t *data, size_t size, size_t most, unsigned seed);
 
 size_t LLVMFuzzerMutate (uint8_t *data, size_t size, size_t most);

@@ -13,7 +13,7 @@ int LLVMFuzzerTestOneInput (const uint8_t *data, size_t size) {
   if (size < 2) return 0;
   FILE *f = fmemopen ((void *)(size_t)(data + 1), size - 1, "rb");
   if (f == NULL) return 0;
-  double *t = pw_columns_from_stream (f, "data.csv", column[data[0] % 3], unit, 2, 0, &count, &error);
+  double *t = pw_columns_from_stream (f, "data.csv", column[data[0] % 3], unit, 2, PW_GAPS_REFUSED, &count, &error);
   for (int i = 0; t && i < count; i++) {
     if (!isfinite (t[i]) || !isfinite (t[count + i])) abort ();
     if (i > 0 && !(t[i] > t[i - 1])) abort ();
@@ -33,7 +33,7 @@ static fuzz_grammar table_rules[] = {
   "u:` [$v]` ($v)`[$v]",
   "v:s`ms`N m`N mm`kN*m`$v/$v`$v^$p`$v $v`deg`rad/s`min`h`us`km`1`-`\xC2\xB5s`\xC2\xB0",
   "p:2`-1`9`0`-9",
-  "c:$d`$d.$d`-$d`$de$d`$de-$d` $d `\"$d\"`nan`inf`0x1p3``1e308`1e-308`t",
+  "c:$d`$d.$d`-$d`$de$d`$de-$d` $d `\"$d\"`\"$d$s$d\"`\"$d`nan`inf`0x1p3``1e308`1e-308`t",
   "d:1`2`3`4`10`99`0`5",
   NULL
 };

@@ -1,5 +1,5 @@
-/* Signals of forces that read velocities, as a controller's do: with every method they act as the element of the same law,
- * at whatever point of a step the velocities change. */
+/* Signals of forces that read velocities, as a controller's do: with every method they act as the element of the same
+ * law, at whatever point of a step the velocities change. */
 #include <math.h>
 #include <string.h>
 #include "check.h"
@@ -27,8 +27,8 @@ typedef struct {
 static const pw_parameter feedback_list[] = { { PW_AT (feedback_parameters, signals), 0, "", "", PW_REAL },
                                               { .name = NULL } };
 
-/* Two rods: the first one's hinge resists its turning, and air resists the second's motion.  The start is inconsistent, so
- * that it changes velocities, too. */
+/* Two rods: the first one's hinge resists its turning, and air resists the second's motion.  The start is
+ * inconsistent, so that it changes velocities, too. */
 static void feedback_build (pw_model *m, const void *parameters) {
   static const char *const omega[] = { "a.omega", NULL }, *const vx[] = { "b.vx", NULL },
                            *const vy[] = { "b.vy", NULL };

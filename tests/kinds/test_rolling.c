@@ -71,8 +71,8 @@ static void test_unicycle (void **state) {
  *
  *   v = a t, phi = b t^2 / 2:  (m + 2 I / r^2) a = (u1 + u2) / r,  (J + 2 I c^2 / r^2) b = c (u2 - u1) / r
  *
- * Either wheel keeps the axle from sliding sideways, so that they share the force; or the right one does not, since it sits
- * in a massless hub that may slide along the axle. */
+ * Either wheel keeps the axle from sliding sideways, so that they share the force; or the right one does not, since it
+ * sits in a massless hub that may slide along the axle. */
 
 static const struct { double m, J, I, r, c, u1, u2; } rolling_r = { 10, 0.4, 0.02, 0.1, 0.25, 0.5, 0.8 };
 

@@ -6,7 +6,8 @@
 
 /* ---- A block on an incline, held at a point beside its centre of mass ----
  *
- *   s'' = -g sin(alpha),  N = m g cos(alpha),  M = -N t.a     a: from the centre of mass to the point, t: up the incline */
+ * s'' = -g sin(alpha),  N = m g cos(alpha),  M = -N t.a     a: from the centre of mass to the point, t: up the
+ * incline */
 
 static const struct {
   double m, g, alpha, beta, v, at[2], foot[2];

@@ -17,7 +17,7 @@ typedef struct {
 
 static const pw_parameter tyre_list[] = {
   { PW_AT (tyre_parameters, load), 0, "N", "normal load", PW_NONNEGATIVE },
-  { PW_AT (tyre_parameters, friction), 0.4, "", "of the tyre", PW_NONNEGATIVE },
+  { PW_AT (tyre_parameters, friction), 0, "", "of the tyre", PW_NONNEGATIVE },
   { .name = NULL },
 };
 
@@ -42,7 +42,7 @@ static const pw_plugin_table tyre_slide_table = { .abi = PW_ABI,
                                                   .build = tyre_slide };
 
 static void tyre_stop (const char *method, double load, double bound, const char *reason) {
-  pw_system *s = scene_system (&tyre_slide_table, "load", load, NULL);
+  pw_system *s = scene_system (&tyre_slide_table, "load", load, "friction", load > 0 ? 0.4 : 0, NULL);
   pw_run *r = runs_open (s, method, &(pw_settings){ .step = 1e-3, .rtol = 1e-10, .span = 1, .ledger = 1 });
   double k = tyre_s.C / (tyre_s.m * tyre_s.v0), scale = load > 0 ? 0.4 * load * tyre_s.v0 / tyre_s.C : 0;
   for (int i = 1; i <= 5; i++) {
@@ -122,16 +122,22 @@ static void test_limit (void **state) {
                "1/C, and the next power of 1/C");
 }
 
-/* ---- Its load ---- */
+/* ---- Its limit: load and friction, or neither ---- */
+
+static void tyre_refused (double load, double friction, const char *message) {
+  pw_error error = { 0 };
+  pw_model *m = scene_model (&tyre_slide_table, "load", load, "friction", friction, NULL);
+  assert_null (pw_system_compile (m, &error));
+  check_error (&error, PW_INPUT, message);
+  pw_model_free (m);
+}
 
 static void test_refused (void **state) {
   (void)state;
-  pw_error error = { 0 };
-  pw_model *m = scene_model (&tyre_slide_table, "load", 5.0, "friction", 0.0, NULL);
-  assert_null (pw_system_compile (m, &error));
-  check_error (&error, PW_INPUT,
-               "model scene: tyre T: friction = 0: expected > 0, since a load limits the force to friction x load");
-  pw_model_free (m);
+  tyre_refused (5, 0,
+                "model scene: tyre T: friction = 0: expected > 0, since a load limits the force to friction x load");
+  tyre_refused (0, 0.4,
+                "model scene: tyre T: load = 0: expected > 0, since friction limits the force to friction x load");
 }
 
 /* ---- A car that brakes away at the rear: both laws, a load that is reached, arms, headings ---- */

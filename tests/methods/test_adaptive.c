@@ -147,7 +147,8 @@ static void test_edge (void **state) {
 
 /* ---- Step-size control, with known error estimates ---- */
 
-/* The pair of Dormand & Prince: times, stages, weights of the estimate (Hairer, Norsett & Wanner 1993, table II.5.2). */
+/* The pair of Dormand & Prince: times, stages, weights of the estimate (Hairer, Norsett & Wanner 1993, table
+ * II.5.2). */
 static const double adaptive_c[] = { 0, 1. / 5, 3. / 10, 4. / 5, 8. / 9, 1, 1 };
 static const double adaptive_A[7][6] = {
   { 0 },
@@ -179,7 +180,8 @@ static int adaptive_bump (void *context, double t, const double *x, double value
   return 0;
 }
 
-/* The transverse motion makes the kinetic energy so large that, at first, errors of the state dominate those of work. */
+/* The transverse motion makes the kinetic energy so large that, at first, errors of the state dominate those of
+ * work. */
 static void adaptive_pushed (pw_model *m, int (*eval) (void *, double, const double *, double *, double *)) {
   pw_add_body (m, &(pw_body){ .name = "puck", .mass = 1, .inertia = 1, .rate = { 3, 30, 0 } });
   pw_add_force (m, &(pw_force){ .name = "push", .body = "puck", .fx = { PW_FUNCTION, .function = { .eval = eval } } });
@@ -251,7 +253,8 @@ static void test_norm (void **state) {
   pw_system_free (s);
 }
 
-/* A narrow bump causes rejected steps, after which a step may be far smaller than needed: the next one is not longer. */
+/* A narrow bump causes rejected steps, after which a step may be far smaller than needed: the next one is not
+ * longer. */
 static void test_after_rejection (void **state) {
   (void)state;
   int found = 0;
@@ -288,8 +291,9 @@ static void test_after_cut (void **state) {
 
 /* ---- Motion along the constraints ----
  *
- * The motion of a massless body is prescribed, so that there is no work and projection removes the whole error: only the
- * size of the projection limits steps, at rtol^(3/4).  With an estimate of order h^5, h is proportional to rtol^(3/20). */
+ * The motion of a massless body is prescribed, so that there is no work and projection removes the whole error: only
+ * the size of the projection limits steps, at rtol^(3/4).  With an estimate of order h^5, h is proportional to
+ * rtol^(3/20). */
 
 static void adaptive_turned (pw_model *m, const void *parameters) {
   (void)parameters;

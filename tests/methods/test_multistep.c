@@ -43,7 +43,8 @@ static void test_tolerances (void **state) {
     }
 }
 
-/* Steps grow as rtol^(-1/(order + 1)): those of Adams, of orders to 12, more slowly than those of BDF, of orders to 5. */
+/* Steps grow as rtol^(-1/(order + 1)): those of Adams, of orders to 12, more slowly than those of BDF, of orders to
+ * 5. */
 static void test_orders (void **state) {
   (void)state;
   static const struct {

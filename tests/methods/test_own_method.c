@@ -1,5 +1,5 @@
-/* A method defined by the caller with pinwheel-method.h: symplectic Euler, with and without projection, with Baumgarte's
- * terms.  Its order in accuracy is in docs/method.c for another one. */
+/* A method defined by the caller with pinwheel-method.h: symplectic Euler, with and without projection, with
+ * Baumgarte's terms.  Its order in accuracy is in docs/method.c for another one. */
 #include <math.h>
 #include <string.h>
 #include "check.h"

@@ -18,8 +18,8 @@ typedef struct {
   named parameter[5], state[9];
 } problem;
 
-/* The growth of errors: 1000 for some hundred steps; ten times that for the car axis, of which 20 oscillations take most
- * steps of all, and for the caster, which is unstable; bdf doubles it. */
+/* The growth of errors: 1000 for some hundred steps; ten times that for the car axis, of which 20 oscillations take
+ * most steps of all, and for the caster, which is unstable; bdf doubles it. */
 static const problem problems[] = {
   { "benchmarks/scenes/knife-edge-drift.yaml",
     10,

@@ -135,8 +135,8 @@ static void test_tolerances (void **state) {
       }
 }
 
-/* The controller predicts the error of a step from the two before it (Gustafsson 1994): few steps are rejected where the
- * motion repeats. */
+/* The controller predicts the error of a step from the two before it (Gustafsson 1994): few steps are rejected where
+ * the motion repeats. */
 static void test_step_sizes (void **state) {
   static const char *const model[] = { "pendulum", "wheeled-snake" };
   (void)state;

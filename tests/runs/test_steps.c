@@ -154,7 +154,8 @@ static void test_adjacent_breakpoints (void **state) {
   pw_system_free (s);
 }
 
-/* One pulse ends and another one begins, in motion: both times are meant to be the same but differ in the last digit. */
+/* One pulse ends and another one begins, in motion: both times are meant to be the same but differ in the last
+ * digit. */
 static void test_adjacent_in_motion (void **state) {
   char name[STEPS_NAME];
   (void)state;

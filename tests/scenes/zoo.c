@@ -1,5 +1,5 @@
-/* One of each kind: a cart on a driven rolling wheel and a tyre, a welded box, an arm that follows a drive and carries a
- * massless skate, a four-bar loop on top. */
+/* One of each kind: a cart on a driven rolling wheel and a tyre, a welded box, an arm that follows a drive and carries
+ * a massless skate, a four-bar loop on top. */
 #include "pinwheel.h"
 
 typedef struct {

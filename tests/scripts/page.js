@@ -24,7 +24,7 @@
     document.dispatchEvent(new KeyboardEvent("keydown", { key: "End", bubbles: true }));
     $$("#values").open = true;
     await until("the table of values", () => $$("#page-values tr"));
-    const exact = table().trim().split("\n").pop().split(",").slice(1).filter((x, k) => k % 6 < 3);
+    const exact = csv().trim().split("\n").pop().split(",").slice(1).filter((x, k) => k % 6 < 3);
     text = [...document.querySelectorAll("#page-values tr")]
       .map((row, k) => row.cells[0].textContent + " " + row.cells[1].textContent + " " + exact[k]).join("\n");
     const shown = location.hash;

@@ -1,5 +1,5 @@
-/* Random mechanisms.  Configurations are random; each joint is at a random world point, transformed to the frames of its
- * bodies, so that all loops are closed initially.  Velocities are random too; the initial conditions make them
+/* Random mechanisms.  Configurations are random; each joint is at a random world point, transformed to the frames of
+ * its bodies, so that all loops are closed initially.  Velocities are random too; the initial conditions make them
  * consistent. */
 #include "mechanism.h"
 #include <math.h>

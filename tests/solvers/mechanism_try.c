@@ -1,5 +1,5 @@
-/* Runs of random mechanisms: the energy balances, the constraints and the independent verifier's equations are satisfied,
- * and the motion depends neither on the frame, nor on the order of the description, nor on the method. */
+/* Runs of random mechanisms: the energy balances, the constraints and the independent verifier's equations are
+ * satisfied, and the motion depends neither on the frame, nor on the order of the description, nor on the method. */
 #include <math.h>
 #include <stdio.h>
 #include <string.h>

@@ -1,5 +1,5 @@
-/* Transformed mechanisms.  Mirroring changes the sign of y of points on bodies, of angles and of torques; attachments to
- * the ground are rotated and displaced with the bodies. */
+/* Transformed mechanisms.  Mirroring changes the sign of y of points on bodies, of angles and of torques; attachments
+ * to the ground are rotated and displaced with the bodies. */
 #include <math.h>
 #include <string.h>
 #include "mechanism.h"

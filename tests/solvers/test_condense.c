@@ -34,8 +34,8 @@ static const pw_plugin_table condense_arm_table = { .abi = PW_ABI,
                                                     .size = sizeof (pw_plugin_table),
                                                     .build = condense_arm };
 
-/* The equation that remains after the elimination of the arm contains the position of the disc only, not its angle.  It has
- * no multiplier, also after the arm has turned so far that another equation remains. */
+/* The equation that remains after the elimination of the arm contains the position of the disc only, not its angle.
+ * It has no multiplier, also after the arm has turned so far that another equation remains. */
 static void test_prescribed_centre (void **state) {
   (void)state;
   pw_system *s = scene_system (&condense_arm_table, NULL);
@@ -76,8 +76,8 @@ static const pw_parameter platform_list[] = {
   { .name = NULL },
 };
 
-/* A platform with legs.  In the coordinates of a leg that stands on the ground its two pins are dependent; the second one is
- * therefore eliminated after the platform. */
+/* A platform with legs.  In the coordinates of a leg that stands on the ground its two pins are dependent; the second
+ * one is therefore eliminated after the platform. */
 static void platform_build (pw_model *m, const void *parameters) {
   const platform *p = parameters;
   char leg[20], pin[20];
@@ -124,7 +124,7 @@ static solution platform_solve (double mass, int last, int feet) {
   for (int j = 0; j < coords; j++) f[(j + first) % coords] = cos (j);
   for (int i = 0; i < s->rows; i++) gamma[i] = sin (3 * i);
   x.status = pw_saddle_factor (k);
-  x.sine = pw_saddle_pivot (k, &x.row);
+  x.sine = pw_saddle_sine (k, &x.row);
   if (x.status == PW_OK) pw_saddle_solve (k, f, gamma, a, x.lambda);
   for (int j = 0; j < coords; j++) x.a[j] = a[(j + first) % coords];
   pw_saddle_close (k);
@@ -190,7 +190,7 @@ static void test_stretched_leg (void **state) {
   assert_int_equal (pw_update_kinematics (w, 0, q, s->v0), PW_OK);
   pw_evaluate_J (w);
   assert_int_equal (pw_saddle_factor (k), PW_OK);
-  assert_true (pw_saddle_pivot (k, &row) > 0.05);
+  assert_true (pw_saddle_sine (k, &row) > 0.05);
   free (q);
   pw_saddle_close (k);
   pw_workspace_free (w);

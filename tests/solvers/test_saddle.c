@@ -217,7 +217,7 @@ static double pairs_sine (const pw_plugin_table *table, double angle) {
   pw_saddle *k = pw_saddle_open (w, s->mass, s->rows, NULL, &error);
   check_ok (k ? PW_OK : error.status, &error);
   assert_int_equal (pw_saddle_factor (k), PW_OK);
-  double sine = pw_saddle_pivot (k, &row);
+  double sine = pw_saddle_sine (k, &row);
   pw_saddle_close (k);
   pw_workspace_free (w);
   pw_system_free (s);

@@ -1,4 +1,5 @@
-/* Specialised code against the general engine: single evaluations and projections, and what it leaves to that engine. */
+/* Specialised code against the general engine: single evaluations and projections, and what it leaves to that
+ * engine. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -265,7 +266,8 @@ static void test_singular (void **state) {
   both_close (&x);
 }
 
-/* At a singular configuration, a crank and a rod of equal lengths above the slider, evaluation and projection refuse. */
+/* At a singular configuration, a crank and a rod of equal lengths above the slider, evaluation and projection
+ * refuse. */
 static void test_guard (void **state) {
   const double up = PW_PI / 2;
   double q[12] = { 0, 0.5, up, 0, 0.5, -up, 0, 0, 0 }, v[12] = { 0 }, a[12], lambda[12];

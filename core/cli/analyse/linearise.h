@@ -1,4 +1,4 @@
-/* The result of `pinwheel linearise`, and its reports. */
+/* The command `pinwheel linearise`, its result, and the reports of that (linearise_report.c). */
 #ifndef PW_LINEARISE_H
 #define PW_LINEARISE_H
 
@@ -7,30 +7,29 @@
 
 typedef struct {
   pw_cli_line line;
-  const char *at, *name;   /* NAME of the files, or NULL */
-  const char *animate;     /* name of the page of modes, or NULL */
-  const char **hold_texts; /* of --steady */
-  int steady;
+  const char *t_text;                       /* of --at */
+  const char *name;                         /* of -o: the files are NAME.json, NAME.csv, NAME.npz; or NULL */
+  const char *page_path;                    /* of --animate, or NULL */
+  const char **hold_texts;                  /* of --hold */
+  int steady;                               /* 1: --steady */
   const char **input_names, **output_names; /* as given, ended by NULL; or NULL: all */
   pw_cli_model m;
   pw_files files;
   pw_run *r;
-  double t;
+  double t;                  /* at which the run is linearised [s] */
   pw_initial_value *initial; /* 2 coordinates: the steady motion; NULL: the model's initial state */
   pw_limit limit;
   pw_linear linear;
-  int *input, *output; /* signals, states */
+  int *input, *output; /* numbers of signals u and of states y */
   int inputs, outputs;
-} pw_linearise;
+} pw_linearise_command;
 
-/* Writes an HTML page in which modes are animated.  A status. */
-int pw_linearise_page (const pw_linearise *x, FILE *f, pw_error *error);
 /* Prints eigenvalues and mode shapes. */
-void pw_linearise_print (const pw_linearise *x);
-/* Writes everything as JSON; [ A B ; C D ] as a table.  A status. */
-void pw_linearise_json (const pw_linearise *x, pw_json *j);
-int pw_linearise_csv (const pw_linearise *x, FILE *f, pw_error *error);
-/* Writes A, B, C, D and the eigenvalues as a NumPy archive.  A status. */
-int pw_linearise_npz (const pw_linearise *x, FILE *f, pw_error *error);
+void pw_linearise_print (const pw_linearise_command *cmd);
+/* Write all as JSON; [ A B ; C D ] as a table; matrices and eigenvalues for NumPy; a page of modes.  Statuses. */
+void pw_linearise_json (const pw_linearise_command *cmd, pw_json *j);
+int pw_linearise_csv (const pw_linearise_command *cmd, FILE *f, pw_error *error);
+int pw_linearise_page (const pw_linearise_command *cmd, FILE *f, pw_error *error);
+int pw_linearise_npz (const pw_linearise_command *cmd, FILE *f, pw_error *error);
 
 #endif

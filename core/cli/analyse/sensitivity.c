@@ -1,4 +1,4 @@
-/* pinwheel sensitivity: derivatives of outputs of a run with respect to parameters and initial values. */
+/* The command `sensitivity`: derivatives of outputs of a run with respect to parameters and initial values. */
 #define _POSIX_C_SOURCE 200809L
 #include <math.h>
 #include <stdlib.h>
@@ -9,77 +9,102 @@
 #include "sensitivity.h"
 #include "text.h"
 
-/* ---- The terminal ---- */
+enum {
+  SENSITIVITY_DIGITS = 9,  /* of numbers in the text */
+  SENSITIVITY_UNIT = 64,   /* longest unit, its end included */
+  SENSITIVITY_ROWS = 1000, /* of the table, unless --every is given */
+  SENSITIVITY_REPEATED = 5 /* computations with better steps of the differences, at most */
+};
 
-enum { SENSITIVITY_DIGITS = 9, SENSITIVITY_UNIT = 64, SENSITIVITY_ROWS = 1000 };
+typedef struct {
+  pw_cli_line line;
+  const char **by; /* of --by, ended by NULL */
+  const char *every, *folder;
+  pw_cli_model m;
+  pw_files files;
+  pw_sensitivity sens;
+  double cpu; /* processor time of the computation [s] */
+} sensitivity;
+
+/* ---- Text ---- */
 
 /* "m per kg"; "" if both are numbers, and of a formula, whose unit is unknown. */
-static const char *sensitivity_unit (const pw_sensitivity *x, int o, int p, char unit[SENSITIVITY_UNIT]) {
+static const char *sensitivity_unit (const pw_sensitivity *sens, int output, int unknown, char unit[SENSITIVITY_UNIT]) {
   char of[SENSITIVITY_UNIT / 2];
-  const char *by = x->unknowns.list[p].unit;
-  pw_outcome_unit (&x->outcomes, o, of, sizeof of);
-  if (*of == 0 && x->outcomes.outcome[o].formula) return strcpy (unit, "");
+  const char *by = sens->unknowns.list[unknown].unit;
+  pw_outcome_unit (&sens->outcomes, output, of, sizeof of);
+  if (*of == 0 && sens->outcomes.outcome[output].formula) return strcpy (unit, "");
   snprintf (unit, SENSITIVITY_UNIT, *by ? "%s per %s" : "%s", *of || *by == 0 ? of : "1", by);
   return unit;
 }
 
-/* Relative changes beyond this one are those of an output that is 0 but for round-off. */
-static const double SENSITIVITY_ELASTIC = 1e12;
+typedef struct {
+  double derivative, error;
+  double elasticity; /* relative change of the output per relative change of the unknown; NaN: there is none */
+} sensitivity_result;
 
-/* The derivative of an output; its error: of the differences and of the derivatives' integration, and of the run, by the change
- * with its tolerances; the relative change for a relative change of the unknown. */
-static void sensitivity_result (const pw_sensitivity *x, int o, int p, double result[3]) {
-  double by = x->unknowns.list[p].value;
-  result[0] = pw_sensitivity_derivative (x, o, p, x->end_slope);
-  result[1] = fabs (pw_sensitivity_derivative (x, o, p, x->end_error));
-  if (x->loose) result[1] += fabs (result[0] - x->loose[o * x->unknowns.count + p]);
-  result[2] = result[0] * by / pw_outcome_value (&x->outcomes, o, NULL);
-  if (by == 0 || !(fabs (result[2]) < SENSITIVITY_ELASTIC)) result[2] = NAN;
+/* The derivative; its error: that of the differences and of the integration of derivatives, and that of the run,
+ * which is estimated by the change with its tolerances; the elasticity. */
+static sensitivity_result sensitivity_of (const pw_sensitivity *sens, int output, int unknown) {
+  const double largest = 1e12; /* elasticities above it are those of an output that is 0 but for round-off */
+  double derivative = pw_sensitivity_derivative (sens, output, unknown, sens->run_slope),
+         error = fabs (pw_sensitivity_derivative (sens, output, unknown, sens->run_slope_error)),
+         value = sens->unknowns.list[unknown].value,
+         elasticity = derivative * value / pw_outcome_value (&sens->outcomes, output, NULL);
+  if (sens->loose) error += fabs (derivative - sens->loose[output * sens->unknowns.count + unknown]);
+  if (value == 0 || !(fabs (elasticity) < largest)) elasticity = NAN;
+  return (sensitivity_result){ derivative, error, elasticity };
 }
 
-static void sensitivity_print (const pw_sensitivity *x) {
+static void sensitivity_print (const pw_sensitivity *sens) {
   char value[32], unit[SENSITIVITY_UNIT], digits[32];
-  static const char *const head[] = { "value", "derivative", "unit", "error", "elasticity", NULL };
-  printf ("%s by %s to t = %.9g s\n", pw_file_name (x->m.file), x->unknowns.method, pw_run_time (x->base.run));
-  for (int o = 0; o < x->outcomes.outcomes && !x->stopped; o++) {
-    pw_outcome_unit (&x->outcomes, o, unit, sizeof unit);
-    pw_cli_print (stdout, "\n%s = %s %s\n", x->of[o], pw_format (value, pw_outcome_value (&x->outcomes, o, NULL), 12),
-                  unit);
+  static const struct {
+    int width;
+    const char *name;
+  } head[] = { { -14, "by" },  { 12, "value" }, { 12, "derivative" },
+               { -8, "unit" }, { 12, "error" }, { 12, "elasticity" } };
+  printf ("%s by %s to t = %.9g s\n", pw_file_name (sens->unknowns.m->file), sens->unknowns.method,
+          pw_run_time (sens->base.run));
+  for (int o = 0; o < sens->outcomes.outcomes && !sens->stopped; o++) {
+    pw_outcome_unit (&sens->outcomes, o, unit, sizeof unit);
+    pw_cli_print (stdout, "\n%s = %s %s\n", sens->of[o],
+                  pw_format (value, pw_outcome_value (&sens->outcomes, o, NULL), 12), unit);
     for (pw_table table = { 0 }; pw_table_pass (&table);) {
-      pw_cell (&table, -14, "by");
-      for (const char *const *h = head; *h; h++) pw_cell (&table, *h == head[2] ? -8 : 12, *h);
+      for (int k = 0; k < 6; k++) pw_cell (&table, head[k].width, head[k].name);
       pw_row_end (&table);
-      for (int p = 0; p < x->unknowns.count; p++) {
-        double result[3];
-        sensitivity_result (x, o, p, result);
-        pw_cell_unit (&table, -14, x->unknowns.list[p].name, x->unknowns.list[p].unit);
-        pw_cell_number (&table, 12, x->unknowns.list[p].value, SENSITIVITY_DIGITS);
-        pw_cell (&table, 12, isnan (result[0]) ? "none" : pw_format (digits, result[0], SENSITIVITY_DIGITS));
-        pw_cell (&table, -8, sensitivity_unit (x, o, p, unit));
-        pw_cell_number (&table, 12, result[1], 2);
-        pw_cell_number (&table, 12, result[2], 5);
+      for (int p = 0; p < sens->unknowns.count; p++) {
+        const sensitivity_result result = sensitivity_of (sens, o, p);
+        const pw_unknown *u = &sens->unknowns.list[p];
+        pw_cell_unit (&table, -14, u->name, u->unit);
+        pw_cell_number (&table, 12, u->value, SENSITIVITY_DIGITS);
+        pw_cell (&table, 12,
+                 isnan (result.derivative) ? "none" : pw_format (digits, result.derivative, SENSITIVITY_DIGITS));
+        pw_cell (&table, -8, sensitivity_unit (sens, o, p, unit));
+        pw_cell_number (&table, 12, result.error, 2);
+        pw_cell_number (&table, 12, result.elasticity, 5);
         pw_row_end (&table);
       }
     }
   }
 }
 
-/* 1 if the error exceeds 1 % of the derivative, and of the output (1e-6 at least, in SI units) for a change of the unknown by its
- * size, of which direction.step is 1e-5. */
-static int sensitivity_is_uncertain (const pw_sensitivity *x, int o, int p) {
-  double result[3], value = pw_outcome_value (&x->outcomes, o, NULL), size = 1e5 * fabs (x->direction[p].step);
-  sensitivity_result (x, o, p, result);
-  return result[1] > 0.01 * fabs (result[0]) && result[1] * size > fmax (0.01 * fabs (value), 1e-6);
+/* 1 if the error exceeds 1 % of the derivative and, for a change of the unknown by its size, 1 % of the output, or
+ * 1e-6 in SI units of one that is near 0. */
+static int sensitivity_is_uncertain (const pw_sensitivity *sens, int output, int unknown) {
+  const sensitivity_result result = sensitivity_of (sens, output, unknown);
+  double change = result.error * sens->unknowns.list[unknown].size;
+  return result.error > 0.01 * fabs (result.derivative) &&
+         change > fmax (0.01 * fabs (pw_outcome_value (&sens->outcomes, output, NULL)), 1e-6);
 }
 
-static void sensitivity_warn (const pw_sensitivity *x) {
+static void sensitivity_warn (const pw_sensitivity *sens) {
   char list[1000] = "";
   size_t used = 0;
-  for (int o = 0; o < x->outcomes.outcomes && !x->stopped; o++)
-    for (int p = 0; p < x->unknowns.count && used < sizeof list; p++)
-      if (sensitivity_is_uncertain (x, o, p))
-        used += (size_t)snprintf (list + used, sizeof list - used, "%s%s by %s", used ? ", " : "", x->of[o],
-                                  x->unknowns.list[p].name);
+  for (int o = 0; o < sens->outcomes.outcomes && !sens->stopped; o++)
+    for (int p = 0; p < sens->unknowns.count && used < sizeof list; p++)
+      if (sensitivity_is_uncertain (sens, o, p))
+        used += (size_t)snprintf (list + used, sizeof list - used, "%s%s by %s", used ? ", " : "", sens->of[o],
+                                  sens->unknowns.list[p].name);
   if (used)
     pw_cli_say ("pinwheel: derivatives with errors above 1 %%, which the motion amplifies or the steps of the run "
                 "cause: %s%s\n",
@@ -89,31 +114,31 @@ static void sensitivity_warn (const pw_sensitivity *x) {
 /* ---- Files ---- */
 
 static void sensitivity_json (const void *context, pw_json *j) {
-  const pw_sensitivity *x = context;
+  const sensitivity *cmd = context;
+  const pw_sensitivity *sens = &cmd->sens;
   char unit[SENSITIVITY_UNIT];
   pw_json_open (j, NULL, '{');
-  pw_json_text (j, "model", pw_file_name (x->m.file));
-  pw_json_text (j, "method", x->unknowns.method);
-  pw_json_number (j, "t_end", pw_run_time (x->base.run));
-  pw_json_flag (j, "complete", !x->stopped);
-  pw_json_number (j, "cpu_seconds", x->cpu);
+  pw_json_text (j, "model", pw_file_name (sens->unknowns.m->file));
+  pw_json_text (j, "method", sens->unknowns.method);
+  pw_json_number (j, "t_end", pw_run_time (sens->base.run));
+  pw_json_flag (j, "complete", !sens->stopped);
+  pw_json_number (j, "cpu_seconds", cmd->cpu);
   pw_json_open (j, "outputs", '[');
-  for (int o = 0; o < x->outcomes.outcomes && !x->stopped; o++) {
+  for (int o = 0; o < sens->outcomes.outcomes && !sens->stopped; o++) {
     pw_json_open (j, NULL, '{');
-    pw_json_text (j, "output", x->of[o]);
-    pw_json_text (j, "unit", pw_outcome_unit (&x->outcomes, o, unit, sizeof unit));
-    pw_json_number (j, "value", pw_outcome_value (&x->outcomes, o, NULL));
+    pw_json_text (j, "output", sens->of[o]);
+    pw_json_text (j, "unit", pw_outcome_unit (&sens->outcomes, o, unit, sizeof unit));
+    pw_json_number (j, "value", pw_outcome_value (&sens->outcomes, o, NULL));
     pw_json_open (j, "derivatives", '[');
-    for (int p = 0; p < x->unknowns.count; p++) {
-      double result[3];
-      sensitivity_result (x, o, p, result);
+    for (int p = 0; p < sens->unknowns.count; p++) {
+      const sensitivity_result result = sensitivity_of (sens, o, p);
       pw_json_open (j, NULL, '{');
-      pw_json_text (j, "by", x->unknowns.list[p].name);
-      pw_json_number (j, "value", x->unknowns.list[p].value);
-      pw_json_text (j, "unit", sensitivity_unit (x, o, p, unit));
-      pw_json_number (j, "derivative", result[0]);
-      pw_json_number (j, "error", result[1]);
-      pw_json_number (j, "elasticity", result[2]);
+      pw_json_text (j, "by", sens->unknowns.list[p].name);
+      pw_json_number (j, "value", sens->unknowns.list[p].value);
+      pw_json_text (j, "unit", sensitivity_unit (sens, o, p, unit));
+      pw_json_number (j, "derivative", result.derivative);
+      pw_json_number (j, "error", result.error);
+      pw_json_number (j, "elasticity", result.elasticity);
       pw_json_close (j, '}');
     }
     pw_json_close (j, ']');
@@ -131,50 +156,52 @@ static void sensitivity_cell (pw_text *t, const char *name, const char *unit) {
 }
 
 static int sensitivity_csv (const void *context, FILE *f, pw_error *error) {
-  const pw_sensitivity *x = context;
+  const sensitivity *cmd = context;
+  const pw_sensitivity *sens = &cmd->sens;
   char unit[SENSITIVITY_UNIT], name[300];
   pw_text t = { 0 };
   pw_text_cell (&t, "t [s]");
-  for (int o = 0; o < x->outcomes.outcomes; o++) {
-    if (!pw_sensitivity_in_table (x, o)) continue;
-    sensitivity_cell (&t, x->of[o], pw_outcome_unit (&x->outcomes, o, unit, sizeof unit));
-    for (int p = 0; p < x->unknowns.count; p++) {
-      snprintf (name, sizeof name, "d(%.140s)/d(%.140s)", x->of[o], x->unknowns.list[p].name);
-      sensitivity_cell (&t, name, sensitivity_unit (x, o, p, unit));
+  for (int o = 0; o < sens->outcomes.outcomes; o++) {
+    if (!pw_sensitivity_in_table (sens, o)) continue;
+    sensitivity_cell (&t, sens->of[o], pw_outcome_unit (&sens->outcomes, o, unit, sizeof unit));
+    for (int p = 0; p < sens->unknowns.count; p++) {
+      snprintf (name, sizeof name, "d(%.140s)/d(%.140s)", sens->of[o], sens->unknowns.list[p].name);
+      sensitivity_cell (&t, name, sensitivity_unit (sens, o, p, unit));
     }
   }
-  int status = pw_text_line (&t, f, x->folder, error);
-  for (int i = 0; i < x->rows && status == PW_OK; i++) {
-    for (int k = 0; k < x->columns; k++) pw_text_number (&t, x->row[(size_t)i * (size_t)x->columns + (size_t)k]);
-    status = pw_text_line (&t, f, x->folder, error);
+  int status = pw_text_line (&t, f, cmd->folder, error);
+  for (int i = 0; i < sens->rows && status == PW_OK; i++) {
+    for (int k = 0; k < sens->columns; k++)
+      pw_text_number (&t, sens->row[(size_t)i * (size_t)sens->columns + (size_t)k]);
+    status = pw_text_line (&t, f, cmd->folder, error);
   }
   return status;
 }
 
-static void sensitivity_label (const pw_sensitivity *x, int o, int p, char *label, size_t size) {
+/* The label of what sensitivity_data writes. */
+static void sensitivity_label (const pw_sensitivity *sens, int output, int unknown, char *label, size_t size) {
   char unit[SENSITIVITY_UNIT];
-  const char *name = x->unknowns.list[p].name;
-  if (x->unknowns.list[p].value != 0) {
-    pw_outcome_unit (&x->outcomes, o, unit, sizeof unit);
+  const char *name = sens->unknowns.list[unknown].name;
+  if (sens->unknowns.list[unknown].value != 0) {
+    pw_outcome_unit (&sens->outcomes, output, unit, sizeof unit);
     snprintf (label, size, *unit ? "%.100s × ∂/∂%.100s [%s]" : "%.100s × ∂/∂%.100s", name, name, unit);
   } else {
-    sensitivity_unit (x, o, p, unit);
+    sensitivity_unit (sens, output, unknown, unit);
     snprintf (label, size, *unit ? "∂/∂%.100s [%s]" : "∂/∂%.100s", name, unit);
   }
 }
 
-/* A block for each derivative. */
+/* A block for each derivative, times the unknown if that is not 0, so that unknowns can be compared. */
 static int sensitivity_data (const void *context, FILE *f, pw_error *error) {
-  const pw_sensitivity *x = context;
-  const double *row = x->row;
-  size_t columns = (size_t)x->columns;
+  const pw_sensitivity *sens = &((const sensitivity *)context)->sens;
+  const double *row = sens->row;
+  size_t columns = (size_t)sens->columns;
   (void)error;
-  for (int c = 1; c < x->columns; c++) {
-    int p = (c - 1) % (1 + x->unknowns.count) - 1;
+  for (int c = 1; c < sens->columns; c++) {
+    int p = (c - 1) % (1 + sens->unknowns.count) - 1; /* -1: the output itself */
     if (p < 0) continue;
-    double factor =
-        x->unknowns.list[p].value != 0 ? x->unknowns.list[p].value : 1; /* so that unknowns can be compared */
-    for (int k = 0; k < x->rows; k++)
+    double factor = sens->unknowns.list[p].value != 0 ? sens->unknowns.list[p].value : 1;
+    for (int k = 0; k < sens->rows; k++)
       fprintf (f, "%.9g %.9g\n", row[(size_t)k * columns], row[(size_t)k * columns + (size_t)c] * factor);
     fputs ("\n\n", f);
   }
@@ -182,34 +209,35 @@ static int sensitivity_data (const void *context, FILE *f, pw_error *error) {
 }
 
 static void sensitivity_variables (const void *context, FILE *f) {
-  const pw_sensitivity *x = context;
+  const pw_sensitivity *sens = &((const sensitivity *)context)->sens;
   int panels = 0;
-  fprintf (f, "unknowns = %d\nt_end = %.10g\n", x->unknowns.count, x->unknowns.t_end);
-  for (int i = 0; i < x->outcomes.outcomes; i++) panels += pw_sensitivity_in_table (x, i);
-  fprintf (f, "panels = %d\narray output[%d]\narray label[%d]\n", panels, panels, panels * x->unknowns.count);
-  for (int i = 0, k = 0; i < x->outcomes.outcomes; i++) {
+  fprintf (f, "unknowns = %d\nt_end = %.10g\n", sens->unknowns.count, sens->unknowns.t_end);
+  for (int i = 0; i < sens->outcomes.outcomes; i++) panels += pw_sensitivity_in_table (sens, i);
+  fprintf (f, "panels = %d\narray output[%d]\narray label[%d]\n", panels, panels, panels * sens->unknowns.count);
+  for (int i = 0, k = 0; i < sens->outcomes.outcomes; i++) {
     char label[300];
-    if (!pw_sensitivity_in_table (x, i)) continue;
-    pw_figure_element (f, "output", ++k, x->of[i]);
-    for (int p = 0; p < x->unknowns.count; p++) {
-      sensitivity_label (x, i, p, label, sizeof label);
-      pw_figure_element (f, "label", (k - 1) * x->unknowns.count + p + 1, label);
+    if (!pw_sensitivity_in_table (sens, i)) continue;
+    pw_figure_element (f, "output", ++k, sens->of[i]);
+    for (int p = 0; p < sens->unknowns.count; p++) {
+      sensitivity_label (sens, i, p, label, sizeof label);
+      pw_figure_element (f, "label", (k - 1) * sens->unknowns.count + p + 1, label);
     }
   }
 }
 
-static int sensitivity_write (const pw_sensitivity *x, pw_error *error) {
-  int status = pw_figure_tables (x->folder, "sensitivity", 5, x, sensitivity_csv, sensitivity_json, error);
-  if (status != PW_OK || x->columns < 2 || x->rows < 2) return status;
-  return pw_figure_write (&x->line, &x->m, x->folder, "sensitivity", x, sensitivity_data, sensitivity_variables, error);
+static int sensitivity_write (const sensitivity *cmd, pw_error *error) {
+  int status = pw_figure_tables (cmd->folder, "sensitivity", 5, cmd, sensitivity_csv, sensitivity_json, error);
+  if (status != PW_OK || cmd->sens.columns < 2 || cmd->sens.rows < 2) return status;
+  return pw_figure_write (&cmd->line, &cmd->m, cmd->folder, "sensitivity", cmd, sensitivity_data, sensitivity_variables,
+                          error);
 }
 
 /* ---- The command ---- */
 
-/* An initial value is the consistent one. */
-static int sensitivity_unknown (const pw_sensitivity *x, pw_unknown *u, const pw_run *r, const char *name,
-                                pw_error *error) {
-  int n = pw_system_coordinates (x->m.system), status = pw_unknown_find (u, &x->m, name, error);
+/* Finds an unknown; its value is that of the parameter, or the initial value of the state that is consistent. */
+static int sensitivity_find_unknown (const pw_sensitivity *sens, pw_unknown *u, const pw_run *r, const char *name,
+                                     pw_error *error) {
+  int n = pw_system_coordinates (sens->unknowns.m->system), status = pw_unknown_find (u, sens->unknowns.m, name, error);
   if (status == PW_OK && u->state >= 0)
     u->value = u->state < n ? pw_run_initial (r)->q[u->state] : pw_run_initial (r)->v[u->state - n];
   if (status != PW_OK || u->parameter == NULL || u->parameter->domain != PW_COUNT) return status;
@@ -218,161 +246,158 @@ static int sensitivity_unknown (const pw_sensitivity *x, pw_unknown *u, const pw
 }
 
 /* Finds the unknowns with a run of their own, which has their values. */
-static int sensitivity_unknowns (pw_sensitivity *x, pw_error *error) {
-  pw_unknowns *u = &x->unknowns;
-  if (x->by == NULL) return pw_fail (error, PW_INPUT, "--by is missing: expected a parameter or an initial value");
-  if (x->of == NULL) return pw_fail (error, PW_INPUT, "--of is missing: expected an output, such as frame.x");
-  while (x->by[u->count]) u->count++;
+static int sensitivity_find_unknowns (sensitivity *cmd, pw_error *error) {
+  pw_unknowns *u = &cmd->sens.unknowns;
+  if (cmd->by == NULL) return pw_fail (error, PW_INPUT, "--by is missing: expected a parameter or an initial value");
+  if (cmd->sens.of == NULL) return pw_fail (error, PW_INPUT, "--of is missing: expected an output, such as frame.x");
+  while (cmd->by[u->count]) u->count++;
   u->list = calloc ((size_t)u->count, sizeof *u->list);
   if (u->list == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
-  pw_run *r = pw_run_open (x->m.system, u->method, &u->settings, error);
+  pw_run *r = pw_run_open (cmd->m.system, u->method, &u->settings, error);
   int status = r ? PW_OK : error->status;
   for (int i = 0; i < u->count && status == PW_OK; i++) {
-    status = sensitivity_unknown (x, &u->list[i], r, x->by[i], error);
+    status = sensitivity_find_unknown (&cmd->sens, &u->list[i], r, cmd->by[i], error);
     for (int k = 0; k < i && status == PW_OK; k++)
-      if (strcmp (x->by[k], x->by[i]) == 0) status = pw_fail (error, PW_INPUT, "--by %s is given twice", x->by[i]);
+      if (strcmp (cmd->by[k], cmd->by[i]) == 0)
+        status = pw_fail (error, PW_INPUT, "--by %s is given twice", cmd->by[i]);
   }
   pw_run_close (r);
   return status;
 }
 
-static int sensitivity_open (pw_sensitivity *x, pw_error *error) {
-  int status = pw_cli_open (&x->m, &x->line, error);
-  if (status == PW_OK) status = pw_unknowns_open (&x->unknowns, &x->line, &x->m, error);
+static int sensitivity_open (sensitivity *cmd, pw_error *error) {
+  pw_sensitivity *sens = &cmd->sens;
+  const double runs = 1;
+  int status = pw_cli_open (&cmd->m, &cmd->line, error);
+  if (status == PW_OK) status = pw_unknowns_open (&sens->unknowns, &cmd->line, &cmd->m, error);
   if (status != PW_OK) return status;
-  pw_unknowns_engine (&x->unknowns, 1);
-  x->unknowns.settings.specialised = pw_cli_engine_code (&x->unknowns.engine);
-  if (x->folder) x->dt = x->unknowns.t_end / SENSITIVITY_ROWS;
-  status = pw_cli_only ("--every", x->every, "-o DIR", x->folder != NULL, error);
-  if (status == PW_OK) status = pw_cli_number ("--every", x->every, PW_POSITIVE, &x->dt, error);
-  if (status == PW_OK) status = sensitivity_unknowns (x, error);
-  return status == PW_OK ? pw_sensitivity_open (x, NULL, error) : status;
+  pw_unknowns_engine (&sens->unknowns, runs);
+  sens->unknowns.settings.specialised = pw_scene_code_table (sens->unknowns.engine.code);
+  if (cmd->folder) sens->row_interval = sens->unknowns.t_end / SENSITIVITY_ROWS;
+  status = pw_cli_requires ("--every", cmd->every, "-o DIR", cmd->folder != NULL, error);
+  if (status == PW_OK) status = pw_cli_number ("--every", cmd->every, PW_POSITIVE, &sens->row_interval, error);
+  if (status == PW_OK) status = sensitivity_find_unknowns (cmd, error);
+  return status == PW_OK ? pw_sensitivity_open (sens, NULL, error) : status;
 }
 
-/* Computations with better steps of the differences, at most. */
-enum { SENSITIVITY_REPEATED = 5 };
-
-/* Sets better steps of the parameters' differences; 1 if there are any. */
-static int sensitivity_steps (pw_sensitivity *x) {
+/* Sets better steps of the differences for parameters; 1 if there are any. */
+static int sensitivity_improve_steps (pw_sensitivity *sens) {
   int better = 0;
-  for (int p = 0; p < x->unknowns.count && !x->stopped; p++) {
-    double step = pw_variation_better_step (x->variation, p);
-    x->unknowns.list[p].last_step = fabs (x->direction[p].step);
-    if (x->unknowns.list[p].parameter == NULL || step == x->direction[p].step) continue;
-    x->unknowns.list[p].step = fabs (step);
+  for (int p = 0; p < sens->unknowns.count && !sens->stopped; p++) {
+    pw_unknown *u = &sens->unknowns.list[p];
+    double used = sens->direction[p].step, step = pw_variation_better_step (sens->variation, p);
+    u->last_step = fabs (used);
+    if (u->size == 0) u->size = u->last_step / PW_UNKNOWN_STEP;
+    if (u->parameter == NULL || step == used) continue;
+    u->step = fabs (step);
     better = 1;
   }
   return better;
 }
 
 /* The same problem without results. */
-static pw_sensitivity sensitivity_copy (const pw_sensitivity *x) {
-  return (pw_sensitivity){ .line = x->line,
-                           .of = x->of,
-                           .by = x->by,
-                           .every = x->every,
-                           .folder = x->folder,
-                           .m = x->m,
-                           .files = x->files,
-                           .unknowns = x->unknowns,
-                           .dt = x->dt };
+static pw_sensitivity sensitivity_copy (const pw_sensitivity *sens) {
+  return (pw_sensitivity){ .of = sens->of, .unknowns = sens->unknowns, .row_interval = sens->row_interval };
 }
 
-/* Computes all derivatives anew. */
-static int sensitivity_again (pw_sensitivity *x, pw_progress *progress, pw_error *error) {
-  pw_sensitivity_close (x);
-  *x = sensitivity_copy (x);
-  int status = pw_sensitivity_open (x, NULL, error);
-  return status == PW_OK ? pw_sensitivity_compute (x, progress, error) : status;
+/* Computes all derivatives again, with the steps now set. */
+static int sensitivity_repeat (pw_sensitivity *sens, pw_progress *progress, pw_error *error) {
+  pw_sensitivity_close (sens);
+  *sens = sensitivity_copy (sens);
+  int status = pw_sensitivity_open (sens, NULL, error);
+  return status == PW_OK ? pw_sensitivity_compute (sens, progress, error) : status;
 }
 
-/* Tolerances with which the derivatives of a run that controls its error are repeated, in its own ones. */
-static const double SENSITIVITY_LOOSE = 10;
+/* Factor of the tolerances with which the derivatives of a run that controls its error are repeated. */
+#define SENSITIVITY_LOOSE 10.0
 
-static int sensitivity_loose (pw_sensitivity *x, pw_progress *progress, pw_error *error) {
-  int outputs = x->outcomes.outcomes, unknowns = x->unknowns.count;
-  pw_sensitivity y = sensitivity_copy (x);
-  y.no_error = 1;
-  y.dt = 0;
-  y.unknowns.settings.rtol = fmin (0.1, SENSITIVITY_LOOSE * x->unknowns.settings.rtol);
-  y.unknowns.settings.atol *= SENSITIVITY_LOOSE;
-  x->loose = malloc ((size_t)(outputs * unknowns) * sizeof *x->loose);
-  int status = x->loose ? pw_sensitivity_open (&y, NULL, error) : pw_fail (error, PW_RESOURCE, "out of memory");
-  if (status == PW_OK) status = pw_sensitivity_compute (&y, progress, error);
-  x->stopped |= y.stopped;
-  for (int o = 0; o < outputs && status == PW_OK && !y.stopped; o++)
-    for (int p = 0; p < unknowns; p++) x->loose[o * unknowns + p] = pw_sensitivity_derivative (&y, o, p, y.end_slope);
-  pw_sensitivity_close (&y);
+/* Computes the derivatives with larger tolerances. */
+static int sensitivity_loosen (pw_sensitivity *sens, pw_progress *progress, pw_error *error) {
+  int outputs = sens->outcomes.outcomes, unknowns = sens->unknowns.count;
+  pw_sensitivity other = sensitivity_copy (sens);
+  other.no_error = 1;
+  other.row_interval = 0;
+  other.unknowns.settings.rtol = fmin (0.1, SENSITIVITY_LOOSE * sens->unknowns.settings.rtol);
+  other.unknowns.settings.atol *= SENSITIVITY_LOOSE;
+  sens->loose = malloc ((size_t)(outputs * unknowns) * sizeof *sens->loose);
+  int status = sens->loose ? pw_sensitivity_open (&other, NULL, error) : pw_fail (error, PW_RESOURCE, "out of memory");
+  if (status == PW_OK) status = pw_sensitivity_compute (&other, progress, error);
+  sens->stopped |= other.stopped;
+  for (int o = 0; o < outputs && status == PW_OK && !other.stopped; o++)
+    for (int p = 0; p < unknowns; p++)
+      sens->loose[o * unknowns + p] = pw_sensitivity_derivative (&other, o, p, other.run_slope);
+  pw_sensitivity_close (&other);
   return status;
 }
 
-/* Estimates the part of the errors that the run's own error causes. */
-static int sensitivity_run_error (pw_sensitivity *x, pw_progress *progress, pw_error *error) {
-  if (x->stopped || pw_cli_adaptive (x->unknowns.method) == 0) return PW_OK;
-  int status = sensitivity_loose (x, progress, error);
+/* Estimates the part of the errors that the error of the run causes. */
+static int sensitivity_estimate_run_error (pw_sensitivity *sens, pw_progress *progress, pw_error *error) {
+  if (sens->stopped || pw_cli_adaptive (sens->unknowns.method) == 0) return PW_OK;
+  int status = sensitivity_loosen (sens, progress, error);
   if (status == PW_OK || status == PW_RESOURCE) return status;
-  for (int i = 0; i < x->outcomes.outcomes * x->unknowns.count; i++) x->loose[i] = NAN;
+  for (int i = 0; i < sens->outcomes.outcomes * sens->unknowns.count; i++) sens->loose[i] = NAN;
   pw_cli_say ("pinwheel: errors are unknown: the run with %g times the tolerances fails: %s\n", SENSITIVITY_LOOSE,
               error->text);
   *error = (pw_error){ 0 };
   return PW_OK;
 }
 
-static int sensitivity_compute (pw_sensitivity *x, pw_error *error) {
+static int sensitivity_compute (pw_sensitivity *sens, pw_error *error) {
   pw_progress progress;
-  double begun = pw_cpu_clock ();
   pw_stop_catch ();
-  pw_progress_start (&progress, pw_file_name (x->m.file), x->unknowns.t_end, 1);
-  int status = pw_sensitivity_compute (x, &progress, error);
-  for (int i = 0; i < SENSITIVITY_REPEATED && status == PW_OK && sensitivity_steps (x); i++) {
-    status = sensitivity_again (x, &progress, error);
+  pw_progress_start (&progress, pw_file_name (sens->unknowns.m->file), sens->unknowns.t_end);
+  int status = pw_sensitivity_compute (sens, &progress, error);
+  for (int i = 0; i < SENSITIVITY_REPEATED && status == PW_OK && sensitivity_improve_steps (sens); i++) {
+    status = sensitivity_repeat (sens, &progress, error);
     if (status == PW_OK || status == PW_RESOURCE) continue;
-    for (int p = 0; p < x->unknowns.count; p++) x->unknowns.list[p].step = x->unknowns.list[p].last_step;
-    *error = (pw_error){ 0 }; /* a model may refuse a longer step */
-    status = sensitivity_again (x, &progress, error);
+    for (int p = 0; p < sens->unknowns.count; p++) sens->unknowns.list[p].step = sens->unknowns.list[p].last_step;
+    *error = (pw_error){ 0 }; /* the model refused a longer step */
+    status = sensitivity_repeat (sens, &progress, error);
     break;
   }
-  if (status == PW_OK) status = sensitivity_run_error (x, &progress, error);
+  if (status == PW_OK) status = sensitivity_estimate_run_error (sens, &progress, error);
   pw_progress_end (&progress);
   pw_stop_release ();
-  x->cpu = pw_cpu_clock () - begun;
   return status;
 }
 
-static int sensitivity_check (const pw_sensitivity *x, pw_error *error) {
-  for (int o = 0; o < x->outcomes.outcomes && !x->stopped; o++)
-    if (!isfinite (pw_outcome_value (&x->outcomes, o, NULL)))
-      return pw_fail (error, PW_METHOD, "%.300s is not a finite number at the end of the run", x->of[o]);
+static int sensitivity_check (const pw_sensitivity *sens, pw_error *error) {
+  for (int o = 0; o < sens->outcomes.outcomes && !sens->stopped; o++)
+    if (!isfinite (pw_outcome_value (&sens->outcomes, o, NULL)))
+      return pw_fail (error, PW_METHOD, "%.300s is not a finite number at the end of the run", sens->of[o]);
   return PW_OK;
 }
 
 static int sensitivity_command (void *options, pw_error *error) {
-  pw_sensitivity *x = options;
-  int status = sensitivity_open (x, error);
-  if (status == PW_OK) status = pw_figure_results (&x->line, &x->m, x->folder, "sensitivity", &x->files, error);
-  if (status == PW_OK) pw_report_model (x->m.model);
-  if (status == PW_OK) status = sensitivity_compute (x, error);
-  if (status == PW_OK) status = sensitivity_check (x, error);
-  if (status == PW_OK) sensitivity_print (x), sensitivity_warn (x);
-  if (status == PW_OK && x->folder) status = sensitivity_write (x, error);
-  if (status == PW_OK && x->stopped) status = pw_limit_fail (&x->limit, pw_run_time (x->base.run), error);
-  pw_files_close (&x->files);
-  pw_sensitivity_close (x);
-  pw_unknowns_close (&x->unknowns);
-  pw_cli_close_model (&x->m);
-  return status == PW_RETRY ? pw_cli_incomplete (&x->line, error) : status;
+  sensitivity *cmd = options;
+  pw_sensitivity *sens = &cmd->sens;
+  int status = sensitivity_open (cmd, error);
+  if (status == PW_OK) status = pw_figure_results (&cmd->line, &cmd->m, cmd->folder, "sensitivity", &cmd->files, error);
+  if (status == PW_OK) pw_report_model (cmd->m.model);
+  const double start = pw_seconds (CLOCK_PROCESS_CPUTIME_ID);
+  if (status == PW_OK) status = sensitivity_compute (sens, error);
+  cmd->cpu = pw_seconds (CLOCK_PROCESS_CPUTIME_ID) - start;
+  if (status == PW_OK) status = sensitivity_check (sens, error);
+  if (status == PW_OK) sensitivity_print (sens), sensitivity_warn (sens);
+  if (status == PW_OK && cmd->folder) status = sensitivity_write (cmd, error);
+  if (status == PW_OK && sens->stopped) status = pw_limit_status (&sens->limit, pw_run_time (sens->base.run), error);
+  pw_files_close (&cmd->files);
+  pw_sensitivity_close (sens);
+  pw_unknowns_close (&sens->unknowns);
+  pw_cli_close_model (&cmd->m);
+  return status == PW_RETRY ? pw_cli_incomplete (&cmd->line, error) : status;
 }
 
 static const struct poptOption sensitivity_options[] = {
   PW_OPTION_GROUP ("Sensitivity"),
-  PW_LIST_OPTION (pw_sensitivity, of, "of", 0, "OUTPUT",
+  PW_LIST_OPTION (sensitivity, sens.of, "of", 0, "OUTPUT",
                   "A column of the table of `run` at the end, or its max:, min:, mean:, integral: or rms:, such as "
                   "max:B.Fx; or an expression of these; repeatable"),
-  PW_LIST_OPTION (pw_sensitivity, by, "by", 0, "NAME",
+  PW_LIST_OPTION (sensitivity, by, "by", 0, "NAME",
                   "A parameter, or the initial value of a state, such as body.vx; repeatable"),
-  PW_TEXT_OPTION (pw_sensitivity, every, "every", 0, "DT",
+  PW_TEXT_OPTION (sensitivity, every, "every", 0, "DT",
                   "Time between rows of the table [s] (default a thousandth of the final time)"),
-  PW_TEXT_OPTION (pw_sensitivity, folder, "output", 'o', "DIR",
+  PW_TEXT_OPTION (sensitivity, folder, "output", 'o', "DIR",
                   "Write sensitivity.csv (outputs and derivatives along the run), sensitivity.json and a figure into a "
                   "folder"),
   PW_WIDTH_OPTION,
@@ -388,9 +413,9 @@ const pw_command pw_cli_sensitivity = {
   .help = "Differentiate outputs of a run with respect to parameters and initial values, at the end and along the run, "
           "by the variational equations: exact in the states, by differences of compiled models in the parameters, "
           "with the error of these.",
-  .least = 1,
-  .most = 1,
-  .size = sizeof (pw_sensitivity),
+  .min_arguments = 1,
+  .max_arguments = 1,
+  .options_size = sizeof (sensitivity),
   .function = sensitivity_command,
   .options = sensitivity_options,
 };

@@ -1,96 +1,95 @@
 /* Derivatives of outputs along a run.
  *
- * An output is a function of functionals of columns.  At a time, the derivative of a column is that of the sample.  That
- * of an extremum is the column's at its time, since inside a step the effect of a shift of time vanishes; that of an
- * integral is the integral of the column's, by Gauss' formula with 5 nodes over a few steps of the derivatives, up to rows
- * of the table and breakpoints. */
+ * An output is a function of functionals of columns.  The derivative of the final value of a column is that of the
+ * sample.  That of an extremum is the derivative of the column at the time of the extremum, since inside a step a
+ * shift of that time has no effect of first order.  That of an integral is the integral of the derivative of the
+ * column, by Gauss' formula with 5 nodes over intervals of a few steps of the derivatives, which end at rows of the
+ * table and at breakpoints. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 #include "sensitivity.h"
 #include "util.h"
 
-/* Rows if their distance is not given; steps of the derivatives in an interval of integrals, in which the square of a
- * column is smooth enough for 5 nodes. */
-enum { SENSITIVITY_PARTS = 20, SENSITIVITY_STEPS = 2 };
+enum {
+  SENSITIVITY_PARTS = 20, /* intervals of the run between rows of the table, if their distance is not given */
+  SENSITIVITY_STEPS = 2 /* of the derivatives in an interval of integrals, where 5 nodes integrate squares of columns */
+};
 
-int pw_sensitivity_in_table (const pw_sensitivity *x, int output) {
-  const pw_outcome *o = &x->outcomes.outcome[output];
+int pw_sensitivity_in_table (const pw_sensitivity *sens, int output) {
+  const pw_outcome *o = &sens->outcomes.outcome[output];
   for (int i = 0; i < o->terms; i++)
-    if (x->outcomes.functional[o->term[i]].type != PW_FINAL) return 0;
+    if (sens->outcomes.functional[o->term[i]].type != PW_FINAL) return 0;
   return 1;
 }
 
-double pw_sensitivity_derivative (const pw_sensitivity *x, int output, int unknown, const double *slope) {
-  const pw_outcome *o = &x->outcomes.outcome[output];
-  double *gradient = x->value + x->outcomes.functionals, sum = 0;
-  pw_outcome_value (&x->outcomes, output, gradient);
-  for (int i = 0; i < o->terms; i++) sum += gradient[o->term[i]] * slope[o->term[i] * x->unknowns.count + unknown];
+double pw_sensitivity_derivative (const pw_sensitivity *sens, int output, int unknown, const double *slope) {
+  const pw_outcome *o = &sens->outcomes.outcome[output];
+  double *gradient = sens->value + sens->outcomes.functionals, sum = 0;
+  pw_outcome_value (&sens->outcomes, output, gradient);
+  for (int i = 0; i < o->terms; i++) sum += gradient[o->term[i]] * slope[o->term[i] * sens->unknowns.count + unknown];
   return sum;
 }
 
 /* ---- Columns at a time ---- */
 
-/* Coordinate `index` of the contact points in a workspace's system, at the positions q + by dq. */
-static int sensitivity_contact (const pw_sensitivity *x, pw_workspace *w, int index, const pw_sample *s,
-                                const double *dq, double by, double *value, pw_error *error) {
-  const pw_system *system = x->base.m.system;
-  int n = pw_system_coordinates (system), contacts = pw_system_contacts (system), status;
-  double *q = malloc ((size_t)n * sizeof *q), (*at)[3] = malloc (((size_t)contacts + 1) * sizeof *at);
-  for (int j = 0; q && j < n; j++) q[j] = s->q[j] + by * dq[j];
-  status = q && at ? pw_workspace_contact_points (w, s->t, q, s->v, at, error)
-                   : pw_fail (error, PW_RESOURCE, "out of memory");
-  if (status == PW_OK) *value = at[index / 2][index % 2];
-  free (q);
-  free (at);
+enum { OF_DERIVATIVE, OF_ERROR }; /* arguments of pw_direction_weight */
+
+/* Coordinate `index` (2 i for x of wheel i) of contact points in a workspace's system, at q + factor dq. */
+static int sensitivity_contact (pw_sensitivity *sens, pw_workspace *w, int index, const pw_sample *s, const double *dq,
+                                double factor, double *value, pw_error *error) {
+  for (int j = 0; j < pw_system_coordinates (sens->base.m.system); j++) sens->q[j] = s->q[j] + factor * dq[j];
+  int status = pw_workspace_contact_points (w, s->t, sens->q, s->v, sens->outcomes.contact, error);
+  if (status == PW_OK) *value = sens->outcomes.contact[index / 2][index % 2];
   return status;
 }
 
-/* Contact points are functions of positions and parameters: differences in both, with the derivatives of positions and their
- * errors. */
-static int sensitivity_contact_slope (const pw_sensitivity *x, int unknown, int index, const pw_sample *s,
-                                      const double *dq, const double *eq, double *slope, double *error_of,
+/* The derivative of a contact point, which is a function of positions and parameters: differences in both at once.
+ * dq, eq: derivatives of the positions, and their errors. */
+static int sensitivity_contact_slope (pw_sensitivity *sens, int unknown, int index, const pw_sample *s,
+                                      const double *dq, const double *eq, double *slope, double *slope_error,
                                       pw_error *error) {
-  const pw_direction *d = &x->direction[unknown];
+  const pw_direction *d = &sens->direction[unknown];
   double value = 0;
   int status = PW_OK;
-  *slope = *error_of = 0;
+  *slope = *slope_error = 0;
   for (int k = 0; k < 4 && status == PW_OK; k++) {
-    pw_unknown_run *near = &x->near[4 * unknown + k];
+    pw_unknown_run *near = &sens->neighbours[4 * unknown + k];
     if (near->workspace == NULL) near->workspace = pw_workspace_new (near->m.system, error);
     if (near->workspace == NULL) return error->status;
-    status = sensitivity_contact (x, near->workspace, index, s, dq, pw_direction_offset (d, k), &value, error);
-    *slope += pw_direction_weight (d, 0, k) * value;
-    *error_of += pw_direction_weight (d, 1, k) * value;
+    status = sensitivity_contact (sens, near->workspace, index, s, dq, pw_direction_offset (d, k), &value, error);
+    *slope += pw_direction_weight (d, OF_DERIVATIVE, k) * value;
+    *slope_error += pw_direction_weight (d, OF_ERROR, k) * value;
   }
   for (int side = -1; side <= 1 && status == PW_OK; side += 2) {
-    status = sensitivity_contact (x, x->outcomes.workspace, index, s, eq, side, &value, error);
-    *error_of += side * value / 2;
+    status = sensitivity_contact (sens, sens->outcomes.workspace, index, s, eq, side, &value, error);
+    *slope_error += side * value / 2;
   }
   return status;
 }
 
 /* A sample of the run at a time that the derivatives have reached. */
-static int sensitivity_sample (pw_sensitivity *x, double t, pw_sample *s, pw_error *error) {
-  int status = x->sampled ? pw_run_advance_to (x->sampled, t, x->unknowns.t_end, error) : PW_OK;
-  return status == PW_OK ? pw_run_sample (x->sampled ? x->sampled : x->base.run, t, s, error) : status;
+static int sensitivity_sample (pw_sensitivity *sens, double t, pw_sample *s, pw_error *error) {
+  int status = sens->sampled ? pw_run_advance_to (sens->sampled, t, sens->unknowns.t_end, error) : PW_OK;
+  return status == PW_OK ? pw_run_sample (sens->sampled ? sens->sampled : sens->base.run, t, s, error) : status;
 }
 
-int pw_sensitivity_at (pw_sensitivity *x, double t, pw_error *error) {
-  pw_sample s, d, e;
-  int status = pw_variation_advance (x->variation, t, x->unknowns.t_end, error), P = x->unknowns.count;
-  if (status == PW_OK) status = sensitivity_sample (x, t, &s, error);
-  if (status == PW_OK) status = pw_outcomes_read (&x->outcomes, &s, x->value, error);
+int pw_sensitivity_at (pw_sensitivity *sens, double t, pw_error *error) {
+  pw_sample s, derivative, slope_error;
+  const int P = sens->unknowns.count;
+  int status = pw_variation_advance (sens->variation, t, sens->unknowns.t_end, error);
+  if (status == PW_OK) status = sensitivity_sample (sens, t, &s, error);
+  if (status == PW_OK) status = pw_outcomes_read (&sens->outcomes, &s, sens->value, error);
   for (int p = 0; p < P && status == PW_OK; p++) {
-    status = pw_variation_sample (x->variation, p, &d, &e, error);
-    for (int i = 0; i < x->outcomes.functionals && status == PW_OK; i++) {
-      pw_column c = x->outcomes.functional[i].column;
-      d.t = e.t = 0; /* the column t does not depend on anything */
-      x->slope[i * P + p] = pw_column_value (x->base.m.system, c, &d);
-      x->error[i * P + p] = pw_column_value (x->base.m.system, c, &e);
+    status = pw_variation_sample (sens->variation, p, &derivative, &slope_error, error);
+    for (int i = 0; i < sens->outcomes.functionals && status == PW_OK; i++) {
+      pw_column c = sens->outcomes.functional[i].column;
+      derivative.t = slope_error.t = 0; /* the column t does not depend on anything */
+      sens->slope[i * P + p] = pw_column_value (sens->base.m.system, c, &derivative);
+      sens->slope_error[i * P + p] = pw_column_value (sens->base.m.system, c, &slope_error);
       if (c.type == PW_COLUMN_CONTACT)
-        status =
-            sensitivity_contact_slope (x, p, c.index, &s, d.q, e.q, &x->slope[i * P + p], &x->error[i * P + p], error);
+        status = sensitivity_contact_slope (sens, p, c.index, &s, derivative.q, slope_error.q, &sens->slope[i * P + p],
+                                            &sens->slope_error[i * P + p], error);
     }
   }
   return status;
@@ -98,72 +97,76 @@ int pw_sensitivity_at (pw_sensitivity *x, double t, pw_error *error) {
 
 /* ---- Functionals ---- */
 
-/* Relative difference of derivatives before and after a jump that are the same. */
-static const double SENSITIVITY_SAME = 1e-5;
+/* Derivatives before and after a jump whose relative difference is smaller are the same. */
+#define SENSITIVITY_SAME 1e-5
 
-/* Adds the current columns to the integrals, with a weight. */
-static void sensitivity_add (pw_sensitivity *x, double weight) {
-  for (int i = 0; i < x->outcomes.functionals; i++) {
-    const pw_functional *f = &x->outcomes.functional[i];
-    double factor = f->type == PW_INTEGRAL ? weight : weight / x->unknowns.t_end;
+/* Adds the current derivatives of columns, times the weight of a node, to those of integrals. */
+static void sensitivity_add_node (pw_sensitivity *sens, double weight) {
+  for (int i = 0; i < sens->outcomes.functionals; i++) {
+    const pw_functional *f = &sens->outcomes.functional[i];
+    double factor = f->type == PW_INTEGRAL ? weight : weight / sens->unknowns.t_end;
     if (!pw_is_integral (f->type)) continue;
-    if (f->type == PW_RMS) factor *= f->value > 0 ? x->value[i] / f->value : 0;
-    for (int p = i * x->unknowns.count; p < (i + 1) * x->unknowns.count; p++) {
-      x->end_slope[p] += factor * x->slope[p];
-      x->end_error[p] += factor * x->error[p];
+    if (f->type == PW_RMS) factor *= f->value > 0 ? sens->value[i] / f->value : 0;
+    for (int p = i * sens->unknowns.count; p < (i + 1) * sens->unknowns.count; p++) {
+      sens->run_slope[p] += factor * sens->slope[p];
+      sens->run_slope_error[p] += factor * sens->slope_error[p];
     }
   }
 }
 
-/* The derivative of the time of the next breakpoint, or of the last breakpoint or jump that has been passed. */
-static double sensitivity_moves (const pw_sensitivity *x, int unknown, int passed) {
+/* The derivative of the time of the last breakpoint or jump; with passed = 0, of the next breakpoint. */
+static double sensitivity_jump_slope (const pw_sensitivity *sens, int unknown, int passed) {
   double slope;
-  if (passed) return pw_variation_jump_slope (x->variation, unknown);
-  pw_variation_breakpoint (x->variation, unknown, &slope);
+  if (passed) return pw_variation_jump_slope (sens->variation, unknown);
+  pw_variation_breakpoint (sens->variation, unknown, &slope);
   return slope;
 }
 
-/* Keeps the current derivatives of functional i that exist. */
-static void sensitivity_keep (pw_sensitivity *x, int i) {
-  for (int at = i * x->unknowns.count; at < (i + 1) * x->unknowns.count; at++)
-    if (!isnan (x->end_slope[at])) x->end_slope[at] = x->slope[at], x->end_error[at] = x->error[at];
+/* Makes the current derivatives of functional i those of the run, except where these do not exist. */
+static void sensitivity_keep (pw_sensitivity *sens, int i) {
+  for (int at = i * sens->unknowns.count; at < (i + 1) * sens->unknowns.count; at++)
+    if (!isnan (sens->run_slope[at]))
+      sens->run_slope[at] = sens->slope[at], sens->run_slope_error[at] = sens->slope_error[at];
 }
 
-/* Keeps those of an extremum; at a breakpoint that moves, and just after it, they do not exist.  reached: 1 if the extremum is at
- * a breakpoint that is not passed yet. */
-static void sensitivity_keep_extremum (pw_sensitivity *x, int i, int reached) {
-  const pw_functional *f = &x->outcomes.functional[i];
-  double slope, next = pw_variation_breakpoint (x->variation, 0, &slope);
-  int before = reached || fabs (f->t - next) < 1e-9 * (1 + fabs (next)),
-      after = f->t - x->passed <= 2 * PW_FUNCTIONAL_BEFORE * f->step;
-  sensitivity_keep (x, i);
-  for (int p = 0; p < x->unknowns.count && (before || after); p++)
-    if (sensitivity_moves (x, p, !before) != 0) x->end_slope[i * x->unknowns.count + p] = NAN;
+/* Where an extremum is: inside an interval, or at a breakpoint that is not passed yet. */
+typedef enum { INSIDE, AT_BREAKPOINT } sensitivity_place;
+
+/* The same for an extremum.  Derivatives do not exist at a breakpoint whose time depends on the unknown, and just
+ * after it. */
+static void sensitivity_keep_extremum (pw_sensitivity *sens, int i, sensitivity_place place) {
+  const pw_functional *f = &sens->outcomes.functional[i];
+  double slope, next = pw_variation_breakpoint (sens->variation, 0, &slope);
+  int before = place == AT_BREAKPOINT || fabs (f->t - next) < 1e-9 * (1 + fabs (next)),
+      after = f->t - sens->last_breakpoint <= 2 * PW_FUNCTIONAL_INSET * f->step;
+  sensitivity_keep (sens, i);
+  for (int p = 0; p < sens->unknowns.count && (before || after); p++)
+    if (sensitivity_jump_slope (sens, p, !before) != 0) sens->run_slope[i * sens->unknowns.count + p] = NAN;
 }
 
-/* Drops derivatives of extrema in the step of the run that passes a jump with the state at t, if those of the column jump there
- * from `before`: they do not exist. */
-static void sensitivity_drop (pw_sensitivity *x, double t, const double *before) {
-  for (int i = 0; i < x->outcomes.functionals; i++) {
-    const pw_functional *f = &x->outcomes.functional[i];
-    for (int at = i * x->unknowns.count; at < (i + 1) * x->unknowns.count && pw_is_extremum (f->type); at++)
-      if (fabs (f->t - t) <= f->step && fabs (x->slope[at] - before[at]) > SENSITIVITY_SAME * fabs (before[at]))
-        x->end_slope[at] = NAN;
+/* Marks derivatives of extrema as missing that do not exist: those in the step of the run that passes a jump with the
+ * state at t, if the derivative of the column jumps there from `before`. */
+static void sensitivity_drop_extrema (pw_sensitivity *sens, double t, const double *before) {
+  for (int i = 0; i < sens->outcomes.functionals; i++) {
+    const pw_functional *f = &sens->outcomes.functional[i];
+    for (int at = i * sens->unknowns.count; at < (i + 1) * sens->unknowns.count && pw_is_extremum (f->type); at++)
+      if (fabs (f->t - t) <= f->step && fabs (sens->slope[at] - before[at]) > SENSITIVITY_SAME * fabs (before[at]))
+        sens->run_slope[at] = NAN;
   }
 }
 
-/* Row of the table: time, then each output that has columns, with its derivatives. */
-static int sensitivity_row (pw_sensitivity *x, double t, pw_error *error) {
-  if (pw_grow (&x->row, (size_t)x->rows, &x->room, (size_t)x->columns * sizeof *x->row) != PW_OK)
+/* Adds a row to the table: time, then each output that has columns, with its derivatives. */
+static int sensitivity_add_row (pw_sensitivity *sens, double t, pw_error *error) {
+  if (pw_grow (&sens->row, (size_t)sens->rows, &sens->room, (size_t)sens->columns * sizeof *sens->row) != PW_OK)
     return pw_fail (error, PW_RESOURCE, "out of memory");
-  double *out = x->row + (size_t)x->rows++ * (size_t)x->columns;
+  double *out = sens->row + (size_t)sens->rows++ * (size_t)sens->columns;
   *out++ = t;
-  for (int i = 0; i < x->outcomes.functionals; i++)
-    if (x->outcomes.functional[i].type == PW_FINAL) x->outcomes.functional[i].value = x->value[i];
-  for (int o = 0; o < x->outcomes.outcomes; o++) {
-    if (!pw_sensitivity_in_table (x, o)) continue;
-    *out++ = pw_outcome_value (&x->outcomes, o, NULL);
-    for (int p = 0; p < x->unknowns.count; p++) *out++ = pw_sensitivity_derivative (x, o, p, x->slope);
+  for (int i = 0; i < sens->outcomes.functionals; i++)
+    if (sens->outcomes.functional[i].type == PW_FINAL) sens->outcomes.functional[i].value = sens->value[i];
+  for (int o = 0; o < sens->outcomes.outcomes; o++) {
+    if (!pw_sensitivity_in_table (sens, o)) continue;
+    *out++ = pw_outcome_value (&sens->outcomes, o, NULL);
+    for (int p = 0; p < sens->unknowns.count; p++) *out++ = pw_sensitivity_derivative (sens, o, p, sens->slope);
   }
   return PW_OK;
 }
@@ -171,185 +174,198 @@ static int sensitivity_row (pw_sensitivity *x, double t, pw_error *error) {
 /* ---- Along the run ---- */
 
 typedef struct {
-  double t, weight; /* of a node */
-  int extremum;     /* functional, or -1 */
-} sensitivity_event;
+  double t;
+  double weight; /* of a node */
+  int extremum;  /* the functional whose extremum it is; -1: it is a node of the integrals */
+} sensitivity_point;
 
-static int sensitivity_earlier (const void *a, const void *b) {
-  double x = ((const sensitivity_event *)a)->t, y = ((const sensitivity_event *)b)->t;
-  return (x > y) - (x < y);
+static int sensitivity_compare_times (const void *a, const void *b) {
+  double first = ((const sensitivity_point *)a)->t, second = ((const sensitivity_point *)b)->t;
+  return (first > second) - (first < second);
 }
 
-/* The nodes and extrema in (t0, t1]. */
-static int sensitivity_events (const pw_sensitivity *x, double t0, double t1, sensitivity_event *list) {
+/* Lists the times of nodes and extrema in (t0, t1] in order; returns their number. */
+static int sensitivity_points (const pw_sensitivity *sens, double t0, double t1, sensitivity_point *list) {
   int count = 0, integrals = 0;
-  for (int i = 0; i < x->outcomes.functionals; i++) {
-    const pw_functional *f = &x->outcomes.functional[i];
+  for (int i = 0; i < sens->outcomes.functionals; i++) {
+    const pw_functional *f = &sens->outcomes.functional[i];
     integrals |= pw_is_integral (f->type);
-    if (pw_is_extremum (f->type) && f->t > t0 && f->t <= t1) list[count++] = (sensitivity_event){ f->t, 0, i };
+    if (pw_is_extremum (f->type) && f->t > t0 && f->t <= t1) list[count++] = (sensitivity_point){ f->t, 0, i };
   }
   for (int k = 0; k < PW_GAUSS_NODES && integrals; k++)
     list[count++] =
-        (sensitivity_event){ (t0 + t1) / 2 + pw_gauss_x[k] * (t1 - t0) / 2, pw_gauss_w[k] * (t1 - t0) / 2, -1 };
-  qsort (list, (size_t)count, sizeof *list, sensitivity_earlier);
+        (sensitivity_point){ (t0 + t1) / 2 + pw_gauss_x[k] * (t1 - t0) / 2, pw_gauss_w[k] * (t1 - t0) / 2, -1 };
+  qsort (list, (size_t)count, sizeof *list, sensitivity_compare_times);
   return count;
 }
 
-/* From t0, where the columns are evaluated, to t1. */
-static int sensitivity_interval (pw_sensitivity *x, double t0, double t1, sensitivity_event *list, pw_error *error) {
-  int count = sensitivity_events (x, t0, t1, list), status = PW_OK;
+/* Advances from t0, where the columns have been evaluated, to t1. */
+static int sensitivity_interval (pw_sensitivity *sens, double t0, double t1, sensitivity_point *list, pw_error *error) {
+  int count = sensitivity_points (sens, t0, t1, list), status = PW_OK;
   for (int i = 0; i < count && status == PW_OK; i++) {
-    double t = list[i].t;
-    status = pw_sensitivity_at (x, t, error);
-    if (status != PW_OK) break;
-    if (list[i].extremum < 0)
-      sensitivity_add (x, list[i].weight);
-    else
-      sensitivity_keep_extremum (x, list[i].extremum, 0);
+    status = pw_sensitivity_at (sens, list[i].t, error);
+    if (status == PW_OK && list[i].extremum < 0) sensitivity_add_node (sens, list[i].weight);
+    if (status == PW_OK && list[i].extremum >= 0) sensitivity_keep_extremum (sens, list[i].extremum, INSIDE);
   }
-  return status == PW_OK ? pw_sensitivity_at (x, t1, error) : status;
+  return status == PW_OK ? pw_sensitivity_at (sens, t1, error) : status;
 }
 
-/* Past a breakpoint t_b, or a jump with the state, from just before it.  The integral of a column that jumps there from x- to x+
- * has the derivative (x- - x+) dt_b/dp.  A breakpoint at the end of the run is only reached. */
-static int sensitivity_jump (pw_sensitivity *x, double t0, double t, int with_state, pw_error *error) {
-  int passed = with_state || t > x->passed;
-  size_t F = (size_t)x->outcomes.functionals, P = (size_t)x->unknowns.count;
-  double *slope = x->before + F;
-  memcpy (x->before, x->value, F * sizeof *x->before);
-  memcpy (slope, x->slope, F * P * sizeof *slope);
-  int status = pw_sensitivity_at (x, t, error);
-  if (status == PW_OK && with_state) sensitivity_drop (x, t, slope);
-  for (int i = 0; i < x->outcomes.functionals && status == PW_OK; i++) {
-    const pw_functional *f = &x->outcomes.functional[i];
-    double jump = x->before[i] - x->value[i];
-    if (pw_is_extremum (f->type) && f->t > t0 && f->t <= t) sensitivity_keep_extremum (x, i, !passed);
+/* Advances from t0, just before a breakpoint or a jump with the state, to t, just after it at the time tb.  The
+ * integral of a column that jumps there from x- to x+ has the derivative (x- - x+) dtb/dp in addition.  A breakpoint
+ * at the end of the run is reached, but not passed. */
+static int sensitivity_jump (pw_sensitivity *sens, double t0, double t, int with_state, pw_error *error) {
+  int passed = with_state || t > sens->last_breakpoint;
+  const size_t F = (size_t)sens->outcomes.functionals, P = (size_t)sens->unknowns.count;
+  double *slope = sens->before + F; /* before the jump */
+  memcpy (sens->before, sens->value, F * sizeof *sens->before);
+  memcpy (slope, sens->slope, F * P * sizeof *slope);
+  int status = pw_sensitivity_at (sens, t, error);
+  if (status == PW_OK && with_state) sensitivity_drop_extrema (sens, t, slope);
+  for (int i = 0; i < sens->outcomes.functionals && status == PW_OK; i++) {
+    const pw_functional *f = &sens->outcomes.functional[i];
+    double jump = sens->before[i] - sens->value[i];
+    if (pw_is_extremum (f->type) && f->t > t0 && f->t <= t)
+      sensitivity_keep_extremum (sens, i, passed ? INSIDE : AT_BREAKPOINT);
     if (!pw_is_integral (f->type) || jump == 0) continue;
-    if (f->type != PW_INTEGRAL) jump /= x->unknowns.t_end;
-    if (f->type == PW_RMS) jump *= (x->before[i] + x->value[i]) / (2 * f->value);
-    for (int p = 0; p < x->unknowns.count; p++)
-      x->end_slope[i * x->unknowns.count + p] += jump * sensitivity_moves (x, p, passed);
+    if (f->type != PW_INTEGRAL) jump /= sens->unknowns.t_end;
+    if (f->type == PW_RMS) jump *= (sens->before[i] + sens->value[i]) / (2 * f->value);
+    for (int p = 0; p < sens->unknowns.count; p++)
+      sens->run_slope[i * sens->unknowns.count + p] += jump * sensitivity_jump_slope (sens, p, passed);
   }
   return status;
 }
 
-/* The end of the next interval, in which derivatives are smooth, unless it ends at a jump.  *jump: 0, or 1 at a breakpoint, 2
- * at a jump with the state.  NAN and the error. */
-static double sensitivity_next (pw_sensitivity *x, double t, double to, int *jump, pw_error *error) {
-  double slope, breakpoint = pw_variation_breakpoint (x->variation, 0, &slope);
-  *jump = 0;
-  if (!x->along) return fmin (to, breakpoint);
-  double next = fmin (fmin (to, breakpoint), t + SENSITIVITY_STEPS * pw_variation_step_size (x->variation));
-  double with_state = pw_variation_next_jump (x->variation, next, x->unknowns.t_end, error);
+typedef enum { NO_JUMP, JUMP_AT_BREAKPOINT, JUMP_WITH_STATE } sensitivity_jump_type;
+
+/* The end of the next interval from t towards `to`, in which derivatives are smooth: at most the next jump, whose
+ * type is stored.  NAN and the error if that is not found. */
+static double sensitivity_next (pw_sensitivity *sens, double t, double to, sensitivity_jump_type *jump,
+                                pw_error *error) {
+  double slope, breakpoint = pw_variation_breakpoint (sens->variation, 0, &slope);
+  *jump = NO_JUMP;
+  if (!sens->along_run) return fmin (to, breakpoint);
+  double next = fmin (fmin (to, breakpoint), t + SENSITIVITY_STEPS * pw_variation_step_size (sens->variation));
+  double with_state = pw_variation_next_jump (sens->variation, next, sens->unknowns.t_end, error);
   if (isnan (with_state)) return NAN;
-  *jump = with_state < next ? 2 : next == breakpoint;
+  *jump = with_state < next ? JUMP_WITH_STATE : next == breakpoint ? JUMP_AT_BREAKPOINT : NO_JUMP;
   return fmin (next, with_state);
 }
 
-static int sensitivity_advance (pw_sensitivity *x, double t, double to, sensitivity_event *list, pw_progress *progress,
-                                pw_error *error) {
-  const double near =
-      1e-9 * fmin (x->dt, x->unknowns.t_end / SENSITIVITY_PARTS); /* distance of states beside a jump from it */
-  int jump, status = PW_OK;
+/* Advances from t to `to`, in intervals without jumps and across these from just before to just after. */
+static int sensitivity_advance (pw_sensitivity *sens, double t, double to, sensitivity_point *list,
+                                pw_progress *progress, pw_error *error) {
+  const double aside = 1e-9 * fmin (sens->row_interval, sens->unknowns.t_end / SENSITIVITY_PARTS); /* of a jump [s] */
+  sensitivity_jump_type jump;
+  int status = PW_OK;
   while (t < to && status == PW_OK) {
-    double next = sensitivity_next (x, t, to, &jump, error);
+    double next = sensitivity_next (sens, t, to, &jump, error);
     if (isnan (next)) return error->status;
-    double end = jump ? next - fmin (near, next - t) : next;
-    if (jump == 1) x->passed = next, next = fmin (next + near, x->unknowns.t_end);
-    status = sensitivity_interval (x, t, end, list, error);
-    if (status == PW_OK && jump) status = sensitivity_jump (x, end, next, jump == 2, error);
+    double end = jump ? next - fmin (aside, next - t) : next;
+    if (jump == JUMP_AT_BREAKPOINT) sens->last_breakpoint = next, next = fmin (next + aside, sens->unknowns.t_end);
+    status = sensitivity_interval (sens, t, end, list, error);
+    if (status == PW_OK && jump) status = sensitivity_jump (sens, end, next, jump == JUMP_WITH_STATE, error);
     pw_progress_at (progress, t = next);
   }
   return status;
 }
 
-static int sensitivity_along (pw_sensitivity *x, sensitivity_event *list, pw_progress *progress, pw_error *error) {
+/* Advances to the end, with a row of the table at the beginning and after every interval of rows. */
+static int sensitivity_advance_to_end (pw_sensitivity *sens, sensitivity_point *list, pw_progress *progress,
+                                       pw_error *error) {
+  const double t_end = sens->unknowns.t_end;
   double t = 0, to;
-  x->passed = -INFINITY;
-  int status = pw_sensitivity_at (x, 0, error);
-  if (status == PW_OK) status = sensitivity_row (x, 0, error);
-  for (int i = 0; i < x->outcomes.functionals && status == PW_OK; i++)
-    if (pw_is_extremum (x->outcomes.functional[i].type)) sensitivity_keep (x, i);
-  for (long k = 1; t < x->unknowns.t_end && status == PW_OK; k++, t = to) {
-    to = (double)k * x->dt < x->unknowns.t_end * (1 - 1e-12) ? (double)k * x->dt : x->unknowns.t_end;
-    status = sensitivity_advance (x, t, to, list, progress, error);
-    if (status == PW_OK) status = sensitivity_row (x, to, error);
+  sens->last_breakpoint = -INFINITY;
+  int status = pw_sensitivity_at (sens, 0, error);
+  if (status == PW_OK) status = sensitivity_add_row (sens, 0, error);
+  for (int i = 0; i < sens->outcomes.functionals && status == PW_OK; i++)
+    if (pw_is_extremum (sens->outcomes.functional[i].type)) sensitivity_keep (sens, i);
+  for (long k = 1; t < t_end && status == PW_OK; k++, t = to) {
+    to = (double)k * sens->row_interval;
+    if (to >= t_end * (1 - 1e-12)) to = t_end; /* no row beside the last one due to round-off */
+    status = sensitivity_advance (sens, t, to, list, progress, error);
+    if (status == PW_OK) status = sensitivity_add_row (sens, to, error);
   }
-  for (int i = 0; i < x->outcomes.functionals; i++)
-    if (x->outcomes.functional[i].type == PW_FINAL) sensitivity_keep (x, i);
+  for (int i = 0; i < sens->outcomes.functionals; i++)
+    if (sens->outcomes.functional[i].type == PW_FINAL) sensitivity_keep (sens, i);
   return status;
 }
 
-static int sensitivity_integrate (pw_sensitivity *x, pw_progress *progress, pw_error *error) {
-  sensitivity_event *list = malloc (((size_t)x->outcomes.functionals + PW_GAUSS_NODES) * sizeof *list);
+static int sensitivity_integrate (pw_sensitivity *sens, pw_progress *progress, pw_error *error) {
+  sensitivity_point *list = malloc (((size_t)sens->outcomes.functionals + PW_GAUSS_NODES) * sizeof *list);
   if (list == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
-  int status = sensitivity_along (x, list, progress, error);
+  int status = sensitivity_advance_to_end (sens, list, progress, error);
   free (list);
-  x->stopped = status == PW_STOPPED;
-  return x->stopped ? PW_OK : status;
+  sens->stopped = status == PW_STOPPED;
+  return sens->stopped ? PW_OK : status;
 }
 
 /* ---- Opening ---- */
 
-int pw_sensitivity_open (pw_sensitivity *x, const double *at, pw_error *error) {
-  size_t P = (size_t)x->unknowns.count;
-  if (x->dt == 0) x->dt = x->unknowns.t_end / SENSITIVITY_PARTS;
-  x->limit.most = x->unknowns.limit;
-  x->unknowns.settings.stop = pw_limit_over;
-  x->unknowns.settings.stop_context = &x->limit;
-  x->at = malloc (P * sizeof *x->at);
-  x->near = calloc (4 * P, sizeof *x->near);
-  x->direction = calloc (P, sizeof *x->direction);
-  for (size_t p = 0; p < P && x->at; p++) x->at[p] = at ? at[p] : x->unknowns.list[p].value;
-  return x->at && x->near && x->direction ? PW_OK : pw_fail (error, PW_RESOURCE, "out of memory");
+int pw_sensitivity_open (pw_sensitivity *sens, const double *values, pw_error *error) {
+  size_t P = (size_t)sens->unknowns.count;
+  if (sens->row_interval == 0) sens->row_interval = sens->unknowns.t_end / SENSITIVITY_PARTS;
+  sens->limit.seconds = sens->unknowns.limit;
+  sens->unknowns.settings.stop = pw_limit_over;
+  sens->unknowns.settings.stop_context = &sens->limit;
+  sens->unknown_value = malloc (P * sizeof *sens->unknown_value);
+  sens->neighbours = calloc (4 * P, sizeof *sens->neighbours);
+  sens->direction = calloc (P, sizeof *sens->direction);
+  for (size_t p = 0; p < P && sens->unknown_value; p++)
+    sens->unknown_value[p] = values ? values[p] : sens->unknowns.list[p].value;
+  return sens->unknown_value && sens->neighbours && sens->direction ? PW_OK
+                                                                    : pw_fail (error, PW_RESOURCE, "out of memory");
 }
 
-static int sensitivity_arrays (pw_sensitivity *x, pw_error *error) {
-  size_t F = (size_t)x->outcomes.functionals, P = (size_t)x->unknowns.count;
-  x->value = calloc (3 * F + 5 * F * P + 1, sizeof *x->value);
-  x->columns = 1;
-  for (int o = 0; o < x->outcomes.outcomes; o++)
-    if (pw_sensitivity_in_table (x, o)) x->columns += 1 + x->unknowns.count;
-  if (x->value == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
-  x->slope = x->value + 2 * F, x->error = x->slope + F * P;
-  x->end_slope = x->error + F * P, x->end_error = x->end_slope + F * P;
-  x->before = x->end_error + F * P;
-  return PW_OK;
+static int sensitivity_arrays (pw_sensitivity *sens, pw_error *error) {
+  const size_t F = (size_t)sens->outcomes.functionals, P = (size_t)sens->unknowns.count;
+  const pw_array array[] = { { &sens->value, 2 * F },
+                             { &sens->slope, F * P },
+                             { &sens->slope_error, F * P },
+                             { &sens->run_slope, F * P },
+                             { &sens->run_slope_error, F * P },
+                             { &sens->before, F + F * P },
+                             { &sens->q, (size_t)pw_system_coordinates (sens->base.m.system) } };
+  sens->columns = 1;
+  for (int o = 0; o < sens->outcomes.outcomes; o++)
+    if (pw_sensitivity_in_table (sens, o)) sens->columns += 1 + sens->unknowns.count;
+  sens->memory = pw_alloc_arrays (array, sizeof array / sizeof *array);
+  return sens->memory ? PW_OK : pw_fail (error, PW_RESOURCE, "out of memory");
 }
 
-/* Work and losses need a run with the ledger. */
-static int sensitivity_ledger (pw_sensitivity *x, pw_error *error) {
-  if (!x->outcomes.ledger) return PW_OK;
-  x->unknowns.settings.ledger = 1;
-  pw_run_close (x->base.run);
-  x->base.run = pw_run_open (x->base.m.system, x->unknowns.method, &x->unknowns.settings, error);
-  return x->base.run ? PW_OK : error->status;
+/* Opens the run again with the ledger if outputs need it. */
+static int sensitivity_open_ledger (pw_sensitivity *sens, pw_error *error) {
+  if (!sens->outcomes.ledger) return PW_OK;
+  sens->unknowns.settings.ledger = 1;
+  pw_run_close (sens->base.run);
+  sens->base.run = pw_run_open (sens->base.m.system, sens->unknowns.method, &sens->unknowns.settings, error);
+  return sens->base.run ? PW_OK : error->status;
 }
 
-/* The values of extrema and integrals, and the times of extrema, from a run of its own. */
-static int sensitivity_functionals (pw_sensitivity *x, pw_error *error) {
-  for (int i = 0; i < x->outcomes.functionals; i++) x->along |= x->outcomes.functional[i].type != PW_FINAL;
-  return x->along ? pw_outcomes_run (&x->outcomes, x->unknowns.method, &x->unknowns.settings, x->unknowns.t_end, error)
-                  : PW_OK;
+/* Determines the values of extrema and integrals, and the times of extrema, by another run. */
+static int sensitivity_find_functionals (pw_sensitivity *sens, pw_error *error) {
+  for (int i = 0; i < sens->outcomes.functionals; i++) sens->along_run |= sens->outcomes.functional[i].type != PW_FINAL;
+  return sens->along_run ? pw_outcomes_run (&sens->outcomes, sens->unknowns.method, &sens->unknowns.settings,
+                                            sens->unknowns.t_end, error)
+                         : PW_OK;
 }
 
-/* The run of which samples are taken, where the derivatives' is ahead. */
-static int sensitivity_sampled (pw_sensitivity *x, pw_error *error) {
-  if (!pw_system_may_jump (x->base.m.system)) return PW_OK;
-  x->sampled = pw_run_open (x->base.m.system, x->unknowns.method, &x->unknowns.settings, error);
-  return x->sampled ? PW_OK : error->status;
+/* Opens the run of which samples are taken where base.run is ahead of the derivatives (pw_variation_advance). */
+static int sensitivity_open_sampled (pw_sensitivity *sens, pw_error *error) {
+  if (!pw_system_may_jump (sens->base.m.system)) return PW_OK;
+  sens->sampled = pw_run_open (sens->base.m.system, sens->unknowns.method, &sens->unknowns.settings, error);
+  return sens->sampled ? PW_OK : error->status;
 }
 
-/* Initial values can only change by themselves if the constraints permit it. */
-static int sensitivity_independent (const pw_sensitivity *x, pw_error *error) {
-  int n = pw_system_coordinates (x->base.m.system);
-  for (int p = 0; p < x->unknowns.count; p++) {
-    const pw_unknown *u = &x->unknowns.list[p];
-    const pw_direction *d = &x->direction[p];
+/* Refuses initial values that the constraints determine: making a neighbour consistent changes them back. */
+static int sensitivity_check_independence (const pw_sensitivity *sens, pw_error *error) {
+  int n = pw_system_coordinates (sens->base.m.system);
+  for (int p = 0; p < sens->unknowns.count; p++) {
+    const pw_unknown *u = &sens->unknowns.list[p];
+    const pw_direction *d = &sens->direction[p];
     if (u->state < 0) continue;
-    const pw_initial_report *s = pw_run_initial (d->neighbour[0]);
-    double value = u->state < n ? s->q[u->state] : s->v[u->state - n];
-    if (fabs (value - x->at[p] - pw_direction_offset (d, 0)) > 1e-2 * fabs (d->step))
+    const pw_initial_report *initial = pw_run_initial (d->neighbour[0]);
+    double value = u->state < n ? initial->q[u->state] : initial->v[u->state - n];
+    if (fabs (value - sens->unknown_value[p] - pw_direction_offset (d, 0)) > 0.01 * fabs (d->step))
       return pw_fail (
           error, PW_INPUT,
           "--by %s: it cannot change while the other initial values of --by and --start are kept: constraints "
@@ -359,44 +375,46 @@ static int sensitivity_independent (const pw_sensitivity *x, pw_error *error) {
   return PW_OK;
 }
 
-/* The run and its neighbours. */
-static int sensitivity_runs (pw_sensitivity *x, pw_error *error) {
+static int sensitivity_open_runs (pw_sensitivity *sens, pw_error *error) {
   int count = 0;
-  while (x->of[count]) count++;
-  int status = pw_unknown_run_open (&x->base, &x->unknowns, x->at, error);
-  if (status == PW_OK) status = pw_outcomes_open (&x->outcomes, x->base.m.system, "--of", x->of, count, error);
-  if (status == PW_OK) status = sensitivity_ledger (x, error);
-  if (status == PW_OK) status = pw_unknowns_directions (x->direction, &x->unknowns, x->at, &x->base, x->near, error);
-  for (int p = 0; p < x->unknowns.count; p++) x->direction[p].no_error = x->no_error;
-  return status == PW_OK && !x->no_error ? sensitivity_independent (x, error) : status;
+  while (sens->of[count]) count++;
+  int status = pw_unknown_run_open (&sens->base, &sens->unknowns, sens->unknown_value, error);
+  if (status == PW_OK) status = pw_outcomes_open (&sens->outcomes, sens->base.m.system, "--of", sens->of, count, error);
+  if (status == PW_OK) status = sensitivity_open_ledger (sens, error);
+  if (status == PW_OK)
+    status = pw_unknowns_directions (sens->direction, &sens->unknowns, sens->unknown_value, &sens->base,
+                                     sens->neighbours, error);
+  for (int p = 0; p < sens->unknowns.count; p++) sens->direction[p].no_error = sens->no_error;
+  return status == PW_OK && !sens->no_error ? sensitivity_check_independence (sens, error) : status;
 }
 
-int pw_sensitivity_start (pw_sensitivity *x, pw_error *error) {
-  int status = sensitivity_runs (x, error);
-  if (status == PW_OK) status = sensitivity_arrays (x, error);
-  if (status == PW_OK) status = sensitivity_sampled (x, error);
-  pw_limit_start (&x->limit);
+int pw_sensitivity_start (pw_sensitivity *sens, pw_error *error) {
+  int status = sensitivity_open_runs (sens, error);
+  if (status == PW_OK) status = sensitivity_arrays (sens, error);
+  if (status == PW_OK) status = sensitivity_open_sampled (sens, error);
+  pw_limit_start (&sens->limit);
   if (status != PW_OK) return status;
-  x->variation = pw_variation_open (x->base.run, x->direction, x->unknowns.count, x->outcomes.ledger, error);
-  return x->variation ? PW_OK : error->status;
+  sens->variation =
+      pw_variation_open (sens->base.run, sens->direction, sens->unknowns.count, sens->outcomes.ledger, error);
+  return sens->variation ? PW_OK : error->status;
 }
 
-int pw_sensitivity_compute (pw_sensitivity *x, pw_progress *progress, pw_error *error) {
-  int status = pw_sensitivity_start (x, error);
-  if (status == PW_OK) status = sensitivity_functionals (x, error);
-  return status == PW_OK ? sensitivity_integrate (x, progress, error) : status;
+int pw_sensitivity_compute (pw_sensitivity *sens, pw_progress *progress, pw_error *error) {
+  int status = pw_sensitivity_start (sens, error);
+  if (status == PW_OK) status = sensitivity_find_functionals (sens, error);
+  return status == PW_OK ? sensitivity_integrate (sens, progress, error) : status;
 }
 
-void pw_sensitivity_close (pw_sensitivity *x) {
-  pw_variation_close (x->variation);
-  pw_run_close (x->sampled);
-  if (x->outcomes.system) pw_outcomes_close (&x->outcomes);
-  for (int i = 0; x->near && i < 4 * x->unknowns.count; i++) pw_unknown_run_close (&x->near[i]);
-  pw_unknown_run_close (&x->base);
-  free (x->near);
-  free (x->direction);
-  free (x->at);
-  free (x->value);
-  free (x->loose);
-  free (x->row);
+void pw_sensitivity_close (pw_sensitivity *sens) {
+  pw_variation_close (sens->variation);
+  pw_run_close (sens->sampled);
+  if (sens->outcomes.system) pw_outcomes_close (&sens->outcomes);
+  for (int i = 0; sens->neighbours && i < 4 * sens->unknowns.count; i++) pw_unknown_run_close (&sens->neighbours[i]);
+  pw_unknown_run_close (&sens->base);
+  free (sens->neighbours);
+  free (sens->direction);
+  free (sens->unknown_value);
+  free (sens->memory);
+  free (sens->loose);
+  free (sens->row);
 }

@@ -1,10 +1,9 @@
-/* States in options and reports of analyses. */
+/* States in options and reports of `linearise`, `steady` and `periodic`. */
 #include "states.h"
-#include <math.h>
 #include <string.h>
 #include "print_table.h"
 
-enum { STATES_BODIES = 20 }; /* printed */
+enum { STATES_BODIES = 20 }; /* printed, at most */
 
 int pw_hold_add (const pw_system *s, const char *option, const char *text, const char *name, double value,
                  pw_initial_value *hold, int *holds, pw_error *error) {
@@ -17,20 +16,20 @@ int pw_hold_add (const pw_system *s, const char *option, const char *text, const
   return PW_OK;
 }
 
-int pw_hold_read (const pw_system *s, const char *option, const char *text, pw_initial_value *hold, int *holds,
-                  pw_error *error) {
-  char name[200];
-  const char *equals = strchr (text, '=');
-  double value;
-  if (equals == NULL || equals == text || (size_t)(equals - text) >= sizeof name)
-    return pw_fail (error, PW_INPUT, "%s %s: expected STATE=VALUE", option, text);
-  snprintf (name, sizeof name, "%.*s", (int)(equals - text), text);
-  if (pw_read_expression (equals + 1, &value) != PW_OK || !isfinite (value))
-    return pw_fail (error, PW_INPUT, "%s %s: \"%s\" is not a number", option, text, equals + 1);
-  return pw_hold_add (s, option, text, name, value, hold, holds, error);
+int pw_hold_read (const pw_system *s, const char **texts, pw_initial_value *hold, int *holds, pw_error *error) {
+  int status = PW_OK;
+  for (; status == PW_OK && texts && *texts; texts++) {
+    char name[PW_ASSIGNED_NAME];
+    double value;
+    status = pw_cli_assignment ("--hold", *texts, "STATE=VALUE", name, &value, error);
+    if (status == PW_OK && !isfinite (value))
+      status = pw_fail (error, PW_INPUT, "--hold %s: the value is not finite", *texts);
+    if (status == PW_OK) status = pw_hold_add (s, "--hold", *texts, name, value, hold, holds, error);
+  }
+  return status;
 }
 
-void pw_states_print (const pw_system *s, const double *q, const double *v, int digits, double small) {
+void pw_states_print (const pw_system *s, const double *q, const double *v, int digits, double smallest) {
   static const char *const head[] = { "", "x [m]", "y [m]", "phi [rad]", "vx [m/s]", "vy [m/s]", "omega [rad/s]" };
   int bodies = pw_system_bodies (s);
   for (pw_table t = { 0 }; pw_table_pass (&t);) {
@@ -38,10 +37,8 @@ void pw_states_print (const pw_system *s, const double *q, const double *v, int 
     pw_row_end (&t);
     for (int b = 0; b < bodies && b < STATES_BODIES; b++) {
       pw_cell (&t, -12, pw_system_body_name (s, b));
-      for (int k = 0; k < 6; k++) {
-        double value = (k < 3 ? q : v)[3 * b + k % 3];
-        pw_cell_number (&t, 12, fabs (value) < small ? 0 : value, digits);
-      }
+      for (int k = 0; k < 6; k++)
+        pw_cell_number (&t, 12, pw_rounded ((k < 3 ? q : v)[3 * b + k % 3], smallest), digits);
       pw_row_end (&t);
     }
   }
@@ -63,10 +60,20 @@ void pw_numbers_json (pw_json *j, const char *key, const double *value, int coun
   pw_json_close (j, ']');
 }
 
-void pw_states_head (const pw_system *s, pw_text *t) {
+void pw_states_header (const pw_system *s, pw_text *t) {
   char name[300];
   for (int i = 0; i < 2 * pw_system_coordinates (s); i++)
     pw_text_name (t, pw_system_state_name (s, i, name, sizeof name), pw_system_state_unit (s, i));
+}
+
+void pw_complex_header (pw_text *t, int most, const char *unit) {
+  char name[32];
+  for (int i = 0; i < 2 * most; i++)
+    snprintf (name, sizeof name, "%s%d", i % 2 ? "im" : "re", i / 2 + 1), pw_text_name (t, name, unit);
+}
+
+void pw_complex_cells (pw_text *t, const double *re, const double *im, int count, int most) {
+  for (int i = 0; i < 2 * most; i++) pw_text_number (t, i / 2 < count ? (i % 2 ? im : re)[i / 2] : NAN);
 }
 
 const char *pw_states_symmetries (int count, char text[40]) {

@@ -1,4 +1,4 @@
-/* The result of `pinwheel steady`, and its reports. */
+/* The command `pinwheel steady`, its result, and the reports of that (steady_report.c). */
 #ifndef PW_STEADY_REPORT_H
 #define PW_STEADY_REPORT_H
 
@@ -7,11 +7,11 @@
 
 /* A steady motion found, or a point of a branch. */
 typedef struct {
-  int branch;              /* from 1; without --vary its number */
-  int attempt;             /* of pw_steady_solve: 0 and 1 begin at the initial state */
-  pw_steady_motion motion; /* its arrays are those of `state` */
-  pw_linear linear;        /* twist, unknowns and eigenvalues of it */
-  double *state;           /* q, v; then re, im, rigid */
+  int branch;              /* number of its branch, from 1; without --vary the number of the motion */
+  int attempt;             /* number of the attempt of pw_steady_solve that found it */
+  pw_steady_motion motion; /* its arrays are in `state` */
+  pw_linear linear;        /* its linearisation: twist, unknowns and eigenvalues alone */
+  double *state;           /* q, v; then re, im, rigid of the linearisation */
   char advice[200];        /* options that select it within its family, " --hold NAME=VALUE..." */
 } pw_steady_point;
 
@@ -23,22 +23,23 @@ typedef struct {
   pw_cli_model m;
   pw_files files;
   pw_limit limit;
-  pw_steady_settings set;
-  pw_initial_value hold[PW_HOLDS]; /* set.holds */
+  pw_steady_settings settings;
+  pw_initial_value hold[PW_HOLDS]; /* settings.holds values */
   pw_vary vary;
-  int attempts; /* random ones at each end */
-  pw_steady *steady;
+  int random_attempts; /* in each search: those that begin at random states */
+  pw_steady *search;
   pw_steady_point *point;
   int points;
   size_t room;
-  char (*end)[PW_STEADY_REASON]; /* branches: why it ended; "" at the end of the range */
+  char (*end)[PW_STEADY_REASON]; /* why each branch ended; "" at the end of the range */
   int branches;
-  double nearest[2];     /* smallest residual without solution: from the initial state, from random ones */
-  int changing, stopped; /* motions of equations that change; 1: by Ctrl-C or --limit */
-} pw_steady_cli;
+  double nearest[2]; /* smallest residual without solution: from the initial state, from random ones */
+  int changing;      /* solutions that are not steady, as the equations change with time or along the motion */
+  int stopped;       /* 1: by Ctrl-C or --limit */
+} pw_steady_command;
 
-void pw_steady_print (const pw_steady_cli *x);
-/* Writes everything as JSON, as a table, and with --vary as a figure, into the folder.  A status. */
-int pw_steady_write (const pw_steady_cli *x, pw_error *error);
+void pw_steady_print (const pw_steady_command *cmd);
+/* Writes everything as JSON and as a table, and with --vary a figure, into the folder.  Returns a status. */
+int pw_steady_write (const pw_steady_command *cmd, pw_error *error);
 
 #endif

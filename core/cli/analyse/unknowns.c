@@ -1,4 +1,4 @@
-/* Parameters and initial values that analyses vary. */
+/* Unknowns of analyses: finds and reads them, and compiles models and opens runs with given values of them. */
 #include <gsl/gsl_qrng.h>
 #include <gsl/gsl_rng.h>
 #include <math.h>
@@ -15,10 +15,10 @@ int pw_unknown_find (pw_unknown *u, const pw_cli_model *m, const char *name, pw_
     snprintf (u->unit, sizeof u->unit, "%s", u->parameter->unit);
     return PW_OK;
   }
-  if (strchr (name, '.') == NULL) { /* fails with the nearest name */
-    pw_model *other = pw_file_model (m->file, error);
-    if (other) pw_model_set (other, name, 0, error);
-    pw_model_free (other);
+  if (strchr (name, '.') == NULL) {
+    pw_model *copy = pw_file_model (m->file, error); /* of m->model before it was built: fails with the nearest name */
+    if (copy) pw_model_set (copy, name, 0, error);
+    pw_model_free (copy);
     return error->status;
   }
   u->state = pw_system_find_state (m->system, name, error);
@@ -42,8 +42,8 @@ int pw_unknowns_open (pw_unknowns *u, const pw_cli_line *line, const pw_cli_mode
   if (status == PW_OK) status = pw_cli_specialise (line->specialise, &u->when, error);
   if (status != PW_OK) return status;
   u->settings.stop = NULL;
-  u->limit = limit.most;
-  pw_cli_unused (u->method, line);
+  u->limit = limit.seconds;
+  pw_cli_report_unused (u->method, line);
   return PW_OK;
 }
 
@@ -60,41 +60,40 @@ void pw_unknowns_close (pw_unknowns *u) {
 
 /* ---- Unknowns of --free ---- */
 
-/* "LOW:HIGH" */
 static int free_bounds (pw_unknown *u, const char *text, pw_error *error) {
-  double end[2];
-  if (pw_cli_range (text, &end[0], &end[1]) != PW_OK || !(end[0] < end[1]))
+  double bounds[2];
+  if (pw_cli_range (text, &bounds[0], &bounds[1]) != PW_OK || !(bounds[0] < bounds[1]))
     return pw_fail (error, PW_INPUT, "--free %s=...: expected bounds LOW:HIGH, two numbers, the first one smaller",
                     u->name);
   for (int i = 0; i < 2 && u->parameter; i++) {
-    const char *expected = pw_domain_check (u->parameter->domain, end[i]);
+    const char *expected = pw_domain_check (u->parameter->domain, bounds[i]);
     if (*expected)
       return pw_fail (error, PW_INPUT, "--free %s: the %s bound is %g, expected %s", u->name, i ? "upper" : "lower",
-                      end[i], expected);
+                      bounds[i], expected);
   }
-  u->low = end[0], u->high = end[1], u->given = 1;
+  u->low = bounds[0], u->high = bounds[1], u->has_bounds = 1;
   if (u->low <= u->value && u->value <= u->high) return PW_OK;
   return pw_fail (error, PW_INPUT, "--free %s: its initial value %.9g is not between %.9g and %.9g; set it by %s",
                   u->name, u->value, u->low, u->high, u->parameter ? "--set" : "--start");
 }
 
-/* "NAME" or "NAME=LOW:HIGH" */
+/* Adds the unknown of "NAME" or "NAME=LOW:HIGH". */
 static int free_add (pw_unknowns *u, const char *text, pw_error *error) {
   const size_t size = strcspn (text, "=");
-  pw_unknown *x = u->list + u->count;
-  char name[sizeof x->name];
+  pw_unknown *added = u->list + u->count;
+  char name[sizeof added->name];
   snprintf (name, sizeof name, "%.*s", (int)size, text);
   for (int i = 0; i < u->count; i++)
     if (strcmp (u->list[i].name, name) == 0) return pw_fail (error, PW_INPUT, "--free %s is given twice", name);
   u->count++;
-  int status = pw_unknown_find (x, u->m, name, error);
-  pw_domain domain = x->parameter ? x->parameter->domain : PW_REAL;
-  x->low = domain == PW_REAL ? -INFINITY : 0;
-  x->high = domain == PW_FRACTION ? 1 : INFINITY;
+  int status = pw_unknown_find (added, u->m, name, error);
+  pw_domain domain = added->parameter ? added->parameter->domain : PW_REAL;
+  added->low = domain == PW_REAL ? -INFINITY : 0;
+  added->high = domain == PW_FRACTION ? 1 : INFINITY;
   if (domain == PW_COUNT)
     status = pw_fail (error, PW_INPUT, "--free %s: it is a count, and only continuous parameters can be free", name);
-  if (status == PW_OK && text[size]) status = free_bounds (x, text + size + 1, error);
-  x->scale = x->given ? x->high - x->low : x->value != 0 ? fabs (x->value) : 1;
+  if (status == PW_OK && text[size]) status = free_bounds (added, text + size + 1, error);
+  added->scale = added->has_bounds ? added->high - added->low : added->value != 0 ? fabs (added->value) : 1;
   return status;
 }
 
@@ -111,21 +110,22 @@ int pw_unknowns_read (pw_unknowns *u, const char **list, pw_error *error) {
 
 /* ---- Runs ---- */
 
-/* Sets the parameters, or the initial values. */
-static int unknown_set (pw_model *m, const pw_unknowns *u, const double *x, int initial, pw_error *error) {
+typedef int unknown_setter (pw_model *m, const char *name, double value, pw_error *error);
+
+/* Sets the unknowns that are parameters, by pw_model_set, or those that are states, by pw_model_set_initial. */
+static int unknown_set (pw_model *m, const pw_unknowns *u, const double *x, unknown_setter *set, pw_error *error) {
   int status = PW_OK;
   for (int i = 0; i < u->count && status == PW_OK; i++)
-    if ((u->list[i].parameter == NULL) == initial)
-      status = (initial ? pw_model_set_initial : pw_model_set) (m, u->list[i].name, x[i], error);
+    if ((u->list[i].parameter != NULL) == (set == pw_model_set)) status = set (m, u->list[i].name, x[i], error);
   return status;
 }
 
 int pw_unknowns_system (pw_cli_model *m, const pw_unknowns *u, const double *x, pw_error *error) {
   *m = (pw_cli_model){ .model = pw_file_model (u->m->file, error) };
   int status = m->model ? pw_cli_apply (m->model, "--set", u->line->sets, pw_model_set, error) : error->status;
-  if (status == PW_OK) status = unknown_set (m->model, u, x, 0, error);
+  if (status == PW_OK) status = unknown_set (m->model, u, x, pw_model_set, error);
   if (status == PW_OK) status = pw_cli_apply (m->model, "--start", u->line->starts, pw_model_set_initial, error);
-  if (status == PW_OK) status = unknown_set (m->model, u, x, 1, error);
+  if (status == PW_OK) status = unknown_set (m->model, u, x, pw_model_set_initial, error);
   if (status == PW_OK) status = pw_model_build (m->model, error);
   if (status == PW_OK) m->system = pw_system_compile (m->model, error);
   return m->system ? PW_OK : error->status;
@@ -139,8 +139,8 @@ int pw_unknown_run_open (pw_unknown_run *to, const pw_unknowns *u, const double 
 }
 
 int pw_unknown_run_prepare (pw_unknown_run *to, const pw_unknowns *u, const double *x, pw_error *error) {
-  const pw_specialised *code = pw_cli_engine_code (&u->engine);
-  *to = (pw_unknown_run){ .settings = u->settings, .limit = { .most = u->limit } };
+  const pw_specialised *code = pw_scene_code_table (u->engine.code);
+  *to = (pw_unknown_run){ .settings = u->settings, .limit = { .seconds = u->limit } };
   if (pw_unknowns_system (&to->m, u, x, error) != PW_OK) return error->status;
   to->settings.stop = pw_limit_over;
   to->settings.stop_context = &to->limit;
@@ -161,26 +161,26 @@ void pw_unknowns_report (const pw_unknowns *u, const double *x) {
   pw_unknown_run r;
   if (pw_unknown_run_prepare (&r, u, x, &(pw_error){ 0 }) == PW_OK)
     r.run = pw_run_open (r.m.system, u->method, &r.settings, NULL);
-  if (r.run && pw_cli_change (r.run, r.m.system, text) > 0)
+  if (r.run && pw_cli_largest_change (r.run, r.m.system, text) > 0)
     pw_cli_say ("pinwheel: the constraints changed given initial values of this result, at worst %s\n", text);
   pw_unknown_run_close (&r);
 }
 
 /* ---- Directions ---- */
 
-/* 1e-5 of the number's size: the error of extrapolated differences is then about 1e-10, mostly round-off.  It is at
- * least 0.1 for angles, the scene's unit for initial values, 1e-3 of its scale for an unknown of a search; that of a parameter
- * that is 0 is its default, else 1. */
+/* PW_UNKNOWN_STEP of the size of the number.  That is at least 0.1 for angles, the unit of the scene for initial
+ * values, 1e-3 of its scale for an unknown of a search; of a parameter that is 0 it is the default value, else 1. */
 static double unknown_step (const pw_unknown *u, double value, const pw_run *r) {
   if (u->step > 0) return u->step;
   double size = fabs (value), length = pw_run_scale (r)->length, time = pw_run_scale (r)->time;
   if (strcmp (u->unit, "rad") == 0) size = fmax (size, 0.1);
   if (u->state >= 0) size = fmax (size, (*u->unit == 'm' ? length : 1) / (strchr (u->unit, 's') ? time : 1));
   if (size == 0 && u->parameter) size = fabs (u->parameter->value);
-  return 1e-5 * fmax (size > 0 ? size : 1, 1e-3 * u->scale);
+  return PW_UNKNOWN_STEP * fmax (size > 0 ? size : 1, 1e-3 * u->scale);
 }
 
-/* Keeps the neighbours within the domain: a positive parameter gets a smaller step, at a closed end they are on one side. */
+/* Keeps the neighbours within the domain of a parameter: a positive one gets a smaller step; at 0 or 1, which may be
+ * reached, they are on one side. */
 static void unknown_stay_inside (const pw_unknown *u, double value, pw_direction *d) {
   pw_domain domain = u->parameter ? u->parameter->domain : PW_REAL;
   if (domain == PW_POSITIVE) d->step = fmin (d->step, value / 4);
@@ -196,43 +196,43 @@ static int unknown_same_size (const pw_system *a, const pw_system *b) {
 }
 
 static int unknown_direction (pw_direction *d, const pw_unknowns *u, int i, double *x, pw_unknown_run *run,
-                              pw_unknown_run *near, pw_error *error) {
+                              pw_unknown_run *neighbours, pw_error *error) {
   double value = x[i];
   int status = PW_OK;
   *d = (pw_direction){ .step = unknown_step (&u->list[i], value, run->run) };
   unknown_stay_inside (&u->list[i], value, d);
   for (int k = 0; k < 4 && status == PW_OK; k++) {
     x[i] = value + pw_direction_offset (d, k);
-    status = pw_unknown_run_open (near + k, u, x, error);
-    if (status == PW_OK && !unknown_same_size (run->m.system, near[k].m.system))
+    status = pw_unknown_run_open (neighbours + k, u, x, error);
+    if (status == PW_OK && !unknown_same_size (run->m.system, neighbours[k].m.system))
       status = pw_fail (error, PW_INPUT,
                         "%s changes the number of bodies or elements: derivatives with respect to it do not exist",
                         u->list[i].name);
-    d->neighbour[k] = near[k].run;
+    d->neighbour[k] = neighbours[k].run;
   }
   x[i] = value;
   return status;
 }
 
-int pw_unknowns_directions (pw_direction *d, const pw_unknowns *u, double *x, pw_unknown_run *run, pw_unknown_run *near,
-                            pw_error *error) {
-  pw_unknowns plain = *u;
+int pw_unknowns_directions (pw_direction *d, const pw_unknowns *u, double *x, pw_unknown_run *run,
+                            pw_unknown_run *neighbours, pw_error *error) {
+  pw_unknowns general = *u; /* without specialised code */
   int status = PW_OK;
-  plain.settings.specialised = NULL;
+  general.settings.specialised = NULL;
   for (int i = 0; i < u->count && status == PW_OK; i++)
-    status = unknown_direction (d + i, &plain, i, x, run, near + 4 * i, error);
+    status = unknown_direction (d + i, &general, i, x, run, neighbours + 4 * i, error);
   return status;
 }
 
 /* ---- Starts and results of searches ---- */
 
-/* The value at this part, from 0 to 1, of the range of starts. */
-static double unknowns_between (const pw_unknown *k, double part) {
-  double x = k->given ? k->low + part * k->scale : k->value + (2 * part - 1) * k->scale;
-  return fmin (fmax (x, k->low), k->high);
+/* The value at a fraction, from 0 to 1, of the range in which searches begin. */
+static double unknowns_between (const pw_unknown *u, double fraction) {
+  double value = u->has_bounds ? u->low + fraction * u->scale : u->value + (2 * fraction - 1) * u->scale;
+  return fmin (fmax (value, u->low), u->high);
 }
 
-/* A row per start after the first one. */
+/* Fills a row for each point after the first one. */
 static int unknowns_sobol (const pw_unknowns *u, int count, double seed, double *out) {
   double point[PW_UNKNOWNS_STARTED], shift[PW_UNKNOWNS_STARTED];
   gsl_rng *random = gsl_rng_alloc (gsl_rng_mt19937);

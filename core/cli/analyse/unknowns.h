@@ -1,4 +1,4 @@
-/* Numbers that analyses vary, parameters and initial values, and runs with values of them. */
+/* Unknowns: parameters and initial values that analyses and searches vary, and runs with given values of them. */
 #ifndef PW_UNKNOWNS_H
 #define PW_UNKNOWNS_H
 
@@ -9,20 +9,24 @@ typedef struct {
   char name[300];                /* "length", "body.vx" */
   const pw_parameter *parameter; /* NULL: the initial value of a state */
   int state;                     /* its number; -1 for a parameter */
-  double value;                  /* at the beginning */
+  double value;                  /* in the model of the command line */
   char unit[16];
-  double step, last_step; /* of differences; 0: the usual one; that of the computation before */
+  double step;      /* of differences; 0: PW_UNKNOWN_STEP times the size of the unknown */
+  double last_step; /* of the differences computed last */
+  double size;      /* of the number, as the first step has it; 0: not computed yet */
   /* for searches: */
   double low, high; /* bounds; infinite without one */
   double scale;     /* size of typical changes: the distance of the bounds, else |value|, else 1 */
-  int given;        /* 1: the bounds are the user's */
+  int has_bounds;   /* 1: the bounds are those of --free, which are finite */
 } pw_unknown;
 
-/* Finds the number of this name in an open model, and its value there.  Errors: PW_INPUT for an unknown name, with the
- * nearest one. */
+#define PW_UNKNOWN_STEP 1e-5 /* leaves an error of about 1e-10 in extrapolated differences, mostly round-off */
+
+/* Finds the parameter or state of this name in an open model, and its value there.  Errors: PW_INPUT for an unknown
+ * name, with the nearest one. */
 int pw_unknown_find (pw_unknown *u, const pw_cli_model *m, const char *name, pw_error *error);
 
-/* Unknowns of a command line's model, and the options of runs with values x of them. */
+/* Unknowns of the model of a command line, and the options of runs with values x of them. */
 typedef struct {
   const pw_cli_line *line;
   const pw_cli_model *m;
@@ -31,18 +35,18 @@ typedef struct {
   const char *method;
   pw_settings settings; /* except stop, initial, specialised */
   double t_end;
-  double limit;       /* of each run's processor time [s] */
+  double limit;       /* of the processor time of each run [s] */
   pw_specialise when; /* of --specialise */
   pw_cli_engine engine;
 } pw_unknowns;
 
-/* Reads the options, without unknowns.  The line and the open model must outlive it.  Close it in every case. */
+/* Reads the options; there are no unknowns yet.  Line and model must outlive it.  Close it in every case. */
 int pw_unknowns_open (pw_unknowns *u, const pw_cli_line *line, const pw_cli_model *m, pw_error *error);
 void pw_unknowns_close (pw_unknowns *u);
 /* Reads unknowns from a list of "NAME" or "NAME=LOW:HIGH" of --free, ended by NULL.  PW_INPUT for an unknown name, a
  * count, bounds without the initial value between them or outside the domain. */
 int pw_unknowns_read (pw_unknowns *u, const char **list, pw_error *error);
-/* Chooses the engine for about `runs` runs. */
+/* Chooses the engine for this estimated number of runs. */
 void pw_unknowns_engine (pw_unknowns *u, double runs);
 
 /* The model with values of the unknowns, compiled.  PW_INPUT if it refuses them; PW_RESOURCE.  Close it by
@@ -63,21 +67,23 @@ int pw_unknown_run_open (pw_unknown_run *to, const pw_unknowns *u, const double 
 int pw_unknown_run_prepare (pw_unknown_run *to, const pw_unknowns *u, const double *x, pw_error *error);
 void pw_unknown_run_close (pw_unknown_run *x);
 
-/* Directions of the run along all unknowns, with their neighbours; x is used for these and restored.  near: 4
- * runs of each unknown, zero before, which are opened without specialised code.  Close all of them, also after an error. */
-int pw_unknowns_directions (pw_direction *d, const pw_unknowns *u, double *x, pw_unknown_run *run, pw_unknown_run *near,
-                            pw_error *error);
+/* Directions of the derivatives of a run with respect to all unknowns at the values x, which are changed and restored.
+ * neighbours: 4 runs of each unknown, zero-initialised, which are opened without specialised code.  Close all of them,
+ * also after an error. */
+int pw_unknowns_directions (pw_direction *d, const pw_unknowns *u, double *x, pw_unknown_run *run,
+                            pw_unknown_run *neighbours, pw_error *error);
 
-/* Points where searches begin, `count` x unknowns: the values at the beginning, then Sobol's sequence between the
- * user's bounds, otherwise within a scale of the values, shifted modulo 1 by random numbers from the seed.  Several starts: at most
- * PW_UNKNOWNS_STARTED unknowns, the limit of the sequence.  NULL if out of memory; free it. */
+/* Points where searches begin, `count` x unknowns: the unknowns' values; then points of Sobol's sequence, shifted
+ * modulo 1 by random numbers from the seed, between the bounds of the user, else within `scale` of the values.  With
+ * a count above 1 there are at most PW_UNKNOWNS_STARTED unknowns, the limit of the sequence.  NULL if out of memory;
+ * free it. */
 enum { PW_UNKNOWNS_STARTED = 40 };
 double *pw_unknowns_starts (const pw_unknowns *u, int count, double seed);
 
-/* A notice if the constraints change given initial values at these values of the unknowns. */
+/* Prints a notice if, with these values, making the initial state consistent changes given initial values. */
 void pw_unknowns_report (const pw_unknowns *u, const double *x);
 
-/* Options that set the values, "--set a=1 --start frame.vx=2".  0 if the text is too short. */
+/* Writes the options that set the values, "--set a=1 --start frame.vx=2", to a text.  0 if its size is too small. */
 int pw_unknowns_options (const pw_unknowns *u, const double *x, char *text, size_t size);
 
 #endif

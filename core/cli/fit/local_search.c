@@ -1,4 +1,4 @@
-/* Local searches of `pinwheel optimise`, by NLopt, with derivatives of smooth outputs. */
+/* Local searches of `pinwheel optimise`, by NLopt, with derivatives of differentiable outputs. */
 #define _POSIX_C_SOURCE 200809L
 #include <math.h>
 #include <nlopt.h>
@@ -7,257 +7,300 @@
 #include "optimise.h"
 #include "util.h"
 
-#define SEARCH_FIRST 0.1    /* first steps, relative to the scales of the unknowns */
-#define SEARCH_ROUGH 1e-3   /* last ones */
-#define SEARCH_ALLOWED 1e-6 /* violation of a constraint, relative to its bound */
-#define SEARCH_GAIN 1e-9    /* least improvement for another repetition, relative to the value */
+#define SEARCH_FIRST 0.1    /* first steps from a start, in scaled unknowns */
+#define SEARCH_ROUGH 1e-3   /* last steps, with which refinements begin */
+#define SEARCH_ALLOWED 1e-6 /* permitted violation of a constraint, relative to its bound */
+#define SEARCH_GAIN 1e-9    /* least improvement of the objective for a restart, relative to its value */
 
-/* Fewest unknowns for derivatives, which cost as much as several runs; repetitions of a search. */
-enum { SEARCH_SLOPES = 3, SEARCH_REPEATS = 8 };
+enum {
+  SEARCH_SLOPES = 3,  /* fewest unknowns for derivatives, which cost as much as several runs */
+  SEARCH_RESTARTS = 7 /* of SLSQP, at most */
+};
 
 /* ---- Runs ---- */
 
 typedef struct {
-  pw_optimise *x;
-  pw_search_start *s;
-  nlopt_opt opt;
-  double *u, *at, *value; /* the last run: scaled unknowns, unknowns, outputs */
-  double *allowed;        /* outputs: excess of the constraints of which the search does not take notice */
-  double *slope;          /* outputs x unknowns: derivatives with respect to scaled unknowns; NULL: without */
-  int known, sloped;      /* 1: there was a run; with derivatives */
-  int failed;             /* 1: the last run failed */
-  int refused;            /* 1: derivatives could not be computed, though the run succeeded */
-  double least, most;     /* objectives of the runs that succeeded */
-} search;
+  pw_optimise *problem;
+  pw_search *search;
+  nlopt_opt optimiser;
+  double *scaled, *unknown, *output; /* of the last run; the unknowns scaled and not */
+  double *allowed;                   /* outputs: violation that NLopt permits */
+  double *slope;             /* outputs x unknowns: derivatives by the scaled unknowns; NULL: without derivatives */
+  int evaluated, has_slopes; /* 1: there was a run; with derivatives */
+  int failed;                /* 1: the last run failed */
+  int slopes_failed;         /* 1: derivatives could not be computed, though the run succeeded */
+  double least, most;        /* sign x objective in the runs that succeeded */
+} local_search;
 
-/* The value of an unknown: u is from 0 to 1 between the user's bounds, otherwise in units of its scale. */
-static double search_unknown (const pw_unknown *k, double u) {
-  return fmin (fmax (k->given ? k->low + u * k->scale : u * k->scale, k->low), k->high);
+/* The value of an unknown: between the user's bounds `scaled` is from 0 to 1, otherwise it is in units of the scale. */
+static double search_unknown (const pw_unknown *unknown, double scaled) {
+  double value = (unknown->has_bounds ? unknown->low : 0) + scaled * unknown->scale;
+  return fmin (fmax (value, unknown->low), unknown->high);
 }
 
-static double search_scaled (const pw_unknown *k, double x) {
-  return k->given ? (x - k->low) / k->scale : x / k->scale;
+static double search_scaled (const pw_unknown *unknown, double value) {
+  return (value - (unknown->has_bounds ? unknown->low : 0)) / unknown->scale;
 }
 
-/* A status; outputs that are not finite count as failed. */
-static int search_run (const search *p, pw_error *error) {
-  const pw_unknowns *u = &p->x->unknowns;
-  pw_outcomes o = { .system = NULL };
-  pw_unknown_run r;
+/* A run; outputs that are not finite count as failed. */
+static int search_run (const local_search *local, pw_error *error) {
+  const pw_optimise *problem = local->problem;
+  const pw_unknowns *unknowns = &problem->unknowns;
+  pw_outcomes outcomes = { .system = NULL };
+  pw_unknown_run run;
   char number[32];
-  int status = pw_unknown_run_prepare (&r, u, p->at, error);
-  if (status == PW_OK) status = pw_outcomes_open (&o, r.m.system, "output", p->x->text, p->x->outputs, error);
-  r.settings.ledger = o.ledger;
-  if (status == PW_OK) status = pw_outcomes_run (&o, u->method, &r.settings, u->t_end, error);
-  for (int i = 0; status == PW_OK && i < p->x->outputs; i++) {
-    p->value[i] = pw_outcome_value (&o, i, NULL);
-    if (!isfinite (p->value[i]))
-      status = pw_fail (error, PW_METHOD, "%s is %s", p->x->text[i], pw_format (number, p->value[i], 9));
+  int status = pw_unknown_run_prepare (&run, unknowns, local->unknown, error);
+  if (status == PW_OK)
+    status = pw_outcomes_open (&outcomes, run.m.system, "output", problem->output, problem->outputs, error);
+  run.settings.ledger = outcomes.ledger;
+  if (status == PW_OK) status = pw_outcomes_run (&outcomes, unknowns->method, &run.settings, unknowns->t_end, error);
+  for (int i = 0; status == PW_OK && i < problem->outputs; i++) {
+    local->output[i] = pw_outcome_value (&outcomes, i, NULL);
+    if (!isfinite (local->output[i]))
+      status = pw_fail (error, PW_METHOD, "%s is %s", problem->output[i], pw_format (number, local->output[i], 9));
   }
-  pw_outcomes_close (&o);
-  pw_unknown_run_close (&r);
+  pw_outcomes_close (&outcomes);
+  pw_unknown_run_close (&run);
   return status;
 }
 
 /* The same with derivatives. */
-static int search_differentiate (search *p, pw_error *error) {
-  const pw_unknowns *u = &p->x->unknowns;
+static int search_differentiate (local_search *local, pw_error *error) {
+  const pw_optimise *problem = local->problem;
+  const pw_unknowns *unknowns = &problem->unknowns;
   pw_progress silent = { 0 };
-  pw_sensitivity s = { .of = p->x->text, .unknowns = *u, .no_error = 1 };
-  int status = pw_sensitivity_open (&s, p->at, error);
+  pw_sensitivity s = { .of = problem->output, .unknowns = *unknowns, .no_error = 1 };
+  int status = pw_sensitivity_open (&s, local->unknown, error);
   if (status == PW_OK) status = pw_sensitivity_compute (&s, &silent, error);
-  if (status == PW_OK && s.stopped) status = pw_limit_fail (&s.limit, pw_run_time (s.base.run), error);
-  for (int i = 0; i < p->x->outputs && status == PW_OK; i++) {
-    p->value[i] = pw_outcome_value (&s.outcomes, i, NULL);
-    for (int j = 0; j < u->count && status == PW_OK; j++) {
-      double *slope = p->slope + i * u->count + j;
-      *slope = u->list[j].scale * pw_sensitivity_derivative (&s, i, j, s.end_slope);
-      if (!isfinite (p->value[i] + *slope)) status = pw_fail (error, PW_METHOD, "%s has no derivative", p->x->text[i]);
+  if (status == PW_OK && s.stopped) status = pw_limit_status (&s.limit, pw_run_time (s.base.run), error);
+  for (int i = 0; i < problem->outputs && status == PW_OK; i++) {
+    local->output[i] = pw_outcome_value (&s.outcomes, i, NULL);
+    for (int j = 0; j < unknowns->count && status == PW_OK; j++) {
+      double *slope = local->slope + i * unknowns->count + j;
+      *slope = unknowns->list[j].scale * pw_sensitivity_derivative (&s, i, j, s.run_slope);
+      if (!isfinite (local->output[i] + *slope))
+        status = pw_fail (error, PW_METHOD, "%s has no derivative", problem->output[i]);
     }
   }
   pw_sensitivity_close (&s);
-  p->s->derivatives += status == PW_OK;
+  local->search->derivatives += status == PW_OK;
   return status;
 }
 
-int pw_search_feasible (const pw_optimise *x, const double *value) {
-  for (int i = 1; i < x->outputs; i++)
-    if (x->sign[i] * (value[i] - x->bound[i]) > SEARCH_ALLOWED * (x->bound[i] != 0 ? fabs (x->bound[i]) : 1)) return 0;
-  return 1;
+/* sign / |bound|, or sign if the bound is 0: makes a constraint relative to its bound. */
+static double search_factor (const pw_optimise *problem, int i) {
+  return problem->sign[i] / (problem->bound[i] != 0 ? fabs (problem->bound[i]) : 1);
 }
 
-/* Appends the last run to those of the start. */
-static int search_store (search *p) {
-  pw_search_start *s = p->s;
-  int n = p->x->unknowns.count, width = n + p->x->outputs;
-  if (pw_grow (&s->trial, (size_t)s->runs, &s->room, (size_t)width * sizeof *s->trial) != PW_OK) return PW_RESOURCE;
-  double *row = s->trial + s->runs++ * width;
-  memcpy (row, p->at, (size_t)n * sizeof *row);
-  for (int i = 0; i < p->x->outputs; i++) row[n + i] = p->failed ? NAN : p->value[i];
+/* By how much the outputs violate constraint i; <= 0: not at all. */
+static double search_violation (const pw_optimise *problem, int i, const double *output) {
+  return search_factor (problem, i) * (output[i] - problem->bound[i]);
+}
+
+double pw_search_violation (const pw_optimise *problem, const double *output, int *constraint) {
+  double most = -INFINITY;
+  for (int i = 1; i < problem->outputs; i++)
+    if (search_violation (problem, i, output) > most) most = search_violation (problem, i, output), *constraint = i;
+  return most;
+}
+
+int pw_search_feasible (const pw_optimise *problem, const double *output) {
+  int constraint;
+  return pw_search_violation (problem, output, &constraint) <= SEARCH_ALLOWED;
+}
+
+/* Appends the last run to those of the search. */
+static int search_store (local_search *local) {
+  pw_search *search = local->search;
+  int unknowns = local->problem->unknowns.count, outputs = local->problem->outputs, width = unknowns + outputs;
+  int status =
+      pw_grow (&search->trials, (size_t)search->runs, &search->allocated, (size_t)width * sizeof *search->trials);
+  if (status != PW_OK) return status;
+  double *row = search->trials + search->runs++ * width;
+  memcpy (row, local->unknown, (size_t)unknowns * sizeof *row);
+  for (int i = 0; i < outputs; i++) row[unknowns + i] = local->failed ? NAN : local->output[i];
   return PW_OK;
 }
 
 /* Keeps the last run if it is the best one. */
-static void search_keep (search *p) {
-  pw_optimise *x = p->x;
-  pw_search_start *s = p->s;
-  double value = x->sign[0] * p->value[0];
-  p->least = fmin (p->least, value);
-  p->most = fmax (p->most, value);
-  if (!pw_search_feasible (x, p->value) || (s->found && !(value < x->sign[0] * s->value[0]))) return;
-  s->found = 1;
-  memcpy (s->best, p->at, (size_t)x->unknowns.count * sizeof *s->best);
-  memcpy (s->value, p->value, (size_t)x->outputs * sizeof *s->value);
-  pthread_mutex_lock (&x->lock);
-  if (value < x->leading) {
-    x->leading = value;
-    snprintf (x->progress.note, sizeof x->progress.note, "best %.7g", p->value[0]);
+static void search_keep (local_search *local) {
+  pw_optimise *problem = local->problem;
+  pw_search *search = local->search;
+  const double objective = problem->sign[0] * local->output[0];
+  local->least = fmin (local->least, objective);
+  local->most = fmax (local->most, objective);
+  if (!pw_search_feasible (problem, local->output)) return;
+  if (search->feasible && !(objective < problem->sign[0] * search->output[0])) return;
+  search->feasible = 1;
+  memcpy (search->to, local->unknown, (size_t)problem->unknowns.count * sizeof *search->to);
+  memcpy (search->output, local->output, (size_t)problem->outputs * sizeof *search->output);
+  pthread_mutex_lock (&problem->lock);
+  if (objective < problem->least) {
+    problem->least = objective;
+    snprintf (problem->progress.note, sizeof problem->progress.note, "best %.7g", local->output[0]);
   }
-  pw_progress_at (&x->progress, x->done);
-  pthread_mutex_unlock (&x->lock);
+  pw_progress_at (&problem->progress, problem->searches_done);
+  pthread_mutex_unlock (&problem->lock);
 }
 
-/* Runs with the unknowns, or differentiates.  If only the derivatives fail, the search ends. */
-static int search_try (search *p, int slopes, pw_error *error) {
+/* A run with these unknowns, with derivatives if `slopes`.  If only the derivatives fail, the search ends. */
+static int search_try (local_search *local, int slopes, pw_error *error) {
   pw_error own = { 0 };
-  int status = slopes ? search_differentiate (p, &own) : PW_METHOD;
+  int status = slopes ? search_differentiate (local, &own) : PW_METHOD;
   if (status == PW_OK || status == PW_RETRY || status == PW_RESOURCE) {
     if (status != PW_OK) *error = own;
     return status;
   }
-  status = search_run (p, error);
-  p->refused = slopes && status == PW_OK;
-  if (p->refused) nlopt_force_stop (p->opt);
+  status = search_run (local, error);
+  local->slopes_failed = slopes && status == PW_OK;
+  if (local->slopes_failed) nlopt_force_stop (local->optimiser);
   return status;
 }
 
-/* Runs with these scaled unknowns (slopes 1: with derivatives), unless the last run did. */
-static void search_evaluate (search *p, const double *u, int slopes) {
-  pw_optimise *x = p->x;
-  int n = x->unknowns.count;
-  pw_error own = { 0 };
-  if (p->known && (p->sloped || !slopes) && memcmp (p->u, u, (size_t)n * sizeof *u) == 0) return;
-  memcpy (p->u, u, (size_t)n * sizeof *u);
-  for (int i = 0; i < n; i++) p->at[i] = search_unknown (x->unknowns.list + i, u[i]);
-  int status = search_try (p, slopes, &own);
+/* Ends all searches with an error. */
+static void search_end_all (local_search *local, const pw_error *error) {
+  pthread_mutex_lock (&local->problem->lock);
+  if (local->problem->fatal.status == PW_OK) local->problem->fatal = *error;
+  pthread_mutex_unlock (&local->problem->lock);
+  pw_stop = pw_stop ? pw_stop : 1;
+  nlopt_force_stop (local->optimiser);
+}
+
+/* Makes a run with these scaled unknowns the last one, with derivatives if `slopes`. */
+static void search_evaluate (local_search *local, const double *scaled, int slopes) {
+  const pw_unknowns *unknowns = &local->problem->unknowns;
+  const size_t size = (size_t)unknowns->count * sizeof *scaled;
+  pw_error error = { 0 };
+  if (local->evaluated && local->has_slopes >= slopes && memcmp (local->scaled, scaled, size) == 0) return;
+  memcpy (local->scaled, scaled, size);
+  for (int i = 0; i < unknowns->count; i++) local->unknown[i] = search_unknown (unknowns->list + i, scaled[i]);
+  int status = search_try (local, slopes, &error);
   if (status == PW_RETRY || pw_stop) {
-    nlopt_force_stop (p->opt);
+    nlopt_force_stop (local->optimiser);
     return;
   }
-  p->known = 1;
-  p->sloped = slopes;
-  p->failed = status != PW_OK;
-  if (p->failed && p->s->failed++ == 0) p->s->error = own;
-  if (search_store (p) != PW_OK) status = pw_fail (&own, PW_RESOURCE, "out of memory");
-  if (!p->failed) search_keep (p);
-  if (status != PW_RESOURCE) return;
-  pthread_mutex_lock (&x->lock);
-  if (x->error.status == PW_OK) x->error = own;
-  pthread_mutex_unlock (&x->lock);
-  pw_stop = pw_stop ? pw_stop : 1;
-  nlopt_force_stop (p->opt);
+  local->evaluated = 1;
+  local->has_slopes = slopes;
+  local->failed = status != PW_OK;
+  if (local->failed && local->search->failed++ == 0) local->search->first_error = error;
+  if (search_store (local) != PW_OK) status = pw_fail (&error, PW_RESOURCE, "out of memory");
+  if (!local->failed) search_keep (local);
+  if (status == PW_RESOURCE) search_end_all (local, &error);
 }
 
-/* The derivatives of factor x output. */
-static void search_gradient (const search *p, int output, double factor, double *gradient) {
-  int n = p->x->unknowns.count;
-  for (int j = 0; gradient && j < n; j++) gradient[j] = p->failed || p->refused ? 0 : factor * p->slope[output * n + j];
+/* The derivatives of factor x output i, unless `gradient` is NULL. */
+static void search_gradient (const local_search *local, int i, double factor, double *gradient) {
+  int unknowns = local->problem->unknowns.count;
+  for (int j = 0; gradient && j < unknowns; j++)
+    gradient[j] = local->failed || local->slopes_failed ? 0 : factor * local->slope[i * unknowns + j];
 }
 
-/* A run that failed counts as worse than all others. */
-static double search_objective (unsigned n, const double *u, double *gradient, void *context) {
-  search *p = context;
-  (void)n;
-  search_evaluate (p, u, gradient != NULL);
-  search_gradient (p, 0, p->x->sign[0], gradient);
-  if (!p->failed) return p->x->sign[0] * p->value[0];
-  return isfinite (p->most) ? p->most + fmax (p->most - p->least, 0.1 * fabs (p->most)) : 0;
+/* The function that NLopt minimises.  A run that failed counts as worse than all others. */
+static double search_objective (unsigned unknowns, const double *scaled, double *gradient, void *context) {
+  local_search *local = context;
+  double sign = local->problem->sign[0], most = local->most;
+  (void)unknowns;
+  search_evaluate (local, scaled, gradient != NULL);
+  search_gradient (local, 0, sign, gradient);
+  if (!local->failed) return sign * local->output[0];
+  return isfinite (most) ? most + fmax (most - local->least, 0.1 * fabs (most)) : 0;
 }
 
-/* The constraints, in units of their bounds; 1 for a run that failed. */
-static void search_excess (unsigned count, double *excess, unsigned n, const double *u, double *gradient,
-                           void *context) {
-  search *p = context;
-  const pw_optimise *x = p->x;
-  search_evaluate (p, u, gradient != NULL);
-  for (unsigned i = 0; i < count; i++) {
-    int output = 1 + (int)i;
-    double bound = x->bound[output], factor = x->sign[output] / (bound != 0 ? fabs (bound) : 1);
-    excess[i] = p->failed ? 1 : factor * (p->value[output] - bound);
-    search_gradient (p, output, factor, gradient ? gradient + i * n : NULL);
+/* The constraints of NLopt: their violations, which are 1 for a run that failed. */
+static void search_constraints (unsigned count, double *violation, unsigned unknowns, const double *scaled,
+                                double *gradient, void *context) {
+  local_search *local = context;
+  search_evaluate (local, scaled, gradient != NULL);
+  for (int i = 1; i <= (int)count; i++) {
+    violation[i - 1] = local->failed ? 1 : search_violation (local->problem, i, local->output);
+    search_gradient (local, i, search_factor (local->problem, i),
+                     gradient ? gradient + (unsigned)(i - 1) * unknowns : NULL);
   }
 }
 
 /* ---- Searches ---- */
 
-/* Bounds and tolerances. */
-static int search_open (search *p, double first, double last) {
-  const pw_unknowns *k = &p->x->unknowns;
-  int n = k->count, status = 1;
-  nlopt_algorithm simple = n == 1 ? NLOPT_LN_SBPLX : NLOPT_LN_BOBYQA; /* BOBYQA needs two unknowns and no constraints */
-  p->opt = nlopt_create (p->slope ? NLOPT_LD_SLSQP : p->x->outputs > 1 ? NLOPT_LN_COBYLA : simple, (unsigned)n);
-  if (p->opt == NULL) return PW_RESOURCE;
-  nlopt_set_min_objective (p->opt, search_objective, p);
+/* BOBYQA and COBYLA need no derivatives; BOBYQA, the faster one, needs two unknowns and no constraints. */
+static nlopt_algorithm search_algorithm (const local_search *local) {
+  if (local->slope) return NLOPT_LD_SLSQP;
+  if (local->problem->outputs > 1) return NLOPT_LN_COBYLA;
+  return local->problem->unknowns.count == 1 ? NLOPT_LN_SBPLX : NLOPT_LN_BOBYQA;
+}
+
+/* Opens the optimiser with the bounds, and with the first and last steps of scaled unknowns. */
+static int search_open (local_search *local, double first, double last) {
+  const pw_unknowns *unknowns = &local->problem->unknowns;
+  int n = unknowns->count, done = 1;
+  nlopt_opt o = local->optimiser = nlopt_create (search_algorithm (local), (unsigned)n);
+  if (o == NULL) return PW_RESOURCE;
+  nlopt_set_min_objective (o, search_objective, local);
   for (int i = 0; i < n; i++) {
-    if (isfinite (k->list[i].low))
-      status &= nlopt_set_lower_bound (p->opt, i, search_scaled (k->list + i, k->list[i].low)) > 0;
-    if (isfinite (k->list[i].high))
-      status &= nlopt_set_upper_bound (p->opt, i, search_scaled (k->list + i, k->list[i].high)) > 0;
+    const pw_unknown *unknown = unknowns->list + i;
+    if (isfinite (unknown->low)) done &= nlopt_set_lower_bound (o, i, search_scaled (unknown, unknown->low)) > 0;
+    if (isfinite (unknown->high)) done &= nlopt_set_upper_bound (o, i, search_scaled (unknown, unknown->high)) > 0;
   }
-  status &= nlopt_add_inequality_mconstraint (p->opt, (unsigned)p->x->outputs - 1, search_excess, p, p->allowed) > 0;
-  status &= nlopt_set_xtol_abs1 (p->opt, last) > 0;
-  status &= nlopt_set_initial_step1 (p->opt, first) > 0;
-  nlopt_set_maxeval (p->opt, 200 + 100 * n);
-  return status ? PW_OK : PW_RESOURCE;
+  unsigned constraints = (unsigned)local->problem->outputs - 1;
+  done &= nlopt_add_inequality_mconstraint (o, constraints, search_constraints, local, local->allowed) > 0;
+  done &= nlopt_set_xtol_abs1 (o, last) > 0;
+  done &= nlopt_set_initial_step1 (o, first) > 0;
+  nlopt_set_maxeval (o, 200 + 100 * n);
+  return done ? PW_OK : PW_RESOURCE;
 }
 
-static void search_point (const pw_unknowns *k, const double *x, double *u) {
-  for (int i = 0; i < k->count; i++) u[i] = search_scaled (k->list + i, x[i]);
+static void search_point (const pw_unknowns *unknowns, const double *value, double *scaled) {
+  for (int i = 0; i < unknowns->count; i++) scaled[i] = search_scaled (unknowns->list + i, value[i]);
 }
 
-/* Searches from u.  SLSQP may end early, where derivatives change much: it begins again at its result. */
-static int search_repeat (search *p, double *u) {
-  for (int left = p->slope ? SEARCH_REPEATS : 1; left > 0 && !p->failed && !p->refused && !pw_stop; left--) {
-    double before = p->s->found ? p->s->value[0] : NAN, value;
-    nlopt_result result = nlopt_optimize (p->opt, u, &value);
+/* Searches from a point.  SLSQP may end early where derivatives change much: it is restarted at its result as long as
+ * this improves. */
+static int search_minimise (local_search *local, double *scaled) {
+  pw_search *search = local->search;
+  for (int left = local->slope ? 1 + SEARCH_RESTARTS : 1;
+       left > 0 && !local->failed && !local->slopes_failed && !pw_stop; left--) {
+    double before = search->feasible ? search->output[0] : NAN, objective;
+    nlopt_result result = nlopt_optimize (local->optimiser, scaled, &objective);
     if (result == NLOPT_OUT_OF_MEMORY) return PW_RESOURCE;
-    p->s->converged = (result > 0 && result != NLOPT_MAXEVAL_REACHED) || result == NLOPT_ROUNDOFF_LIMITED;
-    if (!p->s->found || fabs (p->s->value[0] - before) <= SEARCH_GAIN * fabs (before)) break;
-    search_point (&p->x->unknowns, p->s->best, u);
+    search->converged = (result > 0 && result != NLOPT_MAXEVAL_REACHED) || result == NLOPT_ROUNDOFF_LIMITED;
+    if (!search->feasible || fabs (search->output[0] - before) <= SEARCH_GAIN * fabs (before)) break;
+    search_point (&local->problem->unknowns, search->to, scaled);
   }
   return PW_OK;
 }
 
-static int search_from (search *p, int slopes, double first, double last) {
-  const pw_unknowns *k = &p->x->unknowns;
-  size_t n = (size_t)k->count, outputs = (size_t)p->x->outputs;
+/* Searches by derivatives or without, from the beginning of the search. */
+static int search_from (local_search *local, int slopes, double first, double last) {
+  const pw_unknowns *unknowns = &local->problem->unknowns;
+  size_t n = (size_t)unknowns->count, outputs = (size_t)local->problem->outputs;
   double *memory = calloc (3 * n + 2 * outputs + n * outputs, sizeof *memory);
   int status = memory ? PW_OK : PW_RESOURCE;
   if (status == PW_OK) {
-    p->u = memory, p->at = memory + n, p->value = memory + 2 * n, p->allowed = p->value + outputs;
-    double *u = p->allowed + outputs;
-    p->slope = slopes ? u + n : NULL;
-    p->known = p->refused = 0;
-    for (size_t i = 0; i < outputs; i++) p->allowed[i] = SEARCH_ALLOWED / 10;
-    search_point (k, p->s->first, u);
-    status = search_open (p, first, last);
-    if (status == PW_OK) search_evaluate (p, u, slopes);
-    if (status == PW_OK) status = search_repeat (p, u);
+    double *begin = memory;
+    local->scaled = begin + n, local->unknown = local->scaled + n, local->output = local->unknown + n;
+    local->allowed = local->output + outputs;
+    local->slope = slopes ? local->allowed + outputs : NULL;
+    local->evaluated = local->slopes_failed = 0;
+    for (size_t i = 0; i < outputs; i++)
+      local->allowed[i] = SEARCH_ALLOWED / 10; /* so that NLopt's result is feasible */
+    search_point (unknowns, local->search->from, begin);
+    status = search_open (local, first, last);
+    if (status == PW_OK) search_evaluate (local, begin, slopes);
+    if (status == PW_OK) status = search_minimise (local, begin);
   }
-  nlopt_destroy (p->opt);
-  p->opt = NULL;
+  nlopt_destroy (local->optimiser);
+  local->optimiser = NULL;
   free (memory);
   return status;
 }
 
-static int search_task (pw_optimise *x, int i, int slopes, double first, double last, pw_error *error) {
-  search p = { .x = x, .s = x->start + i, .least = INFINITY, .most = -INFINITY };
+/* Search i; without derivatives if they fail. */
+static int search_task (pw_optimise *problem, int i, int slopes, double first, double last, pw_error *error) {
+  local_search local = { .problem = problem, .search = problem->search + i, .least = INFINITY, .most = -INFINITY };
   if (pw_stop) return PW_OK;
-  int status = search_from (&p, slopes, first, last);
-  if (status == PW_OK && p.refused) status = search_from (&p, 0, first, last);
-  pthread_mutex_lock (&x->lock);
-  pw_progress_at (&x->progress, ++x->done);
-  pthread_mutex_unlock (&x->lock);
+  int status = search_from (&local, slopes, first, last);
+  if (status == PW_OK && local.slopes_failed) status = search_from (&local, 0, first, last);
+  pthread_mutex_lock (&problem->lock);
+  pw_progress_at (&problem->progress, ++problem->searches_done);
+  pthread_mutex_unlock (&problem->lock);
   return status == PW_OK ? PW_OK : pw_fail (error, status, "out of memory");
 }
 
@@ -266,7 +309,7 @@ int pw_search_rough (void *context, int i, pw_error *error) {
 }
 
 int pw_search_fine (void *context, int i, pw_error *error) {
-  pw_optimise *x = context;
-  int slopes = x->smooth && x->unknowns.count >= SEARCH_SLOPES;
-  return search_task (x, x->starts + i, slopes, SEARCH_ROUGH, PW_SEARCH_FINE, error);
+  pw_optimise *problem = context;
+  int slopes = problem->differentiable && problem->unknowns.count >= SEARCH_SLOPES;
+  return search_task (problem, problem->starts + i, slopes, SEARCH_ROUGH, PW_SEARCH_FINE, error);
 }

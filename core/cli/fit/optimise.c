@@ -1,8 +1,7 @@
 /* pinwheel optimise: parameters and initial values for which an output is largest or smallest.
  *
- * Local searches (NLopt) from several starts: the initial values, and Sobol points of the bounds,
- * displaced by the seed.  Each start is a task of its own, so that results do not depend on the number of threads.  The
- * best results continue with a tighter tolerance.  A run that fails gets a value that is worse than all before it. */
+ * Local searches begin at several starts: the model's values, and Sobol points between the bounds.  Each search is a
+ * task of its own, so that results do not depend on the number of threads.  The best results are then refined. */
 #define _POSIX_C_SOURCE 200809L
 #include "optimise.h"
 #include <math.h>
@@ -11,214 +10,255 @@
 #include "figure.h"
 #include "parallel.h"
 
-enum { OPTIMISE_POLISHED = 3 };         /* results that continue */
-static const double OPTIMISE_FAR = 1e6; /* in units of its scale: an unknown without bounds has no optimum */
+enum { OPTIMISE_REFINED = 3 }; /* results that are refined, at most */
+#define OPTIMISE_RUNS 20.      /* of a search, about: to choose the engine */
+#define OPTIMISE_DIVERGED 1e6  /* modulus of an unknown without bounds, in units of its scale, that is no optimum */
 
 /* ---- Starts ---- */
 
-static int optimise_open_starts (pw_optimise *x, pw_error *error) {
-  const size_t n = (size_t)x->unknowns.count, width = 2 * n + (size_t)x->outputs, starts = (size_t)x->starts,
-               all = starts + OPTIMISE_POLISHED;
-  double *point = pw_unknowns_starts (&x->unknowns, x->starts, x->seed),
-         *memory = pw_arena_alloc (&x->arena, all * width * sizeof *memory);
-  x->start = pw_arena_alloc (&x->arena, all * sizeof *x->start);
-  int status = point && memory && x->start ? PW_OK : pw_fail (error, PW_RESOURCE, "out of memory");
+/* Searches from the starts, and room for refinements. */
+static int optimise_open_searches (pw_optimise *problem, pw_error *error) {
+  const size_t n = (size_t)problem->unknowns.count, width = 2 * n + (size_t)problem->outputs,
+               starts = (size_t)problem->starts, all = starts + OPTIMISE_REFINED;
+  double *start = pw_unknowns_starts (&problem->unknowns, problem->starts, problem->seed),
+         *memory = pw_arena_alloc (&problem->arena, all * width * sizeof *memory);
+  problem->search = pw_arena_alloc (&problem->arena, all * sizeof *problem->search);
+  int status = start && memory && problem->search ? PW_OK : pw_fail (error, PW_RESOURCE, "out of memory");
   for (size_t i = 0; status == PW_OK && i < all; i++) {
-    pw_search_start *s = x->start + i;
-    s->first = memory + i * width, s->best = s->first + n, s->value = s->best + n;
-    if (i < starts) memcpy (s->first, point + i * n, n * sizeof *point);
+    pw_search *search = problem->search + i;
+    search->from = memory + i * width, search->to = search->from + n, search->output = search->to + n;
+    if (i < starts) memcpy (search->from, start + i * n, n * sizeof *start);
   }
-  free (point);
+  free (start);
   return status;
 }
 
-/* The best of the first `count` starts, which are not `used`; the first one of equal ones.  -1: there is none. */
-static int optimise_best (const pw_optimise *x, int count, const unsigned char *used) {
-  int best = -1;
-  for (int i = 0; i < count; i++)
-    if (x->start[i].found && !(used && used[i]) &&
-        (best < 0 || x->sign[0] * x->start[i].value[0] < x->sign[0] * x->start[best].value[0]))
-      best = i;
+/* The search with the best result among the first `count`, except those `excluded` unless that is NULL; the first one
+ * of equal ones.  NULL: none has a result. */
+static const pw_search *optimise_best (const pw_optimise *problem, int count, const unsigned char *excluded) {
+  const pw_search *best = NULL;
+  for (int i = 0; i < count; i++) {
+    const pw_search *search = problem->search + i;
+    if (!search->feasible || (excluded && excluded[i])) continue;
+    if (best == NULL || problem->sign[0] * search->output[0] < problem->sign[0] * best->output[0]) best = search;
+  }
   return best;
 }
 
-/* Different optima continue, the best ones first. */
-static int optimise_continue (pw_optimise *x, pw_error *error) {
-  unsigned char *used = calloc ((size_t)x->starts, 1);
-  if (used == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
-  for (int best; x->polished < OPTIMISE_POLISHED && (best = optimise_best (x, x->starts, used)) >= 0;) {
-    pw_search_start *s = x->start + x->starts + x->polished++;
-    memcpy (s->first, x->start[best].best, (size_t)x->unknowns.count * sizeof *s->first);
-    for (int i = 0; i < x->starts; i++) used[i] |= (unsigned char)pw_optimise_same (x, x->start + i, x->start + best);
+/* Refines the best of the results that differ. */
+static int optimise_refine (pw_optimise *problem, pw_error *error) {
+  const pw_search *best;
+  unsigned char *refined = calloc ((size_t)problem->starts, 1); /* 1: the result, or the same one, is refined */
+  if (refined == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
+  while (problem->refinements < OPTIMISE_REFINED && (best = optimise_best (problem, problem->starts, refined))) {
+    pw_search *refinement = problem->search + problem->starts + problem->refinements++;
+    memcpy (refinement->from, best->to, (size_t)problem->unknowns.count * sizeof *best->to);
+    for (int i = 0; i < problem->starts; i++)
+      refined[i] |= (unsigned char)pw_optimise_same (problem, problem->search + i, best);
   }
-  free (used);
-  return pw_parallel (x->jobs, x->polished, pw_search_fine, x, error);
+  free (refined);
+  return pw_parallel (problem->jobs, problem->refinements, pw_search_fine, problem, error);
 }
 
-static void optimise_count (pw_optimise *x) {
-  for (const pw_search_start *s = x->start; s < x->start + x->starts + x->polished; s++) {
-    x->runs += s->runs, x->failed += s->failed, x->derivatives += s->derivatives;
-    if (x->why == NULL && s->failed) x->why = &s->error;
+static void optimise_count_runs (pw_optimise *problem) {
+  for (int i = 0; i < problem->starts + problem->refinements; i++) {
+    const pw_search *search = problem->search + i;
+    problem->runs += search->runs, problem->failed += search->failed, problem->derivatives += search->derivatives;
+    if (problem->first_error == NULL && search->failed) problem->first_error = &search->first_error;
   }
 }
 
-static int optimise_search (pw_optimise *x, pw_error *error) {
+static int optimise_search (pw_optimise *problem, pw_error *error) {
   pw_stop_catch ();
-  pthread_mutex_init (&x->lock, NULL);
-  pw_progress_count (&x->progress, pw_file_name (x->m.file), "starts", 0, x->starts + OPTIMISE_POLISHED);
-  int status = pw_parallel (x->jobs, x->starts, pw_search_rough, x, error);
-  if (status == PW_OK) status = optimise_continue (x, error);
-  pw_progress_end (&x->progress);
-  pthread_mutex_destroy (&x->lock);
+  pthread_mutex_init (&problem->lock, NULL);
+  pw_progress_count (&problem->progress, pw_file_name (problem->model.file), "starts", 0,
+                     problem->starts + OPTIMISE_REFINED);
+  int status = pw_parallel (problem->jobs, problem->starts, pw_search_rough, problem, error);
+  if (status == PW_OK) status = optimise_refine (problem, error);
+  pw_progress_end (&problem->progress);
+  pthread_mutex_destroy (&problem->lock);
   pw_stop_release ();
-  x->best = optimise_best (x, x->starts + x->polished, NULL);
-  optimise_count (x);
-  return x->error.status != PW_OK ? pw_fail (error, x->error.status, "%s", x->error.text) : status;
+  problem->best = optimise_best (problem, problem->starts + problem->refinements, NULL);
+  optimise_count_runs (problem);
+  return problem->fatal.status != PW_OK ? pw_fail (error, problem->fatal.status, "%s", problem->fatal.text) : status;
 }
 
 /* ---- Before the search ---- */
 
-/* "OUTPUT<=VALUE" or "OUTPUT>=VALUE", split in place. */
-static int optimise_constraint (pw_optimise *x, char *text, const char *given, pw_error *error) {
-  char *at = NULL;
+/* Adds the constraint "OUTPUT<=VALUE" or "OUTPUT>=VALUE"; `text` is a copy of `given` that is split in place. */
+static int optimise_constraint (pw_optimise *problem, char *text, const char *given, pw_error *error) {
+  const int i = problem->outputs;
+  char *relation = NULL;
   for (char *c = text; *c; c++)
-    if ((*c == '<' || *c == '>') && c[1] == '=') at = c;
-  if (at == NULL || pw_read_expression (at + 2, &x->bound[x->outputs]) != PW_OK || !isfinite (x->bound[x->outputs]))
+    if ((*c == '<' || *c == '>') && c[1] == '=') relation = c;
+  if (relation == NULL || pw_read_expression (relation + 2, &problem->bound[i]) != PW_OK ||
+      !isfinite (problem->bound[i]))
     return pw_fail (error, PW_INPUT, "--subject-to %.200s: expected OUTPUT<=VALUE or OUTPUT>=VALUE", given);
-  x->sign[x->outputs] = *at == '<' ? 1 : -1;
-  *at = 0;
-  while (at > text && at[-1] == ' ') *--at = 0;
-  x->text[x->outputs++] = text;
+  problem->sign[i] = *relation == '<' ? 1 : -1;
+  *relation = 0;
+  while (relation > text && relation[-1] == ' ') *--relation = 0;
+  problem->output[problem->outputs++] = text;
   return PW_OK;
 }
 
-static int optimise_texts (pw_optimise *x, pw_error *error) {
+static int optimise_read_outputs (pw_optimise *problem, pw_error *error) {
   size_t count = 1;
   int status = PW_OK;
-  for (const char **c = x->subject; c && *c; c++) count++;
-  x->text = pw_arena_alloc (&x->arena, (count + 1) * sizeof *x->text);
-  x->unit = pw_arena_alloc (&x->arena, count * sizeof *x->unit);
-  x->bound = pw_arena_alloc (&x->arena, 2 * count * sizeof *x->bound);
-  if (x->text == NULL || x->unit == NULL || x->bound == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
-  x->sign = x->bound + count;
-  x->text[0] = x->objective;
-  x->sign[0] = x->maximise ? -1 : 1;
-  x->outputs = 1;
-  for (const char **c = x->subject; c && *c && status == PW_OK; c++) {
-    char *copy = pw_arena_copy (&x->arena, *c);
-    status = copy ? optimise_constraint (x, copy, *c, error) : pw_fail (error, PW_RESOURCE, "out of memory");
+  for (const char **given = problem->subject_to; given && *given; given++) count++;
+  problem->output = pw_arena_alloc (&problem->arena, (count + 1) * sizeof *problem->output); /* ended by NULL */
+  problem->unit = pw_arena_alloc (&problem->arena, count * sizeof *problem->unit);
+  problem->bound = pw_arena_alloc (&problem->arena, 2 * count * sizeof *problem->bound);
+  if (problem->output == NULL || problem->unit == NULL || problem->bound == NULL)
+    return pw_fail (error, PW_RESOURCE, "out of memory");
+  problem->sign = problem->bound + count;
+  problem->output[0] = problem->maximise ? problem->maximise : problem->minimise;
+  problem->sign[0] = problem->maximise ? -1 : 1;
+  problem->outputs = 1;
+  for (const char **given = problem->subject_to; given && *given && status == PW_OK; given++) {
+    char *copy = pw_arena_copy (&problem->arena, *given);
+    status = copy ? optimise_constraint (problem, copy, *given, error) : pw_fail (error, PW_RESOURCE, "out of memory");
   }
   return status;
 }
 
-/* Reads outputs as every run will; extrema have kinks. */
-static int optimise_outputs (pw_optimise *x, int from, int count, const char *option, pw_error *error) {
-  pw_outcomes o;
-  int status = pw_outcomes_open (&o, x->m.system, option, x->text + from, count, error);
-  for (int i = 0; i < o.outcomes; i++) pw_outcome_unit (&o, i, x->unit[from + i], sizeof *x->unit);
-  for (int i = 0; i < o.functionals; i++) x->smooth &= !pw_is_extremum (o.functional[i].type);
-  pw_outcomes_close (&o);
+/* Verifies outputs of an option for the model, as every run will read them; stores their units.  Extrema are not
+ * differentiable. */
+static int optimise_open_outputs (pw_optimise *problem, int first, int count, const char *option, pw_error *error) {
+  pw_outcomes outcomes;
+  int status = pw_outcomes_open (&outcomes, problem->model.system, option, problem->output + first, count, error);
+  for (int i = 0; i < outcomes.outcomes; i++)
+    pw_outcome_unit (&outcomes, i, problem->unit[first + i], sizeof *problem->unit);
+  for (int i = 0; i < outcomes.functionals; i++)
+    problem->differentiable &= !pw_is_extremum (outcomes.functional[i].type);
+  pw_outcomes_close (&outcomes);
   return status;
 }
 
-static int optimise_read (pw_optimise *x, pw_error *error) {
+static int optimise_read (pw_optimise *problem, pw_error *error) {
   double starts = 10;
-  x->objective = x->maximise ? x->maximise : x->minimise;
-  x->best = -1;
-  x->leading = INFINITY;
-  x->seed = 1;
-  if (x->objective == NULL || (x->maximise && x->minimise))
+  problem->least = INFINITY;
+  problem->seed = 1;
+  if (!problem->maximise == !problem->minimise)
     return pw_fail (error, PW_INPUT, "expected one of --maximise OUTPUT and --minimise OUTPUT");
-  int status = pw_cli_number ("--starts", x->starts_text, PW_COUNT, &starts, error);
-  if (status == PW_OK) status = pw_cli_number ("--seed", x->seed_text, PW_COUNT, &x->seed, error);
-  if (status == PW_OK) status = pw_parallel_jobs (x->jobs_text, &x->jobs, error);
+  int status = pw_cli_number ("--starts", problem->starts_text, PW_COUNT, &starts, error);
+  if (status == PW_OK) status = pw_cli_number ("--seed", problem->seed_text, PW_COUNT, &problem->seed, error);
+  if (status == PW_OK) status = pw_parallel_jobs (problem->jobs_text, &problem->jobs, error);
   if (status == PW_OK && starts > 1e5) status = pw_fail (error, PW_INPUT, "--starts: at most 100000");
-  if (status == PW_OK) status = pw_cli_only ("--width", x->line.width, "--plots DIR", x->plots_path != NULL, error);
-  x->starts = (int)starts;
-  return status == PW_OK ? optimise_texts (x, error) : status;
+  if (status == PW_OK)
+    status = pw_cli_requires ("--width", problem->line.width, "--plots DIR", problem->plots_path != NULL, error);
+  problem->starts = (int)starts;
+  return status == PW_OK ? optimise_read_outputs (problem, error) : status;
 }
 
-enum { OPTIMISE_RESULT = 1, OPTIMISE_SUMMARY }; /* in the list of files */
+enum { OPTIMISE_RESULT = 1, OPTIMISE_SUMMARY }; /* indices in the list of files of optimise_open */
 
-static int optimise_open (pw_optimise *x, pw_error *error) {
+static int optimise_open (pw_optimise *problem, pw_error *error) {
   static const char *const figures[] = { "optimise.dat", "optimise.gp",  "optimise.svg",
                                          "optimise.png", "optimise.pdf", NULL };
   pw_use use[] = { PW_CLI_MODEL_USE,
-                   { "-o", x->path, PW_WRITES, NULL },
-                   { "--json", x->json_path, PW_WRITES, NULL },
-                   { "--plots", x->plots_path, PW_WRITES_INTO, figures } };
-  int status = pw_cli_open (&x->m, &x->line, error);
-  x->smooth = 1;
-  if (status == PW_OK) status = optimise_outputs (x, 0, 1, x->maximise ? "--maximise" : "--minimise", error);
-  if (status == PW_OK) status = optimise_outputs (x, 1, x->outputs - 1, "--subject-to", error);
-  if (status == PW_OK) status = pw_unknowns_open (&x->unknowns, &x->line, &x->m, error);
-  if (status == PW_OK) status = pw_unknowns_read (&x->unknowns, x->free, error);
-  if (status == PW_OK) pw_unknowns_engine (&x->unknowns, 20. * x->starts);
-  if (status == PW_OK && x->unknowns.count > PW_UNKNOWNS_STARTED)
+                   { "-o", problem->path, PW_WRITES, NULL },
+                   { "--json", problem->json_path, PW_WRITES, NULL },
+                   { "--plots", problem->plots_path, PW_WRITES_INTO, figures } };
+  int status = pw_cli_open (&problem->model, &problem->line, error);
+  problem->differentiable = 1;
+  if (status == PW_OK)
+    status = optimise_open_outputs (problem, 0, 1, problem->maximise ? "--maximise" : "--minimise", error);
+  if (status == PW_OK) status = optimise_open_outputs (problem, 1, problem->outputs - 1, "--subject-to", error);
+  if (status == PW_OK) status = pw_unknowns_open (&problem->unknowns, &problem->line, &problem->model, error);
+  if (status == PW_OK) status = pw_unknowns_read (&problem->unknowns, problem->free, error);
+  if (status == PW_OK) pw_unknowns_engine (&problem->unknowns, OPTIMISE_RUNS * problem->starts);
+  if (status == PW_OK && problem->unknowns.count > PW_UNKNOWNS_STARTED)
     status = pw_fail (error, PW_INPUT, "--free: at most %d unknowns", PW_UNKNOWNS_STARTED);
-  if (status == PW_OK) status = pw_files_open (&x->files, &x->line, &x->m, use, sizeof use / sizeof *use, error);
-  return status == PW_OK ? optimise_open_starts (x, error) : status;
+  if (status == PW_OK)
+    status = pw_files_open (&problem->files, &problem->line, &problem->model, use, sizeof use / sizeof *use, error);
+  return status == PW_OK ? optimise_open_searches (problem, error) : status;
 }
 
 /* ---- After the search ---- */
 
-/* No run satisfied the constraints: the first error, if there was one. */
-static int optimise_nothing (const pw_optimise *x, pw_error *error) {
-  if (x->failed == x->runs && x->why)
-    return pw_fail (error, x->why->status, "none of %ld runs succeeded, the first one: %s", x->runs, x->why->text);
-  return pw_fail (error, PW_METHOD, "no run from %d starts satisfies --subject-to", x->starts);
+/* Outputs of the run that violates its most violated constraint least, and that constraint. */
+static const double *optimise_nearest (const pw_optimise *problem, int *constraint) {
+  const double *nearest = NULL;
+  double least = INFINITY;
+  int n = problem->unknowns.count, width = n + problem->outputs, i = 0;
+  for (const pw_search *search = problem->search; search < problem->search + problem->starts; search++)
+    for (long k = 0; k < search->runs; k++) {
+      const double *output = search->trials + k * width + n;
+      double violation = isnan (output[0]) ? NAN : pw_search_violation (problem, output, &i);
+      if (violation <= least) least = violation, nearest = output, *constraint = i;
+    }
+  return nearest;
 }
 
-/* PW_METHOD if the search that found the best result did not converge: it ended at its limit of runs, or far away. */
-static int optimise_converged (const pw_optimise *x, pw_error *error) {
-  const pw_search_start *s = x->start + x->best;
-  const pw_unknown *far = NULL;
-  double most = 0;
-  for (int i = 0; i < x->unknowns.count; i++) {
-    const pw_unknown *k = x->unknowns.list + i;
-    if (!k->given && fabs (s->best[i]) >= most * k->scale) far = k, most = fabs (s->best[i]) / k->scale;
+/* The error if no run satisfies the constraints: the first one if every run failed. */
+static int optimise_infeasible (const pw_optimise *problem, pw_error *error) {
+  char value[32], bound[32], unit[90] = "";
+  int i = 0;
+  if (problem->failed == problem->runs && problem->first_error)
+    return pw_fail (error, problem->first_error->status, "none of %ld runs succeeded, the first one: %s", problem->runs,
+                    problem->first_error->text);
+  const double *output = optimise_nearest (problem, &i);
+  if (*problem->unit[i]) snprintf (unit, sizeof unit, " %s", problem->unit[i]);
+  return pw_fail (error, PW_METHOD,
+                  "no run from %d starts satisfies --subject-to; in the nearest one %s is %s%s and must be at %s %s%s",
+                  problem->starts, problem->output[i], pw_format (value, output[i], 9), unit,
+                  problem->sign[i] > 0 ? "most" : "least", pw_format (bound, problem->bound[i], 9), unit);
+}
+
+/* PW_METHOD if the search with the best result ended at its limit of runs, or at a very large value of an unknown
+ * without bounds. */
+static int optimise_converged (const pw_optimise *problem, pw_error *error) {
+  const pw_search *search = problem->best;
+  const pw_unknown *farthest = NULL;
+  double distance = 0; /* in units of its scale */
+  for (int i = 0; i < problem->unknowns.count; i++) {
+    const pw_unknown *unknown = problem->unknowns.list + i;
+    if (unknown->has_bounds || !(fabs (search->to[i]) >= distance * unknown->scale)) continue;
+    farthest = unknown, distance = fabs (search->to[i]) / unknown->scale;
   }
-  if (s->converged && most < OPTIMISE_FAR) return PW_OK;
-  if (far == NULL) return pw_fail (error, PW_METHOD, "the search did not converge in %ld runs", s->runs);
+  if (search->converged && distance < OPTIMISE_DIVERGED) return PW_OK;
+  if (farthest == NULL) return pw_fail (error, PW_METHOD, "the search did not converge in %ld runs", search->runs);
   return pw_fail (error, PW_METHOD,
                   "the search did not converge in %ld runs; perhaps there is no optimum without bounds, "
                   "such as --free %s=LOW:HIGH",
-                  s->runs, far->name);
+                  search->runs, farthest->name);
 }
 
-static int optimise_finish (pw_optimise *x, pw_error *error) {
-  FILE *result = pw_files_stream (&x->files, OPTIMISE_RESULT), *summary = pw_files_stream (&x->files, OPTIMISE_SUMMARY);
+static int optimise_finish (pw_optimise *problem, pw_error *error) {
+  FILE *result = pw_files_stream (&problem->files, OPTIMISE_RESULT),
+       *summary = pw_files_stream (&problem->files, OPTIMISE_SUMMARY);
   int interrupted = pw_stop != 0;
-  if (x->best < 0 && interrupted) fputs ("pinwheel: interrupted before the first run was done\n", stderr);
-  if (x->best < 0) return interrupted ? PW_INTERRUPTED : optimise_nothing (x, error);
-  pw_error why = { 0 };
-  int converged = optimise_converged (x, &why) == PW_OK;
-  pw_optimise_print (x);
-  pw_unknowns_report (&x->unknowns, x->start[x->best].best);
-  if (result) pw_optimise_yaml (x, result);
-  if (summary) pw_optimise_json (x, interrupted ? "interrupted" : converged ? "ok" : "method", summary);
-  int status = pw_files_finish (&x->files, error);
-  if (status == PW_OK && x->plots_path) status = pw_optimise_draw (x, error);
+  if (problem->best == NULL && interrupted)
+    pw_cli_say ("pinwheel: interrupted before a run succeeded that satisfies the constraints\n");
+  if (problem->best == NULL) return interrupted ? PW_INTERRUPTED : optimise_infeasible (problem, error);
+  pw_error unconverged = { 0 };
+  int converged = optimise_converged (problem, &unconverged) == PW_OK;
+  pw_optimise_print (problem);
+  pw_unknowns_report (&problem->unknowns, problem->best->to);
+  if (result) pw_optimise_yaml (problem, result);
+  if (summary) pw_optimise_json (problem, interrupted ? "interrupted" : converged ? "ok" : "method", summary);
+  int status = pw_files_finish (&problem->files, error);
+  if (status == PW_OK && problem->plots_path) status = pw_optimise_draw (problem, error);
   if (interrupted) pw_cli_say ("pinwheel: interrupted; this is the best result so far\n");
   if (status == PW_OK && interrupted) return PW_INTERRUPTED;
-  return status == PW_OK && !converged ? pw_fail (error, why.status, "%s", why.text) : status;
+  return status == PW_OK && !converged ? pw_fail (error, unconverged.status, "%s", unconverged.text) : status;
 }
 
-static void optimise_close (pw_optimise *x) {
-  for (int i = 0; x->start && i < x->starts + OPTIMISE_POLISHED; i++) free (x->start[i].trial);
-  pw_arena_free (&x->arena);
-  pw_files_close (&x->files);
-  pw_unknowns_close (&x->unknowns);
-  pw_cli_close_model (&x->m);
+static void optimise_close (pw_optimise *problem) {
+  for (int i = 0; problem->search && i < problem->starts + OPTIMISE_REFINED; i++) free (problem->search[i].trials);
+  pw_arena_free (&problem->arena);
+  pw_files_close (&problem->files);
+  pw_unknowns_close (&problem->unknowns);
+  pw_cli_close_model (&problem->model);
 }
 
 static int optimise_command (void *options, pw_error *error) {
-  pw_optimise *x = options;
-  int status = optimise_read (x, error);
-  if (status == PW_OK) status = optimise_open (x, error);
-  if (status == PW_OK) status = optimise_search (x, error);
-  if (status == PW_OK) status = optimise_finish (x, error);
-  optimise_close (x);
+  pw_optimise *problem = options;
+  int status = optimise_read (problem, error);
+  if (status == PW_OK) status = optimise_open (problem, error);
+  if (status == PW_OK) status = optimise_search (problem, error);
+  if (status == PW_OK) status = optimise_finish (problem, error);
+  optimise_close (problem);
   return status;
 }
 
@@ -231,7 +271,8 @@ static const struct poptOption optimise_options[] = {
   PW_TEXT_OPTION (pw_optimise, minimise, "minimise", 0, "OUTPUT", "Find the smallest value"),
   PW_LIST_OPTION (pw_optimise, free, "free", 0, "NAME[=LOW:HIGH]",
                   "Vary a parameter or an initial value, such as frame.vx, between bounds; repeatable"),
-  PW_LIST_OPTION (pw_optimise, subject, "subject-to", 0, "OUTPUT<=VALUE", "Constraint, or OUTPUT>=VALUE; repeatable"),
+  PW_LIST_OPTION (pw_optimise, subject_to, "subject-to", 0, "OUTPUT<=VALUE",
+                  "Constraint, or OUTPUT>=VALUE; repeatable"),
   PW_TEXT_OPTION (pw_optimise, starts_text, "starts", 0, "N", "Number of searches from different points (default 10)"),
   PW_TEXT_OPTION (pw_optimise, seed_text, "seed", 0, "N", "Seed of these points (default 1)"),
   PW_TEXT_OPTION (pw_optimise, jobs_text, "jobs", 'j', "N", "Number of concurrent runs (default: one per processor)"),
@@ -250,9 +291,9 @@ const pw_command pw_cli_optimise = {
   .summary = "find the parameters for which an output is largest or smallest",
   .help = "Vary parameters and initial values of a model until an output of its runs is largest or smallest, by local "
           "searches from several starts. Runs that fail count as infeasible.",
-  .least = 1,
-  .most = 1,
-  .size = sizeof (pw_optimise),
+  .min_arguments = 1,
+  .max_arguments = 1,
+  .options_size = sizeof (pw_optimise),
   .function = optimise_command,
   .options = optimise_options,
 };

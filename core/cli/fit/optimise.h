@@ -1,4 +1,4 @@
-/* An optimisation and its results. */
+/* An optimisation for `pinwheel optimise`: the problem, its searches and their results. */
 #ifndef PW_OPTIMISE_H
 #define PW_OPTIMISE_H
 
@@ -8,68 +8,68 @@
 #include "sensitivity.h"
 #include "util.h"
 
-/* The search from one start.  Runs are its rows of `trial`. */
+/* A local search and its runs. */
 typedef struct {
-  double *first, *best; /* unknowns */
-  double *value;        /* outputs at the best */
-  int found;            /* 1: the best satisfies the constraints */
-  int converged;        /* 0: the search ended at its limit of runs */
+  double *from, *to; /* unknowns: where it begins; of the best run that satisfies the constraints */
+  double *output;    /* outputs of that run */
+  int feasible;      /* 1: there is such a run */
+  int converged;     /* 0: the search ended at its limit of runs */
   long runs, failed;
-  long derivatives; /* points at which derivatives were computed */
-  double *trial;    /* runs x (unknowns, outputs); outputs of failed runs are NaN */
-  size_t room;      /* rows allocated of `trial` */
-  pw_error error;   /* of the first failed run */
-} pw_search_start;
+  long derivatives;     /* points at which derivatives were computed */
+  double *trials;       /* runs x (unknowns, outputs); outputs of failed runs are NaN */
+  size_t allocated;     /* rows of `trials` */
+  pw_error first_error; /* of the first failed run */
+} pw_search;
 
 typedef struct {
   pw_cli_line line;
   const char *maximise, *minimise, *path, *json_path, *plots_path, *starts_text, *seed_text, *jobs_text;
-  const char **free, **subject;
-  pw_cli_model m;
+  const char **free, **subject_to;
+  pw_cli_model model;
   pw_files files;
   pw_unknowns unknowns;
-  const char *objective;
-  pw_arena arena;    /* of what follows, without trials */
-  const char **text; /* outputs: the objective, then constraints */
-  char (*unit)[80];  /* outputs */
-  double *bound;     /* outputs: of the constraint */
-  double *sign;      /* outputs: sign x (value - bound) <= 0; of the objective: sign x value is minimised */
+  pw_arena arena;      /* of the arrays below, except trials */
+  const char **output; /* outputs, as text: the objective, then the left sides of the constraints */
+  char (*unit)[80];    /* outputs */
+  double *bound;       /* outputs: of a constraint sign x (output - bound) <= 0 */
+  double *sign;        /* outputs: 1 or -1; sign x objective is minimised */
   int outputs, starts, jobs;
-  int polished; /* results from which searches continue with a tight tolerance */
-  int smooth;   /* 1: outputs have derivatives, except where a motion has none */
+  int refinements;    /* results of these starts that are refined: searches continue with a tight tolerance */
+  int differentiable; /* 1: outputs have derivatives, except where a motion has none */
   double seed;
-  pw_search_start *start;         /* starts, then polished */
-  int best;                       /* index of the search with the best result; -1: none */
+  pw_search *search;              /* from the starts, then refinements */
+  const pw_search *best;          /* that with the best result; NULL: none */
   long runs, failed, derivatives; /* of all searches */
-  const pw_error *why;            /* of the first failed run; NULL: there is none */
+  const pw_error *first_error;    /* of the first failed run; NULL: there is none */
   pthread_mutex_t lock;           /* of what follows */
   pw_progress progress;
-  int done;
-  double leading; /* sign x best objective so far */
-  pw_error error; /* that ends everything */
+  int searches_done;
+  double least;   /* sign x best objective so far */
+  pw_error fatal; /* an error that ends all searches */
 } pw_optimise;
 
 /* ---- Searches (local_search.c) ---- */
 
-#define PW_SEARCH_FINE 1e-7 /* last steps of the results that continue, relative to the scales of the unknowns */
+#define PW_SEARCH_FINE 1e-7 /* last steps of refinements, relative to the scales of the unknowns */
 
-/* 1 if outputs satisfy the constraints, with an allowance for the last digits of a solution on the boundary. */
-int pw_search_feasible (const pw_optimise *x, const double *value);
+/* 1 if the outputs of a run satisfy the constraints, with an allowance for round-off on the boundary. */
+int pw_search_feasible (const pw_optimise *problem, const double *output);
+/* The constraint that the outputs of a run violate most, and by how much, relative to its bound if that is not 0. */
+double pw_search_violation (const pw_optimise *problem, const double *output, int *constraint);
 
-/* Tasks of pw_parallel: the search from start i with a rough tolerance; from the i-th of those that continue with a tight
- * one.  The context is the optimisation. */
-int pw_search_rough (void *optimise, int i, pw_error *error);
-int pw_search_fine (void *optimise, int i, pw_error *error);
+/* Tasks of pw_parallel: the search from start i; refinement i.  The context is the pw_optimise. */
+int pw_search_rough (void *context, int i, pw_error *error);
+int pw_search_fine (void *context, int i, pw_error *error);
 
-/* ---- Results ---- */
+/* ---- Results (optimise_report.c) ---- */
 
-/* 1 if the results of two starts are the same optimum. */
-int pw_optimise_same (const pw_optimise *x, const pw_search_start *a, const pw_search_start *b);
+/* 1 if the results of two searches are the same optimum. */
+int pw_optimise_same (const pw_optimise *problem, const pw_search *a, const pw_search *b);
 
 /* Prints the result; writes it as JSON and YAML; draws figures of the runs into the folder. */
-void pw_optimise_print (const pw_optimise *x);
-void pw_optimise_json (const pw_optimise *x, const char *status, FILE *f);
-void pw_optimise_yaml (const pw_optimise *x, FILE *f);
-int pw_optimise_draw (const pw_optimise *x, pw_error *error);
+void pw_optimise_print (const pw_optimise *problem);
+void pw_optimise_json (const pw_optimise *problem, const char *status, FILE *f);
+void pw_optimise_yaml (const pw_optimise *problem, FILE *f);
+int pw_optimise_draw (const pw_optimise *problem, pw_error *error);
 
 #endif

@@ -4,15 +4,16 @@
 #include "check_report.h"
 #include "report.h"
 
-enum { REPORT_LISTED = 8, REPORT_EIGENVALUES = 60 };
+enum { REPORT_LISTED = 8, REPORT_EIGENVALUES = 60 }; /* items of a list; lines of eigenvalues: in the text, at most */
 
-/* ---- Entries: in JSON, or in the text if j is NULL ---- */
+/* ---- Entries: in JSON, or in the text if j is NULL; pw_json_* do nothing then ---- */
 
-/* Begins a line for the next item. */
+/* Begins a line of JSON for the next item. */
 static void report_line (pw_json *j) {
   if (j) j->line = 1;
 }
 
+/* Begins an object or a list. */
 static void report_section (pw_json *j, const char *key, char bracket, const char *title) {
   if (j == NULL && title) printf ("\n%s\n", title);
   report_line (j);
@@ -20,57 +21,60 @@ static void report_section (pw_json *j, const char *key, char bracket, const cha
 }
 
 /* Prints in the text only. */
-PW_PRINTF (2, 3) static void report_say (pw_json *j, const char *format, ...) {
-  va_list list;
-  va_start (list, format);
-  if (j == NULL) vprintf (format, list);
-  va_end (list);
+PW_PRINTF (2, 3) static void report_print (pw_json *j, const char *format, ...) {
+  va_list arguments;
+  va_start (arguments, format);
+  if (j == NULL) vprintf (format, arguments);
+  va_end (arguments);
 }
 
 /* A number in JSON, unless the key is NULL; a line in the text, unless the label is NULL. */
 PW_PRINTF (5, 6)
 static void report_entry (pw_json *j, const char *key, double value, const char *label, const char *format, ...) {
-  va_list list;
+  va_list arguments;
   if (key) pw_json_number (j, key, value);
   if (j || label == NULL) return;
   printf ("  %-34s ", label);
-  va_start (list, format);
-  vprintf (format, list);
-  va_end (list);
+  va_start (arguments, format);
+  vprintf (format, arguments);
+  va_end (arguments);
   putchar ('\n');
 }
+
+/* A line in the text only. */
+#define report_text(j, ...) report_entry (j, NULL, 0, __VA_ARGS__)
 
 /* An item of a list, of which the text shows the first few; `listed` counts them. */
 static void report_item (pw_json *j, int *listed, const char *text, const char *line) {
   if (text) pw_json_text (j, NULL, text);
-  if ((*listed)++ < REPORT_LISTED) report_say (j, "    %s\n", line);
+  if ((*listed)++ < REPORT_LISTED) report_print (j, "    %s\n", line);
 }
 
 static void report_end_list (pw_json *j, int listed) {
   pw_json_close (j, ']');
-  if (listed > REPORT_LISTED) report_say (j, "    and %d more\n", listed - REPORT_LISTED);
+  if (listed > REPORT_LISTED) report_print (j, "    and %d more\n", listed - REPORT_LISTED);
 }
 
 /* ---- Mobility and mass ---- */
 
-static void report_singular_value (pw_json *j, const pw_check *x) {
-  const pw_linear *l = &x->linear;
-  double length = x->r ? pw_run_scale (x->r)->length : NAN;
+static void report_singular_value (pw_json *j, const pw_check *check) {
+  const pw_linear *linear = &check->linear;
+  double length = check->run ? pw_run_scale (check->run)->length : NAN;
   char value[32], unit[32];
-  const char *label = l->rank > 0 ? "smallest singular value of J" : NULL;
-  if (isnan (l->least))
+  const char *label = linear->rank > 0 ? "smallest singular value of J" : NULL;
+  if (isnan (linear->least))
     report_entry (j, "least_singular_value", NAN, label, "not computed: %d coordinates, the limit is %d",
-                  l->coordinates, CHECK_MOST);
+                  linear->coordinates, CHECK_COORDINATES);
   else
-    report_entry (j, "least_singular_value", x->r ? l->least : NAN, label,
-                  "%s, rows of length 1, angles in units of L = %s m", pw_format (value, l->least, CHECK_DIGITS),
+    report_entry (j, "least_singular_value", check->run ? linear->least : NAN, label,
+                  "%s, rows of length 1, angles in units of L = %s m", pw_format (value, linear->least, CHECK_DIGITS),
                   pw_format (unit, length, CHECK_DIGITS));
   pw_json_number (j, "length_scale", length);
 }
 
-static void report_mobility (pw_json *j, const pw_check *x) {
-  const pw_system *s = x->m.system;
-  const pw_linear *l = &x->linear;
+static void report_mobility (pw_json *j, const pw_check *check) {
+  const pw_system *s = check->model.system;
+  const pw_linear *linear = &check->linear;
   int coordinates = pw_system_coordinates (s), rows = pw_system_rows (s), holonomic = pw_system_holonomic (s),
       listed = 0;
   report_section (j, "mobility", '{', "Mobility");
@@ -82,29 +86,29 @@ static void report_mobility (pw_json *j, const pw_check *x) {
   const struct {
     const char *key, *label;
     int value;
-  } count[] = { { "configuration", "degrees of freedom, configuration", l->positions },
-                { "velocity", "degrees of freedom, velocity", l->velocities },
-                { "rank", "rank of J", l->rank } };
+  } count[] = { { "configuration", "degrees of freedom, configuration", linear->positions },
+                { "velocity", "degrees of freedom, velocity", linear->velocities },
+                { "rank", "rank of J", linear->rank } };
   for (int i = 0; i < 3; i++)
-    report_entry (j, count[i].key, x->r ? (double)count[i].value : NAN, x->r ? count[i].label : NULL, "%d",
+    report_entry (j, count[i].key, check->run ? (double)count[i].value : NAN, check->run ? count[i].label : NULL, "%d",
                   count[i].value);
-  report_singular_value (j, x);
+  report_singular_value (j, check);
   pw_json_close (j, '}');
   report_section (j, "redundant", '[', NULL);
-  if (x->r) report_entry (j, NULL, 0, "redundant constraint equations", "%d", pw_run_redundant (x->r));
-  for (const char *const *r = x->redundant; r && *r; r++) report_item (j, &listed, *r, *r);
+  if (check->run) report_text (j, "redundant constraint equations", "%d", pw_run_redundant (check->run));
+  for (const char *const *r = check->redundant; r && *r; r++) report_item (j, &listed, *r, *r);
   report_end_list (j, listed);
 }
 
-static void report_mass (pw_json *j, const pw_check *x) {
+static void report_mass (pw_json *j, const pw_check *check) {
   static const char *const lack[] = { NULL, "no mass", "no inertia", "neither mass nor inertia" };
-  const char *matrix = x->r ? "regular" : x->failure.status == PW_INPUT ? "singular" : NULL;
-  const pw_system *s = x->m.system;
+  const char *matrix = check->run ? "regular" : check->run_error.status == PW_INPUT ? "singular" : NULL;
+  const pw_system *s = check->model.system;
   const double *M = pw_system_mass (s);
   int lacking = 0, listed = 0;
   for (int b = 0; b < pw_system_bodies (s); b++) lacking += M[3 * b] == 0 || M[3 * b + 2] == 0;
   report_section (j, "massless", '[', "Mass");
-  report_entry (j, NULL, 0, "bodies without mass or inertia", "%d", lacking);
+  report_text (j, "bodies without mass or inertia", "%d", lacking);
   for (int b = 0; b < pw_system_bodies (s); b++) {
     int which = (M[3 * b] == 0) + 2 * (M[3 * b + 2] == 0);
     const char *name = pw_system_body_name (s, b);
@@ -114,54 +118,54 @@ static void report_mass (pw_json *j, const pw_check *x) {
     report_item (j, &listed, name, line);
   }
   report_end_list (j, listed);
-  report_entry (j, NULL, 0, "saddle-point matrix", "%s%s", matrix ? matrix : "not known",
-                matrix && x->r == NULL ? "; see below" : "");
+  report_text (j, "saddle-point matrix", "%s%s", matrix ? matrix : "not known",
+               matrix && check->run == NULL ? "; see below" : "");
   report_line (j);
   pw_json_text (j, "saddle_point", matrix);
 }
 
 /* ---- Initial conditions ---- */
 
-static void report_change (pw_json *j, const pw_check *x, int i, int *listed) {
+static void report_change (pw_json *j, const pw_check *check, int i, int *listed) {
   char name[PW_STATE_NAME], line[500], a[32], b[32], c[32];
   double from, to;
-  pw_report_state (x->m.system, pw_run_initial (x->r), i, name, &from, &to);
+  pw_report_state (check->model.system, pw_run_initial (check->run), i, name, &from, &to);
   pw_json_open (j, NULL, '{');
   pw_json_text (j, "state", name);
   pw_json_number (j, "from", from);
   pw_json_number (j, "to", to);
   pw_json_close (j, '}');
   snprintf (line, sizeof line, "%-20s from %s to %s, by %s %s", name, pw_format (a, from, 10), pw_format (b, to, 10),
-            pw_format (c, to - from, 3), pw_system_state_unit (x->m.system, i));
+            pw_format (c, to - from, 3), pw_system_state_unit (check->model.system, i));
   report_item (j, listed, NULL, line);
 }
 
-static void report_initial (pw_json *j, const pw_check *x) {
+static void report_initial (pw_json *j, const pw_check *check) {
   static const char title[] = "Initial conditions";
-  int listed = 0, n = pw_system_coordinates (x->m.system);
-  if (x->r == NULL) {
+  int listed = 0, n = pw_system_coordinates (check->model.system);
+  if (check->run == NULL) {
     report_line (j);
     pw_json_text (j, "start", NULL);
-    report_say (j, "\n%s\n  FAILED: %s\n", title, x->failure.text);
+    report_print (j, "\n%s\n  FAILED: %s\n", title, check->run_error.text);
     return;
   }
-  const pw_initial_report *initial = pw_run_initial (x->r);
+  const pw_initial_report *initial = pw_run_initial (check->run);
   report_section (j, "start", '{', title);
   pw_json_number (j, "moved", initial->moved);
   pw_json_flag (j, "freed", initial->released);
   pw_json_open (j, "changes", '[');
   if (initial->moved == 0)
-    report_say (j, "  consistent as described\n");
+    report_print (j, "  consistent as described\n");
   else
-    report_say (j, "  %d value%s changed%s\n", initial->moved, initial->moved == 1 ? " was" : "s were",
-                initial->released ? ", including given ones: they cannot all be satisfied" : "");
+    report_print (j, "  %d value%s changed%s\n", initial->moved, initial->moved == 1 ? " was" : "s were",
+                  initial->released ? ", including given ones: they cannot all be satisfied" : "");
   for (int i = 0; i < 2 * n; i++)
-    if (pw_initial_moved (x->m.system, initial, i)) report_change (j, x, i, &listed);
+    if (pw_initial_moved (check->model.system, initial, i)) report_change (j, check, i, &listed);
   report_end_list (j, listed);
   pw_json_close (j, '}');
-  if (x->known)
-    report_say (j, "  compared with the reference solution of the model in %d state%s\n", x->known,
-                x->known == 1 ? "" : "s");
+  if (check->reference_states)
+    report_print (j, "  compared with the reference solution of the model in %d state%s\n", check->reference_states,
+                  check->reference_states == 1 ? "" : "s");
 }
 
 /* ---- Element types ---- */
@@ -170,8 +174,8 @@ static void report_failures (pw_json *j, const pw_selftest_report *r, const char
   char error[32], bound[32];
   for (const pw_selftest_check *c = r->check; c < r->check + r->checks; c++) {
     if (!c->failed) continue;
-    report_say (j, "    %s: %s does not hold: off by %s, the bound is %s\n      %s\n", label, c->about,
-                pw_format (error, c->error, 2), pw_format (bound, c->bound, 2), c->where);
+    report_print (j, "    %s: %s does not hold: off by %s, the bound is %s\n      %s\n", label, c->about,
+                  pw_format (error, c->error, 2), pw_format (bound, c->bound, 2), c->where);
     pw_json_open (j, NULL, '{');
     pw_json_text (j, "check", c->name);
     pw_json_text (j, "in", where);
@@ -189,14 +193,14 @@ static void report_kind (pw_json *j, const pw_checked_kind *k) {
   pw_json_open (j, NULL, '{');
   pw_json_text (j, "kind", k->kind->name);
   pw_json_number (j, "elements", k->count);
-  pw_json_number (j, "checks", k->alone.checks + k->inside.checks);
+  pw_json_number (j, "checks", k->random.checks + k->in_model.checks);
   pw_json_open (j, "failed", '[');
   snprintf (name, sizeof name, "%s (%d element%s)", k->kind->name, k->count, k->count == 1 ? "" : "s");
-  report_entry (j, NULL, 0, name, "%s: %d checks at random, %d in this model",
-                k->alone.failed + k->inside.failed ? "FAILED" : "good", k->alone.checks, k->inside.checks);
-  if (*k->untested) report_say (j, "    not tested at random: %s\n", k->untested);
-  report_failures (j, &k->alone, "random scenes", "at random");
-  report_failures (j, &k->inside, "this model", "in this model");
+  report_text (j, name, "%s: %d checks at random, %d in this model",
+               k->random.failed + k->in_model.failed ? "FAILED" : "good", k->random.checks, k->in_model.checks);
+  if (*k->untested) report_print (j, "    not tested at random: %s\n", k->untested);
+  report_failures (j, &k->random, "random scenes", "at random");
+  report_failures (j, &k->in_model, "this model", "in this model");
   pw_json_close (j, ']');
   pw_json_close (j, '}');
 }
@@ -204,113 +208,118 @@ static void report_kind (pw_json *j, const pw_checked_kind *k) {
 /* ---- Linearisation ---- */
 
 /* An eigenvalue, or a conjugate pair. */
-static char *report_eigenvalue (const pw_linear *l, int i, char buffer[100]) {
+static char *report_eigenvalue (const pw_linear *linear, int i, char buffer[100]) {
   char re[32], im[32];
-  snprintf (buffer, 100, l->im[i] != 0 ? "%s +- %s i 1/s" : "%s 1/s", pw_format (re, l->re[i], CHECK_DIGITS),
-            pw_format (im, fabs (l->im[i]), CHECK_DIGITS));
+  snprintf (buffer, 100, linear->im[i] != 0 ? "%s +- %s i 1/s" : "%s 1/s", pw_format (re, linear->re[i], CHECK_DIGITS),
+            pw_format (im, fabs (linear->im[i]), CHECK_DIGITS));
   return buffer;
 }
 
-/* Number of equal eigenvalues from i on. */
-static int report_same (const pw_linear *l, int i) {
+/* Number of equal eigenvalues from i on, those of conjugate pairs included. */
+static int report_equal (const pw_linear *linear, int i) {
   int k = i;
-  while (k < l->unknowns && l->re[k] == l->re[i] && fabs (l->im[k]) == fabs (l->im[i]) && l->rigid[k] == l->rigid[i])
+  while (k < linear->unknowns && linear->re[k] == linear->re[i] && fabs (linear->im[k]) == fabs (linear->im[i]) &&
+         linear->rigid[k] == linear->rigid[i])
     k++;
   return k - i;
 }
 
-static void report_eigenvalues (const pw_linear *l) {
+static void report_eigenvalues (const pw_linear *linear) {
   char text[100];
-  for (int i = 0, lines = 0, same; i < l->unknowns; i += same, lines++) {
+  for (int i = 0, lines = 0, same; i < linear->unknowns; i += same, lines++) {
     if (lines == REPORT_EIGENVALUES) {
-      printf ("    and %d more\n", l->unknowns - i);
+      printf ("    and %d more\n", linear->unknowns - i);
       return;
     }
-    same = report_same (l, i);
-    int multiplicity = l->im[i] != 0 ? same / 2 : same;
+    same = report_equal (linear, i);
+    int multiplicity = linear->im[i] != 0 ? same / 2 : same;
     char times[30] = "";
     if (multiplicity > 1) snprintf (times, sizeof times, ", %d times", multiplicity);
-    report_entry (NULL, NULL, 0, i == 0 ? "eigenvalues, rightmost first" : "", "%s%s%s", report_eigenvalue (l, i, text),
-                  times, l->rigid[i] ? ": rigid displacement" : "");
+    report_text (NULL, i == 0 ? "eigenvalues, rightmost first" : "", "%s%s%s", report_eigenvalue (linear, i, text),
+                 times, linear->rigid[i] ? ": rigid displacement" : "");
   }
 }
 
-static void report_motion (pw_json *j, const pw_linear *l) {
+static void report_motion (pw_json *j, const pw_linear *linear) {
   static const char *const steady[] = { "steady", "accelerated", "changing" };
-  char a[32], w[32];
-  pw_json_text (j, "motion", steady[l->steady]);
-  report_entry (j, "acceleration", l->acceleration, l->steady == PW_ACCELERATED ? "motion" : NULL,
-                "not steady: accelerations of %s m/s^2 in the co-moving frame", pw_format (a, l->acceleration, 3));
-  if (l->steady == PW_CHANGING)
-    report_entry (j, NULL, 0, "motion", "not steady: the equations change with time or along the motion");
-  if (l->steady != PW_STEADY) report_entry (j, NULL, 0, "", "the eigenvalues are not stability exponents");
-  report_entry (j, "turn_rate", l->twist[2], l->twist[2] != 0 ? "co-moving frame" : NULL, "turns at %s rad/s",
-                pw_format (w, l->twist[2], CHECK_DIGITS));
-  pw_json_number (j, "symmetries", l->symmetries);
+  char acceleration[32], rate[32];
+  pw_json_text (j, "motion", steady[linear->steady]);
+  report_entry (j, "acceleration", linear->acceleration, linear->steady == PW_ACCELERATED ? "motion" : NULL,
+                "not steady: accelerations of %s m/s^2 in the co-moving frame",
+                pw_format (acceleration, linear->acceleration, 3));
+  if (linear->steady == PW_CHANGING)
+    report_text (j, "motion", "not steady: the equations change with time or along the motion");
+  if (linear->steady != PW_STEADY) report_text (j, "", "the eigenvalues are not stability exponents");
+  report_entry (j, "turn_rate", linear->twist[2], linear->twist[2] != 0 ? "co-moving frame" : NULL, "turns at %s rad/s",
+                pw_format (rate, linear->twist[2], CHECK_DIGITS));
+  pw_json_number (j, "symmetries", linear->symmetries);
 }
 
-static void report_stability (pw_json *j, const pw_check *x) {
-  const pw_linear *l = &x->linear;
-  double slowest = -INFINITY;
+static void report_stability (pw_json *j, const pw_check *check) {
+  const pw_linear *linear = &check->linear;
+  double rightmost = -INFINITY; /* real part [1/s] */
   char time[32];
-  for (int i = 0; i < l->unknowns; i++)
-    if (!l->rigid[i]) slowest = fmax (slowest, l->re[i]);
-  const char *label = l->steady == PW_STEADY && isfinite (slowest) ? "stability" : NULL;
-  if (slowest > 0)
-    report_entry (j, "doubling_time", x->doubling, label, "unstable, doubles in %s s",
-                  pw_format (time, x->doubling, CHECK_DIGITS));
-  else if (slowest < 0)
-    report_entry (j, "doubling_time", x->doubling, label, "stable, the slowest perturbation halves in %s s",
-                  pw_format (time, log (2) / -slowest, CHECK_DIGITS));
+  for (int i = 0; i < linear->unknowns; i++)
+    if (!linear->rigid[i]) rightmost = fmax (rightmost, linear->re[i]);
+  const char *label = linear->steady == PW_STEADY && isfinite (rightmost) ? "stability" : NULL;
+  if (rightmost > 0)
+    report_entry (j, "doubling_time", check->doubling_time, label, "unstable, doubles in %s s",
+                  pw_format (time, check->doubling_time, CHECK_DIGITS));
+  else if (rightmost < 0)
+    report_entry (j, "doubling_time", check->doubling_time, label, "stable, the slowest perturbation halves in %s s",
+                  pw_format (time, log (2) / -rightmost, CHECK_DIGITS));
   else
-    report_entry (j, "doubling_time", x->doubling, label,
+    report_entry (j, "doubling_time", check->doubling_time, label,
                   "neutral: no perturbation grows exponentially, not all decay");
 }
 
-static void report_fastest (pw_json *j, const pw_check *x) {
-  const pw_linear *l = &x->linear;
-  int there = x->fastest >= 0;
-  double re = there ? l->re[x->fastest] : 0, im = there ? fabs (l->im[x->fastest]) : 0, size = hypot (re, im);
-  double damping = !there ? NAN : re != 0 ? -re / size : 0;
-  char text[100], a[32], b[32];
-  if (there) report_entry (j, NULL, 0, "fastest eigenvalue", "%s", report_eigenvalue (l, x->fastest, text));
+static void report_fastest (pw_json *j, const pw_check *check) {
+  const pw_linear *linear = &check->linear;
+  int found = check->fastest >= 0;
+  double re = found ? linear->re[check->fastest] : 0, im = found ? fabs (linear->im[check->fastest]) : 0,
+         size = hypot (re, im);
+  double damping = !found ? NAN : re != 0 ? -re / size : 0;
+  char text[100], first[32], second[32];
+  if (found) report_text (j, "fastest eigenvalue", "%s", report_eigenvalue (linear, check->fastest, text));
   report_entry (j, "frequency_hz", im / (2 * PW_PI), im != 0 ? "its frequency" : NULL,
-                "%s Hz, undamped it would be %s Hz", pw_format (a, im / (2 * PW_PI), CHECK_DIGITS),
-                pw_format (b, size / (2 * PW_PI), CHECK_DIGITS));
+                "%s Hz, undamped it would be %s Hz", pw_format (first, im / (2 * PW_PI), CHECK_DIGITS),
+                pw_format (second, size / (2 * PW_PI), CHECK_DIGITS));
   report_entry (j, "damping", damping, im != 0 ? "its damping" : NULL, "%s of critical",
-                pw_format (a, damping, CHECK_DIGITS));
-  if (there && im == 0)
-    report_entry (j, NULL, 0, re < 0 ? "it decays by e in" : "it grows by e in", "%s s",
-                  pw_format (a, 1 / size, CHECK_DIGITS));
-  if (isinf (x->limit))
-    report_entry (j, "rk4_step", x->limit, there ? "RK4 is stable" : NULL, "with any step: the fast modes grow");
+                pw_format (first, damping, CHECK_DIGITS));
+  if (found && im == 0)
+    report_text (j, re < 0 ? "it decays by a factor e in" : "it grows by a factor e in", "%s s",
+                 pw_format (first, 1 / size, CHECK_DIGITS));
+  if (isinf (check->rk4_limit))
+    report_entry (j, "rk4_step", check->rk4_limit, found ? "RK4 is stable" : NULL,
+                  "with any step: the fast modes grow");
   else
-    report_entry (j, "rk4_step", x->limit, there ? "RK4 is stable up to a step of" : NULL,
-                  "%s s; the model's step is %s s", pw_format (a, x->limit, 3), pw_format (b, x->step, 6));
+    report_entry (j, "rk4_step", check->rk4_limit, found ? "RK4 is stable up to a step of" : NULL,
+                  "%s s; the model's step is %s s", pw_format (first, check->rk4_limit, 3),
+                  pw_format (second, check->step, 6));
 }
 
-static void report_linear (pw_json *j, const pw_check *x) {
-  const pw_linear *l = &x->linear;
-  if (l->A == NULL) report_line (j), pw_json_text (j, "linearisation", NULL);
-  if (x->r == NULL || (j && l->A == NULL)) return;
+static void report_linear (pw_json *j, const pw_check *check) {
+  const pw_linear *linear = &check->linear;
+  if (linear->A == NULL) report_line (j), pw_json_text (j, "linearisation", NULL);
+  if (check->run == NULL || (j && linear->A == NULL)) return;
   report_section (j, "linearisation", '{', "Linearised at the initial state");
-  report_entry (j, "unknowns", l->unknowns, "unknowns", "%d", l->unknowns);
-  if (l->A == NULL && l->coordinates > CHECK_MOST)
-    report_entry (j, NULL, 0, "eigenvalues", "not computed: %d coordinates, the limit is %d", l->coordinates,
-                  CHECK_MOST);
-  if (l->A == NULL) return;
-  report_motion (j, l);
-  if (j == NULL && x->fastest < 0 && l->twist[2] == 0)
-    report_entry (j, NULL, 0, "eigenvalues", "all 0: nothing vibrates, grows or decays");
+  report_entry (j, "unknowns", linear->unknowns, "unknowns", "%d", linear->unknowns);
+  if (linear->A == NULL && linear->coordinates > CHECK_COORDINATES)
+    report_text (j, "eigenvalues", "not computed: %d coordinates, the limit is %d", linear->coordinates,
+                 CHECK_COORDINATES);
+  if (linear->A == NULL) return;
+  report_motion (j, linear);
+  if (j == NULL && check->fastest < 0 && linear->twist[2] == 0)
+    report_text (j, "eigenvalues", "all 0: nothing vibrates, grows or decays");
   else if (j == NULL)
-    report_eigenvalues (l);
-  report_stability (j, x);
-  report_fastest (j, x);
+    report_eigenvalues (linear);
+  report_stability (j, check);
+  report_fastest (j, check);
   report_section (j, "eigenvalues", '[', NULL);
-  for (int i = 0; i < l->unknowns; i++) {
+  for (int i = 0; i < linear->unknowns; i++) {
     pw_json_open (j, NULL, '[');
-    pw_json_number (j, NULL, l->re[i]);
-    pw_json_number (j, NULL, l->im[i]);
+    pw_json_number (j, NULL, linear->re[i]);
+    pw_json_number (j, NULL, linear->im[i]);
     pw_json_close (j, ']');
   }
   pw_json_close (j, ']');
@@ -319,40 +328,40 @@ static void report_linear (pw_json *j, const pw_check *x) {
 
 /* ---- The report ---- */
 
-static void report_list (pw_json *j, const char *key, const char *one, const pw_check_list *l) {
-  int most = (int)(sizeof l->text / sizeof *l->text);
-  if (l->count > 0) report_say (j, "\n%d %s\n", l->count, l->count == 1 ? one : key);
+static void report_list (pw_json *j, const char *key, const char *one, const pw_check_list *list) {
+  int most = (int)(sizeof list->text / sizeof *list->text);
+  if (list->count > 0) report_print (j, "\n%d %s\n", list->count, list->count == 1 ? one : key);
   report_section (j, key, '[', NULL);
-  for (int i = 0; i < l->count && i < most; i++) {
-    pw_json_text (j, NULL, l->text[i]);
-    report_say (j, "  %s\n", l->text[i]);
+  for (int i = 0; i < list->count && i < most; i++) {
+    pw_json_text (j, NULL, list->text[i]);
+    report_print (j, "  %s\n", list->text[i]);
   }
   pw_json_close (j, ']');
 }
 
-static void report_lists (pw_json *j, const pw_check *x) {
-  report_list (j, "problems", "problem", &x->problem);
-  report_list (j, "findings", "finding", &x->finding);
+static void report_lists (pw_json *j, const pw_check *check) {
+  report_list (j, "problems", "problem", &check->problem);
+  report_list (j, "findings", "finding", &check->finding);
 }
 
-void pw_check_report (const pw_check *x, pw_json *j) {
-  const char *about = pw_file_table (x->m.file)->about;
+void pw_check_report (const pw_check *check, pw_json *j) {
+  const char *about = pw_file_table (check->model.file)->about;
   pw_json_open (j, NULL, '{');
   pw_json_number (j, "schema", 1);
-  pw_json_text (j, "model", pw_file_name (x->m.file));
-  pw_json_text (j, "status", x->problem.count ? "failed" : "ok");
-  if (j) report_lists (j, x);
-  report_say (j, "%s: %s\n", pw_file_name (x->m.file), about ? about : "");
-  report_mobility (j, x);
-  report_mass (j, x);
-  report_initial (j, x);
+  pw_json_text (j, "model", pw_file_name (check->model.file));
+  pw_json_text (j, "status", check->problem.count ? "failed" : "ok");
+  if (j) report_lists (j, check);
+  report_print (j, "%s: %s\n", pw_file_name (check->model.file), about ? about : "");
+  report_mobility (j, check);
+  report_mass (j, check);
+  report_initial (j, check);
   report_section (j, "kinds", '[',
                   "Self-test of the element types in use: each function against differences of others");
-  for (const pw_checked_kind *k = x->kind; k < x->kind + x->kinds; k++) report_kind (j, k);
+  for (const pw_checked_kind *k = check->kind; k < check->kind + check->kinds; k++) report_kind (j, k);
   pw_json_close (j, ']');
-  report_linear (j, x);
+  report_linear (j, check);
   report_line (j);
   pw_json_close (j, '}');
-  if (x->problem.count + x->finding.count == 0) report_say (j, "\nNo problems found\n");
-  if (j == NULL) report_lists (j, x);
+  if (check->problem.count + check->finding.count == 0) report_print (j, "\nNo problems found\n");
+  if (j == NULL) report_lists (j, check);
 }

@@ -6,14 +6,17 @@
 #include "pinwheel-analysis.h"
 #include "pinwheel-selftest.h"
 
-enum { CHECK_MOST = 400 /* coordinates above which computations of cubic cost are omitted */, CHECK_DIGITS = 5 };
+enum {
+  CHECK_COORDINATES = 400, /* above this number computations of cubic cost are omitted */
+  CHECK_DIGITS = 5
+};
 
 /* The self-test of an element type in use. */
 typedef struct {
   const pw_kind *kind;
-  int count;                        /* elements */
-  pw_selftest_report alone, inside; /* results in random scenes; in this model */
-  char untested[500];               /* why there is no test in random scenes, or "" */
+  int count;                           /* elements */
+  pw_selftest_report random, in_model; /* of elements in random scenes; of those in this model */
+  char untested[500];                  /* why there is no test in random scenes, or "" */
 } pw_checked_kind;
 
 /* Number of messages, and the first ones. */
@@ -25,23 +28,24 @@ typedef struct {
 /* Problems make the check fail; findings do not: the model can be run, but may not be what was intended. */
 typedef struct {
   pw_cli_line line;
-  const char *json; /* path, or NULL */
-  pw_cli_model m;
-  pw_run *r; /* NULL: initialisation failed, for the reason in `failure` */
-  pw_error failure;
-  pw_linear linear;       /* zero without a run */
+  const char *json_path; /* NULL: not given */
+  pw_cli_model model;
+  pw_run *run; /* NULL: initialisation failed with `run_error` */
+  pw_error run_error;
+  pw_linear linear;       /* at the initial state; zero without a run */
   const char **redundant; /* a description of each redundant constraint equation, ended by NULL; or NULL */
   pw_checked_kind *kind;  /* kinds: the element types in use */
   int kinds;
-  int known;          /* states of the model's reference solution, compared with the initial state */
-  double step, limit; /* the model's step, or 0; the largest stable step of RK4, or INFINITY [s] */
-  int explicit_rk4;   /* 1: the model selects rk4 */
-  int fastest;        /* the eigenvalue of largest modulus except rigid displacements; -1: all are 0 */
-  double doubling; /* time in which the fastest growing perturbation of a steady motion doubles [s]; INFINITY: none */
+  int reference_states; /* states of the model's reference solution, compared with the initial state */
+  double step;          /* the model's [s] */
+  int uses_rk4;         /* 1: the model's method is rk4 */
+  double rk4_limit;     /* the largest stable step of RK4 [s]; INFINITY: all are stable */
+  int fastest;          /* the eigenvalue of largest modulus except rigid displacements; -1: all are 0 */
+  double doubling_time; /* of the fastest growing perturbation of a steady motion [s]; INFINITY: none grows */
   pw_check_list problem, finding;
 } pw_check;
 
 /* Writes the report: as JSON to j, or as text to standard output if j is NULL. */
-void pw_check_report (const pw_check *x, pw_json *j);
+void pw_check_report (const pw_check *check, pw_json *j);
 
 #endif

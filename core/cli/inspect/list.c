@@ -5,11 +5,8 @@
 #include "print_table.h"
 #include "util.h"
 
-enum {
-  LIST_WIDTH = 110, /* of a line, if the last column leaves room */
-  LIST_NAMES = 100, /* of a line of names */
-  LIST_HEADING = 14 /* of the heading before them */
-};
+/* Characters of a line whose last column is wrapped; of a line of names; of the heading before the names. */
+enum { LIST_WIDTH = 110, LIST_NAMES = 100, LIST_HEADING = 14 };
 
 /* Of each type of field: its name, default, and value in an example. */
 static const struct {
@@ -18,18 +15,18 @@ static const struct {
                    [PW_VECTOR] = { "vector", "[0, 0]", "[X, Y]" }, [PW_BODY] = { "body", "", "BODY" },
                    [PW_SIGNAL] = { "signal", "0", "SIGNAL" },      [PW_CHOICE] = { "choice", "", "" } };
 
-/* A row such as "radius  number [m]  required  radius of the wheel". */
-static void list_row (pw_table *t, const char *name, const char *type, const char *given, const char *about) {
+/* A row such as "radius  number [m]  required  radius of the wheel", the last column wrapped. */
+static void list_row (pw_table *t, const char *name, const char *type, const char *value, const char *about) {
   t->pad = t->indent = 4;
   pw_cell (t, -1, name);
   pw_cell (t, -1, type);
-  pw_cell (t, 0, given);
-  if (pw_cell (t, 0, "")) pw_cli_wrap (about, t->indent, LIST_WIDTH);
+  pw_cell (t, 0, value);
+  if (pw_cell (t, 0, "")) pw_cli_print_wrapped (about, t->indent, LIST_WIDTH);
   t->column = t->pad = 0;
 }
 
 /* "required" or the default; the domain of a number; the alternatives of a choice. */
-static void list_given (const pw_field *f, char *text, size_t size) {
+static void list_default (const pw_field *f, char *text, size_t size) {
   const char *domain = f->type == PW_NUMBER ? pw_domain_text (f->domain) : "";
   snprintf (text, size, *domain ? "%s (%s)" : "%s",
             f->required || f->type == PW_BODY ? "required" : list_types[f->type].zero, domain);
@@ -41,55 +38,56 @@ static void list_given (const pw_field *f, char *text, size_t size) {
 
 static void list_fields (pw_table *t, const pw_field *fields) {
   for (const pw_field *f = fields; f->name; f++) {
-    char type[60], given[80], times[16] = "";
+    char type[60], value[80], times[16] = "";
     if (pw_field_count (f) > 1) snprintf (times, sizeof times, "%d x ", f->count);
     snprintf (type, sizeof type, "%s%s%s%s%s", times, list_types[f->type].name, f->unit ? " [" : "",
               f->unit ? f->unit : "", f->unit ? "]" : "");
-    list_given (f, given, sizeof given);
-    list_row (t, f->name, type, given, f->about ? f->about : "");
+    list_default (f, value, sizeof value);
+    list_row (t, f->name, type, value, f->about ? f->about : "");
   }
 }
 
-/* ---- Descriptions of named items ---- */
+/* ---- Descriptions of methods and element types by name ---- */
 
-/* Describes the items given by name; "all" stands for all.  `item` ends with NULL; the first member of each is its
- * name.  `what`: "element type". */
-static int list_named (const char *what, const void *const *item, void (*show) (const void *item), const char **name,
-                       pw_error *error) {
+/* Describes those of these names, or all for the name "all".  `entries` ends with NULL; the first member of each is its
+ * name.  `sort`: "element type". */
+static int list_named (const char *sort, const void *const *entries, void (*describe) (const void *entry),
+                       const char **name, pw_error *error) {
   for (int shown = 0; *name; name++) {
     int all = strcmp (*name, "all") == 0, found = all;
     pw_nearest near = { .sought = *name };
-    for (const void *const *i = item; *i; i++) {
-      const char *known = *(const char *const *)*i;
+    for (const void *const *entry = entries; *entry; entry++) {
+      const char *known = *(const char *const *)*entry;
       pw_nearest_try (&near, known);
       if (!all && strcmp (known, *name) != 0) continue;
       if (shown++ > 0) putchar ('\n');
-      show (*i);
+      describe (*entry);
       found = 1;
     }
-    if (!found) return pw_fail (error, PW_INPUT, "there is no %s \"%s\"%s", what, *name, pw_nearest_text (&near));
+    if (!found) return pw_fail (error, PW_INPUT, "there is no %s \"%s\"%s", sort, *name, pw_nearest_text (&near));
   }
   return PW_OK;
 }
 
 /* ---- Models ---- */
 
-static int list_width (void *context, const char *name, const char *path) {
-  int *width = context, n = (int)strlen (name);
+/* The length of the longest name. */
+static int list_longest (void *context, const char *name, const char *path) {
+  int *width = context, length = (int)strlen (name);
   (void)path;
-  if (*width < n) *width = n;
+  if (*width < length) *width = length;
   return 0;
 }
 
 /* A file that cannot be opened is listed with the reason. */
 static int list_model (void *context, const char *name, const char *path) {
-  char folder[1000];
+  char short_path[1000];
   pw_error error = { 0 };
   pw_file *f = pw_file_open (path, &error);
   const char *about = f ? pw_file_table (f)->about : error.text;
   const int width = *(const int *)context;
   pw_cli_print (stdout, "  %-*s  %s\n  %-*s  %s\n", width, name, about ? about : "", width, "",
-                pw_cli_short_path (path, folder, sizeof folder));
+                pw_cli_short_path (path, short_path, sizeof short_path));
   pw_file_close (f);
   return 0;
 }
@@ -100,7 +98,7 @@ static int list_models (const char **name, pw_error *error) {
   int width = 0;
   (void)name;
   puts ("Models");
-  int status = pw_file_list (list_width, &width, error);
+  int status = pw_file_list (list_longest, &width, error);
   if (status == PW_OK) status = pw_file_list (list_model, &width, error);
   if (status == PW_OK && width == 0) printf (" %s\n", list_none);
   return status;
@@ -126,8 +124,8 @@ static void list_method (const pw_method *m) {
   for (const pw_stabilisation *s = m->refused; s && s->name; s++) printf ("    no %s: %s\n", s->name, s->about);
 }
 
-static void list_method_options (const void *item) {
-  const pw_method *m = item;
+static void list_method_options (const void *entry) {
+  const pw_method *m = entry;
   list_method (m);
   for (const pw_option *o = m->options; o && o->name; o++) list_option (o);
 }
@@ -162,9 +160,9 @@ static void list_quantities (const char *title, const pw_quantity *q, int count)
     for (int i = 0; i < count; i++) list_row (&t, q[i].name, q[i].unit, q[i].rate ? q[i].rate : "", q[i].about);
 }
 
-static void list_kind (const void *item) {
+static void list_kind (const void *entry) {
   static const char *const level[] = { "force", "constraint on positions", "constraint on velocities" };
-  const pw_kind *k = item;
+  const pw_kind *k = entry;
   printf ("%s: %s\n    %s", k->name, k->about, pw_kind_acts (k) ? level[k->level] : "without effect");
   if (k->rows) printf (", %d constraint equation%s per element", k->rows, k->rows == 1 ? "" : "s");
   puts (k->each_body ? ", acts on every body that has mass" : "");
@@ -182,17 +180,17 @@ static int list_kinds (const char **name, pw_error *error) {
   static const struct {
     int acts;
     pw_level level;
-    const char *name;
-  } part[] = { { 1, PW_HOLONOMIC, "constraints on positions" },
-               { 1, PW_NONHOLONOMIC, "constraints on velocities" },
-               { 1, PW_FORCE, "forces" },
-               { 0, PW_FORCE, "without effect" } };
+    const char *title;
+  } section[] = { { 1, PW_HOLONOMIC, "constraints on positions" },
+                  { 1, PW_NONHOLONOMIC, "constraints on velocities" },
+                  { 1, PW_FORCE, "forces" },
+                  { 0, PW_FORCE, "without effect" } };
   if (*name) return list_named ("element type", (const void *const *)pw_kinds, list_kind, name, error);
   puts ("Element types (kinds)");
-  for (size_t i = 0; i < sizeof part / sizeof *part; i++) {
-    printf ("  %s\n", part[i].name);
+  for (size_t i = 0; i < sizeof section / sizeof *section; i++) {
+    printf ("  %s\n", section[i].title);
     for (const pw_kind *const *k = pw_kinds; *k; k++)
-      if ((*k)->level == part[i].level && pw_kind_acts (*k) == part[i].acts)
+      if ((*k)->level == section[i].level && pw_kind_acts (*k) == section[i].acts)
         printf ("    %-18s  %s\n", (*k)->name, (*k)->about);
   }
   puts ("`pinwheel list kinds NAME...` shows the fields of a type, `pinwheel list kinds all` those of all");
@@ -201,6 +199,7 @@ static int list_kinds (const char **name, pw_error *error) {
 
 /* ---- Signals ---- */
 
+/* The fields of a form of signals; a table has further ones in a text model. */
 static void list_signal (pw_table *t, const pw_signal_form *s) {
   list_fields (t, s->fields);
   if (s->type != PW_TABLE) return;
@@ -257,20 +256,20 @@ static int list_command (void *options, pw_error *error) {
     const char *name;
     int (*list) (const char **name, pw_error *error);
     int named; /* 1: accepts names */
-  } part[] = { { "models", list_models, 0 },
-               { "methods", list_methods, 1 },
-               { "kinds", list_kinds, 1 },
-               { "signals", list_signals, 0 },
-               { .name = NULL } };
+  } lists[] = { { "models", list_models, 0 },
+                { "methods", list_methods, 1 },
+                { "kinds", list_kinds, 1 },
+                { "signals", list_signals, 0 },
+                { .name = NULL } };
   const pw_cli_line *l = options;
   if (l->arguments == 0) return list_overview (error);
   const char *const sought = l->argument[0];
   char hint[PW_HINT];
-  int i = pw_find_name (part, sizeof *part, sought, hint);
+  int i = pw_find_name (lists, sizeof *lists, sought, hint);
   if (i < 0) return pw_fail (error, PW_INPUT, "there is no list of \"%s\"%s", sought, hint);
-  if (l->arguments > 1 && !part[i].named)
+  if (l->arguments > 1 && !lists[i].named)
     return pw_fail (error, PW_INPUT, "unexpected argument \"%s\"; usage: pinwheel list %s", l->argument[1], sought);
-  return part[i].list (l->argument + 1, error);
+  return lists[i].list (l->argument + 1, error);
 }
 
 const pw_command pw_cli_list = {
@@ -280,7 +279,7 @@ const pw_command pw_cli_list = {
   .help =
       "List the names of models, integration methods, element types (kinds) and forms of signals, or describe "
       "those of one sort. With a NAME or \"all\", describe the options of a method or the fields of an element type.",
-  .size = sizeof (pw_cli_line),
+  .options_size = sizeof (pw_cli_line),
   .function = list_command,
   .options = (const struct poptOption[]){ POPT_TABLEEND },
 };

@@ -8,18 +8,19 @@
  * new_model_yaml. */
 #include "new.inc"
 
-/* "folder/my_car.c" gives "my_car" and ".c"; PW_INPUT for a name that would need quotes, begins with -, or is too long. */
+/* "folder/my_car.c" gives "my_car" and ".c".  PW_INPUT for a name that a shell would not read as one word or as a name,
+ * or that is too long. */
 static int new_name (const char *path, char *name, size_t size, const char **ending, pw_error *error) {
-  const char *base = strrchr (path, '/');
-  base = base ? base + 1 : path;
-  size_t n = strspn (base, "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_-");
-  *ending = base + n;
-  if (n == 0 || n >= size || base[0] == '-' || (strcmp (*ending, ".c") != 0 && strcmp (*ending, ".yaml") != 0))
+  const char *slash = strrchr (path, '/'), *base = slash ? slash + 1 : path;
+  size_t length = strspn (base, "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_-");
+  *ending = base + length;
+  if (length == 0 || length >= size || base[0] == '-' ||
+      (strcmp (*ending, ".c") != 0 && strcmp (*ending, ".yaml") != 0))
     return pw_fail (error, PW_INPUT,
                     "\"%s\": a model file's name has at most %zu letters, digits, _ and -, does not begin with -, and "
                     "ends in .c or .yaml",
                     path, size - 1);
-  snprintf (name, size, "%.*s", (int)n, base);
+  snprintf (name, size, "%.*s", (int)length, base);
   return PW_OK;
 }
 
@@ -41,11 +42,11 @@ static int new_write (const char *path, pw_error *error) {
   if (f == NULL && errno == EEXIST) return pw_fail (error, PW_INPUT, "%s exists already and was not changed", path);
   if (f == NULL) return pw_fail (error, PW_RESOURCE, "cannot write %s: %s", path, strerror (errno));
   new_print (f, name, ending[1] == 'y' ? new_model_yaml : new_model_c);
-  int why = fflush (f) != 0 ? errno : 0;
-  if (fclose (f) != 0 && why == 0) why = errno;
-  if (why) {
+  int failed = fflush (f) != 0 ? errno : 0; /* an errno value */
+  if (fclose (f) != 0 && failed == 0) failed = errno;
+  if (failed) {
     remove (path);
-    return pw_fail (error, PW_RESOURCE, "cannot write %s: %s", path, strerror (why));
+    return pw_fail (error, PW_RESOURCE, "cannot write %s: %s", path, strerror (failed));
   }
   pw_cli_print (stdout, "%s is written; now:  pinwheel run %s%s\n", path, strchr (path, '/') ? "" : "./", path);
   return PW_OK;
@@ -60,9 +61,9 @@ const pw_command pw_cli_new = {
   .synopsis = "NAME.c|NAME.yaml",
   .summary = "write a small commented model to start from",
   .help = "Write a small commented model, in C or as text, to start from. Existing files are never overwritten.",
-  .least = 1,
-  .most = 1,
-  .size = sizeof (pw_cli_line),
+  .min_arguments = 1,
+  .max_arguments = 1,
+  .options_size = sizeof (pw_cli_line),
   .function = new_command,
   .options = (const struct poptOption[]){ POPT_TABLEEND },
 };

@@ -66,11 +66,11 @@ static void show_parameters (const pw_model *m) {
 }
 
 static void show_defaults (const pw_plugin_table *table) {
-  pw_run_defaults d = pw_cli_defaults (table);
+  pw_run_defaults defaults = pw_cli_defaults (table);
   char t_end[32], step[32], rtol[32];
-  printf ("\nRuns by default for %s s with %s, --step %s", pw_format (t_end, d.t_end, SHOW_DIGITS), d.method,
-          pw_format (step, d.step, SHOW_DIGITS));
-  if (d.rtol != 0) printf (", --rtol %s", pw_format (rtol, d.rtol, SHOW_DIGITS));
+  printf ("\nRuns by default for %s s with %s, --step %s", pw_format (t_end, defaults.t_end, SHOW_DIGITS),
+          defaults.method, pw_format (step, defaults.step, SHOW_DIGITS));
+  if (defaults.rtol != 0) printf (", --rtol %s", pw_format (rtol, defaults.rtol, SHOW_DIGITS));
   putchar ('\n');
 }
 
@@ -83,27 +83,27 @@ static void show_sizes (const pw_system *s) {
 
 /* The states given by the reference solution of the model. */
 static void show_reference (const pw_cli_model *m) {
-  enum { MOST = 12 };
+  enum { LISTED = 12 }; /* states, at most */
   int n = pw_system_coordinates (m->system), known = 0;
   char name[300];
   double *x = pw_system_has_reference (m->model) ? malloc (2 * (size_t)n * sizeof *x) : NULL;
   if (x && pw_system_reference (m->model, m->system, 0, x, x + n, NULL) == PW_OK)
     for (int i = 0; i < 2 * n; i++)
-      if (!isnan (x[i]) && ++known <= MOST)
+      if (!isnan (x[i]) && ++known <= LISTED)
         printf ("%s%s",
                 known > 1 ? ", " : "\nReference solution: ", pw_system_state_name (m->system, i, name, sizeof name));
-  if (known > MOST) printf (", and %d more", known - MOST);
+  if (known > LISTED) printf (", and %d more", known - LISTED);
   if (known) putchar ('\n');
   free (x);
 }
 
 static void show_model (const pw_cli_model *m) {
-  char folder[1000];
+  char path[1000];
   int elements;
   const pw_plugin_table *table = pw_model_table (m->model);
   const pw_element *e = pw_model_elements (m->model, &elements);
   pw_cli_print (stdout, "%s: %s\n%s\n", pw_model_name (m->model), table->about ? table->about : "",
-                pw_cli_short_path (pw_file_path (m->file), folder, sizeof folder));
+                pw_cli_short_path (pw_file_path (m->file), path, sizeof path));
   show_bodies (m->system);
   if (elements) puts ("\nElements");
   for (int i = 0; i < elements; i++) show_element (&e[i]);
@@ -114,7 +114,9 @@ static void show_model (const pw_cli_model *m) {
   show_sizes (m->system);
 }
 
-/* ---- The equations  M a + J^T lambda = f,  J a = gamma  in numbers ---- */
+/* ---- The equations of motion in numbers ----
+ *
+ * M a + J^T lambda = f,  J a = gamma;  constraints on velocities J v = eta, on positions g (q, t) = 0. */
 
 enum { MATRICES_DIGITS = 7, MATRICES_PANEL = 6 /* columns of J side by side */ };
 
@@ -123,92 +125,93 @@ static void matrices_head (pw_table *t, const char *const *head) {
   pw_row_end (t);
 }
 
-static void matrices_coordinates (const pw_system *s, const pw_equations *k, const pw_sample *x) {
+/* A row of numbers; "-" in place of NaN. */
+static void matrices_row (pw_table *t, const char *name, const char *unit, const double *value, int count) {
+  pw_cell_unit (t, -22, name, unit);
+  for (int i = 0; i < count; i++)
+    isnan (value[i]) ? pw_cell (t, 13, "-") : pw_cell_number (t, 13, value[i], MATRICES_DIGITS);
+  pw_row_end (t);
+}
+
+static void matrices_coordinates (const pw_system *s, const pw_equations *equations, const pw_sample *sample) {
   static const char *const head[] = { "M", "f", "q", "v", "a", NULL };
   char name[300];
   puts ("\nM (diagonal), forces and state by coordinate; SI units");
   for (pw_table t = { 0 }; pw_table_pass (&t);) {
     matrices_head (&t, head);
-    for (int j = 0; j < k->coordinates; j++) {
-      const double value[] = { k->mass[j], k->force[j], x->q[j], x->v[j], x->a[j] };
-      pw_cell_unit (&t, -22, pw_system_state_name (s, j, name, sizeof name), pw_system_state_unit (s, j));
-      for (int i = 0; i < 5; i++) pw_cell_number (&t, 13, value[i], MATRICES_DIGITS);
-      pw_row_end (&t);
+    for (int j = 0; j < equations->coordinates; j++) {
+      const double value[] = { equations->mass[j], equations->force[j], sample->q[j], sample->v[j], sample->a[j] };
+      pw_system_state_name (s, j, name, sizeof name);
+      matrices_row (&t, name, pw_system_state_unit (s, j), value, 5);
     }
   }
 }
 
-static void matrices_rows (const pw_system *s, const pw_equations *k, const pw_sample *x) {
+static void matrices_constraints (const pw_system *s, const pw_equations *equations, const pw_sample *sample) {
   static const char *const head[] = { "gamma", "eta", "g", "lambda", NULL };
   char name[300];
   puts ("\ngamma, eta, g and lambda by constraint equation, named after its reaction, which is -lambda");
   for (pw_table t = { 0 }; pw_table_pass (&t);) {
     matrices_head (&t, head);
-    for (int i = 0; i < k->rows; i++) {
-      pw_cell_unit (&t, -22, pw_system_reaction_name (s, i, name, sizeof name), pw_system_reaction_unit (s, i));
-      pw_cell_number (&t, 13, k->gamma[i], MATRICES_DIGITS);
-      pw_cell_number (&t, 13, k->eta[i], MATRICES_DIGITS);
-      if (i < k->holonomic)
-        pw_cell_number (&t, 13, k->g[i], MATRICES_DIGITS);
-      else
-        pw_cell (&t, 13, "-");
-      pw_cell_number (&t, 13, x->lambda[i], MATRICES_DIGITS);
-      pw_row_end (&t);
+    for (int i = 0; i < equations->rows; i++) {
+      const double g = i < equations->holonomic ? equations->g[i] : NAN,
+                   value[] = { equations->gamma[i], equations->eta[i], g, sample->lambda[i] };
+      pw_system_reaction_name (s, i, name, sizeof name);
+      matrices_row (&t, name, pw_system_reaction_unit (s, i), value, 4);
     }
   }
 }
 
-/* A few columns of J; in a large scene only the rows that are not zero there. */
-static void matrices_panel (const pw_system *s, const pw_equations *k, int first, int columns) {
+/* Some columns of J; in a large scene only the rows that are not zero there.  The entries are sorted by rows. */
+static void matrices_panel (const pw_system *s, const pw_equations *equations, int first, int columns) {
   char name[300];
   putchar ('\n');
   for (pw_table t = { 0 }; pw_table_pass (&t);) {
     pw_cell (&t, -22, "J");
     for (int c = 0; c < columns; c++) pw_cell (&t, 13, pw_system_state_name (s, first + c, name, sizeof name));
     pw_row_end (&t);
-    for (int i = 0, e = 0; i < k->rows; i++) {
+    for (int i = 0, entry = 0; i < equations->rows; i++) {
       double row[MATRICES_PANEL] = { 0 };
-      int used = k->coordinates <= 2 * MATRICES_PANEL;
-      for (; e < k->entries && k->row[e] == i; e++) {
-        int c = k->column[e] - first;
+      int shown = equations->coordinates <= 2 * MATRICES_PANEL;
+      for (; entry < equations->entries && equations->row[entry] == i; entry++) {
+        int c = equations->column[entry] - first;
         if (c < 0 || c >= columns) continue;
-        row[c] = k->value[e] + 0; /* not -0 */
-        used |= row[c] != 0;
+        row[c] = equations->value[entry] + 0; /* not -0 */
+        shown |= row[c] != 0;
       }
-      if (!used) continue;
-      pw_cell (&t, -22, pw_system_reaction_name (s, i, name, sizeof name));
-      for (int c = 0; c < columns; c++) pw_cell_number (&t, 13, row[c], MATRICES_DIGITS);
-      pw_row_end (&t);
+      if (!shown) continue;
+      matrices_row (&t, pw_system_reaction_name (s, i, name, sizeof name), "", row, columns);
     }
   }
 }
 
-static void matrices_print (const pw_cli_model *m, const pw_equations *k, const pw_sample *x) {
+static void matrices_print (const pw_cli_model *m, const pw_equations *equations, const pw_sample *sample) {
   const pw_system *s = m->system;
   char t[32];
-  printf ("%s at t = %s s\n", pw_file_name (m->file), pw_format (t, x->t, MATRICES_DIGITS));
-  matrices_coordinates (s, k, x);
-  if (k->rows == 0) puts ("\nThe model has no constraints: no J, no gamma");
-  if (k->rows > 0) matrices_rows (s, k, x);
-  if (k->rows > 0 && k->coordinates > 2 * MATRICES_PANEL)
+  printf ("%s at t = %s s\n", pw_file_name (m->file), pw_format (t, sample->t, MATRICES_DIGITS));
+  matrices_coordinates (s, equations, sample);
+  if (equations->rows == 0) puts ("\nThe model has no constraints: no J, no gamma");
+  if (equations->rows > 0) matrices_constraints (s, equations, sample);
+  if (equations->rows > 0 && equations->coordinates > 2 * MATRICES_PANEL)
     puts ("\nRows of J that are zero in the columns shown are left out");
-  for (int j = 0; k->rows > 0 && j < k->coordinates; j += MATRICES_PANEL)
-    matrices_panel (s, k, j, k->coordinates - j < MATRICES_PANEL ? k->coordinates - j : MATRICES_PANEL);
+  for (int j = 0; equations->rows > 0 && j < equations->coordinates; j += MATRICES_PANEL)
+    matrices_panel (s, equations, j,
+                    equations->coordinates - j < MATRICES_PANEL ? equations->coordinates - j : MATRICES_PANEL);
 }
 
 static int show_matrices (const pw_cli_model *m, double t, pw_error *error) {
-  pw_run_defaults d = pw_cli_defaults (pw_file_table (m->file));
-  pw_settings settings = { .span = t > 0 ? t : d.t_end, .step = d.step, .rtol = d.rtol };
-  pw_run *r = pw_run_open (m->system, d.method, &settings, error);
-  if (r == NULL) return error->status;
-  pw_sample x;
-  pw_equations k = { .rows = 0 };
-  int status = t > 0 ? pw_run_advance_to (r, t, t, error) : PW_OK;
-  if (status == PW_OK) status = pw_run_sample (r, t, &x, error);
-  if (status == PW_OK) status = pw_system_equations (m->system, x.t, x.q, x.v, &k, error);
-  if (status == PW_OK) matrices_print (m, &k, &x);
-  pw_equations_free (&k);
-  pw_run_close (r);
+  pw_run_defaults defaults = pw_cli_defaults (pw_file_table (m->file));
+  pw_settings settings = { .span = t > 0 ? t : defaults.t_end, .step = defaults.step, .rtol = defaults.rtol };
+  pw_run *run = pw_run_open (m->system, defaults.method, &settings, error);
+  if (run == NULL) return error->status;
+  pw_sample sample;
+  pw_equations equations = { .rows = 0 };
+  int status = t > 0 ? pw_run_advance_to (run, t, t, error) : PW_OK;
+  if (status == PW_OK) status = pw_run_sample (run, t, &sample, error);
+  if (status == PW_OK) status = pw_system_equations (m->system, sample.t, sample.q, sample.v, &equations, error);
+  if (status == PW_OK) matrices_print (m, &equations, &sample);
+  pw_equations_free (&equations);
+  pw_run_close (run);
   return status;
 }
 
@@ -216,9 +219,9 @@ static int show_matrices (const pw_cli_model *m, double t, pw_error *error) {
 
 typedef struct {
   pw_cli_line line;
-  int matrices, yaml, code;
-  const char *at;
-} show;
+  int matrices, yaml, code; /* 1: what is shown in place of the usual */
+  const char *at;           /* time at which matrices are shown, as text */
+} show_line;
 
 static int show_code (const pw_cli_model *m, pw_error *error) {
   char *text = pw_cli_source (m->system, error);
@@ -228,16 +231,16 @@ static int show_code (const pw_cli_model *m, pw_error *error) {
 }
 
 static int show_command (void *options, pw_error *error) {
-  const show *x = options;
+  const show_line *given = options;
   pw_cli_model m = { .file = NULL };
   double t = 0;
-  int matrices = x->matrices || x->at, status = pw_cli_number ("--at", x->at, PW_NONNEGATIVE, &t, error);
-  if (status == PW_OK && matrices + x->yaml + x->code > 1)
-    status = pw_fail (error, PW_INPUT, "expected one of --%s, --yaml and --c", x->at ? "at T" : "matrices");
-  if (status == PW_OK) status = pw_cli_open (&m, &x->line, error);
-  if (status == PW_OK && x->code)
+  int matrices = given->matrices || given->at, status = pw_cli_number ("--at", given->at, PW_NONNEGATIVE, &t, error);
+  if (status == PW_OK && matrices + given->yaml + given->code > 1)
+    status = pw_fail (error, PW_INPUT, "expected one of --%s, --yaml and --c", given->at ? "at T" : "matrices");
+  if (status == PW_OK) status = pw_cli_open (&m, &given->line, error);
+  if (status == PW_OK && given->code)
     status = show_code (&m, error);
-  else if (status == PW_OK && x->yaml)
+  else if (status == PW_OK && given->yaml)
     status = pw_show_yaml (&m, error);
   else if (status == PW_OK && matrices)
     status = show_matrices (&m, t, error);
@@ -249,10 +252,11 @@ static int show_command (void *options, pw_error *error) {
 
 static const struct poptOption show_options[] = {
   PW_OPTION_GROUP ("Output"),
-  PW_FLAG_OPTION (show, matrices, "matrices", "Show M, J and gamma at the initial state instead"),
-  PW_TEXT_OPTION (show, at, "at", 0, "T", "Show M, J and gamma at time T [s] of a run with the model's default method"),
-  PW_FLAG_OPTION (show, code, "c", "Write the C code of the specialised scene, as --specialise compiles it"),
-  PW_FLAG_OPTION (show, yaml, "yaml", "Write the model as a text model with the same trajectory"),
+  PW_FLAG_OPTION (show_line, matrices, "matrices", "Show M, J and gamma at the initial state instead"),
+  PW_TEXT_OPTION (show_line, at, "at", 0, "T",
+                  "Show M, J and gamma at time T [s] of a run with the model's default method"),
+  PW_FLAG_OPTION (show_line, code, "c", "Write the C code of the specialised scene, as --specialise compiles it"),
+  PW_FLAG_OPTION (show_line, yaml, "yaml", "Write the model as a text model with the same trajectory"),
   PW_MODEL_OPTIONS,
   POPT_TABLEEND
 };
@@ -263,9 +267,9 @@ const pw_command pw_cli_show = {
   .summary = "show the bodies, elements and parameters of a model, or its matrices",
   .help = "Show the bodies, elements, parameters and default run settings of a model, or the matrices of its equations "
           "of motion.",
-  .least = 1,
-  .most = 1,
-  .size = sizeof (show),
+  .min_arguments = 1,
+  .max_arguments = 1,
+  .options_size = sizeof (show_line),
   .function = show_command,
   .options = show_options,
 };

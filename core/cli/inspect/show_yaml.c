@@ -50,7 +50,7 @@ static void yaml_function (const pw_signal *s) {
   for (int i = 0; text && i < 3; i++)
     if (text->part[i]) fputs (key[i], stdout), yaml_text (text->part[i]);
   printf (text ? "}" : "f (t");
-  for (const char *const *r = s->function.reads; text == NULL && r && *r; r++) printf (", %s", *r);
+  for (const char *const *state = s->function.reads; text == NULL && state && *state; state++) printf (", %s", *state);
   if (text == NULL) putchar (')');
 }
 
@@ -70,6 +70,7 @@ static void yaml_points (const pw_signal *s, int digits) {
   putchar (']');
 }
 
+/* 1 if an optional field has its default, zero in all bytes. */
 static int yaml_is_default (const pw_field *f, const void *at) {
   if (f->required || f->type == PW_BODY) return 0;
   size_t size = pw_field_bytes (f->type) * (size_t)pw_field_count (f);
@@ -81,7 +82,7 @@ static int yaml_is_default (const pw_field *f, const void *at) {
 /* {ramp: {to: 1, duration: 2}} */
 static void yaml_signal (const pw_signal *s, int digits) {
   const pw_signal_form *form = pw_signal_form_of (s);
-  const char *glue = "";
+  const char *separator = "";
   if (s->type == PW_FUNCTION) {
     yaml_function (s);
     return;
@@ -94,10 +95,10 @@ static void yaml_signal (const pw_signal *s, int digits) {
   for (const pw_field *f = form->fields; f->name; f++) {
     const void *at = (const char *)s + f->offset;
     if (yaml_is_default (f, at)) continue;
-    printf ("%s%s: ", glue, f->name), glue = ", ";
+    printf ("%s%s: ", separator, f->name), separator = ", ";
     pw_show_field (f, at, digits);
   }
-  if (s->type == PW_TABLE) printf ("%spoints: ", glue), yaml_points (s, digits);
+  if (s->type == PW_TABLE) printf ("%spoints: ", separator), yaml_points (s, digits);
   printf ("}}");
 }
 
@@ -121,11 +122,12 @@ void pw_show_field (const pw_field *f, const void *at, int digits) {
 
 /* ---- Bodies and elements ---- */
 
-static void yaml_triple (const char *what, const char *const name[3], const double value[3], unsigned specified) {
+/* Numbers that are not the default, or that the model specifies: bit i of `specified`. */
+static void yaml_triple (const char *key, const char *const name[3], const double value[3], unsigned specified) {
   int written = 0;
   for (int i = 0; i < 3; i++) {
     if (yaml_is_zero (value[i]) && !(specified >> i & 1)) continue;
-    if (written++ == 0) printf (", %s: {", what);
+    if (written++ == 0) printf (", %s: {", key);
     printf ("%s%s: ", written > 1 ? ", " : "", name[i]);
     yaml_number (value[i], YAML_DIGITS);
   }
@@ -155,7 +157,8 @@ static void yaml_element (const pw_element *e) {
 
 /* ---- Contents that a text model cannot express ---- */
 
-static int yaml_refuse (const pw_model *m, pw_error *error) {
+/* PW_INPUT if there are any. */
+static int yaml_check (const pw_model *m, pw_error *error) {
   int elements;
   const char *model = pw_model_name (m);
   const pw_element *e = pw_model_elements (m, &elements);
@@ -185,33 +188,34 @@ static int yaml_refuse (const pw_model *m, pw_error *error) {
 /* ---- The model ---- */
 
 static void yaml_run (const pw_run_defaults *run) {
-  const char *const name[] = { "t_end", "step", "rtol" };
+  const char *const key[] = { "t_end", "step", "rtol" };
   const double value[] = { run->t_end, run->step, run->rtol };
-  const char *glue = "run: {";
+  const char *separator = "run: {";
   for (int i = 0; i < 3; i++)
-    if (value[i] != 0) printf ("%s%s: ", glue, name[i]), yaml_number (value[i], YAML_DIGITS), glue = ", ";
-  if (run->method) printf ("%smethod: ", glue), yaml_text (run->method), glue = ", ";
-  if (*glue == ',') puts ("}");
+    if (value[i] != 0) printf ("%s%s: ", separator, key[i]), yaml_number (value[i], YAML_DIGITS), separator = ", ";
+  if (run->method) printf ("%smethod: ", separator), yaml_text (run->method), separator = ", ";
+  if (*separator == ',') puts ("}");
 }
 
 /* Expressions contain names, whose values are written under `let`. */
-static void yaml_names (const pw_reference_text *t) {
-  if (t->names) puts ("let:");
-  for (int i = 0; i < t->names; i++)
-    printf ("  %s: ", t->name[i]), yaml_number (t->value[i], YAML_DIGITS), putchar ('\n');
+static void yaml_names (const pw_reference_text *reference) {
+  if (reference->names) puts ("let:");
+  for (int i = 0; i < reference->names; i++)
+    printf ("  %s: ", reference->name[i]), yaml_number (reference->value[i], YAML_DIGITS), putchar ('\n');
 }
 
 static void yaml_reference (const pw_model *m) {
-  const pw_reference_text *t = pw_model_reference (m);
+  const pw_reference_text *reference = pw_model_reference (m);
   if (pw_model_table (m)->reference)
     puts ("# The reference solution of the model is a function in C, which cannot be written as text.");
-  if (t->states) puts ("truth:");
-  for (int i = 0; i < t->states; i++) printf ("  %s: ", t->state[i]), yaml_text (t->text[i]), putchar ('\n');
+  if (reference->states) puts ("truth:");
+  for (int i = 0; i < reference->states; i++)
+    printf ("  %s: ", reference->state[i]), yaml_text (reference->text[i]), putchar ('\n');
 }
 
-int pw_show_yaml (const pw_cli_model *x, pw_error *error) {
-  const pw_model *m = x->model;
-  if (yaml_refuse (m, error) != PW_OK) return error->status;
+int pw_show_yaml (const pw_cli_model *opened, pw_error *error) {
+  const pw_model *m = opened->model;
+  if (yaml_check (m, error) != PW_OK) return error->status;
   puts ("pinwheel: 1");
   const pw_plugin_table *table = pw_model_table (m);
   int bodies, elements;

@@ -7,7 +7,7 @@ set -e
 mkdir -p "$site"
 escape () { sed 's/&/\&amp;/g; s/</\&lt;/g; s/>/\&gt;/g'; }
 {
-  cat <<'H'
+  cat <<'END'
 <!DOCTYPE html>
 <html lang="en">
 <head>
@@ -25,11 +25,11 @@ li { margin: .4rem 0; }
 <h1>Pinwheel: gallery</h1>
 <p>Each page simulates a vehicle or a linkage in the browser: move a slider and see the motion, its error and its cost change.</p>
 <ul>
-H
-  (cd "$models" && LC_ALL=C ls *.c *.yaml) | while read -r m; do
-    name=${m%.*} m=$models/$m
-    "$program" page "$m" -o "$site/$name.html" >&2
-    about=$("$program" show "$m" | head -n 1 | escape)
+END
+  (cd "$models" && LC_ALL=C ls *.c *.yaml) | while read -r file; do
+    name=${file%.*} path=$models/$file
+    "$program" page "$path" -o "$site/$name.html" >&2
+    about=$("$program" show "$path" | head -n 1 | escape)
     echo "<li><a href=\"$name.html\">$name</a>: ${about#*: }</li>"
   done
   echo '</ul>'

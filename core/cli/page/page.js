@@ -1,19 +1,25 @@
+/* The script of interactive pages: runs the model in the browser and shows the result.  It follows the script of
+ * animate.html, which draws `run` at the time state.t: begin() shows the first run, load() another one, seek() a time. */
 
 /* ---- The engine: the model and the integrators, compiled to WebAssembly ---- */
 
 const bytesOf = text => Uint8Array.from(atob(text), c => c.charCodeAt(0));
 
-/* What the engine may import: the clock, and nothing else that works.  A library that it does not have stops the run. */
+/* What the engine imports: the clock, system calls that fail, and functions of libraries that it does not have, which stop
+ * the run. */
 function importsOf (module) {
+  const notSupported = 52; /* the error ENOSYS of WASI */
   const imports = {};
   for (const { module: from, name } of WebAssembly.Module.imports(module)) {
     imports[from] = imports[from] || {};
-    imports[from][name] = from === "wasi_snapshot_preview1" ? () => 52
+    imports[from][name] = from === "wasi_snapshot_preview1" ? () => notSupported
       : () => { throw new Error("this scene needs " + name.replace(/^LAPACKE_.*/, "LAPACK").replace(/^amd_.*/, "AMD") + ", which pages do not have"); };
   }
   imports.page = { now: () => performance.now() };
   return imports;
 }
+
+const shortRun = 40, usualRun = 4000, longRun = 8000; /* limits of computing time [ms] */
 
 class Engine {
   static async open (page) {
@@ -49,30 +55,30 @@ class Engine {
   error () { return this.read(this.wasm.error()); }
   numbers (at, count) { return new Float64Array(this.wasm.memory.buffer, at, count); }
 
-  /* Integrates with { method, step, rtol, end, parameters, initial: [[state, value]] }; returns the time [ms] and the
-   * reason of a failure. */
-  integrate (s, limit, samples) {
-    const w = this.wasm, method = this.text(s.method);
-    const parameters = w.allocate(8 * s.parameters.length), initial = w.allocate(16 * s.initial.length);
-    const view = new DataView(w.memory.buffer, initial); /* after the allocations, which may replace the buffer */
+  /* Integrates with { method, step, rtol, end, parameters, initial: [[state, value]] } for at most `limit` ms; returns the
+   * computing time [ms] and the reason of a failure, or "". */
+  integrate (s, limit, keepSamples) {
+    const wasm = this.wasm, method = this.text(s.method);
+    const parameters = wasm.allocate(8 * s.parameters.length), initial = wasm.allocate(16 * s.initial.length);
+    const view = new DataView(wasm.memory.buffer, initial); /* after the allocations, which may replace the buffer */
     this.numbers(parameters, s.parameters.length).set(s.parameters);
     s.initial.forEach(([state, value], i) => { view.setInt32(16 * i, state, true); view.setFloat64(16 * i + 8, value, true); });
     const before = performance.now();
-    const status = w.run(method, s.step, s.rtol, s.end, limit, samples, parameters, initial, s.initial.length);
+    const status = wasm.run(method, s.step, s.rtol, s.end, limit, keepSamples, parameters, initial, s.initial.length);
     const ms = performance.now() - before;
-    for (const at of [method, parameters, initial]) w.release(at);
+    for (const at of [method, parameters, initial]) wasm.release(at);
     return { ms, reason: status === 0 ? "" : this.error() };
   }
 
-  /* The least of three times, without samples [ms]. */
+  /* The least of three computing times, without samples [ms]. */
   time (s) {
-    return Math.min(...[1, 2, 3].map(() => this.integrate(s, 8000, 0).ms));
+    return Math.min(...[1, 2, 3].map(() => this.integrate(s, longRun, 0).ms));
   }
 
   /* A run for load(), with its computing time [ms] and statistics. */
   run (s, limit) {
-    const many = this.page.parameters.find((p, i) => p.domain === "count" && s.parameters[i] > 200);
-    if (many) throw new Error(many.name + " is too large for a page, which takes at most 200; use the program");
+    const tooLarge = this.page.parameters.find((p, i) => p.domain === "count" && s.parameters[i] > 200);
+    if (tooLarge) throw new Error(tooLarge.name + " is too large for a page, which takes at most 200; use the program");
     const { ms, reason } = this.integrate(s, limit, 1), scene = this.scene();
     if (!scene || scene.samples < 2) throw new Error(reason || "the run has no samples");
     return { ...scene, ...this.arrays(scene), model: this.page.name, about: this.page.about, method: s.method, reason, ms };
@@ -85,10 +91,10 @@ class Engine {
     return scene;
   }
 
-  /* The columns of the samples: t, energies; x, y, phi and velocities of bodies; contacts of wheels; forces of links. */
+  /* The columns of the samples: t, 6 energies; x, y, phi and velocities of bodies; contacts of wheels; forces of links. */
   arrays (scene) {
     const { samples, width } = scene, data = this.numbers(this.wasm.data(), samples * width);
-    let from = 7;
+    let from = 7; /* after t and energies */
     const columns = (first, count) => {
       const part = new Float64Array(samples * count);
       for (let i = 0; i < samples; i++) part.set(data.subarray(i * width + first, i * width + first + count), i * count);
@@ -102,23 +108,26 @@ class Engine {
 
 /* ---- The panel ---- */
 
-let engine, page, settings, reference = null, runs = []; /* runs: { method, ms, error }, in the plot */
+/* page: the data of the model; settings: those of the panel; runs: { method, ms, error } in the plot. */
+let engine, page, settings, runs = [];
 
 const byName = name => page.methods.find(m => m.name === name);
-const clone = () => ({ method: page.method, accuracy: null, end: page.t_end,
+/* A new copy of the settings with which the page begins. */
+const pageSettings = () => ({ method: page.method, accuracy: null, end: page.t_end,
   parameters: page.parameters.map(p => p.value), initial: new Map(page.states.flatMap((x, i) => x.given ? [[i, x.value]] : [])) });
 
 /* The tolerance of an adaptive method, else the step size [s]; the slider is its decimal logarithm. */
 function accuracy (s) {
   return s.accuracy ?? (byName(s.method).adaptive ? page.rtol : page.step);
 }
-/* Initial values only with the page's own numbers of bodies: indices of states depend on them. */
+/* Settings for the engine.  Initial values are used only if the numbers of bodies are those with which the page begins:
+ * indices of states depend on them. */
 function engineSettings (s) {
   const counts = page.parameters.some((p, i) => p.domain === "count" && s.parameters[i] !== p.value);
   return { ...s, initial: counts ? [] : [...s.initial], step: accuracy(s), rtol: accuracy(s) };
 }
 
-/* A label with a slider and a number; `change` gets the number. */
+/* Adds a label with a slider and a number; `change` is called with a new number. */
 function control (parent, name, unit, about, value, low, high, step, change) {
   const label = document.createElement("label"), text = document.createElement("span");
   const slider = document.createElement("input"), number = document.createElement("input");
@@ -147,36 +156,39 @@ function control (parent, name, unit, about, value, low, high, step, change) {
   return { slider, number };
 }
 
-/* Ends of sliders that are to be tried, each with the change that it makes to the page's own settings. */
-let untried = [];
+/* Sliders whose ends are still to be checked, each with its first value and a function that sets a value in settings. */
+let unchecked = [];
 
-/* Moves the ends of the next slider towards its first value until a run can begin there and lasts for 40 ms of computation. */
-async function narrow () {
-  const next = untried.shift();
+/* Moves the ends of the next slider towards its first value until a run can begin there and does not fail within shortRun;
+ * then continues with the next one. */
+async function narrowSliders () {
+  const next = unchecked.shift();
   if (!next) { document.documentElement.dataset.narrowed = true; return; }
-  const { slider, number, value, set } = next, whole = slider.step === "1" ? Math.round : x => x;
+  const { slider, number, value, set } = next, valid = slider.step === "1" ? Math.round : x => x;
   for (const end of ["min", "max"]) {
     let x = Number(slider[end]);
-    for (let k = 0; x !== value && !await runsWith(set, x); k++) x = k < 6 ? whole(value + (x - value) / 2) : value;
+    for (let k = 0; x !== value && !await runsWith(set, x); k++) x = k < 6 ? valid(value + (x - value) / 2) : value;
     slider[end] = Math[end](x, Number(number.value));
   }
   slider.disabled = slider.min === slider.max;
   if (slider.disabled) slider.title = "the model does not run with other values near this one";
-  setTimeout(narrow, 0);
+  setTimeout(narrowSliders, 0);
 }
 
+/* Whether the engine can run with the value x of a slider. */
 async function runsWith (set, x) {
-  const s = clone();
+  const s = pageSettings();
   set(s, x);
   try {
-    return /^(stopped at.*)?$/.test(engine.integrate(engineSettings(s), 40, 0).reason);
+    return /^(stopped at.*)?$/.test(engine.integrate(engineSettings(s), shortRun, 0).reason);
   } catch (error) {
     await engine.restart();
     return false;
   }
 }
 
-/* From a tenth to three times a positive default; around other values as far as they are from zero. */
+/* [low, high, step] of the slider of a value in a domain: from a tenth to three times a positive one; around other values
+ * twice as far as they are from zero. */
 function rangeOf (value, domain) {
   if (domain === "count") return [1, Math.max(10, 2 * value), 1];
   if (domain === "fraction") return [0, 1, 0];
@@ -191,9 +203,9 @@ function fillPanel () {
   $("page-method").value = settings.method;
   $("page-end").value = settings.end;
   for (const id of ["parameters", "states"]) while ($(id).querySelector("label")) $(id).querySelector("label").remove();
-  const add = (parent, item, about, value, first, domain, set) => untried.push({ set, value: first,
-    ...control(parent, item.name, item.unit, about, value, ...rangeOf(first, domain), x => { set(settings, x); later(); }) });
-  untried = [];
+  const add = (parent, quantity, about, value, first, domain, set) => unchecked.push({ set, value: first,
+    ...control(parent, quantity.name, quantity.unit, about, value, ...rangeOf(first, domain), x => { set(settings, x); simulateSoon(); }) });
+  unchecked = [];
   page.parameters.forEach((p, i) => add($("parameters"), p, p.about, settings.parameters[i], p.value, p.domain,
     (s, x) => { s.parameters[i] = x; }));
   page.states.forEach((state, i) => add($("states"), state, "", settings.initial.get(i) ?? state.value, state.value, "real",
@@ -215,8 +227,9 @@ function fillAccuracy () {
 
 /* ---- Runs ---- */
 
+/* Simulates when the settings have not changed for 20 ms. */
 let timer = 0;
-function later () {
+function simulateSoon () {
   clearTimeout(timer);
   timer = setTimeout(simulate, 20);
 }
@@ -229,12 +242,14 @@ function difference (a, b) {
   return most;
 }
 
-/* Runs with the settings of the panel, shows the result, then repeats it more accurately to estimate its error. */
+/* Runs with the settings of the panel, shows the result, then repeats it more accurately to estimate its error, unless they
+ * change before. */
+let estimateTimer = 0;
 function simulate () {
   let result;
   document.documentElement.dataset.simulated = "";
   try {
-    result = engine.run(engineSettings(settings), 4000);
+    result = engine.run(engineSettings(settings), usualRun);
   } catch (error) {
     engine.restart();
     $("reason").textContent = error.message + (run ? ". The run before it is still shown." : "");
@@ -247,17 +262,17 @@ function simulate () {
   showValues();
   history.replaceState(null, "", "#" + link());
   document.documentElement.dataset.simulated = "yes";
-  clearTimeout(reference);
-  if (!result.reason) reference = setTimeout(() => estimate(result), 300);
+  clearTimeout(estimateTimer);
+  if (!result.reason) estimateTimer = setTimeout(() => estimate(result), 300);
 }
 
-/* The reference: erk8+projection with a tolerance of 1e-13. */
+/* Estimates the error of a result by a reference: erk8+projection with a tolerance of 1e-13. */
 function estimate (result) {
   try {
-    const exact = engine.run({ ...engineSettings(settings), method: "erk8+projection", rtol: 1e-13 }, 8000);
-    if (exact.reason) return;
-    const error = difference(result, exact);
-    result.ms = Math.max(engine.time(engineSettings(settings)), 0.01);
+    const reference = engine.run({ ...engineSettings(settings), method: "erk8+projection", rtol: 1e-13 }, longRun);
+    if (reference.reason) return;
+    const error = difference(result, reference);
+    result.ms = Math.max(engine.time(engineSettings(settings)), 0.01); /* logarithmic axes have no 0 */
     runs.push({ method: result.method, ms: result.ms, error: Math.max(error, 1e-16) });
     showCost(result, error);
     document.documentElement.dataset.estimated = error;
@@ -266,23 +281,22 @@ function estimate (result) {
   }
 }
 
-function rows (id, list) {
+function fillTable (id, list) {
   $(id).replaceChildren(...list.map(([name, value]) => {
     const row = document.createElement("tr");
     for (const text of [name, value]) row.append(Object.assign(document.createElement("td"), { textContent: text }));
     return row;
   }));
 }
-/* Two digits. */
+/* A number with two digits. */
 function rounded (x) { return Number.isFinite(x) ? number(x, Math.abs(x) / 10) : "unknown"; }
 
 function showCost (result, error) {
-  const c = result;
-  rows("page-results", [["error at the end [m, rad]", error === null ? "\u2026" : rounded(error)],
-    ["computing time", (c.ms < 10 ? c.ms.toFixed(2) : c.ms.toFixed(0)) + " ms"], ["steps (rejected)", c.steps + " (" + c.rejected + ")"],
-    ["evaluations of accelerations", String(c.evaluations)], ["largest position residual |g|", rounded(c.g)],
-    ["largest velocity residual |J v|", rounded(c.jv)],
-    ["relative energy defect", rounded(c.energy_defect)]]);
+  fillTable("page-results", [["error at the end [m, rad]", error === null ? "\u2026" : rounded(error)],
+    ["computing time", (result.ms < 10 ? result.ms.toFixed(2) : result.ms.toFixed(0)) + " ms"], ["steps (rejected)", result.steps + " (" + result.rejected + ")"],
+    ["evaluations of accelerations", String(result.evaluations)], ["largest position residual |g|", rounded(result.g)],
+    ["largest velocity residual |J v|", rounded(result.jv)],
+    ["relative energy defect", rounded(result.energy_defect)]]);
   plotRuns();
 }
 
@@ -290,33 +304,33 @@ function showCost (result, error) {
 function showValues () {
   if (!$("values").open) return;
   const at = place(state.t);
-  rows("page-values", run.bodies.flatMap((body, b) => placement(b, at).map((x, k) => [body.name + [".x", ".y", ".phi"][k], x.toPrecision(10)])));
+  fillTable("page-values", run.bodies.flatMap((body, b) => placement(b, at).map((x, k) => [body.name + [".x", ".y", ".phi"][k], x.toPrecision(10)])));
 }
 
 /* Error over computing time, both logarithmic; the last run is filled. */
 function plotRuns () {
-  const s = size($("page-plot")), g = s.g, points = runs.slice(-60);
-  g.clearRect(0, 0, s.width, s.height);
+  const area = size($("page-plot")), g = area.g, points = runs.slice(-60);
+  g.clearRect(0, 0, area.width, area.height);
   if (points.length === 0) return;
   const logs = pick => points.map(p => Math.log10(p[pick])), box = list => [Math.floor(Math.min(...list) - 0.2), Math.ceil(Math.max(...list) + 0.2)];
   const [x0, x1] = box(logs("ms")), [y0, y1] = box(logs("error"));
-  const X = x => 38 + (s.width - 48) * (x - x0) / (x1 - x0), Y = y => s.height - 26 - (s.height - 36) * (y - y0) / (y1 - y0);
+  const X = x => 38 + (area.width - 48) * (x - x0) / (x1 - x0), Y = y => area.height - 26 - (area.height - 36) * (y - y0) / (y1 - y0);
   g.font = "11px system-ui, sans-serif";
   g.strokeStyle = colours.grid;
   g.fillStyle = colours.faint;
   g.beginPath();
   g.textAlign = "center";
   const power = n => "10" + raised(n);
-  for (let x = x0; x <= x1; x++) { g.moveTo(X(x), Y(y0)); g.lineTo(X(x), Y(y1)); g.fillText(power(x), X(x), s.height - 14); }
+  for (let x = x0; x <= x1; x++) { g.moveTo(X(x), Y(y0)); g.lineTo(X(x), Y(y1)); g.fillText(power(x), X(x), area.height - 14); }
   const stride = Math.ceil((y1 - y0) / 7);
   g.textAlign = "right";
   for (let y = y0; y <= y1; y += stride) { g.moveTo(X(x0), Y(y)); g.lineTo(X(x1), Y(y)); g.fillText(power(y), 34, Y(y) + 4); }
   g.stroke();
   g.textAlign = "center";
-  g.fillText("error over computing time [ms]", s.width / 2, s.height - 2);
+  g.fillText("error over computing time [ms]", area.width / 2, area.height - 2);
   const colour = method => palette[page.methods.findIndex(m => m.name === method) % palette.length];
   g.textAlign = "right";
-  [...new Set(points.map(p => p.method))].forEach((method, i) => { g.fillStyle = colour(method); g.fillText(method, s.width - 12, 16 + 13 * i); });
+  [...new Set(points.map(p => p.method))].forEach((method, i) => { g.fillStyle = colour(method); g.fillText(method, area.width - 12, 16 + 13 * i); });
   points.forEach((p, i) => {
     g.strokeStyle = g.fillStyle = colour(p.method);
     g.beginPath();
@@ -339,12 +353,13 @@ function link () {
   return list.toString();
 }
 
+/* Sets the settings from the address of the page. */
 function readLink () {
   const list = new URLSearchParams(location.hash.slice(1)), number = (key, otherwise, low = -Infinity) => {
     const text = (list.get(key) || "").trim(), x = Number(text);
     return text && isFinite(x) && x > low ? x : otherwise;
   };
-  settings = clone();
+  settings = pageSettings();
   if (byName(list.get("method"))) settings.method = list.get("method");
   settings.accuracy = number("accuracy", null, 0);
   settings.end = number("t_end", page.t_end, 0);
@@ -352,23 +367,23 @@ function readLink () {
   page.states.forEach((state, i) => { const x = number("start." + state.name, null); if (x !== null) settings.initial.set(i, x); });
 }
 
-function table () {
+function csv () {
   const names = run.bodies.flatMap(body => ["x [m]", "y [m]", "phi [rad]", "vx [m/s]", "vy [m/s]", "omega [rad/s]"].map(n => body.name + "." + n));
   const lines = [["t [s]", ...names].join(",")];
   for (let i = 0; i < count; i++) lines.push([run.t[i], ...run.motion.subarray(6 * i * bodies, 6 * (i + 1) * bodies)].join(","));
   return lines.join("\n") + "\n";
 }
 
-function connect () {
-  $("page-method").addEventListener("change", e => { settings.method = e.target.value; settings.accuracy = null; fillAccuracy(); later(); });
+function addListeners () {
+  $("page-method").addEventListener("change", e => { settings.method = e.target.value; settings.accuracy = null; fillAccuracy(); simulateSoon(); });
   $("page-accuracy").addEventListener("input", e => {
     settings.accuracy = Number(Math.pow(10, Number(e.target.value)).toPrecision(3));
     $("page-accuracy-value").textContent = rounded(settings.accuracy);
-    later();
+    simulateSoon();
   });
-  $("page-end").addEventListener("change", e => { if (Number(e.target.value) > 0) { settings.end = Number(e.target.value); later(); } });
-  $("page-reset").addEventListener("click", () => { settings = clone(); runs = []; fillPanel(); simulate(); narrow(); });
-  $("page-csv").addEventListener("click", () => save(page.name + ".csv", new Blob([table()], { type: "text/csv" })));
+  $("page-end").addEventListener("change", e => { if (Number(e.target.value) > 0) { settings.end = Number(e.target.value); simulateSoon(); } });
+  $("page-reset").addEventListener("click", () => { settings = pageSettings(); runs = []; fillPanel(); simulate(); narrowSliders(); });
+  $("page-csv").addEventListener("click", () => save(page.name + ".csv", new Blob([csv()], { type: "text/csv" })));
   $("page-link").addEventListener("click", async () => {
     try {
       await navigator.clipboard.writeText(location.href);
@@ -380,15 +395,17 @@ function connect () {
   $("values").addEventListener("toggle", showValues);
   $("scrub").addEventListener("input", showValues);
   window.addEventListener("resize", plotRuns);
-  window.addEventListener("hashchange", () => { if (location.hash.slice(1) !== link()) { readLink(); fillPanel(); simulate(); narrow(); } });
+  window.addEventListener("hashchange", () => { if (location.hash.slice(1) !== link()) { readLink(); fillPanel(); simulate(); narrowSliders(); } });
 }
 
+/* Starts the page with the data that page.c writes. */
 async function start_page (data) {
   page = data;
-  for (const what of ["name", "about"]) $(what === "name" ? "model" : what).textContent = page[what];
+  $("model").textContent = page.name;
+  $("about").textContent = page.about;
   readLink();
   fillPanel();
-  connect();
+  addListeners();
   if (typeof WebAssembly !== "object") {
     $("reason").textContent = "This page simulates with WebAssembly, which this browser does not have or has switched off.";
     return;
@@ -396,7 +413,7 @@ async function start_page (data) {
   try {
     engine = await Engine.open(page);
     simulate();
-    narrow();
+    narrowSliders();
   } catch (error) {
     $("reason").textContent = error.message;
   }

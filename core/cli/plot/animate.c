@@ -9,9 +9,9 @@ static const char *const page_lines[] = {
   NULL
 };
 
-static void page_numbers (pw_json *j, const char *key, const double *x, int count) {
+static void page_numbers (pw_json *j, const char *key, const double *number, int count) {
   pw_json_open (j, key, '[');
-  for (int i = 0; i < count; i++) pw_json_number (j, NULL, x[i]);
+  for (int i = 0; i < count; i++) pw_json_number (j, NULL, number[i]);
   pw_json_close (j, ']');
 }
 
@@ -25,53 +25,54 @@ static void page_points (pw_json *j, const char *key, const double *at, int coun
 
 /* ---- Shapes ---- */
 
-static void page_bodies (pw_json *j, const pw_plots *p) {
+static void page_bodies (pw_json *j, const pw_plots *plots) {
   pw_json_open (j, "bodies", '[');
-  for (int b = 0; b < p->bodies.shown; b++) {
-    const pw_plot_body *shape = &p->shape[b];
+  for (int b = 0; b < plots->bodies.drawn; b++) {
+    const pw_plot_body *shape = &plots->shape[b];
     pw_json_open (j, NULL, '{');
-    pw_json_text (j, "name", pw_plot_name (p, &p->bodies, b));
-    page_points (j, "at", *shape->at, shape->count, NULL);
-    page_points (j, "spokes", *shape->at, shape->count, shape);
+    pw_json_text (j, "name", pw_plot_name (plots, &plots->bodies, b));
+    page_points (j, "at", *shape->attachment, shape->attachments, NULL);
+    page_points (j, "spokes", *shape->attachment, shape->attachments, shape);
     page_points (j, "outline", *shape->corner, shape->corners, NULL);
     pw_json_close (j, '}');
   }
   pw_json_close (j, ']');
-  page_points (j, "ground", *p->ground, p->grounds, NULL);
+  page_points (j, "ground", *plots->ground, plots->grounds, NULL);
 }
 
-static void page_wheels (pw_json *j, const pw_plots *p) {
+static void page_wheels (pw_json *j, const pw_plots *plots) {
   pw_json_open (j, "wheels", '[');
-  for (int w = 0; w < p->wheels.shown; w++) {
+  for (int w = 0; w < plots->wheels.drawn; w++) {
     pw_json_open (j, NULL, '{');
-    pw_json_text (j, "name", pw_plot_name (p, &p->wheels, w));
-    pw_json_number (j, "body", p->shown[pw_system_element (p->s, p->wheels.index[w]).body[0]]);
-    pw_json_flag (j, "rolls", pw_plot_rolls (p, w));
+    pw_json_text (j, "name", pw_plot_name (plots, &plots->wheels, w));
+    pw_json_number (j, "body",
+                    plots->body_index[pw_system_element (plots->system, plots->wheels.system_index[w]).body[0]]);
+    pw_json_flag (j, "rolls", pw_plot_rolls (plots, w));
     pw_json_close (j, '}');
   }
   pw_json_close (j, ']');
 }
 
-/* The strokes of a symbol: 1 if it is closed + 2 if it is upright, then its vertices. */
-static void page_strokes (pw_json *j, const pw_plots *p, const pw_plot_link *link) {
+/* Each stroke of a symbol: 1 if it is closed + 2 if it is upright, then its vertices. */
+static void page_strokes (pw_json *j, const pw_plots *plots, const pw_plot_link *link) {
   pw_plot_stroke stroke[PLOT_STROKES];
-  int strokes = pw_plot_strokes (p, link, p->samples, stroke);
+  int strokes = pw_plot_strokes (plots, link, plots->samples, stroke);
   pw_json_open (j, "strokes", '[');
   for (const pw_plot_stroke *s = stroke; s < stroke + strokes; s++) {
     pw_json_open (j, NULL, '[');
     pw_json_number (j, NULL, s->closed + 2 * s->upright);
-    for (int k = 0; k < s->count; k++) page_numbers (j, NULL, s->at[k], 4);
+    for (int k = 0; k < s->vertices; k++) page_numbers (j, NULL, s->vertex[k], 4);
     pw_json_close (j, ']');
   }
   pw_json_close (j, ']');
 }
 
-static void page_links (pw_json *j, const pw_plots *p) {
+static void page_links (pw_json *j, const pw_plots *plots) {
   pw_json_open (j, "links", '[');
-  for (const pw_plot_link *link = p->link; link < p->link + p->links; link++) {
+  for (const pw_plot_link *link = plots->link; link < plots->link + plots->links; link++) {
     pw_json_open (j, NULL, '{');
-    pw_json_text (j, "name", pw_system_element (p->s, link->element).name);
-    pw_json_number (j, "force", link->force);
+    pw_json_text (j, "name", pw_system_element (plots->system, link->element).name);
+    pw_json_number (j, "force", link->force_end);
     pw_json_open (j, "ends", '[');
     for (int n = 0; n < link->ends; n++) {
       pw_json_open (j, NULL, '{');
@@ -80,69 +81,69 @@ static void page_links (pw_json *j, const pw_plots *p) {
       pw_json_close (j, '}');
     }
     pw_json_close (j, ']');
-    pw_json_number (j, "contact", link->contact);
+    pw_json_number (j, "contact", link->wheel);
     pw_json_flag (j, "line", link->rail);
     pw_json_number (j, "heading", pw_plot_heading (link));
-    page_strokes (j, p, link);
+    page_strokes (j, plots, link);
     pw_json_close (j, '}');
   }
   pw_json_close (j, ']');
 }
 
-void pw_animation_scene (pw_json *j, const pw_plots *p) {
+void pw_animation_scene (pw_json *j, const pw_plots *plots) {
   j->digits = 9;
-  pw_json_number (j, "size", p->size);
-  pw_json_number (j, "symbol", p->unit);
-  page_bodies (j, p);
-  page_wheels (j, p);
-  page_links (j, p);
+  pw_json_number (j, "size", plots->size);
+  pw_json_number (j, "symbol", plots->symbol_unit);
+  page_bodies (j, plots);
+  page_wheels (j, plots);
+  page_links (j, plots);
 }
 
 /* ---- The run ---- */
 
 /* `count` numbers of each sample from `offset` on, sample by sample. */
-static void page_samples (pw_json *j, const pw_plots *p, const char *key, int offset, int count, int digits) {
+static void page_samples (pw_json *j, const pw_plots *plots, const char *key, int offset, int count, int digits) {
   if (count == 0) return;
   j->digits = digits;
   pw_json_open (j, key, '[');
-  for (int i = 0; i < p->samples; i++) {
+  for (int i = 0; i < plots->samples; i++) {
     j->line = 1;
-    for (int k = 0; k < count; k++) pw_json_number (j, NULL, pw_plot_sample (p, i)[offset + k]);
+    for (int k = 0; k < count; k++) pw_json_number (j, NULL, pw_plot_sample (plots, i)[offset + k]);
   }
   pw_json_close (j, ']');
 }
 
-void pw_animation_parameters (pw_json *j, const pw_model *m) {
+void pw_animation_parameters (pw_json *j, const pw_model *model) {
   static const char *const domain[] = { "real", "nonnegative", "positive", "count", "fraction" };
   pw_json_open (j, "parameters", '[');
-  for (const pw_parameter *p = pw_model_table (m)->parameters; p && p->name; p++) {
+  for (const pw_parameter *p = pw_model_table (model)->parameters; p && p->name; p++) {
     pw_json_open (j, NULL, '{');
     pw_json_text (j, "name", p->name);
     pw_json_text (j, "unit", p->unit);
     pw_json_text (j, "about", p->about);
     pw_json_text (j, "domain", domain[p->domain]);
-    pw_json_number (j, "value", pw_model_parameter (m, p));
+    pw_json_number (j, "value", pw_model_parameter (model, p));
     pw_json_close (j, '}');
   }
   pw_json_close (j, ']');
 }
 
-void pw_animation_run (FILE *f, const pw_plots *p, const char *method, const char *reason) {
+void pw_animation_run (FILE *f, const pw_plots *plots, const char *method, const char *reason) {
   pw_json j = { .f = f, .lines = 2 };
-  int wheels = 3 * p->wheels.shown;
+  int wheels = 3 * plots->wheels.drawn;
   pw_json_open (&j, NULL, '{');
-  pw_json_text (&j, "model", p->figures.model);
-  pw_json_text (&j, "about", p->figures.about);
+  pw_json_text (&j, "model", plots->figures.model);
+  pw_json_text (&j, "about", plots->figures.about);
   pw_json_text (&j, "method", method);
   pw_json_text (&j, "reason", reason);
-  pw_animation_parameters (&j, p->m);
-  pw_animation_scene (&j, p);
+  pw_animation_parameters (&j, plots->model);
+  pw_animation_scene (&j, plots);
   j.lines = 1;
-  page_samples (&j, p, "t", PLOT_T, 1, 10);
-  page_samples (&j, p, "motion", p->bodies.offset, 6 * p->bodies.shown, 9);
-  page_samples (&j, p, "contact", p->wheels.offset, wheels, 9);
-  if (p->with_forces) page_samples (&j, p, "force", p->wheels.offset + wheels, 2 * p->links, 6);
-  if (p->with_forces) page_samples (&j, p, "energy", PLOT_KINETIC, PLOT_FIRST - PLOT_KINETIC, 7);
+  page_samples (&j, plots, "t", PLOT_T, 1, 10);
+  page_samples (&j, plots, "motion", plots->bodies.offset, 6 * plots->bodies.drawn, 9);
+  page_samples (&j, plots, "contact", plots->wheels.offset, wheels, 9);
+  if (plots->with_forces) page_samples (&j, plots, "force", plots->wheels.offset + wheels, 2 * plots->links, 6);
+  if (plots->with_forces) page_samples (&j, plots, "energy", PLOT_KINETIC, PLOT_FIRST - PLOT_KINETIC, 7);
   pw_json_close (&j, '}');
 }
 
@@ -161,30 +162,30 @@ void pw_animation_page (FILE *f, const char *const *panel, void (*begin) (FILE *
 }
 
 typedef struct {
-  const pw_plots *p;
+  const pw_plots *plots;
   const char *method, *reason;
 } pw_animation;
 
 static void page_begin (FILE *f, const void *context) {
-  const pw_animation *x = context;
+  const pw_animation *animation = context;
   fputs ("begin(", f);
-  pw_animation_run (f, x->p, x->method, x->reason);
+  pw_animation_run (f, animation->plots, animation->method, animation->reason);
   fputs (");\n", f);
 }
 
 int pw_animation_check (const char *option, const char *path, pw_error *error) {
   static const char ending[] = ".html";
-  size_t n = strlen (path), m = sizeof ending - 1;
-  if (n > m && strcasecmp (path + n - m, ending) == 0) return PW_OK;
+  size_t length = strlen (path), end = sizeof ending - 1;
+  if (length > end && strcasecmp (path + length - end, ending) == 0) return PW_OK;
   return pw_fail (error, PW_INPUT, "%s %s: expected a name that ends in .html", option, path);
 }
 
-int pw_animate (const pw_plots *p, const char *path, pw_output *o, const char *method, const char *reason) {
-  if (p->samples < 2) {
+int pw_animate (const pw_plots *plots, const char *path, pw_output *o, const char *method, const char *reason) {
+  if (plots->samples < 2) {
     pw_cli_say ("pinwheel: the run is too short for an animation: %s is not written\n", path);
     return 0;
   }
-  const pw_animation x = { p, method, reason };
-  pw_animation_page (pw_output_stream (o), (const char *const[]){ NULL }, page_begin, &x);
+  const pw_animation animation = { plots, method, reason };
+  pw_animation_page (pw_output_stream (o), (const char *const[]){ NULL }, page_begin, &animation);
   return 1;
 }

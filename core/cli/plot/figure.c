@@ -26,9 +26,12 @@ int pw_figure_width (const char *text, double *width, pw_error *error) {
   return status;
 }
 
-int pw_figures_of (pw_figures *f, const pw_cli_line *l, const pw_cli_model *m, const char *folder, pw_error *error) {
-  *f = (pw_figures){ .folder = folder, .model = pw_file_name (m->file), .about = pw_file_table (m->file)->about };
-  return pw_figure_width (l->width, &f->width, error);
+int pw_figures_of (pw_figures *f, const pw_cli_line *line, const pw_cli_model *model, const char *folder,
+                   pw_error *error) {
+  *f = (pw_figures){ .folder = folder,
+                     .model = pw_file_name (model->file),
+                     .about = pw_file_table (model->file)->about };
+  return pw_figure_width (line->width, &f->width, error);
 }
 
 /* ---- The folder ---- */
@@ -45,7 +48,7 @@ pw_output *pw_figure_data (const pw_figures *f, const char *name, pw_error *erro
   return o;
 }
 
-int pw_figure_results (const pw_cli_line *l, const pw_cli_model *m, const char *folder, const char *name,
+int pw_figure_results (const pw_cli_line *line, const pw_cli_model *model, const char *folder, const char *name,
                        pw_files *files, pw_error *error) {
   static const char *const ending[] = { ".csv", ".json", ".dat", ".gp", ".svg", ".png", ".pdf" };
   enum { ENDINGS = sizeof ending / sizeof *ending };
@@ -53,22 +56,22 @@ int pw_figure_results (const pw_cli_line *l, const pw_cli_model *m, const char *
   const char *names[ENDINGS + 1] = { NULL };
   for (int i = 0; i < ENDINGS; i++) snprintf (text[i], sizeof text[i], "%s%s", name, ending[i]), names[i] = text[i];
   pw_use use[] = { PW_CLI_MODEL_USE, { "-o", folder, PW_WRITES_INTO, names } };
-  if (folder == NULL) return pw_cli_only ("--width", l->width, "-o DIR", 0, error);
-  return pw_files_open (files, l, m, use, 2, error);
+  if (folder == NULL) return pw_cli_requires ("--width", line->width, "-o DIR", 0, error);
+  return pw_files_open (files, line, model, use, 2, error);
 }
 
-int pw_figure_tables (const char *folder, const char *name, int lines, const void *x,
-                      int (*csv) (const void *x, FILE *f, pw_error *error), void (*json) (const void *x, pw_json *j),
-                      pw_error *error) {
+int pw_figure_tables (const char *folder, const char *name, int lines, const void *context,
+                      int (*csv) (const void *context, FILE *f, pw_error *error),
+                      void (*json) (const void *context, pw_json *j), pw_error *error) {
   char path[60];
   pw_output *file[2] = { NULL };
   for (int i = 0; i < 2; i++) {
     snprintf (path, sizeof path, "%s.%s", name, i ? "json" : "csv");
     file[i] = i == 0 || file[0] ? pw_figure_open (folder, path, error) : NULL;
   }
-  int status = file[1] ? csv (x, pw_output_stream (file[0]), error) : PW_RESOURCE;
+  int status = file[1] ? csv (context, pw_output_stream (file[0]), error) : PW_RESOURCE;
   if (status == PW_OK) {
-    json (x, &(pw_json){ .f = pw_output_stream (file[1]), .lines = lines });
+    json (context, &(pw_json){ .f = pw_output_stream (file[1]), .lines = lines });
     return pw_output_finish_all (file, 2, error);
   }
   for (int i = 0; i < 2; i++)
@@ -105,12 +108,19 @@ pw_output *pw_figure_begin (const pw_figures *f, const char *name, pw_error *err
 }
 
 void pw_figure_text (FILE *f, const char *variable, const char *value) {
-  fprintf (f, "%s = '", variable);
-  for (; *value; value++) {
-    if (*value == '\'') fputc ('\'', f);
-    fputc ((unsigned char)*value < ' ' ? ' ' : *value, f);
-  }
-  fputs ("'\n", f);
+  fprintf (f, "%s = ", variable);
+  pw_figure_quoted (f, value, "''");
+  fputc ('\n', f);
+}
+
+void pw_figure_quoted (FILE *f, const char *text, const char *quote) {
+  fputc ('\'', f);
+  for (; *text; text++)
+    if (*text == '\'')
+      fputs (quote, f);
+    else
+      fputc ((unsigned char)*text < ' ' ? ' ' : *text, f);
+  fputc ('\'', f);
 }
 
 void pw_figure_element (FILE *f, const char *name, int i, const char *value) {
@@ -128,7 +138,7 @@ void pw_figure_label (FILE *f, const char *variable, int i, const char *name, co
 int pw_figure_end (pw_output *o, const char *template_name, pw_error *error) {
   int k = 0;
   while (strcmp (figure_template[k].name, template_name) != 0) k++;
-  for (const char *const *line = figure_template[k].line; *line; line++) fputs (*line, pw_output_stream (o));
+  for (const char *const *text = figure_template[k].line; *text; text++) fputs (*text, pw_output_stream (o));
   return pw_output_finish (o, error);
 }
 
@@ -190,20 +200,20 @@ int pw_figure_draw (const char *folder, const char *const *names, pw_error *erro
                   ended ? WTERMSIG (status) : WEXITSTATUS (status), folder);
 }
 
-int pw_figure_write (const pw_cli_line *l, const pw_cli_model *m, const char *folder, const char *name, const void *x,
-                     int (*data) (const void *x, FILE *f, pw_error *error), void (*variables) (const void *x, FILE *f),
-                     pw_error *error) {
+int pw_figure_write (const pw_cli_line *line, const pw_cli_model *model, const char *folder, const char *name,
+                     const void *context, int (*data) (const void *context, FILE *f, pw_error *error),
+                     void (*variables) (const void *context, FILE *f), pw_error *error) {
   pw_figures figures;
   char file[40];
   snprintf (file, sizeof file, "%s.dat", name);
-  if (pw_figures_of (&figures, l, m, folder, error) != PW_OK) return error->status;
+  if (pw_figures_of (&figures, line, model, folder, error) != PW_OK) return error->status;
   pw_output *o = pw_figure_data (&figures, file, error);
   if (o == NULL) return error->status;
-  int status = data (x, pw_output_stream (o), error);
+  int status = data (context, pw_output_stream (o), error);
   if (status != PW_OK) return pw_output_discard (o), status;
   if (pw_output_finish (o, error) != PW_OK || (o = pw_figure_begin (&figures, name, error)) == NULL)
     return error->status;
-  variables (x, pw_output_stream (o));
+  variables (context, pw_output_stream (o));
   status = pw_figure_end (o, name, error);
   return status == PW_OK ? pw_figure_draw (folder, (const char *[]){ name, NULL }, error) : status;
 }

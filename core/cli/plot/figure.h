@@ -21,14 +21,15 @@ typedef struct {
 /* Endings of a folder's data files, scripts and pictures, ended by NULL. */
 extern const char *const pw_figure_endings[];
 
-/* The option of commands that draw figures, and its value [mm] of "85mm", "8.5cm" or "3.3in"; NULL leaves *width unchanged.
- * PW_INPUT unless it is between 50 and 500 mm. */
+/* The option of commands that draw figures, and its value [mm] of "85mm", "8.5cm" or "3.3in"; NULL leaves *width
+ * unchanged.  PW_INPUT unless it is between 50 and 500 mm. */
 #define PW_WIDTH_OPTION                                    \
   PW_TEXT_OPTION (pw_cli_line, width, "width", 0, "WIDTH", \
                   "Width of figures, such as 85mm for one column (default 170mm)")
 int pw_figure_width (const char *text, double *width, pw_error *error);
 /* Figures of the model of a command line in a folder, of the width that it gives.  A status. */
-int pw_figures_of (pw_figures *f, const pw_cli_line *l, const pw_cli_model *m, const char *folder, pw_error *error);
+int pw_figures_of (pw_figures *f, const pw_cli_line *line, const pw_cli_model *model, const char *folder,
+                   pw_error *error);
 
 /* Opens a file of a folder; a data file, with a comment if the run is incomplete.  NULL and PW_RESOURCE. */
 pw_output *pw_figure_open (const char *folder, const char *name, pw_error *error);
@@ -36,26 +37,28 @@ pw_output *pw_figure_data (const pw_figures *f, const char *name, pw_error *erro
 
 /* Locks the folder of results of the option -o, in which NAME.csv, NAME.json and the figure NAME will be written;
  * nothing without one.  A status. */
-int pw_figure_results (const pw_cli_line *l, const pw_cli_model *m, const char *folder, const char *name,
+int pw_figure_results (const pw_cli_line *line, const pw_cli_model *model, const char *folder, const char *name,
                        pw_files *files, pw_error *error);
 /* Writes NAME.csv and NAME.json, with `lines` levels of separate lines, into the folder.  A status. */
-int pw_figure_tables (const char *folder, const char *name, int lines, const void *x,
-                      int (*csv) (const void *x, FILE *f, pw_error *error), void (*json) (const void *x, pw_json *j),
-                      pw_error *error);
+int pw_figure_tables (const char *folder, const char *name, int lines, const void *context,
+                      int (*csv) (const void *context, FILE *f, pw_error *error),
+                      void (*json) (const void *context, pw_json *j), pw_error *error);
 
 /* Opens NAME.gp.  Assign the variables of its template, then end it; PW_RESOURCE if a file cannot be written. */
 pw_output *pw_figure_begin (const pw_figures *f, const char *name, pw_error *error);
 void pw_figure_text (FILE *f, const char *variable, const char *value);
-/* The variable "NAME[1]" .... */
+/* A text in single quotes, on one line.  A quote in it becomes `quote`: "''" for gnuplot and YAML. */
+void pw_figure_quoted (FILE *f, const char *text, const char *quote);
+/* The variable "NAME[i]". */
 void pw_figure_element (FILE *f, const char *name, int i, const char *value);
 /* The same, or with i = 0 the variable "VARIABLE", with the label "NAME [UNIT]"; no unit if it is "". */
 void pw_figure_label (FILE *f, const char *variable, int i, const char *name, const char *unit);
 int pw_figure_end (pw_output *o, const char *template_name, pw_error *error);
 /* All of it for a command with one figure, NAME: `data` writes NAME.dat, `variables` those of the template of this
  * name; then it is drawn.  A status. */
-int pw_figure_write (const pw_cli_line *l, const pw_cli_model *m, const char *folder, const char *name, const void *x,
-                     int (*data) (const void *x, FILE *f, pw_error *error), void (*variables) (const void *x, FILE *f),
-                     pw_error *error);
+int pw_figure_write (const pw_cli_line *line, const pw_cli_model *model, const char *folder, const char *name,
+                     const void *context, int (*data) (const void *context, FILE *f, pw_error *error),
+                     void (*variables) (const void *context, FILE *f), pw_error *error);
 
 /* Runs gnuplot on NAME.gp for each of at most FIGURE_SCRIPTS names, a list ended by NULL; a missing gnuplot is reported
  * on standard error.  PW_RESOURCE if gnuplot fails. */

@@ -4,11 +4,15 @@
 #include "plot.h"
 
 enum {
-  PLOT_NAMED = 12,  /* curves with a name each, at most */
-  PLOT_COLOURS = 8, /* of bodies */
-  PLOT_IMAGES = 60, /* snapshots, at most */
-  PLOT_FEWEST = 8   /* snapshots, at least */
+  FIGURES_NAMED = 12,     /* curves with a name each, at most */
+  FIGURES_COLOURS = 8,    /* of bodies */
+  FIGURES_SNAPSHOTS = 60, /* at most */
+  FIGURES_FEWEST = 8,     /* snapshots, at least */
+  FIGURES_CLOSEUP = 12    /* samples of a close-up, at least */
 };
+#define FIGURES_FAR 10    /* extent of a motion with a close-up, at least, in sizes of the mechanism */
+#define FIGURES_NEAR 4    /* extent of the close-up, at most, in the same */
+#define FIGURES_WHEEL 1.6 /* half the length of a wheel, in units of symbols */
 
 /* Numbers separated by spaces, then an end. */
 static void data_row (FILE *f, const double *value, int count, const char *end) {
@@ -18,48 +22,48 @@ static void data_row (FILE *f, const double *value, int count, const char *end) 
 }
 
 /* 1 if a body has attachment points, or there is a wheel or marker. */
-static int data_extended (const pw_plots *p) {
+static int data_extended (const pw_plots *plots) {
   int b = 0;
-  while (b < p->bodies.shown && p->shape[b].count == 0) b++;
-  return b < p->bodies.shown || p->wheels.shown > 0;
+  while (b < plots->bodies.drawn && plots->shape[b].attachments == 0) b++;
+  return b < plots->bodies.drawn || plots->wheels.drawn > 0;
 }
 
-/* Number of initial samples shown in a separate panel, if the mechanism travels so far that it is small in a figure of
- * the whole run: those that fit a figure a few times its size; 0: none.  A single point has no size. */
-static int data_closeup (const pw_plots *p) {
-  pw_plot_box all = pw_plot_ground (p), few = PLOT_EMPTY;
+/* Number of initial samples in a close-up, a separate panel for a mechanism that travels so far that it is small in a
+ * figure of the whole run; 0: none.  A single point has no size. */
+static int data_closeup (const pw_plots *plots) {
+  pw_plot_box all = pw_plot_ground (plots), first = PLOT_EMPTY;
   double diagonal = 0;
   int n = 0;
-  if (!data_extended (p)) return 0;
-  for (int i = 0; i < p->samples; i++) diagonal = pw_plot_extend (&all, p, i);
-  if (diagonal < 10 * p->size) return 0;
-  while (n < p->samples && pw_plot_extend (&few, p, n) <= 4 * p->size) n++;
-  return n < 12 ? 0 : n;
+  if (!data_extended (plots)) return 0;
+  for (int i = 0; i < plots->samples; i++) diagonal = pw_plot_extend (&all, plots, i);
+  if (diagonal < FIGURES_FAR * plots->size) return 0;
+  while (n < plots->samples && pw_plot_extend (&first, plots, n) <= FIGURES_NEAR * plots->size) n++;
+  return n < FIGURES_CLOSEUP ? 0 : n;
 }
 
 /* ---- Files ---- */
 
 /* One block per curve: time, the numbers of the body or wheel, its number in the model. */
-static int data_tracks (const pw_plots *p, const pw_tracks *t, pw_error *error) {
-  pw_output *o = t->curves ? pw_figure_data (&p->figures, t->file, error) : NULL;
-  if (o == NULL) return t->curves ? PW_RESOURCE : PW_OK;
+static int data_tracks (const pw_plots *plots, const pw_tracks *tracks, pw_error *error) {
+  pw_output *o = tracks->curves ? pw_figure_data (&plots->figures, tracks->file, error) : NULL;
+  if (o == NULL) return tracks->curves ? PW_RESOURCE : PW_OK;
   FILE *out = pw_output_stream (o);
-  for (int c = 0; c < t->curves; c++) {
-    int k = pw_plot_pick (c, t->curves, t->shown);
-    fprintf (out, "%s# %s: %s, number\n", c ? "\n\n" : "", pw_plot_name (p, t, k), t->columns);
-    for (int i = 0; i < p->samples; i++) {
-      data_row (out, pw_plot_sample (p, i), 1, " ");
-      data_row (out, pw_plot_track (p, i, t, k), t->numbers, " ");
-      fprintf (out, "%d\n", pw_plot_pick (k, t->shown, t->all) + 1);
+  for (int c = 0; c < tracks->curves; c++) {
+    int k = pw_plot_pick (c, tracks->curves, tracks->drawn);
+    fprintf (out, "%s# %s: %s, number\n", c ? "\n\n" : "", pw_plot_name (plots, tracks, k), tracks->columns);
+    for (int i = 0; i < plots->samples; i++) {
+      data_row (out, pw_plot_sample (plots, i), 1, " ");
+      data_row (out, pw_plot_track (plots, i, tracks, k), tracks->numbers, " ");
+      fprintf (out, "%d\n", pw_plot_pick (k, tracks->drawn, tracks->count) + 1);
     }
   }
   return pw_output_finish (o, error);
 }
 
-/* The first numbers of equal rows. */
-static int data_table (const pw_plots *p, const char *name, const char *heading, const double *row, int width,
+/* A file of `rows` rows, of which the first `count` of `width` numbers are written; no file without rows. */
+static int data_table (const pw_plots *plots, const char *name, const char *heading, const double *row, int width,
                        int count, int rows, pw_error *error) {
-  pw_output *o = rows ? pw_figure_data (&p->figures, name, error) : NULL;
+  pw_output *o = rows ? pw_figure_data (&plots->figures, name, error) : NULL;
   if (o == NULL) return rows ? PW_RESOURCE : PW_OK;
   fprintf (pw_output_stream (o), "# %s\n", heading);
   for (int i = 0; i < rows; i++, row += width) data_row (pw_output_stream (o), row, count, "\n");
@@ -77,181 +81,186 @@ static void data_segment (FILE *f, const double *from, const double *to, double 
   data_vertex (f, to, t, body, "\n\n");
 }
 
-/* Bodies of sample i: their outlines, and lines from the centre of mass to the attachment points inside, which without an
- * outline are all. */
-static void data_bodies (FILE *f, const pw_plots *p, int i) {
-  double t = pw_plot_sample (p, i)[PLOT_T], point[2];
-  for (int b = 0; b < p->bodies.shown; b++) {
-    const pw_plot_body *shape = &p->shape[b];
-    const double *motion = pw_plot_track (p, i, &p->bodies, b);
+/* Bodies of sample i: their outlines, and lines from the centre of mass to the attachment points inside, all of them if
+ * there is no outline. */
+static void data_bodies (FILE *f, const pw_plots *plots, int i) {
+  double t = pw_plot_sample (plots, i)[PLOT_T], point[2];
+  for (int b = 0; b < plots->bodies.drawn; b++) {
+    const pw_plot_body *shape = &plots->shape[b];
+    const double *motion = pw_plot_track (plots, i, &plots->bodies, b);
     for (int k = 0; k <= shape->corners && shape->corners; k++) {
       pw_plot_point (motion, shape->corner[k % shape->corners], point);
       data_vertex (f, point, t, b, k < shape->corners ? "\n" : "\n\n");
     }
-    for (int k = 0; k < shape->count; k++) {
+    for (int k = 0; k < shape->attachments; k++) {
       if (!pw_plot_inside (shape, k)) continue;
-      pw_plot_point (motion, shape->at[k], point);
+      pw_plot_point (motion, shape->attachment[k], point);
       data_segment (f, motion, point, t, b);
     }
   }
 }
 
 /* Wheels of sample i: lines along their headings. */
-static void data_wheels (FILE *f, const pw_plots *p, int i) {
-  for (int w = 0; w < p->wheels.shown; w++) {
-    if (!pw_plot_rolls (p, w)) continue;
-    const double *contact = pw_plot_track (p, i, &p->wheels, w), half = 1.6 * p->unit;
+static void data_wheels (FILE *f, const pw_plots *plots, int i) {
+  for (int w = 0; w < plots->wheels.drawn; w++) {
+    if (!pw_plot_rolls (plots, w)) continue;
+    const double *contact = pw_plot_track (plots, i, &plots->wheels, w), half = FIGURES_WHEEL * plots->symbol_unit;
     const double from[] = { -half, 0 }, to[] = { half, 0 };
     double end[2][2];
     pw_plot_point (contact, from, end[0]);
     pw_plot_point (contact, to, end[1]);
-    data_segment (f, end[0], end[1], pw_plot_sample (p, i)[PLOT_T],
-                  p->shown[pw_system_element (p->s, p->wheels.index[w]).body[0]]);
+    data_segment (f, end[0], end[1], pw_plot_sample (plots, i)[PLOT_T],
+                  plots->body_index[pw_system_element (plots->system, plots->wheels.system_index[w]).body[0]]);
   }
 }
 
 /* Bodies of sample i that are points. */
-static void data_centres (FILE *f, const pw_plots *p, int i) {
-  for (int b = 0; b < p->bodies.shown; b++)
-    if (p->shape[b].count == 0 || p->shape[b].point)
-      data_vertex (f, pw_plot_track (p, i, &p->bodies, b), pw_plot_sample (p, i)[PLOT_T], b, "\n");
+static void data_centres (FILE *f, const pw_plots *plots, int i) {
+  for (int b = 0; b < plots->bodies.drawn; b++)
+    if (plots->shape[b].attachments == 0 || plots->shape[b].is_point)
+      data_vertex (f, pw_plot_track (plots, i, &plots->bodies, b), pw_plot_sample (plots, i)[PLOT_T], b, "\n");
 }
 
 /* Massless straight elements such as rods at sample i: their symbols begin at one end and end at the other. */
-static void data_rods (FILE *f, const pw_plots *p, int i) {
+static void data_rods (FILE *f, const pw_plots *plots, int i) {
   double end[2][2];
-  for (const pw_plot_link *l = p->link; l < p->link + p->links; l++) {
+  for (const pw_plot_link *l = plots->link; l < plots->link + plots->links; l++) {
     if (l->ends != 2 || l->kind->level != PW_HOLONOMIC || !l->kind->symbol ||
         strncmp (l->kind->symbol, "0 0 0 1 0 0", 11) != 0)
       continue;
-    for (int n = 0; n < 2; n++) pw_plot_end (p, i, l, n, end[n]);
-    data_segment (f, end[0], end[1], pw_plot_sample (p, i)[PLOT_T], -1);
+    for (int n = 0; n < 2; n++) pw_plot_end (plots, i, l, n, end[n]);
+    data_segment (f, end[0], end[1], pw_plot_sample (plots, i)[PLOT_T], -1);
   }
 }
 
-/* The open, or the closed lines of a symbol at the last of n samples. */
-static void data_symbol (FILE *f, const pw_plots *p, const pw_plot_link *link, int n, int closed) {
+/* The open or the closed lines of a symbol at the last of n samples. */
+static void data_symbol (FILE *f, const pw_plots *plots, const pw_plot_link *link, int n, int closed) {
   pw_plot_stroke stroke[PLOT_STROKES];
-  double at[PLOT_VERTICES][2];
-  int strokes = pw_plot_strokes (p, link, n, stroke);
+  double point[PLOT_VERTICES][2];
+  int strokes = pw_plot_strokes (plots, link, n, stroke);
   for (const pw_plot_stroke *s = stroke; s < stroke + strokes; s++) {
     if (s->closed != closed) continue;
-    pw_plot_place (p, n - 1, link, s, at);
-    for (int k = 0; k < s->count; k++)
-      data_vertex (f, at[k], pw_plot_sample (p, n - 1)[PLOT_T], -1, k < s->count - 1 ? "\n" : "\n\n");
+    pw_plot_place (plots, n - 1, link, s, point);
+    for (int k = 0; k < s->vertices; k++)
+      data_vertex (f, point[k], pw_plot_sample (plots, n - 1)[PLOT_T], -1, k < s->vertices - 1 ? "\n" : "\n\n");
   }
 }
 
 /* Samples from one snapshot to the next, of the first n: the body with the longest path moves by about a third of the
  * size of the mechanism. */
-static int data_stride (const pw_plots *p, int n) {
+static int data_stride (const pw_plots *plots, int n) {
   double longest = 0;
-  for (int b = 0; b < p->bodies.shown; b++) {
+  for (int b = 0; b < plots->bodies.drawn; b++) {
     double path = 0;
     for (int i = 1; i < n; i++) {
-      const double *from = pw_plot_track (p, i - 1, &p->bodies, b), *to = pw_plot_track (p, i, &p->bodies, b);
+      const double *from = pw_plot_track (plots, i - 1, &plots->bodies, b),
+                   *to = pw_plot_track (plots, i, &plots->bodies, b);
       path += hypot (to[0] - from[0], to[1] - from[1]);
     }
     longest = fmax (longest, path);
   }
-  int stride = (int)((n - 1) / fmin (fmax (3 * longest / p->size, PLOT_FEWEST), PLOT_IMAGES));
+  int stride = (int)((n - 1) / fmin (fmax (3 * longest / plots->size, FIGURES_FEWEST), FIGURES_SNAPSHOTS));
   return stride < 1 ? 1 : stride;
 }
 
-/* Blocks: snapshots out of the first n samples; then the last of them, with symbols, open and closed lines.  gnuplot counts
- * blocks with data only, so each begins with a point that is not drawn. */
-static int data_mechanism (const pw_plots *p, const char *name, int n, pw_error *error) {
+/* Blocks: snapshots out of the first n samples; then the last of them; then its symbols, open and closed lines.
+ * gnuplot counts blocks with data only, so each begins with a point that is not drawn. */
+static int data_mechanism (const pw_plots *plots, const char *name, int n, pw_error *error) {
   static const struct {
     const char *title;
-    void (*write) (FILE *f, const pw_plots *p, int i);
+    void (*write) (FILE *f, const pw_plots *plots, int i);
   } block[] = {
     { "bodies", data_bodies }, { "wheels", data_wheels }, { "point masses", data_centres }, { "rods", data_rods }
   };
   static const char first[] = "nan nan nan nan\n\n";
-  pw_output *o = pw_figure_data (&p->figures, name, error);
+  pw_output *o = pw_figure_data (&plots->figures, name, error);
   if (o == NULL) return PW_RESOURCE;
   FILE *f = pw_output_stream (o);
-  int stride = data_stride (p, n);
+  int stride = data_stride (plots, n);
   for (int last = 0; last < 2; last++)
     for (int k = 0; k < 4; k++) {
       fprintf (f, "%s# %s, %s: x [m], y [m], t [s], number of the body\n%s", last || k ? "\n\n" : "", block[k].title,
                last ? "at the end" : "before", first);
-      for (int i = last ? n - 1 : 0; i < n - !last; i += stride) block[k].write (f, p, i);
+      for (int i = last ? n - 1 : 0; i < n - !last; i += stride) block[k].write (f, plots, i);
     }
   for (int closed = 0; closed < 2; closed++) {
     fprintf (f, "\n\n# symbols, %s\n%s", closed ? "closed" : "open", first);
-    for (int i = 0; i < p->links; i++) data_symbol (f, p, &p->link[i], n, closed);
+    for (int i = 0; i < plots->links; i++) data_symbol (f, plots, &plots->link[i], n, closed);
   }
   return pw_output_finish (o, error);
 }
 
-static int data_write (const pw_plots *p, int closeup, pw_error *error) {
+static int data_write (const pw_plots *plots, int closeup, pw_error *error) {
   static const char energy[] = "t [s], kinetic [J], potential [J], work [J], loss [J], projection [J], balance [J]";
-  int status = data_tracks (p, &p->bodies, error);
-  if (status == PW_OK) status = data_tracks (p, &p->wheels, error);
-  if (status == PW_OK) status = data_table (p, "energy.dat", energy, p->data, p->width, PLOT_FIRST, p->samples, error);
+  int status = data_tracks (plots, &plots->bodies, error);
+  if (status == PW_OK) status = data_tracks (plots, &plots->wheels, error);
   if (status == PW_OK)
-    status = data_table (p, "ground.dat", "points of the ground: x [m], y [m]", *p->ground, 2, 2, p->grounds, error);
-  if (status == PW_OK) status = data_mechanism (p, "mechanism.dat", p->samples, error);
-  if (status == PW_OK && closeup > 0) status = data_mechanism (p, "mechanism-start.dat", closeup, error);
+    status =
+        data_table (plots, "energy.dat", energy, plots->data, plots->sample_size, PLOT_FIRST, plots->samples, error);
+  if (status == PW_OK)
+    status = data_table (plots, "ground.dat", "points of the ground: x [m], y [m]", *plots->ground, 2, 2,
+                         plots->grounds, error);
+  if (status == PW_OK) status = data_mechanism (plots, "mechanism.dat", plots->samples, error);
+  if (status == PW_OK && closeup > 0) status = data_mechanism (plots, "mechanism-start.dat", closeup, error);
   return status;
 }
 
 /* ---- Scripts: values of the templates' variables ---- */
 
 /* Curves, with a label each unless there are too many, and which of them are paths of markers. */
-static void figures_curves (FILE *f, const pw_plots *p, const pw_tracks *t) {
-  pw_figure_text (f, "data", t->file);
-  pw_figure_text (f, "what", t->what);
-  fprintf (f, "curves = %d\nnumbers = %d\nlast = %d\narray label[%d]\n", t->curves, t->all, t->numbers + 2, t->curves);
-  for (int i = 0; i < t->curves && t->curves <= PLOT_NAMED; i++)
-    pw_figure_element (f, "label", i + 1, pw_plot_name (p, t, i));
+static void figures_curves (FILE *f, const pw_plots *plots, const pw_tracks *tracks) {
+  pw_figure_text (f, "data", tracks->file);
+  pw_figure_text (f, "what", tracks->noun);
+  fprintf (f, "curves = %d\nnumbers = %d\nlast = %d\narray label[%d]\n", tracks->curves, tracks->count,
+           tracks->numbers + 2, tracks->curves);
+  for (int i = 0; i < tracks->curves && tracks->curves <= FIGURES_NAMED; i++)
+    pw_figure_element (f, "label", i + 1, pw_plot_name (plots, tracks, i));
   fputs ("markers = '", f);
-  for (int i = 0; i < t->curves && t == &p->wheels; i++)
-    if (!pw_plot_rolls (p, pw_plot_pick (i, t->curves, t->shown))) fprintf (f, "%d ", i);
+  for (int i = 0; i < tracks->curves && tracks == &plots->wheels; i++)
+    if (!pw_plot_rolls (plots, pw_plot_pick (i, tracks->curves, tracks->drawn))) fprintf (f, "%d ", i);
   fputs ("'\n", f);
 }
 
 /* The names of bodies unless there are too many, and the colours of those with an area. */
-static void figures_bodies (FILE *f, const pw_plots *p) {
-  int bodies = p->bodies.shown, named = bodies <= PLOT_NAMED ? bodies : 0, area[PLOT_COLOURS] = { 0 };
+static void figures_bodies (FILE *f, const pw_plots *plots) {
+  int bodies = plots->bodies.drawn, named = bodies <= FIGURES_NAMED ? bodies : 0, area[FIGURES_COLOURS] = { 0 };
   fprintf (f, "bodies = %d\narray body[%d]\n", named, bodies);
-  for (int b = 0; b < bodies; b++) area[b % PLOT_COLOURS] |= p->shape[b].corners > 0;
+  for (int b = 0; b < bodies; b++) area[b % FIGURES_COLOURS] |= plots->shape[b].corners > 0;
   fputs ("areas = '", f);
-  for (int c = 0; c < PLOT_COLOURS; c++)
+  for (int c = 0; c < FIGURES_COLOURS; c++)
     if (area[c]) fprintf (f, "%d ", c + 1);
   fputs ("'\n", f);
-  for (int b = 0; b < named; b++) pw_figure_element (f, "body", b + 1, pw_plot_name (p, &p->bodies, b));
+  for (int b = 0; b < named; b++) pw_figure_element (f, "body", b + 1, pw_plot_name (plots, &plots->bodies, b));
 }
 
-static int figures_write (const pw_plots *p, const char *name, int closeup, pw_error *error) {
+static int figures_write (const pw_plots *plots, const char *name, int closeup, pw_error *error) {
   int mechanism = strcmp (name, "mechanism") == 0, paths = mechanism || strcmp (name, "paths") == 0;
-  pw_output *o = pw_figure_begin (&p->figures, name, error);
+  pw_output *o = pw_figure_begin (&plots->figures, name, error);
   if (o == NULL) return PW_RESOURCE;
   FILE *f = pw_output_stream (o);
-  fprintf (f, "t_end = %.9g\nt_detail = %.9g\n", pw_plot_sample (p, p->samples - 1)[PLOT_T],
-           closeup > 0 ? pw_plot_sample (p, closeup - 1)[PLOT_T] : 0);
-  figures_curves (f, p, paths && p->wheels.shown ? &p->wheels : &p->bodies);
-  fprintf (f, "ground = %d\nby_time = %d\n", p->grounds > 0, p->by_time);
-  if (mechanism) figures_bodies (f, p);
+  fprintf (f, "t_end = %.9g\nt_detail = %.9g\n", pw_plot_sample (plots, plots->samples - 1)[PLOT_T],
+           closeup > 0 ? pw_plot_sample (plots, closeup - 1)[PLOT_T] : 0);
+  figures_curves (f, plots, paths && plots->wheels.drawn ? &plots->wheels : &plots->bodies);
+  fprintf (f, "ground = %d\nby_time = %d\n", plots->grounds > 0, plots->by_time);
+  if (mechanism) figures_bodies (f, plots);
   return pw_figure_end (o, name, error);
 }
 
-int pw_plots_finish (pw_plots *p, int draw, pw_error *error) {
+int pw_plots_finish (pw_plots *plots, int draw, pw_error *error) {
   static const char *const names[] = { "paths", "velocities", "angular", "energy", "mechanism", NULL };
-  const char *folder = p->figures.folder;
+  const char *folder = plots->figures.folder;
   char t[32], end[32];
   if (folder == NULL) return PW_OK;
-  if (p->samples < 2) {
+  if (plots->samples < 2) {
     pw_cli_say ("pinwheel: the run is too short for figures: none are drawn in %s\n", folder);
     return PW_OK;
   }
-  if (p->samples < p->wanted)
-    snprintf (p->figures.incomplete, sizeof p->figures.incomplete, ", incomplete: up to t = %s s of %s s",
-              pw_format (t, pw_plot_sample (p, p->samples - 1)[PLOT_T], 4), pw_format (end, p->t_end, 4));
-  int closeup = data_closeup (p), status = data_write (p, closeup, error);
+  if (plots->samples < plots->planned)
+    snprintf (plots->figures.incomplete, sizeof plots->figures.incomplete, ", incomplete: up to t = %s s of %s s",
+              pw_format (t, pw_plot_sample (plots, plots->samples - 1)[PLOT_T], 4), pw_format (end, plots->t_end, 4));
+  int closeup = data_closeup (plots), status = data_write (plots, closeup, error);
   for (const char *const *name = names; status == PW_OK && *name; name++)
-    status = figures_write (p, *name, closeup, error);
+    status = figures_write (plots, *name, closeup, error);
   if (status != PW_OK) return status;
   return draw ? pw_figure_draw (folder, names, error) : pw_figure_undrawn (folder, names, "the run was interrupted");
 }

@@ -1,4 +1,4 @@
-/* Checkpoints of a run: their contents, when they are due, and how a run continues from one.
+/* Checkpoints of `pinwheel run`: their contents, when they are due, and how a run continues from one.
  *
  * A checkpoint is saved after the step that reaches a multiple of the interval, when the step's rows are written.  The
  * table is written to the disk first, so that a resumed run finds at least the rows that the checkpoint counts. */
@@ -8,176 +8,190 @@
 #include "run_command.h"
 #include "fingerprint.h"
 
-static const char checkpoints_key[] = "checkpoint-every", checkpoints_engine[] = "engine";
+/* keys of the fingerprint that are also read */
+static const char checkpoints_interval_key[] = "checkpoint-every", checkpoints_engine_key[] = "engine";
 
 /* ---- Before the run ---- */
 
-/* The interval from the file that is resumed. */
-static void checkpoints_interval (pw_checkpoints *c) {
+/* The interval of the checkpoint that is resumed. */
+static void checkpoints_read_interval (pw_checkpoints *checkpoints) {
   char text[40];
   size_t size;
-  const char *value = pw_fingerprint_value (c->from.text, c->from.head_end, checkpoints_key, &size);
+  const pw_checkpoint *resumed = &checkpoints->resumed;
+  const char *value = pw_fingerprint_value (resumed->text, resumed->head_end, checkpoints_interval_key, &size);
   if (value == NULL || size >= sizeof text) return;
   memcpy (text, value, size);
   text[size] = 0;
-  if (pw_read_number (text, &c->every) != PW_OK || !(c->every > 0)) c->every = 0;
+  if (pw_read_number (text, &checkpoints->interval) != PW_OK || !(checkpoints->interval > 0)) checkpoints->interval = 0;
 }
 
-/* Reads the options and the file to be resumed.  Without checkpoints `every` stays 0. */
-static int checkpoints_read (pw_checkpoints *c, double t_end, pw_error *error) {
-  c->due = INFINITY;
-  if (c->resume && c->path == NULL) c->path = c->resume;
-  if (c->path == NULL && c->every_text == NULL) return PW_OK;
-  if (c->path == NULL)
-    return pw_fail (error, PW_INPUT, "--checkpoint-every %s: --checkpoint FILE is needed to save to", c->every_text);
-  if (c->resume && pw_checkpoint_read (c->resume, &c->from, error) != PW_OK) return error->status;
-  c->every = t_end / 10;
-  if (c->resume) checkpoints_interval (c);
-  return pw_cli_number ("--checkpoint-every", c->every_text, PW_POSITIVE, &c->every, error);
+/* Reads the options and the file to be resumed.  Without checkpoints the interval remains 0. */
+static int checkpoints_read_options (pw_checkpoints *checkpoints, double t_end, pw_error *error) {
+  checkpoints->next_time = INFINITY;
+  if (checkpoints->resume_path && checkpoints->path == NULL) checkpoints->path = checkpoints->resume_path;
+  if (checkpoints->path == NULL && checkpoints->interval_text == NULL) return PW_OK;
+  if (checkpoints->path == NULL)
+    return pw_fail (error, PW_INPUT, "--checkpoint-every %s: --checkpoint FILE is needed to save to",
+                    checkpoints->interval_text);
+  if (checkpoints->resume_path && pw_checkpoint_read (checkpoints->resume_path, &checkpoints->resumed, error) != PW_OK)
+    return error->status;
+  checkpoints->interval = t_end / 10;
+  if (checkpoints->resume_path) checkpoints_read_interval (checkpoints);
+  return pw_cli_number ("--checkpoint-every", checkpoints->interval_text, PW_POSITIVE, &checkpoints->interval, error);
 }
 
-int pw_checkpoints_open (pw_run_command *x, pw_specialise *when, pw_error *error) {
-  pw_checkpoints *c = &x->check;
+int pw_checkpoints_open (pw_run_cli *command, pw_specialise *specialise, pw_error *error) {
+  pw_checkpoints *checkpoints = &command->checkpoints;
   size_t size;
-  int status = checkpoints_read (c, x->t_end, error);
-  if (status == PW_OK && c->resume && *when == PW_SPECIALISE_AUTO)
-    *when = pw_fingerprint_value (c->from.text, c->from.head_end, checkpoints_engine, &size) ? PW_SPECIALISE_ALWAYS
-                                                                                             : PW_SPECIALISE_NEVER;
+  int status = checkpoints_read_options (checkpoints, command->t_end, error);
+  if (status == PW_OK && checkpoints->resume_path && *specialise == PW_SPECIALISE_AUTO) {
+    const pw_checkpoint *resumed = &checkpoints->resumed;
+    const char *engine = pw_fingerprint_value (resumed->text, resumed->head_end, checkpoints_engine_key, &size);
+    *specialise = engine ? PW_SPECIALISE_ALWAYS : PW_SPECIALISE_NEVER;
+  }
   return status;
 }
 
-static int checkpoints_lock (pw_checkpoints *c, pw_error *error) {
-  c->lock = pw_output_open (c->path, error);
-  if (c->lock == NULL) return error->status;
-  if (pw_output_is_file (c->lock)) return PW_OK;
+static int checkpoints_lock (pw_checkpoints *checkpoints, pw_error *error) {
+  checkpoints->lock = pw_output_open (checkpoints->path, error);
+  if (checkpoints->lock == NULL) return error->status;
+  if (pw_output_is_file (checkpoints->lock)) return PW_OK;
   return pw_fail (error, PW_INPUT, "%s: a checkpoint needs a regular file, which can be read again and replaced",
-                  c->path);
+                  checkpoints->path);
 }
 
-/* The head: everything that determines the results. */
-static int checkpoints_head (pw_run_command *x, pw_error *error) {
+/* Everything that determines the results. */
+static int checkpoints_fingerprint (pw_run_cli *command, pw_error *error) {
   const unsigned short order = 1;
   char numbers[60];
-  pw_text *t = &x->check.head;
-  const pw_model *m = x->m.model;
-  if (pw_fingerprint_run (t, PW_CHECKPOINT_MAGIC, x->m.file, pw_check_tables (0, m), x->method, &x->settings, error) !=
-      PW_OK)
+  pw_text *text = &command->checkpoints.fingerprint;
+  const pw_model *model = command->compiled.model;
+  if (pw_fingerprint_run (text, PW_CHECKPOINT_MAGIC, command->compiled.file, pw_fingerprint_tables (0, model),
+                          command->method, &command->settings, error) != PW_OK)
     return error->status;
-  if (x->engine.code) pw_fingerprint_line (t, checkpoints_engine, NULL, "specialised");
-  for (const pw_parameter *q = pw_model_table (m)->parameters; q && q->name; q++)
-    pw_fingerprint_number (t, "parameter", q->name, pw_model_parameter (m, q));
-  pw_fingerprint_initial (t, x->line.starts);
-  pw_fingerprint_line (t, "table", NULL, x->csv_path ? "written" : "not written");
-  pw_fingerprint_number (t, "every", NULL, x->every);
-  pw_fingerprint_line (t, "energy", NULL, x->energy ? "kept" : "not kept");
-  pw_fingerprint_line (t, "plots", NULL, x->plots_path ? "drawn" : "not drawn");
-  pw_fingerprint_line (t, "animation", NULL, x->animate_path ? "written" : "not written");
-  if (x->reference_path == NULL)
-    pw_fingerprint_line (t, "reference", NULL, "the model's");
-  else if (pw_fingerprint_file (t, "reference", x->reference_path, x->reference_path, error) != PW_OK)
+  if (command->engine.code) pw_fingerprint_line (text, checkpoints_engine_key, NULL, "specialised");
+  for (const pw_parameter *parameter = pw_model_table (model)->parameters; parameter && parameter->name; parameter++)
+    pw_fingerprint_number (text, "parameter", parameter->name, pw_model_parameter (model, parameter));
+  pw_fingerprint_initial (text, command->line.starts);
+  pw_fingerprint_line (text, "table", NULL, command->table_path ? "written" : "not written");
+  pw_fingerprint_number (text, "every", NULL, command->row_interval);
+  pw_fingerprint_line (text, "energy", NULL, command->with_energies ? "kept" : "not kept");
+  pw_fingerprint_line (text, "plots", NULL, command->plots_path ? "drawn" : "not drawn");
+  pw_fingerprint_line (text, "animation", NULL, command->page_path ? "written" : "not written");
+  if (command->reference_path == NULL)
+    pw_fingerprint_line (text, "reference", NULL, "the model's");
+  else if (pw_fingerprint_file (text, "reference", command->reference_path, command->reference_path, error) != PW_OK)
     return error->status;
-  pw_fingerprint_number (t, checkpoints_key, NULL, x->check.every);
+  pw_fingerprint_number (text, checkpoints_interval_key, NULL, command->checkpoints.interval);
   snprintf (numbers, sizeof numbers, "%s endian, %zu bytes", *(const unsigned char *)&order ? "little" : "big",
             sizeof (long));
-  pw_fingerprint_line (t, "numbers", NULL, numbers);
-  pw_text_add (t, "end\n");
-  return t->failed ? pw_fail (error, PW_RESOURCE, "out of memory") : PW_OK;
+  pw_fingerprint_line (text, "numbers", NULL, numbers);
+  pw_text_add (text, "end\n");
+  return text->failed ? pw_fail (error, PW_RESOURCE, "out of memory") : PW_OK;
 }
 
 /* Refuses a checkpoint of another run. */
-static int checkpoints_match (const pw_checkpoints *c, pw_error *error) {
-  static const char *words[2] = { "there", "here" };
-  char what[300];
-  if (c->resume && pw_fingerprint_differ (c->from.text, c->from.head_end, c->head.at, c->head.at + c->head.used, 1,
-                                          words, what, sizeof what))
-    return pw_fail (error, PW_INPUT, "the checkpoint %.100s belongs to another run: %.300s", c->resume, what);
+static int checkpoints_check_fingerprint (const pw_checkpoints *checkpoints, pw_error *error) {
+  const pw_text *own = &checkpoints->fingerprint;
+  const pw_fingerprint there = { checkpoints->resumed.text, checkpoints->resumed.head_end, "there" };
+  const pw_fingerprint here = { own->chars, own->chars + own->length, "here" };
+  char difference[300];
+  if (checkpoints->resume_path && pw_fingerprint_differ (there, here, NULL, difference, sizeof difference))
+    return pw_fail (error, PW_INPUT, "the checkpoint %.100s belongs to another run: %.300s", checkpoints->resume_path,
+                    difference);
   return PW_OK;
 }
 
-int pw_checkpoints_prepare (pw_run_command *x, pw_error *error) {
-  pw_checkpoints *c = &x->check;
-  if (c->path == NULL) return PW_OK;
-  if (x->csv_path && strcmp (x->csv_path, "-") == 0)
+int pw_checkpoints_prepare (pw_run_cli *command, pw_error *error) {
+  pw_checkpoints *checkpoints = &command->checkpoints;
+  if (checkpoints->path == NULL) return PW_OK;
+  if (command->table_path && strcmp (command->table_path, "-") == 0)
     return pw_fail (error, PW_INPUT,
                     "--checkpoint: a table on standard output cannot be continued; write it to a file");
-  int status = checkpoints_lock (c, error);
-  if (status == PW_OK) status = checkpoints_head (x, error);
-  if (status == PW_OK) status = checkpoints_match (c, error);
-  if (status != PW_OK || x->csv_path == NULL) return status;
+  int status = checkpoints_lock (checkpoints, error);
+  if (status == PW_OK) status = checkpoints_fingerprint (command, error);
+  if (status == PW_OK) status = checkpoints_check_fingerprint (checkpoints, error);
+  if (status != PW_OK || command->table_path == NULL) return status;
+  pw_output **table = &command->output[PW_RUN_TABLE];
   pw_mark mark = { 0 };
-  if (c->resume == NULL)
-    return pw_output_mark (x->output[PW_RUN_TABLE], &mark, error); /* fails if it cannot be continued */
-  pw_archive_bytes (&c->from.state, &mark, sizeof mark);
-  x->output[PW_RUN_TABLE] = pw_output_continue (x->csv_path, &mark, error);
-  return x->output[PW_RUN_TABLE] ? PW_OK : error->status;
+  if (checkpoints->resume_path == NULL)
+    return pw_output_mark (*table, &mark, error); /* fails if it cannot be continued */
+  pw_archive_bytes (&checkpoints->resumed.state, &mark, sizeof mark);
+  *table = pw_output_continue (command->table_path, &mark, error);
+  return *table ? PW_OK : error->status;
 }
 
-void pw_checkpoints_close (pw_checkpoints *c) {
-  if (c->lock) pw_output_discard (c->lock);
-  pw_text_free (&c->head);
-  pw_archive_free (&c->state);
-  pw_checkpoint_free (&c->from);
+void pw_checkpoints_close (pw_checkpoints *checkpoints) {
+  if (checkpoints->lock) pw_output_discard (checkpoints->lock);
+  pw_text_free (&checkpoints->fingerprint);
+  pw_archive_free (&checkpoints->state);
+  pw_checkpoint_free (&checkpoints->resumed);
 }
 
 /* ---- Saving and resuming ---- */
 
-/* The first multiple of the interval after t is due next; every step, if t has 2^53 intervals, where n + 1 is n. */
-static void checkpoints_next (pw_checkpoints *c, double t) {
-  if (c->every == 0) return;
-  double n = fmin (floor (t / c->every), 0x1p53);
-  while (n * c->every <= t && n < 0x1p53) n++;
-  c->due = n * c->every;
+/* The next checkpoint is due at the first multiple of the interval after t; after every step if t has 2^53 intervals,
+ * since then n + 1 is n in double precision. */
+static void checkpoints_schedule (pw_checkpoints *checkpoints, double t) {
+  if (checkpoints->interval == 0) return;
+  double n = fmin (floor (t / checkpoints->interval), 0x1p53);
+  while (n * checkpoints->interval <= t && n < 0x1p53) n++;
+  checkpoints->next_time = n * checkpoints->interval;
 }
 
-/* Serialises the state of the program besides that of the run. */
-static void checkpoints_serialise (pw_run_command *x, pw_archive *a) {
-  pw_archive_bytes (a, &x->row, sizeof x->row);
-  pw_archive_bytes (a, &x->cpu, sizeof x->cpu);
-  pw_archive_bytes (a, x->engine.why, sizeof x->engine.why);
-  x->engine.why[sizeof x->engine.why - 1] = 0;
-  if (x->plots) pw_plots_serialise (x->plots, a);
-  pw_comparison_serialise (&x->comparison, a);
+/* Saves or loads the state of the command besides that of the run. */
+static void checkpoints_serialise (pw_run_cli *command, pw_archive *archive) {
+  pw_archive_bytes (archive, &command->rows, sizeof command->rows);
+  pw_archive_bytes (archive, &command->cpu, sizeof command->cpu);
+  pw_archive_bytes (archive, command->engine.reason, sizeof command->engine.reason);
+  command->engine.reason[sizeof command->engine.reason - 1] = 0;
+  if (command->plots) pw_plots_serialise (command->plots, archive);
+  pw_comparison_serialise (&command->comparison, archive);
 }
 
-/* A checkpoint must lie within the run and have the rows up to its time. */
-static int checkpoints_plausible (const pw_run_command *x) {
-  double t = pw_run_time (x->r), rows = x->csv && x->every > 0 ? floor (t / x->every) + 1 : (double)x->row;
-  return t <= x->t_end && x->row >= 0 && fabs ((double)x->row - rows) <= 1 && isfinite (x->cpu) && x->cpu >= 0;
+/* 1 if the checkpoint that was loaded lies within the run and has the rows up to its time. */
+static int checkpoints_plausible (const pw_run_cli *command) {
+  double t = pw_run_time (command->run), rows = (double)command->rows, expected = rows;
+  double cpu = command->cpu;
+  if (command->table && command->row_interval > 0) expected = floor (t / command->row_interval) + 1;
+  return t <= command->t_end && rows >= 0 && fabs (rows - expected) <= 1 && isfinite (cpu) && cpu >= 0;
 }
 
-int pw_checkpoints_resume (pw_run_command *x, pw_error *error) {
-  pw_checkpoints *c = &x->check;
+int pw_checkpoints_resume (pw_run_cli *command, pw_error *error) {
+  pw_checkpoints *checkpoints = &command->checkpoints;
   char t[32];
-  if (c->resume) {
-    checkpoints_serialise (x, &c->from.state);
-    if (pw_run_load (x->r, &c->from.state, error) != PW_OK) return error->status;
-    if (!checkpoints_plausible (x))
+  if (checkpoints->resume_path) {
+    checkpoints_serialise (command, &checkpoints->resumed.state);
+    if (pw_run_load (command->run, &checkpoints->resumed.state, error) != PW_OK) return error->status;
+    if (!checkpoints_plausible (command))
       return pw_fail (error, PW_INPUT,
                       "the checkpoint %s is not that of a run: time, number of rows or processor time "
                       "are impossible",
-                      c->resume);
-    x->resumed = 1;
-    pw_cli_say ("pinwheel: resumed at t = %s s\n", pw_format (t, pw_run_time (x->r), 6));
+                      checkpoints->resume_path);
+    command->resumed = 1;
+    pw_cli_say ("pinwheel: resumed at t = %s s\n", pw_format (t, pw_run_time (command->run), 6));
   }
-  checkpoints_next (c, pw_run_time (x->r));
+  checkpoints_schedule (checkpoints, pw_run_time (command->run));
   return PW_OK;
 }
 
-int pw_checkpoints_save (pw_run_command *x, pw_error *error) {
-  pw_checkpoints *c = &x->check;
-  double t = pw_run_time (x->r);
+int pw_checkpoints_save (pw_run_cli *command, pw_error *error) {
+  pw_checkpoints *checkpoints = &command->checkpoints;
+  pw_output *table = command->output[PW_RUN_TABLE];
+  double t = pw_run_time (command->run);
   pw_mark mark = { 0 };
-  if (t >= x->t_end) return PW_OK;
-  if (x->output[PW_RUN_TABLE] && pw_output_mark (x->output[PW_RUN_TABLE], &mark, error) != PW_OK) return error->status;
-  pw_archive_clear (&c->state);
-  if (x->output[PW_RUN_TABLE]) pw_archive_bytes (&c->state, &mark, sizeof mark);
-  checkpoints_serialise (x, &c->state);
-  int status = pw_run_save (x->r, &c->state, error);
+  if (t >= command->t_end) return PW_OK;
+  if (table && pw_output_mark (table, &mark, error) != PW_OK) return error->status;
+  pw_archive_clear (&checkpoints->state);
+  if (table) pw_archive_bytes (&checkpoints->state, &mark, sizeof mark);
+  checkpoints_serialise (command, &checkpoints->state);
+  int status = pw_run_save (command->run, &checkpoints->state, error);
   if (status != PW_OK) return status > 0 ? PW_OK : status;
-  checkpoints_next (c, t);
-  if (c->state.failed) return pw_fail (error, PW_RESOURCE, "out of memory while saving a checkpoint");
-  pw_output *o = pw_output_open_as (c->path, ".next", error);
-  status = o ? pw_checkpoint_put (o, c->head.at, &c->state, error) : error->status;
-  if (status == PW_OK) c->saved = t;
+  checkpoints_schedule (checkpoints, t);
+  if (checkpoints->state.failed) return pw_fail (error, PW_RESOURCE, "out of memory while saving a checkpoint");
+  pw_output *output = pw_output_open_as (checkpoints->path, ".next", error);
+  status =
+      output ? pw_checkpoint_put (output, checkpoints->fingerprint.chars, &checkpoints->state, error) : error->status;
+  if (status == PW_OK) checkpoints->saved_time = t;
   return status;
 }

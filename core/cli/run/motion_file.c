@@ -1,4 +1,4 @@
-/* A reference from a file: a table with the columns of `pinwheel run -o`; missing columns are not compared. */
+/* Reads a reference from a file: a table with the columns of `pinwheel run -o`, some of which may be missing. */
 #include <errno.h>
 #include <math.h>
 #include <stdlib.h>
@@ -6,69 +6,58 @@
 #include "motion.h"
 #include "util.h"
 
-#define FILE_SAME 1e-9 /* relative to the end: smaller differences of times are ignored */
+#define FILE_SAME 1e-9 /* relative to the final time: smaller differences of times are ignored */
+
+enum { FILE_LINE = 16 << 20 }; /* bytes of the longest line */
+
+typedef struct {
+  int index;     /* of its values in a sample of a motion; -1: not read */
+  double factor; /* to that sample: to SI units; negative for reactions, which are -lambda */
+} file_column;
 
 typedef struct {
   const char *path;
   FILE *f;
-  char *line;
-  size_t room;
-  long number;   /* of the line */
-  int *place;    /* columns after the first: index in a motion, or -1 */
-  double *sign;  /* factor to SI units; negative for reactions, which are -lambda */
-  double second; /* unit of the time [s] */
-  int columns, known;
-  pw_names index; /* in a motion, of states and reactions */
+  char *line; /* FILE_LINE bytes and the end */
+  long line_number;
+  double time_unit; /* of the first column [s] */
+  file_column *column;
+  int columns, states; /* columns after the first; those of them that are states of the model */
+  pw_names indices;    /* in a sample, of the names of states and reactions */
   pw_arena names;
 } file_reader;
 
 /* ---- Lines ---- */
 
-enum { FILE_LINE = 16 << 20 }; /* bytes of the longest line */
-
-static int file_unreadable (const file_reader *in, const char *why, pw_error *error) {
-  return pw_fail (error, PW_INPUT, "--reference %s: cannot be read: %s", in->path, why);
+static int file_unreadable (const file_reader *reader, const char *why, pw_error *error) {
+  return pw_fail (error, PW_INPUT, "--reference %s: cannot be read: %s", reader->path, why);
 }
 
-/* Doubles the room for a line. */
-static int file_grow (file_reader *in, pw_error *error) {
-  size_t room = in->room ? 2 * in->room : 1 << 12;
-  if (room > FILE_LINE)
-    return pw_fail (error, PW_INPUT, "--reference %s: cannot be read: line %ld has more than %d MB", in->path,
-                    in->number + 1, FILE_LINE >> 20);
-  char *more = realloc (in->line, room);
-  if (more == NULL) return pw_fail (error, PW_RESOURCE, "--reference %s: out of memory", in->path);
-  in->line = more;
-  in->room = room;
-  return PW_OK;
-}
-
-/* Reads up to the end of the line; PW_RETRY at the end of the file. */
-static int file_read_line (file_reader *in, pw_error *error) {
-  size_t used = 0;
-  do {
-    if (in->room - used < 2 && file_grow (in, error) != PW_OK) return error->status;
-    errno = 0;
-    if (fgets (in->line + used, (int)(in->room - used), in->f) == NULL) {
-      if (!feof (in->f)) return file_unreadable (in, strerror (errno), error);
-      return used > 0 ? PW_OK : PW_RETRY;
-    }
-    if (in->line[used] == 0) return file_unreadable (in, "a table is text, and this has a byte 0", error);
-    used += strlen (in->line + used);
-  } while (in->line[used - 1] != '\n');
-  return PW_OK;
-}
-
-/* The next line that is not empty, without its end; PW_RETRY at the end of the file. */
-static int file_line (file_reader *in, pw_error *error) {
-  for (;;) {
-    int status = file_read_line (in, error);
-    if (status != PW_OK) return status;
-    size_t n = strlen (in->line);
-    while (n > 0 && strchr ("\r\n", in->line[n - 1])) in->line[--n] = 0;
-    in->number++;
-    if (n > 0) return PW_OK;
+/* Reads a line, without its end; PW_RETRY at the end of the file. */
+static int file_read_line (file_reader *reader, pw_error *error) {
+  size_t size = 0;
+  int c;
+  errno = 0;
+  while ((c = getc (reader->f)) != EOF && c != '\n') {
+    if (c == 0) return file_unreadable (reader, "a table is text, and this has a byte 0", error);
+    if (size == FILE_LINE)
+      return pw_fail (error, PW_INPUT, "--reference %s: cannot be read: line %ld has more than %d MB", reader->path,
+                      reader->line_number + 1, FILE_LINE >> 20);
+    reader->line[size++] = (char)c;
   }
+  if (ferror (reader->f)) return file_unreadable (reader, strerror (errno), error);
+  while (size > 0 && reader->line[size - 1] == '\r') size--;
+  reader->line[size] = 0;
+  reader->line_number++;
+  return c == EOF && size == 0 ? PW_RETRY : PW_OK;
+}
+
+/* The next line that is not empty; PW_RETRY at the end of the file. */
+static int file_next_line (file_reader *reader, pw_error *error) {
+  int status;
+  do status = file_read_line (reader, error);
+  while (status == PW_OK && *reader->line == 0);
+  return status;
 }
 
 /* Splits off the next cell. */
@@ -79,90 +68,95 @@ static char *file_cell (char **rest) {
   return cell;
 }
 
-static int file_number (const file_reader *in, const char *cell, double *value, pw_error *error) {
+static int file_number (const file_reader *reader, const char *cell, double *value, pw_error *error) {
   if (pw_read_number (cell, value) == PW_OK) return PW_OK;
-  return pw_fail (error, PW_INPUT, "--reference %s: line %ld: \"%.60s\" is not a number", in->path, in->number, cell);
+  return pw_fail (error, PW_INPUT, "--reference %s: line %ld: \"%.60s\" is not a number", reader->path,
+                  reader->line_number, cell);
 }
 
 /* ---- Columns ---- */
 
-static int file_index (file_reader *in, const pw_system *s) {
+/* Lists the names of states and reactions in the order of a sample. */
+static int file_list_names (file_reader *reader, const pw_system *system) {
   char name[300];
-  int states = 2 * pw_system_coordinates (s), rows = pw_system_rows (s);
-  if (pw_names_open (&in->index, (size_t)(states + rows)) != PW_OK) return PW_RESOURCE;
+  int states = 2 * pw_system_coordinates (system), rows = pw_system_rows (system);
+  if (pw_names_open (&reader->indices, (size_t)(states + rows)) != PW_OK) return PW_RESOURCE;
   for (int i = 0; i < states + rows; i++) {
     if (i < states)
-      pw_system_state_name (s, i, name, sizeof name);
+      pw_system_state_name (system, i, name, sizeof name);
     else
-      pw_system_reaction_name (s, i - states, name, sizeof name);
-    const char *copy = pw_arena_copy (&in->names, name);
+      pw_system_reaction_name (system, i - states, name, sizeof name);
+    const char *copy = pw_arena_copy (&reader->names, name);
     if (copy == NULL) return PW_RESOURCE;
-    pw_names_add (&in->index, copy, i);
+    pw_names_add (&reader->indices, copy, i);
   }
   return PW_OK;
 }
 
-/* Finds column i, such as "frame.x [m]", in a motion. */
-static int file_column (file_reader *in, int i, const pw_system *s, const char *cell, pw_error *error) {
-  char name[300], unit[260];
-  double factor;
-  int states = 2 * pw_system_coordinates (s);
-  snprintf (name, sizeof name, "%.*s", (int)pw_unit_split (cell, unit, sizeof unit), cell);
-  int place = in->place[i] = pw_names_find (&in->index, name), is_state = place < states;
-  if (place < 0) return PW_OK;
-  const char *wanted = is_state ? pw_system_state_unit (s, place) : pw_system_reaction_unit (s, place - states);
-  if (pw_unit_check (cell, wanted, &factor, unit, sizeof unit) != PW_OK)
-    return pw_fail (error, PW_INPUT, "--reference %s: %s", in->path, unit);
-  in->sign[i] = is_state ? factor : -factor;
-  in->known += is_state;
+/* Finds column i, such as "frame.x [m]", in a sample. */
+static int file_find_column (file_reader *reader, int i, const pw_system *system, const char *cell, pw_error *error) {
+  char name[300], text[260]; /* the unit, or why it is refused */
+  file_column *column = reader->column + i;
+  int states = 2 * pw_system_coordinates (system);
+  snprintf (name, sizeof name, "%.*s", (int)pw_unit_split (cell, text, sizeof text), cell);
+  int index = column->index = pw_names_find (&reader->indices, name), is_state = index < states;
+  if (index < 0) return PW_OK;
+  for (int k = 0; k < i; k++)
+    if (reader->column[k].index == index)
+      return pw_fail (error, PW_INPUT, "--reference %s: columns %d and %d are both named \"%.60s\"", reader->path,
+                      k + 2, i + 2, name);
+  const char *unit = is_state ? pw_system_state_unit (system, index) : pw_system_reaction_unit (system, index - states);
+  if (pw_unit_check (cell, unit, &column->factor, text, sizeof text) != PW_OK)
+    return pw_fail (error, PW_INPUT, "--reference %s: %s", reader->path, text);
+  if (!is_state) column->factor = -column->factor;
+  reader->states += is_state;
   return PW_OK;
 }
 
-static int file_columns (file_reader *in, const pw_system *s, pw_error *error) {
-  char example[300], unit[260], *rest;
-  int status = file_line (in, error);
-  if (status == PW_RETRY) return pw_fail (error, PW_INPUT, "--reference %s: the file is empty", in->path);
+static int file_read_columns (file_reader *reader, const pw_system *system, pw_error *error) {
+  char example[300], text[260];
+  int status = file_next_line (reader, error);
+  if (status == PW_RETRY) return pw_fail (error, PW_INPUT, "--reference %s: the file is empty", reader->path);
   if (status != PW_OK) return status;
-  for (const char *c = in->line; *c; c++) in->columns += *c == ',';
-  in->place = calloc ((size_t)in->columns + 1, sizeof *in->place);
-  in->sign = calloc ((size_t)in->columns + 1, sizeof *in->sign);
-  if (in->place == NULL || in->sign == NULL || file_index (in, s) != PW_OK)
+  for (const char *c = reader->line; *c; c++) reader->columns += *c == ',';
+  reader->column = calloc ((size_t)reader->columns + 1, sizeof *reader->column);
+  if (reader->column == NULL || file_list_names (reader, system) != PW_OK)
     return pw_fail (error, PW_RESOURCE, "out of memory");
-  rest = in->line;
+  char *rest = reader->line;
   const char *first = file_cell (&rest);
-  if (pw_unit_split (first, unit, sizeof unit) != 1 || *first != 't')
-    return pw_fail (error, PW_INPUT, "--reference %s: the first column is \"%.60s\", expected \"t [s]\"", in->path,
+  if (pw_unit_split (first, text, sizeof text) != 1 || *first != 't')
+    return pw_fail (error, PW_INPUT, "--reference %s: the first column is \"%.60s\", expected \"t [s]\"", reader->path,
                     first);
-  if (pw_unit_check (first, "s", &in->second, unit, sizeof unit) != PW_OK)
-    return pw_fail (error, PW_INPUT, "--reference %s: %s", in->path, unit);
-  for (int i = 0; i < in->columns; i++)
-    if (file_column (in, i, s, file_cell (&rest), error) != PW_OK) return error->status;
-  if (in->known) return PW_OK;
-  return pw_fail (error, PW_INPUT, "--reference %s: no column is a state of this model, such as \"%s\"", in->path,
-                  pw_system_state_name (s, 0, example, sizeof example));
+  if (pw_unit_check (first, "s", &reader->time_unit, text, sizeof text) != PW_OK)
+    return pw_fail (error, PW_INPUT, "--reference %s: %s", reader->path, text);
+  for (int i = 0; i < reader->columns; i++)
+    if (file_find_column (reader, i, system, file_cell (&rest), error) != PW_OK) return error->status;
+  if (reader->states) return PW_OK;
+  return pw_fail (error, PW_INPUT, "--reference %s: no column is a state of this model, such as \"%s\"", reader->path,
+                  pw_system_state_name (system, 0, example, sizeof example));
 }
 
 /* ---- Rows ---- */
 
-/* The next line's time; PW_RETRY at the end. */
-static int file_time (file_reader *in, char **rest, double *t, pw_error *error) {
-  int status = file_line (in, error);
+/* Reads the next line, and its time [s] from the first cell; PW_RETRY at the end of the file. */
+static int file_read_time (file_reader *reader, char **rest, double *t, pw_error *error) {
+  int status = file_next_line (reader, error);
   if (status != PW_OK) return status;
-  *rest = in->line;
-  status = file_number (in, file_cell (rest), t, error);
-  if (status == PW_OK) *t *= in->second;
+  *rest = reader->line;
+  status = file_number (reader, file_cell (rest), t, error);
+  if (status == PW_OK) *t *= reader->time_unit;
   return status;
 }
 
-/* Rows from the start to the end, which is the time of the last row if it is not given. */
-static int file_count (file_reader *in, double *t_end, int whole, int *rows, pw_error *error) {
+/* Counts the rows after 0 and up to *t_end, which becomes the time of the last row if it is 0. */
+static int file_count_rows (file_reader *reader, double *t_end, int *rows, pw_error *error) {
   double t, last = 0, before = -INFINITY;
-  char *rest;
+  char *rest, end[32];
   int status;
-  for (*rows = 0; (status = file_time (in, &rest, &t, error)) == PW_OK;) {
+  for (*rows = 0; (status = file_read_time (reader, &rest, &t, error)) == PW_OK;) {
     if (!(t > before) || isinf (t))
-      return pw_fail (error, PW_INPUT, "--reference %s: line %ld: times must be finite and increase", in->path,
-                      in->number);
+      return pw_fail (error, PW_INPUT, "--reference %s: line %ld: times must be finite and increase", reader->path,
+                      reader->line_number);
     before = t;
     if (t <= 0 || (*t_end > 0 && t > *t_end * (1 + FILE_SAME))) continue;
     last = t;
@@ -170,68 +164,67 @@ static int file_count (file_reader *in, double *t_end, int whole, int *rows, pw_
   }
   if (status != PW_RETRY) return status;
   if (*t_end == 0) *t_end = last;
-  char end[32], reached[32];
-  if (*rows == 0 && !whole)
-    return pw_fail (error, PW_INPUT, "--reference %s: no row between 0 and the final time, t = %s s", in->path,
-                    pw_format (end, *t_end, 9));
-  if (*rows > 0 && (!whole || fabs (last - *t_end) <= FILE_SAME * *t_end)) return PW_OK;
-  return pw_fail (error, PW_INPUT,
-                  "--reference %s: no row at the final time, t = %s s; the last one before it is at %s s", in->path,
-                  pw_format (end, *t_end, 9), pw_format (reached, last, 9));
+  if (*rows > 0) return PW_OK;
+  return pw_fail (error, PW_INPUT, "--reference %s: no row between 0 and the final time, t = %s s", reader->path,
+                  pw_format (end, *t_end, 9));
 }
 
-static int file_row (file_reader *in, char *rest, double *x, int width, pw_error *error) {
-  for (int i = 0; i < width; i++) x[i] = NAN;
-  for (int i = 0; i < in->columns; i++) {
+/* Reads the cells after the time into a sample of `width` numbers; NaN where there is no column. */
+static int file_read_sample (file_reader *reader, char *rest, double *sample, int width, pw_error *error) {
+  for (int i = 0; i < width; i++) sample[i] = NAN;
+  for (const file_column *column = reader->column; column < reader->column + reader->columns; column++) {
     const char *cell = file_cell (&rest);
     double value;
-    if (in->place[i] < 0) continue;
-    int status = file_number (in, cell, &value, error);
-    if (status != PW_OK) return status;
-    x[in->place[i]] = in->sign[i] * value;
+    if (column->index < 0) continue;
+    if (file_number (reader, cell, &value, error) != PW_OK) return PW_INPUT;
+    sample[column->index] = column->factor * value;
   }
   return PW_OK;
 }
 
-/* Selects as many rows as there are samples, evenly spaced and including the last one; times within round-off of the
- * end are set to it. */
-static int file_rows (file_reader *in, int rows, double t_end, pw_motion *m, pw_error *error) {
+/* Selects as many of the rows as there are samples, evenly spaced and including the last one; times within round-off of
+ * the end are set to it. */
+static int file_read_samples (file_reader *reader, int rows, double t_end, pw_motion *motion, pw_error *error) {
   char *rest;
   double t;
-  for (int row = 0, k = 0; k < m->samples;) {
-    int status = file_time (in, &rest, &t, error);
+  for (int row = 0, k = 0; k < motion->samples;) {
+    int status = file_read_time (reader, &rest, &t, error);
     if (status != PW_OK) return status;
-    if (t <= 0 || ++row < (int)((long long)rows * (k + 1) / m->samples)) continue;
-    m->t[k] = fabs (t - t_end) <= FILE_SAME * t_end ? t_end : t;
-    status = file_row (in, rest, m->x + k++ * m->width, m->width, error);
+    if (t <= 0 || ++row < (int)((long long)rows * (k + 1) / motion->samples)) continue;
+    motion->t[k] = fabs (t - t_end) <= FILE_SAME * t_end ? t_end : t;
+    status = file_read_sample (reader, rest, pw_motion_at (motion, k++), motion->width, error);
     if (status != PW_OK) return status;
   }
   return PW_OK;
 }
 
-static int file_read (file_reader *in, pw_motion *m, const pw_system *s, double *t_end, int whole, pw_error *error) {
-  int rows;
-  int status = file_columns (in, s, error);
-  if (status == PW_OK) status = file_count (in, t_end, whole, &rows, error);
+/* Reads the file twice: rows are selected once their number is known. */
+static int file_read (file_reader *reader, pw_motion *motion, const pw_system *system, double *t_end, pw_error *error) {
+  int rows, status = file_read_columns (reader, system, error);
+  if (status == PW_OK) status = file_count_rows (reader, t_end, &rows, error);
   if (status != PW_OK) return status;
-  rewind (in->f);
-  in->number = 0;
-  status = file_line (in, error);
-  if (status == PW_OK) status = pw_motion_open (m, s, rows < MOTION_SAMPLES ? rows : MOTION_SAMPLES, *t_end, error);
-  return status == PW_OK ? file_rows (in, rows, *t_end, m, error) : status;
+  rewind (reader->f);
+  reader->line_number = 0;
+  status = file_next_line (reader, error);
+  if (status == PW_OK)
+    status = pw_motion_open (motion, system, rows < MOTION_SAMPLES ? rows : MOTION_SAMPLES, *t_end, error);
+  return status == PW_OK ? file_read_samples (reader, rows, *t_end, motion, error) : status;
 }
 
-int pw_motion_read (pw_motion *m, const pw_system *s, const char *path, double *t_end, int whole, pw_error *error) {
+int pw_motion_read (pw_motion *motion, const pw_system *system, const char *path, double *t_end, pw_error *error) {
   const char *why;
-  file_reader in = { .path = path, .f = pw_open_input (path, &why) };
-  if (in.f == NULL) return pw_fail (error, pw_open_input_status (), "--reference %s: cannot be read: %s", path, why);
-  int status = file_read (&in, m, s, t_end, whole, error);
-  if (status == PW_RETRY) status = file_unreadable (&in, "another program has changed it", error);
-  fclose (in.f);
-  free (in.line);
-  free (in.place);
-  free (in.sign);
-  pw_names_close (&in.index);
-  pw_arena_free (&in.names);
+  file_reader reader = { .path = path, .f = pw_open_input (path, &why), .line = malloc (FILE_LINE + 1) };
+  int status = PW_OK;
+  if (reader.f == NULL)
+    status = pw_fail (error, pw_open_input_status (), "--reference %s: cannot be read: %s", path, why);
+  else if (reader.line == NULL)
+    status = pw_fail (error, PW_RESOURCE, "--reference %s: out of memory", path);
+  if (status == PW_OK) status = file_read (&reader, motion, system, t_end, error);
+  if (status == PW_RETRY) status = file_unreadable (&reader, "another program has changed it", error);
+  if (reader.f) fclose (reader.f);
+  free (reader.line);
+  free (reader.column);
+  pw_names_close (&reader.indices);
+  pw_arena_free (&reader.names);
   return status;
 }

@@ -7,38 +7,38 @@
 /* ---- Warnings on standard error ---- */
 
 /* Angles of more than a turn, which are probably degrees, and expressions that may jump as states change. */
-void pw_report_model (const pw_model *m);
+void pw_report_model (const pw_model *model);
 
 /* Options without effect, long fixed steps, an absolute tolerance within which a force saturates. */
-void pw_report_settings (pw_run *r, const pw_system *s, const char *method, const pw_cli_line *l,
+void pw_report_settings (pw_run *run, const pw_system *system, const char *method, const pw_cli_line *line,
                          const pw_settings *settings);
 
 /* Derivatives by differences, states changed by the consistent initialisation, redundant constraint equations. */
-void pw_report_initialisation (const pw_run *r, const pw_system *s, const char *const *redundant);
+void pw_report_initialisation (const pw_run *run, const pw_system *system, const char *const *redundant);
 
 /* After the run: a relative energy defect of more than 1 % (NaN: not known), speeds that grow beyond any plausible
  * scale. */
-void pw_report_warnings (const pw_run *r, const pw_system *s, double defect);
+void pw_report_warnings (const pw_run *run, const pw_system *system, double defect);
 
 /* ---- Results ---- */
 
 enum { PW_STATE_NAME = 300 };
 /* The name of a state, and its values before and after the consistent initialisation. */
-void pw_report_state (const pw_system *s, const pw_initial_report *x, int i, char name[PW_STATE_NAME], double *from,
-                      double *to);
+void pw_report_state (const pw_system *system, const pw_initial_report *initial, int state, char name[PW_STATE_NAME],
+                      double *given, double *consistent);
 
-/* Descriptions of the redundant constraint equations, ended by NULL; release them with one free.  NULL if there are none
- * or memory is exhausted. */
-const char **pw_report_redundancies (pw_run *r);
+/* Descriptions of the redundant constraint equations, ended by NULL; release them with one free.  NULL if there are
+ * none or memory is exhausted. */
+const char **pw_report_redundancies (pw_run *run);
 
 /* A table on standard output: last state, reactions, residuals, energies, cost. */
-void pw_report_end (const pw_summary *summary, const pw_system *s, const pw_sample *last, int energy,
+void pw_report_end (const pw_summary *summary, const pw_system *system, const pw_sample *last, int energy,
                     const pw_statistics *statistics);
 
 /* ---- The tables of --profile (profile.c) ---- */
 
 /* Measures a finished run (pw_run_profile) and prints the cost of each element type and of each stage of an evaluation.
  * cpu: processor time of the run [s].  Errors: PW_RESOURCE. */
-int pw_print_profile (const pw_system *s, pw_run *r, double cpu, FILE *out, pw_error *error);
+int pw_print_profile (const pw_system *system, pw_run *run, double cpu, FILE *out, pw_error *error);
 
 #endif

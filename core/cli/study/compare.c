@@ -1,34 +1,36 @@
-/* pinwheel compare: accuracy and cost of methods.  A row for each method and each tolerance or step: one run with samples
- * and ledger, then timed runs without. */
+/* pinwheel compare: accuracy and cost of methods.  A row is a method with a tolerance or step size: one run with
+ * samples and energies for the errors, then timed runs without them. */
 #include <gsl/gsl_sort.h>
 #include <gsl/gsl_statistics.h>
 #include <math.h>
 #include <string.h>
 #include "reference.h"
 
-enum { COMPARE_REPEATS = 99 };
-#define COMPARE_FEW 3      /* smallest number of timed runs within the limit */
-#define COMPARE_ENOUGH 0.5 /* total time [s] after which no further run is timed */
-#define COMPARE_FINER 1.2  /* ratio of the numbers of steps that shows an order */
-#define COMPARE_CLEAR 10   /* error over uncertainty of the reference, for orders accurate to log2 1.1 = 0.14 */
+enum { COMPARE_REPEATS = 99 }; /* timed runs of a row, at most */
+#define COMPARE_FEW 3          /* timed runs of a row, at least, unless they exceed the limit */
+#define COMPARE_ENOUGH 0.5     /* total processor time [s] of a row after which no further run is timed */
+#define COMPARE_REFINEMENT 1.2 /* smallest ratio of numbers of steps from which an order is computed */
+#define COMPARE_CLEAR 10   /* error over uncertainty of the reference, so that orders are accurate to log2 1.1 = 0.14 */
 #define COMPARE_AGREE 0.1  /* largest relative difference of the last two orders in the asymptotic range */
+#define COMPARE_DECADE 1.6 /* cost of a tolerance divided by ten, for a method of order 5: 10^(1/5) */
 
 /* Explicit and implicit, one-step and multistep methods, each with the stabilisation that suits it. */
-static const char compare_usual[] = "rk4+projection,erk5+projection,erk8+projection,bdf+projection,"
-                                    "ida+baumgarte,ida+ggl,radau+ggl,galpha+index3";
+static const char compare_default_methods[] = "rk4+projection,erk5+projection,erk8+projection,bdf+projection,"
+                                              "ida+baumgarte,ida+ggl,radau+ggl,galpha+index3";
 
 typedef struct {
   pw_study study;
   int table;     /* --table */
-  int concludes; /* errors of coordinates are known */
+  int concludes; /* 1: errors of coordinates are known */
   const char *rtol_text, *step_text, *repeats_text;
-  double finest_step; /* of the ladder [s] */
+  double finest_step; /* of --step-ladder [s] */
   double repeats;     /* timed runs of a row, at most */
   pw_reference reference;
 } pw_compare;
 
 /* ---- Columns ---- */
 
+/* Indices in compare_columns.  The counts that pw_study_record_run fills begin with the steps. */
 enum {
   COLUMN_LEVEL = 2,
   COLUMN_T = 4,
@@ -44,17 +46,17 @@ enum {
   COLUMN_REPEATS
 };
 
-static const char *compare_ladder (const pw_row *r) {
-  return r->adaptive ? "rtol" : "step";
+static const char *compare_ladder_name (const pw_row *row) {
+  return row->adaptive ? "rtol" : "step";
 }
 
-static const char *compare_below (const pw_row *r) {
-  return r->bounds;
+static const char *compare_upper_bounds (const pw_row *row) {
+  return row->bound_names;
 }
 
 static const pw_study_column compare_columns[] = {
   { "method", .text = pw_study_method },
-  { "ladder", .text = compare_ladder },
+  { "ladder", .text = compare_ladder_name },
   { "rung", NULL, "or step", 10, .format = "%.4g" },
   { "status", .text = pw_study_status },
   { "t", .unit = "s" },
@@ -67,7 +69,7 @@ static const pw_study_column compare_columns[] = {
   { "largest.speed", .unit = "m/s" },
   { "largest.rate", .unit = "rad/s" },
   { "multiplier", NULL, "multipl.", 10, .format = "%.1e" },
-  { "below", .text = compare_below },
+  { "below", .text = compare_upper_bounds },
   { "order", NULL, "order", 6, .format = "%.1f" },
   { "residual.position", NULL, "position", 10, .format = "%.1e" },
   { "residual.velocity", NULL, "velocity", 9, .format = "%.1e" },
@@ -81,17 +83,19 @@ static const pw_study_column compare_columns[] = {
   { "spread", .unit = "s" },
   { NULL, NULL, "spread", 7, .format = "%.0f %%" },
   { .name = "repeats" },
-  { .name = NULL },
 };
 
-/* ---- Ladders ---- */
+/* Coordinates of a row's point in the figures; the last two are errors. */
+enum { POINT_LEVEL, POINT_CPU, POINT_RHS, POINT_LENGTH, POINT_ANGLE, POINT_COORDINATES };
+
+/* ---- Ladders: the tolerances or step sizes of a method ---- */
 
 typedef struct {
-  double from, to; /* from > to > 0 */
-} ladder;
+  double from, to; /* from >= to > 0 */
+} compare_ladder;
 
 /* "FROM:TO", in either order, or a single level. */
-static int ladder_read (const char *option, const char *text, ladder *l, pw_error *error) {
+static int compare_read_ladder (const char *option, const char *text, compare_ladder *ladder, pw_error *error) {
   if (text == NULL) return PW_OK;
   char first[40];
   size_t n = strcspn (text, ":");
@@ -102,222 +106,234 @@ static int ladder_read (const char *option, const char *text, ladder *l, pw_erro
   int status = pw_cli_number (option, first, PW_POSITIVE, &from, error);
   if (status == PW_OK) status = pw_cli_number (option, text[n] ? text + n + 1 : first, PW_POSITIVE, &to, error);
   if (status != PW_OK) return status;
-  *l = (ladder){ fmax (from, to), fmin (from, to) };
-  if (l->from / l->to > 1e30) return pw_fail (error, PW_INPUT, "%s %.80s: too long a ladder", option, text);
+  *ladder = (compare_ladder){ fmax (from, to), fmin (from, to) };
+  if (ladder->from / ladder->to > 1e30) return pw_fail (error, PW_INPUT, "%s %.80s: too long a ladder", option, text);
   return PW_OK;
 }
 
-/* Level i of a ladder, or 0 after its end; steps are halved, tolerances divided by ten and rounded to 12 digits: 1e-6. */
-static double ladder_level (ladder l, int adaptive, int i) {
+/* Level i of a ladder, or 0 after its end; steps are halved, tolerances divided by ten and rounded to 12 digits. */
+static double compare_level (compare_ladder ladder, int adaptive, int i) {
   char text[32];
-  double level = ldexp (l.from, -i);
-  if (adaptive) pw_read_number (pw_format (text, l.from / pow (10, i), 12), &level);
-  return level >= l.to * (1 - 1e-9) ? level : 0;
+  double level = ldexp (ladder.from, -i);
+  if (adaptive) pw_read_number (pw_format (text, ladder.from / pow (10, i), 12), &level);
+  return level >= ladder.to * (1 - 1e-9) ? level : 0;
 }
 
-/* A row for each level of each method. */
-static int compare_plan_rows (pw_study *x, const ladder of[2], pw_error *error) {
-  for (int i = 0; i < x->methods; i++) {
-    int adaptive = pw_cli_adaptive (x->method[i]);
+/* All rows are one group; those of a method are a curve, with a point each. */
+enum { COMPARE_GROUP = 0, COMPARE_POINTS = 1 };
+
+/* Adds a row for each level of each method. */
+static int compare_plan_rows (pw_study *study, const compare_ladder ladders[2], pw_error *error) {
+  for (int i = 0; i < study->methods; i++) {
+    int adaptive = pw_cli_adaptive (study->method[i]);
     double level;
-    for (int k = 0; (level = ladder_level (of[adaptive], adaptive, k)) > 0; k++) {
-      pw_row *r = pw_study_add (x, 0, i, x->method[i], 1, error);
-      if (r == NULL) return PW_RESOURCE;
-      r->adaptive = adaptive;
-      r->before = k;
-      r->level = r->value[COLUMN_LEVEL] = level;
-      r->value[COLUMN_REPEATS] = 0;
+    for (int k = 0; (level = compare_level (ladders[adaptive], adaptive, k)) > 0; k++) {
+      pw_row *row = pw_study_add (study, COMPARE_GROUP, i, study->method[i], COMPARE_POINTS, error);
+      if (row == NULL) return PW_RESOURCE;
+      row->adaptive = adaptive;
+      row->coarser_levels = k;
+      row->level = row->value[COLUMN_LEVEL] = level;
+      row->value[COLUMN_REPEATS] = 0;
     }
   }
   return PW_OK;
 }
 
-static int compare_plan (pw_study *s, pw_error *error) {
-  pw_compare *x = (pw_compare *)s;
-  ladder of[2] = { { 0.1, 1e-4 }, { 1e-3, 1e-12 } }; /* steps, tolerances */
-  s->t_end = pw_cli_defaults (pw_file_table (s->m.file)).t_end;
-  s->limit.most = INFINITY; /* the clock is read between batches of steps only: timed runs are not slowed down */
-  s->cpu_end = 10;
-  x->repeats = 9;
-  int status = pw_cli_number ("--t-end", s->line.t_end, PW_POSITIVE, &s->t_end, error);
-  if (status == PW_OK) status = pw_cli_number ("--limit", s->line.limit, PW_POSITIVE, &s->cpu_end, error);
-  if (status == PW_OK) status = pw_cli_number ("--repeats", x->repeats_text, PW_COUNT, &x->repeats, error);
-  if (status == PW_OK && x->repeats > COMPARE_REPEATS)
-    return pw_fail (error, PW_INPUT, "--repeats %s: at most %d", x->repeats_text, COMPARE_REPEATS);
-  if (status == PW_OK) status = pw_study_read_methods (s, s->methods_text ? s->methods_text : compare_usual, error);
-  if (status == PW_OK) status = ladder_read ("--step-ladder", x->step_text, &of[0], error);
-  if (status == PW_OK) status = ladder_read ("--rtol-ladder", x->rtol_text, &of[1], error);
-  x->finest_step = of[0].to;
-  return status == PW_OK ? compare_plan_rows (s, of, error) : status;
+static int compare_plan (pw_study *study, pw_error *error) {
+  pw_compare *compare = (pw_compare *)study;
+  compare_ladder ladders[2] = { { 0.1, 1e-4 }, { 1e-3, 1e-12 } }; /* steps, tolerances */
+  study->t_end = pw_cli_defaults (pw_file_table (study->compiled.file)).t_end;
+  study->limit.seconds = INFINITY; /* the clock is read between batches of steps only: timed runs are not slowed down */
+  study->cpu_limit = 10;
+  compare->repeats = 9;
+  int status = pw_cli_number ("--t-end", study->line.t_end, PW_POSITIVE, &study->t_end, error);
+  if (status == PW_OK) status = pw_cli_number ("--limit", study->line.limit, PW_POSITIVE, &study->cpu_limit, error);
+  if (status == PW_OK) status = pw_cli_number ("--repeats", compare->repeats_text, PW_COUNT, &compare->repeats, error);
+  if (status == PW_OK && compare->repeats > COMPARE_REPEATS)
+    return pw_fail (error, PW_INPUT, "--repeats %s: at most %d", compare->repeats_text, COMPARE_REPEATS);
+  if (status == PW_OK)
+    status = pw_study_read_methods (study, study->methods_text ? study->methods_text : compare_default_methods, error);
+  if (status == PW_OK) status = compare_read_ladder ("--step-ladder", compare->step_text, &ladders[0], error);
+  if (status == PW_OK) status = compare_read_ladder ("--rtol-ladder", compare->rtol_text, &ladders[1], error);
+  compare->finest_step = ladders[0].to;
+  return status == PW_OK ? compare_plan_rows (study, ladders, error) : status;
 }
 
 /* ---- A row ---- */
 
 /* Errors below the uncertainty of the reference are replaced by it, and marked. */
-static void compare_errors (const pw_compare *x, const pw_motion *motion, pw_row *r) {
-  const pw_reference *reference = &x->reference;
-  double *error = &r->value[COLUMN_ERROR];
+static void compare_set_errors (const pw_compare *compare, const pw_motion *motion, pw_row *row) {
+  const pw_reference *reference = &compare->reference;
+  double *error = &row->value[COLUMN_ERROR];
   if (!reference->known) return;
-  pw_motion_distance (x->study.m.system, &reference->motion, motion, error);
+  pw_motion_distance (compare->study.compiled.system, &reference->motion, motion, error);
   for (int i = 0; i < MOTION_ERRORS; i++) {
     if (reference->uncertainty[i] == 0) error[i] = NAN;
     if (!(error[i] <= reference->uncertainty[i])) continue;
     error[i] = reference->uncertainty[i];
-    r->below |= 1u << (COLUMN_ERROR + i);
-    strcat (strcat (r->bounds, *r->bounds ? " " : ""), compare_columns[COLUMN_ERROR + i].name);
+    row->upper_bounds |= 1u << (COLUMN_ERROR + i);
+    strcat (strcat (row->bound_names, *row->bound_names ? " " : ""), compare_columns[COLUMN_ERROR + i].name);
   }
 }
 
-/* log (error before / error) over log (steps / steps before); NaN if an error is unknown or below ten times the
- * uncertainty of the reference, or if the numbers of steps are nearly equal. */
-static double compare_order_of (const pw_compare *x, const pw_row *r) {
-  const pw_row *before = r - 1;
-  const double *error = &r->value[COLUMN_ERROR];
-  int i = isnan (error[MOTION_MOST]) ? MOTION_MOST + MOTION_ANGLE : MOTION_MOST;
-  int known =
-      before->state == ROW_DONE && r->state == ROW_DONE && error[i] > COMPARE_CLEAR * x->reference.uncertainty[i];
-  double finer =
-      r->adaptive ? (double)r->statistics.steps / (double)before->statistics.steps : before->level / r->level;
-  return known && finer > COMPARE_FINER ? log (before->value[COLUMN_ERROR + i] / error[i]) / log (finer) : NAN;
+/* The order p of a row and the coarser one before it, from error ~ steps^-p: log (coarser error / error) over
+ * log (steps / coarser steps).  NaN if an error is unknown or less than COMPARE_CLEAR times the uncertainty of the
+ * reference, or if the numbers of steps are nearly equal. */
+static double compare_pair_order (const pw_compare *compare, const pw_row *row) {
+  const pw_row *coarser = row - 1;
+  const double *error = &row->value[COLUMN_ERROR];
+  int error_index = isnan (error[MOTION_LARGEST]) ? MOTION_LARGEST + MOTION_ANGLE : MOTION_LARGEST;
+  int known = coarser->state == ROW_DONE && row->state == ROW_DONE &&
+              error[error_index] > COMPARE_CLEAR * compare->reference.uncertainty[error_index];
+  double refinement =
+      row->adaptive ? (double)row->statistics.steps / (double)coarser->statistics.steps : coarser->level / row->level;
+  return known && refinement > COMPARE_REFINEMENT
+             ? log (coarser->value[COLUMN_ERROR + error_index] / error[error_index]) / log (refinement)
+             : NAN;
 }
 
 /* The observed order of convergence: only in the asymptotic range, where the last two orders agree and errors are well
  * above the uncertainty of the reference; else NaN. */
-static double compare_order (const pw_compare *x, const pw_row *r) {
-  double order = r->before >= 2 ? compare_order_of (x, r) : NAN,
-         last = r->before >= 2 ? compare_order_of (x, r - 1) : NAN;
-  return order > 0 && fabs (order - last) <= COMPARE_AGREE * order ? order : NAN;
+static double compare_order (const pw_compare *compare, const pw_row *row) {
+  double order = row->coarser_levels >= 2 ? compare_pair_order (compare, row) : NAN,
+         coarser_order = row->coarser_levels >= 2 ? compare_pair_order (compare, row - 1) : NAN;
+  return order > 0 && fabs (order - coarser_order) <= COMPARE_AGREE * order ? order : NAN;
 }
 
-static int compare_times (pw_compare *x, pw_row *r, pw_error *error) {
+/* Times runs without samples; the cost of the row is their median. */
+static int compare_measure_times (pw_compare *compare, pw_row *row, pw_error *error) {
   double cpu[COMPARE_REPEATS], sum = 0;
   int n = 0;
-  while (n < x->repeats && !(n >= COMPARE_FEW && sum > COMPARE_ENOUGH) && sum <= x->study.cpu_end) {
-    int status = pw_motion_run (&x->study, r, NULL, error);
+  while (n < compare->repeats && !(n >= COMPARE_FEW && sum > COMPARE_ENOUGH) && sum <= compare->study.cpu_limit) {
+    int status = pw_motion_run (&compare->study, row, NULL, error);
     if (status != PW_OK) return status;
-    sum += cpu[n++] = r->cpu;
+    sum += cpu[n++] = row->cpu;
   }
   gsl_sort (cpu, 1, (size_t)n);
-  r->cpu = gsl_stats_median_from_sorted_data (cpu, 1, (size_t)n);
-  r->value[COLUMN_REPEATS] = n;
+  row->cpu = gsl_stats_median_from_sorted_data (cpu, 1, (size_t)n);
+  row->value[COLUMN_REPEATS] = n;
   if (n < 2) return PW_OK;
-  r->value[COLUMN_SPREAD] = cpu[n - 1] - cpu[0];
-  r->value[COLUMN_PERCENT] = 100 * r->value[COLUMN_SPREAD] / r->cpu;
+  row->value[COLUMN_SPREAD] = cpu[n - 1] - cpu[0];
+  row->value[COLUMN_PERCENT] = 100 * row->value[COLUMN_SPREAD] / row->cpu;
   return PW_OK;
 }
 
-/* The CPU time of a row predicted from the levels of its method before it: a halved step doubles it; the factor of a decade
- * is that of the last one, or at first that of a method of order 5. */
-static double compare_predict (const pw_row *r) {
-  const pw_row *last = r - 1;
-  if (r->before == 0 || last->state == ROW_FAILED || last->state == ROW_REFUSED) return 0;
-  if (last->state != ROW_DONE) return INFINITY;
-  if (!r->adaptive) return 2 * last->cpu;
-  if (r->before < 2 || last[-1].state != ROW_DONE) return 1.6 * last->cpu;
-  return fmax (last->cpu / last[-1].cpu, 1) * last->cpu;
+/* The processor time [s] of a row, predicted from the coarser levels of its method: a halved step doubles it; a
+ * tolerance divided by ten costs the factor that the last one did, at first COMPARE_DECADE.  INFINITY after a run that
+ * was stopped. */
+static double compare_predicted_time (const pw_row *row) {
+  const pw_row *coarser = row - 1;
+  if (row->coarser_levels == 0 || coarser->state == ROW_FAILED || coarser->state == ROW_REFUSED) return 0;
+  if (coarser->state != ROW_DONE) return INFINITY;
+  if (!row->adaptive) return 2 * coarser->cpu;
+  if (row->coarser_levels < 2 || coarser[-1].state != ROW_DONE) return COMPARE_DECADE * coarser->cpu;
+  return fmax (coarser->cpu / coarser[-1].cpu, 1) * coarser->cpu;
 }
 
-/* The run with samples at the times of the reference, and its errors. */
-static int compare_sample (pw_compare *x, pw_row *r, pw_error *error) {
-  pw_study *s = &x->study;
+/* A run with samples at the times of the reference, and its errors. */
+static int compare_measure_errors (pw_compare *compare, pw_row *row, pw_error *error) {
+  pw_study *study = &compare->study;
   pw_motion motion;
-  int status = x->reference.known ? pw_motion_open_at (&motion, s->m.system, &x->reference.motion, error)
-                                  : pw_motion_open (&motion, s->m.system, MOTION_SAMPLES, s->t_end, error);
+  int status = compare->reference.known
+                   ? pw_motion_open_at (&motion, study->compiled.system, &compare->reference.motion, error)
+                   : pw_motion_open (&motion, study->compiled.system, MOTION_SAMPLES, study->t_end, error);
   if (status != PW_OK) return status;
-  status = pw_motion_run (s, r, &motion, error);
-  if (status == PW_OK) compare_errors (x, &motion, r);
+  status = pw_motion_run (study, row, &motion, error);
+  if (status == PW_OK) compare_set_errors (compare, &motion, row);
   pw_motion_close (&motion);
   return status;
 }
 
-static int compare_measure (pw_study *s, pw_row *r, pw_error *error) {
-  pw_compare *x = (pw_compare *)s;
-  pw_error own = { 0 };
+static int compare_measure (pw_study *study, pw_row *row, pw_error *error) {
+  pw_compare *compare = (pw_compare *)study;
+  pw_error run_error = { 0 };
   char limit[32], text[60] = "";
-  double predicted = compare_predict (r);
-  pw_format (limit, s->cpu_end, 4);
-  if (predicted > s->cpu_end) {
-    r->state = ROW_SKIPPED;
+  double predicted = compare_predicted_time (row);
+  pw_format (limit, study->cpu_limit, 4);
+  if (predicted > study->cpu_limit) {
+    row->state = ROW_SKIPPED;
     if (isfinite (predicted)) snprintf (text, sizeof text, ", about %.2g s", predicted);
-    snprintf (r->reason, sizeof r->reason, "too slow%s; the limit is %s s", text, limit);
+    snprintf (row->reason, sizeof row->reason, "too slow%s; the limit is %s s", text, limit);
     return PW_OK;
   }
-  r->balance = NAN;
-  int status = compare_sample (x, r, &own);
-  if (status == PW_OK) status = compare_times (x, r, &own);
-  if (r->state == ROW_STOPPED)
-    snprintf (r->reason, sizeof r->reason, "too slow: the limit of %s s was reached at t = %s s", limit,
-              pw_format (text, r->t, 4));
-  status = pw_study_outcome (s, r, status, &own, error);
-  r->value[COLUMN_ORDER] = compare_order (x, r);
-  r->value[COLUMN_POSITION] = r->statistics.position;
-  r->value[COLUMN_VELOCITY] = r->statistics.velocity;
-  r->value[COLUMN_BALANCE] = r->balance;
-  r->value[COLUMN_CPU] = r->cpu;
-  const double *error_of = &r->value[COLUMN_ERROR + MOTION_MOST];
-  const double point[STUDY_COORDINATES] = { r->level, r->cpu, (double)r->statistics.rhs, error_of[MOTION_LENGTH],
-                                            error_of[MOTION_ANGLE] };
-  if (r->state == ROW_DONE) memcpy (r->point, point, sizeof point);
+  row->balance = NAN;
+  int status = compare_measure_errors (compare, row, &run_error);
+  if (status == PW_OK) status = compare_measure_times (compare, row, &run_error);
+  if (row->state == ROW_STOPPED)
+    snprintf (row->reason, sizeof row->reason, "too slow: the limit of %s s was reached at t = %s s", limit,
+              pw_format (text, row->t, 4));
+  status = pw_study_record_run (study, row, status, &run_error, error);
+  row->value[COLUMN_ORDER] = compare_order (compare, row);
+  row->value[COLUMN_POSITION] = row->statistics.position;
+  row->value[COLUMN_VELOCITY] = row->statistics.velocity;
+  row->value[COLUMN_BALANCE] = row->balance;
+  row->value[COLUMN_CPU] = row->cpu;
+  const double *largest = &row->value[COLUMN_ERROR + MOTION_LARGEST];
+  const double point[] = { row->level, row->cpu, (double)row->statistics.rhs, largest[MOTION_LENGTH],
+                           largest[MOTION_ANGLE] };
+  if (row->state == ROW_DONE) memcpy (row->point, point, sizeof point);
   return status;
 }
 
 /* ---- The command ---- */
 
-static int compare_begin (pw_study *s, pw_error *error) {
-  pw_compare *x = (pw_compare *)s;
-  int status = pw_reference_find (&x->reference, s, x->finest_step, error);
-  if (status == PW_OK && s->folder)
-    status = pw_reference_write (&x->reference, s->folder, compare_columns + COLUMN_ERROR, error);
+static int compare_begin (pw_study *study, pw_error *error) {
+  pw_compare *compare = (pw_compare *)study;
+  int status = pw_reference_find (&compare->reference, study, compare->finest_step, error);
+  if (status == PW_OK && study->folder)
+    status = pw_reference_write (&compare->reference, study->folder, compare_columns + COLUMN_ERROR, error);
   if (status != PW_OK) return status;
-  s->share = 1 / (x->repeats + 1);
-  const double *largest = x->reference.uncertainty + MOTION_MOST;
-  x->concludes = x->reference.known && (largest[MOTION_LENGTH] > 0 || largest[MOTION_ANGLE] > 0);
-  s->quiet = x->concludes && !x->table;
-  pw_reference_print (&x->reference, s->reference_path != NULL, x->table);
+  study->run_share = 1 / (compare->repeats + 1);
+  const double *largest = compare->reference.uncertainty + MOTION_LARGEST;
+  compare->concludes = compare->reference.known && (largest[MOTION_LENGTH] > 0 || largest[MOTION_ANGLE] > 0);
+  study->quiet = compare->concludes && !compare->table;
+  pw_reference_print (&compare->reference, compare->table ? REFERENCE_CANDIDATES : 1);
   return PW_OK;
 }
 
-static void compare_conclude (const pw_study *s) {
-  const pw_compare *x = (const pw_compare *)s;
-  if (x->concludes && x->table) putchar ('\n');
-  if (x->concludes) pw_conclusion_print (s, &x->reference, COLUMN_ERROR + MOTION_MOST);
+static void compare_conclude (const pw_study *study) {
+  const pw_compare *compare = (const pw_compare *)study;
+  if (compare->concludes && compare->table) putchar ('\n');
+  if (compare->concludes) pw_conclusion_print (study, &compare->reference, COLUMN_ERROR + MOTION_LARGEST);
 }
 
 /* Work-precision diagrams of lengths and of angles, if their errors are known. */
-static int compare_figures (pw_study *x, pw_error *error) {
+static int compare_figures (pw_study *study, pw_error *error) {
   static const char *const name[] = { "work-precision", "work-precision-angles" };
-  const pw_reference *reference = &((pw_compare *)x)->reference;
-  int status = pw_study_write_data (x, 0, name[0],
+  const pw_reference *reference = &((pw_compare *)study)->reference;
+  int status = pw_study_write_data (study, COMPARE_GROUP, name[0],
                                     "tolerance or step, CPU time [s], right-hand side evaluations, largest error of "
                                     "lengths [m] and angles [rad]",
-                                    STUDY_COORDINATES, error);
+                                    POINT_COORDINATES, error);
   for (int unit = 0; status == PW_OK && unit < 2; unit++) {
     char variables[100];
     snprintf (variables, sizeof variables, "uncertainty = %.9g\nsize_of_motion = %.9g\n",
-              reference->uncertainty[MOTION_MOST + unit], reference->size[unit]);
-    if (pw_study_positive (x, 0, 3 + unit))
-      status = pw_study_write_script (x, 0, name[unit], "work-precision", variables, error);
+              reference->uncertainty[MOTION_LARGEST + unit], reference->size[unit]);
+    if (pw_study_positive (study, COMPARE_GROUP, POINT_LENGTH + unit))
+      status = pw_study_write_script (study, COMPARE_GROUP, name[unit], "work-precision", variables, error);
   }
   return status;
 }
 
-static void compare_close (pw_study *s) {
-  pw_motion_close (&((pw_compare *)s)->reference.motion);
+static void compare_close (pw_study *study) {
+  pw_motion_close (&((pw_compare *)study)->reference.motion);
 }
 
 static int compare_command (void *options, pw_error *error) {
   static const char *const group[] = { "" };
   static const pw_study_type type = {
-    .tables = { "compare.csv", "truth.csv" },
-    .unit = "rows",
+    .table_names = { "compare.csv", "truth.csv" },
+    .row_noun = "rows",
     .group = group,
-    .above = "      rtol  error at the end    largest error       error of        residual of        error of     "
-             "                                  CPU time",
+    .heading_above =
+        "      rtol  error at the end    largest error       error of        residual of        error of     "
+        "                                  CPU time",
     .column = compare_columns,
-    .runs = 9,
+    .columns = sizeof compare_columns / sizeof *compare_columns,
+    .runs_per_row = 9,
     .timed = 1,
-    .time = COLUMN_T,
-    .steps = COLUMN_STEPS,
+    .time_column = COLUMN_T,
+    .first_count_column = COLUMN_STEPS,
     .plan = compare_plan,
     .begin = compare_begin,
     .measure = compare_measure,
@@ -363,9 +379,9 @@ const pw_command pw_cli_compare = {
   .summary = "compare the accuracy and cost of methods against a reference solution",
   .help = "Run a model by several methods, each with a ladder of tolerances or step sizes, and compare their errors "
           "against a reference solution with their processor times.",
-  .least = 1,
-  .most = 1,
-  .size = sizeof (pw_compare),
+  .min_arguments = 1,
+  .max_arguments = 1,
+  .options_size = sizeof (pw_compare),
   .function = compare_command,
   .options = compare_options,
 };

@@ -1,4 +1,4 @@
-/* Common functions of compare and drift: methods, runs, the sequence of a command. */
+/* What compare and drift have in common: the list of methods, runs, the course of the command. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -6,36 +6,43 @@
 #include "study.h"
 #include "util.h"
 
-#define STUDY_SHORT 0.005 /* CPU time [s] of a batch of steps below which batches become longer */
-#define STUDY_LONG 0.02   /* and above which they become shorter */
+#define STUDY_SHORT 0.005 /* processor time [s] of a batch of steps below which the next one is longer */
+#define STUDY_LONG 0.02   /* above which it is shorter: limits and signals are checked after a batch */
+enum { STUDY_FIRST_BATCH = 8, STUDY_LONGEST_BATCH = 65536 }; /* steps */
 
 /* ---- Methods ---- */
 
-static int methods_add (pw_study *x, const char *name, pw_error *error) {
+static int methods_add (pw_study *study, const char *name, pw_error *error) {
   const pw_method *integrator;
   int stabilisation, status = pw_method_parse (name, &integrator, &stabilisation, error);
   if (status != PW_OK) return status;
-  for (int i = 0; i < x->methods; i++)
-    if (strcmp (x->method[i], name) == 0) return PW_OK;
-  void *more = realloc (x->method, (size_t)(x->methods + 1) * sizeof *x->method);
+  for (int i = 0; i < study->methods; i++)
+    if (strcmp (study->method[i], name) == 0) return PW_OK;
+  void *more = realloc (study->method, (size_t)(study->methods + 1) * sizeof *study->method);
   if (more == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
-  x->method = more;
-  strcpy (x->method[x->methods++], name);
+  study->method = more;
+  strcpy (study->method[study->methods++], name);
   return PW_OK;
 }
 
-/* Adds an integrator, or all of them (NULL), with a stabilisation, or all of them (NULL). */
-static int methods_add_all (pw_study *x, const pw_method *integrator, const char *stabilisation, pw_error *error) {
-  char name[STUDY_NAME];
+/* Adds the methods of "all", "INTEGRATOR+all", "all+STABILISATION", or a method. */
+static int methods_add_pattern (pw_study *study, char *pattern, pw_error *error) {
+  char name[STUDY_NAME], *plus = pattern + strcspn (pattern, "+:");
+  int any_integrator = strncmp (pattern, "all+", 4) == 0 || strcmp (pattern, "all") == 0;
+  const char *stabilisation = any_integrator && *plus && strcmp (plus, "+all") != 0 ? plus + 1 : NULL; /* NULL: all */
+  const pw_method *integrator = NULL;                                                                  /* NULL: all */
   pw_nearest near = { .sought = stabilisation };
-  int status = PW_OK, found = 0;
+  int index, status = PW_OK, found = 0;
+  if (!any_integrator && strcmp (plus, "+all") != 0) return methods_add (study, pattern, error);
+  *plus = 0;
+  if (!any_integrator) status = pw_method_parse (pattern, &integrator, &index, error);
   for (int i = 0; pw_methods[i]; i++)
     for (const pw_stabilisation *s = pw_methods[i]->stabilisations; status == PW_OK && s->name; s++) {
       if (integrator && integrator != pw_methods[i]) continue;
       if (stabilisation) pw_nearest_try (&near, s->name);
       if (stabilisation && strcmp (stabilisation, s->name) != 0) continue;
       snprintf (name, sizeof name, "%s+%s", pw_methods[i]->name, s->name);
-      status = methods_add (x, name, error);
+      status = methods_add (study, name, error);
       found = 1;
     }
   if (status != PW_OK || found) return status;
@@ -43,262 +50,258 @@ static int methods_add_all (pw_study *x, const pw_method *integrator, const char
                   pw_nearest_text (&near));
 }
 
-/* "all", "INTEGRATOR+all", "all+STABILISATION", or a method. */
-static int methods_add_item (pw_study *x, char *item, pw_error *error) {
-  const pw_method *integrator;
-  int stabilisation;
-  char *plus = item + strcspn (item, "+:");
-  if (strcmp (item, "all") == 0 || strcmp (item, "all+all") == 0) return methods_add_all (x, NULL, NULL, error);
-  if (strncmp (item, "all+", 4) == 0) return methods_add_all (x, NULL, item + 4, error);
-  if (strcmp (plus, "+all") != 0) return methods_add (x, item, error);
-  *plus = 0;
-  int status = pw_method_parse (item, &integrator, &stabilisation, error);
-  return status == PW_OK ? methods_add_all (x, integrator, NULL, error) : status;
-}
-
-int pw_study_read_methods (pw_study *x, const char *text, pw_error *error) {
+int pw_study_read_methods (pw_study *study, const char *text, pw_error *error) {
   int status = PW_OK;
-  for (const char *at = text; status == PW_OK; at++) {
-    char item[STUDY_NAME];
-    size_t n = strcspn (at, ",");
-    if (n == 0 || n >= sizeof item)
+  for (const char *rest = text; status == PW_OK; rest++) {
+    char pattern[STUDY_NAME];
+    size_t n = strcspn (rest, ",");
+    if (n == 0 || n >= sizeof pattern)
       return pw_fail (error, PW_INPUT, "--methods \"%.80s\": %s", text, n ? "too long a name" : "a name is missing");
-    snprintf (item, sizeof item, "%.*s", (int)n, at);
-    status = methods_add_item (x, item, error);
-    at += n;
-    if (*at == 0) break;
+    snprintf (pattern, sizeof pattern, "%.*s", (int)n, rest);
+    status = methods_add_pattern (study, pattern, error);
+    rest += n;
+    if (*rest == 0) break;
   }
   return status;
 }
 
 /* ---- Rows ---- */
 
-pw_row *pw_study_add (pw_study *x, int group, int line, const char *method, int points, pw_error *error) {
-  pw_row *r = realloc (x->row, (size_t)(x->rows + 1) * sizeof *r);
+pw_row *pw_study_add (pw_study *study, int group, int curve, const char *method, int points, pw_error *error) {
+  pw_row *row = realloc (study->row, (size_t)(study->rows + 1) * sizeof *row);
   double (*point)[STUDY_COORDINATES] = malloc ((size_t)points * sizeof *point);
-  if (r) x->row = r;
-  if (r == NULL || point == NULL) {
+  if (row) study->row = row;
+  if (row == NULL || point == NULL) {
     free (point);
     pw_fail (error, PW_RESOURCE, "out of memory");
     return NULL;
   }
-  r += x->rows++;
-  *r = (pw_row){ .group = group, .line = line, .points = points, .point = point };
-  snprintf (r->method, sizeof r->method, "%s", method);
-  for (int i = 0; i < STUDY_COLUMNS; i++) r->value[i] = NAN;
+  row += study->rows++;
+  *row = (pw_row){ .group = group, .curve = curve, .points = points, .point = point };
+  snprintf (row->method, sizeof row->method, "%s", method);
+  snprintf (row->label, sizeof row->label, "%s", method);
+  for (int i = 0; i < STUDY_COLUMNS; i++) row->value[i] = NAN;
   for (int k = 0; k < points; k++)
-    for (int i = 0; i < STUDY_COORDINATES; i++) r->point[k][i] = NAN;
-  return r;
+    for (int i = 0; i < STUDY_COORDINATES; i++) row->point[k][i] = NAN;
+  return row;
 }
 
-void pw_study_show (pw_study *x, const char *what, const char *unit, int rows) {
-  x->finished = 0;
-  pw_progress_count (&x->progress, what, unit, 0, rows);
+void pw_study_begin_progress (pw_study *study, const char *what, const char *unit, int rows) {
+  study->progress_sum = 0;
+  pw_progress_count (&study->progress, what, unit, 0, rows);
 }
 
-void pw_study_part (pw_study *x, pw_row *r, double part) {
-  pthread_mutex_lock (&x->mutex);
-  x->finished += fmin (part, 1) - r->part;
-  r->part = fmin (part, 1);
-  pw_progress_at (&x->progress, x->finished);
-  pthread_mutex_unlock (&x->mutex);
+void pw_study_progress (pw_study *study, pw_row *row, double part) {
+  pthread_mutex_lock (&study->mutex);
+  study->progress_sum += fmin (part, 1) - row->progress;
+  row->progress = fmin (part, 1);
+  pw_progress_at (&study->progress, study->progress_sum);
+  pthread_mutex_unlock (&study->mutex);
 }
 
-/* Advances in batches of steps, so that clocks are read rarely. */
-static int study_steps (pw_study *x, pw_row *r, pw_run *run, const pw_limit *limit, pw_study_visitor *v,
+/* Advances to the end in batches of steps, so that clocks are read rarely. */
+static int study_steps (pw_study *study, pw_row *row, pw_run *run, const pw_limit *limit, pw_visitor *visitor,
                         pw_error *error) {
   int status = PW_OK;
-  long batch = 8;
-  while (status == PW_OK && pw_run_time (run) < x->t_end) {
+  long batch = STUDY_FIRST_BATCH;
+  while (status == PW_OK && pw_run_time (run) < study->t_end) {
     double start = pw_seconds (CLOCK_THREAD_CPUTIME_ID);
     long n = 0;
     do {
-      status = pw_run_advance_towards (run, v ? v->due : x->t_end, x->t_end, error);
-      if (status == PW_OK && v && pw_run_time (run) >= v->due) status = v->visit (v, run, error);
-    } while (status == PW_OK && ++n < batch && pw_run_time (run) < x->t_end);
+      status = pw_run_advance_towards (run, visitor ? visitor->due : study->t_end, study->t_end, error);
+      if (status == PW_OK && visitor && pw_run_time (run) >= visitor->due)
+        status = visitor->visit (visitor, run, error);
+    } while (status == PW_OK && ++n < batch && pw_run_time (run) < study->t_end);
     double used = pw_seconds (CLOCK_THREAD_CPUTIME_ID) - start;
-    r->cpu += used;
-    if (used < STUDY_SHORT && n == batch && batch < 65536) batch *= 2;
+    row->cpu += used;
+    if (used < STUDY_SHORT && n == batch && batch < STUDY_LONGEST_BATCH) batch *= 2;
     if (used > STUDY_LONG && batch > 1) batch /= 2;
-    pw_study_part (x, r, x->share * (r->runs + pw_run_time (run) / x->t_end));
-    if (status == PW_STOPPED) return pw_limit_fail (limit, pw_run_time (run), error);
-    if (status == PW_OK && r->cpu > x->cpu_end && pw_run_time (run) < x->t_end) {
-      r->state = ROW_STOPPED;
+    pw_study_progress (study, row, study->run_share * (row->runs + pw_run_time (run) / study->t_end));
+    if (status == PW_STOPPED) return pw_limit_status (limit, pw_run_time (run), error);
+    if (status == PW_OK && row->cpu > study->cpu_limit && pw_run_time (run) < study->t_end) {
+      row->state = ROW_STOPPED;
       return PW_RETRY;
     }
   }
   return status;
 }
 
-int pw_study_run (pw_study *x, pw_row *r, const pw_settings *settings, pw_study_visitor *v, pw_error *error) {
-  pw_settings own = *settings;
-  pw_limit limit = x->limit;
-  r->cpu = 0;
+int pw_study_run (pw_study *study, pw_row *row, const pw_settings *settings, pw_visitor *visitor, pw_error *error) {
+  pw_settings run_settings = *settings;
+  pw_limit limit = study->limit;
+  row->cpu = 0;
   pw_limit_start (&limit);
-  own.stop = pw_limit_over;
-  own.stop_context = &limit;
-  own.specialised = pw_cli_engine_code (&x->engine);
-  pw_run *run = pw_run_open (x->m.system, r->method, &own, error);
+  run_settings.stop = pw_limit_over;
+  run_settings.stop_context = &limit;
+  run_settings.specialised = pw_scene_code_table (study->engine.code);
+  pw_run *run = pw_run_open (study->compiled.system, row->method, &run_settings, error);
   if (run == NULL) return error->status;
-  int status = study_steps (x, r, run, &limit, v, error);
-  r->t = pw_run_time (run);
-  r->statistics = *pw_run_statistics (run);
-  r->runs += status == PW_OK;
+  int status = study_steps (study, row, run, &limit, visitor, error);
+  row->t = pw_run_time (run);
+  row->statistics = *pw_run_statistics (run);
+  row->runs += status == PW_OK;
   pw_run_close (run);
   return status;
 }
 
-int pw_study_parallel (pw_study *x, int count, pw_task *task, void *context, pw_error *error) {
-  int status = (x->type->timed ? pw_parallel_timed : pw_parallel) (x->jobs, count, task, context, error);
-  pw_progress_end (&x->progress);
+int pw_study_parallel (pw_study *study, int count, pw_task *task, void *context, pw_error *error) {
+  int status = (study->type->timed ? pw_parallel_timed : pw_parallel) (study->jobs, count, task, context, error);
+  pw_progress_end (&study->progress);
   return status;
 }
 
-int pw_study_outcome (const pw_study *x, pw_row *r, int status, const pw_error *run_error, pw_error *error) {
-  const pw_statistics *s = &r->statistics;
-  const long count[] = { s->steps, s->rejected, s->rhs, s->jacobians, s->factorisations };
-  for (int i = 0; i < 5; i++) r->value[x->type->steps + i] = (double)count[i];
-  r->value[x->type->time] = r->t;
-  if (status == PW_OK || r->state == ROW_STOPPED) return PW_OK;
+int pw_study_record_run (const pw_study *study, pw_row *row, int status, const pw_error *run_error, pw_error *error) {
+  const pw_statistics *statistics = &row->statistics;
+  const long count[] = { statistics->steps, statistics->rejected, statistics->rhs, statistics->jacobians,
+                         statistics->factorisations };
+  for (int i = 0; i < 5; i++) row->value[study->type->first_count_column + i] = (double)count[i];
+  row->value[study->type->time_column] = row->t;
+  if (status == PW_OK || row->state == ROW_STOPPED) return PW_OK;
   if (status == PW_RESOURCE || status == PW_INITIAL) return pw_fail (error, status, "%s", run_error->text);
   if (pw_stop) return PW_RETRY;
-  r->state = status == PW_INPUT ? ROW_REFUSED : ROW_FAILED;
-  snprintf (r->reason, sizeof r->reason, "%s",
+  row->state = status == PW_INPUT ? ROW_REFUSED : ROW_FAILED;
+  snprintf (row->reason, sizeof row->reason, "%s",
             run_error->status ? run_error->text : "the method failed without giving a reason");
   return PW_OK;
 }
 
 /* ---- The command ---- */
 
-static int study_open_folder (pw_study *x, pw_error *error) {
-  const char *const *tables = x->type->tables;
+static int study_open_folder (pw_study *study, pw_error *error) {
+  const char *const *tables = study->type->table_names;
   const char *const names[] = { ".dat", ".gp", ".svg", ".png", ".pdf", tables[0], tables[1], NULL };
   pw_use use[] = { PW_CLI_MODEL_USE,
-                   { "--reference", x->reference_path, PW_READS, NULL },
-                   { "-o", x->folder, PW_WRITES_INTO, names } };
-  if (x->folder == NULL) return pw_cli_only ("--width", x->line.width, "-o DIR", 0, error);
-  if (pw_figures_of (&x->figures, &x->line, &x->m, x->folder, error) != PW_OK) return error->status;
-  if (pw_cli_uses (&x->line, x->m.file, use, sizeof use / sizeof *use, error) != PW_OK) return error->status;
-  x->lock = pw_cli_folder (x->folder, error);
-  return x->lock < 0 ? error->status : pw_study_open_table (x, error);
+                   { "--reference", study->reference_path, PW_READS, NULL },
+                   { "-o", study->folder, PW_WRITES_INTO, names } };
+  if (study->folder == NULL) return pw_cli_requires ("--width", study->line.width, "-o DIR", 0, error);
+  if (pw_figures_of (&study->figures, &study->line, &study->compiled, study->folder, error) != PW_OK)
+    return error->status;
+  if (pw_cli_check_uses (&study->line, study->compiled.file, use, sizeof use / sizeof *use, error) != PW_OK)
+    return error->status;
+  study->lock = pw_cli_lock_folder (study->folder, error);
+  return study->lock < 0 ? error->status : pw_study_open_table (study, error);
 }
 
 /* Estimated number of steps of all runs. */
-static double study_work (const pw_study *x) {
-  pw_run_defaults d = pw_cli_defaults (pw_file_table (x->m.file));
+static double study_steps_of_all (const pw_study *study) {
+  pw_run_defaults defaults = pw_cli_defaults (pw_file_table (study->compiled.file));
   double steps = 0;
-  for (const pw_row *r = x->row; r < x->row + x->rows; r++) {
-    pw_settings s = x->settings;
-    if (r->level > 0) s.step = s.rtol = r->level;
-    steps += x->type->runs * pw_method_steps (r->method, &s, d.step, x->t_end);
+  for (const pw_row *row = study->row; row < study->row + study->rows; row++) {
+    pw_settings settings = study->settings;
+    if (row->level > 0) settings.step = settings.rtol = row->level;
+    steps += study->type->runs_per_row * pw_method_steps (row->method, &settings, defaults.step, study->t_end);
   }
   return steps;
 }
 
-static int study_open (pw_study *x, pw_error *error) {
+static int study_open (pw_study *study, pw_error *error) {
   pw_specialise when;
-  x->lock = -1;
-  x->share = 1;
-  x->cpu_end = INFINITY;
-  pthread_mutex_init (&x->mutex, NULL);
-  int status = pw_cli_open (&x->m, &x->line, error);
-  if (status == PW_OK) status = pw_parallel_jobs (x->jobs_text, &x->jobs, error);
-  if (status == PW_OK) status = x->type->plan (x, error);
-  if (status == PW_OK) status = pw_cli_specialise (x->line.specialise, &when, error);
+  study->lock = -1;
+  study->run_share = 1;
+  study->cpu_limit = INFINITY;
+  pthread_mutex_init (&study->mutex, NULL);
+  int status = pw_cli_open (&study->compiled, &study->line, error);
+  if (status == PW_OK) status = pw_parallel_jobs (study->jobs_text, &study->jobs, error);
+  if (status == PW_OK) status = study->type->plan (study, error);
+  if (status == PW_OK) status = pw_cli_specialise (study->line.specialise, &when, error);
   if (status != PW_OK) return status;
-  pw_cli_engine_open (&x->engine, x->m.system, when, study_work (x)); /* of all runs, since their times are compared */
-  return study_open_folder (x, error);
+  /* one engine for all runs, since their times are compared */
+  pw_cli_engine_open (&study->engine, study->compiled.system, when, study_steps_of_all (study));
+  return study_open_folder (study, error);
 }
 
-/* Measures a row, then writes all rows that are done before the first one that is not: in their order. */
-static int study_row (void *context, int i, pw_error *error) {
-  pw_study *x = context;
-  int status = x->type->measure (x, &x->row[i], error);
+/* Measures a row.  Then writes all measured rows before the first one that is not, so that they are in their order. */
+static int study_measure_row (void *context, int i, pw_error *error) {
+  pw_study *study = context;
+  int status = study->type->measure (study, &study->row[i], error);
   if (status != PW_OK) return status;
-  pw_study_part (x, &x->row[i], 1);
-  pthread_mutex_lock (&x->mutex);
-  x->row[i].measured = 1;
-  pw_progress_end (&x->progress);
-  for (; status == PW_OK && x->done < x->rows && x->row[x->done].measured; x->done++)
-    status = pw_study_write_row (x, &x->row[x->done], error);
-  pthread_mutex_unlock (&x->mutex);
+  pw_study_progress (study, &study->row[i], 1);
+  pthread_mutex_lock (&study->mutex);
+  study->row[i].measured = 1;
+  pw_progress_end (&study->progress);
+  for (; status == PW_OK && study->written < study->rows && study->row[study->written].measured; study->written++)
+    status = pw_study_write_row (study, &study->row[study->written], error);
+  pthread_mutex_unlock (&study->mutex);
   return status;
 }
 
-static int study_method (void *context, int line, pw_error *error) {
-  const pw_study *x = context;
+/* Measures the rows of a method, in compare a curve, one after the other. */
+static int study_measure_method (void *context, int curve, pw_error *error) {
+  const pw_study *study = context;
   int status = PW_OK;
-  for (int i = 0; status == PW_OK && i < x->rows; i++)
-    if (x->row[i].line == line) status = study_row (context, i, error);
+  for (int i = 0; status == PW_OK && i < study->rows; i++)
+    if (study->row[i].curve == curve) status = study_measure_row (context, i, error);
   return status;
 }
 
-/* Writes the rows that are done after one that an interruption has stopped. */
-static int study_write_kept (pw_study *x, pw_error *error) {
-  for (const pw_row *r = x->row + x->done; r < x->row + x->rows; r++) {
-    if (!r->measured) continue;
-    if (pw_study_write_row (x, r, error) != PW_OK) return error->status;
-    x->done++;
+/* Writes the measured rows that follow one that an interruption has stopped. */
+static int study_write_kept (pw_study *study, pw_error *error) {
+  for (const pw_row *row = study->row + study->written; row < study->row + study->rows; row++) {
+    if (!row->measured) continue;
+    if (pw_study_write_row (study, row, error) != PW_OK) return error->status;
+    study->written++;
   }
   return PW_RETRY;
 }
 
-static int study_rows (pw_study *x, pw_error *error) {
+static int study_perform (pw_study *study, pw_error *error) {
   pw_stop_catch ();
-  int status = x->type->begin (x, error);
-  if (status == PW_OK && x->engine.code) puts ("all runs use code specialised for this scene where the method can\n");
-  if (status == PW_OK && x->engine.code == NULL) printf ("all runs use the general engine: %s\n\n", x->engine.why);
-  pw_study_show (x, pw_file_name (x->m.file), x->type->unit, x->rows);
-  if (status == PW_OK && x->type->timed)
-    status = pw_study_parallel (x, x->methods, study_method, x, error);
+  int status = study->type->begin (study, error);
+  if (status == PW_OK && study->engine.code)
+    puts ("all runs use code specialised for this scene where the method can\n");
+  if (status == PW_OK && study->engine.code == NULL)
+    printf ("all runs use the general engine: %s\n\n", study->engine.reason);
+  pw_study_begin_progress (study, pw_file_name (study->compiled.file), study->type->row_noun, study->rows);
+  if (status == PW_OK && study->type->timed)
+    status = pw_study_parallel (study, study->methods, study_measure_method, study, error);
   else if (status == PW_OK)
-    status = pw_study_parallel (x, x->rows, study_row, x, error);
-  if (status == PW_RETRY && pw_stop) status = study_write_kept (x, error);
-  if (status == PW_OK && x->type->conclude) x->type->conclude (x);
+    status = pw_study_parallel (study, study->rows, study_measure_row, study, error);
+  if (status == PW_RETRY && pw_stop) status = study_write_kept (study, error);
+  if (status == PW_OK && study->type->conclude) study->type->conclude (study);
   pw_stop_release ();
   return status;
 }
 
-/* A complete CSV file gets its final name; the figures show all of its rows. */
-static int study_finish (pw_study *x, int status, pw_error *error) {
-  char part[FIGURE_PATH + 16] = "";
-  if (x->csv && status == PW_OK)
-    status = pw_output_finish (x->csv, error);
-  else if (x->csv)
-    pw_text_abandon (x->csv, x->done, part, sizeof part);
+/* Gives a complete CSV file its final name and draws the figures; an incomplete one remains as NAME.part. */
+static int study_finish (pw_study *study, int status, pw_error *error) {
+  char part_path[FIGURE_PATH + 16] = "";
+  if (study->csv && status == PW_OK)
+    status = pw_output_finish (study->csv, error);
+  else if (study->csv)
+    pw_cli_abandon_table (study->csv, study->written, part_path, sizeof part_path);
   if (status == PW_RETRY && pw_stop) {
-    pw_cli_say ("pinwheel: interrupted; %d of %d %s are done%s%s\n", x->done, x->rows, x->type->unit,
-                *part ? ", and kept in " : "", part);
+    pw_cli_say ("pinwheel: interrupted; %d of %d %s are done%s%s\n", study->written, study->rows, study->type->row_noun,
+                *part_path ? ", and kept in " : "", part_path);
     return PW_INTERRUPTED;
   }
-  if (x->csv && status == PW_OK) status = x->type->figures (x, error);
-  return status == PW_OK && x->drawn[0] ? pw_figure_draw (x->folder, x->drawn, error) : status;
+  if (study->csv && status == PW_OK) status = study->type->figures (study, error);
+  return status == PW_OK && study->scripts[0] ? pw_figure_draw (study->folder, study->scripts, error) : status;
 }
 
 /* A study in which no run has reached the end is a failure. */
-static int study_verdict (const pw_study *x, pw_error *error) {
+static int study_require_success (const pw_study *study, pw_error *error) {
   const pw_row *failed = NULL;
-  for (const pw_row *r = x->row; r < x->row + x->rows; r++) {
-    if (r->state == ROW_DONE) return PW_OK;
-    if (r->state == ROW_FAILED || r->state == ROW_REFUSED) failed = r;
+  for (const pw_row *row = study->row; row < study->row + study->rows; row++) {
+    if (row->state == ROW_DONE) return PW_OK;
+    if (row->state == ROW_FAILED || row->state == ROW_REFUSED) failed = row;
   }
   return failed ? pw_fail (error, PW_METHOD, "no method has reached the end; the last error: %s", failed->reason)
                 : pw_fail (error, PW_METHOD, "no method has reached the end within the limit; see --limit");
 }
 
-int pw_study_command (pw_study *x, const pw_study_type *type, pw_error *error) {
-  x->type = type;
-  int status = study_open (x, error);
-  if (status == PW_OK) status = study_rows (x, error);
-  status = study_finish (x, status, error);
-  if (status == PW_OK) status = study_verdict (x, error);
-  if (x->lock >= 0) close (x->lock);
-  type->close (x);
-  for (int i = 0; i < x->rows; i++) free (x->row[i].point);
-  free (x->row);
-  free (x->method);
-  pthread_mutex_destroy (&x->mutex);
-  pw_cli_engine_close (&x->engine);
-  pw_cli_close_model (&x->m);
+int pw_study_command (pw_study *study, const pw_study_type *type, pw_error *error) {
+  study->type = type;
+  int status = study_open (study, error);
+  if (status == PW_OK) status = study_perform (study, error);
+  status = study_finish (study, status, error);
+  if (status == PW_OK) status = study_require_success (study, error);
+  if (study->lock >= 0) close (study->lock);
+  type->close (study);
+  for (int i = 0; i < study->rows; i++) free (study->row[i].point);
+  free (study->row);
+  free (study->method);
+  pthread_mutex_destroy (&study->mutex);
+  pw_cli_engine_close (&study->engine);
+  pw_cli_close_model (&study->compiled);
   return status == PW_INTERRUPTED ? status : error->status;
 }

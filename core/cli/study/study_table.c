@@ -1,163 +1,164 @@
-/* Tables and figures of studies: rows on the terminal and in a CSV file, points of figures in data files. */
+/* Writes the tables and figures of studies: rows on the terminal and in a CSV file, points of figures in data files. */
 #include <math.h>
 #include <string.h>
 #include "study.h"
 
-const char *pw_study_method (const pw_row *r) {
-  return r->method;
+const char *pw_study_method (const pw_row *row) {
+  return row->method;
 }
 
-const char *pw_study_status (const pw_row *r) {
+const char *pw_study_status (const pw_row *row) {
   static const char *const status[] = { "ok", "failed", "refused", "stopped", "not run" };
-  return status[r->state];
-}
-
-static int table_is_end (const pw_study_column *c) {
-  return c->name == NULL && c->head == NULL;
+  return status[row->state];
 }
 
 /* ---- CSV ---- */
 
 /* Rows are written as they finish, to NAME.part, which remains if the study is stopped. */
-int pw_study_open_table (pw_study *x, pw_error *error) {
-  pw_text t = { .at = NULL };
-  x->csv = pw_figure_open (x->folder, x->type->tables[0], error);
-  if (x->csv == NULL) return error->status;
-  for (const pw_study_column *c = x->type->column; !table_is_end (c); c++)
-    if (c->name) pw_text_name (&t, c->name, c->unit);
-  pw_text_cell (&t, "reason");
-  return pw_text_line (&t, pw_output_stream (x->csv), x->folder, error);
+int pw_study_open_table (pw_study *study, pw_error *error) {
+  const pw_study_column *column = study->type->column;
+  pw_text line = { .chars = NULL };
+  study->csv = pw_figure_open (study->folder, study->type->table_names[0], error);
+  if (study->csv == NULL) return error->status;
+  for (int i = 0; i < study->type->columns; i++)
+    if (column[i].name) pw_text_name (&line, column[i].name, column[i].unit);
+  pw_text_cell (&line, "reason");
+  return pw_text_line (&line, pw_output_stream (study->csv), study->folder, error);
 }
 
-static int table_write (const pw_study *x, const pw_row *r, pw_error *error) {
-  pw_text t = { .at = NULL };
-  for (const pw_study_column *c = x->type->column; !table_is_end (c); c++)
-    if (c->text)
-      pw_text_cell (&t, c->text (r));
-    else if (c->name)
-      pw_text_number (&t, r->value[c - x->type->column]);
-  pw_text_quoted (&t, r->reason);
-  return pw_text_line (&t, pw_output_stream (x->csv), x->folder, error);
+static int table_write_csv (const pw_study *study, const pw_row *row, pw_error *error) {
+  const pw_study_column *column = study->type->column;
+  pw_text line = { .chars = NULL };
+  for (int i = 0; i < study->type->columns; i++)
+    if (column[i].text)
+      pw_text_cell (&line, column[i].text (row));
+    else if (column[i].name)
+      pw_text_number (&line, row->value[i]);
+  pw_text_quoted (&line, row->reason);
+  return pw_text_line (&line, pw_output_stream (study->csv), study->folder, error);
 }
 
 /* ---- Terminal ---- */
 
-static int table_width (const pw_study *x) {
-  size_t width = 6;
-  for (const pw_row *r = x->row; r < x->row + x->rows; r++)
-    if (strlen (r->method) > width) width = strlen (r->method);
+/* The width of the first column, which contains the methods. */
+static int table_width (const pw_study *study) {
+  size_t width = strlen ("method");
+  for (const pw_row *row = study->row; row < study->row + study->rows; row++)
+    if (strlen (row->method) > width) width = strlen (row->method);
   return (int)width;
 }
 
-static void table_heading (const pw_study *x, int group) {
-  int width = table_width (x);
-  printf ("%s%-*s%s\n%-*s", group ? "\n" : "", width, x->type->group[group], x->type->above, width, "method");
-  for (const pw_study_column *c = x->type->column; !table_is_end (c); c++)
-    if (c->head) printf ("%*s", c->width, c->head);
+static void table_heading (const pw_study *study, int group) {
+  const pw_study_column *column = study->type->column;
+  int width = table_width (study);
+  printf ("%s%-*s%s\n%-*s", group ? "\n" : "", width, study->type->group[group], study->type->heading_above, width,
+          "method");
+  for (int i = 0; i < study->type->columns; i++)
+    if (column[i].head) printf ("%*s", column[i].width, column[i].head);
   putchar ('\n');
 }
 
-static void table_number (const pw_row *r, const pw_study_column *c, int i) {
-  char text[32] = "<", *at = text + (r->below >> i & 1);
-  if (isnan (r->value[i]))
-    strcpy (at, "-");
+/* Prints a value, "-" if it is unknown, "<1e-9" if it is an upper bound. */
+static void table_number (const pw_row *row, const pw_study_column *column, int value_index) {
+  char text[32] = "<", *number = text + (row->upper_bounds >> value_index & 1);
+  if (isnan (row->value[value_index]))
+    strcpy (number, "-");
   else
-    snprintf (at, sizeof text - 1, c->format, r->value[i]);
-  printf ("%*s", c->width, text);
+    snprintf (number, sizeof text - 1, column->format, row->value[value_index]);
+  printf ("%*s", column->width, text);
 }
 
-/* Columns after the status are printed only for finished rows. */
-static void table_print (const pw_study *x, const pw_row *r) {
+/* Prints a row; columns after the status only if its runs have reached the end. */
+static void table_print (const pw_study *study, const pw_row *row) {
+  const pw_study_column *column = study->type->column;
   char t[32];
   int shown = 1;
-  printf ("%-*s", table_width (x), r->method);
-  for (const pw_study_column *c = x->type->column; shown && !table_is_end (c); c++) {
-    if (c->head) table_number (r, c, (int)(c - x->type->column));
-    if (c->text == pw_study_status) shown = r->state == ROW_DONE;
+  printf ("%-*s", table_width (study), row->method);
+  for (int i = 0; shown && i < study->type->columns; i++) {
+    if (column[i].head) table_number (row, &column[i], i);
+    if (column[i].text == pw_study_status) shown = row->state == ROW_DONE;
   }
-  if (r->state != ROW_DONE) {
-    printf ("  %s", pw_study_status (r));
-    if (r->state == ROW_FAILED && strncmp (r->reason, "t = ", 4) != 0) printf (" at t = %s s", pw_format (t, r->t, 4));
-    printf (": %s", r->reason);
+  if (row->state != ROW_DONE) {
+    printf ("  %s", pw_study_status (row));
+    if (row->state == ROW_FAILED && strncmp (row->reason, "t = ", 4) != 0)
+      printf (" at t = %s s", pw_format (t, row->t, 4));
+    printf (": %s", row->reason);
   }
   putchar ('\n');
   fflush (stdout);
 }
 
-int pw_study_write_row (pw_study *x, const pw_row *r, pw_error *error) {
-  if (!x->quiet && (r == x->row || r->group != r[-1].group)) table_heading (x, r->group);
-  if (!x->quiet) table_print (x, r);
-  return x->csv ? table_write (x, r, error) : PW_OK;
+int pw_study_write_row (pw_study *study, const pw_row *row, pw_error *error) {
+  if (!study->quiet && (row == study->row || row->group != row[-1].group)) table_heading (study, row->group);
+  if (!study->quiet) table_print (study, row);
+  return study->csv ? table_write_csv (study, row, error) : PW_OK;
 }
 
 /* ---- Figures ---- */
 
-/* The next defined point of a group, after point *k of *r; NULL after the last one.  Coordinate 0 may be set in advance, the
- * others are set together. */
-static const double *table_next (const pw_study *x, int group, const pw_row **r, int *k) {
-  for (; *r < x->row + x->rows; ++*r, *k = -1)
-    while ((*r)->group == group && ++*k < (*r)->points)
-      if (!isnan ((*r)->point[*k][1])) return (*r)->point[*k];
+/* The coordinates of the next defined point of a group, after point *point of *row; NULL after the last one.
+ * Coordinate 0 may be set in advance, the others are set together. */
+static const double *table_next_point (const pw_study *study, int group, const pw_row **row, int *point) {
+  for (; *row < study->row + study->rows; ++*row, *point = -1)
+    while ((*row)->group == group && ++*point < (*row)->points)
+      if (!isnan ((*row)->point[*point][1])) return (*row)->point[*point];
   return NULL;
 }
 
-int pw_study_positive (const pw_study *x, int group, int coordinate) {
-  const pw_row *r = x->row;
+int pw_study_positive (const pw_study *study, int group, int coordinate) {
+  const pw_row *row = study->row;
   const double *point;
   int k = -1;
-  while ((point = table_next (x, group, &r, &k)) != NULL)
+  while ((point = table_next_point (study, group, &row, &k)) != NULL)
     if (point[coordinate] > 0 && isfinite (point[coordinate])) return 1;
   return 0;
 }
 
-static const char *table_label (const pw_row *r) {
-  return *r->label ? r->label : r->method;
-}
-
-int pw_study_write_data (const pw_study *x, int group, const char *name, const char *heading, int count,
+int pw_study_write_data (const pw_study *study, int group, const char *name, const char *heading, int count,
                          pw_error *error) {
   char file[40], text[32];
   snprintf (file, sizeof file, "%s.dat", name);
-  pw_output *o = pw_figure_open (x->folder, file, error);
-  if (o == NULL) return PW_RESOURCE;
-  FILE *f = pw_output_stream (o);
-  const pw_row *r = x->row;
+  pw_output *output = pw_figure_open (study->folder, file, error);
+  if (output == NULL) return PW_RESOURCE;
+  FILE *f = pw_output_stream (output);
+  const pw_row *row = study->row;
   const double *point;
   fprintf (f, "# %s\n", heading);
-  for (int k = -1, line = -1; (point = table_next (x, group, &r, &k)) != NULL; line = r->line) {
-    if (r->line != line) fprintf (f, "%s# %s\n", line < 0 ? "" : "\n\n", table_label (r));
+  for (int k = -1, curve = -1; (point = table_next_point (study, group, &row, &k)) != NULL; curve = row->curve) {
+    if (row->curve != curve) fprintf (f, "%s# %s\n", curve < 0 ? "" : "\n\n", row->label);
     for (int i = 0; i < count; i++) /* only positive numbers have logarithms */
       fprintf (f, "%s%s", i ? " " : "", point[i] > 0 ? pw_format (text, point[i], 9) : "NaN");
     fputc ('\n', f);
   }
-  return pw_output_finish (o, error);
+  return pw_output_finish (output, error);
 }
 
-/* The labels of the lines that have points, with stabilisations if they are methods; with f NULL returns their number. */
-static int table_labels (const pw_study *x, int group, FILE *f) {
-  const pw_row *r = x->row;
+/* Writes the labels of the curves that have points, with stabilisations if they are methods, unless f is NULL; returns
+ * the number of these curves. */
+static int table_write_labels (const pw_study *study, int group, FILE *f) {
+  const pw_row *row = study->row;
   const pw_method *integrator;
-  int stabilisation, n = 0;
-  for (int k = -1, line = -1; table_next (x, group, &r, &k) != NULL; line = r->line) {
-    if (r->line == line) continue;
-    n++;
+  int stabilisation, curves = 0;
+  for (int k = -1, curve = -1; table_next_point (study, group, &row, &k) != NULL; curve = row->curve) {
+    if (row->curve == curve) continue;
+    curves++;
     if (f == NULL) continue;
-    int known = pw_method_parse (table_label (r), &integrator, &stabilisation, NULL) == PW_OK;
-    pw_figure_element (f, "label", n, table_label (r));
-    pw_figure_element (f, "stabilisation", n, known ? integrator->stabilisations[stabilisation].name : "");
+    int known = pw_method_parse (row->label, &integrator, &stabilisation, NULL) == PW_OK;
+    pw_figure_element (f, "label", curves, row->label);
+    pw_figure_element (f, "stabilisation", curves, known ? integrator->stabilisations[stabilisation].name : "");
   }
-  return n;
+  return curves;
 }
 
-int pw_study_write_script (pw_study *x, int group, const char *name, const char *template_name, const char *variables,
-                           pw_error *error) {
-  pw_output *o = pw_figure_begin (&x->figures, name, error);
-  int drawn = 0, lines = table_labels (x, group, NULL);
-  if (o == NULL) return PW_RESOURCE;
-  FILE *f = pw_output_stream (o);
-  fprintf (f, "%smethods = %d\narray label[%d]\narray stabilisation[%d]\n", variables, lines, lines, lines);
-  table_labels (x, group, f);
-  while (x->drawn[drawn]) drawn++;
-  x->drawn[drawn] = name;
-  return pw_figure_end (o, template_name, error);
+int pw_study_write_script (pw_study *study, int group, const char *name, const char *template_name,
+                           const char *variables, pw_error *error) {
+  pw_output *output = pw_figure_begin (&study->figures, name, error);
+  int script = 0, curves = table_write_labels (study, group, NULL);
+  if (output == NULL) return PW_RESOURCE;
+  FILE *f = pw_output_stream (output);
+  fprintf (f, "%smethods = %d\narray label[%d]\narray stabilisation[%d]\n", variables, curves, curves, curves);
+  table_write_labels (study, group, f);
+  while (study->scripts[script]) script++;
+  study->scripts[script] = name;
+  return pw_figure_end (output, template_name, error);
 }

@@ -1,22 +1,22 @@
-/* The grid of a sweep: varied quantities and their values.  Its rows are numbered in the order of the table, the last
- * quantity fastest. */
+/* The grid of a sweep: all combinations of the values of its varied quantities (axes), one per row.  Rows are numbered
+ * from 0 in the order of the table, in which the last axis varies fastest. */
 #ifndef PW_SWEEP_GRID_H
 #define PW_SWEEP_GRID_H
 
 #include "pinwheel.h"
 
-#define PW_GRID_ROWS 1e8 /* larger grids are refused */
+#define PW_GRID_MAX_ROWS 1e8 /* larger grids are refused: a journal needs 8 bytes of memory per row */
 
-/* One varied quantity. */
+/* A varied quantity: a parameter of the model or the initial value of a state. */
 typedef struct {
-  char *name;
+  char *name;        /* allocated together with `range` */
   const char *range; /* "lin:1:10:100", as written */
   enum { PW_AXIS_LIST, PW_AXIS_LIN, PW_AXIS_LOG } type;
-  double first, last; /* of PW_AXIS_LIN and PW_AXIS_LOG */
-  double *value;      /* PW_AXIS_LIST: count */
-  long count;
-  long stride;                   /* rows between two of its values */
-  const pw_parameter *parameter; /* NULL: it is the initial value of a state */
+  double first, last;            /* of PW_AXIS_LIN and PW_AXIS_LOG */
+  double *value;                 /* of PW_AXIS_LIST */
+  long count;                    /* number of values */
+  long stride;                   /* number of rows from one value to the next */
+  const pw_parameter *parameter; /* NULL: the initial value of a state */
   const char *unit;
 } pw_axis;
 
@@ -26,19 +26,20 @@ typedef struct {
   long rows;
 } pw_grid;
 
-/* Reads "NAME=RANGE".  PW_INPUT with the wrong text and the expected one.  Free the axis in every case. */
-int pw_axis_read (pw_axis *a, const char *text, pw_error *error);
-void pw_axis_free (pw_axis *a);
-double pw_axis_value (const pw_axis *a, long i);
+/* Reads "NAME=RANGE".  PW_INPUT with the reason, PW_RESOURCE.  Free the axis in every case. */
+int pw_axis_read (pw_axis *axis, const char *text, pw_error *error);
+void pw_axis_free (pw_axis *axis);
+double pw_axis_value (const pw_axis *axis, long i); /* i from 0 */
 
-/* Reads a NULL-terminated list of "NAME=RANGE".  PW_INPUT also for too many rows.  Free the grid in every case. */
-int pw_grid_read (pw_grid *g, const char *const *ranges, pw_error *error);
-void pw_grid_free (pw_grid *g);
-double pw_grid_value (const pw_grid *g, int axis, long row);
+/* Reads a NULL-terminated list of "NAME=RANGE".  PW_INPUT also if there are too many rows.  Free the grid in every
+ * case. */
+int pw_grid_read (pw_grid *grid, const char *const *ranges, pw_error *error);
+void pw_grid_free (pw_grid *grid);
+double pw_grid_value (const pw_grid *grid, int i, long row); /* of axis i */
 
-/* The k-th row in the order of execution, in which rows with the same parameters are consecutive. */
-long pw_grid_ordered (const pw_grid *g, long k);
-/* The index of a row's combination of parameters. */
-long pw_grid_parameters (const pw_grid *g, long row);
+/* The row that is computed k-th, from 0: rows with the same parameters follow each other and share a compiled model. */
+long pw_grid_scheduled_row (const pw_grid *grid, long k);
+/* The number, from 0, of a row's combination of parameters, without regard to its initial values. */
+long pw_grid_parameter_index (const pw_grid *grid, long row);
 
 #endif

@@ -3,14 +3,14 @@
  * A journal has rows in the order of completion, each appended by one write.  If the program is killed, the fingerprint
  * and complete lines remain, and perhaps an incomplete line, which the next start removes.  A lock excludes other
  * processes; it ends with the process.  The table is written under another name in the order of the grid and renamed,
- * then the journal is removed: killed in between, the same command finds the journal complete and writes the same bytes
- * again.
+ * then the journal is removed: if the program is killed in between, the same command finds the journal complete and
+ * writes the same bytes again.  A part is a table of lines of the journal, in the order of the grid.
  *
  *     pinwheel sweep 1              the fingerprint: lines "KEY = VALUE"
  *     ...
  *     part = 2/4
  *     end
- *     17 0 83c1f0a2 1.5,0.05,ok,... a row's number, its run's exit status, a check sum, its line of the table */
+ *     17 0 83c1f0a2 1.5,0.05,ok,... a row's number, its run's exit status, a checksum, its line of the table */
 #define _GNU_SOURCE /* asprintf */
 #include <errno.h>
 #include <stdlib.h>
@@ -22,22 +22,22 @@
 #include "sweep_journal.h"
 
 typedef struct {
-  long row;
+  long row;         /* its number in the grid */
   int status;       /* exit status of the run */
   const char *text; /* the table's line, which ends with a newline */
-  size_t size;      /* its bytes, the newline included */
-  size_t bytes;     /* of the whole line */
+  size_t text_size; /* its bytes, the newline included */
+  size_t line_size; /* those of the journal's line */
 } journal_line;
 
-/* A file in memory, read only. */
+/* A file in memory, read only, and not ended by 0. */
 typedef struct {
-  char *at, *end;
+  char *begin, *end;
 } journal_map;
 
 /* ---- Lines ---- */
 
 /* FNV-1a (Fowler, Noll, Vo) of a row's number, status and text. */
-static uint32_t journal_line_sum (long row, int status, const char *text, size_t size) {
+static uint32_t journal_line_checksum (long row, int status, const char *text, size_t size) {
   uint32_t h = 2166136261u;
   for (int i = 0; i < 32; i += 8) h = (h ^ (((uint32_t)row >> i) & 255)) * 16777619u;
   h = (h ^ (uint32_t)status) * 16777619u;
@@ -45,150 +45,155 @@ static uint32_t journal_line_sum (long row, int status, const char *text, size_t
   return h;
 }
 
-static void journal_line_add (pw_text *t, long row, int status, const char *text) {
+static void journal_line_format (pw_text *line, long row, int status, const char *text) {
   char front[60];
-  size_t n = strlen (text);
-  snprintf (front, sizeof front, "%ld %d %08lx ", row, status, (unsigned long)journal_line_sum (row, status, text, n));
-  pw_text_add (t, front);
-  pw_text_add_bytes (t, text, n);
-  pw_text_add (t, "\n");
+  size_t size = strlen (text);
+  snprintf (front, sizeof front, "%ld %d %08lx ", row, status,
+            (unsigned long)journal_line_checksum (row, status, text, size));
+  pw_text_add (line, front);
+  pw_text_add_bytes (line, text, size);
+  pw_text_add (line, "\n");
 }
 
-static int journal_line_read (const char *at, const char *end, journal_line *line) {
-  const char *newline = at < end ? memchr (at, '\n', (size_t)(end - at)) : NULL;
-  char front[40];
+/* Reads the line that begins here; 0 if it is incomplete or damaged. */
+static int journal_line_read (const char *begin, const char *end, journal_line *line) {
+  const char *newline = begin < end ? memchr (begin, '\n', (size_t)(end - begin)) : NULL;
+  char front[40]; /* up to the line of the table */
   int n = 0;
-  unsigned long sum;
+  unsigned long checksum;
   if (newline == NULL) return 0;
-  snprintf (front, sizeof front, "%.*s", (int)(newline - at < 39 ? newline - at : 39), at);
-  if (sscanf (front, "%10ld %1d %8lx %n", &line->row, &line->status, &sum, &n) != 3 || n == 0) return 0;
-  line->text = at + n;
-  line->size = (size_t)(newline + 1 - line->text);
-  line->bytes = (size_t)(newline + 1 - at);
+  snprintf (front, sizeof front, "%.*s", (int)(newline - begin < 39 ? newline - begin : 39), begin);
+  if (sscanf (front, "%10ld %1d %8lx %n", &line->row, &line->status, &checksum, &n) != 3 || n == 0) return 0;
+  line->text = begin + n;
+  line->text_size = (size_t)(newline + 1 - line->text);
+  line->line_size = (size_t)(newline + 1 - begin);
   return line->row >= 0 && line->status >= 0 && line->status <= 4 &&
-         journal_line_sum (line->row, line->status, line->text, line->size - 1) == (uint32_t)sum;
+         journal_line_checksum (line->row, line->status, line->text, line->text_size - 1) == (uint32_t)checksum;
 }
 
-static int journal_map_open (journal_map *m, int file) {
+static int journal_map_open (journal_map *map, int descriptor) {
   struct stat info;
-  *m = (journal_map){ "", "" };
-  m->end = m->at;
-  if (fstat (file, &info) != 0) return PW_RESOURCE;
+  map->begin = map->end = "";
+  if (fstat (descriptor, &info) != 0) return PW_RESOURCE;
   if (info.st_size == 0) return PW_OK;
-  void *at = mmap (NULL, (size_t)info.st_size, PROT_READ, MAP_PRIVATE, file, 0);
-  if (at == MAP_FAILED) return PW_RESOURCE;
-  m->at = at;
-  m->end = m->at + info.st_size;
+  void *bytes = mmap (NULL, (size_t)info.st_size, PROT_READ, MAP_PRIVATE, descriptor, 0);
+  if (bytes == MAP_FAILED) return PW_RESOURCE;
+  map->begin = bytes;
+  map->end = map->begin + info.st_size;
   return PW_OK;
 }
 
-static void journal_map_close (journal_map *m) {
-  if (m->end > m->at) munmap (m->at, (size_t)(m->end - m->at));
-  *m = (journal_map){ NULL, NULL };
+static void journal_map_close (journal_map *map) {
+  if (map->end > map->begin) munmap (map->begin, (size_t)(map->end - map->begin));
+  *map = (journal_map){ NULL, NULL };
 }
 
 /* ---- The journal ---- */
 
 /* Appends a text, all or nothing. */
-static int journal_write (pw_journal *j, const char *text, size_t size, pw_error *error) {
+static int journal_write (pw_journal *journal, const char *text, size_t size, pw_error *error) {
   size_t done = 0;
   while (done < size) {
-    ssize_t n = pwrite (j->file, text + done, size - done, j->size + (off_t)done);
+    ssize_t n = pwrite (journal->descriptor, text + done, size - done, journal->size + (off_t)done);
     if (n <= 0) {
-      const char *why = n < 0 ? strerror (errno) : "no bytes were taken";
-      if (done > 0 && ftruncate (j->file, j->size) != 0) why = "no room"; /* the next start removes it */
+      const char *why = n < 0 ? strerror (errno) : "nothing was written";
+      int removed = done == 0 || ftruncate (journal->descriptor, journal->size) == 0;
+      (void)removed; /* if not, the next start removes the incomplete line */
       return pw_fail (error, PW_RESOURCE, "cannot write %s: %s; the same command will continue after its %ld rows",
-                      j->part, why, j->done);
+                      journal->part_path, why, journal->done);
     }
     done += (size_t)n;
   }
-  j->size += (off_t)size;
+  journal->size += (off_t)size;
   return PW_OK;
 }
 
-/* Records each line; stops at the first that is incomplete, damaged, a duplicate or of another part. */
-static void journal_rows (pw_journal *j, const pw_plan *p, const journal_map *map, const char *at) {
+/* Stores the offset of each row; stops at a line that is incomplete, damaged, a duplicate or of another part. */
+static void journal_read_rows (pw_journal *journal, const pw_plan *plan, const journal_map *map, const char *at) {
   journal_line line;
-  for (; journal_line_read (at, map->end, &line); at += line.bytes) {
-    long k = line.row / p->parts;
-    if (line.row % p->parts != p->part - 1 || k >= j->rows || j->line[k] != 0) break;
-    j->line[k] = (off_t)(at - map->at);
-    j->done++;
+  for (; journal_line_read (at, map->end, &line); at += line.line_size) {
+    long k = line.row / plan->parts;
+    if (line.row % plan->parts != plan->part - 1 || k >= journal->rows || journal->offset[k] != 0) break;
+    journal->offset[k] = (off_t)(at - map->begin);
+    journal->done++;
   }
-  j->size = (off_t)(at - map->at);
+  journal->size = (off_t)(at - map->begin);
 }
 
-static int journal_read (pw_journal *j, const pw_plan *p, const journal_map *map, pw_error *error) {
-  static const char *words[2] = { "there", "here" };
-  char what[400];
-  size_t size = (size_t)(map->end - map->at), magic = strlen (PW_SWEEP_MAGIC);
-  const char *rows = pw_fingerprint_end (PW_SWEEP_MAGIC, map->at, map->end), *own = p->fingerprint.at;
-  j->size = 0;
+/* Verifies that the journal is one of this sweep, and reads its rows; journal->size is where the next row goes. */
+static int journal_read (pw_journal *journal, const pw_plan *plan, const journal_map *map, pw_error *error) {
+  char difference[400];
+  size_t size = (size_t)(map->end - map->begin), magic_size = strlen (PW_SWEEP_MAGIC);
+  const char *rows = pw_fingerprint_end (PW_SWEEP_MAGIC, map->begin, map->end), *fingerprint = plan->fingerprint.chars;
+  journal->size = 0;
   if (rows == NULL) { /* with an incomplete fingerprint there are no rows */
-    if (memcmp (map->at, PW_SWEEP_MAGIC, size < magic ? size : magic) == 0) return PW_OK;
+    if (memcmp (map->begin, PW_SWEEP_MAGIC, size < magic_size ? size : magic_size) == 0) return PW_OK;
     return pw_fail (error, PW_INPUT, "%s exists and is not the journal of a sweep: remove it if it is not needed",
-                    j->part);
+                    journal->part_path);
   }
-  if (pw_fingerprint_differ (map->at, rows, own, own + p->fingerprint.used, 1, words, what, sizeof what))
+  const pw_fingerprint there = { map->begin, rows, "there" };
+  const pw_fingerprint here = { fingerprint, fingerprint + plan->fingerprint.length, "here" };
+  if (pw_fingerprint_differ (there, here, NULL, difference, sizeof difference))
     return pw_fail (error, PW_INPUT,
                     "%.80s belongs to another sweep: %.300s; finish that one with its own command, or remove the file",
-                    j->part, what);
-  journal_rows (j, p, map, rows);
+                    journal->part_path, difference);
+  journal_read_rows (journal, plan, map, rows);
   return PW_OK;
 }
 
-static int journal_begin (pw_journal *j, const pw_plan *p, pw_error *error) {
+static int journal_begin (pw_journal *journal, const pw_plan *plan, pw_error *error) {
   journal_map map;
-  if (journal_map_open (&map, j->file) != PW_OK)
-    return pw_fail (error, PW_RESOURCE, "cannot read %s: %s", j->part, strerror (errno));
-  int status = journal_read (j, p, &map, error);
-  off_t there = (off_t)(map.end - map.at);
+  if (journal_map_open (&map, journal->descriptor) != PW_OK)
+    return pw_fail (error, PW_RESOURCE, "cannot read %s: %s", journal->part_path, strerror (errno));
+  int status = journal_read (journal, plan, &map, error);
+  off_t file_size = (off_t)(map.end - map.begin);
   journal_map_close (&map);
   if (status != PW_OK) return status;
-  if (there > j->size && ftruncate (j->file, j->size) != 0)
-    return pw_fail (error, PW_RESOURCE, "cannot write %s: %s", j->part, strerror (errno));
-  j->created = j->size == 0;
-  return j->created ? journal_write (j, p->fingerprint.at, p->fingerprint.used, error) : PW_OK;
+  if (file_size > journal->size && ftruncate (journal->descriptor, journal->size) != 0)
+    return pw_fail (error, PW_RESOURCE, "cannot write %s: %s", journal->part_path, strerror (errno));
+  journal->created = journal->size == 0;
+  return journal->created ? journal_write (journal, plan->fingerprint.chars, plan->fingerprint.length, error) : PW_OK;
 }
 
-int pw_journal_open (pw_journal *j, const pw_plan *p, const char *path, pw_error *error) {
-  *j = (pw_journal){ .file = -1, .rows = pw_plan_rows (p) };
-  j->path = pw_output_path (path, error);
-  if (j->path == NULL) return error->status;
-  if (asprintf (&j->part, "%s.part", j->path) < 0) j->part = NULL;
-  j->line = calloc ((size_t)j->rows + 1, sizeof *j->line);
-  if (j->part == NULL || j->line == NULL)
-    return pw_fail (error, PW_RESOURCE, "out of memory for a sweep of %ld rows", j->rows);
-  j->file = pw_lock_path (j->part, error);
-  return j->file >= 0 ? journal_begin (j, p, error) : error->status;
+int pw_journal_open (pw_journal *journal, const pw_plan *plan, const char *path, pw_error *error) {
+  long rows = plan->grid.rows / plan->parts + (plan->grid.rows % plan->parts >= plan->part);
+  *journal = (pw_journal){ .descriptor = -1, .rows = rows };
+  journal->table_path = pw_output_path (path, error);
+  if (journal->table_path == NULL) return error->status;
+  if (asprintf (&journal->part_path, "%s.part", journal->table_path) < 0) journal->part_path = NULL;
+  journal->offset = calloc ((size_t)journal->rows + 1, sizeof *journal->offset);
+  if (journal->part_path == NULL || journal->offset == NULL)
+    return pw_fail (error, PW_RESOURCE, "out of memory for a sweep of %ld rows", journal->rows);
+  journal->descriptor = pw_lock_path (journal->part_path, error);
+  return journal->descriptor >= 0 ? journal_begin (journal, plan, error) : error->status;
 }
 
-int pw_journal_add (pw_journal *j, const pw_plan *p, long row, int status, const char *cells, pw_error *error) {
-  off_t at = j->size;
-  pw_text_clear (&j->text);
-  journal_line_add (&j->text, row, status, cells);
-  if (j->text.failed) return pw_fail (error, PW_RESOURCE, "out of memory");
-  if (journal_write (j, j->text.at, j->text.used, error) != PW_OK) return error->status;
-  j->line[row / p->parts] = at;
-  j->done++;
+int pw_journal_add (pw_journal *journal, const pw_plan *plan, long row, int status, const char *text, pw_error *error) {
+  off_t at = journal->size;
+  pw_text_clear (&journal->line);
+  journal_line_format (&journal->line, row, status, text);
+  if (journal->line.failed) return pw_fail (error, PW_RESOURCE, "out of memory");
+  if (journal_write (journal, journal->line.chars, journal->line.length, error) != PW_OK) return error->status;
+  journal->offset[row / plan->parts] = at;
+  journal->done++;
   return PW_OK;
 }
 
-void pw_journal_close (pw_journal *j) {
-  if (j->created && j->done == 0 && j->file >= 0) unlink (j->part);
-  if (j->file >= 0) close (j->file);
-  pw_text_free (&j->text);
-  free (j->line);
-  free (j->part);
-  free (j->path);
-  *j = (pw_journal){ .file = -1 };
+void pw_journal_close (pw_journal *journal) {
+  if (journal->created && journal->done == 0 && journal->descriptor >= 0) unlink (journal->part_path);
+  if (journal->descriptor >= 0) close (journal->descriptor);
+  pw_text_free (&journal->line);
+  free (journal->offset);
+  free (journal->part_path);
+  free (journal->table_path);
+  *journal = (pw_journal){ .descriptor = -1 };
 }
 
 /* ---- The table of a journal ---- */
 
 /* The reason is the last cell and the only one in quotes, which are doubled inside. */
 static void table_reason (const journal_line *line, char *reason, size_t size) {
-  const char *c = line->text, *end = line->text + line->size - 2;
+  const char *c = line->text, *end = line->text + line->text_size - 2;
   while (c < end && !(c[0] == ',' && c[1] == '"')) c++;
   size_t n = 0;
   for (c += 2; c < end && n + 1 < size; c++) {
@@ -198,52 +203,55 @@ static void table_reason (const journal_line *line, char *reason, size_t size) {
   reason[n] = 0;
 }
 
-/* Writes the line of a row, to a part the whole line, and returns its bytes; 0 if it is not there. */
-static size_t table_row (FILE *stream, const char *at, const char *end, long row, int whole, pw_tally *tally) {
-  journal_line line;
-  if (!journal_line_read (at, end, &line) || line.row != row) return 0;
-  fwrite (whole ? at : line.text, 1, whole ? line.bytes : line.size, stream);
+/* Reads the line of a row, and counts how its run ended; 0 if it is another line. */
+static int table_read_row (const char *at, const char *end, long row, journal_line *line, pw_tally *tally) {
+  if (!journal_line_read (at, end, line) || line->row != row) return 0;
   tally->rows++;
-  if (line.status == 0 || tally->failed++ > 0) return line.bytes;
-  tally->status = line.status;
-  table_reason (&line, tally->reason, sizeof tally->reason);
-  return line.bytes;
+  if (line->status == 0 || tally->failed++ > 0) return 1;
+  tally->status = line->status;
+  table_reason (line, tally->reason, sizeof tally->reason);
+  return 1;
 }
 
-/* Completes the file if all went well so far, else removes it. */
-static int table_close (pw_output *o, pw_error *error) {
-  if (error->status == PW_OK) return pw_output_finish (o, error);
-  pw_output_discard (o);
+/* Completes the file if there is no error so far, else removes it. */
+static int table_close (pw_output *output, pw_error *error) {
+  if (error->status == PW_OK) return pw_output_finish (output, error);
+  pw_output_discard (output);
   return error->status;
 }
 
-static int table_write (const pw_journal *j, const pw_plan *p, const journal_map *map, FILE *stream, pw_tally *tally,
-                        pw_error *error) {
-  int is_part = p->parts > 1;
-  fputs (is_part ? p->fingerprint.at : p->head.at, stream);
+static int table_write (const pw_journal *journal, const pw_plan *plan, const journal_map *map, FILE *stream,
+                        pw_tally *tally, pw_error *error) {
+  int is_part = plan->parts > 1;
+  fputs (is_part ? plan->fingerprint.chars : plan->heading.chars, stream);
   if (!is_part) putc ('\n', stream);
-  for (long k = 0; k < j->rows; k++)
-    if (!table_row (stream, map->at + j->line[k], map->end, p->part - 1 + k * p->parts, is_part, tally))
-      return pw_fail (error, PW_RESOURCE, "%s was changed by another program", j->part);
+  for (long k = 0; k < journal->rows; k++) {
+    const char *at = map->begin + journal->offset[k];
+    journal_line line;
+    if (!table_read_row (at, map->end, plan->part - 1 + k * plan->parts, &line, tally))
+      return pw_fail (error, PW_RESOURCE, "%s was changed by another program", journal->part_path);
+    fwrite (is_part ? at : line.text, 1, is_part ? line.line_size : line.text_size, stream);
+  }
   return PW_OK;
 }
 
-int pw_sweep_finish (pw_journal *j, const pw_plan *p, pw_tally *tally, pw_error *error) {
+int pw_sweep_finish (pw_journal *journal, const pw_plan *plan, pw_tally *tally, pw_error *error) {
   journal_map map;
-  pw_error own = { 0 };
+  pw_error table_error = { 0 };
   *tally = (pw_tally){ .rows = 0 };
-  if (journal_map_open (&map, j->file) != PW_OK)
-    return pw_fail (error, PW_RESOURCE, "cannot read %s: %s", j->part, strerror (errno));
-  pw_output *o = pw_output_open_as (j->path, ".sorted", &own);
-  if (o) table_write (j, p, &map, pw_output_stream (o), tally, &own);
-  if (o) table_close (o, &own);
+  if (journal_map_open (&map, journal->descriptor) != PW_OK)
+    return pw_fail (error, PW_RESOURCE, "cannot read %s: %s", journal->part_path, strerror (errno));
+  pw_output *output = pw_output_open_as (journal->table_path, ".sorted", &table_error);
+  if (output) table_write (journal, plan, &map, pw_output_stream (output), tally, &table_error);
+  if (output) table_close (output, &table_error);
   journal_map_close (&map);
-  if (own.status != PW_OK)
-    return pw_fail (error, own.status, "%.300s; all rows are in %.150s, so the same command only has to sort them",
-                    own.text, j->part);
-  if (unlink (j->part) == 0) return PW_OK;
-  return pw_fail (error, PW_RESOURCE, "%s is complete, but %s cannot be removed: %s", j->path, j->part,
-                  strerror (errno));
+  if (table_error.status != PW_OK)
+    return pw_fail (error, table_error.status,
+                    "%.300s; all rows are in %.150s, so the same command only has to sort them", table_error.text,
+                    journal->part_path);
+  if (unlink (journal->part_path) == 0) return PW_OK;
+  return pw_fail (error, PW_RESOURCE, "%s is complete, but %s cannot be removed: %s", journal->table_path,
+                  journal->part_path, strerror (errno));
 }
 
 /* ---- The table of all parts ---- */
@@ -251,95 +259,99 @@ int pw_sweep_finish (pw_journal *j, const pw_plan *p, pw_tally *tally, pw_error 
 typedef struct {
   const char *path;
   journal_map map;
-  const char *rows; /* the first one */
-  const char *at;   /* the next one */
-  int part, parts;
+  const char *first_row, *next_row; /* their lines */
+  int number, parts;                /* part I of N */
 } table_part;
 
-static int table_open_part (table_part *x, const char *path, pw_error *error) {
+/* Opens a part and finds its number and first row. */
+static int table_open_part (table_part *part, const char *path, pw_error *error) {
   const char *reason;
-  char numbers[40] = "";
+  char fraction[40] = "";
   size_t size;
   FILE *f = pw_open_input (path, &reason);
-  x->path = path;
+  part->path = path;
   if (f == NULL) return pw_fail (error, pw_open_input_status (), "cannot open the part %s: %s", path, reason);
-  int status = journal_map_open (&x->map, fileno (f)), why = errno;
+  int status = journal_map_open (&part->map, fileno (f)), why = errno;
   fclose (f);
   if (status != PW_OK) return pw_fail (error, PW_RESOURCE, "cannot read the part %s: %s", path, strerror (why));
-  x->rows = x->at = pw_fingerprint_end (PW_SWEEP_MAGIC, x->map.at, x->map.end);
-  const char *part = x->rows ? pw_fingerprint_value (x->map.at, x->rows, "part", &size) : NULL;
-  if (part)
-    snprintf (numbers, sizeof numbers, "%.*s", (int)(size < 39 ? size : 39), part); /* a map is not terminated */
-  if (sscanf (numbers, "%9d/%9d", &x->part, &x->parts) != 2 || x->parts < 1 || x->part < 1 || x->part > x->parts)
+  part->first_row = part->next_row = pw_fingerprint_end (PW_SWEEP_MAGIC, part->map.begin, part->map.end);
+  const char *value = part->first_row ? pw_fingerprint_value (part->map.begin, part->first_row, "part", &size) : NULL;
+  if (value)
+    snprintf (fraction, sizeof fraction, "%.*s", (int)(size < 39 ? size : 39), value); /* sscanf needs its end */
+  if (sscanf (fraction, "%9d/%9d", &part->number, &part->parts) != 2 || part->parts < 1 || part->number < 1 ||
+      part->number > part->parts)
     return pw_fail (error, PW_INPUT, "%s is not a part of a sweep: parts are written by --part I/N", path);
   return PW_OK;
 }
 
 static int table_by_part (const void *a, const void *b) {
-  return ((const table_part *)a)->part - ((const table_part *)b)->part;
+  return ((const table_part *)a)->number - ((const table_part *)b)->number;
 }
 
-/* All of one sweep, each part once. */
-static int table_match (table_part *x, int count, pw_error *error) {
-  char what[400];
+/* Sorts the parts; they must be all those of one sweep, each of them once. */
+static int table_match_parts (table_part *part, int count, pw_error *error) {
+  char difference[400];
   for (int i = 1; i < count; i++) {
-    const char *words[2] = { "in the first", "in the second" };
-    if (pw_fingerprint_differ (x->map.at, x->rows, x[i].map.at, x[i].rows, 0, words, what, sizeof what))
-      return pw_fail (error, PW_INPUT, "%.80s and %.80s are parts of different sweeps: %.300s", x->path, x[i].path,
-                      what);
-    if (x[i].parts != x->parts)
-      return pw_fail (error, PW_INPUT, "%.200s is one of %d parts, %.200s one of %d", x->path, x->parts, x[i].path,
-                      x[i].parts);
+    const pw_fingerprint first = { part[0].map.begin, part[0].first_row, "in the first" };
+    const pw_fingerprint second = { part[i].map.begin, part[i].first_row, "in the second" };
+    if (pw_fingerprint_differ (first, second, "part", difference, sizeof difference))
+      return pw_fail (error, PW_INPUT, "%.80s and %.80s are parts of different sweeps: %.300s", part[0].path,
+                      part[i].path, difference);
+    if (part[i].parts != part[0].parts)
+      return pw_fail (error, PW_INPUT, "%.200s is one of %d parts, %.200s one of %d", part[0].path, part[0].parts,
+                      part[i].path, part[i].parts);
   }
-  qsort (x, (size_t)count, sizeof *x, table_by_part);
+  qsort (part, (size_t)count, sizeof *part, table_by_part);
   for (int i = 0; i < count; i++) {
-    if (i > 0 && x[i].part == x[i - 1].part)
-      return pw_fail (error, PW_INPUT, "%.200s and %.200s are both part %d of %d", x[i - 1].path, x[i].path, x[i].part,
-                      x->parts);
-    if (x[i].part != i + 1) return pw_fail (error, PW_INPUT, "part %d of %d is missing", i + 1, x->parts);
+    if (i > 0 && part[i].number == part[i - 1].number)
+      return pw_fail (error, PW_INPUT, "%.200s and %.200s are both part %d of %d", part[i - 1].path, part[i].path,
+                      part[i].number, part[0].parts);
+    if (part[i].number != i + 1) return pw_fail (error, PW_INPUT, "part %d of %d is missing", i + 1, part[0].parts);
   }
-  if (count < x->parts) return pw_fail (error, PW_INPUT, "part %d of %d is missing", count + 1, x->parts);
+  if (count < part[0].parts) return pw_fail (error, PW_INPUT, "part %d of %d is missing", count + 1, part[0].parts);
   return PW_OK;
 }
 
-/* The rows, taken from the parts in turn: row r is the next one of part r mod n. */
-static int table_merge (table_part *x, int count, FILE *stream, pw_tally *tally, pw_error *error) {
+/* Writes the table from sorted parts: row r is the next one of part[r % count]. */
+static int table_merge (table_part *part, int count, FILE *stream, pw_tally *tally, pw_error *error) {
   size_t size = 0;
-  const char *value = pw_fingerprint_value (x->map.at, x->rows, "rows", &size);
-  const char *head = pw_fingerprint_value (x->map.at, x->rows, "columns", &size);
-  if (value == NULL || head == NULL)
-    return pw_fail (error, PW_INPUT, "%s has no number of rows or no columns: it was changed", x->path);
-  long rows = strtol (value, NULL, 10);
-  fwrite (head, 1, size, stream);
+  const char *rows_value = pw_fingerprint_value (part->map.begin, part->first_row, "rows", &size);
+  const char *heading = pw_fingerprint_value (part->map.begin, part->first_row, "columns", &size);
+  if (rows_value == NULL || heading == NULL)
+    return pw_fail (error, PW_INPUT, "%s has no number of rows or no columns: it was changed", part->path);
+  long rows = strtol (rows_value, NULL, 10);
+  fwrite (heading, 1, size, stream);
   putc ('\n', stream);
   for (long r = 0; r < rows; r++) {
-    table_part *from = x + r % count;
-    size_t bytes = table_row (stream, from->at, from->map.end, r, 0, tally);
-    if (bytes == 0)
-      return pw_fail (error, PW_INPUT, "%s is not complete: row %ld is missing; finish that part first", from->path,
+    table_part *source = part + r % count;
+    journal_line line;
+    if (!table_read_row (source->next_row, source->map.end, r, &line, tally))
+      return pw_fail (error, PW_INPUT, "%s is not complete: row %ld is missing; finish that part first", source->path,
                       r + 1);
-    from->at += bytes;
+    fwrite (line.text, 1, line.text_size, stream);
+    source->next_row += line.line_size;
   }
   for (int i = 0; i < count; i++)
-    if (x[i].at != x[i].map.end) return pw_fail (error, PW_INPUT, "%s has too many rows: it was changed", x[i].path);
+    if (part[i].next_row != part[i].map.end)
+      return pw_fail (error, PW_INPUT, "%s has too many rows: it was changed", part[i].path);
   return PW_OK;
 }
 
 int pw_sweep_merge (const char *const *parts, int count, const char *path, pw_tally *tally, pw_error *error) {
   *tally = (pw_tally){ .rows = 0 };
-  pw_output *o = NULL;
-  table_part *x = calloc ((size_t)count, sizeof *x);
-  int status = x ? PW_OK : pw_fail (error, PW_RESOURCE, "out of memory");
+  pw_output *output = NULL;
+  table_part *part = calloc ((size_t)count, sizeof *part);
+  int status = part ? PW_OK : pw_fail (error, PW_RESOURCE, "out of memory");
   for (int i = 0; i < count && status == PW_OK; i++) {
     const pw_use use[] = { { "-o", path, PW_WRITES, NULL }, { "the part", parts[i], PW_READS, NULL } };
     status = pw_check_paths (use, 2, error);
-    if (status == PW_OK) status = table_open_part (x + i, parts[i], error);
+    if (status == PW_OK) status = table_open_part (part + i, parts[i], error);
   }
-  if (status == PW_OK) status = table_match (x, count, error);
-  if (status == PW_OK && (o = pw_output_open_as (path, ".sorted", error)) == NULL) status = error->status;
-  if (o) table_merge (x, count, pw_output_stream (o), tally, error);
-  if (o) status = table_close (o, error);
-  for (int i = 0; x && i < count; i++) journal_map_close (&x[i].map);
-  free (x);
+  if (status == PW_OK) status = table_match_parts (part, count, error);
+  if (status == PW_OK && (output = pw_output_open_as (path, ".sorted", error)) == NULL) status = error->status;
+  if (output) table_merge (part, count, pw_output_stream (output), tally, error);
+  if (output) status = table_close (output, error);
+  for (int i = 0; part && i < count; i++) journal_map_close (&part[i].map);
+  free (part);
   return status;
 }

@@ -5,43 +5,45 @@
 #include <sys/types.h>
 #include "sweep_plan.h"
 
-/* Rows in the order of completion, in a file next to the table, from which a sweep that was stopped continues. */
+/* The rows done, in the order of completion, in a file next to the table, from which a sweep that was stopped
+ * continues. */
 typedef struct {
-  char *path;  /* of the table, links followed */
-  char *part;  /* of the journal: path.part */
-  int file;    /* the journal's, locked; -1: not open */
-  int created; /* 1: by this process */
-  off_t *line; /* pw_plan_rows: offset of each row's line; 0: missing */
-  long rows, done;
-  off_t size;
-  pw_text text; /* of the line that is written */
+  char *table_path; /* links followed */
+  char *part_path;  /* of the journal: table_path.part */
+  int descriptor;   /* of the journal, locked; -1: not open */
+  int created;      /* 1: by this process */
+  off_t *offset;    /* in the journal, of the line of each row of the part; 0: missing */
+  long rows, done;  /* rows of the part; those in the journal */
+  off_t size;       /* bytes of the journal's complete lines */
+  pw_text line;     /* the line that is written */
 } pw_journal;
 
 /* Opens the journal of the table at `path`, or creates it.  It is truncated at the first incomplete or damaged line.
  * Errors: PW_RESOURCE if it cannot be written, PW_INPUT if it belongs to another sweep or is in use by another
  * process. */
-int pw_journal_open (pw_journal *j, const pw_plan *p, const char *path, pw_error *error);
-/* Appends a row of the grid.  One thread at a time.  PW_RESOURCE: the journal is unchanged. */
-int pw_journal_add (pw_journal *j, const pw_plan *p, long row, int status, const char *cells, pw_error *error);
+int pw_journal_open (pw_journal *journal, const pw_plan *plan, const char *path, pw_error *error);
+/* Appends a row of the grid with the status of its run, 0 to 4 as an exit status.  One thread at a time.  PW_RESOURCE:
+ * the journal is unchanged. */
+int pw_journal_add (pw_journal *journal, const pw_plan *plan, long row, int status, const char *text, pw_error *error);
 /* Closes the journal; removes it if it was created here and has no rows. */
-void pw_journal_close (pw_journal *j);
+void pw_journal_close (pw_journal *journal);
 
 /* ---- Rows (sweep_rows.c) ---- */
 
 /* Computes the missing rows by `jobs` threads, until all are there or a signal requests a stop.  PW_RESOURCE. */
-int pw_sweep_rows (const pw_plan *p, pw_journal *j, int jobs, pw_error *error);
+int pw_sweep_rows (const pw_plan *plan, pw_journal *journal, int jobs, pw_error *error);
 
 /* ---- The table ---- */
 
 /* How the runs of a table ended. */
 typedef struct {
-  long rows, failed;
-  int status;       /* exit status of the first that failed */
-  char reason[300]; /* from its row */
+  long rows, failed; /* runs; those that failed */
+  int status;        /* exit status of the first that failed */
+  char reason[300];  /* from its row */
 } pw_tally;
 
 /* Writes the table of a complete journal, or its part, and removes the journal. */
-int pw_sweep_finish (pw_journal *j, const pw_plan *p, pw_tally *tally, pw_error *error);
+int pw_sweep_finish (pw_journal *journal, const pw_plan *plan, pw_tally *tally, pw_error *error);
 /* Writes the table at `path` from all parts of a sweep. */
 int pw_sweep_merge (const char *const *parts, int count, const char *path, pw_tally *tally, pw_error *error);
 

@@ -1,30 +1,42 @@
 /* Breakpoints: times at which an expression jumps or has a kink.
  *
- * Interval arithmetic shows that no comparison or other discontinuous operation changes in an interval of time, and that
- * none of its operands leaves the domain of a function, where comparisons with NaN become false; otherwise the interval
- * is bisected, the earlier half first, down to a relative width of 2^-36 (Moore, Kearfott & Cloud 2009, Introduction to
- * Interval Analysis, chapter 8).  Bisection then finds the two adjacent floating-point numbers between which an operation
- * changes: steps must end there.  Changes that cancel within this width, and changes by round-off only, are ignored.
- * While two compared numbers stay equal, the width grows. */
+ * An interval of time is excluded if interval arithmetic proves that no comparison or other discontinuous operation
+ * changes in it, and that no operand leaves the domain of a function, where comparisons with NaN become false.
+ * Otherwise it is bisected, the earlier half first, down to a least relative width, at first 2^-36 (Moore, Kearfott &
+ * Cloud 2009, Introduction to Interval Analysis, chapter 8).  If an operation differs between the ends of such an
+ * interval, bisection finds the two adjacent floating-point numbers between which it changes: steps must end there.
+ * Changes that cancel within the least width are ignored.  So are those of noisy operations, which change too often
+ * for steps to end there: by round-off of equal numbers, or too fast for any step.  While two compared numbers stay
+ * equal, the least width grows. */
 #include <math.h>
 #include "expression_parts.h"
 #include "pinwheel.h"
 
+#define LATEST 1e18                  /* breakpoints after it are not found [s] */
+#define FIRST_WIDTH 1e-9             /* of the first interval, relative to 1 s + |t|; each next one is twice as wide */
+#define LEAST_WIDTH 0x1p-36          /* of bisected intervals, at first, relative to |t| */
+#define GREATEST_LEAST_WIDTH 0x1p-10 /* to which it grows */
+#define SMALLEST_INTERVAL 1e-18      /* [s]: not bisected either, for t near 0 */
+enum { NOISE_CHANGES = 8 };          /* an operation with more changes in an interval of the least width is noisy */
+enum { NOISE_SAMPLES = 256 };        /* at which they are counted, in the interval, and as many after it */
+#define NOISE_WIDTH 1e-6             /* of the time after the interval, relative to 1 s + |t| */
+#define NOISE_DURATION 1e-2          /* for which changes of a noisy operation are ignored, relative to 1 s + |t| */
+
 typedef struct {
-  const pw_expression *x;
-  double from;
+  const pw_expression *expression;
+  double from;                              /* time at which the search begins */
   int remaining;                            /* intervals that may still be tested */
-  int equal;                                /* intervals of the least width without a change */
-  int max_equal;                            /* number of these after which `min_width` doubles */
-  double min_width;                         /* relative width below which intervals are not bisected */
-  double noise_end;                         /* end of the noise; INFINITY without noisy operations */
-  unsigned char noisy[PW_EXPRESSION_CODES]; /* per operation: 1: changes too often for steps to end there */
+  int equal;                                /* intervals of the least width without a change so far */
+  int max_equal;                            /* number of these after which the least width doubles */
+  double least_width;                       /* relative to |t| */
+  double noise_end;                         /* time until which noisy operations are ignored; INFINITY without any */
+  unsigned char noisy[PW_EXPRESSION_CODES]; /* 1: this operation is noisy */
 } search;
 
-/* Evaluates all discrete operations (comparisons and the like) at a time. */
+/* Evaluates the discrete part of all operations at time t (pw_expression_run_jet). */
 static void search_evaluate (const search *s, double t, double *discrete) {
   double variable[PW_EXPRESSION_VARIABLES] = { t }, u[3];
-  pw_expression_run_jet (s->x->code, s->x->codes, variable, 0, u, discrete);
+  pw_expression_run_jet (s->expression->code, s->expression->codes, variable, PW_EXPRESSION_TIME, u, discrete);
 }
 
 static int search_changed (double a, double b) {
@@ -36,7 +48,7 @@ static int search_differ (const search *s, double a, double b) {
   double before[PW_EXPRESSION_CODES], after[PW_EXPRESSION_CODES];
   search_evaluate (s, a, before);
   search_evaluate (s, b, after);
-  for (int i = 0; i < s->x->codes; i++)
+  for (int i = 0; i < s->expression->codes; i++)
     if (!s->noisy[i] && search_changed (before[i], after[i])) return 1;
   return 0;
 }
@@ -52,48 +64,50 @@ static double search_bisect (const search *s, double a, double b) {
   return b;
 }
 
-/* Marks operations as noisy that change more than 8 times between a and b, or just after b: by round-off of equal numbers,
- * or too fast for any step.  Returns whether it marked any. */
+/* Marks operations as noisy by their changes between a and b and just after b.  Returns whether it marked any. */
 static int search_mark_noisy (search *s, double a, double b) {
-  const double width = 1e-6 * (1 + fabs (b));
+  const double after = NOISE_WIDTH * (1 + fabs (b));
   double value[2][PW_EXPRESSION_CODES];
   short changes[PW_EXPRESSION_CODES] = { 0 };
   int marked = 0;
   search_evaluate (s, a, value[0]);
-  for (int k = 1; k <= 512; k++) {
-    search_evaluate (s, k <= 256 ? a + (b - a) * (k / 256.0) : b + width * (k / 256.0 - 1), value[k % 2]);
-    for (int i = 0; i < s->x->codes; i++)
-      if (search_changed (value[0][i], value[1][i]) && ++changes[i] > 8 && !s->noisy[i]) s->noisy[i] = 1, marked = 1;
+  for (int k = 1; k <= 2 * NOISE_SAMPLES; k++) {
+    double fraction = (double)k / NOISE_SAMPLES,
+           t = fraction <= 1 ? a + (b - a) * fraction : b + after * (fraction - 1);
+    search_evaluate (s, t, value[k % 2]);
+    for (int i = 0; i < s->expression->codes; i++)
+      if (search_changed (value[0][i], value[1][i]) && ++changes[i] > NOISE_CHANGES && !s->noisy[i])
+        s->noisy[i] = 1, marked = 1;
   }
-  if (marked) s->noise_end = fmin (s->noise_end, b + 1e-2 * (1 + fabs (b)));
+  if (marked) s->noise_end = fmin (s->noise_end, b + NOISE_DURATION * (1 + fabs (b)));
   return marked;
 }
 
+/* The first breakpoint between a and b, or INFINITY; at the limit of the search, a time up to which there is none. */
 static double search_first (search *s, double a, double b) {
   if (s->remaining-- <= 0) return fmax (a, nextafter (s->from, INFINITY));
-  if (!pw_expression_range (s->x, s->noisy, a, b).breaks) return INFINITY;
-  if (b - a <= s->min_width * (fmax (fabs (a), fabs (b)) + s->min_width) + 1e-18) {
+  if (!pw_expression_range (s->expression, s->noisy, a, b).breaks) return INFINITY;
+  if (b - a <= s->least_width * (fmax (fabs (a), fabs (b)) + s->least_width) + SMALLEST_INTERVAL) {
     if (search_differ (s, a, b)) return search_mark_noisy (s, a, b) ? search_first (s, a, b) : search_bisect (s, a, b);
-    if (++s->equal % s->max_equal == 0) s->min_width = fmin (2 * s->min_width, 0x1p-10);
+    if (++s->equal % s->max_equal == 0) s->least_width = fmin (2 * s->least_width, GREATEST_LEAST_WIDTH);
     return INFINITY;
   }
   double middle = a + (b - a) / 2, first = search_first (s, a, middle);
   return first < INFINITY ? first : search_first (s, middle, b);
 }
 
-/* At the limit of the search, or with noise, returns a time that need not be a breakpoint; the next call continues there. */
-double pw_expression_breakpoint (const pw_expression *x, double t) {
-  const double latest = 1e18;
-  search s = {
-    .x = x, .from = t, .remaining = 400 + 4000000 / (100 + x->codes), .min_width = 0x1p-36, .noise_end = INFINITY
-  };
-  s.max_equal = 1 + s.remaining / 120; /* all 26 doublings, to 2^-10, before the limit */
+/* At the limit of the search, or with noise, returns a time before the next breakpoint, to continue there. */
+double pw_expression_breakpoint (const pw_expression *expression, double t) {
+  search s = { .expression = expression, .from = t, .least_width = LEAST_WIDTH, .noise_end = INFINITY };
+  s.remaining = 400 + 4000000 / (100 + expression->codes); /* so that the time of a search has a bound */
+  s.max_equal = 1 + s.remaining / 120; /* 26 doublings to the greatest least width before the limit */
   double a = t, found = INFINITY;
-  if (!x->breaks) return INFINITY;
-  for (double w = 1e-9 * (1 + fabs (t)); a < latest && found == INFINITY; w *= 2) {
-    if (a >= s.noise_end || (s.noise_end == INFINITY && !pw_expression_range (x, s.noisy, a, latest).breaks)) break;
-    found = search_first (&s, a, a + w);
-    a += w;
+  if (!expression->breaks) return INFINITY;
+  for (double width = FIRST_WIDTH * (1 + fabs (t)); a < LATEST && found == INFINITY; width *= 2) {
+    int without_noise = s.noise_end == INFINITY;
+    if (a >= s.noise_end || (without_noise && !pw_expression_range (expression, s.noisy, a, LATEST).breaks)) break;
+    found = search_first (&s, a, a + width);
+    a += width;
   }
   return fmin (found, s.noise_end);
 }

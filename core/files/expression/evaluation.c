@@ -4,125 +4,130 @@
  *
  *   f' = f_x x' + f_y y',   f'' = f_xx x'^2 + 2 f_xy x' y' + f_yy y'^2 + f_x x'' + f_y y''
  *
- * (Griewank & Walther 2008, Evaluating Derivatives, chapter 13).  Derivatives decide comparisons of
- * equal numbers, so that an expression has the value just after a jump. */
+ * where f_x is the partial derivative with respect to operand x, and the prime the derivative with respect to the
+ * chosen variable (Griewank & Walther 2008, Evaluating Derivatives, chapter 13).  Derivatives with respect to the time
+ * decide comparisons of equal numbers, so that an expression has the value just after a jump. */
 #include <math.h>
 #include "expression_parts.h"
 #include "pinwheel.h"
 
 /* ---- Values ---- */
 
-static inline int value_order (double a, double b, int *tie) {
-  if (a == b) *tie = 1;
-  return a < b ? -1 : a > b ? 1 : a == b ? 0 : 2;
+static inline pw_order value_order (double a, double b) {
+  return a < b ? PW_ORDER_LESS : a > b ? PW_ORDER_GREATER : a == b ? PW_ORDER_EQUAL : PW_ORDER_UNORDERED;
 }
 
-static inline double value_jump (int op, double x, int *tie) {
+/* sign, floor, ceil, round */
+static inline double value_step (int op, double x, int *may_jump) {
   double y = op == PW_OP_SIGN    ? (x > 0) - (x < 0)
              : op == PW_OP_FLOOR ? floor (x)
              : op == PW_OP_CEIL  ? ceil (x)
                                  : round (x);
-  if (op == PW_OP_ROUND ? fabs (x - trunc (x)) == 0.5 : op == PW_OP_SIGN ? x == 0 : x == y) *tie = 1;
+  if (op == PW_OP_ROUND ? fabs (x - trunc (x)) == 0.5 : op == PW_OP_SIGN ? x == 0 : x == y) *may_jump = 1;
   return y;
 }
 
-/* The value of an operation of x, or of a and x. */
-static inline double value_of (const pw_expression_code *c, double a, double x, int *tie) {
+/* See pw_expression_apply; sets *may_jump to 1 where the operation may jump. */
+static inline double value_of (const pw_expression_code *c, double left, double right, int *may_jump) {
   switch (c->op) {
   case PW_OP_NEGATE:
-    return -x;
+    return -right;
   case PW_OP_ABS:
-    return fabs (x);
+    return fabs (right);
   case PW_OP_TAN:
-  case PW_OP_ONE:
-    return pw_expression_functions[c->which].one (x);
+  case PW_OP_FUNCTION_OF_ONE:
+    return pw_expression_functions[c->index].of_one (right);
   case PW_OP_ADD:
-    return a + x;
+    return left + right;
   case PW_OP_SUBTRACT:
-    return a - x;
+    return left - right;
   case PW_OP_MULTIPLY:
-    return a * x;
+    return left * right;
   case PW_OP_DIVIDE:
-    if (x == 0) *tie = 1;
-    return a / x;
+    if (right == 0) *may_jump = 1;
+    return left / right;
   case PW_OP_POWER:
-    if (a == 0 && x < 0) *tie = 1;
-    return pw_expression_power (a, x);
+    if (left == 0 && right < 0) *may_jump = 1;
+    return pw_expression_power (left, right);
   case PW_OP_AND:
-    return a != 0 && x != 0;
+    return left != 0 && right != 0;
   case PW_OP_OR:
-    return a != 0 || x != 0;
+    return left != 0 || right != 0;
   case PW_OP_MIN:
-    return fmin (a, x);
+    return fmin (left, right);
   case PW_OP_MAX:
-    return fmax (a, x);
+    return fmax (left, right);
   case PW_OP_MOD:
-    a = pw_expression_mod (a, x);
-    if (a == 0) *tie = 1;
-    return a;
+    left = pw_expression_mod (left, right);
+    if (left == 0) *may_jump = 1;
+    return left;
   case PW_OP_ATAN2:
-    if (a == 0 && x <= 0) *tie = 1;
-    return atan2 (a, x);
-  case PW_OP_TWO:
-    return pw_expression_functions[c->which].two (a, x);
+    if (left == 0 && right <= 0) *may_jump = 1;
+    return atan2 (left, right);
+  case PW_OP_FUNCTION_OF_TWO:
+    return pw_expression_functions[c->index].of_two (left, right);
   }
-  if (pw_expression_operands (c->op) == 1) return value_jump (c->op, x, tie);
-  return pw_expression_compare (c->op, value_order (a, x, tie));
+  if (pw_expression_operands (c->op) == 1) return value_step (c->op, right, may_jump);
+  pw_order order = value_order (left, right);
+  if (order == PW_ORDER_EQUAL) *may_jump = 1;
+  return pw_expression_compare (c->op, order);
 }
 
-double pw_expression_apply (const pw_expression_code *c, double a, double x) {
-  int tie;
-  return value_of (c, a, x, &tie);
+double pw_expression_apply (const pw_expression_code *c, double left, double right) {
+  int may_jump;
+  return value_of (c, left, right, &may_jump);
 }
 
-/* x is the top of the stack. */
-double pw_expression_run (const pw_expression_code *code, int codes, const double *variable, int *tie) {
-  double stack[PW_EXPRESSION_STACK + 1], *top = stack, x = 0;
+/* `last` is the last operand; the stack has those before it. */
+double pw_expression_run (const pw_expression_code *code, int codes, const double *variable, int *may_jump) {
+  double stack[PW_EXPRESSION_STACK + 1], *top = stack, last = 0;
   for (const pw_expression_code *c = code, *end = code + codes; c < end; c++)
     if (c->op <= PW_OP_VARIABLE) {
-      *top++ = x;
-      x = c->op == PW_OP_CONSTANT ? c->value : variable[c->which];
+      *top++ = last;
+      last = c->op == PW_OP_CONSTANT ? c->value : variable[c->index];
     } else if (c->op == PW_OP_SELECT) {
       top -= 2;
-      x = top[0] != 0 ? top[1] : x;
+      last = top[0] != 0 ? top[1] : last;
     } else {
-      double a = c->op >= PW_OP_ADD ? *--top : 0;
-      x = value_of (c, a, x, tie);
+      double left = c->op >= PW_OP_ADD ? *--top : 0;
+      last = value_of (c, left, last, may_jump);
     }
-  return x;
+  return last;
 }
 
 /* ---- Derivatives ---- */
 
 typedef struct {
   double v, d, dd; /* value, first and second derivative with respect to the variable */
-  int on;          /* 1: depends on the variable */
+  int varies;      /* 1: depends on the variable */
 } jet;
 
-/* Operands independent of the variable contribute nothing, even with an infinite derivative. */
+/* The chain rule, with the value f. Independent operands contribute nothing, even where a partial derivative is
+ * infinite. */
 static jet jet_chain (double f, const pw_partials *s, const jet *x, const jet *y) {
-  jet r = { f, 0, 0, x->on | y->on };
-  if (x->on) r.d += s->x * x->d, r.dd += s->xx * x->d * x->d + s->x * x->dd;
-  if (y->on) r.d += s->y * y->d, r.dd += s->yy * y->d * y->d + s->y * y->dd;
-  if (x->on && y->on) r.dd += 2 * s->xy * x->d * y->d;
+  jet r = { f, 0, 0, x->varies | y->varies };
+  if (x->varies) r.d += s->x * x->d, r.dd += s->xx * x->d * x->d + s->x * x->dd;
+  if (y->varies) r.d += s->y * y->d, r.dd += s->yy * y->d * y->d + s->y * y->dd;
+  if (x->varies && y->varies) r.dd += 2 * s->xy * x->d * y->d;
   return r;
 }
 
 /* ---- Derivatives of operations with jumps or kinks ---- */
 
+/* The sign just after the current time: that of the first number that is not 0. */
 static inline int jet_sign (const jet *x) {
   double first = x->v != 0 ? x->v : x->d != 0 ? x->d : x->dd;
   return (first > 0) - (first < 0);
 }
 
 /* The order of two numbers just after the current time. */
-static int jet_order (const jet *x, const jet *y) {
-  if (x->v != y->v) return x->v < y->v ? -1 : x->v > y->v ? 1 : 2;
-  jet less = { 0, x->d - y->d, x->dd - y->dd, 1 };
-  return jet_sign (&less);
+static pw_order jet_order (const jet *x, const jet *y) {
+  if (x->v != y->v) return value_order (x->v, y->v);
+  const jet difference = { 0, x->d - y->d, x->dd - y->dd, 1 };
+  return (pw_order)jet_sign (&difference);
 }
 
-/* floor, ceil, round just after the current time; `direction`: sign of the change. */
+/* floor, ceil, round of x just after the current time; `direction`: sign of the change of x. */
 static double jet_step (int op, double x, int direction) {
   double low = floor (x);
   if (op == PW_OP_FLOOR) return x == low && direction < 0 ? low - 1 : low;
@@ -130,18 +135,20 @@ static double jet_step (int op, double x, int direction) {
   return x - low == 0.5 && direction != 0 ? low + (direction > 0) : round (x);
 }
 
+/* abs, sign, floor, ceil, round. */
 static jet jet_discontinuous (int op, const jet *x, double *discrete) {
-  const jet change = { 0, x->d, x->dd, x->on };
+  const jet change = { 0, x->d, x->dd, x->varies };
   int sign = jet_sign (x);
   *discrete = op == PW_OP_ABS || op == PW_OP_SIGN ? sign : jet_step (op, x->v, jet_sign (&change));
-  return op == PW_OP_ABS ? (jet){ fabs (x->v), sign * x->d, sign * x->dd, x->on } : (jet){ .v = *discrete };
+  return op == PW_OP_ABS ? (jet){ fabs (x->v), sign * x->d, sign * x->dd, x->varies } : (jet){ .v = *discrete };
 }
 
+/* x + factor y */
 static jet jet_plus (const jet *x, double factor, const jet *y) {
-  return (jet){ x->v + factor * y->v, x->d + factor * y->d, x->dd + factor * y->dd, x->on | y->on };
+  return (jet){ x->v + factor * y->v, x->d + factor * y->d, x->dd + factor * y->dd, x->varies | y->varies };
 }
 
-/* x - q y; q is computed from the remainder, so that both jump together. */
+/* x - q y with an integer q, which is computed from the remainder so that both jump together. */
 static jet jet_mod (const jet *x, const jet *y, double *q) {
   double r = pw_expression_mod (x->v, y->v);
   *q = rint ((x->v - r) / y->v);
@@ -155,13 +162,13 @@ static jet jet_mod (const jet *x, const jet *y, double *q) {
 
 /* ---- Operations ---- */
 
-static jet jet_one (const pw_expression_code *c, const jet *x, double *discrete) {
+static jet jet_unary (const pw_expression_code *c, const jet *x, double *discrete) {
   static const jet none = { 0 };
-  if (c->op == PW_OP_NEGATE) return (jet){ -x->v, -x->d, -x->dd, x->on };
-  if (c->op == PW_OP_ONE || c->op == PW_OP_TAN) {
+  if (c->op == PW_OP_NEGATE) return (jet){ -x->v, -x->d, -x->dd, x->varies };
+  if (c->op == PW_OP_FUNCTION_OF_ONE || c->op == PW_OP_TAN) {
     if (c->op == PW_OP_TAN) *discrete = floor (x->v / PW_PI + 0.5);
-    const pw_expression_function *f = &pw_expression_functions[c->which];
-    double value = f->one (x->v);
+    const pw_expression_function *f = &pw_expression_functions[c->index];
+    double value = f->of_one (x->v);
     pw_partials s = f->partials (x->v, 0, value);
     return jet_chain (value, &s, x, &none);
   }
@@ -169,25 +176,26 @@ static jet jet_one (const pw_expression_code *c, const jet *x, double *discrete)
 }
 
 static jet jet_product (const jet *x, const jet *y) {
-  return (jet){ x->v * y->v, y->v * x->d + x->v * y->d, y->v * x->dd + 2 * x->d * y->d + x->v * y->dd, x->on | y->on };
+  return (jet){ x->v * y->v, y->v * x->d + x->v * y->d, y->v * x->dd + 2 * x->d * y->d + x->v * y->dd,
+                x->varies | y->varies };
 }
 
 static jet jet_quotient (const jet *x, const jet *y) {
   double f = x->v / y->v, d = (x->d - f * y->d) / y->v;
-  return (jet){ f, d, (x->dd - 2 * d * y->d - f * y->dd) / y->v, x->on | y->on };
+  return (jet){ f, d, (x->dd - 2 * d * y->d - f * y->dd) / y->v, x->varies | y->varies };
 }
 
 /* A power or a function of two arguments. */
 static jet jet_function (const pw_expression_code *c, const jet *x, const jet *y) {
-  const pw_expression_function *f = &pw_expression_functions[c->which];
+  const pw_expression_function *f = &pw_expression_functions[c->index];
   int power = c->op == PW_OP_POWER;
-  double value = power ? pw_expression_power (x->v, y->v) : f->two (x->v, y->v);
-  pw_partials s = power ? pw_expression_power_partials (x->v, y->v, value, y->on) : f->partials (x->v, y->v, value);
+  double value = power ? pw_expression_power (x->v, y->v) : f->of_two (x->v, y->v);
+  pw_partials s = power ? pw_expression_power_partials (x->v, y->v, value, y->varies) : f->partials (x->v, y->v, value);
   return jet_chain (value, &s, x, y);
 }
 
-/* Jumps where y, the first argument, changes sign at x <= 0, and where x does while y is 0.  At the origin the angle just
- * after is that of the velocity. */
+/* Jumps where y, the first argument, changes sign at x <= 0, and where x does while y is 0.  At the origin the angle
+ * just after is that of the velocity. */
 static jet jet_atan2 (const pw_expression_code *c, const jet *y, const jet *x, double *discrete) {
   jet r = jet_function (c, y, x);
   int sign = jet_sign (y);
@@ -197,8 +205,10 @@ static jet jet_atan2 (const pw_expression_code *c, const jet *y, const jet *x, d
   return r;
 }
 
-static jet jet_two (const pw_expression_code *c, const jet *x, const jet *y, double *discrete) {
-  jet after = c->op == PW_OP_DIVIDE ? *y : *x; /* with the sign of a 0 just after the current time, for poles */
+/* Not && and ||, whose operands are 1 or 0 and have no derivatives. */
+static jet jet_binary (const pw_expression_code *c, const jet *x, const jet *y, double *discrete) {
+  /* At a pole, the denominator or base 0 has the sign of its value just after the current time. */
+  jet after = c->op == PW_OP_DIVIDE ? *y : *x;
   if (after.v == 0) after.v = copysign (0, jet_sign (&after));
   switch (c->op) {
   case PW_OP_ADD:
@@ -213,21 +223,18 @@ static jet jet_two (const pw_expression_code *c, const jet *x, const jet *y, dou
   case PW_OP_POWER:
     *discrete = y->v < 0 && fabs (fmod (y->v, 2)) == 1 ? jet_sign (x) : 0;
     return jet_function (c, &after, y);
-  case PW_OP_TWO:
+  case PW_OP_FUNCTION_OF_TWO:
     return jet_function (c, x, y);
   case PW_OP_ATAN2:
     return jet_atan2 (c, x, y, discrete);
   case PW_OP_MOD:
     return jet_mod (x, y, discrete);
-  case PW_OP_AND:
-    return (jet){ .v = x->v != 0 && y->v != 0 };
-  case PW_OP_OR:
-    return (jet){ .v = x->v != 0 || y->v != 0 };
   }
-  int order = jet_order (x, y);
+  pw_order order = jet_order (x, y);
   *discrete = order;
   if (c->op == PW_OP_MIN || c->op == PW_OP_MAX) {
-    int first = order == 2 ? !isnan (x->v) : c->op == PW_OP_MIN ? order < 0 : order > 0;
+    pw_order of_result = c->op == PW_OP_MIN ? PW_ORDER_LESS : PW_ORDER_GREATER;
+    int first = order == PW_ORDER_UNORDERED ? !isnan (x->v) : order == of_result;
     return first ? *x : *y;
   }
   *discrete = pw_expression_compare (c->op, order);
@@ -243,27 +250,27 @@ void pw_expression_run_jet (const pw_expression_code *code, int codes, const dou
     top -= operands;
     if (operands == 0)
       *top = c->op == PW_OP_CONSTANT ? (jet){ .v = c->value }
-                                     : (jet){ variable[c->which], c->which == by, 0, c->which == by };
+                                     : (jet){ variable[c->index], c->index == by, 0, c->index == by };
     else if (operands == 3)
       *top = top[0].v != 0 ? top[1] : top[2];
-    else if (!top[0].on && !top[operands - 1].on)
+    else if (!top[0].varies && !top[operands - 1].varies)
       *top = (jet){ .v = pw_expression_apply (c, top[0].v, top[operands - 1].v) };
     else
-      *top = operands == 1 ? jet_one (c, top, &change) : jet_two (c, top, top + 1, &change);
+      *top = operands == 1 ? jet_unary (c, top, &change) : jet_binary (c, top, top + 1, &change);
     if (discrete) discrete[c - code] = change;
     top++;
   }
   u[0] = top[-1].v, u[1] = top[-1].d, u[2] = top[-1].dd;
 }
 
-void pw_expression_derivatives (const pw_expression *x, const double *variable, int by, double u[3]) {
-  pw_expression_run_jet (x->code, x->codes, variable, by, u, NULL);
+void pw_expression_derivatives (const pw_expression *expression, const double *variable, int by, double u[3]) {
+  pw_expression_run_jet (expression->code, expression->codes, variable, by, u, NULL);
 }
 
-double pw_expression_value (const pw_expression *x, const double *variable) {
-  int tie = 0;
-  double u[3], value = pw_expression_run (x->code, x->codes, variable, &tie);
-  if (!tie || !x->breaks) return value;
-  pw_expression_run_jet (x->code, x->codes, variable, 0, u, NULL);
+double pw_expression_value (const pw_expression *expression, const double *variable) {
+  int may_jump = 0;
+  double u[3], value = pw_expression_run (expression->code, expression->codes, variable, &may_jump);
+  if (!may_jump || !expression->breaks) return value;
+  pw_expression_run_jet (expression->code, expression->codes, variable, PW_EXPRESSION_TIME, u, NULL);
   return u[0];
 }

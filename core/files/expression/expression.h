@@ -5,8 +5,8 @@
  *               min max jacobi_am (u, m), elliptic_K (m)
  *   constants   pi, e, deg = pi / 180
  *
- * A scope defines the named numbers.  The first variable is the time.  Expressions are immutable: any number of threads
- * may evaluate them. */
+ * A scope defines the named numbers.  The first variable is the time, except in formulas.  Expressions are immutable:
+ * any number of threads may evaluate them. */
 #ifndef PW_EXPRESSION_H
 #define PW_EXPRESSION_H
 
@@ -19,6 +19,9 @@ typedef struct {
   char text[240];
 } pw_expression_error;
 
+/* The time among the variables. */
+enum { PW_EXPRESSION_TIME = 0 };
+
 /* ---- Reading ---- */
 
 /* Named numbers. */
@@ -26,7 +29,7 @@ typedef struct {
   int names;
   const char **name; /* names */
   double *value;     /* names */
-  pw_names index;    /* of each name */
+  pw_names index;    /* the index of each name */
 } pw_scope;
 
 /* Opens a scope with room for `room` names, in an arena.  PW_OK or PW_RESOURCE. */
@@ -36,29 +39,29 @@ void pw_scope_close (pw_scope *s); /* names and numbers stay in the arena */
 /* Adds a name, of which the scope keeps a pointer. */
 void pw_scope_add (pw_scope *s, const char *name, double value);
 
-/* One operation of an expression; its operands are on a stack. */
+/* One operation of an expression; it replaces its operands, the last ones on a stack, by its value. */
 typedef struct {
-  short op;    /* pw_expression_op */
-  short which; /* index of the variable or function */
-  double value;
+  short op;     /* pw_expression_op */
+  short index;  /* of the variable or function */
+  double value; /* of a constant */
 } pw_expression_code;
 
 /* An expression: its syntax tree in postfix order. */
 typedef struct {
-  int codes;
+  int codes;        /* operations */
   int breaks;       /* 1: may have jumps or kinks in time */
-  const char *jump; /* part of the text that may jump as states change, or NULL */
+  const char *jump; /* part of the text that may jump as states change, of jump_size bytes, or NULL */
   int jump_size;
   pw_expression_code code[];
 } pw_expression;
 
-/* Size of an expression in bytes; it may be copied. */
-size_t pw_expression_size (const pw_expression *x);
+/* Size of an expression in bytes, by which it may be copied. */
+size_t pw_expression_size (const pw_expression *expression);
 
-/* Reads an expression over a scope and variables, an array of names that ends with NULL, into an arena.  PW_INPUT with the
- * error; PW_RESOURCE. */
+/* Reads an expression of a scope and variables, names ending with NULL, into an arena.  PW_INPUT, with the error;
+ * PW_RESOURCE. */
 int pw_expression_read (const pw_scope *s, const char *const *variable, const char *text, pw_arena *arena,
-                        const pw_expression **x, pw_expression_error *error);
+                        const pw_expression **expression, pw_expression_error *error);
 
 /* The value of an expression without variables, which may be non-finite; the scope may be NULL.  Errors as above. */
 int pw_expression_constant (const pw_scope *s, const char *text, double *value, pw_expression_error *error);
@@ -66,14 +69,14 @@ int pw_expression_constant (const pw_scope *s, const char *text, double *value, 
 /* ---- Values ---- */
 
 /* The value, which may be non-finite; at a jump in time, that just after it. */
-double pw_expression_value (const pw_expression *x, const double *variable);
+double pw_expression_value (const pw_expression *expression, const double *variable);
 
-/* The value and its first two derivatives with respect to one variable; at a jump, those just after it. */
-void pw_expression_derivatives (const pw_expression *x, const double *variable, int by, double u[3]);
+/* The value and its first two derivatives with respect to variable `by`; at a jump, those just after it. */
+void pw_expression_derivatives (const pw_expression *expression, const double *variable, int by, double u[3]);
 
 /* The first time after t at which the value, or a time derivative, may jump for any values of the other variables;
  * or INFINITY.  Jumps whose times depend on other variables are not found. */
-double pw_expression_breakpoint (const pw_expression *x, double t);
+double pw_expression_breakpoint (const pw_expression *expression, double t);
 
 /* ---- Words ---- */
 
@@ -82,8 +85,8 @@ int pw_expression_is_name (const char *text);
 /* Whether a function or constant has this name. */
 int pw_expression_is_reserved (const char *text);
 
-/* Copies the next name in an expression, of functions and constants too, to the buffer, cut to its size; *rest moves
- * behind it.  Returns its position, or NULL after the last name. */
+/* Copies the next name in the text of an expression, also that of a function or constant, to the buffer, cut to its
+ * size, and moves *rest after it.  Returns its position, or NULL after the last name. */
 enum { PW_EXPRESSION_NAME = 100 };
 const char *pw_expression_next_name (const char **rest, char name[PW_EXPRESSION_NAME]);
 

@@ -1,4 +1,4 @@
-/* Internal interface of the files of expressions. */
+/* The operations and functions of expressions: interface between the files of this folder. */
 #ifndef PW_EXPRESSION_PARTS_H
 #define PW_EXPRESSION_PARTS_H
 
@@ -7,7 +7,7 @@
 /* Limits: depth of the stack, variables, operations. */
 enum { PW_EXPRESSION_STACK = 1000, PW_EXPRESSION_VARIABLES = 32, PW_EXPRESSION_CODES = 8000 };
 
-/* Ordered by the number of operands: 0, 1, 2, 3. */
+/* Operations, ordered by their number of operands: 0, 1, 2, 3.  The functions below depend on the order, too. */
 typedef enum {
   PW_OP_CONSTANT,
   PW_OP_VARIABLE,
@@ -18,7 +18,7 @@ typedef enum {
   PW_OP_CEIL,
   PW_OP_ROUND,
   PW_OP_TAN,
-  PW_OP_ONE, /* a smooth function */
+  PW_OP_FUNCTION_OF_ONE, /* a smooth function of one argument */
   PW_OP_ADD,
   PW_OP_SUBTRACT,
   PW_OP_MULTIPLY,
@@ -36,35 +36,40 @@ typedef enum {
   PW_OP_MIN,
   PW_OP_MAX,
   PW_OP_ATAN2,
-  PW_OP_TWO,   /* a smooth function */
-  PW_OP_SELECT /* condition is 1 or 0 */
+  PW_OP_FUNCTION_OF_TWO, /* a smooth function of two arguments */
+  PW_OP_SELECT           /* condition is 1 or 0 */
 } pw_expression_op;
 
 static inline int pw_expression_operands (int op) {
   return op >= PW_OP_SELECT ? 3 : op >= PW_OP_ADD ? 2 : op >= PW_OP_NEGATE ? 1 : 0;
 }
 
-/* Operations with jumps between finite values; others jump at poles, or only have kinks. */
+/* Whether an operation has jumps between finite values. */
 static inline int pw_expression_jumps (int op) {
   return (op >= PW_OP_SIGN && op <= PW_OP_ROUND) || (op >= PW_OP_LESS && op <= PW_OP_UNEQUAL) || op == PW_OP_MOD ||
          op == PW_OP_ATAN2;
 }
+
+/* Whether it has jumps, poles or kinks. */
 static inline int pw_expression_breaks (int op) {
   return pw_expression_jumps (op) || op == PW_OP_ABS || op == PW_OP_MIN || op == PW_OP_MAX || op == PW_OP_TAN ||
          op == PW_OP_DIVIDE || op == PW_OP_POWER;
 }
 
-/* The value of a comparison of two numbers whose order is -1, 0 or 1; 2: one of them is NaN. */
-static inline int pw_expression_compare (int op, int order) {
-  int equal = order == 0 && (op == PW_OP_LESS_EQUAL || op == PW_OP_GREATER_EQUAL || op == PW_OP_EQUAL);
-  int less = order == -1 && (op == PW_OP_LESS || op == PW_OP_LESS_EQUAL);
-  int greater = order == 1 && (op == PW_OP_GREATER || op == PW_OP_GREATER_EQUAL);
-  return equal || less || greater || (order != 0 && op == PW_OP_UNEQUAL);
+/* The order of two numbers; UNORDERED: one of them is NaN. */
+typedef enum { PW_ORDER_LESS = -1, PW_ORDER_EQUAL, PW_ORDER_GREATER, PW_ORDER_UNORDERED } pw_order;
+
+/* The value of a comparison, 1 or 0, of two numbers in this order. */
+static inline int pw_expression_compare (int op, pw_order order) {
+  int equal = order == PW_ORDER_EQUAL && (op == PW_OP_LESS_EQUAL || op == PW_OP_GREATER_EQUAL || op == PW_OP_EQUAL);
+  int less = order == PW_ORDER_LESS && (op == PW_OP_LESS || op == PW_OP_LESS_EQUAL);
+  int greater = order == PW_ORDER_GREATER && (op == PW_OP_GREATER || op == PW_OP_GREATER_EQUAL);
+  return equal || less || greater || (order != PW_ORDER_EQUAL && op == PW_OP_UNEQUAL);
 }
 
 /* ---- Functions (functions.c) ---- */
 
-/* First and second partial derivatives of f (x, y). */
+/* First and second partial derivatives of a function f (x, y), or of f (x). */
 typedef struct {
   double x, y, xx, xy, yy;
 } pw_partials;
@@ -74,10 +79,10 @@ typedef enum { PW_INCREASING, PW_DECREASING, PW_NOT_MONOTONIC } pw_trend;
 
 typedef struct {
   const char *name;
-  short op;          /* PW_OP_ONE, PW_OP_TWO, or a separate operation */
+  short op;          /* PW_OP_FUNCTION_OF_ONE, PW_OP_FUNCTION_OF_TWO, or an operation of its own */
   short least, most; /* arguments; most = 0: any number */
-  double (*one) (double);
-  double (*two) (double, double);
+  double (*of_one) (double);
+  double (*of_two) (double, double);
   pw_partials (*partials) (double x, double y, double f);
   pw_trend trend;
   double from, to; /* domain of a function of one argument, NaN outside */
@@ -92,8 +97,9 @@ typedef struct {
 extern const pw_expression_function pw_expression_functions[];
 extern const pw_expression_constant_name pw_expression_constants[];
 
-/* The index of a function, or -1; a constant, or NULL. */
-int pw_expression_find (const char *name);
+/* The index of a function, or -1. */
+int pw_expression_find_function (const char *name);
+/* A constant, or NULL. */
 const pw_expression_constant_name *pw_expression_find_constant (const char *name);
 
 /* The length of the name at p, which may contain dots (frame.phi), or of the number: digits, perhaps with a decimal
@@ -101,22 +107,22 @@ const pw_expression_constant_name *pw_expression_find_constant (const char *name
 size_t pw_expression_name_size (const char *p);
 size_t pw_expression_number_size (const char *p);
 
-/* x^y and its derivatives, with respect to x alone unless y varies. */
+/* x^y and its derivatives, with respect to x alone unless the exponent y varies. */
 double pw_expression_power (double x, double y);
-pw_partials pw_expression_power_partials (double x, double y, double f, int varies);
+pw_partials pw_expression_power_partials (double x, double y, double f, int exponent_varies);
 /* The remainder with the sign of the divisor: an angle modulo 2 pi lies in [0, 2 pi). */
 double pw_expression_mod (double x, double y);
 
 /* ---- Evaluation ---- */
 
-/* The value of operations; *tie becomes 1 where one of them may jump: at equal numbers, at poles. */
-double pw_expression_run (const pw_expression_code *code, int codes, const double *variable, int *tie);
+/* The value of operations; *may_jump becomes 1 where one of them may jump: at equal numbers, at poles. */
+double pw_expression_run (const pw_expression_code *code, int codes, const double *variable, int *may_jump);
 
-/* The value of an operation of x, or of a and x. */
-double pw_expression_apply (const pw_expression_code *c, double a, double x);
+/* The value of an operation of `right` alone or of `left` and `right`. */
+double pw_expression_apply (const pw_expression_code *c, double left, double right);
 
-/* The value and derivatives.  discrete[codes], unless NULL, receives the part of each operation that changes only at
- * breakpoints. */
+/* The value, first and second derivative with respect to variable `by`.  discrete, unless NULL, receives for each
+ * operation the part of its value that changes only at breakpoints: of floor the value, of abs the sign. */
 void pw_expression_run_jet (const pw_expression_code *code, int codes, const double *variable, int by, double u[3],
                             double *discrete);
 
@@ -125,12 +131,12 @@ void pw_expression_run_jet (const pw_expression_code *code, int codes, const dou
 /* Enclosure of a value over an interval of time. */
 typedef struct {
   double lo, hi; /* of the numbers among the values; lo > hi: all are NaN */
-  int breaks;    /* 1: may break (jump or have a kink) at a time independent of states */
-  int states;    /* 1: the time of a break may depend on states */
+  int breaks;    /* 1: may break, that is jump or have a kink, at a time independent of states */
+  int of_states; /* 1: depends on states, and so may the times of its breaks */
   int nan;       /* 1: the value may be NaN */
 } pw_range;
 
-/* The range over a time interval, ignoring breaks of noisy operations (one flag each). */
-pw_range pw_expression_range (const pw_expression *x, const unsigned char *noisy, double lo, double hi);
+/* The range over a time interval, ignoring breaks of operations that are marked as noisy. */
+pw_range pw_expression_range (const pw_expression *expression, const unsigned char *noisy, double lo, double hi);
 
 #endif

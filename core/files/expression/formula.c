@@ -25,8 +25,8 @@ pw_formula *pw_formula_open (const char *text, const char *const *names, pw_erro
 }
 
 double pw_formula_value (const pw_formula *f, const double *value) {
-  int tie; /* no name is the time: the value at a jump, not after it */
-  return pw_expression_run (f->expression->code, f->expression->codes, value, &tie);
+  int may_jump; /* no name is the time: the value at a jump, not after it */
+  return pw_expression_run (f->expression->code, f->expression->codes, value, &may_jump);
 }
 
 double pw_formula_derivative (const pw_formula *f, const double *value, int by) {

@@ -1,35 +1,35 @@
-/* Functions and constants of expressions, with derivatives of the smooth functions
+/* Functions and constants of expressions, with first and second derivatives of the smooth functions
  * (Abramowitz & Stegun 1964, chapters 4 and 17). */
 #include <string.h>
 #include "elliptic.h"
 #include "expression_parts.h"
 #include "pinwheel.h"
 
-/* ---- Functions of one argument: f', f'' ---- */
+/* ---- Functions f of one argument x: f', f'' ---- */
 
 static pw_partials partials_of_one (double first, double second) {
   return (pw_partials){ .x = first, .xx = second };
 }
 
-#define ONE(name, first, second)                                      \
+#define PARTIALS_OF_ONE(name, first, second)                          \
   static pw_partials partials_##name (double x, double y, double f) { \
     (void)x, (void)y, (void)f;                                        \
     return partials_of_one (first, second);                           \
   }
 
-ONE (sin, pw_cos (x), -f)
-ONE (cos, -pw_sin (x), -f)
-ONE (tan, 1 + f * f, 2 * f * (1 + f * f))
-ONE (asin, 1 / sqrt ((1 - x) * (1 + x)), x / ((1 - x) * (1 + x) * sqrt ((1 - x) * (1 + x))))
-ONE (acos, -1 / sqrt ((1 - x) * (1 + x)), -x / ((1 - x) * (1 + x) * sqrt ((1 - x) * (1 + x))))
-ONE (atan, 1 / (1 + x * x), -2 * x / ((1 + x * x) * (1 + x * x)))
-ONE (sinh, cosh (x), f)
-ONE (cosh, sinh (x), f)
-ONE (tanh, 1 / (cosh (x) * cosh (x)), -2 * f / (cosh (x) * cosh (x)))
-ONE (exp, f, f)
-ONE (log, 1 / x, -1 / (x * x))
-ONE (log10, 1 / (x * log (10)), -1 / (x * x * log (10)))
-ONE (sqrt, 0.5 / f, -0.25 / (f * x))
+PARTIALS_OF_ONE (sin, pw_cos (x), -f)
+PARTIALS_OF_ONE (cos, -pw_sin (x), -f)
+PARTIALS_OF_ONE (tan, 1 + f * f, 2 * f * (1 + f * f))
+PARTIALS_OF_ONE (asin, 1 / sqrt ((1 - x) * (1 + x)), x / ((1 - x) * (1 + x) * sqrt ((1 - x) * (1 + x))))
+PARTIALS_OF_ONE (acos, -1 / sqrt ((1 - x) * (1 + x)), -x / ((1 - x) * (1 + x) * sqrt ((1 - x) * (1 + x))))
+PARTIALS_OF_ONE (atan, 1 / (1 + x * x), -2 * x / ((1 + x * x) * (1 + x * x)))
+PARTIALS_OF_ONE (sinh, cosh (x), f)
+PARTIALS_OF_ONE (cosh, sinh (x), f)
+PARTIALS_OF_ONE (tanh, 1 / (cosh (x) * cosh (x)), -2 * f / (cosh (x) * cosh (x)))
+PARTIALS_OF_ONE (exp, f, f)
+PARTIALS_OF_ONE (log, 1 / x, -1 / (x * x))
+PARTIALS_OF_ONE (log10, 1 / (x * log (10)), -1 / (x * x * log (10)))
+PARTIALS_OF_ONE (sqrt, 0.5 / f, -0.25 / (f * x))
 
 /* ---- Functions of two arguments ---- */
 
@@ -53,14 +53,14 @@ static double partials_product (double a, double b) {
   return a == 0 ? 0 : a * b;
 }
 
-pw_partials pw_expression_power_partials (double x, double y, double f, int varies) {
+pw_partials pw_expression_power_partials (double x, double y, double f, int exponent_varies) {
   pw_partials s = { .x = partials_product (y, pw_expression_power (x, y - 1)),
                     .xx = partials_product (y * (y - 1), pw_expression_power (x, y - 2)) };
-  if (!varies) return s;
-  double l = log (x);
-  s.y = partials_product (f, l);
-  s.xy = partials_product (s.x, l) + pow (x, y - 1);
-  s.yy = partials_product (f, l * l);
+  if (!exponent_varies) return s;
+  double log_x = log (x);
+  s.y = partials_product (f, log_x);
+  s.xy = partials_product (s.x, log_x) + pow (x, y - 1);
+  s.yy = partials_product (f, log_x * log_x);
   return s;
 }
 
@@ -71,65 +71,72 @@ double pw_expression_mod (double x, double y) {
 
 /* ---- Elliptic functions ----
  *
- * With the arithmetic-geometric mean a, b, c of core/base/elliptic.h, the angles phi_n of am (elliptic.c), and R = sum of
- * 2^(n-1) c_n^2 / m from n = 1,
+ * With the arithmetic-geometric mean a, b, c of core/base/elliptic.h, the angles phi_n of am (elliptic.c), the
+ * incomplete elliptic integral E of the second kind, s and c the sine and cosine of am, dn = sqrt (1 - m s^2), and R =
+ * sum of 2^(n-1) c_n^2 / m from n = 1,
  *
  *   dK/dm = K (1/2 - R) / (2 (1 - m)),   m (1 - m) d2K/dm2 = K / 4 - (1 - 2 m) dK/dm
- *   N = (E (phi) - (1 - m) u) / m = u (1/2 - R) + sum of c_n / m sin phi_n
- *   d am/du = dn,   d am/dm = -dn (N - sin cos / dn) / (2 (1 - m))
- *   dN/dm = (dn d am/dm + u/2 - N/2) / m        with constant u */
+ *   N = (E (am | m) - (1 - m) u) / m = u (1/2 - R) + sum of c_n / m sin phi_n
+ *   d am/du = dn,   d am/dm = -dn F,   F = (N - s c / dn) / (2 (1 - m))
+ *   dN/dm = (dn d am/dm + u/2 - N/2) / m        with constant u
+ *
+ * In the code, NAME_m is the derivative of NAME with respect to m, and m1 = 1 - m. */
 
-static double partials_R (double m, int steps, const double part[PW_ELLIPTIC_STEPS]) {
+static double partials_R (double m, int steps, const double c_by_m[PW_ELLIPTIC_STEPS]) {
   double R = 0;
-  for (int n = 0; n < steps; n++) R += ldexp (m * part[n] * part[n], n);
+  for (int n = 0; n < steps; n++) R += ldexp (m * c_by_m[n] * c_by_m[n], n);
   return R;
 }
 
-/* The second derivative of K by its series, for small m, where the formula above cancels. */
+#define SERIES_LIMIT 0.2 /* |m| below which the formula of d2K/dm2 cancels, and 40 terms of its series suffice */
+
+/* d2K/dm2 from K = pi/2 sum of (1 3 ... (2 n - 1) / (2 4 ... 2 n))^2 m^n. */
 static double partials_K_series (double m) {
-  double term = 1, sum = 0, power = 1;
+  double coefficient = 1, sum = 0, power = 1;
   for (int n = 1; n < 40; n++) {
-    double k = (2.0 * n - 1) / (2.0 * n);
-    term *= k * k;
-    if (n >= 2) sum += n * (n - 1) * term * power, power *= m;
+    double quotient = (2.0 * n - 1) / (2.0 * n);
+    coefficient *= quotient * quotient;
+    if (n >= 2) sum += n * (n - 1) * coefficient * power, power *= m;
   }
   return PW_PI / 2 * sum;
 }
 
 static pw_partials partials_elliptic_K (double m, double y, double K) {
-  double a, ratio[PW_ELLIPTIC_STEPS], part[PW_ELLIPTIC_STEPS];
+  double a, c_by_a[PW_ELLIPTIC_STEPS], c_by_m[PW_ELLIPTIC_STEPS];
   (void)y;
-  int n = pw_elliptic_mean (m, &a, ratio, part);
-  double first = K * (0.5 - partials_R (m, n, part)) / (2 * (1 - m));
-  return partials_of_one (first,
-                          fabs (m) < 0.2 ? partials_K_series (m) : (K / 4 - (1 - 2 * m) * first) / (m * (1 - m)));
+  int n = pw_elliptic_mean (m, &a, c_by_a, c_by_m);
+  double first = K * (0.5 - partials_R (m, n, c_by_m)) / (2 * (1 - m));
+  double formula = (K / 4 - (1 - 2 * m) * first) / (m * (1 - m));
+  return partials_of_one (first, fabs (m) < SERIES_LIMIT ? partials_K_series (m) : formula);
 }
 
 static pw_partials partials_jacobi_am (double u, double m, double phi) {
-  double a, ratio[PW_ELLIPTIC_STEPS], part[PW_ELLIPTIC_STEPS];
+  double a, c_by_a[PW_ELLIPTIC_STEPS], c_by_m[PW_ELLIPTIC_STEPS];
   double s = pw_sin (phi), c = pw_cos (phi), dn = sqrt (1 - m * s * s);
-  int n = pw_elliptic_mean (m, &a, ratio, part);
-  double N = u * (0.5 - partials_R (m, n, part)), angle = ldexp (a * u, n), rest = 1 - m;
+  int n = pw_elliptic_mean (m, &a, c_by_a, c_by_m);
+  double N = u * (0.5 - partials_R (m, n, c_by_m)), angle = ldexp (a * u, n), m1 = 1 - m;
   for (; n > 0; n--) {
-    N += part[n - 1] * pw_sin (angle);
-    angle = (angle + asin (ratio[n - 1] * pw_sin (angle))) / 2;
+    N += c_by_m[n - 1] * pw_sin (angle);
+    angle = (angle + asin (c_by_a[n - 1] * pw_sin (angle))) / 2;
   }
-  double F = N / (2 * rest) - s * c / (2 * rest * dn), by_m = -dn * F;
-  double dn_m = -(s * s + 2 * m * s * c * by_m) / (2 * dn), N_m = (dn * by_m + u / 2 - N / 2) / m;
-  double sc_m = ((c * c - s * s) * by_m - s * c * dn_m / dn) / dn;
-  double F_m = (N_m - sc_m) / (2 * rest) + F / rest;
-  pw_partials r = { dn, by_m, -m * s * c, dn_m, -(dn_m * F + dn * F_m) };
-  if (fabs (m) < 1e-5) /* dN/dm cancels: the error would be 1e-15 / m, that of the difference is 1e-9 */
-    r.yy = (partials_jacobi_am (u, m + 1e-4, pw_jacobi_am (u, m + 1e-4)).y -
-            partials_jacobi_am (u, m - 1e-4, pw_jacobi_am (u, m - 1e-4)).y) /
-           2e-4;
+  double F = N / (2 * m1) - s * c / (2 * m1 * dn), am_m = -dn * F;
+  double dn_m = -(s * s + 2 * m * s * c * am_m) / (2 * dn), N_m = (dn * am_m + u / 2 - N / 2) / m;
+  double sc_m = ((c * c - s * s) * am_m - s * c * dn_m / dn) / dn;
+  double F_m = (N_m - sc_m) / (2 * m1) + F / m1;
+  pw_partials r = { dn, am_m, -m * s * c, dn_m, -(dn_m * F + dn * F_m) };
+  if (fabs (m) >= 1e-5) return r;
+  const double h = 1e-4; /* N_m cancels: its error would be 1e-15 / m, that of this difference is 1e-9 */
+  r.yy = (partials_jacobi_am (u, m + h, pw_jacobi_am (u, m + h)).y -
+          partials_jacobi_am (u, m - h, pw_jacobi_am (u, m - h)).y) /
+         (2 * h);
   return r;
 }
 
 /* ---- List of functions and constants ---- */
 
+/* The entries are pw_expression_function. */
 #define FUNCTION_OF_ONE(name, f, trend, from, to) \
-  { #name, PW_OP_ONE, 1, 1, f, NULL, partials_##name, trend, from, to }
+  { #name, PW_OP_FUNCTION_OF_ONE, 1, 1, f, NULL, partials_##name, trend, from, to }
 #define FUNCTION_OF_TWO(name, op, f) \
   { #name, op, 2, 2, NULL, f, partials_##name, PW_NOT_MONOTONIC, 0, 0 }
 #define FUNCTION_WITH_BREAKPOINTS(name, op, least, most) \
@@ -155,8 +162,8 @@ const pw_expression_function pw_expression_functions[] = {
   FUNCTION_WITH_BREAKPOINTS (round, PW_OP_ROUND, 1, 1),
   FUNCTION_WITH_BREAKPOINTS (sign, PW_OP_SIGN, 1, 1),
   FUNCTION_OF_TWO (atan2, PW_OP_ATAN2, atan2),
-  FUNCTION_OF_TWO (hypot, PW_OP_TWO, hypot),
-  FUNCTION_OF_TWO (jacobi_am, PW_OP_TWO, pw_jacobi_am),
+  FUNCTION_OF_TWO (hypot, PW_OP_FUNCTION_OF_TWO, hypot),
+  FUNCTION_OF_TWO (jacobi_am, PW_OP_FUNCTION_OF_TWO, pw_jacobi_am),
   FUNCTION_OF_ONE (elliptic_K, pw_elliptic_K, PW_INCREASING, -INFINITY, 1),
   FUNCTION_WITH_BREAKPOINTS (mod, PW_OP_MOD, 2, 2),
   FUNCTION_WITH_BREAKPOINTS (min, PW_OP_MIN, 1, 0),
@@ -168,7 +175,7 @@ const pw_expression_constant_name pw_expression_constants[] = {
   { "pi", PW_PI }, { "e", 2.71828182845904523536 }, { "deg", PW_PI / 180 }, { .name = NULL }
 };
 
-int pw_expression_find (const char *name) {
+int pw_expression_find_function (const char *name) {
   int i = 0;
   while (pw_expression_functions[i].name && strcmp (pw_expression_functions[i].name, name) != 0) i++;
   return pw_expression_functions[i].name ? i : -1;

@@ -1,4 +1,5 @@
-/* Recursive-descent parser; converts an expression to operations in postfix order:
+/* Recursive-descent parser: converts the text of an expression to operations in postfix order.  { } repeats, [ ] is
+ * optional:
  *
  *   choice   = binary [? choice : choice]
  *   binary   = unary {operator unary}           by precedence, left-associative
@@ -14,7 +15,9 @@
 #include "pinwheel-files.h"
 
 enum { PARSER_MAX_LENGTH = 4000, PARSER_MAX_DEPTH = 200 };
-enum { ON_TIME = 1, ON_STATES = 2 };
+
+/* What the value of a part depends on; variables other than the time are states. */
+enum { DEPENDS_ON_TIME = 1, DEPENDS_ON_STATES = 2 };
 
 /* ---- Tokens ---- */
 
@@ -23,7 +26,7 @@ typedef struct {
   short op, precedence;
 } parser_operator;
 
-/* Longer ones first; precedence 1 binds least. */
+/* An operator that begins with another one comes before it; precedence 1 binds least. */
 static const parser_operator parser_operators[] = {
   { "||", PW_OP_OR, 1 },    { "&&", PW_OP_AND, 2 },     { "<=", PW_OP_LESS_EQUAL, 3 }, { ">=", PW_OP_GREATER_EQUAL, 3 },
   { "==", PW_OP_EQUAL, 3 }, { "!=", PW_OP_UNEQUAL, 3 }, { "<", PW_OP_LESS, 3 },        { ">", PW_OP_GREATER, 3 },
@@ -35,14 +38,14 @@ typedef struct {
   const pw_scope *scope;
   const char *const *variable;
   const char *text;
-  size_t at, size;             /* current token */
-  size_t before;               /* start of the previous token */
-  size_t end;                  /* end of the previous token */
-  char type;                   /* 'n' name, '0' number, 'o' operator, 0 the end; or ( ) , ? : itself */
-  const parser_operator *sign; /* of type 'o' */
-  int depth, stacked;          /* depth of the recursion, of the stack */
-  int status;
+  size_t at, size;               /* of the current token */
+  size_t previous, previous_end; /* start and end of the token before it */
+  char type;                     /* 'n' name, '0' number, 'o' operator, 0 the end; or ( ) , ? : itself */
+  const parser_operator *symbol; /* of a token of type 'o'; else NULL */
+  int depth, stacked;            /* of the recursion; operands on the stack */
+  int status;                    /* PW_OK until the first error */
   pw_expression_error *error;
+  /* of the pw_expression being made */
   int breaks;
   const char *jump;
   int jump_size;
@@ -50,15 +53,17 @@ typedef struct {
   pw_expression_code code[PW_EXPRESSION_CODES];
 } parser;
 
-/* A parsed part: offset in the text, first operation, dependencies, whether its value is 1 or 0. */
+/* A parsed part of the expression. */
 typedef struct {
-  size_t from;
-  int first, depends, condition;
+  size_t from;   /* offset in the text */
+  int first;     /* its first operation; the last one is that of the parser */
+  int depends;   /* DEPENDS_ON_TIME | DEPENDS_ON_STATES */
+  int condition; /* 1: its value is 1 or 0 */
 } parser_part;
 
 static const parser_part parser_nothing = { 0 };
 
-/* Only the first error is kept. */
+/* Records an error at an offset, unless there is one already.  Returns an empty part for the caller to return. */
 PW_PRINTF (3, 4) static parser_part parser_fail (parser *p, size_t at, const char *format, ...) {
   if (p->status != PW_OK) return parser_nothing;
   p->status = PW_INPUT;
@@ -73,65 +78,72 @@ PW_PRINTF (3, 4) static parser_part parser_fail (parser *p, size_t at, const cha
 /* Advances to the next token. */
 static void parser_next (parser *p) {
   const char *word = p->text + p->at + p->size;
-  p->before = p->at;
-  p->end = p->at + p->size;
+  p->previous = p->at;
+  p->previous_end = p->at + p->size;
   word += strspn (word, " \t\r\n");
   p->at = (size_t)(word - p->text);
-  p->sign = NULL;
+  p->symbol = NULL;
   size_t name = pw_expression_name_size (word), number = pw_expression_number_size (word);
   p->size = name ? name : number ? number : *word != 0;
   p->type = name ? 'n' : number ? '0' : *word;
   if (name || number || *word == 0 || strchr ("(),?:", *word)) return;
-  for (const parser_operator *o = parser_operators; o->name && !p->sign; o++)
-    if (strncmp (word, o->name, strlen (o->name)) == 0) p->sign = o;
+  for (const parser_operator *o = parser_operators; o->name && !p->symbol; o++)
+    if (strncmp (word, o->name, strlen (o->name)) == 0) p->symbol = o;
   p->type = 'o';
-  if (p->sign == NULL && *word == '=')
+  if (p->symbol == NULL && *word == '=')
     parser_fail (p, p->at, "\"=\" would assign; equality is written ==");
-  else if (p->sign == NULL)
+  else if (p->symbol == NULL)
     parser_fail (p, p->at, "\"%s\" does not belong in an expression",
                  *word & 0x80 ? "a non-ASCII character" : (char[2]){ *word, 0 });
   else if (word[0] == '*' && word[1] == '*')
     parser_fail (p, p->at, "a power is written with ^");
   else
-    p->size = strlen (p->sign->name);
+    p->size = strlen (p->symbol->name);
 }
 
 /* ---- Operations ---- */
 
-static void parser_append (parser *p, int op, int which, double value) {
+static void parser_push (parser *p, int op, int index, double value) {
   if (p->status != PW_OK) return;
   p->stacked += 1 - pw_expression_operands (op);
   if (p->stacked > PW_EXPRESSION_STACK || p->codes == PW_EXPRESSION_CODES)
     parser_fail (p, p->at, "the nesting is too deep here");
   else
-    p->code[p->codes++] = (pw_expression_code){ (short)op, (short)which, value };
+    p->code[p->codes++] = (pw_expression_code){ (short)op, (short)index, value };
 }
 
-static parser_part parser_leaf (parser *p, int op, int which, double value) {
-  parser_part part = { p->at, p->codes, 0, 0 };
-  if (op == PW_OP_VARIABLE) part.depends = which == 0 ? ON_TIME : ON_STATES;
-  parser_append (p, op, which, value);
+/* The part that begins with the current token. */
+static parser_part parser_begin (const parser *p) {
+  return (parser_part){ .from = p->at, .first = p->codes };
+}
+
+/* A constant or variable, the current token. */
+static parser_part parser_leaf (parser *p, int op, int index, double value) {
+  parser_part part = parser_begin (p);
+  if (op == PW_OP_VARIABLE) part.depends = index == PW_EXPRESSION_TIME ? DEPENDS_ON_TIME : DEPENDS_ON_STATES;
+  parser_push (p, op, index, value);
   parser_next (p);
   return part;
 }
 
-/* Appends an operation; a constant result is replaced by its value. */
-static parser_part parser_emit (parser *p, parser_part part, int depends, int op, int which) {
-  int tie = 0;
+/* Appends an operation on `part`, its first operand, and on others, which depend on `depends`; a constant result is
+ * replaced by its value. */
+static parser_part parser_operation (parser *p, parser_part part, int depends, int op, int index) {
+  int may_jump = 0;
   part.depends |= depends;
   part.condition = op >= PW_OP_LESS && op <= PW_OP_OR;
-  parser_append (p, op, which, 0);
+  parser_push (p, op, index, 0);
   if (p->status != PW_OK) return part;
   if (part.depends == 0) {
-    double value = pw_expression_run (p->code + part.first, p->codes - part.first, NULL, &tie);
+    double value = pw_expression_run (p->code + part.first, p->codes - part.first, NULL, &may_jump);
     p->codes = part.first + 1;
     p->code[part.first] = (pw_expression_code){ PW_OP_CONSTANT, 0, value };
   }
-  if (pw_expression_breaks (op) && part.depends & ON_TIME) p->breaks = 1;
-  int point = op == PW_OP_EQUAL || op == PW_OP_UNEQUAL; /* jumps and jumps back */
-  if (pw_expression_jumps (op) && !point && part.depends & ON_STATES && p->jump == NULL) {
+  if (pw_expression_breaks (op) && part.depends & DEPENDS_ON_TIME) p->breaks = 1;
+  int at_one_point = op == PW_OP_EQUAL || op == PW_OP_UNEQUAL; /* jumps, and back at once */
+  if (pw_expression_jumps (op) && !at_one_point && part.depends & DEPENDS_ON_STATES && p->jump == NULL) {
     p->jump = p->text + part.from;
-    p->jump_size = (int)(p->end - part.from);
+    p->jump_size = (int)(p->previous_end - part.from);
   }
   return part;
 }
@@ -139,14 +151,15 @@ static parser_part parser_emit (parser *p, parser_part part, int depends, int op
 /* Converts a condition to 1 or 0. */
 static parser_part parser_condition (parser *p, parser_part part) {
   if (part.condition) return part;
-  parser_append (p, PW_OP_CONSTANT, 0, 0);
-  return parser_emit (p, part, 0, PW_OP_UNEQUAL, 0);
+  parser_push (p, PW_OP_CONSTANT, 0, 0);
+  return parser_operation (p, part, 0, PW_OP_UNEQUAL, 0);
 }
 
 /* ---- Operands ---- */
 
 static parser_part parser_choice (parser *p);
 
+/* Whether the recursion may go deeper; the caller counts p->depth down again. */
 static int parser_enter (parser *p) {
   if (++p->depth > PARSER_MAX_DEPTH)
     parser_fail (p, p->at, "%s", p->type == '(' ? "too many parentheses" : "the nesting is too deep here");
@@ -164,16 +177,18 @@ static parser_part parser_unexpected (parser *p, char open, size_t at) {
   return parser_fail (p, p->at, "this does not belong here");
 }
 
+/* Reports that no operand begins here. */
 static parser_part parser_missing (parser *p) {
   char last[PW_EXPRESSION_NAME];
   if (p->status != PW_OK) return parser_nothing;
-  snprintf (last, sizeof last, "%.*s", (int)(p->end - p->before), p->text + p->before);
-  if (p->type == 0 && p->end == 0) return parser_fail (p, 0, "an expression is missing");
-  if (p->type == 0 || (p->type == ')' && p->end))
-    return parser_fail (p, p->before, "something is missing after \"%s\"", last);
+  snprintf (last, sizeof last, "%.*s", (int)(p->previous_end - p->previous), p->text + p->previous);
+  if (p->type == 0 && p->previous_end == 0) return parser_fail (p, 0, "an expression is missing");
+  if (p->type == 0 || (p->type == ')' && p->previous_end))
+    return parser_fail (p, p->previous, "something is missing after \"%s\"", last);
   return parser_fail (p, p->at, "this does not belong here");
 }
 
+/* Reports an unknown name. */
 static parser_part parser_unknown (parser *p, const char *name) {
   pw_nearest near = { .sought = name };
   for (const char *const *v = p->variable; v && *v; v++) pw_nearest_try (&near, *v);
@@ -191,21 +206,22 @@ static int parser_is_call (const parser *p) {
 }
 
 static parser_part parser_name (parser *p, const char *name) {
-  const pw_expression_constant_name *c = pw_expression_find_constant (name);
-  int i = 0, known = p->scope ? pw_names_find (&p->scope->index, name) : -1;
-  while (p->variable && p->variable[i] && strcmp (p->variable[i], name) != 0) i++;
-  int variable = p->variable && p->variable[i];
-  if (!variable && known < 0 && c == NULL) return parser_unknown (p, name);
+  const pw_expression_constant_name *constant = pw_expression_find_constant (name);
+  int variable_index = 0, named = p->scope ? pw_names_find (&p->scope->index, name) : -1;
+  while (p->variable && p->variable[variable_index] && strcmp (p->variable[variable_index], name) != 0)
+    variable_index++;
+  int variable = p->variable && p->variable[variable_index];
+  if (!variable && named < 0 && constant == NULL) return parser_unknown (p, name);
   if (parser_is_call (p))
     return parser_fail (p, p->at, "\"%s\" is a number, not a function; a product is written with *", name);
-  if (variable) return parser_leaf (p, PW_OP_VARIABLE, i, 0);
-  return parser_leaf (p, PW_OP_CONSTANT, 0, known >= 0 ? p->scope->value[known] : c->value);
+  if (variable) return parser_leaf (p, PW_OP_VARIABLE, variable_index, 0);
+  return parser_leaf (p, PW_OP_CONSTANT, 0, named >= 0 ? p->scope->value[named] : constant->value);
 }
 
 /* min and max combine more than two arguments pairwise. */
-static parser_part parser_call (parser *p, int which) {
-  const pw_expression_function *f = &pw_expression_functions[which];
-  parser_part part = { p->at, p->codes, 0, 0 };
+static parser_part parser_call (parser *p, int index) {
+  const pw_expression_function *f = &pw_expression_functions[index];
+  parser_part part = parser_begin (p);
   int arguments = 0;
   parser_next (p);
   size_t open = p->at;
@@ -213,17 +229,17 @@ static parser_part parser_call (parser *p, int which) {
     if (!parser_enter (p)) return part;
     parser_next (p);
     if (p->type == ')' && arguments == 0) break;
-    int on = parser_choice (p).depends;
+    int depends = parser_choice (p).depends;
     p->depth--;
-    if (f->most == 0 && arguments) part = parser_emit (p, part, on, f->op, which);
-    part.depends |= on, arguments++;
+    if (f->most == 0 && arguments) part = parser_operation (p, part, depends, f->op, index);
+    part.depends |= depends, arguments++;
   } while (p->type == ',' && p->status == PW_OK);
   if (p->status != PW_OK) return part;
   if (p->type != ')') return parser_unexpected (p, '(', open);
   if (arguments < f->least) return parser_fail (p, p->at, "too few arguments");
   if (f->most && arguments > f->most) return parser_fail (p, p->at, "too many arguments");
   parser_next (p);
-  return f->most ? parser_emit (p, part, part.depends, f->op, which) : part;
+  return f->most ? parser_operation (p, part, part.depends, f->op, index) : part;
 }
 
 static parser_part parser_group (parser *p) {
@@ -254,54 +270,54 @@ static parser_part parser_operand (parser *p) {
   if (p->type == '(') return parser_group (p);
   if (p->type != 'n') return parser_missing (p);
   snprintf (name, sizeof name, "%.*s", (int)p->size, p->text + p->at);
-  int which = pw_expression_find (name);
-  if (which < 0) return parser_name (p, name);
-  if (parser_is_call (p)) return parser_call (p, which);
+  int index = pw_expression_find_function (name);
+  if (index < 0) return parser_name (p, name);
+  if (parser_is_call (p)) return parser_call (p, index);
   return parser_fail (p, p->at, "\"%s\" is a function: write its argument in parentheses", name);
 }
 
 /* ---- Operators ---- */
 
 static parser_part parser_unary (parser *p) {
-  parser_part part = { p->at, p->codes, 0, 0 };
-  int op = p->sign ? p->sign->op : 0;
+  parser_part part = parser_begin (p);
+  int op = p->symbol ? p->symbol->op : 0;
   int sign = op == PW_OP_ADD || op == PW_OP_SUBTRACT;
   if (!sign) part = parser_operand (p);
-  if (!sign && (p->sign == NULL || p->sign->op != PW_OP_POWER)) return part;
+  if (!sign && (p->symbol == NULL || p->symbol->op != PW_OP_POWER)) return part;
   if (!parser_enter (p)) return part;
   parser_next (p);
   part.depends |= parser_unary (p).depends;
   p->depth--;
   if (op == PW_OP_ADD) return part;
-  return parser_emit (p, part, part.depends, sign ? PW_OP_NEGATE : PW_OP_POWER, 0);
+  return parser_operation (p, part, part.depends, sign ? PW_OP_NEGATE : PW_OP_POWER, 0);
 }
 
 static parser_part parser_binary (parser *p, int precedence) {
   parser_part part = parser_unary (p);
-  while (p->status == PW_OK && p->sign && p->sign->precedence >= precedence) {
-    const parser_operator *o = p->sign;
+  while (p->status == PW_OK && p->symbol && p->symbol->precedence >= precedence) {
+    const parser_operator *o = p->symbol;
     int logical = o->op == PW_OP_AND || o->op == PW_OP_OR;
     if (logical) part = parser_condition (p, part);
     parser_next (p);
     parser_part right = parser_binary (p, o->precedence + 1);
     if (logical) right = parser_condition (p, right);
-    part = parser_emit (p, part, right.depends, o->op, 0);
+    part = parser_operation (p, part, right.depends, o->op, 0);
   }
   return part;
 }
 
 static parser_part parser_choice (parser *p) {
   parser_part part = parser_binary (p, 1);
-  size_t mark = p->at;
+  size_t question = p->at;
   if (p->status != PW_OK || p->type != '?' || !parser_enter (p)) return part;
   part = parser_condition (p, part);
   parser_next (p);
   int depends = parser_choice (p).depends;
-  if (p->status == PW_OK && p->type != ':') return parser_unexpected (p, '?', mark);
+  if (p->status == PW_OK && p->type != ':') return parser_unexpected (p, '?', question);
   parser_next (p);
   depends |= parser_choice (p).depends;
   p->depth--;
-  return parser_emit (p, part, depends, PW_OP_SELECT, 0);
+  return parser_operation (p, part, depends, PW_OP_SELECT, 0);
 }
 
 /* ---- Whole expressions ---- */

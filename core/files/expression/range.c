@@ -1,5 +1,5 @@
-/* Enclosures of the values of an expression, by interval arithmetic
- * (Moore, Kearfott & Cloud 2009, Introduction to Interval Analysis, chapter 5). */
+/* Enclosures of the values of an expression over an interval of time, and its possible jumps and kinks, by interval
+ * arithmetic (Moore, Kearfott & Cloud 2009, Introduction to Interval Analysis, chapter 5). */
 #include <float.h>
 #include <math.h>
 #include "expression_parts.h"
@@ -9,8 +9,14 @@ static const pw_range range_nan = { .lo = INFINITY, .hi = -INFINITY, .nan = 1 };
 
 static const pw_range range_all = { .lo = -INFINITY, .hi = INFINITY, .nan = 1 };
 
+static const pw_range range_pole = { .lo = -INFINITY, .hi = INFINITY, .breaks = 1 };
+
+static pw_range range_between (double lo, double hi) {
+  return (pw_range){ .lo = lo, .hi = hi };
+}
+
 static pw_range range_constant (double value) {
-  return isnan (value) ? range_nan : (pw_range){ value, value, 0, 0, 0 };
+  return isnan (value) ? range_nan : range_between (value, value);
 }
 
 static int range_contains (const pw_range *x, double value) {
@@ -28,8 +34,8 @@ static int range_unbounded (const pw_range *x) {
 /* Outward rounding by a few units in the last place; infinite bounds stay infinite. */
 static pw_range range_rounded (double lo, double hi) {
   if (isnan (lo) || isnan (hi)) return range_all;
-  return (pw_range){ lo - fmin (4 * DBL_EPSILON * fabs (lo), DBL_MAX) - DBL_MIN,
-                     hi + fmin (4 * DBL_EPSILON * fabs (hi), DBL_MAX) + DBL_MIN, 0, 0, 0 };
+  return range_between (lo - fmin (4 * DBL_EPSILON * fabs (lo), DBL_MAX) - DBL_MIN,
+                        hi + fmin (4 * DBL_EPSILON * fabs (hi), DBL_MAX) + DBL_MIN);
 }
 
 static double range_product (double a, double b) {
@@ -61,15 +67,13 @@ static pw_range range_multiply (const pw_range *x, const pw_range *y) {
   return r;
 }
 
-/* All numbers, with a jump at a pole. */
-static pw_range range_pole (int jumps, int nan) {
-  return (pw_range){ -INFINITY, INFINITY, jumps, 0, nan };
-}
-
 /* 0/0 is NaN. */
 static pw_range range_divide (const pw_range *x, const pw_range *y) {
-  return range_contains (y, 0) ? range_pole (y->lo < y->hi, range_contains (x, 0))
-                               : range_corners (range_quotient, x, y);
+  if (!range_contains (y, 0)) return range_corners (range_quotient, x, y);
+  pw_range r = range_pole;
+  r.breaks = y->lo < y->hi;
+  r.nan = range_contains (x, 0);
+  return r;
 }
 
 static pw_range range_abs (const pw_range *x) {
@@ -79,10 +83,11 @@ static pw_range range_abs (const pw_range *x) {
   return r;
 }
 
-/* The values at both ends, extended to 1 or -1 if an extremum lies between them. */
+/* sin (x + shift) for x from lo to hi: between its values at both ends, or to 1 or -1 if an extremum lies between them.
+ * `slack` bounds the round-off of angles. */
 static pw_range range_sin (double lo, double hi, double shift) {
   const double turn = 2 * PW_PI, slack = 8 * DBL_EPSILON * (fabs (lo) + fabs (hi) + 1);
-  pw_range r = { -1, 1, 0, 0, 0 };
+  pw_range r = range_between (-1, 1);
   if (!(hi - lo < turn) || !(slack < 0.1)) return r;
   double a = pw_sin (lo + shift), b = pw_sin (hi + shift);
   double top = PW_PI / 2 - shift, bottom = top - PW_PI;
@@ -99,23 +104,23 @@ static pw_range range_cosh (const pw_range *x) {
 
 static pw_range range_tan (const pw_range *x) {
   const double slack = 8 * DBL_EPSILON * (fabs (x->lo) + fabs (x->hi) + 1);
-  if (floor ((x->lo - slack) / PW_PI + 0.5) != floor ((x->hi + slack) / PW_PI + 0.5)) return range_pole (1, 0);
+  if (floor ((x->lo - slack) / PW_PI + 0.5) != floor ((x->hi + slack) / PW_PI + 0.5)) return range_pole;
   return range_rounded (tan (x->lo), tan (x->hi));
 }
 
 /* A function of one argument in its domain. */
 static pw_range range_in_domain (const pw_expression_function *f, const pw_range *x) {
-  if (f->one == pw_sin) return range_sin (x->lo, x->hi, 0);
-  if (f->one == pw_cos) return range_sin (x->lo, x->hi, PW_PI / 2);
-  if (f->one == cosh) return range_cosh (x);
-  if (f->one == tan) return range_tan (x);
-  return f->trend == PW_INCREASING ? range_rounded (f->one (x->lo), f->one (x->hi))
-                                   : range_rounded (f->one (x->hi), f->one (x->lo));
+  if (f->of_one == pw_sin) return range_sin (x->lo, x->hi, 0);
+  if (f->of_one == pw_cos) return range_sin (x->lo, x->hi, PW_PI / 2);
+  if (f->of_one == cosh) return range_cosh (x);
+  if (f->of_one == tan) return range_tan (x);
+  return f->trend == PW_INCREASING ? range_rounded (f->of_one (x->lo), f->of_one (x->hi))
+                                   : range_rounded (f->of_one (x->hi), f->of_one (x->lo));
 }
 
 /* NaN outside the domain. */
 static pw_range range_one_argument (const pw_expression_function *f, const pw_range *x) {
-  pw_range part = { fmax (x->lo, f->from), fmin (x->hi, f->to), 0, 0, 0 };
+  const pw_range part = range_between (fmax (x->lo, f->from), fmin (x->hi, f->to));
   if (part.lo > part.hi) return range_nan;
   pw_range r = range_in_domain (f, &part);
   r.nan |= part.lo > x->lo || part.hi < x->hi;
@@ -124,11 +129,12 @@ static pw_range range_one_argument (const pw_expression_function *f, const pw_ra
 
 /* An integer power; an even one has its minimum at 0. */
 static pw_range range_integer_power (const pw_range *x, double n) {
+  const pw_range exponent = range_constant (n);
   int even = fmod (n, 2) == 0;
-  if (n < 0 && range_contains (x, 0)) return range_pole (!even, 0);
-  pw_range b = even ? range_abs (x) : *x;
-  if (even) b.lo = fmax (0, b.lo);
-  return range_corners (pow, &b, &(pw_range){ n, n, 0, 0, 0 });
+  if (n < 0 && range_contains (x, 0)) return even ? range_between (-INFINITY, INFINITY) : range_pole;
+  pw_range base = even ? range_abs (x) : *x;
+  if (even) base.lo = fmax (0, base.lo);
+  return range_corners (pow, &base, &exponent);
 }
 
 /* Powers of negative numbers are NaN unless the exponent is an integer.  Infinite powers jump at -1 and 1. */
@@ -137,7 +143,8 @@ static pw_range range_power (const pw_range *x, const pw_range *y) {
   if (y->lo == y->hi && y->lo == rint (y->lo)) return range_integer_power (x, y->lo);
   if (x->lo < 0 && y->lo < y->hi) return range_all;
   if (x->hi < 0) return range_nan;
-  pw_range r = range_corners (pow, &(pw_range){ fmax (0, x->lo), x->hi, 0, 0, 0 }, y);
+  const pw_range base = range_between (fmax (0, x->lo), x->hi);
+  pw_range r = range_corners (pow, &base, y);
   r.nan |= x->lo < 0;
   return r;
 }
@@ -150,10 +157,10 @@ static pw_range range_atan2 (const pw_range *y, const pw_range *x) {
 
 /* hypot, or jacobi_am (x, y), which is monotonic in each argument, and NaN for y > 1. */
 static pw_range range_two_arguments (const pw_expression_function *f, const pw_range *x, const pw_range *y) {
-  pw_range a = range_abs (x), b = range_abs (y), below = { y->lo, fmin (y->hi, 1), 0, 0, 0 };
-  if (f->two == hypot) return range_rounded (hypot (fmax (0, a.lo), fmax (0, b.lo)), hypot (a.hi, b.hi));
+  const pw_range a = range_abs (x), b = range_abs (y), in_domain = range_between (y->lo, fmin (y->hi, 1));
+  if (f->of_two == hypot) return range_rounded (hypot (fmax (0, a.lo), fmax (0, b.lo)), hypot (a.hi, b.hi));
   if (y->lo > 1) return range_nan;
-  pw_range r = range_corners (f->two, x, &below);
+  pw_range r = range_corners (f->of_two, x, &in_domain);
   r.nan |= y->hi > 1;
   return r;
 }
@@ -164,8 +171,11 @@ static pw_range range_two_arguments (const pw_expression_function *f, const pw_r
  * either end, in either direction. */
 static pw_range range_integer (int op, const pw_range *x) {
   double shift = op == PW_OP_ROUND ? 0.5 : 0;
-  pw_range r = { ceil (x->lo + shift), floor (x->hi + shift), 0, 0, 0 };
-  *(op == PW_OP_CEIL ? &r.hi : &r.lo) += op == PW_OP_CEIL ? 1 : -1;
+  pw_range r = range_between (ceil (x->lo + shift), floor (x->hi + shift));
+  if (op == PW_OP_CEIL)
+    r.hi += 1;
+  else
+    r.lo -= 1;
   r.breaks = !(r.lo == r.hi);
   return r;
 }
@@ -173,53 +183,72 @@ static pw_range range_integer (int op, const pw_range *x) {
 /* The sign of NaN is 0. */
 static pw_range range_sign (const pw_range *x) {
   if (x->lo > x->hi) return range_constant (0);
-  return (pw_range){ x->lo > 0 ? 1 - x->nan : -1, x->hi < 0 ? x->nan - 1 : 1, range_contains (x, 0) || x->nan, 0, 0 };
+  return (pw_range){ .lo = x->lo > 0 ? 1 - x->nan : -1,
+                     .hi = x->hi < 0 ? x->nan - 1 : 1,
+                     .breaks = range_contains (x, 0) || x->nan };
 }
 
+/* x - n y with n = floor (x / y), which is between 0 and y. */
 static pw_range range_mod (const pw_range *x, const pw_range *y) {
-  pw_range q = range_divide (x, y), n = range_integer (PW_OP_FLOOR, &q);
+  pw_range quotient = range_divide (x, y), n = range_integer (PW_OP_FLOOR, &quotient);
   double most = fmax (fabs (y->lo), fabs (y->hi));
   int nan = range_contains (y, 0) || range_unbounded (x);
-  if (n.breaks) return (pw_range){ y->lo < 0 ? -most : 0, y->hi > 0 ? most : 0, 1, 0, nan };
+  if (n.breaks) return (pw_range){ .lo = y->lo < 0 ? -most : 0, .hi = y->hi > 0 ? most : 0, .breaks = 1, .nan = nan };
   pw_range part = range_corners (range_product, &n, y);
   return range_rounded (x->lo - part.hi, x->hi - part.lo);
 }
 
-/* order: -1, 0, 1, or 2 if an operand is NaN; 3: unknown. */
 static pw_range range_compare (int op, const pw_range *x, const pw_range *y) {
-  static const pw_range either = { 0, 1, 1, 0, 0 };
-  int nan = x->nan | y->nan, empty = x->lo > x->hi || y->lo > y->hi;
-  int order = empty                                                ? 2
-              : x->hi < y->lo                                      ? -1
-              : x->lo > y->hi                                      ? 1
-              : x->lo == x->hi && y->lo == y->hi && x->lo == y->lo ? 0
-                                                                   : 3;
+  static const pw_range either = { .lo = 0, .hi = 1, .breaks = 1 };
+  int nan = x->nan | y->nan, only_nan = x->lo > x->hi || y->lo > y->hi;
+  int equal = x->lo == x->hi && y->lo == y->hi && x->lo == y->lo;
+  if (!only_nan && !equal && x->hi >= y->lo && x->lo <= y->hi) return either;
+  pw_order order = only_nan        ? PW_ORDER_UNORDERED
+                   : equal         ? PW_ORDER_EQUAL
+                   : x->hi < y->lo ? PW_ORDER_LESS
+                                   : PW_ORDER_GREATER;
   int value = pw_expression_compare (op, order);
-  if (order == 3 || (nan && value != pw_expression_compare (op, 2))) return either;
-  return (pw_range){ value, value, 0, 0, 0 };
+  return nan && value != pw_expression_compare (op, PW_ORDER_UNORDERED) ? either : range_constant (value);
+}
+
+/* All values of both. */
+static pw_range range_hull (const pw_range *x, const pw_range *y) {
+  return (pw_range){ .lo = fmin (x->lo, y->lo),
+                     .hi = fmax (x->hi, y->hi),
+                     .breaks = x->breaks | y->breaks,
+                     .of_states = x->of_states | y->of_states,
+                     .nan = x->nan | y->nan };
 }
 
 /* An operand that decides the result hides breaks of the other one. */
 static pw_range range_logical (int op, const pw_range *x, const pw_range *y) {
-  double alone = op == PW_OP_OR; /* 1 decides ||, 0 decides && */
-  const pw_range *decides = x->lo == alone && x->hi == alone ? x : y->lo == alone && y->hi == alone ? y : NULL;
-  if (decides) return *decides;
-  return (pw_range){ op == PW_OP_OR ? fmax (x->lo, y->lo) : fmin (x->lo, y->lo),
-                     op == PW_OP_OR ? fmax (x->hi, y->hi) : fmin (x->hi, y->hi), x->breaks | y->breaks,
-                     x->states | y->states, 0 };
+  double decisive = op == PW_OP_OR; /* 1 decides ||, 0 decides && */
+  if (x->lo == decisive && x->hi == decisive) return *x;
+  if (y->lo == decisive && y->hi == decisive) return *y;
+  pw_range r = range_hull (x, y);
+  if (op == PW_OP_OR)
+    r.lo = fmax (x->lo, y->lo);
+  else
+    r.hi = fmin (x->hi, y->hi);
+  return r;
 }
 
-/* The minimum of NaN and a number is the number. */
+/* The minimum of NaN and a number is the number.  Where either operand can be the smaller one there may be a kink. */
 static pw_range range_min (const pw_range *x, const pw_range *y) {
   if (y->lo > y->hi || (x->hi < y->lo && !x->nan)) return *x;
   if (x->lo > x->hi || (y->hi < x->lo && !y->nan)) return *y;
-  int states = x->states | y->states;
-  double hi = x->nan | y->nan ? fmax (x->hi, y->hi) : fmin (x->hi, y->hi);
-  return (pw_range){ fmin (x->lo, y->lo), hi, x->breaks | y->breaks | !states, states, x->nan & y->nan };
+  pw_range r = range_hull (x, y);
+  if (!r.nan) r.hi = fmin (x->hi, y->hi);
+  r.breaks |= !r.of_states;
+  r.nan = x->nan & y->nan;
+  return r;
 }
 
 static pw_range range_negative (const pw_range *x) {
-  return (pw_range){ -x->hi, -x->lo, x->breaks, x->states, x->nan };
+  pw_range r = *x;
+  r.lo = -x->hi;
+  r.hi = -x->lo;
+  return r;
 }
 
 static pw_range range_max (const pw_range *x, const pw_range *y) {
@@ -230,15 +259,18 @@ static pw_range range_max (const pw_range *x, const pw_range *y) {
 static pw_range range_select (const pw_range *condition, const pw_range *x, const pw_range *y) {
   if (condition->lo > 0) return *x;
   if (condition->hi < 1) return *y;
-  return (pw_range){ fmin (x->lo, y->lo), fmax (x->hi, y->hi), condition->breaks | x->breaks | y->breaks,
-                     condition->states | x->states | y->states, x->nan | y->nan };
+  pw_range r = range_hull (x, y);
+  r.breaks |= condition->breaks;
+  r.of_states |= condition->of_states;
+  return r;
 }
 
 /* ---- Operations ---- */
 
-/* x: one or two operands. */
+/* The operations of one or two operands, without NaN among these. */
 static pw_range range_operation (const pw_expression_code *c, const pw_range *x) {
   const pw_range *y = x + 1;
+  pw_range minus_y;
   switch (c->op) {
   case PW_OP_NEGATE:
     return range_negative (x);
@@ -251,12 +283,13 @@ static pw_range range_operation (const pw_expression_code *c, const pw_range *x)
   case PW_OP_ROUND:
     return range_integer (c->op, x);
   case PW_OP_TAN:
-  case PW_OP_ONE:
-    return range_one_argument (&pw_expression_functions[c->which], x);
+  case PW_OP_FUNCTION_OF_ONE:
+    return range_one_argument (&pw_expression_functions[c->index], x);
   case PW_OP_ADD:
     return range_sum (x, y);
   case PW_OP_SUBTRACT:
-    return range_sum (x, &(pw_range){ -y->hi, -y->lo, 0, 0, 0 });
+    minus_y = range_negative (y);
+    return range_sum (x, &minus_y);
   case PW_OP_MULTIPLY:
     return range_multiply (x, y);
   case PW_OP_DIVIDE:
@@ -267,8 +300,8 @@ static pw_range range_operation (const pw_expression_code *c, const pw_range *x)
     return range_mod (x, y);
   case PW_OP_ATAN2:
     return range_atan2 (x, y);
-  case PW_OP_TWO:
-    return range_two_arguments (&pw_expression_functions[c->which], x, y);
+  case PW_OP_FUNCTION_OF_TWO:
+    return range_two_arguments (&pw_expression_functions[c->index], x, y);
   default:
     return range_compare (c->op, x, y);
   }
@@ -280,16 +313,16 @@ static pw_range range_result (const pw_expression_code *c, const pw_range *x, in
   const pw_range *last = x + operands - 1;
   if (range_is (x, x->lo) && range_is (last, last->lo))
     return range_constant (pw_expression_apply (c, x->lo, last->lo));
-  if (c->op == PW_OP_POWER && (range_is (x, 1) || range_is (last, 0))) return (pw_range){ 1, 1, 0, 0, 0 };
-  int keeps = c->op != PW_OP_SIGN && !(c->op >= PW_OP_LESS && c->op <= PW_OP_UNEQUAL);
-  if (keeps && (x->lo > x->hi || last->lo > last->hi)) return range_nan;
+  if (c->op == PW_OP_POWER && (range_is (x, 1) || range_is (last, 0))) return range_constant (1);
+  int keeps_nan = c->op != PW_OP_SIGN && !(c->op >= PW_OP_LESS && c->op <= PW_OP_UNEQUAL);
+  if (keeps_nan && (x->lo > x->hi || last->lo > last->hi)) return range_nan;
   pw_range r = range_operation (c, x);
-  r.nan |= keeps && (x->nan || last->nan);
+  r.nan |= keeps_nan && (x->nan || last->nan);
   return r;
 }
 
-/* Ignores breaks whose time depends on states.  An operation that jumps has no breaks where it has one value; mod and atan2 also
- * vary between their jumps. */
+/* Ignores breaks whose time depends on states.  An operation that jumps has no breaks where it has one value; mod and
+ * atan2 also vary between their jumps. */
 static pw_range range_apply (const pw_expression_code *c, const pw_range *x, int operands) {
   if (c->op == PW_OP_AND || c->op == PW_OP_OR) return range_logical (c->op, x, x + 1);
   if (c->op == PW_OP_MIN || c->op == PW_OP_MAX) return (c->op == PW_OP_MIN ? range_min : range_max) (x, x + 1);
@@ -297,26 +330,26 @@ static pw_range range_apply (const pw_expression_code *c, const pw_range *x, int
   pw_range r = range_result (c, x, operands);
   if (r.lo > r.hi) return r;
   int constant = range_is (&r, r.lo) && c->op != PW_OP_MOD && c->op != PW_OP_ATAN2 && pw_expression_jumps (c->op);
-  r.states = !constant && (x[0].states || (operands == 2 && x[1].states));
-  r.breaks &= !r.states;
+  r.of_states = !constant && (x[0].of_states || (operands == 2 && x[1].of_states));
+  r.breaks &= !r.of_states;
   r.breaks |= !constant && (x[0].breaks || (operands == 2 && x[1].breaks));
   return r;
 }
 
-pw_range pw_expression_range (const pw_expression *x, const unsigned char *noisy, double lo, double hi) {
+pw_range pw_expression_range (const pw_expression *expression, const unsigned char *noisy, double lo, double hi) {
   pw_range stack[PW_EXPRESSION_STACK], *top = stack;
-  for (const pw_expression_code *c = x->code, *end = c + x->codes; c < end; c++) {
-    int operands = pw_expression_operands (c->op), before = 0;
+  for (const pw_expression_code *c = expression->code, *end = c + expression->codes; c < end; c++) {
+    int operands = pw_expression_operands (c->op), operands_break = 0;
     top -= operands;
-    for (int i = 0; i < operands; i++) before |= top[i].breaks;
+    for (int i = 0; i < operands; i++) operands_break |= top[i].breaks;
     if (operands)
       *top = range_apply (c, top, operands);
     else if (c->op == PW_OP_CONSTANT)
       *top = range_constant (c->value);
     else
-      *top = c->which == 0 ? (pw_range){ .lo = lo, .hi = hi } /* time */
-                           : (pw_range){ .lo = -DBL_MAX, .hi = DBL_MAX, .states = 1 };
-    if (noisy[c - x->code]) top->breaks &= before;
+      *top = c->index == PW_EXPRESSION_TIME ? range_between (lo, hi)
+                                            : (pw_range){ .lo = -DBL_MAX, .hi = DBL_MAX, .of_states = 1 };
+    if (noisy[c - expression->code]) top->breaks &= operands_break;
     top++;
   }
   return top[-1];

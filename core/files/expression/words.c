@@ -31,7 +31,7 @@ const pw_expression_constant_name *pw_expression_find_constant (const char *name
 }
 
 int pw_expression_is_reserved (const char *text) {
-  return pw_expression_find_constant (text) || pw_expression_find (text) >= 0;
+  return pw_expression_find_constant (text) || pw_expression_find_function (text) >= 0;
 }
 
 int pw_expression_is_name (const char *text) {

@@ -1,5 +1,4 @@
-/* Compiles C to a shared object: runs the user's compiler without a shell, in a folder that only the user can write
- * to. */
+/* Compiles C to a shared object: runs the user's compiler without a shell, in a private folder. */
 #include <errno.h>
 #include <fcntl.h>
 #include <signal.h>
@@ -12,14 +11,14 @@
 
 extern char **environ;
 
-/* How files are compiled. */
+/* How a file is compiled. */
 typedef struct {
-  const char *compiler;       /* its command, several words ("ccache gcc") */
+  const char *compiler;       /* one or more words ("ccache gcc") */
   const char *const *options; /* ends with NULL, as does `last` */
-  const char *last[3];        /* options after the names of the files */
+  const char *last[3];        /* options and files after the names of object and source */
   const char *log;            /* file of the messages; NULL: standard error */
-  sigset_t signals;           /* signals that the compiler blocks */
-} build_how;
+  sigset_t signals;           /* that the compiler blocks: those that were blocked before build_defer */
+} build_command;
 
 const char *pw_compiler (void) {
   const char *cc = getenv ("CC");
@@ -27,7 +26,7 @@ const char *pw_compiler (void) {
 }
 
 /* Starts the compiler with its messages on standard error, or in a log, and default signal handling. */
-static int build_spawn (const build_how *how, char *const *word, pid_t *child) {
+static int build_spawn (const build_command *command, char *const *word, pid_t *child) {
   posix_spawn_file_actions_t files;
   posix_spawnattr_t attributes;
   sigset_t pipe;
@@ -37,11 +36,11 @@ static int build_spawn (const build_how *how, char *const *word, pid_t *child) {
   if (code) return code;
   code = posix_spawnattr_init (&attributes);
   if (code == 0) {
-    if (how->log)
-      code = posix_spawn_file_actions_addopen (&files, STDERR_FILENO, how->log,
+    if (command->log)
+      code = posix_spawn_file_actions_addopen (&files, STDERR_FILENO, command->log,
                                                O_WRONLY | O_CREAT | O_TRUNC | O_NOFOLLOW, 0600);
     if (code == 0) code = posix_spawn_file_actions_adddup2 (&files, STDERR_FILENO, STDOUT_FILENO);
-    posix_spawnattr_setsigmask (&attributes, &how->signals);
+    posix_spawnattr_setsigmask (&attributes, &command->signals);
     posix_spawnattr_setsigdefault (&attributes, &pipe);
     posix_spawnattr_setflags (&attributes, POSIX_SPAWN_SETSIGMASK | POSIX_SPAWN_SETSIGDEF);
     if (code == 0) code = posix_spawnp (child, word[0], &files, &attributes, word, environ);
@@ -51,10 +50,10 @@ static int build_spawn (const build_how *how, char *const *word, pid_t *child) {
   return code;
 }
 
-/* Runs a command line that compiles a source. */
-static int build_run (const build_how *how, char *const *word, const char *source, pw_error *error) {
+/* Runs the words of a command line, which compiles a source. */
+static int build_run (const build_command *command, char *const *word, const char *source, pw_error *error) {
   pid_t child;
-  int outcome = 0, code = build_spawn (how, word, &child);
+  int outcome = 0, code = build_spawn (command, word, &child);
   while (code == 0 && waitpid (child, &outcome, 0) < 0)
     if (errno != EINTR) code = errno;
   int status = WIFEXITED (outcome) ? WEXITSTATUS (outcome) : -1;
@@ -62,18 +61,19 @@ static int build_run (const build_how *how, char *const *word, const char *sourc
     return pw_fail (error, PW_RESOURCE, "cannot run the C compiler \"%s\": %s", word[0], strerror (code));
   if (code != 0 || status == 127)
     return pw_fail (error, PW_INPUT, "cannot run the C compiler \"%s\" that %s%s needs (%s): install %s", word[0],
-                    how->log ? "specialised code" : "the model file ", how->log ? "" : source,
+                    command->log ? "specialised code" : "the model file ", command->log ? "" : source,
                     code ? strerror (code) : "not found",
                     strcmp (word[0], "clang") ? "one, or name another in the environment variable CC" : PW_PAGE_TOOLS);
-  if (status != 0 && how->log)
-    return pw_fail (error, PW_METHOD, "%s does not compile; the messages of %s are in %s", source, word[0], how->log);
+  if (status != 0 && command->log)
+    return pw_fail (error, PW_METHOD, "%s does not compile; the messages of %s are in %s", source, word[0],
+                    command->log);
   if (status != 0)
     return pw_fail (error, PW_INPUT, "the model file %s does not compile; the messages of %s are above", source,
                     word[0]);
   return PW_OK;
 }
 
-enum { BUILD_COMMAND = 24, BUILD_OPTIONS = 24 }; /* most words of a compiler's command, of our options */
+enum { BUILD_COMPILER = 24, BUILD_OPTIONS = 24 }; /* most words of the compiler, of all else */
 
 /* Adds words to a command line, which execv does not modify. */
 static void build_add (char **word, int *count, const char *const *more) {
@@ -81,9 +81,9 @@ static void build_add (char **word, int *count, const char *const *more) {
 }
 
 /* Compiles a source to an object. */
-static int build_object (const build_how *how, const char *source, const char *object, pw_error *error) {
-  char *header, *include = NULL, *command = strdup (how->compiler), *rest = NULL;
-  char *word[BUILD_COMMAND + BUILD_OPTIONS] = { NULL };
+static int build_object (const build_command *command, const char *source, const char *object, pw_error *error) {
+  char *header, *include = NULL, *compiler = strdup (command->compiler), *rest = NULL;
+  char *word[BUILD_COMPILER + BUILD_OPTIONS] = { NULL };
   int words = 0, status = pw_search_header (&header, error);
   if (header) include = pw_folder_of (header);
   if (status == PW_OK && header == NULL)
@@ -91,16 +91,16 @@ static int build_object (const build_how *how, const char *source, const char *o
                       "cannot compile %s: pinwheel.h is neither in \"include\" next to the program nor in "
                       "\"../include/pinwheel\"",
                       source);
-  if (status == PW_OK && (include == NULL || command == NULL)) status = pw_fail (error, PW_RESOURCE, "out of memory");
+  if (status == PW_OK && (include == NULL || compiler == NULL)) status = pw_fail (error, PW_RESOURCE, "out of memory");
   if (status == PW_OK) {
-    for (char *w = strtok_r (command, " \t", &rest); w && words < BUILD_COMMAND; w = strtok_r (NULL, " \t", &rest))
+    for (char *w = strtok_r (compiler, " \t", &rest); w && words < BUILD_COMPILER; w = strtok_r (NULL, " \t", &rest))
       word[words++] = w;
-    build_add (word, &words, how->options);
+    build_add (word, &words, command->options);
     build_add (word, &words, (const char *const[]){ "-I", include, "-o", object, source, NULL });
-    build_add (word, &words, how->last);
-    status = build_run (how, word, source, error);
+    build_add (word, &words, command->last);
+    status = build_run (command, word, source, error);
   }
-  free (command);
+  free (compiler);
   free (include);
   free (header);
   return status;
@@ -131,7 +131,7 @@ int pw_processor_lanes (void) {
 
 const char *const *pw_scene_options (int lanes) {
   static const struct {
-    int lanes, processor; /* pw_processor_lanes of the processors that have these instructions */
+    int lanes, processor; /* the least pw_processor_lanes of processors that have these instructions */
     const char *option[16];
   } known[] = {
     { 0, 4, { BUILD_SCENE, "-O2", "-mavx2" } },
@@ -149,7 +149,7 @@ const char *const *pw_scene_options (int lanes) {
   return known[i].option;
 }
 
-/* Defers Ctrl-C, which also reaches the compiler, until the caller's files are removed. */
+/* Defers SIGINT (Ctrl-C, which also reaches the compiler), SIGTERM, SIGHUP until the caller's files are removed. */
 static void build_defer (sigset_t *before) {
   sigset_t stop;
   sigemptyset (&stop);
@@ -170,28 +170,30 @@ int pw_compile_file (const char *path, const char *engine, pw_object_user *use, 
     "-Wl,--gc-sections,--allow-undefined,--strip-all,-z,stack-size=1048576,--whole-archive",
     NULL
   };
-  build_how how = { .compiler = engine ? "clang" : pw_compiler (),
-                    .options = engine ? page : plugin,
-                    .last = { "-lm" } };
-  if (engine) how.last[0] = engine, how.last[1] = "-Wl,--no-whole-archive";
-  build_defer (&how.signals);
+  build_command command = { .compiler = engine ? "clang" : pw_compiler (),
+                            .options = engine ? page : plugin,
+                            .last = { "-lm" } };
+  if (engine) command.last[0] = engine, command.last[1] = "-Wl,--no-whole-archive";
+  build_defer (&command.signals);
   char *folder = pw_temporary_folder (error), *object = folder ? pw_path_join (folder, "model.so", "") : NULL;
   int status = folder ? PW_OK : PW_RESOURCE;
   if (folder && object == NULL) status = pw_fail (error, PW_RESOURCE, "out of memory");
-  if (status == PW_OK) status = build_object (&how, path, object, error);
+  if (status == PW_OK) status = build_object (&command, path, object, error);
   if (status == PW_OK) status = use (context, object, error);
   if (object) unlink (object);
   if (folder) rmdir (folder);
   free (object);
   free (folder);
-  pthread_sigmask (SIG_SETMASK, &how.signals, NULL);
+  pthread_sigmask (SIG_SETMASK, &command.signals, NULL);
   return status;
 }
 
 int pw_compile_scene (const char *path, const char *object, const char *log, int lanes, pw_error *error) {
-  build_how how = { .compiler = pw_compiler (), .options = pw_scene_options (lanes), .last = { "-lm" }, .log = log };
-  build_defer (&how.signals);
-  int status = build_object (&how, path, object, error);
-  pthread_sigmask (SIG_SETMASK, &how.signals, NULL);
+  build_command command = {
+    .compiler = pw_compiler (), .options = pw_scene_options (lanes), .last = { "-lm" }, .log = log
+  };
+  build_defer (&command.signals);
+  int status = build_object (&command, path, object, error);
+  pthread_sigmask (SIG_SETMASK, &command.signals, NULL);
   return status;
 }

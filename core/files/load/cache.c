@@ -28,14 +28,18 @@ static void cache_make (char *path) {
   mkdir (path, 0700);
 }
 
-/* NULL if only the user, or the system, can replace the folder's entries; else what is wrong with it. */
-static const char *cache_defect (const char *path, int is_cache) {
+typedef enum { CACHE_PARENT, CACHE_FOLDER } cache_role;
+
+/* NULL if only the user can write to the folder or, of the parent, only the user or the system can replace its entries;
+ * else what is wrong with it. */
+static const char *cache_defect (const char *path, cache_role role) {
   struct stat info;
-  if ((is_cache ? lstat : stat) (path, &info) != 0) return strerror (errno);
+  if ((role == CACHE_FOLDER ? lstat : stat) (path, &info) != 0) return strerror (errno);
+  int by_system = role == CACHE_PARENT && info.st_uid == 0, sticky = role == CACHE_PARENT && info.st_mode & S_ISVTX;
   if (!S_ISDIR (info.st_mode)) return "it is not a folder";
-  if (info.st_uid != geteuid () && (is_cache || info.st_uid != 0)) return "it belongs to another user";
-  if (info.st_mode & 022 && (is_cache || !(info.st_mode & S_ISVTX))) return "others can write to it";
-  return is_cache && access (path, R_OK | W_OK | X_OK) != 0 ? strerror (errno) : NULL;
+  if (info.st_uid != geteuid () && !by_system) return "it belongs to another user";
+  if (info.st_mode & 022 && !sticky) return "others can write to it";
+  return role == CACHE_FOLDER && access (path, R_OK | W_OK | X_OK) != 0 ? strerror (errno) : NULL;
 }
 
 char *pw_cache_folder (char *notice, size_t size) {
@@ -43,8 +47,8 @@ char *pw_cache_folder (char *notice, size_t size) {
   const char *shown = parent, *defect = NULL;
   if (path) {
     cache_make (path);
-    defect = cache_defect (parent, 0);
-    if (defect == NULL) defect = cache_defect (shown = path, 1);
+    defect = cache_defect (parent, CACHE_PARENT);
+    if (defect == NULL) defect = cache_defect (shown = path, CACHE_FOLDER);
     if (defect) snprintf (notice, size, "the cache %s is not used: %s", shown, defect);
     if (defect) free (path), path = NULL;
   }
@@ -54,8 +58,7 @@ char *pw_cache_folder (char *notice, size_t size) {
 
 /* ---- Size ---- */
 
-/* Returns the size of all files [bytes], and the path of the one that was used least recently, malloced; NULL if there is
- * none. */
+/* The size of all files [bytes], and the path of the least recently used one, malloced; NULL if there is none. */
 static long long cache_size (const char *folder, char **oldest) {
   long long size = 0;
   struct timespec used = { 0 };

@@ -1,8 +1,9 @@
 /* Reads columns of numbers from a CSV file.
  *
- * The separator is the one of , ; and tab that the first line contains.  A first line without numbers names the
- * columns, "NAME" or "NAME [unit]"; a column in another unit than requested is converted.  Blank lines and lines that
- * begin with # are skipped. */
+ * The separator is the first of , ; and tab that the first line contains outside quotes.  A cell in double quotes may
+ * contain it, and "" for a quote (RFC 4180), but no line end.  A first line without numbers names the columns, "NAME"
+ * or "NAME [unit]"; a column in another unit than requested is converted.  Blank lines and those that begin with # are
+ * skipped. */
 #include <math.h>
 #include <stdarg.h>
 #include <stdlib.h>
@@ -13,7 +14,7 @@ enum { COLUMNS_MAX_BYTES = 64 << 20, COLUMNS_MAX_LINES = 1000000 };
 
 /* A column to read. */
 typedef struct {
-  int index;     /* of its cells in a line */
+  int index;     /* of its cell in each line, from 0 */
   double factor; /* to SI units */
 } columns_source;
 
@@ -24,8 +25,8 @@ typedef struct {
   int cells;              /* per line */
   columns_source *source; /* of each column to read; the first one is the time */
   int columns;
-  int gaps;       /* 1: in others, empty cells and nan are NaN */
-  char separator; /* 0 before the first line */
+  pw_gaps gaps;      /* in all but the time */
+  char separator[2]; /* "" before the first line */
   pw_error *error;
 } columns;
 
@@ -40,6 +41,24 @@ PW_PRINTF (2, 3) static int columns_fail (const columns *c, const char *format, 
 
 /* ---- Lines and cells ---- */
 
+/* The end of the cell that begins here: the next of the separators outside quotes, or the end of the line. */
+static const char *columns_cell_end (const char *cell, const char *separators) {
+  const char *p = cell + strspn (cell, " ");
+  if (*p == '"') /* to the closing quote, which is not doubled */
+    for (p++; *p && (*p != '"' || p[1] == '"'); p++) p += *p == '"';
+  return p + strcspn (p, separators);
+}
+
+static char columns_find_separator (const char *line) {
+  static const char separators[] = ",;\t";
+  int semicolon = 0;
+  for (const char *end = columns_cell_end (line, separators); *end; end = columns_cell_end (end + 1, separators)) {
+    if (*end == ',') return ',';
+    semicolon |= *end == ';';
+  }
+  return semicolon ? ';' : '\t';
+}
+
 /* The next line that is neither blank nor a comment, or NULL. */
 static char *columns_line (columns *c) {
   while (*c->rest) {
@@ -48,8 +67,8 @@ static char *columns_line (columns *c) {
     c->line++;
     *end = 0;
     if (*line == '#' || line[strspn (line, " \t\r")] == 0) continue;
-    if (c->separator == 0) c->separator = strchr (line, ',') ? ',' : strchr (line, ';') ? ';' : '\t';
-    while (strchr (c->separator == '\t' ? " \r" : " \t\r", end[-1])) *--end = 0;
+    if (*c->separator == 0) *c->separator = columns_find_separator (line);
+    while (strchr (*c->separator == '\t' ? " \r" : " \t\r", end[-1])) *--end = 0;
     return line;
   }
   return NULL;
@@ -57,22 +76,29 @@ static char *columns_line (columns *c) {
 
 static int columns_count (const columns *c, const char *line) {
   int n = 1;
-  for (; *line; line++) n += *line == c->separator;
+  while (*(line = columns_cell_end (line, c->separator))) line++, n++;
   return n;
 }
 
-/* Copies cell i (from 0) to the buffer, without surrounding blanks and quotes. */
+/* Copies cell i (from 0), if need be cut, to the buffer, without surrounding blanks and quotes. */
 static const char *columns_cell (const columns *c, const char *line, int i, char *buffer, size_t size) {
-  while (i-- > 0) line = strchr (line, c->separator) + 1;
-  const char stop[] = { c->separator, 0 }, *end = line + strcspn (line, stop);
+  while (i-- > 0) line = columns_cell_end (line, c->separator) + 1;
+  const char *end = columns_cell_end (line, c->separator);
   while (line < end && *line == ' ') line++;
   while (line < end && end[-1] == ' ') end--;
-  if (end - line > 1 && *line == '"' && end[-1] == '"') line++, end--;
-  snprintf (buffer, size, "%.*s", (int)(end - line < 1000 ? end - line : 1000), line);
+  int quoted = end - line > 1 && *line == '"' && end[-1] == '"';
+  if (quoted) line++, end--;
+  size_t n = 0;
+  for (; line < end && n + 1 < size; line++) {
+    buffer[n++] = *line;
+    line += quoted && line[0] == '"' && line[1] == '"';
+  }
+  buffer[n] = 0;
   return buffer;
 }
 
-static int columns_names (const columns *c, const char *line) {
+/* Whether a line names the columns: none of its cells is a number. */
+static int columns_are_names (const columns *c, const char *line) {
   char cell[100];
   double value;
   for (int i = 0; i < c->cells; i++)
@@ -82,7 +108,7 @@ static int columns_names (const columns *c, const char *line) {
 
 /* ---- Selection of columns ---- */
 
-/* Finds a column from its name in the first line, with or without its unit, or from its number. */
+/* Finds a column from its number, or its name, with or without unit, if the first line names the columns (named: 1). */
 static int columns_find (const columns *c, const char *first, int named, const char *name, int *index) {
   char cell[100], unit[100], *end;
   pw_nearest near = { .sought = name };
@@ -119,11 +145,12 @@ static int columns_open (const columns *c, const char *first, int named, const c
 
 /* ---- Numbers ---- */
 
-static int columns_number (const columns *c, const char *line, columns_source source, int gap, double *value) {
+/* A number in SI units; with gaps allowed, NaN for an empty cell or nan. */
+static int columns_number (const columns *c, const char *line, columns_source source, pw_gaps gaps, double *value) {
   char cell[100];
   columns_cell (c, line, source.index, cell, sizeof cell);
   int number = pw_read_number (cell, value) == PW_OK;
-  if (gap && (*cell == 0 || (number && isnan (*value)))) return *value = NAN, PW_OK;
+  if (gaps == PW_GAPS_ALLOWED && (*cell == 0 || (number && isnan (*value)))) return *value = NAN, PW_OK;
   if (!number || !isfinite (*value))
     return columns_fail (c, "column %d: expected a finite number, found \"%.40s\"", source.index + 1, cell);
   *value *= source.factor;
@@ -131,13 +158,14 @@ static int columns_number (const columns *c, const char *line, columns_source so
   return columns_fail (c, "column %d: \"%.40s\" is too large in SI units", source.index + 1, cell);
 }
 
-/* Reads lines into columns of `room` numbers. */
+/* Reads this line and all that follow into columns of `room` numbers; *rows is their number. */
 static int columns_rows (columns *c, char *line, double *value, size_t room, int *rows) {
   for (int n = 0; line; line = columns_line (c), *rows = ++n) {
     int cells = columns_count (c, line);
     if (cells != c->cells) return columns_fail (c, "expected %d cells as in the first line, found %d", c->cells, cells);
     for (int k = 0; k < c->columns; k++)
-      if (columns_number (c, line, c->source[k], k > 0 && c->gaps, &value[(size_t)k * room + (size_t)n]) != PW_OK)
+      if (columns_number (c, line, c->source[k], k ? c->gaps : PW_GAPS_REFUSED, &value[(size_t)k * room + (size_t)n]) !=
+          PW_OK)
         return PW_INPUT;
     if (n > 0 && !(value[n] > value[n - 1]))
       return columns_fail (c, "%.9g comes after %.9g: expected increasing times", value[n], value[n - 1]);
@@ -153,7 +181,7 @@ static int columns_all (columns *c, const char *const *column, const char *const
   if (line == NULL) return columns_fail (c, "the file is empty");
   if (lines > COLUMNS_MAX_LINES) return columns_fail (c, "more than %d lines", COLUMNS_MAX_LINES);
   c->cells = columns_count (c, line);
-  int named = columns_names (c, line);
+  int named = columns_are_names (c, line);
   for (int k = 0; k < c->columns; k++)
     if (columns_open (c, line, named, column[k], unit[k], &c->source[k]) != PW_OK) return PW_INPUT;
   *value = malloc ((size_t)c->columns * lines * sizeof **value);
@@ -165,8 +193,8 @@ static int columns_all (columns *c, const char *const *column, const char *const
 }
 
 double *pw_columns_from_stream (FILE *f, const char *shown, const char *const *column, const char *const *unit,
-                                int width, int gaps, int *rows, pw_error *error) {
-  static const char mark[] = "\xEF\xBB\xBF"; /* byte order mark, which some programs write */
+                                int width, pw_gaps gaps, int *rows, pw_error *error) {
+  static const char byte_order_mark[] = "\xEF\xBB\xBF"; /* which some programs write */
   char *text;
   size_t size;
   double *value = NULL;
@@ -177,7 +205,7 @@ double *pw_columns_from_stream (FILE *f, const char *shown, const char *const *c
   if (status == PW_OK && c.source == NULL) status = pw_fail (error, PW_RESOURCE, "%s: out of memory", shown);
   if (status == PW_OK && strlen (text) != size)
     status = pw_fail (error, PW_INPUT, "%.80s: a table is text, and this has a byte 0", shown);
-  if (status == PW_OK && strncmp (text, mark, 3) == 0) c.rest += 3;
+  if (status == PW_OK && strncmp (text, byte_order_mark, 3) == 0) c.rest += 3;
   if (status == PW_OK) status = columns_all (&c, column, unit, &value, rows);
   free (text);
   free (c.source);
@@ -194,7 +222,7 @@ double *pw_read_columns (const char *path, const char *const *column, const char
     pw_fail (error, pw_open_input_status (), "%s: cannot be read: %s", path, why);
     return NULL;
   }
-  double *value = pw_columns_from_stream (f, path, column, unit, width, 1, rows, error);
+  double *value = pw_columns_from_stream (f, path, column, unit, width, PW_GAPS_ALLOWED, rows, error);
   fclose (f);
   return value;
 }

@@ -58,7 +58,7 @@ static int page_tree (pw_page *p, const pw_yaml *y, pw_error *error) {
   return page_add (p, "tree", tree.text, tree.size, error);
 }
 
-enum { PAGE_PARTS = 3 }; /* engine, model, tree; then tables */
+enum { PAGE_PARTS = 3 }; /* engine, model, tree; the tables follow */
 
 typedef struct {
   pw_page *p;

@@ -8,15 +8,15 @@
 
 struct pw_file {
   char *name, *path;
-  void *handle;  /* of dlopen, or */
-  pw_yaml *yaml; /* of a text model */
-  size_t max_bytes;
+  void *handle;     /* of dlopen; NULL for a text model */
+  pw_yaml *yaml;    /* NULL for others */
+  size_t max_bytes; /* of a text model */
   const pw_plugin_table *table;
 };
 
 /* ---- Loading ---- */
 
-/* Removes the path that dlerror puts before its reason. */
+/* The reason of dlerror, without the path that it puts before it. */
 static const char *plugin_reason (const char *object) {
   const char *reason = dlerror ();
   if (reason == NULL) return "unknown reason";
@@ -42,6 +42,7 @@ static int plugin_load (void *context, const char *object, pw_error *error) {
 static const char *const plugin_endings[] = { ".so", ".c", ".yaml" };
 enum { PLUGIN_SO, PLUGIN_C, PLUGIN_YAML, PLUGIN_ENDINGS };
 
+/* The ending of a name; PLUGIN_ENDINGS if it is none of these. */
 static int plugin_ending (const char *name) {
   int i = 0;
   while (i < PLUGIN_ENDINGS && !pw_ends_with (name, plugin_endings[i])) i++;
@@ -86,10 +87,10 @@ static int plugin_find_path (pw_file *f, const char *path, pw_error *error) {
   return PW_OK;
 }
 
-/* The hint for an unknown name: to use a path if the current directory has such a file, else the nearest name. */
+/* Reports an unknown name; suggests a path if the current directory has such a file, else the nearest name. */
 static int plugin_unknown (const pw_search *s, const char *name, pw_error *error) {
   struct stat info;
-  char here[200], unread[300] = "";
+  char here[200], unread[300] = ""; /* a file in the current directory; folders that cannot be searched */
   for (int i = 0; i < PLUGIN_ENDINGS; i++) {
     snprintf (here, sizeof here, "%s%s", name, plugin_endings[i]);
     if (stat (here, &info) == 0)

@@ -1,12 +1,19 @@
-/* Reading up to a limit. */
+/* Reads files up to a limit of their size, for models, tables and checkpoints; joins paths. */
 #include <errno.h>
 #include <stdlib.h>
 #include <string.h>
 #include "files.h"
 
-enum { READ_CHUNK = 1 << 16 };
+enum { READ_CHUNK = 1 << 16 }; /* bytes */
 
-int pw_read_rest (FILE *f, size_t max_bytes, const char *path, const char *what, char **text, size_t *size,
+char *pw_path_join (const char *folder, const char *name, const char *ending) {
+  size_t size = strlen (folder) + strlen (name) + strlen (ending) + 2;
+  char *path = malloc (size);
+  if (path) snprintf (path, size, "%s/%s%s", folder, name, ending);
+  return path;
+}
+
+int pw_read_rest (FILE *f, size_t max_bytes, const char *path, const char *limit, char **text, size_t *size,
                   pw_error *error) {
   size_t room = 0;
   *text = NULL;
@@ -18,18 +25,18 @@ int pw_read_rest (FILE *f, size_t max_bytes, const char *path, const char *what,
     (*text)[*size + n] = 0;
     if (*size + n > max_bytes)
       return pw_fail (error, PW_INPUT, "%s: the file has more than %g MB, %s", path, (double)(max_bytes >> 10) / 1024,
-                      what);
+                      limit);
   }
   return ferror (f) ? pw_fail (error, PW_INPUT, "cannot read %s: %s", path, strerror (errno)) : PW_OK;
 }
 
-int pw_read_file (const char *cannot, const char *path, size_t max_bytes, const char *what, char **text, size_t *size,
+int pw_read_file (const char *failure, const char *path, size_t max_bytes, const char *limit, char **text, size_t *size,
                   pw_error *error) {
   const char *why;
   FILE *f = pw_open_input (path, &why);
   *text = NULL;
-  if (f == NULL) return pw_fail (error, pw_open_input_status (), "%s %s: %s", cannot, path, why);
-  int status = pw_read_rest (f, max_bytes, path, what, text, size, error);
+  if (f == NULL) return pw_fail (error, pw_open_input_status (), "%s %s: %s", failure, path, why);
+  int status = pw_read_rest (f, max_bytes, path, limit, text, size, error);
   fclose (f);
   return status;
 }

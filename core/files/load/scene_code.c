@@ -12,7 +12,7 @@
 #include <unistd.h>
 #include "files.h"
 
-enum { CODE_MAX_BYTES = 64 << 20, CODE_MAX_WAITS = 3000 }; /* waits of 20 ms */
+enum { CODE_MAX_BYTES = 64 << 20, CODE_MAX_WAITS = 3000 }; /* waits of 20 ms: a minute */
 
 struct pw_scene_code {
   void *handle;
@@ -21,36 +21,38 @@ struct pw_scene_code {
   char notice[600];
 };
 
+/* The object to load and the paths of its files, KEY.c and so on. */
 typedef struct {
   const pw_system *system;
   const char *text;
-  int lanes;      /* 0: for single runs */
-  char how[2000]; /* what determines the object: versions, compiler, options, checksum of the header */
-  char key[17];   /* checksum of text and how, in hexadecimal */
+  int lanes;           /* 0: for single runs */
+  char identity[2000]; /* what determines the object: versions, compiler, options, checksum of the header */
+  char key[17];        /* checksum of text and identity, in hexadecimal */
   char *folder, *source, *log, *part, *object;
   pw_scene_code *code;
 } code_job;
 
 /* ---- Identity ---- */
 
-/* Finds the file of a command on PATH. */
+/* Finds the file of a command on PATH, of which an empty entry is the current folder. */
 static int code_find_program (const char *word, struct stat *info) {
-  const char *list = getenv ("PATH");
   if (strchr (word, '/')) return stat (word, info) == 0;
-  for (const char *p = list; p && *p; p += strcspn (p, ":"), p += *p == ':') {
+  for (const char *entry = getenv ("PATH"), *end; entry; entry = *end ? end + 1 : NULL) {
     char path[1000];
-    snprintf (path, sizeof path, "%.*s/%s", (int)strcspn (p, ":"), p, word);
+    end = entry + strcspn (entry, ":");
+    snprintf (path, sizeof path, "%.*s%s%s", (int)(end - entry), entry, end > entry ? "/" : "", word);
     if (stat (path, info) == 0 && S_ISREG (info->st_mode) && access (path, X_OK) == 0) return 1;
   }
   return 0;
 }
 
+/* Adds a line to the identity. */
 static void code_add (code_job *x, const char *text) {
-  size_t used = strlen (x->how);
-  snprintf (x->how + used, sizeof x->how - used, "%s\n", text);
+  size_t used = strlen (x->identity);
+  snprintf (x->identity + used, sizeof x->identity - used, "%s\n", text);
 }
 
-/* The words of the compiler; of programs among them ("ccache gcc") also size, date and inode. */
+/* Adds the words of the compiler; of programs among them ("ccache gcc") also size, date and inode. */
 static int code_add_compiler (code_job *x) {
   char text[200], *copy = strdup (pw_compiler ()), *rest = NULL;
   for (char *w = copy ? strtok_r (copy, " \t", &rest) : NULL; w; w = strtok_r (NULL, " \t", &rest)) {
@@ -62,10 +64,10 @@ static int code_add_compiler (code_job *x) {
     code_add (x, text);
   }
   free (copy);
-  return copy && strlen (x->how) < sizeof x->how - 50 ? PW_OK : PW_RESOURCE; /* room for the checksum */
+  return copy && strlen (x->identity) < sizeof x->identity - 50 ? PW_OK : PW_RESOURCE; /* room for the checksum */
 }
 
-/* PW_RETRY: the file does not exist. */
+/* Reads a file.  PW_RETRY: it does not exist. */
 static int code_read (const char *path, char **text, size_t *size, pw_error *error) {
   int status = pw_read_file ("cannot read", path, CODE_MAX_BYTES, "the limit for an object", text, size, error);
   return status == PW_INPUT && *text == NULL && errno == ENOENT ? PW_RETRY : status;
@@ -82,7 +84,7 @@ static int code_identify (code_job *x, pw_error *error) {
     snprintf (sum, sizeof sum, "%016llx", pw_check_sum (PW_CHECK, text, size));
   code_add (x, sum);
   snprintf (x->key, sizeof x->key, "%016llx",
-            pw_check_sum (pw_check_sum (PW_CHECK, x->text, strlen (x->text)), x->how, strlen (x->how)));
+            pw_check_sum (pw_check_sum (PW_CHECK, x->text, strlen (x->text)), x->identity, strlen (x->identity)));
   free (header);
   free (text);
   return status;
@@ -103,22 +105,24 @@ static int code_paths (code_job *x, pw_error *error) {
 
 /* ---- Loading ---- */
 
-/* Checks a cached object.  PW_RETRY: missing, or of another scene; PW_INPUT: damaged. */
+/* Checks a cached object.  PW_RETRY: missing, or of another text or identity; PW_INPUT: damaged. */
 static int code_check (const code_job *x, pw_error *error) {
   char *bytes;
-  size_t size = 0, text = strlen (x->text), how = strlen (x->how);
+  size_t size = 0, text_size = strlen (x->text), identity_size = strlen (x->identity);
   unsigned long long check = 0;
   int status = code_read (x->object, &bytes, &size, error);
   if (status == PW_OK && size >= sizeof check) memcpy (&check, bytes + (size -= sizeof check), sizeof check);
   if (status == PW_OK && pw_check_sum (PW_CHECK, bytes, size) != check)
     status = pw_fail (error, PW_INPUT, "it is damaged");
-  if (status == PW_OK && (size < text + how || memcmp (bytes + size - how, x->how, how) != 0 ||
-                          memcmp (bytes + size - how - text, x->text, text) != 0))
+  if (status == PW_OK &&
+      (size < text_size + identity_size || memcmp (bytes + size - identity_size, x->identity, identity_size) != 0 ||
+       memcmp (bytes + size - identity_size - text_size, x->text, text_size) != 0))
     status = PW_RETRY;
   free (bytes);
   return status;
 }
 
+/* Loads the object, unless it is that of another scene. */
 static int code_load (code_job *x, pw_error *error) {
   void *handle = dlopen (x->object, RTLD_NOW | RTLD_LOCAL);
   const char *why = handle ? NULL : dlerror ();
@@ -151,15 +155,15 @@ static int code_load_cached (code_job *x) {
 /* Appends text, options and checksum to an object, and renames it. */
 static int code_complete (const code_job *x, pw_error *error) {
   char *bytes;
-  size_t size, text = strlen (x->text), how = strlen (x->how);
+  size_t size, text_size = strlen (x->text), identity_size = strlen (x->identity);
   int status = code_read (x->part, &bytes, &size, error);
   if (status == PW_RETRY) *error = (pw_error){ 0 }, pw_fail (error, PW_RESOURCE, "the compiler has written no object");
   if (status != PW_OK) return free (bytes), PW_RESOURCE;
-  unsigned long long check =
-      pw_check_sum (pw_check_sum (pw_check_sum (PW_CHECK, bytes, size), x->text, text), x->how, how);
+  unsigned long long check = pw_check_sum (pw_check_sum (pw_check_sum (PW_CHECK, bytes, size), x->text, text_size),
+                                           x->identity, identity_size);
   free (bytes);
   FILE *f = fopen (x->part, "ab");
-  if (f) fprintf (f, "%s%s", x->text, x->how);
+  if (f) fprintf (f, "%s%s", x->text, x->identity);
   if (f) fwrite (&check, sizeof check, 1, f);
   int failed = f == NULL || ferror (f);
   if (f && fclose (f) != 0) failed = 1;

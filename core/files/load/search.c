@@ -21,11 +21,14 @@ static int search_no_memory (pw_error *error) {
   return pw_fail (error, PW_RESOURCE, "out of memory while looking for models");
 }
 
-/* The folder of the running program (0) or of this library (1), malloced; NULL if unknown. */
-static int search_anchor (int which, char **folder, pw_error *error) {
+/* Where the search for folders begins: at the program, at this library. */
+typedef enum { SEARCH_PROGRAM, SEARCH_LIBRARY, SEARCH_ANCHORS } search_anchor;
+
+/* The folder of the running program or of this library, malloced; NULL if unknown. */
+static int search_anchor_folder (search_anchor anchor, char **folder, pw_error *error) {
   char path[PATH_MAX];
   *folder = NULL;
-  if (which == 0) {
+  if (anchor == SEARCH_PROGRAM) {
     ssize_t n = readlink ("/proc/self/exe", path, sizeof path - 1);
     if (n <= 0) return PW_OK;
     path[n] = 0;
@@ -42,22 +45,22 @@ static int search_anchor (int which, char **folder, pw_error *error) {
   return *folder ? PW_OK : search_no_memory (error);
 }
 
-/* Folders relative to the program, and to the library. */
-typedef const char *const search_folders[2][3];
+/* Folders relative to each anchor. */
+typedef const char *const search_folders[SEARCH_ANCHORS][3];
 
 /* Calls `visit` with each of these folders, which may not exist. */
 static int search_visit (search_folders where, int (*visit) (void *context, const char *folder, pw_error *error),
                          void *context, pw_error *error) {
   int status = PW_OK;
-  for (int which = 0; which < 2 && status == PW_OK; which++) {
-    char *anchor;
-    status = search_anchor (which, &anchor, error);
-    for (int i = 0; anchor && status == PW_OK && i < 3; i++) {
-      char *folder = pw_path_join (anchor, where[which][i], "");
+  for (search_anchor anchor = 0; anchor < SEARCH_ANCHORS && status == PW_OK; anchor++) {
+    char *parent;
+    status = search_anchor_folder (anchor, &parent, error);
+    for (int i = 0; parent && status == PW_OK && i < 3; i++) {
+      char *folder = pw_path_join (parent, where[anchor][i], "");
       status = folder ? visit (context, folder, error) : search_no_memory (error);
       free (folder);
     }
-    free (anchor);
+    free (parent);
   }
   return status;
 }
@@ -104,15 +107,15 @@ static int search_add_folder (pw_search *s, const char *real) {
   return 1;
 }
 
-/* Skips missing and inaccessible folders, as for PATH; other failures are errors. */
+/* Adds the models in a folder; skips missing and inaccessible folders, as for PATH; other failures are errors. */
 static int search_folder (void *context, const char *folder, pw_error *error) {
   pw_search *s = context;
   char *real = realpath (folder, NULL);
   if (real == NULL && errno == ENOMEM) return search_no_memory (error);
-  int fresh = real && search_add_folder (s, real);
+  int is_new = real && search_add_folder (s, real);
   free (real);
-  DIR *dir = fresh ? opendir (folder) : NULL;
-  if (fresh && dir == NULL && (errno == ENOMEM || errno == EMFILE || errno == ENFILE))
+  DIR *dir = is_new ? opendir (folder) : NULL;
+  if (is_new && dir == NULL && (errno == ENOMEM || errno == EMFILE || errno == ENFILE))
     return pw_fail (error, PW_RESOURCE, "cannot look into the folder %s: %s", folder, strerror (errno));
   if (dir == NULL) return PW_OK;
   int status = PW_OK;
@@ -123,7 +126,7 @@ static int search_folder (void *context, const char *folder, pw_error *error) {
 }
 
 /* Whether a folder can be searched; if not, adds it to s->unread with the reason. */
-static int search_can (pw_search *s, const char *folder) {
+static int search_is_readable (pw_search *s, const char *folder) {
   char inside[PATH_MAX];
   size_t used = strlen (s->unread);
   snprintf (inside, sizeof inside, "%s/.", folder);
@@ -139,7 +142,7 @@ static int search_environment (pw_search *s, pw_error *error) {
   if (copy == NULL) return search_no_memory (error);
   int status = PW_OK;
   while (status == PW_OK && (folder = strsep (&rest, ":")) != NULL)
-    if (*folder && search_can (s, folder)) status = search_folder (s, folder, error);
+    if (*folder && search_is_readable (s, folder)) status = search_folder (s, folder, error);
   free (copy);
   return status;
 }
@@ -169,10 +172,10 @@ void pw_search_close (pw_search *s) {
 
 typedef struct {
   const char *file;
-  char *path; /* of the first that can be read */
+  char *path; /* of the first one that can be read, or NULL */
 } search_file;
 
-static int search_find_file (void *context, const char *folder, pw_error *error) {
+static int search_visit_file (void *context, const char *folder, pw_error *error) {
   search_file *x = context;
   char *path = x->path ? NULL : pw_path_join (folder, x->file, "");
   if (x->path == NULL && path == NULL) return search_no_memory (error);
@@ -183,20 +186,21 @@ static int search_find_file (void *context, const char *folder, pw_error *error)
   return PW_OK;
 }
 
+static int search_find (search_folders where, const char *file, char **path, pw_error *error) {
+  search_file x = { file, NULL };
+  int status = search_visit (where, search_visit_file, &x, error);
+  *path = x.path;
+  return status;
+}
+
 int pw_search_header (char **path, pw_error *error) {
   static const search_folders where = { { "include", "../include", "../include/pinwheel" },
                                         { "include", "../include", "../include/pinwheel" } };
-  search_file x = { "pinwheel.h", NULL };
-  int status = search_visit (where, search_find_file, &x, error);
-  *path = x.path;
-  return status;
+  return search_find (where, "pinwheel.h", path, error);
 }
 
 int pw_search_page_file (const char *file, char **path, pw_error *error) {
   static const search_folders where = { { "page", "../page", "../lib/pinwheel/page" },
                                         { "page", "../page", "pinwheel/page" } };
-  search_file x = { file, NULL };
-  int status = search_visit (where, search_find_file, &x, error);
-  *path = x.path;
-  return status;
+  return search_find (where, file, path, error);
 }

@@ -58,6 +58,7 @@ const pw_unit_name pw_unit_names[] = {
 
 enum { UNITS_BASE = 4 }; /* base units, first in the list */
 
+/* A unit: its factor to SI units, and its dimension as powers of the base units. */
 typedef struct {
   double factor;
   int power[UNITS_BASE];
@@ -65,8 +66,8 @@ typedef struct {
 
 static int units_read (const char *text, units_value *u);
 
-/* Multiplies by a power of the unit whose name has n bytes. */
-static int units_name (const char *name, size_t n, int power, units_value *u) {
+/* Multiplies *u by a power of the unit whose name has n bytes. */
+static int units_multiply (const char *name, size_t n, int power, units_value *u) {
   units_value one = { .factor = 1 };
   const pw_unit_name *unit = pw_unit_names;
   while (unit->name && !(strlen (unit->name) == n && memcmp (unit->name, name, n) == 0)) unit++;
@@ -84,7 +85,7 @@ static int units_name (const char *name, size_t n, int power, units_value *u) {
   return PW_OK;
 }
 
-/* The power after a name: "^2", "²", "2"; 1 if there is none. */
+/* Stores the power at p, after a name: "^2", "²", "2"; 1 if there is none, 0 if it is refused.  Returns its end. */
 static const char *units_power (const char *p, int *power) {
   static const char square[] = "\xC2\xB2", cube[] = "\xC2\xB3";
   char *end;
@@ -97,40 +98,42 @@ static const char *units_power (const char *p, int *power) {
   return end;
 }
 
+/* Reads a product of names with powers; a slash divides by the next name only.  PW_INPUT if the text is none. */
 static int units_read (const char *text, units_value *u) {
-  static const char ends[] = " */^0123456789-\xC2"; /* the last begins a raised digit or a middle dot */
+  static const char ends[] = " */^0123456789-\xC2"; /* of a name; the last begins a raised digit or a middle dot */
   static const char dot[] = "\xC2\xB7";
-  int over = 0;
+  int divide = 0;
   *u = (units_value){ .factor = 1 };
   for (const char *p = text; *p;) {
     int power;
-    size_t sign = strncmp (p, "°", 2) == 0 || strncmp (p, "µ", 2) == 0 ? 2 : 0;
-    size_t n = sign + strcspn (p + sign, ends);
+    size_t symbol = strncmp (p, "°", 2) == 0 || strncmp (p, "µ", 2) == 0 ? 2 : 0; /* begins with \xC2, too */
+    size_t n = symbol + strcspn (p + symbol, ends);
     if (n == 0 && *p == '1') n = 1;
     if (n > 0) {
       const char *after = units_power (p + n, &power);
-      if (power == 0 || units_name (p, n, over ? -power : power, u) != PW_OK) return PW_INPUT;
-      over = 0;
+      if (power == 0 || units_multiply (p, n, divide ? -power : power, u) != PW_OK) return PW_INPUT;
+      divide = 0;
       p = after;
     }
-    n = strspn (p, " *");
-    if (*(p += n) == '/' && !over)
-      over = 1, p++, n++;
+    size_t separators = strspn (p, " *");
+    p += separators;
+    if (*p == '/' && !divide)
+      divide = 1, p++, separators++;
     else if (strncmp (p, dot, 2) == 0)
-      p += 2, n++;
+      p += 2, separators++;
     p += strspn (p, " ");
-    if (n == 0 && *p) return PW_INPUT;
+    if (separators == 0 && *p) return PW_INPUT;
   }
-  return over || *text == 0 ? PW_INPUT : PW_OK;
+  return divide || *text == 0 ? PW_INPUT : PW_OK;
 }
 
 int pw_unit_factor (const char *unit, const char *wanted, double *factor) {
-  units_value u, w;
+  units_value given, expected;
   *factor = 1;
-  if (units_read (unit, &u) != PW_OK) return PW_INPUT;
-  *factor = u.factor;
-  if (wanted == NULL || units_read (wanted, &w) != PW_OK) return PW_OK;
-  return memcmp (u.power, w.power, sizeof u.power) == 0 ? PW_OK : PW_RETRY;
+  if (units_read (unit, &given) != PW_OK) return PW_INPUT;
+  *factor = given.factor;
+  if (wanted == NULL || units_read (wanted, &expected) != PW_OK) return PW_OK;
+  return memcmp (given.power, expected.power, sizeof given.power) == 0 ? PW_OK : PW_RETRY;
 }
 
 size_t pw_unit_split (const char *cell, char *unit, size_t size) {

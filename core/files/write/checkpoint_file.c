@@ -1,4 +1,4 @@
-/* Checkpoints as files. */
+/* Checkpoints as files: a head in text, then the state of a run in binary, with a checksum of both. */
 #include <stdint.h>
 #include <stdlib.h>
 #include <string.h>

@@ -1,10 +1,14 @@
-/* Tables of samples, one line each, readable by Octave, Python and gnuplot, or as a NumPy archive.
+/* Tables of samples: CSV with a line per sample, or NumPy archives.  The columns are
  *
- *   t [s] | states of each body, of each internal coordinate | contact points | reactions | residuals | energies */
+ *   t [s] | states of each body, of each internal coordinate | contact points | reactions | residuals | energies
+ *
+ * The functions of a group of columns write their names or, with a sample, their values. */
 #include <errno.h>
 #include <math.h>
 #include <stdlib.h>
 #include "files.h"
+
+typedef enum { CSV_NAMES, CSV_VALUES } csv_content;
 
 struct pw_csv {
   const pw_system *system;
@@ -13,19 +17,19 @@ struct pw_csv {
   double (*contact)[3];    /* contact points of the system */
   pw_output *output;
   FILE *f;
-  int names;  /* 1: the names of the columns are being written, 0: their values */
-  int cells;  /* written in the current line */
-  int failed; /* 1: memory was exhausted */
-  /* a NumPy archive, whose arrays are written when the table is closed */
+  csv_content content; /* of the current line */
+  int cells;           /* written in the current line */
+  int failed;          /* 1: memory was exhausted */
+  /* of an archive, whose arrays are written when the table is closed */
   int is_archive;
-  double *value; /* line by line */
-  size_t values, room, columns;
+  double *value;                /* line by line */
+  size_t values, room, columns; /* so far; allocated; values per line */
   pw_npz npz;
 };
 
 /* ---- Cells ---- */
 
-/* Adds the next column to the archive. */
+/* Adds the next column to the archive: its values are `columns` apart. */
 static void csv_array (pw_csv *c, const char *name) {
   size_t rows = c->columns ? c->values / c->columns : 0;
   double *column = malloc ((rows + 1) * sizeof *column);
@@ -58,7 +62,7 @@ static void csv_number (pw_csv *c, double value) {
 }
 
 static void csv_cell (pw_csv *c, const char *name, const char *unit, double value) {
-  if (c->names)
+  if (c->content == CSV_NAMES)
     csv_name (c, name, unit);
   else
     csv_number (c, value);
@@ -69,7 +73,7 @@ static void csv_cell (pw_csv *c, const char *name, const char *unit, double valu
 static void csv_state (pw_csv *c, const pw_sample *x, int state) {
   char name[300];
   int n = pw_system_coordinates (c->system);
-  if (c->names)
+  if (c->content == CSV_NAMES)
     csv_name (c, pw_system_state_name (c->system, state, name, sizeof name), pw_system_state_unit (c->system, state));
   else
     csv_number (c, state < n ? x->q[state] : x->v[state - n]);
@@ -90,7 +94,7 @@ static void csv_contacts (pw_csv *c) {
   for (int e = 0; c->workspace && e < pw_system_elements (c->system); e++) {
     const pw_element_info x = pw_system_element (c->system, e);
     for (int i = 0; x.contact >= 0 && i < 2; i++) {
-      if (c->names) snprintf (name, sizeof name, "%s.%c", x.name, "xy"[i]);
+      if (c->content == CSV_NAMES) snprintf (name, sizeof name, "%s.%c", x.name, "xy"[i]);
       csv_cell (c, name, "m", c->contact[x.contact][i]);
     }
   }
@@ -99,7 +103,7 @@ static void csv_contacts (pw_csv *c) {
 static void csv_reactions (pw_csv *c, const pw_sample *x) {
   char name[300];
   for (int i = 0; i < pw_system_rows (c->system); i++)
-    if (c->names)
+    if (c->content == CSV_NAMES)
       csv_name (c, pw_system_reaction_name (c->system, i, name, sizeof name), pw_system_reaction_unit (c->system, i));
     else
       csv_number (c, 0 - x->lambda[i]); /* avoids -0 */
@@ -110,17 +114,17 @@ static void csv_ledger (pw_csv *c, const pw_sample *x) {
   csv_cell (c, "kinetic", "J", x->kinetic);
   csv_cell (c, "potential", "J", x->potential);
   for (int i = 0; i < pw_system_ledger_entries (c->system); i++) {
-    if (c->names) pw_system_ledger_name (c->system, i, name, sizeof name);
+    if (c->content == CSV_NAMES) pw_system_ledger_name (c->system, i, name, sizeof name);
     csv_cell (c, name, "J", x->ledger ? x->ledger[i] : NAN);
   }
   csv_cell (c, "projection", "J", x->projection);
   csv_cell (c, "balance", "J", x->balance);
 }
 
-/* A line of names, with any sample, or of values. */
-static int csv_line (pw_csv *c, int names, const pw_sample *x, pw_error *error) {
+/* A line of names, or of the values of a sample. */
+static int csv_line (pw_csv *c, csv_content content, const pw_sample *x, pw_error *error) {
   errno = 0; /* for pw_output_check */
-  c->names = names;
+  c->content = content;
   c->cells = 0;
   csv_cell (c, "t", "s", x->t);
   csv_states (c, x);
@@ -161,8 +165,8 @@ pw_csv *pw_csv_open (const pw_system *s, int ledger, pw_output *o, pw_error *err
     c->contact = calloc ((size_t)contacts + 1, sizeof *c->contact);
     c->workspace = contacts > 0 ? pw_workspace_new (s, error) : NULL;
   }
-  int good = c && c->contact && (c->workspace || contacts == 0);
-  if (good && (is_archive || continued || csv_line (c, 1, &csv_no_sample, error) == PW_OK)) return c;
+  int complete = c && c->contact && (c->workspace || contacts == 0);
+  if (complete && (is_archive || continued || csv_line (c, CSV_NAMES, &csv_no_sample, error) == PW_OK)) return c;
   pw_fail (error, PW_RESOURCE, "out of memory while writing a table");
   csv_free (c);
   return NULL;
@@ -173,13 +177,13 @@ int pw_csv_write (pw_csv *c, const pw_system *s, const pw_sample *sample, pw_err
   (void)s; /* that of pw_csv_open */
   if (c->workspace)
     status = pw_workspace_contact_points (c->workspace, sample->t, sample->q, sample->v, c->contact, error);
-  return status == PW_OK ? csv_line (c, 0, sample, error) : status;
+  return status == PW_OK ? csv_line (c, CSV_VALUES, sample, error) : status;
 }
 
 int pw_csv_close (pw_csv *c, pw_error *error) {
   int status = PW_OK;
   if (c && c->is_archive) {
-    status = csv_line (c, 1, &csv_no_sample, error);
+    status = csv_line (c, CSV_NAMES, &csv_no_sample, error);
     int end = pw_npz_end (&c->npz, error);
     if (status == PW_OK) status = end == PW_OK ? pw_output_check (c->output, error) : end;
   }

@@ -6,12 +6,12 @@
 
 /* ---- Items ---- */
 
-/* Writes the separator before an item or the end of a container. */
-static void json_separator (pw_json *j, int depth, const char *otherwise) {
+/* Before an item or the end of a container: a new line, indented by depth, or the text used within a line. */
+static void json_separator (pw_json *j, int depth, const char *within_line) {
   if (j->depth <= j->lines || j->line)
     fprintf (j->f, "\n%*s", 2 * depth, "");
   else
-    fputs (otherwise, j->f);
+    fputs (within_line, j->f);
   j->line = 0;
 }
 
@@ -183,9 +183,11 @@ static void json_statistics (pw_json *j, const pw_statistics *n, double cpu) {
   json_numbers (j, "statistics", names, n ? value : NULL, 8);
 }
 
+enum { JSON_ALL_LEVELS = 99 };
+
 int pw_json_write (const pw_summary *summary, const pw_system *s, const pw_sample *sample, int ledger,
                    const pw_statistics *statistics, pw_output *o, pw_error *error) {
-  pw_json j = { .f = pw_output_stream (o), .lines = 99 };
+  pw_json j = { .f = pw_output_stream (o), .lines = JSON_ALL_LEVELS };
   errno = 0;
   pw_json_open (&j, NULL, '{');
   pw_json_number (&j, "schema", 1);

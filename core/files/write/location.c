@@ -1,4 +1,4 @@
-/* Opens inputs; follows links, also to files that do not exist yet; detects names of the same file. */
+/* Opens files for reading; follows links, also to files that do not exist yet; detects names of the same file. */
 #include <errno.h>
 #include <fcntl.h>
 #include <stdlib.h>
@@ -11,10 +11,10 @@ FILE *pw_open_input (const char *path, const char **why) {
   int file = open (path, O_RDONLY | O_NONBLOCK | O_NOCTTY | O_CLOEXEC); /* does not block on a FIFO */
   FILE *f = file >= 0 && fstat (file, &info) == 0 && S_ISREG (info.st_mode) ? fdopen (file, "rb") : NULL;
   if (f) return f;
-  int number = S_ISREG (info.st_mode) ? errno : 0;
-  *why = number ? strerror (number) : pw_not_regular (info.st_mode);
+  int code = S_ISREG (info.st_mode) ? errno : 0;
+  *why = code ? strerror (code) : pw_not_regular (info.st_mode);
   if (file >= 0) close (file);
-  errno = number;
+  errno = code; /* for pw_open_input_status */
   return NULL;
 }
 
@@ -94,7 +94,7 @@ typedef struct {
   const pw_use *use;
   pw_location location;
   struct stat folder; /* that contains it */
-  int known;          /* 1: the folder was found */
+  int known;          /* 1: `folder` was found */
 } location_use;
 
 /* Ignores files that cannot be located, since opening them reports it.  PW_RESOURCE if out of memory. */
@@ -110,27 +110,30 @@ static int location_use_find (location_use *u, const pw_use *use) {
 
 /* Whether a name is `before` (NULL: any name) followed by one of the endings. */
 static int location_ends (const char *name, const char *before, const char *const *ending) {
-  size_t n = before ? strlen (before) : 0, m = strlen (name);
+  size_t size = strlen (name);
   for (; *ending; ending++) {
-    size_t e = strlen (*ending);
-    if (m >= e && strcmp (name + m - e, *ending) == 0 && (before == NULL || (m == n + e && !memcmp (name, before, n))))
-      return 1;
+    size_t ending_size = strlen (*ending), rest = size - ending_size;
+    if (size < ending_size || strcmp (name + rest, *ending) != 0) continue;
+    if (before == NULL || (strlen (before) == rest && memcmp (name, before, rest) == 0)) return 1;
   }
   return 0;
 }
 
+static int location_is_null_device (const struct stat *info) {
+  struct stat null;
+  return S_ISCHR (info->st_mode) && stat ("/dev/null", &null) == 0 && null.st_rdev == info->st_rdev;
+}
+
 /* Whether writing `a` affects `b`: the same file, a temporary file, or a file written into a folder. */
 static int location_conflicts (const location_use *a, const location_use *b) {
-  static const char *const temporary[] = { ".part", ".sorted", ".next", NULL };
-  struct stat null;
+  static const char *const temporary[] = { ".part", ".sorted", ".next", NULL }; /* of tables, sweeps, checkpoints */
+  const struct stat *info = &a->location.info;
   if (a->use->how == PW_READS || !a->known || !b->known) return 0;
   const char *name = location_base (b->location.path);
   if (a->use->how == PW_WRITES_INTO)
-    return a->location.exists && location_same (&a->location.info, &b->folder) &&
-           location_ends (name, NULL, a->use->names);
-  if (a->location.exists && b->location.exists && location_same (&a->location.info, &b->location.info))
-    return !(S_ISCHR (a->location.info.st_mode) && stat ("/dev/null", &null) == 0 &&
-             null.st_rdev == a->location.info.st_rdev);
+    return a->location.exists && location_same (info, &b->folder) && location_ends (name, NULL, a->use->names);
+  if (a->location.exists && b->location.exists && location_same (info, &b->location.info))
+    return !location_is_null_device (info);
   if (a->location.descriptor >= 0 || b->location.descriptor >= 0 || !location_same (&a->folder, &b->folder)) return 0;
   return strcmp (name, location_base (a->location.path)) == 0 ||
          location_ends (name, location_base (a->location.path), temporary);

@@ -1,7 +1,6 @@
 /* Files and folders that are locked while a process uses them.
  *
- * The lock counts, not the existence of the file: a lock ends with its process, so files left by a killed process do
- * not block others. */
+ * The lock counts, not the existence of the file: a lock ends with its process, so a file that one left is no lock. */
 #include <errno.h>
 #include <fcntl.h>
 #include <string.h>
@@ -27,12 +26,12 @@ const char *pw_lock_reason (int code) {
                              : strerror (code);
 }
 
-/* Opens the file, never through a symbolic link, and creates it unless `how` is PW_LOCK_EXISTING; *created is 1 only if it
- * did not exist. */
-static int lock_open_file (const char *path, pw_lock_how how, int *created) {
-  int file = how == PW_LOCK_EXISTING ? -1 : open (path, O_RDWR | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC, 0666);
+/* Opens the file, never through a symbolic link, and creates it unless `mode` is PW_LOCK_EXISTING; *created: it is
+ * new. */
+static int lock_open_file (const char *path, pw_lock_mode mode, int *created) {
+  int file = mode == PW_LOCK_EXISTING ? -1 : open (path, O_RDWR | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC, 0666);
   *created = file >= 0;
-  if (*created || (how != PW_LOCK_EXISTING && errno != EEXIST)) return file;
+  if (*created || (mode != PW_LOCK_EXISTING && errno != EEXIST)) return file;
   return open (path, O_RDWR | O_NOFOLLOW | O_NONBLOCK | O_NOCTTY | O_CLOEXEC);
 }
 
@@ -46,15 +45,15 @@ static int lock_descriptor (int file, const char *path) {
   return lstat (path, &now) == 0 && now.st_dev == info.st_dev && now.st_ino == info.st_ino ? 0 : ESTALE;
 }
 
-int pw_lock_file (const char *path, pw_lock_how how) {
+int pw_lock_file (const char *path, pw_lock_mode mode) {
   for (int tries = 0; tries < LOCK_TRIES; tries++) {
-    int created, file = lock_open_file (path, how, &created), code = file < 0 ? errno : lock_descriptor (file, path);
-    if (code == 0 && (created || how != PW_LOCK_NEW)) return file;
+    int created, file = lock_open_file (path, mode, &created), code = file < 0 ? errno : lock_descriptor (file, path);
+    if (code == 0 && (created || mode != PW_LOCK_NEW)) return file;
     if (code == 0 && unlink (path) != 0) code = errno;                                /* left by a killed process */
     if (created && code != 0 && code != ESTALE && code != EWOULDBLOCK) unlink (path); /* else it is another process's */
     if (file >= 0) close (file);
     errno = code;
-    if (code != 0 && code != ESTALE && (code != ENOENT || how == PW_LOCK_EXISTING)) return -1;
+    if (code != 0 && code != ESTALE && (code != ENOENT || mode == PW_LOCK_EXISTING)) return -1;
   }
   if (errno == 0 || errno == ESTALE) errno = EWOULDBLOCK; /* others create and remove it all the time */
   return -1;

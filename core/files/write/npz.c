@@ -1,5 +1,5 @@
-/* NumPy archives (.npz): a zip file without compression, of one .npy file for each array (numpy.lib.format, version 1.0;
- * PKWARE's APPNOTE). */
+/* NumPy archives (.npz): a zip file (PKWARE's APPNOTE) without compression, of a .npy file (numpy.lib.format 1.0) per
+ * array. */
 #include <stdlib.h>
 #include <string.h>
 #include "files.h"
@@ -7,13 +7,19 @@
 enum { NPZ_HEAD = 128 };   /* bytes before the data of a .npy file, a multiple of 64 */
 enum { NPZ_MOST = 65535 }; /* files of an archive */
 
+/* The first four bytes of the header of a file, of its entry in the directory, of the end record; the version 2.0. */
+#define NPZ_FILE 0x04034b50
+#define NPZ_ENTRY 0x02014b50
+#define NPZ_END 0x06054b50
+#define NPZ_VERSION 20
+
 struct pw_npz_entry {
   char name[312];
   unsigned long check, size, offset;
 };
 
-/* CRC-32 of zip files, continued from `check`, four bits at a time; begins with 0. */
-static unsigned long npz_check (unsigned long check, const void *data, size_t size) {
+/* CRC-32 with the polynomial 0xedb88320, as in zip files, four bits at a time, continued from `check`, at first 0. */
+static unsigned long npz_crc (unsigned long check, const void *data, size_t size) {
   static const unsigned long part[16] = { 0x00000000, 0x1db71064, 0x3b6e20c8, 0x26d930ac, 0x76dc4190, 0x6b6b51f4,
                                           0x4db26158, 0x5005713c, 0xedb88320, 0xf00f9344, 0xd6d6a3e8, 0xcb61b38c,
                                           0x9b64c2b0, 0x86d3d2d4, 0xa00ae278, 0xbdbdf21c };
@@ -38,8 +44,8 @@ static void npz_number (pw_npz *z, unsigned long value, int bytes) {
 /* What the header of a file and its entry in the directory have in common: version 2.0, no flags, stored, 1 January
  * 1980, checksum, compressed and original size, lengths of the name and of extra fields. */
 static void npz_describe (pw_npz *z, const struct pw_npz_entry *e) {
-  npz_number (z, 20, 2);
-  npz_number (z, 0, 4);
+  npz_number (z, NPZ_VERSION, 2);
+  npz_number (z, 0, 4); /* flags, method */
   npz_number (z, 0x00210000, 4);
   npz_number (z, e->check, 4);
   npz_number (z, e->size, 4);
@@ -65,10 +71,10 @@ void pw_npz_add (pw_npz *z, const char *name, long rows, long columns, int parts
   memset (strchr (head + 10, 0), ' ', (size_t)(head + NPZ_HEAD - strchr (head + 10, 0)));
   head[NPZ_HEAD - 1] = '\n';
   snprintf (e->name, sizeof e->name, "%.300s.npy", name);
-  e->check = npz_check (npz_check (0, head, NPZ_HEAD), value, size);
+  e->check = npz_crc (npz_crc (0, head, NPZ_HEAD), value, size);
   e->size = NPZ_HEAD + size;
   e->offset = z->at;
-  npz_number (z, 0x04034b50, 4);
+  npz_number (z, NPZ_FILE, 4);
   npz_describe (z, e);
   npz_bytes (z, e->name, strlen (e->name));
   npz_bytes (z, head, NPZ_HEAD);
@@ -79,8 +85,8 @@ void pw_npz_add (pw_npz *z, const char *name, long rows, long columns, int parts
 static void npz_directory (pw_npz *z) {
   unsigned long start = z->at;
   for (const struct pw_npz_entry *e = z->entry; e < z->entry + z->count; e++) {
-    npz_number (z, 0x02014b50, 4);
-    npz_number (z, 20, 2);
+    npz_number (z, NPZ_ENTRY, 4);
+    npz_number (z, NPZ_VERSION, 2);
     npz_describe (z, e);
     npz_number (z, 0, 6); /* comment, disk, internal attributes */
     npz_number (z, 0, 4);
@@ -88,7 +94,7 @@ static void npz_directory (pw_npz *z) {
     npz_bytes (z, e->name, strlen (e->name));
   }
   unsigned long size = z->at - start;
-  npz_number (z, 0x06054b50, 4);
+  npz_number (z, NPZ_END, 4);
   npz_number (z, 0, 4);
   npz_number (z, (unsigned long)z->count, 2);
   npz_number (z, (unsigned long)z->count, 2);

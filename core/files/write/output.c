@@ -19,7 +19,7 @@ struct pw_output {
   int folder;    /* that contains it; -1: written directly */
   int code;      /* errno of the first failed write */
   int continued; /* 1: continues a file that is not empty */
-  int discard;   /* 1: an incomplete file is removed */
+  int discard;   /* 1: the temporary file is removed unless the output is finished */
 };
 
 static void output_free (pw_output *o) {
@@ -32,13 +32,24 @@ static void output_free (pw_output *o) {
   free (o);
 }
 
-static int output_fail (const pw_output *o, int code, int kept, pw_error *error) {
-  const char *what = strcmp (o->path, "-") == 0 ? "standard output" : o->path;
-  const char *reason = code > 0 ? pw_lock_reason (code) : "a write failed";
-  if (o->part && kept && !o->discard)
-    return pw_fail (error, PW_RESOURCE, "cannot write %.200s: %s; what was written is in %.200s", what, reason,
-                    o->part);
-  return pw_fail (error, PW_RESOURCE, "cannot write %s: %s", what, reason);
+static const char *output_shown (const pw_output *o) {
+  return strcmp (o->path, "-") == 0 ? "standard output" : o->path;
+}
+
+/* code: an errno value, or -1 for an unknown reason. */
+static const char *output_reason (int code) {
+  return code > 0 ? pw_lock_reason (code) : "a write failed";
+}
+
+static int output_fail (const pw_output *o, int code, pw_error *error) {
+  return pw_fail (error, PW_RESOURCE, "cannot write %s: %s", output_shown (o), output_reason (code));
+}
+
+/* The same, after the temporary file is complete or was abandoned: names it, if it remains. */
+static int output_fail_with_part (const pw_output *o, int code, pw_error *error) {
+  if (o->part == NULL || o->discard) return output_fail (o, code, error);
+  return pw_fail (error, PW_RESOURCE, "cannot write %.200s: %s; what was written is in %.200s", output_shown (o),
+                  output_reason (code), o->part);
 }
 
 /* ---- Opening ---- */
@@ -52,8 +63,7 @@ static int output_stream_of (pw_output *o, int file, const char *mode) {
   return code;
 }
 
-/* Opens a descriptor of the process or a file that is not regular.  A FIFO blocks until it has a reader or a signal
- * arrives. */
+/* Opens a descriptor of the process or a file that is not regular.  A FIFO blocks until it has a reader or a signal. */
 static int output_open_direct (pw_output *o, const pw_location *p) {
   int flags = p->descriptor < 0 ? O_WRONLY : fcntl (p->descriptor, F_GETFL);
   if (flags < 0) return errno;
@@ -67,7 +77,7 @@ static int output_open_direct (pw_output *o, const pw_location *p) {
   return output_stream_of (o, file, "w");
 }
 
-/* Copies the mode and, if permitted, the owner of the file to be replaced. */
+/* Gives the new file owner and group of the old one, if permitted, and its mode, else without set-user-ID bits. */
 static int output_inherit (int file, const struct stat *old) {
   struct stat now;
   mode_t mode = old->st_mode & 07777;
@@ -85,14 +95,14 @@ static int output_stream (pw_output *o) {
 }
 
 /* Opens the folder and locks the temporary file. */
-static int output_open_part (pw_output *o, pw_lock_how how) {
+static int output_open_part (pw_output *o, pw_lock_mode lock_mode) {
   char *folder = pw_folder_of (o->real);
   if (folder == NULL) return ENOMEM;
   o->folder = open (folder, O_RDONLY | O_DIRECTORY | O_CLOEXEC);
   int code = o->folder < 0 && errno != EACCES ? errno : 0; /* a folder that cannot be listed may still be writable */
   free (folder);
   if (code) return code;
-  o->file = pw_lock_file (o->part, how);
+  o->file = pw_lock_file (o->part, lock_mode);
   return o->file < 0 ? errno : 0;
 }
 
@@ -156,7 +166,7 @@ pw_output *pw_output_open_as (const char *path, const char *ending, pw_error *er
   int code = output_open_file (o, ending);
   if (code == 0) return o;
   if (code == ENOMEM) pw_fail (error, PW_RESOURCE, "cannot write %s: out of memory", path);
-  output_fail (o, code, 0, error);
+  output_fail (o, code, error);
   output_free (o);
   return NULL;
 }
@@ -176,7 +186,7 @@ int pw_output_is_file (const pw_output *o) {
 int pw_output_check (pw_output *o, pw_error *error) {
   if (!ferror (o->stream)) return PW_OK;
   if (o->code == 0) o->code = errno;
-  return output_fail (o, o->code, 0, error);
+  return output_fail (o, o->code, error);
 }
 
 int pw_output_text (pw_output *o, const char *text, size_t size, pw_error *error) {
@@ -206,7 +216,7 @@ static int output_close (pw_output *o, int code) {
 
 int pw_output_ready (pw_output *o, pw_error *error) {
   if (o->stream) o->code = output_close (o, output_sync (o));
-  return o->code ? output_fail (o, o->code, 1, error) : PW_OK;
+  return o->code ? output_fail_with_part (o, o->code, error) : PW_OK;
 }
 
 /* Truncates the temporary file after its last complete line. */
@@ -243,7 +253,7 @@ static int output_sync_folder (const pw_output *o, pw_error *error) {
 static int output_rename_all (pw_output *const *o, int count, pw_error *error) {
   for (int i = 0; i < count; i++) {
     if (o[i] == NULL || o[i]->part == NULL || rename (o[i]->part, o[i]->real) == 0) continue;
-    int status = output_fail (o[i], errno, 1, error);
+    int status = output_fail_with_part (o[i], errno, error);
     while (i-- > 0)
       if (o[i] && o[i]->part) (void)rename (o[i]->real, o[i]->part);
     return status;
@@ -276,10 +286,11 @@ int pw_output_finish (pw_output *o, pw_error *error) {
 
 /* ---- Continuation of an interrupted run ---- */
 
-/* Checksum of the last 64 kB before `length`; PW_RETRY if the file is shorter. */
+/* Sets mark->check from the last OUTPUT_CHECKED bytes before mark->length; PW_RETRY if the file is shorter. */
+enum { OUTPUT_CHECKED = 65536 };
 static int output_checksum (int file, pw_mark *mark) {
   char bytes[4096];
-  unsigned long long at = mark->length > 65536 ? mark->length - 65536 : 0;
+  unsigned long long at = mark->length > OUTPUT_CHECKED ? mark->length - OUTPUT_CHECKED : 0;
   mark->check = PW_CHECK;
   while (at < mark->length) {
     size_t want = mark->length - at < sizeof bytes ? (size_t)(mark->length - at) : sizeof bytes;
@@ -304,7 +315,7 @@ int pw_output_mark (pw_output *o, pw_mark *mark, pw_error *error) {
     return pw_fail (error, PW_INPUT, "%s cannot be continued: it is not a regular file",
                     o->stream == stdout ? "standard output" : o->path);
   int code = output_sync (o);
-  if (code) return output_fail (o, code, 0, error);
+  if (code) return output_fail (o, code, error);
   mark->length = (unsigned long long)ftello (o->stream);
   if (output_checksum (o->file, mark) == PW_OK) return PW_OK;
   return pw_fail (error, PW_RESOURCE, "cannot read %s", o->part);
@@ -327,13 +338,13 @@ static int output_restore_part (pw_output *o, const pw_mark *mark) {
 static int output_reopen (pw_output *o, const pw_mark *mark, pw_error *error) {
   pw_location p;
   int code = output_name (o, &p, ".part");
-  if (code) return output_fail (o, code, 0, error);
+  if (code) return output_fail (o, code, error);
   if (o->part == NULL) return pw_fail (error, PW_INPUT, "cannot continue %s: it is not a regular file", o->path);
   code = output_open_part (o, PW_LOCK_EXISTING);
   int absent = code == ENOENT;
   if (absent) code = output_restore_part (o, mark);
   if (code == ENOENT) return pw_fail (error, PW_INPUT, "cannot continue %s: there is no %s", o->path, o->part);
-  if (code) return output_fail (o, code, 0, error);
+  if (code) return output_fail (o, code, error);
   if (!output_is_marked (o, mark))
     return pw_fail (error, PW_INPUT, "cannot continue %s: %s is not the table that the checkpoint belongs to", o->path,
                     absent ? "it" : o->part);

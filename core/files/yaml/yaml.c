@@ -6,23 +6,24 @@
 #include <string.h>
 #include "yaml.h"
 
-#define YAML_AHEAD 1e6 /* indicators of one list or map in brackets; about 350 bytes each */
+#define YAML_MAX_AHEAD 1e6 /* indicators of one list or map in brackets; about 350 bytes each */
 
 /* ---- Parameters ---- */
 
 /* Reads a unique name that expressions can use. */
-static int yaml_new_name (const pw_reader *r, const pw_node *node, const char *what, pw_names *names) {
+static int yaml_new_name (const pw_reader *r, const pw_node *node, const char *label, pw_names *names) {
   const char *name;
-  if (pw_yaml_text (r, node, what, &name) != PW_OK) return r->error->status;
+  if (pw_yaml_text (r, node, label, &name) != PW_OK) return r->error->status;
   if (!pw_expression_is_name (name))
     return pw_yaml_fail (r, node->at, "%s \"%.60s\": expected a letter, then letters, digits and _, at most 63 in all",
-                         what, name);
+                         label, name);
   if (strcmp (name, "t") == 0 || pw_expression_is_reserved (name))
-    return pw_yaml_fail (r, node->at, "%s \"%s\": this name is reserved: %s", what, name,
+    return pw_yaml_fail (r, node->at, "%s \"%s\": this name is reserved: %s", label, name,
                          *name == 't' && name[1] == 0 ? "it is the time" : "a function or constant");
-  return pw_names_add (names, name, 0) >= 0 ? pw_yaml_fail (r, node->at, "a second %s \"%s\"", what, name) : PW_OK;
+  return pw_names_add (names, name, 0) >= 0 ? pw_yaml_fail (r, node->at, "a second %s \"%s\"", label, name) : PW_OK;
 }
 
+/* `domain: positive`, or `min: 0`. */
 static int yaml_domain (const pw_reader *r, const pw_node *domain, const pw_node *min, pw_domain *d) {
   static const char *const name[] = { "real", "nonnegative", "positive", "count", NULL };
   int chosen = min ? PW_NONNEGATIVE : PW_REAL;
@@ -40,7 +41,7 @@ static const char *yaml_find_word (const char *text, const char *name) {
   return NULL;
 }
 
-/* Refuses units other than SI units: 40 with the unit deg would mean 40 rad. */
+/* Reads the unit of a parameter and refuses those other than SI units: 40 with the unit deg would mean 40 rad. */
 static int yaml_unit (const pw_reader *r, const pw_node *node, const pw_node *value, const char **unit) {
   if (node == NULL || pw_yaml_text (r, node, "unit", unit) != PW_OK) return r->error->status;
   int number = value->type == PW_YAML_SCALAR && pw_expression_number (value->text, &(double){ 0 });
@@ -58,36 +59,37 @@ static int yaml_unit (const pw_reader *r, const pw_node *node, const pw_node *va
 }
 
 /* A default must not depend on other parameters: --set would have to change it, too. */
-static int yaml_default (const pw_reader *r, const pw_node *node, const char *what, const pw_names *names,
+static int yaml_default (const pw_reader *r, const pw_node *node, const char *label, const pw_names *names,
                          pw_parameter *p) {
   const char *text = node->type == PW_YAML_SCALAR ? node->text : "";
   char name[PW_EXPRESSION_NAME];
   for (const char *rest = text, *at; (at = pw_expression_next_name (&rest, name)) != NULL;)
     if (pw_names_find (names, name) >= 0)
       return pw_yaml_fail (r, pw_yaml_offset (r->y, node, (size_t)(at - text)),
-                           "%s: a default is made of numbers; what follows from parameters belongs in let", what);
-  return pw_yaml_number (r, node, what, p->domain, &p->value);
+                           "%s: a default is made of numbers; what follows from parameters belongs in let", label);
+  return pw_yaml_number (r, node, label, p->domain, &p->value);
 }
 
 static int yaml_parameter (const pw_reader *r, const pw_node *node, pw_names *names, pw_parameter *p) {
   static const char *const key[] = { "name", "value", "unit", "about", "domain", "min", NULL };
   const pw_node *v[sizeof key / sizeof *key];
-  char what[100];
-  if (pw_yaml_keys (r, node, 0, key, "a parameter", v) != PW_OK) return r->error->status;
-  if (v[0] == NULL) return pw_yaml_fail (r, node->at, "a parameter needs a name");
-  if (yaml_new_name (r, v[0], "parameter", names) != PW_OK) return r->error->status;
-  p->name = v[0]->text;
+  char label[100];
+  if (pw_yaml_keys (r, node, key, "a parameter", v) != PW_OK) return r->error->status;
+  const pw_node *name = v[0], *value = v[1], *unit = v[2], *about = v[3], *domain = v[4], *min = v[5];
+  if (name == NULL) return pw_yaml_fail (r, node->at, "a parameter needs a name");
+  if (yaml_new_name (r, name, "parameter", names) != PW_OK) return r->error->status;
+  p->name = name->text;
   p->unit = p->about = "";
-  snprintf (what, sizeof what, "parameter %s", p->name);
-  if (v[1] == NULL) return pw_yaml_fail (r, node->at, "%s needs a value, its default", what);
-  yaml_domain (r, v[4], v[5], &p->domain);
-  yaml_unit (r, v[2], v[1], &p->unit);
-  pw_yaml_text (r, v[3], "about", &p->about);
-  return yaml_default (r, v[1], what, names, p);
+  snprintf (label, sizeof label, "parameter %s", p->name);
+  if (value == NULL) return pw_yaml_fail (r, node->at, "%s needs a value, its default", label);
+  yaml_domain (r, domain, min, &p->domain);
+  yaml_unit (r, unit, value, &p->unit);
+  pw_yaml_text (r, about, "about", &p->about);
+  return yaml_default (r, value, label, names, p);
 }
 
 static int yaml_parameters (pw_yaml *y, const pw_reader *r, const pw_node *list, pw_names *names) {
-  if (pw_yaml_list (r, list, "parameters", -1, "") != PW_OK) return r->error->status;
+  if (pw_yaml_list (r, list, "parameters") != PW_OK) return r->error->status;
   int count = list ? list->count : 0;
   pw_parameter *p = y->parameter = pw_arena_alloc (&y->arena, ((size_t)count + 1) * sizeof *p);
   if (p == NULL) return pw_yaml_no_memory (r);
@@ -106,9 +108,9 @@ static void yaml_run (pw_yaml *y, const pw_reader *r, const pw_node *run) {
   static const char *const key[] = { "t_end", "step", "rtol", "method", NULL };
   const pw_node *v[sizeof key / sizeof *key];
   double *number[] = { &y->table.run.t_end, &y->table.run.step, &y->table.run.rtol };
-  pw_yaml_keys (r, run, 0, key, "run", v);
+  pw_yaml_keys (r, run, key, "run", v);
   for (int i = 0; i < 3; i++) pw_yaml_number (r, v[i], key[i], PW_POSITIVE, number[i]);
-  pw_yaml_text (r, v[3], "method", &y->table.run.method);
+  pw_yaml_text (r, v[3], key[3], &y->table.run.method);
 }
 
 static int yaml_let_names (const pw_reader *r, const pw_node *let, pw_names *names) {
@@ -130,20 +132,19 @@ static int yaml_head (pw_yaml *y, const pw_reader *r) {
                                      "bodies",   "elements", "truth", NULL };
   const pw_node *v[sizeof key / sizeof *key];
   pw_names names = { .size = 0 };
-  size_t count = 0;
   if (y->root == NULL) return pw_yaml_fail (r, 0, "the file is empty; a model begins with \"pinwheel: 1\"");
-  if (pw_yaml_keys (r, y->root, 0, key, "a model", v) != PW_OK) return r->error->status;
+  if (pw_yaml_keys (r, y->root, key, "a model", v) != PW_OK) return r->error->status;
   yaml_version (r, v[0]);
   pw_yaml_text (r, v[1], "about", &y->table.about);
   yaml_run (y, r, v[2]);
-  for (int i = 3; key[i]; i++) {
+  const pw_node *parameters = v[3];
+  y->let = v[4], y->bodies = v[5], y->elements = v[6], y->reference = v[7];
+  for (int i = 3; key[i]; i++)
     if (v[i] && v[i]->count > PW_YAML_MAX_ITEMS)
       pw_yaml_fail (r, v[i]->at, "%s: %d entries; a model may have %d", key[i], v[i]->count, PW_YAML_MAX_ITEMS);
-    count += v[i] && i < 5 ? (size_t)v[i]->count : 0;
-  }
-  y->let = v[4], y->bodies = v[5], y->elements = v[6], y->reference = v[7];
+  size_t count = (size_t)(parameters ? parameters->count : 0) + (size_t)(y->let ? y->let->count : 0);
   if (r->error->status == PW_OK && pw_names_open (&names, count) != PW_OK) pw_yaml_no_memory (r);
-  if (r->error->status == PW_OK) yaml_parameters (y, r, v[3], &names);
+  if (r->error->status == PW_OK) yaml_parameters (y, r, parameters, &names);
   if (r->error->status == PW_OK) yaml_let_names (r, y->let, &names);
   pw_names_close (&names);
   return r->error->status;
@@ -161,7 +162,7 @@ pw_yaml *pw_yaml_open (const char *path, const char *shown, size_t max_bytes, pw
     pw_yaml_close (y);
     return NULL;
   }
-  y->ahead = YAML_AHEAD * fmax (1, (double)max_bytes / PW_FILE_DEFAULT_BYTES);
+  y->max_ahead = YAML_MAX_AHEAD * fmax (1, (double)max_bytes / PW_FILE_DEFAULT_BYTES);
   y->table = (pw_plugin_table){ .abi = PW_ABI, .size = sizeof y->table, .build = pw_yaml_build };
   if (pw_yaml_read_source (y, path, max_bytes, error) == PW_OK && pw_yaml_read_tree (y, error) == PW_OK &&
       yaml_head (y, &(pw_reader){ .y = y, .error = error }) == PW_OK)

@@ -10,7 +10,7 @@
  *   yaml.c             the head of a model: parameters and default run settings, stored in a plug-in's table
  *
  * Functions with a reader return the status of its first error; after an error they do nothing, so that a sequence of
- * calls needs one check.  A NULL node is absent: nothing is read. */
+ * calls needs one check.  `label` ("torque T: value") begins their messages.  A NULL node is absent. */
 #ifndef PW_YAML_H
 #define PW_YAML_H
 
@@ -38,34 +38,34 @@ struct pw_yaml {
   char *folder;          /* of the file, links resolved */
   char *source;          /* the text, zero-terminated */
   size_t size;
-  double ahead;   /* most indicators ([ ] { } , :) that libfyaml may read ahead of an event */
-  pw_arena arena; /* nodes and texts */
+  double max_ahead; /* indicators ([ ] { } , :) that libfyaml may read ahead of an event (yaml_tree.c) */
+  pw_arena arena;   /* nodes and texts */
   const pw_node *root;
   const pw_node *bodies, *elements, *let, *reference; /* or NULL */
   pw_parameter *parameter;                            /* ends with a NULL name */
   int parameters;
 };
 
-/* The state while a file is read or a model is built from it. */
+/* What functions share while a file is read or a model is built from it. */
 typedef struct {
   const pw_yaml *y;
   pw_error *error;
   pw_scope *scope; /* parameters and what `let` defines so far, or NULL */
   /* for building */
-  pw_model *m;
+  pw_model *model;
   pw_arena *arena;              /* lives as long as the model */
   pw_reference_text *reference; /* the model's */
   pw_names bodies;              /* names of bodies so far */
-  pw_names all;                 /* names of bodies and elements so far, to their offsets in the source */
+  pw_names names;               /* of bodies and elements so far, to their offsets in the source */
   pw_names elements;     /* names of all elements, to the index of their types; made when an expression needs it */
   const pw_field *field; /* being read */
   char *definition;      /* of the element being read, with all preceding fields */
   double points;         /* of all tables so far */
-  double codes;          /* operations of all expressions so far */
+  double operations;     /* of all expressions so far */
 } pw_reader;
 
-/* Limits of one model, about 1 GB each, so that a small file cannot use all memory: bodies, elements, parameters or
- * definitions, of each; points of all tables; operations of all expressions. */
+/* Limits of one model, about 1 GB each, so that a small file cannot use all memory: entries of each list, such as
+ * bodies, elements, parameters; points of all tables; operations of all expressions. */
 enum { PW_YAML_MAX_ITEMS = 1000000, PW_YAML_MAX_POINTS = 20000000, PW_YAML_MAX_OPERATIONS = 30000000 };
 
 /* ---- The text (yaml_source.c) ---- */
@@ -92,25 +92,28 @@ int pw_yaml_load_tree (pw_yaml *y, const char *bytes, size_t size, pw_error *err
 
 enum { PW_YAML_MAX_KEYS = 40 }; /* most known keys of a map */
 
-/* Finds known keys (ending with NULL) in a map: value[i] becomes the value of key[i], or NULL.  The first `skip` pairs
- * are skipped.  Other keys, repeated keys and empty values are refused; `what` ("a body") is for messages. */
-int pw_yaml_keys (const pw_reader *r, const pw_node *map, int skip, const char *const *key, const char *what,
+/* Finds known keys (ending with NULL) in a map, or in the pairs from a node on: value[i] becomes the value of key[i],
+ * or NULL.  Other keys, repeated keys and empty values are refused; `owner` ("a body") is for messages. */
+int pw_yaml_keys (const pw_reader *r, const pw_node *map, const char *const *key, const char *owner,
                   const pw_node **value);
+int pw_yaml_keys_from (const pw_reader *r, const pw_node *first, const char *const *key, const char *owner,
+                       const pw_node **value);
 
-/* "a list", "a map", "text" */
+/* What a node is, for messages: "a list", "a map", "text". */
 const char *pw_yaml_found (const pw_node *node);
 
-/* Refuses anything but a list; if `count` >= 0, a list of `count` entries, `items` ("bodies"). */
-int pw_yaml_list (const pw_reader *r, const pw_node *node, const char *what, int count, const char *items);
+/* Refuses anything but a list, or a list of `count` entries, which are `items` ("bodies"). */
+int pw_yaml_list (const pw_reader *r, const pw_node *node, const char *label);
+int pw_yaml_list_of (const pw_reader *r, const pw_node *node, const char *label, int count, const char *items);
 
 /* A scalar's text, not empty. */
-int pw_yaml_text (const pw_reader *r, const pw_node *node, const char *what, const char **text);
+int pw_yaml_text (const pw_reader *r, const pw_node *node, const char *label, const char **text);
 
-/* A scalar as a number of a domain: an expression over r->scope; a list of two, `items` ("numbers, [x, y]"); one of several
- * words, ending with NULL. */
-int pw_yaml_number (const pw_reader *r, const pw_node *node, const char *what, pw_domain domain, double *value);
-int pw_yaml_pair (const pw_reader *r, const pw_node *node, const char *what, const char *items, double *value);
-int pw_yaml_choice (const pw_reader *r, const pw_node *node, const char *what, const char *const *choices, int *value);
+/* A scalar as a number of a domain: an expression over r->scope; a list of two, `items` ("numbers, [x, y]"); one of
+ * several words, ending with NULL. */
+int pw_yaml_number (const pw_reader *r, const pw_node *node, const char *label, pw_domain domain, double *value);
+int pw_yaml_pair (const pw_reader *r, const pw_node *node, const char *label, const char *items, double *value);
+int pw_yaml_choice (const pw_reader *r, const pw_node *node, const char *label, const char *const *choices, int *value);
 
 /* Whether an expression depends on the time t or a state, BODY.phi, and at which offset. */
 int pw_yaml_varies (const char *text, size_t *at);
@@ -118,17 +121,17 @@ int pw_yaml_varies (const char *text, size_t *at);
 /* Converts an offset in a scalar's text to an offset in the source. */
 size_t pw_yaml_offset (const pw_yaml *y, const pw_node *node, size_t offset);
 
-/* Adds the names of all bodies so far. */
+/* Adds the names of all bodies so far to the valid names. */
 void pw_yaml_suggest_bodies (const pw_reader *r, pw_nearest *near);
 
 /* ---- Building ---- */
 
 /* Makes a signal of up to three expressions of time: value, rate, acceleration; NULL: not given (yaml_expression.c). */
-int pw_yaml_time_signal (pw_reader *r, const pw_kind *kind, const char *what, const pw_node *const v[3],
+int pw_yaml_time_signal (pw_reader *r, const pw_kind *kind, const char *label, const pw_node *const v[3],
                          pw_signal *signal);
 
 /* Reads a signal of an element type into a field (yaml_signal.c). */
-int pw_yaml_signal (pw_reader *r, const pw_kind *kind, const char *what, const pw_node *node, pw_signal *signal);
+int pw_yaml_signal (pw_reader *r, const pw_kind *kind, const char *label, const pw_node *node, pw_signal *signal);
 
 /* Reads the reference solution, after bodies and elements (yaml_expression.c). */
 int pw_yaml_reference (pw_reader *r);

@@ -1,23 +1,22 @@
 /* Bodies and elements: fills the definition structures through the field tables of their types, and passes them to
- * pw_add_body and pw_add, like a build function in C.  The core checks numbers, names and elements; this file adds a
- * position to its messages. */
+ * pw_add_body and pw_add, like a build function in C.  The core checks them; its messages get a position. */
 #include <stdlib.h>
 #include <string.h>
 #include "yaml.h"
 
-/* Bodies and elements share one set of names. */
-static int build_name (pw_reader *r, const pw_node *node, const char *what, const char **name) {
-  if (pw_yaml_text (r, node, what, name) != PW_OK) return r->error->status;
-  int before = pw_names_add (&r->all, *name, (int)node->at); /* a file has less than INT_MAX bytes */
+/* A name, which no body or element has yet. */
+static int build_name (pw_reader *r, const pw_node *node, const char *label, const char **name) {
+  if (pw_yaml_text (r, node, label, name) != PW_OK) return r->error->status;
+  int before = pw_names_add (&r->names, *name, (int)node->at); /* a file has less than INT_MAX bytes */
   if (before < 0) return PW_OK;
-  return pw_yaml_fail (r, node->at, "%s \"%.60s\": line %d already uses this name", what, *name,
+  return pw_yaml_fail (r, node->at, "%s \"%.60s\": line %d already uses this name", label, *name,
                        pw_yaml_line (r->y, (size_t)before));
 }
 
-/* The core's message without its prefix "model NAME: ", at a position. */
+/* Reports an error of the core at a node, without its prefix "model NAME: ". */
 static int build_fail (const pw_reader *r, const pw_node *node, const pw_error *cause) {
   char prefix[200];
-  int n = snprintf (prefix, sizeof prefix, "model %s: ", pw_model_name (r->m));
+  int n = snprintf (prefix, sizeof prefix, "model %s: ", pw_model_name (r->model));
   const char *text = cause->text;
   if (n > 0 && strncmp (text, prefix, (size_t)n) == 0) text += n;
   return cause->status == PW_RESOURCE ? pw_fail (r->error, cause->status, "%s", cause->text)
@@ -26,16 +25,17 @@ static int build_fail (const pw_reader *r, const pw_node *node, const pw_error *
 
 /* ---- Bodies ---- */
 
-static void build_triple (const pw_reader *r, const pw_node *node, const char *what, const char *const key[4],
-                          double value[3], unsigned *specified, int first) {
+/* Initial coordinates or velocities; a bit of *specified for each that is given, from `first_bit`. */
+static void build_triple (const pw_reader *r, const pw_node *node, const char *label, const char *const key[4],
+                          double value[3], unsigned *specified, int first_bit) {
   const pw_node *v[4];
   char name[200];
-  pw_yaml_keys (r, node, 0, key, what, v);
+  pw_yaml_keys (r, node, key, label, v);
   for (int i = 0; i < 3; i++) {
     if (v[i] == NULL) continue;
-    snprintf (name, sizeof name, "%s: %s", what, key[i]);
+    snprintf (name, sizeof name, "%s: %s", label, key[i]);
     pw_yaml_number (r, v[i], name, PW_REAL, &value[i]);
-    *specified |= 1u << (first + i);
+    *specified |= 1u << (first_bit + i);
   }
 }
 
@@ -45,51 +45,53 @@ static int build_body (pw_reader *r, const pw_node *node) {
   const pw_node *v[sizeof key / sizeof *key];
   pw_body body = { .specified = PW_SPECIFIES_NOTHING };
   pw_error cause = { 0 };
-  char what[160];
-  if (pw_yaml_keys (r, node, 0, key, "a body", v) != PW_OK) return r->error->status;
-  if (v[0] == NULL) return pw_yaml_fail (r, node->at, "a body needs a name");
-  if (build_name (r, v[0], "body", &body.name) != PW_OK) return r->error->status;
+  char label[160];
+  if (pw_yaml_keys (r, node, key, "a body", v) != PW_OK) return r->error->status;
+  const pw_node *name = v[0];
+  if (name == NULL) return pw_yaml_fail (r, node->at, "a body needs a name");
+  if (build_name (r, name, "body", &body.name) != PW_OK) return r->error->status;
   for (int i = 0; i < 2; i++) {
-    snprintf (what, sizeof what, "body %.60s: %s", body.name, key[1 + i]);
-    pw_yaml_number (r, v[1 + i], what, PW_NONNEGATIVE, i ? &body.inertia : &body.mass);
+    snprintf (label, sizeof label, "body %.60s: %s", body.name, key[1 + i]);
+    pw_yaml_number (r, v[1 + i], label, PW_NONNEGATIVE, i ? &body.inertia : &body.mass);
   }
   for (int i = 0; i < 2; i++) {
-    snprintf (what, sizeof what, "%s of body %.60s", key[3 + i], body.name);
-    build_triple (r, v[3 + i], what, state[i], i ? body.rate : body.start, &body.specified, 3 * i);
+    snprintf (label, sizeof label, "%s of body %.60s", key[3 + i], body.name);
+    build_triple (r, v[3 + i], label, state[i], i ? body.rate : body.start, &body.specified, 3 * i);
   }
   if (r->error->status != PW_OK) return r->error->status;
-  if (pw_model_check_body (r->m, &body, &cause) != PW_OK) return build_fail (r, v[0], &cause);
+  if (pw_model_check_body (r->model, &body, &cause) != PW_OK) return build_fail (r, name, &cause);
   pw_names_add (&r->bodies, body.name, 0);
-  return pw_add_body (r->m, &body);
+  return pw_add_body (r->model, &body);
 }
 
 /* ---- Fields ---- */
 
-static int build_body_name (const pw_reader *r, const pw_node *node, const char *what, const char **name) {
-  if (pw_yaml_text (r, node, what, name) != PW_OK) return r->error->status;
+static int build_body_name (const pw_reader *r, const pw_node *node, const char *label, const char **name) {
+  if (pw_yaml_text (r, node, label, name) != PW_OK) return r->error->status;
   if (strcmp (*name, "ground") == 0 || pw_names_find (&r->bodies, *name) >= 0) return PW_OK;
   pw_nearest near = { .sought = *name };
   pw_yaml_suggest_bodies (r, &near);
   pw_nearest_try (&near, "ground");
-  return pw_yaml_fail (r, node->at, "%s: there is no body \"%.60s\"%s", what, *name, pw_nearest_text (&near));
+  return pw_yaml_fail (r, node->at, "%s: there is no body \"%.60s\"%s", label, *name, pw_nearest_text (&near));
 }
 
-static int build_value (pw_reader *r, const pw_kind *kind, const pw_field *f, const pw_node *node, const char *what,
+/* Reads one value of a field to `at`. */
+static int build_value (pw_reader *r, const pw_kind *kind, const pw_field *f, const pw_node *node, const char *label,
                         void *at) {
   switch (f->type) {
   case PW_NUMBER:
-    return pw_yaml_number (r, node, what, f->domain, at);
+    return pw_yaml_number (r, node, label, f->domain, at);
   case PW_POINT:
   case PW_VECTOR:
-    return pw_yaml_pair (r, node, what, "numbers, [x, y]", at);
+    return pw_yaml_pair (r, node, label, "numbers, [x, y]", at);
   case PW_BODY:
-    return build_body_name (r, node, what, at);
+    return build_body_name (r, node, label, at);
   case PW_SIGNAL:
-    return pw_yaml_signal (r, kind, what, node, at);
+    return pw_yaml_signal (r, kind, label, node, at);
   case PW_CHOICE:
-    return pw_yaml_choice (r, node, what, f->choices, at);
+    return pw_yaml_choice (r, node, label, f->choices, at);
   }
-  return pw_yaml_fail (r, node->at, "%s cannot be given in a text model", what);
+  return pw_yaml_fail (r, node->at, "%s cannot be given in a text model", label);
 }
 
 static int build_field (pw_reader *r, const pw_kind *kind, const pw_field *f, const pw_node *node, const char *element,
@@ -100,19 +102,19 @@ static int build_field (pw_reader *r, const pw_kind *kind, const pw_field *f, co
                                         [PW_BODY] = "bodies",
                                         [PW_SIGNAL] = "signals",
                                         [PW_CHOICE] = "choices" };
-  char what[200];
+  char label[200];
   int count = pw_field_count (f);
-  snprintf (what, sizeof what, "%s %.60s: %s", kind->name, element, f->name);
-  if (count == 1) return build_value (r, kind, f, node, what, at);
-  if (pw_yaml_list (r, node, what, count, plural[f->type]) != PW_OK) return r->error->status;
+  snprintf (label, sizeof label, "%s %.60s: %s", kind->name, element, f->name);
+  if (count == 1) return build_value (r, kind, f, node, label, at);
+  if (pw_yaml_list_of (r, node, label, count, plural[f->type]) != PW_OK) return r->error->status;
   for (const pw_node *n = node->first; n; n = n->next, at += pw_field_bytes (f->type))
-    build_value (r, kind, f, n, what, at);
+    build_value (r, kind, f, n, label, at);
   return r->error->status;
 }
 
 /* ---- Elements ---- */
 
-/* Whether a word of a text begins with this prefix; no if the prefix is shorter than 3 bytes. */
+/* Whether a word of a text begins with this prefix of at least 3 bytes. */
 static int build_has_word (const char *text, const char *prefix) {
   for (const char *at = text; strlen (prefix) >= 3 && (at = strstr (at, prefix)) != NULL; at++)
     if (at == text || strchr (" (", at[-1])) return 1;
@@ -141,7 +143,8 @@ static const pw_kind *build_kind (const pw_reader *r, const pw_node *node) {
   }
   const char *kind = build_later_type (first);
   if (kind) return pw_yaml_fail (r, first->at, "an element begins with its type: write {%s: NAME, ...}", kind), NULL;
-  for (const pw_kind *const *k = pw_kinds; *k && !near.near; k++) /* else by its description: "revolute", "hinge" */
+  /* "revolute" and "hinge" are words of the description of a type. */
+  for (const pw_kind *const *k = pw_kinds; *k && !near.near; k++)
     if (build_has_word ((*k)->about, first->text))
       snprintf (near.best, sizeof near.best, "%s", (*k)->name), near.near = 1;
   pw_yaml_fail (r, first->at, "an element begins with its type, and there is no type \"%.60s\"%s", first->text,
@@ -152,12 +155,12 @@ static const pw_kind *build_kind (const pw_reader *r, const pw_node *node) {
 static int build_fields (pw_reader *r, const pw_kind *kind, const pw_node *node, const char *name) {
   const char *key[PW_YAML_MAX_KEYS + 1];
   const pw_node *v[PW_YAML_MAX_KEYS + 1];
-  char what[100];
+  char label[100];
   int n = 0;
   for (const pw_field *f = kind->fields; f->name && n < PW_YAML_MAX_KEYS; f++) key[n++] = f->name;
   key[n] = NULL;
-  snprintf (what, sizeof what, "a %s", kind->name);
-  if (pw_yaml_keys (r, node, 1, key, what, v) != PW_OK) return r->error->status;
+  snprintf (label, sizeof label, "a %s", kind->name);
+  if (pw_yaml_keys_from (r, node->first->next->next, key, label, v) != PW_OK) return r->error->status;
   for (int i = 0; i < n && r->error->status == PW_OK; i++) {
     const pw_field *f = r->field = &kind->fields[i];
     if (v[i])
@@ -178,21 +181,21 @@ static int build_element (pw_reader *r, const pw_node *node) {
   memcpy (r->definition, &name, sizeof name);
   if (build_fields (r, kind, node, name) != PW_OK) return r->error->status;
   pw_element e = { kind, r->definition };
-  if (pw_model_check_element (r->m, &e, &cause) != PW_OK) return build_fail (r, node->first->next, &cause);
-  return pw_add (r->m, kind, r->definition);
+  if (pw_model_check_element (r->model, &e, &cause) != PW_OK) return build_fail (r, node->first->next, &cause);
+  return pw_add (r->model, kind, r->definition);
 }
 
 /* ---- The model ---- */
 
-/* Reads `let`: numbers defined from parameters and preceding definitions. */
+/* Reads `let`: numbers that are defined by parameters and preceding numbers. */
 static int build_let (pw_reader *r, const double *parameter) {
   const pw_yaml *y = r->y;
-  char what[100];
+  char label[100];
   double value;
   for (int i = 0; i < y->parameters; i++) pw_scope_add (r->scope, y->parameter[i].name, parameter[i]);
   for (const pw_node *n = y->let ? y->let->first : NULL; n; n = n->next->next) {
-    snprintf (what, sizeof what, "let %s", n->text);
-    if (pw_yaml_number (r, n->next, what, PW_REAL, &value) != PW_OK) return r->error->status;
+    snprintf (label, sizeof label, "let %s", n->text);
+    if (pw_yaml_number (r, n->next, label, PW_REAL, &value) != PW_OK) return r->error->status;
     pw_scope_add (r->scope, n->text, value);
   }
   return PW_OK;
@@ -213,8 +216,7 @@ static void build_free (void *arena) {
   free (arena);
 }
 
-/* Allocates the memory for building and the arena of the model: named numbers, expressions, points of tables, the
- * reference solution. */
+/* Allocates the memory for building, and the arena for what lives as long as the model. */
 static int build_open (pw_reader *r) {
   const pw_yaml *y = r->y;
   size_t largest = 1, bodies = y->bodies ? (size_t)y->bodies->count : 0, lets = y->let ? (size_t)y->let->count : 0;
@@ -222,12 +224,12 @@ static int build_open (pw_reader *r) {
   for (const pw_kind *const *k = pw_kinds; *k; k++)
     if ((*k)->definition > largest) largest = (*k)->definition;
   r->arena = calloc (1, sizeof *r->arena);
-  if (r->arena == NULL || pw_model_keep (r->m, r->arena, build_free) != PW_OK) return pw_yaml_no_memory (r);
+  if (r->arena == NULL || pw_model_keep (r->model, r->arena, build_free) != PW_OK) return pw_yaml_no_memory (r);
   r->reference = pw_arena_alloc (r->arena, sizeof *r->reference);
-  pw_model_set_reference (r->m, r->reference);
+  pw_model_set_reference (r->model, r->reference);
   r->definition = malloc (largest);
   if (r->reference && r->definition && pw_scope_open (r->scope, y->parameters + (int)lets, r->arena) == PW_OK &&
-      pw_names_open (&r->bodies, bodies) == PW_OK && pw_names_open (&r->all, all) == PW_OK)
+      pw_names_open (&r->bodies, bodies) == PW_OK && pw_names_open (&r->names, all) == PW_OK)
     return PW_OK;
   return pw_yaml_no_memory (r);
 }
@@ -235,13 +237,12 @@ static int build_open (pw_reader *r) {
 void pw_yaml_build (pw_model *m, const void *parameters) {
   const void *table = pw_model_table (m);
   pw_scope scope = { 0 };
-  pw_reader r = { .y = table, .m = m, .scope = &scope, .error = pw_model_error (m) };
-  pw_yaml_list (&r, r.y->bodies, "bodies", -1, "");
-  if (pw_yaml_list (&r, r.y->elements, "elements", -1, "") == PW_OK && build_open (&r) == PW_OK)
-    build_all (&r, parameters);
+  pw_reader r = { .y = table, .model = m, .scope = &scope, .error = pw_model_error (m) };
+  pw_yaml_list (&r, r.y->bodies, "bodies");
+  if (pw_yaml_list (&r, r.y->elements, "elements") == PW_OK && build_open (&r) == PW_OK) build_all (&r, parameters);
   pw_scope_close (&scope);
   pw_names_close (&r.bodies);
-  pw_names_close (&r.all);
+  pw_names_close (&r.names);
   pw_names_close (&r.elements);
   free (r.definition);
 }

@@ -1,17 +1,16 @@
-/* Expressions of time, and of states, in text models: signals, and the reference solution.
- *
- * Such a signal becomes a function signal.  Each compiled system has a copy and may outlive the model. */
+/* Expressions of time, and of states, in text models: signals, and the reference solution.  A signal becomes a function
+ * signal, of which each compiled system has a copy (time_open), since it may outlive the model. */
 #include <math.h>
 #include <stdarg.h>
 #include <stdlib.h>
 #include <string.h>
 #include "yaml.h"
 
-enum { MAX_SIGNAL_STATES = 16, MAX_BREAKPOINTS = 100 }; /* states of a signal; breakpoints checked for jumps */
+enum { MAX_SIGNAL_STATES = 16, MAX_CHECKED_BREAKPOINTS = 100 };
 
 /* A signal defined by expressions. */
 typedef struct {
-  const pw_expression *x[3];               /* value, rate, acceleration; NULL: not given, differentiated instead */
+  const pw_expression *expression[3];      /* value, rate, acceleration; NULL: not given, differentiated instead */
   int derivatives;                         /* required time derivatives: 0 (of a force), 1, 2 */
   int states;                              /* number of states in it */
   const char *name[MAX_SIGNAL_STATES + 2]; /* "t", then states, "BODY.phi"; used for reading only */
@@ -22,28 +21,28 @@ typedef struct {
 typedef struct {
   pw_reader *r;
   const pw_node *node;
-  const char *what; /* "torque T: value", for messages */
-  time_function *f; /* the signal it belongs to, or NULL */
+  const char *label; /* "torque T: value", for messages */
+  time_function *f;  /* the signal it belongs to, or NULL */
 } reading;
 
 /* Reports an error at an offset of the expression. */
-PW_PRINTF (3, 4) static int reading_fail (const reading *x, size_t at, const char *format, ...) {
+PW_PRINTF (3, 4) static int reading_fail (const reading *e, size_t at, const char *format, ...) {
   char text[300];
   va_list arguments;
   va_start (arguments, format);
   vsnprintf (text, sizeof text, format, arguments);
   va_end (arguments);
-  return pw_yaml_fail (x->r, pw_yaml_offset (x->r->y, x->node, at), "%s: %s", x->what, text);
+  return pw_yaml_fail (e->r, pw_yaml_offset (e->r->y, e->node, at), "%s: %s", e->label, text);
 }
 
-/* Reads an expression of variables, which end with NULL. */
-static int reading_expression (const reading *x, const char *const *variable, const char **text,
+/* Reads the expression; `variable`: names, which end with NULL. */
+static int reading_expression (const reading *e, const char *const *variable, const char **text,
                                const pw_expression **expression) {
   pw_expression_error error;
-  if (pw_yaml_text (x->r, x->node, x->what, text) != PW_OK) return x->r->error->status;
-  int status = pw_expression_read (x->r->scope, variable, *text, x->r->arena, expression, &error);
-  if (status == PW_INPUT) return reading_fail (x, error.at, "%s", error.text);
-  return status == PW_OK ? PW_OK : pw_yaml_no_memory (x->r);
+  if (pw_yaml_text (e->r, e->node, e->label, text) != PW_OK) return e->r->error->status;
+  int status = pw_expression_read (e->r->scope, variable, *text, e->r->arena, expression, &error);
+  if (status == PW_INPUT) return reading_fail (e, error.at, "%s", error.text);
+  return status == PW_OK ? PW_OK : pw_yaml_no_memory (e->r);
 }
 
 /* ---- States: BODY.phi, ELEMENT.spin ---- */
@@ -62,71 +61,72 @@ static int state_elements (pw_reader *r) {
   return PW_OK;
 }
 
-static int state_unknown_owner (const reading *x, const char *owner, size_t at) {
+static int state_unknown_owner (const reading *e, const char *owner, size_t at) {
   pw_nearest near = { .sought = owner };
-  pw_yaml_suggest_bodies (x->r, &near);
-  for (size_t i = 0; i < x->r->elements.size; i++) {
-    const struct pw_name *e = &x->r->elements.slot[i];
-    if (e->name && pw_kinds[e->value]->internal > 0) pw_nearest_try (&near, e->name);
+  pw_yaml_suggest_bodies (e->r, &near);
+  for (size_t i = 0; i < e->r->elements.size; i++) {
+    const struct pw_name *element = &e->r->elements.slot[i];
+    if (element->name && pw_kinds[element->value]->internal > 0) pw_nearest_try (&near, element->name);
   }
-  return reading_fail (x, at, "there is no body \"%s\"%s", owner, pw_nearest_text (&near));
+  return reading_fail (e, at, "there is no body \"%s\"%s", owner, pw_nearest_text (&near));
 }
 
-static int state_of_element (const reading *x, const char *owner, const char *part, size_t at) {
+static int state_of_element (const reading *e, const char *owner, const char *part, size_t at) {
   char list[200] = "";
-  if (state_elements (x->r) != PW_OK) return x->r->error->status;
-  int found = pw_names_find (&x->r->elements, owner);
-  if (found < 0) return state_unknown_owner (x, owner, at);
+  if (state_elements (e->r) != PW_OK) return e->r->error->status;
+  int found = pw_names_find (&e->r->elements, owner);
+  if (found < 0) return state_unknown_owner (e, owner, at);
   const pw_kind *kind = pw_kinds[found];
-  if (kind->internal == 0) return reading_fail (x, at, "%s %s has no states", kind->name, owner);
+  if (kind->internal == 0) return reading_fail (e, at, "%s %s has no states", kind->name, owner);
   for (int i = 0; i < kind->internal; i++) {
     const pw_quantity *state = &kind->coordinate[i];
     if (strcmp (part, state->name) == 0 || strcmp (part, state->rate) == 0) return PW_OK;
     size_t n = strlen (list);
     snprintf (list + n, sizeof list - n, "%s%s, %s", i ? ", " : "", state->name, state->rate);
   }
-  return reading_fail (x, at + strlen (owner) + 1, "the states of %s %s are %s, not \"%.30s\"", kind->name, owner, list,
+  return reading_fail (e, at + strlen (owner) + 1, "the states of %s %s are %s, not \"%.30s\"", kind->name, owner, list,
                        part);
 }
 
 /* Checks that a name with a dot, at an offset of the expression, names a state. */
-static int state_check (const reading *x, const char *name, size_t at) {
+static int state_check (const reading *e, const char *name, size_t at) {
   static const char *const part[] = { "x", "y", "phi", "vx", "vy", "omega" };
   char owner[100];
   size_t n = strcspn (name, ".");
   snprintf (owner, sizeof owner, "%.*s", (int)n, name);
-  if (pw_names_find (&x->r->bodies, owner) < 0) return state_of_element (x, owner, name + n + 1, at);
+  if (pw_names_find (&e->r->bodies, owner) < 0) return state_of_element (e, owner, name + n + 1, at);
   for (int i = 0; i < 6; i++)
     if (strcmp (part[i], name + n + 1) == 0) return PW_OK;
-  return reading_fail (x, at + n + 1, "a body's states are x, y, phi, vx, vy and omega, not \"%.30s\"", name + n + 1);
+  return reading_fail (e, at + n + 1, "a body's states are x, y, phi, vx, vy and omega, not \"%.30s\"", name + n + 1);
 }
 
 /* ---- Evaluation of signals ---- */
 
-/* Differentiates the highest derivative given to obtain those not given. */
+/* Value and derivatives u; those not given are derivatives of the highest one given. */
 static void time_derivatives (const time_function *f, const double *variable, double u[3]) {
-  pw_expression_derivatives (f->x[0], variable, 0, u);
+  pw_expression_derivatives (f->expression[0], variable, PW_EXPRESSION_TIME, u);
   for (int i = 1; i <= f->derivatives; i++) {
-    double d[3];
-    if (f->x[i] == NULL) continue;
-    pw_expression_derivatives (f->x[i], variable, 0, d);
-    u[i] = d[0];
-    if (i == 1) u[2] = d[1];
+    double given[3];
+    if (f->expression[i] == NULL) continue;
+    pw_expression_derivatives (f->expression[i], variable, PW_EXPRESSION_TIME, given);
+    u[i] = given[0];
+    if (i == 1) u[2] = given[1]; /* the derivative of the given rate, unless the acceleration is given, too */
   }
   if (f->derivatives < 2) u[2] = 0;
 }
 
-static int time_eval (void *context, double t, const double *x, double value[3], double *gradient) {
+static int time_eval (void *context, double t, const double *state, double value[3], double *gradient) {
   const time_function *f = context;
-  double variable[MAX_SIGNAL_STATES + 1] = { t }, u[3];
-  if (f->states) memcpy (variable + 1, x, (size_t)f->states * sizeof *x);
+  double variable[MAX_SIGNAL_STATES + 1] = { t }, derivatives[3];
+  if (f->states) memcpy (variable + 1, state, (size_t)f->states * sizeof *state);
   if (f->derivatives)
     time_derivatives (f, variable, value);
   else
-    value[0] = pw_expression_value (f->x[0], variable);
+    value[0] = pw_expression_value (f->expression[0], variable);
   for (int i = 0; gradient && i < f->states; i++) {
-    pw_expression_derivatives (f->x[0], variable, 1 + i, u);
-    gradient[i] = isfinite (u[1]) ? u[1] : 0; /* |v| has no derivative at rest; used by Newton's iteration only */
+    pw_expression_derivatives (f->expression[0], variable, 1 + i, derivatives);
+    /* |v| has no derivative at rest; only Newton's iteration uses it. */
+    gradient[i] = isfinite (derivatives[1]) ? derivatives[1] : 0;
   }
   return isfinite (value[0]) && (f->derivatives == 0 || (isfinite (value[1]) && isfinite (value[2]))) ? 0 : -1;
 }
@@ -135,20 +135,24 @@ static double time_breakpoint (void *context, double t) {
   const time_function *f = context;
   double first = INFINITY;
   for (int i = 0; i < 3; i++)
-    if (f->x[i]) first = fmin (first, pw_expression_breakpoint (f->x[i], t));
+    if (f->expression[i]) first = fmin (first, pw_expression_breakpoint (f->expression[i], t));
   return first;
 }
 
 static void *time_open (void *context) {
   const time_function *f = context;
   size_t size = sizeof *f;
-  for (int i = 0; i < 3; i++) size += f->x[i] ? pw_expression_size (f->x[i]) : 0;
+  for (int i = 0; i < 3; i++) size += f->expression[i] ? pw_expression_size (f->expression[i]) : 0;
   time_function *copy = malloc (size);
   if (copy == NULL) return NULL;
   *copy = *f;
   char *at = (char *)(copy + 1);
-  for (int i = 0; i < 3; i++)
-    if (f->x[i]) copy->x[i] = memcpy (at, f->x[i], pw_expression_size (f->x[i])), at += pw_expression_size (f->x[i]);
+  for (int i = 0; i < 3; i++) {
+    if (f->expression[i] == NULL) continue;
+    size = pw_expression_size (f->expression[i]);
+    copy->expression[i] = memcpy (at, f->expression[i], size);
+    at += size;
+  }
   return copy;
 }
 
@@ -162,56 +166,57 @@ static void time_store_names (const pw_reader *r) {
 }
 
 /* Adds a state, unless it is known already. */
-static int time_add_state (const reading *x, const char *name, size_t at) {
-  time_function *f = x->f;
+static int time_add_state (const reading *e, const char *name, size_t at) {
+  time_function *f = e->f;
   for (int i = 1; i <= f->states; i++)
     if (strcmp (f->name[i], name) == 0) return PW_OK;
   if (f->derivatives)
-    return reading_fail (x, at, "\"%s\": the signal of a constraint depends on the time t alone", name);
-  if (state_check (x, name, at) != PW_OK) return x->r->error->status;
-  if (f->states == MAX_SIGNAL_STATES) return reading_fail (x, at, "more than %d states", MAX_SIGNAL_STATES);
-  f->name[f->states + 1] = pw_arena_copy (x->r->arena, name);
-  return f->name[++f->states] ? PW_OK : pw_yaml_no_memory (x->r);
+    return reading_fail (e, at, "\"%s\": the signal of a constraint depends on the time t alone", name);
+  if (state_check (e, name, at) != PW_OK) return e->r->error->status;
+  if (f->states == MAX_SIGNAL_STATES) return reading_fail (e, at, "more than %d states", MAX_SIGNAL_STATES);
+  f->name[f->states + 1] = pw_arena_copy (e->r->arena, name);
+  return f->name[++f->states] ? PW_OK : pw_yaml_no_memory (e->r);
 }
 
-static int time_expression (reading *x, int i) {
-  pw_reader *r = x->r;
-  time_function *f = x->f;
-  const char *source = x->node->type == PW_YAML_SCALAR ? x->node->text : "";
+/* Reads expression i of the signal. */
+static int time_expression (reading *e, int i) {
+  pw_reader *r = e->r;
+  time_function *f = e->f;
+  const char *source = e->node->type == PW_YAML_SCALAR ? e->node->text : "";
   char name[PW_EXPRESSION_NAME];
   for (const char *rest = source, *p; (p = pw_expression_next_name (&rest, name)) != NULL;)
-    if (strchr (name, '.') && time_add_state (x, name, (size_t)(p - source)) != PW_OK) return r->error->status;
-  if (reading_expression (x, f->name, &f->text.part[i], &f->x[i]) != PW_OK) return r->error->status;
-  const pw_expression *made = f->x[i];
-  if ((r->codes += made->codes) > PW_YAML_MAX_OPERATIONS)
-    return pw_yaml_fail (r, x->node->at,
+    if (strchr (name, '.') && time_add_state (e, name, (size_t)(p - source)) != PW_OK) return r->error->status;
+  if (reading_expression (e, f->name, &f->text.part[i], &f->expression[i]) != PW_OK) return r->error->status;
+  const pw_expression *expression = f->expression[i];
+  if ((r->operations += expression->codes) > PW_YAML_MAX_OPERATIONS)
+    return pw_yaml_fail (r, e->node->at,
                          "%s: the expressions up to here have more than %d operations, which need more "
                          "memory than a model may have",
-                         x->what, PW_YAML_MAX_OPERATIONS);
-  if (made->jump == NULL || f->text.jump) return PW_OK;
-  char *jump = pw_arena_alloc (r->arena, (size_t)made->jump_size + 1);
-  f->text.jump = jump ? memcpy (jump, made->jump, (size_t)made->jump_size) : NULL;
+                         e->label, PW_YAML_MAX_OPERATIONS);
+  if (expression->jump == NULL || f->text.jump) return PW_OK;
+  char *jump = pw_arena_alloc (r->arena, (size_t)expression->jump_size + 1);
+  f->text.jump = jump ? memcpy (jump, expression->jump, (size_t)expression->jump_size) : NULL;
   return jump ? PW_OK : pw_yaml_no_memory (r);
 }
 
-/* Compares a given derivative with the exact one at some times. */
-static int time_check (const reading *x, int i, const char *name) {
-  static const double time[] = { 0.3, 1.7, 4.1 };
+/* Compares given derivative i, 1 or 2, with that of expression i - 1 at some times, to 1e-6 of the largest ones. */
+static int time_check (const reading *e, int i, const char *name) {
+  static const double time[] = { 0.3, 1.7, 4.1 }; /* [s], arbitrary */
   double given[3], exact[3][3], size = 0;
   for (int k = 0; k < 3; k++) {
-    given[k] = pw_expression_value (x->f->x[i], &time[k]);
-    pw_expression_derivatives (x->f->x[i - 1], &time[k], 0, exact[k]);
+    given[k] = pw_expression_value (e->f->expression[i], &time[k]);
+    pw_expression_derivatives (e->f->expression[i - 1], &time[k], PW_EXPRESSION_TIME, exact[k]);
     if (isfinite (given[k]) && isfinite (exact[k][1]))
       size = fmax (size, fabs (given[k]) + fabs (exact[k][1]) + 1e-6 * fabs (exact[k][0]));
   }
   for (int k = 0; k < 3; k++)
     if (isfinite (given[k]) && isfinite (exact[k][1]) && fabs (given[k] - exact[k][1]) > 1e-6 * size)
-      return pw_yaml_fail (x->r, x->node->at, "%s: the %s at t = %g s is %.6g, but the derivative is %.6g", x->what,
+      return pw_yaml_fail (e->r, e->node->at, "%s: the %s at t = %g s is %.6g, but the derivative is %.6g", e->label,
                            name, time[k], given[k], exact[k][1]);
   return PW_OK;
 }
 
-/* The largest magnitude of u[i] at times within 1 s of t. */
+/* The largest magnitude of derivative i at times within 1 s of t, the closer the more of them. */
 static double time_size (const time_function *f, double t, int i) {
   double size = 0;
   for (int k = -20; k <= 20; k++) {
@@ -223,38 +228,39 @@ static double time_size (const time_function *f, double t, int i) {
 }
 
 /* Refuses signals that a constraint cannot follow: a jump of the value or, for positions, of its derivative. */
-static int time_continuous (const reading *x) {
+static int time_continuous (const reading *e) {
   static const char *const name[] = { "its value", "its rate" };
   double t = 0, before[3], after[3];
-  for (int k = 0; k < MAX_BREAKPOINTS; k++) {
-    t = time_breakpoint (x->f, t);
+  for (int k = 0; k < MAX_CHECKED_BREAKPOINTS; k++) {
+    t = time_breakpoint (e->f, t);
     if (t == INFINITY) return PW_OK;
-    time_derivatives (x->f, &(double){ nextafter (t, -INFINITY) }, before);
-    time_derivatives (x->f, &t, after);
+    time_derivatives (e->f, &(double){ nextafter (t, -INFINITY) }, before);
+    time_derivatives (e->f, &t, after);
     double between = t - nextafter (t, -INFINITY);
-    for (int i = 0; i < x->f->derivatives; i++)
+    for (int i = 0; i < e->f->derivatives; i++)
       if (fabs (after[i] - before[i]) >
-          1e-9 * time_size (x->f, t, i) + 2 * between * (fabs (after[i + 1]) + fabs (before[i + 1])))
-        return pw_yaml_fail (x->r, x->node->at, "%s: %s jumps from %.6g to %.6g at t = %.9g s, and that of %s must not",
-                             x->what, name[i], before[i], after[i], t,
-                             x->f->derivatives > 1 ? "a prescribed position" : "a velocity constraint");
+          1e-9 * time_size (e->f, t, i) + 2 * between * (fabs (after[i + 1]) + fabs (before[i + 1])))
+        return pw_yaml_fail (e->r, e->node->at, "%s: %s jumps from %.6g to %.6g at t = %.9g s, and that of %s must not",
+                             e->label, name[i], before[i], after[i], t,
+                             e->f->derivatives > 1 ? "a prescribed position" : "a velocity constraint");
   }
   return PW_OK;
 }
 
 /* Reads the value and the given derivatives. */
-static int time_all (reading *x, const pw_node *const v[3]) {
+static int time_all (reading *e, const pw_node *const node[3]) {
   static const char *const key[] = { "expression", "rate", "acceleration" };
   for (int i = 0; i < 3; i++) {
-    if ((x->node = v[i]) == NULL) continue;
-    if (time_expression (x, i) != PW_OK) return x->r->error->status;
-    if (i > 0 && x->f->x[i - 1] && !x->f->states && time_check (x, i, key[i]) != PW_OK) return x->r->error->status;
+    if ((e->node = node[i]) == NULL) continue;
+    if (time_expression (e, i) != PW_OK) return e->r->error->status;
+    if (i > 0 && e->f->expression[i - 1] && !e->f->states && time_check (e, i, key[i]) != PW_OK)
+      return e->r->error->status;
   }
-  x->node = v[0];
-  return x->f->derivatives ? time_continuous (x) : PW_OK;
+  e->node = node[0];
+  return e->f->derivatives ? time_continuous (e) : PW_OK;
 }
 
-int pw_yaml_time_signal (pw_reader *r, const pw_kind *kind, const char *what, const pw_node *const v[3],
+int pw_yaml_time_signal (pw_reader *r, const pw_kind *kind, const char *label, const pw_node *const v[3],
                          pw_signal *signal) {
   time_function *f = pw_arena_alloc (r->arena, sizeof *f);
   if (f == NULL) return pw_yaml_no_memory (r);
@@ -265,9 +271,9 @@ int pw_yaml_time_signal (pw_reader *r, const pw_kind *kind, const char *what, co
   signal->function.close = free;
   signal->function.text = &f->text;
   time_store_names (r);
-  if (time_all (&(reading){ r, NULL, what, f }, v) != PW_OK) return r->error->status;
+  if (time_all (&(reading){ .r = r, .label = label, .f = f }, v) != PW_OK) return r->error->status;
   for (int i = 0; i < 3; i++)
-    if (f->x[i] && f->x[i]->breaks) signal->function.breakpoint = time_breakpoint;
+    if (f->expression[i] && f->expression[i]->breaks) signal->function.breakpoint = time_breakpoint;
   if (f->states) signal->function.reads = f->name + 1;
   return PW_OK;
 }
@@ -283,15 +289,15 @@ static int reference_entry (pw_reader *r, const pw_node *n, pw_names *seen) {
   static const char *const time[] = { "t", NULL };
   pw_reference_text *t = r->reference;
   const pw_expression **x = t->context;
-  char what[100];
+  char label[100];
   const char *name;
   if (pw_yaml_text (r, n, "truth", &name) != PW_OK) return r->error->status;
   if (strchr (name, '.') == NULL)
     return pw_yaml_fail (r, n->at, "truth: expected a state such as BODY.phi, found \"%.60s\"", name);
-  if (state_check (&(reading){ r, n, "truth", NULL }, n->text, 0) != PW_OK) return r->error->status;
+  if (state_check (&(reading){ .r = r, .node = n, .label = "truth" }, n->text, 0) != PW_OK) return r->error->status;
   if (pw_names_add (seen, n->text, 0) >= 0) return pw_yaml_fail (r, n->at, "truth: a second \"%s\"", n->text);
-  snprintf (what, sizeof what, "truth of %.60s", n->text);
-  const reading value = { r, n->next, what, NULL };
+  snprintf (label, sizeof label, "truth of %.60s", n->text);
+  const reading value = { .r = r, .node = n->next, .label = label };
   t->state[t->states] = n->text;
   int status = reading_expression (&value, time, &t->text[t->states], &x[t->states]);
   t->states += status == PW_OK;

@@ -14,9 +14,9 @@
 
 /* ---- Points of tables, in the model ---- */
 
-static int table_list (pw_reader *r, const char *what, const pw_node *list, pw_signal *s) {
+static int table_list (pw_reader *r, const char *label, const pw_node *list, pw_signal *s) {
   char text[240];
-  if (pw_yaml_list (r, list, what, -1, "") != PW_OK) return r->error->status;
+  if (pw_yaml_list (r, list, label) != PW_OK) return r->error->status;
   size_t bytes = (size_t)list->count * sizeof (double);
   double *t = pw_arena_alloc (r->arena, bytes), *value = pw_arena_alloc (r->arena, bytes);
   if (t == NULL || value == NULL) return pw_yaml_no_memory (r);
@@ -24,7 +24,7 @@ static int table_list (pw_reader *r, const char *what, const pw_node *list, pw_s
   s->table.value = value;
   for (const pw_node *n = list->first; n; n = n->next) {
     double point[2] = { 0 };
-    snprintf (text, sizeof text, "%s: point %d", what, s->table.count + 1);
+    snprintf (text, sizeof text, "%s: point %d", label, s->table.count + 1);
     if (pw_yaml_pair (r, n, text, "numbers, [time, value]", point) != PW_OK) return r->error->status;
     t[s->table.count] = point[0];
     value[s->table.count++] = point[1];
@@ -62,60 +62,61 @@ static FILE *table_open (const pw_yaml *y, const char *name, const char **reason
   return f;
 }
 
-/* The unit of the current field.  For "m or rad" the element's choice decides: rad for an angle. */
+/* The unit of the current field.  If it is "m or rad", the choice before it decides: rad for an angle. */
 static const char *table_unit (const pw_reader *r) {
   if (r->field->unit == NULL || strcmp (r->field->unit, "m or rad") != 0) return r->field->unit;
   const pw_field *choice = r->field;
-  while (choice->type != PW_CHOICE) choice--; /* precedes a field with two units */
+  while (choice->type != PW_CHOICE) choice--;
   int chosen = *(const int *)(const void *)(r->definition + choice->offset);
   return strcmp (choice->choices[chosen], "angle") == 0 ? "rad" : "m";
 }
 
-static int table_file (pw_reader *r, const char *what, const pw_node *node, const pw_node *columns, pw_signal *s) {
+static int table_file (pw_reader *r, const char *label, const pw_node *node, const pw_node *columns, pw_signal *s) {
   const char *name, *reason, *column[2] = { "1", "2" }, *const unit[2] = { "s", table_unit (r) };
   pw_error cause = { 0 };
   char text[240];
-  snprintf (text, sizeof text, "%s: columns", what);
-  if (pw_yaml_list (r, columns, text, 2, "columns, [time, value]") != PW_OK) return r->error->status;
+  snprintf (text, sizeof text, "%s: columns", label);
+  if (pw_yaml_list_of (r, columns, text, 2, "columns, [time, value]") != PW_OK) return r->error->status;
   pw_yaml_text (r, columns ? columns->first : NULL, text, &column[0]);
   pw_yaml_text (r, columns ? columns->first->next : NULL, text, &column[1]);
-  if (pw_yaml_text (r, node, what, &name) != PW_OK) return r->error->status;
+  if (pw_yaml_text (r, node, label, &name) != PW_OK) return r->error->status;
   errno = 0;
   FILE *f = table_open (r->y, name, &reason);
   if (f == NULL && errno == ENOMEM) return pw_yaml_no_memory (r);
-  if (f == NULL) return pw_yaml_fail (r, node->at, "%s: cannot read \"%.60s\": %s", what, name, reason);
-  double *t = pw_columns_from_stream (f, name, column, unit, 2, 0, &s->table.count, &cause);
+  if (f == NULL) return pw_yaml_fail (r, node->at, "%s: cannot read \"%.60s\": %s", label, name, reason);
+  double *t = pw_columns_from_stream (f, name, column, unit, 2, PW_GAPS_REFUSED, &s->table.count, &cause);
   fclose (f);
-  if (cause.status == PW_INPUT) return pw_yaml_fail (r, node->at, "%s: %s", what, cause.text);
-  if (t == NULL || pw_model_keep (r->m, t, free) != PW_OK) return pw_yaml_no_memory (r);
+  if (cause.status == PW_INPUT) return pw_yaml_fail (r, node->at, "%s: %s", label, cause.text);
+  if (t == NULL || pw_model_keep (r->model, t, free) != PW_OK) return pw_yaml_no_memory (r);
   s->table.t = t;
   s->table.value = t + s->table.count;
   return PW_OK;
 }
 
-/* Reads v[0], points, or v[1], a file, with v[2], its columns.  Limits the total number of points, since many tables
- * may read one file. */
-static int table_points (pw_reader *r, const char *what, const pw_node *node, const pw_node *const v[3], pw_signal *s) {
-  if ((v[0] != NULL) + (v[1] != NULL) != 1)
-    return pw_yaml_fail (r, node->at, "%s: a table has either points or a file", what);
-  if (v[0] && v[2]) return pw_yaml_fail (r, v[2]->at, "%s: columns belong to a file", what);
-  int status = v[0] ? table_list (r, what, v[0], s) : table_file (r, what, v[1], v[2], s);
+/* Reads a list of points, or columns of a file.  Limits the points of all tables together: many may read one file. */
+static int table_points (pw_reader *r, const char *label, const pw_node *node, const pw_node *const v[3],
+                         pw_signal *s) {
+  const pw_node *points = v[0], *file = v[1], *columns = v[2]; /* in the order of signal_form */
+  if ((points != NULL) == (file != NULL))
+    return pw_yaml_fail (r, node->at, "%s: a table has either points or a file", label);
+  if (points && columns) return pw_yaml_fail (r, columns->at, "%s: columns belong to a file", label);
+  int status = points ? table_list (r, label, points, s) : table_file (r, label, file, columns, s);
   if (status == PW_OK) r->points += s->table.count;
   if (status != PW_OK || r->points <= PW_YAML_MAX_POINTS) return status;
-  return pw_yaml_fail (r, node->at, "%s: the tables up to here have more than %d points, the limit for a model", what,
+  return pw_yaml_fail (r, node->at, "%s: the tables up to here have more than %d points, the limit for a model", label,
                        PW_YAML_MAX_POINTS);
 }
 
 /* ---- Forms made of numbers ---- */
 
 /* Reads the fields of a form, except a table's points. */
-static int signal_fields (pw_reader *r, const pw_signal_form *form, const char *what, const pw_node *node,
+static int signal_fields (pw_reader *r, const pw_signal_form *form, const char *label, const pw_node *node,
                           const pw_node *const *v, pw_signal *signal) {
   char text[240];
   for (int i = 0; form->fields[i].name; i++) {
     const pw_field *f = &form->fields[i];
     void *at = (char *)signal + f->offset;
-    snprintf (text, sizeof text, "%s: %s", what, f->name);
+    snprintf (text, sizeof text, "%s: %s", label, f->name);
     if (v[i] == NULL && f->required) pw_yaml_fail (r, node->at, "%s is missing", text);
     if (f->type == PW_NUMBER) pw_yaml_number (r, v[i], text, f->domain, at);
     if (f->type == PW_CHOICE) pw_yaml_choice (r, v[i], text, f->choices, at);
@@ -126,17 +127,17 @@ static int signal_fields (pw_reader *r, const pw_signal_form *form, const char *
 }
 
 /* Checks the signal as a whole; reports an error at the faulty point of a table, or at the signal. */
-static int signal_check (pw_reader *r, const pw_kind *kind, const char *what, const pw_node *node,
+static int signal_check (pw_reader *r, const pw_kind *kind, const char *label, const pw_node *node,
                          const pw_node *points, const pw_signal *signal) {
   char fault[300];
   int point;
   if (*pw_signal_check (signal, kind, &point, fault, sizeof fault) == 0) return PW_OK;
   for (const pw_node *n = points ? points->first : NULL; n && point >= 0; n = n->next)
     if (point-- == 0) node = n;
-  return pw_yaml_fail (r, node->at, "%s: %s", what, fault);
+  return pw_yaml_fail (r, node->at, "%s: %s", label, fault);
 }
 
-static int signal_form (pw_reader *r, const pw_kind *kind, const pw_signal_form *form, const char *what,
+static int signal_form (pw_reader *r, const pw_kind *kind, const pw_signal_form *form, const char *label,
                         const pw_node *node, pw_signal *signal) {
   static const char *const table[] = { "points", "file", "columns" };
   const char *key[PW_YAML_MAX_KEYS];
@@ -148,49 +149,50 @@ static int signal_form (pw_reader *r, const pw_kind *kind, const pw_signal_form 
   for (n = fields; is_table && n < fields + 3; n++) key[n] = table[n - fields];
   key[n] = NULL;
   snprintf (about, sizeof about, "a %s", form->name);
-  if (pw_yaml_keys (r, node, 0, key, about, v) != PW_OK || signal_fields (r, form, what, node, v, signal) != PW_OK ||
-      (is_table && table_points (r, what, node, v + fields, signal) != PW_OK))
+  if (pw_yaml_keys (r, node, key, about, v) != PW_OK || signal_fields (r, form, label, node, v, signal) != PW_OK ||
+      (is_table && table_points (r, label, node, v + fields, signal) != PW_OK))
     return r->error->status;
-  return signal_check (r, kind, what, node, is_table ? v[fields] : NULL, signal);
+  return signal_check (r, kind, label, node, is_table ? v[fields] : NULL, signal);
 }
 
+/* Keys of a signal; from SIGNAL_FORMS the names of the forms. */
 enum { SIGNAL_CONSTANT, SIGNAL_EXPRESSION, SIGNAL_RATE, SIGNAL_ACCELERATION, SIGNAL_FORMS };
 
-/* "constant, expression, harmonic, ..." */
+/* The keys of which a signal has one, for messages: "constant, expression, harmonic, ..." */
 static char *signal_list (const char *const *key, char *buffer, size_t size) {
   size_t n = (size_t)snprintf (buffer, size, "%s, %s", key[SIGNAL_CONSTANT], key[SIGNAL_EXPRESSION]);
   for (key += SIGNAL_FORMS; *key && n < size; key++) n += (size_t)snprintf (buffer + n, size - n, ", %s", *key);
   return buffer;
 }
 
-/* {TYPE: ..} */
-static int signal_map (pw_reader *r, const pw_kind *kind, const char *what, const pw_node *node, pw_signal *signal) {
+/* A signal in braces, such as {harmonic: {...}}. */
+static int signal_map (pw_reader *r, const pw_kind *kind, const char *label, const pw_node *node, pw_signal *signal) {
   const char *key[PW_YAML_MAX_KEYS] = { "constant", "expression", "rate", "acceleration" };
   const pw_node *v[PW_YAML_MAX_KEYS];
   char list[100];
   int n = SIGNAL_FORMS, given = 0, form = -1;
   for (const pw_signal_form *f = pw_signal_forms; f->name; f++) key[n++] = f->name;
   key[n] = NULL;
-  if (pw_yaml_keys (r, node, 0, key, "a signal", v) != PW_OK) return r->error->status;
+  if (pw_yaml_keys (r, node, key, "a signal", v) != PW_OK) return r->error->status;
   for (int i = 0; i < n; i++) {
     given += v[i] != NULL && i != SIGNAL_RATE && i != SIGNAL_ACCELERATION;
     if (v[i] && i >= SIGNAL_FORMS) form = i;
   }
   if (given != 1)
-    return pw_yaml_fail (r, node->at, "%s: expected one of %s; found %s", what, signal_list (key, list, sizeof list),
+    return pw_yaml_fail (r, node->at, "%s: expected one of %s; found %s", label, signal_list (key, list, sizeof list),
                          given ? "several" : "none");
   if (!v[SIGNAL_EXPRESSION] && (v[SIGNAL_RATE] || v[SIGNAL_ACCELERATION]))
-    return pw_yaml_fail (r, node->at, "%s: a rate or acceleration belongs to an expression", what);
-  if (v[SIGNAL_CONSTANT]) return pw_yaml_number (r, v[SIGNAL_CONSTANT], what, PW_REAL, &signal->constant);
-  if (v[SIGNAL_EXPRESSION]) return pw_yaml_time_signal (r, kind, what, v + SIGNAL_EXPRESSION, signal);
-  return signal_form (r, kind, &pw_signal_forms[form - SIGNAL_FORMS], what, v[form], signal);
+    return pw_yaml_fail (r, node->at, "%s: a rate or acceleration belongs to an expression", label);
+  if (v[SIGNAL_CONSTANT]) return pw_yaml_number (r, v[SIGNAL_CONSTANT], label, PW_REAL, &signal->constant);
+  if (v[SIGNAL_EXPRESSION]) return pw_yaml_time_signal (r, kind, label, v + SIGNAL_EXPRESSION, signal);
+  return signal_form (r, kind, &pw_signal_forms[form - SIGNAL_FORMS], label, v[form], signal);
 }
 
-int pw_yaml_signal (pw_reader *r, const pw_kind *kind, const char *what, const pw_node *node, pw_signal *signal) {
+int pw_yaml_signal (pw_reader *r, const pw_kind *kind, const char *label, const pw_node *node, pw_signal *signal) {
   const pw_node *const v[3] = { node, NULL, NULL };
   size_t at;
-  if (node->type == PW_YAML_MAP) return signal_map (r, kind, what, node, signal);
+  if (node->type == PW_YAML_MAP) return signal_map (r, kind, label, node, signal);
   if (node->type == PW_YAML_SCALAR && pw_yaml_varies (node->text, &at))
-    return pw_yaml_time_signal (r, kind, what, v, signal);
-  return pw_yaml_number (r, node, what, PW_REAL, &signal->constant);
+    return pw_yaml_time_signal (r, kind, label, v, signal);
+  return pw_yaml_number (r, node, label, PW_REAL, &signal->constant);
 }

@@ -21,14 +21,14 @@ int pw_yaml_line (const pw_yaml *y, size_t at) {
   return line;
 }
 
-/* Characters, not bytes. */
-static int source_count (const char *from, const char *to) {
+static int source_characters (const char *from, const char *to) {
   int n = 0;
   for (; from < to; from++) n += (*from & 0xC0) != 0x80;
   return n;
 }
 
-/* Long lines are shown around the caret, cut between characters.  A byte order mark is no part of the first line. */
+/* The beginning of the line at an offset, and the part from *from to *to that is shown: of a long line the part around
+ * the offset, cut between characters.  A byte order mark does not belong to the first line. */
 static void source_window (const pw_yaml *y, size_t at, const char **begin, const char **from, const char **to) {
   const char *caret = y->source + at, *end = y->source + y->size;
   *begin = caret;
@@ -64,8 +64,9 @@ int pw_yaml_fail (const pw_reader *r, size_t at, const char *format, ...) {
   source_clean (shown);
   size_t n = strlen (y->path);
   return pw_fail (r->error, PW_INPUT, "%s%s:%d:%d: error: %s\n  %s\n  %*s^", n > 100 ? "..." : "",
-                  n > 100 ? y->path + n - 97 : y->path, pw_yaml_line (y, at), 1 + source_count (begin, y->source + at),
-                  text, shown, source_count (from, y->source + at) + 3 * (from > begin), "");
+                  n > 100 ? y->path + n - 97 : y->path, pw_yaml_line (y, at),
+                  1 + source_characters (begin, y->source + at), text, shown,
+                  source_characters (from, y->source + at) + 3 * (from > begin), "");
 }
 
 int pw_yaml_no_memory (const pw_reader *r) {

@@ -3,7 +3,7 @@
 #include <string.h>
 #include "yaml.h"
 
-enum { STORED_DEPTH = 40 };
+enum { STORED_DEPTH = 40 }; /* more than a tree of yaml_tree.c has */
 
 typedef struct {
   unsigned char type, quoted, unused[2]; /* no padding, which would be written uninitialised */

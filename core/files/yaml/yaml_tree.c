@@ -5,22 +5,23 @@
 #include <string.h>
 #include "yaml.h"
 
-enum { TREE_DEPTH = 30, TREE_PIECE = 4096 };
+enum { TREE_DEPTH = 30, TREE_PIECE = 4096 }; /* nested lists and maps; bytes given to the parser at once */
 
 typedef struct {
   pw_reader r;
   pw_yaml *y; /* r.y; receives the nodes */
   struct fy_parser *parser;
   struct fy_diag *diag;
-  struct fy_token_iter *text; /* iterates over the pieces of a scalar */
-  pw_node *open[TREE_DEPTH];  /* open lists and maps */
-  pw_node **tail[TREE_DEPTH]; /* where the next node of each goes */
+  struct fy_token_iter *pieces; /* iterates over the pieces of a scalar */
+  pw_node *open[TREE_DEPTH];    /* open lists and maps */
+  pw_node **tail[TREE_DEPTH];   /* where the next node of each goes */
   int depth;
   int documents;
-  /* source read by the parser since the last event */
-  size_t from, fed;  /* bytes */
-  double indicators; /* [ ] { } , : */
-  double opened;     /* opening minus closing brackets */
+  /* what the parser reads ahead of its events */
+  size_t processed;  /* bytes of the source up to the last event */
+  size_t fed;        /* bytes given to the parser */
+  double indicators; /* [ ] { } , : between the two */
+  double opened;     /* opening minus closing brackets there */
   int too_deep;      /* 1: too many open brackets */
   int too_many;      /* 1: too many indicators */
   /* the last position converted */
@@ -29,8 +30,8 @@ typedef struct {
   unsigned at; /* of the last node, for events without a position */
 } tree;
 
-/* The offset of a mark from its line and column, which counts characters, since the offsets of libfyaml 0.7.12 are wrong
- * if the input is read in pieces.  Starts from the last mark: marks are nearly in order. */
+/* The offset of a mark from its line and column, which counts characters, since the offsets of libfyaml 0.7.12 are
+ * wrong if the input is read in pieces.  Starts from the last mark: marks are nearly in order. */
 static unsigned tree_offset_of (tree *x, const struct fy_mark *mark) {
   static const char bom[] = "\xEF\xBB\xBF"; /* byte order mark, not counted as a column */
   const char *source = x->y->source, *end = source + x->y->size, *p = source + x->offset;
@@ -76,12 +77,12 @@ static long tree_text (tree *x, struct fy_token *token, char *to) {
   long size = 0;
   int error = 0;
   if (token == NULL) return 0;
-  fy_token_iter_start (token, x->text);
-  while ((piece = fy_token_iter_chunk_next (x->text, piece, &error)) != NULL) {
+  fy_token_iter_start (token, x->pieces);
+  while ((piece = fy_token_iter_chunk_next (x->pieces, piece, &error)) != NULL) {
     if (to) memcpy (to + size, piece->str, piece->len);
     size += (long)piece->len;
   }
-  fy_token_iter_finish (x->text);
+  fy_token_iter_finish (x->pieces);
   return error ? -1 : size;
 }
 
@@ -136,7 +137,7 @@ static int tree_refuse_anchor (tree *x, struct fy_event *e) {
  * indicators without an event, or too many open brackets. */
 enum { TREE_NESTED = 10000 };
 
-/* Adds (1) or subtracts (-1) the indicators between two offsets. */
+/* Adds (sign 1) or subtracts (-1) the indicators between two offsets. */
 static void tree_count (tree *x, size_t from, size_t to, int sign) {
   for (const char *p = x->y->source + from; p < x->y->source + to; p++) {
     int opens = *p == '[' || *p == '{', closes = *p == ']' || *p == '}';
@@ -153,7 +154,7 @@ static ssize_t tree_feed (void *user, void *to, size_t count) {
   tree_count (x, x->fed, x->fed + n, 1);
   x->fed += n;
   x->too_deep = x->opened > TREE_NESTED;
-  x->too_many = x->indicators > x->y->ahead;
+  x->too_many = x->indicators > x->y->max_ahead;
   return x->too_deep || x->too_many ? 0 : (ssize_t)n; /* libfyaml 0.7.12 retries after an error */
 }
 
@@ -161,7 +162,7 @@ static int tree_event (tree *x, struct fy_event *e) {
   if (tree_refuse_anchor (x, e) != PW_OK) return PW_INPUT;
   size_t at = tree_event_offset (x, e);
   if (at > x->fed) at = x->fed;
-  if (at > x->from) tree_count (x, x->from, at, -1), x->from = at;
+  if (at > x->processed) tree_count (x, x->processed, at, -1), x->processed = at;
   switch (e->type) {
   case FYET_DOCUMENT_START:
     if (x->documents++ == 0) return PW_OK;
@@ -221,12 +222,12 @@ static int tree_syntax (tree *x) {
 }
 
 static int tree_refused (const tree *x) {
-  if (x->too_deep) return pw_yaml_fail (&x->r, x->from, "nested too deeply");
+  if (x->too_deep) return pw_yaml_fail (&x->r, x->processed, "nested too deeply");
   return pw_yaml_fail (
-      &x->r, x->from,
+      &x->r, x->processed,
       "a list or map in brackets with more than %g commas, colons and brackets, which takes much memory: "
       "write its entries on separate lines, after \"- \" or \"key: \"",
-      x->y->ahead);
+      x->y->max_ahead);
 }
 
 static int tree_parse (tree *x) {
@@ -250,19 +251,19 @@ int pw_yaml_read_tree (pw_yaml *y, pw_error *error) {
   fy_diag_cfg_default (&quiet);
   quiet.fp = NULL;
   errno = 0;
-  x.diag = pw_reserve (TREE_RESERVE) == PW_OK ? fy_diag_create (&quiet) : NULL;
+  x.diag = pw_check_memory (TREE_RESERVE) == PW_OK ? fy_diag_create (&quiet) : NULL;
   if (x.diag) {
     fy_diag_set_collect_errors (x.diag, true); /* prints nothing */
     struct fy_parse_cfg how = { .flags = FYPCF_ALLOW_DUPLICATE_KEYS, .diag = x.diag };
     x.parser = fy_parser_create (&how);
-    x.text = fy_token_iter_create (NULL);
+    x.pieces = fy_token_iter_create (NULL);
   }
-  if (x.parser && x.text && fy_parser_set_input_callback (x.parser, &x, tree_feed) == 0)
+  if (x.parser && x.pieces && fy_parser_set_input_callback (x.parser, &x, tree_feed) == 0)
     tree_parse (&x);
   else
     pw_yaml_no_memory (&x.r);
   if (errno == ENOMEM) cause.status = PW_OK, pw_yaml_no_memory (&x.r);
-  fy_token_iter_destroy (x.text);
+  fy_token_iter_destroy (x.pieces);
   if (x.parser) fy_parser_destroy (x.parser);
   if (x.diag) fy_diag_destroy (x.diag);
   return cause.status == PW_OK ? PW_OK : pw_fail (error, cause.status, "%s", cause.text);

@@ -10,45 +10,49 @@
 #include "batch.h"
 
 typedef struct {
-  double c1, c2; /* [N s/m], [N s^2/m^2] */
-  double d1, d2; /* [N m s/rad], [N m s^2/rad^2] */
+  double linear, quadratic;          /* c1 [N s/m], c2 [N s^2/m^2] */
+  double turning, turning_quadratic; /* d1 [N m s/rad], d2 [N m s^2/rad^2] */
 } drag;
 
-/* An element in the current state: speed, force per speed, moment per angular velocity. */
+/* An element in the current state. */
 typedef struct {
-  const drag *k;
-  const pw_configuration *A;
-  double v, c, d;
+  const drag *element;
+  const pw_configuration *body;
+  double speed, force_per_speed, moment_per_omega; /* |v|, c1 + c2 |v|, d1 + d2 |w| */
 } drag_state;
 
-static inline drag_state drag_at (const pw_batch *b, int e) {
-  const drag *k = (const drag *)b->element + e;
-  const pw_configuration *A = batch_body (b, e, 1, 0);
-  double v = hypot (A->vx, A->vy);
-  return (drag_state){ k, A, v, k->c1 + k->c2 * v, k->d1 + k->d2 * fabs (A->omega) };
+static inline drag_state drag_at (const pw_batch *batch, int e) {
+  const drag *element = (const drag *)batch->element + e;
+  const pw_configuration *body = batch_only_body (batch, e);
+  double speed = hypot (body->vx, body->vy);
+  return (drag_state){ element, body, speed, element->linear + element->quadratic * speed,
+                       element->turning + element->turning_quadratic * fabs (body->omega) };
 }
 
 PREPARE (drag_prepare, pw_drag, drag) {
-  *k = (drag){ d->linear, d->quadratic, d->turning, d->turning_quadratic };
+  *element = (drag){ definition->linear, definition->quadratic, definition->turning, definition->turning_quadratic };
   return PW_OK;
 }
 
 PER_ELEMENT (drag_force, drag, 3) {
-  out[0] = -x.c * x.A->vx, out[1] = -x.c * x.A->vy, out[2] = -x.d * x.A->omega;
+  out[0] = -now.force_per_speed * now.body->vx;
+  out[1] = -now.force_per_speed * now.body->vy;
+  out[2] = -now.moment_per_omega * now.body->omega;
 }
 
 /* d(|v| v)/dv = |v| 1 + v v^T / |v|, zero at rest; v / |v| is divided, since 1 / |v| may overflow. */
 PER_ELEMENT (drag_force_v, drag, 9) {
-  double ex = x.v > 0 ? x.A->vx / x.v : 0, ey = x.v > 0 ? x.A->vy / x.v : 0;
+  double ex = now.speed > 0 ? now.body->vx / now.speed : 0, ey = now.speed > 0 ? now.body->vy / now.speed : 0;
+  double quadratic = now.element->quadratic;
   memset (out, 0, 9 * sizeof *out);
-  out[0] = -x.c - x.k->c2 * x.A->vx * ex;
-  out[1] = out[3] = -x.k->c2 * x.A->vx * ey;
-  out[4] = -x.c - x.k->c2 * x.A->vy * ey;
-  out[8] = -x.d - x.k->d2 * fabs (x.A->omega);
+  out[0] = -now.force_per_speed - quadratic * now.body->vx * ex;
+  out[1] = out[3] = -quadratic * now.body->vx * ey;
+  out[4] = -now.force_per_speed - quadratic * now.body->vy * ey;
+  out[8] = -now.moment_per_omega - now.element->turning_quadratic * fabs (now.body->omega);
 }
 
 PER_ELEMENT (drag_loss, drag, 1) {
-  *out = x.c * x.v * x.v + x.d * x.A->omega * x.A->omega;
+  *out = now.force_per_speed * now.speed * now.speed + now.moment_per_omega * now.body->omega * now.body->omega;
 }
 
 static const pw_field drag_fields[] = {
@@ -66,8 +70,7 @@ static const pw_field drag_fields[] = {
 const pw_kind pw_kind_drag = {
   .name = "drag",
   .about = "linear and quadratic resistance of still air to the translation and rotation of a body",
-  DEFINITION (pw_drag, drag_fields),
-  ELEMENT (drag, drag_prepare),
+  TYPE (drag, pw_drag, drag),
   .bodies = 1,
   .force = drag_force,
   .force_v = drag_force_v,

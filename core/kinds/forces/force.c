@@ -9,54 +9,57 @@
 #include "batch.h"
 
 typedef struct {
-  double at[2]; /* in the body's frame [m] */
-  double turns; /* 1: components along the body's axes */
+  double at[2];     /* in the body's frame [m] */
+  double body_axes; /* 1: components along the body's axes; 0: along the world's */
 } force;
 
-/* A force in the current state: cosine and sine of the angle of its axes, arm, world components, moment. */
+/* A force in the current state. */
 typedef struct {
-  const force *k;
-  const pw_configuration *A;
-  double cos, sin, X, Y, Fx, Fy, M;
+  const force *element;
+  const pw_configuration *body;
+  double cos, sin;  /* of the angle of the axes along which it is given */
+  double arm[2];    /* (X, Y) */
+  double Fx, Fy, M; /* components in the world, moment */
 } force_state;
 
-static inline force_state force_at (const pw_batch *b, int e) {
-  const force *k = (const force *)b->element + e;
-  const pw_configuration *A = batch_body (b, e, 1, 0);
-  const double *u = b->u + 6 * e;
-  force_state x = { k, A, .cos = k->turns > 0 ? A->cos : 1, .sin = k->turns > 0 ? A->sin : 0 };
-  x.X = A->cos * k->at[0] - A->sin * k->at[1], x.Y = A->sin * k->at[0] + A->cos * k->at[1];
-  x.Fx = x.cos * u[0] - x.sin * u[3], x.Fy = x.sin * u[0] + x.cos * u[3];
-  x.M = x.X * x.Fy - x.Y * x.Fx;
-  return x;
+static inline force_state force_at (const pw_batch *batch, int e) {
+  const force *element = (const force *)batch->element + e;
+  const pw_configuration *body = batch_only_body (batch, e);
+  const double *ux = batch->u + 6 * e, *uy = ux + 3; /* the signals, each with two time derivatives */
+  force_state now = { element, body, .cos = element->body_axes > 0 ? body->cos : 1,
+                      .sin = element->body_axes > 0 ? body->sin : 0 };
+  to_world (body, element->at, now.arm);
+  now.Fx = now.cos * ux[0] - now.sin * uy[0], now.Fy = now.sin * ux[0] + now.cos * uy[0];
+  now.M = now.arm[0] * now.Fy - now.arm[1] * now.Fx;
+  return now;
 }
 
 PREPARE (force_prepare, pw_force, force) {
-  *k = (force){ { d->at[0], d->at[1] }, d->axes == PW_AXES_BODY };
+  *element = (force){ { definition->at[0], definition->at[1] }, definition->axes == PW_AXES_BODY };
   return PW_OK;
 }
 
 PER_ELEMENT (force_force, force, 3) {
-  out[0] = x.Fx, out[1] = x.Fy, out[2] = x.M;
+  out[0] = now.Fx, out[1] = now.Fy, out[2] = now.M;
 }
 
 PER_ELEMENT (force_force_u, force, 6) {
-  out[0] = x.cos, out[1] = -x.sin;
-  out[2] = x.sin, out[3] = x.cos;
-  out[4] = x.X * x.sin - x.Y * x.cos, out[5] = x.X * x.cos + x.Y * x.sin;
+  out[0] = now.cos, out[1] = -now.sin;
+  out[2] = now.sin, out[3] = now.cos;
+  out[4] = now.arm[0] * now.sin - now.arm[1] * now.cos, out[5] = now.arm[0] * now.cos + now.arm[1] * now.sin;
 }
 
 /* A force that turns with the body has a constant moment. */
 PER_ELEMENT (force_force_q, force, 9) {
   memset (out, 0, 9 * sizeof *out);
-  if (x.k->turns > 0)
-    out[2] = -x.Fy, out[5] = x.Fx;
+  if (now.element->body_axes > 0)
+    out[2] = -now.Fy, out[5] = now.Fx;
   else
-    out[8] = -x.X * x.Fx - x.Y * x.Fy;
+    out[8] = -now.arm[0] * now.Fx - now.arm[1] * now.Fy;
 }
 
 PER_ELEMENT (force_power, force, 1) {
-  *out = x.Fx * x.A->vx + x.Fy * x.A->vy + x.M * x.A->omega;
+  *out = now.Fx * now.body->vx + now.Fy * now.body->vy + now.M * now.body->omega;
 }
 
 static const char *const force_axes[] = { "world", "body", NULL };
@@ -74,8 +77,7 @@ static const pw_field force_fields[] = {
 const pw_kind pw_kind_force = {
   .name = "force",
   .about = "an external force on a point of a body, given along world or body axes",
-  DEFINITION (pw_force, force_fields),
-  ELEMENT (force, force_prepare),
+  TYPE (force, pw_force, force),
   .bodies = 1,
   .signals = 2,
   .force = force_force,

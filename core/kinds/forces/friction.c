@@ -1,40 +1,26 @@
 /* friction: a torque opposing the rotation of body 1 relative to body 2, as in a pin.
  *
- *   f = (0, 0, -T | 0, 0, T),  loss = T w >= 0,  w = w1 - w2            T(w) as F in coulomb.h
+ *   f = (0, 0, -T | 0, 0, T) = -T S,  S = [ 0 0 1 | 0 0 -1 ],  loss = T w >= 0,  w = w1 - w2    T(w): F(v) of coulomb.h
  *
  * The limit is the friction coefficient times radius times load. */
 #include "coulomb.h"
 
-/* Friction in the current state: its law and the relative angular velocity. */
+/* Friction in the current state; v: w. */
 typedef struct {
-  const coulomb *k;
-  double w;
+  const coulomb *law;
+  double v, S[6], v_q[6];
 } friction_state;
 
-static inline friction_state friction_at (const pw_batch *b, int e) {
-  return (friction_state){ (const coulomb *)b->element + e,
-                           batch_body (b, e, 2, 0)->omega - batch_body (b, e, 2, 1)->omega };
+static inline friction_state friction_at (const pw_batch *batch, int e) {
+  return (friction_state){ (const coulomb *)batch->element + e,
+                           batch_body1 (batch, e)->omega - batch_body2 (batch, e)->omega, .S = { [2] = 1, [5] = -1 } };
 }
 
 PREPARE (friction_prepare, pw_friction, coulomb) {
-  return coulomb_make (d->viscous, d->limit, d->speed, k, error);
+  return coulomb_make (definition->viscous, definition->limit, definition->speed, element, error);
 }
 
-PER_ELEMENT (friction_force, friction, 6) {
-  opposite_moments (-coulomb_force (x.k, x.w), out);
-}
-
-PER_ELEMENT (friction_force_v, friction, 36) {
-  opposite_moments_block (coulomb_slope (x.k, x.w), out);
-}
-
-PER_ELEMENT (friction_saturation, friction, 12) {
-  out[8] = out[11] = coulomb_saturation (x.k, x.w, 1);
-}
-
-PER_ELEMENT (friction_loss, friction, 1) {
-  *out = coulomb_force (x.k, x.w) * x.w;
-}
+COULOMB (friction, 6)
 
 static const pw_field friction_fields[] = {
   { PW_AT (pw_friction, body), PW_BODY, .count = 2, .required = 1, .about = "the two bodies; one may be ground" },
@@ -49,8 +35,7 @@ static const pw_field friction_fields[] = {
 const pw_kind pw_kind_friction = {
   .name = "friction",
   .about = "a viscous and a Coulomb torque that oppose the rotation of one body relative to another",
-  DEFINITION (pw_friction, friction_fields),
-  ELEMENT (coulomb, friction_prepare),
+  TYPE (friction, pw_friction, coulomb),
   .bodies = 2,
   .force = friction_force,
   .force_v = friction_force_v,

@@ -4,30 +4,30 @@
 #include "batch.h"
 
 typedef struct {
-  double fx, fy; /* weight [N] */
+  double fx, fy; /* m a [N] */
 } gravity;
 
 typedef struct {
-  const gravity *k;
-  const pw_configuration *A;
+  const gravity *element;
+  const pw_configuration *body;
 } gravity_state;
 
-static inline gravity_state gravity_at (const pw_batch *b, int e) {
-  return (gravity_state){ (const gravity *)b->element + e, batch_body (b, e, 1, 0) };
+static inline gravity_state gravity_at (const pw_batch *batch, int e) {
+  return (gravity_state){ (const gravity *)batch->element + e, batch_only_body (batch, e) };
 }
 
 PREPARE (gravity_prepare, pw_gravity, gravity) {
   double m = bodies[0]->mass;
-  *k = (gravity){ m * d->acceleration[0], m * d->acceleration[1] };
+  *element = (gravity){ m * definition->acceleration[0], m * definition->acceleration[1] };
   return PW_OK;
 }
 
 PER_ELEMENT (gravity_force, gravity, 3) {
-  out[0] = x.k->fx, out[1] = x.k->fy, out[2] = 0;
+  out[0] = now.element->fx, out[1] = now.element->fy, out[2] = 0;
 }
 
 PER_ELEMENT (gravity_energy, gravity, 1) {
-  *out = -x.k->fx * x.A->x - x.k->fy * x.A->y;
+  *out = -now.element->fx * now.body->x - now.element->fy * now.body->y;
 }
 
 static const pw_field gravity_fields[] = {
@@ -39,8 +39,7 @@ static const pw_field gravity_fields[] = {
 const pw_kind pw_kind_gravity = {
   .name = "gravity",
   .about = "the same acceleration for every body that has mass",
-  DEFINITION (pw_gravity, gravity_fields),
-  ELEMENT (gravity, gravity_prepare),
+  TYPE (gravity, pw_gravity, gravity),
   .bodies = 1,
   .each_body = 1,
   .constant = 1,

@@ -6,7 +6,7 @@
 #include "contact.h"
 
 PREPARE (marker_prepare, pw_marker, contact) {
-  *k = contact_along (d->at, 0);
+  *element = contact_along (definition->at, 0);
   return PW_OK;
 }
 
@@ -20,8 +20,7 @@ const pw_kind pw_kind_marker = {
   .name = "marker",
   .about = "a point of a body whose path is shown in tables, figures and animations",
   .symbol = "o 0 0 0 .3",
-  DEFINITION (pw_marker, marker_fields),
-  ELEMENT (contact, marker_prepare),
+  TYPE (marker, pw_marker, contact),
   .bodies = 1,
   .contact = contact_place,
 };

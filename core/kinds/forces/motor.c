@@ -12,56 +12,60 @@
 #include "batch.h"
 
 typedef struct {
-  double k, c;  /* [N m/rad], [N m s/rad] */
-  double limit; /* L [N m]; 0: no limit */
+  double stiffness, damping; /* k [N m/rad], c [N m s/rad] */
+  double limit;              /* L [N m]; 0: no limit */
 } motor;
 
-/* A motor in the current state: the torque, its slope dT/dy, and y. */
+/* A motor in the current state. */
 typedef struct {
-  const motor *k;
-  const pw_configuration *A, *B;
-  double T, slope, y;
+  const motor *element;
+  const pw_configuration *body1, *body2;
+  double y, T, slope; /* y, T, dT/dy */
 } motor_state;
 
-static inline motor_state motor_at (const pw_batch *b, int e) {
-  const motor *k = (const motor *)b->element + e;
-  const pw_configuration *A = batch_body (b, e, 2, 0), *B = batch_body (b, e, 2, 1);
-  const double *u = b->u + 6 * e;
-  double y = k->k * (u[0] - A->phi + B->phi) + k->c * (u[3] - A->omega + B->omega);
-  double tanh_y = WHERE (k->limit > 0, tanh (y / k->limit));
-  return (motor_state){ k, A, B, k->limit > 0 ? k->limit * tanh_y : y, k->limit > 0 ? 1 - tanh_y * tanh_y : 1, y };
+static inline motor_state motor_at (const pw_batch *batch, int e) {
+  const motor *element = (const motor *)batch->element + e;
+  const pw_configuration *body1 = batch_body1 (batch, e), *body2 = batch_body2 (batch, e);
+  const double *angle = batch->u + 6 * e, *rate = angle + 3; /* the signals u1, u2, each with two time derivatives */
+  motor_state now = { element, body1, body2,
+                      .y = element->stiffness * (angle[0] - body1->phi + body2->phi) +
+                           element->damping * (rate[0] - body1->omega + body2->omega) };
+  now.T = limited_force (now.y, element->limit, &now.slope);
+  return now;
 }
 
 PREPARE (motor_prepare, pw_motor, motor) {
-  *k = (motor){ d->stiffness, d->damping, d->limit };
+  *element = (motor){ definition->stiffness, definition->damping, definition->limit };
   return PW_OK;
 }
 
 PER_ELEMENT (motor_force, motor, 6) {
-  opposite_moments (x.T, out);
+  opposite_moments (now.T, out);
 }
 
 PER_ELEMENT (motor_force_u, motor, 12) {
   memset (out, 0, 12 * sizeof *out);
-  out[4] = x.slope * x.k->k, out[5] = x.slope * x.k->c;
+  out[4] = now.slope * now.element->stiffness, out[5] = now.slope * now.element->damping;
   out[10] = -out[4], out[11] = -out[5];
 }
 
 PER_ELEMENT (motor_force_q, motor, 36) {
-  opposite_moments_block (x.slope * x.k->k, out);
+  opposite_moments_block (now.slope * now.element->stiffness, out);
 }
 
 PER_ELEMENT (motor_force_v, motor, 36) {
-  opposite_moments_block (x.slope * x.k->c, out);
+  opposite_moments_block (now.slope * now.element->damping, out);
 }
 
+/* The changes that change y by L + |y|, which reverses a saturated torque. */
 PER_ELEMENT (motor_saturation, motor, 12) {
-  if (x.k->limit > 0 && x.k->k > 0) out[2] = out[5] = (x.k->limit + fabs (x.y)) / x.k->k;
-  if (x.k->limit > 0 && x.k->c > 0) out[8] = out[11] = (x.k->limit + fabs (x.y)) / x.k->c;
+  double limit = now.element->limit, stiffness = now.element->stiffness, damping = now.element->damping;
+  if (limit > 0 && stiffness > 0) out[2] = out[5] = (limit + fabs (now.y)) / stiffness;
+  if (limit > 0 && damping > 0) out[8] = out[11] = (limit + fabs (now.y)) / damping;
 }
 
 PER_ELEMENT (motor_power, motor, 1) {
-  *out = x.T * (x.A->omega - x.B->omega);
+  *out = now.T * (now.body1->omega - now.body2->omega);
 }
 
 static const pw_field motor_fields[] = {
@@ -84,8 +88,7 @@ const pw_kind pw_kind_motor = {
   .name = "motor",
   .about = "a limited torque that drives the relative angle and angular velocity of two bodies to target values",
   .symbol = "0 .9 -.5 0 1 0 0 .7 .7 0 0 1 0 -.7 .7 0 -.2 .8 0 -.7 .7 0 -.6 1.2",
-  DEFINITION (pw_motor, motor_fields),
-  ELEMENT (motor, motor_prepare),
+  TYPE (motor, pw_motor, motor),
   .bodies = 2,
   .signals = 2,
   FORCE (motor),

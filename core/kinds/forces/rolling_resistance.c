@@ -1,8 +1,8 @@
 /* rolling-resistance: a force along a heading that opposes the velocity of the contact point P in that direction.
  *
- *   F = -L tanh (v_e / v0),  v_e = E . (vx, vy, w)                v_e: speed of P along the heading (coulomb.h)
- *   E = [ cos(theta)  sin(theta)  -m ]          theta = phi + psi; m: the arm of P to the left of the heading
- *   f = F E,  loss = -F v_e >= 0
+ *   F = L tanh (v / v0),  v = S (vx, vy, w)                        v: speed of P along the heading (coulomb.h)
+ *   S = [ cos(theta)  sin(theta)  -m ]          theta = phi + psi, psi: heading in the body; m: arm of P to its left
+ *   f = -F S,  loss = F v >= 0
  *
  * (Wong 2008, Theory of Ground Vehicles, section 1.2.)
  * It has no lateral component; a wheel at the same point provides that. */
@@ -11,65 +11,44 @@
 #include "coulomb.h"
 
 typedef struct {
-  contact point; /* direction: the heading */
+  contact along; /* its direction is the heading */
   coulomb law;
 } resistance;
 
-/* An element in the current state: E and the speed along it. */
+/* An element in the current state. */
 typedef struct {
-  const resistance *k;
-  const pw_configuration *A;
-  double E[3], ve;
+  const coulomb *law;
+  double v, S[3], v_q[3];
 } resistance_state;
 
-static inline resistance_state resistance_at (const pw_batch *b, int e) {
-  const resistance *k = (const resistance *)b->element + e;
-  contact_state d = contact_of (k->point, b, e);
-  resistance_state x = { k, d.A, .ve = contact_speed (&d) };
-  contact_J_one (d, x.E);
-  return x;
+static inline resistance_state resistance_at (const pw_batch *batch, int e) {
+  const resistance *element = (const resistance *)batch->element + e;
+  contact_state along = contact_of (element->along, batch, e);
+  resistance_state now = { &element->law, .v = contact_speed (&along) };
+  contact_J_one (along, now.S);
+  now.v_q[2] = contact_speed_phi (&along);
+  return now;
 }
 
 PREPARE (resistance_prepare, pw_rolling_resistance, resistance) {
-  k->point = contact_along (d->at, d->heading);
-  return coulomb_make (0, d->limit, d->speed, &k->law, error);
+  element->along = contact_along (definition->at, definition->heading);
+  return coulomb_make (0, definition->limit, definition->speed, &element->law, error);
 }
 
-PER_ELEMENT (resistance_force, resistance, 3) {
-  double F = -coulomb_force (&x.k->law, x.ve);
-  for (int i = 0; i < 3; i++) out[i] = F * x.E[i];
-}
-
-/* d(F E)/dphi with dE/dphi = (-s, c, 0) and dv_e/dphi = c vy - s vx. */
+/* -d(F S)/dphi with dS/dphi = (-sin(theta), cos(theta), 0). */
 PER_ELEMENT (resistance_force_q, resistance, 9) {
-  double F = -coulomb_force (&x.k->law, x.ve),
-         turn = -coulomb_slope (&x.k->law, x.ve) * (x.E[0] * x.A->vy - x.E[1] * x.A->vx);
+  double F = coulomb_force (now.law, now.v), F_phi = coulomb_slope (now.law, now.v) * now.v_q[2];
   memset (out, 0, 9 * sizeof *out);
-  out[2] = turn * x.E[0] - F * x.E[1];
-  out[5] = turn * x.E[1] + F * x.E[0];
-  out[8] = turn * x.E[2];
+  out[2] = F * now.S[1] - F_phi * now.S[0];
+  out[5] = -F * now.S[0] - F_phi * now.S[1];
+  out[8] = -F_phi * now.S[2];
 }
 
-PER_ELEMENT (resistance_force_v, resistance, 9) {
-  double slope = -coulomb_slope (&x.k->law, x.ve);
-  for (int i = 0; i < 9; i++) out[i] = slope * x.E[i / 3] * x.E[i % 3];
-}
-
-PER_ELEMENT (resistance_saturation, resistance, 6) {
-  out[2] = coulomb_saturation (&x.k->law, x.ve, x.E[0] * x.A->vy - x.E[1] * x.A->vx);
-  for (int i = 0; i < 3; i++) out[3 + i] = coulomb_saturation (&x.k->law, x.ve, x.E[i]);
-}
-
-PER_ELEMENT (resistance_loss, resistance, 1) {
-  *out = coulomb_force (&x.k->law, x.ve) * x.ve;
-}
+COULOMB (resistance, 3)
 
 static const pw_field resistance_fields[] = {
   { PW_AT (pw_rolling_resistance, body), PW_BODY, .required = 1, .about = "the body that rolls" },
-  { PW_AT (pw_rolling_resistance, at), PW_POINT, .unit = "m", .required = 1,
-    .about = "contact point in the body's frame" },
-  { PW_AT (pw_rolling_resistance, heading), PW_NUMBER, .unit = "rad",
-    .about = "rolling direction in the body's frame; 0: along its x" },
+  CONTACT_FIELDS (pw_rolling_resistance),
   { PW_AT (pw_rolling_resistance, limit), PW_NUMBER, .unit = "N", .required = 1, .domain = PW_NONNEGATIVE,
     .about = "the force while rolling: coefficient times normal load" },
   { PW_AT (pw_rolling_resistance, speed), PW_NUMBER, .unit = "m/s", .required = 1, .domain = PW_POSITIVE,
@@ -80,8 +59,7 @@ static const pw_field resistance_fields[] = {
 const pw_kind pw_kind_rolling_resistance = {
   .name = "rolling-resistance",
   .about = "a force of given magnitude that opposes the motion of a point along a heading",
-  DEFINITION (pw_rolling_resistance, resistance_fields),
-  ELEMENT (resistance, resistance_prepare),
+  TYPE (resistance, pw_rolling_resistance, resistance),
   .bodies = 1,
   FORCE (resistance),
   .saturation = resistance_saturation,

@@ -9,44 +9,43 @@
 #include "batch.h"
 
 typedef struct {
-  double k, c, beta; /* stiffness [N m/rad], damping [N m s/rad], free angle [rad] */
+  double stiffness, damping, free_angle; /* k [N m/rad], c [N m s/rad], beta [rad] */
 } twist;
 
-/* A spring in the current state: twist and its rate. */
 typedef struct {
-  const twist *k;
-  double angle, rate;
+  const twist *element;
+  double angle, rate; /* phi1 - phi2 - beta, w1 - w2 */
 } twist_state;
 
-static inline twist_state twist_at (const pw_batch *b, int e) {
-  const twist *k = (const twist *)b->element + e;
-  const pw_configuration *A = batch_body (b, e, 2, 0), *B = batch_body (b, e, 2, 1);
-  return (twist_state){ k, A->phi - B->phi - k->beta, A->omega - B->omega };
+static inline twist_state twist_at (const pw_batch *batch, int e) {
+  const twist *element = (const twist *)batch->element + e;
+  const pw_configuration *body1 = batch_body1 (batch, e), *body2 = batch_body2 (batch, e);
+  return (twist_state){ element, body1->phi - body2->phi - element->free_angle, body1->omega - body2->omega };
 }
 
 PREPARE (twist_prepare, pw_rotational_spring, twist) {
-  *k = (twist){ d->stiffness, d->damping, d->angle };
+  *element = (twist){ definition->stiffness, definition->damping, definition->angle };
   return PW_OK;
 }
 
 PER_ELEMENT (twist_force, twist, 6) {
-  opposite_moments (-(x.k->k * x.angle + x.k->c * x.rate), out);
+  opposite_moments (-(now.element->stiffness * now.angle + now.element->damping * now.rate), out);
 }
 
 PER_ELEMENT (twist_force_q, twist, 36) {
-  opposite_moments_block (x.k->k, out);
+  opposite_moments_block (now.element->stiffness, out);
 }
 
 PER_ELEMENT (twist_force_v, twist, 36) {
-  opposite_moments_block (x.k->c, out);
+  opposite_moments_block (now.element->damping, out);
 }
 
 PER_ELEMENT (twist_energy, twist, 1) {
-  *out = x.k->k * x.angle * x.angle / 2;
+  *out = now.element->stiffness * now.angle * now.angle / 2;
 }
 
 PER_ELEMENT (twist_loss, twist, 1) {
-  *out = x.k->c * x.rate * x.rate;
+  *out = now.element->damping * now.rate * now.rate;
 }
 
 static const pw_field twist_fields[] = {
@@ -65,8 +64,7 @@ const pw_kind pw_kind_rotational_spring = {
   .name = "rotational-spring",
   .about = "a torsion spring and a parallel damper between two bodies",
   .symbol = "0 .4 0 0 .3 .4 0 -.2 .5 0 -.6 0 0 -.3 -.7 0 .4 -.8 0 .9 0 0 .7 .8 0 0 1.1 0 -.8 .9",
-  DEFINITION (pw_rotational_spring, twist_fields),
-  ELEMENT (twist, twist_prepare),
+  TYPE (twist, pw_rotational_spring, twist),
   .bodies = 2,
   FORCE (twist),
   .energy = twist_energy,

@@ -6,89 +6,93 @@
  *   V = k (l - l0)^2 / 2,  loss = c l'^2
  *
  * (Shabana 2001, Computational Dynamics, section 6.5.)
- * If l = 0, or 1 / l overflows, the direction is undefined: e = 0 and the force is zero.  For l0 = 0 this is the limit
- * of the smooth spring force k d; for l0 > 0 the ends should not meet. */
+ * If the ends meet, the direction is undefined: e = 0 and the force is zero.  For l0 = 0 this is the limit of the
+ * smooth spring force k d; for l0 > 0 the ends should not meet. */
 #include "points.h"
+
+#define SPRING_SHORTEST 1e-150 /* [m]; for smaller lengths products with 1 / l could overflow */
 
 typedef struct {
   points points;
-  double k, c, l0; /* stiffness [N/m], damping [N s/m], free length [m] */
+  double stiffness, damping, free_length; /* k [N/m], c [N s/m], l0 [m] */
 } spring;
 
 /* A spring in the current state. */
 typedef struct {
-  const spring *k;
-  points_state p;
-  double D[12];       /* 2 x 6 */
-  double e[2], l, il; /* direction, length, 1 / length; direction and 1 / length are 0 if the length is */
-  double speed;       /* l' */
-  double F[2];        /* pull */
+  const spring *element;
+  points_state ends;
+  double D[12];            /* 2 x 6 */
+  double e[2], l, inverse; /* e, l, 1 / l; e and 1 / l are 0 for l <= SPRING_SHORTEST */
+  double speed;            /* l' */
+  double F[2];
 } spring_state;
 
-static inline spring_state spring_at (const pw_batch *b, int e) {
-  const spring *k = (const spring *)b->element + e;
-  spring_state x = { .k = k, .p = points_of (&k->points, b, e) };
-  points_J_one (x.p, x.D);
-  x.l = hypot (x.p.d[0], x.p.d[1]);
-  x.il = x.l > 1e-150 ? 1 / x.l : 0;
-  x.e[0] = x.p.d[0] * x.il, x.e[1] = x.p.d[1] * x.il;
-  x.speed = x.e[0] * x.p.rate[0] + x.e[1] * x.p.rate[1];
-  double pull = k->k * (x.l - k->l0) + k->c * x.speed;
-  x.F[0] = pull * x.e[0], x.F[1] = pull * x.e[1];
-  return x;
+static inline spring_state spring_at (const pw_batch *batch, int e) {
+  const spring *element = (const spring *)batch->element + e;
+  spring_state now = { .element = element, .ends = points_of (&element->points, batch, e) };
+  points_J_one (now.ends, now.D);
+  now.l = hypot (now.ends.d[0], now.ends.d[1]);
+  now.inverse = now.l > SPRING_SHORTEST ? 1 / now.l : 0;
+  now.e[0] = now.ends.d[0] * now.inverse, now.e[1] = now.ends.d[1] * now.inverse;
+  now.speed = now.e[0] * now.ends.rate[0] + now.e[1] * now.ends.rate[1];
+  double pull = element->stiffness * (now.l - element->free_length) + element->damping * now.speed;
+  now.F[0] = pull * now.e[0], now.F[1] = pull * now.e[1];
+  return now;
 }
 
 PREPARE (spring_prepare, pw_spring, spring) {
-  *k = (spring){ points_make (d->at), d->stiffness, d->damping, d->length };
+  *element = (spring){ points_make (definition->at), definition->stiffness, definition->damping, definition->length };
   return PW_OK;
 }
 
 PER_ELEMENT (spring_force, spring, 6) {
-  out[0] = -x.F[0], out[1] = -x.F[1], out[2] = x.F[0] * x.p.S1[1] - x.F[1] * x.p.S1[0];
-  out[3] = x.F[0], out[4] = x.F[1], out[5] = x.F[1] * x.p.S2[0] - x.F[0] * x.p.S2[1];
+  out[0] = -now.F[0], out[1] = -now.F[1], out[2] = now.F[0] * now.ends.S1[1] - now.F[1] * now.ends.S1[0];
+  out[3] = now.F[0], out[4] = now.F[1], out[5] = now.F[1] * now.ends.S2[0] - now.F[0] * now.ends.S2[1];
 }
 
 /* out = -D^T K D, 6 x 6; K = dF/dd or dF/dd'. */
 static inline void spring_product (const spring_state *s, double K[2][2], double *out) {
   for (int j = 0; j < 6; j++) {
-    double x = K[0][0] * s->D[j] + K[0][1] * s->D[6 + j], y = K[1][0] * s->D[j] + K[1][1] * s->D[6 + j];
-    for (int i = 0; i < 6; i++) out[6 * i + j] = -s->D[i] * x - s->D[6 + i] * y;
+    double KD[2] = { K[0][0] * s->D[j] + K[0][1] * s->D[6 + j], K[1][0] * s->D[j] + K[1][1] * s->D[6 + j] };
+    for (int i = 0; i < 6; i++) out[6 * i + j] = -s->D[i] * KD[0] - s->D[6 + i] * KD[1];
   }
 }
 
-/* Includes the rotation of the arms: d^2d/dphi1^2 = -(X1, Y1), d^2d/dphi2^2 = (X2, Y2), dd'/dphi = -w (X, Y).
+/* Includes the rotation of the arms: d^2d/dphi1^2 = -(X1, Y1), d^2d/dphi2^2 = (X2, Y2), dd'/dphi1 = -w1 (X1, Y1),
+ * dd'/dphi2 = w2 (X2, Y2).
  * K = dF/dd = (k (1 - l0/l) + c l'/l) (1 - e e^T) + k e e^T + (c/l) e (d' - l' e)^T */
 PER_ELEMENT (spring_force_q, spring, 36) {
-  const spring *k = x.k;
-  const double *S1 = x.p.S1, *S2 = x.p.S2, w1 = x.p.A->omega, w2 = x.p.B->omega;
-  double across = x.il > 0 ? k->k * (1 - k->l0 * x.il) + k->c * x.speed * x.il : k->k, K[2][2];
+  const double k = now.element->stiffness, c = now.element->damping, l0 = now.element->free_length;
+  const double *S1 = now.ends.S1, *S2 = now.ends.S2, w1 = now.ends.body1->omega, w2 = now.ends.body2->omega;
+  double across = now.inverse > 0 ? k * (1 - l0 * now.inverse) + c * now.speed * now.inverse : k, K[2][2];
   for (int i = 0; i < 2; i++)
     for (int j = 0; j < 2; j++)
-      K[i][j] = across * (i == j) + (k->k - across) * x.e[i] * x.e[j] +
-                k->c * x.il * x.e[i] * (x.p.rate[j] - x.speed * x.e[j]);
-  spring_product (&x, K, out);
-  double turn1 = -w1 * (x.e[0] * S1[0] + x.e[1] * S1[1]), turn2 = w2 * (x.e[0] * S2[0] + x.e[1] * S2[1]);
+      K[i][j] = across * (i == j) + (k - across) * now.e[i] * now.e[j] +
+                c * now.inverse * now.e[i] * (now.ends.rate[j] - now.speed * now.e[j]);
+  spring_product (&now, K, out);
+  double speed_phi1 = -w1 * (now.e[0] * S1[0] + now.e[1] * S1[1]);
+  double speed_phi2 = w2 * (now.e[0] * S2[0] + now.e[1] * S2[1]);
   for (int i = 0; i < 6; i++) {
-    double along = k->c * (x.D[i] * x.e[0] + x.D[6 + i] * x.e[1]);
-    out[6 * i + 2] -= along * turn1;
-    out[6 * i + 5] -= along * turn2;
+    double along = c * (now.D[i] * now.e[0] + now.D[6 + i] * now.e[1]);
+    out[6 * i + 2] -= along * speed_phi1;
+    out[6 * i + 5] -= along * speed_phi2;
   }
-  out[14] += x.F[0] * S1[0] + x.F[1] * S1[1];
-  out[35] -= x.F[0] * S2[0] + x.F[1] * S2[1];
+  out[14] += now.F[0] * S1[0] + now.F[1] * S1[1];
+  out[35] -= now.F[0] * S2[0] + now.F[1] * S2[1];
 }
 
 PER_ELEMENT (spring_force_v, spring, 36) {
-  const double c = x.k->c, *e = x.e;
+  const double c = now.element->damping, *e = now.e;
   double K[2][2] = { { c * e[0] * e[0], c * e[0] * e[1] }, { c * e[1] * e[0], c * e[1] * e[1] } };
-  spring_product (&x, K, out);
+  spring_product (&now, K, out);
 }
 
 PER_ELEMENT (spring_energy, spring, 1) {
-  *out = x.k->k * (x.l - x.k->l0) * (x.l - x.k->l0) / 2;
+  *out = now.element->stiffness * (now.l - now.element->free_length) * (now.l - now.element->free_length) / 2;
 }
 
 PER_ELEMENT (spring_loss, spring, 1) {
-  *out = x.k->c * x.speed * x.speed;
+  *out = now.element->damping * now.speed * now.speed;
 }
 
 static const pw_field spring_fields[] = {
@@ -110,8 +114,7 @@ const pw_kind pw_kind_spring = {
             ".59 0 .7 .65 0 -.7 .71 0 .7 .77 0 -.7 .8 0 0 1 0 0; "
             "damping: 0 0 0 .1 0 0 .1 0 -1.2 .35 0 -1.2 .35 0 -.7 .7 0 -.7 .35 0 -.7 .35 0 -1.7 .7 0 -1.7; "
             "damping: .5 0 -.8 .5 0 -1.6 .5 0 -1.2 .9 0 -1.2 .9 0 0 1 0 0",
-  DEFINITION (pw_spring, spring_fields),
-  ELEMENT (spring, spring_prepare),
+  TYPE (spring, pw_spring, spring),
   .bodies = 2,
   FORCE (spring),
   .energy = spring_energy,

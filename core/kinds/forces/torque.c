@@ -3,17 +3,17 @@
  *   f = (0, 0, u | 0, 0, -u),  power = u (w1 - w2) */
 #include "batch.h"
 
-static void torque_force (const pw_batch *b, double *out) {
-  for (int e = 0; e < b->count; e++) opposite_moments (b->u[3 * e], out + 6 * e);
+static void torque_force (const pw_batch *batch, double *out) {
+  for (int e = 0; e < batch->count; e++) opposite_moments (batch->u[3 * e], out + 6 * e);
 }
 
-static void torque_force_u (const pw_batch *b, double *out) {
-  for (int e = 0; e < b->count; e++) opposite_moments (1, out + 6 * e);
+static void torque_force_u (const pw_batch *batch, double *out) {
+  for (int e = 0; e < batch->count; e++) opposite_moments (1, out + 6 * e);
 }
 
-static void torque_power (const pw_batch *b, double *out) {
-  for (int e = 0; e < b->count; e++)
-    out[e] = b->u[3 * e] * (batch_body (b, e, 2, 0)->omega - batch_body (b, e, 2, 1)->omega);
+static void torque_power (const pw_batch *batch, double *out) {
+  for (int e = 0; e < batch->count; e++)
+    out[e] = batch->u[3 * e] * (batch_body1 (batch, e)->omega - batch_body2 (batch, e)->omega);
 }
 
 static const pw_field torque_fields[] = {

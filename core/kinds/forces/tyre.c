@@ -1,10 +1,10 @@
 /* tyre: a wheel with lateral slip; a lateral force at the contact point P opposes the slip.
  *
- *   sigma = v_n / R,  R = sqrt (v_e^2 + v0^2)      v_e, v_n: speed of P along the heading and to its left
+ *   sigma = v_n / R,  R = sqrt (v_t^2 + v0^2)      v_t, v_n: speed of P along the heading and to its left
  *   F     = -C sigma                                              (linear: no limit)
  *   F     = -mu N tanh (C sigma / (mu N))                         (saturating)
- *   f     = F S,  S = [ -sin(theta)  cos(theta)  l ]              theta = phi + psi, psi: the heading in the body;
- *   v_n   = S v,  v_e = [ cos(theta)  sin(theta)  -m ] v          l, m: coordinates of P along it, and to its left
+ *   f     = F S_n,  S_n = [ -sin(theta)  cos(theta)  l ]          theta = phi + psi, psi: the heading in the body;
+ *   v_n   = S_n v,  v_t = S_t v,  S_t = [ cos(theta)  sin(theta)  -m ]    l, m: arm of P along it, and to its left
  *   loss  = -F v_n >= 0
  *
  * (Pacejka 2012, Tire and Vehicle Dynamics, chapter 1, for slip and cornering stiffness; the regularising v0 keeps the
@@ -22,90 +22,88 @@ typedef struct {
 
 /* A tyre in the current state. */
 typedef struct {
-  const tyre *k;
-  contact_state e, n;  /* along and across the heading */
-  double ve, vn, R, F; /* speeds of P; R; force along n */
-  double F_ve, F_vn;   /* derivatives of F */
+  const tyre *element;
+  contact_state along, across;
+  double v_along, v_across, R; /* v_t, v_n, R */
+  double F, F_along, F_across; /* F and its derivatives with respect to v_t and v_n */
 } tyre_state;
 
-static inline tyre_state tyre_at (const pw_batch *b, int e) {
-  const tyre *k = (const tyre *)b->element + e;
-  tyre_state x = { .k = k, .e = contact_of (k->along, b, e), .n = contact_of (k->across, b, e) };
-  x.ve = contact_speed (&x.e), x.vn = contact_speed (&x.n), x.R = sqrt (x.ve * x.ve + k->speed * k->speed);
-  double sigma = x.vn / x.R, slope = -k->stiffness;
-  x.F = slope * sigma;
-  double y = WHERE (k->limit > 0, tanh (x.F / k->limit));
-  x.F = k->limit > 0 ? k->limit * y : x.F;
-  slope *= k->limit > 0 ? 1 - y * y : 1;
-  x.F_vn = slope / x.R;
-  x.F_ve = -slope * sigma * x.ve / (x.R * x.R);
-  return x;
+static inline tyre_state tyre_at (const pw_batch *batch, int e) {
+  const tyre *element = (const tyre *)batch->element + e;
+  tyre_state now = { .element = element,
+                     .along = contact_of (element->along, batch, e),
+                     .across = contact_of (element->across, batch, e) };
+  now.v_along = contact_speed (&now.along), now.v_across = contact_speed (&now.across);
+  now.R = sqrt (now.v_along * now.v_along + element->speed * element->speed);
+  double sigma = now.v_across / now.R, slope;
+  now.F = limited_force (-element->stiffness * sigma, element->limit, &slope);
+  double F_sigma = -element->stiffness * slope;
+  now.F_across = F_sigma / now.R;
+  now.F_along = -F_sigma * sigma * now.v_along / (now.R * now.R);
+  return now;
 }
 
 PREPARE (tyre_prepare, pw_tyre, tyre) {
-  *k = (tyre){ contact_along (d->at, d->heading), contact_across (d->at, d->heading), d->stiffness, d->speed,
-               d->friction * d->load };
-  if (d->load > 0 && !(d->friction > 0))
-    return pw_fail (error, PW_INPUT, "friction = %g: expected > 0, since a load limits the force to friction x load",
-                    d->friction);
-  return PW_OK;
+  *element =
+      (tyre){ contact_along (definition->at, definition->heading), contact_across (definition->at, definition->heading),
+              definition->stiffness, definition->speed, definition->friction * definition->load };
+  if ((definition->load > 0) == (definition->friction > 0)) return PW_OK;
+  return pw_fail (error, PW_INPUT, "%s = 0: expected > 0, since %s limits the force to friction x load",
+                  definition->load > 0 ? "friction" : "load", definition->load > 0 ? "a load" : "friction");
 }
 
 PER_ELEMENT (tyre_force, tyre, 3) {
-  out[0] = x.F * x.n.dx, out[1] = x.F * x.n.dy, out[2] = x.F * x.k->across.arm;
+  out[0] = now.F * now.across.dx, out[1] = now.F * now.across.dy, out[2] = now.F * now.element->across.arm;
 }
 
-/* d(F S)/dphi with dS/dphi = -(c, s, 0), dv_n/dphi = -(c, s) . v, dv_e/dphi = (-s, c) . v, v: velocity of the body. */
+/* d(F S_n)/dphi with dS_n/dphi = -(cos(theta), sin(theta), 0). */
 PER_ELEMENT (tyre_force_q, tyre, 9) {
-  const pw_configuration *A = x.n.A;
-  double c = x.e.dx, s = x.e.dy, slope = -x.F_vn * (c * A->vx + s * A->vy) + x.F_ve * (c * A->vy - s * A->vx);
+  double F_phi = now.F_across * contact_speed_phi (&now.across) + now.F_along * contact_speed_phi (&now.along);
   memset (out, 0, 9 * sizeof *out);
-  out[2] = -x.F * c - slope * s;
-  out[5] = -x.F * s + slope * c;
-  out[8] = slope * x.k->across.arm;
+  out[2] = -now.F * now.along.dx + F_phi * now.across.dx;
+  out[5] = -now.F * now.along.dy + F_phi * now.across.dy;
+  out[8] = F_phi * now.element->across.arm;
 }
 
 PER_ELEMENT (tyre_force_v, tyre, 9) {
-  double S[3], E[3];
-  contact_J_one (x.n, S);
-  contact_J_one (x.e, E);
-  for (int i = 0; i < 9; i++) out[i] = S[i / 3] * (x.F_vn * S[i % 3] + x.F_ve * E[i % 3]);
+  double across[3], along[3]; /* S_n, S_t */
+  contact_J_one (now.across, across);
+  contact_J_one (now.along, along);
+  for (int i = 0; i < 9; i++) out[i] = across[i / 3] * (now.F_across * across[i % 3] + now.F_along * along[i % 3]);
 }
 
-/* Velocity scales: R along the heading, over which the slip varies near rest; laterally, if there is a limit, the
- * change that reverses a saturated force. */
+/* Changes of v_t and v_n: R, over which the slip varies near rest; the one that reverses a saturated force, if there is
+ * a limit.  They are divided by the derivatives of v_t and v_n with respect to coordinates and velocities. */
 PER_ELEMENT (tyre_saturation, tyre, 6) {
-  double across = x.k->limit / x.k->stiffness * x.R + fabs (x.vn), E[6] = { 0 }, S[6] = { 0 };
-  E[2] = x.n.dx * x.n.A->vx + x.n.dy * x.n.A->vy, S[2] = -x.e.dx * x.e.A->vx - x.e.dy * x.e.A->vy;
-  contact_J_one (x.e, E + 3);
-  contact_J_one (x.n, S + 3);
+  double change = now.element->limit / now.element->stiffness * now.R + fabs (now.v_across);
+  double along[6] = { [2] = contact_speed_phi (&now.along) }, across[6] = { [2] = contact_speed_phi (&now.across) };
+  contact_J_one (now.along, along + 3);
+  contact_J_one (now.across, across + 3);
   for (int i = 0; i < 6; i++) {
-    if (E[i] != 0) out[i] = x.R / fabs (E[i]);
-    if (S[i] != 0 && x.k->limit > 0) out[i] = fmin (out[i], across / fabs (S[i]));
+    if (along[i] != 0) out[i] = now.R / fabs (along[i]);
+    if (across[i] != 0 && now.element->limit > 0) out[i] = fmin (out[i], change / fabs (across[i]));
   }
 }
 
 PER_ELEMENT (tyre_loss, tyre, 1) {
-  *out = -x.F * x.vn;
+  *out = -now.F * now.v_across;
 }
 
 PER_ELEMENT (tyre_contact, tyre, 3) {
-  contact_place_one (x.e, out);
+  contact_place_one (now.along, out);
 }
 
 static const pw_field tyre_fields[] = {
   { PW_AT (pw_tyre, body), PW_BODY, .required = 1, .about = "the body with the tyre" },
-  { PW_AT (pw_tyre, at), PW_POINT, .unit = "m", .required = 1, .about = "contact point in the body's frame" },
-  { PW_AT (pw_tyre, heading), PW_NUMBER, .unit = "rad",
-    .about = "rolling direction in the body's frame; 0: along its x" },
+  CONTACT_FIELDS (pw_tyre),
   { PW_AT (pw_tyre, stiffness), PW_NUMBER, .unit = "N", .required = 1, .domain = PW_POSITIVE,
     .about = "cornering stiffness: lateral force per slip" },
   { PW_AT (pw_tyre, speed), PW_NUMBER, .unit = "m/s", .required = 1, .domain = PW_POSITIVE,
     .about = "below about this rolling speed the slip is regularised" },
   { PW_AT (pw_tyre, load), PW_NUMBER, .unit = "N", .domain = PW_NONNEGATIVE,
-    .about = "normal load that limits the force; 0: no limit" },
+    .about = "normal load; with friction it limits the force" },
   { PW_AT (pw_tyre, friction), PW_NUMBER, .domain = PW_NONNEGATIVE,
-    .about = "the limit is friction times load; required with a load" },
+    .about = "the limit is friction times load; 0, as the load: no limit" },
   { .name = NULL },
 };
 
@@ -113,8 +111,7 @@ const pw_kind pw_kind_tyre = {
   .name = "tyre",
   .symbol = "0 -1.6 -.5 0 1.6 -.5 0 1.6 .5 0 -1.6 .5 0 -1.6 -.5",
   .about = "a wheel with lateral slip; the lateral force increases with the slip",
-  DEFINITION (pw_tyre, tyre_fields),
-  ELEMENT (tyre, tyre_prepare),
+  TYPE (tyre, pw_tyre, tyre),
   .bodies = 1,
   FORCE (tyre),
   .saturation = tyre_saturation,

@@ -11,36 +11,37 @@
 #include "line.h"
 
 PREPARE (drive_prepare, pw_drive, line) {
-  *k = (line){ .s1 = { d->at[0][0], d->at[0][1] }, .angle = d->what == PW_DRIVE_ANGLE };
-  if (d->what == PW_DRIVE_ANGLE) return PW_OK;
-  k->n[d->what] = 1;
-  k->c = d->at[1][d->what];
+  *element = (line){ .s1 = { definition->at[0][0], definition->at[0][1] },
+                     .prescribes_angle = definition->what == PW_DRIVE_ANGLE };
+  if (definition->what == PW_DRIVE_ANGLE) return PW_OK;
+  element->n[definition->what] = 1;
+  element->c = definition->at[1][definition->what];
   return PW_OK;
 }
 
 PER_ELEMENT (drive_g, line, 1) {
-  line_g_one (x, out);
-  *out = *out + x.k->angle * (x.A->phi - x.B->phi) - x.u[0];
+  line_g_one (now, out);
+  *out = *out + now.constants->prescribes_angle * (now.body1->phi - now.body2->phi) - now.u[0];
 }
 
 PER_ELEMENT (drive_g_size, line, 1) {
-  line_g_size_one (x, out);
-  *out += x.k->angle * (fabs (x.A->phi) + fabs (x.B->phi));
-  *out += fabs (x.u[0]);
+  line_g_size_one (now, out);
+  *out += now.constants->prescribes_angle * (fabs (now.body1->phi) + fabs (now.body2->phi));
+  *out += fabs (now.u[0]);
 }
 
-static void drive_eta (const pw_batch *b, double *out) {
-  for (int e = 0; e < b->count; e++) out[e] = b->u[3 * e + 1];
+static void drive_eta (const pw_batch *batch, double *out) {
+  for (int e = 0; e < batch->count; e++) out[e] = batch->u[3 * e + 1];
 }
 
 PER_ELEMENT (drive_J, line, 6) {
-  line_J_one (x, out);
-  out[2] += x.k->angle, out[5] -= x.k->angle;
+  line_J_one (now, out);
+  out[2] += now.constants->prescribes_angle, out[5] -= now.constants->prescribes_angle;
 }
 
 PER_ELEMENT (drive_gamma, line, 1) {
-  line_gamma_one (x, out);
-  *out += x.u[2];
+  line_gamma_one (now, out);
+  *out += now.u[2];
 }
 
 static const char *const drive_what[] = { "x", "y", "angle", NULL };
@@ -57,13 +58,9 @@ static const pw_field drive_fields[] = {
   { .name = NULL },
 };
 
-static const pw_quantity drive_reaction[] = {
-  { "F", "N or N m", NULL, "force on the first body at its point along the prescribed coordinate, or moment on it" },
-};
-
 static const char *drive_unit (const void *element, int row) {
   (void)row;
-  return ((const line *)element)->angle != 0 ? "N m" : "N";
+  return ((const line *)element)->prescribes_angle != 0 ? "N m" : "N";
 }
 
 const pw_kind pw_kind_drive = {
@@ -72,19 +69,16 @@ const pw_kind pw_kind_drive = {
   .symbol = "what=0: 0 .6 0 0 2.2 0 0 1.7 .3 0 2.2 0 0 1.7 -.3; "
             "what=1: 0 0 .6 0 0 2.2 0 .3 1.7 0 0 2.2 0 -.3 1.7; "
             "what=2: 0 .9 -.5 0 1 0 0 .7 .7 0 0 1 0 -.7 .7 0 -.2 .8 0 -.7 .7 0 -.6 1.2",
-  DEFINITION (pw_drive, drive_fields),
-  ELEMENT (line, drive_prepare),
+  TYPE (drive, pw_drive, line),
   .bodies = 2,
   .rows = 1,
   .signals = 1,
   .level = PW_HOLONOMIC,
-  .reaction = drive_reaction,
+  REACTION ("F", "N or N m", "force on the first body at its point along the prescribed coordinate, or moment on it"),
   .reaction_unit = drive_unit,
   POSITION (drive),
   .eta = drive_eta,
   .J = drive_J,
   .gamma = drive_gamma,
-  .jw_q = line_jw_q,
-  .gamma_q = line_gamma_q,
-  .gamma_v = line_gamma_v,
+  DERIVATIVES (line),
 };

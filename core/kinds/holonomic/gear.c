@@ -16,35 +16,37 @@ typedef struct {
 } gear;
 
 PREPARE (gear_prepare, pw_gear, gear) {
-  double phi[3];
-  for (int n = 0; n < 3; n++) phi[n] = bodies[n]->start[2];
-  double start = phi[0] - phi[2] - d->ratio * (phi[1] - phi[2]);
-  *k = (gear){ d->ratio, d->from == PW_GEAR_START ? start : d->offset };
-  if (d->ratio == 0) return pw_fail (error, PW_INPUT, "ratio = 0: expected another number, positive or negative");
+  double phi3 = bodies[2]->start[2];
+  double initial = bodies[0]->start[2] - phi3 - definition->ratio * (bodies[1]->start[2] - phi3);
+  *element = (gear){ definition->ratio, definition->from == PW_GEAR_START ? initial : definition->offset };
+  if (definition->ratio == 0)
+    return pw_fail (error, PW_INPUT, "ratio = 0: expected another number, positive or negative");
   return PW_OK;
 }
 
 typedef struct {
-  const gear *k;
+  const gear *element;
   double phi1, phi2, phi3;
 } gear_state;
 
-static inline gear_state gear_at (const pw_batch *b, int e) {
-  return (gear_state){ (const gear *)b->element + e, batch_body (b, e, 3, 0)->phi, batch_body (b, e, 3, 1)->phi,
-                       batch_body (b, e, 3, 2)->phi };
+static inline gear_state gear_at (const pw_batch *batch, int e) {
+  const pw_configuration *all = batch->configuration;
+  const int *body = batch->body + 3 * e;
+  return (gear_state){ (const gear *)batch->element + e, all[body[0]].phi, all[body[1]].phi, all[body[2]].phi };
 }
 
 PER_ELEMENT (gear_g, gear, 1) {
-  *out = x.phi1 - x.phi3 - x.k->ratio * (x.phi2 - x.phi3) - x.k->offset;
+  *out = now.phi1 - now.phi3 - now.element->ratio * (now.phi2 - now.phi3) - now.element->offset;
 }
 
 PER_ELEMENT (gear_g_size, gear, 1) {
-  *out = fabs (x.phi1) + fabs (x.phi3) + fabs (x.k->ratio) * (fabs (x.phi2) + fabs (x.phi3)) + fabs (x.k->offset);
+  *out = fabs (now.phi1) + fabs (now.phi3) + fabs (now.element->ratio) * (fabs (now.phi2) + fabs (now.phi3)) +
+         fabs (now.element->offset);
 }
 
 PER_ELEMENT (gear_J, gear, 9) {
   memset (out, 0, 9 * sizeof *out);
-  out[2] = 1, out[5] = -x.k->ratio, out[8] = x.k->ratio - 1;
+  out[2] = 1, out[5] = -now.element->ratio, out[8] = now.element->ratio - 1;
 }
 
 static const char *const gear_from[] = { "start", "offset", NULL };
@@ -62,18 +64,15 @@ static const pw_field gear_fields[] = {
   { .name = NULL },
 };
 
-static const pw_quantity gear_reaction[] = { { "M", "N m", NULL, "moment on the first body" } };
-
 const pw_kind pw_kind_gear = {
   .name = "gear",
   .about = "the angles of two bodies relative to a third have a fixed ratio",
   .symbol = "g1; g2",
-  DEFINITION (pw_gear, gear_fields),
-  ELEMENT (gear, gear_prepare),
+  TYPE (gear, pw_gear, gear),
   .bodies = 3,
   .rows = 1,
   .level = PW_HOLONOMIC,
-  .reaction = gear_reaction,
+  REACTION ("M", "N m", "moment on the first body"),
   POSITION (gear),
   .J = gear_J,
 };

@@ -6,7 +6,7 @@
 #include "points.h"
 
 PREPARE (pin_prepare, pw_pin, points) {
-  *k = points_make (d->at);
+  *element = points_make (definition->at);
   return PW_OK;
 }
 
@@ -26,8 +26,7 @@ const pw_kind pw_kind_pin = {
   .name = "pin",
   .about = "a point of one body and a point of another coincide (revolute joint, hinge)",
   .symbol = "o 0 0 0 .4",
-  DEFINITION (pw_pin, pin_fields),
-  ELEMENT (points, pin_prepare),
+  TYPE (pin, pw_pin, points),
   .bodies = 2,
   .rows = 2,
   .level = PW_HOLONOMIC,

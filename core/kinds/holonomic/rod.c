@@ -16,18 +16,18 @@ typedef struct {
 
 /* A rod in the current state. */
 typedef struct {
-  points_state p;
+  points_state ends;
   double D[12];  /* 2 x 6 */
   double w1, w2; /* angular velocities of the bodies */
   double L;
 } rod_state;
 
-static inline rod_state rod_at (const pw_batch *b, int e) {
-  const rod *k = (const rod *)b->element + e;
-  rod_state x = { .p = points_of (&k->points, b, e), .L = k->length };
-  points_J_one (x.p, x.D);
-  x.w1 = x.p.A->omega, x.w2 = x.p.B->omega;
-  return x;
+static inline rod_state rod_at (const pw_batch *batch, int e) {
+  const rod *element = (const rod *)batch->element + e;
+  rod_state now = { .ends = points_of (&element->points, batch, e), .L = element->length };
+  points_J_one (now.ends, now.D);
+  now.w1 = now.ends.body1->omega, now.w2 = now.ends.body2->omega;
+  return now;
 }
 
 static inline double rod_dot (const double *a, const double *b) {
@@ -35,58 +35,60 @@ static inline double rod_dot (const double *a, const double *b) {
 }
 
 /* out = y^T D / L */
-static inline void rod_through (const rod_state *x, const double y[2], double *out) {
-  for (int j = 0; j < 6; j++) out[j] = (y[0] * x->D[j] + y[1] * x->D[6 + j]) / x->L;
+static inline void rod_multiply_D (const rod_state *now, const double y[2], double *out) {
+  for (int j = 0; j < 6; j++) out[j] = (y[0] * now->D[j] + y[1] * now->D[6 + j]) / now->L;
 }
 
 PREPARE (rod_prepare, pw_rod, rod) {
-  *k = (rod){ points_make (d->at), d->length };
+  *element = (rod){ points_make (definition->at), definition->length };
   return PW_OK;
 }
 
 PER_ELEMENT (rod_g, rod, 1) {
-  *out = (rod_dot (x.p.d, x.p.d) - x.L * x.L) / (2 * x.L);
+  *out = (rod_dot (now.ends.d, now.ends.d) - now.L * now.L) / (2 * now.L);
 }
 
 PER_ELEMENT (rod_g_size, rod, 1) {
   double size[2];
-  points_g_size_one (x.p, size);
-  *out = (fabs (x.p.d[0]) * size[0] + fabs (x.p.d[1]) * size[1]) / x.L + x.L / 2;
+  points_g_size_one (now.ends, size);
+  *out = (fabs (now.ends.d[0]) * size[0] + fabs (now.ends.d[1]) * size[1]) / now.L + now.L / 2;
 }
 
 PER_ELEMENT (rod_J, rod, 6) {
-  rod_through (&x, x.p.d, out);
+  rod_multiply_D (&now, now.ends.d, out);
 }
 
 PER_ELEMENT (rod_gamma, rod, 1) {
-  double turn = x.w1 * x.w1 * rod_dot (x.p.d, x.p.S1) - x.w2 * x.w2 * rod_dot (x.p.d, x.p.S2);
-  *out = (turn - rod_dot (x.p.rate, x.p.rate)) / x.L;
+  double centripetal =
+      now.w1 * now.w1 * rod_dot (now.ends.d, now.ends.S1) - now.w2 * now.w2 * rod_dot (now.ends.d, now.ends.S2);
+  *out = (centripetal - rod_dot (now.ends.rate, now.ends.rate)) / now.L;
 }
 
 /* ((D w)^T D + d^T d(D w)/dq) / L with d(D w)/dphi1 = -(X1, Y1) w_2, d(D w)/dphi2 = (X2, Y2) w_5. */
 PER_ELEMENT (rod_jw_q, rod, 6) {
   double Dw[2] = { 0, 0 };
-  for (int j = 0; j < 6; j++) Dw[0] += x.D[j] * x.p.w[j], Dw[1] += x.D[6 + j] * x.p.w[j];
-  rod_through (&x, Dw, out);
-  out[2] -= rod_dot (x.p.d, x.p.S1) * x.p.w[2] / x.L;
-  out[5] += rod_dot (x.p.d, x.p.S2) * x.p.w[5] / x.L;
+  for (int j = 0; j < 6; j++) Dw[0] += now.D[j] * now.ends.w[j], Dw[1] += now.D[6 + j] * now.ends.w[j];
+  rod_multiply_D (&now, Dw, out);
+  out[2] -= rod_dot (now.ends.d, now.ends.S1) * now.ends.w[2] / now.L;
+  out[5] += rod_dot (now.ends.d, now.ends.S2) * now.ends.w[5] / now.L;
 }
 
 /* dd'/dphi1 = -w1 (X1, Y1), dd'/dphi2 = w2 (X2, Y2); derivatives of the arms are columns of D, for arm 2 negated. */
 PER_ELEMENT (rod_gamma_q, rod, 6) {
-  const double square1 = x.w1 * x.w1, square2 = x.w2 * x.w2, *d = x.p.d;
-  double turn[2];
-  points_gamma_one (x.p, turn);
-  rod_through (&x, turn, out);
-  out[2] += (square1 * (d[0] * x.D[2] + d[1] * x.D[8]) + 2 * x.w1 * rod_dot (x.p.rate, x.p.S1)) / x.L;
-  out[5] += (square2 * (d[0] * x.D[5] + d[1] * x.D[11]) - 2 * x.w2 * rod_dot (x.p.rate, x.p.S2)) / x.L;
+  const double square1 = now.w1 * now.w1, square2 = now.w2 * now.w2, *d = now.ends.d;
+  double centripetal[2];
+  points_gamma_one (now.ends, centripetal);
+  rod_multiply_D (&now, centripetal, out);
+  out[2] += (square1 * (d[0] * now.D[2] + d[1] * now.D[8]) + 2 * now.w1 * rod_dot (now.ends.rate, now.ends.S1)) / now.L;
+  out[5] +=
+      (square2 * (d[0] * now.D[5] + d[1] * now.D[11]) - 2 * now.w2 * rod_dot (now.ends.rate, now.ends.S2)) / now.L;
 }
 
 PER_ELEMENT (rod_gamma_v, rod, 6) {
-  const double minus_twice[2] = { -2 * x.p.rate[0], -2 * x.p.rate[1] };
-  rod_through (&x, minus_twice, out);
-  out[2] += 2 * x.w1 * rod_dot (x.p.d, x.p.S1) / x.L;
-  out[5] -= 2 * x.w2 * rod_dot (x.p.d, x.p.S2) / x.L;
+  const double minus_twice[2] = { -2 * now.ends.rate[0], -2 * now.ends.rate[1] };
+  rod_multiply_D (&now, minus_twice, out);
+  out[2] += 2 * now.w1 * rod_dot (now.ends.d, now.ends.S1) / now.L;
+  out[5] -= 2 * now.w2 * rod_dot (now.ends.d, now.ends.S2) / now.L;
 }
 
 static const pw_field rod_fields[] = {
@@ -98,20 +100,15 @@ static const pw_field rod_fields[] = {
   { .name = NULL },
 };
 
-static const pw_quantity rod_reaction[] = {
-  { "F", "N", NULL, "force on the first body, away from the second; negative: tension" },
-};
-
 const pw_kind pw_kind_rod = {
   .name = "rod",
   .about = "a massless bar keeps a point of one body at a fixed distance from a point of another",
   .symbol = "0 0 0 1 0 0; o 0 0 0 .3; o 1 0 0 .3",
-  DEFINITION (pw_rod, rod_fields),
-  ELEMENT (rod, rod_prepare),
+  TYPE (rod, pw_rod, rod),
   .bodies = 2,
   .rows = 1,
   .level = PW_HOLONOMIC,
-  .reaction = rod_reaction,
+  REACTION ("F", "N", "force on the first body, away from the second; negative: tension"),
   POSITION (rod),
   CONSTRAINT (rod),
 };

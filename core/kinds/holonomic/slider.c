@@ -8,53 +8,45 @@
 #include "line.h"
 
 PREPARE (slider_prepare, pw_slider, line) {
-  *k = line_make (d->at, d->heading);
-  k->angle = d->angle;
+  *element = line_make (definition->at, definition->heading);
+  element->angle = definition->angle;
   return PW_OK;
 }
 
 PER_ELEMENT (slider_g, line, 2) {
-  line_g_one (x, out);
-  out[1] = x.A->phi - x.B->phi - x.k->angle;
+  line_g_one (now, out);
+  out[1] = now.body1->phi - now.body2->phi - now.constants->angle;
 }
 
 PER_ELEMENT (slider_g_size, line, 2) {
-  line_g_size_one (x, out);
-  out[1] = fabs (x.A->phi) + fabs (x.B->phi) + fabs (x.k->angle);
+  line_g_size_one (now, out);
+  out[1] = fabs (now.body1->phi) + fabs (now.body2->phi) + fabs (now.constants->angle);
 }
 
 PER_ELEMENT (slider_J, line, 12) {
-  line_J_one (x, out);
+  line_J_one (now, out);
   out[6] = out[7] = out[9] = out[10] = 0, out[8] = 1, out[11] = -1;
 }
 
 PER_ELEMENT (slider_gamma, line, 2) {
-  line_gamma_one (x, out);
+  line_gamma_one (now, out);
   out[1] = 0;
 }
 
-PER_ELEMENT (slider_jw_q, line, 12) {
-  line_jw_q_one (x, out);
-  memset (out + 6, 0, 6 * sizeof *out);
-}
-
-PER_ELEMENT (slider_gamma_q, line, 12) {
-  line_gamma_q_one (x, out);
-  memset (out + 6, 0, 6 * sizeof *out);
-}
-
-PER_ELEMENT (slider_gamma_v, line, 12) {
-  line_gamma_v_one (x, out);
-  memset (out + 6, 0, 6 * sizeof *out);
-}
+/* A derivative of the first row, and 0 for the second: slider_jw_q, ... */
+#define SLIDER_DERIVATIVE(member)           \
+  PER_ELEMENT (slider_##member, line, 12) { \
+    line_##member##_one (now, out);         \
+    memset (out + 6, 0, 6 * sizeof *out);   \
+  }
+SLIDER_DERIVATIVE (jw_q)
+SLIDER_DERIVATIVE (gamma_q)
+SLIDER_DERIVATIVE (gamma_v)
 
 static const pw_field slider_fields[] = {
   { PW_AT (pw_slider, body), PW_BODY, .count = 2, .required = 1,
     .about = "the sliding body and the body with the line; one may be ground" },
-  { PW_AT (pw_slider, at), PW_POINT, .count = 2, .unit = "m", .required = 1,
-    .about = "the point, and a point of the line, in each body's frame" },
-  { PW_AT (pw_slider, heading), PW_NUMBER, .unit = "rad",
-    .about = "direction of the line in the second body's frame; 0: along its x" },
+  LINE_FIELDS (pw_slider),
   { PW_AT (pw_slider, angle), PW_NUMBER, .unit = "rad", .about = "of the first body relative to the second" },
   { .name = NULL },
 };
@@ -68,8 +60,7 @@ const pw_kind pw_kind_slider = {
   .name = "slider",
   .about = "a body slides along a line of another without rotating relative to it (prismatic joint)",
   .symbol = "1 -inf 0 1 inf 0; 0 -1.2 -.7 0 1.2 -.7 0 1.2 .7 0 -1.2 .7 0 -1.2 -.7",
-  DEFINITION (pw_slider, slider_fields),
-  ELEMENT (line, slider_prepare),
+  TYPE (slider, pw_slider, line),
   .bodies = 2,
   .rows = 2,
   .level = PW_HOLONOMIC,

@@ -6,34 +6,26 @@
 #include "line.h"
 
 PREPARE (slot_prepare, pw_slot, line) {
-  *k = line_make (d->at, d->heading);
+  *element = line_make (definition->at, definition->heading);
   return PW_OK;
 }
 
 static const pw_field slot_fields[] = {
   { PW_AT (pw_slot, body), PW_BODY, .count = 2, .required = 1,
     .about = "the body with the point and the body with the line; one may be ground" },
-  { PW_AT (pw_slot, at), PW_POINT, .count = 2, .unit = "m", .required = 1,
-    .about = "the point, and a point of the line, in each body's frame" },
-  { PW_AT (pw_slot, heading), PW_NUMBER, .unit = "rad",
-    .about = "direction of the line in the second body's frame; 0: along its x" },
+  LINE_FIELDS (pw_slot),
   { .name = NULL },
-};
-
-static const pw_quantity slot_reaction[] = {
-  { "N", "N", NULL, "force on the first body, to the left of the line's heading" },
 };
 
 const pw_kind pw_kind_slot = {
   .name = "slot",
   .about = "a point of one body stays on a line of another",
   .symbol = "1 -inf .4 1 inf .4; 1 -inf -.4 1 inf -.4; o 0 0 0 .3",
-  DEFINITION (pw_slot, slot_fields),
-  ELEMENT (line, slot_prepare),
+  TYPE (slot, pw_slot, line),
   .bodies = 2,
   .rows = 1,
   .level = PW_HOLONOMIC,
-  .reaction = slot_reaction,
+  REACTION ("N", "N", "force on the first body, to the left of the line's heading"),
   POSITION (line),
   CONSTRAINT (line),
 };

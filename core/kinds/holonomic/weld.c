@@ -3,66 +3,61 @@
  *   g     = ( d,  phi1 - phi2 + beta ) = 0,  d = r1 + R(phi1) s1 - r2 - R(phi2) s2     (3 holonomic equations)
  *   gamma = ( as in points.h,  0 )
  *
- * points.h has the derivatives of the first two equations.  The force -lambda(1, 2) in world axes, at the common point, and
- * the moment -lambda(3) act on body 1; the opposites act on body 2. */
+ * points.h has the derivatives of the first two equations.  The force -lambda(1, 2) in world axes, at the common point,
+ * and the moment -lambda(3) act on body 1; the opposites act on body 2. */
 #include <string.h>
 #include "points.h"
 
 typedef struct {
   points points;
-  double beta; /* phi2 - phi1 [rad] */
+  double beta; /* [rad] */
 } weld;
 
 /* A weld in the current state. */
 typedef struct {
-  points_state p;
+  points_state points;
   double beta;
 } weld_state;
 
-static inline weld_state weld_at (const pw_batch *b, int e) {
-  const weld *k = (const weld *)b->element + e;
-  return (weld_state){ points_of (&k->points, b, e), k->beta };
+static inline weld_state weld_at (const pw_batch *batch, int e) {
+  const weld *element = (const weld *)batch->element + e;
+  return (weld_state){ points_of (&element->points, batch, e), element->beta };
 }
 
 PREPARE (weld_prepare, pw_weld, weld) {
-  *k = (weld){ points_make (d->at), d->angle };
+  *element = (weld){ points_make (definition->at), definition->angle };
   return PW_OK;
 }
 
 PER_ELEMENT (weld_g, weld, 3) {
-  points_g_one (x.p, out);
-  out[2] = x.p.A->phi - x.p.B->phi + x.beta;
+  points_g_one (now.points, out);
+  out[2] = now.points.body1->phi - now.points.body2->phi + now.beta;
 }
 
 PER_ELEMENT (weld_g_size, weld, 3) {
-  points_g_size_one (x.p, out);
-  out[2] = fabs (x.p.A->phi) + fabs (x.p.B->phi) + fabs (x.beta);
+  points_g_size_one (now.points, out);
+  out[2] = fabs (now.points.body1->phi) + fabs (now.points.body2->phi) + fabs (now.beta);
 }
 
 PER_ELEMENT (weld_J, weld, 18) {
-  points_J_one (x.p, out);
+  points_J_one (now.points, out);
   out[12] = out[13] = out[15] = out[16] = 0, out[14] = 1, out[17] = -1;
 }
 
 PER_ELEMENT (weld_gamma, weld, 3) {
-  points_gamma_one (x.p, out);
+  points_gamma_one (now.points, out);
   out[2] = 0;
 }
 
-PER_ELEMENT (weld_jw_q, weld, 18) {
-  points_jw_q_one (x.p, out);
-  memset (out + 12, 0, 6 * sizeof *out);
-}
-
-PER_ELEMENT (weld_gamma_q, weld, 18) {
-  points_gamma_q_one (x.p, out);
-  memset (out + 12, 0, 6 * sizeof *out);
-}
-
-PER_ELEMENT (weld_gamma_v, weld, 18) {
-  points_gamma_v_one (x.p, out);
-  memset (out + 12, 0, 6 * sizeof *out);
-}
+/* A derivative of the first two rows, and 0 for the third: weld_jw_q, ... */
+#define WELD_DERIVATIVE(member)              \
+  PER_ELEMENT (weld_##member, weld, 18) {    \
+    points_##member##_one (now.points, out); \
+    memset (out + 12, 0, 6 * sizeof *out);   \
+  }
+WELD_DERIVATIVE (jw_q)
+WELD_DERIVATIVE (gamma_q)
+WELD_DERIVATIVE (gamma_v)
 
 static const pw_field weld_fields[] = {
   { PW_AT (pw_weld, body), PW_BODY, .count = 2, .required = 1, .about = "the two bodies; one may be ground" },
@@ -82,8 +77,7 @@ const pw_kind pw_kind_weld = {
   .name = "weld",
   .about = "two bodies are fixed to each other",
   .symbol = "0 -.4 -.4 0 .4 -.4 0 .4 .4 0 -.4 .4 0 -.4 -.4",
-  DEFINITION (pw_weld, weld_fields),
-  ELEMENT (weld, weld_prepare),
+  TYPE (weld, pw_weld, weld),
   .bodies = 2,
   .rows = 3,
   .level = PW_HOLONOMIC,

@@ -15,54 +15,58 @@ typedef struct {
   double a[3], b[3];
 } pfaffian;
 
-/* A relation in the current state: A and B in world axes. */
+/* A relation in the current state. */
 typedef struct {
-  const pfaffian *k;
-  const pw_configuration *P, *Q;
-  const double *w, *u;
-  double Ax, Ay, Bx, By;
+  const pfaffian *element;
+  const pw_configuration *body1, *body2;
+  const double *w, *u; /* the vector w of jw_q, else NULL; the signal with its time derivatives */
+  double A[2], B[2];
 } pfaffian_state;
 
-static inline pfaffian_state pfaffian_at (const pw_batch *b, int e) {
-  const pfaffian *k = (const pfaffian *)b->element + e;
-  const pw_configuration *P = batch_body (b, e, 2, 0), *Q = batch_body (b, e, 2, 1);
-  pfaffian_state x = { .k = k, .P = P, .Q = Q, .w = batch_w (b, e), .u = b->u + 3 * e };
-  x.Ax = P->cos * k->a[0] - P->sin * k->a[1], x.Ay = P->sin * k->a[0] + P->cos * k->a[1];
-  x.Bx = P->cos * k->b[0] - P->sin * k->b[1], x.By = P->sin * k->b[0] + P->cos * k->b[1];
-  return x;
+static inline pfaffian_state pfaffian_at (const pw_batch *batch, int e) {
+  const pfaffian *element = (const pfaffian *)batch->element + e;
+  const pw_configuration *body1 = batch_body1 (batch, e), *body2 = batch_body2 (batch, e);
+  pfaffian_state now = { element, body1, body2, .w = batch_w (batch, e), .u = batch->u + 3 * e };
+  to_world (body1, element->a, now.A);
+  to_world (body1, element->b, now.B);
+  return now;
 }
 
 PREPARE (pfaffian_prepare, pw_pfaffian, pfaffian) {
-  double size = 0;
-  memcpy (k->a, d->a, sizeof k->a);
-  memcpy (k->b, d->b, sizeof k->b);
-  for (int i = 0; i < 3; i++) size = fmax (size, fmax (fabs (d->a[i]), fabs (d->b[i])));
-  if (size == 0) return pw_fail (error, PW_INPUT, "a and b are all zero: expected at least one other number");
+  double largest = 0;
+  memcpy (element->a, definition->a, sizeof element->a);
+  memcpy (element->b, definition->b, sizeof element->b);
+  for (int i = 0; i < 3; i++) largest = fmax (largest, fmax (fabs (definition->a[i]), fabs (definition->b[i])));
+  if (largest == 0) return pw_fail (error, PW_INPUT, "a and b are all zero: expected at least one other number");
   return PW_OK;
 }
 
 PER_ELEMENT (pfaffian_J, pfaffian, 6) {
-  out[0] = x.Ax, out[1] = x.Ay, out[2] = x.k->a[2], out[3] = x.Bx, out[4] = x.By, out[5] = x.k->b[2];
+  out[0] = now.A[0], out[1] = now.A[1], out[2] = now.element->a[2];
+  out[3] = now.B[0], out[4] = now.B[1], out[5] = now.element->b[2];
 }
 
 PER_ELEMENT (pfaffian_gamma, pfaffian, 1) {
-  *out = x.u[1] - x.P->omega * (x.Ax * x.P->vy - x.Ay * x.P->vx + x.Bx * x.Q->vy - x.By * x.Q->vx);
+  *out = now.u[1] - now.body1->omega * (now.A[0] * now.body1->vy - now.A[1] * now.body1->vx + now.B[0] * now.body2->vy -
+                                        now.B[1] * now.body2->vx);
 }
 
 PER_ELEMENT (pfaffian_jw_q, pfaffian, 6) {
   memset (out, 0, 6 * sizeof *out);
-  out[2] = x.Ax * x.w[1] - x.Ay * x.w[0] + x.Bx * x.w[4] - x.By * x.w[3];
+  out[2] = now.A[0] * now.w[1] - now.A[1] * now.w[0] + now.B[0] * now.w[4] - now.B[1] * now.w[3];
 }
 
 PER_ELEMENT (pfaffian_gamma_q, pfaffian, 6) {
   memset (out, 0, 6 * sizeof *out);
-  out[2] = x.P->omega * (x.Ax * x.P->vx + x.Ay * x.P->vy + x.Bx * x.Q->vx + x.By * x.Q->vy);
+  out[2] = now.body1->omega *
+           (now.A[0] * now.body1->vx + now.A[1] * now.body1->vy + now.B[0] * now.body2->vx + now.B[1] * now.body2->vy);
 }
 
 PER_ELEMENT (pfaffian_gamma_v, pfaffian, 6) {
-  double w = x.P->omega;
-  out[0] = w * x.Ay, out[1] = -w * x.Ax, out[2] = x.Ay * x.P->vx - x.Ax * x.P->vy + x.By * x.Q->vx - x.Bx * x.Q->vy;
-  out[3] = w * x.By, out[4] = -w * x.Bx, out[5] = 0;
+  double w = now.body1->omega;
+  out[0] = w * now.A[1], out[1] = -w * now.A[0],
+  out[2] = now.A[1] * now.body1->vx - now.A[0] * now.body1->vy + now.B[1] * now.body2->vx - now.B[0] * now.body2->vy;
+  out[3] = w * now.B[1], out[4] = -w * now.B[0], out[5] = 0;
 }
 
 static const pw_field pfaffian_fields[] = {
@@ -75,20 +79,15 @@ static const pw_field pfaffian_fields[] = {
   { .name = NULL },
 };
 
-static const pw_quantity pfaffian_reaction[] = {
-  { "F", "N", NULL, "F a and F b are force and moment on the two bodies, in the frame of the first" },
-};
-
 const pw_kind pw_kind_pfaffian = {
   .name = "pfaffian",
   .about = "a linear relation, given by its coefficients, between the velocities of one or two bodies",
-  DEFINITION (pw_pfaffian, pfaffian_fields),
-  ELEMENT (pfaffian, pfaffian_prepare),
+  TYPE (pfaffian, pw_pfaffian, pfaffian),
   .bodies = 2,
   .rows = 1,
   .signals = 1,
   .level = PW_NONHOLONOMIC,
-  .reaction = pfaffian_reaction,
-  .eta = batch_signal,
+  REACTION ("F", "N", "F a and F b are force and moment on the two bodies, in the frame of the first"),
+  .eta = batch_eta_of_signal,
   CONSTRAINT (pfaffian),
 };

@@ -1,7 +1,7 @@
 /* rolling-wheel: a wheel of radius R that rolls without slip; its spin angle chi is an internal coordinate.
  *
  *   n . v_P = 0,  e . v_P - R chi' = 0,  e = (cos, sin)(phi + psi), n = (-sin, cos)(phi + psi)    (2 nonholonomic)
- *   S     = [ -s  c   l   0 ]      (c, s) = e; l and m are the components of the contact point's arm along e and n
+ *   S     = [ -s  c   l   0 ]      psi: heading in the body; (c, s) = e; l, m: arm of the contact point P along e, n
  *           [  c  s  -m  -R ]
  *   gamma = ( w (c vx + s vy),  w (s vx - c vy) )                 so that S a = gamma; both rows as in contact.h
  *   f     = u on chi, power = u chi'                              u: torque about the axle
@@ -21,75 +21,70 @@ typedef struct {
   double radius;
 } rolling_state;
 
-static inline rolling_state rolling_at (const pw_batch *b, int e) {
-  const rolling *k = (const rolling *)b->element + e;
-  return (rolling_state){ contact_of (k->across, b, e), contact_of (k->along, b, e), k->radius };
+static inline rolling_state rolling_at (const pw_batch *batch, int e) {
+  const rolling *element = (const rolling *)batch->element + e;
+  return (rolling_state){ contact_of (element->across, batch, e), contact_of (element->along, batch, e),
+                          element->radius };
 }
 
 /* The spin rate for rolling at the initial velocity of the body. */
-static double rolling_spin_rate (const rolling *k, const pw_body *body) {
-  double angle = body->start[2] + k->along.heading;
-  return (pw_cos (angle) * body->rate[0] + pw_sin (angle) * body->rate[1] + k->along.arm * body->rate[2]) / k->radius;
+static double rolling_spin_rate (const rolling *element, const pw_body *body) {
+  double angle = body->start[2] + element->along.heading;
+  return (pw_cos (angle) * body->rate[0] + pw_sin (angle) * body->rate[1] + element->along.arm * body->rate[2]) /
+         element->radius;
 }
 
 PREPARE (rolling_prepare, pw_rolling_wheel, rolling) {
-  *k = (rolling){ contact_across (d->at, d->heading), contact_along (d->at, d->heading), d->radius };
-  internal[0] = (pw_internal){
-    d->inertia, d->start, d->rate != 0 ? d->rate : rolling_spin_rate (k, bodies[0]), { d->start != 0, d->rate != 0 }
-  };
+  *element = (rolling){ contact_across (definition->at, definition->heading),
+                        contact_along (definition->at, definition->heading), definition->radius };
+  internal[0] = (pw_internal){ definition->inertia,
+                               definition->start,
+                               definition->rate != 0 ? definition->rate : rolling_spin_rate (element, bodies[0]),
+                               { definition->start != 0, definition->rate != 0 } };
   return PW_OK;
 }
 
 PER_ELEMENT (rolling_J, rolling, 8) {
-  contact_J_one (x.across, out);
-  contact_J_one (x.along, out + 4);
-  out[3] = 0, out[7] = -x.radius;
+  contact_J_one (now.across, out);
+  contact_J_one (now.along, out + 4);
+  out[3] = 0, out[7] = -now.radius;
 }
 
 PER_ELEMENT (rolling_gamma, rolling, 2) {
-  contact_gamma_one (x.across, out);
-  contact_gamma_one (x.along, out + 1);
+  contact_gamma_one (now.across, out);
+  contact_gamma_one (now.along, out + 1);
 }
 
-PER_ELEMENT (rolling_jw_q, rolling, 8) {
-  contact_jw_q_one (x.across, out);
-  contact_jw_q_one (x.along, out + 4);
-  out[3] = out[7] = 0;
+/* A derivative of both rows, which is 0 with respect to the spin angle: rolling_jw_q, ... */
+#define ROLLING_DERIVATIVE(member)               \
+  PER_ELEMENT (rolling_##member, rolling, 8) {   \
+    contact_##member##_one (now.across, out);    \
+    contact_##member##_one (now.along, out + 4); \
+    out[3] = out[7] = 0;                         \
+  }
+ROLLING_DERIVATIVE (jw_q)
+ROLLING_DERIVATIVE (gamma_q)
+ROLLING_DERIVATIVE (gamma_v)
+
+static void rolling_force (const pw_batch *batch, double *out) {
+  for (int e = 0; e < batch->count; e++, out += 4) out[0] = out[1] = out[2] = 0, out[3] = batch->u[3 * e];
 }
 
-PER_ELEMENT (rolling_gamma_q, rolling, 8) {
-  contact_gamma_q_one (x.across, out);
-  contact_gamma_q_one (x.along, out + 4);
-  out[3] = out[7] = 0;
+static void rolling_force_u (const pw_batch *batch, double *out) {
+  for (int e = 0; e < batch->count; e++, out += 4) out[0] = out[1] = out[2] = 0, out[3] = 1;
 }
 
-PER_ELEMENT (rolling_gamma_v, rolling, 8) {
-  contact_gamma_v_one (x.across, out);
-  contact_gamma_v_one (x.along, out + 4);
-  out[3] = out[7] = 0;
-}
-
-static void rolling_force (const pw_batch *b, double *out) {
-  for (int e = 0; e < b->count; e++, out += 4) out[0] = out[1] = out[2] = 0, out[3] = b->u[3 * e];
-}
-
-static void rolling_force_u (const pw_batch *b, double *out) {
-  for (int e = 0; e < b->count; e++, out += 4) out[0] = out[1] = out[2] = 0, out[3] = 1;
-}
-
-static void rolling_power (const pw_batch *b, double *out) {
-  for (int e = 0; e < b->count; e++) out[e] = b->u[3 * e] * b->v[e];
+static void rolling_power (const pw_batch *batch, double *out) {
+  for (int e = 0; e < batch->count; e++) out[e] = batch->u[3 * e] * batch->v[e];
 }
 
 PER_ELEMENT (rolling_contact, rolling, 3) {
-  contact_place_one (x.along, out);
+  contact_place_one (now.along, out);
 }
 
 static const pw_field rolling_fields[] = {
   { PW_AT (pw_rolling_wheel, body), PW_BODY, .required = 1, .about = "the body with the wheel" },
-  { PW_AT (pw_rolling_wheel, at), PW_POINT, .unit = "m", .required = 1, .about = "contact point in the body's frame" },
-  { PW_AT (pw_rolling_wheel, heading), PW_NUMBER, .unit = "rad",
-    .about = "rolling direction in the body's frame; 0: along its x" },
+  CONTACT_FIELDS (pw_rolling_wheel),
   { PW_AT (pw_rolling_wheel, radius), PW_NUMBER, .unit = "m", .required = 1, .domain = PW_POSITIVE,
     .about = "radius of the wheel" },
   { PW_AT (pw_rolling_wheel, inertia), PW_NUMBER, .unit = "kg m^2", .domain = PW_NONNEGATIVE,
@@ -115,8 +110,7 @@ const pw_kind pw_kind_rolling_wheel = {
   .name = "rolling-wheel",
   .about = "a wheel that rolls without slip, free or driven by a torque about its axle",
   .symbol = "0 -1.6 -.5 0 1.6 -.5 0 1.6 .5 0 -1.6 .5 0 -1.6 -.5",
-  DEFINITION (pw_rolling_wheel, rolling_fields),
-  ELEMENT (rolling, rolling_prepare),
+  TYPE (rolling, pw_rolling_wheel, rolling),
   .bodies = 1,
   .internal = 1,
   .rows = 2,

@@ -1,6 +1,6 @@
 /* speed: the speed of a point P along a direction fixed in its body follows a signal u (contact.h).
  *
- *   e . v_P = u,  e = (cos, sin)(phi + psi)                       (1 nonholonomic equation)
+ *   e . v_P = u,  e = (cos, sin)(phi + psi)           psi: heading in the body          (1 nonholonomic equation)
  *   S     = [ cos(theta)  sin(theta)  -m ]      theta = phi + psi; m: the arm of P to the left of e
  *   eta   = u
  *   gamma = u' + w (sin(theta) vx - cos(theta) vy)                so that S a = gamma
@@ -9,13 +9,13 @@
 #include "contact.h"
 
 PREPARE (speed_prepare, pw_speed, contact) {
-  *k = contact_along (d->at, d->heading);
+  *element = contact_along (definition->at, definition->heading);
   return PW_OK;
 }
 
-static void speed_gamma (const pw_batch *b, double *out) {
-  contact_gamma (b, out);
-  for (int e = 0; e < b->count; e++) out[e] += b->u[3 * e + 1];
+static void speed_gamma (const pw_batch *batch, double *out) {
+  contact_gamma (batch, out);
+  for (int e = 0; e < batch->count; e++) out[e] += batch->u[3 * e + 1];
 }
 
 static const pw_field speed_fields[] = {
@@ -27,23 +27,18 @@ static const pw_field speed_fields[] = {
   { .name = NULL },
 };
 
-static const pw_quantity speed_reaction[] = { { "F", "N", NULL, "force on the body along the direction" } };
-
 const pw_kind pw_kind_speed = {
   .name = "speed",
   .symbol = "0 .6 0 0 2.2 0 0 1.7 .3 0 2.2 0 0 1.7 -.3",
   .about = "the velocity component of a point along a direction fixed in its body follows a signal of time",
-  DEFINITION (pw_speed, speed_fields),
-  ELEMENT (contact, speed_prepare),
+  TYPE (speed, pw_speed, contact),
   .bodies = 1,
   .rows = 1,
   .signals = 1,
   .level = PW_NONHOLONOMIC,
-  .reaction = speed_reaction,
-  .eta = batch_signal,
+  REACTION ("F", "N", "force on the body along the direction"),
+  .eta = batch_eta_of_signal,
   .J = contact_J,
   .gamma = speed_gamma,
-  .jw_q = contact_jw_q,
-  .gamma_q = contact_gamma_q,
-  .gamma_v = contact_gamma_v,
+  DERIVATIVES (contact),
 };

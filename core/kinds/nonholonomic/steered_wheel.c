@@ -4,7 +4,8 @@
  *   S     = [ -sin(theta)  cos(theta)  l ]      theta = phi + u;  l, m: arm of P along the heading, to its left
  *   gamma = (w + u') (cos(theta) vx + sin(theta) vy) - u' m w     so that S a = gamma, with l' = u' m
  *
- * S is that of contact.h for the direction n.  The lateral force on the body, along n, is N = -lambda.  It acts at the steering pivot, so steering needs no moment and does no work. */
+ * S is that of contact.h for the direction n.  The lateral force on the body, along n, is N = -lambda.  It acts at the
+ * steering pivot, so steering needs no moment and does no work. */
 #include "contact.h"
 
 typedef struct {
@@ -14,46 +15,47 @@ typedef struct {
 /* A wheel in the current state. */
 typedef struct {
   contact_state n;
-  double aside;      /* m */
-  double turn, rate; /* u' and w + u' */
+  double aside;                       /* m */
+  double steering_rate, heading_rate; /* u', w + u' */
 } steered_state;
 
-static inline steered_state steered_at (const pw_batch *b, int e) {
-  const double *at = ((const steered *)b->element)[e].at, *u = b->u + 3 * e;
+static inline steered_state steered_at (const pw_batch *batch, int e) {
+  const double *at = ((const steered *)batch->element)[e].at, *u = batch->u + 3 * e;
   double c, s;
   pw_sin_cos (u[0], &s, &c);
-  contact_state n = contact_of (contact_make (at, u[0], -s, c), b, e);
-  return (steered_state){ n, at[1] * c - at[0] * s, u[1], n.A->omega + u[1] };
+  contact_state n = contact_of (contact_make (at, u[0], -s, c), batch, e);
+  return (steered_state){ n, at[1] * c - at[0] * s, u[1], n.body->omega + u[1] };
 }
 
 PREPARE (steered_prepare, pw_steered_wheel, steered) {
-  *k = (steered){ { d->at[0], d->at[1] } };
+  *element = (steered){ { definition->at[0], definition->at[1] } };
   return PW_OK;
 }
 
 PER_ELEMENT (steered_J, steered, 3) {
-  contact_J_one (x.n, out);
+  contact_J_one (now.n, out);
 }
 
 PER_ELEMENT (steered_gamma, steered, 1) {
-  *out = x.rate * (x.n.dy * x.n.A->vx - x.n.dx * x.n.A->vy) - x.turn * x.aside * x.n.A->omega;
+  *out = now.heading_rate * (now.n.dy * now.n.body->vx - now.n.dx * now.n.body->vy) -
+         now.steering_rate * now.aside * now.n.body->omega;
 }
 
 PER_ELEMENT (steered_jw_q, steered, 3) {
-  contact_jw_q_one (x.n, out);
+  contact_jw_q_one (now.n, out);
 }
 
 PER_ELEMENT (steered_gamma_q, steered, 3) {
-  out[0] = out[1] = 0, out[2] = x.rate * (x.n.dx * x.n.A->vx + x.n.dy * x.n.A->vy);
+  out[0] = out[1] = 0, out[2] = now.heading_rate * (now.n.dx * now.n.body->vx + now.n.dy * now.n.body->vy);
 }
 
 PER_ELEMENT (steered_gamma_v, steered, 3) {
-  out[0] = x.rate * x.n.dy, out[1] = -x.rate * x.n.dx;
-  out[2] = x.n.dy * x.n.A->vx - x.n.dx * x.n.A->vy - x.turn * x.aside;
+  out[0] = now.heading_rate * now.n.dy, out[1] = -now.heading_rate * now.n.dx;
+  out[2] = now.n.dy * now.n.body->vx - now.n.dx * now.n.body->vy - now.steering_rate * now.aside;
 }
 
 PER_ELEMENT (steered_contact, steered, 3) {
-  contact_place_one (x.n, out);
+  contact_place_one (now.n, out);
 }
 
 static const pw_field steered_fields[] = {
@@ -64,21 +66,16 @@ static const pw_field steered_fields[] = {
   { .name = NULL },
 };
 
-static const pw_quantity steered_reaction[] = {
-  { "N", "N", NULL, "lateral force on the body, to the left of the heading" },
-};
-
 const pw_kind pw_kind_steered_wheel = {
   .name = "steered-wheel",
   .about = "a knife edge whose heading in the body follows a signal of time",
   .symbol = "0 -1.6 -.2 0 1.6 -.2 0 1.6 .2 0 -1.6 .2 0 -1.6 -.2",
-  DEFINITION (pw_steered_wheel, steered_fields),
-  ELEMENT (steered, steered_prepare),
+  TYPE (steered, pw_steered_wheel, steered),
   .bodies = 1,
   .rows = 1,
   .signals = 1,
   .level = PW_NONHOLONOMIC,
-  .reaction = steered_reaction,
+  REACTION ("N", "N", "lateral force on the body, to the left of the heading"),
   CONSTRAINT (steered),
   .contact = steered_contact,
 };

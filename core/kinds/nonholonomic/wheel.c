@@ -1,38 +1,32 @@
 /* wheel: a knife edge; the contact point P has no velocity perpendicular to the heading (contact.h).
  *
- *   n . v_P = 0,  n = (-sin, cos)(phi + psi)                      (1 nonholonomic equation)
- *   S     = [ -sin(theta)  cos(theta)  l ]      theta = phi + psi, l = s . (cos psi, sin psi): the arm along the heading
+ *   n . v_P = 0,  n = (-sin, cos)(phi + psi)          psi: heading in the body          (1 nonholonomic equation)
+ *   S     = [ -sin(theta)  cos(theta)  l ]      theta = phi + psi; l = s . (cos psi, sin psi): arm along the heading
  *   gamma = w (cos(theta) vx + sin(theta) vy)                     so that S a = gamma
  *
  * The lateral force on the body, along n, is N = -lambda. */
 #include "contact.h"
 
 PREPARE (wheel_prepare, pw_wheel, contact) {
-  *k = contact_across (d->at, d->heading);
+  *element = contact_across (definition->at, definition->heading);
   return PW_OK;
 }
 
 static const pw_field wheel_fields[] = {
   { PW_AT (pw_wheel, body), PW_BODY, .required = 1, .about = "the body with the wheel" },
-  { PW_AT (pw_wheel, at), PW_POINT, .unit = "m", .required = 1, .about = "contact point in the body's frame" },
-  { PW_AT (pw_wheel, heading), PW_NUMBER, .unit = "rad",
-    .about = "rolling direction in the body's frame; 0: along its x" },
+  CONTACT_FIELDS (pw_wheel),
   { .name = NULL },
 };
-
-static const pw_quantity wheel_reaction[] = { { "N", "N", NULL,
-                                                "lateral force on the body, to the left of the heading" } };
 
 const pw_kind pw_kind_wheel = {
   .name = "wheel",
   .about = "a knife edge: a point of the body moves only along a heading fixed in the body",
   .symbol = "0 -1.6 -.2 0 1.6 -.2 0 1.6 .2 0 -1.6 .2 0 -1.6 -.2",
-  DEFINITION (pw_wheel, wheel_fields),
-  ELEMENT (contact, wheel_prepare),
+  TYPE (wheel, pw_wheel, contact),
   .bodies = 1,
   .rows = 1,
   .level = PW_NONHOLONOMIC,
-  .reaction = wheel_reaction,
+  REACTION ("N", "N", "lateral force on the body, to the left of the heading"),
   CONSTRAINT (contact),
   .contact = contact_place,
 };

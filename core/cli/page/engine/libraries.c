@@ -1,19 +1,19 @@
-/* The two library functions that explicit methods call, for scenes of the size of a page: AMD's order and LAPACK's
- * Cholesky solution. */
+/* The two library functions that explicit methods call, for scenes of the size of a page: AMD's fill-reducing order and
+ * LAPACK's solution by a Cholesky factorisation. */
 #include <amd.h>
 #include <lapacke.h>
 #include <math.h>
 #include <stdlib.h>
 
-enum { LIBRARIES_MOST = 4000 }; /* nodes: a byte for each pair */
+enum { LIBRARIES_NODES = 4000 }; /* at most: a byte for each pair of them */
 
-/* Connects the neighbours of a node that is eliminated. */
+/* Removes a node from a graph, given by its n x n adjacency matrix, and connects its neighbours with each other. */
 static void eliminate (int n, unsigned char *edge, int node) {
-  unsigned char *of = edge + (size_t)node * (size_t)n;
+  unsigned char *neighbour = edge + (size_t)node * (size_t)n;
   for (int i = 0; i < n; i++)
-    if (of[i])
-      for (int j = 0; j < n; j++) edge[(size_t)i * (size_t)n + (size_t)j] |= of[j] && j != i;
-  for (int i = 0; i < n; i++) of[i] = edge[(size_t)i * (size_t)n + (size_t)node] = 0;
+    if (neighbour[i])
+      for (int j = 0; j < n; j++) edge[(size_t)i * (size_t)n + (size_t)j] |= neighbour[j] && j != i;
+  for (int i = 0; i < n; i++) neighbour[i] = edge[(size_t)i * (size_t)n + (size_t)node] = 0;
 }
 
 static int degree (int n, const unsigned char *edge, int node) {
@@ -22,10 +22,10 @@ static int degree (int n, const unsigned char *edge, int node) {
   return count;
 }
 
-/* Minimum degree. */
+/* The order of elimination by the minimum degree algorithm: always a node with the fewest neighbours. */
 int amd_order (int n, const int Ap[], const int Ai[], int P[], double control[], double info[]) {
   (void)control, (void)info;
-  unsigned char *edge = n <= LIBRARIES_MOST ? calloc ((size_t)n * (size_t)n + 1, 1) : NULL,
+  unsigned char *edge = n <= LIBRARIES_NODES ? calloc ((size_t)n * (size_t)n + 1, 1) : NULL,
                 *done = calloc ((size_t)n + 1, 1);
   for (int i = 0; edge && i < n; i++)
     for (int k = Ap[i]; k < Ap[i + 1]; k++)
@@ -43,10 +43,10 @@ int amd_order (int n, const int Ap[], const int Ai[], int P[], double control[],
   return status;
 }
 
-/* Upper triangle by columns; one right-hand side. */
-lapack_int LAPACKE_dposv_work (int layout, char part, lapack_int n, lapack_int sides, double *a, lapack_int lda,
+/* Solves A x = b, A = U^T U, for the layout by columns, the upper triangle (uplo) and one right-hand side (nrhs). */
+lapack_int LAPACKE_dposv_work (int layout, char uplo, lapack_int n, lapack_int nrhs, double *a, lapack_int lda,
                                double *b, lapack_int ldb) {
-  (void)layout, (void)part, (void)sides, (void)ldb;
+  (void)layout, (void)uplo, (void)nrhs, (void)ldb;
   for (int j = 0; j < n; j++)
     for (int i = 0; i <= j; i++) {
       double sum = a[i + j * lda];

@@ -1,5 +1,5 @@
-/* The engine of interactive pages: models, methods and samples for figures, compiled to WebAssembly.  Its functions are
- * called by page.js.  Files are in memory; there is one model at a time. */
+/* The engine of interactive pages: models, methods and samples for figures, compiled to WebAssembly.  Its exported
+ * functions are called by page.js.  Files are in memory; there is one model at a time. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -8,7 +8,7 @@
 
 #define PAGE_EXPORT(name) __attribute__ ((export_name (#name)))
 
-/* Of the page: the clock [ms]. */
+/* The clock of the browser [ms]; page.js provides it. */
 __attribute__ ((import_module ("page"), import_name ("now"))) double pw_page_now (void);
 
 /* ---- Files ---- */
@@ -21,12 +21,13 @@ PAGE_EXPORT (allocate) void *page_allocate (size_t size) {
   return calloc (1, size);
 }
 
-/* The name and bytes belong to the engine from now on. */
+/* Adds a file, whose name and bytes belong to the engine from now on. */
 PAGE_EXPORT (file) void page_add_file (char *name, char *bytes, size_t size) {
   if (pw_grow (&page_file, (size_t)page_files, &page_room, sizeof *page_file) != PW_OK) return; /* not found later */
   page_file[page_files++] = (pw_page_file){ name, bytes, size };
 }
 
+/* The index of a file, the number of files if there is none. */
 static int page_find_file (const char *name) {
   int i = 0;
   name += *name == '/';
@@ -82,10 +83,10 @@ static pw_model *page_model;
 static pw_system *page_system;
 static pw_plots *page_plots;
 static pw_statistics page_statistics;
-static double page_energy;   /* defect */
-static double page_deadline; /* [ms] */
+static double page_energy_defect; /* relative */
+static double page_deadline;      /* [ms] */
 
-static int page_late (void *context) {
+static int page_is_late (void *context) {
   (void)context;
   return pw_page_now () > page_deadline;
 }
@@ -99,7 +100,7 @@ static void page_close (void) {
   page_model = NULL;
 }
 
-/* `parameter`: values, in the order of the table. */
+/* Compiles the model with these values of the parameters, in the order of the table. */
 static int page_compile (const double *parameter) {
   page_close ();
   page_error = (pw_error){ 0 };
@@ -117,7 +118,7 @@ static int page_take_samples (pw_run *r) {
   while (status == PW_OK && page_plots && pw_plots_next (page_plots) <= pw_run_time (r)) {
     status = pw_run_sample (r, pw_plots_next (page_plots), &sample, &page_error);
     if (status == PW_OK) pw_plots_add (page_plots, &sample);
-    page_energy = status == PW_OK ? pw_run_energy_defect (r, &sample) : NAN;
+    page_energy_defect = status == PW_OK ? pw_run_energy_defect (r, &sample) : NAN;
   }
   return status;
 }
@@ -143,7 +144,7 @@ int page_run (const char *method, double step, double rtol, double t_end, double
                                  .step = step,
                                  .rtol = rtol,
                                  .ledger = samples,
-                                 .stop = page_late,
+                                 .stop = page_is_late,
                                  .initial = initial,
                                  .initials = initials };
   if (samples) page_plots = pw_plots_open (NULL, 1, page_model, page_system, t_end, &page_error);
@@ -168,16 +169,21 @@ static void page_write_scene (pw_json *j) {
   const struct {
     const char *key;
     double value;
-  } number[] = { { "samples", page_plots->samples },      { "width", page_plots->width }, { "steps", (double)s->steps },
-                 { "rejected", (double)s->rejected },     { "g", s->g },                  { "jv", s->jv },
-                 { "evaluations", (double)s->rhs },       { "energy_defect", page_energy } };
+  } number[] = { { "samples", page_plots->samples },
+                 { "width", page_plots->sample_size },
+                 { "steps", (double)s->steps },
+                 { "rejected", (double)s->rejected },
+                 { "g", s->g },
+                 { "jv", s->jv },
+                 { "evaluations", (double)s->rhs },
+                 { "energy_defect", page_energy_defect } };
   pw_json_open (j, NULL, '{');
   for (size_t i = 0; i < sizeof number / sizeof *number; i++) pw_json_number (j, number[i].key, number[i].value);
   pw_animation_scene (j, page_plots);
   pw_json_close (j, '}');
 }
 
-/* The scene's shapes, the size of the data, and statistics of the run as JSON; free it by `release`.  NULL without a run. */
+/* Shapes, size of the data and statistics of the run as JSON; free it by `release`.  NULL without a run. */
 PAGE_EXPORT (scene) char *page_scene (void) {
   pw_stream scene;
   if (page_plots == NULL) return NULL;

@@ -8,8 +8,8 @@ logarithmic = name ne 'drift'
 title = name eq 'drift' ? 'drift of the constraints and the energy' : name eq 'drift-baumgarte' ? \
   "largest drift by Baumgarte's parameters" : 'largest drift by the interval between projections'
 label_of_x = name eq 'drift' ? 't [s]' : name eq 'drift-baumgarte' ? 'α [1/s]' : 'steps per projection (every)'
-high = narrow ? 90.0 : 112.0
-height = top + words(quantities)*(high + 10) - 10 + bottom
+panel_height = narrow ? 90.0 : 112.0
+height = top + words(quantities)*(panel_height + 10) - 10 + bottom
 array label_of_y[3] = ['position residual', 'velocity residual', 'energy defect [J]']
 array least[3]
 array most[3]
@@ -34,7 +34,7 @@ stats data index 0 using 1 name 'first' nooutput
 step = logarithmic ? 1 : max(1, int(first_records/10))
 do for [form in forms] {
   eval page(form)
-  eval key(above, per_row)
+  eval key(legend_top, per_row)
   set format x ''
   set format y '10^{%T}'
   set xlabel ''
@@ -47,12 +47,12 @@ do for [form in forms] {
     }
     set ylabel label_of_y[k]
     set yrange [least[k]:most[k]]
-    eval panel(left, width - right, y, y + high)
+    eval panel(left, width - right, y, y + panel_height)
     plot for [i = 1:methods] data index i - 1 using 1:k + 1 with lines ls i notitle, \
-         for [i = 1:methods] data index i - 1 every step::int(step*(i - 1.0)/methods) using 1:k + 1 with points ls i notitle, \
+         for [i = 1:methods] data index i - 1 every step::int(step*(i - 1.0)/methods) using 1:k + 1 \
+           with points ls i notitle, \
          for [i = 1:methods] NaN with linespoints ls i title y == top ? label[i] : ''
-    y = y + high + 10
+    y = y + panel_height + 10
   }
-  unset multiplot
-  unset output
+  eval finish
 }

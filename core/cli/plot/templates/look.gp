@@ -1,16 +1,21 @@
 
 # ---- Look of all figures ----
-# Lengths are in points: `width` is set by --width, a template computes `height`, and page(form) opens one of svg png pdf
-# at that size.  panel(x0, x1, y0, y1) places a plot, measured from the upper left corner; key(y, columns) a legend, which
-# takes rows(n, columns) below `top`.  Text of the user (labels, names) is plain; our own is enhanced: 'v_x [m/s]',
-# '10^{%T}'.  Line type i: colour, dash and width distinguish it without colour, and wider ones stay visible below later
-# ones.  A new figure is a template NAME.gp; a line "# include OTHER.gp" stands for the contents of another one.
+# A new figure is a template NAME.gp; a line "# include OTHER.gp" stands for the contents of another one.  A template
+# computes `height` and draws the figure in each of the forms: eval page(form), panels, eval finish.
+#
+# Lengths are in points; `width` is set by --width.  panel(x0, x1, y0, y1) places a plot, measured from the upper left
+# corner.  key(y, columns) places a legend of the next plot, which takes rows(n, columns) below `top`; begin_legend is a
+# panel of its own for it.
+#
+# Text of the user (labels, names) is plain; our own is enhanced: 'v_x [m/s]', '10^{%T}'.  Line type i: colour, dash and
+# width distinguish it without colour, and wider ones stay visible below later ones.
 
 set encoding utf8
 set minussign
 set border lw 0.5 lc rgb '#404040'
 set tics nomirror out scale 0.5
-set grid lt 1 lw 0.4 lc rgb '#dddddd'
+grid = "set grid back lt 1 lw 0.4 lc rgb '#dddddd'; "
+eval grid
 set offsets 0,0,graph 0.04,graph 0.04
 set xzeroaxis lt 1 lw 0.5 lc rgb '#999999'
 # Distinct for colour-blind readers; neighbours differ in greyscale as well.
@@ -51,19 +56,35 @@ top = 30.0
 do for [i = 1:strlen(heading)] { if (heading[i:i] eq "\n") { top = top + 11 } }
 
 # Terminals differ in the place of a legend: lift [pt] moves it up, pitch is the distance of its lines.
-page(form) = sprintf(form eq 'svg' ? "set terminal svg size %.2f,%.2f enhanced ". \
-    "font 'DejaVu Sans,Helvetica,sans-serif,10' linewidth 1.3333 background rgb 'white'; set pointsize 0.6; lift = 2; pitch = 0.82; set xlabel offset 0,0.6; set ylabel offset 0.8,0" : \
-  form eq 'png' ? "set terminal pngcairo size %.2f,%.2f enhanced font 'DejaVu Sans,7.5' ". \
-    "fontscale 1.5625 linewidth 2.0833 pointscale 2.0833 background rgb 'white'; set pointsize 0.5; lift = 5; pitch = 1; set xlabel offset 0,0; set ylabel offset 0,0" : \
-    "set terminal pdfcairo size %.6f,%.6f enhanced font 'DejaVu Sans,7.5' fontscale 0.75 linewidth 2; set pointsize 0.25; lift = 5; pitch = 1; set xlabel offset 0,0; set ylabel offset 0,0", \
-  width*scale(form), height*scale(form)).sprintf("; set output '%s.%s'; ", name, form). \
+terminal(form) = form eq 'svg' ? "svg size %.2f,%.2f enhanced font 'DejaVu Sans,Helvetica,sans-serif,10' ". \
+    "linewidth 1.3333 background rgb 'white'; set pointsize 0.6; lift = 2; pitch = 0.82; ". \
+    "set xlabel offset 0,0.6; set ylabel offset 0.8,0" : \
+  form eq 'png' ? "pngcairo size %.2f,%.2f enhanced font 'DejaVu Sans,7.5' fontscale 1.5625 linewidth 2.0833 ". \
+    "pointscale 2.0833 background rgb 'white'; set pointsize 0.5; lift = 5; pitch = 1; ". \
+    "set xlabel offset 0,0; set ylabel offset 0,0" : \
+    "pdfcairo size %.6f,%.6f enhanced font 'DejaVu Sans,7.5' fontscale 0.75 linewidth 2; set pointsize 0.25; ". \
+    "lift = 5; pitch = 1; set xlabel offset 0,0; set ylabel offset 0,0"
+page(form) = sprintf('set terminal '.terminal(form), width*scale(form), height*scale(form)). \
+  sprintf("; set output '%s.%s'; ", name, form). \
   'caption = "{/*1.13 ".heading."}\n".title.incomplete; set multiplot title caption'
+finish = 'unset multiplot; unset output'
 scale(form) = form eq 'svg' ? 96/72.0 : form eq 'png' ? 150/72.0 : 1/72.0 # units of a terminal in a point
 panel(x0, x1, y0, y1) = sprintf('set lmargin at screen %.6f; set rmargin at screen %.6f; ', x0/width, x1/width). \
   sprintf('set tmargin at screen %.6f; set bmargin at screen %.6f', 1 - y0/height, 1 - y1/height)
-key(y, columns) = sprintf('set key noenhanced at screen 0.5,screen %.6f center top horizontal maxcols %d samplen 3 spacing %g', \
-                          1 - (y - lift)/height, columns, pitch)
-columns(longest) = max(1, int((width - left - right)/(32 + letter*longest))) # no more than gnuplot would set in a row
+key(y, columns) = sprintf('set key noenhanced at screen 0.5,screen %.6f center top ', 1 - (y - lift)/height). \
+  sprintf('horizontal maxcols %d samplen 3 spacing %g', columns, pitch)
+# Panels in two columns, if there is room, with a gap between them.
+two_columns = "panel_columns = narrow ? 1 : min(panels, 2); ". \
+  "panel_rows = (panels + panel_columns - 1)/panel_columns; ". \
+  "panel_width = (width - left - right + gap)/panel_columns - gap"
+bare_x = "set format x ''; set xlabel ''" # the axis of a panel above another one
+# A panel of the legend alone, at legend_top.
+begin_legend(columns) = key(legend_top, columns)."; set tics scale 0; set format ''; set border 0; unset grid; ". \
+  "unset xzeroaxis; set xlabel ''; set ylabel ''; set xrange [1:10]; set yrange [1:10]; ". \
+  panel(left, width - right, legend_top - 1, top - 1)
+end_legend = 'unset key; set tics scale 0.5; set border 31; set autoscale; '.grid
+# Entries in a row of a legend: no more than gnuplot would set.
+columns(label_length) = max(1, int((width - left - right)/(32 + letter*label_length)))
 rows(n, columns) = 3 + 9.6*((n + columns - 1)/columns)
 short(s) = strlen(s) > 24 ? s[1:24].'…' : s
 

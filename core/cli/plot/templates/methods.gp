@@ -17,13 +17,13 @@ dashing = '1 (2,3) (10,4) (10,4,3,4) (20,6) (10,3,3,3,3,3) (16,4,16,4,3,4) (5,5)
 dash(s) = (place = 9, sum [k = 1:8] (word(known, k) eq s ? (place = k) : 0), word(dashing, place))
 # Filled and open in turn, so that neighbours differ most.
 marks = '7 4 9 12 5 6 13 8 11 10 15 14 2 1 3'
-longest = 0
+label_length = 0
 do for [i = 1:methods] {
   eval sprintf("set style line %d lw %.2f dt %s lc rgb '%s' pt %s", i, 0.7*thickness(i, methods), \
                stabilisation[i] eq '' ? word('1 (10,4) (10,4,3,4) (4,4)', (i - 1) % 4 + 1) : dash(stabilisation[i]), \
                colour(number[i] + 1), word(marks, (i - 1) % 15 + 1))
-  longest = max(longest, strlen(label[i]))
+  label_length = max(label_length, strlen(label[i]))
 }
-per_row = columns(longest)
-above = top
+per_row = columns(label_length)
+legend_top = top
 top = top + rows(methods, per_row)

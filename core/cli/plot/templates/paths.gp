@@ -8,14 +8,11 @@ title = 'paths of the '.(what eq 'body' ? 'centres of mass' : words(markers) == 
   words(markers) < curves ? 'wheels and markers' : 'markers')
 do for [form in forms] {
   eval page(form)
-  set xlabel 'x [m]'
-  set ylabel 'y [m]'
-  unset xzeroaxis
+  eval axes
   do for [i = 1:panels] {
     eval legend(i == panels)
     eval place(i)
     eval draw(2, 3, 0, i == 1)
   }
-  unset multiplot
-  unset output
+  eval finish
 }

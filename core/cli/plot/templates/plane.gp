@@ -4,10 +4,10 @@
 
 if (name eq 'mechanism' && by_time) { bottom = bottom + 40 } # room for a colour bar
 if (name eq 'mechanism') {
-  above = top
-  longest = 0
+  legend_top = top
+  label_length = 0
   items = by_time ? 0 : bodies
-  do for [i = 1:items] { longest = max(longest, strlen(short(body[i]))) }
+  do for [i = 1:items] { label_length = max(label_length, strlen(short(body[i]))) }
 }
 panels = t_detail > 0 ? 2 : 1
 array px0[2]
@@ -18,9 +18,11 @@ array x0[2] = [1e300, 1e300]
 array x1[2] = [-1e300, -1e300]
 array y0[2] = [1e300, 1e300]
 array y1[2] = [-1e300, -1e300]
-side(i, z, what, k) = sprintf('stats %s using %s nooutput; ', what, k). \
+# Extends panel i by columns of a file: one of them along the axis z; both.
+extend_axis(i, z, file, k) = sprintf('stats %s using %s nooutput; ', file, k). \
   sprintf('%s0[%d] = min(%s0[%d], STATS_min); %s1[%d] = max(%s1[%d], STATS_max); ', z, i, z, i, z, i, z, i)
-extend(i, what, x, y) = side(i, 'x', what, x).side(i, 'y', what, y)
+extend(i, file, x, y) = extend_axis(i, 'x', file, x).extend_axis(i, 'y', file, y)
+# Column k, in panel 2 at the beginning alone.
 during(i, k) = i == 1 ? sprintf('%d', k) : sprintf('($1 <= 1.000001*t_detail ? $%d : NaN)', k)
 do for [i = 1:panels] {
   if (name eq 'mechanism') {
@@ -38,41 +40,41 @@ do for [i = 1:panels] {
   y1[i] = y1[i] + edge
 }
 aspect(i, least, most) = min(max((y1[i] - y0[i])/(x1[i] - x0[i]), least), most)
-tall = narrow ? 300.0 : 380.0 # highest panel
-full = width - left - right
+most_height = narrow ? 300.0 : 380.0 # highest panel
+full_width = width - left - right
 px0[1] = left
 if (panels == 1) {
-  wide = full
-  high = wide*aspect(1, 0.25, 2)
-  if (high > tall) {
-    wide = max(0.6*full, wide*tall/high)
-    high = tall
+  panel_width = full_width
+  high = panel_width*aspect(1, 0.25, 2)
+  if (high > most_height) {
+    panel_width = max(0.6*full_width, panel_width*most_height/high)
+    high = most_height
   }
   py0[1] = top
   py1[1] = top + high
-  px0[1] = left + 0.5*(full - wide)
-  px1[1] = px0[1] + wide
+  px0[1] = left + 0.5*(full_width - panel_width)
+  px1[1] = px0[1] + panel_width
 } else { if (narrow || aspect(1, 0, 1) < 0.5) { # a long straight path above its beginning
   py0[1] = top + 13
-  py1[1] = py0[1] + full*aspect(1, 0.15, 0.8)
-  px1[1] = left + full
+  py1[1] = py0[1] + full_width*aspect(1, 0.15, 0.8)
+  px1[1] = left + full_width
   py0[2] = py1[1] + bottom + 16
-  py1[2] = py0[2] + full*aspect(2, 0.25, 0.8)
+  py1[2] = py0[2] + full_width*aspect(2, 0.25, 0.8)
   px0[2] = left
-  px1[2] = left + full
+  px1[2] = left + full_width
 } else { # side by side
-  wide = full - 40
-  px1[1] = left + 0.4*wide
+  panel_width = full_width - 40
+  px1[1] = left + 0.4*panel_width
   px0[2] = px1[1] + 40
-  px1[2] = left + full
+  px1[2] = left + full_width
   py0[1] = top + 13
   py0[2] = py0[1]
-  py1[1] = py0[1] + max(0.4*wide*aspect(1, 0.5, 1.6), 0.6*wide*aspect(2, 0.5, 1.1))
+  py1[1] = py0[1] + max(0.4*panel_width*aspect(1, 0.5, 1.6), 0.6*panel_width*aspect(2, 0.5, 1.1))
   py1[2] = py1[1]
 }}
-# The legend is as wide as the first panel.
-per_row = max(1, int((px1[1] - px0[1])/(32 + letter*longest)))
-shift = items ? rows(items, per_row) - (top - above) : 0
+# The legend is as panel_width as the first panel.
+per_row = max(1, int((px1[1] - px0[1])/(32 + letter*label_length)))
+shift = items ? rows(items, per_row) - (top - legend_top) : 0
 do for [i = 1:panels] {
   py0[i] = py0[i] + shift
   py1[i] = py1[i] + shift
@@ -88,6 +90,7 @@ do for [i = 1:panels] {
   y0[i] = y - 0.5*high
   y1[i] = y + 0.5*high
 }
+axes = "set xlabel 'x [m]'; set ylabel 'y [m]'; unset xzeroaxis"
 place(i) = panel(px0[i], px1[i], py0[i], py1[i]). \
   sprintf('; set xrange [%.9g:%.9g]; set yrange [%.9g:%.9g]', x0[i], x1[i], y0[i], y1[i]). \
   (panels == 1 ? '' : i == 1 ? "; set title 'whole run'" : sprintf("; set title 'the first %.3g s'", t_detail))

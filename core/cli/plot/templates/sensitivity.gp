@@ -5,10 +5,10 @@
 data = name.'.dat'
 title = 'derivatives along the run'
 eval lines(unknowns)
-high = 112.0
+panel_height = 112.0
 gap = 34.0
-above = rows(unknowns, 1)
-height = top + panels*(above + high + gap) - gap + bottom
+legend_height = rows(unknowns, 1)
+height = top + panels*(legend_height + panel_height + gap) - gap + bottom
 set xrange [0:t_end]
 do for [form in forms] {
   eval page(form)
@@ -17,11 +17,10 @@ do for [form in forms] {
     eval key(y, 1)
     set xlabel (k == panels ? 't [s]' : '')
     set ylabel short(output[k]) noenhanced
-    eval panel(left, width - right, y + above, y + above + high)
+    eval panel(left, width - right, y + legend_height, y + legend_height + panel_height)
     plot for [i = 1:unknowns] data index (k - 1)*unknowns + i - 1 using 1:2 with lines lt i \
       title label[(k - 1)*unknowns + i]
-    y = y + above + high + gap
+    y = y + legend_height + panel_height + gap
   }
-  unset multiplot
-  unset output
+  eval finish
 }

@@ -8,9 +8,9 @@ angles = name eq 'work-precision-angles'
 title = 'work-precision diagram'.(angles ? ' of angles' : '')
 label_of_error = angles ? 'largest error of an angle [rad]' : 'largest error of a coordinate [m]'
 column_of_error = angles ? 5 : 4
-wide = narrow ? width - left - right : 0.5*(width - left - 14 - right)
-high = narrow ? 0.85*wide : 1.05*wide
-height = top + high + (narrow ? high + 36 : 0) + bottom
+panel_width = narrow ? width - left - right : 0.5*(width - left - 14 - right)
+panel_height = narrow ? 0.85*panel_width : 1.05*panel_width
+height = top + panel_height + (narrow ? panel_height + 36 : 0) + bottom
 stats data using 2 name 'cpu' nooutput
 stats data using 3 name 'rhs' nooutput
 stats data using (column(column_of_error) > 0 ? column(column_of_error) : NaN) name 'error' nooutput
@@ -21,29 +21,20 @@ unset offsets
 unset xzeroaxis
 do for [form in forms] {
   eval page(form)
-  # The legend has a panel of its own, as wide as both others.
-  eval key(above, per_row)
-  set tics scale 0
-  set format ''
-  set border 0
-  unset grid
-  set xrange [1:10]
-  set yrange [1:10]
-  eval panel(left, width - right, above - 1, top - 1)
+  eval begin_legend(per_row)
   plot for [i = 1:methods] NaN with linespoints ls i title label[i]
-  set tics scale 0.5
-  set border 31
-  set grid back lt 1 lw 0.4 lc rgb '#dddddd'
+  eval end_legend
   set ylabel label_of_error
   set format '10^{%T}'
   set yrange [error_min/4:largest]
   if (uncertainty > error_min/4) {
     set object 1 rectangle from graph 0,graph 0 to graph 1,first uncertainty behind fc rgb '#e8e8e8' fs noborder
-    set label 1 'below the uncertainty of the reference' at graph 0.02,first uncertainty offset 0,-0.6 textcolor rgb '#555555'
+    set label 1 'below the uncertainty of the reference' at graph 0.02,first uncertainty offset 0,-0.6 \
+      textcolor rgb '#555555'
   }
   set xlabel 'CPU time [s]'
   set xrange [cpu_min/1.6:cpu_max*1.6]
-  eval panel(left, left + wide, top, top + high)
+  eval panel(left, left + panel_width, top, top + panel_height)
   plot for [i = 1:methods] data index i - 1 using 2:column_of_error with linespoints ls i notitle
   if (!narrow) {
     set ylabel ''
@@ -52,12 +43,9 @@ do for [form in forms] {
   unset label 1
   set xlabel 'right-hand side evaluations'
   set xrange [rhs_min/1.6:rhs_max*1.6]
-  if (narrow) { eval panel(left, left + wide, height - bottom - high, height - bottom) } \
-  else { eval panel(left + wide + 14, width - right, top, top + high) }
+  if (narrow) { eval panel(left, left + panel_width, height - bottom - panel_height, height - bottom) } \
+  else { eval panel(left + panel_width + 14, width - right, top, top + panel_height) }
   plot for [i = 1:methods] data index i - 1 using 3:column_of_error with linespoints ls i notitle
-  set xlabel ''
-  set ylabel ''
   unset object 1
-  unset multiplot
-  unset output
+  eval finish
 }
