@@ -15,6 +15,7 @@ struct pw_output {
   char *path;    /* as the user knows it */
   char *real;    /* of the file itself, links followed */
   char *part;    /* its temporary name; NULL: written directly */
+  char *old;     /* name of its predecessor while several files are renamed */
   int file;      /* keeps the temporary file locked; -1: written directly */
   int folder;    /* that contains it; -1: written directly */
   int code;      /* errno of the first failed write */
@@ -29,6 +30,7 @@ static void output_free (pw_output *o) {
   free (o->path);
   free (o->real);
   free (o->part);
+  free (o->old);
   free (o);
 }
 
@@ -77,16 +79,15 @@ static int output_open_direct (pw_output *o, const pw_location *p) {
   return output_stream_of (o, file, "w");
 }
 
-/* Gives the new file owner and group of the old one, if permitted, and its mode, else without set-user-ID bits. */
+/* Gives the new file owner and group of the old one, or the group alone, as permitted, and its mode; without the owner
+ * no set-user-ID bit, without the group no set-group-ID bit either. */
 static int output_inherit (int file, const struct stat *old) {
   struct stat now;
-  mode_t mode = old->st_mode & 07777;
   if (fstat (file, &now) != 0) return errno;
-  if ((now.st_uid != old->st_uid || now.st_gid != old->st_gid) && fchown (file, old->st_uid, old->st_gid) != 0 &&
-      fchown (file, (uid_t)-1, old->st_gid) != 0)
-    mode &= 0777;
-  if ((now.st_mode & 07777) != mode && fchmod (file, mode) != 0) return errno;
-  return 0;
+  int owner = (now.st_uid == old->st_uid && now.st_gid == old->st_gid) || fchown (file, old->st_uid, old->st_gid) == 0;
+  int group = owner || fchown (file, (uid_t)-1, old->st_gid) == 0;
+  mode_t mode = old->st_mode & (owner ? 07777 : group ? 03777 : 0777);
+  return (now.st_mode & 07777) != mode && fchmod (file, mode) != 0 ? errno : 0;
 }
 
 /* The stream has a separate descriptor, so that the lock outlives it. */
@@ -124,16 +125,21 @@ char *pw_output_path (const char *path, pw_error *error) {
   return NULL;
 }
 
+static char *output_append (const char *path, const char *ending) {
+  size_t size = path ? strlen (path) + strlen (ending) + 1 : 0;
+  char *longer = size ? malloc (size) : NULL;
+  if (longer) snprintf (longer, size, "%s%s", path, ending);
+  return longer;
+}
+
 /* Finds the location `p`, and o->part unless the file is written directly. */
 static int output_name (pw_output *o, pw_location *p, const char *ending) {
   int direct, code = output_locate (o->path, p, &direct);
   o->real = p->path;
   if (code || direct) return code;
-  size_t size = strlen (o->real) + strlen (ending) + 1;
-  o->part = malloc (size);
-  if (o->part == NULL) return ENOMEM;
-  snprintf (o->part, size, "%s%s", o->real, ending);
-  return 0;
+  o->part = output_append (o->real, ending);
+  o->old = output_append (o->part, ".old");
+  return o->old ? 0 : ENOMEM;
 }
 
 static int output_open_file (pw_output *o, const char *ending) {
@@ -249,16 +255,26 @@ static int output_sync_folder (const pw_output *o, pw_error *error) {
                   strerror (errno));
 }
 
-/* Renames all files or none. */
+static int output_is_renamed (const pw_output *o) {
+  return o && o->part;
+}
+
+/* Renames all files or none.  Until the last one has its name, predecessors keep a second one, where hard links exist. */
 static int output_rename_all (pw_output *const *o, int count, pw_error *error) {
-  for (int i = 0; i < count; i++) {
-    if (o[i] == NULL || o[i]->part == NULL || rename (o[i]->part, o[i]->real) == 0) continue;
-    int status = output_fail_with_part (o[i], errno, error);
-    while (i-- > 0)
-      if (o[i] && o[i]->part) (void)rename (o[i]->real, o[i]->part);
-    return status;
+  int last = count - 1, renamed = 0, status = PW_OK;
+  while (last > 0 && !output_is_renamed (o[last])) last--;
+  for (int i = 0; i <= last && status == PW_OK; i++) {
+    if (!output_is_renamed (o[i])) continue;
+    if (i < last) unlink (o[i]->old), (void)!link (o[i]->real, o[i]->old);
+    if (rename (o[i]->part, o[i]->real) != 0) status = output_fail_with_part (o[i], errno, error);
+    renamed = i;
   }
-  return PW_OK;
+  for (int i = 0; i < last; i++) {
+    if (!output_is_renamed (o[i])) continue;
+    if (status != PW_OK && i < renamed) (void)rename (o[i]->real, o[i]->part), (void)rename (o[i]->old, o[i]->real);
+    unlink (o[i]->old);
+  }
+  return status;
 }
 
 int pw_output_finish_all (pw_output *const *o, int count, pw_error *error) {
