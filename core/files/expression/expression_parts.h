@@ -36,6 +36,7 @@ typedef enum {
   PW_OP_MIN,
   PW_OP_MAX,
   PW_OP_ATAN2,
+  PW_OP_HYPOT,
   PW_OP_FUNCTION_OF_TWO, /* a smooth function of two arguments */
   PW_OP_SELECT           /* condition is 1 or 0 */
 } pw_expression_op;
@@ -53,7 +54,7 @@ static inline int pw_expression_jumps (int op) {
 /* Whether it has jumps, poles or kinks. */
 static inline int pw_expression_breaks (int op) {
   return pw_expression_jumps (op) || op == PW_OP_ABS || op == PW_OP_MIN || op == PW_OP_MAX || op == PW_OP_TAN ||
-         op == PW_OP_DIVIDE || op == PW_OP_POWER;
+         op == PW_OP_DIVIDE || op == PW_OP_POWER || op == PW_OP_HYPOT;
 }
 
 /* The order of two numbers; UNORDERED: one of them is NaN. */

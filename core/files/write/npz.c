@@ -41,11 +41,11 @@ static void npz_number (pw_npz *z, unsigned long value, int bytes) {
   for (; bytes > 0; bytes--, value >>= 8) npz_bytes (z, &(unsigned char){ (unsigned char)value }, 1);
 }
 
-/* What the header of a file and its entry in the directory have in common: version 2.0, no flags, stored, 1 January
+/* What the header of a file and its entry in the directory have in common: version 2.0, names in UTF-8, stored, 1 January
  * 1980, checksum, compressed and original size, lengths of the name and of extra fields. */
 static void npz_describe (pw_npz *z, const struct pw_npz_entry *e) {
   npz_number (z, NPZ_VERSION, 2);
-  npz_number (z, 0, 4); /* flags, method */
+  npz_number (z, 0x0800, 4); /* flags, method */
   npz_number (z, 0x00210000, 4);
   npz_number (z, e->check, 4);
   npz_number (z, e->size, 4);

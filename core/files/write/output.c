@@ -259,7 +259,7 @@ static int output_is_renamed (const pw_output *o) {
   return o && o->part;
 }
 
-/* Renames all files or none.  Until the last one has its name, predecessors keep a second one, where hard links exist. */
+/* Renames all files or none.  Until the last one has its name, predecessors keep a second one, a hard link. */
 static int output_rename_all (pw_output *const *o, int count, pw_error *error) {
   int last = count - 1, renamed = 0, status = PW_OK;
   while (last > 0 && !output_is_renamed (o[last])) last--;

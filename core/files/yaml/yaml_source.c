@@ -1,6 +1,7 @@
 /* The text of a model file, and messages that point into it.
  *
- * The text is checked first: size, UTF-8, no control characters, no line that begins with %, on some of which libfyaml
+ * The text is checked first: size, UTF-8, no control characters, no line that begins with %, not even after a
+ * byte order mark, on some of which libfyaml
  * 0.7.12 does not terminate. */
 #include <stdarg.h>
 #include <string.h>
@@ -83,7 +84,7 @@ static int source_check (const pw_reader *r) {
     if (n == 0) return pw_yaml_fail (r, at, "byte %02X is not UTF-8; a model file is text in UTF-8", (unsigned char)*p);
     if ((*p == 0 || pw_control (p)) && !(*p == '\r' && p[1] == '\n'))
       return pw_yaml_fail (r, at, "a control character, code %d, does not belong in a model file", pw_control (p));
-    if (*p == '%' && (at == 0 || p[-1] == '\n'))
+    if (*p == '%' && (at == 0 || p[-1] == '\n' || (at == 3 && p[-1] == '\xBF')))
       return pw_yaml_fail (r, at, "a line of a model file must not begin with %%");
     p += n;
   }
