@@ -175,8 +175,7 @@ int pw_output_ready (pw_output *o, pw_error *error);
 /* Completes and frees: the file is written to the disk, then renamed, then its folder is written to the disk.
  * PW_RESOURCE if anything failed: NAME.part remains and the text names it. */
 int pw_output_finish (pw_output *o, pw_error *error);
-/* The same for several outputs, some of which may be NULL: completes all, or leaves all under their temporary names and
- * what they were to replace in its place. */
+/* The same for several outputs, some of which may be NULL: completes all, or leaves all under their temporary names. */
 int pw_output_finish_all (pw_output *const *o, int count, pw_error *error);
 /* Gives up and frees: NAME.part remains, of a text with complete lines.  Its path is written to the buffer, which is
  * returned; NULL, and "" in the buffer, if there is no such file (standard output, a device). */

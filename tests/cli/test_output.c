@@ -32,6 +32,7 @@ static void test_uses (void **state) {
     { "run ezyroller -o o.csv --json ./o.csv", "-o and --json cannot both write to ./o.csv" },
     { "run ezyroller -o new.csv --json soft.csv", "-o and --json cannot both write to soft.csv" },
     { "run ezyroller -o o.csv --json D/../o.csv.part", "-o and --json cannot both write to D/../o.csv.part" },
+    { "run ezyroller -o o.csv --json o.csv.part.old", "-o and --json cannot both write to o.csv.part.old" },
     { "run ezyroller -o - --json /dev/stdout", "-o and --json cannot both write to /dev/stdout" },
     { "run ezyroller -o a.html --animate ./a.html", "-o and --animate cannot both write to ./a.html" },
     { "run ezyroller -o c --checkpoint ./c", "--checkpoint and -o cannot both write to c" },

@@ -111,7 +111,7 @@ size_t pw_expression_number_size (const char *p);
 /* x^y and its derivatives, with respect to x alone unless the exponent y varies. */
 double pw_expression_power (double x, double y);
 pw_partials pw_expression_power_partials (double x, double y, double f, int exponent_varies);
-/* The remainder with the sign of the divisor: an angle modulo 2 pi lies in [0, 2 pi). */
+/* The remainder with the sign of the divisor: an angle modulo 2 pi lies from 0 to 2 pi. */
 double pw_expression_mod (double x, double y);
 
 /* ---- Evaluation ---- */

@@ -6,9 +6,7 @@
 #include "pinwheel.h"
 
 static const pw_range range_nan = { .lo = INFINITY, .hi = -INFINITY, .nan = 1 };
-
 static const pw_range range_all = { .lo = -INFINITY, .hi = INFINITY, .nan = 1 };
-
 static const pw_range range_pole = { .lo = -INFINITY, .hi = INFINITY, .breaks = 1 };
 
 static pw_range range_between (double lo, double hi) {
@@ -166,8 +164,7 @@ static pw_range range_hypot (const pw_range *x, const pw_range *y) {
 /* jacobi_am (x, y) is monotonic in each argument, and NaN for y > 1. */
 static pw_range range_jacobi_am (const pw_range *x, const pw_range *y) {
   const pw_range in_domain = range_between (y->lo, fmin (y->hi, 1));
-  if (y->lo > 1) return range_nan;
-  pw_range r = range_corners (pw_jacobi_am, x, &in_domain);
+  pw_range r = y->lo > 1 ? range_nan : range_corners (pw_jacobi_am, x, &in_domain);
   r.nan |= y->hi > 1;
   return r;
 }
@@ -218,7 +215,6 @@ static pw_range range_compare (int op, const pw_range *x, const pw_range *y) {
   return nan && value != pw_expression_compare (op, PW_ORDER_UNORDERED) ? either : range_constant (value);
 }
 
-/* All values of both. */
 static pw_range range_hull (const pw_range *x, const pw_range *y) {
   return (pw_range){ .lo = fmin (x->lo, y->lo),
                      .hi = fmax (x->hi, y->hi),

@@ -12,7 +12,6 @@
 
 enum { COLUMNS_MAX_BYTES = 64 << 20, COLUMNS_MAX_LINES = 1000000, COLUMNS_CELL = 1000 };
 
-/* A column to read. */
 typedef struct {
   int index;     /* of its cell in each line, from 0 */
   double factor; /* to SI units */
@@ -132,7 +131,6 @@ static int columns_find (const columns *c, const char *first, int named, const c
   return columns_fail (c, "there is no column \"%.60s\"%s", name, pw_nearest_text (&near));
 }
 
-/* Finds a column and its conversion factor. */
 static int columns_open (const columns *c, const char *first, int named, const char *name, const char *unit,
                          columns_source *source) {
   char cell[COLUMNS_CELL], reason[260];

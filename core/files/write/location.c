@@ -124,8 +124,7 @@ static int location_is_null_device (const struct stat *info) {
   return S_ISCHR (info->st_mode) && stat ("/dev/null", &null) == 0 && null.st_rdev == info->st_rdev;
 }
 
-/* Whether writing `a` affects `b`: the same file, a temporary file of a table, sweep or checkpoint, or a file written
- * into a folder. */
+/* Whether writing `a` affects `b`: the same file, a temporary file, or a file written into a folder. */
 static int location_conflicts (const location_use *a, const location_use *b) {
   static const char *const temporary[] = { ".part", ".part.old", ".sorted", ".next", NULL };
   const struct stat *info = &a->location.info;

@@ -30,7 +30,6 @@ static void output_free (pw_output *o) {
   free (o->path);
   free (o->real);
   free (o->part);
-  free (o->old);
   free (o);
 }
 
@@ -95,7 +94,6 @@ static int output_stream (pw_output *o) {
   return output_stream_of (o, fcntl (o->file, F_DUPFD_CLOEXEC, 3), "r+");
 }
 
-/* Opens the folder and locks the temporary file. */
 static int output_open_part (pw_output *o, pw_lock_mode lock_mode) {
   char *folder = pw_folder_of (o->real);
   if (folder == NULL) return ENOMEM;
@@ -125,21 +123,16 @@ char *pw_output_path (const char *path, pw_error *error) {
   return NULL;
 }
 
-static char *output_append (const char *path, const char *ending) {
-  size_t size = path ? strlen (path) + strlen (ending) + 1 : 0;
-  char *longer = size ? malloc (size) : NULL;
-  if (longer) snprintf (longer, size, "%s%s", path, ending);
-  return longer;
-}
-
-/* Finds the location `p`, and o->part unless the file is written directly. */
+/* Finds the location `p`, and o->part and o->old, in one allocation, unless the file is written directly. */
 static int output_name (pw_output *o, pw_location *p, const char *ending) {
   int direct, code = output_locate (o->path, p, &direct);
   o->real = p->path;
   if (code || direct) return code;
-  o->part = output_append (o->real, ending);
-  o->old = output_append (o->part, ".old");
-  return o->old ? 0 : ENOMEM;
+  size_t size = strlen (o->real) + strlen (ending) + 1;
+  if ((o->part = malloc (2 * size + strlen (".old"))) == NULL) return ENOMEM;
+  snprintf (o->part, size, "%s%s", o->real, ending);
+  o->old = strcat (strcpy (o->part + size, o->part), ".old");
+  return 0;
 }
 
 static int output_open_file (pw_output *o, const char *ending) {
@@ -255,22 +248,18 @@ static int output_sync_folder (const pw_output *o, pw_error *error) {
                   strerror (errno));
 }
 
-static int output_is_renamed (const pw_output *o) {
-  return o && o->part;
-}
-
 /* Renames all files or none.  Until the last one has its name, predecessors keep a second one, a hard link. */
 static int output_rename_all (pw_output *const *o, int count, pw_error *error) {
   int last = count - 1, renamed = 0, status = PW_OK;
-  while (last > 0 && !output_is_renamed (o[last])) last--;
+  while (last > 0 && (o[last] == NULL || o[last]->part == NULL)) last--;
   for (int i = 0; i <= last && status == PW_OK; i++) {
-    if (!output_is_renamed (o[i])) continue;
+    if (o[i] == NULL || o[i]->part == NULL) continue;
     if (i < last) unlink (o[i]->old), (void)!link (o[i]->real, o[i]->old);
     if (rename (o[i]->part, o[i]->real) != 0) status = output_fail_with_part (o[i], errno, error);
     renamed = i;
   }
   for (int i = 0; i < last; i++) {
-    if (!output_is_renamed (o[i])) continue;
+    if (o[i] == NULL || o[i]->part == NULL) continue;
     if (status != PW_OK && i < renamed) (void)rename (o[i]->real, o[i]->part), (void)rename (o[i]->old, o[i]->real);
     unlink (o[i]->old);
   }

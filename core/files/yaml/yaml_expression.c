@@ -17,7 +17,6 @@ typedef struct {
   pw_signal_text text;
 } time_function;
 
-/* The expression being read. */
 typedef struct {
   pw_reader *r;
   const pw_node *node;
@@ -125,10 +124,8 @@ static int time_eval (void *context, double t, const double *state, double value
     value[0] = pw_expression_value (f->expression[0], variable);
   for (int i = 0; gradient && i < f->states; i++) {
     pw_expression_derivatives (f->expression[0], variable, 1 + i, derivatives);
-    if (derivatives[0] != value[0]) { /* at a jump in time: that is the value before it */
-      variable[PW_EXPRESSION_TIME] = nextafter (t, INFINITY);
-      pw_expression_derivatives (f->expression[0], variable, 1 + i, derivatives);
-    }
+    if (derivatives[0] != value[0]) /* that before a jump in time */
+      variable[0] = nextafter (t, INFINITY), pw_expression_derivatives (f->expression[0], variable, 1 + i, derivatives);
     /* |v| has no derivative at rest; only Newton's iteration uses it. */
     gradient[i] = isfinite (derivatives[1]) ? derivatives[1] : 0;
   }
@@ -182,7 +179,6 @@ static int time_add_state (const reading *e, const char *name, size_t at) {
   return f->name[++f->states] ? PW_OK : pw_yaml_no_memory (e->r);
 }
 
-/* Reads expression i of the signal. */
 static int time_expression (reading *e, int i) {
   pw_reader *r = e->r;
   time_function *f = e->f;
@@ -203,8 +199,7 @@ static int time_expression (reading *e, int i) {
   return jump ? PW_OK : pw_yaml_no_memory (r);
 }
 
-/* Compares given derivative i, 1 or 2, with that of the last expression before it at some times, to 1e-6 of the largest
- * ones. */
+/* Compares given derivative i, 1 or 2, with that of what is given before it, at some times to 1e-6 of the largest. */
 static int time_check (const reading *e, int i, const char *name) {
   static const double time[] = { 0.3, 1.7, 4.1 }; /* [s], arbitrary */
   int last = e->f->expression[i - 1] ? i - 1 : 0, n = i - last;
@@ -253,7 +248,6 @@ static int time_continuous (const reading *e) {
   return PW_OK;
 }
 
-/* Reads the value and the given derivatives. */
 static int time_all (reading *e, const pw_node *const node[3]) {
   static const char *const key[] = { "expression", "rate", "acceleration" };
   for (int i = 0; i < 3; i++) {

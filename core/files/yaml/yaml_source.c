@@ -1,7 +1,6 @@
 /* The text of a model file, and messages that point into it.
  *
- * The text is checked first: size, UTF-8, no control characters, no line that begins with %, not even after a
- * byte order mark, on some of which libfyaml
+ * The text is checked first: size, UTF-8, no control characters, no line that begins with %, on some of which libfyaml
  * 0.7.12 does not terminate. */
 #include <stdarg.h>
 #include <string.h>
