@@ -53,7 +53,7 @@ static int build_spawn (const build_command *command, char *const *word, pid_t *
 static int build_run (const build_command *command, char *const *word, const char *source, pw_error *error) {
   pid_t child;
   int outcome = 0, code = build_spawn (command, word, &child);
-  while (code == 0 && waitpid (child, &outcome, 0) < 0)
+  while (code == 0 && waitpid (child, &outcome, 0) < 0 && errno != ECHILD) /* if SIGCHLD is ignored, the object tells */
     if (errno != EINTR) code = errno;
   int status = WIFEXITED (outcome) ? WEXITSTATUS (outcome) : -1;
   if (code != 0 && code != ENOENT && code != EACCES)
