@@ -9,10 +9,8 @@ void pw_archive_bytes (pw_archive *a, void *bytes, size_t count) {
   if (count == 0 || a->failed) return;
   a->failed = a->loading ? a->size - a->used < count : pw_grow (&a->at, a->used + count, &a->size, 1) != PW_OK;
   if (a->failed) return;
-  if (a->loading)
-    memcpy (bytes, a->at + a->used, count);
-  else
-    memcpy (a->at + a->used, bytes, count);
+  unsigned char *at = a->at + a->used;
+  memcpy (a->loading ? bytes : at, a->loading ? at : bytes, count);
   a->used += count;
 }
 

@@ -65,7 +65,7 @@ static void test_npz (void **state) {
   assert_int_equal (fread (head, sizeof head, 1, f), 1);
   assert_int_equal (fread (A, sizeof A, 1, f), 1);
   fclose (f);
-  assert_memory_equal (head, "PK\3\4", 4);
+  assert_memory_equal (head, "PK\3\4\x14\0\0\x08", 8); /* version 2.0, names in UTF-8 */
   assert_memory_equal (head + 30, "A.npy\x93NUMPY\1\0\x76\0{'descr': '", 5 + 10 + 11);
   assert_memory_equal (head + 30 + 5 + 22, "f8', 'fortran_order': False, 'shape': (2, 2), }", 46);
   check_close ("trace", A[0] + A[3], -2.4 / 1.5, 1e-14, "round-off");

@@ -226,6 +226,9 @@ static void test_bad_files (void **state) {
   assert_string_equal (
       cli_err, "pinwheel: there is no model \"here\" on the search path; to use the file here, write ./here.c\n");
   cli_write ("broken.c", "#include \"pinwheel.h\"\nnonsense (;\n");
+  assert_int_equal (cli_run ("CC=\"cc $(printf -- '-DA%d ' $(seq 24))\" pinwheel run @/broken.c"), 2);
+  assert_non_null (strstr (cli_err, "the C compiler's command in CC has more than 24 words"));
+  cli_good ("cp models/ezyroller.c @/e.c; env --ignore-signal=CHLD \"${PINWHEEL:-build/pinwheel}\" show @/e.c");
   assert_int_equal (cli_run ("CC=/no/compiler pinwheel run @/broken.c"), 2);
   assert_non_null (strstr (cli_err, "cannot run the C compiler \"/no/compiler\""));
   assert_int_equal (cli_run ("pinwheel run @/broken.c"), 2);

@@ -3,6 +3,7 @@
 #define _GNU_SOURCE
 #include <errno.h>
 #include <fcntl.h>
+#include <grp.h>
 #include <math.h>
 #include <signal.h>
 #include <stdio.h>
@@ -31,6 +32,7 @@ static void test_uses (void **state) {
     { "run ezyroller -o o.csv --json ./o.csv", "-o and --json cannot both write to ./o.csv" },
     { "run ezyroller -o new.csv --json soft.csv", "-o and --json cannot both write to soft.csv" },
     { "run ezyroller -o o.csv --json D/../o.csv.part", "-o and --json cannot both write to D/../o.csv.part" },
+    { "run ezyroller -o o.csv --json o.csv.part.old", "-o and --json cannot both write to o.csv.part.old" },
     { "run ezyroller -o - --json /dev/stdout", "-o and --json cannot both write to /dev/stdout" },
     { "run ezyroller -o a.html --animate ./a.html", "-o and --animate cannot both write to ./a.html" },
     { "run ezyroller -o c --checkpoint ./c", "--checkpoint and -o cannot both write to c" },
@@ -244,6 +246,54 @@ static void test_together (void **state) {
   if (strstr (cli_out, "No such") == NULL) assert_string_equal (cli_out, "1\na.csv.part\ngo\nlog\n");
 }
 
+static void output_put (pw_output *o, const char *text) {
+  assert_non_null (o);
+  fputs (text, pw_output_stream (o));
+}
+
+/* A user who may give the new file the group of the old one, but not its owner, gets no program that runs as the
+ * latter. */
+static void test_set_user (void **state) {
+  struct stat info;
+  char path[300];
+  int how;
+  (void)state;
+  if (getuid () != 0) skip ();
+  cli_good ("mkdir @/s && chmod 777 @/s && echo old >@/s/a && chown 12345:23456 @/s/a && chmod 6775 @/s/a");
+  cli_expand ("@/s", path, sizeof path);
+  pid_t child = fork ();
+  if (child == 0) {
+    if (chdir (path) || setgroups (1, (gid_t[]){ 23456 }) || setgid (34567) || setuid (34567)) _exit (2);
+    pw_output *o = pw_output_open ("a", NULL);
+    _exit (o && pw_output_finish (o, NULL) == PW_OK ? 0 : 3); /* empty: writing would remove the bits anyway */
+  }
+  waitpid (child, &how, 0);
+  assert_int_equal (how, 0);
+  cli_expand ("@/s/a", path, sizeof path);
+  assert_int_equal (stat (path, &info), 0);
+  assert_true (info.st_uid == 34567 && info.st_gid == 23456);
+  assert_int_equal (info.st_mode & 07777, 02775);
+}
+
+/* If the second of two outputs cannot be renamed, the first one's predecessor keeps its name. */
+static void test_predecessor (void **state) {
+  char path[300];
+  pw_output *o[3] = { NULL };
+  (void)state;
+  for (int fails = 1; fails >= 0; fails--) {
+    pw_error error = { 0 };
+    cli_good ("rm -rf @/p; mkdir @/p; echo old >@/p/a; echo old >@/p/b; echo old >@/p/a.part.old");
+    for (int i = 0; i < 2; i++) {
+      cli_expand (i ? "@/p/b" : "@/p/a", path, sizeof path);
+      output_put (o[i] = pw_output_open (path, &error), "new\n");
+    }
+    if (fails) cli_good ("rm @/p/b; mkdir @/p/b");
+    assert_int_equal (pw_output_finish_all (o, 3, &error), fails ? PW_RESOURCE : PW_OK);
+    cli_good ("cd @/p; grep -s . * || true");
+    assert_string_equal (cli_out, fails ? "a:old\na.part:new\nb.part:new\n" : "a:new\nb:new\n");
+  }
+}
+
 /* ---- What is read ---- */
 
 static void test_types (void **state) {
@@ -440,12 +490,13 @@ static void test_limit (void **state) {
 
 int main (int argc, char **argv) {
   const struct CMUnitTest tests[] = {
-    cmocka_unit_test (test_left_over), cmocka_unit_test (test_whole_lines), cmocka_unit_test (test_kept),
-    cmocka_unit_test (test_uses),      cmocka_unit_test (test_links),       cmocka_unit_test (test_lock),
-    cmocka_unit_test (test_direct),    cmocka_unit_test (test_keeps_lock),  cmocka_unit_test (test_mode),
-    cmocka_unit_test (test_types),     cmocka_unit_test (test_together),    cmocka_unit_test (test_bounded),
-    cmocka_unit_test (test_process),   cmocka_unit_test (test_forged),      cmocka_unit_test (test_terminal),
-    cmocka_unit_test (test_limit),     cmocka_unit_test (test_not_written),
+    cmocka_unit_test (test_left_over),   cmocka_unit_test (test_whole_lines), cmocka_unit_test (test_kept),
+    cmocka_unit_test (test_uses),        cmocka_unit_test (test_links),       cmocka_unit_test (test_lock),
+    cmocka_unit_test (test_direct),      cmocka_unit_test (test_keeps_lock),  cmocka_unit_test (test_mode),
+    cmocka_unit_test (test_types),       cmocka_unit_test (test_together),    cmocka_unit_test (test_bounded),
+    cmocka_unit_test (test_process),     cmocka_unit_test (test_forged),      cmocka_unit_test (test_terminal),
+    cmocka_unit_test (test_limit),       cmocka_unit_test (test_not_written), cmocka_unit_test (test_set_user),
+    cmocka_unit_test (test_predecessor),
   };
   if (argc > 1) return setenv ("CHILD", argv[1], 1) || system ("echo $$ >\"$CHILD\"; sleep 600");
   return cmocka_run_group_tests (tests, cli_setup, cli_teardown);

@@ -131,6 +131,21 @@ static void test_gradient (void **state) {
   scene_close (&x);
 }
 
+/* At a jump in time it is that just after it, as the value is. */
+static void test_gradient_after (void **state) {
+  scene x = scene_of ("  - {torque: T, body: [b, ground], value: \"@\"}\n", "t <= 1 ? b.phi : 2*b.phi + a.x*floor(-t)");
+  const pw_signal *s = scene_signal (&x);
+  void *own = s->function.open (s->function.context);
+  double value[3], gradient[2];
+  (void)state;
+  assert_int_equal (s->function.eval (own, 1, (double[]){ 3, 5 }, value, gradient), 0);
+  assert_true (value[0] == 6 - 10 && gradient[0] == 2 && gradient[1] == -2);
+  assert_int_equal (s->function.eval (own, 0.5, (double[]){ 3, 5 }, value, gradient), 0);
+  assert_true (value[0] == 3 && gradient[0] == 1 && gradient[1] == 0);
+  s->function.close (own);
+  scene_close (&x);
+}
+
 /* A derivative without a value stops the run with its reason; one that is given in its place does not. */
 static void test_no_derivative (void **state) {
   static const char *const value[] = { "sqrt(t^4)", "{expression: sqrt(t^4), rate: 2*t, acceleration: 2}",
@@ -191,8 +206,9 @@ static int teardown (void **state) {
 }
 
 int main (void) {
-  const struct CMUnitTest tests[] = { cmocka_unit_test (test_push),          cmocka_unit_test (test_built_in),
-                                      cmocka_unit_test (test_gradient),      cmocka_unit_test (test_continuous),
-                                      cmocka_unit_test (test_no_derivative), cmocka_unit_test (test_formula) };
+  const struct CMUnitTest tests[] = { cmocka_unit_test (test_push),       cmocka_unit_test (test_built_in),
+                                      cmocka_unit_test (test_gradient),   cmocka_unit_test (test_gradient_after),
+                                      cmocka_unit_test (test_continuous), cmocka_unit_test (test_no_derivative),
+                                      cmocka_unit_test (test_formula) };
   return cmocka_run_group_tests (tests, setup, teardown);
 }

@@ -98,7 +98,8 @@ static void bad_write (const char *text, size_t size) {
 
 /* Columns of the first line do not count a byte order mark. */
 static void test_byte_order_mark (void **state) {
-  static const char *const bad[] = { "about: a: b\n", "pinwheel: 2\n", "pinwheel: 1, x: [\n", "{pinwheel: 1, x: 3}\n" };
+  static const char *const bad[] = { "about: a: b\n", "pinwheel: 2\n", "pinwheel: 1, x: [\n", "{pinwheel: 1, x: 3}\n",
+                                     "%YAML 1.2\n---\npinwheel: 1\n" };
   (void)state;
   for (size_t i = 0; i < sizeof bad / sizeof *bad; i++) {
     char text[100];

@@ -310,6 +310,10 @@ static void test_after (void **state) {
     { "atan2(t - 1, 1 - t) > 2", 1, { 1, 0, 0 } },
     { "atan2((t - 1)^2, 0) > 1", 1, { 1, 0, 0 } },
     { "(1 - t)^-3 < 0", 1, { 1, 0, 0 } },
+    { "atan2(0 - (t - 1)^2, 1 - t) < 0", 1, { 1, 0, 0 } },
+    { "hypot(t - 1, 0)", 1, { 0, 1, 0 } },
+    { "hypot(3*(t - 1), 4*(t - 1) + 5*(t - 1)^2)", 1, { 0, 5, 8 } },
+    { "hypot(3*(t - 1)^2, 4*(t - 1)^2)", 1, { 0, 0, 10 } },
     { "frame.phi >= 1", 1, { 1, 0, 0 } },
     { "frame.phi > 1", 1, { 0, 0, 0 } },
   };
@@ -408,6 +412,12 @@ static void test_breakpoints (void **state) {
     { "exp(-(t - 2)^-2)", 0, 0 },
     { "atan(tan(t))", 1.5707963267948966, 4.7123889803846899 },
     { "atan2(t - 1, 0)", 1, 0 },
+    /* hypot at the origin */
+    { "hypot(t - 1, 0)", 1, 0 },
+    { "hypot(0, 3 - 2*t)", 1.5, 0 },
+    { "hypot(t - 2, 4 - t^2)", 2, 0 },
+    { "hypot(t - 1, t - 2)", 0, 0 },
+    { "hypot(t - 1, frame.phi)", 0, 0 },
     { "atan2(sin(t), log(1))", 3.1415926535897931, 6.2831853071795862 },
     { "1/(2 + sin(t)) + t/3 + t^2", 0, 0 },
     { "(sin(acos(frame.phi)) < 2) + (t > 3)", 3, 0 },
@@ -425,6 +435,8 @@ static void test_breakpoints (void **state) {
     if (at[i].next > 0)
       check_close (at[i].text, next, expected[1], 8 * CHECK_EPS * next, "round-off of the comparison");
   }
+  double t = -1e-9 / (1 - 1e-9); /* the first interval, from t, ends at the kink */
+  check_close ("abs(t)", pw_expression_breakpoint (expression_of ("abs(t)"), t), 0, 1e-24, "exact");
 }
 
 /* Numbers that ought to be equal differ by round-off again and again: no breakpoints, and none of the others is

@@ -122,6 +122,21 @@ static void test_too_large (void **state) {
   table_bad ("{file: large.csv}", "large.csv:3: column 1: \"1e305\" is too large in SI units");
 }
 
+/* Cells are not cut: neither a number before its exponent nor a name before its unit. */
+static void test_long_cells (void **state) {
+  char csv[3000];
+  (void)state;
+  snprintf (csv, sizeof csv, "t,%0150d [N mm]\n0,1.%0150de3\n0.5,-2e3\n2,300\n", 0, 0);
+  csv[2] = 'M'; /* a name */
+  table_good (csv, "{file: data.csv}");
+  snprintf (csv, sizeof csv, "0,1\n0.5,-2\n2,3.%01500de-1\n", 0);
+  table_write ("model/data.csv", csv, strlen (csv));
+  table_bad ("{file: data.csv}", "data.csv:3: column 2: expected a finite number, found \"3.000");
+  snprintf (csv, sizeof csv, "t,M%01500d [N mm]\n0,1\n0.5,-2\n2,3\n", 0);
+  table_write ("model/data.csv", csv, strlen (csv));
+  table_bad ("{file: data.csv}", "data.csv:1: the name of column 2 is too long");
+}
+
 /* The unit a signal has: of a drive, that of what it drives. */
 static void table_unit (const char *element, const char *header, double expected, const char *text) {
   char yaml[500], csv[100];
@@ -283,9 +298,12 @@ static void test_limits (void **state) {
   FILE *f = fopen (table_in ("model/long.csv"), "w");
   assert_non_null (f);
   for (int i = 0; i < 1000001; i++) fputs ("1\n", f);
-  assert_int_equal (fclose (f), 0);
+  assert_int_equal (fflush (f), 0);
   snprintf (message, sizeof message, "long.csv:1: more than %d lines", 1000000);
   table_bad ("{file: long.csv}", message);
+  assert_int_equal (ftruncate (fileno (f), 2000000), 0);
+  assert_int_equal (fclose (f), 0);
+  table_bad ("{file: long.csv}", "long.csv:1: there is no column 2: the line has 1 cell");
 }
 
 /* A page has a table once, although two signals read it, and takes no definition for a table. */
@@ -333,16 +351,11 @@ static int table_teardown (void **state) {
 }
 
 int main (void) {
-  const struct CMUnitTest tests[] = { cmocka_unit_test (test_forms),
-                                      cmocka_unit_test (test_units),
-                                      cmocka_unit_test (test_bad_units),
-                                      cmocka_unit_test (test_too_large),
-                                      cmocka_unit_test (test_unit_of_signal),
-                                      cmocka_unit_test (test_unit_factors),
-                                      cmocka_unit_test (test_scale),
-                                      cmocka_unit_test (test_contents),
-                                      cmocka_unit_test (test_places),
-                                      cmocka_unit_test (test_limits),
-                                      cmocka_unit_test (test_page) };
+  const struct CMUnitTest tests[] = { cmocka_unit_test (test_forms),        cmocka_unit_test (test_units),
+                                      cmocka_unit_test (test_bad_units),    cmocka_unit_test (test_too_large),
+                                      cmocka_unit_test (test_long_cells),   cmocka_unit_test (test_unit_of_signal),
+                                      cmocka_unit_test (test_unit_factors), cmocka_unit_test (test_scale),
+                                      cmocka_unit_test (test_contents),     cmocka_unit_test (test_places),
+                                      cmocka_unit_test (test_limits),       cmocka_unit_test (test_page) };
   return cmocka_run_group_tests (tests, table_setup, table_teardown);
 }

@@ -64,6 +64,7 @@ static inline double value_of (const pw_expression_code *c, double left, double 
   case PW_OP_ATAN2:
     if (left == 0 && right <= 0) *may_jump = 1;
     return atan2 (left, right);
+  case PW_OP_HYPOT:
   case PW_OP_FUNCTION_OF_TWO:
     return pw_expression_functions[c->index].of_two (left, right);
   }
@@ -195,14 +196,25 @@ static jet jet_function (const pw_expression_code *c, const jet *x, const jet *y
 }
 
 /* Jumps where y, the first argument, changes sign at x <= 0, and where x does while y is 0.  At the origin the angle
- * just after is that of the velocity. */
+ * just after is that of the velocity or, if this is 0, of the acceleration. */
 static jet jet_atan2 (const pw_expression_code *c, const jet *y, const jet *x, double *discrete) {
   jet r = jet_function (c, y, x);
   int sign = jet_sign (y);
   *discrete = x->v <= 0 ? (sign < 0) + 2 * (sign == 0) : 0;
-  if (y->v == 0 && x->v < 0 && sign != 0) r.v = sign * PW_PI;
-  if (y->v == 0 && x->v == 0) r.v = y->d != 0 || x->d != 0 ? atan2 (y->d, x->d) : atan2 (y->dd, x->dd);
+  double b = y->v, a = x->v;
+  if (b == 0 && a == 0) b = y->d, a = x->d;
+  if (b == 0 && a == 0) b = y->dd, a = x->dd;
+  if (y->v == 0 && x->v <= 0) r.v = atan2 (sign ? copysign (b, sign) : b, a);
   return r;
+}
+
+/* Has a kink at the origin, through which signs change.  With p = (x, y) just after it |p' h + p'' h^2 / 2|, that is
+ * |p'| h + p' p'' / |p'| h^2 / 2, or |p''| h^2 / 2 if p' is 0. */
+static jet jet_hypot (const pw_expression_code *c, const jet *x, const jet *y, double *discrete) {
+  *discrete = jet_sign (x) + 3 * jet_sign (y);
+  if (x->v != 0 || y->v != 0) return jet_function (c, x, y);
+  double d = hypot (x->d, y->d);
+  return (jet){ 0, d, d > 0 ? (x->d * x->dd + y->d * y->dd) / d : hypot (x->dd, y->dd), 1 };
 }
 
 /* Not && and ||, whose operands are 1 or 0 and have no derivatives. */
@@ -227,6 +239,8 @@ static jet jet_binary (const pw_expression_code *c, const jet *x, const jet *y, 
     return jet_function (c, x, y);
   case PW_OP_ATAN2:
     return jet_atan2 (c, x, y, discrete);
+  case PW_OP_HYPOT:
+    return jet_hypot (c, x, y, discrete);
   case PW_OP_MOD:
     return jet_mod (x, y, discrete);
   }

@@ -13,13 +13,11 @@
 #include <stddef.h>
 #include "util.h"
 
-/* An error in an expression. */
 typedef struct {
   size_t at; /* offset in bytes */
   char text[240];
 } pw_expression_error;
 
-/* The time among the variables. */
 enum { PW_EXPRESSION_TIME = 0 };
 
 /* ---- Reading ---- */

@@ -36,6 +36,7 @@ typedef enum {
   PW_OP_MIN,
   PW_OP_MAX,
   PW_OP_ATAN2,
+  PW_OP_HYPOT,
   PW_OP_FUNCTION_OF_TWO, /* a smooth function of two arguments */
   PW_OP_SELECT           /* condition is 1 or 0 */
 } pw_expression_op;
@@ -53,7 +54,7 @@ static inline int pw_expression_jumps (int op) {
 /* Whether it has jumps, poles or kinks. */
 static inline int pw_expression_breaks (int op) {
   return pw_expression_jumps (op) || op == PW_OP_ABS || op == PW_OP_MIN || op == PW_OP_MAX || op == PW_OP_TAN ||
-         op == PW_OP_DIVIDE || op == PW_OP_POWER;
+         op == PW_OP_DIVIDE || op == PW_OP_POWER || op == PW_OP_HYPOT;
 }
 
 /* The order of two numbers; UNORDERED: one of them is NaN. */
@@ -110,7 +111,7 @@ size_t pw_expression_number_size (const char *p);
 /* x^y and its derivatives, with respect to x alone unless the exponent y varies. */
 double pw_expression_power (double x, double y);
 pw_partials pw_expression_power_partials (double x, double y, double f, int exponent_varies);
-/* The remainder with the sign of the divisor: an angle modulo 2 pi lies in [0, 2 pi). */
+/* The remainder with the sign of the divisor: an angle modulo 2 pi lies from 0 to 2 pi. */
 double pw_expression_mod (double x, double y);
 
 /* ---- Evaluation ---- */

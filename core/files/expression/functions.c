@@ -162,7 +162,7 @@ const pw_expression_function pw_expression_functions[] = {
   FUNCTION_WITH_BREAKPOINTS (round, PW_OP_ROUND, 1, 1),
   FUNCTION_WITH_BREAKPOINTS (sign, PW_OP_SIGN, 1, 1),
   FUNCTION_OF_TWO (atan2, PW_OP_ATAN2, atan2),
-  FUNCTION_OF_TWO (hypot, PW_OP_FUNCTION_OF_TWO, hypot),
+  FUNCTION_OF_TWO (hypot, PW_OP_HYPOT, hypot),
   FUNCTION_OF_TWO (jacobi_am, PW_OP_FUNCTION_OF_TWO, pw_jacobi_am),
   FUNCTION_OF_ONE (elliptic_K, pw_elliptic_K, PW_INCREASING, -INFINITY, 1),
   FUNCTION_WITH_BREAKPOINTS (mod, PW_OP_MOD, 2, 2),

@@ -53,7 +53,6 @@ typedef struct {
   pw_expression_code code[PW_EXPRESSION_CODES];
 } parser;
 
-/* A parsed part of the expression. */
 typedef struct {
   size_t from;   /* offset in the text */
   int first;     /* its first operation; the last one is that of the parser */
@@ -75,7 +74,6 @@ PW_PRINTF (3, 4) static parser_part parser_fail (parser *p, size_t at, const cha
   return parser_nothing;
 }
 
-/* Advances to the next token. */
 static void parser_next (parser *p) {
   const char *word = p->text + p->at + p->size;
   p->previous = p->at;
@@ -188,7 +186,6 @@ static parser_part parser_missing (parser *p) {
   return parser_fail (p, p->at, "this does not belong here");
 }
 
-/* Reports an unknown name. */
 static parser_part parser_unknown (parser *p, const char *name) {
   pw_nearest near = { .sought = name };
   for (const char *const *v = p->variable; v && *v; v++) pw_nearest_try (&near, *v);
@@ -199,7 +196,6 @@ static parser_part parser_unknown (parser *p, const char *name) {
   return parser_fail (p, p->at, "there is no \"%s\"%s", name, pw_nearest_text (&near));
 }
 
-/* Whether the next token is an opening parenthesis. */
 static int parser_is_call (const parser *p) {
   const char *after = p->text + p->at + p->size;
   return after[strspn (after, " \t\r\n")] == '(';

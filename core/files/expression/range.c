@@ -6,9 +6,7 @@
 #include "pinwheel.h"
 
 static const pw_range range_nan = { .lo = INFINITY, .hi = -INFINITY, .nan = 1 };
-
 static const pw_range range_all = { .lo = -INFINITY, .hi = INFINITY, .nan = 1 };
-
 static const pw_range range_pole = { .lo = -INFINITY, .hi = INFINITY, .breaks = 1 };
 
 static pw_range range_between (double lo, double hi) {
@@ -79,7 +77,7 @@ static pw_range range_divide (const pw_range *x, const pw_range *y) {
 static pw_range range_abs (const pw_range *x) {
   if (x->lo >= 0) return range_rounded (x->lo, x->hi);
   pw_range r = x->hi <= 0 ? range_rounded (-x->hi, -x->lo) : range_rounded (0, fmax (-x->lo, x->hi));
-  r.breaks = x->hi > 0;
+  r.breaks = x->hi >= 0;
   return r;
 }
 
@@ -155,12 +153,18 @@ static pw_range range_atan2 (const pw_range *y, const pw_range *x) {
   return range_corners (atan2, y, x);
 }
 
-/* hypot, or jacobi_am (x, y), which is monotonic in each argument, and NaN for y > 1. */
-static pw_range range_two_arguments (const pw_expression_function *f, const pw_range *x, const pw_range *y) {
-  const pw_range a = range_abs (x), b = range_abs (y), in_domain = range_between (y->lo, fmin (y->hi, 1));
-  if (f->of_two == hypot) return range_rounded (hypot (fmax (0, a.lo), fmax (0, b.lo)), hypot (a.hi, b.hi));
-  if (y->lo > 1) return range_nan;
-  pw_range r = range_corners (f->of_two, x, &in_domain);
+/* Has a kink at the origin. */
+static pw_range range_hypot (const pw_range *x, const pw_range *y) {
+  const pw_range a = range_abs (x), b = range_abs (y);
+  pw_range r = range_rounded (hypot (fmax (0, a.lo), fmax (0, b.lo)), hypot (a.hi, b.hi));
+  r.breaks = range_contains (x, 0) && range_contains (y, 0);
+  return r;
+}
+
+/* jacobi_am (x, y) is monotonic in each argument, and NaN for y > 1. */
+static pw_range range_jacobi_am (const pw_range *x, const pw_range *y) {
+  const pw_range in_domain = range_between (y->lo, fmin (y->hi, 1));
+  pw_range r = y->lo > 1 ? range_nan : range_corners (pw_jacobi_am, x, &in_domain);
   r.nan |= y->hi > 1;
   return r;
 }
@@ -211,7 +215,6 @@ static pw_range range_compare (int op, const pw_range *x, const pw_range *y) {
   return nan && value != pw_expression_compare (op, PW_ORDER_UNORDERED) ? either : range_constant (value);
 }
 
-/* All values of both. */
 static pw_range range_hull (const pw_range *x, const pw_range *y) {
   return (pw_range){ .lo = fmin (x->lo, y->lo),
                      .hi = fmax (x->hi, y->hi),
@@ -300,8 +303,10 @@ static pw_range range_operation (const pw_expression_code *c, const pw_range *x)
     return range_mod (x, y);
   case PW_OP_ATAN2:
     return range_atan2 (x, y);
+  case PW_OP_HYPOT:
+    return range_hypot (x, y);
   case PW_OP_FUNCTION_OF_TWO:
-    return range_two_arguments (&pw_expression_functions[c->index], x, y);
+    return range_jacobi_am (x, y);
   default:
     return range_compare (c->op, x, y);
   }

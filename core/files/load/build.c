@@ -11,7 +11,6 @@
 
 extern char **environ;
 
-/* How a file is compiled. */
 typedef struct {
   const char *compiler;       /* one or more words ("ccache gcc") */
   const char *const *options; /* ends with NULL, as does `last` */
@@ -54,7 +53,7 @@ static int build_spawn (const build_command *command, char *const *word, pid_t *
 static int build_run (const build_command *command, char *const *word, const char *source, pw_error *error) {
   pid_t child;
   int outcome = 0, code = build_spawn (command, word, &child);
-  while (code == 0 && waitpid (child, &outcome, 0) < 0)
+  while (code == 0 && waitpid (child, &outcome, 0) < 0 && errno != ECHILD) /* if SIGCHLD is ignored, the object tells */
     if (errno != EINTR) code = errno;
   int status = WIFEXITED (outcome) ? WEXITSTATUS (outcome) : -1;
   if (code != 0 && code != ENOENT && code != EACCES)
@@ -80,7 +79,6 @@ static void build_add (char **word, int *count, const char *const *more) {
   for (; *more; more++) memcpy (&word[(*count)++], more, sizeof *more);
 }
 
-/* Compiles a source to an object. */
 static int build_object (const build_command *command, const char *source, const char *object, pw_error *error) {
   char *header, *include = NULL, *compiler = strdup (command->compiler), *rest = NULL;
   char *word[BUILD_COMPILER + BUILD_OPTIONS] = { NULL };
@@ -93,12 +91,13 @@ static int build_object (const build_command *command, const char *source, const
                       source);
   if (status == PW_OK && (include == NULL || compiler == NULL)) status = pw_fail (error, PW_RESOURCE, "out of memory");
   if (status == PW_OK) {
-    for (char *w = strtok_r (compiler, " \t", &rest); w && words < BUILD_COMPILER; w = strtok_r (NULL, " \t", &rest))
-      word[words++] = w;
+    char *w = strtok_r (compiler, " \t", &rest);
+    for (; w && words < BUILD_COMPILER; w = strtok_r (NULL, " \t", &rest)) word[words++] = w;
     build_add (word, &words, command->options);
     build_add (word, &words, (const char *const[]){ "-I", include, "-o", object, source, NULL });
     build_add (word, &words, command->last);
-    status = build_run (command, word, source, error);
+    status = w ? pw_fail (error, PW_INPUT, "the C compiler's command in CC has more than %d words", BUILD_COMPILER)
+               : build_run (command, word, source, error);
   }
   free (compiler);
   free (include);

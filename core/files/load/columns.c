@@ -10,9 +10,8 @@
 #include <string.h>
 #include "files.h"
 
-enum { COLUMNS_MAX_BYTES = 64 << 20, COLUMNS_MAX_LINES = 1000000 };
+enum { COLUMNS_MAX_BYTES = 64 << 20, COLUMNS_MAX_LINES = 1000000, COLUMNS_CELL = 1000 };
 
-/* A column to read. */
 typedef struct {
   int index;     /* of its cell in each line, from 0 */
   double factor; /* to SI units */
@@ -110,7 +109,7 @@ static int columns_are_names (const columns *c, const char *line) {
 
 /* Finds a column from its number, or its name, with or without unit, if the first line names the columns (named: 1). */
 static int columns_find (const columns *c, const char *first, int named, const char *name, int *index) {
-  char cell[100], unit[100], *end;
+  char cell[COLUMNS_CELL], unit[100], *end;
   pw_nearest near = { .sought = name };
   long number = strtol (name, &end, 10);
   if (*end == 0 && number >= 1 && number <= c->cells) return *index = (int)number - 1, PW_OK;
@@ -132,13 +131,13 @@ static int columns_find (const columns *c, const char *first, int named, const c
   return columns_fail (c, "there is no column \"%.60s\"%s", name, pw_nearest_text (&near));
 }
 
-/* Finds a column and its conversion factor. */
 static int columns_open (const columns *c, const char *first, int named, const char *name, const char *unit,
                          columns_source *source) {
-  char cell[100], reason[260];
+  char cell[COLUMNS_CELL], reason[260];
   source->factor = 1;
   if (columns_find (c, first, named, name, &source->index) != PW_OK) return PW_INPUT;
   columns_cell (c, first, source->index, cell, sizeof cell);
+  if (strlen (cell) == sizeof cell - 1) return columns_fail (c, "the name of column %d is too long", source->index + 1);
   if (!named || pw_unit_check (cell, unit, &source->factor, reason, sizeof reason) == PW_OK) return PW_OK;
   return columns_fail (c, "%s", reason);
 }
@@ -147,9 +146,9 @@ static int columns_open (const columns *c, const char *first, int named, const c
 
 /* A number in SI units; with gaps allowed, NaN for an empty cell or nan. */
 static int columns_number (const columns *c, const char *line, columns_source source, pw_gaps gaps, double *value) {
-  char cell[100];
+  char cell[COLUMNS_CELL];
   columns_cell (c, line, source.index, cell, sizeof cell);
-  int number = pw_read_number (cell, value) == PW_OK;
+  int number = strlen (cell) < sizeof cell - 1 && pw_read_number (cell, value) == PW_OK; /* not cut */
   if (gaps == PW_GAPS_ALLOWED && (*cell == 0 || (number && isnan (*value)))) return *value = NAN, PW_OK;
   if (!number || !isfinite (*value))
     return columns_fail (c, "column %d: expected a finite number, found \"%.40s\"", source.index + 1, cell);
@@ -176,7 +175,7 @@ static int columns_rows (columns *c, char *line, double *value, size_t room, int
 /* Stores the columns in *value, one after the other, for the caller to release in every case. */
 static int columns_all (columns *c, const char *const *column, const char *const *unit, double **value, int *rows) {
   size_t lines = 1;
-  for (const char *p = c->rest; (p = strchr (p, '\n')) != NULL; p++) lines++;
+  for (const char *p = c->rest; (p = strchr (p, '\n')) != NULL && p[1]; p++) lines++;
   char *line = columns_line (c);
   if (line == NULL) return columns_fail (c, "the file is empty");
   if (lines > COLUMNS_MAX_LINES) return columns_fail (c, "more than %d lines", COLUMNS_MAX_LINES);

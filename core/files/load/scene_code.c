@@ -46,7 +46,6 @@ static int code_find_program (const char *word, struct stat *info) {
   return 0;
 }
 
-/* Adds a line to the identity. */
 static void code_add (code_job *x, const char *text) {
   size_t used = strlen (x->identity);
   snprintf (x->identity + used, sizeof x->identity - used, "%s\n", text);

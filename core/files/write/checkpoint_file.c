@@ -17,7 +17,6 @@ int pw_checkpoint_put (pw_output *o, const char *head, const pw_archive *state, 
   int status = pw_output_text (o, head, strlen (head), error);
   if (status == PW_OK) status = pw_output_text (o, line, strlen (line), error);
   if (status == PW_OK) status = pw_output_text (o, (const char *)state->at, state->used, error);
-  if (status == PW_OK) status = pw_output_ready (o, error);
   if (status == PW_OK) return pw_output_finish (o, error);
   pw_output_discard (o);
   return status;
@@ -30,7 +29,6 @@ int pw_checkpoint_write (const char *path, const char *head, const pw_archive *s
 
 /* ---- Reading ---- */
 
-/* Checks the first line. */
 static int checkpoint_version (const char *path, const char *text, pw_error *error) {
   static const char magic[] = PW_CHECKPOINT_MAGIC;
   size_t word = strcspn (magic, "0123456789");

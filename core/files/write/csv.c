@@ -121,7 +121,6 @@ static void csv_ledger (pw_csv *c, const pw_sample *x) {
   csv_cell (c, "balance", "J", x->balance);
 }
 
-/* A line of names, or of the values of a sample. */
 static int csv_line (pw_csv *c, csv_content content, const pw_sample *x, pw_error *error) {
   errno = 0; /* for pw_output_check */
   c->content = content;

@@ -32,17 +32,17 @@ static void json_string (FILE *f, const char *text) {
   fputc ('"', f);
 }
 
-static void json_item (pw_json *j, const char *key) {
+/* 0 without a writer, which writes nothing. */
+static int json_item (pw_json *j, const char *key) {
+  if (j == NULL) return 0;
   if (j->items++ > 0) fputc (',', j->f);
   if (j->depth > 0) json_separator (j, j->depth, j->items > 1 ? " " : "");
-  if (key == NULL) return;
-  json_string (j->f, key);
-  fputs (": ", j->f);
+  if (key) json_string (j->f, key), fputs (": ", j->f);
+  return 1;
 }
 
 void pw_json_open (pw_json *j, const char *key, char bracket) {
-  if (j == NULL) return;
-  json_item (j, key);
+  if (!json_item (j, key)) return;
   fputc (bracket, j->f);
   j->depth++;
   j->items = 0;
@@ -57,22 +57,17 @@ void pw_json_close (pw_json *j, char bracket) {
 }
 
 void pw_json_text (pw_json *j, const char *key, const char *text) {
-  if (j == NULL) return;
-  json_item (j, key);
-  text ? json_string (j->f, text) : (void)fputs ("null", j->f);
+  if (json_item (j, key)) text ? json_string (j->f, text) : (void)fputs ("null", j->f);
 }
 
 void pw_json_number (pw_json *j, const char *key, double value) {
   char text[32];
-  if (j == NULL) return;
-  json_item (j, key);
+  if (!json_item (j, key)) return;
   fputs (isfinite (value) ? pw_format (text, value, j->digits ? j->digits : 17) : "null", j->f);
 }
 
 void pw_json_flag (pw_json *j, const char *key, int value) {
-  if (j == NULL) return;
-  json_item (j, key);
-  fputs (value ? "true" : "false", j->f);
+  if (json_item (j, key)) fputs (value ? "true" : "false", j->f);
 }
 
 /* ---- The final state ---- */

@@ -41,11 +41,11 @@ static void npz_number (pw_npz *z, unsigned long value, int bytes) {
   for (; bytes > 0; bytes--, value >>= 8) npz_bytes (z, &(unsigned char){ (unsigned char)value }, 1);
 }
 
-/* What the header of a file and its entry in the directory have in common: version 2.0, no flags, stored, 1 January
- * 1980, checksum, compressed and original size, lengths of the name and of extra fields. */
+/* What the header of a file and its entry in the directory have in common: version 2.0, names in UTF-8, stored, 1
+ * January 1980, checksum, compressed and original size, lengths of the name and of extra fields. */
 static void npz_describe (pw_npz *z, const struct pw_npz_entry *e) {
   npz_number (z, NPZ_VERSION, 2);
-  npz_number (z, 0, 4); /* flags, method */
+  npz_number (z, 0x0800, 4); /* flags, method */
   npz_number (z, 0x00210000, 4);
   npz_number (z, e->check, 4);
   npz_number (z, e->size, 4);
@@ -54,16 +54,12 @@ static void npz_describe (pw_npz *z, const struct pw_npz_entry *e) {
   npz_number (z, 0, 2);
 }
 
-static struct pw_npz_entry *npz_entry (pw_npz *z) {
-  z->failed |= pw_grow (&z->entry, (size_t)z->count, &z->room, sizeof *z->entry) != PW_OK;
-  return z->failed ? NULL : z->entry + z->count++;
-}
-
 void pw_npz_add (pw_npz *z, const char *name, long rows, long columns, int parts, const double *value) {
   char head[NPZ_HEAD + 1] = "\x93NUMPY\x01", shape[60];
   size_t size = (size_t)rows * (size_t)(columns ? columns : 1) * (size_t)parts * sizeof *value;
-  struct pw_npz_entry *e = npz_entry (z);
-  if (e == NULL) return;
+  z->failed |= pw_grow (&z->entry, (size_t)z->count, &z->room, sizeof *z->entry) != PW_OK;
+  if (z->failed) return;
+  struct pw_npz_entry *e = z->entry + z->count++;
   snprintf (shape, sizeof shape, columns ? "%ld, %ld" : "%ld,", rows, columns);
   head[8] = NPZ_HEAD - 10;
   sprintf (head + 10, "{'descr': '%c%s', 'fortran_order': False, 'shape': (%s), }",

@@ -15,6 +15,7 @@ struct pw_output {
   char *path;    /* as the user knows it */
   char *real;    /* of the file itself, links followed */
   char *part;    /* its temporary name; NULL: written directly */
+  char *old;     /* name of its predecessor while several files are renamed */
   int file;      /* keeps the temporary file locked; -1: written directly */
   int folder;    /* that contains it; -1: written directly */
   int code;      /* errno of the first failed write */
@@ -77,16 +78,15 @@ static int output_open_direct (pw_output *o, const pw_location *p) {
   return output_stream_of (o, file, "w");
 }
 
-/* Gives the new file owner and group of the old one, if permitted, and its mode, else without set-user-ID bits. */
+/* Gives the new file owner and group of the old one, or the group alone, as permitted, and its mode; without the owner
+ * no set-user-ID bit, without the group no set-group-ID bit either. */
 static int output_inherit (int file, const struct stat *old) {
   struct stat now;
-  mode_t mode = old->st_mode & 07777;
   if (fstat (file, &now) != 0) return errno;
-  if ((now.st_uid != old->st_uid || now.st_gid != old->st_gid) && fchown (file, old->st_uid, old->st_gid) != 0 &&
-      fchown (file, (uid_t)-1, old->st_gid) != 0)
-    mode &= 0777;
-  if ((now.st_mode & 07777) != mode && fchmod (file, mode) != 0) return errno;
-  return 0;
+  int owner = (now.st_uid == old->st_uid && now.st_gid == old->st_gid) || fchown (file, old->st_uid, old->st_gid) == 0;
+  int group = owner || fchown (file, (uid_t)-1, old->st_gid) == 0;
+  mode_t mode = old->st_mode & (owner ? 07777 : group ? 03777 : 0777);
+  return (now.st_mode & 07777) != mode && fchmod (file, mode) != 0 ? errno : 0;
 }
 
 /* The stream has a separate descriptor, so that the lock outlives it. */
@@ -94,7 +94,6 @@ static int output_stream (pw_output *o) {
   return output_stream_of (o, fcntl (o->file, F_DUPFD_CLOEXEC, 3), "r+");
 }
 
-/* Opens the folder and locks the temporary file. */
 static int output_open_part (pw_output *o, pw_lock_mode lock_mode) {
   char *folder = pw_folder_of (o->real);
   if (folder == NULL) return ENOMEM;
@@ -124,15 +123,15 @@ char *pw_output_path (const char *path, pw_error *error) {
   return NULL;
 }
 
-/* Finds the location `p`, and o->part unless the file is written directly. */
+/* Finds the location `p`, and o->part and o->old, in one allocation, unless the file is written directly. */
 static int output_name (pw_output *o, pw_location *p, const char *ending) {
   int direct, code = output_locate (o->path, p, &direct);
   o->real = p->path;
   if (code || direct) return code;
   size_t size = strlen (o->real) + strlen (ending) + 1;
-  o->part = malloc (size);
-  if (o->part == NULL) return ENOMEM;
+  if ((o->part = malloc (2 * size + strlen (".old"))) == NULL) return ENOMEM;
   snprintf (o->part, size, "%s%s", o->real, ending);
+  o->old = strcat (strcpy (o->part + size, o->part), ".old");
   return 0;
 }
 
@@ -249,16 +248,22 @@ static int output_sync_folder (const pw_output *o, pw_error *error) {
                   strerror (errno));
 }
 
-/* Renames all files or none. */
+/* Renames all files or none.  Until the last one has its name, predecessors keep a second one, a hard link. */
 static int output_rename_all (pw_output *const *o, int count, pw_error *error) {
-  for (int i = 0; i < count; i++) {
-    if (o[i] == NULL || o[i]->part == NULL || rename (o[i]->part, o[i]->real) == 0) continue;
-    int status = output_fail_with_part (o[i], errno, error);
-    while (i-- > 0)
-      if (o[i] && o[i]->part) (void)rename (o[i]->real, o[i]->part);
-    return status;
+  int last = count - 1, renamed = 0, status = PW_OK;
+  while (last > 0 && (o[last] == NULL || o[last]->part == NULL)) last--;
+  for (int i = 0; i <= last && status == PW_OK; i++) {
+    if (o[i] == NULL || o[i]->part == NULL) continue;
+    if (i < last) unlink (o[i]->old), (void)!link (o[i]->real, o[i]->old);
+    if (rename (o[i]->part, o[i]->real) != 0) status = output_fail_with_part (o[i], errno, error);
+    renamed = i;
   }
-  return PW_OK;
+  for (int i = 0; i < last; i++) {
+    if (o[i] == NULL || o[i]->part == NULL) continue;
+    if (status != PW_OK && i < renamed) (void)rename (o[i]->real, o[i]->part), (void)rename (o[i]->old, o[i]->real);
+    unlink (o[i]->old);
+  }
+  return status;
 }
 
 int pw_output_finish_all (pw_output *const *o, int count, pw_error *error) {

@@ -75,7 +75,6 @@ static int build_body_name (const pw_reader *r, const pw_node *node, const char 
   return pw_yaml_fail (r, node->at, "%s: there is no body \"%.60s\"%s", label, *name, pw_nearest_text (&near));
 }
 
-/* Reads one value of a field to `at`. */
 static int build_value (pw_reader *r, const pw_kind *kind, const pw_field *f, const pw_node *node, const char *label,
                         void *at) {
   switch (f->type) {

@@ -17,7 +17,6 @@ typedef struct {
   pw_signal_text text;
 } time_function;
 
-/* The expression being read. */
 typedef struct {
   pw_reader *r;
   const pw_node *node;
@@ -125,6 +124,8 @@ static int time_eval (void *context, double t, const double *state, double value
     value[0] = pw_expression_value (f->expression[0], variable);
   for (int i = 0; gradient && i < f->states; i++) {
     pw_expression_derivatives (f->expression[0], variable, 1 + i, derivatives);
+    if (derivatives[0] != value[0]) /* that before a jump in time */
+      variable[0] = nextafter (t, INFINITY), pw_expression_derivatives (f->expression[0], variable, 1 + i, derivatives);
     /* |v| has no derivative at rest; only Newton's iteration uses it. */
     gradient[i] = isfinite (derivatives[1]) ? derivatives[1] : 0;
   }
@@ -178,7 +179,6 @@ static int time_add_state (const reading *e, const char *name, size_t at) {
   return f->name[++f->states] ? PW_OK : pw_yaml_no_memory (e->r);
 }
 
-/* Reads expression i of the signal. */
 static int time_expression (reading *e, int i) {
   pw_reader *r = e->r;
   time_function *f = e->f;
@@ -199,20 +199,21 @@ static int time_expression (reading *e, int i) {
   return jump ? PW_OK : pw_yaml_no_memory (r);
 }
 
-/* Compares given derivative i, 1 or 2, with that of expression i - 1 at some times, to 1e-6 of the largest ones. */
+/* Compares given derivative i, 1 or 2, with that of what is given before it, at some times to 1e-6 of the largest. */
 static int time_check (const reading *e, int i, const char *name) {
   static const double time[] = { 0.3, 1.7, 4.1 }; /* [s], arbitrary */
+  int last = e->f->expression[i - 1] ? i - 1 : 0, n = i - last;
   double given[3], exact[3][3], size = 0;
   for (int k = 0; k < 3; k++) {
     given[k] = pw_expression_value (e->f->expression[i], &time[k]);
-    pw_expression_derivatives (e->f->expression[i - 1], &time[k], PW_EXPRESSION_TIME, exact[k]);
-    if (isfinite (given[k]) && isfinite (exact[k][1]))
-      size = fmax (size, fabs (given[k]) + fabs (exact[k][1]) + 1e-6 * fabs (exact[k][0]));
+    pw_expression_derivatives (e->f->expression[last], &time[k], PW_EXPRESSION_TIME, exact[k]);
+    if (isfinite (given[k]) && isfinite (exact[k][n]))
+      size = fmax (size, fabs (given[k]) + fabs (exact[k][n]) + 1e-6 * fabs (exact[k][0]));
   }
   for (int k = 0; k < 3; k++)
-    if (isfinite (given[k]) && isfinite (exact[k][1]) && fabs (given[k] - exact[k][1]) > 1e-6 * size)
+    if (isfinite (given[k]) && isfinite (exact[k][n]) && fabs (given[k] - exact[k][n]) > 1e-6 * size)
       return pw_yaml_fail (e->r, e->node->at, "%s: the %s at t = %g s is %.6g, but the derivative is %.6g", e->label,
-                           name, time[k], given[k], exact[k][1]);
+                           name, time[k], given[k], exact[k][n]);
   return PW_OK;
 }
 
@@ -247,14 +248,12 @@ static int time_continuous (const reading *e) {
   return PW_OK;
 }
 
-/* Reads the value and the given derivatives. */
 static int time_all (reading *e, const pw_node *const node[3]) {
   static const char *const key[] = { "expression", "rate", "acceleration" };
   for (int i = 0; i < 3; i++) {
     if ((e->node = node[i]) == NULL) continue;
     if (time_expression (e, i) != PW_OK) return e->r->error->status;
-    if (i > 0 && e->f->expression[i - 1] && !e->f->states && time_check (e, i, key[i]) != PW_OK)
-      return e->r->error->status;
+    if (i > 0 && !e->f->states && time_check (e, i, key[i]) != PW_OK) return e->r->error->status;
   }
   e->node = node[0];
   return e->f->derivatives ? time_continuous (e) : PW_OK;

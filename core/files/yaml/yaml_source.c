@@ -83,7 +83,7 @@ static int source_check (const pw_reader *r) {
     if (n == 0) return pw_yaml_fail (r, at, "byte %02X is not UTF-8; a model file is text in UTF-8", (unsigned char)*p);
     if ((*p == 0 || pw_control (p)) && !(*p == '\r' && p[1] == '\n'))
       return pw_yaml_fail (r, at, "a control character, code %d, does not belong in a model file", pw_control (p));
-    if (*p == '%' && (at == 0 || p[-1] == '\n'))
+    if (*p == '%' && (at == 0 || p[-1] == '\n' || (at == 3 && p[-1] == '\xBF')))
       return pw_yaml_fail (r, at, "a line of a model file must not begin with %%");
     p += n;
   }
