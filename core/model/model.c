@@ -102,6 +102,7 @@ static const char *model_copy_text (pw_model *m, const char *text) {
 }
 
 int pw_add_body (pw_model *m, const pw_body *body) {
+  if (m == NULL) return PW_INPUT;
   if (body == NULL) return pw_model_refuse (m, "pw_add_body without a body");
   if (m->error.status != PW_OK || model_grow (m, &m->body, m->bodies, &m->body_room, sizeof *m->body) != PW_OK)
     return m->error.status;
@@ -138,6 +139,7 @@ static int model_check_kind (pw_model *m, const pw_kind *kind) {
 }
 
 int pw_add (pw_model *m, const pw_kind *kind, const void *definition) {
+  if (m == NULL) return PW_INPUT;
   if (m->error.status != PW_OK || model_check_kind (m, kind) != PW_OK ||
       model_grow (m, &m->element, m->elements, &m->element_room, sizeof *m->element) != PW_OK)
     return m->error.status;
@@ -255,6 +257,7 @@ int pw_system_has_reference (const pw_model *m) {
 }
 
 int pw_system_reference (const pw_model *m, const pw_system *s, double t, double *q, double *v, pw_error *error) {
+  if (pw_require (m, "a model", error) != PW_OK || pw_require (s, "a system", error) != PW_OK) return PW_INPUT;
   int n = pw_system_coordinates (s);
   for (int j = 0; j < n; j++) q[j] = v[j] = NAN;
   if (m->table->reference) m->table->reference (m->parameters, t, q, v);

@@ -7,6 +7,7 @@
 #include <string.h>
 #include "check.h"
 #include "pinwheel-files.h"
+#include "pinwheel-selftest.h"
 #include "scene.h"
 #include "system.h"
 #include "toys.h"
@@ -136,8 +137,31 @@ static void test_missing (void **state) {
   assert_int_equal (pw_model_set_initial (NULL, "cart.x", 1, &e[3]), PW_INPUT);
   assert_null (pw_system_compile (NULL, &e[4]));
   for (int i = 0; i < 5; i++) check_error (&e[i], PW_INPUT, "a model is missing");
+  assert_int_equal (pw_add_body (NULL, &(pw_body){ .name = "cart" }), PW_INPUT);
+  assert_int_equal (pw_add_wheel (NULL, &(pw_wheel){ .name = "W", .body = "cart" }), PW_INPUT);
   assert_null (pw_file_model (NULL, &e[5]));
   check_error (&e[5], PW_INPUT, "a model file is missing");
+}
+
+static void test_missing_system (void **state) {
+  (void)state;
+  pw_error e[6] = { { 0 } };
+  double q[3] = { 0 };
+  pw_equations equations;
+  pw_selftest_report report = { 0 };
+  pw_model *m = scene_model (&description_table, NULL);
+  assert_int_equal (pw_system_find_state (NULL, "cart.x", &e[0]), PW_INPUT);
+  assert_int_equal (pw_system_find_reaction (NULL, "W.N", &e[1]), PW_INPUT);
+  assert_int_equal (pw_system_find_signal (NULL, "motor", &e[2]), PW_INPUT);
+  assert_int_equal (pw_system_equations (NULL, 0, q, q, &equations, &e[3]), PW_INPUT);
+  assert_int_equal (pw_system_reference (m, NULL, 0, q, q, &e[4]), PW_INPUT);
+  assert_int_equal (pw_selftest_scene (NULL, 1, &pw_kind_wheel, 0, q, q, 1, &report, &e[5]), PW_INPUT);
+  for (int i = 0; i < 6; i++) check_error (&e[i], PW_INPUT, "a system is missing");
+  e[0] = (pw_error){ 0 };
+  assert_null (pw_workspace_new (NULL, &e[0]));
+  check_error (&e[0], PW_INPUT, "a system is missing");
+  pw_equations_free (&equations);
+  pw_model_free (m);
 }
 
 static void description_add_nothing (pw_model *m, const void *parameters) {
@@ -325,14 +349,15 @@ static void test_find_reaction (void **state) {
 
 int main (void) {
   const struct CMUnitTest tests[] = {
-    cmocka_unit_test (test_parameters),     cmocka_unit_test (test_bad_parameters),
-    cmocka_unit_test (test_no_parameters),  cmocka_unit_test (test_refused),
-    cmocka_unit_test (test_bad_tables),     cmocka_unit_test (test_order_of_calls),
-    cmocka_unit_test (test_bad_set_signal), cmocka_unit_test (test_start),
-    cmocka_unit_test (test_bad_start),      cmocka_unit_test (test_query),
-    cmocka_unit_test (test_bad_query),      cmocka_unit_test (test_own_coordinates),
-    cmocka_unit_test (test_find_reaction),  cmocka_unit_test (test_copies),
-    cmocka_unit_test (test_missing),        cmocka_unit_test (test_missing_definitions),
+    cmocka_unit_test (test_parameters),          cmocka_unit_test (test_bad_parameters),
+    cmocka_unit_test (test_no_parameters),       cmocka_unit_test (test_refused),
+    cmocka_unit_test (test_bad_tables),          cmocka_unit_test (test_order_of_calls),
+    cmocka_unit_test (test_bad_set_signal),      cmocka_unit_test (test_start),
+    cmocka_unit_test (test_bad_start),           cmocka_unit_test (test_query),
+    cmocka_unit_test (test_bad_query),           cmocka_unit_test (test_own_coordinates),
+    cmocka_unit_test (test_find_reaction),       cmocka_unit_test (test_copies),
+    cmocka_unit_test (test_missing_system),      cmocka_unit_test (test_missing),
+    cmocka_unit_test (test_missing_definitions),
   };
   return cmocka_run_group_tests (tests, NULL, NULL);
 }
