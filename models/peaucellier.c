@@ -34,13 +34,12 @@ static void add_pin (pw_model *m, const char *name, const char *one, double x1, 
 }
 
 /* The joints: A, O on the ground, B on the crank, C and D on the arms, P on the line; and the bars between them. */
-enum { A, O, B, C, D, P, JOINTS };
+enum { A, O, B, C, D, P, JOINTS, BARS = 7 };
 static const struct {
   const char *name;
   int from, to;
-} bars[] = { { "crank", A, B }, { "OC", O, C }, { "OD", O, D }, { "BC", B, C },
-             { "BD", B, D },    { "PC", P, C }, { "PD", P, D } };
-enum { BARS = sizeof bars / sizeof *bars };
+} bars[BARS] = { { "crank", A, B }, { "OC", O, C }, { "OD", O, D }, { "BC", B, C },
+                 { "BD", B, D },    { "PC", P, C }, { "PD", P, D } };
 
 /* At a crank angle. */
 typedef struct {
@@ -89,7 +88,6 @@ static void build (pw_model *m, const void *parameter) {
                                 .value = { PW_HARMONIC, .harmonic = { .amplitude = p->swing, .omega = p->omega } } });
 }
 
-/* The angle of a bar. */
 static double bar_angle (const joints *j, int i) {
   const double *from = j->at[bars[i].from], *to = j->at[bars[i].to];
   return atan2 (to[1] - from[1], to[0] - from[0]);

@@ -102,8 +102,7 @@ static const char *model_copy_text (pw_model *m, const char *text) {
 }
 
 int pw_add_body (pw_model *m, const pw_body *body) {
-  if (m == NULL) return PW_INPUT;
-  if (body == NULL) return pw_model_refuse (m, "pw_add_body without a body");
+  if (m == NULL || body == NULL) return m ? pw_model_refuse (m, "pw_add_body without a body") : PW_INPUT;
   if (m->error.status != PW_OK || model_grow (m, &m->body, m->bodies, &m->body_room, sizeof *m->body) != PW_OK)
     return m->error.status;
   pw_body *b = &m->body[m->bodies++];

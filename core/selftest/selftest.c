@@ -293,8 +293,6 @@ static void selftest_power (pw_probe *probe) {
   }
 }
 
-/* ---- */
-
 /* Bodies near the corners of a square, everything else at random. */
 static void selftest_randomise (pw_probe *probe, pw_random *r) {
   static const double corner[PW_SCENE_BODIES][2] = { { 2, 2 }, { -2, 2 }, { -2, -2 }, { 2, -2 } };

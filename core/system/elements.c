@@ -147,9 +147,8 @@ static int elements_evaluate (pw_workspace *w, double t, const double *q, const 
 int pw_system_equations (const pw_system *s, double t, const double *q, const double *v, pw_equations *out,
                          pw_error *error) {
   *out = (pw_equations){ .rows = 0 };
-  if (pw_require (s, "a system", error) != PW_OK) return PW_INPUT;
   pw_workspace *w = pw_workspace_new (s, error);
-  int status = w ? elements_allocate (w, out, error) : PW_RESOURCE;
+  int status = w ? elements_allocate (w, out, error) : s ? PW_RESOURCE : PW_INPUT;
   if (status == PW_OK) status = elements_evaluate (w, t, q, v, out, error);
   pw_workspace_free (w);
   return status;
