@@ -111,20 +111,27 @@ int pw_add_body (pw_model *m, const pw_body *body) {
   return m->error.status;
 }
 
-static const double *model_copy_numbers (pw_model *m, const double *from, int count) {
-  double *copy = pw_arena_alloc (&m->arena, (size_t)count * sizeof *copy);
-  if (copy == NULL) {
-    model_no_memory (m);
-    return NULL;
-  }
-  return memcpy (copy, from, (size_t)count * sizeof *copy);
+static void *model_copy (pw_model *m, const void *from, size_t bytes) {
+  void *copy = pw_arena_alloc (&m->arena, bytes);
+  if (copy) return memcpy (copy, from, bytes);
+  model_no_memory (m);
+  return NULL;
 }
 
-/* Copies the points of a table; pw_system_compile reports invalid ones. */
-static void model_copy_table (pw_model *m, pw_signal *s) {
-  if (s == NULL || s->type != PW_TABLE || s->table.count < 1 || s->table.t == NULL || s->table.value == NULL) return;
-  s->table.t = model_copy_numbers (m, s->table.t, s->table.count);
-  s->table.value = model_copy_numbers (m, s->table.value, s->table.count);
+static const char *const *model_copy_names (pw_model *m, const char *const *names) {
+  size_t count = 0;
+  while (names[count]) count++;
+  const char **copy = model_copy (m, names, (count + 1) * sizeof *copy);
+  for (size_t i = 0; copy && i < count; i++) copy[i] = model_copy_text (m, names[i]);
+  return copy;
+}
+
+/* Copies the points of a table, which pw_system_compile checks, and the names of the states that a function reads. */
+static void model_copy_signal (pw_model *m, pw_signal *s) {
+  if (s->type == PW_FUNCTION && s->function.reads) s->function.reads = model_copy_names (m, s->function.reads);
+  if (s->type != PW_TABLE || s->table.count < 1 || s->table.t == NULL || s->table.value == NULL) return;
+  s->table.t = model_copy (m, s->table.t, (size_t)s->table.count * sizeof (double));
+  s->table.value = model_copy (m, s->table.value, (size_t)s->table.count * sizeof (double));
 }
 
 /* Checks an element type, unless the previous element has the same type. */
@@ -143,16 +150,15 @@ int pw_add (pw_model *m, const pw_kind *kind, const void *definition) {
       model_grow (m, &m->element, m->elements, &m->element_room, sizeof *m->element) != PW_OK)
     return m->error.status;
   if (definition == NULL) return pw_model_refuse (m, "pw_add of element type %s without a definition", kind->name);
-  void *copy = pw_arena_alloc (&m->arena, kind->definition);
-  if (copy == NULL) return model_no_memory (m);
-  memcpy (copy, definition, kind->definition);
+  void *copy = model_copy (m, definition, kind->definition);
+  if (copy == NULL) return m->error.status;
   const char **name = copy;
   *name = model_copy_text (m, *name);
   for (int i = 0; i < kind->bodies && !kind->each_body; i++) {
     const char **body = pw_field_mutable (kind, copy, PW_BODY, i);
     *body = model_copy_text (m, *body);
   }
-  for (int i = 0; i < kind->signals; i++) model_copy_table (m, pw_field_mutable (kind, copy, PW_SIGNAL, i));
+  for (int i = 0; i < kind->signals; i++) model_copy_signal (m, pw_field_mutable (kind, copy, PW_SIGNAL, i));
   m->element[m->elements++] = (pw_element){ kind, copy };
   return m->error.status;
 }
@@ -232,7 +238,7 @@ int pw_model_set_signal (pw_model *m, const char *element, const char *field, co
   if (f->name == NULL)
     return pw_fail (error, PW_INPUT, "model %s: %s %s has no signal \"%s\"%s", m->name, e->kind->name, element, field,
                     pw_nearest_text (&fields));
-  model_copy_table (m, memcpy ((char *)e->definition + f->offset, signal, sizeof *signal));
+  model_copy_signal (m, memcpy ((char *)e->definition + f->offset, signal, sizeof *signal));
   return model_status (m, error);
 }
 

@@ -118,7 +118,6 @@ static void selftest_force_u (pw_probe *probe) {
   selftest_compare (probe, PW_CHECK_force_u, probe->cols * signals, 1, selftest_largest (n, plus), value, reference);
 }
 
-/* A force declared constant does not change with time and state. */
 static void selftest_constant (pw_probe *probe) {
   selftest_numbers before, after;
   int n = probe->elements * probe->cols, changed = 0;

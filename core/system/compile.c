@@ -409,8 +409,6 @@ static int compile_totals (const compilation *job) {
   return PW_OK;
 }
 
-/* ---- All steps ---- */
-
 static int compile_all (compilation *job) {
   int status = compile_names (job);
   if (status == PW_OK) status = pw_check_model (job->m, &job->body, job->error);

@@ -315,19 +315,33 @@ static void test_own_coordinates (void **state) {
   pw_system_free (s);
 }
 
+static int description_spin (void *context, double t, const double *x, double value[3], double *gradient) {
+  (void)context, (void)t;
+  value[0] = -x[0];
+  if (gradient) gradient[0] = -1;
+  return 0;
+}
+
 /* The description may be changed after it has been handed over: the model keeps copies. */
 static void test_copies (void **state) {
   (void)state;
-  char body[] = "cart", name[] = "W";
+  char body[] = "cart", name[] = "W", read[] = "cart.omega";
+  const char *reads[] = { read, NULL };
   pw_model *m = scene_model (&description_table, NULL);
   pw_add_body (m, &(pw_body){ .name = body });
   pw_add_wheel (m, &(pw_wheel){ .name = name, .body = body });
+  pw_add_torque (m, &(pw_torque){ .name = "T",
+                                  .body = { body, "ground" },
+                                  .value = { PW_FUNCTION, .function = { description_spin, .reads = reads } } });
   memset (body, 'x', 4);
+  memset (read, 'x', 4);
+  reads[0] = NULL;
   memset (name, 'x', 1);
   pw_system *s = scene_compile (m);
   char text[100];
   assert_int_equal (pw_system_find_body (s, "cart"), 2);
   assert_string_equal (pw_system_row_name (s, 0, text, sizeof text), "wheel W");
+  assert_int_equal (s->source[0].reads, 1);
   pw_system_free (s);
 }
 
