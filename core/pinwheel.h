@@ -309,10 +309,10 @@ typedef struct {
 enum { PW_DRIVE_X, PW_DRIVE_Y, PW_DRIVE_ANGLE };
 
 /* Drive: a coordinate of a point of body 1 relative to body 2, or the relative angle, follows a signal.  One
- * holonomic constraint equation. */
+ * holonomic constraint equation.  The points of an angle serve figures and the length scale only. */
 typedef struct {
   const char *name, *body[2]; /* the driven body, the reference body; "ground" for one of them */
-  double at[2][2];            /* a point in each body's frame [m]; on the ground: in the world; ignored for an angle */
+  double at[2][2];            /* a point in each body's frame [m]; on the ground: in the world */
   int what;        /* PW_DRIVE_X, PW_DRIVE_Y: from point 2 to point 1 in body 2's frame; PW_DRIVE_ANGLE: phi1 - phi2 */
   pw_signal value; /* with its first and second time derivative [m] or [rad] */
 } pw_drive;

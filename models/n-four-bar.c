@@ -1,7 +1,7 @@
-/* N four-bar linkages in a row: N + 1 vertical cranks of 1 m at x = 0 .. N, joined at their tops by N couplers of 1 m.
+/* N four-bar linkages in a row: N + 1 vertical cranks at x = 0, l .. N l, N couplers on their tops; all of length l.
  *
- * All cranks stay parallel.  When they are horizontal the linkage is in a singular configuration: N constraint
- * equations become dependent and the motion could branch; the cranks of the reference solution stay parallel:
+ * When the cranks are horizontal the configuration is singular: N constraint equations become dependent and the motion
+ * could branch; the cranks of the reference solution stay parallel:
  * theta'' = -(g / l) ((N + 1) / 2 + N) / ((N + 1) / 3 + N) cos theta.
  * (Gonzalez, Dopico, Pastorino & Cuadrado 2006, Multibody System Dynamics 16; IFToMM benchmark A02.) */
 #include <math.h>

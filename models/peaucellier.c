@@ -33,9 +33,17 @@ static void add_pin (pw_model *m, const char *name, const char *one, double x1, 
   pw_add_pin (m, &(pw_pin){ .name = name, .body = { one, two }, .at = { { x1, 0 }, { x2, 0 } } });
 }
 
-/* The joints at a crank angle: A, O on the ground, B on the crank, C and D on the arms, P on the line. */
+/* The joints: A, O on the ground, B on the crank, C and D on the arms, P on the line; and the bars between them. */
+enum { A, O, B, C, D, P, JOINTS, BARS = 7 };
+static const struct {
+  const char *name;
+  int from, to;
+} bars[BARS] = { { "crank", A, B }, { "OC", O, C }, { "OD", O, D }, { "BC", B, C },
+                 { "BD", B, D },    { "PC", P, C }, { "PD", P, D } };
+
+/* At a crank angle. */
 typedef struct {
-  double A[2], O[2], B[2], C[2], D[2], P[2];
+  double at[JOINTS][2];
 } joints;
 
 static joints joints_at (const inversor *p, double angle) {
@@ -43,11 +51,11 @@ static joints joints_at (const inversor *p, double angle) {
   /* mid: from O to the middle of the rhombus along OB; aside: from there to C and D. */
   double OB = 2 * p->a * c, OP = (p->L * p->L - p->s * p->s) / OB, mid = (OB + OP) / 2,
          aside = sqrt (p->L * p->L - mid * mid);
-  return (joints){ .A = { p->a, 0 },
-                   .B = { OB * c, OB * s },
-                   .C = { mid * c - aside * s, mid * s + aside * c },
-                   .D = { mid * c + aside * s, mid * s - aside * c },
-                   .P = { OP * c, OP * s } };
+  return (joints){ { [A] = { p->a, 0 },
+                     [B] = { OB * c, OB * s },
+                     [C] = { mid * c - aside * s, mid * s + aside * c },
+                     [D] = { mid * c + aside * s, mid * s - aside * c },
+                     [P] = { OP * c, OP * s } } };
 }
 
 static void build (pw_model *m, const void *parameter) {
@@ -62,13 +70,7 @@ static void build (pw_model *m, const void *parameter) {
     return;
   }
   joints j = joints_at (p, p->swing);
-  add_bar (m, p, "crank", j.A, j.B);
-  add_bar (m, p, "OC", j.O, j.C);
-  add_bar (m, p, "OD", j.O, j.D);
-  add_bar (m, p, "BC", j.B, j.C);
-  add_bar (m, p, "BD", j.B, j.D);
-  add_bar (m, p, "PC", j.P, j.C);
-  add_bar (m, p, "PD", j.P, j.D);
+  for (int i = 0; i < BARS; i++) add_bar (m, p, bars[i].name, j.at[bars[i].from], j.at[bars[i].to]);
   add_pin (m, "A", "crank", -p->a / 2, "ground", p->a);
   add_pin (m, "O1", "OC", -L, "ground", 0);
   add_pin (m, "O2", "OD", -L, "ground", 0);
@@ -86,24 +88,22 @@ static void build (pw_model *m, const void *parameter) {
                                 .value = { PW_HARMONIC, .harmonic = { .amplitude = p->swing, .omega = p->omega } } });
 }
 
-/* The configuration of a bar; its angle is within pi of the initial one. */
-static void bar_configuration (const double from[2], const double to[2], const double from0[2], const double to0[2],
-                               double *q) {
-  double start = atan2 (to0[1] - from0[1], to0[0] - from0[0]), now = atan2 (to[1] - from[1], to[0] - from[0]);
-  q[0] = (from[0] + to[0]) / 2, q[1] = (from[1] + to[1]) / 2, q[2] = start + remainder (now - start, 2 * PW_PI);
+static double bar_angle (const joints *j, int i) {
+  const double *from = j->at[bars[i].from], *to = j->at[bars[i].to];
+  return atan2 (to[1] - from[1], to[0] - from[0]);
 }
 
+/* OB turns by `turn`; relative to it each bar turns by less than pi. */
 static void reference (const void *parameter, double t, double *q, double *v) {
   const inversor *p = parameter;
-  joints j = joints_at (p, p->swing * cos (p->omega * t)), j0 = joints_at (p, p->swing);
+  double angle = p->swing * cos (p->omega * t), turn = (angle - p->swing) / 2;
+  joints j = joints_at (p, angle), j0 = joints_at (p, p->swing);
   (void)v;
-  bar_configuration (j.A, j.B, j0.A, j0.B, q);
-  bar_configuration (j.O, j.C, j0.O, j0.C, q + 3);
-  bar_configuration (j.O, j.D, j0.O, j0.D, q + 6);
-  bar_configuration (j.B, j.C, j0.B, j0.C, q + 9);
-  bar_configuration (j.B, j.D, j0.B, j0.D, q + 12);
-  bar_configuration (j.P, j.C, j0.P, j0.C, q + 15);
-  bar_configuration (j.P, j.D, j0.P, j0.D, q + 18);
+  for (int i = 0; i < BARS; i++, q += 3) {
+    const double *from = j.at[bars[i].from], *to = j.at[bars[i].to], start = bar_angle (&j0, i) + turn;
+    q[0] = (from[0] + to[0]) / 2, q[1] = (from[1] + to[1]) / 2;
+    q[2] = start + remainder (bar_angle (&j, i) - start, 2 * PW_PI);
+  }
 }
 
 PW_MODEL (.about = "Peaucellier's inversor, which draws an exactly straight line", .parameters = parameters,

@@ -34,9 +34,17 @@ const void *pw_field_at (const pw_kind *kind, const void *definition, pw_field_t
   return NULL;
 }
 
+#define FAULT_TEXT ": expected at most 50 bytes of UTF-8 without control characters"
+
+/* 1 if a name or unit does not fit into a line of a table or file. */
+static int fault_text (const char *text) {
+  return strlen (text) > PW_NAME_MAX || !pw_is_text (text) || strpbrk (text, "\n\t");
+}
+
 /* The fault of one field, or "". */
 static const char *fault_field (const pw_kind *kind, const pw_field *f) {
   size_t bytes = pw_field_bytes (f->type) * (size_t)pw_field_count (f);
+  if (fault_text (f->name) || (f->unit && fault_text (f->unit))) return "name or unit" FAULT_TEXT;
   if (bytes == 0) return "its type does not exist";
   if (f->offset < sizeof (char *) || f->offset + bytes > kind->definition)
     return "it lies outside the definition: is .definition its sizeof, its first member the name?";
@@ -78,28 +86,25 @@ static const char *fault_functions (const pw_kind *kind) {
   return "";
 }
 
-static int fault_too_long (const char *name) {
-  return strlen (name) > PW_NAME_MAX;
-}
-
 static const char *fault_names (const pw_kind *kind) {
   for (int i = 0; i < kind->rows; i++)
     if (kind->reaction == NULL || kind->reaction[i].name == NULL || kind->reaction[i].unit == NULL)
       return "constraint equations without names of their reactions";
-    else if (fault_too_long (kind->reaction[i].name))
-      return "a reaction's name of more than 50 bytes";
+    else if (fault_text (kind->reaction[i].name) || fault_text (kind->reaction[i].unit))
+      return "name or unit of a reaction" FAULT_TEXT;
   for (int i = 0; i < kind->internal; i++)
     if (kind->coordinate == NULL || kind->coordinate[i].name == NULL || kind->coordinate[i].rate == NULL ||
         kind->coordinate[i].unit == NULL)
       return "internal coordinates without names";
-    else if (fault_too_long (kind->coordinate[i].name) || fault_too_long (kind->coordinate[i].rate))
-      return "an internal coordinate's name of more than 50 bytes";
+    else if (fault_text (kind->coordinate[i].name) || fault_text (kind->coordinate[i].rate) ||
+             fault_text (kind->coordinate[i].unit))
+      return "name or unit of an internal coordinate" FAULT_TEXT;
   return "";
 }
 
 const char *pw_kind_check (const pw_kind *kind, char *buffer, size_t size) {
   if (kind->name == NULL || *kind->name == 0) return "no name";
-  if (fault_too_long (kind->name)) return "a name of more than 50 bytes";
+  if (fault_text (kind->name)) return "its name" FAULT_TEXT;
   if (kind->definition < sizeof (char *)) return "the definition has no room for its name";
   if (kind->bodies < 0 || kind->bodies > PW_MAX_BODIES || kind->internal < 0 || kind->internal > PW_MAX_INTERNAL ||
       kind->rows < 0 || kind->rows > PW_MAX_ROWS || kind->signals < 0 || kind->signals > PW_MAX_SIGNALS) {

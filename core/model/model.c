@@ -102,7 +102,7 @@ static const char *model_copy_text (pw_model *m, const char *text) {
 }
 
 int pw_add_body (pw_model *m, const pw_body *body) {
-  if (body == NULL) return pw_model_refuse (m, "pw_add_body without a body");
+  if (m == NULL || body == NULL) return m ? pw_model_refuse (m, "pw_add_body without a body") : PW_INPUT;
   if (m->error.status != PW_OK || model_grow (m, &m->body, m->bodies, &m->body_room, sizeof *m->body) != PW_OK)
     return m->error.status;
   pw_body *b = &m->body[m->bodies++];
@@ -111,20 +111,27 @@ int pw_add_body (pw_model *m, const pw_body *body) {
   return m->error.status;
 }
 
-static const double *model_copy_numbers (pw_model *m, const double *from, int count) {
-  double *copy = pw_arena_alloc (&m->arena, (size_t)count * sizeof *copy);
-  if (copy == NULL) {
-    model_no_memory (m);
-    return NULL;
-  }
-  return memcpy (copy, from, (size_t)count * sizeof *copy);
+static void *model_copy (pw_model *m, const void *from, size_t bytes) {
+  void *copy = pw_arena_alloc (&m->arena, bytes);
+  if (copy) return memcpy (copy, from, bytes);
+  model_no_memory (m);
+  return NULL;
 }
 
-/* Copies the points of a table; pw_system_compile reports invalid ones. */
-static void model_copy_table (pw_model *m, pw_signal *s) {
-  if (s == NULL || s->type != PW_TABLE || s->table.count < 1 || s->table.t == NULL || s->table.value == NULL) return;
-  s->table.t = model_copy_numbers (m, s->table.t, s->table.count);
-  s->table.value = model_copy_numbers (m, s->table.value, s->table.count);
+static const char *const *model_copy_names (pw_model *m, const char *const *names) {
+  size_t count = 0;
+  while (names[count]) count++;
+  const char **copy = model_copy (m, names, (count + 1) * sizeof *copy);
+  for (size_t i = 0; copy && i < count; i++) copy[i] = model_copy_text (m, names[i]);
+  return copy;
+}
+
+/* Copies the points of a table, which pw_system_compile checks, and the names of the states that a function reads. */
+static void model_copy_signal (pw_model *m, pw_signal *s) {
+  if (s->type == PW_FUNCTION && s->function.reads) s->function.reads = model_copy_names (m, s->function.reads);
+  if (s->type != PW_TABLE || s->table.count < 1 || s->table.t == NULL || s->table.value == NULL) return;
+  s->table.t = model_copy (m, s->table.t, (size_t)s->table.count * sizeof (double));
+  s->table.value = model_copy (m, s->table.value, (size_t)s->table.count * sizeof (double));
 }
 
 /* Checks an element type, unless the previous element has the same type. */
@@ -138,20 +145,20 @@ static int model_check_kind (pw_model *m, const pw_kind *kind) {
 }
 
 int pw_add (pw_model *m, const pw_kind *kind, const void *definition) {
+  if (m == NULL) return PW_INPUT;
   if (m->error.status != PW_OK || model_check_kind (m, kind) != PW_OK ||
       model_grow (m, &m->element, m->elements, &m->element_room, sizeof *m->element) != PW_OK)
     return m->error.status;
   if (definition == NULL) return pw_model_refuse (m, "pw_add of element type %s without a definition", kind->name);
-  void *copy = pw_arena_alloc (&m->arena, kind->definition);
-  if (copy == NULL) return model_no_memory (m);
-  memcpy (copy, definition, kind->definition);
+  void *copy = model_copy (m, definition, kind->definition);
+  if (copy == NULL) return m->error.status;
   const char **name = copy;
   *name = model_copy_text (m, *name);
   for (int i = 0; i < kind->bodies && !kind->each_body; i++) {
     const char **body = pw_field_mutable (kind, copy, PW_BODY, i);
     *body = model_copy_text (m, *body);
   }
-  for (int i = 0; i < kind->signals; i++) model_copy_table (m, pw_field_mutable (kind, copy, PW_SIGNAL, i));
+  for (int i = 0; i < kind->signals; i++) model_copy_signal (m, pw_field_mutable (kind, copy, PW_SIGNAL, i));
   m->element[m->elements++] = (pw_element){ kind, copy };
   return m->error.status;
 }
@@ -231,7 +238,7 @@ int pw_model_set_signal (pw_model *m, const char *element, const char *field, co
   if (f->name == NULL)
     return pw_fail (error, PW_INPUT, "model %s: %s %s has no signal \"%s\"%s", m->name, e->kind->name, element, field,
                     pw_nearest_text (&fields));
-  model_copy_table (m, memcpy ((char *)e->definition + f->offset, signal, sizeof *signal));
+  model_copy_signal (m, memcpy ((char *)e->definition + f->offset, signal, sizeof *signal));
   return model_status (m, error);
 }
 
@@ -255,6 +262,7 @@ int pw_system_has_reference (const pw_model *m) {
 }
 
 int pw_system_reference (const pw_model *m, const pw_system *s, double t, double *q, double *v, pw_error *error) {
+  if (pw_require (m, "a model", error) != PW_OK || pw_require (s, "a system", error) != PW_OK) return PW_INPUT;
   int n = pw_system_coordinates (s);
   for (int j = 0; j < n; j++) q[j] = v[j] = NAN;
   if (m->table->reference) m->table->reference (m->parameters, t, q, v);

@@ -192,7 +192,7 @@ int pw_selftest_scene (const pw_system *s, double T, const pw_kind *kind, double
                        unsigned seed, pw_selftest_report *report, pw_error *error) {
   pw_random random = { seed };
   pw_workspace *w = pw_workspace_new (s, error);
-  if (w == NULL) return PW_RESOURCE;
+  if (w == NULL) return s ? PW_RESOURCE : PW_INPUT;
   w->scale.time = T;
   scene_test test = { .probe = { .s = s, .workspace = w, .batch = w->batch, .t = t, .report = report } };
   pw_probe *probe = &test.probe;

@@ -115,7 +115,8 @@ static int specialise_write (pw_generator *scene) {
            scene->prepare.text ? scene->prepare.text : "");
   fprintf (scene->out,
            "\nPW_EXPORT const pw_specialised pw_specialised_scene = {\n"
-           "  PW_SCENE_ABI, %d, %luu, independent, prepare, evaluate, project, stages, residuals, steps\n};\n#endif\n",
+           "  PW_SCENE_ABI, %d, %luu, independent, prepare, evaluate, project, stages, compute_residuals, "
+           "steps\n};\n#endif\n",
            scene->constants + 1, pw_system_shape (scene->s));
   return status;
 }

@@ -85,7 +85,7 @@ typedef struct pw_scene_steps {
 } pw_scene_steps;
 
 /* Functions return 0, or 1 if the general engine has to do the work: an angle beyond the range of the own sine, a small
- * pivot, values that are not finite, a signal that failed.  Nothing but c, J and u is modified then. */
+ * pivot, values that are not finite, a signal that failed.  The state from which they begin is unchanged then. */
 typedef struct pw_specialised {
   int abi, constants;
   unsigned long shape;              /* pw_system_shape of the system */

@@ -6,7 +6,7 @@
 
 typedef enum { PW_TERM_ZERO, PW_TERM_ONE, PW_TERM_CONSTANT, PW_TERM_VARIABLE } pw_term_type;
 
-/* sign times 0, 1, constant number `id` (computed once), or variable number `id`. */
+/* sign times 0, 1, a constant (computed once) or a variable. */
 typedef struct {
   pw_term_type type;
   int sign;

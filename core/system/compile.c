@@ -177,9 +177,10 @@ static int compile_prepare (const compilation *job, const pw_element *from, cons
   pw_error cause = { 0 };
   memset (job->prepared, 0, size);
   memset (job->prepared + size, COMPILE_MARK, COMPILE_GUARD);
-  if (kind->prepare (from->definition, bodies, job->prepared, internal, &cause) != PW_OK)
-    return pw_fail (job->error, PW_INPUT, "model %s: %s %s: %s", job->m->name, kind->name, pw_element_name (from),
-                    cause.text);
+  int status = kind->prepare (from->definition, bodies, job->prepared, internal, &cause);
+  if (status != PW_OK)
+    return pw_fail (job->error, status == PW_RESOURCE ? PW_RESOURCE : PW_INPUT, "model %s: %s %s: %s", job->m->name,
+                    kind->name, pw_element_name (from), *cause.text ? cause.text : "prepare refuses it");
   for (size_t i = 0; i < COMPILE_GUARD; i++)
     if (job->prepared[size + i] != COMPILE_MARK)
       return pw_fail (job->error, PW_INPUT,
@@ -216,6 +217,10 @@ static int compile_element (const compilation *job, const pw_element_batch *k, c
   pw_internal internal[PW_MAX_INTERNAL] = { { 0 } };
   if (compile_prepare (job, from, bodies, internal, a->element + (size_t)e * kind->element) != PW_OK) return PW_INPUT;
   for (int n = 0, j = k->internal + e * kind->internal; n < kind->internal; n++, j++) {
+    const char *expected = pw_domain_check (PW_NONNEGATIVE, internal[n].mass);
+    if (*expected)
+      return pw_fail (job->error, PW_INPUT, "model %s: %s %s: inertia of %s = %g: expected %s", job->m->name,
+                      kind->name, pw_element_name (from), kind->coordinate[n].name, internal[n].mass, expected);
     s->mass[j] = internal[n].mass;
     s->q0[j] = internal[n].start;
     s->v0[j] = internal[n].rate;
@@ -403,8 +408,6 @@ static int compile_totals (const compilation *job) {
   pw_workspace_free (w);
   return PW_OK;
 }
-
-/* ---- All steps ---- */
 
 static int compile_all (compilation *job) {
   int status = compile_names (job);

@@ -148,7 +148,7 @@ int pw_system_equations (const pw_system *s, double t, const double *q, const do
                          pw_error *error) {
   *out = (pw_equations){ .rows = 0 };
   pw_workspace *w = pw_workspace_new (s, error);
-  int status = w ? elements_allocate (w, out, error) : PW_RESOURCE;
+  int status = w ? elements_allocate (w, out, error) : s ? PW_RESOURCE : PW_INPUT;
   if (status == PW_OK) status = elements_evaluate (w, t, q, v, out, error);
   pw_workspace_free (w);
   return status;

@@ -96,37 +96,27 @@ static int query_body_state (const pw_system *s, const char *name, pw_nearest *n
 
 typedef char *query_name (const pw_system *s, int i, char *buffer, size_t size);
 
-/* Fails with the nearest of `count` names, unless it is known already. */
-static int query_missing (const pw_system *s, const char *what, int count, query_name *name_of, pw_nearest *near,
-                          pw_error *error) {
+/* The index of near->sought among the names; without it, fails with the nearest one, unless that is known already. */
+static int query_find (const pw_system *s, const char *what, int (*count_of) (const pw_system *s), query_name *name_of,
+                       pw_nearest *near, pw_error *error) {
   char text[120];
-  for (int i = 0, search = *near->best == 0; search && i < count; i++)
-    pw_nearest_try (near, name_of (s, i, text, sizeof text));
+  if (pw_require (s, "a system", error) != PW_OK) return PW_INPUT;
+  if (near->sought == NULL) return pw_fail (error, PW_INPUT, "model %s: the name of a %s is missing", s->model, what);
+  int count = count_of (s), search = *near->best == 0;
+  for (int i = 0; i < count; i++)
+    if (strcmp (name_of (s, i, text, sizeof text), near->sought) == 0) return i;
+  for (int i = 0; search && i < count; i++) pw_nearest_try (near, name_of (s, i, text, sizeof text));
   return pw_fail (error, PW_INPUT, "model %s has no %s \"%s\"%s", s->model, what, near->sought, pw_nearest_text (near));
 }
 
-/* The index of one of `count` names. */
-static int query_find (const pw_system *s, const char *what, int count, query_name *name_of, const char *name,
-                       pw_error *error) {
-  char text[120];
-  if (name == NULL) return pw_fail (error, PW_INPUT, "model %s: the name of a %s is missing", s->model, what);
-  for (int i = 0; i < count; i++)
-    if (strcmp (name_of (s, i, text, sizeof text), name) == 0) return i;
-  return query_missing (s, what, count, name_of, &(pw_nearest){ .sought = name }, error);
+static int query_states (const pw_system *s) {
+  return 2 * s->coords;
 }
 
 int pw_system_find_state (const pw_system *s, const char *name, pw_error *error) {
-  char text[120];
-  if (pw_require (s, "a system", error) != PW_OK) return PW_INPUT;
-  if (name == NULL) return pw_fail (error, PW_INPUT, "model %s: the name of a state is missing", s->model);
   pw_nearest near = { .sought = name };
-  int state = query_body_state (s, name, &near);
-  if (state >= 0) return state;
-  for (int j = 3 * s->bodies; j < s->coords; j++)
-    for (int velocity = 0; velocity < 2; velocity++)
-      if (strcmp (pw_system_state_name (s, j + velocity * s->coords, text, sizeof text), name) == 0)
-        return j + velocity * s->coords;
-  return query_missing (s, "state", 2 * s->coords, pw_system_state_name, &near, error);
+  int state = s && name ? query_body_state (s, name, &near) : -1;
+  return state >= 0 ? state : query_find (s, "state", query_states, pw_system_state_name, &near, error);
 }
 
 /* The batch of a constraint equation, its element, and the number of the equation in the element. */
@@ -153,7 +143,7 @@ const char *pw_system_reaction_unit (const pw_system *s, int row) {
 }
 
 int pw_system_find_reaction (const pw_system *s, const char *name, pw_error *error) {
-  return query_find (s, "reaction", s->rows, pw_system_reaction_name, name, error);
+  return query_find (s, "reaction", pw_system_rows, pw_system_reaction_name, &(pw_nearest){ .sought = name }, error);
 }
 
 char *pw_system_row_name (const pw_system *s, int row, char *buffer, size_t size) {
@@ -203,10 +193,12 @@ const char *pw_system_signal_unit (const pw_system *s, int signal) {
 }
 
 int pw_system_find_signal (const pw_system *s, const char *name, pw_error *error) {
-  for (const pw_element_batch *k = s->batch; name && k < s->batch + s->batches; k++)
+  for (int i = 0; s && name && i < s->batches; i++) {
+    const pw_element_batch *k = &s->batch[i];
     for (int e = 0; k->kind->signals == 1 && e < k->b.count; e++)
       if (strcmp (k->name[e], name) == 0) return (int)(k->source - s->source) + e;
-  return query_find (s, "signal", s->sources, pw_system_signal_name, name, error);
+  }
+  return query_find (s, "signal", pw_system_signals, pw_system_signal_name, &(pw_nearest){ .sought = name }, error);
 }
 
 char *pw_failed_signal (const pw_workspace *w, char *buffer, size_t size) {

@@ -79,6 +79,7 @@ void pw_close_signals (const pw_source *source, int count) {
 
 pw_workspace *pw_workspace_new (const pw_system *s, pw_error *error) {
   pw_layout layout = { NULL, 0 };
+  if (pw_require (s, "a system", error) != PW_OK) return NULL;
   workspace_layout (&layout, &(pw_workspace){ .s = s });
   pw_workspace *w = calloc (1, layout.used);
   if (w) {

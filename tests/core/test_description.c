@@ -7,6 +7,7 @@
 #include <string.h>
 #include "check.h"
 #include "pinwheel-files.h"
+#include "pinwheel-selftest.h"
 #include "scene.h"
 #include "system.h"
 #include "toys.h"
@@ -136,8 +137,31 @@ static void test_missing (void **state) {
   assert_int_equal (pw_model_set_initial (NULL, "cart.x", 1, &e[3]), PW_INPUT);
   assert_null (pw_system_compile (NULL, &e[4]));
   for (int i = 0; i < 5; i++) check_error (&e[i], PW_INPUT, "a model is missing");
+  assert_int_equal (pw_add_body (NULL, &(pw_body){ .name = "cart" }), PW_INPUT);
+  assert_int_equal (pw_add_wheel (NULL, &(pw_wheel){ .name = "W", .body = "cart" }), PW_INPUT);
   assert_null (pw_file_model (NULL, &e[5]));
   check_error (&e[5], PW_INPUT, "a model file is missing");
+}
+
+static void test_missing_system (void **state) {
+  (void)state;
+  pw_error e[6] = { { 0 } };
+  double q[3] = { 0 };
+  pw_equations equations;
+  pw_selftest_report report = { 0 };
+  pw_model *m = scene_model (&description_table, NULL);
+  assert_int_equal (pw_system_find_state (NULL, "cart.x", &e[0]), PW_INPUT);
+  assert_int_equal (pw_system_find_reaction (NULL, "W.N", &e[1]), PW_INPUT);
+  assert_int_equal (pw_system_find_signal (NULL, "motor", &e[2]), PW_INPUT);
+  assert_int_equal (pw_system_equations (NULL, 0, q, q, &equations, &e[3]), PW_INPUT);
+  assert_int_equal (pw_system_reference (m, NULL, 0, q, q, &e[4]), PW_INPUT);
+  assert_int_equal (pw_selftest_scene (NULL, 1, &pw_kind_wheel, 0, q, q, 1, &report, &e[5]), PW_INPUT);
+  for (int i = 0; i < 6; i++) check_error (&e[i], PW_INPUT, "a system is missing");
+  e[0] = (pw_error){ 0 };
+  assert_null (pw_workspace_new (NULL, &e[0]));
+  check_error (&e[0], PW_INPUT, "a system is missing");
+  pw_equations_free (&equations);
+  pw_model_free (m);
 }
 
 static void description_add_nothing (pw_model *m, const void *parameters) {
@@ -291,19 +315,33 @@ static void test_own_coordinates (void **state) {
   pw_system_free (s);
 }
 
+static int description_spin (void *context, double t, const double *x, double value[3], double *gradient) {
+  (void)context, (void)t;
+  value[0] = -x[0];
+  if (gradient) gradient[0] = -1;
+  return 0;
+}
+
 /* The description may be changed after it has been handed over: the model keeps copies. */
 static void test_copies (void **state) {
   (void)state;
-  char body[] = "cart", name[] = "W";
+  char body[] = "cart", name[] = "W", read[] = "cart.omega";
+  const char *reads[] = { read, NULL };
   pw_model *m = scene_model (&description_table, NULL);
   pw_add_body (m, &(pw_body){ .name = body });
   pw_add_wheel (m, &(pw_wheel){ .name = name, .body = body });
+  pw_add_torque (m, &(pw_torque){ .name = "T",
+                                  .body = { body, "ground" },
+                                  .value = { PW_FUNCTION, .function = { description_spin, .reads = reads } } });
   memset (body, 'x', 4);
+  memset (read, 'x', 4);
+  reads[0] = NULL;
   memset (name, 'x', 1);
   pw_system *s = scene_compile (m);
   char text[100];
   assert_int_equal (pw_system_find_body (s, "cart"), 2);
   assert_string_equal (pw_system_row_name (s, 0, text, sizeof text), "wheel W");
+  assert_int_equal (s->source[0].reads, 1);
   pw_system_free (s);
 }
 
@@ -325,14 +363,15 @@ static void test_find_reaction (void **state) {
 
 int main (void) {
   const struct CMUnitTest tests[] = {
-    cmocka_unit_test (test_parameters),     cmocka_unit_test (test_bad_parameters),
-    cmocka_unit_test (test_no_parameters),  cmocka_unit_test (test_refused),
-    cmocka_unit_test (test_bad_tables),     cmocka_unit_test (test_order_of_calls),
-    cmocka_unit_test (test_bad_set_signal), cmocka_unit_test (test_start),
-    cmocka_unit_test (test_bad_start),      cmocka_unit_test (test_query),
-    cmocka_unit_test (test_bad_query),      cmocka_unit_test (test_own_coordinates),
-    cmocka_unit_test (test_find_reaction),  cmocka_unit_test (test_copies),
-    cmocka_unit_test (test_missing),        cmocka_unit_test (test_missing_definitions),
+    cmocka_unit_test (test_parameters),          cmocka_unit_test (test_bad_parameters),
+    cmocka_unit_test (test_no_parameters),       cmocka_unit_test (test_refused),
+    cmocka_unit_test (test_bad_tables),          cmocka_unit_test (test_order_of_calls),
+    cmocka_unit_test (test_bad_set_signal),      cmocka_unit_test (test_start),
+    cmocka_unit_test (test_bad_start),           cmocka_unit_test (test_query),
+    cmocka_unit_test (test_bad_query),           cmocka_unit_test (test_own_coordinates),
+    cmocka_unit_test (test_find_reaction),       cmocka_unit_test (test_copies),
+    cmocka_unit_test (test_missing_system),      cmocka_unit_test (test_missing),
+    cmocka_unit_test (test_missing_definitions),
   };
   return cmocka_run_group_tests (tests, NULL, NULL);
 }

@@ -173,6 +173,12 @@ static const pw_field kinds_choice[] = { { .name = "mode", .offset = 8, .type = 
 static const pw_field kinds_typeless[] = { { .name = "mode", .offset = 8, .type = (pw_field_type)77 },
                                            { .name = NULL } };
 
+#define KINDS_50 "a-name-of-fifty-bytes-that-is-longer-than-it-shoul"
+#define KINDS_TEXT ": expected at most 50 bytes of UTF-8 without control characters"
+static const pw_quantity kinds_long_name[] = { { "x", "N", NULL, "" }, { KINDS_50 "x", "N", NULL, "" } };
+static const pw_quantity kinds_line[] = { { "x", "N\n", NULL, "" }, { KINDS_50, "N", NULL, "" } };
+static const pw_field kinds_latin1[] = { { .name = "m\xF6", .offset = 8, .type = PW_NUMBER }, { .name = NULL } };
+
 static void test_faults (void **state) {
   (void)state;
 #define KINDS_FAULT(member, value, text) \
@@ -182,6 +188,11 @@ static void test_faults (void **state) {
     kinds_expect_fault (&broken, text);  \
   } while (0)
   KINDS_FAULT (name, NULL, "no name");
+  KINDS_FAULT (name, KINDS_50 "x", "its name" KINDS_TEXT);
+  KINDS_FAULT (name, "a\nb", "its name" KINDS_TEXT);
+  KINDS_FAULT (reaction, kinds_long_name, "name or unit of a reaction" KINDS_TEXT);
+  KINDS_FAULT (reaction, kinds_line, "name or unit of a reaction" KINDS_TEXT);
+  KINDS_FAULT (fields, kinds_latin1, "field m\xF6: name or unit" KINDS_TEXT);
   KINDS_FAULT (definition, 0, "the definition has no room for its name");
   KINDS_FAULT (bodies, 5, "at most 4 bodies, 4 internal coordinates, 6 constraint equations and 4 signals");
   KINDS_FAULT (bodies, 0, "neither a body nor an internal coordinate");

@@ -199,6 +199,42 @@ static void test_bad_prepare (void **state) {
        pw_add (m, &kind, &(messages_chooser){ "c", "frame", 1 }));
 }
 
+/* A flywheel whose inertia is `mode`; what its prepare returns without a message. */
+static int messages_flywheel (const void *definition, const pw_body *const *bodies, void *element,
+                              pw_internal *internal, pw_error *error) {
+  int mode = ((const messages_chooser *)definition)->mode;
+  (void)bodies, (void)element, (void)error;
+  if (mode == 0) return PW_RESOURCE;
+  internal[0].mass = mode == 2 ? NAN : mode == 1 ? -3 : 1;
+  return PW_OK;
+}
+
+static void test_bad_internal (void **state) {
+  static const pw_quantity angle[] = { { "turn", "rad", "turn_rate", NULL } };
+  static const char *const mode[] = { "zero", "one", "two", NULL };
+  const pw_field fields[] = { { PW_AT (messages_chooser, body), PW_BODY },
+                              { PW_AT (messages_chooser, mode), PW_CHOICE, .choices = mode },
+                              { .name = NULL } };
+  pw_kind kind = { .name = "flywheel",
+                   .definition = sizeof (messages_chooser),
+                   .fields = fields,
+                   .bodies = 1,
+                   .internal = 1,
+                   .coordinate = angle,
+                   .prepare = messages_flywheel };
+  (void)state;
+  BAD (": flywheel f: inertia of turn = -3: expected a number >= 0",
+       pw_add (m, &kind, &(messages_chooser){ "f", "frame", 1 }));
+  BAD (": flywheel f: inertia of turn = nan: expected a finite number",
+       pw_add (m, &kind, &(messages_chooser){ "f", "frame", 2 }));
+  pw_error error = { 0 };
+  pw_model *m = scene_model (&messages_table, NULL);
+  pw_add (m, &kind, &(messages_chooser){ "f", "frame", 0 });
+  assert_null (pw_system_compile (m, &error));
+  check_error (&error, PW_RESOURCE, "model scene: flywheel f: prepare refuses it");
+  pw_model_free (m);
+}
+
 /* Names that are missing are no names, and no crash. */
 static void test_missing_names (void **state) {
   (void)state;
@@ -246,11 +282,13 @@ static void test_no_body (void **state) {
 
 int main (void) {
   const struct CMUnitTest tests[] = {
-    cmocka_unit_test (test_bad_names),      cmocka_unit_test (test_bad_bodies),  cmocka_unit_test (test_bad_references),
-    cmocka_unit_test (test_bad_numbers),    cmocka_unit_test (test_bad_signals), cmocka_unit_test (test_bad_readers),
-    cmocka_unit_test (test_bad_choices),    cmocka_unit_test (test_bad_kinds),   cmocka_unit_test (test_no_body),
-    cmocka_unit_test (test_too_large),      cmocka_unit_test (test_bad_prepare), cmocka_unit_test (test_missing_names),
-    cmocka_unit_test (test_bad_parameters),
+    cmocka_unit_test (test_bad_names),      cmocka_unit_test (test_bad_bodies),
+    cmocka_unit_test (test_bad_references), cmocka_unit_test (test_bad_numbers),
+    cmocka_unit_test (test_bad_signals),    cmocka_unit_test (test_bad_readers),
+    cmocka_unit_test (test_bad_choices),    cmocka_unit_test (test_bad_kinds),
+    cmocka_unit_test (test_no_body),        cmocka_unit_test (test_too_large),
+    cmocka_unit_test (test_bad_prepare),    cmocka_unit_test (test_bad_internal),
+    cmocka_unit_test (test_missing_names),  cmocka_unit_test (test_bad_parameters),
   };
   return cmocka_run_group_tests (tests, NULL, NULL);
 }

@@ -195,6 +195,8 @@ static void test_gallery (void **state) {
     { "n-four-bar --set speed=2 --set N=3 --set l=1.2", 1e-8, "1e4 h^4: 6 rad/s, singular configurations" },
     { "redundant-parallelogram --set theta=0.4 --set mc=1 --set l=0.7", 1e-9, "1000 h^4: 6 rad/s" },
     { "peaucellier --set swing=0.7 --set omega=2 --set a=0.35", 1e-12, "prescribed: round-off" },
+    { "peaucellier --set swing=1.7", 1e-12, "prescribed: round-off; the crank turns by more than pi" },
+    { "peaucellier --set swing=2.4 --set a=0.74", 1e-12, "prescribed: round-off; so do bars of the rhombus" },
   };
   char command[300];
   (void)state;

@@ -50,7 +50,7 @@ static const pw_field drive_fields[] = {
   { PW_AT (pw_drive, body), PW_BODY, .count = 2, .required = 1,
     .about = "the driven body and the reference body; one may be ground" },
   { PW_AT (pw_drive, at), PW_POINT, .count = 2, .unit = "m",
-    .about = "a point in each body's frame; ignored for an angle" },
+    .about = "a point in each body's frame; for an angle it serves figures and the length scale only" },
   { PW_AT (pw_drive, what), PW_CHOICE, .required = 1, .choices = drive_what,
     .about = "the coordinate, from point 2 to point 1 in the frame of body 2, or the relative angle" },
   { PW_AT (pw_drive, value), PW_SIGNAL, .unit = "m or rad", .required = 1,
