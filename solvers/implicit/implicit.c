@@ -106,7 +106,6 @@ int pw_implicit_advance (pw_run *r, double t_end, pw_implicit_step *step, void (
   const double end = pw_step_end (r, &x->counter, t_end, &whole);
   double h = whole ? r->settings.step : end - r->t, t1 = end;
   size_t n = (size_t)r->s->coords * sizeof (double);
-  r->near_singular = 0;
   int status = whole ? implicit_step_around (r, step, h, fmin (t_end, r->breakpoint), &t1) : step (r, h, t1);
   if (t1 > end) h = t1 - r->t, whole = 0;
   if (status != PW_OK) return pw_implicit_fail (r, status, h, error);

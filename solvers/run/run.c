@@ -164,6 +164,7 @@ int pw_run_advance (pw_run *r, double t_end, pw_error *error) {
     r->t = stop;
     return run_check_progress (r, before, error);
   }
+  r->near_singular = 0;
   if (status == PW_OK) status = r->method->advance (r, t_end, error);
   if (status == PW_STOPPED) return status;
   if (status == PW_OK) status = pw_run_watchdog (r, error);
@@ -218,8 +219,8 @@ static int run_check_given (const pw_run *r, const double *x, int first, pw_erro
   char name[120];
   for (int j = 0, n = r->s->coords; x && j < n; j++)
     if (!(fabs (x[j]) < r->limits.extreme))
-      return pw_fail (error, PW_INPUT, "model %s: restart with %s = %g: expected a finite number", r->s->model,
-                      pw_system_state_name (r->s, first + j, name, sizeof name), x[j]);
+      return pw_fail (error, PW_INPUT, "model %s: restart with %s = %g: expected a magnitude below %g", r->s->model,
+                      pw_system_state_name (r->s, first + j, name, sizeof name), x[j], r->limits.extreme);
   return PW_OK;
 }
 
