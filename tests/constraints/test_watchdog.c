@@ -300,6 +300,32 @@ static void test_messages (void **state) {
   watchdog_expect ("slider-crank", NULL, 0, "galpha+index3", 9e-6, 4, "singular configuration");
 }
 
+/* A small body at a pin, whose moment of inertia is too extreme for its size. */
+static void watchdog_build_small (pw_model *m, const void *parameter) {
+  pw_add_body (m, &(pw_body){ .name = "rod", .mass = 1, .inertia = *(const double *)parameter });
+  pw_add_pin (m, &(pw_pin){ .name = "hinge", .body = { "rod", "ground" }, .at = { { 0, 0 }, { 0, 0 } } });
+  pw_add_pin (m, &(pw_pin){ .name = "end", .body = { "rod", "ground" }, .at = { { 1e-3, 0 }, { 1e-3, 0 } } });
+}
+
+/* The bounds in the message are in the units of the value, which is outside them. */
+static void watchdog_try_inertia (double inertia) {
+  static const pw_parameter list[] = { { .name = "inertia", .value = 1 }, { .name = NULL } };
+  static const pw_plugin_table table = { .abi = PW_ABI,
+                                         .size = sizeof (pw_plugin_table),
+                                         .parameters = list,
+                                         .parameters_size = sizeof (double),
+                                         .build = watchdog_build_small };
+  double value, low, high;
+  pw_error error = { 0 };
+  pw_system *s = scene_system (&table, "inertia", inertia, NULL);
+  assert_null (pw_run_open (s, "rk4", NULL, &error));
+  const char *is = strstr (error.text, "that goes with rod.phi is ");
+  assert_non_null (is);
+  assert_int_equal (sscanf (is, "that goes with rod.phi is %lf: expected 0, or %lf to %lf", &value, &low, &high), 3);
+  assert_true (value == inertia && (value < low || value > high));
+  pw_system_free (s);
+}
+
 static void test_extreme (void **state) {
   static const double mass[] = { 1e200, 1e-200 };
   pw_error error = { 0 }, beyond = { 0 };
@@ -307,8 +333,10 @@ static void test_extreme (void **state) {
   pw_system *far = scene_system (&watchdog_cart_table, "phi", 1e308, NULL);
   assert_null (pw_run_open (far, "bdf", NULL, &beyond));
   check_error (&beyond, PW_INPUT,
-               "model scene: values too extreme: bob.phi is initially 1e+308: expected less than 1e+100");
+               "model scene: values too extreme: bob.phi is initially 1e+308: expected a magnitude below 1e+100");
   pw_system_free (far);
+  watchdog_try_inertia (1e98);
+  watchdog_try_inertia (1e-108);
   for (int i = 0; i < 2; i++) {
     pw_error refused = { 0 };
     pw_system *s = scene_named ("n-four-bar", "m", mass[i]);
