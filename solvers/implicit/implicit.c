@@ -49,8 +49,7 @@ int pw_implicit_restart (pw_run *r, pw_error *error) {
 
 void pw_implicit_scale (const pw_dae *x, double c, double e, double *row_factor, double *column_factor) {
   const pw_system *s = x->tangent.run->s;
-  int n = x->n,
-      g_rows = x->enforces_velocities ? 0 : x->tangent.holonomic; /* rows of lambda in which g = 0 replaces J v = eta */
+  int n = x->n, g_rows = x->enforces_velocities ? 0 : x->tangent.holonomic; /* in which g = 0 replaces J v = eta */
   double mass = 0;
   for (int j = 0; j < n; j++) mass = fmax (mass, s->mass[j]);
   if (mass == 0) mass = 1;

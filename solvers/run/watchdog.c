@@ -57,6 +57,7 @@ static void watchdog_sample_sines (pw_run *r) {
     if (pw_evaluate_J_at (r->w, r->t, g->previous_q, r->v) != PW_OK) break;
     g->largest_sine = fmax (g->largest_sine, pw_watchdog_sine (r, NULL));
   }
+  r->w->failed = NULL;
   (void)pw_evaluate_J_at (r->w, r->t, r->q, r->v);
 }
 
