@@ -138,8 +138,8 @@ void pw_run_close (pw_run *r);
 
 /* Appends the state reached to the archive, and continues as a run loaded from it would: matrices are planned again,
  * and a multistep method restarts, which the statistics count.  Take samples of the last step before.  PW_RETRY near
- * a singular configuration, where nothing is done: try after the next step.  Errors: PW_METHOD if the state cannot be
- * evaluated; PW_RESOURCE. */
+ * a singular configuration, where nothing is done: try after the next step.  Errors: PW_METHOD or PW_INPUT if the
+ * state cannot be evaluated; PW_RESOURCE. */
 int pw_run_save (pw_run *r, pw_archive *a, pw_error *error);
 
 /* Loads a saved state into a run opened with the same system, method and settings that has not advanced; it continues

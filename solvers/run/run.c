@@ -99,16 +99,16 @@ int pw_run_renew (pw_run *r, pw_references references, pw_error *error) {
   else if (status == PW_OK)
     pw_watchdog_begin (r);
   run_close_method (r); /* it may use the previous saddle */
-  if (status == PW_RESOURCE) return status;
+  if (status == PW_RESOURCE || r->saddle == NULL) return status;
   int opened = r->method->open (r, error);
   if (opened != PW_OK) run_close_method (r);
   return status == PW_OK ? opened : status;
 }
 
-/* 1 if memory did not suffice to reopen the method: the run can only be closed. */
+/* 1 if the saddle or the method could not be reopened: the run can only be closed. */
 static int run_has_no_method (const pw_run *r, pw_error *error) {
   if (r->data) return 0;
-  pw_fail (error, PW_RESOURCE, "model %s: the run ended at t = %.6g s: out of memory", r->s->model, r->t);
+  pw_fail (error, PW_RESOURCE, "model %s: t = %.6g s: the method could not be reopened", r->s->model, r->t);
   return 1;
 }
 
