@@ -107,13 +107,13 @@ int pw_implicit_advance (pw_run *r, double t_end, pw_implicit_step *step, void (
   size_t n = (size_t)r->s->coords * sizeof (double);
   int status = whole ? implicit_step_around (r, step, h, fmin (t_end, r->breakpoint), &t1) : step (r, h, t1);
   if (t1 > end) h = t1 - r->t, whole = 0;
+  x->h = status == PW_OK ? h : 0;
   if (status != PW_OK) return pw_implicit_fail (r, status, h, error);
   pw_store_start (&x->last.start, r);
   memcpy (r->q, x->q1, n);
   memcpy (r->v, x->v1, n);
   accept (r);
   r->t = t1;
-  x->h = h;
   pw_dense_output_integrate_ledger (&x->last, r);
   r->statistics.steps++;
   pw_count_step (&x->counter, whole, t1);
