@@ -1,10 +1,9 @@
-/* What the benchmark programs share: a model opened and compiled, and a run that is timed. */
+/* Shared by the programs quick and demo: opens and compiles a model; ends the program on an error. */
 #ifndef BENCH_H
 #define BENCH_H
 
 #include <stdio.h>
 #include <stdlib.h>
-#include <time.h>
 #include "pinwheel-files.h"
 #include "pinwheel-solvers.h"
 
@@ -14,7 +13,7 @@ typedef struct {
   pw_system *system;
 } bench_scene;
 
-/* Ends the program with the error's text. */
+/* Ends the program with the text and the status of the error. */
 static inline void bench_fail (const char *what, const pw_error *error) {
   fprintf (stderr, "%s: %s\n", what, error->text);
   exit (-error->status);
@@ -34,11 +33,6 @@ static inline void bench_close (bench_scene *s) {
   pw_system_free (s->system);
   pw_model_free (s->model);
   pw_file_close (s->file);
-}
-
-/* Processor time used so far [s]. */
-static inline double bench_clock (void) {
-  return (double)clock () / CLOCKS_PER_SEC;
 }
 
 #endif

@@ -1,21 +1,23 @@
-/* effects: what an effect costs where it is used, and that it costs nothing where it is not.
+/* effects: measures what a physical effect costs in a scene, and checks that effects cost nothing in a scene without
+ * them.
  *
- *   effects [LIBRARY]     instructions per evaluation of the EzyRoller, exactly, by callgrind
+ *   effects [FOLDER]     instructions per evaluation of the EzyRoller, counted by callgrind
  *
- * First the EzyRoller alone, with the libpinwheel this program is linked to and with the one in the folder LIBRARY, which
- * has only the kinds the EzyRoller needs: the numbers are to be the same, else the exit status is 1.  Then with one effect
- * more at a time.  Kinds are found by name, so that one program goes with either library. */
+ * First the EzyRoller alone, with the libpinwheel to which this program is linked and with the one in FOLDER, which
+ * has only the element types of the EzyRoller: the counts must be equal, otherwise the exit status is 1.  Then the
+ * EzyRoller with one further effect at a time.  Element types are found by name, so that the program runs with both
+ * libraries. */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include "engine/engine.h"
 
-enum { EFFECTS_POOL = 64, EFFECTS_SPACING = 200, EFFECTS_ROUNDS = 10 };
-
-_Noreturn void engine_die (const char *what, const char *why) {
-  fprintf (stderr, "%s: %s\n", what, why);
-  exit (2);
-}
+enum {
+  EFFECTS_POOL = 64,     /* states that are evaluated */
+  EFFECTS_SPACING = 200, /* steps between them */
+  EFFECTS_ROUNDS = 10,   /* evaluations of each */
+  EFFECTS_COORDS = 12    /* at most 3 bodies or 2 with a spin angle, and 3 entries of the ground */
+};
 
 /* ---- Scenes ---- */
 
@@ -34,10 +36,6 @@ static void effects_wheel (pw_model *m) {
 
 static void effects_seat (pw_model *m) {
   pw_add_body (m, &(pw_body){ .name = "seat", .mass = 0.2, .inertia = 0.01, .start = { 0.1, 0, 0 } });
-}
-
-static void effects_none (pw_model *m) {
-  effects_wheel (m);
 }
 
 static void effects_gravity (pw_model *m) {
@@ -103,7 +101,7 @@ static const struct {
   const char *key, *what;
   void (*add) (pw_model *m);
 } effects_scene[] = {
-  { "none", "the EzyRoller alone", effects_none },
+  { "none", "the EzyRoller alone", effects_wheel },
   { "gravity", "gravity along a slope", effects_gravity },
   { "torque", "a second torque, constant", effects_torque },
   { "spring", "a spring with a damper", effects_spring },
@@ -127,10 +125,10 @@ static const pw_parameter effects_parameter[] = {
 
 static void effects_build (pw_model *m, const void *parameters) {
   const effects_parameters *p = parameters;
-  double light = p->massless > 0 ? 0 : 1;
+  double factor = p->massless > 0 ? 0 : 1;
   pw_add_body (m, &(pw_body){ .name = "frame", .mass = 1, .inertia = 0.1 });
   pw_add_body (
-      m, &(pw_body){ .name = "steer", .mass = 0.1 * light, .inertia = 0.01 * light, .start = { 0.375, 0, PW_PI } });
+      m, &(pw_body){ .name = "steer", .mass = 0.1 * factor, .inertia = 0.01 * factor, .start = { 0.375, 0, PW_PI } });
   effects_add (m, "pin", &(pw_pin){ .name = "B", .body = { "frame", "steer" }, .at = { { 0.5, 0 }, { -0.125, 0 } } });
   effects_add (m, "wheel", &(pw_wheel){ .name = "C", .body = "steer", .at = { 0.125, 0 } });
   effects_add (m, "torque",
@@ -149,10 +147,13 @@ static const pw_plugin_table effects_table = { .abi = PW_ABI,
 
 /* ---- Under callgrind ---- */
 
+static const char *const effects_steering[] = { "massive", "massless" };
+
 typedef struct {
   pw_system *system;
   pw_run *run;
-  double t[EFFECTS_POOL], q[EFFECTS_POOL][12], v[EFFECTS_POOL][12], a[12], lambda[8];
+  double t[EFFECTS_POOL], q[EFFECTS_POOL][EFFECTS_COORDS], v[EFFECTS_POOL][EFFECTS_COORDS];
+  double a[EFFECTS_COORDS], lambda[8]; /* at most 4 rows and 3 of a weld or a drive */
 } effects_data;
 
 static long effects_evaluate (void *context, long n) {
@@ -164,11 +165,11 @@ static long effects_evaluate (void *context, long n) {
   return n;
 }
 
-/* Opens a scene. */
 static pw_run *effects_open (const char *key, int massless, pw_system **system) {
   pw_error e = { 0 };
   int scene = 0;
-  while (scene < EFFECTS_SCENES - 1 && strcmp (effects_scene[scene].key, key) != 0) scene++;
+  while (scene < EFFECTS_SCENES && strcmp (effects_scene[scene].key, key) != 0) scene++;
+  if (scene == EFFECTS_SCENES) engine_die (key, "no such scene");
   pw_model *m = pw_model_new ("effects", &effects_table, &e);
   if (m) pw_model_set (m, "scene", scene, &e), pw_model_set (m, "massless", massless, &e);
   pw_system *s = m && pw_model_build (m, &e) == PW_OK ? pw_system_compile (m, &e) : NULL;
@@ -184,8 +185,9 @@ static void effects_close (pw_run *r, pw_system *s) {
   pw_system_free (s);
 }
 
-/* States along the way of the EzyRoller alone, the same for all scenes, since a sine takes more instructions for one angle
- * than for another; what else the scene has stays as it starts. */
+/* Fills the pool from a run of the EzyRoller alone: all scenes are evaluated at the same states, since the
+ * instructions of a sine depend on the angle.  Coordinates that the EzyRoller does not have keep their initial
+ * values. */
 static void effects_fill (effects_data *d, int massless) {
   pw_error e = { 0 };
   pw_system *s;
@@ -202,10 +204,10 @@ static void effects_fill (effects_data *d, int massless) {
   effects_close (alone, s);
 }
 
-/* Evaluates in the function that callgrind counts. */
-static int effects_child (const char *key, const char *side) {
+/* The process that callgrind watches: evaluates the pool several times. */
+static int effects_child (const char *key, const char *steering) {
   static effects_data d;
-  int massless = strcmp (side, "massless") == 0;
+  int massless = strcmp (steering, effects_steering[1]) == 0;
   d.run = effects_open (key, massless, &d.system);
   effects_fill (&d, massless);
   engine_counted (&(timing_work){ effects_evaluate, &d }, EFFECTS_ROUNDS * EFFECTS_POOL);
@@ -221,12 +223,11 @@ static int effects_list_kinds (void) {
 
 /* ---- The table ---- */
 
-static const char *const effects_side[] = { "massive", "massless" };
-
+/* Instructions per evaluation. */
 static double effects_count (const char *program, const char *key, int massless) {
-  double all = engine_count (program, key, effects_side[massless], "pw_run_accelerate");
-  if (all == 0) engine_die (key, "nothing was counted; is valgrind installed?");
-  return all / (EFFECTS_ROUNDS * EFFECTS_POOL);
+  double instructions = engine_count (program, key, effects_steering[massless], "pw_run_accelerate");
+  if (instructions == 0) engine_die (key, "nothing was counted; is valgrind installed?");
+  return instructions / (EFFECTS_ROUNDS * EFFECTS_POOL);
 }
 
 static void effects_print (const char *what, const double count[2], const double base[2]) {
@@ -236,7 +237,7 @@ static void effects_print (const char *what, const double count[2], const double
   fflush (stdout);
 }
 
-/* A line for the EzyRoller alone with the library that is found now. */
+/* Prints the element types of the library that the dynamic linker finds, and the counts of the EzyRoller alone. */
 static void effects_library (const char *program, const char *name, double count[2]) {
   char command[1000];
   printf ("%s:", name);
@@ -247,28 +248,28 @@ static void effects_library (const char *program, const char *name, double count
   effects_print ("  the EzyRoller alone", count, NULL);
 }
 
-/* The EzyRoller alone with the library in a folder, which is looked for before any other. */
+/* The same with the library in a folder, which the dynamic linker then searches first. */
 static void effects_other_library (const char *program, const char *folder, double count[2]) {
-  const char *others = getenv ("LD_LIBRARY_PATH");
-  char path[8000], before[4000];
-  snprintf (before, sizeof before, "%s", others ? others : "");
-  snprintf (path, sizeof path, "%.3000s:%s", folder, before);
+  const char *given = getenv ("LD_LIBRARY_PATH");
+  char path[8000], saved[4000];
+  snprintf (saved, sizeof saved, "%s", given ? given : "");
+  snprintf (path, sizeof path, "%.3000s:%s", folder, saved);
   setenv ("LD_LIBRARY_PATH", path, 1);
   effects_library (program, "few kinds", count);
-  others ? setenv ("LD_LIBRARY_PATH", before, 1) : unsetenv ("LD_LIBRARY_PATH");
+  given ? setenv ("LD_LIBRARY_PATH", saved, 1) : unsetenv ("LD_LIBRARY_PATH");
 }
 
 int main (int argc, char **argv) {
   double all[2], few[2];
-  int same = 1;
+  int equal = 1;
   if (argc == 4 && strcmp (argv[1], "--count") == 0) return effects_child (argv[2], argv[3]);
   if (argc == 2 && strcmp (argv[1], "--kinds") == 0) return effects_list_kinds ();
   printf ("instructions per evaluation, steering with mass and without; difference to the EzyRoller alone\n\n");
   effects_library (argv[0], "all kinds", all);
   if (argc == 2) {
     effects_other_library (argv[0], argv[1], few);
-    same = all[0] == few[0] && all[1] == few[1];
-    printf ("%s to the instruction\n", same ? "the same" : "NOT the same");
+    equal = all[0] == few[0] && all[1] == few[1];
+    printf ("%s to the instruction\n", equal ? "the same" : "NOT the same");
   }
   printf ("\nwith one effect more\n");
   for (int i = 1; i < EFFECTS_SCENES; i++) {
@@ -276,5 +277,5 @@ int main (int argc, char **argv) {
                         effects_count (argv[0], effects_scene[i].key, 1) };
     effects_print (effects_scene[i].what, count, all);
   }
-  return !same;
+  return !equal;
 }

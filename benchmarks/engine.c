@@ -1,10 +1,10 @@
-/* engine: how fast Pinwheel is against programs written by hand, and how its cost grows with the size of a scene.
+/* engine: compares Pinwheel with programs written by hand, and measures its cost against the size of a scene.
  *
- *   engine                     every claim; writes benchmarks/results/engine-MACHINE.csv
- *   engine KEY...              only these (rhs, chain-1000, growth, memory, ...); writes nothing
- *   engine --count KEY SIDE    the work of one side alone, for callgrind
+ *   engine                     everything; writes benchmarks/results/engine-MACHINE.csv
+ *   engine KEY...              comparisons whose key starts with KEY (rhs, chain-1000, ...), growth, memory; no file
+ *   engine --count KEY SIDE    the work of one side ("base" or "ours") alone, for callgrind
  *
- * Times are medians over interleaved pairs of batches; instructions are exact, per call. */
+ * Times are medians over pairs of alternating batches; instructions are exact, per unit. */
 #include <ctype.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -12,8 +12,8 @@
 #include <sys/stat.h>
 #include "engine/engine.h"
 
-enum { ENGINE_PAIRS = 21, ENGINE_SIZES = 5 };
-static const double engine_batch = 0.01; /* [s] */
+enum { ENGINE_PAIRS = 21, ENGINE_IDA_BATCHES = 5, ENGINE_SIZES = 5 /* of a scene, at most */ };
+static const double engine_batch = 0.01; /* duration [s] */
 
 static engine_case engine_cases[] = {
   { "rhs", "EzyRoller, one evaluation", "evaluation", 1.5, engine_open_rhs, engine_close_ezy, .calls = 640 },
@@ -85,7 +85,7 @@ static engine_case engine_cases[] = {
 typedef struct {
   FILE *csv;
   const char *program;
-  char *const *only; /* keys, or NULL: everything */
+  char *const *only; /* beginnings of keys, or NULL: everything */
   int met, missed;
 } engine_report;
 
@@ -119,27 +119,28 @@ static void engine_target (char *buffer, size_t size, double low, double high) {
     snprintf (buffer, size, "<= %g", high);
 }
 
-/* One line of the table and of the file; a value of 0 is left out, high = 0: no target. */
+/* A line of the table and of the file.  Values of 0 are left out; if high > 0, the ratio must be in [low, high]. */
 typedef struct {
   const char *what, *unit;
   double base, ours, ratio, base_count, our_count, low, high, difference;
 } engine_line;
 
 static void engine_put (engine_report *r, const engine_line *l) {
-  char t[7][40];
+  enum { WIDTH = 40 };
+  char target[WIDTH], base[WIDTH], ours[WIDTH], ratio_text[WIDTH], counts[2][WIDTH], agreement[WIDTH] = "";
   const char *verdict = engine_verdict (r, l->ratio, l->low, l->high);
-  const char *ratio = engine_number (t[6], sizeof t[6], l->ratio, 3);
-  engine_target (t[0], sizeof t[0], l->low, l->high);
-  printf ("%-58s %10s %10s %8s %10s %10s  %-10s %-6s %s\n", l->what, engine_number (t[1], sizeof t[1], l->base, 1),
-          engine_number (t[2], sizeof t[2], l->ours, 1), ratio, engine_number (t[3], sizeof t[3], l->base_count, 1),
-          engine_number (t[4], sizeof t[4], l->our_count, 1), t[0], verdict,
-          l->difference > 0 ? (snprintf (t[5], sizeof t[5], "agree to %.0e", l->difference), t[5]) : "");
+  const char *ratio = engine_number (ratio_text, WIDTH, l->ratio, 3);
+  engine_target (target, WIDTH, l->low, l->high);
+  if (l->difference > 0) snprintf (agreement, WIDTH, "agree to %.0e", l->difference);
+  printf ("%-58s %10s %10s %8s %10s %10s  %-10s %-6s %s\n", l->what, engine_number (base, WIDTH, l->base, 1),
+          engine_number (ours, WIDTH, l->ours, 1), ratio, engine_number (counts[0], WIDTH, l->base_count, 1),
+          engine_number (counts[1], WIDTH, l->our_count, 1), target, verdict, agreement);
   fflush (stdout);
   if (r->csv == NULL) return;
   fprintf (r->csv, "\"%s\",%s,%s,%s,%s,%s,%s,%s,%s\n", l->what + strspn (l->what, " "), l->unit,
-           engine_number (t[1], sizeof t[1], l->base, 2), engine_number (t[2], sizeof t[2], l->ours, 2), ratio,
-           engine_number (t[3], sizeof t[3], l->base_count, 2), engine_number (t[4], sizeof t[4], l->our_count, 2),
-           t[0], verdict);
+           engine_number (base, WIDTH, l->base, 2), engine_number (ours, WIDTH, l->ours, 2), ratio,
+           engine_number (counts[0], WIDTH, l->base_count, 2), engine_number (counts[1], WIDTH, l->our_count, 2),
+           target, verdict);
 }
 
 static void engine_title (const char *title) {
@@ -168,24 +169,24 @@ static timing_result engine_compare (engine_report *r, engine_case *c) {
   return t;
 }
 
-/* One sin and cos of the same angle: the unit in which machines differ less than in ns. */
-static long engine_pair (void *context, long n) {
+/* One sin and cos of the same angle: a unit of time that differs less between machines than the ns. */
+static long engine_sincos (void *context, long n) {
   double *angle = context, sum = 0;
   for (long i = 0; i < n; i++) sum += sin (angle[i % 64]) + cos (angle[i % 64]);
-  angle[64] = sum; /* somebody could look */
+  angle[64] = sum; /* keeps the compiler from removing the loop */
   return n;
 }
 
-static double engine_time_pair (void) {
-  double angle[65];
-  timing_work work = { engine_pair, angle };
+static double engine_time_sincos (void) {
+  double angle[65]; /* the last one takes the sum */
+  timing_work work = { engine_sincos, angle };
   for (int i = 0; i < 64; i++) angle[i] = 0.05 * i - 1.6;
   return timing_alone (&work, ENGINE_PAIRS, engine_batch);
 }
 
-/* The hand-written programs themselves against what such programs are known to take, with 15 ns for a pair. */
-static void engine_units (engine_report *r, double pair, const char *what, double ns, double known) {
-  engine_put (r, &(engine_line){ what, "sin+cos pair", pair, ns, ns / pair, .high = 1.3 * known / 15 });
+/* Checks a program by hand: `known` [ns] is its time where a sin and a cos take 15 ns; 30 % more is accepted. */
+static void engine_units (engine_report *r, double sincos, const char *what, double ns, double known) {
+  engine_put (r, &(engine_line){ what, "sin+cos pair", sincos, ns, ns / sincos, .high = 1.3 * known / 15 });
 }
 
 /* ---- Growth ---- */
@@ -199,7 +200,7 @@ static double engine_slope (const int *size, const double *time, int from, int c
   return (n * sxy - sx * sy) / (n * sxx - sx * sx);
 }
 
-/* Flatness of cost per body and slope of cost against size, from the second size on. */
+/* The spread of the times per body, and the slope of log time against log size, from the second size on. */
 static void engine_growth_lines (engine_report *r, const char *name, const int *size, const double *ns, int count,
                                  int target) {
   char what[2][80];
@@ -217,10 +218,10 @@ static void engine_growth_lines (engine_report *r, const char *name, const int *
 typedef struct {
   const char *name;
   pw_system *(*open) (int size);
-  int free, chain; /* bent as a free chain; a chain at all */
+  engine_shape shape;
   engine_task task;
+  int target; /* 1: growth must be linear */
   int count, size[ENGINE_SIZES];
-  int target;
 } engine_growth;
 
 static void engine_grow (engine_report *r, const engine_growth *g) {
@@ -230,9 +231,9 @@ static void engine_grow (engine_report *r, const engine_growth *g) {
   for (int i = 0; i < g->count; i++) {
     pw_system *s = g->open (g->size[i]);
     bodies[i] = s->bodies;
-    cost[i] = engine_cost_open (s, g->task, g->chain, g->free);
+    cost[i] = engine_cost_open (s, g->task, g->shape);
   }
-  for (int k = 0; k < (g->task == ENGINE_IDA ? 5 : ENGINE_PAIRS); k++)
+  for (int k = 0; k < (g->task == ENGINE_IDA ? ENGINE_IDA_BATCHES : ENGINE_PAIRS); k++)
     for (int i = 0; i < g->count; i++) engine_cost_take (cost[i]);
   for (int i = 0; i < g->count; i++) {
     char what[80];
@@ -245,11 +246,11 @@ static void engine_grow (engine_report *r, const engine_growth *g) {
 
 static void engine_grow_all (engine_report *r) {
   static const engine_growth all[] = {
-    { "chain, evaluation", engine_chain, 0, 1, ENGINE_EVALUATION, 5, { 10, 100, 1000, 10000, 100000 }, 1 },
-    { "chain, projection", engine_chain, 0, 1, ENGINE_PROJECTION, 5, { 10, 100, 1000, 10000, 100000 }, 1 },
-    { "chain, step of ida+ggl", engine_chain, 0, 1, ENGINE_IDA, 4, { 10, 100, 1000, 10000 }, 1 },
-    { "snake, evaluation", engine_snake, 1, 1, ENGINE_EVALUATION, 4, { 10, 100, 1000, 10000 }, 1 },
-    { "grid, evaluation", engine_grid, 0, 0, ENGINE_EVALUATION, 4, { 2, 7, 22, 70 }, 0 },
+    { "chain, evaluation", engine_chain, ENGINE_PINNED, ENGINE_EVALUATION, 1, 5, { 10, 100, 1000, 10000, 100000 } },
+    { "chain, projection", engine_chain, ENGINE_PINNED, ENGINE_PROJECTION, 1, 5, { 10, 100, 1000, 10000, 100000 } },
+    { "chain, step of ida+ggl", engine_chain, ENGINE_PINNED, ENGINE_IDA, 1, 4, { 10, 100, 1000, 10000 } },
+    { "snake, evaluation", engine_snake, ENGINE_FREE, ENGINE_EVALUATION, 1, 4, { 10, 100, 1000, 10000 } },
+    { "grid, evaluation", engine_grid, ENGINE_DESCRIBED, ENGINE_EVALUATION, 0, 4, { 2, 7, 22, 70 } },
   };
   for (size_t i = 0; i < sizeof all / sizeof *all; i++) engine_grow (r, &all[i]);
 }
@@ -269,9 +270,9 @@ static void engine_memory_lines (engine_report *r) {
   engine_put (r, &(engine_line){ "validation and ordering [s]", "s", .ratio = time, .high = 2 });
 }
 
-/* ---- The whole ---- */
+/* ---- The program ---- */
 
-/* "amd-epyc-7763" */
+/* The processor's name as part of a file name: "amd-epyc-7763". */
 static void engine_machine (char *name, size_t size) {
   char line[300] = "";
   FILE *file = fopen ("/proc/cpuinfo", "r");
@@ -289,21 +290,21 @@ static void engine_machine (char *name, size_t size) {
 }
 
 static void engine_everything (engine_report *r) {
-  double hand[3] = { 0 };
+  double ezyroller = 0, chain_link = 0, ida = 0; /* times of programs by hand [ns] */
   engine_title ("Against programs written by hand: ns per unit, instructions per unit");
   for (engine_case *c = engine_cases; c->key; c++) {
     if (!engine_wanted (r, c->key)) continue;
     timing_result t = engine_compare (r, c);
-    if (strcmp (c->key, "rhs") == 0) hand[0] = t.base;
-    if (strcmp (c->key, "chain-1000") == 0) hand[1] = t.base;
-    if (strcmp (c->key, "ida-6") == 0) hand[2] = t.base;
+    if (strcmp (c->key, "rhs") == 0) ezyroller = t.base;
+    if (strcmp (c->key, "chain-1000") == 0) chain_link = t.base;
+    if (strcmp (c->key, "ida-6") == 0) ida = t.base;
   }
   if (r->only == NULL) {
-    double pair = engine_time_pair ();
+    double sincos = engine_time_sincos ();
     engine_title ("The hand-written programs, in units of one sin and cos (base)");
-    engine_units (r, pair, "EzyRoller, evaluation by hand", hand[0], 80);
-    engine_units (r, pair, "chain of 1000, evaluation by hand, per body", hand[1], 49);
-    engine_units (r, pair, "EzyRoller, IDA by hand, step", hand[2], 5000);
+    engine_units (r, sincos, "EzyRoller, evaluation by hand", ezyroller, 80);
+    engine_units (r, sincos, "chain of 1000, evaluation by hand, per body", chain_link, 49);
+    engine_units (r, sincos, "EzyRoller, IDA by hand, step", ida, 5000);
   }
   if (engine_wanted (r, "growth")) engine_title ("Growth with the size of the scene"), engine_grow_all (r);
   if (engine_wanted (r, "memory")) engine_title ("Chain of 100,000 bodies"), engine_memory_lines (r);

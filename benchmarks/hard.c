@@ -1,10 +1,11 @@
-/* hard: every method on every hard case, a matrix of verdicts against what is expected.
+/* hard: runs every method on every hard case, and compares the matrix of verdicts with the expected one.
  *
  *     hard [-j CELLS] [-c CASE] [-m METHOD] [-s] [-v] [-o PAGE] FOLDER
  *
- * Writes PAGE.md and PAGE.csv.  FOLDER holds cases/ and models/; CASE and METHOD are patterns; -s: specialised scenes.
- * Each cell runs in its own process with a limit of processor time, so that a crash or a hang becomes a verdict.  Exit
- * status: 0 if all verdicts are as expected and none is wrong, 1 if not, 2 for a mistake in the cases. */
+ * FOLDER has the folders cases and models.  CELLS: runs at a time; CASE and METHOD: patterns of names; -s: with
+ * specialised code; -v: prints every cell; -o: writes PAGE.md and PAGE.csv.  Each cell runs in its own process with
+ * a limit of processor time, so that a crash or an endless run becomes a verdict.  Exit status: 0 if all verdicts
+ * are as expected, 1 if not, 2 for a mistake in the cases. */
 #define _XOPEN_SOURCE 700
 #include <dirent.h>
 #include <fnmatch.h>
@@ -16,15 +17,19 @@
 #include <unistd.h>
 #include "hard/hard.h"
 
-enum { HARD_SLOTS = 64, HARD_ELAPSED = 10 /* limit of elapsed time, relative to that of processor time */ };
+enum {
+  HARD_SLOTS = 64,  /* most runs at a time */
+  HARD_ELAPSED = 10 /* limit of the elapsed time, relative to that of the processor time */
+};
 
 typedef struct {
   const char *folder, *only_case, *only_method, *page;
-  int slots, verbose, specialised;
+  int slots; /* runs at a time */
+  int verbose, specialised;
   hard_case *cases;
   int count, methods, done; /* cases, methods, finished cells */
-  char method[HARD_METHODS][48];
-  hard_result *result;
+  char method[HARD_METHODS][HARD_NAME];
+  hard_result *result; /* [case * methods + method] */
 } hard;
 
 /* A running cell. */
@@ -203,7 +208,7 @@ int main (int argc, char **argv) {
   x.result = calloc ((size_t)(x.count * x.methods) + 1, sizeof *x.result);
   if (x.result == NULL || x.count * x.methods == 0) return hard_usage ();
   hard_all (&x);
-  const hard_matrix m = { x.cases, x.count, x.methods, (const char (*)[48])x.method, x.result };
+  const hard_matrix m = { x.cases, x.count, x.methods, (const char (*)[HARD_NAME])x.method, x.result };
   hard_print (&m, stdout);
   if (x.page) {
     hard_write (&x, ".md", &m, hard_page);

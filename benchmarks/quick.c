@@ -1,36 +1,33 @@
-/* quick: what 100 s of the EzyRoller cost on this machine, by method; the median of some repeats. */
+/* quick: processor time of 100 s of the EzyRoller on this machine, by method; the median of repeated runs. */
 #include "bench.h"
+#include "timing.h"
 
 enum { QUICK_SECONDS = 100, QUICK_REPEATS = 9 };
 
 typedef struct {
   const char *method;
-  double step, rtol;
-  int ledger;
+  double step; /* of rk4 [s]; 0: ida */
+  double rtol; /* of ida; 0: rk4 */
+  int ledger;  /* integrates the energy ledger, too */
 } quick_case;
 
-/* One run: its processor time, and what it counted. */
+/* The processor time of one run [s], and its statistics. */
 static double quick_run (const quick_case *c, pw_statistics *statistics) {
   pw_error error = { 0 };
   bench_scene scene = bench_open ("ezyroller");
   pw_settings settings = {
     .span = QUICK_SECONDS, .step = c->step, .rtol = c->rtol, .atol = c->rtol, .ledger = c->ledger
   };
-  double start = bench_clock ();
+  double start = timing_now ();
   pw_run *r = pw_run_open (scene.system, c->method, &settings, &error);
   while (r && pw_run_time (r) < QUICK_SECONDS)
     if (pw_run_advance (r, QUICK_SECONDS, &error) != PW_OK) break;
-  double cpu = bench_clock () - start;
+  double cpu = timing_now () - start;
   if (error.status != PW_OK) bench_fail (c->method, &error);
   *statistics = *pw_run_statistics (r);
   pw_run_close (r);
   bench_close (&scene);
   return cpu;
-}
-
-static int quick_order (const void *a, const void *b) {
-  double x = *(const double *)a, y = *(const double *)b;
-  return (x > y) - (x < y);
 }
 
 int main (void) {
@@ -44,8 +41,7 @@ int main (void) {
     pw_statistics n;
     double cpu[QUICK_REPEATS];
     for (int k = 0; k < QUICK_REPEATS; k++) cpu[k] = quick_run (&cases[i], &n);
-    qsort (cpu, QUICK_REPEATS, sizeof *cpu, quick_order);
-    double median = cpu[QUICK_REPEATS / 2];
+    double median = timing_median (cpu, QUICK_REPEATS);
     printf ("%-16s %-7s %9.4f %9.4f %9ld %9ld %9.0f %9.0f\n", cases[i].method, cases[i].ledger ? "yes" : "no", median,
             cpu[0], n.steps, n.rhs, 1e9 * median / (double)n.steps, 1e9 * median / (double)n.rhs);
   }

@@ -1,10 +1,10 @@
 #!/bin/sh
-# Tables and figures of docs/benchmarks.md from the results of `make bench`, or of its parts.
+# Writes the tables and figures of docs/benchmarks.md from the results of `make bench`, or of its parts.
 #
-#   report.sh [MACHINE]     reads benchmarks/results/*-MACHINE.csv (the newest); PAGE: instead of docs/benchmarks.md
+#   report.sh [MACHINE]     reads benchmarks/results/*-MACHINE.csv, by default the newest; PAGE: another page to write
 #
-# Replaces what stands between the lines <!-- PART --> and <!-- end --> of the page, for each part that has a result, and
-# draws the figures as SVG and PNG, if there is a gnuplot.
+# Replaces the lines between <!-- PART --> and <!-- end --> of the page for each part that has a result, and draws the
+# figures as PNG if gnuplot is installed.
 set -eu
 results=benchmarks/results page=${PAGE:-docs/benchmarks.md} figures=docs/figures
 export LC_ALL=C
@@ -13,10 +13,10 @@ machine=${1:-$(basename "$newest" .csv | sed 's/work-precision-//')}
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
 
-# Methods that are shown; the CSV has all of them.
+# Methods in the tables and figures; the CSV has all methods.
 shown='rk4+projection erk5+projection erk8+projection adams+none bdf+projection ida+baumgarte ida+ggl radau+ggl galpha+index3'
 
-# section PART: puts standard input into the page.
+# section PART: replaces this part of the page by standard input.
 section () {
   cat >"$work/section"
   awk -v part="<!-- $1 -->" -v file="$work/section" '
@@ -27,8 +27,8 @@ section () {
   cp "$work/page" "$page"
 }
 
-# draw NAME HEIGHT TITLE: a gnuplot script from standard input, as PNG with the look of the program's figures; the height is in
-# thousandths of the width.
+# draw NAME HEIGHT TITLE: runs a gnuplot script from standard input; writes a PNG in the style of the program's figures.
+# HEIGHT is in thousandths of the width.
 draw () {
   cat >"$work/script"
   command -v gnuplot >/dev/null || { echo 'report.sh: no gnuplot, no figures' >&2; return 0; }
@@ -38,7 +38,7 @@ draw () {
     cat "$work/script"; echo "unset multiplot"; } | LC_ALL= LC_CTYPE=C.UTF-8 LC_NUMERIC=C gnuplot
 }
 
-# Colour, mark and dash of a method's line: told apart in black and white too.
+# style METHOD: colour, mark and dash of its line, which can be distinguished in black and white, too.
 style () {
   case $1 in
   rk4+*) echo "lc rgb '#004488' pt 7 dt 1" ;;

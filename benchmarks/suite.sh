@@ -1,11 +1,11 @@
 #!/bin/sh
-# The whole suite: `make bench`.
+# Runs all benchmarks: `make bench`.
 #
-#   suite.sh BUILD          reads BUILD/pinwheel and BUILD/benchmarks, works in BUILD/bench, writes benchmarks/results
+#   suite.sh BUILD          runs BUILD/pinwheel and BUILD/benchmarks, works in BUILD/bench, writes benchmarks/results
 #
-# What has been done since the program was built is not done again, so a suite that was stopped goes on where it was;
-# remove BUILD/bench to start anew.  Results are one CSV per part and machine, from which benchmarks/report.sh makes the
-# tables and figures of docs/benchmarks.md.  LIMIT=0.05 REPEATS=1: a trial.
+# Steps that have finished since the program was built are skipped, so that an interrupted suite continues; remove
+# BUILD/bench to run all of them again.  Results are one CSV per part and machine, from which benchmarks/report.sh
+# writes the tables and figures of docs/benchmarks.md.  For a quick trial: LIMIT=0.05 REPEATS=1.
 set -eu
 build=$1
 program=$build/pinwheel work=$build/bench results=benchmarks/results
@@ -15,7 +15,7 @@ mkdir -p "$work" "$results"
 PINWHEEL_MODELS=benchmarks/scenes${PINWHEEL_MODELS:+:$PINWHEEL_MODELS}
 export PINWHEEL_MODELS LC_ALL=C
 
-# Scenes of the work-precision part: group, name, model and options.  Step ladders begin where the method is of some use.
+# Scenes of the work-precision part: group, name, model and options.  Step ladders begin at the largest useful step.
 scenes='smooth ezyroller ezyroller --step-ladder 0.1:4e-4
 smooth chaplygin-sleigh chaplygin-sleigh --step-ladder 0.1:4e-4
 smooth knife-edge-incline knife-edge-incline --step-ladder 0.1:4e-4
@@ -35,7 +35,7 @@ singular slider-crank slider-crank --set l2=1.001 --step-ladder 0.02:1e-4
 stiff stiff-tyres stiff-tyres --step-ladder 1e-3:1e-5 --rtol-ladder 1e-3:1e-9
 stiff stiff-steering stiff-steering --step-ladder 1e-3:1e-5 --rtol-ladder 1e-3:1e-9
 stiff stiff-bushings stiff-bushings --step-ladder 1e-3:1e-5 --rtol-ladder 1e-3:1e-9'
-# Methods that are measured with code specialised for the scene, too.
+# Methods that are also measured with code specialised for the scene.
 specialised=rk4+projection,erk5+projection,erk8+projection,bdf+projection
 limit=${LIMIT:-0.3} repeats=${REPEATS:-3} # of a run: processor time [s]; timed runs
 
@@ -44,7 +44,7 @@ limit=${LIMIT:-0.3} repeats=${REPEATS:-3} # of a run: processor time [s]; timed 
 count=$(printf '%s\n' "$scenes" | wc -l)
 total=$((count + 5)) number=0 begun=$(date +%s)
 
-# step NAME COMMAND...: runs it in the folder BUILD/bench/NAME, unless that is done; its words go to a log there.
+# step NAME COMMAND...: runs the command unless it is done; its output goes to files in BUILD/bench/NAME.
 step () {
   name=$1
   shift
@@ -62,7 +62,7 @@ step () {
     printf '%4d s, %d s in all\n' $(($(date +%s) - from)) $(($(date +%s) - begun))
   else
     status=$?
-    [ $status = 130 ] && { echo 'interrupted; make bench goes on from here'; exit 130; }
+    [ $status = 130 ] && { echo 'interrupted; make bench continues here'; exit 130; }
     echo "FAILED, status $status: $(tail -1 "$work/$name/errors")"
     failed="$failed $name"
   fi
@@ -78,8 +78,8 @@ scene () {
       -o "$work/$name/specialised"
 }
 
-# The original program held the torque over each step, projected with the pseudo-inverse, and added up its work by
-# rectangles: the sum is made here, from a table with a row per step.
+# The original program held the torque constant over each step, projected with the pseudo-inverse, and summed its work
+# by the rectangle rule: awk computes that sum from a table with a row per step.
 original () {
   "$program" compare ezyroller --methods rk4+projection:metric=identity:inputs=held,rk4+projection \
     --step-ladder 0.1:2e-4 --repeats "$repeats" -o "$work/original"
@@ -112,7 +112,7 @@ effects () {
 
 # ---- Results ----
 
-# The columns that matter, in four digits; the reason is the last one and may hold commas.
+# The columns of the reports, with four digits; the last one, the reason, may have commas.
 gather () {
   printf 'group,scene,engine,method,ladder,rung,status,t,end_length,end_angle,largest_length,largest_angle,multiplier,below,order,position,velocity,balance,steps,rhs,jacobians,factorisations,cpu,spread,reason\n'
   { printf '%s\n' "$scenes"; echo original original; } | while read -r group name options; do
@@ -144,7 +144,7 @@ references () {
   done
 }
 
-# keep STEP FILE NAME: a result of a step.
+# keep STEP FILE NAME: copies a file of a finished step to the results.
 keep () {
   if [ -f "$work/$1/done" ]; then cp "$work/$1/$2" "$results/$3"; fi
 }

@@ -1,5 +1,5 @@
-/* Timing of small pieces of work, two against each other: batches of both alternate, so that a machine that is slow
- * for a while is slow for both, and the median of the pairs' ratios counts. */
+/* Times small pieces of work, one alone or two against each other.  Batches of both alternate, so that a slow phase
+ * of the machine affects both; the result is the median of the ratios of adjacent batches. */
 #ifndef TIMING_H
 #define TIMING_H
 
@@ -15,9 +15,10 @@ typedef struct {
   void *context;
 } timing_work;
 
-/* What a comparison gives: medians over the pairs, per unit [ns]. */
+/* The result of a comparison: medians over the pairs. */
 typedef struct {
-  double base, ours, ratio; /* ratio: the median of the pairs' own, ours / base */
+  double base, ours; /* time per unit [ns] */
+  double ratio;      /* of ours / base in each pair */
 } timing_result;
 
 /* Processor time of this process so far [s]. */
@@ -32,6 +33,7 @@ static inline int timing_order (const void *a, const void *b) {
   return (x > y) - (x < y);
 }
 
+/* Sorts the values. */
 static inline double timing_median (double *value, int count) {
   qsort (value, (size_t)count, sizeof *value, timing_order);
   return count % 2 ? value[count / 2] : (value[count / 2 - 1] + value[count / 2]) / 2;
@@ -44,7 +46,7 @@ static inline double timing_batch (const timing_work *w, long n) {
   return 1e9 * (timing_now () - start) / (double)units;
 }
 
-/* How often the work fits into the given time [s]; warms up on the way. */
+/* How many times the work can be done in the given time [s]; also warms up the caches. */
 static inline long timing_calibrate (const timing_work *w, double seconds) {
   for (long n = 1;; n *= 2) {
     double start = timing_now ();
@@ -62,7 +64,7 @@ static inline double timing_alone (const timing_work *w, int batches, double sec
   return timing_median (ns, batches);
 }
 
-/* Both, in interleaved pairs of batches of about this duration [s] each; every other pair in the other order. */
+/* Compares two pieces of work in pairs of batches of about this duration [s] each; the order alternates. */
 static inline timing_result timing_compare (const timing_work *base, const timing_work *ours, int pairs,
                                             double seconds) {
   double a[TIMING_PAIRS_MAX], b[TIMING_PAIRS_MAX], ratio[TIMING_PAIRS_MAX];

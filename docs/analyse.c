@@ -1,15 +1,16 @@
-/* Analyses the car with a trailer of analysis.md: critical speed, growth in reverse, what parameters change.  Compile
- * it as embed.c, and run it with the model:  ./analyse ./car-trailer.yaml */
+/* Analyses the car with a trailer of analysis.md: critical speed, growth in reverse, what parameters change.
+ * Compile it like embed.c, and run it with the model:  ./analyse ./car-trailer.yaml */
 #include <stdio.h>
 #include "pinwheel-analysis.h"
 #include "pinwheel-files.h"
 
+/* The model of a file, in which one parameter varies. */
 typedef struct {
   pw_file *file;
   const char *parameter;
 } variant;
 
-/* The system with a value of the parameter; NULL and the error. */
+/* The system with this value of the parameter; NULL after an error. */
 static pw_system *compile (void *context, double value, pw_error *e) {
   const variant *v = context;
   pw_model *model = pw_file_model (v->file, e);
@@ -20,7 +21,7 @@ static pw_system *compile (void *context, double value, pw_error *e) {
   return system;
 }
 
-/* Follows straight motion over the speed, and prints where a mode begins to grow. */
+/* Follows straight motion from 2 to 60 m/s, and prints the speed at which an oscillation begins to grow. */
 static void critical_speed (variant *speed, pw_error *e) {
   pw_steady_settings range = { .first = 2, .last = 60, .vary = -1, .compile = compile, .context = speed };
   pw_steady_motion m;

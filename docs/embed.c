@@ -2,14 +2,14 @@
  *     cc -std=c11 -Ibuild/include docs/embed.c -o embed -Lbuild -lpinwheel-files -lpinwheel -Wl,-rpath,$PWD/build -lm
  * with an installed Pinwheel:
  *     cc -std=c11 embed.c -o embed $(pkg-config --cflags --libs pinwheel) -lm
- * and, if its prefix is a private one, with PKG_CONFIG_PATH=PREFIX/lib/pkgconfig in the environment and at the end
+ * and, if the prefix is not searched by the system, with PKG_CONFIG_PATH=PREFIX/lib/pkgconfig in the environment and
  *     -Wl,-rpath,"$(pkg-config --variable=libdir pinwheel)" */
 #include <math.h>
 #include <stdio.h>
 #include "pinwheel-files.h"
 #include "pinwheel-solvers.h"
 
-/* The rider swings and damps the hinge: M0 cos (pi t) - c (omega1 - omega2), with the two rates in x. */
+/* The torque of the rider drives and damps the hinge: M0 cos (pi t) - c (x[0] - x[1]), x: the states in `reads`. */
 typedef struct {
   double M0, c; /* [N m], [N m s] */
 } rider;
@@ -23,9 +23,9 @@ static int rider_torque (void *context, double t, const double *x, double value[
 
 int main (void) {
   static const char *const reads[] = { "frame.omega", "steer.omega", NULL };
-  rider who = { 0.1, 0.002 };
-  pw_signal torque = { PW_FUNCTION, .function = { .eval = rider_torque, .context = &who, .reads = reads } };
-  pw_error e = { 0 }; /* keeps the first failure; what then is NULL is refused by the calls behind it */
+  rider parameters = { 0.1, 0.002 };
+  pw_signal torque = { PW_FUNCTION, .function = { .eval = rider_torque, .context = &parameters, .reads = reads } };
+  pw_error e = { 0 }; /* keeps the first error; calls with a NULL from a failed call fail, too */
   pw_sample now;
 
   pw_file *file = pw_file_open ("ezyroller", &e);

@@ -1,4 +1,4 @@
-/* An integration method of your own: Kutta's of order 3, and its order from runs of a pendulum whose motion is known.
+/* An integration method of your own: that of Kutta of order 3; measures its order on a pendulum with a known motion.
  * From the source tree, after `make`:
  *     cc -std=c11 -Ibuild/include docs/method.c -o method -Lbuild -lpinwheel-files -lpinwheel -Wl,-rpath,$PWD/build -lm
  * with an installed Pinwheel as docs/embed.c. */

@@ -1,6 +1,6 @@
-/* The EzyRoller by CVODES as one would write it for this vehicle alone: y = (q, v), y' = (v, a) by the hand-written
- * accelerations; Adams with functional iteration, or BDF with the library's own dense Jacobian by differences and with the
- * hand-written projection after each step (Hindmarsh et al. 2005). */
+/* The EzyRoller by CVODES, programmed for this vehicle alone: y = (q, v), y' = (v, a) by the hand-written
+ * accelerations; Adams with functional iteration, or BDF with a dense Jacobian by the library's differences and with
+ * the hand-written projection after each step (Hindmarsh et al. 2005). */
 #include <stdlib.h>
 #include <string.h>
 #include <cvodes/cvodes.h>
@@ -33,7 +33,7 @@ static int cvode_rates (double t, N_Vector vy, N_Vector rates, void *user) {
   return 0;
 }
 
-static int cvode_project (double t, N_Vector vy, N_Vector change, double enough, N_Vector error, void *user) {
+static int cvode_project (double t, N_Vector vy, N_Vector change, double tolerance, N_Vector error, void *user) {
   const ezy *e = &((const ezy_cvode *)user)->e;
   const double *y = N_VGetArrayPointer (vy);
   double *out = N_VGetArrayPointer (change), q[6], v[6];
@@ -42,7 +42,7 @@ static int cvode_project (double t, N_Vector vy, N_Vector change, double enough,
   memcpy (v, y + 6, sizeof v);
   ezy_project (e, t, q, v, &s);
   for (int j = 0; j < 6; j++) out[j] = s.q[j] - y[j], out[6 + j] = s.v[j] - y[6 + j];
-  (void)enough, (void)error;
+  (void)tolerance, (void)error;
   return 0;
 }
 
@@ -97,11 +97,11 @@ int ezy_cvode_step (ezy_cvode *d) {
   return flag < 0 ? flag : flag == CV_TSTOP_RETURN;
 }
 
-void ezy_cvode_look (const ezy_cvode *d, long *steps, long *evaluations, double q[6]) {
-  long more = 0;
+void ezy_cvode_result (const ezy_cvode *d, long *steps, long *evaluations, double q[6]) {
+  long of_jacobians = 0;
   CVodeGetNumSteps (d->cvode, steps);
   CVodeGetNumRhsEvals (d->cvode, evaluations);
-  if (d->solver) CVodeGetNumLinRhsEvals (d->cvode, &more);
-  *evaluations += more;
+  if (d->solver) CVodeGetNumLinRhsEvals (d->cvode, &of_jacobians);
+  *evaluations += of_jacobians;
   memcpy (q, N_VGetArrayPointer (d->y), 6 * sizeof *q);
 }

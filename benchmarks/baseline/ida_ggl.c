@@ -1,8 +1,8 @@
-/* The EzyRoller by IDA as one would write it for this vehicle alone: stabilised index 2, KLU, analytic Jacobian.
+/* The EzyRoller by IDA, programmed for this vehicle alone: stabilised index 2, KLU, analytic Jacobian.
  *
  *   q' = v - G^T mu,   M v' + J^T lambda = f,   J v = 0,   g = 0          y = (q, v, lambda, mu), 18 unknowns
  *
- * (Gear, Gupta & Leimkuhler 1985.)  lambda and mu are kept out of the error test. */
+ * (Gear, Gupta & Leimkuhler 1985.)  lambda and mu are excluded from the error test. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -53,7 +53,7 @@ static int ggl_residual (double t, N_Vector vy, N_Vector vyp, N_Vector vr, void 
   return 0;
 }
 
-/* The pattern, column by column; IDA clears it before each Jacobian. */
+/* The sparsity pattern, column by column: row indices, starts of columns.  IDA clears it before each Jacobian. */
 static const sunindextype ggl_rows[] = {
   0, 16,                             /* x1 */
   1, 17,                             /* y1 */
@@ -74,8 +74,8 @@ static const sunindextype ggl_rows[] = {
   0, 2,  3,  5,                      /* mu x */
   1, 2,  4,  5,                      /* mu y */
 };
-static const sunindextype ggl_columns[GGL_SIZE + 1] = { 0,  2,  4,  13, 15, 17, 26, 30, 34, 39,
-                                                        43, 47, 52, 56, 60, 63, 66, 70, 74 };
+static const sunindextype ggl_starts[GGL_SIZE + 1] = { 0,  2,  4,  13, 15, 17, 26, 30, 34, 39,
+                                                       43, 47, 52, 56, 60, 63, 66, 70, 74 };
 
 static int ggl_jacobian (double t, double c, N_Vector vy, N_Vector vyp, N_Vector vr, SUNMatrix matrix, void *user,
                          N_Vector t1, N_Vector t2, N_Vector t3) {
@@ -83,84 +83,23 @@ static int ggl_jacobian (double t, double c, N_Vector vy, N_Vector vyp, N_Vector
   const double *q = N_VGetArrayPointer (vy), *v = q + 6, *l = q + 12, *mu = q + 16;
   double c1 = cos (q[2]), s1 = sin (q[2]), c2 = cos (q[5]), s2 = sin (q[5]);
   double b1 = p->b * s1, b2 = p->b * c1, d1 = p->d * s2, d2 = p->d * c2;
+  /* clang-format off */
   const double value[] = {
-    c,
-    1,
-    c,
-    1,
-    c - b2 * mu[0] - b1 * mu[1],
-    -c1 * l[2],
-    -s1 * l[2],
-    -b2 * l[0] - b1 * l[1],
-    -b2 * v[2],
-    -b1 * v[2],
-    -c1 * v[0] - s1 * v[1],
-    -b1,
-    b2,
-    c,
-    -1,
-    c,
-    -1,
-    c - d2 * mu[0] - d1 * mu[1],
-    -c2 * l[3],
-    -s2 * l[3],
-    -d2 * l[0] - d1 * l[1],
-    -d2 * v[5],
-    -d1 * v[5],
-    -c2 * v[3] - s2 * v[4],
-    -d1,
-    d2,
-    -1,
-    c * p->m1,
-    1,
-    -s1,
-    -1,
-    c * p->m1,
-    1,
-    c1,
-    -1,
-    c * p->I1,
-    -b1,
-    b2,
-    -p->a,
-    -1,
-    c * p->m2,
-    -1,
-    -s2,
-    -1,
-    c * p->m2,
-    -1,
-    c2,
-    -1,
-    c * p->I2,
-    -d1,
-    d2,
-    p->c,
-    1,
-    -b1,
-    -1,
-    -d1,
-    1,
-    b2,
-    -1,
-    d2,
-    -s1,
-    c1,
-    -p->a,
-    -s2,
-    c2,
-    p->c,
-    1,
-    -b1,
-    -1,
-    -d1,
-    1,
-    b2,
-    -1,
-    d2,
+    c, 1, c, 1,                                                                                         /* x1, y1 */
+    c - b2 * mu[0] - b1 * mu[1], -c1 * l[2], -s1 * l[2], -b2 * l[0] - b1 * l[1], -b2 * v[2], -b1 * v[2],
+    -c1 * v[0] - s1 * v[1], -b1, b2,                                                                    /* phi1 */
+    c, -1, c, -1,                                                                                       /* x2, y2 */
+    c - d2 * mu[0] - d1 * mu[1], -c2 * l[3], -s2 * l[3], -d2 * l[0] - d1 * l[1], -d2 * v[5], -d1 * v[5],
+    -c2 * v[3] - s2 * v[4], -d1, d2,                                                                    /* phi2 */
+    -1, c * p->m1, 1, -s1, -1, c * p->m1, 1, c1, -1, c * p->I1, -b1, b2, -p->a,         /* vx1, vy1, omega1 */
+    -1, c * p->m2, -1, -s2, -1, c * p->m2, -1, c2, -1, c * p->I2, -d1, d2, p->c,        /* vx2, vy2, omega2 */
+    1, -b1, -1, -d1, 1, b2, -1, d2, -s1, c1, -p->a, -s2, c2, p->c,                      /* Bx, By, A, C */
+    1, -b1, -1, -d1, 1, b2, -1, d2                                                      /* mu x, mu y */
   };
-  _Static_assert(sizeof value / sizeof *value == sizeof ggl_rows / sizeof *ggl_rows, "a value for each place");
-  memcpy (SUNSparseMatrix_IndexPointers (matrix), ggl_columns, sizeof ggl_columns);
+  /* clang-format on */
+  _Static_assert(sizeof value / sizeof *value == sizeof ggl_rows / sizeof *ggl_rows,
+                 "one value per entry of the pattern");
+  memcpy (SUNSparseMatrix_IndexPointers (matrix), ggl_starts, sizeof ggl_starts);
   memcpy (SUNSparseMatrix_IndexValues (matrix), ggl_rows, sizeof ggl_rows);
   memcpy (SUNSparseMatrix_Data (matrix), value, sizeof value);
   (void)t, (void)vyp, (void)vr, (void)t1, (void)t2, (void)t3;
@@ -198,7 +137,7 @@ static int ggl_open (ezy_ida *d, double rtol) {
   flag |= IDASetMaxNumSteps (d->ida, -1);
   flag |= IDASetStopTime (d->ida, d->t_end);
   d->matrix = SUNSparseMatrix (GGL_SIZE, GGL_SIZE, sizeof ggl_rows / sizeof *ggl_rows, CSC_MAT, d->context);
-  memcpy (SUNSparseMatrix_IndexPointers (d->matrix), ggl_columns, sizeof ggl_columns);
+  memcpy (SUNSparseMatrix_IndexPointers (d->matrix), ggl_starts, sizeof ggl_starts);
   memcpy (SUNSparseMatrix_IndexValues (d->matrix), ggl_rows, sizeof ggl_rows);
   d->solver = SUNLinSol_KLU (d->y, d->matrix, d->context);
   flag |= IDASetLinearSolver (d->ida, d->solver, d->matrix);
@@ -231,7 +170,7 @@ int ezy_ida_step (ezy_ida *d) {
   return flag < 0 ? flag : flag == IDA_TSTOP_RETURN;
 }
 
-void ezy_ida_look (const ezy_ida *d, long *steps, long *residuals, double q[6]) {
+void ezy_ida_result (const ezy_ida *d, long *steps, long *residuals, double q[6]) {
   IDAGetNumSteps (d->ida, steps);
   IDAGetNumResEvals (d->ida, residuals);
   memcpy (q, N_VGetArrayPointer (d->y), 6 * sizeof *q);

@@ -1,45 +1,38 @@
-/* Whole runs by the programs of benchmarks/baseline; see by_hand.h. */
+/* Complete runs by the programs of benchmarks/baseline, for the program peers; see by_hand.h. */
 #include <stdlib.h>
 #include <string.h>
 #include "by_hand.h"
 #include "engine.h"
 
+/* The coefficients of erk8 are static in its source. */
 #define pw_method_erk8 by_hand_unused
 #include "erk8.c"
 #undef pw_method_erk8
 
-const ezy_model by_hand_model = { 0.5, 0.5, 0.125, 0.125, 1, 0.1, 0.1, 0.01, 0.1, PW_PI };
+const ezy_model by_hand_model = {
+  .a = 0.5, .b = 0.5, .c = 0.125, .d = 0.125, .m1 = 1, .I1 = 0.1, .m2 = 0.1, .I2 = 0.01, .M0 = 0.1, .omega = PW_PI
+};
 static const ezy_tableau by_hand_tableau = { 12, erk8_c, erk8_A, erk8_b };
 
 /* ---- EzyRoller ---- */
 
-static void by_hand_rate (void *context, double t, const double *q, const double *v, double *a, double *lambda) {
-  ezy_massive (context, t, q, v, a, lambda);
-}
-
-static void by_hand_project (void *context, double t, double *q, double *v, ezy_state *s) {
-  ezy_project (context, t, q, v, s);
-}
-
-double by_hand_eighth (void *scene, const ladder *way, double h, double *q) {
+double by_hand_eighth (void *scene, const ladder *self, double h, double *q) {
   long steps = lround (BY_HAND_SECONDS / h);
   ezy e;
   ezy_state s;
-  (void)scene, (void)way;
+  (void)scene, (void)self;
   ezy_open (&e, &by_hand_model);
   ezy_start (&e, &s);
-  for (long i = 1; i <= steps; i++)
-    ezy_step (&by_hand_tableau, &(ezy_dynamics){ by_hand_rate, by_hand_project, &e },
-              BY_HAND_SECONDS * (double)i / (double)steps, &s);
+  for (long i = 1; i <= steps; i++) ezy_step (&e, &by_hand_tableau, BY_HAND_SECONDS * (double)i / (double)steps, &s);
   memcpy (q, s.q, sizeof s.q);
   return 12.0 * (double)steps + 1;
 }
 
-double by_hand_classical (void *scene, const ladder *way, double h, double *q) {
+double by_hand_classical (void *scene, const ladder *self, double h, double *q) {
   long steps = lround (BY_HAND_SECONDS / h);
   ezy e;
   ezy_state s;
-  (void)scene, (void)way;
+  (void)scene, (void)self;
   ezy_open (&e, &by_hand_model);
   ezy_start (&e, &s);
   for (long i = 0; i < steps; i++) {
@@ -66,12 +59,12 @@ static void by_hand_minimal_step (const ezy *e, double t, double h, double y[6])
   memcpy (y, z, sizeof z);
 }
 
-double by_hand_minimal (void *scene, const ladder *way, double h, double *q) {
+double by_hand_minimal (void *scene, const ladder *self, double h, double *q) {
   const ezy_model *m = &by_hand_model;
   long steps = lround (BY_HAND_SECONDS / h);
   double y[6] = { -m->a, 0, 0, acos (-1), 0, 0 };
   ezy e;
-  (void)scene, (void)way;
+  (void)scene, (void)self;
   ezy_open (&e, m);
   h = BY_HAND_SECONDS / (double)steps;
   for (long i = 0; i < steps; i++) by_hand_minimal_step (&e, (double)i * h, h, y);
@@ -80,27 +73,27 @@ double by_hand_minimal (void *scene, const ladder *way, double h, double *q) {
   return 12.0 * (double)steps;
 }
 
-double by_hand_cvode (void *scene, const ladder *way, double rtol, double *q) {
-  ezy_cvode *d = ezy_cvode_open (&by_hand_model, way->method[0] == 'a', rtol, BY_HAND_SECONDS);
+double by_hand_cvode (void *scene, const ladder *self, double rtol, double *q) {
+  ezy_cvode *d = ezy_cvode_open (&by_hand_model, self->method[0] == 'a', rtol, BY_HAND_SECONDS);
   long steps, evaluations;
   int flag = 0;
   (void)scene;
-  if (d == NULL) engine_die (way->name, "cannot be opened");
+  if (d == NULL) engine_die (self->name, "cannot be opened");
   while (flag == 0) flag = ezy_cvode_step (d);
-  ezy_cvode_look (d, &steps, &evaluations, q);
+  ezy_cvode_result (d, &steps, &evaluations, q);
   ezy_cvode_close (d);
   for (int j = 0; flag < 0 && j < 6; j++) q[j] = NAN;
   return (double)evaluations;
 }
 
-double by_hand_ida (void *scene, const ladder *way, double rtol, double *q) {
+double by_hand_ida (void *scene, const ladder *self, double rtol, double *q) {
   ezy_ida *d = ezy_ida_open (&by_hand_model, rtol, BY_HAND_SECONDS);
   long steps, evaluations;
   int flag = 0;
   (void)scene;
-  if (d == NULL) engine_die (way->name, "cannot be opened");
+  if (d == NULL) engine_die (self->name, "cannot be opened");
   while (flag == 0) flag = ezy_ida_step (d);
-  ezy_ida_look (d, &steps, &evaluations, q);
+  ezy_ida_result (d, &steps, &evaluations, q);
   ezy_ida_close (d);
   for (int j = 0; flag < 0 && j < 6; j++) q[j] = NAN;
   return (double)evaluations;
@@ -108,7 +101,7 @@ double by_hand_ida (void *scene, const ladder *way, double rtol, double *q) {
 
 /* ---- Chain ---- */
 
-/* out = y + h sum_k w_k K_k for n entries; zeros of the tableau are skipped. */
+/* out = y + h sum_k w_k K_k for n entries; skips zeros of the tableau. */
 static void by_hand_sum (double *out, const double *y, double *const *K, const double *w, double h, int count, int n) {
   memcpy (out, y, (size_t)n * sizeof *out);
   for (int k = 0; k < count; k++)
@@ -116,7 +109,7 @@ static void by_hand_sum (double *out, const double *y, double *const *K, const d
       for (int j = 0; j < n; j++) out[j] += h * w[k] * K[k][j];
 }
 
-/* A step; V and A are the stages, q and v take the result. */
+/* A step; V[0..11] and A[0..11] take the stages, A[12] is work space, q and v take the result. */
 void by_hand_chain_step (chain *c, double h, double *q, double *v, double *const *V, double *const *A, double *lambda) {
   const double *row = erk8_A;
   double *stage = A[12];
@@ -134,12 +127,12 @@ void by_hand_chain_step (chain *c, double h, double *q, double *v, double *const
   memcpy (v, stage, (size_t)n * sizeof *v);
 }
 
-double by_hand_chain (void *scene, const ladder *way, double h, double *q) {
+double by_hand_chain (void *scene, const ladder *self, double h, double *q) {
   int links = *(const int *)scene, n = 3 * links;
   long steps = lround (1 / h);
   double *V[13], *A[13], *memory = calloc ((size_t)n * 29, sizeof *memory), *v = memory + 26 * n, *lambda = v + n;
   chain c;
-  (void)way;
+  (void)self;
   if (memory == NULL || chain_open (&c, links) != 0) engine_die ("chain by hand", "out of memory");
   for (int i = 0; i < 13; i++) V[i] = memory + i * n, A[i] = memory + (13 + i) * n;
   for (int i = 0; i < links; i++) q[3 * i] = i + 0.5, q[3 * i + 1] = q[3 * i + 2] = 0;

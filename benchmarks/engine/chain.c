@@ -1,4 +1,4 @@
-/* The pendulum chain against its hand-written program, and how the cost of large scenes grows. */
+/* Comparisons of the pendulum chain with the program by hand, and the cost of large scenes against their size. */
 #include <stdlib.h>
 #include <string.h>
 #include "engine.h"
@@ -7,7 +7,7 @@ typedef struct {
   chain hand;
   pw_system *system;
   pw_run *run;
-  double *q, *v, *a[2], *lambda[2];
+  double *q, *v, *a[2], *lambda[2]; /* one block; results by hand and of Pinwheel */
 } chain_data;
 
 static long chain_hand (void *context, long n) {
@@ -22,20 +22,16 @@ static long chain_ours (void *context, long n) {
   return n * d->hand.links;
 }
 
-static double *chain_array (int links) {
-  double *x = calloc ((size_t)(3 * links + 3), sizeof *x);
-  if (x == NULL) engine_die ("chain", "out of memory");
-  return x;
-}
-
 void engine_open_chain (engine_case *c) {
   chain_data *d = calloc (1, sizeof *d);
-  if (d == NULL || chain_open (&d->hand, c->links) != 0) engine_die (c->key, "out of memory");
-  double **const array[] = { &d->q, &d->v, &d->a[0], &d->a[1], &d->lambda[0], &d->lambda[1] };
-  for (size_t i = 0; i < sizeof array / sizeof *array; i++) *array[i] = chain_array (c->links);
+  size_t n = (size_t)(3 * c->links + 3); /* accelerations: 3 per link, 3 of the ground */
+  if (d) d->q = calloc (6 * n, sizeof *d->q);
+  if (d == NULL || d->q == NULL || chain_open (&d->hand, c->links) != 0) engine_die (c->key, "out of memory");
+  d->v = d->q + n;
+  for (size_t i = 0; i < 2; i++) d->a[i] = d->v + (1 + i) * n, d->lambda[i] = d->v + (3 + i) * n;
   d->system = engine_chain (c->links);
   d->run = engine_open (d->system, "rk4+none", &(pw_settings){ .step = 1e-3, .span = 1 });
-  engine_bend (c->links, 0, d->q, d->v);
+  engine_bend (c->links, ENGINE_PINNED, d->q, d->v);
   c->data = d;
   c->base = (timing_work){ chain_hand, d };
   c->ours = (timing_work){ chain_ours, d };
@@ -49,11 +45,10 @@ void engine_open_chain (engine_case *c) {
 
 void engine_close_chain (engine_case *c) {
   chain_data *d = c->data;
-  double *const array[] = { d->q, d->v, d->a[0], d->a[1], d->lambda[0], d->lambda[1] };
-  for (size_t i = 0; i < sizeof array / sizeof *array; i++) free (array[i]);
   pw_run_close (d->run);
   pw_system_free (d->system);
   chain_close (&d->hand);
+  free (d->q);
   free (d);
 }
 
@@ -64,8 +59,9 @@ struct engine_cost {
   pw_system *system;
   pw_run *run;
   pw_projector projector;
-  double *q, *v, *q1, *v1, *lambda;
-  long batch;
+  double *q, *v;               /* the state */
+  double *q1, *v1, *lambda;    /* results */
+  long batch;                  /* repetitions of the work per batch */
   double ns[TIMING_PAIRS_MAX]; /* per body */
   int batches;
 };
@@ -76,7 +72,7 @@ static long cost_evaluation (void *context, long n) {
   return n * d->system->bodies;
 }
 
-/* From a state whose bodies are off by up to 1e-8: positions, then rates. */
+/* Positions, then velocities, of a state that is off by up to 1e-8 [m], [rad], [m/s], [rad/s]. */
 static long cost_projection (void *context, long n) {
   engine_cost *d = context;
   for (long i = 0; i < n; i++) {
@@ -91,7 +87,7 @@ static long cost_projection (void *context, long n) {
   return n * d->system->bodies;
 }
 
-/* The first steps of a run; opening it is not part of the time. */
+/* Time per step and body [ns] of the first steps of a run, without its opening. */
 static double cost_ida (engine_cost *d) {
   const int steps = 40;
   pw_error error = { 0 };
@@ -118,14 +114,14 @@ static void cost_open_run (engine_cost *d) {
   d->batch = timing_calibrate (&w, 0.01);
 }
 
-engine_cost *engine_cost_open (pw_system *s, engine_task task, int bent, int free) {
+engine_cost *engine_cost_open (pw_system *s, engine_task task, engine_shape shape) {
   size_t n = (size_t)s->coords + 3;
   engine_cost *d = calloc (1, sizeof *d);
   if (d) *d = (engine_cost){ .task = task, .system = s, .q = calloc (4 * n + (size_t)s->rows, sizeof *d->q) };
   if (d == NULL || d->q == NULL) engine_die ("engine", "out of memory");
   d->v = d->q + n, d->q1 = d->v + n, d->v1 = d->q1 + n, d->lambda = d->v1 + n;
   memcpy (d->q, s->q0, (size_t)s->coords * sizeof *d->q);
-  if (bent) engine_bend (s->bodies, free, d->q, d->v);
+  if (shape != ENGINE_DESCRIBED) engine_bend (s->bodies, shape, d->q, d->v);
   if (task != ENGINE_IDA) cost_open_run (d);
   return d;
 }

@@ -1,33 +1,38 @@
-/* Instructions, counted by callgrind in a process of its own. */
+/* Counts the instructions of a function: runs this program again under callgrind, and reads what that writes. */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
 #include "engine.h"
 
+_Noreturn void engine_die (const char *what, const char *why) {
+  fprintf (stderr, "%s: %s\n", what, why);
+  exit (2);
+}
+
 long engine_counted (const timing_work *w, long n) {
   return w->run (w->context, n);
 }
 
-/* The cost of all calls of a function: "cfn=NAME", "calls=COUNT ...", "LINE COST".  The counts are of no use, since they
- * run on while nothing is collected. */
+/* The instructions of all calls of a function.  The file has three lines for a call: "cfn=NAME", "calls=COUNT ..." and
+ * "LINE INSTRUCTIONS".  COUNT is not used: it includes calls made while nothing is collected. */
 static double count_read (FILE *file, const char *function) {
   char line[1000];
-  double cost = 0, n;
-  int ours = 0, next = 0;
+  double sum = 0, instructions;
+  int named = 0, next = 0; /* the call is one of the function; its instructions are on the next line */
   while (fgets (line, sizeof line, file)) {
     if (strncmp (line, "cfn=", 4) == 0) {
       line[strcspn (line, "\n")] = '\0';
-      ours = strcmp (line + 4, function) == 0;
+      named = strcmp (line + 4, function) == 0;
     } else if (strncmp (line, "calls=", 6) == 0) {
-      next = ours;
-      ours = 0;
+      next = named;
+      named = 0;
     } else if (next) {
-      if (sscanf (line, "%*s %lf", &n) == 1) cost += n;
+      if (sscanf (line, "%*s %lf", &instructions) == 1) sum += instructions;
       next = 0;
     }
   }
-  return cost;
+  return sum;
 }
 
 double engine_count (const char *program, const char *key, const char *side, const char *function) {
@@ -36,7 +41,7 @@ double engine_count (const char *program, const char *key, const char *side, con
   int fd = mkstemp (out);
   if (fd < 0) return 0;
   close (fd);
-  /* Names are resolved at the start, so that the first call is like the others. */
+  /* LD_BIND_NOW: symbols are resolved before the first call, which is then like the others. */
   snprintf (command, sizeof command,
             "LD_BIND_NOW=1 valgrind -q --tool=callgrind --collect-atstart=no --toggle-collect=engine_counted "
             "--compress-strings=no --callgrind-out-file=%s '%s' --count %s %s >/dev/null 2>&1",

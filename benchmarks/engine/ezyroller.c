@@ -1,16 +1,16 @@
-/* The EzyRoller against its hand-written programs: one evaluation, one step of classical Runge-Kutta with projection. */
+/* Comparisons of the EzyRoller with the programs by hand: an evaluation, a step of classical Runge-Kutta with
+ * projection. */
 #include <stdlib.h>
 #include <string.h>
+#include "by_hand.h"
 #include "engine.h"
 #include "pinwheel-files.h"
 
-enum { EZY_POOL = 64, EZY_SPACING = 200, EZY_ROUND = 100000 };
+enum { EZY_POOL = 64, EZY_SPACING = 200 /* steps between states of the pool */ };
+enum { EZY_ROUND = 100000 };              /* steps after which a run starts again */
+static const double ezy_step_size = 1e-3; /* [s] */
 
-static const ezy_model ezy_parameters = {
-  .a = 0.5, .b = 0.5, .c = 0.125, .d = 0.125, .m1 = 1, .I1 = 0.1, .m2 = 0.1, .I2 = 0.01, .M0 = 0.1, .omega = PW_PI
-};
-
-/* One side of a comparison: the vehicle by hand and by Pinwheel, and states along its way to work on. */
+/* One side of a comparison: the vehicle by hand and by Pinwheel, and a pool of states of its motion to evaluate. */
 typedef struct {
   ezy hand;
   ezy_state state;
@@ -18,8 +18,10 @@ typedef struct {
   pw_system *system;
   pw_run *run;
   pw_scene_code *code; /* or NULL */
-  double t[EZY_POOL], q[EZY_POOL][9], v[EZY_POOL][9], y[EZY_POOL][6];
-  double a[9], lambda[4];
+  double t[EZY_POOL], q[EZY_POOL][6], v[EZY_POOL][6];
+  double y[EZY_POOL][6]; /* the same states in minimal coordinates */
+  double a[9];           /* 3 of the ground */
+  double lambda[4];
 } ezy_side;
 
 typedef struct {
@@ -27,7 +29,7 @@ typedef struct {
 } ezy_data;
 
 static void ezy_open_side (ezy_side *d, int massless, int specialised, const char *method) {
-  ezy_model p = ezy_parameters;
+  ezy_model p = by_hand_model;
   if (massless) p.m2 = p.I2 = 0;
   ezy_open (&d->hand, &p);
   ezy_start (&d->hand, &d->state);
@@ -40,12 +42,13 @@ static void ezy_open_side (ezy_side *d, int massless, int specialised, const cha
     double y[6] = { q[0] - p.a * cos (q[2]), q[1] - p.a * sin (q[2]), q[2], q[5], u, v[2] };
     memcpy (d->y[k], y, sizeof y);
     for (int i = 0; i < EZY_SPACING; i++)
-      massless ? ezy_massless_step (&d->hand, 1e-3, &d->state) : ezy_massive_step (&d->hand, 1e-3, &d->state);
+      massless ? ezy_massless_step (&d->hand, ezy_step_size, &d->state)
+               : ezy_massive_step (&d->hand, ezy_step_size, &d->state);
   }
   ezy_start (&d->hand, &d->state);
   d->system = engine_ezyroller (massless);
   if (specialised) d->code = engine_specialise (d->system);
-  pw_settings set = { .step = 1e-3, .span = 100, .specialised = pw_scene_code_table (d->code) };
+  pw_settings set = { .step = ezy_step_size, .span = 100, .specialised = pw_scene_code_table (d->code) };
   d->run = engine_open (d->system, method, &set);
 }
 
@@ -72,20 +75,11 @@ void engine_close_ezy (engine_case *c) {
 
 /* ---- One evaluation ---- */
 
-static long ezy_hand_massive (void *context, long n) {
+static long ezy_hand (void *context, long n) {
   ezy_side *d = context;
   for (long i = 0; i < n; i++) {
     int k = (int)(i % EZY_POOL);
-    ezy_massive (&d->hand, d->t[k], d->q[k], d->v[k], d->a, d->lambda);
-  }
-  return n;
-}
-
-static long ezy_hand_massless (void *context, long n) {
-  ezy_side *d = context;
-  for (long i = 0; i < n; i++) {
-    int k = (int)(i % EZY_POOL);
-    ezy_massless (&d->hand, d->t[k], d->q[k], d->v[k], d->a, d->lambda);
+    (d->hand.p.m2 > 0 ? ezy_massive : ezy_massless) (&d->hand, d->t[k], d->q[k], d->v[k], d->a, d->lambda);
   }
   return n;
 }
@@ -108,7 +102,7 @@ static long ezy_ours (void *context, long n) {
   return n;
 }
 
-/* The accelerations and multipliers of both for every state of the pool. */
+/* The largest relative difference of accelerations and multipliers over the pool. */
 static double ezy_compare (engine_case *c, const ezy_data *d) {
   const ezy_side *x = &d->side[0], *y = &d->side[1];
   double worst = 0;
@@ -123,11 +117,11 @@ static double ezy_compare (engine_case *c, const ezy_data *d) {
 
 void engine_open_rhs (engine_case *c) {
   ezy_data *d = ezy_open_sides (c, c->massless, c->massless, "rk4+none");
-  c->base.run = c->massless ? ezy_hand_massless : ezy_hand_massive;
+  c->base.run = ezy_hand;
   c->ours.run = ezy_ours;
   c->base_function = c->massless ? "ezy_massless" : "ezy_massive";
   c->our_function = "pw_run_accelerate";
-  pw_run_advance (d->side[1].run, 1, NULL); /* the watchdog evaluates more at the beginning */
+  pw_run_advance (d->side[1].run, 1, NULL); /* first evaluations of a run cost more: its watchdog starts */
   c->difference = ezy_compare (c, d);
 }
 
@@ -137,7 +131,7 @@ void engine_open_light (engine_case *c) {
   c->base_function = c->our_function = "pw_run_accelerate";
 }
 
-/* phi1'' and phi2' = omega2 are in both. */
+/* Compares phi1'' and omega2, which both formulations have. */
 void engine_open_minimal (engine_case *c) {
   ezy_data *d = ezy_open_sides (c, c->massless, c->massless, "rk4+none");
   c->base.run = ezy_hand_minimal;
@@ -158,22 +152,18 @@ static long ezy_hand_step (void *context, long n) {
   ezy_side *d = context;
   for (long i = 0; i < n; i++) {
     if (d->steps++ % EZY_ROUND == 0) ezy_start (&d->hand, &d->state);
-    d->hand.p.m2 > 0 ? ezy_massive_step (&d->hand, 1e-3, &d->state) : ezy_massless_step (&d->hand, 1e-3, &d->state);
+    d->hand.p.m2 > 0 ? ezy_massive_step (&d->hand, ezy_step_size, &d->state)
+                     : ezy_massless_step (&d->hand, ezy_step_size, &d->state);
   }
   return n;
 }
 
-/* A round is 100 s, a multiple of the torque's period, so that starting anew at the time reached changes nothing. */
+/* A round is 100 s, a multiple of the period of the torque: a restart at the time reached repeats the motion. */
 static long ezy_our_step (void *context, long n) {
   ezy_side *d = context;
   ezy_state start;
   ezy_start (&d->hand, &start);
-  for (long i = 0, more; i < n; i += more, d->steps += more) {
-    long left = EZY_ROUND - d->steps % EZY_ROUND;
-    more = n - i < left ? n - i : left;
-    if (left == EZY_ROUND) pw_run_restart (d->run, start.q, start.v, NULL);
-    engine_steps (d->run, more);
-  }
+  engine_rounds (d->run, &d->steps, EZY_ROUND, start.q, start.v, n);
   return n;
 }
 

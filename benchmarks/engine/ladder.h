@@ -1,39 +1,39 @@
-/* Runs down a ladder of steps or tolerances, and what an accuracy costs by it: read off a line through the points nearby
- * (least squares of the logarithms). */
+/* Runs a method at decreasing steps or tolerances, for the program peers.  The cost of an accuracy is interpolated:
+ * a line through the points near that error, by least squares of the logarithms. */
 #ifndef LADDER_H
 #define LADDER_H
 
 #include "timing.h"
 
-enum { LADDER_ROUNDS = 7, LADDER_RUNGS = 24 };
+enum { LADDER_ROUNDS = 5, LADDER_LEVELS = 24 };
 
 typedef struct {
-  double level, error, evaluations; /* step [s] or tolerance; [m]; of the accelerations or the residual */
-  double cpu[LADDER_ROUNDS];        /* [s], sorted in the end */
+  double level;              /* step [s] or relative tolerance */
+  double error;              /* of the positions at the end [m]; NaN: the run failed */
+  double evaluations;        /* of the accelerations or the residual */
+  double cpu[LADDER_ROUNDS]; /* processor time [s]; sorted by ladder_sort */
 } ladder_point;
 
-/* One way to go down: from `first`, by `factor`. */
+/* A method at `count` levels: `first`, and each `factor` times the one before. */
 typedef struct ladder ladder;
 struct ladder {
   const char *name, *method;
   double first, factor;
   int count;
-  /* Runs to the end, q taking the positions there (NaN: it fails); returns the evaluations. */
-  double (*run) (void *scene, const ladder *way, double level, double *q);
-  const char *function; /* what callgrind counts, if asked */
-  ladder_point point[LADDER_RUNGS];
+  /* Runs to the end; q takes the coordinates there (NaN: the run fails); returns the number of evaluations. */
+  double (*run) (void *scene, const ladder *self, double level, double *q);
+  const char *function; /* whose instructions callgrind counts */
+  ladder_point point[LADDER_LEVELS];
 };
 
-double ladder_rung (const ladder *l, int i);
-
-/* Takes one point; the error is that of the lengths among n coordinates, with room for them in q. */
-void ladder_take (ladder *l, void *scene, const double *reference, int n, double *q, int round, int level);
+/* Runs the i-th level.  Its error is the largest of x and y of all bodies; q: room for the n coordinates. */
+void ladder_take (ladder *l, void *scene, const double *reference, int n, double *q, int round, int i);
 
 /* Sorts the times of all rounds; the median is then in the middle. */
-void ladder_sort (ladder *l, int rounds);
+void ladder_sort (ladder *l);
 
-/* Processor time [s] and evaluations for an error [m]; 0: it is not reached. */
-double ladder_time (const ladder *l, double error, int rounds);
+/* Processor time [s] and evaluations for an error [m]; 0: no level reaches it. */
+double ladder_time (const ladder *l, double error);
 double ladder_evaluations (const ladder *l, double error);
 
 #endif

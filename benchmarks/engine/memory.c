@@ -1,4 +1,4 @@
-/* Memory of a long chain: what malloc hands out, and which pages an evaluation touches. */
+/* Memory of a long chain: allocated by malloc, and in the pages that an evaluation touches. */
 #include <malloc.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -10,7 +10,7 @@ static double memory_used (void) {
   return (double)m.uordblks + (double)m.hblkhd;
 }
 
-/* Forgets which pages were touched. */
+/* Clears the referenced flags of all pages; 0: the system refuses. */
 static int memory_forget (void) {
   FILE *file = fopen ("/proc/self/clear_refs", "w");
   if (file == NULL) return 0;
@@ -18,7 +18,7 @@ static int memory_forget (void) {
   return fclose (file) == 0;
 }
 
-/* Bytes of writable pages touched since. */
+/* Bytes of the writable pages referenced since. */
 static double memory_touched (void) {
   char line[300], rights[5] = "";
   double sum = 0, kb;
@@ -31,12 +31,12 @@ static double memory_touched (void) {
   return sum;
 }
 
-/* State and result are the caller's: their pages are not counted. */
+/* Bytes of the pages that an evaluation touches, without the state and the result: 11 numbers per link. */
 static double memory_touch (pw_run *r, int links) {
   size_t n = (size_t)(3 * links + 3);
   double *q = calloc (5 * n, sizeof *q), *v = q + n, *a = v + n, *lambda = a + n, touched = 0;
   if (q == NULL) engine_die ("memory", "out of memory");
-  engine_bend (links, 0, q, v);
+  engine_bend (links, ENGINE_PINNED, q, v);
   pw_run_accelerate (r, 0, q, v, a, lambda);
   if (memory_forget ()) {
     pw_run_accelerate (r, 0, q, v, a, lambda);
@@ -48,17 +48,21 @@ static double memory_touch (pw_run *r, int links) {
 
 engine_memory engine_measure_memory (int links) {
   pw_error error = { 0 };
-  double start = timing_now (), use0 = memory_used ();
+  double start = timing_now (), at_start = memory_used ();
   pw_model *m = engine_describe_chain (links);
-  double use1 = memory_used ();
+  double described = memory_used ();
   pw_system *s = pw_system_compile (m, &error);
   if (s == NULL) engine_die ("chain", error.text);
-  double use2 = memory_used (), compiled = timing_now ();
+  double with_system = memory_used (), compiled = timing_now ();
   pw_run *r = engine_open (s, "rk4+projection", &(pw_settings){ .step = 1e-3, .span = 1 });
-  double use3 = memory_used (), opened = timing_now (), touched = memory_touch (r, links);
+  double with_run = memory_used (), opened = timing_now (), touched = memory_touch (r, links);
   pw_run_close (r);
   pw_system_free (s);
   pw_model_free (m);
-  return (engine_memory){ (use1 - use0) / links, (use2 - use1) / links, (use3 - use2) / links,
-                          touched / links,       compiled - start,      opened - compiled };
+  return (engine_memory){ (described - at_start) / links,
+                          (with_system - described) / links,
+                          (with_run - with_system) / links,
+                          touched / links,
+                          compiled - start,
+                          opened - compiled };
 }

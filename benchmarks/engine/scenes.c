@@ -1,14 +1,9 @@
-/* The scenes of the engine benchmark, built through the public interface. */
+/* The scenes of the programs engine and peers, built through the public interface. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include "engine.h"
-
-_Noreturn void engine_die (const char *what, const char *why) {
-  fprintf (stderr, "%s: %s\n", what, why);
-  exit (1);
-}
 
 double engine_difference (const double *a, const double *b, int n) {
   double worst = 0, size = 0;
@@ -76,35 +71,35 @@ static void scene_snake (pw_model *m, const void *parameters) {
   }
 }
 
-/* Pins the end of a bar to what meets at node (i, j) already, and notes it if it is the first. */
-static void scene_node (pw_model *m, char (*first)[24], double *end, int node, const char *bar, double at) {
+/* Pins the point (at, 0) of a bar to the first bar of the node; becomes the first bar itself if there is none yet. */
+static void scene_node (pw_model *m, char (*first)[24], double *first_at, int node, const char *bar, double at) {
   char pin[60];
   if (first[node][0] == '\0') {
     snprintf (first[node], sizeof first[node], "%s", bar);
-    end[node] = at;
+    first_at[node] = at;
     return;
   }
   snprintf (pin, sizeof pin, "N%d-%s", node, bar);
-  pw_add_pin (m, &(pw_pin){ .name = pin, .body = { first[node], bar }, .at = { { end[node], 0 }, { at, 0 } } });
+  pw_add_pin (m, &(pw_pin){ .name = pin, .body = { first[node], bar }, .at = { { first_at[node], 0 }, { at, 0 } } });
 }
 
 static void scene_grid (pw_model *m, const void *parameters) {
   int n = (int)((const scene *)parameters)->n, side = n + 1;
   char (*first)[24] = calloc ((size_t)(side * side), sizeof *first), bar[24];
-  double *end = calloc ((size_t)(side * side), sizeof *end);
-  if (first == NULL || end == NULL) engine_die ("grid", "out of memory");
+  double *first_at = calloc ((size_t)(side * side), sizeof *first_at);
+  if (first == NULL || first_at == NULL) engine_die ("grid", "out of memory");
   snprintf (first[0], sizeof first[0], "ground");
   for (int j = 0; j < side; j++)
     for (int i = 0; i < side; i++)
-      for (int up = 0; up < 2; up++) {
-        if ((up ? j : i) == n) continue;
-        snprintf (bar, sizeof bar, "%c%d-%d", up ? 'v' : 'h', i, j);
-        scene_bar (m, bar, i + (up ? 0 : 0.5), j + (up ? 0.5 : 0), up ? PW_PI / 2 : 0);
-        scene_node (m, first, end, j * side + i, bar, -0.5);
-        scene_node (m, first, end, up ? (j + 1) * side + i : j * side + i + 1, bar, 0.5);
+      for (int vertical = 0; vertical < 2; vertical++) {
+        if ((vertical ? j : i) == n) continue;
+        snprintf (bar, sizeof bar, "%c%d-%d", vertical ? 'v' : 'h', i, j);
+        scene_bar (m, bar, i + (vertical ? 0 : 0.5), j + (vertical ? 0.5 : 0), vertical ? PW_PI / 2 : 0);
+        scene_node (m, first, first_at, j * side + i, bar, -0.5);
+        scene_node (m, first, first_at, vertical ? (j + 1) * side + i : j * side + i + 1, bar, 0.5);
       }
   free (first);
-  free (end);
+  free (first_at);
 }
 
 /* ---- From description to run ---- */
@@ -116,7 +111,7 @@ static pw_model *scene_describe (const char *name, void (*build) (pw_model *, co
                             .parameters = scene_parameters,
                             .parameters_size = sizeof (scene),
                             .build = build };
-  pw_plugin_table *keep = malloc (sizeof *keep); /* the table outlives the model: kept until the program ends */
+  pw_plugin_table *keep = malloc (sizeof *keep); /* never deallocated: the model refers to it */
   pw_error error = { 0 };
   if (keep == NULL) engine_die (name, "out of memory");
   *keep = table;
@@ -163,8 +158,9 @@ pw_run *engine_open (pw_system *s, const char *method, const pw_settings *settin
   return r;
 }
 
-void engine_bend (int links, int free, double *q, double *v) {
-  double x = 0, y = 0, vx = free ? 1 : 0, vy = free ? 0.5 : 0;
+void engine_bend (int links, engine_shape shape, double *q, double *v) {
+  int moves = shape == ENGINE_FREE; /* its first end */
+  double x = 0, y = 0, vx = moves ? 1 : 0, vy = moves ? 0.5 : 0;
   for (int i = 0; i < links; i++) {
     double phi = 0.4 * sin (0.7 * i), w = 0.3 * cos (1.1 * i), c = cos (phi) / 2, s = sin (phi) / 2;
     q[3 * i] = x += c, q[3 * i + 1] = y += s, q[3 * i + 2] = phi;

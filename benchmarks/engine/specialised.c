@@ -1,19 +1,23 @@
-/* Specialised code of scenes of the gallery against the general engine. */
+/* Comparisons of specialised code with the general engine, one run at a time and in lanes, on models of the gallery. */
 #include <stdlib.h>
 #include <string.h>
 #include "engine.h"
 #include "pinwheel-files.h"
 
-enum { SPECIALISED_POOL = 64, SPECIALISED_SPACING = 40 };
-enum { SPECIALISED_STEPS = 1000 }; /* after which a run begins again: a motion may become faster */
+enum {
+  SPECIALISED_POOL = 64,
+  SPECIALISED_SPACING = 40, /* steps between states of the pool */
+  SPECIALISED_STEPS = 1000, /* after which a run starts again: a motion may become faster */
+  SPECIALISED_COORDS = 300  /* most coordinates of a model */
+};
 
-/* The general engine and specialised code, with states of a motion to evaluate. */
+/* A run by the general engine, one by specialised code, and a pool of states of a motion to evaluate. */
 typedef struct {
   pw_system *system;
   pw_scene_code *code;
   pw_run *run[2];
-  int n, rows, side;
-  double t[SPECIALISED_POOL], *q, *v; /* pool x coordinates */
+  int n;                              /* coordinates */
+  double t[SPECIALISED_POOL], *q, *v; /* pool: [k * n + j] */
   double *a, *lambda;
 } specialised_data;
 
@@ -38,7 +42,16 @@ void engine_steps (pw_run *r, long n) {
     engine_die (r->s->model, error.text);
 }
 
-/* And the default step. */
+void engine_rounds (pw_run *r, long *done, long round, const double *q, const double *v, long n) {
+  for (long i = 0, count; i < n; i += count, *done += count) {
+    long left = round - *done % round;
+    count = n - i < left ? n - i : left;
+    if (left == round) pw_run_restart (r, q, v, NULL);
+    engine_steps (r, count);
+  }
+}
+
+/* Compiles a model; `step` takes its default step. */
 static pw_system *specialised_system (const char *name, double *step) {
   pw_error error = { 0 };
   pw_file *file = pw_file_open (name, &error);
@@ -51,7 +64,7 @@ static pw_system *specialised_system (const char *name, double *step) {
   return s; /* the file stays open: it holds the functions of the model */
 }
 
-/* States of a motion. */
+/* Fills the pool from a motion by the general engine. */
 static void specialised_pool (specialised_data *d) {
   pw_error error = { 0 };
   for (int k = 0; k < SPECIALISED_POOL; k++) {
@@ -60,7 +73,7 @@ static void specialised_pool (specialised_data *d) {
     memcpy (d->q + k * d->n, d->run[0]->q, (size_t)d->n * sizeof (double));
     memcpy (d->v + k * d->n, d->run[0]->v, (size_t)d->n * sizeof (double));
   }
-  pw_run_advance (d->run[1], 1e9, &error); /* the watchdog evaluates more at the beginning */
+  pw_run_advance (d->run[1], 1e9, &error); /* first evaluations of a run cost more: its watchdog starts */
   if (error.status != PW_OK) engine_die (d->system->model, error.text);
 }
 
@@ -76,29 +89,25 @@ static long specialised_evaluate (void *context, long n) {
 
 static long specialised_step (void *context, long n) {
   specialised_side *x = context;
-  for (long i = 0, more; i < n; i += more, x->steps += more) {
-    long left = SPECIALISED_STEPS - x->steps % SPECIALISED_STEPS;
-    more = n - i < left ? n - i : left;
-    if (left == SPECIALISED_STEPS) pw_run_restart (x->d->run[x->side], x->d->q, x->d->v, NULL);
-    engine_steps (x->d->run[x->side], more);
-  }
+  engine_rounds (x->d->run[x->side], &x->steps, SPECIALISED_STEPS, x->d->q, x->d->v, n);
   return n;
 }
 
-static void specialised_open (engine_case *c, const char *method) {
+static void specialised_open (engine_case *c) {
   static specialised_side side[2];
   specialised_data *d = c->data = calloc (1, sizeof *d);
   if (d == NULL) engine_die (c->key, "out of memory");
   double step = 0;
   d->system = specialised_system (c->model, &step);
   d->code = engine_specialise (d->system);
-  d->n = pw_system_coordinates (d->system), d->rows = pw_system_rows (d->system);
-  d->q = calloc ((size_t)(2 * SPECIALISED_POOL * d->n + d->n + d->rows) + 4, sizeof (double));
+  d->n = pw_system_coordinates (d->system);
+  size_t numbers = (size_t)(2 * SPECIALISED_POOL * d->n + d->n + pw_system_rows (d->system)) + 4;
+  d->q = calloc (numbers, sizeof (double));
   if (d->q == NULL) engine_die (c->key, "out of memory");
   d->v = d->q + SPECIALISED_POOL * d->n, d->a = d->v + SPECIALISED_POOL * d->n, d->lambda = d->a + d->n + 3;
   for (int i = 0; i < 2; i++) {
     pw_settings set = { .step = step, .span = 100, .specialised = i ? pw_scene_code_table (d->code) : NULL };
-    d->run[i] = engine_open (d->system, method, &set);
+    d->run[i] = engine_open (d->system, "rk4+projection", &set);
     side[i] = (specialised_side){ d, i, 0 };
   }
   specialised_pool (d);
@@ -106,12 +115,12 @@ static void specialised_open (engine_case *c, const char *method) {
 }
 
 void engine_open_specialised (engine_case *c) {
-  specialised_open (c, "rk4+projection");
+  specialised_open (c);
   specialised_data *d = c->data;
   c->base.run = c->ours.run = specialised_evaluate;
   c->base_function = c->our_function = "pw_run_accelerate";
   for (long n = 1; n <= SPECIALISED_POOL; n++) {
-    double a[300];
+    double a[SPECIALISED_COORDS];
     c->base.run (c->base.context, n);
     memcpy (a, d->a, (size_t)d->n * sizeof *a);
     c->ours.run (c->ours.context, n);
@@ -120,7 +129,7 @@ void engine_open_specialised (engine_case *c) {
 }
 
 void engine_open_specialised_step (engine_case *c) {
-  specialised_open (c, "rk4+projection");
+  specialised_open (c);
   c->base.run = c->ours.run = specialised_step;
   c->base_function = c->our_function = "pw_run_advance_to";
 }
@@ -136,20 +145,21 @@ void engine_close_specialised (engine_case *c) {
 
 /* ---- Several runs at once ---- */
 
-enum { LANES_MOST = 8 };
+enum { LANES_MOST = 8, LANES_WARM_UP = 1600 /* steps, in all runs together */ };
 
-/* Runs that begin with slightly different velocities: in the general engine, one after the other; in lanes. */
+/* Runs that start with slightly different velocities: by the general engine, one after the other; in lanes. */
 typedef struct {
   pw_system *system;
-  pw_scene_code *code, *lanes;
+  pw_scene_code *code, *lanes; /* for one run, for all at once */
   void *memory;
-  int n, steps; /* runs; steps after which they begin again */
-  double step;
+  int n;       /* runs */
+  double step; /* [s] */
   pw_run *general[LANES_MOST], *run[LANES_MOST];
 } lanes_data;
 
-static void lanes_again (pw_run *r, const pw_system *s, int k) {
-  double v[300];
+/* Restarts the k-th run from the initial state, with its own velocity. */
+static void lanes_restart (pw_run *r, const pw_system *s, int k) {
+  double v[SPECIALISED_COORDS];
   memcpy (v, s->v0, (size_t)s->coords * sizeof *v);
   v[0] += 1e-3 * k;
   pw_run_restart (r, s->q0, v, NULL);
@@ -159,10 +169,10 @@ static long lanes_general (void *context, long n) {
   lanes_data *d = context;
   n = (n + d->n - 1) / d->n;
   for (int k = 0; k < d->n; k++)
-    for (long i = 0, more; i < n; i += more) {
-      more = n - i < d->steps ? n - i : d->steps;
-      lanes_again (d->general[k], d->system, k);
-      engine_steps (d->general[k], more);
+    for (long i = 0, count; i < n; i += count) {
+      count = n - i < SPECIALISED_STEPS ? n - i : SPECIALISED_STEPS;
+      lanes_restart (d->general[k], d->system, k);
+      engine_steps (d->general[k], count);
     }
   return n * d->n;
 }
@@ -170,10 +180,10 @@ static long lanes_general (void *context, long n) {
 static long lanes_run (void *context, long n) {
   lanes_data *d = context;
   n = (n + d->n - 1) / d->n;
-  for (long i = 0, more; i < n; i += more) {
-    more = n - i < d->steps ? n - i : d->steps;
-    for (int k = 0; k < d->n; k++) lanes_again (d->run[k], d->system, k);
-    const double end = d->run[0]->t + (double)more * d->step;
+  for (long i = 0, count; i < n; i += count) {
+    count = n - i < SPECIALISED_STEPS ? n - i : SPECIALISED_STEPS;
+    for (int k = 0; k < d->n; k++) lanes_restart (d->run[k], d->system, k);
+    const double end = d->run[0]->t + (double)count * d->step;
     while (pw_run_time (d->run[0]) < end) {
       int status[LANES_MOST];
       pw_error error[LANES_MOST] = { { 0 } };
@@ -190,7 +200,6 @@ void engine_open_lanes (engine_case *c) {
   pw_error error = { 0 };
   if (d == NULL) engine_die (c->key, "out of memory");
   d->system = specialised_system (c->model, &d->step);
-  d->steps = SPECIALISED_STEPS;
   d->n = pw_processor_lanes ();
   d->code = engine_specialise (d->system);
   char *text = pw_system_source (d->system, NULL, &error);
@@ -205,7 +214,7 @@ void engine_open_lanes (engine_case *c) {
     d->run[k] = engine_open (d->system, "rk4+projection", &set);
   }
   c->base = (timing_work){ lanes_general, d }, c->ours = (timing_work){ lanes_run, d };
-  lanes_general (d, 1600), lanes_run (d, 1600);
+  lanes_general (d, LANES_WARM_UP), lanes_run (d, LANES_WARM_UP);
   c->difference = engine_difference (d->general[1]->q, d->run[1]->q, d->system->coords);
 }
 

@@ -1,4 +1,4 @@
-/* Shared by the parts of the hard cases: the cases as written, a cell of the matrix with its result, the matrix. */
+/* Shared by the parts of the program hard: the cases, the result of one method in one case, the matrix of results. */
 #ifndef HARD_H
 #define HARD_H
 
@@ -6,14 +6,15 @@
 #include "pinwheel-files.h"
 #include "pinwheel-solvers.h"
 
-enum { HARD_VALUES = 24, HARD_EXPECTATIONS = 24, HARD_CASES = 100, HARD_METHODS = 60 };
+/* Largest numbers of entries, and of characters of a name. */
+enum { HARD_VALUES = 24, HARD_EXPECTATIONS = 24, HARD_CASES = 100, HARD_METHODS = 60, HARD_NAME = 48 };
 
-/* Worst first: of several bounds the worst verdict counts. */
+/* Verdicts, the worst first; the worst one over all measures counts. */
 typedef enum {
-  HARD_CRASH,   /* ended by a signal */
+  HARD_CRASH,   /* the process ended abnormally */
   HARD_WRONG,   /* reports success outside all bounds, or stops without a reason: never allowed */
   HARD_SLOW,    /* stopped at the limit of processor time */
-  HARD_REFUSE,  /* stops with its reason */
+  HARD_REFUSE,  /* stops with a reason */
   HARD_LIMITED, /* within the second bound */
   HARD_PASS,    /* within the first bound */
   HARD_VERDICTS
@@ -21,12 +22,12 @@ typedef enum {
 
 extern const char *const hard_verdict_name[HARD_VERDICTS];
 
-/* What is measured of a run, and compared with the bounds of the case. */
+/* Measures of a run, which are compared with the bounds of the case. */
 typedef enum {
-  HARD_ERROR,     /* of the states at the end, relative to the reference or to the scene's unit, whichever is larger */
-  HARD_BALANCE,   /* of the energy, at worst, relative to the largest energy, work or loss */
-  HARD_RESIDUAL,  /* scaled, of g = 0 and J v = eta, at worst over the accepted steps */
-  HARD_EQUATIONS, /* scaled, of J a = gamma and M a + J^T lambda = f, by the independent verifier, at the end */
+  HARD_ERROR,     /* largest error of a state at the end, relative to the reference, but at least to its scale */
+  HARD_BALANCE,   /* largest energy defect, relative to the largest kinetic energy, work or loss */
+  HARD_RESIDUAL,  /* largest scaled residual of g = 0 and J v = eta after an accepted step */
+  HARD_EQUATIONS, /* scaled residual of J a = gamma and M a + J^T lambda = f at the end, by the independent verifier */
   HARD_MEASURES
 } hard_measure;
 
@@ -40,18 +41,18 @@ typedef struct {
 /* The verdict expected of all methods whose name matches a pattern; the last expectation that matches counts. */
 typedef struct {
   char pattern[400]; /* or several, separated by blanks */
-  int verdict;       /* bits: 1 << hard_verdict, several where round-off decides */
+  int verdict;       /* bits 1 << hard_verdict; several where round-off decides */
   char why[200];     /* why it does not pass */
   char reason[80];   /* text that the message of a refusal must contain */
 } hard_expectation;
 
 /* A case: a model, a time span, a reference solution or invariant, and the verdict expected of each method. */
 typedef struct {
-  char group[80], group_about[600], name[48], about[200], source[200];
+  char group[80], group_about[600], name[HARD_NAME], about[200], source[200];
   char model[300];
   hard_value set[HARD_VALUES], initial[HARD_VALUES], reference[HARD_VALUES];
   int sets, initials, references;
-  double t_end, step, rtol;       /* [s]; step of fixed-step methods [s]; rtol of adaptive ones */
+  double t_end, step, rtol;       /* [s]; of fixed-step methods [s]; of adaptive methods */
   double seconds;                 /* limit of processor time per cell [s] */
   char stops[80];                 /* if not empty, the run must stop, with this text in its message */
   double stop_time[2];            /* latest time of the stop: pass, limited [s] */
@@ -67,10 +68,11 @@ typedef struct {
   double t;                      /* time reached [s] */
   double measure[HARD_MEASURES]; /* NaN: not measured */
   double cpu;                    /* [s] */
-  char reason[500];              /* of a refusal */
+  char reason[500];              /* message, if the status is not PW_OK */
 } hard_result;
 
-/* Appends the cases of one file to the `count` cases read before.  Returns the new count; exits on a mistake. */
+/* Appends the cases of a file to the `count` cases read before; models: folder of their own models.  Returns the new
+ * count; ends the program on a mistake. */
 int hard_read (const char *path, const char *models, hard_case *cases, int count);
 
 /* Runs one cell in this process, without a verdict. */
@@ -89,7 +91,7 @@ int hard_as_expected (const hard_expectation *e, const hard_result *r);
 typedef struct {
   const hard_case *cases;
   int count, methods;
-  const char (*method)[48];
+  const char (*method)[HARD_NAME];
   const hard_result *result;
 } hard_matrix;
 

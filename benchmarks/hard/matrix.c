@@ -1,4 +1,4 @@
-/* The matrix of verdicts: for a terminal, as a page, as a table. */
+/* Writes the matrix of verdicts: as text for a terminal, as a page, as a table. */
 #include <math.h>
 #include <string.h>
 #include "hard.h"

@@ -1,4 +1,4 @@
-/* The cases, as they are written in the files of benchmarks/hard/cases. */
+/* Reads the files of benchmarks/hard/cases. */
 #include <libfyaml.h>
 #include <stdlib.h>
 #include <string.h>
@@ -7,7 +7,7 @@
 const char *const hard_verdict_name[HARD_VERDICTS] = { "CRASH", "WRONG", "slow", "refuse", "limited", "pass" };
 const char *const hard_measure_name[HARD_MEASURES] = { "error", "balance", "residual", "equations" };
 
-/* Where the reader is, for its messages. */
+/* The file and the case that are being read, for messages. */
 typedef struct {
   const char *path, *name;
 } read_place;
@@ -121,7 +121,7 @@ static void read_text (const read_place *at, struct fy_node *map, const char *ke
   if (text) read_copy (at, to, size, text);
 }
 
-/* A model that ends in .yaml is one of the folder of the hard cases' own. */
+/* A model that ends in .yaml is in the folder `models`; others are found by name. */
 static void read_model (const read_place *at, struct fy_node *n, const char *models, hard_case *c) {
   char name[sizeof c->model] = "";
   read_text (at, n, "model", name, sizeof name);

@@ -1,4 +1,4 @@
-/* One cell: a case by a method, run to its end and measured. */
+/* Runs one case by one method, measures the run, and decides on its verdict. */
 #include <fnmatch.h>
 #include <math.h>
 #include <stdlib.h>
@@ -7,7 +7,7 @@
 #include "hard.h"
 #include "pinwheel-selftest.h"
 
-enum { RUN_SAMPLES = 50 };
+enum { RUN_SAMPLES = 50 }; /* at which the energy balance is measured */
 
 typedef struct {
   pw_file *file;
@@ -21,8 +21,8 @@ typedef struct {
 
 /* Specialised code, if the scene has one, and a run that uses it. */
 static void run_specialise (run_cell *x, const char *method, pw_settings *settings, pw_error *error) {
-  pw_error none = { 0 };
-  char *text = pw_run_source (x->run, &none);
+  pw_error ignored = { 0 }; /* the scene has no code */
+  char *text = pw_run_source (x->run, &ignored);
   if (text) x->code = pw_scene_code_open (text, x->system, error);
   free (text);
   if (x->code == NULL) return;
@@ -55,13 +55,13 @@ static void run_close (run_cell *x) {
 
 /* ---- Measuring ---- */
 
-/* NaN counts as infinite. */
+/* The larger value; NaN counts as infinite. */
 static double run_worst (double a, double b) {
   return isnan (a) || isnan (b) ? INFINITY : fmax (a, b);
 }
 
-/* The scene's unit of a state, from the unit it is printed with. */
-static double run_unit (const run_cell *x, const char *name) {
+/* The scale of a state: length of the scene or 1 rad, divided by the time of the scene for a velocity. */
+static double run_scale (const run_cell *x, const char *name) {
   const pw_scale *scale = pw_run_scale (x->run);
   int i = pw_system_find_state (x->system, name, NULL);
   const char *unit = pw_system_state_unit (x->system, i);
@@ -76,7 +76,7 @@ static double run_error (const hard_case *c, const run_cell *x, const pw_sample 
     int state = pw_system_find_state (x->system, c->reference[i].name, NULL);
     if (state < 0) return INFINITY;
     double value = state < n ? sample->q[state] : sample->v[state - n];
-    double size = fmax (fabs (c->reference[i].value), run_unit (x, c->reference[i].name));
+    double size = fmax (fabs (c->reference[i].value), run_scale (x, c->reference[i].name));
     worst = run_worst (worst, fabs (value - c->reference[i].value) / size);
   }
   return worst;
@@ -89,7 +89,7 @@ static double run_equations (const run_cell *x, const pw_sample *sample) {
   return status == PW_OK ? run_worst (v.acceleration.scaled, v.force.scaled) : INFINITY;
 }
 
-/* Advances from sample to sample. */
+/* Runs to t_end, and measures at samples and at the end. */
 static int run_through (const hard_case *c, const run_cell *x, hard_result *r, pw_error *error) {
   double balance = 0, energy = 0;
   pw_sample sample = { .t = 0 };
@@ -140,12 +140,12 @@ hard_verdict hard_verdict_of (const hard_case *c, const hard_result *r) {
 }
 
 /* 1 if a name matches one of the patterns, which are separated by blanks. */
-static int run_fits (const char *patterns, const char *name) {
-  char one[sizeof ((hard_expectation *)0)->pattern];
+static int run_matches (const char *patterns, const char *name) {
+  char pattern[sizeof ((hard_expectation *)0)->pattern];
   for (; *patterns; patterns += strspn (patterns, " ")) {
     size_t n = strcspn (patterns, " ");
-    snprintf (one, sizeof one, "%.*s", (int)n, patterns);
-    if (fnmatch (one, name, 0) == 0) return 1;
+    snprintf (pattern, sizeof pattern, "%.*s", (int)n, patterns);
+    if (fnmatch (pattern, name, 0) == 0) return 1;
     patterns += n;
   }
   return 0;
@@ -153,7 +153,7 @@ static int run_fits (const char *patterns, const char *name) {
 
 const hard_expectation *hard_expected (const hard_case *c, const char *method) {
   for (int i = c->expectations - 1; i >= 0; i--)
-    if (run_fits (c->expect[i].pattern, method)) return &c->expect[i];
+    if (run_matches (c->expect[i].pattern, method)) return &c->expect[i];
   fprintf (stderr, "%s: no expectation for %s\n", c->name, method);
   exit (2);
 }

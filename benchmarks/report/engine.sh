@@ -1,6 +1,6 @@
-# The part of report.sh about the engine.
+# Part of report.sh: the table and the figure from the results of the program engine.
 
-# Fields of a line of CSV, the first perhaps quoted, separated by tabs.
+# The lines of the CSV with tabs between their fields; the first field may be quoted.
 split () {
   awk 'NR > 1 { name = $0; rest = $0
     if (/^"/) { name = substr ($0, 2); rest = name; sub (/".*/, "", name); sub (/^[^"]*",/, "", rest) }

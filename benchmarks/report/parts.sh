@@ -1,4 +1,4 @@
-# The parts of report.sh about programs by hand, the original algorithm, drift, long runs and effects.
+# Part of report.sh: the original algorithm, drift, long runs, effects and programs by hand.
 
 # ---- The original algorithm ----
 

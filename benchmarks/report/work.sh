@@ -1,4 +1,4 @@
-# The part of report.sh about work and precision.
+# Part of report.sh: tables and figures of work and precision.
 
 csv=$results/work-precision-$machine.csv
 
@@ -18,7 +18,7 @@ relative () {
           print c[1] "\t" c[4] "\t" c[2] "\t" 3 * k "\t" (c[5 + k] == "-" ? "-" : c[5 + k] / least[c[2], k]) } }' "$work/shown" >"$work/relative"
 }
 
-# The median and the largest of these costs in each group of scenes.
+# The median and the maximum of these relative costs in each group of scenes.
 summary_table () {
   awk -F '\t' -v methods="$shown" '
     function cell(g, m, k,  n, i, j, t, v) {
@@ -37,7 +37,7 @@ summary_table () {
         print " " cell("singular", m[i], 6) " |" } }' "$work/relative"
 }
 
-# Relative costs at 1e-6: a line for each method, a mark for each scene.
+# Costs for an error of 1e-6, relative to the cheapest method: a line for each method, a mark for each scene.
 summary_figure () {
   n=0 labels=
   for m in $shown; do
@@ -60,7 +60,7 @@ plot '$work/strip-stiff' with points pt 6 ps 0.7 lw 1 lc rgb '#cc6677'
 G
 }
 
-# Processor times for 1e-6 of every scene, and what the reference is known to.
+# Processor times for an error of 1e-6 in every scene, and the uncertainty of the reference solution.
 work_table () {
   awk -F '\t' -v methods="$shown" -v file="$results/reference-$machine.csv" '
     BEGIN { m = split(methods, method, " ")
@@ -77,7 +77,7 @@ work_table () {
         print "" } }' "$work/shown"
 }
 
-# Runs that do not reach the end, by method, with the scenes; methods without any are left out.
+# Runs that do not reach the end, by method, with their scenes; without the methods that have none.
 failure_table () {
   echo '| method | runs that fail | scenes |'
   echo '|---|---|---|'
@@ -92,7 +92,7 @@ failure_table () {
         printf "| `%s` | %d of %d | %s |\n", m, bad[m], all[m], text } }' "$csv"
 }
 
-# The same methods with both engines: processor times for 1e-6.
+# The same methods by the general engine and by specialised code: processor times for an error of 1e-6.
 engines_table () {
   echo '| scene | `erk8+projection`, general [ms] | specialised | ratio | `bdf+projection`, general [ms] | specialised | ratio |'
   echo '|---|---|---|---|---|---|---|'

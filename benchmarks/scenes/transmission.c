@@ -4,15 +4,15 @@
  *
  *   (a1 + b1 x) y' = (a2 + b2 x) z'                               y, z: angles of the discs
  *
- * With radii x and 1 (a1 = 0) this is the contact oscillator z' = x y'; a1 = a2 = 1, b1 = 0.3, b2 = -0.3 is a transmission
- * with two cones.  With beta = 0 the motion is reversible, without eccentricity also integrable, which favours symmetric
- * methods.  A gyroscopic coupling of the first disc and the carriage, beta, takes that away and keeps the energy.
- * (Modin & Verdier 2014, "Integrability of nonholonomically coupled oscillators"; Modin & Verdier 2020, Numer. Math. 145,
- * "What makes nonholonomic integrators work?", on perturbed problems.) */
+ * With radii x and 1 (a1 = 0) this is the contact oscillator z' = x y'; a1 = a2 = 1, b1 = 0.3, b2 = -0.3 is a
+ * transmission with two cones.  With beta = 0 the motion is reversible, without eccentricity also integrable; both
+ * favour symmetric methods.  A gyroscopic coupling beta of the first disc and the carriage destroys these properties
+ * and conserves the energy.  (Modin & Verdier 2014, "Integrability of nonholonomically coupled oscillators"; Modin &
+ * Verdier 2020, Numer. Math. 145, "What makes nonholonomic integrators work?", on perturbed problems.) */
 #include <math.h>
 #include "pinwheel.h"
 
-/* ---- belt: disc 1 and disc 2 roll on a belt whose place is that of body 3 along x ----
+/* ---- belt: discs 1 and 2 roll on a belt whose position is x of body 3 ----
  *
  *   r1 w1 - r2 w2 = 0,  r1 = a1 + b1 x3,  r2 = a2 + b2 x3              (1 nonholonomic equation)
  *   gamma = -(b1 w1 - b2 w2) vx3
@@ -91,7 +91,7 @@ static void belt_gamma_v (const pw_batch *b, double *out) {
 
 static const pw_kind belt_kind = {
   .name = "belt",
-  .about = "two discs roll on a belt whose place, that of a carriage, sets their radii",
+  .about = "two discs roll on a belt; the position of a carriage sets their radii",
   .definition = sizeof (belt),
   .element = sizeof (belt_element),
   .fields = belt_fields,
@@ -106,7 +106,7 @@ static const pw_kind belt_kind = {
   .gamma_v = belt_gamma_v,
 };
 
-/* ---- gyro: force -beta w1 along x on body 2, moment beta vx2 on body 1, without power ---- */
+/* ---- gyro: force -beta w1 along x on body 2, moment beta vx2 on body 1; their total power is zero ---- */
 
 typedef struct {
   const char *name;
@@ -181,7 +181,7 @@ static const pw_parameter parameters[] = {
   { .name = NULL },
 };
 
-/* The carriage's spring begins 10 m away, so that it is linear. */
+/* The spring of the carriage is linear: its other end is on the line of the rail, 10 m away. */
 static void build (pw_model *m, const void *parameter) {
   const model *p = parameter;
   double r1 = p->a1 + p->b1 * p->x, r2 = p->a2 + p->b2 * p->x, c = cos (p->y), s = sin (p->y), w = p->rate;

@@ -1,6 +1,6 @@
-"""Builds the wheel: the package and, if ../../build has been made, the libraries, the program and the models.
+"""Builds the wheel: the package and, if ../../build exists, the libraries, the program and the models (PEP 517).
 
-Needs nothing but Python, so that ``pip install core/python`` works without a network (PEP 517).
+Needs nothing but Python, so that ``pip install core/python`` works without a network.
 """
 
 import base64
@@ -17,7 +17,7 @@ _NAME, _VERSION = "pinwheel", "0.1.0"
 
 
 def _contents():
-    """Pairs of a name in the wheel and a file."""
+    """Pairs of a name in the wheel and the path of the file."""
     for path in sorted((_HERE / "pinwheel").glob("*.py")) + [_HERE / "pinwheel/py.typed"]:
         yield f"pinwheel/{path.name}", path
     build = _HERE.parent.parent / "build"
@@ -30,7 +30,7 @@ def _contents():
 
 
 def _read(path):
-    """The bytes of a file; those of libraries and programs without debugging information, which names the source tree."""
+    """The bytes of a file; libraries and programs without debugging information, which has paths of the source tree."""
     if not path.read_bytes().startswith(b"\x7fELF") or shutil.which("strip") is None:
         return path.read_bytes()
     with tempfile.TemporaryDirectory() as folder:

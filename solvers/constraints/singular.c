@@ -6,9 +6,9 @@
 #include "rank.h"
 #include "util.h"
 
-/* s: the sine over the largest one of the run; d: the scaled constraint residual; eps: the machine precision.  Where
- * branches cross, the constraints are x y = 0 in suitable coordinates, and s = |(x, y)|; with a residual d, x y = d,
- * whose branches turn where s^2 = 2 d. */
+/* s: the sine; d: the scaled constraint residual; eps: the machine precision.  Where branches cross, the constraints
+ * are x y = 0 in suitable coordinates, and s = |(x, y)|; with a residual d, x y = d, whose branches turn where s^2 = 2
+ * d. */
 const pw_thresholds pw_watchdog_limits = {
   /* A motion with residuals of 1 % is wrong; without stabilisation some drift is expected. */
   .lost = 1e-2,
@@ -19,10 +19,9 @@ const pw_thresholds pw_watchdog_limits = {
   .redundant_residual = 1e-9,
   .redundant_ratio = 1e4,
 
-  /* Round-off leaves sqrt (eps) = 1.5e-8 of a row that depends on others; below the sine 1e-6 accelerations, with an
-   * error of eps / s after refinement, are wrong by more than 1e-10.  After rows that are nearly dependent themselves,
-   * round-off leaves up to 1e-5, which is refused where a scene is too large for its rank to be computed.  Elsewhere
-   * the rank is computed below a hundred times that. */
+  /* rank_lost: round-off leaves sqrt (eps) = 1.5e-8 of a row that depends on others; below 1e-6 accelerations, with an
+   * error of eps / s after refinement, are wrong by more than 1e-10.  rank_refused: round-off leaves up to 1e-5 of a
+   * row that depends on rows which are nearly dependent themselves.  rank_suspect: a hundred times rank_refused. */
   .rank_lost = 1e-6,
   .rank_suspect = 1e-3,
   .rank_refused = 1e-5,
@@ -37,8 +36,10 @@ const pw_thresholds pw_watchdog_limits = {
   .refine = 0.02,
 
   /* Drift: measured on four-bar linkages and slider-cranks, d / s^2 is 0.08 to 0.34 where the turn is sharpest;
-   * accelerations have grown by a factor of 3 when it is 0.02 to 0.07.  Above `regular` a configuration is not
-   * singular, however large the drift. */
+   * accelerations, at least turn_reference L / T^2, have grown by a factor of 3 when it is 0.02 to 0.07.  Without
+   * accelerations to compare it must stay below half of that (drift_near), or, where d itself is a residual that counts
+   * as lost (drift_far), below the sharpest turn (drift_any).  Above `regular` times its largest value the sine is not
+   * that of a singular configuration, however large the drift. */
   .regular = 0.6,
   .turn_growth = 3,
   .turn_reference = 0.1,
@@ -57,15 +58,17 @@ const pw_thresholds pw_watchdog_limits = {
   .step_growth = 2,
 
   /* Change points (change_point.c): a sine within a step below an eighth of those at its ends belongs to a turn that
-   * the step cannot resolve; half of them indicates that there may be one.  Strides of 0.3 s stay on a curve whose
-   * radius is s.  A stride that approaches its destination by less than a tenth of its length leads elsewhere. */
+   * the step cannot resolve; half of them indicates that there may be one.  Strides of 0.3 times the sine stay on a
+   * curve whose radius is the sine.  A stride that approaches its destination by less than a tenth of its length leads
+   * elsewhere. */
   .unresolved = 0.125,
   .low = 0.5,
   .stride = 0.3,
   .progress = 0.1,
 
   /* The projection leaves residuals of 1e-14, which leave an error of 1e-7 in the sine: below `floor`, ten times that,
-   * it cannot be distinguished from 0 (`crossing`: with the tolerance of a stride).  Such a point must be left straight
+   * it cannot be distinguished from 0 (`crossing`: twice that, since a stride ends within `floor` of its destination).
+   * Such a point must be left straight
    * on, within 60 degrees of the direction in which it was entered. */
   .floor = 1e-6,
   .crossing = 2e-6,
@@ -74,8 +77,8 @@ const pw_thresholds pw_watchdog_limits = {
   /* Methods of order 2 have an error of (0.4)^2 / 12 = 1 % at a turn that takes 1 / 0.4 steps. */
   .resolved = 0.4,
 
-  /* Divisions of a step near a singular configuration mostly agree to 1e-11; those that differ by more than the error
-   * of a good step, 1e-7, do not agree. */
+  /* Results of the same step divided into parts, differently each time, near a singular configuration mostly agree to
+   * 1e-11; those that differ by more than the error of a good step, 1e-7, do not agree. */
   .agree = 1e-7,
   .agree_best = 1e-11,
 
@@ -83,12 +86,12 @@ const pw_thresholds pw_watchdog_limits = {
    * of the state over the sine, are ten times less accurate than at its beginning. */
   .ends_singular = 0.1,
 
-  /* A sample does not affect the next step: an error of a hundredth is acceptable. */
+  /* A sample does not affect the next step: an error of 0.01 L or 0.01 rad is acceptable. */
   .sample = 1e-2,
   .sample_best = 1e-9,
 
-  /* Conditioning of the active rows: another set is sought at 0.6 of the initial value, and where a coefficient exceeds
-   * 1 / 0.7. */
+  /* Independence of the active rows: another set is sought below both 0.6 of the initial value and 0.7, where a
+   * coefficient exceeds 1 / 0.7. */
   .reselect_ratio = 0.6,
   .reselect_below = 0.7,
 
@@ -176,7 +179,8 @@ int pw_fail_singular (pw_run *r, double t, pw_error *error) {
   char element[120] = "a constraint";
   int row = -1;
   double sine = pw_watchdog_sine (r, &row);
-  if (sine > r->limits.rank_refused && sine > r->limits.near * r->geometry.largest_sine) /* 0 at opening */
+  /* largest_sine is 0 while the run is being opened */
+  if (sine > r->limits.rank_refused && sine > r->limits.near * r->geometry.largest_sine)
     return pw_fail (
         error, PW_METHOD,
         "t = %.6g s: values too extreme: masses and inertias differ by so much that the equations of motion "

@@ -22,7 +22,7 @@ static const double radau_alpha = 2.68108287362775213390, radau_beta = 3.0504301
 
 /* ---- Equations ---- */
 
-/* F (t, y): the equations of dae.h without B y', with the opposite sign; leaves kinematics and J there. */
+/* F (t, y) = B y', B = diag (1, M, 0): minus the residual of dae.h without B y'.  Leaves kinematics and J at (t, y). */
 static int radau_evaluate (pw_run *r, double t, const double *y, double *F) {
   radau *d = r->data;
   int n = d->dae.n, status = pw_evaluate_J_at (r->w, pw_before_breakpoint (r, t), y, y + n);
@@ -116,12 +116,13 @@ static int radau_solve_complex (radau *d, double *re, double *im) {
 
 /* ---- Tolerances ---- */
 
+/* makes the error of order 5 about proportional to rtol (radau.c) */
 double pw_radau_rtol (const pw_run *r) {
   return 0.05 * cbrt (r->settings.rtol * r->settings.rtol);
 }
 
-/* Sets the tolerances for a step of size h: of the error test, of Newton's corrections, and their round-off, which for
- * velocities in index3 is that of positions over h. */
+/* Sets, for a step of size h, the tolerances of the error test and of Newton's corrections, and the round-off of the
+ * states; in index3 that of velocities is that of positions over h.  (radau has ggl, index2 and index3 only.) */
 static void radau_set_tolerances (pw_run *r, double h) {
   radau *d = r->data;
   const pw_settings *settings = &r->settings;
@@ -130,10 +131,10 @@ static void radau_set_tolerances (pw_run *r, double h) {
   double largest = 1; /* the largest coordinate in units of the scene: its round-off may affect others */
   for (int j = 0; j < n; j++) largest = fmax (largest, fabs (d->now.y[j]) / d->unit[j]);
   for (int i = 0; i < 2 * n; i++) {
-    double size = fabs (d->now.y[i]), least = settings->atol > 0 ? settings->atol / settings->rtol : d->unit[i];
-    double unit = index3 && i >= n ? fmax (d->unit[i], largest * d->unit[i - n] / h) : d->unit[i];
-    d->tolerance[i] = fmin (rtol * (size + least), r->saturation[i]);
-    d->round_off[i] = fmin (8 * DBL_EPSILON * (size + unit), 0.1 * r->saturation[i]);
+    double size = fabs (d->now.y[i]), offset = settings->atol > 0 ? settings->atol / settings->rtol : d->unit[i];
+    double typical = index3 && i >= n ? fmax (d->unit[i], largest * d->unit[i - n] / h) : d->unit[i];
+    d->tolerance[i] = fmin (rtol * (size + offset), r->saturation[i]);
+    d->round_off[i] = fmin (8 * DBL_EPSILON * (size + typical), 0.1 * r->saturation[i]);
     d->newton_tolerance[i] = pw_fixed_steps (r) ? d->round_off[i] : fmax (newton * d->tolerance[i], d->round_off[i]);
   }
 }
@@ -148,11 +149,11 @@ void pw_radau_basis (double x, double *weight) {
   }
 }
 
-/* to = factor from, of the values at the stages; `to` may be `from`. */
-static void radau_combine (radau *d, const double factor[STAGES][STAGES], double *const *from, double *const *to) {
+/* to[k] = sum_j matrix[k][j] from[j], for each unknown; `to` may be `from`. */
+static void radau_combine (radau *d, const double matrix[STAGES][STAGES], double *const *from, double *const *to) {
   for (int i = 0; i < d->dae.size; i++) {
     double a = from[0][i], b = from[1][i], c = from[2][i];
-    for (int k = 0; k < STAGES; k++) to[k][i] = factor[k][0] * a + factor[k][1] * b + factor[k][2] * c;
+    for (int k = 0; k < STAGES; k++) to[k][i] = matrix[k][0] * a + matrix[k][1] * b + matrix[k][2] * c;
   }
 }
 
@@ -213,15 +214,16 @@ static int radau_correct (pw_run *r, double h, double t1, double *size, double *
 }
 
 /* Tests convergence after a correction with `done` ones before it; size, before: of this correction and the previous
- * one in units of the tolerances, round_offs: in units of round-off.  Diverged: or too slow.  The tests are those of
- * Hairer & Wanner 1996, section IV.8, and one for round-off, which a singular configuration magnifies. */
+ * one in units of the tolerances, round_offs: in units of round-off.  PW_DIVERGED also if convergence is too slow.
+ * The tests are those of Hairer & Wanner 1996, section IV.8, and one for round-off: corrections of 64 times their
+ * round-off, or 1e7 times near a singular configuration, which magnifies it, that shrink slowly are accepted. */
 static pw_convergence radau_test (pw_run *r, int done, double size, double before, double round_offs) {
   radau *d = r->data;
   const int fixed = pw_fixed_steps (r), most = fixed ? 50 : PW_RADAU_MOST; /* a fixed step cannot be made shorter */
   d->reduction = 0.5;
   if (!isfinite (size)) return PW_DIVERGED;
   if (size == 0) return PW_CONVERGED;
-  if (done == 0) {
+  if (done == 0) { /* forces that saturate may seem to converge with the force of another state (tolerances.c) */
     if (fixed || r->s->saturates) return PW_ITERATE;
     d->remaining = pow (fmax (d->remaining, DBL_EPSILON), 0.8);
     return d->remaining * size <= 1 ? PW_CONVERGED : PW_ITERATE;
@@ -270,7 +272,7 @@ int pw_radau_solve (pw_run *r, double h, double t1) {
 
 /* ---- Errors ---- */
 
-/* Root of the sum of the squares of errors in units of the tolerances, over the number of states. */
+/* The root mean square of the errors of the states in units of their tolerances. */
 static double radau_norm (const radau *d, const double *e) {
   double sum = 0;
   for (int i = 0; i < 2 * d->dae.n; i++) sum += e[i] * e[i] / (d->tolerance[i] * d->tolerance[i]);
@@ -282,7 +284,7 @@ int pw_radau_estimate (pw_run *r, double h, int filter_twice, double *error) {
   int n = d->dae.n;
   double *e = d->F[0], *from_stages = d->F[1];
   double *const *Z = d->now.Z;
-  for (int i = 0; i < d->dae.size; i++) {
+  for (int i = 0; i < d->dae.size; i++) { /* F at the state reached is (v, M a, 0) */
     from_stages[i] = i < 2 * n ? d->B[i] / h * pw_radau_sum (0, radau_e, Z, i) : 0;
     e[i] = from_stages[i] + (i < n ? d->now.y[n + i] : i < 2 * n ? d->B[i] * r->a[i - n] : 0);
   }
@@ -290,7 +292,7 @@ int pw_radau_estimate (pw_run *r, double h, int filter_twice, double *error) {
   *error = radau_norm (d, e);
   if (!filter_twice || *error < 1) return PW_OK;
   for (int i = 0; i < d->dae.size; i++) d->Y[i] = d->now.y[i] + e[i];
-  if (radau_evaluate (r, r->t, d->Y, e) != PW_OK) return PW_OK;
+  if (radau_evaluate (r, r->t, d->Y, e) != PW_OK) return PW_OK; /* keeps the first estimate */
   for (int i = 0; i < d->dae.size; i++) e[i] += from_stages[i];
   if (radau_solve_real (d, e) != PW_OK) return PW_RESOURCE;
   *error = radau_norm (d, e);
@@ -321,6 +323,7 @@ int pw_radau_work (pw_run *r, double h, double t1, double *error) {
     double err = pw_radau_sum (h * r->rate[e], radau_e, d->now.ledger_change, e);
     sum += err * err;
   }
+  /* the estimate has order 3, like that of the states */
   double tolerance = pw_ledger_tolerance (r, h) * fmax (1, pw_radau_rtol (r) / r->settings.rtol);
   *error = fmax (*error, sqrt (sum) / radau_gamma / tolerance);
   return PW_OK;

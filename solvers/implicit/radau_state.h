@@ -47,7 +47,7 @@ struct pw_method_data {
 
 typedef struct pw_method_data radau;
 
-/* Records the pattern of F_y at the initial state and opens both matrices.  PW_OK or PW_RESOURCE. */
+/* Records the pattern of F_y, which does not depend on values, and opens both matrices.  PW_OK or PW_RESOURCE. */
 int pw_radau_open_matrices (pw_run *r);
 
 /* The relative tolerance of the error estimate, whose order is 3. */

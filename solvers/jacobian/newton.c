@@ -3,16 +3,16 @@
 #include "newton.h"
 
 int pw_newton_open (pw_newton_scratch *n, const pw_system *s) {
-  size_t block = 1, direction = 1;
+  size_t block_size = 1, direction_size = 1;
   for (const pw_element_batch *k = s->batch; k < s->batch + s->batches; k++) {
     const size_t columns = (size_t)k->b.count * (size_t)k->b.cols,
                  widths[] = { (size_t)k->b.cols, (size_t)k->kind->rows, PW_MAX_SIGNALS };
-    if (columns > direction) direction = columns;
+    if (columns > direction_size) direction_size = columns;
     for (int i = 0; i < 3; i++)
-      if (columns * widths[i] > block) block = columns * widths[i];
+      if (columns * widths[i] > block_size) block_size = columns * widths[i];
   }
-  n->block = malloc ((block + direction) * sizeof *n->block);
-  n->direction = n->block ? n->block + block : NULL;
+  n->block = malloc ((block_size + direction_size) * sizeof *n->block);
+  n->direction = n->block ? n->block + block_size : NULL;
   return n->block ? PW_OK : PW_RESOURCE;
 }
 
@@ -20,7 +20,7 @@ void pw_newton_close (pw_newton_scratch *n) {
   free (n->block);
 }
 
-/* Copies a vector over the coordinates to the columns of each element; the ground's are 0. */
+/* Copies the entries of a vector of coordinates that belong to the columns of each element; 0 for the ground. */
 static void newton_gather (const pw_system *s, const pw_element_batch *k, const double *vector, double *local) {
   for (int e = 0; e < k->b.count; e++)
     for (int c = 0; c < k->b.cols; c++) {
@@ -38,7 +38,8 @@ static inline int newton_is_length (int c) {
   return c % 3 != 2;
 }
 
-/* 1 for an entry of a pin that is always zero: its rows of J are multiples of unit vectors in x and y columns. */
+/* 1 for an entry of a pin that is always zero: its rows of J are multiples of unit vectors in x and
+ * y columns, so that their derivatives are in columns of angles only. */
 static inline int newton_is_zero (newton_part part, int r, int c) {
   if (part == NEWTON_J || part == NEWTON_JT) return newton_is_length (c) && c % 3 == 1 - r;
   return newton_is_length (c) || (part == NEWTON_COORDINATES && newton_is_length (r));
@@ -102,9 +103,9 @@ void pw_newton_add_signals (pw_newton_scratch *n, pw_workspace *w, pw_scatter_ma
     for (int e = 0; e < k->b.count; e++)
       for (int u = 0; u < signals; u++) {
         const pw_source *source = &k->source[e * signals + u];
-        for (int x = 0; x < source->reads; x++) { /* source->x: the values of the states read, then derivatives */
-          int j = source->state[x], col = j < s->coords ? col_q + j : col_v + j - s->coords;
-          double slope = source->x[source->reads + x];
+        for (int read = 0; read < source->reads; read++) { /* source->x: values of the states read, derivatives */
+          int j = source->state[read], col = j < s->coords ? col_q + j : col_v + j - s->coords;
+          double slope = source->x[source->reads + read];
           for (int c = 0; c < cols; c++) {
             int i = pw_global (k, e, c);
             if (i >= s->coords) continue;

@@ -20,7 +20,7 @@ void pw_newton_close (pw_newton_scratch *n);
 typedef struct {
   int row, col;
   int rows;                   /* only the first `rows` constraint equations are included */
-  double factor;              /* of blocks of forces, and of those of holonomic equations */
+  double factor;              /* of blocks whose rows are coordinates, and of those of holonomic equations */
   double factor_nonholonomic; /* of those of nonholonomic equations */
   const double *row_scale;    /* further factors, one for each row from `row` on; NULL: 1 */
   const int *row_index;       /* rows: index of each constraint equation, or -1: omitted; NULL: unchanged indices */

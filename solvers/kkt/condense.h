@@ -1,7 +1,8 @@
 /* Condensation of a saddle-point system to its constraint equations: planned by condense*.c, carried out by saddle.c.
  *
- * Equations are grouped into nodes of 1 or 2 with the same columns; a node contributes to the bodies and internal
- * coordinates with weight in its equations.  Two contributions to the same one make a block of S = J W^-1 J^T. */
+ * Equations are grouped into nodes of 1 or 2 with the same columns.  A node has a contribution at each body or internal
+ * coordinate of its equations whose weight, its entry of W (saddle.h), is not 0.  Two contributions at the same body or
+ * coordinate make a block of S = J W^-1 J^T. */
 #ifndef PW_CONDENSE_H
 #define PW_CONDENSE_H
 
@@ -12,7 +13,7 @@ struct pw_saddle {
   const pw_system *s;
   const pw_workspace *w; /* contains J */
   int rows;              /* of J: all, or the holonomic ones */
-  double postponed;      /* > 0: J has been evaluated but not factorised; lower bound of its pivots */
+  double postponed;      /* > 0: not factorised yet; specialised code has found pivots of at least this */
   pw_massless massless;
   double *inverse_weight; /* coords + 3: 1 / weight; 0 for prescribed ones and those without weight, and the ground's */
   double *force;          /* coords: forces changed by `massless` */
@@ -21,12 +22,14 @@ struct pw_saddle {
   pw_block_ldl *block;
   int *inactive; /* rows that are not enforced */
   int inactive_count;
-  double pivot;  /* smallest pivot of `massless` and `block` when last factorised, a squared sine */
+  double pivot;  /* smallest pivot of `massless` and `block` when last factorised, the squared sine between a row and
+                    those before it */
   int pivot_row; /* its row; -1: none, or of a massless component */
   char *memory;
 };
 
-/* Plans everything but `massless`, which must be open.  Errors: PW_RESOURCE. */
+/* Plans everything but `massless`, which must be open.  weight: coords; active: s->rows, 0 for rows not enforced, or
+ * NULL: all are.  Errors: PW_RESOURCE. */
 int pw_condense (struct pw_saddle *saddle, const double *weight, const unsigned char *active);
 
 /* ---- Planning ---- */
@@ -64,7 +67,8 @@ int pw_condense_rank (pw_plan *plan);
 /* Makes the saddle's block L D L^T.  Errors: PW_RESOURCE. */
 int pw_condense_block (pw_plan *plan);
 
-/* Finds the chains, and marks their inner columns; the contributions of each group are in the order of their columns.
+/* Finds the chains, and marks their inner columns.  Requires plan->list sorted within each group by the columns of the
+ * nodes in l.
  * PW_OK or PW_RESOURCE. */
 int pw_condense_chains (pw_plan *plan, pw_block_ldl *l);
 

@@ -11,7 +11,7 @@
  *   (T_a + gamma T_v + gamma^2 T_q) da + T_lambda dlambda = - T_q (b_q + gamma b_v) - T_v b_v
  *
  * T is evaluated when CVODES asks for a new Jacobian; gamma changes more often.  KLU analyses the matrix once and
- * refactors it, with new pivots if its reciprocal condition number has decreased. */
+ * refactors it, with new pivots if the estimated condition number exceeds eps^(-2/3), eps the machine precision. */
 #include <stdlib.h>
 #include <string.h>
 #include <cvodes/cvodes.h>

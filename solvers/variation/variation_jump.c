@@ -6,8 +6,8 @@
  *
  * as at breakpoints (variation_breakpoint.c), with the time t_s at which the motion meets the surface (Aizerman &
  * Gantmakher 1958; Leine & Nijmeijer 2004).  Neither the surface nor its gradient is known; bisection finds t_s of the
- * run, and that of neighbours along y + (p_i - p) dy + (t - t_s) y'-, by the accelerations, which are nearer to one or
- * to the other of the two sides. */
+ * run, and that of motions nearby, y + step dy + (t - t_s) y'-, by the accelerations, which are nearer to one or to the
+ * other of the two sides: motions of the neighbouring systems, and of the run's own from a state nearby. */
 #include <math.h>
 #include <string.h>
 #include "util.h"
@@ -15,7 +15,10 @@
 
 enum { JUMP_MANY = 8 }; /* jumps in one step of a run: more are chatter */
 
-/* A jump: between times that do not differ, accelerations change by at least this part of their change in the interval
+/* The difference below which times count as equal, in units of the scene. */
+static const double JUMP_ZERO = 1e-20;
+
+/* A jump: between equal times, accelerations change by at least this part of their change in the interval
  * that was searched, and by JUMP_LEAST in units of the scene. */
 static const double JUMP_PART = 0.25, JUMP_LEAST = 1e-6;
 
@@ -23,11 +26,9 @@ static const double JUMP_PART = 0.25, JUMP_LEAST = 1e-6;
  * part of their change. */
 static const double JUMP_BEND = 0.1;
 
-/* The first and the largest interval of time in which a neighbour meets the surface, in units of the scene. */
+/* The first and the largest interval of time in which a motion nearby is searched for the surface, in units of the
+ * scene; JUMP_NEAR is also the time after which the run must have left it. */
 static const double JUMP_NEAR = 1e-9, JUMP_FAR = 1e-2;
-
-/* Times that do not differ, in units of the scene. */
-static const double JUMP_ZERO = 1e-20;
 
 /* Largest difference of accelerations, in units of the scene. */
 static double jump_distance (const pw_variation *x, const double *a, const double *b) {
@@ -60,15 +61,15 @@ static int jump_insert (pw_variation *x, int i, double t, const double *state, p
  * accelerations. *found: 1 if they jump between the times t0 and t1 that remain. */
 static int jump_bisect (pw_variation *x, double *t0, double *t1, double *left, double *right, int *found,
                         pw_error *error) {
-  double *middle = x->scratch, first = jump_distance (x, left + 2 * x->n, right + 2 * x->n), t;
+  double *middle = x->scratch, largest = jump_distance (x, left + 2 * x->n, right + 2 * x->n), t;
   size_t bytes = 3 * (size_t)x->n * sizeof *left;
   while (*t1 - *t0 > JUMP_ZERO * x->r->w->scale.time && (t = *t0 + (*t1 - *t0) / 2) > *t0 && t < *t1) {
     int status = jump_state (x, t, middle, error);
     if (status != PW_OK) return status;
     double before = jump_distance (x, left + 2 * x->n, middle + 2 * x->n),
            after = jump_distance (x, middle + 2 * x->n, right + 2 * x->n);
-    first = fmax (first, fmax (before, after));
-    if (!(fmax (before, after) > fmax (JUMP_LEAST, JUMP_PART * first))) return PW_OK;
+    largest = fmax (largest, fmax (before, after));
+    if (!(fmax (before, after) > fmax (JUMP_LEAST, JUMP_PART * largest))) return PW_OK;
     memcpy (before < after ? left : right, middle, bytes);
     *(before < after ? t0 : t1) = t;
   }
@@ -76,7 +77,8 @@ static int jump_bisect (pw_variation *x, double *t0, double *t1, double *left, d
   return PW_OK;
 }
 
-/* 1 if accelerations between points i and i + 1 may jump: they are not linear. */
+/* *suspected: 1 if accelerations between points i and i + 1 may jump, since they are not linear.  state: scratch, 3
+ * n. */
 static int jump_suspected (pw_variation *x, int i, double *state, int *suspected, pw_error *error) {
   const double *left = x->point[i].x + 2 * x->n, *right = x->point[i + 1].x + 2 * x->n;
   double t = x->point[i].t + (x->point[i + 1].t - x->point[i].t) / 2, *a = state + 2 * x->n;
@@ -153,10 +155,10 @@ static int jump_fail (double t, pw_error *error) {
       t);
 }
 
-/* A motion near that of the run: y + step dy + (t - t_s) y'-, of a system. */
+/* A motion near that of the run, y + step dy + (t - t_s) y'-. */
 typedef struct {
   pw_variation *x;
-  pw_run *r;
+  pw_run *r;                    /* whose equations give its accelerations: the run's, or those of a neighbouring run */
   double t, t_after;            /* t_s, and the time after it */
   const double *before, *after; /* q, v, a of the run at t_s, on both sides */
   const double *dy;
@@ -170,24 +172,30 @@ static jump_neighbour jump_of (pw_variation *x, double t) {
   return (jump_neighbour){ .x = x, .r = x->r, .t = t, .t_after = p[1].t, .before = p[0].x, .after = p[1].x };
 }
 
-/* 1 if the accelerations of the neighbour at time t_s + t are those after the jump, 0 before it. */
-static int jump_side (const jump_neighbour *k, double t, int *side) {
+/* n + 3: where jump_side leaves the accelerations. */
+static double *jump_scratch_a (const pw_variation *x) {
+  return x->scratch + 2 * (x->n + 3);
+}
+
+/* *after: 1 if the accelerations of the motion at time t_s + delay are nearer to those after the jump than to those
+ * before it.  A status. */
+static int jump_side (const jump_neighbour *k, double delay, int *after) {
   pw_variation *x = k->x;
   int n = x->n;
-  double *q = x->scratch, *v = q + n + 3, *a = v + n + 3, *lambda = a + n + 3;
+  double *q = x->scratch, *v = q + n + 3, *a = jump_scratch_a (x), *lambda = a + n + 3;
   for (int j = 0; j < n; j++) {
-    q[j] = k->before[j] + k->step * k->dy[j] + t * k->before[n + j];
-    v[j] = k->before[n + j] + k->step * k->dy[n + j] + t * k->before[2 * n + j];
+    q[j] = k->before[j] + k->step * k->dy[j] + delay * k->before[n + j];
+    v[j] = k->before[n + j] + k->step * k->dy[n + j] + delay * k->before[2 * n + j];
   }
   pw_statistics statistics = k->r->statistics;
-  int near = k->r->near_singular, status = pw_run_accelerate (k->r, k->t + t, q, v, a, lambda);
+  int near = k->r->near_singular, status = pw_run_accelerate (k->r, k->t + delay, q, v, a, lambda);
   k->r->statistics = statistics;
   k->r->near_singular = near;
-  *side = jump_distance (x, a, k->after + 2 * n) < jump_distance (x, a, k->before + 2 * n);
+  *after = jump_distance (x, a, k->after + 2 * n) < jump_distance (x, a, k->before + 2 * n);
   return status;
 }
 
-/* The time at which the neighbour meets the surface, minus t_s; NaN if it does not, or cannot be evaluated. */
+/* The time at which the motion meets the surface, minus t_s; NaN if it does not, or cannot be evaluated. */
 static double jump_time (const jump_neighbour *k) {
   double T = k->x->r->w->scale.time, lo, hi, middle;
   int before = 1, after = 0, side;
@@ -204,7 +212,7 @@ static double jump_time (const jump_neighbour *k) {
   return fabs (middle) > 2 * JUMP_ZERO * T ? middle : 0;
 }
 
-/* The derivative of t_s by the state along a column. */
+/* The directional derivative of t_s along the change of state c->Y. */
 static double jump_along (const pw_variation_column *c, jump_neighbour k) {
   double step = pw_variation_step_along (c);
   k.dy = c->Y;
@@ -214,7 +222,7 @@ static double jump_along (const pw_variation_column *c, jump_neighbour k) {
   return (later - jump_time (&k)) / (2 * step);
 }
 
-/* The derivative of t_s, or its error. */
+/* The derivative of t_s, or its error: that of the state, as it changes t_s, and that of the differences. */
 static double jump_slope (const pw_variation_column *c, jump_neighbour k) {
   const pw_direction *d = &c->direction->given;
   int index = pw_variation_column_index (c);
@@ -229,7 +237,8 @@ static double jump_slope (const pw_variation_column *c, jump_neighbour k) {
   return slope;
 }
 
-/* 1 if the motion leaves the surface after the jump, instead of sliding along it. */
+/* 1 if the motion leaves the surface after the jump, instead of sliding along it: with the velocities and accelerations
+ * after it (dy adds their difference to those before, times step), it is on that side a short time later. */
 static int jump_leaves (jump_neighbour k) {
   int n = k.x->n, side;
   double *dy = k.x->output;
@@ -242,22 +251,23 @@ static int jump_leaves (jump_neighbour k) {
  * it. */
 static int jump_arrives (jump_neighbour k) {
   int n = k.x->n, side;
-  double t = -JUMP_NEAR * k.x->r->w->scale.time, *a = k.x->scratch + 2 * (n + 3);
-  k.dy = k.before;
-  return jump_side (&k, t, &side) == PW_OK &&
+  double delay = -JUMP_NEAR * k.x->r->w->scale.time, *a = jump_scratch_a (k.x);
+  k.dy = k.before; /* any, since step is 0 */
+  return jump_side (&k, delay, &side) == PW_OK &&
          jump_distance (k.x, a, k.before + 2 * n) < JUMP_PART * jump_distance (k.x, k.before + 2 * n, k.after + 2 * n);
 }
 
-/* The largest difference between t_s and the times at which neighbours pass the surface, those at the state of the run
- * and those near it, at which powers are differentiated. */
+/* The largest difference between t_s and the times at which motions nearby meet the surface: those of the neighbouring
+ * runs from the state of the run, and with the ledger those of the run from states displaced along each column, at
+ * which powers are differentiated. */
 static double jump_width (pw_variation *x, jump_neighbour k) {
   double most = 0;
   PW_EACH_COLUMN (c, x)
-  for (int side = -1; side <= 1 && x->ledger; side += 2) {
-    k.dy = c->Y, k.step = side * pw_variation_step_along (c);
+  for (int sign = -1; sign <= 1 && x->ledger; sign += 2) {
+    k.dy = c->Y, k.step = sign * pw_variation_step_along (c);
     most = pw_larger_or_nan (most, fabs (jump_time (&k)));
   }
-  k.dy = k.before, k.step = 0;
+  k.dy = k.before, k.step = 0; /* any, since step is 0 */
   for (pw_direction_copy *d = x->direction; d < x->direction + x->count; d++)
     for (int i = 0; i < PW_VARIATION_NEIGHBOURS && d->given.initial == NULL; i++) {
       k.r = d->given.neighbour[i];
@@ -266,11 +276,11 @@ static double jump_width (pw_variation *x, jump_neighbour k) {
   return most;
 }
 
-/* The state at t_s + t, with the velocities and accelerations of one side. */
-static void jump_hold (pw_variation_hold *h, const double *state, double t_s, double t, int n) {
-  for (int j = 0; j < 2 * n; j++) h->state[j] = state[j] + t * state[n + j];
-  h->t = t_s + t;
-  h->from = fmin (t_s, h->t), h->to = fmax (t_s, h->t);
+/* The state at t_side + delay, with the velocities and accelerations of one side of the jump, whose time is t_side. */
+static void jump_hold (pw_variation_hold *h, const double *state, double t_side, double delay, int n) {
+  for (int j = 0; j < 2 * n; j++) h->state[j] = state[j] + delay * state[n + j];
+  h->t = t_side + delay;
+  h->from = fmin (t_side, h->t), h->to = fmax (t_side, h->t);
 }
 
 int pw_variation_approach_jump (pw_variation *x, pw_error *error) {
@@ -282,20 +292,22 @@ int pw_variation_approach_jump (pw_variation *x, pw_error *error) {
   jump_hold (&x->hold[0], k.before, t, -width, x->n);
   jump_hold (&x->hold[1], k.after, k.t_after, width, x->n);
   if (x->t < x->hold[0].from) return PW_OK;
+  /* the derivatives are already within the interval: their rates are those at the held state */
   PW_EACH_COLUMN (c, x) memcpy (c->trial, c->Y, (size_t)x->size * sizeof *c->Y);
   int status = pw_variation_evaluate_at (x, x->t, error);
   return status == PW_OK ? pw_variation_restart (x, error) : status;
 }
 
 int pw_variation_pass_jump (pw_variation *x, pw_error *error) {
-  int moves = 0, smooth;
+  int time_varies = 0, smooth;
   jump_neighbour k = jump_of (x, x->t);
   smooth = jump_leaves (k);
   PW_EACH_COLUMN (c, x) {
     c->slope = jump_slope (c, k);
     smooth &= isfinite (c->slope);
-    moves |= c->slope != 0;
+    time_varies |= c->slope != 0;
   }
-  if (!smooth || (moves && !jump_arrives (k))) return jump_fail (x->t, error);
+  /* a motion may start at the jump if t_s does not depend on the parameters */
+  if (!smooth || (time_varies && !jump_arrives (k))) return jump_fail (x->t, error);
   return pw_variation_jump (x, k.t_after, k.after, error);
 }

@@ -80,7 +80,7 @@ struct pw_variation {
   double *motion_error, *motion_defect;
   double speed;             /* largest velocity of the run so far, in units of the scene */
   double reversal;          /* change of a velocity over which a force reverses, at most 1, in units of the scene */
-  double *scratch, *output; /* k = 3 n + 4 m + entries + 9; output: 2 + entries + m of pw_variation_outputs */
+  double *scratch, *output; /* k = 3 n + 4 m + entries + 9 each; results of pw_variation_outputs */
   double *values;           /* 2 k: scratch */
   int elements;
   double *element_energy; /* 2 elements: potential energies at two states */

@@ -219,7 +219,7 @@ static void test_bad (void **state) {
     { "@/point.yaml --free a=2:1 --maximise p.x",
       "--free a=...: expected bounds LOW:HIGH, two numbers, the first one smaller" },
     { "@/point.yaml --free a=1:2 --maximise p.x",
-      "--free a: its initial value -1 is not between 1 and 2; set it by --set" },
+      "--free a: its value -1, where the search starts, is not between 1 and 2; set it by --set" },
     { "@/point.yaml --free a --free a --maximise p.x", "--free a is given twice" },
     { "@/point.yaml --free a --maximise p.x --starts 0", "--starts 0: expected a whole number >= 1" },
     { "@/point.yaml --free a --maximise p.x -o @/x.yaml --json @/x.yaml",

@@ -94,20 +94,22 @@ static void test_n_trailer (void **state) {
 
 static void test_chain (void **state) {
   (void)state;
-  for (double n = 1; n <= 20; n *= 4) gallery_energy (gallery_open ("chain", "n", n, NULL), 2e-4, 1, n * 1e4 * H4, 0);
+  for (double n = 1; n <= 20; n *= 4)
+    gallery_energy (gallery_open ("chain", "n", n, NULL), 2e-4, 1, n * 1e4 * H4, GALLERY_CONSERVATIVE);
 }
 
 static void test_snakeboard (void **state) {
   (void)state;
-  gallery_energy (gallery_open ("snakeboard", NULL), 1e-3, 10, 100 * H4, 1);
+  gallery_energy (gallery_open ("snakeboard", NULL), 1e-3, 10, 100 * H4, GALLERY_DRIVEN);
   gallery_energy (gallery_open ("snakeboard", "swing", 0., "steer", 0., "trim", 0.4, "u0", 1.5, NULL), 1e-3, 10,
-                  100 * H4, 0);
+                  100 * H4, GALLERY_CONSERVATIVE);
 }
 
 static void test_roller_racer (void **state) {
   (void)state;
-  gallery_energy (gallery_open ("roller-racer", NULL), 1e-3, 5, 1e6 * H4, 1);
-  gallery_energy (gallery_open ("roller-racer", "stiffness", 0., "damping", 0., "u0", 1., NULL), 1e-3, 5, 1e3 * H4, 0);
+  gallery_energy (gallery_open ("roller-racer", NULL), 1e-3, 5, 1e6 * H4, GALLERY_DRIVEN);
+  gallery_energy (gallery_open ("roller-racer", "stiffness", 0., "damping", 0., "u0", 1., NULL), 1e-3, 5, 1e3 * H4,
+                  GALLERY_CONSERVATIVE);
 }
 
 /* ---- Mechanisms ---- */

@@ -9,7 +9,7 @@
 static void test_wheeled_snake (void **state) {
   (void)state;
   for (double n = 3; n <= 12; n += 3)
-    gallery_energy (gallery_open ("wheeled-snake", "n", n, NULL), 5e-4, 4, 1e6 * H4, 1);
+    gallery_energy (gallery_open ("wheeled-snake", "n", n, NULL), 5e-4, 4, 1e6 * H4, GALLERY_DRIVEN);
 }
 
 /* The circle on which a point of a body moves: it begins at (x0, 0) in x direction, with the centre to its left. */

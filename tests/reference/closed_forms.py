@@ -1,5 +1,5 @@
-"""The reference itself, against what is known without it: closed forms, digits in quadruple
-precision, balances of energy."""
+"""Checks of the reference simulator: against closed forms, digits in quadruple precision, differences, energy
+balances."""
 import functools
 import math
 import os
@@ -7,7 +7,7 @@ import sys
 import numpy as np
 from scipy.special import ellipj, ellipkinc
 from mechanisms import random_mechanism
-from simulator import Mechanism, Now
+from simulator import Mechanism, State
 
 HERE = os.path.dirname(os.path.abspath(__file__))
 PENDULUM = {"bodies": [{"name": "b", "mass": 2, "inertia": 0.3, "start": {"x": 0.5}}],
@@ -45,7 +45,7 @@ def pendulum():
 
 
 def skate():
-    """x = a/(2 w^2) sin^2 wt, y = a/(2 w^2) (wt - sin (2 wt)/2); the edge carries 2 m a sin wt (Neimark & Fufaev 1972)."""
+    """x = a/(2 w^2) sin^2 wt, y = a/(2 w^2) (wt - sin (2 wt)/2); lateral force 2 m a sin wt (Neimark & Fufaev 1972)."""
     a, w, t = 4.905, 1.3, 2.0
     row = table(SKATE, [t])[-1]
     return max(abs(row["b.x"] - a / (2 * w * w) * math.sin(w * t)**2),
@@ -67,22 +67,22 @@ def mechanisms():
 
 
 def derivatives():
-    """J and what the constraints add to accelerations, against differences of the constraints along a motion."""
+    """Central differences of the constrained rates along a motion with the accelerations of the simulator: zero."""
     worst, h = 0.0, 1e-4
-    for m, _, _ in mechanisms():
+    for m, _ in mechanisms():
         q, v = m.q, m.v
-        a = m.solve(Now(m, 0.0, m.middle(0.0), q, v))[0]
-        moved = [Now(m, s, m.middle(0.0), q + s * v + s * s / 2 * a, v + s * a) for s in (-h, h)]
-        residuals = [np.array([r.x for _, r, _ in now.rows]) for now in moved]
+        a = m.solve(State(m, 0.0, m.middle(0.0), q, v))[0]
+        moved = [State(m, s, m.middle(0.0), q + s * v + s * s / 2 * a, v + s * a) for s in (-h, h)]
+        residuals = [np.array([r.x for _, r, _ in state.rows]) for state in moved]
         if len(residuals[0]):
             worst = max(worst, float(np.max(np.abs(residuals[1] - residuals[0]))) / (2 * h) / (1 + max(abs(a))))
     return worst
 
 
 def energy():
-    """Kinetic and potential energy are what work and losses leave."""
+    """Kinetic and potential energy change by work less losses."""
     worst = 0.0
-    for _, rows, _ in mechanisms():
+    for _, rows in mechanisms():
         energies = ("work", "loss", "kinetic", "potential")
         size = max([1.0] + [abs(x) for r in rows for k, x in r.items() if k.endswith(energies)])
         total = [r["kinetic"] + r["potential"] - sum(x for k, x in r.items() if k.endswith(".work")) +

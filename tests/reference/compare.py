@@ -1,4 +1,4 @@
-"""Random mechanisms by every method of Pinwheel, against the reference.
+"""Compares random mechanisms by every method of Pinwheel with the reference simulator.
 
   compare.py [--seed S] [--count N] [--methods A,B,...] [--keep FOLDER] [--program PATH] [--hard]
 
@@ -22,12 +22,11 @@ ORDER = {"rk4": 4, "galpha": 2, "leapfrog": 2}  # of the methods with fixed step
 STEP = {"rk4": 0.005, "galpha": 0.002, "leapfrog": 0.002}  # [s]
 RTOL = dict.fromkeys(("erk5", "erk8", "adams", "bdf", "ida", "radau"), 1e-9)
 
-
-FAILURES = 0.002  # the part of runs that may end with a reason: these mechanisms are neither stiff nor singular
+FAILURES = 0.002  # largest fraction of runs that may fail: these mechanisms are neither stiff nor singular
 
 
 class Refused(Exception):
-    """A run that Pinwheel ends with a status other than 0."""
+    """A run that ends with a status other than 0, or takes too long."""
 
 
 def methods(program):
@@ -43,7 +42,7 @@ def methods(program):
 
 
 def reason_in(text):
-    """The line of an error among notices."""
+    """The line with the error in messages that also have notices."""
     lines = [x for x in text.splitlines() if re.search("error:|pinwheel: ", x)
              and not re.search("redundant|is kept in|were moved|by differences", x)]
     return lines[-1] if lines else text[-200:]
@@ -68,10 +67,10 @@ def run(program, path, method, span, every, setting, more=()):
 
 
 def groups(m, row):
-    """The columns of a row that are compared, by what they are."""
+    """The columns of a row that are compared, by group."""
     positions, velocities = m.names()
     reactions = [k for k in row if k not in positions + velocities and not k.endswith((".work", ".loss")) and "." in k]
-    # How redundant constraints share their work is not unique, as their reactions are not.
+    # The works of redundant constraints are not unique, their sum is.
     ledger = ["kinetic", "potential"] + [k for k in row if k.endswith(".loss") or k.endswith(".work") and m.regular] + \
         ["work"] * (not m.regular)
     return {"positions": positions, "velocities": velocities, "reactions": reactions, "ledger": ledger}
@@ -94,33 +93,35 @@ def errors(m, table, rows, states_only=False):
             for c in columns:
                 if states_only and c not in got:
                     continue
-                # A power that never is needs no column.
+                # An element that never exchanges energy may have no column.
                 x = got.get(c, 0.0 if c.endswith((".work", ".loss")) else np.nan)
                 worst = np.maximum(worst, abs(x - want[c]) / size)
         out[name] = float(worst)
     return out
 
 
-def setting(integrator, refine):
+def setting(method, refine, unit=1.0):
+    """The option for the step or the tolerance; unit: the unit of time [s]."""
+    integrator = method.split("+")[0]
     if integrator in STEP:
-        return ["--step", repr(STEP[integrator] / 2**refine)]
+        return ["--step", repr(STEP[integrator] / 2**refine * unit)]
     return ["--rtol", repr(RTOL[integrator] / 10**refine)]
 
 
-# A tolerance is one on the error of a step.  Over the span, tens to hundreds of steps add theirs, and the motion itself
-# magnifies them.  In 120 mechanisms errors were up to this many times the tolerance: erk5 430, erk8 169, adams 1240,
-# bdf 2990, ida 399, radau (60 of them) 141.  Without stabilisation the drift adds its own: in seed 163 bdf+none drifts by 96
-# times the tolerance, velocities at the end are 78 times as sensitive to the length of a rod, and their error is 9370 times the
-# tolerance (with projection 1350).  What is above a bound has to be below it at a finer tolerance.
+# Largest error at the end in units of the tolerance.  The tolerance applies to one step; tens to hundreds of steps add
+# up, and the motion magnifies their errors.  Largest ratios in 120 mechanisms: erk5 430, erk8 169, adams 1240, bdf
+# 2990, ida 399, radau (in 60) 141.  Without stabilisation drift adds to them: in seed 163 bdf+none drifts by 96 times
+# the tolerance, the final velocities are 78 times as sensitive to the length of a rod, and their error is 9370 times
+# the tolerance (with projection 1350).  An error above the bound must be below it at a finer tolerance.
 FACTOR = {"erk5": 1e3, "erk8": 3e2, "adams": 3e3, "bdf": 5e3, "ida": 3e3, "radau": 1e3}
-FLOOR = 1e-8  # of the reference, at rtol 1e-11
+FLOOR = 1e-8  # above the error of the reference, which has rtol 1e-11
 
 
 def floor(method, group, m, refine):
-    """What an error is not asked to be below."""
+    """Errors below this are accepted: round-off, and the error of the reference."""
     if method == "galpha+index3" and group == "reactions":
-        # Second differences of positions, each with an error of eps L; chains of bodies magnify it, up to 1000 times in 300
-        # mechanisms, whatever the order of elimination.
+        # Second differences of positions with errors of eps L, which chains of bodies magnify: up to 1000 times in 300
+        # mechanisms, in any order of elimination.
         return FLOOR + 1024 * 2.2e-16 * m.length / (STEP["galpha"] / 2**refine)**2
     return FLOOR
 
@@ -129,10 +130,10 @@ LARGEST = collections.Counter()  # errors in units of the tolerance, by integrat
 
 
 def converges(m, table, method, rows, states_only=False):
-    """None, or what is wrong: errors by group, at ever finer settings; rows (refine): those of a run.
+    """None, or the errors that are too large, by group; rows (refine): the rows of a run with finer settings.
 
-    Steps: halved, the error goes down by 2^order, or is below the floor.  Tolerances: the error is below FACTOR times the
-    tolerance.  Where that is not seen at once, at finer settings again: at coarse ones a method may be outside its
+    Fixed steps: halving the step reduces the error by 2^order, unless it is below the floor.  Tolerances: the error is
+    below FACTOR times the tolerance.  If not, the settings are refined: at coarse ones a method may be outside its
     asymptotic range."""
     integrator, history, bad = method.split("+")[0], [], []
     for refine in range(5):
@@ -143,13 +144,13 @@ def converges(m, table, method, rows, states_only=False):
             if refine == 4 or "too large" not in str(e):
                 raise
             continue
-        bad = [g for g in history[-1] if not good_enough(integrator, g, history, floor(method, g, m, refine), refine)]
+        bad = [g for g in history[-1] if not accepted(integrator, g, history, floor(method, g, m, refine), refine)]
         if not bad:
             return None
     return "%s: %s" % (", ".join(bad), "; ".join(" ".join("%s %.2g" % (g, e[g]) for g in bad) for e in history))
 
 
-def good_enough(integrator, group, history, least, refine):
+def accepted(integrator, group, history, least, refine):
     e = history[-1][group]
     if integrator in STEP:
         return e < least or len(history) > 1 and e < history[-2][group] / 2**(ORDER[integrator] - 0.6) and e < 1e-2
@@ -160,13 +161,13 @@ def good_enough(integrator, group, history, least, refine):
 
 
 class Case:
-    """A mechanism with a start: as it is, by its free coordinates or velocities, or near a consistent
-    one, by turns.
+    """A mechanism with one of four kinds of starts in turn: consistent, independent coordinates and velocities given,
+    near a consistent one, independent velocities given.
 
-    path: its model; options: of the program; table: the reference's."""
+    path: its model; options: of the program; table: that of the reference."""
 
     def __init__(self, seed, folder, program, hard):
-        self.m, self.table, _ = random_mechanism(seed, hard)
+        self.m, self.table = random_mechanism(seed, hard)
         self.program, self.options = program, []
         self.path = os.path.join(folder, "m%d.yaml" % seed)
         model, r = self.m.model, random.Random(seed)
@@ -183,25 +184,26 @@ class Case:
             self.start(Mechanism(model))
 
     def start(self, m):
-        """Checks the start that Pinwheel makes consistent; the reference takes it where it is not the only one."""
+        """Checks the start that Pinwheel makes consistent; if others are possible, the reference starts from it,
+        too."""
         rows, _ = run(self.program, self.path, "erk5+projection", 1e-3, 1e-3, [], self.options)
         names = self.m.names()
         q, v = (np.array([rows[0][k] for k in part]) for part in names)
         if self.kind == "nearby":
-            wrong = initial.corrected(m, rows[0])
+            wrong = initial.wrong_correction(m, rows[0])
             if wrong:
                 raise Failure(wrong)
             self.m, self.table = m, m.run(q, v, [SPAN / 2, SPAN])
         elif max(abs(np.concatenate([q - self.m.q, v - self.m.v]))) > FLOOR:
-            raise Failure("what is given does not lead to the only consistent state")
+            raise Failure("the given values do not lead to the only consistent state")
 
-    def judge(self, method):
+    def check(self, method):
         return converges(self.m, self.table, method, lambda refine: run(
-            self.program, self.path, method, SPAN, SPAN / 2, setting(method.split("+")[0], refine), self.options)[0])
+            self.program, self.path, method, SPAN, SPAN / 2, setting(method, refine), self.options)[0])
 
 
 def reason_of(text):
-    """A message without the numbers and names of one case."""
+    """A message without numbers and names, to count messages of the same kind."""
     text = re.sub(r"\b[be]\d+(\.\w+)?\b", "..", text)
     return re.sub(r"[-+]?\d[\d.e+-]*", "#", text)
 
@@ -226,13 +228,13 @@ def features(m):
 
 
 class Campaign:
-    """Many mechanisms: what was compared, what ended early and why, what was seen."""
+    """Many mechanisms: counts of comparisons, of reasons of failed runs, of the features of the mechanisms."""
 
     def __init__(self, args):
         self.args, self.methods = args, args.methods.split(",") if args.methods else methods(args.program)
         self.counts, self.reasons, self.seen = collections.Counter(), collections.Counter(), collections.Counter()
 
-    def one(self, seed, folder):
+    def run_case(self, seed, folder):
         a = self.args
         try:
             case = Case(seed, a.keep or folder, a.program, a.hard)
@@ -244,9 +246,9 @@ class Campaign:
             os.remove(case.path)
 
     def by_method(self, case, seed, method):
-        """Whether there is nothing to see."""
+        """Whether the run agrees with the reference."""
         try:
-            wrong = case.judge(method)
+            wrong = case.check(method)
         except Refused as e:
             self.counts["failed"] += 1
             self.reasons[method.split("+")[0], reason_of(str(e))] += 1
@@ -261,8 +263,8 @@ class Campaign:
         self.counts["mismatches"] += 1
         print("MISMATCH " + text, flush=True)
 
-    def sum(self):
-        """Prints the counts; the status."""
+    def report(self):
+        """Prints the counts; returns the exit status."""
         n = self.counts
         print("mechanisms with: " + ", ".join("%s %d" % x for x in sorted(self.seen.items())))
         for (integrator, group), x in sorted(LARGEST.items()):
@@ -286,8 +288,8 @@ def main():
     campaign = Campaign(a)
     with tempfile.TemporaryDirectory() as folder:
         for seed in range(a.seed, a.seed + a.count):
-            campaign.one(seed, folder)
-    return campaign.sum()
+            campaign.run_case(seed, folder)
+    return campaign.report()
 
 
 if __name__ == "__main__":

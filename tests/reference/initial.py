@@ -1,21 +1,22 @@
-"""Initial conditions that leave something to do: only what is free given, or a state near a consistent one."""
+"""Models whose start Pinwheel has to make consistent: only independent values are given, or a state near a consistent
+one."""
 import copy
 import numpy as np
 from scipy.linalg import qr
 from mechanisms import SPAN
-from simulator import Failure, Mechanism, Now
+from simulator import Failure, Mechanism, State
 
-OFF = 0.02  # how far described positions are off [m, rad]
+OFF = 0.02  # largest error of a described position [m, rad]
 
 
 def rows_at(m, q, v):
-    """J, and which of its rows are holonomic."""
-    now = Now(m, 0.0, m.middle(0.0), q, v)
-    return m.constraints(now)[0], [i for i, (_, _, g) in enumerate(now.rows) if g is not None], now
+    """J, the indices of its holonomic rows, and the state."""
+    state = State(m, 0.0, m.middle(0.0), q, v)
+    return m.constraints(state)[0], [i for i, (_, _, g) in enumerate(state.rows) if g is not None], state
 
 
 def free(J, n):
-    """As many coordinates as J leaves free, those that determine the others best."""
+    """Independent coordinates: as many as J leaves free, those that determine the others best."""
     if len(J) == 0:
         return list(range(n))
     _, s, V = np.linalg.svd(J)
@@ -40,7 +41,7 @@ def described(m, q, v):
 
 
 def by_free(m, r):
-    """The free coordinates and velocities by --start, the others off: a model and options; the start is that of m."""
+    """A model and options: independent values by --start, the others with errors; the consistent start is that of m."""
     J, held, _ = rows_at(m, m.q, m.v)
     positions, velocities = m.names()
     fq, fv = free(J[held], m.n), free(J, m.n)
@@ -51,7 +52,7 @@ def by_free(m, r):
 
 
 def specified(m):
-    """A model that specifies the free velocities and none of the others: they follow."""
+    """A model that specifies independent velocities alone: the others follow."""
     model = copy.deepcopy(m.model)
     kept = {m.names()[1][i] for i in free(rows_at(m, m.q, m.v)[0], m.n)}
     for b in model["bodies"]:
@@ -67,28 +68,28 @@ def nearby(m, r):
     return described(m, [x + r.uniform(-OFF, OFF) for x in m.q], [x + r.uniform(-0.3, 0.3) for x in m.v])
 
 
-def least(A, b):
-    """How much of b is not in the range of A, relative to b."""
+def outside_range(A, b):
+    """The part of b that is not in the range of A, relative to b."""
     size = np.linalg.norm(b)
     return 0.0 if size < 1e-13 else np.linalg.norm(b - A @ np.linalg.lstsq(A, b, rcond=1e-9)[0]) / size
 
 
-def corrected(m, row):
-    """What is wrong with the corrections from the described start of m to that of a row of a table, by the manual's
-    equations: None, or a text.  Velocities: M dv = J^T mu.  Positions: what has mass moves only if it must, and then
-    M dq = G^T mu up to the curvature of the constraints, which dq is the size of."""
+def wrong_correction(m, row):
+    """Checks the correction from the described start of m to the start in a row of a table, by the equations of the
+    manual: None, or a text that says what is wrong.  Velocities: M dv = J^T mu.  Positions: M dq = G^T mu up to the
+    curvature of the constraints, which is of the size of dq."""
     positions, velocities = m.names()
     q, v = np.array([row[k] for k in positions]), np.array([row[k] for k in velocities])
-    J, held, now = rows_at(m, q, v)
-    residual = max([abs(now.rows[i][2]) for i in held] + [abs(r.x) for _, r, _ in now.rows] + [0.0])
+    J, held, state = rows_at(m, q, v)
+    residual = max([abs(state.rows[i][2]) for i in held] + [abs(r.x) for _, r, _ in state.rows] + [0.0])
     if residual > 1e-12:
         return "not consistent by %.2g" % residual
-    e = least(J.T, m.mass * (v - m.v)) if len(J) else 0.0
+    e = outside_range(J.T, m.mass * (v - m.v)) if len(J) else 0.0
     if e > 1e-9:
         return "the correction of velocities is not the smallest, by %.2g" % e
-    dq, mean = q - m.q, np.mean(m.mass[m.mass > 0])
-    e = least(J[held].T, m.mass * dq) if held else 0.0
-    # The last multiplier's direction is that of the last iterate; curvatures are about 1 to 10.
+    dq = q - m.q
+    e = outside_range(J[held].T, m.mass * dq) if held else 0.0
+    # G is that of the last iterate, not of the described start; curvatures are about 1 to 10.
     if e > 20 * np.linalg.norm(dq):
         return "the correction of positions is not the smallest, by %.2g of it" % e
     return None

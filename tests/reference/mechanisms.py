@@ -1,12 +1,13 @@
-"""Random mechanisms: bodies anywhere, then elements placed so that they fit them; seeds give the same ones again.
+"""Random mechanisms: bodies at random positions, and elements placed to fit them.  A seed always gives the same
+mechanism.
 
-Everything is about 1 in SI units.  What is near a singular configuration, or becomes so, is not taken: that is decided by
-the reference alone."""
+All quantities are about 1 in SI units.  A mechanism that is near a singular configuration, or comes near one, is
+rejected; the reference alone decides on that."""
 import cmath
 import math
 import random
 import numpy as np
-from simulator import Failure, Mechanism, Now
+from simulator import Failure, Mechanism, State
 
 SPAN = 1.0  # of a run [s]
 POSITION = ["pin", "pin", "pin", "weld", "slider", "slot", "rod", "drive", "gear"]
@@ -16,9 +17,9 @@ FORCE = ["tyre", "rolling-resistance", "spring", "spring", "rotational-spring", 
 
 
 class Builder:
-    """bodies and elements of a model as text models write them; r: the generator's random numbers.
+    """The bodies and elements of a model, as entries of a text model; r: random numbers.
 
-    hard: masses, stiffnesses and speeds of friction differ by orders of magnitude."""
+    hard: masses, stiffnesses and smoothing speeds of friction differ by orders of magnitude."""
 
     def __init__(self, seed, hard=False):
         self.r, self.hard = random.Random(seed), hard
@@ -67,13 +68,13 @@ class Builder:
         return self.r.choice(self.bodies)["name"]
 
     def meeting(self, body):
-        """The same place in the frames of both bodies, somewhere between them."""
+        """A point between two bodies: in the world, and in the frames of both."""
         a, b = (self.frame(x)[0] for x in body)
         P = a + (b - a) * self.r.uniform(0.2, 0.8) + complex(self.r.uniform(-0.4, 0.4), self.r.uniform(-0.4, 0.4))
         return P, [self.local(x, P) for x in body]
 
     def apart(self, body):
-        """Points in the frames of both bodies with a distance between them."""
+        """A point in the frame of each body, and their distance [m], which is not small."""
         while True:
             at = [self.point(), self.point()]
             d = abs(self.world(body[0], at[0]) - self.world(body[1], at[1]))
@@ -93,7 +94,7 @@ class Builder:
         return {"table": table}
 
     def expression(self, size):
-        """Of time: value, rate and acceleration."""
+        """An expression of time, with its first and second derivative."""
         A, w, p, o = self.number(0.2, 1) * size, self.number(0.5, 4), self.number(-3, 3), self.number(-0.5, 0.5) * size
         if self.chance(0.6):
             a = f"{w}*t + {p}"
@@ -169,7 +170,7 @@ class Builder:
         self.elements.append({kind: f"e{len(self.elements)}", **fields})
 
     def place(self, kind, body=None):
-        """One element of the kind, at random; body: the two it joins."""
+        """Adds a random element of the kind; body: the two bodies of a constraint of positions."""
         return getattr(self, "_" + kind.replace("-", "_"))(*([body] if kind in POSITION else []))
 
     def _pin(self, body):
@@ -180,7 +181,7 @@ class Builder:
         self.add("weld", body=body, at=self.meeting(body)[1], angle=b - a)
 
     def _line(self, body):
-        """Both bodies' points and the heading of a line on which the first one's lies."""
+        """Points of both bodies, and the heading of a line through the second point on which the first one lies."""
         P, (s, _) = self.meeting(body)
         h = self.number(-3, 3)
         Q = P + self.r.uniform(-0.8, 0.8) * cmath.exp(1j * (self.frame(body[1])[1] + h))
@@ -306,19 +307,20 @@ class Builder:
         return {"pinwheel": 1, "about": "a random mechanism", "run": {"t_end": SPAN}, "bodies": self.bodies,
                 "elements": self.elements}
 
-    def quality(self):
+    def condition(self):
+        """The mechanism, and Mechanism.condition of its start."""
         m = Mechanism(self.model())
-        return m, m.condition(Now(m, 0.0, m.middle(0.0), m.q, m.v))
+        return m, m.condition(State(m, 0.0, m.middle(0.0), m.q, m.v))
 
     def attempt(self, kind, body=None):
-        """Adds an element if the configuration stays regular with it and something stays free to move."""
+        """Adds an element if the configuration stays regular and keeps a degree of freedom."""
         before = list(self.elements)
         self.place(kind, body)
         try:
-            m, (smallest, rank, _) = self.quality()
+            m, (smallest, rank, _) = self.condition()
         except Failure:
             smallest = 0
-        if smallest < 0.2 or rank != len(Now(m, 0.0, m.middle(0.0), m.q, m.v).rows) or m.n - rank < 1:
+        if smallest < 0.2 or rank != len(State(m, 0.0, m.middle(0.0), m.q, m.v).rows) or m.n - rank < 1:
             self.elements = before
 
 
@@ -331,21 +333,21 @@ def evaluate(signal):
 
 
 def massless(b):
-    """Takes mass or inertia, or both, off some bodies, where the constraints still determine how they move."""
+    """Removes mass or inertia, or both, of some bodies, where the constraints still determine their motion."""
     for body in b.bodies:
         if not b.chance(0.5):
             continue
         saved = dict(body)
         for part in b.r.choice([["mass"], ["inertia"], ["mass", "inertia"], ["mass", "inertia"]]):
             body.pop(part)
-        m, (_, _, kinetic) = b.quality()
+        m, (_, _, kinetic) = b.condition()
         if kinetic < 0.02 * min(1.0, m.lightest):
             body.clear()
             body.update(saved)
 
 
 def redundant(b):
-    """Says again what the elements say: the same element, a wheel on the same axle, a point on the same line."""
+    """Adds redundant constraints: the same element again, a wheel on the same axle, a point on the same line."""
     candidates = [e for e in b.elements if next(iter(e)) in ("pin", "weld", "slider", "slot", "rod", "gear", "drive",
                                                              "wheel",
                                                              "steered-wheel", "speed", "pfaffian")]
@@ -369,7 +371,7 @@ def redundant(b):
 
 
 def build(seed, hard=False):
-    """A mechanism as a model; Failure if the random numbers did not make one."""
+    """A model; Failure if it is near a singular configuration."""
     b = Builder(seed, hard)
     for i in range(b.r.choice([1, 1, 2, 2, 3, 3, 4, 5])):
         b.bodies.append({"name": f"b{i}", "mass": b.number(0.5, 2) * b.wide(-4, 1),
@@ -391,7 +393,7 @@ def build(seed, hard=False):
     for _ in range(b.r.randint(1, 5)):
         b.place(b.r.choice(FORCE))
     b.r.shuffle(b.elements)
-    m, (smallest, _, kinetic) = b.quality()
+    m, (smallest, _, kinetic) = b.condition()
     if smallest < 0.15 or kinetic < 0.02 * min(1.0, m.lightest):
         raise Failure("near a singular configuration at the start")
     # Velocities: at random, then consistent.
@@ -405,28 +407,11 @@ def build(seed, hard=False):
 
 
 def random_mechanism(seed, hard=False):
-    """The first good mechanism of this seed, its table at half the span and the span by the reference, and the tries."""
-    reasons = {}
+    """The first regular mechanism of this seed, and its table at half the span and the span by the reference."""
     for n in range(1000):
         try:
-            model = build(seed * 1000 + n, hard)
-            m = Mechanism(model)
-            table = m.run(m.q, m.v, [SPAN / 2, SPAN])
-            return m, table, reasons
-        except (Failure, OverflowError, ZeroDivisionError) as e:
-            reasons[str(e) or type(e).__name__] = reasons.get(str(e), 0) + 1
-    raise Failure("no mechanism in 1000 tries")
-
-
-if __name__ == "__main__":
-    import collections
-    import time
-    kinds = collections.Counter()
-    for seed in range(12):
-        t = time.time()
-        m, table, reasons = random_mechanism(seed)
-        model = m.model
-        kinds.update(next(iter(e)) for e in model["elements"])
-        print(seed, len(model["bodies"]), [next(iter(e)) for e in model["elements"]], reasons,
-              "%.2f s" % (time.time() - t))
-    print(kinds)
+            m = Mechanism(build(seed * 1000 + n, hard))
+            return m, m.run(m.q, m.v, [SPAN / 2, SPAN])
+        except (Failure, OverflowError, ZeroDivisionError):
+            continue
+    raise Failure("no mechanism in 1000 attempts")

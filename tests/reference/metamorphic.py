@@ -1,5 +1,5 @@
-"""Random mechanisms in other words: the same motion in other units, mirrored, displaced, turned, in another order, in two
-runs, by equivalent elements.  Each is compared with the reference of the first.
+"""Compares transformed random mechanisms with the reference of the original: in other units, mirrored, displaced,
+turned, in another order, in two runs, with equivalent elements.
 
   metamorphic.py [--seed S] [--count N] [--program PATH] [--keep FOLDER]"""
 import argparse
@@ -14,24 +14,17 @@ import compare
 import transform
 from mechanisms import SPAN, random_mechanism
 
-# One method of each kind; their settings, which go with the unit of time.
-METHODS = ["erk8+projection", "rk4+projection", "bdf+projection", "ida+ggl", "galpha+ggl", "radau+ggl", "leapfrog+rattle",
-           "erk5+nullspace", "adams+baumgarte"]
-
-
-def settings(method, s, refine):
-    integrator = method.split("+")[0]
-    if integrator in compare.STEP:
-        return ["--step", repr(compare.STEP[integrator] / 2**refine * s)]
-    return ["--rtol", repr(compare.RTOL[integrator] / 10**refine)]
+# One method of each kind.
+METHODS = ["erk8+projection", "rk4+projection", "bdf+projection", "ida+ggl", "galpha+ggl", "radau+ggl",
+           "leapfrog+rattle", "erk5+nullspace", "adams+baumgarte"]
 
 
 class Check:
-    """What all transformations share: the mechanism, its reference, where to write models, what was found."""
+    """A mechanism with its reference, and the comparisons of its transformations; counts: results by transformation."""
 
     def __init__(self, args, seed, folder, counts):
         self.args, self.seed, self.folder, self.counts = args, seed, folder, counts
-        self.m, self.table, _ = random_mechanism(seed)
+        self.m, self.table = random_mechanism(seed)
         self.r = random.Random(seed)
 
     def write(self, name, model):
@@ -40,7 +33,7 @@ class Check:
             json.dump(model, f)
         return path
 
-    def tell(self, name, method, wrong):
+    def count(self, name, method, wrong):
         self.counts[name, "mismatches" if wrong else "good"] += 1
         if wrong:
             print("MISMATCH seed %d %s %s: %s" % (self.seed, name, method, wrong), flush=True)
@@ -53,8 +46,9 @@ class Check:
 
         def rows(refine):
             # Baumgarte's coefficients are rates.
-            wish = method + (":alpha=%r:beta=%r" % (10 / s, 10 / s) if method.endswith("baumgarte") else "")
-            out, _ = compare.run(self.args.program, path, wish, SPAN * s, SPAN * s / 2, settings(method, s, refine))
+            scaled = method + (":alpha=%r:beta=%r" % (10 / s, 10 / s) if method.endswith("baumgarte") else "")
+            out, _ = compare.run(self.args.program, path, scaled, SPAN * s, SPAN * s / 2,
+                                 compare.setting(method, refine, s))
             return [back(row) for row in out]
         states_only = name.startswith("equivalent")
         self.attempt(name, method, lambda: compare.converges(self.m, self.table, method, rows, states_only))
@@ -63,33 +57,33 @@ class Check:
 
     def attempt(self, name, method, wrong):
         try:
-            self.tell(name, method, wrong())
+            self.count(name, method, wrong())
         except compare.Refused as e:
-            self.tell(name, method, str(e))
+            self.count(name, method, str(e))
 
     def tyres(self, method):
-        """Wheels as tyres, ever stiffer: the difference goes like 1/stiffness."""
+        """Wheels as tyres: the difference is proportional to 1/stiffness."""
         def wrong():
             found = []
             for stiffness in (1e4, 1e5, 1e6):
                 path = self.write("tyres", transform.tyres(self.m.model, stiffness))
                 rows, _ = compare.run(self.args.program, path, method, SPAN, SPAN / 2, ["--rtol", "1e-9"])
                 found.append(max(compare.errors(self.m, self.table, rows, states_only=True).values()))
-            # Ten times the stiffness, a tenth of the difference, give or take its next term; 1e-6: the method's own errors.
+            # Ten times the stiffness, a tenth of the difference up to its next term; 1e-6: errors of the method.
             good = all(b < 1e-6 or b < a / 8 for a, b in zip(found, found[1:]))
             return None if good and found[-1] < 1e-3 else "differences " + " ".join("%.2g" % x for x in found)
         self.attempt("tyres", method, wrong)
 
     def split(self, method):
-        """A run to the middle, and another one from where it ended."""
+        """A run to half the span, and another one from its final state."""
         half = SPAN / 2
         first, second = self.write("first", self.m.model), self.write("second", transform.later(self.m.model, half))
 
         def rows(refine):
-            a, _ = compare.run(self.args.program, first, method, half, half, settings(method, 1, refine))
+            a, _ = compare.run(self.args.program, first, method, half, half, compare.setting(method, refine))
             positions, velocities = self.m.names()
             start = [x for k in positions + velocities for x in ("--start", "%s=%r" % (k, a[-1][k]))]
-            b, _ = compare.run(self.args.program, second, method, half, half, settings(method, 1, refine), start)
+            b, _ = compare.run(self.args.program, second, method, half, half, compare.setting(method, refine), start)
             before = {k: x for k, x in a[-1].items() if k.endswith((".work", ".loss"))}
             whole = {**b[-1], **{k: b[-1][k] + x for k, x in before.items()}, "t": SPAN}
             return [a[0], a[-1], whole]

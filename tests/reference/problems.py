@@ -1,6 +1,6 @@
-"""Digits of the problems in benchmarks/scenes, computed twice: from minimal equations derived by hand, with 30 digits, and
-from a closed form, other equations, published digits or the simulator of this folder.  Prints the states that
-tests/methods/test_problems.c has, and how far both are apart; takes minutes and needs mpmath and yaml.
+"""Reference digits of the problems in benchmarks/scenes, computed twice: from minimal equations derived by hand, with
+30 digits, and from a closed form, other equations, published digits or the simulator of this folder.  Prints the
+states for tests/methods/test_problems.c, and their differences; takes minutes and needs mpmath and yaml.
 
   problems.py [PART OF A NAME]                    from the top folder"""
 import re
@@ -48,7 +48,7 @@ def dot(a, b):
 
 
 def knife_edge_drift(t):
-    """phi' = w, u' = drift w + G cos phi, A' = u e + drift n."""
+    """phi = w t, u' = drift w + G cos phi; velocity of the contact point: u along the blade, drift to its left."""
     G, w, u0, drift = d("9.81") / 2, one, d("0.5"), d("0.1")
 
     def f(t, y):
@@ -71,7 +71,7 @@ def sleigh_friction(t):
 
 
 def caster_shimmy(t):
-    """Lagrange's equations of y, the pivot's, and psi."""
+    """Lagrange's equations for y of the pivot and the angle psi of the caster."""
     M, m, I, p, e, V, k, c = one, 3 * one, d("0.05"), d("0.05"), d("0.1"), 5 * one, 4000 * one, 5 * one
     C, limit, v0 = 2000 * one, 100 * one, d("0.01")
 
@@ -90,7 +90,7 @@ def caster_shimmy(t):
 
 
 def car_axis(t):
-    """The angles of the road (given) and of the axle, and the distance of the left mass from the wheel: two freedoms."""
+    """Degrees of freedom: the distance of the left mass from its wheel and the angle of the axle; the road is given."""
     m, L, r, W = d("0.0005"), one, d("0.1"), 10 * one
 
     def road(t):
@@ -128,9 +128,10 @@ def car_axis(t):
             "left.vx": vl[0], "left.vy": vl[1], "right.vx": vl[0] - w * mp.sin(th), "right.vy": vl[1] + w * mp.cos(th)}
 
 
-def transmission(t, of, other=False):
-    """y' = r2 s, z' = r1 s; other: with the multiplier as an unknown."""
-    (a1, b1, a2, b2), beta = of, d("0.3")
+def transmission(t, radii, multiplier=False):
+    """radii: a1, b1, a2, b2.  The speed s satisfies the constraint by y' = r2 s, z' = r1 s; multiplier: the equations
+    of y and z with the multiplier l instead."""
+    (a1, b1, a2, b2), beta = radii, d("0.3")
     k1, k2, rest, off, g = d("1.7"), d("2.3"), d("0.3"), d("0.1"), d("9.81")
 
     def torques(y, z, u):
@@ -151,17 +152,17 @@ def transmission(t, of, other=False):
         return [u, v, w, -x - beta * v, Q1 - r1 * l, Q2 + r2 * l]
     x, y, v = d("0.8"), d("0.5"), d("0.6")
     r1, r2 = a1 + b1 * x, a2 + b2 * x
-    rates = [v, r1 * v / r2] if other else [v / r2]
-    x, y, z = integrate(by_multiplier if other else by_speed, [x, y, 0, 0] + rates, t, 300)[:3]
+    rates = [v, r1 * v / r2] if multiplier else [v / r2]
+    x, y, z = integrate(by_multiplier if multiplier else by_speed, [x, y, 0, 0] + rates, t, 300)[:3]
     return {"carriage.x": x, "first.phi": y, "second.phi": z}
 
 
 CONTACT, CONES = (d("0.2"), 1, 1, 0), (1, d("0.3"), 1, -d("0.3"))
 
 
-def slider_crank(t, other=False):
-    """Crank of length 1 and rod l of 1 kg each, slider of 1 kg: I(theta) theta'^2 / 2 is constant.  The angle from the
-    time by quadrature, by secants; other: theta'' = -I' theta'^2 / (2 I)."""
+def slider_crank(t, by_acceleration=False):
+    """Crank of length 1 and rod l of 1 kg each, slider of 1 kg: I(theta) theta'^2 / 2 is constant.  The angle follows
+    from the time by quadrature and secants; by_acceleration: from theta'' = -I' theta'^2 / (2 I) instead."""
     l = d("1.001")
 
     def inertia(a):
@@ -179,7 +180,7 @@ def slider_crank(t, other=False):
                 2 * (l * l * b * db / 12 + x * dx + y * dy + X * dX))
     start, w = pi / 4, 2 * one
     two_E = inertia(start)[0] * w * w
-    if other:
+    if by_acceleration:
         def f(t, y):
             I, dI = inertia(y[0])
             return [y[1], -dI * y[1]**2 / (2 * I)]
@@ -192,12 +193,13 @@ def slider_crank(t, other=False):
     return {"crank.phi": mp.findroot(lambda a: time(a) - t, (2.3, 2.5), solver="secant", tol=d("1e-24"))}
 
 
-# ---- The same problems, computed otherwise ----
+# ---- The same problems, by other computations ----
 
 
 def simulated(name, t):
-    """By the simulator of this folder, from the text model with its parameters put in: about 9 digits."""
-    text = subprocess.run(["build/pinwheel", "show", "--yaml", FOLDER + name], capture_output=True, text=True, check=True)
+    """By the simulator of this folder, from the text model with values for its parameters: about 9 digits."""
+    text = subprocess.run(["build/pinwheel", "show", "--yaml", FOLDER + name], capture_output=True, text=True,
+                          check=True)
     model = yaml.safe_load(text.stdout)
     for e in model["elements"]:
         for signal in [x for x in e.values() if isinstance(x, dict) and "expression" in x]:
@@ -224,11 +226,11 @@ PUBLISHED = {"left.x": "0.493455784275402809122e-1", "left.y": "0.49698946023017
 CASES = [  # problem, time, minimal equations, other computation, parameters
     ("benchmarks/scenes/knife-edge-drift.yaml", 10, knife_edge_drift, closed_knife_edge, ""),
     ("benchmarks/scenes/transmission.c", 10, lambda t: transmission(t, CONTACT),
-     lambda t: transmission(t, CONTACT, True), ""),
-    ("benchmarks/scenes/transmission.c", 10, lambda t: transmission(t, CONES), lambda t: transmission(t, CONES, True),
-     "a1=1 b1=0.3 a2=1 b2=-0.3"),
+     lambda t: transmission(t, CONTACT, multiplier=True), ""),
+    ("benchmarks/scenes/transmission.c", 10, lambda t: transmission(t, CONES),
+     lambda t: transmission(t, CONES, multiplier=True), "a1=1 b1=0.3 a2=1 b2=-0.3"),
     ("benchmarks/scenes/car-axis.yaml", 3, car_axis, lambda t: {k: d(x) for k, x in PUBLISHED.items()}, ""),
-    ("slider-crank", 1, slider_crank, lambda t: slider_crank(t, True), "l2=1.001"),
+    ("slider-crank", 1, slider_crank, lambda t: slider_crank(t, by_acceleration=True), "l2=1.001"),
     ("benchmarks/scenes/sleigh-friction.yaml", 5, sleigh_friction, lambda t: simulated("sleigh-friction.yaml", t), ""),
     ("benchmarks/scenes/caster-shimmy.yaml", 2, caster_shimmy, lambda t: simulated("caster-shimmy.yaml", t), ""),
 ]

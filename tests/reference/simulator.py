@@ -1,11 +1,12 @@
 """A second simulator: dense, from the positions of points and their derivatives, without any of Pinwheel's code.
 
-It reads a text model in the syntax of JSON, numbers written as such.  The equations of each element are those of the
-manual, stated through points, directions and what does work on them: a constraint is a quantity that does not change, or
-changes as a signal asks, and its multiplier mu is the force or moment that does work on it,
+It reads a text model in the syntax of JSON, without expressions for numbers.  The equations of the elements are those
+of the manual, written with points, directions and rates.  A constraint prescribes a coordinate or a rate; its
+multiplier mu is the force or moment whose power is mu times that rate:
 
-    M a = f + J^T mu,    J a + b = 0         b: the second derivatives of the constraints at zero accelerations."""
-import bisect
+    M a = f + J^T mu,    J a + b = 0         b: the derivatives of the constrained rates at zero accelerations.
+
+  simulator.py MODEL [T_END]                      prints the states at 0 and T_END [s]"""
 import json
 import math
 import sys
@@ -16,11 +17,11 @@ from taylor import Jet, Rate, dot
 from signals import Signal
 
 
-np.seterr(all="ignore")  # what is not finite is no motion to compare with
+np.seterr(all="ignore")  # a motion that is not finite is rejected later
 
 
 class Failure(Exception):
-    """A mechanism for which the reference has no trustworthy solution: what is wrong with it."""
+    """A mechanism for which the reference has no reliable solution; the text has the reason."""
 
 
 class Frame:
@@ -37,10 +38,11 @@ class Frame:
         return self.e * complex(math.cos(angle), math.sin(angle))
 
 
-class Now:
-    """One state of a mechanism: frames, and what its elements add.
+class State:
+    """One state of a mechanism: frames of its bodies, constraints and forces of its elements.
 
-    rows: (name, Rate, g or None); f: applied forces by coordinate; work, loss: powers by element [W]; potential [J]"""
+    rows: constraints (name, Rate that is zero, g or None); f: applied forces by coordinate; work, loss: powers by
+    element [W]; potential [J]; driven: (name, row, rate that a signal prescribes)."""
 
     def __init__(self, m, t, middle, q, v):
         self.m, self.t, self.middle = m, t, middle
@@ -64,232 +66,233 @@ class Now:
         s = self.m.signals.get((id(e), field))
         return s.at(self.t, self.middle, self.states) if s else Jet(0.0)
 
-    def two(self, e):
+    def frames(self, e):
         return [self.frame[b] for b in e["body"]]
 
     def points(self, e):
         return [self.frame[b].point(s) for b, s in zip(e["body"], e.get("at", [[0, 0], [0, 0]]))]
 
-    def hold(self, name, g):
-        """A scalar that stays zero."""
+    def constrain(self, name, g):
+        """Adds the holonomic constraint g = 0."""
         self.rows.append((name, g.rate(), g.x))
 
-    def force(self, effort, rate):
-        """A scalar force or moment on what the rate is the velocity of."""
+    def apply(self, effort, rate):
+        """Adds a force or moment whose power is effort times rate."""
         self.f += effort * rate.g
 
-    def push(self, F, P):
-        """A force, as a vector, on a point."""
+    def apply_at(self, F, P):
+        """Adds a force, as a vector, at a point."""
         self.f += (F.conjugate() * P.g).real
 
 
-def pin(now, name, e):
-    P, Q = now.points(e)
+def pin(state, name, e):
+    P, Q = state.points(e)
     d = P - Q
-    now.hold(name + ".Fx", taylor.real(d))
-    now.hold(name + ".Fy", taylor.real(d * -1j))
+    state.constrain(name + ".Fx", taylor.real(d))
+    state.constrain(name + ".Fy", taylor.real(d * -1j))
 
 
-def weld(now, name, e):
-    pin(now, name, e)
-    A, B = now.two(e)
-    now.hold(name + ".M", A.phi - B.phi + e.get("angle", 0))
+def weld(state, name, e):
+    pin(state, name, e)
+    A, B = state.frames(e)
+    state.constrain(name + ".M", A.phi - B.phi + e.get("angle", 0))
 
 
-def slot(now, name, e):
-    P, Q = now.points(e)
-    now.hold(name + ".N", dot(now.two(e)[1].direction(e.get("heading", 0)) * 1j, P - Q))
+def slot(state, name, e):
+    P, Q = state.points(e)
+    state.constrain(name + ".N", dot(state.frames(e)[1].direction(e.get("heading", 0)) * 1j, P - Q))
 
 
-def slider(now, name, e):
-    slot(now, name, e)
-    A, B = now.two(e)
-    now.hold(name + ".M", A.phi - B.phi - e.get("angle", 0))
+def slider(state, name, e):
+    slot(state, name, e)
+    A, B = state.frames(e)
+    state.constrain(name + ".M", A.phi - B.phi - e.get("angle", 0))
 
 
-def rod(now, name, e):
-    P, Q = now.points(e)
-    now.hold(name + ".F", taylor.sqrt(dot(P - Q, P - Q)) - e["length"])
+def rod(state, name, e):
+    P, Q = state.points(e)
+    state.constrain(name + ".F", taylor.sqrt(dot(P - Q, P - Q)) - e["length"])
 
 
-def gear(now, name, e):
-    A, B, C = (f.phi for f in now.two(e))
-    a, b, c = (now.m.start_angle(x) for x in e["body"])
+def gear(state, name, e):
+    A, B, C = (f.phi for f in state.frames(e))
+    a, b, c = (state.m.start_angle(x) for x in e["body"])
     i = e["ratio"]
     offset = e.get("offset", 0) if e.get("from", "start") == "offset" else a - c - i * (b - c)
-    now.hold(name + ".M", A - C - (B - C) * i - offset)
+    state.constrain(name + ".M", A - C - (B - C) * i - offset)
 
 
-def drive(now, name, e):
-    u = now.signal(e, "value")
-    A, B = now.two(e)
-    P, Q = now.points(e)
+def drive(state, name, e):
+    u = state.signal(e, "value")
+    A, B = state.frames(e)
+    P, Q = state.points(e)
     if e["what"] == "angle":
         g = A.phi - B.phi - u
     else:
         g = dot(B.direction(0 if e["what"] == "x" else math.pi / 2), P - Q) - u
-    now.hold(name + ".F", g)
-    now.driven.append((name, len(now.rows) - 1, u.d))
+    state.constrain(name + ".F", g)
+    state.driven.append((name, len(state.rows) - 1, u.d))
 
 
-def heading(now, e):
-    return now.frame[e["body"]].direction(e.get("heading", 0))
+def heading(state, e):
+    return state.frame[e["body"]].direction(e.get("heading", 0))
 
 
-def contact(now, e):
-    return now.frame[e["body"]].point(e.get("at", [0, 0]))
+def contact(state, e):
+    return state.frame[e["body"]].point(e.get("at", [0, 0]))
 
 
-def wheel(now, name, e):
-    now.rows.append((name + ".N", dot(heading(now, e) * 1j, contact(now, e).rate()), None))
+def wheel(state, name, e):
+    state.rows.append((name + ".N", dot(heading(state, e) * 1j, contact(state, e).rate()), None))
 
 
-def rolling_wheel(now, name, e):
-    wheel(now, name, e)
-    spin = now.coordinate[now.m.own[name]]
-    now.rows.append((name + ".T", dot(heading(now, e), contact(now, e).rate()) - spin.rate() * e["radius"], None))
-    u = now.signal(e, "torque").x
-    now.force(u, spin.rate())
-    now.work[name] = u * spin.d
+def rolling_wheel(state, name, e):
+    wheel(state, name, e)
+    spin = state.coordinate[state.m.own[name]]
+    state.rows.append((name + ".T", dot(heading(state, e), contact(state, e).rate()) - spin.rate() * e["radius"], None))
+    u = state.signal(e, "torque").x
+    state.apply(u, spin.rate())
+    state.work[name] = u * spin.d
 
 
-def steered_wheel(now, name, e):
-    h = now.frame[e["body"]].e * taylor.turn(now.signal(e, "heading"))
-    now.rows.append((name + ".N", dot(h * 1j, contact(now, e).rate()), None))
+def steered_wheel(state, name, e):
+    h = state.frame[e["body"]].e * taylor.turn(state.signal(e, "heading"))
+    state.rows.append((name + ".N", dot(h * 1j, contact(state, e).rate()), None))
 
 
-def prescribed(now, name, rate, u):
-    """A rate that is u, whose power is that of mu."""
-    now.rows.append((name + ".F", Rate(rate.x - u.x, rate.d - u.d, rate.g), None))
-    now.driven.append((name, len(now.rows) - 1, u.x))
+def prescribed(state, name, rate, u):
+    """Constrains a rate to the signal u; the work of the element is that of mu."""
+    state.rows.append((name + ".F", Rate(rate.x - u.x, rate.d - u.d, rate.g), None))
+    state.driven.append((name, len(state.rows) - 1, u.x))
 
 
-def speed(now, name, e):
-    prescribed(now, name, dot(heading(now, e), contact(now, e).rate()), now.signal(e, "value"))
+def speed(state, name, e):
+    prescribed(state, name, dot(heading(state, e), contact(state, e).rate()), state.signal(e, "value"))
 
 
-def pfaffian(now, name, e):
-    A, B = now.two(e)
+def pfaffian(state, name, e):
+    A, B = state.frames(e)
     total = None
     for body, (x, y, turning) in ((A, e["a"]), (B, e.get("b", [0, 0, 0]))):
         part = dot(A.e * complex(x, y), body.z.rate()) + body.phi.rate() * turning
         total = part if total is None else total + part
-    prescribed(now, name, total, now.signal(e, "value"))
+    prescribed(state, name, total, state.signal(e, "value"))
 
 
-def tyre(now, name, e):
-    P, h = contact(now, e), heading(now, e)
+def tyre(state, name, e):
+    P, h = contact(state, e), heading(state, e)
     along, across = dot(h, P.rate()).x, dot(h * 1j, P.rate()).x
     F = -e["stiffness"] * across / math.hypot(along, e["speed"])
     limit = e.get("load", 0) * e.get("friction", 0)
     if limit > 0:
         F = limit * math.tanh(F / limit)
-    now.push(F * h.x * 1j, P)
-    now.loss[name] = -F * across
+    state.apply_at(F * h.x * 1j, P)
+    state.loss[name] = -F * across
 
 
-def rolling_resistance(now, name, e):
-    w = dot(heading(now, e), contact(now, e).rate())
+def rolling_resistance(state, name, e):
+    w = dot(heading(state, e), contact(state, e).rate())
     F = -e["limit"] * math.tanh(w.x / e["speed"])
-    now.force(F, w)
-    now.loss[name] = -F * w.x
+    state.apply(F, w)
+    state.loss[name] = -F * w.x
 
 
-def spring(now, name, e):
-    P, Q = now.points(e)
+def spring(state, name, e):
+    P, Q = state.points(e)
     l = taylor.sqrt(dot(P - Q, P - Q))
-    now.m.near(l.x, name)
+    state.m.check_length(l.x, name)
     stretch, c = l.x - e.get("length", 0), e.get("damping", 0)
-    now.force(-e["stiffness"] * stretch - c * l.d, l.rate())
-    now.potential += e["stiffness"] * stretch**2 / 2
-    now.loss[name] = c * l.d**2
+    state.apply(-e["stiffness"] * stretch - c * l.d, l.rate())
+    state.potential += e["stiffness"] * stretch**2 / 2
+    state.loss[name] = c * l.d**2
 
 
-def rotational_spring(now, name, e):
-    A, B = now.two(e)
+def rotational_spring(state, name, e):
+    A, B = state.frames(e)
     angle, c = A.phi - B.phi - e.get("angle", 0), e.get("damping", 0)
-    now.force(-e["stiffness"] * angle.x - c * angle.d, angle.rate())
-    now.potential += e["stiffness"] * angle.x**2 / 2
-    now.loss[name] = c * angle.d**2
+    state.apply(-e["stiffness"] * angle.x - c * angle.d, angle.rate())
+    state.potential += e["stiffness"] * angle.x**2 / 2
+    state.loss[name] = c * angle.d**2
 
 
-def resisted(now, name, e, w):
-    """A viscous and a Coulomb force against the rate w."""
+def resist(state, name, e, w):
+    """Viscous and Coulomb friction against the rate w."""
     F = e.get("viscous", 0) * w.x
     if e.get("limit", 0) > 0:
         F += e["limit"] * math.tanh(w.x / e["speed"])
-    now.force(-F, w)
-    now.loss[name] = F * w.x
+    state.apply(-F, w)
+    state.loss[name] = F * w.x
 
 
-def friction(now, name, e):
-    A, B = now.two(e)
-    resisted(now, name, e, (A.phi - B.phi).rate())
+def friction(state, name, e):
+    A, B = state.frames(e)
+    resist(state, name, e, (A.phi - B.phi).rate())
 
 
-def sliding_friction(now, name, e):
-    P, Q = now.points(e)
-    resisted(now, name, e, dot(now.two(e)[1].direction(e.get("heading", 0)), P - Q).rate())
+def sliding_friction(state, name, e):
+    P, Q = state.points(e)
+    resist(state, name, e, dot(state.frames(e)[1].direction(e.get("heading", 0)), P - Q).rate())
 
 
-def drag(now, name, e):
-    A = now.frame[e["body"]]
+def drag(state, name, e):
+    A = state.frame[e["body"]]
     v, w = A.z.d, A.phi.d
     F = -(e.get("linear", 0) + e.get("quadratic", 0) * abs(v)) * v
     M = -(e.get("turning", 0) + e.get("turning_quadratic", 0) * abs(w)) * w
-    now.push(F, A.z)
-    now.force(M, A.phi.rate())
-    now.loss[name] = -(F * v.conjugate()).real - M * w
+    state.apply_at(F, A.z)
+    state.apply(M, A.phi.rate())
+    state.loss[name] = -(F * v.conjugate()).real - M * w
 
 
-def gravity(now, name, e):
+def gravity(state, name, e):
     a = complex(*e["acceleration"])
-    for body, mass in zip(now.m.bodies, now.m.mass[0::3]):
-        z = now.frame[body].z
-        now.push(mass * a, z)
-        now.potential -= mass * (a.conjugate() * z.x).real
+    for body, mass in zip(state.m.bodies, state.m.mass[0::3]):
+        z = state.frame[body].z
+        state.apply_at(mass * a, z)
+        state.potential -= mass * (a.conjugate() * z.x).real
 
 
-def force(now, name, e):
-    F = complex(now.signal(e, "fx").x, now.signal(e, "fy").x)
+def force(state, name, e):
+    F = complex(state.signal(e, "fx").x, state.signal(e, "fy").x)
     if e.get("axes", "world") == "body":
-        F *= now.frame[e["body"]].e.x
-    P = contact(now, e)
-    now.push(F, P)
-    now.work[name] = (F.conjugate() * P.d).real
+        F *= state.frame[e["body"]].e.x
+    P = contact(state, e)
+    state.apply_at(F, P)
+    state.work[name] = (F.conjugate() * P.d).real
 
 
-def turned(now, name, e, T):
-    """A moment on body 1, its opposite on body 2."""
-    A, B = now.two(e)
+def apply_torque(state, name, e, T):
+    """A torque T on body 1, -T on body 2."""
+    A, B = state.frames(e)
     angle = A.phi - B.phi
-    now.force(T, angle.rate())
-    now.work[name] = T * angle.d
+    state.apply(T, angle.rate())
+    state.work[name] = T * angle.d
 
 
-def torque(now, name, e):
-    turned(now, name, e, now.signal(e, "value").x)
+def torque(state, name, e):
+    apply_torque(state, name, e, state.signal(e, "value").x)
 
 
-def motor(now, name, e):
-    A, B = now.two(e)
+def motor(state, name, e):
+    A, B = state.frames(e)
     angle = A.phi - B.phi
-    y = e.get("stiffness", 0) * (now.signal(e, "angle").x - angle.x) + \
-        e.get("damping", 0) * (now.signal(e, "rate").x - angle.d)
+    y = e.get("stiffness", 0) * (state.signal(e, "angle").x - angle.x) + \
+        e.get("damping", 0) * (state.signal(e, "rate").x - angle.d)
     limit = e.get("limit", 0)
-    turned(now, name, e, limit * math.tanh(y / limit) if limit > 0 else y)
+    apply_torque(state, name, e, limit * math.tanh(y / limit) if limit > 0 else y)
 
 
-def marker(now, name, e):
+def marker(state, name, e):
     pass
 
 
 KINDS = {f.__name__.replace("_", "-"): f for f in (
     pin, weld, slider, slot, rod, gear, drive, wheel, rolling_wheel, steered_wheel, speed, pfaffian, tyre,
     rolling_resistance, spring, rotational_spring, friction, sliding_friction, drag, gravity, force, torque, motor,
-                                                   marker)}
-SIGNALS = {"value", "torque", "fx", "fy", "rate"}  # and "heading", "angle" where they are signals
-MOMENTS = {"weld": ".M", "slider": ".M", "gear": ".M"}
+    marker)}
+SIGNALS = {("drive", "value"), ("speed", "value"), ("pfaffian", "value"), ("torque", "value"),
+           ("rolling-wheel", "torque"), ("force", "fx"), ("force", "fy"), ("motor", "angle"), ("motor", "rate"),
+           ("steered-wheel", "heading")}
 
 
 class Mechanism:
@@ -317,17 +320,15 @@ class Mechanism:
         self.reads_states, self.signals = False, {}
         for kind, name, e in self.elements:
             for field, value in e.items():
-                if field in SIGNALS and not (kind == "rolling-wheel" and field == "rate") or \
-                        (kind, field) in (("steered-wheel", "heading"), ("motor", "angle")):
+                if (kind, field) in SIGNALS:
                     s = self.signals[id(e), field] = Signal(value)
                     self.reads_states = self.reads_states or s.states
         self.breaks = sorted({b for s in self.signals.values() for b in s.breaks})
         self.length = self._length()
-        self.shortest = math.inf
-        self.regular = False
+        self.regular = False  # set by run: the constraints are independent
 
     def _length(self):
-        """L of the manual, section Scales and tolerances; markers change nothing."""
+        """L of the manual, section Scales and tolerances; markers do not count."""
         far = 0.0
         for kind, _, e in self.elements:
             if "at" in e and kind != "marker":
@@ -344,8 +345,9 @@ class Mechanism:
     def start_angle(self, body):
         return 0.0 if body == "ground" else self.q[3 * self.bodies.index(body) + 2]
 
-    def near(self, length, name):
-        self.shortest = min(self.shortest, length)
+    @staticmethod
+    def check_length(length, name):
+        """Fails where the direction of a spring is badly defined."""
         if length < 0.05:
             raise Failure("the ends of " + name + " meet")
 
@@ -359,29 +361,29 @@ class Mechanism:
 
     # ---- Equations ----
 
-    def constraints(self, now):
-        """J, the residuals of its velocities, the bias b, and the weights by which multipliers are compared."""
-        J = np.array([r.g for _, r, _ in now.rows]).reshape(len(now.rows), self.n)
-        return J, np.array([r.x for _, r, _ in now.rows]), np.array([r.d for _, r, _ in now.rows])
+    def constraints(self, state):
+        """J, the residuals of the constrained rates, and b."""
+        J = np.array([r.g for _, r, _ in state.rows]).reshape(len(state.rows), self.n)
+        return J, np.array([r.x for _, r, _ in state.rows]), np.array([r.d for _, r, _ in state.rows])
 
-    def weights(self, now):
-        """1 of a force, 1/L of a moment, by row."""
+    def weights(self, state):
+        """The weight of each multiplier in the least-squares norm: 1 of a force, 1/L of a moment."""
         angles = {name for kind, name, e in self.elements if kind == "drive" and e["what"] == "angle"}
         return np.array([1 / self.length if name.endswith(".M") or name[:-2] in angles else 1.0 for name, _,
-                         _ in now.rows])
+                         _ in state.rows])
 
-    def solve(self, now):
-        """Accelerations (n,) and multipliers (rows,): least squares; multipliers that are not unique are the smallest."""
-        J, _, b = self.constraints(now)
+    def solve(self, state):
+        """Accelerations (n,) and multipliers (rows,); where these are not unique, those of the smallest norm."""
+        J, _, b = self.constraints(state)
         k, n = len(b), self.n
         if k == 0:
-            return now.f / self.mass, np.zeros(0)
-        w = self.weights(now)
+            return state.f / self.mass, np.zeros(0)
+        w = self.weights(state)
         K = np.zeros((n + k, n + k))
         K[:n, :n] = np.diag(self.mass)
         K[:n, n:] = -(J / w[:, None]).T
         K[n:, :n] = J / w[:, None]
-        r = np.concatenate([now.f, -b / w])
+        r = np.concatenate([state.f, -b / w])
         if self.regular:
             x = np.linalg.solve(K, r)
         else:
@@ -390,43 +392,44 @@ class Mechanism:
 
     def derivative(self, t, middle, y):
         n = self.n
-        now = Now(self, t, middle, y[:n], y[n:2 * n])
-        a, mu = self.solve(now)
-        return np.concatenate([y[n:2 * n], a, list(self.powers(now, mu).values())])
+        state = State(self, t, middle, y[:n], y[n:2 * n])
+        a, mu = self.solve(state)
+        return np.concatenate([y[n:2 * n], a, list(self.powers(state, mu).values())])
 
-    def powers(self, now, mu):
+    def powers(self, state, mu):
         """Powers by column of the ledger, such as "T.work"."""
-        p = {name + ".work": x for name, x in now.work.items()}
-        p.update({name + ".work": mu[i] * u for name, i, u in now.driven})
-        p.update({name + ".loss": x for name, x in now.loss.items()})
+        p = {name + ".work": x for name, x in state.work.items()}
+        p.update({name + ".work": mu[i] * u for name, i, u in state.driven})
+        p.update({name + ".loss": x for name, x in state.loss.items()})
         return p
 
     # ---- Consistent states ----
 
     def middle(self, t):
-        """A time of the same smooth piece as what follows t."""
+        """A time after t and before the next break: it selects the smooth pieces of the signals."""
         after = [b for b in self.breaks if b > t]
         return (t + after[0]) / 2 if after else t + 1
 
-    def project(self, q, v, t=0.0):
-        """The consistent state next to (q, v): Gauss-Newton on positions, then velocities."""
-        middle = self.middle(t)
+    def project(self, q, v):
+        """The consistent state next to (q, v) at t = 0: Gauss-Newton on positions, then velocities."""
+        middle = self.middle(0.0)
         for _ in range(20):
-            now = Now(self, t, middle, q, v)
-            held = [i for i, (_, _, g) in enumerate(now.rows) if g is not None]
+            state = State(self, 0.0, middle, q, v)
+            held = [i for i, (_, _, g) in enumerate(state.rows) if g is not None]
             if not held:
                 break
-            g = np.array([now.rows[i][2] for i in held])
+            g = np.array([state.rows[i][2] for i in held])
             if max(abs(g)) < 1e-14:
                 break
-            q = q - np.linalg.lstsq(self.constraints(now)[0][held], g, rcond=1e-9)[0]
-        now = Now(self, t, middle, q, v)
-        J, residual, _ = self.constraints(now)
+            q = q - np.linalg.lstsq(self.constraints(state)[0][held], g, rcond=1e-9)[0]
+        state = State(self, 0.0, middle, q, v)
+        J, residual, _ = self.constraints(state)
         return q, v - np.linalg.lstsq(J, residual, rcond=1e-9)[0] if len(J) else v
 
-    def condition(self, now):
-        """Smallest singular value of J with rows of length 1, its rank; that of the saddle-point matrix, of size 1."""
-        J, _, _ = self.constraints(now)
+    def condition(self, state):
+        """Smallest nonzero singular value of J with rows of length 1; its rank; smallest eigenvalue of M on its null
+        space."""
+        J, _, _ = self.constraints(state)
         scale = np.ones(self.n)
         scale[2:3 * len(self.bodies):3] = 1 / self.length
         if not len(J):
@@ -434,7 +437,6 @@ class Mechanism:
         J = J * scale
         s = np.linalg.svd(J / np.linalg.norm(J, axis=1)[:, None], compute_uv=False)
         rank = int(np.sum(s > 1e-7))
-        # What the rows leave free must have mass.
         _, _, V = np.linalg.svd(J)
         N = V[rank:]
         kinetic = np.linalg.eigvalsh((N * (self.mass * scale**2)) @ N.T) if len(N) else np.array([1.0])
@@ -442,10 +444,10 @@ class Mechanism:
 
     # ---- Runs ----
 
-    def run(self, q, v, times, rtol=1e-11, check=True):
+    def run(self, q, v, times, check=True):
         """States at the times [s]: a list of dicts of columns, as a table of `pinwheel run --energy` has them.  Raises
-        Failure where the motion comes near a singular configuration, or is too fast to be compared."""
-        t, k = 0.0, len(self.powers(Now(self, 0, self.middle(0), q, v), np.zeros(1000)))
+        Failure where the motion fails; check: or comes near a singular configuration, or is too fast to be compared."""
+        t, k = 0.0, len(self.powers(State(self, 0, self.middle(0), q, v), np.zeros(1000)))
         y = np.concatenate([q, v, np.zeros(k)])
         rank = None
         out = []
@@ -453,27 +455,27 @@ class Mechanism:
         for stop in [0.0] + stops:
             middle = (t + stop) / 2 if stop > 0 else self.middle(0)
             if stop > 0:
-                solver = DOP853(lambda s, z: self.derivative(s, middle, z), t, y, stop, rtol=rtol, atol=rtol * 0.1)
+                solver = DOP853(lambda s, z: self.derivative(s, middle, z), t, y, stop, rtol=1e-11, atol=1e-12)
                 steps = 0
                 while solver.status == "running":
                     if solver.step() is not None or steps > 3000:
-                        raise Failure("the reference does not get on")
+                        raise Failure("the reference fails, or needs more than 3000 steps")
                     steps += 1
                     if check:
                         self.watch(solver.t, middle, solver.y, rank)
                 y, t = solver.y, stop
             else:
-                now = Now(self, 0, middle, q, v)
-                smallest, rank, kinetic = self.condition(now)
-                self.regular = rank == len(now.rows)
+                state = State(self, 0, middle, q, v)
+                smallest, rank, kinetic = self.condition(state)
+                self.regular = rank == len(state.rows)
             if stop in times or stop == 0:
                 out.append(self.columns(t, middle, y))
         return out
 
     def watch(self, t, middle, y, rank):
         n = self.n
-        now = Now(self, t, middle, y[:n], y[n:2 * n])
-        smallest, r, kinetic = self.condition(now)
+        state = State(self, t, middle, y[:n], y[n:2 * n])
+        smallest, r, kinetic = self.condition(state)
         if smallest < 0.05 or r != rank or kinetic < 0.01 * min(1.0, self.lightest):
             raise Failure("near a singular configuration")
         if max(abs(y[n:2 * n])) > 25:
@@ -482,24 +484,18 @@ class Mechanism:
     def columns(self, t, middle, y):
         n = self.n
         q, v, ledger = y[:n], y[n:2 * n], y[2 * n:]
-        now = Now(self, t, middle, q, v)
-        a, mu = self.solve(now)
+        state = State(self, t, middle, q, v)
+        a, mu = self.solve(state)
         row = {"t": t, **self.named(q, v)}
-        row.update({name: x for (name, _, _), x in zip(now.rows, mu)})
-        row.update(zip(self.powers(now, mu), ledger))
-        row["kinetic"], row["potential"] = 0.5 * float(self.mass @ v**2), now.potential
-        row["residual"] = max([abs(g) for _, _,
-                               g in now.rows if g is not None] + [abs(r.x) for _, r, _ in now.rows] + [0])
+        row.update({name: x for (name, _, _), x in zip(state.rows, mu)})
+        row.update(zip(self.powers(state, mu), ledger))
+        row["kinetic"], row["potential"] = 0.5 * float(self.mass @ v**2), state.potential
         return row
 
 
-def read(path):
-    with open(path) as f:
-        return Mechanism(json.load(f))
-
-
 if __name__ == "__main__":
-    m = read(sys.argv[1])
+    with open(sys.argv[1]) as f:
+        m = Mechanism(json.load(f))
     end = float(sys.argv[2]) if len(sys.argv) > 2 else m.model["run"]["t_end"]
     for row in m.run(*m.project(m.q, m.v), [end], check=False):
         print(json.dumps(row, indent=1))

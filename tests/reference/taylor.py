@@ -1,13 +1,13 @@
 """Taylor arithmetic: quantities along a motion, their first two time derivatives, and their gradients.
 
-A vector of the plane is a complex number, so that a turn by phi is a product with exp (i phi).  The motion is q (t) with
-the velocities v and zero accelerations; what accelerations add to a second derivative is the gradient times them."""
+A vector of the plane is a complex number, so that a turn by phi is a product with exp (i phi).  The motion is q (t)
+with velocities v and zero accelerations; accelerations a add the gradient times a to a second derivative."""
 import cmath
 import math
 
 
 class Jet:
-    """A function of the coordinates and time: value x, derivatives d and dd by time, gradient g (array) by the coordinates."""
+    """A function of coordinates and time: value x, time derivatives d and dd, gradient g (array) by the coordinates."""
     __slots__ = ("x", "d", "dd", "g")
 
     def __init__(self, x, d=0.0, dd=0.0, g=0.0):
@@ -47,7 +47,7 @@ class Jet:
     __radd__, __rmul__ = __add__, __mul__
 
     def chain(self, f, f1, f2):
-        """F (self), of which f, f1, f2 are the value and the derivatives at self.x."""
+        """F (self) by the chain rule; f, f1, f2: F and its derivatives at self.x."""
         return Jet(f, f1 * self.d, f2 * self.d**2 + f1 * self.dd, f1 * self.g)
 
     def rate(self):
@@ -55,8 +55,8 @@ class Jet:
 
 
 class Rate:
-    """A function of coordinates, velocities and time that is linear in the velocities: value x, derivative d by time at zero
-    accelerations, and the gradient g by the velocities, which is the one by the accelerations of its derivative."""
+    """A function of coordinates, velocities and time that is linear in the velocities: value x, time derivative d at
+    zero accelerations, gradient g by the velocities, which is that of the time derivative by the accelerations."""
     __slots__ = ("x", "d", "g")
 
     def __init__(self, x, d, g):

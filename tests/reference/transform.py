@@ -1,14 +1,16 @@
-"""Transformations of models, and what becomes of their results: units, mirrors, displaced ground, order, time.
+"""Transformations of models whose results follow from those of the model: units, mirror, displacement, order, time.
 
-A transformation is a function of a model and random numbers that returns another model and a function that maps a row of
-its table back to what the row of the first model has to be (columns missing there are not compared)."""
+A transformation is a function of a model and random numbers.  It returns another model, a function that maps a row of
+its table to the row that the first model must have (columns that are missing there are not compared), and the ratio of
+the times; or None if it does not apply."""
 import cmath
 import copy
 import json
 import math
 import re
+from simulator import SIGNALS
 
-# Dimensions of fields: exponents of kg, m, s.  What is not here, angles above all, has none.
+# Dimensions of fields: exponents of kg, m, s.  Other fields, such as angles, have none.
 LENGTH, SPEED, FORCE, MOMENT = (0, 1, 0), (0, 1, -1), (1, 1, -2), (1, 2, -2)
 FIELDS = {
     "rod": {"length": LENGTH}, "rolling-wheel": {"radius": LENGTH, "inertia": (1, 2, 0), "rate": (0, 0, -1),
@@ -24,10 +26,6 @@ FIELDS = {
     "motor": {"stiffness": MOMENT, "damping": (1, 2, -1), "limit": MOMENT, "rate": (0, 0, -1)}}
 STATES = {"x": LENGTH, "y": LENGTH, "phi": (0, 0, 0), "vx": SPEED, "vy": SPEED, "omega": (0, 0, -1), "spin": (0, 0, 0),
           "spin_rate": (0, 0, -1)}
-SIGNALS = {("drive", "value"), ("speed", "value"), ("pfaffian", "value"), ("torque", "value"),
-           ("rolling-wheel", "torque"),
-           ("force", "fx"), ("force", "fy"), ("motor", "angle"), ("motor", "rate"), ("steered-wheel", "heading")}
-
 
 def kind_of(e):
     return next(iter(e))
@@ -38,13 +36,13 @@ def is_signal(kind, field):
 
 
 def signal(s, scale=1.0, tau=1.0, shift=0.0, states=None):
-    """The signal scale u (t/tau + shift); states: the text that takes the place of a state, by its name such as "vx"."""
+    """The signal scale u (t/tau + shift); states: formats that replace a state, by its name such as "vx"."""
     if not isinstance(s, (dict, str)):
         return scale * s
 
     def words(text, factor):
         text = re.sub(r"\b[A-Za-z]\w*\.([a-z]\w*)\b", lambda m: (states or {}).get(m[1], "%s") % m[0], text)
-        # Times that t is compared with move; elsewhere t does.
+        # In comparisons of t the other side is transformed, elsewhere t.
         parts = re.split(r"\bt ([<>]) ([\d.]+)", text)
         moved = "t" if (tau, shift) == (1.0, 0.0) else "(t*%r + %r)" % (1 / tau, shift)
         parts[1::3] = [" t %s " % x for x in parts[1::3]]
@@ -73,12 +71,12 @@ def signal(s, scale=1.0, tau=1.0, shift=0.0, states=None):
     return {form: f}
 
 
-def times(x, c):
-    return [times(y, c) for y in x] if isinstance(x, list) else x * c
+def scaled(x, c):
+    return [scaled(y, c) for y in x] if isinstance(x, list) else x * c
 
 
 def units(model, r, scales=None):
-    """Units of mass, length and time that are 1e-9 to 1e6 of the others."""
+    """Random units of mass, length and time, 1e-9 to 1e6 of the SI units."""
     kg, m, s = scales or [10.0**r.uniform(-9, 6) for _ in range(3)]
 
     def factor(d):
@@ -100,7 +98,7 @@ def units(model, r, scales=None):
             if is_signal(kind, field):
                 e[field] = signal(e[field], c, s, 0.0, states)
             elif field in dimensions:
-                e[field] = times(e[field], c)
+                e[field] = scaled(e[field], c)
         if kind == "pfaffian":
             for k in "ab":
                 e[k] = [x * c for x, c in zip(e[k], (1, 1, m))]
@@ -118,7 +116,7 @@ def units(model, r, scales=None):
 
 
 def mirrored(model, r):
-    """Left and right exchanged: y and angles change their signs."""
+    """Mirrored in the x axis: y and angles change their signs."""
     new = copy.deepcopy(model)
     flip = {k: "(-%s)" for k in ("y", "phi", "vy", "omega")}
     for b in new["bodies"]:
@@ -130,8 +128,8 @@ def mirrored(model, r):
             e["at"] = [[x, -y] for x, y in e["at"]] if isinstance(e["body"], list) else [e["at"][0], -e["at"][1]]
         for field in list(e):
             odd = (kind, field) in (("steered-wheel", "heading"), ("torque", "value"), ("force", "fy"),
-                                    ("motor", "angle"),
-                                    ("motor", "rate")) or (kind, field) == ("drive", "value") and e["what"] != "x"
+                                    ("motor", "angle"), ("motor", "rate")) or \
+                (kind, field) == ("drive", "value") and e["what"] != "x"
             if is_signal(kind, field):
                 e[field] = signal(e[field], -1.0 if odd else 1.0, states=flip)
             elif field in ("heading", "angle", "offset"):
@@ -149,11 +147,11 @@ def mirrored(model, r):
 
 
 def displaced(model, r):
-    """All of it elsewhere."""
+    """Displaced by a random vector."""
     d = [r.uniform(-50, 50), r.uniform(-50, 50)]
     new = copy.deepcopy(model)
     states = {"x": "(%%s - %r)" % d[0], "y": "(%%s - %r)" % d[1]}
-    fall = 0.0
+    constant = 0.0  # that is added to the potential energy
     for b in new["bodies"]:
         b["start"]["x"] += d[0]
         b["start"]["y"] += d[1]
@@ -164,16 +162,16 @@ def displaced(model, r):
         e.update({f: signal(e[f], states=states) for f in list(e) if is_signal(kind, f)})
         if kind == "gravity":
             a = e["acceleration"]
-            fall -= sum(b.get("mass", 0) for b in model["bodies"]) * (d[0] * a[0] + d[1] * a[1])
+            constant -= sum(b.get("mass", 0) for b in model["bodies"]) * (d[0] * a[0] + d[1] * a[1])
 
     def back(row):
         moved = {k: x - d["xy".index(k[-1])] for k, x in row.items() if re.fullmatch(r"b\d+\.[xy]", k)}
-        return {**row, **moved, "potential": row["potential"] - fall}
+        return {**row, **moved, "potential": row["potential"] - constant}
     return new, back, 1.0
 
 
 def turned(model, r):
-    """All of it turned, on a body without mass that is welded to the ground and stands for it."""
+    """Turned and displaced: a massless body that is welded to the ground replaces it."""
     angle, z = r.uniform(-3, 3), complex(r.uniform(-2, 2), r.uniform(-2, 2))
     if any(kind_of(e) == "force" and e["axes"] == "world" for e in model["elements"]):
         angle = 0.0
@@ -187,7 +185,7 @@ def turned(model, r):
         v = turn * complex(b["rate"]["vx"], b["rate"]["vy"])
         b["start"] = {"x": p.real, "y": p.imag, "phi": b["start"]["phi"] + angle}
         b["rate"] = {"vx": v.real, "vy": v.imag, "omega": b["rate"]["omega"]}
-    constant = 0.0
+    constant = 0.0  # that is added to the potential energy
     for e in new["elements"]:
         kind = kind_of(e)
         if isinstance(e.get("body"), list):
@@ -231,10 +229,10 @@ def later(model, shift):
     return new
 
 
-# ---- Equivalent elements: states, and what reactions keep their names ----
+# ---- Equivalent elements: the states must agree ----
 
 def rewrite(model, rules, r):
-    """Replaces elements, where a rule knows what by; None if none could be."""
+    """Replaces most elements for which there is a rule by kind; None if none is replaced."""
     new, found = copy.deepcopy(model), False
     new["elements"] = []
     for e in model["elements"]:
@@ -314,7 +312,7 @@ def gravity_forces(e, new):
 
 
 def rolling_without_inertia(e, new):
-    """What carries no inertia passes its torque on to the ground."""
+    """A wheel without inertia transmits its torque to the ground: a wheel, and a force along its heading."""
     if e.get("inertia", 0) > 0 or any("%s.spin" % e["rolling-wheel"] in json.dumps(x) for x in new["elements"]):
         return None
     name = e["rolling-wheel"]
@@ -333,7 +331,7 @@ def gear_pfaffian(e, new):
 
 
 def tyres(model, stiffness):
-    """Wheels give way: their slip is the lateral force times speed / stiffness."""
+    """Replaces wheels by tyres: their lateral velocity is the lateral force times speed / stiffness."""
     new = copy.deepcopy(model)
     new["elements"] = [{"tyre": e["wheel"], **{k: e[k] for k in ("body", "at", "heading")}, "stiffness": stiffness,
                         "speed": 0.5}
@@ -341,7 +339,7 @@ def tyres(model, stiffness):
     return new
 
 
-def speed_of_nought(e, new):
+def zero_lateral_speed(e, new):
     return [{"speed": e["wheel"], **{k: e[k] for k in ("body", "at")}, "heading": e["heading"] + math.pi / 2,
              "value": 0}]
 
@@ -361,7 +359,7 @@ EQUIVALENT = [
             {"drive": e["pin"] + w, "body": e["body"], "at": e["at"], "what": w, "value": 0} for w in "xy"]},
     {"wheel": wheel_pfaffian, "gear": gear_pfaffian},
     {"wheel": lambda e, new: [{**{"steered-wheel": e["wheel"]}, **{k: x for k, x in e.items() if k != "wheel"}}]},
-    {"wheel": speed_of_nought},
+    {"wheel": zero_lateral_speed},
     {"friction": friction_torque,
      "motor": motor_expression},
     {"rotational-spring": lambda e, new: [{"motor": e["rotational-spring"], "body": e["body"],

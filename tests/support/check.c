@@ -1,3 +1,4 @@
+/* Comparisons of numbers, arrays and errors, for all tests; see check.h. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>

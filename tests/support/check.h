@@ -1,6 +1,6 @@
-/* Checks of tests: a number is compared with a reference, within a bound that has a reason.
+/* Checks for all tests: a number is compared with a reference, within a bound that has a reason.
  *
- * With PW_TOL_SCALE in the environment every bound is multiplied by it; 0 prints every residual and fails none. */
+ * With PW_TOL_SCALE in the environment every bound is multiplied by it; 0 prints all of them and fails none. */
 #ifndef CHECK_H
 #define CHECK_H
 

@@ -1,3 +1,4 @@
+/* Runs the program in a temporary folder and reads its output, for the tests; see cli.h. */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -7,10 +8,10 @@
 
 /* ---- Running the program ---- */
 
-char cli_folder[] = "/tmp/pinwheel-cli-XXXXXX"; /* for whatever a test writes; @ in a command stands for it */
-char cli_out[200000], cli_err[20000];           /* what the last command wrote */
+char cli_folder[] = "/tmp/pinwheel-cli-XXXXXX";
+char cli_out[200000], cli_err[20000];
 
-static int cli_slurp (const char *path, char *text, size_t size) {
+static int cli_read_all (const char *path, char *text, size_t size) {
   FILE *f = fopen (path, "r");
   if (f == NULL) return 0;
   size_t n = fread (text, 1, size - 1, f);
@@ -23,7 +24,7 @@ const char *cli_file (const char *name) {
   static char text[200000];
   char path[300];
   snprintf (path, sizeof path, "%s/%s", cli_folder, name);
-  return cli_slurp (path, text, sizeof text) ? text : NULL;
+  return cli_read_all (path, text, sizeof text) ? text : NULL;
 }
 
 void cli_expand (const char *from, char *to, size_t size) {
@@ -37,16 +38,16 @@ void cli_expand (const char *from, char *to, size_t size) {
 }
 
 int cli_run (const char *command) {
-  char expanded[2000], whole[3000], path[300];
+  char expanded[2000], script[3000], path[300];
   const char *program = getenv ("PINWHEEL");
   cli_expand (command, expanded, sizeof expanded);
-  snprintf (whole, sizeof whole, "pinwheel () { '%s' \"$@\"; }\n{ %s\n} >%s/out 2>%s/err </dev/null",
+  snprintf (script, sizeof script, "pinwheel () { '%s' \"$@\"; }\n{ %s\n} >%s/out 2>%s/err </dev/null",
             program ? program : "build/pinwheel", expanded, cli_folder, cli_folder);
-  int status = system (whole);
+  int status = system (script);
   snprintf (path, sizeof path, "%s/out", cli_folder);
-  assert_true (cli_slurp (path, cli_out, sizeof cli_out));
+  assert_true (cli_read_all (path, cli_out, sizeof cli_out));
   snprintf (path, sizeof path, "%s/err", cli_folder);
-  assert_true (cli_slurp (path, cli_err, sizeof cli_err));
+  assert_true (cli_read_all (path, cli_err, sizeof cli_err));
   return WIFEXITED (status) ? WEXITSTATUS (status) : -1;
 }
 
@@ -66,10 +67,10 @@ void cli_bad (const char *command, int status, const char *message) {
   char text[1000], expanded[900];
   cli_expand (message, expanded, sizeof expanded);
   snprintf (text, sizeof text, "pinwheel: %s\n", expanded);
-  int got = cli_run (command);
-  if (got != status || strcmp (cli_err, text) != 0)
-    print_error ("%s\nends with %d:\n%sexpected %d:\n%s", command, got, cli_err, status, text);
-  assert_int_equal (got, status);
+  int found = cli_run (command);
+  if (found != status || strcmp (cli_err, text) != 0)
+    print_error ("%s\nends with %d:\n%sexpected %d:\n%s", command, found, cli_err, status, text);
+  assert_int_equal (found, status);
   assert_string_equal (cli_err, text);
 }
 
@@ -93,17 +94,21 @@ void cli_write (const char *name, const char *text) {
 
 /* ---- Reading summaries ---- */
 
+/* The value of the first such key; NULL if there is none. */
+static const char *cli_value (const char *json, const char *key) {
+  char quoted[300];
+  snprintf (quoted, sizeof quoted, "\"%s\"", key);
+  json = strstr (json, quoted);
+  return json ? json + strlen (quoted) + strspn (json + strlen (quoted), " \n:") : NULL;
+}
+
 double cli_number (const char *json, ...) {
   va_list keys;
   va_start (keys, json);
   for (const char *key = va_arg (keys, const char *); key; key = va_arg (keys, const char *)) {
-    char quoted[60];
-    snprintf (quoted, sizeof quoted, "\"%s\"", key);
-    json = strstr (json, quoted);
-    if (json == NULL) print_error ("no key %s\n", quoted);
+    json = cli_value (json, key);
+    if (json == NULL) print_error ("no key \"%s\"\n", key);
     assert_non_null (json);
-    json += strlen (quoted);
-    json += strspn (json, " \n:");
   }
   va_end (keys);
   return strtod (json, NULL);
@@ -111,13 +116,9 @@ double cli_number (const char *json, ...) {
 
 int cli_says (const char *json, const char *key, const char *value) {
   char quoted[300];
-  snprintf (quoted, sizeof quoted, "\"%s\"", key);
-  json = strstr (json, quoted);
-  if (json == NULL) return 0;
-  json += strlen (quoted);
-  json += strspn (json, " \n:");
-  snprintf (quoted, sizeof quoted, "\"%s\"", value);
-  return strncmp (json, quoted, strlen (quoted)) == 0;
+  int length = snprintf (quoted, sizeof quoted, "\"%s\"", value);
+  json = cli_value (json, key);
+  return json && strncmp (json, quoted, (size_t)length) == 0;
 }
 
 int cli_setup (void **state) {

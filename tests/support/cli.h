@@ -6,8 +6,8 @@
 
 #include <stddef.h>
 
-extern char cli_folder[];                    /* files of a test; @ in a command stands for it */
-extern char cli_out[200000], cli_err[20000]; /* output of the last command */
+extern char cli_folder[];                    /* temporary folder for the files of a test program */
+extern char cli_out[200000], cli_err[20000]; /* standard output and error of the last command */
 
 /* Makes and removes the folder. */
 int cli_setup (void **state);
@@ -16,16 +16,16 @@ int cli_teardown (void **state);
 /* Runs a shell command in which `pinwheel` is the program and @ the folder; returns its exit status. */
 int cli_run (const char *command);
 
-/* Runs a command that should succeed and write nothing to standard error. */
+/* Runs a command that must succeed and write nothing to standard error. */
 void cli_good (const char *command);
 
-/* Runs a command that should succeed, with any messages. */
+/* Runs a command that must succeed, with any messages. */
 void cli_shell (const char *command);
 
-/* Runs a command that should end with a status and one line on standard error: "pinwheel: MESSAGE". */
+/* Runs a command that must end with this status and one line on standard error: "pinwheel: MESSAGE". */
 void cli_bad (const char *command, int status, const char *message);
 
-/* Runs `pinwheel COMMAND ARGUMENTS` for each; all are wrong input, and nothing is on standard output. */
+/* Runs `pinwheel COMMAND ARGUMENTS` for each: all must fail as wrong input, with this message and no output. */
 typedef struct {
   const char *arguments, *message;
 } cli_wrong;

@@ -1,11 +1,12 @@
+/* Errors and orders of methods; see ladder.h. */
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
 #include "check.h"
 #include "ladder.h"
-#include "pinwheel-files.h"
 #include "scene.h"
 #include "system.h"
+#include "trial.h"
 
 static void ladder_arm (pw_model *m, const void *parameters) {
   (void)parameters;
@@ -36,22 +37,11 @@ static void ladder_tractor (pw_model *m, const void *parameters) {
                                 .value = { PW_HARMONIC, .harmonic = { .offset = 2, .amplitude = 1, .omega = 1 } } });
 }
 
-#define LADDER_TABLE(f) \
-  { .abi = PW_ABI, .size = sizeof (pw_plugin_table), .build = f }
-
 pw_system *ladder_open (const char *model) {
-  static const pw_plugin_table arm = LADDER_TABLE (ladder_arm), tractor = LADDER_TABLE (ladder_tractor);
-  pw_error error = { 0 };
+  static const pw_plugin_table arm = TRIAL_TABLE (ladder_arm), tractor = TRIAL_TABLE (ladder_tractor);
   if (strcmp (model, "arm") == 0) return scene_system (&arm, NULL);
   if (strcmp (model, "tractor") == 0) return scene_system (&tractor, NULL);
-  pw_file *f = pw_file_open (model, &error);
-  check_ok (f ? PW_OK : error.status, &error);
-  pw_model *m = pw_file_model (f, &error);
-  check_ok (m ? PW_OK : error.status, &error);
-  check_ok (pw_model_build (m, &error), &error);
-  pw_system *s = scene_compile (m);
-  pw_file_close (f);
-  return s;
+  return scene_named (model, NULL, 0);
 }
 
 ladder_error ladder_run (const char *model, const char *method, double step, double t) {
@@ -59,32 +49,32 @@ ladder_error ladder_run (const char *model, const char *method, double step, dou
 }
 
 ladder_error ladder_solve (const char *model, const char *method, const pw_settings *settings, double t) {
-  pw_system *s = ladder_open (model), *S = ladder_open (model);
+  pw_system *s = ladder_open (model), *same = ladder_open (model);
   pw_run *r = runs_open (s, method, settings);
-  pw_run *exact = runs_open (S, "erk8+projection", &(pw_settings){ .rtol = 3e-14, .span = t });
+  pw_run *exact = runs_open (same, "erk8+projection", &(pw_settings){ .rtol = 3e-14, .span = t });
   pw_sample x = runs_to (r, t), y = runs_to (exact, t);
-  ladder_error off = { .cost = *pw_run_statistics (r) };
-  double most = 0, T = pw_run_scale (exact)->time;
+  ladder_error e = { .cost = *pw_run_statistics (r) };
+  double largest = 0, time = pw_run_scale (exact)->time;
   for (int j = 0; j < s->coords; j++) {
-    off.q = fmax (off.q, fabs (x.q[j] - y.q[j]) / pw_unit (s, j));
-    off.v = fmax (off.v, fabs (x.v[j] - y.v[j]) / pw_unit (s, j) * T);
+    e.q = fmax (e.q, fabs (x.q[j] - y.q[j]) / pw_unit (s, j));
+    e.v = fmax (e.v, fabs (x.v[j] - y.v[j]) / pw_unit (s, j) * time);
   }
   for (int i = 0; i < s->rows; i++) {
-    off.lambda = fmax (off.lambda, fabs (x.lambda[i] - y.lambda[i]));
-    most = fmax (most, fabs (y.lambda[i]));
+    e.lambda = fmax (e.lambda, fabs (x.lambda[i] - y.lambda[i]));
+    largest = fmax (largest, fabs (y.lambda[i]));
   }
-  off.lambda /= most;
+  e.lambda /= largest;
   pw_run_close (r);
   pw_run_close (exact);
   pw_system_free (s);
-  pw_system_free (S);
-  return off;
+  pw_system_free (same);
+  return e;
 }
 
-static void ladder_check (const char *model, const char *method, const char *of, double coarse, double fine, double h,
-                          int order, double band) {
+static void ladder_check (const char *model, const char *method, const char *quantity, double coarse, double fine,
+                          double h, int order, double band) {
   char what[160];
-  snprintf (what, sizeof what, "%s, %s: order of %s at h = %g", model, method, of, h);
+  snprintf (what, sizeof what, "%s, %s: order of %s at h = %g", model, method, quantity, h);
   check_close (what, log2 (coarse / fine), order, band, "the order, and the next power of h");
 }
 
@@ -94,7 +84,7 @@ void ladder_expect (const char *model, const char *method, double h, double t, i
   for (int i = 0; i < 3; i++) e[i] = ladder_run (model, method, ldexp (h, -i), t);
   for (int i = 0; i < 2; i++) {
     ladder_check (model, method, "positions", e[i].q, e[i + 1].q, ldexp (h, -i), order, band);
-    if (depth >= LADDER_V) ladder_check (model, method, "rates", e[i].v, e[i + 1].v, ldexp (h, -i), order, band);
+    if (depth >= LADDER_V) ladder_check (model, method, "velocities", e[i].v, e[i + 1].v, ldexp (h, -i), order, band);
     if (depth >= LADDER_LAMBDA)
       ladder_check (model, method, "multipliers", e[i].lambda, e[i + 1].lambda, ldexp (h, -i), order, band);
   }

@@ -1,7 +1,5 @@
-/* A time limit for every test program: after LIMIT seconds (1200 by default) it ends its children, says its name and
- * fails.
- *
- * So that they can be found, a test program and its children are a process group of their own. */
+/* A time limit for every test program: after LIMIT seconds of the environment, 1200 by default, it prints its name,
+ * ends its children and fails.  For that, a test program and its children are a process group of their own. */
 #define _GNU_SOURCE /* program_invocation_short_name */
 #include <errno.h>
 #include <signal.h>
@@ -12,17 +10,17 @@
 #include <sys/prctl.h>
 #endif
 
-static void limit_say (const char *text) {
+static void limit_print (const char *text) {
   ssize_t n = write (STDOUT_FILENO, text, strlen (text));
   (void)n;
 }
 
-/* Who ends the program ends its children, too. */
+/* On SIGALRM and SIGTERM: ends the process group. */
 static void limit_end (int number) {
   if (number == SIGALRM) {
-    limit_say ("\n[  FAILED  ] ");
-    limit_say (program_invocation_short_name);
-    limit_say (": takes longer than its time limit\n");
+    limit_print ("\n[  FAILED  ] ");
+    limit_print (program_invocation_short_name);
+    limit_print (": takes longer than its time limit\n");
   }
   kill (0, SIGKILL);
   _exit (1);
@@ -32,12 +30,13 @@ __attribute__ ((constructor)) void limit_begin (void);
 void limit_begin (void) {
   const char *text = getenv ("LIMIT");
   int seconds = text ? atoi (text) : 0;
-  signal (SIGINT, SIG_DFL); /* ignored in what a shell starts in the background */
+  signal (SIGINT, SIG_DFL); /* a shell lets its background processes ignore it */
   if (getpgrp () != getpid () && setpgid (0, 0) != 0) return;
   signal (SIGALRM, limit_end);
   signal (SIGTERM, limit_end);
 #ifdef __linux__
-  prctl (PR_SET_PDEATHSIG, SIGTERM); /* Ctrl-C at a terminal reaches whoever has started it, which is another group */
+  /* Ctrl-C reaches only the group of the parent process: its end must end this program. */
+  prctl (PR_SET_PDEATHSIG, SIGTERM);
 #endif
   alarm (seconds > 0 ? (unsigned)seconds : 1200);
 }

@@ -1,17 +1,17 @@
-# What the test scripts share.  Sourced, with the top folder as the current one:
+# Shared by the test scripts, which source it in the top folder:
 #
-#   $pinwheel           the program, by its whole path (PINWHEEL, or build/pinwheel)
-#   $work               a folder that goes when the script ends
-#   report NAME STATUS  a line for a test that has ended with this status; what $work/log holds if it failed
-#   random LOW HIGH     sets $random, from $seed (SEED, or another one each time; print it)
-#   exit $bad           at the end: 0 if all were good
+#   $pinwheel           absolute path of the program (PINWHEEL, or build/pinwheel)
+#   $work               a temporary folder, removed when the script ends
+#   report NAME STATUS  prints the result of a test that ended with this status, with the end of $work/log if it failed
+#   random LOW HIGH     sets $random to a number in this range, from $seed (SEED, or the process id; print it)
+#   exit $bad           at the end: 0 if no test failed
 
 pinwheel=${PINWHEEL:-build/pinwheel}
 case $pinwheel in /*) ;; *) pinwheel=$PWD/$pinwheel ;; esac
 work=$(mktemp -d) || exit 1
 trap 'rm -rf "$work"' EXIT
 trap 'exit 130' INT TERM
-export XDG_CACHE_HOME="$work/cache" # not the user's
+export XDG_CACHE_HOME="$work/cache" # no code compiled before
 bad=0
 seed=${SEED:-$$}
 

@@ -1,3 +1,4 @@
+/* Runs that several tests make; see runs.h. */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -46,12 +47,12 @@ int runs_reference (const char *path, int lines, int columns, double *table) {
   assert_non_null (f);
   while (line < lines && fgets (text, sizeof text, f)) {
     if (text[0] == '#') continue;
-    char *at = text;
+    char *number = text;
     for (int c = 0; c < columns; c++) {
       char *end;
-      table[line * columns + c] = strtod (at, &end);
-      assert_true (end > at);
-      at = end;
+      table[line * columns + c] = strtod (number, &end);
+      assert_true (end > number);
+      number = end;
     }
     line++;
   }

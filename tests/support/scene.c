@@ -1,6 +1,7 @@
+/* Models and systems that several tests use; see scene.h. */
 #include <stdarg.h>
 #include "check.h"
-#include "pinwheel-files.h"
+#include "gallery.h"
 #include "scene.h"
 
 /* The model file itself, under another name than that of a plug-in's table. */
@@ -42,14 +43,5 @@ pw_system *scene_system (const pw_plugin_table *table, ...) {
 }
 
 pw_system *scene_named (const char *model, const char *parameter, double value) {
-  pw_error error = { 0 };
-  pw_file *f = pw_file_open (model, &error);
-  check_ok (f ? PW_OK : error.status, &error);
-  pw_model *m = pw_file_model (f, &error);
-  check_ok (m ? PW_OK : error.status, &error);
-  if (parameter) check_ok (pw_model_set (m, parameter, value, &error), &error);
-  check_ok (pw_model_build (m, &error), &error);
-  pw_system *s = scene_compile (m);
-  pw_file_close (f);
-  return s;
+  return gallery_open (model, parameter, value, NULL); /* without a parameter the list ends at once */
 }

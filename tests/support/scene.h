@@ -1,4 +1,4 @@
-/* Scenes that several tests use. */
+/* Models and systems that several tests use; any error fails the test. */
 #ifndef SCENE_H
 #define SCENE_H
 
@@ -7,14 +7,13 @@
 /* The model of models/ezyroller.c. */
 extern const pw_plugin_table scene_ezyroller;
 
-/* A built model of a table, with parameters set: scene_model (&table, "m2", 0.1, "I2", 0.01, NULL).  Fails the test
- * on any error. */
+/* A built model of a table, with parameters set: scene_model (&table, "m2", 0.1, "I2", 0.01, NULL). */
 pw_model *scene_model (const pw_plugin_table *table, ...);
 
 /* The same, compiled. */
 pw_system *scene_system (const pw_plugin_table *table, ...);
 
-/* A model by its file's name, with one parameter set (NULL: none). */
+/* The system of a model by name or path, with one parameter set (NULL: none). */
 pw_system *scene_named (const char *model, const char *parameter, double value);
 
 /* Compiles a model and frees it. */

@@ -1,10 +1,11 @@
+/* The element types of toys.h. */
 #include <math.h>
 #include "toys.h"
 
 /* ---- spring: V = k (l - l0)^2 / 2, force -(k (l - l0) + c l') along the line, l its length ---- */
 
 typedef struct {
-  double s[2][2], k, l0, c;
+  double s[2][2], k, l0, c; /* ends in the frames of the bodies [m], [N/m], [m], [N s/m] */
 } spring;
 
 typedef struct {
@@ -41,8 +42,8 @@ static int spring_prepare (const void *definition, const pw_body *const *bodies,
   return PW_OK;
 }
 
-/* dl/dq of the six local coordinates. */
-static void spring_slope (const spring_state *s, double d[6]) {
+/* dl/dq, q: x, y, phi of both bodies. */
+static void spring_gradient (const spring_state *s, double d[6]) {
   d[0] = s->ex, d[1] = s->ey, d[2] = -s->ex * s->Y[0] + s->ey * s->X[0];
   d[3] = -s->ex, d[4] = -s->ey, d[5] = s->ex * s->Y[1] - s->ey * s->X[1];
 }
@@ -50,7 +51,7 @@ static void spring_slope (const spring_state *s, double d[6]) {
 static void spring_force (const pw_batch *b, double *out) {
   for (int e = 0; e < b->count; e++, out += 6) {
     spring_state s = spring_at (b, e);
-    spring_slope (&s, out);
+    spring_gradient (&s, out);
     for (int c = 0; c < 6; c++) out[c] *= -s.force;
   }
 }
@@ -59,7 +60,7 @@ static void spring_force_v (const pw_batch *b, double *out) {
   for (int e = 0; e < b->count; e++, out += 36) {
     spring_state s = spring_at (b, e);
     double d[6];
-    spring_slope (&s, d);
+    spring_gradient (&s, d);
     for (int i = 0; i < 36; i++) out[i] = -((const spring *)b->element)[e].c * d[i / 6] * d[i % 6];
   }
 }
@@ -157,7 +158,7 @@ const pw_kind toy_kind_drive = {
 /* ---- roller: n . v_P = 0 and d . v_P = r s', with d = (cos, sin) phi the heading and s its spin ---- */
 
 typedef struct {
-  double at[2], r;
+  double at[2], r; /* contact point, radius [m] */
 } roller;
 
 static int roller_prepare (const void *definition, const pw_body *const *bodies, void *element, pw_internal *internal,
@@ -224,7 +225,7 @@ const pw_kind toy_kind_roller = {
 /* ---- weight: f = m g, V = -m g . r ---- */
 
 typedef struct {
-  double f[2];
+  double f[2]; /* [N] */
 } weight;
 
 static int weight_prepare (const void *definition, const pw_body *const *bodies, void *element, pw_internal *internal,

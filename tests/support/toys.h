@@ -1,10 +1,11 @@
-/* Element types of the tests, as a plug-in would define them: they use features that the built-in ones do not use. */
+/* Element types of the tests, as a plug-in would define them: they use features of pw_kind that no built-in type
+ * uses. */
 #ifndef TOYS_H
 #define TOYS_H
 
 #include "pinwheel.h"
 
-/* A spring with a damper between a point of body 1 and a point of body 2: energy and loss. */
+/* A spring with a damper between points of two bodies: a force with energy and loss. */
 typedef struct {
   const char *name;
   const char *body[2];

@@ -1,3 +1,4 @@
+/* Checks that every element type must pass; see trial.h. */
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
@@ -23,7 +24,7 @@ double trial_reaction (const pw_system *s, const pw_sample *x, const char *name)
   return -x->lambda[row];
 }
 
-/* The sizes of what is compared. */
+/* Sizes to which differences are relative: of the states, of the energy; at least 1. */
 typedef struct {
   double state, energy;
 } trial_size;
@@ -53,17 +54,17 @@ static void trial_compare (const pw_system *s, const char *method, const pw_samp
   }
 }
 
-/* times: how many times rtol the errors of the steps may add up to. */
-static void trial_implicit (pw_system *s, const char *method, double times, double t_end, const double *reference,
+/* factor: the errors of the steps may add up to this multiple of rtol. */
+static void trial_implicit (pw_system *s, const char *method, double factor, double t_end, const double *reference,
                             trial_size size) {
   const double rtol = 1e-9;
   char what[80];
   pw_run *r = runs_open (s, method, &(pw_settings){ .rtol = rtol, .span = t_end, .ledger = 1 });
   pw_sample x = runs_to (r, t_end);
   const pw_statistics *cost = pw_run_statistics (r);
-  trial_compare (s, method, &x, reference, times * rtol * size.state, "times rtol");
+  trial_compare (s, method, &x, reference, factor * rtol * size.state, "the sum of the errors of the steps");
   snprintf (what, sizeof what, "%s: balance", method);
-  check_below (what, fabs (x.balance), times * rtol * size.energy, "times rtol");
+  check_below (what, fabs (x.balance), factor * rtol * size.energy, "the sum of the errors of the steps");
   snprintf (what, sizeof what, "%s: rejected of %ld steps", method, cost->steps);
   check_below (what, (double)cost->rejected, 10 + 0.1 * (double)cost->steps, "an exact Newton matrix");
   pw_run_close (r);

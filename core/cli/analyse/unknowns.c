@@ -16,7 +16,8 @@ int pw_unknown_find (pw_unknown *u, const pw_cli_model *m, const char *name, pw_
     return PW_OK;
   }
   if (strchr (name, '.') == NULL) {
-    pw_model *copy = pw_file_model (m->file, error); /* of m->model before it was built: fails with the nearest name */
+    /* there is no such parameter: setting it, in a model that is not built yet, fails with the nearest name */
+    pw_model *copy = pw_file_model (m->file, error);
     if (copy) pw_model_set (copy, name, 0, error);
     pw_model_free (copy);
     return error->status;
@@ -60,7 +61,7 @@ void pw_unknowns_close (pw_unknowns *u) {
 
 /* ---- Unknowns of --free ---- */
 
-static int free_bounds (pw_unknown *u, const char *text, pw_error *error) {
+static int unknown_read_bounds (pw_unknown *u, const char *text, pw_error *error) {
   double bounds[2];
   if (pw_cli_range (text, &bounds[0], &bounds[1]) != PW_OK || !(bounds[0] < bounds[1]))
     return pw_fail (error, PW_INPUT, "--free %s=...: expected bounds LOW:HIGH, two numbers, the first one smaller",
@@ -73,12 +74,13 @@ static int free_bounds (pw_unknown *u, const char *text, pw_error *error) {
   }
   u->low = bounds[0], u->high = bounds[1], u->has_bounds = 1;
   if (u->low <= u->value && u->value <= u->high) return PW_OK;
-  return pw_fail (error, PW_INPUT, "--free %s: its initial value %.9g is not between %.9g and %.9g; set it by %s",
+  return pw_fail (error, PW_INPUT,
+                  "--free %s: its value %.9g, where the search starts, is not between %.9g and %.9g; set it by %s",
                   u->name, u->value, u->low, u->high, u->parameter ? "--set" : "--start");
 }
 
 /* Adds the unknown of "NAME" or "NAME=LOW:HIGH". */
-static int free_add (pw_unknowns *u, const char *text, pw_error *error) {
+static int unknown_add (pw_unknowns *u, const char *text, pw_error *error) {
   const size_t size = strcspn (text, "=");
   pw_unknown *added = u->list + u->count;
   char name[sizeof added->name];
@@ -92,7 +94,7 @@ static int free_add (pw_unknowns *u, const char *text, pw_error *error) {
   added->high = domain == PW_FRACTION ? 1 : INFINITY;
   if (domain == PW_COUNT)
     status = pw_fail (error, PW_INPUT, "--free %s: it is a count, and only continuous parameters can be free", name);
-  if (status == PW_OK && text[size]) status = free_bounds (added, text + size + 1, error);
+  if (status == PW_OK && text[size]) status = unknown_read_bounds (added, text + size + 1, error);
   added->scale = added->has_bounds ? added->high - added->low : added->value != 0 ? fabs (added->value) : 1;
   return status;
 }
@@ -104,7 +106,7 @@ int pw_unknowns_read (pw_unknowns *u, const char **list, pw_error *error) {
   while (list[count]) count++;
   u->list = calloc (count, sizeof *u->list);
   if (u->list == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
-  for (size_t i = 0; i < count && status == PW_OK; i++) status = free_add (u, list[i], error);
+  for (size_t i = 0; i < count && status == PW_OK; i++) status = unknown_add (u, list[i], error);
   return status;
 }
 
@@ -168,8 +170,8 @@ void pw_unknowns_report (const pw_unknowns *u, const double *x) {
 
 /* ---- Directions ---- */
 
-/* PW_UNKNOWN_STEP of the size of the number.  That is at least 0.1 for angles, the unit of the scene for initial
- * values, 1e-3 of its scale for an unknown of a search; of a parameter that is 0 it is the default value, else 1. */
+/* PW_UNKNOWN_STEP times the size of the unknown: |value|, but at least 0.1 for angles, the unit of the scene for
+ * states, 1e-3 of the scale in searches; for a parameter that is 0 its default value, or 1 if that is 0, too. */
 static double unknown_step (const pw_unknown *u, double value, const pw_run *r) {
   if (u->step > 0) return u->step;
   double size = fabs (value), length = pw_run_scale (r)->length, time = pw_run_scale (r)->time;
@@ -179,8 +181,8 @@ static double unknown_step (const pw_unknown *u, double value, const pw_run *r) 
   return PW_UNKNOWN_STEP * fmax (size > 0 ? size : 1, 1e-3 * u->scale);
 }
 
-/* Keeps the neighbours within the domain of a parameter: a positive one gets a smaller step; at 0 or 1, which may be
- * reached, they are on one side. */
+/* Keeps the neighbours within the domain of a parameter.  If that excludes 0, the step is at most value / 4; next to a
+ * bound that belongs to it, 0 or 1, all neighbours are on the inner side. */
 static void unknown_stay_inside (const pw_unknown *u, double value, pw_direction *d) {
   pw_domain domain = u->parameter ? u->parameter->domain : PW_REAL;
   if (domain == PW_POSITIVE) d->step = fmin (d->step, value / 4);
@@ -234,7 +236,7 @@ static double unknowns_between (const pw_unknown *u, double fraction) {
 
 /* Fills a row for each point after the first one. */
 static int unknowns_sobol (const pw_unknowns *u, int count, double seed, double *out) {
-  double point[PW_UNKNOWNS_STARTED], shift[PW_UNKNOWNS_STARTED];
+  double point[PW_UNKNOWNS_SOBOL_MOST], shift[PW_UNKNOWNS_SOBOL_MOST];
   gsl_rng *random = gsl_rng_alloc (gsl_rng_mt19937);
   gsl_qrng *sobol = gsl_qrng_alloc (gsl_qrng_sobol, (unsigned)u->count);
   if (random) gsl_rng_set (random, (unsigned long)seed);

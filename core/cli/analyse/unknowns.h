@@ -33,7 +33,7 @@ typedef struct {
   pw_unknown *list;
   int count;
   const char *method;
-  pw_settings settings; /* except stop, initial, specialised */
+  pw_settings settings; /* except stop and initial; `sensitivity` sets specialised for its run */
   double t_end;
   double limit;       /* of the processor time of each run [s] */
   pw_specialise when; /* of --specialise */
@@ -75,9 +75,9 @@ int pw_unknowns_directions (pw_direction *d, const pw_unknowns *u, double *x, pw
 
 /* Points where searches begin, `count` x unknowns: the unknowns' values; then points of Sobol's sequence, shifted
  * modulo 1 by random numbers from the seed, between the bounds of the user, else within `scale` of the values.  With
- * a count above 1 there are at most PW_UNKNOWNS_STARTED unknowns, the limit of the sequence.  NULL if out of memory;
+ * a count above 1 there are at most PW_UNKNOWNS_SOBOL_MOST unknowns, the limit of the sequence.  NULL if out of memory;
  * free it. */
-enum { PW_UNKNOWNS_STARTED = 40 };
+enum { PW_UNKNOWNS_SOBOL_MOST = 40 };
 double *pw_unknowns_starts (const pw_unknowns *u, int count, double seed);
 
 /* Prints a notice if, with these values, making the initial state consistent changes given initial values. */

@@ -167,8 +167,8 @@ static int fit_open_data (pw_fit *fit, pw_error *error) {
   if (fit->residuals < fit->unknowns.count)
     return pw_fail (error, PW_INPUT, "--data %s has fewer data (%d) than there are unknowns (%d)", fit->data_path,
                     fit->residuals, fit->unknowns.count);
-  if (fit->starts > 1 && fit->unknowns.count > PW_UNKNOWNS_STARTED)
-    return pw_fail (error, PW_INPUT, "--starts: at most %d unknowns", PW_UNKNOWNS_STARTED);
+  if (fit->starts > 1 && fit->unknowns.count > PW_UNKNOWNS_SOBOL_MOST)
+    return pw_fail (error, PW_INPUT, "--starts: at most %d unknowns", PW_UNKNOWNS_SOBOL_MOST);
   fit->unknowns.t_end = fit->unknowns.settings.span = fit->t[fit->rows - 1];
   pw_unknowns_engine (&fit->unknowns, FIT_RUNS);
   return PW_OK;

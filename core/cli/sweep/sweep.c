@@ -21,7 +21,7 @@ typedef struct {
 
 /* ---- Before the sweep ---- */
 
-/* Refuses combinations of options and arguments. */
+/* Refuses missing or unsuitable options and arguments. */
 static int sweep_check_options (const pw_sweep *sweep, pw_error *error) {
   if (sweep->line.arguments == 0)
     return pw_fail (error, PW_INPUT, "missing argument; usage: pinwheel sweep %s",
@@ -108,7 +108,8 @@ static void sweep_report_failures (const pw_tally *tally) {
     pw_cli_say ("pinwheel: %ld of %ld runs failed, the first of them: %s\n", tally->failed, tally->rows, tally->reason);
 }
 
-/* Failed runs are rows; the sweep fails only if all runs failed. */
+/* A failed run has its row in the table, too; the sweep fails only if all runs failed.  tally->status: exit status of
+ * the first failure, the negative of its error status. */
 static int sweep_conclude (const pw_tally *tally, pw_error *error) {
   if (tally->failed == tally->rows)
     return pw_fail (error, -tally->status, "all %ld runs failed, the first one: %s", tally->rows, tally->reason);
@@ -173,10 +174,10 @@ static const struct poptOption sweep_options[] = {
   PW_TEXT_OPTION (pw_sweep, jobs_text, "jobs", 'j', "N", "Number of threads (default: one per processor)"),
   PW_TEXT_OPTION (pw_sweep, lanes_text, "lanes", 0, "N",
                   "Runs that a thread advances at once, 1, 2, 4 or 8, with steps of fixed size and specialised code "
-                  "(default: as many as pay)"),
+                  "(default: as many as are worthwhile)"),
   PW_TEXT_OPTION (pw_sweep, part_text, "part", 0, "I/N",
                   "Compute every N-th row, from the I-th on, for a later --merge"),
-  PW_FLAG_OPTION (pw_sweep, merge, "merge", "Merge the parts named instead of a model"),
+  PW_FLAG_OPTION (pw_sweep, merge, "merge", "Merge the parts of a sweep: the arguments are their files"),
   PW_FLAG_OPTION (pw_sweep, with_cpu, "cpu",
                   "Add a column with the processor time of each run, which is never reproducible"),
   PW_METHOD_OPTIONS,

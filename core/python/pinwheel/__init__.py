@@ -18,8 +18,9 @@ from .results import Result
 from .simulation import Inputs, Simulation
 from .studies import command, help_of, sweep
 
-__all__ = ["Body", "Element", "Error", "InitialError", "InputError", "Inputs", "Linear", "MethodError", "Model", "ResourceError",
-           "Result", "Simulation", "command", "describe", "elements", "help_of", "models", "sweep", "__version__"]
+__all__ = ["Body", "Element", "Error", "InitialError", "InputError", "Inputs", "Linear", "MethodError", "Model",
+           "ResourceError", "Result", "Simulation", "command", "describe", "elements", "help_of", "models", "sweep",
+           "__version__"]
 
 if TYPE_CHECKING:
     def __getattr__(name: str) -> Any: ...

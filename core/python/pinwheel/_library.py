@@ -44,7 +44,7 @@ _EXCEPTIONS = {PW_RESOURCE: ResourceError, PW_INPUT: InputError, PW_INITIAL: Ini
 # ---- Loading ----
 
 def _folders():
-    """Where the libraries may be: in the package (wheels), in a build of the source tree, in the package's prefix."""
+    """Where the libraries may be: in the package (wheels), in a build of the source tree, in an installed prefix."""
     here = pathlib.Path(__file__).resolve().parent
     yield here / "lib"
     for parent in here.parents:
@@ -52,7 +52,7 @@ def _folders():
         yield parent / "lib"
 
 
-_named = os.environ.get("PINWHEEL_LIBRARY")
+_given_folder = os.environ.get("PINWHEEL_LIBRARY")
 
 
 def _load(name, folders):
@@ -60,7 +60,7 @@ def _load(name, folders):
     for folder in folders:
         for path in sorted(folder.glob(file + "*")):
             return c.CDLL(str(path), mode=c.RTLD_GLOBAL), path
-    system = None if _named else ctypes.util.find_library(name)
+    system = None if _given_folder else ctypes.util.find_library(name)
     if system is None:
         raise ImportError(f"{file} was not found in {', '.join(map(str, folders[:2]))} ...: build Pinwheel with `make`, "
                           "install it, or name the folder of the library in PINWHEEL_LIBRARY")
@@ -79,13 +79,13 @@ def _check_version(library, path):
                           "or name the folder of the other library in PINWHEEL_LIBRARY")
 
 
-core, library_path = _load("pinwheel", [pathlib.Path(_named).absolute()] if _named else list(_folders()))
+core, library_path = _load("pinwheel", [pathlib.Path(_given_folder).absolute()] if _given_folder else list(_folders()))
 _check_version(core, library_path)
 files, _ = _load("pinwheel-files", [library_path.parent] if library_path.parent.name else [])
 
 
 def program() -> str:
-    """The path of the program ``pinwheel`` that belongs to the library."""
+    """The path of the program ``pinwheel`` of the same installation as the library."""
     for path in (os.environ.get("PINWHEEL"), library_path.parent / "pinwheel", library_path.parent.parent / "bin/pinwheel"):
         if path and os.path.isfile(path) and os.access(path, os.X_OK):
             return str(path)
@@ -130,7 +130,7 @@ def _structure(name, /, **types):
 
 
 def listed(structure, address):
-    """The structures from an address on, up to the one without a name."""
+    """The structures of an array in C, which ends with one without a name."""
     while address and (entry := structure.from_address(address)).name:
         yield entry
         address += c.sizeof(structure)
@@ -175,6 +175,7 @@ def _declare(library, result, *names_and_arguments):
         function.restype, function.argtypes = result, arguments
 
 
+# Pointer, int, double, text, error, size.
 _p, _i, _d, _s, _e, _z = c.c_void_p, c.c_int, c.c_double, c.c_char_p, c.POINTER(pw_error), c.c_size_t
 _declare(files, _p, ("pw_file_open", _s, _e), ("pw_file_model", _p, _e))
 _declare(files, _s, ("pw_file_name", _p), ("pw_file_path", _p))
@@ -221,7 +222,7 @@ def encode(value, what: str) -> bytes:
 
 
 def number(value, what: str, above: float | None = None) -> float:
-    """A number, or an expression of numbers ("30*deg"), perhaps only a finite one above a bound."""
+    """A number, or an expression of numbers ("30*deg"); with `above`, it must be finite and larger."""
     result = c.c_double()
     try:
         if not isinstance(value, str):
@@ -242,11 +243,12 @@ def numbers(values, what: str) -> dict:
     return {encode(name, what).decode(): number(value, str(name)) for name, value in values.items()}
 
 
-free = c.CDLL(None).free
+free = c.CDLL(None).free  # of the C library, for texts that the library allocates
 free.restype, free.argtypes = None, [c.c_void_p]
 
 
 def name_of(function, *arguments) -> str:
+    """The name that a function of the library writes into a buffer."""
     buffer = c.create_string_buffer(400)
     function(*arguments, buffer, 400)
     return buffer.value.decode()

@@ -1,4 +1,4 @@
-"""The program, which has what the library has not."""
+"""Runs the program ``pinwheel``, for commands and pages that the library does not have."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from . import _library as lib
 
 
 def options(model):
-    """A model, or its name, as arguments."""
+    """The arguments that name a model (a Model or its name), with its parameters and initial values."""
     given = [lib.encode(str(getattr(model, "source", model)), "model").decode()]
     if hasattr(model, "signals"):
         if model.signals:
@@ -22,6 +22,7 @@ def options(model):
 
 
 def run(arguments):
+    """The finished process; raises the exception of its exit status."""
     try:
         done = subprocess.run([lib.program(), *arguments], capture_output=True, text=True, check=False)
     except ValueError as failure:
@@ -35,25 +36,26 @@ def run(arguments):
 
 
 def animation(result) -> str:
-    """The animation of a result's model and settings, in a frame; a text with the reason if there is none."""
+    """An HTML frame that animates a run of the result's model and settings; a text with the reason if there is none."""
     given = result.settings
     if "inputs" in given:
         return html.escape(f"{result!r}, not shown: the program cannot set inputs")
-    words = [f"--method={given['method']}", f"--t-end={given['t_end']!r}", f"--specialise={given.get('specialise', 'auto')}"]
-    words += [f"--{name}={given[name]!r}" for name in ("step", "rtol", "atol") if name in given]
-    return _page("run", result.model, "--animate", words, repr(result))
+    settings = [f"--method={given['method']}", f"--t-end={given['t_end']!r}",
+                f"--specialise={given.get('specialise', 'auto')}"]
+    settings += [f"--{name}={given[name]!r}" for name in ("step", "rtol", "atol") if name in given]
+    return _page("run", result.model, "--animate", settings, repr(result))
 
 
 def interactive(model) -> str:
-    """The page that simulates a model in the browser, likewise."""
+    """The same for the page that simulates a model in the browser."""
     return _page("page", model, "--output", [], repr(model))
 
 
-def _page(command, model, option, words, otherwise):
+def _page(command, model, output_option, settings, otherwise):
     with tempfile.TemporaryDirectory() as folder:
         path = pathlib.Path(folder) / "page.html"
         try:
-            run([command, *options(model), f"{option}={path}", *words])
+            run([command, *options(model), f"{output_option}={path}", *settings])
             page = path.read_text(encoding="utf-8")
         except (lib.Error, OSError) as failure:
             return html.escape(f"{otherwise}, not shown: {failure}")

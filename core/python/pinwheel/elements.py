@@ -68,10 +68,11 @@ def _parameter(field):
         shape = "{" + ", ".join(f'"{word}"' for word in names) + "}"
     if field.count > 1:
         shape, default = f"list of {field.count} {shape}", [default] * field.count
-    says = [shape, "required" if field.required else f"default {default!r}"]
-    lines = [f"{name} : {', '.join(says)}", "    " + " ".join(filter(None, [about, unit, lib.DOMAINS[field.domain]]))]
-    kept = inspect.Parameter.empty if field.required else default
-    return inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=kept), lines
+    properties = [shape, "required" if field.required else f"default {default!r}"]
+    lines = [f"{name} : {', '.join(properties)}", "    " + " ".join(filter(None, [about, unit, lib.DOMAINS[field.domain]]))]
+    if field.required:
+        default = inspect.Parameter.empty
+    return inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=default), lines
 
 
 def _until_null(pointer):
@@ -103,8 +104,8 @@ def _class(kind):
 def _classes():
     pointers = c.cast(lib.core.pw_kinds, c.POINTER(c.c_void_p))
     for address in _until_null(pointers):
-        made = _class(lib.pw_kind.from_address(address))
-        yield made.__name__, made
+        element = _class(lib.pw_kind.from_address(address))
+        yield element.__name__, element
 
 
 KINDS = dict(_classes())

@@ -21,7 +21,10 @@ from .simulation import Simulation
 
 
 class _System:
-    """A compiled system; simulations share it."""
+    """A compiled system, which simulations share.
+
+    keep: objects to which it refers; raised: exceptions of functions in Python, by thread.
+    """
 
     _compiling = threading.Lock()
 
@@ -56,7 +59,7 @@ class _System:
     def check(self, error) -> None:
         """Raises the exception of a library error; what a function in Python has raised is its cause."""
         raised = self._raised.pop(threading.get_ident(), None)
-        if raised is not None and not isinstance(raised, Exception):  # KeyboardInterrupt, though the method may have gone on
+        if raised is not None and not isinstance(raised, Exception):  # KeyboardInterrupt, even if the method continued
             raise raised
         if error.status < 0 and raised is not None:
             error.text += f": {type(raised).__name__}: {raised}".encode()[:499 - len(error.text)]
@@ -133,11 +136,11 @@ def models() -> dict:
     found, error = {}, lib.pw_error()
 
     @c.CFUNCTYPE(c.c_int, c.c_void_p, c.c_char_p, c.c_char_p)
-    def each(_, name, path):
+    def add(_, name, path):
         found[name.decode()] = path.decode()
         return 0
 
-    lib.files.pw_file_list(each, None, c.byref(error))
+    lib.files.pw_file_list(add, None, c.byref(error))
     lib.check(error)
     return found
 
@@ -148,7 +151,8 @@ class Model:
     Parameters
     ----------
     model : str or path
-        A name ("snakeboard"), or the path of a .yaml, .c or .so file.  Models in C are programs: open only what you trust.
+        A name ("snakeboard"), or the path of a .yaml, .c or .so file.  Models in C are programs: open only files
+        that you trust.
     start : dict, optional
         Initial values of states [m, rad, m/s, rad/s], such as ``{"frame.vx": 1}``.
     signals : dict, optional
@@ -249,9 +253,9 @@ class Model:
         for name, function in self.signals.items():
             self._set_signal(model, name, _callback(function, raised), None, keep)
         cells = {name: c.c_double(value) for name, value in lib.numbers(inputs, "inputs").items()}
-        own = c.cast(lib.core.pw_input_signal, c.c_void_p).value
+        reads_cell = c.cast(lib.core.pw_input_signal, c.c_void_p).value
         for name, cell in cells.items():
-            self._set_signal(model, name, own, c.addressof(cell), keep)
+            self._set_signal(model, name, reads_cell, c.addressof(cell), keep)
         pointer = lib.core.pw_system_compile(model.pointer, c.byref(error))
         lib.check(error)
         system = _System(pointer, (keep, model, cells), raised)
@@ -260,7 +264,7 @@ class Model:
         return system, cells
 
     def _set_signal(self, model, name, function, context, keep):
-        """`name`: ELEMENT or ELEMENT.FIELD."""
+        """name: ELEMENT or ELEMENT.FIELD; function: a callback or the address of a C function."""
         signal, error = lib.pw_signal(), lib.pw_error()
         signal.type = lib.PW_FUNCTION
         signal.function__eval = function if isinstance(function, int) else c.cast(function, c.c_void_p).value
@@ -286,8 +290,8 @@ class Model:
         step : float, optional
             Step size of fixed-step methods [s]; default: the model's.
         rtol, atol : float, optional
-            Relative tolerance of adaptive methods (default: the model's), absolute tolerance of every state (default: rtol
-            times its scale).
+            Relative tolerance of adaptive methods (default: the model's), absolute tolerance of every state (default:
+            rtol times its scale).
         max_steps : int, optional
             Largest number of attempted steps of adaptive methods, 1e7 by default.
         energy : bool
@@ -295,8 +299,8 @@ class Model:
         inputs : dict, optional
             Signals that the caller sets between steps, and their initial values: ``{"rider": 0.0}``.
         specialise : {"auto", "always", "never"}
-            Use code compiled for this model alone, if that is possible: from some 1e6 steps on, as the program does; always;
-            never.  ``statistics["specialised"]`` counts its evaluations.
+            Use code compiled for this model alone, if possible: from 1e6 expected steps on, as the program does;
+            always; never.  ``statistics["specialised"]`` counts its evaluations.
 
         Returns
         -------
@@ -404,18 +408,19 @@ class Model:
         studies.analysis, ("check", "compare", "drift", "steady", "periodic", "sensitivity", "fit", "optimise"))
 
     @staticmethod
-    def _linear(l, s):
-        if not l.A:
+    def _linear(linear, system):
+        if not linear.A:
             raise lib.InputError("too many coordinates to linearise: raise `most`")
-        n, states = l.unknowns, 2 * lib.core.pw_system_coordinates(s)
-        inputs = [lib.name_of(lib.core.pw_system_signal_name, s, i) for i in range(lib.core.pw_system_signals(s))]
+        n, states = linear.unknowns, 2 * lib.core.pw_system_coordinates(system)
+        inputs = [lib.name_of(lib.core.pw_system_signal_name, system, i) for i in range(lib.core.pw_system_signals(system))]
 
         def matrix(pointer, rows, columns):
             return np.ctypeslib.as_array(pointer, (rows, columns)).copy() if rows * columns else np.zeros((rows, columns))
 
-        return Linear(matrix(l.A, n, n), matrix(l.B, n, len(inputs)),
-                      np.array([complex(l.re[i], l.im[i]) for i in range(n)]), matrix(l.basis, states, n), inputs,
-                      [lib.name_of(lib.core.pw_system_state_name, s, i) for i in range(states)], l.steady == 0, np.array(l.twist))
+        return Linear(matrix(linear.A, n, n), matrix(linear.B, n, len(inputs)),
+                      np.array([complex(linear.re[i], linear.im[i]) for i in range(n)]), matrix(linear.basis, states, n), inputs,
+                      [lib.name_of(lib.core.pw_system_state_name, system, i) for i in range(states)], linear.steady == 0,
+                      np.array(linear.twist))
 
 
 def specialised(when: str, steps: float) -> bool:
@@ -440,7 +445,7 @@ def _functions(signals):
 
 
 def _callback(function, raised):
-    """A function of the time as the library calls it; what it raises stops the run, and goes to `raised`, by thread."""
+    """A function of the time as the library calls it; an exception stops the run and is kept in `raised`, by thread."""
 
     @lib.eval_function
     def evaluate(_context, t, _x, value, _gradient):
@@ -462,7 +467,7 @@ def _callback(function, raised):
 
 def describe(name: str = "model", *, about: str = "", bodies=(), elements=(), parameters=(), let: dict | None = None,
              run: dict | None = None, **model) -> Model:
-    """A model described in Python, with the words of text models.
+    """A model described in Python, with the keywords of text models.
 
     Parameters
     ----------
@@ -473,8 +478,8 @@ def describe(name: str = "model", *, about: str = "", bodies=(), elements=(), pa
     bodies : list of Body or dict
         ``{"name": "sleigh", "mass": 1, "inertia": 0.5}``; see :class:`Body`.  Numbers may be expressions of parameters.
     elements : list of Element or dict
-        ``pw.Wheel("edge", body="sleigh", at=[-0.25, 0])`` or ``{"wheel": "edge", "body": "sleigh", "at": [-0.25, 0]}``.  A
-        signal may be a Python function of the time.
+        ``pw.Wheel("edge", body="sleigh", at=[-0.25, 0])`` or ``{"wheel": "edge", "body": "sleigh", "at": [-0.25, 0]}``.
+        A signal may be a Python function of the time.
     parameters : list of dict
         ``{"name": "a", "value": 0.25, "unit": "m"}``.
     let, run : dict, optional

@@ -1,4 +1,4 @@
-"""The table of a run."""
+"""The samples of a run, as a table with named columns."""
 
 from __future__ import annotations
 

@@ -16,9 +16,9 @@ from . import _library as lib
 from ._progress import watched
 from .results import Result, _nearest
 
-_HEAD = {"t": "s", "position_residual": "", "velocity_residual": "", "kinetic": "J", "potential": "J", "work": "J", "loss": "J",
-         "projection": "J", "balance": "J"}  # the first columns of every table, and their units
-_MEMORY = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")  # bytes
+_FIRST_COLUMNS = {"t": "s", "position_residual": "", "velocity_residual": "", "kinetic": "J", "potential": "J", "work": "J",
+                  "loss": "J", "projection": "J", "balance": "J"}  # of every table, with their units
+_MEMORY = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")  # of the machine [bytes]
 
 
 class Inputs(MutableMapping):
@@ -75,7 +75,7 @@ class _Rows:
             raise lib.ResourceError(f"{capacity} samples of {width} numbers: out of memory") from None
 
     def room(self, done: float) -> np.ndarray:
-        """The rows that are not used yet, at least one; done: fraction of the run."""
+        """The rows that are not used yet, at least one; done: fraction of the run that is done."""
         if self.count == len(self._rows):
             expected = self.count * min(64, max(1.1 / done, 1.2)) if done > 0 else 64 * self.count
             most = max(_MEMORY // (8 * self._rows.shape[1]), self.count + 1)
@@ -101,8 +101,8 @@ class Simulation:
     inputs : Inputs
         Inputs that may be set between steps, by name; after a change the method restarts from the state reached.
     changed : dict of tuple
-        Initial values that did not satisfy the constraints, (described, consistent) by name; a warning names those that the
-        user has given.
+        Initial values that did not satisfy the constraints, (described, consistent) by name; a warning names those that
+        the user has given.
 
     Examples
     --------
@@ -117,7 +117,7 @@ class Simulation:
     def __init__(self, model, system, cells, method, settings, given):
         self.model, self._system, self._settings = model, system, settings
         self.method, self._given, self._restart = method, given, False
-        self._lock, self._steps = threading.Lock(), 16
+        self._lock, self._steps_per_call = threading.Lock(), 16
         error = lib.pw_error()
         self._run = lib.core.pw_run_open(system.pointer, lib.encode(method, "method"), c.byref(settings), c.byref(error))
         system.check(error)
@@ -192,7 +192,7 @@ class Simulation:
 
     def _columns(self):
         s, n, core = self._system.pointer, lib.core.pw_system_coordinates(self._system.pointer), lib.core
-        units, groups = dict(_HEAD), {}
+        units, groups = dict(_FIRST_COLUMNS), {}
         groups["states"] = [lib.name_of(core.pw_system_state_name, s, i) for i in range(2 * n)]
         for i, name in enumerate(groups["states"]):
             units[name] = lib.text(core.pw_system_state_unit(s, i))
@@ -267,7 +267,7 @@ class Simulation:
         with self._used() as run:
             t_end = self._later(run, t_end, "t_end")
             times = self._times(lib.core.pw_run_time(run), t_end, every, times)
-            status, reason, rows = "ok", "", _Rows(self._width(run), 4096 if times is None else len(times))
+            status, reason, rows = "ok", "", _Rows(lib.core.pw_run_record_width(run), 4096 if times is None else len(times))
             cause: BaseException | None = None
             try:
                 self._record(run, times, t_end, rows, progress)
@@ -284,10 +284,6 @@ class Simulation:
         return result
 
     @staticmethod
-    def _width(run):
-        return lib.core.pw_run_record_width(run)
-
-    @staticmethod
     def _times(start, t_end, every, times):
         """The times of samples; None: every step."""
         if times is None and every is None:
@@ -295,7 +291,7 @@ class Simulation:
         if times is None:
             every = lib.number(every, "every", above=0)
             count = np.floor((t_end - start) / every * (1 + 1e-12))
-            if not count * 8 * len(_HEAD) < _MEMORY:
+            if not count * 8 * len(_FIRST_COLUMNS) < _MEMORY:
                 raise lib.ResourceError(f"every = {every}: {count:g} samples: out of memory")
             times = start + every * np.arange(count + 1)
             return np.append(times[:-1], t_end) if abs(times[-1] - t_end) < 1e-9 * every else np.append(times, t_end)
@@ -310,7 +306,7 @@ class Simulation:
 
     def _record(self, run, times, t_end, rows=None, progress=False):
         """Adds the samples at these times, or after every step (None), to the rows."""
-        rows = rows or _Rows(self._width(run), len(times))
+        rows = rows or _Rows(lib.core.pw_run_record_width(run), len(times))
         start, now, error = lib.core.pw_run_time(run), lib.core.pw_run_time, lib.pw_error()
         if self._restart:
             lib.core.pw_run_restart(run, None, None, c.byref(error))
@@ -329,14 +325,17 @@ class Simulation:
         return rows
 
     def _call(self, run, times, t_end, rows, done):
-        """One call of the library, of some 50 ms, between which Python notices Ctrl-C."""
+        """One call of the library: some 50 ms, so that Python notices Ctrl-C soon."""
         recorded, error, room, began = c.c_long(), lib.pw_error(), rows.room(done), time.perf_counter()
         room = room if times is None else room[:len(times)]
         try:
-            lib.core.pw_run_record(run, t_end, None if times is None else times.ctypes.data, len(room), self._steps,
+            lib.core.pw_run_record(run, t_end, None if times is None else times.ctypes.data, len(room), self._steps_per_call,
                                    room.ctypes.data, c.byref(recorded), c.byref(error))
         finally:
             rows.count += recorded.value
         seconds = time.perf_counter() - began
-        self._steps = min(10**7, 2 * self._steps) if seconds < 0.04 else max(1, self._steps // 2) if seconds > 0.1 else self._steps
+        if seconds < 0.04:
+            self._steps_per_call = min(10**7, 2 * self._steps_per_call)
+        elif seconds > 0.1:
+            self._steps_per_call = max(1, self._steps_per_call // 2)
         self._system.check(error)

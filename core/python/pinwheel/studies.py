@@ -1,4 +1,4 @@
-"""Many runs, and the commands of the program."""
+"""Sweeps: runs for many values of parameters; and the commands of the program as functions."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from ._progress import watched
 # ---- Sweeps ----
 
 def _final(model, parameters, start, method, t_end, settings, cancelled=None):
-    """The last sample of one run, its units, or why it fails.  Not nested, so that other processes can call it."""
+    """The last sample of one run, its units, and why it failed, or "".  Other processes import this function."""
     varied = model.replace(start=start, **parameters)
     end = varied.defaults["t_end"] if t_end is None else t_end
     try:
@@ -46,8 +46,8 @@ def _points(vary):
     return names, values, [dict(zip(names, map(float, point))) for point in itertools.product(*values)]
 
 
-def _engine(model, runs, method, t_end, settings):
-    """The engine depends on the whole sweep, as in the program."""
+def _specialise(model, runs, method, t_end, settings):
+    """The setting ``specialise`` of all runs, which depends on the steps of the whole sweep, as in the program."""
     from .model import specialised
     when, given = settings.pop("specialise", "auto"), lib.pw_settings()
     for name in ("step", "rtol"):
@@ -89,14 +89,14 @@ def sweep(model, vary: dict, *, method: str | None = None, t_end: float | None =
     model = model if isinstance(model, Model) else Model(model)
     names, values, points = _points(vary)
     t_end = None if t_end is None else lib.number(t_end, "t_end")
-    settings["specialise"] = _engine(model, len(points), method, t_end, dict(settings))
+    settings["specialise"] = _specialise(model, len(points), method, t_end, dict(settings))
     pool, cancelled = executor or concurrent.futures.ThreadPoolExecutor(os.cpu_count()), threading.Event()
-    own = [cancelled.is_set] if executor is None else []
+    watch = [cancelled.is_set] if executor is None else []  # other executors may not be able to send it
     if not hasattr(pool, "submit"):
         raise lib.InputError(f"executor: expected a concurrent.futures.Executor, found {executor!r:.60}")
     try:
         pending = [pool.submit(_final, model, {n: x for n, x in p.items() if n in model.parameters},
-                               {n: x for n, x in p.items() if n not in model.parameters}, method, t_end, settings, *own)
+                               {n: x for n, x in p.items() if n not in model.parameters}, method, t_end, settings, *watch)
                    for p in points]
         with watched(progress) as report:
             rows = [(future.result(), report((i + 1) / len(pending)))[0] for i, future in enumerate(pending)]
@@ -135,8 +135,9 @@ def command(name: str, model, *arguments, **options):
     model : Model or str
     *arguments, **options
         Further arguments and options of the command, see :func:`help_of`: ``t_end=10`` stands for ``--t-end=10``,
-        ``energy=True`` for ``--energy``; a list repeats the option, and so does a dict: ``hold={"frame.vx": 1}`` stands for
-        ``--hold=frame.vx=1``, ``free={"m": (0, 2)}`` for ``--free=m=0:2``.  ``data`` may be a dict of arrays or a DataFrame.
+        ``energy=True`` for ``--energy``; a list repeats the option, and so does a dict: ``hold={"frame.vx": 1}`` stands
+        for ``--hold=frame.vx=1``, ``free={"m": (0, 2)}`` for ``--free=m=0:2``.  ``data`` may be a dict of arrays or a
+        DataFrame.
 
     Returns
     -------
@@ -161,15 +162,27 @@ def help_of(name: str) -> str:
     return _program.run([lib.encode(name, "command").decode(), "--help"]).stdout
 
 
+_SUMMARIES = {
+    "check": "Checks mobility, redundancy, initial conditions, derivatives and stability.",
+    "compare": "Compares the accuracy and cost of methods against a reference solution.",
+    "drift": "Compares the drift of constraints and energy in long runs, by stabilisation.",
+    "steady": "Finds steady motions, and follows them over a parameter.",
+    "periodic": "Finds periodic motions, and follows them over a parameter.",
+    "sensitivity": "Differentiates outputs of a run with respect to parameters and initial values.",
+    "fit": "Fits parameters and initial values to measured data.",
+    "optimise": "Finds the parameters for which an output is largest or smallest.",
+}
+_RETURNS = dict.fromkeys(("compare", "drift"), "Columns of the table: arrays of shape (rows,), with units in their names.")
+
+
 def analysis(name):
-    """The method of models that runs a command."""
+    """The method of :class:`Model` that runs a command of the program."""
 
     def method(self, *arguments, **options):
         return _report(name, self, arguments, options, tables=True)
 
-    summary = next(line for line in _SUMMARIES if line.startswith(name + " ")).split(" ", 1)[1]
     method.__name__, method.__qualname__, method.__module__ = name, f"Model.{name}", "pinwheel"
-    method.__doc__ = f"""{summary}
+    method.__doc__ = f"""{_SUMMARIES[name]}
 
         Runs ``pinwheel {name}`` with this model, its parameters and initial values.
 
@@ -189,18 +202,6 @@ def analysis(name):
             With the program's message.
         """
     return method
-
-
-_SUMMARIES = """\
-check Checks mobility, redundancy, initial conditions, derivatives and stability.
-compare Compares the accuracy and cost of methods against a reference solution.
-drift Compares the drift of constraints and energy in long runs, by stabilisation.
-steady Finds steady motions, and follows them over a parameter.
-periodic Finds periodic motions, and follows them over a parameter.
-sensitivity Differentiates outputs of a run with respect to parameters and initial values.
-fit Fits parameters and initial values to measured data.
-optimise Finds the parameters for which an output is largest or smallest.""".splitlines()
-_RETURNS = dict.fromkeys(("compare", "drift"), "Columns of the table, ndarray of shape (rows,), with units in their names.")
 
 
 def _report(name, model, arguments, options, tables):
