@@ -181,7 +181,7 @@ static inline double pw_least_step (const pw_run *r) {
 /* Adds the name of the signal that failed in the last attempted step, if any, to the error.  Returns status. */
 int pw_run_annotate_error (const pw_run *r, int status, pw_error *error);
 
-/* Replaces the saddle by one for the active rows.  PW_OK or PW_RESOURCE. */
+/* Replaces the saddle by one for the active rows; r->saddle is NULL after an error of pw_saddle_open. */
 int pw_run_open_saddle (pw_run *r, pw_error *error);
 
 /* Evaluates accelerations, multipliers and the ledger's powers at the state reached; errors contain the reason. */

@@ -129,7 +129,7 @@ double pw_run_growth (const pw_run *r, int *state, double *power);
 
 /* Restarts from a state at the time reached, after the caller has changed something.  The state is made consistent
  * first. q and v may be NULL: unchanged.  The ledger continues; the change of energy does not count in its balance.
- * Errors: PW_INPUT for a value that is not finite, PW_INITIAL, PW_METHOD: the run stays where it was; PW_RESOURCE. */
+ * Errors: PW_INPUT (a value of 1e100, or NaN), PW_INITIAL, PW_METHOD: the run stays where it was; PW_RESOURCE. */
 int pw_run_restart (pw_run *r, const double *q, const double *v, pw_error *error);
 
 void pw_run_close (pw_run *r);
@@ -138,8 +138,8 @@ void pw_run_close (pw_run *r);
 
 /* Appends the state reached to the archive, and continues as a run loaded from it would: matrices are planned again,
  * and a multistep method restarts, which the statistics count.  Take samples of the last step before.  PW_RETRY near
- * a singular configuration, where nothing is done: try after the next step.  Errors: PW_METHOD if the state cannot be
- * evaluated; PW_RESOURCE. */
+ * a singular configuration, where nothing is done: try after the next step.  Errors: PW_METHOD or PW_INPUT if the
+ * state cannot be evaluated; PW_RESOURCE. */
 int pw_run_save (pw_run *r, pw_archive *a, pw_error *error);
 
 /* Loads a saved state into a run opened with the same system, method and settings that has not advanced; it continues

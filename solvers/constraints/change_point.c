@@ -207,23 +207,22 @@ static int change_report (pw_run *r, const change_walk *w, change_verdict verdic
   pw_geometry *g = &r->geometry;
   double low = r->limits.unresolved * fmin (g->previous_sine, sine);
   g->crossed |= verdict == CHANGE_UNKNOWN || w->least_sine <= r->limits.crossing;
-  if (verdict == CHANGE_OTHER_BRANCH)
-    return change_fail (r, w->least_row, w->least_sine / w->sine_slope, "the motion has left its branch", length,
-                        error);
-  if (verdict == CHANGE_SAME_BRANCH && !g->crossed && w->least_sine < low)
-    return change_fail (r, w->least_row, w->least_sine / w->sine_slope, "the step does not resolve it", length, error);
-  return PW_OK;
+  const char *finding = verdict == CHANGE_OTHER_BRANCH ? "the motion has left its branch" : NULL;
+  if (verdict == CHANGE_SAME_BRANCH && !g->crossed && w->least_sine < low) finding = "the step does not resolve it";
+  return finding ? change_fail (r, w->least_row, w->least_sine / w->sine_slope, finding, length, error) : PW_OK;
 }
 
 int pw_change_point_check (pw_run *r, double sine, pw_error *error) {
   pw_geometry *g = &r->geometry;
   change_walk w;
   pw_error cause = { 0 };
+  const pw_source *failed = r->w->failed;
   double length = change_distance (r->s, r->q, g->previous_q);
   if (!g->loops || length == 0) return PW_OK;
   if (isnan (g->previous_sine)) g->previous_sine = change_sine_at (r, g->previous_t, g->previous_q);
   int suspect = change_may_be_low (r, g->previous_sine, sine, length);
   change_verdict verdict = suspect ? change_walk_step (r, &w, &cause) : CHANGE_UNKNOWN;
+  r->w->failed = failed;
   if (pw_evaluate_J_at (r->w, r->t, r->q, r->v) != PW_OK) return pw_fail_signal (r->t, error);
   if (cause.status != PW_OK) return pw_fail (error, cause.status, "%s", cause.text);
   return suspect ? change_report (r, &w, verdict, sine, length, error) : PW_OK;

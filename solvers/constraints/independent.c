@@ -91,6 +91,7 @@ static int independent_search (pw_run *r, pw_row_basis *b, double *q, pw_error *
     int nearby = independent_rank_nearby (r, b, n, q);
     if (nearby > largest) largest = nearby;
   }
+  if (status == PW_OK) r->w->failed = NULL;
   if (largest > rank)
     return pw_fail (
         error, PW_INITIAL,

@@ -65,7 +65,6 @@ void pw_projector_close (pw_projector *p) {
 static int project_check_redundant (pw_projector *p, const pw_system *s, double tolerance, const double *g,
                                     const double *size) {
   double largest = tolerance;
-  p->contradictory_row = -1;
   if (p->active == NULL || p->ignores_inactive) return PW_OK;
   for (int i = 0; i < s->holonomic; i++) {
     double residual = p->active[i] ? 0 : fabs (g[i]) / size[i];
@@ -82,6 +81,7 @@ int pw_project_positions (pw_projector *p, pw_run *r, double t, double *q, const
   const pw_system *s = r->s;
   pw_residuals now = { 0 };
   double *g = r->scratch, *size = g + s->rows, *mu = size + s->rows, *dq = mu + s->rows, previous = INFINITY;
+  p->contradictory_row = -1;
   for (p->iterations = 0;; p->iterations++) {
     int status = pw_update_kinematics (r->w, t, q, v);
     if (status != PW_OK) return status;

@@ -160,6 +160,7 @@ void pw_watchdog_close (pw_run *r) {
 
 double pw_watchdog_sine (pw_run *r, int *row) {
   pw_saddle *saddle = r->geometry.saddle;
+  if (row) *row = -1;
   if (saddle == NULL) return 1;
   int status = pw_saddle_factor (saddle);
   double sine = pw_saddle_sine (saddle, row);
@@ -198,6 +199,7 @@ int pw_fail_singular (pw_run *r, double t, pw_error *error) {
 
 int pw_watchdog_near_state (pw_run *r) {
   if (pw_evaluate_J_at (r->w, r->t, r->q, r->v) != PW_OK) return 0;
+  pw_saddle_factor (r->saddle);
   r->geometry.singular_ahead = 1;
   return pw_watchdog_near (r);
 }
@@ -209,16 +211,17 @@ int pw_watchdog_check_values (const pw_run *r, pw_error *error) {
   for (int i = 0; i < 2 * s->coords; i++) {
     double value = i < s->coords ? r->q[i] : r->v[i - s->coords];
     if (!(fabs (value) < extreme))
-      return pw_fail (error, PW_INPUT, "model %s: values too extreme: %s is initially %g: expected less than %g",
-                      s->model, pw_system_state_name (s, i, name, sizeof name), value, extreme);
+      return pw_fail (error, PW_INPUT,
+                      "model %s: values too extreme: %s is initially %g: expected a magnitude below %g", s->model,
+                      pw_system_state_name (s, i, name, sizeof name), value, extreme);
   }
   for (int j = 0; s->rows > 0 && j < s->coords; j++) {
-    double mass = s->mass[j] / (pw_length_factor (s, j) * pw_length_factor (s, j));
+    double unit = pw_length_factor (s, j) * pw_length_factor (s, j), mass = s->mass[j] / unit;
     if (mass != 0 && !(mass < extreme && mass > 1 / extreme))
       return pw_fail (
           error, PW_INPUT,
           "model %s: values too extreme: the mass or inertia that goes with %s is %g: expected 0, or %g to %g",
-          s->model, pw_system_state_name (s, j, name, sizeof name), s->mass[j], 1 / extreme, extreme);
+          s->model, pw_system_state_name (s, j, name, sizeof name), s->mass[j], unit / extreme, unit * extreme);
   }
   return PW_OK;
 }

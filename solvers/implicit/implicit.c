@@ -49,8 +49,7 @@ int pw_implicit_restart (pw_run *r, pw_error *error) {
 
 void pw_implicit_scale (const pw_dae *x, double c, double e, double *row_factor, double *column_factor) {
   const pw_system *s = x->tangent.run->s;
-  int n = x->n,
-      g_rows = x->enforces_velocities ? 0 : x->tangent.holonomic; /* rows of lambda in which g = 0 replaces J v = eta */
+  int n = x->n, g_rows = x->enforces_velocities ? 0 : x->tangent.holonomic; /* in which g = 0 replaces J v = eta */
   double mass = 0;
   for (int j = 0; j < n; j++) mass = fmax (mass, s->mass[j]);
   if (mass == 0) mass = 1;
@@ -106,16 +105,15 @@ int pw_implicit_advance (pw_run *r, double t_end, pw_implicit_step *step, void (
   const double end = pw_step_end (r, &x->counter, t_end, &whole);
   double h = whole ? r->settings.step : end - r->t, t1 = end;
   size_t n = (size_t)r->s->coords * sizeof (double);
-  r->near_singular = 0;
   int status = whole ? implicit_step_around (r, step, h, fmin (t_end, r->breakpoint), &t1) : step (r, h, t1);
   if (t1 > end) h = t1 - r->t, whole = 0;
+  x->h = status == PW_OK ? h : 0;
   if (status != PW_OK) return pw_implicit_fail (r, status, h, error);
   pw_store_start (&x->last.start, r);
   memcpy (r->q, x->q1, n);
   memcpy (r->v, x->v1, n);
   accept (r);
   r->t = t1;
-  x->h = h;
   pw_dense_output_integrate_ledger (&x->last, r);
   r->statistics.steps++;
   pw_count_step (&x->counter, whole, t1);

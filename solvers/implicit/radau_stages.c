@@ -25,8 +25,7 @@ static const double radau_alpha = 2.68108287362775213390, radau_beta = 3.0504301
 /* F (t, y) = B y', B = diag (1, M, 0): minus the residual of dae.h without B y'.  Leaves kinematics and J at (t, y). */
 static int radau_evaluate (pw_run *r, double t, const double *y, double *F) {
   radau *d = r->data;
-  int n = d->dae.n;
-  int status = pw_evaluate_J_at (r->w, pw_before_breakpoint (r, t), y, y + n);
+  int n = d->dae.n, status = pw_evaluate_J_at (r->w, pw_before_breakpoint (r, t), y, y + n);
   if (status != PW_OK) return status;
   r->statistics.rhs++;
   pw_dae_residual (&d->dae, y + n, NULL, y + 2 * n, F);

@@ -121,18 +121,17 @@ int pw_rk_advance_fixed (pw_run *r, double t_end, pw_error *error) {
   const int was_off_grid = d->off_grid;
   double added_energy = 0, t1 = pw_step_end (r, &d->counter, t_end, &whole);
   double h = whole && !was_off_grid ? r->settings.step : t1 - r->t;
-  r->near_singular = 0;
   int status = pw_rk_step (r, h, t1, project, r->settings.ledger ? &added_energy : NULL);
   int ends_singular =
       r->near_singular && r->geometry.evaluated_sine < r->limits.ends_singular * r->geometry.checked_sine;
   d->off_grid = r->near_singular && !was_off_grid;
   double stop = whole ? fmin (t_end, r->breakpoint) : t1, t = t1;
   if (d->off_grid) status = fixed_step_around (r, status, ends_singular, t1, stop, project, &t);
-  if (r->stopped) {
+  if (status != PW_OK) {
+    if (status != PW_STOPPED) status = pw_rk_fail (r, status, r->settings.step, error);
     d->off_grid = was_off_grid;
-    return PW_STOPPED;
+    return status;
   }
-  if (status != PW_OK) return pw_rk_fail (r, status, r->settings.step, error);
   r->statistics.steps++;
   if (d->off_grid) { /* counted with the next step, which ends at the next multiple */
     if (t > t1) d->counter.count = (long)floor ((t - d->counter.base) / r->settings.step);

@@ -173,7 +173,7 @@ void pw_runs_advance (pw_run *const *runs, int count, double t_end, const pw_spe
 
 int pw_run_advance_to (pw_run *r, double t, double t_end, pw_error *error) {
   if (pw_require (r, "a run", error) != PW_OK) return PW_INPUT;
-  while (r->t < t && r->t < t_end) {
+  while (r->t < t && !(r->t >= t_end)) {
     int status = pw_run_advance_towards (r, t, t_end, error);
     if (status != PW_OK) return status;
   }

@@ -99,16 +99,16 @@ int pw_run_renew (pw_run *r, pw_references references, pw_error *error) {
   else if (status == PW_OK)
     pw_watchdog_begin (r);
   run_close_method (r); /* it may use the previous saddle */
-  if (status == PW_RESOURCE) return status;
+  if (status == PW_RESOURCE || r->saddle == NULL) return status;
   int opened = r->method->open (r, error);
   if (opened != PW_OK) run_close_method (r);
   return status == PW_OK ? opened : status;
 }
 
-/* 1 if memory did not suffice to reopen the method: the run can only be closed. */
+/* 1 if the saddle or the method could not be reopened: the run can only be closed. */
 static int run_has_no_method (const pw_run *r, pw_error *error) {
   if (r->data) return 0;
-  pw_fail (error, PW_RESOURCE, "model %s: the run ended at t = %.6g s: out of memory", r->s->model, r->t);
+  pw_fail (error, PW_RESOURCE, "model %s: t = %.6g s: the method could not be reopened", r->s->model, r->t);
   return 1;
 }
 
@@ -164,6 +164,7 @@ int pw_run_advance (pw_run *r, double t_end, pw_error *error) {
     r->t = stop;
     return run_check_progress (r, before, error);
   }
+  r->near_singular = 0;
   if (status == PW_OK) status = r->method->advance (r, t_end, error);
   if (status == PW_STOPPED) return status;
   if (status == PW_OK) status = pw_run_watchdog (r, error);
@@ -218,8 +219,8 @@ static int run_check_given (const pw_run *r, const double *x, int first, pw_erro
   char name[120];
   for (int j = 0, n = r->s->coords; x && j < n; j++)
     if (!(fabs (x[j]) < r->limits.extreme))
-      return pw_fail (error, PW_INPUT, "model %s: restart with %s = %g: expected a finite number", r->s->model,
-                      pw_system_state_name (r->s, first + j, name, sizeof name), x[j]);
+      return pw_fail (error, PW_INPUT, "model %s: restart with %s = %g: expected a magnitude below %g", r->s->model,
+                      pw_system_state_name (r->s, first + j, name, sizeof name), x[j], r->limits.extreme);
   return PW_OK;
 }
 

@@ -57,6 +57,7 @@ static void watchdog_sample_sines (pw_run *r) {
     if (pw_evaluate_J_at (r->w, r->t, g->previous_q, r->v) != PW_OK) break;
     g->largest_sine = fmax (g->largest_sine, pw_watchdog_sine (r, NULL));
   }
+  r->w->failed = NULL;
   (void)pw_evaluate_J_at (r->w, r->t, r->q, r->v);
 }
 
@@ -102,14 +103,14 @@ static int watchdog_follow (pw_run *r, pw_error *error) {
 
 /* ---- Lost constraints ---- */
 
-static int watchdog_fail_lost (pw_run *r, pw_error *error) {
+static int watchdog_fail_lost (pw_run *r, int contradicts, pw_error *error) {
   pw_residuals now;
   char element[120] = "a constraint", cause[60] = "constraint drift";
   pw_evaluate_residuals (r->w, NULL, &now);
   int row = now.position > now.velocity ? now.row_position : now.row_velocity;
   if (row >= 0) pw_system_row_name (r->s, row, element, sizeof element);
   const char *advice = "";
-  if (row >= 0 && r->active && !r->active[row])
+  if (contradicts)
     snprintf (cause, sizeof cause, "constraints contradict each other");
   else if (pw_stabilised_by (r, PW_UNSTABILISED))
     advice = pw_fixed_steps (r) ? "; a smaller step or a stabilisation reduces it"
@@ -198,11 +199,11 @@ static int watchdog_check_jump (pw_run *r, pw_error *error) {
 }
 
 int pw_run_watchdog (pw_run *r, pw_error *error) {
-  const pw_statistics *s = &r->statistics;
   pw_record_residuals (r);
   double lost = pw_stabilised_by (r, PW_UNSTABILISED) ? r->limits.lost_unstabilised : r->limits.lost;
-  if (watchdog_exceeds (s->position, s->velocity, lost) || (r->redundant && watchdog_contradicts (r)))
-    return watchdog_fail_lost (r, error);
+  int contradicts = r->redundant && watchdog_contradicts (r);
+  if (contradicts || watchdog_exceeds (r->residuals.position, r->residuals.velocity, lost))
+    return watchdog_fail_lost (r, contradicts, error);
   int status = watchdog_follow (r, error);
   return status == PW_OK ? watchdog_check_jump (r, error) : status;
 }

@@ -257,7 +257,6 @@ static int multistep_advance (pw_run *r, double t_end, pw_error *error) {
   multistep_data *d = r->data;
   double stop = fmin (t_end, r->breakpoint), t = r->t;
   int flag = CVodeSetStopTime (d->cvode, stop);
-  r->near_singular = 0;
   if (flag >= 0) flag = CVode (d->cvode, stop, d->sun.y, &t, CV_ONE_STEP);
   if (flag < 0) return multistep_fail (d, flag, error);
   multistep_count (d);

@@ -108,8 +108,26 @@ static void test_wild_residual (void **state) {
   pw_system_free (s);
 }
 
+/* A row that contradicted the others in one projection does not explain why the next one fails. */
+static void test_not_contradictory (void **state) {
+  (void)state;
+  pw_system *s = scene_named ("redundant-parallelogram", NULL, 0);
+  pw_run *r = runs_open (s, "rk4+projection", NULL);
+  pw_error error = { 0 };
+  pw_projector p;
+  check_ok (pw_projector_open_by_options (&p, r, &error), &error);
+  p.contradictory_row = r->redundant_row[0];
+  r->q[0] = NAN;
+  assert_int_equal (pw_project_positions (&p, r, 0, r->q, r->v), PW_RETRY);
+  assert_int_equal (p.contradictory_row, -1);
+  pw_projector_close (&p);
+  pw_run_close (r);
+  pw_system_free (s);
+}
+
 int main (void) {
   const struct CMUnitTest tests[] = { cmocka_unit_test (test_consistent), cmocka_unit_test (test_off),
-                                      cmocka_unit_test (test_metric), cmocka_unit_test (test_wild_residual) };
+                                      cmocka_unit_test (test_metric), cmocka_unit_test (test_wild_residual),
+                                      cmocka_unit_test (test_not_contradictory) };
   return cmocka_run_group_tests (tests, NULL, NULL);
 }

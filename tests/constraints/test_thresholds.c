@@ -88,6 +88,20 @@ static void test_limits (void **state) {
   assert_int_equal (bad, 0);
 }
 
+/* A step that has failed fails again. */
+static void test_again (void **state) {
+  (void)state;
+  pw_error first = { 0 }, second = { 0 };
+  pw_system *s = scene_named ("n-four-bar", NULL, 0);
+  pw_run *r = runs_open (s, "rk4+projection", &(pw_settings){ .step = 1e-3, .span = 4 });
+  r->limits.agree *= 1e-6;
+  assert_int_equal (pw_run_advance_to (r, 4, 4, &first), PW_METHOD);
+  assert_int_equal (pw_run_advance (r, 4, &second), PW_METHOD);
+  check_error (&second, PW_METHOD, first.text);
+  pw_run_close (r);
+  pw_system_free (s);
+}
+
 /* ---- Thresholds without effect on the end of a run ---- */
 
 /* Sets the state of r to a rhombus of bars of 1 m at this angle, in motion. */
@@ -98,6 +112,35 @@ static void watchdog_bend (pw_run *r, double angle) {
   memcpy (r->q, q, sizeof q);
   memcpy (r->v, v, sizeof v);
   r->geometry.singular_ahead = 1;
+}
+
+/* The state reached is examined, not that at which the run's matrix was factorised last. */
+static void test_near_state (void **state) {
+  (void)state;
+  static const char *const method[] = { "rk4+projection", "erk5+projection" };
+  for (int i = 0; i < 2; i++) {
+    pw_system *s = scene_system (&bars_table, NULL);
+    pw_run *r = runs_open (s, method[i], NULL);
+    watchdog_bend (r, 1e-4);
+    assert_int_equal (pw_watchdog_near_state (r), 1);
+    watchdog_bend (r, 1);
+    assert_int_equal (pw_watchdog_near_state (r), 0);
+    pw_run_close (r);
+    pw_system_free (s);
+  }
+}
+
+/* Without a sine, that of a tree of joints, no row is named. */
+static void test_tree (void **state) {
+  (void)state;
+  int row = 7;
+  pw_system *s = scene_named ("pendulum", NULL, 0);
+  pw_run *r = runs_open (s, "rk4+projection", NULL);
+  assert_null (r->geometry.saddle);
+  check_close ("sine", pw_watchdog_sine (r, &row), 1, 0, "never singular");
+  assert_int_equal (row, -1);
+  pw_run_close (r);
+  pw_system_free (s);
 }
 
 /* Residual |J a - gamma| of accelerations evaluated at this angle. */
@@ -165,6 +208,26 @@ static void test_jump (void **state) {
   pw_system_free (s);
 }
 
+/* A redundant row whose residual is the largest does not contradict the others if theirs are of the same size. */
+static void test_drift (void **state) {
+  (void)state;
+  pw_error error = { 0 };
+  char row[120];
+  pw_system *s = scene_named ("redundant-parallelogram", NULL, 0);
+  pw_run *r = runs_open (s, "rk4+none", NULL);
+  int n;
+  pw_system_row_name (s, r->redundant_row[0], row, sizeof row);
+  assert_int_equal (sscanf (row, "pin B%d", &n), 1);
+  r->q[3 * n] += 0.15, r->q[3 * n + 1] += 0.15; /* the crank, */
+  r->q[0] -= 0.3, r->q[1] -= 0.3;               /* and the coupler */
+  assert_int_equal (pw_evaluate_J_at (r->w, r->t, r->q, r->v), PW_OK);
+  pw_forget_residuals (r);
+  assert_int_equal (pw_run_watchdog (r, &error), PW_METHOD);
+  assert_non_null (strstr (error.text, "constraint drift: pin B"));
+  pw_run_close (r);
+  pw_system_free (s);
+}
+
 static void test_masses (void **state) {
   (void)state;
   pw_error error = { 0 };
@@ -207,7 +270,9 @@ int main (void) {
   const struct CMUnitTest tests[] = {
     cmocka_unit_test (test_limits), cmocka_unit_test (test_evaluations),
     cmocka_unit_test (test_jump),   cmocka_unit_test (test_acceleration_norm),
-    cmocka_unit_test (test_masses),
+    cmocka_unit_test (test_masses), cmocka_unit_test (test_near_state),
+    cmocka_unit_test (test_tree),   cmocka_unit_test (test_drift),
+    cmocka_unit_test (test_again),
   };
   return cmocka_run_group_tests (tests, NULL, NULL);
 }

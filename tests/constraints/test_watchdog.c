@@ -273,6 +273,52 @@ static void test_fast_disc (void **state) {
   pw_system_free (s);
 }
 
+/* ---- A signal that fails where only the watchdog evaluates it ---- */
+
+static double watchdog_valid; /* the changes of the crank's initial angle with which the signal can be evaluated */
+
+static int watchdog_fails_inside (void *context, double t, const double *x, double value[3], double *gradient) {
+  (void)context, (void)t;
+  value[0] = fabs (x[0]) < 2.5 * watchdog_valid || fabs (x[0] - 1.2) < watchdog_valid || x[0] > 3 ? 0 : NAN;
+  if (gradient) gradient[0] = 0;
+  return 0;
+}
+
+static void watchdog_build_failing (pw_model *m, const void *parameters) {
+  static const char *const reads[] = { "crank.phi", NULL };
+  bars_table.build (m, parameters);
+  pw_torque torque = { .name = "torque", .body = { "crank", "ground" } };
+  torque.value = (pw_signal){ PW_FUNCTION, .function = { .eval = watchdog_fails_inside, .reads = reads } };
+  pw_add_torque (m, &torque);
+}
+
+/* Its failure is no reason for a later error. */
+static void test_failing_signal (void **state) {
+  (void)state;
+  pw_error error = { 0 };
+  pw_plugin_table table = bars_table;
+  watchdog_valid = 0.2;
+  table.build = watchdog_build_failing;
+  pw_system *s = scene_system (&table, "b", watchdog_bar, "d", watchdog_bar, NULL);
+  pw_run *r = runs_open (s, "rk4+projection", &(pw_settings){ .step = 1e-3, .span = 1 });
+  assert_null (r->w->failed);
+  watchdog_bars_at (-0.3, 0, r->geometry.previous_q);
+  watchdog_bars_at (PW_PI + 0.3, 0, r->q);
+  assert_int_equal (pw_evaluate_J_at (r->w, r->t, r->q, r->v), PW_OK);
+  check_ok (pw_change_point_check (r, pw_watchdog_sine (r, NULL), &error), &error);
+  assert_null (r->w->failed);
+  static const double flat[] = { 0.5, 0, 0, 2.25, 0, 0, 3, 0, 0 };
+  pw_initial_value initial[WATCHDOG_BARS];
+  for (int i = 0; i < WATCHDOG_BARS; i++) initial[i] = (pw_initial_value){ i, flat[i] };
+  watchdog_valid = 0.01;
+  assert_null (pw_run_open (s, "rk4", &(pw_settings){ .initial = initial, .initials = WATCHDOG_BARS }, &error));
+  check_error (&error, PW_INITIAL,
+               "model scene: the initial configuration is singular: 7 constraint equations are independent there, 8 "
+               "nearby; begin slightly off it");
+  pw_run_close (r);
+  pw_system_free (s);
+}
+
 /* ---- Messages ---- */
 
 static void watchdog_expect (const char *model, const char *parameter, double value, const char *method,
@@ -300,6 +346,32 @@ static void test_messages (void **state) {
   watchdog_expect ("slider-crank", NULL, 0, "galpha+index3", 9e-6, 4, "singular configuration");
 }
 
+/* A small body at a pin, whose moment of inertia is too extreme for its size. */
+static void watchdog_build_small (pw_model *m, const void *parameter) {
+  pw_add_body (m, &(pw_body){ .name = "rod", .mass = 1, .inertia = *(const double *)parameter });
+  pw_add_pin (m, &(pw_pin){ .name = "hinge", .body = { "rod", "ground" }, .at = { { 0, 0 }, { 0, 0 } } });
+  pw_add_pin (m, &(pw_pin){ .name = "end", .body = { "rod", "ground" }, .at = { { 1e-3, 0 }, { 1e-3, 0 } } });
+}
+
+/* The bounds in the message are in the units of the value, which is outside them. */
+static void watchdog_try_inertia (double inertia) {
+  static const pw_parameter list[] = { { .name = "inertia", .value = 1 }, { .name = NULL } };
+  static const pw_plugin_table table = { .abi = PW_ABI,
+                                         .size = sizeof (pw_plugin_table),
+                                         .parameters = list,
+                                         .parameters_size = sizeof (double),
+                                         .build = watchdog_build_small };
+  double value, low, high;
+  pw_error error = { 0 };
+  pw_system *s = scene_system (&table, "inertia", inertia, NULL);
+  assert_null (pw_run_open (s, "rk4", NULL, &error));
+  const char *is = strstr (error.text, "that goes with rod.phi is ");
+  assert_non_null (is);
+  assert_int_equal (sscanf (is, "that goes with rod.phi is %lf: expected 0, or %lf to %lf", &value, &low, &high), 3);
+  assert_true (value == inertia && (value < low || value > high));
+  pw_system_free (s);
+}
+
 static void test_extreme (void **state) {
   static const double mass[] = { 1e200, 1e-200 };
   pw_error error = { 0 }, beyond = { 0 };
@@ -307,8 +379,10 @@ static void test_extreme (void **state) {
   pw_system *far = scene_system (&watchdog_cart_table, "phi", 1e308, NULL);
   assert_null (pw_run_open (far, "bdf", NULL, &beyond));
   check_error (&beyond, PW_INPUT,
-               "model scene: values too extreme: bob.phi is initially 1e+308: expected less than 1e+100");
+               "model scene: values too extreme: bob.phi is initially 1e+308: expected a magnitude below 1e+100");
   pw_system_free (far);
+  watchdog_try_inertia (1e98);
+  watchdog_try_inertia (1e-108);
   for (int i = 0; i < 2; i++) {
     pw_error refused = { 0 };
     pw_system *s = scene_named ("n-four-bar", "m", mass[i]);
@@ -335,6 +409,7 @@ int main (void) {
     cmocka_unit_test (test_no_change_point),
     cmocka_unit_test (test_two_crossings),
     cmocka_unit_test (test_fast_disc),
+    cmocka_unit_test (test_failing_signal),
     cmocka_unit_test (test_messages),
     cmocka_unit_test (test_extreme),
   };

@@ -3,7 +3,7 @@
 #include <math.h>
 #include <string.h>
 #include "check.h"
-#include "pinwheel-method.h"
+#include "method.h"
 #include "runs.h"
 #include "scene.h"
 
@@ -135,6 +135,22 @@ static void test_checkpoint (void **state) {
   pw_archive_free (&a);
 }
 
+/* Only while a step is near a singular configuration is there no checkpoint. */
+static void test_after_singular (void **state) {
+  (void)state;
+  pw_error error = { 0 };
+  pw_archive a = { 0 };
+  pw_system *s = own_system (NULL);
+  pw_run *r = runs_open (s, "euler+projection", &own_settings);
+  r->near_singular = 1;
+  assert_int_equal (pw_run_save (r, &a, &error), PW_RETRY);
+  check_ok (pw_run_advance (r, 1, &error), &error);
+  check_ok (pw_run_save (r, &a, &error), &error);
+  pw_archive_free (&a);
+  pw_run_close (r);
+  pw_system_free (s);
+}
+
 static void test_errors (void **state) {
   (void)state;
   pw_system *s = own_system (NULL);
@@ -152,7 +168,7 @@ static void test_errors (void **state) {
 
 int main (void) {
   const struct CMUnitTest tests[] = { cmocka_unit_test (test_stabilisations), cmocka_unit_test (test_breakpoint),
-                                      cmocka_unit_test (test_sample), cmocka_unit_test (test_checkpoint),
-                                      cmocka_unit_test (test_errors) };
+                                      cmocka_unit_test (test_sample),         cmocka_unit_test (test_checkpoint),
+                                      cmocka_unit_test (test_errors),         cmocka_unit_test (test_after_singular) };
   return cmocka_run_group_tests (tests, NULL, NULL);
 }

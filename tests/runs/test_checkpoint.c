@@ -5,6 +5,7 @@
 #include <stdio.h>
 #include <string.h>
 #include "check.h"
+#include "method.h"
 #include "pinwheel-files.h"
 #include "runs.h"
 #include "scene.h"
@@ -347,11 +348,42 @@ static void test_failing (void **state) {
   pw_system_free (s);
 }
 
+/* ---- An arm without inertia, in line with the rod that determines its angle ---- */
+
+static void undetermined_build (pw_model *m, const void *parameters) {
+  (void)parameters;
+  pw_add_body (m, &(pw_body){ .name = "arm", .mass = 1 });
+  pw_add_rod (m,
+              &(pw_rod){ .name = "rod", .body = { "arm", "ground" }, .at = { { 0.5, 0 }, { 0.5, 1 } }, .length = 1 });
+}
+
+/* Matrices cannot be planned again there. */
+static void test_undetermined (void **state) {
+  static const pw_parameter none[] = { { .name = NULL } };
+  static const pw_plugin_table table = {
+    .abi = PW_ABI, .size = sizeof (pw_plugin_table), .parameters = none, .build = undetermined_build
+  };
+  (void)state;
+  pw_error error = { 0 };
+  pw_archive a = { 0 };
+  pw_system *s = scene_system (&table, NULL);
+  pw_run *r = runs_open (s, "rk4", NULL);
+  r->q[0] = 0.5, r->q[1] = -0.5, r->q[2] = PW_PI / 2;
+  assert_int_equal (pw_run_save (r, &a, &error), PW_INPUT);
+  assert_non_null (strstr (error.text, "arm.phi has no inertia, and no constraint determines how it moves"));
+  error.status = PW_OK;
+  assert_int_equal (pw_run_advance (r, 1, &error), PW_RESOURCE);
+  check_error (&error, PW_RESOURCE, "model scene: t = 0 s: the method could not be reopened");
+  pw_archive_free (&a);
+  pw_run_close (r);
+  pw_system_free (s);
+}
+
 int main (void) {
   const struct CMUnitTest tests[] = {
     cmocka_unit_test (test_same),     cmocka_unit_test (test_options), cmocka_unit_test (test_other),
     cmocka_unit_test (test_kicked),   cmocka_unit_test (test_counts),  cmocka_unit_test (test_ledger),
-    cmocka_unit_test (test_negative), cmocka_unit_test (test_failing),
+    cmocka_unit_test (test_negative), cmocka_unit_test (test_failing), cmocka_unit_test (test_undetermined),
   };
   return cmocka_run_group_tests (tests, saved_setup, saved_teardown);
 }
