@@ -66,9 +66,17 @@ static int periodic_open (pw_periodic *x, pw_error *error) {
     return pw_fail (error, PW_INPUT, "model %s has %d coordinates; periodic motions are sought with at most %d",
                     s->model, x->n, PERIODIC_MAX_COORDINATES);
   /* At a time at which no signal is likely to vanish: then the system would have more symmetries. */
-  double signals = pw_system_period (s), period = x->settings.period > 0 ? x->settings.period : signals;
+  const pw_system *first = pw_periodic_system (x, PW_HERE, x->settings.first);
+  if (first == NULL) return *error = x->why, error->status;
+  double period = x->settings.period > 0 ? x->settings.period : pw_system_period (first);
   if (!(period >= 0)) period = 0;
-  x->steady = pw_steady_open_symmetries (s, x->settings.t + 0.317 * period, period > 0 ? period : 1, error);
+  const pw_steady_settings settings = { .t = x->settings.t + 0.317 * period,
+                                        .span = period > 0 ? period : 1,
+                                        .first = x->settings.first,
+                                        .vary = -1,
+                                        .compile = x->settings.compile,
+                                        .context = x->settings.context };
+  x->steady = pw_steady_open_symmetries (s, &settings, error);
   if (x->steady == NULL) return error->status;
   x->symmetries = x->steady->free_symmetries = x->steady->symmetries, x->L = x->steady->L, x->T = x->steady->T;
   const pw_branch_problem problem = { .unknowns = pw_periodic_unknowns (x),

@@ -130,8 +130,8 @@ pw_steady *pw_steady_open (const pw_system *s, const pw_steady_settings *setting
   return steady_open (s, settings, SIGNALS_CONSTANT, error);
 }
 
-pw_steady *pw_steady_open_symmetries (const pw_system *s, double t, double span, pw_error *error) {
-  return steady_open (s, &(pw_steady_settings){ .t = t, .span = span, .vary = -1 }, SIGNALS_OF_TIME, error);
+pw_steady *pw_steady_open_symmetries (const pw_system *s, const pw_steady_settings *settings, pw_error *error) {
+  return steady_open (s, settings, SIGNALS_OF_TIME, error);
 }
 
 void pw_steady_close (pw_steady *x) {

@@ -32,7 +32,7 @@ static int periodic_read_period (pw_periodic_command *cmd, pw_error *error) {
   if (status != PW_OK) return status;
   cmd->settings.periods = (int)periods;
   double common_period = pw_system_period (cmd->m.system);
-  if (cmd->period_text || common_period > 0) return PW_OK;
+  if (cmd->period_text || cmd->vary_text || common_period > 0) return PW_OK;
   if (isnan (common_period))
     return pw_fail (error, PW_INPUT, "%s: the periods of its signals have no common multiple: give --period T",
                     pw_file_name (cmd->m.file));
