@@ -334,7 +334,7 @@ static int sensitivity_loosen (pw_sensitivity *sens, pw_progress *progress, pw_e
 static int sensitivity_estimate_run_error (pw_sensitivity *sens, pw_progress *progress, pw_error *error) {
   if (sens->stopped || pw_cli_adaptive (sens->unknowns.method) == 0) return PW_OK;
   int status = sensitivity_loosen (sens, progress, error);
-  if (status == PW_OK || status == PW_RESOURCE) return status;
+  if (status == PW_OK || status == PW_RESOURCE || status == PW_RETRY) return status;
   for (int i = 0; i < sens->outcomes.outcomes * sens->unknowns.count; i++) sens->loose[i] = NAN;
   pw_cli_say ("pinwheel: errors are unknown: the run with %g times the tolerances fails: %s\n", SENSITIVITY_LOOSE,
               error->text);
@@ -349,7 +349,7 @@ static int sensitivity_compute (pw_sensitivity *sens, pw_error *error) {
   int status = pw_sensitivity_compute (sens, &progress, error);
   for (int i = 0; i < SENSITIVITY_REPEATED && status == PW_OK && sensitivity_improve_steps (sens); i++) {
     status = sensitivity_repeat (sens, &progress, error);
-    if (status == PW_OK || status == PW_RESOURCE) continue;
+    if (status == PW_OK || status == PW_RESOURCE || status == PW_RETRY) continue;
     for (int p = 0; p < sens->unknowns.count; p++) sens->unknowns.list[p].step = sens->unknowns.list[p].last_step;
     *error = (pw_error){ 0 }; /* the model refused a longer step */
     status = sensitivity_repeat (sens, &progress, error);
