@@ -367,6 +367,24 @@ static void test_bad (void **state) {
   cli_bad ("pinwheel linearise n-trailer --hold tractor.speed=1", 2, "--hold needs --steady");
 }
 
+/* A parameter of a model in C need not have a unit. */
+static void test_without_unit (void **state) {
+  (void)state;
+  cli_write ("unitless.c", "#include \"pinwheel.h\"\ntypedef struct { double v; } numbers;\n"
+                           "static const pw_parameter list[] = { { PW_AT (numbers, v), 1 }, { .name = NULL } };\n"
+                           "static void build (pw_model *m, const void *p) {\n"
+                           "  pw_add_body (m, &(pw_body){ .name = \"a\", .mass = 1, .inertia = 1,\n"
+                           "                              .rate = { ((const numbers *)p)->v, 0, 0 } });\n"
+                           "  pw_add_wheel (m, &(pw_wheel){ .name = \"W\", .body = \"a\" });\n"
+                           "}\n"
+                           "PW_MODEL (.about = \"a wheel\", .parameters = list, .parameters_size = sizeof (numbers),\n"
+                           "          .build = build);\n");
+  cli_shell ("pinwheel steady @/unitless.c --vary v=1:2 --starts 0 -o @/unitless");
+  assert_int_equal (strncmp (cli_file ("unitless/steady.csv"), "branch,event,v,growing,", 23), 0);
+  cli_good ("pinwheel sensitivity @/unitless.c --of a.x --by v -t 1");
+  steady_shows ("  v                          1             1  m ");
+}
+
 int main (void) {
   const struct CMUnitTest tests[] = {
     cmocka_unit_test (test_motion),
@@ -386,6 +404,7 @@ int main (void) {
     cmocka_unit_test (test_rest),
     cmocka_unit_test (test_many_symmetries),
     cmocka_unit_test (test_one_body),
+    cmocka_unit_test (test_without_unit),
   };
   return cmocka_run_group_tests (tests, cli_setup, cli_teardown);
 }
