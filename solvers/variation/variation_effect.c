@@ -3,7 +3,6 @@
 #include <math.h>
 #include <string.h>
 #include "util.h"
-#include "rank.h"
 #include "variation_parts.h"
 
 /* Weight of neighbour i in the difference with `step` (which = 0) or twice that. */

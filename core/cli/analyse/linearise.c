@@ -4,7 +4,6 @@
 #include <string.h>
 #include "linearise.h"
 #include "plot.h"
-#include "progress.h"
 #include "report.h"
 #include "states.h"
 

@@ -4,7 +4,6 @@
 #include <string.h>
 #include "figure.h"
 #include "periodic_report.h"
-#include "progress.h"
 #include "report.h"
 #include "util.h"
 

@@ -4,9 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include "figure.h"
-#include "progress.h"
 #include "report.h"
-#include "states.h"
 #include "util.h"
 
 enum { STEADY_STARTS = 30 }; /* default of --starts */
