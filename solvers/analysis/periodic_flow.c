@@ -3,7 +3,6 @@
 #include <stdlib.h>
 #include <string.h>
 #include "periodic_parts.h"
-#include "util.h"
 
 enum {
   FLOW_MULTIPLES = 24, /* of the period of a signal, that are tried as a common period */

@@ -146,11 +146,11 @@ void pw_steady_close (pw_steady *x) {
 }
 
 const char *pw_steady_reason (const pw_steady *x) {
-  return x->why.text;
+  return x ? x->why.text : "";
 }
 
 int pw_steady_symmetries (const pw_steady *x) {
-  return x->symmetries;
+  return x ? x->symmetries : 0;
 }
 
 /* ---- Solutions ---- */
@@ -273,7 +273,8 @@ static int suggest_candidate (const pw_steady *x, int c) {
 }
 
 int pw_steady_suggest (pw_steady *x, pw_initial_value *hold, int most) {
-  int family = steady_family (x), count = 0, held = 0, turns = 0 /* 1: the whole can turn */, anchored = 0;
+  int family = x ? steady_family (x) : PW_INPUT, count = 0, held = 0, turns = 0 /* 1: the whole can turn */,
+      anchored = 0;
   if (family < 0) return family;
   double *basis = calloc ((size_t)family * ((size_t)family + 1) + 1, sizeof *basis);
   if (basis == NULL) return PW_RESOURCE;

@@ -10,7 +10,6 @@
  * to the other of the two sides. */
 #include <math.h>
 #include <string.h>
-#include "util.h"
 #include "variation_parts.h"
 
 enum { JUMP_MANY = 8 }; /* jumps in one step of a run: more are chatter */
