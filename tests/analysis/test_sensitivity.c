@@ -410,6 +410,19 @@ static void test_light_body (void **state) {
   }
 }
 
+/* Outputs that differ after 400 characters have different columns. */
+static void test_long_names (void **state) {
+  char sum[600] = "bob.phi";
+  (void)state;
+  while (strlen (sum) < 400) strcat (sum, "+bob.phi");
+  char command[2000], column[2000];
+  snprintf (command, sizeof command, "pinwheel sensitivity pendulum --of %s --of %s-1 --by m -t 0.1 -o @/sens", sum,
+            sum);
+  cli_good (command);
+  snprintf (column, sizeof column, "t [s],%s,d(%s)/d(m),%s-1,d(%s-1)/d(m)\n", sum, sum, sum, sum);
+  assert_int_equal (strncmp (cli_file ("sens/sensitivity.csv"), column, strlen (column)), 0);
+}
+
 /* Ctrl-C at a certain evaluation, in each part of the computation: it is no failure of that part. */
 static void test_interrupt (void **state) {
   int status = 130, interrupted = 0;
@@ -472,12 +485,15 @@ static void test_refusals (void **state) {
 
 int main (void) {
   const struct CMUnitTest tests[] = {
-    cmocka_unit_test (test_sleigh),    cmocka_unit_test (test_pendulum),    cmocka_unit_test (test_incline),
-    cmocka_unit_test (test_outputs),   cmocka_unit_test (test_pulse),       cmocka_unit_test (test_files),
-    cmocka_unit_test (test_steps),     cmocka_unit_test (test_no_effect),   cmocka_unit_test (test_energies),
-    cmocka_unit_test (test_refusals),  cmocka_unit_test (test_interrupt),   cmocka_unit_test (test_parameters),
-    cmocka_unit_test (test_chaos),     cmocka_unit_test (test_oscillation), cmocka_unit_test (test_jumping_integrals),
-    cmocka_unit_test (test_run_error), cmocka_unit_test (test_light_body),
+    cmocka_unit_test (test_sleigh),      cmocka_unit_test (test_pendulum),
+    cmocka_unit_test (test_incline),     cmocka_unit_test (test_outputs),
+    cmocka_unit_test (test_pulse),       cmocka_unit_test (test_files),
+    cmocka_unit_test (test_steps),       cmocka_unit_test (test_no_effect),
+    cmocka_unit_test (test_energies),    cmocka_unit_test (test_refusals),
+    cmocka_unit_test (test_interrupt),   cmocka_unit_test (test_long_names),
+    cmocka_unit_test (test_parameters),  cmocka_unit_test (test_chaos),
+    cmocka_unit_test (test_oscillation), cmocka_unit_test (test_jumping_integrals),
+    cmocka_unit_test (test_run_error),   cmocka_unit_test (test_light_body),
   };
   return cmocka_run_group_tests (tests, cli_setup, cli_teardown);
 }

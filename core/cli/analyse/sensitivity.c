@@ -10,10 +10,11 @@
 #include "text.h"
 
 enum {
-  SENSITIVITY_DIGITS = 9,  /* of numbers in the text */
-  SENSITIVITY_UNIT = 64,   /* longest unit, its end included */
-  SENSITIVITY_ROWS = 1000, /* of the table, unless --every is given */
-  SENSITIVITY_REPEATED = 5 /* computations with better steps of the differences, at most */
+  SENSITIVITY_DIGITS = 9,   /* of numbers in the text */
+  SENSITIVITY_UNIT = 64,    /* longest unit, its end included */
+  SENSITIVITY_NAME = 10000, /* likewise the name of a column of the table; a formula has 4000 characters at most */
+  SENSITIVITY_ROWS = 1000,  /* of the table, unless --every is given */
+  SENSITIVITY_REPEATED = 5  /* computations with better steps of the differences, at most */
 };
 
 typedef struct {
@@ -150,7 +151,7 @@ static void sensitivity_json (const void *context, pw_json *j) {
 
 /* A header's cell, in quotes if the output contains a comma. */
 static void sensitivity_cell (pw_text *t, const char *name, const char *unit) {
-  char text[400];
+  char text[SENSITIVITY_NAME + SENSITIVITY_UNIT];
   snprintf (text, sizeof text, *unit ? "%s [%s]" : "%s", name, unit);
   (strchr (name, ',') ? pw_text_quoted : pw_text_cell) (t, text);
 }
@@ -158,14 +159,14 @@ static void sensitivity_cell (pw_text *t, const char *name, const char *unit) {
 static int sensitivity_csv (const void *context, FILE *f, pw_error *error) {
   const sensitivity *cmd = context;
   const pw_sensitivity *sens = &cmd->sens;
-  char unit[SENSITIVITY_UNIT], name[300];
+  char unit[SENSITIVITY_UNIT], name[SENSITIVITY_NAME];
   pw_text t = { 0 };
   pw_text_cell (&t, "t [s]");
   for (int o = 0; o < sens->outcomes.outcomes; o++) {
     if (!pw_sensitivity_in_table (sens, o)) continue;
     sensitivity_cell (&t, sens->of[o], pw_outcome_unit (&sens->outcomes, o, unit, sizeof unit));
     for (int p = 0; p < sens->unknowns.count; p++) {
-      snprintf (name, sizeof name, "d(%.140s)/d(%.140s)", sens->of[o], sens->unknowns.list[p].name);
+      snprintf (name, sizeof name, "d(%s)/d(%s)", sens->of[o], sens->unknowns.list[p].name);
       sensitivity_cell (&t, name, sensitivity_unit (sens, o, p, unit));
     }
   }
