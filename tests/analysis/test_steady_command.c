@@ -367,6 +367,20 @@ static void test_bad (void **state) {
   cli_bad ("pinwheel linearise n-trailer --hold tractor.speed=1", 2, "--hold needs --steady");
 }
 
+/* Without stiffness, where the range begins, a body can move; with any, it passes through its equilibrium at that speed,
+ * which is no steady motion.  Rest is one. */
+static void test_more_symmetries (void **state) {
+  (void)state;
+  cli_write ("held.yaml", "pinwheel: 1\nparameters: [{name: k, value: 0}]\n"
+                          "bodies: [{name: bob, mass: 1, inertia: 1, start: {x: 0.3}, rate: {vx: 0.1}}]\nelements:\n"
+                          "  - {spring: s, body: [bob, ground], at: [[0, 0], [-2, 0]], stiffness: k, length: 2}\n");
+  assert_int_equal (cli_run ("pinwheel steady @/held.yaml --hold bob.speed=0.1 --vary k=0:1 --starts 5"), 2);
+  assert_non_null (
+      strstr (cli_err, "held: the equations change with time or along the motion: there is no steady motion\n"));
+  cli_good ("pinwheel steady @/held.yaml --hold bob.speed=0 --hold bob.omega=0 --vary k=0:1 --starts 5");
+  steady_shows ("       2  begins                      1        0                0        0.159155\n");
+}
+
 /* A parameter of a model in C need not have a unit. */
 static void test_without_unit (void **state) {
   (void)state;
@@ -405,6 +419,7 @@ int main (void) {
     cmocka_unit_test (test_many_symmetries),
     cmocka_unit_test (test_one_body),
     cmocka_unit_test (test_without_unit),
+    cmocka_unit_test (test_more_symmetries),
   };
   return cmocka_run_group_tests (tests, cli_setup, cli_teardown);
 }
