@@ -122,8 +122,7 @@ static int periodic_follow (pw_periodic_command *cmd, pw_error *error) {
   pw_periodic_orbit o;
   pw_progress progress = { .title = NULL };
   pw_vary_progress (&cmd->vary, &progress, cmd->settings.first, cmd->settings.first, cmd->settings.last);
-  const int to_last = 1; /* direction */
-  int status = pw_periodic_follow (cmd->search, to_last, error);
+  int status = pw_periodic_follow (cmd->search, 1, error); /* towards the last value */
   while (status == PW_OK && !periodic_is_stopped (cmd)) {
     status = pw_periodic_next (cmd->search, &o, error);
     if (status != PW_OK || o.event == PW_PERIODIC_END) break;
