@@ -66,9 +66,17 @@ static int periodic_open (pw_periodic *x, pw_error *error) {
     return pw_fail (error, PW_INPUT, "model %s has %d coordinates; periodic motions are sought with at most %d",
                     s->model, x->n, PERIODIC_MAX_COORDINATES);
   /* At a time at which no signal is likely to vanish: then the system would have more symmetries. */
-  double signals = pw_system_period (s), period = x->settings.period > 0 ? x->settings.period : signals;
+  const pw_system *first = pw_periodic_system (x, PW_HERE, x->settings.first);
+  if (first == NULL) return *error = x->why, error->status;
+  double period = x->settings.period > 0 ? x->settings.period : pw_system_period (first);
   if (!(period >= 0)) period = 0;
-  x->steady = pw_steady_open_symmetries (s, x->settings.t + 0.317 * period, period > 0 ? period : 1, error);
+  const pw_steady_settings settings = { .t = x->settings.t + 0.317 * period,
+                                        .span = period > 0 ? period : 1,
+                                        .first = x->settings.first,
+                                        .vary = -1,
+                                        .compile = x->settings.compile,
+                                        .context = x->settings.context };
+  x->steady = pw_steady_open_symmetries (s, &settings, error);
   if (x->steady == NULL) return error->status;
   x->symmetries = x->steady->free_symmetries = x->steady->symmetries, x->L = x->steady->L, x->T = x->steady->T;
   const pw_branch_problem problem = { .unknowns = pw_periodic_unknowns (x),
@@ -88,8 +96,9 @@ static int periodic_open (pw_periodic *x, pw_error *error) {
 }
 
 pw_periodic *pw_periodic_open (const pw_system *s, const pw_periodic_settings *settings, pw_error *error) {
-  pw_periodic *x = pw_require (s, "a system", error) == PW_OK ? calloc (1, sizeof *x) : NULL;
-  if (x == NULL) return s ? (pw_fail_memory (s, error), NULL) : NULL;
+  if (pw_require (s, "a system", error) != PW_OK || pw_require (settings, "settings", error) != PW_OK) return NULL;
+  pw_periodic *x = calloc (1, sizeof *x);
+  if (x == NULL) return pw_fail_memory (s, error), NULL;
   x->s = s, x->settings = *settings, x->n = s->coords;
   if (x->settings.method == NULL) x->settings.method = "erk8+projection";
   if (x->settings.rtol <= 0) x->settings.rtol = 1e-12;
@@ -110,11 +119,11 @@ void pw_periodic_close (pw_periodic *x) {
 }
 
 const char *pw_periodic_reason (const pw_periodic *x) {
-  return x->why.text;
+  return x ? x->why.text : "";
 }
 
 int pw_periodic_symmetries (const pw_periodic *x) {
-  return x->symmetries;
+  return x ? x->symmetries : 0;
 }
 
 /* ---- Motions ---- */
@@ -165,6 +174,7 @@ static void periodic_set_unknowns (pw_periodic *x, double parameter) {
 
 int pw_periodic_solve (pw_periodic *x, int settle, double parameter, pw_periodic_orbit *out, pw_error *error) {
   *out = (pw_periodic_orbit){ .residual = INFINITY };
+  if (pw_require (x, "a search", error) != PW_OK) return PW_INPUT;
   if (x->settings.free) x->last_period = x->settings.period > 0 ? x->settings.period : 2 * PW_PI * x->T;
   int status = pw_periodic_settle (x, parameter, settle);
   if (status < 0) return *error = x->why, status;
@@ -180,6 +190,7 @@ int pw_periodic_solve (pw_periodic *x, int settle, double parameter, pw_periodic
 /* ---- Branches ---- */
 
 int pw_periodic_follow (pw_periodic *x, int direction, pw_error *error) {
+  if (pw_require (x, "a search", error) != PW_OK) return PW_INPUT;
   pw_branch *b = &x->branch;
   b->max_change = 1.0 / x->settings.points, b->step = b->max_change / 4, b->min_step = PERIODIC_MIN_STEP;
   b->event_accuracy = PERIODIC_EVENT, b->max_points = PERIODIC_MAX_POINTS * x->settings.points;
@@ -241,6 +252,7 @@ static int periodic_events (void *periodic, pw_error *error) {
 
 int pw_periodic_next (pw_periodic *x, pw_periodic_orbit *out, pw_error *error) {
   *out = (pw_periodic_orbit){ .event = PW_PERIODIC_END };
+  if (pw_require (x, "a search", error) != PW_OK) return PW_INPUT;
   const pw_branch_event *next;
   int status = pw_branch_next (&x->branch, periodic_events, &x->why, &next, error);
   if (next == NULL) return status;

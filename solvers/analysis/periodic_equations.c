@@ -18,7 +18,6 @@
 #include <stdlib.h>
 #include <string.h>
 #include "periodic_parts.h"
-#include "util.h"
 
 /* Speed along the orbit, after removal of symmetries, below which a motion is steady, in units of the scene. */
 static const double EQUATIONS_STEADY = 1e-4;

@@ -3,7 +3,6 @@
 #include <stdlib.h>
 #include <string.h>
 #include "periodic_parts.h"
-#include "util.h"
 
 enum {
   FLOW_MULTIPLES = 24, /* of the period of a signal, that are tried as a common period */
@@ -48,13 +47,13 @@ double pw_system_period (const pw_system *s) {
   return period;
 }
 
-/* Sets the period, unless it is free, to that given or that of the signals, and verifies that they repeat after it; if
- * it is free, that they are constant. */
+/* Sets the period, unless it is free, to that given, that of the signals, or where none of them has one, the last one,
+ * and verifies that they repeat after it; if it is free, that they are constant. */
 static int flow_signals (pw_periodic *x, pw_place place, pw_run *r) {
   double signals = pw_system_period (r->s), period = x->settings.period;
   char name[200];
   int changed, status;
-  if (!x->settings.free && period <= 0) period = x->settings.periods * signals;
+  if (!x->settings.free && period <= 0) period = signals == 0 ? x->last_period : x->settings.periods * signals;
   if (!x->settings.free && !(period > 0))
     return pw_fail (&x->why, PW_INPUT,
                     isnan (signals) ? "model %s: the periods of its signals have no common multiple: a period is needed"
@@ -74,8 +73,7 @@ static int flow_signals (pw_periodic *x, pw_place place, pw_run *r) {
 
 /* ---- Runs ---- */
 
-/* The system at a value of the parameter.  NULL, with x->why, if there is none. */
-static const pw_system *flow_system (pw_periodic *x, pw_place place, double value) {
+const pw_system *pw_periodic_system (pw_periodic *x, pw_place place, double value) {
   if (x->settings.compile == NULL) return x->s;
   if (x->system[place].own && x->system[place].value == value) return x->system[place].own;
   pw_system_free (x->system[place].own);
@@ -94,7 +92,7 @@ pw_run *pw_periodic_run (pw_periodic *x, pw_place place, double value, double rt
                                  .stop = x->settings.stop,
                                  .stop_context = x->settings.stop_context };
   x->why = (pw_error){ 0 };
-  const pw_system *s = flow_system (x, place, value);
+  const pw_system *s = pw_periodic_system (x, place, value);
   pw_run *r = s ? pw_run_open (s, x->settings.method, &settings, &x->why) : NULL;
   int status = r ? PW_OK : x->why.status;
   if (status == PW_OK && x->system[place].period <= 0) status = flow_signals (x, place, r);

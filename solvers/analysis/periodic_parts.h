@@ -22,7 +22,7 @@ struct pw_periodic {
   } system[PW_PLACES];
   pw_branch branch;
   double *u;          /* 2 n, symmetries, 1, 1: state, displacement in a period, free period, parameter; scaled */
-  double last_period; /* the free period last known [s] */
+  double last_period; /* the period of the last motion [s]; also a guess of a free one */
   /* Of the last flow: state at its beginning and end, with accelerations there. */
   double *y0, *y1, *a0, *a1; /* 2 n, 2 n, n, n */
   double *state, *change;    /* 2 n: a state that a run begins with, a change of a state; scratch */
@@ -55,6 +55,8 @@ static inline double pw_periodic_parameter (const pw_periodic *x, const double *
 
 /* ---- periodic_flow.c ---- */
 
+/* The system at a value of the parameter.  NULL, with x->why, if there is none. */
+const pw_system *pw_periodic_system (pw_periodic *x, pw_place place, double value);
 /* Opens a run at a value of the parameter from the consistent state nearest to y (NULL: the initial one), and
  * determines the period of x->system[place].  NULL, with x->why, if it fails. */
 pw_run *pw_periodic_run (pw_periodic *x, pw_place place, double value, double rtol, const double *y);

@@ -4,7 +4,6 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include "rank.h"
 #include "util.h"
 
 enum {
@@ -130,8 +129,8 @@ pw_steady *pw_steady_open (const pw_system *s, const pw_steady_settings *setting
   return steady_open (s, settings, SIGNALS_CONSTANT, error);
 }
 
-pw_steady *pw_steady_open_symmetries (const pw_system *s, double t, double span, pw_error *error) {
-  return steady_open (s, &(pw_steady_settings){ .t = t, .span = span, .vary = -1 }, SIGNALS_OF_TIME, error);
+pw_steady *pw_steady_open_symmetries (const pw_system *s, const pw_steady_settings *settings, pw_error *error) {
+  return steady_open (s, settings, SIGNALS_OF_TIME, error);
 }
 
 void pw_steady_close (pw_steady *x) {
@@ -147,11 +146,11 @@ void pw_steady_close (pw_steady *x) {
 }
 
 const char *pw_steady_reason (const pw_steady *x) {
-  return x->why.text;
+  return x ? x->why.text : "";
 }
 
 int pw_steady_symmetries (const pw_steady *x) {
-  return x->symmetries;
+  return x ? x->symmetries : 0;
 }
 
 /* ---- Solutions ---- */
@@ -274,7 +273,8 @@ static int suggest_candidate (const pw_steady *x, int c) {
 }
 
 int pw_steady_suggest (pw_steady *x, pw_initial_value *hold, int most) {
-  int family = steady_family (x), count = 0, held = 0, turns = 0 /* 1: the whole can turn */, anchored = 0;
+  int family = x ? steady_family (x) : PW_INPUT, count = 0, held = 0, turns = 0 /* 1: the whole can turn */,
+      anchored = 0;
   if (family < 0) return family;
   double *basis = calloc ((size_t)family * ((size_t)family + 1) + 1, sizeof *basis);
   if (basis == NULL) return PW_RESOURCE;

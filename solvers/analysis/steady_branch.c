@@ -1,6 +1,5 @@
 /* Branches of steady motions: points, folds and changes of stability. */
 #include <math.h>
-#include <string.h>
 #include "steady_parts.h"
 #include "util.h"
 

@@ -129,8 +129,8 @@ int pw_signals_change (pw_run *r, double t, double period, double span, int *cha
 
 /* ---- steady.c ---- */
 
-/* Opens only scales and symmetries at time t, for other searches: signals may change with time. */
-pw_steady *pw_steady_open_symmetries (const pw_system *s, double t, double span, pw_error *error);
+/* Opens only scales and symmetries at the first value of the parameter, for other searches: signals may change. */
+pw_steady *pw_steady_open_symmetries (const pw_system *s, const pw_steady_settings *settings, pw_error *error);
 
 /* The motion of the unknowns u, a solution, with its linearisation. */
 int pw_steady_motion_at (pw_steady *x, const double *u, pw_steady_motion *out, pw_error *error);

@@ -7,7 +7,6 @@
 #include <string.h>
 #include "rank.h"
 #include "steady_parts.h"
-#include "util.h"
 
 enum { SYMMETRY_STATES = 2 }; /* more than one, since a body alone has more displacements than equations */
 static const double SYMMETRY_DISTANCE = 0.02,    /* of these states from the initial one, in units of the scene */
@@ -287,5 +286,5 @@ double pw_steady_distance (pw_steady *x, const double *q1, const double *v1, con
 }
 
 int pw_steady_same (pw_steady *x, const double *q1, const double *v1, const double *q2, const double *v2) {
-  return pw_steady_distance (x, q1, v1, q2, v2) <= SYMMETRY_SAME;
+  return x && pw_steady_distance (x, q1, v1, q2, v2) <= SYMMETRY_SAME;
 }

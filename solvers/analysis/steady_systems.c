@@ -1,7 +1,6 @@
 /* The systems and runs of a search for steady motions, at values of the parameter. */
 #include <string.h>
 #include "steady_parts.h"
-#include "util.h"
 
 void pw_steady_close_system (pw_steady *x, pw_place place) {
   pw_linear_close (&x->system[place].linearisation);

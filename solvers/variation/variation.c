@@ -317,6 +317,7 @@ int pw_variation_advance (pw_variation *x, double t, double t_end, pw_error *err
 }
 
 double pw_variation_next_jump (pw_variation *x, double t, double t_end, pw_error *error) {
+  if (pw_require (x, "derivatives", error) != PW_OK) return NAN;
   int status = x->may_jump ? variation_advance_run (x, t, t_end, error) : PW_OK;
   double jump = pw_variation_recorded_jump (x);
   for (int i = 0; i + 1 < x->points && status == PW_OK; i++)

@@ -2,8 +2,6 @@
 #include <float.h>
 #include <math.h>
 #include <string.h>
-#include "util.h"
-#include "rank.h"
 #include "variation_parts.h"
 
 /* Weight of neighbour i in the difference with `step` (which = 0) or twice that. */

@@ -15,7 +15,6 @@
  * has gamma, the real eigenvalue of the inverse of (a_ij), and e_i from there.  With r = |err|/|Y|, (10 r)^(3/2) is
  * about the error of the method, of order h^6 (step_scale_error), as in RADAU5. */
 #include <lapacke.h>
-#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 #include "radau_coefficients.h"

@@ -10,7 +10,6 @@
  * other of the two sides: motions of the neighbouring systems, and of the run's own from a state nearby. */
 #include <math.h>
 #include <string.h>
-#include "util.h"
 #include "variation_parts.h"
 
 enum { JUMP_MANY = 8 }; /* jumps in one step of a run: more are chatter */

@@ -4,7 +4,6 @@
 #include <math.h>
 #include <string.h>
 #include "rank.h"
-#include "util.h"
 #include "variation_parts.h"
 
 /* ---- Energies ---- */

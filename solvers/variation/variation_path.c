@@ -2,7 +2,6 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
-#include "util.h"
 #include "variation_parts.h"
 
 enum { PATH_DEPTH = 6 }; /* of bisection */

@@ -116,11 +116,16 @@ static void test_command (void **state) {
 /* Beyond p.x = 0.3 every run fails. */
 static void test_failing (void **state) {
   (void)state;
-  cli_shell ("pinwheel optimise @/point.yaml --maximise 'p.x + 0*sqrt(0.3 - p.x)' --free a=-2:2 --json @/o.json");
+  cli_shell ("pinwheel optimise @/point.yaml --maximise 'p.x + 0*sqrt(0.3 - p.x)' --free a=-2:2 --json @/o.json "
+             "--plots @/failing");
+  int failed = 0;
+  for (const char *row = cli_file ("failing/optimise.dat"); (row = strstr (row, " nan ")) != NULL; failed++)
+    assert_int_equal (strncmp (row += 5, "0\n", 2), 0);
   const char *json = cli_file ("o.json");
+  assert_int_equal (failed, cli_number (json, "failed", NULL));
   check_close ("a", optimise_value (json, "a"), 0.3, 1e-5, "last steps of 1e-7 of 4, one-sided");
   assert_true (optimise_value (json, "a") <= 0.3 + 1e-12);
-  assert_true (cli_number (json, "failed", NULL) > 0);
+  assert_true (failed > 0);
   assert_non_null (
       strstr (cli_out, "runs failed and count as infeasible, the first of them: p.x + 0*sqrt(0.3 - p.x) is"));
 }

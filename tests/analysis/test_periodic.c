@@ -368,12 +368,31 @@ static void test_refused (void **state) {
   pw_system_free (s);
 }
 
+/* A search that could not be opened is refused. */
+static void test_missing (void **state) {
+  pw_error e[5] = { { 0 } };
+  pw_periodic_orbit o;
+  (void)state;
+  assert_null (pw_periodic_open (NULL, &(pw_periodic_settings){ .period = 1 }, &e[0]));
+  check_error (&e[0], PW_INPUT, "a system is missing");
+  pw_system *s = mathieu_at (NULL, 1, NULL);
+  assert_null (pw_periodic_open (s, NULL, &e[1]));
+  check_error (&e[1], PW_INPUT, "settings is missing");
+  pw_system_free (s);
+  assert_int_equal (pw_periodic_solve (NULL, 0, 0, &o, &e[2]), PW_INPUT);
+  assert_int_equal (pw_periodic_follow (NULL, 1, &e[3]), PW_INPUT);
+  assert_int_equal (pw_periodic_next (NULL, &o, &e[4]), PW_INPUT);
+  for (int i = 2; i < 5; i++) check_error (&e[i], PW_INPUT, "a search is missing");
+  assert_string_equal (pw_periodic_reason (NULL), "");
+  assert_int_equal (pw_periodic_symmetries (NULL), 0);
+}
+
 int main (void) {
   const struct CMUnitTest tests[] = {
     cmocka_unit_test (test_pendulum),   cmocka_unit_test (test_folds),        cmocka_unit_test (test_mathieu),
     cmocka_unit_test (test_boundaries), cmocka_unit_test (test_torus),        cmocka_unit_test (test_van_der_pol),
     cmocka_unit_test (test_gait),       cmocka_unit_test (test_turning_gait), cmocka_unit_test (test_frequency),
-    cmocka_unit_test (test_refused),
+    cmocka_unit_test (test_refused),    cmocka_unit_test (test_missing),
   };
   return cmocka_run_group_tests (tests, NULL, NULL);
 }

@@ -220,6 +220,36 @@ static void test_constraint (void **state) {
   periodic_shows ("  ends                      0.3");
 }
 
+/* Where the drive vanishes, no signal has a period: the branch keeps that of the motion before. */
+static void test_vanishing_drive (void **state) {
+  (void)state;
+  cli_good ("pinwheel periodic @/oscillator.yaml --vary A=0.2:0");
+  periodic_shows ("  ends                        0      7.853982                 0               0             0 ");
+  cli_write ("still.yaml", "pinwheel: 1\nparameters: [{name: A, value: 0}]\n"
+                           "bodies: [{name: rod, mass: 1, inertia: 1}]\nelements:\n"
+                           "  - {pin: O, body: [ground, rod], at: [[0, 0], [0, 0]]}\n"
+                           "  - {rotational-spring: s, body: [rod, ground], stiffness: 3, damping: 1}\n"
+                           "  - {torque: drive, body: [rod, ground], value: {harmonic: {amplitude: A, omega: 1}}}\n");
+  cli_good ("pinwheel periodic @/still.yaml --vary A=1:2");
+  periodic_shows ("  ends                        2      6.283185 ");
+  cli_bad ("pinwheel periodic @/still.yaml --vary A=0:2", 2,
+           "model still: no signal has a known period: a period is needed");
+}
+
+/* Symmetries are those of the range: without the stiffness of the model's own value the body could be anywhere. */
+static void test_symmetries_of_range (void **state) {
+  (void)state;
+  cli_write ("held.yaml", "pinwheel: 1\nparameters: [{name: k, value: 0}]\n"
+                          "bodies: [{name: bob, mass: 1, inertia: 1, start: {x: 0.3}, rate: {vx: 0.1}}]\nelements:\n"
+                          "  - {spring: s, body: [bob, ground], at: [[0, 0], [-2, 0]], stiffness: k, length: 2}\n"
+                          "  - {drag: air, body: bob, linear: 0.5}\n"
+                          "  - {force: drive, body: bob, fx: {harmonic: {amplitude: 1, omega: 2}}}\n");
+  cli_good ("pinwheel periodic @/held.yaml --vary k=0.5:1");
+  periodic_shows ("held: a branch of periodic motions up to 1 symmetry, k from 0.5 to 1, ");
+  periodic_shows ("  begins                    0.5      3.141593                 0 ");
+  periodic_shows ("  ends                        1      3.141593                 0 ");
+}
+
 static void test_limit (void **state) {
   (void)state;
   cli_bad ("pinwheel periodic snakeboard --limit 1e-9 -o @/limit", 4, "--limit 1e-9: stopped; results are incomplete");
@@ -290,11 +320,23 @@ static void test_vanishing (void **state) {
 
 int main (void) {
   const struct CMUnitTest tests[] = {
-    cmocka_unit_test (test_motion),    cmocka_unit_test (test_periods),    cmocka_unit_test (test_free_period),
-    cmocka_unit_test (test_pitchfork), cmocka_unit_test (test_two_events), cmocka_unit_test (test_constraint),
-    cmocka_unit_test (test_branch),    cmocka_unit_test (test_turns),      cmocka_unit_test (test_limit),
-    cmocka_unit_test (test_bad),       cmocka_unit_test (test_domain),     cmocka_unit_test (test_pairs),
-    cmocka_unit_test (test_none),      cmocka_unit_test (test_vanishing),  cmocka_unit_test (test_without_multipliers),
+    cmocka_unit_test (test_motion),
+    cmocka_unit_test (test_periods),
+    cmocka_unit_test (test_free_period),
+    cmocka_unit_test (test_pitchfork),
+    cmocka_unit_test (test_two_events),
+    cmocka_unit_test (test_constraint),
+    cmocka_unit_test (test_branch),
+    cmocka_unit_test (test_turns),
+    cmocka_unit_test (test_limit),
+    cmocka_unit_test (test_bad),
+    cmocka_unit_test (test_domain),
+    cmocka_unit_test (test_pairs),
+    cmocka_unit_test (test_none),
+    cmocka_unit_test (test_vanishing),
+    cmocka_unit_test (test_without_multipliers),
+    cmocka_unit_test (test_vanishing_drive),
+    cmocka_unit_test (test_symmetries_of_range),
   };
   return cmocka_run_group_tests (tests, cli_setup, cli_teardown);
 }

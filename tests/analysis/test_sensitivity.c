@@ -410,6 +410,55 @@ static void test_light_body (void **state) {
   }
 }
 
+/* Outputs that differ after 400 characters have different columns. */
+static void test_long_names (void **state) {
+  char sum[600] = "bob.phi";
+  (void)state;
+  while (strlen (sum) < 400) strcat (sum, "+bob.phi");
+  char command[2000], column[2000];
+  snprintf (command, sizeof command, "pinwheel sensitivity pendulum --of %s --of %s-1 --by m -t 0.1 -o @/sens", sum,
+            sum);
+  cli_good (command);
+  snprintf (column, sizeof column, "t [s],%s,d(%s)/d(m),%s-1,d(%s-1)/d(m)\n", sum, sum, sum, sum);
+  assert_int_equal (strncmp (cli_file ("sens/sensitivity.csv"), column, strlen (column)), 0);
+}
+
+/* Ctrl-C at a certain evaluation, in each part of the computation: it is no failure of that part. */
+static void test_interrupt (void **state) {
+  int status = 130, interrupted = 0;
+  (void)state;
+  cli_write ("stop.c",
+             "#include <signal.h>\n#include <stdlib.h>\n#include \"pinwheel.h\"\n"
+             "typedef struct { double k; } numbers;\n"
+             "static const pw_parameter list[] = { { PW_AT (numbers, k), 1 }, { .name = NULL } };\n"
+             "static long calls;\n"
+             "static int force (void *c, double t, const double *x, double *u, double *g) {\n"
+             "  (void)c, (void)x, (void)g;\n"
+             "  u[0] = t, u[1] = 1, u[2] = 0;\n"
+             "  if (++calls == atol (getenv (\"CALLS\"))) raise (SIGINT);\n"
+             "  return 0;\n"
+             "}\n"
+             "static void build (pw_model *m, const void *p) {\n"
+             "  pw_add_body (m, &(pw_body){ .name = \"a\", .mass = 1, .inertia = 1, .start = { 1, 0, 0 } });\n"
+             "  pw_add_force (m, &(pw_force){ .name = \"F\", .body = \"a\",\n"
+             "    .fx = { PW_FUNCTION, .function = { .eval = force } } });\n"
+             "  pw_add_spring (m, &(pw_spring){ .name = \"s\", .body = { \"a\", \"ground\" },\n"
+             "                                  .stiffness = ((const numbers *)p)->k });\n"
+             "}\n"
+             "PW_MODEL (.about = \"interrupts\", .parameters = list, .parameters_size = sizeof (numbers),\n"
+             "          .run = { .t_end = 20, .method = \"erk5+projection\" }, .build = build);\n");
+  for (int calls = 4000; status == 130; calls += 800) {
+    char command[200];
+    snprintf (command, sizeof command, "CALLS=%d pinwheel sensitivity @/stop.c --of max:a.x --by k", calls);
+    status = cli_run (command);
+    if (status == 130) assert_non_null (strstr (cli_err, "pinwheel: interrupted; results are incomplete\n"));
+    interrupted += status == 130;
+  }
+  assert_int_equal (status, 0); /* it ended before */
+  assert_string_equal (cli_err, "");
+  assert_true (interrupted > 5);
+}
+
 static void test_refusals (void **state) {
   static const cli_wrong each[] = {
     { "pendulum --by l", "--of is missing: expected an output, such as frame.x" },
@@ -441,6 +490,7 @@ int main (void) {
     cmocka_unit_test (test_pulse),       cmocka_unit_test (test_files),
     cmocka_unit_test (test_steps),       cmocka_unit_test (test_no_effect),
     cmocka_unit_test (test_energies),    cmocka_unit_test (test_refusals),
+    cmocka_unit_test (test_interrupt),   cmocka_unit_test (test_long_names),
     cmocka_unit_test (test_parameters),  cmocka_unit_test (test_chaos),
     cmocka_unit_test (test_oscillation), cmocka_unit_test (test_jumping_integrals),
     cmocka_unit_test (test_run_error),   cmocka_unit_test (test_light_body),

@@ -367,6 +367,38 @@ static void test_bad (void **state) {
   cli_bad ("pinwheel linearise n-trailer --hold tractor.speed=1", 2, "--hold needs --steady");
 }
 
+/* Without stiffness, where the range begins, a body can move; with any, it passes through its equilibrium at that speed,
+ * which is no steady motion.  Rest is one. */
+static void test_more_symmetries (void **state) {
+  (void)state;
+  cli_write ("held.yaml", "pinwheel: 1\nparameters: [{name: k, value: 0}]\n"
+                          "bodies: [{name: bob, mass: 1, inertia: 1, start: {x: 0.3}, rate: {vx: 0.1}}]\nelements:\n"
+                          "  - {spring: s, body: [bob, ground], at: [[0, 0], [-2, 0]], stiffness: k, length: 2}\n");
+  assert_int_equal (cli_run ("pinwheel steady @/held.yaml --hold bob.speed=0.1 --vary k=0:1 --starts 5"), 2);
+  assert_non_null (
+      strstr (cli_err, "held: the equations change with time or along the motion: there is no steady motion\n"));
+  cli_good ("pinwheel steady @/held.yaml --hold bob.speed=0 --hold bob.omega=0 --vary k=0:1 --starts 5");
+  steady_shows ("       2  begins                      1        0                0        0.159155\n");
+}
+
+/* A parameter of a model in C need not have a unit. */
+static void test_without_unit (void **state) {
+  (void)state;
+  cli_write ("unitless.c", "#include \"pinwheel.h\"\ntypedef struct { double v; } numbers;\n"
+                           "static const pw_parameter list[] = { { PW_AT (numbers, v), 1 }, { .name = NULL } };\n"
+                           "static void build (pw_model *m, const void *p) {\n"
+                           "  pw_add_body (m, &(pw_body){ .name = \"a\", .mass = 1, .inertia = 1,\n"
+                           "                              .rate = { ((const numbers *)p)->v, 0, 0 } });\n"
+                           "  pw_add_wheel (m, &(pw_wheel){ .name = \"W\", .body = \"a\" });\n"
+                           "}\n"
+                           "PW_MODEL (.about = \"a wheel\", .parameters = list, .parameters_size = sizeof (numbers),\n"
+                           "          .build = build);\n");
+  cli_shell ("pinwheel steady @/unitless.c --vary v=1:2 --starts 0 -o @/unitless");
+  assert_int_equal (strncmp (cli_file ("unitless/steady.csv"), "branch,event,v,growing,", 23), 0);
+  cli_good ("pinwheel sensitivity @/unitless.c --of a.x --by v -t 1");
+  steady_shows ("  v                          1             1  m ");
+}
+
 int main (void) {
   const struct CMUnitTest tests[] = {
     cmocka_unit_test (test_motion),
@@ -386,6 +418,8 @@ int main (void) {
     cmocka_unit_test (test_rest),
     cmocka_unit_test (test_many_symmetries),
     cmocka_unit_test (test_one_body),
+    cmocka_unit_test (test_without_unit),
+    cmocka_unit_test (test_more_symmetries),
   };
   return cmocka_run_group_tests (tests, cli_setup, cli_teardown);
 }

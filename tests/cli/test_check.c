@@ -77,6 +77,25 @@ static void test_start (void **state) {
   assert_true (moved >= 1 && omega != 0);
 }
 
+/* The first 8 of 12 findings, and how many more there are. */
+static void test_many_findings (void **state) {
+  char text[2000];
+  int n = snprintf (text, sizeof text, "pinwheel: 1\nbodies:\n");
+  (void)state;
+  for (int i = 0; i < 12; i++)
+    n += snprintf (text + n, sizeof text - (size_t)n, "  - {name: b%d, mass: 1, inertia: 1, start: {x: 1}}\n", i);
+  n += snprintf (text + n, sizeof text - (size_t)n, "elements:\n");
+  for (int i = 0; i < 12; i++)
+    n += snprintf (text + n, sizeof text - (size_t)n, "  - {pin: p%d, body: [b%d, ground], at: [[0, 0], [0, 0]]}\n", i,
+                   i);
+  cli_write ("many.yaml", text);
+  cli_good ("pinwheel check @/many.yaml");
+  check_shows ("\n12 findings\n");
+  check_shows ("b7.x = 1 m, but the constraints require 0 m\n  and 4 more\n");
+  cli_good ("pinwheel check @/many.yaml --json -");
+  check_shows ("\"and 4 more\"]");
+}
+
 static void test_singular (void **state) {
   (void)state;
   cli_write ("loose.yaml", "pinwheel: 1\nbodies:\n  - {name: a, mass: 1, inertia: 1}\n  - {name: ghost}\n"
@@ -251,12 +270,13 @@ static void test_failing_signal (void **state) {
 
 int main (void) {
   const struct CMUnitTest tests[] = {
-    cmocka_unit_test (test_ezyroller),   cmocka_unit_test (test_pendulum),
-    cmocka_unit_test (test_spring),      cmocka_unit_test (test_redundant),
-    cmocka_unit_test (test_start),       cmocka_unit_test (test_singular),
-    cmocka_unit_test (test_broken_kind), cmocka_unit_test (test_broken_gradient),
-    cmocka_unit_test (test_large),       cmocka_unit_test (test_bad_options),
-    cmocka_unit_test (test_scene),       cmocka_unit_test (test_failing_signal),
+    cmocka_unit_test (test_ezyroller),     cmocka_unit_test (test_pendulum),
+    cmocka_unit_test (test_spring),        cmocka_unit_test (test_redundant),
+    cmocka_unit_test (test_start),         cmocka_unit_test (test_singular),
+    cmocka_unit_test (test_broken_kind),   cmocka_unit_test (test_broken_gradient),
+    cmocka_unit_test (test_large),         cmocka_unit_test (test_bad_options),
+    cmocka_unit_test (test_scene),         cmocka_unit_test (test_failing_signal),
+    cmocka_unit_test (test_many_findings),
   };
   return cmocka_run_group_tests (tests, cli_setup, cli_teardown);
 }

@@ -17,6 +17,7 @@ static void test_bad_lines (void **state) {
     { "run a b", "unexpected argument \"b\"; usage: pinwheel run MODEL [OPTION...]" },
     { "run ezyroler", "there is no model \"ezyroler\"; did you mean \"ezyroller\"?" },
     { "run ezyroller --metod rk4", "run has no option \"--metod\"; did you mean \"--method\"?" },
+    { "page pendulum --atol 1e-9 -o @/p.html", "page has no option \"--atol\"; did you mean \"--rtol\"?" },
     { "run ezyroller --quiet", "run has no option \"--quiet\"; see pinwheel run --help" },
     { "run ezyroller --method", "run: option --method needs a value" },
     { "run ezyroller --step 1e-3 --method rk4 --step 1e-4", "run: option --step is given twice" },

@@ -14,7 +14,6 @@
 #include <gsl/gsl_errno.h>
 #include <gsl/gsl_min.h>
 #include <math.h>
-#include <stdlib.h>
 #include "cli.h"
 #include "outcome.h"
 

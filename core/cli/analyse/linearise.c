@@ -4,7 +4,6 @@
 #include <string.h>
 #include "linearise.h"
 #include "plot.h"
-#include "progress.h"
 #include "report.h"
 #include "states.h"
 
@@ -73,9 +72,8 @@ static int linearise_solve_steady (pw_linearise_command *cmd, pw_steady *steady,
   int n = pw_system_coordinates (cmd->m.system);
   pw_steady_motion m;
   int status = steady ? PW_RETRY : error->status;
-  const double parameter = 0;                                         /* there is none */
   for (int attempt = 0; status == PW_RETRY && attempt < 2; attempt++) /* those after these begin at random states */
-    status = pw_steady_solve (steady, attempt, parameter, &m, error);
+    status = pw_steady_solve (steady, attempt, 0, &m, error);
   if (status == PW_RETRY)
     return pw_fail (error, PW_METHOD,
                     "%s: no steady motion near the initial state: the residual ends at %.2g, in units of the scene; "

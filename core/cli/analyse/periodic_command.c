@@ -4,7 +4,6 @@
 #include <string.h>
 #include "figure.h"
 #include "periodic_report.h"
-#include "progress.h"
 #include "report.h"
 #include "util.h"
 
@@ -32,7 +31,7 @@ static int periodic_read_period (pw_periodic_command *cmd, pw_error *error) {
   if (status != PW_OK) return status;
   cmd->settings.periods = (int)periods;
   double common_period = pw_system_period (cmd->m.system);
-  if (cmd->period_text || common_period > 0) return PW_OK;
+  if (cmd->period_text || cmd->vary_text || common_period > 0) return PW_OK;
   if (isnan (common_period))
     return pw_fail (error, PW_INPUT, "%s: the periods of its signals have no common multiple: give --period T",
                     pw_file_name (cmd->m.file));
@@ -123,8 +122,7 @@ static int periodic_follow (pw_periodic_command *cmd, pw_error *error) {
   pw_periodic_orbit o;
   pw_progress progress = { .title = NULL };
   pw_vary_progress (&cmd->vary, &progress, cmd->settings.first, cmd->settings.first, cmd->settings.last);
-  const int to_last = 1; /* direction */
-  int status = pw_periodic_follow (cmd->search, to_last, error);
+  int status = pw_periodic_follow (cmd->search, 1, error); /* towards the last value */
   while (status == PW_OK && !periodic_is_stopped (cmd)) {
     status = pw_periodic_next (cmd->search, &o, error);
     if (status != PW_OK || o.event == PW_PERIODIC_END) break;

@@ -266,8 +266,7 @@ static int periodic_data (const void *context, FILE *f, pw_error *error) {
   int status = PW_OK;
   if (cmd->vary_text) {
     fputs ("# parameter, displacement [m], largest multiplier, period [s]: stable parts; unstable ones; events; "
-           "multipliers; "
-           "trivial ones\n",
+           "multipliers; trivial ones\n",
            f);
     for (int stable = 1; stable >= 0; stable--) periodic_write_parts (cmd, f, stable);
     for (const pw_periodic_point *p = cmd->point; p < cmd->point + cmd->points; p++)

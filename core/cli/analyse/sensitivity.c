@@ -10,10 +10,11 @@
 #include "text.h"
 
 enum {
-  SENSITIVITY_DIGITS = 9,  /* of numbers in the text */
-  SENSITIVITY_UNIT = 64,   /* longest unit, its end included */
-  SENSITIVITY_ROWS = 1000, /* of the table, unless --every is given */
-  SENSITIVITY_REPEATED = 5 /* computations with better steps of the differences, at most */
+  SENSITIVITY_DIGITS = 9,   /* of numbers in the text */
+  SENSITIVITY_UNIT = 64,    /* longest unit, its end included */
+  SENSITIVITY_NAME = 10000, /* likewise the name of a column of the table; a formula has 4000 characters at most */
+  SENSITIVITY_ROWS = 1000,  /* of the table, unless --every is given */
+  SENSITIVITY_REPEATED = 5  /* computations with better steps of the differences, at most */
 };
 
 typedef struct {
@@ -150,7 +151,7 @@ static void sensitivity_json (const void *context, pw_json *j) {
 
 /* A header's cell, in quotes if the output contains a comma. */
 static void sensitivity_cell (pw_text *t, const char *name, const char *unit) {
-  char text[400];
+  char text[SENSITIVITY_NAME + SENSITIVITY_UNIT];
   snprintf (text, sizeof text, *unit ? "%s [%s]" : "%s", name, unit);
   (strchr (name, ',') ? pw_text_quoted : pw_text_cell) (t, text);
 }
@@ -158,14 +159,14 @@ static void sensitivity_cell (pw_text *t, const char *name, const char *unit) {
 static int sensitivity_csv (const void *context, FILE *f, pw_error *error) {
   const sensitivity *cmd = context;
   const pw_sensitivity *sens = &cmd->sens;
-  char unit[SENSITIVITY_UNIT], name[300];
+  char unit[SENSITIVITY_UNIT], name[SENSITIVITY_NAME];
   pw_text t = { 0 };
   pw_text_cell (&t, "t [s]");
   for (int o = 0; o < sens->outcomes.outcomes; o++) {
     if (!pw_sensitivity_in_table (sens, o)) continue;
     sensitivity_cell (&t, sens->of[o], pw_outcome_unit (&sens->outcomes, o, unit, sizeof unit));
     for (int p = 0; p < sens->unknowns.count; p++) {
-      snprintf (name, sizeof name, "d(%.140s)/d(%.140s)", sens->of[o], sens->unknowns.list[p].name);
+      snprintf (name, sizeof name, "d(%s)/d(%s)", sens->of[o], sens->unknowns.list[p].name);
       sensitivity_cell (&t, name, sensitivity_unit (sens, o, p, unit));
     }
   }
@@ -267,11 +268,10 @@ static int sensitivity_find_unknowns (sensitivity *cmd, pw_error *error) {
 
 static int sensitivity_open (sensitivity *cmd, pw_error *error) {
   pw_sensitivity *sens = &cmd->sens;
-  const double runs = 1;
   int status = pw_cli_open (&cmd->m, &cmd->line, error);
   if (status == PW_OK) status = pw_unknowns_open (&sens->unknowns, &cmd->line, &cmd->m, error);
   if (status != PW_OK) return status;
-  pw_unknowns_engine (&sens->unknowns, runs);
+  pw_unknowns_engine (&sens->unknowns, 1);
   sens->unknowns.settings.specialised = pw_scene_code_table (sens->unknowns.engine.code);
   if (cmd->folder) sens->row_interval = sens->unknowns.t_end / SENSITIVITY_ROWS;
   status = pw_cli_requires ("--every", cmd->every, "-o DIR", cmd->folder != NULL, error);
@@ -334,7 +334,7 @@ static int sensitivity_loosen (pw_sensitivity *sens, pw_progress *progress, pw_e
 static int sensitivity_estimate_run_error (pw_sensitivity *sens, pw_progress *progress, pw_error *error) {
   if (sens->stopped || pw_cli_adaptive (sens->unknowns.method) == 0) return PW_OK;
   int status = sensitivity_loosen (sens, progress, error);
-  if (status == PW_OK || status == PW_RESOURCE) return status;
+  if (status == PW_OK || status == PW_RESOURCE || status == PW_RETRY) return status;
   for (int i = 0; i < sens->outcomes.outcomes * sens->unknowns.count; i++) sens->loose[i] = NAN;
   pw_cli_say ("pinwheel: errors are unknown: the run with %g times the tolerances fails: %s\n", SENSITIVITY_LOOSE,
               error->text);
@@ -349,7 +349,7 @@ static int sensitivity_compute (pw_sensitivity *sens, pw_error *error) {
   int status = pw_sensitivity_compute (sens, &progress, error);
   for (int i = 0; i < SENSITIVITY_REPEATED && status == PW_OK && sensitivity_improve_steps (sens); i++) {
     status = sensitivity_repeat (sens, &progress, error);
-    if (status == PW_OK || status == PW_RESOURCE) continue;
+    if (status == PW_OK || status == PW_RESOURCE || status == PW_RETRY) continue;
     for (int p = 0; p < sens->unknowns.count; p++) sens->unknowns.list[p].step = sens->unknowns.list[p].last_step;
     *error = (pw_error){ 0 }; /* the model refused a longer step */
     status = sensitivity_repeat (sens, &progress, error);

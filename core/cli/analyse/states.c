@@ -1,6 +1,5 @@
 /* States in options and reports of `linearise`, `steady` and `periodic`. */
 #include "states.h"
-#include <string.h>
 #include "print_table.h"
 
 enum { STATES_BODIES = 20 }; /* printed, at most */

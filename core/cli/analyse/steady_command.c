@@ -4,9 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include "figure.h"
-#include "progress.h"
 #include "report.h"
-#include "states.h"
 #include "util.h"
 
 enum { STEADY_STARTS = 30 }; /* default of --starts */
@@ -162,6 +160,10 @@ static int steady_follow (pw_steady_command *cmd, const pw_steady_point *from, i
   while (status == PW_OK && !steady_is_stopped (cmd)) {
     status = pw_steady_next (cmd->search, &m, error);
     if (status != PW_OK || m.event == PW_STEADY_END) break;
+    if (m.event == PW_STEADY_POINT && m.linear->steady == PW_CHANGING) { /* more symmetries where the range begins */
+      cmd->changing++, status = pw_fail (error, PW_METHOD, "the equations change along the motion");
+      break;
+    }
     if (steady_add (cmd, &m, from->attempt, error) == NULL) status = PW_RESOURCE;
     pw_vary_progress (&cmd->vary, &progress, begin, m.parameter,
                       direction == TO_LAST ? cmd->settings.last : cmd->settings.first);

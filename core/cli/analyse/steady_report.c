@@ -1,10 +1,8 @@
 /* The reports of `pinwheel steady`: text, JSON, table and figure. */
 #include "steady_report.h"
 #include <math.h>
-#include <stdlib.h>
 #include "figure.h"
 #include "print_table.h"
-#include "states.h"
 #include "text.h"
 
 enum {

@@ -12,7 +12,7 @@ int pw_unknown_find (pw_unknown *u, const pw_cli_model *m, const char *name, pw_
   snprintf (u->name, sizeof u->name, "%s", name);
   if (u->parameter) {
     u->value = pw_model_parameter (m->model, u->parameter);
-    snprintf (u->unit, sizeof u->unit, "%s", u->parameter->unit);
+    snprintf (u->unit, sizeof u->unit, "%s", u->parameter->unit ? u->parameter->unit : "");
     return PW_OK;
   }
   if (strchr (name, '.') == NULL) {

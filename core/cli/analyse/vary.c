@@ -29,7 +29,7 @@ int pw_vary_read (pw_vary *v, const pw_cli_line *line, const pw_cli_model *m, co
   v->parameter = v->unknown.parameter = pw_cli_parameter (m->model, v->name);
   v->unknowns = (pw_unknowns){ .line = line, .m = m, .list = &v->unknown, .count = 1 };
   if (v->parameter == NULL) return PW_OK;
-  v->unit = v->parameter->unit;
+  v->unit = v->parameter->unit ? v->parameter->unit : "";
   return vary_check (v, text, error);
 }
 

@@ -54,8 +54,8 @@ static int data_read_sigma (const pw_fit *fit, const char *text, fit_sigma *sigm
   if (i == fit->columns) return pw_fail (error, PW_INPUT, "--sigma %.*s: it is not among --columns", length, text);
   if (sigma[i].text) return pw_fail (error, PW_INPUT, "--sigma %.*s is given twice", length, text);
   sigma[i] = (fit_sigma){ value, NAN };
-  if (pw_read_expression (value, &sigma[i].number) == PW_OK && !(sigma[i].number > 0))
-    return pw_fail (error, PW_INPUT, "--sigma %s: expected a number > 0", text);
+  if (pw_read_expression (value, &sigma[i].number) == PW_OK && !(sigma[i].number > 0 && isfinite (sigma[i].number)))
+    return pw_fail (error, PW_INPUT, "--sigma %s: expected a finite number > 0", text);
   return PW_OK;
 }
 

@@ -2,8 +2,6 @@
 #ifndef PW_FIT_H
 #define PW_FIT_H
 
-#include "outcome.h"
-#include "progress.h"
 #include "sensitivity.h"
 
 typedef struct {

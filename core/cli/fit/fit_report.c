@@ -2,7 +2,6 @@
 #include "fit.h"
 #include <gsl/gsl_cdf.h>
 #include <math.h>
-#include <stdlib.h>
 #include "figure.h"
 #include "print_table.h"
 #include "states.h"

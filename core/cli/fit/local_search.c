@@ -5,7 +5,6 @@
 #include <stdlib.h>
 #include <string.h>
 #include "optimise.h"
-#include "util.h"
 
 #define SEARCH_FIRST 0.1    /* first steps from a start, in scaled unknowns */
 #define SEARCH_ROUGH 1e-3   /* last steps, with which refinements begin */

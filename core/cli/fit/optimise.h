@@ -3,8 +3,6 @@
 #define PW_OPTIMISE_H
 
 #include <pthread.h>
-#include "outcome.h"
-#include "progress.h"
 #include "sensitivity.h"
 #include "util.h"
 

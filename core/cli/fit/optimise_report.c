@@ -261,7 +261,7 @@ static int report_data (const void *context, FILE *f, pw_error *error) {
       fprintf (f, "%d", i + 1);
       const double *row = problem->search[i].trials + k * width;
       for (int c = 0; c <= n; c++) fprintf (f, " %s", pw_format (number, row[c], 12));
-      fprintf (f, " %d\n", pw_search_feasible (problem, row + n));
+      fprintf (f, " %d\n", !isnan (row[n]) && pw_search_feasible (problem, row + n));
     }
   return PW_OK;
 }

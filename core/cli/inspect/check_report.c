@@ -330,11 +330,14 @@ static void report_linear (pw_json *j, const pw_check *check) {
 
 static void report_list (pw_json *j, const char *key, const char *one, const pw_check_list *list) {
   int most = (int)(sizeof list->text / sizeof *list->text);
+  char more[40];
+  snprintf (more, sizeof more, "and %d more", list->count - most);
   if (list->count > 0) report_print (j, "\n%d %s\n", list->count, list->count == 1 ? one : key);
   report_section (j, key, '[', NULL);
-  for (int i = 0; i < list->count && i < most; i++) {
-    pw_json_text (j, NULL, list->text[i]);
-    report_print (j, "  %s\n", list->text[i]);
+  for (int i = 0; i < list->count && i <= most; i++) {
+    const char *text = i < most ? list->text[i] : more;
+    pw_json_text (j, NULL, text);
+    report_print (j, "  %s\n", text);
   }
   pw_json_close (j, ']');
 }

@@ -166,8 +166,15 @@ static int page_command (void *options, pw_error *error) {
 }
 
 static const struct poptOption page_options[] = {
-  PW_OPTION_GROUP ("Page"), PW_TEXT_OPTION (page, path, "output", 'o', "FILE.html", "The page to write"),
-  PW_MODEL_OPTIONS, PW_METHOD_OPTIONS, POPT_TABLEEND
+  PW_OPTION_GROUP ("Page"),
+  PW_TEXT_OPTION (page, path, "output", 'o', "FILE.html", "The page to write"),
+  PW_MODEL_OPTIONS,
+  PW_OPTION_GROUP ("Integration"),
+  PW_TEXT_OPTION (pw_cli_line, method, "method", 'm', "METHOD", "rk4, erk5 or erk8, and the stabilisation"),
+  PW_TEXT_OPTION (pw_cli_line, t_end, "t-end", 't', "T", "Final time [s]"),
+  PW_TEXT_OPTION (pw_cli_line, step, "step", 0, "H", "Step size of rk4 [s]"),
+  PW_TEXT_OPTION (pw_cli_line, rtol, "rtol", 0, "R", "Relative tolerance of erk5 and erk8"),
+  POPT_TABLEEND
 };
 
 const pw_command pw_cli_page = {
