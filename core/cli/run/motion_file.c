@@ -179,7 +179,9 @@ static int file_read_sample (file_reader *reader, char *rest, double *sample, in
     if (file_number (reader, cell, &value, error) != PW_OK) return PW_INPUT;
     sample[column->index] = column->factor * value;
   }
-  return PW_OK;
+  if (*rest == 0) return PW_OK;
+  return pw_fail (error, PW_INPUT, "--reference %s: line %ld has more cells than the first line", reader->path,
+                  reader->line_number);
 }
 
 /* Selects as many of the rows as there are samples, evenly spaced and including the last one; times within round-off of
