@@ -167,6 +167,8 @@ static int drift_plan (pw_study *study, pw_error *error) {
         pw_study_read_methods (study, study->methods_text ? study->methods_text : "rk4+all,ida+all,galpha+all", error);
   for (int i = 0; status == PW_OK && i < DRIFT_OPTIONS; i++)
     status = drift_read_values (drift, drift_default_values[i], error);
+  if (status == PW_OK && drift->only_methods && drift->vary)
+    status = pw_fail (error, PW_INPUT, "--vary %s: not with --only-methods", *drift->vary);
   for (const char **v = drift->vary; status == PW_OK && v && *v; v++) status = drift_read_values (drift, *v, error);
   return status == PW_OK ? drift_plan_rows (drift, error) : status;
 }
