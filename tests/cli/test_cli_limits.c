@@ -22,6 +22,11 @@ static void test_max_steps (void **state) {
   assert_true (sscanf (cli_out, "%d", &lines) == 1 && lines == (int)steps + 2); /* header, start, steps */
   assert_int_equal (cli_run ("pinwheel run ezyroller --max-steps 5 --t-end 0.1 --json -"), 0);
   assert_non_null (strstr (cli_err, "--max-steps has no effect: rk4+projection takes "));
+  /* a run that fails by itself fails again when it is resumed */
+  assert_int_equal (cli_run ("pinwheel run n-four-bar -m rk4+none --step 0.01 --max-steps 10 -t 9 --checkpoint @/m.ck"),
+                    4);
+  assert_non_null (strstr (cli_err, "s: the step of 0.01 s is too large"));
+  assert_null (strstr (cli_err, "--resume"));
 }
 
 static void test_limit (void **state) {

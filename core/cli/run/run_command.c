@@ -232,7 +232,8 @@ static int run_integrate (pw_run_cli *command, pw_error *error) {
   pw_progress_end (&command->progress);
   pw_stop_release ();
   const pw_statistics *statistics = pw_run_statistics (command->run);
-  int too_many_steps = status == PW_METHOD && statistics->steps + statistics->rejected >= command->settings.max_steps;
+  int too_many_steps = status == PW_METHOD && pw_cli_adaptive (command->method) == 1 &&
+                       statistics->steps + statistics->rejected >= command->settings.max_steps;
   command->limited = status == PW_STOPPED || too_many_steps;
   if (status == PW_STOPPED) status = pw_limit_status (&command->limit, pw_run_time (command->run), error);
   return status;
