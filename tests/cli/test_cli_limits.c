@@ -153,11 +153,27 @@ static void test_growth (void **state) {
   assert_non_null (strstr (cli_err, "rejected; the motion grows without bound: rotor.omega = "));
 }
 
+/* A signal during the last step interrupts nothing. */
+static void test_last_step (void **state) {
+  (void)state;
+  cli_write ("raise.c", "#include <signal.h>\n#include \"pinwheel.h\"\n"
+                        "static int value (void *c, double t, const double *x, double *u, double *g) {\n"
+                        "  (void)c, (void)x, (void)g;\n  u[0] = u[1] = u[2] = 0;\n"
+                        "  if (t >= 1) raise (SIGTERM);\n  return 0;\n}\n"
+                        "static void build (pw_model *m, const void *p) {\n  (void)p;\n"
+                        "  pw_add_body (m, &(pw_body){ .name = \"a\", .mass = 1, .inertia = 1 });\n"
+                        "  pw_add_torque (m, &(pw_torque){ .name = \"T\", .body = { \"a\", \"ground\" },\n"
+                        "    .value = { PW_FUNCTION, .function = { .eval = value } } });\n}\n"
+                        "PW_MODEL (.about = \"raises a signal\", .build = build);\n");
+  assert_int_equal (cli_run ("pinwheel run @/raise.c --t-end 1 --step 0.1 -o @/raise.csv && wc -l <@/raise.csv"), 0);
+  assert_string_equal (cli_out, "12\n");
+}
+
 int main (void) {
   const struct CMUnitTest tests[] = {
     cmocka_unit_test (test_max_steps), cmocka_unit_test (test_limit),  cmocka_unit_test (test_rows),
     cmocka_unit_test (test_resume),    cmocka_unit_test (test_bad),    cmocka_unit_test (test_rows_of_a_step),
-    cmocka_unit_test (test_lines),     cmocka_unit_test (test_growth),
+    cmocka_unit_test (test_lines),     cmocka_unit_test (test_growth), cmocka_unit_test (test_last_step),
   };
   return cmocka_run_group_tests (tests, cli_setup, cli_teardown);
 }

@@ -231,6 +231,7 @@ static int run_integrate (pw_run_cli *command, pw_error *error) {
   int status = run_steps (command, error);
   pw_progress_end (&command->progress);
   pw_stop_release ();
+  if (status == PW_OK && pw_run_time (command->run) >= command->t_end) pw_stop = 0; /* too late: the run is complete */
   const pw_statistics *statistics = pw_run_statistics (command->run);
   int too_many_steps = status == PW_METHOD && pw_cli_adaptive (command->method) == 1 &&
                        statistics->steps + statistics->rejected >= command->settings.max_steps;
