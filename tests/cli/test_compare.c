@@ -408,6 +408,7 @@ static void test_failure (void **state) {
   assert_string_equal (compare_cell ("f/compare.csv", 0, STATUS), "ok");
   assert_string_equal (compare_cell ("f/compare.csv", 1, STATUS), "refused");
   assert_non_null (strstr (compare_cell ("f/compare.csv", 1, REASON), "round-off allows no less"));
+  assert_string_equal (compare_cell ("f/compare.csv", 1, POSITION), "nan");
   cli_bad ("pinwheel compare ezyroller --methods erk8+projection" ONCE "--t-end 1 --rtol-ladder 1e-15 >@/out1", 4,
            "no method has reached the end; the last error: setting rtol = 1e-15: round-off allows no less than "
            "2.2e-14");

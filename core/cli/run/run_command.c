@@ -7,7 +7,6 @@
 #include <stdlib.h>
 #include <string.h>
 #include "run_command.h"
-#include "figure.h"
 #include "report.h"
 
 #define RUN_SHORT 0.01     /* processor time of a batch [s] below which the next one is longer */

@@ -5,7 +5,6 @@
 #include "cli.h"
 #include "motion.h"
 #include "plot.h"
-#include "progress.h"
 #include "text.h"
 
 typedef struct {

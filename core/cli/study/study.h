@@ -8,7 +8,6 @@
 #include "cli.h"
 #include "figure.h"
 #include "parallel.h"
-#include "progress.h"
 #include "text.h"
 
 enum {
