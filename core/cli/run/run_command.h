@@ -2,7 +2,6 @@
 #ifndef PW_RUN_COMMAND_H
 #define PW_RUN_COMMAND_H
 
-#include "cli.h"
 #include "motion.h"
 #include "plot.h"
 #include "text.h"

@@ -5,7 +5,6 @@
 #define PW_STUDY_H
 
 #include <pthread.h>
-#include "cli.h"
 #include "figure.h"
 #include "parallel.h"
 #include "text.h"
