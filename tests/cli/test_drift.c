@@ -160,6 +160,13 @@ static void test_interrupt (void **state) {
   assert_string_equal (drift_cell ("i/drift.csv.part", "rk4+none", STATUS), "ok");
 }
 
+/* No figure against alpha if it is 0, which a logarithmic axis does not show. */
+static void test_alpha_zero (void **state) {
+  (void)state;
+  cli_good ("pinwheel drift pendulum --t-end 0.1 --step 0.01 --methods rk4 --vary alpha=0 --vary beta=1 --vary every=1 "
+            "-o @/zero && test ! -e @/zero/drift-baumgarte.gp");
+}
+
 /* Rows that have been written are kept, and named. */
 static void test_kept (void **state) {
   (void)state;
@@ -210,7 +217,7 @@ int main (void) {
     cmocka_unit_test (test_growth),    cmocka_unit_test (test_row_is_run), cmocka_unit_test (test_all_of_one),
     cmocka_unit_test (test_options),   cmocka_unit_test (test_times),      cmocka_unit_test (test_failure),
     cmocka_unit_test (test_interrupt), cmocka_unit_test (test_bad),        cmocka_unit_test (test_jobs),
-    cmocka_unit_test (test_kept),
+    cmocka_unit_test (test_kept),      cmocka_unit_test (test_alpha_zero),
   };
   return cmocka_run_group_tests (tests, cli_setup, cli_teardown);
 }

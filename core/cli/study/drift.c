@@ -258,7 +258,7 @@ static int drift_write_times (const pw_study *study, pw_error *error) {
   return pw_cli_close_table (output, status, error);
 }
 
-/* A panel for each quantity that is not always zero, against time, alpha, or the interval between projections. */
+/* A panel for each quantity that is not always zero, against time, alpha > 0, or the interval between projections. */
 static int drift_figures (pw_study *study, pw_error *error) {
   static const char *const name[] = { "drift", "drift-baumgarte", "drift-projection" };
   static const char *const axis[] = { "t [s]", "alpha [1/s]", "steps per projection (every)" };
@@ -267,7 +267,7 @@ static int drift_figures (pw_study *study, pw_error *error) {
     char variables[40] = "quantities = '", heading[160];
     for (int i = 1; i <= DRIFT_QUANTITIES; i++)
       if (pw_study_positive (study, group, i)) sprintf (strchr (variables, 0), "%d ", i);
-    if (variables[strlen (variables) - 1] == '\'') continue;
+    if (variables[strlen (variables) - 1] == '\'' || !pw_study_positive (study, group, 0)) continue;
     strcat (variables, "'\n");
     snprintf (heading, sizeof heading, "%s, largest scaled residuals of position and velocity, energy defect [J]",
               axis[group]);
