@@ -173,6 +173,8 @@ static void test_kept (void **state) {
   assert_int_equal (cli_run ("(ulimit -f 2; pinwheel drift pendulum --t-end 1 --step 0.01 -o @/full)"), 1);
   assert_non_null (strstr (cli_err, "pinwheel: the runs so far are kept in "));
   assert_non_null (cli_file ("full/drift.csv.part"));
+  assert_int_equal (cli_run ("(ulimit -f 20; pinwheel drift pendulum --only-methods --t-end 1 -o @/time)"), 1);
+  assert_non_null (strstr (cli_err, "time/drift-time.csv.part\n"));
 }
 
 static void test_bad (void **state) {
