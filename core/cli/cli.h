@@ -17,7 +17,7 @@ enum { PW_INTERRUPTED = 130, PW_CLOSED_PIPE = 141 };
 
 /* ---- Requests to stop, by a signal or a limit of processor time; commands check them between steps (stop.c) ---- */
 
-extern volatile sig_atomic_t pw_stop; /* number of signals SIGINT or SIGTERM since pw_stop_catch */
+extern volatile sig_atomic_t pw_stop; /* not 0: commands stop; each signal SIGINT or SIGTERM adds 1 */
 
 /* Counts signals from now on.  The first requests a stop after the current step.  The third ends the program, in case
  * that step never ends; the second does not, since some senders signal a program and its group as well. */

@@ -56,12 +56,13 @@ void pw_cli_engine_open (pw_cli_engine *e, const pw_system *s, pw_specialise whe
     engine_open_code (e, s, when);
 }
 
-/* Why runs cannot be in lanes; NULL if they can. */
+/* Why runs cannot be in lanes; NULL if they can.  r: of the initial state, NULL if that is refused. */
 static const char *engine_lanes_obstacle (const pw_cli_engine *e, const pw_system *s, const char *method,
                                           const pw_run *r) {
   if (e->code == NULL) return "the general engine is in use, see --specialise";
   if (pw_cli_adaptive (method) != 0) return "the method controls its step size";
-  if (r == NULL || pw_run_redundant (r) > 0) return "the scene has redundant constraint equations";
+  if (r == NULL) return "the model's own initial state is refused";
+  if (pw_run_redundant (r) > 0) return "the scene has redundant constraint equations";
   return pw_system_has_lanes (s) ? NULL : "the scene has element types of its own, or signals that depend on the state";
 }
 

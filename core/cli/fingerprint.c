@@ -72,8 +72,12 @@ uint64_t pw_fingerprint_tables (uint64_t sum, const pw_model *m) {
 void pw_fingerprint_initial (pw_text *t, const char **starts) {
   for (; starts && *starts; starts++) {
     char name[200];
-    snprintf (name, sizeof name, "%.*s", (int)strcspn (*starts, "="), *starts);
-    pw_fingerprint_line (t, "start", name, *starts + strcspn (*starts, "=") + 1);
+    size_t n = strcspn (*starts, "=");
+    const char **later = starts + 1;
+    while (*later && strncmp (*later, *starts, n + 1) != 0) later++;
+    if (*later) continue;
+    snprintf (name, sizeof name, "%.*s", (int)n, *starts);
+    pw_fingerprint_line (t, "start", name, *starts + n + 1);
   }
 }
 

@@ -20,7 +20,7 @@ int pw_fingerprint_run (pw_text *t, const char *magic, const pw_file *file, uint
                         const pw_settings *s, pw_error *error);
 /* Continues a checksum, 0 at first, with the tables in the signals of a model. */
 uint64_t pw_fingerprint_tables (uint64_t sum, const pw_model *m);
-/* Adds a line for each "STATE=VALUE" of the option --start; the list ends with NULL, or is NULL. */
+/* Adds a line for each state of a list of "STATE=VALUE", its last value; the list ends with NULL, or is NULL. */
 void pw_fingerprint_initial (pw_text *t, const char **starts);
 
 /* ---- Reading ---- */

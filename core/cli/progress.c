@@ -10,6 +10,7 @@
 #define PROGRESS_BAR_INTERVAL 0.1 /* between drawings of the bar [s] */
 #define PROGRESS_LINE_INTERVAL 60 /* between lines without a terminal [s] */
 #define PROGRESS_WIDTH 30         /* characters of a full bar */
+#define PROGRESS_TITLE 16         /* bytes of the title before it, at most */
 
 double pw_seconds (clockid_t id) {
   struct timespec now;
@@ -49,13 +50,14 @@ void pw_progress_at (pw_progress *p, double reached) {
   double fraction = fmin (fmax (reached / p->last, 0), 1);
   char remaining[24], bar[PROGRESS_WIDTH + 1];
   progress_duration ((now - p->start) / (reached - p->first) * (p->last - reached), remaining, sizeof remaining);
-  int full = (int)(fraction * PROGRESS_WIDTH);
+  int full = (int)(fraction * PROGRESS_WIDTH), shown = (int)strnlen (p->title, PROGRESS_TITLE);
+  while (shown > 0 && (p->title[shown] & 0xC0) == 0x80) shown--; /* not in the middle of a character */
   for (int i = 0; i < PROGRESS_WIDTH; i++) bar[i] = i < full ? '#' : '.';
   bar[PROGRESS_WIDTH] = 0;
   if (p->lines)
     fprintf (stderr, "pinwheel: %s: ", p->title);
   else
-    fprintf (stderr, "\r%.16s [%s] ", p->title, bar);
+    fprintf (stderr, "\r%.*s [%s] ", shown, p->title, bar);
   fprintf (stderr, "%*.0f %%  ", p->lines ? 0 : 3, floor (100 * fraction));
   if (strcmp (p->unit, "s") == 0)
     fprintf (stderr, "t = %.4g of %.4g s  ", reached, p->last);

@@ -47,10 +47,10 @@ void pw_cli_print_wrapped (const char *text, int indent, int width) {
   puts (text);
 }
 
-/* 1 if standard output is a pipe that the reader has closed: `pinwheel ... | head`. */
+/* 1 if a write to standard output has failed since it is a pipe that the reader has closed: `pinwheel ... | head`. */
 static int say_pipe_closed (void) {
   struct pollfd out = { .fd = STDOUT_FILENO, .events = POLLOUT };
-  return poll (&out, 1, 0) == 1 && out.revents & POLLERR;
+  return ferror (stdout) && poll (&out, 1, 0) == 1 && out.revents & POLLERR;
 }
 
 const char *pw_cli_status_word (int status) {

@@ -13,10 +13,10 @@ static void stop_on_signal (int number) {
 }
 
 /* Handles SIGINT and SIGTERM; a signal that the program was started to ignore, by nohup or in the background of a
- * script, stays ignored. */
+ * script, stays ignored.  SA_RESTART: a write that waits for the reader of a pipe goes on. */
 static void stop_set (void (*handler) (int)) {
   static const int numbers[] = { SIGINT, SIGTERM };
-  struct sigaction action = { .sa_handler = handler }, before;
+  struct sigaction action = { .sa_handler = handler, .sa_flags = SA_RESTART }, before;
   sigemptyset (&action.sa_mask);
   for (int i = 0; i < 2; i++)
     if (sigaction (numbers[i], NULL, &before) == 0 && before.sa_handler != SIG_IGN)

@@ -3,7 +3,7 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
-#include "pinwheel-files.h"
+#include "cli.h"
 #include "text.h"
 
 void pw_text_clear (pw_text *t) {
@@ -82,8 +82,9 @@ void pw_cli_abandon_table (pw_output *o, long rows, char *part, size_t size) {
 }
 
 int pw_cli_close_table (pw_output *o, int status, pw_error *error) {
-  char part[8];
+  char part[4200];
   if (status == PW_OK) return pw_output_finish (o, error);
   pw_output_abandon (o, part, sizeof part);
+  pw_cli_say ("pinwheel: the table so far is kept in %s\n", part);
   return status;
 }

@@ -2,7 +2,6 @@
 #ifndef PW_TEXT_H
 #define PW_TEXT_H
 
-#include <stdio.h>
 #include "pinwheel-files.h"
 
 /* A string; zero-initialised, it is empty. */
@@ -30,7 +29,7 @@ int pw_text_line (pw_text *t, FILE *f, const char *folder, pw_error *error);
 /* Closes an incomplete table: it remains as NAME.part, whose path goes to the buffer; without rows it is removed, and
  * the path is "". */
 void pw_cli_abandon_table (pw_output *o, long rows, char *part, size_t size);
-/* Closes a table that was written with this status: with PW_OK as NAME, else as NAME.part.  Returns a status. */
+/* Closes a table that was written with this status: with PW_OK as NAME, else as NAME.part, and says so.  A status. */
 int pw_cli_close_table (pw_output *o, int status, pw_error *error);
 
 #endif

@@ -41,6 +41,7 @@ static void test_motion (void **state) {
                "steps of the derivatives: 1e-9 each");
   assert_non_null (cli_file ("one/periodic.dat"));
   assert_non_null (strstr (cli_file ("one/periodic.gp"), "branch = 0\n"));
+  assert_non_null (strstr (cli_file ("one/periodic.gp"), "set ylabel 'imaginary part'"));
 }
 
 /* A vehicle without multipliers but those of symmetries: a figure of its path. */

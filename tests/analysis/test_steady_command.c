@@ -53,6 +53,7 @@ static void test_branch (void **state) {
   assert_int_equal (events, 1);
   assert_non_null (cli_file ("car/steady.dat"));
   assert_non_null (strstr (cli_file ("car/steady.gp"), "label_of_x = 'u [m/s]'"));
+  assert_non_null (strstr (cli_file ("car/steady.gp"), "set ylabel 'imaginary part [1/s]'"));
   assert_true (cli_says (cli_file ("car/steady.json"), "parameter", "u"));
 }
 

@@ -287,6 +287,10 @@ static void test_closed_pipe (void **state) {
   assert_true (cli_says (cli_file ("pipe.json"), "status", "machine"));
   assert_string_equal (cli_out, "0\n");
   assert_string_equal (cli_err, "");
+  /* an error in another file is reported all the same */
+  cli_run ("{ sleep 0.2; pinwheel run pendulum -t 0.1 -o @/none/x.csv; echo $? >@/status; } | true");
+  assert_string_equal (cli_file ("status"), "1\n");
+  assert_non_null (strstr (cli_err, "none/x.csv: No such file or directory\n"));
 }
 
 /* Steps and rejected ones are not mixed up. */

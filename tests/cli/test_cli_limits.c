@@ -22,6 +22,11 @@ static void test_max_steps (void **state) {
   assert_true (sscanf (cli_out, "%d", &lines) == 1 && lines == (int)steps + 2); /* header, start, steps */
   assert_int_equal (cli_run ("pinwheel run ezyroller --max-steps 5 --t-end 0.1 --json -"), 0);
   assert_non_null (strstr (cli_err, "--max-steps has no effect: rk4+projection takes "));
+  /* a run that fails by itself fails again when it is resumed */
+  assert_int_equal (cli_run ("pinwheel run n-four-bar -m rk4+none --step 0.01 --max-steps 10 -t 9 --checkpoint @/m.ck"),
+                    4);
+  assert_non_null (strstr (cli_err, "s: the step of 0.01 s is too large"));
+  assert_null (strstr (cli_err, "--resume"));
 }
 
 static void test_limit (void **state) {
@@ -148,11 +153,27 @@ static void test_growth (void **state) {
   assert_non_null (strstr (cli_err, "rejected; the motion grows without bound: rotor.omega = "));
 }
 
+/* A signal during the last step interrupts nothing. */
+static void test_last_step (void **state) {
+  (void)state;
+  cli_write ("raise.c", "#include <signal.h>\n#include \"pinwheel.h\"\n"
+                        "static int value (void *c, double t, const double *x, double *u, double *g) {\n"
+                        "  (void)c, (void)x, (void)g;\n  u[0] = u[1] = u[2] = 0;\n"
+                        "  if (t >= 1) raise (SIGTERM);\n  return 0;\n}\n"
+                        "static void build (pw_model *m, const void *p) {\n  (void)p;\n"
+                        "  pw_add_body (m, &(pw_body){ .name = \"a\", .mass = 1, .inertia = 1 });\n"
+                        "  pw_add_torque (m, &(pw_torque){ .name = \"T\", .body = { \"a\", \"ground\" },\n"
+                        "    .value = { PW_FUNCTION, .function = { .eval = value } } });\n}\n"
+                        "PW_MODEL (.about = \"raises a signal\", .build = build);\n");
+  assert_int_equal (cli_run ("pinwheel run @/raise.c --t-end 1 --step 0.1 -o @/raise.csv && wc -l <@/raise.csv"), 0);
+  assert_string_equal (cli_out, "12\n");
+}
+
 int main (void) {
   const struct CMUnitTest tests[] = {
     cmocka_unit_test (test_max_steps), cmocka_unit_test (test_limit),  cmocka_unit_test (test_rows),
     cmocka_unit_test (test_resume),    cmocka_unit_test (test_bad),    cmocka_unit_test (test_rows_of_a_step),
-    cmocka_unit_test (test_lines),     cmocka_unit_test (test_growth),
+    cmocka_unit_test (test_lines),     cmocka_unit_test (test_growth), cmocka_unit_test (test_last_step),
   };
   return cmocka_run_group_tests (tests, cli_setup, cli_teardown);
 }

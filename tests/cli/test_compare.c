@@ -408,6 +408,7 @@ static void test_failure (void **state) {
   assert_string_equal (compare_cell ("f/compare.csv", 0, STATUS), "ok");
   assert_string_equal (compare_cell ("f/compare.csv", 1, STATUS), "refused");
   assert_non_null (strstr (compare_cell ("f/compare.csv", 1, REASON), "round-off allows no less"));
+  assert_string_equal (compare_cell ("f/compare.csv", 1, POSITION), "nan");
   cli_bad ("pinwheel compare ezyroller --methods erk8+projection" ONCE "--t-end 1 --rtol-ladder 1e-15 >@/out1", 4,
            "no method has reached the end; the last error: setting rtol = 1e-15: round-off allows no less than "
            "2.2e-14");
@@ -484,6 +485,8 @@ static void test_bad (void **state) {
     { "ezyroller --reference @/twice.csv", "--reference @/twice.csv: columns 2 and 4 are both named \"frame.x\"" },
     { "ezyroller --reference @/back.csv", "--reference @/back.csv: line 3: times must be finite and increase" },
     { "ezyroller --reference @/inf.csv", "--reference @/inf.csv: line 3: times must be finite and increase" },
+    { "ezyroller --reference @/far.csv", "--reference @/far.csv: line 3: \"-inf\" is not finite" },
+    { "ezyroller --reference @/comma.csv", "--reference @/comma.csv: line 2 has more cells than the first line" },
     { "ezyroller --reference @/short.csv --t-end 2",
       "--reference @/short.csv: no row at the final time, t = 2 s; the last one before it is at 1 s" },
   };
@@ -494,6 +497,8 @@ static void test_bad (void **state) {
   cli_write ("twice.csv", "t,frame.x [m],a,frame.x [mm]\n1,0,0,0\n");
   cli_write ("back.csv", "t,frame.x\n1,0\n0.5,0\n");
   cli_write ("inf.csv", "t,frame.x\n1,0\ninf,0\n");
+  cli_write ("far.csv", "\xEF\xBB\xBFt,frame.x\n1,nan\n2,-inf\n"); /* with a byte order mark */
+  cli_write ("comma.csv", "t,frame.x\n1,0,3,14\n");                /* decimal commas */
   cli_write ("short.csv", "t,frame.x\n1,0\n");
   cli_bad_each ("compare", bad, sizeof bad / sizeof *bad);
   cli_write ("file", "");

@@ -160,6 +160,23 @@ static void test_interrupt (void **state) {
   assert_string_equal (drift_cell ("i/drift.csv.part", "rk4+none", STATUS), "ok");
 }
 
+/* No figure against alpha if it is 0, which a logarithmic axis does not show. */
+static void test_alpha_zero (void **state) {
+  (void)state;
+  cli_good ("pinwheel drift pendulum --t-end 0.1 --step 0.01 --methods rk4 --vary alpha=0 --vary beta=1 --vary every=1 "
+            "-o @/zero && test ! -e @/zero/drift-baumgarte.gp");
+}
+
+/* Rows that have been written are kept, and named. */
+static void test_kept (void **state) {
+  (void)state;
+  assert_int_equal (cli_run ("(ulimit -f 2; pinwheel drift pendulum --t-end 1 --step 0.01 -o @/full)"), 1);
+  assert_non_null (strstr (cli_err, "pinwheel: the runs so far are kept in "));
+  assert_non_null (cli_file ("full/drift.csv.part"));
+  assert_int_equal (cli_run ("(ulimit -f 20; pinwheel drift pendulum --only-methods --t-end 1 -o @/time)"), 1);
+  assert_non_null (strstr (cli_err, "time/drift-time.csv.part\n"));
+}
+
 static void test_bad (void **state) {
   (void)state;
   const cli_wrong bad[] = {
@@ -172,6 +189,7 @@ static void test_bad (void **state) {
     { "ezyroller --vary alpha=-1", "--vary alpha=-1: expected a number >= 0" },
     { "ezyroller --vary every=1.5", "--vary every=1.5: expected a whole number >= 1" },
     { "ezyroller --methods rk4 --vary alpha=lin:1:1e6:100000", "400015 runs are too many; vary less" },
+    { "ezyroller --only-methods --vary alpha=1", "--vary alpha=1: not with --only-methods" },
     { "ezyroller --stp 3", "drift has no option \"--stp\"; did you mean \"--step\"?" },
   };
   cli_bad_each ("drift", bad, sizeof bad / sizeof *bad);
@@ -201,6 +219,7 @@ int main (void) {
     cmocka_unit_test (test_growth),    cmocka_unit_test (test_row_is_run), cmocka_unit_test (test_all_of_one),
     cmocka_unit_test (test_options),   cmocka_unit_test (test_times),      cmocka_unit_test (test_failure),
     cmocka_unit_test (test_interrupt), cmocka_unit_test (test_bad),        cmocka_unit_test (test_jobs),
+    cmocka_unit_test (test_kept),      cmocka_unit_test (test_alpha_zero),
   };
   return cmocka_run_group_tests (tests, cli_setup, cli_teardown);
 }

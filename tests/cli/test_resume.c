@@ -83,6 +83,15 @@ static void test_every_step (void **state) {
   }
 }
 
+/* A state given twice has its last value. */
+static void test_start_twice (void **state) {
+  (void)state;
+#define RESUME_TWICE "pinwheel run ezyroller -t 2 -o @/t.csv --start frame.vx=1 --start frame.vx=0.1 "
+  cli_shell (RESUME_TWICE "--checkpoint @/t.ck; mv @/t.csv @/t.csv.part; " RESUME_TWICE "--resume @/t.ck");
+  cli_bad ("mv @/t.csv @/t.csv.part; " RESUME_TWICE "--start frame.vx=2 --resume @/t.ck", 2,
+           "the checkpoint @/t.ck belongs to another run: start frame.vx is 0.1 there and 2 here");
+}
+
 /* ---- What is refused ---- */
 
 #define RESUME_WITH(t_end, every) "run ezyroller --t-end " t_end " --checkpoint-every " every " -o @/b.csv "
@@ -185,10 +194,10 @@ static void test_options (void **state) {
 
 int main (void) {
   const struct CMUnitTest tests[] = {
-    cmocka_unit_test (test_killed),         cmocka_unit_test (test_restarts),   cmocka_unit_test (test_interrupted),
-    cmocka_unit_test (test_other_run),      cmocka_unit_test (test_other_file), cmocka_unit_test (test_damaged),
-    cmocka_unit_test (test_options),        cmocka_unit_test (test_summary),    cmocka_unit_test (test_every_step),
-    cmocka_unit_test (test_short_interval),
+    cmocka_unit_test (test_killed),         cmocka_unit_test (test_restarts),    cmocka_unit_test (test_interrupted),
+    cmocka_unit_test (test_other_run),      cmocka_unit_test (test_other_file),  cmocka_unit_test (test_damaged),
+    cmocka_unit_test (test_options),        cmocka_unit_test (test_summary),     cmocka_unit_test (test_every_step),
+    cmocka_unit_test (test_short_interval), cmocka_unit_test (test_start_twice),
   };
   return cmocka_run_group_tests (tests, cli_setup, cli_teardown);
 }

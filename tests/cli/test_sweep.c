@@ -99,13 +99,21 @@ static void test_cpu (void **state) {
   assert_string_equal (cli_out, "rhs,cpu [s],reason\n");
 }
 
-/* Why runs that are measured or limited one by one have no lanes. */
+/* Why runs that are measured or limited one by one have no lanes, nor those of a scene that cannot run by itself. */
 static void test_no_lanes (void **state) {
   (void)state;
   assert_int_equal (cli_run ("pinwheel sweep ezyroller " GRID " --lanes 4 --cpu -o @/cpu.csv"), 0);
   assert_string_equal (cli_err, "pinwheel: one run after the other: --cpu measures each run\n");
   assert_int_equal (cli_run ("pinwheel sweep ezyroller " GRID " --lanes 4 --limit 60 -o @/cpu.csv"), 0);
   assert_string_equal (cli_err, "pinwheel: one run after the other: --limit stops each run by itself\n");
+  cli_write ("locked.yaml", "pinwheel: 1\nabout: three wheels that lock\nbodies:\n"
+                            "  - {name: b, mass: 1, inertia: 1, rate: {vx: 1}}\nelements:\n"
+                            "  - {wheel: A, body: b, at: [1, 0]}\n  - {wheel: B, body: b, at: [0, 1], heading: 1}\n"
+                            "  - {wheel: C, body: b, at: [-1, 0], heading: 2}\n");
+  assert_int_equal (cli_run ("pinwheel sweep @/locked.yaml --vary b.vx=0,0 --t-end 0.1 --lanes 4 --specialise always "
+                             "-o @/locked.csv"),
+                    0);
+  assert_string_equal (cli_err, "pinwheel: one run after the other: the model's own initial state is refused\n");
 }
 
 /* ---- Compiled systems ---- */

@@ -11,7 +11,7 @@
 #include "cli.h"
 
 /* Starts a run whose standard error is the far end of a new terminal; returns the near end. */
-static int terminal_open (const char *t_end, pid_t *child) {
+static int terminal_open (const char *model, const char *t_end, pid_t *child) {
   const char *program = getenv ("PINWHEEL");
   int near = posix_openpt (O_RDWR | O_NOCTTY);
   if (near < 0 || grantpt (near) != 0 || unlockpt (near) != 0) return -1;
@@ -23,7 +23,7 @@ static int terminal_open (const char *t_end, pid_t *child) {
     dup2 (nothing, STDOUT_FILENO);
     dup2 (far, STDERR_FILENO);
     close (near);
-    execl (program, program, "run", "ezyroller", "--t-end", t_end, (char *)NULL);
+    execl (program, program, "run", model, "--t-end", t_end, (char *)NULL);
     _exit (127);
   }
   close (far);
@@ -44,15 +44,15 @@ static int terminal_read (int near, const char *until, char *text, size_t size, 
 }
 
 /* A bar that says how far it is and how long it will take, and is wiped away before the last message. */
-static void terminal_bar (const char *t_end, const char *of) {
+static void terminal_bar (const char *model, const char *title, const char *t_end, const char *of) {
   char text[20000] = "";
   size_t n = 0;
   pid_t child = -1;
-  int status = 0, near = terminal_open (t_end, &child);
+  int status = 0, near = terminal_open (model, t_end, &child);
   if (near < 0) skip ();
   assert_true (child > 0);
   assert_true (terminal_read (near, " to go\033[K", text, sizeof text, &n));
-  assert_non_null (strstr (text, "\rezyroller ["));
+  assert_non_null (strstr (text, title));
   assert_non_null (strstr (text, of));
   assert_non_null (strstr (text, " %  t = "));
   assert_int_equal (kill (child, SIGINT), 0);
@@ -66,9 +66,14 @@ static void terminal_bar (const char *t_end, const char *of) {
 
 static void test_bar (void **state) {
   (void)state;
-  terminal_bar ("3e4", " of 3e+04 s  ");  /* most of a minute */
-  terminal_bar ("1e7", " of 1e+07 s  ");  /* hours */
-  terminal_bar ("1e12", " of 1e+12 s  "); /* nobody knows */
+  char path[300];
+  terminal_bar ("ezyroller", "\rezyroller [", "3e4", " of 3e+04 s  ");  /* most of a minute */
+  terminal_bar ("ezyroller", "\rezyroller [", "1e7", " of 1e+07 s  ");  /* hours */
+  terminal_bar ("ezyroller", "\rezyroller [", "1e12", " of 1e+12 s  "); /* nobody knows */
+  /* the 16 bytes that are shown would end within the umlaut */
+  cli_write ("fifteen-lettersü.yaml", "pinwheel: 1\nabout: free\nbodies:\n  - {name: b, mass: 1, inertia: 1}\n");
+  cli_expand ("@/fifteen-lettersü.yaml", path, sizeof path);
+  terminal_bar (path, "\rfifteen-letters [", "1e7", " of 1e+07 s  ");
 }
 
 /* A model that never answers: the first two Ctrl-C ask it to stop, the third ends the program. */

@@ -4,6 +4,7 @@
  * table is written to the disk first, so that a resumed run finds at least the rows that the checkpoint counts. */
 #include <math.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 #include "run_command.h"
 #include "fingerprint.h"
@@ -13,20 +14,10 @@ static const char checkpoints_interval_key[] = "checkpoint-every", checkpoints_e
 
 /* ---- Before the run ---- */
 
-/* The interval of the checkpoint that is resumed. */
-static void checkpoints_read_interval (pw_checkpoints *checkpoints) {
-  char text[40];
-  size_t size;
-  const pw_checkpoint *resumed = &checkpoints->resumed;
-  const char *value = pw_fingerprint_value (resumed->text, resumed->head_end, checkpoints_interval_key, &size);
-  if (value == NULL || size >= sizeof text) return;
-  memcpy (text, value, size);
-  text[size] = 0;
-  if (pw_read_number (text, &checkpoints->interval) != PW_OK || !(checkpoints->interval > 0)) checkpoints->interval = 0;
-}
-
 /* Reads the options and the file to be resumed.  Without checkpoints the interval remains 0. */
 static int checkpoints_read_options (pw_checkpoints *checkpoints, double t_end, pw_error *error) {
+  const pw_checkpoint *resumed = &checkpoints->resumed;
+  size_t size;
   checkpoints->next_time = INFINITY;
   if (checkpoints->resume_path && checkpoints->path == NULL) checkpoints->path = checkpoints->resume_path;
   if (checkpoints->path == NULL && checkpoints->interval_text == NULL) return PW_OK;
@@ -36,7 +27,10 @@ static int checkpoints_read_options (pw_checkpoints *checkpoints, double t_end, 
   if (checkpoints->resume_path && pw_checkpoint_read (checkpoints->resume_path, &checkpoints->resumed, error) != PW_OK)
     return error->status;
   checkpoints->interval = t_end / 10;
-  if (checkpoints->resume_path) checkpoints_read_interval (checkpoints);
+  const char *saved = checkpoints->resume_path
+                          ? pw_fingerprint_value (resumed->text, resumed->head_end, checkpoints_interval_key, &size)
+                          : NULL;
+  if (saved) checkpoints->interval = fmax (strtod (saved, NULL), 0); /* up to the end of its line */
   return pw_cli_number ("--checkpoint-every", checkpoints->interval_text, PW_POSITIVE, &checkpoints->interval, error);
 }
 

@@ -1,6 +1,5 @@
 /* Motions: their samples, and the errors of one motion relative to another. */
 #include <math.h>
-#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include "motion.h"

@@ -122,7 +122,7 @@ static int file_read_columns (file_reader *reader, const pw_system *system, pw_e
   reader->column = calloc ((size_t)reader->columns + 1, sizeof *reader->column);
   if (reader->column == NULL || file_list_names (reader, system) != PW_OK)
     return pw_fail (error, PW_RESOURCE, "out of memory");
-  char *rest = reader->line;
+  char *rest = reader->line + (strncmp (reader->line, "\xEF\xBB\xBF", 3) ? 0 : 3); /* without a byte order mark */
   const char *first = file_cell (&rest);
   if (pw_unit_split (first, text, sizeof text) != 1 || *first != 't')
     return pw_fail (error, PW_INPUT, "--reference %s: the first column is \"%.60s\", expected \"t [s]\"", reader->path,
@@ -176,10 +176,14 @@ static int file_read_sample (file_reader *reader, char *rest, double *sample, in
     const char *cell = file_cell (&rest);
     double value;
     if (column->index < 0) continue;
-    if (file_number (reader, cell, &value, error) != PW_OK) return PW_INPUT;
+    if (file_number (reader, cell, &value, error) != PW_OK || isinf (value))
+      return pw_fail (error, PW_INPUT, "--reference %s: line %ld: \"%.60s\" is not finite", reader->path,
+                      reader->line_number, cell);
     sample[column->index] = column->factor * value;
   }
-  return PW_OK;
+  if (*rest == 0) return PW_OK;
+  return pw_fail (error, PW_INPUT, "--reference %s: line %ld has more cells than the first line", reader->path,
+                  reader->line_number);
 }
 
 /* Selects as many of the rows as there are samples, evenly spaced and including the last one; times within round-off of

@@ -1,6 +1,5 @@
 /* Prints tables: a first pass over the rows measures the columns, a second one prints. */
 #include <math.h>
-#include <stdio.h>
 #include <stdlib.h>
 #include "pinwheel-files.h"
 #include "print_table.h"

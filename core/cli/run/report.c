@@ -1,6 +1,5 @@
 /* Prints messages and results of a run: warnings on standard error, results as tables on standard output. */
 #include <math.h>
-#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include "print_table.h"

@@ -7,7 +7,6 @@
 #include <stdlib.h>
 #include <string.h>
 #include "run_command.h"
-#include "figure.h"
 #include "report.h"
 
 #define RUN_SHORT 0.01     /* processor time of a batch [s] below which the next one is longer */
@@ -231,8 +230,10 @@ static int run_integrate (pw_run_cli *command, pw_error *error) {
   int status = run_steps (command, error);
   pw_progress_end (&command->progress);
   pw_stop_release ();
+  if (status == PW_OK && pw_run_time (command->run) >= command->t_end) pw_stop = 0; /* too late: the run is complete */
   const pw_statistics *statistics = pw_run_statistics (command->run);
-  int too_many_steps = status == PW_METHOD && statistics->steps + statistics->rejected >= command->settings.max_steps;
+  int too_many_steps = status == PW_METHOD && pw_cli_adaptive (command->method) == 1 &&
+                       statistics->steps + statistics->rejected >= command->settings.max_steps;
   command->limited = status == PW_STOPPED || too_many_steps;
   if (status == PW_STOPPED) status = pw_limit_status (&command->limit, pw_run_time (command->run), error);
   return status;

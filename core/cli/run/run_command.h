@@ -2,10 +2,8 @@
 #ifndef PW_RUN_COMMAND_H
 #define PW_RUN_COMMAND_H
 
-#include "cli.h"
 #include "motion.h"
 #include "plot.h"
-#include "progress.h"
 #include "text.h"
 
 typedef struct {

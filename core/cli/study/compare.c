@@ -264,9 +264,11 @@ static int compare_measure (pw_study *study, pw_row *row, pw_error *error) {
               pw_format (text, row->t, 4));
   status = pw_study_record_run (study, row, status, &run_error, error);
   row->value[COLUMN_ORDER] = compare_order (compare, row);
-  row->value[COLUMN_POSITION] = row->statistics.position;
-  row->value[COLUMN_VELOCITY] = row->statistics.velocity;
-  row->value[COLUMN_BALANCE] = row->balance;
+  if (row->state != ROW_REFUSED) {
+    row->value[COLUMN_POSITION] = row->statistics.position;
+    row->value[COLUMN_VELOCITY] = row->statistics.velocity;
+    row->value[COLUMN_BALANCE] = row->balance;
+  }
   row->value[COLUMN_CPU] = row->cpu;
   const double *largest = &row->value[COLUMN_ERROR + MOTION_LARGEST];
   const double point[] = { row->level, row->cpu, (double)row->statistics.rhs, largest[MOTION_LENGTH],

@@ -167,6 +167,8 @@ static int drift_plan (pw_study *study, pw_error *error) {
         pw_study_read_methods (study, study->methods_text ? study->methods_text : "rk4+all,ida+all,galpha+all", error);
   for (int i = 0; status == PW_OK && i < DRIFT_OPTIONS; i++)
     status = drift_read_values (drift, drift_default_values[i], error);
+  if (status == PW_OK && drift->only_methods && drift->vary)
+    status = pw_fail (error, PW_INPUT, "--vary %s: not with --only-methods", *drift->vary);
   for (const char **v = drift->vary; status == PW_OK && v && *v; v++) status = drift_read_values (drift, *v, error);
   return status == PW_OK ? drift_plan_rows (drift, error) : status;
 }
@@ -256,7 +258,7 @@ static int drift_write_times (const pw_study *study, pw_error *error) {
   return pw_cli_close_table (output, status, error);
 }
 
-/* A panel for each quantity that is not always zero, against time, alpha, or the interval between projections. */
+/* A panel for each quantity that is not always zero, against time, alpha > 0, or the interval between projections. */
 static int drift_figures (pw_study *study, pw_error *error) {
   static const char *const name[] = { "drift", "drift-baumgarte", "drift-projection" };
   static const char *const axis[] = { "t [s]", "alpha [1/s]", "steps per projection (every)" };
@@ -265,7 +267,7 @@ static int drift_figures (pw_study *study, pw_error *error) {
     char variables[40] = "quantities = '", heading[160];
     for (int i = 1; i <= DRIFT_QUANTITIES; i++)
       if (pw_study_positive (study, group, i)) sprintf (strchr (variables, 0), "%d ", i);
-    if (variables[strlen (variables) - 1] == '\'') continue;
+    if (variables[strlen (variables) - 1] == '\'' || !pw_study_positive (study, group, 0)) continue;
     strcat (variables, "'\n");
     snprintf (heading, sizeof heading, "%s, largest scaled residuals of position and velocity, energy defect [J]",
               axis[group]);

@@ -274,6 +274,7 @@ static int study_finish (pw_study *study, int status, pw_error *error) {
                 *part_path ? ", and kept in " : "", part_path);
     return PW_INTERRUPTED;
   }
+  if (*part_path) pw_cli_say ("pinwheel: the %s so far are kept in %s\n", study->type->row_noun, part_path);
   if (study->csv && status == PW_OK) status = study->type->figures (study, error);
   return status == PW_OK && study->scripts[0] ? pw_figure_draw (study->folder, study->scripts, error) : status;
 }

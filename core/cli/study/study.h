@@ -5,10 +5,8 @@
 #define PW_STUDY_H
 
 #include <pthread.h>
-#include "cli.h"
 #include "figure.h"
 #include "parallel.h"
-#include "progress.h"
 #include "text.h"
 
 enum {

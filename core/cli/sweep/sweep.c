@@ -59,12 +59,10 @@ static int sweep_read_part (pw_sweep *sweep, pw_error *error) {
 }
 
 static int sweep_read_lanes (pw_sweep *sweep, pw_error *error) {
-  static const char *const width[] = { "1", "2", "4", "8", NULL };
-  char hint[PW_HINT];
-  int i = sweep->lanes_text ? pw_find_name (width, sizeof *width, sweep->lanes_text, hint) : -1;
-  if (sweep->lanes_text && i < 0)
-    return pw_fail (error, PW_INPUT, "--lanes %.60s: expected 1, 2, 4 or 8", sweep->lanes_text);
-  sweep->plan.lanes = i < 0 ? 0 : 1 << i;
+  const char *text = sweep->lanes_text;
+  if (text && (strspn (text, "1248") != 1 || text[1]))
+    return pw_fail (error, PW_INPUT, "--lanes %.60s: expected 1, 2, 4 or 8", text);
+  sweep->plan.lanes = text ? *text - '0' : 0;
   return PW_OK;
 }
 

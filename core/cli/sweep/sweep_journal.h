@@ -19,8 +19,7 @@ typedef struct {
 } pw_journal;
 
 /* Opens the journal of the table at `path`, or creates it.  It is truncated at the first incomplete or damaged line.
- * Errors: PW_RESOURCE if it cannot be written, PW_INPUT if it belongs to another sweep or is in use by another
- * process. */
+ * Errors: PW_RESOURCE if it cannot be written or another process has it, PW_INPUT if it belongs to another sweep. */
 int pw_journal_open (pw_journal *journal, const pw_plan *plan, const char *path, pw_error *error);
 /* Appends a row of the grid with the status of its run, 0 to 4 as an exit status.  One thread at a time.  PW_RESOURCE:
  * the journal is unchanged. */

@@ -8,7 +8,6 @@
 #include <stdlib.h>
 #include <string.h>
 #include "parallel.h"
-#include "progress.h"
 #include "sweep_journal.h"
 
 enum { ROWS_LANES = 8 }; /* runs that a thread advances at once, at most: the largest --lanes */

@@ -15,7 +15,7 @@ do for [i = 1:curves] {
     extrema = extrema + (now*sign < 0), sign = now ? now : sign, extrema) name 'one' nooutput
   most_extrema = max(most_extrema, extrema)
 }
-# The part of the run shown in detail: at most 12 extrema.
+# The part of the run shown in detail: at most 12 extrema, but not less than 2 %.
 detail = most_extrema < 30 ? 0 : most_extrema <= 60 ? 0.2 : most_extrema <= 120 ? 0.1 : \
   most_extrema <= 240 ? 0.05 : 0.02
 title = 'angular velocities'.(detail > 0 ? ', and their last part in detail' : '')

@@ -29,7 +29,7 @@ if (logarithmic) {
 }
 unset offsets
 unset xzeroaxis
-# Marks of a method: at most 12, between those of the others; few points all have one.
+# Marks of a method: 10 to 19, between those of the others; few points all have one.
 stats data index 0 using 1 name 'first' nooutput
 step = logarithmic ? 1 : max(1, int(first_records/10))
 do for [form in forms] {

@@ -80,8 +80,8 @@ do for [form in forms] {
   }
   unset key
   set format x '%g'
-  set xlabel 'real panel_height'
-  set ylabel 'imaginary panel_height'
+  set xlabel 'real part'
+  set ylabel 'imaginary part'
   set parametric
   set trange [0:2*pi]
   set cbrange [first:last]

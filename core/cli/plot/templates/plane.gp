@@ -72,7 +72,7 @@ if (panels == 1) {
   py1[1] = py0[1] + max(0.4*panel_width*aspect(1, 0.5, 1.6), 0.6*panel_width*aspect(2, 0.5, 1.1))
   py1[2] = py1[1]
 }}
-# The legend is as panel_width as the first panel.
+# The legend is as wide as the first panel.
 per_row = max(1, int((px1[1] - px0[1])/(32 + letter*label_length)))
 shift = items ? rows(items, per_row) - (top - legend_top) : 0
 do for [i = 1:panels] {

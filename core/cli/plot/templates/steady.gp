@@ -20,7 +20,7 @@ do for [form in forms] {
   eval key(legend_top, 2)
   set xrange [first:last]
   eval bare_x
-  set ylabel 'real panel_height [1/s]'
+  set ylabel 'real part [1/s]'
   set yrange [y_min - margin:y_max + margin]
   eval panel(left, width - right, top, top + panel_height)
   plot data index 0 using 1:2 with lines lw 1.1 dt 1 lc rgb '#004488' title 'stable', \
@@ -37,8 +37,8 @@ do for [form in forms] {
   eval panel(left, width - right, top + panel_height + 10, top + 2*panel_height + 10)
   plot data index 0 using 1:($3 > 1e-12 ? $3 : NaN) with lines lw 1.1 dt 1 lc rgb '#004488' title '', \
        data index 1 using 1:($3 > 1e-12 ? $3 : NaN) with lines lw 1.1 dt (8,5) lc rgb '#cc6677' title ''
-  set xlabel 'real panel_height [1/s]' enhanced
-  set ylabel 'imaginary panel_height [1/s]'
+  set xlabel 'real part [1/s]' enhanced
+  set ylabel 'imaginary part [1/s]'
   set xrange [y_min - margin:y_max + margin]
   set yrange [-1.08*most_imaginary:1.08*most_imaginary]
   set arrow 1 from 0,graph 0 to 0,graph 1 nohead lw 0.5 lc rgb '#999999'
