@@ -368,8 +368,8 @@ static void test_bad (void **state) {
   cli_bad ("pinwheel linearise n-trailer --hold tractor.speed=1", 2, "--hold needs --steady");
 }
 
-/* Without stiffness, where the range begins, a body can move; with any, it passes through its equilibrium at that speed,
- * which is no steady motion.  Rest is one. */
+/* Without stiffness, where the range begins, a body can move at any speed; with stiffness it only passes through its
+ * equilibrium, which is no steady motion.  Rest is one. */
 static void test_more_symmetries (void **state) {
   (void)state;
   cli_write ("held.yaml", "pinwheel: 1\nparameters: [{name: k, value: 0}]\n"
