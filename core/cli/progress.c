@@ -2,6 +2,7 @@
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
+#include <sys/ioctl.h>
 #include <time.h>
 #include <unistd.h>
 #include "progress.h"
@@ -9,7 +10,8 @@
 #define PROGRESS_DELAY 0.5        /* time before the bar appears [s], so that short runs show none */
 #define PROGRESS_BAR_INTERVAL 0.1 /* between drawings of the bar [s] */
 #define PROGRESS_LINE_INTERVAL 60 /* between lines without a terminal [s] */
-#define PROGRESS_WIDTH 30         /* characters of a full bar */
+#define PROGRESS_WIDTH 30         /* characters of a full bar, fewer on a narrow terminal */
+#define PROGRESS_COLUMNS 80       /* of a terminal that does not tell */
 #define PROGRESS_TITLE 16         /* bytes of the title before it, at most */
 
 double pw_seconds (clockid_t id) {
@@ -42,28 +44,37 @@ static void progress_duration (double seconds, char *text, size_t size) {
     snprintf (text, size, "%d:%02d", s / 60, s % 60);
 }
 
+/* Draws the title, a bar that leaves room for `text` in the line, and `text`. */
+static void progress_draw (const pw_progress *p, double fraction, const char *text) {
+  struct winsize size = { .ws_col = 0 };
+  char bar[PROGRESS_WIDTH + 1] = "";
+  int shown = (int)strnlen (p->title, PROGRESS_TITLE);
+  while (shown > 0 && (p->title[shown] & 0xC0) == 0x80) shown--; /* not in the middle of a character */
+  int columns = ioctl (STDERR_FILENO, TIOCGWINSZ, &size) == 0 && size.ws_col > 0 ? size.ws_col : PROGRESS_COLUMNS;
+  int width = columns - shown - (int)strlen (" [] ") - (int)strlen (text) - 1;
+  width = width < 0 ? 0 : width > PROGRESS_WIDTH ? PROGRESS_WIDTH : width;
+  for (int i = 0; i < width; i++) bar[i] = i < (int)(fraction * width) ? '#' : '.';
+  fprintf (stderr, "\r%.*s [%s] %s\033[K", shown, p->title, bar, text);
+}
+
 void pw_progress_at (pw_progress *p, double reached) {
   if (p->title == NULL || (p->no_bar && !p->lines)) return;
   double now = pw_seconds (CLOCK_MONOTONIC);
   if (now < p->next) return;
   p->next = now + (p->lines ? PROGRESS_LINE_INTERVAL : PROGRESS_BAR_INTERVAL);
   double fraction = fmin (fmax (reached / p->last, 0), 1);
-  char remaining[24], bar[PROGRESS_WIDTH + 1];
+  char remaining[24], done[80] = "", text[200];
   progress_duration ((now - p->start) / (reached - p->first) * (p->last - reached), remaining, sizeof remaining);
-  int full = (int)(fraction * PROGRESS_WIDTH), shown = (int)strnlen (p->title, PROGRESS_TITLE);
-  while (shown > 0 && (p->title[shown] & 0xC0) == 0x80) shown--; /* not in the middle of a character */
-  for (int i = 0; i < PROGRESS_WIDTH; i++) bar[i] = i < full ? '#' : '.';
-  bar[PROGRESS_WIDTH] = 0;
-  if (p->lines)
-    fprintf (stderr, "pinwheel: %s: ", p->title);
-  else
-    fprintf (stderr, "\r%.*s [%s] ", shown, p->title, bar);
-  fprintf (stderr, "%*.0f %%  ", p->lines ? 0 : 3, floor (100 * fraction));
   if (strcmp (p->unit, "s") == 0)
-    fprintf (stderr, "t = %.4g of %.4g s  ", reached, p->last);
-  else if (*p->unit)
-    fprintf (stderr, "%.9g of %.9g %s  ", floor (reached), p->last, p->unit);
-  fprintf (stderr, "%s to go%s%s%s", remaining, *p->note ? "  " : "", p->note, p->lines ? "\n" : "\033[K");
+    snprintf (done, sizeof done, "t = %.4g of %.4g s  ", reached, p->last);
+  else if (*p->unit) /* a count may include a part of what is in progress */
+    snprintf (done, sizeof done, "%.9g of %.9g %.40s  ", floor (reached), p->last, p->unit);
+  snprintf (text, sizeof text, "%*.0f %%  %s%s to go%s%s", p->lines ? 0 : 3, floor (100 * fraction), done, remaining,
+            *p->note ? "  " : "", p->note);
+  if (p->lines)
+    fprintf (stderr, "pinwheel: %s: %s\n", p->title, text);
+  else
+    progress_draw (p, fraction, text);
   fflush (stderr);
   p->drawn = !p->lines;
 }

@@ -5,18 +5,23 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/ioctl.h>
 #include <sys/wait.h>
 #include <unistd.h>
 #include "check.h"
 #include "cli.h"
+
+enum { TERMINAL_COLUMNS = 60 };
 
 /* Starts a run whose standard error is the far end of a new terminal; returns the near end. */
 static int terminal_open (const char *model, const char *t_end, pid_t *child) {
   const char *program = getenv ("PINWHEEL");
   int near = posix_openpt (O_RDWR | O_NOCTTY);
   if (near < 0 || grantpt (near) != 0 || unlockpt (near) != 0) return -1;
+  const struct winsize size = { .ws_row = 24, .ws_col = TERMINAL_COLUMNS };
   int far = open (ptsname (near), O_RDWR | O_NOCTTY), nothing = open ("/dev/null", O_RDWR);
   if (program == NULL) program = "build/pinwheel";
+  if (ioctl (near, TIOCSWINSZ, &size) != 0) return -1;
   *child = fork ();
   if (*child == 0) {
     dup2 (nothing, STDIN_FILENO);
@@ -55,6 +60,8 @@ static void terminal_bar (const char *model, const char *title, const char *t_en
   assert_non_null (strstr (text, title));
   assert_non_null (strstr (text, of));
   assert_non_null (strstr (text, " %  t = "));
+  const char *bar = strstr (text, title);
+  check_below ("columns", (double)(strstr (bar, "\033[K") - bar - 1), TERMINAL_COLUMNS, "one line of the terminal");
   assert_int_equal (kill (child, SIGINT), 0);
   terminal_read (near, NULL, text, sizeof text, &n);
   close (near);
