@@ -405,6 +405,7 @@ static void test_breakpoints (void **state) {
     { "exp(t) - exp(t + 1) < 1", 709.782712893384, 0 },
     { "0*exp(t) < 1", 709.782712893384, 0 },
     { "exp(t)/exp(t) > 0", 709.782712893384, 0 },
+    { "abs(exp(t)/(exp(t) - 2)) >= -1", 709.782712893384, 0 },
     { "sin(acos(frame.phi)) < 2", 0, 0 },
     /* poles */
     { "tanh(1/(t - 1))", 1, 0 },

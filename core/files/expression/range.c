@@ -65,12 +65,12 @@ static pw_range range_multiply (const pw_range *x, const pw_range *y) {
   return r;
 }
 
-/* 0/0 is NaN. */
+/* 0/0 and inf/inf are NaN. */
 static pw_range range_divide (const pw_range *x, const pw_range *y) {
   if (!range_contains (y, 0)) return range_corners (range_quotient, x, y);
   pw_range r = range_pole;
   r.breaks = y->lo < y->hi;
-  r.nan = range_contains (x, 0);
+  r.nan = range_contains (x, 0) || (range_unbounded (x) && range_unbounded (y));
   return r;
 }
 
@@ -125,11 +125,11 @@ static pw_range range_one_argument (const pw_expression_function *f, const pw_ra
   return r;
 }
 
-/* An integer power; an even one has its minimum at 0. */
+/* An integer power.  n < 0: a pole at 0, where an odd power jumps; n >= 0: an even power has its minimum at 0. */
 static pw_range range_integer_power (const pw_range *x, double n) {
   const pw_range exponent = range_constant (n);
   int even = fmod (n, 2) == 0;
-  if (n < 0 && range_contains (x, 0)) return even ? range_between (-INFINITY, INFINITY) : range_pole;
+  if (n < 0 && range_contains (x, 0)) return even ? range_between (0, INFINITY) : range_pole;
   pw_range base = even ? range_abs (x) : *x;
   if (even) base.lo = fmax (0, base.lo);
   return range_corners (pow, &base, &exponent);
@@ -137,7 +137,11 @@ static pw_range range_integer_power (const pw_range *x, double n) {
 
 /* Powers of negative numbers are NaN unless the exponent is an integer.  Infinite powers jump at -1 and 1. */
 static pw_range range_power (const pw_range *x, const pw_range *y) {
-  if (isinf (y->lo) || isinf (y->hi)) return (pw_range){ .lo = 0, .hi = INFINITY, .breaks = 1, .nan = 1 };
+  if (isinf (y->lo) || isinf (y->hi)) {
+    pw_range r = range_between (x->lo < 0 ? -INFINITY : 0, INFINITY);
+    r.breaks = r.nan = 1;
+    return r;
+  }
   if (y->lo == y->hi && y->lo == rint (y->lo)) return range_integer_power (x, y->lo);
   if (x->lo < 0 && y->lo < y->hi) return range_all;
   if (x->hi < 0) return range_nan;
