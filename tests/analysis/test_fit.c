@@ -89,6 +89,15 @@ static void test_exact (void **state) {
   }
 }
 
+/* A search that begins at the answer, with residuals of round-off, has found it. */
+static void test_at_the_answer (void **state) {
+  (void)state;
+  cli_shell ("pinwheel run car -o @/drive.csv --every 0.5");
+  cli_shell ("pinwheel fit car --data @/drive.csv --columns car.x,car.y --sigma car.x=0.02 --sigma car.y=0.02 "
+             "--free a --free car.vx --json @/fit.json");
+  check_close ("a", fit_value (cli_file ("fit.json"), "a", "value"), 1.2, 1e-12, "round-off");
+}
+
 /* States and contact points have derivatives by the variational equations, methods with held inputs have not. */
 static void test_derivatives (void **state) {
   static const char *const columns[] = { "frame.y", "A.x", "frame.y" }, *const method[] = { "rk4", "rk4",
@@ -347,11 +356,13 @@ static void test_interrupt (void **state) {
 
 int main (void) {
   const struct CMUnitTest tests[] = {
-    cmocka_unit_test (test_exact),    cmocka_unit_test (test_derivatives), cmocka_unit_test (test_errors),
-    cmocka_unit_test (test_coverage), cmocka_unit_test (test_unweighted),  cmocka_unit_test (test_undetermined),
-    cmocka_unit_test (test_failing),  cmocka_unit_test (test_bound),       cmocka_unit_test (test_bad),
-    cmocka_unit_test (test_starts),   cmocka_unit_test (test_interrupt),   cmocka_unit_test (test_changed_values),
-    cmocka_unit_test (test_engine),
+    cmocka_unit_test (test_exact),          cmocka_unit_test (test_at_the_answer),
+    cmocka_unit_test (test_derivatives),    cmocka_unit_test (test_errors),
+    cmocka_unit_test (test_coverage),       cmocka_unit_test (test_unweighted),
+    cmocka_unit_test (test_undetermined),   cmocka_unit_test (test_failing),
+    cmocka_unit_test (test_bound),          cmocka_unit_test (test_bad),
+    cmocka_unit_test (test_starts),         cmocka_unit_test (test_interrupt),
+    cmocka_unit_test (test_changed_values), cmocka_unit_test (test_engine),
   };
   return cmocka_run_group_tests (tests, fit_setup, cli_teardown);
 }

@@ -72,7 +72,7 @@ static void test_degrees (void **state) {
   assert_non_null (strstr (cli_err, "pinwheel: body skate: initial phi = 30 rad is more than a turn"));
   assert_non_null (strstr (cli_err,
                            "pinwheel: wheel W: heading = -90 rad is more than a turn and ends at -116.6 degrees; "
-                           "degrees are written -90*deg\n"));
+                           "if degrees are meant, write \"*deg\" after the number\n"));
   assert_non_null (strstr (cli_err, "pinwheel: steered-wheel S: heading = 45 rad is more than a turn"));
 }
 

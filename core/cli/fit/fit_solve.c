@@ -19,6 +19,7 @@
 #define SOLVE_RANK 1e-6       /* smallest singular value of the scaled Jacobian, relative to the largest one */
 #define SOLVE_EFFECT 1e-9     /* smallest effect of an unknown, relative to the largest one */
 #define SOLVE_EXACT 1e-8      /* norm of the residuals of an exact fit, relative to the initial one */
+#define SOLVE_ROUND_OFF 1e-12 /* the same, relative to the data: round-off of a run */
 #define SOLVE_TOLERANCE 1e-10 /* of GSL: relative step in u, and gradient */
 enum { SOLVE_ITERATIONS = 100 /* of a search, at most */ };
 
@@ -223,6 +224,14 @@ static void solve_scale (pw_fit *fit, gsl_matrix *J) {
   }
 }
 
+/* The norm of the data in units of their standard deviations. */
+static double solve_data_norm (const pw_fit *fit) {
+  double sum = 0;
+  for (int i = 0; i < fit->columns * fit->rows; i++)
+    if (!isnan (fit->data[i])) sum += fit->data[i] / fit->sigma[i] * (fit->data[i] / fit->sigma[i]);
+  return sqrt (sum);
+}
+
 /* At a minimum the residuals are very small or orthogonal to the columns of J, which have length 1; unknowns at a bound
  * do not count. */
 static int solve_converged (const pw_fit *fit, const gsl_matrix *J) {
@@ -236,7 +245,8 @@ static int solve_converged (const pw_fit *fit, const gsl_matrix *J) {
         dot += gsl_matrix_get (J, (size_t)k++, (size_t)j) * (fit->fitted[i] - fit->data[i]) / fit->sigma[i];
     worst = fmax (worst, fabs (dot));
   }
-  return worst <= cosine * norm || norm < SOLVE_EXACT * sqrt (fit->initial_chi2);
+  return worst <= cosine * norm ||
+         norm < fmax (SOLVE_EXACT * sqrt (fit->initial_chi2), SOLVE_ROUND_OFF * solve_data_norm (fit));
 }
 
 /* J D^-1 = U S V^T, where D has the lengths of the columns of J: the covariance of the unknowns is

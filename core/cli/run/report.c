@@ -61,8 +61,9 @@ static void report_angle (const char *kind, const char *name, const char *field,
   if (!(fabs (angle) > 2 * PW_PI)) return;
   pw_format (value, angle, 6);
   pw_format (degrees, fmod (angle * 180 / PW_PI, 360), 4);
-  pw_cli_say ("pinwheel: %s %s: %s = %s rad is more than a turn and ends at %s degrees; degrees are written %s*deg\n",
-              kind, name, field, value, degrees, value);
+  pw_cli_say ("pinwheel: %s %s: %s = %s rad is more than a turn and ends at %s degrees; if degrees are meant, write "
+              "\"*deg\" after the number\n",
+              kind, name, field, value, degrees);
 }
 
 /* Expressions that may jump when states change; steps do not end at such jumps. */
