@@ -41,24 +41,6 @@ void pw_motion_add (pw_motion *motion, const pw_system *system, const pw_sample 
   if (rows) memcpy (values + 2 * n, sample->lambda, rows * sizeof *values);
 }
 
-/* The model's own reference solution; multipliers are not known. */
-static int motion_of_model (pw_motion *motion, const pw_cli_model *compiled, double t_end, pw_error *error) {
-  const pw_system *system = compiled->system;
-  int n = pw_system_coordinates (system), status = pw_motion_open (motion, system, MOTION_SAMPLES, t_end, error);
-  for (int k = 0; k < motion->samples && status == PW_OK; k++) {
-    double *state = pw_motion_at (motion, k);
-    for (int j = 2 * n; j < motion->width; j++) state[j] = NAN;
-    status = pw_system_reference (compiled->model, system, motion->t[k], state, state + n, error);
-  }
-  return status;
-}
-
-int pw_motion_open_reference (pw_motion *motion, const pw_cli_model *compiled, const char *path, double *t_end,
-                              pw_error *error) {
-  return path ? pw_motion_read (motion, compiled->system, path, t_end, error)
-              : motion_of_model (motion, compiled, *t_end, error);
-}
-
 int pw_motion_unit (const pw_system *system, int state) {
   int rate = state >= pw_system_coordinates (system);
   int angle = strncmp (pw_system_state_unit (system, state), "rad", 3) == 0;

@@ -1,4 +1,5 @@
-/* Reads a reference from a file: a table with the columns of `pinwheel run -o`, some of which may be missing. */
+/* References: of the model, or from a file, a table with the columns of `pinwheel run -o`, some of which may be
+ * missing. */
 #include <errno.h>
 #include <math.h>
 #include <stdlib.h>
@@ -231,4 +232,24 @@ int pw_motion_read (pw_motion *motion, const pw_system *system, const char *path
   pw_names_close (&reader.indices);
   pw_arena_free (&reader.names);
   return status;
+}
+
+/* ---- Opening ---- */
+
+/* The model's own reference solution; multipliers are not known. */
+static int motion_of_model (pw_motion *motion, const pw_cli_model *compiled, double t_end, pw_error *error) {
+  const pw_system *system = compiled->system;
+  int n = pw_system_coordinates (system), status = pw_motion_open (motion, system, MOTION_SAMPLES, t_end, error);
+  for (int k = 0; k < motion->samples && status == PW_OK; k++) {
+    double *state = pw_motion_at (motion, k);
+    for (int j = 2 * n; j < motion->width; j++) state[j] = NAN;
+    status = pw_system_reference (compiled->model, system, motion->t[k], state, state + n, error);
+  }
+  return status;
+}
+
+int pw_motion_open_reference (pw_motion *motion, const pw_cli_model *compiled, const char *path, double *t_end,
+                              pw_error *error) {
+  return path ? pw_motion_read (motion, compiled->system, path, t_end, error)
+              : motion_of_model (motion, compiled, *t_end, error);
 }

@@ -1,17 +1,10 @@
-/* Reads files up to a limit of their size, for models, tables and checkpoints; joins paths. */
+/* Reads files up to a limit of their size, for models, tables and checkpoints. */
 #include <errno.h>
 #include <stdlib.h>
 #include <string.h>
 #include "files.h"
 
 enum { READ_CHUNK = 1 << 16 }; /* bytes */
-
-char *pw_path_join (const char *folder, const char *name, const char *ending) {
-  size_t size = strlen (folder) + strlen (name) + strlen (ending) + 2;
-  char *path = malloc (size);
-  if (path) snprintf (path, size, "%s/%s%s", folder, name, ending);
-  return path;
-}
 
 int pw_read_rest (FILE *f, size_t max_bytes, const char *path, const char *limit, char **text, size_t *size,
                   pw_error *error) {
