@@ -425,7 +425,7 @@ static void test_long_names (void **state) {
 
 /* Ctrl-C at a certain evaluation, in each part of the computation: it is no failure of that part. */
 static void test_interrupt (void **state) {
-  int status = 130, interrupted = 0;
+  int status = 130, interrupted = 0, without_errors = 0;
   (void)state;
   cli_write ("stop.c",
              "#include <signal.h>\n#include <stdlib.h>\n#include \"pinwheel.h\"\n"
@@ -453,10 +453,11 @@ static void test_interrupt (void **state) {
     status = cli_run (command);
     if (status == 130) assert_non_null (strstr (cli_err, "pinwheel: interrupted; results are incomplete\n"));
     interrupted += status == 130;
+    if (status == 130 && strstr (cli_out, "max:a.x = ")) without_errors++; /* in the run that estimates them */
   }
   assert_int_equal (status, 0); /* it ended before */
   assert_string_equal (cli_err, "");
-  assert_true (interrupted > 5);
+  assert_true (interrupted > 5 && without_errors > 0);
 }
 
 static void test_refusals (void **state) {

@@ -73,7 +73,7 @@ static int linearise_solve_steady (pw_linearise_command *cmd, pw_steady *steady,
   pw_steady_motion m;
   int status = steady ? PW_RETRY : error->status;
   for (int attempt = 0; status == PW_RETRY && attempt < 2; attempt++) /* those after these begin at random states */
-    status = pw_steady_solve (steady, attempt, 0, &m, error);
+    status = pw_steady_solve (steady, attempt, 0 /* no parameter */, &m, error);
   if (status == PW_RETRY)
     return pw_fail (error, PW_METHOD,
                     "%s: no steady motion near the initial state: the residual ends at %.2g, in units of the scene; "

@@ -311,21 +311,21 @@ static int sensitivity_repeat (pw_sensitivity *sens, pw_progress *progress, pw_e
 /* Factor of the tolerances with which the derivatives of a run that controls its error are repeated. */
 #define SENSITIVITY_LOOSE 10.0
 
-/* Computes the derivatives with larger tolerances. */
+/* Computes the derivatives with larger tolerances; NaN, and PW_RETRY after a signal, if it fails. */
 static int sensitivity_loosen (pw_sensitivity *sens, pw_progress *progress, pw_error *error) {
   int outputs = sens->outcomes.outcomes, unknowns = sens->unknowns.count;
   pw_sensitivity other = sensitivity_copy (sens);
   other.no_error = 1;
   other.row_interval = 0;
-  other.unknowns.settings.rtol = fmin (0.1, SENSITIVITY_LOOSE * sens->unknowns.settings.rtol);
+  other.unknowns.settings.rtol = fmin (0.1, SENSITIVITY_LOOSE * sens->unknowns.settings.rtol); /* must be below 1 */
   other.unknowns.settings.atol *= SENSITIVITY_LOOSE;
   sens->loose = malloc ((size_t)(outputs * unknowns) * sizeof *sens->loose);
   int status = sens->loose ? pw_sensitivity_open (&other, NULL, error) : pw_fail (error, PW_RESOURCE, "out of memory");
   if (status == PW_OK) status = pw_sensitivity_compute (&other, progress, error);
-  sens->stopped |= other.stopped;
-  for (int o = 0; o < outputs && status == PW_OK && !other.stopped; o++)
-    for (int p = 0; p < unknowns; p++)
-      sens->loose[o * unknowns + p] = pw_sensitivity_derivative (&other, o, p, other.run_slope);
+  if (status == PW_OK && other.stopped) status = pw_limit_status (&other.limit, pw_run_time (other.base.run), error);
+  for (int i = 0; sens->loose && i < outputs * unknowns; i++)
+    sens->loose[i] =
+        status == PW_OK ? pw_sensitivity_derivative (&other, i / unknowns, i % unknowns, other.run_slope) : NAN;
   pw_sensitivity_close (&other);
   return status;
 }
@@ -335,7 +335,6 @@ static int sensitivity_estimate_run_error (pw_sensitivity *sens, pw_progress *pr
   if (sens->stopped || pw_cli_adaptive (sens->unknowns.method) == 0) return PW_OK;
   int status = sensitivity_loosen (sens, progress, error);
   if (status == PW_OK || status == PW_RESOURCE || status == PW_RETRY) return status;
-  for (int i = 0; i < sens->outcomes.outcomes * sens->unknowns.count; i++) sens->loose[i] = NAN;
   pw_cli_say ("pinwheel: errors are unknown: the run with %g times the tolerances fails: %s\n", SENSITIVITY_LOOSE,
               error->text);
   *error = (pw_error){ 0 };
@@ -376,11 +375,14 @@ static int sensitivity_command (void *options, pw_error *error) {
   if (status == PW_OK) pw_report_model (cmd->m.model);
   const double start = pw_seconds (CLOCK_PROCESS_CPUTIME_ID);
   if (status == PW_OK) status = sensitivity_compute (sens, error);
+  const int without_errors = status == PW_RETRY && sens->loose; /* interrupted when all derivatives were known */
+  if (without_errors) status = PW_OK;
   cmd->cpu = pw_seconds (CLOCK_PROCESS_CPUTIME_ID) - start;
   if (status == PW_OK) status = sensitivity_check (sens, error);
   if (status == PW_OK) sensitivity_print (sens), sensitivity_warn (sens);
   if (status == PW_OK && cmd->folder) status = sensitivity_write (cmd, error);
   if (status == PW_OK && sens->stopped) status = pw_limit_status (&sens->limit, pw_run_time (sens->base.run), error);
+  if (status == PW_OK && without_errors) status = PW_RETRY;
   pw_files_close (&cmd->files);
   pw_sensitivity_close (sens);
   pw_unknowns_close (&sens->unknowns);
@@ -412,7 +414,7 @@ const pw_command pw_cli_sensitivity = {
   .summary = "differentiate outputs of a run with respect to parameters and initial values",
   .help = "Differentiate outputs of a run with respect to parameters and initial values, at the end and along the run, "
           "by the variational equations: exact in the states, by differences of compiled models in the parameters, "
-          "with the error of these.",
+          "with the error of these and, if the method controls its error, of the run.",
   .min_arguments = 1,
   .max_arguments = 1,
   .options_size = sizeof (sensitivity),
