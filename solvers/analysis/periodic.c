@@ -53,6 +53,21 @@ static int periodic_arrays (pw_periodic *x) {
   return x->memory ? PW_OK : PW_RESOURCE;
 }
 
+/* The period of the signals where the range of the parameter begins, or if none has one there, where their amplitudes
+ * may be 0, within the range; 0 without one. */
+static int periodic_signal_period (pw_periodic *x, double *period) {
+  const double value[] = { x->settings.first, pw_value_within (x->settings.first, x->settings.last) };
+  *period = 0;
+  for (int i = 0; i < 2 && *period == 0; i++) {
+    const pw_system *s = pw_periodic_system (x, PW_HERE, value[i]);
+    if (s == NULL) return x->why.status;
+    *period = pw_system_period (s);
+  }
+  if (!(*period >= 0)) *period = 0;
+  x->last_period = x->settings.periods * *period;
+  return PW_OK;
+}
+
 static int periodic_open (pw_periodic *x, pw_error *error) {
   const pw_system *s = x->s;
   const pw_method *integrator;
@@ -65,14 +80,13 @@ static int periodic_open (pw_periodic *x, pw_error *error) {
   if (x->n > PERIODIC_MAX_COORDINATES)
     return pw_fail (error, PW_INPUT, "model %s has %d coordinates; periodic motions are sought with at most %d",
                     s->model, x->n, PERIODIC_MAX_COORDINATES);
+  double period = x->settings.period;
+  if (period <= 0 && periodic_signal_period (x, &period) != PW_OK) return *error = x->why, error->status;
   /* At a time at which no signal is likely to vanish: then the system would have more symmetries. */
-  const pw_system *first = pw_periodic_system (x, PW_HERE, x->settings.first);
-  if (first == NULL) return *error = x->why, error->status;
-  double period = x->settings.period > 0 ? x->settings.period : pw_system_period (first);
-  if (!(period >= 0)) period = 0;
   const pw_steady_settings settings = { .t = x->settings.t + 0.317 * period,
                                         .span = period > 0 ? period : 1,
                                         .first = x->settings.first,
+                                        .last = x->settings.last,
                                         .vary = -1,
                                         .compile = x->settings.compile,
                                         .context = x->settings.context };

@@ -79,22 +79,32 @@ static int steady_constant (pw_steady *x, pw_error *error) {
 /* What signals must be. */
 typedef enum { SIGNALS_CONSTANT, SIGNALS_OF_TIME } signal_rule;
 
-/* Determines scales and symmetries at the initial state. */
-static int steady_begin (pw_steady *x, signal_rule signals, pw_error *error) {
-  pw_run *r = x->system[PW_HERE].run;
+/* Stores the initial state and scales at the first value of the parameter. */
+static int steady_begin (pw_steady *x, pw_error *error) {
+  if (pw_steady_open_system (x, PW_HERE, x->settings.first) != PW_OK) return *error = x->why, error->status;
+  const pw_run *r = x->system[PW_HERE].run;
   x->L = x->s->scale.length;
   x->T = r->w->scale.time;
   memcpy (x->start, r->q, (size_t)x->n * sizeof *r->q);
   memcpy (x->start + x->n, r->v, (size_t)x->n * sizeof *r->v);
   if (x->s->bodies) memcpy (x->origin, r->q, sizeof x->origin);
-  int status = signals == SIGNALS_CONSTANT ? steady_constant (x, error) : PW_OK;
+  return PW_OK;
+}
+
+/* Determines the symmetries within the range: at its ends, for instance without gravity, there may be more. */
+static int steady_symmetries (pw_steady *x, signal_rule signals, pw_error *error) {
+  const double first = x->settings.first;
+  int status = pw_steady_open_system (x, PW_HERE, pw_value_within (first, x->settings.last));
+  if (status != PW_OK) status = pw_steady_open_system (x, PW_HERE, first);
+  if (status != PW_OK) return *error = x->why, error->status;
+  if (signals == SIGNALS_CONSTANT) status = steady_constant (x, error);
   if (status != PW_OK) return status;
   status = pw_steady_find_symmetries (x);
   if (status == PW_RESOURCE) return pw_fail_memory (x->s, error);
-  if (status != PW_OK) return pw_fail_singular (r, x->settings.t, error);
+  if (status != PW_OK) return pw_fail_singular (x->system[PW_HERE].run, x->settings.t, error);
   for (int i = 0; i < x->m; i++)
     x->norm[i] = x->system[PW_HERE].linearisation.norm[i] > 0 ? x->system[PW_HERE].linearisation.norm[i] : 1;
-  return PW_OK;
+  return pw_steady_open_system (x, PW_HERE, first) == PW_OK ? PW_OK : (*error = x->why, error->status);
 }
 
 static pw_steady *steady_open (const pw_system *s, const pw_steady_settings *settings, signal_rule signals,
@@ -109,9 +119,8 @@ static pw_steady *steady_open (const pw_system *s, const pw_steady_settings *set
     status = pw_fail (error, PW_INPUT, "model %s has %d coordinates; steady motions are sought with at most %d",
                       s->model, x->n, PW_STEADY_MAX_COORDINATES);
   if (status == PW_OK && steady_arrays (x) != PW_OK) status = pw_fail_memory (s, error);
-  if (status == PW_OK && pw_steady_open_system (x, PW_HERE, x->settings.first) != PW_OK)
-    *error = x->why, status = error->status;
-  if (status == PW_OK) status = steady_begin (x, signals, error);
+  if (status == PW_OK) status = steady_begin (x, error);
+  if (status == PW_OK) status = steady_symmetries (x, signals, error);
   const pw_branch_problem problem = { .unknowns = pw_steady_unknowns (x),
                                       .equations = pw_steady_equations (x),
                                       .tolerance = STEADY_EXACT,

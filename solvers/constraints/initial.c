@@ -368,7 +368,7 @@ int pw_run_make_consistent (pw_run *r, const unsigned char *origin, pw_error *er
                                     .released = released,
                                     .position = before.position,
                                     .velocity = before.velocity };
-  if (status == PW_OK) status = initial_locked (r, error);
+  if (status == PW_OK && origin) status = initial_locked (r, error); /* wheels may absorb the impulse of a restart */
   if (status == PW_METHOD) return pw_fail_signal (r->t, error);
   return status == PW_RETRY ? initial_fail (r, &failure, error) : status;
 }

@@ -368,18 +368,37 @@ static void test_bad (void **state) {
   cli_bad ("pinwheel linearise n-trailer --hold tractor.speed=1", 2, "--hold needs --steady");
 }
 
-/* Without stiffness, where the range begins, a body can move at any speed; with stiffness it only passes through its
- * equilibrium, which is no steady motion.  Rest is one. */
+/* Where the range begins there may be more symmetries: without stiffness or slope a body can be anywhere or have any
+ * direction.  Branches have the symmetries within the range, and begin at its other end, or within
+ * it. */
 static void test_more_symmetries (void **state) {
   (void)state;
   cli_write ("held.yaml", "pinwheel: 1\nparameters: [{name: k, value: 0}]\n"
                           "bodies: [{name: bob, mass: 1, inertia: 1, start: {x: 0.3}, rate: {vx: 0.1}}]\nelements:\n"
                           "  - {spring: s, body: [bob, ground], at: [[0, 0], [-2, 0]], stiffness: k, length: 2}\n");
-  assert_int_equal (cli_run ("pinwheel steady @/held.yaml --hold bob.speed=0.1 --vary k=0:1 --starts 5"), 2);
-  assert_non_null (
-      strstr (cli_err, "held: the equations change with time or along the motion: there is no steady motion\n"));
-  cli_good ("pinwheel steady @/held.yaml --hold bob.speed=0 --hold bob.omega=0 --vary k=0:1 --starts 5");
-  steady_shows ("       2  begins                      1        0                0        0.159155\n");
+  cli_shell ("pinwheel steady @/held.yaml --hold bob.speed=0 --hold bob.omega=0 --vary k=0:1 --starts 5");
+  steady_shows ("held: 1 branch of steady motions up to 2 symmetries, k from 0 to 1\n");
+  steady_shows ("       1  begins                      1        0                0        0.159155\n");
+  assert_int_equal (cli_run ("pinwheel steady @/held.yaml --hold bob.speed=0.1 --vary k=1:0.5 -o @/circle"), 0);
+  const char *json = cli_file ("circle/steady.json");
+  double number[4];
+  for (int i = 0; i < 4; i++)
+    number[i] =
+        cli_number (json, "motions", "state", (const char *[]){ "bob.x", "bob.y", "bob.vx", "bob.vy" }[i], NULL);
+  const double r = hypot (number[0] + 2, number[1]), v = hypot (number[2], number[3]);
+  check_close ("force", r - 2, v * v / r, 1e-9, "k (r - l) = m v^2 / r");
+  assert_int_equal (cli_run ("pinwheel steady knife-edge-incline --set w=0 --start skate.phi=1.5 --vary alpha=0:0.3"),
+                    0);
+  assert_string_equal (cli_err, "pinwheel: holding skate.speed=0, as in the motion nearest to the initial state\n"
+                                "pinwheel: alpha=0: no branch begins at a steady motion that is one of a family of "
+                                "dimension 1\n");
+  steady_shows ("knife-edge-incline: 2 branches of steady motions up to 2 symmetries, alpha from 0 to 0.3\n");
+  steady_shows ("       1  begins                    0.3        0                                 \n");
+  steady_shows ("       2  ends                        0        0                                 \n");
+  assert_int_equal (cli_run ("pinwheel steady chaplygin-sleigh --vary a=0:0.2"), 0);
+  steady_shows ("       1  begins                      0.2        1 ");
+  cli_shell ("pinwheel steady knife-edge-incline --set w=0 --start skate.phi=1.5 --vary alpha=0:pi");
+  steady_shows ("knife-edge-incline: 4 branches of steady motions up to 2 symmetries, alpha from 0 to 3.14159265\n");
 }
 
 /* A parameter of a model in C need not have a unit. */

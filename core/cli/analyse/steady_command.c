@@ -7,7 +7,8 @@
 #include "report.h"
 #include "util.h"
 
-enum { STEADY_STARTS = 30 }; /* default of --starts */
+enum { STEADY_STARTS = 30 };               /* default of --starts */
+static const double STEADY_WITHIN = 0.382; /* a fraction of the range at which no parameter is likely to vanish */
 
 /* Attempts of pw_steady_solve that begin at the initial state or near it, not at random states. */
 enum { STEADY_NOT_RANDOM = 2 };
@@ -136,6 +137,11 @@ static int steady_fail (pw_steady_command *cmd, pw_error *error) {
     return pw_fail (error, PW_INPUT,
                     "%s: the equations change with time or along the motion: there is no steady motion",
                     pw_file_name (cmd->m.file));
+  if (cmd->families)
+    return pw_fail (
+        error, PW_METHOD,
+        "%s: all steady motions found are members of families, in which no branch begins; hold more (--hold)",
+        pw_file_name (cmd->m.file));
   snprintf (initial, sizeof initial, "from the initial state the residual ends at %.2g", cmd->nearest[0]);
   if (cmd->random_attempts)
     snprintf (random, sizeof random, ", from %d random ones at %.2g at best", cmd->random_attempts, cmd->nearest[1]);
@@ -148,6 +154,16 @@ static int steady_fail (pw_steady_command *cmd, pw_error *error) {
 
 /* ---- Branches ---- */
 
+/* Removes a branch that has no direction where it should begin, since the motion is one of a family there. */
+static int steady_omit (pw_steady_command *cmd, const pw_steady_motion *m, pw_error *error) {
+  cmd->branches--;
+  cmd->families++;
+  pw_cli_say ("pinwheel: %s=%.9g: no branch begins at a steady motion that is one of a family of dimension %d\n",
+              cmd->vary.name, m->parameter, m->family);
+  *error = (pw_error){ 0 };
+  return PW_OK;
+}
+
 static int steady_follow (pw_steady_command *cmd, const pw_steady_point *from, int direction, pw_error *error) {
   char (*ends)[PW_STEADY_REASON] = realloc (cmd->end, ((size_t)cmd->branches + 1) * sizeof *ends);
   if (ends == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
@@ -157,6 +173,7 @@ static int steady_follow (pw_steady_command *cmd, const pw_steady_point *from, i
   pw_progress progress = { .title = NULL };
   const double begin = from->motion.parameter;
   int status = pw_steady_follow (cmd->search, from->motion.q, from->motion.v, begin, direction, error);
+  if (status == PW_METHOD && from->motion.family > 0) return steady_omit (cmd, &from->motion, error);
   while (status == PW_OK && !steady_is_stopped (cmd)) {
     status = pw_steady_next (cmd->search, &m, error);
     if (status != PW_OK || m.event == PW_STEADY_END) break;
@@ -216,13 +233,24 @@ static double steady_model_value (const pw_steady_command *cmd) {
                                pw_system_initial_v (s));
 }
 
+/* The motion nearest to the initial state at the value of the model or where the range begins; at a value within the
+ * range if the family is smaller there. */
+static int steady_nearest_motion (pw_steady_command *cmd, pw_steady_motion *m, pw_error *error) {
+  const double first = cmd->settings.first, held = cmd->settings.vary < 0 ? NAN : steady_model_value (cmd),
+               begin = isfinite (held) ? held : first, within = first + STEADY_WITHIN * (cmd->settings.last - first);
+  pw_error none = { 0 };
+  int status = pw_steady_solve (cmd->search, 0, begin, m, error), family = m->family;
+  if (status != PW_OK || family == 0) return status;
+  if (pw_steady_solve (cmd->search, 0, within, m, &none) == PW_OK && m->family < family) return PW_OK;
+  return pw_steady_solve (cmd->search, 0, begin, m, error);
+}
+
 /* Where what is held leaves a family of motions, holds more, as in the motion nearest to the initial state. */
 static int steady_hold_more (pw_steady_command *cmd, pw_error *error) {
   const pw_system *s = cmd->m.system;
   pw_steady_motion m;
   char name[300];
-  double parameter = cmd->settings.vary >= 0 ? steady_model_value (cmd) : NAN;
-  int status = pw_steady_solve (cmd->search, 0, isfinite (parameter) ? parameter : cmd->settings.first, &m, error);
+  int status = steady_nearest_motion (cmd, &m, error);
   if (status == PW_RETRY || (status == PW_OK && m.family == 0)) return PW_OK;
   if (status != PW_OK) return status;
   int more = pw_steady_suggest (cmd->search, cmd->hold + cmd->settings.holds, PW_HOLDS - cmd->settings.holds);
@@ -236,15 +264,16 @@ static int steady_hold_more (pw_steady_command *cmd, pw_error *error) {
   return cmd->search ? PW_OK : error->status;
 }
 
-/* Finds branches that begin at the ends of the range, or if there are none, one at the value of the model. */
+/* Finds branches that begin at the ends of the range, or if there are none, at the value of the model or within the
+ * range. */
 static int steady_branches (pw_steady_command *cmd, pw_error *error) {
   const double first = cmd->settings.first, last = cmd->settings.last;
   int status = steady_hold_more (cmd, error);
   double own = steady_model_value (cmd), fraction = (own - first) / (last - first);
+  if (!(fraction > 0 && fraction < 1)) own = first + STEADY_WITHIN * (last - first);
   if (status == PW_OK) status = steady_branches_from (cmd, first, TO_LAST, error);
   if (status == PW_OK && !cmd->stopped) status = steady_branches_from (cmd, last, TO_FIRST, error);
-  if (status == PW_OK && !cmd->stopped && cmd->points == 0 && fraction > 0 && fraction < 1)
-    status = steady_branches_from (cmd, own, TO_LAST, error);
+  if (status == PW_OK && !cmd->stopped && cmd->points == 0) status = steady_branches_from (cmd, own, TO_LAST, error);
   return status;
 }
 

@@ -35,6 +35,7 @@ typedef struct {
   int branches;
   double nearest[2]; /* smallest residual without solution: from the initial state, from random ones */
   int changing;      /* solutions that are not steady, as the equations change with time or along the motion */
+  int families;      /* solutions of which no branch begins, since they are members of families */
   int stopped;       /* 1: by Ctrl-C or --limit */
 } pw_steady_command;
 
