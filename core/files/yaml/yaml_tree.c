@@ -201,6 +201,8 @@ static const char *tree_hint (const pw_yaml *y, size_t at, const char *message) 
   const char *line = y->source + begin, *slashes = strstr (line, " //");
   if (size > 1 && line[0] == '-' && strchr ("- 0123456789.", line[1]) == NULL) return "; a space goes after the -";
   if (slashes && slashes < line + size) return "; a comment begins with #";
+  if (strstr (message, "missing comma") && memchr (line, '?', size))
+    return "; an expression with ? : goes between double quotes";
   for (size_t i = 0; i < sizeof known / sizeof *known; i++)
     if (strstr (message, known[i].message)) return known[i].hint;
   return "";
