@@ -61,8 +61,7 @@ double pw_fit_quantile (const pw_fit *fit) {
 /* Relative noise of the model's values as functions of the unknowns: the tolerance of an adaptive method, round-off
  * with fixed steps. */
 static double jacobian_noise (const pw_fit *fit) {
-  if (pw_cli_adaptive (fit->unknowns.method) != 1) return DBL_EPSILON;
-  return fit->unknowns.settings.rtol > 0 ? fit->unknowns.settings.rtol : 1e-6;
+  return pw_cli_adaptive (fit->unknowns.method) == 1 ? fit->unknowns.settings.rtol : DBL_EPSILON;
 }
 
 double pw_fit_derivative_error (const pw_fit *fit) {
