@@ -16,7 +16,7 @@ int pw_unknown_find (pw_unknown *u, const pw_cli_model *m, const char *name, pw_
     return PW_OK;
   }
   if (strchr (name, '.') == NULL) {
-    /* there is no such parameter: setting it, in a model that is not built yet, fails with the nearest name */
+    /* Setting an unknown parameter, in a model that is not built yet, fails with the nearest name. */
     pw_model *copy = pw_file_model (m->file, error);
     if (copy) pw_model_set (copy, name, 0, error);
     pw_model_free (copy);
@@ -152,11 +152,11 @@ int pw_unknown_run_prepare (pw_unknown_run *to, const pw_unknowns *u, const doub
   return PW_OK;
 }
 
-void pw_unknown_run_close (pw_unknown_run *x) {
-  pw_run_close (x->run);
-  pw_workspace_free (x->workspace);
-  pw_cli_close_model (&x->m);
-  *x = (pw_unknown_run){ .run = NULL };
+void pw_unknown_run_close (pw_unknown_run *run) {
+  pw_run_close (run->run);
+  pw_workspace_free (run->workspace);
+  pw_cli_close_model (&run->m);
+  *run = (pw_unknown_run){ .run = NULL };
 }
 
 void pw_unknowns_report (const pw_unknowns *u, const double *x) {
@@ -171,8 +171,9 @@ void pw_unknowns_report (const pw_unknowns *u, const double *x) {
 
 /* ---- Directions ---- */
 
-/* PW_UNKNOWN_STEP times the size of the unknown: |value|, but at least 0.1 for angles, the unit of the scene for
- * states, 1e-3 of the scale in searches; for a parameter that is 0 its default value, or 1 if that is 0, too. */
+/* PW_UNKNOWN_STEP times the typical size of the unknown: |value|, but at least 0.1 rad for angles, the unit of the
+ * scene for states, 1e-3 of the scale in searches; for a parameter that is 0 its default value, or 1 if that is 0,
+ * too. */
 static double unknown_step (const pw_unknown *u, double value, const pw_run *r) {
   if (u->step > 0) return u->step;
   double size = fabs (value), length = pw_run_scale (r)->length, time = pw_run_scale (r)->time;
@@ -182,8 +183,8 @@ static double unknown_step (const pw_unknown *u, double value, const pw_run *r) 
   return PW_UNKNOWN_STEP * fmax (size > 0 ? size : 1, 1e-3 * u->scale);
 }
 
-/* Keeps the neighbours within the domain of a parameter.  If that excludes 0, the step is at most value / 4; next to a
- * bound that belongs to it, 0 or 1, all neighbours are on the inner side. */
+/* Keeps the neighbours within the domain of a parameter: in an open one, > 0, by a step of at most value / 4; next to a
+ * bound that belongs to the domain, 0 or 1, by differences on its inner side alone. */
 static void unknown_stay_inside (const pw_unknown *u, double value, pw_direction *d) {
   pw_domain domain = u->parameter ? u->parameter->domain : PW_REAL;
   if (domain == PW_POSITIVE) d->step = fmin (d->step, value / 4);
@@ -198,7 +199,7 @@ static int unknown_same_size (const pw_system *a, const pw_system *b) {
          pw_system_rows (a) == pw_system_rows (b);
 }
 
-static int unknown_direction (pw_direction *d, const pw_unknowns *u, int i, double *x, pw_unknown_run *run,
+static int unknown_direction (pw_direction *d, const pw_unknowns *u, int i, double *x, const pw_unknown_run *run,
                               pw_unknown_run *neighbours, pw_error *error) {
   double value = x[i];
   int status = PW_OK;
@@ -217,7 +218,7 @@ static int unknown_direction (pw_direction *d, const pw_unknowns *u, int i, doub
   return status;
 }
 
-int pw_unknowns_directions (pw_direction *d, const pw_unknowns *u, double *x, pw_unknown_run *run,
+int pw_unknowns_directions (pw_direction *d, const pw_unknowns *u, double *x, const pw_unknown_run *run,
                             pw_unknown_run *neighbours, pw_error *error) {
   pw_unknowns general = *u; /* without specialised code */
   int status = PW_OK;
@@ -235,7 +236,7 @@ static double unknowns_between (const pw_unknown *u, double fraction) {
   return fmin (fmax (value, u->low), u->high);
 }
 
-/* Fills a row for each point after the first one. */
+/* Stores the points after the first one; a status. */
 static int unknowns_sobol (const pw_unknowns *u, int count, double seed, double *out) {
   double point[PW_UNKNOWNS_SOBOL_MOST], shift[PW_UNKNOWNS_SOBOL_MOST];
   gsl_rng *random = gsl_rng_alloc (gsl_rng_mt19937);

@@ -26,13 +26,13 @@ static double report_correlation (const pw_fit *fit, int i, int j) {
              : NAN;
 }
 
-/* The end of the confidence interval at a side, -1 the lower or 1 the upper one; NaN without one. */
+/* The lower (side -1) or upper (side 1) end of the confidence interval of unknown i; NaN if there is none. */
 static double report_interval_end (const pw_fit *fit, int i, int side) {
   return isfinite (fit->standard_error[i]) ? fit->estimate[i] + side * pw_fit_quantile (fit) * fit->standard_error[i]
                                            : NAN;
 }
 
-/* "" if the estimate is not at a bound. */
+/* "at its lower bound", "at its upper bound"; "" if the estimate of unknown i is at neither. */
 static const char *report_bound (const pw_fit *fit, int i) {
   const pw_unknown *unknown = fit->unknowns.list + i;
   const double value = fit->estimate[i], near = PW_FIT_MARGIN * unknown->scale;
@@ -108,13 +108,13 @@ static void report_columns (const pw_fit *fit) {
   }
 }
 
-/* 1 if unknown i belongs to a combination, a singular vector. */
+/* 1 if unknown i belongs to a combination, the singular vector of this number. */
 static int report_contains (const pw_fit *fit, int combination, int i) {
   return fabs (fit->singular_vector[i * fit->unknowns.count + combination]) > PW_FIT_COMPONENT;
 }
 
-/* Proportional changes of the unknowns along a singular vector; that of the first one is its estimate, or 1 if this is
- * 0. */
+/* Prints the ratio of changes of the unknowns along a singular vector; the change of the first one is its estimate, or
+ * 1 if this is 0. */
 static void report_ratio (const pw_fit *fit, int combination) {
   double scale = 0;
   for (int i = 0; i < fit->unknowns.count; i++) {
@@ -127,7 +127,7 @@ static void report_ratio (const pw_fit *fit, int combination) {
   puts (" have no effect");
 }
 
-/* Combinations of unknowns that change no datum: singular vectors to singular values 0. */
+/* Prints combinations of unknowns that change no model value: singular vectors with the singular value 0. */
 static void report_undetermined (const pw_fit *fit) {
   for (int k = fit->rank; k < fit->unknowns.count; k++) {
     int count = 0;
@@ -146,7 +146,7 @@ static int report_is_best (const pw_fit *fit, const double *minimum) {
   return *minimum <= fit->chi2 + 1e-6 * fit->chi2 + 1e-12 * fit->initial_chi2;
 }
 
-/* Searches that ended at the best minimum, and the next best one. */
+/* Prints how many searches ended at the best minimum, and the next best one. */
 static void report_minima (const pw_fit *fit) {
   char options[REPORT_OPTIONS];
   const double *next = NULL;
@@ -219,7 +219,7 @@ static void report_json_columns (const pw_fit *fit, pw_json *j) {
   pw_json_close (j, ']');
 }
 
-/* A square matrix of the unknowns with these entries. */
+/* Writes a matrix, unknowns x unknowns, with these entries. */
 static void report_json_matrix (const pw_fit *fit, pw_json *j, const char *key,
                                 double (*entry) (const pw_fit *fit, int i, int j)) {
   int n = fit->unknowns.count;
@@ -233,7 +233,7 @@ static void report_json_matrix (const pw_fit *fit, pw_json *j, const char *key,
   pw_json_close (j, ']');
 }
 
-/* Where each search ended. */
+/* Writes where each search ended. */
 static void report_json_minima (const pw_fit *fit, pw_json *j) {
   int n = fit->unknowns.count;
   pw_json_open (j, "searches", '[');

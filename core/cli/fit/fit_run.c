@@ -1,5 +1,5 @@
-/* Runs of a fit, which give the model's values at the times of the data; derivatives of these values by the unknowns,
- * from the variational equations or else from differences; statistics. */
+/* Runs of a fit, which give the model's values at the times of the data; derivatives of these values with respect to
+ * the unknowns, from the variational equations or else from differences; statistics. */
 #define _POSIX_C_SOURCE 200809L
 #include <float.h>
 #include <gsl/gsl_cdf.h>
@@ -9,11 +9,11 @@
 #include "fit.h"
 #include "parallel.h"
 
-#define JACOBIAN_ERROR 1e-8 /* relative error of derivatives by the variational equations, at least */
+#define JACOBIAN_ERROR 1e-8 /* least relative error of derivatives from the variational equations */
 
 /* ---- Runs ---- */
 
-/* Columns at the times of the data; `row` is scratch for one row. */
+/* Stores the columns at the times of the data in `out`, columns x rows; row: scratch for one row. */
 static int fit_sample (const pw_fit *fit, pw_outcomes *outcomes, pw_run *run, double *out, double *row,
                        pw_error *error) {
   pw_sample sample;
@@ -58,7 +58,7 @@ double pw_fit_quantile (const pw_fit *fit) {
 
 /* ---- Differences ---- */
 
-/* Relative noise of the model's values as functions of the unknowns: the tolerance of an adaptive method, round-off
+/* Relative noise of the model's values as functions of the unknowns: the tolerance of an adaptive method, or round-off
  * with fixed steps. */
 static double jacobian_noise (const pw_fit *fit) {
   return pw_cli_adaptive (fit->unknowns.method) == 1 ? fit->unknowns.settings.rtol : DBL_EPSILON;
@@ -69,15 +69,15 @@ double pw_fit_derivative_error (const pw_fit *fit) {
   return fit->by_differences ? pow (noise, 2. / 3) : fmax (noise, JACOBIAN_ERROR);
 }
 
-/* Runs on both sides of each unknown: task 2 j below unknown j, task 2 j + 1 above it. */
+/* Runs on both sides of each unknown: task 2 j is the run below unknown j, task 2 j + 1 that above it. */
 typedef struct {
   const pw_fit *fit;
   double *unknowns, *values, *step; /* of each task: unknowns, values of the model, signed step */
   pw_error *error;                  /* of each task */
 } jacobian_differences;
 
-/* The step is the cube root of the noise, relative: it balances the truncation error of central differences,
- * proportional to its square, and their noise, divided by it.  Then both are noise^(2/3). */
+/* The relative step is the cube root of the noise: it balances the truncation error of central differences, the square
+ * of the step, and their noise over the step.  Then both are noise^(2/3). */
 static int jacobian_side (void *context, int task, pw_error *error) {
   jacobian_differences *d = context;
   const pw_fit *fit = d->fit;
@@ -92,7 +92,8 @@ static int jacobian_side (void *context, int task, pw_error *error) {
   return PW_OK; /* see jacobian_column */
 }
 
-/* Central differences; one-sided ones if the run on the other side failed. */
+/* Derivatives with respect to unknown j by central differences; by one-sided ones if the run on one side failed.
+ * middle: the values of the model between both sides. */
 static int jacobian_column (const jacobian_differences *d, int j, const double *middle, double *out, pw_error *error) {
   size_t cells = (size_t)d->fit->columns * (size_t)d->fit->rows;
   const double *side[2];
@@ -146,15 +147,13 @@ static int jacobian_row (pw_sensitivity *s, const pw_fit *fit, int row, double *
 
 static int jacobian_by_variation (const pw_fit *fit, const double *unknowns, double *jacobian, pw_error *error) {
   pw_sensitivity s = { .of = fit->column_name, .unknowns = fit->unknowns, .no_error = 1 };
-  int status = pw_sensitivity_open (&s, unknowns, error);
-  if (status == PW_OK) status = pw_sensitivity_start (&s, error);
+  int status = pw_sensitivity_start (&s, unknowns, error);
   for (int row = 0; row < fit->rows && status == PW_OK; row++) status = jacobian_row (&s, fit, row, jacobian, error);
   if (status == PW_STOPPED) status = pw_limit_status (&s.limit, pw_run_time (s.base.run), error);
   pw_sensitivity_close (&s);
   return status;
 }
 
-/* By differences from the first run on whose variational equations cannot be used. */
 int pw_fit_jacobian (pw_fit *fit, const double *unknowns, const double *values, double *jacobian, pw_error *error) {
   pw_error own = { 0 };
   int status = fit->by_differences ? PW_METHOD : jacobian_by_variation (fit, unknowns, jacobian, &own);
