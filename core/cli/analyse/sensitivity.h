@@ -15,7 +15,7 @@ typedef struct {
   /* results */
   pw_outcomes outcomes;                /* of the run */
   double *run_slope, *run_slope_error; /* F x P: derivatives of the functionals, and their errors; NaN: none exists */
-  int rows, columns;                   /* of the table: t, then each output in it (below) and its derivatives */
+  int rows, columns;                   /* of the table: t, then each output that is in it, with its derivatives */
   double *row;                         /* rows x columns */
   double *loose;                       /* outputs x P: derivatives with larger tolerances; NULL: not computed */
   int stopped;                         /* 1: stopped before t_end, by Ctrl-C or the limit */

@@ -97,8 +97,8 @@ int pw_sensitivity_at (pw_sensitivity *sens, double t, pw_error *error) {
 
 /* ---- Functionals ---- */
 
-#define SENSITIVITY_SAME \
-  1e-5 /* relative difference of derivatives before and after a jump up to which they are equal */
+/* Derivatives before and after a jump count as equal up to this relative difference. */
+#define SENSITIVITY_SAME 1e-5
 
 /* Adds the current derivatives of columns, times the weight of a node, to the derivatives of integrals. */
 static void sensitivity_add_node (pw_sensitivity *sens, double weight) {
@@ -335,8 +335,8 @@ static int sensitivity_find_functionals (pw_sensitivity *sens, pw_error *error) 
                           error);
 }
 
-/* Refuses initial values that the constraints determine: making the state of a neighbour consistent changes them
- * back. */
+/* Refuses initial values that the constraints determine: then making the state of a neighbour consistent changes them
+ * back, by much more than 1 % of the step. */
 static int sensitivity_check_independence (const pw_sensitivity *sens, pw_error *error) {
   int n = pw_system_coordinates (sens->base.m.system);
   for (int p = 0; p < sens->unknowns.count; p++) {
@@ -395,7 +395,7 @@ int pw_sensitivity_compute (pw_sensitivity *sens, const double *values, pw_progr
 void pw_sensitivity_close (pw_sensitivity *sens) {
   pw_variation_close (sens->variation);
   pw_run_close (sens->sampled);
-  if (sens->outcomes.system) pw_outcomes_close (&sens->outcomes);
+  pw_outcomes_close (&sens->outcomes);
   for (int i = 0; sens->neighbours && i < 4 * sens->unknowns.count; i++) pw_unknown_run_close (&sens->neighbours[i]);
   pw_unknown_run_close (&sens->base);
   free (sens->neighbours);

@@ -134,13 +134,6 @@ int pw_unknowns_system (pw_cli_model *m, const pw_unknowns *u, const double *x, 
   return m->system ? PW_OK : error->status;
 }
 
-int pw_unknown_run_open (pw_unknown_run *to, const pw_unknowns *u, const double *x, pw_error *error) {
-  *to = (pw_unknown_run){ .settings = u->settings };
-  if (pw_unknowns_system (&to->m, u, x, error) != PW_OK) return error->status;
-  to->run = pw_run_open (to->m.system, u->method, &to->settings, error);
-  return to->run ? PW_OK : error->status;
-}
-
 int pw_unknown_run_prepare (pw_unknown_run *to, const pw_unknowns *u, const double *x, pw_error *error) {
   const pw_specialised *code = pw_scene_code_table (u->engine.code);
   *to = (pw_unknown_run){ .settings = u->settings, .limit = { .seconds = u->limit } };
@@ -201,18 +194,22 @@ static int unknown_same_size (const pw_system *a, const pw_system *b) {
 
 static int unknown_direction (pw_direction *d, const pw_unknowns *u, int i, double *x, const pw_unknown_run *run,
                               pw_unknown_run *neighbours, pw_error *error) {
-  double value = x[i];
+  const double value = x[i];
+  pw_settings general = u->settings;
+  general.specialised = NULL;
   int status = PW_OK;
   *d = (pw_direction){ .step = unknown_step (&u->list[i], value, run->run) };
   unknown_stay_inside (&u->list[i], value, d);
   for (int k = 0; k < 4 && status == PW_OK; k++) {
+    pw_unknown_run *near = neighbours + k;
     x[i] = value + pw_direction_offset (d, k);
-    status = pw_unknown_run_open (neighbours + k, u, x, error);
-    if (status == PW_OK && !unknown_same_size (run->m.system, neighbours[k].m.system))
+    status = pw_unknowns_system (&near->m, u, x, error);
+    if (status == PW_OK && !unknown_same_size (run->m.system, near->m.system))
       status = pw_fail (error, PW_INPUT,
                         "%s changes the number of bodies or elements: derivatives with respect to it do not exist",
                         u->list[i].name);
-    d->neighbour[k] = neighbours[k].run;
+    if (status == PW_OK) d->neighbour[k] = near->run = pw_run_open (near->m.system, u->method, &general, error);
+    if (status == PW_OK && near->run == NULL) status = error->status;
   }
   x[i] = value;
   return status;
@@ -220,11 +217,9 @@ static int unknown_direction (pw_direction *d, const pw_unknowns *u, int i, doub
 
 int pw_unknowns_directions (pw_direction *d, const pw_unknowns *u, double *x, const pw_unknown_run *run,
                             pw_unknown_run *neighbours, pw_error *error) {
-  pw_unknowns general = *u; /* without specialised code */
   int status = PW_OK;
-  general.settings.specialised = NULL;
   for (int i = 0; i < u->count && status == PW_OK; i++)
-    status = unknown_direction (d + i, &general, i, x, run, neighbours + 4 * i, error);
+    status = unknown_direction (d + i, u, i, x, run, neighbours + 4 * i, error);
   return status;
 }
 

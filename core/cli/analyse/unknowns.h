@@ -1,5 +1,5 @@
 /* Unknowns: parameters and initial values that analyses and searches vary, and runs with given values of them.  An
- * argument x is a value for each unknown. */
+ * array x has a value for each unknown. */
 #ifndef PW_UNKNOWNS_H
 #define PW_UNKNOWNS_H
 
@@ -62,8 +62,6 @@ typedef struct {
   pw_run *run;
   pw_workspace *workspace; /* for contact points; NULL: not needed yet */
 } pw_unknown_run;
-/* Opens a run with u->settings.  Close it in every case. */
-int pw_unknown_run_open (pw_unknown_run *to, const pw_unknowns *u, const double *x, pw_error *error);
 /* Compiles the model and sets m and settings, with the engine and a limit of its own, whose clock starts; the caller
  * opens `run`.  Close it in every case. */
 int pw_unknown_run_prepare (pw_unknown_run *to, const pw_unknowns *u, const double *x, pw_error *error);

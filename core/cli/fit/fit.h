@@ -65,10 +65,9 @@ double pw_fit_derivative_error (const pw_fit *fit);
  * status; PW_RETRY after Ctrl-C. */
 int pw_fit_solve (pw_fit *fit, pw_error *error);
 
-/* Degrees of freedom; half the width of confidence intervals in standard errors, from the normal distribution if
- * standard deviations are given, else from Student's. */
-int pw_fit_freedom (const pw_fit *fit);
-double pw_fit_quantile (const pw_fit *fit);
+static inline int pw_fit_degrees_of_freedom (const pw_fit *fit) {
+  return fit->residuals - fit->rank;
+}
 
 /* Reports (fit_report.c): text, JSON with this status ("ok", ...), the table of data and residuals, figures. */
 void pw_fit_print (const pw_fit *fit);

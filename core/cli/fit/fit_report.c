@@ -26,9 +26,17 @@ static double report_correlation (const pw_fit *fit, int i, int j) {
              : NAN;
 }
 
+/* Half the width of confidence intervals in standard errors: from the normal distribution if standard deviations are
+ * given, else from Student's. */
+static double report_quantile (const pw_fit *fit) {
+  double tail = (1 - fit->confidence) / 2;
+  return fit->weighted ? gsl_cdf_gaussian_Qinv (tail, 1)
+                       : gsl_cdf_tdist_Qinv (tail, fmax (pw_fit_degrees_of_freedom (fit), 1));
+}
+
 /* The lower (side -1) or upper (side 1) end of the confidence interval of unknown i; NaN if there is none. */
 static double report_interval_end (const pw_fit *fit, int i, int side) {
-  return isfinite (fit->standard_error[i]) ? fit->estimate[i] + side * pw_fit_quantile (fit) * fit->standard_error[i]
+  return isfinite (fit->standard_error[i]) ? fit->estimate[i] + side * report_quantile (fit) * fit->standard_error[i]
                                            : NAN;
 }
 
@@ -51,21 +59,17 @@ static double report_rms (const pw_fit *fit, int column, int *count) {
 /* ---- Text ---- */
 
 static void report_unknowns (const pw_fit *fit) {
-  char head[80];
-  snprintf (head, sizeof head, "%g %% confidence:  from", 100 * fit->confidence);
+  char from[80];
+  const char *const head[] = { "free", "initially", "estimate", "standard error", from, "to" };
+  snprintf (from, sizeof from, "%g %% confidence:  from", 100 * fit->confidence);
   for (pw_table t = { 0 }; pw_table_pass (&t);) {
-    pw_cell (&t, -12, "free");
-    pw_cell (&t, 12, "initially");
-    pw_cell (&t, 12, "estimate");
-    pw_cell (&t, 14, "standard error");
-    pw_cell (&t, 12, head);
-    pw_cell (&t, 12, "to");
+    for (int k = 0; k < 6; k++) pw_cell (&t, k ? 12 : -12, head[k]);
     pw_row_end (&t);
     for (int i = 0; i < fit->unknowns.count; i++) {
       pw_cell_unit (&t, -12, fit->unknowns.list[i].name, fit->unknowns.list[i].unit);
       pw_cell_number (&t, 12, fit->unknowns.list[i].value, REPORT_DIGITS);
       pw_cell_number (&t, 12, fit->estimate[i], REPORT_DIGITS);
-      pw_cell_number (&t, 14, isfinite (fit->standard_error[i]) ? fit->standard_error[i] : NAN, 3);
+      pw_cell_number (&t, 12, isfinite (fit->standard_error[i]) ? fit->standard_error[i] : NAN, 3);
       pw_cell_number (&t, 12, report_interval_end (fit, i, -1), REPORT_DIGITS);
       pw_cell_number (&t, 12, report_interval_end (fit, i, 1), REPORT_DIGITS);
       pw_cell (&t, -1, isinf (fit->standard_error[i]) ? "not determined by the data" : report_bound (fit, i));
@@ -164,7 +168,7 @@ static void report_minima (const pw_fit *fit) {
 
 void pw_fit_print (const pw_fit *fit) {
   char options[REPORT_OPTIONS];
-  int freedom = pw_fit_freedom (fit);
+  int freedom = pw_fit_degrees_of_freedom (fit);
   report_unknowns (fit);
   report_columns (fit);
   if (fit->weighted)
@@ -259,7 +263,7 @@ void pw_fit_json (const pw_fit *fit, const char *status, FILE *f) {
                 pw_unknowns_options (&fit->unknowns, fit->estimate, options, sizeof options) ? options : NULL);
   pw_json_text (j, "method", fit->unknowns.method);
   pw_json_number (j, "residuals", fit->residuals);
-  pw_json_number (j, "freedom", pw_fit_freedom (fit));
+  pw_json_number (j, "freedom", pw_fit_degrees_of_freedom (fit));
   pw_json_flag (j, "weighted", fit->weighted);
   pw_json_number (j, "chi2", fit->chi2);
   pw_json_number (j, "confidence", fit->confidence);

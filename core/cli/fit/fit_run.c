@@ -1,8 +1,7 @@
 /* Runs of a fit, which give the model's values at the times of the data; derivatives of these values with respect to
- * the unknowns, from the variational equations or else from differences; statistics. */
+ * the unknowns, from the variational equations or else from differences. */
 #define _POSIX_C_SOURCE 200809L
 #include <float.h>
-#include <gsl/gsl_cdf.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -43,17 +42,6 @@ int pw_fit_run (const pw_fit *fit, const double *unknowns, double *out, pw_error
   pw_unknown_run_close (&run);
   free (row);
   return status;
-}
-
-/* ---- Statistics ---- */
-
-int pw_fit_freedom (const pw_fit *fit) {
-  return fit->residuals - fit->rank;
-}
-
-double pw_fit_quantile (const pw_fit *fit) {
-  double tail = (1 - fit->confidence) / 2;
-  return fit->weighted ? gsl_cdf_gaussian_Qinv (tail, 1) : gsl_cdf_tdist_Qinv (tail, fmax (pw_fit_freedom (fit), 1));
 }
 
 /* ---- Differences ---- */
@@ -131,7 +119,7 @@ static int jacobian_by_differences (pw_fit *fit, const double *unknowns, const d
 
 /* ---- Variational equations ---- */
 
-/* Derivatives at the time of a row. */
+/* Stores the derivatives at the time of a row of the data. */
 static int jacobian_row (pw_sensitivity *s, const pw_fit *fit, int row, double *jacobian, pw_error *error) {
   const int n = fit->unknowns.count;
   int status = pw_sensitivity_at (s, fit->t[row], error);

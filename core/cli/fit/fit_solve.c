@@ -15,10 +15,10 @@
 #include <string.h>
 #include "fit.h"
 
-#define SOLVE_GRADIENT 1e-4   /* largest cosine between the residuals and a column of the Jacobian at a minimum */
-#define SOLVE_RANK 1e-6       /* smallest singular value of the scaled Jacobian, relative to the largest one */
-#define SOLVE_EFFECT 1e-9     /* smallest effect of an unknown times its scale, relative to the largest one */
-#define SOLVE_EXACT 1e-8      /* norm of the residuals of an exact fit, relative to the initial one */
+#define SOLVE_GRADIENT 1e-4 /* largest cosine between the residuals and a column of the Jacobian at a minimum */
+#define SOLVE_RANK 1e-6   /* singular values of the scaled Jacobian count as 0 below it, relative to the largest one */
+#define SOLVE_EFFECT 1e-9 /* smallest effect of an unknown times its scale, relative to the largest one */
+#define SOLVE_EXACT 1e-8  /* norm of the residuals of an exact fit, relative to the initial one */
 #define SOLVE_ROUND_OFF 1e-12 /* the same, relative to the norm of the data: round-off of a run */
 #define SOLVE_TOLERANCE 1e-10 /* of GSL: relative step in u, and gradient */
 enum { SOLVE_ITERATIONS = 100 /* of a search, at most */ };
@@ -251,9 +251,9 @@ static int solve_converged (const pw_fit *fit, const gsl_matrix *J) {
 static void solve_covariance (pw_fit *fit) {
   const double *length = fit->column_length;
   int n = fit->unknowns.count;
-  double least = fmax (SOLVE_RANK, 10 * pw_fit_derivative_error (fit)) * fit->singular_value[0];
+  double least = fmax (SOLVE_RANK, 10 /* a margin */ * pw_fit_derivative_error (fit)) * fit->singular_value[0];
   for (fit->rank = 0; fit->rank < n && fit->singular_value[fit->rank] > least;) fit->rank++;
-  int freedom = pw_fit_freedom (fit);
+  int freedom = pw_fit_degrees_of_freedom (fit);
   double variance = fit->weighted ? 1 : freedom > 0 ? fit->chi2 / freedom : NAN;
   for (int i = 0; i < n; i++)
     for (int j = 0; j < n; j++) {

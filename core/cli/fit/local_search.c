@@ -188,7 +188,7 @@ static void search_evaluate (local_search *local, const double *scaled, int slop
   if (status == PW_RESOURCE) search_end_all (local, &error);
 }
 
-/* The derivatives of factor x output i, unless `gradient` is NULL. */
+/* Stores the derivatives of factor x output i, 0 if they are unknown, unless `gradient` is NULL. */
 static void search_gradient (const local_search *local, int i, double factor, double *gradient) {
   int unknowns = local->problem->unknowns.count;
   for (int j = 0; gradient && j < unknowns; j++)
@@ -220,7 +220,8 @@ static void search_constraints (unsigned count, double *violation, unsigned unkn
 
 /* ---- Searches ---- */
 
-/* BOBYQA and COBYLA need no derivatives; BOBYQA, the faster one, needs two unknowns and no constraints. */
+/* SLSQP uses derivatives.  Without them BOBYQA is the fastest one, but takes no constraints, which COBYLA does, nor a
+ * single unknown, which SBPLX does. */
 static nlopt_algorithm search_algorithm (const local_search *local) {
   if (local->slope) return NLOPT_LD_SLSQP;
   if (local->problem->outputs > 1) return NLOPT_LN_COBYLA;

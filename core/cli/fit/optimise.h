@@ -9,14 +9,14 @@
 
 /* A local search and its runs. */
 typedef struct {
-  double *from, *to; /* unknowns: where it begins; those of its best run that satisfies the constraints, its result */
-  double *output;    /* outputs: of that run */
-  int feasible;      /* 1: there is such a run */
-  int converged;     /* 0: the search ended at its limit of runs */
-  long runs, failed; /* number of runs; of those that failed */
-  long derivatives;  /* number of points at which derivatives were computed */
-  double *trials;    /* runs x (unknowns + outputs): all runs; outputs of failed ones are NaN */
-  size_t allocated;  /* rows of `trials` */
+  double *from, *to;    /* unknowns: where it begins; its result, the best run that satisfies the constraints */
+  double *output;       /* outputs: of that run */
+  int feasible;         /* 1: there is such a run */
+  int converged;        /* 0: the search ended at its limit of runs */
+  long runs, failed;    /* number of runs; of those that failed */
+  long derivatives;     /* number of points at which derivatives were computed */
+  double *trials;       /* runs x (unknowns + outputs): all runs; outputs of failed ones are NaN */
+  size_t allocated;     /* rows of `trials` */
   pw_error first_error; /* of the first failed run */
 } pw_search;
 
@@ -30,8 +30,8 @@ typedef struct {
   pw_arena arena;      /* of the arrays below, except trials */
   const char **output; /* outputs, as text: the objective, then the left sides of the constraints */
   char (*unit)[80];    /* outputs */
-  double *sign;        /* outputs: 1 or -1; sign x objective is minimised, */
-  double *bound;       /* outputs: under the constraints sign x (output - bound) <= 0; [0] is not used */
+  double *sign;        /* outputs: 1 or -1; of the objective: sign x objective is minimised */
+  double *bound;       /* outputs: of a constraint: sign x (output - bound) <= 0 */
   int outputs, starts, jobs;
   int refinements;    /* searches that continue from the best results of the starts, with smaller last steps */
   int differentiable; /* 1: outputs have derivatives, except where a motion has none */
