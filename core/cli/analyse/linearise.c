@@ -159,16 +159,6 @@ static int linearise_write (pw_linearise_command *cmd, pw_error *error) {
   return status == PW_OK ? pw_files_finish (&cmd->files, error) : status;
 }
 
-static void linearise_close (pw_linearise_command *cmd) {
-  pw_linear_free (&cmd->linear);
-  pw_files_close (&cmd->files);
-  pw_run_close (cmd->r);
-  free (cmd->initial);
-  free (cmd->input);
-  free (cmd->output);
-  pw_cli_close_model (&cmd->m);
-}
-
 static int linearise_command (void *options, pw_error *error) {
   pw_linearise_command *cmd = options;
   int status = pw_cli_number ("--at", cmd->t_text, PW_NONNEGATIVE, &cmd->t, error);
@@ -180,7 +170,13 @@ static int linearise_command (void *options, pw_error *error) {
   if (status == PW_OK) status = linearise_compute (cmd, error);
   if (status == PW_OK) pw_linearise_print (cmd);
   if (status == PW_OK) status = linearise_write (cmd, error);
-  linearise_close (cmd);
+  pw_linear_free (&cmd->linear);
+  pw_files_close (&cmd->files);
+  pw_run_close (cmd->r);
+  free (cmd->initial);
+  free (cmd->input);
+  free (cmd->output);
+  pw_cli_close_model (&cmd->m);
   if (status == PW_RETRY) pw_cli_say ("pinwheel: interrupted\n");
   return status == PW_RETRY ? PW_INTERRUPTED : status;
 }

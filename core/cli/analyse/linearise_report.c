@@ -12,7 +12,7 @@
 enum {
   LINEARISE_DIGITS = 5, /* of numbers in the text */
   LINEARISE_MODES = 12, /* mode shapes in the text, at most */
-  LINEARISE_BODIES = 20 /* bodies in each, at most, and internal coordinates of elements, at most */
+  LINEARISE_ROWS = 20   /* in each: bodies, at most, and internal coordinates of elements, at most */
 };
 #define LINEARISE_SMALL 1e-9 /* components of mode shapes below it are printed as 0: the largest is 1 */
 
@@ -88,25 +88,26 @@ static void linearise_print_component (pw_table *t, const pw_linear *l, int mode
 
 static void linearise_print_mode (const pw_linearise_command *cmd, int mode) {
   const pw_system *s = cmd->m.system;
-  int bodies = pw_system_bodies (s), shown = bodies < LINEARISE_BODIES ? bodies : LINEARISE_BODIES;
+  int bodies = pw_system_bodies (s), internal = pw_system_coordinates (s) - 3 * bodies;
   char name[300];
   printf ("\nMode %d\n", mode + 1);
   for (pw_table t = { 0 }; pw_table_pass (&t);) {
     static const char *const head[] = { "", "x [m]", "y [m]", "phi [rad]" };
     for (int k = 0; k < 4; k++) pw_cell (&t, k ? 12 : -12, head[k]);
     pw_row_end (&t);
-    for (int b = 0; b < shown; b++) {
+    for (int b = 0; b < bodies && b < LINEARISE_ROWS; b++) {
       pw_cell (&t, -12, pw_system_body_name (s, b));
       for (int k = 0; k < 3; k++) linearise_print_component (&t, &cmd->linear, mode, 3 * b + k);
       pw_row_end (&t);
     }
-    for (int j = 3 * bodies; j < pw_system_coordinates (s) && j < 3 * bodies + LINEARISE_BODIES; j++) {
+    for (int j = 3 * bodies; j < 3 * bodies + internal && j < 3 * bodies + LINEARISE_ROWS; j++) {
       pw_cell_unit (&t, -12, pw_system_state_name (s, j, name, sizeof name), pw_system_state_unit (s, j));
       linearise_print_component (&t, &cmd->linear, mode, j);
       pw_row_end (&t);
     }
   }
-  if (shown < bodies) printf ("  and %d more bodies\n", bodies - shown);
+  if (bodies > LINEARISE_ROWS) printf ("  and %d more bodies\n", bodies - LINEARISE_ROWS);
+  if (internal > LINEARISE_ROWS) printf ("  and %d more internal coordinates\n", internal - LINEARISE_ROWS);
 }
 
 static void linearise_print_shapes (const pw_linearise_command *cmd) {

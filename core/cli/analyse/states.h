@@ -19,10 +19,10 @@ enum { PW_STEADY_NOT_RANDOM = 2 }; /* attempts of pw_steady_solve that begin at 
  * messages.  PW_INPUT if there is none, with the nearest name, or it is held already. */
 int pw_hold_add (const pw_system *s, const char *option, const char *text, const char *name, double value,
                  pw_initial_value *hold, int *holds, pw_error *error);
-/* Adds those of each --hold "STATE=VALUE"; `texts` ends with NULL, or is NULL. */
+/* Adds the quantity of each --hold "STATE=VALUE"; `texts` ends with NULL, or is NULL. */
 int pw_hold_read (const pw_system *s, const char **texts, pw_initial_value *hold, int *holds, pw_error *error);
 
-/* The value, or 0 if it is smaller than that in modulus, as by round-off. */
+/* The value, or 0 if its modulus is below `smallest`. */
 static inline double pw_rounded (double value, double smallest) {
   return fabs (value) < smallest ? 0 : value;
 }

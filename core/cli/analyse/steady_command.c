@@ -260,15 +260,6 @@ static int steady_compute (pw_steady_command *cmd, pw_error *error) {
   return status;
 }
 
-static void steady_close (pw_steady_command *cmd) {
-  pw_files_close (&cmd->files);
-  for (int i = 0; i < cmd->points; i++) free (cmd->point[i].state);
-  free (cmd->point);
-  free (cmd->end);
-  pw_steady_close (cmd->search);
-  pw_cli_close_model (&cmd->m);
-}
-
 static int steady_command (void *options, pw_error *error) {
   pw_steady_command *cmd = options;
   int status = pw_cli_open (&cmd->m, &cmd->line, error);
@@ -278,7 +269,12 @@ static int steady_command (void *options, pw_error *error) {
   if (status == PW_OK) status = steady_compute (cmd, error);
   if (status == PW_OK && cmd->points) pw_steady_print (cmd);
   if (status == PW_OK && cmd->points && cmd->folder) status = pw_steady_write (cmd, error);
-  steady_close (cmd);
+  pw_files_close (&cmd->files);
+  for (int i = 0; i < cmd->points; i++) free (cmd->point[i].state);
+  free (cmd->point);
+  free (cmd->end);
+  pw_steady_close (cmd->search);
+  pw_cli_close_model (&cmd->m);
   return status == PW_OK && cmd->stopped ? pw_cli_incomplete (&cmd->line, error) : status;
 }
 

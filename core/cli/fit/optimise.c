@@ -243,21 +243,17 @@ static int optimise_finish (pw_optimise *problem, pw_error *error) {
   return status == PW_OK && !converged ? pw_fail (error, unconverged.status, "%s", unconverged.text) : status;
 }
 
-static void optimise_close (pw_optimise *problem) {
-  for (int i = 0; problem->search && i < problem->starts + OPTIMISE_REFINED; i++) free (problem->search[i].trials);
-  pw_arena_free (&problem->arena);
-  pw_files_close (&problem->files);
-  pw_unknowns_close (&problem->unknowns);
-  pw_cli_close_model (&problem->model);
-}
-
 static int optimise_command (void *options, pw_error *error) {
   pw_optimise *problem = options;
   int status = optimise_read (problem, error);
   if (status == PW_OK) status = optimise_open (problem, error);
   if (status == PW_OK) status = optimise_search (problem, error);
   if (status == PW_OK) status = optimise_finish (problem, error);
-  optimise_close (problem);
+  for (int i = 0; problem->search && i < problem->starts + OPTIMISE_REFINED; i++) free (problem->search[i].trials);
+  pw_arena_free (&problem->arena);
+  pw_files_close (&problem->files);
+  pw_unknowns_close (&problem->unknowns);
+  pw_cli_close_model (&problem->model);
   return status;
 }
 
