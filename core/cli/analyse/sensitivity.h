@@ -45,7 +45,7 @@ int pw_sensitivity_at (pw_sensitivity *sens, double t, pw_error *error);
 /* Starts the run, advances it to the end, and computes all results except `loose`.  PW_OK, too, if it is stopped on the
  * way. */
 int pw_sensitivity_compute (pw_sensitivity *sens, const double *values, pw_progress *progress, pw_error *error);
-void pw_sensitivity_close (pw_sensitivity *sens); /* the unknowns stay */
+void pw_sensitivity_close (pw_sensitivity *sens); /* but not its unknowns */
 /* 1 if an output is in the table: it is a function of columns at one time, without extrema and integrals. */
 int pw_sensitivity_in_table (const pw_sensitivity *sens, int output);
 /* The derivative of an output with respect to an unknown from those of the functionals, slope or run_slope; or its

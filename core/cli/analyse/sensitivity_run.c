@@ -122,7 +122,8 @@ static double sensitivity_jump_slope (const pw_sensitivity *sens, int unknown, i
   return slope;
 }
 
-/* Makes the current derivatives of column i those of the functional, except where they do not exist, NaN. */
+/* Makes the current derivatives of the column of functional i those of the functional, unless these are NaN: they do
+ * not exist. */
 static void sensitivity_keep (pw_sensitivity *sens, int i) {
   for (int at = i * sens->unknowns.count; at < (i + 1) * sens->unknowns.count; at++)
     if (!isnan (sens->run_slope[at]))

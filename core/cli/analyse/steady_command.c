@@ -213,7 +213,7 @@ static double steady_model_value (const pw_steady_command *cmd) {
                                pw_system_initial_v (s));
 }
 
-/* If the quantities held leave a family of motions, holds more of them, at their values in the motion nearest to the
+/* If the quantities held leave a family of motions, holds further ones, at their values in the motion nearest to the
  * initial state. */
 static int steady_hold_more (pw_steady_command *cmd, pw_error *error) {
   const pw_system *s = cmd->m.system;

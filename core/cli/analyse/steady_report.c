@@ -21,8 +21,8 @@ static void steady_cell (pw_table *t, double value) {
   pw_cell_number (t, 12, pw_rounded (value, STEADY_SMALL), STEADY_DIGITS);
 }
 
-/* Prints real part and frequency of the rightmost eigenvalue, without those that are 0 or of rigid displacements; at an
- * event, of the one that crosses the imaginary axis. */
+/* Prints real part and frequency of the rightmost eigenvalue that is neither 0 nor of a rigid displacement; at an event,
+ * of the one that crosses the imaginary axis.  Eigenvalues are in descending order of their real parts. */
 static void steady_cells_rightmost (pw_table *t, const pw_steady_point *p) {
   const pw_linear *l = &p->linear;
   int best = -1, crossing = p->motion.event != PW_STEADY_POINT;
@@ -213,8 +213,8 @@ static int steady_csv (const void *context, FILE *f, pw_error *error) {
 
 /* ---- The figure ---- */
 
-/* Whether the branch is stable from p to the next point: an event does not count what changes there, so that the next
- * point decides. */
+/* Whether the branch is stable from p to the next point.  At an event, where `unstable` does not count the modes that
+ * change, the next point decides. */
 static int steady_is_stable (const pw_steady_point *p) {
   return (p->motion.event == PW_STEADY_POINT ? p : p + 1)->motion.unstable == 0;
 }

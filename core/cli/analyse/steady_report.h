@@ -9,8 +9,8 @@
 typedef struct {
   int branch;              /* number of its branch, from 1; without --vary the number of the motion */
   int attempt;             /* number of the attempt of pw_steady_solve that found it */
-  pw_steady_motion motion; /* its arrays are in `state`; its `linear` is NULL */
-  pw_linear linear;        /* of its linearisation twist, unknowns, re, im and rigid, arrays in `state`, too */
+  pw_steady_motion motion; /* its arrays are in `state`; motion.linear is NULL */
+  pw_linear linear;        /* twist, unknowns, and in `state` re, im, rigid; the other members are not set */
   double *state;           /* q, v, re, im, rigid */
   char advice[200];        /* options that select it within its family, " --hold NAME=VALUE..." */
 } pw_steady_point;

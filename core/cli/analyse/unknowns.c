@@ -176,8 +176,8 @@ static double unknown_step (const pw_unknown *u, double value, const pw_run *r) 
   return PW_UNKNOWN_STEP * fmax (size > 0 ? size : 1, 1e-3 * u->scale);
 }
 
-/* Keeps the neighbours within the domain of a parameter: in an open one, > 0, by a step of at most value / 4; next to a
- * bound that belongs to the domain, 0 or 1, by differences on its inner side alone. */
+/* Keeps the neighbours within the domain of a parameter: in the open domain > 0 by a step of at most value / 4, next to
+ * a bound that belongs to the domain, 0 or 1, by neighbours on its inner side alone. */
 static void unknown_stay_inside (const pw_unknown *u, double value, pw_direction *d) {
   pw_domain domain = u->parameter ? u->parameter->domain : PW_REAL;
   if (domain == PW_POSITIVE) d->step = fmin (d->step, value / 4);

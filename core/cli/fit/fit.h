@@ -61,8 +61,8 @@ int pw_fit_jacobian (pw_fit *fit, const double *unknowns, const double *values, 
 /* Relative error of these derivatives. */
 double pw_fit_derivative_error (const pw_fit *fit);
 
-/* Minimises the sum of squares from all starts and sets the results, which fit->estimate and fit->minima own.  A
- * status; PW_RETRY after Ctrl-C. */
+/* Minimises the sum of squares from all starts and sets the results.  Free fit->minima and fit->estimate, whose memory
+ * the arrays after it share, in every case.  A status; PW_RETRY after Ctrl-C. */
 int pw_fit_solve (pw_fit *fit, pw_error *error);
 
 static inline int pw_fit_degrees_of_freedom (const pw_fit *fit) {

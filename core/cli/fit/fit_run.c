@@ -64,8 +64,8 @@ typedef struct {
   pw_error *error;                  /* of each task */
 } jacobian_differences;
 
-/* The relative step is the cube root of the noise: it balances the truncation error of central differences, the square
- * of the step, and their noise over the step.  Then both are noise^(2/3). */
+/* The relative step h is the cube root of the noise, which balances the truncation error of central differences, of
+ * order h^2, and the effect of the noise, noise / h: both are noise^(2/3). */
 static int jacobian_side (void *context, int task, pw_error *error) {
   jacobian_differences *d = context;
   const pw_fit *fit = d->fit;

@@ -220,8 +220,8 @@ static void search_constraints (unsigned count, double *violation, unsigned unkn
 
 /* ---- Searches ---- */
 
-/* SLSQP uses derivatives.  Without them BOBYQA is the fastest one, but takes no constraints, which COBYLA does, nor a
- * single unknown, which SBPLX does. */
+/* SLSQP uses derivatives.  Without them BOBYQA is the fastest, but takes neither constraints, as COBYLA does, nor a
+ * single unknown, as SBPLX does. */
 static nlopt_algorithm search_algorithm (const local_search *local) {
   if (local->slope) return NLOPT_LD_SLSQP;
   if (local->problem->outputs > 1) return NLOPT_LN_COBYLA;

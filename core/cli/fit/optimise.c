@@ -204,8 +204,8 @@ static int optimise_infeasible (const pw_optimise *problem, pw_error *error) {
                   problem->sign[i] > 0 ? "most" : "least", pw_format (bound, problem->bound[i], 9), unit);
 }
 
-/* PW_METHOD if the search with the best result ended at its limit of runs, or at a very large value of an unknown
- * without bounds. */
+/* PW_METHOD if the search with the best result did not converge, or ended at a very large value of an unknown without
+ * bounds. */
 static int optimise_converged (const pw_optimise *problem, pw_error *error) {
   const pw_search *search = problem->best;
   const pw_unknown *farthest = NULL;

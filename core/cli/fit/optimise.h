@@ -12,7 +12,7 @@ typedef struct {
   double *from, *to;    /* unknowns: where it begins; its result, the best run that satisfies the constraints */
   double *output;       /* outputs: of that run */
   int feasible;         /* 1: there is such a run */
-  int converged;        /* 0: the search ended at its limit of runs */
+  int converged;        /* 0: the search ended at its limit of runs, or NLopt failed */
   long runs, failed;    /* number of runs; of those that failed */
   long derivatives;     /* number of points at which derivatives were computed */
   double *trials;       /* runs x (unknowns + outputs): all runs; outputs of failed ones are NaN */
