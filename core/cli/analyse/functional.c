@@ -240,10 +240,10 @@ static int functional_end (pw_outcomes *set, pw_run *r, pw_error *error) {
   return step.status;
 }
 
-int pw_outcomes_read (pw_outcomes *set, const pw_sample *s, double *value, pw_error *error) {
+int pw_outcomes_read (pw_outcomes *set, const pw_sample *s, double *value, int stride, pw_error *error) {
   int status = functional_find_contacts (set, s, error);
   for (int i = 0; status == PW_OK && i < set->functionals; i++)
-    value[i] = functional_read (set, set->functional + i, s);
+    value[i * stride] = functional_read (set, set->functional + i, s);
   return status;
 }
 

@@ -102,8 +102,8 @@ int pw_outcomes_open (pw_outcomes *set, const pw_system *s, const char *option, 
                       pw_error *error);
 void pw_outcomes_close (pw_outcomes *set);
 
-/* Stores the columns of all functionals in a sample: set->functionals values. */
-int pw_outcomes_read (pw_outcomes *set, const pw_sample *s, double *value, pw_error *error);
+/* Stores the column of functional i in a sample as value[i x stride]. */
+int pw_outcomes_read (pw_outcomes *set, const pw_sample *s, double *value, int stride, pw_error *error);
 /* Evaluates the functionals along a run to t_end; settings.stop_context is a pw_limit.  A status: that of
  * pw_limit_status if the run is stopped. */
 int pw_outcomes_run (pw_outcomes *set, const char *method, const pw_settings *settings, double t_end, pw_error *error);

@@ -79,7 +79,7 @@ int pw_sensitivity_at (pw_sensitivity *sens, double t, pw_error *error) {
   const int P = sens->unknowns.count;
   int status = pw_variation_advance (sens->variation, t, sens->unknowns.t_end, error);
   if (status == PW_OK) status = sensitivity_sample (sens, t, &s, error);
-  if (status == PW_OK) status = pw_outcomes_read (&sens->outcomes, &s, sens->value, error);
+  if (status == PW_OK) status = pw_outcomes_read (&sens->outcomes, &s, sens->value, 1, error);
   for (int p = 0; p < P && status == PW_OK; p++) {
     status = pw_variation_sample (sens->variation, p, &derivative, &slope_error, error);
     for (int i = 0; i < sens->outcomes.functionals && status == PW_OK; i++) {

@@ -21,8 +21,8 @@ static void steady_cell (pw_table *t, double value) {
   pw_cell_number (t, 12, pw_rounded (value, STEADY_SMALL), STEADY_DIGITS);
 }
 
-/* Prints real part and frequency of the rightmost eigenvalue that is neither 0 nor of a rigid displacement; at an event,
- * of the one that crosses the imaginary axis.  Eigenvalues are in descending order of their real parts. */
+/* Prints real part and frequency of the rightmost eigenvalue, the first one that is neither 0 nor of a rigid
+ * displacement; at an event, of the one that crosses the imaginary axis. */
 static void steady_cells_rightmost (pw_table *t, const pw_steady_point *p) {
   const pw_linear *l = &p->linear;
   int best = -1, crossing = p->motion.event != PW_STEADY_POINT;

@@ -12,16 +12,14 @@
 
 /* ---- Runs ---- */
 
-/* Stores the columns at the times of the data in `out`, columns x rows; row: scratch for one row. */
-static int fit_sample (const pw_fit *fit, pw_outcomes *outcomes, pw_run *run, double *out, double *row,
-                       pw_error *error) {
+/* Stores the columns at the times of the data in `out`, columns x rows. */
+static int fit_sample (const pw_fit *fit, pw_outcomes *outcomes, pw_run *run, double *out, pw_error *error) {
   pw_sample sample;
   int status = PW_OK;
   for (int k = 0; k < fit->rows && status == PW_OK; k++) {
     status = pw_run_advance_to (run, fit->t[k], fit->unknowns.t_end, error);
     if (status == PW_OK) status = pw_run_sample (run, fit->t[k], &sample, error);
-    if (status == PW_OK) status = pw_outcomes_read (outcomes, &sample, row, error);
-    for (int i = 0; i < fit->columns && status == PW_OK; i++) out[i * fit->rows + k] = row[i];
+    if (status == PW_OK) status = pw_outcomes_read (outcomes, &sample, out + k, fit->rows, error);
   }
   return status;
 }
@@ -29,18 +27,15 @@ static int fit_sample (const pw_fit *fit, pw_outcomes *outcomes, pw_run *run, do
 int pw_fit_run (const pw_fit *fit, const double *unknowns, double *out, pw_error *error) {
   pw_outcomes outcomes = { .system = NULL };
   pw_unknown_run run;
-  double *row = calloc ((size_t)fit->columns, sizeof *row);
-  if (row == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
   int status = pw_unknown_run_prepare (&run, &fit->unknowns, unknowns, error);
   if (status == PW_OK)
     status = pw_outcomes_open (&outcomes, run.m.system, "--columns", fit->column_name, fit->columns, error);
   run.settings.ledger = outcomes.ledger;
   if (status == PW_OK) run.run = pw_run_open (run.m.system, fit->unknowns.method, &run.settings, error);
-  if (status == PW_OK) status = run.run ? fit_sample (fit, &outcomes, run.run, out, row, error) : error->status;
+  if (status == PW_OK) status = run.run ? fit_sample (fit, &outcomes, run.run, out, error) : error->status;
   if (status == PW_STOPPED) status = pw_limit_status (&run.limit, pw_run_time (run.run), error);
   pw_outcomes_close (&outcomes);
   pw_unknown_run_close (&run);
-  free (row);
   return status;
 }
 

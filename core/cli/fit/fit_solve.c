@@ -143,13 +143,18 @@ static void solve_progress (const size_t iteration, void *context, const gsl_mul
   pw_progress_at (&solver->fit->progress, solver->fit->iterations);
 }
 
+/* The sum of squares of (values - data) / sigma, or of data / sigma if `values` is NULL. */
+static double solve_sum (const pw_fit *fit, const double *values) {
+  double sum = 0;
+  for (int i = 0; i < fit->columns * fit->rows; i++)
+    if (!isnan (fit->data[i])) sum += pow (((values ? values[i] : 0) - fit->data[i]) / fit->sigma[i], 2);
+  return sum;
+}
+
 /* Stores the sum of squares and the values at the minimum that a search has reached. */
 static void solve_keep (fit_solver *solver, double *minimum) {
-  const pw_fit *fit = solver->fit;
-  *minimum = 0;
-  for (int i = 0; i < fit->columns * fit->rows; i++)
-    if (!isnan (fit->data[i])) *minimum += pow ((solver->values[i] - fit->data[i]) / fit->sigma[i], 2);
-  memcpy (minimum + 1, solver->unknowns, (size_t)fit->unknowns.count * sizeof *solver->unknowns);
+  *minimum = solve_sum (solver->fit, solver->values);
+  memcpy (minimum + 1, solver->unknowns, (size_t)solver->fit->unknowns.count * sizeof *solver->unknowns);
   if (!(*minimum < solver->least)) return;
   solver->least = *minimum;
   solve_store (solver, *minimum);
@@ -220,14 +225,6 @@ static void solve_scale (pw_fit *fit, gsl_matrix *J) {
   }
 }
 
-/* The norm of the data in units of their standard deviations. */
-static double solve_data_norm (const pw_fit *fit) {
-  double sum = 0;
-  for (int i = 0; i < fit->columns * fit->rows; i++)
-    if (!isnan (fit->data[i])) sum += fit->data[i] / fit->sigma[i] * (fit->data[i] / fit->sigma[i]);
-  return sqrt (sum);
-}
-
 /* At a minimum the residuals are very small or orthogonal to the columns of J, which have length 1; unknowns at a bound
  * do not count. */
 static int solve_converged (const pw_fit *fit, const gsl_matrix *J) {
@@ -242,7 +239,7 @@ static int solve_converged (const pw_fit *fit, const gsl_matrix *J) {
     worst = fmax (worst, fabs (dot));
   }
   return worst <= cosine * norm ||
-         norm < fmax (SOLVE_EXACT * sqrt (fit->initial_chi2), SOLVE_ROUND_OFF * solve_data_norm (fit));
+         norm < fmax (SOLVE_EXACT * sqrt (fit->initial_chi2), SOLVE_ROUND_OFF * sqrt (solve_sum (fit, NULL)));
 }
 
 /* J D^-1 = U S V^T, where D has the lengths of the columns of J: the covariance of the unknowns is
