@@ -58,7 +58,9 @@ static int periodic_read_options (pw_periodic_command *cmd, pw_error *error) {
   cmd->settings.first = cmd->vary.first, cmd->settings.last = cmd->vary.last;
   cmd->settings.compile = pw_vary_compile;
   cmd->settings.context = &cmd->vary;
-  return cmd->vary.parameter ? PW_OK : pw_model_set (cmd->m.model, cmd->vary.name, cmd->settings.first, error);
+  if (cmd->vary.parameter == NULL) /* fails with the nearest name */
+    return pw_model_set (cmd->m.model, cmd->vary.name, cmd->settings.first, error);
+  return PW_OK;
 }
 
 /* ---- The search ---- */

@@ -15,13 +15,8 @@ int pw_unknown_find (pw_unknown *u, const pw_cli_model *m, const char *name, pw_
     snprintf (u->unit, sizeof u->unit, "%s", u->parameter->unit ? u->parameter->unit : "");
     return PW_OK;
   }
-  if (strchr (name, '.') == NULL) {
-    /* Setting an unknown parameter, in a model that is not built yet, fails with the nearest name. */
-    pw_model *copy = pw_file_model (m->file, error);
-    if (copy) pw_model_set (copy, name, 0, error);
-    pw_model_free (copy);
-    return error->status;
-  }
+  if (strchr (name, '.') == NULL) /* no parameter: fails with the nearest name */
+    return pw_model_set (m->model, name, 0, error);
   u->state = pw_system_find_state (m->system, name, error);
   if (u->state < 0) return error->status;
   int n = pw_system_coordinates (m->system);
@@ -113,22 +108,12 @@ int pw_unknowns_read (pw_unknowns *u, const char **list, pw_error *error) {
 
 /* ---- Runs ---- */
 
-typedef int unknown_setter (pw_model *m, const char *name, double value, pw_error *error);
-
-/* Sets the unknowns that are parameters, by pw_model_set, or those that are states, by pw_model_set_initial. */
-static int unknown_set (pw_model *m, const pw_unknowns *u, const double *x, unknown_setter *set, pw_error *error) {
-  int status = PW_OK;
-  for (int i = 0; i < u->count && status == PW_OK; i++)
-    if ((u->list[i].parameter != NULL) == (set == pw_model_set)) status = set (m, u->list[i].name, x[i], error);
-  return status;
-}
-
 int pw_unknowns_system (pw_cli_model *m, const pw_unknowns *u, const double *x, pw_error *error) {
   *m = (pw_cli_model){ .model = pw_file_model (u->m->file, error) };
   int status = m->model ? pw_cli_apply (m->model, "--set", u->line->sets, pw_model_set, error) : error->status;
-  if (status == PW_OK) status = unknown_set (m->model, u, x, pw_model_set, error);
   if (status == PW_OK) status = pw_cli_apply (m->model, "--start", u->line->starts, pw_model_set_initial, error);
-  if (status == PW_OK) status = unknown_set (m->model, u, x, pw_model_set_initial, error);
+  for (int i = 0; i < u->count && status == PW_OK; i++)
+    status = (u->list[i].parameter ? pw_model_set : pw_model_set_initial) (m->model, u->list[i].name, x[i], error);
   if (status == PW_OK) status = pw_model_build (m->model, error);
   if (status == PW_OK) m->system = pw_system_compile (m->model, error);
   return m->system ? PW_OK : error->status;
