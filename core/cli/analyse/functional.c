@@ -1,9 +1,9 @@
 /* Functionals of columns, evaluated along a run.
  *
  * Each step, of size h, is sampled at its middle and end: with its beginning, a column has the values x0, xm and x1.
- * Where it bends little, |x0 - 2 xm + x1| < 1e-4 max |x|, Simpson's formula gives its integral: for x = cos (w t) the
- * left side is (w h)^2 / 4 and the relative error of the formula (w h)^4 / 2880, so 6e-11.  Where it is nearly linear,
- * |x0 - 2 xm + x1| < |x1 - x0| / 5, the parabola through the three values is monotonic: the extremum is at an end.
+ * Where its bend |x0 - 2 xm + x1| is below 1e-4 max |x|, Simpson's formula gives its integral: for x = cos (w t) the
+ * bend is at most (w h)^2 / 4, and the relative error of the formula (w h)^4 / 2880, so 6e-11.  Where the bend is below
+ * |x1 - x0| / 5, the parabola through the three values is monotonic: the extremum is at an end.
  *
  * Otherwise the step is sampled at the 5 nodes of the Gauss-Legendre formula.  Integrals: the step is halved, at most
  * 4 times, until the interpolatory formula of nodes 1, 3 and 5 agrees to 1e-3 of the largest value.  For cos (w t) in
@@ -17,9 +17,9 @@
 #include "cli.h"
 #include "outcome.h"
 
-#define FUNCTIONAL_PARABOLA 1e-4
-#define FUNCTIONAL_LINEAR 0.2
-#define FUNCTIONAL_AGREE 1e-3
+#define FUNCTIONAL_SIMPSON 1e-4 /* largest bend for Simpson's formula, relative to max |x| */
+#define FUNCTIONAL_LINEAR 0.2   /* largest bend of a column that counts as monotonic, relative to |x1 - x0| */
+#define FUNCTIONAL_AGREE 1e-3   /* largest difference of two formulas that agree, relative to the largest value */
 /* Brent's method ends when its interval has shrunk by this factor: nearer to the extremum, the column changes by less
  * than round-off. */
 #define FUNCTIONAL_WIDTH 1e-8
@@ -192,7 +192,7 @@ static void functional_sample_columns (functional_step *step, double t, int i) {
 static int functional_needs_nodes (const pw_functional *f) {
   double x0 = f->values[0], xm = f->values[FUNCTIONAL_MIDDLE], x1 = f->values[FUNCTIONAL_END],
          bend = fabs (x0 - 2 * xm + x1), largest = fmax (fabs (x0), fmax (fabs (xm), fabs (x1)));
-  if (pw_is_integral (f->type)) return bend > FUNCTIONAL_PARABOLA * largest;
+  if (pw_is_integral (f->type)) return bend > FUNCTIONAL_SIMPSON * largest;
   double lead = f->type == PW_MAX ? fmax (x0, fmax (xm, x1)) - f->value : f->value - fmin (x0, fmin (xm, x1));
   return pw_is_extremum (f->type) && bend > FUNCTIONAL_LINEAR * fabs (x1 - x0) && lead + bend + fabs (x1 - x0) > 0;
 }

@@ -31,7 +31,7 @@ static double linearise_doubling_time (double rate) {
   return rate > 0 ? log (2) / rate : NAN;
 }
 
-/* A row for each real eigenvalue and conjugate pair. */
+/* Prints a row for each real eigenvalue and each conjugate pair. */
 static void linearise_print_eigenvalues (const pw_linear *l) {
   static const char *const head[] = { "mode",    "real [1/s]",     "imaginary [1/s]", "frequency [Hz]",
                                       "damping", "doubles in [s]", "halves in [s]" };

@@ -39,7 +39,7 @@ static void steady_cells_rightmost (pw_table *t, const pw_steady_point *p) {
 
 static void steady_print_motions (const pw_steady_command *cmd) {
   const pw_system *s = cmd->m.system;
-  const int n = pw_system_coordinates (s), held[] = { 2 * n, n + 2 }; /* speed and omega of the first body */
+  const int n = pw_system_coordinates (s), held[] = { 2 * n, n + 2 }; /* (pw_system_find_held) speed, omega of body 0 */
   char name[300];
   for (pw_table t = { 0 }; pw_table_pass (&t);) {
     pw_cell (&t, 6, "motion");
