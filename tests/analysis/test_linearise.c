@@ -52,6 +52,21 @@ static void test_oscillator (void **state) {
   check_close ("along", x[1], y[2], 0, "the same input");
 }
 
+/* A body on 22 wheels, whose spins the text does not show all. */
+static void test_internal (void **state) {
+  char text[4000] = "pinwheel: 1\nbodies: [{name: car, mass: 1, inertia: 1}]\nelements:\n"
+                    "  - {spring: S, body: [ground, car], at: [[-10, 0], [0, 0]], stiffness: 350, length: 10}\n";
+  size_t used = strlen (text);
+  (void)state;
+  for (int i = 0; i < 22; i++)
+    used += (size_t)snprintf (text + used, sizeof text - used,
+                              "  - {rolling-wheel: w%d, body: car, at: [%d, 0], radius: 0.1, inertia: 0.01}\n", i, i);
+  cli_write ("wheels.yaml", text);
+  cli_good ("pinwheel linearise @/wheels.yaml");
+  linearise_shows ("  w19.spin [rad] ");
+  linearise_shows ("  and 2 more internal coordinates\n");
+}
+
 /* The archive begins with A.npy, whose 128 bytes of head describe a 2 x 2 matrix: trace and determinant as above. */
 static void test_npz (void **state) {
   char path[300], head[30 + 5 + 128];
@@ -169,8 +184,9 @@ static void test_page (void **state) {
 
 int main (void) {
   const struct CMUnitTest tests[] = {
-    cmocka_unit_test (test_oscillator), cmocka_unit_test (test_npz), cmocka_unit_test (test_page),
-    cmocka_unit_test (test_times),      cmocka_unit_test (test_bad), cmocka_unit_test (test_whirl),
+    cmocka_unit_test (test_internal), cmocka_unit_test (test_oscillator), cmocka_unit_test (test_npz),
+    cmocka_unit_test (test_page),     cmocka_unit_test (test_times),      cmocka_unit_test (test_bad),
+    cmocka_unit_test (test_whirl),
   };
   return cmocka_run_group_tests (tests, cli_setup, cli_teardown);
 }

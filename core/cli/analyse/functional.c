@@ -1,32 +1,33 @@
 /* Functionals of columns, evaluated along a run.
  *
- * Each step is sampled at its middle and end.  If a column is nearly parabolic there, |x0 - 2 xm + x1| < 1e-4 max |x|,
- * its integral is that of Simpson's formula: for x = cos (w t) the left side is (w h)^2 / 4 and the relative error of
- * the formula (w h)^4 / 2880, so 6e-11.  If it is nearly linear, |x0 - 2 xm + x1| < |x1 - x0| / 5, its slope has one
- * sign in the parabola through the three values, and the extremum is at an end.
+ * Each step, of size h, is sampled at its middle and end: with its beginning, a column has the values x0, xm and x1.
+ * Where its bend |x0 - 2 xm + x1| is below 1e-4 max |x|, Simpson's formula gives its integral: for x = cos (w t) the
+ * bend is at most (w h)^2 / 4, and the relative error of the formula (w h)^4 / 2880, so 6e-11.  Where the bend is below
+ * |x1 - x0| / 5, the parabola through the three values is monotonic: the extremum is at an end.
  *
- * Otherwise the step is sampled at the 5 nodes of the Gauss-Legendre formula.  Integrals: the step is divided until
- * the interpolatory formula of nodes 1, 3 and 5 agrees to 1e-3 of the largest value.  For cos (w t) in a part of
- * length h Gauss' formula has the relative error 4e-10 (w h / 2)^10, the other one 3e-3 (w h / 2)^4: agreement to
- * 1e-3 makes the integral accurate to 3e-11.  Extrema: the largest value at the nodes and ends, refined by Brent's
- * method between its neighbours.  Values jump at breakpoints, where steps end: a step before a jump is always sampled
- * at the nodes. */
+ * Otherwise the step is sampled at the 5 nodes of the Gauss-Legendre formula.  Integrals: the step is halved, at most
+ * 4 times, until the interpolatory formula of nodes 1, 3 and 5 agrees to 1e-3 of the largest value.  For cos (w t) in
+ * a part of length h Gauss' formula has the relative error 4e-10 (w h / 2)^10, the other one 3e-3 (w h / 2)^4:
+ * agreement to 1e-3 makes the integral accurate to 3e-11.  Extrema: the largest or least value at the nodes and ends,
+ * refined by Brent's method between its neighbours.  Values jump at breakpoints, where steps end: a step before a jump
+ * is always sampled at the nodes. */
 #include <gsl/gsl_errno.h>
 #include <gsl/gsl_min.h>
 #include <math.h>
 #include "cli.h"
 #include "outcome.h"
 
-#define FUNCTIONAL_PARABOLA 1e-4
-#define FUNCTIONAL_LINEAR 0.2
-#define FUNCTIONAL_AGREE 1e-3
-/* Brent's method ends with an interval of this part of the first one: nearer to an extremum all is round-off. */
+#define FUNCTIONAL_SIMPSON 1e-4 /* largest bend for Simpson's formula, relative to max |x| */
+#define FUNCTIONAL_LINEAR 0.2   /* largest bend of a column that counts as monotonic, relative to |x1 - x0| */
+#define FUNCTIONAL_AGREE 1e-3   /* largest difference of two formulas that agree, relative to the largest value */
+/* Brent's method ends when its interval has shrunk by this factor: nearer to the extremum, the column changes by less
+ * than round-off. */
 #define FUNCTIONAL_WIDTH 1e-8
 enum {
   FUNCTIONAL_MIDDLE = 4,                    /* index of the time in the middle of a step, see functional_times */
   FUNCTIONAL_END = PW_FUNCTIONAL_TIMES - 1, /* and at its end */
   FUNCTIONAL_DIVISIONS = 4,                 /* of a step into halves, at most */
-  FUNCTIONAL_ITERATIONS = 60                /* of Brent's method, at most; golden sections alone need 39 */
+  FUNCTIONAL_ITERATIONS = 60                /* of Brent's method, at most; golden sections alone would need 39 */
 };
 
 /* Nodes and weights of Gauss' formula (Abramowitz and Stegun, table 25.4), and weights of the interpolatory formula of
@@ -48,7 +49,7 @@ typedef struct {
 /* ---- Values ---- */
 
 /* Evaluates the contact points at a sample, if a functional needs them. */
-static int functional_prepare (pw_outcomes *set, const pw_sample *s, pw_error *error) {
+static int functional_find_contacts (pw_outcomes *set, const pw_sample *s, pw_error *error) {
   int contacts = 0;
   for (int i = 0; i < set->functionals; i++) contacts |= set->functional[i].column.type == PW_COLUMN_CONTACT;
   return contacts ? pw_workspace_contact_points (set->workspace, s->t, s->q, s->v, set->contact, error) : PW_OK;
@@ -59,10 +60,10 @@ static double functional_read (const pw_outcomes *set, const pw_functional *f, c
   return pw_column_value (set->system, f->column, s);
 }
 
-/* Samples the run at time t in the step; 0 and the status if that fails. */
+/* Samples the run at time t in the step.  Returns 0, with step->status set, if that or an earlier sample failed. */
 static int functional_sample (functional_step *step, double t, pw_sample *s) {
   if (step->status == PW_OK) step->status = pw_run_sample (step->run, t, s, step->error);
-  if (step->status == PW_OK) step->status = functional_prepare (step->set, s, step->error);
+  if (step->status == PW_OK) step->status = functional_find_contacts (step->set, s, step->error);
   return step->status == PW_OK;
 }
 
@@ -73,10 +74,6 @@ static double functional_at (functional_step *step, const pw_functional *f, doub
 }
 
 /* ---- Integrals ---- */
-
-static double functional_time (double t0, double t1, int node) {
-  return (t0 + t1) / 2 + pw_gauss_x[node] * (t1 - t0) / 2;
-}
 
 /* Adds the integral of the column, or of its square, over [t0, t1], a part of the step, from its values at the nodes,
  * or from those in the halves if the two formulas do not agree.  depth: number of divisions so far. */
@@ -92,7 +89,7 @@ static void functional_integrate (functional_step *step, pw_functional *f, doubl
   if (fabs (fine - coarse) > FUNCTIONAL_AGREE * 2 * largest && depth < FUNCTIONAL_DIVISIONS) {
     for (int half = 0; half < 2 && step->status == PW_OK; half++) {
       double from = half ? t0 + h : t0, to = half ? t1 : t0 + h, inside[PW_GAUSS_NODES];
-      for (int i = 0; i < PW_GAUSS_NODES; i++) inside[i] = functional_at (step, f, functional_time (from, to, i));
+      for (int i = 0; i < PW_GAUSS_NODES; i++) inside[i] = functional_at (step, f, pw_gauss_time (from, to, i));
       functional_integrate (step, f, from, to, inside, depth + 1);
     }
     return;
@@ -100,15 +97,9 @@ static void functional_integrate (functional_step *step, pw_functional *f, doubl
   f->value += h * fine;
 }
 
-/* Makes the mean, or root mean square, of an integral over a run of duration `span`. */
-static void functional_average (pw_functional *f, double span) {
-  if (f->type == PW_MEAN) f->value /= span;
-  if (f->type == PW_RMS) f->value = sqrt (f->value / span);
-}
-
 /* ---- Extrema ---- */
 
-/* Keeps a value if it exceeds the extremum so far. */
+/* Keeps a value if it is beyond the extremum so far. */
 static void functional_update_extremum (const functional_step *step, pw_functional *f, double t, double value) {
   if (f->type == PW_MAX ? value > f->value : value < f->value)
     f->value = value, f->t = t, f->step = step->t1 - step->t0;
@@ -117,17 +108,18 @@ static void functional_update_extremum (const functional_step *step, pw_function
 typedef struct {
   functional_step *step;
   const pw_functional *f;
-  double origin; /* of the time: GSL's tolerance is relative to the time, which may be large */
+  double origin; /* of GSL's times [s]: their tolerance is relative, and t may be large */
 } functional_search;
 
-/* What is minimised: the column, or minus it for a maximum. */
-static double functional_signed (double t, void *context) {
+/* What is minimised at a time after the origin: the column, or for a maximum its negative. */
+static double functional_signed (double after, void *context) {
   functional_search *search = context;
-  double value = functional_at (search->step, search->f, search->origin + t);
+  double value = functional_at (search->step, search->f, search->origin + after);
   return search->f->type == PW_MAX ? -value : value;
 }
 
-/* Refines an extremum between three times; value: what is minimised there, least at the second one. */
+/* Refines an extremum that lies between the first and the last of three times; value: what is minimised, at each of
+ * them, the least at the second one. */
 static void functional_refine (functional_step *step, pw_functional *f, const double t[3], const double value[3]) {
   functional_search search = { step, f, t[1] };
   gsl_function minimised = { functional_signed, &search };
@@ -148,8 +140,8 @@ static void functional_refine (functional_step *step, pw_functional *f, const do
   gsl_min_fminimizer_free (m);
 }
 
-/* The extremum over the step from values at all of its times.  It is refined if it is inside the step and, lower than
- * the lowest value by their range at most, may exceed the extremum so far. */
+/* The extremum over the step from values at all of its times.  It is refined if it is inside the step and may be beyond
+ * the extremum so far: by assumption it is beyond these values by their range at most. */
 static void functional_extremum (functional_step *step, pw_functional *f, const double *t, const double *value) {
   double y[PW_FUNCTIONAL_TIMES], range = 0;
   int best = 0;
@@ -170,7 +162,7 @@ static int functional_begin (pw_outcomes *set, pw_run *r, pw_error *error) {
   pw_sample s;
   set->t0 = set->t = pw_run_time (r);
   int status = pw_run_sample (r, set->t, &s, error);
-  if (status == PW_OK) status = functional_prepare (set, &s, error);
+  if (status == PW_OK) status = functional_find_contacts (set, &s, error);
   for (pw_functional *f = set->functional; f < set->functional + set->functionals && status == PW_OK; f++) {
     f->values[0] = functional_read (set, f, &s);
     f->value = pw_is_integral (f->type) ? 0 : f->values[0];
@@ -183,11 +175,11 @@ static int functional_begin (pw_outcomes *set, pw_run *r, pw_error *error) {
 static void functional_times (const functional_step *step, double t[PW_FUNCTIONAL_TIMES]) {
   const double h = step->t1 - step->t0;
   t[0] = step->t0, t[1] = step->t0 + PW_FUNCTIONAL_INSET * h;
-  for (int i = 0; i < PW_GAUSS_NODES; i++) t[2 + i] = functional_time (step->t0, step->t1, i);
+  for (int i = 0; i < PW_GAUSS_NODES; i++) t[2 + i] = pw_gauss_time (step->t0, step->t1, i);
   t[FUNCTIONAL_END - 1] = step->t1 - PW_FUNCTIONAL_INSET * h, t[FUNCTIONAL_END] = step->t1;
 }
 
-/* Stores the columns of all functionals at time number i of the step. */
+/* Stores the columns of all functionals at t, time number i of the step. */
 static void functional_sample_columns (functional_step *step, double t, int i) {
   pw_sample s;
   if (!functional_sample (step, t, &s)) return;
@@ -195,12 +187,12 @@ static void functional_sample_columns (functional_step *step, double t, int i) {
     f->values[i] = functional_read (step->set, f, &s);
 }
 
-/* 1 if the values at the ends and in the middle do not suffice: an integrand is no parabola; or a column is not nearly
- * linear, and in the step may exceed the extremum so far. */
+/* 1 if the values at the ends and in the middle do not suffice: the column of an integral bends too much; or that of an
+ * extremum is not nearly linear, and in the step may be beyond the extremum so far. */
 static int functional_needs_nodes (const pw_functional *f) {
   double x0 = f->values[0], xm = f->values[FUNCTIONAL_MIDDLE], x1 = f->values[FUNCTIONAL_END],
          bend = fabs (x0 - 2 * xm + x1), largest = fmax (fabs (x0), fmax (fabs (xm), fabs (x1)));
-  if (pw_is_integral (f->type)) return bend > FUNCTIONAL_PARABOLA * largest;
+  if (pw_is_integral (f->type)) return bend > FUNCTIONAL_SIMPSON * largest;
   double lead = f->type == PW_MAX ? fmax (x0, fmax (xm, x1)) - f->value : f->value - fmin (x0, fmin (xm, x1));
   return pw_is_extremum (f->type) && bend > FUNCTIONAL_LINEAR * fabs (x1 - x0) && lead + bend + fabs (x1 - x0) > 0;
 }
@@ -217,11 +209,10 @@ static void functional_simpson (const functional_step *step, pw_functional *f) {
 static int functional_advance (pw_outcomes *set, pw_run *r, pw_error *error) {
   functional_step step = { set, r, set->t, pw_run_time (r), PW_OK, error };
   double t[PW_FUNCTIONAL_TIMES];
-  int along = 0, nodes = pw_system_jumps (set->system, step.t1);
+  int nodes = pw_system_jumps (set->system, step.t1);
   pw_functional *const end = set->functional + set->functionals;
-  for (const pw_functional *f = set->functional; f < end; f++) along |= f->type != PW_FINAL;
   set->t = step.t1;
-  if (!along) return PW_OK; /* final values alone */
+  if (!set->along_run) return PW_OK;
   functional_times (&step, t);
   functional_sample_columns (&step, t[FUNCTIONAL_MIDDLE], FUNCTIONAL_MIDDLE);
   functional_sample_columns (&step, step.t1, FUNCTIONAL_END);
@@ -240,17 +231,19 @@ static int functional_advance (pw_outcomes *set, pw_run *r, pw_error *error) {
 
 static int functional_end (pw_outcomes *set, pw_run *r, pw_error *error) {
   functional_step step = { set, r, set->t, pw_run_time (r), PW_OK, error };
+  const double span = set->t - set->t0;
   for (pw_functional *f = set->functional; f < set->functional + set->functionals && step.status == PW_OK; f++) {
-    if (pw_is_integral (f->type)) functional_average (f, set->t - set->t0);
-    if (f->type == PW_FINAL) f->value = functional_at (&step, f, f->t = step.t1);
+    if (f->type == PW_MEAN) f->value /= span;
+    if (f->type == PW_RMS) f->value = sqrt (f->value / span);
+    if (f->type == PW_FINAL) f->value = functional_at (&step, f, step.t1);
   }
   return step.status;
 }
 
-int pw_outcomes_read (pw_outcomes *set, const pw_sample *s, double *value, pw_error *error) {
-  int status = functional_prepare (set, s, error);
+int pw_outcomes_read (pw_outcomes *set, const pw_sample *s, double *value, int stride, pw_error *error) {
+  int status = functional_find_contacts (set, s, error);
   for (int i = 0; status == PW_OK && i < set->functionals; i++)
-    value[i] = functional_read (set, set->functional + i, s);
+    value[i * stride] = functional_read (set, set->functional + i, s);
   return status;
 }
 

@@ -11,7 +11,7 @@ enum { LINEARISE_COORDINATES = 400 }; /* at most: the cost is cubic */
 
 /* ---- Inputs and outputs ---- */
 
-/* Stores the numbers of names, which end with NULL, each once; `find` returns the number of one. */
+/* Adds the indices of the names, which end with NULL, each once; `find` returns that of one name. */
 static int linearise_find_all (const pw_system *s, const char **name, int *list, int *count,
                                int (*find) (const pw_system *s, const char *name, pw_error *error), pw_error *error) {
   for (; *name; name++) {
@@ -23,19 +23,11 @@ static int linearise_find_all (const pw_system *s, const char **name, int *list,
   return PW_OK;
 }
 
-/* Refuses signals of constraints: their first and second derivatives are inputs as well. */
-static int linearise_check_inputs (const pw_linearise_command *cmd, pw_error *error) {
-  char name[200];
-  for (int i = 0; i < cmd->inputs; i++)
-    if (!pw_system_signal_forced (cmd->m.system, cmd->input[i]))
-      return pw_fail (error, PW_INPUT, "--input %s is the signal of a constraint; only signals of forces can be inputs",
-                      pw_system_signal_name (cmd->m.system, cmd->input[i], name, sizeof name));
-  return PW_OK;
-}
-
-/* Selects inputs and outputs: those named, else all signals of forces, and all states. */
+/* Selects inputs and outputs: those named; by default all signals of forces, and all states.  Signals of constraints
+ * are refused: their first and second time derivatives would be inputs as well. */
 static int linearise_select (pw_linearise_command *cmd, pw_error *error) {
   const pw_system *s = cmd->m.system;
+  char name[200];
   int states = 2 * pw_system_coordinates (s), signals = pw_system_signals (s);
   cmd->input = malloc (((size_t)signals + 1) * sizeof *cmd->input);
   cmd->output = malloc (((size_t)states + 1) * sizeof *cmd->output);
@@ -48,7 +40,12 @@ static int linearise_select (pw_linearise_command *cmd, pw_error *error) {
     status = linearise_find_all (s, cmd->input_names, cmd->input, &cmd->inputs, pw_system_find_signal, error);
   if (status == PW_OK && cmd->output_names)
     status = linearise_find_all (s, cmd->output_names, cmd->output, &cmd->outputs, pw_system_find_state, error);
-  return status == PW_OK ? linearise_check_inputs (cmd, error) : status;
+  for (int i = 0; i < cmd->inputs && status == PW_OK; i++)
+    if (!pw_system_signal_forced (s, cmd->input[i]))
+      status =
+          pw_fail (error, PW_INPUT, "--input %s is the signal of a constraint; only signals of forces can be inputs",
+                   pw_system_signal_name (s, cmd->input[i], name, sizeof name));
+  return status;
 }
 
 /* ---- The run ---- */
@@ -67,12 +64,12 @@ static int linearise_advance (pw_linearise_command *cmd, pw_error *error) {
   return status == PW_STOPPED ? pw_limit_status (&cmd->limit, pw_run_time (cmd->r), error) : status;
 }
 
-/* Finds the steady motion nearest to the initial state. */
+/* Finds the steady motion nearest to the initial state, with the quantities of --hold held. */
 static int linearise_solve_steady (pw_linearise_command *cmd, pw_steady *steady, pw_error *error) {
   int n = pw_system_coordinates (cmd->m.system);
   pw_steady_motion m;
   int status = steady ? PW_RETRY : error->status;
-  for (int attempt = 0; status == PW_RETRY && attempt < 2; attempt++) /* those after these begin at random states */
+  for (int attempt = 0; status == PW_RETRY && attempt < PW_STEADY_NOT_RANDOM; attempt++)
     status = pw_steady_solve (steady, attempt, 0 /* no parameter */, &m, error);
   if (status == PW_RETRY)
     return pw_fail (error, PW_METHOD,
@@ -86,19 +83,17 @@ static int linearise_solve_steady (pw_linearise_command *cmd, pw_steady *steady,
   return PW_OK;
 }
 
-/* The same with the states that --hold keeps. */
 static int linearise_find_steady (pw_linearise_command *cmd, double span, pw_error *error) {
   pw_initial_value hold[PW_HOLDS];
-  pw_steady_settings set = { .hold = hold, .t = cmd->t, .span = span, .vary = -1 };
-  int status = pw_hold_read (cmd->m.system, cmd->hold_texts, hold, &set.holds, error);
-  if (status != PW_OK) return status;
+  pw_steady_settings set = { .hold = hold, .t = cmd->t, .span = span, .vary = -1 /* none of them */ };
+  if (pw_hold_read (cmd->m.system, cmd->hold_texts, hold, &set.holds, error) != PW_OK) return error->status;
   pw_steady *steady = pw_steady_open (cmd->m.system, &set, error);
-  status = linearise_solve_steady (cmd, steady, error);
+  int status = linearise_solve_steady (cmd, steady, error);
   pw_steady_close (steady);
   return status;
 }
 
-/* Runs the model to the time of --at, and makes the state there consistent; or opens a run at the steady motion. */
+/* Runs the model to the time of --at, and makes the state reached consistent; or opens a run at the steady motion. */
 static int linearise_run (pw_linearise_command *cmd, pw_error *error) {
   pw_run_defaults d = pw_cli_defaults (pw_file_table (cmd->m.file));
   pw_settings settings;
@@ -134,7 +129,7 @@ static int linearise_compute (pw_linearise_command *cmd, pw_error *error) {
 
 /* ---- Files ---- */
 
-/* Files in the list of uses, after the model. */
+/* Indices in the list of files of linearise_open_files; 0 is the model. */
 enum { LINEARISE_JSON = 1, LINEARISE_CSV, LINEARISE_NPZ, LINEARISE_PAGE, LINEARISE_FILES };
 
 /* Opens NAME.json, .csv, .npz, and the page, before anything is computed. */
@@ -164,16 +159,6 @@ static int linearise_write (pw_linearise_command *cmd, pw_error *error) {
   return status == PW_OK ? pw_files_finish (&cmd->files, error) : status;
 }
 
-static void linearise_close (pw_linearise_command *cmd) {
-  pw_linear_free (&cmd->linear);
-  pw_files_close (&cmd->files);
-  pw_run_close (cmd->r);
-  free (cmd->initial);
-  free (cmd->input);
-  free (cmd->output);
-  pw_cli_close_model (&cmd->m);
-}
-
 static int linearise_command (void *options, pw_error *error) {
   pw_linearise_command *cmd = options;
   int status = pw_cli_number ("--at", cmd->t_text, PW_NONNEGATIVE, &cmd->t, error);
@@ -185,7 +170,13 @@ static int linearise_command (void *options, pw_error *error) {
   if (status == PW_OK) status = linearise_compute (cmd, error);
   if (status == PW_OK) pw_linearise_print (cmd);
   if (status == PW_OK) status = linearise_write (cmd, error);
-  linearise_close (cmd);
+  pw_linear_free (&cmd->linear);
+  pw_files_close (&cmd->files);
+  pw_run_close (cmd->r);
+  free (cmd->initial);
+  free (cmd->input);
+  free (cmd->output);
+  pw_cli_close_model (&cmd->m);
   if (status == PW_RETRY) pw_cli_say ("pinwheel: interrupted\n");
   return status == PW_RETRY ? PW_INTERRUPTED : status;
 }

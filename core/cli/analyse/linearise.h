@@ -1,4 +1,4 @@
-/* The command `pinwheel linearise`, its result, and the reports of that (linearise_report.c). */
+/* The command `pinwheel linearise`, its result and its reports (linearise_report.c). */
 #ifndef PW_LINEARISE_H
 #define PW_LINEARISE_H
 
@@ -8,25 +8,24 @@
 typedef struct {
   pw_cli_line line;
   const char *t_text;                       /* of --at */
-  const char *name;                         /* of -o: the files are NAME.json, NAME.csv, NAME.npz; or NULL */
+  const char *name;                         /* of -o, for the files NAME.json, NAME.csv, NAME.npz; or NULL */
   const char *page_path;                    /* of --animate, or NULL */
   const char **hold_texts;                  /* of --hold */
   int steady;                               /* 1: --steady */
-  const char **input_names, **output_names; /* as given, ended by NULL; or NULL: all */
+  const char **input_names, **output_names; /* of --input and --output, ended by NULL; or NULL: all */
   pw_cli_model m;
   pw_files files;
   pw_run *r;
-  double t;                  /* at which the run is linearised [s] */
-  pw_initial_value *initial; /* 2 coordinates: the steady motion; NULL: the model's initial state */
+  double t;                  /* of the state that is linearised [s] */
+  pw_initial_value *initial; /* 2 x coordinates: the steady motion; NULL: the model's initial state */
   pw_limit limit;
   pw_linear linear;
-  int *input, *output; /* numbers of signals u and of states y */
-  int inputs, outputs;
+  int inputs, outputs, *input, *output; /* numbers of the signals u and the states y, and their indices */
 } pw_linearise_command;
 
 /* Prints eigenvalues and mode shapes. */
 void pw_linearise_print (const pw_linearise_command *cmd);
-/* Write all as JSON; [ A B ; C D ] as a table; matrices and eigenvalues for NumPy; a page of modes.  Statuses. */
+/* Write the result as JSON, [ A B ; C D ] as a table, a page of modes, matrices and eigenvalues for NumPy; a status. */
 void pw_linearise_json (const pw_linearise_command *cmd, pw_json *j);
 int pw_linearise_csv (const pw_linearise_command *cmd, FILE *f, pw_error *error);
 int pw_linearise_page (const pw_linearise_command *cmd, FILE *f, pw_error *error);

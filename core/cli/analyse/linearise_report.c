@@ -12,15 +12,15 @@
 enum {
   LINEARISE_DIGITS = 5, /* of numbers in the text */
   LINEARISE_MODES = 12, /* mode shapes in the text, at most */
-  LINEARISE_BODIES = 20 /* bodies in each, at most, and as many internal coordinates */
+  LINEARISE_ROWS = 20   /* in each: bodies, at most, and internal coordinates of elements, at most */
 };
 #define LINEARISE_SMALL 1e-9 /* components of mode shapes below it are printed as 0: the largest is 1 */
 
-static const char *const linearise_motions[] = { "steady", "accelerated", "changing" };
+static const char *const linearise_motions[] = { "steady", "accelerated", "changing" }; /* by pw_steadiness */
 
 /* ---- Eigenvalues ---- */
 
-/* Damping ratio, the fraction of critical damping; NaN for the eigenvalue 0. */
+/* Damping ratio of mode i, the fraction of critical damping; NaN for the eigenvalue 0. */
 static double linearise_damping (const pw_linear *l, int i) {
   double modulus = hypot (l->re[i], l->im[i]);
   return modulus > 0 ? -l->re[i] / modulus + 0 : NAN; /* + 0 turns -0 into 0 */
@@ -31,7 +31,7 @@ static double linearise_doubling_time (double rate) {
   return rate > 0 ? log (2) / rate : NAN;
 }
 
-/* A row for each real eigenvalue and conjugate pair. */
+/* Prints a row for each real eigenvalue and each conjugate pair. */
 static void linearise_print_eigenvalues (const pw_linear *l) {
   static const char *const head[] = { "mode",    "real [1/s]",     "imaginary [1/s]", "frequency [Hz]",
                                       "damping", "doubles in [s]", "halves in [s]" };
@@ -72,7 +72,7 @@ static const double *linearise_shape (const pw_linear *l, int i, int state) {
   return l->shape + 2 * ((size_t)i * 2 * (size_t)l->coordinates + (size_t)state);
 }
 
-/* Prints a component of a mode shape: a real number, or amplitude and phase of a complex one, to 0.1 degrees. */
+/* Prints a component of a mode shape: a real number, or amplitude and phase of a complex one, this to 0.1 degrees. */
 static void linearise_print_component (pw_table *t, const pw_linear *l, int mode, int coordinate) {
   const double *c = linearise_shape (l, mode, coordinate);
   char text[80];
@@ -88,25 +88,26 @@ static void linearise_print_component (pw_table *t, const pw_linear *l, int mode
 
 static void linearise_print_mode (const pw_linearise_command *cmd, int mode) {
   const pw_system *s = cmd->m.system;
-  int bodies = pw_system_bodies (s), shown = bodies < LINEARISE_BODIES ? bodies : LINEARISE_BODIES;
+  int bodies = pw_system_bodies (s), internal = pw_system_coordinates (s) - 3 * bodies;
   char name[300];
   printf ("\nMode %d\n", mode + 1);
   for (pw_table t = { 0 }; pw_table_pass (&t);) {
     static const char *const head[] = { "", "x [m]", "y [m]", "phi [rad]" };
     for (int k = 0; k < 4; k++) pw_cell (&t, k ? 12 : -12, head[k]);
     pw_row_end (&t);
-    for (int b = 0; b < shown; b++) {
+    for (int b = 0; b < bodies && b < LINEARISE_ROWS; b++) {
       pw_cell (&t, -12, pw_system_body_name (s, b));
       for (int k = 0; k < 3; k++) linearise_print_component (&t, &cmd->linear, mode, 3 * b + k);
       pw_row_end (&t);
     }
-    for (int j = 3 * bodies; j < pw_system_coordinates (s) && j < 3 * bodies + LINEARISE_BODIES; j++) {
+    for (int j = 3 * bodies; j < 3 * bodies + internal && j < 3 * bodies + LINEARISE_ROWS; j++) {
       pw_cell_unit (&t, -12, pw_system_state_name (s, j, name, sizeof name), pw_system_state_unit (s, j));
       linearise_print_component (&t, &cmd->linear, mode, j);
       pw_row_end (&t);
     }
   }
-  if (shown < bodies) printf ("  and %d more bodies\n", bodies - shown);
+  if (bodies > LINEARISE_ROWS) printf ("  and %d more bodies\n", bodies - LINEARISE_ROWS);
+  if (internal > LINEARISE_ROWS) printf ("  and %d more internal coordinates\n", internal - LINEARISE_ROWS);
 }
 
 static void linearise_print_shapes (const pw_linearise_command *cmd) {
@@ -137,7 +138,8 @@ void pw_linearise_print (const pw_linearise_command *cmd) {
 
 /* ---- Matrices ---- */
 
-/* Entry of [ A B ; C D ]: rows are minimal coordinates and outputs, columns minimal coordinates and inputs. */
+/* Entry of [ A B ; C D ], whose rows belong to minimal coordinates, then outputs, and columns to minimal coordinates,
+ * then inputs; D = 0. */
 static double linearise_entry (const pw_linearise_command *cmd, int row, int column) {
   const pw_linear *l = &cmd->linear;
   int n = l->unknowns;
@@ -146,10 +148,10 @@ static double linearise_entry (const pw_linearise_command *cmd, int row, int col
   return column < n ? l->basis[cmd->output[row - n] * n + column] : 0;
 }
 
-/* Rows and columns of one of the matrices A, B, C, D in [ A B ; C D ]. */
+/* One of the matrices A, B, C, D in [ A B ; C D ]: its first row, number of rows, first column, number of columns. */
 typedef struct {
   const char *name;
-  int row, rows, column, columns; /* the first row and their number, likewise columns */
+  int row, rows, column, columns;
 } linearise_block;
 
 static void linearise_blocks (const pw_linearise_command *cmd, linearise_block block[4]) {
@@ -191,7 +193,7 @@ static void linearise_mode_json (const pw_linearise_command *cmd, pw_json *j, in
   pw_json_close (j, '}');
 }
 
-/* Names and units of inputs or outputs. */
+/* Writes names and units of the inputs or outputs with the indices of a list. */
 static void linearise_names_json (const pw_linearise_command *cmd, pw_json *j, const char *key, const int *list,
                                   int count, char *(*name_of) (const pw_system *s, int i, char *buffer, size_t size),
                                   const char *(*unit_of) (const pw_system *s, int i)) {
@@ -275,15 +277,15 @@ int pw_linearise_npz (const pw_linearise_command *cmd, FILE *f, pw_error *error)
 
 /* ---- The page of mode shapes ----
  *
- * The displacement of a mode with the eigenvalue re + i im is size Re (shape exp (i im t)), without growth; with im = 0
- * it is size shape exp (re t), which grows to size or decays from it. */
+ * The displacement of a mode with the eigenvalue re + i im is size Re (shape exp (i im t)), without its growth; with
+ * im = 0 it is size shape exp (re t) if it decays, or size shape exp (re (t - end)) if it grows, until t = end. */
 
 enum {
   PAGE_SAMPLES = 180,     /* of each mode */
-  PAGE_PERIODS = 3,       /* of an oscillation */
-  PAGE_TIME_CONSTANTS = 3 /* of a real mode */
+  PAGE_PERIODS = 3,       /* for which an oscillation is shown */
+  PAGE_TIME_CONSTANTS = 3 /* 1 / |re|, for which a mode with im = 0 is shown */
 };
-#define PAGE_SIZE 0.1 /* largest displacement, in units of the scene's length */
+#define PAGE_SIZE 0.1 /* largest displacement, relative to the length scale */
 
 typedef struct {
   const pw_linearise_command *cmd;
@@ -293,7 +295,7 @@ typedef struct {
   pw_error *error;
 } page;
 
-/* The state at time t of a mode that is shown until `end`. */
+/* Sets the state at time t of a mode that is shown until `end` [s]. */
 static void page_state (const page *p, int mode, double t, double end) {
   const pw_linear *l = &p->cmd->linear;
   const double re = l->re[mode], im = l->im[mode];
@@ -325,6 +327,8 @@ static void page_mode (const page *p, FILE *f, int mode) {
   pw_plots_close (plots);
 }
 
+/* Writes the list of modes, and the statements that show the one selected; their functions are those of
+ * animate.html. */
 static void page_begin (FILE *f, const void *context) {
   const page *p = context;
   fputs ("const modes = [", f);

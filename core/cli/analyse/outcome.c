@@ -98,11 +98,12 @@ static int outcome_add_functional (pw_outcomes *set, pw_functional_type type, pw
   if (more == NULL) return -1;
   set->functional = more;
   set->functional[set->functionals] = (pw_functional){ .type = type, .column = c };
-  set->ledger |= c.type == PW_COLUMN_LEDGER || c.type >= PW_COLUMN_PROJECTION;
+  set->ledger |= c.type > PW_COLUMN_POTENTIAL;
+  set->along_run |= type != PW_FINAL;
   return set->functionals++;
 }
 
-/* The variable of term i in a formula, "column1": names in formulas have no dots. */
+/* The variable that stands for term i in a formula, "column1": names in formulas have no dots. */
 enum { OUTCOME_VARIABLE = 20 };
 static const char *outcome_variable (char name[OUTCOME_VARIABLE], int i) {
   snprintf (name, OUTCOME_VARIABLE, "column%d", i + 1);

@@ -7,9 +7,9 @@
 #include "report.h"
 #include "util.h"
 
-enum { PERIODIC_PERIODS = 100000 }; /* of the signals in one of the motion, at most */
+enum { PERIODIC_PERIODS = 100000 }; /* of the signals in one period of the motion, at most */
 
-/* Periods of a run before each attempt, in which the motion approaches a periodic one that is stable. */
+/* Periods of a run before each attempt: in them the motion approaches a periodic one that is stable. */
 static const int periodic_settling[PW_PERIODIC_ATTEMPTS] = { 0, 10, 100 };
 
 /* ---- Options ---- */
@@ -58,7 +58,9 @@ static int periodic_read_options (pw_periodic_command *cmd, pw_error *error) {
   cmd->settings.first = cmd->vary.first, cmd->settings.last = cmd->vary.last;
   cmd->settings.compile = pw_vary_compile;
   cmd->settings.context = &cmd->vary;
-  return cmd->vary.parameter ? PW_OK : pw_model_set (cmd->m.model, cmd->vary.name, cmd->settings.first, error);
+  if (cmd->vary.parameter == NULL) /* fails with the nearest name */
+    return pw_model_set (cmd->m.model, cmd->vary.name, cmd->settings.first, error);
+  return PW_OK;
 }
 
 /* ---- The search ---- */
@@ -90,7 +92,7 @@ static int periodic_find (pw_periodic_command *cmd, pw_periodic_orbit *o, pw_err
   pw_progress_count (&progress, pw_file_name (cmd->m.file), "attempts", 0, PW_PERIODIC_ATTEMPTS);
   for (int k = 0; status == PW_RETRY && k < PW_PERIODIC_ATTEMPTS && !periodic_is_stopped (cmd); k++) {
     status = pw_periodic_solve (cmd->search, periodic_settling[k], cmd->settings.first, o, error);
-    cmd->nearest[k] = o->residual;
+    cmd->residual[k] = o->residual;
     if (o->residual <= best) snprintf (cmd->reason, sizeof cmd->reason, "%s", pw_periodic_reason (cmd->search));
     best = fmin (best, o->residual);
     pw_progress_at (&progress, k + 1);
@@ -99,14 +101,15 @@ static int periodic_find (pw_periodic_command *cmd, pw_periodic_orbit *o, pw_err
   return status;
 }
 
+/* The error if no attempt succeeded. */
 static int periodic_fail (const pw_periodic_command *cmd, pw_error *error) {
   char period[60] = "a free period", tried[200] = "";
   double T = cmd->settings.period > 0 ? cmd->settings.period : cmd->settings.periods * pw_system_period (cmd->m.system);
   if (!cmd->settings.free) snprintf (period, sizeof period, "period %.9g s", T);
   for (int k = 0; k < PW_PERIODIC_ATTEMPTS; k++) {
     size_t used = strlen (tried);
-    snprintf (tried + used, sizeof tried - used, isfinite (cmd->nearest[k]) ? "%s%d (%.2g)" : "%s%d (not begun)",
-              k ? ", " : "", periodic_settling[k], cmd->nearest[k]);
+    snprintf (tried + used, sizeof tried - used, isfinite (cmd->residual[k]) ? "%s%d (%.2g)" : "%s%d (not begun)",
+              k ? ", " : "", periodic_settling[k], cmd->residual[k]);
   }
   return pw_fail (
       error, PW_METHOD,

@@ -9,18 +9,19 @@
 #include "text.h"
 
 enum {
-  PERIODIC_SHOWN = 12,    /* multipliers, or points of a branch besides events, in the text, about */
+  PERIODIC_SHOWN = 12,    /* multipliers in the text, at most; points of a branch in it besides events, about */
   PERIODIC_BODIES = 20,   /* in the figure, at most */
-  PERIODIC_SAMPLES = 400, /* of the figure of one motion */
+  PERIODIC_SAMPLES = 400, /* of one motion, in its figure */
   PERIODIC_CURVES = 3     /* over the parameter, see periodic_curve */
 };
 #define PERIODIC_SMALL 1e-9 /* displacements [m] and rotations [rad] below it are printed as 0 */
 
+/* By pw_periodic_event. */
 static const char *const periodic_events[] = { "point", "fold", "branch point", "period doubling", "Neimark-Sacker" };
 
 /* ---- Quantities ---- */
 
-/* Displacement of the first body in one period [m]: along its initial direction, to the left of that, and in total. */
+/* Displacement of the first body in one period [m]: along its initial x axis, to the left of that, and in total. */
 typedef struct {
   double along, left, total;
 } periodic_displacement;
@@ -30,7 +31,7 @@ static periodic_displacement periodic_displace (const pw_periodic_orbit *o) {
   return (periodic_displacement){ c * x + s * y, c * y - s * x, hypot (x, y) };
 }
 
-/* The largest modulus of a multiplier that is not trivial; NaN if there is none. */
+/* The largest modulus of the multipliers that are not trivial; NaN if there is none. */
 static double periodic_largest (const pw_periodic_orbit *o) {
   return o->multipliers > o->trivial ? hypot (o->re[0], o->im[0]) : NAN;
 }
@@ -59,7 +60,7 @@ static const char *periodic_stability (const pw_periodic_orbit *o, char *text, s
   if (o->multipliers == o->trivial) return "no perturbations but shifts along symmetries";
   if (o->unstable)
     snprintf (text, size, "unstable: %d growing, the fastest by a factor of %.6g per period", o->unstable, largest);
-  else if (largest > 1 - 1e-6) /* as pw_periodic_orbit counts growing ones */
+  else if (largest > 1 - 1e-6) /* with the tolerance of pw_periodic_orbit.unstable */
     snprintf (text, size, "neutral: not all perturbations decay");
   else
     snprintf (text, size, "stable: perturbations shrink to %.6g or less per period", largest);
@@ -228,16 +229,16 @@ static int periodic_write_motion (const pw_periodic_command *cmd, const pw_perio
   return status;
 }
 
-/* Curve k over the parameter: displacement [m], largest multiplier, period [s]. */
+/* The ordinate of curve k over the parameter: displacement [m], modulus of the largest multiplier, period [s]. */
 static double periodic_curve (const pw_periodic_orbit *o, int k) {
   const periodic_displacement d = periodic_displace (o);
   return k == 0 ? periodic_round (d.total) : k == 1 ? periodic_largest (o) : o->period;
 }
 
-/* Writes the stable or unstable parts of the branch, each followed by a blank line.  A point belongs to the part
- * after it, and ends the one before; of an event, the stability is that of the next point. */
+/* Writes the stable or unstable parts of the branch, each followed by a blank line.  A point belongs to the part that
+ * begins at it and to the one that ends there.  An event has the stability of the point after it. */
 static void periodic_write_parts (const pw_periodic_command *cmd, FILE *f, int stable) {
-  int inside = 0; /* a part that is written */
+  int inside = 0; /* 1: the last point began or continued a part */
   for (const pw_periodic_point *p = cmd->point; p < cmd->point + cmd->points; p++) {
     int last = p + 1 == cmd->point + cmd->points;
     int here = !last && (p[p->orbit.event != PW_PERIODIC_POINT].orbit.unstable == 0) == stable;
@@ -252,7 +253,7 @@ static void periodic_write_parts (const pw_periodic_command *cmd, FILE *f, int s
   fputs ("nan nan nan nan\n\n\n", f);
 }
 
-/* Writes the multipliers that are trivial or not, with the parameter. */
+/* Writes the multipliers that are trivial, or those that are not, with the parameter. */
 static void periodic_write_multipliers (const pw_periodic_command *cmd, FILE *f, int trivial) {
   for (const pw_periodic_point *p = cmd->point; p < cmd->point + cmd->points; p++)
     for (int i = 0; i < p->orbit.multipliers; i++)

@@ -1,4 +1,4 @@
-/* The command `pinwheel periodic`, its result, and the reports of that (periodic_report.c). */
+/* The command `pinwheel periodic`, its result and its reports (periodic_report.c). */
 #ifndef PW_PERIODIC_REPORT_H
 #define PW_PERIODIC_REPORT_H
 
@@ -10,7 +10,7 @@ typedef struct {
   double *state;           /* q, v at the beginning, q, v at the end; then re, im of the multipliers */
 } pw_periodic_point;
 
-enum { PW_PERIODIC_ATTEMPTS = 3 }; /* of Newton's method, each after more periods of a run */
+enum { PW_PERIODIC_ATTEMPTS = 3 }; /* of Newton's method, each from the state after more periods of a run */
 
 typedef struct {
   pw_cli_line line;
@@ -22,16 +22,17 @@ typedef struct {
   const char *source; /* of the period: "of the signals", "--period", "found" */
   pw_vary vary;
   pw_periodic *search;
-  pw_periodic_point *point;
+  pw_periodic_point *point; /* points: the motion, or those of the branch */
   int points;
-  size_t room;
-  double nearest[PW_PERIODIC_ATTEMPTS]; /* the residual at which each attempt ended */
-  char reason[300];                     /* why, of the nearest one */
-  int stopped;                          /* 1: by Ctrl-C or --limit */
+  size_t room;                           /* points allocated */
+  double residual[PW_PERIODIC_ATTEMPTS]; /* at which each attempt ended, in units of the scene */
+  char reason[300];                      /* why the attempt with the least residual failed, or "" */
+  int stopped;                           /* 1: by Ctrl-C or --limit */
 } pw_periodic_command;
 
+/* Prints the motion or the branch; there is at least one point. */
 void pw_periodic_print (const pw_periodic_command *cmd);
-/* Writes everything as JSON and as a table, and a figure, into the folder.  Returns a status. */
+/* Writes periodic.json, periodic.csv and the figure into the folder.  A status. */
 int pw_periodic_write (const pw_periodic_command *cmd, pw_error *error);
 
 #endif

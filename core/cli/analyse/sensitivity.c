@@ -29,12 +29,12 @@ typedef struct {
 
 /* ---- Text ---- */
 
-/* "m per kg"; "" if both are numbers, and of a formula, whose unit is unknown. */
+/* The unit of a derivative, "m per kg"; "" if it has none, or the output is a formula, whose unit is unknown. */
 static const char *sensitivity_unit (const pw_sensitivity *sens, int output, int unknown, char unit[SENSITIVITY_UNIT]) {
   char of[SENSITIVITY_UNIT / 2];
   const char *by = sens->unknowns.list[unknown].unit;
   pw_outcome_unit (&sens->outcomes, output, of, sizeof of);
-  if (*of == 0 && sens->outcomes.outcome[output].formula) return strcpy (unit, "");
+  if (sens->outcomes.outcome[output].formula) return strcpy (unit, "");
   snprintf (unit, SENSITIVITY_UNIT, *by ? "%s per %s" : "%s", *of || *by == 0 ? of : "1", by);
   return unit;
 }
@@ -44,8 +44,8 @@ typedef struct {
   double elasticity; /* relative change of the output per relative change of the unknown; NaN: there is none */
 } sensitivity_result;
 
-/* The derivative; its error: that of the differences and of the integration of derivatives, and that of the run,
- * which is estimated by the change with its tolerances; the elasticity. */
+/* The error is that of the differences and of the integration of derivatives, plus that of the run, which is estimated
+ * by the change of the derivative with larger tolerances. */
 static sensitivity_result sensitivity_of (const pw_sensitivity *sens, int output, int unknown) {
   const double largest = 1e12; /* elasticities above it are those of an output that is 0 but for round-off */
   double derivative = pw_sensitivity_derivative (sens, output, unknown, sens->run_slope),
@@ -89,13 +89,13 @@ static void sensitivity_print (const pw_sensitivity *sens) {
   }
 }
 
-/* 1 if the error exceeds 1 % of the derivative and, for a change of the unknown by its size, 1 % of the output, or
- * 1e-6 in SI units of one that is near 0. */
+/* 1 if the error exceeds 1 % of the derivative and, times the size of the unknown, 1 % of the output and 1e-6 in SI
+ * units. */
 static int sensitivity_is_uncertain (const pw_sensitivity *sens, int output, int unknown) {
   const sensitivity_result result = sensitivity_of (sens, output, unknown);
-  double change = result.error * sens->unknowns.list[unknown].size;
   return result.error > 0.01 * fabs (result.derivative) &&
-         change > fmax (0.01 * fabs (pw_outcome_value (&sens->outcomes, output, NULL)), 1e-6);
+         result.error * sens->unknowns.list[unknown].size >
+             fmax (0.01 * fabs (pw_outcome_value (&sens->outcomes, output, NULL)), 1e-6);
 }
 
 static void sensitivity_warn (const pw_sensitivity *sens) {
@@ -149,7 +149,7 @@ static void sensitivity_json (const void *context, pw_json *j) {
   pw_json_close (j, '}');
 }
 
-/* A header's cell, in quotes if the output contains a comma. */
+/* Adds a cell "NAME [UNIT]", in quotes if the name contains a comma. */
 static void sensitivity_cell (pw_text *t, const char *name, const char *unit) {
   char text[SENSITIVITY_NAME + SENSITIVITY_UNIT];
   snprintf (text, sizeof text, *unit ? "%s [%s]" : "%s", name, unit);
@@ -179,7 +179,7 @@ static int sensitivity_csv (const void *context, FILE *f, pw_error *error) {
   return status;
 }
 
-/* The label of what sensitivity_data writes. */
+/* The label of a curve of sensitivity_data. */
 static void sensitivity_label (const pw_sensitivity *sens, int output, int unknown, char *label, size_t size) {
   char unit[SENSITIVITY_UNIT];
   const char *name = sens->unknowns.list[unknown].name;
@@ -192,7 +192,8 @@ static void sensitivity_label (const pw_sensitivity *sens, int output, int unkno
   }
 }
 
-/* A block for each derivative, times the unknown if that is not 0, so that unknowns can be compared. */
+/* Writes a block for each derivative, times the value of the unknown unless that is 0, so that unknowns can be
+ * compared. */
 static int sensitivity_data (const void *context, FILE *f, pw_error *error) {
   const pw_sensitivity *sens = &((const sensitivity *)context)->sens;
   const double *row = sens->row;
@@ -235,7 +236,7 @@ static int sensitivity_write (const sensitivity *cmd, pw_error *error) {
 
 /* ---- The command ---- */
 
-/* Finds an unknown; its value is that of the parameter, or the initial value of the state that is consistent. */
+/* Finds an unknown; its value is that of the parameter, or of the state in the consistent initial state of run r. */
 static int sensitivity_find_unknown (const pw_sensitivity *sens, pw_unknown *u, const pw_run *r, const char *name,
                                      pw_error *error) {
   int n = pw_system_coordinates (sens->unknowns.m->system), status = pw_unknown_find (u, sens->unknowns.m, name, error);
@@ -246,7 +247,7 @@ static int sensitivity_find_unknown (const pw_sensitivity *sens, pw_unknown *u, 
                   u->value);
 }
 
-/* Finds the unknowns with a run of their own, which has their values. */
+/* Finds the unknowns, and their values in a run opened for this. */
 static int sensitivity_find_unknowns (sensitivity *cmd, pw_error *error) {
   pw_unknowns *u = &cmd->sens.unknowns;
   if (cmd->by == NULL) return pw_fail (error, PW_INPUT, "--by is missing: expected a parameter or an initial value");
@@ -276,8 +277,7 @@ static int sensitivity_open (sensitivity *cmd, pw_error *error) {
   if (cmd->folder) sens->row_interval = sens->unknowns.t_end / SENSITIVITY_ROWS;
   status = pw_cli_requires ("--every", cmd->every, "-o DIR", cmd->folder != NULL, error);
   if (status == PW_OK) status = pw_cli_number ("--every", cmd->every, PW_POSITIVE, &sens->row_interval, error);
-  if (status == PW_OK) status = sensitivity_find_unknowns (cmd, error);
-  return status == PW_OK ? pw_sensitivity_open (sens, NULL, error) : status;
+  return status == PW_OK ? sensitivity_find_unknowns (cmd, error) : status;
 }
 
 /* Sets better steps of the differences for parameters; 1 if there are any. */
@@ -295,7 +295,7 @@ static int sensitivity_improve_steps (pw_sensitivity *sens) {
   return better;
 }
 
-/* The same problem without results. */
+/* The problem without its results. */
 static pw_sensitivity sensitivity_copy (const pw_sensitivity *sens) {
   return (pw_sensitivity){ .of = sens->of, .unknowns = sens->unknowns, .row_interval = sens->row_interval };
 }
@@ -304,14 +304,12 @@ static pw_sensitivity sensitivity_copy (const pw_sensitivity *sens) {
 static int sensitivity_repeat (pw_sensitivity *sens, pw_progress *progress, pw_error *error) {
   pw_sensitivity_close (sens);
   *sens = sensitivity_copy (sens);
-  int status = pw_sensitivity_open (sens, NULL, error);
-  return status == PW_OK ? pw_sensitivity_compute (sens, progress, error) : status;
+  return pw_sensitivity_compute (sens, NULL, progress, error);
 }
 
-/* Factor of the tolerances with which the derivatives of a run that controls its error are repeated. */
-#define SENSITIVITY_LOOSE 10.0
+#define SENSITIVITY_LOOSE 10. /* factor of the larger tolerances with which the error of a run is estimated */
 
-/* Computes the derivatives with larger tolerances; NaN, and PW_RETRY after a signal, if it fails. */
+/* Computes the derivatives with larger tolerances.  They are NaN if that fails; PW_RETRY after a signal. */
 static int sensitivity_loosen (pw_sensitivity *sens, pw_progress *progress, pw_error *error) {
   int outputs = sens->outcomes.outcomes, unknowns = sens->unknowns.count;
   pw_sensitivity other = sensitivity_copy (sens);
@@ -320,10 +318,10 @@ static int sensitivity_loosen (pw_sensitivity *sens, pw_progress *progress, pw_e
   other.unknowns.settings.rtol = fmin (0.1, SENSITIVITY_LOOSE * sens->unknowns.settings.rtol); /* must be below 1 */
   other.unknowns.settings.atol *= SENSITIVITY_LOOSE;
   sens->loose = malloc ((size_t)(outputs * unknowns) * sizeof *sens->loose);
-  int status = sens->loose ? pw_sensitivity_open (&other, NULL, error) : pw_fail (error, PW_RESOURCE, "out of memory");
-  if (status == PW_OK) status = pw_sensitivity_compute (&other, progress, error);
+  if (sens->loose == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
+  int status = pw_sensitivity_compute (&other, NULL, progress, error);
   if (status == PW_OK && other.stopped) status = pw_limit_status (&other.limit, pw_run_time (other.base.run), error);
-  for (int i = 0; sens->loose && i < outputs * unknowns; i++)
+  for (int i = 0; i < outputs * unknowns; i++)
     sens->loose[i] =
         status == PW_OK ? pw_sensitivity_derivative (&other, i / unknowns, i % unknowns, other.run_slope) : NAN;
   pw_sensitivity_close (&other);
@@ -345,7 +343,7 @@ static int sensitivity_compute (pw_sensitivity *sens, pw_error *error) {
   pw_progress progress;
   pw_stop_catch ();
   pw_progress_start (&progress, pw_file_name (sens->unknowns.m->file), sens->unknowns.t_end);
-  int status = pw_sensitivity_compute (sens, &progress, error);
+  int status = pw_sensitivity_compute (sens, NULL, &progress, error);
   for (int i = 0; i < SENSITIVITY_REPEATED && status == PW_OK && sensitivity_improve_steps (sens); i++) {
     status = sensitivity_repeat (sens, &progress, error);
     if (status == PW_OK || status == PW_RESOURCE || status == PW_RETRY) continue;

@@ -1,10 +1,10 @@
 /* Derivatives of outputs along a run.
  *
  * An output is a function of functionals of columns.  The derivative of the final value of a column is that of the
- * sample.  That of an extremum is the derivative of the column at the time of the extremum, since inside a step a
+ * last sample.  That of an extremum is the derivative of the column at the time of the extremum, since inside a step a
  * shift of that time has no effect of first order.  That of an integral is the integral of the derivative of the
  * column, by Gauss' formula with 5 nodes over intervals of a few steps of the derivatives, which end at rows of the
- * table and at breakpoints. */
+ * table and at breakpoints; the shift of a jump adds to it (sensitivity_jump). */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -12,7 +12,7 @@
 #include "util.h"
 
 enum {
-  SENSITIVITY_PARTS = 20, /* intervals of the run between rows of the table, if their distance is not given */
+  SENSITIVITY_PARTS = 20, /* of the run, between rows of the table, if row_interval is not given */
   SENSITIVITY_STEPS = 2 /* of the derivatives in an interval of integrals, where 5 nodes integrate squares of columns */
 };
 
@@ -35,7 +35,7 @@ double pw_sensitivity_derivative (const pw_sensitivity *sens, int output, int un
 
 enum { OF_DERIVATIVE, OF_ERROR }; /* arguments of pw_direction_weight */
 
-/* Coordinate `index` (2 i for x of wheel i) of contact points in a workspace's system, at q + factor dq. */
+/* Column `index` of the contact points (see pw_column) of a workspace's system, at q + factor dq. */
 static int sensitivity_contact (pw_sensitivity *sens, pw_workspace *w, int index, const pw_sample *s, const double *dq,
                                 double factor, double *value, pw_error *error) {
   for (int j = 0; j < pw_system_coordinates (sens->base.m.system); j++) sens->q[j] = s->q[j] + factor * dq[j];
@@ -44,8 +44,8 @@ static int sensitivity_contact (pw_sensitivity *sens, pw_workspace *w, int index
   return status;
 }
 
-/* The derivative of a contact point, which is a function of positions and parameters: differences in both at once.
- * dq, eq: derivatives of the positions, and their errors. */
+/* The derivative of a coordinate of a contact point, a function of positions and parameters: differences in both at
+ * once.  dq, eq: derivatives of the positions, and their errors. */
 static int sensitivity_contact_slope (pw_sensitivity *sens, int unknown, int index, const pw_sample *s,
                                       const double *dq, const double *eq, double *slope, double *slope_error,
                                       pw_error *error) {
@@ -68,7 +68,7 @@ static int sensitivity_contact_slope (pw_sensitivity *sens, int unknown, int ind
   return status;
 }
 
-/* A sample of the run at a time that the derivatives have reached. */
+/* A sample of the run at a time that its derivatives have reached. */
 static int sensitivity_sample (pw_sensitivity *sens, double t, pw_sample *s, pw_error *error) {
   int status = sens->sampled ? pw_run_advance_to (sens->sampled, t, sens->unknowns.t_end, error) : PW_OK;
   return status == PW_OK ? pw_run_sample (sens->sampled ? sens->sampled : sens->base.run, t, s, error) : status;
@@ -79,7 +79,7 @@ int pw_sensitivity_at (pw_sensitivity *sens, double t, pw_error *error) {
   const int P = sens->unknowns.count;
   int status = pw_variation_advance (sens->variation, t, sens->unknowns.t_end, error);
   if (status == PW_OK) status = sensitivity_sample (sens, t, &s, error);
-  if (status == PW_OK) status = pw_outcomes_read (&sens->outcomes, &s, sens->value, error);
+  if (status == PW_OK) status = pw_outcomes_read (&sens->outcomes, &s, sens->value, 1, error);
   for (int p = 0; p < P && status == PW_OK; p++) {
     status = pw_variation_sample (sens->variation, p, &derivative, &slope_error, error);
     for (int i = 0; i < sens->outcomes.functionals && status == PW_OK; i++) {
@@ -97,10 +97,10 @@ int pw_sensitivity_at (pw_sensitivity *sens, double t, pw_error *error) {
 
 /* ---- Functionals ---- */
 
-/* Derivatives before and after a jump whose relative difference is smaller are the same. */
+/* Derivatives before and after a jump count as equal up to this relative difference. */
 #define SENSITIVITY_SAME 1e-5
 
-/* Adds the current derivatives of columns, times the weight of a node, to those of integrals. */
+/* Adds the current derivatives of columns, times the weight of a node, to the derivatives of integrals. */
 static void sensitivity_add_node (pw_sensitivity *sens, double weight) {
   for (int i = 0; i < sens->outcomes.functionals; i++) {
     const pw_functional *f = &sens->outcomes.functional[i];
@@ -114,7 +114,7 @@ static void sensitivity_add_node (pw_sensitivity *sens, double weight) {
   }
 }
 
-/* The derivative of the time of the last breakpoint or jump; with passed = 0, of the next breakpoint. */
+/* The derivative of the time of the breakpoint or jump last passed; with passed = 0, of the next breakpoint. */
 static double sensitivity_jump_slope (const pw_sensitivity *sens, int unknown, int passed) {
   double slope;
   if (passed) return pw_variation_jump_slope (sens->variation, unknown);
@@ -122,30 +122,28 @@ static double sensitivity_jump_slope (const pw_sensitivity *sens, int unknown, i
   return slope;
 }
 
-/* Makes the current derivatives of functional i those of the run, except where these do not exist. */
+/* Makes the current derivatives of the column of functional i those of the functional, unless these are NaN: they do
+ * not exist. */
 static void sensitivity_keep (pw_sensitivity *sens, int i) {
   for (int at = i * sens->unknowns.count; at < (i + 1) * sens->unknowns.count; at++)
     if (!isnan (sens->run_slope[at]))
       sens->run_slope[at] = sens->slope[at], sens->run_slope_error[at] = sens->slope_error[at];
 }
 
-/* Where an extremum is: inside an interval, or at a breakpoint that is not passed yet. */
-typedef enum { INSIDE, AT_BREAKPOINT } sensitivity_place;
-
-/* The same for an extremum.  Derivatives do not exist at a breakpoint whose time depends on the unknown, and just
- * after it. */
-static void sensitivity_keep_extremum (pw_sensitivity *sens, int i, sensitivity_place place) {
+/* The same for an extremum, whose derivatives do not exist if it is at a breakpoint whose time depends on the unknown,
+ * or just after it.  at_next: 1: it is at the next breakpoint. */
+static void sensitivity_keep_extremum (pw_sensitivity *sens, int i, int at_next) {
   const pw_functional *f = &sens->outcomes.functional[i];
   double slope, next = pw_variation_breakpoint (sens->variation, 0, &slope);
-  int before = place == AT_BREAKPOINT || fabs (f->t - next) < 1e-9 * (1 + fabs (next)),
+  int before = at_next || fabs (f->t - next) < 1e-9 * (1 + fabs (next)), /* up to round-off */
       after = f->t - sens->last_breakpoint <= 2 * PW_FUNCTIONAL_INSET * f->step;
   sensitivity_keep (sens, i);
   for (int p = 0; p < sens->unknowns.count && (before || after); p++)
     if (sensitivity_jump_slope (sens, p, !before) != 0) sens->run_slope[i * sens->unknowns.count + p] = NAN;
 }
 
-/* Marks derivatives of extrema as missing that do not exist: those in the step of the run that passes a jump with the
- * state at t, if the derivative of the column jumps there from `before`. */
+/* Drops derivatives of extrema that do not exist: those in the step of the run in which accelerations jump with the
+ * state, at t, if the derivative of the column jumps there; before: derivatives before the jump. */
 static void sensitivity_drop_extrema (pw_sensitivity *sens, double t, const double *before) {
   for (int i = 0; i < sens->outcomes.functionals; i++) {
     const pw_functional *f = &sens->outcomes.functional[i];
@@ -155,7 +153,7 @@ static void sensitivity_drop_extrema (pw_sensitivity *sens, double t, const doub
   }
 }
 
-/* Adds a row to the table: time, then each output that has columns, with its derivatives. */
+/* Adds a row to the table: the time, then each output in it, with its derivatives. */
 static int sensitivity_add_row (pw_sensitivity *sens, double t, pw_error *error) {
   if (pw_grow (&sens->row, (size_t)sens->rows, &sens->room, (size_t)sens->columns * sizeof *sens->row) != PW_OK)
     return pw_fail (error, PW_RESOURCE, "out of memory");
@@ -174,9 +172,9 @@ static int sensitivity_add_row (pw_sensitivity *sens, double t, pw_error *error)
 /* ---- Along the run ---- */
 
 typedef struct {
-  double t;
-  double weight; /* of a node */
-  int extremum;  /* the functional whose extremum it is; -1: it is a node of the integrals */
+  double t;      /* [s] */
+  double weight; /* of a node [s] */
+  int extremum;  /* the functional whose extremum is at t; -1: t is a node of the integrals */
 } sensitivity_point;
 
 static int sensitivity_compare_times (const void *a, const void *b) {
@@ -193,8 +191,7 @@ static int sensitivity_points (const pw_sensitivity *sens, double t0, double t1,
     if (pw_is_extremum (f->type) && f->t > t0 && f->t <= t1) list[count++] = (sensitivity_point){ f->t, 0, i };
   }
   for (int k = 0; k < PW_GAUSS_NODES && integrals; k++)
-    list[count++] =
-        (sensitivity_point){ (t0 + t1) / 2 + pw_gauss_x[k] * (t1 - t0) / 2, pw_gauss_w[k] * (t1 - t0) / 2, -1 };
+    list[count++] = (sensitivity_point){ pw_gauss_time (t0, t1, k), pw_gauss_w[k] * (t1 - t0) / 2, -1 };
   qsort (list, (size_t)count, sizeof *list, sensitivity_compare_times);
   return count;
 }
@@ -205,14 +202,14 @@ static int sensitivity_interval (pw_sensitivity *sens, double t0, double t1, sen
   for (int i = 0; i < count && status == PW_OK; i++) {
     status = pw_sensitivity_at (sens, list[i].t, error);
     if (status == PW_OK && list[i].extremum < 0) sensitivity_add_node (sens, list[i].weight);
-    if (status == PW_OK && list[i].extremum >= 0) sensitivity_keep_extremum (sens, list[i].extremum, INSIDE);
+    if (status == PW_OK && list[i].extremum >= 0) sensitivity_keep_extremum (sens, list[i].extremum, 0);
   }
   return status == PW_OK ? pw_sensitivity_at (sens, t1, error) : status;
 }
 
-/* Advances from t0, just before a breakpoint or a jump with the state, to t, just after it at the time tb.  The
- * integral of a column that jumps there from x- to x+ has the derivative (x- - x+) dtb/dp in addition.  A breakpoint
- * at the end of the run is reached, but not passed. */
+/* Advances from t0 to t, from just before to just after a breakpoint, or a jump with the state, at a time tb that
+ * depends on the unknown p.  Where a column jumps from x- to x+, this adds (x- - x+) dtb/dp to the derivative of its
+ * integral.  A breakpoint at the end of the run is reached, but not passed. */
 static int sensitivity_jump (pw_sensitivity *sens, double t0, double t, int with_state, pw_error *error) {
   int passed = with_state || t > sens->last_breakpoint;
   const size_t F = (size_t)sens->outcomes.functionals, P = (size_t)sens->unknowns.count;
@@ -224,8 +221,7 @@ static int sensitivity_jump (pw_sensitivity *sens, double t0, double t, int with
   for (int i = 0; i < sens->outcomes.functionals && status == PW_OK; i++) {
     const pw_functional *f = &sens->outcomes.functional[i];
     double jump = sens->before[i] - sens->value[i];
-    if (pw_is_extremum (f->type) && f->t > t0 && f->t <= t)
-      sensitivity_keep_extremum (sens, i, passed ? INSIDE : AT_BREAKPOINT);
+    if (pw_is_extremum (f->type) && f->t > t0 && f->t <= t) sensitivity_keep_extremum (sens, i, !passed);
     if (!pw_is_integral (f->type) || jump == 0) continue;
     if (f->type != PW_INTEGRAL) jump /= sens->unknowns.t_end;
     if (f->type == PW_RMS) jump *= (sens->before[i] + sens->value[i]) / (2 * f->value);
@@ -237,13 +233,13 @@ static int sensitivity_jump (pw_sensitivity *sens, double t0, double t, int with
 
 typedef enum { NO_JUMP, JUMP_AT_BREAKPOINT, JUMP_WITH_STATE } sensitivity_jump_type;
 
-/* The end of the next interval from t towards `to`, in which derivatives are smooth: at most the next jump, whose
- * type is stored.  NAN and the error if that is not found. */
+/* The end of the next interval from t towards `to`, in which derivatives are smooth; the type of the jump at its end is
+ * stored.  NAN and the error if the search for the next jump fails. */
 static double sensitivity_next (pw_sensitivity *sens, double t, double to, sensitivity_jump_type *jump,
                                 pw_error *error) {
   double slope, breakpoint = pw_variation_breakpoint (sens->variation, 0, &slope);
   *jump = NO_JUMP;
-  if (!sens->along_run) return fmin (to, breakpoint);
+  if (!sens->outcomes.along_run) return fmin (to, breakpoint);
   double next = fmin (fmin (to, breakpoint), t + SENSITIVITY_STEPS * pw_variation_step_size (sens->variation));
   double with_state = pw_variation_next_jump (sens->variation, next, sens->unknowns.t_end, error);
   if (isnan (with_state)) return NAN;
@@ -251,7 +247,7 @@ static double sensitivity_next (pw_sensitivity *sens, double t, double to, sensi
   return fmin (next, with_state);
 }
 
-/* Advances from t to `to`, in intervals without jumps and across these from just before to just after. */
+/* Advances from t to `to`: in intervals without jumps, and across jumps from just before to just after them. */
 static int sensitivity_advance (pw_sensitivity *sens, double t, double to, sensitivity_point *list,
                                 pw_progress *progress, pw_error *error) {
   const double aside = 1e-9 * fmin (sens->row_interval, sens->unknowns.t_end / SENSITIVITY_PARTS); /* of a jump [s] */
@@ -301,7 +297,8 @@ static int sensitivity_integrate (pw_sensitivity *sens, pw_progress *progress, p
 
 /* ---- Opening ---- */
 
-int pw_sensitivity_open (pw_sensitivity *sens, const double *values, pw_error *error) {
+/* Sets the defaults and the values of the unknowns. */
+static int sensitivity_prepare (pw_sensitivity *sens, const double *values, pw_error *error) {
   size_t P = (size_t)sens->unknowns.count;
   if (sens->row_interval == 0) sens->row_interval = sens->unknowns.t_end / SENSITIVITY_PARTS;
   sens->limit.seconds = sens->unknowns.limit;
@@ -310,10 +307,10 @@ int pw_sensitivity_open (pw_sensitivity *sens, const double *values, pw_error *e
   sens->unknown_value = malloc (P * sizeof *sens->unknown_value);
   sens->neighbours = calloc (4 * P, sizeof *sens->neighbours);
   sens->direction = calloc (P, sizeof *sens->direction);
-  for (size_t p = 0; p < P && sens->unknown_value; p++)
-    sens->unknown_value[p] = values ? values[p] : sens->unknowns.list[p].value;
-  return sens->unknown_value && sens->neighbours && sens->direction ? PW_OK
-                                                                    : pw_fail (error, PW_RESOURCE, "out of memory");
+  if (sens->unknown_value == NULL || sens->neighbours == NULL || sens->direction == NULL)
+    return pw_fail (error, PW_RESOURCE, "out of memory");
+  for (size_t p = 0; p < P; p++) sens->unknown_value[p] = values ? values[p] : sens->unknowns.list[p].value;
+  return PW_OK;
 }
 
 static int sensitivity_arrays (pw_sensitivity *sens, pw_error *error) {
@@ -332,31 +329,15 @@ static int sensitivity_arrays (pw_sensitivity *sens, pw_error *error) {
   return sens->memory ? PW_OK : pw_fail (error, PW_RESOURCE, "out of memory");
 }
 
-/* Opens the run again with the ledger if outputs need it. */
-static int sensitivity_open_ledger (pw_sensitivity *sens, pw_error *error) {
-  if (!sens->outcomes.ledger) return PW_OK;
-  sens->unknowns.settings.ledger = 1;
-  pw_run_close (sens->base.run);
-  sens->base.run = pw_run_open (sens->base.m.system, sens->unknowns.method, &sens->unknowns.settings, error);
-  return sens->base.run ? PW_OK : error->status;
-}
-
 /* Determines the values of extrema and integrals, and the times of extrema, by another run. */
 static int sensitivity_find_functionals (pw_sensitivity *sens, pw_error *error) {
-  for (int i = 0; i < sens->outcomes.functionals; i++) sens->along_run |= sens->outcomes.functional[i].type != PW_FINAL;
-  return sens->along_run ? pw_outcomes_run (&sens->outcomes, sens->unknowns.method, &sens->unknowns.settings,
-                                            sens->unknowns.t_end, error)
-                         : PW_OK;
+  if (!sens->outcomes.along_run) return PW_OK;
+  return pw_outcomes_run (&sens->outcomes, sens->unknowns.method, &sens->unknowns.settings, sens->unknowns.t_end,
+                          error);
 }
 
-/* Opens the run of which samples are taken where base.run is ahead of the derivatives (pw_variation_advance). */
-static int sensitivity_open_sampled (pw_sensitivity *sens, pw_error *error) {
-  if (!pw_system_may_jump (sens->base.m.system)) return PW_OK;
-  sens->sampled = pw_run_open (sens->base.m.system, sens->unknowns.method, &sens->unknowns.settings, error);
-  return sens->sampled ? PW_OK : error->status;
-}
-
-/* Refuses initial values that the constraints determine: making a neighbour consistent changes them back. */
+/* Refuses initial values that the constraints determine: then making the state of a neighbour consistent changes them
+ * back, by much more than 1 % of the step. */
 static int sensitivity_check_independence (const pw_sensitivity *sens, pw_error *error) {
   int n = pw_system_coordinates (sens->base.m.system);
   for (int p = 0; p < sens->unknowns.count; p++) {
@@ -375,23 +356,30 @@ static int sensitivity_check_independence (const pw_sensitivity *sens, pw_error 
   return PW_OK;
 }
 
+/* Opens the run, with the ledger if outputs need it; the one of which samples are taken where base.run is ahead of the
+ * derivatives (pw_variation_advance); and the neighbours. */
 static int sensitivity_open_runs (pw_sensitivity *sens, pw_error *error) {
+  const pw_settings *settings = &sens->unknowns.settings;
   int count = 0;
   while (sens->of[count]) count++;
-  int status = pw_unknown_run_open (&sens->base, &sens->unknowns, sens->unknown_value, error);
+  int status = pw_unknowns_system (&sens->base.m, &sens->unknowns, sens->unknown_value, error);
   if (status == PW_OK) status = pw_outcomes_open (&sens->outcomes, sens->base.m.system, "--of", sens->of, count, error);
-  if (status == PW_OK) status = sensitivity_open_ledger (sens, error);
-  if (status == PW_OK)
-    status = pw_unknowns_directions (sens->direction, &sens->unknowns, sens->unknown_value, &sens->base,
-                                     sens->neighbours, error);
+  if (status != PW_OK) return status;
+  sens->unknowns.settings.ledger = sens->outcomes.ledger;
+  sens->base.run = pw_run_open (sens->base.m.system, sens->unknowns.method, settings, error);
+  if (sens->base.run && pw_system_may_jump (sens->base.m.system))
+    sens->sampled = pw_run_open (sens->base.m.system, sens->unknowns.method, settings, error);
+  if (error->status != PW_OK) return error->status;
+  status = pw_unknowns_directions (sens->direction, &sens->unknowns, sens->unknown_value, &sens->base, sens->neighbours,
+                                   error);
   for (int p = 0; p < sens->unknowns.count; p++) sens->direction[p].no_error = sens->no_error;
   return status == PW_OK && !sens->no_error ? sensitivity_check_independence (sens, error) : status;
 }
 
-int pw_sensitivity_start (pw_sensitivity *sens, pw_error *error) {
-  int status = sensitivity_open_runs (sens, error);
+int pw_sensitivity_start (pw_sensitivity *sens, const double *values, pw_error *error) {
+  int status = sensitivity_prepare (sens, values, error);
+  if (status == PW_OK) status = sensitivity_open_runs (sens, error);
   if (status == PW_OK) status = sensitivity_arrays (sens, error);
-  if (status == PW_OK) status = sensitivity_open_sampled (sens, error);
   pw_limit_start (&sens->limit);
   if (status != PW_OK) return status;
   sens->variation =
@@ -399,8 +387,8 @@ int pw_sensitivity_start (pw_sensitivity *sens, pw_error *error) {
   return sens->variation ? PW_OK : error->status;
 }
 
-int pw_sensitivity_compute (pw_sensitivity *sens, pw_progress *progress, pw_error *error) {
-  int status = pw_sensitivity_start (sens, error);
+int pw_sensitivity_compute (pw_sensitivity *sens, const double *values, pw_progress *progress, pw_error *error) {
+  int status = pw_sensitivity_start (sens, values, error);
   if (status == PW_OK) status = sensitivity_find_functionals (sens, error);
   return status == PW_OK ? sensitivity_integrate (sens, progress, error) : status;
 }
@@ -408,7 +396,7 @@ int pw_sensitivity_compute (pw_sensitivity *sens, pw_progress *progress, pw_erro
 void pw_sensitivity_close (pw_sensitivity *sens) {
   pw_variation_close (sens->variation);
   pw_run_close (sens->sampled);
-  if (sens->outcomes.system) pw_outcomes_close (&sens->outcomes);
+  pw_outcomes_close (&sens->outcomes);
   for (int i = 0; sens->neighbours && i < 4 * sens->unknowns.count; i++) pw_unknown_run_close (&sens->neighbours[i]);
   pw_unknown_run_close (&sens->base);
   free (sens->neighbours);

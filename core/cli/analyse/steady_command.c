@@ -10,15 +10,12 @@
 enum { STEADY_STARTS = 30 };               /* default of --starts */
 static const double STEADY_WITHIN = 0.382; /* a fraction of the range at which no parameter is likely to vanish */
 
-/* Attempts of pw_steady_solve that begin at the initial state or near it, not at random states. */
-enum { STEADY_NOT_RANDOM = 2 };
-
 /* Directions of pw_steady_follow: towards the first or the last value of the range. */
 enum { TO_FIRST = -1, TO_LAST = 1 };
 
 /* ---- What is held and varied ---- */
 
-/* Reads --vary NAME=FIRST:LAST: a parameter of the model or the value of what is held. */
+/* Reads --vary NAME=FIRST:LAST: NAME is a parameter of the model, or a quantity that is held at the varied value. */
 static int steady_read_vary (pw_steady_command *cmd, pw_error *error) {
   if (pw_vary_read (&cmd->vary, &cmd->line, &cmd->m, cmd->vary_text, error) != PW_OK) return PW_INPUT;
   cmd->settings.first = cmd->vary.first, cmd->settings.last = cmd->vary.last;
@@ -41,7 +38,7 @@ static int steady_read_options (pw_steady_command *cmd, pw_error *error) {
   int status = pw_cli_number ("--at", cmd->at_text, PW_NONNEGATIVE, &cmd->settings.t, error);
   cmd->limit.seconds = INFINITY;
   cmd->settings.span = pw_cli_defaults (pw_file_table (cmd->m.file)).t_end;
-  cmd->settings.vary = -1; /* nothing held */
+  cmd->settings.vary = -1; /* none of the values held */
   cmd->settings.hold = cmd->hold;
   if (status == PW_OK) status = pw_cli_number ("--limit", cmd->line.limit, PW_POSITIVE, &cmd->limit.seconds, error);
   if (status == PW_OK) status = pw_cli_number ("--starts", cmd->starts_text, PW_REAL, &starts, error);
@@ -73,7 +70,7 @@ static pw_steady_point *steady_add (pw_steady_command *cmd, const pw_steady_moti
   return p;
 }
 
-/* Stores which options --hold, besides those given, select the motion last found within its family. */
+/* Stores the options --hold which, besides those given, select the motion last found within its family. */
 static int steady_advise (pw_steady_command *cmd, pw_steady_point *p, pw_error *error) {
   pw_initial_value hold[PW_HOLDS];
   char name[300];
@@ -96,7 +93,7 @@ static int steady_is_stopped (pw_steady_command *cmd) {
 
 /* ---- The search ---- */
 
-/* Adds a solution unless it is known; of families of the same dimension and stability only one. */
+/* Adds a solution unless it is known; of solutions in families of the same dimension and stability only one. */
 static int steady_found (pw_steady_command *cmd, const pw_steady_motion *m, int attempt, pw_error *error) {
   if (m->linear->steady == PW_CHANGING) return cmd->changing++, PW_OK;
   for (int i = 0; i < cmd->points; i++) {
@@ -109,19 +106,19 @@ static int steady_found (pw_steady_command *cmd, const pw_steady_motion *m, int 
   return p ? steady_advise (cmd, p, error) : PW_RESOURCE;
 }
 
-/* Adds the solutions at a value of the parameter; that from the initial state is the first. */
+/* Adds the solutions at a value of the parameter, first the one found from the initial state. */
 static int steady_search (pw_steady_command *cmd, double parameter, pw_error *error) {
   pw_progress progress;
   pw_steady_motion m;
   int status = PW_OK;
-  const int attempts = STEADY_NOT_RANDOM + cmd->random_attempts;
+  const int attempts = PW_STEADY_NOT_RANDOM + cmd->random_attempts;
   pw_progress_count (&progress, pw_file_name (cmd->m.file), "starts", 0, attempts);
   for (int k = 0; status == PW_OK && k < attempts && !steady_is_stopped (cmd); k++) {
     status = pw_steady_solve (cmd->search, k, parameter, &m, error);
     if (status == PW_OK) status = steady_found (cmd, &m, k, error);
     if (status == PW_RETRY || (status == PW_METHOD && k > 0)) {
-      double *nearest = &cmd->nearest[k >= STEADY_NOT_RANDOM];
-      *nearest = fmin (*nearest, m.residual);
+      double *least = &cmd->residual[k >= PW_STEADY_NOT_RANDOM];
+      *least = fmin (*least, m.residual);
       *error = (pw_error){ 0 };
       status = PW_OK;
     }
@@ -142,9 +139,9 @@ static int steady_fail (pw_steady_command *cmd, pw_error *error) {
         error, PW_METHOD,
         "%s: all steady motions found are members of families, in which no branch begins; hold more (--hold)",
         pw_file_name (cmd->m.file));
-  snprintf (initial, sizeof initial, "from the initial state the residual ends at %.2g", cmd->nearest[0]);
+  snprintf (initial, sizeof initial, "from the initial state the residual ends at %.2g", cmd->residual[0]);
   if (cmd->random_attempts)
-    snprintf (random, sizeof random, ", from %d random ones at %.2g at best", cmd->random_attempts, cmd->nearest[1]);
+    snprintf (random, sizeof random, ", from %d random ones at %.2g at best", cmd->random_attempts, cmd->residual[1]);
   if (*pw_steady_reason (cmd->search)) snprintf (reason, sizeof reason, "; %s", pw_steady_reason (cmd->search));
   return pw_fail (error, PW_METHOD,
                   "%s: no steady motion found: %s%s, in units of the scene (L, L/T, L/T^2)%s; change what is held, or "
@@ -177,7 +174,7 @@ static int steady_follow (pw_steady_command *cmd, const pw_steady_point *from, i
   while (status == PW_OK && !steady_is_stopped (cmd)) {
     status = pw_steady_next (cmd->search, &m, error);
     if (status != PW_OK || m.event == PW_STEADY_END) break;
-    if (m.event == PW_STEADY_POINT && m.linear->steady == PW_CHANGING) { /* more symmetries where the range begins */
+    if (m.event == PW_STEADY_POINT && m.linear->steady == PW_CHANGING) { /* a symmetry at the beginning is lost */
       cmd->changing++, status = pw_fail (error, PW_METHOD, "the equations change along the motion");
       break;
     }
@@ -199,8 +196,8 @@ static int steady_is_known (const pw_steady_command *cmd, const pw_steady_motion
   return known;
 }
 
-/* Searches at a value of the parameter, and follows those solutions that are on no branch yet: in a direction from an
- * end of the range, from values in between in both directions unless the branch is closed. */
+/* Searches at a value of the parameter, and follows the solutions that are on no branch yet: from an end of the range
+ * in this direction, from a value in between also in the other one, unless the branch is closed. */
 static int steady_branches_from (pw_steady_command *cmd, double parameter, int direction, pw_error *error) {
   int before = cmd->points, status = steady_search (cmd, parameter, error), found = cmd->points - before;
   int inside = parameter != cmd->settings.first && parameter != cmd->settings.last;
@@ -245,7 +242,8 @@ static int steady_nearest_motion (pw_steady_command *cmd, pw_steady_motion *m, p
   return pw_steady_solve (cmd->search, 0, begin, m, error);
 }
 
-/* Where what is held leaves a family of motions, holds more, as in the motion nearest to the initial state. */
+/* If the quantities held leave a family of motions, holds further ones, at their values in the motion nearest to the
+ * initial state. */
 static int steady_hold_more (pw_steady_command *cmd, pw_error *error) {
   const pw_system *s = cmd->m.system;
   pw_steady_motion m;
@@ -264,7 +262,7 @@ static int steady_hold_more (pw_steady_command *cmd, pw_error *error) {
   return cmd->search ? PW_OK : error->status;
 }
 
-/* Finds branches that begin at the ends of the range, or if there are none, at the value of the model or within the
+/* Finds branches that begin at the ends of the range or, if there are none, at the value of the model or within the
  * range. */
 static int steady_branches (pw_steady_command *cmd, pw_error *error) {
   const double first = cmd->settings.first, last = cmd->settings.last;
@@ -280,7 +278,7 @@ static int steady_branches (pw_steady_command *cmd, pw_error *error) {
 /* ---- The command ---- */
 
 static int steady_compute (pw_steady_command *cmd, pw_error *error) {
-  cmd->nearest[0] = cmd->nearest[1] = INFINITY;
+  cmd->residual[0] = cmd->residual[1] = INFINITY;
   pw_limit_start (&cmd->limit);
   cmd->search = pw_steady_open (cmd->m.system, &cmd->settings, error);
   if (cmd->search == NULL) return error->status;
@@ -289,15 +287,6 @@ static int steady_compute (pw_steady_command *cmd, pw_error *error) {
   pw_stop_release ();
   if (status == PW_OK && cmd->points == 0 && !cmd->stopped) status = steady_fail (cmd, error);
   return status;
-}
-
-static void steady_close (pw_steady_command *cmd) {
-  pw_files_close (&cmd->files);
-  for (int i = 0; i < cmd->points; i++) free (cmd->point[i].state);
-  free (cmd->point);
-  free (cmd->end);
-  pw_steady_close (cmd->search);
-  pw_cli_close_model (&cmd->m);
 }
 
 static int steady_command (void *options, pw_error *error) {
@@ -309,7 +298,12 @@ static int steady_command (void *options, pw_error *error) {
   if (status == PW_OK) status = steady_compute (cmd, error);
   if (status == PW_OK && cmd->points) pw_steady_print (cmd);
   if (status == PW_OK && cmd->points && cmd->folder) status = pw_steady_write (cmd, error);
-  steady_close (cmd);
+  pw_files_close (&cmd->files);
+  for (int i = 0; i < cmd->points; i++) free (cmd->point[i].state);
+  free (cmd->point);
+  free (cmd->end);
+  pw_steady_close (cmd->search);
+  pw_cli_close_model (&cmd->m);
   return status == PW_OK && cmd->stopped ? pw_cli_incomplete (&cmd->line, error) : status;
 }
 

@@ -8,12 +8,12 @@
 enum {
   STEADY_DIGITS = 6,         /* of numbers in the text */
   STEADY_SHOWN = 12,         /* motions in the text, at most */
-  STEADY_CONFIGURATIONS = 3, /* of which the states are printed */
+  STEADY_CONFIGURATIONS = 3, /* motions whose states are printed, at most */
   STEADY_EVENTS = 40         /* of branches, in the text, at most */
 };
 #define STEADY_SMALL 1e-12 /* numbers below it are printed as 0, in SI units */
 
-static const char *const steady_events[] = { "point", "fold", "zero eigenvalue", "Hopf" };
+static const char *const steady_events[] = { "point", "fold", "zero eigenvalue", "Hopf" }; /* by pw_steady_event */
 
 /* ---- Text ---- */
 
@@ -21,7 +21,8 @@ static void steady_cell (pw_table *t, double value) {
   pw_cell_number (t, 12, pw_rounded (value, STEADY_SMALL), STEADY_DIGITS);
 }
 
-/* Prints real part and frequency of the rightmost eigenvalue, or at an event of the one that crosses the axis. */
+/* Prints real part and frequency of the rightmost eigenvalue, the first one that is neither 0 nor of a rigid
+ * displacement; at an event, of the one that crosses the imaginary axis. */
 static void steady_cells_rightmost (pw_table *t, const pw_steady_point *p) {
   const pw_linear *l = &p->linear;
   int best = -1, crossing = p->motion.event != PW_STEADY_POINT;
@@ -36,35 +37,21 @@ static void steady_cells_rightmost (pw_table *t, const pw_steady_point *p) {
   steady_cell (t, im > 0 ? im / (2 * PW_PI) : NAN);
 }
 
-/* The speed or angular velocity of the first body; NaN if it has none. */
-static double steady_held (const pw_steady_command *cmd, const pw_steady_point *p, const char *quantity) {
-  char name[300];
-  pw_error none = { 0 };
-  const pw_system *s = cmd->m.system;
-  snprintf (name, sizeof name, "%s.%s", pw_system_body_name (s, 0), quantity);
-  int number = pw_system_find_held (s, name, &none);
-  return number < 0 ? NAN : pw_system_held_value (s, number, p->motion.q, p->motion.v);
-}
-
-static void steady_cell_name (pw_table *t, const pw_steady_command *cmd, const char *quantity, const char *unit) {
-  char name[300];
-  snprintf (name, sizeof name, "%s.%s", pw_system_body_name (cmd->m.system, 0), quantity);
-  pw_cell_unit (t, 12, name, unit);
-}
-
 static void steady_print_motions (const pw_steady_command *cmd) {
+  const pw_system *s = cmd->m.system;
+  const int n = pw_system_coordinates (s), held[] = { 2 * n, n + 2 }; /* (pw_system_find_held) speed, omega of body 0 */
+  char name[300];
   for (pw_table t = { 0 }; pw_table_pass (&t);) {
     pw_cell (&t, 6, "motion");
-    steady_cell_name (&t, cmd, "speed", "m/s");
-    steady_cell_name (&t, cmd, "omega", "rad/s");
+    for (int k = 0; k < 2; k++)
+      pw_cell_unit (&t, 12, pw_system_held_name (s, held[k], name, sizeof name), pw_system_held_unit (s, held[k]));
     for (int k = 0; k < 5; k++)
       pw_cell (&t, 7, (const char *[]){ "family", "growing", "rightmost [1/s]", "frequency [Hz]", "residual" }[k]);
     pw_row_end (&t);
     for (int i = 0; i < cmd->points && i < STEADY_SHOWN; i++) {
       const pw_steady_point *p = cmd->point + i;
       pw_cell_number (&t, 6, i + 1, 6);
-      steady_cell (&t, steady_held (cmd, p, "speed"));
-      steady_cell (&t, steady_held (cmd, p, "omega"));
+      for (int k = 0; k < 2; k++) steady_cell (&t, pw_system_held_value (s, held[k], p->motion.q, p->motion.v));
       pw_cell_number (&t, 7, p->motion.family, 6);
       pw_cell_number (&t, 7, p->motion.unstable, 6);
       steady_cells_rightmost (&t, p);
@@ -121,7 +108,8 @@ void pw_steady_print (const pw_steady_command *cmd) {
   steady_print_motions (cmd);
   for (int i = 0; i < cmd->points && i < STEADY_CONFIGURATIONS; i++) {
     const pw_steady_motion *m = &cmd->point[i].motion;
-    printf ("\nMotion %d, found from %s\n", i + 1, cmd->point[i].attempt > 1 ? "a random state" : "the initial state");
+    printf ("\nMotion %d, found from %s\n", i + 1,
+            cmd->point[i].attempt >= PW_STEADY_NOT_RANDOM ? "a random state" : "the initial state");
     pw_states_print (cmd->m.system, m->q, m->v, STEADY_DIGITS, STEADY_SMALL);
   }
   for (int i = 0; i < cmd->points && i < STEADY_SHOWN; i++)
@@ -177,7 +165,7 @@ static void steady_json (const void *context, pw_json *j) {
                       cmd->hold[i].value);
   pw_json_close (j, '}');
   pw_json_number (j, "symmetries", pw_steady_symmetries (cmd->search));
-  pw_json_number (j, "attempts", cmd->random_attempts + 2);
+  pw_json_number (j, "attempts", PW_STEADY_NOT_RANDOM + cmd->random_attempts);
   pw_json_flag (j, "complete", !cmd->stopped);
   pw_json_open (j, "ends", '[');
   for (int i = 0; cmd->vary_text && i < cmd->branches; i++) pw_json_text (j, NULL, cmd->end[i]);
@@ -225,15 +213,16 @@ static int steady_csv (const void *context, FILE *f, pw_error *error) {
 
 /* ---- The figure ---- */
 
-/* Whether the branch is stable from p to the next point, which decides after an event: that omits what changes. */
+/* Whether the branch is stable from p to the next point.  At an event, where `unstable` does not count the modes that
+ * change, the next point decides. */
 static int steady_is_stable (const pw_steady_point *p) {
   return (p->motion.event == PW_STEADY_POINT ? p : p + 1)->motion.unstable == 0;
 }
 
 typedef enum { REAL, IMAGINARY } steady_part;
 
-/* Number k in descending order of the real parts, or of the absolute values of the imaginary parts, of eigenvalues
- * without rigid displacements; NaN if there are fewer. */
+/* Number k, from 0, of the real parts, or the absolute values of the imaginary parts, in descending order, of
+ * eigenvalues without those of rigid displacements; NaN if there are fewer. */
 static double steady_ranked (const pw_linear *l, steady_part part, int k) {
   for (int i = 0; i < l->unknowns; i++) {
     double value = part == IMAGINARY ? fabs (l->im[i]) : l->re[i];
@@ -249,7 +238,7 @@ static double steady_ranked (const pw_linear *l, steady_part part, int k) {
 
 /* Writes the k-th real part and frequency on the stable or unstable parts of a branch, with a blank line after each. */
 static void steady_write_parts (FILE *f, const pw_steady_point *first, int count, int k, int stable) {
-  int inside = 0; /* a part that is written */
+  int inside = 0; /* 1: the last point began or continued a part */
   for (const pw_steady_point *p = first; p < first + count; p++) {
     int here = p + 1 < first + count && steady_is_stable (p) == stable;
     if (here || inside)

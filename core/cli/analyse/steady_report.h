@@ -1,4 +1,4 @@
-/* The command `pinwheel steady`, its result, and the reports of that (steady_report.c). */
+/* The command `pinwheel steady`, its result and its reports (steady_report.c). */
 #ifndef PW_STEADY_REPORT_H
 #define PW_STEADY_REPORT_H
 
@@ -9,13 +9,13 @@
 typedef struct {
   int branch;              /* number of its branch, from 1; without --vary the number of the motion */
   int attempt;             /* number of the attempt of pw_steady_solve that found it */
-  pw_steady_motion motion; /* its arrays are in `state` */
-  pw_linear linear;        /* its linearisation: twist, unknowns and eigenvalues alone */
-  double *state;           /* q, v; then re, im, rigid of the linearisation */
+  pw_steady_motion motion; /* its arrays are in `state`; motion.linear is NULL */
+  pw_linear linear;        /* twist, unknowns, and in `state` re, im, rigid; the other members are not set */
+  double *state;           /* q, v, re, im, rigid */
   char advice[200];        /* options that select it within its family, " --hold NAME=VALUE..." */
 } pw_steady_point;
 
-enum { PW_STEADY_REASON = 200 };
+enum { PW_STEADY_REASON = 200 }; /* longest reason, its end included */
 
 typedef struct {
   pw_cli_line line;
@@ -28,19 +28,20 @@ typedef struct {
   pw_vary vary;
   int random_attempts; /* in each search: those that begin at random states */
   pw_steady *search;
-  pw_steady_point *point;
+  pw_steady_point *point; /* points: the motions, or those of each branch in turn */
   int points;
-  size_t room;
-  char (*end)[PW_STEADY_REASON]; /* why each branch ended; "" at the end of the range */
+  size_t room;                   /* points allocated */
+  char (*end)[PW_STEADY_REASON]; /* branches: why each ended; "" at the end of the range */
   int branches;
-  double nearest[2]; /* smallest residual without solution: from the initial state, from random ones */
-  int changing;      /* solutions that are not steady, as the equations change with time or along the motion */
-  int families;      /* solutions of which no branch begins, since they are members of families */
-  int stopped;       /* 1: by Ctrl-C or --limit */
+  double residual[2]; /* the least of attempts that failed: from the initial state, from random ones */
+  int changing;       /* solutions that are not steady, as the equations change with time or along the motion */
+  int families;       /* solutions of which no branch begins, since they are members of families */
+  int stopped;        /* 1: by Ctrl-C or --limit */
 } pw_steady_command;
 
+/* Prints the motions or the branches; there is at least one point. */
 void pw_steady_print (const pw_steady_command *cmd);
-/* Writes everything as JSON and as a table, and with --vary a figure, into the folder.  Returns a status. */
+/* Writes steady.json, steady.csv and, with --vary, the figure into the folder.  A status. */
 int pw_steady_write (const pw_steady_command *cmd, pw_error *error);
 
 #endif

@@ -15,13 +15,8 @@ int pw_unknown_find (pw_unknown *u, const pw_cli_model *m, const char *name, pw_
     snprintf (u->unit, sizeof u->unit, "%s", u->parameter->unit ? u->parameter->unit : "");
     return PW_OK;
   }
-  if (strchr (name, '.') == NULL) {
-    /* there is no such parameter: setting it, in a model that is not built yet, fails with the nearest name */
-    pw_model *copy = pw_file_model (m->file, error);
-    if (copy) pw_model_set (copy, name, 0, error);
-    pw_model_free (copy);
-    return error->status;
-  }
+  if (strchr (name, '.') == NULL) /* no parameter: fails with the nearest name */
+    return pw_model_set (m->model, name, 0, error);
   u->state = pw_system_find_state (m->system, name, error);
   if (u->state < 0) return error->status;
   int n = pw_system_coordinates (m->system);
@@ -43,6 +38,7 @@ int pw_unknowns_open (pw_unknowns *u, const pw_cli_line *line, const pw_cli_mode
   if (status == PW_OK) status = pw_cli_specialise (line->specialise, &u->when, error);
   if (status != PW_OK) return status;
   u->settings.stop = NULL;
+  if (u->settings.rtol == 0) u->settings.rtol = 1e-6; /* the default, from which errors are estimated */
   u->limit = limit.seconds;
   pw_cli_report_unused (u->method, line);
   return PW_OK;
@@ -112,32 +108,15 @@ int pw_unknowns_read (pw_unknowns *u, const char **list, pw_error *error) {
 
 /* ---- Runs ---- */
 
-typedef int unknown_setter (pw_model *m, const char *name, double value, pw_error *error);
-
-/* Sets the unknowns that are parameters, by pw_model_set, or those that are states, by pw_model_set_initial. */
-static int unknown_set (pw_model *m, const pw_unknowns *u, const double *x, unknown_setter *set, pw_error *error) {
-  int status = PW_OK;
-  for (int i = 0; i < u->count && status == PW_OK; i++)
-    if ((u->list[i].parameter != NULL) == (set == pw_model_set)) status = set (m, u->list[i].name, x[i], error);
-  return status;
-}
-
 int pw_unknowns_system (pw_cli_model *m, const pw_unknowns *u, const double *x, pw_error *error) {
   *m = (pw_cli_model){ .model = pw_file_model (u->m->file, error) };
   int status = m->model ? pw_cli_apply (m->model, "--set", u->line->sets, pw_model_set, error) : error->status;
-  if (status == PW_OK) status = unknown_set (m->model, u, x, pw_model_set, error);
   if (status == PW_OK) status = pw_cli_apply (m->model, "--start", u->line->starts, pw_model_set_initial, error);
-  if (status == PW_OK) status = unknown_set (m->model, u, x, pw_model_set_initial, error);
+  for (int i = 0; i < u->count && status == PW_OK; i++)
+    status = (u->list[i].parameter ? pw_model_set : pw_model_set_initial) (m->model, u->list[i].name, x[i], error);
   if (status == PW_OK) status = pw_model_build (m->model, error);
   if (status == PW_OK) m->system = pw_system_compile (m->model, error);
   return m->system ? PW_OK : error->status;
-}
-
-int pw_unknown_run_open (pw_unknown_run *to, const pw_unknowns *u, const double *x, pw_error *error) {
-  *to = (pw_unknown_run){ .settings = u->settings };
-  if (pw_unknowns_system (&to->m, u, x, error) != PW_OK) return error->status;
-  to->run = pw_run_open (to->m.system, u->method, &to->settings, error);
-  return to->run ? PW_OK : error->status;
 }
 
 int pw_unknown_run_prepare (pw_unknown_run *to, const pw_unknowns *u, const double *x, pw_error *error) {
@@ -151,11 +130,11 @@ int pw_unknown_run_prepare (pw_unknown_run *to, const pw_unknowns *u, const doub
   return PW_OK;
 }
 
-void pw_unknown_run_close (pw_unknown_run *x) {
-  pw_run_close (x->run);
-  pw_workspace_free (x->workspace);
-  pw_cli_close_model (&x->m);
-  *x = (pw_unknown_run){ .run = NULL };
+void pw_unknown_run_close (pw_unknown_run *run) {
+  pw_run_close (run->run);
+  pw_workspace_free (run->workspace);
+  pw_cli_close_model (&run->m);
+  *run = (pw_unknown_run){ .run = NULL };
 }
 
 void pw_unknowns_report (const pw_unknowns *u, const double *x) {
@@ -170,8 +149,9 @@ void pw_unknowns_report (const pw_unknowns *u, const double *x) {
 
 /* ---- Directions ---- */
 
-/* PW_UNKNOWN_STEP times the size of the unknown: |value|, but at least 0.1 for angles, the unit of the scene for
- * states, 1e-3 of the scale in searches; for a parameter that is 0 its default value, or 1 if that is 0, too. */
+/* PW_UNKNOWN_STEP times the typical size of the unknown: |value|, but at least 0.1 rad for angles, the unit of the
+ * scene for states, 1e-3 of the scale in searches; for a parameter that is 0 its default value, or 1 if that is 0,
+ * too. */
 static double unknown_step (const pw_unknown *u, double value, const pw_run *r) {
   if (u->step > 0) return u->step;
   double size = fabs (value), length = pw_run_scale (r)->length, time = pw_run_scale (r)->time;
@@ -181,8 +161,8 @@ static double unknown_step (const pw_unknown *u, double value, const pw_run *r) 
   return PW_UNKNOWN_STEP * fmax (size > 0 ? size : 1, 1e-3 * u->scale);
 }
 
-/* Keeps the neighbours within the domain of a parameter.  If that excludes 0, the step is at most value / 4; next to a
- * bound that belongs to it, 0 or 1, all neighbours are on the inner side. */
+/* Keeps the neighbours within the domain of a parameter: in the open domain > 0 by a step of at most value / 4, next to
+ * a bound that belongs to the domain, 0 or 1, by neighbours on its inner side alone. */
 static void unknown_stay_inside (const pw_unknown *u, double value, pw_direction *d) {
   pw_domain domain = u->parameter ? u->parameter->domain : PW_REAL;
   if (domain == PW_POSITIVE) d->step = fmin (d->step, value / 4);
@@ -197,32 +177,34 @@ static int unknown_same_size (const pw_system *a, const pw_system *b) {
          pw_system_rows (a) == pw_system_rows (b);
 }
 
-static int unknown_direction (pw_direction *d, const pw_unknowns *u, int i, double *x, pw_unknown_run *run,
+static int unknown_direction (pw_direction *d, const pw_unknowns *u, int i, double *x, const pw_unknown_run *run,
                               pw_unknown_run *neighbours, pw_error *error) {
-  double value = x[i];
+  const double value = x[i];
+  pw_settings general = u->settings;
+  general.specialised = NULL;
   int status = PW_OK;
   *d = (pw_direction){ .step = unknown_step (&u->list[i], value, run->run) };
   unknown_stay_inside (&u->list[i], value, d);
   for (int k = 0; k < 4 && status == PW_OK; k++) {
+    pw_unknown_run *near = neighbours + k;
     x[i] = value + pw_direction_offset (d, k);
-    status = pw_unknown_run_open (neighbours + k, u, x, error);
-    if (status == PW_OK && !unknown_same_size (run->m.system, neighbours[k].m.system))
+    status = pw_unknowns_system (&near->m, u, x, error);
+    if (status == PW_OK && !unknown_same_size (run->m.system, near->m.system))
       status = pw_fail (error, PW_INPUT,
                         "%s changes the number of bodies or elements: derivatives with respect to it do not exist",
                         u->list[i].name);
-    d->neighbour[k] = neighbours[k].run;
+    if (status == PW_OK) d->neighbour[k] = near->run = pw_run_open (near->m.system, u->method, &general, error);
+    if (status == PW_OK && near->run == NULL) status = error->status;
   }
   x[i] = value;
   return status;
 }
 
-int pw_unknowns_directions (pw_direction *d, const pw_unknowns *u, double *x, pw_unknown_run *run,
+int pw_unknowns_directions (pw_direction *d, const pw_unknowns *u, double *x, const pw_unknown_run *run,
                             pw_unknown_run *neighbours, pw_error *error) {
-  pw_unknowns general = *u; /* without specialised code */
   int status = PW_OK;
-  general.settings.specialised = NULL;
   for (int i = 0; i < u->count && status == PW_OK; i++)
-    status = unknown_direction (d + i, &general, i, x, run, neighbours + 4 * i, error);
+    status = unknown_direction (d + i, u, i, x, run, neighbours + 4 * i, error);
   return status;
 }
 
@@ -234,7 +216,7 @@ static double unknowns_between (const pw_unknown *u, double fraction) {
   return fmin (fmax (value, u->low), u->high);
 }
 
-/* Fills a row for each point after the first one. */
+/* Stores the points after the first one; a status. */
 static int unknowns_sobol (const pw_unknowns *u, int count, double seed, double *out) {
   double point[PW_UNKNOWNS_SOBOL_MOST], shift[PW_UNKNOWNS_SOBOL_MOST];
   gsl_rng *random = gsl_rng_alloc (gsl_rng_mt19937);

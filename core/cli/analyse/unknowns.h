@@ -1,4 +1,5 @@
-/* Unknowns: parameters and initial values that analyses and searches vary, and runs with given values of them. */
+/* Unknowns: parameters and initial values that analyses and searches vary, and runs with given values of them.  An
+ * array x has a value for each unknown. */
 #ifndef PW_UNKNOWNS_H
 #define PW_UNKNOWNS_H
 
@@ -11,79 +12,78 @@ typedef struct {
   int state;                     /* its number; -1 for a parameter */
   double value;                  /* in the model of the command line */
   char unit[16];
-  double step;      /* of differences; 0: PW_UNKNOWN_STEP times the size of the unknown */
+  double step;      /* of differences; 0: PW_UNKNOWN_STEP times the typical size of the unknown */
   double last_step; /* of the differences computed last */
-  double size;      /* of the number, as the first step has it; 0: not computed yet */
+  double size;      /* the typical size, from the first step; 0: not computed yet */
   /* for searches: */
-  double low, high; /* bounds; infinite without one */
-  double scale;     /* size of typical changes: the distance of the bounds, else |value|, else 1 */
+  double low, high; /* bounds, of --free or else of the parameter's domain; infinite without one */
+  double scale;     /* size of typical changes: high - low of --free, else |value|, else 1 */
   int has_bounds;   /* 1: the bounds are those of --free, which are finite */
 } pw_unknown;
 
 #define PW_UNKNOWN_STEP 1e-5 /* leaves an error of about 1e-10 in extrapolated differences, mostly round-off */
 
-/* Finds the parameter or state of this name in an open model, and its value there.  Errors: PW_INPUT for an unknown
- * name, with the nearest one. */
+/* Finds the parameter or state of this name in an open model, and its value there.  PW_INPUT, with the nearest name,
+ * if there is none. */
 int pw_unknown_find (pw_unknown *u, const pw_cli_model *m, const char *name, pw_error *error);
 
-/* Unknowns of the model of a command line, and the options of runs with values x of them. */
+/* Unknowns of the model of a command line, and the options of its runs. */
 typedef struct {
   const pw_cli_line *line;
   const pw_cli_model *m;
   pw_unknown *list;
   int count;
   const char *method;
-  pw_settings settings; /* except stop and initial; `sensitivity` sets specialised for its run */
-  double t_end;
-  double limit;       /* of the processor time of each run [s] */
-  pw_specialise when; /* of --specialise */
+  pw_settings settings; /* without stop, initial and specialised, which callers may set */
+  double t_end;         /* [s] */
+  double limit;         /* of the processor time of each run [s] */
+  pw_specialise when;   /* of --specialise */
   pw_cli_engine engine;
 } pw_unknowns;
 
-/* Reads the options; there are no unknowns yet.  Line and model must outlive it.  Close it in every case. */
+/* Reads the options of runs; there are no unknowns yet.  Line and model must outlive it.  Close it in every case. */
 int pw_unknowns_open (pw_unknowns *u, const pw_cli_line *line, const pw_cli_model *m, pw_error *error);
 void pw_unknowns_close (pw_unknowns *u);
-/* Reads unknowns from a list of "NAME" or "NAME=LOW:HIGH" of --free, ended by NULL.  PW_INPUT for an unknown name, a
- * count, bounds without the initial value between them or outside the domain. */
+/* Reads unknowns from a list of "NAME" or "NAME=LOW:HIGH" of --free, ended by NULL.  PW_INPUT for a name that the model
+ * does not have, a parameter that is a count, and bounds outside its domain or without its value between them. */
 int pw_unknowns_read (pw_unknowns *u, const char **list, pw_error *error);
 /* Chooses the engine for this estimated number of runs. */
 void pw_unknowns_engine (pw_unknowns *u, double runs);
 
-/* The model with values of the unknowns, compiled.  PW_INPUT if it refuses them; PW_RESOURCE.  Close it by
+/* The model with these values of the unknowns, compiled.  PW_INPUT if it refuses them; PW_RESOURCE.  Close it by
  * pw_cli_close_model in every case.  May be called by several threads at once. */
 int pw_unknowns_system (pw_cli_model *m, const pw_unknowns *u, const double *x, pw_error *error);
 
-/* A run of it. */
+/* A run with given values of the unknowns. */
 typedef struct {
   pw_cli_model m;
   pw_settings settings;
-  pw_limit limit; /* of pw_unknown_run_prepare */
+  pw_limit limit; /* set by pw_unknown_run_prepare */
   pw_run *run;
   pw_workspace *workspace; /* for contact points; NULL: not needed yet */
 } pw_unknown_run;
-/* Opens a run with u->settings.  Close it in every case. */
-int pw_unknown_run_open (pw_unknown_run *to, const pw_unknowns *u, const double *x, pw_error *error);
-/* The same with the engine and a limit of its own, whose clock starts; the run itself is opened by the caller. */
+/* Compiles the model and sets m and settings, with the engine and a limit of its own, whose clock starts; the caller
+ * opens `run`.  Close it in every case. */
 int pw_unknown_run_prepare (pw_unknown_run *to, const pw_unknowns *u, const double *x, pw_error *error);
-void pw_unknown_run_close (pw_unknown_run *x);
+void pw_unknown_run_close (pw_unknown_run *run);
 
-/* Directions of the derivatives of a run with respect to all unknowns at the values x, which are changed and restored.
- * neighbours: 4 runs of each unknown, zero-initialised, which are opened without specialised code.  Close all of them,
- * also after an error. */
-int pw_unknowns_directions (pw_direction *d, const pw_unknowns *u, double *x, pw_unknown_run *run,
+/* Directions of the derivatives of a run with respect to all unknowns at x, which is changed and restored.  Opens
+ * neighbours, 4 zero-initialised runs for each unknown, without specialised code; close all of them in every case. */
+int pw_unknowns_directions (pw_direction *d, const pw_unknowns *u, double *x, const pw_unknown_run *run,
                             pw_unknown_run *neighbours, pw_error *error);
 
 /* Points where searches begin, `count` x unknowns: the unknowns' values; then points of Sobol's sequence, shifted
- * modulo 1 by random numbers from the seed, between the bounds of the user, else within `scale` of the values.  With
- * a count above 1 there are at most PW_UNKNOWNS_SOBOL_MOST unknowns, the limit of the sequence.  NULL if out of memory;
+ * modulo 1 by random numbers from the seed, between the bounds of --free, else within `scale` of the values.  If count
+ * exceeds 1, there may be at most PW_UNKNOWNS_SOBOL_MOST unknowns, the limit of GSL's sequence.  NULL if out of memory;
  * free it. */
 enum { PW_UNKNOWNS_SOBOL_MOST = 40 };
 double *pw_unknowns_starts (const pw_unknowns *u, int count, double seed);
 
-/* Prints a notice if, with these values, making the initial state consistent changes given initial values. */
+/* Prints a notice if, with these values, initial values that the user has given or that are unknowns must change to
+ * satisfy the constraints. */
 void pw_unknowns_report (const pw_unknowns *u, const double *x);
 
-/* Writes the options that set the values, "--set a=1 --start frame.vx=2", to a text.  0 if its size is too small. */
+/* Writes the options that set the values, "--set a=1 --start frame.vx=2", to a text.  1, or 0 if they do not fit. */
 int pw_unknowns_options (const pw_unknowns *u, const double *x, char *text, size_t size);
 
 #endif

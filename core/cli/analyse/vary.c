@@ -1,9 +1,9 @@
-/* The number that `steady` and `periodic` vary continuously, of the option --vary NAME=FIRST:LAST. */
+/* The option --vary of `steady` and `periodic`. */
 #include "vary.h"
 #include <string.h>
 #include "util.h"
 
-/* Refuses a range outside the domain of the parameter, and one that is also set. */
+/* Refuses a parameter that is a count or also given by --set, and a range outside its domain. */
 static int vary_check (const pw_vary *v, const char *text, pw_error *error) {
   const pw_parameter *p = v->parameter;
   const double ends[] = { v->first, v->last };

@@ -22,7 +22,7 @@ static int data_has_sigma_column (const fit_sigma *sigma) {
 
 /* Splits "NAME,..." of --columns. */
 static int data_read_columns (pw_fit *fit, pw_error *error) {
-  size_t count = 2; /* a name more than there are commas, and the NULL that ends them */
+  size_t count = 2; /* one name more than commas, and NULL at the end */
   for (const char *text = fit->columns_text; *text; text++) count += *text == ',';
   fit->columns_copy = strdup (fit->columns_text);
   fit->column_name = calloc (2 * count, sizeof *fit->column_name);
@@ -59,7 +59,7 @@ static int data_read_sigma (const pw_fit *fit, const char *text, fit_sigma *sigm
   return PW_OK;
 }
 
-/* Standard deviations are given for all columns or for none; then all data have one unit and equal weights. */
+/* Checks that standard deviations are given for all columns or, if all have the same unit, for none. */
 static int data_check_sigma (pw_fit *fit, const fit_sigma *sigma, pw_error *error) {
   for (int i = 0; i < fit->columns; i++) fit->weighted |= sigma[i].text != NULL;
   for (int i = 0; i < fit->columns; i++) {
@@ -88,7 +88,7 @@ static int data_read_table (pw_fit *fit, const fit_sigma *sigma, pw_error *error
   return fit->table ? PW_OK : error->status;
 }
 
-/* Reads the data; a standard deviation for each datum. */
+/* Reads the data, and sets the standard deviation of each datum. */
 static int data_read (pw_fit *fit, const fit_sigma *sigma, pw_error *error) {
   if (data_read_table (fit, sigma, error) != PW_OK) return error->status;
   size_t rows = (size_t)fit->rows, cells = (size_t)fit->columns * rows;
@@ -135,8 +135,8 @@ static int fit_read_data (pw_fit *fit, pw_error *error) {
 
 /* ---- The command ---- */
 
-#define FIT_RUNS 50.       /* of a fit, about: to choose the engine */
-#define FIT_ITERATIONS 20. /* of a search, about: to show progress */
+#define FIT_RUNS 50.       /* usual number of runs, to choose the engine */
+#define FIT_ITERATIONS 20. /* usual number of iterations of a search, to show progress */
 
 enum { FIT_TABLE = 2, FIT_SUMMARY }; /* indices in the list of files of fit_open */
 
@@ -280,9 +280,8 @@ const pw_command pw_cli_fit = {
   .synopsis = "MODEL --data FILE.csv --columns NAME,... --free NAME[=LOW:HIGH]... [OPTION...]",
   .summary = "fit parameters and initial values to measured data",
   .help = "Determine parameters and initial values of a model by least squares, so that it agrees with measured data. "
-          "Prints "
-          "estimates with standard errors, confidence intervals and correlations, and unknowns that the data do not "
-          "determine.",
+          "Prints estimates with standard errors, confidence intervals and correlations, and unknowns that the data do "
+          "not determine.",
   .min_arguments = 1,
   .max_arguments = 1,
   .options_size = sizeof (pw_fit),

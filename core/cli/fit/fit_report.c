@@ -26,13 +26,21 @@ static double report_correlation (const pw_fit *fit, int i, int j) {
              : NAN;
 }
 
-/* The end of the confidence interval at a side, -1 the lower or 1 the upper one; NaN without one. */
+/* Half the width of confidence intervals in standard errors: from the normal distribution if standard deviations are
+ * given, else from Student's. */
+static double report_quantile (const pw_fit *fit) {
+  double tail = (1 - fit->confidence) / 2;
+  return fit->weighted ? gsl_cdf_gaussian_Qinv (tail, 1)
+                       : gsl_cdf_tdist_Qinv (tail, fmax (pw_fit_degrees_of_freedom (fit), 1));
+}
+
+/* The lower (side -1) or upper (side 1) end of the confidence interval of unknown i; NaN if there is none. */
 static double report_interval_end (const pw_fit *fit, int i, int side) {
-  return isfinite (fit->standard_error[i]) ? fit->estimate[i] + side * pw_fit_quantile (fit) * fit->standard_error[i]
+  return isfinite (fit->standard_error[i]) ? fit->estimate[i] + side * report_quantile (fit) * fit->standard_error[i]
                                            : NAN;
 }
 
-/* "" if the estimate is not at a bound. */
+/* "at its lower bound", "at its upper bound"; "" if the estimate of unknown i is at neither. */
 static const char *report_bound (const pw_fit *fit, int i) {
   const pw_unknown *unknown = fit->unknowns.list + i;
   const double value = fit->estimate[i], near = PW_FIT_MARGIN * unknown->scale;
@@ -51,21 +59,17 @@ static double report_rms (const pw_fit *fit, int column, int *count) {
 /* ---- Text ---- */
 
 static void report_unknowns (const pw_fit *fit) {
-  char head[80];
-  snprintf (head, sizeof head, "%g %% confidence:  from", 100 * fit->confidence);
+  char from[80];
+  const char *const head[] = { "free", "initially", "estimate", "standard error", from, "to" };
+  snprintf (from, sizeof from, "%g %% confidence:  from", 100 * fit->confidence);
   for (pw_table t = { 0 }; pw_table_pass (&t);) {
-    pw_cell (&t, -12, "free");
-    pw_cell (&t, 12, "initially");
-    pw_cell (&t, 12, "estimate");
-    pw_cell (&t, 14, "standard error");
-    pw_cell (&t, 12, head);
-    pw_cell (&t, 12, "to");
+    for (int k = 0; k < 6; k++) pw_cell (&t, k ? 12 : -12, head[k]);
     pw_row_end (&t);
     for (int i = 0; i < fit->unknowns.count; i++) {
       pw_cell_unit (&t, -12, fit->unknowns.list[i].name, fit->unknowns.list[i].unit);
       pw_cell_number (&t, 12, fit->unknowns.list[i].value, REPORT_DIGITS);
       pw_cell_number (&t, 12, fit->estimate[i], REPORT_DIGITS);
-      pw_cell_number (&t, 14, isfinite (fit->standard_error[i]) ? fit->standard_error[i] : NAN, 3);
+      pw_cell_number (&t, 12, isfinite (fit->standard_error[i]) ? fit->standard_error[i] : NAN, 3);
       pw_cell_number (&t, 12, report_interval_end (fit, i, -1), REPORT_DIGITS);
       pw_cell_number (&t, 12, report_interval_end (fit, i, 1), REPORT_DIGITS);
       pw_cell (&t, -1, isinf (fit->standard_error[i]) ? "not determined by the data" : report_bound (fit, i));
@@ -108,13 +112,13 @@ static void report_columns (const pw_fit *fit) {
   }
 }
 
-/* 1 if unknown i belongs to a combination, a singular vector. */
+/* 1 if unknown i belongs to a combination, the singular vector of this number. */
 static int report_contains (const pw_fit *fit, int combination, int i) {
   return fabs (fit->singular_vector[i * fit->unknowns.count + combination]) > PW_FIT_COMPONENT;
 }
 
-/* Proportional changes of the unknowns along a singular vector; that of the first one is its estimate, or 1 if this is
- * 0. */
+/* Prints the ratio of changes of the unknowns along a singular vector; the change of the first one is its estimate, or
+ * 1 if this is 0. */
 static void report_ratio (const pw_fit *fit, int combination) {
   double scale = 0;
   for (int i = 0; i < fit->unknowns.count; i++) {
@@ -127,7 +131,7 @@ static void report_ratio (const pw_fit *fit, int combination) {
   puts (" have no effect");
 }
 
-/* Combinations of unknowns that change no datum: singular vectors to singular values 0. */
+/* Prints combinations of unknowns that change no model value: singular vectors with the singular value 0. */
 static void report_undetermined (const pw_fit *fit) {
   for (int k = fit->rank; k < fit->unknowns.count; k++) {
     int count = 0;
@@ -146,7 +150,7 @@ static int report_is_best (const pw_fit *fit, const double *minimum) {
   return *minimum <= fit->chi2 + 1e-6 * fit->chi2 + 1e-12 * fit->initial_chi2;
 }
 
-/* Searches that ended at the best minimum, and the next best one. */
+/* Prints how many searches ended at the best minimum, and the next best one. */
 static void report_minima (const pw_fit *fit) {
   char options[REPORT_OPTIONS];
   const double *next = NULL;
@@ -164,7 +168,7 @@ static void report_minima (const pw_fit *fit) {
 
 void pw_fit_print (const pw_fit *fit) {
   char options[REPORT_OPTIONS];
-  int freedom = pw_fit_freedom (fit);
+  int freedom = pw_fit_degrees_of_freedom (fit);
   report_unknowns (fit);
   report_columns (fit);
   if (fit->weighted)
@@ -219,7 +223,7 @@ static void report_json_columns (const pw_fit *fit, pw_json *j) {
   pw_json_close (j, ']');
 }
 
-/* A square matrix of the unknowns with these entries. */
+/* Writes a matrix, unknowns x unknowns, with these entries. */
 static void report_json_matrix (const pw_fit *fit, pw_json *j, const char *key,
                                 double (*entry) (const pw_fit *fit, int i, int j)) {
   int n = fit->unknowns.count;
@@ -233,7 +237,7 @@ static void report_json_matrix (const pw_fit *fit, pw_json *j, const char *key,
   pw_json_close (j, ']');
 }
 
-/* Where each search ended. */
+/* Writes where each search ended. */
 static void report_json_minima (const pw_fit *fit, pw_json *j) {
   int n = fit->unknowns.count;
   pw_json_open (j, "searches", '[');
@@ -259,7 +263,7 @@ void pw_fit_json (const pw_fit *fit, const char *status, FILE *f) {
                 pw_unknowns_options (&fit->unknowns, fit->estimate, options, sizeof options) ? options : NULL);
   pw_json_text (j, "method", fit->unknowns.method);
   pw_json_number (j, "residuals", fit->residuals);
-  pw_json_number (j, "freedom", pw_fit_freedom (fit));
+  pw_json_number (j, "freedom", pw_fit_degrees_of_freedom (fit));
   pw_json_flag (j, "weighted", fit->weighted);
   pw_json_number (j, "chi2", fit->chi2);
   pw_json_number (j, "confidence", fit->confidence);

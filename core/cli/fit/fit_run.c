@@ -1,28 +1,25 @@
-/* Runs of a fit, which give the model's values at the times of the data; derivatives of these values by the unknowns,
- * from the variational equations or else from differences; statistics. */
+/* Runs of a fit, which give the model's values at the times of the data; derivatives of these values with respect to
+ * the unknowns, from the variational equations or else from differences. */
 #define _POSIX_C_SOURCE 200809L
 #include <float.h>
-#include <gsl/gsl_cdf.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 #include "fit.h"
 #include "parallel.h"
 
-#define JACOBIAN_ERROR 1e-8 /* relative error of derivatives by the variational equations, at least */
+#define JACOBIAN_ERROR 1e-8 /* least relative error of derivatives from the variational equations */
 
 /* ---- Runs ---- */
 
-/* Columns at the times of the data; `row` is scratch for one row. */
-static int fit_sample (const pw_fit *fit, pw_outcomes *outcomes, pw_run *run, double *out, double *row,
-                       pw_error *error) {
+/* Stores the columns at the times of the data in `out`, columns x rows. */
+static int fit_sample (const pw_fit *fit, pw_outcomes *outcomes, pw_run *run, double *out, pw_error *error) {
   pw_sample sample;
   int status = PW_OK;
   for (int k = 0; k < fit->rows && status == PW_OK; k++) {
     status = pw_run_advance_to (run, fit->t[k], fit->unknowns.t_end, error);
     if (status == PW_OK) status = pw_run_sample (run, fit->t[k], &sample, error);
-    if (status == PW_OK) status = pw_outcomes_read (outcomes, &sample, row, error);
-    for (int i = 0; i < fit->columns && status == PW_OK; i++) out[i * fit->rows + k] = row[i];
+    if (status == PW_OK) status = pw_outcomes_read (outcomes, &sample, out + k, fit->rows, error);
   }
   return status;
 }
@@ -30,39 +27,24 @@ static int fit_sample (const pw_fit *fit, pw_outcomes *outcomes, pw_run *run, do
 int pw_fit_run (const pw_fit *fit, const double *unknowns, double *out, pw_error *error) {
   pw_outcomes outcomes = { .system = NULL };
   pw_unknown_run run;
-  double *row = calloc ((size_t)fit->columns, sizeof *row);
-  if (row == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
   int status = pw_unknown_run_prepare (&run, &fit->unknowns, unknowns, error);
   if (status == PW_OK)
     status = pw_outcomes_open (&outcomes, run.m.system, "--columns", fit->column_name, fit->columns, error);
   run.settings.ledger = outcomes.ledger;
   if (status == PW_OK) run.run = pw_run_open (run.m.system, fit->unknowns.method, &run.settings, error);
-  if (status == PW_OK) status = run.run ? fit_sample (fit, &outcomes, run.run, out, row, error) : error->status;
+  if (status == PW_OK) status = run.run ? fit_sample (fit, &outcomes, run.run, out, error) : error->status;
   if (status == PW_STOPPED) status = pw_limit_status (&run.limit, pw_run_time (run.run), error);
   pw_outcomes_close (&outcomes);
   pw_unknown_run_close (&run);
-  free (row);
   return status;
-}
-
-/* ---- Statistics ---- */
-
-int pw_fit_freedom (const pw_fit *fit) {
-  return fit->residuals - fit->rank;
-}
-
-double pw_fit_quantile (const pw_fit *fit) {
-  double tail = (1 - fit->confidence) / 2;
-  return fit->weighted ? gsl_cdf_gaussian_Qinv (tail, 1) : gsl_cdf_tdist_Qinv (tail, fmax (pw_fit_freedom (fit), 1));
 }
 
 /* ---- Differences ---- */
 
-/* Relative noise of the model's values as functions of the unknowns: the tolerance of an adaptive method, round-off
+/* Relative noise of the model's values as functions of the unknowns: the tolerance of an adaptive method, or round-off
  * with fixed steps. */
 static double jacobian_noise (const pw_fit *fit) {
-  if (pw_cli_adaptive (fit->unknowns.method) != 1) return DBL_EPSILON;
-  return fit->unknowns.settings.rtol > 0 ? fit->unknowns.settings.rtol : 1e-6;
+  return pw_cli_adaptive (fit->unknowns.method) == 1 ? fit->unknowns.settings.rtol : DBL_EPSILON;
 }
 
 double pw_fit_derivative_error (const pw_fit *fit) {
@@ -70,15 +52,15 @@ double pw_fit_derivative_error (const pw_fit *fit) {
   return fit->by_differences ? pow (noise, 2. / 3) : fmax (noise, JACOBIAN_ERROR);
 }
 
-/* Runs on both sides of each unknown: task 2 j below unknown j, task 2 j + 1 above it. */
+/* Runs on both sides of each unknown: task 2 j is the run below unknown j, task 2 j + 1 that above it. */
 typedef struct {
   const pw_fit *fit;
   double *unknowns, *values, *step; /* of each task: unknowns, values of the model, signed step */
   pw_error *error;                  /* of each task */
 } jacobian_differences;
 
-/* The step is the cube root of the noise, relative: it balances the truncation error of central differences,
- * proportional to its square, and their noise, divided by it.  Then both are noise^(2/3). */
+/* The relative step h is the cube root of the noise, which balances the truncation error of central differences, of
+ * order h^2, and the effect of the noise, noise / h: both are noise^(2/3). */
 static int jacobian_side (void *context, int task, pw_error *error) {
   jacobian_differences *d = context;
   const pw_fit *fit = d->fit;
@@ -93,7 +75,8 @@ static int jacobian_side (void *context, int task, pw_error *error) {
   return PW_OK; /* see jacobian_column */
 }
 
-/* Central differences; one-sided ones if the run on the other side failed. */
+/* Derivatives with respect to unknown j by central differences; by one-sided ones if the run on one side failed.
+ * middle: the values of the model between both sides. */
 static int jacobian_column (const jacobian_differences *d, int j, const double *middle, double *out, pw_error *error) {
   size_t cells = (size_t)d->fit->columns * (size_t)d->fit->rows;
   const double *side[2];
@@ -131,7 +114,7 @@ static int jacobian_by_differences (pw_fit *fit, const double *unknowns, const d
 
 /* ---- Variational equations ---- */
 
-/* Derivatives at the time of a row. */
+/* Stores the derivatives at the time of a row of the data. */
 static int jacobian_row (pw_sensitivity *s, const pw_fit *fit, int row, double *jacobian, pw_error *error) {
   const int n = fit->unknowns.count;
   int status = pw_sensitivity_at (s, fit->t[row], error);
@@ -147,15 +130,13 @@ static int jacobian_row (pw_sensitivity *s, const pw_fit *fit, int row, double *
 
 static int jacobian_by_variation (const pw_fit *fit, const double *unknowns, double *jacobian, pw_error *error) {
   pw_sensitivity s = { .of = fit->column_name, .unknowns = fit->unknowns, .no_error = 1 };
-  int status = pw_sensitivity_open (&s, unknowns, error);
-  if (status == PW_OK) status = pw_sensitivity_start (&s, error);
+  int status = pw_sensitivity_start (&s, unknowns, error);
   for (int row = 0; row < fit->rows && status == PW_OK; row++) status = jacobian_row (&s, fit, row, jacobian, error);
   if (status == PW_STOPPED) status = pw_limit_status (&s.limit, pw_run_time (s.base.run), error);
   pw_sensitivity_close (&s);
   return status;
 }
 
-/* By differences from the first run on whose variational equations cannot be used. */
 int pw_fit_jacobian (pw_fit *fit, const double *unknowns, const double *values, double *jacobian, pw_error *error) {
   pw_error own = { 0 };
   int status = fit->by_differences ? PW_METHOD : jacobian_by_variation (fit, unknowns, jacobian, &own);

@@ -1,9 +1,9 @@
 /* The solution of a least-squares fit, by GSL's Levenberg-Marquardt method, and the errors of the estimate.
  *
- * The method has no bounds: it varies u, and the value of an unknown is (James & Roos 1975, MINUIT)
+ * The method does not know bounds: it varies a vector u, and the value of an unknown is (James & Roos 1975, MINUIT)
  *
  *   low + (high - low) (1 + sin u) / 2      between two bounds
- *   low + scale (sqrt (1 + u^2) - 1)        above one
+ *   low + scale (sqrt (1 + u^2) - 1)        above a lower bound
  *   scale u                                 without bounds */
 #define _POSIX_C_SOURCE 200809L
 #include <gsl/gsl_blas.h>
@@ -15,29 +15,29 @@
 #include <string.h>
 #include "fit.h"
 
-#define SOLVE_GRADIENT 1e-4   /* largest cosine between the residuals and a column of the Jacobian at a minimum */
-#define SOLVE_RANK 1e-6       /* smallest singular value of the scaled Jacobian, relative to the largest one */
-#define SOLVE_EFFECT 1e-9     /* smallest effect of an unknown, relative to the largest one */
-#define SOLVE_EXACT 1e-8      /* norm of the residuals of an exact fit, relative to the initial one */
-#define SOLVE_ROUND_OFF 1e-12 /* the same, relative to the data: round-off of a run */
+#define SOLVE_GRADIENT 1e-4 /* largest cosine between the residuals and a column of the Jacobian at a minimum */
+#define SOLVE_RANK 1e-6   /* singular values of the scaled Jacobian count as 0 below it, relative to the largest one */
+#define SOLVE_EFFECT 1e-9 /* smallest effect of an unknown times its scale, relative to the largest one */
+#define SOLVE_EXACT 1e-8  /* norm of the residuals of an exact fit, relative to the initial one */
+#define SOLVE_ROUND_OFF 1e-12 /* the same, relative to the norm of the data: round-off of a run */
 #define SOLVE_TOLERANCE 1e-10 /* of GSL: relative step in u, and gradient */
 enum { SOLVE_ITERATIONS = 100 /* of a search, at most */ };
 
 typedef struct {
   pw_fit *fit;
-  double *u;        /* where a search begins and ends */
-  double *unknowns; /* of the last run */
+  double *u;        /* unknowns: where a search begins and ends */
+  double *unknowns; /* unknowns: their values in the last run */
   double *values;   /* columns x rows: of the model, in the last run */
   double *jacobian; /* unknowns x (columns x rows) */
   int known;        /* 1: the last run succeeded */
-  int status;       /* not PW_OK: ends the fit */
+  int status;       /* PW_OK, or else the fit ends */
   pw_error *error;
-  double worst; /* largest norm of the residuals of a run of this search that succeeded */
-  double least; /* sum of squares at the best minimum so far, which is fit->estimate; INFINITY: none */
+  double worst; /* largest norm of the residuals of the runs of this search that succeeded */
+  double least; /* sum of squares at the best minimum so far, fit->estimate; INFINITY: no search has ended yet */
   int previous; /* iterations of earlier searches */
 } fit_solver;
 
-/* ---- Bounds; an upper one implies a lower one ---- */
+/* ---- Bounds: an unknown with an upper bound has a lower one, too ---- */
 
 static double solve_value (const pw_unknown *unknown, double u) {
   if (isfinite (unknown->high)) return unknown->low + (unknown->high - unknown->low) * (1 + sin (u)) / 2;
@@ -45,14 +45,14 @@ static double solve_value (const pw_unknown *unknown, double u) {
   return u * unknown->scale;
 }
 
-/* The derivative of the value by u. */
+/* The derivative of the value with respect to u. */
 static double solve_slope (const pw_unknown *unknown, double u) {
   if (isfinite (unknown->high)) return (unknown->high - unknown->low) * cos (u) / 2;
   if (isfinite (unknown->low)) return unknown->scale * u / sqrt (1 + u * u);
   return unknown->scale;
 }
 
-/* u where a search begins: away from bounds, where the derivative is 0. */
+/* u of a value where a search begins, moved away from bounds, at which solve_slope is 0. */
 static double solve_start (const pw_unknown *unknown, double value) {
   double range = isfinite (unknown->high) ? unknown->high - unknown->low : unknown->scale,
          part = fmax ((value - unknown->low) / range, PW_FIT_MARGIN);
@@ -62,8 +62,8 @@ static double solve_start (const pw_unknown *unknown, double value) {
 
 /* ---- Residuals ---- */
 
-/* Makes the run at u the last one, unless it is already.  A status, also in solver->status if it ends the fit: the
- * first run must succeed. */
+/* Makes the run at u the last one, unless it already is.  Its status, which is also that of the solver if it ends the
+ * fit: a failure of the very first run, of memory, or Ctrl-C. */
 static int solve_run (fit_solver *solver, const gsl_vector *u) {
   pw_fit *fit = solver->fit;
   int same = solver->known;
@@ -85,8 +85,7 @@ static int solve_run (fit_solver *solver, const gsl_vector *u) {
   return status;
 }
 
-/* The residuals (model - data) / sigma.  A run that failed gets large ones, so that GSL repeats the step with a smaller
- * one. */
+/* The residuals (model - data) / sigma.  They are large for a run that failed, so that GSL tries a shorter step. */
 static int solve_residuals (const gsl_vector *u, void *context, gsl_vector *f) {
   fit_solver *solver = context;
   const pw_fit *fit = solver->fit;
@@ -104,7 +103,7 @@ static int solve_residuals (const gsl_vector *u, void *context, gsl_vector *f) {
   return GSL_SUCCESS;
 }
 
-/* Derivatives of the residuals by u, or by the unknowns themselves if u is NULL. */
+/* Derivatives of the residuals with respect to u, or if u is NULL, to the unknowns themselves, at the last run. */
 static int solve_derivatives (const gsl_vector *u, void *context, gsl_matrix *J) {
   fit_solver *solver = context;
   pw_fit *fit = solver->fit;
@@ -124,13 +123,11 @@ static int solve_derivatives (const gsl_vector *u, void *context, gsl_matrix *J)
 
 /* ---- Minimum ---- */
 
-/* Until a search has ended, what the first one has reached is the result. */
-static void solve_reached (const fit_solver *solver, const gsl_vector *u, double norm) {
+/* Makes the last run the result. */
+static void solve_store (fit_solver *solver, double chi2) {
   pw_fit *fit = solver->fit;
-  if (isfinite (solver->least) || !solver->known) return;
-  fit->chi2 = norm * norm;
-  for (int i = 0; i < fit->unknowns.count; i++)
-    fit->estimate[i] = solve_value (fit->unknowns.list + i, gsl_vector_get (u, (size_t)i));
+  fit->chi2 = chi2;
+  memcpy (fit->estimate, solver->unknowns, (size_t)fit->unknowns.count * sizeof *fit->estimate);
   memcpy (fit->fitted, solver->values, (size_t)fit->columns * (size_t)fit->rows * sizeof *fit->fitted);
 }
 
@@ -140,26 +137,30 @@ static void solve_progress (const size_t iteration, void *context, const gsl_mul
   if (solver->status != PW_OK) return;
   if (iteration == 0 && solver->previous == 0) solver->fit->initial_chi2 = norm * norm;
   solver->fit->iterations = solver->previous + (int)iteration;
-  solve_reached (solver, gsl_multifit_nlinear_position (w), norm);
+  /* The last run, at the position reached, is the result if Ctrl-C ends the first search. */
+  if (!isfinite (solver->least) && solver->known) solve_store (solver, norm * norm);
   snprintf (solver->fit->progress.note, sizeof solver->fit->progress.note, "residual %.6g", norm);
   pw_progress_at (&solver->fit->progress, solver->fit->iterations);
 }
 
-/* Stores the sum of squares and the values at the minimum that a search has reached. */
-static void solve_keep (fit_solver *solver, double *minimum) {
-  pw_fit *fit = solver->fit;
-  size_t n = (size_t)fit->unknowns.count, cells = (size_t)fit->columns * (size_t)fit->rows;
-  *minimum = 0;
-  for (size_t i = 0; i < cells; i++)
-    if (!isnan (fit->data[i])) *minimum += pow ((solver->values[i] - fit->data[i]) / fit->sigma[i], 2);
-  memcpy (minimum + 1, solver->unknowns, n * sizeof *solver->unknowns);
-  if (!(*minimum < solver->least)) return;
-  fit->chi2 = solver->least = *minimum;
-  memcpy (fit->estimate, solver->unknowns, n * sizeof *solver->unknowns);
-  memcpy (fit->fitted, solver->values, cells * sizeof *solver->values);
+/* The sum of squares of (values - data) / sigma, or of data / sigma if `values` is NULL. */
+static double solve_sum (const pw_fit *fit, const double *values) {
+  double sum = 0;
+  for (int i = 0; i < fit->columns * fit->rows; i++)
+    if (!isnan (fit->data[i])) sum += pow (((values ? values[i] : 0) - fit->data[i]) / fit->sigma[i], 2);
+  return sum;
 }
 
-/* A search from the values of `minimum`, which it replaces.  Only the first search must have a result. */
+/* Stores the sum of squares and the values at the minimum that a search has reached. */
+static void solve_keep (fit_solver *solver, double *minimum) {
+  *minimum = solve_sum (solver->fit, solver->values);
+  memcpy (minimum + 1, solver->unknowns, (size_t)solver->fit->unknowns.count * sizeof *solver->unknowns);
+  if (!(*minimum < solver->least)) return;
+  solver->least = *minimum;
+  solve_store (solver, *minimum);
+}
+
+/* A search from the values in `minimum`, which its result replaces.  Only the first search must have one. */
 static int solve_minimum (fit_solver *solver, gsl_multifit_nlinear_workspace *w, double *minimum) {
   pw_fit *fit = solver->fit;
   size_t n = (size_t)fit->unknowns.count;
@@ -208,7 +209,7 @@ static int solve_minima (fit_solver *solver, gsl_multifit_nlinear_workspace *w) 
 
 /* ---- Errors of the estimates ---- */
 
-/* Scales the columns of J to length 1, or 0 of an unknown without effect. */
+/* Scales the columns of J to length 1, or to 0 for an unknown without effect. */
 static void solve_scale (pw_fit *fit, gsl_matrix *J) {
   double largest = 0, *length = fit->column_length;
   int n = fit->unknowns.count;
@@ -222,14 +223,6 @@ static void solve_scale (pw_fit *fit, gsl_matrix *J) {
     if (!(length[j] * fit->unknowns.list[j].scale > SOLVE_EFFECT * largest)) length[j] = 0;
     gsl_vector_scale (&column.vector, length[j] > 0 ? 1 / length[j] : 0);
   }
-}
-
-/* The norm of the data in units of their standard deviations. */
-static double solve_data_norm (const pw_fit *fit) {
-  double sum = 0;
-  for (int i = 0; i < fit->columns * fit->rows; i++)
-    if (!isnan (fit->data[i])) sum += fit->data[i] / fit->sigma[i] * (fit->data[i] / fit->sigma[i]);
-  return sqrt (sum);
 }
 
 /* At a minimum the residuals are very small or orthogonal to the columns of J, which have length 1; unknowns at a bound
@@ -246,7 +239,7 @@ static int solve_converged (const pw_fit *fit, const gsl_matrix *J) {
     worst = fmax (worst, fabs (dot));
   }
   return worst <= cosine * norm ||
-         norm < fmax (SOLVE_EXACT * sqrt (fit->initial_chi2), SOLVE_ROUND_OFF * solve_data_norm (fit));
+         norm < fmax (SOLVE_EXACT * sqrt (fit->initial_chi2), SOLVE_ROUND_OFF * sqrt (solve_sum (fit, NULL)));
 }
 
 /* J D^-1 = U S V^T, where D has the lengths of the columns of J: the covariance of the unknowns is
@@ -255,9 +248,9 @@ static int solve_converged (const pw_fit *fit, const gsl_matrix *J) {
 static void solve_covariance (pw_fit *fit) {
   const double *length = fit->column_length;
   int n = fit->unknowns.count;
-  double least = fmax (SOLVE_RANK, 10 * pw_fit_derivative_error (fit)) * fit->singular_value[0];
+  double least = fmax (SOLVE_RANK, 10 /* a margin */ * pw_fit_derivative_error (fit)) * fit->singular_value[0];
   for (fit->rank = 0; fit->rank < n && fit->singular_value[fit->rank] > least;) fit->rank++;
-  int freedom = pw_fit_freedom (fit);
+  int freedom = pw_fit_degrees_of_freedom (fit);
   double variance = fit->weighted ? 1 : freedom > 0 ? fit->chi2 / freedom : NAN;
   for (int i = 0; i < n; i++)
     for (int j = 0; j < n; j++) {
@@ -274,7 +267,7 @@ static void solve_covariance (pw_fit *fit) {
   }
 }
 
-/* Covariance and standard errors of the estimate, where the last run was. */
+/* Covariance and standard errors of the estimate, at which the last run was made. */
 static int solve_errors (fit_solver *solver) {
   pw_fit *fit = solver->fit;
   size_t n = (size_t)fit->unknowns.count;

@@ -1,4 +1,5 @@
-/* Local searches of `pinwheel optimise`, by NLopt, with derivatives of differentiable outputs. */
+/* Local searches of `pinwheel optimise`, by NLopt; refinements use derivatives of differentiable outputs.  NLopt varies
+ * scaled unknowns (search_unknown). */
 #define _POSIX_C_SOURCE 200809L
 #include <math.h>
 #include <nlopt.h>
@@ -7,12 +8,12 @@
 #include "optimise.h"
 
 #define SEARCH_FIRST 0.1    /* first steps from a start, in scaled unknowns */
-#define SEARCH_ROUGH 1e-3   /* last steps, with which refinements begin */
-#define SEARCH_ALLOWED 1e-6 /* permitted violation of a constraint, relative to its bound */
+#define SEARCH_ROUGH 1e-3   /* last steps from a start, first steps of refinements */
+#define SEARCH_ALLOWED 1e-6 /* permitted violation of a constraint, relative to its bound if that is not 0 */
 #define SEARCH_GAIN 1e-9    /* least improvement of the objective for a restart, relative to its value */
 
 enum {
-  SEARCH_SLOPES = 3,  /* fewest unknowns for derivatives, which cost as much as several runs */
+  SEARCH_SLOPES = 3,  /* unknowns from which on derivatives are used, which cost as much as several runs */
   SEARCH_RESTARTS = 7 /* of SLSQP, at most */
 };
 
@@ -24,11 +25,12 @@ typedef struct {
   nlopt_opt optimiser;
   double *scaled, *unknown, *output; /* of the last run; the unknowns scaled and not */
   double *allowed;                   /* outputs: violation that NLopt permits */
-  double *slope;             /* outputs x unknowns: derivatives by the scaled unknowns; NULL: without derivatives */
-  int evaluated, has_slopes; /* 1: there was a run; with derivatives */
-  int failed;                /* 1: the last run failed */
-  int slopes_failed;         /* 1: derivatives could not be computed, though the run succeeded */
-  double least, most;        /* sign x objective in the runs that succeeded */
+  double *slope;      /* outputs x unknowns: derivatives with respect to scaled unknowns; NULL: none are used */
+  int evaluated;      /* 1: there was a run */
+  int has_slopes;     /* 1: the last run had derivatives */
+  int failed;         /* 1: the last run failed */
+  int slopes_failed;  /* 1: derivatives could not be computed, though the run succeeded */
+  double least, most; /* extrema of sign x objective in the runs that succeeded */
 } local_search;
 
 /* The value of an unknown: between the user's bounds `scaled` is from 0 to 1, otherwise it is in units of the scale. */
@@ -41,7 +43,7 @@ static double search_scaled (const pw_unknown *unknown, double value) {
   return (value - (unknown->has_bounds ? unknown->low : 0)) / unknown->scale;
 }
 
-/* A run; outputs that are not finite count as failed. */
+/* Runs the model with local->unknown and stores the outputs; a run with outputs that are not finite fails. */
 static int search_run (const local_search *local, pw_error *error) {
   const pw_optimise *problem = local->problem;
   const pw_unknowns *unknowns = &problem->unknowns;
@@ -69,8 +71,7 @@ static int search_differentiate (local_search *local, pw_error *error) {
   const pw_unknowns *unknowns = &problem->unknowns;
   pw_progress silent = { 0 };
   pw_sensitivity s = { .of = problem->output, .unknowns = *unknowns, .no_error = 1 };
-  int status = pw_sensitivity_open (&s, local->unknown, error);
-  if (status == PW_OK) status = pw_sensitivity_compute (&s, &silent, error);
+  int status = pw_sensitivity_compute (&s, local->unknown, &silent, error);
   if (status == PW_OK && s.stopped) status = pw_limit_status (&s.limit, pw_run_time (s.base.run), error);
   for (int i = 0; i < problem->outputs && status == PW_OK; i++) {
     local->output[i] = pw_outcome_value (&s.outcomes, i, NULL);
@@ -91,7 +92,7 @@ static double search_factor (const pw_optimise *problem, int i) {
   return problem->sign[i] / (problem->bound[i] != 0 ? fabs (problem->bound[i]) : 1);
 }
 
-/* By how much the outputs violate constraint i; <= 0: not at all. */
+/* By how much the outputs of a run violate constraint i; <= 0: not at all. */
 static double search_violation (const pw_optimise *problem, int i, const double *output) {
   return search_factor (problem, i) * (output[i] - problem->bound[i]);
 }
@@ -121,7 +122,7 @@ static int search_store (local_search *local) {
   return PW_OK;
 }
 
-/* Keeps the last run if it is the best one. */
+/* Makes the last run the result of the search if it is the best one. */
 static void search_keep (local_search *local) {
   pw_optimise *problem = local->problem;
   pw_search *search = local->search;
@@ -142,7 +143,7 @@ static void search_keep (local_search *local) {
   pthread_mutex_unlock (&problem->lock);
 }
 
-/* A run with these unknowns, with derivatives if `slopes`.  If only the derivatives fail, the search ends. */
+/* Makes a run, with derivatives if `slopes`.  If only the derivatives fail, the search ends. */
 static int search_try (local_search *local, int slopes, pw_error *error) {
   pw_error own = { 0 };
   int status = slopes ? search_differentiate (local, &own) : PW_METHOD;
@@ -165,7 +166,7 @@ static void search_end_all (local_search *local, const pw_error *error) {
   nlopt_force_stop (local->optimiser);
 }
 
-/* Makes a run with these scaled unknowns the last one, with derivatives if `slopes`. */
+/* Makes the run with these scaled unknowns the last one unless it already is, with derivatives if `slopes`. */
 static void search_evaluate (local_search *local, const double *scaled, int slopes) {
   const pw_unknowns *unknowns = &local->problem->unknowns;
   const size_t size = (size_t)unknowns->count * sizeof *scaled;
@@ -187,14 +188,14 @@ static void search_evaluate (local_search *local, const double *scaled, int slop
   if (status == PW_RESOURCE) search_end_all (local, &error);
 }
 
-/* The derivatives of factor x output i, unless `gradient` is NULL. */
+/* Stores the derivatives of factor x output i, 0 if they are unknown, unless `gradient` is NULL. */
 static void search_gradient (const local_search *local, int i, double factor, double *gradient) {
   int unknowns = local->problem->unknowns.count;
   for (int j = 0; gradient && j < unknowns; j++)
     gradient[j] = local->failed || local->slopes_failed ? 0 : factor * local->slope[i * unknowns + j];
 }
 
-/* The function that NLopt minimises.  A run that failed counts as worse than all others. */
+/* The function that NLopt minimises: sign x objective, for a failed run more than in all others. */
 static double search_objective (unsigned unknowns, const double *scaled, double *gradient, void *context) {
   local_search *local = context;
   double sign = local->problem->sign[0], most = local->most;
@@ -219,14 +220,15 @@ static void search_constraints (unsigned count, double *violation, unsigned unkn
 
 /* ---- Searches ---- */
 
-/* BOBYQA and COBYLA need no derivatives; BOBYQA, the faster one, needs two unknowns and no constraints. */
+/* SLSQP uses derivatives.  Without them BOBYQA is the fastest, but takes neither constraints, as COBYLA does, nor a
+ * single unknown, as SBPLX does. */
 static nlopt_algorithm search_algorithm (const local_search *local) {
   if (local->slope) return NLOPT_LD_SLSQP;
   if (local->problem->outputs > 1) return NLOPT_LN_COBYLA;
   return local->problem->unknowns.count == 1 ? NLOPT_LN_SBPLX : NLOPT_LN_BOBYQA;
 }
 
-/* Opens the optimiser with the bounds, and with the first and last steps of scaled unknowns. */
+/* Opens the optimiser with the bounds and these first and last steps of scaled unknowns. */
 static int search_open (local_search *local, double first, double last) {
   const pw_unknowns *unknowns = &local->problem->unknowns;
   int n = unknowns->count, done = 1;
@@ -250,8 +252,8 @@ static void search_point (const pw_unknowns *unknowns, const double *value, doub
   for (int i = 0; i < unknowns->count; i++) scaled[i] = search_scaled (unknowns->list + i, value[i]);
 }
 
-/* Searches from a point.  SLSQP may end early where derivatives change much: it is restarted at its result as long as
- * this improves. */
+/* Searches from a point.  SLSQP may end early where derivatives change much: it is restarted at the best run as long as
+ * that improves. */
 static int search_minimise (local_search *local, double *scaled) {
   pw_search *search = local->search;
   for (int left = local->slope ? 1 + SEARCH_RESTARTS : 1;
@@ -266,7 +268,7 @@ static int search_minimise (local_search *local, double *scaled) {
   return PW_OK;
 }
 
-/* Searches by derivatives or without, from the beginning of the search. */
+/* Searches from the beginning of the search, by derivatives if `slopes`. */
 static int search_from (local_search *local, int slopes, double first, double last) {
   const pw_unknowns *unknowns = &local->problem->unknowns;
   size_t n = (size_t)unknowns->count, outputs = (size_t)local->problem->outputs;
@@ -291,7 +293,7 @@ static int search_from (local_search *local, int slopes, double first, double la
   return status;
 }
 
-/* Search i; without derivatives if they fail. */
+/* Search i of the problem, repeated without derivatives if they fail. */
 static int search_task (pw_optimise *problem, int i, int slopes, double first, double last, pw_error *error) {
   local_search local = { .problem = problem, .search = problem->search + i, .least = INFINITY, .most = -INFINITY };
   if (pw_stop) return PW_OK;

@@ -11,12 +11,12 @@
 #include "parallel.h"
 
 enum { OPTIMISE_REFINED = 3 }; /* results that are refined, at most */
-#define OPTIMISE_RUNS 20.      /* of a search, about: to choose the engine */
-#define OPTIMISE_DIVERGED 1e6  /* modulus of an unknown without bounds, in units of its scale, that is no optimum */
+#define OPTIMISE_RUNS 20.      /* usual number of runs of a search, to choose the engine */
+#define OPTIMISE_DIVERGED 1e6  /* modulus of an unknown without bounds, in units of its scale: the search diverged */
 
 /* ---- Starts ---- */
 
-/* Searches from the starts, and room for refinements. */
+/* Allocates the searches, those from the starts with their first points. */
 static int optimise_open_searches (pw_optimise *problem, pw_error *error) {
   const size_t n = (size_t)problem->unknowns.count, width = 2 * n + (size_t)problem->outputs,
                starts = (size_t)problem->starts, all = starts + OPTIMISE_REFINED;
@@ -33,8 +33,8 @@ static int optimise_open_searches (pw_optimise *problem, pw_error *error) {
   return status;
 }
 
-/* The search with the best result among the first `count`, except those `excluded` unless that is NULL; the first one
- * of equal ones.  NULL: none has a result. */
+/* The search with the best result, the first one of equal ones, among the first `count` searches without those
+ * `excluded`, which may be NULL.  NULL: none has a result. */
 static const pw_search *optimise_best (const pw_optimise *problem, int count, const unsigned char *excluded) {
   const pw_search *best = NULL;
   for (int i = 0; i < count; i++) {
@@ -45,10 +45,10 @@ static const pw_search *optimise_best (const pw_optimise *problem, int count, co
   return best;
 }
 
-/* Refines the best of the results that differ. */
+/* Refines the best ones among the different results. */
 static int optimise_refine (pw_optimise *problem, pw_error *error) {
   const pw_search *best;
-  unsigned char *refined = calloc ((size_t)problem->starts, 1); /* 1: the result, or the same one, is refined */
+  unsigned char *refined = calloc ((size_t)problem->starts, 1); /* 1: its result, or the same optimum, is refined */
   if (refined == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
   while (problem->refinements < OPTIMISE_REFINED && (best = optimise_best (problem, problem->starts, refined))) {
     pw_search *refinement = problem->search + problem->starts + problem->refinements++;
@@ -85,7 +85,7 @@ static int optimise_search (pw_optimise *problem, pw_error *error) {
 
 /* ---- Before the search ---- */
 
-/* Adds the constraint "OUTPUT<=VALUE" or "OUTPUT>=VALUE"; `text` is a copy of `given` that is split in place. */
+/* Adds the constraint "OUTPUT<=VALUE" or "OUTPUT>=VALUE"; text: a copy of `given`, which becomes OUTPUT. */
 static int optimise_constraint (pw_optimise *problem, char *text, const char *given, pw_error *error) {
   const int i = problem->outputs;
   char *relation = NULL;
@@ -121,8 +121,7 @@ static int optimise_read_outputs (pw_optimise *problem, pw_error *error) {
   return status;
 }
 
-/* Verifies outputs of an option for the model, as every run will read them; stores their units.  Extrema are not
- * differentiable. */
+/* Checks the outputs of an option, from number `first` on, and stores their units.  Extrema are not differentiable. */
 static int optimise_open_outputs (pw_optimise *problem, int first, int count, const char *option, pw_error *error) {
   pw_outcomes outcomes;
   int status = pw_outcomes_open (&outcomes, problem->model.system, option, problem->output + first, count, error);
@@ -190,7 +189,7 @@ static const double *optimise_nearest (const pw_optimise *problem, int *constrai
   return nearest;
 }
 
-/* The error if no run satisfies the constraints: the first one if every run failed. */
+/* The error if no run satisfies the constraints: that of the first run if every run failed. */
 static int optimise_infeasible (const pw_optimise *problem, pw_error *error) {
   char value[32], bound[32], unit[90] = "";
   int i = 0;
@@ -205,8 +204,8 @@ static int optimise_infeasible (const pw_optimise *problem, pw_error *error) {
                   problem->sign[i] > 0 ? "most" : "least", pw_format (bound, problem->bound[i], 9), unit);
 }
 
-/* PW_METHOD if the search with the best result ended at its limit of runs, or at a very large value of an unknown
- * without bounds. */
+/* PW_METHOD if the search with the best result did not converge, or ended at a very large value of an unknown without
+ * bounds. */
 static int optimise_converged (const pw_optimise *problem, pw_error *error) {
   const pw_search *search = problem->best;
   const pw_unknown *farthest = NULL;
@@ -244,21 +243,17 @@ static int optimise_finish (pw_optimise *problem, pw_error *error) {
   return status == PW_OK && !converged ? pw_fail (error, unconverged.status, "%s", unconverged.text) : status;
 }
 
-static void optimise_close (pw_optimise *problem) {
-  for (int i = 0; problem->search && i < problem->starts + OPTIMISE_REFINED; i++) free (problem->search[i].trials);
-  pw_arena_free (&problem->arena);
-  pw_files_close (&problem->files);
-  pw_unknowns_close (&problem->unknowns);
-  pw_cli_close_model (&problem->model);
-}
-
 static int optimise_command (void *options, pw_error *error) {
   pw_optimise *problem = options;
   int status = optimise_read (problem, error);
   if (status == PW_OK) status = optimise_open (problem, error);
   if (status == PW_OK) status = optimise_search (problem, error);
   if (status == PW_OK) status = optimise_finish (problem, error);
-  optimise_close (problem);
+  for (int i = 0; problem->search && i < problem->starts + OPTIMISE_REFINED; i++) free (problem->search[i].trials);
+  pw_arena_free (&problem->arena);
+  pw_files_close (&problem->files);
+  pw_unknowns_close (&problem->unknowns);
+  pw_cli_close_model (&problem->model);
   return status;
 }
 

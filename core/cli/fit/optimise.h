@@ -1,4 +1,5 @@
-/* An optimisation for `pinwheel optimise`: the problem, its searches and their results. */
+/* An optimisation for `pinwheel optimise`: the problem, its searches and their results.  Comments on arrays begin with
+ * their sizes. */
 #ifndef PW_OPTIMISE_H
 #define PW_OPTIMISE_H
 
@@ -8,13 +9,13 @@
 
 /* A local search and its runs. */
 typedef struct {
-  double *from, *to; /* unknowns: where it begins; of the best run that satisfies the constraints */
-  double *output;    /* outputs of that run */
-  int feasible;      /* 1: there is such a run */
-  int converged;     /* 0: the search ended at its limit of runs */
-  long runs, failed;
-  long derivatives;     /* points at which derivatives were computed */
-  double *trials;       /* runs x (unknowns, outputs); outputs of failed runs are NaN */
+  double *from, *to;    /* unknowns: where it begins; its result, the best run that satisfies the constraints */
+  double *output;       /* outputs: of that run */
+  int feasible;         /* 1: there is such a run */
+  int converged;        /* 0: the search ended at its limit of runs, or NLopt failed */
+  long runs, failed;    /* number of runs; of those that failed */
+  long derivatives;     /* number of points at which derivatives were computed */
+  double *trials;       /* runs x (unknowns + outputs): all runs; outputs of failed ones are NaN */
   size_t allocated;     /* rows of `trials` */
   pw_error first_error; /* of the first failed run */
 } pw_search;
@@ -29,17 +30,17 @@ typedef struct {
   pw_arena arena;      /* of the arrays below, except trials */
   const char **output; /* outputs, as text: the objective, then the left sides of the constraints */
   char (*unit)[80];    /* outputs */
-  double *bound;       /* outputs: of a constraint sign x (output - bound) <= 0 */
-  double *sign;        /* outputs: 1 or -1; sign x objective is minimised */
+  double *sign;        /* outputs: 1 or -1; of the objective: sign x objective is minimised */
+  double *bound;       /* outputs: of a constraint: sign x (output - bound) <= 0 */
   int outputs, starts, jobs;
-  int refinements;    /* results of these starts that are refined: searches continue with a tight tolerance */
+  int refinements;    /* searches that continue from the best results of the starts, with smaller last steps */
   int differentiable; /* 1: outputs have derivatives, except where a motion has none */
   double seed;
-  pw_search *search;              /* from the starts, then refinements */
-  const pw_search *best;          /* that with the best result; NULL: none */
+  pw_search *search;              /* starts, then refinements */
+  const pw_search *best;          /* that with the best result; NULL: none has one */
   long runs, failed, derivatives; /* of all searches */
   const pw_error *first_error;    /* of the first failed run; NULL: there is none */
-  pthread_mutex_t lock;           /* of what follows */
+  pthread_mutex_t lock;           /* of the members below */
   pw_progress progress;
   int searches_done;
   double least;   /* sign x best objective so far */
@@ -50,9 +51,10 @@ typedef struct {
 
 #define PW_SEARCH_FINE 1e-7 /* last steps of refinements, relative to the scales of the unknowns */
 
-/* 1 if the outputs of a run satisfy the constraints, with an allowance for round-off on the boundary. */
+/* 1 if the outputs of a run satisfy the constraints, up to violations of 1e-6 relative to their bounds. */
 int pw_search_feasible (const pw_optimise *problem, const double *output);
-/* The constraint that the outputs of a run violate most, and by how much, relative to its bound if that is not 0. */
+/* The largest violation of a constraint by the outputs of a run, relative to its bound if that is not 0; <= 0: there is
+ * none.  *constraint: the index of that output; not set without constraints. */
 double pw_search_violation (const pw_optimise *problem, const double *output, int *constraint);
 
 /* Tasks of pw_parallel: the search from start i; refinement i.  The context is the pw_optimise. */
@@ -61,10 +63,11 @@ int pw_search_fine (void *context, int i, pw_error *error);
 
 /* ---- Results (optimise_report.c) ---- */
 
-/* 1 if the results of two searches are the same optimum. */
+/* 1 if two searches have results, and these are the same optimum. */
 int pw_optimise_same (const pw_optimise *problem, const pw_search *a, const pw_search *b);
 
-/* Prints the result; writes it as JSON and YAML; draws figures of the runs into the folder. */
+/* Print the result; write it as JSON, with this status ("ok", ...), and as YAML; draw figures of the runs into the
+ * folder.  problem->best is not NULL. */
 void pw_optimise_print (const pw_optimise *problem);
 void pw_optimise_json (const pw_optimise *problem, const char *status, FILE *f);
 void pw_optimise_yaml (const pw_optimise *problem, FILE *f);

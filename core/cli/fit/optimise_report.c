@@ -7,8 +7,8 @@
 #include "print_table.h"
 #include "states.h"
 
-#define REPORT_SAME 0.01       /* distance of results of the same optimum, relative to the scales of the unknowns */
-#define REPORT_ROUND_OFF 1e-14 /* difference of equal outputs, relative to them */
+#define REPORT_SAME 0.01       /* largest distance of results of the same optimum, in scales of the unknowns */
+#define REPORT_ROUND_OFF 1e-14 /* largest relative difference of equal outputs */
 
 enum {
   REPORT_DIGITS = 9,
@@ -40,8 +40,8 @@ static int report_is_constant (const pw_optimise *problem) {
   return most - least <= REPORT_ROUND_OFF * fabs (most);
 }
 
-/* 1 if unknown i has no effect: outputs are the same in all runs that differ from the first one of their search in it
- * alone, and there are such runs. */
+/* 1 if unknown i has no effect: there are runs that differ from the first run of their search in unknown i alone, and
+ * their outputs are the same. */
 static int report_has_no_effect (const pw_optimise *problem, int i) {
   int n = problem->unknowns.count, columns = n + problem->outputs, pairs = 0;
   const pw_search *search = problem->search, *end = search + problem->starts + problem->refinements;
@@ -57,7 +57,7 @@ static int report_has_no_effect (const pw_optimise *problem, int i) {
   return pairs > 0;
 }
 
-/* The bound at which the best value of unknown i is: -1 the lower, 1 the upper one, 0 none or without effect. */
+/* The bound at which the best value of unknown i is: -1 the lower one, 1 the upper one, 0 neither, or no effect. */
 static int report_bound (const pw_optimise *problem, int i) {
   const pw_unknown *unknown = problem->unknowns.list + i;
   if (report_has_no_effect (problem, i)) return 0;
@@ -201,7 +201,7 @@ static void report_word (FILE *f, const char *word) {
   pw_figure_quoted (f, word, "'\\''");
 }
 
-/* The run of the result, as a comment: with the options given that have an effect on it, then with the values found. */
+/* Writes the command that runs the result, as a comment: the given options that affect runs, then the values found. */
 static void report_command (const pw_optimise *problem, const char *values, FILE *f) {
   const pw_cli_line *line = &problem->line;
   const struct {
@@ -247,7 +247,7 @@ void pw_optimise_yaml (const pw_optimise *problem, FILE *f) {
 
 /* ---- Figures ---- */
 
-/* A row per run: number of the start, unknowns, output, whether it satisfies the constraints. */
+/* Writes a row per run: number of its search, unknowns, objective, 1 if it satisfies the constraints. */
 static int report_data (const void *context, FILE *f, pw_error *error) {
   const pw_optimise *problem = context;
   int n = problem->unknowns.count, width = n + problem->outputs;
