@@ -49,7 +49,7 @@ static void test_bracket (void **state) {
   trial (&redundant_towed_table, 1);
   redundant_end (&redundant_towed_table, "rk4+projection", 0, 5, name, a, 1e-3);
   redundant_end (&redundant_towed_plainly_table, "rk4+projection", 0, 5, name, b, 1e-3);
-  check_below ("past many changes", redundant_off (a, b, 6), 1e-10, "round-off of 5 s, magnified by the motion");
+  check_below ("past many changes", redundant_distance (a, b, 6), 1e-10, "round-off of 5 s, magnified by the motion");
 }
 
 /* ---- The same with a caster of short trail under the load ----
@@ -87,7 +87,7 @@ static void test_caster (void **state) {
   for (int i = 0; method[i]; i++) {
     redundant_end (&redundant_on_caster_table, method[i], 1e-9, 3, name, a, 0);
     redundant_end (&redundant_on_caster_plainly_table, method[i], 1e-9, 3, name, b, 0);
-    check_below (method[i], redundant_off (a, exact, 6), 1e-9 + 10 * redundant_off (b, exact, 6),
+    check_below (method[i], redundant_distance (a, exact, 6), 1e-9 + 10 * redundant_distance (b, exact, 6),
                  "rtol, and 10 times the twin's own error");
   }
 }
@@ -99,7 +99,7 @@ static void test_drifting_bolts (void **state) {
   double a[REDUNDANT_COORDS], b[REDUNDANT_COORDS];
   redundant_end (&redundant_on_caster_table, "rk4+none", 0, 3, name, a, 0.004);
   redundant_end (&redundant_on_caster_plainly_table, "rk4+none", 0, 3, name, b, 0.004);
-  check_below ("the bolted bracket", redundant_off (a, b, 6), 1e-3, "drift");
+  check_below ("the bolted bracket", redundant_distance (a, b, 6), 1e-3, "drift");
 }
 
 /* ---- A cart on two casters with massless forks, with two wheels on each axle ----

@@ -65,8 +65,7 @@ ladder_error ladder_solve (const char *model, const char *method, const pw_setti
   }
   e.lambda /= largest;
   pw_run_close (r);
-  pw_run_close (exact);
-  pw_system_free (s);
+  runs_close (exact, s);
   pw_system_free (same);
   return e;
 }
