@@ -147,9 +147,8 @@ static void test_axle_forces (void **state) {
                  "round-off: the same motion by the same steps");
     check_close ("the halves", left, right, 1e-12 * (1 + fabs (whole)), "reactions of least norm are equal");
   }
-  pw_run_close (r);
-  runs_close (one, s);
-  pw_system_free (twin);
+  runs_close (r, s);
+  runs_close (one, twin);
 }
 
 /* ---- Two bodies connected by a weld and two pins, pinned to the ground ---- */

@@ -49,8 +49,7 @@ static void test_oscillator (void **state) {
   spring_swing ("ida", 1e-6, "1e4 rtol");
 }
 
-/* ---- Free length 0: a planar oscillator, on an ellipse or on a line through its centre, where the ends coincide
- * ---- */
+/* ---- Free length 0: a planar oscillator, on an ellipse or on a line through the point where the ends coincide ---- */
 
 static const struct { double x[2], v[2]; } spring_start[] = { { { 1, 0 }, { 0, 0.5 } }, { { 0, 0 }, { 0.6, 0.8 } } };
 

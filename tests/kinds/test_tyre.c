@@ -124,8 +124,7 @@ static void test_refused (void **state) {
                  "model scene: tyre T: load = 0: expected > 0, since friction limits the force to friction x load");
 }
 
-/* ---- By all methods: a car and a trailer on tyres with and without a load, off their axes, one of them oblique
- * ---- */
+/* ---- By all methods: a car and a trailer on tyres, with and without a load, off their axes, oblique ---- */
 
 static void tyre_car (pw_model *m, const void *parameters) {
   (void)parameters;
