@@ -90,7 +90,7 @@ struct pw_variation {
   int points, room;          /* recorded states, allocated ones */
   pw_variation_point *point; /* room: states of the run from t on, in the order of time */
   double passed;             /* the last breakpoint that the derivatives have passed */
-  pw_variation_hold hold[2]; /* before the next jump, after the last one */
+  pw_variation_hold hold[2]; /* just before and just after the jump approached last */
   char *memory;
 };
 

@@ -62,8 +62,8 @@ static double step_noise (const pw_variation *x) {
   return STEP_ROUND * most * x->r->w->scale.time / fmin (x->r->settings.step, x->r->w->scale.time);
 }
 
-/* The permitted step_motion_error: STEP_MOTION, or the run's own error if that is small compared with the change of
- * velocity over which forces reverse. */
+/* The permitted step_motion_error: STEP_MOTION, or the run's own error if that is larger, multiplied by x->reversal: in
+ * motions with forces that reverse fast, smaller errors matter. */
 static double step_motion_tolerance (const pw_variation *x) {
   return fmax (STEP_MOTION, step_noise (x) * x->reversal / fmax (1, x->speed));
 }
@@ -74,7 +74,7 @@ static const double STEP_CHANGE = 1e-6, STEP_CHANGE_RTOL = 1000;
 
 /* The difference between the change of the run's velocities and the integral of its accelerations over a step, relative
  * to the integral, at most 1: large where the run does not resolve the motion.  The error of the method, and step_noise
- * where it is small compared with the change over which forces reverse, do not count. */
+ * multiplied by x->reversal, do not count. */
 static double step_defect (const pw_variation *x, double h) {
   int stages = x->implicit ? 1 + PW_VARIATION_STAGES : PW_VARIATION_RATES - 1;
   double most =

@@ -52,7 +52,7 @@ REFUSED = {
         *[(f"m.run({name}={value})", name) for name in ("step", "rtol", "atol", "max_steps") for value in ("0", "-1", "NAN", "INF", "'a'")],
         ("m.run(max_steps=1.5)", "whole number"), ("m.run(max_steps=10**30)", "whole number"), ("m.linearise(NAN)", "at = nan"),
         ("m.linearise(-1)", "at = -1"), ("m.linearise('a')", "at = 'a'"), ("m.linearise(0, 0)", "most"), ("m.linearise(0, None)", "most"),
-        ("m.linearise(0, 2)", "raise `most`"), ("m.open().advance(NAN)", "finite"), ("m.open().advance(INF)", "finite"),
+        ("m.linearise(0, 2)", "raise `most`"), ("m.open().advance(NAN)", "finite"), ("m.open().advance(INF)", "finite"), ("m.run(t_end=INF)", "finite"),
         ("m.open().advance('a')", "expected a number"), ("m.open().advance(-1)", "has reached"), ("m.open().record(-1)", "has reached"),
         ("m.open().record(None)", "t_end"), ("m.open(inputs={'rider': 'a'})", "rider = 'a'"),
         ("m.open(inputs={'rider': 0}).inputs.update(rider=NAN)", "finite"), ("m.open(inputs={'rider': 0}).inputs.update(rider=None)", "number")],

@@ -237,7 +237,7 @@ def number(value, what: str, above: float | None = None) -> float:
     except (TypeError, ValueError, OverflowError):
         raise InputError(f"{what} = {value!r:.60}: expected a number") from None
     if above is not None and not above < result.value < float("inf"):
-        raise InputError(f"{what} = {result.value!r}: expected a number > {above:g}")
+        raise InputError(f"{what} = {result.value!r}: expected a finite number > {above:g}")
     return result.value
 
 

@@ -353,7 +353,7 @@ class Model:
         every : float, optional
             Time between samples [s]; default: a sample after every step.
         times : array_like, shape (n,), optional
-            Increasing times of samples [s], at most t_end.
+            Increasing times of samples [s], at most t_end; the run ends at the last one.
         start : dict, optional
             Initial values of states [m, rad, m/s, rad/s].
         progress : callable or bool, optional

@@ -244,7 +244,7 @@ class Simulation:
 
     def record(self, t_end: float, every: float | None = None, times=None,
                progress: Callable[[float], object] | bool | None = None) -> Result:
-        """Advances to t_end and returns the samples.
+        """Advances to t_end, or to the last of ``times``, and returns the samples.
 
         Parameters
         ----------
