@@ -5,8 +5,7 @@
  *
  * First the EzyRoller alone, with the libpinwheel to which this program is linked and with the one in FOLDER, which
  * has only the element types of the EzyRoller: the counts must be equal, otherwise the exit status is 1.  Then the
- * EzyRoller with one further effect at a time.  Element types are found by name, so that the program runs with both
- * libraries. */
+ * EzyRoller with one further effect at a time.  Element types are found by name: it runs with both libraries. */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -186,8 +185,7 @@ static void effects_close (pw_run *r, pw_system *s) {
 }
 
 /* Fills the pool from a run of the EzyRoller alone: all scenes are evaluated at the same states, since the
- * instructions of a sine depend on the angle.  Coordinates that the EzyRoller does not have keep their initial
- * values. */
+ * instructions of a sine depend on the angle.  Further coordinates keep their initial values. */
 static void effects_fill (effects_data *d, int massless) {
   pw_error e = { 0 };
   pw_system *s;

@@ -187,8 +187,7 @@ static double engine_time_sincos (void) {
   return timing_alone (&work, ENGINE_PAIRS, engine_batch);
 }
 
-/* Checks the time [ns] of a program written by hand: `known` is its time where a sin and a cos take 15 ns; 30 % more is
- * accepted. */
+/* Checks the time [ns] of a program written by hand: `known`, where a sin and a cos take 15 ns; accepts 30 % more. */
 static void engine_units (engine_report *r, double sincos, const char *what, double ns, double known) {
   engine_put (r, &(engine_line){ what, "sin+cos pair", sincos, ns, ns / sincos, .high = 1.3 * known / 15 });
 }
@@ -205,8 +204,7 @@ static double engine_slope (const int *size, const double *time, int from, int c
   return (n * sxy - sx * sy) / (n * sxx - sx * sx);
 }
 
-/* Reports the ratio of the largest to the least time per body, and the slope, both without the smallest scene; ns: per
- * body. */
+/* Reports the ratio of the largest to the least time per body, `ns`, and the slope, both without the smallest scene. */
 static void engine_growth_lines (engine_report *r, const char *name, const int *size, const double *ns, int count,
                                  int target) {
   char what[2][80];

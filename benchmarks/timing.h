@@ -1,6 +1,5 @@
-/* Measures the processor time of small pieces of work, of one alone or of two in comparison.  Batches of both
- * alternate, so that a slow phase of the machine affects both; the result is the median of the ratios of adjacent
- * batches. */
+/* Measures the processor time of small pieces of work, one alone or two in comparison.  Batches of both alternate, so
+ * that a slow phase of the machine affects both; the result is the median of the ratios of adjacent batches. */
 #ifndef TIMING_H
 #define TIMING_H
 

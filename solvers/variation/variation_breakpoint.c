@@ -59,8 +59,7 @@ int pw_variation_look_ahead (pw_variation *x, pw_direction_copy *d, double next,
                   x->t, (int)(d - x->direction) + 1);
 }
 
-/* Prescribed velocities jump if the residual of velocity constraints increases by more than this, in units of the
- * scene. */
+/* Prescribed velocities jump if the residual of velocity constraints grows by more than this, in units of the scene. */
 static const double BREAKPOINT_VELOCITY = 1e-6;
 
 /* The residual of velocity constraints at the state evaluated. */

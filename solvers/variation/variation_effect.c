@@ -131,8 +131,7 @@ double pw_variation_least_effect (const pw_direction_copy *d) {
   return fmin (1, 1e-5 / fabs (d->given.step));
 }
 
-/* The two differences become the extrapolated one and its error, as in pw_direction_weight, which includes
- * round-off. */
+/* The two differences become the extrapolated one and its error, as in pw_direction_weight, plus round-off. */
 static void effect_extrapolate (const pw_variation *x, pw_direction_copy *d) {
   double *one = d->effect[0], *two = d->effect[1], all = 0;
   double round = 4 * DBL_EPSILON * fabs (effect_weight (&d->given, 0, 1));
@@ -150,7 +149,7 @@ static void effect_extrapolate (const pw_variation *x, pw_direction_copy *d) {
 
 /* The step of the differences is kept while their relative error is below EFFECT_ROUND if it is round-off, else, if it
  * is the remainder of the differences, below EFFECT_REMAINDER, whose square is about the remainder of the extrapolated
- * one. A better step aims at EFFECT_AIM times these. */
+ * one.  A better step aims at EFFECT_AIM times these. */
 static const double EFFECT_ROUND = 1e-7, EFFECT_REMAINDER = 1e-4, EFFECT_AIM = 0.1;
 
 /* With a smaller step an effect may be 0 only because the step is lost in the rounding of numbers of the order of 1. */

@@ -119,8 +119,7 @@ static void implicit_coordinates (const pw_variation *x, int i, const double *ve
   }
 }
 
-/* Factorises the matrix of the z_i and the filter.  If one is singular, results are not finite: the step is
- * repeated. */
+/* Factorises the matrix of the z_i and the filter.  If one is singular, errors are not finite: the step is rejected. */
 static void implicit_factor (pw_variation *x, double h) {
   pw_variation_implicit *p = x->implicit;
   int size = p->size, rows = STAGES * size;

@@ -76,8 +76,7 @@ static int jump_bisect (pw_variation *x, double *t0, double *t1, double *left, d
   return PW_OK;
 }
 
-/* *suspected: 1 if accelerations between points i and i + 1 are not linear in time and may jump.  state: scratch, 3
- * n. */
+/* *suspected: 1 if accelerations between points i and i + 1 may jump: they are not linear in time.  state: 3 n */
 static int jump_suspected (pw_variation *x, int i, double *state, int *suspected, pw_error *error) {
   const double *left = x->point[i].x + 2 * x->n, *right = x->point[i + 1].x + 2 * x->n;
   double t = x->point[i].t + (x->point[i + 1].t - x->point[i].t) / 2, *a = state + 2 * x->n;
@@ -247,8 +246,7 @@ static int jump_leaves (jump_neighbour k) {
   return jump_side (&k, k.step, &side) == PW_OK && side;
 }
 
-/* 1 if the motion has come from another state, where accelerations were those before the jump, instead of starting at
- * it. */
+/* 1 if the motion has not started at the jump: at an earlier state, accelerations are those before the jump. */
 static int jump_arrives (jump_neighbour k) {
   int n = k.x->n, side;
   double delay = -JUMP_NEAR * k.x->r->w->scale.time, *a = jump_scratch_a (k.x);

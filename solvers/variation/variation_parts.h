@@ -25,8 +25,7 @@ typedef struct {
   double energy;                 /* largest derivative of work and losses so far */
 } pw_variation_column;
 
-/* Sums of the magnitudes, in units of the scene, of differences, of their errors, and of the round-off in the
- * errors. */
+/* Sums of magnitudes, in units of the scene: of differences, of their errors, and of the round-off in the errors. */
 typedef struct {
   double all, error, round;
 } pw_difference_sums;
@@ -75,8 +74,7 @@ struct pw_variation {
   struct pw_variation_implicit *implicit; /* implicit steps; NULL: explicit ones */
   double *q, *v;                          /* n + 3: the state last evaluated */
   double *a[PW_VARIATION_RATES];          /* n: accelerations of the run at the stages */
-  /* n: errors of the run's velocities in the last step: the estimate of the method, and the difference from the run's
-   * own */
+  /* n: of velocities in the last step: the error of the method, the difference from the change of the run's own */
   double *motion_error, *motion_defect;
   double speed;              /* largest velocity of the run so far, in units of the scene */
   double reversal;           /* change of a velocity over which a force reverses, at most 1, in units of the scene */

@@ -119,8 +119,7 @@ static int path_is_accurate (const pw_variation *x, int i) {
   return 1;
 }
 
-/* Inserts the state at the midpoint between points i and i + 1 and, if interpolation was not accurate there, does so in
- * both halves. */
+/* Inserts the state at the midpoint; if interpolation was not accurate there, does so in both halves, too. */
 int pw_variation_refine (pw_variation *x, int i, pw_error *error) {
   double t0 = x->point[i].t, t1 = x->point[i + 1].t, middle = t0 + (t1 - t0) / 2;
   if (pw_fixed_steps (x->r) || t1 - t0 < PATH_SHORTEST * (x->r->t - x->begun) || !(t0 < middle && middle < t1))

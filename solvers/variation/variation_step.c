@@ -53,8 +53,7 @@ static double step_motion_error (const pw_variation *x) {
   return step_largest_velocity (x, x->motion_error) / fmax (1, x->speed);
 }
 
-/* Errors of the run's velocities between its steps, in units of the scene; a fifth of its tolerance if it adapts its
- * steps. */
+/* Errors of the run's velocities between its steps, in units of the scene: with adaptive steps, rtol / 5. */
 static double step_noise (const pw_variation *x) {
   double most = 1;
   if (!pw_fixed_steps (x->r)) return 0.2 * x->r->settings.rtol * fmax (1, x->speed);

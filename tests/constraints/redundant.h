@@ -2,9 +2,17 @@
 #ifndef REDUNDANT_H
 #define REDUNDANT_H
 
-#include "pinwheel-solvers.h"
+#include "trial.h"
 
 enum { REDUNDANT_COORDS = 20 };
+
+/* Defines a scene, built by statements that fill the model m, and its table, NAME_table. */
+#define REDUNDANT_SCENE(name, build)                      \
+  static void name (pw_model *m, const void *parameter) { \
+    (void)parameter;                                      \
+    build;                                                \
+  }                                                       \
+  static const pw_plugin_table name##_table = TRIAL_TABLE (name)
 
 /* Runs a scene to t, with a fixed step or with rtol, and stores the final values of the states with these names, which
  * end with NULL. */

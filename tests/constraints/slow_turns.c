@@ -1,5 +1,4 @@
-/* Methods without projection at every tolerance, through singular configurations: correct, or stopped with a
- * message. */
+/* Methods without projection, at many tolerances, through singular configurations: correct, or stopped by an error. */
 #include "check.h"
 #include "turns.h"
 

@@ -8,7 +8,7 @@
 #define START_REASON "64 eps of the row's terms: round-off"
 
 /* Opens a run of the EzyRoller with these initial values; names end with NULL, or `name` is NULL.  Checks the
- * constraints. Close it with runs_close. */
+ * constraints.  Close it with runs_close. */
 pw_run *start_open (pw_system **system, const char *const *name, const double *value);
 
 #endif

@@ -237,14 +237,12 @@ static void test_contradictory_drives (void **state) {
 }
 
 int main (void) {
-  const struct CMUnitTest tests[] = {
-    cmocka_unit_test (test_locked),
-    cmocka_unit_test (test_locked_with_velocity),
-    cmocka_unit_test (test_skidding),
-    cmocka_unit_test (test_spinning_wheel_locked),
-    cmocka_unit_test (test_locks_in_motion),
-    cmocka_unit_test (test_open_weld),
-    cmocka_unit_test (test_contradictory_drives),
-  };
+  const struct CMUnitTest tests[] = { cmocka_unit_test (test_locked),
+                                      cmocka_unit_test (test_locked_with_velocity),
+                                      cmocka_unit_test (test_skidding),
+                                      cmocka_unit_test (test_spinning_wheel_locked),
+                                      cmocka_unit_test (test_locks_in_motion),
+                                      cmocka_unit_test (test_open_weld),
+                                      cmocka_unit_test (test_contradictory_drives) };
   return cmocka_run_group_tests (tests, NULL, NULL);
 }

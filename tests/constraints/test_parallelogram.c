@@ -78,10 +78,7 @@ static void test_partners (void **state) {
 }
 
 int main (void) {
-  const struct CMUnitTest tests[] = {
-    cmocka_unit_test (test_digits),
-    cmocka_unit_test (test_shares),
-    cmocka_unit_test (test_partners),
-  };
+  const struct CMUnitTest tests[] = { cmocka_unit_test (test_digits), cmocka_unit_test (test_shares),
+                                      cmocka_unit_test (test_partners) };
   return cmocka_run_group_tests (tests, NULL, NULL);
 }

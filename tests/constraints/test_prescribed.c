@@ -142,8 +142,7 @@ static void test_massive_body_kept (void **state) {
   runs_close (r, s);
 }
 
-/* An angle is specified, and velocities that violate the constraint of a wheel: the velocities change, not the
- * angle. */
+/* The angle of a wheel is specified, and velocities that violate its constraint: the velocities change. */
 static void start_slipping (pw_model *m, const void *parameters) {
   (void)parameters;
   pw_add_body (m, &(pw_body){ .name = "frame", .mass = 1, .inertia = 0.1, .rate = { 1, 0.3, 0.2 } });

@@ -85,18 +85,8 @@ static void redundant_tricycle (pw_model *m, int wheels) {
                                   .value = { PW_HARMONIC, .harmonic = { .amplitude = 0.3, .omega = 2 } } });
 }
 
-static void redundant_three (pw_model *m, const void *parameter) {
-  (void)parameter;
-  redundant_tricycle (m, 2);
-}
-
-static void redundant_two (pw_model *m, const void *parameter) {
-  (void)parameter;
-  redundant_tricycle (m, 1);
-}
-
-static const pw_plugin_table redundant_three_table = TRIAL_TABLE (redundant_three);
-static const pw_plugin_table redundant_two_table = TRIAL_TABLE (redundant_two);
+REDUNDANT_SCENE (redundant_three, redundant_tricycle (m, 2));
+REDUNDANT_SCENE (redundant_two, redundant_tricycle (m, 1));
 
 /* Two equal drives turn a crank against its weight: each has half of the reaction and half of the work. */
 static void redundant_drives (pw_model *m, const void *parameter) {
@@ -175,18 +165,8 @@ static void redundant_frame (pw_model *m, int pins) {
   pw_add_gravity (m, &(pw_gravity){ .name = "gravity", .acceleration = { 0, -9.81 } });
 }
 
-static void redundant_bolted (pw_model *m, const void *parameter) {
-  (void)parameter;
-  redundant_frame (m, 2);
-}
-
-static void redundant_welded (pw_model *m, const void *parameter) {
-  (void)parameter;
-  redundant_frame (m, 0);
-}
-
-static const pw_plugin_table redundant_bolted_table = TRIAL_TABLE (redundant_bolted);
-static const pw_plugin_table redundant_welded_table = TRIAL_TABLE (redundant_welded);
+REDUNDANT_SCENE (redundant_bolted, redundant_frame (m, 2));
+REDUNDANT_SCENE (redundant_welded, redundant_frame (m, 0));
 
 static void test_frame (void **state) {
   (void)state;
@@ -293,17 +273,15 @@ static void test_restart (void **state) {
 }
 
 int main (void) {
-  const struct CMUnitTest tests[] = {
-    cmocka_unit_test (test_parallelogram_twins),
-    cmocka_unit_test (test_parallelogram_start),
-    cmocka_unit_test (test_drives),
-    cmocka_unit_test (test_axle),
-    cmocka_unit_test (test_axle_forces),
-    cmocka_unit_test (test_frame),
-    cmocka_unit_test (test_names),
-    cmocka_unit_test (test_kept),
-    cmocka_unit_test (test_moments),
-    cmocka_unit_test (test_restart),
-  };
+  const struct CMUnitTest tests[] = { cmocka_unit_test (test_parallelogram_twins),
+                                      cmocka_unit_test (test_parallelogram_start),
+                                      cmocka_unit_test (test_drives),
+                                      cmocka_unit_test (test_axle),
+                                      cmocka_unit_test (test_axle_forces),
+                                      cmocka_unit_test (test_frame),
+                                      cmocka_unit_test (test_names),
+                                      cmocka_unit_test (test_kept),
+                                      cmocka_unit_test (test_moments),
+                                      cmocka_unit_test (test_restart) };
   return cmocka_run_group_tests (tests, NULL, NULL);
 }

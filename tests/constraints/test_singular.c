@@ -273,17 +273,15 @@ static void test_nan (void **state) {
 }
 
 int main (void) {
-  const struct CMUnitTest tests[] = {
-    cmocka_unit_test (test_four_bar),
-    cmocka_unit_test (test_implicit_steps_ending_there),
-    cmocka_unit_test (test_slider_crank),
-    cmocka_unit_test (test_ida),
-    cmocka_unit_test (test_flat_start),
-    cmocka_unit_test (test_restart_there),
-    cmocka_unit_test (test_steps_ending_there),
-    cmocka_unit_test (test_turned),
-    cmocka_unit_test (test_accelerated_by_restart),
-    cmocka_unit_test (test_nan),
-  };
+  const struct CMUnitTest tests[] = { cmocka_unit_test (test_four_bar),
+                                      cmocka_unit_test (test_implicit_steps_ending_there),
+                                      cmocka_unit_test (test_slider_crank),
+                                      cmocka_unit_test (test_ida),
+                                      cmocka_unit_test (test_flat_start),
+                                      cmocka_unit_test (test_restart_there),
+                                      cmocka_unit_test (test_steps_ending_there),
+                                      cmocka_unit_test (test_turned),
+                                      cmocka_unit_test (test_accelerated_by_restart),
+                                      cmocka_unit_test (test_nan) };
   return cmocka_run_group_tests (tests, NULL, NULL);
 }

@@ -239,18 +239,16 @@ static void test_given_consistent (void **state) {
 }
 
 int main (void) {
-  const struct CMUnitTest tests[] = {
-    cmocka_unit_test (test_settings),
-    cmocka_unit_test (test_bad_settings),
-    cmocka_unit_test (test_consistent_unchanged),
-    cmocka_unit_test (test_small_deviation),
-    cmocka_unit_test (test_round_off),
-    cmocka_unit_test (test_reached_state_unchanged),
-    cmocka_unit_test (test_specified),
-    cmocka_unit_test (test_specified_zero),
-    cmocka_unit_test (test_overspecified),
-    cmocka_unit_test (test_given_before_specified),
-    cmocka_unit_test (test_given_consistent),
-  };
+  const struct CMUnitTest tests[] = { cmocka_unit_test (test_settings),
+                                      cmocka_unit_test (test_bad_settings),
+                                      cmocka_unit_test (test_consistent_unchanged),
+                                      cmocka_unit_test (test_small_deviation),
+                                      cmocka_unit_test (test_round_off),
+                                      cmocka_unit_test (test_reached_state_unchanged),
+                                      cmocka_unit_test (test_specified),
+                                      cmocka_unit_test (test_specified_zero),
+                                      cmocka_unit_test (test_overspecified),
+                                      cmocka_unit_test (test_given_before_specified),
+                                      cmocka_unit_test (test_given_consistent) };
   return cmocka_run_group_tests (tests, NULL, NULL);
 }

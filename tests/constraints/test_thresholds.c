@@ -250,12 +250,10 @@ static void test_acceleration_norm (void **state) {
 }
 
 int main (void) {
-  const struct CMUnitTest tests[] = {
-    cmocka_unit_test (test_limits), cmocka_unit_test (test_evaluations),
-    cmocka_unit_test (test_jump),   cmocka_unit_test (test_acceleration_norm),
-    cmocka_unit_test (test_masses), cmocka_unit_test (test_near_state),
-    cmocka_unit_test (test_tree),   cmocka_unit_test (test_drift),
-    cmocka_unit_test (test_again),
-  };
+  const struct CMUnitTest tests[] = { cmocka_unit_test (test_limits), cmocka_unit_test (test_evaluations),
+                                      cmocka_unit_test (test_jump),   cmocka_unit_test (test_acceleration_norm),
+                                      cmocka_unit_test (test_masses), cmocka_unit_test (test_near_state),
+                                      cmocka_unit_test (test_tree),   cmocka_unit_test (test_drift),
+                                      cmocka_unit_test (test_again) };
   return cmocka_run_group_tests (tests, NULL, NULL);
 }

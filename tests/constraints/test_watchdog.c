@@ -388,17 +388,15 @@ static void test_extreme (void **state) {
 }
 
 int main (void) {
-  const struct CMUnitTest tests[] = {
-    cmocka_unit_test (test_nearly_massless_cart),
-    cmocka_unit_test (test_sine),
-    cmocka_unit_test (test_close_branches_slider_crank),
-    cmocka_unit_test (test_close_branches_four_bar),
-    cmocka_unit_test (test_no_change_point),
-    cmocka_unit_test (test_two_crossings),
-    cmocka_unit_test (test_fast_disc),
-    cmocka_unit_test (test_failing_signal),
-    cmocka_unit_test (test_messages),
-    cmocka_unit_test (test_extreme),
-  };
+  const struct CMUnitTest tests[] = { cmocka_unit_test (test_nearly_massless_cart),
+                                      cmocka_unit_test (test_sine),
+                                      cmocka_unit_test (test_close_branches_slider_crank),
+                                      cmocka_unit_test (test_close_branches_four_bar),
+                                      cmocka_unit_test (test_no_change_point),
+                                      cmocka_unit_test (test_two_crossings),
+                                      cmocka_unit_test (test_fast_disc),
+                                      cmocka_unit_test (test_failing_signal),
+                                      cmocka_unit_test (test_messages),
+                                      cmocka_unit_test (test_extreme) };
   return cmocka_run_group_tests (tests, NULL, NULL);
 }

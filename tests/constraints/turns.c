@@ -1,5 +1,4 @@
-/* With drifted constraints a motion can change from one branch to another smoothly, without a jump of the
- * accelerations. */
+/* With drifted constraints a motion can change its branch smoothly, without a jump of the accelerations. */
 #include <math.h>
 #include <string.h>
 #include "check.h"

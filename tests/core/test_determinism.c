@@ -210,9 +210,8 @@ static void test_shared_system (void **state) {
 }
 
 int main (void) {
-  const struct CMUnitTest tests[] = {
-    cmocka_unit_test (test_hashes),  cmocka_unit_test (test_again),         cmocka_unit_test (test_used_system),
-    cmocka_unit_test (test_threads), cmocka_unit_test (test_shared_system),
-  };
+  const struct CMUnitTest tests[] = { cmocka_unit_test (test_hashes), cmocka_unit_test (test_again),
+                                      cmocka_unit_test (test_used_system), cmocka_unit_test (test_threads),
+                                      cmocka_unit_test (test_shared_system) };
   return cmocka_run_group_tests_name ("determinism", tests, same_setup, same_teardown);
 }

@@ -276,10 +276,9 @@ static void test_refused (void **state) {
 }
 
 int main (void) {
-  const struct CMUnitTest tests[] = {
-    cmocka_unit_test (test_built_in),      cmocka_unit_test (test_plug_in), cmocka_unit_test (test_broken),
-    cmocka_unit_test (test_sizes),         cmocka_unit_test (test_faults),  cmocka_unit_test (test_saturation),
-    cmocka_unit_test (test_wheel_contact), cmocka_unit_test (test_refused),
-  };
+  const struct CMUnitTest tests[] = { cmocka_unit_test (test_built_in),      cmocka_unit_test (test_plug_in),
+                                      cmocka_unit_test (test_broken),        cmocka_unit_test (test_sizes),
+                                      cmocka_unit_test (test_faults),        cmocka_unit_test (test_saturation),
+                                      cmocka_unit_test (test_wheel_contact), cmocka_unit_test (test_refused) };
   return cmocka_run_group_tests (tests, NULL, NULL);
 }

@@ -5,6 +5,7 @@
 #include <stdlib.h>
 #include "check.h"
 #include "cli.h"
+#include "gallery.h"
 #include "pinwheel-files.h"
 #include "runs.h"
 
@@ -13,14 +14,8 @@ static void locale_write (const char *model, const char *name) {
   pw_error error = { 0 };
   pw_sample sample;
   char path[400];
-  pw_file *f = pw_file_open (model, &error);
-  check_ok (error.status, &error);
-  pw_model *m = pw_file_model (f, &error);
-  check_ok (pw_model_build (m, &error), &error);
-  pw_system *s = pw_system_compile (m, &error);
-  check_ok (error.status, &error);
-  pw_run *r = pw_run_open (s, "rk4+baumgarte:alpha=2.5:beta=.5", &(pw_settings){ .step = 1e-2, .ledger = 1 }, &error);
-  check_ok (error.status, &error);
+  pw_system *s = gallery_open (model, NULL);
+  pw_run *r = runs_open (s, "rk4+baumgarte:alpha=2.5:beta=.5", &(pw_settings){ .step = 1e-2, .ledger = 1 });
   snprintf (path, sizeof path, "%s/%s.csv", cli_folder, name);
   pw_output *o = pw_output_open (path, &error);
   pw_csv *csv = pw_csv_open (s, 1, o, &error);
@@ -38,8 +33,6 @@ static void locale_write (const char *model, const char *name) {
   check_ok (pw_json_write (&summary, s, &sample, 1, pw_run_statistics (r), o, &error), &error);
   check_ok (pw_output_finish (o, &error), &error);
   runs_close (r, s);
-  pw_model_free (m);
-  pw_file_close (f);
 }
 
 static void test_comma (void **state) {

@@ -274,14 +274,12 @@ static void test_no_body (void **state) {
 }
 
 int main (void) {
-  const struct CMUnitTest tests[] = {
-    cmocka_unit_test (test_bad_names),      cmocka_unit_test (test_bad_bodies),
-    cmocka_unit_test (test_bad_references), cmocka_unit_test (test_bad_numbers),
-    cmocka_unit_test (test_bad_signals),    cmocka_unit_test (test_bad_readers),
-    cmocka_unit_test (test_bad_choices),    cmocka_unit_test (test_bad_kinds),
-    cmocka_unit_test (test_no_body),        cmocka_unit_test (test_too_large),
-    cmocka_unit_test (test_bad_prepare),    cmocka_unit_test (test_bad_internal),
-    cmocka_unit_test (test_missing_names),  cmocka_unit_test (test_bad_parameters),
-  };
+  const struct CMUnitTest tests[] = { cmocka_unit_test (test_bad_names),      cmocka_unit_test (test_bad_bodies),
+                                      cmocka_unit_test (test_bad_references), cmocka_unit_test (test_bad_numbers),
+                                      cmocka_unit_test (test_bad_signals),    cmocka_unit_test (test_bad_readers),
+                                      cmocka_unit_test (test_bad_choices),    cmocka_unit_test (test_bad_kinds),
+                                      cmocka_unit_test (test_no_body),        cmocka_unit_test (test_too_large),
+                                      cmocka_unit_test (test_bad_prepare),    cmocka_unit_test (test_bad_internal),
+                                      cmocka_unit_test (test_missing_names),  cmocka_unit_test (test_bad_parameters) };
   return cmocka_run_group_tests (tests, NULL, NULL);
 }

@@ -39,8 +39,7 @@ static void own_close (own *x) {
 
 /* ---- The reference ---- */
 
-/* The position of a planet at the time t after its perihelion: Kepler's equation E - e sin E = t, by Newton's
- * method. */
+/* The position of a planet at the time t after perihelion: Kepler's equation E - e sin E = t, by Newton's method. */
 static void own_planet (double t, double p[2]) {
   double E = t;
   for (int i = 0; i < 50; i++) E -= (E - own_e * sin (E) - t) / (1 - own_e * cos (E));
@@ -285,12 +284,10 @@ static void test_selftest (void **state) {
 }
 
 int main (void) {
-  const struct CMUnitTest tests[] = {
-    cmocka_unit_test (test_planet),   cmocka_unit_test (test_faster),
-    cmocka_unit_test (test_methods),  cmocka_unit_test (test_notice),
-    cmocka_unit_test (test_show),     cmocka_unit_test (test_expression),
-    cmocka_unit_test (test_guide),    cmocka_unit_test (test_redundant_guide),
-    cmocka_unit_test (test_selftest),
-  };
+  const struct CMUnitTest tests[] = { cmocka_unit_test (test_planet),  cmocka_unit_test (test_faster),
+                                      cmocka_unit_test (test_methods), cmocka_unit_test (test_notice),
+                                      cmocka_unit_test (test_show),    cmocka_unit_test (test_expression),
+                                      cmocka_unit_test (test_guide),   cmocka_unit_test (test_redundant_guide),
+                                      cmocka_unit_test (test_selftest) };
   return cmocka_run_group_tests (tests, cli_setup, cli_teardown);
 }

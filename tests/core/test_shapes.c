@@ -142,8 +142,7 @@ static void test_many_pulses (void **state) {
 
 /* ---- Splines ---- */
 
-/* The points of a cubic table between its ends, kinks of the second derivative, are breakpoints for PW_JUMPS_AND_KINKS
- * only. */
+/* Points between the ends of a cubic table, where its second derivative has kinks, are no breakpoints for PW_JUMPS. */
 static void test_knots (void **state) {
   (void)state;
   for (int i = 0; i < SHAPES_POINTS - 1; i++) {

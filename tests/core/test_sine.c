@@ -130,11 +130,7 @@ static void test_special (void **unused) {
 }
 
 int main (void) {
-  const struct CMUnitTest tests[] = {
-    cmocka_unit_test (test_table),
-    cmocka_unit_test (test_random),
-    cmocka_unit_test (test_lanes),
-    cmocka_unit_test (test_special),
-  };
+  const struct CMUnitTest tests[] = { cmocka_unit_test (test_table), cmocka_unit_test (test_random),
+                                      cmocka_unit_test (test_lanes), cmocka_unit_test (test_special) };
   return cmocka_run_group_tests (tests, NULL, NULL);
 }

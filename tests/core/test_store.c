@@ -200,13 +200,11 @@ static void test_domains (void **state) {
 }
 
 int main (void) {
-  const struct CMUnitTest tests[] = {
-    cmocka_unit_test (test_names),        cmocka_unit_test (test_names_empty),
-    cmocka_unit_test (test_arena),        cmocka_unit_test (test_layout),
-    cmocka_unit_test (test_layout_pass),  cmocka_unit_test (test_nearest),
-    cmocka_unit_test (test_nearest_text), cmocka_unit_test (test_nearest_long),
-    cmocka_unit_test (test_long_error),   cmocka_unit_test (test_first_error_stays),
-    cmocka_unit_test (test_domains),
-  };
+  const struct CMUnitTest tests[] = { cmocka_unit_test (test_names),        cmocka_unit_test (test_names_empty),
+                                      cmocka_unit_test (test_arena),        cmocka_unit_test (test_layout),
+                                      cmocka_unit_test (test_layout_pass),  cmocka_unit_test (test_nearest),
+                                      cmocka_unit_test (test_nearest_text), cmocka_unit_test (test_nearest_long),
+                                      cmocka_unit_test (test_long_error),   cmocka_unit_test (test_first_error_stays),
+                                      cmocka_unit_test (test_domains) };
   return cmocka_run_group_tests (tests, NULL, NULL);
 }

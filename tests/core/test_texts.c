@@ -102,9 +102,8 @@ static void test_file_name (void **state) {
 }
 
 int main (void) {
-  const struct CMUnitTest tests[] = {
-    cmocka_unit_test (test_characters), cmocka_unit_test (test_controls), cmocka_unit_test (test_message),
-    cmocka_unit_test (test_summary),    cmocka_unit_test (test_model),    cmocka_unit_test (test_file_name),
-  };
+  const struct CMUnitTest tests[] = { cmocka_unit_test (test_characters), cmocka_unit_test (test_controls),
+                                      cmocka_unit_test (test_message),    cmocka_unit_test (test_summary),
+                                      cmocka_unit_test (test_model),      cmocka_unit_test (test_file_name) };
   return cmocka_run_group_tests (tests, cli_setup, cli_teardown);
 }

@@ -215,9 +215,8 @@ static void test_methods (void **state) {
 }
 
 int main (void) {
-  const struct CMUnitTest tests[] = {
-    cmocka_unit_test (test_shaken), cmocka_unit_test (test_bead),    cmocka_unit_test (test_flywheel),
-    cmocka_unit_test (test_start),  cmocka_unit_test (test_refused), cmocka_unit_test (test_methods),
-  };
+  const struct CMUnitTest tests[] = { cmocka_unit_test (test_shaken),   cmocka_unit_test (test_bead),
+                                      cmocka_unit_test (test_flywheel), cmocka_unit_test (test_start),
+                                      cmocka_unit_test (test_refused),  cmocka_unit_test (test_methods) };
   return cmocka_run_group_tests (tests, NULL, NULL);
 }

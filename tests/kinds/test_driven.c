@@ -179,9 +179,8 @@ static void test_knots (void **state) {
 }
 
 int main (void) {
-  const struct CMUnitTest tests[] = {
-    cmocka_unit_test (test_order),       cmocka_unit_test (test_held),   cmocka_unit_test (test_tolerances),
-    cmocka_unit_test (test_short_pulse), cmocka_unit_test (test_copies), cmocka_unit_test (test_knots),
-  };
+  const struct CMUnitTest tests[] = { cmocka_unit_test (test_order),      cmocka_unit_test (test_held),
+                                      cmocka_unit_test (test_tolerances), cmocka_unit_test (test_short_pulse),
+                                      cmocka_unit_test (test_copies),     cmocka_unit_test (test_knots) };
   return cmocka_run_group_tests (tests, NULL, NULL);
 }

@@ -93,8 +93,7 @@ static void friction_beam (pw_model *m, const void *parameters) {
                                                       .speed = p->speed });
 }
 
-/* The line passes through both centres of mass, so that nothing turns; the relative velocity decays as that of the
- * reduced mass. */
+/* The line passes through both centres of mass: nothing turns, the relative velocity is that of the reduced mass. */
 static void friction_slide (const char *method, double viscous, double limit, double bound, const char *reason) {
   static const pw_plugin_table table = FRICTION_TABLE (friction_beam);
   pw_system *s = scene_system (&table, "viscous", viscous, "limit", limit, "speed", friction_b.w0, NULL);
@@ -253,9 +252,8 @@ static void test_methods (void **state) {
 }
 
 int main (void) {
-  const struct CMUnitTest tests[] = {
-    cmocka_unit_test (test_discs),  cmocka_unit_test (test_slide), cmocka_unit_test (test_refused),
-    cmocka_unit_test (test_flight), cmocka_unit_test (test_coast), cmocka_unit_test (test_methods),
-  };
+  const struct CMUnitTest tests[] = { cmocka_unit_test (test_discs),   cmocka_unit_test (test_slide),
+                                      cmocka_unit_test (test_refused), cmocka_unit_test (test_flight),
+                                      cmocka_unit_test (test_coast),   cmocka_unit_test (test_methods) };
   return cmocka_run_group_tests (tests, NULL, NULL);
 }

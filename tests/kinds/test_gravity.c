@@ -15,8 +15,7 @@ static void gravity_fall (pw_model *m, const void *parameters) {
   pw_add_gravity (m, &(pw_gravity){ .name = "g", .acceleration = { 0.5, -9.81 } });
 }
 
-/* The centre of mass moves on a parabola, which the classical Runge-Kutta method integrates exactly; the wing is
- * massless. */
+/* The centre of mass moves on a parabola, which rk4 integrates exactly; the wing is massless. */
 static void test_fall (void **state) {
   (void)state;
   static const pw_plugin_table table = TRIAL_TABLE (gravity_fall);
@@ -154,8 +153,7 @@ static void gravity_rain (pw_model *m, const void *parameters) {
 
 static const pw_plugin_table gravity_rain_table = TRIAL_TABLE (gravity_rain);
 
-/* Each body falls with its own terminal velocity, v = m g / c (exp (-c t / m) - 1) from rest, and has its own entry in
- * the ledger. */
+/* Each body has its own terminal velocity, v = m g / c (exp (-c t / m) - 1) from rest, and its own ledger entry. */
 static void test_each_body (void **state) {
   (void)state;
   static const double mass[] = { 0.5, 2 }, up[] = { 3, 0 };
@@ -182,9 +180,8 @@ static void test_methods (void **state) {
 }
 
 int main (void) {
-  const struct CMUnitTest tests[] = {
-    cmocka_unit_test (test_fall),      cmocka_unit_test (test_incline), cmocka_unit_test (test_pendulum),
-    cmocka_unit_test (test_each_body), cmocka_unit_test (test_methods),
-  };
+  const struct CMUnitTest tests[] = { cmocka_unit_test (test_fall), cmocka_unit_test (test_incline),
+                                      cmocka_unit_test (test_pendulum), cmocka_unit_test (test_each_body),
+                                      cmocka_unit_test (test_methods) };
   return cmocka_run_group_tests (tests, NULL, NULL);
 }

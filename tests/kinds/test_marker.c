@@ -65,10 +65,7 @@ static void test_figures (void **state) {
 }
 
 int main (void) {
-  const struct CMUnitTest tests[] = {
-    cmocka_unit_test (test_without_effect),
-    cmocka_unit_test (test_place),
-    cmocka_unit_test (test_figures),
-  };
+  const struct CMUnitTest tests[] = { cmocka_unit_test (test_without_effect), cmocka_unit_test (test_place),
+                                      cmocka_unit_test (test_figures) };
   return cmocka_run_group_tests (tests, cli_setup, cli_teardown);
 }

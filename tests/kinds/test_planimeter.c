@@ -66,11 +66,7 @@ static void test_without_mass (void **state) {
 }
 
 int main (void) {
-  const struct CMUnitTest tests[] = {
-    cmocka_unit_test (test_comes_back),
-    cmocka_unit_test (test_area),
-    cmocka_unit_test (test_long_radius),
-    cmocka_unit_test (test_without_mass),
-  };
+  const struct CMUnitTest tests[] = { cmocka_unit_test (test_comes_back), cmocka_unit_test (test_area),
+                                      cmocka_unit_test (test_long_radius), cmocka_unit_test (test_without_mass) };
   return cmocka_run_group_tests (tests, cli_setup, cli_teardown);
 }

@@ -255,10 +255,9 @@ static void test_methods (void **state) {
 }
 
 int main (void) {
-  const struct CMUnitTest tests[] = {
-    cmocka_unit_test (test_unicycle), cmocka_unit_test (test_robot), cmocka_unit_test (test_hub),
-    cmocka_unit_test (test_motor),    cmocka_unit_test (test_start), cmocka_unit_test (test_given),
-    cmocka_unit_test (test_methods),
-  };
+  const struct CMUnitTest tests[] = { cmocka_unit_test (test_unicycle), cmocka_unit_test (test_robot),
+                                      cmocka_unit_test (test_hub),      cmocka_unit_test (test_motor),
+                                      cmocka_unit_test (test_start),    cmocka_unit_test (test_given),
+                                      cmocka_unit_test (test_methods) };
   return cmocka_run_group_tests (tests, NULL, NULL);
 }

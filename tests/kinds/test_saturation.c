@@ -1,5 +1,4 @@
-/* Friction and other saturating forces, whose velocity scale is far below the tolerance, bring bodies to rest, at all
- * tolerances. */
+/* Friction and other saturating forces bring bodies to rest at all tolerances, however small their velocity scale. */
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
@@ -173,11 +172,7 @@ static void test_atol (void **state) {
 }
 
 int main (void) {
-  const struct CMUnitTest tests[] = {
-    cmocka_unit_test (test_block),
-    cmocka_unit_test (test_kinds),
-    cmocka_unit_test (test_explicit),
-    cmocka_unit_test (test_atol),
-  };
+  const struct CMUnitTest tests[] = { cmocka_unit_test (test_block), cmocka_unit_test (test_kinds),
+                                      cmocka_unit_test (test_explicit), cmocka_unit_test (test_atol) };
   return cmocka_run_group_tests (tests, NULL, NULL);
 }

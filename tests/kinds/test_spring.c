@@ -178,9 +178,8 @@ static void test_methods (void **state) {
 }
 
 int main (void) {
-  const struct CMUnitTest tests[] = {
-    cmocka_unit_test (test_oscillator), cmocka_unit_test (test_ellipse), cmocka_unit_test (test_meeting),
-    cmocka_unit_test (test_settling),   cmocka_unit_test (test_methods),
-  };
+  const struct CMUnitTest tests[] = { cmocka_unit_test (test_oscillator), cmocka_unit_test (test_ellipse),
+                                      cmocka_unit_test (test_meeting), cmocka_unit_test (test_settling),
+                                      cmocka_unit_test (test_methods) };
   return cmocka_run_group_tests (tests, NULL, NULL);
 }

@@ -156,11 +156,7 @@ static void test_methods (void **state) {
 }
 
 int main (void) {
-  const struct CMUnitTest tests[] = {
-    cmocka_unit_test (test_slide),
-    cmocka_unit_test (test_limit),
-    cmocka_unit_test (test_refused),
-    cmocka_unit_test (test_methods),
-  };
+  const struct CMUnitTest tests[] = { cmocka_unit_test (test_slide), cmocka_unit_test (test_limit),
+                                      cmocka_unit_test (test_refused), cmocka_unit_test (test_methods) };
   return cmocka_run_group_tests (tests, NULL, NULL);
 }

@@ -168,11 +168,7 @@ static void test_methods (void **state) {
 }
 
 int main (void) {
-  const struct CMUnitTest tests[] = {
-    cmocka_unit_test (test_one_body),
-    cmocka_unit_test (test_points),
-    cmocka_unit_test (test_beam),
-    cmocka_unit_test (test_methods),
-  };
+  const struct CMUnitTest tests[] = { cmocka_unit_test (test_one_body), cmocka_unit_test (test_points),
+                                      cmocka_unit_test (test_beam), cmocka_unit_test (test_methods) };
   return cmocka_run_group_tests (tests, NULL, NULL);
 }

@@ -6,7 +6,7 @@
 
 #define H4 1e-12 /* h^4, for methods of order 4, at h = 1 ms */
 
-/* The system of a model by name, with parameters set: gallery_open ("chain", "n", 3., NULL). */
+/* The system of a model by name or path, with parameters set: gallery_open ("chain", "n", 3., NULL). */
 pw_system *gallery_open (const char *model, ...);
 
 /* Opens a run of rk4+projection with an energy ledger, to end at t. */
