@@ -6,6 +6,7 @@
 #include "scene.h"
 #include "trial.h"
 
+/* The EzyRoller with this torque of the rider. */
 static pw_system *driven_scene (const pw_signal *torque) {
   pw_error error = { 0 };
   pw_model *m = scene_model (&scene_ezyroller, NULL);
@@ -13,6 +14,7 @@ static pw_system *driven_scene (const pw_signal *torque) {
   return scene_compile (m);
 }
 
+/* Its coordinates at 4 s. */
 static void driven_run (const pw_signal *torque, const char *method, const pw_settings *settings, double *q,
                         pw_statistics *cost) {
   double v[6];
@@ -21,31 +23,32 @@ static void driven_run (const pw_signal *torque, const char *method, const pw_se
   pw_system_free (s);
 }
 
-static double driven_error (const pw_signal *torque, const char *method, double step, const double *exact) {
+/* The largest error of the coordinates at 4 s, with a fixed step or an rtol of this size. */
+static double driven_error (const pw_signal *torque, const char *method, double size, const double *exact) {
   double q[6], worst = 0;
-  driven_run (torque, method, &(pw_settings){ .step = step, .rtol = step, .span = 4 }, q, NULL);
+  driven_run (torque, method, &(pw_settings){ .step = size, .rtol = size, .span = 4 }, q, NULL);
   for (int j = 0; j < 6; j++) worst = fmax (worst, fabs (q[j] - exact[j]));
   return worst;
 }
 
-static double driven_wave_t[21], driven_wave_y[21];
+enum { DRIVEN_TORQUES = 6, DRIVEN_POINTS = 20 };
+static double driven_wave_t[DRIVEN_POINTS], driven_wave_y[DRIVEN_POINTS];
 
 /* The i-th signal of the torque [N m]. */
 static pw_signal driven_torque (int i) {
   static const double little_t[] = { 0.31, 1.07, 1.9, 3.3 }, little_y[] = { 0, 0.2, -0.2, 0.1 };
-  for (int k = 0; k < 21; k++) driven_wave_t[k] = 0.21 * k, driven_wave_y[k] = 0.2 * sin (2 * driven_wave_t[k]);
+  for (int k = 0; k < DRIVEN_POINTS; k++)
+    driven_wave_t[k] = 0.21 * k, driven_wave_y[k] = 0.2 * sin (2 * driven_wave_t[k]);
   const pw_signal torque[] = {
     { PW_RAMP, .ramp = { 0, 0.2, 1 / 3., 1.77 } },
     { PW_PULSE, .pulse = { 0.2, 1 / 3., 0.41, 1.13, -0.1 } },
     { PW_TABLE, .table = { little_t, little_y, 4, PW_LINEAR, 0, 0, 0 } },
     { PW_SMOOTH_STEP, .ramp = { 0, 0.2, 1 / 3., 1.77 } },
     { PW_TABLE, .table = { little_t, little_y, 4, PW_CUBIC, PW_ENDS_FREE, 0, 0 } },
-    { PW_TABLE, .table = { driven_wave_t, driven_wave_y, 20, PW_CUBIC, PW_ENDS_REST, 0, 0 } },
+    { PW_TABLE, .table = { driven_wave_t, driven_wave_y, DRIVEN_POINTS, PW_CUBIC, PW_ENDS_REST, 0, 0 } },
   };
   return torque[i];
 }
-
-enum { DRIVEN_TORQUES = 6 };
 
 /* The order is 4, although jumps and kinks do not lie at multiples of the step. */
 static void test_order (void **state) {

@@ -113,17 +113,17 @@ static void rolling_circle (const pw_plugin_table *table, const double shares[2]
   const double t = 2, m = rolling_r.m, I = rolling_r.I, r = rolling_r.r, c = rolling_r.c;
   double a = (rolling_r.u1 + rolling_r.u2) / r / (m + 2 * I / (r * r));
   double b = c * (rolling_r.u2 - rolling_r.u1) / r / (rolling_r.J + 2 * I * c * c / (r * r));
-  double phi = b * t * t / 2, way = a * t * t / 2, lateral = m * a * t * b * t;
+  double phi = b * t * t / 2, distance = a * t * t / 2, lateral = m * a * t * b * t;
   pw_system *s = scene_system (table, NULL);
   pw_run *run = runs_open (s, method, &(pw_settings){ .step = 1e-3, .rtol = 1e-10, .span = t, .ledger = 1 });
   pw_sample x = runs_to (run, t);
   check_close ("phi", x.q[2], phi, bound, reason);
   check_close ("x", x.q[0], a / b * sin (phi), bound, reason);
   check_close ("y", x.q[1], a / b * (1 - cos (phi)), bound, reason);
-  check_close ("left", trial_state (s, &x, "left.spin"), (way - c * phi) / r, 10 * bound, reason);
-  check_close ("right", trial_state (s, &x, "right.spin"), (way + c * phi) / r, 10 * bound, reason);
-  check_close ("work", x.work, (rolling_r.u1 * (way - c * phi) + rolling_r.u2 * (way + c * phi)) / r, 10 * bound,
-               reason);
+  check_close ("left", trial_state (s, &x, "left.spin"), (distance - c * phi) / r, 10 * bound, reason);
+  check_close ("right", trial_state (s, &x, "right.spin"), (distance + c * phi) / r, 10 * bound, reason);
+  check_close ("work", x.work, (rolling_r.u1 * (distance - c * phi) + rolling_r.u2 * (distance + c * phi)) / r,
+               10 * bound, reason);
   check_close ("left force", trial_reaction (s, &x, "left.N"), shares[0] * lateral, 1e3 * bound, reason);
   check_close ("right force", trial_reaction (s, &x, "right.N"), shares[1] * lateral, 1e3 * bound, reason);
   check_close ("balance", x.balance, 0, 10 * bound, reason);

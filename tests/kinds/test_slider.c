@@ -39,12 +39,12 @@ static void test_incline (void **state) {
   const double t = 2, c = cos (slider_i.beta), si = sin (slider_i.beta), ca = cos (slider_i.alpha),
                sa = sin (slider_i.alpha), bound = 1e4 * CHECK_EPS;
   double X = c * slider_i.at[0] - si * slider_i.at[1], Y = si * slider_i.at[0] + c * slider_i.at[1];
-  double N = slider_i.m * slider_i.g * ca, way = slider_i.v * t - slider_i.g * sa * t * t / 2;
+  double N = slider_i.m * slider_i.g * ca, distance = slider_i.v * t - slider_i.g * sa * t * t / 2;
   check_below ("start", pw_run_initial (r)->velocity, 16 * CHECK_EPS, "given consistently");
   pw_sample x = runs_to (r, t);
-  check_close ("x", x.q[0], slider_i.foot[0] - X + way * ca, bound,
+  check_close ("x", x.q[0], slider_i.foot[0] - X + distance * ca, bound,
                "RK4 is exact for parabolas: round-off of 200 steps");
-  check_close ("y", x.q[1], slider_i.foot[1] - Y + way * sa, bound,
+  check_close ("y", x.q[1], slider_i.foot[1] - Y + distance * sa, bound,
                "RK4 is exact for parabolas: round-off of 200 steps");
   check_close ("N", trial_reaction (s, &x, "rail.N"), N, bound, "round-off");
   check_close ("M", trial_reaction (s, &x, "rail.M"), -N * (ca * X + sa * Y), bound, "round-off");
