@@ -136,13 +136,13 @@ static void effect_extrapolate (const pw_variation *x, pw_direction_copy *d) {
   double *one = d->effect[0], *two = d->effect[1], all = 0;
   double round = 4 * DBL_EPSILON * fabs (effect_weight (&d->given, 0, 1));
   for (int i = 0; i < x->n + 3 * x->m; i++) {
-    double error = (one[i] - two[i]) / 3, part = effect_unit (x, i);
+    double error = (one[i] - two[i]) / 3, per_unit = effect_unit (x, i);
     one[i] += error;
     double noise = one[i] != 0 || error != 0 ? round * d->terms[i] : 0; /* 0: no effect */
     two[i] = error + copysign (noise, error);
-    all += fabs (one[i]) * part;
-    d->effects.error += fabs (two[i]) * part;
-    d->effects.round += noise * part;
+    all += fabs (one[i]) * per_unit;
+    d->effects.error += fabs (two[i]) * per_unit;
+    d->effects.round += noise * per_unit;
   }
   d->effects.all += fmax (all, pw_variation_least_effect (d));
 }

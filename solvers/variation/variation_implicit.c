@@ -65,7 +65,7 @@ void pw_variation_implicit_close (pw_variation_implicit *p) {
 /* ---- Stages ---- */
 
 /* N_i, A_i, N_i^+ of minimal coordinate c at the state evaluated; N_i^+ is the transpose of the orthonormal bases. */
-static void implicit_coordinate (pw_variation *x, int i, int c) {
+static void implicit_tangent (pw_variation *x, int i, int c) {
   pw_linearisation *l = &x->linear;
   pw_variation_implicit *p = x->implicit;
   size_t n = (size_t)x->n, row = (size_t)c * n, half = n * sizeof (double);
@@ -104,7 +104,7 @@ static int implicit_stage (pw_variation *x, int i, double h, double t1, pw_error
   pw_variation_accelerate (x, 0, RATE + i);
   pw_variation_accelerate (x, 1, RATE + i);
   pw_linear_bases (&x->linear);
-  for (int c = 0; c < x->linear.size; c++) implicit_coordinate (x, i, c);
+  for (int c = 0; c < x->linear.size; c++) implicit_tangent (x, i, c);
   return PW_OK;
 }
 

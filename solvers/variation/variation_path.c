@@ -75,8 +75,8 @@ int pw_variation_accelerations (pw_variation *x, double t, const double *q, cons
 /* Part of the run's step over which its velocities are differentiated. */
 static const double PATH_PART = 1e-3;
 
-/* Accelerations of a point in the run's last step, of size h, as the derivative of its dense output: in stiff motions
- * those of the equations magnify the errors of the states. */
+/* Accelerations of a point in the run's last step, of size h, by differences of its dense output, central or at the end
+ * of the step backward: in stiff motions those by the equations magnify the errors of the states. */
 static int path_differentiate (pw_variation *x, const pw_variation_point *p, double h, pw_error *error) {
   double d = PATH_PART * h, *a = p->x + 2 * x->n;
   int inside = p->t + d <= x->r->t, status = PW_OK;
