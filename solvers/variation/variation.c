@@ -184,11 +184,10 @@ static int variation_check_blocks (const pw_variation *x, pw_error *error) {
   int found = pw_find_missing_block (x->r->w, x->r->t, x->r->q, x->r->v, block, sizeof block);
   if (found == 0) return PW_OK;
   if (found == PW_RESOURCE) return pw_fail_memory (x->r->s, error);
-  return pw_fail (
-      error, PW_INPUT,
-      "model %s: %s is left out, but it is not zero, and derivatives need it: add it, or PW_BY_DIFFERENCES in "
-      "its place",
-      x->r->s->model, block);
+  return pw_fail (error, PW_INPUT,
+                  "model %s: %s is left out, but it is not zero, and derivatives need it: add it, or "
+                  "PW_BY_DIFFERENCES in its place",
+                  x->r->s->model, block);
 }
 
 /* Records the states of the run in its last step, from time t0; at first, its initial state.  A step across a jump is

@@ -45,14 +45,18 @@ static int jump_state (pw_variation *x, double t, double *state, pw_error *error
   return pw_variation_accelerations (x, t, state, state + n, state + 2 * n, error);
 }
 
+static void jump_replace (pw_variation *x, int i, double t, const double *state) {
+  x->point[i].t = t;
+  memcpy (x->point[i].x, state, 3 * (size_t)x->n * sizeof *state);
+}
+
 /* Inserts a state between points i and i + 1. */
 static int jump_insert (pw_variation *x, int i, double t, const double *state, pw_error *error) {
   if (pw_variation_add_point (x, error) != PW_OK) return PW_RESOURCE;
   pw_variation_point p = x->point[x->points - 1];
-  p.t = t;
-  memcpy (p.x, state, 3 * (size_t)x->n * sizeof *state);
   memmove (x->point + i + 2, x->point + i + 1, (size_t)(x->points - i - 2) * sizeof p);
   x->point[i + 1] = p;
+  jump_replace (x, i + 1, t, state);
   return PW_OK;
 }
 
@@ -85,11 +89,6 @@ static int jump_suspected (pw_variation *x, int i, double *state, int *suspected
   for (int j = 0; j < x->n; j++) a[j] -= left[j] / 2, state[j] = right[j] / 2; /* the distance from the mean */
   *suspected = jump_distance (x, a, state) > fmax (JUMP_LEAST, JUMP_BEND * most);
   return status;
-}
-
-static void jump_replace (pw_variation *x, int i, double t, const double *state) {
-  x->point[i].t = t;
-  memcpy (x->point[i].x, state, 3 * (size_t)x->n * sizeof *state);
 }
 
 /* Extends a recorded jump by one that adjoins it: a state may lie on the surface, where sign (0) = 0. */
@@ -147,11 +146,10 @@ double pw_variation_recorded_jump (const pw_variation *x) {
 /* ---- Derivatives of their times ---- */
 
 static int jump_fail (double t, pw_error *error) {
-  return pw_fail (
-      error, PW_METHOD,
-      "t = %.6g s: the motion touches, slides along, or starts at states where accelerations jump: it is not "
-      "differentiable",
-      t);
+  return pw_fail (error, PW_METHOD,
+                  "t = %.6g s: the motion touches, slides along, or starts at states where accelerations jump: "
+                  "it is not differentiable",
+                  t);
 }
 
 /* A motion near that of the run, y + step dy + (t - t_s) y'-. */

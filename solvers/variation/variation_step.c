@@ -211,16 +211,14 @@ static double step_end (const pw_variation *x, double t1) {
 /* The error if steps have become too small. */
 static int step_fail (pw_variation *x, pw_error *error) {
   if (pw_evaluate_J_at (x->r->w, x->at, x->q, x->v) == PW_OK && pw_watchdog_sine (x->r, NULL) < STEP_SINGULAR)
-    return pw_fail (
-        error, PW_METHOD,
-        "t = %.6g s: the derivatives cannot be computed near a singular configuration, where constraints are "
-        "nearly dependent",
-        x->t);
-  return pw_fail (
-      error, PW_METHOD,
-      "t = %.6g s: no step of the derivatives meets their tolerance, however small: the motion is too stiff, "
-      "or not differentiable",
-      x->t);
+    return pw_fail (error, PW_METHOD,
+                    "t = %.6g s: the derivatives cannot be computed near a singular configuration, where "
+                    "constraints are nearly dependent",
+                    x->t);
+  return pw_fail (error, PW_METHOD,
+                  "t = %.6g s: no step of the derivatives meets their tolerance, however small: the motion is "
+                  "too stiff, or not differentiable",
+                  x->t);
 }
 
 /* Changes to implicit steps if stability limited many steps. */
