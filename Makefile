@@ -138,7 +138,7 @@ FILE_LAYERS   := $(patsubst %/,%,$(wildcard core/files/ core/files/*/))
 CLI_LAYERS    := $(patsubst %/,%,$(wildcard core/cli/ core/cli/*/))
 
 $(BUILD)/obj/core/%.o:       INCLUDE := $(call layer,$(CORE_LAYERS))
-# Without this gcc computes pairs of numbers that a kind stores twice, or delays the loads that follow the store.
+# Otherwise gcc would compute numbers that a kind stores as a pair twice, or later loads would wait for the store.
 $(BUILD)/obj/core/kinds/%.o: STRICT += $(ONE_BY_ONE)
 $(BUILD)/obj/core/kinds/%.o: INCLUDE := $(call layer,core core/kinds)
 $(BUILD)/obj/solvers/%.o:    INCLUDE := $(call layer,$(CORE_LAYERS) $(SOLVER_LAYERS)) $(SYSTEM)

@@ -77,7 +77,7 @@ static void test_limits (void **state) {
     long rejected[2];
     watchdog_measure ((int)i, 1, &t[0], &rejected[0]);
     watchdog_measure ((int)i, watchdog_limit[i].factor, &t[1], &rejected[1]);
-    int good[] = { t[1]<t[0], t[1]> t[0], rejected[1]<rejected[0], rejected[1]> rejected[0] };
+    int good[] = { t[1]<t[0], t[1]> t[0], rejected[1]<rejected[0], rejected[1]> rejected[0] }; /* by effect */
     if (!good[watchdog_limit[i].effect]) print_error ("%s has no effect\n", watchdog_limit[i].name), bad++;
   }
   assert_int_equal (bad, 0);

@@ -158,7 +158,7 @@ static void test_used_system (void **state) {
 
 typedef struct {
   const pw_system *const *shared; /* one for each scene; NULL: each run compiles its own */
-  int first;
+  int first;                      /* the run with which it begins */
   uint64_t hash[SAME_RUNS];
 } same_worker;
 
