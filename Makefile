@@ -1,6 +1,6 @@
-# Pinwheel.  `make help` says what there is; everything built goes to $(BUILD).
+# Pinwheel.  `make help` lists the targets; everything is built in $(BUILD).
 
-# Written once, in the header.  The libraries' soname follows the ABI of plug-ins.
+# Defined in the header.  The soname of the libraries is the ABI of plug-ins.
 VERSION := $(shell sed -n 's/^\#define PW_VERSION "\(.*\)".*/\1/p' core/pinwheel.h)
 ABI     := $(shell sed -n 's/^\#define PW_ABI \([0-9]*\).*/\1/p' core/pinwheel.h)
 
@@ -19,16 +19,16 @@ endif
 # ---- How to compile and link ----
 
 WARN   := -Wall -Wextra -Wpedantic -Wshadow -Wconversion -Wstrict-prototypes -Wmissing-prototypes -Wcast-qual
-# -fvisibility=hidden: a library exports what its public headers declare.  -fno-plt: calls between the files of a library are
-# calls, not calls of jumps.
+# -fvisibility=hidden: a library exports what its public headers declare.  -fno-plt: calls between the files of a library do not
+# go through the procedure linkage table.
 STRICT := -std=c11 -fPIC -fvisibility=hidden -fno-plt -ffp-contract=off -fno-semantic-interposition $(WARN) $(if $(WERROR),-Werror)
 ONE_BY_ONE := -fno-tree-slp-vectorize
-# gcc 12.2 fuses multiplications and additions when it vectorises straight code, -ffp-contract=off or not, for processors
-# that can: results would depend on the build.  The default processor of x86-64 cannot.
+# gcc 12.2 fuses multiplications and additions when it vectorises straight-line code, in spite of -ffp-contract=off, for
+# processors with such instructions (-m...): results would depend on the build.  The default processor of x86-64 has none.
 STRICT += $(if $(findstring -m,$(CFLAGS)),$(ONE_BY_ONE))
 PW_CFLAGS = $(STRICT) $(THREADS) -D_POSIX_C_SOURCE=200809L $(INCLUDE) $(CPPFLAGS) $(CFLAGS) $(SAN)
 
-# SuiteSparse has no pkg-config file; a folder that is not there does no harm.
+# SuiteSparse has no pkg-config file; the folder need not exist.
 SUITESPARSE ?= /usr/include/suitesparse
 SYSTEM := -isystem $(SUITESPARSE)
 
@@ -39,7 +39,7 @@ CLI_LIBS    := -lpopt -lgsl -lgslcblas -lnlopt
 LINK         = $(CC) $(CFLAGS) $(SAN) $(LDFLAGS) -Wl,--as-needed
 SHARED       = $(LINK) -shared -Wl,--no-undefined
 
-# ---- What there is: a file dropped into one of these folders is part of the build ----
+# ---- Sources: every file in one of these folders is part of the build ----
 
 obj = $(patsubst %.c,$(BUILD)/obj/%.o,$(1))
 
@@ -63,7 +63,7 @@ INCLUDES := $(addprefix $(BUILD)/include/,$(notdir $(HEADERS)))
 LIB       := $(BUILD)/libpinwheel.so
 FILES_LIB := $(BUILD)/libpinwheel-files.so
 LIB_OBJ   := $(call obj,$(CORE) $(SOLVERS))
-# Utilities that are no interface: the program and each library have their own.
+# Utilities that the libraries do not export: the program and each library contain them.
 BASE_OBJ  := $(call obj,$(addprefix core/base/,characters.c nearest.c store.c stream.c))
 FILES_OBJ := $(call obj,$(FILES))
 CLI_OBJ   := $(call obj,$(CLI))
@@ -72,12 +72,12 @@ TESTS     := $(patsubst %.c,$(BUILD)/tests/%,$(notdir $(QUICK)))
 SLOWS     := $(patsubst %.c,$(BUILD)/tests/%,$(notdir $(SLOW)))
 PROGRAMS  := $(BENCH:%.c=$(BUILD)/%) $(EMBED:%.c=$(BUILD)/%)
 PROGRAM   := $(BUILD)/pinwheel
-# The engine of interactive pages, if there are tools to compile it; builds that check the code do not need another.
+# The engine of interactive pages, if the tools to compile it are installed; builds in $(BUILD)/variant do not need it.
 WASM_CC   ?= $(if $(findstring ccache,$(CC)),ccache )clang
 WASI      := $(if $(findstring /variant/,$(BUILD)),,$(and $(wildcard /usr/include/wasm32-wasi/stdio.h),$(wildcard /usr/lib/llvm-*/lib/clang/*/lib/wasi/libclang_rt.builtins-wasm32.a)))
 PAGE      := $(if $(and $(WASI),$(shell command -v $(lastword $(WASM_CC))),$(shell command -v wasm-ld)),$(addprefix $(BUILD)/page/,pinwheel-page.objects pinwheel.wasm))
 
-# Targets of fuzzing; with replay.c they are programs that take files.
+# Targets of fuzzing; with replay.c they are programs that read files.
 FUZZ_SHARE := tests/fuzz/fuzz.c $(if $(FUZZING),,tests/fuzz/replay.c)
 FUZZ       := $(filter-out tests/fuzz/fuzz.c tests/fuzz/replay.c,$(wildcard tests/fuzz/*.c))
 FUZZERS    := $(FUZZ:tests/fuzz/%.c=$(BUILD)/fuzz/%)
@@ -92,32 +92,32 @@ all: $(LIB) $(FILES_LIB) $(LIB:.so=.a) $(FILES_LIB:.so=.a) $(INCLUDES) $(PLUGINS
 everything: all $(TESTS) $(SLOWS) $(PROGRAMS) $(FUZZERS)
 
 help:
-	@echo 'make                  the libraries, the program and the models, into $(BUILD)/; everything: tests and benchmarks too'
-	@echo 'make deps             install the libraries that are missing'
+	@echo 'make                  the libraries, the program and the models, in $(BUILD)/; everything: also tests and benchmarks'
+	@echo 'make deps             installs the libraries that are missing'
 	@echo 'make demo             the EzyRoller by three methods: a table, figures in $(BUILD)/demo/'
 	@echo 'make gallery          pages that simulate the models in a browser, in $(BUILD)/site/'
 	@echo 'make figures          all figures of README and docs, into docs/figures/'
-	@echo 'make test             the tests; test-all: the slow ones too'
-	@echo 'make bench            everything that is measured, and docs/benchmarks.md; goes on where it was stopped'
-	@echo 'make bench-quick      what a run costs on this machine'
-	@echo 'make bench-engine     an evaluation, a step against programs written by hand; growth with size'
-	@echo 'make bench-effects    instructions of an evaluation, with one effect more at a time; what is not used costs none'
+	@echo 'make test             runs the tests; test-all: also the slow ones and scripts'
+	@echo 'make bench            all measurements, and docs/benchmarks.md; continues where it was stopped'
+	@echo 'make bench-quick      the processor time of runs on this machine'
+	@echo 'make bench-engine     the time of an evaluation and a step, compared with programs written by hand; growth with size'
+	@echo 'make bench-effects    instructions per evaluation with one further effect at a time; unused element types cost none'
 	@echo 'make hard             every method on every hard case, against the expected verdicts; writes docs/hard-cases.md'
-	@echo 'make layers           proof of what depends on what; words: standard terms in names and text'
-	@echo 'make san              the tests with ASan and UBSan; clang, gcc: all of it without a warning'
-	@echo 'make fuzz TIME=60     models, expressions, tables, checkpoints, command lines from a fuzzer, TIME seconds each'
-	@echo 'make mutants TIME=7200   one small change at a time to the sources; lists those that no test notices; resumes'
-	@echo 'make cov              lines that the tests run, and those they do not'
+	@echo 'make layers           checks the dependencies between directories; words: the terms in names and text'
+	@echo 'make san              the tests with ASan and UBSan; clang, gcc: compiles everything, warnings are errors'
+	@echo 'make fuzz TIME=60     fuzzes models, expressions, tables, checkpoints and command lines, TIME seconds each'
+	@echo 'make mutants TIME=7200   changes the sources in one place at a time; lists changes that no test detects; resumes'
+	@echo 'make cov              lines that the tests run, and those that they do not'
 	@echo 'make tsan             runs in many threads with ThreadSanitizer; valgrind: some tests with memcheck'
-	@echo 'make format           clang-format on all sources; format-check: complain only'
+	@echo 'make format           formats all sources by clang-format; format-check: lists those that are not'
 	@echo 'make deb              a Debian package, in $(BUILD)/deb/'
-	@echo 'make install          to PREFIX (/usr/local) below DESTDIR; uninstall'
-	@echo 'make clean            remove $(BUILD)/'
+	@echo 'make install          installs below DESTDIR in PREFIX (/usr/local); uninstall: removes that'
+	@echo 'make clean            removes $(BUILD)/'
 	@echo
 	@echo 'CC CFLAGS CPPFLAGS LDFLAGS BUILD as usual; WERROR=1; V=1 shows the commands;'
-	@echo 'NO_DEPS=1 leaves the system alone (demo and test begin with deps otherwise)'
+	@echo 'NO_DEPS=1 installs nothing (otherwise demo, test and others begin with deps)'
 
-# ---- Dependencies: whoever asks to see something run gets the libraries first ----
+# ---- Dependencies: targets that run something install missing libraries first ----
 
 ifneq ($(filter demo test test-all layers bench bench-quick bench-engine bench-effects hard san cov fuzz mutants,$(MAKECMDGOALS)),)
 ifndef NO_DEPS
@@ -129,7 +129,7 @@ deps:
 	@CC='$(CC)' CPPFLAGS='$(CPPFLAGS) $(SYSTEM)' LDFLAGS='$(LDFLAGS)' BUILD='$(BUILD)' NO_DEPS='$(NO_DEPS)' \
 	  sh .ci/deps.sh $(if $(filter deps,$(MAKECMDGOALS)),fresh) $(TOOLS)
 
-# ---- Objects; each folder sees only what it may include (-iquote: core/signals/signal.h is not <signal.h>) ----
+# ---- Objects; a folder finds only headers that it may include (-iquote: core/signals/signal.h is not <signal.h>) ----
 
 layer = $(addprefix -iquote ,$(1))
 CORE_LAYERS   := core $(addprefix core/,base signals model system selftest specialise)
@@ -138,7 +138,7 @@ FILE_LAYERS   := $(patsubst %/,%,$(wildcard core/files/ core/files/*/))
 CLI_LAYERS    := $(patsubst %/,%,$(wildcard core/cli/ core/cli/*/))
 
 $(BUILD)/obj/core/%.o:       INCLUDE := $(call layer,$(CORE_LAYERS))
-# Numbers that a kind stores as a pair would be computed twice or be waited for.
+# Otherwise gcc would compute numbers that a kind stores as a pair twice, or later loads would wait for the store.
 $(BUILD)/obj/core/kinds/%.o: STRICT += $(ONE_BY_ONE)
 $(BUILD)/obj/core/kinds/%.o: INCLUDE := $(call layer,core core/kinds)
 $(BUILD)/obj/solvers/%.o:    INCLUDE := $(call layer,$(CORE_LAYERS) $(SOLVER_LAYERS)) $(SYSTEM)
@@ -155,7 +155,7 @@ $(call obj,core/specialise/sources.c): $(BUILD)/obj/core/specialise/sources.inc
 $(call obj,core/specialise/sources.c): INCLUDE += -iquote $(BUILD)/obj/core/specialise
 $(call obj,core/cli/parallel.c core/cli/sweep/sweep_rows.c $(wildcard core/cli/fit/*.c)) $(BUILD)/pinwheel: private THREADS = -pthread
 ALL_LAYERS := $(CORE_LAYERS) $(FILE_LAYERS) $(SOLVER_LAYERS)
-# Libraries below call functions that tests wrap.
+# Functions of tests that replace those of other libraries must be visible to these.
 $(BUILD)/obj/tests/%.o:      STRICT += -fvisibility=default
 $(BUILD)/obj/tests/%.o:      INCLUDE := $(call layer,tests/support tests/faults tests/solvers $(ALL_LAYERS)) $(SYSTEM)
 $(BUILD)/obj/tests/analysis/test_outcome.o: INCLUDE := $(call layer,tests/support $(ALL_LAYERS) core/cli/analyse)
@@ -176,7 +176,7 @@ $(call obj,$(BENCH) $(HARD) $(EMBED)): | $(INCLUDES)
 -include $(patsubst %.o,%.d,$(call obj,$(CORE) $(SOLVERS) $(FILES) $(CLI) $(QUICK) $(SLOW) $(SHARE) $(FUZZ) $(FUZZ_SHARE) $(BENCH) $(ENGINE) $(HARD) $(EMBED)))
 -include $(MODELS:%.c=$(BUILD)/obj/%.d)
 
-# The page of an animation and the templates of figures and new models become part of the program: their lines as C strings.
+# The page of animations and the templates of figures and new models become part of the program, as C strings, one per line.
 AS_STRINGS := sed -e 's/\\/&&/g' -e 's/"/\\"/g' -e 's/.*/"&\\n",/'
 $(BUILD)/obj/%.inc: %.html
 	@mkdir -p $(@D)
@@ -197,7 +197,7 @@ $(BUILD)/obj/core/cli/plot/templates.inc: $(wildcard core/cli/plot/templates/*.g
 	  awk '/^# include / { while ((getline line <("core/cli/plot/templates/" $$3)) > 0) print line; next } { print }' $$f | \
 	  $(AS_STRINGS); echo 'NULL } },'; done >$@
 
-# The engine of interactive pages, WebAssembly: what integrates with rk4, erk5 and erk8, without libraries.
+# The engine of interactive pages, in WebAssembly: all that rk4, erk5 and erk8 need, without libraries.
 WASM_FLAGS := --target=wasm32-wasi -std=c11 -O2 -ffp-contract=off -ffunction-sections -fdata-sections \
   -D_POSIX_C_SOURCE=200809L -D_WASI_EMULATED_SIGNAL -include core/cli/page/engine/wasi.h '-DPW_METHODS=PW_METHOD (rk4) PW_METHOD (erk5) PW_METHOD (erk8)' \
   $(call layer,$(CORE_LAYERS) core/kinds $(SOLVER_LAYERS) $(FILE_LAYERS) core/cli core/cli/plot $(BUILD)/obj/core/cli/plot) $(SYSTEM)
@@ -218,7 +218,7 @@ $(BUILD)/page/pinwheel-page.objects: $(WASM_OBJ)
 	@mkdir -p $(@D)
 	@rm -f $@
 	$(Q)$(AR) rcs $@ $^
-# Functions that pages do not reach are in undefined.txt; any other that is missing is an error here.
+# Missing functions are errors, except those in undefined.txt, which pages never call.
 $(BUILD)/page/pinwheel.wasm: $(BUILD)/page/pinwheel-page.objects core/cli/page/engine/undefined.txt
 	$(Q)$(WASM_CC) $(WASM_FLAGS) -mexec-model=reactor -Wl,--gc-sections,--allow-undefined-file=core/cli/page/engine/undefined.txt,--strip-all,-z,stack-size=1048576,--whole-archive $< -Wl,--no-whole-archive -o $@
 
@@ -266,28 +266,28 @@ $(BUILD)/models/%.so: models/%.c | $(INCLUDES) $(FIRST)
 	$(Q)$(CC) $(STRICT) $(INCLUDE) $(CPPFLAGS) $(CFLAGS) $(SAN) $(LDFLAGS) -Wl,--as-needed -shared \
 	  -MMD -MP -MF $(BUILD)/obj/models/$*.d -o $@ $< -lm
 
-# A link: $(BUILD)/pinwheel finds models/, too, and a file that is reached twice counts once.  It is relative, so that the
-# tree can be copied.  Nor may a model be found as the C it was before.
+# A link: $(BUILD)/pinwheel searches models/, too, and a file found twice counts once.  It is relative, so that the tree can be
+# copied.  A plug-in of the same name, from when the model was written in C, is removed.
 $(BUILD)/models/%.yaml: models/%.yaml
 	@mkdir -p $(@D) && rm -f $(@:.yaml=.so)
 	@ln -sfr $< $@ 2>/dev/null || ln -sf "$(CURDIR)/$<" $@
 
-HOUSE_LIBS = -L$(BUILD) -lpinwheel-files -lpinwheel
+OWN_LIBS = -L$(BUILD) -lpinwheel-files -lpinwheel
 
 $(PROGRAM): $(CLI_OBJ) $(BASE_OBJ) $(LIB) $(FILES_LIB)
 	$(call say,LINK)
-	$(Q)$(LINK) $(THREADS) -Wl,-rpath,'$$ORIGIN:$$ORIGIN/../lib' -o $@ $(CLI_OBJ) $(BASE_OBJ) $(HOUSE_LIBS) $(CLI_LIBS) -lm
+	$(Q)$(LINK) $(THREADS) -Wl,-rpath,'$$ORIGIN:$$ORIGIN/../lib' -o $@ $(CLI_OBJ) $(BASE_OBJ) $(OWN_LIBS) $(CLI_LIBS) -lm
 
-# Benchmarks that look inside have the libraries whole, as tests do.
+# Benchmarks that call internal functions contain the whole libraries, as tests do.
 WHOLE := -Wl,--whole-archive $(FILES_LIB:.so=.a) $(LIB:.so=.a) -Wl,--no-whole-archive $(FILES_LIBS) $(SOLVER_LIBS)
 INSIDE := $(addprefix $(BUILD)/benchmarks/,engine peers)
-$(INSIDE): HOUSE_LIBS = -rdynamic $(WHOLE)
+$(INSIDE): OWN_LIBS = -rdynamic $(WHOLE)
 $(INSIDE): $(FILES_LIB:.so=.a) $(LIB:.so=.a)
 
 $(PROGRAMS): $(BUILD)/%: $(BUILD)/obj/%.o $(LIB) $(FILES_LIB)
 	@mkdir -p $(@D)
 	$(call say,LINK)
-	$(Q)$(LINK) -Wl,-rpath,'$$ORIGIN/..' -o $@ $(filter %.o,$^) $(HOUSE_LIBS) $(EXTRA_LIBS) -lm
+	$(Q)$(LINK) -Wl,-rpath,'$$ORIGIN/..' -o $@ $(filter %.o,$^) $(OWN_LIBS) $(EXTRA_LIBS) -lm
 
 $(BUILD)/benchmarks/engine: $(call obj,$(ENGINE))
 $(BUILD)/benchmarks/engine $(BUILD)/benchmarks/peers: EXTRA_LIBS := $(SOLVER_LIBS) -lsundials_sunlinsoldense -lsundials_sunmatrixdense
@@ -297,8 +297,8 @@ $(BUILD)/benchmarks/effects: $(call obj,benchmarks/engine/count.c)
 $(BUILD)/benchmarks/hard: $(call obj,$(HARD))
 $(BUILD)/benchmarks/hard: EXTRA_LIBS := -lfyaml
 
-# A test holds the libraries whole, so that the plug-ins it opens find them in it; these and the program are to be of the
-# same sources when it runs.
+# A test contains the whole libraries, in which the plug-ins that it opens find their symbols; plug-ins and the program are
+# brought up to date first.
 test_obj = $(filter %/$(1).o,$(call obj,$(QUICK) $(SLOW)))
 .SECONDEXPANSION:
 $(TESTS) $(SLOWS): $(BUILD)/tests/%: $$(call test_obj,$$*) $(BUILD)/libtests.a $(FILES_LIB:.so=.a) $(LIB:.so=.a) | $(PROGRAM) $(PLUGINS) $(INCLUDES)
@@ -309,8 +309,7 @@ $(TESTS) $(SLOWS): $(BUILD)/tests/%: $$(call test_obj,$$*) $(BUILD)/libtests.a $
 
 $(BUILD)/tests/test_embed: | $(BUILD)/docs/embed
 
-# These make every allocation fail in turn; those that have the program's commands, what it asks of files and what the
-# libraries below it allocate.
+# Tests that make allocations and, in test_cli_faults, operations on files fail one at a time: they wrap these functions.
 comma := ,
 ALLOC_WRAP := malloc calloc realloc strdup free
 FILES_WRAP := open fopen fdopen fclose fflush fwrite fread fseek fseeko ftell fgets rename ftruncate fsync pread pwrite flock \
@@ -322,12 +321,12 @@ $(BUILD)/tests/test_memory $(BUILD)/tests/slow_memory: WRAP = -pthread $(addpref
 $(BUILD)/tests/test_cli_faults $(BUILD)/tests/test_memory $(BUILD)/tests/slow_memory: $(filter-out %/main.o,$(CLI_OBJ))
 $(BUILD)/tests/test_cli_limits: $(call obj,core/cli/progress.c)
 $(BUILD)/tests/test_outcome: $(call obj,core/cli/analyse/outcome.c core/cli/analyse/functional.c core/cli/stop.c core/cli/progress.c)
-# This every call of the libraries below.
+# It wraps every call of other libraries that it lists.
 $(BUILD)/tests/test_faults: WRAP = $(shell sed -n 's/^FAULT_[A-Z]* .[^,]*, \([A-Za-z_]*\),.*/-Wl,--wrap=\1/p' tests/faults/test_faults.c)
-# A part of SUNDIALS that Pinwheel does not use, to compare with.
+# A part of SUNDIALS that is used for comparison only.
 $(BUILD)/tests/test_arkode: WRAP := -Wl,--no-as-needed -lsundials_arkode -Wl,--as-needed
 
-# A target has the program's commands but not its main.
+# A target contains the commands of the program, without its main.
 $(FUZZERS): $(BUILD)/fuzz/%: $(BUILD)/obj/tests/fuzz/%.o $(call obj,$(FUZZ_SHARE)) $(filter-out %/main.o,$(CLI_OBJ)) $(FILES_LIB:.so=.a) $(LIB:.so=.a)
 	@mkdir -p $(@D)
 	$(call say,LINK)
@@ -378,7 +377,7 @@ words:
 layers: all
 	@BUILD=$(BUILD) sh .ci/layers
 
-# Further builds have folders of their own, deep enough that their programs do not find $(BUILD)/models as well.
+# Further builds, in folders so deep that their programs do not find $(BUILD)/models.
 VARIANT := $(BUILD)/variant
 
 san:
@@ -386,8 +385,8 @@ san:
 	  SAN='-fsanitize=address,undefined -fno-sanitize-recover=undefined -fno-omit-frame-pointer'
 san: $(FIRST)
 
-# clang's libFuzzer, TIME seconds for each target; what it finds new and interesting goes to the corpus, what breaks a target
-# into $(VARIANT)/fuzz/found.
+# clang's libFuzzer, TIME seconds for each target; inputs that reach new code go to the corpus in $(VARIANT)/fuzz, those that
+# make a target fail to $(VARIANT)/fuzz/found.
 TIME ?= 60
 fuzz:
 	@$(MAKE) --no-print-directory NO_DEPS=1 CC=clang FUZZING=1 BUILD=$(VARIANT)/fuzz CFLAGS='-O1 -g' \
@@ -404,19 +403,19 @@ fuzz: $(FIRST)
 fuzzers: LDFLAGS += -fsanitize=fuzzer
 fuzzers: $(FUZZERS)
 
-# Not part of `make test`; TIME as for fuzzing.
+# TIME: the seconds after which it stops, 7200 by default.
 mutants: $(FIRST)
 	@mkdir -p $(VARIANT)/mutants
 	@python3 tests/mutants/run.py $(if $(filter command line,$(origin TIME)),--time $(TIME)) $(if $(ONLY),--only '$(ONLY)') $(VARIANT)/mutants
 
-# Lines of core/ and solvers/ that tests run; the old counts go first.
+# Lines of core/ and solvers/ that tests run; earlier counts are deleted first.
 cov:
 	@mkdir -p $(VARIANT)/cov && find $(VARIANT)/cov -name '*.gcda' -delete
 	@$(MAKE) --no-print-directory NO_DEPS=1 CC=gcc BUILD=$(VARIANT)/cov CFLAGS='-O1 -g' SAN='--coverage -fprofile-update=atomic' test-all || echo 'some tests fail in this build, layers among them'
 	@sh .ci/coverage $(VARIANT)/cov 95
 cov: $(FIRST)
 
-# Many systems in many threads at once.
+# Runs of many systems in many threads.
 tsan:
 	@$(MAKE) --no-print-directory NO_DEPS=1 BUILD=$(VARIANT)/tsan CFLAGS='-O1 -g' SAN=-fsanitize=thread \
 	  all $(THREADED:%=$(VARIANT)/tsan/tests/%)
@@ -424,7 +423,7 @@ tsan:
 
 THREADED := test_determinism
 
-# Tests that between them go everywhere, and not too often.
+# Tests that together run most of the code, and that memcheck does not slow down too much.
 MEMCHECK := checkpoint description faults gear locale messages redundant store yaml
 valgrind: all $(MEMCHECK:%=$(BUILD)/tests/test_%)
 	@RUNNER='valgrind -q --error-exitcode=99 --leak-check=full --errors-for-leak-kinds=definite' $(RUN_TESTS) \
@@ -438,7 +437,7 @@ clang:
 gcc:
 	@$(MAKE) --no-print-directory CC=gcc WERROR=1 BUILD=$(VARIANT)/gcc everything
 
-# A library with few kinds, of a copy of the sources whose list is shorter: what it does not have cannot cost anything.
+# A library with few element types, for bench-effects: a copy of the sources with a shorter list.
 BASIC       := $(VARIANT)/basic
 BASIC_KINDS := pin wheel torque
 BASIC_COPY   = $(filter-out core/kinds/%.c core/pinwheel.h $(FILES) $(CLI) $(wildcard core/files/*.h core/cli/*.h), \
@@ -472,7 +471,7 @@ FIGURES  := $(wildcard docs/figures/*)
 EXAMPLES := $(EMBED) $(wildcard models/*.c) core/kinds/forces/torque.c \
             $(addprefix core/kinds/,batch.h contact.h holonomic/gear.c nonholonomic/rolling_wheel.c)
 
-# Where Python looks for packages below PREFIX: Debian's for /usr, otherwise that of its version.
+# Where Python looks for packages below PREFIX: Debian's folder for /usr, otherwise that of the Python version.
 PYTHON_SITE = lib/$(if $(filter /usr,$(PREFIX)),python3/dist-packages,$(shell python3 -c 'import sys; print("python%d.%d" % sys.version_info[:2])')/site-packages)
 
 define PKGCONFIG
@@ -526,7 +525,7 @@ deb:
 	  $(VERSION) $(VERSION) "$$(date -R)" >$(BUILD)/deb/pinwheel/debian/changelog
 	@cd $(BUILD)/deb/pinwheel && dpkg-buildpackage -b -uc -us
 
-# Removes what install put there and the directories that only Pinwheel uses, if they are empty.
+# Removes what install has installed, and directories that only Pinwheel uses, if they are empty.
 uninstall:
 	[ ! -d "$(D)" ] || { cd "$(D)" && rm -rf $(PYTHON_SITE)/pinwheel && rm -f bin/pinwheel share/bash-completion/completions/pinwheel share/zsh/site-functions/_pinwheel \
 	  lib/libpinwheel.* lib/libpinwheel-files.* lib/pkgconfig/pinwheel.pc \

@@ -1,11 +1,11 @@
 #!/bin/sh
-# Checks what Pinwheel needs and installs only what is missing, with the system's package manager.
+# Finds the libraries and programs that Pinwheel needs, and installs those that are missing with the system's package manager.
 #
 #   deps.sh [fresh] [style] [browser] [slurm] [reference] [page] [python]
 #
-# fresh: do not trust the last result; style: clang and clang-format too; browser: one that can run without a screen, for
-# the tests of animations; slurm: for tests/scripts/slurm.sh; reference: Python's numpy and scipy, for tests/reference/reference.sh; page: a compiler for
-# WebAssembly, for interactive pages; python: what the tests of the Python package use.
+# fresh: ignore the last result, which is kept in BUILD.  The other words add tools: style: clang and clang-format; browser: a
+# headless one, for the tests of pages; slurm: for tests/scripts/slurm.sh; reference: Python's numpy and scipy, for
+# tests/reference/reference.sh; page: a compiler for WebAssembly, for interactive pages; python: for tests of the package.
 #
 # Reads CC, CPPFLAGS, LDFLAGS, BUILD, NO_DEPS.  Only apt has been tried; dnf, pacman and brew are unverified.
 
@@ -28,7 +28,7 @@ for word; do
   esac
 done
 
-# The last good result stands as long as nothing it depends on has changed.
+# The last good result is valid as long as the words, the compiler, its flags and this script are the same.
 key="$needs | $CC | $CPPFLAGS | $LDFLAGS" good=$BUILD/deps.ok
 if [ -z "$fresh" ] && [ -f "$good" ] && [ "$(cat "$good")" = "$key" ] && [ -z "$(find "$0" -newer "$good")" ]; then
   exit 0
@@ -38,7 +38,7 @@ work=$(mktemp -d) || exit 1
 trap 'rm -rf "$work"' EXIT
 trap 'exit 130' INT TERM
 
-# ---- One tiny program per library ----
+# ---- A test program for each library ----
 
 source_of () {
   case $1 in
@@ -97,7 +97,7 @@ libs_of () {
   esac
 }
 
-# Compiles and links the programs of the libraries named; quiet, the answer is the status.
+# links LIBRARY...: succeeds if the test programs of these libraries compile, link and run; without output.
 links () {
   libs=
   {
@@ -109,7 +109,7 @@ links () {
   $CC -w $CPPFLAGS "$work/try.c" -o "$work/try" $LDFLAGS $libs -lm >"$work/log" 2>&1 && "$work/try" >>"$work/log" 2>&1
 }
 
-# What is missing, in $missing.  All libraries are tried at once, and one by one only if that fails.
+# Sets $missing.  All libraries are tried at once, and one by one only if that fails.
 look () {
   missing= libraries=
   for n in $needs; do
@@ -168,7 +168,7 @@ package_of () {
   esac
 }
 
-# The one command that installs $packages, in $command; apt's package lists are fetched only where they lack one.
+# compose SUDO: sets $command, which installs $packages; apt's package lists are updated only if $update is set.
 compose () {
   as=$1
   case $manager in
@@ -181,7 +181,7 @@ compose () {
   esac
 }
 
-# ---- From here it happens ----
+# ---- The work ----
 
 look
 if [ -z "$missing" ]; then

@@ -13,13 +13,13 @@ typedef struct {
   pw_system *system;
 } bench_scene;
 
-/* Ends the program with the text and the status of the error. */
+/* Prints the error and ends the program with its status. */
 static inline void bench_fail (const char *what, const pw_error *error) {
   fprintf (stderr, "%s: %s\n", what, error->text);
   exit (-error->status);
 }
 
-/* Opens a model by name, with its parameters at their defaults. */
+/* Opens and compiles a model with default parameters; close it with bench_close. */
 static inline bench_scene bench_open (const char *name) {
   pw_error error = { 0 };
   bench_scene s = { .file = pw_file_open (name, &error) };

@@ -5,8 +5,7 @@
  *
  * First the EzyRoller alone, with the libpinwheel to which this program is linked and with the one in FOLDER, which
  * has only the element types of the EzyRoller: the counts must be equal, otherwise the exit status is 1.  Then the
- * EzyRoller with one further effect at a time.  Element types are found by name, so that the program runs with both
- * libraries. */
+ * EzyRoller with one further effect at a time.  Element types are found by name: it runs with both libraries. */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -16,7 +15,7 @@ enum {
   EFFECTS_POOL = 64,     /* states that are evaluated */
   EFFECTS_SPACING = 200, /* steps between them */
   EFFECTS_ROUNDS = 10,   /* evaluations of each */
-  EFFECTS_COORDS = 12    /* at most 3 bodies or 2 with a spin angle, and 3 entries of the ground */
+  EFFECTS_COORDS = 12    /* 3 bodies, or 2 and a spin angle; 3 entries of the ground */
 };
 
 /* ---- Scenes ---- */
@@ -27,7 +26,7 @@ static void effects_add (pw_model *m, const char *kind, const void *definition) 
       pw_add (m, *k, definition);
       return;
     }
-  pw_model_refuse (m, "no kind %s in this library", kind);
+  pw_model_refuse (m, "this library has no element type %s", kind);
 }
 
 static void effects_wheel (pw_model *m) {
@@ -145,7 +144,7 @@ static const pw_plugin_table effects_table = { .abi = PW_ABI,
                                                .parameters_size = sizeof (effects_parameters),
                                                .build = effects_build };
 
-/* ---- Under callgrind ---- */
+/* ---- Evaluations, under callgrind ---- */
 
 static const char *const effects_steering[] = { "massive", "massless" };
 
@@ -153,7 +152,7 @@ typedef struct {
   pw_system *system;
   pw_run *run;
   double t[EFFECTS_POOL], q[EFFECTS_POOL][EFFECTS_COORDS], v[EFFECTS_POOL][EFFECTS_COORDS];
-  double a[EFFECTS_COORDS], lambda[8]; /* at most 4 rows and 3 of a weld or a drive */
+  double a[EFFECTS_COORDS], lambda[8]; /* 4 constraint equations, and at most 3 of an effect */
 } effects_data;
 
 static long effects_evaluate (void *context, long n) {
@@ -186,8 +185,7 @@ static void effects_close (pw_run *r, pw_system *s) {
 }
 
 /* Fills the pool from a run of the EzyRoller alone: all scenes are evaluated at the same states, since the
- * instructions of a sine depend on the angle.  Coordinates that the EzyRoller does not have keep their initial
- * values. */
+ * instructions of a sine depend on the angle.  Further coordinates keep their initial values. */
 static void effects_fill (effects_data *d, int massless) {
   pw_error e = { 0 };
   pw_system *s;
@@ -204,7 +202,7 @@ static void effects_fill (effects_data *d, int massless) {
   effects_close (alone, s);
 }
 
-/* The process that callgrind watches: evaluates the pool several times. */
+/* The process whose instructions callgrind counts: evaluates the pool several times. */
 static int effects_child (const char *key, const char *steering) {
   static effects_data d;
   int massless = strcmp (steering, effects_steering[1]) == 0;
@@ -226,7 +224,7 @@ static int effects_list_kinds (void) {
 /* Instructions per evaluation. */
 static double effects_count (const char *program, const char *key, int massless) {
   double instructions = engine_count (program, key, effects_steering[massless], "pw_run_accelerate");
-  if (instructions == 0) engine_die (key, "nothing was counted; is valgrind installed?");
+  if (instructions == 0) engine_die (key, "no instructions were counted; is valgrind installed?");
   return instructions / (EFFECTS_ROUNDS * EFFECTS_POOL);
 }
 

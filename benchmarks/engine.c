@@ -2,9 +2,10 @@
  *
  *   engine                     everything; writes benchmarks/results/engine-MACHINE.csv
  *   engine KEY...              comparisons whose key starts with KEY (rhs, chain-1000, ...), growth, memory; no file
- *   engine --count KEY SIDE    the work of one side ("base" or "ours") alone, for callgrind
+ *   engine --count KEY SIDE    the work of one side of a comparison ("base" or "ours") alone, for callgrind
  *
- * Times are medians over pairs of alternating batches; instructions are exact, per unit. */
+ * Times are medians over pairs of alternating batches; instructions are exact.  Both are per unit: an evaluation of the
+ * accelerations, a step, a body. */
 #include <ctype.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -13,7 +14,7 @@
 #include "engine/engine.h"
 
 enum { ENGINE_PAIRS = 21, ENGINE_IDA_BATCHES = 5, ENGINE_SIZES = 5 /* of a scene, at most */ };
-static const double engine_batch = 0.01; /* duration [s] */
+static const double engine_batch = 0.01; /* duration of a batch [s] */
 
 static engine_case engine_cases[] = {
   { "rhs", "EzyRoller, one evaluation", "evaluation", 1.5, engine_open_rhs, engine_close_ezy, .calls = 640 },
@@ -96,13 +97,14 @@ static int engine_wanted (const engine_report *r, const char *key) {
   return 0;
 }
 
-/* A number, or nothing for 0. */
+/* A number as text; "" for 0. */
 static const char *engine_number (char *buffer, size_t size, double value, int digits) {
   if (value == 0) return "";
   snprintf (buffer, size, "%.*f", digits, value);
   return buffer;
 }
 
+/* Counts whether a value is in [low, high]; "" without a target, high = 0. */
 static const char *engine_verdict (engine_report *r, double value, double low, double high) {
   if (high == 0) return "";
   int met = value >= low && value <= high;
@@ -119,7 +121,8 @@ static void engine_target (char *buffer, size_t size, double low, double high) {
     snprintf (buffer, size, "<= %g", high);
 }
 
-/* A line of the table and of the file.  Values of 0 are left out; if high > 0, the ratio must be in [low, high]. */
+/* A line of the table and of the file.  Values of 0 are not printed; if high > 0, the ratio must be in [low, high].
+ * difference: of the results of both sides. */
 typedef struct {
   const char *what, *unit;
   double base, ours, ratio, base_count, our_count, low, high, difference;
@@ -169,7 +172,7 @@ static timing_result engine_compare (engine_report *r, engine_case *c) {
   return t;
 }
 
-/* One sin and cos of the same angle: a unit of time that differs less between machines than the ns. */
+/* One sin and cos of the same angle: in this unit, times differ less between machines than in ns. */
 static long engine_sincos (void *context, long n) {
   double *angle = context, sum = 0;
   for (long i = 0; i < n; i++) sum += sin (angle[i % 64]) + cos (angle[i % 64]);
@@ -184,13 +187,14 @@ static double engine_time_sincos (void) {
   return timing_alone (&work, ENGINE_PAIRS, engine_batch);
 }
 
-/* Checks a program by hand: `known` [ns] is its time where a sin and a cos take 15 ns; 30 % more is accepted. */
+/* Checks the time [ns] of a program written by hand: `known`, where a sin and a cos take 15 ns; accepts 30 % more. */
 static void engine_units (engine_report *r, double sincos, const char *what, double ns, double known) {
   engine_put (r, &(engine_line){ what, "sin+cos pair", sincos, ns, ns / sincos, .high = 1.3 * known / 15 });
 }
 
 /* ---- Growth ---- */
 
+/* The slope of log time against log size, from entry `from` on, by least squares. */
 static double engine_slope (const int *size, const double *time, int from, int count) {
   double n = count - from, sx = 0, sy = 0, sxx = 0, sxy = 0;
   for (int i = from; i < count; i++) {
@@ -200,7 +204,7 @@ static double engine_slope (const int *size, const double *time, int from, int c
   return (n * sxy - sx * sy) / (n * sxx - sx * sx);
 }
 
-/* The spread of the times per body, and the slope of log time against log size, from the second size on. */
+/* Reports the ratio of the largest to the least time per body, `ns`, and the slope, both without the smallest scene. */
 static void engine_growth_lines (engine_report *r, const char *name, const int *size, const double *ns, int count,
                                  int target) {
   char what[2][80];
@@ -337,6 +341,8 @@ int main (int argc, char **argv) {
   printf ("machine %s; medians of %d interleaved pairs of %g ms\n", machine, ENGINE_PAIRS, 1e3 * engine_batch);
   engine_everything (&r);
   printf ("\n%d targets met, %d missed\n", r.met, r.missed);
-  if (r.csv && fclose (r.csv) == 0 && rename (part, path) == 0) printf ("%s\n", path);
+  if (r.csv == NULL) return 0;
+  if (fclose (r.csv) != 0 || rename (part, path) != 0) engine_die (path, "cannot be written");
+  printf ("%s\n", path);
   return 0;
 }

@@ -3,9 +3,9 @@
  *     hard [-j CELLS] [-c CASE] [-m METHOD] [-s] [-v] [-o PAGE] FOLDER
  *
  * FOLDER has the folders cases and models.  CELLS: runs at a time; CASE and METHOD: patterns of names; -s: with
- * specialised code; -v: prints every cell; -o: writes PAGE.md and PAGE.csv.  Each cell runs in its own process with
- * a limit of processor time, so that a crash or an endless run becomes a verdict.  Exit status: 0 if all verdicts
- * are as expected, 1 if not, 2 for a mistake in the cases. */
+ * specialised code; -v: prints every cell; -o: writes PAGE.md and PAGE.csv.  A cell is one method on one case; each
+ * runs in its own process with a limit of processor time, so that a crash or an endless run becomes a verdict.  Exit
+ * status: 0 if all verdicts are as expected, 1 if not, 2 for a mistake in the cases. */
 #define _XOPEN_SOURCE 700
 #include <dirent.h>
 #include <fnmatch.h>
@@ -24,12 +24,12 @@ enum {
 
 typedef struct {
   const char *folder, *only_case, *only_method, *page;
-  int slots; /* runs at a time */
+  int slots; /* number of runs at a time */
   int verbose, specialised;
   hard_case *cases;
   int count, methods, done; /* cases, methods, finished cells */
   char method[HARD_METHODS][HARD_NAME];
-  hard_result *result; /* [case * methods + method] */
+  hard_result *result; /* of each cell, whose index is case * methods + method */
 } hard;
 
 /* A running cell. */
@@ -78,7 +78,7 @@ static void hard_list_methods (hard *x) {
 
 /* ---- Cells ---- */
 
-/* In the child process: sets the limits, runs, sends the result. */
+/* The child process: sets the limits, runs the cell, writes the result to the pipe `to`. */
 static void hard_cell (const hard_case *c, const char *method, int specialised, int to) {
   hard_result r;
   struct rlimit limit = { (rlim_t)c->seconds, (rlim_t)c->seconds + 5 }, none = { 0, 0 };
@@ -90,7 +90,7 @@ static void hard_cell (const hard_case *c, const char *method, int specialised, 
 }
 
 static void hard_start (hard *x, hard_child *child, int cell) {
-  int end[2];
+  int end[2]; /* of the pipe: to read from, to write to */
   fflush (NULL);
   if (pipe (end) != 0) {
     perror ("pipe");
@@ -106,7 +106,7 @@ static void hard_start (hard *x, hard_child *child, int cell) {
   exit (2);
 }
 
-/* One line about a cell whose result is not as expected, or with -v about any cell. */
+/* Prints a line about a cell whose result is not as expected, with -v about every cell. */
 static void hard_report (const hard *x, int cell) {
   const hard_case *c = &x->cases[cell / x->methods];
   const hard_result *r = &x->result[cell];
@@ -121,6 +121,7 @@ static void hard_report (const hard *x, int cell) {
   putchar ('\n');
 }
 
+/* Reads the result of a child process that has ended with this status of `wait`. */
 static void hard_finish (hard *x, hard_child *child, int status) {
   hard_result *r = &x->result[child->cell];
   const hard_case *c = &x->cases[child->cell / x->methods];

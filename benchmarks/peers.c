@@ -1,7 +1,7 @@
-/* peers: the cost of an accuracy by Pinwheel's methods, and by programs written by hand for one mechanism with the same
- * kind of method: 100 s of the EzyRoller with a massive steering assembly, and 1 s of chains of pendulums.
+/* peers: what an accuracy costs with Pinwheel's methods, and with programs written by hand for one mechanism by the
+ * same kind of method: 100 s of the EzyRoller with a massive steering assembly, and 1 s of chains of pendulums.
  *
- *   peers [CSV]            runs every method down its ladder of tolerances or steps; prints, and writes to CSV, the
+ *   peers [CSV]            runs every method with each tolerance or step of its ladder; prints, and writes to CSV, the
  *                          cost of errors of 1e-3, 1e-6, 1e-9 and 1e-12 m of the positions at the end and, if valgrind
  *                          is installed, the instructions per evaluation of a run with an error of about 1e-6 m
  *   peers --count K LEVEL  one level of ladder K alone, for callgrind
@@ -30,6 +30,8 @@ typedef struct {
 
 /* ---- Pinwheel ---- */
 
+/* Runs a method of Pinwheel; `level` is the tolerance or the step.  Stores the final positions in q, NAN if it fails;
+ * returns the number of evaluations. */
 static double peers_ours (void *scene, const ladder *self, double level, double *q) {
   const peers_scene *s = scene;
   pw_error error = { 0 };
@@ -44,7 +46,7 @@ static double peers_ours (void *scene, const ladder *self, double level, double 
   return evaluations;
 }
 
-/* ---- Programs by hand, and methods of Pinwheel that are compared with them ---- */
+/* ---- Programs written by hand, and methods of Pinwheel that are compared with them ---- */
 
 #define PEERS_LADDER(name_, method_, first_, factor_, count_, run_, function_)                          \
   {                                                                                                     \

@@ -8,7 +8,7 @@ typedef struct {
   const char *method;
   double step; /* of rk4 [s]; 0: ida */
   double rtol; /* of ida; 0: rk4 */
-  int ledger;  /* integrates the energy ledger, too */
+  int ledger;  /* 1: integrates the energy ledger, too */
 } quick_case;
 
 /* The processor time of one run [s], and its statistics. */
@@ -43,7 +43,7 @@ int main (void) {
     for (int k = 0; k < QUICK_REPEATS; k++) cpu[k] = quick_run (&cases[i], &n);
     double median = timing_median (cpu, QUICK_REPEATS);
     printf ("%-16s %-7s %9.4f %9.4f %9ld %9ld %9.0f %9.0f\n", cases[i].method, cases[i].ledger ? "yes" : "no", median,
-            cpu[0], n.steps, n.rhs, 1e9 * median / (double)n.steps, 1e9 * median / (double)n.rhs);
+            cpu[0] /* sorted */, n.steps, n.rhs, 1e9 * median / (double)n.steps, 1e9 * median / (double)n.rhs);
   }
   printf ("\nns/rhs of rk4+none is the cost of one evaluation of the accelerations and of its share of the step.\n");
   return 0;

@@ -1,5 +1,5 @@
-/* Times small pieces of work, one alone or two against each other.  Batches of both alternate, so that a slow phase
- * of the machine affects both; the result is the median of the ratios of adjacent batches. */
+/* Measures the processor time of small pieces of work, one alone or two in comparison.  Batches of both alternate, so
+ * that a slow phase of the machine affects both; the result is the median of the ratios of adjacent batches. */
 #ifndef TIMING_H
 #define TIMING_H
 
@@ -7,7 +7,7 @@
 #include <stdlib.h>
 #include <time.h>
 
-enum { TIMING_PAIRS_MAX = 99 };
+enum { TIMING_PAIRS_MAX = 99 }; /* most batches or pairs */
 
 /* Work to be timed: does it n times and returns how many units (evaluations, steps) that were. */
 typedef struct {
@@ -33,7 +33,7 @@ static inline int timing_order (const void *a, const void *b) {
   return (x > y) - (x < y);
 }
 
-/* Sorts the values. */
+/* The median; sorts the values. */
 static inline double timing_median (double *value, int count) {
   qsort (value, (size_t)count, sizeof *value, timing_order);
   return count % 2 ? value[count / 2] : (value[count / 2 - 1] + value[count / 2]) / 2;

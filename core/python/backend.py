@@ -7,6 +7,7 @@ import base64
 import hashlib
 import pathlib
 import shutil
+import stat
 import subprocess
 import sysconfig
 import tempfile
@@ -40,10 +41,12 @@ def _read(path):
 
 
 def _tag(native):
+    """The tag of a wheel with or without compiled files (PEP 425)."""
     return f"py3-none-{sysconfig.get_platform().replace('-', '_').replace('.', '_')}" if native else "py3-none-any"
 
 
 def build_wheel(directory, config_settings=None, metadata_directory=None):
+    """Writes the wheel to the directory and returns its file name (PEP 517)."""
     contents = [(name, _read(path), path.stat().st_mode) for name, path in _contents()]
     tag = _tag(any("/lib/" in name for name, _, _ in contents))
     info = f"{_NAME}-{_VERSION}.dist-info"
@@ -54,7 +57,7 @@ def build_wheel(directory, config_settings=None, metadata_directory=None):
     with zipfile.ZipFile(pathlib.Path(directory) / file, "w", zipfile.ZIP_DEFLATED) as wheel:
         for name, data, mode in contents:
             entry = zipfile.ZipInfo(name)
-            entry.external_attr = (mode & 0o777 | 0o100000) << 16
+            entry.external_attr = (mode & 0o777 | stat.S_IFREG) << 16
             entry.compress_type = zipfile.ZIP_DEFLATED
             wheel.writestr(entry, data)
             digest = base64.urlsafe_b64encode(hashlib.sha256(data).digest()).rstrip(b"=").decode()

@@ -6,17 +6,17 @@
  *     [ M J^T ; J 0 ] (da, dlambda) = ( (f_q - (J^T lambda)_q) dq + f_v dv, (gamma_q - (J a)_q) dq + gamma_v dv )
  *                                     + d/dp ( f - M a - J^T lambda, gamma - J a ),
  *
- * the first part by the exact blocks of the element types (linear_variation.c), the second by differences of the
- * systems of neighbouring runs, at the state of this one (variation_effect.c).  Initial values of dq and dv are
- * differences of the neighbours' consistent initial states.  Differences with two steps of p give both the
- * extrapolated ones (Richardson) and their error.  The error of the result obeys the same equations, with the error of
- * the differences in place of the effects of p, and after each step with the error of the step added.
+ * the first line by the exact blocks of the element types (linear_variation.c), the second, the effect of p, by
+ * differences of the systems of neighbouring runs (pw_direction), at the state of this one (variation_effect.c).
+ * Initial values of dq and dv are differences of the neighbours' consistent initial states.  Differences with two
+ * steps of p give their extrapolation (Richardson) and its error.  The error of the result obeys the same equations,
+ * with the error of the differences in place of the effect of p; after each step the error of the step is added.
  *
- * Steps are explicit (variation_explicit.c), or implicit if the motion is stiff (variation_implicit.c), for runs by
- * all methods: along the states that the run has reached, with steps of their own, which end at samples and
- * breakpoints.  Steps of a run with a fixed step are usually much smaller; a linearisation costs about 6 evaluations
- * of the accelerations.  The result is therefore the derivative of the motion that the run follows, to 1e-10 or the
- * accuracy of its states, not that of its discretisation error.
+ * The derivatives are integrated with steps of their own, which end at samples and breakpoints, along the states that
+ * the run has reached by any method.  These steps are explicit (variation_explicit.c), or implicit if the motion is
+ * stiff (variation_implicit.c).  The steps of a run with a fixed step are usually much smaller, and a linearisation
+ * costs about 6 evaluations of the accelerations.  The result is therefore the derivative of the exact motion, to 1e-10
+ * or the accuracy of the run's states; the derivative of the run's discretisation error is no part of it.
  *
  * After each step dq and dv are projected onto the tangent of the constraints,
  *
@@ -30,13 +30,16 @@
 #include "util.h"
 #include "variation_parts.h"
 
-/* Several times the movement of neighbours, in units of the scene: their accelerations may jump so much before the
- * run's. */
+/* How far the run is ahead of the derivatives where accelerations may jump, in units of the scene: those of neighbours
+ * may jump earlier than the run's.  Several times the largest such difference. */
 static const double VARIATION_AHEAD = 1e-4;
+
+static const double VARIATION_FIRST_STEP = 1e-3; /* of the derivatives, in units of the scene */
 
 /* ---- Opening ---- */
 
-static int variation_linear (pw_variation *x) {
+/* With more than PW_VARIATION_DENSE coordinates only the arrays that explicit steps need. */
+static int variation_open_linear (pw_variation *x) {
   pw_linearisation *l = &x->linear;
   size_t n = (size_t)x->n, m = (size_t)x->m;
   int status = pw_linear_open (l, x->r, PW_WITHOUT_MODES, PW_VARIATION_DENSE);
@@ -52,7 +55,7 @@ static int variation_linear (pw_variation *x) {
   return l->memory ? pw_linear_derivatives (l) : PW_RESOURCE;
 }
 
-static int variation_arrays (pw_variation *x) {
+static int variation_open_arrays (pw_variation *x) {
   size_t n = (size_t)x->n, m = (size_t)x->m, entries = (size_t)x->r->s->entries, size = (size_t)x->size;
   size_t all = 3 * n + 4 * m + entries + 9, sample = 3 * n + m + entries;
   const pw_array array[] = { { &x->q, n + 3 },
@@ -72,7 +75,7 @@ static int variation_arrays (pw_variation *x) {
   for (int k = 1; x->memory && k < PW_VARIATION_RATES; k++) x->a[k] = x->a[k - 1] + n;
   for (int i = 0; x->memory && i < x->count; i++) {
     pw_direction_copy *d = &x->direction[i];
-    pw_array own[10 + 2 * (3 + PW_VARIATION_RATES)], *a = own;
+    pw_array own[2 + 2 * (4 + PW_VARIATION_RATES)], *a = own;
     *a++ = (pw_array){ &d->local_error, size };
     *a++ = (pw_array){ &d->terms, n + 3 * m };
     for (int c = 0; c < 2; c++) {
@@ -90,7 +93,7 @@ static int variation_arrays (pw_variation *x) {
   return x->memory ? PW_OK : PW_RESOURCE;
 }
 
-/* A neighbour has the same elements, whose constraint equations are the same ones. */
+/* Neighbours must have the run's numbers of bodies, elements and (redundant) constraint equations. */
 static int variation_check_neighbours (const pw_variation *x, const pw_direction *d, int i, pw_error *error) {
   const pw_system *s = x->r->s;
   if (d->initial) return PW_OK;
@@ -106,7 +109,7 @@ static int variation_check_neighbours (const pw_variation *x, const pw_direction
   return PW_OK;
 }
 
-/* 1 if the signals of a batch may differ; those that point to tables or functions are not compared. */
+/* 1 if signals of a batch differ, or may: tables and functions are not compared. */
 static int variation_signals_differ (const pw_element_batch *a, const pw_element_batch *b) {
   for (int i = 0; i < a->b.count * a->kind->signals; i++) {
     const pw_signal *one = &a->source[i].signal, *other = &b->source[i].signal;
@@ -115,7 +118,7 @@ static int variation_signals_differ (const pw_element_batch *a, const pw_element
   return 0;
 }
 
-/* Finds what differs between the neighbours and the run.  PW_RESOURCE; PW_INPUT if that is other elements. */
+/* Finds what differs in the neighbours.  PW_OK, PW_RESOURCE; PW_INPUT if types or numbers of elements differ. */
 static int variation_find_changes (const pw_variation *x, pw_direction_copy *d) {
   const pw_system *s = x->r->s;
   size_t bytes = (size_t)s->coords * sizeof (double);
@@ -136,22 +139,23 @@ static int variation_find_changes (const pw_variation *x, pw_direction_copy *d) 
   return PW_OK;
 }
 
-/* Adds round-off of the differences of the initial states to their error. */
+/* Adds the round-off of the differences of initial states, 4 eps |weight value| each, to their error. */
 static void variation_add_round_off (const pw_variation *x, pw_direction_copy *d) {
   const pw_run *near = d->given.neighbour[1], *r = x->r;
-  const double by = 4 * DBL_EPSILON * fabs (pw_direction_weight (&d->given, 0, 1)), *Y = d->column[0].trial;
+  const double relative = 4 * DBL_EPSILON * fabs (pw_direction_weight (&d->given, 0, 1)), *Y = d->column[0].trial;
   double *error = d->column[1].trial;
   for (int j = 0; j < 2 * x->n; j++) {
     int i = j % x->n;
-    double part = (j < x->n ? 1 : r->w->scale.time) / pw_unit (r->s, i), value = j < x->n ? near->q[i] : near->v[i],
-           round = value != (j < x->n ? r->q[i] : r->v[i]) ? by * fabs (value) : 0;
+    double per_unit = (j < x->n ? 1 : r->w->scale.time) / pw_unit (r->s, i), value = j < x->n ? near->q[i] : near->v[i],
+           round = value != (j < x->n ? r->q[i] : r->v[i]) ? relative * fabs (value) : 0;
     error[j] += copysign (round, error[j]);
-    d->start.all += part * fabs (Y[j]), d->start.error += part * fabs (error[j]), d->start.round += part * round;
+    d->start.all += per_unit * fabs (Y[j]), d->start.error += per_unit * fabs (error[j]),
+        d->start.round += per_unit * round;
   }
   d->start.all = fmax (d->start.all, pw_variation_least_effect (d));
 }
 
-/* Initial derivatives. */
+/* The initial derivatives, into `trial`. */
 static int variation_start (pw_variation *x, pw_direction_copy *d, const pw_direction *given, pw_error *error) {
   int n = x->n;
   d->given = *given;
@@ -174,21 +178,21 @@ static int variation_start (pw_variation *x, pw_direction_copy *d, const pw_dire
   return pw_variation_look_ahead (x, d, x->r->breakpoint, error);
 }
 
-/* A missing derivative of an element type would give wrong results. */
+/* PW_INPUT if a second-order block of an element type is missing: the results would be wrong. */
 static int variation_check_blocks (const pw_variation *x, pw_error *error) {
   char block[200];
   int found = pw_find_missing_block (x->r->w, x->r->t, x->r->q, x->r->v, block, sizeof block);
   if (found == 0) return PW_OK;
   if (found == PW_RESOURCE) return pw_fail_memory (x->r->s, error);
-  return pw_fail (
-      error, PW_INPUT,
-      "model %s: %s is left out, but it is not zero, and derivatives need it: add it, or PW_BY_DIFFERENCES in "
-      "its place",
-      x->r->s->model, block);
+  return pw_fail (error, PW_INPUT,
+                  "model %s: %s is left out, but it is not zero, and derivatives need it: add it, or "
+                  "PW_BY_DIFFERENCES in its place",
+                  x->r->s->model, block);
 }
 
-/* Appends the last step of the run, from time t0, to its states.  A step across a jump is not refined: samples in it,
- * each an own step of a Runge-Kutta method, are not continuous in time and might seem to cross it several times. */
+/* Records the states of the run in its last step, from time t0; at first, its initial state.  A step across a jump is
+ * not refined: samples in it, each computed by a Runge-Kutta step of its own, are not continuous in time and might seem
+ * to cross the jump several times. */
 static int variation_record (pw_variation *x, double t0, pw_error *error) {
   int last = x->points - 1, points;
   x->begun = t0;
@@ -201,10 +205,11 @@ static int variation_record (pw_variation *x, double t0, pw_error *error) {
   return status == PW_OK && x->points > points ? pw_variation_find_jumps (x, last, error) : status;
 }
 
+/* The smallest change of a velocity over which a force reverses, at most 1, in units of the scene. */
 static double variation_reversal (pw_run *r) {
   char element[80];
   double least;
-  int state = pw_run_saturation (r, &least, element, sizeof element);
+  int state = pw_run_saturation (r, &least, element, sizeof element); /* a velocity */
   return state < 0 ? 1 : fmin (1, least * r->w->scale.time / pw_unit (r->s, state - r->s->coords));
 }
 
@@ -218,7 +223,7 @@ static int variation_open (pw_variation *x, const pw_direction *d, pw_error *err
   if (status != PW_OK) return status;
   x->reversal = variation_reversal (r);
   x->direction = calloc ((size_t)x->count + 1, sizeof *x->direction);
-  if (x->direction == NULL || variation_arrays (x) != PW_OK || variation_linear (x) != PW_OK)
+  if (x->direction == NULL || variation_open_arrays (x) != PW_OK || variation_open_linear (x) != PW_OK)
     return pw_fail_memory (r->s, error);
   status = variation_record (x, x->t, error);
   for (int i = 0; i < x->count && status == PW_OK; i++) status = variation_start (x, &x->direction[i], &d[i], error);
@@ -236,16 +241,13 @@ pw_variation *pw_variation_open (pw_run *r, const pw_direction *d, int count, in
     pw_fail_memory (r->s, error);
     return NULL;
   }
-  *x = (pw_variation){
-    .r = r, .n = r->s->coords, .m = r->s->rows, .entries = r->s->entries, .count = count, .ledger = ledger
-  };
+  const pw_system *s = r->s;
+  *x = (pw_variation){ .r = r, .n = s->coords, .m = s->rows, .entries = s->entries, .count = count, .ledger = ledger };
   x->size = 2 * x->n + (ledger ? x->entries : 0);
-  for (int i = 0; i < r->s->batches; i++) x->elements += r->s->batch[i].b.count;
-  x->t = r->t;
-  x->passed = -INFINITY;
-  x->may_jump = pw_system_may_jump (r->s);
-  x->hold[0].to = x->hold[1].to = -INFINITY;
-  x->h = 1e-3 * r->w->scale.time;
+  for (int i = 0; i < s->batches; i++) x->elements += s->batch[i].b.count;
+  x->t = r->t, x->h = VARIATION_FIRST_STEP * r->w->scale.time;
+  x->passed = x->hold[0].to = x->hold[1].to = -INFINITY;
+  x->may_jump = pw_system_may_jump (s);
   if (pw_run_annotate_error (r, variation_open (x, d, error), error) == PW_OK) return x;
   pw_variation_close (x);
   return NULL;
@@ -284,15 +286,10 @@ static int variation_advance_run (pw_variation *x, double to, double t_end, pw_e
   return status;
 }
 
-/* The time that the run must reach for the next step. */
+/* The time that the run must reach before the next step of the derivatives. */
 static double variation_run_time (const pw_variation *x, double t, double t_end) {
-  double near = x->may_jump ? VARIATION_AHEAD * x->r->w->scale.time : 0;
-  return fmin (fmin (t, x->t + x->h) + near, t_end);
-}
-
-static int variation_pass (pw_variation *x, int (*pass) (pw_variation *x, pw_error *error), pw_error *error) {
-  int status = pass (x, error);
-  return status == PW_OK ? pw_variation_restart (x, error) : status;
+  double ahead = x->may_jump ? VARIATION_AHEAD * x->r->w->scale.time : 0;
+  return fmin (fmin (t, x->t + x->h) + ahead, t_end);
 }
 
 int pw_variation_advance (pw_variation *x, double t, double t_end, pw_error *error) {
@@ -301,9 +298,9 @@ int pw_variation_advance (pw_variation *x, double t, double t_end, pw_error *err
   int status = PW_OK;
   while (status == PW_OK && x->t < fmin (t, t_end)) {
     if (x->t == pw_variation_recorded_jump (x))
-      status = variation_pass (x, pw_variation_pass_jump, error);
+      status = pw_variation_pass_jump (x, error);
     else if (x->t == r->breakpoint && x->passed < x->t)
-      status = variation_pass (x, pw_variation_pass_breakpoint, error);
+      status = pw_variation_pass_breakpoint (x, error);
     else {
       status = variation_advance_run (x, variation_run_time (x, t, t_end), t_end, error);
       if (status == PW_OK && pw_run_stop_requested (r)) return PW_STOPPED;
@@ -331,7 +328,7 @@ double pw_variation_jump_slope (const pw_variation *x, int i) {
 
 /* ---- Samples ---- */
 
-/* A column as a sample; zeros without a column. */
+/* Column c as a sample; zeros if there is none. */
 static int variation_column_sample (pw_variation *x, const pw_direction_copy *d, int c, pw_sample *sample) {
   int n = x->n, m = x->m, entries = x->entries;
   const pw_variation_column *from = &d->column[c];

@@ -10,10 +10,16 @@
 #include <string.h>
 #include "variation_parts.h"
 
-/* Differences with two steps must agree to this, relative to the movement; curvature over a step is far smaller. */
+/* The breakpoints of the neighbours may deviate from a linear function of p by this part of their movement; curvature
+ * over a step is far smaller. */
 static const double BREAKPOINT_SMOOTH = 1e-3;
 
-/* The derivative of a breakpoint, or its error (c = 1); without round-off where it does not move. */
+/* The first breakpoint of a run after time t: for methods of order > 2 also the kinks of signals. */
+static double breakpoint_next (const pw_run *r, double t) {
+  return pw_next_breakpoint (r->w, r->method->order > 2, t);
+}
+
+/* The derivative of a breakpoint by p, or its error (c = 1); exactly 0 if the breakpoint does not move. */
 static double breakpoint_derivative (const pw_direction_copy *d, int c) {
   double sum = 0;
   for (int i = 0; i < PW_VARIATION_NEIGHBOURS; i++)
@@ -21,7 +27,8 @@ static double breakpoint_derivative (const pw_direction_copy *d, int c) {
   return sum;
 }
 
-/* 1 if the neighbours' breakpoints lie smoothly around the run's. */
+/* 1 if the neighbours' breakpoints lie smoothly around the run's: they surround it evenly, and the derivatives with the
+ * two steps, whose difference is 3 times the error, agree. */
 static int breakpoint_smooth (const pw_direction_copy *d, double next) {
   double most = 0, mean = 0, step = fabs (d->given.step), round = 64 * DBL_EPSILON * (1 + fabs (next));
   for (int i = 0; i < PW_VARIATION_NEIGHBOURS; i++) {
@@ -35,17 +42,15 @@ static int breakpoint_smooth (const pw_direction_copy *d, double next) {
 
 int pw_variation_look_ahead (pw_variation *x, pw_direction_copy *d, double next, pw_error *error) {
   int infinite = 0;
-  d->first = d->last = d->given.initial ? -INFINITY : d->breakpoint[0];
+  d->first = d->given.initial ? -INFINITY : d->breakpoint[0];
+  d->last = INFINITY;
   for (int i = 0; i < PW_VARIATION_NEIGHBOURS && d->given.initial == NULL; i++) {
-    pw_run *r = d->given.neighbour[i];
     d->first = fmax (d->first, d->breakpoint[i]);
-    d->breakpoint[i] = pw_next_breakpoint (r->w, r->method->order > 2, d->breakpoint[i]);
+    d->breakpoint[i] = breakpoint_next (d->given.neighbour[i], d->breakpoint[i]);
     if (isnan (d->breakpoint[i])) return pw_fail (error, PW_METHOD, "a signal has no next breakpoint");
     infinite += isinf (d->breakpoint[i]) != 0;
-  }
-  d->last = INFINITY;
-  for (int i = 0; i < PW_VARIATION_NEIGHBOURS && d->given.initial == NULL; i++)
     d->last = fmin (d->last, d->breakpoint[i]);
+  }
   if (d->given.initial || (infinite == PW_VARIATION_NEIGHBOURS && isinf (next))) return PW_OK;
   if (infinite == 0 && isfinite (next) && breakpoint_smooth (d, next)) return PW_OK;
   return pw_fail (error, PW_METHOD,
@@ -54,7 +59,7 @@ int pw_variation_look_ahead (pw_variation *x, pw_direction_copy *d, double next,
                   x->t, (int)(d - x->direction) + 1);
 }
 
-/* Velocities jump if the residual of velocity constraints does, by more than this in units of the scene. */
+/* Prescribed velocities jump if the residual of velocity constraints grows by more than this, in units of the scene. */
 static const double BREAKPOINT_VELOCITY = 1e-6;
 
 /* The residual of velocity constraints at the state evaluated. */
@@ -63,11 +68,6 @@ static double breakpoint_residual (pw_variation *x) {
   if (pw_evaluate_J_at (x->r->w, x->at, x->q, x->v) != PW_OK) return NAN;
   pw_evaluate_velocity_residual (x->r->w, x->r->active, &now);
   return now.velocity;
-}
-
-static int breakpoint_check (pw_variation *x, double before, pw_error *error) {
-  if (breakpoint_residual (x) <= 2 * before + BREAKPOINT_VELOCITY) return PW_OK;
-  return pw_fail (error, PW_METHOD, "t = %.6g s: prescribed velocities jump: the motion is not differentiable", x->t);
 }
 
 /* Accelerations at the state evaluated and, with the ledger, powers. */
@@ -93,19 +93,19 @@ int pw_variation_jump (pw_variation *x, double t, const double *state, pw_error 
     for (int j = n; j < x->size; j++) c->trial[j] += (before[j - n] - after[j - n]) * c->slope;
   }
   x->t = t;
-  return PW_OK;
+  return pw_variation_restart (x, error);
 }
 
 int pw_variation_pass_breakpoint (pw_variation *x, pw_error *error) {
-  double next = pw_next_breakpoint (x->r->w, x->r->method->order > 2, x->t), residual = breakpoint_residual (x);
+  double next = breakpoint_next (x->r, x->t), residual = breakpoint_residual (x);
   int status = PW_OK;
   PW_EACH_COLUMN (c, x) c->slope = d->given.initial ? 0 : breakpoint_derivative (d, pw_variation_column_index (c));
-  for (int i = 0; i < x->count && status == PW_OK; i++) {
-    pw_direction_copy *d = &x->direction[i];
-    status = pw_variation_look_ahead (x, d, next, error);
-  }
+  for (int i = 0; i < x->count && status == PW_OK; i++)
+    status = pw_variation_look_ahead (x, &x->direction[i], next, error);
   if (status == PW_OK) status = pw_variation_jump (x, x->t, x->point[0].x, error);
-  if (status == PW_OK) status = breakpoint_check (x, residual, error);
+  if (status == PW_OK && !(breakpoint_residual (x) <= 2 * residual + BREAKPOINT_VELOCITY))
+    status =
+        pw_fail (error, PW_METHOD, "t = %.6g s: prescribed velocities jump: the motion is not differentiable", x->t);
   if (status == PW_OK) memcpy (x->point[0].x + 2 * x->n, x->linear.a, (size_t)x->n * sizeof (double));
   x->passed = x->t;
   return status;
@@ -113,7 +113,6 @@ int pw_variation_pass_breakpoint (pw_variation *x, pw_error *error) {
 
 double pw_variation_breakpoint (const pw_variation *x, int i, double *slope) {
   const pw_direction_copy *d = &x->direction[i];
-  double next = pw_next_breakpoint (x->r->w, x->r->method->order > 2, x->t);
   *slope = d->given.initial == NULL && isfinite (d->breakpoint[0]) ? breakpoint_derivative (d, 0) : 0;
-  return next;
+  return breakpoint_next (x->r, x->t);
 }

@@ -4,7 +4,7 @@
 #include <string.h>
 #include "variation_parts.h"
 
-/* Weight of neighbour i in the difference with `step` (which = 0) or twice that. */
+/* Weight of neighbour i in the difference with `step` (which = 0) or with twice that (which = 1). */
 static double effect_weight (const pw_direction *d, int which, int i) {
   static const double central[2][PW_VARIATION_NEIGHBOURS] = { { 0, -0.5, 0.5, 0 }, { -0.25, 0, 0, 0.25 } };
   static const double one_sided[2][PW_VARIATION_NEIGHBOURS] = { { -1.5, 2, -0.5, 0 }, { -0.75, 0, 1, -0.25 } };
@@ -33,7 +33,7 @@ static void effect_add_term (const effect_difference *to, int i, double value, d
   if (to->terms) to->terms[i] += size;
 }
 
-/* The rows of a batch of a neighbour. */
+/* Adds the constraint equations of a neighbour's batch: -J^T lambda, gamma - J a, g, J v - eta. */
 static void effect_rows (pw_variation *x, const effect_difference *to, pw_element_batch *k) {
   const pw_linearisation *l = &x->linear;
   int rows = k->kind->rows, n = x->n, m = x->m;
@@ -61,6 +61,7 @@ static void effect_rows (pw_variation *x, const effect_difference *to, pw_elemen
   }
 }
 
+/* Adds the forces of a neighbour's batch. */
 static void effect_force (pw_variation *x, const effect_difference *to, pw_element_batch *k) {
   const double *f = k->block;
   k->kind->force (&k->b, k->block);
@@ -71,8 +72,7 @@ static void effect_force (pw_variation *x, const effect_difference *to, pw_eleme
     }
 }
 
-/* Adds f - M a - J^T lambda, gamma - J a; g and J v - eta of a neighbour's system at the state of the run to one of the
- * differences, without the elements that are the same in all neighbours. */
+/* Adds a neighbour's system at the state of the run, without the elements that are the same in all neighbours. */
 static void effect_add_system (pw_variation *x, const pw_direction_copy *d, const effect_difference *to,
                                pw_workspace *w) {
   const pw_system *s = w->s;
@@ -107,6 +107,7 @@ static int effect_kinematics (pw_variation *x, const pw_direction_copy *d, pw_wo
   return PW_OK;
 }
 
+/* Adds neighbour i to the two differences, in effect[0] and effect[1]. */
 static int effect_neighbour (pw_variation *x, pw_direction_copy *d, int i) {
   pw_workspace *w = d->given.neighbour[i]->w;
   if (effect_kinematics (x, d, w) != PW_OK) return PW_METHOD;
@@ -126,37 +127,35 @@ static double effect_unit (const pw_variation *x, int i) {
   return (i < x->n + x->m ? T * T : i < x->n + 2 * x->m ? 1 : T) / x->r->s->scale.length;
 }
 
-/* Effects below one unit of the scene per unit of p, or per p (about 1e5 steps) if that is smaller, count as that
- * large. */
 double pw_variation_least_effect (const pw_direction_copy *d) {
   return fmin (1, 1e-5 / fabs (d->given.step));
 }
 
-/* The two differences become the extrapolated one and its error, as in pw_direction_weight, to which round-off is
- * added. */
+/* The two differences become the extrapolated one and its error, as in pw_direction_weight, plus round-off. */
 static void effect_extrapolate (const pw_variation *x, pw_direction_copy *d) {
   double *one = d->effect[0], *two = d->effect[1], all = 0;
   double round = 4 * DBL_EPSILON * fabs (effect_weight (&d->given, 0, 1));
   for (int i = 0; i < x->n + 3 * x->m; i++) {
-    double error = (one[i] - two[i]) / 3, part = effect_unit (x, i);
+    double error = (one[i] - two[i]) / 3, per_unit = effect_unit (x, i);
     one[i] += error;
     double noise = one[i] != 0 || error != 0 ? round * d->terms[i] : 0; /* 0: no effect */
     two[i] = error + copysign (noise, error);
-    all += fabs (one[i]) * part;
-    d->effects.error += fabs (two[i]) * part;
-    d->effects.round += noise * part;
+    all += fabs (one[i]) * per_unit;
+    d->effects.error += fabs (two[i]) * per_unit;
+    d->effects.round += noise * per_unit;
   }
   d->effects.all += fmax (all, pw_variation_least_effect (d));
 }
 
-/* Relative errors of differences up to which a step is kept, and the part of them aimed at with a better one: errors
- * by round-off, and by the remainder of each difference, whose square is about that of the extrapolated one. */
+/* The step of the differences is kept while their relative error is below EFFECT_ROUND if it is round-off, else, if it
+ * is the remainder of the differences, below EFFECT_REMAINDER, whose square is about the remainder of the extrapolated
+ * one.  A better step aims at EFFECT_AIM times these. */
 static const double EFFECT_ROUND = 1e-7, EFFECT_REMAINDER = 1e-4, EFFECT_AIM = 0.1;
 
 /* With a smaller step an effect may be 0 only because the step is lost in the rounding of numbers of the order of 1. */
 static const double EFFECT_LOST = 1e-10;
 
-/* The factor of the step with which differences are accurate. */
+/* The factor for the step with which these differences would be accurate; 1 if they are. */
 static double effect_factor (const pw_difference_sums *s) {
   int rounds = s->round > 0.1 * s->error;
   double off = s->all > 0 ? s->error / s->all / (rounds ? EFFECT_ROUND : EFFECT_REMAINDER) : 0;
@@ -172,6 +171,7 @@ double pw_variation_better_step (const pw_variation *x, int i) {
   return step * (start == 1 ? effects : effects == 1 ? start : fmin (start, effects));
 }
 
+/* The effects of one direction at the state evaluated. */
 static int effect_direction (pw_variation *x, pw_direction_copy *d) {
   size_t bytes = ((size_t)x->n + 3 * (size_t)x->m) * sizeof (double);
   int status = PW_OK;
@@ -184,6 +184,7 @@ static int effect_direction (pw_variation *x, pw_direction_copy *d) {
   return status;
 }
 
+/* Not counted in the statistics of the run. */
 int pw_variation_evaluate (pw_variation *x, double t, pw_error *error) {
   pw_statistics before = x->r->statistics;
   int near = x->r->near_singular, status = pw_linear_evaluate (&x->linear, t, x->q, x->v);

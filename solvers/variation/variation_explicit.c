@@ -8,11 +8,10 @@
 /* Adds h sum weight_k K_k to `out`: entries from `first` to `end` - 1. */
 static void explicit_combine (const pw_variation_column *c, const double *weight, int count, double h, int first,
                               int end, double *out) {
-  for (int k = 0; k < count; k++)
-    for (int j = first; j < end; j++) out[j] += h * weight[k] * c->K[k][j];
+  for (int k = 0; k < count; k++) pw_variation_add (out + first, c->K[k] + first, h * weight[k], end - first);
 }
 
-/* The derivatives of every column after `count` stages into `trial`. */
+/* `trial` = Y + h sum weight_k K_k of every column, over `count` stages. */
 static void explicit_stage (pw_variation *x, const double *weight, int count, double h) {
   PW_EACH_COLUMN (c, x) {
     memcpy (c->trial, c->Y, (size_t)x->size * sizeof *c->Y);
@@ -30,15 +29,13 @@ int pw_variation_explicit_stages (pw_variation *x, double h, double t1, pw_error
     if (status == PW_OK) status = pw_variation_time_derivatives (x, k, error);
   }
   if (status != PW_OK) return status;
-  explicit_stage (x, b->b, b->stages, h); /* at the state of the last stage */
+  explicit_stage (x, b->b, b->stages, h); /* the last stage has evaluated the state at t1 */
   PW_EACH_COLUMN (c, x) pw_variation_project (x, c);
   memset (x->motion_error, 0, (size_t)x->n * sizeof *x->motion_error);
   for (int k = 0; k < PW_VARIATION_RATES; k++) {
     const double *a = k < b->stages ? x->a[k] : x->linear.a;
-    for (int j = 0; j < x->n; j++) {
-      x->motion_error[j] += h * b->e[k] * a[j];
-      if (k < b->stages) x->motion_defect[j] += h * b->b[k] * a[j];
-    }
+    pw_variation_add (x->motion_error, a, h * b->e[k], x->n);
+    if (k < b->stages) pw_variation_add (x->motion_defect, a, h * b->b[k], x->n);
   }
   return PW_OK;
 }
@@ -50,7 +47,8 @@ void pw_variation_explicit_errors (pw_variation *x, double h, int first, int end
   }
 }
 
-/* The last two stages, both at the end of the step, approach each other at the rate of the fastest component. */
+/* |F_new - F_last| / |Y_new - Y_last| of the result of the step and its last stage, both at its end, is about the rate
+ * of the fastest component (Hairer & Wanner 1996, section IV.2). */
 double pw_variation_stiffness (const pw_variation *x, double h) {
   const pw_tableau *b = &pw_erk5_tableau;
   const double *row = b->A + (b->stages - 1) * (b->stages - 2) / 2;

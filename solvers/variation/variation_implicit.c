@@ -22,17 +22,18 @@
 #include "util.h"
 #include "variation_parts.h"
 
-enum { STAGES = PW_VARIATION_STAGES, RATE = 1, STATE = RATE + STAGES }; /* F_i in K[RATE + i], Y_i in K[STATE + i] */
+/* At stage i, F_i is in K[RATE + i], Y_i in K[STATE + i]; F at the beginning of the step is in K[0]. */
+enum { STAGES = PW_VARIATION_STAGES, RATE = 1, STATE = RATE + STAGES };
 
 struct pw_variation_implicit {
-  int size;          /* minimal coordinates */
+  int size;          /* number of minimal coordinates */
   double *N[STAGES]; /* size x 2n: N_i, a row for each coordinate */
   double *A[STAGES]; /* size x 2n: A_i */
   double *D[STAGES]; /* size x n: N_i^+; of dq for coordinates of position, of dv for those of velocity */
   double *matrix;    /* 3 size x 3 size, by columns */
   double *filter;    /* size x size, by columns: gamma/h - N_3^+ A_3 */
-  double *z;         /* 3 size for each column of pw_variation */
-  lapack_int *pivot; /* 3 size, then size of the filter */
+  double *z;         /* 3 size for each column: z_i of all stages */
+  lapack_int *pivot; /* 3 size of `matrix`, then size of `filter` */
   char *memory;
 };
 
@@ -61,16 +62,10 @@ void pw_variation_implicit_close (pw_variation_implicit *p) {
   free (p);
 }
 
-static double implicit_dot (const double *a, const double *b, int n) {
-  double sum = 0;
-  for (int j = 0; j < n; j++) sum += a[j] * b[j];
-  return sum;
-}
-
 /* ---- Stages ---- */
 
-/* N_i, A_i, N_i^+ of minimal coordinate c at the state evaluated. */
-static void implicit_direction (pw_variation *x, int i, int c) {
+/* N_i, A_i, N_i^+ of minimal coordinate c at the state evaluated; N_i^+ is the transpose of the orthonormal bases. */
+static void implicit_tangent (pw_variation *x, int i, int c) {
   pw_linearisation *l = &x->linear;
   pw_variation_implicit *p = x->implicit;
   size_t n = (size_t)x->n, row = (size_t)c * n, half = n * sizeof (double);
@@ -109,7 +104,7 @@ static int implicit_stage (pw_variation *x, int i, double h, double t1, pw_error
   pw_variation_accelerate (x, 0, RATE + i);
   pw_variation_accelerate (x, 1, RATE + i);
   pw_linear_bases (&x->linear);
-  for (int c = 0; c < x->linear.size; c++) implicit_direction (x, i, c);
+  for (int c = 0; c < x->linear.size; c++) implicit_tangent (x, i, c);
   return PW_OK;
 }
 
@@ -117,13 +112,14 @@ static int implicit_stage (pw_variation *x, int i, double h, double t1, pw_error
 
 /* z = N_i^+ vector */
 static void implicit_coordinates (const pw_variation *x, int i, const double *vector, double *z) {
-  int n = x->n, positions = x->linear.positions;
   const double *D = x->implicit->D[i];
-  for (int k = 0; k < x->implicit->size; k++, D += n) z[k] = implicit_dot (D, k < positions ? vector : vector + n, n);
+  for (int k = 0; k < x->implicit->size; k++) {
+    z[k] = 0;
+    for (int j = k < x->linear.positions ? 0 : x->n, end = j + x->n; j < end; j++) z[k] += *D++ * vector[j];
+  }
 }
 
-/* Factorises the matrix of the z_i and the filter.  A singular one gives derivatives that are not
- * finite, and the step is repeated. */
+/* Factorises the matrix of the z_i and the filter.  If one is singular, errors are not finite: the step is rejected. */
 static void implicit_factor (pw_variation *x, double h) {
   pw_variation_implicit *p = x->implicit;
   int size = p->size, rows = STAGES * size;
@@ -167,22 +163,21 @@ static void implicit_solve (pw_variation *x, double h) {
       pw_variation_add (c->K[STATE + i], p->N[i] + (size_t)k * (size_t)length, *z, length);
 }
 
-/* Powers at the stages. */
+/* F_i and Y_i of work and losses, for which the stages Y_i of dq and dv must be known. */
 static int implicit_powers (pw_variation *x, double h, double t1, pw_error *error) {
+  int from = 2 * x->n, length = x->size - from;
   for (int i = 0; x->ledger && i < STAGES; i++) {
     int status = pw_variation_evaluate_at (x, i + 1 < STAGES ? x->t + radau_c[i] * h : t1, error);
     if (status != PW_OK) return status;
-    PW_EACH_COLUMN (c, x) memcpy (c->trial, c->K[STATE + i], 2 * (size_t)x->n * sizeof *c->trial);
-    pw_variation_accelerate (x, 0, RATE + i);
-    pw_variation_accelerate (x, 1, RATE + i);
-    if (pw_variation_ledger_rates (x, RATE + i) != PW_OK) return pw_fail_signal (x->at, error);
+    PW_EACH_COLUMN (c, x) memcpy (c->trial, c->K[STATE + i], (size_t)from * sizeof *c->trial);
+    status = pw_variation_time_derivatives (x, RATE + i, error);
+    if (status != PW_OK) return status;
   }
-  PW_EACH_COLUMN (c, x) {
-    for (int i = 0; i < STAGES; i++)
-      for (int j = 2 * x->n; j < x->size; j++) {
-        c->K[STATE + i][j] = c->Y[j];
-        for (int k = 0; k < STAGES; k++) c->K[STATE + i][j] += h * radau_A[i][k] * c->K[RATE + k][j];
-      }
+  PW_EACH_COLUMN (c, x)
+  for (int i = 0; i < STAGES; i++) {
+    memcpy (c->K[STATE + i] + from, c->Y + from, (size_t)length * sizeof *c->Y);
+    for (int k = 0; k < STAGES; k++)
+      pw_variation_add (c->K[STATE + i] + from, c->K[RATE + k] + from, h * radau_A[i][k], length);
   }
   return PW_OK;
 }
@@ -199,7 +194,7 @@ static void implicit_filter (pw_variation *x, double *e) {
   for (int k = 0; k < size; k++) pw_variation_add (e, p->N[2] + (size_t)k * (size_t)length, p->z[k], length);
 }
 
-/* The errors of the derivatives. */
+/* The errors of the derivatives; those of work and losses need no filter, since their A_i is 0. */
 static void implicit_errors (pw_variation *x, double h) {
   for (pw_direction_copy *d = x->direction; d < x->direction + x->count; d++) {
     const pw_variation_column *c = d->column;
@@ -211,7 +206,8 @@ static void implicit_errors (pw_variation *x, double h) {
   }
 }
 
-/* Estimates the error of the run's velocities likewise, into `motion_error`; filters `motion_defect`. */
+/* The same estimate for the run's velocities, into `motion_error`; adds the integral of the accelerations to
+ * `motion_defect`, and filters it. */
 static void implicit_motion (pw_variation *x, double h) {
   int n = x->n;
   double *e = x->values, *defect = e + 2 * n;

@@ -1,24 +1,24 @@
-/* Jumps of the accelerations at a state, such as those of sign (vx).
+/* Jumps of the accelerations at a surface in the space of states, such as vx = 0 of a force sign (vx).
  *
- * With the surface s (y, t, p) = 0 in the space of states, where y' jumps from y'- to y'+, derivatives jump by
+ * Where the motion crosses the surface s (y, t, p) = 0, y = (q, v), and y' jumps from y'- to y'+, derivatives jump by
  *
  *     dy+ = dy- + (y'- - y'+) dt_s/dp
  *
  * as at breakpoints (variation_breakpoint.c), with the time t_s at which the motion meets the surface (Aizerman &
- * Gantmakher 1958; Leine & Nijmeijer 2004).  Neither the surface nor its gradient is known; bisection finds t_s of the
- * run, and that of motions nearby, y + step dy + (t - t_s) y'-, by the accelerations, which are nearer to one or to the
- * other of the two sides: motions of the neighbouring systems, and of the run's own from a state nearby. */
+ * Gantmakher 1958; Leine & Nijmeijer 2004).  Neither the surface nor its gradient is known.  Bisection finds t_s of the
+ * run, and of motions nearby, y + step dy + (t - t_s) y'-, with the equations of the run or of its neighbours: the
+ * accelerations are nearer to those of one side or of the other. */
 #include <math.h>
 #include <string.h>
 #include "variation_parts.h"
 
 enum { JUMP_MANY = 8 }; /* jumps in one step of a run: more are chatter */
 
-/* The difference below which times count as equal, in units of the scene. */
+/* The interval of time at which bisection ends, in units of the scene. */
 static const double JUMP_ZERO = 1e-20;
 
-/* A jump: between equal times, accelerations change by at least this part of their change in the interval
- * that was searched, and by JUMP_LEAST in units of the scene. */
+/* Accelerations jump if they change over the last interval of the bisection by more than JUMP_PART of their largest
+ * change over an interval before, and by more than JUMP_LEAST in units of the scene. */
 static const double JUMP_PART = 0.25, JUMP_LEAST = 1e-6;
 
 /* An interval is searched if accelerations at its middle differ from the mean of those at its ends by more than this
@@ -45,14 +45,18 @@ static int jump_state (pw_variation *x, double t, double *state, pw_error *error
   return pw_variation_accelerations (x, t, state, state + n, state + 2 * n, error);
 }
 
+static void jump_replace (pw_variation *x, int i, double t, const double *state) {
+  x->point[i].t = t;
+  memcpy (x->point[i].x, state, 3 * (size_t)x->n * sizeof *state);
+}
+
 /* Inserts a state between points i and i + 1. */
 static int jump_insert (pw_variation *x, int i, double t, const double *state, pw_error *error) {
   if (pw_variation_add_point (x, error) != PW_OK) return PW_RESOURCE;
   pw_variation_point p = x->point[x->points - 1];
-  p.t = t;
-  memcpy (p.x, state, 3 * (size_t)x->n * sizeof *state);
   memmove (x->point + i + 2, x->point + i + 1, (size_t)(x->points - i - 2) * sizeof p);
   x->point[i + 1] = p;
+  jump_replace (x, i + 1, t, state);
   return PW_OK;
 }
 
@@ -76,21 +80,15 @@ static int jump_bisect (pw_variation *x, double *t0, double *t1, double *left, d
   return PW_OK;
 }
 
-/* *suspected: 1 if accelerations between points i and i + 1 may jump, since they are not linear.  state: scratch, 3
- * n. */
+/* *suspected: 1 if accelerations between points i and i + 1 may jump: they are not linear in time.  state: 3 n */
 static int jump_suspected (pw_variation *x, int i, double *state, int *suspected, pw_error *error) {
   const double *left = x->point[i].x + 2 * x->n, *right = x->point[i + 1].x + 2 * x->n;
   double t = x->point[i].t + (x->point[i + 1].t - x->point[i].t) / 2, *a = state + 2 * x->n;
   int status = jump_state (x, t, state, error);
   double most = fmax (jump_distance (x, left, a), jump_distance (x, a, right));
-  for (int j = 0; j < x->n; j++) a[j] -= left[j] / 2, state[j] = right[j] / 2;
+  for (int j = 0; j < x->n; j++) a[j] -= left[j] / 2, state[j] = right[j] / 2; /* the distance from the mean */
   *suspected = jump_distance (x, a, state) > fmax (JUMP_LEAST, JUMP_BEND * most);
   return status;
-}
-
-static void jump_replace (pw_variation *x, int i, double t, const double *state) {
-  x->point[i].t = t;
-  memcpy (x->point[i].x, state, 3 * (size_t)x->n * sizeof *state);
 }
 
 /* Extends a recorded jump by one that adjoins it: a state may lie on the surface, where sign (0) = 0. */
@@ -104,6 +102,7 @@ static int jump_extend (pw_variation *x, int i, double t0, double t1, const doub
   return 1;
 }
 
+/* *found: 1 if a jump between points i and i + 1 has been found and recorded, with the states on both sides. */
 static int jump_find (pw_variation *x, int i, int *found, pw_error *error) {
   double t0 = x->point[i].t, t1 = x->point[i + 1].t, *left = x->values, *right = left + 3 * x->n;
   int status = jump_suspected (x, i, left, found, error);
@@ -147,18 +146,17 @@ double pw_variation_recorded_jump (const pw_variation *x) {
 /* ---- Derivatives of their times ---- */
 
 static int jump_fail (double t, pw_error *error) {
-  return pw_fail (
-      error, PW_METHOD,
-      "t = %.6g s: the motion touches, slides along, or starts at states where accelerations jump: it is not "
-      "differentiable",
-      t);
+  return pw_fail (error, PW_METHOD,
+                  "t = %.6g s: the motion touches, slides along, or starts at states where accelerations jump: "
+                  "it is not differentiable",
+                  t);
 }
 
 /* A motion near that of the run, y + step dy + (t - t_s) y'-. */
 typedef struct {
   pw_variation *x;
-  pw_run *r;                    /* whose equations give its accelerations: the run's, or those of a neighbouring run */
-  double t, t_after;            /* t_s, and the time after it */
+  pw_run *r;                    /* its equations: those of the run or of a neighbouring one */
+  double t, t_after;            /* t_s, and the recorded time after it */
   const double *before, *after; /* q, v, a of the run at t_s, on both sides */
   const double *dy;
   double step;
@@ -221,7 +219,7 @@ static double jump_along (const pw_variation_column *c, jump_neighbour k) {
   return (later - jump_time (&k)) / (2 * step);
 }
 
-/* The derivative of t_s, or its error: that of the state, as it changes t_s, and that of the differences. */
+/* The derivative of t_s, or its error, the sum of those due to the state's error and to the differences' one. */
 static double jump_slope (const pw_variation_column *c, jump_neighbour k) {
   const pw_direction *d = &c->direction->given;
   int index = pw_variation_column_index (c);
@@ -246,12 +244,11 @@ static int jump_leaves (jump_neighbour k) {
   return jump_side (&k, k.step, &side) == PW_OK && side;
 }
 
-/* 1 if the motion has come from another state, where accelerations were those before the jump, instead of starting at
- * it. */
+/* 1 if the motion has not started at the jump: at an earlier state, accelerations are those before the jump. */
 static int jump_arrives (jump_neighbour k) {
   int n = k.x->n, side;
   double delay = -JUMP_NEAR * k.x->r->w->scale.time, *a = jump_scratch_a (k.x);
-  k.dy = k.before; /* any, since step is 0 */
+  k.dy = k.before; /* without effect: step is 0 */
   return jump_side (&k, delay, &side) == PW_OK &&
          jump_distance (k.x, a, k.before + 2 * n) < JUMP_PART * jump_distance (k.x, k.before + 2 * n, k.after + 2 * n);
 }
@@ -266,7 +263,7 @@ static double jump_width (pw_variation *x, jump_neighbour k) {
     k.dy = c->Y, k.step = sign * pw_variation_step_along (c);
     most = pw_larger_or_nan (most, fabs (jump_time (&k)));
   }
-  k.dy = k.before, k.step = 0; /* any, since step is 0 */
+  k.dy = k.before, k.step = 0; /* dy is without effect */
   for (pw_direction_copy *d = x->direction; d < x->direction + x->count; d++)
     for (int i = 0; i < PW_VARIATION_NEIGHBOURS && d->given.initial == NULL; i++) {
       k.r = d->given.neighbour[i];
@@ -275,7 +272,7 @@ static double jump_width (pw_variation *x, jump_neighbour k) {
   return most;
 }
 
-/* The state at t_side + delay, with the velocities and accelerations of one side of the jump, whose time is t_side. */
+/* Holds the state at t_side + delay, linearly from that at t_side, on one side of the jump. */
 static void jump_hold (pw_variation_hold *h, const double *state, double t_side, double delay, int n) {
   for (int j = 0; j < 2 * n; j++) h->state[j] = state[j] + delay * state[n + j];
   h->t = t_side + delay;

@@ -1,5 +1,4 @@
-/* Derivatives of energies, powers and multipliers along a column: exact, or by differences along the derivative of the
- * state. */
+/* Derivatives of energies, powers and multipliers along a column: exact, or by differences along that of the state. */
 #include <float.h>
 #include <math.h>
 #include <string.h>
@@ -22,8 +21,8 @@ static double output_kinetic (const pw_variation *x, const pw_variation_column *
   return sum;
 }
 
-/* The sum over the elements of their potential energies minus those at the state evaluated, which are close: the
- * energies of elements on which a derivative does not depend must not contribute round-off. */
+/* The potential energy minus that at the state evaluated, summed by element: elements whose energy does not change must
+ * not contribute round-off. */
 static double output_potential (pw_variation *x, pw_workspace *w) {
   double sum = 0;
   pw_evaluate_energies (w, x->element_energy + x->elements);
@@ -31,7 +30,7 @@ static double output_potential (pw_variation *x, pw_workspace *w) {
   return sum;
 }
 
-/* Round-off of a difference of the energies that have changed between the state evaluated and the one last used. */
+/* Round-off of the last output_potential: of the energies that were not those at the state evaluated. */
 static double output_round (const pw_variation *x) {
   double sum = 0;
   for (int i = 0; i < x->elements; i++)
@@ -41,7 +40,7 @@ static double output_round (const pw_variation *x) {
 
 /* ---- All outputs ---- */
 
-/* The values at a state of a run, without the kinetic energy. */
+/* The outputs at a state of a run, into x->values, in the order of pw_variation_outputs; 0 for the kinetic energy. */
 static int output_values (pw_variation *x, pw_run *r, double t, const double *q, const double *v,
                           const double *lambda) {
   double *out = x->values;
@@ -59,7 +58,7 @@ double pw_variation_step_along (const pw_variation_column *c) {
   return 1e-5 / (c->largest > 0 ? c->largest : 1);
 }
 
-/* Adds the part that is due to the derivative Y of the state, by central differences along it. */
+/* Adds the effect of the derivative Y of the state, by central differences along Y. */
 static int output_by_state (pw_variation *x, const pw_variation_column *c, pw_variation_place at, const double *Y,
                             double *out) {
   int n = x->n, m = x->m, status = PW_OK;

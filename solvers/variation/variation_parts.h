@@ -1,5 +1,5 @@
-/* Derivatives of a run in progress; for variation*.c only.  Equations in variation.c.  n coordinates, m constraint
- * equations. */
+/* Derivatives of a run in progress; for variation*.c only.  Equations in variation.c.  Comments of arrays begin with
+ * their lengths: n coordinates, m constraint equations, `entries` of the ledger. */
 #ifndef PW_VARIATION_H
 #define PW_VARIATION_H
 
@@ -8,7 +8,7 @@
 enum {
   PW_VARIATION_NEIGHBOURS = 4, /* neighbouring runs of a direction */
   PW_VARIATION_STAGES = 3,     /* of an implicit step */
-  PW_VARIATION_RATES = 7,      /* stages of a step, and the derivative at its end */
+  PW_VARIATION_RATES = 7,      /* stages of an explicit step, and the time derivative at its end */
   PW_VARIATION_POINTS = 256,   /* most states of the run between the derivatives' time and its own */
   PW_VARIATION_DENSE = 100     /* most coordinates for implicit steps, which need dense matrices */
 };
@@ -20,25 +20,25 @@ typedef struct {
   double *K[PW_VARIATION_RATES]; /* size: time derivatives of Y at the stages; implicit steps: F_i, then Y_i */
   double *lambda;                /* m: d lambda at the state last evaluated */
   double *trial;                 /* size: Y at a stage, or at the end of a step */
-  double slope;                  /* derivative of the breakpoint being passed */
+  double slope;                  /* derivative of the time of the breakpoint or jump being passed */
   double largest;                /* norm of Y so far, in units of the scene */
   double energy;                 /* largest derivative of work and losses so far */
 } pw_variation_column;
 
-/* Sums of the magnitudes, in units of the scene, of differences, of their errors, and of the round-off in these. */
+/* Sums of magnitudes, in units of the scene: of differences, of their errors, and of the round-off in the errors. */
 typedef struct {
   double all, error, round;
 } pw_difference_sums;
 
 typedef struct pw_direction_copy {
   pw_direction given;
-  int columns; /* 2, or 1 with `no_error` */
-  pw_variation_column column[2];
-  double breakpoint[PW_VARIATION_NEIGHBOURS]; /* of the neighbours: the next one */
+  int columns;                                /* 2, or 1 with `no_error` */
+  pw_variation_column column[2];              /* the derivative, its error */
+  double breakpoint[PW_VARIATION_NEIGHBOURS]; /* the next one of each neighbour */
   double first, last;                         /* times between which no neighbour has a breakpoint */
-  /* of each column, n + 3 m: derivatives of f - M a - J^T lambda, gamma - J a, g, J v - eta by the parameter */
+  /* of each column, n + 3 m: d/dp of f - M a - J^T lambda, gamma - J a, g, J v - eta */
   double *effect[2];
-  double *terms;                     /* n + 3 m: magnitudes of the terms of these differences */
+  double *terms;                     /* n + 3 m: magnitudes of the terms of which these are differences */
   pw_difference_sums start, effects; /* of the initial state; of the effects at all evaluations */
   double *local_error;               /* size: error of the derivative in the last step */
   int signals;                       /* 1: some signals differ in the neighbours */
@@ -47,50 +47,48 @@ typedef struct pw_direction_copy {
   char *memory;
 } pw_direction_copy;
 
-/* A state of the run: t, q, v, a. */
+/* A state of the run. */
 typedef struct {
-  double t, *x; /* 3 n */
-  int jumps;    /* 1: accelerations jump between this state and the next one, at the same time but for round-off */
+  double t, *x; /* 3 n: q, v, a */
+  int jumps;    /* 1: accelerations jump between this state and the next one, at the same time up to round-off */
 } pw_variation_point;
 
-/* Times on one side of a jump at which neighbours of the state of the run may be on the other side.  They are
- * evaluated near the state of another time instead; the interval is so short that this changes their effect by
- * round-off. */
+/* Times [from, to] on one side of a jump at which motions nearby may be on the other side.  Neighbours are evaluated at
+ * the held time t and state instead; the interval is so short that their effects change by round-off. */
 typedef struct {
   double from, to;
-  double t, *state; /* q, v */
+  double t, *state; /* 2 n: q, v */
 } pw_variation_hold;
 
 struct pw_variation {
   pw_run *r;
-  int n, m, entries, size, count; /* size: 2 n + entries; count: directions */
-  int ledger;
+  int n, m, entries, size, count;         /* size: of Y; count: number of directions */
+  int ledger;                             /* 1: with derivatives of work and losses */
   pw_direction_copy *direction;           /* count */
   pw_linearisation linear;                /* at the state last evaluated */
-  double t;                               /* of the derivatives */
+  double t;                               /* time reached by the derivatives */
   double at;                              /* time of the state last evaluated */
-  double h;                               /* next step [s] */
-  double last_error;                      /* of the last accepted step, relative */
-  int stiff;                              /* number of steps whose size stability limited */
+  double h;                               /* size of the next step [s] */
+  double last_error;                      /* relative error of the last accepted step */
+  int stiff;                              /* steps whose size stability limited, minus others; >= 0 */
   struct pw_variation_implicit *implicit; /* implicit steps; NULL: explicit ones */
   double *q, *v;                          /* n + 3: the state last evaluated */
   double *a[PW_VARIATION_RATES];          /* n: accelerations of the run at the stages */
-  /* n: errors of the run's velocities in the last step: the estimate of the method, and the difference from the run's
-   * own */
+  /* n: of velocities in the last step: the error of the method, the difference from the change of the run's own */
   double *motion_error, *motion_defect;
-  double speed;             /* largest velocity of the run so far, in units of the scene */
-  double reversal;          /* change of a velocity over which a force reverses, at most 1, in units of the scene */
-  double *scratch, *output; /* k = 3 n + 4 m + entries + 9 each; results of pw_variation_outputs */
-  double *values;           /* 2 k: scratch */
-  int elements;
-  double *element_energy; /* 2 elements: potential energies at two states */
-  double *sample[2];      /* 3 n + m + entries: results */
-  int may_jump;           /* 1: accelerations may jump with the state */
-  double begun;           /* the beginning of the run's last step */
-  int points, room;
-  pw_variation_point *point; /* room: states of the run from t on */
+  double speed;              /* largest velocity of the run so far, in units of the scene */
+  double reversal;           /* change of a velocity over which a force reverses, at most 1, in units of the scene */
+  double *scratch, *output;  /* k = 3 n + 4 m + entries + 9 each; `output`: of pw_variation_outputs */
+  double *values;            /* 2 k: scratch */
+  int elements;              /* number of elements */
+  double *element_energy;    /* 2 elements: potential energies at the state evaluated, and at another one */
+  double *sample[2];         /* 3 n + m + entries: of the last sample; its error */
+  int may_jump;              /* 1: accelerations may jump with the state */
+  double begun;              /* the beginning of the run's last step */
+  int points, room;          /* recorded states, allocated ones */
+  pw_variation_point *point; /* room: states of the run from t on, in the order of time */
   double passed;             /* the last breakpoint that the derivatives have passed */
-  pw_variation_hold hold[2]; /* before the next jump, after the last one */
+  pw_variation_hold hold[2]; /* just before and just after the jump approached last */
   char *memory;
 };
 
@@ -102,9 +100,10 @@ struct pw_variation {
 typedef struct {
   double t;
   const double *q, *v;
-  int held; /* 1: not those of the run */
+  int held; /* 1: time and state of a pw_variation_hold */
 } pw_variation_place;
 
+/* to += weight * from */
 static inline void pw_variation_add (double *restrict to, const double *restrict from, double weight, int n) {
   for (int i = 0; i < n; i++) to[i] += weight * from[i];
 }
@@ -116,14 +115,14 @@ int pw_variation_append (pw_variation *x, double t, pw_error *error);
 /* Inserts states between point i and the last one, in the last step of a run that adapts its steps, until
  * interpolation is as good as a tenth of its tolerance.  A status. */
 int pw_variation_refine (pw_variation *x, int i, pw_error *error);
-/* A new last point, without a state. */
+/* Adds a last point, whose state the caller stores.  PW_OK or PW_RESOURCE. */
 int pw_variation_add_point (pw_variation *x, pw_error *error);
-/* Accelerations of the run's equations at a state; just before a breakpoint.  A status. */
+/* Accelerations by the run's equations at a state; at a breakpoint, those before it.  A status. */
 int pw_variation_accelerations (pw_variation *x, double t, const double *q, const double *v, double *a,
                                 pw_error *error);
-/* Discards states before t. */
+/* Discards the states that precede the last one up to x->t. */
 void pw_variation_discard_points (pw_variation *x);
-/* The state at a time, q and v, by Hermite interpolation. */
+/* The state (q, v) of the run at a time, by Hermite interpolation between recorded ones; 2 n numbers. */
 void pw_variation_state (const pw_variation *x, double t, double *out);
 
 /* ---- variation_effect.c ---- */
@@ -138,36 +137,38 @@ double pw_variation_norm (const pw_variation *x, const double *Y);
 void pw_variation_accelerate (pw_variation *x, int c, int k);
 /* Projects a column's `trial` onto the linearised constraints at the state evaluated. */
 void pw_variation_project (pw_variation *x, pw_variation_column *c);
-/* Where to evaluate neighbours: at the state evaluated, at a time between their breakpoints, one of which they may
- * pass slightly before the run; near a jump, at the state held. */
+/* Where to evaluate neighbours: at the state evaluated, and a time between d->first and d->last, since their
+ * breakpoints differ slightly from the run's; near a jump, at the held time and state. */
 pw_variation_place pw_variation_place_of (const pw_variation *x, const pw_direction_copy *d);
 
-/* The least effect of a unit of p that counts, in units of the scene. */
+/* Smaller effects of p count as this large: 1 or, for p > 1, 1/p, in units of the scene per unit of p; a step of the
+ * differences is about 1e-5 p. */
 double pw_variation_least_effect (const pw_direction_copy *d);
 
 /* ---- variation_outputs.c ---- */
 
 /* The step of differences along a column: the state changes by at most 1e-5 in units of the scene. */
 double pw_variation_step_along (const pw_variation_column *c);
-/* Derivatives of kinetic and potential energy, the ledger's rates, least-norm multipliers along a column: 2 + entries
- * + m numbers.  Non-zero if a signal fails. */
+/* Derivatives of kinetic and potential energy, the ledger's rates, multipliers (of least norm) along a column whose
+ * state is Y: 2 + entries + m numbers.  Non-zero if a signal fails. */
 int pw_variation_outputs (pw_variation *x, const pw_variation_column *c, const double *Y, double *out);
-/* Time derivatives of the columns' ledgers into K[k].  Non-zero if a signal fails. */
+/* Time derivatives of the work and losses of every column at its `trial`, into K[k].  Non-zero if a signal fails. */
 int pw_variation_ledger_rates (pw_variation *x, int k);
-/* All time derivatives into K[k]; accelerations of the run into a[k].  A status. */
+/* All time derivatives of every column at its `trial`, into K[k]; accelerations of the run into a[k].  A status. */
 int pw_variation_time_derivatives (pw_variation *x, int k, pw_error *error);
 
 /* ---- variation_step.c ---- */
 
-/* Makes every column's `trial`, projected, its derivatives at the state evaluated. */
+/* Continues from `trial` of every column, projected, at the state evaluated.  A status. */
 int pw_variation_restart (pw_variation *x, pw_error *error);
-/* Tries a step that does not pass t1 or the state that the run has reached; the next one is smaller if it fails. */
+/* Tries a step that passes neither t1 nor the time that the run has reached.  If its error is too large, the next call
+ * tries a smaller one.  A status. */
 int pw_variation_step (pw_variation *x, double t1, pw_error *error);
 
 /* ---- variation_explicit.c ---- */
 
-/* The columns after a step from x->t to t1 = x->t + h into `trial`, with the state there evaluated; `motion_error`;
- * adds the integral of accelerations to `motion_defect`. */
+/* Computes the columns after a step from x->t to t1 = x->t + h into `trial`, evaluates the state there, estimates
+ * `motion_error` and adds the integral of the accelerations to `motion_defect`.  A status. */
 int pw_variation_explicit_stages (pw_variation *x, double h, double t1, pw_error *error);
 /* Entries from `first` to `end` - 1 of `local_error`, when the last time derivatives are known. */
 void pw_variation_explicit_errors (pw_variation *x, double h, int first, int end);
@@ -190,23 +191,23 @@ static inline int pw_variation_column_index (const pw_variation_column *c) {
   return (int)(c - c->direction->column);
 }
 
-/* Finds the neighbours' breakpoints that correspond to the next one of the run. */
+/* Finds the neighbours' breakpoints that correspond to `next`, the next one of the run.  PW_METHOD if they do not. */
 int pw_variation_look_ahead (pw_variation *x, pw_direction_copy *d, double next, pw_error *error);
-/* Passes the breakpoint at which run and derivatives have arrived. */
+/* Passes the breakpoint at which run and derivatives have arrived.  A status. */
 int pw_variation_pass_breakpoint (pw_variation *x, pw_error *error);
-/* To the state q, v at time t, at which accelerations jump from those at the state evaluated: `trial` becomes every
- * column after the jump, whose time has the derivative `slope`. */
+/* Passes a jump of the accelerations, from those at the state evaluated to those at `state` (q, v) and time t:
+ * evaluates the latter and continues there, with the derivative `slope` of the time of the jump.  A status. */
 int pw_variation_jump (pw_variation *x, double t, const double *state, pw_error *error);
 
 /* ---- variation_jump.c ---- */
 
-/* Finds jumps between the points from `first` on, and inserts the states on both sides.  A status. */
+/* Finds jumps between the points from `first` on, and records the states on both sides of each.  A status. */
 int pw_variation_find_jumps (pw_variation *x, int first, pw_error *error);
 /* The time of the first of these jumps that has not been passed, or INFINITY. */
 double pw_variation_recorded_jump (const pw_variation *x);
-/* Prepares the steps up to the first of these jumps. */
+/* Determines the times around the first of these jumps at which neighbours are held.  A status. */
 int pw_variation_approach_jump (pw_variation *x, pw_error *error);
-/* Passes the jump at which the derivatives have arrived. */
+/* Passes the jump at which the derivatives have arrived.  A status. */
 int pw_variation_pass_jump (pw_variation *x, pw_error *error);
 
 #endif

@@ -4,11 +4,12 @@
 #include <string.h>
 #include "variation_parts.h"
 
-enum { PATH_DEPTH = 6 }; /* of bisection */
+/* The shortest interval that is bisected, as a part of the run's step: 1/32 is, 1/64 is not. */
+static const double PATH_SHORTEST = 1. / 50;
 
-/* Hermite interpolation between two points, t_0 + u h: q of degree 5 from q, v, a at both ends.  v is its derivative
- * for a run with fixed steps.  Otherwise the errors of a run in q and v may differ, and v is of degree 3 from v and a;
- * the points are dense enough. */
+/* Hermite interpolation between two points, at t = t_0 + u h: q of degree 5 from q, v, a at both ends.  In a run with
+ * fixed steps v is the derivative of q.  Otherwise the errors of q and v may differ, and v is of degree 3 from v and a
+ * at both ends; the points are dense enough. */
 static void path_interpolate (const pw_variation *x, const pw_variation_point *p, double t, double *out) {
   int n = x->n, fixed = pw_fixed_steps (x->r);
   double h = p[1].t - p[0].t, u = (t - p[0].t) / h, up = u * u * (3 - 2 * u), w = u * (1 - u);
@@ -74,8 +75,8 @@ int pw_variation_accelerations (pw_variation *x, double t, const double *q, cons
 /* Part of the run's step over which its velocities are differentiated. */
 static const double PATH_PART = 1e-3;
 
-/* Accelerations of a point in the run's last step, of size h, as the derivative of its dense output: in stiff motions
- * those of the equations magnify the errors of the states. */
+/* Accelerations of a point in the run's last step, of size h, by differences of its dense output, central or at the end
+ * of the step backward: in stiff motions those by the equations magnify the errors of the states. */
 static int path_differentiate (pw_variation *x, const pw_variation_point *p, double h, pw_error *error) {
   double d = PATH_PART * h, *a = p->x + 2 * x->n;
   int inside = p->t + d <= x->r->t, status = PW_OK;
@@ -118,11 +119,11 @@ static int path_is_accurate (const pw_variation *x, int i) {
   return 1;
 }
 
-/* Inserts states between points i and i + 1 until interpolation is good, which is tested at the midpoint; that is
- * kept. */
-static int path_refine (pw_variation *x, int i, int depth, pw_error *error) {
+/* Inserts the state at the midpoint; if interpolation was not accurate there, does so in both halves, too. */
+int pw_variation_refine (pw_variation *x, int i, pw_error *error) {
   double t0 = x->point[i].t, t1 = x->point[i + 1].t, middle = t0 + (t1 - t0) / 2;
-  if (pw_fixed_steps (x->r) || depth == 0 || !(t0 < middle && middle < t1)) return PW_OK;
+  if (pw_fixed_steps (x->r) || t1 - t0 < PATH_SHORTEST * (x->r->t - x->begun) || !(t0 < middle && middle < t1))
+    return PW_OK;
   int status = pw_variation_append (x, middle, error);
   if (status != PW_OK) return status;
   int good = path_is_accurate (x, i);
@@ -130,10 +131,6 @@ static int path_refine (pw_variation *x, int i, int depth, pw_error *error) {
   memmove (x->point + i + 2, x->point + i + 1, (size_t)(x->points - i - 2) * sizeof kept);
   x->point[i + 1] = kept;
   if (good) return PW_OK;
-  status = path_refine (x, i + 1, depth - 1, error);
-  return status == PW_OK ? path_refine (x, i, depth - 1, error) : status;
-}
-
-int pw_variation_refine (pw_variation *x, int i, pw_error *error) {
-  return path_refine (x, i, PATH_DEPTH, error);
+  status = pw_variation_refine (x, i + 1, error);
+  return status == PW_OK ? pw_variation_refine (x, i, error) : status;
 }

@@ -3,22 +3,22 @@
 #include <string.h>
 #include "variation_parts.h"
 
-/* Permitted error of a step, relative to the largest derivative.  The loose one applies where the other would need
- * more than one linearisation per step of a run with fixed steps: the motion is so fast that these are large for it,
- * too. */
+/* Permitted error of a step, relative to the largest derivative; at least a tenth of the rtol of a run that adapts its
+ * steps.  STEP_LOOSE applies where the derivatives would need more than one linearisation per fixed step of the run:
+ * the run's steps, too, are large for such a fast motion. */
 static const double STEP_TOLERANCE = 1e-9, STEP_LOOSE = 1e-7;
-enum { STEP_RATIO = 5 }; /* linearisations in a step of the derivatives */
+enum { STEP_RATIO = 5 }; /* linearisations in an explicit step of the derivatives */
 
-/* Permitted error of the run's velocities in a step, relative to the largest. */
+/* Permitted error of the method for the run's velocities in a step, relative to the largest velocity. */
 static const double STEP_MOTION = 1e-8;
 
-/* Round-off of positions, relative to the scene or themselves, that interpolation between fixed steps turns into one of
- * velocities. */
+/* Round-off of positions, relative to the scene or themselves, which interpolation between fixed steps turns into
+ * errors of velocities. */
 static const double STEP_ROUND = 1e-14;
 
-/* Derivatives by p below this part of the scene's unit per p are computed to the same absolute error; p is estimated
- * from the step of its differences, usually STEP_OF_PARAMETER times p.  Derivatives of work and losses: below this
- * part of the energy exchanged per unit of the scene. */
+/* Derivatives below STEP_LEAST_DERIVATIVE units of the scene per p are computed to the absolute error of one that
+ * large; p is estimated as the step of its differences over STEP_OF_PARAMETER.  Derivatives of work and losses: below
+ * STEP_LEAST_ENERGY times the energy exchanged, per unit of the scene. */
 static const double STEP_LEAST_DERIVATIVE = 0.1, STEP_OF_PARAMETER = 1e-5, STEP_LEAST_ENERGY = 1e-3;
 
 /* The smallest step, in units of the scene. */
@@ -27,8 +27,9 @@ static const double STEP_SMALLEST = 1e-12;
 /* Sine between constraint equations below which the round-off of accelerations prevents steps. */
 static const double STEP_SINGULAR = 0.01;
 
-/* The motion is stiff if that many steps were longer than this part of the time in which its fastest component decays.
- * A tolerance of 1e-9 alone permits about 0.2; stability limits it to 3.3 (Hairer & Wanner 1996, section IV.2). */
+/* The motion is stiff if STEP_STIFF more steps were longer than STEP_FAST times the time in which its fastest component
+ * decays than were shorter.  A tolerance of 1e-9 permits about 0.2 times this time, stability 3.3 times it (Hairer &
+ * Wanner 1996, section IV.2). */
 enum { STEP_STIFF = 100 };
 static const double STEP_FAST = 1;
 
@@ -39,21 +40,20 @@ static double step_largest_energy (const pw_variation *x, const double *Y) {
   return most;
 }
 
-/* Largest of velocities in units of the scene. */
+/* The largest velocity in units of the scene. */
 static double step_largest_velocity (const pw_variation *x, const double *v) {
   double most = 0;
   for (int j = 0; j < x->n; j++) most = fmax (most, fabs (v[j]) * x->r->w->scale.time / pw_unit (x->r->s, j));
   return most;
 }
 
-/* The error of the method for the velocities of the run, relative to the largest: derivatives alone may not see that a
- * step passes over a short phase of the motion, such as the reversal of friction. */
+/* The error of the method for the velocities of the run, relative to the largest: the errors of derivatives alone may
+ * not reveal that a step passes over a short phase of the motion, such as the reversal of friction. */
 static double step_motion_error (const pw_variation *x) {
   return step_largest_velocity (x, x->motion_error) / fmax (1, x->speed);
 }
 
-/* Errors of the run's velocities between its steps, in units of the scene; estimated as a fifth of the tolerance if it
- * adapts its steps. */
+/* Errors of the run's velocities between its steps, in units of the scene: with adaptive steps, rtol / 5. */
 static double step_noise (const pw_variation *x) {
   double most = 1;
   if (!pw_fixed_steps (x->r)) return 0.2 * x->r->settings.rtol * fmax (1, x->speed);
@@ -61,8 +61,8 @@ static double step_noise (const pw_variation *x) {
   return STEP_ROUND * most * x->r->w->scale.time / fmin (x->r->settings.step, x->r->w->scale.time);
 }
 
-/* The permitted one: STEP_MOTION, or the run's own if that is small compared with the change over which forces
- * reverse. */
+/* The permitted step_motion_error: STEP_MOTION, or the run's own error if that is larger, multiplied by x->reversal: in
+ * motions with forces that reverse fast, smaller errors matter. */
 static double step_motion_tolerance (const pw_variation *x) {
   return fmax (STEP_MOTION, step_noise (x) * x->reversal / fmax (1, x->speed));
 }
@@ -71,9 +71,9 @@ static double step_motion_tolerance (const pw_variation *x) {
  * the error of a body in free flight, which does not accelerate, is no large part of its motion. */
 static const double STEP_CHANGE = 1e-6, STEP_CHANGE_RTOL = 1000;
 
-/* The difference between a step of the run's velocities and the integral of its accelerations, relative to the latter:
- * large where the run does not resolve the motion.  Errors of the method, and of the velocities if they are small
- * compared with the change over which forces reverse, do not count. */
+/* The difference between the change of the run's velocities and the integral of its accelerations over a step, relative
+ * to the integral, at most 1: large where the run does not resolve the motion.  The error of the method, and step_noise
+ * multiplied by x->reversal, do not count. */
 static double step_defect (const pw_variation *x, double h) {
   int stages = x->implicit ? 1 + PW_VARIATION_STAGES : PW_VARIATION_RATES - 1;
   double most =
@@ -95,7 +95,7 @@ static void step_add_defect (pw_variation *x, double h) {
   }
 }
 
-/* What errors of a derivative are relative to; likewise of those of work and losses. */
+/* What the errors of a derivative are relative to; the same for work and losses. */
 static double step_norm (const pw_variation *x, const pw_direction_copy *d) {
   double size = fmax (d->column->largest, pw_variation_norm (x, d->column->trial));
   return d->given.initial ? size : fmax (size, STEP_LEAST_DERIVATIVE * STEP_OF_PARAMETER / fabs (d->given.step));
@@ -123,7 +123,7 @@ static void step_add_errors (pw_variation *x, int first, int end) {
     for (int j = first; j < end && d->columns > 1; j++) d->column[1].trial[j] += d->local_error[j];
 }
 
-/* Scales an estimate of order h^4, relative to `size`, to the error of the implicit step. */
+/* Scales an estimate of order h^4 with the magnitude r = `relative` to (10 r)^(3/2), about the error of the step. */
 static void step_scale_error (double *error, double relative, int n) {
   double factor = fmin (1, sqrt (1000 * relative));
   for (int j = 0; j < n && relative > 0; j++) error[j] *= factor;
@@ -138,7 +138,8 @@ static void step_implicit_errors (pw_variation *x) {
   step_scale_error (x->motion_error, step_motion_error (x), x->n);
 }
 
-/* The stages, the new derivatives in `trial`, their time derivatives and errors. */
+/* Computes the stages, the new derivatives into `trial`, their time derivatives and errors.  The errors of the step
+ * follow from the time derivatives of column 0 and are added to column 1 before its own are evaluated. */
 static int step_stages (pw_variation *x, double h, double t1, pw_error *error) {
   int last = PW_VARIATION_RATES - 1, status;
   pw_variation_state (x, x->t, x->scratch);
@@ -162,6 +163,7 @@ static int step_stages (pw_variation *x, double h, double t1, pw_error *error) {
   return PW_OK;
 }
 
+/* The end of the step becomes the beginning of the next one. */
 static void step_accept (pw_variation *x) {
   memcpy (x->a[0], x->a[PW_VARIATION_RATES - 1], (size_t)x->n * sizeof *x->q);
   x->speed = fmax (x->speed, step_largest_velocity (x, x->v));
@@ -185,44 +187,38 @@ int pw_variation_restart (pw_variation *x, pw_error *error) {
   return status;
 }
 
-/* The strict tolerance; in a run that adapts its steps, a tenth of its tolerance if that is larger. */
-static double step_tolerance (const pw_run *r) {
-  return pw_fixed_steps (r) ? STEP_TOLERANCE : fmax (STEP_TOLERANCE, 0.1 * r->settings.rtol);
-}
-
-/* The factor of the next step for a tolerance.  It depends on the error of the last accepted step, too (at least 1e-4
- * of the tolerance: the first step has none), which damps oscillations of the step at the limit of stability (Hairer &
- * Wanner 1996, section IV.2: exponents 1 / order - 0.75 b and b, b = 0.04). */
+/* The size of the next step relative to one with the error `off`.  It depends on the error of the last accepted step,
+ * too (at least 1e-4 of the tolerance: the first step has none), which damps oscillations of the step at the limit of
+ * stability (Hairer & Wanner 1996, section IV.2: exponents 1 / order - 0.75 b and b, b = 0.04). */
 static double step_factor (const pw_variation *x, double off, double tolerance) {
   double factor = 0.9 * pow (off / tolerance, -0.17) * pow (fmax (x->last_error, 1e-4 * tolerance) / tolerance, 0.04);
   return fmin (5, fmax (0.2, factor));
 }
 
-/* The next step by the error of one of size h: for the strict tolerance, or the loose one up to `fine`. */
+/* The size of the next step after one of size h with the error `off`: by `tolerance`, or by STEP_LOOSE up to `fine`. */
 static double step_next_size (const pw_variation *x, double h, double off, double tolerance, double fine) {
   if (!isfinite (off)) return h / 10;
   return fmax (h * step_factor (x, off, tolerance), fmin (h * step_factor (x, off, STEP_LOOSE), fine));
 }
 
-/* The end of the next step: two equal steps rather than a short one reach t1. */
+/* The end of the next step; the last two steps to t1 have the same size. */
 static double step_end (const pw_variation *x, double t1) {
   double rest = t1 - x->t;
   if (!(x->h < rest * (1 - 1e-9))) return fmin (t1, x->r->t);
   return fmin (x->t + (2 * x->h > rest ? rest / 2 : x->h), x->r->t);
 }
 
+/* The error if steps have become too small. */
 static int step_fail (pw_variation *x, pw_error *error) {
   if (pw_evaluate_J_at (x->r->w, x->at, x->q, x->v) == PW_OK && pw_watchdog_sine (x->r, NULL) < STEP_SINGULAR)
-    return pw_fail (
-        error, PW_METHOD,
-        "t = %.6g s: the derivatives cannot be computed near a singular configuration, where constraints are "
-        "nearly dependent",
-        x->t);
-  return pw_fail (
-      error, PW_METHOD,
-      "t = %.6g s: no step of the derivatives meets their tolerance, however small: the motion is too stiff, "
-      "or not differentiable",
-      x->t);
+    return pw_fail (error, PW_METHOD,
+                    "t = %.6g s: the derivatives cannot be computed near a singular configuration, where "
+                    "constraints are nearly dependent",
+                    x->t);
+  return pw_fail (error, PW_METHOD,
+                  "t = %.6g s: no step of the derivatives meets their tolerance, however small: the motion is "
+                  "too stiff, or not differentiable",
+                  x->t);
 }
 
 /* Changes to implicit steps if stability limited many steps. */
@@ -235,8 +231,9 @@ static int step_check_stiffness (pw_variation *x, double h, pw_error *error) {
 }
 
 int pw_variation_step (pw_variation *x, double t1, pw_error *error) {
-  double tolerance = step_tolerance (x->r),
-         fine = pw_fixed_steps (x->r) && x->implicit == NULL ? STEP_RATIO * x->r->settings.step : 0;
+  int fixed = pw_fixed_steps (x->r);
+  double tolerance = fixed ? STEP_TOLERANCE : fmax (STEP_TOLERANCE, 0.1 * x->r->settings.rtol),
+         fine = fixed && x->implicit == NULL ? STEP_RATIO * x->r->settings.step : 0;
   if (x->h <= STEP_SMALLEST * x->r->w->scale.time) return step_fail (x, error);
   double end = step_end (x, t1), h = end - x->t, allowed = h <= fine ? STEP_LOOSE : tolerance;
   int status = step_stages (x, h, end, error);

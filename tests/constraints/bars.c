@@ -1,8 +1,9 @@
 /* See bars.h. */
 #include <math.h>
 #include "bars.h"
+#include "trial.h"
 
-/* A four-bar linkage with initially parallel crank and rocker, consistent if a = c and b = d. */
+/* Lengths of the bars [m]; g: gravity [m/s^2]. */
 typedef struct {
   double a, b, c, d, g;
 } bars;
@@ -13,6 +14,7 @@ static const pw_parameter bars_list[] = {
   { PW_AT (bars, g), 0, "m/s^2", "gravity", PW_REAL }, { .name = NULL },
 };
 
+/* Crank and rocker are initially parallel: the initial state is consistent if a = c and b = d. */
 static void bars_build (pw_model *m, const void *parameter) {
   const bars *p = parameter;
   const double phi = 1.2, w = 4, c = cos (phi), s = sin (phi);
@@ -38,8 +40,4 @@ static void bars_build (pw_model *m, const void *parameter) {
   pw_add_gravity (m, &(pw_gravity){ .name = "g", .acceleration = { 0, -p->g } });
 }
 
-const pw_plugin_table bars_table = { .abi = PW_ABI,
-                                     .size = sizeof (pw_plugin_table),
-                                     .parameters = bars_list,
-                                     .parameters_size = sizeof (bars),
-                                     .build = bars_build };
+const pw_plugin_table bars_table = TRIAL_TABLE_WITH (bars_build, bars_list, sizeof (bars));

@@ -1,4 +1,5 @@
-/* A four-bar linkage with bars of given lengths a, b, c, d. */
+/* A four-bar linkage; parameters: lengths of the crank a, the coupler b, the rocker c and the ground d [m], all 1 by
+ * default, and gravity g, 0 by default. */
 #ifndef BARS_H
 #define BARS_H
 

@@ -20,11 +20,10 @@ void redundant_end (const pw_plugin_table *table, const char *method, double rto
   pw_run *r = runs_open (s, method, &(pw_settings){ .step = step, .rtol = rtol, .span = t });
   pw_sample x = runs_to (r, t);
   for (int i = 0; name[i]; i++) end[i] = trial_state (s, &x, name[i]);
-  pw_run_close (r);
-  pw_system_free (s);
+  runs_close (r, s);
 }
 
-double redundant_off (const double *a, const double *b, int n) {
+double redundant_distance (const double *a, const double *b, int n) {
   double most = 0;
   for (int i = 0; i < n; i++) most = fmax (most, fabs (a[i] - b[i]));
   return most;
@@ -41,18 +40,19 @@ void redundant_twins (const pw_plugin_table *table, const pw_plugin_table *twin,
   for (int i = 0; redundant_fixed[i]; i++) {
     redundant_end (table, redundant_fixed[i], rtol, t, name, a, step);
     redundant_end (twin, redundant_fixed[i], rtol, t, name, b, step);
-    check_below (redundant_fixed[i], redundant_off (a, b, n), 1e-12, "twins in a fixed-step method");
+    check_below (redundant_fixed[i], redundant_distance (a, b, n), 1e-12,
+                 "round-off: the same motion by the same steps");
   }
   for (int i = 0; redundant_second[i]; i++) {
     redundant_end (table, redundant_second[i], rtol, t, name, a, step);
     redundant_end (twin, redundant_second[i], rtol, t, name, b, step);
-    check_below (redundant_second[i], redundant_off (a, b, n), redundant_off (b, exact, n),
-                 "the twin's own error: ggl weighs angles by the scene's length");
+    check_below (redundant_second[i], redundant_distance (a, b, n), redundant_distance (b, exact, n),
+                 "the twin's own error: ggl weights angles by the length of the scene");
   }
   for (int i = 0; redundant_adaptive[i]; i++) {
     redundant_end (table, redundant_adaptive[i], rtol, t, name, a, step);
     redundant_end (twin, redundant_adaptive[i], rtol, t, name, b, step);
-    check_below (redundant_adaptive[i], redundant_off (a, b, n), 10 * redundant_off (b, exact, n),
+    check_below (redundant_adaptive[i], redundant_distance (a, b, n), 10 * redundant_distance (b, exact, n),
                  "10 times the twin's own error");
   }
 }
@@ -65,6 +65,5 @@ void redundant_expect_reports (const pw_plugin_table *table, const char *const *
   pw_run *r = runs_open (s, "rk4+projection", NULL);
   assert_int_equal (pw_run_redundant (r), n);
   for (int i = 0; i < n; i++) assert_string_equal (pw_run_redundancy (r, i, buffer, sizeof buffer), text[i]);
-  pw_run_close (r);
-  pw_system_free (s);
+  runs_close (r, s);
 }

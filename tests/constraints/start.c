@@ -15,8 +15,3 @@ pw_run *start_open (pw_system **system, const char *const *name, const double *v
   check_below ("velocity", now.velocity, START_ROUND_OFF, START_REASON);
   return r;
 }
-
-void start_close (pw_run *r, pw_system *s) {
-  pw_run_close (r);
-  pw_system_free (s);
-}

@@ -7,8 +7,8 @@
 #define START_ROUND_OFF (64 * CHECK_EPS)
 #define START_REASON "64 eps of the row's terms: round-off"
 
-/* Opens a run on the EzyRoller with initial values, NULL-terminated names and values, and checks the constraints. */
+/* Opens a run of the EzyRoller with these initial values; names end with NULL, or `name` is NULL.  Checks the
+ * constraints.  Close it with runs_close. */
 pw_run *start_open (pw_system **system, const char *const *name, const double *value);
-void start_close (pw_run *r, pw_system *s);
 
 #endif

@@ -5,15 +5,14 @@
 #include "scene.h"
 #include "trial.h"
 
-/* Expected results of a run of 1 s, within a bound that follows from the method. */
+/* Checks the results of a run of 1 s, within a bound that follows from the method. */
 typedef void parallelogram_check (pw_system *s, pw_run *r, double bound, const char *reason);
 
 static void parallelogram_try (const char *method, parallelogram_check *check, double bound, const char *reason) {
   pw_system *s = scene_named ("redundant-parallelogram", NULL, 0);
   pw_run *r = runs_open (s, method, &(pw_settings){ .step = 1e-3, .rtol = 1e-10, .span = 1, .ledger = 1 });
   check (s, r, bound, reason);
-  pw_run_close (r);
-  pw_system_free (s);
+  runs_close (r, s);
 }
 
 static void parallelogram_every_method (parallelogram_check *check, double adaptive, const char *reason) {
@@ -53,9 +52,9 @@ static void parallelogram_shares (pw_system *s, pw_run *r, double bound, const c
   for (int i = 1; i < 6; i++)
     if (i != 3) check_close (name[i], share[i], share[i / 3 * 3], bound * hypot (share[0], share[3]), reason);
   check_close ("coupler's angle", trial_state (s, &x, "coupler.phi"), 0, bound, "the cranks are parallel");
-  check_close ("all three lift the coupler", -(share[3] + share[4] + share[5]), 2 * (x.a[1] + 9.81), 1e2 * bound,
+  check_close ("Newton's law of the coupler, y", -(share[3] + share[4] + share[5]), 2 * (x.a[1] + 9.81), 1e2 * bound,
                reason);
-  check_close ("and push it", -(share[0] + share[1] + share[2]), 2 * x.a[0], 1e2 * bound, reason);
+  check_close ("Newton's law of the coupler, x", -(share[0] + share[1] + share[2]), 2 * x.a[0], 1e2 * bound, reason);
 }
 
 static void test_shares (void **state) {
@@ -63,7 +62,7 @@ static void test_shares (void **state) {
   parallelogram_every_method (parallelogram_shares, 1e-6, "1e4 rtol");
 }
 
-/* ---- Messages: the dependence of a row names all elements; a short buffer truncates the text ---- */
+/* ---- Messages: all elements that a redundant row depends on are named; a short buffer truncates the text ---- */
 
 static void test_partners (void **state) {
   (void)state;
@@ -75,15 +74,11 @@ static void test_partners (void **state) {
                        "pin B2 (B2.Fy) follows from pin A1, pin B1, pin A2, pin A3, pin B3");
   pw_run_redundancy (r, 0, text, 10);
   assert_int_equal (strlen (text), 9);
-  pw_run_close (r);
-  pw_system_free (s);
+  runs_close (r, s);
 }
 
 int main (void) {
-  const struct CMUnitTest tests[] = {
-    cmocka_unit_test (test_digits),
-    cmocka_unit_test (test_shares),
-    cmocka_unit_test (test_partners),
-  };
+  const struct CMUnitTest tests[] = { cmocka_unit_test (test_digits), cmocka_unit_test (test_shares),
+                                      cmocka_unit_test (test_partners) };
   return cmocka_run_group_tests (tests, NULL, NULL);
 }

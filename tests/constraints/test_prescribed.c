@@ -5,11 +5,11 @@
 #include <string.h>
 #include "check.h"
 #include "model.h"
-#include "runs.h"
 #include "scene.h"
 #include "system.h"
-#include "toys.h"
 #include "start.h"
+#include "toys.h"
+#include "trial.h"
 
 /* ---- Given values are kept ---- */
 
@@ -27,7 +27,7 @@ static void test_given_values_kept (void **state) {
   assert_true (start->moved == moved && moved > 0);
   assert_true (start->q_given[3] == 0.375 && start->v_given[0] == 1.5 && start->position > 0.01 &&
                start->velocity > 0.01);
-  start_close (r, s);
+  runs_close (r, s);
 }
 
 /* All states of the frame are given; they satisfy the row of wheel A, which has no other coordinates. */
@@ -45,8 +45,8 @@ static void test_given_body_kept (void **state) {
   check_bits ("frame", start->v, v, 3);
   for (int j = 3; j < 6; j++) check_close ("steer", start->q[j], q[j], 8 * CHECK_EPS, "8 eps: round-off");
   /* wheel C does not slip: at phi = pi/2 its lateral velocity is vx - 0.125 omega = 0 */
-  check_close ("the steering turns", start->v[5], (start->v[3]) / 0.125, 64 * CHECK_EPS, "64 eps: round-off");
-  start_close (r, s);
+  check_close ("steer.omega", start->v[5], start->v[3] / 0.125, 64 * CHECK_EPS, "64 eps: round-off");
+  runs_close (r, s);
 }
 
 /* A chain whose second link is displaced, with a gear between the first and the third. */
@@ -70,9 +70,7 @@ static void test_given_satisfied_rows (void **state) {
   static const char *const name[] = { "link0.x", "link0.y", "link0.phi", "link2.phi" };
   static const double value[] = { 0.5, 0, 0, 0 };
   static const pw_parameter list[] = { { .name = "links", .value = 3 }, { .name = NULL } };
-  static const pw_plugin_table table = {
-    .abi = PW_ABI, .size = sizeof table, .parameters = list, .parameters_size = sizeof (double), .build = start_chain
-  };
+  static const pw_plugin_table table = TRIAL_TABLE_WITH (start_chain, list, sizeof (double));
   (void)state;
   for (int links = 3; links <= 16; links++) {
     pw_error error = { 0 };
@@ -85,7 +83,7 @@ static void test_given_satisfied_rows (void **state) {
     check_bits ("link0", start->q, value, 3);
     assert_true (start->q[8] == 0);
     check_below ("position", runs_to (r, 0).position, START_ROUND_OFF, START_REASON);
-    start_close (r, s);
+    runs_close (r, s);
   }
 }
 
@@ -112,9 +110,7 @@ static void test_given_centre_kept (void **state) {
   static const char *const name[] = { "disc0.x", "disc0.y", "disc0.vx", "disc0.vy" };
   static const double value[] = { 0.6, 0.8, -0.8, 0.6 };
   static const pw_parameter list[] = { { .name = "arms", .value = 1 }, { .name = NULL } };
-  static const pw_plugin_table table = {
-    .abi = PW_ABI, .size = sizeof table, .parameters = list, .parameters_size = sizeof (double), .build = start_arms
-  };
+  static const pw_plugin_table table = TRIAL_TABLE_WITH (start_arms, list, sizeof (double));
   (void)state;
   for (int arms = 1; arms <= 40; arms += 13) {
     pw_error error = { 0 };
@@ -127,11 +123,11 @@ static void test_given_centre_kept (void **state) {
     check_bits ("position", start->q, value, 2);
     check_bits ("velocity", start->v, value + 2, 2);
     check_below ("position", runs_to (r, 0).position, START_ROUND_OFF, START_REASON);
-    start_close (r, s);
+    runs_close (r, s);
   }
 }
 
-/* A given angle of the massless steering assembly does not move the frame. */
+/* A given angle of the massless steering assembly does not change the frame. */
 static void test_massive_body_kept (void **state) {
   (void)state;
   static const char *const name[] = { "steer.phi", NULL };
@@ -143,11 +139,11 @@ static void test_massive_body_kept (void **state) {
   assert_int_equal (start->released, 0);
   check_bits ("frame", start->q, frame, 3);
   assert_true (start->q[5] == 2 && start->moved == 2);
-  start_close (r, s);
+  runs_close (r, s);
 }
 
-/* An angle is specified, with velocities that violate a wheel's constraint: these change, positions do not. */
-static void start_slips (pw_model *m, const void *parameters) {
+/* The angle of a wheel is specified, and velocities that violate its constraint: the velocities change. */
+static void start_slipping (pw_model *m, const void *parameters) {
   (void)parameters;
   pw_add_body (m, &(pw_body){ .name = "frame", .mass = 1, .inertia = 0.1, .rate = { 1, 0.3, 0.2 } });
   pw_add_body (m, &(pw_body){ .name = "steer", .start = { 0, 0, 2 } });
@@ -157,7 +153,7 @@ static void start_slips (pw_model *m, const void *parameters) {
 }
 
 static void test_velocities_change (void **state) {
-  static const pw_plugin_table table = { .abi = PW_ABI, .size = sizeof table, .build = start_slips };
+  static const pw_plugin_table table = TRIAL_TABLE (start_slipping);
   (void)state;
   pw_system *s = scene_system (&table, NULL);
   pw_run *r = runs_open (s, "rk4", NULL);
@@ -165,7 +161,7 @@ static void test_velocities_change (void **state) {
   const double frame[3] = { 0 };
   check_bits ("frame", start->q, frame, 3);
   assert_true (start->q[5] == 2 && start->v[1] != 0.3);
-  start_close (r, s);
+  runs_close (r, s);
 }
 
 /* If given positions are released, given velocities are kept. */
@@ -178,7 +174,7 @@ static void test_velocities_kept (void **state) {
   const pw_initial_report *start = pw_run_initial (r);
   assert_int_equal (start->released, 1);
   assert_true (start->v[4] == 5 && start->q[3] < 1);
-  start_close (r, s);
+  runs_close (r, s);
 }
 
 /* Given values that contradict each other are all released. */
@@ -190,7 +186,7 @@ static void test_released (void **state) {
   pw_run *r = start_open (&s, name, value);
   const pw_initial_report *start = pw_run_initial (r);
   assert_true (start->released == 1 && start->moved > 0);
-  start_close (r, s);
+  runs_close (r, s);
 }
 
 /* ---- The smallest change: M-orthogonal to all admissible velocities ---- */
@@ -211,11 +207,7 @@ static void test_least_change (void **state) {
   static const pw_parameter list[] = { { .name = "vx" },
                                        { .name = "omega", .offset = sizeof (double) },
                                        { .name = NULL } };
-  static const pw_plugin_table table = { .abi = PW_ABI,
-                                         .size = sizeof table,
-                                         .parameters = list,
-                                         .parameters_size = 2 * sizeof (double),
-                                         .build = start_massive };
+  static const pw_plugin_table table = TRIAL_TABLE_WITH (start_massive, list, 2 * sizeof (double));
   double v[6][6], change[6][6];
   pw_system *s = NULL;
   for (int i = 0; i < 6; i++) {
@@ -251,7 +243,7 @@ static void start_driven (pw_model *m, const void *parameters) {
 
 static void test_driven_constraint (void **state) {
   (void)state;
-  static const pw_plugin_table table = { .abi = PW_ABI, .size = sizeof table, .build = start_driven };
+  static const pw_plugin_table table = TRIAL_TABLE (start_driven);
   pw_system *s = scene_system (&table, NULL);
   pw_run *r = runs_open (s, "rk4+projection", &(pw_settings){ .t = 3, .span = 1 });
   const pw_initial_report *start = pw_run_initial (r);
@@ -259,7 +251,7 @@ static void test_driven_constraint (void **state) {
   check_close ("rate", start->v[2], -sin (7), 4 * CHECK_EPS, "4 eps: round-off");
   pw_sample now = runs_to (r, 4);
   check_close ("angle", now.q[2], 0.5 * cos (9), 4 * CHECK_EPS, "projected: round-off");
-  start_close (r, s);
+  runs_close (r, s);
 }
 
 /* ---- Inconsistent initial conditions ---- */
@@ -283,7 +275,7 @@ static void start_contradictory (pw_model *m, const void *parameters) {
 }
 
 static void start_expect_error (void (*build) (pw_model *, const void *), const char *text) {
-  const pw_plugin_table table = { .abi = PW_ABI, .size = sizeof table, .build = build };
+  const pw_plugin_table table = TRIAL_TABLE (build);
   pw_error error = { 0 };
   pw_system *s = scene_system (&table, NULL);
   assert_null (pw_run_open (s, "rk4", NULL, &error));

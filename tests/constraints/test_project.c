@@ -9,7 +9,7 @@
 
 enum { PROJECT_MOST = 24 };
 
-/* The state at 1/3 s with a perturbed velocity, projected. */
+/* Projects the state at 0.3 s with one velocity perturbed by `off`. */
 static void project_try (const char *model, const char *parameter, double value, const char *method, double off) {
   pw_system *s = scene_named (model, parameter, value);
   pw_run *r = runs_open (s, method, &(pw_settings){ .step = 1e-3 });
@@ -40,8 +40,7 @@ static void project_try (const char *model, const char *parameter, double value,
   for (int j = 0; j < n; j++) check_close (model, a[j], other[j], 256 * CHECK_EPS * most, "round-off, condition");
   for (int i = 0; i < rows; i++) check_close (model, lambda[i], mu[i], 256 * CHECK_EPS * most, "round-off, condition");
   pw_projector_close (&p);
-  pw_run_close (r);
-  pw_system_free (s);
+  runs_close (r, s);
 }
 
 static void test_consistent (void **state) {
@@ -51,7 +50,7 @@ static void test_consistent (void **state) {
   project_try ("n-trailer", NULL, 0, "rk4+projection", 0);
 }
 
-static void test_off (void **state) {
+static void test_perturbed (void **state) {
   (void)state;
   project_try ("ezyroller", NULL, 0, "rk4+projection", 1e-3);
   project_try ("ezyroller", "m2", 0.1, "rk4+projection", 1e-3);
@@ -76,13 +75,11 @@ static double project_length (const char *method) {
   assert_int_equal (pw_project_state (&p, r, x.t, q, v, a, lambda), PW_OK);
   for (int j = 0; j < n; j++) square += (v[j] - before[j]) * (v[j] - before[j]);
   pw_projector_close (&p);
-  pw_run_close (r);
-  pw_system_free (s);
+  runs_close (r, s);
   return sqrt (square);
 }
 
-/* In the identity metric the correction is the shortest one; a third of its components have other weights in the mass
- * matrix. */
+/* The correction is shortest in the identity metric. */
 static void test_metric (void **state) {
   (void)state;
   double identity = project_length ("rk4+projection:metric=identity"), mass = project_length ("rk4+projection");
@@ -90,25 +87,25 @@ static void test_metric (void **state) {
   check_below ("correction", identity, 0.999 * mass, "the mass matrix has entries from 0.1 to 1");
 }
 
-/* A residual that is NaN is the largest, in whichever row it is. */
-static void test_wild_residual (void **state) {
+/* A residual that is NaN is the largest, in any row. */
+static void test_nan_residual (void **state) {
   (void)state;
   double size[PROJECT_MOST];
   pw_system *s = scene_named ("n-four-bar", NULL, 0);
   assert_in_range (s->holonomic, 3, PROJECT_MOST);
   for (int i = 0; i < s->holonomic; i++) size[i] = 1;
-  for (int wild = 0; wild < 3; wild++) {
+  for (int row = 0; row < 3; row++) {
     double g[PROJECT_MOST] = { 1e-3, 2e-3, 3e-3 };
     pw_residuals now;
-    g[wild] = NAN;
+    g[row] = NAN;
     pw_worst_position (s, g, size, NULL, &now);
     assert_true (isnan (now.position));
-    assert_int_equal (now.row_position, wild);
+    assert_int_equal (now.row_position, row);
   }
   pw_system_free (s);
 }
 
-/* A row that contradicted the others in one projection does not explain why the next one fails. */
+/* A contradictory row of one projection is not reported as the cause of a failure of the next one. */
 static void test_not_contradictory (void **state) {
   (void)state;
   pw_system *s = scene_named ("redundant-parallelogram", NULL, 0);
@@ -121,13 +118,12 @@ static void test_not_contradictory (void **state) {
   assert_int_equal (pw_project_positions (&p, r, 0, r->q, r->v), PW_RETRY);
   assert_int_equal (p.contradictory_row, -1);
   pw_projector_close (&p);
-  pw_run_close (r);
-  pw_system_free (s);
+  runs_close (r, s);
 }
 
 int main (void) {
-  const struct CMUnitTest tests[] = { cmocka_unit_test (test_consistent), cmocka_unit_test (test_off),
-                                      cmocka_unit_test (test_metric), cmocka_unit_test (test_wild_residual),
+  const struct CMUnitTest tests[] = { cmocka_unit_test (test_consistent), cmocka_unit_test (test_perturbed),
+                                      cmocka_unit_test (test_metric), cmocka_unit_test (test_nan_residual),
                                       cmocka_unit_test (test_not_contradictory) };
   return cmocka_run_group_tests (tests, NULL, NULL);
 }

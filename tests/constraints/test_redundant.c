@@ -12,8 +12,8 @@
 
 /* ---- Three cranks with one coupler ---- */
 
-/* The third crank only adds a force along x: the others determine y.  Independent while the cranks are not
- * horizontal. */
+/* The third crank is connected to the coupler in x only; the others determine y.  The rows are independent unless the
+ * cranks are horizontal. */
 static void redundant_slotted (pw_model *m, const void *parameter) {
   (void)parameter;
   double c = cos (-PW_PI / 4), s = sin (-PW_PI / 4);
@@ -43,7 +43,7 @@ static void test_parallelogram_twins (void **state) {
   redundant_twins (&redundant_parallelogram, &redundant_slotted_table, 1, 1e-3, redundant_cranks);
 }
 
-/* The initial angle of one crank differs from the others: off the constraints, all rows are independent. */
+/* The initial angle of one crank differs from the others: where constraints are violated, all rows are independent. */
 static void test_parallelogram_start (void **state) {
   static const char *const crank[] = { "crank1.phi", "crank2.phi", "crank3.phi" };
   static const double off[] = { 1e-5, 1e-3, 0.1, 0.4, 0.6, 1.0 };
@@ -59,16 +59,14 @@ static void test_parallelogram_start (void **state) {
       pw_sample x = runs_to (r, 0);
       check_below ("initial residual", x.position, 64 * CHECK_EPS, "64 eps: accuracy of initial positions");
       if (off[k] == 1.0) { /* beyond the change point at 0: Newton's iteration may change the given angle */
-        pw_run_close (r);
-        pw_system_free (s);
+        runs_close (r, s);
         continue;
       }
       assert_int_equal (pw_run_initial (r)->released, 0);
       for (int j = 0; j < 3; j++)
         check_close (crank[j], trial_state (s, &x, crank[j]), phi, 64 * CHECK_EPS,
                      "64 eps: accuracy of initial positions");
-      pw_run_close (r);
-      pw_system_free (s);
+      runs_close (r, s);
     }
 }
 
@@ -87,18 +85,8 @@ static void redundant_tricycle (pw_model *m, int wheels) {
                                   .value = { PW_HARMONIC, .harmonic = { .amplitude = 0.3, .omega = 2 } } });
 }
 
-static void redundant_three (pw_model *m, const void *parameter) {
-  (void)parameter;
-  redundant_tricycle (m, 2);
-}
-
-static void redundant_two (pw_model *m, const void *parameter) {
-  (void)parameter;
-  redundant_tricycle (m, 1);
-}
-
-static const pw_plugin_table redundant_three_table = TRIAL_TABLE (redundant_three);
-static const pw_plugin_table redundant_two_table = TRIAL_TABLE (redundant_two);
+REDUNDANT_SCENE (redundant_three, redundant_tricycle (m, 2));
+REDUNDANT_SCENE (redundant_two, redundant_tricycle (m, 1));
 
 /* Two equal drives turn a crank against its weight: each has half of the reaction and half of the work. */
 static void redundant_drives (pw_model *m, const void *parameter) {
@@ -122,10 +110,9 @@ static void test_drives (void **state) {
     pw_run *r = runs_open (s, method[i], &(pw_settings){ .rtol = 1e-8, .step = 1e-3, .span = 1, .ledger = 1 });
     pw_sample x = runs_to (r, 1);
     assert_int_equal (pw_system_ledger_entries (s), 2);
-    check_close (method[i], x.ledger[0], x.ledger[1], 1e-9 * (1 + fabs (x.ledger[0])), "shared like the reactions");
+    check_close (method[i], x.ledger[0], x.ledger[1], 1e-9 * (1 + fabs (x.ledger[0])), "shared as the reactions are");
     check_close (method[i], x.ledger[0] + x.ledger[1], 10 * sin (1), 1e-5, "the weight is lifted by sin (1)");
-    pw_run_close (r);
-    pw_system_free (s);
+    runs_close (r, s);
   }
 }
 
@@ -137,7 +124,7 @@ static void test_axle (void **state) {
   trial (&redundant_three_table, 2);
 }
 
-/* Twin wheels have half of the reaction of a single wheel each. */
+/* Two wheels on one axle have half of the reaction of a single one each. */
 static void test_axle_forces (void **state) {
   (void)state;
   pw_system *s = scene_system (&redundant_three_table, NULL), *twin = scene_system (&redundant_two_table, NULL);
@@ -146,13 +133,12 @@ static void test_axle_forces (void **state) {
     pw_sample x = runs_to (r, 0.7 * i), y = runs_to (one, 0.7 * i);
     double left = trial_reaction (s, &x, "rear_left.N"), right = trial_reaction (s, &x, "rear_right.N");
     double whole = trial_reaction (twin, &y, "rear_left.N");
-    check_close ("the sum", left + right, whole, 1e-12 * (1 + fabs (whole)), "twins in a fixed-step method");
-    check_close ("the halves", left, right, 1e-12 * (1 + fabs (whole)), "the smallest reactions are equal ones");
+    check_close ("the sum", left + right, whole, 1e-12 * (1 + fabs (whole)),
+                 "round-off: the same motion by the same steps");
+    check_close ("the halves", left, right, 1e-12 * (1 + fabs (whole)), "reactions of least norm are equal");
   }
-  pw_run_close (r);
-  pw_run_close (one);
-  pw_system_free (s);
-  pw_system_free (twin);
+  runs_close (r, s);
+  runs_close (one, twin);
 }
 
 /* ---- Two bodies connected by a weld and two pins, pinned to the ground ---- */
@@ -179,18 +165,8 @@ static void redundant_frame (pw_model *m, int pins) {
   pw_add_gravity (m, &(pw_gravity){ .name = "gravity", .acceleration = { 0, -9.81 } });
 }
 
-static void redundant_bolted (pw_model *m, const void *parameter) {
-  (void)parameter;
-  redundant_frame (m, 2);
-}
-
-static void redundant_welded (pw_model *m, const void *parameter) {
-  (void)parameter;
-  redundant_frame (m, 0);
-}
-
-static const pw_plugin_table redundant_bolted_table = TRIAL_TABLE (redundant_bolted);
-static const pw_plugin_table redundant_welded_table = TRIAL_TABLE (redundant_welded);
+REDUNDANT_SCENE (redundant_bolted, redundant_frame (m, 2));
+REDUNDANT_SCENE (redundant_welded, redundant_frame (m, 0));
 
 static void test_frame (void **state) {
   (void)state;
@@ -264,8 +240,7 @@ static void test_moments (void **state) {
   check_close ("pin", trial_reaction (s, &x, "pin.Fy"), p, 1e-12 * W, "round-off");
   check_close ("weld", trial_reaction (s, &x, "weld.Fy"), W - p, 1e-12 * W, "round-off");
   check_close ("moment", fabs (trial_reaction (s, &x, "weld.M")), d * p, 1e-12 * W * d, "round-off");
-  pw_run_close (r);
-  pw_system_free (s);
+  runs_close (r, s);
 }
 
 /* Two bodies with two common pins: the redundant equation is the one along the line between them. */
@@ -278,7 +253,7 @@ static void redundant_two_pins (pw_model *m, const void *parameter) {
     pw_add_pin (m, &(pw_pin){ .name = i ? "Q" : "P", .body = { "one", "two" }, .at = { { i, 0 }, { i, 0 } } });
 }
 
-/* After a restart with this line turned by 90 degrees other equations are independent. */
+/* After a restart with this line turned by 90 degrees other equations are redundant. */
 static void test_restart (void **state) {
   static const pw_plugin_table pins = TRIAL_TABLE (redundant_two_pins);
   static const double turned[] = { 0, 0, PW_PI / 2, 0, 0, PW_PI / 2 };
@@ -298,17 +273,15 @@ static void test_restart (void **state) {
 }
 
 int main (void) {
-  const struct CMUnitTest tests[] = {
-    cmocka_unit_test (test_parallelogram_twins),
-    cmocka_unit_test (test_parallelogram_start),
-    cmocka_unit_test (test_drives),
-    cmocka_unit_test (test_axle),
-    cmocka_unit_test (test_axle_forces),
-    cmocka_unit_test (test_frame),
-    cmocka_unit_test (test_names),
-    cmocka_unit_test (test_kept),
-    cmocka_unit_test (test_moments),
-    cmocka_unit_test (test_restart),
-  };
+  const struct CMUnitTest tests[] = { cmocka_unit_test (test_parallelogram_twins),
+                                      cmocka_unit_test (test_parallelogram_start),
+                                      cmocka_unit_test (test_drives),
+                                      cmocka_unit_test (test_axle),
+                                      cmocka_unit_test (test_axle_forces),
+                                      cmocka_unit_test (test_frame),
+                                      cmocka_unit_test (test_names),
+                                      cmocka_unit_test (test_kept),
+                                      cmocka_unit_test (test_moments),
+                                      cmocka_unit_test (test_restart) };
   return cmocka_run_group_tests (tests, NULL, NULL);
 }

@@ -27,29 +27,18 @@ static void redundant_tow (pw_model *m, int bolts) {
              .name = "rope", .body = { "bracket", "load" }, .at = { { 0.2, 0 } }, .stiffness = 10, .length = 2 });
 }
 
-static void redundant_towed (pw_model *m, const void *parameter) {
-  (void)parameter;
-  redundant_tow (m, 2);
-}
-
-static void redundant_towed_plainly (pw_model *m, const void *parameter) {
-  (void)parameter;
-  redundant_tow (m, 0);
-}
-
-static const pw_plugin_table redundant_towed_table = TRIAL_TABLE (redundant_towed);
-static const pw_plugin_table redundant_towed_plainly_table = TRIAL_TABLE (redundant_towed_plainly);
+REDUNDANT_SCENE (redundant_bolted, redundant_tow (m, 2));
+REDUNDANT_SCENE (redundant_welded, redundant_tow (m, 0));
 
 static void test_bracket (void **state) {
   (void)state;
   static const char *const name[] = { "hull.x", "hull.phi", "load.x", "load.y", "bracket.phi", "hull.omega", NULL };
   double a[REDUNDANT_COORDS], b[REDUNDANT_COORDS];
-  redundant_twins (&redundant_towed_table, &redundant_towed_plainly_table, 1, 2e-4,
-                   name); /* past one reselection of rows */
-  trial (&redundant_towed_table, 1);
-  redundant_end (&redundant_towed_table, "rk4+projection", 0, 5, name, a, 1e-3);
-  redundant_end (&redundant_towed_plainly_table, "rk4+projection", 0, 5, name, b, 1e-3);
-  check_below ("past many changes", redundant_off (a, b, 6), 1e-10, "round-off of 5 s, magnified by the motion");
+  redundant_twins (&redundant_bolted_table, &redundant_welded_table, 1, 2e-4, name); /* past one reselection of rows */
+  trial (&redundant_bolted_table, 1);
+  redundant_end (&redundant_bolted_table, "rk4+projection", 0, 5, name, a, 1e-3);
+  redundant_end (&redundant_welded_table, "rk4+projection", 0, 5, name, b, 1e-3);
+  check_below ("past many changes", redundant_distance (a, b, 6), 1e-10, "round-off of 5 s, magnified by the motion");
 }
 
 /* ---- The same with a caster of short trail under the load ----
@@ -63,31 +52,19 @@ static void redundant_caster (pw_model *m) {
   pw_add_wheel (m, &(pw_wheel){ .name = "wheel", .body = "fork", .at = { -0.08, 0 } });
 }
 
-static void redundant_towed_on_caster (pw_model *m, const void *parameter) {
-  (void)parameter;
-  redundant_tow (m, 2);
-  redundant_caster (m);
-}
-
-static void redundant_towed_on_caster_plainly (pw_model *m, const void *parameter) {
-  (void)parameter;
-  redundant_tow (m, 0);
-  redundant_caster (m);
-}
-
-static const pw_plugin_table redundant_on_caster_table = TRIAL_TABLE (redundant_towed_on_caster);
-static const pw_plugin_table redundant_on_caster_plainly_table = TRIAL_TABLE (redundant_towed_on_caster_plainly);
+REDUNDANT_SCENE (redundant_bolted_on_caster, redundant_tow (m, 2); redundant_caster (m));
+REDUNDANT_SCENE (redundant_welded_on_caster, redundant_tow (m, 0); redundant_caster (m));
 
 static void test_caster (void **state) {
   (void)state;
   static const char *const name[] = { "hull.x", "hull.phi", "load.x", "load.y", "bracket.phi", "fork.phi", NULL };
   static const char *const method[] = { "erk8+projection", "erk5+projection", "erk8+baumgarte", "ida+ggl", NULL };
   double a[REDUNDANT_COORDS], b[REDUNDANT_COORDS], exact[REDUNDANT_COORDS];
-  redundant_end (&redundant_on_caster_plainly_table, "erk8+projection", 1e-12, 3, name, exact, 0);
+  redundant_end (&redundant_welded_on_caster_table, "erk8+projection", 1e-12, 3, name, exact, 0);
   for (int i = 0; method[i]; i++) {
-    redundant_end (&redundant_on_caster_table, method[i], 1e-9, 3, name, a, 0);
-    redundant_end (&redundant_on_caster_plainly_table, method[i], 1e-9, 3, name, b, 0);
-    check_below (method[i], redundant_off (a, exact, 6), 1e-9 + 10 * redundant_off (b, exact, 6),
+    redundant_end (&redundant_bolted_on_caster_table, method[i], 1e-9, 3, name, a, 0);
+    redundant_end (&redundant_welded_on_caster_table, method[i], 1e-9, 3, name, b, 0);
+    check_below (method[i], redundant_distance (a, exact, 6), 1e-9 + 10 * redundant_distance (b, exact, 6),
                  "rtol, and 10 times the twin's own error");
   }
 }
@@ -97,9 +74,9 @@ static void test_drifting_bolts (void **state) {
   (void)state;
   static const char *const name[] = { "hull.x", "hull.y", "hull.phi", "load.x", "load.y", "fork.phi", NULL };
   double a[REDUNDANT_COORDS], b[REDUNDANT_COORDS];
-  redundant_end (&redundant_on_caster_table, "rk4+none", 0, 3, name, a, 0.004);
-  redundant_end (&redundant_on_caster_plainly_table, "rk4+none", 0, 3, name, b, 0.004);
-  check_below ("the bolted bracket", redundant_off (a, b, 6), 1e-3, "drift");
+  redundant_end (&redundant_bolted_on_caster_table, "rk4+none", 0, 3, name, a, 0.004);
+  redundant_end (&redundant_welded_on_caster_table, "rk4+none", 0, 3, name, b, 0.004);
+  check_below ("the bolted bracket", redundant_distance (a, b, 6), 1e-3, "drift");
 }
 
 /* ---- A cart on two casters with massless forks, with two wheels on each axle ----
@@ -126,18 +103,8 @@ static void redundant_casters (pw_model *m, int wheels) {
                                   .value = { PW_HARMONIC, .harmonic = { .amplitude = 0.1, .omega = 2 } } });
 }
 
-static void redundant_four_wheels (pw_model *m, const void *parameter) {
-  (void)parameter;
-  redundant_casters (m, 2);
-}
-
-static void redundant_two_wheels (pw_model *m, const void *parameter) {
-  (void)parameter;
-  redundant_casters (m, 1);
-}
-
-static const pw_plugin_table redundant_four_wheels_table = TRIAL_TABLE (redundant_four_wheels);
-static const pw_plugin_table redundant_two_wheels_table = TRIAL_TABLE (redundant_two_wheels);
+REDUNDANT_SCENE (redundant_four_wheels, redundant_casters (m, 2));
+REDUNDANT_SCENE (redundant_two_wheels, redundant_casters (m, 1));
 
 static void test_casters (void **state) {
   (void)state;
@@ -149,11 +116,7 @@ static void test_casters (void **state) {
 }
 
 int main (void) {
-  const struct CMUnitTest tests[] = {
-    cmocka_unit_test (test_bracket),
-    cmocka_unit_test (test_caster),
-    cmocka_unit_test (test_drifting_bolts),
-    cmocka_unit_test (test_casters),
-  };
+  const struct CMUnitTest tests[] = { cmocka_unit_test (test_bracket), cmocka_unit_test (test_caster),
+                                      cmocka_unit_test (test_drifting_bolts), cmocka_unit_test (test_casters) };
   return cmocka_run_group_tests (tests, NULL, NULL);
 }

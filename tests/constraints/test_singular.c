@@ -37,17 +37,16 @@ static void test_four_bar (void **state) {
   check_below ("energy, worst of the run", energy, 1e-9, "kept over ten passes");
   check_close ("balance at the end", x.balance, 0, 1e-9, "kept over ten passes");
   /* between passes the energy defect oscillates by 1.01e-9 J, of order h^4: relative to 36 J */
-  check_below ("balance, worst of the run", balance, 1e-9 * start, "kept over ten passes, of the energy there is");
+  check_below ("balance, worst of the run", balance, 1e-9 * start, "kept over ten passes, relative to the energy");
   assert_true (pw_run_statistics (r)->rejected > 0);
-  pw_run_close (r);
-  pw_system_free (s);
+  runs_close (r, s);
 }
 
-/* A step that ends on a singular configuration is replaced by a longer one, at every step size. */
-static void test_steps_on_it (void **state) {
+/* A step that would end at a singular configuration is replaced by a longer one, for all step sizes. */
+static void test_steps_ending_there (void **state) {
   static const struct {
     double cranks, step, t;
-    int parts;
+    int parts; /* number of samples */
   } steps[] = { { 2, 7.75e-4, 10, 10 }, { 2, 7.842e-4, 10, 1 }, { 5, 1e-4, 1, 10 }, { 40, 3.1e-4, 1.5, 10 } };
   (void)state;
   for (size_t i = 0; i < sizeof steps / sizeof *steps; i++) {
@@ -59,15 +58,14 @@ static void test_steps_on_it (void **state) {
       most = fmax (most, fabs (x.balance));
       before = x.kinetic + x.potential;
     }
-    check_below ("balance", most, 1e-8 * before, "kept over the passes, of the energy there is");
+    check_below ("balance", most, 1e-8 * before, "kept over the passes, relative to the energy");
     assert_true ((double)pw_run_statistics (r)->steps < 1.01 * t / steps[i].step);
-    pw_run_close (r);
-    pw_system_free (s);
+    runs_close (r, s);
   }
 }
 
-/* Implicit methods, too: these steps end on a singular configuration at 1.2, 2.7, 3.2, 5.1 or 6.5 s. */
-static void test_implicit_steps_on_it (void **state) {
+/* The same by implicit methods: these steps end at a singular configuration at 1.2, 2.7, 3.2, 5.1 or 6.5 s. */
+static void test_implicit_steps_ending_there (void **state) {
   static const struct {
     const char *method;
     double step;
@@ -82,8 +80,7 @@ static void test_implicit_steps_on_it (void **state) {
     pw_sample x = runs_to (r, 10);
     check_close (steps[i].method, remainder (trial_state (s, &x, "crank0.phi") - four, 2 * PW_PI), 0, 1e-4,
                  "published digits; of order 2: an error of 3e-5 at neighbouring steps");
-    pw_run_close (r);
-    pw_system_free (s);
+    runs_close (r, s);
   }
 }
 
@@ -97,14 +94,13 @@ static void test_slider_crank (void **state) {
     pw_sample x = runs_to (r, 1);
     check_close (method[i], trial_state (s, &x, "crank.phi"), 2.428234829106999646, 1e-9, "published digits");
     check_close ("balance", x.balance, 0, 1e-9, "energy is kept");
-    pw_run_close (r);
-    pw_system_free (s);
+    runs_close (r, s);
   }
 }
 
 /* An adaptive method passes or stops with a message; it never ends with status ok and a wrong result. */
-static void singular_or_told (const char *model, const char *method, double rtol, const char *name, double t,
-                              double exact, double period) {
+static void singular_passes_or_stops (const char *model, const char *method, double rtol, const char *name, double t,
+                                      double exact, double period) {
   pw_error error = { 0 };
   pw_sample x;
   char what[80];
@@ -121,8 +117,7 @@ static void singular_or_told (const char *model, const char *method, double rtol
     assert_int_equal (status, PW_METHOD);
     assert_true (strlen (error.text) > 20);
   }
-  pw_run_close (r);
-  pw_system_free (s);
+  runs_close (r, s);
 }
 
 /* Without the watchdog's criteria for drift, all of these end on another branch with status ok. */
@@ -146,8 +141,8 @@ static void test_ida (void **state) {
   (void)state;
   for (int i = 0; i < 2; i++) {
     double four = atan2 (0.9445185381786009622, 0.3284581115408153787);
-    singular_or_told ("n-four-bar", "ida+ggl", rtol[i], "crank0.phi", 10, four, 2 * PW_PI);
-    singular_or_told ("slider-crank", "ida+ggl", rtol[i], "crank.phi", 1, 2.428234829106999646, 2 * PW_PI);
+    singular_passes_or_stops ("n-four-bar", "ida+ggl", rtol[i], "crank0.phi", 10, four, 2 * PW_PI);
+    singular_passes_or_stops ("slider-crank", "ida+ggl", rtol[i], "crank.phi", 1, 2.428234829106999646, 2 * PW_PI);
   }
 }
 
@@ -207,12 +202,9 @@ static void singular_rhombus (pw_model *m, const void *parameter) {
 }
 
 /* A restart in a singular configuration is refused with the name of a pin; the run continues from its former state. */
-static void test_restarted_in (void **state) {
-  static const pw_plugin_table table = { .abi = PW_ABI,
-                                         .size = sizeof (pw_plugin_table),
-                                         .parameters = singular_angle_list,
-                                         .parameters_size = sizeof (singular_angle),
-                                         .build = singular_rhombus };
+static void test_restart_there (void **state) {
+  static const pw_plugin_table table =
+      TRIAL_TABLE_WITH (singular_rhombus, singular_angle_list, sizeof (singular_angle));
   static const double flat[9] = { 0.5, 0, 0, 1.5, 0, 0, 1.5, 0, 0 }, rest[9] = { 0 };
   static const char *const method[] = { "rk4+projection", "galpha+ggl", "bdf+projection" };
   (void)state;
@@ -230,8 +222,7 @@ static void test_restarted_in (void **state) {
     pw_sample now = runs_to (r, 0.01);
     for (int j = 0; j < 9; j++)
       check_close ("displacement after restart", now.q[j], start[j], 0.1, "from rest, in 10 ms");
-    pw_run_close (r);
-    pw_system_free (s);
+    runs_close (r, s);
   }
 }
 
@@ -239,7 +230,7 @@ static void test_restarted_in (void **state) {
  * singular configuration passes it like one that arrives at the same speed. */
 static void test_accelerated_by_restart (void **state) {
   static const char *const method[] = { "rk4", "leapfrog", "galpha+index3" };
-  const double slow = 1.4908, fast = 40, end = 1.5; /* 0.08 rad before it, which is the length of a step at `fast` */
+  const double slow = 1.4908, fast = 40, end = 1.5; /* 0.08 rad before it: a step of 2 ms at 40 rad/s */
   (void)state;
   for (int i = 0; i < 3; i++) {
     pw_error error = { 0 };
@@ -252,8 +243,7 @@ static void test_accelerated_by_restart (void **state) {
     x = runs_to (r, end);
     check_close ("angle", x.q[2], PW_PI / 2 - slow - fast * (end - slow), 1e-3,
                  "(0.08 rad)^3 of the methods of order 2");
-    pw_run_close (r);
-    pw_system_free (s);
+    runs_close (r, s);
   }
 }
 
@@ -279,23 +269,19 @@ static void test_nan (void **state) {
     assert_int_equal (pw_update_kinematics (r->w, 0, r->q, r->v), PW_OK);
     pw_evaluate_J (r->w);
   }
-  pw_run_close (r);
-  pw_system_free (s);
+  runs_close (r, s);
 }
 
 int main (void) {
-  const struct CMUnitTest tests[] = {
-    cmocka_unit_test (test_four_bar),
-    cmocka_unit_test (test_implicit_steps_on_it),
-    cmocka_unit_test (test_slider_crank),
-    cmocka_unit_test (test_ida),
-    cmocka_unit_test (test_flat_start),
-    cmocka_unit_test (test_restarted_in),
-
-    cmocka_unit_test (test_steps_on_it),
-    cmocka_unit_test (test_turned),
-    cmocka_unit_test (test_accelerated_by_restart),
-    cmocka_unit_test (test_nan),
-  };
+  const struct CMUnitTest tests[] = { cmocka_unit_test (test_four_bar),
+                                      cmocka_unit_test (test_implicit_steps_ending_there),
+                                      cmocka_unit_test (test_slider_crank),
+                                      cmocka_unit_test (test_ida),
+                                      cmocka_unit_test (test_flat_start),
+                                      cmocka_unit_test (test_restart_there),
+                                      cmocka_unit_test (test_steps_ending_there),
+                                      cmocka_unit_test (test_turned),
+                                      cmocka_unit_test (test_accelerated_by_restart),
+                                      cmocka_unit_test (test_nan) };
   return cmocka_run_group_tests (tests, NULL, NULL);
 }

@@ -5,11 +5,10 @@
 #include <string.h>
 #include "check.h"
 #include "model.h"
-#include "runs.h"
 #include "scene.h"
 #include "system.h"
-#include "toys.h"
 #include "start.h"
+#include "trial.h"
 
 /* ---- Initial values of the settings ---- */
 
@@ -35,8 +34,8 @@ static void test_settings (void **state) {
   pw_run_close (plain);
   pw_run *again = runs_open (shared, "rk4", NULL);
   check_bits ("the system's", pw_run_initial (again)->q, shared->q0, 6);
-  start_close (again, shared);
-  start_close (expected, own);
+  runs_close (again, shared);
+  runs_close (expected, own);
 }
 
 static void test_bad_settings (void **state) {
@@ -55,7 +54,7 @@ static void test_bad_settings (void **state) {
   pw_system_free (s);
 }
 
-/* ---- Nothing to do ---- */
+/* ---- Consistent and nearly consistent values ---- */
 
 static void test_consistent_unchanged (void **state) {
   (void)state;
@@ -65,10 +64,10 @@ static void test_consistent_unchanged (void **state) {
   assert_true (start->moved == 0 && start->released == 0);
   check_bits ("positions", start->q, s->q0, 6);
   check_bits ("velocities", start->v, s->v0, 6);
-  start_close (r, s);
+  runs_close (r, s);
 }
 
-/* Deviations above round-off are corrected, however small. */
+/* All deviations above round-off are corrected and reported. */
 static void test_small_deviation (void **state) {
   static const char *const name[] = { "steer.x", "frame.vy", NULL };
   static const double value[] = { 0.375 + 1e-10, 1e-10 };
@@ -78,7 +77,7 @@ static void test_small_deviation (void **state) {
     const char *const one[] = { name[i], NULL };
     pw_run *r = start_open (&s, one, value + i);
     assert_true (pw_run_initial (r)->moved > 0);
-    start_close (r, s);
+    runs_close (r, s);
   }
 }
 
@@ -93,7 +92,7 @@ static void test_round_off (void **state) {
   int changed = 0;
   for (int j = 0; j < 6; j++) changed += start->q[j] != start->q_given[j];
   assert_true (changed > 0 && start->moved == 0);
-  start_close (r, s);
+  runs_close (r, s);
 }
 
 /* A restart does not change a state reached by a run. */
@@ -112,7 +111,7 @@ static void test_reached_state_unchanged (void **state) {
     now = runs_to (r, t);
     check_bits ("positions", now.q, q, 6);
     check_bits ("velocities", now.v, v, 6);
-    start_close (r, s);
+    runs_close (r, s);
   }
 }
 
@@ -136,11 +135,7 @@ static const pw_parameter start_rod_list[] = { { .name = "phi" },
                                                { .name = "vy", .offset = 24 },
                                                { .name = "specified", .offset = 32 },
                                                { .name = NULL } };
-static const pw_plugin_table start_rod_table = { .abi = PW_ABI,
-                                                 .size = sizeof (pw_plugin_table),
-                                                 .parameters = start_rod_list,
-                                                 .parameters_size = 40,
-                                                 .build = start_rod };
+static const pw_plugin_table start_rod_table = TRIAL_TABLE_WITH (start_rod, start_rod_list, 40);
 
 static const pw_initial_report *start_of_rod (pw_system **s, pw_run **r, double phi, double x, double omega, double vy,
                                               double specified) {
@@ -161,7 +156,7 @@ static void test_specified (void **state) {
   check_close ("x", start->q[0], 0.5 * cos (PW_PI / 6), START_ROUND_OFF, START_REASON);
   check_close ("vy", start->v[1], cos (PW_PI / 6), START_ROUND_OFF, START_REASON);
   assert_true (pw_initial_specified (start, 2) && pw_initial_specified (start, 5) && !pw_initial_specified (start, 0));
-  start_close (r, s);
+  runs_close (r, s);
 }
 
 /* A specified 0, and x instead of the angle: the angle follows from x = 0.5 cos phi, omega from vy = 0.5 omega cos
@@ -173,11 +168,11 @@ static void test_specified_zero (void **state) {
   const pw_initial_report *start = start_of_rod (&s, &r, 1.5, 0, 0, 0, PW_SPECIFIES_X);
   assert_true (start->q[0] == 0 && start->changed == 0);
   check_close ("phi", start->q[2], PW_PI / 2, START_ROUND_OFF, START_REASON);
-  start_close (r, s);
+  runs_close (r, s);
   start = start_of_rod (&s, &r, PW_PI / 3, 0, 0, 0.75, 0);
   assert_true (start->q[2] == PW_PI / 3 && start->v[1] == 0.75 && start->changed == 0);
   check_close ("omega", start->v[2], 3, START_ROUND_OFF, START_REASON);
-  start_close (r, s);
+  runs_close (r, s);
 }
 
 /* Specified positions that contradict the pin change as little as possible and are reported; specified velocities
@@ -189,7 +184,7 @@ static void test_overspecified (void **state) {
   const pw_initial_report *start = start_of_rod (&s, &r, PW_PI / 6, 0.5, 2, 0, 0);
   assert_true (start->released == 0 && start->changed == 2 && start->v[2] == 2);
   assert_true (start->q[2] > 0.1 && start->q[2] < PW_PI / 6 && start->q[0] < 0.5);
-  start_close (r, s);
+  runs_close (r, s);
 }
 
 /* Given values take precedence over specified ones. */
@@ -203,10 +198,10 @@ static void test_given_before_specified (void **state) {
   const pw_initial_report *start = pw_run_initial (r);
   assert_true (start->q[1] == 0.4 && start->released == 0 && start->changed == 1);
   check_close ("phi", start->q[2], asin (0.8), START_ROUND_OFF, START_REASON);
-  start_close (r, s);
+  runs_close (r, s);
 }
 
-/* A body on two wheels or slots one behind the other, pinned to an arm that is not placed. */
+/* A body on two wheels, or in two slots, one behind the other, pinned to an arm without given values. */
 static void start_axles (pw_model *m, const void *parameters) {
   const int slots = ((const double *)parameters)[4] != 0;
   pw_add_body (m, &(pw_body){ .name = "car", .mass = 1, .inertia = 1 });
@@ -224,9 +219,7 @@ static void start_axles (pw_model *m, const void *parameters) {
 /* Given values that satisfy the constraints are kept, though they leave two equations for one unknown: with y, or vy,
  * only the angle, or omega, of the car is left. */
 static void test_given_consistent (void **state) {
-  static const pw_plugin_table table = {
-    .abi = PW_ABI, .size = sizeof table, .parameters = start_rod_list, .parameters_size = 40, .build = start_axles
-  };
+  static const pw_plugin_table table = TRIAL_TABLE_WITH (start_axles, start_rod_list, 40);
   static const char *const name[2][3] = { { "car.vx", "car.vy", "car.omega" }, { "car.x", "car.y", "car.phi" } };
   (void)state;
   for (int slots = 0; slots < 2; slots++)
@@ -241,23 +234,21 @@ static void test_given_consistent (void **state) {
       assert_true (start->released == 0 && start->changed == 0);
       check_close ("x of the car", state_of[0], given & 1 ? 10 : 0, START_ROUND_OFF, START_REASON);
       check_close ("x of the arm", state_of[3], given & 1 ? 10 : 0, 10 * START_ROUND_OFF, START_REASON);
-      start_close (r, s);
+      runs_close (r, s);
     }
 }
 
 int main (void) {
-  const struct CMUnitTest tests[] = {
-    cmocka_unit_test (test_settings),
-    cmocka_unit_test (test_bad_settings),
-    cmocka_unit_test (test_consistent_unchanged),
-    cmocka_unit_test (test_small_deviation),
-    cmocka_unit_test (test_round_off),
-    cmocka_unit_test (test_reached_state_unchanged),
-    cmocka_unit_test (test_specified),
-    cmocka_unit_test (test_specified_zero),
-    cmocka_unit_test (test_overspecified),
-    cmocka_unit_test (test_given_before_specified),
-    cmocka_unit_test (test_given_consistent),
-  };
+  const struct CMUnitTest tests[] = { cmocka_unit_test (test_settings),
+                                      cmocka_unit_test (test_bad_settings),
+                                      cmocka_unit_test (test_consistent_unchanged),
+                                      cmocka_unit_test (test_small_deviation),
+                                      cmocka_unit_test (test_round_off),
+                                      cmocka_unit_test (test_reached_state_unchanged),
+                                      cmocka_unit_test (test_specified),
+                                      cmocka_unit_test (test_specified_zero),
+                                      cmocka_unit_test (test_overspecified),
+                                      cmocka_unit_test (test_given_before_specified),
+                                      cmocka_unit_test (test_given_consistent) };
   return cmocka_run_group_tests (tests, NULL, NULL);
 }

@@ -1,4 +1,4 @@
-/* The watchdog: a change of each threshold changes a result. */
+/* The thresholds of the watchdog: a change of each one changes a result. */
 #include <math.h>
 #include <stddef.h>
 #include <stdio.h>
@@ -10,21 +10,20 @@
 #include "scene.h"
 #include "trial.h"
 
-/* Effect of a changed threshold on a run. */
+/* The effect on a run: it stops EARLIER or LATER; FEWER or MORE steps are rejected. */
 typedef enum { WATCHDOG_EARLIER, WATCHDOG_LATER, WATCHDOG_FEWER, WATCHDOG_MORE } watchdog_effect;
 
 #define WATCHDOG_LIMIT(x) #x, offsetof(pw_thresholds, x)
 
-/* EARLIER, LATER: time at which the run stops; FEWER, MORE: rejected steps. */
 static const struct {
   const char *name;
-  size_t at;
-  double factor;
+  size_t at;     /* offset in pw_thresholds */
+  double factor; /* of the threshold */
   watchdog_effect effect;
   const char *model, *parameter;
-  double value;
+  double value; /* of the parameter */
   const char *method;
-  double tolerance, t;
+  double tolerance, t; /* rtol, or fixed step [s]; end of the run [s] */
 } watchdog_limit[] = {
   { WATCHDOG_LIMIT (lost), 4, WATCHDOG_LATER, "slider-crank", NULL, 0, "ida+ggl", 1e-2, 4 },
   { WATCHDOG_LIMIT (lost_unstabilised), 0.5, WATCHDOG_EARLIER, "pendulum", NULL, 0, "ida+none", 1e-3, 100 },
@@ -54,13 +53,10 @@ static const struct {
   { WATCHDOG_LIMIT (resolved), 8, WATCHDOG_LATER, "slider-crank", "l2", 1.001, "leapfrog", 1e-2, 4 },
 };
 
-/* The time at which a run stops, and its rejected steps. */
+/* The time at which a run stops, and its rejected steps, with one threshold multiplied by the factor. */
 static void watchdog_measure (int i, double factor, double *t, long *rejected) {
   pw_error error = { 0 };
-  const char *parameter = watchdog_limit[i].parameter;
-  double value = watchdog_limit[i].value;
-  pw_system *s = watchdog_limit[i].model ? scene_named (watchdog_limit[i].model, parameter, value)
-                                         : scene_system (&bars_table, parameter, value, NULL);
+  pw_system *s = scene_named (watchdog_limit[i].model, watchdog_limit[i].parameter, watchdog_limit[i].value);
   pw_run *r = runs_open (s, watchdog_limit[i].method,
                          &(pw_settings){ .rtol = watchdog_limit[i].tolerance,
                                          .step = watchdog_limit[i].tolerance,
@@ -70,8 +66,7 @@ static void watchdog_measure (int i, double factor, double *t, long *rejected) {
   *t = pw_run_time (r);
   *rejected = pw_run_statistics (r)->rejected;
   print_message ("%s times %g: t = %g, %ld rejected: %s\n", watchdog_limit[i].name, factor, *t, *rejected, error.text);
-  pw_run_close (r);
-  pw_system_free (s);
+  runs_close (r, s);
 }
 
 static void test_limits (void **state) {
@@ -82,7 +77,7 @@ static void test_limits (void **state) {
     long rejected[2];
     watchdog_measure ((int)i, 1, &t[0], &rejected[0]);
     watchdog_measure ((int)i, watchdog_limit[i].factor, &t[1], &rejected[1]);
-    int good[] = { t[1]<t[0], t[1]> t[0], rejected[1]<rejected[0], rejected[1]> rejected[0] };
+    int good[] = { t[1]<t[0], t[1]> t[0], rejected[1]<rejected[0], rejected[1]> rejected[0] }; /* by effect */
     if (!good[watchdog_limit[i].effect]) print_error ("%s has no effect\n", watchdog_limit[i].name), bad++;
   }
   assert_int_equal (bad, 0);
@@ -98,11 +93,10 @@ static void test_again (void **state) {
   assert_int_equal (pw_run_advance_to (r, 4, 4, &first), PW_METHOD);
   assert_int_equal (pw_run_advance (r, 4, &second), PW_METHOD);
   check_error (&second, PW_METHOD, first.text);
-  pw_run_close (r);
-  pw_system_free (s);
+  runs_close (r, s);
 }
 
-/* ---- Thresholds without effect on the end of a run ---- */
+/* ---- Thresholds that such runs do not reveal ---- */
 
 /* Sets the state of r to a rhombus of bars of 1 m at this angle, in motion. */
 static void watchdog_bend (pw_run *r, double angle) {
@@ -125,12 +119,11 @@ static void test_near_state (void **state) {
     assert_int_equal (pw_watchdog_near_state (r), 1);
     watchdog_bend (r, 1);
     assert_int_equal (pw_watchdog_near_state (r), 0);
-    pw_run_close (r);
-    pw_system_free (s);
+    runs_close (r, s);
   }
 }
 
-/* Without a sine, that of a tree of joints, no row is named. */
+/* A tree of joints has no singular configuration: the sine is 1, without a row. */
 static void test_tree (void **state) {
   (void)state;
   int row = 7;
@@ -139,8 +132,7 @@ static void test_tree (void **state) {
   assert_null (r->geometry.saddle);
   check_close ("sine", pw_watchdog_sine (r, &row), 1, 0, "never singular");
   assert_int_equal (row, -1);
-  pw_run_close (r);
-  pw_system_free (s);
+  runs_close (r, s);
 }
 
 /* Residual |J a - gamma| of accelerations evaluated at this angle. */
@@ -187,8 +179,7 @@ static void test_evaluations (void **state) {
   r->refused_sine = 0.5 * sine;
   assert_int_equal (pw_run_accelerate (r, 0, r->q, r->v, r->a, r->lambda), PW_OK);
   assert_true (r->limits.rank_lost == pw_watchdog_limits.rank_lost);
-  pw_run_close (r);
-  pw_system_free (s);
+  runs_close (r, s);
 }
 
 static void test_jump (void **state) {
@@ -204,8 +195,7 @@ static void test_jump (void **state) {
   error = (pw_error){ 0 };
   r->near_singular = 1;
   check_ok (pw_run_watchdog (r, &error), &error);
-  pw_run_close (r);
-  pw_system_free (s);
+  runs_close (r, s);
 }
 
 /* A redundant row whose residual is the largest does not contradict the others if theirs are of the same size. */
@@ -224,8 +214,7 @@ static void test_drift (void **state) {
   pw_forget_residuals (r);
   assert_int_equal (pw_run_watchdog (r, &error), PW_METHOD);
   assert_non_null (strstr (error.text, "constraint drift: pin B"));
-  pw_run_close (r);
-  pw_system_free (s);
+  runs_close (r, s);
 }
 
 static void test_masses (void **state) {
@@ -236,8 +225,7 @@ static void test_masses (void **state) {
   assert_int_equal (pw_watchdog_check_values (r, &error), PW_OK);
   r->limits.extreme /= 2;
   assert_int_equal (pw_watchdog_check_values (r, &error), PW_INPUT);
-  pw_run_close (r);
-  pw_system_free (s);
+  runs_close (r, s);
 }
 
 /* The acceleration norm is in units of the scene: independent of the torque on a disc. */
@@ -251,28 +239,21 @@ static void watchdog_build_disc (pw_model *m, const void *parameter) {
 
 static void test_acceleration_norm (void **state) {
   static const pw_parameter list[] = { { .name = "torque", .value = 1 }, { .name = NULL } };
-  static const pw_plugin_table table = { .abi = PW_ABI,
-                                         .size = sizeof (pw_plugin_table),
-                                         .parameters = list,
-                                         .parameters_size = sizeof (double),
-                                         .build = watchdog_build_disc };
+  static const pw_plugin_table table = TRIAL_TABLE_WITH (watchdog_build_disc, list, sizeof (double));
   (void)state;
   for (int k = 0; k <= 6; k += 2) {
     pw_system *s = scene_system (&table, "torque", pow (10, k), NULL);
     pw_run *r = runs_open (s, "rk4+projection", NULL);
     check_close ("acceleration norm", pw_run_acceleration_norm (r), 1, 16 * CHECK_EPS, "round-off");
-    pw_run_close (r);
-    pw_system_free (s);
+    runs_close (r, s);
   }
 }
 
 int main (void) {
-  const struct CMUnitTest tests[] = {
-    cmocka_unit_test (test_limits), cmocka_unit_test (test_evaluations),
-    cmocka_unit_test (test_jump),   cmocka_unit_test (test_acceleration_norm),
-    cmocka_unit_test (test_masses), cmocka_unit_test (test_near_state),
-    cmocka_unit_test (test_tree),   cmocka_unit_test (test_drift),
-    cmocka_unit_test (test_again),
-  };
+  const struct CMUnitTest tests[] = { cmocka_unit_test (test_limits), cmocka_unit_test (test_evaluations),
+                                      cmocka_unit_test (test_jump),   cmocka_unit_test (test_acceleration_norm),
+                                      cmocka_unit_test (test_masses), cmocka_unit_test (test_near_state),
+                                      cmocka_unit_test (test_tree),   cmocka_unit_test (test_drift),
+                                      cmocka_unit_test (test_again) };
   return cmocka_run_group_tests (tests, NULL, NULL);
 }

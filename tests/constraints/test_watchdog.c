@@ -35,11 +35,8 @@ static void watchdog_build_cart (pw_model *m, const void *parameter) {
   pw_add_gravity (m, &(pw_gravity){ .name = "g", .acceleration = { 0, -9.81 } });
 }
 
-static const pw_plugin_table watchdog_cart_table = { .abi = PW_ABI,
-                                                     .size = sizeof (pw_plugin_table),
-                                                     .parameters = watchdog_cart_list,
-                                                     .parameters_size = sizeof (watchdog_cart),
-                                                     .build = watchdog_build_cart };
+static const pw_plugin_table watchdog_cart_table =
+    TRIAL_TABLE_WITH (watchdog_build_cart, watchdog_cart_list, sizeof (watchdog_cart));
 
 /* ---- Regular scenes with very different masses ---- */
 
@@ -73,8 +70,7 @@ static void watchdog_try_cart (const char *method, double cart, double scale, do
   pw_run *r = runs_open (s, method, &(pw_settings){ .rtol = 1e-9, .span = 10 });
   pw_sample x = runs_to (r, 10);
   check_close (method, trial_state (s, &x, "cart.x"), (1 - cos (exact)) / (1 + cart), bound, "1e4 rtol");
-  pw_run_close (r);
-  pw_system_free (s);
+  runs_close (r, s);
 }
 
 static void test_nearly_massless_cart (void **state) {
@@ -102,8 +98,7 @@ static void test_sine (void **state) {
     pw_run *r = runs_open (s, "rk4+projection", NULL);
     sine[i] = pw_watchdog_sine (r, NULL);
     check_close ("largest", r->geometry.largest_sine, sine[i], 0.3, "at any configuration but a singular one");
-    pw_run_close (r);
-    pw_system_free (s);
+    runs_close (r, s);
   }
   check_bits ("sine", sine, sine + 1, 2);
 }
@@ -206,8 +201,8 @@ static void test_no_change_point (void **state) {
 enum { WATCHDOG_BARS = 9 };
 static const double watchdog_bar = 2.5;
 
-/* A parallelogram with cranks of 1 m at this angle; crossed: on the other branch, its pin C is reflected at the line
- * from pin B to pin D. */
+/* A parallelogram with cranks of 1 m at this angle; crossed: on the other branch, with pin C reflected at the line from
+ * pin B to pin D. */
 static void watchdog_bars_at (double phi, int crossed, double *q) {
   const double b = watchdog_bar, x = cos (phi), y = sin (phi);
   const double part = crossed ? 2 * b * (b - x) / ((b - x) * (b - x) + y * y) : 0;
@@ -219,7 +214,7 @@ static void watchdog_bars_at (double phi, int crossed, double *q) {
   q[8] += 2 * PW_PI * round ((phi - q[8]) / (2 * PW_PI));
 }
 
-/* Of two crossings of branches within a step, the second one must also be left straight on. */
+/* Branches cross twice within a step: the motion must stay on its branch at the second crossing, too. */
 static void test_two_crossings (void **state) {
   (void)state;
   for (int crossed = 0; crossed < 2; crossed++) {
@@ -233,8 +228,7 @@ static void test_two_crossings (void **state) {
     double sine = pw_watchdog_sine (r, NULL);
     assert_int_equal (pw_change_point_check (r, sine, &error), crossed ? PW_METHOD : PW_OK);
     assert_true (!crossed || strstr (error.text, "the motion has left its branch"));
-    pw_run_close (r);
-    pw_system_free (s);
+    runs_close (r, s);
   }
 }
 
@@ -242,7 +236,7 @@ static void test_two_crossings (void **state) {
 
 static long watchdog_count;
 
-/* Counts the configurations that are evaluated. */
+/* 0; counts the evaluations. */
 static int watchdog_torque (void *context, double t, const double *x, double value[3], double *gradient) {
   (void)context, (void)t, (void)x, (void)gradient;
   watchdog_count++;
@@ -268,9 +262,8 @@ static void test_fast_disc (void **state) {
   watchdog_count = 0;
   pw_run *r = runs_open (s, "rk4+projection", &(pw_settings){ .step = 1e-3, .span = 1 });
   for (int i = 0; i < 3; i++) check_ok (pw_run_advance (r, 1, &error), &error);
-  check_close ("evaluations", (double)watchdog_count, 0, 1e4, "a thousand within each step, and some");
-  pw_run_close (r);
-  pw_system_free (s);
+  check_close ("evaluations", (double)watchdog_count, 0, 1e4, "about a thousand in each step");
+  runs_close (r, s);
 }
 
 /* ---- A signal that fails where only the watchdog evaluates it ---- */
@@ -292,7 +285,7 @@ static void watchdog_build_failing (pw_model *m, const void *parameters) {
   pw_add_torque (m, &torque);
 }
 
-/* Its failure is no reason for a later error. */
+/* A later error does not mention this failure. */
 static void test_failing_signal (void **state) {
   (void)state;
   pw_error error = { 0 };
@@ -315,8 +308,7 @@ static void test_failing_signal (void **state) {
   check_error (&error, PW_INITIAL,
                "model scene: the initial configuration is singular: 7 constraint equations are independent there, 8 "
                "nearby; begin slightly off it");
-  pw_run_close (r);
-  pw_system_free (s);
+  runs_close (r, s);
 }
 
 /* ---- Messages ---- */
@@ -356,11 +348,7 @@ static void watchdog_build_small (pw_model *m, const void *parameter) {
 /* The bounds in the message are in the units of the value, which is outside them. */
 static void watchdog_try_inertia (double inertia) {
   static const pw_parameter list[] = { { .name = "inertia", .value = 1 }, { .name = NULL } };
-  static const pw_plugin_table table = { .abi = PW_ABI,
-                                         .size = sizeof (pw_plugin_table),
-                                         .parameters = list,
-                                         .parameters_size = sizeof (double),
-                                         .build = watchdog_build_small };
+  static const pw_plugin_table table = TRIAL_TABLE_WITH (watchdog_build_small, list, sizeof (double));
   double value, low, high;
   pw_error error = { 0 };
   pw_system *s = scene_system (&table, "inertia", inertia, NULL);
@@ -396,22 +384,19 @@ static void test_extreme (void **state) {
   if (r) pw_run_advance_to (r, 1, 1, &error);
   assert_int_equal (error.status, PW_METHOD);
   assert_non_null (strstr (error.text, "values too extreme: masses and inertias differ"));
-  pw_run_close (r);
-  pw_system_free (s);
+  runs_close (r, s);
 }
 
 int main (void) {
-  const struct CMUnitTest tests[] = {
-    cmocka_unit_test (test_nearly_massless_cart),
-    cmocka_unit_test (test_sine),
-    cmocka_unit_test (test_close_branches_slider_crank),
-    cmocka_unit_test (test_close_branches_four_bar),
-    cmocka_unit_test (test_no_change_point),
-    cmocka_unit_test (test_two_crossings),
-    cmocka_unit_test (test_fast_disc),
-    cmocka_unit_test (test_failing_signal),
-    cmocka_unit_test (test_messages),
-    cmocka_unit_test (test_extreme),
-  };
+  const struct CMUnitTest tests[] = { cmocka_unit_test (test_nearly_massless_cart),
+                                      cmocka_unit_test (test_sine),
+                                      cmocka_unit_test (test_close_branches_slider_crank),
+                                      cmocka_unit_test (test_close_branches_four_bar),
+                                      cmocka_unit_test (test_no_change_point),
+                                      cmocka_unit_test (test_two_crossings),
+                                      cmocka_unit_test (test_fast_disc),
+                                      cmocka_unit_test (test_failing_signal),
+                                      cmocka_unit_test (test_messages),
+                                      cmocka_unit_test (test_extreme) };
   return cmocka_run_group_tests (tests, NULL, NULL);
 }

@@ -1,4 +1,4 @@
-/* Drifted constraints turn one branch of a motion into another, smoothly, without a jump of the accelerations. */
+/* With drifted constraints a motion can change its branch smoothly, without a jump of the accelerations. */
 #include <math.h>
 #include <string.h>
 #include "check.h"
@@ -31,7 +31,6 @@ int turns_try (const char *method, double rtol, const char *model, double value)
   }
   print_message ("%s %g, %s, rtol %g: %s\n", model, value, method, rtol, status == PW_OK ? "passed" : error.text);
   check_below (method, apart, 0.3, "on the initial branch, or stopped before leaving it");
-  pw_run_close (r);
-  pw_system_free (s);
+  runs_close (r, s);
   return status == PW_METHOD && strstr (error.text, "methods with projection pass") != NULL;
 }

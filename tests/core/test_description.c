@@ -1,7 +1,6 @@
-/* The description: parameters, the order of calls, start values, names and sizes of what is compiled.
+/* The description: parameters, the order of calls, initial values, names and sizes in the compiled system.
  *
- * Here and in test_messages.c every message of the core is provoked, save "out of memory" (test_alloc.c) and "is too
- * large" (which takes more memory than a test should). */
+ * Together with test_messages.c this provokes every message of the core, except "out of memory" (test_alloc.c). */
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
@@ -11,6 +10,7 @@
 #include "scene.h"
 #include "system.h"
 #include "toys.h"
+#include "trial.h"
 
 /* ---- A model with parameters of all domains ---- */
 
@@ -35,13 +35,8 @@ static void description_build (pw_model *m, const void *parameters) {
   pw_add_body (m, &(pw_body){ .name = "steer", .mass = 1, .inertia = 1 });
 }
 
-static const pw_plugin_table description_table = {
-  .abi = PW_ABI,
-  .size = sizeof description_table,
-  .parameters = description_list,
-  .parameters_size = sizeof (description_parameters),
-  .build = description_build,
-};
+static const pw_plugin_table description_table =
+    TRIAL_TABLE_WITH (description_build, description_list, sizeof (description_parameters));
 
 static void test_parameters (void **state) {
   (void)state;
@@ -74,7 +69,7 @@ static void test_bad_parameters (void **state) {
 
 static void test_no_parameters (void **state) {
   (void)state;
-  pw_plugin_table table = { .abi = PW_ABI, .size = sizeof table, .build = description_build };
+  pw_plugin_table table = TRIAL_TABLE (description_build);
   pw_error error = { 0 };
   pw_model *m = pw_model_new ("cart", &table, &error);
   assert_int_equal (pw_model_set (m, "length", 1, &error), PW_INPUT);
@@ -127,7 +122,7 @@ static void test_order_of_calls (void **state) {
   pw_model_free (m);
 }
 
-/* What an earlier call could not give is passed on as NULL, and refused wherever it goes. */
+/* NULL, the result of a failed call, is an error of every function that takes it. */
 static void test_missing (void **state) {
   (void)state;
   pw_error e[] = { { 0 }, { 0 }, { 0 }, { 0 }, { 0 }, { 0 } };
@@ -164,20 +159,20 @@ static void test_missing_system (void **state) {
   pw_model_free (m);
 }
 
-static void description_add_nothing (pw_model *m, const void *parameters) {
+static void description_add_no_body (pw_model *m, const void *parameters) {
   (void)parameters;
   pw_add_body (m, NULL);
 }
 
-static void description_add_nameless (pw_model *m, const void *parameters) {
+static void description_add_no_pin (pw_model *m, const void *parameters) {
   (void)parameters;
   pw_add_pin (m, NULL);
 }
 
 static void test_missing_definitions (void **state) {
   (void)state;
-  static void (*const build[]) (pw_model * m, const void *parameters) = { description_add_nothing,
-                                                                          description_add_nameless };
+  static void (*const build[]) (pw_model * m, const void *parameters) = { description_add_no_body,
+                                                                          description_add_no_pin };
   static const char *const text[] = { "model cart: pw_add_body without a body",
                                       "model cart: pw_add of element type pin without a definition" };
   for (int i = 0; i < 2; i++) {
@@ -190,14 +185,7 @@ static void test_missing_definitions (void **state) {
   }
 }
 
-static void description_refused (pw_model *m, const char *text) {
-  pw_error error = { 0 };
-  assert_null (pw_system_compile (m, &error));
-  check_error (&error, PW_INPUT, text);
-  pw_model_free (m);
-}
-
-/* ---- From outside a build function ---- */
+/* ---- Changes of a built model ---- */
 
 static void description_no_signal (const char *element, const char *field, const char *text) {
   pw_error error = { 0 };
@@ -215,7 +203,7 @@ static void test_bad_set_signal (void **state) {
   description_no_signal ("A", "value", "model ezyroller: wheel A has no signal \"value\"");
 }
 
-static void test_start (void **state) {
+static void test_initial (void **state) {
   (void)state;
   pw_error error = { 0 };
   pw_model *m = scene_model (&scene_ezyroller, NULL);
@@ -223,13 +211,13 @@ static void test_start (void **state) {
   check_ok (pw_model_set_initial (m, "steer.vy", -2, &error), &error);
   pw_system *s = scene_compile (m);
   assert_true (s->q0[2] == 0.5 && s->v0[4] == -2 && s->origin[2] && s->origin[6 + 4]);
-  int held = 0;
-  for (int i = 0; i < 12; i++) held += s->origin[i] & PW_GIVEN;
-  assert_int_equal (held, 2);
+  int given = 0;
+  for (int i = 0; i < 12; i++) given += s->origin[i] & PW_GIVEN;
+  assert_int_equal (given, 2);
   pw_system_free (s);
 }
 
-static void test_bad_start (void **state) {
+static void test_bad_initial (void **state) {
   (void)state;
   pw_error error = { 0 };
   pw_model *m = scene_model (&scene_ezyroller, NULL);
@@ -237,10 +225,10 @@ static void test_bad_start (void **state) {
   check_error (&error, PW_INPUT, "model ezyroller: start frame.phi = nan: expected a finite number");
   error.status = PW_OK;
   check_ok (pw_model_set_initial (m, "frame.ph", 1, &error), &error);
-  description_refused (m, "model ezyroller has no state \"frame.ph\"; did you mean \"frame.phi\"?");
+  scene_refused (m, "model ezyroller has no state \"frame.ph\"; did you mean \"frame.phi\"?");
 }
 
-/* ---- Names and sizes of what is compiled ---- */
+/* ---- Names and sizes in the compiled system ---- */
 
 static void test_query (void **state) {
   (void)state;
@@ -288,8 +276,8 @@ static void test_bad_query (void **state) {
   pw_system_free (s);
 }
 
-/* Coordinates and losses of elements have names, too. */
-static void test_own_coordinates (void **state) {
+/* Names of internal coordinates and losses of elements. */
+static void test_internal_coordinates (void **state) {
   (void)state;
   pw_model *m = scene_model (&description_table, NULL);
   pw_add (m, &toy_kind_roller,
@@ -310,7 +298,7 @@ static void test_own_coordinates (void **state) {
   assert_string_equal (pw_system_state_unit (s, 8 + 7), "rad/s");
   assert_string_equal (pw_system_reaction_name (s, 3, text, sizeof text), "right.T");
   assert_string_equal (pw_system_ledger_name (s, 0, text, sizeof text), "k.loss");
-  assert_true (s->scale.length == 5); /* the farthest attachment */
+  assert_true (s->scale.length == 5); /* the largest distance of a point from its body's centre of mass */
   description_no_state (s, "left.spun", "model scene has no state \"left.spun\"; did you mean \"left.spin\"?");
   pw_system_free (s);
 }
@@ -345,7 +333,7 @@ static void test_copies (void **state) {
   pw_system_free (s);
 }
 
-/* Reactions are found by the names they have in tables. */
+/* Reactions are found by their names. */
 static void test_find_reaction (void **state) {
   (void)state;
   pw_system *s = scene_system (&scene_ezyroller, NULL);
@@ -366,9 +354,9 @@ int main (void) {
     cmocka_unit_test (test_parameters),          cmocka_unit_test (test_bad_parameters),
     cmocka_unit_test (test_no_parameters),       cmocka_unit_test (test_refused),
     cmocka_unit_test (test_bad_tables),          cmocka_unit_test (test_order_of_calls),
-    cmocka_unit_test (test_bad_set_signal),      cmocka_unit_test (test_start),
-    cmocka_unit_test (test_bad_start),           cmocka_unit_test (test_query),
-    cmocka_unit_test (test_bad_query),           cmocka_unit_test (test_own_coordinates),
+    cmocka_unit_test (test_bad_set_signal),      cmocka_unit_test (test_initial),
+    cmocka_unit_test (test_bad_initial),         cmocka_unit_test (test_query),
+    cmocka_unit_test (test_bad_query),           cmocka_unit_test (test_internal_coordinates),
     cmocka_unit_test (test_find_reaction),       cmocka_unit_test (test_copies),
     cmocka_unit_test (test_missing_system),      cmocka_unit_test (test_missing),
     cmocka_unit_test (test_missing_definitions),

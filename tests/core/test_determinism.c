@@ -1,13 +1,14 @@
-/* The same input gives the same bits: again, on a system used before, in any number of threads at once. */
+/* The same input gives the same bits: in a second run, on a system used before, in any number of threads. */
 #include <pthread.h>
 #include <stdint.h>
 #include <stdlib.h>
 #include <string.h>
 #include "check.h"
 #include "pinwheel-files.h"
-#include "pinwheel-solvers.h"
+#include "runs.h"
+#include "util.h"
 
-/* ---- Runs: scenes and methods that between them use all there is ---- */
+/* ---- Runs: scenes and methods that together use all parts of the library ---- */
 
 static const struct {
   const char *scene, *parameter;
@@ -54,26 +55,20 @@ static int same_teardown (void **state) {
   return 0;
 }
 
-/* ---- Hashes: FNV-1a (Fowler, Noll, Vo) of all bits of a final state ---- */
-
-static uint64_t same_add (uint64_t h, const void *data, size_t size) {
-  const unsigned char *c = data;
-  for (size_t i = 0; i < size; i++) h = (h ^ c[i]) * 1099511628211u;
-  return h;
-}
+/* ---- Hashes of all bits of a final state ---- */
 
 static uint64_t same_hash (pw_run *r, const pw_sample *x, int coordinates, int rows) {
   size_t n = (size_t)coordinates * sizeof (double);
   const pw_statistics *s = pw_run_statistics (r);
   const long counts[] = { s->steps, s->rejected, s->rhs, s->jacobians, s->factorisations };
   const double numbers[] = { x->t, x->kinetic, x->potential, x->work, x->loss, s->position, s->velocity, s->g, s->jv };
-  uint64_t h = same_add (14695981039346656037u, x->q, n);
-  h = same_add (same_add (h, x->v, n), x->a, n);
-  h = same_add (h, x->lambda, (size_t)rows * sizeof (double));
-  return same_add (same_add (h, counts, sizeof counts), numbers, sizeof numbers);
+  uint64_t h = pw_check_sum (PW_CHECK, x->q, n);
+  h = pw_check_sum (pw_check_sum (h, x->v, n), x->a, n);
+  h = pw_check_sum (h, x->lambda, (size_t)rows * sizeof (double));
+  return pw_check_sum (pw_check_sum (h, counts, sizeof counts), numbers, sizeof numbers);
 }
 
-/* A compiled scene, or NULL; no check fails in here, since it runs in threads. */
+/* A compiled scene, or NULL and the error: threads call this, in which no assertion of cmocka may fail. */
 static pw_system *same_system (int scene, pw_error *error) {
   pw_system *s = NULL;
   pw_model *m = pw_file_model (same_file[scene], error);
@@ -105,6 +100,7 @@ static uint64_t same_run (int run, pw_error *error) {
   return h;
 }
 
+/* The hashes of all runs, computed in the first call. */
 static const uint64_t *same_reference (void) {
   static uint64_t hash[SAME_RUNS];
   for (int i = 0; i < SAME_RUNS && hash[SAME_RUNS - 1] == 0; i++) {
@@ -117,14 +113,14 @@ static const uint64_t *same_reference (void) {
 
 static void same_expect (int run, uint64_t hash, const char *what) {
   if (hash == same_reference ()[run]) return;
-  print_error ("%s, %s %g, %s: other bits than the first time\n", what, same_scenes[run / SAME_METHODS].scene,
+  print_error ("%s, %s %g, %s: other bits than in the first run\n", what, same_scenes[run / SAME_METHODS].scene,
                same_scenes[run / SAME_METHODS].value, same_methods[run % SAME_METHODS]);
   fail ();
 }
 
 /* ---- Tests ---- */
 
-/* Runs differ from each other, else the hashes say nothing. */
+/* All hashes differ: they distinguish the runs. */
 static void test_hashes (void **state) {
   (void)state;
   const uint64_t *hash = same_reference ();
@@ -132,7 +128,7 @@ static void test_hashes (void **state) {
     for (int k = 0; k < i; k++) assert_true (hash[i] != hash[k]);
 }
 
-/* Backwards, on memory that is full of something. */
+/* In reverse order, with memory that is not zero. */
 static void test_again (void **state) {
   (void)state;
   for (int i = SAME_RUNS - 1; i >= 0; i--) {
@@ -145,7 +141,7 @@ static void test_again (void **state) {
   }
 }
 
-/* What a run leaves in its system is no part of the next one. */
+/* A run does not depend on earlier ones of the same system. */
 static void test_used_system (void **state) {
   (void)state;
   for (int scene = 0; scene < SAME_SCENES; scene++) {
@@ -162,7 +158,7 @@ static void test_used_system (void **state) {
 
 typedef struct {
   const pw_system *const *shared; /* one for each scene; NULL: each run compiles its own */
-  int first;
+  int first;                      /* the run with which it begins */
   uint64_t hash[SAME_RUNS];
 } same_worker;
 
@@ -184,7 +180,7 @@ static void same_threads (const pw_system *const *shared, const char *what) {
     assert_non_null (w);
     for (int i = 0; i < threads; i++) {
       w[i].shared = shared;
-      w[i].first = i * (SAME_RUNS / threads / 2); /* neighbours at work on the same scenes */
+      w[i].first = i * (SAME_RUNS / threads / 2); /* two threads each have the same scenes at about the same time */
       assert_int_equal (pthread_create (&id[i], NULL, same_work, w + i), 0);
     }
     for (int i = 0; i < threads; i++) pthread_join (id[i], NULL);
@@ -214,9 +210,8 @@ static void test_shared_system (void **state) {
 }
 
 int main (void) {
-  const struct CMUnitTest tests[] = {
-    cmocka_unit_test (test_hashes),  cmocka_unit_test (test_again),         cmocka_unit_test (test_used_system),
-    cmocka_unit_test (test_threads), cmocka_unit_test (test_shared_system),
-  };
+  const struct CMUnitTest tests[] = { cmocka_unit_test (test_hashes), cmocka_unit_test (test_again),
+                                      cmocka_unit_test (test_used_system), cmocka_unit_test (test_threads),
+                                      cmocka_unit_test (test_shared_system) };
   return cmocka_run_group_tests_name ("determinism", tests, same_setup, same_teardown);
 }

@@ -1,7 +1,7 @@
-/* docs/embed.c, the program that uses Pinwheel as a library, prints what a run of the same says here; and the layers
- * of the house are what they should be.
+/* docs/embed.c, a program that uses Pinwheel as a library, prints the results of the same run here; the directories
+ * depend on each other only as .ci/layers permits.
  *
- * BUILD in the environment names the folder of what is built, build otherwise; run from the top folder. */
+ * BUILD in the environment is the build folder, otherwise build; run from the top folder. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -26,7 +26,7 @@ static int embed_run (const char *command, char *text, size_t size) {
   return WIFEXITED (status) ? WEXITSTATUS (status) : -1;
 }
 
-/* The rider of docs/embed.c. */
+/* The torque of docs/embed.c. */
 static int embed_torque (void *context, double t, const double *x, double value[3], double *gradient) {
   (void)context;
   value[0] = 0.1 * cos (PW_PI * t) - 0.002 * (x[0] - x[1]);
@@ -50,14 +50,13 @@ static void test_embed (void **state) {
   snprintf (expected, sizeof expected, "frame at t = %g s: x = %.6f m, y = %.6f m, phi = %.6f rad\n", now.t, now.q[0],
             now.q[1], now.q[2]);
   assert_string_equal (printed, expected);
-  pw_run_close (r);
-  pw_system_free (s);
+  runs_close (r, s);
 }
 
 static void test_layers (void **state) {
   (void)state;
 #if defined(__SANITIZE_ADDRESS__)
-  skip (); /* the libraries need the sanitizer's, too */
+  skip (); /* the libraries also need that of the sanitizer */
 #else
   char command[300], text[8000];
   snprintf (command, sizeof command, "BUILD='%s' sh .ci/layers 2>&1", embed_build ());

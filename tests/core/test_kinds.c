@@ -1,4 +1,5 @@
-/* Every element type passes the self-test, and the self-test detects every fault in an element type. */
+/* Every element type passes the self-test, which detects each fault made in its functions or its table.  A sweep is one
+ * of the functions of type pw_batch_function. */
 #include <float.h>
 #include <math.h>
 #include <stdio.h>
@@ -10,7 +11,7 @@
 #include "pinwheel-selftest.h"
 #include "toys.h"
 
-enum { KINDS_SEEDS = 100, KINDS_FEW = 3 };
+enum { KINDS_SEEDS = 100, KINDS_FEW = 3 }; /* random scenes for a good element type, for a faulty one */
 
 static void kinds_run (const pw_kind *kind, int seeds, pw_selftest_report *report) {
   pw_error error = { 0 };
@@ -42,7 +43,7 @@ static void test_plug_in (void **state) {
   kinds_pass (toy_kinds);
 }
 
-/* ---- Broken kinds ---- */
+/* ---- Faulty element types ---- */
 
 static const struct {
   const char *name;
@@ -62,11 +63,11 @@ static pw_batch_function **kinds_member (pw_kind *kind, size_t offset) {
   return (pw_batch_function **)(void *)((char *)kind + offset);
 }
 
-/* The sweep that kinds_multiplied stands in for, and by what it multiplies. */
+/* The sweep that a faulty one replaces; the factor of kinds_multiplied. */
 static pw_batch_function *kinds_original;
 static double kinds_factor;
 
-/* Multiplies whatever the original writes; how much that is shows from what it leaves alone. */
+/* Multiplies all numbers that the original writes; the first one that stays NaN is not written. */
 static void kinds_multiplied (const pw_batch *b, double *out) {
   double values[PW_PROBE_OUT];
   for (int i = 0; i < PW_PROBE_OUT; i++) values[i] = NAN;
@@ -74,7 +75,7 @@ static void kinds_multiplied (const pw_batch *b, double *out) {
   for (int i = 0; i < PW_PROBE_OUT && !isnan (values[i]); i++) out[i] = kinds_factor * values[i];
 }
 
-/* Declares a thousand times what the original does. */
+/* Saturations that are a thousand times too wide. */
 static void kinds_wide (const pw_batch *b, double *out) {
   kinds_original (b, out);
   for (int i = 0; i < b->count * 2 * b->cols; i++) out[i] *= 1000;
@@ -88,7 +89,7 @@ static void kinds_expect_caught (const pw_kind *kind, const char *sweep, const c
   fail ();
 }
 
-/* Each sweep in turn: missing, with the wrong sign, wrong by one part in a hundred thousand. */
+/* Each sweep in turn: missing, with the wrong sign, with a relative error of 1e-5. */
 static void kinds_break (const pw_kind *kind) {
   for (int i = 0; i < KINDS_SWEEPS; i++) {
     pw_kind broken = *kind;
@@ -101,7 +102,7 @@ static void kinds_break (const pw_kind *kind) {
     *member = kinds_multiplied;
     kinds_factor = -1;
     kinds_expect_caught (&broken, kinds_sweeps[i].name, "with the wrong sign");
-    if (strcmp (kinds_sweeps[i].name, "g_size") == 0) continue; /* it is free to be larger */
+    if (strcmp (kinds_sweeps[i].name, "g_size") == 0) continue; /* an upper bound */
     kinds_factor = 1 + 1e-5;
     kinds_expect_caught (&broken, kinds_sweeps[i].name, "off by 1e-5");
   }
@@ -113,19 +114,21 @@ static void test_broken (void **state) {
   for (const pw_kind *const *k = toy_kinds; *k; k++) kinds_break (*k);
 }
 
-/* A sweep that looks at its first element only passes in a scene of one, and must not here. */
+/* All elements as the first one: random scenes must have several. */
 static void kinds_first_only (const pw_batch *b, double *out) {
   pw_batch one = *b;
   one.count = 1;
   for (int e = 0; e < b->count; e++) kinds_original (&one, out + e * 2 * b->cols);
 }
 
+/* The last element is missing. */
 static void kinds_short (const pw_batch *b, double *out) {
   pw_batch fewer = *b;
   fewer.count--;
   kinds_original (&fewer, out);
 }
 
+/* One number too many is written. */
 static void kinds_long (const pw_batch *b, double *out) {
   kinds_original (b, out);
   out[b->count * 2 * b->cols] = 0;
@@ -142,7 +145,7 @@ static void test_sizes (void **state) {
   }
 }
 
-/* A saturation that is not declared, and one declared a thousand times too wide. */
+/* A missing saturation, and one a thousand times too wide. */
 static void test_saturation (void **state) {
   int kinds = 0;
   (void)state;
@@ -159,7 +162,7 @@ static void test_saturation (void **state) {
   assert_int_equal (kinds, 5);
 }
 
-/* ---- Tables that do not hold together ---- */
+/* ---- Inconsistent tables ---- */
 
 static void kinds_expect_fault (const pw_kind *kind, const char *fault) {
   pw_selftest_report report;
@@ -216,9 +219,9 @@ static void test_faults (void **state) {
 #undef KINDS_FAULT
 }
 
-/* ---- What the tables alone do not say ---- */
+/* ---- Further checks ---- */
 
-/* A wheel's row is the speed of its contact point across its heading, the contact being the kind's own. */
+/* J v of a wheel is the lateral velocity of its contact point, by differences of `contact`. */
 static void test_wheel_contact (void **state) {
   (void)state;
   for (uint64_t seed = 1; seed <= 20; seed++) {
@@ -246,7 +249,7 @@ static void test_wheel_contact (void **state) {
     for (int e = 0; e < 3; e++) {
       double vx = (plus[3 * e] - minus[3 * e]) / (2 * h), vy = (plus[3 * e + 1] - minus[3 * e + 1]) / (2 * h);
       double across = cos (contact[3 * e + 2]) * vy - sin (contact[3 * e + 2]) * vx;
-      check_close ("speed across the heading", speed[e], across, 1e3 * pow (DBL_EPSILON, 2. / 3),
+      check_close ("lateral velocity", speed[e], across, 1e3 * pow (DBL_EPSILON, 2. / 3),
                    "central differences, terms up to 10");
     }
     free (x.memory);
@@ -255,7 +258,7 @@ static void test_wheel_contact (void **state) {
   }
 }
 
-/* A kind that refuses every definition its table allows says so. */
+/* The self-test reports the error of a prepare function that rejects valid definitions. */
 static int kinds_refuse (const void *definition, const pw_body *const *bodies, void *element, pw_internal *internal,
                          pw_error *error) {
   (void)definition, (void)bodies, (void)element, (void)internal;
@@ -273,10 +276,9 @@ static void test_refused (void **state) {
 }
 
 int main (void) {
-  const struct CMUnitTest tests[] = {
-    cmocka_unit_test (test_built_in),      cmocka_unit_test (test_plug_in), cmocka_unit_test (test_broken),
-    cmocka_unit_test (test_sizes),         cmocka_unit_test (test_faults),  cmocka_unit_test (test_saturation),
-    cmocka_unit_test (test_wheel_contact), cmocka_unit_test (test_refused),
-  };
+  const struct CMUnitTest tests[] = { cmocka_unit_test (test_built_in),      cmocka_unit_test (test_plug_in),
+                                      cmocka_unit_test (test_broken),        cmocka_unit_test (test_sizes),
+                                      cmocka_unit_test (test_faults),        cmocka_unit_test (test_saturation),
+                                      cmocka_unit_test (test_wheel_contact), cmocka_unit_test (test_refused) };
   return cmocka_run_group_tests (tests, NULL, NULL);
 }

@@ -1,9 +1,10 @@
-/* The layout of structures that plug-ins and Pinwheel exchange, for one number of the ABI: who changes it
- * raises PW_ABI (once 0.1.0 is out) and writes down the new one here, so that a plug-in compiled before is refused. */
+/* The layout of the structures that plug-ins and Pinwheel exchange, for one value of PW_ABI.  After a change of the
+ * layout enter the new one here and, once 0.1.0 is out, raise PW_ABI, so that plug-ins compiled before are refused. */
 #include <assert.h>
 #include <stdio.h>
 #include <string.h>
 #include "check.h"
+#include "util.h"
 
 #if PW_ABI == 1 && defined __LP64__
 
@@ -150,30 +151,24 @@ LAYOUT_VALUE (PW_INPUT, -2);
 LAYOUT_VALUE (PW_INITIAL, -3);
 LAYOUT_VALUE (PW_METHOD, -4);
 
-/* FNV-1a (Fowler, Noll, Vo) of what a definition is made of. */
-static unsigned long layout_add (unsigned long sum, const void *bytes, size_t count) {
-  const unsigned char *c = bytes;
-  for (size_t i = 0; i < count; i++) sum = (sum ^ c[i]) * 1099511628211u;
-  return sum;
-}
-
-static unsigned long layout_of (const pw_kind *k) {
-  unsigned long sum = layout_add (14695981039346656037u, &k->definition, sizeof k->definition);
+/* A checksum of the size and the fields of a definition. */
+static unsigned long long layout_of (const pw_kind *k) {
+  unsigned long long sum = pw_check_sum (PW_CHECK, &k->definition, sizeof k->definition);
   for (const pw_field *f = k->fields; f->name; f++) {
-    sum = layout_add (sum, f->name, strlen (f->name));
-    sum = layout_add (sum, &f->offset, sizeof f->offset);
-    sum = layout_add (sum, &f->type, sizeof f->type);
-    sum = layout_add (sum, &f->count, sizeof f->count);
-    for (const char *const *c = f->choices; c && *c; c++) sum = layout_add (sum, *c, strlen (*c) + 1);
+    sum = pw_check_sum (sum, f->name, strlen (f->name));
+    sum = pw_check_sum (sum, &f->offset, sizeof f->offset);
+    sum = pw_check_sum (sum, &f->type, sizeof f->type);
+    sum = pw_check_sum (sum, &f->count, sizeof f->count);
+    for (const char *const *c = f->choices; c && *c; c++) sum = pw_check_sum (sum, *c, strlen (*c) + 1);
   }
   return sum;
 }
 
-/* A kind that is new is written down too; it does not change the number. */
+/* Enter a new element type here, too; PW_ABI stays. */
 static void test_definitions (void **state) {
   static const struct {
     const char *kind;
-    unsigned long layout;
+    unsigned long long layout;
   } known[] = {
     { "pin", 0x2e992ed58a0ca1ea },           { "weld", 0x96d837462e580df9 },
     { "slider", 0x72bb16fc630c9167 },        { "slot", 0x3a0f550a70778644 },
@@ -194,11 +189,10 @@ static void test_definitions (void **state) {
     size_t i = 0;
     while (i < sizeof known / sizeof *known && strcmp (known[i].kind, (*k)->name) != 0) i++;
     if (i < sizeof known / sizeof *known && known[i].layout == layout_of (*k)) continue;
-    print_error ("{ \"%s\", 0x%lx },\n", (*k)->name, layout_of (*k));
+    print_error ("{ \"%s\", 0x%llx },\n", (*k)->name, layout_of (*k));
     bad++;
   }
-  if (bad)
-    print_error ("definitions that have changed, or are new: raise PW_ABI for the former, and write them down\n");
+  if (bad) print_error ("these definitions are new or have changed: see the top of this file\n");
   assert_int_equal (bad, 0);
 }
 
@@ -206,7 +200,7 @@ static void test_definitions (void **state) {
 
 static void test_definitions (void **state) {
   (void)state;
-  print_message ("nothing is written down for ABI %d of this machine\n", PW_ABI);
+  print_message ("no layout is known for ABI %d on this machine\n", PW_ABI);
   skip ();
 }
 

@@ -1,26 +1,21 @@
-/* A program that uses the libraries may live in a locale with a decimal comma: models are read and tables and summaries
- * written as in any other.  The locale is made here, by localedef, if the system has what it takes. */
+/* In a locale with a decimal comma models are read, and tables and summaries written, as in any other.  localedef makes
+ * the locale, if the system has its sources. */
 #include <locale.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include "check.h"
 #include "cli.h"
+#include "gallery.h"
 #include "pinwheel-files.h"
-#include "pinwheel-solvers.h"
+#include "runs.h"
 
-/* Opens a model, runs it and writes a table and a summary, NAME.csv and NAME.json. */
+/* Runs a model and writes a table and a summary, NAME.csv and NAME.json. */
 static void locale_write (const char *model, const char *name) {
   pw_error error = { 0 };
   pw_sample sample;
   char path[400];
-  pw_file *f = pw_file_open (model, &error);
-  check_ok (error.status, &error);
-  pw_model *m = pw_file_model (f, &error);
-  check_ok (pw_model_build (m, &error), &error);
-  pw_system *s = pw_system_compile (m, &error);
-  check_ok (error.status, &error);
-  pw_run *r = pw_run_open (s, "rk4+baumgarte:alpha=2.5:beta=.5", &(pw_settings){ .step = 1e-2, .ledger = 1 }, &error);
-  check_ok (error.status, &error);
+  pw_system *s = gallery_open (model, NULL);
+  pw_run *r = runs_open (s, "rk4+baumgarte:alpha=2.5:beta=.5", &(pw_settings){ .step = 1e-2, .ledger = 1 });
   snprintf (path, sizeof path, "%s/%s.csv", cli_folder, name);
   pw_output *o = pw_output_open (path, &error);
   pw_csv *csv = pw_csv_open (s, 1, o, &error);
@@ -37,10 +32,7 @@ static void locale_write (const char *model, const char *name) {
   pw_summary summary = { .model = "x", .method = "y", .status = "ok", .reason = "", .cpu = 0.25 };
   check_ok (pw_json_write (&summary, s, &sample, 1, pw_run_statistics (r), o, &error), &error);
   check_ok (pw_output_finish (o, &error), &error);
-  pw_run_close (r);
-  pw_system_free (s);
-  pw_model_free (m);
-  pw_file_close (f);
+  runs_close (r, s);
 }
 
 static void test_comma (void **state) {
@@ -53,7 +45,7 @@ static void test_comma (void **state) {
     setenv ("LOCPATH", cli_folder, 1);
     if (setlocale (LC_ALL, "de_DE.UTF-8") == NULL) skip ();
     snprintf (text, sizeof text, "%.1f", 0.5);
-    assert_string_equal (text, "0,5"); /* the comma is there */
+    assert_string_equal (text, "0,5"); /* the locale has a decimal comma */
     locale_write (model[i], "comma");
     setlocale (LC_ALL, "C");
     cli_good ("cmp @/plain.csv @/comma.csv && cmp @/plain.json @/comma.json && test -s @/plain.csv");

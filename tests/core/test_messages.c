@@ -1,11 +1,11 @@
-/* Invalid descriptions: every message of the core about bodies, elements, fields,
- * signals and kinds. */
+/* Invalid descriptions: every message of the core about bodies, elements, fields, signals and element types. */
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
 #include "check.h"
 #include "scene.h"
 #include "toys.h"
+#include "trial.h"
 
 static void messages_build (pw_model *m, const void *parameters) {
   (void)parameters;
@@ -13,23 +13,16 @@ static void messages_build (pw_model *m, const void *parameters) {
   pw_add_body (m, &(pw_body){ .name = "steer", .mass = 1, .inertia = 1 });
 }
 
-static const pw_plugin_table messages_table = { .abi = PW_ABI, .size = sizeof messages_table, .build = messages_build };
+static const pw_plugin_table messages_table = TRIAL_TABLE (messages_build);
 
-/* ---- What a model may not say ---- */
+/* ---- Invalid bodies and elements ---- */
 
-static void messages_refused (pw_model *m, const char *text) {
-  pw_error error = { 0 };
-  assert_null (pw_system_compile (m, &error));
-  check_error (&error, PW_INPUT, text);
-  pw_model_free (m);
-}
-
-/* Adds something to a good model, and expects a message. */
+/* Executes statements that make the valid model m invalid, and expects "model scene" with this text. */
 #define BAD(text, ...)                                 \
   do {                                                 \
     pw_model *m = scene_model (&messages_table, NULL); \
     __VA_ARGS__;                                       \
-    messages_refused (m, "model scene" text);          \
+    scene_refused (m, "model scene" text);             \
   } while (0)
 #define BODY(...) pw_add_body (m, &(pw_body){ __VA_ARGS__ })
 #define PIN(...) pw_add_pin (m, &(pw_pin){ __VA_ARGS__ })
@@ -151,12 +144,12 @@ static void test_bad_choices (void **state) {
   BAD (": chooser c: mode = -1: expected 0 to 1", pw_add (m, &messages_kind, &(messages_chooser){ "c", "frame", -1 }));
 }
 
-/* ---- Kinds and models that do not fit ---- */
+/* ---- Invalid element types and models ---- */
 
 static void test_bad_kinds (void **state) {
   (void)state;
   pw_kind kind = messages_kind;
-  kind.rows = 1; /* rows, but no constraint */
+  kind.rows = 1; /* but .level is PW_FORCE */
   BAD (": element type chooser: rows and level are inconsistent",
        pw_add (m, &kind, &(messages_chooser){ "c", "frame", 0 }));
   kind = messages_kind;
@@ -179,10 +172,10 @@ static void test_too_large (void **state) {
     pw_add_body (m, &(pw_body){ .name = name[i][0], .mass = 1, .inertia = 1 });
     pw_add_gravity (m, &(pw_gravity){ .name = name[i][1], .acceleration = { 0, -9.81 } });
   }
-  messages_refused (m, "model scene is too large");
+  scene_refused (m, "model scene is too large");
 }
 
-/* Writes as much as its definition has, whatever room there is. */
+/* Writes more bytes than .element declares. */
 static int messages_prepare (const void *definition, const pw_body *const *bodies, void *element, pw_internal *internal,
                              pw_error *error) {
   (void)bodies, (void)internal, (void)error;
@@ -199,7 +192,7 @@ static void test_bad_prepare (void **state) {
        pw_add (m, &kind, &(messages_chooser){ "c", "frame", 1 }));
 }
 
-/* A flywheel whose inertia is `mode`; what its prepare returns without a message. */
+/* A flywheel.  mode 0: fails without a message; 1, 2: an invalid inertia. */
 static int messages_flywheel (const void *definition, const pw_body *const *bodies, void *element,
                               pw_internal *internal, pw_error *error) {
   int mode = ((const messages_chooser *)definition)->mode;
@@ -235,7 +228,7 @@ static void test_bad_internal (void **state) {
   pw_model_free (m);
 }
 
-/* Names that are missing are no names, and no crash. */
+/* A missing name is an error. */
 static void test_missing_names (void **state) {
   (void)state;
   pw_model *m = scene_model (&messages_table, NULL);
@@ -270,25 +263,23 @@ static void test_bad_parameters (void **state) {
                "model scene: parameter a lies outside the model's structure: set .parameters_size to its sizeof");
 }
 
-static void messages_nothing (pw_model *m, const void *parameters) {
+static void messages_empty (pw_model *m, const void *parameters) {
   (void)m, (void)parameters;
 }
 
 static void test_no_body (void **state) {
   (void)state;
-  pw_plugin_table table = { .abi = PW_ABI, .size = sizeof table, .build = messages_nothing };
-  messages_refused (scene_model (&table, NULL), "model scene has no body");
+  pw_plugin_table table = TRIAL_TABLE (messages_empty);
+  scene_refused (scene_model (&table, NULL), "model scene has no body");
 }
 
 int main (void) {
-  const struct CMUnitTest tests[] = {
-    cmocka_unit_test (test_bad_names),      cmocka_unit_test (test_bad_bodies),
-    cmocka_unit_test (test_bad_references), cmocka_unit_test (test_bad_numbers),
-    cmocka_unit_test (test_bad_signals),    cmocka_unit_test (test_bad_readers),
-    cmocka_unit_test (test_bad_choices),    cmocka_unit_test (test_bad_kinds),
-    cmocka_unit_test (test_no_body),        cmocka_unit_test (test_too_large),
-    cmocka_unit_test (test_bad_prepare),    cmocka_unit_test (test_bad_internal),
-    cmocka_unit_test (test_missing_names),  cmocka_unit_test (test_bad_parameters),
-  };
+  const struct CMUnitTest tests[] = { cmocka_unit_test (test_bad_names),      cmocka_unit_test (test_bad_bodies),
+                                      cmocka_unit_test (test_bad_references), cmocka_unit_test (test_bad_numbers),
+                                      cmocka_unit_test (test_bad_signals),    cmocka_unit_test (test_bad_readers),
+                                      cmocka_unit_test (test_bad_choices),    cmocka_unit_test (test_bad_kinds),
+                                      cmocka_unit_test (test_no_body),        cmocka_unit_test (test_too_large),
+                                      cmocka_unit_test (test_bad_prepare),    cmocka_unit_test (test_bad_internal),
+                                      cmocka_unit_test (test_missing_names),  cmocka_unit_test (test_bad_parameters) };
   return cmocka_run_group_tests (tests, NULL, NULL);
 }

@@ -12,9 +12,10 @@
 
 #define OWN_NOTICE "pinwheel: derivatives by differences: force_q of element type attraction\n"
 
-static const double own_e = 0.6, own_b = 0.8; /* eccentricity and short semi-axis; the long one is 1, and so is mu */
+/* Eccentricity and semi-minor axis of the ellipse; the semi-major axis is 1 m, the attraction 1 N m^2 / r^2. */
+static const double own_e = 0.6, own_b = 0.8;
 
-/* A system of the model, whose file has to stay open. */
+/* A system of models/elliptic-wire.c, whose file must stay open; factor: of the speed of a planet. */
 typedef struct {
   pw_file *file;
   pw_system *s;
@@ -38,7 +39,7 @@ static void own_close (own *x) {
 
 /* ---- The reference ---- */
 
-/* Where a planet is t after its perihelion: Kepler's equation E - e sin E = t, by Newton's method. */
+/* The position of a planet at the time t after perihelion: Kepler's equation E - e sin E = t, by Newton's method. */
 static void own_planet (double t, double p[2]) {
   double E = t;
   for (int i = 0; i < 50; i++) E -= (E - own_e * sin (E) - t) / (1 - own_e * cos (E));
@@ -46,7 +47,7 @@ static void own_planet (double t, double p[2]) {
   p[1] = own_b * sin (E);
 }
 
-/* As fast as a planet, the bead is where a planet is, and the wire carries nothing. */
+/* With the speed of a planet the bead moves like one, without a force on the wire. */
 static void test_planet (void **state) {
   (void)state;
   own x = own_open (1);
@@ -66,7 +67,8 @@ static void test_planet (void **state) {
   own_close (&x);
 }
 
-/* Faster, it presses on the wire with m (v^2 - v_K^2) / rho, and v^2 - v_K^2 = (1.2^2 - 1) 4 everywhere. */
+/* A faster bead presses on the wire with m (v^2 - v_p^2) / rho, v_p the speed of a planet; v^2 - v_p^2 is constant, and
+ * (1.2^2 - 1) 2^2 at perihelion. */
 static void test_faster (void **state) {
   (void)state;
   own x = own_open (1.2);
@@ -100,7 +102,7 @@ static void test_methods (void **state) {
   }
 }
 
-/* ---- Two rows, a coordinate of the element's own and a force: a guide ----
+/* ---- An element with two rows, an internal coordinate u and a force: a guide ----
  *
  *   g = r - (1, 2) u = 0,   force -k x along x,   so that 6 u'' = -k u with unit mass and inertia */
 
@@ -180,9 +182,9 @@ static void guide_build (pw_model *m, const void *parameters) {
   pw_add (m, &guide_kind, &(guide){ .name = "line", .body = "bead" });
 }
 
-static const pw_plugin_table guide_table = { .abi = PW_ABI, .size = sizeof (pw_plugin_table), .build = guide_build };
+static const pw_plugin_table guide_table = TRIAL_TABLE (guide_build);
 
-/* Methods with Newton's iteration have its matrix whole: hardly a step is taken again. */
+/* Methods with Newton's iteration have its complete matrix: few steps are rejected. */
 static void test_guide (void **state) {
   (void)state;
   char method[40];
@@ -193,8 +195,7 @@ static void test_guide (void **state) {
     const pw_statistics *n = pw_run_statistics (r);
     assert_true (n->rejected <= 5 && n->steps <= 2000 && n->jacobians <= n->steps);
     check_close (method, now.q[3], 0.1 * cos (GUIDE_RATE * 2.0), 1e-4, "t h^2 w^3, 1e4 rtol");
-    pw_run_close (r);
-    pw_system_free (s);
+    runs_close (r, s);
   }
 }
 
@@ -204,11 +205,9 @@ static void slotted_build (pw_model *m, const void *parameters) {
   pw_add_slot (m, &(pw_slot){ .name = "slot", .body = { "bead", "ground" }, .heading = atan2 (2, 1) });
 }
 
-static const pw_plugin_table slotted_table = { .abi = PW_ABI,
-                                               .size = sizeof (pw_plugin_table),
-                                               .build = slotted_build };
+static const pw_plugin_table slotted_table = TRIAL_TABLE (slotted_build);
 
-/* An element on one body connects it to the ground: with another one it can be redundant. */
+/* A guide connects its body to the ground: together with another such element it can be redundant. */
 static void test_redundant_guide (void **state) {
   (void)state;
   pw_system *s = scene_system (&slotted_table, NULL);
@@ -216,13 +215,12 @@ static void test_redundant_guide (void **state) {
   assert_int_equal (pw_run_redundant (r), 1);
   pw_sample now = runs_to (r, 2);
   check_close ("u", now.q[3], 0.1 * cos (GUIDE_RATE * 2.0), 1e-9, "0.1 t w (h w)^4 / 120 of rk4, times 5");
-  pw_run_close (r);
-  pw_system_free (s);
+  runs_close (r, s);
 }
 
 /* ---- The program ---- */
 
-/* One notice, with whatever method. */
+/* One notice, by every method. */
 static void test_notice (void **state) {
   static const char *const method[] = { "rk4+projection", "erk8+projection", "ida+ggl" };
   (void)state;
@@ -286,12 +284,10 @@ static void test_selftest (void **state) {
 }
 
 int main (void) {
-  const struct CMUnitTest tests[] = {
-    cmocka_unit_test (test_planet),   cmocka_unit_test (test_faster),
-    cmocka_unit_test (test_methods),  cmocka_unit_test (test_notice),
-    cmocka_unit_test (test_show),     cmocka_unit_test (test_expression),
-    cmocka_unit_test (test_guide),    cmocka_unit_test (test_redundant_guide),
-    cmocka_unit_test (test_selftest),
-  };
+  const struct CMUnitTest tests[] = { cmocka_unit_test (test_planet),  cmocka_unit_test (test_faster),
+                                      cmocka_unit_test (test_methods), cmocka_unit_test (test_notice),
+                                      cmocka_unit_test (test_show),    cmocka_unit_test (test_expression),
+                                      cmocka_unit_test (test_guide),   cmocka_unit_test (test_redundant_guide),
+                                      cmocka_unit_test (test_selftest) };
   return cmocka_run_group_tests (tests, cli_setup, cli_teardown);
 }

@@ -43,8 +43,8 @@ static void queries_close (queries *k) {
   pw_file_close (k->file);
 }
 
-/* M a = sum of the forces of all elements, for each body (Newton, Euler): with reactions and applied forces apart from
- * the solver's sums. */
+/* M a = sum of the forces of all elements, for each body (Newton, Euler): reactions and applied forces, independently
+ * of the solver's sums. */
 static void test_forces (void **state) {
   (void)state;
   for (int i = 0; i < SCENES; i++) {
@@ -99,7 +99,7 @@ static void test_equations (void **state) {
   }
 }
 
-/* Elements stand in the order of their rows, and are those of the model; a row's name begins with its element's. */
+/* Elements are those of the model, in the order of their rows; a reaction's name begins with its element's. */
 static void test_elements (void **state) {
   (void)state;
   for (int i = 0; i < SCENES; i++) {
@@ -137,7 +137,7 @@ static void test_elements (void **state) {
   }
 }
 
-/* Contacts move with the bodies they are points of, and keep their headings. */
+/* Contact points are displaced with their bodies and keep their headings. */
 static void test_contacts (void **state) {
   static const double at[2] = { 0.3, -0.2 };
   (void)state;

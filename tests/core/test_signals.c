@@ -6,6 +6,7 @@
 #include "signal.h"
 #include "system.h"
 #include "toys.h"
+#include "trial.h"
 
 static void test_constant (void **state) {
   (void)state;
@@ -109,8 +110,8 @@ static int signals_of_angle (void *context, double t, const double *x, double va
   return 0;
 }
 
-/* New velocities leave alone what reads none, and what is held. */
-static void test_rates_spare (void **state) {
+/* New velocities do not evaluate signals that read none, or held ones. */
+static void test_velocities (void **state) {
   static const char *const reads[][2] = { { "steer.phi", NULL }, { "steer.omega", NULL } };
   (void)state;
   for (int velocity = 0; velocity < 2; velocity++) {
@@ -132,7 +133,7 @@ static void test_rates_spare (void **state) {
   }
 }
 
-/* Stages at the same time share the value of a signal of time alone; a held signal is not evaluated at all. */
+/* A signal of time alone is evaluated once for stages at the same time; a held one is not evaluated. */
 static void test_sharing_and_hold (void **state) {
   (void)state;
   signals_context c = { 0 };
@@ -154,14 +155,14 @@ static void test_sharing_and_hold (void **state) {
   c.fails = 1;
   assert_int_equal (pw_update_kinematics (w, 4, q, v), PW_METHOD);
   c.fails = 0;
-  assert_int_equal (pw_update_kinematics (w, 3, q, v), PW_OK); /* a failure in between leaves no value behind */
+  assert_int_equal (pw_update_kinematics (w, 3, q, v), PW_OK); /* after a failure the signal is evaluated again */
   pw_evaluate_force (w, f);
   assert_true (f[2] == 9);
   pw_workspace_free (w);
   pw_system_free (s);
 }
 
-/* ---- A constraint gets the derivatives, too ---- */
+/* ---- A constraint, which needs the derivatives of its signal ---- */
 
 static signals_context signals_driven;
 
@@ -177,7 +178,7 @@ static void signals_build (pw_model *m, const void *parameters) {
 
 static void test_drive (void **state) {
   (void)state;
-  static const pw_plugin_table table = { .abi = PW_ABI, .size = sizeof table, .build = signals_build };
+  static const pw_plugin_table table = TRIAL_TABLE (signals_build);
   signals_driven = (signals_context){ 0 };
   pw_system *s = scene_system (&table, NULL);
   pw_workspace *w = pw_workspace_new (s, NULL);
@@ -199,8 +200,8 @@ static void test_drive (void **state) {
 
 int main (void) {
   const struct CMUnitTest tests[] = {
-    cmocka_unit_test (test_constant),    cmocka_unit_test (test_harmonic),         cmocka_unit_test (test_reads),
-    cmocka_unit_test (test_rates_spare), cmocka_unit_test (test_sharing_and_hold), cmocka_unit_test (test_drive),
+    cmocka_unit_test (test_constant),   cmocka_unit_test (test_harmonic),         cmocka_unit_test (test_reads),
+    cmocka_unit_test (test_velocities), cmocka_unit_test (test_sharing_and_hold), cmocka_unit_test (test_drive),
   };
   return cmocka_run_group_tests (tests, NULL, NULL);
 }

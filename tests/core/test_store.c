@@ -23,7 +23,7 @@ static void test_names (void **state) {
     char copy[16];
     assert_int_equal (pw_names_find (&names, strcpy (copy, text[i])), i);
   }
-  assert_int_equal (pw_names_add (&names, "body7", 99), 7); /* keeps what it has */
+  assert_int_equal (pw_names_add (&names, "body7", 99), 7); /* the value does not change */
   assert_int_equal (pw_names_find (&names, "body7"), 7);
   assert_int_equal (pw_names_find (&names, ""), -1);
   pw_names_close (&names);
@@ -38,7 +38,7 @@ static void test_names_empty (void **state) {
   pw_names_close (&names);
 }
 
-/* Pieces are zeroed, aligned and apart, whether they fit into a chunk or are larger than one. */
+/* Pieces are zeroed, aligned and disjoint, whether they fit into a chunk or are larger than one. */
 static void test_arena (void **state) {
   (void)state;
   static const size_t size[] = { 1, 7, 16, 100, 70000, 3, 65536, 65537, 0, 5 };
@@ -63,7 +63,7 @@ static void test_arena (void **state) {
   assert_null (arena.chunk);
 }
 
-/* The same takes twice give the size and then the places. */
+/* The same calls, made twice, give the size and then the addresses. */
 static void test_layout (void **state) {
   (void)state;
   _Alignas(max_align_t) char room[256];
@@ -77,7 +77,7 @@ static void test_layout (void **state) {
   assert_true (place.used == size.used && c + 2 * sizeof (double) <= room + size.used);
 }
 
-/* Two passes, also over no arrays. */
+/* Two passes, also for an array without elements. */
 static void test_layout_pass (void **state) {
   (void)state;
   for (size_t count = 0; count < 3; count++) {
@@ -110,7 +110,7 @@ static void test_nearest (void **state) {
   assert_string_equal (store_nearest ("Steer", names), "steer");    /* one other */
   assert_string_equal (store_nearest ("", names), "frame");         /* the first of equals */
   assert_string_equal (store_nearest ("x", none), "");
-  /* a change counts as a share of the name, so that short names are not preferred */
+  /* the distance is relative to the length, so that short names are not preferred */
   assert_string_equal (store_nearest ("stiff", (const char *const[]){ "at", "stiffness", NULL }), "stiffness");
 }
 
@@ -120,7 +120,7 @@ static void store_hint (const char *sought, const char *const *candidates, const
   assert_string_equal (pw_nearest_text (&n), expected);
 }
 
-/* What is not near is not proposed: a few valid names are all given, many not. */
+/* If no name is near, all valid names are given, if they are few. */
 static void test_nearest_text (void **state) {
   (void)state;
   static const char *const names[] = { "frame", "steer", "ground", NULL };
@@ -140,7 +140,7 @@ static void test_nearest_text (void **state) {
   store_hint ("x", (const char *const[]){ NULL }, "");
 }
 
-/* A candidate too long for the table of distances counts as far away, and does no harm. */
+/* A candidate that is too long for the table of distances is never near. */
 static void test_nearest_long (void **state) {
   (void)state;
   char longer[300];
@@ -200,13 +200,11 @@ static void test_domains (void **state) {
 }
 
 int main (void) {
-  const struct CMUnitTest tests[] = {
-    cmocka_unit_test (test_names),        cmocka_unit_test (test_names_empty),
-    cmocka_unit_test (test_arena),        cmocka_unit_test (test_layout),
-    cmocka_unit_test (test_layout_pass),  cmocka_unit_test (test_nearest),
-    cmocka_unit_test (test_nearest_text), cmocka_unit_test (test_nearest_long),
-    cmocka_unit_test (test_long_error),   cmocka_unit_test (test_first_error_stays),
-    cmocka_unit_test (test_domains),
-  };
+  const struct CMUnitTest tests[] = { cmocka_unit_test (test_names),        cmocka_unit_test (test_names_empty),
+                                      cmocka_unit_test (test_arena),        cmocka_unit_test (test_layout),
+                                      cmocka_unit_test (test_layout_pass),  cmocka_unit_test (test_nearest),
+                                      cmocka_unit_test (test_nearest_text), cmocka_unit_test (test_nearest_long),
+                                      cmocka_unit_test (test_long_error),   cmocka_unit_test (test_first_error_stays),
+                                      cmocka_unit_test (test_domains) };
   return cmocka_run_group_tests (tests, NULL, NULL);
 }

@@ -8,7 +8,7 @@
 #include "pinwheel-files.h"
 #include "util.h"
 
-/* Characters of one to four bytes with their neighbours that are too long, too high, surrogates, or cut off. */
+/* Characters of one to four bytes, and sequences that are overlong, too high, surrogates or truncated. */
 static void test_characters (void **state) {
   static const struct {
     const char *text;
@@ -18,7 +18,7 @@ static void test_characters (void **state) {
     { "\x7f", 1 },
     { "\x80", 0 },
     { "\xC2\x80", 2 },
-    { "\xC1\xBF", 0 }, /* could be shorter */
+    { "\xC1\xBF", 0 }, /* overlong */
     { "\xC3", 0 },
     { "\xE2\x82\xAC", 3 },
     { "\xE0\x9F\xBF", 0 },
@@ -43,7 +43,7 @@ static void test_controls (void **state) {
   assert_int_equal (pw_is_text (text), 1);
 }
 
-/* A message repeats what was found. */
+/* Messages quote external texts. */
 static void test_message (void **state) {
   pw_error error = { 0 };
   (void)state;
@@ -51,7 +51,7 @@ static void test_message (void **state) {
   check_error (&error, PW_INPUT, "there is no \"?]0;title??\"");
 }
 
-/* Escaped where JSON can, replaced where it cannot. */
+/* JSON: control characters are escaped, invalid bytes replaced. */
 static void test_summary (void **state) {
   pw_error error = { 0 };
   pw_summary summary = { .model = "a\033\xff\"\\\n", .method = "1", .status = "ok", .reason = "\xC3" };
@@ -67,7 +67,7 @@ static void test_summary (void **state) {
   assert_non_null (strstr (text, "\"reason\": \"\xEF\xBF\xBD\""));
 }
 
-/* A model in C whose table says so about itself, its parameter and its body. */
+/* A model in C with this `about`, unit of its parameter and name of its body is rejected with the message. */
 static void texts_model (const char *about, const char *unit, const char *body, const char *message) {
   char text[700];
   snprintf (text, sizeof text,
@@ -102,9 +102,8 @@ static void test_file_name (void **state) {
 }
 
 int main (void) {
-  const struct CMUnitTest tests[] = {
-    cmocka_unit_test (test_characters), cmocka_unit_test (test_controls), cmocka_unit_test (test_message),
-    cmocka_unit_test (test_summary),    cmocka_unit_test (test_model),    cmocka_unit_test (test_file_name),
-  };
+  const struct CMUnitTest tests[] = { cmocka_unit_test (test_characters), cmocka_unit_test (test_controls),
+                                      cmocka_unit_test (test_message),    cmocka_unit_test (test_summary),
+                                      cmocka_unit_test (test_model),      cmocka_unit_test (test_file_name) };
   return cmocka_run_group_tests (tests, cli_setup, cli_teardown);
 }

@@ -1,12 +1,12 @@
-/* Signals of forces that read velocities, as a controller's do: with every method they act as the element of the same
- * law, at whatever point of a step the velocities change. */
+/* Signals of forces that read velocities, as those of controllers do: with every method the motion is that with
+ * elements of the same force laws. */
 #include <math.h>
 #include <string.h>
 #include "check.h"
-#include "runs.h"
 #include "scene.h"
+#include "trial.h"
 
-static const double feedback_c = 2; /* [N m s/rad] and [N s/m] */
+static const double feedback_c = 2; /* damping [N m s/rad] and [N s/m] */
 
 static int feedback_eval (void *context, double t, const double *x, double value[3], double *gradient) {
   (void)context, (void)t;
@@ -27,8 +27,8 @@ typedef struct {
 static const pw_parameter feedback_list[] = { { PW_AT (feedback_parameters, signals), 0, "", "", PW_REAL },
                                               { .name = NULL } };
 
-/* Two rods: the first one's hinge resists its turning, and air resists the second's motion.  The start is
- * inconsistent, so that it changes velocities, too. */
+/* Two rods: the hinge of the first one is damped, and air resists the motion of the second one.  The described initial
+ * velocities are inconsistent. */
 static void feedback_build (pw_model *m, const void *parameters) {
   static const char *const omega[] = { "a.omega", NULL }, *const vx[] = { "b.vx", NULL },
                            *const vy[] = { "b.vy", NULL };
@@ -47,13 +47,10 @@ static void feedback_build (pw_model *m, const void *parameters) {
   }
 }
 
-static const pw_plugin_table feedback_table = { .abi = PW_ABI,
-                                                .size = sizeof feedback_table,
-                                                .parameters = feedback_list,
-                                                .parameters_size = sizeof (feedback_parameters),
-                                                .build = feedback_build };
+static const pw_plugin_table feedback_table =
+    TRIAL_TABLE_WITH (feedback_build, feedback_list, sizeof (feedback_parameters));
 
-/* The state at t, and inside the step before. */
+/* q and a at 1 s and, from state[12] on, 0.3 steps earlier. */
 static void feedback_run (const char *method, double signals, double step, double state[24]) {
   pw_error error = { 0 };
   pw_sample x;
@@ -65,8 +62,7 @@ static void feedback_run (const char *method, double signals, double step, doubl
     memcpy (state, x.q, 6 * sizeof *state);
     memcpy (state + 6, x.a, 6 * sizeof *state);
   }
-  pw_run_close (r);
-  pw_system_free (s);
+  runs_close (r, s);
 }
 
 static void test_methods (void **state) {
@@ -74,7 +70,7 @@ static void test_methods (void **state) {
   (void)state;
   for (int i = 0; runs_method (i, name); i++) {
     int adaptive = runs_method (i, name)->adaptive;
-    double with[24], without[24], step = adaptive ? 1e-6 : 0.01; /* inside the last step of any of them */
+    double with[24], without[24], step = adaptive ? 1e-6 : 0.01; /* adaptive: less than the last step of any method */
     double bound = adaptive ? 1e-5 : 1e-9;                       /* 1e3 rtol; the tolerance of galpha's iteration */
     feedback_run (name, 1, step, with);
     feedback_run (name, 0, step, without);
@@ -83,7 +79,7 @@ static void test_methods (void **state) {
   }
 }
 
-/* What was of order 1 only while the signals of a step's end were those of its middle's velocities. */
+/* leapfrog would be of order 1 if signals at the end of a step were evaluated with the velocities of its middle. */
 static void test_order (void **state) {
   double exact[24], coarse[24], fine[24];
   (void)state;

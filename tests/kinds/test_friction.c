@@ -1,4 +1,4 @@
-/* friction, drag, rolling-resistance: bodies that run down, by laws whose solutions are known. */
+/* friction, drag, rolling-resistance: bodies that slow down by laws with known solutions. */
 #include <math.h>
 #include "check.h"
 #include "scene.h"
@@ -16,7 +16,7 @@ static double friction_air (double v, double t, double m, double c, double d) {
   return c * v * decay / (c + d * v * (1 - decay));
 }
 
-/* ---- A disc that runs down on another: their relative rate, with the inertia 1 / (1/I1 + 1/I2) ---- */
+/* ---- A disc that rubs on another one: the relative rate is that of the inertia 1 / (1/I1 + 1/I2) ---- */
 
 static const struct { double I[2], w, w0; } friction_d = { { 0.3, 0.9 }, 2, 0.5 };
 
@@ -33,11 +33,7 @@ static const pw_parameter friction_list[] = {
   { .name = NULL },
 };
 
-#define FRICTION_TABLE(f)                                                         \
-  {                                                                               \
-    .abi = PW_ABI, .size = sizeof (pw_plugin_table), .parameters = friction_list, \
-    .parameters_size = sizeof (friction_parameters), .build = f                   \
-  }
+#define FRICTION_TABLE(build) TRIAL_TABLE_WITH (build, friction_list, sizeof (friction_parameters))
 
 static void friction_discs (pw_model *m, const void *parameters) {
   const friction_parameters *p = parameters;
@@ -65,8 +61,7 @@ static void friction_rub (const char *method, double viscous, double limit, doub
     check_close ("loss", x.loss, I * (friction_d.w * friction_d.w - w * w) / 2, bound, reason);
     check_close ("balance", x.balance, 0, bound, reason);
   }
-  pw_run_close (r);
-  pw_system_free (s);
+  runs_close (r, s);
 }
 
 static void test_discs (void **state) {
@@ -98,7 +93,7 @@ static void friction_beam (pw_model *m, const void *parameters) {
                                                       .speed = p->speed });
 }
 
-/* Through both centres of mass nothing turns; the speed of one along the other runs down as of their reduced mass. */
+/* The line passes through both centres of mass: nothing turns, the relative velocity is that of the reduced mass. */
 static void friction_slide (const char *method, double viscous, double limit, double bound, const char *reason) {
   static const pw_plugin_table table = FRICTION_TABLE (friction_beam);
   pw_system *s = scene_system (&table, "viscous", viscous, "limit", limit, "speed", friction_b.w0, NULL);
@@ -113,8 +108,7 @@ static void friction_slide (const char *method, double viscous, double limit, do
     check_close ("loss", x.loss, M * (friction_b.v * friction_b.v - w * w) / 2, 10 * bound, reason);
     check_close ("balance", x.balance, 0, 10 * bound, reason);
   }
-  pw_run_close (r);
-  pw_system_free (s);
+  runs_close (r, s);
 }
 
 static void test_slide (void **state) {
@@ -126,15 +120,11 @@ static void test_slide (void **state) {
 
 static void test_refused (void **state) {
   (void)state;
-  pw_error error = { 0 };
-  pw_model *m = scene_model (&friction_discs_table, "limit", 0.2, "speed", 0.0, NULL);
-  assert_null (pw_system_compile (m, &error));
-  check_error (&error, PW_INPUT,
-               "model scene: friction rub: speed = 0: expected > 0, since below it the limit is smoothed");
-  pw_model_free (m);
+  scene_refused (scene_model (&friction_discs_table, "limit", 0.2, "speed", 0.0, NULL),
+                 "model scene: friction rub: speed = 0: expected > 0, since below it the limit is smoothed");
 }
 
-/* ---- Air: straight flight and turning, each by its own law ---- */
+/* ---- Air drag: of the translation and of the rotation, each with its own coefficients ---- */
 
 static const struct { double m, I, v, w, turning, turning_quadratic; } friction_a = { 1.4, 0.2, 3, -5, 0.1, 0.05 };
 
@@ -171,8 +161,7 @@ static void friction_fly (const char *method, double linear, double quadratic, d
         10 * bound, reason);
     check_close ("balance", x.balance, 0, 10 * bound, reason);
   }
-  pw_run_close (r);
-  pw_system_free (s);
+  runs_close (r, s);
 }
 
 static void test_flight (void **state) {
@@ -183,7 +172,7 @@ static void test_flight (void **state) {
   friction_fly ("ida", 0.3, 0.4, 1e-6, "1e4 rtol");
 }
 
-/* ---- A cart that coasts to rest along its heading; a wheel at the same point holds it across ---- */
+/* ---- A cart that coasts to rest along its heading; a wheel at the same point prevents lateral motion ---- */
 
 static const struct { double m, v, psi, L, v0; } friction_c = { 2, 1.5, 0.7, 1.2, 0.4 };
 
@@ -216,8 +205,7 @@ static void friction_coast (const char *method, double bound, const char *reason
     check_close ("loss", x.loss, friction_c.m * (friction_c.v * friction_c.v - v * v) / 2, 10 * bound, reason);
     check_close ("balance", x.balance, 0, 10 * bound, reason);
   }
-  pw_run_close (r);
-  pw_system_free (s);
+  runs_close (r, s);
 }
 
 static void test_coast (void **state) {
@@ -226,7 +214,7 @@ static void test_coast (void **state) {
   friction_coast ("ida+ggl", 1e-6, "1e4 rtol");
 }
 
-/* ---- By all methods: a car and a trailer that stop, each resisted differently ---- */
+/* ---- By all methods: a car and a trailer that are slowed down by all of these elements ---- */
 
 static void friction_car (pw_model *m, const void *parameters) {
   (void)parameters;
@@ -264,9 +252,8 @@ static void test_methods (void **state) {
 }
 
 int main (void) {
-  const struct CMUnitTest tests[] = {
-    cmocka_unit_test (test_discs),  cmocka_unit_test (test_slide), cmocka_unit_test (test_refused),
-    cmocka_unit_test (test_flight), cmocka_unit_test (test_coast), cmocka_unit_test (test_methods),
-  };
+  const struct CMUnitTest tests[] = { cmocka_unit_test (test_discs),   cmocka_unit_test (test_slide),
+                                      cmocka_unit_test (test_refused), cmocka_unit_test (test_flight),
+                                      cmocka_unit_test (test_coast),   cmocka_unit_test (test_methods) };
   return cmocka_run_group_tests (tests, NULL, NULL);
 }

@@ -1,4 +1,4 @@
-/* gear: a reduction, a planetary set, offsets, what is refused. */
+/* gear: a reduction, a planetary set, offsets, invalid gears. */
 #include <math.h>
 #include "check.h"
 #include "scene.h"
@@ -8,20 +8,20 @@
   { PW_CONSTANT, .constant = x }
 
 typedef struct {
-  double ratio, from, offset, held; /* held 1: the ring stands still, else the carrier does */
+  double ratio, from, offset, held; /* from: an offset choice of pw_gear; held: see gear_list */
 } gear_parameters;
 
 static const pw_parameter gear_list[] = {
   { PW_AT (gear_parameters, ratio), -3, "", "of the speeds", PW_REAL },
-  { PW_AT (gear_parameters, from), 0, "", "where the offset comes from", PW_NONNEGATIVE },
+  { PW_AT (gear_parameters, from), 0, "", "pw_gear.from", PW_NONNEGATIVE },
   { PW_AT (gear_parameters, offset), 0, "rad", "of the gear", PW_REAL },
-  { PW_AT (gear_parameters, held), 0, "", "1: the ring stands still, else the carrier", PW_NONNEGATIVE },
+  { PW_AT (gear_parameters, held), 0, "", "1: the ring is fixed, 0: the carrier", PW_NONNEGATIVE },
   { .name = NULL },
 };
 
 static const double gear_I[2] = { 0.2, 1.1 }, gear_T = 0.7;
 
-/* Two bodies that turn on the ground, one driven.  The other is the second gear, or the carrier. */
+/* Two bodies pinned to the ground, the first one driven by a torque.  The second one is a gear or the carrier. */
 static void gear_build (pw_model *m, const void *parameters) {
   const gear_parameters *p = parameters;
   pw_add_body (m, &(pw_body){ .name = "in", .mass = 1, .inertia = gear_I[0], .start = { 0, 0, 0.4 } });
@@ -36,20 +36,16 @@ static void gear_build (pw_model *m, const void *parameters) {
   pw_add_torque (m, &(pw_torque){ .name = "T", .body = { "in", "ground" }, .value = GEAR_CONSTANT (gear_T) });
 }
 
-static const pw_plugin_table gear_table = { .abi = PW_ABI,
-                                            .size = sizeof gear_table,
-                                            .parameters = gear_list,
-                                            .parameters_size = sizeof (gear_parameters),
-                                            .build = gear_build };
+static const pw_plugin_table gear_table = TRIAL_TABLE_WITH (gear_build, gear_list, sizeof (gear_parameters));
 
-/* phi_in' = i phi_out':  (I_in + I_out / i^2) phi_in'' = T;  with the ring held phi_in' = (1 - i) phi_out' (Willis). */
+/* phi_in' = i phi_out':  (I_in + I_out / i^2) phi_in'' = T;  with a fixed ring phi_in' = (1 - i) phi_out' (Willis). */
 static void gear_turn (double ratio, double held) {
   pw_system *s = scene_system (&gear_table, "ratio", ratio, "held", held, NULL);
   pw_run *r = runs_open (s, "rk4+projection", &(pw_settings){ .step = 1e-2, .ledger = 1 });
   const double bound = 1e5 * CHECK_EPS;
   const char *reason = "RK4 is exact for parabolas: round-off of 200 steps";
   double i = held > 0 ? 1 - ratio : ratio, a = gear_T / (gear_I[0] + gear_I[1] / (i * i));
-  check_below ("start", pw_run_initial (r)->position, 16 * CHECK_EPS, "the start's own offset");
+  check_below ("start", pw_run_initial (r)->position, 16 * CHECK_EPS, "the offset is that of the initial angles");
   pw_sample x = runs_to (r, 2);
   check_close ("in", x.q[2], 0.4 + 2 * a, bound, reason);
   check_close ("out", x.q[5], -0.3 + 2 * a / i, bound, reason);
@@ -57,8 +53,7 @@ static void gear_turn (double ratio, double held) {
   check_close ("moment", trial_reaction (s, &x, "gear.M"), gear_I[0] * a - gear_T, bound, reason);
   check_close ("work", x.work, gear_T * 2 * a, bound, reason);
   check_close ("balance", x.balance, 0, bound, reason);
-  pw_run_close (r);
-  pw_system_free (s);
+  runs_close (r, s);
 }
 
 static void test_turn (void **state) {
@@ -69,7 +64,7 @@ static void test_turn (void **state) {
   gear_turn (2.5, 1);
 }
 
-/* A given offset moves the start; the consistent start moves both bodies. */
+/* The initial angles do not have the given offset: both are changed to satisfy the constraint. */
 static void test_offset (void **state) {
   (void)state;
   pw_system *s = scene_system (&gear_table, "from", (double)PW_GEAR_OFFSET, "offset", 0.25, NULL);
@@ -78,8 +73,7 @@ static void test_offset (void **state) {
   check_close ("offset", q[2] + 3 * q[5], 0.25, 100 * CHECK_EPS, "the constraint");
   check_close ("least change", gear_I[0] * (q[2] - 0.4), gear_I[1] * (q[5] + 0.3) / 3, 1e-9,
                "the change is M^-1 G^T times a number");
-  pw_run_close (r);
-  pw_system_free (s);
+  runs_close (r, s);
 }
 
 static void gear_twice (pw_model *m, const void *parameters) {
@@ -92,19 +86,13 @@ static void gear_twice (pw_model *m, const void *parameters) {
 static void test_refused (void **state) {
   static const pw_plugin_table twice = TRIAL_TABLE (gear_twice);
   (void)state;
-  pw_error error = { 0 };
-  pw_model *m = scene_model (&gear_table, "ratio", 0.0, NULL);
-  assert_null (pw_system_compile (m, &error));
-  check_error (&error, PW_INPUT, "model scene: gear gear: ratio = 0: expected another number, positive or negative");
-  pw_model_free (m);
-  error = (pw_error){ 0 };
-  m = scene_model (&twice, NULL);
-  assert_null (pw_system_compile (m, &error));
-  check_error (&error, PW_INPUT, "model scene: gear gear: two of its bodies are \"a\": expected different ones");
-  pw_model_free (m);
+  scene_refused (scene_model (&gear_table, "ratio", 0.0, NULL),
+                 "model scene: gear gear: ratio = 0: expected another number, positive or negative");
+  scene_refused (scene_model (&twice, NULL),
+                 "model scene: gear gear: two of its bodies are \"a\": expected different ones");
 }
 
-/* ---- By all methods: a sun, a planet on a carrier, a ring that gives way ---- */
+/* ---- By all methods: a sun, a planet on a carrier, a ring, all of which can turn ---- */
 
 static void gear_planetary (pw_model *m, const void *parameters) {
   const double sun = 0.3, planet = 0.2, ring = sun + 2 * planet, arm = sun + planet;
@@ -129,11 +117,7 @@ static void test_methods (void **state) {
 }
 
 int main (void) {
-  const struct CMUnitTest tests[] = {
-    cmocka_unit_test (test_turn),
-    cmocka_unit_test (test_offset),
-    cmocka_unit_test (test_refused),
-    cmocka_unit_test (test_methods),
-  };
+  const struct CMUnitTest tests[] = { cmocka_unit_test (test_turn), cmocka_unit_test (test_offset),
+                                      cmocka_unit_test (test_refused), cmocka_unit_test (test_methods) };
   return cmocka_run_group_tests (tests, NULL, NULL);
 }

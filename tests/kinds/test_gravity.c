@@ -15,7 +15,7 @@ static void gravity_fall (pw_model *m, const void *parameters) {
   pw_add_gravity (m, &(pw_gravity){ .name = "g", .acceleration = { 0.5, -9.81 } });
 }
 
-/* The centre of mass moves on a parabola, which classical Runge-Kutta follows exactly; the wing has no mass. */
+/* The centre of mass moves on a parabola, which rk4 integrates exactly; the wing is massless. */
 static void test_fall (void **state) {
   (void)state;
   static const pw_plugin_table table = TRIAL_TABLE (gravity_fall);
@@ -30,8 +30,7 @@ static void test_fall (void **state) {
   check_close ("balance", x.balance, 0, 1e3 * bound, "round-off of an energy of 1 kJ");
   for (int k = 0; k < s->batches; k++)
     if (s->batch[k].kind == &pw_kind_gravity) assert_int_equal (s->batch[k].b.count, 1);
-  pw_run_close (r);
-  pw_system_free (s);
+  runs_close (r, s);
 }
 
 /* ---- Knife edge on an incline: x = k sin^2 wt, y = k (wt - sin (2wt) / 2), k = g sin alpha / 2w^2 ---- */
@@ -58,8 +57,7 @@ static void gravity_skate (const char *method, double bound, const char *reason)
     check_close ("x (10 s)", x.q[0], 0.7258393717013280771, bound, reason);
     check_close ("y (10 s)", x.q[1], 23.40550088629524659, bound, reason);
   }
-  pw_run_close (r);
-  pw_system_free (s);
+  runs_close (r, s);
 }
 
 static void test_incline (void **state) {
@@ -88,11 +86,10 @@ static void test_pendulum (void **state) {
   check_close ("x", x.q[0], 0.2750874625761168601, 1e-9, "10 (h g/L)^4 at h = 1e-3, over 4 swings");
   check_close ("y", x.q[1], -0.9614192050991250643, 1e-9, "10 (h g/L)^4 at h = 1e-3, over 4 swings");
   check_close ("balance", x.balance, 0, 1e-9, "10 (h g/L)^4");
-  pw_run_close (r);
-  pw_system_free (s);
+  runs_close (r, s);
 }
 
-/* ---- An element type of the user's that acts on every body: drag, f = -c v on each centre of mass ---- */
+/* ---- A user's element type that acts on every body: drag, f = -c v at each centre of mass ---- */
 
 typedef struct {
   const char *name;
@@ -156,7 +153,7 @@ static void gravity_rain (pw_model *m, const void *parameters) {
 
 static const pw_plugin_table gravity_rain_table = TRIAL_TABLE (gravity_rain);
 
-/* Each falls at its own pace, v = m g / c (exp (-c t / m) - 1) from rest, and has a line of its own in the ledger. */
+/* Each body has its own terminal velocity, v = m g / c (exp (-c t / m) - 1) from rest, and its own ledger entry. */
 static void test_each_body (void **state) {
   (void)state;
   static const double mass[] = { 0.5, 2 }, up[] = { 3, 0 };
@@ -173,8 +170,7 @@ static void test_each_body (void **state) {
     assert_true (x.ledger[i] > 0);
   }
   check_close ("balance", x.balance, 0, 1e-9, "1000 (h c / m)^4");
-  pw_run_close (r);
-  pw_system_free (s);
+  runs_close (r, s);
 }
 
 static void test_methods (void **state) {
@@ -184,9 +180,8 @@ static void test_methods (void **state) {
 }
 
 int main (void) {
-  const struct CMUnitTest tests[] = {
-    cmocka_unit_test (test_fall),      cmocka_unit_test (test_incline), cmocka_unit_test (test_pendulum),
-    cmocka_unit_test (test_each_body), cmocka_unit_test (test_methods),
-  };
+  const struct CMUnitTest tests[] = { cmocka_unit_test (test_fall), cmocka_unit_test (test_incline),
+                                      cmocka_unit_test (test_pendulum), cmocka_unit_test (test_each_body),
+                                      cmocka_unit_test (test_methods) };
   return cmocka_run_group_tests (tests, NULL, NULL);
 }

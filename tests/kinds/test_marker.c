@@ -16,7 +16,7 @@
 
 #define MARKER_TIP "  - {marker: tip, body: arm, at: [40, -3]}\n"
 
-/* Tolerances and residuals are measured by the scene's length, of which a marker far away is no part. */
+/* Tolerances and residuals refer to the length of the scene, which a distant marker does not change. */
 static void test_without_effect (void **state) {
   char *bare;
   (void)state;
@@ -47,7 +47,7 @@ static void test_place (void **state) {
 
 #define MARKER_WHEELS "# wheels, before: x [m], y [m], t [s], number of the body\n"
 
-/* Figures follow it; it is no wheel and has no dash. */
+/* Figures show its path, and, other than for wheels, no heading. */
 static void test_figures (void **state) {
   (void)state;
   cli_write ("arm.yaml", MARKER_ARM MARKER_TIP);
@@ -65,10 +65,7 @@ static void test_figures (void **state) {
 }
 
 int main (void) {
-  const struct CMUnitTest tests[] = {
-    cmocka_unit_test (test_without_effect),
-    cmocka_unit_test (test_place),
-    cmocka_unit_test (test_figures),
-  };
+  const struct CMUnitTest tests[] = { cmocka_unit_test (test_without_effect), cmocka_unit_test (test_place),
+                                      cmocka_unit_test (test_figures) };
   return cmocka_run_group_tests (tests, cli_setup, cli_teardown);
 }

@@ -1,4 +1,4 @@
-/* rotational-spring, force, motor: oscillators, thrust that turns, torques that saturate. */
+/* rotational-spring, force, motor: oscillators, rotating thrust, saturating torques. */
 #include <math.h>
 #include "check.h"
 #include "scene.h"
@@ -14,7 +14,7 @@
 static const struct { double I[2], k, c, beta, d, w; } motor_o = { { 0.4, 1.1 }, 5, 0.3, 0.5, 0.8, 1.5 };
 
 typedef struct {
-  double driven, limit; /* driven 1: by a motor */
+  double driven, limit;
 } motor_parameters;
 
 static const pw_parameter motor_list[] = {
@@ -44,11 +44,8 @@ static void motor_oscillator (pw_model *m, const void *parameters) {
             .name = "M", .body = { "a", "b" }, .stiffness = motor_o.k, .damping = motor_o.c, .angle = motor_o.beta });
 }
 
-static const pw_plugin_table motor_oscillator_table = { .abi = PW_ABI,
-                                                        .size = sizeof motor_oscillator_table,
-                                                        .parameters = motor_list,
-                                                        .parameters_size = sizeof (motor_parameters),
-                                                        .build = motor_oscillator };
+static const pw_plugin_table motor_oscillator_table =
+    TRIAL_TABLE_WITH (motor_oscillator, motor_list, sizeof (motor_parameters));
 
 static void motor_swing (const char *method, double driven, double bound, const char *reason) {
   pw_system *s = scene_system (&motor_oscillator_table, "driven", driven, NULL);
@@ -66,14 +63,13 @@ static void motor_swing (const char *method, double driven, double bound, const 
                  "the torques balance");
     check_close ("kinetic", x.kinetic, turned, 10 * bound, reason);
     double lost = motor_o.k * (motor_o.d * motor_o.d - d * d) / 2 + I * (motor_o.w * motor_o.w - rate * rate) / 2;
-    if (driven > 0) /* all is work */
+    if (driven > 0) /* a motor does work; it has neither energy nor loss */
       check_close ("work", x.work, -I * (motor_o.w * motor_o.w - rate * rate) / 2, 10 * bound, reason);
     else
       check_close ("loss", x.loss, lost, 10 * bound, reason);
     check_close ("balance", x.balance, 0, 10 * bound, reason);
   }
-  pw_run_close (r);
-  pw_system_free (s);
+  runs_close (r, s);
 }
 
 static void test_oscillator (void **state) {
@@ -96,11 +92,7 @@ static void motor_start (pw_model *m, const void *parameters) {
              .name = "M", .body = { "rotor", "ground" }, .damping = 2, .limit = p->limit, .rate = MOTOR_CONSTANT (3) });
 }
 
-static const pw_plugin_table motor_start_table = { .abi = PW_ABI,
-                                                   .size = sizeof motor_start_table,
-                                                   .parameters = motor_list,
-                                                   .parameters_size = sizeof (motor_parameters),
-                                                   .build = motor_start };
+static const pw_plugin_table motor_start_table = TRIAL_TABLE_WITH (motor_start, motor_list, sizeof (motor_parameters));
 
 static void motor_run_up (const char *method, double limit, double bound, const char *reason) {
   pw_system *s = scene_system (&motor_start_table, "limit", limit, NULL);
@@ -114,8 +106,7 @@ static void motor_run_up (const char *method, double limit, double bound, const 
     check_close ("balance", x.balance, 0, bound, reason);
     if (limit > 0) assert_true (x.v[2] < limit * t / 0.4);
   }
-  pw_run_close (r);
-  pw_system_free (s);
+  runs_close (r, s);
 }
 
 static void test_limit (void **state) {
@@ -125,10 +116,10 @@ static void test_limit (void **state) {
   motor_run_up ("ida", 1.5, 1e-6, "1e4 rtol");
 }
 
-/* ---- Thrust along the axes of a body that turns evenly, and along those of the world ----
+/* ---- Thrust along the axes of a body that turns at the constant rate w, and along those of the world ----
  *
  *   body    m v' = F (cos w t, sin w t):  the thrust passes through the centre of mass
- *   world   m v' = F, and its work is F times the way of its point */
+ *   world   m v' = F, and its work is F times the displacement of its point */
 
 static const struct { double m, I, w, F; } motor_f = { 1.2, 0.3, 1.7, 0.9 };
 
@@ -163,7 +154,7 @@ static void motor_fly (const char *method, double bound, const char *reason) {
   check_close ("x", x.q[0], a * (1 - cos (w * t)) / (w * w), bound, reason);
   check_close ("y", x.q[1], a * (t - sin (w * t) / w) / w, bound, reason);
   check_close ("work", x.work, motor_f.m * a * a * (1 - cos (w * t)) / (w * w), bound, reason);
-  pw_run_close (r), pw_system_free (s);
+  runs_close (r, s);
   s = scene_system (&push, NULL);
   r = runs_open (s, method, &settings);
   x = runs_to (r, t);
@@ -174,7 +165,7 @@ static void motor_fly (const char *method, double bound, const char *reason) {
   check_close ("work", x.work, motor_f.F * X - 0.4 * Y, bound, reason);
   check_close ("balance", x.balance, 0, bound, reason);
   assert_true (fabs (x.v[2] - w) > 0.1);
-  pw_run_close (r), pw_system_free (s);
+  runs_close (r, s);
 }
 
 static void test_force (void **state) {
@@ -183,7 +174,7 @@ static void test_force (void **state) {
   motor_fly ("ida", 1e-6, "1e4 rtol");
 }
 
-/* ---- By all methods: an arm of two links, one moved by a motor, one by a spring, pushed at its tip ---- */
+/* ---- By all methods: an arm of two links with a motor, a spring and forces; signals that read states ---- */
 
 static void motor_arm (pw_model *m, const void *parameters) {
   (void)parameters;
@@ -211,7 +202,7 @@ static void motor_arm (pw_model *m, const void *parameters) {
   pw_add_force (m, &(pw_force){ .name = "wind", .body = "lower", .at = { 0.1, 0.1 }, .fx = MOTOR_CONSTANT (0.3) });
 }
 
-/* Follows another body: its angle doubled, and its rate; a force that grows with its speed. */
+/* *context times the state that it reads. */
 static int motor_follow (void *context, double t, const double *x, double value[3], double *gradient) {
   (void)t;
   value[0] = *(const double *)context * x[0];
@@ -219,6 +210,7 @@ static int motor_follow (void *context, double t, const double *x, double value[
   return 0;
 }
 
+/* A motor whose targets are twice the angle and the rate of another body, and a force that depends on that rate. */
 static void motor_leader (pw_model *m, const void *parameters) {
   static const char *const angle[] = { "leader.phi", NULL }, *const rate[] = { "leader.omega", NULL };
   static double twice = 2, brake = -0.3;
@@ -252,11 +244,7 @@ static void test_methods (void **state) {
 }
 
 int main (void) {
-  const struct CMUnitTest tests[] = {
-    cmocka_unit_test (test_oscillator),
-    cmocka_unit_test (test_limit),
-    cmocka_unit_test (test_force),
-    cmocka_unit_test (test_methods),
-  };
+  const struct CMUnitTest tests[] = { cmocka_unit_test (test_oscillator), cmocka_unit_test (test_limit),
+                                      cmocka_unit_test (test_force), cmocka_unit_test (test_methods) };
   return cmocka_run_group_tests (tests, NULL, NULL);
 }

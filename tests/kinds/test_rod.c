@@ -1,10 +1,10 @@
-/* rod: two bodies that whirl about each other, a link with pins that does the same. */
+/* rod: two free bodies on a rod, a four-bar linkage with a rod or an equivalent link with pins. */
 #include <math.h>
 #include "check.h"
 #include "scene.h"
 #include "trial.h"
 
-/* ---- Two bodies on a rod, free: they whirl about their common centre of mass at an even rate ---- */
+/* ---- Two free bodies on a rod revolve about their common centre of mass at a constant rate ---- */
 
 static const struct { double m[2], L, w, vx; } rod_d = { { 1.5, 0.5 }, 0.8, 3, 0.4 };
 
@@ -36,8 +36,7 @@ static void rod_whirl (const char *method, double bound, const char *reason) {
     check_close ("rod", trial_reaction (s, &x, "rod.F"), -pull, 100 * bound, reason);
     check_close ("balance", x.balance, 0, 100 * bound, reason);
   }
-  pw_run_close (r);
-  pw_system_free (s);
+  runs_close (r, s);
 }
 
 static void test_whirl (void **state) {
@@ -49,7 +48,7 @@ static void test_whirl (void **state) {
 /* ---- A four-bar whose coupler is a rod, or a massless body between two pins ---- */
 
 typedef struct {
-  double link; /* 1: a body without mass */
+  double link; /* see rod_list */
 } rod_parameters;
 
 static const pw_parameter rod_list[] = {
@@ -65,21 +64,18 @@ static void rod_fourbar (pw_model *m, const void *parameters) {
   pw_add_pin (m, &(pw_pin){ .name = "O", .body = { "crank", "ground" }, .at = { { 0, -0.3 }, { 0, 0 } } });
   pw_add_pin (m, &(pw_pin){ .name = "Q", .body = { "rocker", "ground" }, .at = { { 0, -0.4 }, { 1.1, 0 } } });
   pw_add_gravity (m, &(pw_gravity){ .name = "g", .acceleration = { 0, -9.81 } });
-  if (!link)
+  if (!link) {
     pw_add_rod (
         m,
         &(pw_rod){ .name = "rod", .body = { "crank", "rocker" }, .at = { { 0.1, 0.3 }, { -0.1, 0.5 } }, .length = L });
-  if (!link) return;
+    return;
+  }
   pw_add_body (m, &(pw_body){ .name = "link", .start = { 0.1, 0.6, atan2 (0.3, 0.9) } });
   pw_add_pin (m, &(pw_pin){ .name = "A", .body = { "crank", "link" }, .at = { { 0.1, 0.3 }, { 0, 0 } } });
   pw_add_pin (m, &(pw_pin){ .name = "B", .body = { "rocker", "link" }, .at = { { -0.1, 0.5 }, { L, 0 } } });
 }
 
-static const pw_plugin_table rod_fourbar_table = { .abi = PW_ABI,
-                                                   .size = sizeof rod_fourbar_table,
-                                                   .parameters = rod_list,
-                                                   .parameters_size = sizeof (rod_parameters),
-                                                   .build = rod_fourbar };
+static const pw_plugin_table rod_fourbar_table = TRIAL_TABLE_WITH (rod_fourbar, rod_list, sizeof (rod_parameters));
 
 static void test_link (void **state) {
   (void)state;
@@ -101,7 +97,7 @@ static void test_link (void **state) {
   pw_system_free (s), pw_system_free (p);
 }
 
-/* ---- By all methods: a chain of bodies on rods that hold them beside their centres ---- */
+/* ---- By all methods: a chain of bodies on rods with ends off the centres of mass ---- */
 
 static void rod_chain (pw_model *m, const void *parameters) {
   (void)parameters;
@@ -122,10 +118,7 @@ static void test_methods (void **state) {
 }
 
 int main (void) {
-  const struct CMUnitTest tests[] = {
-    cmocka_unit_test (test_whirl),
-    cmocka_unit_test (test_link),
-    cmocka_unit_test (test_methods),
-  };
+  const struct CMUnitTest tests[] = { cmocka_unit_test (test_whirl), cmocka_unit_test (test_link),
+                                      cmocka_unit_test (test_methods) };
   return cmocka_run_group_tests (tests, NULL, NULL);
 }

@@ -1,10 +1,12 @@
-/* rolling-wheel: a driven wheel that turns freely, a robot with two driven wheels, a motor, starts. */
+/* rolling-wheel: a body on one driven wheel, a robot with two of them, a motor, initial states. */
 #include <math.h>
 #include "check.h"
 #include "scene.h"
 #include "trial.h"
 
-/* ---- One driven wheel below the centre of mass: u = a t along the heading, phi = w t ---- */
+/* ---- One driven wheel below the centre of mass ----
+ *
+ *   speed a t along the heading, phi = w t:  a = u r / (m r^2 + I) with the torque u and the inertia of the wheel, I */
 
 typedef struct {
   double inertia;
@@ -29,11 +31,8 @@ static void rolling_unicycle (pw_model *m, const void *parameters) {
                                                 .torque = { .constant = rolling_u.u } });
 }
 
-static const pw_plugin_table rolling_unicycle_table = { .abi = PW_ABI,
-                                                        .size = sizeof rolling_unicycle_table,
-                                                        .parameters = rolling_list,
-                                                        .parameters_size = sizeof (rolling_parameters),
-                                                        .build = rolling_unicycle };
+static const pw_plugin_table rolling_unicycle_table =
+    TRIAL_TABLE_WITH (rolling_unicycle, rolling_list, sizeof (rolling_parameters));
 
 static void rolling_turn (const char *method, double inertia, double bound, const char *reason) {
   const double t = 3, w = rolling_u.w, r = rolling_u.r;
@@ -52,8 +51,7 @@ static void rolling_turn (const char *method, double inertia, double bound, cons
   check_close ("traction", trial_reaction (system, &x, "wheel.T"), rolling_u.m * a, 100 * bound, reason);
   check_close ("work", x.work, rolling_u.u * a * t * t / (2 * r), 10 * bound, reason);
   check_close ("balance", x.balance, 0, 10 * bound, reason);
-  pw_run_close (run);
-  pw_system_free (system);
+  runs_close (run, system);
 }
 
 static void test_unicycle (void **state) {
@@ -67,12 +65,13 @@ static void test_unicycle (void **state) {
   }
 }
 
-/* ---- A robot with two driven wheels on one axle, centre of mass between them: it runs along a circle ----
+/* ---- A robot with two driven wheels on one axle, centre of mass between them: it moves along a circle ----
  *
- *   v = a t, phi = b t^2 / 2:  (m + 2 I / r^2) a = (u1 + u2) / r,  (J + 2 I c^2 / r^2) b = c (u2 - u1) / r
+ *   v = a t, phi = b t^2 / 2:  (m + 2 I / r^2) a = (u1 + u2) / r,  (J + 2 I c^2 / r^2) b = c (u2 - u1) / r,
+ *   with the torques u1, u2 and half the length of the axle, c
  *
- * Either wheel keeps the axle from sliding sideways, so that they share the force; or the right one does not, since it
- * sits in a massless hub that may slide along the axle. */
+ * Both wheels prevent lateral motion and share the lateral force; or the left one has all of it, since the right one
+ * is in a massless hub that can slide along the axle. */
 
 static const struct { double m, J, I, r, c, u1, u2; } rolling_r = { 10, 0.4, 0.02, 0.1, 0.25, 0.5, 0.8 };
 
@@ -108,28 +107,27 @@ static void rolling_hub (pw_model *m, const void *parameters) {
 static const pw_plugin_table rolling_robot_table = TRIAL_TABLE (rolling_robot);
 static const pw_plugin_table rolling_hub_table = TRIAL_TABLE (rolling_hub);
 
-/* shares: of the lateral force, of the left wheel and the right one. */
+/* shares: the parts of the lateral force that the left and the right wheel have. */
 static void rolling_circle (const pw_plugin_table *table, const double shares[2], const char *method, double bound,
                             const char *reason) {
   const double t = 2, m = rolling_r.m, I = rolling_r.I, r = rolling_r.r, c = rolling_r.c;
   double a = (rolling_r.u1 + rolling_r.u2) / r / (m + 2 * I / (r * r));
   double b = c * (rolling_r.u2 - rolling_r.u1) / r / (rolling_r.J + 2 * I * c * c / (r * r));
-  double phi = b * t * t / 2, way = a * t * t / 2, side = m * a * t * b * t;
+  double phi = b * t * t / 2, distance = a * t * t / 2, lateral = m * a * t * b * t;
   pw_system *s = scene_system (table, NULL);
   pw_run *run = runs_open (s, method, &(pw_settings){ .step = 1e-3, .rtol = 1e-10, .span = t, .ledger = 1 });
   pw_sample x = runs_to (run, t);
   check_close ("phi", x.q[2], phi, bound, reason);
   check_close ("x", x.q[0], a / b * sin (phi), bound, reason);
   check_close ("y", x.q[1], a / b * (1 - cos (phi)), bound, reason);
-  check_close ("left", trial_state (s, &x, "left.spin"), (way - c * phi) / r, 10 * bound, reason);
-  check_close ("right", trial_state (s, &x, "right.spin"), (way + c * phi) / r, 10 * bound, reason);
-  check_close ("work", x.work, (rolling_r.u1 * (way - c * phi) + rolling_r.u2 * (way + c * phi)) / r, 10 * bound,
-               reason);
-  check_close ("left force", trial_reaction (s, &x, "left.N"), shares[0] * side, 1e3 * bound, reason);
-  check_close ("right force", trial_reaction (s, &x, "right.N"), shares[1] * side, 1e3 * bound, reason);
+  check_close ("left", trial_state (s, &x, "left.spin"), (distance - c * phi) / r, 10 * bound, reason);
+  check_close ("right", trial_state (s, &x, "right.spin"), (distance + c * phi) / r, 10 * bound, reason);
+  check_close ("work", x.work, (rolling_r.u1 * (distance - c * phi) + rolling_r.u2 * (distance + c * phi)) / r,
+               10 * bound, reason);
+  check_close ("left force", trial_reaction (s, &x, "left.N"), shares[0] * lateral, 1e3 * bound, reason);
+  check_close ("right force", trial_reaction (s, &x, "right.N"), shares[1] * lateral, 1e3 * bound, reason);
   check_close ("balance", x.balance, 0, 10 * bound, reason);
-  pw_run_close (run);
-  pw_system_free (s);
+  runs_close (run, s);
 }
 
 static void rolling_every_method (const pw_plugin_table *table, const double shares[2]) {
@@ -152,8 +150,7 @@ static void test_robot (void **state) {
   assert_int_equal (pw_run_redundant (r), 1);
   assert_string_equal (pw_run_redundancy (r, 0, text, sizeof text),
                        "rolling-wheels left and right: the same lateral constraint");
-  pw_run_close (r);
-  pw_system_free (s);
+  runs_close (r, s);
 }
 
 static void test_hub (void **state) {
@@ -183,8 +180,7 @@ static void rolling_speed (const char *method, double bound, const char *reason)
   pw_sample x = runs_to (run, 2);
   double J = rolling_u.m * rolling_u.r * rolling_u.r + 0.03;
   check_close ("speed", trial_state (s, &x, "wheel.spin_rate"), 20 * (1 - exp (-0.05 * 2 / J)), bound, reason);
-  pw_run_close (run);
-  pw_system_free (s);
+  runs_close (run, s);
 }
 
 static void test_motor (void **state) {
@@ -193,7 +189,7 @@ static void test_motor (void **state) {
   rolling_speed ("ida+ggl", 1e-6, "1e4 rtol");
 }
 
-/* ---- Starts ---- */
+/* ---- Initial states ---- */
 
 static void rolling_coast (pw_model *m, const void *parameters) {
   (void)parameters;
@@ -207,7 +203,7 @@ static void rolling_coast (pw_model *m, const void *parameters) {
       m, &(pw_rolling_wheel){ .name = "wheel", .body = "body", .at = { 0, -0.4 }, .radius = 0.2, .inertia = 0.05 });
 }
 
-/* A wheel that is not told how fast it spins rolls with its body, which then need not change its own motion. */
+/* A wheel without a given spin rate takes that with which it rolls; the velocity of the body does not change. */
 static void test_start (void **state) {
   (void)state;
   static const pw_plugin_table table = TRIAL_TABLE (rolling_coast);
@@ -215,11 +211,10 @@ static void test_start (void **state) {
   pw_run *r = runs_open (s, "rk4+projection", NULL);
   assert_int_equal (pw_run_initial (r)->moved, 0);
   check_close ("spin rate", pw_run_initial (r)->v[3], 2 / 0.2, 64 * CHECK_EPS, "speed of the contact point / radius");
-  pw_run_close (r);
-  pw_system_free (s);
+  runs_close (r, s);
 }
 
-/* What is given from outside is held: the body follows its wheel. */
+/* A spin rate set by pw_model_set_initial is kept; the velocity of the body changes. */
 static void test_given (void **state) {
   (void)state;
   pw_error error = { 0 };
@@ -228,13 +223,12 @@ static void test_given (void **state) {
   pw_system *s = scene_compile (m);
   pw_run *r = runs_open (s, "rk4+projection", NULL);
   assert_int_equal (pw_run_initial (r)->released, 0);
-  check_close ("vx", pw_run_initial (r)->v[0], 4 * rolling_u.r * cos (rolling_u.heading), 64 * CHECK_EPS, "it rolls");
-  check_close ("vy", pw_run_initial (r)->v[1], 4 * rolling_u.r * sin (rolling_u.heading), 64 * CHECK_EPS, "it rolls");
-  pw_run_close (r);
-  pw_system_free (s);
+  check_close ("vx", pw_run_initial (r)->v[0], 4 * rolling_u.r * cos (rolling_u.heading), 64 * CHECK_EPS, "rolling");
+  check_close ("vy", pw_run_initial (r)->v[1], 4 * rolling_u.r * sin (rolling_u.heading), 64 * CHECK_EPS, "rolling");
+  runs_close (r, s);
 }
 
-/* ---- A bicycle without lean: the rear wheel is driven, the front one steers freely on a fork with trail ---- */
+/* ---- By all methods: a planar bicycle with a driven rear wheel and a free fork with trail ---- */
 
 static void rolling_bicycle (pw_model *m, const void *parameters) {
   (void)parameters;
@@ -261,10 +255,9 @@ static void test_methods (void **state) {
 }
 
 int main (void) {
-  const struct CMUnitTest tests[] = {
-    cmocka_unit_test (test_unicycle), cmocka_unit_test (test_robot), cmocka_unit_test (test_hub),
-    cmocka_unit_test (test_motor),    cmocka_unit_test (test_start), cmocka_unit_test (test_given),
-    cmocka_unit_test (test_methods),
-  };
+  const struct CMUnitTest tests[] = { cmocka_unit_test (test_unicycle), cmocka_unit_test (test_robot),
+                                      cmocka_unit_test (test_hub),      cmocka_unit_test (test_motor),
+                                      cmocka_unit_test (test_start),    cmocka_unit_test (test_given),
+                                      cmocka_unit_test (test_methods) };
   return cmocka_run_group_tests (tests, NULL, NULL);
 }

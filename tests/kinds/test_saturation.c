@@ -1,28 +1,23 @@
-/* Friction and other forces that saturate within a velocity far below the tolerance bring bodies to rest, at all
- * tolerances. */
+/* Friction and other saturating forces bring bodies to rest at all tolerances, however small their velocity scale. */
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
 #include "check.h"
-#include "runs.h"
 #include "scene.h"
+#include "trial.h"
 
-/* All of them slow down at 1 m/s^2 or 1 rad/s^2 and stop after v^2 / 2. */
+/* All bodies slow down at 1 m/s^2 or 1 rad/s^2 and stop after v^2 / 2. */
 typedef struct {
   double speed, v;
 } saturation;
 
 static const pw_parameter saturation_list[] = {
-  { PW_AT (saturation, speed), 1e-8, "", "within which the force reverses", PW_POSITIVE },
+  { PW_AT (saturation, speed), 1e-8, "", "change over which the force saturates", PW_POSITIVE },
   { PW_AT (saturation, v), 1, "", "at the start", PW_POSITIVE },
   { .name = NULL },
 };
 
-#define SATURATION_TABLE(f)                                                         \
-  {                                                                                 \
-    .abi = PW_ABI, .size = sizeof (pw_plugin_table), .parameters = saturation_list, \
-    .parameters_size = sizeof (saturation), .build = f                              \
-  }
+#define SATURATION_TABLE(build) TRIAL_TABLE_WITH (build, saturation_list, sizeof (saturation))
 
 static void saturation_body (pw_model *m, double vx, double omega) {
   pw_add_body (m, &(pw_body){ .name = "b", .mass = 1, .inertia = 1, .rate = { vx, 0, omega } });
@@ -36,7 +31,7 @@ static void saturation_block (pw_model *m, const void *parameters) {
       m, &(pw_sliding_friction){ .name = "f", .body = { "b", "ground" }, .limit = 1, .speed = p->speed });
 }
 
-/* On a table that moves at 10 m/s. */
+/* A block on a table that moves at 10 m/s. */
 static void saturation_table (pw_model *m, const void *parameters) {
   const saturation *p = parameters;
   saturation_body (m, 10 + p->v, 0);
@@ -69,7 +64,7 @@ static void saturation_wheel (pw_model *m, const void *parameters) {
       m, &(pw_rolling_resistance){ .name = "f", .body = "b", .at = { 0.3, 0 }, .limit = 1, .speed = p->speed });
 }
 
-/* It skids sideways. */
+/* A body that skids laterally. */
 static void saturation_tyre (pw_model *m, const void *parameters) {
   const saturation *p = parameters;
   saturation_body (m, p->v, 0);
@@ -86,8 +81,8 @@ static void saturation_tyre (pw_model *m, const void *parameters) {
 static const struct {
   const char *name;
   pw_plugin_table table;
-  int state;     /* which runs down */
-  double moving; /* what it runs down to */
+  int state;     /* the coordinate whose velocity decreases */
+  double moving; /* its final velocity */
 } saturation_scenes[] = {
   { "block", SATURATION_TABLE (saturation_block), 0, 0 }, { "table", SATURATION_TABLE (saturation_table), 0, 10 },
   { "disc", SATURATION_TABLE (saturation_disc), 2, 0 },   { "motor", SATURATION_TABLE (saturation_motor), 2, 0 },
@@ -95,7 +90,7 @@ static const struct {
 };
 enum { SATURATION_SCENES = sizeof saturation_scenes / sizeof *saturation_scenes };
 
-/* Runs for 4 s, in not more than a thousand steps. */
+/* Runs for 4 s, in at most a thousand steps, and checks the final state. */
 static void saturation_stops (int scene, const char *method, double rtol, double atol, double speed, double v) {
   char what[160];
   pw_error error = { 0 };
@@ -107,14 +102,12 @@ static void saturation_stops (int scene, const char *method, double rtol, double
   snprintf (what, sizeof what, "%s, %s, rtol %g, atol %g, speed %g, v = %g", saturation_scenes[scene].name, method,
             rtol, atol, speed, v);
   while (pw_run_time (r) < 4 && steps++ < 1000) check_ok (pw_run_advance (r, 4, &error), &error);
-  check_close (what, pw_run_time (r), 4, 0, "a thousand steps: the force and its smoothing need some ten each");
+  check_close (what, pw_run_time (r), 4, 0, "a thousand steps: the sliding and the smoothed stop need about ten each");
   check_ok (pw_run_sample (r, 4, &x, &error), &error);
   double bound = 100 * fmax (rtol, atol) * (1 + 4 * moving) + 100 * speed;
-  check_close (what, x.q[j], 4 * moving + v * v / 2, bound,
-               "100 rtol, and what is left of the motion where it is smooth");
+  check_close (what, x.q[j], 4 * moving + v * v / 2, bound, "100 rtol, and the motion within the smoothing");
   check_close (what, x.v[j], moving, 10 * rtol * moving + 10 * speed, "at rest within the smoothing");
-  pw_run_close (r);
-  pw_system_free (s);
+  runs_close (r, s);
 }
 
 static const char *const saturation_methods[] = { "bdf+none",   "bdf+projection", "ida+none",
@@ -122,7 +115,7 @@ static const char *const saturation_methods[] = { "bdf+none",   "bdf+projection"
                                                   "radau+ggl",  "radau+index2",   "radau+index3" };
 enum { SATURATION_METHODS = sizeof saturation_methods / sizeof *saturation_methods };
 
-/* The sweep that found it: twelve speeds, of which with bdf+projection all went wrong, without a word. */
+/* Without bounds of the tolerances, bdf+projection ends at wrong positions, without an error. */
 static void test_block (void **state) {
   static const double setting[][2] = { { 1e-6, 1e-8 }, { 1e-6, 1e-7 }, { 1e-4, 1e-8 },
                                        { 1e-4, 1e-7 }, { 1e-2, 1e-8 }, { 1e-8, 1e-10 } };
@@ -143,7 +136,7 @@ static void test_kinds (void **state) {
           saturation_stops (scene, saturation_methods[m], setting[k][0], 0, setting[k][1], 0.25 + 0.45 * i);
 }
 
-/* Explicit methods follow what is smooth in ten or a thousand steps, and then tremble around rest. */
+/* Explicit methods oscillate about rest, with an amplitude that the tolerance permits. */
 static void test_explicit (void **state) {
   static const char *const methods[] = { "erk5+none", "erk5+projection", "erk8+projection" };
   (void)state;
@@ -154,12 +147,13 @@ static void test_explicit (void **state) {
         pw_system *s = scene_system (&saturation_scenes[0].table, "speed", 1e-8, "v", v, NULL);
         runs_state (s, methods[m], &(pw_settings){ .rtol = rtol, .span = 4 }, 4, q, w, NULL);
         check_close (methods[m], q[0], v * v / 2, 4 * pow (rtol, 0.75), "4 s at rtol^(3/4)");
-        check_close (methods[m], w[0], 0, 4 * pow (rtol, 0.75), "what the error test allows of 6 states, and T = 2 s");
+        check_close (methods[m], w[0], 0, 4 * pow (rtol, 0.75),
+                     "what the error test permits with 6 states and T = 2 s");
         pw_system_free (s);
       }
 }
 
-/* An absolute tolerance above it does not change that; a run tells what it is above. */
+/* The same with an absolute tolerance above the velocity scale, which pw_run_saturation returns. */
 static void test_atol (void **state) {
   (void)state;
   for (int m = 0; m < SATURATION_METHODS; m++)
@@ -173,17 +167,12 @@ static void test_atol (void **state) {
     assert_true (j == pw_system_coordinates (s) + saturation_scenes[scene].state);
     check_close (saturation_scenes[scene].name, least, 1e-8, 1e-8 * 8 * CHECK_EPS, "round-off");
     assert_string_equal (element + strlen (element) - 2, " f");
-    pw_run_close (r);
-    pw_system_free (s);
+    runs_close (r, s);
   }
 }
 
 int main (void) {
-  const struct CMUnitTest tests[] = {
-    cmocka_unit_test (test_block),
-    cmocka_unit_test (test_kinds),
-    cmocka_unit_test (test_explicit),
-    cmocka_unit_test (test_atol),
-  };
+  const struct CMUnitTest tests[] = { cmocka_unit_test (test_block), cmocka_unit_test (test_kinds),
+                                      cmocka_unit_test (test_explicit), cmocka_unit_test (test_atol) };
   return cmocka_run_group_tests (tests, NULL, NULL);
 }

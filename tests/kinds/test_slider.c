@@ -1,4 +1,4 @@
-/* slider, slot: an incline, a scotch yoke, drives that do the same. */
+/* slider, slot: an incline, a scotch yoke, equivalent drives. */
 #include <math.h>
 #include "check.h"
 #include "scene.h"
@@ -6,8 +6,9 @@
 
 /* ---- A block on an incline, held at a point beside its centre of mass ----
  *
- * s'' = -g sin(alpha),  N = m g cos(alpha),  M = -N t.a     a: from the centre of mass to the point, t: up the
- * incline */
+ *   s'' = -g sin(alpha),  N = m g cos(alpha),  M = -N t.a
+ *
+ * a = (X, Y): from the centre of mass to the point; t: unit vector up the incline. */
 
 static const struct {
   double m, g, alpha, beta, v, at[2], foot[2];
@@ -38,18 +39,17 @@ static void test_incline (void **state) {
   const double t = 2, c = cos (slider_i.beta), si = sin (slider_i.beta), ca = cos (slider_i.alpha),
                sa = sin (slider_i.alpha), bound = 1e4 * CHECK_EPS;
   double X = c * slider_i.at[0] - si * slider_i.at[1], Y = si * slider_i.at[0] + c * slider_i.at[1];
-  double N = slider_i.m * slider_i.g * ca, way = slider_i.v * t - slider_i.g * sa * t * t / 2;
+  double N = slider_i.m * slider_i.g * ca, distance = slider_i.v * t - slider_i.g * sa * t * t / 2;
   check_below ("start", pw_run_initial (r)->velocity, 16 * CHECK_EPS, "given consistently");
   pw_sample x = runs_to (r, t);
-  check_close ("x", x.q[0], slider_i.foot[0] - X + way * ca, bound,
+  check_close ("x", x.q[0], slider_i.foot[0] - X + distance * ca, bound,
                "RK4 is exact for parabolas: round-off of 200 steps");
-  check_close ("y", x.q[1], slider_i.foot[1] - Y + way * sa, bound,
+  check_close ("y", x.q[1], slider_i.foot[1] - Y + distance * sa, bound,
                "RK4 is exact for parabolas: round-off of 200 steps");
   check_close ("N", trial_reaction (s, &x, "rail.N"), N, bound, "round-off");
   check_close ("M", trial_reaction (s, &x, "rail.M"), -N * (ca * X + sa * Y), bound, "round-off");
   check_close ("balance", x.balance, 0, 100 * bound, "round-off");
-  pw_run_close (r);
-  pw_system_free (s);
+  runs_close (r, s);
 }
 
 /* ---- A scotch yoke: a crank's pin in a slot of a body that slides ----
@@ -85,8 +85,7 @@ static void slider_turn (const char *method, double bound, const char *reason) {
     check_close ("N", trial_reaction (s, &x, "slot.N"), -mr * (w1 * sn + w * w * cs), 100 * bound, reason);
     check_close ("balance", x.balance, 0, 100 * bound, reason);
   }
-  pw_run_close (r);
-  pw_system_free (s);
+  runs_close (r, s);
 }
 
 static void test_yoke (void **state) {
@@ -95,7 +94,7 @@ static void test_yoke (void **state) {
   slider_turn ("ida+ggl", 1e-7, "1e3 rtol");
 }
 
-/* ---- The same as drives that stand still, on a body that swings ---- */
+/* ---- A slider and a slot on a swinging body, compared with constant drives ---- */
 
 typedef struct {
   double by; /* what holds the bead: 0 slider, 1 drives, 2 slot, 3 one drive */
@@ -137,11 +136,8 @@ static void slider_bead (pw_model *m, const void *parameters) {
     pw_add_drive (m, &(pw_drive){ .name = "aside", .body = { "bead", "arm" }, .at = SLIDER_AT, .what = PW_DRIVE_Y });
 }
 
-static const pw_plugin_table slider_bead_table = { .abi = PW_ABI,
-                                                   .size = sizeof slider_bead_table,
-                                                   .parameters = slider_list,
-                                                   .parameters_size = sizeof (slider_parameters),
-                                                   .build = slider_bead };
+static const pw_plugin_table slider_bead_table =
+    TRIAL_TABLE_WITH (slider_bead, slider_list, sizeof (slider_parameters));
 
 static void slider_state (double by, const char *force, const char *moment, double out[14]) {
   pw_system *s = scene_system (&slider_bead_table, "by", by, NULL);
@@ -150,8 +146,7 @@ static void slider_state (double by, const char *force, const char *moment, doub
   for (int i = 0; i < 6; i++) out[i] = x.q[i], out[6 + i] = x.v[i];
   out[12] = trial_reaction (s, &x, force);
   out[13] = moment ? trial_reaction (s, &x, moment) : 0;
-  pw_run_close (r);
-  pw_system_free (s);
+  runs_close (r, s);
 }
 
 static void test_drives (void **state) {
@@ -165,7 +160,7 @@ static void test_drives (void **state) {
   for (int i = 0; i < 14; i++) check_close ("slot", a[i], b[i], 1e6 * CHECK_EPS, "round-off of 2000 steps");
 }
 
-/* ---- By all methods: lines that are turned, on bodies that move ---- */
+/* ---- By all methods: oblique lines on moving bodies ---- */
 
 static void slider_train (pw_model *m, const void *parameters) {
   (void)parameters;
@@ -194,11 +189,7 @@ static void test_methods (void **state) {
 }
 
 int main (void) {
-  const struct CMUnitTest tests[] = {
-    cmocka_unit_test (test_incline),
-    cmocka_unit_test (test_yoke),
-    cmocka_unit_test (test_drives),
-    cmocka_unit_test (test_methods),
-  };
+  const struct CMUnitTest tests[] = { cmocka_unit_test (test_incline), cmocka_unit_test (test_yoke),
+                                      cmocka_unit_test (test_drives), cmocka_unit_test (test_methods) };
   return cmocka_run_group_tests (tests, NULL, NULL);
 }

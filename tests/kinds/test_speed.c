@@ -1,4 +1,4 @@
-/* speed, pfaffian: a sled whose speed is prescribed, relations that other kinds state as well. */
+/* speed, pfaffian: a sled with a prescribed speed, pfaffian elements in place of other types. */
 #include <math.h>
 #include "check.h"
 #include "scene.h"
@@ -9,23 +9,23 @@
     PW_HARMONIC, .harmonic = {.amplitude = A, .omega = w, .offset = o } \
   }
 
-/* ---- A sled that turns evenly while its speed follows u: v = u e(w t) ----
+/* ---- A sled that turns at the rate w while its speed is u = o + A cos (s t): v = u e(w t), e a unit vector ----
  *
  *   F = m u' along e,  N = m u w across it,  work = m (u^2 - u(0)^2) / 2 */
 
 static const struct { double m, w, A, s, o, psi; } speed_s = { 1.3, 0.7, 0.8, 2, 0.5, 0.6 };
 
 typedef struct {
-  double stated; /* 1: both rows by coefficients */
+  double pfaffian; /* see speed_list */
 } speed_parameters;
 
 static const pw_parameter speed_list[] = {
-  { PW_AT (speed_parameters, stated), 0, "", "1: by coefficients", PW_NONNEGATIVE },
+  { PW_AT (speed_parameters, pfaffian), 0, "", "1: pfaffian elements in place of speed and wheel", PW_NONNEGATIVE },
   { .name = NULL },
 };
 
 static void speed_sled (pw_model *m, const void *parameters) {
-  int stated = ((const speed_parameters *)parameters)->stated > 0;
+  int pfaffian = ((const speed_parameters *)parameters)->pfaffian > 0;
   double c = cos (speed_s.psi), s = sin (speed_s.psi), u = speed_s.o + speed_s.A;
   const pw_signal signal = SPEED_HARMONIC (speed_s.A, speed_s.s, speed_s.o);
   pw_add_body (m, &(pw_body){ .name = "sled",
@@ -33,7 +33,7 @@ static void speed_sled (pw_model *m, const void *parameters) {
                               .inertia = 0.2,
                               .start = { 0, 0, -speed_s.psi },
                               .rate = { u, 0, speed_s.w } });
-  if (stated) {
+  if (pfaffian) {
     pw_add_pfaffian (m,
                      &(pw_pfaffian){ .name = "push", .body = { "sled", "ground" }, .a = { c, s, 0 }, .value = signal });
     pw_add_pfaffian (m, &(pw_pfaffian){ .name = "edge", .body = { "sled", "ground" }, .a = { -s, c, 0 } });
@@ -43,50 +43,45 @@ static void speed_sled (pw_model *m, const void *parameters) {
   pw_add_wheel (m, &(pw_wheel){ .name = "edge", .body = "sled", .heading = speed_s.psi });
 }
 
-static const pw_plugin_table speed_sled_table = { .abi = PW_ABI,
-                                                  .size = sizeof speed_sled_table,
-                                                  .parameters = speed_list,
-                                                  .parameters_size = sizeof (speed_parameters),
-                                                  .build = speed_sled };
+static const pw_plugin_table speed_sled_table = TRIAL_TABLE_WITH (speed_sled, speed_list, sizeof (speed_parameters));
 
-/* The integral of A cos(s t) e(w t), and of o e(w t). */
-static void speed_place (double t, double out[2]) {
+/* The position at t: the integral of u e(w t). */
+static void speed_position (double t, double out[2]) {
   double p = speed_s.s + speed_s.w, q = speed_s.w - speed_s.s, w = speed_s.w, A = speed_s.A / 2, o = speed_s.o;
   out[0] = A * (sin (p * t) / p + sin (q * t) / q) + o * sin (w * t) / w;
   out[1] = A * ((1 - cos (p * t)) / p + (1 - cos (q * t)) / q) + o * (1 - cos (w * t)) / w;
 }
 
-static void speed_follow (const char *method, double stated, double bound, const char *reason) {
-  pw_system *s = scene_system (&speed_sled_table, "stated", stated, NULL);
+static void speed_follow (const char *method, double pfaffian, double bound, const char *reason) {
+  pw_system *s = scene_system (&speed_sled_table, "pfaffian", pfaffian, NULL);
   pw_run *r = runs_open (s, method, &(pw_settings){ .step = 1e-3, .rtol = 1e-10, .span = 3, .ledger = 1 });
   check_below ("start", pw_run_initial (r)->velocity, 16 * CHECK_EPS, "given consistently");
   for (int i = 1; i <= 3; i++) {
-    double t = i, place[2], u0 = speed_s.o + speed_s.A, u = speed_s.o + speed_s.A * cos (speed_s.s * t),
+    double t = i, r_t[2], u0 = speed_s.o + speed_s.A, u = speed_s.o + speed_s.A * cos (speed_s.s * t),
            a = -speed_s.A * speed_s.s * sin (speed_s.s * t);
     pw_sample x = runs_to (r, t);
-    speed_place (t, place);
-    check_close ("x", x.q[0], place[0], bound, reason);
-    check_close ("y", x.q[1], place[1], bound, reason);
+    speed_position (t, r_t);
+    check_close ("x", x.q[0], r_t[0], bound, reason);
+    check_close ("y", x.q[1], r_t[1], bound, reason);
     check_close ("speed", hypot (x.v[0], x.v[1]), fabs (u), bound, reason);
     check_close ("force", trial_reaction (s, &x, "push.F"), speed_s.m * a, 100 * bound, reason);
-    check_close ("across", trial_reaction (s, &x, stated > 0 ? "edge.F" : "edge.N"), speed_s.m * u * speed_s.w,
+    check_close ("across", trial_reaction (s, &x, pfaffian > 0 ? "edge.F" : "edge.N"), speed_s.m * u * speed_s.w,
                  100 * bound, reason);
     check_close ("work", x.work, speed_s.m * (u * u - u0 * u0) / 2, 10 * bound, reason);
     check_close ("balance", x.balance, 0, 10 * bound, reason);
   }
-  pw_run_close (r);
-  pw_system_free (s);
+  runs_close (r, s);
 }
 
 static void test_sled (void **state) {
   (void)state;
-  for (int stated = 0; stated < 2; stated++) {
-    speed_follow ("rk4+projection", stated, 1e-10, "(h w)^4 at h = 1e-3 and w = 2/s");
-    speed_follow ("ida+ggl", stated, 1e-6, "1e4 rtol");
+  for (int pfaffian = 0; pfaffian < 2; pfaffian++) {
+    speed_follow ("rk4+projection", pfaffian, 1e-10, "(h w)^4 at h = 1e-3 and w = 2/s");
+    speed_follow ("ida+ggl", pfaffian, 1e-6, "1e4 rtol");
   }
 }
 
-/* ---- Relations between two bodies: a speed between them, their turning as by a gear ---- */
+/* ---- Two bodies: a prescribed velocity of one, rotations coupled as by a gear ---- */
 
 static const struct { double m[2], I[2], A, s, ratio; } speed_p = { { 1, 3 }, { 0.2, 0.7 }, 0.6, 1.5, -2.5 };
 
@@ -119,8 +114,7 @@ static void test_pair (void **state) {
   check_close ("first angle", x.q[2], i * a * t * t / 2, bound, reason);
   check_close ("mesh", trial_reaction (s, &x, "mesh.F"), speed_p.I[0] * i * a, bound, reason);
   check_close ("balance", x.balance, 0, 10 * bound, reason);
-  pw_run_close (r);
-  pw_system_free (s);
+  runs_close (r, s);
 }
 
 static void speed_nothing (pw_model *m, const void *parameters) {
@@ -132,15 +126,11 @@ static void speed_nothing (pw_model *m, const void *parameters) {
 static void test_refused (void **state) {
   static const pw_plugin_table nothing = TRIAL_TABLE (speed_nothing);
   (void)state;
-  pw_error error = { 0 };
-  pw_model *m = scene_model (&nothing, NULL);
-  assert_null (pw_system_compile (m, &error));
-  check_error (&error, PW_INPUT,
-               "model scene: pfaffian none: a and b are all zero: expected at least one other number");
-  pw_model_free (m);
+  scene_refused (scene_model (&nothing, NULL),
+                 "model scene: pfaffian none: a and b are all zero: expected at least one other number");
 }
 
-/* ---- By all methods: points beside the centres, both bodies turning, both signals changing ---- */
+/* ---- By all methods: points off the centres of mass, rotating bodies, variable signals ---- */
 
 static void speed_tow (pw_model *m, const void *parameters) {
   (void)parameters;
@@ -170,11 +160,7 @@ static void test_methods (void **state) {
 }
 
 int main (void) {
-  const struct CMUnitTest tests[] = {
-    cmocka_unit_test (test_sled),
-    cmocka_unit_test (test_pair),
-    cmocka_unit_test (test_refused),
-    cmocka_unit_test (test_methods),
-  };
+  const struct CMUnitTest tests[] = { cmocka_unit_test (test_sled), cmocka_unit_test (test_pair),
+                                      cmocka_unit_test (test_refused), cmocka_unit_test (test_methods) };
   return cmocka_run_group_tests (tests, NULL, NULL);
 }

@@ -1,11 +1,11 @@
-/* spring: an oscillator, an ellipse, ends that meet, bodies with arms. */
+/* spring: an oscillator, an ellipse, coincident ends, ends off the centres of mass. */
 #include <math.h>
 #include "check.h"
 #include "scene.h"
 #include "system.h"
 #include "trial.h"
 
-/* ---- A damped oscillator: l = l0 + exp (-d t) (A cos wt + B sin wt) ---- */
+/* ---- A damped oscillator: the length is l0 + exp (-d t) (A cos wt + B sin wt) ---- */
 
 static const struct { double m, k, c, l0, l, v; } spring_o = { 1.5, 60, 2.4, 0.8, 1.1, 0.5 };
 
@@ -33,15 +33,14 @@ static void spring_swing (const char *method, double bound, const char *reason) 
   pw_system *s = scene_system (&spring_oscillator_table, NULL);
   pw_run *r = runs_open (s, method, &(pw_settings){ .step = 1e-3, .rtol = 1e-10, .span = 2, .ledger = 1 });
   for (int i = 1; i <= 10; i++) {
-    double t = 0.2 * i, decay = exp (-d * t), l = decay * (A * cos (w * t) + B * sin (w * t));
+    double t = 0.2 * i, decay = exp (-d * t), stretch = decay * (A * cos (w * t) + B * sin (w * t));
     pw_sample x = runs_to (r, t);
-    check_close ("length", hypot (x.q[0] - 1, x.q[1] - 2), spring_o.l0 + l, bound, reason);
-    check_close ("potential", x.potential, spring_o.k * l * l / 2, 100 * bound, reason);
+    check_close ("length", hypot (x.q[0] - 1, x.q[1] - 2), spring_o.l0 + stretch, bound, reason);
+    check_close ("potential", x.potential, spring_o.k * stretch * stretch / 2, 100 * bound, reason);
     check_close ("balance", x.balance, 0, 100 * bound, reason);
     assert_true (x.loss > 0);
   }
-  pw_run_close (r);
-  pw_system_free (s);
+  runs_close (r, s);
 }
 
 static void test_oscillator (void **state) {
@@ -50,7 +49,7 @@ static void test_oscillator (void **state) {
   spring_swing ("ida", 1e-6, "1e4 rtol");
 }
 
-/* ---- Free length 0: a plane oscillator, on an ellipse, or straight through the point where the ends meet ---- */
+/* ---- Free length 0: a planar oscillator, on an ellipse or on a line through the point where the ends coincide ---- */
 
 static const struct { double x[2], v[2]; } spring_start[] = { { { 1, 0 }, { 0, 0.5 } }, { { 0, 0 }, { 0.6, 0.8 } } };
 
@@ -70,11 +69,7 @@ static const pw_parameter spring_which[] = { { .name = "which", .value = 0, .dom
 
 static void test_ellipse (void **state) {
   (void)state;
-  static const pw_plugin_table table = { .abi = PW_ABI,
-                                         .size = sizeof table,
-                                         .parameters = spring_which,
-                                         .parameters_size = sizeof (double),
-                                         .build = spring_ellipse };
+  static const pw_plugin_table table = TRIAL_TABLE_WITH (spring_ellipse, spring_which, sizeof (double));
   const double w = 3, t = 4;
   for (int i = 0; i < 2; i++) {
     pw_system *s = scene_system (&table, "which", (double)i, NULL);
@@ -84,12 +79,11 @@ static void test_ellipse (void **state) {
       check_close ("coordinate", x.q[j], spring_start[i].x[j] * cos (w * t) + spring_start[i].v[j] / w * sin (w * t),
                    1e-11, "(h w)^4 / 10 at h = 1e-3 and w = 3/s");
     check_close ("balance", x.balance, 0, 1e-10, "(h w)^4 at h = 1e-3 and w = 3/s");
-    pw_run_close (r);
-    pw_system_free (s);
+    runs_close (r, s);
   }
 }
 
-/* ---- Where the ends meet there is no direction: no force, and nothing that is not finite ---- */
+/* ---- Coincident ends, without a direction: the force is 0, its derivatives are finite ---- */
 
 static void spring_meeting (pw_model *m, const void *parameters) {
   (void)parameters;
@@ -128,7 +122,7 @@ static void test_meeting (void **state) {
   pw_system_free (s);
 }
 
-/* ---- A bead that a damped spring of free length 0 brings to rest: at last numbers have no inverse ---- */
+/* ---- Free length 0, lengths so small that their inverse overflows: derivatives are bounded ---- */
 
 static void spring_settling (pw_model *m, const void *parameters) {
   (void)parameters;
@@ -155,7 +149,7 @@ static void test_settling (void **state) {
   pw_system_free (s);
 }
 
-/* ---- Three bodies, tied together, to each other's arms and to the ground ---- */
+/* ---- By all methods: three bodies connected by springs, one of them to the ground ---- */
 
 static void spring_web (pw_model *m, const void *parameters) {
   static const char *const body[] = { "a", "b", "c", "a" };
@@ -184,9 +178,8 @@ static void test_methods (void **state) {
 }
 
 int main (void) {
-  const struct CMUnitTest tests[] = {
-    cmocka_unit_test (test_oscillator), cmocka_unit_test (test_ellipse), cmocka_unit_test (test_meeting),
-    cmocka_unit_test (test_settling),   cmocka_unit_test (test_methods),
-  };
+  const struct CMUnitTest tests[] = { cmocka_unit_test (test_oscillator), cmocka_unit_test (test_ellipse),
+                                      cmocka_unit_test (test_meeting), cmocka_unit_test (test_settling),
+                                      cmocka_unit_test (test_methods) };
   return cmocka_run_group_tests (tests, NULL, NULL);
 }

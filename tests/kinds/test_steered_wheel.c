@@ -1,4 +1,4 @@
-/* steered-wheel: a car that steers, a massless fork that does the same, a heading that stands still. */
+/* steered-wheel: a steered car, an equivalent massless fork, a constant heading. */
 #include <math.h>
 #include "check.h"
 #include "scene.h"
@@ -36,7 +36,7 @@ static double steered_speed (double t) {
   return steered_c.v * sqrt ((1 + k * a * a) / (1 + k * b * b));
 }
 
-/* x, y, phi at t: Simpson's rule for the angle inside one for the place. */
+/* x, y, phi at t_end, by Simpson's rule, for phi with half the step. */
 static void steered_path (double t_end, double out[3]) {
   enum { STEPS = 4000 };
   double h = t_end / STEPS;
@@ -69,8 +69,7 @@ static void steered_drive (const char *method, double bound, const char *reason)
   check_close ("speed", hypot (x.v[0], x.v[1]), steered_speed (t), bound, reason);
   check_close ("kinetic", x.balance, 0, bound, reason);
   assert_true (x.work == 0);
-  pw_run_close (r);
-  pw_system_free (s);
+  runs_close (r, s);
 }
 
 static void test_car (void **state) {
@@ -81,14 +80,14 @@ static void test_car (void **state) {
   steered_drive ("ida+baumgarte", 1e-6, "1e4 rtol");
 }
 
-/* ---- The same as a wheel on a fork without mass, which a drive turns ---- */
+/* ---- Compared with a wheel on a massless fork that a drive turns ---- */
 
 typedef struct {
-  double by; /* 0: steered wheel, 1: fork, 2: wheel that stands still, 3: steered wheel that does */
+  double by; /* front wheel: 0: steered, 1: on a fork, 2: fixed heading 0.3, 3: steered to the constant heading 0.3 */
 } steered_parameters;
 
 static const pw_parameter steered_list[] = {
-  { PW_AT (steered_parameters, by), 0, "", "what steers", PW_NONNEGATIVE },
+  { PW_AT (steered_parameters, by), 0, "", "type of the front wheel", PW_NONNEGATIVE },
   { .name = NULL },
 };
 
@@ -118,21 +117,16 @@ static void steered_truck (pw_model *m, const void *parameters) {
   pw_add_wheel (m, &(pw_wheel){ .name = "front", .body = "fork" });
 }
 
-static const pw_plugin_table steered_truck_table = { .abi = PW_ABI,
-                                                     .size = sizeof steered_truck_table,
-                                                     .parameters = steered_list,
-                                                     .parameters_size = sizeof (steered_parameters),
-                                                     .build = steered_truck };
+static const pw_plugin_table steered_truck_table =
+    TRIAL_TABLE_WITH (steered_truck, steered_list, sizeof (steered_parameters));
 
 static void steered_compare (double one, double other, double bound, const char *reason) {
   pw_system *s = scene_system (&steered_truck_table, "by", one, NULL),
             *p = scene_system (&steered_truck_table, "by", other, NULL);
   pw_run *r = runs_open (s, "rk4+projection", &(pw_settings){ .step = 1e-3, .ledger = 1 }),
          *q = runs_open (p, "rk4+projection", &(pw_settings){ .step = 1e-3, .ledger = 1 });
-  double start[3]; /* what the consistent start makes of the truck's rates need not be the same with a fork */
-  for (int j = 0; j < 3; j++) start[j] = pw_run_initial (r)->v[j];
   for (int j = 0; j < 3; j++)
-    check_close ("start", start[j], pw_run_initial (q)->v[j], 1e-5, "the fork's small weights");
+    check_close ("start", pw_run_initial (r)->v[j], pw_run_initial (q)->v[j], 1e-5, "small weights of a massless fork");
   for (int i = 1; i <= 4; i++) {
     pw_sample x = runs_to (r, 0.5 * i), y = runs_to (q, 0.5 * i);
     for (int j = 0; j < 3; j++) {
@@ -152,7 +146,7 @@ static void test_fork (void **state) {
   steered_compare (2, 3, 1e5 * CHECK_EPS, "round-off of 2000 steps");
 }
 
-/* ---- By all methods: a truck that is pulled, its wheel beside everything ---- */
+/* ---- By all methods ---- */
 
 static void test_methods (void **state) {
   static const pw_plugin_table car = TRIAL_TABLE (steered_car);
@@ -162,10 +156,7 @@ static void test_methods (void **state) {
 }
 
 int main (void) {
-  const struct CMUnitTest tests[] = {
-    cmocka_unit_test (test_car),
-    cmocka_unit_test (test_fork),
-    cmocka_unit_test (test_methods),
-  };
+  const struct CMUnitTest tests[] = { cmocka_unit_test (test_car), cmocka_unit_test (test_fork),
+                                      cmocka_unit_test (test_methods) };
   return cmocka_run_group_tests (tests, NULL, NULL);
 }

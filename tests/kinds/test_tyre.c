@@ -1,10 +1,10 @@
-/* tyre: sliding sideways, the wheel as its limit, its load. */
+/* tyre: lateral sliding, the wheel as the limit of large stiffness, the load. */
 #include <math.h>
 #include "check.h"
 #include "scene.h"
 #include "trial.h"
 
-/* ---- A block that slides straight to the side ----
+/* ---- A block that slides laterally ----
  *
  *   linear      m v' = -C v / v0:                      v = v(0) exp (-k t),  k = C / (m v0)
  *   saturating  m v' = -mu N tanh (C v / (mu N v0)):   sinh (C v / (mu N v0)) decays with the same k */
@@ -23,7 +23,7 @@ static const pw_parameter tyre_list[] = {
 
 static void tyre_slide (pw_model *m, const void *parameters) {
   const tyre_parameters *p = parameters;
-  double c = cos (0.8), s = sin (0.8); /* the heading; it slides to its left */
+  double c = cos (0.8), s = sin (0.8); /* of the heading; the block slides to the left of it */
   pw_add_body (m,
                &(pw_body){ .name = "block", .mass = tyre_s.m, .inertia = 1, .rate = { -tyre_s.v * s, tyre_s.v * c } });
   pw_add_tyre (m, &(pw_tyre){ .name = "T",
@@ -35,11 +35,7 @@ static void tyre_slide (pw_model *m, const void *parameters) {
                               .friction = p->friction });
 }
 
-static const pw_plugin_table tyre_slide_table = { .abi = PW_ABI,
-                                                  .size = sizeof tyre_slide_table,
-                                                  .parameters = tyre_list,
-                                                  .parameters_size = sizeof (tyre_parameters),
-                                                  .build = tyre_slide };
+static const pw_plugin_table tyre_slide_table = TRIAL_TABLE_WITH (tyre_slide, tyre_list, sizeof (tyre_parameters));
 
 static void tyre_stop (const char *method, double load, double bound, const char *reason) {
   pw_system *s = scene_system (&tyre_slide_table, "load", load, "friction", load > 0 ? 0.4 : 0, NULL);
@@ -52,8 +48,7 @@ static void tyre_stop (const char *method, double load, double bound, const char
     check_close ("speed", hypot (x.v[0], x.v[1]), v, bound, reason);
     check_close ("loss", x.loss, tyre_s.m * (tyre_s.v * tyre_s.v - v * v) / 2, bound, reason);
   }
-  pw_run_close (r);
-  pw_system_free (s);
+  runs_close (r, s);
 }
 
 static void test_slide (void **state) {
@@ -64,14 +59,14 @@ static void test_slide (void **state) {
   tyre_stop ("ida", 5, 1e-7, "1e3 rtol");
 }
 
-/* ---- As the stiffness grows, the tyre becomes the wheel ---- */
+/* ---- With increasing stiffness the motion on tyres approaches that on wheels ---- */
 
 typedef struct {
   double stiffness; /* 0: a wheel */
-} tyre_sleigh_parameters;
+} tyre_vehicle_parameters;
 
-static const pw_parameter tyre_sleigh_list[] = {
-  { PW_AT (tyre_sleigh_parameters, stiffness), 0, "N", "of the tyres; 0: wheels", PW_NONNEGATIVE },
+static const pw_parameter tyre_vehicle_list[] = {
+  { PW_AT (tyre_vehicle_parameters, stiffness), 0, "N", "of the tyres; 0: wheels", PW_NONNEGATIVE },
   { .name = NULL },
 };
 
@@ -82,9 +77,9 @@ static void tyre_wheel (pw_model *m, const char *name, const char *body, double 
     pw_add_wheel (m, &(pw_wheel){ .name = name, .body = body, .at = { x, 0 } });
 }
 
-/* A vehicle of two segments, moved by swinging its hinge. */
+/* A vehicle of two segments, moved by a torque at its hinge. */
 static void tyre_vehicle (pw_model *m, const void *parameters) {
-  const tyre_sleigh_parameters *p = parameters;
+  const tyre_vehicle_parameters *p = parameters;
   pw_add_body (m, &(pw_body){ .name = "frame", .mass = 1, .inertia = 0.1, .rate = { 0.5 } });
   pw_add_body (m, &(pw_body){ .name = "steer", .mass = 0.2, .inertia = 0.01, .start = { 0.6 }, .rate = { 0.5 } });
   pw_add_pin (m, &(pw_pin){ .name = "B", .body = { "frame", "steer" }, .at = { { 0.5, 0 }, { -0.1, 0 } } });
@@ -95,14 +90,11 @@ static void tyre_vehicle (pw_model *m, const void *parameters) {
                                   .value = { PW_HARMONIC, .harmonic = { .amplitude = 0.1, .omega = 3 } } });
 }
 
-static const pw_plugin_table tyre_vehicle_table = { .abi = PW_ABI,
-                                                    .size = sizeof tyre_vehicle_table,
-                                                    .parameters = tyre_sleigh_list,
-                                                    .parameters_size = sizeof (tyre_sleigh_parameters),
-                                                    .build = tyre_vehicle };
+static const pw_plugin_table tyre_vehicle_table =
+    TRIAL_TABLE_WITH (tyre_vehicle, tyre_vehicle_list, sizeof (tyre_vehicle_parameters));
 
 static void test_limit (void **state) {
-  enum { STEPS = 5 };
+  enum { STEPS = 5 }; /* stiffnesses, from 100 N over two decades */
   (void)state;
   double wheel[6], rate[6], q[6], v[6], distance[STEPS], stiffness = 100;
   pw_settings settings = { .rtol = 1e-10, .span = 2 };
@@ -122,25 +114,17 @@ static void test_limit (void **state) {
                "1/C, and the next power of 1/C");
 }
 
-/* ---- Its limit: load and friction, or neither ---- */
-
-static void tyre_refused (double load, double friction, const char *message) {
-  pw_error error = { 0 };
-  pw_model *m = scene_model (&tyre_slide_table, "load", load, "friction", friction, NULL);
-  assert_null (pw_system_compile (m, &error));
-  check_error (&error, PW_INPUT, message);
-  pw_model_free (m);
-}
+/* ---- Load and friction: both are given, or neither ---- */
 
 static void test_refused (void **state) {
   (void)state;
-  tyre_refused (5, 0,
-                "model scene: tyre T: friction = 0: expected > 0, since a load limits the force to friction x load");
-  tyre_refused (0, 0.4,
-                "model scene: tyre T: load = 0: expected > 0, since friction limits the force to friction x load");
+  scene_refused (scene_model (&tyre_slide_table, "load", 5.0, NULL),
+                 "model scene: tyre T: friction = 0: expected > 0, since a load limits the force to friction x load");
+  scene_refused (scene_model (&tyre_slide_table, "friction", 0.4, NULL),
+                 "model scene: tyre T: load = 0: expected > 0, since friction limits the force to friction x load");
 }
 
-/* ---- A car that brakes away at the rear: both laws, a load that is reached, arms, headings ---- */
+/* ---- By all methods: a car and a trailer on tyres, with and without a load, off their axes, oblique ---- */
 
 static void tyre_car (pw_model *m, const void *parameters) {
   (void)parameters;
@@ -172,11 +156,7 @@ static void test_methods (void **state) {
 }
 
 int main (void) {
-  const struct CMUnitTest tests[] = {
-    cmocka_unit_test (test_slide),
-    cmocka_unit_test (test_limit),
-    cmocka_unit_test (test_refused),
-    cmocka_unit_test (test_methods),
-  };
+  const struct CMUnitTest tests[] = { cmocka_unit_test (test_slide), cmocka_unit_test (test_limit),
+                                      cmocka_unit_test (test_refused), cmocka_unit_test (test_methods) };
   return cmocka_run_group_tests (tests, NULL, NULL);
 }

@@ -1,14 +1,15 @@
-/* weld: two bodies move as one, a beam held by a wall, a start that is open. */
+/* weld: two bodies move as one, a string of points, a beam held by a wall. */
 #include <math.h>
 #include "check.h"
 #include "scene.h"
 #include "trial.h"
 
-/* ---- A sleigh in two parts and in one ---- */
+/* ---- A sleigh of two welded parts, and of one body ---- */
 
+/* Masses and inertias of the rear and the front part, and the vector from one centre of mass to the other. */
 static const double weld_mass[2] = { 2, 0.5 }, weld_inertia[2] = { 0.3, 0.04 }, weld_apart[2] = { 0.7, 0.4 };
 
-/* What acts on the sleigh; the rear part's centre of mass is at (x, y) in the body's frame. */
+/* Adds the other elements; the rear part's centre of mass is at (x, y) in the frame of `body`. */
 static void weld_equip (pw_model *m, const char *body, double x, double y) {
   pw_add_wheel (m, &(pw_wheel){ .name = "blade", .body = body, .at = { x - 0.3, y }, .heading = 0.2 });
   pw_add_torque (m, &(pw_torque){ .name = "rider",
@@ -35,7 +36,7 @@ static void weld_two (pw_model *m, const void *parameters) {
   weld_equip (m, "rear", 0, 0);
 }
 
-/* The centre of mass of both is the share of the front's mass along the way to it. */
+/* share: the front part's share of the mass, by which the centre of mass of the sleigh is moved towards it. */
 static void weld_one (pw_model *m, const void *parameters) {
   (void)parameters;
   double mass = weld_mass[0] + weld_mass[1], share = weld_mass[1] / mass;
@@ -76,7 +77,7 @@ static void test_one_body (void **state) {
   weld_compare ("ida+baumgarte", 1e-6, "1e4 rtol");
 }
 
-/* ---- Points with mass but no inertia, welded one to the next, swing as one body ---- */
+/* ---- A string of welded points with mass but no inertia swings as one body ---- */
 
 enum { WELD_POINTS = 12 };
 
@@ -129,7 +130,7 @@ static void test_points (void **state) {
     pw_sample x = runs_to (r, 1), y = runs_to (twin, 1);
     double bound = i < 2 ? 1e-11 : 3e-5;
     check_close (method[i], trial_state (s, &x, "p11.phi"), y.q[2], bound,
-                 i < 2 ? "the same steps: round-off" : "100 h^2/12 of its frequency of about 1/s");
+                 i < 2 ? "the same steps: round-off" : "100 h^2 / 12 at a frequency of about 1/s");
     pw_run_close (r), pw_run_close (twin);
     pw_system_free (s), pw_system_free (t);
   }
@@ -144,7 +145,7 @@ static void weld_beam (pw_model *m, const void *parameters) {
   pw_add_gravity (m, &(pw_gravity){ .name = "g", .acceleration = { 2, -9.81 } });
 }
 
-/* It starts half a metre too far to the left, so the start has to close the weld. */
+/* The described position is half a metre too far to the left; the initial state satisfies the weld. */
 static void test_beam (void **state) {
   (void)state;
   static const pw_plugin_table table = TRIAL_TABLE (weld_beam);
@@ -158,8 +159,7 @@ static void test_beam (void **state) {
   check_close ("Fx", trial_reaction (s, &x, "wall.Fx"), -4 * 2, 40 * bound, "weight");
   check_close ("Fy", trial_reaction (s, &x, "wall.Fy"), 4 * 9.81, 40 * bound, "weight");
   check_close ("M", trial_reaction (s, &x, "wall.M"), 4 * 9.81 * 1.5, 60 * bound, "weight times arm");
-  pw_run_close (r);
-  pw_system_free (s);
+  runs_close (r, s);
 }
 
 static void test_methods (void **state) {
@@ -168,11 +168,7 @@ static void test_methods (void **state) {
 }
 
 int main (void) {
-  const struct CMUnitTest tests[] = {
-    cmocka_unit_test (test_one_body),
-    cmocka_unit_test (test_points),
-    cmocka_unit_test (test_beam),
-    cmocka_unit_test (test_methods),
-  };
+  const struct CMUnitTest tests[] = { cmocka_unit_test (test_one_body), cmocka_unit_test (test_points),
+                                      cmocka_unit_test (test_beam), cmocka_unit_test (test_methods) };
   return cmocka_run_group_tests (tests, NULL, NULL);
 }

@@ -32,7 +32,7 @@ static void test_chaplygin_sleigh (void **state) {
   check_close ("y", trial_state (s, &x, "sleigh.y") - 0.25 * e, -2.351907635692708835, 100 * H4, "100 h^4");
   double w = trial_state (s, &x, "sleigh.omega");
   check_close ("N", trial_reaction (s, &x, "blade.N"), 0.5 * u * w / k2, 100 * H4, "m I u w / J, to 100 h^4");
-  gallery_close (r, s);
+  runs_close (r, s);
 }
 
 static void test_knife_edge_incline (void **state) {
@@ -43,7 +43,7 @@ static void test_knife_edge_incline (void **state) {
   check_close ("x", trial_state (s, &x, "skate.x"), 0.7258393717013280771, 100 * H4, "100 h^4");
   check_close ("y", trial_state (s, &x, "skate.y"), 23.40550088629524659, 100 * H4, "100 h^4");
   check_close ("N", fabs (trial_reaction (s, &x, "edge.N")), 9.81 * fabs (sin (10.)), 100 * H4, "100 h^4");
-  gallery_close (r, s);
+  runs_close (r, s);
 }
 
 static void test_pendulum (void **state) {
@@ -53,7 +53,7 @@ static void test_pendulum (void **state) {
   pw_sample x = runs_to (r, 10);
   check_close ("x", trial_state (s, &x, "bob.x"), 0.2750874625761168601, 1000 * H4, "1000 h^4: 10 s at 4 rad/s");
   check_close ("y", trial_state (s, &x, "bob.y"), -0.9614192050991250643, 1000 * H4, "1000 h^4: 10 s at 4 rad/s");
-  gallery_close (r, s);
+  runs_close (r, s);
 }
 
 /* The steady turn of n trailers: only the angle changes, up to accumulated round-off. */
@@ -81,7 +81,7 @@ static void gallery_turn (int n, double longer, double ratio) {
     L += longer;
     m = i > 0 ? m * ratio : 2;
   }
-  gallery_close (r, s);
+  runs_close (r, s);
 }
 
 static void test_n_trailer (void **state) {
@@ -128,7 +128,7 @@ static void test_andrews_squeezer (void **state) {
   check_close ("Omega", trial_state (s, &x, "K6.phi") - digits[3], 0.534730116342080, 10 * HW4, "10 (h w)^4");
   check_close ("work", x.work, 0.033 * (beta + 0.0617138900142764496), HW4, "torque times angle, to (h w)^4");
   check_close ("balance", x.balance, 0, 10 * HW4, "10 (h w)^4");
-  gallery_close (r, s);
+  runs_close (r, s);
 }
 
 static void test_peaucellier (void **state) {
@@ -145,7 +145,7 @@ static void test_peaucellier (void **state) {
     low = fmin (low, P[1]), high = fmax (high, P[1]);
   }
   assert_true (high > 0.5 && low < -0.5);
-  gallery_close (r, s);
+  runs_close (r, s);
 }
 
 /* The loops stay closed, and after one revolution the leg is back at its initial position. */
@@ -162,7 +162,7 @@ static void test_theo_jansen (void **state) {
   check_close ("shoulder", trial_state (s, &x, "shoulder.phi"), shoulder, 100 * H4, "100 h^4");
   check_close ("kinetic", x.kinetic, energy, 100 * H4, "100 h^4");
   check_close ("balance", x.balance, 0, 100 * H4, "100 h^4");
-  gallery_close (r, s);
+  runs_close (r, s);
 }
 
 /* ---- All models ---- */
@@ -187,7 +187,7 @@ static int gallery_default (void *context, const char *model, const char *path) 
   check_below ("verifier, position", off.position.scaled, 1e4 * CHECK_EPS, "round-off of a projected state");
   check_below ("verifier, velocity", off.velocity.scaled, 1e4 * CHECK_EPS, "round-off of a projected state");
   check_below ("verifier, force", off.force.scaled, 1e4 * CHECK_EPS, "round-off of a projected state");
-  gallery_close (r, s);
+  runs_close (r, s);
   pw_file_close (f);
   return 0;
 }

@@ -35,7 +35,7 @@ static void test_car (void **state) {
     gallery_circle (s, &x, "car", -1.4, -1.4, R, 100 * H4, "100 h^4");
     check_close ("turned", trial_state (s, &x, "car.phi"), 5 / R * t, 100 * H4, "100 h^4");
   }
-  gallery_close (r, s);
+  runs_close (r, s);
 }
 
 /* Steered while driving: the four wheels are consistent at all times, and the car turns at u T / L. */
@@ -51,14 +51,14 @@ static void test_ackermann_car (void **state) {
     check_close ("rate", trial_state (s, &x, "car.omega"), 5 * k * cos (w * t) / L, 64 * CHECK_EPS, "round-off");
     check_below ("all four wheels", x.velocity, 64 * CHECK_EPS, "round-off, including redundant rows");
   }
-  gallery_close (r, s);
+  runs_close (r, s);
   s = gallery_open ("ackermann-car", "w", 0., "track", 2.4, NULL);
   r = gallery_run (s, 1e-3, 10);
   for (int t = 1; t <= 10; t++) {
     pw_sample x = runs_to (r, t);
     gallery_circle (s, &x, "car", -1.4, -1.4, L / k, 100 * H4, "100 h^4");
   }
-  gallery_close (r, s);
+  runs_close (r, s);
 }
 
 /* The headings of both front wheels, from the model's expressions: cot (outer) - cot (inner) = track / L. */
@@ -94,7 +94,7 @@ static void test_car_two_trailers (void **state) {
   }
   check_close ("hitch1", trial_reaction (s, &x, "hitch1.Fx") / 1e3, 0, 100 * H4, "no force in the hitches");
   check_close ("hitch2", trial_reaction (s, &x, "hitch2.Fy") / 1e3, 0, 100 * H4, "no force in the hitches");
-  gallery_close (r, s);
+  runs_close (r, s);
 }
 
 /* The final radius of the middle of the rear axle. */
@@ -107,7 +107,7 @@ static double gallery_tyres (double stiffness) {
       hypot (trial_state (s, &x, "car.vx") + 1.4 * w * sin (phi), trial_state (s, &x, "car.vy") - 1.4 * w * cos (phi)) /
       w;
   check_below ("dissipated", -x.loss, 0, "slip dissipates energy");
-  gallery_close (r, s);
+  runs_close (r, s);
   return radius;
 }
 
@@ -134,7 +134,7 @@ static void test_differential_drive (void **state) {
   check_close ("left wheel", trial_state (s, &x, "left.spin"), 10 * 0.4 / 0.08, 100 * H4, "100 h^4");
   check_close ("right wheel", trial_state (s, &x, "right.spin"), 10 * 0.6 / 0.08, 100 * H4, "100 h^4");
   check_close ("balance", x.balance, 0, 100 * H4, "100 h^4");
-  gallery_close (r, s);
+  runs_close (r, s);
 }
 
 int main (void) {

@@ -46,7 +46,7 @@ REFUSED = {
         ("pw.Model('snakeboard', swing=10**400)", "expected a number"), ("pw.Model('snakeboard', swing=NAN).run()", "swing = nan"),
         ("pw.Model('snakeboard', swing=np.zeros(2))", "expected a number"), ("m.run(start={'frame.x': NAN})", "frame.x = nan"),
         ("m.run(start={'frame.x': 'a'})", "frame.x = 'a'"), ("m.run(start={'frame.vx': 1e300})", "extreme"),
-        ("m.run(t_end=NAN)", "t_end"), ("m.run(t_end=INF)", "t_end"), ("m.run(t_end=-1)", "t_end"), ("m.run(t_end='a')", "t_end"),
+        ("m.run(t_end=NAN)", "t_end"), ("m.run(t_end=INF)", "expected a finite number"), ("m.run(t_end=-1)", "t_end"), ("m.run(t_end='a')", "t_end"),
         ("m.run(t_end=[])", "t_end"), ("m.run(every=NAN)", "every"), ("m.run(every=INF)", "every"), ("m.run(every=0)", "every"),
         ("m.run(every='a')", "every"), ("m.run(every=1e-300)", "memory"), ("m.run(every=1e-10)", "memory"), ("m.run(t_end=1e300, every=1)", "setting step"),
         *[(f"m.run({name}={value})", name) for name in ("step", "rtol", "atol", "max_steps") for value in ("0", "-1", "NAN", "INF", "'a'")],

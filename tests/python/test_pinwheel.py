@@ -178,8 +178,8 @@ def test_columns_are_views():
 
 def test_ctrl_c_keeps_the_samples():
     timer = threading.Timer(0.3, lambda: os.kill(os.getpid(), signal.SIGINT))
-    timer.start()
-    r = pw.Model("ezyroller").run(t_end=1e5)
+    # started when the run has begun: before, specialised code may be compiled
+    r = pw.Model("ezyroller").run(t_end=1e5, progress=lambda done: timer.ident or timer.start())
     assert r.status == "stopped" and 0 < r.t[-1] < 1e5 and "interrupted" in r.reason
 
 

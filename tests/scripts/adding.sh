@@ -1,6 +1,6 @@
 #!/bin/sh
-# The recipes of docs/adding.md, followed in a copy of the sources: a model, an element type, a Runge-Kutta tableau and another
-# one-step method, each one file and at most one line in a list.  Reads CC.  (In an installed tree: install.sh.)
+# The instructions of docs/adding.md, in a copy of the sources: a model, an element type, a Runge-Kutta tableau and another
+# one-step method, each one file and at most one line in a list.  Reads PINWHEEL, CC.  (In an installed tree: install.sh.)
 
 . "$(dirname "$0")/../support/report.sh"
 
@@ -21,7 +21,7 @@ sed -e '/pinwheel-files/d; /^static const pw_method \*const methods/,$d' -e 's/^
 sed 's/PW_METHOD (rk4) /PW_METHOD (rk4) PW_METHOD (kutta38) PW_METHOD (kutta3) /' solvers/methods.h >"$work/h" && mv "$work/h" solvers/methods.h
 
 make -s NO_DEPS=1 CC="${CC:-cc}" CFLAGS=-O0 BUILD=build all >"$work/log" 2>&1
-report 'a tree with a model, an element type and two methods more' $?
+report 'the tree with another model, another element type and two other methods' $?
 added=build/pinwheel
 unset PINWHEEL_MODELS
 
@@ -36,7 +36,7 @@ EOF
 $added check ./twisted.yaml >"$work/log" 2>&1 && grep -q '^ *twist (1 element) *good' "$work/log" && $added list kinds twist >>"$work/log" 2>&1
 report 'the element type, with its self-test' $?
 
-# With half the step the error is 2^order times smaller.
+# order METHOD ORDER: with half the step the error is 2^ORDER times smaller; x, y and phi of the pendulum at 1 s
 order () {
   for h in 0.02 0.01; do
     $added run pendulum -m "$1" -t 1 --step $h --every 1 -o - 2>"$work/log" | tail -n 1 | cut -d, -f2-4

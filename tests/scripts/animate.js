@@ -1,12 +1,12 @@
-/* What tests/scripts/animate.sh puts at the end of an animation: it uses the page as a person would and writes down what it
- * finds as the text of an element "verdict", "ok" if all is well.  Frames come from tests/scripts/animate.sh's own clock. */
+/* tests/scripts/animate.sh appends this script to an animation.  It uses the controls of the page and writes the result
+ * into an element "verdict": "ok", or the expectations that fail.  Frames follow the clock of tests/scripts/animate.sh. */
 (async () => {
   const failures = [], root = document.documentElement.dataset, time = () => Number(root.time);
   const expect = (what, good) => { if (!good) failures.push(what); };
   const press = (key, more) => document.dispatchEvent(new KeyboardEvent("keydown", { key, bubbles: true, ...more }));
   const wait = ms => new Promise(done => setTimeout(done, ms));
   const copy = document.createElement("canvas").getContext("2d", { willReadFrequently: true });
-  const drawn = () => {
+  const drawn = () => { // a checksum of the pixels
     const canvas = document.getElementById("scene");
     copy.canvas.width = canvas.width;
     copy.canvas.height = canvas.height;

@@ -1,6 +1,6 @@
 #!/bin/sh
-# Animations: whole files of the right kind; in a browser without a screen, if there is one, the page loads, plays and
-# scrubs as tests/scripts/animate.js asks, without a message on its console.  Reads PINWHEEL, BROWSER.
+# Animations: complete HTML files; in a headless browser, if there is one, pages load, play and scrub as
+# tests/scripts/animate.js expects, without a message on the console.  Reads PINWHEEL, BROWSER.
 
 . "$(dirname "$0")/../support/report.sh"
 here=$(cd "$(dirname "$0")" && pwd)
@@ -10,14 +10,14 @@ for b in chromium chromium-browser google-chrome; do
   [ -n "$browser" ] || ! command -v $b >/dev/null || browser=$b
 done
 
-# browse PAGE: what becomes of it after some seconds, in $work/dom; messages in $work/console
+# browse PAGE: the document after some seconds in $work/dom, messages in $work/console
 browse () {
   timeout 120 "$browser" --headless --no-sandbox --disable-gpu --user-data-dir="$work/profile" --window-size=1000,760 \
     --virtual-time-budget=20000 --enable-logging=stderr --v=0 --dump-dom "file://$1" >"$work/dom" 2>"$work/messages"
   grep ':CONSOLE' "$work/messages" >"$work/console"
 }
 
-# Frames 40 ms apart by a clock of our own: a browser without a screen draws when it likes, and more so on a busy machine.
+# A clock with frames 40 ms apart: a headless browser draws at irregular times.
 clock='<script>{ let now = 0; performance.now = () => now;'
 clock="$clock requestAnimationFrame = f => setTimeout(() => f(now += 40), 5); }</script>"
 
@@ -26,7 +26,7 @@ for model in ezyroller andrews-squeezer wheeled-snake pendulum car-tyres; do
   "$pinwheel" run $model --animate "$page" >/dev/null 2>"$work/err"
   report "$model: the page is written" $?
   tail -n 1 "$page" | grep -q '</html>' && ! grep -Eq '(src|href)=|https?://|@import|\bNaN\b' "$page"
-  report "$model: it is whole and asks for nothing else" $?
+  report "$model: it is complete and needs no other file" $?
   [ -n "$browser" ] || { echo "# skipped: no browser was found to show it"; continue; }
   { sed "s|<head>|<head>$clock|" "$page" | sed '$d' | sed '$d'; echo '<script>'; cat "$here/animate.js"; echo '</script></body></html>'; } >"$work/use.html"
   browse "$work/use.html"
@@ -51,6 +51,6 @@ fi
 
 "$pinwheel" run ezyroller --animate "$work/x.mp4" >/dev/null 2>"$work/err"
 [ $? = 2 ] && grep -q 'expected a name that ends in .html' "$work/err"
-report 'another ending is refused' $?
+report 'a name without .html is an error' $?
 
 exit $bad

@@ -1,12 +1,12 @@
 #!/bin/sh
-# Runs killed by SIGKILL at random moments and resumed, again and again: table and summary are those of a run that was left
-# alone, byte for byte, for every method and for scenes with what a state can hold.
-# Run from the top folder; reads PINWHEEL, SEED (of the random moments).
+# Runs that are repeatedly killed by SIGKILL at random times and resumed: table and summary are, byte for byte, those of an
+# uninterrupted run, for every method and every kind of state.
+# Run from the top folder; reads PINWHEEL, SEED (of the random times).
 
 . "$(dirname "$0")/../support/report.sh"
 echo "# SEED=$seed"
 
-# killed MODEL OPTION...: once left alone, once killed until it gets through
+# killed MODEL OPTION...: compares an uninterrupted run with one that is killed up to 30 times
 killed () {
   rm -f "$work"/*
   "$pinwheel" run "$@" -o "$work/whole.csv" --json "$work/whole.json" --checkpoint "$work/whole.ck" 2>"$work/err" || {

@@ -1,7 +1,7 @@
 #!/bin/sh
-# What the manual and the other pages show is what the program prints: each block that begins with "$ build/pinwheel" is run,
-# and its lines are found in the output, in their order.  Numbers agree to 1 %, or both are below 1e-6 in size, or the line is
-# about what is the machine's alone: times, and what a drifting method does at a singular configuration.
+# The pages of docs/ show what the program prints: each block that begins with "$ build/pinwheel" is run, and its lines must
+# be in the output, in their order.  Numbers agree to 1 %, or both are below 1e-6 in size, or the line depends on the machine:
+# times, and results of a drifting method at a singular configuration.
 # A YAML block after "save as `NAME`:" becomes a file for the commands after it.  Run from the top folder; reads PINWHEEL.
 
 . "$(dirname "$0")/../support/report.sh"
@@ -22,7 +22,7 @@ files () {
     /^```yaml$/ && name != "" { writing = 1 }' "$1"
 }
 
-# The lines of standard input that are not in the file, from the first that is missing on.
+# missing FILE: the first line of standard input that is not in the file, after the lines before it; "..." is skipped.
 missing () {
   awk -v file="$1" '
     function bare(word) { gsub (/[(),:;"]/, "", word); return word }
@@ -54,7 +54,7 @@ for page in README.md docs/*.md; do
     sed -n "$((at + 1)),\${/^# /q;p}" "$work/page" | missing "$work/out" >"$work/log"
     [ ! -s "$work/log" ]
     report "$page: pinwheel $command" $?
-    [ $bad = 0 ] || : >"$work/bad"
+    [ $bad = 0 ] || : >"$work/bad" # $bad itself is lost with this subshell
   done
 done
 [ ! -e "$work/bad" ]

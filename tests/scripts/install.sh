@@ -1,11 +1,11 @@
 #!/bin/sh
-# What `make install` puts below a folder works from there: the program, a model in C and one as text by their paths, a
-# program that embeds the libraries through pkg-config; uninstall leaves nothing.  Reads BUILD, CC.
+# What `make install` installs works without the build: the program, a model in C and one as text by their paths, a program
+# that embeds the libraries through pkg-config; uninstall leaves nothing.  Reads BUILD, CC.
 
 build=${BUILD:-build} cc=${CC:-cc}
 . "$(dirname "$0")/../support/report.sh"
 
-# The paths contain spaces; "my" is what a list of words would make of "my pinwheel".
+# The paths contain spaces; files of others are in "my", to which a wrong splitting of "my pinwheel" leads, and in lib.
 destination="$work/a root" prefix='/opt/my pinwheel'
 top=$destination$prefix
 install () { make -s --no-print-directory NO_DEPS=1 BUILD="$build" DESTDIR="$destination" PREFIX="$prefix" "$1"; }
@@ -15,12 +15,12 @@ touch "$destination/opt/my/other" "$top/lib/other"
 install install >"$work/log" 2>&1
 report 'install' $?
 
-# What is there is found without the build: from another folder, with the search path empty.
+# Installed models are found from another folder, without a search path in the environment.
 cd "$work" && unset PINWHEEL_MODELS
 "$top/bin/pinwheel" run ezyroller --t-end 1 >"$work/log" 2>&1
 report 'the program runs an installed model' $?
 "$top/bin/pinwheel" list models >"$work/log" 2>&1 && grep -q '^ *chaplygin-sleigh' "$work/log"
-report 'and lists them' $?
+report 'the program lists the installed models' $?
 
 abi=$("$top/bin/pinwheel" --version | sed -n 's/.*ABI \([0-9]*\).*/\1/p')
 for l in libpinwheel libpinwheel-files; do
@@ -45,16 +45,16 @@ report 'links to the models are relative, so that a build can be copied' $?
 if command -v pkg-config >/dev/null; then
   export PKG_CONFIG_PATH="$top/lib/pkgconfig"
   cp "$top/share/doc/pinwheel/examples/embed.c" "$work"
-  # The recipe as the file has it, for a prefix that is where pkg-config says.
+  # The command in the file's comment, with the prefix of pkg-config changed to where the files are.
   sed -i "s|^prefix=.*|prefix=$top|" "$top/lib/pkgconfig/pinwheel.pc"
   (cd "$work" && eval "$cc -std=c11 embed.c -o embed $(pkg-config --cflags --libs pinwheel) -lm \
     -Wl,-rpath,\"$(pkg-config --variable=libdir pinwheel)\"" && ./embed) >"$work/log" 2>&1
-  report 'a program that embeds it, by the recipe in embed.c' $?
+  report 'a program that embeds the libraries, compiled as embed.c says' $?
   cp "$top/share/doc/pinwheel/examples/method.c" "$work"
   (cd "$work" && eval "$cc -std=c11 method.c -o method $(pkg-config --cflags --libs pinwheel) -lm \
     -Wl,-rpath,\"$(pkg-config --variable=libdir pinwheel)\"" && ./method) >"$work/log" 2>&1 &&
     awk '$NF == "nan" { next } { n++; bad += $NF < 2.9 || $NF > 3.1 } END { exit n != 6 || bad }' "$work/log"
-  report 'a method of its own, of order 3 as it should be' $?
+  report 'a program with a method of its own, of order 3' $?
   awk '/^```yaml/ { n++; next } /^```/ { if (n == 1) exit } n == 1' "$top/share/doc/pinwheel/docs/analysis.md" >"$work/car-trailer.yaml"
   sed -n '/^    critical speed/,/^$/s/^    //p' "$top/share/doc/pinwheel/docs/analysis.md" >"$work/expected"
   cp "$top/share/doc/pinwheel/examples/analyse.c" "$work"
@@ -68,7 +68,7 @@ if command -v pkg-config >/dev/null; then
 else
   $cc -std=c11 -I"$top/include/pinwheel" docs/embed.c -o "$work/embed" -L"$top/lib" -lpinwheel-files -lpinwheel \
     -Wl,-rpath,"$top/lib" -lm >"$work/log" 2>&1 && (cd "$work" && ./embed) >"$work/log" 2>&1
-  report 'a program that embeds it' $?
+  report 'a program that embeds the libraries' $?
 fi
 
 if command -v c++ >/dev/null; then
@@ -90,10 +90,10 @@ int main (int count, char **argument) {
 EOF
   c++ -std=c++11 -Wall -Wextra -Wpedantic -Werror -I"$top/include/pinwheel" "$work/plus.cc" -o "$work/plus" -L"$top/lib" \
     -lpinwheel-files -lpinwheel -Wl,-rpath,"$top/lib" >"$work/log" 2>&1 && (cd "$work" && ./plus && ./plus ./mine.c) >"$work/log" 2>&1
-  report 'and one in C++, which compiles a model, too' $?
+  report 'a program in C++ that embeds them, with a compiled model and with one in C' $?
 fi
 
-# Links of the pages to files beside them lead somewhere.
+# The files to which the pages link exist.
 for page in "$top/share/doc/pinwheel/"*.md "$top/share/doc/pinwheel/docs/"*.md; do
   grep -o '](\([^)#: ]*\)' "$page" | sed 's/^](//' | while read -r link; do
     [ -z "$link" ] || [ -e "$(dirname "$page")/$link" ] || echo "${page##*/}: $link"

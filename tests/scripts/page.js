@@ -1,5 +1,6 @@
-/* What tests/scripts/page.sh puts at the end of an interactive page: it uses the controls and writes the values that the page
- * displays at the end of the run as the text of an element "verdict", or what went wrong. */
+/* tests/scripts/page.sh appends this script to an interactive page.  It uses the controls and writes into an element
+ * "verdict" the values that the page displays at the end of the run, or "wrong" and what failed.  wanted: name and value of
+ * the parameter to change. */
 (async () => {
   const root = document.documentElement.dataset, $$ = selector => document.querySelector(selector);
   const until = async (what, good) => {

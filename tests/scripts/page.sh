@@ -1,6 +1,6 @@
 #!/bin/sh
-# Interactive pages: in a browser without a screen, tests/scripts/page.js changes a parameter, the method and the
-# tolerance, and the values that the page displays at the end are those of the program.  Reads PINWHEEL, BROWSER.
+# Interactive pages: in a headless browser, tests/scripts/page.js changes a parameter, the method and the tolerance, and
+# the values that the page displays at the end are those of the program.  Reads PINWHEEL, BROWSER.
 
 . "$(dirname "$0")/../support/report.sh"
 here=$(cd "$(dirname "$0")" && pwd)
@@ -83,7 +83,7 @@ printf 't,fx\n0,0\n1,3\n5,-1\n' >"$work/push.csv"
 } >"$work/many.yaml"
 try 'many tables' "$work/many.yaml" m 3 1
 
-# Texts of a model are texts, and a page reaches nothing: neither by script nor by an image.
+# Texts of a model are displayed as texts, and a page has no access to the network, neither by a script nor by an image.
 cat >"$work/hostile.yaml" <<'Y'
 pinwheel: 1
 about: "</script><script>document.title = 'taken'</script> \" ' \\ \u2028 <img src=x onerror=alert(1)> -->"
@@ -122,7 +122,7 @@ done
 
 "$pinwheel" page "$work/table.yaml" --t-end 5 -o "$work/table.html" 2>"$work/log"
 [ $? = 0 ] && grep -q '"push.csv"' "$work/table.html"
-report 'a model takes its tables with it' $?
+report 'the page contains the tables of its model' $?
 grep -q '"method": "erk8+projection"' "$work/table.html"
 report 'a default method of a model that pages do not have is replaced' $?
 
@@ -134,6 +134,6 @@ report 'a compiled model without its source is refused' $?
 report 'a method that pages do not have is refused' $?
 "$pinwheel" page snakeboard -o "$work/x.pdf" 2>"$work/log"
 [ $? = 2 ] && grep -q 'ends in .html' "$work/log"
-report 'another ending is refused' $?
+report 'a name without .html is an error' $?
 
 exit $bad

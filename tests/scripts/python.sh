@@ -18,7 +18,7 @@ for case in tree.parse(sys.argv[1]).iter("testcase"):
 sys.exit(bad)
 P
 
-# In a namespace in which the source tree is empty, if that is permitted.
+# Runs $work/check in a namespace in which the source tree is empty, if that is permitted.
 without_tree() {
   if unshare -rm true 2>/dev/null; then
     unshare -rm sh -c 'mount -t tmpfs none "$1" && [ ! -e "$1/Makefile" ] && cd "$2" && ./check "$1"' sh "$PWD" "$work"

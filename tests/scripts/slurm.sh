@@ -1,6 +1,6 @@
 #!/bin/sh
-# The manual's Slurm job array on a cluster of two virtual nodes on this machine: six parts, one node fails while it works,
-# its parts are requeued, a dependent job merges.  The table has the bytes of one sweep.  Skipped without Slurm
+# The manual's Slurm job array on a cluster of two virtual nodes on this machine: six parts, one node fails during the work,
+# its parts are requeued, a dependent job merges them.  The table is, byte for byte, that of a single sweep.  Skipped without Slurm
 # (`make deps TOOLS=slurm`).  Reads PINWHEEL.
 
 for program in slurmctld slurmd munged sbatch scontrol; do
@@ -70,14 +70,14 @@ ended () { left=$(squeue -h -j "$1" 2>/dev/null) && [ -z "$left" ]; } # no answe
 { slurmctld -c && slurmd -N one && slurmd -N two && wait_for 60 idle 2; } >"$work/log" 2>&1
 report 'two nodes are idle' $?
 
-# ---- The recipe, with a smaller grid ----
+# ---- The job of the manual, with a smaller grid ----
 
 manual=docs/manual.md grid='--vary omega=lin:1:10:12 --vary M0=log:0.01:1:10 --t-end 500 --lanes 1'
 sed -n '/^    #!\/bin\/sh$/,/^$/s/^    //p' "$manual" | sed -e 's/array=1-16/array=1-6/' -e 's|TASK_ID/16|TASK_ID/6|' \
   -e "s|--vary omega=.* --vary M0=[^ ]*|$grid|" -e 's/cpus-per-task=8/cpus-per-task=1/' >"$work/job.sh"
 merge=$(sed -n "s/^    sbatch --dependency=.* --wrap '\(.*\)'$/\1/p" "$manual")
 grep -q 'array=1-6' "$work/job.sh" && grep -q 'requeue' "$work/job.sh" && grep -q 'omega=lin:1:10:12' "$work/job.sh" && [ -n "$merge" ]
-report 'the manual has the recipe' $?
+report 'the manual has the job' $?
 PATH=$(dirname "$pinwheel"):$PATH
 "$pinwheel" sweep ezyroller $grid -o "$work/whole.csv" >"$work/log" 2>&1
 report 'one sweep' $?

@@ -1,6 +1,6 @@
 #!/bin/sh
-# Sweeps under fire: killed at random moments again and again, in one piece and in parts, by GNU parallel if it is there.
-# Run from the top folder; reads PINWHEEL, SEED (of the random moments).
+# Sweeps that are repeatedly killed at random times, as a whole and in parts, also by GNU parallel if it is installed: the
+# table is, byte for byte, that of an uninterrupted sweep.  Run from the top folder; reads PINWHEEL, SEED (of the times).
 
 . "$(dirname "$0")/../support/report.sh"
 echo "# SEED=$seed"
@@ -8,9 +8,9 @@ echo "# SEED=$seed"
 grid='ezyroller --vary omega=log:1:10:20 --vary a=0.4,0.5,0.6 --vary frame.omega=0,0.1 --t-end 8'
 
 "$pinwheel" sweep $grid --jobs 1 -o "$work/whole.csv" 2>"$work/err"
-report 'a sweep that is left alone' $?
+report 'an uninterrupted sweep' $?
 
-# until_done FILE OPTION...: starts it, kills it with the signal, starts it again until it succeeds; then lets it be.  The
+# until_done FILE OPTION...: starts the sweep and sends it $signal, up to $most times, then lets it finish; $kills counts.  The
 # table may exist before: a kill between writing it and removing the journal leaves both, and the next start removes the journal.
 until_done () {
   file=$1 kills=0
@@ -36,7 +36,7 @@ for signal in KILL KILL KILL INT TERM KILL KILL; do
   rm -f "$work"/killed.csv*
 done
 
-# The journal cut after random bytes, and grown again from there.
+# A journal that ends after any byte is continued from there.
 "$pinwheel" sweep $grid --part 1/3 -o "$work/part.csv" 2>"$work/err"
 cp "$work/part.csv" "$work/good.csv"
 size=$(wc -c <"$work/good.csv") failed=0 i=0
@@ -62,10 +62,11 @@ if command -v parallel >/dev/null; then
     "$pinwheel" sweep --merge "$work"/gnu-*.csv -o "$work/gnu.csv" && cmp "$work/gnu.csv" "$work/whole.csv"
   report 'six parts by GNU parallel, merged' $?
 else
-  echo '# GNU parallel is not there: not tried'
+  echo '# skipped: no GNU parallel'
 fi
-# Several runs per processor at once: the same bytes for any number of lanes and jobs, and after kills.  Some runs fail; guards
-# leave steps to the general engine; the structure of the scene changes.
+
+# same_lanes NAME OPTION...: the same bytes for any number of lanes (runs at once per processor) and jobs, also where runs fail,
+# where steps are left to the general engine, and where the structure of the scene changes.
 same_lanes () {
   name=$1 failed=0
   shift

@@ -31,11 +31,6 @@ pw_run *gallery_run (pw_system *s, double step, double t) {
   return runs_open (s, "rk4+projection", &(pw_settings){ .step = step, .span = t, .ledger = 1 });
 }
 
-void gallery_close (pw_run *r, pw_system *s) {
-  pw_run_close (r);
-  pw_system_free (s);
-}
-
 void gallery_energy (pw_system *s, double step, double t, double bound, gallery_source source) {
   pw_run *r = gallery_run (s, step, t);
   double start = runs_to (r, 0).kinetic;
@@ -46,7 +41,7 @@ void gallery_energy (pw_system *s, double step, double t, double bound, gallery_
     assert_true (x.work > 0.1);
   else
     check_close ("work", x.work, 0, 64 * CHECK_EPS, "no element does work");
-  gallery_close (r, s);
+  runs_close (r, s);
 }
 
 void gallery_point (const pw_system *s, const pw_sample *x, const char *body, double along, double p[2]) {

@@ -4,21 +4,19 @@
 
 #include "pinwheel-solvers.h"
 
-#define H4 1e-12 /* h^4, the order of the method, at h = 1 ms */
+#define H4 1e-12 /* h^4, for methods of order 4, at h = 1 ms */
 
-/* The system of a model by name, with parameters set: gallery_open ("chain", "n", 3., NULL). */
+/* The system of a model by name or path, with parameters set: gallery_open ("chain", "n", 3., NULL). */
 pw_system *gallery_open (const char *model, ...);
 
-/* Opens a run of rk4+projection with an energy ledger, expected to end at t. */
+/* Opens a run of rk4+projection with an energy ledger, to end at t. */
 pw_run *gallery_run (pw_system *s, double step, double t);
-
-void gallery_close (pw_run *r, pw_system *s);
 
 typedef enum { GALLERY_CONSERVATIVE, GALLERY_DRIVEN } gallery_source;
 
 /* Runs to t and frees the system.  Checks that the energy balance closes, that kinetic and potential energy change by
- * the work, and that no element does work unless the scene is driven.  The bound is h^4 times a power of the fastest
- * rate of the motion: about 1/s for a snakeboard, 10/s for a chain, 30/s for light parts with motors. */
+ * the work, and that elements do work if, and only if, the scene is driven.  The bound is h^4 times a power of the
+ * fastest rate of the motion: about 1/s for a snakeboard, 10/s for a chain, 30/s for light parts with motors. */
 void gallery_energy (pw_system *s, double step, double t, double bound, gallery_source source);
 
 /* The point (along, 0) of a body, in the world. */

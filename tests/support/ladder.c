@@ -64,10 +64,8 @@ ladder_error ladder_solve (const char *model, const char *method, const pw_setti
     largest = fmax (largest, fabs (y.lambda[i]));
   }
   e.lambda /= largest;
-  pw_run_close (r);
-  pw_run_close (exact);
-  pw_system_free (s);
-  pw_system_free (same);
+  runs_close (r, s);
+  runs_close (exact, same);
   return e;
 }
 

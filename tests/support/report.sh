@@ -3,8 +3,8 @@
 #   $pinwheel           absolute path of the program (PINWHEEL, or build/pinwheel)
 #   $work               a temporary folder, removed when the script ends
 #   report NAME STATUS  prints the result of a test that ended with this status, with the end of $work/log if it failed
-#   random LOW HIGH     sets $random to a number in this range, from $seed (SEED, or the process id; print it)
-#   exit $bad           at the end: 0 if no test failed
+#   random LOW HIGH     sets $random to a pseudorandom number in this range; it begins with $seed (SEED, or the process id)
+#   exit $bad           at the end of a script: 0 if no test failed
 
 pinwheel=${PINWHEEL:-build/pinwheel}
 case $pinwheel in /*) ;; *) pinwheel=$PWD/$pinwheel ;; esac

@@ -12,6 +12,11 @@ pw_run *runs_open (pw_system *s, const char *method, const pw_settings *settings
   return r;
 }
 
+void runs_close (pw_run *r, pw_system *s) {
+  pw_run_close (r);
+  pw_system_free (s);
+}
+
 const pw_method *runs_method (int i, char name[40]) {
   for (const pw_method *const *m = pw_methods; *m; m++)
     for (const pw_stabilisation *s = (*m)->stabilisations; s->name; s++)

@@ -6,14 +6,18 @@
 
 pw_run *runs_open (pw_system *s, const char *method, const pw_settings *settings);
 
-/* Advances to t and samples the state there. */
+/* Closes a run and frees its system. */
+void runs_close (pw_run *r, pw_system *s);
+
+/* Advances to t and samples the state there; arrays of the sample are valid until the next call. */
 pw_sample runs_to (pw_run *r, double t);
 
-/* The integrator of the i-th method, i.e. integrator with stabilisation, of which `name` takes the name; "rk4+none" is
+/* The integrator of the i-th pair of an integrator and a stabilisation, whose name is written to `name`; "rk4+none" is
  * the first; NULL after the last. */
 const pw_method *runs_method (int i, char name[40]);
 
-/* The state at t of a run that is opened for it: q and v take the coordinates; statistics may be NULL. */
+/* Opens a run, advances it to t and closes it: the state there is written to q and v (coordinates numbers each), what
+ * the run has cost to `statistics` unless that is NULL. */
 void runs_state (pw_system *s, const char *method, const pw_settings *settings, double t, double *q, double *v,
                  pw_statistics *statistics);
 

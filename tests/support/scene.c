@@ -4,7 +4,7 @@
 #include "gallery.h"
 #include "scene.h"
 
-/* The model file itself, under another name than that of a plug-in's table. */
+/* The model file itself; the name of its table is changed, since a program can have only one pw_plugin. */
 #define pw_plugin scene_ezyroller
 #include "../../models/ezyroller.c"
 
@@ -34,6 +34,13 @@ pw_system *scene_compile (pw_model *m) {
   return s;
 }
 
+void scene_refused (pw_model *m, const char *message) {
+  pw_error error = { 0 };
+  assert_null (pw_system_compile (m, &error));
+  check_error (&error, PW_INPUT, message);
+  pw_model_free (m);
+}
+
 pw_system *scene_system (const pw_plugin_table *table, ...) {
   va_list sets;
   va_start (sets, table);
@@ -43,5 +50,5 @@ pw_system *scene_system (const pw_plugin_table *table, ...) {
 }
 
 pw_system *scene_named (const char *model, const char *parameter, double value) {
-  return gallery_open (model, parameter, value, NULL); /* without a parameter the list ends at once */
+  return gallery_open (model, parameter, value, NULL); /* parameter NULL ends the list */
 }

@@ -15,8 +15,10 @@ void trial_verify (const pw_system *s, const pw_run *r, const pw_sample *x, doub
 double trial_state (const pw_system *s, const pw_sample *x, const char *name);
 double trial_reaction (const pw_system *s, const pw_sample *x, const char *name);
 
-/* The table of a model without parameters, whose elements the function f adds. */
-#define TRIAL_TABLE(f) \
-  { .abi = PW_ABI, .size = sizeof (pw_plugin_table), .build = f }
+/* The table of a model, whose bodies and elements the function `build` adds: without parameters; with a list of
+ * parameters that are members of a structure of `bytes` bytes. */
+#define TRIAL_TABLE(build) TRIAL_TABLE_WITH (build, NULL, 0)
+#define TRIAL_TABLE_WITH(build_, list, bytes) \
+  { .abi = PW_ABI, .size = sizeof (pw_plugin_table), .parameters = list, .parameters_size = bytes, .build = build_ }
 
 #endif

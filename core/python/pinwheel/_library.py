@@ -13,7 +13,7 @@ import pathlib
 
 VERSION = "0.1.0"
 PW_OK, PW_RETRY, PW_STOPPED, PW_RESOURCE, PW_INPUT, PW_INITIAL, PW_METHOD = 0, 1, 2, -1, -2, -3, -4
-PW_FUNCTION, PW_SPECIALISE_STEPS = 2, 1000000
+PW_FUNCTION, PW_STEADY, PW_SPECIALISE_STEPS = 2, 0, 1000000
 PW_NUMBER, PW_POINT, PW_VECTOR, PW_BODY, PW_SIGNAL, PW_CHOICE = range(6)
 DOMAINS = ("", ">= 0", "> 0", "1, 2, 3, ...", "from 0 to 1")  # by pw_domain
 
@@ -56,6 +56,7 @@ _given_folder = os.environ.get("PINWHEEL_LIBRARY")
 
 
 def _load(name, folders):
+    """A library and its path: from the first of these folders that has it, else where the system finds it."""
     file = f"lib{name}.so"
     for folder in folders:
         for path in sorted(folder.glob(file + "*")):
@@ -99,6 +100,7 @@ class _Member(c.Structure):
 
 
 def _members():
+    """Offset and size of each "STRUCTURE.MEMBER", and of each structure, from the library's table."""
     table, found = c.cast(core.pw_members, c.POINTER(_Member)), {}
     i = 0
     while table[i].name:
@@ -111,7 +113,10 @@ _LAYOUT = _members()
 
 
 def _structure(name, /, **types):
-    """A ctypes structure with these members at the offsets of the library; the bytes between them have no name."""
+    """A ctypes structure with these members at the offsets of the library, and unnamed bytes between them.
+
+    "__" in the name of a member stands for "." in C.
+    """
     end, fields = 0, []
     for member, kind in sorted(types.items(), key=lambda item: _LAYOUT[f"{name}.{item[0].replace('__', '.')}"]):
         offset, size = _LAYOUT[f"{name}.{member.replace('__', '.')}"]
@@ -130,7 +135,7 @@ def _structure(name, /, **types):
 
 
 def listed(structure, address):
-    """The structures of an array in C, which ends with one without a name."""
+    """The structures of an array in C that ends with a NULL name."""
     while address and (entry := structure.from_address(address)).name:
         yield entry
         address += c.sizeof(structure)
@@ -175,7 +180,7 @@ def _declare(library, result, *names_and_arguments):
         function.restype, function.argtypes = result, arguments
 
 
-# Pointer, int, double, text, error, size.
+# Types of arguments and results: pointer, int, double, text, error, size.
 _p, _i, _d, _s, _e, _z = c.c_void_p, c.c_int, c.c_double, c.c_char_p, c.POINTER(pw_error), c.c_size_t
 _declare(files, _p, ("pw_file_open", _s, _e), ("pw_file_model", _p, _e))
 _declare(files, _s, ("pw_file_name", _p), ("pw_file_path", _p))
@@ -222,7 +227,7 @@ def encode(value, what: str) -> bytes:
 
 
 def number(value, what: str, above: float | None = None) -> float:
-    """A number, or an expression of numbers ("30*deg"); with `above`, it must be finite and larger."""
+    """A number, or an expression of numbers ("30*deg"); with `above`, it must be finite and larger than that."""
     result = c.c_double()
     try:
         if not isinstance(value, str):
@@ -232,7 +237,7 @@ def number(value, what: str, above: float | None = None) -> float:
     except (TypeError, ValueError, OverflowError):
         raise InputError(f"{what} = {value!r:.60}: expected a number") from None
     if above is not None and not above < result.value < float("inf"):
-        raise InputError(f"{what} = {result.value!r}: expected a number > {above:g}")
+        raise InputError(f"{what} = {result.value!r}: expected a finite number > {above:g}")
     return result.value
 
 
@@ -243,7 +248,7 @@ def numbers(values, what: str) -> dict:
     return {encode(name, what).decode(): number(value, str(name)) for name, value in values.items()}
 
 
-free = c.CDLL(None).free  # of the C library, for texts that the library allocates
+free = c.CDLL(None).free  # for texts that the library allocates
 free.restype, free.argtypes = None, [c.c_void_p]
 
 

@@ -1,4 +1,4 @@
-"""Runs the program ``pinwheel``, for commands and pages that the library does not have."""
+"""Runs the program ``pinwheel``, for commands and pages that are not in the library."""
 
 from __future__ import annotations
 
@@ -22,7 +22,8 @@ def options(model):
 
 
 def run(arguments):
-    """The finished process; raises the exception of its exit status."""
+    """Runs the program and returns the finished process; raises the exception of its exit status, unless that is 130, of a
+    command that Ctrl-C has stopped."""
     try:
         done = subprocess.run([lib.program(), *arguments], capture_output=True, text=True, check=False)
     except ValueError as failure:
@@ -47,11 +48,12 @@ def animation(result) -> str:
 
 
 def interactive(model) -> str:
-    """The same for the page that simulates a model in the browser."""
+    """An HTML frame with the page that simulates a model in the browser; a text with the reason if there is none."""
     return _page("page", model, "--output", [], repr(model))
 
 
 def _page(command, model, output_option, settings, otherwise):
+    """An HTML frame with the page that a command writes; if it fails, `otherwise` and the reason."""
     with tempfile.TemporaryDirectory() as folder:
         path = pathlib.Path(folder) / "page.html"
         try:

@@ -13,6 +13,7 @@ def _in_notebook() -> bool:
 
 
 def _remaining(done, seconds):
+    """Percentage and time remaining; done: fraction of the work; seconds: time elapsed."""
     return f"{100 * done:.0f} %, {seconds * (1 / done - 1):.0f} s remaining" if done > 0 else ""
 
 
@@ -46,12 +47,12 @@ class _Terminal:
 
 @contextlib.contextmanager
 def watched(progress):
-    """A function to call with the fraction done.  Bars appear after half a second and are removed at the end.
+    """Yields a function to call with the fraction done.  Bars appear after half a second and are removed at the end.
 
     Parameters
     ----------
     progress : callable, bool or None
-        Called itself; True: a bar; None: a bar in notebooks only.
+        A function: yielded itself; True: a bar; None: a bar in notebooks only; False: nothing.
     """
     if callable(progress):
         yield progress

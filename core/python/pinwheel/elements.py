@@ -41,7 +41,7 @@ class Element(dict):
 
     kind = ""
     _required: tuple = ()
-    _fields: dict = {}  # names in Python and in text models
+    _fields: dict = {}  # names in text models, by names in Python
 
     def __init__(self, name: str, **fields):
         for field in fields:
@@ -59,7 +59,7 @@ def _python_name(field):
 
 
 def _parameter(field):
-    """The field as a parameter of a signature, and as lines of a docstring."""
+    """A field as a parameter of the signature, and as lines of the docstring."""
     name, about = _python_name(field), lib.text(field.about)
     shape, unit = _SHAPES[field.type], f"[{lib.text(field.unit)}]" if field.unit else ""
     names = [word.decode() for word in _until_null(field.choices)]
@@ -76,6 +76,7 @@ def _parameter(field):
 
 
 def _until_null(pointer):
+    """The entries of an array in C that ends with NULL."""
     i = 0
     while pointer and pointer[i]:
         yield pointer[i]
@@ -83,6 +84,7 @@ def _until_null(pointer):
 
 
 def _class(kind):
+    """The subclass of Element for an element type."""
     fields = [(field, *_parameter(field)) for field in lib.listed(lib.pw_field, kind.fields)]
     name = kind.name.decode()
     about = lib.text(kind.about)
@@ -102,6 +104,7 @@ def _class(kind):
 
 
 def _classes():
+    """Names and classes of all element types."""
     pointers = c.cast(lib.core.pw_kinds, c.POINTER(c.c_void_p))
     for address in _until_null(pointers):
         element = _class(lib.pw_kind.from_address(address))

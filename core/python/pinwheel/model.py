@@ -23,15 +23,15 @@ from .simulation import Simulation
 class _System:
     """A compiled system, which simulations share.
 
-    keep: objects to which it refers; raised: exceptions of functions in Python, by thread.
+    keep: objects to which the system refers; raised: exceptions raised by signals in Python, by thread, see _callback.
     """
 
-    _compiling = threading.Lock()
+    _compiling = threading.Lock()  # one specialised code at a time
 
     def __init__(self, pointer, keep, raised):
         self.pointer, self._keep, self._raised = pointer, keep, raised
         self._code = _Handle(None, lib.files.pw_scene_code_close)
-        self._has_code = False
+        self._code_tried = False
 
     def __del__(self):
         if self.pointer:
@@ -40,15 +40,16 @@ class _System:
     def code(self) -> int | None:
         """Specialised code, compiled or from the cache; None if there cannot be any."""
         with self._compiling:
-            if not self._has_code:
+            if not self._code_tried:
                 text = self._source()
                 if text:
                     self._code.pointer = lib.files.pw_scene_code_open(text, self.pointer, None)
                     lib.free(text)
-                self._has_code = True
+                self._code_tried = True
         return lib.files.pw_scene_code_table(self._code.pointer)
 
     def _source(self):
+        """The text of the code for the independent constraint equations, which a run selects."""
         run = lib.core.pw_run_open(self.pointer, b"rk4+none", None, None)
         if run is None:
             return lib.core.pw_system_source(self.pointer, None, None)
@@ -70,7 +71,7 @@ class _System:
 
 
 class _Described:
-    """The text of a model described in Python, as a file that lives as long as this object; it can be pickled."""
+    """The text of a model described in Python, as a file that exists as long as this object; str() is its path."""
 
     def __init__(self, name: str, text: str):
         if not isinstance(name, str) or not name or len(name) > 50 or set(name) & set("/\\\0"):
@@ -101,18 +102,18 @@ class _Handle:
 
 @dataclass(frozen=True)
 class Linear:
-    """A linearisation x' = A x + B u in minimal coordinates, positions first, in a frame that moves with the motion.
+    """A linearisation x' = A x + B u in minimal coordinates x [m], positions first, in a frame that moves with the motion.
 
     Attributes
     ----------
     A : ndarray, shape (n, n)
         [1/s]
     B : ndarray, shape (n, inputs)
-        Per unit of each input, in its column; columns of signals of constraints are NaN.
+        [m/s] per unit of each input u; columns of signals of constraints are NaN.
     eigenvalues : ndarray of complex, shape (n,)
         [1/s], the fastest growing first.
     basis : ndarray, shape (states, n)
-        Perturbation of the states per m of x.
+        Perturbations of the states, one column for each coordinate x = 1 m.
     inputs, states : list of str
         Names of the signals and of the states.
     steady : bool
@@ -176,7 +177,7 @@ class Model:
     """
 
     def __init__(self, model, *, start: dict | None = None, signals: dict[str, Callable] | None = None, **parameters):
-        self._origin = model if isinstance(model, _Described) else str(model)
+        self._origin = model if isinstance(model, _Described) else str(model)  # keeps the file of a described model
         self.source = str(model)
         self.start, self.signals = lib.numbers(start or {}, "start"), _functions(signals or {})
         error = lib.pw_error()
@@ -237,6 +238,7 @@ class Model:
     # ---- Compiling ----
 
     def _compile(self, inputs=()):
+        """The compiled system, and the cells (C doubles) that its inputs read, by name."""
         if not inputs and self._compiled:
             return self._compiled
         error, keep, raised = lib.pw_error(), [self._file], {}
@@ -264,7 +266,10 @@ class Model:
         return system, cells
 
     def _set_signal(self, model, name, function, context, keep):
-        """name: ELEMENT or ELEMENT.FIELD; function: a callback or the address of a C function."""
+        """Replaces a signal by a function, which is appended to `keep`.
+
+        name: ELEMENT or ELEMENT.FIELD; function: a callback or the address of a C function; context: its first argument.
+        """
         signal, error = lib.pw_signal(), lib.pw_error()
         signal.type = lib.PW_FUNCTION
         signal.function__eval = function if isinstance(function, int) else c.cast(function, c.c_void_p).value
@@ -286,7 +291,7 @@ class Model:
         method : str, optional
             Integrator and stabilisation, "erk8+projection"; default: the model's.
         t_end : float, optional
-            Expected final time [s]: only for the scale of a scene at rest.
+            Expected final time [s], from which only the time scale of a scene at rest is estimated.
         step : float, optional
             Step size of fixed-step methods [s]; default: the model's.
         rtol, atol : float, optional
@@ -327,6 +332,7 @@ class Model:
         return Simulation(self, system, cells, method, settings, given)
 
     def _setting(self, name, value):
+        """A setting by its name in C, as a number; the model's default for None, 0 if it has none."""
         if value is None:
             return self.defaults.get("t_end" if name == "span" else name, 0)
         value = lib.number(value, "t_end" if name == "span" else name, above=0)
@@ -347,7 +353,7 @@ class Model:
         every : float, optional
             Time between samples [s]; default: a sample after every step.
         times : array_like, shape (n,), optional
-            Increasing times of samples [s], at most t_end.
+            Increasing times of samples [s], at most t_end; the run ends at the last one.
         start : dict, optional
             Initial values of states [m, rad, m/s, rad/s].
         progress : callable or bool, optional
@@ -419,7 +425,7 @@ class Model:
 
         return Linear(matrix(linear.A, n, n), matrix(linear.B, n, len(inputs)),
                       np.array([complex(linear.re[i], linear.im[i]) for i in range(n)]), matrix(linear.basis, states, n), inputs,
-                      [lib.name_of(lib.core.pw_system_state_name, system, i) for i in range(states)], linear.steady == 0,
+                      [lib.name_of(lib.core.pw_system_state_name, system, i) for i in range(states)], linear.steady == lib.PW_STEADY,
                       np.array(linear.twist))
 
 
@@ -435,6 +441,7 @@ def _restore(origin, start, parameters):
 
 
 def _functions(signals):
+    """A dict of functions by name, checked."""
     if not hasattr(signals, "items"):
         raise lib.InputError(f"signals: expected a dict of functions by name, found {signals!r:.60}")
     for name, function in signals.items():
@@ -515,6 +522,7 @@ def describe(name: str = "model", *, about: str = "", bodies=(), elements=(), pa
 
 
 def _entries(given, what):
+    """A list of dicts, made from one or several."""
     entries = [given] if isinstance(given, (str, dict)) else list(given) if np.iterable(given) else [given]
     for entry in entries:
         if not isinstance(entry, dict) or not entry:
@@ -523,6 +531,7 @@ def _entries(given, what):
 
 
 def _json(value):
+    """JSON, which is YAML of one line."""
     def convert(x):
         if isinstance(x, np.ndarray):
             return x.tolist()

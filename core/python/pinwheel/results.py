@@ -15,7 +15,7 @@ class Result:
     t : ndarray, shape (samples,)
         Times [s].
     rows : ndarray, shape (samples, columns)
-        All numbers; ``result[name]`` is a view of one column.
+        All samples; ``result[name]`` is a view of one column.
     units : dict of str
         Unit of each column.
     states, reactions, ledger : list of str
@@ -24,9 +24,9 @@ class Result:
     reason : str
         Why the run ended early, or "".
     statistics : dict
-        Steps, evaluations (how many by specialised code), largest constraint residuals.
+        Numbers of steps and evaluations, the latter in all and by specialised code; largest constraint residuals.
     changed : dict of tuple
-        Initial values that the constraints have changed, (described, consistent) by name.
+        Initial values that the constraints have changed: (described, consistent) by name of the state.
     cause : Exception or None
         What a function in Python raised, if that ended the run.
     model : Model
@@ -97,6 +97,7 @@ class Result:
 
 
 def _nearest(name, names):
+    """A hint for messages about an unknown name: the nearest one, else all if they are few, else ""."""
     import difflib
     near = difflib.get_close_matches(str(name), list(names), 1, 0.5)
     known = ", ".join(names)

@@ -1,4 +1,4 @@
-"""Open runs: samples of a whole run, or steps that the caller requests."""
+"""Open runs: recorded as a whole, or advanced by the caller."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ _MEMORY = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")  # of the mac
 
 
 class Inputs(MutableMapping):
-    """Values of the signals that a simulation's user sets, by name; the names cannot change."""
+    """Values of the signals that the user of a simulation sets, by name; no names can be added or removed."""
 
     def __init__(self, cells: dict, changed: Callable[[], None]):
         self._cells, self._changed = cells, changed
@@ -68,7 +68,7 @@ class _Rows:
     @staticmethod
     def _allocate(capacity, width):
         try:
-            if capacity * width * 8 > _MEMORY:  # the system may promise it, and end the process later
+            if capacity * width * 8 > _MEMORY:  # the system might grant it and end the process when it is used
                 raise MemoryError
             return np.empty((capacity, width))
         except (MemoryError, ValueError):
@@ -77,6 +77,7 @@ class _Rows:
     def room(self, done: float) -> np.ndarray:
         """The rows that are not used yet, at least one; done: fraction of the run that is done."""
         if self.count == len(self._rows):
+            # 10 % more than the whole run needs at this rate; growth by a factor from 1.2 to 64
             expected = self.count * min(64, max(1.1 / done, 1.2)) if done > 0 else 64 * self.count
             most = max(_MEMORY // (8 * self._rows.shape[1]), self.count + 1)
             larger = self._allocate(min(int(expected) + 16, most), self._rows.shape[1])
@@ -101,8 +102,8 @@ class Simulation:
     inputs : Inputs
         Inputs that may be set between steps, by name; after a change the method restarts from the state reached.
     changed : dict of tuple
-        Initial values that did not satisfy the constraints, (described, consistent) by name; a warning names those that
-        the user has given.
+        Initial values that the constraints have changed: (described, consistent) by name of the state; a warning names
+        those that the user has given.
 
     Examples
     --------
@@ -111,8 +112,8 @@ class Simulation:
     ...     simulation.advance(0.01)
     """
 
-    _run = None
-    _cancelled = staticmethod(lambda: False)
+    _run = None  # a closed run
+    _cancelled = staticmethod(lambda: False)  # asked between calls of the library; True: ends the run as Ctrl-C does
 
     def __init__(self, model, system, cells, method, settings, given):
         self.model, self._system, self._settings = model, system, settings
@@ -128,7 +129,7 @@ class Simulation:
         self._restart = True
 
     def _initial(self):
-        """Initial values that the constraints have changed."""
+        """The attribute `changed`; warns of changed values that the user has given."""
         s, core, report, changed, given = self._system.pointer, lib.core, lib.core.pw_run_initial(self._run), {}, []
         n, x = core.pw_system_coordinates(s), report.contents
         for i in range(2 * n):
@@ -184,13 +185,14 @@ class Simulation:
 
     @property
     def statistics(self) -> dict:
-        """Steps, evaluations (how many by specialised code), largest constraint residuals so far."""
+        """Numbers of steps and evaluations, in all and by specialised code; largest constraint residuals so far."""
         with self._used() as run:
             s = lib.core.pw_run_statistics(run).contents
             return {name: getattr(s, name) for name in ("steps", "rejected", "rhs", "jacobians", "factorisations", "specialised",
                                                         "position", "velocity", "g", "jv")}
 
     def _columns(self):
+        """Units of all columns by name, in their order; names of columns by group, as in :class:`Result`."""
         s, n, core = self._system.pointer, lib.core.pw_system_coordinates(self._system.pointer), lib.core
         units, groups = dict(_FIRST_COLUMNS), {}
         groups["states"] = [lib.name_of(core.pw_system_state_name, s, i) for i in range(2 * n)]
@@ -232,6 +234,7 @@ class Simulation:
             return dict(zip(units, self._record(run, np.array([t]), t).used[0].tolist()))
 
     def _later(self, run, t, what):
+        """The time t as a number; it must not be earlier than the time reached."""
         reached, t = lib.core.pw_run_time(run), _finite(t, what)
         if not t >= reached:
             raise lib.InputError(f"{what}({t}): the run has reached t = {reached}")
@@ -241,7 +244,7 @@ class Simulation:
 
     def record(self, t_end: float, every: float | None = None, times=None,
                progress: Callable[[float], object] | bool | None = None) -> Result:
-        """Advances to t_end and returns the samples.
+        """Advances to t_end, or to the last of ``times``, and returns the samples.
 
         Parameters
         ----------
@@ -305,7 +308,7 @@ class Simulation:
         return times
 
     def _record(self, run, times, t_end, rows=None, progress=False):
-        """Adds the samples at these times, or after every step (None), to the rows."""
+        """Advances and adds the samples at these times, or after every step (None), to the rows, which are returned."""
         rows = rows or _Rows(lib.core.pw_run_record_width(run), len(times))
         start, now, error = lib.core.pw_run_time(run), lib.core.pw_run_time, lib.pw_error()
         if self._restart:
@@ -325,7 +328,7 @@ class Simulation:
         return rows
 
     def _call(self, run, times, t_end, rows, done):
-        """One call of the library: some 50 ms, so that Python notices Ctrl-C soon."""
+        """One call of the library, of 40 to 100 ms, so that Python reacts to Ctrl-C soon."""
         recorded, error, room, began = c.c_long(), lib.pw_error(), rows.room(done), time.perf_counter()
         room = room if times is None else room[:len(times)]
         try:

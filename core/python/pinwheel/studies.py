@@ -21,7 +21,10 @@ from ._progress import watched
 # ---- Sweeps ----
 
 def _final(model, parameters, start, method, t_end, settings, cancelled=None):
-    """The last sample of one run, its units, and why it failed, or "".  Other processes import this function."""
+    """The last sample of one run, its units, and why it failed, or "".
+
+    Executors call it in threads or other processes; cancelled: a function that says whether to stop.
+    """
     varied = model.replace(start=start, **parameters)
     end = varied.defaults["t_end"] if t_end is None else t_end
     try:
@@ -34,7 +37,7 @@ def _final(model, parameters, start, method, t_end, settings, cancelled=None):
 
 
 def _points(vary):
-    """Names, their values, and all combinations."""
+    """Names, their values, and all combinations as dicts."""
     if not hasattr(vary, "items"):
         raise lib.InputError(f"vary: expected a dict of values by name, found {vary!r:.60}")
     names, values = [lib.encode(name, "vary").decode() for name in vary], []
@@ -91,7 +94,7 @@ def sweep(model, vary: dict, *, method: str | None = None, t_end: float | None =
     t_end = None if t_end is None else lib.number(t_end, "t_end")
     settings["specialise"] = _specialise(model, len(points), method, t_end, dict(settings))
     pool, cancelled = executor or concurrent.futures.ThreadPoolExecutor(os.cpu_count()), threading.Event()
-    watch = [cancelled.is_set] if executor is None else []  # other executors may not be able to send it
+    watch = [cancelled.is_set] if executor is None else []  # it cannot be sent to other processes
     if not hasattr(pool, "submit"):
         raise lib.InputError(f"executor: expected a concurrent.futures.Executor, found {executor!r:.60}")
     try:
@@ -108,6 +111,7 @@ def sweep(model, vary: dict, *, method: str | None = None, t_end: float | None =
 
 
 def _table(values, rows, units):
+    """The result of a sweep.  values: those varied, by name; rows: results of _final; units: those of parameters."""
     shape = [len(v) for v in values.values()]
     columns = next((of for row, of, _ in rows if row), {})
     table = {name: np.array([row.get(name, np.nan) for row, _, _ in rows]).reshape(shape) for name in columns}
@@ -136,7 +140,7 @@ def command(name: str, model, *arguments, **options):
     *arguments, **options
         Further arguments and options of the command, see :func:`help_of`: ``t_end=10`` stands for ``--t-end=10``,
         ``energy=True`` for ``--energy``; a list repeats the option, and so does a dict: ``hold={"frame.vx": 1}`` stands
-        for ``--hold=frame.vx=1``, ``free={"m": (0, 2)}`` for ``--free=m=0:2``.  ``data`` may be a dict of arrays or a
+        for ``--hold=frame.vx=1``, and ``free={"m": (0, 2)}`` for ``--free=m=0:2``.  ``data`` may be a dict of arrays or a
         DataFrame.
 
     Returns
@@ -222,7 +226,7 @@ def _report(name, model, arguments, options, tables):
 
 
 def _output(name, described, folder, tables):
-    """The option that makes a command write to the folder."""
+    """The option, found in the command's help, that makes it write to the folder; None if it has none."""
     if "--json" in described:
         return f"--json={folder / name}.json"
     if "-o, --name=NAME" in described:
@@ -248,10 +252,12 @@ def _words(key, value, folder):
 
 
 def _value(x):
+    """A value of an option: a range as LOW:HIGH."""
     return ":".join(map(str, x)) if isinstance(x, _LISTS) else str(x)
 
 
 def _write_columns(path, columns):
+    """Writes a dict of arrays or a DataFrame as a CSV table; NaN: an empty cell."""
     try:
         names = list(columns)
         rows = np.column_stack([np.asarray(columns[name], float) for name in names])
@@ -265,6 +271,7 @@ def _write_columns(path, columns):
 
 
 def _columns(path):
+    """The columns of a CSV table by name, without lines that begin with #."""
     with path.open(encoding="utf-8", newline="") as file:
         rows = list(csv.reader(line for line in file if not line.startswith("#")))
     return {name: _array([row[i] for row in rows[1:]]) for i, name in enumerate(rows[0])}
