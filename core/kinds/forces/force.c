@@ -2,9 +2,10 @@
  *
  *   F = (ux, uy) or R(phi) (ux, uy)
  *   f = (Fx, Fy, X Fy - Y Fx),  (X, Y) = R(phi) s
- *   power = F . v_P = Fx vx + Fy vy + (X Fy - Y Fx) w
+ *   power = F . v_P = Fx vx + Fy vy + (X Fy - Y Fx) omega
  *
- * (Shabana 2001, Computational Dynamics, section 5.3.) It has no reaction on another body. */
+ * (Shabana 2001, Computational Dynamics, section 5.3.)
+ * There is no reaction on another body. */
 #include <string.h>
 #include "batch.h"
 
@@ -17,7 +18,7 @@ typedef struct {
 typedef struct {
   const force *element;
   const pw_configuration *body;
-  double cos, sin;  /* of the angle of the axes along which it is given */
+  double cos, sin;  /* of the angle of the axes of ux, uy */
   double arm[2];    /* (X, Y) */
   double Fx, Fy, M; /* components in the world, moment */
 } force_state;

@@ -1,6 +1,6 @@
 /* torque: the signal u acts on body 1, -u on body 2.
  *
- *   f = (0, 0, u | 0, 0, -u),  power = u (w1 - w2) */
+ *   f = (0, 0, u | 0, 0, -u),  power = u (omega1 - omega2) */
 #include "batch.h"
 
 static void torque_force (const pw_batch *batch, double *out) {

@@ -3,9 +3,9 @@
  *   g = (phi1 - phi3) - i (phi2 - phi3) - c = 0                    (1 holonomic equation, linear)
  *   G = [ 0 0 1 | 0 0 -i | 0 0 i-1 ],  gamma = 0
  *
- * (Willis 1870, Principles of Mechanism.)  External gears of radii R1 and R2 have i = -R2 / R1, a gear inside a ring
- * i = R2 / R1.  Pins define the axles.  The moments are -lambda on body 1, i lambda on body 2, (1 - i) lambda on the
- * carrier. */
+ * (Willis 1870, Principles of Mechanism.)
+ * External gears of radii R1 and R2 have i = -R2 / R1, a gear inside a ring i = R2 / R1.  The axles need pins.  The
+ * moments are -lambda on body 1, i lambda on body 2, (1 - i) lambda on the carrier. */
 #include <math.h>
 #include <string.h>
 #include "batch.h"

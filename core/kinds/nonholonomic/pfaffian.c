@@ -1,12 +1,12 @@
 /* pfaffian: a linear combination of the velocities of two bodies, in the axes of body 1, equals a signal u.
  *
- *   a . (R(phi1)^T r1', w1) + b . (R(phi1)^T r2', w2) = u          (1 nonholonomic equation)
+ *   a . (R(phi1)^T r1', omega1) + b . (R(phi1)^T r2', omega2) = u  (1 nonholonomic equation)
  *   S     = [ A a3 | B b3 ],  A = R(phi1) (a1, a2), B = R(phi1) (b1, b2),  eta = u
- *   gamma = u' - w1 (p(A).r1' + p(B).r2')                          so that S a = gamma; p rotates by +90 degrees
+ *   gamma = u' - omega1 (p(A).r1' + p(B).r2')           so that S v' = gamma; p(A) = A turned by +90 degrees
  *
  * (Neimark & Fufaev 1972, Dynamics of Nonholonomic Systems, chapter I.)
- * The reaction F = -lambda acts on body 1 as the force F A and the moment F a3, on body 2 as F B and F b3; the
- * two need not balance; the difference is an external force.  The power is F u. */
+ * The reaction F = -lambda acts on body 1 as the force F A and the moment F a3, on body 2 as F B and F b3.  The two
+ * forces need not balance: their sum is an external force.  The power is F u. */
 #include <math.h>
 #include <string.h>
 #include "batch.h"
@@ -19,7 +19,7 @@ typedef struct {
 typedef struct {
   const pfaffian *element;
   const pw_configuration *body1, *body2;
-  const double *w, *u; /* the vector w of jw_q, else NULL; the signal with its time derivatives */
+  const double *w, *u; /* the vector w of jw_q, else NULL; the signal with two time derivatives */
   double A[2], B[2];
 } pfaffian_state;
 
@@ -63,10 +63,10 @@ PER_ELEMENT (pfaffian_gamma_q, pfaffian, 6) {
 }
 
 PER_ELEMENT (pfaffian_gamma_v, pfaffian, 6) {
-  double w = now.body1->omega;
-  out[0] = w * now.A[1], out[1] = -w * now.A[0],
+  double omega = now.body1->omega;
+  out[0] = omega * now.A[1], out[1] = -omega * now.A[0],
   out[2] = now.A[1] * now.body1->vx - now.A[0] * now.body1->vy + now.B[1] * now.body2->vx - now.B[0] * now.body2->vy;
-  out[3] = w * now.B[1], out[4] = -w * now.B[0], out[5] = 0;
+  out[3] = omega * now.B[1], out[4] = -omega * now.B[0], out[5] = 0;
 }
 
 static const pw_field pfaffian_fields[] = {
