@@ -2,9 +2,10 @@
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
+#include <strings.h>
 #include "util.h"
 
-/* Edit distance (Levenshtein 1966), keeping one row of the table; of a candidate longer than the row, its length. */
+/* Edit distance (Levenshtein 1966), keeping one row of the table; for a candidate longer than the row, its length. */
 static size_t nearest_distance (const char *a, const char *b) {
   size_t row[64], n = strlen (b);
   if (n >= sizeof row / sizeof *row) return n;
@@ -30,16 +31,6 @@ static int nearest_is_near (const char *a, size_t n, const char *b, size_t m, si
          (shorter > 0 && (memcmp (a, b, shorter) == 0 || memcmp (a + n - shorter, b + m - shorter, shorter) == 0));
 }
 
-static int nearest_lower (char c) {
-  return c >= 'A' && c <= 'Z' ? c - 'A' + 'a' : c;
-}
-
-/* 1 if two names are equal except for capitals. */
-static int nearest_equal (const char *a, const char *b) {
-  while (*a && nearest_lower (*a) == nearest_lower (*b)) a++, b++;
-  return *a == *b;
-}
-
 static void nearest_append (pw_nearest *n, const char *candidate) {
   size_t used = strlen (n->all), more = strlen (candidate);
   n->overflow |= used + more + 3 > sizeof n->all;
@@ -50,7 +41,7 @@ static void nearest_append (pw_nearest *n, const char *candidate) {
 
 void pw_nearest_try (pw_nearest *n, const char *candidate) {
   size_t a = strlen (n->sought), b = strlen (candidate), length = a > b ? a : b;
-  size_t distance = nearest_equal (n->sought, candidate) ? 0 : nearest_distance (n->sought, candidate);
+  size_t distance = strcasecmp (n->sought, candidate) == 0 ? 0 : nearest_distance (n->sought, candidate);
   nearest_append (n, candidate);
   if (*n->best && distance * n->length >= n->distance * length) return;
   snprintf (n->best, sizeof n->best, "%s", candidate);

@@ -50,8 +50,8 @@ int pw_names_find (const pw_names *n, const char *name) {
   return slot->name ? slot->value : -1;
 }
 
-#define STORE_ALIGN 16
-#define STORE_CHUNK 65536
+#define STORE_ALIGN 16    /* bytes: alignment of any object */
+#define STORE_CHUNK 65536 /* bytes of a chunk, unless an allocation needs more */
 
 struct pw_chunk {
   struct pw_chunk *next;

@@ -1,4 +1,4 @@
-/* The forms of a signal, as text models and lists use them: their fields, and checks of a whole signal. */
+/* Forms of signals: their fields, and checks of signals. */
 #include <math.h>
 #include <stdio.h>
 #include "signal.h"
@@ -64,7 +64,7 @@ const pw_signal_form *pw_signal_form_of (const pw_signal *s) {
 
 /* ---- Checks: each writes the fault to `text`, or leaves it empty ---- */
 
-/* The number of each field, and its choice, of which there are two. */
+/* Each field is a number or a choice between 0 and 1. */
 static void form_check_fields (const pw_signal *s, const pw_signal_form *form, char *text, size_t size) {
   for (const pw_field *f = form->fields; f->name && !*text; f++) {
     const void *at = (const char *)s + f->offset;
@@ -106,7 +106,7 @@ static void form_check_points (const pw_signal *s, int *point, char *text, size_
 
 typedef enum { FORM_JUMPS, FORM_KINKS, FORM_SMOOTH } form_continuity;
 
-/* Whether a signal jumps, or has kinks, and the name of its form in messages. */
+/* Whether a signal jumps or has kinks; *form: a form that does, for messages, or "". */
 static form_continuity form_continuity_of (const pw_signal *s, const char **form) {
   *form = s->type == PW_PULSE                   ? "a pulse"
           : s->type == PW_RAMP                  ? "a ramp"

@@ -5,7 +5,8 @@
 #include <string.h>
 #include "system.h"
 
-static const char *const query_names[] = { "x", "y", "phi", "vx", "vy", "omega" };
+/* The states of a body: names and units. */
+static const char *const query_states[] = { "x", "y", "phi", "vx", "vy", "omega" };
 static const char *const query_units[] = { "m", "m", "rad", "m/s", "m/s", "rad/s" };
 
 #define MEMBER(type, function, member) \
@@ -44,25 +45,21 @@ int pw_system_find_body (const pw_system *s, const char *name) {
 
 /* The batch of internal coordinate j >= 3 bodies, its element, and the number of the coordinate in the element. */
 static const pw_element_batch *query_internal (const pw_system *s, int j, int *element, int *number) {
-  for (const pw_element_batch *k = s->batch; k < s->batch + s->batches; k++) {
-    int n = j - k->internal;
-    if (k->kind->internal == 0 || n < 0 || n >= k->b.count * k->kind->internal) continue;
-    *element = n / k->kind->internal;
-    *number = n % k->kind->internal;
-    return k;
-  }
-  return NULL;
+  const pw_element_batch *k = s->batch;
+  while (j >= k->internal + k->b.count * k->kind->internal) k++;
+  *element = (j - k->internal) / k->kind->internal;
+  *number = (j - k->internal) % k->kind->internal;
+  return k;
 }
 
 char *pw_system_state_name (const pw_system *s, int state, char *buffer, size_t size) {
   int velocity = state >= s->coords, j = velocity ? state - s->coords : state, e, n;
   if (j < 3 * s->bodies) {
-    snprintf (buffer, size, "%s.%s", s->body_name[j / 3], query_names[3 * velocity + j % 3]);
+    snprintf (buffer, size, "%s.%s", s->body_name[j / 3], query_states[3 * velocity + j % 3]);
     return buffer;
   }
   const pw_element_batch *k = query_internal (s, j, &e, &n);
-  if (k)
-    snprintf (buffer, size, "%s.%s", k->name[e], velocity ? k->kind->coordinate[n].rate : k->kind->coordinate[n].name);
+  snprintf (buffer, size, "%s.%s", k->name[e], velocity ? k->kind->coordinate[n].rate : k->kind->coordinate[n].name);
   return buffer;
 }
 
@@ -70,12 +67,11 @@ const char *pw_system_state_unit (const pw_system *s, int state) {
   int velocity = state >= s->coords, j = velocity ? state - s->coords : state, e, n;
   if (j < 3 * s->bodies) return query_units[3 * velocity + j % 3];
   const pw_element_batch *k = query_internal (s, j, &e, &n);
-  if (k == NULL) return "";
   if (!velocity) return k->kind->coordinate[n].unit;
   return strcmp (k->kind->coordinate[n].unit, "m") == 0 ? "m/s" : "rad/s";
 }
 
-/* Index of the state "body.x", or -1; near->best: the nearest name if the body exists. */
+/* Index of the state "BODY.x", or -1; if only the body exists, near->best becomes its state of the nearest name. */
 static int query_body_state (const pw_system *s, const char *name, pw_nearest *near) {
   const char *dot = strrchr (name, '.');
   if (dot == NULL) return -1;
@@ -85,8 +81,8 @@ static int query_body_state (const pw_system *s, const char *name, pw_nearest *n
   if (b == s->bodies) return -1;
   pw_nearest state = { .sought = dot + 1 };
   for (int i = 0; i < 6; i++) {
-    if (strcmp (dot + 1, query_names[i]) == 0) return i < 3 ? 3 * b + i : s->coords + 3 * b + i - 3;
-    pw_nearest_try (&state, query_names[i]);
+    if (strcmp (dot + 1, query_states[i]) == 0) return i < 3 ? 3 * b + i : s->coords + 3 * b + i - 3;
+    pw_nearest_try (&state, query_states[i]);
   }
   state.sought = name;
   *near = state;
@@ -96,7 +92,8 @@ static int query_body_state (const pw_system *s, const char *name, pw_nearest *n
 
 typedef char *query_name (const pw_system *s, int i, char *buffer, size_t size);
 
-/* The index of near->sought among the names; without it, fails with the nearest one, unless that is known already. */
+/* The index of near->sought among the names.  If it is not there, fails with near->best, or else with the nearest name;
+ * what: "state", ... */
 static int query_find (const pw_system *s, const char *what, int (*count_of) (const pw_system *s), query_name *name_of,
                        pw_nearest *near, pw_error *error) {
   char text[120];
@@ -109,14 +106,14 @@ static int query_find (const pw_system *s, const char *what, int (*count_of) (co
   return pw_fail (error, PW_INPUT, "model %s has no %s \"%s\"%s", s->model, what, near->sought, pw_nearest_text (near));
 }
 
-static int query_states (const pw_system *s) {
+static int query_state_count (const pw_system *s) {
   return 2 * s->coords;
 }
 
 int pw_system_find_state (const pw_system *s, const char *name, pw_error *error) {
   pw_nearest near = { .sought = name };
   int state = s && name ? query_body_state (s, name, &near) : -1;
-  return state >= 0 ? state : query_find (s, "state", query_states, pw_system_state_name, &near, error);
+  return state >= 0 ? state : query_find (s, "state", query_state_count, pw_system_state_name, &near, error);
 }
 
 /* The batch of a constraint equation, its element, and the number of the equation in the element. */
@@ -126,6 +123,12 @@ static const pw_element_batch *query_row (const pw_system *s, int row, int *elem
   *element = (row - k->row) / k->kind->rows;
   *number = (row - k->row) % k->kind->rows;
   return k;
+}
+
+int pw_system_row_element (const pw_system *s, int row) {
+  int element, n;
+  for (const pw_element_batch *k = query_row (s, row, &element, &n); k > s->batch;) element += (--k)->b.count;
+  return element;
 }
 
 char *pw_system_reaction_name (const pw_system *s, int row, char *buffer, size_t size) {
@@ -153,14 +156,11 @@ char *pw_system_row_name (const pw_system *s, int row, char *buffer, size_t size
   return buffer;
 }
 
-/* The field of the n-th signal of an element type; *n becomes the index of its value. */
+/* The field of signal *n of an element type; *n becomes the index of the signal in this field. */
 static const pw_field *query_signal_field (const pw_kind *kind, int *n) {
   const pw_field *f = kind->fields;
-  for (; f->name; f++) {
-    if (f->type != PW_SIGNAL) continue;
-    if (*n < pw_field_count (f)) break;
-    *n -= pw_field_count (f);
-  }
+  for (; f->type != PW_SIGNAL || *n >= pw_field_count (f); f++)
+    if (f->type == PW_SIGNAL) *n -= pw_field_count (f);
   return f;
 }
 
@@ -179,9 +179,8 @@ char *pw_system_signal_name (const pw_system *s, int signal, char *buffer, size_
   const pw_element_batch *k = query_signal (s, &signal);
   int n = signal % k->kind->signals;
   const pw_field *f = query_signal_field (k->kind, &n);
-  int length = snprintf (buffer, size, "%s.%s", k->name[signal / k->kind->signals], f->name ? f->name : "signal");
-  if (f->name && pw_field_count (f) > 1 && (size_t)length < size)
-    snprintf (buffer + length, size - (size_t)length, "[%d]", n);
+  int length = snprintf (buffer, size, "%s.%s", k->name[signal / k->kind->signals], f->name);
+  if (pw_field_count (f) > 1 && (size_t)length < size) snprintf (buffer + length, size - (size_t)length, "[%d]", n);
   return buffer;
 }
 
@@ -189,7 +188,7 @@ const char *pw_system_signal_unit (const pw_system *s, int signal) {
   const pw_kind *kind = query_signal (s, &signal)->kind;
   int n = signal % kind->signals;
   const pw_field *f = query_signal_field (kind, &n);
-  return f->name && f->unit ? f->unit : "";
+  return f->unit ? f->unit : "";
 }
 
 int pw_system_find_signal (const pw_system *s, const char *name, pw_error *error) {
@@ -208,8 +207,7 @@ char *pw_failed_signal (const pw_workspace *w, char *buffer, size_t size) {
   const pw_element_batch *k = query_signal (w->s, &signal);
   int n = signal % k->kind->signals;
   const pw_field *f = query_signal_field (k->kind, &n);
-  snprintf (buffer, size, "%s %.60s: %s", k->kind->name, k->name[signal / k->kind->signals],
-            f->name ? f->name : "signal");
+  snprintf (buffer, size, "%s %s: %s", k->kind->name, k->name[signal / k->kind->signals], f->name);
   return buffer;
 }
 

@@ -53,7 +53,7 @@ static void workspace_layout (pw_layout *layout, pw_workspace *w) {
   }
 }
 
-/* Sets where signals are evaluated to; opens a context of this workspace for each function signal with `open`. */
+/* Sets where signals store their values; opens a context of this workspace for each function signal with `open`. */
 static int workspace_open_signals (pw_workspace *w) {
   int status = PW_OK;
   for (pw_element_batch *k = w->batch; k < w->batch + w->s->batches; k++)
@@ -62,9 +62,9 @@ static int workspace_open_signals (pw_workspace *w) {
       k->source[i].u = k->u + 3 * i;
       if (k->source[i].signal.type != PW_FUNCTION || f->open == NULL) continue;
       f->context = status == PW_OK ? f->open (f->context) : NULL;
-      if (f->context == NULL)
-        status = PW_RESOURCE,
-        f->close = NULL; /* this one, and the following ones, which are not opened, will not be closed */
+      if (f->context) continue;
+      status = PW_RESOURCE; /* pw_close_signals must skip this signal and the following ones, which are not opened */
+      f->close = NULL;
     }
   return status;
 }
