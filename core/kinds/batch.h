@@ -104,15 +104,9 @@ static inline const double *batch_w (const pw_batch *batch, int e) {
   return batch->w ? batch->w + e * batch->cols : NULL;
 }
 
-/* The body of element e in its current state, if elements have one body; bodies 1 and 2, if they have two. */
-static inline const pw_configuration *batch_only_body (const pw_batch *batch, int e) {
-  return &batch->configuration[batch->body[e]];
-}
-static inline const pw_configuration *batch_body1 (const pw_batch *batch, int e) {
-  return &batch->configuration[batch->body[2 * e]];
-}
-static inline const pw_configuration *batch_body2 (const pw_batch *batch, int e) {
-  return &batch->configuration[batch->body[2 * e + 1]];
+/* Body i of the batch in its current state: body n (from 0) of element e is i = e x bodies of an element + n. */
+static inline const pw_configuration *batch_body (const pw_batch *batch, int i) {
+  return &batch->configuration[batch->body[i]];
 }
 
 /* eta of a velocity constraint equation that prescribes the element's only signal. */

@@ -41,7 +41,7 @@ static inline contact contact_across (const double at[2], double heading) {
 
 /* A contact of element e of a batch of elements with one body. */
 static inline contact_state contact_of (contact constants, const pw_batch *batch, int e) {
-  const pw_configuration *body = batch_only_body (batch, e);
+  const pw_configuration *body = batch_body (batch, e);
   return (contact_state){ constants, body, batch_w (batch, e), body->cos * constants.a - body->sin * constants.b,
                           body->sin * constants.a + body->cos * constants.b };
 }

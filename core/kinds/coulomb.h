@@ -9,7 +9,6 @@
 #ifndef PW_COULOMB_H
 #define PW_COULOMB_H
 
-#include <math.h>
 #include "batch.h"
 
 typedef struct {

@@ -10,7 +10,6 @@
 #ifndef PW_LINE_H
 #define PW_LINE_H
 
-#include <math.h>
 #include <string.h>
 #include "batch.h"
 
@@ -39,7 +38,7 @@ static inline line line_make (const double at[2][2], double heading) {
 
 /* A line of element e of a batch of elements with two bodies and at most one signal. */
 static inline line_state line_of (const line *constants, const pw_batch *batch, int e) {
-  const pw_configuration *body1 = batch_body1 (batch, e), *body2 = batch_body2 (batch, e);
+  const pw_configuration *body1 = batch_body (batch, 2 * e), *body2 = batch_body (batch, 2 * e + 1);
   line_state now = { constants, body1, body2, .w = batch_w (batch, e), .u = batch->u + 3 * e };
   to_world (body2, constants->n, now.n);
   to_world (body1, constants->s1, now.a);

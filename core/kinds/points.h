@@ -9,7 +9,6 @@
 #ifndef PW_POINTS_H
 #define PW_POINTS_H
 
-#include <math.h>
 #include "batch.h"
 
 typedef struct {
@@ -30,7 +29,7 @@ static inline points points_make (const double at[2][2]) {
 
 /* The points of element e of a batch of elements with two bodies. */
 static inline points_state points_of (const points *constants, const pw_batch *batch, int e) {
-  const pw_configuration *body1 = batch_body1 (batch, e), *body2 = batch_body2 (batch, e);
+  const pw_configuration *body1 = batch_body (batch, 2 * e), *body2 = batch_body (batch, 2 * e + 1);
   points_state now = { .body1 = body1, .body2 = body2, .w = batch_w (batch, e) };
   to_world (body1, constants->s1, now.S1);
   to_world (body2, constants->s2, now.S2);

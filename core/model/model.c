@@ -102,7 +102,9 @@ static void *model_copy (pw_model *m, const void *from, size_t bytes) {
 }
 
 static const char *model_copy_text (pw_model *m, const char *text) {
-  return text ? model_copy (m, text, strlen (text) + 1) : NULL;
+  char *copy = text ? pw_arena_copy (&m->arena, text) : NULL;
+  if (text && copy == NULL) model_no_memory (m);
+  return copy;
 }
 
 int pw_add_body (pw_model *m, const pw_body *body) {

@@ -43,13 +43,19 @@ int pw_system_find_body (const pw_system *s, const char *name) {
   return -1;
 }
 
-/* The batch of internal coordinate j >= 3 bodies, its element, and the number of the coordinate in the element. */
-static const pw_element_batch *query_internal (const pw_system *s, int j, int *element, int *number) {
-  const pw_element_batch *k = s->batch;
-  while (j >= k->internal + k->b.count * k->kind->internal) k++;
-  *element = (j - k->internal) / k->kind->internal;
-  *number = (j - k->internal) % k->kind->internal;
-  return k;
+/* The batch of constraint equation, internal coordinate or signal i of the system, its element in the batch, and its
+ * number in the element.  member: offset of `rows`, `internal` or `signals` in pw_kind. */
+static const pw_element_batch *query_find_element (const pw_system *s, size_t member, int i, int *element,
+                                                   int *number) {
+  for (const pw_element_batch *k = s->batch;; k++) {
+    int per_element = *(const int *)(const void *)((const char *)k->kind + member);
+    if (i < k->b.count * per_element) {
+      *element = i / per_element;
+      *number = i % per_element;
+      return k;
+    }
+    i -= k->b.count * per_element;
+  }
 }
 
 char *pw_system_state_name (const pw_system *s, int state, char *buffer, size_t size) {
@@ -58,7 +64,7 @@ char *pw_system_state_name (const pw_system *s, int state, char *buffer, size_t 
     snprintf (buffer, size, "%s.%s", s->body_name[j / 3], query_states[3 * velocity + j % 3]);
     return buffer;
   }
-  const pw_element_batch *k = query_internal (s, j, &e, &n);
+  const pw_element_batch *k = query_find_element (s, offsetof (pw_kind, internal), j - 3 * s->bodies, &e, &n);
   snprintf (buffer, size, "%s.%s", k->name[e], velocity ? k->kind->coordinate[n].rate : k->kind->coordinate[n].name);
   return buffer;
 }
@@ -66,7 +72,7 @@ char *pw_system_state_name (const pw_system *s, int state, char *buffer, size_t 
 const char *pw_system_state_unit (const pw_system *s, int state) {
   int velocity = state >= s->coords, j = velocity ? state - s->coords : state, e, n;
   if (j < 3 * s->bodies) return query_units[3 * velocity + j % 3];
-  const pw_element_batch *k = query_internal (s, j, &e, &n);
+  const pw_element_batch *k = query_find_element (s, offsetof (pw_kind, internal), j - 3 * s->bodies, &e, &n);
   if (!velocity) return k->kind->coordinate[n].unit;
   return strcmp (k->kind->coordinate[n].unit, "m") == 0 ? "m/s" : "rad/s";
 }
@@ -116,31 +122,23 @@ int pw_system_find_state (const pw_system *s, const char *name, pw_error *error)
   return state >= 0 ? state : query_find (s, "state", query_state_count, pw_system_state_name, &near, error);
 }
 
-/* The batch of a constraint equation, its element, and the number of the equation in the element. */
-static const pw_element_batch *query_row (const pw_system *s, int row, int *element, int *number) {
-  const pw_element_batch *k = s->batch;
-  while (row >= k->row + k->b.count * k->kind->rows) k++;
-  *element = (row - k->row) / k->kind->rows;
-  *number = (row - k->row) % k->kind->rows;
-  return k;
-}
-
 int pw_system_row_element (const pw_system *s, int row) {
   int element, n;
-  for (const pw_element_batch *k = query_row (s, row, &element, &n); k > s->batch;) element += (--k)->b.count;
+  for (const pw_element_batch *k = query_find_element (s, offsetof (pw_kind, rows), row, &element, &n); k > s->batch;)
+    element += (--k)->b.count;
   return element;
 }
 
 char *pw_system_reaction_name (const pw_system *s, int row, char *buffer, size_t size) {
   int e, n;
-  const pw_element_batch *k = query_row (s, row, &e, &n);
+  const pw_element_batch *k = query_find_element (s, offsetof (pw_kind, rows), row, &e, &n);
   snprintf (buffer, size, "%s.%s", k->name[e], k->kind->reaction[n].name);
   return buffer;
 }
 
 const char *pw_system_reaction_unit (const pw_system *s, int row) {
   int e, n;
-  const pw_element_batch *k = query_row (s, row, &e, &n);
+  const pw_element_batch *k = query_find_element (s, offsetof (pw_kind, rows), row, &e, &n);
   if (k->kind->reaction_unit == NULL) return k->kind->reaction[n].unit;
   return k->kind->reaction_unit ((const char *)k->b.element + (size_t)e * k->kind->element, n);
 }
@@ -151,43 +149,39 @@ int pw_system_find_reaction (const pw_system *s, const char *name, pw_error *err
 
 char *pw_system_row_name (const pw_system *s, int row, char *buffer, size_t size) {
   int e, n;
-  const pw_element_batch *k = query_row (s, row, &e, &n);
+  const pw_element_batch *k = query_find_element (s, offsetof (pw_kind, rows), row, &e, &n);
   snprintf (buffer, size, "%s %s", k->kind->name, k->name[e]);
   return buffer;
 }
 
-/* The field of signal *n of an element type; *n becomes the index of the signal in this field. */
-static const pw_field *query_signal_field (const pw_kind *kind, int *n) {
-  const pw_field *f = kind->fields;
-  for (; f->type != PW_SIGNAL || *n >= pw_field_count (f); f++)
-    if (f->type == PW_SIGNAL) *n -= pw_field_count (f);
-  return f;
-}
-
-/* The batch of a signal; *n becomes its number among those of the batch. */
-static const pw_element_batch *query_signal (const pw_system *s, int *n) {
-  const pw_element_batch *k = s->batch;
-  for (; *n >= k->b.count * k->kind->signals; k++) *n -= k->b.count * k->kind->signals;
+/* The batch, element and field of a signal, and its index in this field. */
+static const pw_element_batch *query_signal (const pw_system *s, int signal, int *element, const pw_field **field,
+                                             int *index) {
+  const pw_element_batch *k = query_find_element (s, offsetof (pw_kind, signals), signal, element, index);
+  const pw_field *f = k->kind->fields;
+  for (; f->type != PW_SIGNAL || *index >= pw_field_count (f); f++)
+    if (f->type == PW_SIGNAL) *index -= pw_field_count (f);
+  *field = f;
   return k;
 }
 
 int pw_system_signal_forced (const pw_system *s, int signal) {
-  return pw_kind_signals_force (query_signal (s, &signal)->kind);
+  return s->source[signal].of_force;
 }
 
 char *pw_system_signal_name (const pw_system *s, int signal, char *buffer, size_t size) {
-  const pw_element_batch *k = query_signal (s, &signal);
-  int n = signal % k->kind->signals;
-  const pw_field *f = query_signal_field (k->kind, &n);
-  int length = snprintf (buffer, size, "%s.%s", k->name[signal / k->kind->signals], f->name);
+  int e, n;
+  const pw_field *f;
+  const pw_element_batch *k = query_signal (s, signal, &e, &f, &n);
+  int length = snprintf (buffer, size, "%s.%s", k->name[e], f->name);
   if (pw_field_count (f) > 1 && (size_t)length < size) snprintf (buffer + length, size - (size_t)length, "[%d]", n);
   return buffer;
 }
 
 const char *pw_system_signal_unit (const pw_system *s, int signal) {
-  const pw_kind *kind = query_signal (s, &signal)->kind;
-  int n = signal % kind->signals;
-  const pw_field *f = query_signal_field (kind, &n);
+  int e, n;
+  const pw_field *f;
+  query_signal (s, signal, &e, &f, &n);
   return f->unit ? f->unit : "";
 }
 
@@ -203,11 +197,10 @@ int pw_system_find_signal (const pw_system *s, const char *name, pw_error *error
 char *pw_failed_signal (const pw_workspace *w, char *buffer, size_t size) {
   buffer[0] = 0;
   if (w->failed == NULL) return buffer;
-  int signal = (int)(w->failed - w->source);
-  const pw_element_batch *k = query_signal (w->s, &signal);
-  int n = signal % k->kind->signals;
-  const pw_field *f = query_signal_field (k->kind, &n);
-  snprintf (buffer, size, "%s %s: %s", k->kind->name, k->name[signal / k->kind->signals], f->name);
+  int e, n;
+  const pw_field *f;
+  const pw_element_batch *k = query_signal (w->s, (int)(w->failed - w->source), &e, &f, &n);
+  snprintf (buffer, size, "%s %s: %s", k->kind->name, k->name[e], f->name);
   return buffer;
 }
 

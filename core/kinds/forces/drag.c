@@ -5,7 +5,6 @@
  *   f = (Fx, Fy, M),  loss = -F . v - M omega >= 0
  *
  * (Batchelor 1967, An Introduction to Fluid Dynamics, sections 4.9 and 5.11: low and high Reynolds numbers.) */
-#include <math.h>
 #include <string.h>
 #include "batch.h"
 
@@ -23,7 +22,7 @@ typedef struct {
 
 static inline drag_state drag_at (const pw_batch *batch, int e) {
   const drag *element = (const drag *)batch->element + e;
-  const pw_configuration *body = batch_only_body (batch, e);
+  const pw_configuration *body = batch_body (batch, e);
   double speed = hypot (body->vx, body->vy);
   return (drag_state){ element, body, speed, element->linear + element->quadratic * speed,
                        element->turning + element->turning_quadratic * fabs (body->omega) };

@@ -25,7 +25,7 @@ typedef struct {
 
 static inline force_state force_at (const pw_batch *batch, int e) {
   const force *element = (const force *)batch->element + e;
-  const pw_configuration *body = batch_only_body (batch, e);
+  const pw_configuration *body = batch_body (batch, e);
   const double *ux = batch->u + 6 * e, *uy = ux + 3; /* the signals, each with two time derivatives */
   force_state now = { element, body, .cos = element->body_axes > 0 ? body->cos : 1,
                       .sin = element->body_axes > 0 ? body->sin : 0 };

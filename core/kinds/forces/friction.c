@@ -13,7 +13,8 @@ typedef struct {
 
 static inline friction_state friction_at (const pw_batch *batch, int e) {
   return (friction_state){ (const coulomb *)batch->element + e,
-                           batch_body1 (batch, e)->omega - batch_body2 (batch, e)->omega, .S = { [2] = 1, [5] = -1 } };
+                           batch_body (batch, 2 * e)->omega - batch_body (batch, 2 * e + 1)->omega,
+                           .S = { [2] = 1, [5] = -1 } };
 }
 
 PREPARE (friction_prepare, pw_friction, coulomb) {

@@ -6,7 +6,6 @@
  *
  * (Spong, Hutchinson & Vidyasagar 2006, Robot Modeling and Control, section 6.3, for the law; tanh keeps it smooth.)
  * All of its power counts as work, not as loss or potential energy; it is negative when the motor brakes. */
-#include <math.h>
 #include <string.h>
 #include "batch.h"
 
@@ -24,7 +23,7 @@ typedef struct {
 
 static inline motor_state motor_at (const pw_batch *batch, int e) {
   const motor *element = (const motor *)batch->element + e;
-  const pw_configuration *body1 = batch_body1 (batch, e), *body2 = batch_body2 (batch, e);
+  const pw_configuration *body1 = batch_body (batch, 2 * e), *body2 = batch_body (batch, 2 * e + 1);
   const double *angle = batch->u + 6 * e, *rate = angle + 3; /* the signals u1, u2, each with two time derivatives */
   motor_state now = { element, body1, body2,
                       .y = element->stiffness * (angle[0] - body1->phi + body2->phi) +

@@ -19,7 +19,7 @@ typedef struct {
 
 static inline twist_state twist_at (const pw_batch *batch, int e) {
   const twist *element = (const twist *)batch->element + e;
-  const pw_configuration *body1 = batch_body1 (batch, e), *body2 = batch_body2 (batch, e);
+  const pw_configuration *body1 = batch_body (batch, 2 * e), *body2 = batch_body (batch, 2 * e + 1);
   return (twist_state){ element, body1->phi - body2->phi - element->free_angle, body1->omega - body2->omega };
 }
 

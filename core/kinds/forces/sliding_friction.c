@@ -22,7 +22,7 @@ typedef struct {
 
 static inline sliding_state sliding_at (const pw_batch *batch, int e) {
   const sliding *element = (const sliding *)batch->element + e;
-  const pw_configuration *body1 = batch_body1 (batch, e), *body2 = batch_body2 (batch, e);
+  const pw_configuration *body1 = batch_body (batch, 2 * e), *body2 = batch_body (batch, 2 * e + 1);
   const double rate[6] = { body1->vx, body1->vy, body1->omega, body2->vx, body2->vy, body2->omega };
   sliding_state now = { &element->law, line_of (&element->across, batch, e), .v = 0 };
   line_J_one (now.across, now.S);

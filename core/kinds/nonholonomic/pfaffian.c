@@ -7,7 +7,6 @@
  * (Neimark & Fufaev 1972, Dynamics of Nonholonomic Systems, chapter I.)
  * The reaction F = -lambda acts on body 1 as the force F A and the moment F a3, on body 2 as F B and F b3.  The two
  * forces need not balance: their sum is an external force.  The power is F u. */
-#include <math.h>
 #include <string.h>
 #include "batch.h"
 
@@ -25,7 +24,7 @@ typedef struct {
 
 static inline pfaffian_state pfaffian_at (const pw_batch *batch, int e) {
   const pfaffian *element = (const pfaffian *)batch->element + e;
-  const pw_configuration *body1 = batch_body1 (batch, e), *body2 = batch_body2 (batch, e);
+  const pw_configuration *body1 = batch_body (batch, 2 * e), *body2 = batch_body (batch, 2 * e + 1);
   pfaffian_state now = { element, body1, body2, .w = batch_w (batch, e), .u = batch->u + 3 * e };
   to_world (body1, element->a, now.A);
   to_world (body1, element->b, now.B);
