@@ -144,7 +144,7 @@ typedef struct {
   };
 } pw_signal;
 
-/* A form of signal that numbers describe, as checks, text models, `show` and `list signals` use it. */
+/* A form of signal described by numbers; checks, text models, `show` and `list signals` use it. */
 typedef struct {
   const char *name; /* "ramp", as written in a model file */
   pw_signal_type type;
@@ -185,7 +185,7 @@ typedef enum {
   PW_REAL,        /* any finite number */
   PW_NONNEGATIVE, /* >= 0 */
   PW_POSITIVE,    /* > 0 */
-  PW_COUNT,       /* a whole number >= 1 */
+  PW_COUNT,       /* a whole number from 1 to 1e9 */
   PW_FRACTION     /* from 0 to 1 */
 } pw_domain;
 
@@ -249,8 +249,7 @@ int pw_model_refuse (pw_model *m, const char *format, ...);
 double pw_jacobi_am (double u, double m);
 double pw_elliptic_K (double m);
 
-/* Sine and cosine of an angle [rad] to 1 ulp, with the same bits on every machine for |x| < 1e6; for larger |x| those
- * of the C library. */
+/* Sine and cosine of an angle [rad] to 1 ulp: for |x| < 1e6 the same bits on every machine, else the C library's. */
 void pw_sin_cos (double x, double *sine, double *cosine);
 double pw_sin (double x);
 double pw_cos (double x);
@@ -286,8 +285,7 @@ typedef struct {
   double heading;  /* direction of the line in body 2's frame [rad] */
 } pw_slot;
 
-/* Rod: a massless bar keeps a point of body 1 at a fixed distance from a point of body 2.  One holonomic constraint
- * equation. */
+/* Rod: a massless bar keeps points of bodies 1 and 2 at a fixed distance.  One holonomic constraint equation. */
 typedef struct {
   const char *name, *body[2]; /* the two bodies, or "ground" for one of them */
   double at[2][2];            /* the end points in the bodies' frames [m]; on the ground: in the world */
@@ -345,8 +343,7 @@ typedef struct {
   pw_signal heading; /* rolling direction in the body's frame, with its first time derivative [rad] */
 } pw_steered_wheel;
 
-/* Speed: the speed of a point along a direction fixed in its body follows a signal.  One nonholonomic
- * constraint equation. */
+/* Speed: a point's speed along a direction of its body follows a signal.  One nonholonomic constraint equation. */
 typedef struct {
   const char *name, *body;
   double at[2];    /* the point in the body's frame [m] */
@@ -396,16 +393,15 @@ typedef struct {
   double angle;               /* free angle, of body 1 relative to body 2: phi1 - phi2 [rad] */
 } pw_rotational_spring;
 
-/* Friction: a viscous and a Coulomb torque that oppose the rotation of body 1 relative to body 2, for example in a
- * pin. */
+/* Friction: a viscous and a Coulomb torque that oppose the rotation of body 1 relative to body 2, as in a pin. */
 typedef struct {
   const char *name, *body[2]; /* the two bodies, or "ground" for one of them */
   double viscous, limit;      /* [N m s/rad]; Coulomb torque [N m]; >= 0 */
   double speed;               /* below about this velocity the Coulomb torque is smoothed [rad/s]; > 0 if limit > 0 */
 } pw_friction;
 
-/* Sliding friction: a viscous and a Coulomb force that oppose the motion of a point of body 1 along a line of body
- * 2, for example in a slider or slot. */
+/* Sliding friction: a viscous and a Coulomb force that oppose the motion of a point of body 1 along a line of body 2,
+ * as in a slider or slot. */
 typedef struct {
   const char *name, *body[2]; /* what slides, and what it slides on; "ground" for one of them */
   double at[2][2];       /* the point, and a point of the line, in each body's frame [m]; on the ground: in the world */
@@ -555,15 +551,14 @@ typedef enum {
   PW_NONHOLONOMIC /* S (q, t) v = eta (t, q) */
 } pw_level;
 
-/* An element type: one const table in one file.  A NULL function is identically zero; the self-test verifies this.
- * Sizes are per element. */
+/* An element type: one const table.  A NULL function is zero (the self-test verifies this).  Sizes are per element. */
 struct pw_kind {
   const char *name;       /* "pin" */
   const char *about;      /* one line */
   size_t definition;      /* bytes of the definition structure, whose first member is `const char *name` */
   size_t element;         /* bytes of the prepared element */
   const pw_field *fields; /* ends with a NULL name; the member `name` is not listed */
-  int bodies;             /* bodies of an element: the values of its fields of type PW_BODY, or 1 if each_body */
+  int bodies;             /* bodies of an element: those that its fields of type PW_BODY name, or 1 if each_body */
   int internal;           /* internal coordinates */
   int rows;               /* constraint equations */
   int signals;    /* in the order of the fields; they belong to its force if force_u is set, else to its constraints */
@@ -644,8 +639,7 @@ int pw_model_set (pw_model *m, const char *parameter, double value, pw_error *er
 /* Runs the model's build function.  Errors: the first one of a body or element added. */
 int pw_model_build (pw_model *m, pw_error *error);
 
-/* Replaces a signal of a built model; pw_system_compile checks it.  Errors: PW_INPUT for an unknown element or field,
- * with the nearest name. */
+/* Replaces a signal of a built model; pw_system_compile checks it.  PW_INPUT for an unknown element or field. */
 int pw_model_set_signal (pw_model *m, const char *element, const char *field, const pw_signal *signal, pw_error *error);
 
 /* Prescribes the initial value of a state, "frame.vx" or "wheel.spin", which the consistent initial state keeps if
@@ -670,14 +664,13 @@ static inline const char *pw_element_name (const pw_element *e) {
 }
 int pw_model_initial (const pw_model *m); /* number of values set by pw_model_set_initial */
 
-/* Reference solution of a text model: expressions of time for some states, and the values of the names used in them
- * and in signals. */
+/* Reference solution of a text model: expressions of time for some states; names used in them and in signals. */
 typedef struct {
   int states;                 /* 0: no reference solution */
   const char **state, **text; /* states: name, "bob.phi", and expression */
   int names;
   const char **name;                               /* names */
-  double *value;                                   /* names */
+  double *value;                                   /* names: their values */
   double (*eval) (void *context, int i, double t); /* value of expression i at time t */
   void *context;
 } pw_reference_text;
@@ -697,7 +690,7 @@ pw_error *pw_model_error (pw_model *m);
 int pw_model_check_body (const pw_model *m, const pw_body *body, pw_error *error);
 int pw_model_check_element (const pw_model *m, const pw_element *element, pw_error *error);
 
-/* Writes the fault of a signal used by an element type, or "", to the buffer and returns it.  *point: the faulty
+/* Writes the fault of a signal used by an element type, or "", to the buffer, which is returned.  *point: the faulty
  * point of a table, or -1. */
 char *pw_signal_check (const pw_signal *s, const pw_kind *kind, int *point, char *buffer, size_t size);
 
@@ -750,8 +743,7 @@ const char *pw_system_reaction_unit (const pw_system *s, int row);
  * error, with the nearest name, if there is none. */
 int pw_system_find_reaction (const pw_system *s, const char *name, pw_error *error);
 
-/* The number of signals; name and unit of one ("rider.value", "N m"), as pw_system_state_name; whether it belongs to a
- * force: 1, or to a constraint: 0. */
+/* The number of signals; name and unit of one ("rider.value", "N m"), as pw_system_state_name; 1 if it is a force's. */
 int pw_system_signals (const pw_system *s);
 char *pw_system_signal_name (const pw_system *s, int signal, char *buffer, size_t size);
 const char *pw_system_signal_unit (const pw_system *s, int signal);
@@ -774,8 +766,7 @@ double pw_system_length (const pw_system *s);
 const double *pw_system_initial_q (const pw_system *s);
 const double *pw_system_initial_v (const pw_system *s);
 
-/* 1 if multipliers may jump at time t: the signal of a force, or a constraint's signal or one of its derivatives,
- * jumps there. */
+/* 1 if multipliers may jump at time t: the signal of a force, or that of a constraint or its derivatives, jumps. */
 int pw_system_jumps (const pw_system *s, double t);
 
 /* Specialised code: C code for this system alone, which evaluates and projects it faster than the library
@@ -783,7 +774,7 @@ int pw_system_jumps (const pw_system *s, double t);
  * none is.  NULL and the error if there is no such code, as for too many constraint equations.  Free the text. */
 char *pw_system_source (const pw_system *s, const unsigned char *independent, pw_error *error);
 
-/* Whether compiled code is of this version of Pinwheel and of a system with the same structure: parameters and initial
+/* 1 if compiled code is of this version of Pinwheel and of a system with the same structure: parameters and initial
  * values may differ. */
 typedef struct pw_specialised pw_specialised;
 int pw_specialised_fits (const pw_specialised *code, const pw_system *s);
@@ -847,8 +838,7 @@ int pw_system_equations (const pw_system *s, double t, const double *q, const do
                          pw_error *error);
 void pw_equations_free (pw_equations *e); /* required even after an error */
 
-/* Number of second-order blocks given as PW_BY_DIFFERENCES, and the name of one ("force_q of element type drag"), as
- * pw_system_state_name. */
+/* Number of blocks given as PW_BY_DIFFERENCES; name of one, as pw_system_state_name: "force_q of element type drag". */
 int pw_system_differences (const pw_system *s);
 char *pw_system_difference_name (const pw_system *s, int i, char *buffer, size_t size);
 

@@ -1,5 +1,4 @@
-/* Input and output of a run: settings, samples, statistics, saved states.  The methods are in solvers/; see
- * pinwheel-solvers.h. */
+/* Input and output of a run: settings, samples, statistics, saved states (pinwheel-solvers.h: runs and methods). */
 #ifndef PW_RUN_H
 #define PW_RUN_H
 

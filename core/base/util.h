@@ -56,8 +56,7 @@ typedef struct {
   size_t size, room; /* bytes of the text; allocated */
 } pw_stream;
 FILE *pw_stream_open (pw_stream *t); /* NULL if out of memory */
-/* Closes f, which may be NULL.  PW_RESOURCE if any part of the text is missing: t->text is NULL then.  The caller frees
- * t->text. */
+/* Closes f, which may be NULL.  PW_RESOURCE, and t->text is NULL, if any part of it is missing.  Free t->text. */
 int pw_stream_close (FILE *f, pw_stream *t);
 
 /* ---- Checksums, tables of names, memory (store.c) ---- */
@@ -80,8 +79,7 @@ void pw_names_close (pw_names *n);
 int pw_names_add (pw_names *n, const char *name, int value);
 int pw_names_find (const pw_names *n, const char *name); /* -1 if absent */
 
-/* Makes room for more than `count` entries of `size` bytes in the array *(void **)array, for which *room are allocated.
- * PW_OK or PW_RESOURCE. */
+/* Makes room in *(void **)array, which has *room, for more than `count` entries of `size` bytes.  Returns a status. */
 int pw_grow (void *array, size_t count, size_t *room, size_t size);
 
 /* The root of member i of a union-find structure, in which a root is its own parent; halves the path. */

@@ -83,8 +83,7 @@ LIBM (libm_hypot (libm_lanes x, libm_lanes y)) {
   static inline int function##_one (const definition_type *definition, MAYBE_UNUSED const pw_body *const *bodies,   \
                                     type *element, MAYBE_UNUSED pw_internal *internal, MAYBE_UNUSED pw_error *error)
 
-/* Groups of members of a type's table.  TYPE (weld, ...): .fields = weld_fields, .prepare = weld_prepare; CONSTRAINT
- * (weld): .J = weld_J, ... */
+/* Groups of members of a type's table: TYPE (weld, ...) sets .fields = weld_fields, .prepare = weld_prepare, ... */
 #define TYPE(type, definition_type, element_type)                                                    \
   .definition = sizeof (definition_type), .fields = type##_fields, .element = sizeof (element_type), \
   .prepare = type##_prepare
@@ -132,8 +131,7 @@ static inline void opposite_moments (double T, double *out) {
   out[0] = out[1] = out[3] = out[4] = 0, out[2] = T, out[5] = -T;
 }
 
-/* Its derivative with respect to the coordinates or velocities, 6 x 6; slope = -dT/d(phi1 - phi2) or
- * -dT/d(omega1 - omega2). */
+/* Its derivative with respect to q or v, 6 x 6, for T = -slope (phi1 - phi2) or T = -slope (omega1 - omega2). */
 static inline void opposite_moments_block (double slope, double *out) {
   for (int i = 0; i < 36; i++) out[i] = 0;
   out[14] = out[35] = -slope, out[17] = out[32] = slope;

@@ -1,4 +1,4 @@
-/* A point of body 1 on a line of body 2: the constraint equation shared by slot, slider and drive.
+/* A point of body 1 on a line of body 2: the equation shared by slot, slider, drive and sliding-friction.
  *
  *   g     = n . D - c = 0,  D = r1 + R(phi1) s1 - r2,  c = n . R(phi2) s2           (1 holonomic equation)
  *   G     = [ n  t.a | -n  -t.D ]             t: along the line, n: t turned by +90 degrees, a = R(phi1) s1

@@ -6,8 +6,7 @@
 #include <string.h>
 #include "system.h"
 
-/* Each block: its function in the type's table; the original, of which it is the derivative; and the product that is
- * formed of the original before. */
+/* Each block: its function in the type's table; the original, of which, or of whose product, it is the derivative. */
 #define BLOCKS_ENTRY(f, g) .function = offsetof (pw_kind, f), .original = offsetof (pw_kind, g)
 static const struct {
   size_t function, original;
@@ -101,8 +100,7 @@ static double blocks_unit (const pw_workspace *w, const pw_kind *kind, int c, in
   return velocity ? unit / w->scale.time : unit;
 }
 
-/* An exactly representable step h that balances truncation, h^2 / unit^2, against the round-off eps x / h of x; eps is
- * 2.3e-16. */
+/* An exactly representable step h that balances truncation, (h / unit)^2, and round-off, eps x / h, eps = 2.3e-16. */
 static double blocks_step (const pw_workspace *w, const pw_kind *kind, int c, int velocity, double x) {
   double unit = blocks_unit (w, kind, c, velocity);
   volatile double moved = x + unit * cbrt (2.3e-16 * fmax (1, fabs (x) / unit));
@@ -127,8 +125,8 @@ void pw_difference (const pw_workspace *w, const pw_element_batch *k, int e, pw_
   }
 }
 
-/* A derivative below this part of the function's value per unit is taken for 0: differences of a constant function are
- * round-off, eps / h = 4e-11. */
+/* Derivatives below this, times the value of the function, per unit of the variable, are taken for 0: those of a
+ * constant function are round-off, eps / h = 4e-11 times its value. */
 #define BLOCKS_ZERO 1e-6
 
 int pw_block_missing (const pw_workspace *w, const pw_element_batch *k, int e, pw_block block) {

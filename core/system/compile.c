@@ -10,8 +10,7 @@
 /* Bytes after an element, and their value, which `prepare` must not change. */
 enum { COMPILE_GUARD = 64, COMPILE_MARK = 0xa5 };
 
-/* The most elements, coordinates and constraint equations: products with numbers of columns and signals of one element
- * must fit into an int. */
+/* The most elements, coordinates, constraint equations: products with columns and signals of an element must be int. */
 enum { COMPILE_MOST = INT_MAX / 64 };
 
 typedef struct {

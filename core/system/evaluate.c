@@ -11,8 +11,7 @@ void pw_evaluate_J (pw_workspace *w) {
   EACH_CONSTRAINT (k, w) k->kind->J (&k->b, k->J);
 }
 
-/* Fills an array over constraint equations by one function of every type, at offset `function` of its table; NULL
- * gives zeros. */
+/* Fills an array over constraint equations by the function at this offset of each type's table; NULL gives zeros. */
 static void evaluate_rows (pw_workspace *w, size_t function, int rows, double *out) {
   EACH_CONSTRAINT (k, w) {
     if (k->row >= rows) break;

@@ -43,8 +43,7 @@ static int kinematics_copy_states (const pw_workspace *w, const pw_source *sourc
   return copied;
 }
 
-/* Evaluates the state-dependent signals (q NULL: only those that read velocities), or those that depend only on
- * time. */
+/* Evaluates the state-dependent signals (q NULL: only those that read velocities), or the signals of time alone. */
 PW_INLINE int kinematics_evaluate_signals (pw_workspace *w, int state_dependent, double t, const double *q,
                                            const double *v) {
   for (pw_source *source = w->source, *end = source + w->s->sources; source < end; source++) {

@@ -63,7 +63,7 @@ struct pw_workspace {
   pw_source *source;               /* sources: copies of the system's, with contexts of this workspace */
   double *u, *J;                   /* those of all batches: sources x 3; entries of J, element by element */
   pw_configuration *configuration; /* bodies + 1; the last is the ground */
-  double *scratch;                 /* rows x 3 + coords + 3 */
+  double *scratch;                 /* rows x 3 + coords + 3, for the function in progress */
   pw_scale scale;                  /* the run's */
   int hold;                        /* 1: signals of forces keep their values (pw_hold_signals) */
   double t_signal;                 /* time of the last evaluation of signals; NaN: evaluate them again */
@@ -164,8 +164,7 @@ void pw_worst_position (const pw_system *s, const double *g, const double *size,
  * PW_JUMPS_AND_KINKS of those of constraints.  NaN if the breakpoint function of a signal returned a time <= t. */
 double pw_next_breakpoint (pw_workspace *w, int kinks, double t);
 
-/* 1 if the force, J or gamma of an element is not finite at the current state; writes "force of spring S" to the
- * buffer. */
+/* 1 if a force, J or gamma is not finite at the current state; writes "force of spring S" to the buffer. */
 int pw_find_nonfinite (pw_workspace *w, char *buffer, size_t size);
 
 /* The function at this offset of the type's table. */
@@ -177,8 +176,7 @@ static inline pw_batch_function *pw_kind_function (const pw_kind *kind, size_t o
  * lambda)/dq; ETA_Q: d eta/dq; ... */
 typedef enum { PW_JW_Q, PW_JTL_Q, PW_ETA_Q, PW_GAMMA_Q, PW_GAMMA_V, PW_FORCE_Q, PW_FORCE_V, PW_BLOCKS } pw_block;
 
-/* The type's function for a block: NULL if identically zero, pw_by_differences if the core computes it by
- * differences. */
+/* The type's function for a block: NULL if identically zero, or pw_by_differences. */
 pw_batch_function *pw_block_function (const pw_kind *kind, pw_block block);
 
 /* Rows of a block per element: kind->rows or the number of local columns. */
@@ -188,8 +186,7 @@ int pw_block_rows (const pw_kind *kind, pw_block block);
  * the type is PW_BY_DIFFERENCES there.  Returns 0 without changing out if the block is identically zero. */
 int pw_evaluate_block (const pw_workspace *w, const pw_element_batch *k, pw_block block, double *out);
 
-/* 1 if the type gives NULL for a block of element e that is not zero according to differences; configurations, w and
- * lambda must be set. */
+/* 1 if the type gives NULL for a block of element e that differences show not to be zero; needs w and lambda. */
 int pw_block_missing (const pw_workspace *w, const pw_element_batch *k, int e, pw_block block);
 
 /* Searches for such a block near the state q, v at time t, in a few elements of each type that is not built-in
