@@ -100,12 +100,11 @@ double pw_kinetic (const pw_system *s, const double *v) {
   return sum / 2;
 }
 
-/* out = J x for a batch; `bodies` and `internal` are constants after inlining.  X[n], y: the entries of x of body n and
- * of internal coordinates. */
+/* out = J x for a batch; `bodies` and `internal` are constants after inlining. */
 PW_INLINE void evaluate_multiply_J (const pw_system *s, const pw_element_batch *k, const double *x, double *out,
                                     int bodies, int internal) {
   static const double ground[3] = { 0, 0, 0 };
-  const double *J = k->J, *X[PW_MAX_BODIES] = { 0 }, *y = x + k->internal;
+  const double *J = k->J, *X[PW_MAX_BODIES] = { 0 }, *y = x + k->internal; /* entries of x: of each body, internal */
   const int *column = k->column;
   for (int e = 0; e < k->b.count; e++, column += bodies, y += internal) {
     PW_UNROLL for (int n = 0; n < bodies; n++) X[n] = column[n] < s->coords ? x + column[n] : ground;

@@ -98,8 +98,8 @@ static int query_body_state (const pw_system *s, const char *name, pw_nearest *n
 
 typedef char *query_name (const pw_system *s, int i, char *buffer, size_t size);
 
-/* The index of near->sought among the names of all states (what: "state"), ...; if it is not there, fails with a hint:
- * near->best, or else the nearest name. */
+/* The index of near->sought among the names that name_of gives; fails if it is not there, with a hint: near->best, or
+ * else the nearest name.  what: "state", ... */
 static int query_find (const pw_system *s, const char *what, int (*count_of) (const pw_system *s), query_name *name_of,
                        pw_nearest *near, pw_error *error) {
   char text[120];

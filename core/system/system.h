@@ -20,7 +20,7 @@ typedef struct {
   const int *column; /* count x bodies: first coordinate of each body; s->coords for the ground */
   const char **name; /* count */
   double *J;         /* count x rows x cols */
-  double *block;     /* scratch for forces, energies, contacts, saturation */
+  double *block;     /* count x cols: scratch for forces, energies, powers; count x 2 cols for saturation */
   double *u;         /* count x signals x 3, as b.u */
   pw_source *source; /* count x signals, part of the array of all sources */
 } pw_element_batch;
@@ -70,7 +70,7 @@ struct pw_workspace {
   const pw_source *failed;         /* the last signal that failed, or NULL */
 };
 
-/* Lists the entries of the ledger, unless entry is NULL.  Returns their number.  Needs the system's signals. */
+/* Stores the entries of the ledger, unless entry is NULL.  Returns their number.  Call it when signals are compiled. */
 int pw_ledger_list (const pw_system *s, pw_entry *entry);
 
 /* Closes the contexts made by `open`.  Signals that have not been stored yet may be all zero. */

@@ -16,13 +16,12 @@ static void workspace_batch (pw_layout *layout, const pw_workspace *w, int i, do
   const pw_element_batch *from = &w->s->batch[i];
   const pw_kind *kind = from->kind;
   size_t n = (size_t)from->b.count, cols = (size_t)from->b.cols;
-  size_t block = kind->saturation ? 2 * cols : cols > 3 ? cols : 3; /* saturation; force; contact */
-  int scratch = kind->force || kind->energy || kind->power || kind->loss || kind->contact;
-  double *space = pw_layout_alloc (layout, scratch ? n * block : 0, sizeof *space);
+  int used = kind->force || kind->energy || kind->power || kind->loss;
+  double *block = pw_layout_alloc (layout, used ? n * (kind->saturation ? 2 : 1) * cols : 0, sizeof *block);
   if (layout->base == NULL) return;
   pw_element_batch *k = &w->batch[i];
   *k = *from;
-  k->J = *J, k->block = space;
+  k->J = *J, k->block = block;
   *J += n * (size_t)kind->rows * cols;
   k->source = w->source + (from->source - w->s->source);
   k->b.u = k->u = w->u + 3 * (k->source - w->source);
