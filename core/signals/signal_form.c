@@ -95,8 +95,7 @@ static void form_check_points (const pw_signal *s, int *point, char *text, size_
     if (!isfinite (t[i]) || !isfinite (s->table.value[i]))
       snprintf (text, size, "point %d is (%g, %g): expected finite numbers", i + 1, t[i], s->table.value[i]);
     else if (!isfinite (pw_table_value (s, i)))
-      snprintf (text, size, "point %d: %g * %g + %g: expected a finite value", i + 1, s->table.value[i], s->table.scale,
-                s->table.offset);
+      snprintf (text, size, "point %d: offset + scale * %g is not finite", i + 1, s->table.value[i]);
     else if (i > 0 && !(t[i] > t[i - 1]))
       snprintf (text, size, "point %d is at t = %.9g s, after one at %.9g s: expected increasing times", i + 1, t[i],
                 t[i - 1]);
