@@ -1,8 +1,8 @@
 /* Suggestions of valid names for unknown ones, and the domains of numbers, for messages. */
+#include <ctype.h>
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
-#include <strings.h>
 #include "util.h"
 
 /* Edit distance (Levenshtein 1966), keeping one row of the table; for a candidate longer than the row, its length. */
@@ -31,6 +31,12 @@ static int nearest_is_near (const char *a, size_t n, const char *b, size_t m, si
          (shorter > 0 && (memcmp (a, b, shorter) == 0 || memcmp (a + n - shorter, b + m - shorter, shorter) == 0));
 }
 
+/* 1 if two names are equal except for capitals. */
+static int nearest_equal (const char *a, const char *b) {
+  while (*a && tolower ((unsigned char)*a) == tolower ((unsigned char)*b)) a++, b++;
+  return *a == *b;
+}
+
 static void nearest_append (pw_nearest *n, const char *candidate) {
   size_t used = strlen (n->all), more = strlen (candidate);
   n->overflow |= used + more + 3 > sizeof n->all;
@@ -41,7 +47,7 @@ static void nearest_append (pw_nearest *n, const char *candidate) {
 
 void pw_nearest_try (pw_nearest *n, const char *candidate) {
   size_t a = strlen (n->sought), b = strlen (candidate), length = a > b ? a : b;
-  size_t distance = strcasecmp (n->sought, candidate) == 0 ? 0 : nearest_distance (n->sought, candidate);
+  size_t distance = nearest_equal (n->sought, candidate) ? 0 : nearest_distance (n->sought, candidate);
   nearest_append (n, candidate);
   if (*n->best && distance * n->length >= n->distance * length) return;
   snprintf (n->best, sizeof n->best, "%s", candidate);
