@@ -6,7 +6,7 @@
 #include <string.h>
 #include "system.h"
 
-/* Each block: its function in the type's table; the original, of which, or of whose product, it is the derivative. */
+/* Each block: `function` of the type's table is the derivative of `original`, or of its product with w or lambda. */
 #define BLOCKS_ENTRY(f, g) .function = offsetof (pw_kind, f), .original = offsetof (pw_kind, g)
 static const struct {
   size_t function, original;
@@ -125,8 +125,8 @@ void pw_difference (const pw_workspace *w, const pw_element_batch *k, int e, pw_
   }
 }
 
-/* Derivatives below this, times the value of the function, per unit of the variable, are taken for 0: those of a
- * constant function are round-off, eps / h = 4e-11 times its value. */
+/* A derivative per unit of the variable is taken for 0 if it is at most this part of the function's value; that of a
+ * constant function is round-off, eps / h = 4e-11 of the value. */
 #define BLOCKS_ZERO 1e-6
 
 int pw_block_missing (const pw_workspace *w, const pw_element_batch *k, int e, pw_block block) {

@@ -307,9 +307,9 @@ static int compile_reads (const compilation *job, pw_source *source, const char 
 }
 
 static int compile_source (const compilation *job, pw_source *source, const pw_signal *signal, const char *element) {
-  void *context =
-      signal->type == PW_FUNCTION && signal->function.open ? signal->function.open (signal->function.context) : NULL;
-  if (signal->type == PW_FUNCTION && signal->function.open && context == NULL) return compile_no_memory (job);
+  const pw_function *opens = signal->type == PW_FUNCTION && signal->function.open ? &signal->function : NULL;
+  void *context = opens ? opens->open (opens->context) : NULL;
+  if (opens && context == NULL) return compile_no_memory (job);
   source->signal = *signal;
   if (context) source->signal.function.context = context;
   if (signal->type == PW_TABLE) return compile_table (job, source);

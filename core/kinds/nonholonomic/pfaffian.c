@@ -32,12 +32,11 @@ static inline pfaffian_state pfaffian_at (const pw_batch *batch, int e) {
 }
 
 PREPARE (pfaffian_prepare, pw_pfaffian, pfaffian) {
-  double largest = 0;
   memcpy (element->a, definition->a, sizeof element->a);
   memcpy (element->b, definition->b, sizeof element->b);
-  for (int i = 0; i < 3; i++) largest = fmax (largest, fmax (fabs (definition->a[i]), fabs (definition->b[i])));
-  if (largest == 0) return pw_fail (error, PW_INPUT, "a and b are all zero: expected at least one other number");
-  return PW_OK;
+  for (int i = 0; i < 3; i++)
+    if (definition->a[i] != 0 || definition->b[i] != 0) return PW_OK;
+  return pw_fail (error, PW_INPUT, "a and b are all zero: expected at least one other number");
 }
 
 PER_ELEMENT (pfaffian_J, pfaffian, 6) {
