@@ -75,7 +75,7 @@ typedef struct {
   double kinetic;       /* [J] */
   double potential;     /* [J] */
   const double *ledger; /* pw_system_ledger_entries: work or loss of each entry [J]; NULL without pw_settings.ledger */
-  double work;          /* supplied by torques, forces, motors and drives since the initial time [J] */
+  double work;          /* supplied since the initial time, by torques, forces, motors, drives, ... [J] */
   double loss;          /* dissipated since the initial time [J] */
   double projection;    /* energy added by projections after steps [J]; 0 without pw_settings.ledger */
   double balance;       /* change of (kinetic + potential) - work + loss - projection [J] */

@@ -162,13 +162,13 @@ int pw_add (pw_model *m, const pw_kind *kind, const void *definition) {
   return m->error.status;
 }
 
-const char *pw_model_name (const pw_model *m) {
-  return m->name;
-}
-
-const pw_plugin_table *pw_model_table (const pw_model *m) {
-  return m->table;
-}
+#define MEMBER(type, function, member) \
+  type function (const pw_model *m) {  \
+    return m->member;                  \
+  }
+MEMBER (const char *, pw_model_name, name)
+MEMBER (const pw_plugin_table *, pw_model_table, table)
+MEMBER (int, pw_model_initial, initials)
 
 double pw_model_parameter (const pw_model *m, const pw_parameter *p) {
   double value;
@@ -184,10 +184,6 @@ const pw_body *pw_model_bodies (const pw_model *m, int *count) {
 const pw_element *pw_model_elements (const pw_model *m, int *count) {
   *count = m->elements;
   return m->element;
-}
-
-int pw_model_initial (const pw_model *m) {
-  return m->initials;
 }
 
 const pw_reference_text *pw_model_reference (const pw_model *m) {

@@ -71,8 +71,8 @@ PER_ELEMENT (tyre_force_v, tyre, 9) {
   for (int i = 0; i < 9; i++) out[i] = across[i / 3] * (now.F_across * across[i % 3] + now.F_along * along[i % 3]);
 }
 
-/* A change of v_t by R changes the slip by its own magnitude; one of v_n by `reversal` reverses a force at its limit.
- * Divided by the derivatives of v_t and v_n, these are changes of coordinates and velocities. */
+/* A change of v_t by R changes the slip by about its own magnitude; one of v_n by `reversal` reverses a force at its
+ * limit.  Divided by the derivatives of v_t and v_n, these are changes of coordinates and velocities. */
 PER_ELEMENT (tyre_saturation, tyre, 6) {
   double reversal = now.element->limit / now.element->stiffness * now.R + fabs (now.v_across);
   double along[6] = { [2] = contact_speed_phi (&now.along) }, across[6] = { [2] = contact_speed_phi (&now.across) };
