@@ -5,12 +5,13 @@
  *   - the built-in element types, and what an element type of your own has to provide,
  *   - the compiled system that the solvers integrate.
  *
- * Units are SI, angles are radians, counter-clockwise.  The state consists of q, which is (x, y, phi) of each body's
- * centre of mass followed by the internal coordinates of elements, and v = dq/dt.  The equations are
+ * Units are SI, angles are radians, counter-clockwise.  The state consists of q, which is (x, y) of the centre of mass
+ * and the angle phi of each body, then the internal coordinates of elements, and v = dq/dt.  The equations are
  *
  *     M a + J^T lambda = f(t, q, v),     g(q, t) = 0,     J v = eta(t, q),     J = [ G = dg/dq ; S(q, t) ]
  *
- * The holonomic constraint equations G come first, then the nonholonomic ones S.  Differentiated: J a = gamma. */
+ * with the rows G of holonomic constraint equations before those of nonholonomic ones, S; a = dv/dt.  The derivative of
+ * J v = eta with respect to time is J a = gamma(t, q, v). */
 #ifndef PINWHEEL_H
 #define PINWHEEL_H
 
@@ -26,7 +27,7 @@
 #define PW_VISIBILITY(change)
 #endif
 
-/* Around the declarations of a public header: exported from the library, with C linkage. */
+/* They enclose the declarations of a public header: exported from the library, with C linkage. */
 #ifdef __cplusplus
 #define PW_BEGIN PW_VISIBILITY ("GCC visibility push(default)") extern "C" {
 #define PW_END \
@@ -40,7 +41,7 @@
 PW_BEGIN
 
 #define PW_VERSION "0.1.0"
-#define PW_ABI 1 /* raised, once 0.1.0 is out, when a plug-in compiled against an older header could be misread */
+#define PW_ABI 1 /* after release 0.1.0, raised when plug-ins compiled against an older header could be misread */
 #define PW_PI 3.14159265358979323846
 
 /* ---- Status and errors ---- */
@@ -80,13 +81,13 @@ enum { PW_ENDS_FREE, PW_ENDS_REST };
 /* The source text of a function signal in a text model. */
 typedef struct {
   const char *part[3]; /* expressions of value, rate, acceleration; NULL: not given */
-  const char *jump;    /* a part that jumps with the state, where no step ends; or NULL */
+  const char *jump; /* an operation in them that jumps as states change, where no step ends: "sign (a.vx)"; or NULL */
 } pw_signal_text;
 
 /* A signal computed by the caller.  `eval` stores the value in value[0] and, for a signal of a constraint, its time
  * derivatives in value[1] and value[2].  x contains the states named in `reads`; gradient, unless NULL, receives the
- * derivatives of value[0] with respect to them.  A non-zero return stops the run.  Equal t and x must give equal
- * values; if they change between steps (a controller sets a new torque), call pw_run_restart. */
+ * derivatives of value[0] with respect to x.  A non-zero return stops the run.  Equal t and x must give equal values;
+ * if the function changes between steps (a controller sets a new torque), call pw_run_restart. */
 typedef struct {
   int (*eval) (void *context, double t, const double *x, double value[3], double *gradient);
   void *context;            /* passed to eval and breakpoint; must outlive the systems, unless open replaces it */
@@ -143,7 +144,7 @@ typedef struct {
   };
 } pw_signal;
 
-/* A form of signal that is described by numbers: used by checks, text models, `show` and `list signals`. */
+/* A form of signal described by numbers; checks, text models, `show` and `list signals` use it. */
 typedef struct {
   const char *name; /* "ramp", as written in a model file */
   pw_signal_type type;
@@ -184,7 +185,7 @@ typedef enum {
   PW_REAL,        /* any finite number */
   PW_NONNEGATIVE, /* >= 0 */
   PW_POSITIVE,    /* > 0 */
-  PW_COUNT,       /* a whole number >= 1 */
+  PW_COUNT,       /* a whole number from 1 to 1e9 */
   PW_FRACTION     /* from 0 to 1 */
 } pw_domain;
 
@@ -221,8 +222,8 @@ typedef struct {
   void (*build) (pw_model *m, const void *parameters); /* declares bodies and elements */
 
   /* The reference (exact) solution for the described initial conditions; may be NULL.  Stores the known entries of q
-   * and v at time t: three for each body in the order they were added, then the internal coordinates of elements.
-   * All entries are NaN (unknown) before the call. */
+   * and v at time t: three for each body in the order they were added, then the internal coordinates of elements in the
+   * order of pw_system_element.  All entries are NaN (unknown) before the call. */
   void (*reference) (const void *parameters, double t, double *q, double *v);
 } pw_plugin_table;
 
@@ -243,13 +244,12 @@ int pw_add (pw_model *m, const pw_kind *kind, const void *definition);
 int pw_model_refuse (pw_model *m, const char *format, ...);
 
 /* Jacobi's amplitude am (u | m) and the complete elliptic integral K (m), m = k^2 <= 1 (NaN above): sn = sin (am).
- * A pendulum released at rest at an angle A from its lowest point is at the angle 2 asin (k sn (K - w t)),
- * k = sin (A / 2). */
+ * A pendulum released at rest at an angle A from its lowest point is at the angle 2 asin (k sn (K - w t)), where
+ * k = sin (A / 2) and w is the angular frequency of small oscillations. */
 double pw_jacobi_am (double u, double m);
 double pw_elliptic_K (double m);
 
-/* Sine and cosine of an angle [rad] to 1 ulp, with the same bits on every machine for |x| < 1e6; for larger |x| those
- * of the C library. */
+/* Sine and cosine of an angle [rad] to 1 ulp: for |x| < 1e6 the same bits on every machine, else the C library's. */
 void pw_sin_cos (double x, double *sine, double *cosine);
 double pw_sin (double x);
 double pw_cos (double x);
@@ -285,8 +285,7 @@ typedef struct {
   double heading;  /* direction of the line in body 2's frame [rad] */
 } pw_slot;
 
-/* Rod: a massless bar keeps a point of body 1 at a fixed distance from a point of body 2.  One holonomic constraint
- * equation. */
+/* Rod: a massless bar keeps points of bodies 1 and 2 at a fixed distance.  One holonomic constraint equation. */
 typedef struct {
   const char *name, *body[2]; /* the two bodies, or "ground" for one of them */
   double at[2][2];            /* the end points in the bodies' frames [m]; on the ground: in the world */
@@ -333,7 +332,7 @@ typedef struct {
   double heading;     /* rolling direction in the body's frame [rad] */
   double radius;      /* [m], > 0 */
   double inertia;     /* about its axle [kg m^2], >= 0; its mass belongs to the body */
-  double start, rate; /* initial spin angle [rad] and velocity [rad/s]; 0: from rolling at the body's velocity */
+  double start, rate; /* initial spin angle [rad] and velocity [rad/s]; rate 0: from rolling at the body's velocity */
   pw_signal torque;   /* on the wheel about its axle [N m]; its reaction is out of the plane */
 } pw_rolling_wheel;
 
@@ -344,8 +343,7 @@ typedef struct {
   pw_signal heading; /* rolling direction in the body's frame, with its first time derivative [rad] */
 } pw_steered_wheel;
 
-/* Speed: the speed of a point along a direction fixed in its body follows a signal.  One nonholonomic
- * constraint equation. */
+/* Speed: a point's speed along a direction of its body follows a signal.  One nonholonomic constraint equation. */
 typedef struct {
   const char *name, *body;
   double at[2];    /* the point in the body's frame [m] */
@@ -357,8 +355,8 @@ typedef struct {
  * a . (vx1, vy1, omega1) + b . (vx2, vy2, omega2) = value.  One nonholonomic constraint equation. */
 typedef struct {
   const char *name, *body[2]; /* the two bodies, or "ground" for one of them */
-  double a[3], b[3];          /* coefficients of the velocities of body 1 and body 2, in body 1's frame */
-  pw_signal value;            /* with its first time derivative */
+  double a[3], b[3];          /* coefficients of the velocities of body 1 and body 2 */
+  pw_signal value;            /* with its first time derivative; its unit follows from a and b */
 } pw_pfaffian;
 
 /* Tyre: a wheel with side slip; a lateral force that grows with the slip replaces the constraint equation. */
@@ -395,16 +393,15 @@ typedef struct {
   double angle;               /* free angle, of body 1 relative to body 2: phi1 - phi2 [rad] */
 } pw_rotational_spring;
 
-/* Friction: a viscous and a Coulomb torque that oppose the rotation of body 1 relative to body 2, for example in a
- * pin. */
+/* Friction: a viscous and a Coulomb torque that oppose the rotation of body 1 relative to body 2, as in a pin. */
 typedef struct {
   const char *name, *body[2]; /* the two bodies, or "ground" for one of them */
   double viscous, limit;      /* [N m s/rad]; Coulomb torque [N m]; >= 0 */
   double speed;               /* below about this velocity the Coulomb torque is smoothed [rad/s]; > 0 if limit > 0 */
 } pw_friction;
 
-/* Sliding friction: a viscous and a Coulomb force that oppose the motion of a point of body 1 along a line of body
- * 2, for example in a slider or slot. */
+/* Sliding friction: a viscous and a Coulomb force that oppose the motion of a point of body 1 along a line of body 2,
+ * as in a slider or slot. */
 typedef struct {
   const char *name, *body[2]; /* what slides, and what it slides on; "ground" for one of them */
   double at[2][2];       /* the point, and a point of the line, in each body's frame [m]; on the ground: in the world */
@@ -543,7 +540,8 @@ typedef struct {
 /* Fills one array for all elements of the batch. */
 typedef void pw_batch_function (const pw_batch *b, double *out);
 
-/* Placeholder for a second-order block: the core computes it by differences of the function whose derivative it is. */
+/* Placeholder for a second-order block, that is jw_q, eta_q, gamma_q, gamma_v, force_q or force_v of a type: the core
+ * computes the block by differences. */
 pw_batch_function pw_by_differences;
 #define PW_BY_DIFFERENCES pw_by_differences
 
@@ -553,18 +551,17 @@ typedef enum {
   PW_NONHOLONOMIC /* S (q, t) v = eta (t, q) */
 } pw_level;
 
-/* An element type: one const table in one file.  A NULL function is identically zero; the self-test verifies this.
- * Sizes are per element. */
+/* An element type: one const table.  A NULL function is zero (the self-test verifies this).  Sizes are per element. */
 struct pw_kind {
   const char *name;       /* "pin" */
   const char *about;      /* one line */
   size_t definition;      /* bytes of the definition structure, whose first member is `const char *name` */
   size_t element;         /* bytes of the prepared element */
   const pw_field *fields; /* ends with a NULL name; the member `name` is not listed */
-  int bodies;             /* bodies of an element: the number of fields of type PW_BODY, or 1 if each_body */
+  int bodies;             /* bodies of an element: those that its fields of type PW_BODY name, or 1 if each_body */
   int internal;           /* internal coordinates */
   int rows;               /* constraint equations */
-  int signals;    /* signals, in the order of the fields; of its force if force_u is set, else of its constraints */
+  int signals;    /* in the order of the fields; they belong to its force if force_u is set, else to its constraints */
   int each_body;  /* 1: names no body; acts on every body with mass */
   int constant;   /* 1: its force is constant and evaluated once, when the system is compiled */
   pw_level level; /* of its constraint equations */
@@ -592,10 +589,10 @@ struct pw_kind {
   pw_batch_function *power;                     /* 1: power supplied to the system [W] */
   pw_batch_function *loss;                      /* 1: dissipated power [W], >= 0 */
   pw_batch_function *contact;                   /* 3: contact point on the ground [m] and heading [rad], for output */
-  /* 2 cols, for forces that saturate, such as friction: the change of each coordinate, then of each velocity, over
-   * which the force changes by its own magnitude.  Entries are INFINITY (no saturation) before the call. */
+  /* 2 cols, for forces that saturate, such as friction: the smallest change of each coordinate, then of each velocity,
+   * that reverses the force or changes it by its own magnitude.  Entries are INFINITY before the call. */
   pw_batch_function *saturation;
-  const char *symbol; /* how figures draw it: see plot_symbols.c; NULL: not at all */
+  const char *symbol; /* how figures draw it: see core/cli/plot/plot_symbols.c; NULL: not at all */
 };
 
 /* The number of values of a field, and the bytes of one value; 0 bytes: invalid type. */
@@ -604,7 +601,7 @@ static inline int pw_field_count (const pw_field *f) {
 }
 size_t pw_field_bytes (pw_field_type type);
 
-/* The k-th value of a type in a definition, where a field counts `count` times; NULL if there are fewer. */
+/* Value k (from 0) of a type in a definition, over all fields of that type; NULL if there are fewer. */
 const void *pw_field_at (const pw_kind *kind, const void *definition, pw_field_type type, int k);
 
 /* 1 if elements of the type influence the motion; 0 for markers. */
@@ -642,8 +639,7 @@ int pw_model_set (pw_model *m, const char *parameter, double value, pw_error *er
 /* Runs the model's build function.  Errors: the first one of a body or element added. */
 int pw_model_build (pw_model *m, pw_error *error);
 
-/* Replaces a signal of a built model; pw_system_compile checks it.  Errors: PW_INPUT for an unknown element or field,
- * with the nearest name. */
+/* Replaces a signal of a built model; pw_system_compile checks it.  PW_INPUT for an unknown element or field. */
 int pw_model_set_signal (pw_model *m, const char *element, const char *field, const pw_signal *signal, pw_error *error);
 
 /* Prescribes the initial value of a state, "frame.vx" or "wheel.spin", which the consistent initial state keeps if
@@ -668,14 +664,13 @@ static inline const char *pw_element_name (const pw_element *e) {
 }
 int pw_model_initial (const pw_model *m); /* number of values set by pw_model_set_initial */
 
-/* Reference solution of a text model: expressions of time for some states, and the values of the names used in them
- * and in signals. */
+/* Reference solution of a text model: expressions of time for some states; names used in them and in signals. */
 typedef struct {
   int states;                 /* 0: no reference solution */
   const char **state, **text; /* states: name, "bob.phi", and expression */
   int names;
   const char **name;                               /* names */
-  double *value;                                   /* names */
+  double *value;                                   /* names: their values */
   double (*eval) (void *context, int i, double t); /* value of expression i at time t */
   void *context;
 } pw_reference_text;
@@ -684,7 +679,7 @@ void pw_model_set_reference (pw_model *m, const pw_reference_text *reference); /
 
 /* ---- For build functions that read models from other sources ---- */
 
-/* Frees an object together with the model.  PW_RESOURCE: it has been freed. */
+/* Frees an object together with the model.  If it returns PW_RESOURCE, the object has been freed already. */
 int pw_model_keep (pw_model *m, void *object, void (*free_object) (void *object));
 
 /* The first error of a model; a build function may set it. */
@@ -695,7 +690,7 @@ pw_error *pw_model_error (pw_model *m);
 int pw_model_check_body (const pw_model *m, const pw_body *body, pw_error *error);
 int pw_model_check_element (const pw_model *m, const pw_element *element, pw_error *error);
 
-/* Writes the fault of a signal used by an element type, or "", to the buffer and returns it.  *point: the faulty
+/* Writes the fault of a signal used by an element type, or "", to the buffer, which is returned.  *point: the faulty
  * point of a table, or -1. */
 char *pw_signal_check (const pw_signal *s, const pw_kind *kind, int *point, char *buffer, size_t size);
 
@@ -723,7 +718,7 @@ void pw_system_free (pw_system *s);
 int pw_system_has_reference (const pw_model *m);
 int pw_system_reference (const pw_model *m, const pw_system *s, double t, double *q, double *v, pw_error *error);
 
-/* Sizes: bodies; coordinates (entries of q and of v); constraint equations; the first of these, which are holonomic. */
+/* Numbers of bodies; coordinates (entries of q and of v); constraint equations; holonomic ones, which come first. */
 int pw_system_bodies (const pw_system *s);
 int pw_system_coordinates (const pw_system *s);
 int pw_system_rows (const pw_system *s);
@@ -748,15 +743,14 @@ const char *pw_system_reaction_unit (const pw_system *s, int row);
  * error, with the nearest name, if there is none. */
 int pw_system_find_reaction (const pw_system *s, const char *name, pw_error *error);
 
-/* The number of signals; name and unit of one ("rider.value", "N m"), as pw_system_state_name; 1 if it belongs to a
- * force. */
+/* The number of signals; name and unit of one ("rider.value", "N m"), as pw_system_state_name; 1 if it is a force's. */
 int pw_system_signals (const pw_system *s);
 char *pw_system_signal_name (const pw_system *s, int signal, char *buffer, size_t size);
 const char *pw_system_signal_unit (const pw_system *s, int signal);
 int pw_system_signal_forced (const pw_system *s, int signal);
 
-/* The signal of this name; that of an element is enough if it has no other signal.  PW_INPUT and the error, with the
- * nearest name, if there is none. */
+/* The signal of this name; the name of an element suffices if the element has one signal.  PW_INPUT and the error, with
+ * the nearest name, if there is none. */
 int pw_system_find_signal (const pw_system *s, const char *name, pw_error *error);
 
 /* Type and name of the element of a constraint equation ("wheel C"), as pw_system_state_name. */
@@ -772,8 +766,7 @@ double pw_system_length (const pw_system *s);
 const double *pw_system_initial_q (const pw_system *s);
 const double *pw_system_initial_v (const pw_system *s);
 
-/* 1 if multipliers may jump at time t: the signal of a force, or a constraint's signal or one of its derivatives,
- * jumps there. */
+/* 1 if multipliers may jump at time t: the signal of a force, or that of a constraint or its derivatives, jumps. */
 int pw_system_jumps (const pw_system *s, double t);
 
 /* Specialised code: C code for this system alone, which evaluates and projects it faster than the library
@@ -781,21 +774,21 @@ int pw_system_jumps (const pw_system *s, double t);
  * none is.  NULL and the error if there is no such code, as for too many constraint equations.  Free the text. */
 char *pw_system_source (const pw_system *s, const unsigned char *independent, pw_error *error);
 
-/* Whether compiled code is of this version of Pinwheel and of a system with the same structure: parameters and initial
+/* 1 if compiled code is of this version of Pinwheel and of a system with the same structure: parameters and initial
  * values may differ. */
 typedef struct pw_specialised pw_specialised;
 int pw_specialised_fits (const pw_specialised *code, const pw_system *s);
 
-/* The same text compiled with PW_LANES for that many runs of such systems at once (pw_runs_advance). */
+/* The same text compiled with PW_LANES defined as the number of runs that it advances at once (pw_runs_advance). */
 typedef struct pw_specialised_lanes pw_specialised_lanes;
 int pw_specialised_lanes_fit (const pw_specialised_lanes *code, const pw_system *s);
 int pw_specialised_lanes_count (const pw_specialised_lanes *code);
 /* Memory for the runs of one thread; NULL if out of memory.  Free it. */
 void *pw_specialised_lanes_memory (const pw_specialised_lanes *code);
-/* 1 if the code can be compiled for several runs at once: built-in element types and signals of time alone, and not too
- * many constraint equations.  The runs must not have redundant ones. */
+/* 1 if the code can be compiled for several runs at once: all element types are built-in, signals depend on time alone,
+ * and there are not too many constraint equations.  The runs must not have redundant constraint equations. */
 int pw_system_has_lanes (const pw_system *s);
-/* 1 if accelerations may jump with the state: there are element types of a plug-in, or signals that depend on it. */
+/* 1 if accelerations may jump at some states: an element type is from a plug-in, or a signal depends on states. */
 int pw_system_may_jump (const pw_system *s);
 
 /* ---- Elements of a system, in the order of its constraint equations ---- */
@@ -820,7 +813,7 @@ void pw_workspace_free (pw_workspace *w);
 
 /* The functions below evaluate a state.  Errors: PW_METHOD if a signal fails, PW_RESOURCE. */
 
-/* Point on the ground [m] and heading [rad] of each contact. */
+/* Number of elements with a contact point; contact point on the ground (x, y) [m] and heading [rad] of each. */
 int pw_system_contacts (const pw_system *s);
 int pw_workspace_contact_points (pw_workspace *w, double t, const double *q, const double *v, double (*out)[3],
                                  pw_error *error);
@@ -838,15 +831,14 @@ typedef struct {
   double *mass, *force; /* coordinates: diagonal of M; f */
   double *g;            /* holonomic */
   double *eta, *gamma;  /* rows */
-  int *row, *column;    /* entries: indices in J */
+  int *row, *column;    /* entries: indices in J, from 0 */
   double *value;        /* entries */
 } pw_equations;
 int pw_system_equations (const pw_system *s, double t, const double *q, const double *v, pw_equations *out,
                          pw_error *error);
 void pw_equations_free (pw_equations *e); /* required even after an error */
 
-/* Number of second-order blocks given as PW_BY_DIFFERENCES, and the name of one ("force_q of element type drag"), as
- * pw_system_state_name. */
+/* Number of blocks given as PW_BY_DIFFERENCES; name of one, as pw_system_state_name: "force_q of element type drag". */
 int pw_system_differences (const pw_system *s);
 char *pw_system_difference_name (const pw_system *s, int i, char *buffer, size_t size);
 

@@ -1,5 +1,4 @@
-/* Input and output of a run: settings, samples, statistics, saved states.  The methods are in solvers/; see
- * pinwheel-solvers.h. */
+/* Input and output of a run: settings, samples, statistics, saved states (pinwheel-solvers.h: runs and methods). */
 #ifndef PW_RUN_H
 #define PW_RUN_H
 
@@ -50,7 +49,7 @@ typedef struct {
   double time; /* T: 1 / max (1 / span, largest velocity, square root of the largest acceleration), in units of L [s] */
 } pw_scale;
 
-/* Cost of a run, and its worst constraint residuals at accepted steps; for scaled ones see docs/theory.md. */
+/* Cost of a run, and its worst constraint residuals at accepted steps; docs/theory.md defines scaled residuals. */
 typedef struct {
   long steps;          /* accepted */
   long rejected;       /* repeated with another step size */
@@ -76,7 +75,7 @@ typedef struct {
   double kinetic;       /* [J] */
   double potential;     /* [J] */
   const double *ledger; /* pw_system_ledger_entries: work or loss of each entry [J]; NULL without pw_settings.ledger */
-  double work;          /* supplied by torques, forces, motors and drives since the initial time [J] */
+  double work;          /* supplied since the initial time, by torques, forces, motors, drives, ... [J] */
   double loss;          /* dissipated since the initial time [J] */
   double projection;    /* energy added by projections after steps [J]; 0 without pw_settings.ledger */
   double balance;       /* change of (kinetic + potential) - work + loss - projection [J] */
@@ -91,10 +90,10 @@ char *pw_system_ledger_name (const pw_system *s, int entry, char *buffer, size_t
 typedef struct {
   const double *q_given, *v_given; /* the described state */
   const double *q, *v;             /* the initial state of the run; valid until it advances */
-  int moved;                       /* states that differ by more than round-off */
+  int moved;                       /* number of states that differ by more than round-off */
   const unsigned char *origin;     /* for pw_initial_specified */
   int released;                    /* 1: some of the user's values could not be kept */
-  int changed;                     /* those of the moved states that the model specifies */
+  int changed;                     /* number of moved states that the model specifies */
   double position, velocity;       /* scaled residuals of the described state */
   double time;                     /* time scale of the run [s] */
 } pw_initial_report;
@@ -114,7 +113,7 @@ typedef struct {
 void pw_archive_bytes (pw_archive *a, void *bytes, size_t count);
 /* Saves or loads a count; fails if a loaded one is negative or above LONG_MAX / 2. */
 void pw_archive_count (pw_archive *a, long *count);
-void pw_archive_clear (pw_archive *a); /* rewinds */
+void pw_archive_clear (pw_archive *a); /* rewinds: the next bytes are the first again */
 void pw_archive_free (pw_archive *a);
 
 PW_END

@@ -14,7 +14,7 @@ void pw_archive_bytes (pw_archive *a, void *bytes, size_t count) {
   a->used += count;
 }
 
-/* Half of what a long can be: the caller may add to it. */
+/* The bound leaves room for sums of counts. */
 void pw_archive_count (pw_archive *a, long *count) {
   pw_archive_bytes (a, count, sizeof *count);
   if (a->loading && (*count < 0 || *count > LONG_MAX / 2)) a->failed = 1;

@@ -3,8 +3,8 @@
 #include "util.h"
 
 int pw_utf8_size (const char *text) {
-  static const unsigned least[] = { 0, 0x80, 0x800,
-                                    0x10000 }; /* code by the number of following bytes; below, it is overlong */
+  /* The smallest code of each number of following bytes; a smaller one is encoded in too many bytes. */
+  static const unsigned least[] = { 0, 0x80, 0x800, 0x10000 };
   const unsigned char *p = (const unsigned char *)text;
   /* The first byte is 0xxxxxxx, 110xxxxx, 1110xxxx or 11110xxx, the following ones are 10xxxxxx. */
   int following = p[0] < 0x80 ? 0 : p[0] >> 5 == 6 ? 1 : p[0] >> 4 == 14 ? 2 : p[0] >> 3 == 30 ? 3 : -1;

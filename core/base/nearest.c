@@ -1,10 +1,11 @@
 /* Suggestions of valid names for unknown ones, and the domains of numbers, for messages. */
+#include <ctype.h>
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
 #include "util.h"
 
-/* Edit distance (Levenshtein 1966), keeping one row of the table; of a candidate longer than the row, its length. */
+/* Edit distance (Levenshtein 1966), keeping one row of the table; for a candidate longer than the row, its length. */
 static size_t nearest_distance (const char *a, const char *b) {
   size_t row[64], n = strlen (b);
   if (n >= sizeof row / sizeof *row) return n;
@@ -30,13 +31,9 @@ static int nearest_is_near (const char *a, size_t n, const char *b, size_t m, si
          (shorter > 0 && (memcmp (a, b, shorter) == 0 || memcmp (a + n - shorter, b + m - shorter, shorter) == 0));
 }
 
-static int nearest_lower (char c) {
-  return c >= 'A' && c <= 'Z' ? c - 'A' + 'a' : c;
-}
-
 /* 1 if two names are equal except for capitals. */
 static int nearest_equal (const char *a, const char *b) {
-  while (*a && nearest_lower (*a) == nearest_lower (*b)) a++, b++;
+  while (*a && tolower ((unsigned char)*a) == tolower ((unsigned char)*b)) a++, b++;
   return *a == *b;
 }
 

@@ -3,8 +3,8 @@
  * x = n pi/2 + y + lo, where n is an integer, |y| <= pi/4 and lo is below the round-off of y: pi/2 is the sum of three
  * parts of 33 bits, whose products with n are exact, and a tail (Cody & Waite 1980), and lo collects the tail and the
  * round-off of the differences, so that y + lo is accurate next to multiples of pi/2 too.  Sine and cosine of y + lo
- * are the polynomials of fdlibm (Sun Microsystems 1993, k_sin.c and k_cos.c).  There are no branches, and nothing is
- * fused, so that the bits do not depend on the C library, the compiler or the processor. */
+ * are the polynomials of fdlibm (Sun Microsystems 1993, k_sin.c and k_cos.c).  There are no branches and no fused
+ * multiply-adds, so that the bits do not depend on the C library, the compiler or the processor. */
 #ifndef PW_SINE_H
 #define PW_SINE_H
 
@@ -18,10 +18,10 @@
 enum { PW_SINE_LANES = 2 };
 #define PW_SINE_LIMIT 1e6 /* [rad]: n has at most 20 bits, and its product with 33 bits fits into 53 */
 
-#ifndef PW_LANES /* vectors of GNU C, whose operators act on each lane */
+#ifndef PW_LANES /* GNU C vectors, whose operators act on each lane */
 typedef double pw_lanes __attribute__ ((vector_size (8 * PW_SINE_LANES)));
 typedef uint64_t pw_lane_bits __attribute__ ((vector_size (8 * PW_SINE_LANES)));
-#else /* in code specialised for several runs at once: one of them, in a loop that the compiler vectorises */
+#else /* code specialised for several runs at once: the angle of one run, in a loop that the compiler vectorises */
 typedef double pw_lanes;
 typedef uint64_t pw_lane_bits;
 #endif
@@ -66,9 +66,9 @@ static inline void pw_sin_cos_lanes (pw_lanes x, pw_lanes *sine, pw_lanes *cosin
   pw_lanes shifted = x * two_by_pi + integers, n = shifted - integers;
   pw_lanes y1 = x - n * half_pi_1, part2 = n * half_pi_2, part3 = n * half_pi_3;
   pw_lanes y2 = y1 - part2, y = y2 - part3;
-  /* The round-off of both differences, exactly: one that is smaller than what is subtracted has none (Dekker 1971). */
+  /* The round-off of both differences, exactly: a minuend smaller than what is subtracted has none (Dekker 1971). */
   pw_lanes lo = (((y1 - y2) - part2) + ((y2 - y) - part3)) - n * half_pi_tail;
-  /* In odd quadrants sine and cosine are exchanged; the second last bits of n and n + 1 are their signs. */
+  /* In odd quadrants sine and cosine are exchanged; bit 1 of n is the sign of the sine, of n + 1 that of the cosine. */
   pw_lane_bits quadrant = pw_sine_bits (shifted), odd = 0 - (quadrant & 1);
   pw_lane_bits sine_bits = pw_sine_bits (pw_sine_polynomial (y, lo)),
                cosine_bits = pw_sine_bits (pw_cosine_polynomial (y, lo)), swap = (sine_bits ^ cosine_bits) & odd;

@@ -50,8 +50,8 @@ int pw_names_find (const pw_names *n, const char *name) {
   return slot->name ? slot->value : -1;
 }
 
-#define STORE_ALIGN 16
-#define STORE_CHUNK 65536
+#define STORE_ALIGN 16    /* bytes: alignment of any object */
+#define STORE_CHUNK 65536 /* bytes of a chunk, unless an allocation needs more */
 
 struct pw_chunk {
   struct pw_chunk *next;
@@ -63,7 +63,7 @@ static size_t store_round (size_t bytes, size_t align) {
   return (bytes + align - 1) / align * align;
 }
 
-static void *arena_alloc (pw_arena *a, size_t bytes, size_t align) {
+static void *store_alloc (pw_arena *a, size_t bytes, size_t align) {
   size_t used = a->chunk ? store_round (a->chunk->used, align) : 0;
   if (a->chunk == NULL || a->chunk->size < used || a->chunk->size - used < bytes) {
     size_t size = bytes > STORE_CHUNK ? bytes : STORE_CHUNK;
@@ -79,12 +79,12 @@ static void *arena_alloc (pw_arena *a, size_t bytes, size_t align) {
 }
 
 void *pw_arena_alloc (pw_arena *a, size_t bytes) {
-  return arena_alloc (a, bytes, STORE_ALIGN);
+  return store_alloc (a, bytes, STORE_ALIGN);
 }
 
 char *pw_arena_copy (pw_arena *a, const char *text) {
   size_t n = strlen (text) + 1;
-  char *copy = arena_alloc (a, n, 1);
+  char *copy = store_alloc (a, n, 1);
   return copy ? memcpy (copy, text, n) : NULL;
 }
 

@@ -31,7 +31,7 @@ void pw_nearest_try (pw_nearest *n, const char *candidate);
 const char *pw_nearest_text (pw_nearest *n);
 
 /* The index of a name in a table whose entries, of `entry_size` bytes, begin with a name and whose last name is NULL;
- * -1, with the hint of pw_nearest_text, if it is not there.  The table may be NULL: it has no entries. */
+ * -1, with the hint of pw_nearest_text, if the name is not there.  A table that is NULL has no entries. */
 int pw_find_name (const void *table, size_t entry_size, const char *name, char hint[PW_HINT]);
 /* "", ">= 0", "> 0", "1, 2, ...", "0 to 1" */
 const char *pw_domain_text (pw_domain domain);
@@ -42,7 +42,7 @@ const char *pw_domain_check (pw_domain domain, double value);
 
 /* Bytes of the UTF-8 character at the beginning of a text; 0 if invalid. */
 int pw_utf8_size (const char *text);
-/* Code of the control character at the beginning of a text, except line ends and tabs; 0 if there is none. */
+/* Code of the control character at the beginning of a text; 0 if there is none, or a line end or tab. */
 int pw_control (const char *text);
 /* 1 if a text is UTF-8 without control characters. */
 int pw_is_text (const char *text);
@@ -56,7 +56,7 @@ typedef struct {
   size_t size, room; /* bytes of the text; allocated */
 } pw_stream;
 FILE *pw_stream_open (pw_stream *t); /* NULL if out of memory */
-/* Closes f, which may be NULL.  PW_RESOURCE if any part of the text is missing: t->text is NULL then.  Free it. */
+/* Closes f, which may be NULL.  PW_RESOURCE, and t->text is NULL, if any part of it is missing.  Free t->text. */
 int pw_stream_close (FILE *f, pw_stream *t);
 
 /* ---- Checksums, tables of names, memory (store.c) ---- */
@@ -75,12 +75,11 @@ typedef struct {
 } pw_names;
 int pw_names_open (pw_names *n, size_t entries); /* PW_OK or PW_RESOURCE */
 void pw_names_close (pw_names *n);
-/* -1 if the name is new, else its value, which does not change. */
+/* Adds a new name and returns -1; if the name exists, returns its value, which does not change. */
 int pw_names_add (pw_names *n, const char *name, int value);
 int pw_names_find (const pw_names *n, const char *name); /* -1 if absent */
 
-/* Makes room for more than `count` entries of `size` bytes in an array, *(void **)array, with *room allocated.  PW_OK
- * or PW_RESOURCE. */
+/* Makes room in *(void **)array, which has *room, for more than `count` entries of `size` bytes.  Returns a status. */
 int pw_grow (void *array, size_t count, size_t *room, size_t size);
 
 /* The root of member i of a union-find structure, in which a root is its own parent; halves the path. */
@@ -97,8 +96,8 @@ void *pw_arena_alloc (pw_arena *a, size_t bytes);    /* zeroed, or NULL */
 char *pw_arena_copy (pw_arena *a, const char *text); /* or NULL */
 void pw_arena_free (pw_arena *a);
 
-/* Lays out arrays in one allocation: the same calls of pw_layout_alloc are made twice; with base NULL, the first time,
- * they only add up the size, and return NULL. */
+/* Lays out arrays in one allocation.  The same calls of pw_layout_alloc are made twice: first with base NULL, where
+ * they only add up the size and return NULL, then with the allocated memory. */
 typedef struct {
   char *base;
   size_t used;

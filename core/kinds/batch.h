@@ -1,9 +1,9 @@
 /* Batch functions and `prepare` functions of element types, written for one element; members of their tables.
  *
- * Notation in the files of element types: r = (x, y), phi: centre of mass and angle of a body; w = phi'; R(phi): its
- * rotation matrix; s: a point in its frame; indices 1, 2: of body 1, 2.  a: accelerations (r'', w') of the element's
- * bodies; f: its generalised force; G, S: its rows of J, of position and velocity constraints; u: its signal; V: its
- * potential energy. */
+ * Notation in the files of element types: ' = d/dt; r = (x, y), phi, omega = phi': centre of mass, angle and angular
+ * velocity of a body; R(phi): its rotation matrix; s: a point in its frame; indices 1, 2: of body 1, 2.  q, v = q':
+ * local coordinates and velocities of an element; f: its generalised force; G, S: its rows of J, of position and
+ * velocity constraints; u: its signal; V: its potential energy. */
 #ifndef PW_BATCH_H
 #define PW_BATCH_H
 
@@ -83,7 +83,7 @@ LIBM (libm_hypot (libm_lanes x, libm_lanes y)) {
   static inline int function##_one (const definition_type *definition, MAYBE_UNUSED const pw_body *const *bodies,   \
                                     type *element, MAYBE_UNUSED pw_internal *internal, MAYBE_UNUSED pw_error *error)
 
-/* Members of a type's table, whose values have their names: weld_fields, weld_prepare, weld_J, ... */
+/* Groups of members of a type's table: TYPE (weld, ...) sets .fields = weld_fields, .prepare = weld_prepare, ... */
 #define TYPE(type, definition_type, element_type)                                                    \
   .definition = sizeof (definition_type), .fields = type##_fields, .element = sizeof (element_type), \
   .prepare = type##_prepare
@@ -103,18 +103,12 @@ static inline const double *batch_w (const pw_batch *batch, int e) {
   return batch->w ? batch->w + e * batch->cols : NULL;
 }
 
-/* The body of element e in its current state, if elements have one body; bodies 1 and 2, if they have two. */
-static inline const pw_configuration *batch_only_body (const pw_batch *batch, int e) {
-  return &batch->configuration[batch->body[e]];
-}
-static inline const pw_configuration *batch_body1 (const pw_batch *batch, int e) {
-  return &batch->configuration[batch->body[2 * e]];
-}
-static inline const pw_configuration *batch_body2 (const pw_batch *batch, int e) {
-  return &batch->configuration[batch->body[2 * e + 1]];
+/* Body i of the batch in its current state: body n (from 0) of element e is i = e x bodies of an element + n. */
+static inline const pw_configuration *batch_body (const pw_batch *batch, int i) {
+  return &batch->configuration[batch->body[i]];
 }
 
-/* eta of a velocity constraint whose right-hand side is the element's only signal. */
+/* eta of a velocity constraint equation that prescribes the element's only signal. */
 static inline void batch_eta_of_signal (const pw_batch *batch, double *out) {
   for (int e = 0; e < batch->count; e++) out[e] = batch->u[3 * e];
 }
@@ -137,8 +131,7 @@ static inline void opposite_moments (double T, double *out) {
   out[0] = out[1] = out[3] = out[4] = 0, out[2] = T, out[5] = -T;
 }
 
-/* Its derivative with respect to the positions or to the velocities, 6 x 6, if -slope is that of T with respect to the
- * relative angle or angular velocity, body 1 minus body 2. */
+/* Its derivative with respect to q or v, 6 x 6, for T = -slope (phi1 - phi2) or T = -slope (omega1 - omega2). */
 static inline void opposite_moments_block (double slope, double *out) {
   for (int i = 0; i < 36; i++) out[i] = 0;
   out[14] = out[35] = -slope, out[17] = out[32] = slope;

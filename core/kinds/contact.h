@@ -1,9 +1,9 @@
-/* Wheels: the contact point P, and the component of its velocity along a direction d fixed in its body, which velocity
- * constraints prescribe and forces oppose.
+/* The velocity of a point P of a body, the contact point of a wheel, along a direction d fixed in the body: velocity
+ * constraints prescribe it, forces oppose it.
  *
- *   d . v_P = S v,  d = R(phi) (a, b),  v = (vx, vy, w)
+ *   d . v_P = S v,  d = R(phi) (a, b),  v = (vx, vy, omega)
  *   S     = [ dx  dy  l ]                                         l: the arm of P along (b, -a) in the body
- *   gamma = w (dy vx - dx vy)                                     so that d(S v)/dt = S v' - gamma
+ *   gamma = omega (dy vx - dx vy)                                 so that d(S v)/dt = S v' - gamma
  *
  * (Neimark & Fufaev 1972, Dynamics of Nonholonomic Systems, chapter I.) */
 #ifndef PW_CONTACT_H
@@ -30,7 +30,7 @@ static inline contact contact_make (const double at[2], double heading, double a
   return (contact){ a, b, at[0] * b - at[1] * a, { at[0], at[1] }, heading };
 }
 
-/* The direction along the heading, and the one to its left. */
+/* Contacts whose direction d is along the heading, and to its left. */
 static inline contact contact_along (const double at[2], double heading) {
   return contact_make (at, heading, pw_cos (heading), pw_sin (heading));
 }
@@ -41,7 +41,7 @@ static inline contact contact_across (const double at[2], double heading) {
 
 /* A contact of element e of a batch of elements with one body. */
 static inline contact_state contact_of (contact constants, const pw_batch *batch, int e) {
-  const pw_configuration *body = batch_only_body (batch, e);
+  const pw_configuration *body = batch_body (batch, e);
   return (contact_state){ constants, body, batch_w (batch, e), body->cos * constants.a - body->sin * constants.b,
                           body->sin * constants.a + body->cos * constants.b };
 }
@@ -50,12 +50,12 @@ static inline contact_state contact_at (const pw_batch *batch, int e) {
   return contact_of (((const contact *)batch->element)[e], batch, e);
 }
 
-/* The velocity component S v. */
+/* S v */
 static inline double contact_speed (const contact_state *now) {
   return now->dx * now->body->vx + now->dy * now->body->vy + now->constants.arm * now->body->omega;
 }
 
-/* Its derivative with respect to the angle of the body. */
+/* d(S v)/dphi */
 static inline double contact_speed_phi (const contact_state *now) {
   return now->dx * now->body->vy - now->dy * now->body->vx;
 }

@@ -9,7 +9,6 @@
 #ifndef PW_COULOMB_H
 #define PW_COULOMB_H
 
-#include <math.h>
 #include "batch.h"
 
 typedef struct {
@@ -34,14 +33,14 @@ static inline double coulomb_slope (const coulomb *law, double v) {
   return law->viscous + law->limit * law->inverse * (1 - y * y);
 }
 
-/* The change of a variable that reverses the force, given v and its derivative with respect to that variable; INFINITY
- * without a limit. */
+/* The change of a coordinate or velocity that reverses the force: by v0 + |v| in v.  derivative: of v with respect to
+ * it.  INFINITY if the force does not saturate. */
 static inline double coulomb_saturation (const coulomb *law, double v, double derivative) {
   return derivative != 0 && law->inverse > 0 ? (1 / law->inverse + fabs (v)) / fabs (derivative) : INFINITY;
 }
 
-/* COULOMB (friction, 6) defines friction_force, friction_force_v, friction_saturation and friction_loss for elements of
- * 6 coordinates q with f = -F S, v = S q'.  friction_state has the members law, v, S[6] and v_q[6] = dv/dq. */
+/* COULOMB (friction, 6) defines friction_force, friction_force_v, friction_saturation and friction_loss for elements
+ * with 6 local coordinates q and f = -F S, v = S q'.  friction_state has the members law, v, S[6], v_q[6] = dv/dq. */
 #define COULOMB(type, cols)                                                                    \
   PER_ELEMENT (type##_force, type, cols) {                                                     \
     double F = coulomb_force (now.law, now.v);                                                 \

@@ -1,8 +1,8 @@
-/* A point of body 1 on a line of body 2: the constraint equation shared by slot, slider and drive.
+/* A point of body 1 on a line of body 2: the equation shared by slot, slider, drive and sliding-friction.
  *
  *   g     = n . D - c = 0,  D = r1 + R(phi1) s1 - r2,  c = n . R(phi2) s2           (1 holonomic equation)
  *   G     = [ n  t.a | -n  -t.D ]             t: along the line, n: t turned by +90 degrees, a = R(phi1) s1
- *   gamma = -v.H v = 2 w2 t.(r1' - r2') + w1 (w1 - 2 w2) n.a + w2^2 n.D             so that G a = gamma
+ *   gamma = -v.H v = 2 omega2 t.(r1' - r2') + omega1 (omega1 - 2 omega2) n.a + omega2^2 n.D      so that G v' = gamma
  *
  * With dn/dphi2 = -t and dt/dphi2 = n, the entries of H = d2g/dq2 are -t and t over (r1, phi2) and (r2, phi2), -n.a
  * over (phi1, phi1), n.a over (phi1, phi2) and -n.D over (phi2, phi2).
@@ -10,7 +10,6 @@
 #ifndef PW_LINE_H
 #define PW_LINE_H
 
-#include <math.h>
 #include <string.h>
 #include "batch.h"
 
@@ -19,7 +18,7 @@ typedef struct {
   double n[2];             /* normal of the line in body 2's frame */
   double c;                /* offset of the line along n [m] */
   double angle;            /* of a slider: phi1 - phi2 [rad] */
-  double prescribes_angle; /* of a drive: 1 if it prescribes phi1 - phi2, and n is 0; else 0 */
+  double prescribes_angle; /* 1 in a drive that prescribes phi1 - phi2, where n and c are 0; else 0 */
 } line;
 
 /* A line in the current state. */
@@ -39,7 +38,7 @@ static inline line line_make (const double at[2][2], double heading) {
 
 /* A line of element e of a batch of elements with two bodies and at most one signal. */
 static inline line_state line_of (const line *constants, const pw_batch *batch, int e) {
-  const pw_configuration *body1 = batch_body1 (batch, e), *body2 = batch_body2 (batch, e);
+  const pw_configuration *body1 = batch_body (batch, 2 * e), *body2 = batch_body (batch, 2 * e + 1);
   line_state now = { constants, body1, body2, .w = batch_w (batch, e), .u = batch->u + 3 * e };
   to_world (body2, constants->n, now.n);
   to_world (body1, constants->s1, now.a);
@@ -68,9 +67,9 @@ PER_ELEMENT (line_J, line, 6) {
 }
 
 PER_ELEMENT (line_gamma, line, 1) {
-  double w1 = now.body1->omega, w2 = now.body2->omega,
+  double omega1 = now.body1->omega, omega2 = now.body2->omega,
          tV = now.t[0] * (now.body1->vx - now.body2->vx) + now.t[1] * (now.body1->vy - now.body2->vy);
-  *out = 2 * w2 * tV + w1 * (w1 - 2 * w2) * now.na + w2 * w2 * now.nD;
+  *out = 2 * omega2 * tV + omega1 * (omega1 - 2 * omega2) * now.na + omega2 * omega2 * now.nD;
 }
 
 /* out = factor H w */
@@ -96,14 +95,14 @@ PER_ELEMENT (line_jw_q, line, 6) {
 }
 
 PER_ELEMENT (line_gamma_q, line, 6) {
-  double w1 = now.body1->omega, w2 = now.body2->omega,
+  double omega1 = now.body1->omega, omega2 = now.body2->omega,
          nV = now.n[0] * (now.body1->vx - now.body2->vx) + now.n[1] * (now.body1->vy - now.body2->vy);
-  out[0] = w2 * w2 * now.n[0];
-  out[1] = w2 * w2 * now.n[1];
-  out[2] = (w1 - w2) * (w1 - w2) * now.ta;
+  out[0] = omega2 * omega2 * now.n[0];
+  out[1] = omega2 * omega2 * now.n[1];
+  out[2] = (omega1 - omega2) * (omega1 - omega2) * now.ta;
   out[3] = -out[0];
   out[4] = -out[1];
-  out[5] = 2 * w2 * nV - w1 * (w1 - 2 * w2) * now.ta - w2 * w2 * now.tD;
+  out[5] = 2 * omega2 * nV - omega1 * (omega1 - 2 * omega2) * now.ta - omega2 * omega2 * now.tD;
 }
 
 PER_ELEMENT (line_gamma_v, line, 6) {
@@ -113,7 +112,7 @@ PER_ELEMENT (line_gamma_v, line, 6) {
   line_multiply_H (&now, -2, v, out);
 }
 
-/* Fields of a definition: the two points and the heading of line_make. */
+/* Fields of a definition: the arguments of line_make. */
 #define LINE_FIELDS(type)                                                                                         \
   { PW_AT (type, at), PW_POINT,      .count = 2,                                                                  \
     .unit = "m",      .required = 1, .about = "the point, and a point of the line, in each body's frame" },       \

@@ -3,13 +3,12 @@
  *   d     = r1 + R(phi1) s1 - r2 - R(phi2) s2                     from point 2 to point 1
  *   D     = dd/dq = [ 1 0 -Y1 | -1 0  Y2 ]       with (X, Y) = R(phi) s, the arm in world axes
  *                   [ 0 1  X1 |  0 -1 -X2 ]
- *   d'    = D v,  d'' = D v' - gamma,  gamma = (X1, Y1) w1^2 - (X2, Y2) w2^2
+ *   d'    = D v,  d'' = D v' - gamma,  gamma = (X1, Y1) omega1^2 - (X2, Y2) omega2^2
  *
  * (Haug 1989, Computer Aided Kinematics and Dynamics of Mechanical Systems, section 3.3.) */
 #ifndef PW_POINTS_H
 #define PW_POINTS_H
 
-#include <math.h>
 #include "batch.h"
 
 typedef struct {
@@ -30,7 +29,7 @@ static inline points points_make (const double at[2][2]) {
 
 /* The points of element e of a batch of elements with two bodies. */
 static inline points_state points_of (const points *constants, const pw_batch *batch, int e) {
-  const pw_configuration *body1 = batch_body1 (batch, e), *body2 = batch_body2 (batch, e);
+  const pw_configuration *body1 = batch_body (batch, 2 * e), *body2 = batch_body (batch, 2 * e + 1);
   points_state now = { .body1 = body1, .body2 = body2, .w = batch_w (batch, e) };
   to_world (body1, constants->s1, now.S1);
   to_world (body2, constants->s2, now.S2);
@@ -71,8 +70,8 @@ static inline void points_angles (double *out, double x1, double y1, double x2, 
 }
 
 PER_ELEMENT (points_jw_q, points, 12) {
-  double w1 = now.w[2], w2 = now.w[5];
-  points_angles (out, -now.S1[0] * w1, -now.S1[1] * w1, now.S2[0] * w2, now.S2[1] * w2);
+  double w_phi1 = now.w[2], w_phi2 = now.w[5];
+  points_angles (out, -now.S1[0] * w_phi1, -now.S1[1] * w_phi1, now.S2[0] * w_phi2, now.S2[1] * w_phi2);
 }
 
 PER_ELEMENT (points_gamma_q, points, 12) {

@@ -36,7 +36,7 @@ const void *pw_field_at (const pw_kind *kind, const void *definition, pw_field_t
 
 #define FAULT_TEXT ": expected at most 50 bytes of UTF-8 without control characters"
 
-/* 1 if a name or unit does not fit into a line of a table or file. */
+/* 1 if a name or unit cannot be an entry of a table or file: too long, or not one line of text. */
 static int fault_text (const char *text) {
   return strlen (text) > PW_NAME_MAX || !pw_is_text (text) || strpbrk (text, "\n\t");
 }
@@ -46,12 +46,14 @@ static const char *fault_field (const pw_kind *kind, const pw_field *f) {
   size_t bytes = pw_field_bytes (f->type) * (size_t)pw_field_count (f);
   if (fault_text (f->name) || (f->unit && fault_text (f->unit))) return "name or unit" FAULT_TEXT;
   if (bytes == 0) return "its type does not exist";
+  if ((size_t)f->domain > PW_FRACTION) return "its domain does not exist";
   if (f->offset < sizeof (char *) || f->offset + bytes > kind->definition)
     return "it lies outside the definition: is .definition its sizeof, its first member the name?";
   if (f->type == PW_CHOICE && (f->choices == NULL || f->choices[0] == NULL)) return "a choice without choices";
   return "";
 }
 
+/* As pw_kind_check, of the fields. */
 static const char *fault_fields (const pw_kind *kind, char *buffer, size_t size) {
   int bodies = 0, signals = 0;
   if (kind->fields == NULL) return "no table of fields";
@@ -87,18 +89,17 @@ static const char *fault_functions (const pw_kind *kind) {
 }
 
 static const char *fault_names (const pw_kind *kind) {
-  for (int i = 0; i < kind->rows; i++)
-    if (kind->reaction == NULL || kind->reaction[i].name == NULL || kind->reaction[i].unit == NULL)
-      return "constraint equations without names of their reactions";
-    else if (fault_text (kind->reaction[i].name) || fault_text (kind->reaction[i].unit))
-      return "name or unit of a reaction" FAULT_TEXT;
-  for (int i = 0; i < kind->internal; i++)
-    if (kind->coordinate == NULL || kind->coordinate[i].name == NULL || kind->coordinate[i].rate == NULL ||
-        kind->coordinate[i].unit == NULL)
-      return "internal coordinates without names";
-    else if (fault_text (kind->coordinate[i].name) || fault_text (kind->coordinate[i].rate) ||
-             fault_text (kind->coordinate[i].unit))
+  for (int i = 0; i < kind->rows; i++) {
+    const pw_quantity *q = kind->reaction ? &kind->reaction[i] : NULL;
+    if (!q || !q->name || !q->unit) return "constraint equations without names of their reactions";
+    if (fault_text (q->name) || fault_text (q->unit)) return "name or unit of a reaction" FAULT_TEXT;
+  }
+  for (int i = 0; i < kind->internal; i++) {
+    const pw_quantity *q = kind->coordinate ? &kind->coordinate[i] : NULL;
+    if (!q || !q->name || !q->rate || !q->unit) return "internal coordinates without names";
+    if (fault_text (q->name) || fault_text (q->rate) || fault_text (q->unit))
       return "name or unit of an internal coordinate" FAULT_TEXT;
+  }
   return "";
 }
 

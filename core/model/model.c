@@ -1,4 +1,4 @@
-/* The description: parameters, bodies and elements as the build function declares them. */
+/* Models: parameters, bodies and elements as the build function declares them. */
 #include <math.h>
 #include <stdarg.h>
 #include <stdio.h>
@@ -17,7 +17,7 @@ static int model_no_memory (pw_model *m) {
   return pw_fail (&m->error, PW_RESOURCE, "model %s: out of memory", m->name ? m->name : "");
 }
 
-/* Copies the first error of the model, if there is one, to the caller's. */
+/* Passes on the first error of the model. */
 static int model_status (const pw_model *m, pw_error *error) {
   return m->error.status == PW_OK ? PW_OK : pw_fail (error, m->error.status, "%s", m->error.text);
 }
@@ -94,10 +94,16 @@ static int model_grow (pw_model *m, void *array, int count, size_t *room, size_t
   return pw_grow (array, (size_t)count, room, size) == PW_OK ? PW_OK : model_no_memory (m);
 }
 
+static void *model_copy (pw_model *m, const void *from, size_t bytes) {
+  void *copy = pw_arena_alloc (&m->arena, bytes);
+  if (copy) return memcpy (copy, from, bytes);
+  model_no_memory (m);
+  return NULL;
+}
+
 static const char *model_copy_text (pw_model *m, const char *text) {
-  if (text == NULL) return NULL;
-  char *copy = pw_arena_copy (&m->arena, text);
-  if (copy == NULL) model_no_memory (m);
+  char *copy = text ? pw_arena_copy (&m->arena, text) : NULL;
+  if (text && copy == NULL) model_no_memory (m);
   return copy;
 }
 
@@ -109,13 +115,6 @@ int pw_add_body (pw_model *m, const pw_body *body) {
   *b = *body;
   b->name = model_copy_text (m, body->name);
   return m->error.status;
-}
-
-static void *model_copy (pw_model *m, const void *from, size_t bytes) {
-  void *copy = pw_arena_alloc (&m->arena, bytes);
-  if (copy) return memcpy (copy, from, bytes);
-  model_no_memory (m);
-  return NULL;
 }
 
 static const char *const *model_copy_names (pw_model *m, const char *const *names) {
@@ -134,7 +133,7 @@ static void model_copy_signal (pw_model *m, pw_signal *s) {
   s->table.value = model_copy (m, s->table.value, (size_t)s->table.count * sizeof (double));
 }
 
-/* Checks an element type, unless the previous element has the same type. */
+/* Checks an element type; that of the previous element has been checked. */
 static int model_check_kind (pw_model *m, const pw_kind *kind) {
   if (m->elements > 0 && m->element[m->elements - 1].kind == kind) return PW_OK;
   char buffer[200];
@@ -163,13 +162,13 @@ int pw_add (pw_model *m, const pw_kind *kind, const void *definition) {
   return m->error.status;
 }
 
-const char *pw_model_name (const pw_model *m) {
-  return m->name;
-}
-
-const pw_plugin_table *pw_model_table (const pw_model *m) {
-  return m->table;
-}
+#define MEMBER(type, function, member) \
+  type function (const pw_model *m) {  \
+    return m->member;                  \
+  }
+MEMBER (const char *, pw_model_name, name)
+MEMBER (const pw_plugin_table *, pw_model_table, table)
+MEMBER (int, pw_model_initial, initials)
 
 double pw_model_parameter (const pw_model *m, const pw_parameter *p) {
   double value;
@@ -185,10 +184,6 @@ const pw_body *pw_model_bodies (const pw_model *m, int *count) {
 const pw_element *pw_model_elements (const pw_model *m, int *count) {
   *count = m->elements;
   return m->element;
-}
-
-int pw_model_initial (const pw_model *m) {
-  return m->initials;
 }
 
 const pw_reference_text *pw_model_reference (const pw_model *m) {

@@ -32,7 +32,7 @@ struct pw_model {
   int initials;
   size_t body_room, element_room, initial_room; /* entries allocated */
   const pw_reference_text *reference;
-  struct pw_kept *kept; /* released with the model */
+  struct pw_kept *kept; /* objects of pw_model_keep */
   int built;            /* 1: pw_model_build has been called */
   pw_error error;       /* the first error */
 };
@@ -40,10 +40,11 @@ struct pw_model {
 /* The longest name [bytes]: "KIND ELEMENT" and "ELEMENT.REACTION" fit in a buffer of 120. */
 enum { PW_NAME_MAX = 50 };
 
-/* Checks every body and element: names, numbers, names of bodies (against the table of all of them), signals. */
+/* Checks every body and element: names, numbers, signals, and whether the bodies of elements are in the table. */
 int pw_check_model (const pw_model *m, const pw_names *bodies, pw_error *error);
 
-/* Returns what is wrong with an element type's table (in the buffer, or a constant), or "".  Others may crash on it. */
+/* Returns what is wrong with an element type's table (in the buffer, or a constant), or "".  No other function may be
+ * called with a table that has not passed. */
 const char *pw_kind_check (const pw_kind *kind, char *buffer, size_t size);
 
 /* 1 for the library's own element types, 0 for those of plug-ins. */

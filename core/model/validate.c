@@ -15,6 +15,8 @@ static int check_parameter (const pw_plugin_table *t, const pw_parameter *p, con
     return pw_fail (error, PW_INPUT,
                     "%s: parameter %s lies outside the model's structure: set .parameters_size to its sizeof", what,
                     p->name);
+  if ((size_t)p->domain > PW_FRACTION)
+    return pw_fail (error, PW_INPUT, "%s: parameter %s: its domain does not exist", what, p->name);
   if (*expected == 0) return PW_OK;
   return pw_fail (error, PW_INPUT, "%s: parameter %s has the default %g: expected %s", what, p->name, p->value,
                   expected);

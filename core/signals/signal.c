@@ -35,7 +35,7 @@ static double signal_rise_breakpoint (const pw_signal *s, double t) {
   return t < s->ramp.start ? s->ramp.start : t < end ? end : INFINITY;
 }
 
-/* The beginning of the pulse period that contains t, and of the next one, for t >= start. */
+/* The beginning of the period that contains t, and of the next one, for t >= start. */
 static void signal_pulse_period (const pw_signal *s, double t, double *begin, double *next) {
   double start = s->pulse.start, period = s->pulse.period;
   *begin = start;
@@ -70,7 +70,7 @@ static double signal_pulse_breakpoint (const pw_signal *s, double t) {
 
 /* ---- All signals ---- */
 
-/* A value that is not finite is a failure. */
+/* Fails if a number that is needed is not finite. */
 static int signal_function (const pw_source *source, double t, pw_signal_order order, double u[3]) {
   const pw_function *f = &source->signal.function;
   int status = f->eval (f->context, t, source->x, u, source->reads ? source->x + source->reads : NULL);

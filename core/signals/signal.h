@@ -11,21 +11,23 @@ typedef struct {
   const int *state; /* their indices: coordinate j, or coordinates + j for a velocity */
   double *x;        /* 2 reads: values of these states, then the gradient */
   double *spline;   /* of a table: see pw_table_spline */
-  double *u;        /* 3: destination of its values */
+  double *u;        /* 3: receives value, first and second time derivative */
   int of_force;     /* 1: belongs to a force, which needs no derivatives */
 } pw_source;
 
-/* Which of value, first and second time derivative are needed. */
+/* What is needed: the value, or also the first and second time derivative. */
 typedef enum { PW_SIGNAL_VALUE, PW_SIGNAL_DERIVATIVES } pw_signal_order;
 
 /* Stores value, first and second time derivative at time t in u; u[1] and u[2] are meaningless for PW_SIGNAL_VALUE.
- * The states a function reads are in source->x.  Returns non-zero, which stops the run, if the user's function did or
- * if its values are not finite. */
+ * source->x: the states that a function reads.  Returns non-zero, which stops the run, if the user's function returns
+ * it or computes values that are not finite. */
 int pw_signal_eval (const pw_source *source, double t, pw_signal_order order, double u[3]);
 
-/* Times at which a step must end: jumps of the signal or of its first or second derivative; these and the kinks of the
- * second derivative of a cubic table, at its points. */
-typedef enum { PW_JUMPS, PW_JUMPS_AND_KINKS } pw_breakpoints;
+/* Times at which a step must end. */
+typedef enum {
+  PW_JUMPS,          /* jumps of the signal or of its first or second derivative */
+  PW_JUMPS_AND_KINKS /* also kinks of the second derivative: the points of a cubic table */
+} pw_breakpoints;
 
 /* The first such time after t, or INFINITY. */
 double pw_signal_breakpoint (const pw_signal *s, pw_breakpoints which, double t);
@@ -38,7 +40,8 @@ static inline double pw_table_value (const pw_signal *s, int i) {
   return s->table.offset + scale * s->table.value[i];
 }
 
-/* Computes the spline of a checked table: first derivatives at the points, then second ones, 2 count numbers. */
+/* Computes the spline of a checked table, 2 count numbers: the first derivative just after each point (after the last
+ * one meaningless), then the second derivatives. */
 void pw_table_spline (const pw_signal *s, double *spline);
 void pw_table_eval (const pw_signal *s, const double *spline, double t, double u[3]);
 double pw_table_breakpoint (const pw_signal *s, pw_breakpoints which, double t);

@@ -1,4 +1,4 @@
-/* The forms of a signal, as text models and lists use them: their fields, and checks of a whole signal. */
+/* Forms of signals: their fields, and checks of signals. */
 #include <math.h>
 #include <stdio.h>
 #include "signal.h"
@@ -64,7 +64,7 @@ const pw_signal_form *pw_signal_form_of (const pw_signal *s) {
 
 /* ---- Checks: each writes the fault to `text`, or leaves it empty ---- */
 
-/* The number of each field, and its choice, of which there are two. */
+/* Each field is a number or a choice between 0 and 1. */
 static void form_check_fields (const pw_signal *s, const pw_signal_form *form, char *text, size_t size) {
   for (const pw_field *f = form->fields; f->name && !*text; f++) {
     const void *at = (const char *)s + f->offset;
@@ -95,8 +95,7 @@ static void form_check_points (const pw_signal *s, int *point, char *text, size_
     if (!isfinite (t[i]) || !isfinite (s->table.value[i]))
       snprintf (text, size, "point %d is (%g, %g): expected finite numbers", i + 1, t[i], s->table.value[i]);
     else if (!isfinite (pw_table_value (s, i)))
-      snprintf (text, size, "point %d: %g * %g + %g: expected a finite value", i + 1, s->table.value[i], s->table.scale,
-                s->table.offset);
+      snprintf (text, size, "point %d: offset + scale * %g is not finite", i + 1, s->table.value[i]);
     else if (i > 0 && !(t[i] > t[i - 1]))
       snprintf (text, size, "point %d is at t = %.9g s, after one at %.9g s: expected increasing times", i + 1, t[i],
                 t[i - 1]);
@@ -104,30 +103,26 @@ static void form_check_points (const pw_signal *s, int *point, char *text, size_
   if (!*text) *point = -1;
 }
 
-typedef enum { FORM_JUMPS, FORM_KINKS, FORM_SMOOTH } form_continuity;
-
-/* Whether a signal jumps, or has kinks, and the name of its form in messages. */
-static form_continuity form_continuity_of (const pw_signal *s, const char **form) {
-  *form = s->type == PW_PULSE                   ? "a pulse"
-          : s->type == PW_RAMP                  ? "a ramp"
-          : s->type != PW_TABLE                 ? ""
-          : s->table.interpolation == PW_LINEAR ? "a linear table"
-          : s->table.ends == PW_ENDS_FREE       ? "a cubic table with free ends"
-                                                : "";
-  return s->type == PW_PULSE ? FORM_JUMPS : **form ? FORM_KINKS : FORM_SMOOTH;
+/* The form of a signal that jumps or has kinks, for messages; NULL if it has neither. */
+static const char *form_with_kinks (const pw_signal *s) {
+  if (s->type == PW_PULSE) return "a pulse";
+  if (s->type == PW_RAMP) return "a ramp";
+  if (s->type != PW_TABLE) return NULL;
+  if (s->table.interpolation == PW_LINEAR) return "a linear table";
+  return s->table.ends == PW_ENDS_FREE ? "a cubic table with free ends" : NULL;
 }
 
 /* Kinks of prescribed positions and jumps of prescribed velocities would require infinite forces. */
 static void form_check_continuity (const pw_signal *s, const pw_kind *kind, char *text, size_t size) {
-  const char *form;
-  form_continuity continuity = form_continuity_of (s, &form);
-  if (pw_kind_signals_force (kind)) return;
-  if (kind->level == PW_HOLONOMIC && continuity != FORM_SMOOTH)
+  const char *form = form_with_kinks (s);
+  int jumps = s->type == PW_PULSE;
+  if (form == NULL || pw_kind_signals_force (kind)) return;
+  if (kind->level == PW_HOLONOMIC)
     snprintf (text, size,
               "%s has %s, and a prescribed position must not: use a smooth-step, a cubic table with ends at rest, a "
               "harmonic",
-              form, continuity == FORM_JUMPS ? "jumps" : "kinks");
-  else if (continuity == FORM_JUMPS)
+              form, jumps ? "jumps" : "kinks");
+  else if (jumps)
     snprintf (text, size, "%s jumps, and the signal of a velocity constraint must not: use a ramp or smooth-step",
               form);
 }

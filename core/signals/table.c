@@ -2,7 +2,7 @@
  *
  *   u = y_i + b_i x + M_i x^2 / 2 + (M_j - M_i) x^3 / (6 h_i),   x = t - t_i,  j = i + 1,  h_i = t_j - t_i
  *
- * between two points; outside, the signal is constant.  b_i and M_i are the first and second derivative at point i.
+ * between two points; outside, the signal is constant.  b_i and M_i are the first and second derivative just after t_i.
  * In a cubic table the M_i make the first derivative continuous (de Boor 2001, A Practical Guide to Splines, chapter
  * IV):
  *
@@ -14,8 +14,8 @@
 #include <string.h>
 #include "signal.h"
 
-/* Row i of the equations for M: coefficients of M_k, M_i and M_j, and the right-hand side.  M at a free end is
- * eliminated by table_extrapolate. */
+/* Row i of the equations for M: coefficients of M_k, M_i and M_j, and the right-hand side.  At free ends the formula of
+ * table_extrapolate has eliminated M_0 and M_(n-1). */
 static void table_row (const double *t, const double *y, int n, int ends, int i, double row[4]) {
   double before = i > 0 ? t[i] - t[i - 1] : 0, after = i < n - 1 ? t[i + 1] - t[i] : 0;
   double slope_before = i > 0 ? (y[i] - y[i - 1]) / before : 0, slope_after = i < n - 1 ? (y[i + 1] - y[i]) / after : 0;
@@ -33,8 +33,8 @@ static double table_extrapolate (double t0, double t1, double t2, double M1, dou
   return M1 + (M1 - M2) * ((t1 - t0) / (t2 - t1));
 }
 
-/* Solves the tridiagonal equations for M without pivoting; they are diagonally dominant.  `upper`: n numbers of
- * memory. */
+/* Solves the tridiagonal equations for M without pivoting; they are diagonally dominant.  `upper`: memory for n
+ * numbers, the upper diagonal after elimination. */
 static void table_second_derivatives (const double *t, const double *y, int n, int ends, double *M, double *upper) {
   int first = ends == PW_ENDS_REST ? 0 : 1, last = n - 1 - first;
   double row[4];
@@ -92,6 +92,6 @@ void pw_table_eval (const pw_signal *s, const double *spline, double t, double u
 double pw_table_breakpoint (const pw_signal *s, pw_breakpoints which, double t) {
   int n = s->table.count, next = table_passed (s, t);
   if (next == n) return INFINITY;
-  int only_kinks_inside = s->table.interpolation == PW_CUBIC && next > 0;
-  return s->table.t[only_kinks_inside && which == PW_JUMPS ? n - 1 : next];
+  int in_spline = s->table.interpolation == PW_CUBIC && next > 0;
+  return s->table.t[in_spline && which == PW_JUMPS ? n - 1 : next];
 }

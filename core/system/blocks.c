@@ -6,13 +6,12 @@
 #include <string.h>
 #include "system.h"
 
-/* Each block: its function in the type's table, the function it differentiates, and the product formed before
- * differentiation. */
+/* Each block: `function` of the type's table is the derivative of `original`, or of its product with w or lambda. */
 #define BLOCKS_ENTRY(f, g) .function = offsetof (pw_kind, f), .original = offsetof (pw_kind, g)
 static const struct {
   size_t function, original;
   enum { BLOCKS_NONE, BLOCKS_J_W, BLOCKS_JT_LAMBDA } product;
-  int velocity; /* derivative with respect to v instead of q */
+  int velocity; /* 1: derivative with respect to v; 0: to q */
   int square;   /* 1: it has as many rows as local columns; 0: kind->rows */
 } blocks_table[PW_BLOCKS] = {
   [PW_JW_Q] = { BLOCKS_ENTRY (jw_q, J), .product = BLOCKS_J_W },
@@ -70,6 +69,7 @@ static double *blocks_variable (const pw_kind *kind, blocks_single *one, int c, 
   return velocity ? v[c % 3] : q[c % 3];
 }
 
+/* y = the function or product whose derivative the block is. */
 static void blocks_value (const pw_kind *kind, pw_block block, blocks_single *one, double *y) {
   pw_batch_function *original = pw_kind_function (kind, blocks_table[block].original);
   int rows = kind->rows, cols = one->b.cols;
@@ -100,7 +100,7 @@ static double blocks_unit (const pw_workspace *w, const pw_kind *kind, int c, in
   return velocity ? unit / w->scale.time : unit;
 }
 
-/* An exactly representable step h that balances truncation, h^2 / unit^2, against the round-off eps x / h of x. */
+/* An exactly representable step h that balances truncation, (h / unit)^2, and round-off, eps x / h, eps = 2.3e-16. */
 static double blocks_step (const pw_workspace *w, const pw_kind *kind, int c, int velocity, double x) {
   double unit = blocks_unit (w, kind, c, velocity);
   volatile double moved = x + unit * cbrt (2.3e-16 * fmax (1, fabs (x) / unit));
@@ -125,8 +125,8 @@ void pw_difference (const pw_workspace *w, const pw_element_batch *k, int e, pw_
   }
 }
 
-/* Differences of a function that does not depend on a variable are round-off of its value divided by the step:
- * 4e-11. */
+/* A derivative per unit of the variable is taken for 0 if it is at most this part of the function's value; that of a
+ * constant function is round-off, eps / h = 4e-11 of the value. */
 #define BLOCKS_ZERO 1e-6
 
 int pw_block_missing (const pw_workspace *w, const pw_element_batch *k, int e, pw_block block) {

@@ -1,4 +1,4 @@
-/* Compiles a description: names become indices, elements become one batch per element type.
+/* Compiles a model: names become indices, the elements of each type become one batch.
  *
  * All arrays of the system are in its arena.  Data needed only during compilation are in `scratch`. */
 #include <limits.h>
@@ -10,8 +10,7 @@
 /* Bytes after an element, and their value, which `prepare` must not change. */
 enum { COMPILE_GUARD = 64, COMPILE_MARK = 0xa5 };
 
-/* The most elements, coordinates and constraint equations: products with numbers of one element (columns, signals) are
- * int. */
+/* The most elements, coordinates, constraint equations: products with columns and signals of an element must be int. */
 enum { COMPILE_MOST = INT_MAX / 64 };
 
 typedef struct {
@@ -21,8 +20,8 @@ typedef struct {
   pw_arena scratch;
   pw_names body, element;
   const pw_kind **kind;    /* element types in use, in the order of the batches */
-  int *count;              /* elements of each of them */
-  int *batch_of;           /* elements of the description: index of the batch */
+  int *count;              /* number of elements of each of them */
+  int *batch_of;           /* for each element of the model: index of its batch */
   size_t bytes;            /* of the largest element and its guard */
   unsigned char *prepared; /* bytes: memory in which an element is prepared */
 } compilation;
@@ -70,7 +69,7 @@ static int compile_names (compilation *job) {
   return PW_OK;
 }
 
-/* Number of elements of the system created from an element of the description. */
+/* Number of elements of the system for one element of the model: one, or one for each body with mass. */
 static int compile_copies (const pw_model *m, const pw_kind *kind) {
   int massive = 0;
   if (!kind->each_body) return 1;
@@ -109,20 +108,17 @@ static int compile_types (compilation *job) {
 static int compile_count (const compilation *job) {
   const pw_model *m = job->m;
   pw_system *s = job->s;
-  double coords = 3.0 * m->bodies, rows = 0;
+  double coords = 3.0 * m->bodies;
   if (m->bodies == 0) return pw_fail (job->error, PW_INPUT, "model %s has no body", m->name);
   for (int k = 0; k < s->batches; k++) {
     coords += (double)job->count[k] * job->kind[k]->internal;
-    rows += (double)job->count[k] * job->kind[k]->rows;
-  }
-  if (coords > COMPILE_MOST || rows > COMPILE_MOST) return compile_too_large (job);
-  s->bodies = m->bodies;
-  s->coords = (int)coords;
-  s->rows = (int)rows;
-  for (int k = 0; k < s->batches; k++) {
-    if (job->kind[k]->level == PW_HOLONOMIC) s->holonomic += job->count[k] * job->kind[k]->rows;
+    s->rows += job->count[k] * job->kind[k]->rows;
+    if (job->kind[k]->level == PW_HOLONOMIC) s->holonomic = s->rows; /* these batches come first */
     s->sources += job->count[k] * job->kind[k]->signals;
   }
+  if (coords > COMPILE_MOST || s->rows > COMPILE_MOST) return compile_too_large (job);
+  s->bodies = m->bodies;
+  s->coords = (int)coords;
   return PW_OK;
 }
 
@@ -144,7 +140,7 @@ static int compile_arrays (const compilation *job) {
 
 /* ---- Bodies and elements ---- */
 
-/* Origin of the initial value of a body's state (0 to 5); `zero` if the value is 0 in a body without `specified`. */
+/* Origin of the initial value of a body's state (0 to 5: x to omega); `zero`: the origin of a 0 without `specified`. */
 static unsigned char compile_origin (const pw_body *b, double value, int state, unsigned char zero) {
   if (b->specified) return b->specified >> state & 1 ? PW_SPECIFIED : 0;
   return value != 0 ? PW_SPECIFIED : zero;
@@ -162,7 +158,7 @@ static int compile_bodies (const compilation *job) {
     memcpy (s->q0 + 3 * i, b->start, sizeof b->start);
     memcpy (s->v0 + 3 * i, b->rate, sizeof b->rate);
     for (int k = 0; k < 3; k++) {
-      s->origin[3 * i + k] = compile_origin (b, b->start[k], k, PW_UNSPECIFIED);
+      s->origin[3 * i + k] = compile_origin (b, b->start[k], k, PW_ZERO_POSITION);
       s->origin[s->coords + 3 * i + k] = compile_origin (b, b->rate[k], 3 + k, 0);
     }
   }
@@ -197,8 +193,8 @@ typedef struct {
   const char **name;
 } batch_arrays;
 
-/* Stores element e of a batch: bodies, columns, prepared element, internal coordinates.  body: the one an each_body
- * type acts on, or -1. */
+/* Stores element e of a batch: bodies, columns, prepared element, internal coordinates.  body: the body on which an
+ * each_body type acts, or -1. */
 static int compile_element (const compilation *job, const pw_element_batch *k, const batch_arrays *a, int e,
                             const pw_element *from, int body) {
   static const pw_body ground = { .name = "ground" };
@@ -289,7 +285,7 @@ static int compile_table (const compilation *job, pw_source *source) {
   return PW_OK;
 }
 
-/* Converts the names of states a function reads to indices. */
+/* Converts the names of the states that a function reads to indices. */
 static int compile_reads (const compilation *job, pw_source *source, const char *element) {
   const char *const *reads = source->signal.function.reads;
   int count = 0;
@@ -311,9 +307,9 @@ static int compile_reads (const compilation *job, pw_source *source, const char 
 }
 
 static int compile_source (const compilation *job, pw_source *source, const pw_signal *signal, const char *element) {
-  void *context =
-      signal->type == PW_FUNCTION && signal->function.open ? signal->function.open (signal->function.context) : NULL;
-  if (signal->type == PW_FUNCTION && signal->function.open && context == NULL) return compile_no_memory (job);
+  const pw_function *opens = signal->type == PW_FUNCTION && signal->function.open ? &signal->function : NULL;
+  void *context = opens ? opens->open (opens->context) : NULL;
+  if (opens && context == NULL) return compile_no_memory (job);
   source->signal = *signal;
   if (context) source->signal.function.context = context;
   if (signal->type == PW_TABLE) return compile_table (job, source);
@@ -322,7 +318,7 @@ static int compile_source (const compilation *job, pw_source *source, const pw_s
 
 /* Runs after all elements are stored, because signals may read their internal coordinates. */
 static int compile_signals (const compilation *job) {
-  int *next = job->count; /* reused: counts the elements visited in each batch */
+  int *next = job->count; /* reused: the number of elements of each batch whose signals are stored */
   memset (next, 0, (size_t)job->s->batches * sizeof *next);
   for (int n = 0; n < job->m->elements; n++) {
     const pw_element *from = &job->m->element[n];
@@ -373,8 +369,8 @@ static double compile_length (const compilation *job) {
   return L > 0 ? L : 1;
 }
 
-/* M with zeros replaced by 1e-6 of the mean of its other entries, angles in units of L.  This is independent of
- * units, and of whether mass or inertia is zero. */
+/* M with zeros replaced by 1e-6 of the mean of its other entries, where inertias count as inertia / L^2: independent of
+ * units, and of whether a mass or an inertia is zero. */
 static void compile_metric (pw_system *s) {
   double sum = 0, L2 = s->scale.length * s->scale.length;
   int massive = 0;

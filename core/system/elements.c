@@ -1,4 +1,4 @@
-/* Queries about elements: properties, contact points, forces; and the equations of motion. */
+/* Elements: their properties, contact points and forces; the equations of motion. */
 #include <stdlib.h>
 #include <string.h>
 #include "system.h"
@@ -24,13 +24,6 @@ pw_element_info pw_system_element (const pw_system *s, int element) {
   info.contact = k->kind->contact ? info.contact + element : -1;
   info.force += 3 * element * k->kind->bodies;
   return info;
-}
-
-int pw_system_row_element (const pw_system *s, int row) {
-  int element = 0;
-  const pw_element_batch *k = s->batch;
-  for (; row >= k->row + k->b.count * k->kind->rows; k++) element += k->b.count;
-  return element + (row - k->row) / k->kind->rows;
 }
 
 static int elements_update (pw_workspace *w, double t, const double *q, const double *v, pw_error *error) {
@@ -59,7 +52,7 @@ int pw_workspace_contact_points (pw_workspace *w, double t, const double *q, con
 
 /* ---- Forces ---- */
 
-/* F -= J^T lambda, only the columns of bodies. */
+/* F -= J^T lambda of each element, only the columns of bodies. */
 static void elements_reactions (const pw_element_batch *k, const double *lambda, double *F) {
   const double *J = k->J;
   int bodies = 3 * k->kind->bodies;
@@ -68,6 +61,7 @@ static void elements_reactions (const pw_element_batch *k, const double *lambda,
       for (int c = 0; c < bodies; c++) F[c] -= J[c] * *lambda;
 }
 
+/* F += the force of each element, only the components of bodies. */
 static void elements_applied (const pw_element_batch *k, double *F) {
   int bodies = 3 * k->kind->bodies;
   k->kind->force (&k->b, k->block);
@@ -119,8 +113,9 @@ static int elements_allocate (const pw_workspace *w, pw_equations *out, pw_error
   const pw_system *s = w->s;
   size_t n = (size_t)s->coords, rows = (size_t)s->rows, entries = (size_t)elements_jacobian (w, NULL);
   double *indices;
-  const pw_array array[] = { { &out->mass, n },        { &out->force, n + 3 }, /* three more entries: the ground's */
-                             { &out->g, rows },        { &out->eta, rows },    { &out->gamma, rows },
+  const pw_array array[] = { { &out->mass, n },      /* first: it is what pw_equations_free frees */
+                             { &out->force, n + 3 }, /* three more entries: the ground's */
+                             { &out->g, rows },        { &out->eta, rows },  { &out->gamma, rows },
                              { &out->value, entries }, { &indices, entries } }; /* two indices fit in one double */
   *out =
       (pw_equations){ .coordinates = s->coords, .rows = s->rows, .holonomic = s->holonomic, .entries = (int)entries };

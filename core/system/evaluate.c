@@ -11,8 +11,7 @@ void pw_evaluate_J (pw_workspace *w) {
   EACH_CONSTRAINT (k, w) k->kind->J (&k->b, k->J);
 }
 
-/* Fills an array over constraint equations by one function of every type, at offset `function` of its table; NULL
- * gives zeros. */
+/* Fills an array over constraint equations by the function at this offset of each type's table; NULL gives zeros. */
 static void evaluate_rows (pw_workspace *w, size_t function, int rows, double *out) {
   EACH_CONSTRAINT (k, w) {
     if (k->row >= rows) break;
@@ -101,17 +100,17 @@ double pw_kinetic (const pw_system *s, const double *v) {
   return sum / 2;
 }
 
-/* out = J w for a batch; `bodies` and `internal` are constants after inlining. */
-PW_INLINE void evaluate_multiply_J (const pw_system *s, const pw_element_batch *k, const double *w, double *out,
+/* out = J x for a batch; `bodies` and `internal` are constants after inlining. */
+PW_INLINE void evaluate_multiply_J (const pw_system *s, const pw_element_batch *k, const double *x, double *out,
                                     int bodies, int internal) {
   static const double ground[3] = { 0, 0, 0 };
-  const double *J = k->J, *x[PW_MAX_BODIES] = { 0 }, *y = w + k->internal;
+  const double *J = k->J, *X[PW_MAX_BODIES] = { 0 }, *y = x + k->internal; /* entries of x: of each body, internal */
   const int *column = k->column;
   for (int e = 0; e < k->b.count; e++, column += bodies, y += internal) {
-    PW_UNROLL for (int n = 0; n < bodies; n++) x[n] = column[n] < s->coords ? w + column[n] : ground;
+    PW_UNROLL for (int n = 0; n < bodies; n++) X[n] = column[n] < s->coords ? x + column[n] : ground;
     for (int r = 0; r < k->kind->rows; r++) {
       double sum = 0;
-      PW_UNROLL for (int n = 0; n < bodies; n++, J += 3) sum += J[0] * x[n][0] + J[1] * x[n][1] + J[2] * x[n][2];
+      PW_UNROLL for (int n = 0; n < bodies; n++, J += 3) sum += J[0] * X[n][0] + J[1] * X[n][1] + J[2] * X[n][2];
       for (int n = 0; n < internal; n++) sum += *J++ * y[n];
       *out++ = sum;
     }
@@ -146,8 +145,7 @@ void pw_add_JT (const pw_workspace *w, const double *lambda, double *out) {
   }
 }
 
-/* The largest residual and the largest scaled residual so far, and the constraint equation of the latter.  NaN is the
- * largest. */
+/* The largest absolute and scaled residual so far, and the constraint equation of the latter.  NaN is the largest. */
 typedef struct {
   double largest, scaled;
   int row;
@@ -170,26 +168,26 @@ void pw_worst_position (const pw_system *s, const double *g, const double *size,
   r->row_position = worst.row;
 }
 
-/* Updates the worst residual J v - eta with a batch, at the velocities of the workspace; eta NULL: zero. */
+/* Updates the worst residual J v - eta with a batch; eta NULL: zero; unit: L / T of a run. */
 PW_INLINE evaluate_worst evaluate_worst_velocity (const pw_element_batch *k, const double *eta,
                                                   const unsigned char *enforced, double unit, evaluate_worst worst,
                                                   int bodies, int internal) {
-  const double *J = k->J, *y = k->b.v;
+  const double *J = k->J, *spin = k->b.v;
   const int *body = k->b.body;
   int i = k->row;
-  for (int e = 0; e < k->b.count; e++, body += bodies, y += internal)
+  for (int e = 0; e < k->b.count; e++, body += bodies, spin += internal)
     for (int r = 0; r < k->kind->rows; r++, i++) {
       double sum = 0, size = 0;
       PW_UNROLL for (int n = 0; n < bodies; n++, J += 3) {
         const pw_configuration *p = &k->b.configuration[body[n]];
-        double vx = J[0] * p->vx, vy = J[1] * p->vy, w = J[2] * p->omega;
-        sum += vx + vy + w;
-        size += fabs (vx) + fabs (vy) + fabs (w);
+        double x = J[0] * p->vx, y = J[1] * p->vy, phi = J[2] * p->omega; /* terms of J v */
+        sum += x + y + phi;
+        size += fabs (x) + fabs (y) + fabs (phi);
       }
       for (int n = 0; n < internal; n++) {
-        double spin = *J++ * y[n];
-        sum += spin;
-        size += fabs (spin);
+        double term = *J++ * spin[n];
+        sum += term;
+        size += fabs (term);
       }
       if (eta) sum -= eta[i], size += fabs (eta[i]);
       if (enforced == NULL || enforced[i]) worst = evaluate_update_worst (worst, i, sum, size + unit);

@@ -3,7 +3,7 @@
 #include <stdio.h>
 #include "system.h"
 
-/* The first element with a non-finite value among its `each` values, or -1. */
+/* The first of `count` elements, of `each` numbers, with one that is not finite; -1: there is none. */
 static int finite_first (const double *x, int count, int each) {
   for (int i = 0; i < count * each; i++)
     if (!isfinite (x[i])) return i / each;

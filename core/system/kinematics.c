@@ -5,7 +5,6 @@
 #include "signal.h"
 #include "unroll.h"
 
-/* Internal coordinates are not copied: batches point into q and v. */
 void pw_point_to_internal (pw_workspace *w, const double *q, const double *v) {
   for (pw_element_batch *k = w->batch; k < w->batch + w->s->batches; k++) {
     if (q) k->b.q = q + k->internal;
@@ -32,7 +31,7 @@ static inline void kinematics_configurations (pw_workspace *w, const double *q, 
   }
 }
 
-/* Copies the states a function reads; q NULL: only velocities.  Returns the number of states copied. */
+/* Copies the states that a function reads; q NULL: only velocities.  Returns the number of states copied. */
 static int kinematics_copy_states (const pw_workspace *w, const pw_source *source, const double *q, const double *v) {
   int copied = 0;
   for (int r = 0; r < source->reads; r++) {
@@ -44,8 +43,7 @@ static int kinematics_copy_states (const pw_workspace *w, const pw_source *sourc
   return copied;
 }
 
-/* Evaluates the state-dependent signals (q NULL: only those that read velocities), or those that depend only on
- * time. */
+/* Evaluates the state-dependent signals (q NULL: only those that read velocities), or the signals of time alone. */
 PW_INLINE int kinematics_evaluate_signals (pw_workspace *w, int state_dependent, double t, const double *q,
                                            const double *v) {
   for (pw_source *source = w->source, *end = source + w->s->sources; source < end; source++) {
@@ -59,7 +57,7 @@ PW_INLINE int kinematics_evaluate_signals (pw_workspace *w, int state_dependent,
   return PW_OK;
 }
 
-/* Signals that depend on time only are evaluated once per time, also for several stages. */
+/* Signals of time alone are evaluated once per time, even if several stages of a step have the same time. */
 int pw_update_signals (pw_workspace *w, double t, const double *q, const double *v) {
   if (t != w->t_signal) {
     w->t_signal = NAN; /* if a signal fails, others have changed already */
@@ -90,11 +88,11 @@ void pw_hold_signals (pw_workspace *w, int hold) {
   w->t_signal = NAN;
 }
 
-double pw_next_breakpoint (pw_workspace *w, int knots, double t) {
+double pw_next_breakpoint (pw_workspace *w, int kinks, double t) {
   double next = INFINITY;
   for (const pw_source *source = w->source, *end = source + w->s->sources; source < end; source++) {
     double breakpoint =
-        pw_signal_breakpoint (&source->signal, knots && !source->of_force ? PW_JUMPS_AND_KINKS : PW_JUMPS, t);
+        pw_signal_breakpoint (&source->signal, kinks && !source->of_force ? PW_JUMPS_AND_KINKS : PW_JUMPS, t);
     if (breakpoint < next) next = breakpoint;
     if (breakpoint > t) continue;
     w->failed = source;

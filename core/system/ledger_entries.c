@@ -2,7 +2,7 @@
 #include <stdio.h>
 #include "system.h"
 
-/* 1 if an element may do work: it has power or a rheonomic constraint.  A position prescribed by constants does no
+/* 1 if an element may do work: its type has a function `power` or eta.  A position prescribed by constants does no
  * work. */
 static int ledger_has_work (const pw_element_batch *k, int element) {
   const pw_kind *kind = k->kind;

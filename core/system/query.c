@@ -5,7 +5,8 @@
 #include <string.h>
 #include "system.h"
 
-static const char *const query_names[] = { "x", "y", "phi", "vx", "vy", "omega" };
+/* The states of a body: names and units. */
+static const char *const query_states[] = { "x", "y", "phi", "vx", "vy", "omega" };
 static const char *const query_units[] = { "m", "m", "rad", "m/s", "m/s", "rad/s" };
 
 #define MEMBER(type, function, member) \
@@ -42,40 +43,41 @@ int pw_system_find_body (const pw_system *s, const char *name) {
   return -1;
 }
 
-/* The batch of internal coordinate j >= 3 bodies, its element, and the number of the coordinate in the element. */
-static const pw_element_batch *query_internal (const pw_system *s, int j, int *element, int *number) {
-  for (const pw_element_batch *k = s->batch; k < s->batch + s->batches; k++) {
-    int n = j - k->internal;
-    if (k->kind->internal == 0 || n < 0 || n >= k->b.count * k->kind->internal) continue;
-    *element = n / k->kind->internal;
-    *number = n % k->kind->internal;
-    return k;
+/* The batch of constraint equation, internal coordinate or signal i of the system, its element in the batch, and its
+ * number in the element.  member: offset of `rows`, `internal` or `signals` in pw_kind. */
+static const pw_element_batch *query_find_element (const pw_system *s, size_t member, int i, int *element,
+                                                   int *number) {
+  for (const pw_element_batch *k = s->batch;; k++) {
+    int per_element = *(const int *)(const void *)((const char *)k->kind + member);
+    if (i < k->b.count * per_element) {
+      *element = i / per_element;
+      *number = i % per_element;
+      return k;
+    }
+    i -= k->b.count * per_element;
   }
-  return NULL;
 }
 
 char *pw_system_state_name (const pw_system *s, int state, char *buffer, size_t size) {
   int velocity = state >= s->coords, j = velocity ? state - s->coords : state, e, n;
   if (j < 3 * s->bodies) {
-    snprintf (buffer, size, "%s.%s", s->body_name[j / 3], query_names[3 * velocity + j % 3]);
+    snprintf (buffer, size, "%s.%s", s->body_name[j / 3], query_states[3 * velocity + j % 3]);
     return buffer;
   }
-  const pw_element_batch *k = query_internal (s, j, &e, &n);
-  if (k)
-    snprintf (buffer, size, "%s.%s", k->name[e], velocity ? k->kind->coordinate[n].rate : k->kind->coordinate[n].name);
+  const pw_element_batch *k = query_find_element (s, offsetof (pw_kind, internal), j - 3 * s->bodies, &e, &n);
+  snprintf (buffer, size, "%s.%s", k->name[e], velocity ? k->kind->coordinate[n].rate : k->kind->coordinate[n].name);
   return buffer;
 }
 
 const char *pw_system_state_unit (const pw_system *s, int state) {
   int velocity = state >= s->coords, j = velocity ? state - s->coords : state, e, n;
   if (j < 3 * s->bodies) return query_units[3 * velocity + j % 3];
-  const pw_element_batch *k = query_internal (s, j, &e, &n);
-  if (k == NULL) return "";
+  const pw_element_batch *k = query_find_element (s, offsetof (pw_kind, internal), j - 3 * s->bodies, &e, &n);
   if (!velocity) return k->kind->coordinate[n].unit;
   return strcmp (k->kind->coordinate[n].unit, "m") == 0 ? "m/s" : "rad/s";
 }
 
-/* Index of the state "body.x", or -1; near->best: the nearest name if the body exists. */
+/* Index of the state "BODY.x", or -1; if only the body exists, near->best becomes its state of the nearest name. */
 static int query_body_state (const pw_system *s, const char *name, pw_nearest *near) {
   const char *dot = strrchr (name, '.');
   if (dot == NULL) return -1;
@@ -85,8 +87,8 @@ static int query_body_state (const pw_system *s, const char *name, pw_nearest *n
   if (b == s->bodies) return -1;
   pw_nearest state = { .sought = dot + 1 };
   for (int i = 0; i < 6; i++) {
-    if (strcmp (dot + 1, query_names[i]) == 0) return i < 3 ? 3 * b + i : s->coords + 3 * b + i - 3;
-    pw_nearest_try (&state, query_names[i]);
+    if (strcmp (dot + 1, query_states[i]) == 0) return i < 3 ? 3 * b + i : s->coords + 3 * b + i - 3;
+    pw_nearest_try (&state, query_states[i]);
   }
   state.sought = name;
   *near = state;
@@ -96,7 +98,8 @@ static int query_body_state (const pw_system *s, const char *name, pw_nearest *n
 
 typedef char *query_name (const pw_system *s, int i, char *buffer, size_t size);
 
-/* The index of near->sought among the names; without it, fails with the nearest one, unless that is known already. */
+/* The index of near->sought among the names that name_of gives; fails if it is not there, with a hint: near->best, or
+ * else the nearest name.  what: "state", ... */
 static int query_find (const pw_system *s, const char *what, int (*count_of) (const pw_system *s), query_name *name_of,
                        pw_nearest *near, pw_error *error) {
   char text[120];
@@ -109,35 +112,33 @@ static int query_find (const pw_system *s, const char *what, int (*count_of) (co
   return pw_fail (error, PW_INPUT, "model %s has no %s \"%s\"%s", s->model, what, near->sought, pw_nearest_text (near));
 }
 
-static int query_states (const pw_system *s) {
+static int query_state_count (const pw_system *s) {
   return 2 * s->coords;
 }
 
 int pw_system_find_state (const pw_system *s, const char *name, pw_error *error) {
   pw_nearest near = { .sought = name };
   int state = s && name ? query_body_state (s, name, &near) : -1;
-  return state >= 0 ? state : query_find (s, "state", query_states, pw_system_state_name, &near, error);
+  return state >= 0 ? state : query_find (s, "state", query_state_count, pw_system_state_name, &near, error);
 }
 
-/* The batch of a constraint equation, its element, and the number of the equation in the element. */
-static const pw_element_batch *query_row (const pw_system *s, int row, int *element, int *number) {
-  const pw_element_batch *k = s->batch;
-  while (row >= k->row + k->b.count * k->kind->rows) k++;
-  *element = (row - k->row) / k->kind->rows;
-  *number = (row - k->row) % k->kind->rows;
-  return k;
+int pw_system_row_element (const pw_system *s, int row) {
+  int element, n;
+  for (const pw_element_batch *k = query_find_element (s, offsetof (pw_kind, rows), row, &element, &n); k > s->batch;)
+    element += (--k)->b.count;
+  return element;
 }
 
 char *pw_system_reaction_name (const pw_system *s, int row, char *buffer, size_t size) {
   int e, n;
-  const pw_element_batch *k = query_row (s, row, &e, &n);
+  const pw_element_batch *k = query_find_element (s, offsetof (pw_kind, rows), row, &e, &n);
   snprintf (buffer, size, "%s.%s", k->name[e], k->kind->reaction[n].name);
   return buffer;
 }
 
 const char *pw_system_reaction_unit (const pw_system *s, int row) {
   int e, n;
-  const pw_element_batch *k = query_row (s, row, &e, &n);
+  const pw_element_batch *k = query_find_element (s, offsetof (pw_kind, rows), row, &e, &n);
   if (k->kind->reaction_unit == NULL) return k->kind->reaction[n].unit;
   return k->kind->reaction_unit ((const char *)k->b.element + (size_t)e * k->kind->element, n);
 }
@@ -148,48 +149,40 @@ int pw_system_find_reaction (const pw_system *s, const char *name, pw_error *err
 
 char *pw_system_row_name (const pw_system *s, int row, char *buffer, size_t size) {
   int e, n;
-  const pw_element_batch *k = query_row (s, row, &e, &n);
+  const pw_element_batch *k = query_find_element (s, offsetof (pw_kind, rows), row, &e, &n);
   snprintf (buffer, size, "%s %s", k->kind->name, k->name[e]);
   return buffer;
 }
 
-/* The field of the n-th signal of an element type; *n becomes the index of its value. */
-static const pw_field *query_signal_field (const pw_kind *kind, int *n) {
-  const pw_field *f = kind->fields;
-  for (; f->name; f++) {
-    if (f->type != PW_SIGNAL) continue;
-    if (*n < pw_field_count (f)) break;
-    *n -= pw_field_count (f);
-  }
-  return f;
-}
-
-/* The batch of a signal; *n becomes its number among those of the batch. */
-static const pw_element_batch *query_signal (const pw_system *s, int *n) {
-  const pw_element_batch *k = s->batch;
-  for (; *n >= k->b.count * k->kind->signals; k++) *n -= k->b.count * k->kind->signals;
+/* The batch, element and field of a signal, and its index in this field. */
+static const pw_element_batch *query_signal (const pw_system *s, int signal, int *element, const pw_field **field,
+                                             int *index) {
+  const pw_element_batch *k = query_find_element (s, offsetof (pw_kind, signals), signal, element, index);
+  const pw_field *f = k->kind->fields;
+  for (; f->type != PW_SIGNAL || *index >= pw_field_count (f); f++)
+    if (f->type == PW_SIGNAL) *index -= pw_field_count (f);
+  *field = f;
   return k;
 }
 
 int pw_system_signal_forced (const pw_system *s, int signal) {
-  return pw_kind_signals_force (query_signal (s, &signal)->kind);
+  return s->source[signal].of_force;
 }
 
 char *pw_system_signal_name (const pw_system *s, int signal, char *buffer, size_t size) {
-  const pw_element_batch *k = query_signal (s, &signal);
-  int n = signal % k->kind->signals;
-  const pw_field *f = query_signal_field (k->kind, &n);
-  int length = snprintf (buffer, size, "%s.%s", k->name[signal / k->kind->signals], f->name ? f->name : "signal");
-  if (f->name && pw_field_count (f) > 1 && (size_t)length < size)
-    snprintf (buffer + length, size - (size_t)length, "[%d]", n);
+  int e, n;
+  const pw_field *f;
+  const pw_element_batch *k = query_signal (s, signal, &e, &f, &n);
+  int length = snprintf (buffer, size, "%s.%s", k->name[e], f->name);
+  if (pw_field_count (f) > 1 && (size_t)length < size) snprintf (buffer + length, size - (size_t)length, "[%d]", n);
   return buffer;
 }
 
 const char *pw_system_signal_unit (const pw_system *s, int signal) {
-  const pw_kind *kind = query_signal (s, &signal)->kind;
-  int n = signal % kind->signals;
-  const pw_field *f = query_signal_field (kind, &n);
-  return f->name && f->unit ? f->unit : "";
+  int e, n;
+  const pw_field *f;
+  query_signal (s, signal, &e, &f, &n);
+  return f->unit ? f->unit : "";
 }
 
 int pw_system_find_signal (const pw_system *s, const char *name, pw_error *error) {
@@ -204,12 +197,10 @@ int pw_system_find_signal (const pw_system *s, const char *name, pw_error *error
 char *pw_failed_signal (const pw_workspace *w, char *buffer, size_t size) {
   buffer[0] = 0;
   if (w->failed == NULL) return buffer;
-  int signal = (int)(w->failed - w->source);
-  const pw_element_batch *k = query_signal (w->s, &signal);
-  int n = signal % k->kind->signals;
-  const pw_field *f = query_signal_field (k->kind, &n);
-  snprintf (buffer, size, "%s %.60s: %s", k->kind->name, k->name[signal / k->kind->signals],
-            f->name ? f->name : "signal");
+  int e, n;
+  const pw_field *f;
+  const pw_element_batch *k = query_signal (w->s, (int)(w->failed - w->source), &e, &f, &n);
+  snprintf (buffer, size, "%s %s: %s", k->kind->name, k->name[e], f->name);
   return buffer;
 }
 

@@ -1,4 +1,4 @@
-/* The changes of positions and velocities over which saturating forces, such as friction, reverse. */
+/* The changes of positions and velocities that reverse saturating forces, such as friction (pw_kind.saturation). */
 #include <math.h>
 #include <stdio.h>
 #include "system.h"

@@ -10,9 +10,8 @@
 #include "model.h"
 #include "signal.h"
 
-/* One element type in use: its batch, and the indices of its constraint equations and coordinates.  Data modified by
- * a run (the last four arrays, and what b points to for configurations, velocities and signals) are only in the
- * batches of a workspace. */
+/* One element type in use: its batch, and the indices of its constraint equations and coordinates.  What a run modifies
+ * (J, block, u, and the configurations, velocities and signals of b) is NULL in a system: workspaces have it. */
 typedef struct {
   pw_batch b; /* the argument of the type's functions */
   const pw_kind *kind;
@@ -21,7 +20,7 @@ typedef struct {
   const int *column; /* count x bodies: first coordinate of each body; s->coords for the ground */
   const char **name; /* count */
   double *J;         /* count x rows x cols */
-  double *block;     /* scratch for forces, energies, contacts, saturation */
+  double *block;     /* count x cols: scratch for forces, energies, powers; count x 2 cols for saturation */
   double *u;         /* count x signals x 3, as b.u */
   pw_source *source; /* count x signals, part of the array of all sources */
 } pw_element_batch;
@@ -41,10 +40,10 @@ struct pw_system {
   int forces;              /* batches with a force that is not constant */
   int saturates;           /* 1: some of these have a function `saturation` */
   int sources;             /* signals */
-  int state_dependent;     /* of these, state-dependent */
-  int reads;               /* total number of states they read */
-  int rheonomic;           /* batches with an eta: J v = eta may be other than 0 */
-  pw_scale scale;          /* the time is 1 s here; a run's is in its workspace */
+  int state_dependent;     /* signals that depend on states */
+  int reads;               /* number of states that they read, with repetitions */
+  int rheonomic;           /* batches whose eta may be other than 0 */
+  pw_scale scale;          /* with T = 1 s; T of a run is in its workspace */
   const char **body_name;  /* bodies */
   double *mass;            /* coords: diagonal of M */
   double *constant;        /* coords + 3: sum of the constant forces */
@@ -61,25 +60,25 @@ struct pw_workspace {
   const pw_system *s;
   pw_element_batch *batch;         /* batches: copies of the system's, with arrays of this workspace */
   pw_element_batch **force;        /* those with a force that is not constant */
-  pw_source *source;               /* sources, in the order of the system's */
+  pw_source *source;               /* sources: copies of the system's, with contexts of this workspace */
   double *u, *J;                   /* those of all batches: sources x 3; entries of J, element by element */
   pw_configuration *configuration; /* bodies + 1; the last is the ground */
-  double *scratch;                 /* rows x 3 + coords + 3 */
+  double *scratch;                 /* rows x 3 + coords + 3, for the function in progress */
   pw_scale scale;                  /* the run's */
-  int hold;                        /* 1: signals of forces are constant (inputs=held) */
+  int hold;                        /* 1: signals of forces keep their values (pw_hold_signals) */
   double t_signal;                 /* time of the last evaluation of signals; NaN: evaluate them again */
   const pw_source *failed;         /* the last signal that failed, or NULL */
 };
 
-/* Lists the entries of the ledger, unless entry is NULL, of a system with signals.  Returns their number. */
+/* Stores the entries of the ledger, unless entry is NULL.  Returns their number.  Call it when signals are compiled. */
 int pw_ledger_list (const pw_system *s, pw_entry *entry);
 
-/* Closes the contexts made by `open`; signals not opened yet are all zero. */
+/* Closes the contexts made by `open`.  Signals that have not been stored yet may be all zero. */
 void pw_close_signals (const pw_source *source, int count);
 
-/* Origin of an initial value: given by the user, which takes precedence; specified by the model; a position 0 of a
- * model that does not say whether it is specified.  0: unspecified. */
-enum { PW_GIVEN = 1, PW_SPECIFIED = 2, PW_UNSPECIFIED = 4 };
+/* Origin of an initial value: given by the user, which takes precedence; specified by the model; a position 0 of a body
+ * that does not say which values are specified.  0: none of these. */
+enum { PW_GIVEN = 1, PW_SPECIFIED = 2, PW_ZERO_POSITION = 4 };
 
 /* Writes the last signal that failed, "torque T: value", or "", to the buffer and returns it. */
 char *pw_failed_signal (const pw_workspace *w, char *buffer, size_t size);
@@ -106,9 +105,9 @@ int pw_update_kinematics (pw_workspace *w, double t, const double *q, const doub
 /* Updates velocities, and signals that read them, at unchanged time and positions.  Returns as pw_update_kinematics. */
 int pw_update_velocities (pw_workspace *w, const double *v);
 
-/* Evaluates signals that have changed; non-zero if one fails. */
+/* Evaluates signals whose time or states have changed.  Returns as pw_update_kinematics. */
 int pw_update_signals (pw_workspace *w, double t, const double *q, const double *v);
-/* Configurations have been stored by specialised code: points the batches to internal coordinates. */
+/* Points the batches to the internal coordinates in q, v; q NULL: only to their velocities. */
 void pw_point_to_internal (pw_workspace *w, const double *q, const double *v);
 
 /* 1: the signals of forces keep their current values; 0: they are evaluated again. */
@@ -123,20 +122,20 @@ void pw_evaluate_eta (pw_workspace *w, double *eta);
 void pw_evaluate_gamma (pw_workspace *w, double *gamma);
 void pw_evaluate_force (pw_workspace *w, double *f);
 void pw_evaluate_constant (pw_workspace *w, double *f); /* adds the constant forces */
-/* 2 coords: the smallest change of each state over which a saturating force changes by its own magnitude; INFINITY
- * if there is none.  Only if the system `saturates`. */
+/* 2 coords: the smallest change of each state that reverses a saturating force or changes it by its own magnitude;
+ * INFINITY if there is none. */
 void pw_evaluate_saturation (pw_workspace *w, double *least);
-/* The smallest of these for velocities, and its element ("friction hinge").  Returns the state, or -1 if no force
- * saturates. */
+/* The smallest of these changes of velocities, and its element ("friction hinge").  Returns the state, numbered as in
+ * pw_system_find_state, or -1 if no force saturates. */
 int pw_find_saturation (pw_workspace *w, double *least, char *element, size_t size);
 double pw_potential (pw_workspace *w);
-/* The potential energy of each element [J], in the order of the batches; elements without one are left out. */
+/* The potential energy of each element [J], in the order of the batches; entries of types without one are not set. */
 void pw_evaluate_energies (pw_workspace *w, double *out);
 double pw_kinetic (const pw_system *s, const double *v);
 /* Power of each entry of the ledger [W]; needs J and lambda. */
 void pw_evaluate_ledger (pw_workspace *w, const double *lambda, double *rate);
 
-/* out = J x; out += J^T lambda; with the last evaluated J. */
+/* out = J x; out += J^T lambda; with J as evaluated last. */
 void pw_mul_J (const pw_workspace *w, const double *x, double *out);
 void pw_add_JT (const pw_workspace *w, const double *lambda, double *out);
 
@@ -146,12 +145,13 @@ static inline int pw_global (const pw_element_batch *k, int e, int c) {
   return c < n ? k->column[e * k->kind->bodies + c / 3] + c % 3 : k->internal + e * k->kind->internal + c - n;
 }
 
-/* Worst residuals after an update of kinematics and J: scaled and absolute. */
+/* Worst residuals of g = 0 and J v = eta. */
 typedef struct {
-  double position, velocity, g, jv;
+  double position, velocity;      /* scaled */
+  double g, jv;                   /* absolute */
   int row_position, row_velocity; /* equations with the worst scaled residuals, or -1 */
 } pw_residuals;
-/* Only equations with enforced[i] != 0, unless enforced is NULL. */
+/* At the kinematics and J of the workspace; only equations with enforced[i] != 0, unless enforced is NULL. */
 void pw_evaluate_residuals (pw_workspace *w, const unsigned char *enforced, pw_residuals *r);
 void pw_evaluate_position_residual (pw_workspace *w, const unsigned char *enforced, pw_residuals *r); /* g = 0 only */
 /* J v = eta only */
@@ -160,12 +160,11 @@ void pw_evaluate_velocity_residual (pw_workspace *w, const unsigned char *enforc
 void pw_worst_position (const pw_system *s, const double *g, const double *size, const unsigned char *enforced,
                         pw_residuals *r);
 
-/* First discontinuity of any signal after t, or INFINITY; with `knots` also kinks in second derivatives of signals of
- * constraints.  NaN if the breakpoint function of a signal returned a time that is not later. */
-double pw_next_breakpoint (pw_workspace *w, int knots, double t);
+/* The first time after t at which a step must end because of a signal, or INFINITY: PW_JUMPS of all signals; kinks: 1:
+ * PW_JUMPS_AND_KINKS of those of constraints.  NaN if the breakpoint function of a signal returned a time <= t. */
+double pw_next_breakpoint (pw_workspace *w, int kinks, double t);
 
-/* 1 if the force, J or gamma of an element is not finite at the current state; writes "force of attraction sun" to the
- * buffer. */
+/* 1 if a force, J or gamma is not finite at the current state; writes "force of spring S" to the buffer. */
 int pw_find_nonfinite (pw_workspace *w, char *buffer, size_t size);
 
 /* The function at this offset of the type's table. */
@@ -173,11 +172,11 @@ static inline pw_batch_function *pw_kind_function (const pw_kind *kind, size_t o
   return *(pw_batch_function *const *)(const void *)((const char *)kind + offset);
 }
 
-/* Second-order blocks: terms of the exact Newton matrices of implicit methods besides M, J and J^T. */
+/* Second-order blocks: the terms of exact Newton matrices other than M, J and J^T.  JW_Q: d(J w)/dq; JTL_Q: d(J^T
+ * lambda)/dq; ETA_Q: d eta/dq; ... */
 typedef enum { PW_JW_Q, PW_JTL_Q, PW_ETA_Q, PW_GAMMA_Q, PW_GAMMA_V, PW_FORCE_Q, PW_FORCE_V, PW_BLOCKS } pw_block;
 
-/* The type's function for a block: NULL if identically zero, pw_by_differences if the core computes it by
- * differences. */
+/* The type's function for a block: NULL if identically zero, or pw_by_differences. */
 pw_batch_function *pw_block_function (const pw_kind *kind, pw_block block);
 
 /* Rows of a block per element: kind->rows or the number of local columns. */
@@ -187,12 +186,11 @@ int pw_block_rows (const pw_kind *kind, pw_block block);
  * the type is PW_BY_DIFFERENCES there.  Returns 0 without changing out if the block is identically zero. */
 int pw_evaluate_block (const pw_workspace *w, const pw_element_batch *k, pw_block block, double *out);
 
-/* 1 if the type gives NULL for a block of element e that is not zero by differences; configurations, w and lambda
- * must be set. */
+/* 1 if the type gives NULL for a block of element e that differences show not to be zero; needs w and lambda. */
 int pw_block_missing (const pw_workspace *w, const pw_element_batch *k, int e, pw_block block);
 
 /* Searches for such a block near the state q, v at time t, in a few elements of each type that is not built-in
- * (built-in ones pass the self-test).  Returns 1 and writes its name ("force_q of element type well") to the buffer;
+ * (built-in ones pass the self-test).  Returns 1 and writes its name ("force_q of element type magnet") to the buffer;
  * 0 if there is none; PW_RESOURCE.  Update the kinematics afterwards. */
 int pw_find_missing_block (pw_workspace *w, double t, const double *q, const double *v, char *buffer, size_t size);
 

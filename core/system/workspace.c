@@ -11,20 +11,22 @@ static size_t workspace_entries (const pw_system *s) {
   return entries;
 }
 
-/* Copies a batch of the system, with arrays of the workspace. */
-static void workspace_batch (pw_layout *layout, const pw_element_batch *from, const pw_workspace *w, double *u,
-                             double *J, pw_element_batch *k) {
+/* Copies batch i of the system, with arrays of the workspace.  *J: advances over the batch's part of w->J. */
+static void workspace_batch (pw_layout *layout, const pw_workspace *w, int i, double **J) {
+  const pw_element_batch *from = &w->s->batch[i];
   const pw_kind *kind = from->kind;
   size_t n = (size_t)from->b.count, cols = (size_t)from->b.cols;
-  size_t block = kind->saturation ? 2 * cols : cols > 3 ? cols : 3; /* saturation; force; contact */
-  int scratch = kind->force || kind->energy || kind->power || kind->loss || kind->contact;
-  double *space = pw_layout_alloc (layout, scratch ? n * block : 0, sizeof *space);
+  int used = kind->force || kind->energy || kind->power || kind->loss;
+  double *block = pw_layout_alloc (layout, used ? n * (kind->saturation ? 2 : 1) * cols : 0, sizeof *block);
   if (layout->base == NULL) return;
+  pw_element_batch *k = &w->batch[i];
   *k = *from;
-  k->J = J, k->block = space, k->b.u = k->u = u;
+  k->J = *J, k->block = block;
+  *J += n * (size_t)kind->rows * cols;
+  k->source = w->source + (from->source - w->s->source);
+  k->b.u = k->u = w->u + 3 * (k->source - w->source);
   k->b.configuration = w->configuration;
   k->b.q = w->s->q0 + k->internal, k->b.v = w->s->v0 + k->internal; /* until kinematics are updated */
-  k->source = w->source + (from->source - w->s->source);
 }
 
 static void workspace_layout (pw_layout *layout, pw_workspace *w) {
@@ -37,14 +39,8 @@ static void workspace_layout (pw_layout *layout, pw_workspace *w) {
   w->scratch = pw_layout_alloc (layout, (size_t)(3 * s->rows + s->coords) + 3, sizeof *w->scratch);
   w->u = pw_layout_alloc (layout, 3 * (size_t)s->sources, sizeof *w->u);
   w->J = pw_layout_alloc (layout, workspace_entries (s), sizeof *w->J);
-  double *u = w->u, *J = w->J;
-  for (int i = 0; i < s->batches; i++) {
-    const pw_element_batch *k = &s->batch[i];
-    workspace_batch (layout, k, w, u, J, layout->base ? &w->batch[i] : NULL);
-    if (layout->base == NULL) continue;
-    u += 3 * k->b.count * k->kind->signals;
-    J += (size_t)k->b.count * (size_t)(k->kind->rows * k->b.cols);
-  }
+  double *J = w->J;
+  for (int i = 0; i < s->batches; i++) workspace_batch (layout, w, i, &J);
   double *x = pw_layout_alloc (layout, 2 * (size_t)s->reads, sizeof *x);
   for (int i = 0; layout->base && i < s->sources; i++) {
     w->source[i] = s->source[i];
@@ -53,7 +49,7 @@ static void workspace_layout (pw_layout *layout, pw_workspace *w) {
   }
 }
 
-/* Sets where signals are evaluated to; opens a context of this workspace for each function signal with `open`. */
+/* Sets where signals store their values; opens a context of this workspace for each function signal with `open`. */
 static int workspace_open_signals (pw_workspace *w) {
   int status = PW_OK;
   for (pw_element_batch *k = w->batch; k < w->batch + w->s->batches; k++)
@@ -62,9 +58,9 @@ static int workspace_open_signals (pw_workspace *w) {
       k->source[i].u = k->u + 3 * i;
       if (k->source[i].signal.type != PW_FUNCTION || f->open == NULL) continue;
       f->context = status == PW_OK ? f->open (f->context) : NULL;
-      if (f->context == NULL)
-        status = PW_RESOURCE,
-        f->close = NULL; /* this one, and the following ones, which are not opened, will not be closed */
+      if (f->context) continue;
+      status = PW_RESOURCE; /* pw_close_signals must skip this signal and the following ones, which are not opened */
+      f->close = NULL;
     }
   return status;
 }

@@ -271,7 +271,7 @@ static const struct initial_set {
   enum {
     INITIAL_FREE,
     INITIAL_MASS,
-    INITIAL_MASS_UNSPECIFIED /* as INITIAL_MASS, but the set applies only if one of them is PW_UNSPECIFIED */
+    INITIAL_MASS_UNSPECIFIED /* as INITIAL_MASS, but the set applies only if one of them is PW_ZERO_POSITION */
   } mass;
 } initial_sets[] = {
   { PW_GIVEN | PW_SPECIFIED, PW_GIVEN | PW_SPECIFIED, INITIAL_MASS },
@@ -300,7 +300,7 @@ static int initial_prescribe (const pw_system *s, const unsigned char *origin, c
     prescribed[j] = (q & set->q) != 0 || by_mass;
     prescribed[n + j] = (v & set->v) != 0;
     massless += s->mass[j] == 0 && !prescribed[j];
-    massive += by_mass, unspecified += by_mass && q & PW_UNSPECIFIED;
+    massive += by_mass, unspecified += by_mass && q & PW_ZERO_POSITION;
   }
   return !set->mass || (massless > 0 && massive > 0 && (set->mass == INITIAL_MASS || unspecified > 0));
 }

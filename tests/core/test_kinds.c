@@ -175,6 +175,7 @@ static void kinds_expect_fault (const pw_kind *kind, const char *fault) {
 static const pw_field kinds_choice[] = { { .name = "mode", .offset = 8, .type = PW_CHOICE }, { .name = NULL } };
 static const pw_field kinds_typeless[] = { { .name = "mode", .offset = 8, .type = (pw_field_type)77 },
                                            { .name = NULL } };
+static const pw_field kinds_domain[] = { { .name = "mode", .offset = 8, .domain = (pw_domain)77 }, { .name = NULL } };
 
 #define KINDS_50 "a-name-of-fifty-bytes-that-is-longer-than-it-shoul"
 #define KINDS_TEXT ": expected at most 50 bytes of UTF-8 without control characters"
@@ -205,6 +206,7 @@ static void test_faults (void **state) {
   KINDS_FAULT (prepare, NULL, "an element or internal coordinates, but no prepare function");
   KINDS_FAULT (fields, NULL, "no table of fields");
   KINDS_FAULT (fields, kinds_typeless, "field mode: its type does not exist");
+  KINDS_FAULT (fields, kinds_domain, "field mode: its domain does not exist");
   KINDS_FAULT (definition, 16,
                "field body: it lies outside the definition: is .definition its sizeof, its first member the name?");
   KINDS_FAULT (fields, kinds_choice, "field mode: a choice without choices");

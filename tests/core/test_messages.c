@@ -251,6 +251,7 @@ static void test_missing_names (void **state) {
 }
 
 static const pw_parameter messages_outside[] = { { "a", 8, 1, "m", "a length", PW_REAL }, { .name = NULL } };
+static const pw_parameter messages_domain[] = { { "a", 0, 1, "m", "a length", (pw_domain)77 }, { .name = NULL } };
 
 static void test_bad_parameters (void **state) {
   (void)state;
@@ -261,6 +262,10 @@ static void test_bad_parameters (void **state) {
   assert_null (pw_model_new ("scene", &table, &error));
   check_error (&error, PW_INPUT,
                "model scene: parameter a lies outside the model's structure: set .parameters_size to its sizeof");
+  error = (pw_error){ 0 };
+  table.parameters = messages_domain;
+  assert_null (pw_model_new ("scene", &table, &error));
+  check_error (&error, PW_INPUT, "model scene: parameter a: its domain does not exist");
 }
 
 static void messages_empty (pw_model *m, const void *parameters) {

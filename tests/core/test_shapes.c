@@ -278,6 +278,8 @@ static void test_faults (void **state) {
                   FAULT "point 4 is at t = -0.3 s, after one at 0.7 s: expected increasing times");
   shapes_refused (SHAPES_FORCE, shapes_points (shapes_t, y, 4, PW_LINEAR),
                   FAULT "point 3 is (1.5, nan): expected finite numbers");
+  shapes_refused (SHAPES_FORCE, (pw_signal){ PW_TABLE, .table = { t, t, 4, PW_LINEAR, 0, 1e308, 1e308 } },
+                  FAULT "point 2: offset + scale * 1 is not finite");
   shapes_refused (SHAPES_FORCE, shapes_points (t, t, 1, PW_LINEAR),
                   FAULT "a linear table needs at least 2 points, found 1");
   shapes_refused (SHAPES_FORCE, shapes_points (NULL, t, 3, PW_LINEAR),

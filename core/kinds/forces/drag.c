@@ -1,11 +1,10 @@
-/* drag: resistance of air at rest to the translation and rotation of a body; the force acts at its centre of mass.
+/* drag: resistance of still air to the translation and rotation of a body; the force acts at its centre of mass.
  *
  *   F = -(c1 + c2 |v|) v,  v = (vx, vy)
- *   M = -(d1 + d2 |w|) w
- *   f = (Fx, Fy, M),  loss = -F . v - M w >= 0
+ *   M = -(d1 + d2 |omega|) omega
+ *   f = (Fx, Fy, M),  loss = -F . v - M omega >= 0
  *
  * (Batchelor 1967, An Introduction to Fluid Dynamics, sections 4.9 and 5.11: low and high Reynolds numbers.) */
-#include <math.h>
 #include <string.h>
 #include "batch.h"
 
@@ -18,12 +17,12 @@ typedef struct {
 typedef struct {
   const drag *element;
   const pw_configuration *body;
-  double speed, force_per_speed, moment_per_omega; /* |v|, c1 + c2 |v|, d1 + d2 |w| */
+  double speed, force_per_speed, moment_per_omega; /* |v|, c1 + c2 |v|, d1 + d2 |omega| */
 } drag_state;
 
 static inline drag_state drag_at (const pw_batch *batch, int e) {
   const drag *element = (const drag *)batch->element + e;
-  const pw_configuration *body = batch_only_body (batch, e);
+  const pw_configuration *body = batch_body (batch, e);
   double speed = hypot (body->vx, body->vy);
   return (drag_state){ element, body, speed, element->linear + element->quadratic * speed,
                        element->turning + element->turning_quadratic * fabs (body->omega) };
@@ -40,7 +39,7 @@ PER_ELEMENT (drag_force, drag, 3) {
   out[2] = -now.moment_per_omega * now.body->omega;
 }
 
-/* d(|v| v)/dv = |v| 1 + v v^T / |v|, zero at rest; v / |v| is divided, since 1 / |v| may overflow. */
+/* d(|v| v)/dv = |v| I + v v^T / |v|, zero at rest.  e = v / |v|, not v times 1 / |v|, which may overflow. */
 PER_ELEMENT (drag_force_v, drag, 9) {
   double ex = now.speed > 0 ? now.body->vx / now.speed : 0, ey = now.speed > 0 ? now.body->vy / now.speed : 0;
   double quadratic = now.element->quadratic;

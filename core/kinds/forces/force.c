@@ -2,9 +2,10 @@
  *
  *   F = (ux, uy) or R(phi) (ux, uy)
  *   f = (Fx, Fy, X Fy - Y Fx),  (X, Y) = R(phi) s
- *   power = F . v_P = Fx vx + Fy vy + (X Fy - Y Fx) w
+ *   power = F . v_P = Fx vx + Fy vy + (X Fy - Y Fx) omega
  *
- * (Shabana 2001, Computational Dynamics, section 5.3.) It has no reaction on another body. */
+ * (Shabana 2001, Computational Dynamics, section 5.3.)
+ * There is no reaction on another body. */
 #include <string.h>
 #include "batch.h"
 
@@ -17,14 +18,14 @@ typedef struct {
 typedef struct {
   const force *element;
   const pw_configuration *body;
-  double cos, sin;  /* of the angle of the axes along which it is given */
+  double cos, sin;  /* of the angle of the axes of ux, uy */
   double arm[2];    /* (X, Y) */
   double Fx, Fy, M; /* components in the world, moment */
 } force_state;
 
 static inline force_state force_at (const pw_batch *batch, int e) {
   const force *element = (const force *)batch->element + e;
-  const pw_configuration *body = batch_only_body (batch, e);
+  const pw_configuration *body = batch_body (batch, e);
   const double *ux = batch->u + 6 * e, *uy = ux + 3; /* the signals, each with two time derivatives */
   force_state now = { element, body, .cos = element->body_axes > 0 ? body->cos : 1,
                       .sin = element->body_axes > 0 ? body->sin : 0 };

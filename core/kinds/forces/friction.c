@@ -1,11 +1,11 @@
 /* friction: a torque opposing the rotation of body 1 relative to body 2, as in a pin.
  *
- *   f = (0, 0, -T | 0, 0, T) = -T S,  S = [ 0 0 1 | 0 0 -1 ],  loss = T w >= 0,  w = w1 - w2    T(w): F(v) of coulomb.h
+ *   f = (0, 0, -T | 0, 0, T) = -T S,  S = [ 0 0 1 | 0 0 -1 ],  loss = T v >= 0       v = omega1 - omega2, T = F(v)
  *
- * The limit is the friction coefficient times radius times load. */
+ * F(v) as in coulomb.h; its limit is the friction coefficient times radius times load. */
 #include "coulomb.h"
 
-/* Friction in the current state; v: w. */
+/* Friction in the current state; dv/dq = 0. */
 typedef struct {
   const coulomb *law;
   double v, S[6], v_q[6];
@@ -13,7 +13,8 @@ typedef struct {
 
 static inline friction_state friction_at (const pw_batch *batch, int e) {
   return (friction_state){ (const coulomb *)batch->element + e,
-                           batch_body1 (batch, e)->omega - batch_body2 (batch, e)->omega, .S = { [2] = 1, [5] = -1 } };
+                           batch_body (batch, 2 * e)->omega - batch_body (batch, 2 * e + 1)->omega,
+                           .S = { [2] = 1, [5] = -1 } };
 }
 
 PREPARE (friction_prepare, pw_friction, coulomb) {

@@ -13,7 +13,7 @@ typedef struct {
 } gravity_state;
 
 static inline gravity_state gravity_at (const pw_batch *batch, int e) {
-  return (gravity_state){ (const gravity *)batch->element + e, batch_only_body (batch, e) };
+  return (gravity_state){ (const gravity *)batch->element + e, batch_body (batch, e) };
 }
 
 PREPARE (gravity_prepare, pw_gravity, gravity) {

@@ -1,13 +1,11 @@
-/* motor: a saturating torque between body 1 and body 2 that tracks a relative angle u1 and angular velocity u2
- * (signals).
+/* motor: a torque of limited size that drives the relative angle and angular velocity of two bodies to signals u1, u2.
  *
- *   y = k (u1 - phi1 + phi2) + c (u2 - w1 + w2)
+ *   y = k (u1 - phi1 + phi2) + c (u2 - omega1 + omega2)
  *   T = L tanh (y / L);  T = y without a limit L
- *   f = (0, 0, T | 0, 0, -T),  power = T (w1 - w2)
+ *   f = (0, 0, T | 0, 0, -T),  power = T (omega1 - omega2)
  *
  * (Spong, Hutchinson & Vidyasagar 2006, Robot Modeling and Control, section 6.3, for the law; tanh keeps it smooth.)
  * All of its power counts as work, not as loss or potential energy; it is negative when the motor brakes. */
-#include <math.h>
 #include <string.h>
 #include "batch.h"
 
@@ -20,12 +18,12 @@ typedef struct {
 typedef struct {
   const motor *element;
   const pw_configuration *body1, *body2;
-  double y, T, slope; /* y, T, dT/dy */
+  double y, T, slope; /* slope: dT/dy */
 } motor_state;
 
 static inline motor_state motor_at (const pw_batch *batch, int e) {
   const motor *element = (const motor *)batch->element + e;
-  const pw_configuration *body1 = batch_body1 (batch, e), *body2 = batch_body2 (batch, e);
+  const pw_configuration *body1 = batch_body (batch, 2 * e), *body2 = batch_body (batch, 2 * e + 1);
   const double *angle = batch->u + 6 * e, *rate = angle + 3; /* the signals u1, u2, each with two time derivatives */
   motor_state now = { element, body1, body2,
                       .y = element->stiffness * (angle[0] - body1->phi + body2->phi) +
@@ -57,7 +55,7 @@ PER_ELEMENT (motor_force_v, motor, 36) {
   opposite_moments_block (now.slope * now.element->damping, out);
 }
 
-/* The changes that change y by L + |y|, which reverses a saturated torque. */
+/* Changes of angles and angular velocities that change y by L + |y|, which reverses a saturated torque. */
 PER_ELEMENT (motor_saturation, motor, 12) {
   double limit = now.element->limit, stiffness = now.element->stiffness, damping = now.element->damping;
   if (limit > 0 && stiffness > 0) out[2] = out[5] = (limit + fabs (now.y)) / stiffness;

@@ -1,21 +1,21 @@
 /* rolling-resistance: a force along a heading that opposes the velocity of the contact point P in that direction.
  *
- *   F = L tanh (v / v0),  v = S (vx, vy, w)                        v: speed of P along the heading (coulomb.h)
+ *   F = L tanh (v / v0),  v = S (vx, vy, omega)                    v: speed of P along the heading (coulomb.h)
  *   S = [ cos(theta)  sin(theta)  -m ]          theta = phi + psi, psi: heading in the body; m: arm of P to its left
  *   f = -F S,  loss = F v >= 0
  *
  * (Wong 2008, Theory of Ground Vehicles, section 1.2.)
- * It has no lateral component; a wheel at the same point provides that. */
+ * A wheel at the same point provides the lateral force. */
 #include <string.h>
 #include "contact.h"
 #include "coulomb.h"
 
 typedef struct {
-  contact along; /* its direction is the heading */
+  contact along;
   coulomb law;
 } resistance;
 
-/* An element in the current state. */
+/* An element in the current state; v_q = dv/dq. */
 typedef struct {
   const coulomb *law;
   double v, S[3], v_q[3];

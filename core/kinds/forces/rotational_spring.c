@@ -1,11 +1,11 @@
 /* rotational-spring: a spring and a parallel damper between the angles of two bodies.
  *
- *   T = k (phi1 - phi2 - beta) + c (w1 - w2)
+ *   T = k (phi1 - phi2 - beta) + c (omega1 - omega2)
  *   f = (0, 0, -T | 0, 0, T)
- *   V = k (phi1 - phi2 - beta)^2 / 2,  loss = c (w1 - w2)^2
+ *   V = k (phi1 - phi2 - beta)^2 / 2,  loss = c (omega1 - omega2)^2
  *
  * (Shabana 2001, Computational Dynamics, section 6.5.)
- * Angles accumulate over full turns. */
+ * A full turn changes phi1 - phi2 by 2 pi. */
 #include "batch.h"
 
 typedef struct {
@@ -14,12 +14,12 @@ typedef struct {
 
 typedef struct {
   const twist *element;
-  double angle, rate; /* phi1 - phi2 - beta, w1 - w2 */
+  double angle, rate; /* phi1 - phi2 - beta, omega1 - omega2 */
 } twist_state;
 
 static inline twist_state twist_at (const pw_batch *batch, int e) {
   const twist *element = (const twist *)batch->element + e;
-  const pw_configuration *body1 = batch_body1 (batch, e), *body2 = batch_body2 (batch, e);
+  const pw_configuration *body1 = batch_body (batch, 2 * e), *body2 = batch_body (batch, 2 * e + 1);
   return (twist_state){ element, body1->phi - body2->phi - element->free_angle, body1->omega - body2->omega };
 }
 

@@ -1,10 +1,10 @@
 /* sliding-friction: a force opposing the motion of a point of body 1 along a line of body 2, as in a slider or slot.
  *
- *   s = e . (r1 + R(phi1) s1 - r2) - c,  S = ds/dq,  v = S q'          e: unit vector along the line
+ *   g = e . (r1 + R(phi1) s1 - r2) - c,  S = dg/dq,  v = S q'          e: unit vector along the line
  *   f = -F S,  loss = F v >= 0                                          F(v) as in coulomb.h
- *   df/dq = -dF/dv S (H q')^T - F H,  df/dq' = -dF/dv S S^T,  H = d2s/dq2
+ *   df/dq = -dF/dv S (H q')^T - F H,  df/dq' = -dF/dv S S^T,  H = d2g/dq2
  *
- * S and H are G and H of line.h for the perpendicular line with normal e; s is the distance from that line. */
+ * g is the position along the line: that of line.h for the perpendicular line with normal e; S and H: G and H there. */
 #include "coulomb.h"
 #include "line.h"
 
@@ -13,7 +13,7 @@ typedef struct {
   coulomb law;
 } sliding;
 
-/* An element in the current state; v_q: H q'. */
+/* An element in the current state; v_q = dv/dq = H q'. */
 typedef struct {
   const coulomb *law;
   line_state across;
@@ -22,7 +22,7 @@ typedef struct {
 
 static inline sliding_state sliding_at (const pw_batch *batch, int e) {
   const sliding *element = (const sliding *)batch->element + e;
-  const pw_configuration *body1 = batch_body1 (batch, e), *body2 = batch_body2 (batch, e);
+  const pw_configuration *body1 = batch_body (batch, 2 * e), *body2 = batch_body (batch, 2 * e + 1);
   const double rate[6] = { body1->vx, body1->vy, body1->omega, body2->vx, body2->vy, body2->omega };
   sliding_state now = { &element->law, line_of (&element->across, batch, e), .v = 0 };
   line_J_one (now.across, now.S);

@@ -22,7 +22,7 @@ typedef struct {
   const spring *element;
   points_state ends;
   double D[12];            /* 2 x 6 */
-  double e[2], l, inverse; /* e, l, 1 / l; e and 1 / l are 0 for l <= SPRING_SHORTEST */
+  double e[2], l, inverse; /* inverse: 1 / l; it and e are 0 for l <= SPRING_SHORTEST */
   double speed;            /* l' */
   double F[2];
 } spring_state;
@@ -50,7 +50,7 @@ PER_ELEMENT (spring_force, spring, 6) {
   out[3] = now.F[0], out[4] = now.F[1], out[5] = now.F[1] * now.ends.S2[0] - now.F[0] * now.ends.S2[1];
 }
 
-/* out = -D^T K D, 6 x 6; K = dF/dd or dF/dd'. */
+/* out = -D^T K D, 6 x 6 */
 static inline void spring_product (const spring_state *s, double K[2][2], double *out) {
   for (int j = 0; j < 6; j++) {
     double KD[2] = { K[0][0] * s->D[j] + K[0][1] * s->D[6 + j], K[1][0] * s->D[j] + K[1][1] * s->D[6 + j] };
@@ -58,20 +58,20 @@ static inline void spring_product (const spring_state *s, double K[2][2], double
   }
 }
 
-/* Includes the rotation of the arms: d^2d/dphi1^2 = -(X1, Y1), d^2d/dphi2^2 = (X2, Y2), dd'/dphi1 = -w1 (X1, Y1),
- * dd'/dphi2 = w2 (X2, Y2).
- * K = dF/dd = (k (1 - l0/l) + c l'/l) (1 - e e^T) + k e e^T + (c/l) e (d' - l' e)^T */
+/* -D^T K D and terms of the rotating arms: d^2d/dphi1^2 = -(X1, Y1), d^2d/dphi2^2 = (X2, Y2), dd'/dphi1 =
+ * -omega1 (X1, Y1), dd'/dphi2 = omega2 (X2, Y2).
+ * K = dF/dd = (k (1 - l0/l) + c l'/l) (I - e e^T) + k e e^T + (c/l) e (d' - l' e)^T */
 PER_ELEMENT (spring_force_q, spring, 36) {
   const double k = now.element->stiffness, c = now.element->damping, l0 = now.element->free_length;
-  const double *S1 = now.ends.S1, *S2 = now.ends.S2, w1 = now.ends.body1->omega, w2 = now.ends.body2->omega;
+  const double *S1 = now.ends.S1, *S2 = now.ends.S2, omega1 = now.ends.body1->omega, omega2 = now.ends.body2->omega;
   double across = now.inverse > 0 ? k * (1 - l0 * now.inverse) + c * now.speed * now.inverse : k, K[2][2];
   for (int i = 0; i < 2; i++)
     for (int j = 0; j < 2; j++)
       K[i][j] = across * (i == j) + (k - across) * now.e[i] * now.e[j] +
                 c * now.inverse * now.e[i] * (now.ends.rate[j] - now.speed * now.e[j]);
   spring_product (&now, K, out);
-  double speed_phi1 = -w1 * (now.e[0] * S1[0] + now.e[1] * S1[1]);
-  double speed_phi2 = w2 * (now.e[0] * S2[0] + now.e[1] * S2[1]);
+  double speed_phi1 = -omega1 * (now.e[0] * S1[0] + now.e[1] * S1[1]);
+  double speed_phi2 = omega2 * (now.e[0] * S2[0] + now.e[1] * S2[1]);
   for (int i = 0; i < 6; i++) {
     double along = c * (now.D[i] * now.e[0] + now.D[6 + i] * now.e[1]);
     out[6 * i + 2] -= along * speed_phi1;
@@ -81,6 +81,7 @@ PER_ELEMENT (spring_force_q, spring, 36) {
   out[35] -= now.F[0] * S2[0] + now.F[1] * S2[1];
 }
 
+/* -D^T K D with K = dF/dd' = c e e^T */
 PER_ELEMENT (spring_force_v, spring, 36) {
   const double c = now.element->damping, *e = now.e;
   double K[2][2] = { { c * e[0] * e[0], c * e[0] * e[1] }, { c * e[1] * e[0], c * e[1] * e[1] } };

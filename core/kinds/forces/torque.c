@@ -1,6 +1,6 @@
 /* torque: the signal u acts on body 1, -u on body 2.
  *
- *   f = (0, 0, u | 0, 0, -u),  power = u (w1 - w2) */
+ *   f = (0, 0, u | 0, 0, -u),  power = u (omega1 - omega2) */
 #include "batch.h"
 
 static void torque_force (const pw_batch *batch, double *out) {
@@ -13,7 +13,7 @@ static void torque_force_u (const pw_batch *batch, double *out) {
 
 static void torque_power (const pw_batch *batch, double *out) {
   for (int e = 0; e < batch->count; e++)
-    out[e] = batch->u[3 * e] * (batch_body1 (batch, e)->omega - batch_body2 (batch, e)->omega);
+    out[e] = batch->u[3 * e] * (batch_body (batch, 2 * e)->omega - batch_body (batch, 2 * e + 1)->omega);
 }
 
 static const pw_field torque_fields[] = {

@@ -3,13 +3,12 @@
  *   sigma = v_n / R,  R = sqrt (v_t^2 + v0^2)      v_t, v_n: speed of P along the heading and to its left
  *   F     = -C sigma                                              (linear: no limit)
  *   F     = -mu N tanh (C sigma / (mu N))                         (saturating)
- *   f     = F S_n,  S_n = [ -sin(theta)  cos(theta)  l ]          theta = phi + psi, psi: the heading in the body;
- *   v_n   = S_n v,  v_t = S_t v,  S_t = [ cos(theta)  sin(theta)  -m ]    l, m: arm of P along it, and to its left
+ *   f     = F S_n,  S_n = [ -sin(theta)  cos(theta)  l ]          theta = phi + psi, psi: heading in the body;
+ *   v_n   = S_n v,  v_t = S_t v,  S_t = [ cos(theta)  sin(theta)  -m ]    l, m: arm of P along the heading, to its left
  *   loss  = -F v_n >= 0
  *
  * (Pacejka 2012, Tire and Vehicle Dynamics, chapter 1, for slip and cornering stiffness; the regularising v0 keeps the
  * slip smooth at rest.)  As C grows, v_n = -F R / C vanishes like 1/C: the tyre approaches a knife edge. */
-#include <math.h>
 #include <string.h>
 #include "contact.h"
 
@@ -72,16 +71,16 @@ PER_ELEMENT (tyre_force_v, tyre, 9) {
   for (int i = 0; i < 9; i++) out[i] = across[i / 3] * (now.F_across * across[i % 3] + now.F_along * along[i % 3]);
 }
 
-/* Changes of v_t and v_n: R, over which the slip varies near rest; the one that reverses a saturated force, if there is
- * a limit.  They are divided by the derivatives of v_t and v_n with respect to coordinates and velocities. */
+/* A change of v_t by R changes the slip by about its own magnitude; one of v_n by `reversal` reverses a force at its
+ * limit.  Divided by the derivatives of v_t and v_n, these are changes of coordinates and velocities. */
 PER_ELEMENT (tyre_saturation, tyre, 6) {
-  double change = now.element->limit / now.element->stiffness * now.R + fabs (now.v_across);
+  double reversal = now.element->limit / now.element->stiffness * now.R + fabs (now.v_across);
   double along[6] = { [2] = contact_speed_phi (&now.along) }, across[6] = { [2] = contact_speed_phi (&now.across) };
   contact_J_one (now.along, along + 3);
   contact_J_one (now.across, across + 3);
   for (int i = 0; i < 6; i++) {
     if (along[i] != 0) out[i] = now.R / fabs (along[i]);
-    if (across[i] != 0 && now.element->limit > 0) out[i] = fmin (out[i], change / fabs (across[i]));
+    if (across[i] != 0 && now.element->limit > 0) out[i] = fmin (out[i], reversal / fabs (across[i]));
   }
 }
 

@@ -1,13 +1,14 @@
 /* drive: a coordinate of a point of body 1 in the frame of body 2, or the angle between the two, follows a signal u.
  *
- *   g = e . D - c - u = 0           x, y    e = R(phi2) (1, 0) or R(phi2) (0, 1), D = r1 + R(phi1) s1 - r2,
- *   g = phi1 - phi2 - u = 0         angle   c = that component of s2                    (1 holonomic equation)
+ *   g = e . D - c - u = 0           x, y: e = R(phi2) (1, 0) or R(phi2) (0, 1), D = r1 + R(phi1) s1 - r2,
+ *                                   c: the component of s2 along x or y                 (1 holonomic equation)
+ *   g = phi1 - phi2 - u = 0         angle: G = [ 0 0 1 | 0 0 -1 ]
  *
- * For x and y the derivatives are those of line.h with the normal e; in addition eta = u' and gamma contains u''.  For
- * an angle G = [ 0 0 1 | 0 0 -1 ], gamma = u''.
+ * For x and y, G is that of line.h with the normal e, and gamma is that of line.h plus u''; for an angle gamma = u''.
+ * eta = u'.
  *
- * (Haug 1989, Computer Aided Kinematics and Dynamics of Mechanical Systems, sections 3.3 and 3.5.) The drive acts on
- * body 1 with -lambda: along e at its point, or as a moment; on body 2 with the opposite. */
+ * (Haug 1989, Computer Aided Kinematics and Dynamics of Mechanical Systems, sections 3.3 and 3.5.)
+ * The drive acts on body 1 with -lambda: along e at its point, or as a moment; on body 2 with the opposite. */
 #include "line.h"
 
 PREPARE (drive_prepare, pw_drive, line) {

@@ -3,10 +3,9 @@
  *   g = (phi1 - phi3) - i (phi2 - phi3) - c = 0                    (1 holonomic equation, linear)
  *   G = [ 0 0 1 | 0 0 -i | 0 0 i-1 ],  gamma = 0
  *
- * (Willis 1870, Principles of Mechanism.)  External gears of radii R1 and R2 have i = -R2 / R1, a gear inside a ring
- * i = R2 / R1.  Pins define the axles.  The moments are -lambda on body 1, i lambda on body 2, (1 - i) lambda on the
- * carrier. */
-#include <math.h>
+ * (Willis 1870, Principles of Mechanism.)
+ * External gears of radii R1 and R2 have i = -R2 / R1, a gear inside a ring i = R2 / R1.  The axles need pins.  The
+ * moments are -lambda on body 1, i lambda on body 2, (1 - i) lambda on the carrier. */
 #include <string.h>
 #include "batch.h"
 
@@ -30,9 +29,8 @@ typedef struct {
 } gear_state;
 
 static inline gear_state gear_at (const pw_batch *batch, int e) {
-  const pw_configuration *all = batch->configuration;
-  const int *body = batch->body + 3 * e;
-  return (gear_state){ (const gear *)batch->element + e, all[body[0]].phi, all[body[1]].phi, all[body[2]].phi };
+  return (gear_state){ (const gear *)batch->element + e, batch_body (batch, 3 * e)->phi,
+                       batch_body (batch, 3 * e + 1)->phi, batch_body (batch, 3 * e + 2)->phi };
 }
 
 PER_ELEMENT (gear_g, gear, 1) {

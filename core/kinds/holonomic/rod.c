@@ -2,8 +2,9 @@
  *
  *   g     = (d.d - L^2) / (2 L) = 0                               (1 holonomic equation); d, D: points.h
  *   G     = d^T D / L
- *   gamma = ( d.((X1, Y1) w1^2 - (X2, Y2) w2^2) - d'.d' ) / L     so that G a = gamma; (X, Y): arms in world axes
+ *   gamma = ( d.((X1, Y1) omega1^2 - (X2, Y2) omega2^2) - d'.d' ) / L      so that G v' = gamma
  *
+ * with (X, Y): arms in world axes.
  * (Haug 1989, Computer Aided Kinematics and Dynamics of Mechanical Systems, section 3.3, with d.d - L^2 divided by
  * 2 L: near the constraint g is the distance minus L, without a square root.)
  * The force on body 1 is -lambda d / L, away from body 2; body 2 receives the opposite. */
@@ -17,8 +18,8 @@ typedef struct {
 /* A rod in the current state. */
 typedef struct {
   points_state ends;
-  double D[12];  /* 2 x 6 */
-  double w1, w2; /* angular velocities of the bodies */
+  double D[12];          /* 2 x 6 */
+  double omega1, omega2; /* angular velocities of the bodies */
   double L;
 } rod_state;
 
@@ -26,7 +27,7 @@ static inline rod_state rod_at (const pw_batch *batch, int e) {
   const rod *element = (const rod *)batch->element + e;
   rod_state now = { .ends = points_of (&element->points, batch, e), .L = element->length };
   points_J_one (now.ends, now.D);
-  now.w1 = now.ends.body1->omega, now.w2 = now.ends.body2->omega;
+  now.omega1 = now.ends.body1->omega, now.omega2 = now.ends.body2->omega;
   return now;
 }
 
@@ -59,12 +60,12 @@ PER_ELEMENT (rod_J, rod, 6) {
 }
 
 PER_ELEMENT (rod_gamma, rod, 1) {
-  double centripetal =
-      now.w1 * now.w1 * rod_dot (now.ends.d, now.ends.S1) - now.w2 * now.w2 * rod_dot (now.ends.d, now.ends.S2);
+  double centripetal = now.omega1 * now.omega1 * rod_dot (now.ends.d, now.ends.S1) -
+                       now.omega2 * now.omega2 * rod_dot (now.ends.d, now.ends.S2);
   *out = (centripetal - rod_dot (now.ends.rate, now.ends.rate)) / now.L;
 }
 
-/* ((D w)^T D + d^T d(D w)/dq) / L with d(D w)/dphi1 = -(X1, Y1) w_2, d(D w)/dphi2 = (X2, Y2) w_5. */
+/* ((D w)^T D + d^T d(D w)/dq) / L with d(D w)/dphi1 = -(X1, Y1) w[2], d(D w)/dphi2 = (X2, Y2) w[5]. */
 PER_ELEMENT (rod_jw_q, rod, 6) {
   double Dw[2] = { 0, 0 };
   for (int j = 0; j < 6; j++) Dw[0] += now.D[j] * now.ends.w[j], Dw[1] += now.D[6 + j] * now.ends.w[j];
@@ -73,22 +74,24 @@ PER_ELEMENT (rod_jw_q, rod, 6) {
   out[5] += rod_dot (now.ends.d, now.ends.S2) * now.ends.w[5] / now.L;
 }
 
-/* dd'/dphi1 = -w1 (X1, Y1), dd'/dphi2 = w2 (X2, Y2); derivatives of the arms are columns of D, for arm 2 negated. */
+/* With dd'/dphi1 = -omega1 (X1, Y1), dd'/dphi2 = omega2 (X2, Y2).  The derivative of arm 1 is column 2 of D, that of
+ * arm 2 is column 5 with the opposite sign. */
 PER_ELEMENT (rod_gamma_q, rod, 6) {
-  const double square1 = now.w1 * now.w1, square2 = now.w2 * now.w2, *d = now.ends.d;
+  const double square1 = now.omega1 * now.omega1, square2 = now.omega2 * now.omega2, *d = now.ends.d;
   double centripetal[2];
   points_gamma_one (now.ends, centripetal);
   rod_multiply_D (&now, centripetal, out);
-  out[2] += (square1 * (d[0] * now.D[2] + d[1] * now.D[8]) + 2 * now.w1 * rod_dot (now.ends.rate, now.ends.S1)) / now.L;
+  out[2] +=
+      (square1 * (d[0] * now.D[2] + d[1] * now.D[8]) + 2 * now.omega1 * rod_dot (now.ends.rate, now.ends.S1)) / now.L;
   out[5] +=
-      (square2 * (d[0] * now.D[5] + d[1] * now.D[11]) - 2 * now.w2 * rod_dot (now.ends.rate, now.ends.S2)) / now.L;
+      (square2 * (d[0] * now.D[5] + d[1] * now.D[11]) - 2 * now.omega2 * rod_dot (now.ends.rate, now.ends.S2)) / now.L;
 }
 
 PER_ELEMENT (rod_gamma_v, rod, 6) {
   const double minus_twice[2] = { -2 * now.ends.rate[0], -2 * now.ends.rate[1] };
   rod_multiply_D (&now, minus_twice, out);
-  out[2] += 2 * now.w1 * rod_dot (now.ends.d, now.ends.S1) / now.L;
-  out[5] -= 2 * now.w2 * rod_dot (now.ends.d, now.ends.S2) / now.L;
+  out[2] += 2 * now.omega1 * rod_dot (now.ends.d, now.ends.S1) / now.L;
+  out[5] -= 2 * now.omega2 * rod_dot (now.ends.d, now.ends.S2) / now.L;
 }
 
 static const pw_field rod_fields[] = {

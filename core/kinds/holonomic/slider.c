@@ -33,7 +33,7 @@ PER_ELEMENT (slider_gamma, line, 2) {
   out[1] = 0;
 }
 
-/* A derivative of the first row, and 0 for the second: slider_jw_q, ... */
+/* Defines slider_jw_q, ...: the first row is that of line.h, the second is 0. */
 #define SLIDER_DERIVATIVE(member)           \
   PER_ELEMENT (slider_##member, line, 12) { \
     line_##member##_one (now, out);         \

@@ -49,7 +49,7 @@ PER_ELEMENT (weld_gamma, weld, 3) {
   out[2] = 0;
 }
 
-/* A derivative of the first two rows, and 0 for the third: weld_jw_q, ... */
+/* Defines weld_jw_q, ...: the first two rows are those of points.h, the third is 0. */
 #define WELD_DERIVATIVE(member)              \
   PER_ELEMENT (weld_##member, weld, 18) {    \
     points_##member##_one (now.points, out); \

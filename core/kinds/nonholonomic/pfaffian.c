@@ -1,13 +1,12 @@
 /* pfaffian: a linear combination of the velocities of two bodies, in the axes of body 1, equals a signal u.
  *
- *   a . (R(phi1)^T r1', w1) + b . (R(phi1)^T r2', w2) = u          (1 nonholonomic equation)
+ *   a . (R(phi1)^T r1', omega1) + b . (R(phi1)^T r2', omega2) = u  (1 nonholonomic equation)
  *   S     = [ A a3 | B b3 ],  A = R(phi1) (a1, a2), B = R(phi1) (b1, b2),  eta = u
- *   gamma = u' - w1 (p(A).r1' + p(B).r2')                          so that S a = gamma; p rotates by +90 degrees
+ *   gamma = u' - omega1 (p(A).r1' + p(B).r2')           so that S v' = gamma; p(A) = A turned by +90 degrees
  *
  * (Neimark & Fufaev 1972, Dynamics of Nonholonomic Systems, chapter I.)
- * The reaction F = -lambda acts on body 1 as the force F A and the moment F a3, on body 2 as F B and F b3; the
- * two need not balance; the difference is an external force.  The power is F u. */
-#include <math.h>
+ * The reaction F = -lambda acts on body 1 as the force F A and the moment F a3, on body 2 as F B and F b3.  The two
+ * forces need not balance: their sum is an external force.  The power is F u. */
 #include <string.h>
 #include "batch.h"
 
@@ -19,13 +18,13 @@ typedef struct {
 typedef struct {
   const pfaffian *element;
   const pw_configuration *body1, *body2;
-  const double *w, *u; /* the vector w of jw_q, else NULL; the signal with its time derivatives */
+  const double *w, *u; /* the vector w of jw_q, else NULL; the signal with two time derivatives */
   double A[2], B[2];
 } pfaffian_state;
 
 static inline pfaffian_state pfaffian_at (const pw_batch *batch, int e) {
   const pfaffian *element = (const pfaffian *)batch->element + e;
-  const pw_configuration *body1 = batch_body1 (batch, e), *body2 = batch_body2 (batch, e);
+  const pw_configuration *body1 = batch_body (batch, 2 * e), *body2 = batch_body (batch, 2 * e + 1);
   pfaffian_state now = { element, body1, body2, .w = batch_w (batch, e), .u = batch->u + 3 * e };
   to_world (body1, element->a, now.A);
   to_world (body1, element->b, now.B);
@@ -33,12 +32,11 @@ static inline pfaffian_state pfaffian_at (const pw_batch *batch, int e) {
 }
 
 PREPARE (pfaffian_prepare, pw_pfaffian, pfaffian) {
-  double largest = 0;
   memcpy (element->a, definition->a, sizeof element->a);
   memcpy (element->b, definition->b, sizeof element->b);
-  for (int i = 0; i < 3; i++) largest = fmax (largest, fmax (fabs (definition->a[i]), fabs (definition->b[i])));
-  if (largest == 0) return pw_fail (error, PW_INPUT, "a and b are all zero: expected at least one other number");
-  return PW_OK;
+  for (int i = 0; i < 3; i++)
+    if (definition->a[i] != 0 || definition->b[i] != 0) return PW_OK;
+  return pw_fail (error, PW_INPUT, "a and b are all zero: expected at least one other number");
 }
 
 PER_ELEMENT (pfaffian_J, pfaffian, 6) {
@@ -63,10 +61,10 @@ PER_ELEMENT (pfaffian_gamma_q, pfaffian, 6) {
 }
 
 PER_ELEMENT (pfaffian_gamma_v, pfaffian, 6) {
-  double w = now.body1->omega;
-  out[0] = w * now.A[1], out[1] = -w * now.A[0],
+  double omega = now.body1->omega;
+  out[0] = omega * now.A[1], out[1] = -omega * now.A[0],
   out[2] = now.A[1] * now.body1->vx - now.A[0] * now.body1->vy + now.B[1] * now.body2->vx - now.B[0] * now.body2->vy;
-  out[3] = w * now.B[1], out[4] = -w * now.B[0], out[5] = 0;
+  out[3] = omega * now.B[1], out[4] = -omega * now.B[0], out[5] = 0;
 }
 
 static const pw_field pfaffian_fields[] = {

@@ -3,11 +3,11 @@
  *   n . v_P = 0,  e . v_P - R chi' = 0,  e = (cos, sin)(phi + psi), n = (-sin, cos)(phi + psi)    (2 nonholonomic)
  *   S     = [ -s  c   l   0 ]      psi: heading in the body; (c, s) = e; l, m: arm of the contact point P along e, n
  *           [  c  s  -m  -R ]
- *   gamma = ( w (c vx + s vy),  w (s vx - c vy) )                 so that S a = gamma; both rows as in contact.h
+ *   gamma = ( omega (c vx + s vy),  omega (s vx - c vy) )         so that S v' = gamma; both rows as in contact.h
  *   f     = u on chi, power = u chi'                              u: torque about the axle
  *
- * On the body act -lambda(1) along n and -lambda(2) along e.  The axle is horizontal, so the reaction to u and the
- * gyroscopic moments of the wheel have no component in the plane model. */
+ * The forces -lambda(1) along n and -lambda(2) along e act on the body at P.  The axle is horizontal, so the reaction
+ * to u and the gyroscopic moments of the wheel act out of the plane. */
 #include "contact.h"
 
 typedef struct {
@@ -27,7 +27,7 @@ static inline rolling_state rolling_at (const pw_batch *batch, int e) {
                           element->radius };
 }
 
-/* The spin rate for rolling at the initial velocity of the body. */
+/* chi' of a wheel that rolls at the initial velocity of the body. */
 static double rolling_spin_rate (const rolling *element, const pw_body *body) {
   double angle = body->start[2] + element->along.heading;
   return (pw_cos (angle) * body->rate[0] + pw_sin (angle) * body->rate[1] + element->along.arm * body->rate[2]) /
@@ -55,7 +55,7 @@ PER_ELEMENT (rolling_gamma, rolling, 2) {
   contact_gamma_one (now.along, out + 1);
 }
 
-/* A derivative of both rows, which is 0 with respect to the spin angle: rolling_jw_q, ... */
+/* Defines rolling_jw_q, ...: the derivatives with respect to the spin angle are 0. */
 #define ROLLING_DERIVATIVE(member)               \
   PER_ELEMENT (rolling_##member, rolling, 8) {   \
     contact_##member##_one (now.across, out);    \

@@ -3,7 +3,7 @@
  *   e . v_P = u,  e = (cos, sin)(phi + psi)           psi: heading in the body          (1 nonholonomic equation)
  *   S     = [ cos(theta)  sin(theta)  -m ]      theta = phi + psi; m: the arm of P to the left of e
  *   eta   = u
- *   gamma = u' + w (sin(theta) vx - cos(theta) vy)                so that S a = gamma
+ *   gamma = u' + omega (sin(theta) vx - cos(theta) vy)            so that S v' = gamma
  *
  * The force on the body at P, along e, is F = -lambda; its power is F u. */
 #include "contact.h"

@@ -2,10 +2,10 @@
  *
  *   n . v_P = 0,  n = (-sin, cos)(phi + u)                        (1 nonholonomic equation)
  *   S     = [ -sin(theta)  cos(theta)  l ]      theta = phi + u;  l, m: arm of P along the heading, to its left
- *   gamma = (w + u') (cos(theta) vx + sin(theta) vy) - u' m w     so that S a = gamma, with l' = u' m
+ *   gamma = (omega + u') (cos(theta) vx + sin(theta) vy) - u' m omega    so that S v' = gamma, with l' = u' m
  *
- * S is that of contact.h for the direction n.  The lateral force on the body, along n, is N = -lambda.  It acts at the
- * steering pivot, so steering needs no moment and does no work. */
+ * S is that of contact.h for the direction n.  The lateral force on the body, along n, is N = -lambda.  It acts at P,
+ * about which the wheel is steered, so steering needs no moment and does no work. */
 #include "contact.h"
 
 typedef struct {
@@ -16,7 +16,7 @@ typedef struct {
 typedef struct {
   contact_state n;
   double aside;                       /* m */
-  double steering_rate, heading_rate; /* u', w + u' */
+  double steering_rate, heading_rate; /* u', omega + u' */
 } steered_state;
 
 static inline steered_state steered_at (const pw_batch *batch, int e) {

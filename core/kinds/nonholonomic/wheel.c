@@ -1,8 +1,8 @@
 /* wheel: a knife edge; the contact point P has no velocity perpendicular to the heading (contact.h).
  *
  *   n . v_P = 0,  n = (-sin, cos)(phi + psi)          psi: heading in the body          (1 nonholonomic equation)
- *   S     = [ -sin(theta)  cos(theta)  l ]      theta = phi + psi; l = s . (cos psi, sin psi): arm along the heading
- *   gamma = w (cos(theta) vx + sin(theta) vy)                     so that S a = gamma
+ *   S     = [ -sin(theta)  cos(theta)  l ]      theta = phi + psi; l: arm of P along the heading
+ *   gamma = omega (cos(theta) vx + sin(theta) vy)                 so that S v' = gamma
  *
  * The lateral force on the body, along n, is N = -lambda. */
 #include "contact.h"
