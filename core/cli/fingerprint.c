@@ -131,7 +131,7 @@ const char *pw_fingerprint_value (const char *at, const char *end, const char *k
   return e.value;
 }
 
-/* Describes the first entry of `a` that `b` does not have. */
+/* Describes the first entry of `a` that `b` does not have, or has with another value; 0 if there is none. */
 static int fingerprint_missing (pw_fingerprint a, pw_fingerprint b, const char *ignored, char *text, size_t size) {
   enum { SHOWN = 120 }; /* characters of a value, at most */
   fingerprint_entry own, other;

@@ -35,7 +35,8 @@ typedef struct {
   const char *where; /* in messages: "here", "there" */
 } pw_fingerprint;
 
-/* 1 if fingerprints differ, not only in the key `ignored` (or NULL): text is "step is 0.001 there and 0.002 here". */
+/* 1 if fingerprints differ in a key other than `ignored` (may be NULL); `text` is then the first difference: "step is
+ * 0.001 there and 0.002 here". */
 int pw_fingerprint_differ (pw_fingerprint a, pw_fingerprint b, const char *ignored, char *text, size_t size);
 
 #endif

@@ -8,7 +8,7 @@
 #include "cli.h"
 #include "util.h"
 
-/* Writes control characters and invalid bytes as \\xNN. */
+/* Writes control characters and invalid bytes as \xNN. */
 static void say_escaped (FILE *f, const char *text) {
   for (int n; *text; text += n) {
     n = pw_utf8_size (text);

@@ -129,7 +129,7 @@ static void report_mass (pw_json *j, const pw_check *check) {
 static void report_change (pw_json *j, const pw_check *check, int i, int *listed) {
   char name[PW_STATE_NAME], line[500], a[32], b[32], c[32];
   double from, to;
-  pw_report_state (check->model.system, pw_run_initial (check->run), i, name, &from, &to);
+  pw_cli_state_change (check->model.system, pw_run_initial (check->run), i, name, &from, &to);
   pw_json_open (j, NULL, '{');
   pw_json_text (j, "state", name);
   pw_json_number (j, "from", from);

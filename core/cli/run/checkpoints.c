@@ -109,7 +109,7 @@ int pw_checkpoints_prepare (pw_run_cli *command, pw_error *error) {
   pw_output **table = &command->output[PW_RUN_TABLE];
   pw_mark mark = { 0 };
   if (checkpoints->resume_path == NULL)
-    return pw_output_mark (*table, &mark, error); /* fails if it cannot be continued */
+    return pw_output_mark (*table, &mark, error); /* fails for a table that cannot be continued */
   pw_archive_bytes (&checkpoints->resumed.state, &mark, sizeof mark);
   *table = pw_output_continue (command->table_path, &mark, error);
   return *table ? PW_OK : error->status;
@@ -162,7 +162,7 @@ int pw_checkpoints_resume (pw_run_cli *command, pw_error *error) {
                       "the checkpoint %s is not that of a run: time, number of rows or processor time "
                       "are impossible",
                       checkpoints->resume_path);
-    command->resumed = 1;
+    command->loaded = 1;
     pw_cli_say ("pinwheel: resumed at t = %s s\n", pw_format (t, pw_run_time (command->run), 6));
   }
   checkpoints_schedule (checkpoints, pw_run_time (command->run));

@@ -39,7 +39,7 @@ static void report_atol (pw_run *run, const pw_system *system, double atol) {
   int state = atol > 0 ? pw_run_saturation (run, &saturation, element, sizeof element) : -1;
   if (state >= 0 && atol > saturation)
     pw_cli_say ("pinwheel: --atol %s is above %s %s, within which the force of %s reverses: methods with Newton's "
-                "iteration reduce it for the states it depends on, others may be wrong\n",
+                "iteration reduce the tolerance of the states that the force depends on, others may be wrong\n",
                 pw_format (atol_text, atol, 3), pw_format (saturation_text, saturation, 3),
                 pw_system_state_unit (system, state), element);
 }
@@ -96,14 +96,6 @@ void pw_report_model (const pw_model *model) {
 
 /* ---- Initialisation ---- */
 
-void pw_report_state (const pw_system *system, const pw_initial_report *initial, int state, char name[PW_STATE_NAME],
-                      double *given, double *consistent) {
-  int n = pw_system_coordinates (system);
-  *given = state < n ? initial->q_given[state] : initial->v_given[state - n];
-  *consistent = state < n ? initial->q[state] : initial->v[state - n];
-  pw_system_state_name (system, state, name, PW_STATE_NAME);
-}
-
 /* States that the consistent initialisation has changed. */
 static void report_initial (const pw_system *system, const pw_initial_report *initial) {
   int n = pw_system_coordinates (system), moved = initial->moved, listed = 0;
@@ -117,7 +109,7 @@ static void report_initial (const pw_system *system, const pw_initial_report *in
     double given, consistent;
     char name[PW_STATE_NAME], given_text[32], consistent_text[32];
     if (!pw_initial_moved (system, initial, state)) continue;
-    pw_report_state (system, initial, state, name, &given, &consistent);
+    pw_cli_state_change (system, initial, state, name, &given, &consistent);
     pw_cli_say ("  %s from %s to %s %s%s\n", name, pw_format (given_text, given, 10),
                 pw_format (consistent_text, consistent, 10), pw_system_state_unit (system, state),
                 initial->changed && pw_initial_specified (initial, state) ? " (specified)" : "");
@@ -153,12 +145,11 @@ const char **pw_report_redundancies (pw_run *run) {
 /* ---- Results ---- */
 
 static void report_bodies (const pw_system *system, const pw_sample *last) {
-  static const char *const heads[] = { "x [m]", "y [m]", "phi [rad]", "vx [m/s]", "vy [m/s]", "omega [rad/s]" };
+  static const char *const head[] = { "body",     "x [m]",    "y [m]",         "phi [rad]",
+                                      "vx [m/s]", "vy [m/s]", "omega [rad/s]", NULL };
   int bodies = pw_system_bodies (system), shown = bodies < REPORT_BODIES ? bodies : REPORT_BODIES;
   for (pw_table table = { 0 }; pw_table_pass (&table);) {
-    pw_cell (&table, -5, "body");
-    for (int i = 0; i < 6; i++) pw_cell (&table, REPORT_WIDTH, heads[i]);
-    pw_row_end (&table);
+    pw_head (&table, -5, REPORT_WIDTH, head);
     for (int b = 0; b < shown; b++) {
       pw_cell (&table, -5, pw_system_body_name (system, b));
       for (int i = 0; i < 6; i++)
@@ -236,10 +227,7 @@ static void report_errors (const pw_reference_error *errors) {
   pw_cli_print (stdout, "\n  error against the reference solution of %s, at %d time%s\n", errors->source,
                 errors->samples, errors->samples == 1 ? "" : "s");
   for (pw_table table = { 0 }; pw_table_pass (&table);) {
-    pw_cell (&table, -10, "");
-    pw_cell (&table, REPORT_WIDTH, at);
-    pw_cell (&table, REPORT_WIDTH, "largest");
-    pw_row_end (&table);
+    pw_head (&table, -10, REPORT_WIDTH, (const char *const[]){ "", at, "largest", NULL });
     for (int i = 0; i < 4; i++) report_error (&table, name[i], errors->end[i], errors->most[i], unit[i]);
     report_error (&table, "reactions", NAN, errors->reactions, "of the largest");
   }
