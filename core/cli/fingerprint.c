@@ -14,7 +14,7 @@ void pw_fingerprint_line (pw_text *t, const char *key, const char *name, const c
   pw_text_add (t, key);
   if (name) pw_text_add (t, " "), pw_text_add (t, name);
   pw_text_add (t, " = ");
-  pw_text_add (t, value);
+  for (; *value; value++) pw_text_add_bytes (t, *value == '\n' ? " " : value, 1); /* an entry has one line */
   pw_text_add (t, "\n");
 }
 

@@ -94,8 +94,8 @@ static int sweep_open (pw_sweep *sweep, pw_error *error) {
   if (status == PW_OK) status = pw_journal_open (&sweep->journal, &sweep->plan, sweep->path, error);
   if (status != PW_OK) return status;
   if (sweep->journal.done > 0)
-    pw_cli_say ("pinwheel: continuing with %s: %ld of %ld runs are done\n", sweep->journal.part_path,
-                sweep->journal.done, sweep->journal.rows);
+    pw_cli_say ("pinwheel: continuing with %s: %ld of %ld runs are done\n", sweep->journal.path, sweep->journal.done,
+                sweep->journal.rows);
   return PW_OK;
 }
 
@@ -132,7 +132,7 @@ static int sweep_finish (pw_sweep *sweep, pw_error *error) {
   }
   if (sweep->journal.done < sweep->journal.rows) {
     pw_cli_say ("pinwheel: interrupted; %ld of %ld runs are kept in %s; the same command continues from there\n",
-                sweep->journal.done, sweep->journal.rows, sweep->journal.part_path);
+                sweep->journal.done, sweep->journal.rows, sweep->journal.path);
     return PW_INTERRUPTED;
   }
   int status = pw_sweep_finish (&sweep->journal, &sweep->plan, &tally, error);

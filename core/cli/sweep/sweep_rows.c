@@ -12,7 +12,7 @@
 
 enum { ROWS_LANES = 8 }; /* runs that a thread advances at once, at most: the largest --lanes */
 
-/* A compiled system, shared by the rows with the same parameters. */
+/* A compiled system, shared by rows with the same parameters. */
 typedef struct {
   long parameters;            /* pw_grid_parameter_index of these rows */
   int users;                  /* number of runs that use it, and one more while it is the latest system */
