@@ -44,9 +44,10 @@ static void report_entry (pw_json *j, const char *key, double value, const char 
 /* A line in the text only. */
 #define report_text(j, ...) report_entry (j, NULL, 0, __VA_ARGS__)
 
-/* An item of a list, of which the text shows the first few; `listed` counts them. */
-static void report_item (pw_json *j, int *listed, const char *text, const char *line) {
-  if (text) pw_json_text (j, NULL, text);
+/* An item of a list: a string in JSON, unless it is NULL; a line in the text, for the first REPORT_LISTED ones, which
+ * `listed` counts. */
+static void report_item (pw_json *j, int *listed, const char *string, const char *line) {
+  if (string) pw_json_text (j, NULL, string);
   if ((*listed)++ < REPORT_LISTED) report_print (j, "    %s\n", line);
 }
 
@@ -100,9 +101,19 @@ static void report_mobility (pw_json *j, const pw_check *check) {
   report_end_list (j, listed);
 }
 
+/* The saddle-point matrix: "regular" or "singular"; NULL: not known.  If it is singular the initialisation fails with
+ * PW_INPUT, which has one other cause: an initial value of 1e100 or more. */
+static const char *report_matrix (const pw_check *check) {
+  const pw_system *s = check->model.system;
+  double largest = 0;
+  for (int j = 0; j < pw_system_coordinates (s); j++)
+    largest = fmax (largest, fmax (fabs (pw_system_initial_q (s)[j]), fabs (pw_system_initial_v (s)[j])));
+  return check->run ? "regular" : check->run_error.status == PW_INPUT && largest < 1e100 ? "singular" : NULL;
+}
+
 static void report_mass (pw_json *j, const pw_check *check) {
   static const char *const lack[] = { NULL, "no mass", "no inertia", "neither mass nor inertia" };
-  const char *matrix = check->run ? "regular" : check->run_error.status == PW_INPUT ? "singular" : NULL;
+  const char *matrix = report_matrix (check);
   const pw_system *s = check->model.system;
   const double *M = pw_system_mass (s);
   int lacking = 0, listed = 0;
@@ -170,7 +181,8 @@ static void report_initial (pw_json *j, const pw_check *check) {
 
 /* ---- Element types ---- */
 
-static void report_failures (pw_json *j, const pw_selftest_report *r, const char *where, const char *label) {
+/* The checks that failed, in "random scenes" or "this model"; label: the same in the text. */
+static void report_failures (pw_json *j, const pw_selftest_report *r, const char *scenes, const char *label) {
   char error[32], bound[32];
   for (const pw_selftest_check *c = r->check; c < r->check + r->checks; c++) {
     if (!c->failed) continue;
@@ -178,7 +190,7 @@ static void report_failures (pw_json *j, const pw_selftest_report *r, const char
                   pw_format (error, c->error, 2), pw_format (bound, c->bound, 2), c->where);
     pw_json_open (j, NULL, '{');
     pw_json_text (j, "check", c->name);
-    pw_json_text (j, "in", where);
+    pw_json_text (j, "in", scenes);
     pw_json_text (j, "expected", c->about);
     pw_json_number (j, "error", c->error);
     pw_json_number (j, "bound", c->bound);

@@ -49,8 +49,8 @@ static void list_fields (pw_table *t, const pw_field *fields) {
 
 /* ---- Descriptions of methods and element types by name ---- */
 
-/* Describes those of these names, or all for the name "all".  `entries` ends with NULL; the first member of each is its
- * name.  `sort`: "element type". */
+/* Describes the entries of these names, all of them for the name "all".  The first member of an entry is its name; both
+ * lists end with NULL.  `sort`: "element type". */
 static int list_named (const char *sort, const void *const *entries, void (*describe) (const void *entry),
                        const char **name, pw_error *error) {
   for (int shown = 0; *name; name++) {
@@ -71,7 +71,7 @@ static int list_named (const char *sort, const void *const *entries, void (*desc
 
 /* ---- Models ---- */
 
-/* The length of the longest name. */
+/* Raises *context, an int, to the length of the name. */
 static int list_longest (void *context, const char *name, const char *path) {
   int *width = context, length = (int)strlen (name);
   (void)path;

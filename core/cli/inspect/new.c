@@ -8,8 +8,8 @@
  * new_model_yaml. */
 #include "new.inc"
 
-/* "folder/my_car.c" gives "my_car" and ".c".  PW_INPUT for a name that a shell would not read as one word or as a name,
- * or that is too long. */
+/* "folder/my_car.c" gives "my_car" and ".c".  PW_INPUT for a name that is too long, that a shell would not read as one
+ * word, or a program as an option. */
 static int new_name (const char *path, char *name, size_t size, const char **ending, pw_error *error) {
   const char *slash = strrchr (path, '/'), *base = slash ? slash + 1 : path;
   size_t length = strspn (base, "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_-");
