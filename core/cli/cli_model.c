@@ -1,5 +1,4 @@
 /* The model of a command line: opened with its --set and --start, and its parameters and initial values. */
-#define _POSIX_C_SOURCE 200809L
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>

@@ -1,5 +1,4 @@
 /* Command lines: reads the options of a command into its structure, prints help, and checks values. */
-#define _POSIX_C_SOURCE 200809L
 #include <errno.h>
 #include <gsl/gsl_errno.h>
 #include <limits.h>

@@ -1,5 +1,4 @@
 /* The program `pinwheel`: finds the command and runs it. */
-#define _POSIX_C_SOURCE 200809L
 #include <errno.h>
 #include <gsl/gsl_version.h>
 #include <nlopt.h>

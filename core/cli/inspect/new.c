@@ -27,11 +27,7 @@ static int new_name (const char *path, char *name, size_t size, const char **end
 /* Writes a template with the model's name in place of each %. */
 static void new_print (FILE *f, const char *name, const char *const *line) {
   for (; *line; line++)
-    for (const char *c = *line; *c; c++)
-      if (*c == '%')
-        fputs (name, f);
-      else
-        fputc (*c, f);
+    for (const char *c = *line; *c; c++) *c == '%' ? fputs (name, f) : fputc (*c, f);
 }
 
 static int new_write (const char *path, pw_error *error) {

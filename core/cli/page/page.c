@@ -61,9 +61,9 @@ static void page_states_json (const page *cmd, pw_json *j) {
 
 /* 1 if the engine has this integrator and its stabilisation of this index. */
 static int page_has_method (const pw_method *m, int stabilisation) {
-  int i = 0;
-  while (page_integrators[i] && strcmp (page_integrators[i], m->name) != 0) i++;
-  return page_integrators[i] && m->stabilisations[stabilisation].kind != PW_NULLSPACE;
+  char hint[PW_HINT];
+  return m->stabilisations[stabilisation].kind != PW_NULLSPACE &&
+         pw_find_name (page_integrators, sizeof *page_integrators, m->name, hint) >= 0;
 }
 
 static void page_methods_json (pw_json *j) {

@@ -77,11 +77,10 @@ static void report_jump (const pw_element *element, const char *field, const pw_
 static void report_field (const pw_element *element, const pw_field *field) {
   const void *value = (const char *)element->definition + field->offset;
   const pw_signal *signal = field->type == PW_SIGNAL ? value : NULL;
-  int is_heading = strcmp (field->name, "heading") == 0;
-  if (is_heading && field->type == PW_NUMBER)
-    report_angle (element->kind->name, pw_element_name (element), field->name, *(const double *)value);
-  if (is_heading && signal && signal->type == PW_CONSTANT)
-    report_angle (element->kind->name, pw_element_name (element), field->name, signal->constant);
+  const double *number = signal && signal->type == PW_CONSTANT ? &signal->constant : NULL;
+  if (field->type == PW_NUMBER) number = value;
+  if (number && strcmp (field->name, "heading") == 0)
+    report_angle (element->kind->name, pw_element_name (element), field->name, *number);
   for (int i = 0; signal && i < pw_field_count (field); i++) report_jump (element, field->name, signal + i);
 }
 
@@ -144,6 +143,13 @@ const char **pw_report_redundancies (pw_run *run) {
 
 /* ---- Results ---- */
 
+/* Cells of a name, a number and its unit. */
+static void report_value (pw_table *table, int width, const char *name, double value, const char *unit) {
+  pw_cell (table, width, name);
+  pw_cell_number (table, REPORT_WIDTH, value, REPORT_DIGITS);
+  pw_cell (table, -1, unit);
+}
+
 static void report_bodies (const pw_system *system, const pw_sample *last) {
   static const char *const head[] = { "body",     "x [m]",    "y [m]",         "phi [rad]",
                                       "vx [m/s]", "vy [m/s]", "omega [rad/s]", NULL };
@@ -167,11 +173,9 @@ static void report_internal (const pw_system *system, const pw_sample *last) {
   char name[PW_STATE_NAME];
   for (pw_table table = { 0 }; pw_table_pass (&table);)
     for (int j = first; j < end; j++) {
-      for (int state = j; state < 2 * n; state += n) {
-        pw_cell (&table, -1, pw_system_state_name (system, state, name, sizeof name));
-        pw_cell_number (&table, REPORT_WIDTH, state < n ? last->q[j] : last->v[j], REPORT_DIGITS);
-        pw_cell (&table, -1, pw_system_state_unit (system, state));
-      }
+      for (int state = j; state < 2 * n; state += n)
+        report_value (&table, -1, pw_system_state_name (system, state, name, sizeof name),
+                      state < n ? last->q[j] : last->v[j], pw_system_state_unit (system, state));
       pw_row_end (&table);
     }
   report_more (stdout, n - end, "");
@@ -184,9 +188,8 @@ static void report_reactions (const pw_system *system, const pw_sample *last) {
   if (rows > 0) printf ("\n  reaction\n");
   for (pw_table table = { 0 }; pw_table_pass (&table);)
     for (int i = 0; i < shown; i++) {
-      pw_cell (&table, -8, pw_system_reaction_name (system, i, name, sizeof name));
-      pw_cell_number (&table, REPORT_WIDTH, 0 - last->lambda[i], REPORT_DIGITS);
-      pw_cell (&table, -1, pw_system_reaction_unit (system, i));
+      report_value (&table, -8, pw_system_reaction_name (system, i, name, sizeof name), 0 - last->lambda[i],
+                    pw_system_reaction_unit (system, i));
       pw_row_end (&table);
     }
   report_more (stdout, rows - shown, ": -o FILE.csv writes them all");
@@ -201,9 +204,7 @@ static void report_energy (const pw_sample *last) {
   printf ("\n  energy\n");
   for (pw_table table = { 0 }; pw_table_pass (&table);)
     for (int i = 0; i < 6; i++) {
-      pw_cell (&table, -10, row[i].name);
-      pw_cell_number (&table, REPORT_WIDTH, row[i].value, REPORT_DIGITS);
-      pw_cell (&table, -1, "J");
+      report_value (&table, -10, row[i].name, row[i].value, "J");
       pw_row_end (&table);
     }
 }

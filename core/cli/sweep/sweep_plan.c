@@ -1,6 +1,5 @@
 /* Makes the plan of a sweep: matches the varied quantities to the model, and finds the columns of the table and the
  * fingerprint. */
-#define _POSIX_C_SOURCE 200809L
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>

@@ -2,7 +2,6 @@
  *
  * Rows with the same parameters follow each other and share a compiled system; systems of the same structure share
  * specialised code. */
-#define _POSIX_C_SOURCE 200809L
 #include <math.h>
 #include <pthread.h>
 #include <stdlib.h>
