@@ -12,12 +12,12 @@
 #include "pinwheel-solvers.h"
 #include "progress.h"
 
-/* Exit statuses after SIGINT and SIGPIPE, as shells report them: 128 and the number of the signal. */
+/* Exit statuses after SIGINT or SIGTERM, and after SIGPIPE: 128 + SIGINT and 128 + SIGPIPE, as shells report them. */
 enum { PW_INTERRUPTED = 130, PW_CLOSED_PIPE = 141 };
 
 /* ---- Requests to stop, by a signal or a limit of processor time; commands check them between steps (stop.c) ---- */
 
-extern volatile sig_atomic_t pw_stop; /* not 0: commands stop; SIGINT and SIGTERM add 1 each */
+extern volatile sig_atomic_t pw_stop; /* not 0: commands stop; each SIGINT or SIGTERM adds 1 */
 
 /* Counts these signals from now on.  The first requests a stop after the current step.  The third ends the program, in
  * case that step never ends; the second does not, since some senders signal both a process and its group. */
@@ -264,7 +264,7 @@ int pw_cli_check_csv (const char *path, pw_error *error);
 
 /* ---- Messages ---- */
 
-/* Print: pw_cli_print to a stream, pw_cli_say to standard error.  On a terminal control characters are escaped. */
+/* Prints to a stream; pw_cli_say: to standard error.  On a terminal control characters are escaped. */
 void pw_cli_print (FILE *f, const char *format, ...) PW_PRINTF (2, 3);
 #define pw_cli_say(...) pw_cli_print (stderr, __VA_ARGS__)
 

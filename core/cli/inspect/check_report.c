@@ -1,6 +1,7 @@
 /* The report of `pinwheel check`: a sequence of entries, each with a key in JSON, a label and words in text. */
 #include <math.h>
 #include <stdarg.h>
+#include <string.h>
 #include "check_report.h"
 #include "report.h"
 
@@ -101,19 +102,11 @@ static void report_mobility (pw_json *j, const pw_check *check) {
   report_end_list (j, listed);
 }
 
-/* The saddle-point matrix: "regular" or "singular"; NULL: not known.  If it is singular the initialisation fails with
- * PW_INPUT, which has one other cause: an initial value of 1e100 or more. */
-static const char *report_matrix (const pw_check *check) {
-  const pw_system *s = check->model.system;
-  double largest = 0;
-  for (int j = 0; j < pw_system_coordinates (s); j++)
-    largest = fmax (largest, fmax (fabs (pw_system_initial_q (s)[j]), fabs (pw_system_initial_v (s)[j])));
-  return check->run ? "regular" : check->run_error.status == PW_INPUT && largest < 1e100 ? "singular" : NULL;
-}
-
 static void report_mass (pw_json *j, const pw_check *check) {
   static const char *const lack[] = { NULL, "no mass", "no inertia", "neither mass nor inertia" };
-  const char *matrix = report_matrix (check);
+  /* the error says if the matrix is singular; after other errors of the initialisation that is not known */
+  int is_singular = strstr (check->run_error.text, "no constraint determines how it moves") != NULL;
+  const char *matrix = check->run ? "regular" : is_singular ? "singular" : NULL;
   const pw_system *s = check->model.system;
   const double *M = pw_system_mass (s);
   int lacking = 0, listed = 0;

@@ -49,8 +49,8 @@ static void list_fields (pw_table *t, const pw_field *fields) {
 
 /* ---- Descriptions of methods and element types by name ---- */
 
-/* Describes the entries of these names, all of them for the name "all".  The first member of an entry is its name; both
- * lists end with NULL.  `sort`: "element type". */
+/* Describes the entries of these names, all of them for the name "all".  The first member of an entry is its name;
+ * entries and names end with NULL.  `sort`: "element type". */
 static int list_named (const char *sort, const void *const *entries, void (*describe) (const void *entry),
                        const char **name, pw_error *error) {
   for (int shown = 0; *name; name++) {

@@ -30,9 +30,9 @@ static void new_print (FILE *f, const char *name, const char *const *line) {
     for (const char *c = *line; *c; c++) *c == '%' ? fputs (name, f) : fputc (*c, f);
 }
 
-static int new_write (const char *path, pw_error *error) {
+static int new_command (void *options, pw_error *error) {
+  const char *ending, *path = ((const pw_cli_line *)options)->argument[0];
   char name[100];
-  const char *ending;
   if (new_name (path, name, sizeof name, &ending, error) != PW_OK) return PW_INPUT;
   FILE *f = fopen (path, "wx"); /* never overwrites a file */
   if (f == NULL && errno == EEXIST) return pw_fail (error, PW_INPUT, "%s exists already and was not changed", path);
@@ -46,10 +46,6 @@ static int new_write (const char *path, pw_error *error) {
   }
   pw_cli_print (stdout, "%s is written; now:  pinwheel run %s%s\n", path, strchr (path, '/') ? "" : "./", path);
   return PW_OK;
-}
-
-static int new_command (void *options, pw_error *error) {
-  return new_write (((const pw_cli_line *)options)->argument[0], error);
 }
 
 const pw_command pw_cli_new = {

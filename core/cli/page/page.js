@@ -192,8 +192,7 @@ async function runsWith (set, x) {
   }
 }
 
-/* [low, high, step] of the slider of a value in a domain, step 0 for any number: a positive value may become a tenth to
- * three times as large, other values may change by twice their size. */
+/* [low, high, step] of the slider of a value in a domain; step 0: any number. */
 function rangeOf (value, domain) {
   if (domain === "count") return [1, Math.max(10, 2 * value), 1];
   if (domain === "fraction") return [0, 1, 0];

@@ -6,9 +6,9 @@
 #include "report.h"
 
 enum {
-  REPORT_MESSAGES = 8, /* of a kind, at most; also changed states */
-  REPORT_BODIES = 20,  /* at most */
-  REPORT_ROWS = 24,    /* of reactions, or of internal coordinates, at most */
+  REPORT_MESSAGES = 8, /* messages of one kind, or changed states, that are printed at most */
+  REPORT_BODIES = 20,  /* bodies that are printed at most */
+  REPORT_ROWS = 24,    /* reactions, or internal coordinates, that are printed at most */
   REPORT_TEXT = 400,   /* longest description of a redundant equation, end included */
   REPORT_WIDTH = 13,   /* of a column of numbers */
   REPORT_DIGITS = 8

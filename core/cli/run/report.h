@@ -26,7 +26,7 @@ void pw_report_warnings (const pw_run *run, const pw_system *system, double defe
  * none or memory is exhausted. */
 const char **pw_report_redundancies (pw_run *run);
 
-/* Prints tables of the last state, the reactions, with `energy` the energies, the errors, and a summary of the cost. */
+/* Prints the last state, reactions, energies if `energy` is not 0, errors, residuals and cost. */
 void pw_report_end (const pw_summary *summary, const pw_system *system, const pw_sample *last, int energy,
                     const pw_statistics *statistics);
 
