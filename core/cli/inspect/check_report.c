@@ -98,7 +98,7 @@ static void report_mobility (pw_json *j, const pw_check *check) {
   pw_json_close (j, '}');
   report_section (j, "redundant", '[', NULL);
   if (check->run) report_text (j, "redundant constraint equations", "%d", pw_run_redundant (check->run));
-  for (const char *const *r = check->redundant; r && *r; r++) report_item (j, &listed, *r, *r);
+  for (const char *const *text = check->redundant; text && *text; text++) report_item (j, &listed, *text, *text);
   report_end_list (j, listed);
 }
 
@@ -175,9 +175,9 @@ static void report_initial (pw_json *j, const pw_check *check) {
 /* ---- Element types ---- */
 
 /* The checks that failed, in "random scenes" or "this model"; label: the same in the text. */
-static void report_failures (pw_json *j, const pw_selftest_report *r, const char *scenes, const char *label) {
+static void report_failures (pw_json *j, const pw_selftest_report *report, const char *scenes, const char *label) {
   char error[32], bound[32];
-  for (const pw_selftest_check *c = r->check; c < r->check + r->checks; c++) {
+  for (const pw_selftest_check *c = report->check; c < report->check + report->checks; c++) {
     if (!c->failed) continue;
     report_print (j, "    %s: %s does not hold: off by %s, the bound is %s\n      %s\n", label, c->about,
                   pw_format (error, c->error, 2), pw_format (bound, c->bound, 2), c->where);

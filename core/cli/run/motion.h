@@ -63,7 +63,7 @@ int pw_comparison_open (pw_comparison *comparison, const pw_cli_model *compiled,
 void pw_comparison_close (pw_comparison *comparison);
 /* Saves or loads the samples of a checkpoint. */
 void pw_comparison_serialise (pw_comparison *comparison, pw_archive *a);
-/* The errors of the samples taken; NULL if there are none. */
+/* The errors of the samples taken, after the run; NULL if there are none. */
 const pw_reference_error *pw_comparison_errors (pw_comparison *comparison, const pw_system *system);
 
 #endif
