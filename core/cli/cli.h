@@ -193,12 +193,12 @@ enum { PW_STATE_NAME = 300, PW_CHANGE_TEXT = 400 };
 /* The name of a state, and its values before and after the consistent initialisation. */
 void pw_cli_state_change (const pw_system *system, const pw_initial_report *initial, int state,
                           char name[PW_STATE_NAME], double *given, double *consistent);
-/* The largest change [SI units] of a value given by the user, and a text such as "frame.vy from 1 to 1.2 m/s"; 0,
- * without a text, if all are as given. */
+/* The largest such change [SI units] of the values given by the user, and a text such as "frame.vy from 1 to 1.2 m/s";
+ * 0, without a text, if all are as given. */
 double pw_cli_largest_change (const pw_run *r, const pw_system *s, char text[PW_CHANGE_TEXT]);
 
-/* A path, relative to the current directory if it lies there.  The buffer is scratch; the result is part of `path`. */
-const char *pw_cli_short_path (const char *path, char *buffer, size_t size);
+/* The part of a path that is relative to the current directory, or all of it if it does not lie there. */
+const char *pw_cli_short_path (const char *path);
 
 /* The default run settings of a model; where it has none, 10 s, rk4+projection and a step of 1e-3 s.  rtol may be 0. */
 pw_run_defaults pw_cli_defaults (const pw_plugin_table *table);

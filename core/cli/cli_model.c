@@ -96,9 +96,10 @@ double pw_cli_largest_change (const pw_run *r, const pw_system *s, char text[PW_
   return largest;
 }
 
-const char *pw_cli_short_path (const char *path, char *buffer, size_t size) {
-  size_t n = getcwd (buffer, size) ? strlen (buffer) : 0;
-  return n > 1 && strncmp (path, buffer, n) == 0 && path[n] == '/' ? path + n + 1 : path;
+const char *pw_cli_short_path (const char *path) {
+  char folder[4096];
+  size_t n = getcwd (folder, sizeof folder) ? strlen (folder) : 0;
+  return n > 1 && strncmp (path, folder, n) == 0 && path[n] == '/' ? path + n + 1 : path;
 }
 
 pw_run_defaults pw_cli_defaults (const pw_plugin_table *table) {

@@ -81,13 +81,12 @@ static int list_longest (void *context, const char *name, const char *path) {
 
 /* A file that cannot be opened is listed with the reason. */
 static int list_model (void *context, const char *name, const char *path) {
-  char short_path[1000];
   pw_error error = { 0 };
   pw_file *f = pw_file_open (path, &error);
   const char *about = f ? pw_file_table (f)->about : error.text;
   const int width = *(const int *)context;
   pw_cli_print (stdout, "  %-*s  %s\n  %-*s  %s\n", width, name, about ? about : "", width, "",
-                pw_cli_short_path (path, short_path, sizeof short_path));
+                pw_cli_short_path (path));
   pw_file_close (f);
   return 0;
 }

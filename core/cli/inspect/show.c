@@ -97,12 +97,11 @@ static void show_reference (const pw_cli_model *m) {
 }
 
 static void show_model (const pw_cli_model *m) {
-  char path[1000];
   int elements;
   const pw_plugin_table *table = pw_model_table (m->model);
   const pw_element *e = pw_model_elements (m->model, &elements);
   pw_cli_print (stdout, "%s: %s\n%s\n", pw_model_name (m->model), table->about ? table->about : "",
-                pw_cli_short_path (pw_file_path (m->file), path, sizeof path));
+                pw_cli_short_path (pw_file_path (m->file)));
   show_bodies (m->system);
   if (elements) puts ("\nElements");
   for (int i = 0; i < elements; i++) show_element (&e[i]);

@@ -127,8 +127,8 @@ function accuracy (s) {
 /* Settings for the engine.  Initial values are used only if the numbers of bodies are those with which the page begins:
  * indices of states depend on them. */
 function engineSettings (s) {
-  const counts = page.parameters.some((p, i) => p.domain === "count" && s.parameters[i] !== p.value);
-  return { ...s, initial: counts ? [] : [...s.initial], step: accuracy(s), rtol: accuracy(s) };
+  const otherCounts = page.parameters.some((p, i) => p.domain === "count" && s.parameters[i] !== p.value);
+  return { ...s, initial: otherCounts ? [] : [...s.initial], step: accuracy(s), rtol: accuracy(s) };
 }
 
 /* Adds a label with a slider and a field for a number; `change` is called with a new number. */
