@@ -164,8 +164,8 @@ function control (parent, name, unit, about, value, low, high, step, change) {
 /* Sliders whose ends are still to be checked, each with its first value and a function that sets a value in settings. */
 let unchecked = [];
 
-/* Moves the ends of the next slider towards its first value until a run can begin there and does not fail within shortRun;
- * then continues with the next one. */
+/* Moves the ends of the next slider towards its first value, by half of the distance up to six times, then to that value,
+ * until a run can begin there and does not fail within shortRun; then continues with the next slider. */
 async function narrowSliders () {
   const next = unchecked.shift();
   if (!next) { document.documentElement.dataset.narrowed = true; return; }

@@ -15,6 +15,7 @@ enum {
 };
 #define REPORT_DEFECT 0.01 /* relative energy defect above which a warning is printed */
 
+/* The end of a list of which `more` entries are not printed. */
 static void report_more (FILE *f, int more, const char *hint) {
   if (more > 0) fprintf (f, "  and %d more%s\n", more, hint);
 }

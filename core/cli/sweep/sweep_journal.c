@@ -26,8 +26,8 @@ typedef struct {
   long row;         /* its number in the grid */
   int status;       /* exit status of the run */
   const char *text; /* the table's line, which ends with a newline */
-  size_t text_size; /* its bytes, the newline included */
-  size_t line_size; /* those of the journal's line */
+  size_t text_size; /* bytes of that line, the newline included */
+  size_t line_size; /* bytes of the journal's line, the newline included */
 } journal_line;
 
 /* A file in memory, read only, and not ended by 0. */
