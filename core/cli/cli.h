@@ -12,15 +12,15 @@
 #include "pinwheel-solvers.h"
 #include "progress.h"
 
-/* Exit statuses after SIGINT and SIGPIPE, as shells report them: 128 and the number of the signal. */
+/* Exit statuses after SIGINT or SIGTERM, and after SIGPIPE: 128 + SIGINT and 128 + SIGPIPE, as shells report them. */
 enum { PW_INTERRUPTED = 130, PW_CLOSED_PIPE = 141 };
 
 /* ---- Requests to stop, by a signal or a limit of processor time; commands check them between steps (stop.c) ---- */
 
-extern volatile sig_atomic_t pw_stop; /* not 0: commands stop; each signal SIGINT or SIGTERM adds 1 */
+extern volatile sig_atomic_t pw_stop; /* not 0: commands stop; each SIGINT or SIGTERM adds 1 */
 
-/* Counts signals from now on.  The first requests a stop after the current step.  The third ends the program, in case
- * that step never ends; the second does not, since some senders signal a program and its group as well. */
+/* Counts these signals from now on.  The first requests a stop after the current step.  The third ends the program, in
+ * case that step never ends; the second does not, since some senders signal both a process and its group. */
 void pw_stop_catch (void);
 /* Lets signals end the program again. */
 void pw_stop_release (void);
@@ -38,7 +38,7 @@ void pw_limit_start (pw_limit *limit);
 /* 1 if the limit is exceeded or a signal has requested a stop.  For pw_settings.stop; the context is the pw_limit. */
 int pw_limit_over (void *context);
 /* The status of a command whose run returned PW_STOPPED at time t: PW_RETRY, without an error, after a signal; else
- * PW_METHOD with the limit. */
+ * PW_METHOD with an error that names the limit. */
 int pw_limit_status (const pw_limit *limit, double t, pw_error *error);
 
 /* ---- Commands ---- */
@@ -66,7 +66,7 @@ typedef struct {
   /* private */
   poptContext popt;
   struct poptOption *table; /* a copy of the command's options, bound to its structure */
-  void **text;              /* the text that popt allocated for each option */
+  void **text;              /* the text or list that popt allocated for each option */
 } pw_cli_line;
 
 typedef struct {
@@ -145,17 +145,18 @@ int pw_cli_number (const char *option, const char *text, pw_domain domain, doubl
 /* Reads a range "FIRST:LAST".  PW_INPUT, without an error, if it is not two finite numbers. */
 int pw_cli_range (const char *text, double *first, double *last);
 
-/* The settings of a run, without the ledger, from options and defaults.  The limit must outlive the run. */
+/* Final time, settings except `ledger`, and limit of a run, from options and defaults.  The limit must outlive it. */
 int pw_cli_settings (const pw_cli_line *line, const pw_run_defaults *defaults, double *t_end, pw_settings *settings,
                      pw_limit *limit, pw_error *error);
 
-/* The status of a command that has been stopped: PW_INTERRUPTED after a signal, with a message that results are
- * incomplete; else PW_METHOD with --limit. */
+/* The status of a command that was stopped: PW_INTERRUPTED after a signal, with a message that results are incomplete;
+ * else PW_METHOD with an error that names --limit. */
 int pw_cli_incomplete (const pw_cli_line *line, pw_error *error);
 
 /* 1 if the step size of a method follows a tolerance, 0 if it is fixed; -1 if there is no such method. */
 int pw_cli_adaptive (const char *method);
-/* Prints notices of options without effect on a method; steps with tolerances, common in scripts, are not reported. */
+/* Prints notices of options without effect on a method; but --step and tolerances may be given together, as by scripts
+ * that compare methods. */
 void pw_cli_report_unused (const char *method, const pw_cli_line *line);
 
 /* ---- Models ---- */
@@ -188,15 +189,18 @@ int pw_cli_apply (pw_model *m, const char *option, const char **list,
 /* The parameter of a model of this name; NULL: there is none. */
 const pw_parameter *pw_cli_parameter (const pw_model *m, const char *name);
 
-enum { PW_CHANGE_TEXT = 400 };
-/* Making the initial state consistent may change values that the user has given.  The largest change, in SI units,
- * and a text such as "frame.vy from 1 to 1.2 m/s"; 0 if all are as given. */
+enum { PW_STATE_NAME = 300, PW_CHANGE_TEXT = 400 };
+/* The name of a state, and its values before and after the consistent initialisation. */
+void pw_cli_state_change (const pw_system *system, const pw_initial_report *initial, int state,
+                          char name[PW_STATE_NAME], double *given, double *consistent);
+/* The largest such change [SI units] of the values given by the user, and a text such as "frame.vy from 1 to 1.2 m/s";
+ * 0, without a text, if all are as given. */
 double pw_cli_largest_change (const pw_run *r, const pw_system *s, char text[PW_CHANGE_TEXT]);
 
-/* A path, relative to the current directory if that contains it; the result may be in `buffer`. */
-const char *pw_cli_short_path (const char *path, char *buffer, size_t size);
+/* The part of a path that is relative to the current directory, or all of it if it does not lie there. */
+const char *pw_cli_short_path (const char *path);
 
-/* The default run settings of a model, completed by 10 s of rk4+projection with steps of 1e-3 s; rtol 0 if not set. */
+/* The default run settings of a model; where it has none, 10 s, rk4+projection and a step of 1e-3 s.  rtol may be 0. */
 pw_run_defaults pw_cli_defaults (const pw_plugin_table *table);
 
 /* ---- The engine of runs (engine.c): what evaluates the equations of motion ---- */
@@ -205,14 +209,14 @@ typedef enum { PW_SPECIALISE_AUTO, PW_SPECIALISE_ALWAYS, PW_SPECIALISE_NEVER } p
 
 typedef struct {
   pw_scene_code *code; /* NULL: the general engine */
-  char reason[200];    /* for the general engine */
+  char reason[200];    /* why the general engine is used */
 } pw_cli_engine;
 
-/* Reads the value of --specialise, NULL if it is not given. */
+/* Reads the value of --specialise; NULL, if it is not given, means "auto". */
 int pw_cli_specialise (const char *text, pw_specialise *when, pw_error *error);
 
 /* The C text of the code specialised for a system, without the constraint equations that are redundant at the initial
- * state.  NULL and the error if there can be none.  Free it. */
+ * state, if that can be made consistent.  NULL and the error if there can be none.  Free it. */
 char *pw_cli_source (const pw_system *s, pw_error *error);
 /* Chooses the engine for runs with `steps` steps in total; loads or compiles the code, and prints notices. */
 void pw_cli_engine_open (pw_cli_engine *e, const pw_system *s, pw_specialise when, double steps);
@@ -227,7 +231,7 @@ pw_scene_code *pw_cli_engine_lanes (const pw_cli_engine *e, const pw_system *s, 
 
 /* ---- Files ---- */
 
-/* First entry of the list of files passed to pw_cli_check_uses; that fills in the path. */
+/* First entry of the list of files passed to pw_cli_check_uses, which fills in the path. */
 #define PW_CLI_MODEL_USE \
   { "the model", NULL, PW_READS, NULL }
 
@@ -235,18 +239,18 @@ pw_scene_code *pw_cli_engine_lanes (const pw_cli_engine *e, const pw_system *s, 
  * for the model of the command line and, if its file is open (`file` is not NULL), for the tables that it reads. */
 int pw_cli_check_uses (const pw_cli_line *line, const pw_file *file, pw_use *use, int count, pw_error *error);
 
-/* Makes a folder and those above it, and locks it until the returned descriptor is closed.  -1 and the error. */
+/* Makes a folder and those above it, and locks it until the returned descriptor is closed; -1 if that fails. */
 int pw_cli_lock_folder (const char *folder, pw_error *error);
 
-/* The files that a command writes, and the lock of the folder that it writes into. */
+/* The files that a command writes, and the lock of the folder that it writes into; zero-initialised. */
 enum { PW_FILES = 6 };
 typedef struct {
   pw_output *output[PW_FILES]; /* NULL: not requested */
   int locked, lock;            /* 1: a folder is locked; the descriptor of the lock */
 } pw_files;
 
-/* Checks a list of at most PW_FILES uses (pw_cli_check_uses) and opens what it writes, before anything is computed:
- * use[i] is output[i].  Close them in every case. */
+/* Checks a list of at most PW_FILES uses (pw_cli_check_uses), then opens what is written: use[i] becomes output[i].
+ * Close them in every case. */
 int pw_files_open (pw_files *files, const pw_cli_line *line, const pw_cli_model *m, pw_use *use, int count,
                    pw_error *error);
 FILE *pw_files_stream (const pw_files *files, int i); /* NULL: not requested */
@@ -260,11 +264,12 @@ int pw_cli_check_csv (const char *path, pw_error *error);
 
 /* ---- Messages ---- */
 
-/* Print to a stream, and to standard error; on a terminal control characters, as in names of files, are escaped. */
+/* Prints to a stream; pw_cli_say: to standard error.  On a terminal control characters are escaped. */
 void pw_cli_print (FILE *f, const char *format, ...) PW_PRINTF (2, 3);
 #define pw_cli_say(...) pw_cli_print (stderr, __VA_ARGS__)
 
-/* Prints text broken into lines of `width` characters; the first line continues at column `indent`. */
+/* Prints text broken into lines of `width` characters.  The first line continues at column `indent`, where the others
+ * begin. */
 void pw_cli_print_wrapped (const char *text, int indent, int width);
 
 /* The word for a status PW_OK to PW_METHOD in tables and summaries: "ok", "machine", "input", "start" or "method". */

@@ -1,5 +1,4 @@
 /* The files that a command reads and writes: checks, folders, those kept open until it ends. */
-#define _POSIX_C_SOURCE 200809L
 #include <errno.h>
 #include <stdlib.h>
 #include <string.h>

@@ -1,5 +1,4 @@
 /* The model of a command line: opened with its --set and --start, and its parameters and initial values. */
-#define _POSIX_C_SOURCE 200809L
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -74,25 +73,33 @@ void pw_cli_close_model (pw_cli_model *m) {
   *m = (pw_cli_model){ .file = NULL };
 }
 
+void pw_cli_state_change (const pw_system *system, const pw_initial_report *initial, int state,
+                          char name[PW_STATE_NAME], double *given, double *consistent) {
+  int n = pw_system_coordinates (system);
+  *given = state < n ? initial->q_given[state] : initial->v_given[state - n];
+  *consistent = state < n ? initial->q[state] : initial->v[state - n];
+  pw_system_state_name (system, state, name, PW_STATE_NAME);
+}
+
 double pw_cli_largest_change (const pw_run *r, const pw_system *s, char text[PW_CHANGE_TEXT]) {
-  const pw_initial_report *report = pw_run_initial (r);
-  int n = pw_system_coordinates (s);
-  double largest = 0;
-  char name[300], given_text[32], after_text[32];
-  for (int i = 0; i < 2 * n; i++) {
-    double given = i < n ? report->q_given[i] : report->v_given[i - n], after = i < n ? report->q[i] : report->v[i - n];
-    if (!pw_initial_given (report, i) || !pw_initial_moved (s, report, i)) continue;
-    if (!(fabs (after - given) > largest)) continue;
-    largest = fabs (after - given);
-    snprintf (text, PW_CHANGE_TEXT, "%s from %s to %s %s", pw_system_state_name (s, i, name, sizeof name),
-              pw_format (given_text, given, 10), pw_format (after_text, after, 10), pw_system_state_unit (s, i));
+  const pw_initial_report *initial = pw_run_initial (r);
+  double largest = 0, given, consistent;
+  char name[PW_STATE_NAME], given_text[32], consistent_text[32];
+  for (int i = 0; i < 2 * pw_system_coordinates (s); i++) {
+    if (!pw_initial_given (initial, i) || !pw_initial_moved (s, initial, i)) continue;
+    pw_cli_state_change (s, initial, i, name, &given, &consistent);
+    if (!(fabs (consistent - given) > largest)) continue;
+    largest = fabs (consistent - given);
+    snprintf (text, PW_CHANGE_TEXT, "%s from %s to %s %s", name, pw_format (given_text, given, 10),
+              pw_format (consistent_text, consistent, 10), pw_system_state_unit (s, i));
   }
   return largest;
 }
 
-const char *pw_cli_short_path (const char *path, char *buffer, size_t size) {
-  size_t n = getcwd (buffer, size) ? strlen (buffer) : 0;
-  return n > 1 && strncmp (path, buffer, n) == 0 && path[n] == '/' ? path + n + 1 : path;
+const char *pw_cli_short_path (const char *path) {
+  char folder[4096];
+  size_t n = getcwd (folder, sizeof folder) ? strlen (folder) : 0;
+  return n > 1 && strncmp (path, folder, n) == 0 && path[n] == '/' ? path + n + 1 : path;
 }
 
 pw_run_defaults pw_cli_defaults (const pw_plugin_table *table) {

@@ -13,8 +13,8 @@ int pw_cli_specialise (const char *text, pw_specialise *when, pw_error *error) {
   return PW_OK;
 }
 
-/* Stores a short reason for the general engine: the error, which does not repeat the model; once the text of the code
- * has been generated (`has_text`), what its status means. */
+/* Stores in a few words why the general engine is used: the error without the model's name or, if code was generated
+ * (`has_text`), the meaning of its status. */
 static void engine_keep_reason (pw_cli_engine *e, const pw_system *s, int has_text, const pw_error *error) {
   char model[300];
   size_t n = (size_t)snprintf (model, sizeof model, "model %s: ", pw_system_name (s));
@@ -56,7 +56,7 @@ void pw_cli_engine_open (pw_cli_engine *e, const pw_system *s, pw_specialise whe
     engine_open_code (e, s, when);
 }
 
-/* Why runs cannot be in lanes; NULL if they can.  r: of the initial state, NULL if that is refused. */
+/* Why runs cannot be in lanes; NULL if they can.  r: a run at the initial state; NULL if that was refused. */
 static const char *engine_lanes_obstacle (const pw_cli_engine *e, const pw_system *s, const char *method,
                                           const pw_run *r) {
   if (e->code == NULL) return "the general engine is in use, see --specialise";

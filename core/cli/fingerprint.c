@@ -14,7 +14,7 @@ void pw_fingerprint_line (pw_text *t, const char *key, const char *name, const c
   pw_text_add (t, key);
   if (name) pw_text_add (t, " "), pw_text_add (t, name);
   pw_text_add (t, " = ");
-  pw_text_add (t, value);
+  for (; *value; value++) pw_text_add_bytes (t, *value == '\n' ? " " : value, 1); /* an entry has one line */
   pw_text_add (t, "\n");
 }
 
@@ -39,7 +39,7 @@ int pw_fingerprint_file (pw_text *t, const char *key, const char *name, const ch
 }
 
 int pw_fingerprint_run (pw_text *t, const char *magic, const pw_file *file, uint64_t table_sum, const char *method,
-                        const pw_settings *s, pw_error *error) {
+                        const pw_settings *settings, pw_error *error) {
   char text[200];
   pw_text_add (t, magic);
   pw_fingerprint_line (t, "version", NULL, PW_VERSION);
@@ -47,10 +47,10 @@ int pw_fingerprint_run (pw_text *t, const char *magic, const pw_file *file, uint
   snprintf (text, sizeof text, "contents %016llx", (unsigned long long)table_sum);
   if (table_sum) pw_fingerprint_line (t, "tables", NULL, text);
   pw_fingerprint_line (t, "method", NULL, method);
-  pw_fingerprint_number (t, "t-end", NULL, s->span);
-  pw_fingerprint_number (t, "step", NULL, s->step);
-  pw_fingerprint_number (t, "rtol", NULL, s->rtol);
-  pw_fingerprint_number (t, "atol", NULL, s->atol);
+  pw_fingerprint_number (t, "t-end", NULL, settings->span);
+  pw_fingerprint_number (t, "step", NULL, settings->step);
+  pw_fingerprint_number (t, "rtol", NULL, settings->rtol);
+  pw_fingerprint_number (t, "atol", NULL, settings->atol);
   return status;
 }
 
@@ -131,7 +131,7 @@ const char *pw_fingerprint_value (const char *at, const char *end, const char *k
   return e.value;
 }
 
-/* Describes the first entry of `a` that `b` does not have. */
+/* Describes the first entry of `a` that `b` does not have, or has with another value; 0 if there is none. */
 static int fingerprint_missing (pw_fingerprint a, pw_fingerprint b, const char *ignored, char *text, size_t size) {
   enum { SHOWN = 120 }; /* characters of a value, at most */
   fingerprint_entry own, other;

@@ -17,7 +17,7 @@ int pw_fingerprint_file (pw_text *t, const char *key, const char *name, const ch
 /* Adds the first lines of the fingerprint of a run or sweep: `magic`, version, model, the checksum of its tables
  * (pw_fingerprint_tables) unless it is 0, method and settings.  Errors as of pw_fingerprint_file. */
 int pw_fingerprint_run (pw_text *t, const char *magic, const pw_file *file, uint64_t table_sum, const char *method,
-                        const pw_settings *s, pw_error *error);
+                        const pw_settings *settings, pw_error *error);
 /* Continues a checksum, 0 at first, with the tables in the signals of a model. */
 uint64_t pw_fingerprint_tables (uint64_t sum, const pw_model *m);
 /* Adds a line for each state of a list of "STATE=VALUE", its last value; the list ends with NULL, or is NULL. */
@@ -35,7 +35,8 @@ typedef struct {
   const char *where; /* in messages: "here", "there" */
 } pw_fingerprint;
 
-/* 1 if fingerprints differ, not only in the key `ignored` (or NULL): text is "step is 0.001 there and 0.002 here". */
+/* 1 if fingerprints differ in a key other than `ignored` (may be NULL); `text` is then the first difference: "step is
+ * 0.001 there and 0.002 here". */
 int pw_fingerprint_differ (pw_fingerprint a, pw_fingerprint b, const char *ignored, char *text, size_t size);
 
 #endif

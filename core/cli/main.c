@@ -1,5 +1,4 @@
 /* The program `pinwheel`: finds the command and runs it. */
-#define _POSIX_C_SOURCE 200809L
 #include <errno.h>
 #include <gsl/gsl_version.h>
 #include <nlopt.h>
@@ -72,7 +71,7 @@ int main (int argc, char **argv) {
   /* A closed pipe or a file size limit makes writes fail, which is handled like other errors. */
   signal (SIGPIPE, SIG_IGN);
   signal (SIGXFSZ, SIG_IGN);
-  unsetenv ("POSIXLY_CORRECT"); /* popt would not accept options after the model */
+  unsetenv ("POSIXLY_CORRECT"); /* with this variable popt does not accept options after the model */
   int status = main_dispatch (argc, (const char **)(void *)argv);
   pw_error error = { 0 };
   if ((fflush (stdout) != 0 || ferror (stdout)) && status == 0)

@@ -12,7 +12,7 @@
 
 enum { PARALLEL_JOBS = 10000 }; /* at most; more threads than any machine runs at once */
 
-/* OMP_NUM_THREADS, or the processors that this process may use. */
+/* OMP_NUM_THREADS, or the number of processors that this process may use. */
 static long parallel_processors (void) {
   const char *text = getenv ("OMP_NUM_THREADS");
   long wanted = text ? strtol (text, NULL, 10) : 0;
@@ -48,7 +48,8 @@ typedef struct {
   const parallel_cores *cores; /* NULL: threads run on any processor */
 } parallel;
 
-/* Binds the calling thread to cores of its own; with several it can avoid those that other programs use. */
+/* Binds the calling thread to its share of the cores; among several of them the system can avoid those that other
+ * programs use. */
 static void parallel_bind (const parallel_cores *c, int thread, int threads) {
   cpu_set_t own;
   CPU_ZERO (&own);

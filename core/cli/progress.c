@@ -11,8 +11,8 @@
 #define PROGRESS_BAR_INTERVAL 0.1 /* between drawings of the bar [s] */
 #define PROGRESS_LINE_INTERVAL 60 /* between lines without a terminal [s] */
 #define PROGRESS_WIDTH 30         /* characters of a full bar, fewer on a narrow terminal */
-#define PROGRESS_COLUMNS 80       /* of a terminal that does not tell */
-#define PROGRESS_TITLE 16         /* bytes of the title before it, at most */
+#define PROGRESS_COLUMNS 80       /* of a terminal that does not report its width */
+#define PROGRESS_TITLE 16         /* bytes of the title before the bar, at most */
 
 double pw_seconds (clockid_t id) {
   struct timespec now;

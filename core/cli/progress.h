@@ -15,7 +15,7 @@ typedef struct {
   int drawn;         /* 1: there is a bar to erase */
   int no_bar;        /* 1: no bar on a terminal, as the results are printed there; set after the start */
   int lines;         /* 1: no terminal: lines in place of the bar */
-  char note[40];     /* printed at the end; "" at first */
+  char note[40];     /* printed at the end of the line; "" at first */
 } pw_progress;
 
 /* The time of a clock [s]. */

@@ -1,5 +1,4 @@
 /* Messages and other text that contains names, and the error with which a command ends. */
-#define _POSIX_C_SOURCE 200809L
 #include <poll.h>
 #include <stdarg.h>
 #include <stdio.h>
@@ -8,18 +7,13 @@
 #include "cli.h"
 #include "util.h"
 
-/* Writes control characters and invalid bytes as \\xNN. */
+/* Writes control characters and invalid bytes as \xNN. */
 static void say_escaped (FILE *f, const char *text) {
   for (int n; *text; text += n) {
     n = pw_utf8_size (text);
     int escaped = n == 0 || pw_control (text);
     if (n == 0) n = 1;
-    for (int i = 0; i < n; i++) {
-      if (escaped)
-        fprintf (f, "\\x%02x", (unsigned char)text[i]);
-      else
-        fputc (text[i], f);
-    }
+    for (int i = 0; i < n; i++) fprintf (f, escaped ? "\\x%02x" : "%c", (unsigned char)text[i]);
   }
 }
 

@@ -1,4 +1,4 @@
-/* Requests to stop a command, by a signal or a limit of processor time, which it checks between steps. */
+/* Requests to stop, by a signal or a limit of processor time; commands check them between steps. */
 #define _DEFAULT_SOURCE /* CLOCK_MONOTONIC_COARSE */
 #include <math.h>
 #include <time.h>
@@ -12,8 +12,8 @@ static void stop_on_signal (int number) {
   raise (number);
 }
 
-/* Handles SIGINT and SIGTERM; a signal that the program was started to ignore, by nohup or in the background of a
- * script, stays ignored.  SA_RESTART: a write that waits for the reader of a pipe goes on. */
+/* Sets the handler of SIGINT and SIGTERM; a signal that the program was started to ignore, by nohup or in a script's
+ * background, stays ignored.  SA_RESTART: a write that waits for the reader of a pipe goes on. */
 static void stop_set (void (*handler) (int)) {
   static const int numbers[] = { SIGINT, SIGTERM };
   struct sigaction action = { .sa_handler = handler, .sa_flags = SA_RESTART }, before;

@@ -23,7 +23,7 @@ void pw_text_cell (pw_text *t, const char *text);
 void pw_text_name (pw_text *t, const char *name, const char *unit);
 /* Adds a cell in quotes; line ends in it become blanks. */
 void pw_text_quoted (pw_text *t, const char *text);
-/* Writes the text and a line end to a file of the folder, and frees the text.  PW_OK or PW_RESOURCE. */
+/* Writes the text and a line end to a file, and frees the text.  PW_OK, or PW_RESOURCE with the file's folder. */
 int pw_text_line (pw_text *t, FILE *f, const char *folder, pw_error *error);
 
 /* Closes an incomplete table: it remains as NAME.part, whose path goes to the buffer; without rows it is removed, and

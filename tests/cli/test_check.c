@@ -107,6 +107,8 @@ static void test_singular (void **state) {
   assert_int_equal (cli_run ("pinwheel check @/loose.yaml --json -"), 2);
   assert_non_null (strstr (cli_out, "\"saddle_point\": \"singular\""));
   assert_true (cli_says (cli_out, "status", "failed"));
+  assert_int_equal (cli_run ("pinwheel check ezyroller --start frame.vx=1e120"), 2);
+  check_shows ("saddle-point matrix                not known\n");
 }
 
 /* A plug-in's own kind whose force is not the gradient of its energy, and whose force_q is missing. */

@@ -127,13 +127,18 @@ static void test_bad_parts (void **state) {
   cli_shell ("for i in 1 2 3; do pinwheel sweep ezyroller " GRID " --part $i/3 -o @/p$i.csv || exit 1; done\n"
              "pinwheel sweep ezyroller " GRID " --step 2e-3 --part 2/3 -o @/q2.csv\n"
              "pinwheel sweep ezyroller " GRID
-             " --part 2/4 -o @/r2.csv; cp @/p2.csv @/copy.csv; head -n -1 @/p3.csv >@/short.csv");
+             " --part 2/4 -o @/r2.csv; cp @/p2.csv @/copy.csv; head -n -1 @/p3.csv >@/short.csv\n"
+             "for i in 1 2; do pinwheel sweep ezyroller --vary \"frame.vx=1,\n$i\" --t-end 0.01 --part $i/2"
+             " -o @/n$i.csv; done");
   cli_bad ("pinwheel sweep --merge @/p1.csv @/p3.csv -o @/m.csv", 2, "part 2 of 3 is missing");
   cli_bad ("pinwheel sweep --merge @/p1.csv @/p2.csv -o @/m.csv", 2, "part 3 of 3 is missing");
   cli_bad ("pinwheel sweep --merge @/p1.csv @/p2.csv @/copy.csv -o @/m.csv", 2,
            "@/p2.csv and @/copy.csv are both part 2 of 3");
   cli_bad ("pinwheel sweep --merge @/p1.csv @/q2.csv @/p3.csv -o @/m.csv", 2,
            "@/p1.csv and @/q2.csv are parts of different sweeps: step is 0.001 in the first and 0.002 in the second");
+  cli_bad ("pinwheel sweep --merge @/n1.csv @/n2.csv -o @/m.csv", 2,
+           "@/n1.csv and @/n2.csv are parts of different sweeps: vary frame.vx is 1, 1 in the first and 1, 2 in the "
+           "second");
   cli_bad ("pinwheel sweep --merge @/p1.csv @/r2.csv @/p3.csv -o @/m.csv", 2,
            "@/p1.csv is one of 3 parts, @/r2.csv one of 4");
   cli_bad ("pinwheel sweep --merge @/p1.csv @/p2.csv @/short.csv -o @/m.csv", 2,

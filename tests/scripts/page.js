@@ -20,6 +20,10 @@
     await change("#page-method", "erk5+projection", "change");
     await change("#page-accuracy", "-9", "input");
     await change('#parameters input[type=number][data-name="' + wanted.name + '"]', wanted.value, "change");
+    const field = $$('#parameters input[type=number][data-name="' + wanted.name + '"]');
+    field.value = "";
+    field.dispatchEvent(new Event("change", { bubbles: true }));
+    if (Number(field.value) !== wanted.value) throw new Error("without a number, a field does not show the value that is set: " + field.value);
     if (!location.hash.includes(wanted.name + "=" + wanted.value)) throw new Error("the address lacks the parameter: " + location.hash);
     if (!location.hash.includes("accuracy=1e-9")) throw new Error("the address lacks the tolerance: " + location.hash);
     document.dispatchEvent(new KeyboardEvent("keydown", { key: "End", bubbles: true }));

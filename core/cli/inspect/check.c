@@ -40,7 +40,7 @@ static void check_given_values (pw_check *check) {
     char name[PW_STATE_NAME], from_text[32], to_text[32];
     double from, to;
     if (!pw_initial_moved (s, initial, i) || !pw_initial_specified (initial, i)) continue;
-    pw_report_state (s, initial, i, name, &from, &to);
+    pw_cli_state_change (s, initial, i, name, &from, &to);
     if (fabs (to) < 1e-12 * fabs (from)) to = 0; /* round-off */
     check_add (&check->finding, "%s %s = %s %s, but the constraints require %s %s",
                pw_initial_given (initial, i) ? "--start gives" : "the model specifies", name,
@@ -61,7 +61,7 @@ static int check_reference (pw_check *check, pw_error *error) {
     double from, to;
     if (isnan (reference[i])) continue;
     check->reference_states++;
-    pw_report_state (check->model.system, pw_run_initial (check->run), i, name, &from, &to);
+    pw_cli_state_change (check->model.system, pw_run_initial (check->run), i, name, &from, &to);
     if (!(fabs (reference[i] - to) <= 1e-9 * (1 + fabs (to))))
       check_add (&check->problem, "the model's reference solution does not hold initially: %s is %s, not %s", name,
                  pw_format (from_text, to, 9), pw_format (to_text, reference[i], 9));

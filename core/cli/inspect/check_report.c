@@ -1,6 +1,7 @@
 /* The report of `pinwheel check`: a sequence of entries, each with a key in JSON, a label and words in text. */
 #include <math.h>
 #include <stdarg.h>
+#include <string.h>
 #include "check_report.h"
 #include "report.h"
 
@@ -44,9 +45,10 @@ static void report_entry (pw_json *j, const char *key, double value, const char 
 /* A line in the text only. */
 #define report_text(j, ...) report_entry (j, NULL, 0, __VA_ARGS__)
 
-/* An item of a list, of which the text shows the first few; `listed` counts them. */
-static void report_item (pw_json *j, int *listed, const char *text, const char *line) {
-  if (text) pw_json_text (j, NULL, text);
+/* An item of a list: a string in JSON, unless it is NULL; a line in the text, for the first REPORT_LISTED ones, which
+ * `listed` counts. */
+static void report_item (pw_json *j, int *listed, const char *string, const char *line) {
+  if (string) pw_json_text (j, NULL, string);
   if ((*listed)++ < REPORT_LISTED) report_print (j, "    %s\n", line);
 }
 
@@ -96,13 +98,15 @@ static void report_mobility (pw_json *j, const pw_check *check) {
   pw_json_close (j, '}');
   report_section (j, "redundant", '[', NULL);
   if (check->run) report_text (j, "redundant constraint equations", "%d", pw_run_redundant (check->run));
-  for (const char *const *r = check->redundant; r && *r; r++) report_item (j, &listed, *r, *r);
+  for (const char *const *text = check->redundant; text && *text; text++) report_item (j, &listed, *text, *text);
   report_end_list (j, listed);
 }
 
 static void report_mass (pw_json *j, const pw_check *check) {
   static const char *const lack[] = { NULL, "no mass", "no inertia", "neither mass nor inertia" };
-  const char *matrix = check->run ? "regular" : check->run_error.status == PW_INPUT ? "singular" : NULL;
+  /* the error says if the matrix is singular; after other errors of the initialisation that is not known */
+  int is_singular = strstr (check->run_error.text, "no constraint determines how it moves") != NULL;
+  const char *matrix = check->run ? "regular" : is_singular ? "singular" : NULL;
   const pw_system *s = check->model.system;
   const double *M = pw_system_mass (s);
   int lacking = 0, listed = 0;
@@ -129,7 +133,7 @@ static void report_mass (pw_json *j, const pw_check *check) {
 static void report_change (pw_json *j, const pw_check *check, int i, int *listed) {
   char name[PW_STATE_NAME], line[500], a[32], b[32], c[32];
   double from, to;
-  pw_report_state (check->model.system, pw_run_initial (check->run), i, name, &from, &to);
+  pw_cli_state_change (check->model.system, pw_run_initial (check->run), i, name, &from, &to);
   pw_json_open (j, NULL, '{');
   pw_json_text (j, "state", name);
   pw_json_number (j, "from", from);
@@ -170,15 +174,16 @@ static void report_initial (pw_json *j, const pw_check *check) {
 
 /* ---- Element types ---- */
 
-static void report_failures (pw_json *j, const pw_selftest_report *r, const char *where, const char *label) {
+/* The checks that failed, in "random scenes" or "this model"; label: the same in the text. */
+static void report_failures (pw_json *j, const pw_selftest_report *report, const char *scenes, const char *label) {
   char error[32], bound[32];
-  for (const pw_selftest_check *c = r->check; c < r->check + r->checks; c++) {
+  for (const pw_selftest_check *c = report->check; c < report->check + report->checks; c++) {
     if (!c->failed) continue;
     report_print (j, "    %s: %s does not hold: off by %s, the bound is %s\n      %s\n", label, c->about,
                   pw_format (error, c->error, 2), pw_format (bound, c->bound, 2), c->where);
     pw_json_open (j, NULL, '{');
     pw_json_text (j, "check", c->name);
-    pw_json_text (j, "in", where);
+    pw_json_text (j, "in", scenes);
     pw_json_text (j, "expected", c->about);
     pw_json_number (j, "error", c->error);
     pw_json_number (j, "bound", c->bound);

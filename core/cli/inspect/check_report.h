@@ -37,7 +37,7 @@ typedef struct {
   pw_checked_kind *kind;  /* kinds: the element types in use */
   int kinds;
   int reference_states; /* states of the model's reference solution, compared with the initial state */
-  double step;          /* the model's [s] */
+  double step;          /* the model's step size [s] */
   int uses_rk4;         /* 1: the model's method is rk4 */
   double rk4_limit;     /* the largest stable step of RK4 [s]; INFINITY: all are stable */
   int fastest;          /* the eigenvalue of largest modulus except rigid displacements; -1: all are 0 */

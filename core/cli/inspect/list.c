@@ -49,8 +49,8 @@ static void list_fields (pw_table *t, const pw_field *fields) {
 
 /* ---- Descriptions of methods and element types by name ---- */
 
-/* Describes those of these names, or all for the name "all".  `entries` ends with NULL; the first member of each is its
- * name.  `sort`: "element type". */
+/* Describes the entries of these names, all of them for the name "all".  The first member of an entry is its name;
+ * entries and names end with NULL.  `sort`: "element type". */
 static int list_named (const char *sort, const void *const *entries, void (*describe) (const void *entry),
                        const char **name, pw_error *error) {
   for (int shown = 0; *name; name++) {
@@ -71,7 +71,7 @@ static int list_named (const char *sort, const void *const *entries, void (*desc
 
 /* ---- Models ---- */
 
-/* The length of the longest name. */
+/* Raises *context, an int, to the length of the name. */
 static int list_longest (void *context, const char *name, const char *path) {
   int *width = context, length = (int)strlen (name);
   (void)path;
@@ -81,13 +81,12 @@ static int list_longest (void *context, const char *name, const char *path) {
 
 /* A file that cannot be opened is listed with the reason. */
 static int list_model (void *context, const char *name, const char *path) {
-  char short_path[1000];
   pw_error error = { 0 };
   pw_file *f = pw_file_open (path, &error);
   const char *about = f ? pw_file_table (f)->about : error.text;
   const int width = *(const int *)context;
   pw_cli_print (stdout, "  %-*s  %s\n  %-*s  %s\n", width, name, about ? about : "", width, "",
-                pw_cli_short_path (path, short_path, sizeof short_path));
+                pw_cli_short_path (path));
   pw_file_close (f);
   return 0;
 }

@@ -8,8 +8,8 @@
  * new_model_yaml. */
 #include "new.inc"
 
-/* "folder/my_car.c" gives "my_car" and ".c".  PW_INPUT for a name that a shell would not read as one word or as a name,
- * or that is too long. */
+/* "folder/my_car.c" gives "my_car" and ".c".  PW_INPUT for a name that is too long, that a shell would not read as one
+ * word, or a program as an option. */
 static int new_name (const char *path, char *name, size_t size, const char **ending, pw_error *error) {
   const char *slash = strrchr (path, '/'), *base = slash ? slash + 1 : path;
   size_t length = strspn (base, "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_-");
@@ -27,16 +27,12 @@ static int new_name (const char *path, char *name, size_t size, const char **end
 /* Writes a template with the model's name in place of each %. */
 static void new_print (FILE *f, const char *name, const char *const *line) {
   for (; *line; line++)
-    for (const char *c = *line; *c; c++)
-      if (*c == '%')
-        fputs (name, f);
-      else
-        fputc (*c, f);
+    for (const char *c = *line; *c; c++) *c == '%' ? fputs (name, f) : fputc (*c, f);
 }
 
-static int new_write (const char *path, pw_error *error) {
+static int new_command (void *options, pw_error *error) {
+  const char *ending, *path = ((const pw_cli_line *)options)->argument[0];
   char name[100];
-  const char *ending;
   if (new_name (path, name, sizeof name, &ending, error) != PW_OK) return PW_INPUT;
   FILE *f = fopen (path, "wx"); /* never overwrites a file */
   if (f == NULL && errno == EEXIST) return pw_fail (error, PW_INPUT, "%s exists already and was not changed", path);
@@ -50,10 +46,6 @@ static int new_write (const char *path, pw_error *error) {
   }
   pw_cli_print (stdout, "%s is written; now:  pinwheel run %s%s\n", path, strchr (path, '/') ? "" : "./", path);
   return PW_OK;
-}
-
-static int new_command (void *options, pw_error *error) {
-  return new_write (((const pw_cli_line *)options)->argument[0], error);
 }
 
 const pw_command pw_cli_new = {

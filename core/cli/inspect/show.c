@@ -10,12 +10,11 @@
 enum { SHOW_DIGITS = 6 };
 
 static void show_bodies (const pw_system *s) {
-  static const char *const heads[] = { "",          "mass [kg]", "inertia [kg m^2]", "x [m]",        "y [m]",
-                                       "phi [rad]", "vx [m/s]",  "vy [m/s]",         "omega [rad/s]" };
+  static const char *const head[] = { "",          "mass [kg]", "inertia [kg m^2]", "x [m]",         "y [m]",
+                                      "phi [rad]", "vx [m/s]",  "vy [m/s]",         "omega [rad/s]", NULL };
   puts ("\nBodies and their initial conditions");
   for (pw_table t = { 0 }; pw_table_pass (&t);) {
-    for (int i = 0; i < 9; i++) pw_cell (&t, i ? 9 : -1, heads[i]);
-    pw_row_end (&t);
+    pw_head (&t, -1, 9, head);
     for (int b = 0; b < pw_system_bodies (s); b++) {
       const double *M = pw_system_mass (s) + 3 * b, *q = pw_system_initial_q (s) + 3 * b,
                    *v = pw_system_initial_v (s) + 3 * b;
@@ -98,12 +97,11 @@ static void show_reference (const pw_cli_model *m) {
 }
 
 static void show_model (const pw_cli_model *m) {
-  char path[1000];
   int elements;
   const pw_plugin_table *table = pw_model_table (m->model);
   const pw_element *e = pw_model_elements (m->model, &elements);
   pw_cli_print (stdout, "%s: %s\n%s\n", pw_model_name (m->model), table->about ? table->about : "",
-                pw_cli_short_path (pw_file_path (m->file), path, sizeof path));
+                pw_cli_short_path (pw_file_path (m->file)));
   show_bodies (m->system);
   if (elements) puts ("\nElements");
   for (int i = 0; i < elements; i++) show_element (&e[i]);
@@ -120,11 +118,6 @@ static void show_model (const pw_cli_model *m) {
 
 enum { MATRICES_DIGITS = 7, MATRICES_PANEL = 6 /* columns of J side by side */ };
 
-static void matrices_head (pw_table *t, const char *const *head) {
-  for (pw_cell (t, -22, ""); *head; head++) pw_cell (t, 13, *head);
-  pw_row_end (t);
-}
-
 /* A row of numbers; "-" in place of NaN. */
 static void matrices_row (pw_table *t, const char *name, const char *unit, const double *value, int count) {
   pw_cell_unit (t, -22, name, unit);
@@ -134,11 +127,11 @@ static void matrices_row (pw_table *t, const char *name, const char *unit, const
 }
 
 static void matrices_coordinates (const pw_system *s, const pw_equations *equations, const pw_sample *sample) {
-  static const char *const head[] = { "M", "f", "q", "v", "a", NULL };
+  static const char *const head[] = { "", "M", "f", "q", "v", "a", NULL };
   char name[300];
   puts ("\nM (diagonal), forces and state by coordinate; SI units");
   for (pw_table t = { 0 }; pw_table_pass (&t);) {
-    matrices_head (&t, head);
+    pw_head (&t, -22, 13, head);
     for (int j = 0; j < equations->coordinates; j++) {
       const double value[] = { equations->mass[j], equations->force[j], sample->q[j], sample->v[j], sample->a[j] };
       pw_system_state_name (s, j, name, sizeof name);
@@ -148,11 +141,11 @@ static void matrices_coordinates (const pw_system *s, const pw_equations *equati
 }
 
 static void matrices_constraints (const pw_system *s, const pw_equations *equations, const pw_sample *sample) {
-  static const char *const head[] = { "gamma", "eta", "g", "lambda", NULL };
+  static const char *const head[] = { "", "gamma", "eta", "g", "lambda", NULL };
   char name[300];
   puts ("\ngamma, eta, g and lambda by constraint equation, named after its reaction, which is -lambda");
   for (pw_table t = { 0 }; pw_table_pass (&t);) {
-    matrices_head (&t, head);
+    pw_head (&t, -22, 13, head);
     for (int i = 0; i < equations->rows; i++) {
       const double g = i < equations->holonomic ? equations->g[i] : NAN,
                    value[] = { equations->gamma[i], equations->eta[i], g, sample->lambda[i] };

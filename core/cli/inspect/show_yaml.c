@@ -24,13 +24,10 @@ static void yaml_name (const char *name) {
 
 static void yaml_text (const char *text) {
   putchar ('"');
-  for (; *text; text++)
-    if (*text == '"' || *text == '\\')
-      printf ("\\%c", *text);
-    else if ((unsigned char)*text < ' ')
-      printf ("\\x%02x", (unsigned)*text);
-    else
-      putchar (*text);
+  for (; *text; text++) {
+    int quoted = *text == '"' || *text == '\\', control = (unsigned char)*text < ' ';
+    printf (quoted ? "\\%c" : control ? "\\x%02x" : "%c", *text);
+  }
   putchar ('"');
 }
 
@@ -38,9 +35,8 @@ static void yaml_text (const char *text) {
 
 /* "[1, 2]" */
 static void yaml_pair (const double value[2], int digits) {
-  putchar ('['), yaml_number (value[0], digits);
-  printf (", "), yaml_number (value[1], digits);
-  putchar (']');
+  char first[32], second[32];
+  printf ("[%s, %s]", pw_format (first, value[0], digits), pw_format (second, value[1], digits));
 }
 
 /* {expression: "t^2", rate: "2*t"}, or f (t, a.phi) for a function of a C model */
@@ -58,9 +54,9 @@ static void yaml_function (const pw_signal *s) {
 static void yaml_points (const pw_signal *s, int digits) {
   const double *t = s->table.t;
   int count = s->table.count;
+  char from[32], to[32];
   if (digits < YAML_DIGITS) {
-    printf ("%d from ", count), yaml_number (t[0], digits);
-    printf (" to "), yaml_number (t[count - 1], digits), printf (" s");
+    printf ("%d from %s to %s s", count, pw_format (from, t[0], digits), pw_format (to, t[count - 1], digits));
     return;
   }
   for (int i = 0; i < count; i++) {

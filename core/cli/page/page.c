@@ -14,11 +14,11 @@ static const char *const page_integrators[] = { "rk4", "erk5", "erk8", NULL };
 typedef struct {
   pw_cli_line line;
   const char *path; /* of -o */
-  pw_cli_model m;
+  pw_cli_model compiled;
   pw_page content; /* files for the engine */
-  char *base64;    /* scratch: the longest of them as text */
+  char *base64;    /* scratch: the longest of these files as text */
   pw_run *run;     /* for its consistent initial state */
-  double t_end;
+  double t_end;    /* [s] */
   pw_settings settings;
   pw_limit limit;
   char method[100];
@@ -27,9 +27,9 @@ typedef struct {
 /* ---- Data ---- */
 
 /* Writes a file as base64 (RFC 4648). */
-static void page_file_json (pw_json *j, const pw_page_file *file, char *text) {
+static void page_file_json (pw_json *j, const pw_page_file *file, char *base64) {
   static const char digit[] = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
-  char *to = text;
+  char *to = base64;
   for (size_t i = 0; i < file->size; i += 3, to += 4) {
     size_t left = file->size - i;
     const unsigned char *byte = (const unsigned char *)file->bytes + i;
@@ -37,19 +37,19 @@ static void page_file_json (pw_json *j, const pw_page_file *file, char *text) {
     for (int k = 0; k < 4; k++) to[k] = (size_t)k > left ? '=' : digit[bits >> (18 - 6 * k) & 63];
   }
   *to = 0;
-  pw_json_text (j, file->name, text);
+  pw_json_text (j, file->name, base64);
 }
 
-/* Writes the consistent initial state, but values of --start as they are given, and marked so. */
+/* Writes the consistent initial state, but values of --start as given, with a mark. */
 static void page_states_json (const page *cmd, pw_json *j) {
   const pw_initial_report *initial = pw_run_initial (cmd->run);
   char name[300];
-  int n = pw_system_coordinates (cmd->m.system);
+  int n = pw_system_coordinates (cmd->compiled.system);
   pw_json_open (j, "states", '[');
   for (int i = 0; i < 2 * n; i++) {
     pw_json_open (j, NULL, '{');
-    pw_json_text (j, "name", pw_system_state_name (cmd->m.system, i, name, sizeof name));
-    pw_json_text (j, "unit", pw_system_state_unit (cmd->m.system, i));
+    pw_json_text (j, "name", pw_system_state_name (cmd->compiled.system, i, name, sizeof name));
+    pw_json_text (j, "unit", pw_system_state_unit (cmd->compiled.system, i));
     int given = pw_initial_given (initial, i);
     const double *q = given ? initial->q_given : initial->q, *v = given ? initial->v_given : initial->v;
     pw_json_number (j, "value", i < n ? q[i] : v[i - n]);
@@ -59,11 +59,11 @@ static void page_states_json (const page *cmd, pw_json *j) {
   pw_json_close (j, ']');
 }
 
-/* 1 if the engine has an integrator with this of its stabilisations. */
+/* 1 if the engine has this integrator and its stabilisation of this index. */
 static int page_has_method (const pw_method *m, int stabilisation) {
-  int i = 0;
-  while (page_integrators[i] && strcmp (page_integrators[i], m->name) != 0) i++;
-  return page_integrators[i] && m->stabilisations[stabilisation].kind != PW_NULLSPACE;
+  char hint[PW_HINT];
+  return m->stabilisations[stabilisation].kind != PW_NULLSPACE &&
+         pw_find_name (page_integrators, sizeof *page_integrators, m->name, hint) >= 0;
 }
 
 static void page_methods_json (pw_json *j) {
@@ -84,15 +84,15 @@ static void page_methods_json (pw_json *j) {
 static void page_data_json (const page *cmd, FILE *f) {
   pw_json j = { .f = f, .lines = 1 };
   pw_json_open (&j, NULL, '{');
-  pw_json_text (&j, "name", pw_system_name (cmd->m.system));
-  pw_json_text (&j, "about", pw_model_table (cmd->m.model)->about);
+  pw_json_text (&j, "name", pw_system_name (cmd->compiled.system));
+  pw_json_text (&j, "about", pw_model_table (cmd->compiled.model)->about);
   pw_json_text (&j, "version", PW_VERSION);
   pw_json_text (&j, "method", cmd->method);
   pw_json_number (&j, "t_end", cmd->t_end);
-  pw_json_number (&j, "step", cmd->settings.step > 0 ? cmd->settings.step : 1e-3);
-  pw_json_number (&j, "rtol", cmd->settings.rtol > 0 ? cmd->settings.rtol : 1e-6);
+  pw_json_number (&j, "step", cmd->settings.step);
+  pw_json_number (&j, "rtol", cmd->settings.rtol > 0 ? cmd->settings.rtol : 1e-6); /* the default of pw_settings */
   page_methods_json (&j);
-  pw_animation_parameters (&j, cmd->m.model);
+  pw_animation_parameters (&j, cmd->compiled.model);
   page_states_json (cmd, &j);
   pw_json_open (&j, "files", '{');
   for (int i = 0; i < cmd->content.files; i++) page_file_json (&j, &cmd->content.file[i], cmd->base64);
@@ -100,7 +100,8 @@ static void page_data_json (const page *cmd, FILE *f) {
   pw_json_close (&j, '}');
 }
 
-static void page_begin (FILE *f, const void *context) {
+/* Writes the script, and the call that passes the data to it. */
+static void page_script (FILE *f, const void *context) {
   for (const char *const *line = page_js; *line; line++) fputs (*line, f);
   fputs ("start_page(", f);
   page_data_json (context, f);
@@ -109,7 +110,7 @@ static void page_begin (FILE *f, const void *context) {
 
 /* ---- The command ---- */
 
-/* Chooses the method of --method; or that of the model, which is replaced if the engine does not have it. */
+/* Chooses the method of --method, else that of the model; PAGE_METHOD if that has options or the engine lacks it. */
 static int page_choose_method (page *cmd, const pw_run_defaults *d, pw_error *error) {
   const pw_method *m;
   int stabilisation;
@@ -131,7 +132,7 @@ static int page_choose_method (page *cmd, const pw_run_defaults *d, pw_error *er
 
 static int page_open_files (page *cmd, pw_error *error) {
   size_t longest = 0;
-  if (pw_page_open (&cmd->content, cmd->m.file, error) != PW_OK) return error->status;
+  if (pw_page_open (&cmd->content, cmd->compiled.file, error) != PW_OK) return error->status;
   for (int i = 0; i < cmd->content.files; i++)
     if (longest < cmd->content.file[i].size) longest = cmd->content.file[i].size;
   cmd->base64 = malloc (longest * 4 / 3 + 5); /* 4 characters for every 3 bytes begun, and the terminating 0 */
@@ -142,10 +143,10 @@ static int page_open (page *cmd, pw_error *error) {
   pw_use use[] = { PW_CLI_MODEL_USE, { "-o", cmd->path, PW_WRITES, NULL } };
   if (cmd->path == NULL) return pw_fail (error, PW_INPUT, "-o FILE.html is missing: the page to write");
   int status = pw_animation_check ("-o", cmd->path, error);
-  if (status == PW_OK) status = pw_cli_open (&cmd->m, &cmd->line, error);
-  if (status == PW_OK) status = pw_cli_check_uses (&cmd->line, cmd->m.file, use, 2, error);
+  if (status == PW_OK) status = pw_cli_open (&cmd->compiled, &cmd->line, error);
+  if (status == PW_OK) status = pw_cli_check_uses (&cmd->line, cmd->compiled.file, use, 2, error);
   if (status != PW_OK) return status;
-  pw_run_defaults d = pw_cli_defaults (pw_file_table (cmd->m.file));
+  pw_run_defaults d = pw_cli_defaults (pw_file_table (cmd->compiled.file));
   status = pw_cli_settings (&cmd->line, &d, &cmd->t_end, &cmd->settings, &cmd->limit, error);
   if (status == PW_OK) status = page_choose_method (cmd, &d, error);
   return status == PW_OK ? page_open_files (cmd, error) : status;
@@ -154,14 +155,15 @@ static int page_open (page *cmd, pw_error *error) {
 static int page_command (void *options, pw_error *error) {
   page *cmd = options;
   pw_output *o = NULL;
-  if (page_open (cmd, error) == PW_OK) cmd->run = pw_run_open (cmd->m.system, cmd->method, &cmd->settings, error);
+  if (page_open (cmd, error) == PW_OK)
+    cmd->run = pw_run_open (cmd->compiled.system, cmd->method, &cmd->settings, error);
   if (cmd->run) o = pw_output_open (cmd->path, error);
-  if (o) pw_animation_page (pw_output_stream (o), page_html, page_begin, cmd);
+  if (o) pw_animation_page (pw_output_stream (o), page_html, page_script, cmd);
   if (o) pw_output_finish (o, error);
   pw_run_close (cmd->run);
   free (cmd->base64);
   pw_page_close (&cmd->content);
-  pw_cli_close_model (&cmd->m);
+  pw_cli_close_model (&cmd->compiled);
   return error->status;
 }
 

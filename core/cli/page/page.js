@@ -1,5 +1,6 @@
 /* The script of interactive pages: runs the model in the browser and shows the result.  It follows the script of
- * animate.html, which draws `run` at the time state.t: begin() shows the first run, load() another one, seek() a time. */
+ * animate.html, which draws `run` at the time state.t: begin() shows the first run, load() another one, key() the legend
+ * of its curves, seek() a time; $, number, raised, size, place, placement, save, colours, palette are from there too. */
 
 /* ---- The engine: the model and the integrators, compiled to WebAssembly ---- */
 
@@ -19,7 +20,7 @@ function importsOf (module) {
   return imports;
 }
 
-const shortRun = 40, usualRun = 4000, longRun = 8000; /* limits of computing time [ms] */
+const shortRun = 40, usualRun = 4000, longRun = 8000; /* limits of the computing time of a run [ms] */
 
 class Engine {
   static async open (page) {
@@ -42,12 +43,14 @@ class Engine {
     if (this.wasm.open(this.text(this.page.name)) !== 0) throw new Error(this.error());
   }
 
+  /* Copies bytes into the memory of the engine, and a 0 after them; returns the address. */
   copy (bytes) {
     const at = this.wasm.allocate(bytes.length + 1);
     new Uint8Array(this.wasm.memory.buffer, at, bytes.length).set(bytes);
     return at;
   }
   text (text) { return this.copy(new TextEncoder().encode(text)); }
+  /* The text at an address. */
   read (at) {
     const bytes = new Uint8Array(this.wasm.memory.buffer);
     return new TextDecoder().decode(bytes.subarray(at, bytes.indexOf(0, at)));
@@ -62,6 +65,7 @@ class Engine {
     const parameters = wasm.allocate(8 * s.parameters.length), initial = wasm.allocate(16 * s.initial.length);
     const view = new DataView(wasm.memory.buffer, initial); /* after the allocations, which may replace the buffer */
     this.numbers(parameters, s.parameters.length).set(s.parameters);
+    /* a pw_initial_value has 16 bytes: the state at 0, the value at 8 */
     s.initial.forEach(([state, value], i) => { view.setInt32(16 * i, state, true); view.setFloat64(16 * i + 8, value, true); });
     const before = performance.now();
     const status = wasm.run(method, s.step, s.rtol, s.end, limit, keepSamples, parameters, initial, s.initial.length);
@@ -123,11 +127,11 @@ function accuracy (s) {
 /* Settings for the engine.  Initial values are used only if the numbers of bodies are those with which the page begins:
  * indices of states depend on them. */
 function engineSettings (s) {
-  const counts = page.parameters.some((p, i) => p.domain === "count" && s.parameters[i] !== p.value);
-  return { ...s, initial: counts ? [] : [...s.initial], step: accuracy(s), rtol: accuracy(s) };
+  const otherCounts = page.parameters.some((p, i) => p.domain === "count" && s.parameters[i] !== p.value);
+  return { ...s, initial: otherCounts ? [] : [...s.initial], step: accuracy(s), rtol: accuracy(s) };
 }
 
-/* Adds a label with a slider and a number; `change` is called with a new number. */
+/* Adds a label with a slider and a field for a number; `change` is called with a new number. */
 function control (parent, name, unit, about, value, low, high, step, change) {
   const label = document.createElement("label"), text = document.createElement("span");
   const slider = document.createElement("input"), number = document.createElement("input");
@@ -141,13 +145,14 @@ function control (parent, name, unit, about, value, low, high, step, change) {
   const short = x => Number(x.toPrecision(7));
   slider.dataset.name = number.dataset.name = name;
   const show = x => { slider.value = x; number.value = short(x); };
-  slider.addEventListener("input", () => { number.value = Number(Number(slider.value).toPrecision(4)); change(Number(number.value)); });
+  const set = x => { value = x; change(x); };
+  slider.addEventListener("input", () => { number.value = Number(Number(slider.value).toPrecision(4)); set(Number(number.value)); });
   number.addEventListener("change", () => {
     const x = Number(number.value);
     if (number.value === "" || !isFinite(x)) return show(value);
     slider.min = Math.min(slider.min, x); slider.max = Math.max(slider.max, x);
     slider.value = x;
-    change(x);
+    set(x);
   });
   show(value);
   label.append(text, slider, number);
@@ -159,8 +164,8 @@ function control (parent, name, unit, about, value, low, high, step, change) {
 /* Sliders whose ends are still to be checked, each with its first value and a function that sets a value in settings. */
 let unchecked = [];
 
-/* Moves the ends of the next slider towards its first value until a run can begin there and does not fail within shortRun;
- * then continues with the next one. */
+/* Moves the ends of the next slider towards its first value, by half of the distance up to six times, then to that value,
+ * until a run can begin there and does not fail within shortRun; then continues with the next slider. */
 async function narrowSliders () {
   const next = unchecked.shift();
   if (!next) { document.documentElement.dataset.narrowed = true; return; }
@@ -175,7 +180,7 @@ async function narrowSliders () {
   setTimeout(narrowSliders, 0);
 }
 
-/* Whether the engine can run with the value x of a slider. */
+/* Whether the engine can run with the value x of a slider, at least until the limit of computing time stops it. */
 async function runsWith (set, x) {
   const s = pageSettings();
   set(s, x);
@@ -187,8 +192,7 @@ async function runsWith (set, x) {
   }
 }
 
-/* [low, high, step] of the slider of a value in a domain: from a tenth to three times a positive one; around other values
- * twice as far as they are from zero. */
+/* [low, high, step] of the slider of a value in a domain; step 0: any number. */
 function rangeOf (value, domain) {
   if (domain === "count") return [1, Math.max(10, 2 * value), 1];
   if (domain === "fraction") return [0, 1, 0];
@@ -242,8 +246,8 @@ function difference (a, b) {
   return most;
 }
 
-/* Runs with the settings of the panel, shows the result, then repeats it more accurately to estimate its error, unless they
- * change before. */
+/* Runs with the settings of the panel and shows the result; 300 ms later, unless another run has followed, estimates its
+ * error. */
 let estimateTimer = 0;
 function simulate () {
   let result;
@@ -295,7 +299,7 @@ function showCost (result, error) {
   fillTable("page-results", [["error at the end [m, rad]", error === null ? "\u2026" : rounded(error)],
     ["computing time", (result.ms < 10 ? result.ms.toFixed(2) : result.ms.toFixed(0)) + " ms"], ["steps (rejected)", result.steps + " (" + result.rejected + ")"],
     ["evaluations of accelerations", String(result.evaluations)], ["largest position residual |g|", rounded(result.g)],
-    ["largest velocity residual |J v|", rounded(result.jv)],
+    ["largest velocity residual |J v \u2212 \u03b7|", rounded(result.jv)],
     ["relative energy defect", rounded(result.energy_defect)]]);
   plotRuns();
 }
@@ -353,7 +357,7 @@ function link () {
   return list.toString();
 }
 
-/* Sets the settings from the address of the page. */
+/* Sets the settings from the address of the page, as link() writes them. */
 function readLink () {
   const list = new URLSearchParams(location.hash.slice(1)), number = (key, otherwise, low = -Infinity) => {
     const text = (list.get(key) || "").trim(), x = Number(text);

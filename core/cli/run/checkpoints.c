@@ -14,36 +14,29 @@ static const char checkpoints_interval_key[] = "checkpoint-every", checkpoints_e
 
 /* ---- Before the run ---- */
 
-/* Reads the options and the file to be resumed.  Without checkpoints the interval remains 0. */
-static int checkpoints_read_options (pw_checkpoints *checkpoints, double t_end, pw_error *error) {
-  const pw_checkpoint *resumed = &checkpoints->resumed;
+/* The value of a key of the checkpoint that is resumed, up to the end of its line; NULL if there is none. */
+static const char *checkpoints_value (const pw_checkpoints *checkpoints, const char *key) {
   size_t size;
-  checkpoints->next_time = INFINITY;
-  if (checkpoints->resume_path && checkpoints->path == NULL) checkpoints->path = checkpoints->resume_path;
-  if (checkpoints->path == NULL && checkpoints->interval_text == NULL) return PW_OK;
-  if (checkpoints->path == NULL)
-    return pw_fail (error, PW_INPUT, "--checkpoint-every %s: --checkpoint FILE is needed to save to",
-                    checkpoints->interval_text);
-  if (checkpoints->resume_path && pw_checkpoint_read (checkpoints->resume_path, &checkpoints->resumed, error) != PW_OK)
-    return error->status;
-  checkpoints->interval = t_end / 10;
-  const char *saved = checkpoints->resume_path
-                          ? pw_fingerprint_value (resumed->text, resumed->head_end, checkpoints_interval_key, &size)
-                          : NULL;
-  if (saved) checkpoints->interval = fmax (strtod (saved, NULL), 0); /* up to the end of its line */
-  return pw_cli_number ("--checkpoint-every", checkpoints->interval_text, PW_POSITIVE, &checkpoints->interval, error);
+  return pw_fingerprint_value (checkpoints->resumed.text, checkpoints->resumed.head_end, key, &size);
 }
 
 int pw_checkpoints_open (pw_run_cli *command, pw_specialise *specialise, pw_error *error) {
   pw_checkpoints *checkpoints = &command->checkpoints;
-  size_t size;
-  int status = checkpoints_read_options (checkpoints, command->t_end, error);
-  if (status == PW_OK && checkpoints->resume_path && *specialise == PW_SPECIALISE_AUTO) {
-    const pw_checkpoint *resumed = &checkpoints->resumed;
-    const char *engine = pw_fingerprint_value (resumed->text, resumed->head_end, checkpoints_engine_key, &size);
-    *specialise = engine ? PW_SPECIALISE_ALWAYS : PW_SPECIALISE_NEVER;
+  checkpoints->next_time = INFINITY;
+  if (checkpoints->path == NULL) checkpoints->path = checkpoints->resume_path;
+  if (checkpoints->path == NULL && checkpoints->interval_text == NULL) return PW_OK;
+  if (checkpoints->path == NULL)
+    return pw_fail (error, PW_INPUT, "--checkpoint-every %s: --checkpoint FILE is needed to save to",
+                    checkpoints->interval_text);
+  checkpoints->interval = command->t_end / 10;
+  if (checkpoints->resume_path) {
+    if (pw_checkpoint_read (checkpoints->resume_path, &checkpoints->resumed, error) != PW_OK) return error->status;
+    const char *interval = checkpoints_value (checkpoints, checkpoints_interval_key);
+    const char *engine = checkpoints_value (checkpoints, checkpoints_engine_key);
+    if (interval) checkpoints->interval = fmax (strtod (interval, NULL), 0);
+    if (*specialise == PW_SPECIALISE_AUTO) *specialise = engine ? PW_SPECIALISE_ALWAYS : PW_SPECIALISE_NEVER;
   }
-  return status;
+  return pw_cli_number ("--checkpoint-every", checkpoints->interval_text, PW_POSITIVE, &checkpoints->interval, error);
 }
 
 static int checkpoints_lock (pw_checkpoints *checkpoints, pw_error *error) {
@@ -109,7 +102,7 @@ int pw_checkpoints_prepare (pw_run_cli *command, pw_error *error) {
   pw_output **table = &command->output[PW_RUN_TABLE];
   pw_mark mark = { 0 };
   if (checkpoints->resume_path == NULL)
-    return pw_output_mark (*table, &mark, error); /* fails if it cannot be continued */
+    return pw_output_mark (*table, &mark, error); /* fails for a table that cannot be continued */
   pw_archive_bytes (&checkpoints->resumed.state, &mark, sizeof mark);
   *table = pw_output_continue (command->table_path, &mark, error);
   return *table ? PW_OK : error->status;
@@ -162,7 +155,7 @@ int pw_checkpoints_resume (pw_run_cli *command, pw_error *error) {
                       "the checkpoint %s is not that of a run: time, number of rows or processor time "
                       "are impossible",
                       checkpoints->resume_path);
-    command->resumed = 1;
+    command->loaded = 1;
     pw_cli_say ("pinwheel: resumed at t = %s s\n", pw_format (t, pw_run_time (command->run), 6));
   }
   checkpoints_schedule (checkpoints, pw_run_time (command->run));

@@ -58,7 +58,7 @@ static double motion_largest_multiplier (const pw_system *system, const pw_motio
   return largest > 0 ? largest : 1;
 }
 
-/* Raises an error, NaN at first; one that is unknown at one time remains NaN, since it has no maximum. */
+/* Raises an error, NaN at first, to a difference; a difference that is NaN, not known, makes it NaN for good. */
 static void motion_raise (double *error, int *compared, double difference) {
   if (!*compared || difference > *error || isnan (difference)) *error = difference;
   *compared = 1;

@@ -9,9 +9,9 @@ enum { MOTION_SAMPLES = 100 }; /* of a motion, at most */
 /* Units of states: m, rad, m/s, rad/s. */
 enum { MOTION_LENGTH, MOTION_ANGLE, MOTION_SPEED, MOTION_RATE, MOTION_UNITS };
 
-/* Errors of a motion: the largest of the states of each unit at the end, then over all samples; that of the multipliers
- * over all samples, relative to the largest multiplier of the same unit, except at times at which a signal makes them
- * jump.  NaN: not known. */
+/* Indices of the errors of a motion, NaN if not known.  MOTION_END + unit: the largest of the states of a unit at the
+ * end; MOTION_LARGEST + unit: the same over all samples.  MOTION_MULTIPLIERS: the largest of the multipliers over all
+ * samples, relative to the largest multiplier of the same unit, except at times at which a signal makes them jump. */
 enum { MOTION_END, MOTION_LARGEST = MOTION_UNITS, MOTION_MULTIPLIERS = 2 * MOTION_UNITS, MOTION_ERRORS };
 
 typedef struct {
@@ -42,31 +42,28 @@ void pw_motion_distance (const pw_system *system, const pw_motion *reference, co
 /* The unit of a state: MOTION_LENGTH to MOTION_RATE. */
 int pw_motion_unit (const pw_system *system, int state);
 
-/* Opens a reference, to be closed in every case: the table at `path`, or if it is NULL the model's own reference
- * solution up to *t_end. */
+/* Opens a reference, to be closed in every case.  If `path` is NULL, it is the model's own reference solution up to
+ * *t_end; else the table at `path`, with columns as `pinwheel run -o` writes them: at most MOTION_SAMPLES of its rows
+ * after t = 0 and up to *t_end, which if 0 becomes the time of the last row.  Errors: PW_INPUT with the line,
+ * PW_RESOURCE. */
 int pw_motion_open_reference (pw_motion *motion, const pw_cli_model *compiled, const char *path, double *t_end,
                               pw_error *error);
-
-/* Reads a table with columns as `pinwheel run -o` writes them: of its rows after t = 0 and up to *t_end, at most
- * MOTION_SAMPLES.  *t_end = 0 becomes the time of the last row.  Errors: PW_INPUT with the line, PW_RESOURCE. */
-int pw_motion_read (pw_motion *motion, const pw_system *system, const char *path, double *t_end, pw_error *error);
 
 /* ---- A run compared with a reference ---- */
 
 typedef struct {
-  pw_motion reference, motion; /* of 0 samples: there is no reference */
+  pw_motion reference, motion; /* at the same times; `motion` is that of the run; without a reference, no samples */
   pw_reference_error errors;
 } pw_comparison;
 
-/* Opens the reference of a run up to t_end: the table at `path`, or the model's reference solution unless the run has
- * other initial values (`started`).  The samples of the run go to `motion`.  Close it in every case.  Errors: PW_INPUT,
- * PW_RESOURCE. */
+/* Opens the reference of a run up to t_end: the table at `path` or, if that is NULL, the model's reference solution
+ * unless the run has other initial values (`started`).  Close it in every case.  Errors: PW_INPUT, PW_RESOURCE. */
 int pw_comparison_open (pw_comparison *comparison, const pw_cli_model *compiled, const char *path, int started,
                         double t_end, pw_error *error);
 void pw_comparison_close (pw_comparison *comparison);
 /* Saves or loads the samples of a checkpoint. */
 void pw_comparison_serialise (pw_comparison *comparison, pw_archive *a);
-/* The errors of the samples taken; NULL if there are none. */
+/* The errors of the samples taken, after the run; NULL if there are none. */
 const pw_reference_error *pw_comparison_errors (pw_comparison *comparison, const pw_system *system);
 
 #endif

@@ -1,5 +1,5 @@
-/* References: of the model, or from a file, a table with the columns of `pinwheel run -o`, some of which may be
- * missing. */
+/* Opens references: the solution of the model, or a file with a table like those of `pinwheel run -o`, in which columns
+ * may be missing. */
 #include <errno.h>
 #include <math.h>
 #include <stdlib.h>
@@ -13,13 +13,13 @@ enum { FILE_LINE = 16 << 20 }; /* bytes of the longest line */
 
 typedef struct {
   int index;     /* of its values in a sample of a motion; -1: not read */
-  double factor; /* to that sample: to SI units; negative for reactions, which are -lambda */
+  double factor; /* from the unit of the column to SI units; negative for reactions, which are -lambda */
 } file_column;
 
 typedef struct {
   const char *path;
   FILE *f;
-  char *line; /* FILE_LINE bytes and the end */
+  char *line; /* FILE_LINE bytes and the terminating 0 */
   long line_number;
   double time_unit; /* of the first column [s] */
   file_column *column;
@@ -216,24 +216,6 @@ static int file_read (file_reader *reader, pw_motion *motion, const pw_system *s
   return status == PW_OK ? file_read_samples (reader, rows, *t_end, motion, error) : status;
 }
 
-int pw_motion_read (pw_motion *motion, const pw_system *system, const char *path, double *t_end, pw_error *error) {
-  const char *why;
-  file_reader reader = { .path = path, .f = pw_open_input (path, &why), .line = malloc (FILE_LINE + 1) };
-  int status = PW_OK;
-  if (reader.f == NULL)
-    status = pw_fail (error, pw_open_input_status (), "--reference %s: cannot be read: %s", path, why);
-  else if (reader.line == NULL)
-    status = pw_fail (error, PW_RESOURCE, "--reference %s: out of memory", path);
-  if (status == PW_OK) status = file_read (&reader, motion, system, t_end, error);
-  if (status == PW_RETRY) status = file_unreadable (&reader, "another program has changed it", error);
-  if (reader.f) fclose (reader.f);
-  free (reader.line);
-  free (reader.column);
-  pw_names_close (&reader.indices);
-  pw_arena_free (&reader.names);
-  return status;
-}
-
 /* ---- Opening ---- */
 
 /* The model's own reference solution; multipliers are not known. */
@@ -250,6 +232,20 @@ static int motion_of_model (pw_motion *motion, const pw_cli_model *compiled, dou
 
 int pw_motion_open_reference (pw_motion *motion, const pw_cli_model *compiled, const char *path, double *t_end,
                               pw_error *error) {
-  return path ? pw_motion_read (motion, compiled->system, path, t_end, error)
-              : motion_of_model (motion, compiled, *t_end, error);
+  if (path == NULL) return motion_of_model (motion, compiled, *t_end, error);
+  const char *why;
+  file_reader reader = { .path = path, .f = pw_open_input (path, &why), .line = malloc (FILE_LINE + 1) };
+  int status = PW_OK;
+  if (reader.f == NULL)
+    status = pw_fail (error, pw_open_input_status (), "--reference %s: cannot be read: %s", path, why);
+  else if (reader.line == NULL)
+    status = pw_fail (error, PW_RESOURCE, "--reference %s: out of memory", path);
+  if (status == PW_OK) status = file_read (&reader, motion, compiled->system, t_end, error);
+  if (status == PW_RETRY) status = file_unreadable (&reader, "another program has changed it", error);
+  if (reader.f) fclose (reader.f);
+  free (reader.line);
+  free (reader.column);
+  pw_names_close (&reader.indices);
+  pw_arena_free (&reader.names);
+  return status;
 }

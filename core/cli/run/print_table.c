@@ -43,3 +43,9 @@ void pw_row_end (pw_table *table) {
   if (table->pass == 2) fputc ('\n', table->f);
   table->column = table->pad = table->indent = 0;
 }
+
+void pw_head (pw_table *table, int first, int width, const char *const *heading) {
+  pw_cell (table, first, *heading);
+  while (*++heading) pw_cell (table, width, *heading);
+  pw_row_end (table);
+}

@@ -17,7 +17,7 @@ typedef struct {
 } pw_table;
 
 int pw_table_pass (pw_table *table);
-/* A cell after two blanks, of at least |width| characters, aligned to the right; width < 0: to the left.  Returns 1 if
+/* A cell after two blanks, of at least |width| characters, aligned to the right; width <= 0: to the left.  Returns 1 if
  * it is printed in this pass. */
 int pw_cell (pw_table *table, int width, const char *text);
 /* A number with this number of digits; empty if it is NaN. */
@@ -25,5 +25,7 @@ int pw_cell_number (pw_table *table, int width, double value, int digits);
 /* A cell "NAME [UNIT]". */
 int pw_cell_unit (pw_table *table, int width, const char *name, const char *unit);
 void pw_row_end (pw_table *table);
+/* A row of headings, ended by NULL: the first one in a cell of width `first`, the others of `width`. */
+void pw_head (pw_table *table, int first, int width, const char *const *heading);
 
 #endif

@@ -14,12 +14,6 @@ static void profile_share (pw_table *table, double part, double whole) {
   pw_cell (table, 8, whole > 0 ? text : "");
 }
 
-static void profile_head (pw_table *table, const char *const *head) {
-  pw_cell (table, -14, *head++);
-  for (; *head; head++) pw_cell (table, 8, *head);
-  pw_row_end (table);
-}
-
 /* The name of an element type, or of the bodies, and its counts. */
 static void profile_counts (pw_table *table, const char *name, int elements, int rows, int unknowns) {
   pw_cell (table, -14, name);
@@ -45,7 +39,7 @@ static void profile_kinds (const pw_profile *profile, int bodies, FILE *f) {
   static const char *const head[] = { "type",  "elements", "rows",  "unknowns", "signals", "J, gamma",
                                       "force", "sum",      "share", "g",        NULL };
   for (pw_table table = { .f = f }; pw_table_pass (&table);) {
-    profile_head (&table, head);
+    pw_head (&table, -14, 8, head);
     profile_counts (&table, "(bodies)", bodies, 0, 3 * bodies);
     for (int i = 0; i < 3; i++) pw_cell (&table, 8, "");
     profile_cell (&table, profile->configurations);
@@ -55,8 +49,9 @@ static void profile_kinds (const pw_profile *profile, int bodies, FILE *f) {
   }
 }
 
-/* A row of the stages, omitted unless its time is positive: the time of a stage, how often a step has it.  `whole`,
- * `step`: the times of an evaluation and of a step, for the shares; 0 leaves their columns empty. */
+/* A row of the table of stages, omitted unless its time `ns` is positive.  per_step: how often a step has the stage.
+ * whole, step: the times of an evaluation and of a step [ns]; if `whole` is 0 the cells per evaluation are empty, if
+ * `step` is 0 there are none per step. */
 static void profile_stage (pw_table *table, const char *name, double ns, double per_step, double whole, double step) {
   if (!(ns > 0)) return;
   pw_cell (table, -14, name);
@@ -79,7 +74,7 @@ static void profile_stages (const pw_profile *profile, FILE *f) {
   double step = profile->evaluations * profile->evaluation + profile->projections * profile->projection;
   fputc ('\n', f);
   for (pw_table table = { .f = f }; pw_table_pass (&table);) {
-    profile_head (&table, step > 0 ? head : no_steps);
+    pw_head (&table, -14, 8, step > 0 ? head : no_steps);
     for (size_t i = 0; i < sizeof stage / sizeof *stage; i++)
       profile_stage (&table, stage[i].name, stage[i].ns, profile->evaluations, profile->evaluation, step);
     if (profile->projections > 0)

@@ -6,15 +6,16 @@
 #include "report.h"
 
 enum {
-  REPORT_MESSAGES = 8, /* of a kind, at most; also changed states */
-  REPORT_BODIES = 20,  /* at most */
-  REPORT_ROWS = 24,    /* of reactions, or of internal coordinates, at most */
+  REPORT_MESSAGES = 8, /* messages of one kind, or changed states, that are printed at most */
+  REPORT_BODIES = 20,  /* bodies that are printed at most */
+  REPORT_ROWS = 24,    /* reactions, or internal coordinates, that are printed at most */
   REPORT_TEXT = 400,   /* longest description of a redundant equation, end included */
   REPORT_WIDTH = 13,   /* of a column of numbers */
   REPORT_DIGITS = 8
 };
 #define REPORT_DEFECT 0.01 /* relative energy defect above which a warning is printed */
 
+/* The end of a list of which `more` entries are not printed. */
 static void report_more (FILE *f, int more, const char *hint) {
   if (more > 0) fprintf (f, "  and %d more%s\n", more, hint);
 }
@@ -39,7 +40,7 @@ static void report_atol (pw_run *run, const pw_system *system, double atol) {
   int state = atol > 0 ? pw_run_saturation (run, &saturation, element, sizeof element) : -1;
   if (state >= 0 && atol > saturation)
     pw_cli_say ("pinwheel: --atol %s is above %s %s, within which the force of %s reverses: methods with Newton's "
-                "iteration reduce it for the states it depends on, others may be wrong\n",
+                "iteration reduce the tolerance of the states that the force depends on, others may be wrong\n",
                 pw_format (atol_text, atol, 3), pw_format (saturation_text, saturation, 3),
                 pw_system_state_unit (system, state), element);
 }
@@ -77,11 +78,10 @@ static void report_jump (const pw_element *element, const char *field, const pw_
 static void report_field (const pw_element *element, const pw_field *field) {
   const void *value = (const char *)element->definition + field->offset;
   const pw_signal *signal = field->type == PW_SIGNAL ? value : NULL;
-  int is_heading = strcmp (field->name, "heading") == 0;
-  if (is_heading && field->type == PW_NUMBER)
-    report_angle (element->kind->name, pw_element_name (element), field->name, *(const double *)value);
-  if (is_heading && signal && signal->type == PW_CONSTANT)
-    report_angle (element->kind->name, pw_element_name (element), field->name, signal->constant);
+  const double *number = signal && signal->type == PW_CONSTANT ? &signal->constant : NULL;
+  if (field->type == PW_NUMBER) number = value;
+  if (number && strcmp (field->name, "heading") == 0)
+    report_angle (element->kind->name, pw_element_name (element), field->name, *number);
   for (int i = 0; signal && i < pw_field_count (field); i++) report_jump (element, field->name, signal + i);
 }
 
@@ -96,14 +96,6 @@ void pw_report_model (const pw_model *model) {
 
 /* ---- Initialisation ---- */
 
-void pw_report_state (const pw_system *system, const pw_initial_report *initial, int state, char name[PW_STATE_NAME],
-                      double *given, double *consistent) {
-  int n = pw_system_coordinates (system);
-  *given = state < n ? initial->q_given[state] : initial->v_given[state - n];
-  *consistent = state < n ? initial->q[state] : initial->v[state - n];
-  pw_system_state_name (system, state, name, PW_STATE_NAME);
-}
-
 /* States that the consistent initialisation has changed. */
 static void report_initial (const pw_system *system, const pw_initial_report *initial) {
   int n = pw_system_coordinates (system), moved = initial->moved, listed = 0;
@@ -117,7 +109,7 @@ static void report_initial (const pw_system *system, const pw_initial_report *in
     double given, consistent;
     char name[PW_STATE_NAME], given_text[32], consistent_text[32];
     if (!pw_initial_moved (system, initial, state)) continue;
-    pw_report_state (system, initial, state, name, &given, &consistent);
+    pw_cli_state_change (system, initial, state, name, &given, &consistent);
     pw_cli_say ("  %s from %s to %s %s%s\n", name, pw_format (given_text, given, 10),
                 pw_format (consistent_text, consistent, 10), pw_system_state_unit (system, state),
                 initial->changed && pw_initial_specified (initial, state) ? " (specified)" : "");
@@ -152,13 +144,19 @@ const char **pw_report_redundancies (pw_run *run) {
 
 /* ---- Results ---- */
 
+/* Cells of a name, a number and its unit. */
+static void report_value (pw_table *table, int width, const char *name, double value, const char *unit) {
+  pw_cell (table, width, name);
+  pw_cell_number (table, REPORT_WIDTH, value, REPORT_DIGITS);
+  pw_cell (table, -1, unit);
+}
+
 static void report_bodies (const pw_system *system, const pw_sample *last) {
-  static const char *const heads[] = { "x [m]", "y [m]", "phi [rad]", "vx [m/s]", "vy [m/s]", "omega [rad/s]" };
+  static const char *const head[] = { "body",     "x [m]",    "y [m]",         "phi [rad]",
+                                      "vx [m/s]", "vy [m/s]", "omega [rad/s]", NULL };
   int bodies = pw_system_bodies (system), shown = bodies < REPORT_BODIES ? bodies : REPORT_BODIES;
   for (pw_table table = { 0 }; pw_table_pass (&table);) {
-    pw_cell (&table, -5, "body");
-    for (int i = 0; i < 6; i++) pw_cell (&table, REPORT_WIDTH, heads[i]);
-    pw_row_end (&table);
+    pw_head (&table, -5, REPORT_WIDTH, head);
     for (int b = 0; b < shown; b++) {
       pw_cell (&table, -5, pw_system_body_name (system, b));
       for (int i = 0; i < 6; i++)
@@ -176,11 +174,9 @@ static void report_internal (const pw_system *system, const pw_sample *last) {
   char name[PW_STATE_NAME];
   for (pw_table table = { 0 }; pw_table_pass (&table);)
     for (int j = first; j < end; j++) {
-      for (int state = j; state < 2 * n; state += n) {
-        pw_cell (&table, -1, pw_system_state_name (system, state, name, sizeof name));
-        pw_cell_number (&table, REPORT_WIDTH, state < n ? last->q[j] : last->v[j], REPORT_DIGITS);
-        pw_cell (&table, -1, pw_system_state_unit (system, state));
-      }
+      for (int state = j; state < 2 * n; state += n)
+        report_value (&table, -1, pw_system_state_name (system, state, name, sizeof name),
+                      state < n ? last->q[j] : last->v[j], pw_system_state_unit (system, state));
       pw_row_end (&table);
     }
   report_more (stdout, n - end, "");
@@ -193,9 +189,8 @@ static void report_reactions (const pw_system *system, const pw_sample *last) {
   if (rows > 0) printf ("\n  reaction\n");
   for (pw_table table = { 0 }; pw_table_pass (&table);)
     for (int i = 0; i < shown; i++) {
-      pw_cell (&table, -8, pw_system_reaction_name (system, i, name, sizeof name));
-      pw_cell_number (&table, REPORT_WIDTH, 0 - last->lambda[i], REPORT_DIGITS);
-      pw_cell (&table, -1, pw_system_reaction_unit (system, i));
+      report_value (&table, -8, pw_system_reaction_name (system, i, name, sizeof name), 0 - last->lambda[i],
+                    pw_system_reaction_unit (system, i));
       pw_row_end (&table);
     }
   report_more (stdout, rows - shown, ": -o FILE.csv writes them all");
@@ -210,9 +205,7 @@ static void report_energy (const pw_sample *last) {
   printf ("\n  energy\n");
   for (pw_table table = { 0 }; pw_table_pass (&table);)
     for (int i = 0; i < 6; i++) {
-      pw_cell (&table, -10, row[i].name);
-      pw_cell_number (&table, REPORT_WIDTH, row[i].value, REPORT_DIGITS);
-      pw_cell (&table, -1, "J");
+      report_value (&table, -10, row[i].name, row[i].value, "J");
       pw_row_end (&table);
     }
 }
@@ -236,10 +229,7 @@ static void report_errors (const pw_reference_error *errors) {
   pw_cli_print (stdout, "\n  error against the reference solution of %s, at %d time%s\n", errors->source,
                 errors->samples, errors->samples == 1 ? "" : "s");
   for (pw_table table = { 0 }; pw_table_pass (&table);) {
-    pw_cell (&table, -10, "");
-    pw_cell (&table, REPORT_WIDTH, at);
-    pw_cell (&table, REPORT_WIDTH, "largest");
-    pw_row_end (&table);
+    pw_head (&table, -10, REPORT_WIDTH, (const char *const[]){ "", at, "largest", NULL });
     for (int i = 0; i < 4; i++) report_error (&table, name[i], errors->end[i], errors->most[i], unit[i]);
     report_error (&table, "reactions", NAN, errors->reactions, "of the largest");
   }

@@ -22,16 +22,11 @@ void pw_report_warnings (const pw_run *run, const pw_system *system, double defe
 
 /* ---- Results ---- */
 
-enum { PW_STATE_NAME = 300 };
-/* The name of a state, and its values before and after the consistent initialisation. */
-void pw_report_state (const pw_system *system, const pw_initial_report *initial, int state, char name[PW_STATE_NAME],
-                      double *given, double *consistent);
-
 /* Descriptions of the redundant constraint equations, ended by NULL; release them with one free.  NULL if there are
  * none or memory is exhausted. */
 const char **pw_report_redundancies (pw_run *run);
 
-/* A table on standard output: last state, reactions, residuals, energies, cost. */
+/* Prints the last state, reactions, energies if `energy` is not 0, errors, residuals and cost. */
 void pw_report_end (const pw_summary *summary, const pw_system *system, const pw_sample *last, int energy,
                     const pw_statistics *statistics);
 

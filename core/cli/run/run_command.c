@@ -10,19 +10,19 @@
 #include "report.h"
 
 #define RUN_SHORT 0.01     /* processor time of a batch [s] below which the next one is longer */
-#define RUN_LONG 0.04      /* above which it is shorter: Ctrl-C and the progress bar wait for its end */
+#define RUN_LONG 0.04      /* above which it is shorter: the progress bar waits for its end */
 enum { RUN_BATCH = 4096 }; /* steps of a batch, at most */
 
 /* ---- Before the run ---- */
 
-/* Refuses files used twice: called before the model is open, and again with the tables that it reads. */
+/* Refuses files used twice.  Called before the model is open, and again after that, for the tables that it reads. */
 static int run_check_paths (pw_run_cli *command, pw_error *error) {
   const pw_checkpoints *checkpoints = &command->checkpoints;
-  const char *resumed = checkpoints->resume_path;
-  if (resumed && checkpoints->path && strcmp (resumed, checkpoints->path) == 0) resumed = NULL; /* the same file */
+  const char *resume_path = checkpoints->resume_path;
+  if (resume_path && checkpoints->path && strcmp (resume_path, checkpoints->path) == 0) resume_path = NULL;
   pw_use use[] = { PW_CLI_MODEL_USE,
                    { "--reference", command->reference_path, PW_READS, NULL },
-                   { "--resume", resumed, checkpoints->path ? PW_READS : PW_WRITES, NULL },
+                   { "--resume", resume_path, checkpoints->path ? PW_READS : PW_WRITES, NULL },
                    { "--checkpoint", checkpoints->path, PW_WRITES, NULL },
                    { "-o", command->table_path, PW_WRITES, NULL },
                    { "--json", command->summary_path, PW_WRITES, NULL },
@@ -149,8 +149,8 @@ static int run_open (pw_run_cli *command, pw_error *error) {
 
 /* ---- The run ---- */
 
-/* The time of the next row [s]: a multiple of the interval, or the end if it differs from that by round-off only; 0 if
- * a row is due after every step. */
+/* The time of the next row [s]: a multiple of the interval, or the end if the two differ by round-off only; 0 if every
+ * step has a row; INFINITY without a table. */
 static double run_next_row_time (const pw_run_cli *command) {
   if (command->table == NULL) return INFINITY;
   if (command->row_interval == 0) return 0;
@@ -185,7 +185,7 @@ static int run_store_samples (pw_run_cli *command, pw_error *error) {
   return status;
 }
 
-/* Advances to the next sample, the end of the batch, or a request to stop. */
+/* Advances to the next sample or checkpoint, the end of the batch, or a request to stop. */
 static int run_batch (pw_run_cli *command, pw_error *error) {
   double due = fmin (command->checkpoints.next_time, command->t_end);
   due = fmin (due, run_next_row_time (command));
@@ -268,7 +268,7 @@ static void run_add_error (pw_error *error, const pw_error *later) {
  * summary. */
 static void run_write_json (pw_run_cli *command, const pw_summary *summary, const pw_sample *sample, pw_error *error) {
   pw_error write_error = { 0 };
-  if (command->checkpoints.resume_path && !command->resumed) run_discard (command, PW_RUN_SUMMARY);
+  if (command->checkpoints.resume_path && !command->loaded) run_discard (command, PW_RUN_SUMMARY);
   pw_output *output = command->output[PW_RUN_SUMMARY];
   if (output == NULL) return;
   const pw_statistics *statistics = command->run ? pw_run_statistics (command->run) : NULL;
@@ -291,6 +291,7 @@ static void run_name_files (pw_run_cli *command, pw_error *error) {
   run_add_error (error, &finish_error);
 }
 
+/* The summary of a run that ended with this error, if any; `reason` receives the text of an interruption. */
 static pw_summary run_summary (const pw_run_cli *command, const pw_error *error, char *reason, size_t size) {
   const pw_file *file = command->compiled.file;
   pw_summary summary = { .model = file ? pw_file_name (file) : command->line.argument[0],
@@ -359,7 +360,7 @@ static void run_close (pw_run_cli *command) {
   pw_checkpoints_close (&command->checkpoints);
   pw_plots_close (command->plots);
   pw_comparison_close (&command->comparison);
-  if (command->run) pw_run_close (command->run);
+  pw_run_close (command->run);
   free (command->redundant);
   pw_cli_engine_close (&command->engine);
   pw_cli_close_model (&command->compiled);

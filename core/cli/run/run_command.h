@@ -7,7 +7,7 @@
 #include "text.h"
 
 typedef struct {
-  /* as given; NULL: not */
+  /* as given, or NULL */
   const char *path, *interval_text, *resume_path;
   /* as understood */
   double interval;       /* simulated time between two checkpoints [s]; 0: there are none */
@@ -47,8 +47,8 @@ typedef struct {
   /* in progress */
   long rows;                            /* written to the table */
   int limited;                          /* 1: --limit, --max-steps or a signal has stopped the run */
-  int resumed;                          /* 1: the state of the checkpoint has been loaded */
-  long batch;                           /* steps between checks of signals and progress */
+  int loaded;                           /* 1: the state of the checkpoint has been loaded */
+  long batch;                           /* steps between updates of the progress, at most */
   double cpu;                           /* processor time of the method [s] */
   int write_failed;                     /* 1: the table or the summary could not be written */
   char kept_path[PW_RUN_OUTPUTS][4200]; /* of incomplete files that are kept, PATH_MAX and an ending, or "" */

@@ -12,7 +12,7 @@ typedef struct {
   pw_cli_line line;
   const char *path, *part_text, *jobs_text, *lanes_text; /* path: -o */
   const char **ranges;                                   /* --vary */
-  int merge, with_cpu;
+  int merge;                                             /* 1: --merge */
   /* as understood */
   pw_plan plan;
   pw_journal journal;
@@ -71,7 +71,6 @@ static int sweep_read_settings (pw_sweep *sweep, pw_error *error) {
   pw_run_defaults defaults = pw_cli_defaults (pw_file_table (plan->file));
   plan->line = &sweep->line;
   plan->method = sweep->line.method ? sweep->line.method : defaults.method;
-  plan->with_cpu = sweep->with_cpu;
   int status = pw_cli_settings (&sweep->line, &defaults, &plan->t_end, &plan->settings, &plan->limit, error);
   if (status == PW_OK) pw_cli_report_unused (plan->method, &sweep->line);
   if (status == PW_OK) status = pw_cli_specialise (sweep->line.specialise, &plan->specialise, error);
@@ -94,8 +93,8 @@ static int sweep_open (pw_sweep *sweep, pw_error *error) {
   if (status == PW_OK) status = pw_journal_open (&sweep->journal, &sweep->plan, sweep->path, error);
   if (status != PW_OK) return status;
   if (sweep->journal.done > 0)
-    pw_cli_say ("pinwheel: continuing with %s: %ld of %ld runs are done\n", sweep->journal.part_path,
-                sweep->journal.done, sweep->journal.rows);
+    pw_cli_say ("pinwheel: continuing with %s: %ld of %ld runs are done\n", sweep->journal.path, sweep->journal.done,
+                sweep->journal.rows);
   return PW_OK;
 }
 
@@ -132,7 +131,7 @@ static int sweep_finish (pw_sweep *sweep, pw_error *error) {
   }
   if (sweep->journal.done < sweep->journal.rows) {
     pw_cli_say ("pinwheel: interrupted; %ld of %ld runs are kept in %s; the same command continues from there\n",
-                sweep->journal.done, sweep->journal.rows, sweep->journal.part_path);
+                sweep->journal.done, sweep->journal.rows, sweep->journal.path);
     return PW_INTERRUPTED;
   }
   int status = pw_sweep_finish (&sweep->journal, &sweep->plan, &tally, error);
@@ -176,7 +175,7 @@ static const struct poptOption sweep_options[] = {
   PW_TEXT_OPTION (pw_sweep, part_text, "part", 0, "I/N",
                   "Compute every N-th row, from the I-th on, for a later --merge"),
   PW_FLAG_OPTION (pw_sweep, merge, "merge", "Merge the parts of a sweep: the arguments are their files"),
-  PW_FLAG_OPTION (pw_sweep, with_cpu, "cpu",
+  PW_FLAG_OPTION (pw_sweep, plan.with_cpu, "cpu",
                   "Add a column with the processor time of each run, which is never reproducible"),
   PW_METHOD_OPTIONS,
   PW_MODEL_OPTIONS,

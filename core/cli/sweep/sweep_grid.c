@@ -108,7 +108,7 @@ double pw_grid_value (const pw_grid *grid, int i, long row) {
   return pw_axis_value (axis, row / axis->stride % axis->count);
 }
 
-/* Initial values vary fastest, then parameters; among themselves each of both in the order of the table. */
+/* Initial values vary fastest, then parameters; the order among initial values and among parameters is the table's. */
 long pw_grid_scheduled_row (const pw_grid *grid, long k) {
   long row = 0;
   for (int parameters = 0; parameters < 2; parameters++)

@@ -4,7 +4,8 @@
  * and complete lines remain, and perhaps an incomplete line, which the next start removes.  A lock excludes other
  * processes; it ends with the process.  The table is written under another name in the order of the grid and renamed,
  * then the journal is removed: if the program is killed in between, the same command finds the journal complete and
- * writes the same bytes again.  A part is a table of lines of the journal, in the order of the grid.
+ * writes the same bytes again.  The file of a part, which is written like a table, has the fingerprint and the lines of
+ * its journal in the order of the grid.
  *
  *     pinwheel sweep 1              the fingerprint: lines "KEY = VALUE"
  *     ...
@@ -25,8 +26,8 @@ typedef struct {
   long row;         /* its number in the grid */
   int status;       /* exit status of the run */
   const char *text; /* the table's line, which ends with a newline */
-  size_t text_size; /* its bytes, the newline included */
-  size_t line_size; /* those of the journal's line */
+  size_t text_size; /* bytes of that line, the newline included */
+  size_t line_size; /* bytes of the journal's line, the newline included */
 } journal_line;
 
 /* A file in memory, read only, and not ended by 0. */
@@ -90,7 +91,7 @@ static void journal_map_close (journal_map *map) {
 
 /* ---- The journal ---- */
 
-/* Appends a text, all or nothing. */
+/* Appends a text to the journal, all or nothing. */
 static int journal_write (pw_journal *journal, const char *text, size_t size, pw_error *error) {
   size_t done = 0;
   while (done < size) {
@@ -100,7 +101,7 @@ static int journal_write (pw_journal *journal, const char *text, size_t size, pw
       int removed = done == 0 || ftruncate (journal->descriptor, journal->size) == 0;
       (void)removed; /* if not, the next start removes the incomplete line */
       return pw_fail (error, PW_RESOURCE, "cannot write %s: %s; the same command will continue after its %ld rows",
-                      journal->part_path, why, journal->done);
+                      journal->path, why, journal->done);
     }
     done += (size_t)n;
   }
@@ -129,14 +130,14 @@ static int journal_read (pw_journal *journal, const pw_plan *plan, const journal
   if (rows == NULL) { /* with an incomplete fingerprint there are no rows */
     if (memcmp (map->begin, PW_SWEEP_MAGIC, size < magic_size ? size : magic_size) == 0) return PW_OK;
     return pw_fail (error, PW_INPUT, "%s exists and is not the journal of a sweep: remove it if it is not needed",
-                    journal->part_path);
+                    journal->path);
   }
   const pw_fingerprint there = { map->begin, rows, "there" };
   const pw_fingerprint here = { fingerprint, fingerprint + plan->fingerprint.length, "here" };
   if (pw_fingerprint_differ (there, here, NULL, difference, sizeof difference))
     return pw_fail (error, PW_INPUT,
                     "%.80s belongs to another sweep: %.300s; finish that one with its own command, or remove the file",
-                    journal->part_path, difference);
+                    journal->path, difference);
   journal_read_rows (journal, plan, map, rows);
   return PW_OK;
 }
@@ -144,13 +145,13 @@ static int journal_read (pw_journal *journal, const pw_plan *plan, const journal
 static int journal_begin (pw_journal *journal, const pw_plan *plan, pw_error *error) {
   journal_map map;
   if (journal_map_open (&map, journal->descriptor) != PW_OK)
-    return pw_fail (error, PW_RESOURCE, "cannot read %s: %s", journal->part_path, strerror (errno));
+    return pw_fail (error, PW_RESOURCE, "cannot read %s: %s", journal->path, strerror (errno));
   int status = journal_read (journal, plan, &map, error);
   off_t file_size = (off_t)(map.end - map.begin);
   journal_map_close (&map);
   if (status != PW_OK) return status;
   if (file_size > journal->size && ftruncate (journal->descriptor, journal->size) != 0)
-    return pw_fail (error, PW_RESOURCE, "cannot write %s: %s", journal->part_path, strerror (errno));
+    return pw_fail (error, PW_RESOURCE, "cannot write %s: %s", journal->path, strerror (errno));
   journal->created = journal->size == 0;
   return journal->created ? journal_write (journal, plan->fingerprint.chars, plan->fingerprint.length, error) : PW_OK;
 }
@@ -160,11 +161,11 @@ int pw_journal_open (pw_journal *journal, const pw_plan *plan, const char *path,
   *journal = (pw_journal){ .descriptor = -1, .rows = rows };
   journal->table_path = pw_output_path (path, error);
   if (journal->table_path == NULL) return error->status;
-  if (asprintf (&journal->part_path, "%s.part", journal->table_path) < 0) journal->part_path = NULL;
+  if (asprintf (&journal->path, "%s.part", journal->table_path) < 0) journal->path = NULL;
   journal->offset = calloc ((size_t)journal->rows + 1, sizeof *journal->offset);
-  if (journal->part_path == NULL || journal->offset == NULL)
+  if (journal->path == NULL || journal->offset == NULL)
     return pw_fail (error, PW_RESOURCE, "out of memory for a sweep of %ld rows", journal->rows);
-  journal->descriptor = pw_lock_path (journal->part_path, error);
+  journal->descriptor = pw_lock_path (journal->path, error);
   return journal->descriptor >= 0 ? journal_begin (journal, plan, error) : error->status;
 }
 
@@ -180,11 +181,11 @@ int pw_journal_add (pw_journal *journal, const pw_plan *plan, long row, int stat
 }
 
 void pw_journal_close (pw_journal *journal) {
-  if (journal->created && journal->done == 0 && journal->descriptor >= 0) unlink (journal->part_path);
+  if (journal->created && journal->done == 0 && journal->descriptor >= 0) unlink (journal->path);
   if (journal->descriptor >= 0) close (journal->descriptor);
   pw_text_free (&journal->line);
   free (journal->offset);
-  free (journal->part_path);
+  free (journal->path);
   free (journal->table_path);
   *journal = (pw_journal){ .descriptor = -1 };
 }
@@ -229,7 +230,7 @@ static int table_write (const pw_journal *journal, const pw_plan *plan, const jo
     const char *at = map->begin + journal->offset[k];
     journal_line line;
     if (!table_read_row (at, map->end, plan->part - 1 + k * plan->parts, &line, tally))
-      return pw_fail (error, PW_RESOURCE, "%s was changed by another program", journal->part_path);
+      return pw_fail (error, PW_RESOURCE, "%s was changed by another program", journal->path);
     fwrite (is_part ? at : line.text, 1, is_part ? line.line_size : line.text_size, stream);
   }
   return PW_OK;
@@ -240,7 +241,7 @@ int pw_sweep_finish (pw_journal *journal, const pw_plan *plan, pw_tally *tally, 
   pw_error table_error = { 0 };
   *tally = (pw_tally){ .rows = 0 };
   if (journal_map_open (&map, journal->descriptor) != PW_OK)
-    return pw_fail (error, PW_RESOURCE, "cannot read %s: %s", journal->part_path, strerror (errno));
+    return pw_fail (error, PW_RESOURCE, "cannot read %s: %s", journal->path, strerror (errno));
   pw_output *output = pw_output_open_as (journal->table_path, ".sorted", &table_error);
   if (output) table_write (journal, plan, &map, pw_output_stream (output), tally, &table_error);
   if (output) table_close (output, &table_error);
@@ -248,10 +249,10 @@ int pw_sweep_finish (pw_journal *journal, const pw_plan *plan, pw_tally *tally, 
   if (table_error.status != PW_OK)
     return pw_fail (error, table_error.status,
                     "%.300s; all rows are in %.150s, so the same command only has to sort them", table_error.text,
-                    journal->part_path);
-  if (unlink (journal->part_path) == 0) return PW_OK;
+                    journal->path);
+  if (unlink (journal->path) == 0) return PW_OK;
   return pw_fail (error, PW_RESOURCE, "%s is complete, but %s cannot be removed: %s", journal->table_path,
-                  journal->part_path, strerror (errno));
+                  journal->path, strerror (errno));
 }
 
 /* ---- The table of all parts ---- */
@@ -259,7 +260,7 @@ int pw_sweep_finish (pw_journal *journal, const pw_plan *plan, pw_tally *tally, 
 typedef struct {
   const char *path;
   journal_map map;
-  const char *first_row, *next_row; /* their lines */
+  const char *first_row, *next_row; /* the lines of these rows */
   int number, parts;                /* part I of N */
 } table_part;
 

@@ -9,11 +9,11 @@
  * continues. */
 typedef struct {
   char *table_path; /* links followed */
-  char *part_path;  /* of the journal: table_path.part */
+  char *path;       /* of the journal: that of the table and ".part" */
   int descriptor;   /* of the journal, locked; -1: not open */
   int created;      /* 1: by this process */
-  off_t *offset;    /* in the journal, of the line of each row of the part; 0: missing */
-  long rows, done;  /* rows of the part; those in the journal */
+  off_t *offset;    /* in the journal, of the line of each row that is to be computed; 0: missing */
+  long rows, done;  /* numbers of these rows; of those in the journal */
   off_t size;       /* bytes of the journal's complete lines */
   pw_text line;     /* the line that is written */
 } pw_journal;
@@ -21,8 +21,8 @@ typedef struct {
 /* Opens the journal of the table at `path`, or creates it.  It is truncated at the first incomplete or damaged line.
  * Errors: PW_RESOURCE if it cannot be written or another process has it, PW_INPUT if it belongs to another sweep. */
 int pw_journal_open (pw_journal *journal, const pw_plan *plan, const char *path, pw_error *error);
-/* Appends a row of the grid with the status of its run, 0 to 4 as an exit status.  One thread at a time.  PW_RESOURCE:
- * the journal is unchanged. */
+/* Appends a row of the grid: the exit status of its run, 0 to 4, and its line of the table, `text`, without a newline.
+ * One thread at a time.  PW_RESOURCE: the journal is unchanged. */
 int pw_journal_add (pw_journal *journal, const pw_plan *plan, long row, int status, const char *text, pw_error *error);
 /* Closes the journal; removes it if it was created here and has no rows. */
 void pw_journal_close (pw_journal *journal);

@@ -1,6 +1,5 @@
 /* Makes the plan of a sweep: matches the varied quantities to the model, and finds the columns of the table and the
  * fingerprint. */
-#define _POSIX_C_SOURCE 200809L
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -11,7 +10,7 @@ enum { PLAN_TRIES = 1000 }; /* failures to build a model after which no other va
 
 /* ---- Models ---- */
 
-/* Sets the parameters of a row, and the initial values of the command line. */
+/* Builds the model of a row, with --set and --start. */
 static int plan_build (const pw_plan *plan, long row, pw_model *model, pw_error *error) {
   int status = pw_cli_apply (model, "--set", plan->line->sets, pw_model_set, error);
   for (int i = 0; i < plan->grid.axes && status == PW_OK; i++)
@@ -34,25 +33,23 @@ int pw_plan_compile (const pw_plan *plan, long row, pw_cli_model *compiled, pw_e
 /* ---- Axes ---- */
 
 /* 1 if a list of "NAME=VALUE", which ends with NULL or is NULL, has this name. */
-static int plan_list_names (const char **list, const char *name) {
+static int plan_has_name (const char **list, const char *name) {
   size_t n = strlen (name);
   for (; list && *list; list++)
     if (strncmp (*list, name, n) == 0 && (*list)[n] == '=') return 1;
   return 0;
 }
 
-/* Finds the parameter of an axis, whose values must all lie in its domain.  Other names with a dot are those of states,
- * which exist only in a compiled model. */
+/* Finds the parameter of an axis, in whose domain all values must lie.  Other names with a dot are those of states,
+ * which exist only in a compiled model.  pw_model_set reports wrong names and values. */
 static int plan_match_axis (const pw_plan *plan, pw_axis *axis, pw_model *model, pw_error *error) {
   const pw_parameter *parameter = axis->parameter = pw_cli_parameter (model, axis->name);
   if (parameter) axis->unit = parameter->unit;
-  const char *option = axis->parameter ? "--set" : "--start";
-  if (plan_list_names (axis->parameter ? plan->line->sets : plan->line->starts, axis->name))
-    return pw_fail (error, PW_INPUT, "%s is given by --vary and by %s", axis->name, option);
-  if (axis->parameter == NULL && strchr (axis->name, '.')) return PW_OK;
-  if (axis->parameter == NULL) return pw_model_set (model, axis->name, pw_axis_value (axis, 0), error);
+  if (plan_has_name (parameter ? plan->line->sets : plan->line->starts, axis->name))
+    return pw_fail (error, PW_INPUT, "%s is given by --vary and by %s", axis->name, parameter ? "--set" : "--start");
+  if (parameter == NULL && strchr (axis->name, '.')) return PW_OK;
   for (long i = 0; i < axis->count; i++)
-    if (*pw_domain_check (parameter->domain, pw_axis_value (axis, i)))
+    if (parameter == NULL || *pw_domain_check (parameter->domain, pw_axis_value (axis, i)))
       return pw_model_set (model, axis->name, pw_axis_value (axis, i), error);
   return PW_OK;
 }
@@ -103,8 +100,8 @@ typedef struct {
   pw_error first_error; /* why the first of them could not */
 } plan_scan;
 
-/* Chooses the code that evaluates the equations, of one run and of several at once.  It depends on the whole sweep, not
- * on the part, since results differ by round-off. */
+/* Chooses the code that evaluates the equations, of one run and of several at once.  The choice depends on the whole
+ * sweep, not on the part: results of different codes differ by round-off. */
 static void plan_open_engines (pw_plan *plan, const pw_system *system) {
   pw_run_defaults defaults = pw_cli_defaults (pw_file_table (plan->file));
   double steps = (double)plan->grid.rows * pw_method_steps (plan->method, &plan->settings, defaults.step, plan->t_end);
@@ -131,9 +128,9 @@ static int plan_scan_row (pw_plan *plan, long row, plan_scan *scan, pw_error *er
   return PW_OK;
 }
 
-/* The bodies, and so the states, may depend on integer parameters.  So a model is built for each value of these, with
- * the others as in the first row, and one for the last row.  If no integer is varied, the first model that can be built
- * suffices. */
+/* The bodies, and so the states, may depend on integer parameters: models are built for the first row, for each value
+ * of an integer with all else as in the first row, and for the last row.  Without integers, rows are tried until a
+ * model can be built. */
 static int plan_find_columns (pw_plan *plan, pw_error *error) {
   plan_scan scan = { .built = 0 };
   int any_count = 0, status = plan_scan_row (plan, 0, &scan, error);

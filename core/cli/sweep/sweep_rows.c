@@ -2,7 +2,6 @@
  *
  * Rows with the same parameters follow each other and share a compiled system; systems of the same structure share
  * specialised code. */
-#define _POSIX_C_SOURCE 200809L
 #include <math.h>
 #include <pthread.h>
 #include <stdlib.h>
@@ -12,7 +11,7 @@
 
 enum { ROWS_LANES = 8 }; /* runs that a thread advances at once, at most: the largest --lanes */
 
-/* A compiled system, shared by the rows with the same parameters. */
+/* A compiled system, shared by rows with the same parameters. */
 typedef struct {
   long parameters;            /* pw_grid_parameter_index of these rows */
   int users;                  /* number of runs that use it, and one more while it is the latest system */
@@ -39,7 +38,7 @@ typedef struct {
   pthread_cond_t compiled;
   row_system *latest;
   row_code *codes;
-  long next;             /* of the whole grid: the next row in the order of pw_grid_scheduled_row */
+  long next;             /* number of rows of the whole grid taken so far, in the order of pw_grid_scheduled_row */
   long missing_at_start; /* number of rows to compute */
   pw_journal *journal;
   pw_progress progress;
@@ -133,8 +132,8 @@ static void system_release (row_system *system) {
   free (system);
 }
 
-/* The system of a row, shared with other threads, or compiled without the lock, which the caller holds.  NULL if out of
- * memory. */
+/* The system of a row: the latest one if it has the same parameters, else a new one.  The caller holds the lock, which
+ * is released meanwhile.  NULL if out of memory. */
 static row_system *system_of (sweep_rows *sweep, long row) {
   long parameters = pw_grid_parameter_index (&sweep->plan->grid, row);
   row_system *system = sweep->latest;
@@ -262,7 +261,7 @@ static void rows_count_change (sweep_rows *sweep, double change, const char *tex
 
 /* ---- Threads ---- */
 
-/* A thread and the rows that it computes at once: as many as the code of the plan's lanes, else one. */
+/* A thread and the rows that it computes at once: as many as plan->lanes_code has lanes, or one. */
 typedef struct {
   sweep_rows *sweep;
   const pw_specialised_lanes *lanes_code; /* NULL: none */
@@ -332,7 +331,7 @@ static int worker_thread (void *context, int i, pw_error *error) {
     worker.width = pw_specialised_lanes_count (worker.lanes_code);
   pthread_mutex_lock (&sweep->lock);
   while (worker.width > 1 && sweep->missing_at_start < (long)worker.width * sweep->jobs)
-    worker.width--; /* rows for all threads */
+    worker.width--; /* all threads are to have rows */
   for (int rows = 1; rows > 0;) {
     for (int k = rows = 0; k < worker.width; k++)
       rows += worker.row[k].system != NULL || worker_begin (sweep, &worker.row[k]);

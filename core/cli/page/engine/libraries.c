@@ -5,20 +5,20 @@
 #include <math.h>
 #include <stdlib.h>
 
-enum { LIBRARIES_NODES = 4000 }; /* at most: a byte for each pair of them */
+enum { LIBRARIES_NODES = 4000 }; /* of a graph, at most: it takes a byte for each pair of nodes */
 
 /* Removes a node from a graph, given by its n x n adjacency matrix, and connects its neighbours with each other. */
 static void eliminate (int n, unsigned char *edge, int node) {
-  unsigned char *neighbour = edge + (size_t)node * (size_t)n;
+  unsigned char *neighbour = edge + node * n;
   for (int i = 0; i < n; i++)
     if (neighbour[i])
-      for (int j = 0; j < n; j++) edge[(size_t)i * (size_t)n + (size_t)j] |= neighbour[j] && j != i;
-  for (int i = 0; i < n; i++) neighbour[i] = edge[(size_t)i * (size_t)n + (size_t)node] = 0;
+      for (int j = 0; j < n; j++) edge[i * n + j] |= neighbour[j] && j != i;
+  for (int i = 0; i < n; i++) neighbour[i] = edge[i * n + node] = 0;
 }
 
 static int degree (int n, const unsigned char *edge, int node) {
   int count = 0;
-  for (int i = 0; i < n; i++) count += edge[(size_t)node * (size_t)n + (size_t)i];
+  for (int i = 0; i < n; i++) count += edge[node * n + i];
   return count;
 }
 
@@ -28,8 +28,7 @@ int amd_order (int n, const int Ap[], const int Ai[], int P[], double control[],
   unsigned char *edge = n <= LIBRARIES_NODES ? calloc ((size_t)n * (size_t)n + 1, 1) : NULL,
                 *done = calloc ((size_t)n + 1, 1);
   for (int i = 0; edge && i < n; i++)
-    for (int k = Ap[i]; k < Ap[i + 1]; k++)
-      edge[(size_t)i * (size_t)n + (size_t)Ai[k]] = edge[(size_t)Ai[k] * (size_t)n + (size_t)i] = Ai[k] != i;
+    for (int k = Ap[i]; k < Ap[i + 1]; k++) edge[i * n + Ai[k]] = edge[Ai[k] * n + i] = Ai[k] != i;
   for (int k = 0; edge && done && k < n; k++) {
     int best = -1, least = n + 1;
     for (int i = 0; i < n; i++)

@@ -15,7 +15,7 @@ __attribute__ ((import_module ("page"), import_name ("now"))) double pw_page_now
 
 static pw_page_file *page_file;
 static int page_files;
-static size_t page_room;
+static size_t page_room; /* entries of page_file that are allocated */
 
 PAGE_EXPORT (allocate) void *page_allocate (size_t size) {
   return calloc (1, size);
@@ -27,7 +27,7 @@ PAGE_EXPORT (file) void page_add_file (char *name, char *bytes, size_t size) {
   page_file[page_files++] = (pw_page_file){ name, bytes, size };
 }
 
-/* The index of a file, the number of files if there is none. */
+/* The index of a file, given its name or "/" and its name; the number of files if there is none. */
 static int page_find_file (const char *name) {
   int i = 0;
   name += *name == '/';
@@ -51,6 +51,7 @@ char *realpath (const char *path, char *resolved) {
 
 int pw_yaml_read_tree (pw_yaml *y, pw_error *error) {
   int i = page_find_file ("tree");
+  if (i == page_files) return pw_fail (error, PW_RESOURCE, "out of memory"); /* it could not be added */
   return pw_yaml_load_tree (y, page_file[i].bytes, page_file[i].size, error);
 }
 
@@ -133,8 +134,8 @@ static int page_integrate (pw_run *r, double t_end) {
   return status;
 }
 
-/* Runs the model with the parameters and initial values given, for at most `limit` ms.  0, or a negative status with
- * the error set; the samples so far are kept.  Without `samples` it only integrates, to measure its time. */
+/* Runs the model with the parameters and initial values given, for at most `limit` ms of computing time.  0, or a negative
+ * status with the error set; the samples so far are kept.  Without `samples` it only integrates, to be timed. */
 PAGE_EXPORT (run)
 int page_run (const char *method, double step, double rtol, double t_end, double limit, int samples,
               const double *parameter, const pw_initial_value *initial, int initials) {
@@ -160,6 +161,7 @@ int page_run (const char *method, double step, double rtol, double t_end, double
 
 /* ---- Results ---- */
 
+/* The samples of the run. */
 PAGE_EXPORT (data) const double *page_data (void) {
   return page_plots->data;
 }
