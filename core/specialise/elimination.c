@@ -156,8 +156,8 @@ static int elimination_next_pair (const pw_elimination *ldl, const double *mass,
   return least >= 0;
 }
 
-/* The next equation: that of least degree, with an addition for variable pivots, so that constant ones are preferred, and
- * a larger one for zero pivots.  -1 after the last one. */
+/* The next equation: that of least degree, with an addition for variable pivots, so that constant ones are preferred,
+ * and a larger one for zero pivots.  -1 after the last one. */
 static int elimination_next_row (const pw_elimination *ldl) {
   int best = -1, least = 0;
   for (int i = ldl->coordinates; i < ldl->n; i++) {
@@ -261,8 +261,9 @@ void pw_elimination_close (pw_elimination *ldl) {
 
 /* ---- Solution ---- */
 
-/* Divides by the m-th pivot and eliminates its unknowns from the later rows.  With a pivot [ 0 d ; d 0 ] of a coordinate p
- * and an equation r, row p determines the multiplier of r, and row r the coordinate: their entries of y are exchanged. */
+/* Divides by the m-th pivot and eliminates its unknowns from the later rows.  With a pivot [ 0 d ; d 0 ] of a
+ * coordinate p and an equation r, row p determines the multiplier of r, and row r the coordinate: their entries of y
+ * are exchanged. */
 static void elimination_forward (const pw_elimination *ldl, pw_emitter *emitter, pw_term *y, int m) {
   int p = ldl->order[m], r = ldl->partner[m];
   if (r >= 0) {

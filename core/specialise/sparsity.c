@@ -1,4 +1,4 @@
-/* Sparsity of element types; see sparsity.h.  Elements on the ground do not count: more of their entries are constant. */
+/* Sparsity of element types; see sparsity.h.  Elements on the ground, with more constant entries, do not count. */
 #include <math.h>
 #include <string.h>
 #include "random_scene.h"
@@ -24,8 +24,8 @@ static int sparsity_is_grounded (const pw_system *s, const pw_element_batch *k, 
   return 0;
 }
 
-/* Merges the entries of element e at one state into `out`.  first: its entries of J at the scene's first state, stored if
- * is_first; known: 1 if `out` has entries already. */
+/* Merges the entries of element e at one state into `out`.  first: its entries of J at the scene's first state, stored
+ * if is_first; known: 1 if `out` has entries already. */
 static void sparsity_state (const pw_element_batch *k, int e, int is_first, int known, double *first,
                             pw_sparsity *out) {
   int n = k->kind->rows * k->b.cols;

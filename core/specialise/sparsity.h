@@ -14,8 +14,8 @@ typedef struct {
   unsigned char length[PW_MAX_ROWS * PW_MAX_COLS / 3];
 } pw_sparsity;
 
-/* All entries of a plug-in's type count as variable: the force of a wall, for example, is 0 at most states.  So do those
- * of a type that rejects random definitions.  PW_OK or PW_RESOURCE. */
+/* All entries of a plug-in's type count as variable: the force of a wall, for example, is 0 at most states.  So do
+ * those of a type that rejects random definitions.  PW_OK or PW_RESOURCE. */
 int pw_sparsity_find (const pw_kind *kind, pw_sparsity *out);
 
 #endif

@@ -88,7 +88,7 @@ static int specialise_solve (const pw_generator *gen, const pw_elimination *ldl,
   return PW_OK;
 }
 
-/* Writes a function that factorises K with the first `rows` constraint equations, and opens ldl for specialise_solve. */
+/* Writes a function that factorises K with the first `rows` constraint equations; ldl serves specialise_solve. */
 static int specialise_factor (const pw_generator *gen, pw_elimination *ldl, pw_emitter *emitter, const pw_term *K,
                               const unsigned char *length, const char *name, int rows) {
   unsigned char takes_part[SPECIALISE_ROWS + 1];

@@ -52,8 +52,8 @@ static void specialise_call (const pw_generator *gen, int k, const char *functio
 #define ARGUMENTS "const pw_scene *s, const pw_configuration *c, const double *q, const double *v, double *out"
 #define UNUSED "  (void)s, (void)c, (void)q, (void)v, (void)out;\n"
 
-/* Writes a function of the first `rows` constraint equations, which fills J, or one number for each equation, by calls of
- * `function`, the member of the types' tables at `offset`; zeros for types where that is NULL. */
+/* Writes a function of the first `rows` constraint equations, which fills J, or one number for each equation, by calls
+ * of `function`, the member of the types' tables at `offset`; zeros for types where that is NULL. */
 static void specialise_rows (const pw_generator *gen, const char *name, const char *function, size_t offset, int rows) {
   char to[40];
   fprintf (gen->out, "\nINLINE void %s (" ARGUMENTS ") {\n" UNUSED, name);

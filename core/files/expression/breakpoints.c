@@ -96,7 +96,6 @@ static double search_first (search *s, double a, double b) {
   return first < INFINITY ? first : search_first (s, middle, b);
 }
 
-/* At the limit of the search, or with noise, returns a time before the next breakpoint, to continue there. */
 double pw_expression_breakpoint (const pw_expression *expression, double t) {
   search s = { .expression = expression, .from = t, .least_width = LEAST_WIDTH, .noise_end = INFINITY };
   s.remaining = 400 + 4000000 / (100 + expression->codes); /* so that the time of a search has a bound */

@@ -69,7 +69,7 @@ static inline double value_of (const pw_expression_code *c, double left, double 
     return pw_expression_functions[c->index].of_two (left, right);
   }
   if (pw_expression_operands (c->op) == 1) return value_step (c->op, right, may_jump);
-  pw_order order = value_order (left, right);
+  pw_order order = value_order (left, right); /* the rest are comparisons */
   if (order == PW_ORDER_EQUAL) *may_jump = 1;
   return pw_expression_compare (c->op, order);
 }
@@ -103,7 +103,7 @@ typedef struct {
   int varies;      /* 1: depends on the variable */
 } jet;
 
-/* The chain rule, with the value f. Independent operands contribute nothing, even where a partial derivative is
+/* The chain rule, with the value f.  Operands that do not vary contribute nothing, even where a partial derivative is
  * infinite. */
 static jet jet_chain (double f, const pw_partials *s, const jet *x, const jet *y) {
   jet r = { f, 0, 0, x->varies | y->varies };
@@ -217,7 +217,7 @@ static jet jet_hypot (const pw_expression_code *c, const jet *x, const jet *y, d
   return (jet){ 0, d, d > 0 ? (x->d * x->dd + y->d * y->dd) / d : hypot (x->dd, y->dd), 1 };
 }
 
-/* Not && and ||, whose operands are 1 or 0 and have no derivatives. */
+/* All but && and ||, whose operands never vary: they are 1 or 0. */
 static jet jet_binary (const pw_expression_code *c, const jet *x, const jet *y, double *discrete) {
   /* At a pole, the denominator or base 0 has the sign of its value just after the current time. */
   jet after = c->op == PW_OP_DIVIDE ? *y : *x;

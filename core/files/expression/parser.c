@@ -42,7 +42,7 @@ typedef struct {
   size_t previous, previous_end; /* start and end of the token before it */
   char type;                     /* 'n' name, '0' number, 'o' operator, 0 the end; or ( ) , ? : itself */
   const parser_operator *symbol; /* of a token of type 'o'; else NULL */
-  int depth, stacked;            /* of the recursion; operands on the stack */
+  int depth, stacked;            /* of the recursion; operands on the stack during evaluation */
   int status;                    /* PW_OK until the first error */
   pw_expression_error *error;
   /* of the pw_expression being made */
@@ -164,7 +164,7 @@ static int parser_enter (parser *p) {
   return p->status == PW_OK;
 }
 
-/* Reports an unexpected token; `open`: the unclosed parenthesis or ?, or 0, and its offset. */
+/* Reports an unexpected token.  open: a '(' or '?' at offset `at` that is not complete; 0 if there is none. */
 static parser_part parser_unexpected (parser *p, char open, size_t at) {
   if (p->type == 'n' || p->type == '0' || p->type == '(')
     return parser_fail (p, p->at, "an operator such as * is missing before \"%s\"", (char[2]){ p->text[p->at], 0 });

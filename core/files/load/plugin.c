@@ -1,4 +1,4 @@
-/* Finds model files from a name or a path, loads and checks them. */
+/* Finds a model file by its name or path, loads and checks it. */
 #define _XOPEN_SOURCE 700 /* realpath */
 #include <dlfcn.h>
 #include <errno.h>
@@ -7,10 +7,10 @@
 #include "files.h"
 
 struct pw_file {
-  char *name, *path;
-  void *handle;     /* of dlopen; NULL for a text model */
-  pw_yaml *yaml;    /* NULL for others */
-  size_t max_bytes; /* of a text model */
+  char *name, *path; /* the name without its ending; the path with links resolved */
+  void *handle;      /* of dlopen; NULL for a text model */
+  pw_yaml *yaml;     /* NULL for others */
+  size_t max_bytes;  /* of a text model */
   const pw_plugin_table *table;
 };
 
@@ -54,7 +54,7 @@ static int plugin_is_cpp (const char *name) {
          pw_ends_with (name, ".C");
 }
 
-/* Opens the file at f->path, which exists; `shown` is its path as the user knows it. */
+/* Opens the file at f->path, which exists; `shown` is its path for messages. */
 static int plugin_open_path (pw_file *f, const char *shown, pw_error *error) {
   const char *base = strrchr (f->path, '/');
   base = base ? base + 1 : f->path;
@@ -124,7 +124,7 @@ static int plugin_find_name (pw_file *f, const char *name, pw_error *error) {
   return status;
 }
 
-/* Finds the file; `*shown` is its path as the user knows it. */
+/* Finds a model's file, which is not opened; *shown: its path for messages. */
 static pw_file *plugin_find (const char *model, const char **shown, pw_error *error) {
   int named = model && *model;
   pw_file *f = named ? calloc (1, sizeof *f) : NULL;
@@ -156,10 +156,11 @@ pw_file *pw_file_open (const char *model, pw_error *error) {
 
 pw_file *pw_file_open_limited (const char *model, size_t max_bytes, pw_error *error) {
   const char *shown;
-  pw_file *f = plugin_find (model, &shown, error);
+  pw_error own = { 0 }, *why = error ? error : &own;
+  pw_file *f = plugin_find (model, &shown, why);
   if (f == NULL) return NULL;
   f->max_bytes = max_bytes < PW_FILE_MAX_BYTES ? max_bytes : PW_FILE_MAX_BYTES;
-  if (plugin_open_path (f, shown, error) == PW_OK) return f;
+  if (plugin_open_path (f, shown, why) == PW_OK) return f;
   pw_file_close (f);
   return NULL;
 }
@@ -180,7 +181,7 @@ pw_model *pw_file_model (const pw_file *f, pw_error *error) {
 }
 
 const pw_plugin_table *pw_file_table (const pw_file *f) {
-  return f->table;
+  return f ? f->table : NULL;
 }
 
 const pw_yaml *pw_file_yaml (const pw_file *f) {
@@ -188,11 +189,11 @@ const pw_yaml *pw_file_yaml (const pw_file *f) {
 }
 
 const char *pw_file_name (const pw_file *f) {
-  return f->name;
+  return f ? f->name : NULL;
 }
 
 const char *pw_file_path (const pw_file *f) {
-  return f->path;
+  return f ? f->path : NULL;
 }
 
 int pw_file_tables (const pw_file *f, int (*each) (void *context, const char *path), void *context) {

@@ -21,10 +21,10 @@ static int search_no_memory (pw_error *error) {
   return pw_fail (error, PW_RESOURCE, "out of memory while looking for models");
 }
 
-/* Where the search for folders begins: at the program, at this library. */
+/* What folders are relative to: the folder of the running program, that of this library. */
 typedef enum { SEARCH_PROGRAM, SEARCH_LIBRARY, SEARCH_ANCHORS } search_anchor;
 
-/* The folder of the running program or of this library, malloced; NULL if unknown. */
+/* Stores the folder of the running program or of this library, malloced; NULL if unknown. */
 static int search_anchor_folder (search_anchor anchor, char **folder, pw_error *error) {
   char path[PATH_MAX];
   *folder = NULL;
@@ -48,7 +48,7 @@ static int search_anchor_folder (search_anchor anchor, char **folder, pw_error *
 /* Folders relative to each anchor. */
 typedef const char *const search_folders[SEARCH_ANCHORS][3];
 
-/* Calls `visit` with each of these folders, which may not exist. */
+/* Calls `visit` with each of these folders, which need not exist, until it fails. */
 static int search_visit (search_folders where, int (*visit) (void *context, const char *folder, pw_error *error),
                          void *context, pw_error *error) {
   int status = PW_OK;
@@ -67,7 +67,7 @@ static int search_visit (search_folders where, int (*visit) (void *context, cons
 
 /* ---- Model files ---- */
 
-/* Adds a model file, unless it is in the list already. */
+/* Adds a model, whose name is the first `length` bytes of `name`, unless it is in the list already. */
 static int search_add_file (pw_search *s, const char *name, size_t length, const char *path, pw_error *error) {
   for (int i = 0; i < s->count; i++)
     if (strcmp (s->found[i].path, path) == 0 && strncmp (s->found[i].name, name, length) == 0 &&
@@ -98,7 +98,7 @@ static int search_entry (pw_search *s, const char *folder, const char *entry, pw
   return status;
 }
 
-/* Adds a folder to s->folders, "/first:/second", if it fits; 0 if it is there already, so that it is searched once. */
+/* Adds a folder to s->folders if there is room; 0 if it is there already, so that it is searched once. */
 static int search_add_folder (pw_search *s, const char *real) {
   size_t n = strlen (real), used = strlen (s->folders);
   for (const char *p = s->folders; *p; p += strcspn (p, ":"), p += *p == ':')
@@ -107,7 +107,7 @@ static int search_add_folder (pw_search *s, const char *real) {
   return 1;
 }
 
-/* Adds the models in a folder; skips missing and inaccessible folders, as for PATH; other failures are errors. */
+/* Adds the models in a folder; skips missing and inaccessible folders, as shells do with PATH. */
 static int search_folder (void *context, const char *folder, pw_error *error) {
   pw_search *s = context;
   char *real = realpath (folder, NULL);

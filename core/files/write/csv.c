@@ -152,6 +152,7 @@ static void csv_free (pw_csv *c) {
 }
 
 pw_csv *pw_csv_open (const pw_system *s, int ledger, pw_output *o, pw_error *error) {
+  if (pw_require (s, "a system", error) != PW_OK || pw_require (o, "an output", error) != PW_OK) return NULL;
   int contacts = pw_system_contacts (s), is_archive = pw_output_named (o, ".npz"), continued = pw_output_continued (o);
   if (is_archive && continued) {
     pw_fail (error, PW_INPUT, "an archive of arrays cannot be continued: write a table that ends in .csv");
@@ -172,9 +173,9 @@ pw_csv *pw_csv_open (const pw_system *s, int ledger, pw_output *o, pw_error *err
 }
 
 int pw_csv_write (pw_csv *c, const pw_system *s, const pw_sample *sample, pw_error *error) {
-  int status = PW_OK;
+  int status = pw_require (c, "a table", error);
   (void)s; /* that of pw_csv_open */
-  if (c->workspace)
+  if (status == PW_OK && c->workspace)
     status = pw_workspace_contact_points (c->workspace, sample->t, sample->q, sample->v, c->contact, error);
   return status == PW_OK ? csv_line (c, CSV_VALUES, sample, error) : status;
 }

@@ -6,7 +6,7 @@
 #include <string.h>
 #include "yaml.h"
 
-#define YAML_MAX_AHEAD 1e6 /* indicators of one list or map in brackets; about 350 bytes each */
+#define YAML_MAX_AHEAD 1e6 /* pw_yaml.max_ahead of a file of the default size; libfyaml takes 350 bytes for each */
 
 /* ---- Parameters ---- */
 
@@ -201,5 +201,5 @@ static int yaml_each_table (const pw_yaml *y, const pw_node *node, int (*each) (
 }
 
 int pw_yaml_tables (const pw_yaml *y, int (*each) (void *context, const char *path), void *context) {
-  return y->elements ? yaml_each_table (y, y->elements, each, context) : 0; /* a definition may be named "file" */
+  return y->elements ? yaml_each_table (y, y->elements, each, context) : 0; /* in let, "file" is the name of a number */
 }

@@ -124,9 +124,9 @@ static int time_eval (void *context, double t, const double *state, double value
     value[0] = pw_expression_value (f->expression[0], variable);
   for (int i = 0; gradient && i < f->states; i++) {
     pw_expression_derivatives (f->expression[0], variable, 1 + i, derivatives);
-    if (derivatives[0] != value[0]) /* that before a jump in time */
+    if (derivatives[0] != value[0]) /* the value before a jump in time; the one after it is needed */
       variable[0] = nextafter (t, INFINITY), pw_expression_derivatives (f->expression[0], variable, 1 + i, derivatives);
-    /* |v| has no derivative at rest; only Newton's iteration uses it. */
+    /* 0 where there is no derivative, such as that of |v| at rest: only Newton's iteration uses the gradient. */
     gradient[i] = isfinite (derivatives[1]) ? derivatives[1] : 0;
   }
   return isfinite (value[0]) && (f->derivatives == 0 || (isfinite (value[1]) && isfinite (value[2]))) ? 0 : -1;
@@ -199,7 +199,8 @@ static int time_expression (reading *e, int i) {
   return jump ? PW_OK : pw_yaml_no_memory (r);
 }
 
-/* Compares given derivative i, 1 or 2, with that of what is given before it, at some times to 1e-6 of the largest. */
+/* Compares the given derivative i, 1 or 2, with that of the highest lower one given, at some times, to 1e-6 of the
+ * largest. */
 static int time_check (const reading *e, int i, const char *name) {
   static const double time[] = { 0.3, 1.7, 4.1 }; /* [s], arbitrary */
   int last = e->f->expression[i - 1] ? i - 1 : 0, n = i - last;
@@ -228,7 +229,8 @@ static double time_size (const time_function *f, double t, int i) {
   return size;
 }
 
-/* Refuses signals that a constraint cannot follow: a jump of the value or, for positions, of its derivative. */
+/* Refuses signals that a constraint cannot follow: a jump of the value or, for positions, of its derivative, beyond
+ * round-off and the change between adjacent times. */
 static int time_continuous (const reading *e) {
   static const char *const name[] = { "its value", "its rate" };
   double t = 0, before[3], after[3];
