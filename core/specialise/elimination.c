@@ -8,6 +8,7 @@ static const pw_term elimination_one = { PW_TERM_ONE, 1, "1", 1 };
 
 #define AT(p, q) ldl->K[(size_t)(p) * (size_t)ldl->n + (size_t)(q)]
 #define FACTOR(p, q) ldl->L[(size_t)(p) * (size_t)ldl->n + (size_t)(q)]
+#define FIRST(p, q) ldl->first[(size_t)(p) * (size_t)ldl->n + (size_t)(q)]
 
 /* Loops over the unknowns eliminated after the m-th one. */
 #define EACH_LATER(i, m)           \
@@ -72,7 +73,7 @@ static void elimination_guard_column (const pw_elimination *ldl, pw_emitter *emi
   fprintf (emitter->code, "  GUARD (%s * %s > " ELIMINATION_COLUMN " * (", pivot.name, pivot.name);
   const char *plus = "";
   for (int i = ldl->coordinates; i < ldl->n; i++) {
-    pw_term now = AT (i, c), was = ldl->first[(size_t)i * (size_t)ldl->n + (size_t)c];
+    pw_term now = AT (i, c), was = FIRST (i, c);
     for (int k = 0; k < 2; k++, now = was) {
       if (elimination_is_zero (now) || (k == 1 && strcmp (AT (i, c).name, was.name) == 0)) continue;
       fprintf (emitter->code, "%s%s * %s", plus, now.name, now.name);
@@ -96,8 +97,7 @@ static void elimination_update (pw_elimination *ldl, pw_emitter *emitter, int i,
 static int elimination_constant_length (pw_elimination *ldl, pw_emitter *emitter, int i, int p) {
   if (i < ldl->coordinates || p >= 3 * ldl->s->bodies || p % 3 == 2) return 0;
   int first = p - p % 3;
-  pw_term a = ldl->first[(size_t)i * (size_t)ldl->n + (size_t)first],
-          b = ldl->first[(size_t)i * (size_t)ldl->n + (size_t)first + 1];
+  pw_term a = FIRST (i, first), b = FIRST (i, first + 1);
   if (!ldl->length[(size_t)(i - ldl->coordinates) * (size_t)ldl->s->bodies + (size_t)(p / 3)]) return 0;
   if (a.type != PW_TERM_VARIABLE || b.type != PW_TERM_VARIABLE) return 0;
   if (strcmp (a.name, AT (i, first).name) != 0 || strcmp (b.name, AT (i, first + 1).name) != 0) return 0;

@@ -106,7 +106,7 @@ static int specialise_write (pw_generator *gen) {
            "\nPW_EXPORT const pw_specialised pw_specialised_scene = {\n"
            "  PW_SCENE_ABI, %d, %luu, independent, prepare, evaluate, project, stages, compute_residuals, "
            "steps\n};\n#endif\n",
-           gen->constants + 1, pw_system_shape (gen->s));
+           gen->emitter.constants + 1, pw_system_shape (gen->s));
   return status;
 }
 

@@ -57,8 +57,7 @@ typedef enum { SPECIALISE_ACCELERATION, SPECIALISE_VELOCITY, SPECIALISE_POSITION
 
 /* Writes the function `solve`, which computes accelerations and multipliers from forces f and right-hand sides g, or
  * solve_velocity or solve_position: changes of velocities or positions from right-hand sides g alone. */
-static int specialise_solve (const pw_generator *gen, const pw_elimination *ldl, pw_emitter *emitter,
-                             specialise_unknown unknown) {
+static int specialise_solve (pw_generator *gen, const pw_elimination *ldl, specialise_unknown unknown) {
   static const char *const name[] = { "solve", "solve_velocity", "solve_position" };
   const pw_system *s = gen->s;
   char text[24], next[24];
@@ -76,7 +75,7 @@ static int specialise_solve (const pw_generator *gen, const pw_elimination *ldl,
            "  (void)C, (void)J, (void)F, (void)g, (void)a;\n",
            name[unknown], unknown == SPECIALISE_ACCELERATION ? "const double *f, " : "",
            unknown == SPECIALISE_ACCELERATION ? ", double *lambda" : "");
-  pw_elimination_solve (ldl, emitter, right);
+  pw_elimination_solve (ldl, &gen->emitter, right);
   for (int j = 0; j + 1 < s->coords; j += 2)
     fprintf (gen->out, "  STORE_PAIR (a + %d, %s, %s);\n", j, pw_term_text (right[j], text),
              pw_term_text (right[j + 1], next));
@@ -89,15 +88,15 @@ static int specialise_solve (const pw_generator *gen, const pw_elimination *ldl,
 }
 
 /* Writes a function that factorises K with the first `rows` constraint equations; ldl serves specialise_solve. */
-static int specialise_factor (const pw_generator *gen, pw_elimination *ldl, pw_emitter *emitter, const pw_term *K,
-                              const unsigned char *length, const char *name, int rows) {
+static int specialise_factor (pw_generator *gen, pw_elimination *ldl, const pw_term *K, const unsigned char *length,
+                              const char *name, int rows) {
   unsigned char takes_part[SPECIALISE_ROWS + 1];
   for (int i = 0; i < gen->s->rows; i++) takes_part[i] = i < rows && pw_specialise_is_independent (gen, i);
   pw_stream text;
-  FILE *out = emitter->code = pw_stream_open (&text);
-  int status = out ? pw_elimination_open (ldl, gen->s, K, length, takes_part, emitter) : PW_RESOURCE;
+  FILE *out = gen->emitter.code = pw_stream_open (&text);
+  int status = out ? pw_elimination_open (ldl, gen->s, K, length, takes_part, &gen->emitter) : PW_RESOURCE;
   if (pw_stream_close (out, &text) != PW_OK) status = PW_RESOURCE;
-  emitter->code = gen->out;
+  gen->emitter.code = gen->out;
   if (status == PW_OK)
     fprintf (gen->out,
              "\nGUARDED %s (const double *M, const double *C, const double *J, double *F) {\n  GUARDS;\n"
@@ -144,24 +143,23 @@ static void specialise_product (const pw_generator *gen) {
 int pw_specialise_algebra (pw_generator *gen) {
   const pw_system *s = gen->s;
   pw_elimination all = { 0 }, position = { 0 };
-  pw_emitter emitter = { .prepare = pw_stream_open (&gen->prepare), .prepared = &gen->prepare.text, .code = gen->out };
+  gen->emitter =
+      (pw_emitter){ .prepare = pw_stream_open (&gen->prepare), .prepared = &gen->prepare.text, .code = gen->out };
   specialise_product (gen);
   pw_term *K = specialise_matrix (gen);
   unsigned char *length = specialise_lengths (gen);
-  int status = K && length && emitter.prepare ? specialise_factor (gen, &all, &emitter, K, length, "factor", s->rows)
-                                              : PW_RESOURCE;
-  if (status == PW_OK) status = specialise_solve (gen, &all, &emitter, SPECIALISE_ACCELERATION);
-  if (status == PW_OK) status = specialise_solve (gen, &all, &emitter, SPECIALISE_VELOCITY);
+  int status =
+      K && length && gen->emitter.prepare ? specialise_factor (gen, &all, K, length, "factor", s->rows) : PW_RESOURCE;
+  if (status == PW_OK) status = specialise_solve (gen, &all, SPECIALISE_ACCELERATION);
+  if (status == PW_OK) status = specialise_solve (gen, &all, SPECIALISE_VELOCITY);
   int alone = PW_OK; /* PW_RETRY if the holonomic equations alone do not determine the massless coordinates */
-  if (status == PW_OK) alone = specialise_factor (gen, &position, &emitter, K, length, "factor_position", s->holonomic);
+  if (status == PW_OK) alone = specialise_factor (gen, &position, K, length, "factor_position", s->holonomic);
   if (alone == PW_RESOURCE) status = PW_RESOURCE;
-  if (status == PW_OK)
-    status = specialise_solve (gen, alone == PW_OK ? &position : &all, &emitter, SPECIALISE_POSITION);
-  gen->constants = emitter.constants;
+  if (status == PW_OK) status = specialise_solve (gen, alone == PW_OK ? &position : &all, SPECIALISE_POSITION);
   fprintf (gen->out, "\nenum { FACTORS = %d };\n",
            1 + (all.factors > position.factors ? all.factors : position.factors));
   if (alone != PW_OK) fputs ("#define factor_position factor\n", gen->out);
-  if (pw_stream_close (emitter.prepare, &gen->prepare) != PW_OK) status = PW_RESOURCE;
+  if (pw_stream_close (gen->emitter.prepare, &gen->prepare) != PW_OK) status = PW_RESOURCE;
   pw_elimination_close (&all);
   pw_elimination_close (&position);
   free (K);

@@ -193,14 +193,14 @@ void pw_specialise_data (const pw_generator *gen) {
     data += s->batch[k].b.count * (int)(s->batch[k].kind->element / sizeof (double));
   }
   fprintf (gen->out, "%d };\nenum { BATCHES = %d, SIGNALS = %d, SIMPLE = %d, DATA = %d, FIXED = %d };\n", data,
-           s->batches, s->sources, specialise_is_simple (s), data + 4 * s->sources, gen->constants);
+           s->batches, s->sources, specialise_is_simple (s), data + 4 * s->sources, gen->emitter.constants);
   fputs ("static const unsigned char is_harmonic[] = { ", gen->out);
   for (int i = 0; i < s->sources; i++) fprintf (gen->out, "%d, ", s->source[i].signal.type == PW_HARMONIC);
   fputs ("0 };\n", gen->out);
   pw_specialise_list (gen->out, "DATUM", data + 4 * s->sources);
   pw_specialise_list (gen->out, "SIGNAL", 3 * s->sources);
   pw_specialise_list (gen->out, "ENTRY", gen->entries);
-  pw_specialise_list (gen->out, "FIXED", gen->constants);
+  pw_specialise_list (gen->out, "FIXED", gen->emitter.constants);
   pw_specialise_list (gen->out, "LEDGER", s->entries);
   pw_specialise_list (gen->out, "BATCH", s->batches + 1);
   pw_specialise_list (gen->out, "WATCH", (int)(sizeof (pw_scene_watch) / sizeof (double)));

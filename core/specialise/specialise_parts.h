@@ -20,7 +20,7 @@ typedef struct {
   pw_sparsity *sparsity; /* batches */
   int entries;           /* of J */
   pw_stream prepare;     /* statements of the generated function `prepare` */
-  int constants;         /* that they compute */
+  pw_emitter emitter;
 } pw_generator;
 
 /* "rolling_wheel", in the buffer, which is returned. */

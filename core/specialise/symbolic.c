@@ -64,10 +64,8 @@ pw_term pw_emit_difference (pw_emitter *emitter, pw_term a, pw_term b, pw_term c
     c = (pw_term){ PW_TERM_ONE, 1, "1", 1 };
   }
   int constant = emit_is_constant (a) && emit_is_constant (b) && emit_is_constant (c);
-  if (b.type == PW_TERM_ONE || c.type == PW_TERM_ONE)
-    snprintf (text, sizeof text, "%s", b.type == PW_TERM_ONE ? (c.type == PW_TERM_ONE ? "1" : c.name) : b.name);
-  else
-    snprintf (text, sizeof text, "%s * %s", b.name, c.name);
+  const char *left = b.type == PW_TERM_ONE ? "" : b.name, *right = c.type == PW_TERM_ONE && *left ? "" : c.name;
+  snprintf (text, sizeof text, "%s%s%s", left, *left && *right ? " * " : "", right);
   return emit_define (emitter, constant, a.sign, a.value - b.value * c.value, a.name,
                       b.sign * c.sign * a.sign > 0 ? '-' : '+', text);
 }
