@@ -133,8 +133,7 @@ static void elimination_pair (pw_elimination *ldl, pw_emitter *emitter, int c, i
   }
 }
 
-/* 1 if the entry of equation i in column j is large enough for a pivot, compared with the others there, at the initial
- * state. */
+/* 1 if the entry of equation i in column j can be a pivot: no other one is much larger at the initial state. */
 static int elimination_is_large (const pw_elimination *ldl, int i, int j) {
   double most = 0;
   for (int k = ldl->coordinates; k < ldl->n; k++)
@@ -261,9 +260,8 @@ void pw_elimination_close (pw_elimination *ldl) {
 
 /* ---- Solution ---- */
 
-/* Divides by the m-th pivot and eliminates its unknowns from the later rows.  With a pivot [ 0 d ; d 0 ] of a
- * coordinate p and an equation r, row p determines the multiplier of r, and row r the coordinate: their entries of y
- * are exchanged. */
+/* Divides by the m-th pivot, and eliminates its unknowns from the later rows.  Row p of a pivot [ 0 d ; d 0 ]
+ * determines the multiplier of equation r, and row r the coordinate p: their entries of y are exchanged. */
 static void elimination_forward (const pw_elimination *ldl, pw_emitter *emitter, pw_term *y, int m) {
   int p = ldl->order[m], r = ldl->partner[m];
   if (r >= 0) {

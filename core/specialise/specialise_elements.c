@@ -108,8 +108,7 @@ static void specialise_forces (const pw_generator *gen) {
   fputs ("}\n", gen->out);
 }
 
-/* Writes the function of the ledger's powers, as in pw_evaluate_ledger.  A constraint J v = eta without a function
- * `power` has the power -lambda^T eta. */
+/* Writes the function of the ledger's powers (pw_evaluate_ledger); that of a constraint is -lambda^T eta by default. */
 static void specialise_ledger (const pw_generator *gen) {
   const pw_system *s = gen->s;
   char more[40];
@@ -182,8 +181,7 @@ int pw_system_has_lanes (const pw_system *s) {
   return s->rows <= SPECIALISE_ROWS && s->state_dependent == 0;
 }
 
-/* A run's data, as doubles: the prepared elements of all batches, then a pw_harmonic, or a constant in its place, for
- * each signal. */
+/* A run's data, as doubles: the elements of all batches, then for each signal a pw_harmonic, or a constant instead. */
 void pw_specialise_data (const pw_generator *gen) {
   const pw_system *s = gen->s;
   int data = 0;

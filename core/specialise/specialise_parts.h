@@ -51,8 +51,7 @@ void pw_specialise_list (FILE *out, const char *name, int n);
 /* Writes the tables of the data that code for several runs copies from each. */
 void pw_specialise_data (const pw_generator *gen);
 
-/* Writes products with J, factorisations and solutions, and collects the statements of `prepare`.  PW_RETRY if there is
- * no fixed order of elimination; PW_RESOURCE. */
+/* Writes products with J, factorisations and solutions; fills gen->prepare.  Returns as pw_elimination_open. */
 int pw_specialise_algebra (pw_generator *gen);
 
 #endif

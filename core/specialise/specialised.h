@@ -1,5 +1,4 @@
-/* The interface between a run and the specialised code of its scene.  Generated code contains a copy of this header:
- * raise PW_SCENE_ABI with every change. */
+/* The interface between a run and specialised code, which has a copy of this header: raise PW_SCENE_ABI if it changes. */
 #ifndef PW_SPECIALISED_H
 #define PW_SPECIALISED_H
 
@@ -70,8 +69,7 @@ typedef struct {
   double position, g, velocity, jv; /* largest residuals of the steps, as in pw_scene */
 } pw_scene_watch;
 
-/* Consecutive steps of size h of a Runge-Kutta method, each followed by the watchdog and the ledger.  The arrays belong
- * to the run. */
+/* Consecutive steps of size h of a Runge-Kutta method, with watchdog and ledger.  The arrays belong to the run. */
 typedef struct pw_scene_steps {
   int count, done; /* steps to take; taken */
   int project;     /* 1: onto the constraints after each step */
@@ -118,8 +116,7 @@ typedef struct pw_specialised {
 struct pw_specialised_lanes {
   int abi, lanes;
   unsigned long shape, size; /* size: of memory, in bytes */
-  /* As pw_specialised.steps, for `lanes` runs with the same step size and tableau.  memory: scratch, aligned to 64
-   * bytes. */
+  /* The same for `lanes` runs with the same step size and tableau; memory: scratch, aligned to 64 bytes. */
   void (*steps) (pw_scene *const *s, pw_scene_steps *const *x, void *memory);
 };
 

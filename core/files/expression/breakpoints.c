@@ -6,8 +6,7 @@
  * Cloud 2009, Introduction to Interval Analysis, chapter 8).  If an operation differs between the ends of such an
  * interval, bisection finds the two adjacent floating-point numbers between which it changes: steps must end there.
  * Changes that cancel within the least width are ignored.  So are those of noisy operations, which change too often
- * for steps to end there: by round-off of equal numbers, or too fast for any step.  While two compared numbers stay
- * equal, the least width grows. */
+ * for steps to end there.  While two compared numbers stay equal, the least width grows. */
 #include <math.h>
 #include "expression_parts.h"
 #include "pinwheel.h"

@@ -103,8 +103,7 @@ typedef struct {
   int varies;      /* 1: depends on the variable */
 } jet;
 
-/* The chain rule, with the value f.  Operands that do not vary contribute nothing, even where a partial derivative is
- * infinite. */
+/* The chain rule; f: the value.  Constant operands contribute 0, even where a partial derivative is infinite. */
 static jet jet_chain (double f, const pw_partials *s, const jet *x, const jet *y) {
   jet r = { f, 0, 0, x->varies | y->varies };
   if (x->varies) r.d += s->x * x->d, r.dd += s->xx * x->d * x->d + s->x * x->dd;

@@ -56,13 +56,11 @@ typedef struct {
 /* Size of an expression in bytes, by which it may be copied. */
 size_t pw_expression_size (const pw_expression *expression);
 
-/* Reads an expression of a scope and variables, names ending with NULL, into an arena.  PW_INPUT, with the error;
- * PW_RESOURCE. */
+/* Reads an expression of a scope and variables, which end with NULL, into an arena.  PW_INPUT, error; PW_RESOURCE. */
 int pw_expression_read (const pw_scope *s, const char *const *variable, const char *text, pw_arena *arena,
                         const pw_expression **expression, pw_expression_error *error);
 
-/* The value of an expression without variables, which may be non-finite; the scope may be NULL.  Returns as
- * pw_expression_read. */
+/* The same of an expression without variables: its value, which may be non-finite.  The scope may be NULL. */
 int pw_expression_constant (const pw_scope *s, const char *text, double *value, pw_expression_error *error);
 
 /* ---- Values ---- */

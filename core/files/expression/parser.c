@@ -124,8 +124,7 @@ static parser_part parser_leaf (parser *p, int op, int index, double value) {
   return part;
 }
 
-/* Appends an operation on `part`, its first operand, and on others, which depend on `depends`; a constant result is
- * replaced by its value. */
+/* Appends an operation on `part` and operands that depend on `depends`; a constant result is replaced by its value. */
 static parser_part parser_operation (parser *p, parser_part part, int depends, int op, int index) {
   int may_jump = 0;
   part.depends |= depends;

@@ -148,8 +148,7 @@ const char *const *pw_scene_options (int lanes) {
   return known[i].option;
 }
 
-/* Blocks SIGINT (Ctrl-C, which also reaches the compiler), SIGTERM and SIGHUP, until the caller has removed its files
- * and restores the signal mask `before`. */
+/* Blocks SIGINT (Ctrl-C reaches the compiler, too), SIGTERM and SIGHUP; the mask `before` restores them. */
 static void build_defer (sigset_t *before) {
   sigset_t stop;
   sigemptyset (&stop);

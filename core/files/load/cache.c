@@ -30,8 +30,7 @@ static void cache_make (char *path) {
 
 typedef enum { CACHE_PARENT, CACHE_FOLDER } cache_role;
 
-/* What is wrong with a folder; NULL if only the user can write to it or, for CACHE_PARENT, if only the user or root can
- * rename and delete what it contains. */
+/* Why a folder is not safe, or NULL: others can write to it or, for CACHE_PARENT, rename or delete what it contains. */
 static const char *cache_defect (const char *path, cache_role role) {
   struct stat info;
   if ((role == CACHE_FOLDER ? lstat : stat) (path, &info) != 0) return strerror (errno);

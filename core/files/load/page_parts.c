@@ -1,5 +1,4 @@
-/* The files that an interactive page contains: the engine as WebAssembly; of a text model, its text, tree and
- * tables. */
+/* The files in an interactive page: the engine as WebAssembly; for a text model also its text, tree and tables. */
 #include <stdlib.h>
 #include <string.h>
 #include "files.h"

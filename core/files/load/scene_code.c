@@ -34,8 +34,7 @@ typedef struct {
 
 /* ---- Identity ---- */
 
-/* Finds the file of a command, on PATH unless its name has a slash; an empty entry of PATH is the current folder.  1,
- * and its `info`; 0 if there is none. */
+/* Finds a command, on PATH unless it has a slash; an empty entry of PATH is the current folder.  0 if there is none. */
 static int code_find_program (const char *word, struct stat *info) {
   if (strchr (word, '/')) return stat (word, info) == 0;
   for (const char *entry = getenv ("PATH"), *end; entry; entry = *end ? end + 1 : NULL) {
@@ -198,8 +197,7 @@ static FILE *code_lock (const code_job *x) {
   return f;
 }
 
-/* Compiles into the cache.  PW_METHOD if the text does not compile; PW_RETRY after any other failure: the cache may be
- * the cause. */
+/* Compiles into the cache.  PW_METHOD if the text does not compile, else PW_RETRY: the cache may be the cause. */
 static int code_compile_cached (code_job *x, pw_error *error) {
   pw_error cause = { 0 };
   FILE *source = code_lock (x);

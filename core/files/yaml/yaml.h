@@ -115,8 +115,8 @@ int pw_yaml_number (const pw_reader *r, const pw_node *node, const char *label, 
 int pw_yaml_pair (const pw_reader *r, const pw_node *node, const char *label, const char *items, double *value);
 int pw_yaml_choice (const pw_reader *r, const pw_node *node, const char *label, const char *const *choices, int *value);
 
-/* 1 if an expression depends on the time t or a state, BODY.phi; *at: the offset of its first name. */
-int pw_yaml_varies (const char *text, size_t *at);
+/* The first name of the time t or of a state, BODY.phi, in an expression, or NULL. */
+const char *pw_yaml_find_variable (const char *text);
 
 /* Converts an offset in a scalar's text to an offset in the source. */
 size_t pw_yaml_offset (const pw_yaml *y, const pw_node *node, size_t offset);

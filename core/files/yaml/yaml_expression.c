@@ -199,8 +199,7 @@ static int time_expression (reading *e, int i) {
   return jump ? PW_OK : pw_yaml_no_memory (r);
 }
 
-/* Compares the given derivative i, 1 or 2, with that of the highest lower one given, at some times, to 1e-6 of the
- * largest. */
+/* Compares derivative i, 1 or 2, which is given, with that computed from the last one given before, at some times. */
 static int time_check (const reading *e, int i, const char *name) {
   static const double time[] = { 0.3, 1.7, 4.1 }; /* [s], arbitrary */
   int last = e->f->expression[i - 1] ? i - 1 : 0, n = i - last;
