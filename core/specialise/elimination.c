@@ -8,9 +8,9 @@ static const pw_term elimination_one = { PW_TERM_ONE, 1, "1", 1 };
 
 #define AT(p, q) ldl->K[(size_t)(p) * (size_t)ldl->n + (size_t)(q)]
 #define FACTOR(p, q) ldl->L[(size_t)(p) * (size_t)ldl->n + (size_t)(q)]
-#define FIRST(p, q) ldl->first[(size_t)(p) * (size_t)ldl->n + (size_t)(q)]
+#define ORIGINAL(p, q) ldl->original[(size_t)(p) * (size_t)ldl->n + (size_t)(q)]
 
-/* Loops over the unknowns eliminated after the m-th one. */
+/* Loops over the unknowns eliminated after the m-th pivot. */
 #define EACH_LATER(i, m)           \
   for (int i = 0; i < ldl->n; i++) \
     if (ldl->step[i] > (m) && ldl->step[i] <= ldl->n)
@@ -31,7 +31,7 @@ static int elimination_degree (const pw_elimination *ldl, int p) {
   return degree;
 }
 
-/* A comment with the names of the unknowns. */
+/* Writes a comment with the names of unknown p and its partner, which may be -1. */
 static void elimination_comment (const pw_elimination *ldl, pw_emitter *emitter, int p, int partner) {
   char name[120];
   for (int k = 0, i = p; k < 1 + (partner >= 0); k++, i = partner) {
@@ -73,7 +73,7 @@ static void elimination_guard_column (const pw_elimination *ldl, pw_emitter *emi
   fprintf (emitter->code, "  GUARD (%s * %s > " ELIMINATION_COLUMN " * (", pivot.name, pivot.name);
   const char *plus = "";
   for (int i = ldl->coordinates; i < ldl->n; i++) {
-    pw_term now = AT (i, c), was = FIRST (i, c);
+    pw_term now = AT (i, c), was = ORIGINAL (i, c);
     for (int k = 0; k < 2; k++, now = was) {
       if (elimination_is_zero (now) || (k == 1 && strcmp (AT (i, c).name, was.name) == 0)) continue;
       fprintf (emitter->code, "%s%s * %s", plus, now.name, now.name);
@@ -96,18 +96,19 @@ static void elimination_update (pw_elimination *ldl, pw_emitter *emitter, int i,
  * p = vy.  Returns 1 if this equation is done, 0 if its entry for p is still to be subtracted. */
 static int elimination_constant_length (pw_elimination *ldl, pw_emitter *emitter, int i, int p) {
   if (i < ldl->coordinates || p >= 3 * ldl->s->bodies || p % 3 == 2) return 0;
-  int first = p - p % 3;
-  pw_term a = FIRST (i, first), b = FIRST (i, first + 1);
+  const int vx = p - p % 3;
+  pw_term a = ORIGINAL (i, vx), b = ORIGINAL (i, vx + 1);
   if (!ldl->length[(size_t)(i - ldl->coordinates) * (size_t)ldl->s->bodies + (size_t)(p / 3)]) return 0;
   if (a.type != PW_TERM_VARIABLE || b.type != PW_TERM_VARIABLE) return 0;
-  if (strcmp (a.name, AT (i, first).name) != 0 || strcmp (b.name, AT (i, first + 1).name) != 0) return 0;
-  if (p > first) return 1;
+  if (strcmp (a.name, AT (i, vx).name) != 0 || strcmp (b.name, AT (i, vx + 1).name) != 0) return 0;
+  if (p > vx) return 1;
   a.type = b.type = PW_TERM_CONSTANT;
   pw_term square = pw_emit_difference (emitter, pw_emit_product (emitter, a, a), pw_term_negative (b), b);
   AT (i, i) = pw_emit_difference (emitter, AT (i, i), square, ldl->inverse[p]);
   return 1;
 }
 
+/* Eliminates unknown p with a 1 x 1 pivot, whose reciprocal is `inverse`. */
 static void elimination_pivot (pw_elimination *ldl, pw_emitter *emitter, int p, pw_term inverse) {
   elimination_comment (ldl, emitter, p, -1);
   elimination_place (ldl, p, -1);
@@ -120,7 +121,7 @@ static void elimination_pivot (pw_elimination *ldl, pw_emitter *emitter, int p, 
         elimination_update (ldl, emitter, i, j, FACTOR (i, p), AT (j, p));
 }
 
-/* The pivot [ 0 p ; p 0 ] of a massless coordinate c and an equation r. */
+/* Eliminates a massless coordinate c and an equation r with the pivot [ 0 d ; d 0 ]. */
 static void elimination_pair (pw_elimination *ldl, pw_emitter *emitter, int c, int r) {
   elimination_comment (ldl, emitter, c, r);
   elimination_place (ldl, c, r);
@@ -172,27 +173,28 @@ static int elimination_next_row (const pw_elimination *ldl) {
  * and c - b^2 / a, whose reciprocals 1 / a and a / (a c - b^2) need not be computed one after the other. */
 static int elimination_rows (pw_elimination *ldl, pw_emitter *emitter) {
   const size_t n = (size_t)ldl->n;
-  pw_term *first = malloc ((2 * n + 1) * sizeof *first), *before_p = first + n; /* diagonals: at first, before p */
-  if (first == NULL) return PW_RESOURCE;
-  for (int i = 0; i < ldl->n; i++) first[i] = AT (i, i);
+  pw_term *diagonal = malloc ((2 * n + 1) * sizeof *diagonal); /* of K before the equations are eliminated */
+  pw_term *before_p = diagonal + n;                            /* that before p was */
+  if (diagonal == NULL) return PW_RESOURCE;
+  for (int i = 0; i < ldl->n; i++) diagonal[i] = AT (i, i);
   int status = PW_OK, p = -1; /* p: the equation eliminated last, if the next one may be its q */
   for (int q; status == PW_OK && (q = elimination_next_row (ldl)) >= 0;) {
     if (elimination_is_zero (AT (q, q))) {
       status = PW_RETRY;
     } else if (p < 0 || elimination_is_zero (AT (q, p))) {
       for (int i = 0; i < ldl->n; i++) before_p[i] = AT (i, i);
-      elimination_guard_row (emitter, pw_term_negative (AT (q, q)), pw_term_negative (first[q]));
+      elimination_guard_row (emitter, pw_term_negative (AT (q, q)), pw_term_negative (diagonal[q]));
       elimination_pivot (ldl, emitter, q, pw_emit_quotient (emitter, elimination_one, AT (q, q)));
       p = AT (q, q).type == PW_TERM_VARIABLE ? q : -1;
     } else {
       pw_term a = AT (p, p), b = AT (q, p), ac = pw_emit_product (emitter, a, before_p[q]);
       pw_term det = pw_emit_difference (emitter, ac, b, b);
-      elimination_guard_row (emitter, det, pw_emit_product (emitter, a, first[q]));
+      elimination_guard_row (emitter, det, pw_emit_product (emitter, a, diagonal[q]));
       elimination_pivot (ldl, emitter, q, pw_emit_quotient (emitter, a, det));
       p = -1;
     }
   }
-  free (first);
+  free (diagonal);
   return status;
 }
 
@@ -237,7 +239,8 @@ static int elimination_allocate (pw_elimination *ldl, const pw_term *K) {
 
 int pw_elimination_open (pw_elimination *ldl, const pw_system *s, const pw_term *K, const unsigned char *length,
                          const unsigned char *takes_part, pw_emitter *emitter) {
-  *ldl = (pw_elimination){ .s = s, .first = K, .length = length, .coordinates = s->coords, .n = s->coords + s->rows };
+  *ldl =
+      (pw_elimination){ .s = s, .original = K, .length = length, .coordinates = s->coords, .n = s->coords + s->rows };
   if (elimination_allocate (ldl, K) != PW_OK) return PW_RESOURCE;
   for (int i = 0; i < ldl->n; i++) ldl->step[i] = i < s->coords || takes_part[i - s->coords] ? ldl->n : ldl->n + 1;
   for (int c, r; elimination_next_pair (ldl, s->mass, &c, &r);) {

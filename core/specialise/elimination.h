@@ -16,7 +16,7 @@ typedef struct {
   int *step;                   /* n: position in the order; n: not eliminated yet; n + 1: takes no part */
   int pivots;                  /* entries of `order` so far */
   int factors;                 /* entries of F, an array of the generated code */
-  const pw_term *first;        /* n x n: K before the elimination */
+  const pw_term *original;     /* n x n: K before the elimination */
   const unsigned char *length; /* rows x bodies: see pw_elimination_open */
 } pw_elimination;
 

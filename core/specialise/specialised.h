@@ -1,4 +1,4 @@
-/* The interface between a run and specialised code, which has a copy of this header: raise PW_SCENE_ABI if it changes. */
+/* The interface between a run and specialised code, which has a copy of it: raise PW_SCENE_ABI if it changes. */
 #ifndef PW_SPECIALISED_H
 #define PW_SPECIALISED_H
 

@@ -139,7 +139,7 @@ static int yaml_head (pw_yaml *y, const pw_reader *r) {
   yaml_run (y, r, v[2]);
   const pw_node *parameters = v[3];
   y->let = v[4], y->bodies = v[5], y->elements = v[6], y->reference = v[7];
-  for (int i = 3; key[i]; i++)
+  for (int i = 3; key[i]; i++) /* from "parameters" on: lists and maps */
     if (v[i] && v[i]->count > PW_YAML_MAX_ITEMS)
       pw_yaml_fail (r, v[i]->at, "%s: %d entries; a model may have %d", key[i], v[i]->count, PW_YAML_MAX_ITEMS);
   size_t count = (size_t)(parameters ? parameters->count : 0) + (size_t)(y->let ? y->let->count : 0);
