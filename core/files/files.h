@@ -23,11 +23,12 @@ typedef struct {
   char unread[160];  /* folders of PINWHEEL_MODELS that cannot be searched: "/nowhere (No such file or directory)" */
 } pw_search;
 
-/* Searches every folder of the search path.  Close in every case.  PW_OK or PW_RESOURCE, as below. */
+/* Searches every folder of the search path.  Close in every case.  PW_OK or PW_RESOURCE. */
 int pw_search_open (pw_search *s, pw_error *error);
 void pw_search_close (pw_search *s);
 
-/* Find this library's pinwheel.h, a file of the engine of interactive pages; *path: malloced, NULL if there is none. */
+/* Find the pinwheel.h of this library, a file of the engine of interactive pages; *path: malloced, or NULL if there is
+ * none.  PW_OK or PW_RESOURCE. */
 int pw_search_header (char **path, pw_error *error);
 int pw_search_page_file (const char *file, char **path, pw_error *error);
 

@@ -187,7 +187,7 @@ char *pw_output_path (const char *path, pw_error *error);
 /* Opens a file for reading and writing, creates it if there is none, and locks it until the descriptor that is returned
  * is closed.  A symbolic link is not followed.  -1 and PW_RESOURCE, also if another process has it. */
 int pw_lock_path (const char *path, pw_error *error);
-/* Locks a folder until the descriptor that is returned is closed.  -1 and PW_RESOURCE, also if another process has
+/* Locks a folder until the descriptor returned is closed.  -1 and PW_RESOURCE, also if another process has locked
  * it. */
 int pw_lock_folder (const char *path, pw_error *error);
 
@@ -252,7 +252,7 @@ int pw_npz_end (pw_npz *z, pw_error *error);
 /* A table of samples: states, contact points, reactions (-lambda), scaled residuals, and energies if the run keeps a
  * ledger.  As CSV it has a header line "t [s],frame.x [m],...", then a line per sample with 17 digits; non-finite is
  * nan.  If the output is named .npz, it is a NumPy archive with a vector per column, named without unit, which is
- * written when the table is closed.  Errors: PW_RESOURCE; PW_METHOD if a signal fails; PW_INPUT if a .npz continues. */
+ * written when the table is closed; it cannot continue a file (PW_INPUT).  PW_RESOURCE; PW_METHOD if a signal fails. */
 typedef struct pw_csv pw_csv;
 pw_csv *pw_csv_open (const pw_system *s, int ledger, pw_output *o, pw_error *error);
 int pw_csv_write (pw_csv *c, const pw_system *s, const pw_sample *sample, pw_error *error);

@@ -3,8 +3,6 @@
 #include <stdlib.h>
 #include "specialise_parts.h"
 
-/* ---- Linear algebra ---- */
-
 /* The entry of J in row r and column c of element e of batch k. */
 static pw_term specialise_entry (const pw_generator *gen, int k, int e, int r, int c) {
   const pw_element_batch *batch = &gen->s->batch[k];

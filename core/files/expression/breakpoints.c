@@ -35,7 +35,7 @@ typedef struct {
 /* Evaluates the discrete part of all operations at time t (pw_expression_run_jet). */
 static void search_evaluate (const search *s, double t, double *discrete) {
   double variable[PW_EXPRESSION_VARIABLES] = { t }, u[3];
-  pw_expression_run_jet (s->expression->code, s->expression->codes, variable, PW_EXPRESSION_TIME, u, discrete);
+  pw_expression_run_jet (s->expression, variable, PW_EXPRESSION_TIME, u, discrete);
 }
 
 static int search_changed (double a, double b) {

@@ -254,10 +254,10 @@ static jet jet_binary (const pw_expression_code *c, const jet *x, const jet *y, 
   return (jet){ .v = *discrete };
 }
 
-void pw_expression_run_jet (const pw_expression_code *code, int codes, const double *variable, int by, double u[3],
+void pw_expression_run_jet (const pw_expression *expression, const double *variable, int by, double u[3],
                             double *discrete) {
   jet stack[PW_EXPRESSION_STACK], *top = stack;
-  for (const pw_expression_code *c = code, *end = code + codes; c < end; c++) {
+  for (const pw_expression_code *c = expression->code, *end = c + expression->codes; c < end; c++) {
     int operands = pw_expression_operands (c->op);
     double change = 0;
     top -= operands;
@@ -270,20 +270,20 @@ void pw_expression_run_jet (const pw_expression_code *code, int codes, const dou
       *top = (jet){ .v = pw_expression_apply (c, top[0].v, top[operands - 1].v) };
     else
       *top = operands == 1 ? jet_unary (c, top, &change) : jet_binary (c, top, top + 1, &change);
-    if (discrete) discrete[c - code] = change;
+    if (discrete) discrete[c - expression->code] = change;
     top++;
   }
   u[0] = top[-1].v, u[1] = top[-1].d, u[2] = top[-1].dd;
 }
 
 void pw_expression_derivatives (const pw_expression *expression, const double *variable, int by, double u[3]) {
-  pw_expression_run_jet (expression->code, expression->codes, variable, by, u, NULL);
+  pw_expression_run_jet (expression, variable, by, u, NULL);
 }
 
 double pw_expression_value (const pw_expression *expression, const double *variable) {
   int may_jump = 0;
   double u[3], value = pw_expression_run (expression->code, expression->codes, variable, &may_jump);
   if (!may_jump || !expression->breaks) return value;
-  pw_expression_run_jet (expression->code, expression->codes, variable, PW_EXPRESSION_TIME, u, NULL);
+  pw_expression_derivatives (expression, variable, PW_EXPRESSION_TIME, u);
   return u[0];
 }

@@ -124,7 +124,7 @@ double pw_expression_apply (const pw_expression_code *c, double left, double rig
 
 /* The value, first and second derivative with respect to variable `by`.  discrete, unless NULL, receives for each
  * operation the part of its value that changes only at breakpoints: of floor the value, of abs the sign. */
-void pw_expression_run_jet (const pw_expression_code *code, int codes, const double *variable, int by, double u[3],
+void pw_expression_run_jet (const pw_expression *expression, const double *variable, int by, double u[3],
                             double *discrete);
 
 /* ---- Enclosures (range.c) ---- */

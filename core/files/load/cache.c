@@ -30,7 +30,7 @@ static void cache_make (char *path) {
 
 typedef enum { CACHE_PARENT, CACHE_FOLDER } cache_role;
 
-/* Why a folder is not safe, or NULL: others can write to it or, for CACHE_PARENT, rename or delete what it contains. */
+/* Why a folder cannot be used, or NULL: others can write to it or, if it is the parent, replace what it contains. */
 static const char *cache_defect (const char *path, cache_role role) {
   struct stat info;
   if ((role == CACHE_FOLDER ? lstat : stat) (path, &info) != 0) return strerror (errno);
@@ -54,8 +54,6 @@ char *pw_cache_folder (char *notice, size_t size) {
   free (parent);
   return path;
 }
-
-/* ---- Size ---- */
 
 /* The size of all files [bytes]; *oldest: the path of the least recently used one, malloced, or NULL. */
 static long long cache_size (const char *folder, char **oldest) {

@@ -2,7 +2,7 @@
  *
  * The separator is the first of , ; and tab that the first line contains outside quotes.  A cell in double quotes may
  * contain it, and "" for a quote (RFC 4180), but no line end.  A first line without numbers names the columns, "NAME"
- * or "NAME [unit]"; columns are converted to the unit requested.  Blank lines and lines with # first are skipped. */
+ * or "NAME [unit]"; columns are converted to the unit requested.  Blank lines and comments (#) are skipped. */
 #include <math.h>
 #include <stdarg.h>
 #include <stdlib.h>

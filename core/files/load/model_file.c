@@ -9,7 +9,7 @@
 struct pw_file {
   char *name, *path; /* the name without its ending; the path with links resolved */
   void *handle;      /* of dlopen; NULL for a text model */
-  pw_yaml *yaml;     /* NULL for others */
+  pw_yaml *yaml;     /* the text model; NULL for a plug-in */
   size_t max_bytes;  /* of a text model */
   const pw_plugin_table *table;
 };
@@ -56,8 +56,7 @@ static int model_is_cpp (const char *name) {
 
 /* Opens the file at f->path, which exists; `shown` is its path for messages. */
 static int model_open_path (pw_file *f, const char *shown, pw_error *error) {
-  const char *base = strrchr (f->path, '/');
-  base = base ? base + 1 : f->path;
+  const char *base = strrchr (f->path, '/') + 1; /* the path is absolute */
   int ending = model_ending (base);
   if (model_is_cpp (base))
     return pw_fail (error, PW_INPUT,

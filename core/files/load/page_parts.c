@@ -28,8 +28,6 @@ static int page_read (pw_page *p, const char *name, const char *path, pw_error *
   return status;
 }
 
-/* ---- The engine ---- */
-
 static int page_use_engine (void *context, const char *object, pw_error *error) {
   return page_read (context, "engine", object, error);
 }
@@ -90,8 +88,6 @@ static int page_text (pw_page *p, const pw_file *f, const pw_yaml *y, pw_error *
   if (status == PW_OK) status = pw_file_tables (f, page_table, &x);
   return status == PW_OK ? PW_OK : pw_fail (error, status, "out of memory"); /* unless the reason is recorded */
 }
-
-/* ---- The page ---- */
 
 int pw_page_open (pw_page *p, const pw_file *f, pw_error *error) {
   *p = (pw_page){ .files = 0 };

@@ -126,8 +126,8 @@ static int location_is_null_device (const struct stat *info) {
 
 /* Whether writing `a` affects `b`: the same file, a temporary file, or a file written into a folder. */
 static int location_conflicts (const location_use *a, const location_use *b) {
-  static const char *const temporary[] = { ".part", ".part.old", ".sorted", ".next",
-                                           NULL }; /* of outputs, sorted tables, checkpoints */
+  /* Endings of temporary files: of outputs, of sorted tables, of checkpoints. */
+  static const char *const temporary[] = { ".part", ".part.old", ".sorted", ".next", NULL };
   const struct stat *info = &a->location.info;
   if (a->use->how == PW_READS || !a->known || !b->known) return 0;
   const char *name = location_base (b->location.path);
