@@ -32,7 +32,7 @@ static void json_string (FILE *f, const char *text) {
   fputc ('"', f);
 }
 
-/* 0 without a writer, which writes nothing. */
+/* Begins an item.  0 if j is NULL: nothing is written. */
 static int json_item (pw_json *j, const char *key) {
   if (j == NULL) return 0;
   if (j->items++ > 0) fputc (',', j->f);

@@ -8,7 +8,7 @@
 #include <unistd.h>
 #include "files.h"
 
-enum { LOCK_TRIES = 100 }; /* retries when another process has just released the file */
+enum { LOCK_TRIES = 100 }; /* when other processes create and remove the file at the same time */
 
 /* 0 or an errno value.  File systems without locks give no protection. */
 static int lock_acquire (int file) {

@@ -14,10 +14,10 @@ struct pw_output {
   char *path;    /* as the user knows it */
   char *real;    /* of the file itself, links followed */
   char *part;    /* its temporary name; NULL: written directly */
-  char *old;     /* name of its predecessor while several files are renamed */
+  char *old;     /* second name of the file that it replaces, while several are renamed */
   int file;      /* keeps the temporary file locked; -1: written directly */
-  int folder;    /* that contains it; -1: written directly */
-  int code;      /* errno of the first failed write */
+  int folder;    /* that contains it; -1: written directly, or the folder is not readable */
+  int code;      /* errno of the first failed write; -1: unknown; 0: none has failed */
   int continued; /* 1: continues a file that is not empty */
   int discard;   /* 1: the temporary file is removed unless the output is finished */
 };
@@ -203,7 +203,7 @@ static int output_sync (pw_output *o) {
   return errno ? errno : -1;
 }
 
-/* Closes the stream; standard output stays open. */
+/* Closes the stream, except standard output.  Returns `code` unless it is 0, else as output_sync. */
 static int output_close (pw_output *o, int code) {
   FILE *f = o->stream;
   o->stream = NULL;
@@ -331,7 +331,7 @@ static int output_is_marked (const pw_output *o, const pw_mark *mark) {
   return output_checksum (o->file, &now) == PW_OK && now.check == mark->check;
 }
 
-/* A process killed just after completing its table leaves it under its final name. */
+/* Takes a table under its final name, which a process killed just after completing it has left. */
 static int output_restore_part (pw_output *o, const pw_mark *mark) {
   int file = pw_lock_file (o->real, PW_LOCK_EXISTING);
   if (file < 0) return errno;
