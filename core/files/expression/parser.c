@@ -60,18 +60,16 @@ typedef struct {
   int condition; /* 1: its value is 1 or 0 */
 } parser_part;
 
-static const parser_part parser_nothing = { 0 };
-
 /* Records an error at an offset, unless there is one already.  Returns an empty part for the caller to return. */
 PW_PRINTF (3, 4) static parser_part parser_fail (parser *p, size_t at, const char *format, ...) {
-  if (p->status != PW_OK) return parser_nothing;
+  if (p->status != PW_OK) return (parser_part){ 0 };
   p->status = PW_INPUT;
   p->error->at = at;
   va_list arguments;
   va_start (arguments, format);
   vsnprintf (p->error->text, sizeof p->error->text, format, arguments);
   va_end (arguments);
-  return parser_nothing;
+  return (parser_part){ 0 };
 }
 
 static void parser_next (parser *p) {
@@ -177,7 +175,7 @@ static parser_part parser_unexpected (parser *p, char open, size_t at) {
 /* Reports that no operand begins here. */
 static parser_part parser_missing (parser *p) {
   char last[PW_EXPRESSION_NAME];
-  if (p->status != PW_OK) return parser_nothing;
+  if (p->status != PW_OK) return (parser_part){ 0 };
   snprintf (last, sizeof last, "%.*s", (int)(p->previous_end - p->previous), p->text + p->previous);
   if (p->type == 0 && p->previous_end == 0) return parser_fail (p, 0, "an expression is missing");
   if (p->type == 0 || (p->type == ')' && p->previous_end))
@@ -239,7 +237,7 @@ static parser_part parser_call (parser *p, int index) {
 
 static parser_part parser_group (parser *p) {
   size_t open = p->at;
-  if (!parser_enter (p)) return parser_nothing;
+  if (!parser_enter (p)) return (parser_part){ 0 };
   parser_next (p);
   parser_part part = parser_choice (p);
   p->depth--;
@@ -260,7 +258,7 @@ static parser_part parser_number (parser *p) {
 
 static parser_part parser_operand (parser *p) {
   char name[PW_EXPRESSION_NAME];
-  if (p->status != PW_OK) return parser_nothing;
+  if (p->status != PW_OK) return (parser_part){ 0 };
   if (p->type == '0') return parser_number (p);
   if (p->type == '(') return parser_group (p);
   if (p->type != 'n') return parser_missing (p);

@@ -47,21 +47,15 @@ static int search_anchor_folder (search_anchor anchor, char **folder, pw_error *
 
 /* Folders relative to each anchor. */
 typedef const char *const search_folders[SEARCH_ANCHORS][3];
+enum { SEARCH_FOLDERS = 3 * SEARCH_ANCHORS };
 
-/* Calls `visit` with each of these folders, which need not exist, until it fails. */
-static int search_visit (search_folders where, int (*visit) (void *context, const char *folder, pw_error *error),
-                         void *context, pw_error *error) {
-  int status = PW_OK;
-  for (search_anchor anchor = 0; anchor < SEARCH_ANCHORS && status == PW_OK; anchor++) {
-    char *parent;
-    status = search_anchor_folder (anchor, &parent, error);
-    for (int i = 0; parent && status == PW_OK && i < 3; i++) {
-      char *folder = pw_path_join (parent, where[anchor][i], "");
-      status = folder ? visit (context, folder, error) : search_no_memory (error);
-      free (folder);
-    }
-    free (parent);
-  }
+/* Stores the i-th of these folders, which need not exist, malloced; NULL if its anchor is unknown. */
+static int search_place (search_folders where, int i, char **folder, pw_error *error) {
+  char *anchor;
+  int status = search_anchor_folder ((search_anchor)(i / 3), &anchor, error);
+  *folder = anchor ? pw_path_join (anchor, where[i / 3][i % 3], "") : NULL;
+  if (anchor && *folder == NULL) status = search_no_memory (error);
+  free (anchor);
   return status;
 }
 
@@ -108,8 +102,7 @@ static int search_add_folder (pw_search *s, const char *real) {
 }
 
 /* Adds the models in a folder; skips missing and inaccessible folders, as shells do with PATH. */
-static int search_folder (void *context, const char *folder, pw_error *error) {
-  pw_search *s = context;
+static int search_folder (pw_search *s, const char *folder, pw_error *error) {
   char *real = realpath (folder, NULL);
   if (real == NULL && errno == ENOMEM) return search_no_memory (error);
   int is_new = real && search_add_folder (s, real);
@@ -158,7 +151,12 @@ int pw_search_open (pw_search *s, pw_error *error) {
                                         { "models", "../models", "pinwheel/models" } };
   *s = (pw_search){ .count = 0 };
   int status = search_environment (s, error);
-  if (status == PW_OK) status = search_visit (where, search_folder, s, error);
+  for (int i = 0; i < SEARCH_FOLDERS && status == PW_OK; i++) {
+    char *folder;
+    status = search_place (where, i, &folder, error);
+    if (folder) status = search_folder (s, folder, error);
+    free (folder);
+  }
   if (s->count > 1) qsort (s->found, (size_t)s->count, sizeof *s->found, search_order);
   return status;
 }
@@ -170,26 +168,17 @@ void pw_search_close (pw_search *s) {
 
 /* ---- Other files ---- */
 
-typedef struct {
-  const char *file;
-  char *path; /* of the first one that can be read, or NULL */
-} search_file;
-
-static int search_visit_file (void *context, const char *folder, pw_error *error) {
-  search_file *x = context;
-  char *path = x->path ? NULL : pw_path_join (folder, x->file, "");
-  if (x->path == NULL && path == NULL) return search_no_memory (error);
-  if (path && access (path, R_OK) == 0)
-    x->path = path;
-  else
-    free (path);
-  return PW_OK;
-}
-
+/* Stores the path of the first of the files of this name that can be read, malloced; NULL if there is none. */
 static int search_find (search_folders where, const char *file, char **path, pw_error *error) {
-  search_file x = { file, NULL };
-  int status = search_visit (where, search_visit_file, &x, error);
-  *path = x.path;
+  int status = PW_OK;
+  *path = NULL;
+  for (int i = 0; i < SEARCH_FOLDERS && *path == NULL && status == PW_OK; i++) {
+    char *folder;
+    status = search_place (where, i, &folder, error);
+    if (folder && (*path = pw_path_join (folder, file, "")) == NULL) status = search_no_memory (error);
+    if (*path && access (*path, R_OK) != 0) free (*path), *path = NULL;
+    free (folder);
+  }
   return status;
 }
 
