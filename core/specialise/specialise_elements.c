@@ -34,7 +34,8 @@ static void specialise_batch (const pw_generator *gen, int k, int e, const char 
   if (batch->kind->internal)
     fprintf (gen->out, ", .q = q + %d, .v = v + %d", batch->internal + e * batch->kind->internal,
              batch->internal + e * batch->kind->internal);
-  if (batch->kind->signals) fprintf (gen->out, ", .u = s->u + %d", 3 * pw_specialise_u (gen, k, e));
+  if (batch->kind->signals)
+    fprintf (gen->out, ", .u = s->u + %d", 3 * ((int)(batch->source - gen->s->source) + e * batch->kind->signals));
   fprintf (gen->out, "%s };\n", more);
 }
 

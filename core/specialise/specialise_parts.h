@@ -25,13 +25,10 @@ typedef struct {
 
 /* "rolling_wheel", in the buffer, which is returned. */
 char *pw_specialise_identifier (const pw_kind *kind, char *buffer, size_t size);
-/* The first entry of J and the first signal of an element. */
+/* The first entry of J of element e of batch k. */
 static inline int pw_specialise_J (const pw_generator *gen, int k, int e) {
   const pw_element_batch *batch = &gen->w->batch[k];
   return (int)(batch->J - gen->w->J) + e * batch->kind->rows * batch->b.cols;
-}
-static inline int pw_specialise_u (const pw_generator *gen, int k, int e) {
-  return (int)(gen->s->batch[k].source - gen->s->source) + e * gen->s->batch[k].kind->signals;
 }
 static inline int pw_specialise_is_independent (const pw_generator *gen, int row) {
   return gen->independent == NULL || gen->independent[row];

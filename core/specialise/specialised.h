@@ -95,7 +95,7 @@ typedef struct pw_scene_steps {
  * values that are not finite, a signal that failed.  The state from which they begin is unchanged then. */
 typedef struct pw_specialised {
   int abi, constants;               /* constants: entries of pw_scene.constant */
-  unsigned long shape;              /* pw_system_shape of the system */
+  unsigned long shape;              /* hash of the system's structure */
   const unsigned char *independent; /* rows: 0 for redundant equations, which have the multiplier 0 */
   int (*prepare) (pw_scene *s);     /* 1: a constant pivot is too small */
   /* Accelerations and multipliers at a state; configurations c (bodies + 1, with the ground); entries of J. */
@@ -115,12 +115,9 @@ typedef struct pw_specialised {
 /* The same code for several runs at once, in the lanes of vector registers. */
 struct pw_specialised_lanes {
   int abi, lanes;
-  unsigned long shape, size; /* size: of memory, in bytes */
+  unsigned long shape, size; /* as in pw_specialised; bytes of `memory` */
   /* The same for `lanes` runs with the same step size and tableau; memory: scratch, aligned to 64 bytes. */
   void (*steps) (pw_scene *const *s, pw_scene_steps *const *x, void *memory);
 };
-
-/* Hash of what the generated code depends on besides the library's version. */
-unsigned long pw_system_shape (const pw_system *s);
 
 #endif
