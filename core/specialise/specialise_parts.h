@@ -15,11 +15,11 @@ enum {
 typedef struct {
   const pw_system *s;
   const unsigned char *independent; /* as in pw_system_source */
-  FILE *out;
-  pw_workspace *w;       /* at the initial state */
-  pw_sparsity *sparsity; /* batches */
-  int entries;           /* of J */
-  pw_stream prepare;     /* statements of the generated function `prepare` */
+  FILE *out;                        /* the generated code */
+  pw_workspace *w;                  /* at the initial state */
+  pw_sparsity *sparsity;            /* batches */
+  int entries;                      /* of J */
+  pw_stream prepare;                /* statements of the generated function `prepare` */
   pw_emitter emitter;
 } pw_generator;
 

@@ -18,7 +18,7 @@ typedef struct {
 typedef struct {
   FILE *prepare, *code;     /* those that compute constants; the others, of the function being written */
   char *const *prepared;    /* the text of `prepare`, up to date after fflush */
-  int constants, variables; /* numbers of C[0], C[1], ... and of x0, x1, ... so far */
+  int constants, variables; /* how many C[0], C[1], ... and x0, x1, ... there are so far */
 } pw_emitter;
 
 static inline pw_term pw_term_zero (void) {
