@@ -27,22 +27,22 @@ typedef struct {
 int pw_search_open (pw_search *s, pw_error *error);
 void pw_search_close (pw_search *s);
 
-/* Finds the pinwheel.h that belongs to this library, or a file of the engine of interactive pages; *path is malloced,
- * NULL if there is none.  PW_OK or PW_RESOURCE. */
+/* Find the pinwheel.h of this library, a file of the engine of interactive pages; *path: malloced, or NULL if there is
+ * none.  PW_OK or PW_RESOURCE. */
 int pw_search_header (char **path, pw_error *error);
 int pw_search_page_file (const char *file, char **path, pw_error *error);
 
-/* Whether a name ends in ".so" or the like, with at least one character before it. */
+/* Whether a name has an ending such as ".so", after at least one character. */
 int pw_ends_with (const char *name, const char *ending);
 
 /* ---- Model files in C (build.c) ---- */
 
-/* What is done with a compiled object, which is deleted afterwards. */
+/* What is done with the compiled object at a path; it is deleted afterwards. */
 typedef int pw_object_user (void *context, const char *object, pw_error *error);
 
-/* Compiles a C file in a private temporary folder to a shared object or, unless `engine` is NULL, to WebAssembly linked
- * with that object file; calls `use` with the result and removes it.  PW_INPUT if it does not compile or there is no
- * compiler; PW_RESOURCE; or what `use` returns. */
+/* Compiles a C file to a shared object or, unless `engine` is NULL, to WebAssembly linked with that object file, in a
+ * private temporary folder; returns what `use` returns for the result.  PW_INPUT if it does not compile or there is no
+ * compiler; PW_RESOURCE. */
 int pw_compile_file (const char *path, const char *engine, pw_object_user *use, void *context, pw_error *error);
 #define PW_PAGE_TOOLS "clang, lld, wasi-libc and libclang-rt-14-dev-wasm32 (make deps TOOLS=page)"
 
@@ -111,9 +111,8 @@ char *pw_path_join (const char *folder, const char *name, const char *ending);
 int pw_read_file (const char *failure, const char *path, size_t max_bytes, const char *limit, char **text, size_t *size,
                   pw_error *error);
 
-/* Reads the rest of a file of at most `max_bytes` bytes into *text, malloced, zero-terminated; free it in every case.
- * `limit` explains the limit in messages: "the limit for a table".  PW_INPUT if the file is larger or cannot be read;
- * PW_RESOURCE. */
+/* Reads the rest of a file of at most `max_bytes` bytes into *text, zero-terminated; free it in every case.  `limit`
+ * names the limit in messages: "the limit for a table".  PW_INPUT if the file is larger or unreadable; PW_RESOURCE. */
 int pw_read_rest (FILE *f, size_t max_bytes, const char *path, const char *limit, char **text, size_t *size,
                   pw_error *error);
 

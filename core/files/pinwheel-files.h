@@ -18,7 +18,7 @@ typedef struct pw_file pw_file;
  * (separated by ":"), then in those that belong to the running program and this library: models/ next to it or one
  * up, lib/pinwheel/models/ of the installation.  A path has a "/" or an ending: a .so is loaded, a .c compiled by $CC
  * or cc in a private temporary folder, its messages passed through on standard error; a .yaml is read
- * (docs/model-format.md). Files in the current directory must be given as paths.
+ * (docs/model-format.md).  Files in the current directory must be given as paths.
  *
  * Errors: PW_INPUT for a model that is not found (with the nearest name), found twice (with both paths), does not
  * compile, is not a Pinwheel plug-in, has another ABI or parameters outside their structure or domain; PW_RESOURCE. */
@@ -95,15 +95,15 @@ char *pw_format (char buffer[32], double value, int digits);
 /* Reads a number that fills the whole text, nan and inf included; PW_INPUT otherwise, and *value stays. */
 int pw_read_number (const char *text, double *value);
 
-/* The same, and expressions of numbers as in text models: "30*deg", "2*pi/3". */
+/* The same for numbers and expressions of numbers, as in text models: "30*deg", "2*pi/3". */
 int pw_read_expression (const char *text, double *value);
 
 /* ---- Formulas: expressions of named numbers, the same language (formula.c) ---- */
 
 typedef struct pw_formula pw_formula;
 
-/* Reads an expression of the names, which end with NULL, at most PW_FORMULA_NAMES.  NULL and PW_INPUT with the reason,
- * or PW_RESOURCE. */
+/* Reads an expression of at most PW_FORMULA_NAMES names, which end with NULL.  NULL and PW_INPUT with the reason, or
+ * PW_RESOURCE. */
 #define PW_FORMULA_NAMES 32
 pw_formula *pw_formula_open (const char *text, const char *const *names, pw_error *error);
 /* The value for values of the names, and its derivative with respect to name `by`; both may be non-finite.  At a jump
@@ -114,15 +114,15 @@ void pw_formula_close (pw_formula *f);
 
 /* ---- Tables of numbers: units in their headers, "NAME [UNIT]" (units.c), and columns (columns.c) ---- */
 
-/* Finds the factor from a unit to SI units; PW_INPUT if it is unknown, PW_RETRY if its dimension is not that of
- * `wanted` (NULL: any). */
+/* Finds the factor from a unit to SI units.  PW_INPUT if it is unknown, PW_RETRY if its dimension is not that of
+ * `wanted`, unless that is NULL. */
 int pw_unit_factor (const char *unit, const char *wanted, double *factor);
 
-/* The bytes of the name in a header's cell; its unit goes to the buffer: what is between brackets at its end, or a
+/* Returns the length of the name in a header's cell, and stores its unit: what is between brackets at its end, or a
  * known unit between parentheses; "" without a unit, or if it is - or 1. */
 size_t pw_unit_split (const char *cell, char *unit, size_t size);
 
-/* The factor of a column by its header's cell, 1 without a unit.  PW_INPUT with column, unit and reason. */
+/* Finds the factor of a column from its header's cell, 1 without a unit.  PW_INPUT, and `why`: column, unit, reason. */
 int pw_unit_check (const char *cell, const char *wanted, double *factor, char *why, size_t size);
 
 /* Reads columns of a table by their names or numbers, in SI units: `unit` of each, or NULL for any.  The first one is
@@ -133,8 +133,7 @@ double *pw_read_columns (const char *path, const char *const *column, const char
 
 /* ---- Reading ---- */
 
-/* Opens a regular file for reading, without waiting (a FIFO is refused).  NULL, with the reason in *why, if that fails
- * or it is another type of file. */
+/* Opens a regular file for reading.  NULL, and the reason in *why, if that fails or it is a file of another type. */
 FILE *pw_open_input (const char *path, const char **why);
 
 /* After pw_open_input has failed: PW_RESOURCE if memory or file descriptors did not suffice, else PW_INPUT. */
@@ -188,8 +187,8 @@ char *pw_output_path (const char *path, pw_error *error);
 /* Opens a file for reading and writing, creates it if there is none, and locks it until the descriptor that is returned
  * is closed.  A symbolic link is not followed.  -1 and PW_RESOURCE, also if another process has it. */
 int pw_lock_path (const char *path, pw_error *error);
-/* Locks a folder for this process until the descriptor that is returned is closed.  -1 and PW_RESOURCE, also if another
- * process writes into it. */
+/* Locks a folder until the descriptor returned is closed.  -1 and PW_RESOURCE, also if another process has locked
+ * it. */
 int pw_lock_folder (const char *path, pw_error *error);
 
 /* The position in a file from which another process continues. */
@@ -197,7 +196,7 @@ typedef struct {
   unsigned long long length, check; /* bytes; checksum of the last ones */
 } pw_mark;
 
-/* Writes all output to the disk.  Errors: PW_RESOURCE; PW_INPUT if it is not a regular file. */
+/* Writes all output to the disk, and marks its end.  Errors: PW_RESOURCE; PW_INPUT if it is not a regular file. */
 int pw_output_mark (pw_output *o, pw_mark *mark, pw_error *error);
 /* Reopens NAME.part and truncates it at the mark.  A table continues without a header.  PW_INPUT if the file is missing
  * or differs from the marked contents; PW_RESOURCE. */
@@ -242,10 +241,10 @@ typedef struct {
   unsigned long at; /* bytes written */
 } pw_npz;
 
-/* Adds rows x columns numbers, by rows, each of `parts` doubles: 1, or 2 for complex ones; with 0 columns a vector.
- * The name has at most 300 bytes. */
+/* Adds an array of rows x columns numbers, row by row, or a vector if columns = 0; each number is 1 double, or 2 if it
+ * is complex (parts).  The name has at most 300 bytes. */
 void pw_npz_add (pw_npz *z, const char *name, long rows, long columns, int parts, const double *value);
-/* Completes the archive, and frees what it needs in every case; errors of the stream stay there.  PW_RESOURCE. */
+/* Completes the archive and frees its memory, in every case.  PW_RESOURCE; errors of the stream are the caller's. */
 int pw_npz_end (pw_npz *z, pw_error *error);
 
 /* ---- Tables ---- */
@@ -253,7 +252,7 @@ int pw_npz_end (pw_npz *z, pw_error *error);
 /* A table of samples: states, contact points, reactions (-lambda), scaled residuals, and energies if the run keeps a
  * ledger.  As CSV it has a header line "t [s],frame.x [m],...", then a line per sample with 17 digits; non-finite is
  * nan.  If the output is named .npz, it is a NumPy archive with a vector per column, named without unit, which is
- * written when the table is closed.  Errors: PW_RESOURCE; PW_METHOD if a signal of the model fails. */
+ * written when the table is closed; it cannot continue a file (PW_INPUT).  PW_RESOURCE; PW_METHOD if a signal fails. */
 typedef struct pw_csv pw_csv;
 pw_csv *pw_csv_open (const pw_system *s, int ledger, pw_output *o, pw_error *error);
 int pw_csv_write (pw_csv *c, const pw_system *s, const pw_sample *sample, pw_error *error);

@@ -1,4 +1,4 @@
-/* Symbolic elimination; see elimination.h. */
+/* Symbolic elimination: the factorisation K = L D L^T with symmetric 1 x 1 and 2 x 2 pivots, and its solution. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -8,8 +8,9 @@ static const pw_term elimination_one = { PW_TERM_ONE, 1, "1", 1 };
 
 #define AT(p, q) ldl->K[(size_t)(p) * (size_t)ldl->n + (size_t)(q)]
 #define FACTOR(p, q) ldl->L[(size_t)(p) * (size_t)ldl->n + (size_t)(q)]
+#define ORIGINAL(p, q) ldl->original[(size_t)(p) * (size_t)ldl->n + (size_t)(q)]
 
-/* Loops over the unknowns eliminated after the m-th one. */
+/* Loops over the unknowns eliminated after the m-th pivot. */
 #define EACH_LATER(i, m)           \
   for (int i = 0; i < ldl->n; i++) \
     if (ldl->step[i] > (m) && ldl->step[i] <= ldl->n)
@@ -18,18 +19,19 @@ static int elimination_is_zero (pw_term a) {
   return a.type == PW_TERM_ZERO;
 }
 
-/* 1 for an unknown that is not yet eliminated and coupled to p. */
+/* 1 if unknown i is not eliminated yet and coupled to p. */
 static int elimination_couples (const pw_elimination *ldl, int i, int p) {
   return ldl->step[i] == ldl->n && i != p && !elimination_is_zero (AT (i, p));
 }
 
+/* The number of unknowns that are not eliminated yet and coupled to p. */
 static int elimination_degree (const pw_elimination *ldl, int p) {
   int degree = 0;
   for (int i = 0; i < ldl->n; i++) degree += elimination_couples (ldl, i, p);
   return degree;
 }
 
-/* A comment with the names of the unknowns. */
+/* Writes a comment with the names of unknown p and its partner, which may be -1. */
 static void elimination_comment (const pw_elimination *ldl, pw_emitter *emitter, int p, int partner) {
   char name[120];
   for (int k = 0, i = p; k < 1 + (partner >= 0); k++, i = partner) {
@@ -41,6 +43,7 @@ static void elimination_comment (const pw_elimination *ldl, pw_emitter *emitter,
   fputs (" */\n", emitter->code);
 }
 
+/* Gives p, and its partner unless it is -1, the next position in the order. */
 static void elimination_place (pw_elimination *ldl, int p, int partner) {
   ldl->partner[ldl->pivots] = partner;
   ldl->order[ldl->pivots] = p;
@@ -53,23 +56,24 @@ static void elimination_place (pw_elimination *ldl, int p, int partner) {
 /* The general engine takes over if the pivot of an equation is not larger than this part of its diagonal entry, or if
  * the square of the pivot of a massless coordinate is not larger than this part of the sum of squares of its column. */
 #define ELIMINATION_ROW "PW_SCENE_PIVOT"
-#define ELIMINATION_COLUMN "0.04" /* (1/5)^2; elimination_is_large leaves a margin */
+#define ELIMINATION_COLUMN "0.04" /* (1/5)^2; elimination_is_large demands twice as much of the pivot */
 
 static void elimination_guard_row (pw_emitter *emitter, pw_term pivot, pw_term diagonal) {
   char a[24], b[24];
   int constant = pivot.type != PW_TERM_VARIABLE && diagonal.type != PW_TERM_VARIABLE;
-  if (!constant && strcmp (pivot.name, diagonal.name) == 0) return; /* a sum of squares: if 0, a is not finite */
+  if (!constant && strcmp (pivot.name, diagonal.name) == 0)
+    return; /* a sum of squares; evaluation finds it out if it is 0 */
   fprintf (constant ? emitter->prepare : emitter->code, "  GUARD (%s > " ELIMINATION_ROW " * %s);\n",
            pw_term_text (pivot, a), pw_term_text (diagonal, b));
 }
 
-/* pivot: of column c; compared with all entries of that column, as they are and as they were before the elimination. */
+/* Compares the pivot of column c with the entries of all equations there, now and before the elimination. */
 static void elimination_guard_column (const pw_elimination *ldl, pw_emitter *emitter, int c, pw_term pivot) {
   if (pivot.type != PW_TERM_VARIABLE) return;
   fprintf (emitter->code, "  GUARD (%s * %s > " ELIMINATION_COLUMN " * (", pivot.name, pivot.name);
   const char *plus = "";
   for (int i = ldl->coordinates; i < ldl->n; i++) {
-    pw_term now = AT (i, c), was = ldl->first[(size_t)i * (size_t)ldl->n + (size_t)c];
+    pw_term now = AT (i, c), was = ORIGINAL (i, c);
     for (int k = 0; k < 2; k++, now = was) {
       if (elimination_is_zero (now) || (k == 1 && strcmp (AT (i, c).name, was.name) == 0)) continue;
       fprintf (emitter->code, "%s%s * %s", plus, now.name, now.name);
@@ -92,19 +96,19 @@ static void elimination_update (pw_elimination *ldl, pw_emitter *emitter, int i,
  * p = vy.  Returns 1 if this equation is done, 0 if its entry for p is still to be subtracted. */
 static int elimination_constant_length (pw_elimination *ldl, pw_emitter *emitter, int i, int p) {
   if (i < ldl->coordinates || p >= 3 * ldl->s->bodies || p % 3 == 2) return 0;
-  int first = p - p % 3;
-  pw_term a = ldl->first[(size_t)i * (size_t)ldl->n + (size_t)first],
-          b = ldl->first[(size_t)i * (size_t)ldl->n + (size_t)first + 1];
+  const int vx = p - p % 3;
+  pw_term a = ORIGINAL (i, vx), b = ORIGINAL (i, vx + 1);
   if (!ldl->length[(size_t)(i - ldl->coordinates) * (size_t)ldl->s->bodies + (size_t)(p / 3)]) return 0;
   if (a.type != PW_TERM_VARIABLE || b.type != PW_TERM_VARIABLE) return 0;
-  if (strcmp (a.name, AT (i, first).name) != 0 || strcmp (b.name, AT (i, first + 1).name) != 0) return 0;
-  if (p > first) return 1;
+  if (strcmp (a.name, AT (i, vx).name) != 0 || strcmp (b.name, AT (i, vx + 1).name) != 0) return 0;
+  if (p > vx) return 1;
   a.type = b.type = PW_TERM_CONSTANT;
   pw_term square = pw_emit_difference (emitter, pw_emit_product (emitter, a, a), pw_term_negative (b), b);
   AT (i, i) = pw_emit_difference (emitter, AT (i, i), square, ldl->inverse[p]);
   return 1;
 }
 
+/* Eliminates unknown p with a 1 x 1 pivot, whose reciprocal is `inverse`. */
 static void elimination_pivot (pw_elimination *ldl, pw_emitter *emitter, int p, pw_term inverse) {
   elimination_comment (ldl, emitter, p, -1);
   elimination_place (ldl, p, -1);
@@ -117,7 +121,7 @@ static void elimination_pivot (pw_elimination *ldl, pw_emitter *emitter, int p, 
         elimination_update (ldl, emitter, i, j, FACTOR (i, p), AT (j, p));
 }
 
-/* The pivot [ 0 p ; p 0 ] of a massless coordinate c and an equation r. */
+/* Eliminates a massless coordinate c and an equation r with the pivot [ 0 d ; d 0 ]. */
 static void elimination_pair (pw_elimination *ldl, pw_emitter *emitter, int c, int r) {
   elimination_comment (ldl, emitter, c, r);
   elimination_place (ldl, c, r);
@@ -130,7 +134,7 @@ static void elimination_pair (pw_elimination *ldl, pw_emitter *emitter, int c, i
   }
 }
 
-/* 1 if no entry of column j is much larger than that of equation i at the initial state. */
+/* 1 if the entry of equation i in column j can be a pivot: no other one is much larger at the initial state. */
 static int elimination_is_large (const pw_elimination *ldl, int i, int j) {
   double most = 0;
   for (int k = ldl->coordinates; k < ldl->n; k++)
@@ -138,22 +142,22 @@ static int elimination_is_large (const pw_elimination *ldl, int i, int j) {
   return fabs (AT (i, j).value) > 0.4 * most;
 }
 
-/* The next such pair: a pivot of 1, else a constant, else a variable one; of these the one with the least fill-in,
- * which is far below 1e6. */
+/* Finds the next pair of a massless coordinate c and an equation r: a pivot of 1, else a constant, else a variable one;
+ * among these the one with the least fill-in, which is far below 1e6.  0 if there is none. */
 static int elimination_next_pair (const pw_elimination *ldl, const double *mass, int *c, int *r) {
   long least = -1;
   for (int j = 0; j < ldl->coordinates; j++)
     for (int i = ldl->coordinates; mass[j] == 0 && ldl->step[j] == ldl->n && i < ldl->n; i++) {
       if (!elimination_couples (ldl, i, j) || !elimination_is_large (ldl, i, j)) continue;
-      long kind = AT (i, j).type == PW_TERM_ONE ? 0 : AT (i, j).type == PW_TERM_CONSTANT ? 1 : 2;
-      long cost = kind * 1000000 + (long)(elimination_degree (ldl, j) - 1) * (elimination_degree (ldl, i) - 1);
+      long rank = AT (i, j).type == PW_TERM_ONE ? 0 : AT (i, j).type == PW_TERM_CONSTANT ? 1 : 2;
+      long cost = rank * 1000000 + (long)(elimination_degree (ldl, j) - 1) * (elimination_degree (ldl, i) - 1);
       if (least < 0 || cost < least) least = cost, *c = j, *r = i;
     }
   return least >= 0;
 }
 
-/* The next equation: the one with the least fill-in, to which variable pivots add, so that constant ones are preferred;
- * vanishing pivots are last. */
+/* The next equation: that of least degree, with an addition for variable pivots, so that constant ones are preferred,
+ * and a larger one for zero pivots.  -1 after the last one. */
 static int elimination_next_row (const pw_elimination *ldl) {
   int best = -1, least = 0;
   for (int i = ldl->coordinates; i < ldl->n; i++) {
@@ -165,36 +169,36 @@ static int elimination_next_row (const pw_elimination *ldl) {
   return best;
 }
 
-/* Equations by pairs p, q: with the entries a, b, c of their block, the pivots are a and c - b^2 / a, whose reciprocals
- * 1 / a and a / (a c - b^2) do not wait for each other. */
+/* Eliminates the equations, coupled ones in pairs p, q: with the entries [ a b ; b c ] of their block, the pivots are a
+ * and c - b^2 / a, whose reciprocals 1 / a and a / (a c - b^2) need not be computed one after the other. */
 static int elimination_rows (pw_elimination *ldl, pw_emitter *emitter) {
   const size_t n = (size_t)ldl->n;
-  pw_term *first = malloc ((2 * n + 1) * sizeof *first), *before = first + n;
-  if (first == NULL) return PW_RESOURCE;
-  for (int i = 0; i < ldl->n; i++) first[i] = AT (i, i);
-  int status = PW_OK, p = -1;
-  for (int q; (q = elimination_next_row (ldl)) >= 0; p = p < 0 && AT (q, q).type == PW_TERM_VARIABLE ? q : -1) {
-    pw_term b = p < 0 ? pw_term_zero () : AT (q, p);
+  pw_term *diagonal = malloc ((2 * n + 1) * sizeof *diagonal); /* of K before the equations are eliminated */
+  pw_term *before_p = diagonal + n;                            /* that before p was */
+  if (diagonal == NULL) return PW_RESOURCE;
+  for (int i = 0; i < ldl->n; i++) diagonal[i] = AT (i, i);
+  int status = PW_OK, p = -1; /* p: the equation eliminated last, if the next one may be its q */
+  for (int q; status == PW_OK && (q = elimination_next_row (ldl)) >= 0;) {
     if (elimination_is_zero (AT (q, q))) {
       status = PW_RETRY;
-      break;
-    }
-    if (elimination_is_zero (b)) { /* does not depend on p */
-      for (int i = 0; i < ldl->n; i++) before[i] = AT (i, i);
-      elimination_guard_row (emitter, pw_term_negative (AT (q, q)), pw_term_negative (first[q]));
+    } else if (p < 0 || elimination_is_zero (AT (q, p))) {
+      for (int i = 0; i < ldl->n; i++) before_p[i] = AT (i, i);
+      elimination_guard_row (emitter, pw_term_negative (AT (q, q)), pw_term_negative (diagonal[q]));
       elimination_pivot (ldl, emitter, q, pw_emit_quotient (emitter, elimination_one, AT (q, q)));
+      p = AT (q, q).type == PW_TERM_VARIABLE ? q : -1;
+    } else {
+      pw_term a = AT (p, p), b = AT (q, p), ac = pw_emit_product (emitter, a, before_p[q]);
+      pw_term det = pw_emit_difference (emitter, ac, b, b);
+      elimination_guard_row (emitter, det, pw_emit_product (emitter, a, diagonal[q]));
+      elimination_pivot (ldl, emitter, q, pw_emit_quotient (emitter, a, det));
       p = -1;
-      continue;
     }
-    pw_term a = AT (p, p), det = pw_emit_difference (emitter, pw_emit_product (emitter, a, before[q]), b, b);
-    elimination_guard_row (emitter, det, pw_emit_product (emitter, a, first[q]));
-    elimination_pivot (ldl, emitter, q, pw_emit_quotient (emitter, a, det));
   }
-  free (first);
+  free (diagonal);
   return status;
 }
 
-/* Moves variables that the solution needs to F. */
+/* Stores a variable x12, local to the factorisation, in F, unless that is done; slot: its index in F by its number. */
 static void elimination_keep (pw_elimination *ldl, pw_emitter *emitter, int *slot, pw_term *a) {
   if (a->type != PW_TERM_VARIABLE || a->name[0] != 'x') return;
   int v = atoi (a->name + 1);
@@ -235,7 +239,8 @@ static int elimination_allocate (pw_elimination *ldl, const pw_term *K) {
 
 int pw_elimination_open (pw_elimination *ldl, const pw_system *s, const pw_term *K, const unsigned char *length,
                          const unsigned char *takes_part, pw_emitter *emitter) {
-  *ldl = (pw_elimination){ .s = s, .first = K, .length = length, .coordinates = s->coords, .n = s->coords + s->rows };
+  *ldl =
+      (pw_elimination){ .s = s, .original = K, .length = length, .coordinates = s->coords, .n = s->coords + s->rows };
   if (elimination_allocate (ldl, K) != PW_OK) return PW_RESOURCE;
   for (int i = 0; i < ldl->n; i++) ldl->step[i] = i < s->coords || takes_part[i - s->coords] ? ldl->n : ldl->n + 1;
   for (int c, r; elimination_next_pair (ldl, s->mass, &c, &r);) {
@@ -258,6 +263,8 @@ void pw_elimination_close (pw_elimination *ldl) {
 
 /* ---- Solution ---- */
 
+/* Divides by the m-th pivot, and eliminates its unknowns from the later rows.  Row p of a pivot [ 0 d ; d 0 ]
+ * determines the multiplier of equation r, and row r the coordinate p: their entries of y are exchanged. */
 static void elimination_forward (const pw_elimination *ldl, pw_emitter *emitter, pw_term *y, int m) {
   int p = ldl->order[m], r = ldl->partner[m];
   if (r >= 0) {
@@ -278,6 +285,7 @@ static void elimination_forward (const pw_elimination *ldl, pw_emitter *emitter,
   y[p] = z;
 }
 
+/* Completes the unknowns of the m-th pivot from the later ones. */
 static void elimination_backward (const pw_elimination *ldl, pw_emitter *emitter, pw_term *y, int m) {
   int p = ldl->order[m], r = ldl->partner[m];
   pw_term sum = r >= 0 ? y[p] : pw_term_zero ();

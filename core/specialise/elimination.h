@@ -10,24 +10,25 @@
 typedef struct {
   const pw_system *s;
   int coordinates, n;          /* unknowns: the coordinates, then the constraint equations */
-  pw_term *K, *L;              /* n x n: column p has its values when p was eliminated; multipliers */
+  pw_term *K, *L;              /* n x n: K, column p as it was when unknown p was eliminated; L of K = L D L^T */
   pw_term *inverse;            /* n: reciprocal pivots */
   int *order, *partner;        /* n: unknowns in their order; partner of a 2 x 2 pivot, or -1 */
-  int *step;                   /* n: position in the order; n + 1: takes no part */
-  int pivots, factors;         /* unknowns in the order; entries of F */
-  const pw_term *first;        /* n x n: before the elimination */
+  int *step;                   /* n: position in the order; n: not eliminated yet; n + 1: takes no part */
+  int pivots;                  /* entries of `order` so far */
+  int factors;                 /* entries of F, an array of the generated code */
+  const pw_term *original;     /* n x n: K before the elimination */
   const unsigned char *length; /* rows x bodies: see pw_elimination_open */
 } pw_elimination;
 
-/* K: n x n terms of the lower triangle and their mirror image, n = coordinates + rows; length[i, b] = 1 if the
- * entries of equation i for the velocities vx, vy of body b form a vector of constant length; takes_part[i] = 0 for an
- * equation that is ignored.  Writes the statements of the factorisation, which end with what the solution needs in F.
- * PW_RETRY if a massless coordinate is determined by no equation, or an equation has no pivot.  Errors: PW_RESOURCE. */
+/* K: n x n, symmetric, n = coordinates + rows; length: rows x bodies, 1 if the entries of the equation for the
+ * velocities vx, vy of the body form a vector of constant length; takes_part: rows, 0 for an equation that is ignored.
+ * Writes the statements of the factorisation; the last of them store in F what the solution needs.  PW_RETRY if a
+ * massless coordinate is determined by no equation, or an equation has no pivot; PW_RESOURCE. */
 int pw_elimination_open (pw_elimination *ldl, const pw_system *s, const pw_term *K, const unsigned char *length,
                          const unsigned char *takes_part, pw_emitter *emitter);
 void pw_elimination_close (pw_elimination *ldl);
 
-/* Writes the statements that solve it; right: n terms, replaced by those of the solution. */
+/* Writes the statements that solve K x = right; x replaces the n terms of `right`. */
 void pw_elimination_solve (const pw_elimination *ldl, pw_emitter *emitter, pw_term *right);
 
 #endif

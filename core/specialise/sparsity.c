@@ -1,10 +1,11 @@
-/* Sparsity of element types; see sparsity.h. */
+/* Sparsity of element types; see sparsity.h.  Elements on the ground, with more constant entries, do not count. */
 #include <math.h>
 #include <string.h>
 #include "random_scene.h"
 #include "sparsity.h"
 
 enum { SPARSITY_SCENES = 12, SPARSITY_STATES = 4 };
+#define SPARSITY_ROUND_OFF 1e-12 /* of entries of J */
 
 static unsigned char sparsity_of_value (double value) {
   return value == 0 ? PW_ENTRY_ZERO : value == 1 ? PW_ENTRY_ONE : value == -1 ? PW_ENTRY_MINUS_ONE : PW_ENTRY_CONSTANT;
@@ -16,15 +17,15 @@ static unsigned char sparsity_merge (unsigned char type, double value, double fi
   return sparsity_of_value (value) == type ? type : PW_ENTRY_CONSTANT;
 }
 
-/* 1 for an element on the ground: it has entries that are constant only there. */
+/* 1 if one of the element's bodies is the ground. */
 static int sparsity_is_grounded (const pw_system *s, const pw_element_batch *k, int e) {
   for (int n = 0; n < k->kind->bodies; n++)
     if (k->column[e * k->kind->bodies + n] >= s->coords) return 1;
   return 0;
 }
 
-/* Merges the entries of element e at one state.  first: those of J at the scene's first state, stored if this is it;
- * known: 1 if `out` has entries already. */
+/* Merges the entries of element e at one state into `out`.  first: its entries of J at the scene's first state, stored
+ * if is_first; known: 1 if `out` has entries already. */
 static void sparsity_state (const pw_element_batch *k, int e, int is_first, int known, double *first,
                             pw_sparsity *out) {
   int n = k->kind->rows * k->b.cols;
@@ -36,7 +37,7 @@ static void sparsity_state (const pw_element_batch *k, int e, int is_first, int 
   for (int i = 0; i < k->kind->rows * k->kind->bodies; i++) {
     int at = i / k->kind->bodies * k->b.cols + i % k->kind->bodies * 3;
     const double *J = k->J + e * n + at;
-    if (fabs (hypot (J[0], J[1]) - hypot (first[at], first[at + 1])) > 1e-12) out->length[i] = 0;
+    if (fabs (hypot (J[0], J[1]) - hypot (first[at], first[at + 1])) > SPARSITY_ROUND_OFF) out->length[i] = 0;
   }
   for (int c = 0; k->kind->force && c < k->b.cols; c++)
     if (k->block[e * k->b.cols + c] != 0) out->force[c] = PW_ENTRY_VARIABLE;
@@ -66,7 +67,7 @@ static int sparsity_scene (const pw_system *s, pw_random *random, int *known, pw
 }
 
 int pw_sparsity_find (const pw_kind *kind, pw_sparsity *out) {
-  pw_random random = { 7 };
+  pw_random random = { .state = 7 };
   int known = 0, status = PW_OK;
   memset (out, 0, sizeof *out);
   memset (out->length, 1, sizeof out->length);
@@ -76,6 +77,9 @@ int pw_sparsity_find (const pw_kind *kind, pw_sparsity *out) {
     status = s ? sparsity_scene (s, &random, &known, out) : why.status == PW_RESOURCE ? PW_RESOURCE : PW_OK;
     pw_system_free (s);
   }
-  if (!known) *out = (pw_sparsity){ .length = { 0 } }, memset (out, PW_ENTRY_VARIABLE, offsetof (pw_sparsity, length));
+  if (!known) {
+    memset (out, PW_ENTRY_VARIABLE, offsetof (pw_sparsity, length));
+    memset (out->length, 0, sizeof out->length);
+  }
   return status;
 }

@@ -1,5 +1,5 @@
-/* Writes a compiled system as C code for this scene alone: the sources of its element types, called for one element at
- * a time with constant indices, and a factorisation without loops. */
+/* Writes C code for one compiled system: the sources of its element types, called for one element at a time with
+ * constant indices, and a factorisation without loops. */
 #define _POSIX_C_SOURCE 200809L
 #include <stdlib.h>
 #include <string.h>
@@ -8,47 +8,37 @@
 
 /* ---- Text ---- */
 
-static const pw_source_text *specialise_find_source (const char *name) {
-  for (const pw_source_text *t = pw_source_texts; t->name; t++)
-    if (strcmp (t->name, name) == 0) return t;
-  return NULL;
-}
-
 enum { SPECIALISE_SOURCES = 64 }; /* more than there are in pw_source_texts */
 
-/* Writes a source once, after the headers of element types that it includes. */
-static void specialise_source (FILE *out, const char *name, const pw_source_text **done, int *count) {
-  const pw_source_text *source = specialise_find_source (name);
-  char header[80];
-  for (int i = 0; i < *count; i++)
-    if (done[i] == source) return;
-  if (source == NULL || *count == SPECIALISE_SOURCES) return;
-  done[(*count)++] = source;
-  for (const char *const *line = source->line; *line; line++)
-    if (sscanf (*line, "#include \"%79[a-z_0-9.]\"", header) == 1) specialise_source (out, header, done, count);
+/* Writes a source, unless that is done, after the headers of element types that it includes. */
+static void specialise_source (FILE *out, const char *name, unsigned char done[SPECIALISE_SOURCES]) {
+  char header[80], hint[PW_HINT];
+  const int i = pw_find_name (pw_source_texts, sizeof *pw_source_texts, name, hint);
+  if (i < 0 || i >= SPECIALISE_SOURCES || done[i]) return;
+  done[i] = 1;
+  for (const char *const *line = pw_source_texts[i].line; *line; line++)
+    if (sscanf (*line, "#include \"%79[a-z_0-9.]\"", header) == 1) specialise_source (out, header, done);
   fprintf (out, "\n/* ---- %s ---- */\n\n", name);
-  for (const char *const *line = source->line; *line; line++)
+  for (const char *const *line = pw_source_texts[i].line; *line; line++)
     if (strncmp (*line, "#include \"", 10) != 0) fputs (*line, out);
 }
 
-static void specialise_sources (const pw_generator *scene) {
-  const pw_source_text *done[SPECIALISE_SOURCES];
+static void specialise_sources (const pw_generator *gen, unsigned char done[SPECIALISE_SOURCES]) {
   char name[80], file[90];
-  int count = 0;
-  fputs ("#include <math.h>\n#include <string.h>\n#include \"pinwheel.h\"\n", scene->out);
-  specialise_source (scene->out, "specialised.h", done, &count);
-  specialise_source (scene->out, "sine.h", done, &count);
-  specialise_source (scene->out, "batch.h", done, &count);
-  for (int k = 0; k < scene->s->batches; k++) {
-    if (!pw_kind_is_built_in (scene->s->batch[k].kind)) continue;
-    snprintf (file, sizeof file, "%s.c", pw_specialise_identifier (scene->s->batch[k].kind, name, sizeof name));
-    specialise_source (scene->out, file, done, &count);
+  fputs ("#include <math.h>\n#include <string.h>\n#include \"pinwheel.h\"\n", gen->out);
+  specialise_source (gen->out, "specialised.h", done);
+  specialise_source (gen->out, "sine.h", done);
+  specialise_source (gen->out, "batch.h", done);
+  for (int k = 0; k < gen->s->batches; k++) {
+    if (!pw_kind_is_built_in (gen->s->batch[k].kind)) continue;
+    snprintf (file, sizeof file, "%s.c", pw_specialise_identifier (gen->s->batch[k].kind, name, sizeof name));
+    specialise_source (gen->out, file, done);
   }
 }
 
 /* ---- The file ---- */
 
-/* Coordinates by pairs, X (0, pair) X (2, pair) X (4, one), and one by one. */
+/* Coordinates in pairs, X (0, pair) X (2, pair) X (4, one), and one by one. */
 static void specialise_coordinates (FILE *out, int n) {
   fputs ("#define EACH_COORDINATES(X)", out);
   for (int i = 0; i < n; i += 2) fprintf (out, i + 1 < n ? " X (%d, pair)" : " X (%d, one)", i);
@@ -63,80 +53,31 @@ static void specialise_comment (FILE *out, const char *what, int number, const c
   fputs (" */\n", out);
 }
 
-static void specialise_constants (const pw_generator *scene) {
-  const pw_system *s = scene->s;
-  fprintf (scene->out,
+static void specialise_constants (const pw_generator *gen) {
+  const pw_system *s = gen->s;
+  fprintf (gen->out,
            "\n/* ---- The scene ---- */\n\nenum { BODIES = %d, N = %d, ROWS = %d, HOLONOMIC = %d, INTERNAL = %d,\n"
-           "  ENTRIES = %d, REDUNDANT = %d, LEDGER = %d, RHEONOMIC = %d, READERS = %d };\n",
-           s->bodies, s->coords, s->rows, s->holonomic, s->coords - 3 * s->bodies, scene->entries,
-           scene->independent != NULL, s->entries, s->rheonomic > 0, s->state_dependent > 0);
-  fprintf (scene->out, "#define INLINE static inline%s\n",
+           "  ENTRIES = %d, REDUNDANT = %d, LEDGER = %d, RHEONOMIC = %d, STATE_DEPENDENT = %d };\n",
+           s->bodies, s->coords, s->rows, s->holonomic, s->coords - 3 * s->bodies, gen->entries,
+           gen->independent != NULL, s->entries, s->rheonomic > 0, s->state_dependent > 0);
+  fprintf (gen->out, "#define INLINE static inline%s\n",
            s->rows <= SPECIALISE_INLINE ? " __attribute__ ((always_inline))" : "");
-  pw_specialise_list (scene->out, "BODY", s->bodies);
-  pw_specialise_list (scene->out, "ROW", s->rows);
-  pw_specialise_list (scene->out, "HOLONOMIC", s->holonomic);
-  pw_specialise_list (scene->out, "INTERNAL", s->coords - 3 * s->bodies);
-  specialise_coordinates (scene->out, s->coords);
+  pw_specialise_list (gen->out, "BODY", s->bodies);
+  pw_specialise_list (gen->out, "ROW", s->rows);
+  pw_specialise_list (gen->out, "HOLONOMIC", s->holonomic);
+  pw_specialise_list (gen->out, "INTERNAL", s->coords - 3 * s->bodies);
+  specialise_coordinates (gen->out, s->coords);
   char name[120];
-  for (int b = 0; b < s->bodies; b++) specialise_comment (scene->out, "body", b, s->body_name[b]);
+  for (int b = 0; b < s->bodies; b++) specialise_comment (gen->out, "body", b, s->body_name[b]);
   for (int i = 0; i < s->rows; i++)
-    specialise_comment (scene->out, "equation", i, pw_system_reaction_name (s, i, name, sizeof name));
-  fputs ("\nstatic const unsigned char independent[] = { ", scene->out);
-  for (int i = 0; i < s->rows; i++) fprintf (scene->out, "%d, ", pw_specialise_is_independent (scene, i));
-  fputs ("0 };\n", scene->out);
+    specialise_comment (gen->out, "equation", i, pw_system_reaction_name (s, i, name, sizeof name));
+  fputs ("\nstatic const unsigned char independent[] = { ", gen->out);
+  for (int i = 0; i < s->rows; i++) fprintf (gen->out, "%d, ", pw_specialise_is_independent (gen, i));
+  fputs ("0 };\n", gen->out);
 }
 
-static int specialise_write (pw_generator *scene) {
-  const pw_source_text *done[SPECIALISE_SOURCES];
-  int count = 0;
-  fputs ("/* Generated by Pinwheel for the scene \"", scene->out);
-  pw_emit_name (scene->out, scene->s->model);
-  fputs ("\".  Compile with: cc -std=c11 -O2 -ffp-contract=off -fPIC -shared */\n", scene->out);
-  specialise_sources (scene);
-  specialise_constants (scene);
-  specialise_source (scene->out, "scene_head.inc", done, &count);
-  pw_specialise_elements (scene);
-  int status = pw_specialise_algebra (scene);
-  pw_specialise_data (scene);
-  pw_specialise_signals (scene);
-  specialise_source (scene->out, "scene_both.inc", done, &count);
-  fputs ("\n#ifdef PW_LANES\n", scene->out);
-  specialise_source (scene->out, "scene_lanes.inc", done, &count);
-  fprintf (scene->out,
-           "\nPW_EXPORT const pw_specialised_lanes pw_specialised_scene_lanes = {\n"
-           "  PW_SCENE_ABI, LANES_SERVED, %luu, sizeof (run_lanes), lanes_steps\n};\n#else\n",
-           pw_system_shape (scene->s));
-  specialise_source (scene->out, "scene_tail.inc", done, &count);
-
-  fprintf (scene->out,
-           "\nstatic int prepare (pw_scene *s) {\n  const double *const M = s->mass;\n  double *const C = s->constant, "
-           "J[ENTRIES + 1];\n"
-           "  reference_jacobian (s, J);\n  (void)M, (void)C, (void)J;\n%s  return 0;\n}\n",
-           scene->prepare.text ? scene->prepare.text : "");
-  fprintf (scene->out,
-           "\nPW_EXPORT const pw_specialised pw_specialised_scene = {\n"
-           "  PW_SCENE_ABI, %d, %luu, independent, prepare, evaluate, project, stages, compute_residuals, "
-           "steps\n};\n#endif\n",
-           scene->constants + 1, pw_system_shape (scene->s));
-  return status;
-}
-
-static int specialise_open (pw_generator *scene) {
-  const pw_system *s = scene->s;
-  size_t n = (size_t)s->batches + 1;
-  scene->sparsity = malloc (n * sizeof *scene->sparsity);
-  scene->w = pw_workspace_new (s, NULL);
-  if (scene->sparsity == NULL || scene->w == NULL) return PW_RESOURCE;
-  if (pw_update_kinematics (scene->w, 0, s->q0, s->v0) == PW_OK) pw_evaluate_J (scene->w);
-  int status = PW_OK;
-  for (int k = 0; k < s->batches && status == PW_OK; k++) {
-    scene->entries += s->batch[k].b.count * s->batch[k].kind->rows * s->batch[k].b.cols;
-    status = pw_sparsity_find (s->batch[k].kind, &scene->sparsity[k]);
-  }
-  return status;
-}
-
-unsigned long pw_system_shape (const pw_system *s) {
+/* Hash of what the generated code depends on besides the library's version. */
+static unsigned long specialise_shape (const pw_system *s) {
   unsigned long long h = PW_CHECK;
   const int counts[] = {
     s->bodies, s->coords, s->rows, s->holonomic, s->batches, s->entries, s->sources, s->rheonomic
@@ -159,12 +100,61 @@ unsigned long pw_system_shape (const pw_system *s) {
   return (unsigned long)h;
 }
 
+static int specialise_write (pw_generator *gen) {
+  unsigned char done[SPECIALISE_SOURCES] = { 0 };
+  fputs ("/* Generated by Pinwheel for the scene \"", gen->out);
+  pw_emit_name (gen->out, gen->s->model);
+  fputs ("\".  Compile with: cc -std=c11 -O2 -ffp-contract=off -fPIC -shared */\n", gen->out);
+  specialise_sources (gen, done);
+  specialise_constants (gen);
+  specialise_source (gen->out, "scene_head.inc", done);
+  pw_specialise_elements (gen);
+  int status = pw_specialise_algebra (gen);
+  pw_specialise_data (gen);
+  pw_specialise_signals (gen);
+  specialise_source (gen->out, "scene_both.inc", done);
+  fputs ("\n#ifdef PW_LANES\n", gen->out);
+  specialise_source (gen->out, "scene_lanes.inc", done);
+  fprintf (gen->out,
+           "\nPW_EXPORT const pw_specialised_lanes pw_specialised_scene_lanes = {\n"
+           "  PW_SCENE_ABI, LANES_SERVED, %luu, sizeof (run_lanes), lanes_steps\n};\n#else\n",
+           specialise_shape (gen->s));
+  specialise_source (gen->out, "scene_tail.inc", done);
+
+  fprintf (gen->out,
+           "\nstatic int prepare (pw_scene *s) {\n  const double *const M = s->mass;\n  double *const C = s->constant, "
+           "J[ENTRIES + 1];\n"
+           "  reference_jacobian (s, J);\n  (void)M, (void)C, (void)J;\n%s  return 0;\n}\n",
+           gen->prepare.text ? gen->prepare.text : "");
+  fprintf (gen->out,
+           "\nPW_EXPORT const pw_specialised pw_specialised_scene = {\n"
+           "  PW_SCENE_ABI, %d, %luu, independent, prepare, evaluate, project, stages, compute_residuals, "
+           "steps\n};\n#endif\n",
+           gen->emitter.constants + 1, specialise_shape (gen->s));
+  return status;
+}
+
+static int specialise_open (pw_generator *gen) {
+  const pw_system *s = gen->s;
+  size_t n = (size_t)s->batches + 1;
+  gen->sparsity = malloc (n * sizeof *gen->sparsity);
+  gen->w = pw_workspace_new (s, NULL);
+  if (gen->sparsity == NULL || gen->w == NULL) return PW_RESOURCE;
+  if (pw_update_kinematics (gen->w, 0, s->q0, s->v0) == PW_OK) pw_evaluate_J (gen->w);
+  int status = PW_OK;
+  for (int k = 0; k < s->batches && status == PW_OK; k++) {
+    gen->entries += s->batch[k].b.count * s->batch[k].kind->rows * s->batch[k].b.cols;
+    status = pw_sparsity_find (s->batch[k].kind, &gen->sparsity[k]);
+  }
+  return status;
+}
+
 int pw_specialised_fits (const pw_specialised *code, const pw_system *s) {
-  return code->abi == PW_SCENE_ABI && code->shape == pw_system_shape (s);
+  return code->abi == PW_SCENE_ABI && code->shape == specialise_shape (s);
 }
 
 int pw_specialised_lanes_fit (const pw_specialised_lanes *code, const pw_system *s) {
-  return code->abi == PW_SCENE_ABI && code->shape == pw_system_shape (s);
+  return code->abi == PW_SCENE_ABI && code->shape == specialise_shape (s);
 }
 
 int pw_specialised_lanes_count (const pw_specialised_lanes *code) {
@@ -183,13 +173,13 @@ char *pw_system_source (const pw_system *s, const unsigned char *independent, pw
              SPECIALISE_ROWS);
     return NULL;
   }
-  pw_generator scene = { .s = s, .independent = independent, .out = pw_stream_open (&text) };
-  int status = scene.out ? specialise_open (&scene) : PW_RESOURCE;
-  if (status == PW_OK) status = specialise_write (&scene);
-  if (pw_stream_close (scene.out, &text) != PW_OK) status = PW_RESOURCE;
-  pw_workspace_free (scene.w);
-  free (scene.sparsity);
-  free (scene.prepare.text);
+  pw_generator gen = { .s = s, .independent = independent, .out = pw_stream_open (&text) };
+  int status = gen.out ? specialise_open (&gen) : PW_RESOURCE;
+  if (status == PW_OK) status = specialise_write (&gen);
+  if (pw_stream_close (gen.out, &text) != PW_OK) status = PW_RESOURCE;
+  pw_workspace_free (gen.w);
+  free (gen.sparsity);
+  free (gen.prepare.text);
   if (status == PW_OK) return text.text;
   free (text.text);
   if (status == PW_RETRY)

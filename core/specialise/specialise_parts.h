@@ -1,4 +1,4 @@
-/* Parts of the generator of specialised code. */
+/* The generator of specialised code: interface between its files. */
 #ifndef PW_SPECIALISE_H
 #define PW_SPECIALISE_H
 
@@ -8,51 +8,47 @@
 #include "specialised.h"
 
 enum {
-  SPECIALISE_ROWS = 60, /* beyond, code without loops becomes too long */
-  SPECIALISE_INLINE = 8 /* up to this, everything is inlined, so that common parts are computed once */
+  SPECIALISE_ROWS = 60, /* most constraint equations: code without loops becomes too long */
+  SPECIALISE_INLINE = 8 /* most for which all functions are inlined, so that common parts are computed once */
 };
 
 typedef struct {
   const pw_system *s;
-  const unsigned char *independent; /* or NULL */
-  FILE *out;
-  pw_workspace *w;       /* at the initial state */
-  pw_sparsity *sparsity; /* batches */
-  int entries;           /* of J */
-  pw_stream prepare;     /* prepare's statements */
-  int constants;
+  const unsigned char *independent; /* as in pw_system_source */
+  FILE *out;                        /* the generated code */
+  pw_workspace *w;                  /* at the initial state */
+  pw_sparsity *sparsity;            /* batches */
+  int entries;                      /* of J */
+  pw_stream prepare;                /* statements of the generated function `prepare` */
+  pw_emitter emitter;
 } pw_generator;
 
 /* "rolling_wheel", in the buffer, which is returned. */
 char *pw_specialise_identifier (const pw_kind *kind, char *buffer, size_t size);
-/* The first entry of J and the first signal of an element. */
-static inline int pw_specialise_J (const pw_generator *scene, int k, int e) {
-  const pw_element_batch *batch = &scene->w->batch[k];
-  return (int)(batch->J - scene->w->J) + e * batch->kind->rows * batch->b.cols;
+/* The first entry of J of element e of batch k. */
+static inline int pw_specialise_J (const pw_generator *gen, int k, int e) {
+  const pw_element_batch *batch = &gen->w->batch[k];
+  return (int)(batch->J - gen->w->J) + e * batch->kind->rows * batch->b.cols;
 }
-static inline int pw_specialise_u (const pw_generator *scene, int k, int e) {
-  return (int)(scene->s->batch[k].source - scene->s->source) + e * scene->s->batch[k].kind->signals;
-}
-static inline int pw_specialise_is_independent (const pw_generator *scene, int row) {
-  return scene->independent == NULL || scene->independent[row];
+static inline int pw_specialise_is_independent (const pw_generator *gen, int row) {
+  return gen->independent == NULL || gen->independent[row];
 }
 
-/* The forces that act on a coordinate: a sum of these. */
+/* Which forces act on coordinate j: 0, or a sum of these. */
 enum { SPECIALISE_CONSTANT = 1, SPECIALISE_CHANGING = 2 };
-int pw_specialise_force (const pw_generator *scene, int j);
+int pw_specialise_force (const pw_generator *gen, int j);
 
-/* Write the functions of elements: Jacobian, right-hand sides, forces, ledger; and that of the signals. */
-void pw_specialise_elements (const pw_generator *scene);
-void pw_specialise_signals (const pw_generator *scene);
+/* Write the functions of the elements: Jacobian, right-hand sides, forces, ledger; the function of the signals. */
+void pw_specialise_elements (const pw_generator *gen);
+void pw_specialise_signals (const pw_generator *gen);
 
 /* #define EACH_name(X) X (0) X (1) ...: a loop without a counter, so that arrays stay in registers. */
 void pw_specialise_list (FILE *out, const char *name, int n);
 
-/* Lists what lanes load for each run. */
-void pw_specialise_data (const pw_generator *scene);
+/* Writes the tables of the data that code for several runs copies from each. */
+void pw_specialise_data (const pw_generator *gen);
 
-/* Writes products with J, factorisations and solutions; prepare's statements are collected.  PW_RETRY if there is no
- * fixed order of elimination; PW_RESOURCE. */
-int pw_specialise_algebra (pw_generator *scene);
+/* Writes products with J, factorisations and solutions; fills gen->prepare.  Returns as pw_elimination_open. */
+int pw_specialise_algebra (pw_generator *gen);
 
 #endif

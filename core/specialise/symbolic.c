@@ -1,4 +1,4 @@
-/* Symbolic values and the statements that compute them; see symbolic.h. */
+/* Terms of generated code; see symbolic.h. */
 #include <ctype.h>
 #include <string.h>
 #include "symbolic.h"
@@ -15,7 +15,7 @@ const char *pw_term_text (pw_term a, char buffer[24]) {
   return buffer;
 }
 
-/* The number of the constant with this statement's right-hand side, or -1. */
+/* The number of the constant that is defined by " = a op b;\n" already, or -1. */
 static int emit_find (const pw_emitter *emitter, const char *text) {
   int i = -1;
   fflush (emitter->prepare);
@@ -25,7 +25,7 @@ static int emit_find (const pw_emitter *emitter, const char *text) {
   return i;
 }
 
-/* A new constant or variable, or a constant that exists already, equal to `a op b`. */
+/* The term sign (a op b): a new variable or constant, or a constant that exists already. */
 static pw_term emit_define (pw_emitter *emitter, int constant, int sign, double value, const char *a, char op,
                             const char *b) {
   pw_term out = { PW_TERM_VARIABLE, sign, "", value };
@@ -64,10 +64,8 @@ pw_term pw_emit_difference (pw_emitter *emitter, pw_term a, pw_term b, pw_term c
     c = (pw_term){ PW_TERM_ONE, 1, "1", 1 };
   }
   int constant = emit_is_constant (a) && emit_is_constant (b) && emit_is_constant (c);
-  if (b.type == PW_TERM_ONE || c.type == PW_TERM_ONE)
-    snprintf (text, sizeof text, "%s", b.type == PW_TERM_ONE ? (c.type == PW_TERM_ONE ? "1" : c.name) : b.name);
-  else
-    snprintf (text, sizeof text, "%s * %s", b.name, c.name);
+  const char *left = b.type == PW_TERM_ONE ? "" : b.name, *right = c.type == PW_TERM_ONE && *left ? "" : c.name;
+  snprintf (text, sizeof text, "%s%s%s", left, *left && *right ? " * " : "", right);
   return emit_define (emitter, constant, a.sign, a.value - b.value * c.value, a.name,
                       b.sign * c.sign * a.sign > 0 ? '-' : '+', text);
 }

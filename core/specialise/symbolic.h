@@ -1,4 +1,4 @@
-/* Values known only when the generated code runs, and the statements that compute them. */
+/* Terms: values that generated code has when it runs, and the statements that compute them. */
 #ifndef PW_SYMBOLIC_H
 #define PW_SYMBOLIC_H
 
@@ -6,19 +6,19 @@
 
 typedef enum { PW_TERM_ZERO, PW_TERM_ONE, PW_TERM_CONSTANT, PW_TERM_VARIABLE } pw_term_type;
 
-/* sign times 0, 1, a constant (computed once) or a variable. */
+/* sign times 0, 1, a constant, which `prepare` computes once per run, or a variable. */
 typedef struct {
   pw_term_type type;
   int sign;
   char name[20]; /* as printed without the sign: "C[3]", "x12", "J[7]" */
-  double value;  /* with the sign, at the initial state */
+  double value;  /* at the initial state, including the sign */
 } pw_term;
 
-/* Where statements go: those of constants into `prepare`, the others into the function being written. */
+/* Where statements go. */
 typedef struct {
-  FILE *prepare, *code;
-  char *const *prepared; /* text of the former */
-  int constants, variables;
+  FILE *prepare, *code;     /* those that compute constants; the others, of the function being written */
+  char *const *prepared;    /* the text of `prepare`, up to date after fflush */
+  int constants, variables; /* how many C[0], C[1], ... and x0, x1, ... there are so far */
 } pw_emitter;
 
 static inline pw_term pw_term_zero (void) {
@@ -31,11 +31,12 @@ static inline pw_term pw_term_negative (pw_term a) {
 }
 pw_term pw_term_named (pw_term_type type, const char *array, int i, double value); /* array[i] */
 
+/* Write a statement unless none is needed, and return the term of its result. */
 pw_term pw_emit_product (pw_emitter *emitter, pw_term a, pw_term b);               /* a b */
 pw_term pw_emit_difference (pw_emitter *emitter, pw_term a, pw_term b, pw_term c); /* a - b c */
 pw_term pw_emit_quotient (pw_emitter *emitter, pw_term a, pw_term b);              /* a / b */
 
-/* A name as part of a comment. */
+/* Writes a name as part of a comment: characters that could end the comment become ?. */
 void pw_emit_name (FILE *out, const char *name);
 
 /* "-x3": the term with its sign, in the buffer. */

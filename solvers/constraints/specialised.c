@@ -46,7 +46,7 @@ int pw_specialised_open (pw_run *r, pw_error *error) {
   if (!pw_specialised_fits (code, r->s))
     return pw_fail (error, PW_INPUT, "model %s: the specialised code belongs to another scene", r->s->model);
   if (specialised_allocate (r, code->constants) != PW_OK) return pw_fail_memory (r->s, error);
-  r->scene->follows = r->limits.redundant_residual;
+  r->scene->redundant_residual = r->limits.redundant_residual;
   r->scene->alpha = r->alpha, r->scene->beta = r->beta;
   r->scene_ready = code->prepare (r->scene) == 0;
   pw_specialised_select (r);

@@ -8,6 +8,7 @@
 #include <string.h>
 #include <sys/wait.h>
 #include "check.h"
+#include "pinwheel-files.h"
 #include "runs.h"
 #include "scene.h"
 
@@ -68,7 +69,35 @@ static void test_layers (void **state) {
 #endif
 }
 
+/* What a failed call returned is refused by the next one. */
+static void test_null (void **state) {
+  pw_error e[6] = { { 0 } };
+  pw_page page;
+  (void)state;
+  pw_system *s = scene_compile (scene_model (&scene_ezyroller, "a", 0.6, NULL));
+  assert_null (pw_csv_open (NULL, 0, NULL, &e[0]));
+  check_error (&e[0], PW_INPUT, "a system is missing");
+  assert_null (pw_csv_open (s, 0, NULL, &e[1]));
+  check_error (&e[1], PW_INPUT, "an output is missing");
+  assert_int_equal (pw_csv_write (NULL, s, NULL, &e[2]), PW_INPUT);
+  check_error (&e[2], PW_INPUT, "a table is missing");
+  assert_int_equal (pw_page_open (&page, NULL, &e[3]), PW_INPUT);
+  check_error (&e[3], PW_INPUT, "a model file is missing");
+  pw_page_close (&page);
+  assert_null (pw_scene_code_open (NULL, s, &e[4]));
+  check_error (&e[4], PW_INPUT, "specialised code is missing");
+  assert_int_equal (pw_json_write (&(pw_summary){ .model = "m" }, s, NULL, 0, NULL, NULL, &e[5]), PW_INPUT);
+  check_error (&e[5], PW_INPUT, "an output is missing");
+  assert_null (pw_scene_code_open ("", NULL, NULL));
+  assert_null (pw_file_table (NULL));
+  assert_string_equal (pw_scene_code_notice (NULL), "");
+  assert_null (pw_file_open ("tests/bad-models/no-such.yaml", NULL));
+  assert_null (pw_file_open ("tests/bad-models/key-unknown.yaml", NULL));
+  pw_system_free (s);
+}
+
 int main (void) {
-  const struct CMUnitTest tests[] = { cmocka_unit_test (test_embed), cmocka_unit_test (test_layers) };
+  const struct CMUnitTest tests[] = { cmocka_unit_test (test_embed), cmocka_unit_test (test_null),
+                                      cmocka_unit_test (test_layers) };
   return cmocka_run_group_tests (tests, NULL, NULL);
 }

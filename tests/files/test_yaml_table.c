@@ -179,6 +179,9 @@ static void test_unit_of_signal (void **state) {
   table_unit (speed, "km/h", 25, NULL);
   table_unit (pfaffian, "cm", 0.9, NULL); /* any: its coefficients may have units */
   table_unit (speed, "rpm", 0, "does not measure what m/s does");
+  table_unit (pfaffian, "11 cm", 0, "the unit \"11 cm\" is not known");
+  table_unit (pfaffian, "12", 0, "the unit \"12\" is not known");
+  table_unit (pfaffian, "cm^", 0, "the unit \"cm^\" is not known");
 }
 
 /* 90 of each unit, in SI units. */

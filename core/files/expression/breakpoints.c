@@ -6,8 +6,7 @@
  * Cloud 2009, Introduction to Interval Analysis, chapter 8).  If an operation differs between the ends of such an
  * interval, bisection finds the two adjacent floating-point numbers between which it changes: steps must end there.
  * Changes that cancel within the least width are ignored.  So are those of noisy operations, which change too often
- * for steps to end there: by round-off of equal numbers, or too fast for any step.  While two compared numbers stay
- * equal, the least width grows. */
+ * for steps to end there.  While two compared numbers stay equal, the least width grows. */
 #include <math.h>
 #include "expression_parts.h"
 #include "pinwheel.h"
@@ -36,7 +35,7 @@ typedef struct {
 /* Evaluates the discrete part of all operations at time t (pw_expression_run_jet). */
 static void search_evaluate (const search *s, double t, double *discrete) {
   double variable[PW_EXPRESSION_VARIABLES] = { t }, u[3];
-  pw_expression_run_jet (s->expression->code, s->expression->codes, variable, PW_EXPRESSION_TIME, u, discrete);
+  pw_expression_run_jet (s->expression, variable, PW_EXPRESSION_TIME, u, discrete);
 }
 
 static int search_changed (double a, double b) {
@@ -96,7 +95,6 @@ static double search_first (search *s, double a, double b) {
   return first < INFINITY ? first : search_first (s, middle, b);
 }
 
-/* At the limit of the search, or with noise, returns a time before the next breakpoint, to continue there. */
 double pw_expression_breakpoint (const pw_expression *expression, double t) {
   search s = { .expression = expression, .from = t, .least_width = LEAST_WIDTH, .noise_end = INFINITY };
   s.remaining = 400 + 4000000 / (100 + expression->codes); /* so that the time of a search has a bound */

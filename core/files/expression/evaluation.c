@@ -69,7 +69,7 @@ static inline double value_of (const pw_expression_code *c, double left, double 
     return pw_expression_functions[c->index].of_two (left, right);
   }
   if (pw_expression_operands (c->op) == 1) return value_step (c->op, right, may_jump);
-  pw_order order = value_order (left, right);
+  pw_order order = value_order (left, right); /* the rest are comparisons */
   if (order == PW_ORDER_EQUAL) *may_jump = 1;
   return pw_expression_compare (c->op, order);
 }
@@ -103,8 +103,7 @@ typedef struct {
   int varies;      /* 1: depends on the variable */
 } jet;
 
-/* The chain rule, with the value f. Independent operands contribute nothing, even where a partial derivative is
- * infinite. */
+/* The chain rule; f: the value.  Constant operands contribute 0, even where a partial derivative is infinite. */
 static jet jet_chain (double f, const pw_partials *s, const jet *x, const jet *y) {
   jet r = { f, 0, 0, x->varies | y->varies };
   if (x->varies) r.d += s->x * x->d, r.dd += s->xx * x->d * x->d + s->x * x->dd;
@@ -217,7 +216,7 @@ static jet jet_hypot (const pw_expression_code *c, const jet *x, const jet *y, d
   return (jet){ 0, d, d > 0 ? (x->d * x->dd + y->d * y->dd) / d : hypot (x->dd, y->dd), 1 };
 }
 
-/* Not && and ||, whose operands are 1 or 0 and have no derivatives. */
+/* All but && and ||, whose operands never vary: they are 1 or 0. */
 static jet jet_binary (const pw_expression_code *c, const jet *x, const jet *y, double *discrete) {
   /* At a pole, the denominator or base 0 has the sign of its value just after the current time. */
   jet after = c->op == PW_OP_DIVIDE ? *y : *x;
@@ -255,10 +254,10 @@ static jet jet_binary (const pw_expression_code *c, const jet *x, const jet *y, 
   return (jet){ .v = *discrete };
 }
 
-void pw_expression_run_jet (const pw_expression_code *code, int codes, const double *variable, int by, double u[3],
+void pw_expression_run_jet (const pw_expression *expression, const double *variable, int by, double u[3],
                             double *discrete) {
   jet stack[PW_EXPRESSION_STACK], *top = stack;
-  for (const pw_expression_code *c = code, *end = code + codes; c < end; c++) {
+  for (const pw_expression_code *c = expression->code, *end = c + expression->codes; c < end; c++) {
     int operands = pw_expression_operands (c->op);
     double change = 0;
     top -= operands;
@@ -271,20 +270,20 @@ void pw_expression_run_jet (const pw_expression_code *code, int codes, const dou
       *top = (jet){ .v = pw_expression_apply (c, top[0].v, top[operands - 1].v) };
     else
       *top = operands == 1 ? jet_unary (c, top, &change) : jet_binary (c, top, top + 1, &change);
-    if (discrete) discrete[c - code] = change;
+    if (discrete) discrete[c - expression->code] = change;
     top++;
   }
   u[0] = top[-1].v, u[1] = top[-1].d, u[2] = top[-1].dd;
 }
 
 void pw_expression_derivatives (const pw_expression *expression, const double *variable, int by, double u[3]) {
-  pw_expression_run_jet (expression->code, expression->codes, variable, by, u, NULL);
+  pw_expression_run_jet (expression, variable, by, u, NULL);
 }
 
 double pw_expression_value (const pw_expression *expression, const double *variable) {
   int may_jump = 0;
   double u[3], value = pw_expression_run (expression->code, expression->codes, variable, &may_jump);
   if (!may_jump || !expression->breaks) return value;
-  pw_expression_run_jet (expression->code, expression->codes, variable, PW_EXPRESSION_TIME, u, NULL);
+  pw_expression_derivatives (expression, variable, PW_EXPRESSION_TIME, u);
   return u[0];
 }

@@ -34,7 +34,7 @@ typedef struct {
 int pw_scope_open (pw_scope *s, int room, pw_arena *arena);
 void pw_scope_close (pw_scope *s); /* names and numbers stay in the arena */
 
-/* Adds a name, of which the scope keeps a pointer. */
+/* Adds a name, to which the scope keeps a pointer; there must be room. */
 void pw_scope_add (pw_scope *s, const char *name, double value);
 
 /* One operation of an expression; it replaces its operands, the last ones on a stack, by its value. */
@@ -56,12 +56,11 @@ typedef struct {
 /* Size of an expression in bytes, by which it may be copied. */
 size_t pw_expression_size (const pw_expression *expression);
 
-/* Reads an expression of a scope and variables, names ending with NULL, into an arena.  PW_INPUT, with the error;
- * PW_RESOURCE. */
+/* Reads an expression of a scope and variables, which end with NULL, into an arena.  PW_INPUT, error; PW_RESOURCE. */
 int pw_expression_read (const pw_scope *s, const char *const *variable, const char *text, pw_arena *arena,
                         const pw_expression **expression, pw_expression_error *error);
 
-/* The value of an expression without variables, which may be non-finite; the scope may be NULL.  Errors as above. */
+/* The same of an expression without variables: its value, which may be non-finite.  The scope may be NULL. */
 int pw_expression_constant (const pw_scope *s, const char *text, double *value, pw_expression_error *error);
 
 /* ---- Values ---- */
@@ -73,7 +72,8 @@ double pw_expression_value (const pw_expression *expression, const double *varia
 void pw_expression_derivatives (const pw_expression *expression, const double *variable, int by, double u[3]);
 
 /* The first time after t at which the value, or a time derivative, may jump for any values of the other variables;
- * or INFINITY.  Jumps whose times depend on other variables are not found. */
+ * INFINITY if there is none.  If the search would take too long: a time after t up to which there is none.  Jumps whose
+ * times depend on other variables are not found. */
 double pw_expression_breakpoint (const pw_expression *expression, double t);
 
 /* ---- Words ---- */

@@ -116,7 +116,7 @@ double pw_expression_mod (double x, double y);
 
 /* ---- Evaluation ---- */
 
-/* The value of operations; *may_jump becomes 1 where one of them may jump: at equal numbers, at poles. */
+/* The value of operations; *may_jump becomes 1 if one of them may jump there: at equal numbers, at poles. */
 double pw_expression_run (const pw_expression_code *code, int codes, const double *variable, int *may_jump);
 
 /* The value of an operation of `right` alone or of `left` and `right`. */
@@ -124,7 +124,7 @@ double pw_expression_apply (const pw_expression_code *c, double left, double rig
 
 /* The value, first and second derivative with respect to variable `by`.  discrete, unless NULL, receives for each
  * operation the part of its value that changes only at breakpoints: of floor the value, of abs the sign. */
-void pw_expression_run_jet (const pw_expression_code *code, int codes, const double *variable, int by, double u[3],
+void pw_expression_run_jet (const pw_expression *expression, const double *variable, int by, double u[3],
                             double *discrete);
 
 /* ---- Enclosures (range.c) ---- */
@@ -137,7 +137,7 @@ typedef struct {
   int nan;       /* 1: the value may be NaN */
 } pw_range;
 
-/* The range over a time interval, ignoring breaks of operations that are marked as noisy. */
+/* The range over a time interval, without breaks of operations that are marked in `noisy`, one mark per operation. */
 pw_range pw_expression_range (const pw_expression *expression, const unsigned char *noisy, double lo, double hi);
 
 #endif

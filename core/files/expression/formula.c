@@ -1,4 +1,4 @@
-/* Formulas: expressions for programs, which read them from a command line. */
+/* Formulas: expressions of named numbers, none of which is the time. */
 #include <stdlib.h>
 #include "expression_parts.h"
 #include "pinwheel-files.h"
@@ -25,7 +25,7 @@ pw_formula *pw_formula_open (const char *text, const char *const *names, pw_erro
 }
 
 double pw_formula_value (const pw_formula *f, const double *value) {
-  int may_jump; /* no name is the time: the value at a jump, not after it */
+  int may_jump; /* unused: without a time, there is no value just after a jump */
   return pw_expression_run (f->expression->code, f->expression->codes, value, &may_jump);
 }
 

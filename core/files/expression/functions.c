@@ -7,14 +7,10 @@
 
 /* ---- Functions f of one argument x: f', f'' ---- */
 
-static pw_partials partials_of_one (double first, double second) {
-  return (pw_partials){ .x = first, .xx = second };
-}
-
 #define PARTIALS_OF_ONE(name, first, second)                          \
   static pw_partials partials_##name (double x, double y, double f) { \
     (void)x, (void)y, (void)f;                                        \
-    return partials_of_one (first, second);                           \
+    return (pw_partials){ .x = first, .xx = second };                 \
   }
 
 PARTIALS_OF_ONE (sin, pw_cos (x), -f)
@@ -88,7 +84,7 @@ static double partials_R (double m, int steps, const double c_by_m[PW_ELLIPTIC_S
   return R;
 }
 
-#define SERIES_LIMIT 0.2 /* |m| below which the formula of d2K/dm2 cancels, and 40 terms of its series suffice */
+#define SERIES_LIMIT 0.2 /* |m| below which the formula of d2K/dm2 loses digits, and 40 terms of its series suffice */
 
 /* d2K/dm2 from K = pi/2 sum of (1 3 ... (2 n - 1) / (2 4 ... 2 n))^2 m^n. */
 static double partials_K_series (double m) {
@@ -107,7 +103,7 @@ static pw_partials partials_elliptic_K (double m, double y, double K) {
   int n = pw_elliptic_mean (m, &a, c_by_a, c_by_m);
   double first = K * (0.5 - partials_R (m, n, c_by_m)) / (2 * (1 - m));
   double formula = (K / 4 - (1 - 2 * m) * first) / (m * (1 - m));
-  return partials_of_one (first, fabs (m) < SERIES_LIMIT ? partials_K_series (m) : formula);
+  return (pw_partials){ .x = first, .xx = fabs (m) < SERIES_LIMIT ? partials_K_series (m) : formula };
 }
 
 static pw_partials partials_jacobi_am (double u, double m, double phi) {
@@ -125,7 +121,7 @@ static pw_partials partials_jacobi_am (double u, double m, double phi) {
   double F_m = (N_m - sc_m) / (2 * m1) + F / m1;
   pw_partials r = { dn, am_m, -m * s * c, dn_m, -(dn_m * F + dn * F_m) };
   if (fabs (m) >= 1e-5) return r;
-  const double h = 1e-4; /* N_m cancels: its error would be 1e-15 / m, that of this difference is 1e-9 */
+  const double h = 1e-4; /* the error of N_m, a difference, would be 1e-15 / m; that of this difference is 1e-9 */
   r.yy = (partials_jacobi_am (u, m + h, pw_jacobi_am (u, m + h)).y -
           partials_jacobi_am (u, m - h, pw_jacobi_am (u, m - h)).y) /
          (2 * h);

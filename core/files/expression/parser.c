@@ -42,7 +42,7 @@ typedef struct {
   size_t previous, previous_end; /* start and end of the token before it */
   char type;                     /* 'n' name, '0' number, 'o' operator, 0 the end; or ( ) , ? : itself */
   const parser_operator *symbol; /* of a token of type 'o'; else NULL */
-  int depth, stacked;            /* of the recursion; operands on the stack */
+  int depth, stacked;            /* of the recursion; operands on the stack during evaluation */
   int status;                    /* PW_OK until the first error */
   pw_expression_error *error;
   /* of the pw_expression being made */
@@ -60,18 +60,16 @@ typedef struct {
   int condition; /* 1: its value is 1 or 0 */
 } parser_part;
 
-static const parser_part parser_nothing = { 0 };
-
 /* Records an error at an offset, unless there is one already.  Returns an empty part for the caller to return. */
 PW_PRINTF (3, 4) static parser_part parser_fail (parser *p, size_t at, const char *format, ...) {
-  if (p->status != PW_OK) return parser_nothing;
+  if (p->status != PW_OK) return (parser_part){ 0 };
   p->status = PW_INPUT;
   p->error->at = at;
   va_list arguments;
   va_start (arguments, format);
   vsnprintf (p->error->text, sizeof p->error->text, format, arguments);
   va_end (arguments);
-  return parser_nothing;
+  return (parser_part){ 0 };
 }
 
 static void parser_next (parser *p) {
@@ -124,8 +122,7 @@ static parser_part parser_leaf (parser *p, int op, int index, double value) {
   return part;
 }
 
-/* Appends an operation on `part`, its first operand, and on others, which depend on `depends`; a constant result is
- * replaced by its value. */
+/* Appends an operation on `part` and operands that depend on `depends`; a constant result is replaced by its value. */
 static parser_part parser_operation (parser *p, parser_part part, int depends, int op, int index) {
   int may_jump = 0;
   part.depends |= depends;
@@ -164,7 +161,7 @@ static int parser_enter (parser *p) {
   return p->status == PW_OK;
 }
 
-/* Reports an unexpected token; `open`: the unclosed parenthesis or ?, or 0, and its offset. */
+/* Reports an unexpected token.  open: a '(' or '?' at offset `at` that is not complete; 0 if there is none. */
 static parser_part parser_unexpected (parser *p, char open, size_t at) {
   if (p->type == 'n' || p->type == '0' || p->type == '(')
     return parser_fail (p, p->at, "an operator such as * is missing before \"%s\"", (char[2]){ p->text[p->at], 0 });
@@ -178,7 +175,7 @@ static parser_part parser_unexpected (parser *p, char open, size_t at) {
 /* Reports that no operand begins here. */
 static parser_part parser_missing (parser *p) {
   char last[PW_EXPRESSION_NAME];
-  if (p->status != PW_OK) return parser_nothing;
+  if (p->status != PW_OK) return (parser_part){ 0 };
   snprintf (last, sizeof last, "%.*s", (int)(p->previous_end - p->previous), p->text + p->previous);
   if (p->type == 0 && p->previous_end == 0) return parser_fail (p, 0, "an expression is missing");
   if (p->type == 0 || (p->type == ')' && p->previous_end))
@@ -240,7 +237,7 @@ static parser_part parser_call (parser *p, int index) {
 
 static parser_part parser_group (parser *p) {
   size_t open = p->at;
-  if (!parser_enter (p)) return parser_nothing;
+  if (!parser_enter (p)) return (parser_part){ 0 };
   parser_next (p);
   parser_part part = parser_choice (p);
   p->depth--;
@@ -261,7 +258,7 @@ static parser_part parser_number (parser *p) {
 
 static parser_part parser_operand (parser *p) {
   char name[PW_EXPRESSION_NAME];
-  if (p->status != PW_OK) return parser_nothing;
+  if (p->status != PW_OK) return (parser_part){ 0 };
   if (p->type == '0') return parser_number (p);
   if (p->type == '(') return parser_group (p);
   if (p->type != 'n') return parser_missing (p);

@@ -81,8 +81,7 @@ static pw_range range_abs (const pw_range *x) {
   return r;
 }
 
-/* sin (x + shift) for x from lo to hi: between its values at both ends, or to 1 or -1 if an extremum lies between them.
- * `slack` bounds the round-off of angles. */
+/* sin (x + shift), x from lo to hi, bounded by its values there and extrema in between; `slack` exceeds round-off. */
 static pw_range range_sin (double lo, double hi, double shift) {
   const double turn = 2 * PW_PI, slack = 8 * DBL_EPSILON * (fabs (lo) + fabs (hi) + 1);
   pw_range r = range_between (-1, 1);
@@ -175,8 +174,7 @@ static pw_range range_jacobi_am (const pw_range *x, const pw_range *y) {
 
 /* ---- Operations with jumps or kinks ---- */
 
-/* floor, ceil, round: one integer, or a break.  The interval is closed and includes the value just after a jump at
- * either end, in either direction. */
+/* floor, ceil, round: one integer, or a break; includes values just after a jump at an end, in either direction. */
 static pw_range range_integer (int op, const pw_range *x) {
   double shift = op == PW_OP_ROUND ? 0.5 : 0;
   pw_range r = range_between (ceil (x->lo + shift), floor (x->hi + shift));
@@ -330,8 +328,8 @@ static pw_range range_result (const pw_expression_code *c, const pw_range *x, in
   return r;
 }
 
-/* Ignores breaks whose time depends on states.  An operation that jumps has no breaks where it has one value; mod and
- * atan2 also vary between their jumps. */
+/* Ignores breaks whose time depends on states.  Where an operation that jumps, and is constant between jumps (unlike
+ * mod and atan2), has one value, breaks of its operands do not matter. */
 static pw_range range_apply (const pw_expression_code *c, const pw_range *x, int operands) {
   if (c->op == PW_OP_AND || c->op == PW_OP_OR) return range_logical (c->op, x, x + 1);
   if (c->op == PW_OP_MIN || c->op == PW_OP_MAX) return (c->op == PW_OP_MIN ? range_min : range_max) (x, x + 1);

@@ -1,4 +1,4 @@
-/* Compiles C to a shared object: runs the user's compiler without a shell, in a private folder. */
+/* Compiles C to a shared object or to WebAssembly; runs the compiler without a shell. */
 #include <errno.h>
 #include <fcntl.h>
 #include <signal.h>
@@ -14,9 +14,9 @@ extern char **environ;
 typedef struct {
   const char *compiler;       /* one or more words ("ccache gcc") */
   const char *const *options; /* ends with NULL, as does `last` */
-  const char *last[3];        /* options and files after the names of object and source */
-  const char *log;            /* file of the messages; NULL: standard error */
-  sigset_t signals;           /* that the compiler blocks: those that were blocked before build_defer */
+  const char *last[3];        /* options and files after the name of the source */
+  const char *log;            /* path of the file that gets the messages; NULL: standard error */
+  sigset_t signals;           /* blocked before build_defer, and so in the compiler */
 } build_command;
 
 const char *pw_compiler (void) {
@@ -53,7 +53,7 @@ static int build_spawn (const build_command *command, char *const *word, pid_t *
 static int build_run (const build_command *command, char *const *word, const char *source, pw_error *error) {
   pid_t child;
   int outcome = 0, code = build_spawn (command, word, &child);
-  while (code == 0 && waitpid (child, &outcome, 0) < 0 && errno != ECHILD) /* if SIGCHLD is ignored, the object tells */
+  while (code == 0 && waitpid (child, &outcome, 0) < 0 && errno != ECHILD) /* ECHILD: SIGCHLD is ignored */
     if (errno != EINTR) code = errno;
   int status = WIFEXITED (outcome) ? WEXITSTATUS (outcome) : -1;
   if (code != 0 && code != ENOENT && code != EACCES)
@@ -72,7 +72,7 @@ static int build_run (const build_command *command, char *const *word, const cha
   return PW_OK;
 }
 
-enum { BUILD_COMPILER = 24, BUILD_OPTIONS = 24 }; /* most words of the compiler, of all else */
+enum { BUILD_COMPILER = 24, BUILD_OTHERS = 24 }; /* most words of the compiler's command; of options and files */
 
 /* Adds words to a command line, which execv does not modify. */
 static void build_add (char **word, int *count, const char *const *more) {
@@ -81,7 +81,7 @@ static void build_add (char **word, int *count, const char *const *more) {
 
 static int build_object (const build_command *command, const char *source, const char *object, pw_error *error) {
   char *header, *include = NULL, *compiler = strdup (command->compiler), *rest = NULL;
-  char *word[BUILD_COMPILER + BUILD_OPTIONS] = { NULL };
+  char *word[BUILD_COMPILER + BUILD_OTHERS] = { NULL };
   int words = 0, status = pw_search_header (&header, error);
   if (header) include = pw_folder_of (header);
   if (status == PW_OK && header == NULL)
@@ -130,7 +130,7 @@ int pw_processor_lanes (void) {
 
 const char *const *pw_scene_options (int lanes) {
   static const struct {
-    int lanes, processor; /* the least pw_processor_lanes of processors that have these instructions */
+    int lanes, processor; /* processor: the least pw_processor_lanes for which the options are valid */
     const char *option[16];
   } known[] = {
     { 0, 4, { BUILD_SCENE, "-O2", "-mavx2" } },
@@ -148,7 +148,7 @@ const char *const *pw_scene_options (int lanes) {
   return known[i].option;
 }
 
-/* Defers SIGINT (Ctrl-C, which also reaches the compiler), SIGTERM, SIGHUP until the caller's files are removed. */
+/* Blocks SIGINT (Ctrl-C reaches the compiler, too), SIGTERM and SIGHUP; the mask `before` restores them. */
 static void build_defer (sigset_t *before) {
   sigset_t stop;
   sigemptyset (&stop);

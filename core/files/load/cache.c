@@ -30,35 +30,32 @@ static void cache_make (char *path) {
 
 typedef enum { CACHE_PARENT, CACHE_FOLDER } cache_role;
 
-/* NULL if only the user can write to the folder or, of the parent, only the user or the system can replace its entries;
- * else what is wrong with it. */
+/* Why a folder cannot be used, or NULL: others can write to it or, if it is the parent, replace what it contains. */
 static const char *cache_defect (const char *path, cache_role role) {
   struct stat info;
   if ((role == CACHE_FOLDER ? lstat : stat) (path, &info) != 0) return strerror (errno);
-  int by_system = role == CACHE_PARENT && info.st_uid == 0, sticky = role == CACHE_PARENT && info.st_mode & S_ISVTX;
+  int by_root = role == CACHE_PARENT && info.st_uid == 0, sticky = role == CACHE_PARENT && info.st_mode & S_ISVTX;
   if (!S_ISDIR (info.st_mode)) return "it is not a folder";
-  if (info.st_uid != geteuid () && !by_system) return "it belongs to another user";
+  if (info.st_uid != geteuid () && !by_root) return "it belongs to another user";
   if (info.st_mode & 022 && !sticky) return "others can write to it";
   return role == CACHE_FOLDER && access (path, R_OK | W_OK | X_OK) != 0 ? strerror (errno) : NULL;
 }
 
 char *pw_cache_folder (char *notice, size_t size) {
   char *parent = cache_parent (), *path = parent ? pw_path_join (parent, "pinwheel", "") : NULL;
-  const char *shown = parent, *defect = NULL;
+  const char *faulty = parent, *defect = NULL;
   if (path) {
     cache_make (path);
     defect = cache_defect (parent, CACHE_PARENT);
-    if (defect == NULL) defect = cache_defect (shown = path, CACHE_FOLDER);
-    if (defect) snprintf (notice, size, "the cache %s is not used: %s", shown, defect);
+    if (defect == NULL) defect = cache_defect (faulty = path, CACHE_FOLDER);
+    if (defect) snprintf (notice, size, "the cache %s is not used: %s", faulty, defect);
     if (defect) free (path), path = NULL;
   }
   free (parent);
   return path;
 }
 
-/* ---- Size ---- */
-
-/* The size of all files [bytes], and the path of the least recently used one, malloced; NULL if there is none. */
+/* The size of all files [bytes]; *oldest: the path of the least recently used one, malloced, or NULL. */
 static long long cache_size (const char *folder, char **oldest) {
   long long size = 0;
   struct timespec used = { 0 };

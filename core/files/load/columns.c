@@ -2,8 +2,7 @@
  *
  * The separator is the first of , ; and tab that the first line contains outside quotes.  A cell in double quotes may
  * contain it, and "" for a quote (RFC 4180), but no line end.  A first line without numbers names the columns, "NAME"
- * or "NAME [unit]"; a column in another unit than requested is converted.  Blank lines and those that begin with # are
- * skipped. */
+ * or "NAME [unit]"; columns are converted to the unit requested.  Blank lines and comments (#) are skipped. */
 #include <math.h>
 #include <stdarg.h>
 #include <stdlib.h>
@@ -157,7 +156,7 @@ static int columns_number (const columns *c, const char *line, columns_source so
   return columns_fail (c, "column %d: \"%.40s\" is too large in SI units", source.index + 1, cell);
 }
 
-/* Reads this line and all that follow into columns of `room` numbers; *rows is their number. */
+/* Reads this line and all that follow into columns of `room` numbers; *rows: the number of lines read. */
 static int columns_rows (columns *c, char *line, double *value, size_t room, int *rows) {
   for (int n = 0; line; line = columns_line (c), *rows = ++n) {
     int cells = columns_count (c, line);
@@ -172,7 +171,7 @@ static int columns_rows (columns *c, char *line, double *value, size_t room, int
   return PW_OK;
 }
 
-/* Stores the columns in *value, one after the other, for the caller to release in every case. */
+/* Stores the columns in *value, one after the other; the caller frees it in every case. */
 static int columns_all (columns *c, const char *const *column, const char *const *unit, double **value, int *rows) {
   size_t lines = 1;
   for (const char *p = c->rest; (p = strchr (p, '\n')) != NULL && p[1]; p++) lines++;

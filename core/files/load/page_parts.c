@@ -1,4 +1,4 @@
-/* The parts of an interactive page: the engine as WebAssembly, the text of a model, its tree, its tables. */
+/* The files in an interactive page: the engine as WebAssembly; for a text model also its text, tree and tables. */
 #include <stdlib.h>
 #include <string.h>
 #include "files.h"
@@ -28,13 +28,11 @@ static int page_read (pw_page *p, const char *name, const char *path, pw_error *
   return status;
 }
 
-/* ---- The engine ---- */
-
 static int page_use_engine (void *context, const char *object, pw_error *error) {
   return page_read (context, "engine", object, error);
 }
 
-/* Text models share one engine; a model in C is compiled into its own. */
+/* Text models share one engine; `source`, a model in C or NULL, is compiled into an engine of its own. */
 static int page_engine (pw_page *p, const char *source, pw_error *error) {
   char *path;
   int status = pw_search_page_file (source ? "pinwheel-page.objects" : "pinwheel.wasm", &path, error);
@@ -58,11 +56,11 @@ static int page_tree (pw_page *p, const pw_yaml *y, pw_error *error) {
   return page_add (p, "tree", tree.text, tree.size, error);
 }
 
-enum { PAGE_PARTS = 3 }; /* engine, model, tree; the tables follow */
+enum { PAGE_PARTS = 3 }; /* files before the tables: engine, model, tree */
 
 typedef struct {
   pw_page *p;
-  size_t folder; /* length of the model's folder, with its slash */
+  size_t folder; /* bytes of the path of the model's folder, including the slash */
   pw_error *error;
 } page_tables;
 
@@ -87,15 +85,15 @@ static int page_text (pw_page *p, const pw_file *f, const pw_yaml *y, pw_error *
   if (copy) memcpy (copy, text, size);
   int status = page_add (p, "model", copy, size, error);
   if (status == PW_OK) status = page_tree (p, y, error);
-  return status == PW_OK ? pw_file_tables (f, page_table, &x) : status;
+  if (status == PW_OK) status = pw_file_tables (f, page_table, &x);
+  return status == PW_OK ? PW_OK : pw_fail (error, status, "out of memory"); /* unless the reason is recorded */
 }
 
-/* ---- The page ---- */
-
 int pw_page_open (pw_page *p, const pw_file *f, pw_error *error) {
+  *p = (pw_page){ .files = 0 };
+  if (pw_require (f, "a model file", error) != PW_OK) return PW_INPUT;
   const char *path = pw_file_path (f);
   const pw_yaml *y = pw_file_yaml (f);
-  *p = (pw_page){ .files = 0 };
   if (y == NULL && !pw_ends_with (path, ".c"))
     return pw_fail (error, PW_INPUT, "%s: a page contains the model compiled for browsers: name its source, a .c file",
                     path);

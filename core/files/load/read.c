@@ -1,4 +1,4 @@
-/* Reads files up to a limit of their size, for models, tables and checkpoints. */
+/* Reads whole files of limited size. */
 #include <errno.h>
 #include <stdlib.h>
 #include <string.h>

@@ -1,8 +1,8 @@
-/* Loads the code of specialised scenes: compiles it, or loads it from the cache.
+/* Specialised code: loads the compiled object from the cache, or compiles it.
  *
  * An object in the cache, KEY.so, is followed by the text it was compiled from, the compiler and options, and a
- * checksum; they are compared before it is loaded.  KEY.c is locked while it is compiled; it is only kept, with the
- * messages in KEY.log, if that fails. */
+ * checksum; they are compared before it is loaded.  KEY.c is locked while it is compiled, and deleted afterwards; if it
+ * does not compile, it is kept, with the messages in KEY.log. */
 #include <dlfcn.h>
 #include <errno.h>
 #include <fcntl.h>
@@ -21,20 +21,20 @@ struct pw_scene_code {
   char notice[600];
 };
 
-/* The object to load and the paths of its files, KEY.c and so on. */
+/* The object to load. */
 typedef struct {
   const pw_system *system;
   const char *text;
   int lanes;           /* 0: for single runs */
   char identity[2000]; /* what determines the object: versions, compiler, options, checksum of the header */
   char key[17];        /* checksum of text and identity, in hexadecimal */
-  char *folder, *source, *log, *part, *object;
-  pw_scene_code *code;
+  char *folder, *source, *log, *part, *object; /* paths: KEY.c, KEY.log, the object while written, KEY.so */
+  pw_scene_code *code;                         /* the result */
 } code_job;
 
 /* ---- Identity ---- */
 
-/* Finds the file of a command on PATH, of which an empty entry is the current folder. */
+/* Finds a command, on PATH unless it has a slash; an empty entry of PATH is the current folder.  0 if there is none. */
 static int code_find_program (const char *word, struct stat *info) {
   if (strchr (word, '/')) return stat (word, info) == 0;
   for (const char *entry = getenv ("PATH"), *end; entry; entry = *end ? end + 1 : NULL) {
@@ -46,6 +46,7 @@ static int code_find_program (const char *word, struct stat *info) {
   return 0;
 }
 
+/* Adds a line to the identity. */
 static void code_add (code_job *x, const char *text) {
   size_t used = strlen (x->identity);
   snprintf (x->identity + used, sizeof x->identity - used, "%s\n", text);
@@ -92,7 +93,8 @@ static int code_identify (code_job *x, pw_error *error) {
 static int code_paths (code_job *x, pw_error *error) {
   char **const path[] = { &x->source, &x->log, &x->part, &x->object }, part[40];
   const char *const ending[] = { ".c", ".log", part, ".so" };
-  snprintf (part, sizeof part, ".%ld.part", (long)getpid ()); /* the compiler of a killed process may still run */
+  /* Named by process: the compiler of a killed one may still run. */
+  snprintf (part, sizeof part, ".%ld.part", (long)getpid ());
   int status = PW_OK;
   for (int i = 0; i < 4; i++) {
     free (*path[i]);
@@ -104,7 +106,7 @@ static int code_paths (code_job *x, pw_error *error) {
 
 /* ---- Loading ---- */
 
-/* Checks a cached object.  PW_RETRY: missing, or of another text or identity; PW_INPUT: damaged. */
+/* Checks a cached object.  PW_RETRY: missing, or of another text or identity; PW_INPUT: damaged; PW_RESOURCE. */
 static int code_check (const code_job *x, pw_error *error) {
   char *bytes;
   size_t size = 0, text_size = strlen (x->text), identity_size = strlen (x->identity);
@@ -195,7 +197,7 @@ static FILE *code_lock (const code_job *x) {
   return f;
 }
 
-/* PW_RETRY: the cache cannot be used, or was deleted meanwhile. */
+/* Compiles into the cache.  PW_METHOD if the text does not compile, else PW_RETRY: the cache may be the cause. */
 static int code_compile_cached (code_job *x, pw_error *error) {
   pw_error cause = { 0 };
   FILE *source = code_lock (x);
@@ -237,6 +239,7 @@ static int code_open (code_job *x, pw_error *error) {
 }
 
 pw_scene_code *pw_scene_lanes_open (const char *text, const pw_system *s, int lanes, pw_error *error) {
+  if (pw_require (text, "specialised code", error) != PW_OK || pw_require (s, "a system", error) != PW_OK) return NULL;
   code_job x = { .system = s, .text = text, .lanes = lanes, .code = calloc (1, sizeof *x.code) };
   int status = x.code ? code_open (&x, error) : pw_fail (error, PW_RESOURCE, "out of memory");
   char *const path[] = { x.folder, x.source, x.log, x.part, x.object };
@@ -259,7 +262,7 @@ const pw_specialised *pw_scene_code_table (const pw_scene_code *c) {
 }
 
 const char *pw_scene_code_notice (const pw_scene_code *c) {
-  return c->notice;
+  return c ? c->notice : "";
 }
 
 void pw_scene_code_close (pw_scene_code *c) {

@@ -21,10 +21,10 @@ static int search_no_memory (pw_error *error) {
   return pw_fail (error, PW_RESOURCE, "out of memory while looking for models");
 }
 
-/* Where the search for folders begins: at the program, at this library. */
+/* What folders are relative to: the folder of the running program, that of this library. */
 typedef enum { SEARCH_PROGRAM, SEARCH_LIBRARY, SEARCH_ANCHORS } search_anchor;
 
-/* The folder of the running program or of this library, malloced; NULL if unknown. */
+/* Stores the folder of the running program or of this library, malloced; NULL if unknown. */
 static int search_anchor_folder (search_anchor anchor, char **folder, pw_error *error) {
   char path[PATH_MAX];
   *folder = NULL;
@@ -47,27 +47,21 @@ static int search_anchor_folder (search_anchor anchor, char **folder, pw_error *
 
 /* Folders relative to each anchor. */
 typedef const char *const search_folders[SEARCH_ANCHORS][3];
+enum { SEARCH_FOLDERS = 3 * SEARCH_ANCHORS };
 
-/* Calls `visit` with each of these folders, which may not exist. */
-static int search_visit (search_folders where, int (*visit) (void *context, const char *folder, pw_error *error),
-                         void *context, pw_error *error) {
-  int status = PW_OK;
-  for (search_anchor anchor = 0; anchor < SEARCH_ANCHORS && status == PW_OK; anchor++) {
-    char *parent;
-    status = search_anchor_folder (anchor, &parent, error);
-    for (int i = 0; parent && status == PW_OK && i < 3; i++) {
-      char *folder = pw_path_join (parent, where[anchor][i], "");
-      status = folder ? visit (context, folder, error) : search_no_memory (error);
-      free (folder);
-    }
-    free (parent);
-  }
+/* Stores the i-th of these folders, which need not exist, malloced; NULL if its anchor is unknown. */
+static int search_place (search_folders where, int i, char **folder, pw_error *error) {
+  char *anchor;
+  int status = search_anchor_folder ((search_anchor)(i / 3), &anchor, error);
+  *folder = anchor ? pw_path_join (anchor, where[i / 3][i % 3], "") : NULL;
+  if (anchor && *folder == NULL) status = search_no_memory (error);
+  free (anchor);
   return status;
 }
 
 /* ---- Model files ---- */
 
-/* Adds a model file, unless it is in the list already. */
+/* Adds a model, whose name is the first `length` bytes of `name`, unless it is in the list already. */
 static int search_add_file (pw_search *s, const char *name, size_t length, const char *path, pw_error *error) {
   for (int i = 0; i < s->count; i++)
     if (strcmp (s->found[i].path, path) == 0 && strncmp (s->found[i].name, name, length) == 0 &&
@@ -98,7 +92,7 @@ static int search_entry (pw_search *s, const char *folder, const char *entry, pw
   return status;
 }
 
-/* Adds a folder to s->folders, "/first:/second", if it fits; 0 if it is there already, so that it is searched once. */
+/* Adds a folder to s->folders if there is room; 0 if it is there already, so that it is searched once. */
 static int search_add_folder (pw_search *s, const char *real) {
   size_t n = strlen (real), used = strlen (s->folders);
   for (const char *p = s->folders; *p; p += strcspn (p, ":"), p += *p == ':')
@@ -107,9 +101,8 @@ static int search_add_folder (pw_search *s, const char *real) {
   return 1;
 }
 
-/* Adds the models in a folder; skips missing and inaccessible folders, as for PATH; other failures are errors. */
-static int search_folder (void *context, const char *folder, pw_error *error) {
-  pw_search *s = context;
+/* Adds the models in a folder; skips missing and inaccessible folders, as shells do with PATH. */
+static int search_folder (pw_search *s, const char *folder, pw_error *error) {
   char *real = realpath (folder, NULL);
   if (real == NULL && errno == ENOMEM) return search_no_memory (error);
   int is_new = real && search_add_folder (s, real);
@@ -158,7 +151,12 @@ int pw_search_open (pw_search *s, pw_error *error) {
                                         { "models", "../models", "pinwheel/models" } };
   *s = (pw_search){ .count = 0 };
   int status = search_environment (s, error);
-  if (status == PW_OK) status = search_visit (where, search_folder, s, error);
+  for (int i = 0; i < SEARCH_FOLDERS && status == PW_OK; i++) {
+    char *folder;
+    status = search_place (where, i, &folder, error);
+    if (folder) status = search_folder (s, folder, error);
+    free (folder);
+  }
   if (s->count > 1) qsort (s->found, (size_t)s->count, sizeof *s->found, search_order);
   return status;
 }
@@ -170,26 +168,17 @@ void pw_search_close (pw_search *s) {
 
 /* ---- Other files ---- */
 
-typedef struct {
-  const char *file;
-  char *path; /* of the first one that can be read, or NULL */
-} search_file;
-
-static int search_visit_file (void *context, const char *folder, pw_error *error) {
-  search_file *x = context;
-  char *path = x->path ? NULL : pw_path_join (folder, x->file, "");
-  if (x->path == NULL && path == NULL) return search_no_memory (error);
-  if (path && access (path, R_OK) == 0)
-    x->path = path;
-  else
-    free (path);
-  return PW_OK;
-}
-
+/* Stores the path of the first of the files of this name that can be read, malloced; NULL if there is none. */
 static int search_find (search_folders where, const char *file, char **path, pw_error *error) {
-  search_file x = { file, NULL };
-  int status = search_visit (where, search_visit_file, &x, error);
-  *path = x.path;
+  int status = PW_OK;
+  *path = NULL;
+  for (int i = 0; i < SEARCH_FOLDERS && *path == NULL && status == PW_OK; i++) {
+    char *folder;
+    status = search_place (where, i, &folder, error);
+    if (folder && (*path = pw_path_join (folder, file, "")) == NULL) status = search_no_memory (error);
+    if (*path && access (*path, R_OK) != 0) free (*path), *path = NULL;
+    free (folder);
+  }
   return status;
 }
 

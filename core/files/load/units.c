@@ -91,8 +91,9 @@ static const char *units_power (const char *p, int *power) {
   char *end;
   *power = strncmp (p, square, 2) == 0 ? 2 : strncmp (p, cube, 2) == 0 ? 3 : 1;
   if (*power > 1) return p + 2;
-  if (*p == '^') p++;
-  if (!isdigit ((unsigned char)*p) && !(*p == '-' && isdigit ((unsigned char)p[1]))) return p;
+  const int caret = *p == '^';
+  p += caret;
+  if (!isdigit ((unsigned char)*p) && !(*p == '-' && isdigit ((unsigned char)p[1]))) return *power = !caret, p;
   long value = strtol (p, &end, 10);
   *power = value > -10 && value < 10 ? (int)value : 0;
   return end;
@@ -108,7 +109,7 @@ static int units_read (const char *text, units_value *u) {
     int power;
     size_t symbol = strncmp (p, "°", 2) == 0 || strncmp (p, "µ", 2) == 0 ? 2 : 0; /* begins with \xC2, too */
     size_t n = symbol + strcspn (p + symbol, ends);
-    if (n == 0 && *p == '1') n = 1;
+    if (n == 0 && *p == '1' && !isdigit ((unsigned char)p[1])) n = 1; /* as in 1/s; other numbers are no units */
     if (n > 0) {
       const char *after = units_power (p + n, &power);
       if (power == 0 || units_multiply (p, n, divide ? -power : power, u) != PW_OK) return PW_INPUT;

@@ -29,7 +29,7 @@ struct pw_csv {
 
 /* ---- Cells ---- */
 
-/* Adds the next column to the archive: its values are `columns` apart. */
+/* Adds the next column to the archive. */
 static void csv_array (pw_csv *c, const char *name) {
   size_t rows = c->columns ? c->values / c->columns : 0;
   double *column = malloc ((rows + 1) * sizeof *column);
@@ -139,8 +139,6 @@ static int csv_line (pw_csv *c, csv_content content, const pw_sample *x, pw_erro
   return pw_output_check (c->output, error);
 }
 
-static const pw_sample csv_no_sample = { 0 };
-
 /* ---- The table ---- */
 
 static void csv_free (pw_csv *c) {
@@ -152,6 +150,7 @@ static void csv_free (pw_csv *c) {
 }
 
 pw_csv *pw_csv_open (const pw_system *s, int ledger, pw_output *o, pw_error *error) {
+  if (pw_require (s, "a system", error) != PW_OK || pw_require (o, "an output", error) != PW_OK) return NULL;
   int contacts = pw_system_contacts (s), is_archive = pw_output_named (o, ".npz"), continued = pw_output_continued (o);
   if (is_archive && continued) {
     pw_fail (error, PW_INPUT, "an archive of arrays cannot be continued: write a table that ends in .csv");
@@ -165,16 +164,16 @@ pw_csv *pw_csv_open (const pw_system *s, int ledger, pw_output *o, pw_error *err
     c->workspace = contacts > 0 ? pw_workspace_new (s, error) : NULL;
   }
   int complete = c && c->contact && (c->workspace || contacts == 0);
-  if (complete && (is_archive || continued || csv_line (c, CSV_NAMES, &csv_no_sample, error) == PW_OK)) return c;
+  if (complete && (is_archive || continued || csv_line (c, CSV_NAMES, &(pw_sample){ 0 }, error) == PW_OK)) return c;
   pw_fail (error, PW_RESOURCE, "out of memory while writing a table");
   csv_free (c);
   return NULL;
 }
 
 int pw_csv_write (pw_csv *c, const pw_system *s, const pw_sample *sample, pw_error *error) {
-  int status = PW_OK;
+  int status = pw_require (c, "a table", error);
   (void)s; /* that of pw_csv_open */
-  if (c->workspace)
+  if (status == PW_OK && c->workspace)
     status = pw_workspace_contact_points (c->workspace, sample->t, sample->q, sample->v, c->contact, error);
   return status == PW_OK ? csv_line (c, CSV_VALUES, sample, error) : status;
 }
@@ -182,7 +181,7 @@ int pw_csv_write (pw_csv *c, const pw_system *s, const pw_sample *sample, pw_err
 int pw_csv_close (pw_csv *c, pw_error *error) {
   int status = PW_OK;
   if (c && c->is_archive) {
-    status = csv_line (c, CSV_NAMES, &csv_no_sample, error);
+    status = csv_line (c, CSV_NAMES, &(pw_sample){ 0 }, error);
     int end = pw_npz_end (&c->npz, error);
     if (status == PW_OK) status = end == PW_OK ? pw_output_check (c->output, error) : end;
   }

@@ -32,7 +32,7 @@ static void json_string (FILE *f, const char *text) {
   fputc ('"', f);
 }
 
-/* 0 without a writer, which writes nothing. */
+/* Begins an item.  0 if j is NULL: nothing is written. */
 static int json_item (pw_json *j, const char *key) {
   if (j == NULL) return 0;
   if (j->items++ > 0) fputc (',', j->f);
@@ -182,6 +182,7 @@ enum { JSON_ALL_LEVELS = 99 };
 
 int pw_json_write (const pw_summary *summary, const pw_system *s, const pw_sample *sample, int ledger,
                    const pw_statistics *statistics, pw_output *o, pw_error *error) {
+  if (pw_require (o, "an output", error) != PW_OK) return PW_INPUT;
   pw_json j = { .f = pw_output_stream (o), .lines = JSON_ALL_LEVELS };
   errno = 0;
   pw_json_open (&j, NULL, '{');

@@ -1,4 +1,4 @@
-/* Opens files for reading; follows links, also to files that do not exist yet; detects names of the same file. */
+/* Opens files for reading; follows links, also to files that do not exist; finds different names of one file. */
 #include <errno.h>
 #include <fcntl.h>
 #include <stdlib.h>
@@ -126,6 +126,7 @@ static int location_is_null_device (const struct stat *info) {
 
 /* Whether writing `a` affects `b`: the same file, a temporary file, or a file written into a folder. */
 static int location_conflicts (const location_use *a, const location_use *b) {
+  /* Endings of temporary files: of outputs, of sorted tables, of checkpoints. */
   static const char *const temporary[] = { ".part", ".part.old", ".sorted", ".next", NULL };
   const struct stat *info = &a->location.info;
   if (a->use->how == PW_READS || !a->known || !b->known) return 0;

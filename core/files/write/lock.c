@@ -8,7 +8,7 @@
 #include <unistd.h>
 #include "files.h"
 
-enum { LOCK_TRIES = 100 }; /* retries when another process has just released the file */
+enum { LOCK_TRIES = 100 }; /* when other processes create and remove the file at the same time */
 
 /* 0 or an errno value.  File systems without locks give no protection. */
 static int lock_acquire (int file) {
@@ -26,8 +26,7 @@ const char *pw_lock_reason (int code) {
                              : strerror (code);
 }
 
-/* Opens the file, never through a symbolic link, and creates it unless `mode` is PW_LOCK_EXISTING; *created: it is
- * new. */
+/* Opens the file, never through a symbolic link, and creates it if the mode permits; *created: 1 if it is new. */
 static int lock_open_file (const char *path, pw_lock_mode mode, int *created) {
   int file = mode == PW_LOCK_EXISTING ? -1 : open (path, O_RDWR | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC, 0666);
   *created = file >= 0;

@@ -1,5 +1,4 @@
-/* NumPy archives (.npz): a zip file (PKWARE's APPNOTE) without compression, of a .npy file (numpy.lib.format 1.0) per
- * array. */
+/* NumPy archives: a zip file (PKWARE's APPNOTE), not compressed, with a .npy file per array (numpy.lib.format 1.0). */
 #include <stdlib.h>
 #include <string.h>
 #include "files.h"
@@ -36,16 +35,16 @@ static void npz_bytes (pw_npz *z, const void *data, size_t size) {
   z->at += size;
 }
 
-/* A number of `bytes` bytes, the lowest first. */
+/* Writes a number of `bytes` bytes, the lowest first. */
 static void npz_number (pw_npz *z, unsigned long value, int bytes) {
   for (; bytes > 0; bytes--, value >>= 8) npz_bytes (z, &(unsigned char){ (unsigned char)value }, 1);
 }
 
-/* What the header of a file and its entry in the directory have in common: version 2.0, names in UTF-8, stored, 1
- * January 1980, checksum, compressed and original size, lengths of the name and of extra fields. */
+/* Writes what the header of a file and its entry in the directory share: version 2.0, flags (names in UTF-8), method
+ * (stored), 1 January 1980, checksum, compressed and original size, lengths of the name and of extra fields. */
 static void npz_describe (pw_npz *z, const struct pw_npz_entry *e) {
   npz_number (z, NPZ_VERSION, 2);
-  npz_number (z, 0x0800, 4); /* flags, method */
+  npz_number (z, 0x0800, 4);
   npz_number (z, 0x00210000, 4);
   npz_number (z, e->check, 4);
   npz_number (z, e->size, 4);
@@ -61,7 +60,7 @@ void pw_npz_add (pw_npz *z, const char *name, long rows, long columns, int parts
   if (z->failed) return;
   struct pw_npz_entry *e = z->entry + z->count++;
   snprintf (shape, sizeof shape, columns ? "%ld, %ld" : "%ld,", rows, columns);
-  head[8] = NPZ_HEAD - 10;
+  head[8] = NPZ_HEAD - 10; /* bytes of the header after its length, in two bytes */
   sprintf (head + 10, "{'descr': '%c%s', 'fortran_order': False, 'shape': (%s), }",
            *(const char *)&(int){ 1 } ? '<' : '>', parts == 2 ? "c16" : "f8", shape);
   memset (strchr (head + 10, 0), ' ', (size_t)(head + NPZ_HEAD - strchr (head + 10, 0)));
@@ -77,7 +76,7 @@ void pw_npz_add (pw_npz *z, const char *name, long rows, long columns, int parts
   npz_bytes (z, value, size);
 }
 
-/* The directory, and the end record: disk 0, entries, size and offset of the directory, no comment. */
+/* Writes the directory, and the end record: disk 0, entries, size and offset of the directory, no comment. */
 static void npz_directory (pw_npz *z) {
   unsigned long start = z->at;
   for (const struct pw_npz_entry *e = z->entry; e < z->entry + z->count; e++) {

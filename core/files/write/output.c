@@ -1,8 +1,7 @@
 /* Output files: written as NAME.part, renamed when complete.
  *
- * The temporary file is locked until its folder is written to the disk, so that two processes never write the
- * same output.  Existing files that are not regular (a terminal, a pipe, /dev/null) and open descriptors of the process
- * are written directly. */
+ * The temporary file is locked until its folder is on the disk, so that two processes never write the same output.
+ * Files that are not regular (a terminal, a pipe, /dev/null) and descriptors of the process are written directly. */
 #include <errno.h>
 #include <fcntl.h>
 #include <stdlib.h>
@@ -15,10 +14,10 @@ struct pw_output {
   char *path;    /* as the user knows it */
   char *real;    /* of the file itself, links followed */
   char *part;    /* its temporary name; NULL: written directly */
-  char *old;     /* name of its predecessor while several files are renamed */
+  char *old;     /* second name of the file that it replaces, while several are renamed */
   int file;      /* keeps the temporary file locked; -1: written directly */
-  int folder;    /* that contains it; -1: written directly */
-  int code;      /* errno of the first failed write */
+  int folder;    /* that contains it; -1: written directly, or the folder is not readable */
+  int code;      /* errno of the first failed write; -1: unknown; 0: none has failed */
   int continued; /* 1: continues a file that is not empty */
   int discard;   /* 1: the temporary file is removed unless the output is finished */
 };
@@ -37,7 +36,7 @@ static const char *output_shown (const pw_output *o) {
   return strcmp (o->path, "-") == 0 ? "standard output" : o->path;
 }
 
-/* code: an errno value, or -1 for an unknown reason. */
+/* The reason for messages; code: an errno value, or -1 if it is unknown. */
 static const char *output_reason (int code) {
   return code > 0 ? pw_lock_reason (code) : "a write failed";
 }
@@ -46,7 +45,7 @@ static int output_fail (const pw_output *o, int code, pw_error *error) {
   return pw_fail (error, PW_RESOURCE, "cannot write %s: %s", output_shown (o), output_reason (code));
 }
 
-/* The same, after the temporary file is complete or was abandoned: names it, if it remains. */
+/* The same, and names the temporary file, if that remains. */
 static int output_fail_with_part (const pw_output *o, int code, pw_error *error) {
   if (o->part == NULL || o->discard) return output_fail (o, code, error);
   return pw_fail (error, PW_RESOURCE, "cannot write %.200s: %s; what was written is in %.200s", output_shown (o),
@@ -64,7 +63,7 @@ static int output_stream_of (pw_output *o, int file, const char *mode) {
   return code;
 }
 
-/* Opens a descriptor of the process or a file that is not regular.  A FIFO blocks until it has a reader or a signal. */
+/* Opens a descriptor of the process or a file that is not regular.  A FIFO waits for a reader or a signal. */
 static int output_open_direct (pw_output *o, const pw_location *p) {
   int flags = p->descriptor < 0 ? O_WRONLY : fcntl (p->descriptor, F_GETFL);
   if (flags < 0) return errno;
@@ -204,7 +203,7 @@ static int output_sync (pw_output *o) {
   return errno ? errno : -1;
 }
 
-/* Closes the stream; standard output stays open. */
+/* Closes the stream, except standard output.  Returns `code` unless it is 0, else as output_sync. */
 static int output_close (pw_output *o, int code) {
   FILE *f = o->stream;
   o->stream = NULL;
@@ -241,14 +240,14 @@ void pw_output_discard (pw_output *o) {
   output_free (o);
 }
 
-/* The new name is safe once the folder is on the disk; file systems that refuse this do not need it. */
+/* Writes the folder, with the new name, to the disk; file systems that refuse this do not need it. */
 static int output_sync_folder (const pw_output *o, pw_error *error) {
   if (o->folder < 0 || fsync (o->folder) == 0 || errno == EINVAL || errno == EROFS || errno == ENOTSUP) return PW_OK;
   return pw_fail (error, PW_RESOURCE, "%s is written, but its folder cannot be written to disk: %s", o->path,
                   strerror (errno));
 }
 
-/* Renames all files or none.  Until the last one has its name, predecessors keep a second one, a hard link. */
+/* Renames all files or none.  Until the last one is renamed, replaced files keep a second name, a hard link. */
 static int output_rename_all (pw_output *const *o, int count, pw_error *error) {
   int last = count - 1, renamed = 0, status = PW_OK;
   while (last > 0 && (o[last] == NULL || o[last]->part == NULL)) last--;
@@ -332,7 +331,7 @@ static int output_is_marked (const pw_output *o, const pw_mark *mark) {
   return output_checksum (o->file, &now) == PW_OK && now.check == mark->check;
 }
 
-/* A process killed just after completing its table leaves it under its final name. */
+/* Takes a table under its final name, which a process killed just after completing it has left. */
 static int output_restore_part (pw_output *o, const pw_mark *mark) {
   int file = pw_lock_file (o->real, PW_LOCK_EXISTING);
   if (file < 0) return errno;

@@ -6,7 +6,7 @@
 #include <string.h>
 #include "yaml.h"
 
-#define YAML_MAX_AHEAD 1e6 /* indicators of one list or map in brackets; about 350 bytes each */
+#define YAML_MAX_AHEAD 1e6 /* pw_yaml.max_ahead of a file of the default size; libfyaml takes 350 bytes for each */
 
 /* ---- Parameters ---- */
 
@@ -139,7 +139,7 @@ static int yaml_head (pw_yaml *y, const pw_reader *r) {
   yaml_run (y, r, v[2]);
   const pw_node *parameters = v[3];
   y->let = v[4], y->bodies = v[5], y->elements = v[6], y->reference = v[7];
-  for (int i = 3; key[i]; i++)
+  for (int i = 3; key[i]; i++) /* from "parameters" on: lists and maps */
     if (v[i] && v[i]->count > PW_YAML_MAX_ITEMS)
       pw_yaml_fail (r, v[i]->at, "%s: %d entries; a model may have %d", key[i], v[i]->count, PW_YAML_MAX_ITEMS);
   size_t count = (size_t)(parameters ? parameters->count : 0) + (size_t)(y->let ? y->let->count : 0);
@@ -201,5 +201,5 @@ static int yaml_each_table (const pw_yaml *y, const pw_node *node, int (*each) (
 }
 
 int pw_yaml_tables (const pw_yaml *y, int (*each) (void *context, const char *path), void *context) {
-  return y->elements ? yaml_each_table (y, y->elements, each, context) : 0; /* a definition may be named "file" */
+  return y->elements ? yaml_each_table (y, y->elements, each, context) : 0; /* in let, "file" is the name of a number */
 }

@@ -33,7 +33,7 @@ typedef struct pw_node {
 } pw_node;
 
 struct pw_yaml {
-  pw_plugin_table table; /* first: a model's table is the address of its file */
+  pw_plugin_table table; /* first: the address of a text model's table is that of its pw_yaml */
   char *path;            /* as shown in messages */
   char *folder;          /* of the file, links resolved */
   char *source;          /* the text, zero-terminated */
@@ -109,24 +109,24 @@ int pw_yaml_list_of (const pw_reader *r, const pw_node *node, const char *label,
 /* A scalar's text, not empty. */
 int pw_yaml_text (const pw_reader *r, const pw_node *node, const char *label, const char **text);
 
-/* A scalar as a number of a domain: an expression over r->scope; a list of two, `items` ("numbers, [x, y]"); one of
- * several words, ending with NULL. */
+/* Read a number of a domain: an expression of the names in r->scope; two numbers: a list of `items`, "numbers, [x, y]";
+ * one of `choices`, which end with NULL, as its index. */
 int pw_yaml_number (const pw_reader *r, const pw_node *node, const char *label, pw_domain domain, double *value);
 int pw_yaml_pair (const pw_reader *r, const pw_node *node, const char *label, const char *items, double *value);
 int pw_yaml_choice (const pw_reader *r, const pw_node *node, const char *label, const char *const *choices, int *value);
 
-/* Whether an expression depends on the time t or a state, BODY.phi, and at which offset. */
-int pw_yaml_varies (const char *text, size_t *at);
+/* The first name of the time t or of a state, BODY.phi, in an expression, or NULL. */
+const char *pw_yaml_find_variable (const char *text);
 
 /* Converts an offset in a scalar's text to an offset in the source. */
 size_t pw_yaml_offset (const pw_yaml *y, const pw_node *node, size_t offset);
 
-/* Adds the names of all bodies so far to the valid names. */
+/* Adds the names of all bodies so far to the valid names of a suggestion. */
 void pw_yaml_suggest_bodies (const pw_reader *r, pw_nearest *near);
 
 /* ---- Building ---- */
 
-/* Makes a signal of up to three expressions of time: value, rate, acceleration; NULL: not given (yaml_expression.c). */
+/* Makes a signal from expressions of time: value, rate or NULL, acceleration or NULL (yaml_expression.c). */
 int pw_yaml_time_signal (pw_reader *r, const pw_kind *kind, const char *label, const pw_node *const v[3],
                          pw_signal *signal);
 

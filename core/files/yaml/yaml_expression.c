@@ -124,9 +124,9 @@ static int time_eval (void *context, double t, const double *state, double value
     value[0] = pw_expression_value (f->expression[0], variable);
   for (int i = 0; gradient && i < f->states; i++) {
     pw_expression_derivatives (f->expression[0], variable, 1 + i, derivatives);
-    if (derivatives[0] != value[0]) /* that before a jump in time */
+    if (derivatives[0] != value[0]) /* the value before a jump in time; the one after it is needed */
       variable[0] = nextafter (t, INFINITY), pw_expression_derivatives (f->expression[0], variable, 1 + i, derivatives);
-    /* |v| has no derivative at rest; only Newton's iteration uses it. */
+    /* 0 where there is no derivative, such as that of |v| at rest: only Newton's iteration uses the gradient. */
     gradient[i] = isfinite (derivatives[1]) ? derivatives[1] : 0;
   }
   return isfinite (value[0]) && (f->derivatives == 0 || (isfinite (value[1]) && isfinite (value[2]))) ? 0 : -1;
@@ -179,7 +179,7 @@ static int time_add_state (const reading *e, const char *name, size_t at) {
   return f->name[++f->states] ? PW_OK : pw_yaml_no_memory (e->r);
 }
 
-static int time_expression (reading *e, int i) {
+static int time_read_expression (reading *e, int i) {
   pw_reader *r = e->r;
   time_function *f = e->f;
   const char *source = e->node->type == PW_YAML_SCALAR ? e->node->text : "";
@@ -199,8 +199,8 @@ static int time_expression (reading *e, int i) {
   return jump ? PW_OK : pw_yaml_no_memory (r);
 }
 
-/* Compares given derivative i, 1 or 2, with that of what is given before it, at some times to 1e-6 of the largest. */
-static int time_check (const reading *e, int i, const char *name) {
+/* Compares derivative i, 1 or 2, which is given, with that computed from the last one given before, at some times. */
+static int time_check_derivative (const reading *e, int i, const char *name) {
   static const double time[] = { 0.3, 1.7, 4.1 }; /* [s], arbitrary */
   int last = e->f->expression[i - 1] ? i - 1 : 0, n = i - last;
   double given[3], exact[3][3], size = 0;
@@ -218,7 +218,7 @@ static int time_check (const reading *e, int i, const char *name) {
 }
 
 /* The largest magnitude of derivative i at times within 1 s of t, the closer the more of them. */
-static double time_size (const time_function *f, double t, int i) {
+static double time_magnitude (const time_function *f, double t, int i) {
   double size = 0;
   for (int k = -20; k <= 20; k++) {
     double at = t + (k < 0 ? -1 : 1) * ldexp (1, -abs (k)), u[3];
@@ -228,8 +228,9 @@ static double time_size (const time_function *f, double t, int i) {
   return size;
 }
 
-/* Refuses signals that a constraint cannot follow: a jump of the value or, for positions, of its derivative. */
-static int time_continuous (const reading *e) {
+/* Refuses signals that a constraint cannot follow: a jump of the value or, for positions, of its derivative, at one of
+ * the first breakpoints, beyond round-off and the change between adjacent times. */
+static int time_check_continuity (const reading *e) {
   static const char *const name[] = { "its value", "its rate" };
   double t = 0, before[3], after[3];
   for (int k = 0; k < MAX_CHECKED_BREAKPOINTS; k++) {
@@ -240,7 +241,7 @@ static int time_continuous (const reading *e) {
     double between = t - nextafter (t, -INFINITY);
     for (int i = 0; i < e->f->derivatives; i++)
       if (fabs (after[i] - before[i]) >
-          1e-9 * time_size (e->f, t, i) + 2 * between * (fabs (after[i + 1]) + fabs (before[i + 1])))
+          1e-9 * time_magnitude (e->f, t, i) + 2 * between * (fabs (after[i + 1]) + fabs (before[i + 1])))
         return pw_yaml_fail (e->r, e->node->at, "%s: %s jumps from %.6g to %.6g at t = %.9g s, and that of %s must not",
                              e->label, name[i], before[i], after[i], t,
                              e->f->derivatives > 1 ? "a prescribed position" : "a velocity constraint");
@@ -248,15 +249,15 @@ static int time_continuous (const reading *e) {
   return PW_OK;
 }
 
-static int time_all (reading *e, const pw_node *const node[3]) {
+static int time_read_all (reading *e, const pw_node *const node[3]) {
   static const char *const key[] = { "expression", "rate", "acceleration" };
   for (int i = 0; i < 3; i++) {
     if ((e->node = node[i]) == NULL) continue;
-    if (time_expression (e, i) != PW_OK) return e->r->error->status;
-    if (i > 0 && !e->f->states && time_check (e, i, key[i]) != PW_OK) return e->r->error->status;
+    if (time_read_expression (e, i) != PW_OK) return e->r->error->status;
+    if (i > 0 && !e->f->states && time_check_derivative (e, i, key[i]) != PW_OK) return e->r->error->status;
   }
   e->node = node[0];
-  return e->f->derivatives ? time_continuous (e) : PW_OK;
+  return e->f->derivatives ? time_check_continuity (e) : PW_OK;
 }
 
 int pw_yaml_time_signal (pw_reader *r, const pw_kind *kind, const char *label, const pw_node *const v[3],
@@ -270,7 +271,7 @@ int pw_yaml_time_signal (pw_reader *r, const pw_kind *kind, const char *label, c
   signal->function.close = free;
   signal->function.text = &f->text;
   time_store_names (r);
-  if (time_all (&(reading){ .r = r, .label = label, .f = f }, v) != PW_OK) return r->error->status;
+  if (time_read_all (&(reading){ .r = r, .label = label, .f = f }, v) != PW_OK) return r->error->status;
   for (int i = 0; i < 3; i++)
     if (f->expression[i] && f->expression[i]->breaks) signal->function.breakpoint = time_breakpoint;
   if (f->states) signal->function.reads = f->name + 1;

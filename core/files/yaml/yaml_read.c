@@ -86,16 +86,15 @@ size_t pw_yaml_offset (const pw_yaml *y, const pw_node *node, size_t offset) {
   return at + n <= y->size && strncmp (y->source + at, node->text, n) == 0 ? at + offset : node->at;
 }
 
-int pw_yaml_varies (const char *text, size_t *at) {
+const char *pw_yaml_find_variable (const char *text) {
   char name[PW_EXPRESSION_NAME];
   for (const char *rest = text, *p; (p = pw_expression_next_name (&rest, name)) != NULL;)
-    if (strcmp (name, "t") == 0 || strchr (name, '.')) return *at = (size_t)(p - text), 1;
-  return 0;
+    if (strcmp (name, "t") == 0 || strchr (name, '.')) return p;
+  return NULL;
 }
 
 int pw_yaml_number (const pw_reader *r, const pw_node *node, const char *label, pw_domain domain, double *value) {
   pw_expression_error error;
-  size_t at;
   if (node == NULL || r->error->status != PW_OK) return r->error->status;
   if (node->type != PW_YAML_SCALAR)
     return pw_yaml_fail (r, node->at, "%s: expected a number, found %s", label, pw_yaml_found (node));
@@ -104,7 +103,7 @@ int pw_yaml_number (const pw_reader *r, const pw_node *node, const char *label, 
   if (status == PW_RESOURCE) return pw_yaml_no_memory (r);
   if (status != PW_OK)
     return pw_yaml_fail (r, pw_yaml_offset (r->y, node, error.at), "%s: %s", label,
-                         pw_yaml_varies (node->text, &at) && at == error.at
+                         pw_yaml_find_variable (node->text) == node->text + error.at
                              ? "only the value of a signal may depend on the time t or on states"
                              : error.text);
   const char *expected = pw_domain_check (domain, *value);

@@ -190,9 +190,8 @@ static int signal_map (pw_reader *r, const pw_kind *kind, const char *label, con
 
 int pw_yaml_signal (pw_reader *r, const pw_kind *kind, const char *label, const pw_node *node, pw_signal *signal) {
   const pw_node *const v[3] = { node, NULL, NULL };
-  size_t at;
   if (node->type == PW_YAML_MAP) return signal_map (r, kind, label, node, signal);
-  if (node->type == PW_YAML_SCALAR && pw_yaml_varies (node->text, &at))
+  if (node->type == PW_YAML_SCALAR && pw_yaml_find_variable (node->text))
     return pw_yaml_time_signal (r, kind, label, v, signal);
   return pw_yaml_number (r, node, label, PW_REAL, &signal->constant);
 }

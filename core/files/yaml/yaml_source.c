@@ -1,7 +1,6 @@
 /* The text of a model file, and messages that point into it.
  *
- * The text is checked first: size, UTF-8, no control characters, no line that begins with %, on some of which libfyaml
- * 0.7.12 does not terminate. */
+ * The text is checked first: UTF-8, no control characters, no lines that begin with %: some hang libfyaml 0.7.12. */
 #include <stdarg.h>
 #include <string.h>
 #include "yaml.h"

@@ -30,8 +30,8 @@ typedef struct {
   unsigned at; /* of the last node, for events without a position */
 } tree;
 
-/* The offset of a mark from its line and column, which counts characters, since the offsets of libfyaml 0.7.12 are
- * wrong if the input is read in pieces.  Starts from the last mark: marks are nearly in order. */
+/* The offset of a mark, computed from its line and its column (in characters): the offsets of libfyaml 0.7.12 are wrong
+ * if the input is read in pieces.  Starts from the last mark: marks are nearly in order. */
 static unsigned tree_offset_of (tree *x, const struct fy_mark *mark) {
   static const char bom[] = "\xEF\xBB\xBF"; /* byte order mark, not counted as a column */
   const char *source = x->y->source, *end = source + x->y->size, *p = source + x->offset;
@@ -116,6 +116,7 @@ static int tree_begin (tree *x, struct fy_event *e, pw_yaml_type type) {
 
 /* ---- Events ---- */
 
+/* Refuses aliases, anchors and tags. */
 static int tree_refuse_anchor (tree *x, struct fy_event *e) {
   struct fy_token *anchor = fy_event_get_anchor_token (e), *tag = fy_event_get_tag_token (e);
   struct fy_token *token = e->type == FYET_ALIAS ? e->alias.anchor : anchor ? anchor : tag;
@@ -192,7 +193,7 @@ static const char *tree_hint (const pw_yaml *y, size_t at, const char *message) 
   } known[] = { { "missing comma", "; or a } or ] before it" },
                 { "nested block mapping", "; a text with \": \" in it goes between double quotes" },
                 { "multiline plain key", "; the keys of a map begin in the same column" },
-                { "indendation", "; what belongs together begins in the same column" },
+                { "indendation" /* as libfyaml spells it */, "; what belongs together begins in the same column" },
                 { "indented", "; what belongs together begins in the same column" } };
   size_t begin = at < y->size ? at : y->size, size;
   while (begin > 0 && y->source[begin - 1] != '\n') begin--;

@@ -1,4 +1,4 @@
-/* Finds model files from a name or a path, loads and checks them. */
+/* Finds a model file by its name or path, loads and checks it. */
 #define _XOPEN_SOURCE 700 /* realpath */
 #include <dlfcn.h>
 #include <errno.h>
@@ -7,30 +7,30 @@
 #include "files.h"
 
 struct pw_file {
-  char *name, *path;
-  void *handle;     /* of dlopen; NULL for a text model */
-  pw_yaml *yaml;    /* NULL for others */
-  size_t max_bytes; /* of a text model */
+  char *name, *path; /* the name without its ending; the path with links resolved */
+  void *handle;      /* of dlopen; NULL for a text model */
+  pw_yaml *yaml;     /* the text model; NULL for a plug-in */
+  size_t max_bytes;  /* of a text model */
   const pw_plugin_table *table;
 };
 
 /* ---- Loading ---- */
 
 /* The reason of dlerror, without the path that it puts before it. */
-static const char *plugin_reason (const char *object) {
+static const char *model_reason (const char *object) {
   const char *reason = dlerror ();
   if (reason == NULL) return "unknown reason";
   size_t n = strlen (object);
   return strncmp (reason, object, n) == 0 && strncmp (reason + n, ": ", 2) == 0 ? reason + n + 2 : reason;
 }
 
-static int plugin_load (void *context, const char *object, pw_error *error) {
+static int model_load (void *context, const char *object, pw_error *error) {
   pw_file *f = context;
   errno = 0;
   f->handle = dlopen (object, RTLD_NOW | RTLD_LOCAL);
   if (f->handle == NULL && errno == ENOMEM)
     return pw_fail (error, PW_RESOURCE, "cannot load %s: out of memory", f->path);
-  if (f->handle == NULL) return pw_fail (error, PW_INPUT, "cannot load %s: %s", f->path, plugin_reason (object));
+  if (f->handle == NULL) return pw_fail (error, PW_INPUT, "cannot load %s: %s", f->path, model_reason (object));
   f->table = dlsym (f->handle, "pw_plugin");
   if (f->table == NULL)
     return pw_fail (error, PW_INPUT, "%s is not a Pinwheel model: a model file ends with PW_MODEL (...)", f->path);
@@ -39,44 +39,43 @@ static int plugin_load (void *context, const char *object, pw_error *error) {
 
 /* ---- Finding ---- */
 
-static const char *const plugin_endings[] = { ".so", ".c", ".yaml" };
-enum { PLUGIN_SO, PLUGIN_C, PLUGIN_YAML, PLUGIN_ENDINGS };
+static const char *const model_endings[] = { ".so", ".c", ".yaml" };
+enum { MODEL_SO, MODEL_C, MODEL_YAML, MODEL_ENDINGS };
 
-/* The ending of a name; PLUGIN_ENDINGS if it is none of these. */
-static int plugin_ending (const char *name) {
+/* The ending of a name; MODEL_ENDINGS if it is none of these. */
+static int model_ending (const char *name) {
   int i = 0;
-  while (i < PLUGIN_ENDINGS && !pw_ends_with (name, plugin_endings[i])) i++;
+  while (i < MODEL_ENDINGS && !pw_ends_with (name, model_endings[i])) i++;
   return i;
 }
 
-static int plugin_is_cpp (const char *name) {
+static int model_is_cpp (const char *name) {
   return pw_ends_with (name, ".cpp") || pw_ends_with (name, ".cc") || pw_ends_with (name, ".cxx") ||
          pw_ends_with (name, ".C");
 }
 
-/* Opens the file at f->path, which exists; `shown` is its path as the user knows it. */
-static int plugin_open_path (pw_file *f, const char *shown, pw_error *error) {
-  const char *base = strrchr (f->path, '/');
-  base = base ? base + 1 : f->path;
-  int ending = plugin_ending (base);
-  if (plugin_is_cpp (base))
+/* Opens the file at f->path, which exists; `shown` is its path for messages. */
+static int model_open_path (pw_file *f, const char *shown, pw_error *error) {
+  const char *base = strrchr (f->path, '/') + 1; /* the path is absolute */
+  int ending = model_ending (base);
+  if (model_is_cpp (base))
     return pw_fail (error, PW_INPUT,
                     "%s: a model is compiled as C, not as C++: write it in C, in a file that ends in .c", f->path);
-  if (ending == PLUGIN_ENDINGS) return pw_fail (error, PW_INPUT, "%s: a model file ends in .c, .so or .yaml", f->path);
+  if (ending == MODEL_ENDINGS) return pw_fail (error, PW_INPUT, "%s: a model file ends in .c, .so or .yaml", f->path);
   if (!pw_is_text (base))
     return pw_fail (error, PW_INPUT, "%s: the name of a model file is UTF-8 without control characters", f->path);
   f->name = strdup (base);
   if (f->name == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
-  f->name[strlen (base) - strlen (plugin_endings[ending])] = 0;
-  if (ending == PLUGIN_YAML) {
+  f->name[strlen (base) - strlen (model_endings[ending])] = 0;
+  if (ending == MODEL_YAML) {
     f->yaml = pw_yaml_open (f->path, shown, f->max_bytes, error);
     if (f->yaml) f->table = pw_yaml_table (f->yaml);
     return f->yaml ? PW_OK : error->status;
   }
-  return ending == PLUGIN_C ? pw_compile_file (f->path, NULL, plugin_load, f, error) : plugin_load (f, f->path, error);
+  return ending == MODEL_C ? pw_compile_file (f->path, NULL, model_load, f, error) : model_load (f, f->path, error);
 }
 
-static int plugin_find_path (pw_file *f, const char *path, pw_error *error) {
+static int model_find_path (pw_file *f, const char *path, pw_error *error) {
   struct stat info;
   f->path = realpath (path, NULL);
   if (f->path == NULL)
@@ -88,11 +87,11 @@ static int plugin_find_path (pw_file *f, const char *path, pw_error *error) {
 }
 
 /* Reports an unknown name; suggests a path if the current directory has such a file, else the nearest name. */
-static int plugin_unknown (const pw_search *s, const char *name, pw_error *error) {
+static int model_unknown (const pw_search *s, const char *name, pw_error *error) {
   struct stat info;
   char here[200], unread[300] = ""; /* a file in the current directory; folders that cannot be searched */
-  for (int i = 0; i < PLUGIN_ENDINGS; i++) {
-    snprintf (here, sizeof here, "%s%s", name, plugin_endings[i]);
+  for (int i = 0; i < MODEL_ENDINGS; i++) {
+    snprintf (here, sizeof here, "%s%s", name, model_endings[i]);
     if (stat (here, &info) == 0)
       return pw_fail (error, PW_INPUT, "there is no model \"%s\" on the search path; to use the file here, write ./%s",
                       name, here);
@@ -108,13 +107,13 @@ static int plugin_unknown (const pw_search *s, const char *name, pw_error *error
   return pw_fail (error, PW_INPUT, "there is no model \"%s\" in %s%s%s", name, s->folders, unread, hint);
 }
 
-static int plugin_find_name (pw_file *f, const char *name, pw_error *error) {
+static int model_find_name (pw_file *f, const char *name, pw_error *error) {
   pw_search s;
   int status = pw_search_open (&s, error), first = 0;
   while (first < s.count && strcmp (s.found[first].name, name) != 0) first++;
   const pw_found *found = first < s.count ? &s.found[first] : NULL;
   if (status == PW_OK && found == NULL)
-    status = plugin_unknown (&s, name, error);
+    status = model_unknown (&s, name, error);
   else if (status == PW_OK && first + 1 < s.count && strcmp (found[1].name, name) == 0)
     status = pw_fail (error, PW_INPUT, "two files match the model \"%s\": %s and %s; name one of them by its path",
                       name, found[0].path, found[1].path);
@@ -124,16 +123,16 @@ static int plugin_find_name (pw_file *f, const char *name, pw_error *error) {
   return status;
 }
 
-/* Finds the file; `*shown` is its path as the user knows it. */
-static pw_file *plugin_find (const char *model, const char **shown, pw_error *error) {
+/* Finds a model's file, which is not opened; *shown: its path for messages. */
+static pw_file *model_find (const char *model, const char **shown, pw_error *error) {
   int named = model && *model;
   pw_file *f = named ? calloc (1, sizeof *f) : NULL;
   if (f == NULL) {
     pw_fail (error, named ? PW_RESOURCE : PW_INPUT, named ? "out of memory" : "a model's name or path is missing");
     return NULL;
   }
-  int by_path = strchr (model, '/') || plugin_ending (model) < PLUGIN_ENDINGS || plugin_is_cpp (model);
-  if ((by_path ? plugin_find_path (f, model, error) : plugin_find_name (f, model, error)) == PW_OK) {
+  int by_path = strchr (model, '/') || model_ending (model) < MODEL_ENDINGS || model_is_cpp (model);
+  if ((by_path ? model_find_path (f, model, error) : model_find_name (f, model, error)) == PW_OK) {
     *shown = by_path ? model : f->path;
     return f;
   }
@@ -143,7 +142,7 @@ static pw_file *plugin_find (const char *model, const char **shown, pw_error *er
 
 char *pw_file_find (const char *model, pw_error *error) {
   const char *shown;
-  pw_file *f = plugin_find (model, &shown, error);
+  pw_file *f = model_find (model, &shown, error);
   char *path = f ? f->path : NULL;
   if (f) f->path = NULL;
   pw_file_close (f);
@@ -156,10 +155,11 @@ pw_file *pw_file_open (const char *model, pw_error *error) {
 
 pw_file *pw_file_open_limited (const char *model, size_t max_bytes, pw_error *error) {
   const char *shown;
-  pw_file *f = plugin_find (model, &shown, error);
+  pw_error own = { 0 }, *why = error ? error : &own;
+  pw_file *f = model_find (model, &shown, why);
   if (f == NULL) return NULL;
   f->max_bytes = max_bytes < PW_FILE_MAX_BYTES ? max_bytes : PW_FILE_MAX_BYTES;
-  if (plugin_open_path (f, shown, error) == PW_OK) return f;
+  if (model_open_path (f, shown, why) == PW_OK) return f;
   pw_file_close (f);
   return NULL;
 }
@@ -180,7 +180,7 @@ pw_model *pw_file_model (const pw_file *f, pw_error *error) {
 }
 
 const pw_plugin_table *pw_file_table (const pw_file *f) {
-  return f->table;
+  return f ? f->table : NULL;
 }
 
 const pw_yaml *pw_file_yaml (const pw_file *f) {
@@ -188,11 +188,11 @@ const pw_yaml *pw_file_yaml (const pw_file *f) {
 }
 
 const char *pw_file_name (const pw_file *f) {
-  return f->name;
+  return f ? f->name : NULL;
 }
 
 const char *pw_file_path (const pw_file *f) {
-  return f->path;
+  return f ? f->path : NULL;
 }
 
 int pw_file_tables (const pw_file *f, int (*each) (void *context, const char *path), void *context) {
