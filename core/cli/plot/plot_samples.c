@@ -20,7 +20,7 @@ static int plot_smaller (int a, int b) {
   return a < b ? a : b;
 }
 
-/* A zeroed array; NULL and plots->out_of_memory. */
+/* A zeroed array; NULL, with plots->out_of_memory set. */
 static void *plot_array (pw_plots *plots, int count, size_t size) {
   void *array = pw_arena_alloc (&plots->arena, (size_t)count * size);
   if (array == NULL) plots->out_of_memory = 1;
@@ -53,7 +53,7 @@ static int plot_allocate (pw_plots *plots, pw_error *error) {
   plot_open_tracks (plots, wheels, pw_system_contacts (plots->system));
   plots->sample_size += plots->with_forces ? 2 * plots->links : 0;
   int most = PLOT_NUMBERS / plots->sample_size;
-  plots->planned = 1 + (most < PLOT_FEW ? PLOT_FEW : plot_smaller (most, PLOT_SAMPLES)); /* both ends */
+  plots->planned = 1 + (most < PLOT_FEW ? PLOT_FEW : plot_smaller (most, PLOT_INTERVALS));
   plots->body_index = plot_array (plots, bodies->count + 1, sizeof *plots->body_index);
   plots->shape = plot_array (plots, bodies->drawn, sizeof *plots->shape);
   plots->ground = plot_array (plots, PLOT_DRAWN, sizeof *plots->ground);
@@ -79,7 +79,7 @@ static void plot_choose (pw_plots *plots) {
       plots->wheels.system_index[i++] = e;
 }
 
-/* Reports a folder that cannot be written before the run. */
+/* Locks the folder; an error before the run if it cannot be written. */
 static int plot_try_folder (pw_plots *plots, pw_error *error) {
   plots->lock = pw_cli_lock_folder (plots->figures.folder, error);
   pw_output *probe = plots->lock < 0 ? NULL : pw_figure_data (&plots->figures, "motion.dat", error);

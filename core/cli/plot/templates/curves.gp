@@ -1,5 +1,7 @@
 
-# ---- A family of curves: a block of the data and a label each; more than 12 are coloured by number ----
+# ---- Curves of bodies or wheels, a block of the file `data` each; more than 12 are coloured by number ----
+# Above: data, what ('body' or 'wheel'), curves (their number), label[i] unless there are more than 12, numbers (of all
+# bodies or wheels), number_column of the data.
 
 numbered = curves > 12
 label_length = 0
@@ -16,7 +18,7 @@ legend(bar) = !numbered ? key(legend_top, per_row) : \
   (bar ? 'set colorbox user origin graph 1.02,graph 0 size graph 0.02,graph 1' : 'unset colorbox')
 # Draws column y in units of 10^n against column x.
 draw(x, y, n, titled) = numbered ? \
-  sprintf('plot data using %d:($%d/1e%d):%d with lines lw 0.7 dt 1 lc palette', x, y, n, last) : \
+  sprintf('plot data using %d:($%d/1e%d):%d with lines lw 0.7 dt 1 lc palette', x, y, n, number_column) : \
   sprintf('plot for [i = 1:curves] data index i - 1 using %d:($%d/1e%d) with lines lt i ', x, y, n). \
   (titled ? 'title short(label[i])' : 'notitle')
 
