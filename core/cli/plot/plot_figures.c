@@ -105,10 +105,9 @@ static void data_wheels (FILE *f, const pw_plots *plots, int i) {
   for (int w = 0; w < plots->wheels.drawn; w++) {
     if (!pw_plot_rolls (plots, w)) continue;
     const double *contact = pw_plot_track (plots, i, &plots->wheels, w), half = FIGURES_WHEEL * plots->symbol_unit;
-    const double from[] = { -half, 0 }, to[] = { half, 0 };
     double end[2][2];
-    pw_plot_point (contact, from, end[0]);
-    pw_plot_point (contact, to, end[1]);
+    pw_plot_point (contact, (const double[]){ -half, 0 }, end[0]);
+    pw_plot_point (contact, (const double[]){ half, 0 }, end[1]);
     data_segment (f, end[0], end[1], pw_plot_sample (plots, i)[PLOT_T],
                   plots->body_index[pw_system_element (plots->system, plots->wheels.system_index[w]).body[0]]);
   }

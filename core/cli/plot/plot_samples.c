@@ -90,10 +90,7 @@ static int plot_try_folder (pw_plots *plots, pw_error *error) {
 pw_plots *pw_plots_open (const char *folder, int forces, const pw_model *model, const pw_system *system, double t_end,
                          pw_error *error) {
   pw_plots *plots = malloc (sizeof *plots);
-  if (plots == NULL) {
-    pw_fail (error, PW_RESOURCE, "plots: out of memory");
-    return NULL;
-  }
+  if (plots == NULL) return pw_fail (error, PW_RESOURCE, "plots: out of memory"), NULL;
   *plots = (pw_plots){
     .figures = { .folder = folder, .model = pw_system_name (system), .about = pw_model_table (model)->about },
     .lock = -1,

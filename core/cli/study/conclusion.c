@@ -9,7 +9,11 @@ enum {
   CONCLUSION_WIDTH = 14, /* of a column, at least */
   CONCLUSION_REASON = 70 /* characters of the reason of a failure, at most */
 };
-static const int conclusion_digits[CONCLUSION_COLUMNS] = { 3, 6, 9 };
+/* Correct digits, and the largest relative error that has them. */
+static const struct {
+  int digits;
+  double error;
+} conclusion_required[CONCLUSION_COLUMNS] = { { 3, 1e-3 }, { 6, 1e-6 }, { 9, 1e-9 } };
 
 typedef struct {
   double cpu;         /* [s]; NaN: no run is as accurate */
@@ -45,11 +49,6 @@ static double conclusion_error (const pw_reference *reference, const double *err
   return largest;
 }
 
-/* The largest relative error that column k permits. */
-static double conclusion_required (int k) {
-  return pow (10, -conclusion_digits[k]);
-}
-
 /* ---- Costs ---- */
 
 /* The least processor time of a method for the required relative error, interpolated between neighbouring runs on
@@ -82,8 +81,8 @@ static void conclusion_find_cheapest (pw_conclusion *conclusion) {
   for (int k = 0; k < CONCLUSION_COLUMNS; k++) {
     conclusion->best[k] = -1;
     conclusion->cheapest[k].cpu = NAN;
-    for (int i = 0; i < conclusion->study->methods && conclusion->uncertainty <= conclusion_required (k); i++) {
-      conclusion_cost candidate = conclusion_least_cost (conclusion, i, conclusion_required (k));
+    for (int i = 0; i < conclusion->study->methods && conclusion->uncertainty <= conclusion_required[k].error; i++) {
+      conclusion_cost candidate = conclusion_least_cost (conclusion, i, conclusion_required[k].error);
       if (isnan (candidate.cpu) || conclusion->cheapest[k].cpu <= candidate.cpu) continue;
       conclusion->cheapest[k] = candidate;
       conclusion->best[k] = i;
@@ -121,10 +120,10 @@ static char *conclusion_format_time (char text[40], conclusion_cost c) {
 
 /* The time for column k over that of the cheapest method: "2.5", "<30", "uncertain", "not reached" */
 static char *conclusion_format_ratio (char text[40], const pw_conclusion *conclusion, int method, int k) {
-  conclusion_cost c = conclusion_least_cost (conclusion, method, conclusion_required (k));
+  conclusion_cost c = conclusion_least_cost (conclusion, method, conclusion_required[k].error);
   double ratio = c.cpu / conclusion->cheapest[k].cpu;
   snprintf (text, 40, "%s%.*f", c.is_upper_bound ? "<" : "", ratio < 9.95, ratio);
-  if (conclusion->uncertainty > conclusion_required (k)) return strcpy (text, "uncertain");
+  if (conclusion->uncertainty > conclusion_required[k].error) return strcpy (text, "uncertain");
   return isnan (c.cpu) ? strcpy (text, "not reached") : text;
 }
 
@@ -133,7 +132,8 @@ static void conclusion_print_table (const pw_conclusion *conclusion) {
   char text[40];
   int any_upper_bound = 0, any_uncertain = 0;
   printf ("%-*s", conclusion->width, "");
-  for (int k = 0; k < CONCLUSION_COLUMNS; k++) printf ("  %*d digits", conclusion->width - 7, conclusion_digits[k]);
+  for (int k = 0; k < CONCLUSION_COLUMNS; k++)
+    printf ("  %*d digits", conclusion->width - 7, conclusion_required[k].digits);
   printf ("\n%-*s", conclusion->width, "cheapest");
   for (int k = 0; k < CONCLUSION_COLUMNS; k++)
     printf ("  %*s", conclusion->width, conclusion->best[k] < 0 ? "-" : conclusion->study->method[conclusion->best[k]]);
