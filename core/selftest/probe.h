@@ -67,8 +67,9 @@ void pw_probe_update (pw_probe *probe, pw_probe_move move, double h);
 /* Calls a function of the type, named in reports, that fills n numbers; NULL gives zeros. */
 void pw_probe_evaluate (pw_probe *probe, pw_batch_function *f, const char *name, int n, double *out);
 
-/* Functions of the type: g, eta, gamma, force; J w; J v - eta. */
-pw_probe_function pw_probe_g, pw_probe_eta, pw_probe_gamma, pw_probe_force, pw_probe_Jw, pw_probe_drift;
+/* Functions of the type; J w; J v - eta. */
+pw_probe_function pw_probe_g, pw_probe_g_size, pw_probe_eta, pw_probe_J, pw_probe_gamma, pw_probe_force,
+    pw_probe_energy, pw_probe_power, pw_probe_loss, pw_probe_Jw, pw_probe_drift;
 
 /* out += factor x block x vector, element by element: the block has `rows` rows per element, the vector an entry for
  * each coordinate of the scene.  terms, unless NULL, += absolute values of the terms. */

@@ -12,11 +12,8 @@
  * size, from truncation and from round-off alike (Dennis & Schnabel 1983, section 5.6).  All numbers in the scene are
  * of the order 1, so the sizes of a function and of its third derivative are about the same. */
 #define SELFTEST_STEP 0x1p-17
+#define SELFTEST_BOUND (100 * cbrt (DBL_EPSILON) * cbrt (DBL_EPSILON))
 static const char selftest_reason[] = "100 eps^(2/3) of the largest term: central differences";
-
-static double selftest_bound (void) {
-  return 100 * cbrt (DBL_EPSILON) * cbrt (DBL_EPSILON);
-}
 
 /* The numbers that a function fills, with guards. */
 typedef double selftest_numbers[PW_PROBE_OUT + PW_PROBE_GUARD];
@@ -55,7 +52,7 @@ static void selftest_compare (pw_probe *probe, pw_check check, int rows, int col
   char where[120];
   snprintf (where, sizeof where, "%s, row %d, column %d: %.9g, expected %.9g", probe->batch->name[at / (rows * cols)],
             at / cols % rows, at % cols, value[at], reference[at]);
-  pw_probe_record (probe->report, check, worst, selftest_bound (), selftest_reason, where);
+  pw_probe_record (probe->report, check, worst, SELFTEST_BOUND, selftest_reason, where);
 }
 
 /* ---- First-order checks ---- */
@@ -71,7 +68,7 @@ static void selftest_holonomic (pw_probe *probe) {
       if (pw_global (probe->batch, i / (probe->rows * probe->cols), i % probe->cols) == j)
         reference[i] = derivative[i / probe->cols];
   }
-  pw_probe_evaluate (probe, probe->kind->J, "J", n * probe->cols, value);
+  pw_probe_J (probe, value);
   selftest_compare (probe, PW_CHECK_J, probe->rows, probe->cols, size, value, reference);
 
   size = selftest_derivative (probe, pw_probe_g, PW_PROBE_TIME, n, reference);
@@ -80,7 +77,7 @@ static void selftest_holonomic (pw_probe *probe) {
   selftest_compare (probe, PW_CHECK_eta, probe->rows, 1, size, value, reference);
 
   pw_probe_g (probe, reference);
-  pw_probe_evaluate (probe, probe->kind->g_size, "g_size", n, value);
+  pw_probe_g_size (probe, value);
   for (int i = 0; i < n; i++) { /* a sufficient g_size is its own reference */
     double least = fabs (reference[i]);
     reference[i] = fmax (value[i], least);
@@ -148,7 +145,7 @@ static void selftest_blocks (pw_probe *probe) {
   selftest_numbers J, gamma, force;
   int n = probe->elements * probe->rows;
   pw_probe_update (probe, PW_PROBE_TIME, 0);
-  pw_probe_evaluate (probe, probe->kind->J, "J", n * probe->cols, J);
+  pw_probe_J (probe, J);
   pw_probe_gamma (probe, gamma);
   pw_probe_force (probe, force);
   double size_J = selftest_largest (n * probe->cols, J), size_gamma = selftest_largest (n, gamma);
@@ -225,10 +222,6 @@ static void selftest_saturation (pw_probe *probe) {
 
 /* ---- Energy ---- */
 
-static void selftest_energy (pw_probe *probe, double *out) {
-  pw_probe_evaluate (probe, probe->kind->energy, "energy", probe->elements, out);
-}
-
 /* x . y of n numbers */
 static double selftest_dot (int n, const double *x, const double *y) {
   double sum = 0;
@@ -264,10 +257,10 @@ static int selftest_satisfy (pw_probe *probe, int e) {
  * by its constraints. */
 static void selftest_power_of (pw_probe *probe, int e) {
   selftest_numbers derivative, force, power, loss, Jv;
-  double sum = 0, size = selftest_derivative (probe, selftest_energy, PW_PROBE_MOTION, probe->elements, derivative);
+  double sum = 0, size = selftest_derivative (probe, pw_probe_energy, PW_PROBE_MOTION, probe->elements, derivative);
   pw_probe_force (probe, force);
-  pw_probe_evaluate (probe, probe->kind->power, "power", probe->elements, power);
-  pw_probe_evaluate (probe, probe->kind->loss, "loss", probe->elements, loss);
+  pw_probe_power (probe, power);
+  pw_probe_loss (probe, loss);
   size = fmax (size, fmax (fabs (power[e]), fabs (loss[e])));
   for (int c = 0; c < probe->cols; c++) sum += force[e * probe->cols + c] * pw_probe_local (probe, probe->v, e, c);
   if (probe->rows > 0) {
@@ -282,7 +275,7 @@ static void selftest_power_of (pw_probe *probe, int e) {
   char where[120];
   snprintf (where, sizeof where, "%s: %.9g, expected %.9g", probe->batch->name[e], sum,
             power[e] - loss[e] - derivative[e]);
-  pw_probe_record (probe->report, PW_CHECK_power, error, selftest_bound (), selftest_reason, where);
+  pw_probe_record (probe->report, PW_CHECK_power, error, SELFTEST_BOUND, selftest_reason, where);
   if (probe->kind->loss) pw_probe_record (probe->report, PW_CHECK_loss, fmax (-loss[e], 0), 0, "exact", where);
 }
 

@@ -75,9 +75,9 @@ static void scene_compare (scene_test *test, pw_check check, int rows, pw_probe_
 
 static void scene_holonomic (scene_test *test) {
   int n = test->probe.elements * test->probe.rows;
-  pw_probe_evaluate (&test->probe, test->probe.kind->J, "J", n * test->probe.cols, test->block);
+  pw_probe_J (&test->probe, test->block);
   pw_probe_multiply (&test->probe, test->block, test->probe.rows, test->probe.dq, 1, test->value, test->terms);
-  pw_probe_evaluate (&test->probe, test->probe.kind->g_size, "g_size", n, test->size);
+  pw_probe_g_size (&test->probe, test->size);
   scene_compare (test, PW_CHECK_J, test->probe.rows, pw_probe_g, PW_PROBE_Q);
   pw_probe_eta (&test->probe, test->value);
   for (int i = 0; i < n; i++) test->value[i] *= -test->probe.tau;
@@ -88,7 +88,7 @@ static void scene_acceleration (scene_test *test) {
   int n = test->probe.elements * test->probe.rows;
   double tau = test->probe.tau;
   pw_probe_gamma (&test->probe, test->derivative);
-  pw_probe_evaluate (&test->probe, test->probe.kind->J, "J", n * test->probe.cols, test->block);
+  pw_probe_J (&test->probe, test->block);
   pw_probe_multiply (&test->probe, test->block, test->probe.rows, test->probe.a, tau, test->value, test->terms);
   for (int i = 0; i < n; i++)
     test->value[i] -= tau * test->derivative[i], test->terms[i] += fabs (tau * test->derivative[i]);

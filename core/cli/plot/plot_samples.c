@@ -16,10 +16,6 @@ int pw_plot_rolls (const pw_plots *plots, int wheel) {
 
 /* ---- Opening ---- */
 
-static int plot_smaller (int a, int b) {
-  return a < b ? a : b;
-}
-
 /* A zeroed array; NULL, with plots->out_of_memory set. */
 static void *plot_array (pw_plots *plots, int count, size_t size) {
   void *array = pw_arena_alloc (&plots->arena, (size_t)count * size);
@@ -30,8 +26,8 @@ static void *plot_array (pw_plots *plots, int count, size_t size) {
 /* Makes room for the numbers of tracks in a sample. */
 static void plot_open_tracks (pw_plots *plots, pw_tracks *tracks, int count) {
   tracks->count = count;
-  tracks->drawn = plot_smaller (count, PLOT_DRAWN);
-  tracks->curves = plot_smaller (tracks->drawn, PLOT_CURVES);
+  tracks->drawn = count < PLOT_DRAWN ? count : PLOT_DRAWN;
+  tracks->curves = count < PLOT_CURVES ? count : PLOT_CURVES;
   tracks->offset = plots->sample_size;
   plots->sample_size += tracks->numbers * tracks->drawn;
   tracks->system_index = plot_array (plots, tracks->drawn, sizeof *tracks->system_index);
@@ -47,13 +43,13 @@ static int plot_allocate (pw_plots *plots, pw_error *error) {
     .file = "wheels.dat", .columns = "t [s], x [m], y [m], heading [rad]", .noun = "wheel", .numbers = 3
   };
   pw_model_elements (plots->model, &plots->links);
-  plots->links = plot_smaller (plots->links, PLOT_DRAWN);
+  if (plots->links > PLOT_DRAWN) plots->links = PLOT_DRAWN;
   plots->sample_size = PLOT_FIRST;
   plot_open_tracks (plots, bodies, pw_system_bodies (plots->system));
   plot_open_tracks (plots, wheels, pw_system_contacts (plots->system));
   plots->sample_size += plots->with_forces ? 2 * plots->links : 0;
   int most = PLOT_NUMBERS / plots->sample_size;
-  plots->planned = 1 + (most < PLOT_FEW ? PLOT_FEW : plot_smaller (most, PLOT_INTERVALS));
+  plots->planned = 1 + (most < PLOT_FEW ? PLOT_FEW : most < PLOT_INTERVALS ? most : PLOT_INTERVALS);
   plots->body_index = plot_array (plots, bodies->count + 1, sizeof *plots->body_index);
   plots->shape = plot_array (plots, bodies->drawn, sizeof *plots->shape);
   plots->ground = plot_array (plots, PLOT_DRAWN, sizeof *plots->ground);

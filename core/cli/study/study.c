@@ -53,18 +53,16 @@ static int methods_add_pattern (pw_study *study, char *pattern, pw_error *error)
 }
 
 int pw_study_read_methods (pw_study *study, const char *text, pw_error *error) {
-  int status = PW_OK;
-  for (const char *rest = text; status == PW_OK; rest++) {
+  for (const char *rest = text;; rest++) {
     char pattern[STUDY_NAME];
     size_t n = strcspn (rest, ",");
     if (n == 0 || n >= sizeof pattern)
       return pw_fail (error, PW_INPUT, "--methods \"%.80s\": %s", text, n ? "too long a name" : "a name is missing");
     snprintf (pattern, sizeof pattern, "%.*s", (int)n, rest);
-    status = methods_add_pattern (study, pattern, error);
+    int status = methods_add_pattern (study, pattern, error);
     rest += n;
-    if (*rest == 0) break;
+    if (status != PW_OK || *rest == 0) return status;
   }
-  return status;
 }
 
 /* ---- Rows ---- */
