@@ -1,5 +1,4 @@
-/* N four-bar linkages in a row: N + 1 vertical cranks at x = 0, l, ..., N l and N couplers on their tops, all of
- * length l.
+/* N four-bar linkages in a row: N + 1 vertical cranks at x = 0, l, ..., N l and N couplers, all of length l.
  *
  * When the cranks are horizontal the configuration is singular: N constraint equations become dependent and the motion
  * could branch; the cranks of the reference solution stay parallel, at the angle theta to the horizontal:

@@ -62,8 +62,7 @@ static point centre (point P, point Q, point R) {
   return (point){ (P.x + Q.x + R.x) / 3, (P.y + Q.y + R.y) / 3, (P.vx + Q.vx + R.vx) / 3, (P.vy + Q.vy + R.vy) / 3 };
 }
 
-/* A uniform triangular plate with the mass of bars along its sides.  Its initial angle is 0: the axes of its frame are
- * those of the world. */
+/* A uniform triangular plate with the mass of bars along its sides.  Its initial angle is 0. */
 static void add_plate (pw_model *m, const leg *p, const char *name, point P, point Q, point R) {
   double q = distance (P, Q), r = distance (Q, R), s = distance (R, P), u = p->size;
   double mass = p->density * (q + r + s) * u;

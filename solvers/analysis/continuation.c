@@ -49,8 +49,6 @@ int pw_branch_open (pw_branch *b, const pw_branch_problem *problem, pw_error *er
 void pw_branch_close (pw_branch *b) {
   free (b->memory);
   free (b->pivot);
-  b->memory = NULL;
-  b->pivot = NULL;
 }
 
 /* ---- Newton's method ---- */

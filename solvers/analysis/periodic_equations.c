@@ -215,8 +215,7 @@ static int equations_block (pw_periodic *x, int first, int count, int to, double
   return PW_OK;
 }
 
-/* In coordinates whose first k ones span the shifts, the monodromy matrix is block triangular: the first diagonal block
- * has the trivial multipliers. */
+/* In coordinates that begin with the shifts, the monodromy matrix is block triangular: the first block is trivial. */
 int pw_periodic_multipliers (pw_periodic *x, const double *u, int *trivial) {
   int n = x->n, size = x->size, lwork = 34 * size;
   double *S = x->monodromy + size * size, *tau = S + size * size, *work = tau + size;

@@ -38,9 +38,9 @@ static int steady_arrays (pw_steady *x) {
     { &x->null_space, (most + 1) * (most + 1) },
   };
   x->memory = pw_alloc_arrays (array, sizeof array / sizeof *array);
-  x->cyclic = calloc (n + 1, 1);
-  x->solution = calloc (2 * n + 1, sizeof *x->solution);
-  x->hold = calloc (holds + 1, sizeof *x->hold);
+  x->cyclic = pw_arena_alloc (&x->arena, n);
+  x->solution = pw_arena_alloc (&x->arena, 2 * n * sizeof *x->solution);
+  x->hold = pw_arena_alloc (&x->arena, holds * sizeof *x->hold);
   if (!x->memory || !x->cyclic || !x->solution || !x->hold) return PW_RESOURCE;
   if (holds) memcpy (x->hold, x->settings.hold, holds * sizeof *x->hold);
   for (int j = 0; j < 2 * x->n; j++) x->solution[j].state = j;
@@ -140,9 +140,7 @@ void pw_steady_close (pw_steady *x) {
   for (pw_place place = PW_HERE; place < PW_PLACES; place++) pw_steady_close_system (x, place);
   pw_branch_close (&x->branch);
   pw_linear_free (&x->linear);
-  free (x->cyclic);
-  free (x->solution);
-  free (x->hold);
+  pw_arena_free (&x->arena);
   free (x->memory);
   free (x);
 }
@@ -157,18 +155,13 @@ int pw_steady_symmetries (const pw_steady *x) {
 
 /* ---- Solutions ---- */
 
-/* Remembers a solution, where later runs are opened. */
-static void steady_remember (pw_steady *x) {
-  x->solved = 1;
-  for (int j = 0; j < x->n; j++) x->solution[j].value = x->q[j], x->solution[x->n + j].value = x->v[j];
-}
-
 int pw_steady_motion_at (pw_steady *x, const double *u, pw_steady_motion *out, pw_error *error) {
   int status = pw_steady_open_system (x, PW_HERE, pw_steady_parameter (x, u));
   if (status != PW_OK) return *error = x->why, error->status;
   pw_run *r = x->system[PW_HERE].run;
   pw_steady_state (x, u);
-  steady_remember (x);
+  x->solved = 1;
+  for (int j = 0; j < x->n; j++) x->solution[j].value = x->q[j], x->solution[x->n + j].value = x->v[j];
   memcpy (r->q, x->q, (size_t)x->n * sizeof *r->q);
   memcpy (r->v, x->v, (size_t)x->n * sizeof *r->v);
   pw_linear_free (&x->linear);

@@ -85,8 +85,7 @@ static void steady_residual (pw_steady *x, pw_place place, double *F) {
 
 /* ---- Derivatives ---- */
 
-/* The change of the residuals by the variation (dq, dv) in l->dx and by the change dw of the angular velocity of the
- * whole. */
+/* The change of the residuals by the variation (dq, dv) in l->dx and the change dw of the angular velocity w. */
 static void steady_change (pw_steady *x, double dw, double *F) {
   pw_linearisation *l = &x->system[PW_HERE].linearisation;
   int n = x->n;

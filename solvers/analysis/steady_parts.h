@@ -47,7 +47,8 @@ struct pw_steady {
   int unstable, neutral; /* eigenvalues at the point reached: growing, with real part 0 */
   int sought;            /* index of the eigenvalue whose change of sign is located */
   int neutral_at_ends;   /* `neutral` at both ends of the step; -1: they differ */
-  char *memory;
+  char *memory;          /* of the numbers */
+  pw_arena arena;        /* of the other arrays */
 };
 
 /* ---- steady_symmetries.c ---- */
@@ -69,8 +70,7 @@ void pw_steady_velocities (const pw_steady *x, const double *rates, const double
 /* out: orthonormal rows of length n that span the null space of M (rows x n, by columns, destroyed; rows >= n).
  * Singular values up to the tolerance, or up to round-off, count as 0.  Returns the number of rows, or a status < 0. */
 int pw_null_space (int rows, int n, double *M, double tolerance, double *out);
-/* A state near the run's: every coordinate and velocity differs by up to `distance`, in units of the scene, in the
- * irregular direction `number` = 0, 1, ... */
+/* A state near the run's, at most `distance` units of the scene away: an irregular one for each `number`. */
 void pw_irregular_state (const pw_run *r, double distance, int number, double *q, double *v);
 /* Finds the symmetries of the system.  PW_OK, PW_RESOURCE or PW_RETRY. */
 int pw_steady_find_symmetries (pw_steady *x);

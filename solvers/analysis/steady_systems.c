@@ -28,10 +28,9 @@ static int steady_open_run (pw_steady *x, pw_place place, const pw_system *s) {
     x->system[place].run = pw_run_open (s, "rk4+projection", &settings, &x->why);
   }
   if (x->system[place].run == NULL) return x->why.status;
-  if (pw_linear_open (&x->system[place].linearisation, x->system[place].run, PW_WITHOUT_MODES,
-                      PW_STEADY_MAX_COORDINATES) == PW_OK)
-    return PW_OK;
-  return pw_fail_memory (s, &x->why);
+  int status = pw_linear_open (&x->system[place].linearisation, x->system[place].run, PW_WITHOUT_MODES,
+                               PW_STEADY_MAX_COORDINATES);
+  return status == PW_OK ? PW_OK : pw_fail_memory (s, &x->why);
 }
 
 int pw_steady_open_system (pw_steady *x, pw_place place, double value) {

@@ -20,8 +20,7 @@ static int shapes_order (const void *a, const void *b) {
   return p[0] != q[0] ? (p[0] > q[0]) - (p[0] < q[0]) : (p[1] > q[1]) - (p[1] < q[1]);
 }
 
-/* The convex hull of the attachment points and the centre of mass, by monotone chains (Andrew 1979): below from left to
- * right, then above from right to left. */
+/* The convex hull by monotone chains (Andrew 1979): below from left to right, then above from right to left. */
 static void shapes_outline (pw_plot_body *shape) {
   double point[PLOT_ATTACHMENTS + 1][2] = { { 0, 0 } }, hull[2 * PLOT_ATTACHMENTS + 2][2], size = 0;
   int n = shape->attachments + 1, corners = 0;

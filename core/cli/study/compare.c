@@ -295,9 +295,8 @@ static int compare_begin (pw_study *study, pw_error *error) {
 
 static void compare_conclude (const pw_study *study) {
   const pw_compare *compare = (const pw_compare *)study;
-  if (!compare->concludes) return;
-  if (compare->table) putchar ('\n');
-  pw_conclusion_print (study, &compare->reference, COLUMN_ERROR + MOTION_LARGEST);
+  if (compare->concludes && compare->table) putchar ('\n');
+  if (compare->concludes) pw_conclusion_print (study, &compare->reference, COLUMN_ERROR + MOTION_LARGEST);
 }
 
 /* Work-precision diagrams of lengths and of angles, if their errors are known. */

@@ -248,10 +248,9 @@ static int study_perform (pw_study *study, pw_error *error) {
   if (status == PW_OK && study->engine.code == NULL)
     printf ("all runs use the general engine: %s\n\n", study->engine.reason);
   pw_study_begin_progress (study, pw_file_name (study->compiled.file), study->type->row_noun, study->rows);
-  if (status == PW_OK && study->type->timed)
-    status = pw_study_parallel (study, study->methods, study_measure_method, study, error);
-  else if (status == PW_OK)
-    status = pw_study_parallel (study, study->rows, study_measure_row, study, error);
+  if (status == PW_OK)
+    status = study->type->timed ? pw_study_parallel (study, study->methods, study_measure_method, study, error)
+                                : pw_study_parallel (study, study->rows, study_measure_row, study, error);
   if (status == PW_RETRY && pw_stop) status = study_write_kept (study, error);
   if (status == PW_OK && study->type->conclude) study->type->conclude (study);
   pw_stop_release ();
