@@ -123,7 +123,7 @@ static int branch_descend (pw_branch *b, double *u, pw_error *error) {
  * damping |F|, which leads to the nearest of solutions that are not isolated (Yamashita & Fukushima 2001). */
 static int branch_iterate (pw_branch *b, double *u, const double *c, double damping, pw_error *error) {
   int n = b->problem.unknowns + 1, status;
-  double before = INFINITY;
+  double before = b->residual = INFINITY;
   for (b->iterations = 0;; b->iterations++) {
     status = branch_evaluate (b, u, 1, error);
     if (status != PW_OK) return status;

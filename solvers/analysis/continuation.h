@@ -58,7 +58,7 @@ typedef struct {
   int max_points;        /* of a branch */
 
   int iterations;  /* of the last solution */
-  double residual; /* largest |F_i| there, or where the iteration stopped */
+  double residual; /* largest |F_i| there, or where the iteration stopped; INFINITY: F could not be evaluated */
   int folded;      /* 1: p has an extremum between the last two points */
   /* Points of the last step not yet returned, in order; those before the last one are events. */
   pw_branch_event queue[PW_BRANCH_QUEUE];
