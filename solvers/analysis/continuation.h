@@ -54,16 +54,16 @@ typedef struct {
   double step;           /* length of the next step */
   double max_change;     /* of p by a step, as predicted along the tangent */
   double min_step;       /* shortest step */
-  double event_accuracy; /* of pw_branch_fraction of an event */
+  double event_accuracy; /* of pw_branch_event.fraction */
   int max_points;        /* of a branch */
 
   int iterations;  /* of the last solution */
-  double residual; /* largest |F_i| there, or where the iteration stopped; INFINITY: F could not be evaluated */
+  double residual; /* largest |F_i| there, or where the iteration stopped; INFINITY: it could not begin */
   int folded;      /* 1: p has an extremum between the last two points */
   /* Points of the last step not yet returned, in order; those before the last one are events. */
   pw_branch_event queue[PW_BRANCH_QUEUE];
   int queued, returned;
-  /* private */
+  /* private; F, J and pivot serve callers as scratch, too */
   int steps, ended;
   pw_branch_point first, next, side[2];
   int bounded; /* 1: steps beyond p = 0 to 1 or past p of the first point are refused */

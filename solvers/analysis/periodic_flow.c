@@ -6,8 +6,8 @@
 
 enum {
   FLOW_MULTIPLES = 24, /* of the period of a signal, that are tried as a common period */
-  FLOW_PERIODS = 3,    /* in which signals are compared, */
-  FLOW_TIMES = 20,     /* and if the period is free, multiples of the scale of time T */
+  FLOW_PERIODS = 3,    /* during which signals are compared with those one period later */
+  FLOW_TIMES = 20,     /* multiples of the scale of time T during which they must not change if the period is free */
   /* Largest ratio of the steps of a trial of Newton's method to those of the motion that it is to improve: a trial far
    * away, with enormous velocities, would take millions. */
   FLOW_STEPS = 20,

@@ -21,7 +21,7 @@ struct pw_periodic {
     double period;  /* of its signals, verified [s]; 0: not yet */
   } system[PW_PLACES];
   pw_branch branch;
-  double *u; /* unknowns: 2 n of the state, displacement along symmetries in a period, free period; parameter */
+  double *u;          /* scaled: 2 n of the state, displacement along symmetries in a period, free period; parameter */
   double last_period; /* the period of the last motion, or a guess of a free one [s] */
   /* Of the last flow: state at its beginning and end, with accelerations there. */
   double *y0, *y1, *a0, *a1; /* 2 n, 2 n, n, n */
@@ -29,14 +29,14 @@ struct pw_periodic {
   int size;                  /* number of minimal coordinates of changes of the initial state */
   double *basis, *Phi; /* 2 n x size, by columns: changes of the initial state, of the state after a period, by each */
   double *dual;        /* size x 2 n, by columns: minimal coordinates of a change of each entry by its unit */
-  long steps;          /* of the motion last computed at a solution or a Newton iterate; 0: not yet known */
+  long steps;          /* of the run at the last iterate of Newton's method; 0: not yet known */
   double *monodromy;   /* size x size, by columns: the monodromy matrix; then scratch */
   double *re, *im;     /* size: its eigenvalues, the multipliers */
   double *work, *beside; /* scratch: rates; unknowns and residuals beside a point */
   pw_error why;          /* the last reason why a motion could not be computed */
   int unstable;          /* multipliers outside the unit circle at the last point; -1: not known */
   int sought;            /* index of the multiplier whose crossing of the unit circle is located */
-  int on_circle;         /* 1: this multiplier is on the unit circle before it crosses it */
+  int on_circle;         /* 1: this multiplier moves on the unit circle until it leaves it */
   char *memory;
 };
 

@@ -12,8 +12,8 @@ enum {
 };
 static const double STEADY_EXACT = 1e-9, /* largest residual of a solution, in units of the scene */
     STEADY_SLOW = 1e-4,    /* rates that may be round-off at a double root: more than the root of STEADY_EXACT */
-    SUGGEST_CHANGE = 1e-8, /* least square of the change of a quantity along a family that may be held, */
-    SUGGEST_LEFT = 1e-6;   /* and of the part of this change that is not held already, relative to it */
+    SUGGEST_CHANGE = 1e-8, /* a quantity is worth holding if the square of its change along the family is larger, */
+    SUGGEST_LEFT = 1e-6;   /* and the part of this square that is not held already, relative to the whole, is larger */
 
 /* ---- Opening ---- */
 

@@ -59,7 +59,7 @@ enum { PW_RATE_X, PW_RATE_Y, PW_RATE_TURN, PW_RATE_ANGLES };
 static inline int pw_steady_rate_count (const pw_system *s) {
   return PW_RATE_ANGLES + s->coords - 2 * s->bodies;
 }
-/* The rate that changes coordinate j, an angle, alone. */
+/* The index of the rate that changes the angle of coordinate j alone. */
 static inline int pw_steady_angle_rate (const pw_system *s, int j) {
   return PW_RATE_ANGLES + (j < 3 * s->bodies ? j / 3 : j - 2 * s->bodies);
 }

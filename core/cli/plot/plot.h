@@ -53,9 +53,9 @@ void pw_animation_page (FILE *f, const char *const *panel, void (*begin) (FILE *
 /* ---- Private to this folder ---- */
 
 enum {
-  PLOT_INTERVALS = 1600,  /* between the samples of a run */
-  PLOT_FEW = 240,         /* the fewest of these, for a large scene */
-  PLOT_NUMBERS = 8000000, /* numbers stored, unless that permits less than PLOT_FEW intervals */
+  PLOT_INTERVALS = 1600,  /* intervals between the samples of a run, at most */
+  PLOT_FEW = 240,         /* the same at least, for a large scene */
+  PLOT_NUMBERS = 8000000, /* numbers stored at most, unless that permits fewer than PLOT_FEW intervals */
   PLOT_DRAWN = 1000,      /* bodies, and wheels, drawn at most: more cannot be distinguished */
   PLOT_VERTICES = 32,     /* of a stroke, at most */
   PLOT_HATCHES = 60,      /* strokes of the hatching of the ground, at most */
@@ -125,7 +125,7 @@ struct pw_plots {
   double t_end;            /* [s] */
   int samples, planned;    /* stored so far; in all */
   int sample_size;         /* numbers of a sample */
-  double size;             /* largest dimension of the initial configuration [m] */
+  double size;             /* diagonal of the box around the initial configuration [m] */
   double symbol_unit;      /* u of symbols [m] */
   pw_tracks bodies, wheels;
   int links, grounds;   /* elements drawn, before pw_plot_find_shapes at most; points of the ground */

@@ -1,9 +1,9 @@
 
 # ---- Look of all figures ----
 # A figure is a template NAME.gp; a line "# include OTHER.gp" stands for the contents of another one.  Pinwheel writes
-# the variables that a template needs above it: here name of the figure, name of the model, incomplete ('' or how far
-# the run got), about (the title), width [pt].  A template computes `height` and draws the figure in each of the forms:
-# eval page(form), panels, eval finish.
+# variables above the template, which lists them after "Above:"; for all figures name (of the figure), model (its name),
+# incomplete ('', or how far the run got), about (the title) and width [pt].  A template computes `height` and draws the
+# figure in each of the forms: eval page(form), panels, eval finish.
 #
 # Lengths are in points.  panel(x0, x1, y0, y1) places a plot, measured from the upper left corner of the page.
 # key(y, columns) places the legend of the next plot; n entries in rows of `columns` take the height rows(n, columns).
