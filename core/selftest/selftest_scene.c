@@ -26,7 +26,7 @@ typedef struct {
 
 /* ---- Comparing ---- */
 
-/* The largest of `terms` in the element of entry k: to these the errors by round-off of the moved positions are
+/* The largest of `terms` in the element of entry k, to which errors by round-off of the moved positions are
  * proportional. */
 static double scene_largest_term (const scene_test *test, int k, int rows) {
   double most = 0;
@@ -48,7 +48,7 @@ static void scene_differences (scene_test *test, pw_probe_function *f, pw_probe_
     for (int k = 0; k < n; k++) test->derivative[k] += weight[i] * (test->plus[k] - test->minus[k]) / (2 * far);
   }
   for (int k = 0; k < n; k++) {
-    double noise =
+    double noise = /* 256: a margin */
         256 * DBL_EPSILON * ((fabs (test->plus[k]) + test->size[k]) / h + scene_largest_term (test, k, rows));
     double error = fmax (0, fabs (test->value[k] - test->derivative[k]) - noise) /
                    (test->terms[k] + fabs (test->derivative[k]) + DBL_MIN);

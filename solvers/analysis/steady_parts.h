@@ -63,7 +63,7 @@ static inline int pw_steady_rate_count (const pw_system *s) {
 static inline int pw_steady_angle_rate (const pw_system *s, int j) {
   return PW_RATE_ANGLES + (j < 3 * s->bodies ? j / 3 : j - 2 * s->bodies);
 }
-/* The rates of a combination of symmetries, from their coefficients divided by a unit. */
+/* rates = sum of coefficient[k] / unit times the rates of symmetry k. */
 void pw_steady_combine (const pw_steady *x, const double *coefficient, double unit, double *rates);
 /* The velocities that rates cause at a configuration. */
 void pw_steady_velocities (const pw_steady *x, const double *rates, const double *q, double *v);
@@ -72,9 +72,9 @@ void pw_steady_velocities (const pw_steady *x, const double *rates, const double
 int pw_null_space (int rows, int n, double *M, double tolerance, double *out);
 /* A state near the run's, at most `distance` units of the scene away: an irregular one for each `number`. */
 void pw_irregular_state (const pw_run *r, double distance, int number, double *q, double *v);
-/* Finds the symmetries of the system.  PW_OK, PW_RESOURCE or PW_RETRY. */
+/* Finds the symmetries of the system.  A status; PW_RETRY and PW_METHOD: the equations are singular. */
 int pw_steady_find_symmetries (pw_steady *x);
-/* Finds the symmetries that leave what is held unchanged, at the state x->q, x->v. */
+/* Finds the symmetries that leave what is held unchanged, at the state x->q, x->v.  A status. */
 int pw_steady_find_free_symmetries (pw_steady *x);
 /* The largest difference of two states up to symmetries and whole turns, in units of the scene; of numbers above 1 in
  * these units, relative to them. */
@@ -96,9 +96,9 @@ static inline int pw_steady_equations (const pw_steady *x) {
 /* pw_branch_problem.evaluate, .same. */
 int pw_steady_evaluate (void *steady, const double *u, double *F, double *dF, pw_error *error);
 int pw_steady_same_motion (void *steady, const double *u, const double *other);
-/* Sets x->q, x->v and x->rates to those of unknowns u, and what varies among what is held to its value there. */
+/* Sets x->q, x->v and x->rates to those of the unknowns u, and in x->hold the value that varies. */
 void pw_steady_state (pw_steady *x, const double *u);
-/* The unknowns of the steady motion nearest to the velocities v at q.  PW_METHOD if LAPACK fails. */
+/* Sets u to the unknowns of the steady motion at q whose velocities are nearest to v.  PW_METHOD if LAPACK fails. */
 int pw_steady_nearest (pw_steady *x, const double *q, const double *v, double *u, pw_error *error);
 double pw_steady_parameter (const pw_steady *x, const double *u);
 
@@ -106,10 +106,10 @@ double pw_steady_parameter (const pw_steady *x, const double *u);
 
 enum { PW_STEADY_MAX_COORDINATES = 400 }; /* since the cost is cubic */
 
-/* Opens x->system[place] for a value of the parameter, unless it is open.  A status; PW_RETRY with x->why. */
+/* Opens x->system[place] for a value of the parameter, unless it is open.  A status, with x->why if it fails. */
 int pw_steady_open_system (pw_steady *x, pw_place place, double value);
 void pw_steady_close_system (pw_steady *x, pw_place place);
-/* PW_INPUT if a search cannot proceed from a to b, since they differ in coordinates or constraint equations. */
+/* PW_INPUT and the reason unless both systems have as many bodies, coordinates and constraint equations. */
 int pw_steady_same_sizes (const pw_system *a, const pw_system *b, pw_error *why);
 
 /* ---- steady_hold.c ---- */

@@ -13,6 +13,7 @@ legend_top = top
 items = numbered ? 0 : curves
 per_row = columns(label_length)
 if (numbered) { right = 46 } else { top = top + rows(items, per_row) }
+# The legend; bar: 1 with the scale of colours, if there are more than 12 curves.
 legend(bar) = !numbered ? key(legend_top, per_row) : \
   sprintf("unset key; set cbrange [1:%d]; set cblabel 'number of the %s'; ", numbers, what). \
   (bar ? 'set colorbox user origin graph 1.02,graph 0 size graph 0.02,graph 1' : 'unset colorbox')
