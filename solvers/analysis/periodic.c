@@ -210,8 +210,8 @@ static int periodic_test (void *periodic, const pw_branch_point *point, double *
   return status;
 }
 
-/* Locates where multiplier number `sought` crosses the unit circle between the last two points; it is inside at one of
- * them. */
+/* Locates where multiplier number `sought` crosses the unit circle between the last two points; `inside` is the one at
+ * which it does not lie outside. */
 static int periodic_crossing (pw_periodic *x, const pw_branch_point *inside, pw_periodic_event *event,
                               pw_error *error) {
   pw_branch *b = &x->branch;
