@@ -48,7 +48,7 @@ typedef struct {
   double *q, *v, *a, *dq, *dv; /* coords: the state and its acceleration; directions of moves */
   double *q_now, *v_now;       /* coords: the state as moved by the last update */
   double *w, *lambda;          /* elements x cols, elements x rows: the vector w of jw_q, the multipliers */
-  double *J, *eta;             /* there */
+  double *J, *eta;             /* at the moved state */
   int failed;                  /* 1: a signal failed in an update */
   int check_sizes;             /* 1: also checks that each function fills exactly its array */
   pw_selftest_report *report;
@@ -64,7 +64,7 @@ int pw_probe_open (pw_probe *probe, pw_error *error);
 /* Updates the kinematics to the state moved by h. */
 void pw_probe_update (pw_probe *probe, pw_probe_move move, double h);
 
-/* Calls a function of the type, named in reports, that fills n numbers; NULL gives zeros. */
+/* Calls a function of the type, which fills n numbers; NULL gives zeros.  name: of the function, for the report. */
 void pw_probe_evaluate (pw_probe *probe, pw_batch_function *f, const char *name, int n, double *out);
 
 /* Functions of the type; J w; J v - eta. */

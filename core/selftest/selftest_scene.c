@@ -148,7 +148,7 @@ static void scene_all (scene_test *test) {
 /* ---- The motion ---- */
 
 static void scene_randomise (pw_probe *probe, const double *q, const double *v, pw_random *r) {
-  double T = probe->workspace->scale.time, *w = probe->v_now; /* w: of all coordinates, until the state is updated */
+  double T = probe->workspace->scale.time, *w = probe->v_now; /* w: in v_now until the next update */
   for (int j = 0; j < probe->s->coords; j++) {
     double unit = pw_unit (probe->s, j);
     probe->q[j] = q[j];

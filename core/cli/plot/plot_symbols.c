@@ -4,8 +4,8 @@
  * "a x y": the point p1 + a (p2 - p1) + u (x e + y n), as in pw_plot_stroke, where p1 and p2 are the points of the
  * first and the last body, u the unit of symbols, e a direction and n its normal to the left.  For a contact point e is
  * its heading; for a symbol with a rail, the field `heading` in the last body; otherwise the direction from p1 to p2,
- * or the x axis of the first body if these coincide.  x = inf or -inf, in a rail, is the end of the travel of p1 along
- * e, in both directions from p2.
+ * or the x axis of the first body if these coincide.  In a rail, x = inf and x = -inf are the ends of the travel of p1
+ * along e.
  *
  * "o a x y r" is a circle of radius u r around that point; "g1" and "g2" are the pitch circles of gears with the axles
  * p1 and p2 and the field `ratio`.  A stroke whose last vertex is its first encloses an area, which hides what is

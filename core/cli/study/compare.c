@@ -21,7 +21,7 @@ static const char compare_default_methods[] = "rk4+projection,erk5+projection,er
 typedef struct {
   pw_study study;
   int table;     /* 1: --table */
-  int concludes; /* 1: errors of coordinates will be known: a conclusion is printed */
+  int concludes; /* 1: a conclusion is printed, since errors of coordinates are known */
   const char *rtol_text, *step_text, *repeats_text;
   double finest_step; /* of --step-ladder [s] */
   double repeats;     /* timed runs of a row, at most */

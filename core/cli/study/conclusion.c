@@ -9,7 +9,7 @@ enum {
   CONCLUSION_WIDTH = 14, /* of a column, at least */
   CONCLUSION_REASON = 70 /* characters of the reason of a failure, at most */
 };
-/* Correct digits, and the largest relative error that has them. */
+/* Numbers of correct digits, and the largest relative errors that have them. */
 static const struct {
   int digits;
   double error;
@@ -32,7 +32,7 @@ typedef struct {
 
 /* ---- Errors ---- */
 
-/* The errors of coordinates are relative to the largest one of the same unit, those of angles to 1 rad at most. */
+/* Errors are relative to the largest coordinate of the same unit, those of angles to 1 rad at most. */
 static double conclusion_scale (const pw_reference *reference, int unit) {
   double size = reference->size[unit] > 0 ? reference->size[unit] : 1;
   return unit == MOTION_ANGLE ? fmin (size, 1) : size;
@@ -184,7 +184,7 @@ static void conclusion_print_failures (const pw_study *study, int method) {
                 pw_format (text, first->level, 4), CONCLUSION_REASON, first->reason, cut ? "..." : "");
 }
 
-/* One line for all methods with runs that the limit has stopped. */
+/* One line for all methods with runs that the limit has stopped or prevented. */
 static void conclusion_print_limited (const pw_study *study) {
   char text[32], beginning[80];
   const char *before = beginning;

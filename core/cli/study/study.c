@@ -1,4 +1,4 @@
-/* What compare and drift have in common: reading --methods, performing runs, the order of events in the command. */
+/* What compare and drift have in common: the option --methods, runs, the sequence of a command. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>

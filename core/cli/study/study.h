@@ -111,7 +111,7 @@ struct pw_study {
   pthread_mutex_t mutex;
   pw_progress progress;
   double progress_sum;                     /* of all rows */
-  double run_share;                        /* progress of a row by each of its runs */
+  double run_share;                        /* part of the progress of a row that each of its runs makes */
   pw_output *csv;                          /* NULL: none */
   const char *scripts[FIGURE_SCRIPTS + 1]; /* of figures, ended by NULL */
 };
@@ -137,8 +137,8 @@ typedef struct pw_visitor {
   pw_row *row;
 } pw_visitor;
 
-/* One run of a row to the end or a limit: fills t, statistics, cpu, and at cpu_limit state; the visitor may be NULL.
- * Runs of different rows may be concurrent.  A status; PW_RETRY, without an error: stopped at cpu_limit or by a
+/* One run of a row to the end or a limit: fills t, statistics, cpu, and if cpu_limit stops it, state.  The visitor may
+ * be NULL.  Runs of different rows may be concurrent.  A status; PW_RETRY, without an error: stopped by cpu_limit or a
  * signal. */
 int pw_study_run (pw_study *study, pw_row *row, const pw_settings *settings, pw_visitor *visitor, pw_error *error);
 /* Performs tasks as pw_parallel does, those of a study that is timed as pw_parallel_timed, and ends their progress. */
