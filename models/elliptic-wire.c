@@ -1,9 +1,9 @@
-/* Bead on an elliptic wire, attracted by one of its foci: a model that defines two element types, a force and a
+/* Bead on an elliptic wire, attracted by a focus of the ellipse: a model that defines two element types, a force and a
  * constraint.
  *
- * At the speed of Kepler's motion (factor = 1) the bead moves like a planet and the reaction of the wire is zero.
- * At any other speed v^2 - v_K^2 is constant and the reaction is m (v^2 - v_K^2) / rho = m (factor^2 - 1) v_K(0)^2 /
- * rho, where rho is the radius of curvature.
+ * At the speed v_K of Kepler's motion (factor = 1) the bead moves like a planet and the reaction of the wire is zero.
+ * At any other speed v the difference v^2 - v_K^2 is constant and the reaction is m (v^2 - v_K^2) / rho =
+ * m (factor^2 - 1) v_K(0)^2 / rho, where rho is the radius of curvature.
  * (Bonnet's theorem, 1844; Whittaker 1937, Analytical Dynamics, section 51.) */
 #include <math.h>
 #include "pinwheel.h"
@@ -81,7 +81,7 @@ typedef struct {
 
 static const pw_field wire_fields[] = {
   { PW_AT (wire, body), PW_BODY, .required = 1, .about = "the body on the wire" },
-  { PW_AT (wire, centre), PW_VECTOR, .unit = "m", .about = "of the ellipse, in the world" },
+  { PW_AT (wire, centre), PW_VECTOR, .unit = "m", .about = "centre of the ellipse, in the world" },
   { PW_AT (wire, axis), PW_NUMBER, .count = 2, .unit = "m", .required = 1, .domain = PW_POSITIVE,
     .about = "semi-axes along x and y" },
   { .name = NULL },
@@ -192,7 +192,7 @@ static const pw_parameter parameters[] = {
   { .name = NULL },
 };
 
-/* The bead starts at the point nearest to the focus, which is the origin of the ground. */
+/* The bead starts at the point nearest to the focus, which is the origin of the ground.  Its inertia has no effect. */
 static void build (pw_model *m, const void *parameter) {
   const model *p = parameter;
   if (p->e >= 1) {

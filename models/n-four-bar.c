@@ -1,7 +1,7 @@
-/* N four-bar linkages in a row: N + 1 vertical cranks at x = 0, l .. N l, N couplers on their tops; all of length l.
+/* N four-bar linkages in a row: N + 1 vertical cranks at x = 0, l, ..., N l and N couplers, all of length l.
  *
  * When the cranks are horizontal the configuration is singular: N constraint equations become dependent and the motion
- * could branch; the cranks of the reference solution stay parallel:
+ * could branch; the cranks of the reference solution stay parallel, at the angle theta to the horizontal:
  * theta'' = -(g / l) ((N + 1) / 2 + N) / ((N + 1) / 3 + N) cos theta.
  * (Gonzalez, Dopico, Pastorino & Cuadrado 2006, Multibody System Dynamics 16; IFToMM benchmark A02.) */
 #include <math.h>
@@ -49,14 +49,14 @@ static void build (pw_model *m, const void *parameter) {
   pw_add_gravity (m, &(pw_gravity){ .name = "gravity", .acceleration = { 0, -p->g } });
 }
 
-/* A rotating pendulum: with psi = theta + pi / 2 from the lowest point and W the angular velocity there,
- * psi = 2 am (K + W t / 2 | m), m = 4 kappa / W^2. */
+/* A rotating pendulum: with psi = theta + pi / 2 from the lowest point, W the angular velocity there and
+ * theta'' = -kappa cos theta,  psi = 2 am (K + W t / 2 | k^2), k^2 = 4 kappa / W^2. */
 static void reference (const void *parameter, double t, double *q, double *v) {
   const four_bar *p = parameter;
   double kappa = p->g / p->l * ((p->N + 1) / 2 + p->N) / ((p->N + 1) / 3 + p->N);
-  double W = copysign (sqrt (p->speed * p->speed + 4 * kappa), p->speed), m = 4 * kappa / (W * W);
-  double half = pw_jacobi_am (pw_elliptic_K (m) + W * t / 2, m), theta = 2 * half - PW_PI / 2;
-  double rate = W * sqrt (1 - m * sin (half) * sin (half)), x = p->l * cos (theta), y = p->l * sin (theta);
+  double W = copysign (sqrt (p->speed * p->speed + 4 * kappa), p->speed), k2 = 4 * kappa / (W * W);
+  double half = pw_jacobi_am (pw_elliptic_K (k2) + W * t / 2, k2), theta = 2 * half - PW_PI / 2;
+  double rate = W * sqrt (1 - k2 * sin (half) * sin (half)), x = p->l * cos (theta), y = p->l * sin (theta);
   for (int i = 0; i <= 2 * (int)p->N; i++, q += 3, v += 3) { /* crank0, then crank and coupler in turn */
     int coupler = i > 0 && i % 2 == 0;
     double part = coupler ? 1 : 0.5;

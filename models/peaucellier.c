@@ -33,7 +33,7 @@ static void add_pin (pw_model *m, const char *name, const char *one, double x1, 
   pw_add_pin (m, &(pw_pin){ .name = name, .body = { one, two }, .at = { { x1, 0 }, { x2, 0 } } });
 }
 
-/* The joints: A, O on the ground, B on the crank, C and D on the arms, P on the line; and the bars between them. */
+/* The joints: A and O on the ground, B on the crank, C and D on the arms, P on the line; and the bars between them. */
 enum { A, O, B, C, D, P, JOINTS, BARS = 7 };
 static const struct {
   const char *name;
@@ -41,11 +41,11 @@ static const struct {
 } bars[BARS] = { { "crank", A, B }, { "OC", O, C }, { "OD", O, D }, { "BC", B, C },
                  { "BD", B, D },    { "PC", P, C }, { "PD", P, D } };
 
-/* At a crank angle. */
 typedef struct {
-  double at[JOINTS][2];
+  double at[JOINTS][2]; /* [m] */
 } joints;
 
+/* The joints at a crank angle. */
 static joints joints_at (const inversor *p, double angle) {
   double half = angle / 2, c = cos (half), s = sin (half);
   /* mid: from O to the middle of the rhombus along OB; aside: from there to C and D. */
@@ -60,8 +60,8 @@ static joints joints_at (const inversor *p, double angle) {
 
 static void build (pw_model *m, const void *parameter) {
   const inversor *p = parameter;
-  double OB = 2 * p->a * cos (fmin (fabs (p->swing), PW_PI) / 2), L = p->L / 2, r = p->s / 2; /* OB: the least */
-  if (OB <= fabs (p->L - p->s)) {
+  double least_OB = 2 * p->a * cos (fmin (fabs (p->swing), PW_PI) / 2), arm = p->L / 2, side = p->s / 2; /* halves */
+  if (least_OB <= fabs (p->L - p->s)) {
     pw_model_refuse (m, "swing = %g: arms and rhombus do not reach the crank there", p->swing);
     return;
   }
@@ -72,16 +72,16 @@ static void build (pw_model *m, const void *parameter) {
   joints j = joints_at (p, p->swing);
   for (int i = 0; i < BARS; i++) add_bar (m, p, bars[i].name, j.at[bars[i].from], j.at[bars[i].to]);
   add_pin (m, "A", "crank", -p->a / 2, "ground", p->a);
-  add_pin (m, "O1", "OC", -L, "ground", 0);
-  add_pin (m, "O2", "OD", -L, "ground", 0);
-  add_pin (m, "B1", "crank", p->a / 2, "BC", -r);
-  add_pin (m, "B2", "crank", p->a / 2, "BD", -r);
-  add_pin (m, "C1", "OC", L, "BC", r);
-  add_pin (m, "C2", "OC", L, "PC", r);
-  add_pin (m, "D1", "OD", L, "BD", r);
-  add_pin (m, "D2", "OD", L, "PD", r);
-  add_pin (m, "P", "PC", -r, "PD", -r);
-  pw_add_marker (m, &(pw_marker){ .name = "pencil", .body = "PC", .at = { -r, 0 } });
+  add_pin (m, "O1", "OC", -arm, "ground", 0);
+  add_pin (m, "O2", "OD", -arm, "ground", 0);
+  add_pin (m, "B1", "crank", p->a / 2, "BC", -side);
+  add_pin (m, "B2", "crank", p->a / 2, "BD", -side);
+  add_pin (m, "C1", "OC", arm, "BC", side);
+  add_pin (m, "C2", "OC", arm, "PC", side);
+  add_pin (m, "D1", "OD", arm, "BD", side);
+  add_pin (m, "D2", "OD", arm, "PD", side);
+  add_pin (m, "P", "PC", -side, "PD", -side);
+  pw_add_marker (m, &(pw_marker){ .name = "pencil", .body = "PC", .at = { -side, 0 } });
   pw_add_drive (m, &(pw_drive){ .name = "swing",
                                 .body = { "crank", "ground" },
                                 .what = PW_DRIVE_ANGLE,
@@ -93,7 +93,7 @@ static double bar_angle (const joints *j, int i) {
   return atan2 (to[1] - from[1], to[0] - from[0]);
 }
 
-/* OB turns by `turn`; relative to it each bar turns by less than pi. */
+/* The line OB turns by `turn` from its initial direction; relative to it each bar turns by less than pi. */
 static void reference (const void *parameter, double t, double *q, double *v) {
   const inversor *p = parameter;
   double angle = p->swing * cos (p->omega * t), turn = (angle - p->swing) / 2;

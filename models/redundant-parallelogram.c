@@ -44,8 +44,8 @@ static void build (pw_model *m, const void *parameter) {
   pw_add_gravity (m, &(pw_gravity){ .name = "gravity", .acceleration = { 0, -p->g } });
 }
 
-/* A pendulum released at psi = theta + pi / 2 from the lowest point: sin (psi / 2) = k sn (K - w t),
- * k = sin (psi0 / 2). */
+/* A pendulum with the angle psi = theta + pi / 2 from the lowest point, released at psi0: sin (psi / 2) =
+ * k sn (K - w t | k^2), k = sin (psi0 / 2). */
 static void reference (const void *parameter, double t, double *q, double *v) {
   const parallelogram *p = parameter;
   double k = sin (p->theta / 2 + PW_PI / 4), w = sqrt (p->g * (1.5 * p->m + p->mc) / (p->l * (p->m + p->mc)));

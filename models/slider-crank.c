@@ -1,10 +1,9 @@
-/* Slider-crank: a crank on the ground, a rod, and a slider on the x axis.
+/* Slider-crank: a crank on the ground, a rod, and a slider on the x axis, whose y and angle two drives keep at 0.
  *
- * With equal lengths the slider passes over the crank's pivot, a singular configuration in which
- * the rod could turn with the crank instead.  For rods of mass m and length 1 and a slider of mass ms the angle theta
- * of the crank follows from
- * (5/12 + 9/4 sin^2 theta + 1/4 cos^2 theta) m theta'^2 / 2 + 4 ms sin^2 theta theta'^2 / 2 = constant without gravity.
- * Two drives prescribe y = 0 and angle 0 of the slider. */
+ * With equal lengths the slider passes over the crank's pivot, a singular configuration in which the rod could turn
+ * with the crank instead.  For crank and rod of mass m and length 1 m and a slider of mass ms, without gravity, the
+ * angle theta of the crank follows from the constant kinetic energy
+ * (5/12 + 9/4 sin^2 theta + 1/4 cos^2 theta) m theta'^2 / 2 + 4 ms sin^2 theta theta'^2 / 2. */
 #include <math.h>
 #include "pinwheel.h"
 

@@ -1,7 +1,7 @@
 /* Theo Jansen's leg: a crank and six links whose proportions give the foot a walking motion.
  *
- * The lengths are those of the strandbeests, in hundredths of a metre at size 0.01: two triangles, b d e on the ground
- * pivot B and g h i with the foot, and the bars j, k, c and f.  The crank turns at constant speed about O.
+ * The links have the lengths of the strandbeests: two triangles, b d e on the ground pivot B and g h i with the foot,
+ * and the bars j, k, c and f.  The crank turns about O at constant speed.
  * (Jansen 2007, The Great Pretender.) */
 #include <math.h>
 #include "pinwheel.h"
@@ -18,11 +18,11 @@ static const pw_parameter parameters[] = {
   { .name = NULL },
 };
 
-/* Lengths in units of size, by the letters of the links. */
+/* Lengths by Jansen's letters, in units of size: a and l locate B relative to O, the others are those of links. */
 static const double a = 38, b = 41.5, c = 39.3, d = 40.1, e = 55.8, f = 39.4, g = 36.7, h = 65.7, i = 49, j = 50,
                     k = 61.9, l = 7.8, crank = 15;
 
-/* A point and its velocity. */
+/* A point [size] and its velocity [size/s]. */
 typedef struct {
   double x, y, vx, vy;
 } point;
@@ -62,7 +62,7 @@ static point centre (point P, point Q, point R) {
   return (point){ (P.x + Q.x + R.x) / 3, (P.y + Q.y + R.y) / 3, (P.vx + Q.vx + R.vx) / 3, (P.vy + Q.vy + R.vy) / 3 };
 }
 
-/* A triangular plate with the mass of its sides.  Its initial angle is 0: body and world axes are parallel. */
+/* A uniform triangular plate with the mass of bars along its sides.  Its initial angle is 0. */
 static void add_plate (pw_model *m, const leg *p, const char *name, point P, point Q, point R) {
   double q = distance (P, Q), r = distance (Q, R), s = distance (R, P), u = p->size;
   double mass = p->density * (q + r + s) * u;

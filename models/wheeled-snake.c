@@ -43,7 +43,7 @@ static void build (pw_model *m, const void *parameter) {
   double x = 0, y = 0, phi = 0; /* front end and angle of a link */
   char link[24], ahead[24] = "", name[24];
   for (int i = 0; i < (int)p->n; i++) {
-    if (i > 0) phi += p->amplitude * cos (p->lag * i); /* of the joint with the link ahead */
+    if (i > 0) phi += p->amplitude * cos (p->lag * i); /* the angle of the joint with the link ahead */
     double c = p->l * cos (phi), s = p->l * sin (phi);
     snprintf (link, sizeof link, "link%d", i + 1);
     pw_add_body (m, &(pw_body){ .name = link,

@@ -45,7 +45,7 @@ static int differences_test (const pw_workspace *w, pw_element_batch *k, char *b
   return 0;
 }
 
-/* Searches a batch, with random w, multipliers and signals. */
+/* Searches a batch, with random w, multipliers and signals: 1 if a block is missing, 0 or PW_RESOURCE. */
 static int differences_search (pw_workspace *w, pw_element_batch *k, pw_random *random, char *buffer, size_t size) {
   int cols = k->b.count * k->b.cols, rows = k->b.count * k->kind->rows;
   double *x = malloc (((size_t)cols + (size_t)rows + 1) * sizeof *x);

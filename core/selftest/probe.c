@@ -80,18 +80,23 @@ void pw_probe_evaluate (pw_probe *probe, pw_batch_function *f, const char *name,
   pw_probe_record (probe->report, PW_CHECK_size, untouched + beyond, 0, "exact", where);
 }
 
-/* pw_probe_g, ...: the function of this name, which fills `size` numbers per element. */
-#define PROBE_FUNCTION(function, size)                                                               \
-  void pw_probe_##function (pw_probe *probe, double *out) {                                          \
-    pw_probe_evaluate (probe, probe->kind->function, #function, probe->elements * probe->size, out); \
+/* pw_probe_g, ...: the function of this name, which fills `count` numbers. */
+#define PROBE_FUNCTION(function, count)                                      \
+  void pw_probe_##function (pw_probe *probe, double *out) {                  \
+    pw_probe_evaluate (probe, probe->kind->function, #function, count, out); \
   }
-PROBE_FUNCTION (g, rows)
-PROBE_FUNCTION (eta, rows)
-PROBE_FUNCTION (gamma, rows)
-PROBE_FUNCTION (force, cols)
+PROBE_FUNCTION (g, probe->elements * probe->rows)
+PROBE_FUNCTION (g_size, probe->elements * probe->rows)
+PROBE_FUNCTION (eta, probe->elements * probe->rows)
+PROBE_FUNCTION (J, probe->elements * probe->rows * probe->cols)
+PROBE_FUNCTION (gamma, probe->elements * probe->rows)
+PROBE_FUNCTION (force, probe->elements * probe->cols)
+PROBE_FUNCTION (energy, probe->elements)
+PROBE_FUNCTION (power, probe->elements)
+PROBE_FUNCTION (loss, probe->elements)
 
 void pw_probe_Jw (pw_probe *probe, double *out) {
-  pw_probe_evaluate (probe, probe->kind->J, "J", probe->elements * probe->rows * probe->cols, probe->J);
+  pw_probe_J (probe, probe->J);
   for (int i = 0; i < probe->elements * probe->rows; i++) {
     out[i] = 0;
     for (int c = 0; c < probe->cols; c++)
@@ -126,7 +131,7 @@ void pw_probe_multiply (const pw_probe *probe, const double *block, int rows, co
 }
 
 void pw_probe_multiply_J (pw_probe *probe, const double *vector, double *out) {
-  pw_probe_evaluate (probe, probe->kind->J, "J", probe->elements * probe->rows * probe->cols, probe->J);
+  pw_probe_J (probe, probe->J);
   memset (out, 0, (size_t)(probe->elements * probe->rows) * sizeof *out);
   pw_probe_multiply (probe, probe->J, probe->rows, vector, 1, out, NULL);
 }

@@ -1,5 +1,5 @@
-/* The probe of the self-tests: a batch of a scene, in a state that moves so that functions of its type can be
- * differenced. */
+/* The probe of the self-tests: the elements of one type in a scene (a batch), in a state that is moved to compute
+ * differences of the type's functions. */
 #ifndef PW_PROBE_H
 #define PW_PROBE_H
 
@@ -44,40 +44,41 @@ typedef struct {
   pw_workspace *workspace;
   pw_element_batch *batch;     /* of the element type, in the workspace */
   int elements, rows, cols;    /* rows and cols per element */
-  double t, tau;               /* the time, and the unit of its changes */
-  double *q, *v, *a, *dq, *dv; /* coords: the state and its motion; directions */
-  double *q_now, *v_now;       /* coords: the current state */
+  double t, tau;               /* the time, and the unit of its changes [s] */
+  double *q, *v, *a, *dq, *dv; /* coords: the state and its acceleration; directions of moves */
+  double *q_now, *v_now;       /* coords: the state as moved by the last update */
   double *w, *lambda;          /* elements x cols, elements x rows: the vector w of jw_q, the multipliers */
-  double *J, *eta;             /* at the current state */
+  double *J, *eta;             /* at the moved state */
   int failed;                  /* 1: a signal failed in an update */
   int check_sizes;             /* 1: also checks that each function fills exactly its array */
   pw_selftest_report *report;
-  char *memory; /* of all arrays; the caller frees it in every case */
+  char *memory; /* of the arrays; the caller frees it in every case */
 } pw_probe;
 
-/* Computes numbers at the current state; `out` has room for PW_PROBE_GUARD more. */
+/* Computes numbers at the moved state; `out` has room for PW_PROBE_GUARD more. */
 typedef void pw_probe_function (pw_probe *probe, double *out);
 
-/* Allocates the arrays of a probe with s, workspace, batch and report.  PW_OK or PW_RESOURCE. */
+/* Allocates the arrays of a probe whose s, workspace, batch and report the caller has set.  PW_OK or PW_RESOURCE. */
 int pw_probe_open (pw_probe *probe, pw_error *error);
 
 /* Updates the kinematics to the state moved by h. */
 void pw_probe_update (pw_probe *probe, pw_probe_move move, double h);
 
-/* Calls a function that fills n numbers; NULL gives zeros. */
+/* Calls a function of the type, which fills n numbers; NULL gives zeros.  name: of the function, for the report. */
 void pw_probe_evaluate (pw_probe *probe, pw_batch_function *f, const char *name, int n, double *out);
 
-/* Functions of the type: g, eta, gamma, force; J w; J v - eta. */
-pw_probe_function pw_probe_g, pw_probe_eta, pw_probe_gamma, pw_probe_force, pw_probe_Jw, pw_probe_drift;
+/* Functions of the type; J w; J v - eta. */
+pw_probe_function pw_probe_g, pw_probe_g_size, pw_probe_eta, pw_probe_J, pw_probe_gamma, pw_probe_force,
+    pw_probe_energy, pw_probe_power, pw_probe_loss, pw_probe_Jw, pw_probe_drift;
 
-/* out += factor x block x vector, element by element, where the block has `rows` rows per element and the vector is
- * over all coordinates; terms, unless NULL, += absolute values of the terms. */
+/* out += factor x block x vector, element by element: the block has `rows` rows per element, the vector an entry for
+ * each coordinate of the scene.  terms, unless NULL, += absolute values of the terms. */
 void pw_probe_multiply (const pw_probe *probe, const double *block, int rows, const double *vector, double factor,
                         double *out, double *terms);
 void pw_probe_multiply_J (pw_probe *probe, const double *vector, double *out); /* out = J vector */
 
 int pw_probe_ground (const pw_probe *probe, int e, int c); /* 1: local column c of element e belongs to the ground */
-/* The entry of local column c of element e in a vector over all coordinates; 0 for the ground. */
+/* The entry of local column c of element e in a vector with an entry for each coordinate; 0 for the ground. */
 double pw_probe_local (const pw_probe *probe, const double *vector, int e, int c);
 
 /* Records the result of a check, keeping the worst. */

@@ -1,4 +1,4 @@
-/* Builds the self-test's scene from the table of an element type. */
+/* Builds the scene of the self-test from the table of an element type. */
 #include <math.h>
 #include <string.h>
 #include "model.h"
@@ -58,7 +58,7 @@ static void scene_value (pw_random *r, const pw_field *f, void *at) {
 
 static const char *const scene_bodies[PW_SCENE_BODIES] = { "b0", "b1", "b2", "b3" };
 
-/* Element e acts on bodies e, e + 1, ...; the last element also on the ground, if it has several bodies. */
+/* Element e acts on bodies e, e + 1, ...; of the last element, if it has several bodies, one is the ground. */
 static const char *scene_body (const random_scene *x, int e, int n) {
   int last = e == PW_SCENE_ELEMENTS - 1;
   if (last && x->kind->bodies > 1 && n == (int)(x->random->state % (unsigned)x->kind->bodies)) return "ground";

@@ -12,11 +12,8 @@
  * size, from truncation and from round-off alike (Dennis & Schnabel 1983, section 5.6).  All numbers in the scene are
  * of the order 1, so the sizes of a function and of its third derivative are about the same. */
 #define SELFTEST_STEP 0x1p-17
+#define SELFTEST_BOUND (100 * cbrt (DBL_EPSILON) * cbrt (DBL_EPSILON))
 static const char selftest_reason[] = "100 eps^(2/3) of the largest term: central differences";
-
-static double selftest_bound (void) {
-  return 100 * cbrt (DBL_EPSILON) * cbrt (DBL_EPSILON);
-}
 
 /* The numbers that a function fills, with guards. */
 typedef double selftest_numbers[PW_PROBE_OUT + PW_PROBE_GUARD];
@@ -40,8 +37,8 @@ static double selftest_derivative (pw_probe *probe, pw_probe_function *f, pw_pro
   return selftest_largest (n, plus);
 }
 
-/* Compares elements x rows x cols entries, except the meaningless columns of the ground, relative to 1 + size or the
- * largest reference. */
+/* Compares elements x rows x cols entries, except the meaningless columns of the ground, with a reference, relative to
+ * the larger of 1 + size and the largest reference; size: the largest value of the function differenced. */
 static void selftest_compare (pw_probe *probe, pw_check check, int rows, int cols, double size, const double *value,
                               const double *reference) {
   int n = probe->elements * rows * cols, at = 0;
@@ -55,7 +52,7 @@ static void selftest_compare (pw_probe *probe, pw_check check, int rows, int col
   char where[120];
   snprintf (where, sizeof where, "%s, row %d, column %d: %.9g, expected %.9g", probe->batch->name[at / (rows * cols)],
             at / cols % rows, at % cols, value[at], reference[at]);
-  pw_probe_record (probe->report, check, worst, selftest_bound (), selftest_reason, where);
+  pw_probe_record (probe->report, check, worst, SELFTEST_BOUND, selftest_reason, where);
 }
 
 /* ---- First-order checks ---- */
@@ -71,7 +68,7 @@ static void selftest_holonomic (pw_probe *probe) {
       if (pw_global (probe->batch, i / (probe->rows * probe->cols), i % probe->cols) == j)
         reference[i] = derivative[i / probe->cols];
   }
-  pw_probe_evaluate (probe, probe->kind->J, "J", n * probe->cols, value);
+  pw_probe_J (probe, value);
   selftest_compare (probe, PW_CHECK_J, probe->rows, probe->cols, size, value, reference);
 
   size = selftest_derivative (probe, pw_probe_g, PW_PROBE_TIME, n, reference);
@@ -80,7 +77,7 @@ static void selftest_holonomic (pw_probe *probe) {
   selftest_compare (probe, PW_CHECK_eta, probe->rows, 1, size, value, reference);
 
   pw_probe_g (probe, reference);
-  pw_probe_evaluate (probe, probe->kind->g_size, "g_size", n, value);
+  pw_probe_g_size (probe, value);
   for (int i = 0; i < n; i++) { /* a sufficient g_size is its own reference */
     double least = fabs (reference[i]);
     reference[i] = fmax (value[i], least);
@@ -148,7 +145,7 @@ static void selftest_blocks (pw_probe *probe) {
   selftest_numbers J, gamma, force;
   int n = probe->elements * probe->rows;
   pw_probe_update (probe, PW_PROBE_TIME, 0);
-  pw_probe_evaluate (probe, probe->kind->J, "J", n * probe->cols, J);
+  pw_probe_J (probe, J);
   pw_probe_gamma (probe, gamma);
   pw_probe_force (probe, force);
   double size_J = selftest_largest (n * probe->cols, J), size_gamma = selftest_largest (n, gamma);
@@ -163,7 +160,7 @@ static void selftest_blocks (pw_probe *probe) {
   selftest_block (probe, PW_FORCE_V, PW_CHECK_force_v, size_force);
 }
 
-/* Makes a check at velocities multiplied by a factor. */
+/* Makes a check at velocities multiplied by a factor; dv, which no check here moves along, saves the velocities. */
 static void selftest_at_speed (pw_probe *probe, double factor, void (*check) (pw_probe *probe)) {
   memcpy (probe->dv, probe->v, (size_t)probe->s->coords * sizeof *probe->v);
   for (int j = 0; j < probe->s->coords; j++) probe->v[j] *= factor;
@@ -202,30 +199,28 @@ static double selftest_change (pw_probe *probe, int e, int c, double v, const do
 }
 
 /* From rest, a hundredth of the declared saturation velocity, or of a large velocity if none is declared, must
- * change the force by less than half of what the whole velocity does. */
+ * change the force by less than half of the change by the whole velocity. */
 static void selftest_saturation (pw_probe *probe) {
   const double large = 1000;
-  selftest_numbers out, rest;
+  selftest_numbers declared, rest;
+  int cols = probe->cols;
   pw_probe_force (probe, rest);
-  for (int i = 0; i < probe->elements * 2 * probe->cols; i++) out[i] = INFINITY;
-  if (probe->kind->saturation) probe->kind->saturation (&probe->batch->b, out);
-  for (int i = 0; i < probe->elements * probe->cols; i++) {
-    int e = i / probe->cols, c = i % probe->cols;
+  for (int i = 0; i < probe->elements * 2 * cols; i++) declared[i] = INFINITY;
+  if (probe->kind->saturation) probe->kind->saturation (&probe->batch->b, declared);
+  for (int i = 0; i < probe->elements * cols; i++) {
+    int e = i / cols, c = i % cols;
     if (pw_probe_ground (probe, e, c)) continue;
-    double far = out[i + (e + 1) * probe->cols],
-           all = selftest_change (probe, e, c, isfinite (far) ? far : large, rest);
-    double part = selftest_change (probe, e, c, (isfinite (far) ? far : large) / 100, rest);
-    if (all < 1e-9 * (1 + selftest_largest (probe->elements * probe->cols, rest))) continue;
+    double velocity = declared[(2 * e + 1) * cols + c]; /* after the changes of coordinates of element e */
+    if (!isfinite (velocity)) velocity = large;
+    double all = selftest_change (probe, e, c, velocity, rest);
+    double part = selftest_change (probe, e, c, velocity / 100, rest);
+    if (all < 1e-9 * (1 + selftest_largest (probe->elements * cols, rest))) continue;
     pw_probe_record (probe->report, PW_CHECK_saturation, part / all, 0.5,
                      "a hundredth of the velocity, half of the change", probe->batch->name[e]);
   }
 }
 
 /* ---- Energy ---- */
-
-static void selftest_energy (pw_probe *probe, double *out) {
-  pw_probe_evaluate (probe, probe->kind->energy, "energy", probe->elements, out);
-}
 
 /* x . y of n numbers */
 static double selftest_dot (int n, const double *x, const double *y) {
@@ -237,7 +232,7 @@ static double selftest_dot (int n, const double *x, const double *y) {
 /* Satisfies J v = eta of element e by the change of v of least norm: its rows of J are made orthogonal (Gram-Schmidt).
  * Returns 0 if they are dependent. */
 static int selftest_satisfy (pw_probe *probe, int e) {
-  double row[PW_MAX_ROWS][PW_MAX_COLS + 1], square[PW_MAX_ROWS]; /* row: of J, and of J v - eta */
+  double row[PW_MAX_ROWS][PW_MAX_COLS + 1], square[PW_MAX_ROWS]; /* row: of J, with the entry of J v - eta at its end */
   const int n = probe->cols;
   selftest_numbers off;
   pw_probe_update (probe, PW_PROBE_TIME, 0);
@@ -257,29 +252,30 @@ static int selftest_satisfy (pw_probe *probe, int e) {
   return 1;
 }
 
-/* The power of the forces of element e, including constraint forces -J^T lambda, must equal the supplied power minus
- * losses and the rate of its potential energy. */
+/* The power of the forces of element e on its bodies, including constraint forces -J^T lambda, must equal the supplied
+ * power minus losses and the rate of its potential energy.  A type without the function `power` supplies -lambda . eta
+ * by its constraints. */
 static void selftest_power_of (pw_probe *probe, int e) {
-  selftest_numbers derivative, force, power, loss, drift;
-  double fed = 0, size = selftest_derivative (probe, selftest_energy, PW_PROBE_MOTION, probe->elements, derivative);
+  selftest_numbers derivative, force, power, loss, Jv;
+  double sum = 0, size = selftest_derivative (probe, pw_probe_energy, PW_PROBE_MOTION, probe->elements, derivative);
   pw_probe_force (probe, force);
-  pw_probe_evaluate (probe, probe->kind->power, "power", probe->elements, power);
-  pw_probe_evaluate (probe, probe->kind->loss, "loss", probe->elements, loss);
+  pw_probe_power (probe, power);
+  pw_probe_loss (probe, loss);
   size = fmax (size, fmax (fabs (power[e]), fabs (loss[e])));
-  for (int c = 0; c < probe->cols; c++) fed += force[e * probe->cols + c] * pw_probe_local (probe, probe->v, e, c);
+  for (int c = 0; c < probe->cols; c++) sum += force[e * probe->cols + c] * pw_probe_local (probe, probe->v, e, c);
   if (probe->rows > 0) {
-    pw_probe_multiply_J (probe, probe->v, drift);
+    pw_probe_multiply_J (probe, probe->v, Jv);
     pw_probe_eta (probe, probe->eta);
   }
   for (int r = e * probe->rows; r < (e + 1) * probe->rows; r++) {
-    fed -= probe->lambda[r] * drift[r];
+    sum -= probe->lambda[r] * Jv[r];
     if (probe->kind->power == NULL) power[e] -= probe->lambda[r] * probe->eta[r];
   }
-  double error = fabs (fed + derivative[e] - power[e] + loss[e]) / (1 + size + fabs (fed));
+  double error = fabs (sum + derivative[e] - power[e] + loss[e]) / (1 + size + fabs (sum));
   char where[120];
-  snprintf (where, sizeof where, "%s: %.9g, expected %.9g", probe->batch->name[e], fed,
+  snprintf (where, sizeof where, "%s: %.9g, expected %.9g", probe->batch->name[e], sum,
             power[e] - loss[e] - derivative[e]);
-  pw_probe_record (probe->report, PW_CHECK_power, error, selftest_bound (), selftest_reason, where);
+  pw_probe_record (probe->report, PW_CHECK_power, error, SELFTEST_BOUND, selftest_reason, where);
   if (probe->kind->loss) pw_probe_record (probe->report, PW_CHECK_loss, fmax (-loss[e], 0), 0, "exact", where);
 }
 

@@ -16,9 +16,9 @@ static const char scene_reason[] = "1e-5 of the sum of all terms: the best of se
 typedef struct {
   pw_probe probe;
   int width; /* most values per element in any comparison; the arrays have elements x width entries */
-  double *plus, *minus, *derivative; /* a function before and after a step; its derivative */
-  double *value, *terms;             /* what is compared with it, and the sum of the absolute values of its terms */
-  double *size;                      /* of the terms of the function */
+  double *plus, *minus, *derivative; /* a function after steps forwards and backwards; its derivative by differences */
+  double *value, *terms;             /* what is compared with it; the sum of the absolute values of its terms */
+  double *size;                      /* sum of the absolute values of the terms of the function */
   double *error;                     /* the least one of all steps */
   double *block;                     /* elements x width x width */
   char *memory;
@@ -26,8 +26,8 @@ typedef struct {
 
 /* ---- Comparing ---- */
 
-/* The largest of the terms of the element of entry k: its derivatives with respect to positions multiply round-off of
- * these. */
+/* The largest of `terms` in the element of entry k, to which errors by round-off of the moved positions are
+ * proportional. */
 static double scene_largest_term (const scene_test *test, int k, int rows) {
   double most = 0;
   for (int i = k - k % rows; i < k - k % rows + rows; i++) most = fmax (most, test->terms[i]);
@@ -37,7 +37,7 @@ static double scene_largest_term (const scene_test *test, int k, int rows) {
 /* Updates the least error of each entry by differences with step h. */
 static void scene_differences (scene_test *test, pw_probe_function *f, pw_probe_move move, int rows, double h) {
   int n = test->probe.elements * rows;
-  static const double weight[] = { 4. / 3, -1. / 3 }; /* extrapolated (Richardson) */
+  static const double weight[] = { 4. / 3, -1. / 3 }; /* of steps h and 2 h: Richardson extrapolation */
   for (int k = 0; k < n; k++) test->derivative[k] = 0;
   for (int i = 0; i < 2; i++) {
     double far = ldexp (h, i);
@@ -48,7 +48,7 @@ static void scene_differences (scene_test *test, pw_probe_function *f, pw_probe_
     for (int k = 0; k < n; k++) test->derivative[k] += weight[i] * (test->plus[k] - test->minus[k]) / (2 * far);
   }
   for (int k = 0; k < n; k++) {
-    double noise =
+    double noise = /* 256: a margin */
         256 * DBL_EPSILON * ((fabs (test->plus[k]) + test->size[k]) / h + scene_largest_term (test, k, rows));
     double error = fmax (0, fabs (test->value[k] - test->derivative[k]) - noise) /
                    (test->terms[k] + fabs (test->derivative[k]) + DBL_MIN);
@@ -75,9 +75,9 @@ static void scene_compare (scene_test *test, pw_check check, int rows, pw_probe_
 
 static void scene_holonomic (scene_test *test) {
   int n = test->probe.elements * test->probe.rows;
-  pw_probe_evaluate (&test->probe, test->probe.kind->J, "J", n * test->probe.cols, test->block);
+  pw_probe_J (&test->probe, test->block);
   pw_probe_multiply (&test->probe, test->block, test->probe.rows, test->probe.dq, 1, test->value, test->terms);
-  pw_probe_evaluate (&test->probe, test->probe.kind->g_size, "g_size", n, test->size);
+  pw_probe_g_size (&test->probe, test->size);
   scene_compare (test, PW_CHECK_J, test->probe.rows, pw_probe_g, PW_PROBE_Q);
   pw_probe_eta (&test->probe, test->value);
   for (int i = 0; i < n; i++) test->value[i] *= -test->probe.tau;
@@ -88,7 +88,7 @@ static void scene_acceleration (scene_test *test) {
   int n = test->probe.elements * test->probe.rows;
   double tau = test->probe.tau;
   pw_probe_gamma (&test->probe, test->derivative);
-  pw_probe_evaluate (&test->probe, test->probe.kind->J, "J", n * test->probe.cols, test->block);
+  pw_probe_J (&test->probe, test->block);
   pw_probe_multiply (&test->probe, test->block, test->probe.rows, test->probe.a, tau, test->value, test->terms);
   for (int i = 0; i < n; i++)
     test->value[i] -= tau * test->derivative[i], test->terms[i] += fabs (tau * test->derivative[i]);
@@ -116,7 +116,8 @@ static void scene_gradients (scene_test *test, pw_probe_move move) {
     for (int k = 0; k < source->reads; k++) {
       int j = source->state[k], velocity = j >= coords;
       if (velocity != (move == PW_PROBE_V)) continue;
-      double term = source->x[source->reads + k] * (velocity ? test->probe.dv[j - coords] : test->probe.dq[j]);
+      double gradient = source->x[source->reads + k];
+      double term = gradient * (velocity ? test->probe.dv[j - coords] : test->probe.dq[j]);
       test->value[i] += term, test->terms[i] += fabs (term);
     }
   }
@@ -147,7 +148,7 @@ static void scene_all (scene_test *test) {
 /* ---- The motion ---- */
 
 static void scene_randomise (pw_probe *probe, const double *q, const double *v, pw_random *r) {
-  double T = probe->workspace->scale.time, *w = probe->v_now; /* until the state is updated */
+  double T = probe->workspace->scale.time, *w = probe->v_now; /* w: in v_now until the next update */
   for (int j = 0; j < probe->s->coords; j++) {
     double unit = pw_unit (probe->s, j);
     probe->q[j] = q[j];
@@ -180,7 +181,7 @@ static int scene_open (scene_test *test, pw_error *error) {
   return test->memory ? PW_OK : pw_fail (error, PW_RESOURCE, "model %s: out of memory", test->probe.s->model);
 }
 
-/* Reports the signal, and no checks, which have compared its last values. */
+/* Reports the signal and discards the checks, which have compared its last values. */
 static int scene_fail_signal (scene_test *test, pw_error *error) {
   char signal[160];
   *test->probe.report = (pw_selftest_report){ 0 };

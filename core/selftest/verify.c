@@ -1,10 +1,10 @@
 /* The independent verifier: plain loops over elements, rows and columns; it shares only the element types with the
  * solvers.
  *
- * Each residual is divided by the sum of the absolute values of its terms, plus its unit formed from the run's
- * length L and time T, so that round-off is about 1e-16 in any units.  A position residual is divided by the size that
- * its element type states, at least L.  Forces are compared with the largest one in the scene, since those on a
- * massless body may all be round-off. */
+ * Residuals of velocities and accelerations are divided by the sum of the absolute values of their terms plus L / T or
+ * L / T^2, with the length L and time T of the run, so that round-off is about 1e-16 in any units.  A position residual
+ * is divided by the size that its element type states, at least L.  Residuals of forces are divided by the largest
+ * force in the scene, since those on a massless body may all be round-off. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -77,8 +77,8 @@ static void verify_forces (verified_scene *scene, const pw_element_batch *k) {
 
 /* ---- Worst residuals ---- */
 
-/* Sets the size of every coordinate to the largest force in the scene, but at least the largest mass times L / T^2;
- * moments are divided by L. */
+/* Sets the size of every equation to the largest force in the scene, but at least the largest mass times L / T^2; those
+ * of moments are L times as large. */
 static void verify_force_sizes (verified_scene *scene) {
   const pw_system *s = scene->s;
   double L = scene->workspace->scale.length, T = scene->workspace->scale.time, largest = 0;

@@ -16,13 +16,13 @@ enum {
 static const double NEWTON_EXACT = 1e-4, /* |F| relative to the tolerance that needs no further iteration */
     NEWTON_DAMPING = 0.1,                /* factor of |F| in the square of the damping */
     BRANCH_STEEP = 1e-3,                 /* smallest slope of p along a branch that limits steps by max_change */
-    BRANCH_GROW = 1.5,                   /* of the next step, after half of the iterations at most */
+    BRANCH_GROW = 1.5,                   /* factor of the next step, if half of BRANCH_MOST iterations were enough */
     BRANCH_TURN = 0.96,   /* cosine of the largest angle between the tangents of successive points, 16 degrees */
     BRANCH_APART = 0.3,   /* largest correction of a predictor, relative to the step */
     BRANCH_ASIDE = 0.002, /* largest correction of an interpolated point, relative to the distance of the two points */
-    BRANCH_FINE = 1e-3,   /* of max_change: a step so short may pass p of the first point twice beside a fold */
-    /* Largest distance between the directions of a chord and of the sum of the tangents at its ends: it is of second
-     * order on a smooth branch, but not from one branch to another. */
+    BRANCH_FINE = 1e-3, /* relative to max_change: so short a step may pass p of the first point twice beside a fold */
+    /* Largest difference of the unit vectors along a chord and along the sum of the tangents at its ends: on a smooth
+     * branch it is of second order in the step, from one branch to another it is not. */
     BRANCH_BENT = 0.02;
 
 int pw_branch_open (pw_branch *b, const pw_branch_problem *problem, pw_error *error) {
@@ -49,8 +49,6 @@ int pw_branch_open (pw_branch *b, const pw_branch_problem *problem, pw_error *er
 void pw_branch_close (pw_branch *b) {
   free (b->memory);
   free (b->pivot);
-  b->memory = NULL;
-  b->pivot = NULL;
 }
 
 /* ---- Newton's method ---- */
@@ -76,7 +74,7 @@ static int branch_evaluate (pw_branch *b, const double *u, int derivatives, pw_e
   return b->problem.evaluate (b->problem.context, u, b->F, derivatives ? b->J : NULL, error);
 }
 
-/* Adds rows to J below the equations: one with c, or without c `extra` rows with `diagonal` on their diagonal. */
+/* Adds `extra` rows to the n columns of J: the row c, or if c is NULL rows with `diagonal` on their diagonal. */
 static void branch_extend (pw_branch *b, int n, int extra, const double *c, double diagonal) {
   size_t m = (size_t)b->problem.equations, rows = m + (size_t)extra;
   for (size_t j = (size_t)n; j-- > 0;) {
@@ -87,11 +85,11 @@ static void branch_extend (pw_branch *b, int n, int extra, const double *c, doub
   }
 }
 
-/* du = the shortest least-squares solution of J du = right and c du = value, where c is a row over x and p.  Without c,
- * p is constant, and damping^2 |du|^2 is added to the squares.  J is destroyed. */
+/* du = the shortest least-squares solution of J du = right and c . du = value.  If c is NULL, p is constant, and
+ * damping^2 |du|^2 is added to the sum of squares.  J is destroyed. */
 static int branch_least_squares (pw_branch *b, const double *right, const double *c, double value, double damping) {
   int m = b->problem.equations, n = b->problem.unknowns + (c != NULL), extra = c ? 1 : damping > 0 ? n : 0;
-  int rows = m + extra, large = rows > n ? rows : n;
+  int rows = m + extra, large = rows > n ? rows : n, rank;
   if (extra) branch_extend (b, n, extra, c, damping);
   for (int i = 0; i < large; i++) b->du[i] = i < m ? right[i] : 0;
   if (c) b->du[m] = value;
@@ -99,14 +97,14 @@ static int branch_least_squares (pw_branch *b, const double *right, const double
     if (!isfinite (b->J[i])) return PW_RETRY;
   memset (b->pivot, 0, (size_t)n * sizeof *b->pivot);
   if (LAPACKE_dgelsy_work (LAPACK_COL_MAJOR, rows, n, 1, b->J, rows, b->du, large, b->pivot, b->problem.rank_tolerance,
-                           &b->rank, b->work, b->work_size))
+                           &rank, b->work, b->work_size))
     return PW_RETRY;
   if (!c) b->du[n] = 0;
   return PW_OK;
 }
 
-/* Moves u along du by the largest of the factors 1, 1/2, ... with which |F| decreases by a tenth of its linear
- * prediction. */
+/* Moves u along du by the largest of the factors 1, 1/2, ... with which |F| decreases by at least a tenth of what the
+ * linear equations predict. */
 static int branch_descend (pw_branch *b, double *u, pw_error *error) {
   int n = b->problem.unknowns + 1;
   double before = branch_norm (b->problem.equations, b->F), factor = 1;
@@ -121,11 +119,11 @@ static int branch_descend (pw_branch *b, double *u, pw_error *error) {
   return PW_RETRY;
 }
 
-/* Newton's method at constant c u, or without c at constant p, there with the damping sqrt (damping |F|) of Levenberg &
- * Marquardt, which leads to the nearest of solutions that are not isolated (Yamashita & Fukushima 2001). */
+/* Newton's method at constant c . u, or if c is NULL at constant p, then with the Levenberg-Marquardt parameter
+ * damping |F|, which leads to the nearest of solutions that are not isolated (Yamashita & Fukushima 2001). */
 static int branch_iterate (pw_branch *b, double *u, const double *c, double damping, pw_error *error) {
   int n = b->problem.unknowns + 1, status;
-  double before = INFINITY;
+  double before = b->residual = INFINITY;
   for (b->iterations = 0;; b->iterations++) {
     status = branch_evaluate (b, u, 1, error);
     if (status != PW_OK) return status;
@@ -157,7 +155,7 @@ int pw_branch_solve (pw_branch *b, double *u, pw_error *error) {
 
 /* ---- Branches ---- */
 
-/* The unit tangent t at u with c t > 0.  PW_RETRY if c is orthogonal to the branch, where c t = 1 has no solution. */
+/* The unit tangent t at u with c . t > 0.  PW_RETRY if c is orthogonal to the branch. */
 static int branch_tangent (pw_branch *b, const double *u, const double *c, double *tangent, pw_error *error) {
   int n = b->problem.unknowns + 1;
   double dot = 0;
@@ -210,8 +208,8 @@ static double branch_distance (const pw_branch *b, const double *x, const double
   return sqrt (sum);
 }
 
-/* Corrects to->u on the plane perpendicular to a tangent, or with NULL at constant p; then sets to->tangent.  PW_RETRY
- * if the correction is longer than max_distance. */
+/* Corrects to->u on the plane perpendicular to a tangent, or if that is NULL at constant p; then sets to->tangent.
+ * PW_RETRY if the correction is longer than max_distance. */
 static int branch_correct (pw_branch *b, const double *tangent, double max_distance, pw_branch_point *to,
                            pw_error *error) {
   size_t bytes = ((size_t)b->problem.unknowns + 1) * sizeof *tangent;
@@ -224,8 +222,8 @@ static int branch_correct (pw_branch *b, const double *tangent, double max_dista
   return branch_tangent (b, to->u, b->condition, to->tangent, error);
 }
 
-/* Whether p changes by the mean of its slopes between two points around a fold: noise of solutions at a cusp does not.
- * A solution is accurate to about NEWTON_EXACT tolerances. */
+/* Whether p changes around a fold as its slopes at two points predict, by their mean: p of solutions that scatter at a
+ * cusp does not.  A solution is accurate to about NEWTON_EXACT times the tolerance. */
 static int branch_parabolic (const pw_branch *b, const pw_branch_point *from, const pw_branch_point *to, double chord) {
   int p = b->problem.unknowns;
   double slope = from->tangent[p], end = to->tangent[p], change = (to->u[p] - from->u[p]) / chord;
@@ -243,7 +241,7 @@ static int branch_smooth (const pw_branch *b, const pw_branch_point *from, const
   return dot >= BRANCH_TURN && sqrt (off) <= BRANCH_BENT && branch_parabolic (b, from, to, chord);
 }
 
-/* Whether the step to b->next passes an end of the range, or p of the first point, perhaps twice beside a fold: a
+/* Whether the step to b->next passes an end of the range, or p of the first point, perhaps twice beside a fold.  A
  * shorter one comes so near that branch_step_to_end ends there. */
 static int branch_passes_end (const pw_branch *b) {
   int n = b->problem.unknowns;
@@ -276,8 +274,8 @@ static double branch_longest_step (const pw_branch *b) {
   return b->max_change / fmax (fabs (b->reached.tangent[b->problem.unknowns]), BRANCH_STEEP);
 }
 
-/* Moves to the end of the range, or to p of the first point, if the next step would pass it: without evaluations beyond
- * the end, where the parameter may not be admissible.  PW_RETRY if it would not, or no point is found there. */
+/* Moves to the end of the range, or to p of the first point, if the next step would reach it: without evaluations
+ * beyond the end, where the parameter may not be admissible.  PW_RETRY if it would not, or no point is found there. */
 static int branch_step_to_end (pw_branch *b, pw_error *error) {
   int n = b->problem.unknowns;
   double slope = b->reached.tangent[n], p = b->reached.u[n], first = b->first.u[n];
@@ -321,8 +319,8 @@ static int branch_between (pw_branch *b, const pw_branch_point *from, const pw_b
 }
 
 /* The Illinois variant of regula falsi (Dowell & Jarratt 1971), every fourth step a bisection.  The bracket s[0], s[1]
- * consists of fractions of a cubic.  Points to which Newton's method converges become ends of this cubic; `scale`: its
- * length, relative to the step. */
+ * consists of fractions of the cubic between b->side[0] and b->side[1].  Points to which Newton's method converges
+ * become ends of this cubic; `scale` is its length, relative to the step. */
 int pw_branch_locate (pw_branch *b, pw_branch_test *test, void *context, pw_error *error) {
   pw_branch_point *point = &b->found;
   double s[2] = { 0, 1 }, f[2], middle, value, scale = 1;

@@ -2,10 +2,9 @@
  * pseudo-arclength.
  *
  * The equations are F (x, p) = 0 with u = (x, p); the caller scales them so that all entries of u and F are of
- * comparable size.  A linear system is solved by its least-squares solution of smallest norm with a decision on the
- * rank, so that F may have redundant equations, and solutions need not be isolated.  To continue a branch, solutions at
- * constant p should be isolated: add for each symmetry an equation with residual 0 whose derivatives make corrections
- * orthogonal to it.
+ * comparable size.  Corrections are least-squares solutions of smallest norm, with a decision on the rank: F may have
+ * redundant equations, and solutions need not be isolated.  To continue a branch, solutions at constant p should be
+ * isolated: add for each symmetry an equation with residual 0 whose derivatives make corrections orthogonal to it.
  *
  * (Keller 1977, Numerical solution of bifurcation and nonlinear eigenvalue problems; Allgower & Georg 1990, Numerical
  * Continuation Methods.) */
@@ -18,10 +17,10 @@ typedef struct {
   int unknowns, equations; /* entries of x and of F */
   double tolerance;        /* solutions have |F_i| <= tolerance */
   double rank_tolerance;   /* smaller singular values, relative to the largest one, count as 0; default 1e-9 */
-  /* Evaluates F (equations) and, unless dF is NULL, its derivatives with respect to u by columns: equations x
+  /* Evaluates F (equations) and, unless dF is NULL, its derivatives with respect to u, by columns: equations x
    * (unknowns + 1); both are 0 on entry.  A status; PW_RETRY, with or without an error: F cannot be evaluated at u. */
   int (*evaluate) (void *context, const double *u, double *F, double *dF, pw_error *error);
-  /* Whether two solutions are the same up to symmetries; NULL: if their unknowns are. */
+  /* Whether two solutions are the same up to symmetries; NULL: only if their unknowns are. */
   int (*same) (void *context, const double *u, const double *other);
   void *context;
 } pw_branch_problem;
@@ -43,7 +42,7 @@ typedef struct {
   int tag;         /* a number that the caller attaches */
 } pw_branch_event;
 
-enum { PW_BRANCH_QUEUE = 8 };
+enum { PW_BRANCH_QUEUE = 8 }; /* points and events of a step, at most */
 
 static const double PW_BRANCH_SAME = 1e-6; /* the largest difference of unknowns of points that count as the same */
 
@@ -51,19 +50,20 @@ typedef struct {
   pw_branch_problem problem;
   pw_branch_point reached, previous; /* the last two points */
   pw_branch_point found;             /* by pw_branch_locate */
-  double step;                       /* length of the next step */
-  double max_change;                 /* of p that a step predicts */
-  double min_step;
-  double event_accuracy; /* relative to the step */
-  int max_points;
+  /* Set these before the first step; afterwards `step` is adapted. */
+  double step;           /* length of the next step */
+  double max_change;     /* of p by a step, as predicted along the tangent */
+  double min_step;       /* shortest step */
+  double event_accuracy; /* of pw_branch_event.fraction */
+  int max_points;        /* of a branch */
+
   int iterations;  /* of the last solution */
-  double residual; /* largest |F_i| there, or where the iteration stopped */
-  int rank;        /* of dF/dx (or of dF with the arclength condition) there */
+  double residual; /* largest |F_i| there, or where the iteration stopped; INFINITY: it could not begin */
   int folded;      /* 1: p has an extremum between the last two points */
   /* Points of the last step not yet returned, in order; those before the last one are events. */
   pw_branch_event queue[PW_BRANCH_QUEUE];
   int queued, returned;
-  /* private */
+  /* private; F, J and pivot serve callers as scratch, too */
   int steps, ended;
   pw_branch_point first, next, side[2];
   int bounded; /* 1: steps beyond p = 0 to 1 or past p of the first point are refused */

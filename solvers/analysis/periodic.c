@@ -162,7 +162,7 @@ static int periodic_orbit (pw_periodic *x, const double *u, pw_periodic_orbit *o
   int status = pw_periodic_flow (x, u, PW_FLOW_MULTIPLIERS, PW_HERE, error);
   if (status == PW_OK) status = pw_periodic_multipliers (x, u, &out->trivial);
   if (status == PW_METHOD) return pw_fail (error, status, "model %s: no multipliers: LAPACK failed", x->s->model);
-  out->rotation = x->work[PW_RATE_TURN];
+  out->rotation = x->work[PW_RATE_TURN]; /* the multipliers have set x->work */
   if (status == PW_OK) status = pw_periodic_flow (x, u, PW_FLOW, PW_HERE, error);
   if (status == PW_OK) status = periodic_turns (x);
   if (status != PW_OK) return status;
@@ -213,8 +213,8 @@ int pw_periodic_follow (pw_periodic *x, int direction, pw_error *error) {
   return status == PW_RETRY ? pw_fail (error, PW_METHOD, "the branch cannot be followed from here") : status;
 }
 
-/* pw_branch_test: the distance of multiplier number `sought` from the unit circle, positive outside; +-1 if it moves on
- * the circle before. */
+/* pw_branch_test: the distance of multiplier number `sought` from the unit circle, positive outside; if it moves on the
+ * circle before it leaves it, +-1. */
 static int periodic_test (void *periodic, const pw_branch_point *point, double *value, pw_error *error) {
   pw_periodic *x = periodic;
   pw_periodic_orbit o;
@@ -224,8 +224,8 @@ static int periodic_test (void *periodic, const pw_branch_point *point, double *
   return status;
 }
 
-/* Locates where multiplier number `sought` crosses the unit circle between the last two points; it is inside at one of
- * them. */
+/* Locates where multiplier number `sought` crosses the unit circle between the last two points; `inside` is the one at
+ * which it does not lie outside. */
 static int periodic_crossing (pw_periodic *x, const pw_branch_point *inside, pw_periodic_event *event,
                               pw_error *error) {
   pw_branch *b = &x->branch;
@@ -241,8 +241,8 @@ static int periodic_crossing (pw_periodic *x, const pw_branch_point *inside, pw_
   return status;
 }
 
-/* pw_branch_find_events: the k-th largest multiplier crosses the unit circle.  At a fold, one that passes 1 is no event
- * of its own. */
+/* pw_branch_find_events: multipliers that cross the unit circle.  At a fold, one that passes 1 is no event of its
+ * own. */
 static int periodic_events (void *periodic, pw_error *error) {
   pw_periodic *x = periodic;
   pw_branch *b = &x->branch;

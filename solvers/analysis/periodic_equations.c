@@ -1,16 +1,17 @@
 /* Equations of relative periodic motions, by single shooting; multipliers.
  *
- * P (y) is the consistent state nearest to y, phi (y) the state one period after y, and D (s) y the state y displaced
- * by the symmetries of the system, s times the rates of each.  The unknowns are y, s and, if it is free, the period:
+ * P (y) is the consistent state nearest to y, phi (y) the state one period after y, and D (d) y the state y displaced
+ * by the symmetries of the system, by the k-th one at its rates for the time d_k.  The unknowns are y, d and, if it is
+ * free, the period:
  *
- *     phi (P (y)) - D (s) P (y) = 0,    y - P (y) = 0,
+ *     phi (P (y)) - D (d) P (y) = 0,    y - P (y) = 0,
  *
  * and corrections are orthogonal to symmetries and, with a free period, to the motion.  Derivatives of phi are those of
  * the variational equations (variation.c), along a basis B of perturbations on the constraints (x->basis).  P' = B B^+
  * (x->dual: B^+) is exact for such perturbations; on branches, whose tangents need all others, P' is computed by
  * differences.
  *
- * Multipliers are the eigenvalues of the monodromy matrix D (s)^-1 phi' in minimal coordinates of perturbations, in
+ * Multipliers are the eigenvalues of the monodromy matrix D (d)^-1 phi' in minimal coordinates of perturbations, in
  * the frame that has moved with the whole.  (Wulff & Schebesch 2008, Numerical continuation of symmetric periodic
  * orbits.) */
 #include <lapacke.h>
@@ -24,8 +25,8 @@ static const double EQUATIONS_STEADY = 1e-4;
 
 /* ---- Displacements ---- */
 
-/* The state y displaced by unit time at these rates: the whole translates by t and rotates by w about the origin at the
- * same time, p -> R p + V t, with R the rotation by w and V its mean over the way. */
+/* The state y displaced for unit time at these rates: the whole translates by t while it rotates by w about the origin,
+ * p -> R p + V t, with R the rotation by w and V the mean of the rotations on the way. */
 static void equations_displace (const pw_periodic *x, const double *rates, const double *y, double *out) {
   int n = x->n, bodies = x->s->bodies;
   double w = rates[PW_RATE_TURN], c = pw_cos (w), s = pw_sin (w), half = pw_sin (w / 2);
@@ -39,7 +40,7 @@ static void equations_displace (const pw_periodic *x, const double *rates, const
     q[2] += w + rates[PW_RATE_ANGLES + b];
     v[0] = c * vx - s * vy, v[1] = s * vx + c * vy;
   }
-  for (int j = 3 * bodies; j < n; j++) out[j] += rates[PW_RATE_ANGLES + bodies + j - 3 * bodies];
+  for (int j = 3 * bodies; j < n; j++) out[j] += rates[pw_steady_angle_rate (x->s, j)];
 }
 
 /* The change of a state along symmetry k. */
@@ -63,22 +64,22 @@ static void equations_residual (pw_periodic *x, const double *u, double *F) {
   }
 }
 
-/* Adds the derivatives of -D (s) y with respect to s, by differences. */
+/* Adds the derivatives of -D (d) y with respect to d, by differences. */
 static void equations_by_displacement (pw_periodic *x, const double *u, int rows, double *column) {
   const double h = 1e-6;
   int states = 2 * x->n;
-  double *s = x->work + pw_steady_rate_count (x->s);
+  double *d = x->work + pw_steady_rate_count (x->s);
   for (int k = 0; k < x->symmetries; k++, column += rows)
     for (int side = -1; side <= 1; side += 2) {
-      memcpy (s, u + states, (size_t)x->symmetries * sizeof *s);
-      s[k] += side * h;
-      pw_steady_combine (x->steady, s, 1, x->work);
+      memcpy (d, u + states, (size_t)x->symmetries * sizeof *d);
+      d[k] += side * h;
+      pw_steady_combine (x->steady, d, 1, x->work);
       equations_displace (x, x->work, x->y0, x->state);
       for (int j = 0; j < states; j++) column[j] -= side * x->state[j] / (2 * h) / pw_periodic_unit (x, j);
     }
 }
 
-/* The change of D (s) y by a change of y: positions and velocities rotate by the angle w. */
+/* The change of D (d) y by a change of y: positions and velocities rotate by the angle w. */
 static void equations_rotate (const pw_periodic *x, double w, const double *in, double *out) {
   pw_linear_rotate (&x->steady->system[PW_HERE].linearisation, w, in, out);
   pw_linear_rotate (&x->steady->system[PW_HERE].linearisation, w, in + x->n, out + x->n);
@@ -214,7 +215,7 @@ static int equations_block (pw_periodic *x, int first, int count, int to, double
   return PW_OK;
 }
 
-/* In coordinates whose first ones span the shifts, the monodromy matrix is block triangular. */
+/* In coordinates that begin with the shifts, the monodromy matrix is block triangular: the first block is trivial. */
 int pw_periodic_multipliers (pw_periodic *x, const double *u, int *trivial) {
   int n = x->n, size = x->size, lwork = 34 * size;
   double *S = x->monodromy + size * size, *tau = S + size * size, *work = tau + size;

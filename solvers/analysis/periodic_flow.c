@@ -6,8 +6,8 @@
 
 enum {
   FLOW_MULTIPLES = 24, /* of the period of a signal, that are tried as a common period */
-  FLOW_PERIODS = 3,    /* in which signals are compared; without a period: FLOW_TIMES T */
-  FLOW_TIMES = 20,
+  FLOW_PERIODS = 3,    /* during which signals are compared with those one period later */
+  FLOW_TIMES = 20,     /* multiples of the scale of time T during which they must not change if the period is free */
   /* Largest ratio of the steps of a trial of Newton's method to those of the motion that it is to improve: a trial far
    * away, with enormous velocities, would take millions. */
   FLOW_STEPS = 20,
@@ -47,8 +47,8 @@ double pw_system_period (const pw_system *s) {
   return period;
 }
 
-/* Sets the period, unless it is free, to that given, that of the signals, or where none of them has one, the last one,
- * and verifies that they repeat after it; if it is free, that they are constant. */
+/* Sets the period of x->system[place], unless it is free: that of the settings, or else of the signals, or if none of
+ * these has one, of the last motion.  Verifies that signals repeat after it; if it is free, that they are constant. */
 static int flow_signals (pw_periodic *x, pw_place place, pw_run *r) {
   double signals = pw_system_period (r->s), period = x->settings.period;
   char name[200];
@@ -75,14 +75,13 @@ static int flow_signals (pw_periodic *x, pw_place place, pw_run *r) {
 
 const pw_system *pw_periodic_system (pw_periodic *x, pw_place place, double value) {
   if (x->settings.compile == NULL) return x->s;
-  if (x->system[place].own && x->system[place].value == value) return x->system[place].own;
-  pw_system_free (x->system[place].own);
-  x->system[place].value = value, x->system[place].period = 0;
-  x->system[place].own = x->settings.compile (x->settings.context, value, &x->why);
+  if (x->system[place].own == NULL || x->system[place].value != value) {
+    pw_system_free (x->system[place].own);
+    x->system[place].value = value, x->system[place].period = 0;
+    x->system[place].own = x->settings.compile (x->settings.context, value, &x->why);
+  }
   const pw_system *s = x->system[place].own;
-  if (s == NULL || (s->coords == x->n && s->rows == x->s->rows && s->bodies == x->s->bodies)) return s;
-  pw_fail (&x->why, PW_INPUT, "model %s: the parameter changes the number of bodies or constraint equations", s->model);
-  return NULL;
+  return s && pw_steady_same_sizes (x->s, s, &x->why) == PW_OK ? s : NULL;
 }
 
 pw_run *pw_periodic_run (pw_periodic *x, pw_place place, double value, double rtol, const double *y) {
@@ -104,8 +103,8 @@ pw_run *pw_periodic_run (pw_periodic *x, pw_place place, double value, double rt
 
 /* ---- The flow ---- */
 
-/* x->change = the derivative of the consistent state nearest to x->state with respect to its entry j in its unit, by
- * differences. */
+/* x->change = the derivative of the consistent state nearest to x->state with respect to entry j of x->state, in the
+ * unit of this entry, by differences. */
 static int flow_nearest (pw_periodic *x, pw_run *r, int j) {
   const double h = 1e-5, initial = x->state[j];
   int n = x->n, status = PW_OK;
@@ -122,8 +121,8 @@ static int flow_nearest (pw_periodic *x, pw_run *r, int j) {
   return status;
 }
 
-/* Sets x->basis and x->dual at the initial state of the run.  nearest: those of any change of x->state are the minimal
- * coordinates of the change of the nearest consistent state; otherwise the change is taken to be on the constraints. */
+/* Sets x->basis and x->dual at the initial state of the run.  nearest: 1 if x->dual is to be right for any change of
+ * x->state, which changes the nearest consistent state; 0: for changes on the constraints. */
 static int flow_basis (pw_periodic *x, pw_run *r, int nearest) {
   pw_linearisation l;
   int n = x->n, status = pw_linear_open (&l, r, PW_WITHOUT_MODES, n);
@@ -211,11 +210,12 @@ double pw_periodic_difference (const pw_periodic *x, int j, double a, double b) 
   int rates = pw_steady_rate_count (x->s), changes = j >= 3 * x->s->bodies || j % 3 != 2;
   for (int k = 0; k < x->symmetries && !changes; k++)
     changes = x->steady->symmetry[k * rates + PW_RATE_TURN] != 0 ||
-              x->steady->symmetry[k * rates + PW_RATE_ANGLES + j / 3] != 0;
+              x->steady->symmetry[k * rates + pw_steady_angle_rate (x->s, j)] != 0;
   return changes ? a - b : remainder (a - b, 2 * PW_PI);
 }
 
-/* Sets y to a run's state displaced by symmetries to a unique one; its distance from x->y0 in units of the scene. */
+/* Sets y to the canonical state of a run at time t (pw_steady_canonical), and its distance from x->y0 in units of the
+ * scene. */
 static int flow_distance (pw_periodic *x, pw_run *r, double t, double *y, double *distance) {
   pw_sample sample;
   int n = x->n, status = pw_run_sample (r, t, &sample, &x->why);
@@ -228,8 +228,8 @@ static int flow_distance (pw_periodic *x, pw_run *r, double t, double *y, double
   return PW_OK;
 }
 
-/* Sets x->last_period to the time after which the run first returns near its state, up to symmetries: a minimum of the
- * distance. */
+/* Sets x->last_period to the time after which the run first returns near its present state, up to symmetries: where the
+ * distance from it has a minimum. */
 static int flow_return (pw_periodic *x, pw_run *r) {
   double t0 = pw_run_time (r), step = x->T / RETURN_STEPS, d[3] = { 0, 0, 0 }, far = 0;
   int status = flow_distance (x, r, t0, x->y0, d);
@@ -243,9 +243,8 @@ static int flow_return (pw_periodic *x, pw_run *r) {
     if (i > 2 && far > RETURN_LEAST && d[1] < RETURN_NEAR * far && d[1] < d[0] && d[1] <= d[2])
       return x->last_period = t - step - t0, PW_OK;
   }
-  if (status == PW_OK)
-    pw_fail (&x->why, PW_METHOD, "the motion does not return to a state: a guess of the period is needed");
-  return PW_RETRY;
+  if (status != PW_OK) return status;
+  return pw_fail (&x->why, PW_METHOD, "the motion does not return to a state: a guess of the period is needed");
 }
 
 int pw_periodic_settle (pw_periodic *x, double value, int periods) {

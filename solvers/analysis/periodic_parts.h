@@ -12,7 +12,7 @@ typedef enum { PW_FLOW, PW_FLOW_DERIVATIVES, PW_FLOW_MULTIPLIERS } pw_flow_accur
 struct pw_periodic {
   const pw_system *s; /* as described */
   pw_periodic_settings settings;
-  pw_steady *steady; /* for scales and symmetries alone */
+  pw_steady *steady; /* of pw_steady_open_symmetries */
   int n, symmetries; /* number of coordinates; of symmetries */
   double L, T;       /* scales [m, s] */
   struct {
@@ -21,22 +21,22 @@ struct pw_periodic {
     double period;  /* of its signals, verified [s]; 0: not yet */
   } system[PW_PLACES];
   pw_branch branch;
-  double *u;          /* 2 n, symmetries, 1, 1: state, displacement in a period, free period, parameter; scaled */
-  double last_period; /* the period of the last motion [s]; also a guess of a free one */
+  double *u;          /* scaled: 2 n of the state, displacement along symmetries in a period, free period; parameter */
+  double last_period; /* the period of the last motion, or a guess of a free one [s] */
   /* Of the last flow: state at its beginning and end, with accelerations there. */
   double *y0, *y1, *a0, *a1; /* 2 n, 2 n, n, n */
   double *state, *change;    /* 2 n: a state that a run begins with, a change of a state; scratch */
-  int size;                  /* number of minimal coordinates of changes of the state */
-  double *basis, *Phi;   /* 2 n x size, by columns: their changes of the initial state, of the state after a period */
-  double *dual;          /* size x 2 n, by columns: minimal coordinates of a change of each entry by its unit */
-  long steps;            /* of the last motion at a solution or a step of Newton's method; 0: not yet known */
-  double *monodromy;     /* size x size, by columns: derivative of the state after a period, displaced back */
-  double *re, *im;       /* size: its eigenvalues, the multipliers */
+  int size;                  /* number of minimal coordinates of changes of the initial state */
+  double *basis, *Phi; /* 2 n x size, by columns: changes of the initial state, of the state after a period, by each */
+  double *dual;        /* size x 2 n, by columns: minimal coordinates of a change of each entry by its unit */
+  long steps;          /* of the run at the last iterate of Newton's method; 0: not yet known */
+  double *monodromy;   /* size x size, by columns: the monodromy matrix; then scratch */
+  double *re, *im;     /* size: its eigenvalues, the multipliers */
   double *work, *beside; /* scratch: rates; unknowns and residuals beside a point */
   pw_error why;          /* the last reason why a motion could not be computed */
   int unstable;          /* multipliers outside the unit circle at the last point; -1: not known */
   int sought;            /* index of the multiplier whose crossing of the unit circle is located */
-  int on_circle;         /* 1: it moves on the circle before it leaves it */
+  int on_circle;         /* 1: this multiplier moves on the unit circle until it leaves it */
   char *memory;
 };
 
@@ -47,7 +47,7 @@ static inline int pw_periodic_unknowns (const pw_periodic *x) {
 static inline double pw_periodic_unit (const pw_periodic *x, int j) {
   return j < x->n ? pw_unit (x->s, j) : pw_unit (x->s, j - x->n) / x->T;
 }
-/* The difference a - b of entry j of two states; without whole turns, if it is an angle that no symmetry changes. */
+/* a - b for entry j of two states; of the angle of a body that no symmetry changes, without whole turns. */
 double pw_periodic_difference (const pw_periodic *x, int j, double a, double b);
 static inline double pw_periodic_parameter (const pw_periodic *x, const double *u) {
   return x->settings.first + u[pw_periodic_unknowns (x)] * (x->settings.last - x->settings.first);
@@ -57,21 +57,23 @@ static inline double pw_periodic_parameter (const pw_periodic *x, const double *
 
 /* The system at a value of the parameter.  NULL, with x->why, if there is none. */
 const pw_system *pw_periodic_system (pw_periodic *x, pw_place place, double value);
-/* Opens a run at a value of the parameter from the consistent state nearest to y (NULL: the initial one), and
- * determines the period of x->system[place].  NULL, with x->why, if it fails. */
+/* Opens a run at a value of the parameter from the consistent state nearest to y, or if that is NULL from the initial
+ * state, and determines the period of x->system[place].  NULL, with x->why, if it fails. */
 pw_run *pw_periodic_run (pw_periodic *x, pw_place place, double value, double rtol, const double *y);
-/* Integrates one period from the state of u: sets y0, y1, a0, a1, or with derivatives y0, a0, basis, Phi, dual.  A
- * status; PW_RETRY with x->why. */
+/* Integrates one period from the state of u: sets y0, a0 and y1, a1, or with derivatives basis, dual, Phi.  A status;
+ * PW_RETRY with x->why. */
 int pw_periodic_flow (pw_periodic *x, const double *u, pw_flow_accuracy accuracy, pw_place place, pw_error *error);
-/* Sets x->state to that after some periods, and a free period that is not given to a guess.  PW_RETRY with x->why. */
+/* Sets x->state to the state after some periods of the motion from the initial state, and a free period that is not
+ * given to a guess.  A status; x->why contains the reason of a failure, unless the search has been stopped. */
 int pw_periodic_settle (pw_periodic *x, double value, int periods);
 
 /* ---- periodic_equations.c ---- */
 
 /* pw_branch_problem.evaluate. */
 int pw_periodic_evaluate (void *periodic, const double *u, double *F, double *dF, pw_error *error);
-/* Fills x->re, x->im with the multipliers of u after a flow with derivatives, the largest first, then with the
- * `trivial` ones.  PW_OK or PW_METHOD; PW_RETRY with x->why: with a free period, the motion is steady. */
+/* Fills x->re, x->im with the multipliers of u, after a flow with derivatives: those that are not trivial, the largest
+ * first, then the trivial ones; x->work with the rates of the displacement in a period.  PW_OK; PW_METHOD if LAPACK
+ * fails; PW_RETRY with x->why: with a free period, the motion is steady. */
 int pw_periodic_multipliers (pw_periodic *x, const double *u, int *trivial);
 
 #endif

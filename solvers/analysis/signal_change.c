@@ -15,8 +15,8 @@ typedef struct {
   int count;                    /* value and two derivatives of each signal */
 } signal_comparison;
 
-/* Compares signals at two times, in the run's state (number 0) or in one near it, since a signal may be multiplied by a
- * state that is 0.  A status; signals may fail in other states than the run's. */
+/* Compares signals at two times, in the run's state (number 0) or in one near it (number 1), since a signal may be
+ * multiplied by a state that is 0.  A status; signals may fail in the state near the run's. */
 static int signals_compare (signal_comparison *x, int number, double t0, double t1) {
   pw_run *r = x->r;
   pw_workspace *w = r->w;
@@ -50,8 +50,8 @@ int pw_signals_change (pw_run *r, double t, double period, double span, int *cha
   for (int k = 1; status == PW_OK && k <= 2 * SIGNAL_TIMES && isfinite (at); k++) {
     double part = k / (double)SIGNAL_TIMES;
     at = k > SIGNAL_TIMES ? signals_next_interval (r->w, &breakpoint, t + span)
-         : period > 0     ? t + span * fmod (0.618034 * k, 1)
-                          : t + span * part * part;
+         : period > 0     ? t + span * fmod (0.618034 * k, 1) /* golden ratio: equidistributed */
+                          : t + span * part * part;               /* denser at first */
     for (int number = 0; number < 2 && status == PW_OK && isfinite (at); number++)
       status = signals_compare (&x, number, period > 0 ? at : t, period > 0 ? at + period : at);
   }

@@ -11,8 +11,9 @@ enum {
   STEADY_BREAKPOINTS = 1000 /* that are followed to find the last one */
 };
 static const double STEADY_EXACT = 1e-9, /* largest residual of a solution, in units of the scene */
-    STEADY_SLOW = 1e-4,                  /* rates that may be round-off at a double root, the root of STEADY_EXACT */
-    SUGGEST_CHANGE = 1e-8, SUGGEST_LEFT = 1e-6; /* least square of a change, and its part that is not held already */
+    STEADY_SLOW = 1e-4,    /* rates that may be round-off at a double root: more than the root of STEADY_EXACT */
+    SUGGEST_CHANGE = 1e-8, /* a quantity is worth holding if the square of its change along the family is larger, */
+    SUGGEST_LEFT = 1e-6;   /* and the part of this square that is not held already, relative to the whole, is larger */
 
 /* ---- Opening ---- */
 
@@ -37,9 +38,9 @@ static int steady_arrays (pw_steady *x) {
     { &x->null_space, (most + 1) * (most + 1) },
   };
   x->memory = pw_alloc_arrays (array, sizeof array / sizeof *array);
-  x->cyclic = calloc (n + 1, 1);
-  x->solution = calloc (2 * n + 1, sizeof *x->solution);
-  x->hold = calloc (holds + 1, sizeof *x->hold);
+  x->cyclic = pw_arena_alloc (&x->arena, n);
+  x->solution = pw_arena_alloc (&x->arena, 2 * n * sizeof *x->solution);
+  x->hold = pw_arena_alloc (&x->arena, holds * sizeof *x->hold);
   if (!x->memory || !x->cyclic || !x->solution || !x->hold) return PW_RESOURCE;
   if (holds) memcpy (x->hold, x->settings.hold, holds * sizeof *x->hold);
   for (int j = 0; j < 2 * x->n; j++) x->solution[j].state = j;
@@ -53,7 +54,8 @@ static double steady_last_breakpoint (pw_workspace *w, double t, double span) {
   return t;
 }
 
-/* PW_INPUT with the first signal that changes with time, in the initial state, within the span. */
+/* PW_INPUT with the first signal that changes with time within the span, and if signals are constant after the last
+ * breakpoint, with the time of that, rounded up. */
 static int steady_constant (pw_steady *x, pw_error *error) {
   pw_run *r = x->system[PW_HERE].run;
   char name[200], text[32];
@@ -147,9 +149,7 @@ void pw_steady_close (pw_steady *x) {
   for (pw_place place = PW_HERE; place < PW_PLACES; place++) pw_steady_close_system (x, place);
   pw_branch_close (&x->branch);
   pw_linear_free (&x->linear);
-  free (x->cyclic);
-  free (x->solution);
-  free (x->hold);
+  pw_arena_free (&x->arena);
   free (x->memory);
   free (x);
 }
@@ -164,18 +164,13 @@ int pw_steady_symmetries (const pw_steady *x) {
 
 /* ---- Solutions ---- */
 
-/* Remembers a solution, where later runs are opened. */
-static void steady_remember (pw_steady *x) {
-  x->solved = 1;
-  for (int j = 0; j < x->n; j++) x->solution[j].value = x->q[j], x->solution[x->n + j].value = x->v[j];
-}
-
 int pw_steady_motion_at (pw_steady *x, const double *u, pw_steady_motion *out, pw_error *error) {
   int status = pw_steady_open_system (x, PW_HERE, pw_steady_parameter (x, u));
   if (status != PW_OK) return *error = x->why, error->status;
   pw_run *r = x->system[PW_HERE].run;
   pw_steady_state (x, u);
-  steady_remember (x);
+  x->solved = 1;
+  for (int j = 0; j < x->n; j++) x->solution[j].value = x->q[j], x->solution[x->n + j].value = x->v[j];
   memcpy (r->q, x->q, (size_t)x->n * sizeof *r->q);
   memcpy (r->v, x->v, (size_t)x->n * sizeof *r->v);
   pw_linear_free (&x->linear);
@@ -243,7 +238,7 @@ int pw_steady_solve (pw_steady *x, int attempt, double parameter, pw_steady_moti
 
 /* ---- Suggestions ---- */
 
-/* The change of a quantity along direction i of the family; relative: less that of the angle of the first body. */
+/* The change of a quantity along direction i of the family; relative: 1 for an angle, less that of the first body. */
 static double suggest_change (pw_steady *x, const pw_initial_value *hold, int relative, int i) {
   const double *z = x->null_space + (size_t)i * (size_t)pw_steady_unknowns (x);
   double *dq = x->dq, *dv = x->dv;
@@ -251,7 +246,7 @@ static double suggest_change (pw_steady *x, const pw_initial_value *hold, int re
   pw_steady_velocities (x, x->combined, x->q, dv);
   for (int j = 0; j < x->n; j++) dq[j] = z[j] * pw_unit (x->s, j);
   pw_linear_turn (&x->system[PW_HERE].linearisation, x->rates[PW_RATE_TURN], dq, dv);
-  return pw_hold_change (x, hold, dq, dv) - (relative ? dq[2] : 0);
+  return pw_hold_residual (x, hold, dq, dv) - (relative ? dq[2] : 0);
 }
 
 /* Whether holding a quantity makes the family smaller.  `basis` has `count` orthonormal rows of length `family`, the
@@ -270,7 +265,8 @@ static int suggest_helps (pw_steady *x, const pw_initial_value *hold, int relati
   return norm > SUGGEST_CHANGE && norm > SUGGEST_LEFT * before;
 }
 
-/* Candidate c to hold: speed and angular velocity of the first body; angles; positions; velocities of all bodies. */
+/* Candidate c to hold, as numbered by pw_system_find_held: speed and angular velocity of the first body; angles of
+ * bodies; internal coordinates; positions; speed and angular velocity of every body. */
 static int suggest_candidate (const pw_steady *x, int c) {
   int n = x->n, bodies = x->s->bodies;
   if (c < 2) return c == 0 ? 2 * n : n + 2;
@@ -282,8 +278,8 @@ static int suggest_candidate (const pw_steady *x, int c) {
 }
 
 int pw_steady_suggest (pw_steady *x, pw_initial_value *hold, int most) {
-  int family = x ? steady_family (x) : PW_INPUT, count = 0, held = 0, turns = 0 /* 1: the whole can turn */,
-      anchored = 0;
+  int family = x ? steady_family (x) : PW_INPUT, count = 0, held = 0;
+  int turns = 0, anchored = 0; /* 1: the whole can turn; the angle of the first body is held, to which others relate */
   if (family < 0) return family;
   double *basis = calloc ((size_t)family * ((size_t)family + 1) + 1, sizeof *basis);
   if (basis == NULL) return PW_RESOURCE;

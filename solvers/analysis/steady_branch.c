@@ -33,8 +33,8 @@ int pw_steady_follow (pw_steady *x, const double *q, const double *v, double par
 
 /* ---- Events ---- */
 
-/* The real part of eigenvalue number `sought` of those that are neither 0 nor of rigid displacements, and its imaginary
- * part. */
+/* The real part of eigenvalue number `sought` of those whose real part is not 0, without rigid displacements, and its
+ * imaginary part; -1 if there are fewer. */
 static double branch_eigenvalue (const pw_steady *x, int sought, double *im) {
   const pw_linear *l = &x->linear;
   for (int i = 0; i < l->unknowns; i++) {
@@ -44,8 +44,8 @@ static double branch_eigenvalue (const pw_steady *x, int sought, double *im) {
   return *im = 0, -1;
 }
 
-/* pw_branch_test: the real part that changes its sign, where as many eigenvalues have real part 0 as at both ends of
- * the step (x->neutral_at_ends; -1: these differ); 0 where more have; otherwise +-1 by the number of growing modes. */
+/* pw_branch_test.  If as many eigenvalues have real part 0 as at both ends of the step (x->neutral_at_ends): the real
+ * part that changes its sign; if more have: 0; otherwise 1 if more than `sought` modes grow, or else -1. */
 static int branch_test (void *steady, const pw_branch_point *point, double *value, pw_error *error) {
   pw_steady *x = steady;
   pw_steady_motion motion;
@@ -58,7 +58,7 @@ static int branch_test (void *steady, const pw_branch_point *point, double *valu
   return PW_OK;
 }
 
-/* Whether it is a pair whose real part changes its sign at the point located; `changing` modes do in the step. */
+/* Whether a conjugate pair changes the sign of its real part at the point located; in the step `changing` modes do. */
 static int branch_pair (const pw_steady *x, int changing) {
   double im;
   branch_eigenvalue (x, x->sought, &im);
@@ -72,8 +72,8 @@ static void branch_tag_fold (pw_branch *b, int growing) {
     if (b->queue[i].event == PW_BRANCH_FOLD) b->queue[i].tag = growing;
 }
 
-/* Locates each change of sign of a real part between `least` and `most` growing modes, with the number of the others as
- * tag.  That of a real eigenvalue at a fold is no event of its own. */
+/* Locates each change of sign of a real part between `least` and `most` growing modes; its tag is the number of other
+ * growing modes.  That of a real eigenvalue at a fold is no event of its own. */
 static int branch_changes (pw_steady *x, int least, int most, pw_error *error) {
   int pair = 0;
   pw_branch *b = &x->branch;

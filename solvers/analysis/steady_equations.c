@@ -65,8 +65,8 @@ int pw_steady_nearest (pw_steady *x, const double *q, const double *v, double *u
 
 /* ---- Residuals ---- */
 
-/* Those of x->system[place] in the state x->q, x->v, at which its accelerations are evaluated: g, J v - eta, a - W
- * v. */
+/* The residuals g, J v - eta, a - W v of x->system[place] in the state x->q, x->v, at which its accelerations have been
+ * evaluated. */
 static void steady_residual (pw_steady *x, pw_place place, double *F) {
   pw_linearisation *l = &x->system[place].linearisation;
   pw_workspace *w = x->system[place].run->w;
@@ -85,7 +85,7 @@ static void steady_residual (pw_steady *x, pw_place place, double *F) {
 
 /* ---- Derivatives ---- */
 
-/* The change of the residuals by the variation (dq, dv) in the linearisation and that of the angular velocity, dw. */
+/* The change of the residuals by the variation (dq, dv) in l->dx and the change dw of the angular velocity w. */
 static void steady_change (pw_steady *x, double dw, double *F) {
   pw_linearisation *l = &x->system[PW_HERE].linearisation;
   int n = x->n;
@@ -98,7 +98,7 @@ static void steady_change (pw_steady *x, double dw, double *F) {
   pw_linear_turn (l, -x->rates[PW_RATE_TURN], dv, l->da);
   pw_linear_turn (l, -dw, x->v, l->da);
   for (int j = 0; j < n; j++) *F++ = l->da[j] * pw_length_factor (x->s, j) * x->T * x->T / x->L;
-  for (int i = 0; i < x->settings.holds; i++) *F++ = pw_hold_change (x, x->hold + i, dq, dv);
+  for (int i = 0; i < x->settings.holds; i++) *F++ = pw_hold_residual (x, x->hold + i, dq, dv);
 }
 
 /* The conditions that dq is orthogonal to the free symmetries. */
@@ -114,7 +114,7 @@ static void steady_conditions (pw_steady *x, double *dF) {
   }
 }
 
-/* Derivatives with respect to q and xi. */
+/* Derivatives with respect to the unknowns q and xi. */
 static void steady_columns (pw_steady *x, double *dF) {
   pw_linearisation *l = &x->system[PW_HERE].linearisation;
   int n = x->n, equations = pw_steady_equations (x);
@@ -171,7 +171,7 @@ int pw_steady_evaluate (void *steady, const double *u, double *F, double *dF, pw
     return PW_RETRY;
   }
   steady_residual (x, PW_HERE, F);
-  for (int i = 0; i < x->settings.holds; i++) F[first_held + i] = pw_hold_residual (x, x->hold + i);
+  for (int i = 0; i < x->settings.holds; i++) F[first_held + i] = pw_hold_residual (x, x->hold + i, NULL, NULL);
   if (dF == NULL) return PW_OK;
   steady_columns (x, dF);
   steady_conditions (x, dF);

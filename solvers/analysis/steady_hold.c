@@ -1,4 +1,4 @@
-/* What is held in a steady motion: A (q, v) = value B (q, v), with the states themselves, or of a body
+/* What is held in a steady motion: A (q, v) = value B (q, v).  For a state A is the state and B = 1; for a body
  *
  *     speed      A = vx cos phi + vy sin phi,  B = 1        radius      A = speed,  B = omega
  *                                                           curvature   A = omega,  B = speed */
@@ -77,11 +77,7 @@ static double hold_unit (const pw_steady *x, int held) {
   return (index % HOLD_OF_BODY == HOLD_CURVATURE ? 1 : x->L) / x->T;
 }
 
-double pw_hold_residual (const pw_steady *x, const pw_initial_value *hold) {
-  return pw_hold_change (x, hold, NULL, NULL);
-}
-
-double pw_hold_change (const pw_steady *x, const pw_initial_value *hold, const double *dq, const double *dv) {
+double pw_hold_residual (const pw_steady *x, const pw_initial_value *hold, const double *dq, const double *dv) {
   const hold_pair pair = hold_terms (x->s, hold->state, x->q, x->v, dq, dv);
   return (pair.A - hold->value * pair.B) / hold_unit (x, hold->state);
 }

@@ -19,7 +19,7 @@ struct pw_steady {
   double L, T;           /* scales at the initial state [m, s] */
   double *start;         /* 2 n: initial state */
   unsigned char *cyclic; /* n: 1 for angles on which nothing depends */
-  double *norm;          /* m: lengths of the rows of J */
+  double *norm;          /* m: lengths of the rows of J at the initial state, by which residuals are divided */
 
   /* Displacements are given by their rates: pw_steady_rate_count. */
   int symmetries;
@@ -47,7 +47,8 @@ struct pw_steady {
   int unstable, neutral; /* eigenvalues at the point reached: growing, with real part 0 */
   int sought;            /* index of the eigenvalue whose change of sign is located */
   int neutral_at_ends;   /* `neutral` at both ends of the step; -1: they differ */
-  char *memory;
+  char *memory;          /* of the numbers */
+  pw_arena arena;        /* of the other arrays */
 };
 
 /* ---- steady_symmetries.c ---- */
@@ -56,20 +57,24 @@ struct pw_steady {
  * angle of each body alone; then of each internal coordinate. */
 enum { PW_RATE_X, PW_RATE_Y, PW_RATE_TURN, PW_RATE_ANGLES };
 static inline int pw_steady_rate_count (const pw_system *s) {
-  return PW_RATE_ANGLES + s->bodies + s->coords - 3 * s->bodies;
+  return PW_RATE_ANGLES + s->coords - 2 * s->bodies;
 }
-/* The rates of a combination of symmetries, from their coefficients divided by a unit. */
+/* The index of the rate that changes the angle of coordinate j alone. */
+static inline int pw_steady_angle_rate (const pw_system *s, int j) {
+  return PW_RATE_ANGLES + (j < 3 * s->bodies ? j / 3 : j - 2 * s->bodies);
+}
+/* rates = sum of coefficient[k] / unit times the rates of symmetry k. */
 void pw_steady_combine (const pw_steady *x, const double *coefficient, double unit, double *rates);
 /* The velocities that rates cause at a configuration. */
 void pw_steady_velocities (const pw_steady *x, const double *rates, const double *q, double *v);
-/* Orthonormal rows that span the null space of M (rows x n, by columns, destroyed; rows >= n).  Singular values up to
- * the tolerance, or up to round-off, count as 0.  Returns the number of rows, or a status < 0. */
+/* out: orthonormal rows of length n that span the null space of M (rows x n, by columns, destroyed; rows >= n).
+ * Singular values up to the tolerance, or up to round-off, count as 0.  Returns the number of rows, or a status < 0. */
 int pw_null_space (int rows, int n, double *M, double tolerance, double *out);
-/* A state at a distance from the run's in every coordinate, in units of the scene, in irregular direction `number`. */
+/* A state near the run's, at most `distance` units of the scene away: an irregular one for each `number`. */
 void pw_irregular_state (const pw_run *r, double distance, int number, double *q, double *v);
-/* Finds the symmetries of the system.  PW_OK, PW_RESOURCE or PW_RETRY. */
+/* Finds the symmetries of the system.  A status; PW_RETRY and PW_METHOD: the equations are singular. */
 int pw_steady_find_symmetries (pw_steady *x);
-/* Finds the symmetries that leave what is held unchanged, at the state x->q, x->v. */
+/* Finds the symmetries that leave what is held unchanged, at the state x->q, x->v.  A status. */
 int pw_steady_find_free_symmetries (pw_steady *x);
 /* The largest difference of two states up to symmetries and whole turns, in units of the scene; of numbers above 1 in
  * these units, relative to them. */
@@ -91,9 +96,9 @@ static inline int pw_steady_equations (const pw_steady *x) {
 /* pw_branch_problem.evaluate, .same. */
 int pw_steady_evaluate (void *steady, const double *u, double *F, double *dF, pw_error *error);
 int pw_steady_same_motion (void *steady, const double *u, const double *other);
-/* Sets x->q, x->v and x->rates to those of unknowns u, and what varies among what is held to its value there. */
+/* Sets x->q, x->v and x->rates to those of the unknowns u, and in x->hold the value that varies. */
 void pw_steady_state (pw_steady *x, const double *u);
-/* The unknowns of the steady motion nearest to the velocities v at q.  PW_METHOD if LAPACK fails. */
+/* Sets u to the unknowns of the steady motion at q whose velocities are nearest to v.  PW_METHOD if LAPACK fails. */
 int pw_steady_nearest (pw_steady *x, const double *q, const double *v, double *u, pw_error *error);
 double pw_steady_parameter (const pw_steady *x, const double *u);
 
@@ -101,23 +106,24 @@ double pw_steady_parameter (const pw_steady *x, const double *u);
 
 enum { PW_STEADY_MAX_COORDINATES = 400 }; /* since the cost is cubic */
 
-/* Opens x->system[place] for a value of the parameter, unless it is open.  A status; PW_RETRY with x->why. */
+/* Opens x->system[place] for a value of the parameter, unless it is open.  A status, with x->why if it fails. */
 int pw_steady_open_system (pw_steady *x, pw_place place, double value);
 void pw_steady_close_system (pw_steady *x, pw_place place);
+/* PW_INPUT and the reason unless both systems have as many bodies, coordinates and constraint equations. */
+int pw_steady_same_sizes (const pw_system *a, const pw_system *b, pw_error *why);
 
 /* ---- steady_hold.c ---- */
 
-/* The residual A - value B of what is held (steady_hold.c) in the state x->q, x->v, its change by a variation (dq, dv),
- * and its derivative with respect to the value; all divided by the unit of A. */
-double pw_hold_residual (const pw_steady *x, const pw_initial_value *hold);
-double pw_hold_change (const pw_steady *x, const pw_initial_value *hold, const double *dq, const double *dv);
+/* The residual A - value B of what is held (steady_hold.c) in the state x->q, x->v, or if dq is not NULL its change by
+ * the variation (dq, dv); its derivative with respect to the value.  All are divided by the unit of A. */
+double pw_hold_residual (const pw_steady *x, const pw_initial_value *hold, const double *dq, const double *dv);
 double pw_hold_slope (const pw_steady *x, const pw_initial_value *hold);
 
 /* ---- steady_start.c ---- */
 
 /* The unknowns with which an attempt begins: 0, the initial state; 1, a state to which forces lead from there; then
- * random states, even attempts near the initial one, odd ones anywhere.  Of four in a row the first two need not be
- * consistent, and from the third one forces lead elsewhere as in attempt 1. */
+ * random states, even attempts near the initial one, odd ones anywhere.  By attempt modulo 4: 0 and 1 need not be
+ * consistent; 2, a state to which forces lead as in attempt 1; 3, consistent. */
 int pw_steady_start (pw_steady *x, int attempt, double *u, pw_error *error);
 
 /* ---- signal_change.c ---- */

@@ -4,9 +4,9 @@
 #include <string.h>
 #include "steady_parts.h"
 
-enum { START_STEPS = 300 };          /* of a relaxation, at most */
-static const double START_FAR = 0.2, /* longest of its steps, in units of the scene */
-    START_GROW = 1.1, START_SHRINK = 0.4;
+enum { START_STEPS = 300 };               /* of a relaxation, at most */
+static const double START_FAR = 0.2,      /* longest of its steps, in units of the scene */
+    START_GROW = 1.1, START_SHRINK = 0.4; /* factors of the next step */
 
 /* A random number between -1 and 1: SplitMix64 (Steele, Lea & Flood 2014, Fast splittable pseudorandom number
  * generators). */

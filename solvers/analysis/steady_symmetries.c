@@ -26,9 +26,9 @@ void pw_steady_velocities (const pw_steady *x, const double *rates, const double
   for (int j = 0; j < bodies; j += 3) {
     v[j] = x->L * rates[PW_RATE_X] - rates[PW_RATE_TURN] * (q[j + 1] - x->origin[1]);
     v[j + 1] = x->L * rates[PW_RATE_Y] + rates[PW_RATE_TURN] * (q[j] - x->origin[0]);
-    v[j + 2] = rates[PW_RATE_TURN] + rates[PW_RATE_ANGLES + j / 3];
+    v[j + 2] = rates[PW_RATE_TURN] + rates[pw_steady_angle_rate (x->s, j)];
   }
-  for (int j = bodies; j < x->n; j++) v[j] = rates[PW_RATE_ANGLES + x->s->bodies + j - bodies];
+  for (int j = bodies; j < x->n; j++) v[j] = rates[pw_steady_angle_rate (x->s, j)];
 }
 
 /* The change of the equations by rate of displacement c, in units of the scene. */
@@ -120,9 +120,9 @@ static int symmetry_evaluate (pw_steady *x, double distance, int number) {
   return status;
 }
 
-/* Makes combinations that displace nothing, such as a rotation of the whole about the centre of a pinned disc less one
- * of its angle, vanish from the basis of symmetries.  Returns their number, or a status < 0.  x->q is in general
- * position. */
+/* Reduces the symmetries so that combinations of them that displace nothing vanish, such as a rotation of the whole
+ * about the centre of a pinned disc less one of the disc's angle.  Returns their number, or a status < 0.  x->q is in
+ * general position. */
 static int symmetry_remove_idle (pw_steady *x, int rates) {
   int n = x->n + 3, symmetries = x->symmetries; /* at least as many rows as columns */
   double *F = calloc ((size_t)(n + symmetries + rates) * (size_t)symmetries + 1, sizeof *F);
@@ -149,9 +149,10 @@ static int symmetry_remove_idle (pw_steady *x, int rates) {
   return idle;
 }
 
-/* The coordinate that rate c >= PW_RATE_ANGLES changes. */
+/* The coordinate that rate c >= PW_RATE_ANGLES changes: the inverse of pw_steady_angle_rate. */
 static int symmetry_coordinate (const pw_steady *x, int c) {
-  return c < PW_RATE_ANGLES + x->s->bodies ? 3 * (c - PW_RATE_ANGLES) + 2 : 2 * x->s->bodies + c - 3;
+  int k = c - PW_RATE_ANGLES;
+  return k < x->s->bodies ? 3 * k + 2 : 2 * x->s->bodies + k;
 }
 
 /* Finds the angles whose change is a symmetry by itself. */
@@ -167,8 +168,8 @@ static void symmetry_find_cyclic (pw_steady *x) {
 
 int pw_steady_find_symmetries (pw_steady *x) {
   pw_linearisation *l = &x->system[PW_HERE].linearisation;
-  int rates = pw_steady_rate_count (x->s), length = l->holonomic + l->rank + x->n,
-      rows = SYMMETRY_STATES * (length + 3);
+  int rates = pw_steady_rate_count (x->s); /* n + 3 at most */
+  int length = l->holonomic + l->rank + x->n + 3, rows = SYMMETRY_STATES * length;
   int status = PW_OK;
   double *M = calloc ((size_t)rows * (size_t)rates + (size_t)rates, sizeof *M), size = 0;
   if (M == NULL) return PW_RESOURCE;
@@ -176,7 +177,7 @@ int pw_steady_find_symmetries (pw_steady *x) {
     status = symmetry_evaluate (x, SYMMETRY_DISTANCE, k);
     if (status == PW_RETRY) status = symmetry_evaluate (x, SYMMETRY_DISTANCE / 100, k);
     for (int c = 0; c < rates && status == PW_OK; c++)
-      symmetry_violation (x, c, M + rows * rates, M + c * rows + k * (length + 3));
+      symmetry_violation (x, c, M + rows * rates, M + c * rows + k * length);
     if (status == PW_OK) size = fmax (size, symmetry_largest_change (x));
   }
   double tolerance = PW_LINEAR_SYMMETRIC * (1 + 1e-4 * size); /* round-off of larger derivatives is larger */
@@ -200,7 +201,7 @@ int pw_steady_find_free_symmetries (pw_steady *x) {
     pw_steady_velocities (x, symmetry, x->q, x->dq);
     memset (x->dv, 0, (size_t)x->n * sizeof *x->dv);
     pw_linear_turn (&x->system[PW_HERE].linearisation, symmetry[PW_RATE_TURN], x->v, x->dv);
-    for (int i = 0; i < holds; i++) M[k * rows + i] = pw_hold_change (x, x->hold + i, x->dq, x->dv);
+    for (int i = 0; i < holds; i++) M[k * rows + i] = pw_hold_residual (x, x->hold + i, x->dq, x->dv);
   }
   x->free_symmetries = symmetries ? pw_null_space (rows, symmetries, M, 1e-9, x->free_symmetry) : 0;
   free (M);
@@ -209,7 +210,7 @@ int pw_steady_find_free_symmetries (pw_steady *x) {
 
 /* ---- Comparison ---- */
 
-/* Whether it displaces the whole. */
+/* Whether a symmetry displaces the whole. */
 static int symmetry_of_whole (const double *symmetry) {
   return symmetry[PW_RATE_X] != 0 || symmetry[PW_RATE_Y] != 0 || symmetry[PW_RATE_TURN] != 0;
 }
@@ -233,7 +234,7 @@ static double symmetry_angle (const pw_steady *x, const double centre[2], const 
   return atan2 (q[last + 1] - centre[1], q[last] - centre[0]);
 }
 
-/* Angles of bodies first: rotations of the whole change them, too. */
+/* Changes of single angles first: rotations of the whole change all angles of bodies, translations none. */
 void pw_steady_canonical (const pw_steady *x, double *q, double *v) {
   int rates = pw_steady_rate_count (x->s);
   for (int k = 0; k < x->symmetries; k++) {
@@ -242,8 +243,8 @@ void pw_steady_canonical (const pw_steady *x, double *q, double *v) {
     while (c >= PW_RATE_ANGLES && symmetry[c] == 0) c--;
     if (c >= PW_RATE_ANGLES && !symmetry_of_whole (symmetry)) {
       double by = -q[symmetry_coordinate (x, c)] / symmetry[c];
-      for (int b = 0; b < x->s->bodies; b++) q[3 * b + 2] += by * symmetry[PW_RATE_ANGLES + b];
-      for (int j = 3 * x->s->bodies; j < x->n; j++) q[j] += by * symmetry[PW_RATE_ANGLES - 2 * x->s->bodies + j];
+      for (int j = 0; j < x->n; j++)
+        if (pw_is_angle (x->s, j)) q[j] += by * symmetry[pw_steady_angle_rate (x->s, j)];
     }
     if (symmetry[PW_RATE_TURN] == 0) continue;
     double centre[2] = { x->origin[0] - x->L * symmetry[PW_RATE_Y] / symmetry[PW_RATE_TURN],

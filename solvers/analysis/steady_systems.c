@@ -9,9 +9,11 @@ void pw_steady_close_system (pw_steady *x, pw_place place) {
   memset (&x->system[place], 0, sizeof x->system[place]);
 }
 
-/* Whether a system has the unknowns and equations of the search. */
-static int steady_fits (const pw_steady *x, const pw_system *s) {
-  return s->coords == x->n && s->rows == x->m && s->holonomic == x->holonomic && s->bodies == x->s->bodies;
+int pw_steady_same_sizes (const pw_system *a, const pw_system *b, pw_error *why) {
+  if (b->coords == a->coords && b->rows == a->rows && b->holonomic == a->holonomic && b->bodies == a->bodies)
+    return PW_OK;
+  return pw_fail (why, PW_INPUT, "model %s: the parameter changes the number of bodies or constraint equations",
+                  b->model);
 }
 
 /* Opens a run at the last solution, or if that cannot be made consistent, at rest in its configuration. */
@@ -26,10 +28,9 @@ static int steady_open_run (pw_steady *x, pw_place place, const pw_system *s) {
     x->system[place].run = pw_run_open (s, "rk4+projection", &settings, &x->why);
   }
   if (x->system[place].run == NULL) return x->why.status;
-  if (pw_linear_open (&x->system[place].linearisation, x->system[place].run, PW_WITHOUT_MODES,
-                      PW_STEADY_MAX_COORDINATES) == PW_OK)
-    return PW_OK;
-  return pw_fail_memory (s, &x->why);
+  int status = pw_linear_open (&x->system[place].linearisation, x->system[place].run, PW_WITHOUT_MODES,
+                               PW_STEADY_MAX_COORDINATES);
+  return status == PW_OK ? PW_OK : pw_fail_memory (s, &x->why);
 }
 
 int pw_steady_open_system (pw_steady *x, pw_place place, double value) {
@@ -39,9 +40,7 @@ int pw_steady_open_system (pw_steady *x, pw_place place, double value) {
   x->why = (pw_error){ 0 };
   x->system[place].value = value;
   if (x->settings.compile) s = x->system[place].own = x->settings.compile (x->settings.context, value, &x->why);
-  if (s && !steady_fits (x, s))
-    return pw_fail (&x->why, PW_INPUT, "model %s: the parameter changes the number of bodies or constraint equations",
-                    s->model);
+  if (s && pw_steady_same_sizes (x->s, s, &x->why) != PW_OK) return PW_INPUT;
   int status = s ? steady_open_run (x, place, s) : x->why.status;
   if (status != PW_OK) pw_steady_close_system (x, place);
   return status == PW_OK || status == PW_RESOURCE ? status : PW_RETRY;

@@ -212,6 +212,19 @@ static void test_end (void **state) {
   pw_branch_close (&b);
 }
 
+/* Where F cannot be evaluated at the beginning, there is no residual: not that of an earlier solution. */
+static void test_not_begun (void **state) {
+  double u[3] = { 1, 0, 0 }, outside[3] = { 6, 0, 0 };
+  pw_error error = { 0 };
+  pw_branch b;
+  (void)state;
+  continuation_open (&b, &cubic_equations);
+  check_ok (pw_branch_solve (&b, u, &error), &error);
+  assert_int_equal (pw_branch_solve (&b, outside, &error), PW_RETRY);
+  assert_true (isinf (b.residual));
+  pw_branch_close (&b);
+}
+
 /* p = x^2 / 2 */
 static int parabola (void *context, const double *u, double *F, double *dF, pw_error *error) {
   (void)context, (void)error;
@@ -375,6 +388,7 @@ int main (void) {
                                       cmocka_unit_test (test_start_at_fold), cmocka_unit_test (test_end),
                                       cmocka_unit_test (test_range),         cmocka_unit_test (test_without_solution),
                                       cmocka_unit_test (test_damping),       cmocka_unit_test (test_punctured),
-                                      cmocka_unit_test (test_turns),         cmocka_unit_test (test_cusp) };
+                                      cmocka_unit_test (test_turns),         cmocka_unit_test (test_cusp),
+                                      cmocka_unit_test (test_not_begun) };
   return cmocka_run_group_tests (tests, NULL, NULL);
 }

@@ -368,6 +368,28 @@ static void test_refused (void **state) {
   pw_system_free (s);
 }
 
+static pw_system *snake_at (void *context, double n, pw_error *error) {
+  (void)context;
+  if (n != floor (n)) return pw_fail (error, PW_INPUT, "%g bodies", n), NULL;
+  return gallery_open ("wheeled-snake", "n", n, NULL);
+}
+
+/* A parameter that changes the number of bodies is refused every time. */
+static void test_bodies (void **state) {
+  pw_periodic_orbit o;
+  (void)state;
+  pw_system *s = snake_at (NULL, 3, NULL);
+  pw_periodic *x = periodic_open (s, &(pw_periodic_settings){ .compile = snake_at, .first = 3, .last = 5 });
+  for (int i = 0; i < 2; i++) {
+    pw_error error = { 0 };
+    assert_int_equal (pw_periodic_solve (x, 0, 4, &o, &error), PW_INPUT);
+    check_error (&error, PW_INPUT,
+                 "model wheeled-snake: the parameter changes the number of bodies or constraint equations");
+  }
+  pw_periodic_close (x);
+  pw_system_free (s);
+}
+
 /* A search that could not be opened is refused. */
 static void test_missing (void **state) {
   pw_error e[5] = { { 0 } };
@@ -392,7 +414,7 @@ int main (void) {
     cmocka_unit_test (test_pendulum),   cmocka_unit_test (test_folds),        cmocka_unit_test (test_mathieu),
     cmocka_unit_test (test_boundaries), cmocka_unit_test (test_torus),        cmocka_unit_test (test_van_der_pol),
     cmocka_unit_test (test_gait),       cmocka_unit_test (test_turning_gait), cmocka_unit_test (test_frequency),
-    cmocka_unit_test (test_refused),    cmocka_unit_test (test_missing),
+    cmocka_unit_test (test_refused),    cmocka_unit_test (test_bodies),       cmocka_unit_test (test_missing),
   };
   return cmocka_run_group_tests (tests, NULL, NULL);
 }

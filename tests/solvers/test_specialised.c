@@ -395,13 +395,15 @@ static void test_refused (void **state) {
   assert_null (pw_system_source (s, NULL, &error));
   check_error (&error, PW_INPUT, "model chain: 80 constraint equations: specialised code has at most 60");
   pw_system_free (s);
-  pw_model *m = pw_model_new ("torques", NULL, &error);
-  pw_add_body (m, &(pw_body){ .name = "wheel", .mass = 1, .inertia = 1 });
-  for (int i = 0; i <= 120; i++) pw_add_torque (m, &(pw_torque){ .name = "T", .body = { "wheel", "ground" } });
+  pw_model *m = scene_model (&scene_ezyroller, NULL);
+  for (int i = 0; i <= 120; i++) {
+    const char name[] = { (char)('A' + i / 11), (char)('A' + i % 11), 0 };
+    pw_add_torque (m, &(pw_torque){ .name = name, .body = { "frame", "ground" } });
+  }
   s = scene_compile (m);
   error = (pw_error){ 0 };
   assert_null (pw_system_source (s, NULL, &error));
-  check_error (&error, PW_INPUT, "model torques: 121 elements: specialised code has at most 120");
+  check_error (&error, PW_INPUT, "model ezyroller: 125 elements: specialised code has at most 120");
   pw_system_free (s);
   assert_null (pw_system_source (NULL, NULL, &(pw_error){ 0 }));
   assert_null (pw_run_source (NULL, &(pw_error){ 0 }));

@@ -282,7 +282,7 @@ static void steady_variables (const void *context, FILE *f) {
         low[k] = fmin (low[k], value), high[k] = fmax (high[k], value);
       }
   if (low[0] > high[0]) low[0] = -1, high[0] = 1, low[1] = high[1] = 0; /* no eigenvalues */
-  fprintf (f, "y_min = %.10g\ny_max = %.10g\nz_min = %.10g\nz_max = %.10g\n", low[0], high[0], low[1], high[1]);
+  fprintf (f, "re_min = %.10g\nre_max = %.10g\nim_min = %.10g\nim_max = %.10g\n", low[0], high[0], low[1], high[1]);
   pw_figure_label (f, "label_of_x", 0, cmd->vary.name, cmd->vary.unit);
   fprintf (f, "first = %.10g\nlast = %.10g\n", fmin (cmd->settings.first, cmd->settings.last),
            fmax (cmd->settings.first, cmd->settings.last));

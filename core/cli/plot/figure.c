@@ -103,7 +103,7 @@ pw_output *pw_figure_begin (const pw_figures *f, const char *name, pw_error *err
   pw_figure_text (out, "model", f->model);
   pw_figure_text (out, "incomplete", f->incomplete);
   pw_figure_text (out, "about", f->about && *f->about ? f->about : f->model);
-  fprintf (out, "width = %.2f\n", (f->width > 0 ? f->width : FIGURE_WIDTH) / 25.4 * 72);
+  fprintf (out, "width = %.2f\n", (f->width > 0 ? f->width : FIGURE_WIDTH) / 25.4 * 72); /* points of 1/72 inch */
   return o;
 }
 
@@ -123,10 +123,10 @@ void pw_figure_quoted (FILE *f, const char *text, const char *quote) {
   fputc ('\'', f);
 }
 
-void pw_figure_element (FILE *f, const char *name, int i, const char *value) {
-  char variable[60];
-  snprintf (variable, sizeof variable, "%s[%d]", name, i);
-  pw_figure_text (f, variable, value);
+void pw_figure_element (FILE *f, const char *variable, int i, const char *value) {
+  char element[60];
+  snprintf (element, sizeof element, "%s[%d]", variable, i);
+  pw_figure_text (f, element, value);
 }
 
 void pw_figure_label (FILE *f, const char *variable, int i, const char *name, const char *unit) {
@@ -160,8 +160,8 @@ static int gnuplot_start (const char *folder, char *const *argv, pid_t *child) {
   return failed;
 }
 
-/* Removes figures of an earlier run, and incomplete ones. */
-static void gnuplot_remove_figures (const char *folder, const char *const *names) {
+/* Removes the pictures of an earlier run, and incomplete ones. */
+static void gnuplot_remove_pictures (const char *folder, const char *const *names) {
   char path[2 * FIGURE_PATH];
   for (int i = 0; i < FIGURE_SCRIPTS && names[i]; i++)
     for (const char *const *ending = pw_figure_endings + 2; *ending; ending++) {
@@ -171,14 +171,14 @@ static void gnuplot_remove_figures (const char *folder, const char *const *names
 }
 
 int pw_figure_undrawn (const char *folder, const char *const *names, const char *why) {
-  gnuplot_remove_figures (folder, names);
+  gnuplot_remove_pictures (folder, names);
   pw_cli_say ("pinwheel: %s, so no figures are drawn; data and scripts are in %s: gnuplot FILE.gp draws them there\n",
               why, folder);
   return PW_OK;
 }
 
 int pw_figure_draw (const char *folder, const char *const *names, pw_error *error) {
-  char script[FIGURE_SCRIPTS][40], *argv[2 + FIGURE_SCRIPTS + 1] = { "gnuplot", "-d" };
+  char script[FIGURE_SCRIPTS][40], *argv[2 + FIGURE_SCRIPTS + 1] = { "gnuplot", "-d" /* no settings of the user */ };
   pid_t child;
   int status;
   for (int i = 0; i < FIGURE_SCRIPTS && names[i]; i++) {
@@ -186,14 +186,14 @@ int pw_figure_draw (const char *folder, const char *const *names, pw_error *erro
     argv[2 + i] = script[i];
   }
   fflush (stderr);
-  gnuplot_remove_figures (folder, names);
+  gnuplot_remove_pictures (folder, names);
   int failed = gnuplot_start (folder, argv, &child);
   if (failed == ENOENT) return pw_figure_undrawn (folder, names, "gnuplot was not found");
   if (failed) return pw_fail (error, PW_RESOURCE, "cannot run gnuplot: %s", strerror (failed));
   while (waitpid (child, &status, 0) < 0)
     if (errno != EINTR) return pw_fail (error, PW_RESOURCE, "cannot wait for gnuplot: %s", strerror (errno));
   if (WIFEXITED (status) && WEXITSTATUS (status) == 0) return PW_OK;
-  gnuplot_remove_figures (folder, names);
+  gnuplot_remove_pictures (folder, names);
   int ended = WIFSIGNALED (status);
   return pw_fail (error, PW_RESOURCE, "gnuplot %s %d; its message is above, data and scripts are in %s",
                   ended ? "was ended by signal" : "failed with exit status",

@@ -18,7 +18,7 @@ typedef struct {
   double width;        /* [mm]; 0: FIGURE_WIDTH */
 } pw_figures;
 
-/* Endings of a folder's data files, scripts and pictures, ended by NULL. */
+/* ".dat", ".gp", then those of pictures; ended by NULL. */
 extern const char *const pw_figure_endings[];
 
 /* The option of commands that draw figures, and its value [mm] of "85mm", "8.5cm" or "3.3in"; NULL leaves *width
@@ -35,27 +35,29 @@ int pw_figures_of (pw_figures *f, const pw_cli_line *line, const pw_cli_model *m
 pw_output *pw_figure_open (const char *folder, const char *name, pw_error *error);
 pw_output *pw_figure_data (const pw_figures *f, const char *name, pw_error *error);
 
-/* Locks the folder of results of the option -o, in which NAME.csv, NAME.json and the figure NAME will be written;
- * nothing without one.  A status. */
+/* Locks the folder of the option -o, in which NAME.csv, NAME.json and the figure NAME will be written, for `files`,
+ * which the caller closes.  Without a folder (NULL) it only refuses --width.  A status. */
 int pw_figure_results (const pw_cli_line *line, const pw_cli_model *model, const char *folder, const char *name,
                        pw_files *files, pw_error *error);
-/* Writes NAME.csv and NAME.json, with `lines` levels of separate lines, into the folder.  A status. */
+/* Writes NAME.csv and NAME.json, with this value of pw_json.lines, into the folder.  A status. */
 int pw_figure_tables (const char *folder, const char *name, int lines, const void *context,
                       int (*csv) (const void *context, FILE *f, pw_error *error),
                       void (*json) (const void *context, pw_json *j), pw_error *error);
 
-/* Opens NAME.gp.  Assign the variables of its template, then end it; PW_RESOURCE if a file cannot be written. */
+/* Opens the script NAME.gp; write the variables of its template to it, then end it.  NULL and PW_RESOURCE if it cannot
+ * be written. */
 pw_output *pw_figure_begin (const pw_figures *f, const char *name, pw_error *error);
-void pw_figure_text (FILE *f, const char *variable, const char *value);
-/* A text in single quotes, on one line.  A quote in it becomes `quote`: "''" for gnuplot and YAML. */
-void pw_figure_quoted (FILE *f, const char *text, const char *quote);
-/* The variable "NAME[i]". */
-void pw_figure_element (FILE *f, const char *name, int i, const char *value);
-/* The same, or with i = 0 the variable "VARIABLE", with the label "NAME [UNIT]"; no unit if it is "". */
-void pw_figure_label (FILE *f, const char *variable, int i, const char *name, const char *unit);
+/* Adds the template and completes the script.  PW_OK or PW_RESOURCE. */
 int pw_figure_end (pw_output *o, const char *template_name, pw_error *error);
-/* All of it for a command with one figure, NAME: `data` writes NAME.dat, `variables` those of the template of this
- * name; then it is drawn.  A status. */
+/* Assign a text to VARIABLE; to VARIABLE[i]; "NAME [UNIT]", or "NAME" if the unit is "", to VARIABLE[i], or to VARIABLE
+ * if i = 0. */
+void pw_figure_text (FILE *f, const char *variable, const char *value);
+void pw_figure_element (FILE *f, const char *variable, int i, const char *value);
+void pw_figure_label (FILE *f, const char *variable, int i, const char *name, const char *unit);
+/* Writes a text in single quotes, on one line.  A quote in it becomes `quote`: "''" for gnuplot and YAML. */
+void pw_figure_quoted (FILE *f, const char *text, const char *quote);
+/* Writes and draws the figure of a command that has one, NAME: `data` writes NAME.dat, `variables` those of the
+ * template of this name.  A status. */
 int pw_figure_write (const pw_cli_line *line, const pw_cli_model *model, const char *folder, const char *name,
                      const void *context, int (*data) (const void *context, FILE *f, pw_error *error),
                      void (*variables) (const void *context, FILE *f), pw_error *error);
@@ -63,7 +65,7 @@ int pw_figure_write (const pw_cli_line *line, const pw_cli_model *model, const c
 /* Runs gnuplot on NAME.gp for each of at most FIGURE_SCRIPTS names, a list ended by NULL; a missing gnuplot is reported
  * on standard error.  PW_RESOURCE if gnuplot fails. */
 int pw_figure_draw (const char *folder, const char *const *names, pw_error *error);
-/* Removes the figures of an earlier run and reports why these are not drawn.  PW_OK. */
+/* Removes the pictures of an earlier run and reports why none are drawn.  Returns PW_OK. */
 int pw_figure_undrawn (const char *folder, const char *const *names, const char *why);
 
 #endif

@@ -10,8 +10,8 @@ enum {
   FIGURES_FEWEST = 8,     /* snapshots, at least */
   FIGURES_CLOSEUP = 12    /* samples of a close-up, at least */
 };
-#define FIGURES_FAR 10    /* extent of a motion with a close-up, at least, in sizes of the mechanism */
-#define FIGURES_NEAR 4    /* extent of the close-up, at most, in the same */
+#define FIGURES_FAR 10    /* extent of a motion with a close-up, at least, in sizes of the mechanism (pw_plots.size) */
+#define FIGURES_NEAR 4    /* extent of the close-up, at most, in sizes of the mechanism */
 #define FIGURES_WHEEL 1.6 /* half the length of a wheel, in units of symbols */
 
 /* Numbers separated by spaces, then an end. */
@@ -43,7 +43,7 @@ static int data_closeup (const pw_plots *plots) {
 
 /* ---- Files ---- */
 
-/* One block per curve: time, the numbers of the body or wheel, its number in the model. */
+/* One block per curve: time, the numbers of the body or wheel, its number among all of them, from 1. */
 static int data_tracks (const pw_plots *plots, const pw_tracks *tracks, pw_error *error) {
   pw_output *o = tracks->curves ? pw_figure_data (&plots->figures, tracks->file, error) : NULL;
   if (o == NULL) return tracks->curves ? PW_RESOURCE : PW_OK;
@@ -60,7 +60,7 @@ static int data_tracks (const pw_plots *plots, const pw_tracks *tracks, pw_error
   return pw_output_finish (o, error);
 }
 
-/* A file of `rows` rows, of which the first `count` of `width` numbers are written; no file without rows. */
+/* A file of `rows` rows of `width` numbers, of which the first `count` are written; no file without rows. */
 static int data_table (const pw_plots *plots, const char *name, const char *heading, const double *row, int width,
                        int count, int rows, pw_error *error) {
   pw_output *o = rows ? pw_figure_data (&plots->figures, name, error) : NULL;
@@ -105,23 +105,22 @@ static void data_wheels (FILE *f, const pw_plots *plots, int i) {
   for (int w = 0; w < plots->wheels.drawn; w++) {
     if (!pw_plot_rolls (plots, w)) continue;
     const double *contact = pw_plot_track (plots, i, &plots->wheels, w), half = FIGURES_WHEEL * plots->symbol_unit;
-    const double from[] = { -half, 0 }, to[] = { half, 0 };
     double end[2][2];
-    pw_plot_point (contact, from, end[0]);
-    pw_plot_point (contact, to, end[1]);
+    pw_plot_point (contact, (const double[]){ -half, 0 }, end[0]);
+    pw_plot_point (contact, (const double[]){ half, 0 }, end[1]);
     data_segment (f, end[0], end[1], pw_plot_sample (plots, i)[PLOT_T],
                   plots->body_index[pw_system_element (plots->system, plots->wheels.system_index[w]).body[0]]);
   }
 }
 
-/* Bodies of sample i that are points. */
+/* Bodies of sample i that are points: without attachment points or without inertia. */
 static void data_centres (FILE *f, const pw_plots *plots, int i) {
   for (int b = 0; b < plots->bodies.drawn; b++)
     if (plots->shape[b].attachments == 0 || plots->shape[b].is_point)
       data_vertex (f, pw_plot_track (plots, i, &plots->bodies, b), pw_plot_sample (plots, i)[PLOT_T], b, "\n");
 }
 
-/* Massless straight elements such as rods at sample i: their symbols begin at one end and end at the other. */
+/* Massless straight elements such as rods at sample i: their symbols begin with a stroke from one end to the other. */
 static void data_rods (FILE *f, const pw_plots *plots, int i) {
   double end[2][2];
   for (const pw_plot_link *l = plots->link; l < plots->link + plots->links; l++) {
@@ -133,7 +132,7 @@ static void data_rods (FILE *f, const pw_plots *plots, int i) {
   }
 }
 
-/* The open or the closed lines of a symbol at the last of n samples. */
+/* The open or the closed strokes of a symbol at the last of n samples. */
 static void data_symbol (FILE *f, const pw_plots *plots, const pw_plot_link *link, int n, int closed) {
   pw_plot_stroke stroke[PLOT_STROKES];
   double point[PLOT_VERTICES][2];
@@ -146,8 +145,8 @@ static void data_symbol (FILE *f, const pw_plots *plots, const pw_plot_link *lin
   }
 }
 
-/* Samples from one snapshot to the next, of the first n: the body with the longest path moves by about a third of the
- * size of the mechanism. */
+/* The number of samples from one snapshot to the next, of the first n: the body with the longest path moves by about a
+ * third of the size of the mechanism. */
 static int data_stride (const pw_plots *plots, int n) {
   double longest = 0;
   for (int b = 0; b < plots->bodies.drawn; b++) {
@@ -163,8 +162,8 @@ static int data_stride (const pw_plots *plots, int n) {
   return stride < 1 ? 1 : stride;
 }
 
-/* Blocks: snapshots out of the first n samples; then the last of them; then its symbols, open and closed lines.
- * gnuplot counts blocks with data only, so each begins with a point that is not drawn. */
+/* Blocks: snapshots out of the first n samples; then the last of these samples; then its symbols, open and closed
+ * strokes.  gnuplot does not count blocks without data, so each begins with a point that is not drawn. */
 static int data_mechanism (const pw_plots *plots, const char *name, int n, pw_error *error) {
   static const struct {
     const char *title;
@@ -207,11 +206,11 @@ static int data_write (const pw_plots *plots, int closeup, pw_error *error) {
 
 /* ---- Scripts: values of the templates' variables ---- */
 
-/* Curves, with a label each unless there are too many, and which of them are paths of markers. */
+/* Curves, with a label each unless there are too many; which of them, from 0, are paths of markers. */
 static void figures_curves (FILE *f, const pw_plots *plots, const pw_tracks *tracks) {
   pw_figure_text (f, "data", tracks->file);
   pw_figure_text (f, "what", tracks->noun);
-  fprintf (f, "curves = %d\nnumbers = %d\nlast = %d\narray label[%d]\n", tracks->curves, tracks->count,
+  fprintf (f, "curves = %d\nnumbers = %d\nnumber_column = %d\narray label[%d]\n", tracks->curves, tracks->count,
            tracks->numbers + 2, tracks->curves);
   for (int i = 0; i < tracks->curves && tracks->curves <= FIGURES_NAMED; i++)
     pw_figure_element (f, "label", i + 1, pw_plot_name (plots, tracks, i));

@@ -16,11 +16,7 @@ int pw_plot_rolls (const pw_plots *plots, int wheel) {
 
 /* ---- Opening ---- */
 
-static int plot_smaller (int a, int b) {
-  return a < b ? a : b;
-}
-
-/* A zeroed array; NULL and plots->out_of_memory. */
+/* A zeroed array; NULL, with plots->out_of_memory set. */
 static void *plot_array (pw_plots *plots, int count, size_t size) {
   void *array = pw_arena_alloc (&plots->arena, (size_t)count * size);
   if (array == NULL) plots->out_of_memory = 1;
@@ -30,8 +26,8 @@ static void *plot_array (pw_plots *plots, int count, size_t size) {
 /* Makes room for the numbers of tracks in a sample. */
 static void plot_open_tracks (pw_plots *plots, pw_tracks *tracks, int count) {
   tracks->count = count;
-  tracks->drawn = plot_smaller (count, PLOT_DRAWN);
-  tracks->curves = plot_smaller (tracks->drawn, PLOT_CURVES);
+  tracks->drawn = count < PLOT_DRAWN ? count : PLOT_DRAWN;
+  tracks->curves = count < PLOT_CURVES ? count : PLOT_CURVES;
   tracks->offset = plots->sample_size;
   plots->sample_size += tracks->numbers * tracks->drawn;
   tracks->system_index = plot_array (plots, tracks->drawn, sizeof *tracks->system_index);
@@ -47,13 +43,13 @@ static int plot_allocate (pw_plots *plots, pw_error *error) {
     .file = "wheels.dat", .columns = "t [s], x [m], y [m], heading [rad]", .noun = "wheel", .numbers = 3
   };
   pw_model_elements (plots->model, &plots->links);
-  plots->links = plot_smaller (plots->links, PLOT_DRAWN);
+  if (plots->links > PLOT_DRAWN) plots->links = PLOT_DRAWN;
   plots->sample_size = PLOT_FIRST;
   plot_open_tracks (plots, bodies, pw_system_bodies (plots->system));
   plot_open_tracks (plots, wheels, pw_system_contacts (plots->system));
   plots->sample_size += plots->with_forces ? 2 * plots->links : 0;
   int most = PLOT_NUMBERS / plots->sample_size;
-  plots->planned = 1 + (most < PLOT_FEW ? PLOT_FEW : plot_smaller (most, PLOT_SAMPLES)); /* both ends */
+  plots->planned = 1 + (most < PLOT_FEW ? PLOT_FEW : most < PLOT_INTERVALS ? most : PLOT_INTERVALS);
   plots->body_index = plot_array (plots, bodies->count + 1, sizeof *plots->body_index);
   plots->shape = plot_array (plots, bodies->drawn, sizeof *plots->shape);
   plots->ground = plot_array (plots, PLOT_DRAWN, sizeof *plots->ground);
@@ -79,7 +75,7 @@ static void plot_choose (pw_plots *plots) {
       plots->wheels.system_index[i++] = e;
 }
 
-/* Reports a folder that cannot be written before the run. */
+/* Locks the folder; an error before the run if it cannot be written. */
 static int plot_try_folder (pw_plots *plots, pw_error *error) {
   plots->lock = pw_cli_lock_folder (plots->figures.folder, error);
   pw_output *probe = plots->lock < 0 ? NULL : pw_figure_data (&plots->figures, "motion.dat", error);
@@ -90,10 +86,7 @@ static int plot_try_folder (pw_plots *plots, pw_error *error) {
 pw_plots *pw_plots_open (const char *folder, int forces, const pw_model *model, const pw_system *system, double t_end,
                          pw_error *error) {
   pw_plots *plots = malloc (sizeof *plots);
-  if (plots == NULL) {
-    pw_fail (error, PW_RESOURCE, "plots: out of memory");
-    return NULL;
-  }
+  if (plots == NULL) return pw_fail (error, PW_RESOURCE, "plots: out of memory"), NULL;
   *plots = (pw_plots){
     .figures = { .folder = folder, .model = pw_system_name (system), .about = pw_model_table (model)->about },
     .lock = -1,

@@ -1,4 +1,4 @@
-/* Shapes of bodies in figures and animations, and the links between them: elements with points, and their forces. */
+/* Shapes of bodies in figures and animations, and the elements drawn between them (links), with their forces. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -65,7 +65,7 @@ static void shapes_add_points (pw_plots *plots, const pw_element *e, const int *
 
 /* ---- Links ---- */
 
-/* Adds an end at the joint of two bodies: that of an earlier link on the first one.  0 if there is none. */
+/* Adds an end at the joint of two bodies, the first one's end of an earlier link between them; 0 if there is none. */
 static int shapes_add_joint (const pw_plots *plots, int first, int second, pw_plot_link *link) {
   for (const pw_plot_link *l = plots->link; l < plots->link + plots->links; l++)
     for (int n = 0; n < 2 && l->ends == 2 && !l->rail; n++)
@@ -100,7 +100,7 @@ static int shapes_wheel (const pw_plots *plots, int element) {
   return w < plots->wheels.drawn ? w : -1;
 }
 
-/* Fills a link; 0 if the element has no place, or a body that is not shown. */
+/* Fills a link; 0 if the element has no place, or one of its bodies is not drawn. */
 static int shapes_link (const pw_plots *plots, const pw_element *e, int element, pw_plot_link *link) {
   const pw_element_info info = pw_system_element (plots->system, element);
   *link = (pw_plot_link){ .element = element,
@@ -127,7 +127,7 @@ static int shapes_link (const pw_plots *plots, const pw_element *e, int element,
   return link->force_end >= 0;
 }
 
-/* The system has the elements sorted by kind; those of a kind are in the same order as in the model. */
+/* A system has its elements sorted by type; those of a type are in the order of the model. */
 void pw_plot_find_shapes (pw_plots *plots) {
   int most = plots->links, elements, next = 0;
   const pw_element *e = pw_model_elements (plots->model, &elements);
@@ -162,12 +162,12 @@ void pw_plot_forces (const pw_plots *plots, const pw_sample *sample, double *out
       memcpy (out, plots->forces + plots->link[i].force_offset, 2 * sizeof *out);
 }
 
-/* ---- The size of what figures show ---- */
+/* ---- Sizes ---- */
 
-void pw_plot_point (const double *motion, const double *at, double out[2]) {
-  double c = cos (motion[2]), s = sin (motion[2]);
-  out[0] = motion[0] + c * at[0] - s * at[1];
-  out[1] = motion[1] + s * at[0] + c * at[1];
+void pw_plot_point (const double *placement, const double *at, double out[2]) {
+  double c = cos (placement[2]), s = sin (placement[2]);
+  out[0] = placement[0] + c * at[0] - s * at[1];
+  out[1] = placement[1] + s * at[0] + c * at[1];
 }
 
 static void box_extend (pw_plot_box *box, const double *point) {
@@ -198,7 +198,7 @@ double pw_plot_extend (pw_plot_box *box, const pw_plots *plots, int i) {
 
 void pw_plot_measure (pw_plots *plots) {
   pw_plot_box box = pw_plot_ground (plots);
-  double reach = 0 /* of a body: the largest distance of an attachment point */, size = pw_plot_extend (&box, plots, 0);
+  double reach = 0, size = pw_plot_extend (&box, plots, 0); /* reach: farthest attachment point of a body */
   for (int b = 0; b < plots->bodies.drawn; b++)
     for (int k = 0; k < plots->shape[b].attachments; k++)
       reach = fmax (reach, hypot (plots->shape[b].attachment[k][0], plots->shape[b].attachment[k][1]));

@@ -2,13 +2,14 @@
  *
  * The text of a symbol (pw_kind.symbol) consists of strokes separated by semicolons.  A stroke is a list of vertices
  * "a x y": the point p1 + a (p2 - p1) + u (x e + y n), as in pw_plot_stroke, where p1 and p2 are the points of the
- * first and the last body, u the unit of symbols, e a direction and n its normal to the left.  e is the heading of a
- * contact point, or that of the field `heading` in the last body; without them the direction from p1 to p2, or the x
- * axis of the first body if they coincide.  x = inf and -inf extend to the ends of the travel along e.
+ * first and the last body, u the unit of symbols, e a direction and n its normal to the left.  For a contact point e is
+ * its heading; for a symbol with a rail, the field `heading` in the last body; otherwise the direction from p1 to p2,
+ * or the x axis of the first body if these coincide.  In a rail, x = inf and x = -inf are the ends of the travel of p1
+ * along e.
  *
- * "o a x y r" is a circle of radius u r; "g1" and "g2" are the pitch circles of gears with the axles p1 and p2 and the
- * field `ratio`.  A stroke whose last vertex is its first encloses an area, which hides what is below.  "NAME:" before
- * a stroke: it is drawn if that field of the element is not zero; "NAME=2:": if it is 2. */
+ * "o a x y r" is a circle of radius u r around that point; "g1" and "g2" are the pitch circles of gears with the axles
+ * p1 and p2 and the field `ratio`.  A stroke whose last vertex is its first encloses an area, which hides what is
+ * below.  "NAME:" before a stroke: it is drawn if that field of the element is not zero; "NAME=2:": if it is 2. */
 #include <ctype.h>
 #include <math.h>
 #include <stdlib.h>
@@ -16,8 +17,8 @@
 #include "plot.h"
 
 enum { SYMBOL_CIRCLE = 24 }; /* sides of the polygon of a circle */
-#define SYMBOL_HATCH 0.6     /* distance of the lines of a hatching; these are in units of symbols */
-#define SYMBOL_OVERHANG 2.5  /* of a rail beyond the travel */
+#define SYMBOL_HATCH 0.6     /* distance of the strokes of a hatching, in units of symbols */
+#define SYMBOL_OVERHANG 2.5  /* of a rail beyond the travel, in units of symbols */
 
 /* The value of a number or a choice of an element; 0 if it has no such field. */
 static double symbol_field (const pw_plot_link *link, const char *name, size_t length) {
@@ -42,7 +43,7 @@ static int symbol_condition (const pw_plot_link *link, const char **text) {
   return name[length] == '=' ? value == strtod (name + length + 1, NULL) : value != 0;
 }
 
-/* A circle of radius u r + d |p2 - p1| around a vertex. */
+/* A circle around a vertex, of radius u r or d |p2 - p1|: r or d is 0. */
 static void symbol_circle (pw_plot_stroke *stroke, const double *centre, double r, double d) {
   const double step = 2 * PW_PI / SYMBOL_CIRCLE;
   for (int i = 0; i <= SYMBOL_CIRCLE; i++) {
@@ -124,7 +125,7 @@ static symbol_frame symbol_frame_at (const pw_plots *plots, int i, const pw_plot
   return frame;
 }
 
-/* The ends of a rail on both sides of p2, in units of symbols: beyond those of the travel of p1 along it. */
+/* The ends of a rail along e from p2, in units of symbols: beyond those of the travel of p1. */
 static void symbol_travel (const pw_plots *plots, const pw_plot_link *link, int samples, double *low, double *high) {
   *low = *high = 0;
   for (int i = 0; i < samples && link->rail; i++) {
@@ -135,7 +136,7 @@ static void symbol_travel (const pw_plots *plots, const pw_plot_link *link, int 
   *low -= SYMBOL_OVERHANG, *high += SYMBOL_OVERHANG;
 }
 
-/* Hatching of the line from x0 to x1 at height y relative to p2, on its lower side. */
+/* Hatching below the line from x0 to x1 at height y relative to p2; returns the number of strokes. */
 static int symbol_hatch (double x0, double x1, double y, int upright, pw_plot_stroke *stroke) {
   int strokes = (int)fmin (PLOT_HATCHES, ceil ((x1 - x0) / SYMBOL_HATCH));
   for (int k = 0; k < strokes; k++) {
@@ -145,7 +146,7 @@ static int symbol_hatch (double x0, double x1, double y, int upright, pw_plot_st
   return strokes;
 }
 
-/* A rail on the ground, or a support of a joint on the ground. */
+/* The hatching of a rail on the ground, or the support of a joint on the ground; returns the number of strokes. */
 static int symbol_ground (double low, double high, const pw_plot_link *link, pw_plot_stroke *stroke) {
   static const pw_plot_stroke support = {
     6, 0, 1, { { 1, 1.1, -1.5 }, { 1, .8, -1.5 }, { 1, 0, 0 }, { 1, -.8, -1.5 }, { 1, -1.1, -1.5 }, { 1, 1.1, -1.5 } }

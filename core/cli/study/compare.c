@@ -1,5 +1,5 @@
-/* pinwheel compare: accuracy and cost of methods.  A row is a method with a tolerance or step size: one run with
- * samples and energies for the errors, then timed runs without them. */
+/* pinwheel compare: accuracy and cost of methods.  A row is a method with a tolerance or step size: a run with samples
+ * and energies gives its errors, further runs without them its processor time. */
 #include <gsl/gsl_sort.h>
 #include <gsl/gsl_statistics.h>
 #include <math.h>
@@ -12,7 +12,7 @@ enum { COMPARE_REPEATS = 99 }; /* timed runs of a row, at most */
 #define COMPARE_REFINEMENT 1.2 /* smallest ratio of numbers of steps from which an order is computed */
 #define COMPARE_CLEAR 10   /* error over uncertainty of the reference, so that orders are accurate to log2 1.1 = 0.14 */
 #define COMPARE_AGREE 0.1  /* largest relative difference of the last two orders in the asymptotic range */
-#define COMPARE_DECADE 1.6 /* cost of a tolerance divided by ten, for a method of order 5: 10^(1/5) */
+#define COMPARE_DECADE 1.6 /* factor of the cost if a tolerance is divided by ten, of a method of order 5: 10^(1/5) */
 
 /* Explicit and implicit, one-step and multistep methods, each with the stabilisation that suits it. */
 static const char compare_default_methods[] = "rk4+projection,erk5+projection,erk8+projection,bdf+projection,"
@@ -20,8 +20,8 @@ static const char compare_default_methods[] = "rk4+projection,erk5+projection,er
 
 typedef struct {
   pw_study study;
-  int table;     /* --table */
-  int concludes; /* 1: errors of coordinates are known */
+  int table;     /* 1: --table */
+  int concludes; /* 1: a conclusion is printed, since errors of coordinates are known */
   const char *rtol_text, *step_text, *repeats_text;
   double finest_step; /* of --step-ladder [s] */
   double repeats;     /* timed runs of a row, at most */
@@ -200,7 +200,7 @@ static double compare_order (const pw_compare *compare, const pw_row *row) {
   return order > 0 && fabs (order - coarser_order) <= COMPARE_AGREE * order ? order : NAN;
 }
 
-/* Times runs without samples; the cost of the row is their median. */
+/* Measures runs without samples; the processor time of the row is their median. */
 static int compare_measure_times (pw_compare *compare, pw_row *row, pw_error *error) {
   double cpu[COMPARE_REPEATS], sum = 0;
   int n = 0;

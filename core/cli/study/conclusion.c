@@ -9,7 +9,11 @@ enum {
   CONCLUSION_WIDTH = 14, /* of a column, at least */
   CONCLUSION_REASON = 70 /* characters of the reason of a failure, at most */
 };
-static const int conclusion_digits[CONCLUSION_COLUMNS] = { 3, 6, 9 };
+/* Numbers of correct digits, and the largest relative errors that have them. */
+static const struct {
+  int digits;
+  double error;
+} conclusion_required[CONCLUSION_COLUMNS] = { { 3, 1e-3 }, { 6, 1e-6 }, { 9, 1e-9 } };
 
 typedef struct {
   double cpu;         /* [s]; NaN: no run is as accurate */
@@ -20,7 +24,7 @@ typedef struct {
   const pw_study *study;
   const pw_reference *reference;
   int error_column;             /* in the rows: the largest error of lengths, then of angles */
-  double uncertainty;           /* of the reference, as conclusion_error */
+  double uncertainty;           /* relative, of the reference: its conclusion_error */
   int width;                    /* of columns: that of the longest name of a method */
   int best[CONCLUSION_COLUMNS]; /* the cheapest method; -1: none */
   conclusion_cost cheapest[CONCLUSION_COLUMNS];
@@ -28,14 +32,14 @@ typedef struct {
 
 /* ---- Errors ---- */
 
-/* Errors of lengths are relative to the largest length of the motion; those of angles too, unless it exceeds 1 rad. */
+/* Errors are relative to the largest coordinate of the same unit, those of angles to 1 rad at most. */
 static double conclusion_scale (const pw_reference *reference, int unit) {
   double size = reference->size[unit] > 0 ? reference->size[unit] : 1;
   return unit == MOTION_ANGLE ? fmin (size, 1) : size;
 }
 
-/* The larger of the relative errors of lengths and angles, as far as they are compared; NaN if one is unknown.
- * `errors`: of lengths [m] and angles [rad]. */
+/* The larger of the relative errors of lengths and angles, as far as they are compared; NaN if one of these is unknown.
+ * errors: of lengths [m], of angles [rad]. */
 static double conclusion_error (const pw_reference *reference, const double *errors) {
   double largest = 0;
   for (int unit = MOTION_LENGTH; unit <= MOTION_ANGLE; unit++) {
@@ -45,16 +49,11 @@ static double conclusion_error (const pw_reference *reference, const double *err
   return largest;
 }
 
-/* The relative error of column k. */
-static double conclusion_required (int k) {
-  return pow (10, -conclusion_digits[k]);
-}
-
 /* ---- Costs ---- */
 
-/* The least processor time of a method for the required error, interpolated between neighbouring runs on logarithmic
- * scales.  It is an upper bound if it is that of a run without a less accurate one before it, or interpolated to an
- * error that is only known to be below the uncertainty. */
+/* The least processor time of a method for the required relative error, interpolated between neighbouring runs on
+ * logarithmic scales.  It is an upper bound if no run before it was less accurate, or if it is interpolated to an error
+ * that is only known to be below the uncertainty. */
 static conclusion_cost conclusion_least_cost (const pw_conclusion *conclusion, int method, double required) {
   conclusion_cost least = { NAN, 0 };
   double error_before = NAN;
@@ -77,13 +76,13 @@ static conclusion_cost conclusion_least_cost (const pw_conclusion *conclusion, i
   return least;
 }
 
-/* Finds the cheapest method of each column that the reference is accurate enough for. */
+/* Finds the cheapest method of each column for which the reference is accurate enough. */
 static void conclusion_find_cheapest (pw_conclusion *conclusion) {
   for (int k = 0; k < CONCLUSION_COLUMNS; k++) {
     conclusion->best[k] = -1;
     conclusion->cheapest[k].cpu = NAN;
-    for (int i = 0; i < conclusion->study->methods && conclusion->uncertainty <= conclusion_required (k); i++) {
-      conclusion_cost candidate = conclusion_least_cost (conclusion, i, conclusion_required (k));
+    for (int i = 0; i < conclusion->study->methods && conclusion->uncertainty <= conclusion_required[k].error; i++) {
+      conclusion_cost candidate = conclusion_least_cost (conclusion, i, conclusion_required[k].error);
       if (isnan (candidate.cpu) || conclusion->cheapest[k].cpu <= candidate.cpu) continue;
       conclusion->cheapest[k] = candidate;
       conclusion->best[k] = i;
@@ -121,10 +120,10 @@ static char *conclusion_format_time (char text[40], conclusion_cost c) {
 
 /* The time for column k over that of the cheapest method: "2.5", "<30", "uncertain", "not reached" */
 static char *conclusion_format_ratio (char text[40], const pw_conclusion *conclusion, int method, int k) {
-  conclusion_cost c = conclusion_least_cost (conclusion, method, conclusion_required (k));
+  conclusion_cost c = conclusion_least_cost (conclusion, method, conclusion_required[k].error);
   double ratio = c.cpu / conclusion->cheapest[k].cpu;
   snprintf (text, 40, "%s%.*f", c.is_upper_bound ? "<" : "", ratio < 9.95, ratio);
-  if (conclusion->uncertainty > conclusion_required (k)) return strcpy (text, "uncertain");
+  if (conclusion->uncertainty > conclusion_required[k].error) return strcpy (text, "uncertain");
   return isnan (c.cpu) ? strcpy (text, "not reached") : text;
 }
 
@@ -133,7 +132,8 @@ static void conclusion_print_table (const pw_conclusion *conclusion) {
   char text[40];
   int any_upper_bound = 0, any_uncertain = 0;
   printf ("%-*s", conclusion->width, "");
-  for (int k = 0; k < CONCLUSION_COLUMNS; k++) printf ("  %*d digits", conclusion->width - 7, conclusion_digits[k]);
+  for (int k = 0; k < CONCLUSION_COLUMNS; k++)
+    printf ("  %*d digits", conclusion->width - 7, conclusion_required[k].digits);
   printf ("\n%-*s", conclusion->width, "cheapest");
   for (int k = 0; k < CONCLUSION_COLUMNS; k++)
     printf ("  %*s", conclusion->width, conclusion->best[k] < 0 ? "-" : conclusion->study->method[conclusion->best[k]]);
@@ -184,21 +184,18 @@ static void conclusion_print_failures (const pw_study *study, int method) {
                 pw_format (text, first->level, 4), CONCLUSION_REASON, first->reason, cut ? "..." : "");
 }
 
-/* One line for all methods that the limit has ended. */
+/* One line for all methods with runs that the limit has stopped or prevented. */
 static void conclusion_print_limited (const pw_study *study) {
-  char text[32];
-  int found = 0;
+  char text[32], beginning[80];
+  const char *before = beginning;
+  snprintf (beginning, sizeof beginning, "stopped by the limit of %s s: ", pw_format (text, study->cpu_limit, 4));
   for (int i = 0; i < study->methods; i++) {
     const pw_row *first;
-    conclusion_count_runs (study, i, RUNS_LIMITED, &first);
-    if (first == NULL) continue;
-    if (found++ == 0)
-      printf ("stopped by the limit of %s s: ", pw_format (text, study->cpu_limit, 4));
-    else
-      printf (", ");
-    printf ("%s from %s", first->method, pw_format (text, first->level, 4));
+    if (conclusion_count_runs (study, i, RUNS_LIMITED, &first) == 0) continue;
+    printf ("%s%s from %s", before, first->method, pw_format (text, first->level, 4));
+    before = ", ";
   }
-  if (found) putchar ('\n');
+  if (before != beginning) putchar ('\n');
 }
 
 void pw_conclusion_print (const pw_study *study, const pw_reference *reference, int error_column) {

@@ -7,19 +7,19 @@
 #include "util.h"
 
 #define DRIFT_ROUND_OFF 1e-14                   /* scaled residuals below it are round-off: they have no growth */
-#define DRIFT_RTOL 1e-6                         /* of adaptive methods, unless the model or --rtol says otherwise */
+#define DRIFT_RTOL 1e-6                         /* of adaptive methods, unless the model or --rtol gives another one */
 enum { DRIFT_PARTS = 200, DRIFT_ROWS = 10000 }; /* parts of a run, each a point in the figures; rows at most */
 
-/* What is measured: the scaled residuals of positions and velocities, |energy balance| [J]; and three values of each:
- * the largest of all steps and of the last part, and the growth. */
+/* What is measured: the scaled residuals of positions and velocities, and |balance| of a sample [J], the energy defect.
+ * Three values of each: the largest of all steps, the largest of the last part, and the growth (drift_finish). */
 enum { DRIFT_POSITION, DRIFT_VELOCITY, DRIFT_BALANCE, DRIFT_QUANTITIES };
 enum { DRIFT_LARGEST, DRIFT_LAST, DRIFT_GROWTH, DRIFT_VALUES };
 
-/* The methods, then the effect of the options of two stabilisations. */
+/* Groups of rows: the methods, then two stabilisations with different values of their options. */
 enum { DRIFT_METHODS, DRIFT_BAUMGARTE, DRIFT_PROJECTION, DRIFT_GROUPS };
 static const char *const drift_group[DRIFT_GROUPS] = { "methods", "baumgarte", "projection" };
 
-/* The options whose effect is shown, and their values unless --vary gives others. */
+/* The options that are varied, and their values unless --vary gives others. */
 enum { DRIFT_ALPHA, DRIFT_BETA, DRIFT_EVERY, DRIFT_OPTIONS };
 static const char *const drift_option[] = { "alpha", "beta", "every", NULL };
 static const char *const drift_default_values[] = { "alpha=1,3,10,30,100,300,1000", "beta=1,10,100,1000",
@@ -180,12 +180,12 @@ typedef struct {
   double first_half[DRIFT_QUANTITIES]; /* largest values up to t_end / 2 */
 } drift_visitor;
 
-/* Raises a maximum; NaN if one of both is. */
+/* Raises a maximum; NaN if either number is. */
 static void drift_raise_largest (double *largest, double value) {
   if (!isnan (*largest) && !(value <= *largest)) *largest = value;
 }
 
-/* The part of the run that a time belongs to, its end included, up to round-off. */
+/* The part of the run that contains a time; its end belongs to a part, up to round-off. */
 static int drift_part (const pw_study *study, double t) {
   int k = (int)ceil (t / study->t_end * DRIFT_PARTS - 1e-9) - 1;
   return k < 0 ? 0 : k < DRIFT_PARTS ? k : DRIFT_PARTS - 1;
@@ -209,8 +209,9 @@ static int drift_visit (pw_visitor *visitor, pw_run *run, pw_error *error) {
   return PW_OK;
 }
 
-/* The growth of a quantity from the largest value of the first half to that of the run, as the exponent of t: 0 if it
- * is bounded; NaN if there is only round-off.  A row of an option has the largest value in its figure. */
+/* The growth p of a quantity that is proportional to t^p, from its largest values in the first half and in the whole
+ * run; 0 if the largest is in the first half, NaN if there is only round-off.  The point of a row with a value of an
+ * option has the largest value as ordinate. */
 static void drift_finish (pw_row *row, int quantity, double first_half) {
   double *value = &row->value[COLUMN_QUANTITY + DRIFT_VALUES * quantity], largest = value[DRIFT_LARGEST];
   int known = quantity == DRIFT_BALANCE || largest > DRIFT_ROUND_OFF;

@@ -5,10 +5,10 @@
 #include "reference.h"
 
 #define REFERENCE_CPU_LIMIT 10 /* smallest limit of the processor time of a candidate [s] */
-#define REFERENCE_LOOSEST 1e-9 /* the tolerance of a method that fails is loosened up to this, */
-#define REFERENCE_FEWEST 1000  /* and its step of fixed size enlarged up to t_end over this */
-#define REFERENCE_STEPS 1e5    /* steps of fixed size are t_end over this at first, or the smallest of the comparison */
-#define REFERENCE_ROUND_OFF 8  /* units of round-off of the largest number: the smallest uncertainty */
+#define REFERENCE_LOOSEST 1e-9 /* the largest tolerance, after failures with smaller ones */
+#define REFERENCE_STEPS 1e5    /* the fewest steps of fixed size at first, */
+#define REFERENCE_FEWEST 1000  /* and after failures with more steps */
+#define REFERENCE_ROUND_OFF 8  /* the smallest uncertainty, in units of round-off of the largest coordinate */
 
 /* ---- Runs ---- */
 
@@ -77,7 +77,7 @@ typedef struct {
   pw_motion motion;
 } reference_candidate;
 
-/* Runs candidate i; increases a tolerance or step that is too small.  PW_RETRY: interrupted. */
+/* Runs candidate i, again with ten times the tolerance or step size if it fails.  PW_RETRY: interrupted. */
 static int reference_run (void *context, int i, pw_error *error) {
   reference_candidate *candidate = (reference_candidate *)context + i;
   pw_study *study = candidate->study;

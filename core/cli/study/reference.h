@@ -1,5 +1,6 @@
-/* Reference solutions of comparisons: a table, the exact solution of the model, or else computed by several methods at
- * tight tolerances.  Of the two that agree best, the first is the reference, and their distance is its uncertainty. */
+/* The reference solution of a comparison: a table, the exact solution of the model, or else a motion computed with a
+ * tight tolerance.  Several methods compute one; of the two that agree best, the first is the reference, and their
+ * distance is its uncertainty. */
 #ifndef PW_REFERENCE_H
 #define PW_REFERENCE_H
 
@@ -10,24 +11,24 @@ enum { REFERENCE_CANDIDATES = 4 };
 
 typedef struct {
   pw_motion motion;
-  int known; /* 0: there is no reference */
-  int from_table;
+  int known;                         /* 0: there is no reference */
+  int from_table;                    /* 1: it is the table of --reference */
   double uncertainty[MOTION_ERRORS]; /* 0 where nothing is compared */
   double size[MOTION_UNITS];         /* largest coordinate or velocity */
-  char name[300];                    /* "erk8+projection, rtol 3e-14" or the file's name */
-  int partners;                      /* other computed solutions, and their errors relative to this one */
+  char name[300];                    /* "erk8+projection, rtol 3e-14" or the path of the table */
+  int partners;                      /* number of other computed solutions; their errors relative to this one */
   struct {
     char name[100];
     double error[MOTION_ERRORS];
   } partner[REFERENCE_CANDIDATES - 1];
 } pw_reference;
 
-/* One run of a row at its level, as pw_study_run.  Stores the samples of a motion, with the energy balance; without
- * (NULL) nothing slows the run down. */
+/* One run of a row at its level, as pw_study_run.  Stores the samples of a motion and the largest energy balance;
+ * motion NULL: without samples, for the measurement of times. */
 int pw_motion_run (pw_study *study, pw_row *row, pw_motion *motion, pw_error *error);
 
-/* Finds the reference; `step` is the smallest of the comparison.  The end of a table is that of the comparison unless
- * --t-end is given.  Close its motion in every case. */
+/* Finds the reference.  step: the smallest step size of the comparison [s].  Sets the study's t_end to the end of a
+ * table unless --t-end is given.  Close the motion of the reference in every case. */
 int pw_reference_find (pw_reference *reference, pw_study *study, double step, pw_error *error);
 
 /* Prints the reference, its uncertainty and its distances from the first `partners` other solutions. */
@@ -38,8 +39,8 @@ int pw_reference_write (const pw_reference *reference, const char *folder, const
 
 /* ---- The conclusion of a comparison (conclusion.c) ---- */
 
-/* Prints the processor time of each method for 3, 6 and 9 correct digits against a known reference, and failures.
- * Column `error_column` of the rows is the largest error of lengths; that of angles follows. */
+/* Prints the processor time of each method for 3, 6 and 9 digits that agree with a known reference, and failures.
+ * error_column: index of the largest error of lengths in the values of a row; that of angles follows. */
 void pw_conclusion_print (const pw_study *study, const pw_reference *reference, int error_column);
 
 #endif

@@ -1,4 +1,4 @@
-/* What compare and drift have in common: the list of methods, runs, the course of the command. */
+/* What compare and drift have in common: the option --methods, runs, the sequence of a command. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -6,8 +6,10 @@
 #include "study.h"
 #include "util.h"
 
-#define STUDY_SHORT 0.005 /* processor time [s] of a batch of steps below which the next one is longer */
-#define STUDY_LONG 0.02   /* above which it is shorter: limits and signals are checked after a batch */
+/* Clocks are read after a batch of steps: its processor time [s] below which the next batch has more steps, and above
+ * which it has fewer. */
+#define STUDY_SHORT 0.005
+#define STUDY_LONG 0.02
 enum { STUDY_FIRST_BATCH = 8, STUDY_LONGEST_BATCH = 65536 }; /* steps */
 
 /* ---- Methods ---- */
@@ -51,18 +53,16 @@ static int methods_add_pattern (pw_study *study, char *pattern, pw_error *error)
 }
 
 int pw_study_read_methods (pw_study *study, const char *text, pw_error *error) {
-  int status = PW_OK;
-  for (const char *rest = text; status == PW_OK; rest++) {
+  for (const char *rest = text;; rest++) {
     char pattern[STUDY_NAME];
     size_t n = strcspn (rest, ",");
     if (n == 0 || n >= sizeof pattern)
       return pw_fail (error, PW_INPUT, "--methods \"%.80s\": %s", text, n ? "too long a name" : "a name is missing");
     snprintf (pattern, sizeof pattern, "%.*s", (int)n, rest);
-    status = methods_add_pattern (study, pattern, error);
+    int status = methods_add_pattern (study, pattern, error);
     rest += n;
-    if (*rest == 0) break;
+    if (status != PW_OK || *rest == 0) return status;
   }
-  return status;
 }
 
 /* ---- Rows ---- */
@@ -71,11 +71,7 @@ pw_row *pw_study_add (pw_study *study, int group, int curve, const char *method,
   pw_row *row = realloc (study->row, (size_t)(study->rows + 1) * sizeof *row);
   double (*point)[STUDY_COORDINATES] = malloc ((size_t)points * sizeof *point);
   if (row) study->row = row;
-  if (row == NULL || point == NULL) {
-    free (point);
-    pw_fail (error, PW_RESOURCE, "out of memory");
-    return NULL;
-  }
+  if (row == NULL || point == NULL) return free (point), pw_fail (error, PW_RESOURCE, "out of memory"), NULL;
   row += study->rows++;
   *row = (pw_row){ .group = group, .curve = curve, .points = points, .point = point };
   snprintf (row->method, sizeof row->method, "%s", method);
@@ -99,7 +95,7 @@ void pw_study_progress (pw_study *study, pw_row *row, double part) {
   pthread_mutex_unlock (&study->mutex);
 }
 
-/* Advances to the end in batches of steps, so that clocks are read rarely. */
+/* Advances a run to the end. */
 static int study_steps (pw_study *study, pw_row *row, pw_run *run, const pw_limit *limit, pw_visitor *visitor,
                         pw_error *error) {
   int status = PW_OK;
@@ -210,7 +206,7 @@ static int study_open (pw_study *study, pw_error *error) {
   return study_open_folder (study, error);
 }
 
-/* Measures a row.  Then writes all measured rows before the first one that is not, so that they are in their order. */
+/* Measures a row, then writes the measured rows before the first one that is not: rows are written in their order. */
 static int study_measure_row (void *context, int i, pw_error *error) {
   pw_study *study = context;
   int status = study->type->measure (study, &study->row[i], error);
@@ -225,7 +221,7 @@ static int study_measure_row (void *context, int i, pw_error *error) {
   return status;
 }
 
-/* Measures the rows of a method, in compare a curve, one after the other. */
+/* Measures the rows of a method one after the other; if a study is timed, the curves are its methods. */
 static int study_measure_method (void *context, int curve, pw_error *error) {
   const pw_study *study = context;
   int status = PW_OK;
@@ -234,7 +230,7 @@ static int study_measure_method (void *context, int curve, pw_error *error) {
   return status;
 }
 
-/* Writes the measured rows that follow one that an interruption has stopped. */
+/* Writes the measured rows after one that an interruption has stopped.  PW_RETRY, or the status of a failure. */
 static int study_write_kept (pw_study *study, pw_error *error) {
   for (const pw_row *row = study->row + study->written; row < study->row + study->rows; row++) {
     if (!row->measured) continue;
@@ -252,10 +248,9 @@ static int study_perform (pw_study *study, pw_error *error) {
   if (status == PW_OK && study->engine.code == NULL)
     printf ("all runs use the general engine: %s\n\n", study->engine.reason);
   pw_study_begin_progress (study, pw_file_name (study->compiled.file), study->type->row_noun, study->rows);
-  if (status == PW_OK && study->type->timed)
-    status = pw_study_parallel (study, study->methods, study_measure_method, study, error);
-  else if (status == PW_OK)
-    status = pw_study_parallel (study, study->rows, study_measure_row, study, error);
+  if (status == PW_OK)
+    status = study->type->timed ? pw_study_parallel (study, study->methods, study_measure_method, study, error)
+                                : pw_study_parallel (study, study->rows, study_measure_row, study, error);
   if (status == PW_RETRY && pw_stop) status = study_write_kept (study, error);
   if (status == PW_OK && study->type->conclude) study->type->conclude (study);
   pw_stop_release ();

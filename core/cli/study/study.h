@@ -1,6 +1,6 @@
-/* Studies: runs of one model by several methods, a row of a table for each, failures included.  This part opens the
- * model and the folder, performs the runs, and writes the table and the CSV file as rows are finished.  The commands
- * compare and drift (compare.c, drift.c) provide the rows, what is measured, the columns and the figures. */
+/* Studies: runs of one model by several methods.  A study is a table with a row for each method and its options or
+ * tolerance, failures included.  study.c opens the model and the folder, performs the runs, and prints and writes the
+ * rows as they are finished.  The commands compare and drift provide rows, measurements, columns and figures. */
 #ifndef PW_STUDY_H
 #define PW_STUDY_H
 
@@ -21,23 +21,23 @@ typedef enum { ROW_DONE, ROW_FAILED, ROW_REFUSED, ROW_STOPPED, ROW_SKIPPED } pw_
 typedef struct {
   char method[STUDY_NAME]; /* with options */
   char label[STUDY_NAME];  /* of its curve in the figure: at first the method */
-  int group;               /* of rows in the table; each has a figure */
-  int curve;               /* of the group's figure that has its points */
+  int group;               /* the part of the table that contains it, which has a figure of its own */
+  int curve;               /* the curve of this figure that contains its points */
   int adaptive;            /* 1: the step size follows a tolerance */
   double level;            /* of compare: tolerance, or step size [s] */
-  int coarser_levels;      /* number of rows of its method before it */
+  int coarser_levels;      /* of compare: number of rows of its method before it */
   pw_row_state state;
-  int measured;                 /* 1: all is known */
-  int runs;                     /* finished */
+  int measured;                 /* 1: the row is complete */
+  int runs;                     /* that have reached the end */
   double progress;              /* part of its runs that is done, 0 to 1 */
   double t;                     /* time reached [s] */
-  double cpu;                   /* of the last run [s] */
+  double cpu;                   /* processor time of the last run [s] */
   double balance;               /* largest |energy balance| of the samples [J] */
   pw_statistics statistics;     /* of the last run */
   char reason[500];             /* of a failure */
   double value[STUDY_COLUMNS];  /* NaN: unknown */
   unsigned upper_bounds;        /* bit i: value[i] is an upper bound */
-  char bound_names[STUDY_NAME]; /* columns of these values */
+  char bound_names[STUDY_NAME]; /* names of the columns of upper bounds */
   int points;                   /* in the figure; their coordinates are NaN if undefined */
   double (*point)[STUDY_COORDINATES];
 } pw_row;
@@ -99,9 +99,9 @@ struct pw_study {
   int methods;
   int jobs; /* number of concurrent runs */
   pw_settings settings;
-  pw_limit limit;   /* of a run */
+  pw_limit limit;   /* of a run, checked in every step: the run fails */
+  double cpu_limit; /* of the processor time of a run, checked between batches of steps: ROW_STOPPED [s] */
   double t_end;     /* [s] */
-  double cpu_limit; /* processor time of a run after which it is stopped between steps [s] */
   pw_figures figures;
   /* in progress */
   int lock;  /* descriptor of the locked folder; -1: none */
@@ -111,7 +111,7 @@ struct pw_study {
   pthread_mutex_t mutex;
   pw_progress progress;
   double progress_sum;                     /* of all rows */
-  double run_share;                        /* of a run in the progress of its row */
+  double run_share;                        /* part of the progress of a row that each of its runs makes */
   pw_output *csv;                          /* NULL: none */
   const char *scripts[FIGURE_SCRIPTS + 1]; /* of figures, ended by NULL */
 };
@@ -126,28 +126,29 @@ int pw_study_command (pw_study *study, const pw_study_type *type, pw_error *erro
  * nearest valid name. */
 int pw_study_read_methods (pw_study *study, const char *text, pw_error *error);
 
-/* Adds a row without numbers, with this number of points; rows of a curve follow each other.  NULL and PW_RESOURCE. */
+/* Adds a row whose values and points are NaN; rows of a curve follow each other.  NULL and PW_RESOURCE. */
 pw_row *pw_study_add (pw_study *study, int group, int curve, const char *method, int points, pw_error *error);
 
-/* Called after each step of a run that reaches time `due`, which it may change. */
+/* An observer of a run: `visit` is called after each step that reaches time `due`, which it may change. */
 typedef struct pw_visitor {
-  double due;
+  double due; /* [s]; 0: after each step */
   int (*visit) (struct pw_visitor *visitor, pw_run *run, pw_error *error);
   const pw_study *study;
   pw_row *row;
 } pw_visitor;
 
-/* One run of a row to the end or a limit: fills t, statistics, cpu, and state if it is stopped by cpu_limit; the
- * visitor may be NULL.  Runs of different rows may be concurrent.  PW_RETRY: stopped, or interrupted. */
+/* One run of a row to the end or a limit: fills t, statistics, cpu, and if cpu_limit stops it, state.  The visitor may
+ * be NULL.  Runs of different rows may be concurrent.  A status; PW_RETRY, without an error: stopped by cpu_limit or a
+ * signal. */
 int pw_study_run (pw_study *study, pw_row *row, const pw_settings *settings, pw_visitor *visitor, pw_error *error);
 /* Performs tasks as pw_parallel does, those of a study that is timed as pw_parallel_timed, and ends their progress. */
 int pw_study_parallel (pw_study *study, int count, pw_task *task, void *context, pw_error *error);
-/* Begins to show the progress of `rows` rows, called `unit`, of `what`. */
+/* Begins to show the progress of `what`, which consists of `rows` rows called `unit`. */
 void pw_study_begin_progress (pw_study *study, const char *what, const char *unit, int rows);
 /* Shows that a part of a row is done, 0 to 1. */
 void pw_study_progress (pw_study *study, pw_row *row, double part);
-/* Fills the row's values of the time reached and of the counts, and the failure if pw_study_run has returned this
- * status and `run_error`.  Returns PW_OK, or the status that ends the study. */
+/* Stores the time reached, the counts and, if the last pw_study_run of the row failed, its failure: `status` and
+ * `run_error` are what that returned.  Returns PW_OK, or the status that ends the study. */
 int pw_study_record_run (const pw_study *study, pw_row *row, int status, const pw_error *run_error, pw_error *error);
 
 /* ---- Tables and figures (study_table.c) ---- */
@@ -157,7 +158,7 @@ int pw_study_open_table (pw_study *study, pw_error *error);
 /* Prints a row unless the study is quiet, and writes it into the CSV file. */
 int pw_study_write_row (pw_study *study, const pw_row *row, pw_error *error);
 
-/* 1 if a coordinate of the points of a group is positive somewhere. */
+/* 1 if this coordinate of some point of a group is positive. */
 int pw_study_positive (const pw_study *study, int group, int coordinate);
 /* Writes NAME.dat: a block for each curve of a group that has points, two empty lines between them; `heading` names the
  * coordinates, `count` of them. */

@@ -68,7 +68,7 @@ static void table_number (const pw_row *row, const pw_study_column *column, int 
   printf ("%*s", column->width, text);
 }
 
-/* Prints a row; columns after the status only if its runs have reached the end. */
+/* Prints a row: columns after the status only if its runs have reached the end, else the reason. */
 static void table_print (const pw_study *study, const pw_row *row) {
   const pw_study_column *column = study->type->column;
   char t[32];
@@ -96,8 +96,8 @@ int pw_study_write_row (pw_study *study, const pw_row *row, pw_error *error) {
 
 /* ---- Figures ---- */
 
-/* The coordinates of the next defined point of a group, after point *point of *row; NULL after the last one.
- * Coordinate 0 may be set in advance, the others are set together. */
+/* The coordinates of the next defined point of a group, after point *point of *row; NULL after the last one.  A point
+ * is defined if its coordinates 1, 2, ... are, which are set together. */
 static const double *table_next_point (const pw_study *study, int group, const pw_row **row, int *point) {
   for (; *row < study->row + study->rows; ++*row, *point = -1)
     while ((*row)->group == group && ++*point < (*row)->points)

@@ -4,18 +4,18 @@
 # ---- Angular velocities; where they oscillate often, the end of the run in detail as well ----
 
 stats data using 7 name 'omega' nooutput
-most_extrema = 0 # of a curve; round-off does not count
+most_extrema = 0 # the largest number of extrema of a curve, without round-off
 do for [i = 1:curves] {
   stats data index i - 1 using 7 name 'one' nooutput
   limit = 1e-6*max(abs(one_min), abs(one_max))
   extrema = 0
-  sign = 0 # of the last change
+  sign = 0 # of the last change, as `now` is of the present one
   previous = NaN
   stats data index i - 1 using (change = $7 - previous, previous = $7, now = (change > limit) - (change < -limit), \
     extrema = extrema + (now*sign < 0), sign = now ? now : sign, extrema) name 'one' nooutput
   most_extrema = max(most_extrema, extrema)
 }
-# The part of the run shown in detail: at most 12 extrema, but not less than 2 %.
+# The part of the run shown in detail, 0 to 1: with at most 12 extrema, but not less than 2 %.
 detail = most_extrema < 30 ? 0 : most_extrema <= 60 ? 0.2 : most_extrema <= 120 ? 0.1 : \
   most_extrema <= 240 ? 0.05 : 0.02
 title = 'angular velocities'.(detail > 0 ? ', and their last part in detail' : '')

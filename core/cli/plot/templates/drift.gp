@@ -2,6 +2,7 @@
 # include methods.gp
 
 # ---- Drift: residuals and energy defect, a panel each ----
+# Above: quantities, a list of the numbers 1 to 3 of what is shown: columns 2 to 4 of the data.
 
 data = name.'.dat'
 logarithmic = name ne 'drift'
@@ -29,7 +30,7 @@ if (logarithmic) {
 }
 unset offsets
 unset xzeroaxis
-# Marks of a method: 10 to 19, between those of the others; few points all have one.
+# A curve has a mark at every step-th point, 10 to 19 in all, at other times than those of other methods.
 stats data index 0 using 1 name 'first' nooutput
 step = logarithmic ? 1 : max(1, int(first_records/10))
 do for [form in forms] {

@@ -1,6 +1,6 @@
 # include look.gp
 
-# ---- Energies, work, and the error of the energy balance in a unit of its own ----
+# ---- Energies and work; the error of the energy balance, with a power of ten of its own ----
 
 title = 'energy, work and their balance'
 stats 'energy.dat' using 2 name 'kinetic' nooutput

@@ -1,6 +1,8 @@
 # include look.gp
 
 # ---- Data and model of each column, below them the residuals ----
+# Above: panels (number of columns), label[i], weighted (1: the data have standard deviations).  A block of fit.dat for
+# each column: t [s], data, standard deviation, model.
 
 title = 'data and fitted model'
 left = 58.0 # for the digits of residuals
@@ -14,6 +16,7 @@ top = top + 13
 height = top + panel_rows*block_height - 40 + bottom
 set style line 1 pt 7 ps 0.35 lw 0.6 lc rgb '#888888'
 set style line 2 lw 1.1 lc rgb '#004488'
+# Plots y of block i, with bars of the standard deviation if there is one.
 bars(i, y) = sprintf('plot "fit.dat" index %d using 1:(%s)%s ls 1 notitle', i - 1, y, \
   weighted ? ':3 with yerrorbars' : ' with points')
 do for [form in forms] {

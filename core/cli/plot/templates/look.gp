@@ -1,14 +1,16 @@
 
 # ---- Look of all figures ----
-# A new figure is a template NAME.gp; a line "# include OTHER.gp" stands for the contents of another one.  A template
-# computes `height` and draws the figure in each of the forms: eval page(form), panels, eval finish.
+# A figure is a template NAME.gp; a line "# include OTHER.gp" stands for the contents of another one.  Pinwheel writes
+# variables above the template, which lists them after "Above:"; for all figures name (of the figure), model (its name),
+# incomplete ('', or how far the run got), about (the title) and width [pt].  A template computes `height` and draws the
+# figure in each of the forms: eval page(form), panels, eval finish.
 #
-# Lengths are in points; `width` is set by --width.  panel(x0, x1, y0, y1) places a plot, measured from the upper left
-# corner.  key(y, columns) places a legend of the next plot, which takes rows(n, columns) below `top`; begin_legend is a
-# panel of its own for it.
+# Lengths are in points.  panel(x0, x1, y0, y1) places a plot, measured from the upper left corner of the page.
+# key(y, columns) places the legend of the next plot; n entries in rows of `columns` take the height rows(n, columns).
+# Between begin_legend and end_legend a plot draws a legend alone, in a panel of its own.
 #
-# Text of the user (labels, names) is plain; our own is enhanced: 'v_x [m/s]', '10^{%T}'.  Line type i: colour, dash and
-# width distinguish it without colour, and wider ones stay visible below later ones.
+# Text of the user (labels, names) is plain, that of templates enhanced: 'v_x [m/s]', '10^{%T}'.  Dash and width
+# distinguish line types without colour; earlier ones are wider, so that they stay visible below later ones.
 
 set encoding utf8
 set minussign
@@ -25,6 +27,7 @@ colour(i) = word(colours, (i - 1) % 8 + 1)
 min(a, b) = a < b ? a : b
 max(a, b) = a > b ? a : b
 thickness(i, n) = n < 2 ? 1.1 : 1.7 - 0.8*(i - 1)/(n - 1)
+# Sets line types 1 to n.
 lines(n) = 'do for [i = 1:'.sprintf('%d', n).'] { eval sprintf("set linetype %d lw %.2f dt %s lc rgb ''%s''", i, '. \
   'thickness(i, '.sprintf('%d', n).'), word(dashes, (i - 1) % 4 + 1), colour(i)) }'
 eval lines(4)
@@ -40,11 +43,11 @@ right = 12.0
 bottom = 32.0
 narrow = width < 300 # one column of a page with two
 
-# Breaks a text between words.
+# Breaks a text between words, with `between` in place of the blank, into lines of at most n characters, if possible.
 space(s, n) = n < 2 || s[n:n] eq ' ' ? n : space(s, n - 1)
 wrap(s, n, between) = strlen(s) <= n || space(s, n) < 2 ? s : \
   s[1:space(s, n) - 1].between.wrap(s[space(s, n) + 1:*], n, between)
-# The title: a capital first, special characters of enhanced text escaped.
+# The title begins with a capital; the special characters of enhanced text are escaped.
 escaped = ''
 do for [i = 1:strlen(about)] {
   c = about[i:i]
@@ -52,7 +55,7 @@ do for [i = 1:strlen(about)] {
   escaped = escaped.(strstrt('\_^{}@&~', c) ? '\' : '').(small ? 'ABCDEFGHIJKLMNOPQRSTUVWXYZ'[small:small] : c)
 }
 heading = wrap(escaped, int((width - 16)/5.2), "}\n{/*1.13 ")
-top = 30.0
+top = 30.0 # end of the title; templates add the legend
 do for [i = 1:strlen(heading)] { if (heading[i:i] eq "\n") { top = top + 11 } }
 
 # Terminals differ in the place of a legend: lift [pt] moves it up, pitch is the distance of its lines.
@@ -83,12 +86,12 @@ begin_legend(columns) = key(legend_top, columns)."; set tics scale 0; set format
   "unset xzeroaxis; set xlabel ''; set ylabel ''; set xrange [1:10]; set yrange [1:10]; ". \
   panel(left, width - right, legend_top - 1, top - 1)
 end_legend = 'unset key; set tics scale 0.5; set border 31; set autoscale; '.grid
-# Entries in a row of a legend: no more than gnuplot would set.
+# Entries in a row of a legend: no more than gnuplot would set; height of n entries.
 columns(label_length) = max(1, int((width - left - right)/(32 + letter*label_length)))
 rows(n, columns) = 3 + 9.6*((n + columns - 1)/columns)
 short(s) = strlen(s) > 24 ? s[1:24].'…' : s
 
-# A power of ten for the label of an axis, instead of long numbers at its ticks.
+# The exponent of a power of ten in the label of an axis, instead of long numbers at its tics; 0: none.
 power(lo, hi) = (largest = max(abs(lo), abs(hi)), exponent = largest > 0 ? int(floor(log10(largest))) : 0, \
                  exponent > 3 || exponent < -2 ? exponent : 0)
 axis(label, unit, n) = label.' ['.(n ? sprintf('10^{%d} ', n) : '').unit.']'

@@ -2,6 +2,11 @@
 # include plane.gp
 
 # ---- Snapshots of the motion: earlier ones fainter, the last one with symbols; paths of the markers ----
+# Above: bodies (number of those with a name), body[i], by_time (1: colours show the time), markers (a list of blocks of
+# wheels.dat, from 0), areas (a list of the colours of bodies with an area), ground (1: ground.dat exists), t_end and
+# t_detail as for plane.gp.
+# Blocks of the data file: 0 to 3 bodies, wheels, point masses, rods before the end; 4 to 7 the same at the end; 8 and 9
+# open and closed strokes of symbols.  Columns: x, y, t, number of the body.
 
 title = 'snapshots of the motion'.(by_time ? '' : ', earlier ones lighter')
 array rgb[8]
@@ -11,8 +16,9 @@ mixed(value, channel, strength) = int(255 - strength*(255 - (value/channel) % 25
 # The colour of a body; the ground and elements are grey.
 shade(body, strength) = (c = body > 0 ? rgb[(int(body) - 1) % 8 + 1] : 0x555555, \
   mixed(c, 65536, strength) + mixed(c, 256, strength) + mixed(c, 1, strength))
-fade(t, t_end) = 0.22 + 0.4*t/t_end
-# A part of the plot command for a block of the data file: bodies by colour, before and at the end; symbols.
+fade(t, end) = 0.22 + 0.4*t/end
+# Parts of the plot command for blocks of the data file: bodies by colour, before and at the end; the areas of bodies of
+# colour c; symbols.
 block(k, strength, look) = sprintf(", %s index %d using 1:2:%s with %s%s notitle", file, k, \
   by_time ? '3' : '(shade($4, '.strength.'))', look, by_time ? ' lc palette' : ' lc rgb variable')
 before(k, look) = block(k, 'fade($3, '.span.')', look)

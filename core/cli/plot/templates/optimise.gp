@@ -1,6 +1,9 @@
 # include look.gp
 
 # ---- Output of every run against each unknown, the best one marked ----
+# Above: unknowns (their number), panels (number of unknowns shown), label[i], best[i] (value of an unknown in the best
+# run), objective (label of the output), value (of the output in the best run).  Columns of optimise.dat: number of the
+# run, the unknowns, the output, 1 if the constraints are satisfied.
 
 title = 'runs of the optimisation'
 gap = 40.0

@@ -1,6 +1,10 @@
 # include look.gp
 
-# ---- A periodic motion: paths and angular velocities over a period; or a branch over the parameter; multipliers ----
+# ---- A periodic motion, paths and phase curves over a period; or a branch over the parameter; with multipliers ----
+# Above: branch (0: a single motion), bodies (number of those shown), body[i], largest (modulus of a multiplier); for a
+# branch label_of_x, first and last (range of the parameter), low[k] and high[k] (range of column 1 + k of the data).
+# Blocks of the data: of a motion, the motion, its multipliers, the trivial ones; of a branch, its stable parts, its
+# unstable parts, events, multipliers, the trivial ones.
 
 data = name.'.dat'
 title = branch ? 'periodic motions' : 'periodic motion over one period, Floquet multipliers'
@@ -12,8 +16,8 @@ per_row = columns(label_length)
 legend_top = top
 top = top + rows(items, per_row)
 full_width = width - left - right
-square_side = narrow ? full_width : (full_width - 46)/2 # of the square of multipliers
-reach = 1.12*max(1, largest)
+square_side = narrow ? full_width : (full_width - 46)/2 # of the panel of multipliers
+reach = 1.12*max(1, largest) # half of its range
 square(x, y) = sprintf('set xrange [%g:%g]; set yrange [%g:%g]; ', -reach, reach, -reach, reach). \
   panel(x, x + square_side, y, y + square_side)
 unset offsets
@@ -65,6 +69,7 @@ do for [form in forms] {
     set xlabel 'x [m]'
     set ylabel 'y [m]'
     eval panel(left, width - right, top, top + first_height)
+    # A point marks the beginning of the period, which has 400 intervals.
     plot for [i = 1:bodies] data index 0 using (column(4*i - 2)):(column(4*i - 1)) with lines lt i \
         title short(body[i]), \
       for [i = 1:bodies] '' index 0 using (column(4*i - 2)):(column(4*i - 1)) every 400 with points pt 7 ps 0.5 \

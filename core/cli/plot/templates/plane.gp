@@ -1,6 +1,7 @@
 
 # ---- Panels with equal axes: the whole run and, if the mechanism goes far, its beginning ----
-# Panel i shows x0[i] to x1[i] and y0[i] to y1[i], at px0[i] to px1[i] and py0[i] to py1[i] of the page.
+# Above: t_end of the run, t_detail (end of the beginning that panel 2 shows; 0: no panel 2) [s].
+# Panel i shows x0[i] to x1[i] and y0[i] to y1[i] [m], at px0[i] to px1[i] and py0[i] to py1[i] of the page [pt].
 
 if (name eq 'mechanism' && by_time) { bottom = bottom + 40 } # room for a colour bar
 if (name eq 'mechanism') {
@@ -18,11 +19,11 @@ array x0[2] = [1e300, 1e300]
 array x1[2] = [-1e300, -1e300]
 array y0[2] = [1e300, 1e300]
 array y1[2] = [-1e300, -1e300]
-# Extends panel i by columns of a file: one of them along the axis z; both.
+# Extend the range of panel i by columns of a file: along one axis, z = 'x' or 'y', by column k; along both.
 extend_axis(i, z, file, k) = sprintf('stats %s using %s nooutput; ', file, k). \
   sprintf('%s0[%d] = min(%s0[%d], STATS_min); %s1[%d] = max(%s1[%d], STATS_max); ', z, i, z, i, z, i, z, i)
 extend(i, file, x, y) = extend_axis(i, 'x', file, x).extend_axis(i, 'y', file, y)
-# Column k, in panel 2 at the beginning alone.
+# Column k, for panel 2 at times up to t_detail.
 during(i, k) = i == 1 ? sprintf('%d', k) : sprintf('($1 <= 1.000001*t_detail ? $%d : NaN)', k)
 do for [i = 1:panels] {
   if (name eq 'mechanism') {
@@ -72,7 +73,7 @@ if (panels == 1) {
   py1[1] = py0[1] + max(0.4*panel_width*aspect(1, 0.5, 1.6), 0.6*panel_width*aspect(2, 0.5, 1.1))
   py1[2] = py1[1]
 }}
-# The legend is as wide as the first panel.
+# The legend is as wide as the first panel; panels move down for its rows.
 per_row = max(1, int((px1[1] - px0[1])/(32 + letter*label_length)))
 shift = items ? rows(items, per_row) - (top - legend_top) : 0
 do for [i = 1:panels] {
@@ -80,6 +81,7 @@ do for [i = 1:panels] {
   py1[i] = py1[i] + shift
 }
 height = py1[panels] + bottom
+# Extends ranges to the aspect ratio of the panels.
 do for [i = 1:panels] {
   ratio = (py1[i] - py0[i])/(px1[i] - px0[i])
   high = max(y1[i] - y0[i], (x1[i] - x0[i])*ratio)

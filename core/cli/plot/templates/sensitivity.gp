@@ -1,6 +1,7 @@
 # include look.gp
 
-# ---- Derivatives of outputs along the run: a panel for each output ----
+# ---- Derivatives of outputs along the run: a panel for each output, with a curve for each unknown ----
+# Above: unknowns and panels (their numbers), t_end [s], output[k], label of each curve, panel by panel.
 
 data = name.'.dat'
 title = 'derivatives along the run'

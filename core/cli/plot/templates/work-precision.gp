@@ -2,6 +2,7 @@
 # include methods.gp
 
 # ---- Work-precision diagram: error against CPU time and against evaluations, a line for each method ----
+# Above: uncertainty (of the reference), size_of_motion (largest coordinate).
 
 data = 'work-precision.dat'
 angles = name eq 'work-precision-angles'
@@ -14,7 +15,7 @@ height = top + panel_height + (narrow ? panel_height + 36 : 0) + bottom
 stats data using 2 name 'cpu' nooutput
 stats data using 3 name 'rhs' nooutput
 stats data using (column(column_of_error) > 0 ? column(column_of_error) : NaN) name 'error' nooutput
-largest = min(3*error_max, max(10*error_min, size_of_motion)) # larger errors mean nothing
+largest = min(3*error_max, max(10*error_min, size_of_motion)) # of the axis: larger errors mean nothing
 set logscale xy
 set format '10^{%T}'
 unset offsets
