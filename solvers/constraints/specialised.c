@@ -60,12 +60,11 @@ void pw_specialised_select (pw_run *r) {
   r->specialised = suits ? code : NULL;
 }
 
-/* 0 where the general functions have more to do than to evaluate: with fixed steps they compute the sine of every stage
- * where a singular configuration may be ahead; adaptive methods need it only below the pivots that the specialised code
- * accepts. */
+/* 0 also where a singular configuration may be ahead and steps are fixed: the general functions then compute the sine
+ * of every stage.  Adaptive methods need it only below the pivots that the specialised code accepts. */
 int pw_specialised_suits (const pw_run *r) {
-  const pw_geometry *g = &r->geometry;
-  return r->specialised && !r->redundant_moves && !(g->singular_ahead && g->saddle && pw_fixed_steps (r)) &&
+  const pw_watchdog *watch = &r->watchdog;
+  return r->specialised && !r->redundant_drive && !(watch->singular_ahead && watch->saddle && pw_fixed_steps (r)) &&
          !r->near_singular && !r->w->hold;
 }
 
@@ -102,17 +101,16 @@ int pw_specialised_stages (pw_run *r, const pw_scene_step *x) {
 }
 
 static void specialised_copy_residuals (pw_run *r) {
-  const pw_scene *s = r->scene;
-  r->residuals = (pw_residuals){ .position = s->position, .g = s->g, .velocity = s->velocity, .jv = s->jv };
+  const pw_scene *x = r->scene;
+  r->residuals = (pw_residuals){ .position = x->position, .g = x->g, .velocity = x->velocity, .jv = x->jv };
 }
 
 int pw_specialised_project (const pw_projector *p, pw_run *r, double t, double *q, double *v, double *a,
                             double *lambda) {
-  pw_scene *s = r->scene;
   if (!p->mass_metric || p->ignores_inactive || !pw_specialised_suits (r)) return 0;
   pw_specialised_scale (r);
-  if (r->specialised->project (s, t, q, v, a, lambda, r->w->configuration, r->w->J)) return 0;
-  specialised_finish (r, q, v, s->iterations);
+  if (r->specialised->project (r->scene, t, q, v, a, lambda, r->w->configuration, r->w->J)) return 0;
+  specialised_finish (r, q, v, r->scene->iterations);
   if (r->active)
     pw_forget_residuals (r);
   else

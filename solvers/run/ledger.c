@@ -56,7 +56,7 @@ void pw_ledger_record (pw_run *r) {
 }
 
 void pw_ledger_rates (pw_run *r, const double *lambda, double *rate) {
-  if (r->redundant_moves && pw_saddle_factor (r->saddle) == PW_OK) {
+  if (r->redundant_drive && pw_saddle_factor (r->saddle) == PW_OK) {
     memcpy (r->least_norm, lambda, (size_t)r->s->rows * sizeof *lambda);
     pw_rank_least_norm (r, r->least_norm);
     lambda = r->least_norm;

@@ -74,7 +74,7 @@ void pw_run_close (pw_run *r) {
   if (r == NULL) return;
   run_close_method (r);
   pw_saddle_close (r->saddle);
-  pw_watchdog_close (r);
+  pw_saddle_close (r->watchdog.saddle);
   free (r->rank_memory);
   free (r->scene_memory);
   pw_workspace_free (r->w);
@@ -92,7 +92,7 @@ static int run_restart_method (pw_run *r, pw_error *error) {
 
 int pw_run_renew (pw_run *r, pw_references references, pw_error *error) {
   int status = pw_run_open_saddle (r, error);
-  r->geometry.singular_ahead = 1;
+  r->watchdog.singular_ahead = 1;
   if (status == PW_OK) status = pw_run_evaluate (r, error);
   if (status == PW_OK && references == PW_NEW_REFERENCES)
     pw_run_set_references (r);
@@ -265,7 +265,7 @@ int pw_run_restart (pw_run *r, const double *q, const double *v, pw_error *error
   r->w->t_signal = NAN;
   run_exchange (r, q, v);
   r->near_singular = 0;
-  r->geometry.singular_ahead = 1;
+  r->watchdog.singular_ahead = 1;
   status = run_select_rows (r, error);
   if (status == PW_OK) status = pw_run_make_consistent (r, NULL, error);
   if (status == PW_OK) status = pw_run_evaluate (r, error);

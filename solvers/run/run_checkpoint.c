@@ -33,7 +33,7 @@ static void checkpoint_state (pw_run *r, pw_archive *a) {
   size_t n = (size_t)r->s->coords * sizeof (double), entries = (size_t)r->s->entries * sizeof (double);
   double *const number[] = {
     &r->t,     &r->breakpoint,      &r->projected,     &r->energy0,      &r->potential0,     &r->exchanged,
-    &r->power, &r->reference_level, &r->previous_norm, &r->independence, &r->reselect_below, &r->geometry.largest_sine
+    &r->power, &r->reference_level, &r->previous_norm, &r->independence, &r->reselect_below, &r->watchdog.largest_sine
   };
   for (size_t i = 0; i < sizeof number / sizeof *number; i++) pw_archive_bytes (a, number[i], sizeof (double));
   pw_archive_bytes (a, &r->speed_record, sizeof r->speed_record);

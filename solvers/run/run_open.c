@@ -44,11 +44,18 @@ static int run_allocate (pw_run *r) {
   const pw_system *s = r->s;
   size_t n = (size_t)s->coords + 3, rows = (size_t)s->rows, entries = (size_t)s->entries;
   size_t state = pw_state_length (s), scratch = 2 * n + 3 * rows, matrix = s->saturates ? 2 * n : 0;
-  const pw_array array[] = {
-    { &r->q, state },           { &r->ledger, entries },      { &r->rate, entries },       { &r->q_at, state },
-    { &r->ledger_at, entries }, { &r->scratch, scratch },     { &r->q_given, n },          { &r->v_given, n },
-    { &r->saturation, 2 * n },  { &r->matrix_state, matrix }, { &r->matrix_range, matrix }
-  };
+  const pw_array array[] = { { &r->q, state },
+                             { &r->ledger, entries },
+                             { &r->rate, entries },
+                             { &r->q_at, state },
+                             { &r->ledger_at, entries },
+                             { &r->scratch, scratch },
+                             { &r->q_given, n },
+                             { &r->v_given, n },
+                             { &r->saturation, 2 * n },
+                             { &r->matrix_state, matrix },
+                             { &r->matrix_range, matrix },
+                             { &r->watchdog.previous_q, n } };
   r->memory = pw_alloc_arrays (array, sizeof array / sizeof *array);
   r->origin = malloc (2 * n);
   if (r->memory == NULL || r->origin == NULL) return PW_RESOURCE;
@@ -104,7 +111,7 @@ static int run_first_evaluation (pw_run *r, pw_error *error) {
     if (status == PW_OK && r->redundant) status = pw_run_open_saddle (r, error);
     if (status != PW_OK) return status;
   }
-  r->geometry.singular_ahead = 1;
+  r->watchdog.singular_ahead = 1;
   status = pw_run_evaluate (r, error);
   if (status == PW_OK) pw_run_set_references (r);
   return status;

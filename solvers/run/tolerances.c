@@ -19,7 +19,7 @@ void pw_bound_tolerances (pw_run *r) {
   pw_evaluate_saturation (r->w, r->saturation);
   for (int j = 0; j < n; j++) {
     double y = j < coords ? r->q[j] : r->v[j - coords];
-    r->outdated |= fabs (y - r->matrix_state[j]) > r->matrix_range[j];
+    r->matrix_outdated |= fabs (y - r->matrix_state[j]) > r->matrix_range[j];
     r->saturation[j] *= TOLERANCES_PART / sqrt (n);
   }
 }
@@ -30,7 +30,7 @@ double pw_saturation_range (const pw_run *r, int state) {
 
 void pw_matrix_evaluated (pw_run *r, const double *q, const double *v) {
   int coords = r->s->coords;
-  r->outdated = 0;
+  r->matrix_outdated = 0;
   if (!r->s->saturates) return;
   memcpy (r->matrix_state, q, (size_t)coords * sizeof *q);
   memcpy (r->matrix_state + coords, v, (size_t)coords * sizeof *v);

@@ -22,7 +22,7 @@ double pw_run_acceleration_norm (const pw_run *r) {
 
 /* The largest change of a body's coordinate in the last step, in units of the scene. */
 static double watchdog_step_length (const pw_run *r) {
-  const double *last = r->geometry.previous_q, *q = r->q;
+  const double *last = r->watchdog.previous_q, *q = r->q;
   double length = 0, angle = 0;
   for (int j = 0; j < 3 * r->s->bodies; j += 3) {
     length = pw_larger (fabs (q[j] - last[j]), pw_larger (fabs (q[j + 1] - last[j + 1]), length));
@@ -35,69 +35,70 @@ static double watchdog_step_length (const pw_run *r) {
 
 /* Records the sine at the state reached. */
 static void watchdog_record_sine (pw_run *r, double sine) {
-  pw_geometry *g = &r->geometry;
-  g->checked_sine = sine;
-  g->moved = 0;
-  g->largest_sine = fmax (g->largest_sine, sine);
+  pw_watchdog *watch = &r->watchdog;
+  watch->checked_sine = sine;
+  watch->moved = 0;
+  watch->largest_sine = fmax (watch->largest_sine, sine);
 }
 
 /* 1 if the sine may be below this value at the state reached or after a motion of this length from there. */
 static int watchdog_reaches (const pw_run *r, double sine, double length) {
-  const pw_geometry *g = &r->geometry;
-  return g->saddle && !(g->checked_sine - r->limits.lipschitz * g->largest_sine * (g->moved + length) > sine);
+  const pw_watchdog *watch = &r->watchdog;
+  return watch->saddle &&
+         !(watch->checked_sine - r->limits.lipschitz * watch->largest_sine * (watch->moved + length) > sine);
 }
 
 /* The typical sine: the largest at a few irregular configurations, which need not satisfy the constraints. */
 static void watchdog_sample_sines (pw_run *r) {
   const pw_system *s = r->s;
-  pw_geometry *g = &r->geometry;
+  pw_watchdog *watch = &r->watchdog;
   for (int n = 1; n <= 4; n++) {
     for (int j = 0; j < s->coords; j++)
-      g->previous_q[j] = r->q[j] + 0.5 * pw_unit (s, j) * pw_irregular (n, (j + 1) * n);
-    if (pw_evaluate_J_at (r->w, r->t, g->previous_q, r->v) != PW_OK) break;
-    g->largest_sine = fmax (g->largest_sine, pw_watchdog_sine (r, NULL));
+      watch->previous_q[j] = r->q[j] + 0.5 * pw_unit (s, j) * pw_irregular (n, (j + 1) * n);
+    if (pw_evaluate_J_at (r->w, r->t, watch->previous_q, r->v) != PW_OK) break;
+    watch->largest_sine = fmax (watch->largest_sine, pw_watchdog_sine (r, NULL));
   }
   r->w->failed = NULL;
   (void)pw_evaluate_J_at (r->w, r->t, r->q, r->v);
 }
 
 void pw_watchdog_begin (pw_run *r) {
-  pw_geometry *g = &r->geometry;
-  if (g->saddle == NULL) return;
-  if (g->largest_sine == 0) watchdog_sample_sines (r);
+  pw_watchdog *watch = &r->watchdog;
+  if (watch->saddle == NULL) return;
+  if (watch->largest_sine == 0) watchdog_sample_sines (r);
   watchdog_record_sine (r, pw_watchdog_sine (r, NULL));
-  g->previous_t = r->t;
-  g->previous_sine = g->checked_sine;
-  g->step_length = g->sine_slope = 0;
-  g->sine_before_checked = NAN;
-  g->crossed = 0;
-  g->singular_ahead = 1;
-  memcpy (g->previous_q, r->q, (size_t)r->s->coords * sizeof *g->previous_q);
+  watch->previous_t = r->t;
+  watch->previous_sine = watch->checked_sine;
+  watch->step_length = watch->sine_slope = 0;
+  watch->sine_before_checked = NAN;
+  watch->crossed = 0;
+  watch->singular_ahead = 1;
+  memcpy (watch->previous_q, r->q, (size_t)r->s->coords * sizeof *watch->previous_q);
 }
 
 /* Checks the step to the state reached, where J is evaluated.  PW_METHOD if it has passed a change point without
  * resolving it. */
 static int watchdog_follow (pw_run *r, pw_error *error) {
-  pw_geometry *g = &r->geometry;
+  pw_watchdog *watch = &r->watchdog;
   int status = PW_OK;
-  if (g->saddle == NULL) return PW_OK;
-  g->step_length = watchdog_step_length (r);
-  g->moved += g->step_length;
-  double near = r->limits.near * g->largest_sine, ahead = r->limits.step_growth * g->step_length;
+  if (watch->saddle == NULL) return PW_OK;
+  watch->step_length = watchdog_step_length (r);
+  watch->moved += watch->step_length;
+  double near = r->limits.near * watch->largest_sine, ahead = r->limits.step_growth * watch->step_length;
   int may_be_near = watchdog_reaches (r, near, ahead);
   if (may_be_near) {
-    double last = g->moved == g->step_length ? g->checked_sine : NAN;
-    watchdog_record_sine (r, pw_watchdog_sine (r, &g->dependent_row));
-    status = pw_change_point_check (r, g->checked_sine, error);
+    double last = watch->moved == watch->step_length ? watch->checked_sine : NAN;
+    watchdog_record_sine (r, pw_watchdog_sine (r, &watch->dependent_row));
+    status = pw_change_point_check (r, watch->checked_sine, error);
     if (status == PW_OK) status = pw_change_point_resolve (r, last, error);
-    g->sine_before_checked = last;
+    watch->sine_before_checked = last;
   } else
-    g->sine_before_checked = NAN, g->sine_slope = 0, g->crossed = 0;
-  if (may_be_near && g->checked_sine < near) r->near_singular = 1;
-  g->singular_ahead = may_be_near && watchdog_reaches (r, near, ahead);
-  g->previous_t = r->t;
-  g->previous_sine = may_be_near ? g->checked_sine : NAN;
-  memcpy (g->previous_q, r->q, (size_t)r->s->coords * sizeof *g->previous_q);
+    watch->sine_before_checked = NAN, watch->sine_slope = 0, watch->crossed = 0;
+  if (may_be_near && watch->checked_sine < near) r->near_singular = 1;
+  watch->singular_ahead = may_be_near && watchdog_reaches (r, near, ahead);
+  watch->previous_t = r->t;
+  watch->previous_sine = may_be_near ? watch->checked_sine : NAN;
+  memcpy (watch->previous_q, r->q, (size_t)r->s->coords * sizeof *watch->previous_q);
   return status;
 }
 
@@ -152,7 +153,7 @@ static double watchdog_residual (const pw_run *r) {
  * method that follows the drifted constraints follows the turn, however small its steps. */
 static int watchdog_unresolved (pw_run *r, double residual, double ratio) {
   int row;
-  double bound = fmin (sqrt (residual / ratio), r->limits.regular * r->geometry.largest_sine);
+  double bound = fmin (sqrt (residual / ratio), r->limits.regular * r->watchdog.largest_sine);
   return bound > r->limits.rank_lost && watchdog_reaches (r, bound, 0) && pw_watchdog_sine (r, &row) < bound &&
          row < r->s->holonomic;
 }
