@@ -230,6 +230,12 @@ static inline int pw_evaluate_J_at (pw_workspace *w, double t, const double *q, 
   return status;
 }
 
+/* For qsort: numbers in ascending order. */
+static inline int pw_ascending (const void *a, const void *b) {
+  double x = *(const double *)a, y = *(const double *)b;
+  return (x > y) - (x < y);
+}
+
 /* The larger of two values; NaN if either is NaN, unlike pw_larger. */
 static inline double pw_larger_or_nan (double x, double y) {
   return y > x || isnan (y) ? y : x;

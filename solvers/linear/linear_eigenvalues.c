@@ -31,11 +31,6 @@ static void eigen_perturb (int n, double least, double *B) {
   }
 }
 
-static int eigen_ascending (const void *a, const void *b) {
-  double x = *(const double *)a, y = *(const double *)b;
-  return (x > y) - (x < y);
-}
-
 /* The shift of each eigenvalue by the perturbation: the distance to the nearest one of the perturbed matrix (re2, im2);
  * with moduli in ascending order, the difference to the modulus of the same rank if that is larger, since the nearest
  * one is not meaningful among many defective ones; at least `least`.  re2 becomes the sorted moduli. */
@@ -47,7 +42,7 @@ static void eigen_shift (int n, const double *re, const double *im, double *re2,
     shift[i] = fmax (shift[i], least);
   }
   for (int k = 0; k < n; k++) re2[k] = hypot (re2[k], im2[k]);
-  qsort (re2, (size_t)n, sizeof *re2, eigen_ascending);
+  qsort (re2, (size_t)n, sizeof *re2, pw_ascending);
   for (int i = 0; i < n; i++) {
     double size = hypot (re[i], im[i]);
     int rank = 0;

@@ -80,10 +80,10 @@ int pw_ledger_uses_multipliers (const pw_system *s) {
   return reacts;
 }
 
-/* If kinetic and potential energies are negligible, as for light bodies against friction, the scale is the work done.
- * This grows without bound, so it is limited to that of a time T. */
+/* If kinetic and potential energies are negligible, as for light bodies against friction, the scale is the work done,
+ * which grows without bound; so that of a time T at the most. */
 double pw_ledger_tolerance (const pw_run *r, double h) {
-  const double share = 5;         /* sqrt (25): as strict as for one state of 25 in a root mean square */
+  const double share = 5;         /* sqrt (25): the error of one of 25 states whose root mean square is 1 tolerance */
   const double round_off = 1e-11; /* of powers, due to multipliers */
   const pw_settings *set = &r->settings;
   double work = 0, rtol = fmax (set->rtol, set->atol > 0 ? set->atol / fmax (r->s->scale.length, 1) : 0);

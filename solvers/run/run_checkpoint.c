@@ -45,13 +45,6 @@ static void checkpoint_state (pw_run *r, pw_archive *a) {
   pw_rank_serialise (r, a);
 }
 
-/* 1 if a run can have reached the state: a file may be intact and yet not have been written by a run. */
-static int checkpoint_plausible (const pw_run *r) {
-  int plausible = isfinite (r->t) && r->t >= r->settings.t;
-  for (int i = 0; i < r->s->coords; i++) plausible &= isfinite (r->q[i]) && isfinite (r->v[i]);
-  return plausible;
-}
-
 /* Continues from the state in the run, after saving or loading; `a` is loading, at the method's own data, if any. */
 static int checkpoint_continue (pw_run *r, pw_archive *a, pw_error *error) {
   if (pw_evaluate_J_at (r->w, r->t, r->q, r->v) != PW_OK) return pw_fail_signal (r->t, error);
@@ -84,7 +77,7 @@ int pw_run_load (pw_run *r, pw_archive *a, pw_error *error) {
   int same_sizes = checkpoint_sizes (r, a);
   if (same_sizes) checkpoint_state (r, a);
   if (!same_sizes || a->failed) return pw_fail (error, PW_INPUT, "the saved state is not of this run");
-  if (!checkpoint_plausible (r))
+  if (!isfinite (r->t) || r->t < r->settings.t || !pw_is_finite_state (r, r->q, r->v)) /* not written by a run */
     return pw_fail (
         error, PW_INPUT,
         "the saved state is not that of a run: its time, t = %g s, or a coordinate or velocity is impossible", r->t);

@@ -1,34 +1,27 @@
 /* Checks after each step that the run still follows the motion: that constraints are neither lost nor contradictory,
  * and that the motion has not jumped to another branch at a singular configuration.
  *
- * The sine of the smallest angle between a row and those before it changes by at most about the motion of the
- * bodies, so it is computed again only when the motion since could have brought it to 0. */
+ * The sine (watchdog.h) changes by at most about the motion of the bodies, so it is computed again only when the motion
+ * since could have made it small. */
 #include <stdio.h>
 #include <string.h>
 #include "method.h"
 #include "rank.h"
 
 double pw_run_acceleration_norm (const pw_run *r) {
-  const pw_system *s = r->s;
-  const double *a = r->a, *internal = a + 3 * s->bodies;
-  double linear = 0, angular = 0, time_squared = r->w->scale.time * r->w->scale.time;
-  for (; a < internal; a += 3) {
-    linear = pw_larger_or_nan (pw_larger_or_nan (linear, fabs (a[0])), fabs (a[1]));
-    angular = pw_larger_or_nan (angular, fabs (a[2]));
-  }
-  for (; a < r->a + s->coords; a++) angular = pw_larger_or_nan (angular, fabs (*a));
-  return pw_larger_or_nan (linear * (time_squared / s->scale.length), angular * time_squared);
+  const double per_angle = r->w->scale.time * r->w->scale.time, per_length = per_angle / r->s->scale.length;
+  double norm = 0;
+  for (int j = 0; j < r->s->coords; j++)
+    norm = pw_larger_or_nan (norm, fabs (r->a[j]) * (pw_is_angle (r->s, j) ? per_angle : per_length));
+  return norm;
 }
 
 /* The largest change of a body's coordinate in the last step, in units of the scene. */
 static double watchdog_step_length (const pw_run *r) {
-  const double *last = r->watchdog.previous_q, *q = r->q;
-  double length = 0, angle = 0;
-  for (int j = 0; j < 3 * r->s->bodies; j += 3) {
-    length = pw_larger (fabs (q[j] - last[j]), pw_larger (fabs (q[j + 1] - last[j + 1]), length));
-    angle = pw_larger (fabs (q[j + 2] - last[j + 2]), angle);
-  }
-  return pw_larger (length / r->s->scale.length, angle);
+  double length = 0;
+  for (int j = 0; j < 3 * r->s->bodies; j++)
+    length = pw_larger (fabs (r->q[j] - r->watchdog.previous_q[j]) / pw_unit (r->s, j), length);
+  return length;
 }
 
 /* ---- Following the motion ---- */
@@ -145,12 +138,12 @@ static double watchdog_residual (const pw_run *r) {
   return pw_larger (r->residuals.position, r->residuals.g / r->s->scale.length);
 }
 
-/* 1 if a constraint residual may decide which branch is followed: if the sine s of the smallest angle between rows is
- * below its regular value, and s^2 below residual / ratio.
+/* 1 if a constraint residual d may decide which branch is followed: if the sine s is below its regular value, and s^2
+ * below d / ratio.
  *
  * Where two branches of a motion cross, the constraints are x y = 0 in suitable coordinates, and s = |(x, y)|.  With
- * a residual d they are x y = d: the branches do not cross but turn into each other, where s^2 is about 2 d.  A
- * method that follows the drifted constraints follows the turn, however small its steps. */
+ * the residual they are x y = d: the branches do not cross but turn into each other, where s^2 is about 2 d.  A method
+ * that follows the drifted constraints follows the turn, however small its steps. */
 static int watchdog_unresolved (pw_run *r, double residual, double ratio) {
   int row;
   double bound = fmin (sqrt (residual / ratio), r->limits.regular * r->watchdog.largest_sine);
@@ -158,8 +151,8 @@ static int watchdog_unresolved (pw_run *r, double residual, double ratio) {
          row < r->s->holonomic;
 }
 
-/* Fails where accelerations jump, or residuals are large, while they may decide the branch.  Such a turn is a corner
- * whose radius grows with the residual, so that its accelerations need not jump. */
+/* Fails where residuals may decide the branch and accelerations have grown, or residuals are large: the turn is then a
+ * corner whose radius grows with the residual, so that its accelerations need not grow. */
 static int watchdog_check_turn (pw_run *r, double norm, pw_error *error) {
   const pw_thresholds *limit = &r->limits;
   double residual = watchdog_residual (r), before = fmax (r->previous_norm, limit->turn_reference);
@@ -177,18 +170,14 @@ static int watchdog_check_turn (pw_run *r, double norm, pw_error *error) {
   return PW_OK;
 }
 
-/* 1 near a singular configuration whose dependent row is nonholonomic, or where accelerations are not finite. */
-static int watchdog_may_jump (pw_run *r, double norm) {
-  int row;
-  if (!r->near_singular) return 0;
-  pw_watchdog_sine (r, &row);
-  return row < 0 || row >= r->s->holonomic || !isfinite (norm);
-}
-
-/* Accelerations of the physical motion do not grow at a singular configuration; in a jump to another branch they do. */
+/* Accelerations of the physical motion do not grow at a singular configuration; in a jump to another branch they do, if
+ * the dependent row is nonholonomic. */
 static int watchdog_check_jump (pw_run *r, pw_error *error) {
+  int row = -1;
   double norm = pw_run_acceleration_norm (r);
-  if (watchdog_may_jump (r, norm) && !(norm <= r->limits.jump_growth * r->reference_level))
+  if (r->near_singular) pw_watchdog_sine (r, &row);
+  int may_jump = r->near_singular && (row < 0 || row >= r->s->holonomic || !isfinite (norm));
+  if (may_jump && !(norm <= r->limits.jump_growth * r->reference_level))
     return pw_fail (error, PW_METHOD,
                     "t = %.6g s: lost at a singular configuration: the accelerations are %.3g times those before", r->t,
                     norm / r->reference_level);
