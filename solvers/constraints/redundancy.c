@@ -140,7 +140,7 @@ static void redundancy_describe_pair (const pw_system *s, int one, int two, char
 
 char *pw_run_redundancy (pw_run *r, int i, char *buffer, size_t size) {
   enum { MAX_ELEMENTS = 6 };
-  const double round_off = 1e-8; /* of a coefficient: eps / s^2 at a sine s of 1.5e-4 */
+  const double round_off = 1e-8; /* of a coefficient between rows of length 1: eps / s^2 at a sine s of 1.5e-4 */
   const pw_system *s = r->s;
   int row = r->redundant_row[i], partners = 0, last = -1, elements = 0;
   char element[120], own[120], before[120] = "", reaction[120];
@@ -149,9 +149,9 @@ char *pw_run_redundancy (pw_run *r, int i, char *buffer, size_t size) {
   if (pw_evaluate_J_at (r->w, r->t, r->q, r->v) != PW_OK) return buffer;
   if (pw_saddle_factor (r->saddle) != PW_OK) return buffer;
   redundancy_coefficients (r, i);
-  const double *c = r->coefficient + i * s->rows;
+  const double *c = r->coefficient + i * s->rows, least = round_off * redundancy_length (r->w, row);
   for (int a = 0; a < s->rows; a++) {
-    if (fabs (c[a]) < round_off) continue;
+    if (fabs (c[a]) * redundancy_length (r->w, a) <= least) continue;
     partners++, last = a;
     pw_system_row_name (s, a, element, sizeof element);
     if (elements > MAX_ELEMENTS || strcmp (element, own) == 0 || strcmp (element, before) == 0) continue;
