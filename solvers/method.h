@@ -30,7 +30,7 @@ struct pw_run {
   int *redundant_row;          /* redundant: their indices */
   unsigned char *active_array; /* rows: what `active` points to */
   double *coefficient;         /* redundant x rows: each redundant row as a combination of active rows */
-  double *normal;              /* redundant x (redundant + 1): matrix and right side of their normal equations */
+  double *normal;              /* redundant x (redundant + 1): normal equations in redundancy.c, right side last */
   double *row_force, *zero;    /* coords + 3, rows: right-hand sides for the coefficients of a redundant row */
   double *least_norm;          /* rows: least-norm multipliers for the ledger */
   char *rank_memory;           /* of these arrays */
@@ -64,8 +64,8 @@ struct pw_run {
   double *q_at, *v_at, *a_at, *lambda_at, *ledger_at; /* same layout */
   double projected_at;
 
-  int stopped;     /* 1: settings.stop has requested it */
-  int interrupted; /* 1: by that request, inside a step of SUNDIALS: the method must be restarted */
+  int stopped;     /* 1: settings.stop has requested a stop, */
+  int interrupted; /* 1: which has interrupted a step of SUNDIALS: the method must be restarted */
   struct {
     double time, speed; /* time since the start [s]; the largest speed then, in units of the scene (limits.c) */
   } speed_record, earlier_record; /* the last record; the one before, at half its time or less */
@@ -181,6 +181,10 @@ static inline double pw_least_step (const pw_run *r) {
 
 /* Adds the name of the signal that failed in the last attempted step, if any, to the error.  Returns status. */
 int pw_run_annotate_error (const pw_run *r, int status, pw_error *error);
+
+/* PW_INPUT if an element type leaves out a derivative that is not zero, so that results would be wrong: "USER NEEDS
+ * it".  PW_METHOD if a signal fails; PW_RESOURCE. */
+int pw_run_check_derivatives (pw_run *r, const char *user, const char *needs, pw_error *error);
 
 /* Replaces the saddle by one for the active rows; r->saddle is NULL after an error of pw_saddle_open. */
 int pw_run_open_saddle (pw_run *r, pw_error *error);
@@ -363,7 +367,8 @@ void pw_project_error (pw_run *r, pw_saddle *saddle, double *e, int rows);
 
 /* ---- Specialised code (specialised.c) ---- */
 
-/* Opens the settings' specialised code, if any.  Errors: PW_INPUT, PW_RESOURCE. */
+/* Opens the settings' specialised code, if any; the scales, alpha and beta must be known.  Errors: PW_INPUT,
+ * PW_RESOURCE. */
 int pw_specialised_open (pw_run *r, pw_error *error);
 /* Uses it if it has the run's independent equations. */
 void pw_specialised_select (pw_run *r);
@@ -380,8 +385,6 @@ void pw_specialised_residuals (pw_run *r);
 
 /* 1 if specialised code can do the run's next evaluation. */
 int pw_specialised_suits (const pw_run *r);
-/* Passes the scales of residuals to specialised code. */
-void pw_specialised_scale (pw_run *r);
 /* Adds to the statistics: evaluations, and iterations of projections, of specialised code. */
 void pw_specialised_count (pw_run *r, long evaluations, long iterations);
 

@@ -46,6 +46,7 @@ int pw_specialised_open (pw_run *r, pw_error *error) {
   if (!pw_specialised_fits (code, r->s))
     return pw_fail (error, PW_INPUT, "model %s: the specialised code belongs to another scene", r->s->model);
   if (specialised_allocate (r, code->constants) != PW_OK) return pw_fail_memory (r->s, error);
+  r->scene->length = r->w->scale.length, r->scene->speed = r->scene->length / r->w->scale.time;
   r->scene->follows = r->limits.redundant_residual;
   r->scene->alpha = r->alpha, r->scene->beta = r->beta;
   r->scene_ready = code->prepare (r->scene) == 0;
@@ -66,11 +67,6 @@ int pw_specialised_suits (const pw_run *r) {
   const pw_watchdog *watch = &r->watchdog;
   return r->specialised && !r->redundant_drive && !(watch->singular_ahead && watch->saddle && pw_fixed_steps (r)) &&
          !r->near_singular && !r->w->hold;
-}
-
-void pw_specialised_scale (pw_run *r) {
-  r->scene->length = r->w->scale.length;
-  r->scene->speed = r->scene->length / r->w->scale.time;
 }
 
 void pw_specialised_count (pw_run *r, long evaluations, long iterations) {
@@ -108,7 +104,6 @@ static void specialised_copy_residuals (pw_run *r) {
 int pw_specialised_project (const pw_projector *p, pw_run *r, double t, double *q, double *v, double *a,
                             double *lambda) {
   if (!p->mass_metric || p->ignores_inactive || !pw_specialised_suits (r)) return 0;
-  pw_specialised_scale (r);
   if (r->specialised->project (r->scene, t, q, v, a, lambda, r->w->configuration, r->w->J)) return 0;
   specialised_finish (r, q, v, r->scene->iterations);
   if (r->active)
@@ -121,7 +116,6 @@ int pw_specialised_project (const pw_projector *p, pw_run *r, double t, double *
 void pw_specialised_residuals (pw_run *r) {
   if (!pw_specialised_suits (r) || r->active || !isnan (r->residuals.position) || !isnan (r->residuals.velocity))
     return;
-  pw_specialised_scale (r);
   r->specialised->residuals (r->scene, r->q, r->v, r->w->configuration, r->w->J);
   specialised_copy_residuals (r);
 }

@@ -146,6 +146,7 @@ static int linear_run (pw_run *r, int most, pw_linear_extent extent, pw_linear *
   int near_singular = r->near_singular, status = pw_linear_open (&x, r, extent, most);
   l->coordinates = x.n, l->rank = x.rank;
   l->positions = x.positions, l->velocities = x.velocities, l->unknowns = x.size;
+  if (status == PW_OK && x.n <= most) status = pw_run_check_derivatives (r, "the linearisation", "needs", error);
   if (status == PW_OK && x.n <= most) status = linear_compute (&x, l, error);
   pw_linear_close (&x);
   r->statistics = before;

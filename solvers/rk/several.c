@@ -86,7 +86,6 @@ static int several_plan (pw_run *r, double t, double t_end, pw_scene_steps *x) {
   x->state0 = d->last.q, x->ledger0 = d->last.ledger, x->rate0 = d->last.rate;
   x->V = d->stage_v, x->A = d->stage_a, x->R = d->stage_rate;
   x->configuration = r->w->configuration, x->J = r->w->J;
-  pw_specialised_scale (r);
   return count;
 }
 

@@ -174,19 +174,6 @@ static int variation_start (pw_variation *x, pw_direction_copy *d, const pw_dire
   return pw_variation_look_ahead (x, d, x->r->breakpoint, error);
 }
 
-/* A missing derivative of an element type would give wrong results. */
-static int variation_check_blocks (const pw_variation *x, pw_error *error) {
-  char block[200];
-  int found = pw_find_missing_block (x->r->w, x->r->t, x->r->q, x->r->v, block, sizeof block);
-  if (found == 0) return PW_OK;
-  if (found == PW_RESOURCE) return pw_fail_memory (x->r->s, error);
-  return pw_fail (
-      error, PW_INPUT,
-      "model %s: %s is left out, but it is not zero, and derivatives need it: add it, or PW_BY_DIFFERENCES in "
-      "its place",
-      x->r->s->model, block);
-}
-
 /* Appends the last step of the run, from time t0, to its states.  A step across a jump is not refined: samples in it,
  * each an own step of a Runge-Kutta method, are not continuous in time and might seem to cross it several times. */
 static int variation_record (pw_variation *x, double t0, pw_error *error) {
@@ -214,7 +201,7 @@ static int variation_open (pw_variation *x, const pw_direction *d, pw_error *err
     return pw_fail (error, PW_INPUT, "derivatives need inputs=stage: held inputs depend on the steps");
   for (int i = 0; i < x->count; i++)
     if (variation_check_neighbours (x, &d[i], i, error) != PW_OK) return PW_INPUT;
-  int status = variation_check_blocks (x, error);
+  int status = pw_run_check_derivatives (r, "derivatives", "need", error);
   if (status != PW_OK) return status;
   x->reversal = variation_reversal (r);
   x->direction = calloc ((size_t)x->count + 1, sizeof *x->direction);
