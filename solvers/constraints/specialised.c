@@ -5,7 +5,7 @@
 #include "specialised.h"
 #include "util.h"
 
-/* Updates signals, for the compiled code. */
+/* pw_scene.update: evaluates the signals for the compiled code. */
 static int specialised_update (void *workspace, double t, const double *q, const double *v) {
   return pw_update_signals (workspace, t, q, v);
 }

@@ -35,9 +35,9 @@ static void linear_set_residual (const pw_linearisation *x, pw_linear_frame *f) 
     double relative_y = v[j + 1] - f->twist[1] - w * (q[j] - f->origin[0]);
     most = pw_larger_or_nan (most, hypot (a[j] + w * v[j + 1], a[j + 1] - w * v[j]));
     most = pw_larger_or_nan (most, fabs (w) * hypot (relative_x, relative_y));
-    most = pw_larger_or_nan (most, fabs (a[j + 2]) * x->r->s->scale.length);
   }
-  for (int j = 3 * x->r->s->bodies; j < x->n; j++) most = pw_larger_or_nan (most, fabs (a[j]) * x->r->s->scale.length);
+  for (int j = 0; j < x->n; j++)
+    if (pw_is_angle (x->r->s, j)) most = pw_larger_or_nan (most, fabs (a[j]) * x->r->s->scale.length);
   f->acceleration = most;
   f->residual = most / linear_unit (x);
 }

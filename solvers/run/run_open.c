@@ -96,10 +96,7 @@ static double run_time_scale (const pw_run *r) {
 }
 
 /* Opens the saddle at the consistent initial state and evaluates the accelerations there; if some rows are nearly
- * dependent, an independent set is selected first.
- *
- * Round-off leaves a dependent row a sine of 1e-8, and of 1e-5 after others that are nearly dependent themselves: below
- * `rank_suspect` the rank is examined by orthogonalisation, if the scene is small enough. */
+ * dependent, an independent set is selected first, unless the scene is too large for that. */
 static int run_first_evaluation (pw_run *r, pw_error *error) {
   int status = pw_run_open_saddle (r, error);
   if (status != PW_OK) return status;

@@ -133,17 +133,14 @@ static int watchdog_contradicts (pw_run *r) {
 
 /* ---- Branches ---- */
 
-/* The residual of positions, in units of the scene. */
+/* The residual of positions: scaled, or in units of L if that is larger. */
 static double watchdog_residual (const pw_run *r) {
   return pw_larger (r->residuals.position, r->residuals.g / r->s->scale.length);
 }
 
 /* 1 if a constraint residual d may decide which branch is followed: if the sine s is below its regular value, and s^2
- * below d / ratio.
- *
- * Where two branches of a motion cross, the constraints are x y = 0 in suitable coordinates, and s = |(x, y)|.  With
- * the residual they are x y = d: the branches do not cross but turn into each other, where s^2 is about 2 d.  A method
- * that follows the drifted constraints follows the turn, however small its steps. */
+ * below d / ratio.  Drifted constraints, x y = d in place of x y = 0 (singular.c), connect branches that cross by a
+ * turn, which a method follows however small its steps. */
 static int watchdog_unresolved (pw_run *r, double residual, double ratio) {
   int row;
   double bound = fmin (sqrt (residual / ratio), r->limits.regular * r->watchdog.largest_sine);
