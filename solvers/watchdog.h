@@ -22,7 +22,7 @@ typedef struct {
   double rank_suspect;            /* sine below which the rank is computed, */
   double rank_refused;            /* or, where the scene is too large for that, the configuration refused */
   double independent;             /* sine above which a row counts as independent */
-  double near, regular;           /* relative sines, below and above: of a singular, a regular configuration */
+  double near, regular;           /* relative sines: near a singular configuration below; regular above */
   double refine;                  /* sine below which solutions are refined */
   double turn_growth;             /* growth of the accelerations in a turn to another branch */
   double turn_reference;          /* least acceleration norm to which growth refers */
@@ -32,8 +32,8 @@ typedef struct {
   double jump_growth;             /* growth of the accelerations in a jump */
   double lipschitz;               /* change of the relative sine per unit of motion */
   double step_growth;             /* length of a step over that of the last one */
-  double unresolved;              /* sine within a step over those at its ends: corner not resolved */
-  double low;                     /* sine within a step over those at its ends, or relative: may be a change point */
+  double unresolved;              /* sine within a step, over those at its ends, of a corner that is not resolved */
+  double low;                     /* the same, and relative sine, of a possible change point */
   double stride, progress;        /* of walks past a change point: length over the sine; gain over the length */
   double floor, crossing;         /* sine of round-off, also the shortest stride; sine where branches cross */
   double straight;                /* cosine of the largest angle of a straight passage */

@@ -7,9 +7,10 @@
  *
  * So where the sine may have had a minimum within a step, a walk on the constraint manifold leads from its beginning to
  * its end, in strides proportional to the sine, each followed by a projection.  If the walk does not get closer to the
- * end, that is on another branch.  Where the sine falls below the threshold `floor`, the branches cross to round-off:
- * the walk steps over such a point, and the motion must continue straight on.  (Following a solution curve by predictor
- * and projection: Allgower & Georg 2003, Introduction to numerical continuation methods, chapters 2 and 8.) */
+ * end, the end is on another branch.  Where the sine is below the threshold `crossing`, the branches cross to
+ * round-off: the walk steps over such a point, and the motion must continue straight on.  (Following a solution curve
+ * by predictor and projection: Allgower & Georg 2003, Introduction to numerical continuation methods, chapters 2 and
+ * 8.) */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -26,7 +27,7 @@ typedef enum { CHANGE_SAME_BRANCH, CHANGE_OTHER_BRANCH, CHANGE_UNKNOWN } change_
 typedef struct {
   pw_run *r;
   pw_projector projector;
-  double t, *q, *next; /* time and coordinates that the walk has reached; its next coordinates */
+  double t, *q, *next; /* time and coordinates that the walk has reached; scratch for its next coordinates */
   double *target;      /* the end of the step */
   double *entry;       /* 2 coords: the last coordinates before a crossing of branches, and the first ones in it */
   double sine;         /* at q */

@@ -72,6 +72,7 @@ static int initial_positions (pw_projector *p, pw_run *r, initial_failure *failu
 /* Projects velocities; kinematics must be up to date.  A second linear solve removes the round-off of a large first
  * correction. */
 static int initial_velocities (pw_projector *p, pw_run *r, initial_failure *failure) {
+  double *Jv = r->scratch, *eta = Jv + r->s->rows;
   pw_residuals now;
   pw_evaluate_residuals (r->w, NULL, &now);
   for (int i = 0; i < 2 && !(now.velocity <= PW_RESIDUAL_CONVERGED); i++) {
@@ -81,7 +82,10 @@ static int initial_velocities (pw_projector *p, pw_run *r, initial_failure *fail
     pw_evaluate_residuals (r->w, NULL, &now);
   }
   if (now.velocity <= PW_RESIDUAL_ACCEPTED) return PW_OK;
-  *failure = (initial_failure){ now.row_velocity, INITIAL_VELOCITIES, now.jv, .assembled = 1 };
+  int row = now.row_velocity;
+  pw_mul_J (r->w, r->v, Jv);
+  pw_evaluate_eta (r->w, eta);
+  *failure = (initial_failure){ row, INITIAL_VELOCITIES, row < 0 ? NAN : fabs (Jv[row] - eta[row]), .assembled = 1 };
   return PW_RETRY;
 }
 

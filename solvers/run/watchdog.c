@@ -101,7 +101,7 @@ static int watchdog_fail_lost (pw_run *r, int contradicts, pw_error *error) {
   pw_residuals now;
   char element[120] = "a constraint", cause[60] = "constraint drift";
   pw_evaluate_residuals (r->w, NULL, &now);
-  int row = now.position > now.velocity ? now.row_position : now.row_velocity;
+  int in_position = now.position > now.velocity, row = in_position ? now.row_position : now.row_velocity;
   if (row >= 0) pw_system_row_name (r->s, row, element, sizeof element);
   const char *advice = "";
   if (contradicts)
@@ -111,9 +111,8 @@ static int watchdog_fail_lost (pw_run *r, int contradicts, pw_error *error) {
                                 : "; a smaller tolerance or a stabilisation reduces it";
   else if (pw_fixed_steps (r))
     snprintf (cause, sizeof cause, "the step of %.6g s is too large", r->settings.step);
-  return pw_fail (error, PW_METHOD,
-                  "t = %.6g s: %s: %s is violated by %.3g in position and %.3g in velocity (scaled)%s", r->t, cause,
-                  element, now.position, now.velocity, advice);
+  return pw_fail (error, PW_METHOD, "t = %.6g s: %s: %s is violated by %.3g in %s (scaled)%s", r->t, cause, element,
+                  in_position ? now.position : now.velocity, in_position ? "position" : "velocity", advice);
 }
 
 static int watchdog_exceeds (double position, double velocity, double limit) {
