@@ -136,8 +136,8 @@ static int initial_project_reduced (pw_projector *p, pw_run *r, initial_level le
 }
 
 /* Projects the positions `from` and the given velocities, with prescribed states (2 coords, or NULL); reduce_free: 1:
- * as initial_project_reduced.  The velocity metric is the mass matrix; if that does not determine all velocities, or
- * the projection fails, the position metric. */
+ * projections are reduced.  The velocity metric is the mass matrix; if that does not determine all velocities, or the
+ * projection fails, the position metric. */
 static int initial_attempt (pw_run *r, const unsigned char *prescribed, int reduce_free, const double *from,
                             initial_failure *failure, pw_error *error) {
   const pw_system *s = r->s;
@@ -222,9 +222,9 @@ static int initial_attempt_reduced (pw_run *r, const unsigned char *prescribed, 
   initial_failure later = { .row = -1 };
   int status = initial_attempt (r, prescribed, reduce_free, r->q_given, failure, error), rank = s->rows;
   if (status != PW_RETRY || r->active || (double)s->rows * s->coords > PW_RANK_MAX_ENTRIES) return status;
-  double *at = malloc (2 * n * sizeof *at + rows); /* where the set is selected */
+  double *at = malloc (2 * n * sizeof *at + rows); /* where the equations are selected */
   if (at == NULL) return pw_fail_memory (s, error);
-  double *from = at + n;
+  double *from = at + n; /* where attempts begin */
   unsigned char *active = (unsigned char *)(from + n);
   memcpy (at, r->q_given, n * sizeof *at);
   memcpy (from, at, n * sizeof *at);

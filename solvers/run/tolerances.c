@@ -9,7 +9,7 @@
 #include <string.h>
 #include "method.h"
 
-#define TOLERANCES_PART 0.1 /* largest error of a state over the change of it that changes a force by its magnitude */
+#define TOLERANCES_PART 0.1 /* largest error of a state over its change that changes a force by the force itself */
 
 /* The root mean square of n errors in units of their tolerances may be 1, so a single error may be sqrt (n) times its
  * tolerance. */
