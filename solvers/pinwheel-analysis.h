@@ -175,7 +175,7 @@ void pw_steady_close (pw_steady *x);
 
 /* Newton's method at a value of the parameter, with corrections of least norm, from the initial state (attempt 0), a
  * state to which forces lead from there (1), or a random one (2, 3, ...).  PW_RETRY, without an error, if it finds
- * none: residual and state are where it ended. Errors: PW_INPUT if a parameter changes the number of coordinates;
+ * none: residual and state are where it ended.  Errors: PW_INPUT if a parameter changes the number of coordinates;
  * PW_RESOURCE; PW_METHOD. */
 int pw_steady_solve (pw_steady *x, int attempt, double parameter, pw_steady_motion *out, pw_error *error);
 /* Why the system could last not be evaluated during the search, or why a branch ended within the range; or "". */
