@@ -207,7 +207,6 @@ int pw_change_point_resolve (pw_run *r, double last_sine, pw_error *error) {
                       watch->step_length, error);
 }
 
-/* Reports the result of a walk. */
 static int change_report (pw_run *r, const change_walk *walk, change_verdict verdict, double sine, double length,
                           pw_error *error) {
   pw_watchdog *watch = &r->watchdog;

@@ -58,7 +58,6 @@ static void initial_weights (const pw_system *s, const double *metric, const uns
     weight[j] = prescribed && prescribed[j] ? INFINITY : s->mass[j] > 0 ? metric[j] : scale * metric[j];
 }
 
-/* Projects positions. */
 static int initial_positions (pw_projector *p, pw_run *r, initial_failure *failure) {
   int status = pw_project_positions (p, r, r->t, r->q, r->v);
   if (status == PW_OK) return PW_OK;

@@ -26,7 +26,6 @@ static double watchdog_step_length (const pw_run *r) {
 
 /* ---- Following the motion ---- */
 
-/* Records the sine at the state reached. */
 static void watchdog_record_sine (pw_run *r, double sine) {
   pw_watchdog *watch = &r->watchdog;
   watch->checked_sine = sine;
