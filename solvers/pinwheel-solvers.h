@@ -47,18 +47,18 @@ typedef struct {
 /* An integrator: one const table in one file.  All methods of Pinwheel are such tables; for your own, see
  * pinwheel-method.h. */
 struct pw_method {
-  const char *name;                       /* "rk4" */
-  const char *about;                      /* one line, with its source (author, year) */
-  int adaptive;                           /* 1: uses rtol and atol; 0: uses step */
-  int order;                              /* of convergence, of fixed-step methods; 0: variable */
-  const pw_stabilisation *stabilisations; /* ended by a NULL name; the first is the default */
-  const pw_option *options;               /* ended by a NULL name */
-  const pw_stabilisation *refused;        /* unsupported ones, `about` is the reason; ended likewise, or NULL */
-  int (*open) (pw_run *r, pw_error *error);
-  int (*advance) (pw_run *r, double t_end, pw_error *error);
-  int (*at) (pw_run *r, double t, pw_error *error); /* leaves the state in the run's sample arrays */
-  int (*restart) (pw_run *r, pw_error *error);
-  void (*close) (pw_run *r);
+  const char *name;                         /* "rk4" */
+  const char *about;                        /* one line, with its source (author, year) */
+  int adaptive;                             /* 1: uses rtol and atol; 0: uses step */
+  int order;                                /* of convergence, of fixed-step methods; 0: variable */
+  const pw_stabilisation *stabilisations;   /* ended by a NULL name; the first is the default */
+  const pw_option *options;                 /* ended by a NULL name */
+  const pw_stabilisation *refused;          /* unsupported ones, `about` is the reason; ended likewise, or NULL */
+  int (*open) (pw_run *r, pw_error *error); /* allocates the data; returns a status, as the following */
+  int (*advance) (pw_run *r, double t_end, pw_error *error); /* one step, at most to t_end or a discontinuity */
+  int (*at) (pw_run *r, double t, pw_error *error); /* the state in the last step that pw_run_sample requests */
+  int (*restart) (pw_run *r, pw_error *error);      /* continues at the state reached, after a discontinuity */
+  void (*close) (pw_run *r);                        /* frees the data */
   /* Saves or loads what steps after a checkpoint need beyond the state: step size, counts.  NULL: the method restarts
    * at checkpoints. */
   void (*serialise) (pw_run *r, pw_archive *a);
@@ -70,7 +70,8 @@ extern const pw_method *const pw_methods[];
 /* Makes the initial state consistent and opens a method.  The system must outlive the run, which only reads it: any
  * number of runs, in any threads, may share it.  Errors: PW_INPUT for an unknown or invalid method, option or
  * setting, with the nearest valid name, and if the method uses a derivative that an element type omits though it is
- * not zero; PW_INITIAL if the initial state cannot be made consistent; PW_RESOURCE. */
+ * not zero; PW_INITIAL if the initial state cannot be made consistent; PW_METHOD if it cannot be evaluated;
+ * PW_RESOURCE. */
 pw_run *pw_run_open (const pw_system *s, const char *method, const pw_settings *settings, pw_error *error);
 
 /* Checks a method's name and options without a system; returns the integrator and the index of the stabilisation. */
