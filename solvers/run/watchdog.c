@@ -1,8 +1,8 @@
 /* Checks after each step that the run still follows the motion: that constraints are neither lost nor contradictory,
  * and that the motion has not jumped to another branch at a singular configuration.
  *
- * The sine (watchdog.h) changes by at most about the motion of the bodies, so it is computed again only when the motion
- * since could have made it small. */
+ * The sine (watchdog.h) changes by at most a multiple of the motion of the bodies (`lipschitz`), so it is computed
+ * again only when the motion since could have made it small. */
 #include <stdio.h>
 #include <string.h>
 #include "method.h"
