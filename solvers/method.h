@@ -13,8 +13,8 @@ enum { PW_MAX_OPTIONS = 12 };
 
 struct pw_scene_step;
 
-/* Lengths of arrays: coords and rows are the numbers of coordinates and of constraint equations, entries that of the
- * ledger, which holds the work or loss of each element that exchanges energy. */
+/* Lengths of arrays: coords, rows, entries are the numbers of coordinates, of constraint equations, and of entries of
+ * the ledger, which holds the work or loss of each element that exchanges energy. */
 struct pw_run {
   const pw_system *s;
   pw_workspace *w; /* results of evaluations of s */
@@ -26,22 +26,22 @@ struct pw_run {
   pw_saddle *saddle;           /* matrix of M and all active rows: for accelerations, impulses */
   const unsigned char *active; /* rows: 0 for redundant ones; NULL: none is redundant */
   int redundant;               /* number of redundant rows; the following only if there are any */
-  int redundant_moves;         /* 1: one of them is driven, so that work depends on its multiplier */
+  int redundant_drive;         /* 1: one of them has an eta, so that work depends on its multiplier */
   int *redundant_row;          /* redundant: their indices */
-  unsigned char *independent;  /* rows: what `active` points to */
+  unsigned char *active_array; /* rows: what `active` points to */
   double *coefficient;         /* redundant x rows: each redundant row as a combination of active rows */
-  double *normal;              /* redundant x (redundant + 1): normal equations of least-norm multipliers */
+  double *normal;              /* redundant x (redundant + 1): normal equations in redundancy.c, right side last */
   double *row_force, *zero;    /* coords + 3, rows: right-hand sides for the coefficients of a redundant row */
   double *least_norm;          /* rows: least-norm multipliers for the ledger */
-  char *rank_memory;
-  double independence;                      /* of the active rows at the state reached (rank.h) */
-  double reselect_below;                    /* independence below which other active rows are tried */
+  char *rank_memory;           /* of these arrays */
+  double independence;         /* of the active rows at the state reached (rank.h) */
+  double reselect_below;       /* independence below which other active rows are tried */
   const struct pw_specialised *specialised; /* compiled code of the scene in use, or NULL */
   struct pw_scene *scene;                   /* data of that code */
   char *scene_memory;
   int scene_ready;        /* 1: its constants have been computed */
   pw_thresholds limits;   /* thresholds of the watchdog */
-  pw_geometry geometry;   /* distance of the constraints from a singular configuration */
+  pw_watchdog watchdog;   /* the sine, which measures the distance from a singular configuration */
   double refused_sine;    /* sine below which an evaluation is refused */
   int near_singular;      /* 1 after an evaluation near a singular configuration */
   double reference_level; /* largest acceleration norm away from singular configurations, in units of L / T^2; >= 1 */
@@ -64,21 +64,21 @@ struct pw_run {
   double *q_at, *v_at, *a_at, *lambda_at, *ledger_at; /* same layout */
   double projected_at;
 
-  int stopped;     /* 1: settings.stop has requested it */
-  int interrupted; /* 1: inside a step of SUNDIALS, which must be restarted */
+  int stopped;     /* 1: settings.stop has requested a stop, */
+  int interrupted; /* 1: which has interrupted a step of SUNDIALS: the method must be restarted */
   struct {
     double time, speed; /* time since the start [s]; the largest speed then, in units of the scene (limits.c) */
-  } speed_record, earlier_record; /* the last record; the one at half its time */
+  } speed_record, earlier_record; /* the last record; the one before, at half its time or less */
 
   double energy0, potential0; /* initial kinetic + potential energy; initial potential energy [J] */
   double exchanged;           /* the largest kinetic energy or change of potential energy so far [J] (ledger.c) */
-  double power;               /* the largest sum of the ledger's rates so far [W] */
-  double scene_energy;        /* kinetic energy [J] of a motion by L or 1 rad in the span; if massless: see ledger.c */
+  double power;               /* the largest sum of the absolute values of the ledger's rates so far [W] */
+  double scene_energy;        /* kinetic energy [J] of moving by L and 1 rad in the span; if massless: see ledger.c */
   double *scratch;            /* 2 (coords + 3) + 3 rows, for projections and evaluations */
   double *saturation;         /* 2 coords: upper bounds of tolerances; INFINITY: unbounded */
   double *matrix_state, *matrix_range; /* 2 coords: state at which the Newton matrix was evaluated, range around it
                                         * in which it is valid; only if the system `saturates` */
-  int outdated;                        /* 1: the state reached is outside that range */
+  int matrix_outdated;                 /* 1: a state reached since is outside that range */
   double *q_given, *v_given;           /* coords + 3: initial values before they were made consistent */
   unsigned char *origin;               /* 2 coords: of initial values, as in pw_system */
   pw_initial_report initial;
@@ -97,10 +97,11 @@ static inline double pw_atol (const pw_run *r, int state) {
   double atol = r->settings.rtol * pw_unit (r->s, state < n ? state : state - n);
   return state < n ? atol : atol / r->w->scale.time;
 }
-/* Updates r->saturation, the bounds of tolerances due to saturating forces, and r->outdated at the state reached, whose
- * kinematics must be up to date (tolerances.c). */
+/* Updates r->saturation, the bounds of tolerances due to saturating forces, and r->matrix_outdated at the state
+ * reached, whose kinematics must be up to date (tolerances.c). */
 void pw_bound_tolerances (pw_run *r);
-/* Change of a state (numbered as in pw_system_find_state) from the state reached that reverses a saturating force. */
+/* Change of a state (numbered as in pw_system_find_state) from the state reached over which a saturating force changes
+ * by its own magnitude. */
 double pw_saturation_range (const pw_run *r, int state);
 /* Records the state at which the Newton matrix was evaluated; kinematics must be up to date there. */
 void pw_matrix_evaluated (pw_run *r, const double *q, const double *v);
@@ -181,6 +182,10 @@ static inline double pw_least_step (const pw_run *r) {
 /* Adds the name of the signal that failed in the last attempted step, if any, to the error.  Returns status. */
 int pw_run_annotate_error (const pw_run *r, int status, pw_error *error);
 
+/* PW_INPUT if an element type leaves out a derivative that is not zero, so that results would be wrong: "USER NEEDS
+ * it".  PW_METHOD if a signal fails; PW_RESOURCE. */
+int pw_run_check_derivatives (pw_run *r, const char *user, const char *needs, pw_error *error);
+
 /* Replaces the saddle by one for the active rows; r->saddle is NULL after an error of pw_saddle_open. */
 int pw_run_open_saddle (pw_run *r, pw_error *error);
 
@@ -203,7 +208,7 @@ typedef enum { PW_KEEP_REFERENCES, PW_NEW_REFERENCES } pw_references;
 /* Opens the saddle and the method anew at the state reached, where J is evaluated. */
 int pw_run_renew (pw_run *r, pw_references references, pw_error *error);
 
-/* Numbers in q, v, a and lambda of a state. */
+/* The length of q, v, a and lambda of a state together. */
 static inline size_t pw_state_length (const pw_system *s) {
   return 3 * ((size_t)s->coords + 3) + (size_t)s->rows;
 }
@@ -215,7 +220,7 @@ static inline int pw_fail_signal (double t, pw_error *error) {
   return pw_fail (error, PW_METHOD, "t = %.6g s: a signal failed", t);
 }
 
-/* 1 if the sum of the squares of a state's numbers does not overflow: no number is NaN, infinite or too large. */
+/* 1 if no number of a state is NaN, infinite, or so large that its square overflows. */
 static inline int pw_is_finite_state (const pw_run *r, const double *q, const double *v) {
   double sum = 0;
   for (int j = 0; j < r->s->coords; j++) sum += q[j] * q[j] + v[j] * v[j];
@@ -227,6 +232,12 @@ static inline int pw_evaluate_J_at (pw_workspace *w, double t, const double *q, 
   int status = pw_update_kinematics (w, t, q, v);
   if (status == PW_OK) pw_evaluate_J (w);
   return status;
+}
+
+/* For qsort: numbers in ascending order. */
+static inline int pw_ascending (const void *a, const void *b) {
+  double x = *(const double *)a, y = *(const double *)b;
+  return (x > y) - (x < y);
 }
 
 /* The larger of two values; NaN if either is NaN, unlike pw_larger. */
@@ -276,22 +287,21 @@ void pw_ledger_rates (pw_run *r, const double *lambda, double *rate);
 /* 1 if work or losses depend on multipliers. */
 int pw_ledger_uses_multipliers (const pw_system *s);
 
-/* Tolerance of the total work and loss of a step of size h [J]: rtol times the energy exchanged so far, at least
- * that of the scene at L per span; not below the round-off of their rates. */
+/* Tolerance of the total work and loss of a step of size h [J]: 5 rtol times the energy exchanged so far, or times
+ * r->scene_energy if that is larger; not below the round-off of their rates. */
 double pw_ledger_tolerance (const pw_run *r, double h);
 
 /* ---- Dynamics ---- */
 
-/* A step that ends at a discontinuity evaluates signals just before it. */
+/* t, or just before the breakpoint if t is not before it: steps that end at a discontinuity evaluate signals there. */
 static inline double pw_before_breakpoint (const pw_run *r, double t) {
   return t < r->breakpoint ? t : nextafter (r->breakpoint, -INFINITY);
 }
 
-/* pw_run_accelerate, which leaves J evaluated and the saddle factorised, where they are so already, and velocities are
- * up to date. */
+/* As pw_run_accelerate, at the state for which kinematics are up to date, J is evaluated and the saddle factorised. */
 void pw_run_accelerate_updated (pw_run *r, const double *v, double *a, double *lambda);
 
-/* The same where the saddle is not factorised. */
+/* The same, but factorises the saddle.  Returns as pw_run_accelerate. */
 int pw_run_accelerate_evaluated (pw_run *r, const double *v, double *a, double *lambda);
 
 /* Makes the state reached the sample; updates kinematics and J there. */
@@ -301,8 +311,8 @@ void pw_sample_reached (pw_run *r);
  * (singular.c). */
 int pw_fail_singular (pw_run *r, double t, pw_error *error);
 
-/* Adds the residuals of the state just evaluated to r->residuals and the statistics; those that a projection has
- * computed are reused. */
+/* Completes r->residuals at the state just evaluated, some of which a projection may have computed, and updates the
+ * worst ones in the statistics. */
 void pw_record_residuals (pw_run *r);
 static inline void pw_forget_residuals (pw_run *r) {
   r->residuals.position = r->residuals.velocity = NAN;
@@ -329,14 +339,15 @@ typedef struct {
 } pw_projector;
 
 /* Position metric `weight_q` and velocity metric `weight_v` (NULL: the mass matrix).  J must be evaluated at a typical
- * configuration. */
+ * configuration.  Returns PW_OK or PW_RESOURCE; the error then has the status of pw_saddle_open. */
 int pw_projector_open (pw_projector *p, pw_run *r, const double *weight_q, const double *weight_v, pw_error *error);
 /* The same with the metric of the method's options. */
 int pw_projector_open_by_options (pw_projector *p, pw_run *r, pw_error *error);
 void pw_projector_close (pw_projector *p);
 
 /* Gauss-Newton iteration on g(q) = 0 to round-off, minimal changes in the metric.  Leaves kinematics and J evaluated at
- * (t, q, v).  PW_RETRY if it does not converge, or if a redundant equation contradicts the others. */
+ * (t, q, v).  PW_RETRY if it does not converge, or if a redundant equation contradicts the others; PW_METHOD if a
+ * signal failed. */
 int pw_project_positions (pw_projector *p, pw_run *r, double t, double *q, const double *v);
 
 /* A linear solve for J v = eta at the current configuration, near a singular one two; updates the velocity kinematics.
@@ -357,7 +368,8 @@ void pw_project_error (pw_run *r, pw_saddle *saddle, double *e, int rows);
 
 /* ---- Specialised code (specialised.c) ---- */
 
-/* Opens the settings' specialised code, if any.  Errors: PW_INPUT, PW_RESOURCE. */
+/* Opens the settings' specialised code, if any; the scales, alpha and beta must be known.  Errors: PW_INPUT,
+ * PW_RESOURCE. */
 int pw_specialised_open (pw_run *r, pw_error *error);
 /* Uses it if it has the run's independent equations. */
 void pw_specialised_select (pw_run *r);
@@ -374,15 +386,13 @@ void pw_specialised_residuals (pw_run *r);
 
 /* 1 if specialised code can do the run's next evaluation. */
 int pw_specialised_suits (const pw_run *r);
-/* Passes the scales of residuals to specialised code. */
-void pw_specialised_scale (pw_run *r);
 /* Adds to the statistics: evaluations, and iterations of projections, of specialised code. */
 void pw_specialised_count (pw_run *r, long evaluations, long iterations);
 
 /* ---- Initial conditions ---- */
 
 /* Makes r->q, r->v consistent at r->t and fills the report; origin (or NULL): origins of states, of which those given
- * or specified are kept if possible.  Errors: PW_INITIAL. */
+ * or specified are kept if possible.  Errors: PW_INITIAL, PW_RESOURCE; PW_METHOD if a signal failed. */
 int pw_run_make_consistent (pw_run *r, const unsigned char *origin, pw_error *error);
 /* Counts in the report the states that differ from the given ones; needs the scales. */
 void pw_run_count_moved (pw_run *r);

@@ -27,15 +27,14 @@ typedef struct {
   double least;    /* smallest singular value; NaN: not computed, or no rows */
   int unknowns;    /* of the linearisation: positions + velocities */
   double *A;       /* unknowns x unknowns, by rows [1/s], positions first; NULL: not computed, like all below */
-  double *re, *im; /* its eigenvalues [1/s], the fastest growing first, of a conjugate pair that with im > 0; 0 if below
-                      round-off */
+  double *re, *im; /* its eigenvalues [1/s], by decreasing real part, im > 0 before im < 0; parts below round-off: 0 */
   unsigned char *rigid; /* unknowns: 1 for rigid displacements of the whole, under which the equations are invariant */
   int symmetries;       /* number of symmetry directions among x, y, phi */
   pw_steadiness steady;
   double twist[3];     /* velocity of the frame [m/s, m/s, rad/s] */
   double acceleration; /* the largest in that frame; angles multiplied by the length scale [m/s^2] */
   /* Of pw_run_linear_modes, otherwise NULL; axes are those of the frame, which are the world's at this moment. */
-  double *B;     /* unknowns x signals, by rows: x' = A x + B u, u added to the signals of forces [1/s m per unit of the
+  double *B;     /* unknowns x signals, by rows: x' = A x + B u, u added to the signals of forces [m/s per unit of the
                     signal]; NaN for signals of constraints, which enter with their derivatives */
   double *basis; /* 2 coordinates x unknowns, by rows: change of each state, numbered as in pw_system_find_state, by
                     each x [1, rad/m, 1/s, rad/(m s)] */
@@ -44,15 +43,16 @@ typedef struct {
                     of which it is not unique */
 } pw_linear;
 
-/* Linearises at the state reached.  With more than `most` coordinates only the integers are filled: the cost of the
- * rest is cubic.  Free the result in every case.  Errors: PW_RESOURCE, PW_METHOD. */
+/* Linearises at the state reached.  With more than `most` coordinates only the numbers of coordinates, positions,
+ * velocities, rank and unknowns are stored: the cost of the rest is cubic.  Free the result in every case.  Errors:
+ * PW_RESOURCE, PW_METHOD; PW_INPUT if an element type leaves out a derivative that is not zero. */
 int pw_run_linearise (pw_run *r, int most, pw_linear *l, pw_error *error);
 /* The same with B, basis and shape, at about three times the cost. */
 int pw_run_linear_modes (pw_run *r, int most, pw_linear *l, pw_error *error);
 void pw_linear_free (pw_linear *l);
 
-/* The largest h such that the classical Runge-Kutta method damps x' = (re + i im) x with every step up to h;
- * INFINITY if im = 0 and re >= 0. */
+/* The largest h such that the classical Runge-Kutta method does not amplify x' = (re + i im) x with any step up to h;
+ * re > 0 counts as 0.  INFINITY if im = 0 and re >= 0. */
 double pw_rk4_limit (double re, double im);
 
 /* ---- Derivatives of a run (variation.c) ---- */
@@ -67,24 +67,24 @@ double pw_rk4_limit (double re, double im);
  * `initial` (2 x coordinates) in their place is the derivative of the state (q, v) reached, consistent with the
  * constraints. */
 typedef struct {
-  pw_run *neighbour[4]; /* NULL with `initial` */
-  double step;          /* in the unit of p; not 0 */
-  int one_sided;
-  int no_error;          /* 1: without an error, at about half the cost */
+  pw_run *neighbour[4];  /* NULL with `initial` */
+  double step;           /* in the unit of p; not 0 */
+  int one_sided;         /* 1: k = 0, 1, 2, 4 */
+  int no_error;          /* 1: without an estimate of the error, at about half the cost */
   const double *initial; /* copied; NULL with neighbours */
 } pw_direction;
 
-/* p of neighbour i, minus that of the run; its weight in the derivative of a function of p by extrapolated differences,
- * or in the error of that. */
+/* p of neighbour i, minus that of the run; the weight of its value of a function of p in the extrapolated differences
+ * that approximate the derivative, or (of_error) in the estimate of their error. */
 double pw_direction_offset (const pw_direction *d, int i);
 double pw_direction_weight (const pw_direction *d, int of_error, int i);
 
 /* Derivatives of the motion of a run, integrated with it. */
 typedef struct pw_variation pw_variation;
 
-/* Begins at the state reached: with neighbours, a run that has not advanced.  The run, which is also advanced by
- * pw_variation_advance alone from now on, must outlive the derivatives.  ledger: with derivatives of work and losses,
- * at about twice the cost.  Errors: PW_INPUT if a system differs in its bodies or elements, or the run holds inputs;
+/* Begins at the state reached; with neighbours, the run must not have advanced.  It must outlive the derivatives, and
+ * only pw_variation_advance may advance it from now on.  ledger: 1: with derivatives of work and losses, at about twice
+ * the cost.  Errors: PW_INPUT if a system differs in its bodies or elements, or the run has the option inputs=held;
  * PW_METHOD if the state or a breakpoint is not differentiable; PW_RESOURCE. */
 pw_variation *pw_variation_open (pw_run *r, const pw_direction *d, int count, int ledger, pw_error *error);
 
@@ -95,12 +95,12 @@ int pw_variation_advance (pw_variation *x, double t, double t_end, pw_error *err
 
 /* The derivative along direction i of the sample at the time reached by pw_variation_advance: each number in it is that
  * of the sample differentiated at constant time (residuals, projection, balance: 0; without `ledger`, work, loss and
- * ledger: NaN).  error_of, unless NULL, receives an estimate of its error by differences and by integration, without
- * that of the run (0 with `no_error`).  Arrays are valid until the next call. */
+ * ledger: NaN).  error_of, unless NULL, receives an estimate of its error due to differences and to integration,
+ * without that due to the error of the run (0 with `no_error`).  Arrays are valid until the next call. */
 int pw_variation_sample (pw_variation *x, int i, pw_sample *derivative, pw_sample *error_of, pw_error *error);
 
-/* The first breakpoint of the run after the time reached, or INFINITY; *slope: the derivative along direction i of
- * that, or of the one just reached. */
+/* The first breakpoint of the run after the time reached, or INFINITY; *slope: the derivative along direction i of that
+ * breakpoint, or of one at the time reached. */
 double pw_variation_breakpoint (const pw_variation *x, int i, double *slope);
 
 /* Advances the run to time t and returns the time just after the first jump of its accelerations with the state after
@@ -122,11 +122,11 @@ void pw_variation_close (pw_variation *x);
 
 /* ---- Steady motions (steady.c) ---- */
 
-/* What can be held: a state, numbered as in pw_system_find_state; after these, of each body, the velocity of its centre
- * of mass along its x axis (BODY.speed), the turning radius speed / omega (BODY.radius), positive to the left, and
- * omega / speed (BODY.curvature).  Finds one by name; PW_INPUT and the error, with the nearest name. */
+/* Finds by name a quantity that can be held: a state, numbered as in pw_system_find_state; after these, of each body,
+ * the velocity of its centre of mass along its x axis (BODY.speed), the turning radius speed / omega (BODY.radius),
+ * positive to the left, and omega / speed (BODY.curvature).  PW_INPUT and the error, with the nearest name. */
 int pw_system_find_held (const pw_system *s, const char *name, pw_error *error);
-/* Name, unit and value of one; the name as pw_system_state_name. */
+/* Name, unit and value of such a quantity; the name as pw_system_state_name. */
 char *pw_system_held_name (const pw_system *s, int held, char *buffer, size_t size);
 const char *pw_system_held_unit (const pw_system *s, int held);
 double pw_system_held_value (const pw_system *s, int held, const double *q, const double *v);
@@ -137,7 +137,7 @@ typedef struct {
   double t;           /* time at which signals are evaluated [s] */
   double span;        /* as in pw_settings */
   double first, last; /* range of the parameter */
-  int vary;           /* the parameter is the value of this one of what is held; -1: it is that of `compile`, if any */
+  int vary;           /* the parameter is the value of hold[vary]; -1: it is that of `compile`, if any */
   /* Compiles the system for a value of the parameter.  The search frees it.  NULL and the error: there is no
    * system for this value.  May be NULL. */
   pw_system *(*compile) (void *context, double value, pw_error *error);
@@ -169,13 +169,13 @@ typedef struct {
 
 typedef struct pw_steady pw_steady;
 
-/* Opens a search.  The system must outlive it.  Errors: as pw_run_open.  Free it in every case. */
+/* Opens a search, which the system must outlive.  NULL and the error as pw_run_open. */
 pw_steady *pw_steady_open (const pw_system *s, const pw_steady_settings *settings, pw_error *error);
 void pw_steady_close (pw_steady *x);
 
 /* Newton's method at a value of the parameter, with corrections of least norm, from the initial state (attempt 0), a
  * state to which forces lead from there (1), or a random one (2, 3, ...).  PW_RETRY, without an error, if it finds
- * none: residual and state are where it ended. Errors: PW_INPUT if a parameter changes the number of coordinates;
+ * none: residual and state are where it ended.  Errors: PW_INPUT if a parameter changes the number of coordinates;
  * PW_RESOURCE; PW_METHOD. */
 int pw_steady_solve (pw_steady *x, int attempt, double parameter, pw_steady_motion *out, pw_error *error);
 /* Why the system could last not be evaluated during the search, or why a branch ended within the range; or "". */
@@ -224,9 +224,9 @@ typedef enum {
   PW_PERIODIC_END    /* the end of the range, of a closed branch, or where Newton's method fails at the smallest step */
 } pw_periodic_event;
 
-/* A relative periodic motion: after one period the state is the initial one, displaced by symmetries of the system: the
- * whole in the plane, and angles on which nothing depends; but for whole turns of bodies, on whose number nothing
- * depends. Arrays are valid until the next call. */
+/* A relative periodic motion: after one period the state is the initial one up to symmetries of the system
+ * (displacements of the whole, and angles on which nothing depends) and to whole turns of bodies on whose number
+ * nothing depends.  Arrays are valid until the next call. */
 typedef struct {
   double parameter, period;
   const double *q, *v; /* initial state: pw_system_coordinates */
@@ -234,17 +234,17 @@ typedef struct {
   double rotation;     /* of the whole in one period, without spins [rad] */
   double residual;     /* the largest, in units of the scene (pw_scale): L, L/T */
   int iterations;
-  int multipliers; /* Floquet multipliers: those that are not trivial, the largest first, then `trivial` ones */
-  int trivial;     /* of symmetries and, with a free period, of a shift in time */
-  const double *re, *im;
-  int unstable; /* number of those above 1 in absolute value, by more than 1e-6 */
+  int multipliers;       /* Floquet multipliers: those that are not trivial, the largest first, then the trivial ones */
+  int trivial;           /* number of these: of symmetries and, with a free period, of a shift in time */
+  const double *re, *im; /* multipliers: their values */
+  int unstable;          /* number of those above 1 in absolute value, by more than 1e-6 */
   pw_periodic_event event;
 } pw_periodic_orbit;
 
 typedef struct pw_periodic pw_periodic;
 
-/* Opens a search.  The system must outlive it.  Errors: as pw_run_open; PW_INPUT with the first signal that does not
- * have the period, or with a free period changes with time.  Close it in every case. */
+/* Opens a search, which the system must outlive.  NULL and the error as pw_run_open; PW_INPUT with the first signal
+ * that does not have the period, or with a free period changes with time. */
 pw_periodic *pw_periodic_open (const pw_system *s, const pw_periodic_settings *settings, pw_error *error);
 void pw_periodic_close (pw_periodic *x);
 

@@ -62,7 +62,7 @@ double pw_step_size (pw_run *r, double t_end);
 
 /* Ends `advance`.  `status` is that of the stages; if it is PW_OK, (q, v) at t + h becomes the state reached:
  * projected onto the constraints if the stabilisation is PW_PROJECTION (in the metric of M), with accelerations and
- * multipliers.  Work and losses are integrated by the trapezoidal rule. q and v must not be the arrays of
+ * multipliers.  Work and losses are integrated by the trapezoidal rule.  q and v must not be the arrays of
  * pw_run_state.  Errors: PW_METHOD, with the reason. */
 int pw_step_accept (pw_run *r, int status, double h, double *q, double *v, pw_error *error);
 

@@ -47,18 +47,18 @@ typedef struct {
 /* An integrator: one const table in one file.  All methods of Pinwheel are such tables; for your own, see
  * pinwheel-method.h. */
 struct pw_method {
-  const char *name;                       /* "rk4" */
-  const char *about;                      /* one line, with its source (author, year) */
-  int adaptive;                           /* 1: uses rtol and atol; 0: uses step */
-  int order;                              /* of convergence, of fixed-step methods; 0: variable */
-  const pw_stabilisation *stabilisations; /* ended by a NULL name; the first is the default */
-  const pw_option *options;               /* ended by a NULL name */
-  const pw_stabilisation *refused;        /* unsupported ones, `about` is the reason; ended likewise, or NULL */
-  int (*open) (pw_run *r, pw_error *error);
-  int (*advance) (pw_run *r, double t_end, pw_error *error);
-  int (*at) (pw_run *r, double t, pw_error *error); /* leaves the state in the run's sample arrays */
-  int (*restart) (pw_run *r, pw_error *error);
-  void (*close) (pw_run *r);
+  const char *name;                         /* "rk4" */
+  const char *about;                        /* one line, with its source (author, year) */
+  int adaptive;                             /* 1: uses rtol and atol; 0: uses step */
+  int order;                                /* of convergence, of fixed-step methods; 0: variable */
+  const pw_stabilisation *stabilisations;   /* ended by a NULL name; the first is the default */
+  const pw_option *options;                 /* ended by a NULL name */
+  const pw_stabilisation *refused;          /* unsupported ones, `about` is the reason; ended likewise, or NULL */
+  int (*open) (pw_run *r, pw_error *error); /* allocates the data; returns a status, as the following */
+  int (*advance) (pw_run *r, double t_end, pw_error *error); /* one step, at most to t_end or a discontinuity */
+  int (*at) (pw_run *r, double t, pw_error *error); /* the state in the last step that pw_run_sample requests */
+  int (*restart) (pw_run *r, pw_error *error);      /* continues at the state reached, after a discontinuity */
+  void (*close) (pw_run *r);                        /* frees the data */
   /* Saves or loads what steps after a checkpoint need beyond the state: step size, counts.  NULL: the method restarts
    * at checkpoints. */
   void (*serialise) (pw_run *r, pw_archive *a);
@@ -70,17 +70,19 @@ extern const pw_method *const pw_methods[];
 /* Makes the initial state consistent and opens a method.  The system must outlive the run, which only reads it: any
  * number of runs, in any threads, may share it.  Errors: PW_INPUT for an unknown or invalid method, option or
  * setting, with the nearest valid name, and if the method uses a derivative that an element type omits though it is
- * not zero; PW_INITIAL if the initial state cannot be made consistent; PW_RESOURCE. */
+ * not zero; PW_INITIAL if the initial state cannot be made consistent; PW_METHOD if it cannot be evaluated;
+ * PW_RESOURCE. */
 pw_run *pw_run_open (const pw_system *s, const char *method, const pw_settings *settings, pw_error *error);
 
 /* Checks a method's name and options without a system; returns the integrator and the index of the stabilisation. */
 int pw_method_parse (const char *method, const pw_method **integrator, int *stabilisation, pw_error *error);
 
-/* 1 if a method controls its step size; 0 if steps are fixed, by the integrator or by the option steps=fixed. */
+/* 1 if a method controls its step size; 0 if steps are fixed, by the integrator or by the option steps=fixed.
+ * integrator: that of pw_method_parse; method: the text. */
 int pw_method_adaptive (const pw_method *integrator, const char *method);
 
-/* Estimated number of steps of a run of a model with this default step; 0 for an unknown method.  From
- * PW_SPECIALISE_STEPS on, compiling specialised code saves time. */
+/* Estimated number of steps of a run of a model with this default step [s]; 0 for an unknown method.  From
+ * PW_SPECIALISE_STEPS steps on, compiling specialised code saves time. */
 enum { PW_SPECIALISE_STEPS = 1000000 };
 double pw_method_steps (const char *method, const pw_settings *s, double step, double t_end);
 
@@ -128,7 +130,7 @@ const char *pw_run_energy_advice (const pw_run *r, double defect);
 double pw_run_growth (const pw_run *r, int *state, double *power);
 
 /* Restarts from a state at the time reached, after the caller has changed something.  The state is made consistent
- * first. q and v may be NULL: unchanged.  The ledger continues; the change of energy does not count in its balance.
+ * first.  q and v may be NULL: unchanged.  The ledger continues; the change of energy does not count in its balance.
  * Errors: PW_INPUT (a value of 1e100, or NaN), PW_INITIAL, PW_METHOD: the run stays where it was; PW_RESOURCE. */
 int pw_run_restart (pw_run *r, const double *q, const double *v, pw_error *error);
 
@@ -147,6 +149,8 @@ int pw_run_save (pw_run *r, pw_archive *a, pw_error *error);
  * PW_METHOD; PW_RESOURCE. */
 int pw_run_load (pw_run *r, pw_archive *a, pw_error *error);
 
+/* ---- Properties of a run ---- */
+
 /* The number of redundant constraint equations, and a description of those that the i-th one follows from, in the
  * buffer, which is returned.  With redundant equations reactions are not unique: samples have the least-norm ones. */
 int pw_run_redundant (const pw_run *r);
@@ -156,6 +160,19 @@ char *pw_run_redundancy (pw_run *r, int i, char *buffer, size_t size);
  * returns the velocity (numbered as in pw_system_find_state), or -1 if no force saturates, and the element,
  * "friction hinge".  Methods with Newton iterations keep their tolerances below it, whatever the settings. */
 int pw_run_saturation (pw_run *r, double *least, char *element, size_t size);
+
+/* These belong to the run. */
+const pw_statistics *pw_run_statistics (const pw_run *r);
+const pw_initial_report *pw_run_initial (const pw_run *r);
+const pw_scale *pw_run_scale (const pw_run *r);
+
+/* 1 if making the initial state consistent changed this state (numbered as in pw_system_find_state) by more than
+ * round-off. */
+int pw_initial_moved (const pw_system *s, const pw_initial_report *report, int state);
+/* 1 if the model or the user specifies the initial value of this state. */
+int pw_initial_specified (const pw_initial_report *report, int state);
+/* 1 if the user gives it: pw_model_set_initial, pw_settings.initial. */
+int pw_initial_given (const pw_initial_report *report, int state);
 
 /* ---- Cost of an evaluation of the accelerations (timing.c) ---- */
 
@@ -175,7 +192,7 @@ typedef struct {
   double equations;      /* J, gamma, f */
   double stabilisation;  /* Baumgarte's terms */
   double factorisation, solution;
-  double evaluation;  /* in one call */
+  double evaluation;  /* all stages in one call */
   double evaluations; /* per step, without those that projections contain; 0: not applicable to this method */
   double projection;  /* with the evaluation after it */
   double projections; /* per step */
@@ -187,25 +204,14 @@ typedef struct {
 int pw_run_profile (pw_run *r, pw_profile *p, pw_error *error);
 void pw_profile_free (pw_profile *p);
 
-const pw_statistics *pw_run_statistics (const pw_run *r);
-const pw_initial_report *pw_run_initial (const pw_run *r);
-/* 1 if making the initial state consistent changed this state (numbered as in pw_system_find_state) by more than
- * round-off. */
-int pw_initial_moved (const pw_system *s, const pw_initial_report *report, int state);
-/* 1 if the model or the user specifies the initial value of this state. */
-int pw_initial_specified (const pw_initial_report *report, int state);
-/* 1 if the user gives it: pw_model_set_initial, pw_settings.initial. */
-int pw_initial_given (const pw_initial_report *report, int state);
-const pw_scale *pw_run_scale (const pw_run *r);
-
 /* ---- For programs in other languages (bindings.c) ---- */
 
 /* Advances to t_end and stores samples in rows of pw_run_record_width numbers, at most `count`: at the given times,
  * increasing, from the time reached on; or after every accepted step (times: NULL).  Returns PW_OK with *recorded rows
- * when t_end is reached, the rows are full, or after `steps` steps: call it again, with the rest of the times;
- * otherwise as pw_run_advance. A row is t, scaled residuals of g = 0 and J v = eta, kinetic and potential energy, work,
- * loss, energy added by projections, balance (PW_RECORD_STATES numbers), then q, v, a, reactions (-lambda) and, with
- * pw_settings.ledger, the ledger's entries. */
+ * when t_end is reached, the rows are full, or after `steps` calls of pw_run_advance_towards: call it again, with the
+ * rest of the times; otherwise as pw_run_advance.  A row is t, scaled residuals of g = 0 and J v = eta, kinetic and
+ * potential energy, work, loss, energy added by projections, balance (PW_RECORD_STATES numbers), then q, v, a,
+ * reactions (-lambda) and, with pw_settings.ledger, the ledger's entries. */
 enum { PW_RECORD_STATES = 9 };
 int pw_run_record_width (const pw_run *r);
 int pw_run_record (pw_run *r, double t_end, const double *times, long count, long steps, double *rows, long *recorded,

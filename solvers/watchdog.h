@@ -1,11 +1,10 @@
 /* The watchdog checks that the states of a run follow the motion of the mechanism: constraints are not lost, and the
  * motion does not jump to another branch at a singular configuration.
  *
- * Thresholds are dimensionless: positions in units of the scene's length L, angles in radians.  Singular
- * configurations are a property of J alone, with rows of length 1 and columns of angles divided by L: neither masses
- * nor the initial configuration matter.  The distance from them is measured by the smallest sine of the angle between
- * a row of J and the space of those before it, called the sine below.  Branches are the motions between which a closed
- * loop can change in a singular configuration, a change point. */
+ * Singular configurations are a property of J alone, with rows of length 1 and columns of angles divided by L: neither
+ * masses nor the initial configuration matter.  "The sine" measures the distance from them: it is that of the smallest
+ * angle between a row of J and the space spanned by the rows before it.  Branches are the motions between which a
+ * closed loop can change in a singular configuration, a change point. */
 #ifndef PW_WATCHDOG_H
 #define PW_WATCHDOG_H
 
@@ -13,33 +12,39 @@
 
 struct pw_run;
 
-/* The thresholds; a run has a copy.  Values and derivations are in singular.c.  A sine is that of the smallest angle
- * between a row of J and those before it; a ratio is the sine over the largest one of the run. */
+/* The thresholds, of which a run has a copy; values and derivations are in singular.c.  Residuals are scaled; lengths
+ * and motions are in units of L and rad.  A relative sine is the sine over the largest one of the run. */
 typedef struct {
-  double lost, lost_unstabilised;     /* residuals above which constraints count as lost */
-  double redundant_residual;          /* residual of a redundant row that is round-off */
-  double redundant_ratio;             /* ratio of its residual to those of the active rows */
-  double rank_lost;                   /* sine below which J has lost rank */
-  double rank_suspect, rank_refused;  /* sines: the rank is computed; too small where the scene is too large for that */
-  double independent;                 /* sine above which a row counts as independent */
-  double near, refine;                /* ratio near a singular configuration; sine below which solutions are refined */
-  double regular;                     /* ratio of a regular configuration */
-  double turn_growth, turn_reference; /* growth of the accelerations in a turn; least accelerations it refers to */
-  /* constraint residual over squared sine: where accelerations grow; where there are none to refer to */
-  double drift_turn, drift_near;
-  double drift_far, drift_any;      /* constraint residual; the same over squared sine, where it exceeds drift_far */
-  double jump_growth;               /* growth of the accelerations in a jump */
-  double lipschitz, step_growth;    /* change of the sine per unit of motion; ratio of a step size to the last one */
-  double unresolved, low;           /* sine within a step over those at its ends: corner not resolved; to be examined */
-  double stride, progress;          /* of walks past a change point: length over the sine; least gain of a stride */
-  double floor, crossing, straight; /* sines where branches cross; cosine of the angle of a straight passage */
-  double resolved;                  /* step over the distance of branches */
-  double ends_singular;             /* sine at the end of a step over that at its beginning */
-  double agree, agree_best;         /* difference between two divisions of a step: acceptable; aimed at */
-  double sample, sample_best;       /* the same for a sample inside a step */
-  double reselect_ratio, reselect_below; /* independence of the active rows, over the initial value, and itself */
-  double extreme; /* the largest mass, and one over the smallest [kg]; the largest initial value */
-  double stalled; /* consecutive steps that do not advance */
+  double lost, lost_unstabilised; /* residuals above which constraints count as lost */
+  double redundant_residual;      /* residual of a redundant row that is round-off */
+  double redundant_ratio;         /* residual of a redundant row, over those of the active rows, that they explain */
+  double rank_lost;               /* sine below which J has lost rank */
+  double rank_suspect;            /* sine below which the rank is computed, */
+  double rank_refused;            /* or, where the scene is too large for that, the configuration refused */
+  double independent;             /* sine above which a row counts as independent */
+  double near, regular;           /* relative sines: near a singular configuration below; regular above */
+  double refine;                  /* sine below which solutions are refined */
+  double turn_growth;             /* growth of the accelerations in a turn to another branch */
+  double turn_reference;          /* least acceleration norm to which growth refers */
+  double drift_turn;              /* residual over squared sine above which such a growth indicates a turn */
+  double drift_near;              /* the same above which accelerations are no reference for later ones */
+  double drift_far, drift_any;    /* residual, and the same over squared sine: above both any motion may be a turn */
+  double jump_growth;             /* growth of the accelerations in a jump */
+  double lipschitz;               /* change of the relative sine per unit of motion */
+  double step_growth;             /* length of a step over that of the last one */
+  double unresolved;              /* sine within a step, over those at its ends, of a corner that is not resolved */
+  double low;                     /* the same, and relative sine, of a possible change point */
+  double stride, progress;        /* of walks past a change point: length over the sine; gain over the length */
+  double floor, crossing;         /* sine of round-off, also the shortest stride; sine where branches cross */
+  double straight;                /* cosine of the largest angle of a straight passage */
+  double resolved;                /* length of a step over the distance of branches that it resolves */
+  double ends_singular;           /* sine at the end of a step over that at its beginning */
+  double agree, agree_best;       /* difference between two divisions of a step: acceptable; aimed at */
+  double sample, sample_best;     /* the same for a sample inside a step */
+  double reselect_ratio;          /* independence of the active rows, over the initial one, */
+  double reselect_below;          /* and itself: below both, other active rows are sought */
+  double extreme;                 /* the largest mass, and one over the smallest [kg]; the largest initial value */
+  double stalled;                 /* consecutive steps that do not advance */
 } pw_thresholds;
 
 extern const pw_thresholds pw_watchdog_limits;
@@ -61,10 +66,10 @@ typedef struct {
   double previous_t;          /* where the last step began: the time, */
   double *previous_q;         /* the coordinates, */
   double previous_sine;       /* and the sine; NaN: not computed */
-} pw_geometry;
+} pw_watchdog;
 
+/* Opens r->watchdog.saddle anew for the active rows.  Errors: PW_RESOURCE. */
 int pw_watchdog_open (struct pw_run *r, pw_error *error);
-void pw_watchdog_close (struct pw_run *r);
 
 /* Restarts at the state reached, where J is evaluated. */
 void pw_watchdog_begin (struct pw_run *r);
@@ -80,10 +85,10 @@ int pw_watchdog_near_state (struct pw_run *r);
  * PW_INPUT. */
 int pw_watchdog_check_values (const struct pw_run *r, pw_error *error);
 
-/* 1 if the J last evaluated is near a singular configuration; geometry.evaluated_sine is then its sine. */
+/* 1 if the J last evaluated is near a singular configuration; watchdog.evaluated_sine is then its sine. */
 int pw_watchdog_near (struct pw_run *r);
 
-/* Checks that the motion has come from geometry.previous_q to the state reached without leaving its branch; sine: that
+/* Checks that the motion has come from watchdog.previous_q to the state reached without leaving its branch; sine: that
  * at the state reached (change_point.c). */
 int pw_change_point_check (struct pw_run *r, double sine, pw_error *error);
 

@@ -66,7 +66,7 @@ static inline int dynamics_solve (pw_run *r, const double *v, double *a, double 
   int status = pw_saddle_factor (r->saddle);
   if (status == PW_OK) pw_saddle_solve (r->saddle, f, lambda, a, lambda);
   *near = pw_watchdog_near (r);
-  if (*near && r->geometry.evaluated_sine <= r->refused_sine) return PW_RETRY;
+  if (*near && r->watchdog.evaluated_sine <= r->refused_sine) return PW_RETRY;
   if (status == PW_OK && pw_saddle_sine_below (r->saddle, r->limits.refine)) dynamics_refine (r, v, a, lambda);
   return status;
 }

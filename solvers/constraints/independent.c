@@ -4,14 +4,13 @@
  * motion the set may become ill-conditioned while another one is not; then that is selected.  (Garcia de Jalon &
  * Gutierrez-Lopez 2013, Multibody dynamics with redundant constraints and singular mass matrix.) */
 #include <math.h>
-#include <stdlib.h>
 #include <string.h>
 #include "method.h"
 #include "rank.h"
 #include "util.h"
 
-/* Configurations nearby, and their distance in units of L and rad: far enough for sines well above the threshold
- * `independent`, near enough for the projection to converge. */
+/* The number of configurations nearby, and their distance in units of L and rad: far enough for sines well above the
+ * threshold `independent`, near enough for the projection to converge. */
 enum { INDEPENDENT_NEARBY = 3 };
 static const double INDEPENDENT_MOTION = 0.03;
 
@@ -19,8 +18,8 @@ static int independent_rank (const pw_run *r, pw_row_basis *b) {
   return pw_row_basis_select (b, r->w, r->limits.independent, NULL, r->s->rows, r->s->rows);
 }
 
-/* The n-th direction, admissible and of size 1 in units of the scene: the given velocities (n = 0), or an arbitrary
- * vector, projected. */
+/* The n-th direction that the constraints allow, of largest component 1 in units of the scene: along the velocities v
+ * (n = 0), or an arbitrary one. */
 static void independent_direction (const pw_system *s, const pw_row_basis *b, const double *v, int n,
                                    double *direction) {
   double most = 0;
@@ -31,10 +30,10 @@ static void independent_direction (const pw_system *s, const pw_row_basis *b, co
   for (int j = 0; most > 0 && j < s->coords; j++) direction[j] *= s->scale.length / most / pw_length_factor (s, j);
 }
 
-/* The rank after a short motion in the n-th direction; 0 if no consistent configuration is found there.  q: coords,
- * scratch. */
-static int independent_rank_nearby (pw_run *r, pw_row_basis *b, int n, double *q) {
+/* The rank after a short motion in the n-th direction; 0 if no consistent configuration is found there. */
+static int independent_rank_nearby (pw_run *r, pw_row_basis *b, int n) {
   const pw_system *s = r->s;
+  double *q = r->q_at; /* scratch while the run is being opened */
   pw_projector p;
   pw_error unused = { 0 };
   int rank = 0;
@@ -56,21 +55,21 @@ static int independent_rank_nearby (pw_run *r, pw_row_basis *b, int n, double *q
 /* Makes these rows the run's active ones and lists the others. */
 static void independent_activate (pw_run *r, const unsigned char *active) {
   const pw_system *s = r->s;
-  r->active = memmove (r->independent, active, (size_t)s->rows);
-  r->redundant = r->redundant_moves = 0;
+  r->active = memmove (r->active_array, active, (size_t)s->rows);
+  r->redundant = r->redundant_drive = 0;
   for (const pw_element_batch *k = r->w->batch; k < r->w->batch + s->constraints; k++)
     for (int i = k->row; i < k->row + k->b.count * k->kind->rows; i++) {
       if (active[i]) continue;
       r->redundant_row[r->redundant++] = i;
-      r->redundant_moves |= k->kind->eta != NULL;
+      r->redundant_drive |= k->kind->eta != NULL;
     }
 }
 
-/* Allocates what the run needs for its redundant rows, then activates the others. */
+/* Allocates what the run needs for its redundant rows, `redundant` in number, and activates the others. */
 static int independent_store (pw_run *r, const unsigned char *active, size_t redundant) {
   size_t rows = (size_t)r->s->rows;
   for (pw_layout l = { 0 }; pw_layout_pass (&l, &r->rank_memory);) {
-    r->independent = pw_layout_alloc (&l, rows, 1);
+    r->active_array = pw_layout_alloc (&l, rows, 1);
     r->redundant_row = pw_layout_alloc (&l, redundant, sizeof *r->redundant_row);
     r->coefficient = pw_layout_alloc (&l, redundant * rows, sizeof *r->coefficient);
     r->normal = pw_layout_alloc (&l, redundant * (redundant + 1), sizeof *r->normal);
@@ -83,12 +82,12 @@ static int independent_store (pw_run *r, const unsigned char *active, size_t red
   return PW_OK;
 }
 
-/* Selects the rows at the state reached, whose rank must be the largest one nearby; q: coords, scratch. */
-static int independent_search (pw_run *r, pw_row_basis *b, double *q, pw_error *error) {
+/* Selects the rows at the state reached, whose rank must be the largest one nearby. */
+static int independent_search (pw_run *r, pw_row_basis *b, pw_error *error) {
   const pw_system *s = r->s;
   int status = pw_evaluate_J_at (r->w, r->t, r->q, r->v), rank = independent_rank (r, b), largest = rank;
   for (int n = 0; n < INDEPENDENT_NEARBY && status == PW_OK; n++) {
-    int nearby = independent_rank_nearby (r, b, n, q);
+    int nearby = independent_rank_nearby (r, b, n);
     if (nearby > largest) largest = nearby;
   }
   if (status == PW_OK) r->w->failed = NULL;
@@ -106,11 +105,9 @@ static int independent_search (pw_run *r, pw_row_basis *b, double *q, pw_error *
 
 int pw_rank_open (pw_run *r, pw_error *error) {
   pw_row_basis b;
-  double *q = malloc ((size_t)r->s->coords * sizeof *q);
   int status = pw_row_basis_open (&b, r->s);
-  status = status == PW_OK && q ? independent_search (r, &b, q, error) : pw_fail_memory (r->s, error);
+  status = status == PW_OK ? independent_search (r, &b, error) : pw_fail_memory (r->s, error);
   pw_row_basis_close (&b);
-  free (q);
   (void)pw_evaluate_J_at (r->w, r->t, r->q, r->v);
   return status;
 }
@@ -132,8 +129,8 @@ int pw_rank_reselect (pw_run *r) {
 void pw_rank_serialise (pw_run *r, pw_archive *a) {
   int redundant = 0;
   if (r->redundant == 0) return;
-  pw_archive_bytes (a, r->independent, (size_t)r->s->rows);
-  for (int i = 0; i < r->s->rows; i++) redundant += !r->independent[i];
+  pw_archive_bytes (a, r->active_array, (size_t)r->s->rows);
+  for (int i = 0; i < r->s->rows; i++) redundant += !r->active_array[i];
   a->failed |= redundant != r->redundant;
-  if (!a->failed) independent_activate (r, r->independent);
+  if (!a->failed) independent_activate (r, r->active_array);
 }

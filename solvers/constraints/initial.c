@@ -3,7 +3,10 @@
  *
  * States given by the user or specified by the model are prescribed, and so are, where possible, the positions of
  * coordinates with mass; the rest moves as little as possible in the metric.  If that fails, fewer states are
- * prescribed, in the order of initial_sets.  A state that is consistent to round-off is left unchanged, bit for bit. */
+ * prescribed, in the order of initial_sets.  A state that is consistent to round-off is left unchanged, bit for bit.
+ *
+ * Equations may depend on each other, all in all (redundant ones) or in the free coordinates, those that are not
+ * prescribed.  Then a failed attempt is repeated with independent ones: it is "reduced". */
 #include <float.h>
 #include <math.h>
 #include <stdio.h>
@@ -13,7 +16,7 @@
 #include "rank.h"
 
 /* Rows times coordinates from which on the search for dependent equations, whose cost is rows^2 x coordinates, takes a
- * noticeable time; see initial_try_sets. */
+ * noticeable time (initial_try_sets). */
 #define INITIAL_LARGE 1e4
 
 /* Off the constraints dependent equations appear independent, the more the larger the residuals: hence several
@@ -32,7 +35,7 @@ typedef struct {
 } initial_failure;
 
 /* Factor of the metric of massless coordinates, by which it becomes 1e-6 of the least entry of the mass matrix (angles
- * in units of L), limited by round-off of the largest.  (In the system's metric it refers to their mean, which
+ * in units of L), but at least 1e-12 of the largest.  (In the system's metric it refers to the mean entry, which
  * unrelated massive bodies may determine.) */
 static double initial_massless_scale (const pw_system *s) {
   double least = INFINITY, most = 0, massless = 0;
@@ -55,7 +58,6 @@ static void initial_weights (const pw_system *s, const double *metric, const uns
     weight[j] = prescribed && prescribed[j] ? INFINITY : s->mass[j] > 0 ? metric[j] : scale * metric[j];
 }
 
-/* Projects positions. */
 static int initial_positions (pw_projector *p, pw_run *r, initial_failure *failure) {
   int status = pw_project_positions (p, r, r->t, r->q, r->v);
   if (status == PW_OK) return PW_OK;
@@ -69,6 +71,7 @@ static int initial_positions (pw_projector *p, pw_run *r, initial_failure *failu
 /* Projects velocities; kinematics must be up to date.  A second linear solve removes the round-off of a large first
  * correction. */
 static int initial_velocities (pw_projector *p, pw_run *r, initial_failure *failure) {
+  double *Jv = r->scratch, *eta = Jv + r->s->rows;
   pw_residuals now;
   pw_evaluate_residuals (r->w, NULL, &now);
   for (int i = 0; i < 2 && !(now.velocity <= PW_RESIDUAL_CONVERGED); i++) {
@@ -78,7 +81,10 @@ static int initial_velocities (pw_projector *p, pw_run *r, initial_failure *fail
     pw_evaluate_residuals (r->w, NULL, &now);
   }
   if (now.velocity <= PW_RESIDUAL_ACCEPTED) return PW_OK;
-  *failure = (initial_failure){ now.row_velocity, INITIAL_VELOCITIES, now.jv, .assembled = 1 };
+  int row = now.row_velocity;
+  pw_mul_J (r->w, r->v, Jv);
+  pw_evaluate_eta (r->w, eta);
+  *failure = (initial_failure){ row, INITIAL_VELOCITIES, row < 0 ? NAN : fabs (Jv[row] - eta[row]), .assembled = 1 };
   return PW_RETRY;
 }
 
@@ -86,11 +92,11 @@ static int initial_project (pw_projector *p, pw_run *r, initial_level level, ini
   return level == INITIAL_VELOCITIES ? initial_velocities (p, r, failure) : initial_positions (p, r, failure);
 }
 
-/* Projects positions or velocities.  If that fails since equations depend on each other in the coordinates that are not
- * prescribed (unless prescribed is NULL), it is repeated with independent ones; the prescribed values must then satisfy
- * the others to round-off.  weight: metric of positions, then of velocities. */
-static int initial_project_ranked (pw_projector *p, pw_run *r, initial_level level, const unsigned char *prescribed,
-                                   const double *weight, initial_failure *failure, pw_error *error) {
+/* Projects positions or velocities.  If that fails, it is repeated with equations that are independent in the free
+ * coordinates (unless prescribed is NULL); the prescribed values must then satisfy the others to round-off.  weight:
+ * metric of positions, then of velocities. */
+static int initial_project_reduced (pw_projector *p, pw_run *r, initial_level level, const unsigned char *prescribed,
+                                    const double *weight, initial_failure *failure, pw_error *error) {
   const pw_system *s = r->s;
   const unsigned char *former = r->active;
   size_t bytes = (size_t)s->coords * sizeof (double);
@@ -128,10 +134,10 @@ static int initial_project_ranked (pw_projector *p, pw_run *r, initial_level lev
   return status;
 }
 
-/* Projects the positions `from` and the given velocities, with prescribed states (2 coords, or NULL); ranked: again
- * with independent equations where they depend on each other in the other coordinates.  The velocity metric is the mass
- * matrix; if that does not determine all velocities, or the projection fails, the position metric. */
-static int initial_attempt (pw_run *r, const unsigned char *prescribed, int ranked, const double *from,
+/* Projects the positions `from` and the given velocities, with prescribed states (2 coords, or NULL); reduce_free: 1:
+ * projections are reduced.  The velocity metric is the mass matrix; if that does not determine all velocities, or the
+ * projection fails, the position metric. */
+static int initial_attempt (pw_run *r, const unsigned char *prescribed, int reduce_free, const double *from,
                             initial_failure *failure, pw_error *error) {
   const pw_system *s = r->s;
   const unsigned char *prescribed_v = prescribed ? prescribed + s->coords : NULL;
@@ -151,16 +157,18 @@ static int initial_attempt (pw_run *r, const unsigned char *prescribed, int rank
     initial_weights (s, choice == 0 ? s->mass : s->metric, prescribed_v, weight_v);
     status = pw_projector_open (&p, r, weight, weight_v, choice == 0 ? &cause : error);
     if (status == PW_OK) {
-      status = initial_project_ranked (&p, r, INITIAL_POSITIONS, ranked ? prescribed : NULL, weight, failure, error);
+      const unsigned char *reduce_q = reduce_free ? prescribed : NULL, *reduce_v = reduce_free ? prescribed_v : NULL;
+      status = initial_project_reduced (&p, r, INITIAL_POSITIONS, reduce_q, weight, failure, error);
       failure->assembled |= status == PW_OK;
       if (status == PW_OK)
-        status =
-            initial_project_ranked (&p, r, INITIAL_VELOCITIES, ranked ? prescribed_v : NULL, weight, failure, error);
+        status = initial_project_reduced (&p, r, INITIAL_VELOCITIES, reduce_v, weight, failure, error);
       pw_projector_close (&p);
       if (status != PW_RETRY || failure->level == INITIAL_POSITIONS) break;
     }
-    if (cause.status == PW_RESOURCE) status = pw_fail (error, PW_RESOURCE, "%s", cause.text);
-    if (choice == 0 && cause.status != PW_RESOURCE) status = PW_OK;
+    if (cause.status == PW_RESOURCE)
+      status = pw_fail (error, PW_RESOURCE, "%s", cause.text);
+    else if (choice == 0)
+      status = PW_OK; /* the second choice follows */
   }
   free (weight);
   return status;
@@ -172,14 +180,10 @@ static int initial_fail (pw_run *r, const initial_failure *failure, pw_error *er
     return pw_fail (error, PW_INITIAL, "model %s: the initial state cannot be made consistent", r->s->model);
   pw_system_row_name (r->s, failure->row, element, sizeof element);
   const char *unit = strcmp (pw_system_reaction_unit (r->s, failure->row), "N m") == 0 ? "rad" : "m";
-  if (failure->level == INITIAL_VELOCITIES)
-    return pw_fail (error, PW_INITIAL,
-                    "model %s: the initial state cannot be made consistent: %s is violated by %.6g %s/s", r->s->model,
-                    element, failure->residual, unit);
-  return pw_fail (error, PW_INITIAL,
-                  "model %s: the initial state cannot be made consistent: %s is open by %.6g %s; if it can close, "
-                  "begin nearer to where it does",
-                  r->s->model, element, failure->residual, unit);
+  const int is_open = failure->level == INITIAL_POSITIONS;
+  return pw_fail (error, PW_INITIAL, "model %s: the initial state cannot be made consistent: %s is %s by %.6g %s%s",
+                  r->s->model, element, is_open ? "open" : "violated", failure->residual, unit,
+                  is_open ? "; if it can close, begin nearer to where it does" : "/s");
 }
 
 int pw_initial_moved (const pw_system *s, const pw_initial_report *report, int state) {
@@ -207,19 +211,19 @@ int pw_initial_given (const pw_initial_report *report, int state) {
   return (report->origin[state] & PW_GIVEN) != 0;
 }
 
-/* An attempt from the given positions.  If redundant equations make it fail with all equations, it is repeated with an
- * independent set, selected at the given positions or, failing that, at those reached by an attempt without prescribed
- * values, from which it then starts. */
-static int initial_attempt_ranked (pw_run *r, const unsigned char *prescribed, int ranked, initial_failure *failure,
-                                   pw_error *error) {
+/* An attempt from the given positions.  If it fails with all equations, it is repeated with independent ones, selected
+ * at the given positions or, failing that, at those reached by an attempt without prescribed values, where the free
+ * coordinates then start. */
+static int initial_attempt_reduced (pw_run *r, const unsigned char *prescribed, int reduce_free,
+                                    initial_failure *failure, pw_error *error) {
   const pw_system *s = r->s;
   size_t n = (size_t)s->coords, rows = (size_t)s->rows;
   initial_failure later = { .row = -1 };
-  int status = initial_attempt (r, prescribed, ranked, r->q_given, failure, error), rank = s->rows;
+  int status = initial_attempt (r, prescribed, reduce_free, r->q_given, failure, error), rank = s->rows;
   if (status != PW_RETRY || r->active || (double)s->rows * s->coords > PW_RANK_MAX_ENTRIES) return status;
-  double *at = malloc (2 * n * sizeof *at + rows); /* where the set is selected */
+  double *at = malloc (2 * n * sizeof *at + rows); /* where the equations are selected */
   if (at == NULL) return pw_fail_memory (s, error);
-  double *from = at + n;
+  double *from = at + n; /* where attempts begin */
   unsigned char *active = (unsigned char *)(from + n);
   memcpy (at, r->q_given, n * sizeof *at);
   memcpy (from, at, n * sizeof *at);
@@ -236,7 +240,7 @@ static int initial_attempt_ranked (pw_run *r, const unsigned char *prescribed, i
     rank = found;
     r->active = active;
     later = (initial_failure){ .row = -1 };
-    status = initial_attempt (r, prescribed, ranked, from, &later, error);
+    status = initial_attempt (r, prescribed, reduce_free, from, &later, error);
     r->active = NULL;
     failure->assembled |= later.assembled;
   }
@@ -305,19 +309,11 @@ static int initial_prescribe (const pw_system *s, const unsigned char *origin, c
   return !set->mass || (massless > 0 && massive > 0 && (set->mass == INITIAL_MASS || unspecified > 0));
 }
 
-/* 1 if a value given by the user is not prescribed. */
-static int initial_released (const pw_system *s, const unsigned char *origin, const unsigned char *prescribed) {
-  int released = 0;
-  for (int j = 0; origin && j < 2 * s->coords; j++) released |= origin[j] & PW_GIVEN && !prescribed[j];
-  return released;
-}
-
 /* Makes attempts with one set after another, except those that prescribe the same as the last one (the same positions,
- * if these failed).  *released: 1 if a given value was released.
+ * if these failed).  *released: 1 if the last set does not prescribe all values given by the user.
  *
- * In large scenes dependent equations are not sought while states specified by the model are prescribed: that usually
- * fails for sketches of linkages, which specify all positions; nor, unless values are given, among the equations of the
- * coordinates that are not prescribed. */
+ * In large scenes attempts are not reduced while states specified by the model are prescribed, since they usually fail
+ * for sketches of linkages, which specify all positions; nor in the free coordinates unless the user gives values. */
 static int initial_try_sets (pw_run *r, const unsigned char *origin, initial_failure *failure, int *released,
                              pw_error *error) {
   const int sets = sizeof initial_sets / sizeof *initial_sets;
@@ -328,21 +324,21 @@ static int initial_try_sets (pw_run *r, const unsigned char *origin, initial_fai
   unsigned char *prescribed = malloc (4 * n + 1);
   if (prescribed == NULL) return pw_fail_memory (s, error);
   unsigned char *last = prescribed + 2 * n;
-  int status = PW_RETRY, last_seeks = -1, assembled = 0, given = 0;
+  int status = PW_RETRY, last_reduce_all = -1, assembled = 0, given = 0;
   for (size_t j = 0; origin && j < 2 * n; j++) given |= origin[j] & PW_GIVEN;
   for (const struct initial_set *set = initial_sets; set < initial_sets + sets && status == PW_RETRY; set++) {
     if (!initial_prescribe (s, origin, set, prescribed)) continue;
-    int seeks = is_small || !((set->q | set->v) & PW_SPECIFIED);
-    if (seeks == last_seeks && memcmp (prescribed, last, assembled ? 2 * n : n) == 0) continue;
-    int ranked = is_small || (seeks && given && entries <= PW_RANK_MAX_ENTRIES);
+    int reduce_all = is_small || !((set->q | set->v) & PW_SPECIFIED);
+    if (reduce_all == last_reduce_all && memcmp (prescribed, last, assembled ? 2 * n : n) == 0) continue;
+    int reduce_free = is_small || (reduce_all && given && entries <= PW_RANK_MAX_ENTRIES);
     initial_failure now = { .row = -1 };
-    status = seeks ? initial_attempt_ranked (r, prescribed, ranked, &now, error)
-                   : initial_attempt (r, prescribed, ranked, r->q_given, &now, error);
+    status = reduce_all ? initial_attempt_reduced (r, prescribed, reduce_free, &now, error)
+                        : initial_attempt (r, prescribed, reduce_free, r->q_given, &now, error);
     memcpy (last, prescribed, 2 * n);
-    last_seeks = seeks, assembled = now.assembled;
+    last_reduce_all = reduce_all, assembled = now.assembled;
     if (now.row >= 0) *failure = now;
   }
-  *released = initial_released (s, origin, prescribed);
+  for (size_t j = 0; origin && j < 2 * n; j++) *released |= origin[j] & PW_GIVEN && !prescribed[j];
   free (prescribed);
   return status;
 }

@@ -8,7 +8,6 @@
  * (Lubich 1991, Extrapolation integrators for constrained multibody systems; Eich 1993, Convergence results for a
  * coordinate projection method applied to mechanical systems with algebraic constraints.) */
 #include <math.h>
-#include <stdlib.h>
 #include "method.h"
 #include "specialised.h"
 
@@ -44,14 +43,10 @@ const char *const pw_metrics[] = { "mass", "identity", NULL };
 
 /* The identity metric weights metres and radians equally, as the plain pseudo-inverse does. */
 int pw_projector_open_by_options (pw_projector *p, pw_run *r, pw_error *error) {
-  const pw_system *s = r->s;
+  double *ones = r->scratch;
   if (pw_run_option (r, "metric") == 0) return pw_projector_open (p, r, NULL, NULL, error);
-  double *ones = malloc ((size_t)s->coords * sizeof *ones);
-  if (ones == NULL) return pw_fail_memory (s, error);
-  for (int j = 0; j < s->coords; j++) ones[j] = 1;
-  int status = pw_projector_open (p, r, ones, ones, error);
-  free (ones);
-  return status;
+  for (int j = 0; j < r->s->coords; j++) ones[j] = 1;
+  return pw_projector_open (p, r, ones, ones, error);
 }
 
 void pw_projector_close (pw_projector *p) {
@@ -60,13 +55,12 @@ void pw_projector_close (pw_projector *p) {
   *p = (pw_projector){ 0 };
 }
 
-/* Redundant equations follow from the others up to this scaled residual; PW_RETRY if one does not: it contradicts them.
- * g, size: their values and the sizes of their terms. */
-static int project_check_redundant (pw_projector *p, const pw_system *s, double tolerance, const double *g,
-                                    const double *size) {
-  double largest = tolerance;
+/* PW_RETRY if a redundant equation is violated where the others hold: it contradicts them.  g, size: residuals and the
+ * sizes of their terms. */
+static int project_check_redundant (pw_projector *p, const pw_run *r, const double *g, const double *size) {
+  double largest = r->limits.redundant_residual;
   if (p->active == NULL || p->ignores_inactive) return PW_OK;
-  for (int i = 0; i < s->holonomic; i++) {
+  for (int i = 0; i < r->s->holonomic; i++) {
     double residual = p->active[i] ? 0 : fabs (g[i]) / size[i];
     if (residual > largest || isnan (residual)) largest = residual, p->contradictory_row = i;
   }
@@ -80,7 +74,8 @@ int pw_project_positions (pw_projector *p, pw_run *r, double t, double *q, const
   const int max_iterations = 30; /* quadratic convergence needs some 5; a bad start needs more */
   const pw_system *s = r->s;
   pw_residuals now = { 0 };
-  double *g = r->scratch, *size = g + s->rows, *mu = size + s->rows, *dq = mu + s->rows, previous = INFINITY;
+  double *g = r->scratch, *size = g + s->rows, *mu = size + s->rows, *dq = mu + s->rows;
+  double previous = INFINITY; /* the residual before the last correction */
   p->contradictory_row = -1;
   for (p->iterations = 0;; p->iterations++) {
     int status = pw_update_kinematics (r->w, t, q, v);
@@ -101,7 +96,7 @@ int pw_project_positions (pw_projector *p, pw_run *r, double t, double *q, const
     for (int j = 0; j < s->coords; j++) q[j] += dq[j];
   }
   if (p->active == NULL) r->residuals.position = now.position, r->residuals.g = now.g;
-  int status = project_check_redundant (p, s, r->limits.redundant_residual, g, size);
+  int status = project_check_redundant (p, r, g, size);
   if (status == PW_OK) pw_evaluate_J (r->w);
   return status;
 }
@@ -125,8 +120,8 @@ int pw_project_velocities (pw_projector *p, pw_run *r, double *v) {
   return pw_update_velocities (r->w, v);
 }
 
-/* 1 if the velocities satisfy J v = eta to round-off and need no correction; J must be evaluated.  Near a singular
- * configuration, or with redundant equations, that is not sufficient: 0. */
+/* 1 if the velocities satisfy J v = eta to round-off and need no correction; J must be evaluated.  0 also near a
+ * singular configuration and with redundant equations, where small residuals do not imply small errors. */
 static int project_accepts_velocities (const pw_projector *p, pw_run *r) {
   r->residuals.velocity = NAN;
   if (p->owns_velocity || p->active || r->near_singular) return 0;

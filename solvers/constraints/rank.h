@@ -23,7 +23,7 @@ void pw_rank_rows (const pw_workspace *w, double *rows, double *norm);
 void pw_length_weights (const pw_system *s, double *weight);
 
 /* The n-th of a sequence of irregular numbers in [-1, 1], without symmetries that a scene could share: sines of
- * multiples of the golden angle.  Each phase, an arbitrary number, is another sequence. */
+ * multiples of the golden angle.  Another phase, an arbitrary number, gives another sequence. */
 static inline double pw_irregular (double phase, int n) {
   return pw_sin (phase + 2.39996 * n);
 }

@@ -11,18 +11,19 @@
 #include "method.h"
 #include "rank.h"
 
-/* The batch of an equation; *n: its index in the batch. */
-static const pw_element_batch *redundancy_find (const pw_workspace *w, int row, int *n) {
+/* The batch of an equation; *e: its element there; *J: its row of J in the columns of that element. */
+static const pw_element_batch *redundancy_find (const pw_workspace *w, int row, int *e, const double **J) {
   const pw_element_batch *k = w->batch;
   while (row >= k->row + k->b.count * k->kind->rows) k++;
-  *n = row - k->row;
+  *e = (row - k->row) / k->kind->rows;
+  *J = k->J + (row - k->row) * k->b.cols;
   return k;
 }
 
 double pw_rank_multiplier_unit (const pw_workspace *w, int row) {
-  int n;
-  const pw_element_batch *k = redundancy_find (w, row, &n);
-  const double *J = k->J + n * k->b.cols;
+  int e;
+  const double *J;
+  const pw_element_batch *k = redundancy_find (w, row, &e, &J);
   for (int b = 0; b < k->kind->bodies; b++)
     if (J[3 * b] != 0 || J[3 * b + 1] != 0) return 1;
   return w->scale.length;
@@ -30,12 +31,13 @@ double pw_rank_multiplier_unit (const pw_workspace *w, int row) {
 
 /* The length of a row as a derivative with respect to lengths (pw_length_factor). */
 static double redundancy_length (const pw_workspace *w, int row) {
-  int n;
+  int e;
+  const double *J;
   double square = 0;
-  const pw_element_batch *k = redundancy_find (w, row, &n);
+  const pw_element_batch *k = redundancy_find (w, row, &e, &J);
   for (int c = 0; c < k->b.cols; c++) {
-    int j = pw_global (k, n / k->kind->rows, c);
-    double x = j < w->s->coords ? k->J[n * k->b.cols + c] / pw_length_factor (w->s, j) : 0;
+    int j = pw_global (k, e, c);
+    double x = j < w->s->coords ? J[c] / pw_length_factor (w->s, j) : 0;
     square += x * x;
   }
   return sqrt (square);
@@ -43,12 +45,10 @@ static double redundancy_length (const pw_workspace *w, int row) {
 
 /* f += weight J_i^T */
 static void redundancy_add_row (const pw_workspace *w, int row, double weight, double *f) {
-  int n;
-  const pw_element_batch *k = redundancy_find (w, row, &n);
-  for (int c = 0; c < k->b.cols; c++) {
-    int j = pw_global (k, n / k->kind->rows, c);
-    if (j < w->s->coords) f[j] += weight * k->J[n * k->b.cols + c];
-  }
+  int e;
+  const double *J;
+  const pw_element_batch *k = redundancy_find (w, row, &e, &J);
+  for (int c = 0; c < k->b.cols; c++) f[pw_global (k, e, c)] += weight * J[c];
 }
 
 /* Solves r->row_force = J^T c for the multipliers c and clears the force. */
@@ -140,7 +140,7 @@ static void redundancy_describe_pair (const pw_system *s, int one, int two, char
 
 char *pw_run_redundancy (pw_run *r, int i, char *buffer, size_t size) {
   enum { MAX_ELEMENTS = 6 };
-  const double round_off = 1e-8; /* of a coefficient: eps / s^2 at a sine s of 1.5e-4 */
+  const double round_off = 1e-8; /* of a coefficient between rows of length 1: eps / s^2 at a sine s of 1.5e-4 */
   const pw_system *s = r->s;
   int row = r->redundant_row[i], partners = 0, last = -1, elements = 0;
   char element[120], own[120], before[120] = "", reaction[120];
@@ -149,9 +149,9 @@ char *pw_run_redundancy (pw_run *r, int i, char *buffer, size_t size) {
   if (pw_evaluate_J_at (r->w, r->t, r->q, r->v) != PW_OK) return buffer;
   if (pw_saddle_factor (r->saddle) != PW_OK) return buffer;
   redundancy_coefficients (r, i);
-  const double *c = r->coefficient + i * s->rows;
+  const double *c = r->coefficient + i * s->rows, least = round_off * redundancy_length (r->w, row);
   for (int a = 0; a < s->rows; a++) {
-    if (fabs (c[a]) < round_off) continue;
+    if (fabs (c[a]) * redundancy_length (r->w, a) <= least) continue;
     partners++, last = a;
     pw_system_row_name (s, a, element, sizeof element);
     if (elements > MAX_ELEMENTS || strcmp (element, own) == 0 || strcmp (element, before) == 0) continue;

@@ -7,8 +7,8 @@
 #include "util.h"
 
 /* s: the sine; d: the scaled constraint residual; eps: the machine precision.  Where branches cross, the constraints
- * are x y = 0 in suitable coordinates, and s = |(x, y)|; with a residual d, x y = d, whose branches turn where s^2 = 2
- * d. */
+ * are x y = 0 in suitable coordinates, and s = |(x, y)|; with a residual d, x y = d: each branch turns, most sharply
+ * where s^2 = 2 d. */
 const pw_thresholds pw_watchdog_limits = {
   /* A motion with residuals of 1 % is wrong; without stabilisation some drift is expected. */
   .lost = 1e-2,
@@ -36,10 +36,10 @@ const pw_thresholds pw_watchdog_limits = {
   .refine = 0.02,
 
   /* Drift: measured on four-bar linkages and slider-cranks, d / s^2 is 0.08 to 0.34 where the turn is sharpest;
-   * accelerations, at least turn_reference L / T^2, have grown by a factor of 3 when it is 0.02 to 0.07.  Without
-   * accelerations to compare it must stay below half of that (drift_near), or, where d itself is a residual that counts
-   * as lost (drift_far), below the sharpest turn (drift_any).  Above `regular` times its largest value the sine is not
-   * that of a singular configuration, however large the drift. */
+   * accelerations, at least turn_reference L / T^2, have grown by a factor of 3 when it is 0.02 to 0.07 (drift_turn).
+   * From half of that on (drift_near) they are no reference for later ones.  Where d itself counts as lost (drift_far),
+   * d / s^2 must be below its value in the sharpest turn (drift_any), whatever the accelerations.  Above `regular`
+   * times its largest value the sine is not that of a singular configuration, however large the drift. */
   .regular = 0.6,
   .turn_growth = 3,
   .turn_reference = 0.1,
@@ -68,8 +68,7 @@ const pw_thresholds pw_watchdog_limits = {
 
   /* The projection leaves residuals of 1e-14, which leave an error of 1e-7 in the sine: below `floor`, ten times that,
    * it cannot be distinguished from 0 (`crossing`: twice that, since a stride ends within `floor` of its destination).
-   * Such a point must be left straight
-   * on, within 60 degrees of the direction in which it was entered. */
+   * Such a point must be left straight on, within 60 degrees of the direction in which it was entered. */
   .floor = 1e-6,
   .crossing = 2e-6,
   .straight = 0.5,
@@ -130,36 +129,24 @@ static int singular_has_loops (const pw_system *s) {
   return loops;
 }
 
-/* The rows of a tree of bodies cannot become dependent, whatever its configuration. */
+/* The holonomic rows of a tree of bodies cannot become dependent, whatever its configuration. */
 int pw_watchdog_open (pw_run *r, pw_error *error) {
   const pw_system *s = r->s;
-  pw_geometry *g = &r->geometry;
-  size_t n = (size_t)s->coords + 3;
-  g->loops = singular_has_loops (s);
-  if (g->loops < 0) return pw_fail_memory (s, error);
-  if (g->loops == 0 && s->rows == s->holonomic) return PW_OK;
-  pw_saddle_close (g->saddle);
-  if (g->previous_q == NULL) g->previous_q = malloc (n * sizeof *g->previous_q);
-  double *weight = malloc (n * sizeof *weight);
-  g->saddle = NULL;
-  if (g->previous_q && weight) {
-    pw_length_weights (s, weight);
-    g->saddle = pw_saddle_open (r->w, weight, s->rows, r->active, error);
-  }
-  free (weight);
-  return g->saddle ? PW_OK : pw_fail_memory (s, error);
-}
-
-void pw_watchdog_close (pw_run *r) {
-  pw_saddle_close (r->geometry.saddle);
-  free (r->geometry.previous_q);
-  r->geometry = (pw_geometry){ 0 };
+  pw_watchdog *watch = &r->watchdog;
+  watch->loops = singular_has_loops (s);
+  if (watch->loops < 0) return pw_fail_memory (s, error);
+  if (watch->loops == 0 && s->rows == s->holonomic) return PW_OK;
+  pw_saddle_close (watch->saddle);
+  watch->saddle = NULL;
+  pw_length_weights (s, r->scratch);
+  watch->saddle = pw_saddle_open (r->w, r->scratch, s->rows, r->active, error);
+  return watch->saddle ? PW_OK : PW_RESOURCE;
 }
 
 /* ---- Sines ---- */
 
 double pw_watchdog_sine (pw_run *r, int *row) {
-  pw_saddle *saddle = r->geometry.saddle;
+  pw_saddle *saddle = r->watchdog.saddle;
   if (row) *row = -1;
   if (saddle == NULL) return 1;
   int status = pw_saddle_factor (saddle);
@@ -168,11 +155,11 @@ double pw_watchdog_sine (pw_run *r, int *row) {
 }
 
 int pw_watchdog_near (pw_run *r) {
-  pw_geometry *g = &r->geometry;
-  if (!g->singular_ahead || g->saddle == NULL) return 0;
+  pw_watchdog *watch = &r->watchdog;
+  if (!watch->singular_ahead || watch->saddle == NULL) return 0;
   if (!pw_fixed_steps (r) && !pw_saddle_sine_below (r->saddle, r->limits.refine)) return 0;
-  g->evaluated_sine = pw_watchdog_sine (r, NULL);
-  return g->evaluated_sine < r->limits.near * g->largest_sine;
+  watch->evaluated_sine = pw_watchdog_sine (r, NULL);
+  return watch->evaluated_sine < r->limits.near * watch->largest_sine;
 }
 
 int pw_fail_singular (pw_run *r, double t, pw_error *error) {
@@ -180,7 +167,7 @@ int pw_fail_singular (pw_run *r, double t, pw_error *error) {
   int row = -1;
   double sine = pw_watchdog_sine (r, &row);
   /* largest_sine is 0 while the run is being opened */
-  if (sine > r->limits.rank_refused && sine > r->limits.near * r->geometry.largest_sine)
+  if (sine > r->limits.rank_refused && sine > r->limits.near * r->watchdog.largest_sine)
     return pw_fail (
         error, PW_METHOD,
         "t = %.6g s: values too extreme: masses and inertias differ by so much that the equations of motion "
@@ -200,7 +187,7 @@ int pw_fail_singular (pw_run *r, double t, pw_error *error) {
 int pw_watchdog_near_state (pw_run *r) {
   if (pw_evaluate_J_at (r->w, r->t, r->q, r->v) != PW_OK) return 0;
   pw_saddle_factor (r->saddle);
-  r->geometry.singular_ahead = 1;
+  r->watchdog.singular_ahead = 1;
   return pw_watchdog_near (r);
 }
 

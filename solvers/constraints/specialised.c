@@ -5,7 +5,7 @@
 #include "specialised.h"
 #include "util.h"
 
-/* Updates signals, for the compiled code. */
+/* pw_scene.update: evaluates the signals for the compiled code. */
 static int specialised_update (void *workspace, double t, const double *q, const double *v) {
   return pw_update_signals (workspace, t, q, v);
 }
@@ -46,6 +46,7 @@ int pw_specialised_open (pw_run *r, pw_error *error) {
   if (!pw_specialised_fits (code, r->s))
     return pw_fail (error, PW_INPUT, "model %s: the specialised code belongs to another scene", r->s->model);
   if (specialised_allocate (r, code->constants) != PW_OK) return pw_fail_memory (r->s, error);
+  r->scene->length = r->w->scale.length, r->scene->speed = r->scene->length / r->w->scale.time;
   r->scene->redundant_residual = r->limits.redundant_residual;
   r->scene->alpha = r->alpha, r->scene->beta = r->beta;
   r->scene_ready = code->prepare (r->scene) == 0;
@@ -60,18 +61,12 @@ void pw_specialised_select (pw_run *r) {
   r->specialised = suits ? code : NULL;
 }
 
-/* 0 where the general functions have more to do than to evaluate: with fixed steps they compute the sine of every stage
- * where a singular configuration may be ahead; adaptive methods need it only below the pivots that the specialised code
- * accepts. */
+/* 0 also where a singular configuration may be ahead and steps are fixed: the general functions then compute the sine
+ * of every stage.  Adaptive methods need it only below the pivots that the specialised code accepts. */
 int pw_specialised_suits (const pw_run *r) {
-  const pw_geometry *g = &r->geometry;
-  return r->specialised && !r->redundant_moves && !(g->singular_ahead && g->saddle && pw_fixed_steps (r)) &&
+  const pw_watchdog *watch = &r->watchdog;
+  return r->specialised && !r->redundant_drive && !(watch->singular_ahead && watch->saddle && pw_fixed_steps (r)) &&
          !r->near_singular && !r->w->hold;
-}
-
-void pw_specialised_scale (pw_run *r) {
-  r->scene->length = r->w->scale.length;
-  r->scene->speed = r->scene->length / r->w->scale.time;
 }
 
 void pw_specialised_count (pw_run *r, long evaluations, long iterations) {
@@ -102,17 +97,15 @@ int pw_specialised_stages (pw_run *r, const pw_scene_step *x) {
 }
 
 static void specialised_copy_residuals (pw_run *r) {
-  const pw_scene *s = r->scene;
-  r->residuals = (pw_residuals){ .position = s->position, .g = s->g, .velocity = s->velocity, .jv = s->jv };
+  const pw_scene *x = r->scene;
+  r->residuals = (pw_residuals){ .position = x->position, .g = x->g, .velocity = x->velocity, .jv = x->jv };
 }
 
 int pw_specialised_project (const pw_projector *p, pw_run *r, double t, double *q, double *v, double *a,
                             double *lambda) {
-  pw_scene *s = r->scene;
   if (!p->mass_metric || p->ignores_inactive || !pw_specialised_suits (r)) return 0;
-  pw_specialised_scale (r);
-  if (r->specialised->project (s, t, q, v, a, lambda, r->w->configuration, r->w->J)) return 0;
-  specialised_finish (r, q, v, s->iterations);
+  if (r->specialised->project (r->scene, t, q, v, a, lambda, r->w->configuration, r->w->J)) return 0;
+  specialised_finish (r, q, v, r->scene->iterations);
   if (r->active)
     pw_forget_residuals (r);
   else
@@ -123,7 +116,6 @@ int pw_specialised_project (const pw_projector *p, pw_run *r, double t, double *
 void pw_specialised_residuals (pw_run *r) {
   if (!pw_specialised_suits (r) || r->active || !isnan (r->residuals.position) || !isnan (r->residuals.velocity))
     return;
-  pw_specialised_scale (r);
   r->specialised->residuals (r->scene, r->q, r->v, r->w->configuration, r->w->J);
   specialised_copy_residuals (r);
 }

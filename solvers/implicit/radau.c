@@ -167,7 +167,7 @@ static int radau_accept (pw_run *r, double h, double t1) {
   radau_evaluate_reached (r, h);
   r->statistics.steps++;
   d->F_y_current = 0;
-  d->F_y_outdated = r->outdated || d->contraction > RADAU_REUSE_CONTRACTION;
+  d->F_y_outdated = r->matrix_outdated || d->contraction > RADAU_REUSE_CONTRACTION;
   return PW_OK;
 }
 

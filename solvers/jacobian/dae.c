@@ -26,7 +26,7 @@ void pw_dae_close (pw_dae *x) {
 
 /* ---- Residual ---- */
 
-/* The residual J v - eta becomes J a - gamma + 2 alpha (J v - eta) + beta^2 g, of nonholonomic equations
+/* x->residual, which is J v - eta, becomes J a - gamma + 2 alpha (J v - eta) + beta^2 g; of nonholonomic equations
  * J a - gamma + alpha (J v - eta). */
 static void dae_stabilise (pw_dae *x, const double *a) {
   const pw_run *r = x->tangent.run;
@@ -41,7 +41,7 @@ static void dae_stabilise (pw_dae *x, const double *a) {
   for (int i = 0; i < s->holonomic; i++) x->residual[i] += r->beta * r->beta * x->scratch[i];
 }
 
-/* The constraint equations: those of lambda into `residual`; g, if it is enforced by mu, into `scratch`. */
+/* The residuals of the constraint equations that lambda enforces, then of g = 0 if mu enforces it. */
 static void dae_constraints (pw_dae *x, const double *v, const double *a, double *F) {
   pw_workspace *w = x->tangent.run->w;
   pw_mul_J (w, v, x->residual);
@@ -66,8 +66,8 @@ void pw_dae_residual (pw_dae *x, const double *v, const double *a, const double 
 
 /* ---- Matrix ---- */
 
-/* The kinematics, with multipliers mu of all equations: q_dot_factor I + D (G^T mu)_q; -I; D G^T times mu_factor: the
- * derivatives with respect to q, v, mu. */
+/* The derivatives of the kinematics with respect to q; v; mu: q_dot_factor I + D (G^T mu)_q; -I; mu_factor D G^T.
+ * mu: multipliers of all equations, or NULL. */
 static void dae_add_kinematics (pw_dae *x, const double *mu, double q_dot_factor, double mu_factor) {
   pw_tangent *t = &x->tangent;
   for (int j = 0; j < x->n; j++) {
@@ -84,7 +84,7 @@ static void dae_add_kinematics (pw_dae *x, const double *mu, double q_dot_factor
   pw_newton_add_JT (t->run->w, &t->scatter, &put);
 }
 
-/* Where they are enforced, J v - eta: (J v)_q - eta_q; J; and g: G. */
+/* The derivatives of J v - eta, where it is enforced, with respect to q; v: (J v)_q - eta_q; J; and of g: G. */
 static void dae_add_constraints (pw_dae *x, const double *v) {
   pw_tangent *t = &x->tangent;
   const pw_system *s = t->run->s;

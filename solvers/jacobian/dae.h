@@ -22,7 +22,7 @@ typedef struct {
   int enforces_velocities;     /* 1: index2, ggl, si1 */
   int enforces_positions;      /* 1: index3, ggl, si1; both are 0 for none and baumgarte */
   int integrates_multipliers;  /* 1: si1 */
-  int n, rows, mu_count, size; /* coordinates, independent equations, multipliers mu, unknowns */
+  int n, rows, mu_count, size; /* numbers of coordinates, independent equations, multipliers mu, unknowns */
   double *reaction, *force;    /* coords + 3: J^T lambda or G^T mu; applied forces */
   double *residual, *scratch;  /* all constraint equations */
   char *memory;
@@ -32,8 +32,8 @@ typedef struct {
 int pw_dae_open (pw_dae *x, pw_run *r);
 void pw_dae_close (pw_dae *x);
 
-/* F without q' - v.  Kinematics and J must be up to date.  lambda: the multipliers of the independent equations, mu
- * after them; a may be NULL, which is 0, except for constraints on acceleration level. */
+/* F with q' - v left out.  Kinematics and J must be up to date.  lambda: the multipliers of the independent equations,
+ * mu after them; a: NULL for 0, except in none and baumgarte. */
 void pw_dae_residual (pw_dae *x, const double *v, const double *a, const double *lambda, double *F);
 
 /* Adds dF/dy + q_dot_factor dF/dq' + v_dot_factor dF/dv' to the matrix of x->tangent.  In si1, F depends on the

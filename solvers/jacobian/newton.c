@@ -38,8 +38,8 @@ static inline int newton_is_length (int c) {
   return c % 3 != 2;
 }
 
-/* 1 for an entry of a pin that is always zero: its rows of J are multiples of unit vectors in x and
- * y columns, so that their derivatives are in columns of angles only. */
+/* 1 for an entry of a pin that is always zero: its rows of J are multiples of unit vectors in x and y columns, so that
+ * their derivatives are in columns of angles only. */
 static inline int newton_is_zero (newton_part part, int r, int c) {
   if (part == NEWTON_J || part == NEWTON_JT) return newton_is_length (c) && c % 3 == 1 - r;
   return newton_is_length (c) || (part == NEWTON_COORDINATES && newton_is_length (r));

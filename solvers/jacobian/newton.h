@@ -15,17 +15,16 @@ typedef struct {
 int pw_newton_open (pw_newton_scratch *n, const pw_system *s); /* PW_OK or PW_RESOURCE */
 void pw_newton_close (pw_newton_scratch *n);
 
-/* Where and how a block is added: rows of the matrix from `row` on (coordinates or constraint equations), columns from
- * `col` on. */
+/* Where and how a block is added.  Its rows are coordinates or constraint equations. */
 typedef struct {
-  int row, col;
+  int row, col;               /* the row and column of the matrix for the block's first ones */
   int rows;                   /* only the first `rows` constraint equations are included */
   double factor;              /* of blocks whose rows are coordinates, and of those of holonomic equations */
   double factor_nonholonomic; /* of those of nonholonomic equations */
   const double *row_scale;    /* further factors, one for each row from `row` on; NULL: 1 */
-  const int *row_index;       /* rows: index of each constraint equation, or -1: omitted; NULL: unchanged indices */
-  const double *direction;    /* coords: w of the block (J w)_q */
-  const double *lambda;       /* rows: multipliers of the block (J^T lambda)_q */
+  const int *row_index;       /* equations: new index of each, -1: omitted; NULL: indices do not change */
+  const double *direction;    /* coordinates: w of the block (J w)_q; NULL for other blocks */
+  const double *lambda;       /* equations: multipliers of the block (J^T lambda)_q; NULL for other blocks */
 } pw_placement;
 
 /* Adds a block of every batch. */

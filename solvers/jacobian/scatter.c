@@ -21,31 +21,25 @@ static int scatter_compare (const void *a, const void *b) {
 }
 
 int pw_scatter_lay_out (pw_scatter_map *t, int n, int64_t **colptr, int64_t **rowind) {
+  int64_t nonzeros = 0;
   t->place = malloc ((t->count + 1) * sizeof *t->place);
   *colptr = malloc (((size_t)n + 1) * sizeof **colptr);
   *rowind = malloc ((t->count + 1) * sizeof **rowind);
-  int status = !t->failed && t->place && *colptr && *rowind ? PW_OK : PW_RESOURCE;
-  if (status == PW_OK) {
-    int64_t nonzeros = 0;
-    const struct pw_scatter_entry *e = t->entry;
-    if (t->count > 0) qsort (t->entry, t->count, sizeof *t->entry, scatter_compare);
-    for (int c = 0; c < n; c++) {
-      (*colptr)[c] = nonzeros;
-      for (int last_row = -1; e < t->entry + t->count && e->col == c; e++) {
-        if (e->row != last_row) (*rowind)[nonzeros++] = last_row = e->row;
-        t->place[e->number] = (size_t)nonzeros - 1;
-      }
+  if (t->failed || !t->place || !*colptr || !*rowind) return PW_RESOURCE;
+  const struct pw_scatter_entry *e = t->entry;
+  if (t->count > 0) qsort (t->entry, t->count, sizeof *t->entry, scatter_compare);
+  for (int c = 0; c < n; c++) {
+    (*colptr)[c] = nonzeros;
+    for (int last_row = -1; e < t->entry + t->count && e->col == c; e++) {
+      if (e->row != last_row) (*rowind)[nonzeros++] = last_row = e->row;
+      t->place[e->number] = (size_t)nonzeros - 1;
     }
-    (*colptr)[n] = nonzeros;
-    t->recording = 0;
   }
+  (*colptr)[n] = nonzeros;
   free (t->entry);
   t->entry = NULL;
-  if (status == PW_OK) return PW_OK;
-  free (*colptr);
-  free (*rowind);
-  *colptr = *rowind = NULL;
-  return status;
+  t->recording = 0;
+  return PW_OK;
 }
 
 void pw_scatter_close (pw_scatter_map *t) {

@@ -7,7 +7,7 @@
 #include "pinwheel.h"
 
 typedef struct {
-  int recording;
+  int recording;      /* 1: contributions are recorded; 0: they are added */
   size_t count, room; /* number of contributions; number that `entry` has room for */
   struct pw_scatter_entry {
     int row, col;
@@ -16,14 +16,14 @@ typedef struct {
   size_t *place; /* of each contribution: the index in `value` to which it is added */
   size_t next;   /* while filling: number of the next contribution */
   double *value; /* while filling: the matrix */
-  int failed;    /* out of memory while recording */
+  int failed;    /* 1: out of memory while recording */
 } pw_scatter_map;
 
 /* From now on contributions are recorded; their values are ignored. */
 void pw_scatter_begin_record (pw_scatter_map *t);
 
-/* Ends the recording for n columns; colptr (n + 1) and rowind (nonzeros) are allocated with malloc for the caller.
- * PW_OK or PW_RESOURCE. */
+/* Ends the recording, of a matrix with n columns.  PW_OK or PW_RESOURCE; free colptr (n + 1) and rowind (nonzeros) in
+ * both cases. */
 int pw_scatter_lay_out (pw_scatter_map *t, int n, int64_t **colptr, int64_t **rowind);
 void pw_scatter_close (pw_scatter_map *t);
 

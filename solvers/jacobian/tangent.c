@@ -41,7 +41,8 @@ void pw_tangent_close (pw_tangent *x) {
   free (x->rowind);
 }
 
-/* Values of all equations from those of the first `count` active ones; `all` is the array for the result. */
+/* Values of all equations from those of the first `count` active ones: `active` itself if these are all, else `all`,
+ * whose other entries stay 0. */
 static const double *tangent_expand (const pw_tangent *x, const double *active, int count, double *all) {
   if (count == x->run->s->rows) return active;
   for (int i = 0; i < count; i++) all[x->row[i]] = active[i];

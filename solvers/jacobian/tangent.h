@@ -17,7 +17,7 @@ typedef struct {
   int *row_index;      /* all equations: index among the active ones, or -1 */
   int *row;            /* rows: index among all equations */
   double *lambda, *mu; /* all equations: multipliers last expanded, 0 for those that are not active */
-  double *D;           /* coords: diagonal; 1 for lengths, 1/L^2 for angles, so that mu has one unit */
+  double *D;           /* coords: 1 for lengths, 1/L^2 for angles (dae.h) */
   pw_newton_scratch newton;
   pw_scatter_map scatter;
   int64_t *colptr, *rowind; /* the pattern, in compressed columns */
@@ -29,8 +29,8 @@ void pw_tangent_close (pw_tangent *x);
 
 /* ---- From values of the active equations to those of all, and back ---- */
 
-/* Multipliers of all equations, valid until the next call: lambda; mu, of which there are `count` active ones, NULL if
- * there are none. */
+/* Multipliers of all equations, valid until the next call: lambda; mu, of which `active` has `count`, or NULL if that
+ * is 0. */
 const double *pw_tangent_expand_lambda (const pw_tangent *x, const double *active);
 const double *pw_tangent_expand_mu (const pw_tangent *x, const double *active, int count);
 /* The same lambda in an array of all equations. */
@@ -42,14 +42,14 @@ void pw_tangent_compress (const pw_tangent *x, const double *all, int count, dou
 
 /* ---- Adding to the matrix ---- */
 
-/* Adds a block of the constraint equations at a row and column, with factors of holonomic and nonholonomic ones;
- * w: that of (J w)_q. */
+/* Adds a block whose rows are the active constraint equations, from a row and column on, times the factors `holonomic`
+ * and `nonholonomic`; w: the vector of the block (J w)_q. */
 void pw_tangent_add_equations (pw_tangent *x, pw_block block, int row, int col, const double *w, double holonomic,
                                double nonholonomic);
-/* Adds J of the first `rows` equations in the same way. */
+/* Adds J of the first `rows` of all equations in the same way. */
 void pw_tangent_add_J (pw_tangent *x, int rows, int row, int col, double holonomic, double nonholonomic);
 
-/* Positions of the parts in the matrix, and factors of derivatives. */
+/* Where the parts of the equations are in the matrix, and factors of derivatives. */
 typedef struct {
   int momentum, constraint; /* first row of each */
   int q, v, a, lambda;      /* first column of each; a may share its columns with v */

@@ -17,26 +17,24 @@ static void linear_column_of_A (pw_linearisation *x, int c) {
 
 static int linear_arrays (pw_linearisation *x) {
   size_t n = (size_t)x->n, m = (size_t)x->m, size = (size_t)x->size;
-  const pw_array array[] = {
-    { &x->a, n + 3 },
-    { &x->lambda, m },
-    { &x->norm, m },
-    { &x->R, m * n },
-    { &x->Q, n * n },
-    { &x->dx, 2 * n },
-    { &x->product, n + 2 * m },
-    { &x->da, n + 3 },
-    { &x->scratch, n + 3 * m + 3 },
-    { &x->row_scratch, m },
-    { &x->symmetry, 3 * size },
-    { &x->probe_a, n },
-    { &x->later, 2 * n + 6 },
-    { &x->probe, 2 * n },
-    { &x->probe_da, n },
-    { &x->residual, 4 * (2 * m + n) + 15 },
-    { &x->left_vectors, x->modes ? size * size + size : 0 },
-    { &x->upper_rows, 4 * size },
-  };
+  const pw_array array[] = { { &x->a, n + 3 },
+                             { &x->lambda, m },
+                             { &x->norm, m },
+                             { &x->R, m * n },
+                             { &x->Q, n * n },
+                             { &x->dx, 2 * n },
+                             { &x->product, n + 2 * m },
+                             { &x->da, n + 3 },
+                             { &x->scratch, n + 3 * m + 3 },
+                             { &x->row_scratch, m },
+                             { &x->symmetry, 3 * size },
+                             { &x->later, 2 * n },
+                             { &x->probe, 2 * n },
+                             { &x->probe_a, n },
+                             { &x->probe_da, n },
+                             { &x->residual, 4 * (2 * m + n) + 15 },
+                             { &x->left_vectors, x->modes ? size * size + size : 0 },
+                             { &x->upper_rows, 4 * size } };
   x->memory = pw_alloc_arrays (array, sizeof array / sizeof *array);
   return x->memory ? PW_OK : PW_RESOURCE;
 }
@@ -52,7 +50,7 @@ void pw_linear_close (pw_linearisation *x) {
   free (x->memory);
 }
 
-/* The independent constraint equations; holonomic ones are first in J. */
+/* Lists the independent constraint equations and counts the minimal coordinates. */
 static int linear_rows (pw_linearisation *x) {
   x->row = malloc (((size_t)x->m + 1) * sizeof *x->row);
   for (int i = 0; x->row && i < x->m; i++) {
@@ -85,18 +83,18 @@ int pw_linear_open (pw_linearisation *x, pw_run *r, pw_linear_extent extent, int
   return status;
 }
 
-/* Changes of a state, in units of the scene, and the least change of the accelerations that counts as a jump. */
+/* In units of the scene: two changes of a state, and the least change of the accelerations that counts as a jump. */
 static const double LINEAR_FAR = 1e-6, LINEAR_NEAR = 1e-8, LINEAR_JUMP = 1e-6;
 
 /* The change of the accelerations, in units of the scene, if state j changes by `part` of its unit. */
 static double linear_change (pw_linearisation *x, int j, double part) {
   pw_run *r = x->r;
   int n = x->n;
-  double T = r->w->scale.time, most = 0, *q = x->dx, *v = q + n;
+  double T = r->w->scale.time, most = 0, *q = x->dx, *v = q + n, *lambda = x->scratch;
   memcpy (q, r->q, (size_t)n * sizeof *q);
   memcpy (v, r->v, (size_t)n * sizeof *v);
   *(j < n ? q + j : v + j - n) += part * pw_unit (r->s, j % n) / (j < n ? 1 : T);
-  if (pw_run_accelerate (r, r->t, q, v, x->da, x->scratch) != PW_OK) return 0;
+  if (pw_run_accelerate (r, r->t, q, v, x->da, lambda) != PW_OK) return 0;
   for (int i = 0; i < n; i++) most = fmax (most, fabs (x->da[i] - x->a[i]) * T * T / pw_unit (r->s, i));
   return most;
 }
@@ -112,7 +110,7 @@ static int linear_jump (pw_linearisation *x) {
   return -1;
 }
 
-/* The current state is evaluated last, so that the workspace is left there. */
+/* Computes all but the counts.  The current state is evaluated last, so that the workspace is left there. */
 static int linear_compute (pw_linearisation *x, pw_linear *l, pw_error *error) {
   pw_run *r = x->r;
   char name[120];
@@ -145,16 +143,14 @@ static int linear_run (pw_run *r, int most, pw_linear_extent extent, pw_linear *
   *l = (pw_linear){ .least = NAN };
   if (pw_require (r, "a run", error) != PW_OK) return PW_INPUT;
   pw_statistics before = r->statistics;
-  int near = r->near_singular, status = pw_linear_open (&x, r, extent, most);
-  l->coordinates = x.n;
-  l->rank = x.rank;
-  l->positions = x.positions;
-  l->velocities = x.velocities;
-  l->unknowns = x.size;
+  int near_singular = r->near_singular, status = pw_linear_open (&x, r, extent, most);
+  l->coordinates = x.n, l->rank = x.rank;
+  l->positions = x.positions, l->velocities = x.velocities, l->unknowns = x.size;
+  if (status == PW_OK && x.n <= most) status = pw_run_check_derivatives (r, "the linearisation", "needs", error);
   if (status == PW_OK && x.n <= most) status = linear_compute (&x, l, error);
   pw_linear_close (&x);
   r->statistics = before;
-  r->near_singular = near;
+  r->near_singular = near_singular;
   return status == PW_RESOURCE ? pw_fail_memory (r->s, error) : status;
 }
 

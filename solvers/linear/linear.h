@@ -1,6 +1,6 @@
 /* A linearisation in progress, for linear*.c and for analyses that need its parts.  The system has n coordinates and m
  * constraint equations; a variation of the state is dx = (dq, dv), and has `size` minimal coordinates: first those of
- * positions, then those of velocities (equations in linear_variation.c). */
+ * positions, then those of velocities.  The equations are in linear_variation.c. */
 #ifndef PW_LINEAR_H
 #define PW_LINEAR_H
 
@@ -39,7 +39,7 @@ typedef struct {
   double *product;               /* n + 2 m: derivatives of J^T lambda - f, gamma - J a, J v - eta, times dx */
   double *da;                    /* n + 3: the resulting variation of accelerations */
   double *scratch, *row_scratch; /* n + 3 m + 3, m */
-  double *residual;              /* 3 x (2 m + n): violations by rigid displacements; then scratch, 2 m + n + 15 */
+  double *residual;              /* 3 x (2 m + n): asymmetries of rigid displacements; then scratch, 2 m + n + 15 */
   double *probe, *probe_da;      /* 2 n, n: a variation at the current state, and its da (linear_frame.c) */
   double *probe_a;               /* n: accelerations at the current state */
   double *later;                 /* 2 n: a later state */
@@ -51,8 +51,8 @@ typedef struct {
   int entries;
   char *memory;
   int modes;            /* 1: PW_WITH_MODES, which needs the following */
-  double *left_vectors; /* size^2 + size: eigenvectors of the split matrix, then imaginary parts of its eigenvalues */
-  double *upper_rows;   /* 3 x size: of the split matrix; then scratch, size */
+  double *left_vectors; /* size^2 + size: left eigenvectors of A22^T, then imaginary parts of its eigenvalues */
+  double *upper_rows;   /* 3 x size: [ A11 A12 ] (linear_modes.c); then scratch, size */
   double tau[3];        /* scalars of the reflections in `symmetry` */
 } pw_linearisation;
 
@@ -78,7 +78,7 @@ double pw_linear_least (pw_linearisation *x);
 void pw_linear_bases (pw_linearisation *x);
 /* Evaluates accelerations and derivatives at a state; kinematics are left there.  Returns as pw_run_accelerate. */
 int pw_linear_evaluate (pw_linearisation *x, double t, const double *q, const double *v);
-/* Compute `product` from the variation dx; `product` and da. */
+/* Compute `product` from the variation dx; both `product` and da. */
 void pw_linear_multiply (pw_linearisation *x);
 void pw_linear_vary (pw_linearisation *x);
 /* Sets dx to the variation along minimal coordinate c. */
@@ -92,9 +92,9 @@ void pw_linear_rotate (const pw_linearisation *x, double angle, const double *in
 
 /* ---- linear_eigenvalues.c ---- */
 
-/* Splits off rigid displacements of the whole, an invariant subspace with known eigenvalues (in a rotating frame a
- * displaced motion rotates at -w), so that they do not cause defective zeros; then computes the other eigenvalues.
- * Into l, sorted. */
+/* Fills re, im and rigid, sorted, and with modes the shapes.  Rigid displacements of the whole are split off, an
+ * invariant subspace with known eigenvalues (in a rotating frame a displaced motion rotates at -w), so that they do not
+ * cause defective zeros.  Errors: PW_METHOD, PW_RESOURCE. */
 int pw_linear_eigenvalues (pw_linearisation *x, pw_linear *l, pw_error *error);
 
 /* ---- linear_modes.c ---- */
@@ -109,10 +109,10 @@ int pw_linear_shapes (pw_linearisation *x, int k, pw_linear *l);
 /* Chooses the frame in which the accelerations of the evaluated state are smallest. */
 void pw_linear_choose_frame (pw_linearisation *x);
 /* What the variation dx changes, in units of the scene, 0 for a symmetry: residuals of the constraints, then n
- * accelerations; turns: 1 if it is a rotation of the whole by 1 rad, with which accelerations rotate. */
+ * accelerations; turns: 1 if dx is a rotation of the whole by 1 rad, with which accelerations rotate. */
 void pw_linear_asymmetry (pw_linearisation *x, int turns, double *out);
-/* Number of rigid displacements of the whole (x, y, phi) under which the equations are invariant to first order; their
- * directions go to `symmetry`. */
+/* Number of rigid displacements of the whole (x, y, phi) under which the equations are invariant to first order; stores
+ * their directions in `symmetry`. */
 int pw_linear_symmetries (pw_linearisation *x);
 /* Determines whether A is constant along the motion; see pw_linear.  Leaves the workspace at the current state. */
 pw_steadiness pw_linear_steady (pw_linearisation *x);

@@ -31,11 +31,6 @@ static void eigen_perturb (int n, double least, double *B) {
   }
 }
 
-static int eigen_ascending (const void *a, const void *b) {
-  double x = *(const double *)a, y = *(const double *)b;
-  return (x > y) - (x < y);
-}
-
 /* The shift of each eigenvalue by the perturbation: the distance to the nearest one of the perturbed matrix (re2, im2);
  * with moduli in ascending order, the difference to the modulus of the same rank if that is larger, since the nearest
  * one is not meaningful among many defective ones; at least `least`.  re2 becomes the sorted moduli. */
@@ -47,7 +42,7 @@ static void eigen_shift (int n, const double *re, const double *im, double *re2,
     shift[i] = fmax (shift[i], least);
   }
   for (int k = 0; k < n; k++) re2[k] = hypot (re2[k], im2[k]);
-  qsort (re2, (size_t)n, sizeof *re2, eigen_ascending);
+  qsort (re2, (size_t)n, sizeof *re2, pw_ascending);
   for (int i = 0; i < n; i++) {
     double size = hypot (re[i], im[i]);
     int rank = 0;
@@ -93,25 +88,23 @@ static int eigen_before (const pw_linear *l, int i, int k) {
   return l->im[i] > l->im[k];
 }
 
-/* Exchanges the shapes i and i - 1. */
-static void eigen_swap_shapes (pw_linear *l, int i) {
-  int length = 4 * l->coordinates;
-  double *one = l->shape + (size_t)i * (size_t)length, *other = one - length;
+/* Exchanges `length` numbers with those before them. */
+static void eigen_swap (double *x, int length) {
   for (int k = 0; k < length; k++) {
-    double kept = one[k];
-    one[k] = other[k];
-    other[k] = kept;
+    double kept = x[k];
+    x[k] = x[k - length], x[k - length] = kept;
   }
 }
 
 static void eigen_sort (pw_linear *l) {
+  const int length = 4 * l->coordinates; /* of a shape */
   for (int i = 1; i < l->unknowns; i++)
     for (int j = i; j > 0 && eigen_before (l, j, j - 1); j--) {
-      double re = l->re[j], im = l->im[j];
       unsigned char rigid = l->rigid[j];
-      l->re[j] = l->re[j - 1], l->im[j] = l->im[j - 1], l->rigid[j] = l->rigid[j - 1];
-      l->re[j - 1] = re, l->im[j - 1] = im, l->rigid[j - 1] = rigid;
-      if (l->shape) eigen_swap_shapes (l, j);
+      l->rigid[j] = l->rigid[j - 1], l->rigid[j - 1] = rigid;
+      eigen_swap (l->re + j, 1);
+      eigen_swap (l->im + j, 1);
+      if (l->shape) eigen_swap (l->shape + (size_t)j * (size_t)length, length);
     }
 }
 

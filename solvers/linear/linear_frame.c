@@ -18,10 +18,10 @@
  * chosen. */
 static const double LINEAR_STEADY = 1e-6, LINEAR_EXACT = 1e-13;
 
-/* The unit of accelerations. */
+/* The unit of accelerations, L / T^2. */
 static double linear_unit (const pw_linearisation *x) {
-  const pw_scale *s = &x->r->w->scale;
-  return s->length / (s->time * s->time);
+  const pw_scale *scale = &x->r->w->scale;
+  return scale->length / (scale->time * scale->time);
 }
 
 /* ---- The frame ---- */
@@ -35,9 +35,9 @@ static void linear_set_residual (const pw_linearisation *x, pw_linear_frame *f) 
     double relative_y = v[j + 1] - f->twist[1] - w * (q[j] - f->origin[0]);
     most = pw_larger_or_nan (most, hypot (a[j] + w * v[j + 1], a[j + 1] - w * v[j]));
     most = pw_larger_or_nan (most, fabs (w) * hypot (relative_x, relative_y));
-    most = pw_larger_or_nan (most, fabs (a[j + 2]) * x->r->s->scale.length);
   }
-  for (int j = 3 * x->r->s->bodies; j < x->n; j++) most = pw_larger_or_nan (most, fabs (a[j]) * x->r->s->scale.length);
+  for (int j = 0; j < x->n; j++)
+    if (pw_is_angle (x->r->s, j)) most = pw_larger_or_nan (most, fabs (a[j]) * x->r->s->scale.length);
   f->acceleration = most;
   f->residual = most / linear_unit (x);
 }
@@ -122,7 +122,7 @@ void pw_linear_asymmetry (pw_linearisation *x, int turns, double *out) {
   for (int j = 0; j < x->n; j++) out[j] = x->da[j] * pw_length_factor (x->r->s, j) / linear_unit (x);
 }
 
-/* Tolerance of symmetries: round-off grows with the derivatives of the accelerations, by 1e-4 of their size. */
+/* The largest asymmetry of a symmetry: round-off, which grows by 1e-4 of the largest derivative of an acceleration. */
 static double linear_tolerance (const pw_linearisation *x) {
   double most = 0, T = x->r->w->scale.time;
   for (int i = x->positions; i < x->size; i++)
@@ -130,10 +130,11 @@ static double linear_tolerance (const pw_linearisation *x) {
   return PW_LINEAR_SYMMETRIC + 1e-4 * PW_LINEAR_SYMMETRIC * most;
 }
 
-/* The null space of the asymmetries, from their singular value decomposition; x->symmetry becomes a basis of it. */
+/* The null space of the asymmetries, from their singular value decomposition U sigma V^T; x->symmetry becomes a basis
+ * of it: sums of the three displacements, whose coefficients are the last rows of V^T. */
 int pw_linear_symmetries (pw_linearisation *x) {
   int length = x->holonomic + x->rank + x->n, symmetries = 0;
-  double tolerance = linear_tolerance (x), sigma[3], V[9], *work = x->residual + 3 * length;
+  double tolerance = linear_tolerance (x), sigma[3], VT[9], *work = x->residual + 3 * length;
   if (x->r->s->bodies == 0) return 0;
   for (int k = 0; k < 3; k++) {
     linear_displace (x, k);
@@ -142,22 +143,23 @@ int pw_linear_symmetries (pw_linearisation *x) {
   }
   for (int i = 0; i < 3 * length; i++)
     if (!isfinite (x->residual[i])) return 0;
-  if (LAPACKE_dgesvd_work (LAPACK_COL_MAJOR, 'N', 'A', length, 3, x->residual, length, sigma, NULL, 1, V, 3, work,
+  if (LAPACKE_dgesvd_work (LAPACK_COL_MAJOR, 'N', 'A', length, 3, x->residual, length, sigma, NULL, 1, VT, 3, work,
                            15 + length))
     return 0;
   while (symmetries < 3 && sigma[2 - symmetries] <= tolerance) symmetries++;
   for (int c = 0; c < x->size; c++) {
     double S[3] = { x->symmetry[c], x->symmetry[x->size + c], x->symmetry[2 * x->size + c] };
     for (int k = 0; k < symmetries; k++)
-      x->symmetry[k * x->size + c] = V[2 - k] * S[0] + V[5 - k] * S[1] + V[8 - k] * S[2];
+      x->symmetry[k * x->size + c] = VT[2 - k] * S[0] + VT[5 - k] * S[1] + VT[8 - k] * S[2];
   }
   return symmetries;
 }
 
 /* ---- Steadiness ---- */
 
-/* The state of a steady motion after a time: rotated with the frame about its origin, which has moved along an arc.
- * Angles, internal coordinates, and all coordinates if the frame does not rotate, continue at constant velocity. */
+/* The state to which a steady motion leads after a time: rotated with the frame about its origin, which has moved along
+ * an arc.  Angles, internal coordinates, and all coordinates if the frame does not rotate, continue at constant
+ * velocity. */
 static void linear_later (const pw_linearisation *x, double time, double *q, double *v) {
   const pw_linear_frame *f = &x->frame;
   double w = f->twist[2], c = pw_cos (w * time), s = pw_sin (w * time);

@@ -30,7 +30,7 @@ static void modes_input (pw_linearisation *x, const pw_element_batch *k, int e, 
   pw_linear_coordinates (x, x->dx, x->da, x->r->s->sources, column);
 }
 
-/* Fills B; NAN for signals of constraints. */
+/* Fills B, column by column; NAN for signals of constraints. */
 static void modes_inputs (pw_linearisation *x, double *B) {
   pw_workspace *w = x->r->w;
   int inputs = x->r->s->sources;
@@ -67,7 +67,7 @@ static int modes_near_rigid (const pw_linearisation *x, int k, double complex mu
   return (k != 2 && cabs (mu) <= bound) || (k >= 2 && (cabs (mu - I * w) <= bound || cabs (mu + I * w) <= bound));
 }
 
-/* Sets the first k entries of y, the rigid part of the mode, from the others. */
+/* Sets the first k entries of y, y1, from the others, y2; 0 if they are not unique. */
 static void modes_rigid_part (const pw_linearisation *x, int k, double complex mu, double complex *y) {
   double complex M[9];
   int pivot[3];

@@ -1,13 +1,12 @@
-/* The equations of motion linearised on the constraints, in a frame that moves with the motion: degrees of freedom,
- * eigenvalues, the step RK4 can take.
+/* The equations of motion linearised on the constraints, in a frame that moves with the motion.
  *
  * A state obeys g (q, t) = 0 and J v = eta, so that variations obey  G dq = 0,  J dv = -B dq,  B = (J v)_q - eta_q.
  * With orthonormal bases N_q of the null space of G and N_v of that of J (both from one QR factorisation of J^T,
- * holonomic equations first, in units of the scene) they are
+ * holonomic equations first, in units of the scene) the variations are
  *
  *     dq = N_q z,   dv = N_v u / T - J^+ B N_q z,
  *
- * with T the time scale of the scene; z and u are minimal coordinates of the neighbouring states.  The variations of
+ * with T the time scale of the scene; z and u are the minimal coordinates of the variation.  The variations of
  * the accelerations follow from the saddle-point system
  *
  *     [ M J^T ; J 0 ] (da, dlambda) = ( (f_q - (J^T lambda)_q) dq + f_v dv,  (gamma_q - (J a)_q) dq + gamma_v dv ),
@@ -17,8 +16,8 @@
  *
  *     z' = N_q^T (dv - W dq),   u' = T N_v^T (da - W dv),   W (x, y, phi) = w (-y, x, 0) for each body.
  *
- * The eigenvalues of this matrix A are the exponents of disturbances of a steady motion; linear_frame.c finds the
- * frame, and whether the motion is steady.  (Null-space form: Garcia de Jalon & Bayo 1994, Kinematic and Dynamic
+ * Perturbations of a steady motion grow as exp (mu t) with the eigenvalues mu of this matrix A; linear_frame.c finds
+ * the frame, and whether the motion is steady.  (Null-space form: Garcia de Jalon & Bayo 1994, Kinematic and Dynamic
  * Simulation of Multibody Systems.  Relative equilibria: Marsden & Ratiu 1999, Introduction to Mechanics and
  * Symmetry.) */
 #include <lapacke.h>
@@ -30,7 +29,8 @@
 
 /* ---- Derivatives ---- */
 
-/* Adds the derivatives with respect to q; v: (J^T lambda)_q - f_q; -f_v; gamma_q - (J a)_q; gamma_v; B. */
+/* Adds the derivatives with respect to q and v, by rows: (J^T lambda)_q - f_q and -f_v; gamma_q - (J a)_q and gamma_v;
+ * B and 0. */
 static void linear_put (pw_linearisation *x, const double *v) {
   const int n = x->n, of_J = n + x->m;
   const struct {
@@ -101,10 +101,6 @@ static double *linear_column (const pw_linearisation *x, int j) {
   return x->Q + (size_t)j * (size_t)x->n;
 }
 
-static int linear_stride (int n) {
-  return n > 1 ? n : 1; /* LAPACK refuses 0 */
-}
-
 /* The rows of J of the independent equations, of length 1, to Q. */
 static void linear_independent (pw_linearisation *x) {
   size_t n = (size_t)x->n;
@@ -134,10 +130,10 @@ void pw_linear_bases (pw_linearisation *x) {
 
 /* ---- The reduced system ---- */
 
-/* dv -= J^+ B dq: solves R^T b = B dq, dv -= Q b. */
+/* dv -= J^+ B dq, with B dq in `product`: solves R^T b = B dq, dv -= Q b. */
 static void linear_follow (pw_linearisation *x) {
   double *b = x->row_scratch;
-  int stride = linear_stride (x->rank);
+  const int stride = x->rank > 1 ? x->rank : 1; /* LAPACK refuses 0 */
   for (int i = 0; i < x->rank; i++) b[i] = x->product[x->n + x->m + x->row[i]] / x->norm[x->row[i]];
   LAPACKE_dtrtrs_work (LAPACK_COL_MAJOR, 'U', 'T', 'N', x->rank, 1, x->R, stride, b, stride);
   for (int i = 0; i < x->rank; i++)

@@ -123,7 +123,7 @@ int pw_rk_advance_fixed (pw_run *r, double t_end, pw_error *error) {
   double h = whole && !was_off_grid ? r->settings.step : t1 - r->t;
   int status = pw_rk_step (r, h, t1, project, r->settings.ledger ? &added_energy : NULL);
   int ends_singular =
-      r->near_singular && r->geometry.evaluated_sine < r->limits.ends_singular * r->geometry.checked_sine;
+      r->near_singular && r->watchdog.evaluated_sine < r->limits.ends_singular * r->watchdog.checked_sine;
   d->off_grid = r->near_singular && !was_off_grid;
   double stop = whole ? fmin (t_end, r->breakpoint) : t1, t = t1;
   if (d->off_grid) status = fixed_step_around (r, status, ends_singular, t1, stop, project, &t);

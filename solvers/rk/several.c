@@ -16,7 +16,7 @@ static int several_possible (const pw_run *r) {
     return 0;
   if (d->projects && !(d->every == 1 && d->projector.mass_metric && !d->projector.ignores_inactive)) return 0;
   return pw_specialised_suits (r) && r->redundant == 0 && r->alpha + r->beta == 0 && !r->settings.ledger &&
-         !r->interrupted && r->stalled == 0 && !(r->geometry.saddle && r->geometry.singular_ahead) &&
+         !r->interrupted && r->stalled == 0 && !(r->watchdog.saddle && r->watchdog.singular_ahead) &&
          r->statistics.steps >= PW_CHECK_INTERVAL;
 }
 
@@ -39,7 +39,7 @@ static int several_count (const pw_run *r, double t, double t_end) {
 /* The watchdog's data in the form that specialised code uses. */
 static pw_scene_watch several_watchdog (const pw_run *r) {
   const pw_thresholds *limit = &r->limits;
-  const pw_geometry *g = &r->geometry;
+  const pw_watchdog *g = &r->watchdog;
   const double length = r->s->scale.length, time_squared = r->w->scale.time * r->w->scale.time;
   pw_scene_watch x = { .sine = INFINITY, .moved = g->moved, .reference = r->reference_level };
   x.lost = pw_stabilised_by (r, PW_UNSTABILISED) ? limit->lost_unstabilised : limit->lost;
@@ -56,7 +56,7 @@ static pw_scene_watch several_watchdog (const pw_run *r) {
 static void several_record (pw_run *r, const pw_scene_steps *x) {
   struct pw_method_data *d = r->data;
   pw_statistics *s = &r->statistics;
-  pw_geometry *g = &r->geometry;
+  pw_watchdog *g = &r->watchdog;
   r->t = x->t;
   d->last.t = x->t0, d->last.projected = r->projected;
   d->counter.count += x->done;
@@ -86,7 +86,6 @@ static int several_plan (pw_run *r, double t, double t_end, pw_scene_steps *x) {
   x->state0 = d->last.q, x->ledger0 = d->last.ledger, x->rate0 = d->last.rate;
   x->V = d->stage_v, x->A = d->stage_a, x->R = d->stage_rate;
   x->configuration = r->w->configuration, x->J = r->w->J;
-  pw_specialised_scale (r);
   return count;
 }
 

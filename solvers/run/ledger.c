@@ -56,7 +56,7 @@ void pw_ledger_record (pw_run *r) {
 }
 
 void pw_ledger_rates (pw_run *r, const double *lambda, double *rate) {
-  if (r->redundant_moves && pw_saddle_factor (r->saddle) == PW_OK) {
+  if (r->redundant_drive && pw_saddle_factor (r->saddle) == PW_OK) {
     memcpy (r->least_norm, lambda, (size_t)r->s->rows * sizeof *lambda);
     pw_rank_least_norm (r, r->least_norm);
     lambda = r->least_norm;
@@ -66,11 +66,12 @@ void pw_ledger_rates (pw_run *r, const double *lambda, double *rate) {
 
 int pw_project_with_energy (pw_projector *p, pw_run *r, double t, double *q, double *v, double *a, double *lambda,
                             double *added_energy) {
-  int status = added_energy ? pw_update_kinematics (r->w, t, q, v) : PW_OK;
+  if (added_energy == NULL) return pw_project_state (p, r, t, q, v, a, lambda);
+  int status = pw_update_kinematics (r->w, t, q, v);
   if (status != PW_OK) return status;
-  double before = added_energy ? pw_energy (r, v) : 0;
+  double before = pw_energy (r, v);
   status = pw_project_state (p, r, t, q, v, a, lambda);
-  if (status == PW_OK && added_energy) *added_energy += pw_energy (r, v) - before;
+  if (status == PW_OK) *added_energy += pw_energy (r, v) - before;
   return status;
 }
 
@@ -80,13 +81,13 @@ int pw_ledger_uses_multipliers (const pw_system *s) {
   return reacts;
 }
 
-/* If kinetic and potential energies are negligible, as for light bodies against friction, the scale is the work done.
- * This grows without bound, so it is limited to that of a time T. */
+/* If kinetic and potential energies are negligible, as for light bodies against friction, the scale is the work done,
+ * which grows without bound; so that of a time T at the most. */
 double pw_ledger_tolerance (const pw_run *r, double h) {
-  const double share = 5;         /* sqrt (25): as strict as for one state of 25 in a root mean square */
+  const double share = 5;         /* sqrt (25): the error of one of 25 states whose root mean square is 1 tolerance */
   const double round_off = 1e-11; /* of powers, due to multipliers */
-  const pw_settings *set = &r->settings;
-  double work = 0, rtol = fmax (set->rtol, set->atol > 0 ? set->atol / fmax (r->s->scale.length, 1) : 0);
+  const pw_settings *settings = &r->settings;
+  double work = 0, rtol = fmax (settings->rtol, settings->atol > 0 ? settings->atol / fmax (r->s->scale.length, 1) : 0);
   for (int i = 0; i < r->s->entries; i++) work += fabs (r->ledger[i]);
   double energy = fmax (fmax (r->scene_energy, r->exchanged), fmin (work, r->power * r->w->scale.time));
   double tolerance = share * rtol * energy + round_off * fabs (h) * r->power + 16 * DBL_EPSILON * work;
@@ -104,13 +105,13 @@ double pw_run_energy_defect (const pw_run *r, const pw_sample *sample) {
 const char *pw_run_energy_advice (const pw_run *r, double defect) {
   const double least_rtol = 1e-12; /* that round-off allows */
   const double per_step = 10;      /* acceptable defect of a step over rtol */
-  const pw_statistics *s = &r->statistics;
+  const pw_statistics *now = &r->statistics;
   int projects = pw_stabilised_by (r, PW_PROJECTION);
-  if (!projects && fmax (s->position, s->velocity) > 0.1 * defect)
+  if (!projects && fmax (now->position, now->velocity) > 0.1 * defect)
     return "the constraints have drifted; a method with projection satisfies them";
   if (pw_fixed_steps (r)) return "a smaller step, or another method, follows the motion better";
   if (r->settings.rtol <= least_rtol) return "the tolerance cannot be much smaller; compare with another method";
-  if (defect > per_step * r->settings.rtol * (double)s->steps)
+  if (defect > per_step * r->settings.rtol * (double)now->steps)
     return "that is more than the tolerance explains; compare with another method";
   return "a smaller tolerance, or another method, follows the motion better";
 }

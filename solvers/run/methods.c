@@ -1,4 +1,5 @@
-/* The table of integrators; reading the names of methods: integrator[+stabilisation][:option=value]... */
+/* The table of integrators; their options; reading the names of methods:
+ * integrator[+stabilisation][:option=value]... */
 #include <assert.h>
 #include <locale.h>
 #include <math.h>
@@ -21,7 +22,7 @@ const pw_method *const pw_methods[] = {
 
 enum { METHODS_PART = 80 }; /* characters of a part of a method, with the final 0 */
 
-/* Reads one part of the method, up to one of the characters `ends`; for errors, is_a: "a name", whole: the method. */
+/* Reads one part of the method, up to one of the characters `ends`; for errors: is_a, "a name"; whole, the method. */
 static int methods_part (char part[METHODS_PART], const char **text, const char *ends, const char *is_a,
                          const char *whole, pw_error *error) {
   size_t n = strcspn (*text, ends);
@@ -144,6 +145,12 @@ int pw_parse_options (const char *text, const pw_method *const *own, const pw_me
 int pw_method_parse (const char *text, const pw_method **method, int *stabilisation, pw_error *error) {
   double values[PW_MAX_OPTIONS];
   return pw_parse_options (text, NULL, method, stabilisation, values, error);
+}
+
+double pw_run_option (const pw_run *r, const char *name) {
+  int i = 0;
+  while (r->method->options[i].name && strcmp (r->method->options[i].name, name) != 0) i++;
+  return r->method->options[i].name ? r->option[i] : 0;
 }
 
 #define METHODS_STEP_RATIO 20. /* typical ratio of an adaptive step at rtol 1e-6 to the model's fixed step */

@@ -39,10 +39,11 @@ int pw_step_restart (pw_run *r, pw_error *error) {
 int pw_step_open (pw_run *r, int arrays, pw_error *error) {
   struct pw_method_data *d = r->data = calloc (1, sizeof *d);
   size_t n = (size_t)r->s->coords + 3, rows = (size_t)r->s->rows;
-  if (d) d->length = n > rows ? n : rows;
-  const pw_array array[] = { { &d->a, n }, { &d->lambda, rows }, { &d->array, (size_t)arrays * (d ? d->length : 0) } };
-  if (d) d->memory = pw_alloc_arrays (array, sizeof array / sizeof *array);
-  if (d == NULL || d->memory == NULL) return pw_fail_memory (r->s, error);
+  if (d == NULL) return pw_fail_memory (r->s, error);
+  d->length = n > rows ? n : rows;
+  const pw_array array[] = { { &d->a, n }, { &d->lambda, rows }, { &d->array, (size_t)arrays * d->length } };
+  d->memory = pw_alloc_arrays (array, sizeof array / sizeof *array);
+  if (d->memory == NULL) return pw_fail_memory (r->s, error);
   d->projects = pw_stabilised_by (r, PW_PROJECTION);
   pw_dense_projection projection = d->projects ? PW_DENSE_POSITIONS_AND_VELOCITIES : PW_DENSE_UNPROJECTED;
   int status = pw_dense_output_open (&d->last, r, projection, error);

@@ -74,7 +74,7 @@ void pw_run_close (pw_run *r) {
   if (r == NULL) return;
   run_close_method (r);
   pw_saddle_close (r->saddle);
-  pw_watchdog_close (r);
+  pw_saddle_close (r->watchdog.saddle);
   free (r->rank_memory);
   free (r->scene_memory);
   pw_workspace_free (r->w);
@@ -92,7 +92,7 @@ static int run_restart_method (pw_run *r, pw_error *error) {
 
 int pw_run_renew (pw_run *r, pw_references references, pw_error *error) {
   int status = pw_run_open_saddle (r, error);
-  r->geometry.singular_ahead = 1;
+  r->watchdog.singular_ahead = 1;
   if (status == PW_OK) status = pw_run_evaluate (r, error);
   if (status == PW_OK && references == PW_NEW_REFERENCES)
     pw_run_set_references (r);
@@ -113,7 +113,7 @@ static int run_has_no_method (const pw_run *r, pw_error *error) {
 }
 
 /* If the active rows have become nearly dependent, looks for another set that is not, with which the method is
- * reopened. This is done only before the next step, since until then the last one may be sampled. */
+ * reopened.  This is done only before the next step, since until then the last one may be sampled. */
 static int run_reselect (pw_run *r, pw_error *error) {
   if (r->redundant == 0 || r->independence >= r->reselect_below) return PW_OK;
   r->reselect_below = r->independence / 2;
@@ -265,7 +265,7 @@ int pw_run_restart (pw_run *r, const double *q, const double *v, pw_error *error
   r->w->t_signal = NAN;
   run_exchange (r, q, v);
   r->near_singular = 0;
-  r->geometry.singular_ahead = 1;
+  r->watchdog.singular_ahead = 1;
   status = run_select_rows (r, error);
   if (status == PW_OK) status = pw_run_make_consistent (r, NULL, error);
   if (status == PW_OK) status = pw_run_evaluate (r, error);

@@ -33,7 +33,7 @@ static void checkpoint_state (pw_run *r, pw_archive *a) {
   size_t n = (size_t)r->s->coords * sizeof (double), entries = (size_t)r->s->entries * sizeof (double);
   double *const number[] = {
     &r->t,     &r->breakpoint,      &r->projected,     &r->energy0,      &r->potential0,     &r->exchanged,
-    &r->power, &r->reference_level, &r->previous_norm, &r->independence, &r->reselect_below, &r->geometry.largest_sine
+    &r->power, &r->reference_level, &r->previous_norm, &r->independence, &r->reselect_below, &r->watchdog.largest_sine
   };
   for (size_t i = 0; i < sizeof number / sizeof *number; i++) pw_archive_bytes (a, number[i], sizeof (double));
   pw_archive_bytes (a, &r->speed_record, sizeof r->speed_record);
@@ -43,13 +43,6 @@ static void checkpoint_state (pw_run *r, pw_archive *a) {
   pw_archive_bytes (a, r->ledger, entries);
   checkpoint_statistics (&r->statistics, a);
   pw_rank_serialise (r, a);
-}
-
-/* 1 if a run can have reached the state: a file may be intact and yet not have been written by a run. */
-static int checkpoint_plausible (const pw_run *r) {
-  int plausible = isfinite (r->t) && r->t >= r->settings.t;
-  for (int i = 0; i < r->s->coords; i++) plausible &= isfinite (r->q[i]) && isfinite (r->v[i]);
-  return plausible;
 }
 
 /* Continues from the state in the run, after saving or loading; `a` is loading, at the method's own data, if any. */
@@ -84,7 +77,7 @@ int pw_run_load (pw_run *r, pw_archive *a, pw_error *error) {
   int same_sizes = checkpoint_sizes (r, a);
   if (same_sizes) checkpoint_state (r, a);
   if (!same_sizes || a->failed) return pw_fail (error, PW_INPUT, "the saved state is not of this run");
-  if (!checkpoint_plausible (r))
+  if (!isfinite (r->t) || r->t < r->settings.t || !pw_is_finite_state (r, r->q, r->v)) /* not written by a run */
     return pw_fail (
         error, PW_INPUT,
         "the saved state is not that of a run: its time, t = %g s, or a coordinate or velocity is impossible", r->t);

@@ -44,11 +44,18 @@ static int run_allocate (pw_run *r) {
   const pw_system *s = r->s;
   size_t n = (size_t)s->coords + 3, rows = (size_t)s->rows, entries = (size_t)s->entries;
   size_t state = pw_state_length (s), scratch = 2 * n + 3 * rows, matrix = s->saturates ? 2 * n : 0;
-  const pw_array array[] = {
-    { &r->q, state },           { &r->ledger, entries },      { &r->rate, entries },       { &r->q_at, state },
-    { &r->ledger_at, entries }, { &r->scratch, scratch },     { &r->q_given, n },          { &r->v_given, n },
-    { &r->saturation, 2 * n },  { &r->matrix_state, matrix }, { &r->matrix_range, matrix }
-  };
+  const pw_array array[] = { { &r->q, state },
+                             { &r->ledger, entries },
+                             { &r->rate, entries },
+                             { &r->q_at, state },
+                             { &r->ledger_at, entries },
+                             { &r->scratch, scratch },
+                             { &r->q_given, n },
+                             { &r->v_given, n },
+                             { &r->saturation, 2 * n },
+                             { &r->matrix_state, matrix },
+                             { &r->matrix_range, matrix },
+                             { &r->watchdog.previous_q, n } };
   r->memory = pw_alloc_arrays (array, sizeof array / sizeof *array);
   r->origin = malloc (2 * n);
   if (r->memory == NULL || r->origin == NULL) return PW_RESOURCE;
@@ -77,7 +84,7 @@ static int run_initial_values (pw_run *r, const pw_settings *settings, pw_error 
   return pw_watchdog_check_values (r, error);
 }
 
-/* T: the shortest time scale of the initial velocities, the accelerations and the span. */
+/* The time scale T: see pw_scale. */
 static double run_time_scale (const pw_run *r) {
   const pw_system *s = r->s;
   double fastest = 1 / r->settings.span;
@@ -89,10 +96,7 @@ static double run_time_scale (const pw_run *r) {
 }
 
 /* Opens the saddle at the consistent initial state and evaluates the accelerations there; if some rows are nearly
- * dependent, an independent set is selected first.
- *
- * Round-off leaves a dependent row a sine of 1e-8, and of 1e-5 after others that are nearly dependent themselves: below
- * `rank_suspect` the rank is examined by orthogonalisation, if the scene is small enough. */
+ * dependent, an independent set is selected first, unless the scene is too large for that. */
 static int run_first_evaluation (pw_run *r, pw_error *error) {
   int status = pw_run_open_saddle (r, error);
   if (status != PW_OK) return status;
@@ -104,7 +108,7 @@ static int run_first_evaluation (pw_run *r, pw_error *error) {
     if (status == PW_OK && r->redundant) status = pw_run_open_saddle (r, error);
     if (status != PW_OK) return status;
   }
-  r->geometry.singular_ahead = 1;
+  r->watchdog.singular_ahead = 1;
   status = pw_run_evaluate (r, error);
   if (status == PW_OK) pw_run_set_references (r);
   return status;
@@ -129,17 +133,18 @@ static int run_check_finite (pw_run *r, pw_error *error) {
                   pw_system_state_name (r->s, infinite, element, sizeof element));
 }
 
-/* Refuses a method that needs a derivative that an element type lacks: its matrix would be wrong. */
-static int run_check_derivatives (pw_run *r, const char *method, pw_error *error) {
+int pw_run_check_derivatives (pw_run *r, const char *user, const char *needs, pw_error *error) {
   char block[200];
-  if (!r->uses_derivatives) return PW_OK;
+  const pw_source *failed = r->w->failed;
   int found = pw_find_missing_block (r->w, r->t, r->q, r->v, block, sizeof block);
+  r->w->failed = failed;
+  if (pw_update_kinematics (r->w, r->t, r->q, r->v) != PW_OK) return pw_fail_signal (r->t, error);
   if (found == PW_RESOURCE) return pw_fail_memory (r->s, error);
-  if (found == 0) return pw_update_kinematics (r->w, r->t, r->q, r->v) == PW_OK ? PW_OK : pw_fail_signal (r->t, error);
+  if (found == 0) return PW_OK;
   return pw_fail (
       error, PW_INPUT,
-      "model %s: %s is left out, but it is not zero, and %s needs it: add it, or PW_BY_DIFFERENCES in its place",
-      r->s->model, block, method);
+      "model %s: %s is left out, but it is not zero, and %s %s it: add it, or PW_BY_DIFFERENCES in its place",
+      r->s->model, block, user, needs);
 }
 
 static int run_open (pw_run *r, const char *method, const pw_settings *settings, pw_error *error) {
@@ -156,7 +161,7 @@ static int run_open (pw_run *r, const char *method, const pw_settings *settings,
   if (status != PW_OK) return status;
   r->t = r->settings.t;
   pw_hold_signals (r->w, 0);
-  r->w->scale.time = r->settings.span;
+  r->w->scale.time = r->settings.span; /* until the accelerations are known */
   status = pw_run_make_consistent (r, r->origin, error);
   if (status == PW_OK) status = run_first_evaluation (r, error);
   if (status == PW_OK) status = run_check_finite (r, error);
@@ -172,7 +177,8 @@ static int run_open (pw_run *r, const char *method, const pw_settings *settings,
   if (pw_stabilised_by (r, PW_BAUMGARTE)) r->alpha = pw_run_option (r, "alpha"), r->beta = pw_run_option (r, "beta");
   status = pw_specialised_open (r, error);
   if (status == PW_OK) status = r->method->open (r, error);
-  return status == PW_OK ? run_check_derivatives (r, method, error) : status;
+  if (status != PW_OK || !r->uses_derivatives) return status;
+  return pw_run_check_derivatives (r, method, "needs", error);
 }
 
 pw_run *pw_run_open (const pw_system *s, const char *method, const pw_settings *settings, pw_error *error) {

@@ -13,7 +13,7 @@ enum { PROFILE_REPETITIONS = 5 }; /* of a measurement, of which the median count
 #define PROFILE_MEASUREMENT 0.005 /* minimum processor time of a measurement [s] */
 #define PROFILE_DISTANCE 1e-10 /* displacement off the constraints before a projection, in units of the length scale */
 
-/* What is measured: PROFILE_STAGES stages of an evaluation, then others. */
+/* What is measured: PROFILE_STAGES stages of an evaluation, then other parts. */
 typedef enum {
   PROFILE_KINEMATICS,
   PROFILE_EQUATIONS,
@@ -28,7 +28,7 @@ typedef enum {
   PROFILE_J_GAMMA,
   PROFILE_FORCE,
   PROFILE_G
-} profile_work;
+} profile_part;
 
 typedef struct {
   pw_run *r;
@@ -43,18 +43,18 @@ typedef struct {
   char *memory;
 } profile;
 
-/* Does work on the batch p->k. */
-static void profile_do_batch (profile *p, profile_work work) {
+/* Does a part for the batch p->k. */
+static void profile_do_batch (profile *p, profile_part part) {
   const pw_element_batch *k = p->k;
   const pw_kind *kind = k->kind;
-  if (work == PROFILE_SIGNALS)
+  if (part == PROFILE_SIGNALS)
     for (int i = 0; i < k->b.count * kind->signals; i++)
       pw_signal_eval (&k->source[i], p->t, pw_kind_signals_force (kind) ? PW_SIGNAL_VALUE : PW_SIGNAL_DERIVATIVES,
                       k->u + 3 * i);
-  else if (work == PROFILE_J_GAMMA) {
+  else if (part == PROFILE_J_GAMMA) {
     kind->J (&k->b, k->J);
     if (kind->gamma) kind->gamma (&k->b, p->gamma + k->row);
-  } else if (work == PROFILE_FORCE)
+  } else if (part == PROFILE_FORCE)
     kind->force (&k->b, k->block);
   else {
     kind->g (&k->b, p->eta + k->row);
@@ -62,14 +62,14 @@ static void profile_do_batch (profile *p, profile_work work) {
   }
 }
 
-static void profile_do (profile *p, profile_work work, double t) {
+static void profile_do (profile *p, profile_part part, double t) {
   pw_run *r = p->r;
   pw_workspace *w = r->w;
   size_t bytes = (size_t)r->s->coords * sizeof (double);
-  switch (work) {
+  switch (part) {
   case PROFILE_CONFIGURATIONS:
   case PROFILE_KINEMATICS:
-    pw_update_kinematics (w, work == PROFILE_KINEMATICS ? t : p->t, r->q, r->v);
+    pw_update_kinematics (w, part == PROFILE_KINEMATICS ? t : p->t, r->q, r->v);
     break;
   case PROFILE_EQUATIONS:
     pw_evaluate_J (w);
@@ -96,16 +96,11 @@ static void profile_do (profile *p, profile_work work, double t) {
     pw_project_state (&p->projector, r, t, p->q, p->v, r->a_at, r->lambda_at);
     break;
   default:
-    profile_do_batch (p, work);
+    profile_do_batch (p, part);
   }
 }
 
 /* ---- The clock ---- */
-
-static int profile_compare (const void *a, const void *b) {
-  double x = *(const double *)a, y = *(const double *)b;
-  return (x > y) - (x < y);
-}
 
 static double profile_clock (void) {
   struct timespec t;
@@ -113,31 +108,31 @@ static double profile_clock (void) {
   return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
 }
 
-/* Processor time [s] of doing the work `count` times. */
-static double profile_repeat (profile *p, profile_work work, long count) {
+/* Processor time [s] of doing a part `count` times. */
+static double profile_repeat (profile *p, profile_part part, long count) {
   double start = profile_clock ();
-  for (; count > 0; count--) profile_do (p, work, count % 2 ? p->t : p->earlier);
+  for (; count > 0; count--) profile_do (p, part, count % 2 ? p->t : p->earlier);
   return profile_clock () - start;
 }
 
-/* The median time [ns] of each of the `kinds` kinds of work from `first` on.  They take turns, so that a temporary
- * slowdown of the machine affects all of them. */
-static void profile_times (profile *p, profile_work first, int kinds, double *ns) {
+/* The median times [ns] of `parts` parts, from `first` on.  They take turns, so that a temporary slowdown of the
+ * machine affects all of them. */
+static void profile_times (profile *p, profile_part first, int parts, double *ns) {
   double time[PROFILE_STAGES][PROFILE_REPETITIONS];
   long n[PROFILE_STAGES];
-  for (int i = 0; i < kinds; i++)
-    for (n[i] = 1; profile_repeat (p, first + (profile_work)i, n[i]) < PROFILE_MEASUREMENT;) n[i] *= 2;
+  for (int i = 0; i < parts; i++)
+    for (n[i] = 1; profile_repeat (p, first + (profile_part)i, n[i]) < PROFILE_MEASUREMENT;) n[i] *= 2;
   for (int j = 0; j < PROFILE_REPETITIONS; j++)
-    for (int i = 0; i < kinds; i++) time[i][j] = profile_repeat (p, first + (profile_work)i, n[i]);
-  for (int i = 0; i < kinds; i++) {
-    qsort (time[i], PROFILE_REPETITIONS, sizeof **time, profile_compare);
+    for (int i = 0; i < parts; i++) time[i][j] = profile_repeat (p, first + (profile_part)i, n[i]);
+  for (int i = 0; i < parts; i++) {
+    qsort (time[i], PROFILE_REPETITIONS, sizeof **time, pw_ascending);
     ns[i] = 1e9 * time[i][PROFILE_REPETITIONS / 2] / (double)n[i];
   }
 }
 
-static double profile_time (profile *p, profile_work work) {
+static double profile_time (profile *p, profile_part part) {
   double ns;
-  profile_times (p, work, 1, &ns);
+  profile_times (p, part, 1, &ns);
   return ns;
 }
 

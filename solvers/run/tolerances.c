@@ -1,5 +1,5 @@
-/* Saturating forces, such as friction, which reverse within a small range of velocities: bounds on tolerances and on
- * the use of Newton matrices.
+/* Saturating forces, such as friction, which change by their own magnitude within a small range of velocities: bounds
+ * on tolerances and on the use of Newton matrices.
  *
  * With a Newton matrix evaluated inside that range, at rest, where the force is steep, and used where it has saturated,
  * corrections are about as small as the range, however large the residual is: the iteration would seem to converge with
@@ -9,7 +9,7 @@
 #include <string.h>
 #include "method.h"
 
-#define TOLERANCES_PART 0.1 /* of the change of a state that reverses a force: the largest error of that state */
+#define TOLERANCES_PART 0.1 /* largest error of a state over its change that changes a force by the force itself */
 
 /* The root mean square of n errors in units of their tolerances may be 1, so a single error may be sqrt (n) times its
  * tolerance. */
@@ -19,7 +19,7 @@ void pw_bound_tolerances (pw_run *r) {
   pw_evaluate_saturation (r->w, r->saturation);
   for (int j = 0; j < n; j++) {
     double y = j < coords ? r->q[j] : r->v[j - coords];
-    r->outdated |= fabs (y - r->matrix_state[j]) > r->matrix_range[j];
+    r->matrix_outdated |= fabs (y - r->matrix_state[j]) > r->matrix_range[j];
     r->saturation[j] *= TOLERANCES_PART / sqrt (n);
   }
 }
@@ -30,7 +30,7 @@ double pw_saturation_range (const pw_run *r, int state) {
 
 void pw_matrix_evaluated (pw_run *r, const double *q, const double *v) {
   int coords = r->s->coords;
-  r->outdated = 0;
+  r->matrix_outdated = 0;
   if (!r->s->saturates) return;
   memcpy (r->matrix_state, q, (size_t)coords * sizeof *q);
   memcpy (r->matrix_state + coords, v, (size_t)coords * sizeof *v);
@@ -55,12 +55,4 @@ int pw_run_saturation (pw_run *r, double *least, char *element, size_t size) {
     state = pw_find_saturation (r->w, least, element, size);
   if (s->saturates) (void)pw_update_kinematics (r->w, r->t, r->q, r->v);
   return state;
-}
-
-/* ---- Options of the method ---- */
-
-double pw_run_option (const pw_run *r, const char *name) {
-  int i = 0;
-  while (r->method->options[i].name && strcmp (r->method->options[i].name, name) != 0) i++;
-  return r->method->options[i].name ? r->option[i] : 0;
 }

@@ -1,103 +1,96 @@
 /* Checks after each step that the run still follows the motion: that constraints are neither lost nor contradictory,
  * and that the motion has not jumped to another branch at a singular configuration.
  *
- * The sine of the smallest angle between a row and those before it changes by at most about the motion of the
- * bodies, so it is computed again only when the motion since could have brought it to 0. */
+ * The sine (watchdog.h) changes by at most a multiple of the motion of the bodies (`lipschitz`), so it is computed
+ * again only when the motion since could have made it small. */
 #include <stdio.h>
 #include <string.h>
 #include "method.h"
 #include "rank.h"
 
 double pw_run_acceleration_norm (const pw_run *r) {
-  const pw_system *s = r->s;
-  const double *a = r->a, *internal = a + 3 * s->bodies;
-  double linear = 0, angular = 0, time_squared = r->w->scale.time * r->w->scale.time;
-  for (; a < internal; a += 3) {
-    linear = pw_larger_or_nan (pw_larger_or_nan (linear, fabs (a[0])), fabs (a[1]));
-    angular = pw_larger_or_nan (angular, fabs (a[2]));
-  }
-  for (; a < r->a + s->coords; a++) angular = pw_larger_or_nan (angular, fabs (*a));
-  return pw_larger_or_nan (linear * (time_squared / s->scale.length), angular * time_squared);
+  const double per_angle = r->w->scale.time * r->w->scale.time, per_length = per_angle / r->s->scale.length;
+  double norm = 0;
+  for (int j = 0; j < r->s->coords; j++)
+    norm = pw_larger_or_nan (norm, fabs (r->a[j]) * (pw_is_angle (r->s, j) ? per_angle : per_length));
+  return norm;
 }
 
 /* The largest change of a body's coordinate in the last step, in units of the scene. */
 static double watchdog_step_length (const pw_run *r) {
-  const double *last = r->geometry.previous_q, *q = r->q;
-  double length = 0, angle = 0;
-  for (int j = 0; j < 3 * r->s->bodies; j += 3) {
-    length = pw_larger (fabs (q[j] - last[j]), pw_larger (fabs (q[j + 1] - last[j + 1]), length));
-    angle = pw_larger (fabs (q[j + 2] - last[j + 2]), angle);
-  }
-  return pw_larger (length / r->s->scale.length, angle);
+  double length = 0;
+  for (int j = 0; j < 3 * r->s->bodies; j++)
+    length = pw_larger (fabs (r->q[j] - r->watchdog.previous_q[j]) / pw_unit (r->s, j), length);
+  return length;
 }
 
 /* ---- Following the motion ---- */
 
-/* Records the sine at the state reached. */
 static void watchdog_record_sine (pw_run *r, double sine) {
-  pw_geometry *g = &r->geometry;
-  g->checked_sine = sine;
-  g->moved = 0;
-  g->largest_sine = fmax (g->largest_sine, sine);
+  pw_watchdog *watch = &r->watchdog;
+  watch->checked_sine = sine;
+  watch->moved = 0;
+  watch->largest_sine = fmax (watch->largest_sine, sine);
 }
 
 /* 1 if the sine may be below this value at the state reached or after a motion of this length from there. */
 static int watchdog_reaches (const pw_run *r, double sine, double length) {
-  const pw_geometry *g = &r->geometry;
-  return g->saddle && !(g->checked_sine - r->limits.lipschitz * g->largest_sine * (g->moved + length) > sine);
+  const pw_watchdog *watch = &r->watchdog;
+  return watch->saddle &&
+         !(watch->checked_sine - r->limits.lipschitz * watch->largest_sine * (watch->moved + length) > sine);
 }
 
 /* The typical sine: the largest at a few irregular configurations, which need not satisfy the constraints. */
 static void watchdog_sample_sines (pw_run *r) {
   const pw_system *s = r->s;
-  pw_geometry *g = &r->geometry;
+  pw_watchdog *watch = &r->watchdog;
   for (int n = 1; n <= 4; n++) {
     for (int j = 0; j < s->coords; j++)
-      g->previous_q[j] = r->q[j] + 0.5 * pw_unit (s, j) * pw_irregular (n, (j + 1) * n);
-    if (pw_evaluate_J_at (r->w, r->t, g->previous_q, r->v) != PW_OK) break;
-    g->largest_sine = fmax (g->largest_sine, pw_watchdog_sine (r, NULL));
+      watch->previous_q[j] = r->q[j] + 0.5 * pw_unit (s, j) * pw_irregular (n, (j + 1) * n);
+    if (pw_evaluate_J_at (r->w, r->t, watch->previous_q, r->v) != PW_OK) break;
+    watch->largest_sine = fmax (watch->largest_sine, pw_watchdog_sine (r, NULL));
   }
   r->w->failed = NULL;
   (void)pw_evaluate_J_at (r->w, r->t, r->q, r->v);
 }
 
 void pw_watchdog_begin (pw_run *r) {
-  pw_geometry *g = &r->geometry;
-  if (g->saddle == NULL) return;
-  if (g->largest_sine == 0) watchdog_sample_sines (r);
+  pw_watchdog *watch = &r->watchdog;
+  if (watch->saddle == NULL) return;
+  if (watch->largest_sine == 0) watchdog_sample_sines (r);
   watchdog_record_sine (r, pw_watchdog_sine (r, NULL));
-  g->previous_t = r->t;
-  g->previous_sine = g->checked_sine;
-  g->step_length = g->sine_slope = 0;
-  g->sine_before_checked = NAN;
-  g->crossed = 0;
-  g->singular_ahead = 1;
-  memcpy (g->previous_q, r->q, (size_t)r->s->coords * sizeof *g->previous_q);
+  watch->previous_t = r->t;
+  watch->previous_sine = watch->checked_sine;
+  watch->step_length = watch->sine_slope = 0;
+  watch->sine_before_checked = NAN;
+  watch->crossed = 0;
+  watch->singular_ahead = 1;
+  memcpy (watch->previous_q, r->q, (size_t)r->s->coords * sizeof *watch->previous_q);
 }
 
 /* Checks the step to the state reached, where J is evaluated.  PW_METHOD if it has passed a change point without
  * resolving it. */
 static int watchdog_follow (pw_run *r, pw_error *error) {
-  pw_geometry *g = &r->geometry;
+  pw_watchdog *watch = &r->watchdog;
   int status = PW_OK;
-  if (g->saddle == NULL) return PW_OK;
-  g->step_length = watchdog_step_length (r);
-  g->moved += g->step_length;
-  double near = r->limits.near * g->largest_sine, ahead = r->limits.step_growth * g->step_length;
+  if (watch->saddle == NULL) return PW_OK;
+  watch->step_length = watchdog_step_length (r);
+  watch->moved += watch->step_length;
+  double near = r->limits.near * watch->largest_sine, ahead = r->limits.step_growth * watch->step_length;
   int may_be_near = watchdog_reaches (r, near, ahead);
   if (may_be_near) {
-    double last = g->moved == g->step_length ? g->checked_sine : NAN;
-    watchdog_record_sine (r, pw_watchdog_sine (r, &g->dependent_row));
-    status = pw_change_point_check (r, g->checked_sine, error);
+    double last = watch->moved == watch->step_length ? watch->checked_sine : NAN;
+    watchdog_record_sine (r, pw_watchdog_sine (r, &watch->dependent_row));
+    status = pw_change_point_check (r, watch->checked_sine, error);
     if (status == PW_OK) status = pw_change_point_resolve (r, last, error);
-    g->sine_before_checked = last;
+    watch->sine_before_checked = last;
   } else
-    g->sine_before_checked = NAN, g->sine_slope = 0, g->crossed = 0;
-  if (may_be_near && g->checked_sine < near) r->near_singular = 1;
-  g->singular_ahead = may_be_near && watchdog_reaches (r, near, ahead);
-  g->previous_t = r->t;
-  g->previous_sine = may_be_near ? g->checked_sine : NAN;
-  memcpy (g->previous_q, r->q, (size_t)r->s->coords * sizeof *g->previous_q);
+    watch->sine_before_checked = NAN, watch->sine_slope = 0, watch->crossed = 0;
+  if (may_be_near && watch->checked_sine < near) r->near_singular = 1;
+  watch->singular_ahead = may_be_near && watchdog_reaches (r, near, ahead);
+  watch->previous_t = r->t;
+  watch->previous_sine = may_be_near ? watch->checked_sine : NAN;
+  memcpy (watch->previous_q, r->q, (size_t)r->s->coords * sizeof *watch->previous_q);
   return status;
 }
 
@@ -107,7 +100,7 @@ static int watchdog_fail_lost (pw_run *r, int contradicts, pw_error *error) {
   pw_residuals now;
   char element[120] = "a constraint", cause[60] = "constraint drift";
   pw_evaluate_residuals (r->w, NULL, &now);
-  int row = now.position > now.velocity ? now.row_position : now.row_velocity;
+  int in_position = now.position > now.velocity, row = in_position ? now.row_position : now.row_velocity;
   if (row >= 0) pw_system_row_name (r->s, row, element, sizeof element);
   const char *advice = "";
   if (contradicts)
@@ -117,9 +110,8 @@ static int watchdog_fail_lost (pw_run *r, int contradicts, pw_error *error) {
                                 : "; a smaller tolerance or a stabilisation reduces it";
   else if (pw_fixed_steps (r))
     snprintf (cause, sizeof cause, "the step of %.6g s is too large", r->settings.step);
-  return pw_fail (error, PW_METHOD,
-                  "t = %.6g s: %s: %s is violated by %.3g in position and %.3g in velocity (scaled)%s", r->t, cause,
-                  element, now.position, now.velocity, advice);
+  return pw_fail (error, PW_METHOD, "t = %.6g s: %s: %s is violated by %.3g in %s (scaled)%s", r->t, cause, element,
+                  in_position ? now.position : now.velocity, in_position ? "position" : "velocity", advice);
 }
 
 static int watchdog_exceeds (double position, double velocity, double limit) {
@@ -139,26 +131,23 @@ static int watchdog_contradicts (pw_run *r) {
 
 /* ---- Branches ---- */
 
-/* The residual of positions, in units of the scene. */
+/* The residual of positions: scaled, or in units of L if that is larger. */
 static double watchdog_residual (const pw_run *r) {
   return pw_larger (r->residuals.position, r->residuals.g / r->s->scale.length);
 }
 
-/* 1 if a constraint residual may decide which branch is followed: if the sine s of the smallest angle between rows is
- * below its regular value, and s^2 below residual / ratio.
- *
- * Where two branches of a motion cross, the constraints are x y = 0 in suitable coordinates, and s = |(x, y)|.  With
- * a residual d they are x y = d: the branches do not cross but turn into each other, where s^2 is about 2 d.  A
- * method that follows the drifted constraints follows the turn, however small its steps. */
+/* 1 if a constraint residual d may decide which branch is followed: if the sine s is below its regular value, and s^2
+ * below d / ratio.  Drifted constraints, x y = d in place of x y = 0 (singular.c), connect branches that cross by a
+ * turn, which a method follows however small its steps. */
 static int watchdog_unresolved (pw_run *r, double residual, double ratio) {
   int row;
-  double bound = fmin (sqrt (residual / ratio), r->limits.regular * r->geometry.largest_sine);
+  double bound = fmin (sqrt (residual / ratio), r->limits.regular * r->watchdog.largest_sine);
   return bound > r->limits.rank_lost && watchdog_reaches (r, bound, 0) && pw_watchdog_sine (r, &row) < bound &&
          row < r->s->holonomic;
 }
 
-/* Fails where accelerations jump, or residuals are large, while they may decide the branch.  Such a turn is a corner
- * whose radius grows with the residual, so that its accelerations need not jump. */
+/* Fails where residuals may decide the branch and accelerations have grown, or residuals are large: the turn is then a
+ * corner whose radius grows with the residual, so that its accelerations need not grow. */
 static int watchdog_check_turn (pw_run *r, double norm, pw_error *error) {
   const pw_thresholds *limit = &r->limits;
   double residual = watchdog_residual (r), before = fmax (r->previous_norm, limit->turn_reference);
@@ -176,18 +165,14 @@ static int watchdog_check_turn (pw_run *r, double norm, pw_error *error) {
   return PW_OK;
 }
 
-/* 1 near a singular configuration whose dependent row is nonholonomic, or where accelerations are not finite. */
-static int watchdog_may_jump (pw_run *r, double norm) {
-  int row;
-  if (!r->near_singular) return 0;
-  pw_watchdog_sine (r, &row);
-  return row < 0 || row >= r->s->holonomic || !isfinite (norm);
-}
-
-/* Accelerations of the physical motion do not grow at a singular configuration; in a jump to another branch they do. */
+/* Accelerations of the physical motion do not grow at a singular configuration; in a jump to another branch they do, if
+ * the dependent row is nonholonomic. */
 static int watchdog_check_jump (pw_run *r, pw_error *error) {
+  int row = -1;
   double norm = pw_run_acceleration_norm (r);
-  if (watchdog_may_jump (r, norm) && !(norm <= r->limits.jump_growth * r->reference_level))
+  if (r->near_singular) pw_watchdog_sine (r, &row);
+  int may_jump = r->near_singular && (row < 0 || row >= r->s->holonomic || !isfinite (norm));
+  if (may_jump && !(norm <= r->limits.jump_growth * r->reference_level))
     return pw_fail (error, PW_METHOD,
                     "t = %.6g s: lost at a singular configuration: the accelerations are %.3g times those before", r->t,
                     norm / r->reference_level);

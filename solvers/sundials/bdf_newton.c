@@ -53,7 +53,7 @@ static int newton_set_up (realtype t, N_Vector y, N_Vector derivative, SUNMatrix
   pw_bdf_newton *w = &d->newton;
   const pw_tangent *x = &w->tangent;
   (void)derivative, (void)tmp1, (void)tmp2, (void)tmp3;
-  *evaluated = !reuse || d->sun.run->outdated;
+  *evaluated = !reuse || d->sun.run->matrix_outdated;
   if (*evaluated) {
     int columns = 3 * d->n + x->rows, status = pw_multistep_accelerate (d, t, N_VGetArrayPointer (y));
     if (status != 0) return status;
@@ -92,7 +92,7 @@ static int newton_solve (SUNLinearSolver solver, SUNMatrix matrix, N_Vector vx, 
   const double *b = N_VGetArrayPointer (vb), *da = N_VGetArrayPointer (w->change);
   double *x = N_VGetArrayPointer (vx);
   int n = d->n;
-  if (d->sun.run->outdated) return SUNLS_PACKAGE_FAIL_REC; /* CVODES then requests a new matrix */
+  if (d->sun.run->matrix_outdated) return SUNLS_PACKAGE_FAIL_REC; /* CVODES then requests a new matrix */
   newton_right_side (d, b, N_VGetArrayPointer (w->right));
   int flag = SUNLinSolSolve (d->sun.klu, matrix, w->change, w->right, tolerance);
   if (flag != SUNLS_SUCCESS) return flag;

@@ -76,7 +76,7 @@ static int sun_factorise (SUNLinearSolver solver, SUNMatrix matrix) {
 
 static int sun_solve (SUNLinearSolver solver, SUNMatrix matrix, N_Vector result, N_Vector b, realtype tolerance) {
   const pw_sun *x = solver->content;
-  if (x->run->outdated) return SUNLS_PACKAGE_FAIL_REC;
+  if (x->run->matrix_outdated) return SUNLS_PACKAGE_FAIL_REC;
   return SUNLinSolSolve (x->klu, matrix, result, b, tolerance);
 }
 

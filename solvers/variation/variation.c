@@ -178,18 +178,6 @@ static int variation_start (pw_variation *x, pw_direction_copy *d, const pw_dire
   return pw_variation_look_ahead (x, d, x->r->breakpoint, error);
 }
 
-/* PW_INPUT if a second-order block of an element type is missing: the results would be wrong. */
-static int variation_check_blocks (const pw_variation *x, pw_error *error) {
-  char block[200];
-  int found = pw_find_missing_block (x->r->w, x->r->t, x->r->q, x->r->v, block, sizeof block);
-  if (found == 0) return PW_OK;
-  if (found == PW_RESOURCE) return pw_fail_memory (x->r->s, error);
-  return pw_fail (error, PW_INPUT,
-                  "model %s: %s is left out, but it is not zero, and derivatives need it: add it, or "
-                  "PW_BY_DIFFERENCES in its place",
-                  x->r->s->model, block);
-}
-
 /* Records the states of the run in its last step, from time t0; at first, its initial state.  A step across a jump is
  * not refined: samples in it, each computed by a Runge-Kutta step of its own, are not continuous in time and might seem
  * to cross the jump several times. */
@@ -219,7 +207,7 @@ static int variation_open (pw_variation *x, const pw_direction *d, pw_error *err
     return pw_fail (error, PW_INPUT, "derivatives need inputs=stage: held inputs depend on the steps");
   for (int i = 0; i < x->count; i++)
     if (variation_check_neighbours (x, &d[i], i, error) != PW_OK) return PW_INPUT;
-  int status = variation_check_blocks (x, error);
+  int status = pw_run_check_derivatives (r, "derivatives", "need", error);
   if (status != PW_OK) return status;
   x->reversal = variation_reversal (r);
   x->direction = calloc ((size_t)x->count + 1, sizeof *x->direction);

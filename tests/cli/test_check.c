@@ -160,6 +160,13 @@ static void test_broken_kind (void **state) {
       "pinwheel sensitivity @/broken.c --of ball.x --by ball.vx -t 0.1", 2,
       "model broken: force_q of element type well is left out, but it is not zero, and derivatives need it: add it, or "
       "PW_BY_DIFFERENCES in its place");
+  static const char *const linearising[] = { "linearise", "steady" };
+  for (size_t i = 0; i < sizeof linearising / sizeof *linearising; i++) {
+    snprintf (command, sizeof command, "pinwheel %s @/broken.c", linearising[i]);
+    cli_bad (command, 2,
+             "model broken: force_q of element type well is left out, but it is not zero, and the linearisation needs "
+             "it: add it, or PW_BY_DIFFERENCES in its place");
+  }
 }
 
 /* The derivatives of a signal that reads states: the function's own, wrong by a factor. */

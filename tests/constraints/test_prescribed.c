@@ -274,6 +274,16 @@ static void start_contradictory (pw_model *m, const void *parameters) {
                         .angle = { PW_HARMONIC, .harmonic = { .amplitude = 0.5, .omega = 3, .phase = 1 } } });
 }
 
+/* Speeds contradict each other; that of another body has a larger residual, but a smaller scaled one. */
+static void start_speeds (pw_model *m, const void *parameters) {
+  (void)parameters;
+  pw_add_body (m, &(pw_body){ .name = "fast", .mass = 1, .inertia = 1, .rate = { 1e4 } });
+  pw_add_body (m, &(pw_body){ .name = "slow", .mass = 1, .inertia = 1 });
+  pw_add_speed (m, &(pw_speed){ .name = "other", .body = "fast", .value.constant = 10050 });
+  pw_add_speed (m, &(pw_speed){ .name = "one", .body = "slow", .value.constant = 1 });
+  pw_add_speed (m, &(pw_speed){ .name = "two", .body = "slow", .value.constant = 2 });
+}
+
 static void start_expect_error (void (*build) (pw_model *, const void *), const char *text) {
   const pw_plugin_table table = TRIAL_TABLE (build);
   pw_error error = { 0 };
@@ -291,6 +301,8 @@ static void test_inconsistent (void **state) {
   start_expect_error (
       start_contradictory,
       "model scene: the initial state cannot be made consistent: drive other is violated by 1.26221 rad/s");
+  start_expect_error (start_speeds,
+                      "model scene: the initial state cannot be made consistent: speed two is violated by 2 m/s");
 }
 
 int main (void) {

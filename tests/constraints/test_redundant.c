@@ -179,12 +179,27 @@ static void test_frame (void **state) {
 
 /* ---- Messages ---- */
 
+/* A plate of 1 nm, held by pins at two corners and an angle. */
+static void redundant_plate (pw_model *m, const void *parameter) {
+  const double size = 1e-9;
+  (void)parameter;
+  pw_add_body (m, &(pw_body){ .name = "plate", .mass = 1, .inertia = size * size });
+  pw_add_pin (m, &(pw_pin){ .name = "A", .body = { "plate", "ground" } });
+  pw_add_drive (m, &(pw_drive){ .name = "D", .body = { "plate", "ground" }, .what = PW_DRIVE_ANGLE });
+  pw_add_pin (m, &(pw_pin){ .name = "B", .body = { "plate", "ground" }, .at = { { size, 0 }, { size, 0 } } });
+}
+
+static const pw_plugin_table redundant_plate_table = TRIAL_TABLE (redundant_plate);
+
 static void test_names (void **state) {
   (void)state;
+  static const char *const corner[] = { "pins A and B: the same x constraint",
+                                        "pin B (B.Fy) follows from pin A, drive D", NULL };
   static const char *const axle[] = { "wheels rear_left and rear_right: the same lateral constraint", NULL };
   static const char *const none[] = { NULL };
   redundant_expect_reports (&redundant_three_table, axle);
   redundant_expect_reports (&redundant_two_table, none);
+  redundant_expect_reports (&redundant_plate_table, corner);
 }
 
 /* ---- Selection of independent rows ---- */

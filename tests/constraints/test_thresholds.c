@@ -105,7 +105,7 @@ static void watchdog_bend (pw_run *r, double angle) {
   const double v[] = { -0.5 * n, 0.5 * c, 1, -n, c, 0, -0.5 * n, 0.5 * c, 1 };
   memcpy (r->q, q, sizeof q);
   memcpy (r->v, v, sizeof v);
-  r->geometry.singular_ahead = 1;
+  r->watchdog.singular_ahead = 1;
 }
 
 /* The state reached is examined, not that at which the run's matrix was factorised last. */
@@ -129,7 +129,7 @@ static void test_tree (void **state) {
   int row = 7;
   pw_system *s = scene_named ("pendulum", NULL, 0);
   pw_run *r = runs_open (s, "rk4+projection", NULL);
-  assert_null (r->geometry.saddle);
+  assert_null (r->watchdog.saddle);
   check_close ("sine", pw_watchdog_sine (r, &row), 1, 0, "never singular");
   assert_int_equal (row, -1);
   runs_close (r, s);
@@ -168,7 +168,7 @@ static void test_evaluations (void **state) {
   pw_system *s = scene_system (&bars_table, NULL);
   pw_run *r = runs_open (s, "rk4+projection", NULL);
   const double angle = 1e-4;
-  double refined = watchdog_residual (r, angle), sine = r->geometry.evaluated_sine,
+  double refined = watchdog_residual (r, angle), sine = r->watchdog.evaluated_sine,
          projected = watchdog_projected (r, angle);
   r->limits.refine = 0;
   check_below ("projected", projected, 0.1 * watchdog_projected (r, angle), "eps / s instead of eps / s^2");

@@ -97,7 +97,7 @@ static void test_sine (void **state) {
     pw_system *s = scene_named ("slider-crank", "ms", mass[i]);
     pw_run *r = runs_open (s, "rk4+projection", NULL);
     sine[i] = pw_watchdog_sine (r, NULL);
-    check_close ("largest", r->geometry.largest_sine, sine[i], 0.3, "at any configuration but a singular one");
+    check_close ("largest", r->watchdog.largest_sine, sine[i], 0.3, "at any configuration but a singular one");
     runs_close (r, s);
   }
   check_bits ("sine", sine, sine + 1, 2);
@@ -221,8 +221,8 @@ static void test_two_crossings (void **state) {
     pw_error error = { 0 };
     pw_system *s = scene_system (&bars_table, "b", watchdog_bar, "d", watchdog_bar, NULL);
     pw_run *r = runs_open (s, "rk4+projection", &(pw_settings){ .step = 1e-3, .span = 1 });
-    r->geometry.previous_sine = NAN;
-    watchdog_bars_at (-0.3, 0, r->geometry.previous_q);
+    r->watchdog.previous_sine = NAN;
+    watchdog_bars_at (-0.3, 0, r->watchdog.previous_q);
     watchdog_bars_at (PW_PI + 0.3, crossed, r->q);
     assert_int_equal (pw_evaluate_J_at (r->w, r->t, r->q, r->v), PW_OK);
     double sine = pw_watchdog_sine (r, NULL);
@@ -295,7 +295,7 @@ static void test_failing_signal (void **state) {
   pw_system *s = scene_system (&table, "b", watchdog_bar, "d", watchdog_bar, NULL);
   pw_run *r = runs_open (s, "rk4+projection", &(pw_settings){ .step = 1e-3, .span = 1 });
   assert_null (r->w->failed);
-  watchdog_bars_at (-0.3, 0, r->geometry.previous_q);
+  watchdog_bars_at (-0.3, 0, r->watchdog.previous_q);
   watchdog_bars_at (PW_PI + 0.3, 0, r->q);
   assert_int_equal (pw_evaluate_J_at (r->w, r->t, r->q, r->v), PW_OK);
   check_ok (pw_change_point_check (r, pw_watchdog_sine (r, NULL), &error), &error);

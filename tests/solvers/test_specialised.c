@@ -432,7 +432,7 @@ static void test_several_steps (void **state) {
       check_ok (pw_run_sample (many, t, &b, NULL), NULL);
       same_state (&a, &b, x.s);
       assert_memory_equal (pw_run_statistics (one), pw_run_statistics (many), sizeof (pw_statistics));
-      check_bits ("motion since the last sine", &one->geometry.moved, &many->geometry.moved, 1);
+      check_bits ("motion since the last sine", &one->watchdog.moved, &many->watchdog.moved, 1);
       check_bits ("accelerations so far", &one->reference_level, &many->reference_level, 1);
       check_bits ("energy so far", &one->exchanged, &many->exchanged, 1);
       assert_int_equal (pw_run_advance_towards (many, 1, NAN, &(pw_error){ 0 }), PW_INPUT);

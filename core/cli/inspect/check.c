@@ -145,7 +145,7 @@ static int check_linear (pw_check *check, pw_error *error) {
   char step[32], limit[32], time[32];
   pw_error own = { 0 };
   int status = pw_run_linearise (check->run, CHECK_COORDINATES, &check->linear, &own);
-  if (status == PW_METHOD) {
+  if (status == PW_METHOD || status == PW_INPUT) {
     check_add (&check->finding, "%s", own.text);
     return PW_OK;
   }
