@@ -1,13 +1,11 @@
 /* Plans the block L D L^T: the pattern of S and the body blocks; see condense.h and block_ldl.h. */
 #include <limits.h>
-#include <stdlib.h>
 #include <string.h>
 #include "condense.h"
-#include "util.h"
 
 /* ---- Pattern ---- */
 
-/* The first of the two nodes of the body that begins with coordinate j, or -1 if it is condensed. */
+/* The first of the two nodes of the uncondensed body that begins with coordinate j; -1: it is condensed, or no body. */
 static int condense_body_node (const pw_plan *plan, int j) {
   return j < 3 * plan->saddle->s->bodies ? plan->uncondensed[j / 3] : -1;
 }
@@ -19,7 +17,7 @@ static void condense_add_pair (pw_plan *plan, int a, int b) {
   plan->pairs++;
 }
 
-/* Pairs of nodes that meet in a group, or with an uncondensed body. */
+/* Lists the pairs of nodes that meet at a group, or, if that is an uncondensed body, each of them with its nodes. */
 static void condense_pairs (pw_plan *plan) {
   for (int n = 0; n < plan->groups; n++) {
     int j = pw_group_first (plan->saddle->s, n), body = condense_body_node (plan, j);
@@ -32,7 +30,7 @@ static void condense_pairs (pw_plan *plan) {
   }
 }
 
-/* The contributions of each group in the order of their columns (few: by insertion). */
+/* Sorts the contributions of each group by column; by insertion, since there are few. */
 static void condense_sort_columns (const pw_plan *plan, const int *column_of_node) {
   for (int n = 0; n < plan->groups; n++) {
     int j = pw_group_first (plan->saddle->s, n), *list = plan->list + plan->start[j],
@@ -48,13 +46,7 @@ static void condense_sort_columns (const pw_plan *plan, const int *column_of_nod
 
 /* ---- Body blocks ---- */
 
-/* Position of the block of two nodes. */
-static int condense_coupling (const pw_block_ldl *l, int a, int b) {
-  int p = l->column_of_node[a], q = l->column_of_node[b];
-  return p > q ? pw_block_find (l, p, q) : pw_block_find (l, q, p);
-}
-
-/* Fills the block of a group; *contributions and *couplings count. */
+/* Fills the block p of the group that begins with coordinate j; *contributions, *couplings: used so far. */
 static void condense_body (const pw_plan *plan, pw_block_ldl *l, int j, pw_body_block *p, int *contributions,
                            int *couplings) {
   int body = condense_body_node (plan, j);
@@ -70,10 +62,10 @@ static void condense_body (const pw_plan *plan, pw_block_ldl *l, int j, pw_body_
         (pw_contribution){ a->J, n->unknown, l->column[l->column_of_node[a->node]].first_value, a->row_stride,
                            (short)n->size };
     if (body >= 0)
-      for (int i = 0; i < 2; i++) l->coupling[(*couplings)++] = condense_coupling (l, a->node, body + i);
+      for (int i = 0; i < 2; i++) l->coupling[(*couplings)++] = pw_block_find (l, a->node, body + i);
     else
       for (int y = x + 1; y < plan->start[j + 1]; y++)
-        l->coupling[(*couplings)++] = condense_coupling (l, a->node, plan->contribution[plan->list[y]].node);
+        l->coupling[(*couplings)++] = pw_block_find (l, a->node, plan->contribution[plan->list[y]].node);
   }
   for (int i = body; body >= 0 && i < body + 2; i++)
     l->contribution[(*contributions)++] = (pw_contribution){ .unknown = plan->node[i].unknown,
