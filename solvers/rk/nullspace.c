@@ -5,8 +5,9 @@
  *   q' = v(t, q, u),    u' = B^T W a(t, q, v),      v:  J(t, q) v = eta,  B^T W v = u
  *
  * so that all velocity constraints hold at every stage, for any step size.  u has as many entries as there are degrees
- * of freedom.  A Runge-Kutta stage of u is B^T W times the same stage w of v, since B is constant, and B^T W (v - w) =
- * 0 puts v - w in the range of W^-1 J0^T.  So no basis is formed, and the result is independent of its choice:
+ * of freedom.  Since B is constant, a Runge-Kutta stage of u is B^T W w, with w the stage of v by the same formula.
+ * Then B^T W (v - w) = 0, which puts v - w in the range of W^-1 J0^T.  So no basis is formed, and the result is
+ * independent of its choice:
  *
  *   v = w + W^-1 J0^T mu,    K mu = eta - J w,    K = J W^-1 J0^T
  *
@@ -59,9 +60,9 @@ void pw_nullspace_close (pw_nullspace *b) {
   *b = (pw_nullspace){ 0 };
 }
 
-/* ---- K mu = eta - J w; m, the number of rows, is a constant where it is usual ---- */
+/* ---- K mu = eta - J w; m: number of rows, a constant in the most frequent case, 4, so that loops are unrolled ---- */
 
-/* K_i += J_i (W^-1 J0^T), mu_i -= J_i w, for the entries of row i in columns j to j + width - 1: 3 of a body, or 1. */
+/* K_i += J_i W^-1 J0^T, mu_i -= J_i w, for the entries J of row i in columns j to j + width - 1: 3 of a body, or 1. */
 PW_INLINE void nullspace_gather (pw_nullspace *b, int i, int j, int width, const double *J, const double *w, int m) {
   double *restrict K = b->K + i * m;
   const double *restrict x = b->W_inv_J0T + (size_t)j * (size_t)m, *restrict y = x + m, *restrict phi = y + m;
@@ -115,8 +116,8 @@ PW_INLINE int nullspace_eliminate (double *restrict K, double *restrict mu, int 
   return 1;
 }
 
-/* The same by LAPACK, with scaled rows and pivoting.  PW_RETRY if a pivot is round-off: dependent constraint
- * equations. */
+/* The same by LAPACK, with scaled rows and pivoting.  PW_RETRY if a pivot is round-off, as for dependent constraint
+ * equations, or an entry is not finite. */
 static int nullspace_eliminate_pivoted (pw_nullspace *b) {
   const double least = 1e-13; /* some 500 eps; the largest entry of a row is 1 */
   int m = b->rows;
@@ -165,7 +166,7 @@ int pw_nullspace_begin (pw_nullspace *b, pw_run *r) {
   return PW_OK;
 }
 
-/* v += W^-1 J0^T mu, with mu found without pivoting; returns 0 if a pivot is too small. */
+/* v += W^-1 J0^T mu, with mu found without pivoting from w = v; returns 0 if a pivot is too small. */
 PW_INLINE int nullspace_solve (pw_nullspace *b, pw_run *r, double *v, int m) {
   nullspace_assemble (b, r, v, m);
   if (!nullspace_eliminate (b->K, b->mu, m)) return 0;
@@ -173,7 +174,8 @@ PW_INLINE int nullspace_solve (pw_nullspace *b, pw_run *r, double *v, int m) {
   return 1;
 }
 
-/* v += W^-1 J0^T mu at the J last evaluated.  PW_RETRY if K is singular. */
+/* The same, if necessary with pivoting, at the J last evaluated.  Updates the velocity kinematics.  Returns as
+ * pw_nullspace_velocities. */
 static int nullspace_correct_velocities (pw_nullspace *b, pw_run *r, double *v) {
   const int m = b->rows;
   if (!(m == 4 ? nullspace_solve (b, r, v, 4) : nullspace_solve (b, r, v, m))) {

@@ -1,22 +1,22 @@
 /* Runge-Kutta methods with step-size control.
  *
- *   h_new = 0.9 h e^-(k - 3 m / 4) e_last^m,  limited to h/5 ... 5 h; after a rejection to 0.9 h
+ *   h_new = 0.9 h err^(3 m / 4 - k) err_last^m,  limited to h/5 ... 5 h; after a rejection to 0.9 h
  *
- * with k the tableau's exponent and m its memory (Gustafsson 1991; Hairer, Norsett & Wanner 1993, section II.4).  The
- * error e is that of positions and velocities in units of the tolerances.  After a projection there remains e', the
- * part of the error tangential to the constraints (Eich 1993; Hindmarsh et al., CVODE), to which a small part of the
- * whole error is added:
+ * with k the tableau's exponent and m its memory (Gustafsson 1991; Hairer, Norsett & Wanner 1993, section II.4).  err
+ * is the root mean square error of positions and velocities in units of the tolerances.  A projection leaves the part
+ * of the error tangential to the constraints (Eich 1993; Hindmarsh et al., CVODE), to which a small part of the whole
+ * error is added:
  *
- *   e = sqrt (e'^2 + rtol^(1/2) e_whole^2)      so that the displacement by the projection is at most rtol^(3/4)
+ *   err = sqrt (tangential^2 + rtol^(1/2) whole^2)   so that the displacement by the projection is at most rtol^(3/4)
  *
  * Through the curvature of the constraints, the square of the displacement adds to the tangential error; without this
- * limit the steps of a mostly prescribed motion would grow until that dominates.
+ * limit the steps of a mostly prescribed motion would grow until that square dominates.
  *
  * Where a force reverses within a step, such as friction, estimates of any order may miss it.  The largest change of
  * the acceleration at the stages, h |a_i - a| / 2, therefore counts like the error before a projection, so that a body
  * stopped by friction oscillates at speeds of at most rtol^(3/4).
  *
- * With estimates of three orders, e5 is combined with e3 as in DOP853, and e6 guards both:
+ * With estimates of the orders 3, 5 and 6, e5 is combined with e3 as in DOP853, and e6 guards both:
  *
  *   max (e5^2 / sqrt (e5^2 + e3^2 / 100), e6^3 / (e6^2 + e5^2))      of order h^8 and h^9 for smooth motions
  *
@@ -25,10 +25,10 @@
 #include <math.h>
 #include "rk_step.h"
 
-#define ADAPT_SAFETY 0.9       /* of the factor from one step size to the next */
-#define ADAPT_GROWTH 5.        /* its upper bound */
+#define ADAPT_SAFETY 0.9       /* in the factor from one step size to the next */
+#define ADAPT_GROWTH 5.        /* upper bound of that factor */
 #define ADAPT_REDUCTION 0.2    /* its lower bound */
-#define ADAPT_LEAST_ERROR 1e-4 /* remembered: smaller ones are accidental and would predict too large a step */
+#define ADAPT_LEAST_ERROR 1e-4 /* least err_last: smaller errors are accidental and would predict too large a step */
 
 void pw_rk_reset_step_size (pw_run *r) {
   struct pw_method_data *d = r->data;
@@ -93,12 +93,8 @@ static double adapt_remaining (pw_run *r, double whole, int projected) {
   return adapt_mean_square (r, r->q_at, r->v_at) + sqrt (r->settings.rtol) * whole;
 }
 
-/* Mean square of an estimate, without the part that a projection removes, divided by h^2. */
-static double adapt_tangential (pw_run *r, const pw_rk_row *e, int projected) {
-  return adapt_remaining (r, adapt_whole (r, e), projected);
-}
-
-/* The two errors of which the larger one counts (see the top of this file), from the squares of e3, e5, e6. */
+/* The two errors of which the larger one counts (see the top of this file); e3, e5, e6 are the squares of those
+ * there. */
 static double adapt_combine (double e5, double e3) {
   return e5 == 0 ? 0 : e5 / sqrt (e5 + 0.01 * e3);
 }
@@ -113,11 +109,11 @@ static double adapt_state (pw_run *r, int projected) {
   const pw_tableau *tableau = d->tableau;
   d->stage_v[tableau->stages] = d->v, d->stage_a[tableau->stages] = d->a;
   adapt_weigh (r);
-  double e5 = adapt_tangential (r, &d->estimate[0], projected);
+  double e5 = adapt_remaining (r, adapt_whole (r, &d->estimate[0]), projected);
   if (tableau->e3 == NULL) return sqrt (e5);
-  double err = adapt_combine (e5, adapt_tangential (r, &d->estimate[1], projected));
+  double e3 = adapt_remaining (r, adapt_whole (r, &d->estimate[1]), projected), err = adapt_combine (e5, e3);
   double e6 = adapt_whole (r, &d->estimate[2]);
-  if (adapt_guard (e6, e5) > err) /* otherwise its projection, which mostly reduces e6, is not needed */
+  if (adapt_guard (e6, e5) > err) /* otherwise the projection of e6, which mostly reduces it, is not needed */
     err = fmax (err, adapt_guard (adapt_remaining (r, e6, projected), e5));
   return err;
 }
@@ -142,8 +138,9 @@ static double adapt_error (pw_run *r, double h, int projected) {
   return r->s->entries > 0 && state <= 1 ? fmax (state, h * adapt_ledger (r, h)) : state;
 }
 
-/* Half the root mean square of the largest changes of accelerations at the stages, in units of the tolerances: of those
- * accelerations whose velocity changes, at one of the stages, by more than the range in which a force saturates. */
+/* Half the root mean square of the largest changes of accelerations at the stages, over the tolerances of velocities.
+ * Only coordinates count whose velocity changes, at one of the stages, by more than the range in which a force
+ * saturates. */
 static double adapt_reversal (const pw_run *r) {
   const struct pw_method_data *d = r->data;
   int n = r->s->coords, stages = d->tableau->stages;
@@ -169,8 +166,8 @@ static double adapt_factor (const struct pw_method_data *d, double err) {
   return fmin (ADAPT_GROWTH, fmax (ADAPT_REDUCTION, factor));
 }
 
-/* The step to t1; *err: its error, INFINITY if it fails.  If a signal jumps at t1, the estimate uses the derivative
- * just before t1, since the jump is not an error of the step. */
+/* The step to t1 = t + h; *err: its error, INFINITY if it fails.  If a signal jumps at t1, the estimate uses the
+ * accelerations just before t1, since the jump is not an error of the step. */
 static int adapt_step (pw_run *r, double h, double t1, int project, double *added_energy, double *err) {
   struct pw_method_data *d = r->data;
   double before = pw_before_breakpoint (r, t1);
@@ -184,8 +181,8 @@ static int adapt_step (pw_run *r, double h, double t1, int project, double *adde
   return status;
 }
 
-/* After a step that was shortened to end at t_end or a breakpoint, the next one has at least the size planned before;
- * its error is remembered if it was long enough to predict that of the next one. */
+/* After a step that was shortened to end at t_end or a breakpoint, the next one has at least the size planned before,
+ * and the error is remembered only if the step was long enough to predict that of the next one. */
 static void adapt_accept (pw_run *r, double h, double t1, double added_energy, double err, double most_growth,
                           int shortened) {
   struct pw_method_data *d = r->data;

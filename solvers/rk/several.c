@@ -22,7 +22,7 @@ static int several_possible (const pw_run *r) {
 
 /* The number of whole steps that can be taken at once: up to t_end and the next breakpoint, with the tolerance of
  * pw_step_end; up to the first that reaches t; up to a multiple of PW_CHECK_INTERVAL and the next record of speeds
- * (limits.c); each twice as long as a step that counts as stalled (run.c). */
+ * (limits.c).  Each must be twice as long as a step that counts as stalled (run.c). */
 static int several_count (const pw_run *r, double t, double t_end) {
   const struct pw_method_data *d = r->data;
   const double h = r->settings.step, stop = fmin (t_end, r->breakpoint) - 1e-9 * h, shortest = 128 * DBL_EPSILON;
@@ -123,7 +123,7 @@ int pw_run_advance_towards (pw_run *r, double t, double t_end, pw_error *error) 
 /* Runs whose next steps can be taken together: those with the step size and method of the first. */
 typedef struct {
   pw_run *const *run;
-  int used, index[PW_LANES_MOST];      /* lanes with a run; the index of each lane's run */
+  int used, index[PW_LANES_MOST];      /* number of lanes with a run; index in `run` of each lane's run */
   pw_scene_steps steps[PW_LANES_MOST]; /* of each lane */
 } several_lanes;
 
@@ -136,7 +136,7 @@ static void several_add (several_lanes *x, int i, double t_end) {
   if (several_plan (x->run[i], t_end, t_end, &x->steps[x->used]) > 0) x->index[x->used++] = i;
 }
 
-/* Takes the steps of all lanes; empty lanes repeat the first run. */
+/* Takes the steps of all lanes; empty lanes repeat those of the first lane. */
 static void several_take (several_lanes *x, const pw_specialised_lanes *code, void *memory) {
   pw_scene_steps *steps[PW_LANES_MOST];
   pw_scene *scene[PW_LANES_MOST];
