@@ -6,11 +6,11 @@
  *   q' = q + h v + h^2 ((1/2 - beta) w + beta w') - (h beta / gamma) D G^T mu
  *   M a' + J^T lambda' = f
  *
- *   index3    g = 0,              S v' = b   (nonholonomic rows),   mu = 0
- *   ggl       g = 0,              J v' = eta                        stabilised index 2 (Gear, Gupta & Leimkuhler 1985)
+ *   index3    g = 0,              S v' = b,      mu = 0
+ *   ggl       g = 0,              J v' = eta     stabilised index 2 (Gear, Gupta & Leimkuhler 1985)
  *
- * with G and S the holonomic and the nonholonomic rows of J, D as in dae.h.  The acceleration-like variable w
- * approximates the acceleration at t + shift h, shift = alpha_m - alpha_f, with an error of order h^2.  The
+ * with G the holonomic rows of J, S and b the nonholonomic rows of J and eta, D as in dae.h.  The acceleration-like
+ * variable w approximates the acceleration at t + shift h, shift = alpha_m - alpha_f, with an error of order h^2.  The
  * coefficients follow from the spectral radius rho at infinite frequency.
  *
  * For order 2 from the first step, the initial w is a + shift h a-dot.  In index3, where g = 0 requires a velocity
@@ -20,15 +20,15 @@
  * new initialisation, from velocities projected onto J v = eta.  If vibrations too fast for the step dominate a-dot,
  * this would amplify them a hundredfold; then a-dot is the change of a in a trial step from w = a.
  *
- * Newton's iteration has the unknowns q', v', lambda', mu; w' and a' follow from v'.  With c = gamma / (h beta) and
- * e = (1 - alpha_m) / ((1 - alpha_f) h gamma) the equations are those of dae.h, in which
+ * Newton's iteration has the unknowns q', v', lambda', mu; w' and a' follow from v'.  With c = gamma / (h beta) and e =
+ * (1 - alpha_m) / ((1 - alpha_f) h gamma) the equations are those of dae.h, in which
  *
  *   c (q' - q - h v - h^2 (1/2 - beta) w - h^2 beta w')
  *
- * stands for the derivative of q less v.  Corrections satisfy dw' = dv' / (h gamma), da' = e dv', so that c
- * and e are the coefficients of dF/dy'.  Corrections of v', lambda', mu are in units of c, c e m, c, and the
- * equations are divided by c, c e m, c, with m a mass: then all entries of the matrix are of the same size for every
- * step, and its condition number does not depend on the step (Bottasso, Bauchau & Cardona 2007,
+ * replaces q-dot - v.  Corrections satisfy dw' = dv' / (h gamma), da' = e dv', so that c and e are the q_dot_factor and
+ * the v_dot_factor of pw_dae_matrix.  Corrections of v', lambda', mu are in units of c, c e m, c, and the kinematics,
+ * the momentum and the velocity constraints are divided by c, c e m, c, with m a mass: then all entries of the matrix
+ * are of about the same size, and its condition number does not depend on the step (Bottasso, Bauchau & Cardona 2007,
  * Time-step-size-independent conditioning and sensitivity to perturbations in the numerical solution of index three
  * differential algebraic equations). */
 #include <float.h>
@@ -48,7 +48,7 @@ struct pw_method_data {
 
 typedef struct pw_method_data galpha;
 
-/* The coefficients c and e. */
+/* The factors c and e. */
 static double galpha_c (const galpha *d, double h) {
   return d->gamma / (h * d->beta);
 }
@@ -82,18 +82,12 @@ static int galpha_residual (pw_run *r, double h, double t1) {
   return PW_OK;
 }
 
-/* Adds all entries of the Newton matrix. */
-static void galpha_fill (galpha *d, double h) {
-  pw_dae *x = &d->common.dae;
-  pw_dae_matrix (x, d->common.v1, d->a1, d->y + 2 * x->n, galpha_c (d, h), galpha_e (d, h));
-}
-
 static int galpha_factor (pw_run *r, double h) {
   galpha *d = r->data;
-  const pw_dae *x = &d->common.dae;
+  pw_dae *x = &d->common.dae;
   const int64_t *colptr = x->tangent.colptr, *rowind = x->tangent.rowind;
   pw_implicit_begin_matrix (&d->common, x->size);
-  galpha_fill (d, h);
+  pw_dae_matrix (x, d->common.v1, d->a1, d->y + 2 * x->n, galpha_c (d, h), galpha_e (d, h));
   for (int c = 0; c < x->size; c++)
     for (int64_t i = colptr[c]; i < colptr[c + 1]; i++)
       d->common.value[i] *= d->row_factor[rowind[i]] * d->column_factor[c];
@@ -116,8 +110,8 @@ static void galpha_predict (pw_run *r, double h) {
   pw_tangent_compress (&x->tangent, r->lambda, x->rows, d->y + 2 * x->n);
 }
 
-/* Solves for the correction and applies it.  *correction: its size, the largest of those of q and v / c in units of the
- * scene; *round_off: that of q and h v.  PW_OK or PW_RESOURCE. */
+/* Solves for the correction of the unknowns and applies it.  *correction: its size, the largest of those of q and v / c
+ * in units of the scene; *round_off: the round-off of q and h v in these units.  PW_OK or PW_RESOURCE. */
 static int galpha_correct (pw_run *r, double h, double *correction, double *round_off) {
   galpha *d = r->data;
   int n = d->common.dae.n, size = d->common.dae.size;
@@ -174,7 +168,7 @@ static int galpha_solve (pw_run *r, double h, double t1) {
 
 /* ---- Opening ---- */
 
-/* Order 2 with the least damping of low frequencies for a given spectral radius rho at infinite frequency. */
+/* The coefficients for order 2 with the least damping of low frequencies for a given rho (Chung & Hulbert 1993). */
 static void galpha_coefficients (galpha *d, double rho) {
   d->alpha_m = (2 * rho - 1) / (rho + 1);
   d->alpha_f = rho / (rho + 1);
@@ -196,10 +190,9 @@ static int galpha_open (pw_run *r, pw_error *error) {
   if (status == PW_OK) {
     galpha_coefficients (d, pw_run_option (r, "rho"));
     d->common.q1 = d->y, d->common.v1 = d->y + x->n;
-    pw_scatter_begin_record (&x->tangent.scatter);
-    galpha_fill (d, 1);
-    status = pw_implicit_lay_out (&d->common, x->size);
+    status = pw_dae_lay_out (x, d->common.v1, d->a1, d->y + 2 * x->n);
   }
+  if (status == PW_OK) status = pw_implicit_open_matrix (&d->common, x->size);
   pw_dense_projection projection = x->enforces_velocities ? PW_DENSE_POSITIONS_AND_VELOCITIES : PW_DENSE_POSITIONS;
   return pw_implicit_complete (r, status, projection, error);
 }
@@ -260,13 +253,13 @@ static int galpha_add_velocity_error (pw_run *r, double h, const double *jerk) {
   return PW_OK;
 }
 
-/* Initialises v, a and w for the first step of this size. */
+/* Initialises d->v, d->a and d->w for the first step of this size. */
 static int galpha_begin (pw_run *r, double h) {
   galpha *d = r->data;
   double *jerk = d->w1;
   int status = PW_OK;
   memcpy (d->v, r->v, (size_t)d->common.dae.n * sizeof *d->v);
-  if (!d->common.dae.enforces_velocities) { /* velocities include the error of the steps before */
+  if (!d->common.dae.enforces_velocities) { /* r->v includes the error that earlier steps added */
     status = pw_evaluate_J_at (r->w, r->t, r->q, d->v);
     if (status == PW_OK) status = pw_project_velocities (&d->common.last.projector, r, d->v);
   }

@@ -2,12 +2,13 @@
  * Ordinary Differential Equations II, section IV.8; in index 2 and 3: chapter VII, and Hairer, Lubich & Roche 1989).
  * With y = (q, v, lambda, mu) the equations B y' = F (t, y) are
  *
- *   q' = v - D G^T mu,   M v' = f - J^T lambda,   G, S: holonomic, nonholonomic rows of J;  D as in dae.h
+ *   q' = v - D G^T mu,   M v' = f - J^T lambda
  *   ggl       0 = eta - J v,   0 = -g
- *   index2    0 = eta - J v,                                               mu = 0
- *   index3    0 = -g,   0 = b - S v   (nonholonomic rows)                  mu = 0
+ *   index2    0 = eta - J v,             mu = 0
+ *   index3    0 = -g,   0 = b - S v,     mu = 0
  *
- * The stages y + Z_i at t + c_i h satisfy  B sum_j (A^-1)_ij Z_j = h F (t + c_i h, y + Z_i);  the last one is the new
+ * with G the holonomic rows of J, S and b the nonholonomic rows of J and eta, D as in dae.h, B = diag (1, M, 0).  The
+ * stages y + Z_i at t + c_i h satisfy  B sum_j (A^-1)_ij Z_j = h F (t + c_i h, y + Z_i);  the last one is the new
  * state.  T^-1 A^-1 T = diag (gamma, [ alpha -beta ; beta alpha ]) decouples Newton's equations for W, Z = T W:
  *
  *   (gamma/h B - F_y) dW_1 = r_1,    ((alpha + i beta)/h B - F_y) (dW_2 + i dW_3) = r_2 + i r_3
@@ -17,8 +18,9 @@
  *
  *   err = (gamma/h B - F_y)^-1 (F (t, y) + B sum_i e_i Z_i / h)            of order h^4
  *
- * in units of tolerances of 0.05 rtol^(2/3), which makes the error of order 5 about proportional to rtol.  Multipliers
- * are not tested.  The step follows from the errors of this and the previous step (Gustafsson 1994).
+ * in units of tolerances of 0.05 rtol^(2/3), which makes the error of the method, of order 5, about proportional to
+ * rtol.  Multipliers are not tested.  The step size follows from the errors of this and the previous step (Gustafsson
+ * 1994).
  *
  * Accelerations and multipliers at the ends of steps and in samples are computed from positions and velocities, which
  * are more accurate than the multipliers of the stages.  Work and losses are integrated with the stages. */
@@ -32,8 +34,8 @@
 
 enum { STAGES = PW_RADAU_STAGES };
 
-#define RADAU_REUSE_CONTRACTION 1e-2 /* up to which F_y is reused */
-#define RADAU_REUSE_GROWTH 1.2 /* of the step size up to which it is not changed, so that the factors are reused */
+#define RADAU_REUSE_CONTRACTION 1e-2 /* `contraction` up to which F_y is reused */
+#define RADAU_REUSE_GROWTH 1.2 /* growth up to which the step size is not changed, so that the factors are reused */
 #define RADAU_SIGNAL_STEP 1e-4 /* step in units of the time scale below which a signal that fails ends the run */
 
 /* The last row of A^-1: derivatives at the end of a step. */
@@ -61,33 +63,30 @@ static int radau_restart (pw_run *r, pw_error *error) {
   return PW_OK;
 }
 
-static void radau_lay_out (pw_layout *l, double **const *array, size_t arrays, size_t length) {
-  for (size_t i = 0; i < arrays; i++) *array[i] = pw_layout_alloc (l, length, sizeof (double));
-}
-
 static int radau_allocate (pw_run *r) {
   radau *d = r->data;
-  size_t length = (size_t)d->dae.size + 6; /* of all arrays of unknowns, with room for three more coordinates */
-  double **const of_unknowns[] = { &d->B,         &d->unit,       &d->tolerance,     &d->newton_tolerance,
-                                   &d->round_off, &d->row_factor, &d->column_factor, &d->Y,
-                                   &d->a_end,     &d->now.y,      &d->last.y,        &d->now.a,
-                                   &d->last.a };
-  double **const of_entries[] = { &d->rate, &d->now.ledger, &d->last.ledger };
-  for (pw_layout l = { 0 }; pw_layout_pass (&l, &d->memory);) {
-    radau_lay_out (&l, of_unknowns, sizeof of_unknowns / sizeof *of_unknowns, length);
-    radau_lay_out (&l, of_entries, sizeof of_entries / sizeof *of_entries, (size_t)r->s->entries);
-    for (int k = 0; k < STAGES; k++) {
-      double **const stage[] = { &d->now.Z[k], &d->last.Z[k], &d->W[k], &d->F[k] };
-      double **const ledger[] = { &d->now.ledger_change[k], &d->last.ledger_change[k] };
-      radau_lay_out (&l, stage, sizeof stage / sizeof *stage, length);
-      radau_lay_out (&l, ledger, sizeof ledger / sizeof *ledger, (size_t)r->s->entries);
-    }
-    d->complex_x = pw_layout_alloc (&l, 2 * length, sizeof (double));
+  enum { SINGLE = 16, OF_STAGE = 6, ALL = SINGLE + OF_STAGE * STAGES + 1 };
+  const size_t n = (size_t)d->dae.size + 6; /* of all arrays of unknowns, with room for three more coordinates */
+  const size_t entries = (size_t)r->s->entries;
+  pw_array array[ALL] = {
+    { &d->B, n },         { &d->unit, n },       { &d->tolerance, n },        { &d->newton_tolerance, n },
+    { &d->round_off, n }, { &d->row_factor, n }, { &d->column_factor, n },    { &d->Y, n },
+    { &d->a_end, n },     { &d->now.y, n },      { &d->last.y, n },           { &d->now.a, n },
+    { &d->last.a, n },    { &d->rate, entries }, { &d->now.ledger, entries }, { &d->last.ledger, entries }
+  };
+  for (int k = 0; k < STAGES; k++) {
+    const pw_array of_stage[OF_STAGE] = {
+      { &d->now.Z[k], n },  { &d->now.ledger_change[k], entries },  { &d->W[k], n },
+      { &d->last.Z[k], n }, { &d->last.ledger_change[k], entries }, { &d->F[k], n }
+    };
+    memcpy (array + SINGLE + OF_STAGE * k, of_stage, sizeof of_stage);
   }
+  array[ALL - 1] = (pw_array){ &d->complex_x, 2 * n };
+  d->memory = pw_alloc_arrays (array, ALL);
   return d->memory ? PW_OK : PW_RESOURCE;
 }
 
-/* The diagonal of B, and the units of the unknowns. */
+/* The diagonal of B, and the units of the states. */
 static void radau_constants (pw_run *r) {
   radau *d = r->data;
   const pw_system *s = r->s;
@@ -126,26 +125,26 @@ static void radau_close (pw_run *r) {
 
 /* ---- Advancing ---- */
 
-/* Accelerations and multipliers at the state reached, where J is evaluated: from the state, or in singular
+/* Accelerations and multipliers at the state reached, where J is evaluated: computed from the state, or in singular
  * configurations those of the last stage. */
 static void radau_evaluate_reached (pw_run *r, double h) {
   radau *d = r->data;
   double *lambda = d->now.y + 2 * d->dae.n;
   int status = pw_saddle_factor (r->saddle);
   d->near_singular = r->near_singular = status != PW_OK || pw_watchdog_near (r);
-  if (status == PW_OK)
+  if (status == PW_OK) {
     pw_run_accelerate_updated (r, r->v, r->a, r->lambda);
-  else
-    for (int j = 0, i = d->dae.n; j < d->dae.n; j++, i++)
-      r->a[j] = pw_radau_sum (0, radau_derivative_at_end, d->last.Z, i) / h;
-  if (status != PW_OK) pw_tangent_expand (&d->dae.tangent, lambda, r->lambda);
+  } else {
+    for (int j = 0, n = d->dae.n; j < n; j++) r->a[j] = pw_radau_sum (0, radau_derivative_at_end, d->last.Z, n + j) / h;
+    pw_tangent_expand (&d->dae.tangent, lambda, r->lambda);
+  }
   pw_tangent_compress (&d->dae.tangent, r->lambda, d->dae.rows, lambda);
   memcpy (d->a_end, r->a, (size_t)d->dae.n * sizeof *d->a_end);
   pw_bound_tolerances (r);
   pw_ledger_rates (r, r->lambda, r->rate);
 }
 
-/* The last stage becomes the state reached. */
+/* The last stage becomes the state reached.  PW_OK, or PW_METHOD if a signal failed. */
 static int radau_accept (pw_run *r, double h, double t1) {
   radau *d = r->data;
   size_t n = (size_t)d->dae.n * sizeof (double), entries = (size_t)r->s->entries;
@@ -185,8 +184,8 @@ static double radau_next_h (const radau *d, double h, double error, int rejected
   return d->contraction <= RADAU_REUSE_CONTRACTION && next >= h && next <= RADAU_REUSE_GROWTH * h ? h : next;
 }
 
-/* A step of size h; *error: in units of the tolerances, INFINITY if its equations could not be solved or steps are
- * fixed.  filter_twice: as in pw_radau_estimate. */
+/* Computes a step of size h, and its error in units of the tolerances: INFINITY if its equations could not be solved,
+ * or steps are fixed.  filter_twice: as in pw_radau_estimate. */
 static int radau_try (pw_run *r, double h, double t1, int filter_twice, double *error) {
   *error = INFINITY;
   r->near_singular = 0;

@@ -116,13 +116,12 @@ static int radau_solve_complex (radau *d, double *re, double *im) {
 
 /* ---- Tolerances ---- */
 
-/* makes the error of order 5 about proportional to rtol (radau.c) */
 double pw_radau_rtol (const pw_run *r) {
   return 0.05 * cbrt (r->settings.rtol * r->settings.rtol);
 }
 
 /* Sets, for a step of size h, the tolerances of the error test and of Newton's corrections, and the round-off of the
- * states; in index3 that of velocities is that of positions over h.  (radau has ggl, index2 and index3 only.) */
+ * states; in index3, which alone does not enforce velocities, that of velocities is that of positions over h. */
 static void radau_set_tolerances (pw_run *r, double h) {
   radau *d = r->data;
   const pw_settings *settings = &r->settings;
@@ -184,7 +183,7 @@ static double radau_time (const pw_run *r, int k, double h, double t1) {
   return k == STAGES - 1 ? t1 : r->t + radau_c[k] * h;
 }
 
-/* One correction; *size, *round_offs: the largest of a state in units of its tolerance, and of its round-off. */
+/* One correction; *size, *round_offs: the largest one of a state, in units of newton_tolerance and of round_off. */
 static int radau_correct (pw_run *r, double h, double t1, double *size, double *round_offs) {
   radau *d = r->data;
   double *const *W = d->W, *const *F = d->F;
@@ -214,9 +213,9 @@ static int radau_correct (pw_run *r, double h, double t1, double *size, double *
 }
 
 /* Tests convergence after a correction with `done` ones before it; size, before: of this correction and the previous
- * one in units of the tolerances, round_offs: in units of round-off.  PW_DIVERGED also if convergence is too slow.
- * The tests are those of Hairer & Wanner 1996, section IV.8, and one for round-off: corrections of 64 times their
- * round-off, or 1e7 times near a singular configuration, which magnifies it, that shrink slowly are accepted. */
+ * one in units of newton_tolerance; round_offs: of this one in units of round_off.  PW_DIVERGED also if convergence is
+ * too slow.  The tests are those of Hairer & Wanner 1996, section IV.8, and one for round-off: corrections that shrink
+ * slowly are accepted up to 64 times round_off, or 1e7 times near a singular configuration, which magnifies it. */
 static pw_convergence radau_test (pw_run *r, int done, double size, double before, double round_offs) {
   radau *d = r->data;
   const int fixed = pw_fixed_steps (r), most = fixed ? 50 : PW_RADAU_MOST; /* a fixed step cannot be made shorter */
