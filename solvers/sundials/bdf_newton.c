@@ -10,8 +10,8 @@
  *
  *   (T_a + gamma T_v + gamma^2 T_q) da + T_lambda dlambda = - T_q (b_q + gamma b_v) - T_v b_v
  *
- * T is evaluated when CVODES asks for a new Jacobian; gamma changes more often.  KLU analyses the matrix once and
- * refactors it, with new pivots if the estimated condition number exceeds eps^(-2/3), eps the machine precision. */
+ * T is evaluated when CVODES asks for a new Jacobian; gamma changes more often.  KLU orders the matrix once and keeps
+ * its pivots unless the estimated condition number exceeds eps^(-2/3), with eps the machine precision. */
 #include <stdlib.h>
 #include <string.h>
 #include <cvodes/cvodes.h>
@@ -33,7 +33,7 @@ static void newton_fill_T (multistep_data *d) {
   pw_tangent_add_accelerations (&d->newton.tangent, &to, d->v, d->a);
 }
 
-/* Adds all entries of the matrix, from those of T. */
+/* Adds all entries of the matrix T_a + gamma T_v + gamma^2 T_q, T_lambda from those of T. */
 static void newton_fill_matrix (pw_bdf_newton *w, int n) {
   const pw_tangent *x = &w->tangent;
   const double power[] = { w->gamma * w->gamma, w->gamma, 1 };
@@ -44,8 +44,8 @@ static void newton_fill_matrix (pw_bdf_newton *w, int n) {
   }
 }
 
-/* Called by CVODES: evaluates T unless the last one is still valid, which CVODES proposes by `reuse`, then forms the
- * matrix with gamma.  *evaluated: whether it evaluated T. */
+/* Called by CVODES: evaluates T, unless CVODES proposes to `reuse` the last one and that is still valid, then forms the
+ * matrix with gamma.  *evaluated: 1 if T was evaluated. */
 static int newton_set_up (realtype t, N_Vector y, N_Vector derivative, SUNMatrix matrix, booleantype reuse,
                           booleantype *evaluated, realtype gamma, void *data, N_Vector tmp1, N_Vector tmp2,
                           N_Vector tmp3) {
@@ -105,7 +105,7 @@ static int newton_solve (SUNLinearSolver solver, SUNMatrix matrix, N_Vector vx, 
 
 /* ---- Opening ---- */
 
-/* Records the patterns of T and of the matrix by filling each once. */
+/* Records the patterns of T and of the matrix, with all values 0. */
 static int newton_lay_out (multistep_data *d) {
   pw_bdf_newton *w = &d->newton;
   pw_tangent *x = &w->tangent;

@@ -1,7 +1,7 @@
 /* ida: the variable-order BDF code IDAS of SUNDIALS (Hindmarsh et al. 2005), on the equations of dae.h.
  *
- * The Newton matrix is exact and sparse, factorised by KLU.  The error test excludes lambda and mu but no velocities,
- * not even those of massless coordinates.  In si1 it includes all unknowns. */
+ * The Newton matrix is exact and sparse, factorised by KLU.  The error test covers positions and velocities, including
+ * those of massless coordinates; in si1 it covers all unknowns. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -69,7 +69,7 @@ static int ida_open_matrix (ida_data *d) {
 
 /* ---- Error weights ---- */
 
-/* The coefficient c of y' in the matrix of the current step, 1 / h before the first; at least 1 / T. */
+/* The coefficient c in the matrix dF/dy + c dF/dy' of the current step, 1 / h before the first; at least 1 / T. */
 static double ida_leading_coefficient (const ida_data *d) {
   const pw_run *r = d->sun.run;
   realtype c = 0;
@@ -87,12 +87,13 @@ static double ida_force_scale (const pw_run *r) {
   return force > 0 ? force : 1;
 }
 
-/* Called by IDA: error weights.  Those of the multipliers use the scales of forces and velocities, times L for moments
- * and angles.
+/* Called by IDA: error weights.  Those of lambda and mu use the scales of forces and of velocities, times L where the
+ * equation is one of angles.
  *
- * As unknowns, lambda and mu are not in the error test, and their corrections are those of v or q divided by the step:
- * with J v = eta, their tolerances are multiplied by c T for the test of convergence.  In si1 the unknowns are their
- * integrals, whose tolerances are those of the multipliers times T, with lambda of the previous step. */
+ * Where J v = eta is enforced, corrections of lambda and mu are those of v and q divided by the step.  Outside the
+ * error test, their tolerances are therefore multiplied by c T, for the test of convergence.  In si1 the unknowns are
+ * the integrals of the multipliers, whose tolerances are those of the multipliers times T, with lambda of the previous
+ * step. */
 static int ida_weigh (N_Vector vy, N_Vector weights, void *data) {
   ida_data *d = data;
   const pw_run *r = d->sun.run;
@@ -139,14 +140,14 @@ static void ida_read (const ida_data *d, double *q, double *v, double *a, double
 }
 
 /* Interpolates the state at t into the sample arrays and updates kinematics.  Accelerations and multipliers are
- * computed from the state, since IDA's error test does not control its own; these remain only in singular
+ * computed from the state, since IDA's error test does not control those of IDA, which remain only in singular
  * configurations.  Returns an IDA flag. */
 static int ida_interpolate (ida_data *d, double t) {
   pw_run *r = d->sun.run;
   long steps = 0;
   int flag = IDAGetNumSteps (d->ida, &steps);
   if (flag == IDA_SUCCESS && (steps == 0 ? t != r->t : t > r->t)) flag = IDA_BAD_T;
-  if (steps == 0) ida_fill_vectors (d);
+  if (steps == 0) ida_fill_vectors (d); /* the initial state */
   if (flag == IDA_SUCCESS && steps > 0) flag = IDAGetDky (d->ida, t, 1, d->yp);
   if (flag == IDA_SUCCESS && steps > 0) flag = IDAGetDky (d->ida, t, 0, d->sun.y);
   if (flag != IDA_SUCCESS) return flag;
@@ -166,8 +167,9 @@ static int ida_power (pw_run *r, double t, double *rate) {
   return flag == IDA_SUCCESS ? PW_OK : PW_RETRY;
 }
 
-/* Work and losses up to the state reached; factorised: 1 if the saddle-point matrix is factorised there.  Multipliers
- * outside the error test are not accurate enough and are recomputed.  PW_METHOD if a signal failed. */
+/* Work and losses up to the state reached; factorised: 1 if the saddle-point matrix is factorised there.  The
+ * multipliers that IDA computes with J v = eta are not accurate enough to be integrated, and are recomputed.  PW_METHOD
+ * if a signal failed. */
 static int ida_work (ida_data *d, int factorised) {
   pw_run *r = d->sun.run;
   int order = 1;
@@ -196,6 +198,7 @@ static int ida_open_vectors (ida_data *d, pw_run *r) {
   return PW_OK;
 }
 
+/* Called by IDA at each restart: the next factorisation orders the matrix and selects pivots anew. */
 static int ida_initialise (SUNLinearSolver solver) {
   return SUNLinSolInitialize (((pw_sun *)solver->content)->klu);
 }
@@ -214,7 +217,7 @@ static int ida_open_solver (ida_data *d) {
   if (!x->run->s->saturates) return PW_OK;
   x->iteration = SUNNonlinSol_Newton (x->y, x->context);
   if (x->iteration == NULL || IDASetNonlinearSolver (m, x->iteration)) return PW_RESOURCE;
-  return pw_sun_test_newton (x->iteration, &x->correction) == 0 ? PW_OK : PW_RESOURCE;
+  return pw_sun_test_newton (x);
 }
 
 static int ida_open (pw_run *r, pw_error *error) {
@@ -273,9 +276,9 @@ static int ida_restart (pw_run *r, pw_error *error) {
   return flag == IDA_SUCCESS ? PW_OK : pw_sun_fail_restart (&d->sun, flag, error);
 }
 
-/* Makes (y, y') the state reached and updates the ledger.  IDA's multipliers are accurate if it solves J v = eta.  On
- * acceleration level, only the Newton iteration determines those of prescribed motions, and they may drift without
- * effect on the motion: there they are recomputed.  PW_METHOD if a signal failed. */
+/* Makes (y, y') the state reached and updates the ledger.  With J v = eta, the multipliers are IDA's.  On acceleration
+ * level, only the Newton iteration determines those of prescribed motions, and they may drift without effect on the
+ * motion: there all are recomputed.  PW_METHOD if a signal failed. */
 static int ida_reach (ida_data *d) {
   pw_run *r = d->sun.run;
   ida_read (d, r->q, r->v, r->a, r->lambda);

@@ -18,8 +18,9 @@
 #include "dense_output.h"
 #include "util.h"
 
-/* Error that may remain after Newton's iteration, in units of that of the error test, if only the projected error is
- * tested or forces saturate: less than CVODES' default of 0.1, since with stiff damping it changes the energy. */
+/* The error that may remain after the iteration, over the tolerance of the error test, if only the projected error is
+ * tested or forces saturate: less than CVODES' default of 0.1, since with stiff damping that error changes the
+ * energy. */
 #define MULTISTEP_CONVERGENCE 0.01
 
 /* ---- Functions that CVODES calls ---- */
@@ -50,8 +51,9 @@ static int multistep_project (multistep_data *d, double t, double *q, double *v)
 }
 
 /* Leaves the part of the error tangential to the constraints (Eich 1993), in the metric of the projection, plus a small
- * part of the whole error, so that a displacement off the constraints is at most rtol^(3/4) as in rk_adapt.c.  It has
- * tangential effects that the estimate misses: the accelerations of the step are those of the displaced state. */
+ * part of the whole error, so that the displacement off the constraints is at most rtol^(3/4) as in rk_adapt.c.  That
+ * displacement has tangential effects that the estimate misses: the accelerations of the step are those of the
+ * displaced state. */
 static void multistep_project_error (multistep_data *d, double *e) {
   pw_run *r = d->sun.run;
   double *whole = d->error, share = sqrt (sqrt (r->settings.rtol));
@@ -61,7 +63,7 @@ static void multistep_project_error (multistep_data *d, double *e) {
   for (int j = 0; j < 2 * d->n; j++) e[j] += share * (whole[j] - e[j]);
 }
 
-/* Called by CVODES: the change of y by the projection; projects the error estimate, too, unless it is NULL. */
+/* Called by CVODES: the change of y by the projection; unless `error` is NULL, projects this error estimate, too. */
 static int multistep_correct (realtype t, N_Vector vy, N_Vector change, realtype tolerance, N_Vector error,
                               void *data) {
   multistep_data *d = data;
@@ -143,7 +145,7 @@ static int multistep_open_iteration (multistep_data *d, int formula) {
   if (newton && !x->run->s->saturates) return PW_OK;
   x->iteration = newton ? SUNNonlinSol_Newton (x->y, x->context) : SUNNonlinSol_FixedPoint (x->y, 0, x->context);
   if (x->iteration == NULL || CVodeSetNonlinearSolver (d->cvode, x->iteration)) return PW_RESOURCE;
-  return newton && pw_sun_test_newton (x->iteration, &x->correction) ? PW_RESOURCE : PW_OK;
+  return newton ? pw_sun_test_newton (x) : PW_OK;
 }
 
 static int multistep_open_solver (multistep_data *d, int formula) {
@@ -188,7 +190,7 @@ static void multistep_close (pw_run *r) {
 
 static void multistep_count (multistep_data *d) {
   pw_statistics *s = &d->sun.run->statistics;
-  long steps = 0, tests = 0, iterations = 0, projections = 0; /* the last three: failed */
+  long steps = 0, tests = 0, iterations = 0, projections = 0; /* steps; failed tests, iterations, projections */
   CVodeGetNumSteps (d->cvode, &steps);
   CVodeGetNumErrTestFails (d->cvode, &tests);
   CVodeGetNumNonlinSolvConvFails (d->cvode, &iterations);
@@ -223,8 +225,8 @@ static void multistep_evaluate (multistep_data *d) {
   r->statistics = statistics;
 }
 
-/* Work and losses up to the state reached.  The multipliers of Newton's last iterate, which may be its first, are not
- * accurate enough. */
+/* Work and losses up to the state reached.  Multipliers of the last Newton iterate, which may be the prediction, are
+ * not accurate enough.  Returns as pw_quadrature_step. */
 static int multistep_work (multistep_data *d) {
   pw_run *r = d->sun.run;
   int order = 1;
@@ -234,8 +236,8 @@ static int multistep_work (multistep_data *d) {
   return pw_quadrature_step (&d->sun.quadrature, r, order);
 }
 
-/* Makes y the state reached and updates the ledger.  Accelerations remain those of the last iterate until multistep_at
- * evaluates them, which saves one evaluation in three. */
+/* Makes y the state reached at t and updates the ledger.  Accelerations and multipliers remain those of the last
+ * iterate until multistep_at or multistep_evaluate computes them, which saves one evaluation in three. */
 static int multistep_reach (multistep_data *d, double t, pw_error *error) {
   pw_run *r = d->sun.run;
   const double *y = N_VGetArrayPointer (d->sun.y);
