@@ -44,12 +44,6 @@ static int order_open (order_search *x) {
   return x->memory ? PW_OK : PW_RESOURCE;
 }
 
-static void order_close (order_search *x) {
-  free (x->minimum_degree.below);
-  free (x->natural.below);
-  free (x->memory);
-}
-
 /* Lists the neighbours of each node in the graph of the nodes of at most this rank. */
 static void order_list_neighbours (order_search *x, int rank) {
   memset (x->first, 0, ((size_t)x->nodes + 2) * sizeof *x->first);
@@ -201,7 +195,9 @@ pw_block_ldl *pw_block_open (int nodes, const pw_plan_node *node, long pairs, co
   pw_block_ldl *l = v ? calloc (1, sizeof *l) : NULL;
   if (l) l->nodes = nodes;
   if (l && order_store (l, node, v) != PW_OK) pw_block_close (l), l = NULL;
-  order_close (&x);
+  free (x.minimum_degree.below);
+  free (x.natural.below);
+  free (x.memory);
   return l;
 }
 

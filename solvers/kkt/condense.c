@@ -24,7 +24,8 @@ static void condense_contribute (pw_plan *plan, const double *J, int row_stride,
   plan->failed = pw_grow (&plan->contribution, (size_t)plan->contributions, &plan->contribution_room,
                           sizeof *plan->contribution) != PW_OK;
   if (!plan->failed)
-    plan->contribution[plan->contributions++] = (pw_plan_contribution){ J, plan->nodes - 1, row_stride, j, is_pin };
+    plan->contribution[plan->contributions++] =
+        (pw_plan_contribution){ J, plan->nodes - 1, row_stride, pw_group_of (plan->saddle->s, j), is_pin };
 }
 
 /* Adds the node of `size` rows from row n of a batch on. */
@@ -102,13 +103,12 @@ static void condense_components (pw_plan *plan) {
 
 /* Sorts the contributions by group. */
 static int condense_sort (pw_plan *plan) {
-  const int coords = plan->saddle->s->coords;
-  plan->start = pw_arena_alloc (&plan->arena, ((size_t)coords + 2) * sizeof *plan->start);
+  plan->start = pw_arena_alloc (&plan->arena, ((size_t)plan->groups + 2) * sizeof *plan->start);
   plan->list = pw_arena_alloc (&plan->arena, (size_t)plan->contributions * sizeof *plan->list);
   if (plan->failed || plan->start == NULL || plan->list == NULL) return PW_RESOURCE;
-  for (int p = 0; p < plan->contributions; p++) plan->start[plan->contribution[p].j + 2]++;
-  for (int j = 0; j < coords; j++) plan->start[j + 2] += plan->start[j + 1];
-  for (int p = 0; p < plan->contributions; p++) plan->list[plan->start[plan->contribution[p].j + 1]++] = p;
+  for (int p = 0; p < plan->contributions; p++) plan->start[plan->contribution[p].group + 2]++;
+  for (int g = 0; g < plan->groups; g++) plan->start[g + 2] += plan->start[g + 1];
+  for (int p = 0; p < plan->contributions; p++) plan->list[plan->start[plan->contribution[p].group + 1]++] = p;
   return PW_OK;
 }
 
@@ -119,20 +119,21 @@ static int condense_sort (pw_plan *plan) {
  * with 7 nodes, 0.7 to 1.0 with 6. */
 enum { CONDENSE_NODES = 6 };
 
-static int condense_is_crowded (const pw_plan *plan, int b) {
-  const double *w = plan->saddle->inverse_weight + 3 * b;
-  return plan->start[3 * b + 1] - plan->start[3 * b] > CONDENSE_NODES && w[0] > 0 && w[1] > 0 && w[2] > 0;
+static int condense_is_crowded (const pw_plan *plan, int group) {
+  const double *w = plan->saddle->inverse_weight + 3 * group;
+  return group < plan->saddle->s->bodies && plan->start[group + 1] - plan->start[group] > CONDENSE_NODES && w[0] > 0 &&
+         w[1] > 0 && w[2] > 0;
 }
 
 /* Adds two nodes for every body that is not condensed, and ranks all nodes. */
 static int condense_uncondensed (pw_plan *plan) {
   struct pw_saddle *saddle = plan->saddle;
-  plan->uncondensed = pw_arena_alloc (&plan->arena, (size_t)saddle->s->bodies * sizeof *plan->uncondensed);
+  plan->uncondensed = pw_arena_alloc (&plan->arena, (size_t)plan->groups * sizeof *plan->uncondensed);
   if (plan->uncondensed == NULL) return PW_RESOURCE;
-  for (int b = 0; b < saddle->s->bodies; b++) {
-    plan->uncondensed[b] = -1;
-    if (!condense_is_crowded (plan, b)) continue;
-    plan->uncondensed[b] = plan->nodes;
+  for (int g = 0; g < plan->groups; g++) {
+    plan->uncondensed[g] = -1;
+    if (!condense_is_crowded (plan, g)) continue;
+    plan->uncondensed[g] = plan->nodes;
     condense_add_node (plan, (pw_plan_node){ .size = 2, .rank = 1, .unknown = saddle->s->rows + saddle->extra });
     condense_add_node (plan, (pw_plan_node){ .size = 1, .rank = 1, .unknown = saddle->s->rows + saddle->extra + 2 });
     saddle->extra += 3;

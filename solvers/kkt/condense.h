@@ -34,12 +34,12 @@ int pw_condense (struct pw_saddle *saddle, const double *weight, const unsigned 
 
 /* ---- Planning ---- */
 
-/* The contribution of a node to the group that begins with coordinate j. */
+/* The contribution of a node to a group. */
 typedef struct {
-  const double *J; /* its entry in the node's first row and in column j */
+  const double *J; /* its entry in the node's first row and the group's first column */
   int node;
   int row_stride; /* from row to row of J */
-  int j;
+  int group;
   int is_pin; /* 1: both rows of a pin, whose x and y columns are the unit matrix or its negative */
 } pw_plan_contribution;
 
@@ -53,9 +53,9 @@ typedef struct {
   long pairs;
   size_t node_room, contribution_room, pair_room; /* number of entries for which each has room */
   int failed;                                     /* 1: out of memory */
-  int *start, *list; /* contributions to the group that begins with j: list[start[j]] to list[start[j + 1] - 1] */
   int groups;
-  int *uncondensed; /* bodies: first of the two nodes of an uncondensed body, or -1 */
+  int *start, *list; /* contributions to group g: list[start[g]] to list[start[g + 1] - 1] */
+  int *uncondensed;  /* groups: first of the two nodes of an uncondensed body, or -1 */
   pw_chain *chain;
   int chains, linked;       /* number of chains; number of bodies in them */
   unsigned char *is_linked; /* groups: 1 for a body in a chain */

@@ -1,19 +1,18 @@
 /* Finds the chains of a scene; see condense.h and block_ldl.h. */
 #include "condense.h"
 
-/* The block between a column and the next one: the number of bodies and eliminated columns that add to it, and one of
- * these bodies as a chain of one, if it can be in a chain (else link.bodies is 0). */
+/* A column, and the block between it and the next one. */
 typedef struct {
-  int sources;
-  pw_chain link;
+  int contributions; /* to the column; 2 inside a chain */
+  int sources;       /* bodies and eliminated columns that add to the block */
+  pw_chain link;     /* one of these bodies as a chain of one; link.bodies is 0 if none can be in a chain */
 } chain_between;
 
 /* Fills link for a body whose two nodes are a column and the next one, the only row below it.  Returns the column; -1
  * if the body cannot be in a chain. */
 static int chain_link (const pw_plan *plan, const pw_block_ldl *l, int body, pw_chain *link) {
-  int j = pw_group_first (plan->saddle->s, body);
-  const int *list = plan->list + plan->start[j];
-  if (plan->start[j + 1] - plan->start[j] != 2) return -1;
+  const int j = 3 * body, *list = plan->list + plan->start[body];
+  if (plan->start[body + 1] - plan->start[body] != 2) return -1;
   const pw_plan_contribution *a = &plan->contribution[list[0]], *b = &plan->contribution[list[1]];
   int column = l->column_of_node[a->node];
   if (!a->is_pin || !b->is_pin || plan->saddle->inverse_weight[j] != plan->saddle->inverse_weight[j + 1]) return -1;
@@ -43,8 +42,8 @@ static int chain_add (pw_chain *chain, const pw_chain *last, const pw_chain *lin
   return 1;
 }
 
-/* Joins links to chains.  contributions: their number in each column; 2 inside a chain. */
-static void chain_join (pw_plan *plan, pw_block_ldl *l, const chain_between *between, const int *contributions) {
+/* Joins links to chains. */
+static void chain_join (pw_plan *plan, pw_block_ldl *l, const chain_between *between) {
   plan->chains = plan->linked = 0;
   for (int p = 0; p < l->nodes;) {
     const chain_between *b = &between[p++];
@@ -53,7 +52,7 @@ static void chain_join (pw_plan *plan, pw_block_ldl *l, const chain_between *bet
     *chain = b->link;
     chain->first_factor = 3 * (plan->linked + plan->chains - 1);
     plan->is_linked[b->link.j / 3] = 1;
-    for (; p < l->nodes && between[p].sources == 1 && contributions[p] == 2; p++) {
+    for (; p < l->nodes && between[p].sources == 1 && between[p].contributions == 2; p++) {
       if (between[p].link.bodies == 0) break;
       if (!chain_add (chain, &between[p - 1].link, &between[p].link)) break;
       plan->is_linked[between[p].link.j / 3] = 1;
@@ -74,8 +73,7 @@ static void chain_fill (const pw_block_ldl *l, chain_between *between) {
 
 /* Counts a body as a source; its contributions are in the order of their columns. */
 static void chain_count (const pw_plan *plan, const pw_block_ldl *l, int body, chain_between *between) {
-  int j = pw_group_first (plan->saddle->s, body);
-  for (int x = plan->start[j] + 1; x < plan->start[j + 1]; x++) {
+  for (int x = plan->start[body] + 1; x < plan->start[body + 1]; x++) {
     int column = l->column_of_node[plan->contribution[plan->list[x - 1]].node];
     if (l->column_of_node[plan->contribution[plan->list[x]].node] == column + 1) between[column].sources++;
   }
@@ -84,11 +82,10 @@ static void chain_count (const pw_plan *plan, const pw_block_ldl *l, int body, c
 int pw_condense_chains (pw_plan *plan, pw_block_ldl *l) {
   size_t nodes = (size_t)l->nodes;
   chain_between *between = pw_arena_alloc (&plan->arena, nodes * sizeof *between);
-  int *contributions = pw_arena_alloc (&plan->arena, nodes * sizeof *contributions);
   plan->chain = pw_arena_alloc (&plan->arena, nodes * sizeof *plan->chain);
   plan->is_linked = pw_arena_alloc (&plan->arena, (size_t)plan->groups);
-  if (!between || !contributions || !plan->chain || !plan->is_linked) return PW_RESOURCE;
-  for (int p = 0; p < plan->contributions; p++) contributions[l->column_of_node[plan->contribution[p].node]]++;
+  if (!between || !plan->chain || !plan->is_linked) return PW_RESOURCE;
+  for (int p = 0; p < plan->contributions; p++) between[l->column_of_node[plan->contribution[p].node]].contributions++;
   for (int body = 0; body < plan->saddle->s->bodies; body++) {
     pw_chain link;
     int column = chain_link (plan, l, body, &link);
@@ -96,6 +93,6 @@ int pw_condense_chains (pw_plan *plan, pw_block_ldl *l) {
     chain_count (plan, l, body, between);
   }
   chain_fill (l, between);
-  chain_join (plan, l, between, contributions);
+  chain_join (plan, l, between);
   return PW_OK;
 }

@@ -16,14 +16,6 @@ typedef struct {
   int *surplus; /* roots of legs: equations at uncondensed bodies less those at the ground */
 } rank_plan;
 
-static int rank_group (const pw_plan *plan, int contribution) {
-  return pw_group_of (plan->saddle->s, plan->contribution[contribution].j);
-}
-
-static int rank_is_uncondensed (const pw_plan *plan, int group) {
-  return group < plan->saddle->s->bodies && plan->uncondensed[group] >= 0;
-}
-
 /* The end of the contributions of node n: one after the last. */
 static int rank_end (const pw_plan *plan, int n) {
   return n + 1 < plan->nodes ? plan->node[n + 1].first_contribution : plan->contributions;
@@ -34,10 +26,10 @@ static int rank_leg_group (const pw_plan *plan, int n, int *touches) {
   int found = -1;
   *touches = 0;
   for (int p = plan->node[n].first_contribution; p < rank_end (plan, n); p++)
-    if (rank_is_uncondensed (plan, rank_group (plan, p)))
+    if (plan->uncondensed[plan->contribution[p].group] >= 0)
       *touches = 1;
     else
-      found = rank_group (plan, p);
+      found = plan->contribution[p].group;
   return found;
 }
 
@@ -48,13 +40,13 @@ static int rank_join (rank_plan *x, int n) {
   const int first = plan->node[n].first_contribution, end = rank_end (plan, n);
   int at_rest = plan->node[n].grounded ? plan->groups : -1, root = -1;
   for (int p = first; p < end; p++) {
-    root = pw_root (x->parent, rank_group (plan, p));
-    if (root != plan->groups && !rank_is_uncondensed (plan, root)) continue;
+    root = pw_root (x->parent, plan->contribution[p].group);
+    if (root != plan->groups && plan->uncondensed[root] < 0) continue;
     if (at_rest >= 0 && at_rest != root) return 0;
     at_rest = root;
   }
   if (at_rest >= 0) root = at_rest;
-  for (int p = first; p < end; p++) x->parent[pw_root (x->parent, rank_group (plan, p))] = root;
+  for (int p = first; p < end; p++) x->parent[pw_root (x->parent, plan->contribution[p].group)] = root;
   return 1;
 }
 
