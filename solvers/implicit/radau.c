@@ -86,26 +86,16 @@ static int radau_allocate (pw_run *r) {
   return d->memory ? PW_OK : PW_RESOURCE;
 }
 
-/* The diagonal of B, and the units of the states. */
-static void radau_constants (pw_run *r) {
-  radau *d = r->data;
-  const pw_system *s = r->s;
-  int n = d->dae.n;
-  for (int j = 0; j < n; j++) {
-    d->B[j] = 1;
-    d->B[n + j] = s->mass[j];
-    d->unit[j] = pw_unit (s, j);
-    d->unit[n + j] = d->unit[j] / r->w->scale.time;
-  }
-}
-
 static int radau_open (pw_run *r, pw_error *error) {
   radau *d = r->data = calloc (1, sizeof *d);
   int status = d ? pw_dae_open (&d->dae, r) : PW_RESOURCE;
   if (status == PW_OK) status = radau_allocate (r);
   if (status == PW_OK) status = pw_radau_open_matrices (r);
   if (status != PW_OK) return pw_fail_memory (r->s, error);
-  radau_constants (r);
+  for (int j = 0, n = d->dae.n; j < n; j++) {
+    d->B[j] = 1, d->B[n + j] = r->s->mass[j];
+    d->unit[j] = pw_unit (r->s, j), d->unit[n + j] = d->unit[j] / r->w->scale.time;
+  }
   status = pw_projector_open (&d->projector, r, NULL, NULL, error);
   return status == PW_OK ? radau_restart (r, error) : status;
 }

@@ -20,8 +20,6 @@ static const double radau_inverse_T[STAGES][STAGES] = {
 };
 static const double radau_alpha = 2.68108287362775213390, radau_beta = 3.05043019924741056943;
 
-/* ---- Equations ---- */
-
 /* F (t, y) = B y', B = diag (1, M, 0): minus the residual of dae.h without B y'.  Leaves kinematics and J at (t, y). */
 static int radau_evaluate (pw_run *r, double t, const double *y, double *F) {
   radau *d = r->data;

@@ -179,16 +179,11 @@ void pw_chain_factor (pw_block_ldl *l, const pw_chain *c) {
   chain_lanes D[CHAIN_BLOCK];
   double other[CHAIN_BLOCK]; /* the second lane's contribution to the middle pin */
   for (int n = 0; n < CHAIN_BLOCK; n++) D[n] = (chain_lanes){ first[n], c->includes_last ? last[n] : first[n] };
-  for (int n = pairs; n > 0; n--) {
-    chain_eliminate (l, &s, -1, D);
-    if (!(l->least_pivot > 0)) return;
-  }
+  for (int n = pairs; n > 0 && l->least_pivot > 0; n--) chain_eliminate (l, &s, -1, D);
   for (int n = 0; n < CHAIN_BLOCK && c->includes_last; n++) other[n] = D[n][1], D[n][1] = D[n][0];
   if (c->includes_last) s.second = s.first;
-  for (int n = singles; n > 0; n--) {
-    chain_eliminate (l, &s, 1, D);
-    if (!(l->least_pivot > 0)) return;
-  }
+  for (int n = singles; n > 0 && l->least_pivot > 0; n--) chain_eliminate (l, &s, 1, D);
+  if (!(l->least_pivot > 0)) return;
   if (!c->includes_last) {
     for (int n = 0; n < CHAIN_BLOCK; n++) last[n] += D[n][0];
     return;

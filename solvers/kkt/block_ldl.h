@@ -126,7 +126,7 @@ static inline int pw_block_diagonal (int size) {
   return size * (size + 3) / 2;
 }
 
-/* ---- Numbers ---- */
+/* ---- Factorisation and solution (block_factor.c, block_solve.c, block_chain.c) ---- */
 
 /* Assembles S with the J last evaluated and factorises it; stops where least_pivot is not positive. */
 void pw_block_factor (pw_block_ldl *l);

@@ -6,8 +6,6 @@
 #include "block_ldl.h"
 #include "util.h"
 
-/* ---- Pattern ---- */
-
 /* An order of elimination, and the rows below the diagonal of each column c, ascending: below[first[c]] to
  * below[first[c + 1] - 1]. */
 typedef struct {

@@ -32,8 +32,6 @@ struct pw_saddle {
 /* Plans everything but `massless`, which must be open.  weight, active: as for pw_saddle_open.  Errors: PW_RESOURCE. */
 int pw_condense (struct pw_saddle *saddle, const double *weight, const unsigned char *active);
 
-/* ---- Planning ---- */
-
 /* The contribution of a node to a group. */
 typedef struct {
   const double *J; /* its entry in the node's first row and the group's first column */

@@ -96,8 +96,6 @@ static void massless_add_rows (massless_plan *p, pw_massless *m) {
     }
 }
 
-/* ---- Layout ---- */
-
 /* Allocates the components' arrays.  A component has at most as many groups as were counted with repetition, at most
  * those of the scene, and at most as many pivots as rows. */
 static int massless_lay_out (pw_massless *m, const massless_plan *p) {
@@ -174,6 +172,8 @@ static int massless_number_components (pw_massless *m, massless_plan *p, pw_erro
 }
 
 static int massless_build (pw_massless *m, massless_plan *p, pw_error *error) {
+  for (int g = 0; g < p->groups; g++) p->parent[g] = g, p->member[g] = -1;
+  for (int i = 0; i < p->s->rows; i++) m->component_of_row[i] = -1;
   massless_unite (p);
   int status = massless_number_components (m, p, error);
   if (status != PW_OK || m->components == 0) return status;
@@ -188,18 +188,11 @@ static int massless_build (pw_massless *m, massless_plan *p, pw_error *error) {
 
 int pw_massless_open (pw_massless *m, pw_workspace *w, const double *weight, int rows, const unsigned char *active,
                       pw_error *error) {
-  const pw_system *s = w->s;
-  int groups = pw_groups (s), status = PW_RESOURCE;
-  *m = (pw_massless){ 0 };
-  massless_plan p = { .s = s, .w = w, .weight = weight, .active = active, .rows = rows, .groups = groups };
-  p.parent = malloc (((size_t)groups + 1) * sizeof *p.parent);
-  p.member = malloc (((size_t)groups + 1) * sizeof *p.member);
-  m->component_of_row = malloc (((size_t)s->rows + 1) * sizeof *m->component_of_row);
-  if (p.parent && p.member && m->component_of_row) {
-    for (int g = 0; g < groups; g++) p.parent[g] = g, p.member[g] = -1;
-    for (int i = 0; i < s->rows; i++) m->component_of_row[i] = -1;
-    status = massless_build (m, &p, error);
-  }
+  massless_plan p = { .s = w->s, .w = w, .weight = weight, .active = active, .rows = rows, .groups = pw_groups (w->s) };
+  p.parent = malloc (((size_t)p.groups + 1) * sizeof *p.parent);
+  p.member = malloc (((size_t)p.groups + 1) * sizeof *p.member);
+  *m = (pw_massless){ .component_of_row = malloc (((size_t)w->s->rows + 1) * sizeof *m->component_of_row) };
+  int status = p.parent && p.member && m->component_of_row ? massless_build (m, &p, error) : PW_RESOURCE;
   free (p.parent);
   free (p.member);
   return status;

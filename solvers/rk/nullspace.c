@@ -29,18 +29,6 @@
 
 /* ---- Opening ---- */
 
-static int nullspace_allocate (pw_nullspace *b, const pw_system *s) {
-  size_t m = (size_t)b->rows, all = (size_t)s->rows, n = (size_t)s->coords;
-  const pw_array array[] = {
-    { &b->W_inv_J0T, n * m }, { &b->K, m * m }, { &b->mu, m }, { &b->eta, all }, { &b->v, n + 3 }
-  };
-  b->memory = pw_alloc_arrays (array, sizeof array / sizeof *array);
-  b->active_index = malloc ((2 * all + 1) * sizeof *b->active_index);
-  if (b->memory == NULL || b->active_index == NULL) return PW_RESOURCE;
-  b->pivot = b->active_index + all;
-  return PW_OK;
-}
-
 int pw_nullspace_open (pw_nullspace *b, pw_run *r, pw_error *error) {
   const pw_system *s = r->s;
   *b = (pw_nullspace){ .rows = s->rows - r->redundant };
@@ -49,8 +37,15 @@ int pw_nullspace_open (pw_nullspace *b, pw_run *r, pw_error *error) {
                     "model %s: stabilisation nullspace works with dense matrices, for up to %d constraint rows, and "
                     "this scene has %d; use %s+projection",
                     s->model, PW_NULLSPACE_MOST, b->rows, r->method->name);
-  if (nullspace_allocate (b, s) != PW_OK) return pw_fail_memory (s, error);
-  for (int i = 0, n = 0; i < s->rows; i++) b->active_index[i] = r->active && !r->active[i] ? -1 : n++;
+  const size_t m = (size_t)b->rows, all = (size_t)s->rows, n = (size_t)s->coords;
+  const pw_array array[] = {
+    { &b->W_inv_J0T, n * m }, { &b->K, m * m }, { &b->mu, m }, { &b->eta, all }, { &b->v, n + 3 }
+  };
+  b->memory = pw_alloc_arrays (array, sizeof array / sizeof *array);
+  b->active_index = malloc ((2 * all + 1) * sizeof *b->active_index);
+  if (b->memory == NULL || b->active_index == NULL) return pw_fail_memory (s, error);
+  b->pivot = b->active_index + all;
+  for (int i = 0, count = 0; i < s->rows; i++) b->active_index[i] = r->active && !r->active[i] ? -1 : count++;
   return PW_OK;
 }
 
@@ -150,8 +145,6 @@ PW_INLINE void nullspace_add (const pw_nullspace *b, int coords, double *v, int 
     v[j] += sum;
   }
 }
-
-/* ---- A step ---- */
 
 int pw_nullspace_begin (pw_nullspace *b, pw_run *r) {
   const pw_system *s = r->s;

@@ -132,12 +132,6 @@ static double adapt_ledger (pw_run *r, double h) {
   return isfinite (err) ? err : 0;
 }
 
-/* The error of the step, accepted up to 1.  Work and losses are checked only if the state is accepted. */
-static double adapt_error (pw_run *r, double h, int projected) {
-  double state = h * adapt_state (r, projected);
-  return r->s->entries > 0 && state <= 1 ? fmax (state, h * adapt_ledger (r, h)) : state;
-}
-
 /* Half the root mean square of the largest changes of accelerations at the stages, over the tolerances of velocities.
  * Only coordinates count whose velocity changes, at one of the stages, by more than the range in which a force
  * saturates. */
@@ -166,15 +160,16 @@ static double adapt_factor (const struct pw_method_data *d, double err) {
   return fmin (ADAPT_GROWTH, fmax (ADAPT_REDUCTION, factor));
 }
 
-/* The step to t1 = t + h; *err: its error, INFINITY if it fails.  If a signal jumps at t1, the estimate uses the
- * accelerations just before t1, since the jump is not an error of the step. */
+/* The step to t1 = t + h; *err: its error, accepted up to 1; INFINITY if the step fails.  If a signal jumps at t1, the
+ * estimate uses the accelerations just before t1, since the jump is not an error of the step. */
 static int adapt_step (pw_run *r, double h, double t1, int project, double *added_energy, double *err) {
   struct pw_method_data *d = r->data;
   double before = pw_before_breakpoint (r, t1);
   r->near_singular = 0;
   int status = pw_rk_step (r, h, t1, project, added_energy);
   if (status == PW_OK && before < t1) status = pw_run_accelerate (r, before, d->q, d->v, d->a, d->lambda);
-  *err = status == PW_OK ? adapt_error (r, h, project) : INFINITY;
+  *err = status == PW_OK ? h * adapt_state (r, project) : INFINITY;
+  if (r->s->entries > 0 && *err <= 1) *err = fmax (*err, h * adapt_ledger (r, h)); /* else it is rejected anyway */
   if (r->s->saturates && *err <= 1) *err = hypot (*err, pow (r->settings.rtol, 0.25) * h * adapt_reversal (r));
   if (status == PW_OK && before < t1) status = pw_run_accelerate (r, t1, d->q, d->v, d->a, d->lambda);
   if (status != PW_OK) *err = INFINITY;

@@ -67,8 +67,6 @@ static int divide (pw_run *r, const pw_step_start *from, int status, double t1, 
   return least <= acceptable ? PW_OK : PW_RETRY;
 }
 
-/* ---- Samples ---- */
-
 int pw_rk_at (pw_run *r, double t, pw_error *error) {
   struct pw_method_data *d = r->data;
   const pw_step_start *from = &d->last;
@@ -93,8 +91,6 @@ int pw_rk_at (pw_run *r, double t, pw_error *error) {
   if (status < 0) return pw_fail_signal (t, error);
   return status == PW_OK ? PW_OK : pw_rk_fail (r, status, t - from->t, error);
 }
-
-/* ---- Fixed steps ---- */
 
 /* Replaces a step to t1 near a singular configuration, which returned `status`, by the first part of a divided step,
  * and accepts that part; *t: its end.

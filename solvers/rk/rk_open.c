@@ -116,8 +116,6 @@ void pw_rk_serialise (pw_run *r, pw_archive *a) {
   pw_archive_bytes (a, &d->last_error, sizeof d->last_error);
 }
 
-/* ---- Advancing ---- */
-
 int pw_rk_advance (pw_run *r, double t_end, pw_error *error) {
   return pw_fixed_steps (r) ? pw_rk_advance_fixed (r, t_end, error) : pw_rk_advance_adaptive (r, t_end, error);
 }

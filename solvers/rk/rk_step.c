@@ -77,15 +77,7 @@ static inline int rk_evaluate_stage (pw_run *r, double t, double *v, double *a, 
   return status;
 }
 
-/* Zero-order hold: signals of forces keep their values at the beginning of the step.  Kinematics are updated first,
- * since a sample or a rejected step may have changed them. */
-static int rk_hold (pw_run *r) {
-  int status = pw_update_kinematics (r->w, r->t, r->q, r->v);
-  pw_hold_signals (r->w, status == PW_OK);
-  return status;
-}
-
-/* What rk_stages does, by specialised code: 1; 0 if there is none, or it refuses a stage. */
+/* Does what rk_stages does by specialised code: 1; 0 if there is none, or it refuses a stage. */
 static int rk_stages_specialised (pw_run *r, double h) {
   struct pw_method_data *d = r->data;
   double t[PW_RK_STAGES];
@@ -102,7 +94,11 @@ static int rk_stages (pw_run *r, double h) {
   const pw_tableau *tableau = d->tableau;
   d->stage_v[0] = r->v, d->stage_a[0] = r->a, d->stage_rate[0] = r->rate;
   if (rk_stages_specialised (r, h)) return PW_OK;
-  int status = d->holds_signals ? rk_hold (r) : PW_OK;
+  int status = PW_OK;
+  if (d->holds_signals) { /* a sample or a rejected step may have changed the kinematics, and with them the signals */
+    status = pw_update_kinematics (r->w, r->t, r->q, r->v);
+    pw_hold_signals (r->w, status == PW_OK);
+  }
   for (int i = 1; i < tableau->stages && status == PW_OK; i++) {
     rk_combine (r, d->q, d->stage_v[i], &d->row[i], h);
     double t = pw_before_breakpoint (r, r->t + tableau->c[i] * h);

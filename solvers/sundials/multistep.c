@@ -131,9 +131,6 @@ static int multistep_open_arrays (multistep_data *d, pw_run *r) {
   if (pw_sun_open (&d->sun, r, 2 * d->n) != PW_OK) return PW_RESOURCE;
   d->memory = pw_alloc_arrays (array, sizeof array / sizeof *array);
   if (d->memory == NULL) return PW_RESOURCE;
-  memcpy (d->v, r->v, (size_t)d->n * sizeof *d->v);
-  memcpy (d->a, r->a, (size_t)d->n * sizeof *d->a);
-  memcpy (d->lambda, r->lambda, rows * sizeof *d->lambda);
   d->evaluated = 1;
   return PW_OK;
 }
