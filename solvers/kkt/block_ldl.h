@@ -16,9 +16,9 @@
  * of -a_k (rank 1) after the equations of rank 0 and before those of rank 2 (condense_rank.c).
  *
  * Chains are bodies one after another, each pinned to the one before and the one after.  Nothing else touches the pins
- * inside a chain, so their part of the matrix is block tridiagonal and need not be stored.  In a body's columns, J is [
- * s 1  a ] at the pin c and [ s' 1  b ] at the pin c + 1, with signs s and s' and the unit matrix 1.  With the inverses
- * m of its mass and i of its inertia
+ * inside a chain, so their part of the matrix is block tridiagonal and need not be stored.  In a body's columns, J is
+ * [ s 1  a ] at the pin c and [ s' 1  b ] at the pin c + 1, with signs s and s' and the unit matrix 1.  With the
+ * inverses m of its mass and i of its inertia
  *
  *   K_cc += m 1 + i a a^T,   K_(c+1)c = s s' m 1 + i b a^T = K,   K_(c+1)(c+1) += m 1 + i b b^T
  *   L = K D_c^-1,   D_(c+1) = K_(c+1)(c+1) - L K^T,   y_(c+1) -= L y_c
@@ -59,10 +59,10 @@ typedef struct {
 
 typedef struct {
   int j;                     /* first coordinate */
-  int first_contribution;    /* by column; its contributions end at first_contribution of the next block */
-  int first_coupling;        /* of its couplings: for each contribution a, for each one b after it */
+  int first_contribution;    /* index of the first one, by column; they end at that of the next block */
+  int first_coupling;        /* index of the first one: for each contribution a, for each b after it */
   unsigned char width;       /* columns: 3, or 1 of an internal coordinate */
-  unsigned char uncondensed; /* 1: the two nodes of -a_k are the last contributions; couplings are only with these */
+  unsigned char uncondensed; /* 1: its last contributions are the nodes of -a_k; couplings are with these only */
 } pw_body_block;
 
 /* Pointers and indices are those of the first body and its pins; the others follow at equal strides. */
@@ -105,7 +105,7 @@ typedef struct {
   int rank;               /* 0 to PW_BLOCK_RANKS - 1 */
   int grounded;           /* 1: touches the ground or prescribed coordinates (pw_is_grounded) */
   int unknown;            /* index in y of its first unknown: its first row, or beyond the rows for -a_k */
-  int first_contribution; /* index; its contributions end at first_contribution of the next node */
+  int first_contribution; /* index of the first one; they end at that of the next node */
 } pw_plan_node;
 
 /* Orders the nodes and determines the pattern.  pair: 2 x pairs numbers of nodes that are coupled, in any order, with

@@ -120,9 +120,9 @@ static int condense_sort (pw_plan *plan) {
 enum { CONDENSE_NODES = 6 };
 
 static int condense_is_crowded (const pw_plan *plan, int group) {
+  if (plan->start[group + 1] - plan->start[group] <= CONDENSE_NODES || group >= plan->saddle->s->bodies) return 0;
   const double *w = plan->saddle->inverse_weight + 3 * group;
-  return group < plan->saddle->s->bodies && plan->start[group + 1] - plan->start[group] > CONDENSE_NODES && w[0] > 0 &&
-         w[1] > 0 && w[2] > 0;
+  return w[0] > 0 && w[1] > 0 && w[2] > 0;
 }
 
 /* Adds two nodes for every body that is not condensed, and ranks all nodes. */

@@ -40,7 +40,7 @@ static void condense_sort_columns (const pw_plan *plan, const int *column_of_nod
 
 /* ---- Body blocks ---- */
 
-/* Fills the block p of group g; *contributions, *couplings: used so far. */
+/* Fills the block p of group g; *contributions, *couplings: numbers of those filled so far. */
 static void condense_body (const pw_plan *plan, pw_block_ldl *l, int g, pw_body_block *p, int *contributions,
                            int *couplings) {
   int j = pw_group_first (plan->saddle->s, g), body = plan->uncondensed[g];
