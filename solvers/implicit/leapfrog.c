@@ -99,25 +99,15 @@ static void drift_put_momentum (pw_run *r) {
 /* Adds S + h/2 ((S u)_q - b_q); kinematics and J must be those at (t*, q*). */
 static void drift_put_middle (pw_run *r, double h) {
   pw_tangent *x = &r->data->common.dae.tangent;
-  const pw_system *s = r->s;
-  pw_placement put = { .row = s->coords,
-                       .rows = s->rows,
-                       .factor_nonholonomic = 0.5 * h,
-                       .row_index = x->row_index,
-                       .direction = r->data->u };
-  pw_newton_add_block (&x->newton, r->w, &x->scatter, PW_JW_Q, &put);
-  put.factor_nonholonomic = -0.5 * h;
-  pw_newton_add_block (&x->newton, r->w, &x->scatter, PW_ETA_Q, &put);
-  put.factor_nonholonomic = 1;
-  pw_newton_add_J (r->w, &x->scatter, &put);
+  const int first = r->s->coords;
+  pw_tangent_add_equations (x, PW_JW_Q, first, 0, r->data->u, 0, 0.5 * h);
+  pw_tangent_add_equations (x, PW_ETA_Q, first, 0, NULL, 0, -0.5 * h);
+  pw_tangent_add_J (x, r->s->rows, first, 0, 0, 1);
 }
 
 /* Adds the holonomic rows of J; kinematics and J must be those of the end of the step. */
 static void drift_put_end (pw_run *r) {
-  pw_tangent *x = &r->data->common.dae.tangent;
-  pw_newton_add_J (
-      r->w, &x->scatter,
-      &(pw_placement){ .row = r->s->coords, .rows = r->s->holonomic, .factor = 1, .row_index = x->row_index });
+  pw_tangent_add_J (&r->data->common.dae.tangent, r->s->holonomic, r->s->coords, 0, 1, 0);
 }
 
 static int drift_open_matrix (pw_run *r) {

@@ -224,7 +224,7 @@ static int radau_advance (pw_run *r, double t_end, pw_error *error) {
   if (pw_fixed_steps (r)) return radau_advance_fixed (r, t_end, error);
   double stop = fmin (t_end, r->breakpoint), err;
   for (int rejected = 0, status = PW_OK;; rejected++) {
-    int shortened = r->t + d->h > stop - 0.01 * d->h;
+    int shortened = r->t + d->h > stop - 0.01 * d->h; /* no tiny step remains */
     double h = shortened ? stop - r->t : d->h, t1 = shortened ? stop : r->t + h;
     if (!shortened && !(h > pw_least_step (r))) return pw_implicit_fail (r, status, h, error);
     if (rejected > 0 && (status = pw_run_check_limits (r, error)) != PW_OK) return status;

@@ -1,6 +1,6 @@
-/* Factorisation and solution along chains; see block_ldl.h.  Each elimination waits for the one before it.  A chain that
- * can be eliminated from both ends (includes_last) is therefore swept in the two lanes of vector registers, from the
- * ends to the middle; in any other chain both lanes do the same, from the first pin to the last. */
+/* Factorisation and solution along chains; see block_ldl.h.  Each elimination waits for the one before it.  A chain
+ * that can be eliminated from both ends (includes_last) is therefore swept in the two lanes of vector registers, from
+ * the ends to the middle; in any other chain both lanes do the same, from the first pin to the last. */
 #include <stddef.h>
 #include "block_parts.h"
 #include "unroll.h"

@@ -24,8 +24,8 @@ static inline double block_product (int width, block_row a, const double *b) {
   return width == 3 ? a.x * b[0] + a.y * b[1] + a.angle * b[2] : a.x * b[0];
 }
 
-/* Updates l->least_pivot, dividing the pivot by its original diagonal entry only if that makes it smaller; NaN counts as
- * smaller.  The entry is negative only for uncondensed bodies, which do not count. */
+/* Updates l->least_pivot, dividing the pivot by its original diagonal entry only if that makes it smaller; NaN counts
+ * as smaller.  The entry is negative only for uncondensed bodies, which do not count. */
 static inline void block_track_pivot (pw_block_ldl *l, double pivot, double original, int unknown) {
   if (pivot > l->least_pivot * original || original < 0) return;
   l->least_pivot = pivot / original;
