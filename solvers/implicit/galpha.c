@@ -20,8 +20,8 @@
  * new initialisation, from velocities projected onto J v = eta.  If vibrations too fast for the step dominate a-dot,
  * this would amplify them a hundredfold; then a-dot is the change of a in a trial step from w = a.
  *
- * Newton's iteration has the unknowns q', v', lambda', mu; w' and a' follow from v'.  With c = gamma / (h beta) and e =
- * (1 - alpha_m) / ((1 - alpha_f) h gamma) the equations are those of dae.h, in which
+ * Newton's iteration has the unknowns q', v', lambda', mu; w' and a' follow from v'.  With c = gamma / (h beta) and
+ * e = (1 - alpha_m) / ((1 - alpha_f) h gamma) the equations are those of dae.h, in which
  *
  *   c (q' - q - h v - h^2 (1/2 - beta) w - h^2 beta w')
  *

@@ -162,7 +162,7 @@ static int drift_residual (pw_run *r, double h, double t1) {
   return PW_OK;
 }
 
-/* One correction of u, whose size is that of h times it.  PW_OK or PW_RESOURCE. */
+/* One correction of u; its size is that of the correction of q'.  PW_OK or PW_RESOURCE. */
 static int drift_correct (pw_run *r, double h, leapfrog_progress *p) {
   leapfrog *d = r->data;
   int n = r->s->coords;

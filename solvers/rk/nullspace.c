@@ -112,7 +112,7 @@ PW_INLINE int nullspace_eliminate (double *restrict K, double *restrict mu, int 
 }
 
 /* The same by LAPACK, with scaled rows and pivoting.  PW_RETRY if a pivot is round-off, as for dependent constraint
- * equations, or an entry is not finite. */
+ * equations, or a row is 0 or not finite. */
 static int nullspace_eliminate_pivoted (pw_nullspace *b) {
   const double least = 1e-13; /* some 500 eps; the largest entry of a row is 1 */
   int m = b->rows;

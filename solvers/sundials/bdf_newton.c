@@ -33,7 +33,7 @@ static void newton_fill_T (multistep_data *d) {
   pw_tangent_add_accelerations (&d->newton.tangent, &to, d->v, d->a);
 }
 
-/* Adds all entries of the matrix T_a + gamma T_v + gamma^2 T_q, T_lambda from those of T. */
+/* Adds all entries of the matrix (T_a + gamma T_v + gamma^2 T_q, T_lambda) from those of T. */
 static void newton_fill_matrix (pw_bdf_newton *w, int n) {
   const pw_tangent *x = &w->tangent;
   const double power[] = { w->gamma * w->gamma, w->gamma, 1 };

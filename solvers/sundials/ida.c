@@ -198,7 +198,7 @@ static int ida_open_vectors (ida_data *d, pw_run *r) {
   return PW_OK;
 }
 
-/* Called by IDA at each restart: the next factorisation orders the matrix and selects pivots anew. */
+/* Called by IDA at the start and at each restart: the next factorisation orders the matrix and selects pivots anew. */
 static int ida_initialise (SUNLinearSolver solver) {
   return SUNLinSolInitialize (((pw_sun *)solver->content)->klu);
 }

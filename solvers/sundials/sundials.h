@@ -51,7 +51,7 @@ int pw_sun_open_solver (pw_sun *x, N_Vector right, void *content, pw_sun_solve *
 /* Sets all values to 0 and restores the pattern, which SUNDIALS clears together with the values. */
 void pw_sun_clear (SUNMatrix matrix, const int64_t *colptr, const int64_t *rowind);
 
-/* Replaces the convergence test of x->iteration, Newton's, after it has been attached to the integrator.  That of
+/* Replaces the convergence test of x->iteration, a Newton iteration that the integrator uses already.  The test of
  * SUNDIALS multiplies the first correction by the convergence rate of previous steps, which is meaningless if a force
  * saturates in between.  PW_OK or PW_RESOURCE. */
 int pw_sun_test_newton (pw_sun *x);
