@@ -143,6 +143,8 @@ static int condense_uncondensed (pw_plan *plan) {
   return plan->failed || saddle->y == NULL ? PW_RESOURCE : pw_condense_rank (plan);
 }
 
+/* ---- Opening ---- */
+
 int pw_condense (struct pw_saddle *saddle, const double *weight, const unsigned char *active) {
   size_t n = (size_t)saddle->s->coords;
   pw_plan plan = { .saddle = saddle, .weight = weight, .groups = pw_groups (saddle->s) };

@@ -41,8 +41,6 @@ void pw_saddle_close (pw_saddle *saddle) {
   free (saddle);
 }
 
-/* ---- Factorising ---- */
-
 void pw_saddle_postpone (pw_saddle *saddle, double pivot) {
   saddle->postponed = pivot;
 }
@@ -72,8 +70,6 @@ double pw_saddle_sine (pw_saddle *saddle, int *row) {
   if (row) *row = saddle->pivot_row;
   return saddle->pivot > 0 ? sqrt (fmin (saddle->pivot, 1)) : 0;
 }
-
-/* ---- Solving ---- */
 
 void pw_saddle_solve (pw_saddle *saddle, const double *f, const double *gamma, double *a, double *lambda) {
   const size_t bytes = (size_t)saddle->rows * sizeof *lambda;

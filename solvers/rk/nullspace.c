@@ -146,6 +146,8 @@ PW_INLINE void nullspace_add (const pw_nullspace *b, int coords, double *v, int 
   }
 }
 
+/* ---- A step ---- */
+
 int pw_nullspace_begin (pw_nullspace *b, pw_run *r) {
   const pw_system *s = r->s;
   int status = pw_evaluate_J_at (r->w, r->t, r->q, r->v);

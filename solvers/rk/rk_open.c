@@ -34,8 +34,6 @@ const pw_option pw_rk_options[] = {
   { .name = NULL },
 };
 
-/* ---- Opening ---- */
-
 static pw_rk_row rk_nonzero_weights (const double *weight, int stages) {
   pw_rk_row row = { 0 };
   for (int j = 0; j < stages; j++)

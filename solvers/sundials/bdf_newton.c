@@ -17,14 +17,14 @@
 #include <cvodes/cvodes.h>
 #include "bdf_newton.h"
 
-int pw_multistep_accelerate (multistep_data *d, double t, const double *y) {
+int pw_multistep_accelerate (pw_method_data *d, double t, const double *y) {
   pw_run *r = d->sun.run;
   int status = pw_run_accelerate (r, pw_before_breakpoint (r, t), y, y + d->n, d->a, d->lambda);
   return status == PW_OK ? 0 : status > 0 ? 1 : -1;
 }
 
 /* Adds all entries of T, in the columns q, v, a, lambda. */
-static void newton_fill_T (multistep_data *d) {
+static void newton_fill_T (pw_method_data *d) {
   int n = d->n;
   const pw_tangent_layout to = {
     .momentum = 0, .constraint = n, .q = 0, .v = n, .a = 2 * n, .lambda = 3 * n, .a_factor = 1, .lambda_factor = 1
@@ -49,7 +49,7 @@ static void newton_fill_matrix (pw_bdf_newton *w, int n) {
 static int newton_set_up (realtype t, N_Vector y, N_Vector derivative, SUNMatrix matrix, booleantype reuse,
                           booleantype *evaluated, realtype gamma, void *data, N_Vector tmp1, N_Vector tmp2,
                           N_Vector tmp3) {
-  multistep_data *d = data;
+  pw_method_data *d = data;
   pw_bdf_newton *w = &d->newton;
   const pw_tangent *x = &w->tangent;
   (void)derivative, (void)tmp1, (void)tmp2, (void)tmp3;
@@ -75,7 +75,7 @@ static int newton_set_up (realtype t, N_Vector y, N_Vector derivative, SUNMatrix
 /* ---- Solving for x ---- */
 
 /* right = - T_q (b_q + gamma b_v) - T_v b_v */
-static void newton_right_side (const multistep_data *d, const double *b, double *right) {
+static void newton_right_side (const pw_method_data *d, const double *b, double *right) {
   const pw_bdf_newton *w = &d->newton;
   const pw_tangent *x = &w->tangent;
   int n = d->n;
@@ -87,7 +87,7 @@ static void newton_right_side (const multistep_data *d, const double *b, double 
 }
 
 static int newton_solve (SUNLinearSolver solver, SUNMatrix matrix, N_Vector vx, N_Vector vb, realtype tolerance) {
-  multistep_data *d = solver->content;
+  pw_method_data *d = solver->content;
   pw_bdf_newton *w = &d->newton;
   const double *b = N_VGetArrayPointer (vb), *da = N_VGetArrayPointer (w->change);
   double *x = N_VGetArrayPointer (vx);
@@ -106,7 +106,7 @@ static int newton_solve (SUNLinearSolver solver, SUNMatrix matrix, N_Vector vx, 
 /* ---- Opening ---- */
 
 /* Records the patterns of T and of the matrix, with all values 0. */
-static int newton_lay_out (multistep_data *d) {
+static int newton_lay_out (pw_method_data *d) {
   pw_bdf_newton *w = &d->newton;
   pw_tangent *x = &w->tangent;
   int columns = 3 * d->n + x->rows, size = d->n + x->rows;
@@ -120,7 +120,7 @@ static int newton_lay_out (multistep_data *d) {
   return w->value ? PW_OK : PW_RESOURCE;
 }
 
-int pw_bdf_open_newton (multistep_data *d) {
+int pw_bdf_open_newton (pw_method_data *d) {
   pw_bdf_newton *w = &d->newton;
   pw_sun *x = &d->sun;
   if (pw_tangent_open (&w->tangent, x->run) != PW_OK || newton_lay_out (d) != PW_OK) return PW_RESOURCE;
@@ -134,7 +134,7 @@ int pw_bdf_open_newton (multistep_data *d) {
   return failed ? PW_RESOURCE : PW_OK;
 }
 
-void pw_bdf_close_newton (multistep_data *d) {
+void pw_bdf_close_newton (pw_method_data *d) {
   pw_bdf_newton *w = &d->newton;
   if (w->right) N_VDestroy (w->right);
   if (w->change) N_VDestroy (w->change);

@@ -29,14 +29,12 @@ struct pw_method_data {
   char *memory;
 };
 
-typedef struct pw_method_data multistep_data;
-
 /* Stores accelerations and multipliers at y in d->a and d->lambda.  Returns what CVODES expects: 0; > 0: a smaller step
  * may succeed; < 0: a signal failed. */
-int pw_multistep_accelerate (multistep_data *d, double t, const double *y);
+int pw_multistep_accelerate (pw_method_data *d, double t, const double *y);
 
 /* Opens the Newton matrix and attaches it to CVODES.  PW_OK or PW_RESOURCE. */
-int pw_bdf_open_newton (multistep_data *d);
-void pw_bdf_close_newton (multistep_data *d);
+int pw_bdf_open_newton (pw_method_data *d);
+void pw_bdf_close_newton (pw_method_data *d);
 
 #endif

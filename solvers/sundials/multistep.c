@@ -26,7 +26,7 @@
 /* ---- Functions that CVODES calls ---- */
 
 static int multistep_derivative (realtype t, N_Vector vy, N_Vector derivative, void *data) {
-  multistep_data *d = data;
+  pw_method_data *d = data;
   const double *y = N_VGetArrayPointer (vy);
   double *out = N_VGetArrayPointer (derivative);
   size_t bytes = (size_t)d->n * sizeof *out;
@@ -38,14 +38,14 @@ static int multistep_derivative (realtype t, N_Vector vy, N_Vector derivative, v
 }
 
 static int multistep_weigh (N_Vector y, N_Vector weights, void *data) {
-  pw_sun_weigh (&((multistep_data *)data)->sun, N_VGetArrayPointer (y), N_VGetArrayPointer (weights));
+  pw_sun_weigh (&((pw_method_data *)data)->sun, N_VGetArrayPointer (y), N_VGetArrayPointer (weights));
   return 0;
 }
 
 /* ---- Projection ---- */
 
 /* Projects q and v at t.  Returns as pw_project_positions. */
-static int multistep_project (multistep_data *d, double t, double *q, double *v) {
+static int multistep_project (pw_method_data *d, double t, double *q, double *v) {
   int status = pw_project_positions (&d->projector, d->sun.run, t, q, v);
   return status == PW_OK ? pw_project_velocities (&d->projector, d->sun.run, v) : status;
 }
@@ -54,7 +54,7 @@ static int multistep_project (multistep_data *d, double t, double *q, double *v)
  * part of the whole error, so that the displacement off the constraints is at most rtol^(3/4) as in rk_adapt.c.  That
  * displacement has tangential effects that the estimate misses: the accelerations of the step are those of the
  * displaced state. */
-static void multistep_project_error (multistep_data *d, double *e) {
+static void multistep_project_error (pw_method_data *d, double *e) {
   pw_run *r = d->sun.run;
   double *whole = d->error, share = sqrt (sqrt (r->settings.rtol));
   memcpy (whole, e, 2 * (size_t)d->n * sizeof *e);
@@ -66,7 +66,7 @@ static void multistep_project_error (multistep_data *d, double *e) {
 /* Called by CVODES: the change of y by the projection; unless `error` is NULL, projects this error estimate, too. */
 static int multistep_correct (realtype t, N_Vector vy, N_Vector change, realtype tolerance, N_Vector error,
                               void *data) {
-  multistep_data *d = data;
+  pw_method_data *d = data;
   const double *y = N_VGetArrayPointer (vy);
   double *out = N_VGetArrayPointer (change);
   size_t bytes = (size_t)d->n * sizeof *y;
@@ -86,7 +86,7 @@ static int multistep_correct (realtype t, N_Vector vy, N_Vector change, realtype
 
 /* Accelerations and multipliers at (t, q, v), which are projected first if `project` is 1: also near singular
  * configurations, and without effect on the statistics. */
-static int multistep_complete (multistep_data *d, double t, int project, double *q, double *v, double *a,
+static int multistep_complete (pw_method_data *d, double t, int project, double *q, double *v, double *a,
                                double *lambda) {
   pw_run *r = d->sun.run;
   const int near_singular = r->near_singular;
@@ -100,13 +100,13 @@ static int multistep_complete (multistep_data *d, double t, int project, double 
   return status;
 }
 
-static int multistep_complete_sample (multistep_data *d, double t) {
+static int multistep_complete_sample (pw_method_data *d, double t) {
   pw_run *r = d->sun.run;
   return multistep_complete (d, t, d->projects, r->q_at, r->v_at, r->a_at, r->lambda_at);
 }
 
 /* Interpolates the state at t into the sample arrays.  CV_SUCCESS or CV_BAD_T. */
-static int multistep_interpolate (multistep_data *d, double t) {
+static int multistep_interpolate (pw_method_data *d, double t) {
   pw_run *r = d->sun.run;
   int flag = t < r->t ? CVodeGetDky (d->cvode, t, 0, d->sun.y) : CV_BAD_T;
   const double *y = N_VGetArrayPointer (d->sun.y);
@@ -125,7 +125,7 @@ static int multistep_power (pw_run *r, double t, double *rate) {
 
 /* ---- Opening ---- */
 
-static int multistep_open_arrays (multistep_data *d, pw_run *r) {
+static int multistep_open_arrays (pw_method_data *d, pw_run *r) {
   size_t n = (size_t)d->n + 3, rows = (size_t)r->s->rows;
   const pw_array array[] = { { &d->q, n }, { &d->v, n }, { &d->a, n }, { &d->error, 2 * n }, { &d->lambda, rows } };
   if (pw_sun_open (&d->sun, r, 2 * d->n) != PW_OK) return PW_RESOURCE;
@@ -135,7 +135,7 @@ static int multistep_open_arrays (multistep_data *d, pw_run *r) {
   return PW_OK;
 }
 
-static int multistep_open_iteration (multistep_data *d, int formula) {
+static int multistep_open_iteration (pw_method_data *d, int formula) {
   pw_sun *x = &d->sun;
   int newton = formula == CV_BDF;
   if (newton && pw_bdf_open_newton (d) != PW_OK) return PW_RESOURCE;
@@ -145,7 +145,7 @@ static int multistep_open_iteration (multistep_data *d, int formula) {
   return newton ? pw_sun_test_newton (x) : PW_OK;
 }
 
-static int multistep_open_solver (multistep_data *d, int formula) {
+static int multistep_open_solver (pw_method_data *d, int formula) {
   pw_run *r = d->sun.run;
   void *m = d->cvode = CVodeCreate (formula, d->sun.context);
   if (m == NULL || CVodeSetErrHandlerFn (m, pw_sun_message, &d->sun) || CVodeSetUserData (m, d) ||
@@ -161,7 +161,7 @@ static int multistep_open_solver (multistep_data *d, int formula) {
 }
 
 static int multistep_open (pw_run *r, int formula, pw_error *error) {
-  multistep_data *d = r->data = calloc (1, sizeof *d);
+  pw_method_data *d = r->data = calloc (1, sizeof *d);
   if (d == NULL) return pw_sun_no_memory (r, error);
   d->n = r->s->coords;
   d->projects = pw_stabilised_by (r, PW_PROJECTION);
@@ -174,7 +174,7 @@ static int multistep_open (pw_run *r, int formula, pw_error *error) {
 }
 
 static void multistep_close (pw_run *r) {
-  multistep_data *d = r->data;
+  pw_method_data *d = r->data;
   if (d->cvode) CVodeFree (&d->cvode);
   pw_bdf_close_newton (d);
   pw_sun_close (&d->sun);
@@ -185,7 +185,7 @@ static void multistep_close (pw_run *r) {
 
 /* ---- Advancing ---- */
 
-static void multistep_count (multistep_data *d) {
+static void multistep_count (pw_method_data *d) {
   pw_statistics *s = &d->sun.run->statistics;
   long steps = 0, tests = 0, iterations = 0, projections = 0; /* steps; failed tests, iterations, projections */
   CVodeGetNumSteps (d->cvode, &steps);
@@ -196,7 +196,7 @@ static void multistep_count (multistep_data *d) {
   s->rejected = d->sun.before.rejected + tests + iterations + projections;
 }
 
-static int multistep_fail (multistep_data *d, int flag, pw_error *error) {
+static int multistep_fail (pw_method_data *d, int flag, pw_error *error) {
   pw_run *r = d->sun.run;
   char element[120];
   int singular = flag == CV_FIRST_RHSFUNC_ERR || flag == CV_REPTD_RHSFUNC_ERR || flag == CV_UNREC_RHSFUNC_ERR;
@@ -212,7 +212,7 @@ static int multistep_fail (multistep_data *d, int flag, pw_error *error) {
 
 /* Accelerations and multipliers of the state reached, whose kinematics and J are up to date, without effect on the
  * statistics.  In a singular configuration the multipliers of the last iterate remain. */
-static void multistep_evaluate (multistep_data *d) {
+static void multistep_evaluate (pw_method_data *d) {
   pw_run *r = d->sun.run;
   const pw_statistics statistics = r->statistics;
   r->refused_sine = 0;
@@ -224,7 +224,7 @@ static void multistep_evaluate (multistep_data *d) {
 
 /* Work and losses up to the state reached.  Multipliers of the last Newton iterate, which may be the prediction, are
  * not accurate enough.  Returns as pw_quadrature_step. */
-static int multistep_work (multistep_data *d) {
+static int multistep_work (pw_method_data *d) {
   pw_run *r = d->sun.run;
   int order = 1;
   if (d->sun.klu && pw_ledger_uses_multipliers (r->s)) multistep_evaluate (d);
@@ -235,7 +235,7 @@ static int multistep_work (multistep_data *d) {
 
 /* Makes y the state reached at t and updates the ledger.  Accelerations and multipliers remain those of the last
  * iterate until multistep_at or multistep_evaluate computes them, which saves one evaluation in three. */
-static int multistep_reach (multistep_data *d, double t, pw_error *error) {
+static int multistep_reach (pw_method_data *d, double t, pw_error *error) {
   pw_run *r = d->sun.run;
   const double *y = N_VGetArrayPointer (d->sun.y);
   memcpy (r->q, y, (size_t)d->n * sizeof *y);
@@ -253,7 +253,7 @@ static int multistep_reach (multistep_data *d, double t, pw_error *error) {
 }
 
 static int multistep_advance (pw_run *r, double t_end, pw_error *error) {
-  multistep_data *d = r->data;
+  pw_method_data *d = r->data;
   double stop = fmin (t_end, r->breakpoint), t = r->t;
   int flag = CVodeSetStopTime (d->cvode, stop);
   if (flag >= 0) flag = CVode (d->cvode, stop, d->sun.y, &t, CV_ONE_STEP);
@@ -263,7 +263,7 @@ static int multistep_advance (pw_run *r, double t_end, pw_error *error) {
 }
 
 static int multistep_at (pw_run *r, double t, pw_error *error) {
-  multistep_data *d = r->data;
+  pw_method_data *d = r->data;
   int status = PW_OK;
   if (t == r->t) {
     if (!d->evaluated) status = multistep_complete (d, pw_before_breakpoint (r, t), 0, r->q, r->v, r->a, r->lambda);
@@ -281,7 +281,7 @@ static int multistep_at (pw_run *r, double t, pw_error *error) {
 }
 
 static int multistep_restart (pw_run *r, pw_error *error) {
-  multistep_data *d = r->data;
+  pw_method_data *d = r->data;
   pw_sun_restart (&d->sun);
   d->evaluated = 1;
   int flag = CVodeReInit (d->cvode, r->t, d->sun.y);
