@@ -46,13 +46,11 @@ struct pw_method_data {
   double *row_factor, *column_factor; /* unknowns: by which rows and columns of the matrix are multiplied */
 };
 
-typedef struct pw_method_data galpha;
-
 /* The factors c and e. */
-static double galpha_c (const galpha *d, double h) {
+static double galpha_c (const pw_method_data *d, double h) {
   return d->gamma / (h * d->beta);
 }
-static double galpha_e (const galpha *d, double h) {
+static double galpha_e (const pw_method_data *d, double h) {
   return (1 - d->alpha_m) / ((1 - d->alpha_f) * h * d->gamma);
 }
 
@@ -63,15 +61,15 @@ static int galpha_update (pw_run *r, double t1) {
 }
 
 /* The new velocity of coordinate j, from w'; its displacement in the step, without that by mu. */
-static double galpha_velocity (const galpha *d, double h, int j) {
+static double galpha_velocity (const pw_method_data *d, double h, int j) {
   return d->v[j] + h * ((1 - d->gamma) * d->w[j] + d->gamma * d->w1[j]);
 }
-static double galpha_displacement (const galpha *d, double h, int j) {
+static double galpha_displacement (const pw_method_data *d, double h, int j) {
   return h * (d->v[j] + h * ((0.5 - d->beta) * d->w[j] + d->beta * d->w1[j]));
 }
 
 static int galpha_residual (pw_run *r, double h, double t1) {
-  galpha *d = r->data;
+  pw_method_data *d = r->data;
   pw_dae *x = &d->common.dae;
   int status = galpha_update (r, t1);
   if (status != PW_OK) return status;
@@ -83,7 +81,7 @@ static int galpha_residual (pw_run *r, double h, double t1) {
 }
 
 static int galpha_factor (pw_run *r, double h) {
-  galpha *d = r->data;
+  pw_method_data *d = r->data;
   pw_dae *x = &d->common.dae;
   const int64_t *colptr = x->tangent.colptr, *rowind = x->tangent.rowind;
   pw_implicit_begin_matrix (&d->common, x->size);
@@ -98,7 +96,7 @@ static int galpha_factor (pw_run *r, double h) {
 
 /* The prediction: the accelerations stay constant. */
 static void galpha_predict (pw_run *r, double h) {
-  galpha *d = r->data;
+  pw_method_data *d = r->data;
   const pw_dae *x = &d->common.dae;
   memset (d->y, 0, (size_t)x->size * sizeof *d->y);
   for (int j = 0; j < x->n; j++) {
@@ -113,7 +111,7 @@ static void galpha_predict (pw_run *r, double h) {
 /* Solves for the correction of the unknowns and applies it.  *correction: its size, the largest of those of q and v / c
  * in units of the scene; *round_off: the round-off of q and h v in these units.  PW_OK or PW_RESOURCE. */
 static int galpha_correct (pw_run *r, double h, double *correction, double *round_off) {
-  galpha *d = r->data;
+  pw_method_data *d = r->data;
   int n = d->common.dae.n, size = d->common.dae.size;
   double largest = 1;
   for (int i = 0; i < size; i++) d->z[i] *= -d->row_factor[i];
@@ -143,7 +141,7 @@ static int galpha_correct (pw_run *r, double h, double *correction, double *roun
  * order h^4.  Where corrections stall at a few times their round-off, they are accepted. */
 static int galpha_solve (pw_run *r, double h, double t1) {
   const int most = 20; /* iterations */
-  galpha *d = r->data;
+  pw_method_data *d = r->data;
   double before = INFINITY, size, round_off, target = fmin (1e-9, 1e-3 * pow (h / r->w->scale.time, 4)), rate = 1;
   if (h != d->common.h)
     pw_implicit_scale (&d->common.dae, galpha_c (d, h), galpha_e (d, h), d->row_factor, d->column_factor);
@@ -169,7 +167,7 @@ static int galpha_solve (pw_run *r, double h, double t1) {
 /* ---- Opening ---- */
 
 /* The coefficients for order 2 with the least damping of low frequencies for a given rho (Chung & Hulbert 1993). */
-static void galpha_coefficients (galpha *d, double rho) {
+static void galpha_coefficients (pw_method_data *d, double rho) {
   d->alpha_m = (2 * rho - 1) / (rho + 1);
   d->alpha_f = rho / (rho + 1);
   d->gamma = 0.5 + d->alpha_f - d->alpha_m;
@@ -177,7 +175,7 @@ static void galpha_coefficients (galpha *d, double rho) {
 }
 
 static int galpha_open (pw_run *r, pw_error *error) {
-  galpha *d = r->data = calloc (1, sizeof *d);
+  pw_method_data *d = r->data = calloc (1, sizeof *d);
   const pw_system *s = r->s;
   size_t n = (size_t)s->coords + 3, most = 2 * (n + (size_t)s->rows);
   if (d == NULL) return pw_fail_memory (s, error);
@@ -202,7 +200,7 @@ static int galpha_open (pw_run *r, pw_error *error) {
 /* a-dot at the state reached: a difference quotient over 1e-3 of the step, short enough for stiff forces, long enough
  * for round-off. */
 static int galpha_jerk (pw_run *r, double h, double *jerk) {
-  galpha *d = r->data;
+  pw_method_data *d = r->data;
   double dt = 1e-3 * h;
   for (int j = 0; j < d->common.dae.n; j++) {
     d->common.q1[j] = r->q[j] + dt * (d->v[j] + 0.5 * dt * d->a[j]);
@@ -217,7 +215,7 @@ static int galpha_jerk (pw_run *r, double h, double *jerk) {
 /* 1 if a-dot would change the accelerations by several times their size in a step: the scene has vibrations that are
  * too fast for the step. */
 static int galpha_vibrates (const pw_run *r, double h, const double *jerk) {
-  const galpha *d = r->data;
+  const pw_method_data *d = r->data;
   double change = 0, size = 0;
   for (int j = 0; j < d->common.dae.n; j++) {
     change += r->s->metric[j] * jerk[j] * jerk[j];
@@ -229,7 +227,7 @@ static int galpha_vibrates (const pw_run *r, double h, const double *jerk) {
 /* a-dot as the change of a in a trial step from w = a, which does not amplify vibrations that the step does not
  * resolve. */
 static int galpha_trial_jerk (pw_run *r, double h, double *jerk) {
-  galpha *d = r->data;
+  pw_method_data *d = r->data;
   memcpy (d->w, d->a, (size_t)d->common.dae.n * sizeof *d->w);
   int status = galpha_solve (r, h, r->t + h);
   for (int j = 0; j < d->common.dae.n; j++) jerk[j] = status == PW_OK ? (d->a1[j] - d->a[j]) / h : 0;
@@ -239,7 +237,7 @@ static int galpha_trial_jerk (pw_run *r, double h, double *jerk) {
 /* Adds to the velocities the error with which the method starts without loss of order in index3: the dv with
  * G dv = C h^2 G a-dot that is least in the metric of M. */
 static int galpha_add_velocity_error (pw_run *r, double h, const double *jerk) {
-  galpha *d = r->data;
+  pw_method_data *d = r->data;
   const pw_system *s = r->s;
   double C = 1. / 6 - d->beta - 0.5 * (d->alpha_m - d->alpha_f), *dv = d->common.v1;
   int status = pw_evaluate_J_at (r->w, r->t, r->q, d->v);
@@ -255,7 +253,7 @@ static int galpha_add_velocity_error (pw_run *r, double h, const double *jerk) {
 
 /* Initialises d->v, d->a and d->w for the first step of this size. */
 static int galpha_begin (pw_run *r, double h) {
-  galpha *d = r->data;
+  pw_method_data *d = r->data;
   double *jerk = d->w1;
   int status = PW_OK;
   memcpy (d->v, r->v, (size_t)d->common.dae.n * sizeof *d->v);
@@ -279,7 +277,7 @@ static int galpha_step (pw_run *r, double h, double t1) {
 }
 
 static void galpha_accept (pw_run *r) {
-  galpha *d = r->data;
+  pw_method_data *d = r->data;
   size_t n = (size_t)d->common.dae.n * sizeof (double);
   memcpy (r->a, d->a1, n);
   memcpy (d->v, r->v, n);

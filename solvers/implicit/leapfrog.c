@@ -33,8 +33,6 @@ struct pw_method_data {
   double *z;                   /* coords and independent equations: a correction of u and its multipliers */
 };
 
-typedef struct pw_method_data leapfrog;
-
 /* Convergence of an iteration, from the sizes of its corrections. */
 typedef struct {
   double size;    /* of the last correction: the largest relative change of a coordinate */
@@ -78,7 +76,7 @@ static pw_convergence leapfrog_test (leapfrog_progress *p) {
 
 /* q' and q* from u. */
 static void drift_positions (pw_run *r, double h) {
-  leapfrog *d = r->data;
+  pw_method_data *d = r->data;
   for (int j = 0; j < r->s->coords; j++) {
     d->common.q1[j] = r->q[j] + h * d->u[j];
     d->middle[j] = r->q[j] + 0.5 * h * d->u[j];
@@ -111,7 +109,7 @@ static void drift_put_end (pw_run *r) {
 }
 
 static int drift_open_matrix (pw_run *r) {
-  leapfrog *d = r->data;
+  pw_method_data *d = r->data;
   pw_tangent *x = &d->common.dae.tangent;
   const int size = r->s->coords + x->rows;
   pw_scatter_begin_record (&x->scatter);
@@ -123,7 +121,7 @@ static int drift_open_matrix (pw_run *r) {
 }
 
 static int drift_factor (pw_run *r, double h, double t1) {
-  leapfrog *d = r->data;
+  pw_method_data *d = r->data;
   pw_tangent *x = &d->common.dae.tangent;
   pw_implicit_begin_matrix (&d->common, r->s->coords + x->rows);
   int status = pw_evaluate_J_at (r->w, r->t, r->q, r->v);
@@ -142,7 +140,7 @@ static int drift_factor (pw_run *r, double h, double t1) {
 
 /* Residuals of the constraints on u and q'. */
 static int drift_residual (pw_run *r, double h, double t1) {
-  leapfrog *d = r->data;
+  pw_method_data *d = r->data;
   const pw_system *s = r->s;
   int status = PW_OK;
   if (s->rows > s->holonomic) {
@@ -164,7 +162,7 @@ static int drift_residual (pw_run *r, double h, double t1) {
 
 /* One correction of u; its size is that of the correction of q'.  PW_OK or PW_RESOURCE. */
 static int drift_correct (pw_run *r, double h, leapfrog_progress *p) {
-  leapfrog *d = r->data;
+  pw_method_data *d = r->data;
   int n = r->s->coords;
   memset (d->z, 0, (size_t)n * sizeof *d->z);
   for (int i = 0; i < r->s->rows; i++) d->residual[i] = -d->residual[i];
@@ -181,7 +179,7 @@ static int drift_correct (pw_run *r, double h, leapfrog_progress *p) {
 
 /* The matrix is evaluated at the prediction, and again while convergence is slow. */
 static int drift_solve (pw_run *r, double h, double t1) {
-  leapfrog *d = r->data;
+  pw_method_data *d = r->data;
   leapfrog_progress p = { .rate = 1 };
   for (int j = 0; j < r->s->coords; j++) d->u[j] = r->v[j] + 0.5 * h * r->a[j];
   drift_positions (r, h);
@@ -201,7 +199,7 @@ static int drift_solve (pw_run *r, double h, double t1) {
 /* One correction of v', for the change of the forces since the last correction; d->f: those forces, at first 0.
  * PW_METHOD if a signal failed. */
 static int kick_correct (pw_run *r, double h, leapfrog_progress *p) {
-  leapfrog *d = r->data;
+  pw_method_data *d = r->data;
   const pw_system *s = r->s;
   int status = pw_update_velocities (r->w, d->common.v1);
   if (status != PW_OK) return status;
@@ -224,7 +222,7 @@ static int kick_correct (pw_run *r, double h, leapfrog_progress *p) {
 }
 
 static int kick_solve (pw_run *r, double h, double t1) {
-  leapfrog *d = r->data;
+  pw_method_data *d = r->data;
   leapfrog_progress p = { 0 };
   int status = pw_evaluate_J_at (r->w, pw_before_breakpoint (r, t1), d->common.q1, d->u);
   if (status != PW_OK) return status;
@@ -246,7 +244,7 @@ static int kick_solve (pw_run *r, double h, double t1) {
 /* ---- Opening ---- */
 
 static int leapfrog_open (pw_run *r, pw_error *error) {
-  leapfrog *d = r->data = calloc (1, sizeof *d);
+  pw_method_data *d = r->data = calloc (1, sizeof *d);
   size_t n = (size_t)r->s->coords + 3, rows = (size_t)r->s->rows;
   if (d == NULL) return pw_fail_memory (r->s, error);
   const pw_array array[] = { { &d->u, n },      { &d->common.q1, n }, { &d->common.v1, n },   { &d->middle, n },

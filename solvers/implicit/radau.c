@@ -44,7 +44,7 @@ static const double radau_derivative_at_end[STAGES] = { 5.53197264742180826186, 
 /* ---- Opening ---- */
 
 static int radau_restart (pw_run *r, pw_error *error) {
-  radau *d = r->data;
+  pw_method_data *d = r->data;
   double time_scale = r->w->scale.time;
   (void)error;
   d->counter = (pw_step_counter){ .base = r->t };
@@ -64,7 +64,7 @@ static int radau_restart (pw_run *r, pw_error *error) {
 }
 
 static int radau_allocate (pw_run *r) {
-  radau *d = r->data;
+  pw_method_data *d = r->data;
   enum { SINGLE = 16, OF_STAGE = 6, ALL = SINGLE + OF_STAGE * STAGES + 1 };
   const size_t n = (size_t)d->dae.size + 6; /* of all arrays of unknowns, with room for three more coordinates */
   const size_t entries = (size_t)r->s->entries;
@@ -87,7 +87,7 @@ static int radau_allocate (pw_run *r) {
 }
 
 static int radau_open (pw_run *r, pw_error *error) {
-  radau *d = r->data = calloc (1, sizeof *d);
+  pw_method_data *d = r->data = calloc (1, sizeof *d);
   int status = d ? pw_dae_open (&d->dae, r) : PW_RESOURCE;
   if (status == PW_OK) status = radau_allocate (r);
   if (status == PW_OK) status = pw_radau_open_matrices (r);
@@ -101,7 +101,7 @@ static int radau_open (pw_run *r, pw_error *error) {
 }
 
 static void radau_close (pw_run *r) {
-  radau *d = r->data;
+  pw_method_data *d = r->data;
   pw_projector_close (&d->projector);
   pw_sparse_close (&d->real);
   pw_sparse_close (&d->complex);
@@ -118,7 +118,7 @@ static void radau_close (pw_run *r) {
 /* Accelerations and multipliers at the state reached, where J is evaluated: computed from the state, or in singular
  * configurations those of the last stage. */
 static void radau_evaluate_reached (pw_run *r, double h) {
-  radau *d = r->data;
+  pw_method_data *d = r->data;
   double *lambda = d->now.y + 2 * d->dae.n;
   int status = pw_saddle_factor (r->saddle);
   d->near_singular = r->near_singular = status != PW_OK || pw_watchdog_near (r);
@@ -136,7 +136,7 @@ static void radau_evaluate_reached (pw_run *r, double h) {
 
 /* The last stage becomes the state reached.  PW_OK, or PW_METHOD if a signal failed. */
 static int radau_accept (pw_run *r, double h, double t1) {
-  radau *d = r->data;
+  pw_method_data *d = r->data;
   size_t n = (size_t)d->dae.n * sizeof (double), entries = (size_t)r->s->entries;
   radau_step done = d->now;
   pw_radau_stage (d, STAGES - 1);
@@ -162,7 +162,7 @@ static int radau_accept (pw_run *r, double h, double t1) {
 
 /* The size of the next step, from the errors of this and the previous one; constants as in RADAU5.  rejected: 1 if this
  * one was rejected at least once. */
-static double radau_next_h (const radau *d, double h, double error, int rejected) {
+static double radau_next_h (const pw_method_data *d, double h, double error, int rejected) {
   double safety = 0.9 * fmin (1, (1. + 2 * PW_RADAU_MOST) / (d->iterations + 2 * PW_RADAU_MOST));
   double quotient = fmin (5, fmax (1. / 8, pow (error, 0.25) / safety));
   if (error < 1 && d->previous_h > 0) {
@@ -187,7 +187,7 @@ static int radau_try (pw_run *r, double h, double t1, int filter_twice, double *
 }
 
 static int radau_advance_fixed (pw_run *r, double t_end, pw_error *error) {
-  radau *d = r->data;
+  pw_method_data *d = r->data;
   int whole;
   double err, t1 = pw_step_end (r, &d->counter, t_end, &whole), h = whole ? r->settings.step : t1 - r->t;
   int status = radau_try (r, h, t1, 0, &err);
@@ -199,7 +199,7 @@ static int radau_advance_fixed (pw_run *r, double t_end, pw_error *error) {
 
 /* A step that was shortened to end at t_end or a breakpoint does not reduce the next one. */
 static int radau_accept_adaptive (pw_run *r, double h, double t1, double error, int rejected, int shortened) {
-  radau *d = r->data;
+  pw_method_data *d = r->data;
   double next = radau_next_h (d, h, error, rejected);
   int status = radau_accept (r, h, t1);
   if (status != PW_OK) return status;
@@ -212,7 +212,7 @@ static int radau_accept_adaptive (pw_run *r, double h, double t1, double error, 
 /* In index3 the state reached violates g = 0 and J v = eta within the tolerances.  A step of size h corrects positions
  * by velocities of that size over h: no step, however small, has a smaller error, unless the state is projected. */
 static void radau_project_start (pw_run *r) {
-  radau *d = r->data;
+  pw_method_data *d = r->data;
   double *q = d->now.y, *v = q + d->dae.n;
   if (d->dae.enforces_velocities || pw_project_positions (&d->projector, r, r->t, q, v) != PW_OK) return;
   (void)pw_project_velocities (&d->projector, r, v);
@@ -220,7 +220,7 @@ static void radau_project_start (pw_run *r) {
 }
 
 static int radau_advance (pw_run *r, double t_end, pw_error *error) {
-  radau *d = r->data;
+  pw_method_data *d = r->data;
   if (pw_fixed_steps (r)) return radau_advance_fixed (r, t_end, error);
   double stop = fmin (t_end, r->breakpoint), err;
   for (int rejected = 0, status = PW_OK;; rejected++) {
@@ -245,7 +245,7 @@ static int radau_advance (pw_run *r, double t_end, pw_error *error) {
 
 /* The quintic through positions, velocities and accelerations at both ends of the last step, at x in [0, 1]. */
 static void radau_quintic (const pw_run *r, double x, double *q, double *v) {
-  const radau *d = r->data;
+  const pw_method_data *d = r->data;
   double h = d->last.h;
   for (int j = 0; j < d->dae.n; j++) {
     double q0 = d->last.y[j], v0 = h * d->last.y[d->dae.n + j], a0 = 0.5 * h * h * d->last.a[j];
@@ -259,7 +259,7 @@ static void radau_quintic (const pw_run *r, double x, double *q, double *v) {
 /* The quintic is more accurate than the polynomial through the stages, unless the step does not resolve the motion:
  * then they differ by more than the tolerances, or in fixed steps by more than a tenth of the changes in the step. */
 static int radau_quintic_agrees (const pw_run *r, const double *q, const double *v) {
-  const radau *d = r->data;
+  const pw_method_data *d = r->data;
   double sum = 0;
   for (int i = 0; i < 2 * d->dae.n; i++) {
     double difference = i < d->dae.n ? q[i] - r->q_at[i] : v[i - d->dae.n] - r->v_at[i - d->dae.n];
@@ -275,7 +275,7 @@ static int radau_quintic_agrees (const pw_run *r, const double *q, const double 
 
 /* The sample inside the last step at x in [0, 1]. */
 static void radau_fill_sample (pw_run *r, double x) {
-  radau *d = r->data;
+  pw_method_data *d = r->data;
   const radau_step *p = &d->last;
   int n = d->dae.n;
   double weight[STAGES], *y = d->Y, *q = d->F[0], *v = d->F[1];
@@ -295,7 +295,7 @@ static void radau_fill_sample (pw_run *r, double x) {
 /* Projects the sample onto the constraints that the steps satisfy, and computes accelerations and multipliers from
  * it. */
 static int radau_interpolate (void *method, pw_run *r, double t) {
-  radau *d = method;
+  pw_method_data *d = method;
   int status;
   radau_fill_sample (r, (t - d->last.t) / d->last.h);
   if (d->dae.mu_count > 0 || !d->dae.enforces_velocities)
@@ -309,7 +309,7 @@ static int radau_interpolate (void *method, pw_run *r, double t) {
 }
 
 static int radau_at (pw_run *r, double t, pw_error *error) {
-  radau *d = r->data;
+  pw_method_data *d = r->data;
   return pw_sample_last_step (r, d->last.t, t, radau_interpolate, d, error);
 }
 

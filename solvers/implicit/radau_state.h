@@ -48,8 +48,6 @@ struct pw_method_data {
   char *memory;
 };
 
-typedef struct pw_method_data radau;
-
 /* Determines the pattern of F_y and opens both matrices.  PW_OK or PW_RESOURCE. */
 int pw_radau_open_matrices (pw_run *r);
 
@@ -66,7 +64,7 @@ static inline double pw_radau_sum (double y, const double *weight, double *const
 }
 
 /* Stores the unknowns at stage k in d->Y. */
-void pw_radau_stage (const radau *d, int k);
+void pw_radau_stage (const pw_method_data *d, int k);
 
 /* Weights of the values at the nodes c_i in the value at x of the polynomial through them that is 0 at 0. */
 void pw_radau_basis (double x, double *weight);

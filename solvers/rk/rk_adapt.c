@@ -31,7 +31,7 @@
 #define ADAPT_LEAST_ERROR 1e-4 /* least err_last: smaller errors are accidental and would predict too large a step */
 
 void pw_rk_reset_step_size (pw_run *r) {
-  struct pw_method_data *d = r->data;
+  pw_method_data *d = r->data;
   d->h = 0.1 * r->w->scale.time * pow (r->settings.rtol, d->tableau->exponent);
   d->last_error = ADAPT_LEAST_ERROR;
 }
@@ -55,7 +55,7 @@ static void adapt_estimate (const pw_rk_row *e, double *const *slope, int n, dou
 
 /* Reciprocal tolerances of positions and velocities for the step from the state reached to the new state. */
 static void adapt_weigh (const pw_run *r) {
-  const struct pw_method_data *d = r->data;
+  const pw_method_data *d = r->data;
   double *w = d->weight, rtol = r->settings.rtol;
   for (int j = 0, n = r->s->coords; j < n; j++) {
     *w++ = 1 / (pw_atol (r, j) + rtol * fmax (fabs (r->q[j]), fabs (d->q[j])));
@@ -77,7 +77,7 @@ static double adapt_mean_square (const pw_run *r, const double *eq, const double
 
 /* Mean square of an estimate before a projection, divided by h^2; stores its errors in r->q_at and r->v_at. */
 static double adapt_whole (pw_run *r, const pw_rk_row *e) {
-  struct pw_method_data *d = r->data;
+  pw_method_data *d = r->data;
   adapt_estimate (e, d->stage_v, r->s->coords, r->q_at);
   adapt_estimate (e, d->stage_a, r->s->coords, r->v_at);
   return adapt_mean_square (r, r->q_at, r->v_at);
@@ -86,7 +86,7 @@ static double adapt_whole (pw_run *r, const pw_rk_row *e) {
 /* Mean square of what a projection leaves of the errors in r->q_at and r->v_at, plus a small part of that before the
  * projection, `whole`; projected: 1 if the new state was. */
 static double adapt_remaining (pw_run *r, double whole, int projected) {
-  struct pw_method_data *d = r->data;
+  pw_method_data *d = r->data;
   if (!projected && !d->uses_nullspace) return whole;
   if (projected || d->projects_positions) pw_project_error (r, r->saddle, r->q_at, r->s->holonomic);
   pw_project_error (r, r->saddle, r->v_at, r->s->rows);
@@ -105,7 +105,7 @@ static double adapt_guard (double e6, double e5) {
 
 /* The error of the new state, divided by h. */
 static double adapt_state (pw_run *r, int projected) {
-  struct pw_method_data *d = r->data;
+  pw_method_data *d = r->data;
   const pw_tableau *tableau = d->tableau;
   d->stage_v[tableau->stages] = d->v, d->stage_a[tableau->stages] = d->a;
   adapt_weigh (r);
@@ -120,7 +120,7 @@ static double adapt_state (pw_run *r, int projected) {
 
 /* The error of work and losses, which projections do not change, divided by h. */
 static double adapt_ledger (pw_run *r, double h) {
-  struct pw_method_data *d = r->data;
+  pw_method_data *d = r->data;
   const pw_tableau *tableau = d->tableau;
   double e[3] = { 0 }, tolerance = pw_ledger_tolerance (r, h); /* e: squares of e5, e3, e6 */
   pw_ledger_rates (r, d->lambda, d->stage_rate[tableau->stages]);
@@ -136,7 +136,7 @@ static double adapt_ledger (pw_run *r, double h) {
  * Only coordinates count whose velocity changes, at one of the stages, by more than the range in which a force
  * saturates. */
 static double adapt_reversal (const pw_run *r) {
-  const struct pw_method_data *d = r->data;
+  const pw_method_data *d = r->data;
   int n = r->s->coords, stages = d->tableau->stages;
   double sum = 0;
   for (int j = 0; j < n; j++) {
@@ -152,7 +152,7 @@ static double adapt_reversal (const pw_run *r) {
 }
 
 /* The factor from this step size to the next; see the top of this file. */
-static double adapt_factor (const struct pw_method_data *d, double err) {
+static double adapt_factor (const pw_method_data *d, double err) {
   const pw_tableau *tableau = d->tableau;
   if (err == 0) return ADAPT_GROWTH;
   double exponent = tableau->exponent - 0.75 * tableau->memory;
@@ -163,7 +163,7 @@ static double adapt_factor (const struct pw_method_data *d, double err) {
 /* The step to t1 = t + h; *err: its error, accepted up to 1; INFINITY if the step fails.  If a signal jumps at t1, the
  * estimate uses the accelerations just before t1, since the jump is not an error of the step. */
 static int adapt_step (pw_run *r, double h, double t1, int project, double *added_energy, double *err) {
-  struct pw_method_data *d = r->data;
+  pw_method_data *d = r->data;
   double before = pw_before_breakpoint (r, t1);
   r->near_singular = 0;
   int status = pw_rk_step (r, h, t1, project, added_energy);
@@ -180,7 +180,7 @@ static int adapt_step (pw_run *r, double h, double t1, int project, double *adde
  * and the error is remembered only if the step was long enough to predict that of the next one. */
 static void adapt_accept (pw_run *r, double h, double t1, double added_energy, double err, double most_growth,
                           int shortened) {
-  struct pw_method_data *d = r->data;
+  pw_method_data *d = r->data;
   double next = h * fmin (most_growth, adapt_factor (d, err));
   pw_rk_accept (r, h, t1, added_energy);
   pw_bound_tolerances (r);
@@ -190,7 +190,7 @@ static void adapt_accept (pw_run *r, double h, double t1, double added_energy, d
 }
 
 int pw_rk_advance_adaptive (pw_run *r, double t_end, pw_error *error) {
-  struct pw_method_data *d = r->data;
+  pw_method_data *d = r->data;
   double stop = fmin (t_end, r->breakpoint), most_growth = ADAPT_GROWTH;
   int status = PW_OK, project = pw_rk_projects_next (r);
   for (;;) {

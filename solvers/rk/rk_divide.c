@@ -25,7 +25,7 @@ static int divide_step (pw_run *r, const pw_step_start *from, double t, int proj
 
 /* The same in two parts, with the energy, the first one up to the time `between`. */
 static int divide_two_parts (pw_run *r, const pw_step_start *from, double between, double t, int project) {
-  struct pw_method_data *d = r->data;
+  pw_method_data *d = r->data;
   int status = divide_step (r, from, between, project, 1);
   if (status != PW_OK) return status;
   d->second.t = between, d->second.projected = r->projected_at;
@@ -43,7 +43,7 @@ static int divide (pw_run *r, const pw_step_start *from, int status, double t1, 
                    double *between) {
   /* fractions of the step; irregular, since configurations may recur */
   static const double part[] = { 0.382, 0.681, 0.209, 0.847, 0.127, 0.541, 0.943, 0.302, 0.764, 0.891 };
-  const struct pw_method_data *d = r->data;
+  const pw_method_data *d = r->data;
   const size_t bytes = pw_state_length (r->s) * sizeof *d->q;
   double least = INFINITY, energy = fmax (r->scene_energy, r->exchanged);
   int has_result = status == PW_OK, is_step = from->q == r->q; /* otherwise it is a sample */
@@ -68,7 +68,7 @@ static int divide (pw_run *r, const pw_step_start *from, int status, double t1, 
 }
 
 int pw_rk_at (pw_run *r, double t, pw_error *error) {
-  struct pw_method_data *d = r->data;
+  pw_method_data *d = r->data;
   const pw_step_start *from = &d->last;
   if (t > r->t || t < from->t) return pw_fail_outside (r, from->t, t, error);
   if (t == r->t) {
@@ -114,7 +114,7 @@ static int fixed_step_around (pw_run *r, int status, int ends_singular, double t
 }
 
 int pw_rk_advance_fixed (pw_run *r, double t_end, pw_error *error) {
-  struct pw_method_data *d = r->data;
+  pw_method_data *d = r->data;
   int whole, project = pw_rk_projects_next (r);
   const int was_off_grid = d->off_grid;
   double added_energy = 0, t1 = pw_step_end (r, &d->counter, t_end, &whole);

@@ -10,7 +10,7 @@
 /* 1 if the specialised function `steps` does everything that a step of this run needs.  The ledger records the first
  * steps one by one (ledger.c). */
 static int several_possible (const pw_run *r) {
-  const struct pw_method_data *d = r->data;
+  const pw_method_data *d = r->data;
   if (r->method->advance != pw_rk_advance || d == NULL || !pw_fixed_steps (r) || d->holds_signals ||
       d->uses_nullspace || d->off_grid)
     return 0;
@@ -24,7 +24,7 @@ static int several_possible (const pw_run *r) {
  * pw_step_end; up to the first that reaches t; up to a multiple of PW_CHECK_INTERVAL and the next record of speeds
  * (limits.c).  Each must be twice as long as a step that counts as stalled (run.c). */
 static int several_count (const pw_run *r, double t, double t_end) {
-  const struct pw_method_data *d = r->data;
+  const pw_method_data *d = r->data;
   const double h = r->settings.step, stop = fmin (t_end, r->breakpoint) - 1e-9 * h, shortest = 128 * DBL_EPSILON;
   int most = PW_CHECK_INTERVAL - (int)(r->statistics.steps % PW_CHECK_INTERVAL), n = 0;
   double reached = r->t;
@@ -54,7 +54,7 @@ static pw_scene_watch several_watchdog (const pw_run *r) {
 
 /* Updates the run's data after the steps taken. */
 static void several_record (pw_run *r, const pw_scene_steps *x) {
-  struct pw_method_data *d = r->data;
+  pw_method_data *d = r->data;
   pw_statistics *s = &r->statistics;
   pw_geometry *g = &r->geometry;
   r->t = x->t;
@@ -76,7 +76,7 @@ static void several_record (pw_run *r, const pw_scene_steps *x) {
 /* Fills x for the next steps, up to the first that reaches t, and returns their number; 0: fewer than two can be taken
  * at once. */
 static int several_plan (pw_run *r, double t, double t_end, pw_scene_steps *x) {
-  struct pw_method_data *d = r->data;
+  pw_method_data *d = r->data;
   int count = several_possible (r) ? several_count (r, t, t_end) : 0;
   if (count < 2) return 0;
   *x = (pw_scene_steps){ .count = count, .project = d->projects, .watch = several_watchdog (r) };
