@@ -45,8 +45,7 @@ typedef struct {
 /* Updates size and largest, initially 0 and 1, for the correction of one coordinate.  Its size is relative to `value`,
  * which is the same in all iterations: relative to a growing value, corrections that diverge would stay small. */
 static inline void leapfrog_measure (leapfrog_progress *p, double correction, double value, double unit) {
-  double size = fabs (correction) / (fabs (value) + unit);
-  if (!(size <= p->size)) p->size = size;
+  p->size = pw_larger_or_nan (p->size, fabs (correction) / (fabs (value) + unit));
   p->largest = fmax (p->largest, fabs (value) / unit);
 }
 

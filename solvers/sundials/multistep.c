@@ -84,8 +84,8 @@ static int multistep_correct (realtype t, N_Vector vy, N_Vector change, realtype
 
 /* ---- Inside the last step ---- */
 
-/* Accelerations and multipliers at (t, q, v), which are projected first if `project` is 1: also near singular
- * configurations, and without effect on the statistics. */
+/* Accelerations and multipliers at (t, q, v), projected first if `project` is 1.  No configuration is refused as too
+ * nearly singular, and the statistics do not change. */
 static int multistep_complete (pw_method_data *d, double t, int project, double *q, double *v, double *a,
                                double *lambda) {
   pw_run *r = d->sun.run;
