@@ -92,7 +92,7 @@ typedef struct {
   int *coupling;        /* index in `value` of K_ba */
   pw_chain *chain;      /* chains + 1, by ascending columns, the last one a sentinel; their bodies have no block */
   double *chain_factor; /* factors of D in the chains' columns */
-  int bodies, chains;
+  int bodies;
   double least_pivot;     /* smallest pivot of the last factorisation over its diagonal entry before elimination */
   int least_unknown;      /* index in y of its unknown; -1: there is none */
   char *pattern, *memory; /* allocations of the arrays of columns, and of bodies and chains */

@@ -1,4 +1,4 @@
-/* Solution with the factors; see block_ldl.h.  Of an uncondensed body k, y_k is -a_k, from -f_k.
+/* Solution with the factors; see block_ldl.h.  Of an uncondensed body k, y_k begins as -f_k and becomes -a_k.
  *
  *   for each body:                y_p -= J_p W^-1 f
  *   for each column j:            y_p -= L_pj y_j

@@ -79,7 +79,6 @@ static int condense_fill (const pw_plan *plan, pw_block_ldl *l) {
   int contributions = 0, couplings = 0, body = 0, uncondensed = plan->saddle->extra / 3;
   l->inverse_weight = plan->saddle->inverse_weight;
   for (int g = 0; g < plan->groups; g++) l->bodies += condense_has_block (plan, g);
-  l->chains = plan->chains;
   for (pw_layout lay = { 0 }; pw_layout_pass (&lay, &l->memory);) {
     l->body = pw_layout_alloc (&lay, (size_t)l->bodies + 1, sizeof *l->body);
     l->contribution = pw_layout_alloc (&lay, (size_t)(plan->contributions - 2 * plan->linked + 2 * uncondensed),
@@ -90,7 +89,7 @@ static int condense_fill (const pw_plan *plan, pw_block_ldl *l) {
   }
   if (l->memory == NULL) return PW_RESOURCE;
   memcpy (l->chain, plan->chain, (size_t)plan->chains * sizeof *l->chain);
-  l->chain[l->chains] = (pw_chain){ .first_column = l->nodes + 1 };
+  l->chain[plan->chains] = (pw_chain){ .first_column = l->nodes + 1 };
   for (int last = 0; last < 2; last++) /* uncondensed bodies last: they add to diagonals that the others store */
     for (int g = 0; g < plan->groups; g++)
       if (condense_has_block (plan, g) && (plan->uncondensed[g] >= 0) == last)

@@ -44,7 +44,6 @@ static int chain_add (pw_chain *chain, const pw_chain *last, const pw_chain *lin
 
 /* Joins links to chains. */
 static void chain_join (pw_plan *plan, pw_block_ldl *l, const chain_between *between) {
-  plan->chains = plan->linked = 0;
   for (int p = 0; p < l->nodes;) {
     const chain_between *b = &between[p++];
     if (b->sources != 1 || b->link.bodies == 0) continue;

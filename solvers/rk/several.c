@@ -66,7 +66,7 @@ static void several_record (pw_run *r, const pw_scene_steps *x) {
   s->position = pw_larger (s->position, x->watch.position), s->g = pw_larger (s->g, x->watch.g);
   s->velocity = pw_larger (s->velocity, x->watch.velocity), s->jv = pw_larger (s->jv, x->watch.jv);
   pw_specialised_count (r, (long)x->stages * x->done, x->iterations);
-  if (g->saddle == NULL) return; /* else as watchdog_follow leaves it where the sine need not be computed */
+  if (g->saddle == NULL) return; /* else: what watchdog_follow stores where the sine need not be computed */
   g->step_length = x->watch.step, g->moved = x->watch.moved, g->singular_ahead = 0;
   g->sine_before_checked = NAN, g->sine_slope = 0, g->crossed = 0;
   g->previous_t = r->t, g->previous_sine = NAN;
