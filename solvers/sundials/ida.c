@@ -60,9 +60,8 @@ static int ida_matrix (realtype t, realtype c, N_Vector vy, N_Vector vyp, N_Vect
 
 static int ida_open_matrix (pw_method_data *d) {
   const double *y = N_VGetArrayPointer (d->sun.y), *yp = N_VGetArrayPointer (d->yp);
-  int n = d->dae.n, status = pw_dae_lay_out (&d->dae, y + n, yp + n, ida_lambda (d, y, yp));
-  return status == PW_OK ? pw_sun_open_matrix (&d->sun, d->dae.size, d->dae.tangent.colptr, d->dae.tangent.rowind)
-                         : status;
+  if (pw_dae_lay_out (&d->dae, y + d->dae.n, yp + d->dae.n, ida_lambda (d, y, yp)) != PW_OK) return PW_RESOURCE;
+  return pw_sun_open_matrix (&d->sun, d->dae.size, d->dae.tangent.colptr, d->dae.tangent.rowind);
 }
 
 /* ---- Error weights ---- */

@@ -100,11 +100,6 @@ static int multistep_complete (pw_method_data *d, double t, int project, double 
   return status;
 }
 
-static int multistep_complete_sample (pw_method_data *d, double t) {
-  pw_run *r = d->sun.run;
-  return multistep_complete (d, t, d->projects, r->q_at, r->v_at, r->a_at, r->lambda_at);
-}
-
 /* Interpolates the state at t into the sample arrays.  CV_SUCCESS or CV_BAD_T. */
 static int multistep_interpolate (pw_method_data *d, double t) {
   pw_run *r = d->sun.run;
@@ -117,8 +112,9 @@ static int multistep_interpolate (pw_method_data *d, double t) {
 }
 
 static int multistep_power (pw_run *r, double t, double *rate) {
-  int status = multistep_interpolate (r->data, t) == CV_SUCCESS ? PW_OK : PW_RETRY;
-  if (status == PW_OK) status = multistep_complete_sample (r->data, t);
+  pw_method_data *d = r->data;
+  int status = multistep_interpolate (d, t) == CV_SUCCESS ? PW_OK : PW_RETRY;
+  if (status == PW_OK) status = multistep_complete (d, t, d->projects, r->q_at, r->v_at, r->a_at, r->lambda_at);
   if (status == PW_OK) pw_ledger_rates (r, r->lambda_at, rate);
   return status;
 }
@@ -274,7 +270,7 @@ static int multistep_at (pw_run *r, double t, pw_error *error) {
     int flag = multistep_interpolate (d, t);
     if (flag == CV_BAD_T) return pw_fail_outside (r, NAN, t, error);
     if (flag != CV_SUCCESS) return multistep_fail (d, flag, error);
-    status = multistep_complete_sample (d, t);
+    status = multistep_complete (d, t, d->projects, r->q_at, r->v_at, r->a_at, r->lambda_at);
   }
   if (status > 0) return pw_fail_singular (r, t, error);
   return status == PW_OK ? PW_OK : pw_fail_signal (t, error);
