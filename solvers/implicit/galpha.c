@@ -6,11 +6,11 @@
  *   q' = q + h v + h^2 ((1/2 - beta) w + beta w') - (h beta / gamma) D G^T mu
  *   M a' + J^T lambda' = f
  *
- *   index3    g = 0,              S v' = b   (nonholonomic rows),   mu = 0
- *   ggl       g = 0,              J v' = eta                        stabilised index 2 (Gear, Gupta & Leimkuhler 1985)
+ *   index3    g = 0,              S v' = b,      mu = 0
+ *   ggl       g = 0,              J v' = eta     stabilised index 2 (Gear, Gupta & Leimkuhler 1985)
  *
- * with G and S the holonomic and the nonholonomic rows of J, D as in dae.h.  The acceleration-like variable w
- * approximates the acceleration at t + shift h, shift = alpha_m - alpha_f, with an error of order h^2.  The
+ * with G the holonomic rows of J, S and b the nonholonomic rows of J and eta, D as in dae.h.  The acceleration-like
+ * variable w approximates the acceleration at t + shift h, shift = alpha_m - alpha_f, with an error of order h^2.  The
  * coefficients follow from the spectral radius rho at infinite frequency.
  *
  * For order 2 from the first step, the initial w is a + shift h a-dot.  In index3, where g = 0 requires a velocity
@@ -25,10 +25,10 @@
  *
  *   c (q' - q - h v - h^2 (1/2 - beta) w - h^2 beta w')
  *
- * stands for the derivative of q less v.  Corrections satisfy dw' = dv' / (h gamma), da' = e dv', so that c
- * and e are the coefficients of dF/dy'.  Corrections of v', lambda', mu are in units of c, c e m, c, and the
- * equations are divided by c, c e m, c, with m a mass: then all entries of the matrix are of the same size for every
- * step, and its condition number does not depend on the step (Bottasso, Bauchau & Cardona 2007,
+ * replaces q-dot - v.  Corrections satisfy dw' = dv' / (h gamma), da' = e dv', so that c and e are the q_dot_factor and
+ * the v_dot_factor of pw_dae_matrix.  Corrections of v', lambda', mu are in units of c, c e m, c, and the kinematics,
+ * the momentum and the velocity constraints are divided by c, c e m, c, with m a mass: then all entries of the matrix
+ * are of about the same size, and its condition number does not depend on the step (Bottasso, Bauchau & Cardona 2007,
  * Time-step-size-independent conditioning and sensitivity to perturbations in the numerical solution of index three
  * differential algebraic equations). */
 #include <float.h>
@@ -46,13 +46,11 @@ struct pw_method_data {
   double *row_factor, *column_factor; /* unknowns: by which rows and columns of the matrix are multiplied */
 };
 
-typedef struct pw_method_data galpha;
-
-/* The coefficients c and e. */
-static double galpha_c (const galpha *d, double h) {
+/* The factors c and e. */
+static double galpha_c (const pw_method_data *d, double h) {
   return d->gamma / (h * d->beta);
 }
-static double galpha_e (const galpha *d, double h) {
+static double galpha_e (const pw_method_data *d, double h) {
   return (1 - d->alpha_m) / ((1 - d->alpha_f) * h * d->gamma);
 }
 
@@ -63,15 +61,15 @@ static int galpha_update (pw_run *r, double t1) {
 }
 
 /* The new velocity of coordinate j, from w'; its displacement in the step, without that by mu. */
-static double galpha_velocity (const galpha *d, double h, int j) {
+static double galpha_velocity (const pw_method_data *d, double h, int j) {
   return d->v[j] + h * ((1 - d->gamma) * d->w[j] + d->gamma * d->w1[j]);
 }
-static double galpha_displacement (const galpha *d, double h, int j) {
+static double galpha_displacement (const pw_method_data *d, double h, int j) {
   return h * (d->v[j] + h * ((0.5 - d->beta) * d->w[j] + d->beta * d->w1[j]));
 }
 
 static int galpha_residual (pw_run *r, double h, double t1) {
-  galpha *d = r->data;
+  pw_method_data *d = r->data;
   pw_dae *x = &d->common.dae;
   int status = galpha_update (r, t1);
   if (status != PW_OK) return status;
@@ -82,18 +80,12 @@ static int galpha_residual (pw_run *r, double h, double t1) {
   return PW_OK;
 }
 
-/* Adds all entries of the Newton matrix. */
-static void galpha_fill (galpha *d, double h) {
-  pw_dae *x = &d->common.dae;
-  pw_dae_matrix (x, d->common.v1, d->a1, d->y + 2 * x->n, galpha_c (d, h), galpha_e (d, h));
-}
-
 static int galpha_factor (pw_run *r, double h) {
-  galpha *d = r->data;
-  const pw_dae *x = &d->common.dae;
+  pw_method_data *d = r->data;
+  pw_dae *x = &d->common.dae;
   const int64_t *colptr = x->tangent.colptr, *rowind = x->tangent.rowind;
   pw_implicit_begin_matrix (&d->common, x->size);
-  galpha_fill (d, h);
+  pw_dae_matrix (x, d->common.v1, d->a1, d->y + 2 * x->n, galpha_c (d, h), galpha_e (d, h));
   for (int c = 0; c < x->size; c++)
     for (int64_t i = colptr[c]; i < colptr[c + 1]; i++)
       d->common.value[i] *= d->row_factor[rowind[i]] * d->column_factor[c];
@@ -104,7 +96,7 @@ static int galpha_factor (pw_run *r, double h) {
 
 /* The prediction: the accelerations stay constant. */
 static void galpha_predict (pw_run *r, double h) {
-  galpha *d = r->data;
+  pw_method_data *d = r->data;
   const pw_dae *x = &d->common.dae;
   memset (d->y, 0, (size_t)x->size * sizeof *d->y);
   for (int j = 0; j < x->n; j++) {
@@ -116,10 +108,10 @@ static void galpha_predict (pw_run *r, double h) {
   pw_tangent_compress (&x->tangent, r->lambda, x->rows, d->y + 2 * x->n);
 }
 
-/* Solves for the correction and applies it.  *correction: its size, the largest of those of q and v / c in units of the
- * scene; *round_off: that of q and h v.  PW_OK or PW_RESOURCE. */
+/* Solves for the correction of the unknowns and applies it.  *correction: its size, the largest of those of q and v / c
+ * in units of the scene; *round_off: the round-off of q and h v in these units.  PW_OK or PW_RESOURCE. */
 static int galpha_correct (pw_run *r, double h, double *correction, double *round_off) {
-  galpha *d = r->data;
+  pw_method_data *d = r->data;
   int n = d->common.dae.n, size = d->common.dae.size;
   double largest = 1;
   for (int i = 0; i < size; i++) d->z[i] *= -d->row_factor[i];
@@ -149,7 +141,7 @@ static int galpha_correct (pw_run *r, double h, double *correction, double *roun
  * order h^4.  Where corrections stall at a few times their round-off, they are accepted. */
 static int galpha_solve (pw_run *r, double h, double t1) {
   const int most = 20; /* iterations */
-  galpha *d = r->data;
+  pw_method_data *d = r->data;
   double before = INFINITY, size, round_off, target = fmin (1e-9, 1e-3 * pow (h / r->w->scale.time, 4)), rate = 1;
   if (h != d->common.h)
     pw_implicit_scale (&d->common.dae, galpha_c (d, h), galpha_e (d, h), d->row_factor, d->column_factor);
@@ -174,8 +166,8 @@ static int galpha_solve (pw_run *r, double h, double t1) {
 
 /* ---- Opening ---- */
 
-/* Order 2 with the least damping of low frequencies for a given spectral radius rho at infinite frequency. */
-static void galpha_coefficients (galpha *d, double rho) {
+/* The coefficients for order 2 with the least damping of low frequencies for a given rho (Chung & Hulbert 1993). */
+static void galpha_coefficients (pw_method_data *d, double rho) {
   d->alpha_m = (2 * rho - 1) / (rho + 1);
   d->alpha_f = rho / (rho + 1);
   d->gamma = 0.5 + d->alpha_f - d->alpha_m;
@@ -183,7 +175,7 @@ static void galpha_coefficients (galpha *d, double rho) {
 }
 
 static int galpha_open (pw_run *r, pw_error *error) {
-  galpha *d = r->data = calloc (1, sizeof *d);
+  pw_method_data *d = r->data = calloc (1, sizeof *d);
   const pw_system *s = r->s;
   size_t n = (size_t)s->coords + 3, most = 2 * (n + (size_t)s->rows);
   if (d == NULL) return pw_fail_memory (s, error);
@@ -196,10 +188,9 @@ static int galpha_open (pw_run *r, pw_error *error) {
   if (status == PW_OK) {
     galpha_coefficients (d, pw_run_option (r, "rho"));
     d->common.q1 = d->y, d->common.v1 = d->y + x->n;
-    pw_scatter_begin_record (&x->tangent.scatter);
-    galpha_fill (d, 1);
-    status = pw_implicit_lay_out (&d->common, x->size);
+    status = pw_dae_lay_out (x, d->common.v1, d->a1, d->y + 2 * x->n);
   }
+  if (status == PW_OK) status = pw_implicit_open_matrix (&d->common, x->size);
   pw_dense_projection projection = x->enforces_velocities ? PW_DENSE_POSITIONS_AND_VELOCITIES : PW_DENSE_POSITIONS;
   return pw_implicit_complete (r, status, projection, error);
 }
@@ -209,7 +200,7 @@ static int galpha_open (pw_run *r, pw_error *error) {
 /* a-dot at the state reached: a difference quotient over 1e-3 of the step, short enough for stiff forces, long enough
  * for round-off. */
 static int galpha_jerk (pw_run *r, double h, double *jerk) {
-  galpha *d = r->data;
+  pw_method_data *d = r->data;
   double dt = 1e-3 * h;
   for (int j = 0; j < d->common.dae.n; j++) {
     d->common.q1[j] = r->q[j] + dt * (d->v[j] + 0.5 * dt * d->a[j]);
@@ -224,7 +215,7 @@ static int galpha_jerk (pw_run *r, double h, double *jerk) {
 /* 1 if a-dot would change the accelerations by several times their size in a step: the scene has vibrations that are
  * too fast for the step. */
 static int galpha_vibrates (const pw_run *r, double h, const double *jerk) {
-  const galpha *d = r->data;
+  const pw_method_data *d = r->data;
   double change = 0, size = 0;
   for (int j = 0; j < d->common.dae.n; j++) {
     change += r->s->metric[j] * jerk[j] * jerk[j];
@@ -236,7 +227,7 @@ static int galpha_vibrates (const pw_run *r, double h, const double *jerk) {
 /* a-dot as the change of a in a trial step from w = a, which does not amplify vibrations that the step does not
  * resolve. */
 static int galpha_trial_jerk (pw_run *r, double h, double *jerk) {
-  galpha *d = r->data;
+  pw_method_data *d = r->data;
   memcpy (d->w, d->a, (size_t)d->common.dae.n * sizeof *d->w);
   int status = galpha_solve (r, h, r->t + h);
   for (int j = 0; j < d->common.dae.n; j++) jerk[j] = status == PW_OK ? (d->a1[j] - d->a[j]) / h : 0;
@@ -246,7 +237,7 @@ static int galpha_trial_jerk (pw_run *r, double h, double *jerk) {
 /* Adds to the velocities the error with which the method starts without loss of order in index3: the dv with
  * G dv = C h^2 G a-dot that is least in the metric of M. */
 static int galpha_add_velocity_error (pw_run *r, double h, const double *jerk) {
-  galpha *d = r->data;
+  pw_method_data *d = r->data;
   const pw_system *s = r->s;
   double C = 1. / 6 - d->beta - 0.5 * (d->alpha_m - d->alpha_f), *dv = d->common.v1;
   int status = pw_evaluate_J_at (r->w, r->t, r->q, d->v);
@@ -260,13 +251,13 @@ static int galpha_add_velocity_error (pw_run *r, double h, const double *jerk) {
   return PW_OK;
 }
 
-/* Initialises v, a and w for the first step of this size. */
+/* Initialises d->v, d->a and d->w for the first step of this size. */
 static int galpha_begin (pw_run *r, double h) {
-  galpha *d = r->data;
+  pw_method_data *d = r->data;
   double *jerk = d->w1;
   int status = PW_OK;
   memcpy (d->v, r->v, (size_t)d->common.dae.n * sizeof *d->v);
-  if (!d->common.dae.enforces_velocities) { /* velocities include the error of the steps before */
+  if (!d->common.dae.enforces_velocities) { /* r->v includes the error that earlier steps added */
     status = pw_evaluate_J_at (r->w, r->t, r->q, d->v);
     if (status == PW_OK) status = pw_project_velocities (&d->common.last.projector, r, d->v);
   }
@@ -286,7 +277,7 @@ static int galpha_step (pw_run *r, double h, double t1) {
 }
 
 static void galpha_accept (pw_run *r) {
-  galpha *d = r->data;
+  pw_method_data *d = r->data;
   size_t n = (size_t)d->common.dae.n * sizeof (double);
   memcpy (r->a, d->a1, n);
   memcpy (d->v, r->v, n);

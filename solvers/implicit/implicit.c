@@ -1,8 +1,8 @@
-/* The implicit methods with a fixed step: opening, scaling of the Newton matrix, steps; see implicit.h. */
-#include "implicit.h"
+/* Parts of galpha and leapfrog: opening, scaling of the Newton matrix, steps; see implicit.h. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
+#include "implicit.h"
 
 static pw_implicit *implicit_of (pw_run *r) {
   return (pw_implicit *)r->data;
@@ -15,9 +15,8 @@ int pw_implicit_open (pw_implicit *x, pw_run *r, const pw_array *array, size_t c
   return x->memory ? pw_dae_open (&x->dae, r) : PW_RESOURCE;
 }
 
-int pw_implicit_lay_out (pw_implicit *x, int size) {
-  pw_tangent *t = &x->dae.tangent;
-  if (pw_scatter_lay_out (&t->scatter, size, &t->colptr, &t->rowind) != PW_OK) return PW_RESOURCE;
+int pw_implicit_open_matrix (pw_implicit *x, int size) {
+  const pw_tangent *t = &x->dae.tangent;
   x->value = malloc (((size_t)t->colptr[size] + 1) * sizeof *x->value);
   return x->value ? pw_sparse_open (&x->sparse, PW_SPARSE_REAL, size, t->colptr, t->rowind) : PW_RESOURCE;
 }
@@ -52,7 +51,7 @@ void pw_implicit_scale (const pw_dae *x, double c, double e, double *row_factor,
   int n = x->n, g_rows = x->enforces_velocities ? 0 : x->tangent.holonomic; /* in which g = 0 replaces J v = eta */
   double mass = 0;
   for (int j = 0; j < n; j++) mass = fmax (mass, s->mass[j]);
-  if (mass == 0) mass = 1;
+  if (mass == 0) mass = 1; /* all coordinates are massless */
   for (int j = 0; j < n; j++) {
     row_factor[j] = 1 / c, column_factor[j] = 1;
     row_factor[n + j] = 1 / (c * e * mass), column_factor[n + j] = c;
@@ -83,10 +82,10 @@ int pw_implicit_fail (pw_run *r, int status, double h, pw_error *error) {
                   r->settings.rtol);
 }
 
-/* Makes a step of size h to *t1.  If it fails since its end is near a singular configuration, where Newton's matrix is
- * singular, longer ones are tried, up to `stop`; *t1: the end of the step made. */
+/* Makes a step of size h to *t1.  If it fails because its end is near a singular configuration, where the Newton matrix
+ * is singular, longer ones are tried, up to `stop`; *t1: the end of the step made. */
 static int implicit_step_around (pw_run *r, pw_implicit_step *step, double h, double stop, double *t1) {
-  static const double longer[] = { 1.38, 1.76, 2.62 }; /* no multiples of each other, since configurations may recur */
+  static const double longer[] = { 1.38, 1.76, 2.62 }; /* in units of h; irregular, since configurations may recur */
   int status = step (r, h, *t1);
   for (size_t i = 0; i < sizeof longer / sizeof *longer; i++) {
     double later = r->t + longer[i] * h;

@@ -1,4 +1,5 @@
-/* What galpha and leapfrog, the implicit methods with a fixed step, share: Newton matrix, steps, dense output. */
+/* What galpha and leapfrog, methods with a fixed step that solve equations by Newton's iteration, share: matrix, steps,
+ * dense output. */
 #ifndef PW_IMPLICIT_H
 #define PW_IMPLICIT_H
 
@@ -22,18 +23,18 @@ typedef struct {
   char *memory;         /* of the method's arrays */
 } pw_implicit;
 
-/* Allocates the method's arrays, `count` of them, and the equations: PW_OK or PW_RESOURCE. */
+/* Allocates the method's arrays, `count` of them, and opens x->dae: PW_OK or PW_RESOURCE. */
 int pw_implicit_open (pw_implicit *x, pw_run *r, const pw_array *array, size_t count);
 
-/* Allocates the Newton matrix, of this size, whose pattern has been recorded: PW_OK or PW_RESOURCE. */
-int pw_implicit_lay_out (pw_implicit *x, int size);
+/* Opens the Newton matrix of this size, with the pattern in x->dae.tangent: PW_OK or PW_RESOURCE. */
+int pw_implicit_open_matrix (pw_implicit *x, int size);
 
-/* Completes the opening with a dense output of this projection; if `status` is not PW_OK, reports that memory is
- * exhausted. */
+/* Completes the opening with a dense output of this projection; if `status`, of the functions before, is not PW_OK,
+ * reports that memory is exhausted. */
 int pw_implicit_complete (pw_run *r, int status, pw_dense_projection projection, pw_error *error);
 
-/* Factors of the rows and columns of a Newton matrix whose derivatives by q' and a have the coefficients c and e: with
- * them all its entries are of the same size, whatever the step size. */
+/* Factors of the rows and columns of the matrix of pw_dae_matrix with q_dot_factor c and v_dot_factor e: with them its
+ * entries are of about the same size for every step size (equations in galpha.c). */
 void pw_implicit_scale (const pw_dae *x, double c, double e, double *row_factor, double *column_factor);
 
 /* Sets the matrix to 0 and begins to fill it. */
@@ -47,8 +48,8 @@ typedef int pw_implicit_step (pw_run *r, double h, double t1);
  * multipliers. */
 int pw_implicit_advance (pw_run *r, double t_end, pw_implicit_step *step, void (*accept) (pw_run *r), pw_error *error);
 
-/* Reports a failed step of size h, also of radau; status: what it returned, PW_OK if its error is too large.  The
- * reason may be a singular configuration at its beginning. */
+/* Reports a failed step of size h from the state reached, also of radau; status: what the step returned, PW_OK if its
+ * error is too large.  The reason may be a singular configuration at its beginning. */
 int pw_implicit_fail (pw_run *r, int status, double h, pw_error *error);
 
 /* For the table of the method: PW_IMPLICIT_FUNCTIONS. */

@@ -5,13 +5,14 @@
  *   q' - q     = h u
  *   M (v' - u) = h/2 (f (t', q', v') - J (q')^T lambda-)     J (t', q') v' = eta (t', q')
  *
- * with S the nonholonomic rows of J.  For holonomic constraints this is RATTLE (Andersen 1983, Rattle: a "velocity"
- * version of the Shake algorithm for molecular dynamics calculations); for nonholonomic constraints the discrete
- * Lagrange-d'Alembert principle (Cortés & Martínez 2001, Non-holonomic integrators) with a discrete constraint that is
- * symmetric in both ends, which makes the method reversible (McLachlan & Perlmutter 2006, Integrators for nonholonomic
- * mechanical systems).  Exchanging both ends and h with -h gives the same equations: the method is symmetric, hence of
- * order 2, and with forces even in the velocities it retraces the motion when they are reversed.  lambda+ and lambda-
- * are internal to the step; the reported accelerations and multipliers solve the equations of motion at its end.
+ * with S and b the nonholonomic rows of J and eta.  For holonomic constraints this is RATTLE (Andersen 1983, Rattle: a
+ * "velocity" version of the Shake algorithm for molecular dynamics calculations); for nonholonomic constraints the
+ * discrete Lagrange-d'Alembert principle (Cortés & Martínez 2001, Non-holonomic integrators) with a discrete constraint
+ * that is symmetric in both ends, which makes the method reversible (McLachlan & Perlmutter 2006, Integrators for
+ * nonholonomic mechanical systems).  Exchanging both ends and h with -h gives the same equations: the method is
+ * symmetric, hence of order 2, and with forces even in the velocities it retraces the motion when they are reversed.
+ * lambda+ and lambda- are internal to the step; the reported accelerations and multipliers solve the equations of
+ * motion at its end.
  *
  * All equations are solved to round-off: for u and q' by Newton's iteration, for v' and velocity-dependent forces by
  * fixed-point iteration.  M^-1 is not needed: massless coordinates follow from their constraint equations. */
@@ -26,12 +27,11 @@ enum { DRIFT_MOST = 30, KICK_MOST = 100 }; /* Newton iterations for u; fixed-poi
 struct pw_method_data {
   pw_implicit common;          /* first */
   double *u;                   /* coords + 3: velocities at half the step */
-  double *middle, *dv, *f;     /* coords + 3: q* or a change of impulses, a correction of velocities, forces */
-  double *residual, *mu, *eta; /* all equations: multipliers of a correction, right-hand side */
+  double *middle;              /* coords + 3: q*; in the second half: changes of impulses */
+  double *dv, *f;              /* coords + 3: corrections of v', forces */
+  double *residual, *mu, *eta; /* all equations: residuals; multipliers of a correction of v'; eta or g */
   double *z;                   /* coords and independent equations: a correction of u and its multipliers */
 };
-
-typedef struct pw_method_data leapfrog;
 
 /* Convergence of an iteration, from the sizes of its corrections. */
 typedef struct {
@@ -45,16 +45,14 @@ typedef struct {
 /* Updates size and largest, initially 0 and 1, for the correction of one coordinate.  Its size is relative to `value`,
  * which is the same in all iterations: relative to a growing value, corrections that diverge would stay small. */
 static inline void leapfrog_measure (leapfrog_progress *p, double correction, double value, double unit) {
-  double size = fabs (correction) / (fabs (value) + unit);
-  if (!(size <= p->size)) p->size = size;
+  p->size = pw_larger_or_nan (p->size, fabs (correction) / (fabs (value) + unit));
   p->largest = fmax (p->largest, fabs (value) / unit);
 }
 
-/* ---- Iterations ---- */
-
-/* Converged: to round-off, or the next correction would be below it. */
+/* Converged: to round-off; or the next correction would be below it; or corrections stall at what small masses or
+ * lengths make of the round-off of the largest coordinate, `magnified`. */
 static pw_convergence leapfrog_test (leapfrog_progress *p) {
-  const double round_off = 2 * DBL_EPSILON, magnified = 1e4 * DBL_EPSILON; /* by small masses or lengths */
+  const double round_off = 2 * DBL_EPSILON, magnified = 1e4 * DBL_EPSILON;
   p->rate = p->done > 0 ? p->size / p->before : 1;
   if (!isfinite (p->size)) return PW_DIVERGED;
   if (p->size <= round_off || (p->rate < 1 && p->size * p->rate / (1 - p->rate) <= 0.25 * round_off))
@@ -77,16 +75,14 @@ static pw_convergence leapfrog_test (leapfrog_progress *p) {
 
 /* q' and q* from u. */
 static void drift_positions (pw_run *r, double h) {
-  leapfrog *d = r->data;
+  pw_method_data *d = r->data;
   for (int j = 0; j < r->s->coords; j++) {
     d->common.q1[j] = r->q[j] + h * d->u[j];
     d->middle[j] = r->q[j] + 0.5 * h * d->u[j];
   }
 }
 
-/* ---- Matrix ---- */
-
-/* M and J^T at the beginning; kinematics must be those of the beginning. */
+/* Adds M and J^T; kinematics and J must be those of the beginning of the step. */
 static void drift_put_momentum (pw_run *r) {
   pw_tangent *x = &r->data->common.dae.tangent;
   const pw_system *s = r->s;
@@ -97,41 +93,34 @@ static void drift_put_momentum (pw_run *r) {
           .col = s->coords, .rows = s->rows, .factor = 1, .factor_nonholonomic = 1, .row_index = x->row_index });
 }
 
-/* S + h/2 ((S u)_q - b_q) at the middle; kinematics must be those of the middle. */
+/* Adds S + h/2 ((S u)_q - b_q); kinematics and J must be those at (t*, q*). */
 static void drift_put_middle (pw_run *r, double h) {
   pw_tangent *x = &r->data->common.dae.tangent;
-  const pw_system *s = r->s;
-  pw_placement put = { .row = s->coords,
-                       .rows = s->rows,
-                       .factor_nonholonomic = 0.5 * h,
-                       .row_index = x->row_index,
-                       .direction = r->data->u };
-  pw_newton_add_block (&x->newton, r->w, &x->scatter, PW_JW_Q, &put);
-  put.factor_nonholonomic = -0.5 * h;
-  pw_newton_add_block (&x->newton, r->w, &x->scatter, PW_ETA_Q, &put);
-  put.factor_nonholonomic = 1;
-  pw_newton_add_J (r->w, &x->scatter, &put);
+  const int first = r->s->coords;
+  pw_tangent_add_equations (x, PW_JW_Q, first, 0, r->data->u, 0, 0.5 * h);
+  pw_tangent_add_equations (x, PW_ETA_Q, first, 0, NULL, 0, -0.5 * h);
+  pw_tangent_add_J (x, r->s->rows, first, 0, 0, 1);
 }
 
-/* G at the end; kinematics must be those of the end. */
+/* Adds the holonomic rows of J; kinematics and J must be those of the end of the step. */
 static void drift_put_end (pw_run *r) {
-  pw_tangent *x = &r->data->common.dae.tangent;
-  pw_newton_add_J (
-      r->w, &x->scatter,
-      &(pw_placement){ .row = r->s->coords, .rows = r->s->holonomic, .factor = 1, .row_index = x->row_index });
+  pw_tangent_add_J (&r->data->common.dae.tangent, r->s->holonomic, r->s->coords, 0, 1, 0);
 }
 
 static int drift_open_matrix (pw_run *r) {
-  leapfrog *d = r->data;
-  pw_scatter_begin_record (&d->common.dae.tangent.scatter);
+  pw_method_data *d = r->data;
+  pw_tangent *x = &d->common.dae.tangent;
+  const int size = r->s->coords + x->rows;
+  pw_scatter_begin_record (&x->scatter);
   drift_put_momentum (r);
   drift_put_middle (r, 1);
   drift_put_end (r);
-  return pw_implicit_lay_out (&d->common, r->s->coords + d->common.dae.tangent.rows);
+  if (pw_scatter_lay_out (&x->scatter, size, &x->colptr, &x->rowind) != PW_OK) return PW_RESOURCE;
+  return pw_implicit_open_matrix (&d->common, size);
 }
 
 static int drift_factor (pw_run *r, double h, double t1) {
-  leapfrog *d = r->data;
+  pw_method_data *d = r->data;
   pw_tangent *x = &d->common.dae.tangent;
   pw_implicit_begin_matrix (&d->common, r->s->coords + x->rows);
   int status = pw_evaluate_J_at (r->w, r->t, r->q, r->v);
@@ -148,11 +137,9 @@ static int drift_factor (pw_run *r, double h, double t1) {
   return pw_sparse_factor (&d->common.sparse, d->common.value);
 }
 
-/* ---- Iteration ---- */
-
-/* Residuals of the constraints. */
+/* Residuals of the constraints on u and q'. */
 static int drift_residual (pw_run *r, double h, double t1) {
-  leapfrog *d = r->data;
+  pw_method_data *d = r->data;
   const pw_system *s = r->s;
   int status = PW_OK;
   if (s->rows > s->holonomic) {
@@ -172,9 +159,9 @@ static int drift_residual (pw_run *r, double h, double t1) {
   return PW_OK;
 }
 
-/* One correction of u, measured in positions. */
+/* One correction of u; its size is that of the correction of q'.  PW_OK or PW_RESOURCE. */
 static int drift_correct (pw_run *r, double h, leapfrog_progress *p) {
-  leapfrog *d = r->data;
+  pw_method_data *d = r->data;
   int n = r->s->coords;
   memset (d->z, 0, (size_t)n * sizeof *d->z);
   for (int i = 0; i < r->s->rows; i++) d->residual[i] = -d->residual[i];
@@ -191,7 +178,7 @@ static int drift_correct (pw_run *r, double h, leapfrog_progress *p) {
 
 /* The matrix is evaluated at the prediction, and again while convergence is slow. */
 static int drift_solve (pw_run *r, double h, double t1) {
-  leapfrog *d = r->data;
+  pw_method_data *d = r->data;
   leapfrog_progress p = { .rate = 1 };
   for (int j = 0; j < r->s->coords; j++) d->u[j] = r->v[j] + 0.5 * h * r->a[j];
   drift_positions (r, h);
@@ -208,10 +195,10 @@ static int drift_solve (pw_run *r, double h, double t1) {
 
 /* ---- Second half (kick): v', by fixed-point iteration ---- */
 
-/* One correction of v', for the change of the forces since the last one; d->f holds the forces.  PW_METHOD if a signal
- * failed. */
+/* One correction of v', for the change of the forces since the last correction; d->f: those forces, at first 0.
+ * PW_METHOD if a signal failed. */
 static int kick_correct (pw_run *r, double h, leapfrog_progress *p) {
-  leapfrog *d = r->data;
+  pw_method_data *d = r->data;
   const pw_system *s = r->s;
   int status = pw_update_velocities (r->w, d->common.v1);
   if (status != PW_OK) return status;
@@ -234,7 +221,7 @@ static int kick_correct (pw_run *r, double h, leapfrog_progress *p) {
 }
 
 static int kick_solve (pw_run *r, double h, double t1) {
-  leapfrog *d = r->data;
+  pw_method_data *d = r->data;
   leapfrog_progress p = { 0 };
   int status = pw_evaluate_J_at (r->w, pw_before_breakpoint (r, t1), d->common.q1, d->u);
   if (status != PW_OK) return status;
@@ -256,7 +243,7 @@ static int kick_solve (pw_run *r, double h, double t1) {
 /* ---- Opening ---- */
 
 static int leapfrog_open (pw_run *r, pw_error *error) {
-  leapfrog *d = r->data = calloc (1, sizeof *d);
+  pw_method_data *d = r->data = calloc (1, sizeof *d);
   size_t n = (size_t)r->s->coords + 3, rows = (size_t)r->s->rows;
   if (d == NULL) return pw_fail_memory (r->s, error);
   const pw_array array[] = { { &d->u, n },      { &d->common.q1, n }, { &d->common.v1, n },   { &d->middle, n },

@@ -2,12 +2,13 @@
  * Ordinary Differential Equations II, section IV.8; in index 2 and 3: chapter VII, and Hairer, Lubich & Roche 1989).
  * With y = (q, v, lambda, mu) the equations B y' = F (t, y) are
  *
- *   q' = v - D G^T mu,   M v' = f - J^T lambda,   G, S: holonomic, nonholonomic rows of J;  D as in dae.h
+ *   q' = v - D G^T mu,   M v' = f - J^T lambda
  *   ggl       0 = eta - J v,   0 = -g
- *   index2    0 = eta - J v,                                               mu = 0
- *   index3    0 = -g,   0 = b - S v   (nonholonomic rows)                  mu = 0
+ *   index2    0 = eta - J v,             mu = 0
+ *   index3    0 = -g,   0 = b - S v,     mu = 0
  *
- * The stages y + Z_i at t + c_i h satisfy  B sum_j (A^-1)_ij Z_j = h F (t + c_i h, y + Z_i);  the last one is the new
+ * with G the holonomic rows of J, S and b the nonholonomic rows of J and eta, D as in dae.h, B = diag (1, M, 0).  The
+ * stages y + Z_i at t + c_i h satisfy  B sum_j (A^-1)_ij Z_j = h F (t + c_i h, y + Z_i);  the last one is the new
  * state.  T^-1 A^-1 T = diag (gamma, [ alpha -beta ; beta alpha ]) decouples Newton's equations for W, Z = T W:
  *
  *   (gamma/h B - F_y) dW_1 = r_1,    ((alpha + i beta)/h B - F_y) (dW_2 + i dW_3) = r_2 + i r_3
@@ -17,8 +18,9 @@
  *
  *   err = (gamma/h B - F_y)^-1 (F (t, y) + B sum_i e_i Z_i / h)            of order h^4
  *
- * in units of tolerances of 0.05 rtol^(2/3), which makes the error of order 5 about proportional to rtol.  Multipliers
- * are not tested.  The step follows from the errors of this and the previous step (Gustafsson 1994).
+ * in units of tolerances of 0.05 rtol^(2/3), which makes the error of the method, of order 5, about proportional to
+ * rtol.  Multipliers are not tested.  The step size follows from the errors of this and the previous step (Gustafsson
+ * 1994).
  *
  * Accelerations and multipliers at the ends of steps and in samples are computed from positions and velocities, which
  * are more accurate than the multipliers of the stages.  Work and losses are integrated with the stages. */
@@ -32,8 +34,8 @@
 
 enum { STAGES = PW_RADAU_STAGES };
 
-#define RADAU_REUSE_CONTRACTION 1e-2 /* up to which F_y is reused */
-#define RADAU_REUSE_GROWTH 1.2 /* of the step size up to which it is not changed, so that the factors are reused */
+#define RADAU_REUSE_CONTRACTION 1e-2 /* `contraction` up to which F_y is reused */
+#define RADAU_REUSE_GROWTH 1.2 /* growth up to which the step size is not changed, so that the factors are reused */
 #define RADAU_SIGNAL_STEP 1e-4 /* step in units of the time scale below which a signal that fails ends the run */
 
 /* The last row of A^-1: derivatives at the end of a step. */
@@ -42,7 +44,7 @@ static const double radau_derivative_at_end[STAGES] = { 5.53197264742180826186, 
 /* ---- Opening ---- */
 
 static int radau_restart (pw_run *r, pw_error *error) {
-  radau *d = r->data;
+  pw_method_data *d = r->data;
   double time_scale = r->w->scale.time;
   (void)error;
   d->counter = (pw_step_counter){ .base = r->t };
@@ -61,58 +63,45 @@ static int radau_restart (pw_run *r, pw_error *error) {
   return PW_OK;
 }
 
-static void radau_lay_out (pw_layout *l, double **const *array, size_t arrays, size_t length) {
-  for (size_t i = 0; i < arrays; i++) *array[i] = pw_layout_alloc (l, length, sizeof (double));
-}
-
 static int radau_allocate (pw_run *r) {
-  radau *d = r->data;
-  size_t length = (size_t)d->dae.size + 6; /* of all arrays of unknowns, with room for three more coordinates */
-  double **const of_unknowns[] = { &d->B,         &d->unit,       &d->tolerance,     &d->newton_tolerance,
-                                   &d->round_off, &d->row_factor, &d->column_factor, &d->Y,
-                                   &d->a_end,     &d->now.y,      &d->last.y,        &d->now.a,
-                                   &d->last.a };
-  double **const of_entries[] = { &d->rate, &d->now.ledger, &d->last.ledger };
-  for (pw_layout l = { 0 }; pw_layout_pass (&l, &d->memory);) {
-    radau_lay_out (&l, of_unknowns, sizeof of_unknowns / sizeof *of_unknowns, length);
-    radau_lay_out (&l, of_entries, sizeof of_entries / sizeof *of_entries, (size_t)r->s->entries);
-    for (int k = 0; k < STAGES; k++) {
-      double **const stage[] = { &d->now.Z[k], &d->last.Z[k], &d->W[k], &d->F[k] };
-      double **const ledger[] = { &d->now.ledger_change[k], &d->last.ledger_change[k] };
-      radau_lay_out (&l, stage, sizeof stage / sizeof *stage, length);
-      radau_lay_out (&l, ledger, sizeof ledger / sizeof *ledger, (size_t)r->s->entries);
-    }
-    d->complex_x = pw_layout_alloc (&l, 2 * length, sizeof (double));
+  pw_method_data *d = r->data;
+  enum { SINGLE = 16, OF_STAGE = 6, ALL = SINGLE + OF_STAGE * STAGES + 1 };
+  const size_t n = (size_t)d->dae.size + 6; /* of all arrays of unknowns, with room for three more coordinates */
+  const size_t entries = (size_t)r->s->entries;
+  pw_array array[ALL] = {
+    { &d->B, n },         { &d->unit, n },       { &d->tolerance, n },        { &d->newton_tolerance, n },
+    { &d->round_off, n }, { &d->row_factor, n }, { &d->column_factor, n },    { &d->Y, n },
+    { &d->a_end, n },     { &d->now.y, n },      { &d->last.y, n },           { &d->now.a, n },
+    { &d->last.a, n },    { &d->rate, entries }, { &d->now.ledger, entries }, { &d->last.ledger, entries }
+  };
+  for (int k = 0; k < STAGES; k++) {
+    const pw_array of_stage[OF_STAGE] = {
+      { &d->now.Z[k], n },  { &d->now.ledger_change[k], entries },  { &d->W[k], n },
+      { &d->last.Z[k], n }, { &d->last.ledger_change[k], entries }, { &d->F[k], n }
+    };
+    memcpy (array + SINGLE + OF_STAGE * k, of_stage, sizeof of_stage);
   }
+  array[ALL - 1] = (pw_array){ &d->complex_x, 2 * n };
+  d->memory = pw_alloc_arrays (array, ALL);
   return d->memory ? PW_OK : PW_RESOURCE;
 }
 
-/* The diagonal of B, and the units of the unknowns. */
-static void radau_constants (pw_run *r) {
-  radau *d = r->data;
-  const pw_system *s = r->s;
-  int n = d->dae.n;
-  for (int j = 0; j < n; j++) {
-    d->B[j] = 1;
-    d->B[n + j] = s->mass[j];
-    d->unit[j] = pw_unit (s, j);
-    d->unit[n + j] = d->unit[j] / r->w->scale.time;
-  }
-}
-
 static int radau_open (pw_run *r, pw_error *error) {
-  radau *d = r->data = calloc (1, sizeof *d);
+  pw_method_data *d = r->data = calloc (1, sizeof *d);
   int status = d ? pw_dae_open (&d->dae, r) : PW_RESOURCE;
   if (status == PW_OK) status = radau_allocate (r);
   if (status == PW_OK) status = pw_radau_open_matrices (r);
   if (status != PW_OK) return pw_fail_memory (r->s, error);
-  radau_constants (r);
+  for (int j = 0, n = d->dae.n; j < n; j++) {
+    d->B[j] = 1, d->B[n + j] = r->s->mass[j];
+    d->unit[j] = pw_unit (r->s, j), d->unit[n + j] = d->unit[j] / r->w->scale.time;
+  }
   status = pw_projector_open (&d->projector, r, NULL, NULL, error);
   return status == PW_OK ? radau_restart (r, error) : status;
 }
 
 static void radau_close (pw_run *r) {
-  radau *d = r->data;
+  pw_method_data *d = r->data;
   pw_projector_close (&d->projector);
   pw_sparse_close (&d->real);
   pw_sparse_close (&d->complex);
@@ -126,28 +115,28 @@ static void radau_close (pw_run *r) {
 
 /* ---- Advancing ---- */
 
-/* Accelerations and multipliers at the state reached, where J is evaluated: from the state, or in singular
+/* Accelerations and multipliers at the state reached, where J is evaluated: computed from the state, or in singular
  * configurations those of the last stage. */
 static void radau_evaluate_reached (pw_run *r, double h) {
-  radau *d = r->data;
+  pw_method_data *d = r->data;
   double *lambda = d->now.y + 2 * d->dae.n;
   int status = pw_saddle_factor (r->saddle);
   d->near_singular = r->near_singular = status != PW_OK || pw_watchdog_near (r);
-  if (status == PW_OK)
+  if (status == PW_OK) {
     pw_run_accelerate_updated (r, r->v, r->a, r->lambda);
-  else
-    for (int j = 0, i = d->dae.n; j < d->dae.n; j++, i++)
-      r->a[j] = pw_radau_sum (0, radau_derivative_at_end, d->last.Z, i) / h;
-  if (status != PW_OK) pw_tangent_expand (&d->dae.tangent, lambda, r->lambda);
+  } else {
+    for (int j = 0, n = d->dae.n; j < n; j++) r->a[j] = pw_radau_sum (0, radau_derivative_at_end, d->last.Z, n + j) / h;
+    pw_tangent_expand (&d->dae.tangent, lambda, r->lambda);
+  }
   pw_tangent_compress (&d->dae.tangent, r->lambda, d->dae.rows, lambda);
   memcpy (d->a_end, r->a, (size_t)d->dae.n * sizeof *d->a_end);
   pw_bound_tolerances (r);
   pw_ledger_rates (r, r->lambda, r->rate);
 }
 
-/* The last stage becomes the state reached. */
+/* The last stage becomes the state reached.  PW_OK, or PW_METHOD if a signal failed. */
 static int radau_accept (pw_run *r, double h, double t1) {
-  radau *d = r->data;
+  pw_method_data *d = r->data;
   size_t n = (size_t)d->dae.n * sizeof (double), entries = (size_t)r->s->entries;
   radau_step done = d->now;
   pw_radau_stage (d, STAGES - 1);
@@ -173,7 +162,7 @@ static int radau_accept (pw_run *r, double h, double t1) {
 
 /* The size of the next step, from the errors of this and the previous one; constants as in RADAU5.  rejected: 1 if this
  * one was rejected at least once. */
-static double radau_next_h (const radau *d, double h, double error, int rejected) {
+static double radau_next_h (const pw_method_data *d, double h, double error, int rejected) {
   double safety = 0.9 * fmin (1, (1. + 2 * PW_RADAU_MOST) / (d->iterations + 2 * PW_RADAU_MOST));
   double quotient = fmin (5, fmax (1. / 8, pow (error, 0.25) / safety));
   if (error < 1 && d->previous_h > 0) {
@@ -185,8 +174,8 @@ static double radau_next_h (const radau *d, double h, double error, int rejected
   return d->contraction <= RADAU_REUSE_CONTRACTION && next >= h && next <= RADAU_REUSE_GROWTH * h ? h : next;
 }
 
-/* A step of size h; *error: in units of the tolerances, INFINITY if its equations could not be solved or steps are
- * fixed.  filter_twice: as in pw_radau_estimate. */
+/* Computes a step of size h, and its error in units of the tolerances: INFINITY if its equations could not be solved,
+ * or steps are fixed.  filter_twice: as in pw_radau_estimate. */
 static int radau_try (pw_run *r, double h, double t1, int filter_twice, double *error) {
   *error = INFINITY;
   r->near_singular = 0;
@@ -198,7 +187,7 @@ static int radau_try (pw_run *r, double h, double t1, int filter_twice, double *
 }
 
 static int radau_advance_fixed (pw_run *r, double t_end, pw_error *error) {
-  radau *d = r->data;
+  pw_method_data *d = r->data;
   int whole;
   double err, t1 = pw_step_end (r, &d->counter, t_end, &whole), h = whole ? r->settings.step : t1 - r->t;
   int status = radau_try (r, h, t1, 0, &err);
@@ -210,7 +199,7 @@ static int radau_advance_fixed (pw_run *r, double t_end, pw_error *error) {
 
 /* A step that was shortened to end at t_end or a breakpoint does not reduce the next one. */
 static int radau_accept_adaptive (pw_run *r, double h, double t1, double error, int rejected, int shortened) {
-  radau *d = r->data;
+  pw_method_data *d = r->data;
   double next = radau_next_h (d, h, error, rejected);
   int status = radau_accept (r, h, t1);
   if (status != PW_OK) return status;
@@ -223,7 +212,7 @@ static int radau_accept_adaptive (pw_run *r, double h, double t1, double error, 
 /* In index3 the state reached violates g = 0 and J v = eta within the tolerances.  A step of size h corrects positions
  * by velocities of that size over h: no step, however small, has a smaller error, unless the state is projected. */
 static void radau_project_start (pw_run *r) {
-  radau *d = r->data;
+  pw_method_data *d = r->data;
   double *q = d->now.y, *v = q + d->dae.n;
   if (d->dae.enforces_velocities || pw_project_positions (&d->projector, r, r->t, q, v) != PW_OK) return;
   (void)pw_project_velocities (&d->projector, r, v);
@@ -231,11 +220,11 @@ static void radau_project_start (pw_run *r) {
 }
 
 static int radau_advance (pw_run *r, double t_end, pw_error *error) {
-  radau *d = r->data;
+  pw_method_data *d = r->data;
   if (pw_fixed_steps (r)) return radau_advance_fixed (r, t_end, error);
   double stop = fmin (t_end, r->breakpoint), err;
   for (int rejected = 0, status = PW_OK;; rejected++) {
-    int shortened = r->t + d->h > stop - 0.01 * d->h;
+    int shortened = r->t + d->h > stop - 0.01 * d->h; /* no tiny step remains */
     double h = shortened ? stop - r->t : d->h, t1 = shortened ? stop : r->t + h;
     if (!shortened && !(h > pw_least_step (r))) return pw_implicit_fail (r, status, h, error);
     if (rejected > 0 && (status = pw_run_check_limits (r, error)) != PW_OK) return status;
@@ -256,7 +245,7 @@ static int radau_advance (pw_run *r, double t_end, pw_error *error) {
 
 /* The quintic through positions, velocities and accelerations at both ends of the last step, at x in [0, 1]. */
 static void radau_quintic (const pw_run *r, double x, double *q, double *v) {
-  const radau *d = r->data;
+  const pw_method_data *d = r->data;
   double h = d->last.h;
   for (int j = 0; j < d->dae.n; j++) {
     double q0 = d->last.y[j], v0 = h * d->last.y[d->dae.n + j], a0 = 0.5 * h * h * d->last.a[j];
@@ -270,7 +259,7 @@ static void radau_quintic (const pw_run *r, double x, double *q, double *v) {
 /* The quintic is more accurate than the polynomial through the stages, unless the step does not resolve the motion:
  * then they differ by more than the tolerances, or in fixed steps by more than a tenth of the changes in the step. */
 static int radau_quintic_agrees (const pw_run *r, const double *q, const double *v) {
-  const radau *d = r->data;
+  const pw_method_data *d = r->data;
   double sum = 0;
   for (int i = 0; i < 2 * d->dae.n; i++) {
     double difference = i < d->dae.n ? q[i] - r->q_at[i] : v[i - d->dae.n] - r->v_at[i - d->dae.n];
@@ -286,7 +275,7 @@ static int radau_quintic_agrees (const pw_run *r, const double *q, const double 
 
 /* The sample inside the last step at x in [0, 1]. */
 static void radau_fill_sample (pw_run *r, double x) {
-  radau *d = r->data;
+  pw_method_data *d = r->data;
   const radau_step *p = &d->last;
   int n = d->dae.n;
   double weight[STAGES], *y = d->Y, *q = d->F[0], *v = d->F[1];
@@ -306,7 +295,7 @@ static void radau_fill_sample (pw_run *r, double x) {
 /* Projects the sample onto the constraints that the steps satisfy, and computes accelerations and multipliers from
  * it. */
 static int radau_interpolate (void *method, pw_run *r, double t) {
-  radau *d = method;
+  pw_method_data *d = method;
   int status;
   radau_fill_sample (r, (t - d->last.t) / d->last.h);
   if (d->dae.mu_count > 0 || !d->dae.enforces_velocities)
@@ -320,7 +309,7 @@ static int radau_interpolate (void *method, pw_run *r, double t) {
 }
 
 static int radau_at (pw_run *r, double t, pw_error *error) {
-  radau *d = r->data;
+  pw_method_data *d = r->data;
   return pw_sample_last_step (r, d->last.t, t, radau_interpolate, d, error);
 }
 

@@ -20,11 +20,9 @@ static const double radau_inverse_T[STAGES][STAGES] = {
 };
 static const double radau_alpha = 2.68108287362775213390, radau_beta = 3.05043019924741056943;
 
-/* ---- Equations ---- */
-
 /* F (t, y) = B y', B = diag (1, M, 0): minus the residual of dae.h without B y'.  Leaves kinematics and J at (t, y). */
 static int radau_evaluate (pw_run *r, double t, const double *y, double *F) {
-  radau *d = r->data;
+  pw_method_data *d = r->data;
   int n = d->dae.n, status = pw_evaluate_J_at (r->w, pw_before_breakpoint (r, t), y, y + n);
   if (status != PW_OK) return status;
   r->statistics.rhs++;
@@ -36,7 +34,7 @@ static int radau_evaluate (pw_run *r, double t, const double *y, double *F) {
 /* ---- Matrices ---- */
 
 int pw_radau_open_matrices (pw_run *r) {
-  radau *d = r->data;
+  pw_method_data *d = r->data;
   pw_tangent *x = &d->dae.tangent;
   const double *y = d->now.y;
   if (pw_dae_lay_out (&d->dae, y + d->dae.n, NULL, y + 2 * d->dae.n) != PW_OK) return PW_RESOURCE;
@@ -53,7 +51,7 @@ int pw_radau_open_matrices (pw_run *r) {
 
 /* Evaluates F_y at the state reached. */
 static int radau_linearise (pw_run *r) {
-  radau *d = r->data;
+  pw_method_data *d = r->data;
   const double *y = d->now.y;
   int status = pw_evaluate_J_at (r->w, r->t, y, y + d->dae.n);
   if (status != PW_OK) return status;
@@ -69,7 +67,7 @@ static int radau_linearise (pw_run *r) {
 }
 
 /* Fills `value` with the real (parts: 1) or complex (parts: 2) matrix (re + i im) B - F_y, scaled. */
-static void radau_fill_matrix (radau *d, int parts, double re, double im) {
+static void radau_fill_matrix (pw_method_data *d, int parts, double re, double im) {
   const int64_t *colptr = d->dae.tangent.colptr, *rowind = d->dae.tangent.rowind;
   for (int c = 0; c < d->dae.size; c++)
     for (int64_t i = colptr[c]; i < colptr[c + 1]; i++) {
@@ -81,7 +79,7 @@ static void radau_fill_matrix (radau *d, int parts, double re, double im) {
 }
 
 static int radau_factor (pw_run *r, double h) {
-  radau *d = r->data;
+  pw_method_data *d = r->data;
   if (d->factored_h == h) return PW_OK;
   d->factored_h = 0;
   if (d->choose_pivots) pw_sparse_forget_pivots (&d->real), pw_sparse_forget_pivots (&d->complex);
@@ -97,7 +95,7 @@ static int radau_factor (pw_run *r, double h) {
 }
 
 /* x = (gamma/h B - F_y)^-1 x.  PW_OK or PW_RESOURCE. */
-static int radau_solve_real (radau *d, double *x) {
+static int radau_solve_real (pw_method_data *d, double *x) {
   for (int i = 0; i < d->dae.size; i++) x[i] *= d->row_factor[i];
   int status = pw_sparse_solve (&d->real, x);
   for (int i = 0; i < d->dae.size; i++) x[i] *= d->column_factor[i];
@@ -105,7 +103,7 @@ static int radau_solve_real (radau *d, double *x) {
 }
 
 /* The same with the complex matrix and re + i im for x. */
-static int radau_solve_complex (radau *d, double *re, double *im) {
+static int radau_solve_complex (pw_method_data *d, double *re, double *im) {
   double *x = d->complex_x;
   for (int i = 0; i < d->dae.size; i++) x[2 * i] = d->row_factor[i] * re[i], x[2 * i + 1] = d->row_factor[i] * im[i];
   int status = pw_sparse_solve (&d->complex, x);
@@ -116,15 +114,14 @@ static int radau_solve_complex (radau *d, double *re, double *im) {
 
 /* ---- Tolerances ---- */
 
-/* makes the error of order 5 about proportional to rtol (radau.c) */
 double pw_radau_rtol (const pw_run *r) {
   return 0.05 * cbrt (r->settings.rtol * r->settings.rtol);
 }
 
 /* Sets, for a step of size h, the tolerances of the error test and of Newton's corrections, and the round-off of the
- * states; in index3 that of velocities is that of positions over h.  (radau has ggl, index2 and index3 only.) */
+ * states; in index3, which alone does not enforce velocities, that of velocities is that of positions over h. */
 static void radau_set_tolerances (pw_run *r, double h) {
-  radau *d = r->data;
+  pw_method_data *d = r->data;
   const pw_settings *settings = &r->settings;
   int n = d->dae.n, index3 = !d->dae.enforces_velocities && d->dae.tangent.holonomic > 0;
   double rtol = pw_radau_rtol (r), newton = fmax (10 * DBL_EPSILON / rtol, fmin (0.03, sqrt (rtol))); /* RADAU5's */
@@ -150,7 +147,8 @@ void pw_radau_basis (double x, double *weight) {
 }
 
 /* to[k] = sum_j matrix[k][j] from[j], for each unknown; `to` may be `from`. */
-static void radau_combine (radau *d, const double matrix[STAGES][STAGES], double *const *from, double *const *to) {
+static void radau_combine (pw_method_data *d, const double matrix[STAGES][STAGES], double *const *from,
+                           double *const *to) {
   for (int i = 0; i < d->dae.size; i++) {
     double a = from[0][i], b = from[1][i], c = from[2][i];
     for (int k = 0; k < STAGES; k++) to[k][i] = matrix[k][0] * a + matrix[k][1] * b + matrix[k][2] * c;
@@ -159,7 +157,7 @@ static void radau_combine (radau *d, const double matrix[STAGES][STAGES], double
 
 /* Starting values: the polynomial of the last step, or else constant accelerations and multipliers. */
 static void radau_predict (pw_run *r, double h) {
-  radau *d = r->data;
+  pw_method_data *d = r->data;
   const radau_step *last = &d->last;
   double weight[STAGES];
   for (int k = 0; k < STAGES; k++) {
@@ -176,7 +174,7 @@ static void radau_predict (pw_run *r, double h) {
   radau_combine (d, radau_inverse_T, d->now.Z, d->W);
 }
 
-void pw_radau_stage (const radau *d, int k) {
+void pw_radau_stage (const pw_method_data *d, int k) {
   for (int i = 0; i < d->dae.size; i++) d->Y[i] = d->now.y[i] + d->now.Z[k][i];
 }
 
@@ -184,9 +182,9 @@ static double radau_time (const pw_run *r, int k, double h, double t1) {
   return k == STAGES - 1 ? t1 : r->t + radau_c[k] * h;
 }
 
-/* One correction; *size, *round_offs: the largest of a state in units of its tolerance, and of its round-off. */
+/* One correction; *size, *round_offs: the largest one of a state, in units of newton_tolerance and of round_off. */
 static int radau_correct (pw_run *r, double h, double t1, double *size, double *round_offs) {
-  radau *d = r->data;
+  pw_method_data *d = r->data;
   double *const *W = d->W, *const *F = d->F;
   for (int k = 0; k < STAGES; k++) {
     pw_radau_stage (d, k);
@@ -214,11 +212,11 @@ static int radau_correct (pw_run *r, double h, double t1, double *size, double *
 }
 
 /* Tests convergence after a correction with `done` ones before it; size, before: of this correction and the previous
- * one in units of the tolerances, round_offs: in units of round-off.  PW_DIVERGED also if convergence is too slow.
- * The tests are those of Hairer & Wanner 1996, section IV.8, and one for round-off: corrections of 64 times their
- * round-off, or 1e7 times near a singular configuration, which magnifies it, that shrink slowly are accepted. */
+ * one in units of newton_tolerance; round_offs: of this one in units of round_off.  PW_DIVERGED also if convergence is
+ * too slow.  The tests are those of Hairer & Wanner 1996, section IV.8, and one for round-off: corrections that shrink
+ * slowly are accepted up to 64 times round_off, or 1e7 times near a singular configuration, which magnifies it. */
 static pw_convergence radau_test (pw_run *r, int done, double size, double before, double round_offs) {
-  radau *d = r->data;
+  pw_method_data *d = r->data;
   const int fixed = pw_fixed_steps (r), most = fixed ? 50 : PW_RADAU_MOST; /* a fixed step cannot be made shorter */
   d->reduction = 0.5;
   if (!isfinite (size)) return PW_DIVERGED;
@@ -242,7 +240,7 @@ static pw_convergence radau_test (pw_run *r, int done, double size, double befor
 }
 
 static int radau_iterate (pw_run *r, double h, double t1) {
-  radau *d = r->data;
+  pw_method_data *d = r->data;
   double size = 0, before, round_offs;
   radau_predict (r, h);
   for (int done = 0;; done++) {
@@ -256,7 +254,7 @@ static int radau_iterate (pw_run *r, double h, double t1) {
 }
 
 int pw_radau_solve (pw_run *r, double h, double t1) {
-  radau *d = r->data;
+  pw_method_data *d = r->data;
   if (!d->F_y_current && d->F_y_outdated) d->factored_h = 0;
   radau_set_tolerances (r, h);
   d->reduction = 0.5;
@@ -273,14 +271,14 @@ int pw_radau_solve (pw_run *r, double h, double t1) {
 /* ---- Errors ---- */
 
 /* The root mean square of the errors of the states in units of their tolerances. */
-static double radau_norm (const radau *d, const double *e) {
+static double radau_norm (const pw_method_data *d, const double *e) {
   double sum = 0;
   for (int i = 0; i < 2 * d->dae.n; i++) sum += e[i] * e[i] / (d->tolerance[i] * d->tolerance[i]);
   return sqrt (sum / (2 * d->dae.n));
 }
 
 int pw_radau_estimate (pw_run *r, double h, int filter_twice, double *error) {
-  radau *d = r->data;
+  pw_method_data *d = r->data;
   int n = d->dae.n;
   double *e = d->F[0], *from_stages = d->F[1];
   double *const *Z = d->now.Z;
@@ -300,7 +298,7 @@ int pw_radau_estimate (pw_run *r, double h, int filter_twice, double *error) {
 }
 
 int pw_radau_work (pw_run *r, double h, double t1, double *error) {
-  radau *d = r->data;
+  pw_method_data *d = r->data;
   /* the multipliers of the stages are not accurate enough in index3 */
   int entries = r->s->entries, recomputes = !d->dae.enforces_velocities && pw_ledger_uses_multipliers (r->s);
   double sum = 0;

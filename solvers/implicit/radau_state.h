@@ -7,9 +7,9 @@
 
 enum { PW_RADAU_MOST = 7 }; /* Newton iterations of an adaptive step, as in RADAU5 */
 
-/* A step from y at t, with the values at its stages, which define a polynomial. */
+/* A step of size h from t; h = 0: there is none. */
 typedef struct {
-  double t, h;                                     /* h = 0: there is no step */
+  double t, h;
   double *y, *Z[PW_RADAU_STAGES];                  /* unknowns: at t; their changes up to the stages */
   double *ledger, *ledger_change[PW_RADAU_STAGES]; /* entries: the same of work and losses */
   double *a;                                       /* coords: accelerations at t */
@@ -21,36 +21,37 @@ struct pw_method_data {
   double *minus_F_y;                  /* nonzero values of -F_y */
   double *value;                      /* of the real matrix; of the complex one, in pairs */
   double *row_factor, *column_factor; /* unknowns: by which rows and columns of both are multiplied */
-  int64_t *diagonal;                  /* 2 coords: index of the value to which B is added */
+  int64_t *diagonal;                  /* 2 coords: index in minus_F_y of the diagonal entry, to which B is added */
   double *B;                          /* 2 coords: diagonal of B */
   double factored_h;                  /* step size for which both are factorised; 0: none */
   int choose_pivots;                  /* 1: select pivots anew */
-  int F_y_current, F_y_outdated;      /* 1: F_y was evaluated at the state reached; it must be evaluated again */
-  double *W[PW_RADAU_STAGES], *F[PW_RADAU_STAGES];  /* unknowns: transformed stages, residuals and corrections */
-  double *Y, *complex_x;                            /* unknowns: at a stage; complex, in pairs: scratch */
-  double *rate;                                     /* entries: scratch */
-  double *unit;                                     /* 2 coords: units of the states */
-  double *tolerance, *newton_tolerance, *round_off; /* 2 coords: of the error test, of corrections; their round-off */
-  double contraction;                               /* ratio of successive corrections in the last iteration */
-  double remaining;                                 /* remaining error over the last correction */
-  int iterations;                                   /* of the last step */
-  double reduction;                                 /* of the step size if the iteration does not converge */
-  radau_step now, last;                             /* the step being made; the last one */
-  double *a_end;                                    /* coords: accelerations at the end of the last step */
-  int near_singular;                                /* 1: the state reached is near a singular configuration */
-  pw_step_counter counter;                          /* of fixed steps */
-  double h;                                         /* adaptive: size of the next step */
-  double previous_h, previous_error;                /* adaptive: size and error of the last step; 0: there is none */
+  int F_y_current;                    /* 1: F_y has been evaluated at the state reached */
+  int F_y_outdated;                   /* 1: F_y must be evaluated again */
+  double *W[PW_RADAU_STAGES], *F[PW_RADAU_STAGES]; /* unknowns: transformed stages; residuals, then corrections */
+  double *Y;                                       /* unknowns: at a stage */
+  double *complex_x;                               /* unknowns: scratch, complex numbers as pairs */
+  double *rate;                                    /* entries: scratch */
+  double *unit;                                    /* 2 coords: units of the states */
+  double *tolerance, *newton_tolerance;            /* 2 coords: of the error test; of corrections */
+  double *round_off;                               /* 2 coords: of the states */
+  double contraction;                              /* ratio of successive corrections in the last iteration */
+  double remaining;                                /* remaining error over the last correction */
+  int iterations;                                  /* of the last step */
+  double reduction;                                /* factor of the step size if the iteration does not converge */
+  radau_step now, last;                            /* the step being made; the last one */
+  double *a_end;                                   /* coords: accelerations at the end of the last step */
+  int near_singular;                               /* 1: the state reached is near a singular configuration */
+  pw_step_counter counter;                         /* of fixed steps */
+  double h;                                        /* adaptive: size of the next step */
+  double previous_h, previous_error;               /* adaptive: size and error of the last step; 0: there is none */
   pw_projector projector;
   char *memory;
 };
 
-typedef struct pw_method_data radau;
-
-/* Records the pattern of F_y, which does not depend on values, and opens both matrices.  PW_OK or PW_RESOURCE. */
+/* Determines the pattern of F_y and opens both matrices.  PW_OK or PW_RESOURCE. */
 int pw_radau_open_matrices (pw_run *r);
 
-/* The relative tolerance of the error estimate, whose order is 3. */
+/* The relative tolerance of the error estimate (radau.c). */
 double pw_radau_rtol (const pw_run *r);
 
 /* Solves for the stages of the step to t1 = t + h.  PW_RETRY if Newton's iteration does not converge, PW_INPUT if its
@@ -63,17 +64,17 @@ static inline double pw_radau_sum (double y, const double *weight, double *const
 }
 
 /* Stores the unknowns at stage k in d->Y. */
-void pw_radau_stage (const radau *d, int k);
+void pw_radau_stage (const pw_method_data *d, int k);
 
-/* Weights of the values at the nodes c_i in the value at x of the polynomial that is 0 at 0. */
+/* Weights of the values at the nodes c_i in the value at x of the polynomial through them that is 0 at 0. */
 void pw_radau_basis (double x, double *weight);
 
 /* The error of the states in units of their tolerances.  filter_twice: 1 to filter an error that is too large a second
  * time, as is needed in initial transients (Hairer & Wanner 1996, section IV.8).  PW_OK or PW_RESOURCE. */
 int pw_radau_estimate (pw_run *r, double h, int filter_twice, double *error);
 
-/* Work and losses up to the stages; if their error, in units of their tolerance, is larger than *error, it is stored
- * there.  Returns as pw_update_kinematics. */
+/* Work and losses up to the stages; *error becomes their error, in units of their tolerance, if that is larger.
+ * Returns as pw_update_kinematics. */
 int pw_radau_work (pw_run *r, double h, double t1, double *error);
 
 #endif

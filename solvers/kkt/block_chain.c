@@ -1,6 +1,6 @@
 /* Factorisation and solution along chains; see block_ldl.h.  Each elimination waits for the one before it.  A chain
- * from both of whose ends it can proceed is therefore swept in the two lanes of vector registers, from the ends to the
- * middle; in any other chain both lanes do the same, from the first pin to the last. */
+ * that can be eliminated from both ends (includes_last) is therefore swept in the two lanes of vector registers, from
+ * the ends to the middle; in any other chain both lanes do the same, from the first pin to the last. */
 #include <stddef.h>
 #include "block_parts.h"
 #include "unroll.h"
@@ -17,24 +17,26 @@ typedef struct {
   const double *J_eliminated, *J_next; /* J at this pin, and at the next one */
   double *factor;                      /* of this pin's diagonal block */
   ptrdiff_t j;                         /* first coordinate of the body */
-  ptrdiff_t unknown;                   /* of this pin in y */
+  ptrdiff_t unknown;                   /* index in y of this pin's first unknown */
 } chain_lane;
 
 typedef struct {
   chain_lane first, second;
-  ptrdiff_t J_stride, j_stride, unknown_stride; /* from body to body; of the second lane times `sign`, an argument */
+  ptrdiff_t J_stride, j_stride, unknown_stride; /* from body to body in the first lane; `sign` times those in the
+                                                 * second one */
   ptrdiff_t row_stride;                         /* from row to row of J */
 } chain_sweep;
 
 /* J of a pin in a body's columns: the unit matrix times `sign`, then the angle's column (x, y). */
 typedef struct {
   chain_lanes sign, x, y;
-} chain_arm;
+} chain_jacobian;
 
-/* The inverses of a body's mass and inertia. */
+/* A body: J at the pin that is eliminated, and at the next one; the inverses of its mass and inertia. */
 typedef struct {
+  chain_jacobian a, b;
   chain_lanes m, i;
-} chain_inverse;
+} chain_body;
 
 typedef struct {
   chain_lanes x, y;
@@ -55,7 +57,7 @@ PW_INLINE void chain_advance (chain_lane *x, const chain_sweep *s, ptrdiff_t bod
   x->j += bodies * s->j_stride, x->unknown += bodies * s->unknown_stride;
 }
 
-/* sign: 1, both lanes from the first pin; -1, the second lane from the last pin. */
+/* sign: 1, both lanes begin at the first pin; -1, the second lane begins at the last pin. */
 static chain_sweep chain_begin (const pw_block_ldl *l, const pw_chain *c, int sign) {
   chain_sweep s = {
     .J_stride = c->J_stride, .j_stride = c->j_stride, .unknown_stride = c->unknown_stride, .row_stride = c->row_stride
@@ -84,13 +86,15 @@ PW_INLINE void chain_store (double *a, double *b, ptrdiff_t i, chain_lanes value
   a[i] = value[0], b[i] = value[1];
 }
 
-PW_INLINE chain_arm chain_read (const chain_sweep *s, const double *a, const double *b) {
-  return (chain_arm){ chain_load (a, b, 0), chain_load (a, b, 2), chain_load (a, b, s->row_stride + 2) };
+PW_INLINE chain_jacobian chain_read_J (const chain_sweep *s, const double *a, const double *b) {
+  return (chain_jacobian){ chain_load (a, b, 0), chain_load (a, b, 2), chain_load (a, b, s->row_stride + 2) };
 }
 
-PW_INLINE chain_inverse chain_inverse_of (const pw_block_ldl *l, const chain_sweep *s) {
+PW_INLINE chain_body chain_read (const pw_block_ldl *l, const chain_sweep *s) {
   const double *first = l->inverse_weight + s->first.j, *second = l->inverse_weight + s->second.j;
-  return (chain_inverse){ chain_load (first, second, 0), chain_load (first, second, 2) };
+  return (chain_body){ chain_read_J (s, s->first.J_eliminated, s->second.J_eliminated),
+                       chain_read_J (s, s->first.J_next, s->second.J_next), chain_load (first, second, 0),
+                       chain_load (first, second, 2) };
 }
 
 /* y of the pins that are eliminated. */
@@ -111,10 +115,10 @@ PW_INLINE chain_vector chain_forces (const chain_sweep *s, const double *f) {
   return (chain_vector){ chain_load (first, second, 0), chain_load (first, second, 1), chain_load (first, second, 2) };
 }
 
-/* K, rows of the pin b, columns of the pin a. */
-PW_INLINE chain_square chain_coupling (chain_arm a, chain_arm b, chain_inverse w) {
-  const chain_lanes mass = w.m * a.sign * b.sign, x = w.i * b.x, y = w.i * b.y;
-  return (chain_square){ mass + x * a.x, x * a.y, y * a.x, mass + y * a.y };
+/* K of block_ldl.h: rows of the next pin, columns of the one that is eliminated. */
+PW_INLINE chain_square chain_coupling (chain_body p) {
+  const chain_lanes mass = p.m * p.a.sign * p.b.sign, x = p.i * p.b.x, y = p.i * p.b.y;
+  return (chain_square){ mass + x * p.a.x, x * p.a.y, y * p.a.x, mass + y * p.a.y };
 }
 
 /* (x, y) divided by a block with the factors d, e, f, as block_divide (block_parts.h). */
@@ -131,8 +135,8 @@ PW_INLINE chain_pair chain_divide_stored (const chain_sweep *s, chain_lanes x, c
 
 /* ---- Factorisation ---- */
 
-/* D: a diagonal block of either lane, as in pw_block_column: xx, yx, yy, then xx and yy before elimination.  Factorises
- * it as block_pivot (block_factor.c); the smallest pivot changes rarely. */
+/* Factorises the diagonal block of each lane as block_pivot (block_factor.c).  D: as in pw_block_column: xx, yx, yy,
+ * then xx and yy before elimination.  The smallest pivot rarely changes, so one test of both lanes comes first. */
 PW_INLINE void chain_pivot (chain_lanes *D, pw_block_ldl *l, const chain_sweep *s) {
   const chain_lanes a = D[0], minor = a * D[2] - D[1] * D[1], least = { l->least_pivot, l->least_pivot };
   const chain_lanes bound = least * D[3], minor_bound = least * a * D[4];
@@ -148,45 +152,38 @@ PW_INLINE void chain_pivot (chain_lanes *D, pw_block_ldl *l, const chain_sweep *
 
 /* Eliminates the pins with the diagonal blocks D, which become those of the next ones. */
 PW_INLINE void chain_eliminate (pw_block_ldl *l, chain_sweep *s, int sign, chain_lanes *D) {
-  const chain_arm a = chain_read (s, s->first.J_eliminated, s->second.J_eliminated);
-  const chain_arm b = chain_read (s, s->first.J_next, s->second.J_next);
-  const chain_inverse w = chain_inverse_of (l, s);
-  const chain_square K = chain_coupling (a, b, w);
-  const chain_lanes ax = w.i * a.x, ay = w.i * a.y, xx = w.m + ax * a.x, yy = w.m + ay * a.y;
-  D[0] += xx, D[1] += ax * a.y, D[2] += yy, D[3] += xx, D[4] += yy;
+  const chain_body p = chain_read (l, s);
+  const chain_square K = chain_coupling (p);
+  const chain_lanes ax = p.i * p.a.x, ay = p.i * p.a.y, xx = p.m + ax * p.a.x, yy = p.m + ay * p.a.y;
+  D[0] += xx, D[1] += ax * p.a.y, D[2] += yy, D[3] += xx, D[4] += yy;
   chain_pivot (D, l, s);
   for (int n = 0; n < 3; n++) chain_store (s->first.factor, s->second.factor, n, D[n]);
   /* The rows of L = K D^-1. */
   const chain_pair x = chain_divide (D[0], D[1], D[2], K.xx, K.xy), y = chain_divide (D[0], D[1], D[2], K.yx, K.yy);
-  const chain_lanes bx = w.i * b.x, by = w.i * b.y;
-  D[3] = w.m + bx * b.x, D[4] = w.m + by * b.y;
+  const chain_lanes bx = p.i * p.b.x, by = p.i * p.b.y;
+  D[3] = p.m + bx * p.b.x, D[4] = p.m + by * p.b.y;
   D[0] = D[3] - (x.x * K.xx + x.y * K.xy);
-  D[1] = bx * b.y - (y.x * K.xx + y.y * K.xy);
+  D[1] = bx * p.b.y - (y.x * K.xx + y.y * K.xy);
   D[2] = D[4] - (y.x * K.yx + y.y * K.yy);
   chain_move (s, 1, sign);
 }
 
-/* Eliminates `pairs` of pins from both ends at once, then `singles` from the first pin on: along the chain to the next
- * column; or, if it includes_last, to the pin in the middle, which of an odd number of bodies is that after the body in
- * the middle. */
+/* Without includes_last, eliminates all pins but the last, one by one.  With includes_last, eliminates pairs of pins
+ * from both ends, then the pin before the middle body if the number of bodies is odd, and finally the remaining middle
+ * pin. */
 void pw_chain_factor (pw_block_ldl *l, const pw_chain *c) {
   const int pairs = c->includes_last ? c->bodies / 2 : 0, singles = c->bodies - 2 * pairs;
   const double *first = l->value + l->column[c->first_column].first_value;
   double *last = l->value + l->column[c->first_column + c->bodies].first_value;
   chain_sweep s = chain_begin (l, c, c->includes_last ? -1 : 1);
   chain_lanes D[CHAIN_BLOCK];
-  double other[CHAIN_BLOCK]; /* of the pin in the middle, from the second lane */
+  double other[CHAIN_BLOCK]; /* the second lane's contribution to the middle pin */
   for (int n = 0; n < CHAIN_BLOCK; n++) D[n] = (chain_lanes){ first[n], c->includes_last ? last[n] : first[n] };
-  for (int n = pairs; n > 0; n--) {
-    chain_eliminate (l, &s, -1, D);
-    if (!(l->least_pivot > 0)) return;
-  }
+  for (int n = pairs; n > 0 && l->least_pivot > 0; n--) chain_eliminate (l, &s, -1, D);
   for (int n = 0; n < CHAIN_BLOCK && c->includes_last; n++) other[n] = D[n][1], D[n][1] = D[n][0];
   if (c->includes_last) s.second = s.first;
-  for (int n = singles; n > 0; n--) {
-    chain_eliminate (l, &s, 1, D);
-    if (!(l->least_pivot > 0)) return;
-  }
+  for (int n = singles; n > 0 && l->least_pivot > 0; n--) chain_eliminate (l, &s, 1, D);
+  if (!(l->least_pivot > 0)) return;
   if (!c->includes_last) {
     for (int n = 0; n < CHAIN_BLOCK; n++) last[n] += D[n][0];
     return;
@@ -198,27 +195,26 @@ void pw_chain_factor (pw_block_ldl *l, const pw_chain *c) {
 
 /* ---- Solution ---- */
 
-/* y_(c+1) -= J W^-1 f, then K D^-1 y_c; at: y of the pins that are eliminated.  Returns that of the next ones. */
+/* Subtracts J W^-1 f from y of both pins of the body, then K D^-1 y_c from y_(c+1).  at: y of the pins that are
+ * eliminated.  Returns y of the next ones. */
 PW_INLINE chain_pair chain_forward (const pw_block_ldl *l, chain_sweep *s, int sign, const double *f, double *y,
                                     chain_pair at) {
-  const chain_arm a = chain_read (s, s->first.J_eliminated, s->second.J_eliminated);
-  const chain_arm b = chain_read (s, s->first.J_next, s->second.J_next);
-  const chain_inverse w = chain_inverse_of (l, s);
-  const chain_lanes mass = w.m * a.sign * b.sign;
+  const chain_body p = chain_read (l, s);
+  const chain_lanes mass = p.m * p.a.sign * p.b.sign;
   const double *first = y + s->first.unknown + s->unknown_stride,
                *second = y + s->second.unknown + sign * s->unknown_stride;
   chain_pair next = { chain_load (first, second, 0), chain_load (first, second, 1) };
   if (f) {
     const chain_vector force = chain_forces (s, f);
-    const chain_lanes ax = w.m * force.x, ay = w.m * force.y, angular = w.i * force.angle;
-    at.x -= a.sign * ax + a.x * angular, at.y -= a.sign * ay + a.y * angular;
-    next.x -= b.sign * ax + b.x * angular, next.y -= b.sign * ay + b.y * angular;
+    const chain_lanes ax = p.m * force.x, ay = p.m * force.y, angular = p.i * force.angle;
+    at.x -= p.a.sign * ax + p.a.x * angular, at.y -= p.a.sign * ay + p.a.y * angular;
+    next.x -= p.b.sign * ax + p.b.x * angular, next.y -= p.b.sign * ay + p.b.y * angular;
   }
   chain_store_unknowns (s, y, at);
   const chain_pair z = chain_divide_stored (s, at.x, at.y);
-  const chain_lanes turn = w.i * (a.x * z.x + a.y * z.y);
-  next.x -= mass * z.x + turn * b.x;
-  next.y -= mass * z.y + turn * b.y;
+  const chain_lanes turn = p.i * (p.a.x * z.x + p.a.y * z.y);
+  next.x -= mass * z.x + turn * p.b.x;
+  next.y -= mass * z.y + turn * p.b.y;
   chain_move (s, 1, sign);
   return next;
 }
@@ -227,7 +223,7 @@ void pw_chain_forward (const pw_block_ldl *l, const pw_chain *c, const double *f
   const int pairs = c->includes_last ? c->bodies / 2 : 0, singles = c->bodies - 2 * pairs;
   chain_sweep s = chain_begin (l, c, c->includes_last ? -1 : 1);
   chain_pair at = chain_unknowns (&s, y);
-  double change_x = 0, change_y = 0; /* of the pin in the middle, by the second lane */
+  double change_x = 0, change_y = 0; /* by the second lane to the middle pin */
   if (c->includes_last) {
     for (int n = pairs; n > 0; n--) at = chain_forward (l, &s, -1, f, y, at);
     change_x = at.x[1] - y[s.second.unknown], change_y = at.y[1] - y[s.second.unknown + 1];
@@ -239,39 +235,37 @@ void pw_chain_forward (const pw_block_ldl *l, const pw_chain *c, const double *f
   y[s.first.unknown + 1] = at.y[0] + change_y;
 }
 
-/* lambda of the pins before, from `next` of the next ones, and the accelerations of the bodies between them. */
+/* Goes back to the pins before; returns their lambda, from that of the next ones, `next`, and stores it in y; also
+ * stores the accelerations of the bodies between them. */
 PW_INLINE chain_pair chain_backward (const pw_block_ldl *l, chain_sweep *s, int sign, const double *f, double *y,
                                      double *acceleration, chain_pair next) {
   chain_move (s, -1, sign);
-  const chain_arm a = chain_read (s, s->first.J_eliminated, s->second.J_eliminated);
-  const chain_arm b = chain_read (s, s->first.J_next, s->second.J_next);
-  const chain_inverse w = chain_inverse_of (l, s);
-  const chain_square K = chain_coupling (a, b, w);
+  const chain_body p = chain_read (l, s);
+  const chain_square K = chain_coupling (p);
   const chain_pair own = chain_unknowns (s, y);
   const chain_pair z =
       chain_divide_stored (s, own.x + (K.xx * next.x + K.yx * next.y), own.y + (K.xy * next.x + K.yy * next.y));
   const chain_pair at = { -z.x, -z.y };
   chain_store_unknowns (s, y, at);
   /* f - J^T lambda */
-  chain_vector net = { -(b.sign * next.x + a.sign * at.x), -(b.sign * next.y + a.sign * at.y),
-                       -(b.x * next.x + b.y * next.y + (a.x * at.x + a.y * at.y)) };
+  chain_vector net = { -(p.b.sign * next.x + p.a.sign * at.x), -(p.b.sign * next.y + p.a.sign * at.y),
+                       -(p.b.x * next.x + p.b.y * next.y + (p.a.x * at.x + p.a.y * at.y)) };
   if (f) {
     const chain_vector force = chain_forces (s, f);
     net.x += force.x, net.y += force.y, net.angle += force.angle;
   }
   double *first = acceleration + s->first.j, *second = acceleration + s->second.j;
-  chain_store (first, second, 0, w.m * net.x);
-  chain_store (first, second, 1, w.m * net.y);
-  chain_store (first, second, 2, w.i * net.angle);
+  chain_store (first, second, 0, p.m * net.x);
+  chain_store (first, second, 1, p.m * net.y);
+  chain_store (first, second, 2, p.i * net.angle);
   return at;
 }
 
 void pw_chain_backward (const pw_block_ldl *l, const pw_chain *c, const double *f, double *y, double *a) {
   const int pairs = c->includes_last ? c->bodies / 2 : 0, singles = c->bodies - 2 * pairs;
-  chain_sweep ends = chain_begin (l, c, c->includes_last ? -1 : 1),
-              middle; /* where the sweeps of pw_chain_forward ended */
+  chain_sweep ends = chain_begin (l, c, c->includes_last ? -1 : 1);
   chain_move (&ends, pairs, -1);
-  middle = ends;
+  chain_sweep middle = ends; /* where pw_chain_forward ended */
   middle.second = middle.first;
   chain_move (&middle, singles, 1);
   chain_pair at = chain_unknowns (&middle, y);

@@ -3,14 +3,15 @@
  *   for each body:      K_ba += J_b W^-1 J_a^T  for its contributions a and those after a, b
  *   for each column j:  D = K_jj,  L_pj = K_pj D^-1,  K_pq -= L_pj K_qj^T  for all p >= q below j
  *
- * The elimination is right-looking, with all positions known in advance.  D is stored as its factors. */
+ * The elimination is right-looking, with all positions known in advance.  The rows p are in descending order, so that
+ * the K_qj that they need have not been replaced by L_qj yet.  D is stored as its factors. */
 #include <string.h>
 #include "block_parts.h"
 #include "unroll.h"
 
 /* ---- Assembly ---- */
 
-/* K += B R^T, kb x ka: B is J_b, its rows row_stride apart, and R is J_a W^-1. */
+/* K += B R^T, kb x ka, with B = J_b, whose rows are row_stride apart, and R = J_a W^-1. */
 PW_INLINE void block_couple (int kb, int ka, int width, double *K, const block_row *R, const double *B,
                              int row_stride) {
   K[0] += block_product (width, R[0], B);
@@ -19,8 +20,8 @@ PW_INLINE void block_couple (int kb, int ka, int width, double *K, const block_r
   if (ka == 2 && kb == 2) K[3] += block_product (width, R[1], B + row_stride);
 }
 
-/* Adds the products of a contribution of ka rows with itself and with those after it; coupling: positions of the
- * latter. */
+/* Adds the products of a contribution of ka rows with itself and with those after it; coupling: indices in `value` of
+ * the latter. */
 PW_INLINE void block_contribute (int ka, int width, const pw_block_ldl *l, const pw_body_block *p,
                                  const pw_contribution *a, const int *coupling) {
   const double *A = a->J, *w = l->inverse_weight + p->j;
@@ -35,8 +36,8 @@ PW_INLINE void block_contribute (int ka, int width, const pw_block_ldl *l, const
     BLOCK_SIZE (b->size, block_couple, ka, width, l->value + *coupling++, R, b->J, b->row_stride);
 }
 
-/* Adds an uncondensed body: its mass, its columns of J, and to the original diagonal entries of the equations
- * eliminated after it what they would have if it were condensed. */
+/* Adds an uncondensed body: -W_k, and its columns of J.  The original diagonal entries of the equations eliminated
+ * after the body grow as if it were condensed. */
 static void block_uncondensed (const pw_block_ldl *l, const pw_body_block *p) {
   const pw_contribution *own = l->contribution + p[1].first_contribution - 2;
   const double *w = l->inverse_weight + p->j;
@@ -108,8 +109,8 @@ static inline void block_subtract (int kq, double *T, block_square L, const doub
   if (ki == 2 && kq == 2) T[3] -= block_dot (kj, L.yx, L.yy, A + kj);
 }
 
-/* Eliminates row p of a column: subtracts its products from the blocks K_pq, then replaces K_pj by L_pj.  A: its block;
- * B: the column's first block; target: positions of K_pq. */
+/* Eliminates row p of a column j: subtracts L_pj K_qj^T from the blocks K_pq, then replaces K_pj by L_pj.  A: K_pj; B:
+ * the column's first block; target: indices in `value` of K_pq. */
 PW_INLINE void block_eliminate_row (int ki, const pw_block_ldl *l, const pw_block_column *c, int p, double *A,
                                     const double *B, const double *D, const int *target, int kj) {
   const pw_block_column *column = l->column;

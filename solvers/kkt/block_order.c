@@ -6,8 +6,6 @@
 #include "block_ldl.h"
 #include "util.h"
 
-/* ---- Pattern ---- */
-
 /* An order of elimination, and the rows below the diagonal of each column c, ascending: below[first[c]] to
  * below[first[c + 1] - 1]. */
 typedef struct {
@@ -44,13 +42,7 @@ static int order_open (order_search *x) {
   return x->memory ? PW_OK : PW_RESOURCE;
 }
 
-static void order_close (order_search *x) {
-  free (x->minimum_degree.below);
-  free (x->natural.below);
-  free (x->memory);
-}
-
-/* Lists the neighbours of each node, of nodes of at most this rank only. */
+/* Lists the neighbours of each node in the graph of the nodes of at most this rank. */
 static void order_list_neighbours (order_search *x, int rank) {
   memset (x->first, 0, ((size_t)x->nodes + 2) * sizeof *x->first);
   for (int pass = 0; pass < 2; pass++) { /* counts node c in first[c + 2], then fills through first[c + 1] */
@@ -68,7 +60,8 @@ static void order_list_neighbours (order_search *x, int rank) {
 
 /* Passes through the rows of L.  Row i has entries in the columns on the paths to i in the elimination tree that begin
  * at the columns in which row i of the matrix has entries (Davis 2005, Algorithm 849: LDL).  The first pass counts them
- * in first[column + 2], the second one lists them.  PW_RETRY if there are more than `most`. */
+ * in first[column + 2]; the second one, where v->below is allocated, lists them.  PW_RETRY if there are more than
+ * `most`. */
 static int order_pass (const order_search *x, int most, const order_variant *v) {
   long count = 0;
   for (int i = 0; i < x->nodes; i++) x->visited[i] = x->parent[i] = -1;
@@ -89,8 +82,8 @@ static int order_pass (const order_search *x, int most, const order_variant *v) 
   return count <= most ? PW_OK : PW_RETRY;
 }
 
-/* Moves nodes of higher rank to the end, otherwise in the same order, and lists the rows of each column, fill-in
- * included.  PW_RETRY if there are more than `most`. */
+/* Sorts the nodes of an order by rank and lists the rows of each column, fill-in included.  PW_OK, PW_RESOURCE, or
+ * PW_RETRY if there are more than `most`. */
 static int order_fill (const order_search *x, int most, order_variant *v) {
   int at = 0;
   for (int rank = 0; rank < PW_BLOCK_RANKS; rank++)
@@ -117,14 +110,16 @@ static const order_variant *order_choose (order_search *x) {
 
 /* ---- Layout ---- */
 
-int pw_block_find (const pw_block_ldl *l, int p, int q) {
-  const pw_block_column *c = &l->column[q];
+int pw_block_find (const pw_block_ldl *l, int a, int b) {
+  const int row = l->column_of_node[a], column = l->column_of_node[b];
+  if (row < column) return pw_block_find (l, b, a);
+  const pw_block_column *c = &l->column[column];
   int at = c->first_value + pw_block_diagonal (c->size);
-  for (int i = c->first_below; l->below[i] != p; i++) at += c->size * l->column[l->below[i]].size;
+  for (int i = c->first_below; l->below[i] != row; i++) at += c->size * l->column[l->below[i]].size;
   return at;
 }
 
-/* Assigns the positions of the blocks in the values.  Returns PW_RESOURCE if there are too many values. */
+/* Assigns each column its first value.  PW_OK, or PW_RESOURCE if there are too many values. */
 static int order_place_columns (pw_block_ldl *l) {
   size_t at = 0;
   for (int j = 0; j < l->nodes; j++) {
@@ -139,18 +134,8 @@ static int order_place_columns (pw_block_ldl *l) {
   return PW_OK;
 }
 
-/* The pairs of rows below the diagonal in all columns. */
-static size_t order_count_targets (int nodes, const order_variant *v) {
-  size_t count = 0;
-  for (int j = 0; j < nodes; j++) {
-    size_t n = (size_t)(v->first[j + 1] - v->first[j]);
-    if (n > 1) count += n * (n - 1) / 2;
-  }
-  return count;
-}
-
-/* For each column: for its q-th row below, walks once down the column of that row, where the targets of the rows p > q
- * are found in ascending order. */
+/* For each column, for its q-th row below: walks once down the column of that row, where the targets of the rows p > q
+ * are in ascending order. */
 static void order_place_targets (pw_block_ldl *l) {
   int *target = l->target;
   for (const pw_block_column *c = l->column; c < l->column + l->nodes; c++) {
@@ -170,8 +155,13 @@ static void order_place_targets (pw_block_ldl *l) {
   }
 }
 
+/* Stores the chosen order. */
 static int order_store (pw_block_ldl *l, const pw_plan_node *node, const order_variant *v) {
-  size_t n = (size_t)l->nodes, below = (size_t)v->first[l->nodes], targets = order_count_targets (l->nodes, v);
+  size_t n = (size_t)l->nodes, below = (size_t)v->first[l->nodes], targets = 0;
+  for (int j = 0; j < l->nodes; j++) {
+    size_t rows = (size_t)(v->first[j + 1] - v->first[j]);
+    targets += rows * (rows - 1) / 2; /* one for each pair of rows of the column */
+  }
   for (pw_layout lay = { 0 }; pw_layout_pass (&lay, &l->pattern);) {
     l->column = pw_layout_alloc (&lay, n + 1, sizeof *l->column);
     l->below = pw_layout_alloc (&lay, below, sizeof *l->below);
@@ -182,9 +172,9 @@ static int order_store (pw_block_ldl *l, const pw_plan_node *node, const order_v
   memcpy (l->below, v->below, below * sizeof *l->below);
   memcpy (l->column_of_node, v->column, n * sizeof *l->column_of_node);
   for (int j = 0; j < l->nodes; j++) {
-    const pw_plan_node *own = &node[v->node[j]];
+    const pw_plan_node *x = &node[v->node[j]];
     l->column[j] =
-        (pw_block_column){ .unknown = own->unknown, .first_below = v->first[j], .size = (unsigned char)own->size };
+        (pw_block_column){ .unknown = x->unknown, .first_below = v->first[j], .size = (unsigned char)x->size };
   }
   l->column[l->nodes] = (pw_block_column){ .first_below = v->first[l->nodes] };
   return PW_OK;
@@ -203,7 +193,9 @@ pw_block_ldl *pw_block_open (int nodes, const pw_plan_node *node, long pairs, co
   pw_block_ldl *l = v ? calloc (1, sizeof *l) : NULL;
   if (l) l->nodes = nodes;
   if (l && order_store (l, node, v) != PW_OK) pw_block_close (l), l = NULL;
-  order_close (&x);
+  free (x.minimum_degree.below);
+  free (x.natural.below);
+  free (x.memory);
   return l;
 }
 

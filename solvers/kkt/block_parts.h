@@ -1,5 +1,5 @@
 /* Operations on blocks of up to 2 x 2 and on rows of a body's columns, for block_*.c; see block_ldl.h.  Sizes are
- * constants where these functions are inlined. */
+ * constants where these functions are inlined; kj is the size of column j, and so on. */
 #ifndef PW_BLOCK_PARTS_H
 #define PW_BLOCK_PARTS_H
 
@@ -10,12 +10,12 @@
 #define BLOCK_SIZE(size, f, ...) ((size) == 2 ? f (2, __VA_ARGS__) : f (1, __VA_ARGS__))
 #define BLOCK_WIDTH(width, f, ...) ((width) == 3 ? f (3, __VA_ARGS__) : f (1, __VA_ARGS__))
 
-/* Of a body: x, y and angle; of an internal coordinate: x alone. */
+/* Three numbers of a body; of an internal coordinate x alone. */
 typedef struct {
   double x, y, angle;
 } block_row;
 
-/* A row of J W^-1 of 3 columns, or 1; w: diagonal of W^-1. */
+/* A row of J W^-1 of `width` columns; w: diagonal of W^-1. */
 static inline block_row block_weigh (int width, const double *J, const double *w) {
   return width == 3 ? (block_row){ J[0] * w[0], J[1] * w[1], J[2] * w[2] } : (block_row){ .x = J[0] * w[0] };
 }
@@ -24,8 +24,8 @@ static inline double block_product (int width, block_row a, const double *b) {
   return width == 3 ? a.x * b[0] + a.y * b[1] + a.angle * b[2] : a.x * b[0];
 }
 
-/* Updates the smallest pivot relative to its original diagonal entry, dividing only if it is smaller; NaN and 0 / 0
- * count as smaller.  The entry is negative only for uncondensed bodies, which do not count. */
+/* Updates l->least_pivot, dividing the pivot by its original diagonal entry only if that makes it smaller; NaN counts
+ * as smaller.  The entry is negative only for uncondensed bodies, which do not count. */
 static inline void block_track_pivot (pw_block_ldl *l, double pivot, double original, int unknown) {
   if (pivot > l->least_pivot * original || original < 0) return;
   l->least_pivot = pivot / original;
@@ -43,7 +43,7 @@ static inline block_pair block_divide (int k, const double *D, double x, double 
   return (block_pair){ x * D[0] - D[1] * z, z };
 }
 
-/* A row of kj entries times (x, y). */
+/* (x, y) times a row A of kj entries. */
 static inline double block_dot (int kj, double x, double y, const double *A) {
   return kj == 2 ? x * A[0] + y * A[1] : x * A[0];
 }

@@ -1,4 +1,4 @@
-/* Solution with the factors; see block_ldl.h.
+/* Solution with the factors; see block_ldl.h.  Of an uncondensed body k, y_k begins as -f_k and becomes -a_k.
  *
  *   for each body:                y_p -= J_p W^-1 f
  *   for each column j:            y_p -= L_pj y_j
@@ -7,20 +7,20 @@
 #include "block_parts.h"
 #include "unroll.h"
 
-/* ---- Bodies; sizes are constants where these are inlined ---- */
+/* ---- Bodies ---- */
 
 /* y -= J z */
-PW_INLINE void block_gather (int size, int width, double *y, const double *J, int step, block_row z) {
+PW_INLINE void block_gather (int size, int width, double *y, const double *J, int row_stride, block_row z) {
   y[0] -= block_product (width, z, J);
-  if (size == 2) y[1] -= block_product (width, z, J + step);
+  if (size == 2) y[1] -= block_product (width, z, J + row_stride);
 }
 
 /* z - J^T y */
-PW_INLINE block_row block_scatter (int size, int width, const double *y, const double *J, int step, block_row z) {
-  const double *K = J + step;
-  z.x -= size == 2 ? J[0] * y[0] + K[0] * y[1] : J[0] * y[0];
-  if (width == 3) z.y -= size == 2 ? J[1] * y[0] + K[1] * y[1] : J[1] * y[0];
-  if (width == 3) z.angle -= size == 2 ? J[2] * y[0] + K[2] * y[1] : J[2] * y[0];
+PW_INLINE block_row block_scatter (int size, int width, const double *y, const double *J, int row_stride, block_row z) {
+  const double *second = J + row_stride;
+  z.x -= size == 2 ? J[0] * y[0] + second[0] * y[1] : J[0] * y[0];
+  if (width == 3) z.y -= size == 2 ? J[1] * y[0] + second[1] * y[1] : J[1] * y[0];
+  if (width == 3) z.angle -= size == 2 ? J[2] * y[0] + second[2] * y[1] : J[2] * y[0];
   return z;
 }
 
@@ -47,7 +47,7 @@ PW_INLINE void block_accelerate (int width, const pw_block_ldl *l, const pw_body
 
 /* ---- Columns ---- */
 
-/* to -= L from, L: ki x kj */
+/* to -= L from, L: ki x kj, its rows kj apart */
 PW_INLINE void block_forward (int ki, double *to, const double *L, const double *from, int kj) {
   to[0] -= block_dot (kj, from[0], from[kj - 1], L);
   if (ki == 2) to[1] -= block_dot (kj, from[0], from[kj - 1], L + kj);

@@ -2,7 +2,6 @@
 #include <math.h>
 #include <stdlib.h>
 #include "condense.h"
-#include "util.h"
 
 /* ---- Nodes ---- */
 
@@ -13,18 +12,20 @@ static void condense_add_node (pw_plan *plan, pw_plan_node node) {
   if (!plan->failed) plan->node[plan->nodes++] = node;
 }
 
-/* Adds the columns of the last node at the group that begins with coordinate j. */
-static void condense_contribute (pw_plan *plan, const double *J, int step, int j, int is_pin) {
-  int moves = 0, prescribed = 0;
-  for (int n = 0; n < pw_group_width (plan->saddle->s, j); n++)
-    moves |= plan->saddle->inverse_weight[j + n] > 0, prescribed |= isinf (plan->weight[j + n]) != 0;
+/* Adds the contribution of the last node to the group that begins with coordinate j. */
+static void condense_contribute (pw_plan *plan, const double *J, int row_stride, int j, int is_pin) {
+  int moves = 0;
   if (plan->failed) return;
-  plan->node[plan->nodes - 1].grounded |= prescribed;
+  for (int n = 0; n < pw_group_width (plan->saddle->s, j); n++) {
+    moves |= plan->saddle->inverse_weight[j + n] > 0;
+    plan->node[plan->nodes - 1].grounded |= isinf (plan->weight[j + n]) != 0;
+  }
   if (!moves) return;
   plan->failed = pw_grow (&plan->contribution, (size_t)plan->contributions, &plan->contribution_room,
                           sizeof *plan->contribution) != PW_OK;
   if (!plan->failed)
-    plan->contribution[plan->contributions++] = (pw_plan_contribution){ J, plan->nodes - 1, step, j, is_pin };
+    plan->contribution[plan->contributions++] =
+        (pw_plan_contribution){ J, plan->nodes - 1, row_stride, pw_group_of (plan->saddle->s, j), is_pin };
 }
 
 /* Adds the node of `size` rows from row n of a batch on. */
@@ -38,8 +39,8 @@ static void condense_element (pw_plan *plan, const pw_element_batch *b, int n, i
   }
 }
 
-/* 1 for row n of a batch that becomes part of a node: active, not in a massless component, and not a function of
- * prescribed coordinates alone. */
+/* 1 for row n of a batch that becomes part of a node: active, not in a massless component, and not one of prescribed
+ * coordinates alone. */
 static int condense_takes_part (const pw_plan *plan, const pw_element_batch *b, int n, const unsigned char *active) {
   const double *J = b->J + n * b->b.cols, *inverse = plan->saddle->inverse_weight;
   int i = b->row + n, prescribed = 0;
@@ -63,7 +64,7 @@ static int condense_joins (const pw_element_batch *b, int n) {
   return 1;
 }
 
-/* Groups such rows that follow one another into nodes; others are inactive unless they are in a massless component. */
+/* Makes nodes of the rows that become part of one; others are inactive unless they are in a massless component. */
 static void condense_elements (pw_plan *plan, const unsigned char *active) {
   struct pw_saddle *saddle = plan->saddle;
   for (const pw_element_batch *b = saddle->w->batch;
@@ -100,39 +101,39 @@ static void condense_components (pw_plan *plan) {
     }
 }
 
-/* Sorts the contributions by coordinate. */
+/* Sorts the contributions by group. */
 static int condense_sort (pw_plan *plan) {
-  const int coords = plan->saddle->s->coords;
-  plan->start = calloc ((size_t)coords + 2, sizeof *plan->start);
-  plan->list = malloc (((size_t)plan->contributions + 1) * sizeof *plan->list);
+  plan->start = pw_arena_alloc (&plan->arena, ((size_t)plan->groups + 2) * sizeof *plan->start);
+  plan->list = pw_arena_alloc (&plan->arena, (size_t)plan->contributions * sizeof *plan->list);
   if (plan->failed || plan->start == NULL || plan->list == NULL) return PW_RESOURCE;
-  for (int p = 0; p < plan->contributions; p++) plan->start[plan->contribution[p].j + 2]++;
-  for (int j = 0; j < coords; j++) plan->start[j + 2] += plan->start[j + 1];
-  for (int p = 0; p < plan->contributions; p++) plan->list[plan->start[plan->contribution[p].j + 1]++] = p;
+  for (int p = 0; p < plan->contributions; p++) plan->start[plan->contribution[p].group + 2]++;
+  for (int g = 0; g < plan->groups; g++) plan->start[g + 2] += plan->start[g + 1];
+  for (int p = 0; p < plan->contributions; p++) plan->list[plan->start[plan->contribution[p].group + 1]++] = p;
   return PW_OK;
 }
 
 /* ---- Bodies that are not condensed ---- */
 
-/* A body at which more nodes than this meet is not condensed, if its weights are finite: n nodes have n (n - 1) / 2
- * couplings, but only 2 n with an uncondensed body, fewer from n = 6.  Measured: 0.6 to 0.9 of the time with 7 nodes,
- * 0.7 to 1.0 with 6. */
+/* A body to which more nodes than this contribute is not condensed, if its weights are finite and not 0: n nodes have
+ * n (n - 1) / 2 couplings, but only 2 n with an uncondensed body, fewer from n = 6.  Measured: 0.6 to 0.9 of the time
+ * with 7 nodes, 0.7 to 1.0 with 6. */
 enum { CONDENSE_NODES = 6 };
 
-static int condense_is_crowded (const pw_plan *plan, int b) {
-  const double *w = plan->saddle->inverse_weight + 3 * b;
-  return plan->start[3 * b + 1] - plan->start[3 * b] > CONDENSE_NODES && w[0] > 0 && w[1] > 0 && w[2] > 0;
+static int condense_is_crowded (const pw_plan *plan, int group) {
+  if (plan->start[group + 1] - plan->start[group] <= CONDENSE_NODES || group >= plan->saddle->s->bodies) return 0;
+  const double *w = plan->saddle->inverse_weight + 3 * group;
+  return w[0] > 0 && w[1] > 0 && w[2] > 0;
 }
 
-/* Adds two nodes for every body that is not condensed, and ranks the others. */
+/* Adds two nodes for every body that is not condensed, and ranks all nodes. */
 static int condense_uncondensed (pw_plan *plan) {
   struct pw_saddle *saddle = plan->saddle;
-  plan->uncondensed = malloc (((size_t)saddle->s->bodies + 1) * sizeof *plan->uncondensed);
+  plan->uncondensed = pw_arena_alloc (&plan->arena, (size_t)plan->groups * sizeof *plan->uncondensed);
   if (plan->uncondensed == NULL) return PW_RESOURCE;
-  for (int b = 0; b < saddle->s->bodies; b++) {
-    plan->uncondensed[b] = -1;
-    if (!condense_is_crowded (plan, b)) continue;
-    plan->uncondensed[b] = plan->nodes;
+  for (int g = 0; g < plan->groups; g++) {
+    plan->uncondensed[g] = -1;
+    if (!condense_is_crowded (plan, g)) continue;
+    plan->uncondensed[g] = plan->nodes;
     condense_add_node (plan, (pw_plan_node){ .size = 2, .rank = 1, .unknown = saddle->s->rows + saddle->extra });
     condense_add_node (plan, (pw_plan_node){ .size = 1, .rank = 1, .unknown = saddle->s->rows + saddle->extra + 2 });
     saddle->extra += 3;
@@ -144,14 +145,6 @@ static int condense_uncondensed (pw_plan *plan) {
 
 /* ---- Opening ---- */
 
-static int condense_plan (pw_plan *plan, const unsigned char *active) {
-  condense_elements (plan, active);
-  condense_components (plan);
-  int status = condense_sort (plan);
-  if (status == PW_OK) status = condense_uncondensed (plan);
-  return status == PW_OK ? pw_condense_block (plan) : status;
-}
-
 int pw_condense (struct pw_saddle *saddle, const double *weight, const unsigned char *active) {
   size_t n = (size_t)saddle->s->coords;
   pw_plan plan = { .saddle = saddle, .weight = weight, .groups = pw_groups (saddle->s) };
@@ -162,14 +155,14 @@ int pw_condense (struct pw_saddle *saddle, const double *weight, const unsigned 
   }
   if (saddle->memory == NULL) return PW_RESOURCE;
   for (size_t j = 0; j < n; j++) saddle->inverse_weight[j] = weight[j] > 0 ? 1 / weight[j] : 0;
-  int status = condense_plan (&plan, active);
+  condense_elements (&plan, active);
+  condense_components (&plan);
+  int status = condense_sort (&plan);
+  if (status == PW_OK) status = condense_uncondensed (&plan);
+  if (status == PW_OK) status = pw_condense_block (&plan);
   free (plan.node);
   free (plan.contribution);
   free (plan.pair);
-  free (plan.start);
-  free (plan.list);
-  free (plan.uncondensed);
-  free (plan.chain);
-  free (plan.is_linked);
+  pw_arena_free (&plan.arena);
   return status;
 }

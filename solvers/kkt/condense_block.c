@@ -1,16 +1,9 @@
 /* Plans the block L D L^T: the pattern of S and the body blocks; see condense.h and block_ldl.h. */
 #include <limits.h>
-#include <stdlib.h>
 #include <string.h>
 #include "condense.h"
-#include "util.h"
 
 /* ---- Pattern ---- */
-
-/* The first of the two nodes of the body that begins with coordinate j, or -1 if it is condensed. */
-static int condense_body_node (const pw_plan *plan, int j) {
-  return j < 3 * plan->saddle->s->bodies ? plan->uncondensed[j / 3] : -1;
-}
 
 static void condense_add_pair (pw_plan *plan, int a, int b) {
   plan->failed |= pw_grow (&plan->pair, (size_t)plan->pairs, &plan->pair_room, 2 * sizeof *plan->pair) != PW_OK;
@@ -19,24 +12,23 @@ static void condense_add_pair (pw_plan *plan, int a, int b) {
   plan->pairs++;
 }
 
-/* Pairs of nodes that meet in a group, or with an uncondensed body. */
+/* Lists the pairs of nodes that meet at a group, or, if that is an uncondensed body, each of them with its nodes. */
 static void condense_pairs (pw_plan *plan) {
-  for (int n = 0; n < plan->groups; n++) {
-    int j = pw_group_first (plan->saddle->s, n), body = condense_body_node (plan, j);
-    for (int x = plan->start[j]; x < plan->start[j + 1]; x++) {
+  for (int g = 0; g < plan->groups; g++) {
+    int body = plan->uncondensed[g];
+    for (int x = plan->start[g]; x < plan->start[g + 1]; x++) {
       int a = plan->contribution[plan->list[x]].node;
       if (body >= 0) condense_add_pair (plan, a, body), condense_add_pair (plan, a, body + 1);
-      for (int y = plan->start[j]; y < x && body < 0; y++)
+      for (int y = plan->start[g]; y < x && body < 0; y++)
         condense_add_pair (plan, a, plan->contribution[plan->list[y]].node);
     }
   }
 }
 
-/* The contributions of each group in the order of their columns (few: by insertion). */
+/* Sorts the contributions of each group by column; by insertion, since there are few. */
 static void condense_sort_columns (const pw_plan *plan, const int *column_of_node) {
-  for (int n = 0; n < plan->groups; n++) {
-    int j = pw_group_first (plan->saddle->s, n), *list = plan->list + plan->start[j],
-        count = plan->start[j + 1] - plan->start[j];
+  for (int g = 0; g < plan->groups; g++) {
+    int *list = plan->list + plan->start[g], count = plan->start[g + 1] - plan->start[g];
     for (int x = 1; x < count; x++)
       for (int y = x; y > 0; y--) {
         int a = list[y - 1], b = list[y];
@@ -48,32 +40,26 @@ static void condense_sort_columns (const pw_plan *plan, const int *column_of_nod
 
 /* ---- Body blocks ---- */
 
-/* Position of the block of two nodes. */
-static int condense_coupling (const pw_block_ldl *l, int a, int b) {
-  int p = l->column_of_node[a], q = l->column_of_node[b];
-  return p > q ? pw_block_find (l, p, q) : pw_block_find (l, q, p);
-}
-
-/* Fills the block of a group; *contributions and *couplings count. */
-static void condense_body (const pw_plan *plan, pw_block_ldl *l, int j, pw_body_block *p, int *contributions,
+/* Fills the block p of group g; *contributions, *couplings: numbers of those filled so far. */
+static void condense_body (const pw_plan *plan, pw_block_ldl *l, int g, pw_body_block *p, int *contributions,
                            int *couplings) {
-  int body = condense_body_node (plan, j);
+  int j = pw_group_first (plan->saddle->s, g), body = plan->uncondensed[g];
   *p = (pw_body_block){ .j = j,
                         .first_contribution = *contributions,
                         .first_coupling = *couplings,
                         .width = (unsigned char)pw_group_width (plan->saddle->s, j),
                         .uncondensed = body >= 0 };
-  for (int x = plan->start[j]; x < plan->start[j + 1]; x++) {
+  for (int x = plan->start[g]; x < plan->start[g + 1]; x++) {
     const pw_plan_contribution *a = &plan->contribution[plan->list[x]];
     const pw_plan_node *n = &plan->node[a->node];
     l->contribution[(*contributions)++] =
         (pw_contribution){ a->J, n->unknown, l->column[l->column_of_node[a->node]].first_value, a->row_stride,
                            (short)n->size };
     if (body >= 0)
-      for (int i = 0; i < 2; i++) l->coupling[(*couplings)++] = condense_coupling (l, a->node, body + i);
+      for (int i = 0; i < 2; i++) l->coupling[(*couplings)++] = pw_block_find (l, a->node, body + i);
     else
-      for (int y = x + 1; y < plan->start[j + 1]; y++)
-        l->coupling[(*couplings)++] = condense_coupling (l, a->node, plan->contribution[plan->list[y]].node);
+      for (int y = x + 1; y < plan->start[g + 1]; y++)
+        l->coupling[(*couplings)++] = pw_block_find (l, a->node, plan->contribution[plan->list[y]].node);
   }
   for (int i = body; body >= 0 && i < body + 2; i++)
     l->contribution[(*contributions)++] = (pw_contribution){ .unknown = plan->node[i].unknown,
@@ -82,18 +68,17 @@ static void condense_body (const pw_plan *plan, pw_block_ldl *l, int j, pw_body_
 }
 
 /* 0 for a body of a chain, and for a group without mass, whose accelerations massless.c computes. */
-static int condense_has_block (const pw_plan *plan, int n) {
-  int j = pw_group_first (plan->saddle->s, n), width = pw_group_width (plan->saddle->s, j), has_weight = 0;
+static int condense_has_block (const pw_plan *plan, int g) {
+  int j = pw_group_first (plan->saddle->s, g), width = pw_group_width (plan->saddle->s, j), has_weight = 0;
   for (int i = 0; i < width; i++) has_weight |= plan->weight[j + i] != 0;
-  return has_weight && !plan->is_linked[n];
+  return has_weight && !plan->is_linked[g];
 }
 
 /* Allocates and fills the body blocks. */
 static int condense_fill (const pw_plan *plan, pw_block_ldl *l) {
   int contributions = 0, couplings = 0, body = 0, uncondensed = plan->saddle->extra / 3;
   l->inverse_weight = plan->saddle->inverse_weight;
-  for (int n = 0; n < plan->groups; n++) l->bodies += condense_has_block (plan, n);
-  l->chains = plan->chains;
+  for (int g = 0; g < plan->groups; g++) l->bodies += condense_has_block (plan, g);
   for (pw_layout lay = { 0 }; pw_layout_pass (&lay, &l->memory);) {
     l->body = pw_layout_alloc (&lay, (size_t)l->bodies + 1, sizeof *l->body);
     l->contribution = pw_layout_alloc (&lay, (size_t)(plan->contributions - 2 * plan->linked + 2 * uncondensed),
@@ -104,18 +89,14 @@ static int condense_fill (const pw_plan *plan, pw_block_ldl *l) {
   }
   if (l->memory == NULL) return PW_RESOURCE;
   memcpy (l->chain, plan->chain, (size_t)plan->chains * sizeof *l->chain);
-  l->chain[l->chains] = (pw_chain){ .first_column = l->nodes + 1 };
+  l->chain[plan->chains] = (pw_chain){ .first_column = l->nodes + 1 };
   for (int last = 0; last < 2; last++) /* uncondensed bodies last: they add to diagonals that the others store */
-    for (int n = 0; n < plan->groups; n++) {
-      int first = pw_group_first (plan->saddle->s, n);
-      if (condense_has_block (plan, n) && (condense_body_node (plan, first) >= 0) == last)
-        condense_body (plan, l, first, &l->body[body++], &contributions, &couplings);
-    }
+    for (int g = 0; g < plan->groups; g++)
+      if (condense_has_block (plan, g) && (plan->uncondensed[g] >= 0) == last)
+        condense_body (plan, l, g, &l->body[body++], &contributions, &couplings);
   l->body[body] = (pw_body_block){ .first_contribution = contributions, .first_coupling = couplings };
   return PW_OK;
 }
-
-/* ---- Opening ---- */
 
 int pw_condense_block (pw_plan *plan) {
   condense_pairs (plan);

@@ -1,19 +1,18 @@
 /* Finds the chains of a scene; see condense.h and block_ldl.h. */
-#include <stdlib.h>
 #include "condense.h"
 
-/* The block between a column and the next one: the number of bodies and eliminated columns that add to it, and one of
- * these bodies as a chain of one, if it can be in a chain (else link.bodies is 0). */
+/* A column, and the block between it and the next one. */
 typedef struct {
-  int sources;
-  pw_chain link;
+  int contributions; /* to the column; 2 inside a chain */
+  int sources;       /* bodies and eliminated columns that add to the block */
+  pw_chain link;     /* one of these bodies as a chain of one; link.bodies is 0 if none can be in a chain */
 } chain_between;
 
-/* Fills link for a body that links a column to the next one, which alone is below it; returns the column, or -1. */
+/* Fills link for a body whose two nodes are a column and the next one, the only row below it.  Returns the column; -1
+ * if the body cannot be in a chain. */
 static int chain_link (const pw_plan *plan, const pw_block_ldl *l, int body, pw_chain *link) {
-  int j = pw_group_first (plan->saddle->s, body);
-  const int *list = plan->list + plan->start[j];
-  if (plan->start[j + 1] - plan->start[j] != 2) return -1;
+  const int j = 3 * body, *list = plan->list + plan->start[body];
+  if (plan->start[body + 1] - plan->start[body] != 2) return -1;
   const pw_plan_contribution *a = &plan->contribution[list[0]], *b = &plan->contribution[list[1]];
   int column = l->column_of_node[a->node];
   if (!a->is_pin || !b->is_pin || plan->saddle->inverse_weight[j] != plan->saddle->inverse_weight[j + 1]) return -1;
@@ -31,20 +30,20 @@ static int chain_link (const pw_plan *plan, const pw_block_ldl *l, int body, pw_
   return column;
 }
 
-/* Appends the next body if its positions continue at the same strides. */
+/* Appends the body of link, after that of last, if it continues the chain at the same strides; returns whether it
+ * does. */
 static int chain_add (pw_chain *chain, const pw_chain *last, const pw_chain *link) {
-  int next_J = (int)(link->J_first - last->J_first), next_j = link->j - last->j;
-  if (link->J_second - last->J_second != next_J || link->unknown_stride != chain->unknown_stride) return 0;
-  if (chain->bodies > 1 && (next_J != chain->J_stride || next_j != chain->j_stride)) return 0;
-  chain->J_stride = next_J;
-  chain->j_stride = next_j;
+  int J_stride = (int)(link->J_first - last->J_first), j_stride = link->j - last->j;
+  if (link->J_second - last->J_second != J_stride || link->unknown_stride != chain->unknown_stride) return 0;
+  if (chain->bodies > 1 && (J_stride != chain->J_stride || j_stride != chain->j_stride)) return 0;
+  chain->J_stride = J_stride;
+  chain->j_stride = j_stride;
   chain->bodies++;
   return 1;
 }
 
-/* Joins links to chains.  contributions: columns: how many there are to each, 2 inside a chain. */
-static void chain_join (pw_plan *plan, pw_block_ldl *l, const chain_between *between, const int *contributions) {
-  plan->chains = plan->linked = 0;
+/* Joins links to chains. */
+static void chain_join (pw_plan *plan, pw_block_ldl *l, const chain_between *between) {
   for (int p = 0; p < l->nodes;) {
     const chain_between *b = &between[p++];
     if (b->sources != 1 || b->link.bodies == 0) continue;
@@ -52,7 +51,7 @@ static void chain_join (pw_plan *plan, pw_block_ldl *l, const chain_between *bet
     *chain = b->link;
     chain->first_factor = 3 * (plan->linked + plan->chains - 1);
     plan->is_linked[b->link.j / 3] = 1;
-    for (; p < l->nodes && between[p].sources == 1 && contributions[p] == 2; p++) {
+    for (; p < l->nodes && between[p].sources == 1 && between[p].contributions == 2; p++) {
       if (between[p].link.bodies == 0) break;
       if (!chain_add (chain, &between[p - 1].link, &between[p].link)) break;
       plan->is_linked[between[p].link.j / 3] = 1;
@@ -73,31 +72,26 @@ static void chain_fill (const pw_block_ldl *l, chain_between *between) {
 
 /* Counts a body as a source; its contributions are in the order of their columns. */
 static void chain_count (const pw_plan *plan, const pw_block_ldl *l, int body, chain_between *between) {
-  int j = pw_group_first (plan->saddle->s, body);
-  for (int x = plan->start[j] + 1; x < plan->start[j + 1]; x++) {
+  for (int x = plan->start[body] + 1; x < plan->start[body + 1]; x++) {
     int column = l->column_of_node[plan->contribution[plan->list[x - 1]].node];
     if (l->column_of_node[plan->contribution[plan->list[x]].node] == column + 1) between[column].sources++;
   }
 }
 
 int pw_condense_chains (pw_plan *plan, pw_block_ldl *l) {
-  size_t nodes = (size_t)l->nodes + 1;
-  chain_between *between = calloc (nodes, sizeof *between);
-  int *contributions = calloc (nodes, sizeof *contributions);
-  plan->chain = malloc (nodes * sizeof *plan->chain);
-  plan->is_linked = calloc ((size_t)plan->groups + 1, 1);
-  int status = between && contributions && plan->chain && plan->is_linked ? PW_OK : PW_RESOURCE;
-  for (int p = 0; p < plan->contributions && status == PW_OK; p++)
-    contributions[l->column_of_node[plan->contribution[p].node]]++;
-  for (int body = 0; body < plan->saddle->s->bodies && status == PW_OK; body++) {
+  size_t nodes = (size_t)l->nodes;
+  chain_between *between = pw_arena_alloc (&plan->arena, nodes * sizeof *between);
+  plan->chain = pw_arena_alloc (&plan->arena, nodes * sizeof *plan->chain);
+  plan->is_linked = pw_arena_alloc (&plan->arena, (size_t)plan->groups);
+  if (!between || !plan->chain || !plan->is_linked) return PW_RESOURCE;
+  for (int p = 0; p < plan->contributions; p++) between[l->column_of_node[plan->contribution[p].node]].contributions++;
+  for (int body = 0; body < plan->saddle->s->bodies; body++) {
     pw_chain link;
     int column = chain_link (plan, l, body, &link);
     if (column >= 0) between[column].link = link;
     chain_count (plan, l, body, between);
   }
-  if (status == PW_OK) chain_fill (l, between);
-  if (status == PW_OK) chain_join (plan, l, between, contributions);
-  free (between);
-  free (contributions);
-  return status;
+  chain_fill (l, between);
+  chain_join (plan, l, between);
+  return PW_OK;
 }

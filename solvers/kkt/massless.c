@@ -22,7 +22,7 @@ PW_INLINE void massless_copy (pw_component *c) {
   }
 }
 
-/* The weighted sum of the squares of a row's entries. */
+/* The weighted sum of the squares of the entries of row i. */
 static double massless_square (const pw_component *c, int i, const double *weight) {
   const double *A = c->A + i * c->stride;
   double sum = 0;
@@ -55,7 +55,7 @@ int pw_massless_is_entry (const pw_component *c, int i, int column) {
  * the remainder of a dependent row is small), and moves it to p.  Returns 0 if all entries are round-off; the component
  * is then matched again at the next factorisation. */
 static int massless_select_pivot (pw_component *c, int p) {
-  const double guard = 0.1; /* a pivot may lose one digit until the component is matched again */
+  const double guard = 0.1; /* a pivot may lose a digit before the component is matched again */
   int row = -1, column = -1;
   double best = MASSLESS_ROUND_OFF;
   for (int i = p; i < c->rows; i++)
@@ -75,8 +75,7 @@ static int massless_select_pivot (pw_component *c, int p) {
   return 1;
 }
 
-/* Subtracts row p from those after it, by pairs of columns.  squared_terms of an unmatched row grows by the square of
- * what is subtracted. */
+/* Subtracts row p from those after it, two columns at a time. */
 PW_INLINE void massless_eliminate (pw_component *c, int p, int pivots) {
   const int pivot = c->row[p].pivot, cols = c->cols;
   double *P = c->A + p * c->stride, inverse = 1 / P[pivot];
@@ -176,6 +175,7 @@ PW_INLINE void massless_backward (pw_component *c, double *a, double *lambda, in
     double x = a[c->global[*column]];
     PW_UNROLL for (int p = 0; p < pivots; p++) row[p].gamma -= c->A[p * c->stride + *column] * x;
   }
+  /* reads all before storing any: one row's index may be the `unknown` of another */
   for (int i = pivots; i < c->rows; i++) row[i].lambda = c->unknown[i] < 0 ? 0 : lambda[c->unknown[i]];
   for (int i = pivots; i < c->rows; i++) lambda[row[i].row] = row[i].lambda;
   PW_UNROLL for (int p = pivots - 1; p >= 0; p--) {

@@ -1,8 +1,8 @@
-/* Elimination of coordinates without weight (saddle.h), called massless: each is matched to a constraint row and
- * substituted out of the others.
+/* Elimination of coordinates without weight (saddle.h), called massless; the others are massive.  Each is matched to a
+ * constraint row and substituted out of the other rows.
  *
- * The rows and coordinates concerned form independent components (a massless body and its joints).  In each, Gaussian
- * elimination of the massless columns, with the matched rows p as pivot rows, leaves
+ * The rows and coordinates concerned form independent components, such as a massless body and its joints.  In each,
+ * Gaussian elimination of the massless columns, with the matched rows p as pivot rows, leaves
  *
  *     [ P H ]   [ L 0 ] [ U H' ]       P, H: matched rows in the massless and in the massive columns
  *     [ K Z ] = [ R 1 ] [ 0 Z' ]       K, Z: unmatched rows i
@@ -40,8 +40,8 @@ static inline int pw_group_columns (const pw_kind *kind, int x) {
   return x < 3 * kind->bodies ? 3 : 1;
 }
 
-/* 1 if an element's equations may change under a rigid displacement of its bodies: it touches the ground, or is
- * nonholonomic. */
+/* 1 if an element's equations may change under a rigid displacement of its bodies: it touches the ground, acts on
+ * fewer than two bodies, or is nonholonomic. */
 static inline int pw_is_grounded (const pw_system *s, const pw_element_batch *k, int e) {
   int grounded = k->kind->bodies < 2 || k->row >= s->holonomic;
   for (int b = 0; b < k->kind->bodies; b++) grounded |= k->column[e * k->kind->bodies + b] >= s->coords;
@@ -54,12 +54,12 @@ typedef struct {
   int column;   /* first local column */
 } pw_massless_group;
 
-/* A row of a component.  Entries of columns of angles are multiplied by 1 / L before they are compared with others. */
+/* A row of a component.  Entries in columns of angles are multiplied by 1 / L before they are compared with others. */
 typedef struct {
   int row;               /* global */
   int pivot;             /* matched rows: the local column of the coordinate */
   double largest;        /* largest entry when last matched */
-  double pivot_scale;    /* matched rows: factor of the pivot that makes it relative to `largest` */
+  double pivot_scale;    /* matched rows: factor that makes the pivot relative to `largest` */
   double rematch_below;  /* matched rows: the relative pivot below which the component is matched again */
   double squared_terms;  /* unmatched rows: sum of squares: entries, and what is subtracted from the massive ones */
   double gamma;          /* gamma~ */
@@ -78,10 +78,12 @@ typedef struct {
   double *squared_scale;         /* cols: 1, or for an angle 1 / L^2 */
   double *massive_squared_scale; /* cols: the same, 0 for a massless coordinate */
   pw_massless_row *row;          /* the matched ones first, in the order of elimination */
-  int *unknown; /* rows: index at which gamma~ and the multiplier of an unmatched row are; -1: its multiplier is 0 */
+  int *unknown; /* rows: index in gamma and lambda for the unmatched row i, whichever row that is after matching again;
+                 * -1: its multiplier is 0 */
   double *A;    /* rows x stride: U, with inverses on its diagonal, and H', or 0 and Z'; then L, or R */
-  int first_L_column, stride; /* of L and R: cols rounded up to an even number; distance between rows of A */
-  double least_pivot;         /* smallest pivot relative to its row, or row of Z' relative to its terms */
+  int first_L_column; /* of L and R in A: cols rounded up to an even number */
+  int stride;         /* from row to row of A */
+  double least_pivot; /* the smallest pivot relative to its row, or norm of a row of Z' relative to its terms */
 } pw_component;
 
 typedef struct {
@@ -101,20 +103,19 @@ void pw_massless_close (pw_massless *m);
  * columns, and eliminates them.  Returns the number of pivots found. */
 int pw_massless_match (pw_component *c);
 
-/* 1 if an entry of the row i of Z' is larger than what round-off leaves of its terms. */
+/* 1 if an entry of row i of Z' is larger than what round-off leaves of its terms; column: local. */
 int pw_massless_is_entry (const pw_component *c, int i, int column);
 
 /* Eliminates with the J last evaluated, and matches again if a pivot has become much smaller than when it was matched.
- * Returns the smallest pivot squared, relative to its row, or of an unmatched row its remainder, if smaller; 0 if
- * singular. */
+ * Returns the square of the least of all `least_pivot`, at most 1; 0 if singular. */
 double pw_massless_factor (pw_massless *m);
 
-/* First half of a solve: f becomes f~ at the massive coordinates, gamma becomes gamma~ at `unknown` of unmatched
+/* First half of a solution: f becomes f~ at the massive coordinates, gamma becomes gamma~ at `unknown` of unmatched
  * rows. */
 void pw_massless_forward (pw_massless *m, double *f, double *gamma);
 
-/* Second half, from a of the massive coordinates and lambda at `unknown` of unmatched rows: a of the massless
- * coordinates, and lambda of all rows. */
+/* Second half: from a of the massive coordinates and lambda at `unknown` of unmatched rows, a of the massless
+ * coordinates and lambda of all rows. */
 void pw_massless_backward (pw_massless *m, double *a, double *lambda);
 
 #endif

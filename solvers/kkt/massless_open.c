@@ -5,7 +5,7 @@
 
 /* ---- Components ---- */
 
-/* Union-find over the groups that contain massless coordinates. */
+/* Union-find over the groups that contain massless coordinates, here called massless groups. */
 typedef struct {
   const pw_system *s;
   const pw_workspace *w;
@@ -13,7 +13,7 @@ typedef struct {
   const unsigned char *active;
   int rows, groups;
   int *parent; /* groups */
-  int *member; /* groups: at a root, the number of its component; -1: in no active row */
+  int *member; /* groups: -1: in no active row; at a root, once they are numbered: the number of its component */
 } massless_plan;
 
 /* 1 if a group contains a massless coordinate. */
@@ -24,7 +24,8 @@ static int massless_is_group (const massless_plan *p, int group) {
   return 0;
 }
 
-/* The groups of an element's coordinates, without the ground, and their first local columns. */
+/* The groups of an element's coordinates, without the ground, and the first local column of each.  Returns their
+ * number. */
 static int massless_element_groups (const pw_system *s, const pw_element_batch *k, int e, int *group, int *column) {
   int n = 0;
   for (int x = 0; x < k->b.cols; x += pw_group_columns (k->kind, x)) {
@@ -74,8 +75,8 @@ static void massless_add_row (const pw_system *s, pw_component *c, int row, int 
   for (int i = 0; i < n; i++) to->source[massless_add_group (s, c, group[i])] = J + column[i];
 }
 
-/* Adds each active row with a massless group to the component of this group; before the layout it only counts rows, and
- * groups with repetition. */
+/* Adds each active row with a massless group to the component of that group; before massless_lay_out, only counts the
+ * rows, and the groups with repetition. */
 static void massless_add_rows (massless_plan *p, pw_massless *m) {
   int group[PW_MASSLESS_GROUPS], column[PW_MASSLESS_GROUPS];
   for (const pw_element_batch *k = p->w->batch; k < p->w->batch + p->s->constraints; k++)
@@ -95,10 +96,8 @@ static void massless_add_rows (massless_plan *p, pw_massless *m) {
     }
 }
 
-/* ---- Layout ---- */
-
-/* Allocates the components.  The number of groups is bounded by that counted with repetition, and by that of the scene;
- * the number of pivots by that of rows. */
+/* Allocates the components' arrays.  A component has at most as many groups as were counted with repetition, at most
+ * those of the scene, and at most as many pivots as rows. */
 static int massless_lay_out (pw_massless *m, const massless_plan *p) {
   static const double zero[3] = { 0 };
   for (pw_layout l = { 0 }; pw_layout_pass (&l, &m->memory);)
@@ -173,6 +172,8 @@ static int massless_number_components (pw_massless *m, massless_plan *p, pw_erro
 }
 
 static int massless_build (pw_massless *m, massless_plan *p, pw_error *error) {
+  for (int g = 0; g < p->groups; g++) p->parent[g] = g, p->member[g] = -1;
+  for (int i = 0; i < p->s->rows; i++) m->component_of_row[i] = -1;
   massless_unite (p);
   int status = massless_number_components (m, p, error);
   if (status != PW_OK || m->components == 0) return status;
@@ -187,18 +188,11 @@ static int massless_build (pw_massless *m, massless_plan *p, pw_error *error) {
 
 int pw_massless_open (pw_massless *m, pw_workspace *w, const double *weight, int rows, const unsigned char *active,
                       pw_error *error) {
-  const pw_system *s = w->s;
-  int groups = pw_groups (s), status = PW_RESOURCE;
-  *m = (pw_massless){ 0 };
-  massless_plan p = { .s = s, .w = w, .weight = weight, .active = active, .rows = rows, .groups = groups };
-  p.parent = malloc (((size_t)groups + 1) * sizeof *p.parent);
-  p.member = malloc (((size_t)groups + 1) * sizeof *p.member);
-  m->component_of_row = malloc (((size_t)s->rows + 1) * sizeof *m->component_of_row);
-  if (p.parent && p.member && m->component_of_row) {
-    for (int g = 0; g < groups; g++) p.parent[g] = g, p.member[g] = -1;
-    for (int i = 0; i < s->rows; i++) m->component_of_row[i] = -1;
-    status = massless_build (m, &p, error);
-  }
+  massless_plan p = { .s = w->s, .w = w, .weight = weight, .active = active, .rows = rows, .groups = pw_groups (w->s) };
+  p.parent = malloc (((size_t)p.groups + 1) * sizeof *p.parent);
+  p.member = malloc (((size_t)p.groups + 1) * sizeof *p.member);
+  *m = (pw_massless){ .component_of_row = malloc (((size_t)w->s->rows + 1) * sizeof *m->component_of_row) };
+  int status = p.parent && p.member && m->component_of_row ? massless_build (m, &p, error) : PW_RESOURCE;
   free (p.parent);
   free (p.member);
   return status;

@@ -12,8 +12,9 @@
 #include "saddle.h"
 #include "condense.h"
 
-/* A pivot is 1 minus a squared cosine.  Round-off leaves a dependent row about eps / s^2, with s the smallest sine of
- * the rows before it: this for an s of 0.07.  With a smaller s, the rank is computed (`rank_suspect` in singular.c). */
+/* A pivot is 1 minus a squared cosine.  Round-off leaves the pivot of a dependent row at about eps / s^2, with s the
+ * smallest sine of the rows before it: at this one if s = 0.07.  Below that s, the rank is computed (`rank_suspect` in
+ * singular.c). */
 #define SADDLE_ROUND_OFF (200 * DBL_EPSILON)
 
 pw_saddle *pw_saddle_open (pw_workspace *w, const double *weight, int rows, const unsigned char *active,
@@ -39,8 +40,6 @@ void pw_saddle_close (pw_saddle *saddle) {
   free (saddle->memory);
   free (saddle);
 }
-
-/* ---- Factorising ---- */
 
 void pw_saddle_postpone (pw_saddle *saddle, double pivot) {
   saddle->postponed = pivot;
@@ -71,8 +70,6 @@ double pw_saddle_sine (pw_saddle *saddle, int *row) {
   if (row) *row = saddle->pivot_row;
   return saddle->pivot > 0 ? sqrt (fmin (saddle->pivot, 1)) : 0;
 }
-
-/* ---- Solving ---- */
 
 void pw_saddle_solve (pw_saddle *saddle, const double *f, const double *gamma, double *a, double *lambda) {
   const size_t bytes = (size_t)saddle->rows * sizeof *lambda;

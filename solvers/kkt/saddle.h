@@ -35,8 +35,8 @@ void pw_saddle_solve (pw_saddle *saddle, const double *f, const double *gamma, d
 int pw_saddle_sine_below (pw_saddle *saddle, double sine);
 
 /* The square root of the smallest pivot of the last factorisation, which is the sine of the angle between a row and
- * those before it: small near a singular configuration; *row (unless NULL): that row, or -1 for one of coordinates
- * without weight. */
+ * those before it: small near a singular configuration; *row (unless NULL): that row, or -1 for one that contains
+ * coordinates without weight, or if there is none. */
 double pw_saddle_sine (pw_saddle *saddle, int *row);
 
 #endif

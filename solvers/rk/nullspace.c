@@ -5,8 +5,9 @@
  *   q' = v(t, q, u),    u' = B^T W a(t, q, v),      v:  J(t, q) v = eta,  B^T W v = u
  *
  * so that all velocity constraints hold at every stage, for any step size.  u has as many entries as there are degrees
- * of freedom.  A Runge-Kutta stage of u is B^T W times the same stage w of v, since B is constant, and B^T W (v - w) =
- * 0 puts v - w in the range of W^-1 J0^T.  So no basis is formed, and the result is independent of its choice:
+ * of freedom.  Since B is constant, a Runge-Kutta stage of u is B^T W w, with w the stage of v by the same formula.
+ * Then B^T W (v - w) = 0, which puts v - w in the range of W^-1 J0^T.  So no basis is formed, and the result is
+ * independent of its choice:
  *
  *   v = w + W^-1 J0^T mu,    K mu = eta - J w,    K = J W^-1 J0^T
  *
@@ -28,18 +29,6 @@
 
 /* ---- Opening ---- */
 
-static int nullspace_allocate (pw_nullspace *b, const pw_system *s) {
-  size_t m = (size_t)b->rows, all = (size_t)s->rows, n = (size_t)s->coords;
-  const pw_array array[] = {
-    { &b->W_inv_J0T, n * m }, { &b->K, m * m }, { &b->mu, m }, { &b->eta, all }, { &b->v, n + 3 }
-  };
-  b->memory = pw_alloc_arrays (array, sizeof array / sizeof *array);
-  b->active_index = malloc ((2 * all + 1) * sizeof *b->active_index);
-  if (b->memory == NULL || b->active_index == NULL) return PW_RESOURCE;
-  b->pivot = b->active_index + all;
-  return PW_OK;
-}
-
 int pw_nullspace_open (pw_nullspace *b, pw_run *r, pw_error *error) {
   const pw_system *s = r->s;
   *b = (pw_nullspace){ .rows = s->rows - r->redundant };
@@ -48,8 +37,15 @@ int pw_nullspace_open (pw_nullspace *b, pw_run *r, pw_error *error) {
                     "model %s: stabilisation nullspace works with dense matrices, for up to %d constraint rows, and "
                     "this scene has %d; use %s+projection",
                     s->model, PW_NULLSPACE_MOST, b->rows, r->method->name);
-  if (nullspace_allocate (b, s) != PW_OK) return pw_fail_memory (s, error);
-  for (int i = 0, n = 0; i < s->rows; i++) b->active_index[i] = r->active && !r->active[i] ? -1 : n++;
+  const size_t m = (size_t)b->rows, all = (size_t)s->rows, n = (size_t)s->coords;
+  const pw_array array[] = {
+    { &b->W_inv_J0T, n * m }, { &b->K, m * m }, { &b->mu, m }, { &b->eta, all }, { &b->v, n + 3 }
+  };
+  b->memory = pw_alloc_arrays (array, sizeof array / sizeof *array);
+  b->active_index = malloc ((2 * all + 1) * sizeof *b->active_index);
+  if (b->memory == NULL || b->active_index == NULL) return pw_fail_memory (s, error);
+  b->pivot = b->active_index + all;
+  for (int i = 0, count = 0; i < s->rows; i++) b->active_index[i] = r->active && !r->active[i] ? -1 : count++;
   return PW_OK;
 }
 
@@ -59,9 +55,9 @@ void pw_nullspace_close (pw_nullspace *b) {
   *b = (pw_nullspace){ 0 };
 }
 
-/* ---- K mu = eta - J w; m, the number of rows, is a constant where it is usual ---- */
+/* ---- K mu = eta - J w; m: number of rows, a constant in the most frequent case, 4, so that loops are unrolled ---- */
 
-/* K_i += J_i (W^-1 J0^T), mu_i -= J_i w, for the entries of row i in columns j to j + width - 1: 3 of a body, or 1. */
+/* K_i += J_i W^-1 J0^T, mu_i -= J_i w, for the entries J of row i in columns j to j + width - 1: 3 of a body, or 1. */
 PW_INLINE void nullspace_gather (pw_nullspace *b, int i, int j, int width, const double *J, const double *w, int m) {
   double *restrict K = b->K + i * m;
   const double *restrict x = b->W_inv_J0T + (size_t)j * (size_t)m, *restrict y = x + m, *restrict phi = y + m;
@@ -115,8 +111,8 @@ PW_INLINE int nullspace_eliminate (double *restrict K, double *restrict mu, int 
   return 1;
 }
 
-/* The same by LAPACK, with scaled rows and pivoting.  PW_RETRY if a pivot is round-off: dependent constraint
- * equations. */
+/* The same by LAPACK, with scaled rows and pivoting.  PW_RETRY if a pivot is round-off, as for dependent constraint
+ * equations, or a row is 0 or not finite. */
 static int nullspace_eliminate_pivoted (pw_nullspace *b) {
   const double least = 1e-13; /* some 500 eps; the largest entry of a row is 1 */
   int m = b->rows;
@@ -165,7 +161,7 @@ int pw_nullspace_begin (pw_nullspace *b, pw_run *r) {
   return PW_OK;
 }
 
-/* v += W^-1 J0^T mu, with mu found without pivoting; returns 0 if a pivot is too small. */
+/* v += W^-1 J0^T mu, with mu found without pivoting from w = v; returns 0 if a pivot is too small. */
 PW_INLINE int nullspace_solve (pw_nullspace *b, pw_run *r, double *v, int m) {
   nullspace_assemble (b, r, v, m);
   if (!nullspace_eliminate (b->K, b->mu, m)) return 0;
@@ -173,7 +169,8 @@ PW_INLINE int nullspace_solve (pw_nullspace *b, pw_run *r, double *v, int m) {
   return 1;
 }
 
-/* v += W^-1 J0^T mu at the J last evaluated.  PW_RETRY if K is singular. */
+/* The same, if necessary with pivoting, at the J last evaluated.  Updates the velocity kinematics.  Returns as
+ * pw_nullspace_velocities. */
 static int nullspace_correct_velocities (pw_nullspace *b, pw_run *r, double *v) {
   const int m = b->rows;
   if (!(m == 4 ? nullspace_solve (b, r, v, 4) : nullspace_solve (b, r, v, m))) {

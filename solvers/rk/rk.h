@@ -1,4 +1,4 @@
-/* Explicit Runge-Kutta methods: functions and options that all of them share, and the coefficients of each. */
+/* Explicit Runge-Kutta methods: their coefficients, and the functions and options that all of them share. */
 #ifndef PW_RK_H
 #define PW_RK_H
 
@@ -11,11 +11,11 @@ typedef struct {
   int stages;
   const double *c, *b; /* stages: nodes, weights */
   const double *A;     /* the rows of the lower triangle, one after the other */
-  const double *e;     /* stages + 1: of the error estimate, the last for the new state; NULL: none */
-  const double *e3;    /* as e: of a second, cruder estimate, combined as in DOP853; NULL: none */
-  const double *e6;    /* as e: of a third, sharper one (rk_adapt.c), together with e3 only */
+  const double *e;     /* stages + 1: weights of the error estimate, the last at the new state; NULL: fixed steps */
+  const double *e3;    /* the same of an estimate of lower order (rk_adapt.c); NULL: there is only e */
+  const double *e6;    /* the same of an estimate of higher order, together with e3 only */
   double exponent;     /* of the error in the next step size: 1 / (order of the estimate + 1) */
-  double memory;       /* of the previous error in the step size (Gustafsson 1991) */
+  double memory;       /* exponent of the previous error there (Gustafsson 1991) */
 } pw_tableau;
 
 extern const pw_tableau pw_erk5_tableau;
@@ -27,7 +27,7 @@ int pw_rk_restart (pw_run *r, pw_error *error);
 void pw_rk_close (pw_run *r);
 void pw_rk_serialise (pw_run *r, pw_archive *a);
 extern const pw_stabilisation pw_rk_stabilisations[];
-extern const pw_option pw_rk_options[]; /* the first one, `steps`, is only for tableaus with an error estimate */
+extern const pw_option pw_rk_options[]; /* the first one, `steps`, is only for adaptive methods */
 
 /* Defines pw_method_NAME with this tableau; the remaining arguments initialise the members that methods do not
  * share. */

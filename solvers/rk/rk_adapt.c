@@ -1,22 +1,22 @@
 /* Runge-Kutta methods with step-size control.
  *
- *   h_new = 0.9 h e^-(k - 3 m / 4) e_last^m,  limited to h/5 ... 5 h; after a rejection to 0.9 h
+ *   h_new = 0.9 h err^(3 m / 4 - k) err_last^m,  limited to h/5 ... 5 h; after a rejection to 0.9 h
  *
- * with k the tableau's exponent and m its memory (Gustafsson 1991; Hairer, Norsett & Wanner 1993, section II.4).  The
- * error e is that of positions and velocities in units of the tolerances.  After a projection there remains e', the
- * part of the error tangential to the constraints (Eich 1993; Hindmarsh et al., CVODE), to which a small part of the
- * whole error is added:
+ * with k the tableau's exponent and m its memory (Gustafsson 1991; Hairer, Norsett & Wanner 1993, section II.4).  err
+ * is the root mean square error of positions and velocities in units of the tolerances.  A projection leaves the part
+ * of the error tangential to the constraints (Eich 1993; Hindmarsh et al., CVODE), to which a small part of the whole
+ * error is added:
  *
- *   e = sqrt (e'^2 + rtol^(1/2) e_whole^2)      so that the displacement by the projection is at most rtol^(3/4)
+ *   err = sqrt (tangential^2 + rtol^(1/2) whole^2)   so that the displacement by the projection is at most rtol^(3/4)
  *
  * Through the curvature of the constraints, the square of the displacement adds to the tangential error; without this
- * limit the steps of a mostly prescribed motion would grow until that dominates.
+ * limit the steps of a mostly prescribed motion would grow until that square dominates.
  *
  * Where a force reverses within a step, such as friction, estimates of any order may miss it.  The largest change of
  * the acceleration at the stages, h |a_i - a| / 2, therefore counts like the error before a projection, so that a body
  * stopped by friction oscillates at speeds of at most rtol^(3/4).
  *
- * With estimates of three orders, e5 is combined with e3 as in DOP853, and e6 guards both:
+ * With estimates of the orders 3, 5 and 6, e5 is combined with e3 as in DOP853, and e6 guards both:
  *
  *   max (e5^2 / sqrt (e5^2 + e3^2 / 100), e6^3 / (e6^2 + e5^2))      of order h^8 and h^9 for smooth motions
  *
@@ -25,13 +25,13 @@
 #include <math.h>
 #include "rk_step.h"
 
-#define ADAPT_SAFETY 0.9       /* of the factor from one step size to the next */
-#define ADAPT_GROWTH 5.        /* its upper bound */
+#define ADAPT_SAFETY 0.9       /* in the factor from one step size to the next */
+#define ADAPT_GROWTH 5.        /* upper bound of that factor */
 #define ADAPT_REDUCTION 0.2    /* its lower bound */
-#define ADAPT_LEAST_ERROR 1e-4 /* remembered: smaller ones are accidental and would predict too large a step */
+#define ADAPT_LEAST_ERROR 1e-4 /* least err_last: smaller errors are accidental and would predict too large a step */
 
 void pw_rk_reset_step_size (pw_run *r) {
-  struct pw_method_data *d = r->data;
+  pw_method_data *d = r->data;
   d->h = 0.1 * r->w->scale.time * pow (r->settings.rtol, d->tableau->exponent);
   d->last_error = ADAPT_LEAST_ERROR;
 }
@@ -55,7 +55,7 @@ static void adapt_estimate (const pw_rk_row *e, double *const *slope, int n, dou
 
 /* Reciprocal tolerances of positions and velocities for the step from the state reached to the new state. */
 static void adapt_weigh (const pw_run *r) {
-  const struct pw_method_data *d = r->data;
+  const pw_method_data *d = r->data;
   double *w = d->weight, rtol = r->settings.rtol;
   for (int j = 0, n = r->s->coords; j < n; j++) {
     *w++ = 1 / (pw_atol (r, j) + rtol * fmax (fabs (r->q[j]), fabs (d->q[j])));
@@ -77,7 +77,7 @@ static double adapt_mean_square (const pw_run *r, const double *eq, const double
 
 /* Mean square of an estimate before a projection, divided by h^2; stores its errors in r->q_at and r->v_at. */
 static double adapt_whole (pw_run *r, const pw_rk_row *e) {
-  struct pw_method_data *d = r->data;
+  pw_method_data *d = r->data;
   adapt_estimate (e, d->stage_v, r->s->coords, r->q_at);
   adapt_estimate (e, d->stage_a, r->s->coords, r->v_at);
   return adapt_mean_square (r, r->q_at, r->v_at);
@@ -86,19 +86,15 @@ static double adapt_whole (pw_run *r, const pw_rk_row *e) {
 /* Mean square of what a projection leaves of the errors in r->q_at and r->v_at, plus a small part of that before the
  * projection, `whole`; projected: 1 if the new state was. */
 static double adapt_remaining (pw_run *r, double whole, int projected) {
-  struct pw_method_data *d = r->data;
+  pw_method_data *d = r->data;
   if (!projected && !d->uses_nullspace) return whole;
   if (projected || d->projects_positions) pw_project_error (r, r->saddle, r->q_at, r->s->holonomic);
   pw_project_error (r, r->saddle, r->v_at, r->s->rows);
   return adapt_mean_square (r, r->q_at, r->v_at) + sqrt (r->settings.rtol) * whole;
 }
 
-/* Mean square of an estimate, without the part that a projection removes, divided by h^2. */
-static double adapt_tangential (pw_run *r, const pw_rk_row *e, int projected) {
-  return adapt_remaining (r, adapt_whole (r, e), projected);
-}
-
-/* The two errors of which the larger one counts (see the top of this file), from the squares of e3, e5, e6. */
+/* The two errors of which the larger one counts (see the top of this file); e3, e5, e6 are the squares of those
+ * there. */
 static double adapt_combine (double e5, double e3) {
   return e5 == 0 ? 0 : e5 / sqrt (e5 + 0.01 * e3);
 }
@@ -109,22 +105,22 @@ static double adapt_guard (double e6, double e5) {
 
 /* The error of the new state, divided by h. */
 static double adapt_state (pw_run *r, int projected) {
-  struct pw_method_data *d = r->data;
+  pw_method_data *d = r->data;
   const pw_tableau *tableau = d->tableau;
   d->stage_v[tableau->stages] = d->v, d->stage_a[tableau->stages] = d->a;
   adapt_weigh (r);
-  double e5 = adapt_tangential (r, &d->estimate[0], projected);
+  double e5 = adapt_remaining (r, adapt_whole (r, &d->estimate[0]), projected);
   if (tableau->e3 == NULL) return sqrt (e5);
-  double err = adapt_combine (e5, adapt_tangential (r, &d->estimate[1], projected));
+  double e3 = adapt_remaining (r, adapt_whole (r, &d->estimate[1]), projected), err = adapt_combine (e5, e3);
   double e6 = adapt_whole (r, &d->estimate[2]);
-  if (adapt_guard (e6, e5) > err) /* otherwise its projection, which mostly reduces e6, is not needed */
+  if (adapt_guard (e6, e5) > err) /* otherwise the projection of e6, which mostly reduces it, is not needed */
     err = fmax (err, adapt_guard (adapt_remaining (r, e6, projected), e5));
   return err;
 }
 
 /* The error of work and losses, which projections do not change, divided by h. */
 static double adapt_ledger (pw_run *r, double h) {
-  struct pw_method_data *d = r->data;
+  pw_method_data *d = r->data;
   const pw_tableau *tableau = d->tableau;
   double e[3] = { 0 }, tolerance = pw_ledger_tolerance (r, h); /* e: squares of e5, e3, e6 */
   pw_ledger_rates (r, d->lambda, d->stage_rate[tableau->stages]);
@@ -136,16 +132,11 @@ static double adapt_ledger (pw_run *r, double h) {
   return isfinite (err) ? err : 0;
 }
 
-/* The error of the step, accepted up to 1.  Work and losses are checked only if the state is accepted. */
-static double adapt_error (pw_run *r, double h, int projected) {
-  double state = h * adapt_state (r, projected);
-  return r->s->entries > 0 && state <= 1 ? fmax (state, h * adapt_ledger (r, h)) : state;
-}
-
-/* Half the root mean square of the largest changes of accelerations at the stages, in units of the tolerances: of those
- * accelerations whose velocity changes, at one of the stages, by more than the range in which a force saturates. */
+/* Half the root mean square of the largest changes of accelerations at the stages, over the tolerances of velocities.
+ * Only coordinates count whose velocity changes, at one of the stages, by more than the range in which a force
+ * saturates. */
 static double adapt_reversal (const pw_run *r) {
-  const struct pw_method_data *d = r->data;
+  const pw_method_data *d = r->data;
   int n = r->s->coords, stages = d->tableau->stages;
   double sum = 0;
   for (int j = 0; j < n; j++) {
@@ -161,7 +152,7 @@ static double adapt_reversal (const pw_run *r) {
 }
 
 /* The factor from this step size to the next; see the top of this file. */
-static double adapt_factor (const struct pw_method_data *d, double err) {
+static double adapt_factor (const pw_method_data *d, double err) {
   const pw_tableau *tableau = d->tableau;
   if (err == 0) return ADAPT_GROWTH;
   double exponent = tableau->exponent - 0.75 * tableau->memory;
@@ -169,26 +160,27 @@ static double adapt_factor (const struct pw_method_data *d, double err) {
   return fmin (ADAPT_GROWTH, fmax (ADAPT_REDUCTION, factor));
 }
 
-/* The step to t1; *err: its error, INFINITY if it fails.  If a signal jumps at t1, the estimate uses the derivative
- * just before t1, since the jump is not an error of the step. */
+/* The step to t1 = t + h; *err: its error, accepted up to 1; INFINITY if the step fails.  If a signal jumps at t1, the
+ * estimate uses the accelerations just before t1, since the jump is not an error of the step. */
 static int adapt_step (pw_run *r, double h, double t1, int project, double *added_energy, double *err) {
-  struct pw_method_data *d = r->data;
+  pw_method_data *d = r->data;
   double before = pw_before_breakpoint (r, t1);
   r->near_singular = 0;
   int status = pw_rk_step (r, h, t1, project, added_energy);
   if (status == PW_OK && before < t1) status = pw_run_accelerate (r, before, d->q, d->v, d->a, d->lambda);
-  *err = status == PW_OK ? adapt_error (r, h, project) : INFINITY;
+  *err = status == PW_OK ? h * adapt_state (r, project) : INFINITY;
+  if (r->s->entries > 0 && *err <= 1) *err = fmax (*err, h * adapt_ledger (r, h)); /* else it is rejected anyway */
   if (r->s->saturates && *err <= 1) *err = hypot (*err, pow (r->settings.rtol, 0.25) * h * adapt_reversal (r));
   if (status == PW_OK && before < t1) status = pw_run_accelerate (r, t1, d->q, d->v, d->a, d->lambda);
   if (status != PW_OK) *err = INFINITY;
   return status;
 }
 
-/* After a step that was shortened to end at t_end or a breakpoint, the next one has at least the size planned before;
- * its error is remembered if it was long enough to predict that of the next one. */
+/* After a step that was shortened to end at t_end or a breakpoint, the next one has at least the size planned before,
+ * and the error is remembered only if the step was long enough to predict that of the next one. */
 static void adapt_accept (pw_run *r, double h, double t1, double added_energy, double err, double most_growth,
                           int shortened) {
-  struct pw_method_data *d = r->data;
+  pw_method_data *d = r->data;
   double next = h * fmin (most_growth, adapt_factor (d, err));
   pw_rk_accept (r, h, t1, added_energy);
   pw_bound_tolerances (r);
@@ -198,12 +190,12 @@ static void adapt_accept (pw_run *r, double h, double t1, double added_energy, d
 }
 
 int pw_rk_advance_adaptive (pw_run *r, double t_end, pw_error *error) {
-  struct pw_method_data *d = r->data;
+  pw_method_data *d = r->data;
   double stop = fmin (t_end, r->breakpoint), most_growth = ADAPT_GROWTH;
   int status = PW_OK, project = pw_rk_projects_next (r);
   for (;;) {
     double t1 = r->t + d->h, added_energy = 0, err;
-    int shortened = t1 > stop - 0.01 * d->h;
+    int shortened = t1 > stop - 0.01 * d->h; /* no tiny step remains */
     if (shortened) t1 = stop;
     double h = t1 - r->t;
     if (!shortened && !(h > pw_least_step (r))) {

@@ -1,18 +1,19 @@
 /* Runge-Kutta methods: fixed steps, and samples inside the last step.
  *
  * Fixed steps end at multiples of the step size, at t_end and at breakpoints.  A sample is a step from the beginning of
- * the last one, as accurate as the method.  If a stage of a step or sample lands near a singular configuration, its
- * accelerations are inaccurate.  Then the step is divided in two parts, at several times, until two results agree. */
+ * the last step, as accurate as the method.  If a stage of a step or sample lands near a singular configuration, its
+ * accelerations are inaccurate.  Then the step is divided in two parts, at different times, until two results agree. */
 #include <math.h>
 #include <string.h>
 #include "dense_output.h"
 #include "rk_step.h"
 
-/* A step to t from another state than the one reached, in whose place it is put meanwhile: the new state, with the
- * ledger in ledger_at; with_energy: 1 to compute projected_at. */
+/* A step to t from the state `from`, which temporarily replaces the state reached: computes the new state, and its
+ * ledger in r->ledger_at; with_energy: 1 to compute r->projected_at, too. */
 static int divide_step (pw_run *r, const pw_step_start *from, double t, int project, int with_energy) {
   const double h = t - from->t, t_reached = r->t;
-  double *const q = r->q, *const v = r->v, *const a = r->a, *const rate = r->rate, added_energy = 0;
+  double *const q = r->q, *const v = r->v, *const a = r->a, *const rate = r->rate;
+  double added_energy = 0;
   const size_t n = (size_t)r->s->coords + 3;
   r->t = from->t, r->q = from->q, r->v = from->q + n, r->a = from->q + 2 * n, r->rate = from->rate;
   int status = pw_rk_step (r, h, t, project, with_energy ? &added_energy : NULL);
@@ -22,9 +23,9 @@ static int divide_step (pw_run *r, const pw_step_start *from, double t, int proj
   return status;
 }
 
-/* The same in two parts, the first one up to the time `between`. */
+/* The same in two parts, with the energy, the first one up to the time `between`. */
 static int divide_two_parts (pw_run *r, const pw_step_start *from, double between, double t, int project) {
-  struct pw_method_data *d = r->data;
+  pw_method_data *d = r->data;
   int status = divide_step (r, from, between, project, 1);
   if (status != PW_OK) return status;
   d->second.t = between, d->second.projected = r->projected_at;
@@ -34,14 +35,15 @@ static int divide_two_parts (pw_run *r, const pw_step_start *from, double betwee
   return divide_step (r, &d->second, t, project, 1);
 }
 
-/* Divides the step to t1 at several times after `earliest`, until two successive results differ by less than `best`;
- * *between: the division with the least difference, which must be below `acceptable`.  status: of the undivided step,
- * whose result is in d->q.  In a step from the state reached, energy added by projections is an error, too. */
+/* Divides the step to t1 at several times after `earliest`, until two successive results differ by at most `best`;
+ * *between: the time of division with the least difference.  PW_RETRY if that exceeds `acceptable`.  status: of the
+ * undivided step, whose result is in d->q.  In a step from the state reached, energy added by projections is an error,
+ * too. */
 static int divide (pw_run *r, const pw_step_start *from, int status, double t1, int project, double earliest,
                    double *between) {
-  /* irregular, since configurations may recur */
+  /* fractions of the step; irregular, since configurations may recur */
   static const double part[] = { 0.382, 0.681, 0.209, 0.847, 0.127, 0.541, 0.943, 0.302, 0.764, 0.891 };
-  const struct pw_method_data *d = r->data;
+  const pw_method_data *d = r->data;
   const size_t bytes = pw_state_length (r->s) * sizeof *d->q;
   double least = INFINITY, energy = fmax (r->scene_energy, r->exchanged);
   int has_result = status == PW_OK, is_step = from->q == r->q; /* otherwise it is a sample */
@@ -65,10 +67,8 @@ static int divide (pw_run *r, const pw_step_start *from, int status, double t1, 
   return least <= acceptable ? PW_OK : PW_RETRY;
 }
 
-/* ---- Samples ---- */
-
 int pw_rk_at (pw_run *r, double t, pw_error *error) {
-  struct pw_method_data *d = r->data;
+  pw_method_data *d = r->data;
   const pw_step_start *from = &d->last;
   if (t > r->t || t < from->t) return pw_fail_outside (r, from->t, t, error);
   if (t == r->t) {
@@ -92,17 +92,15 @@ int pw_rk_at (pw_run *r, double t, pw_error *error) {
   return status == PW_OK ? PW_OK : pw_rk_fail (r, status, t - from->t, error);
 }
 
-/* ---- Fixed steps ---- */
-
-/* Replaces a step to t1 near a singular configuration, which returned `status`, by the first part of a divided one, and
- * accepts it; *t: its end.
+/* Replaces a step to t1 near a singular configuration, which returned `status`, by the first part of a divided step,
+ * and accepts that part; *t: its end.
  *
  * Accelerations at the end of a step, with which the next one begins, have the error of the state over the sine.  So if
  * the step ends at the singular configuration (ends_singular: 1), longer ones, up to `stop`, are tried first, whose
  * first part ends after t1; otherwise they are tried if no division of the step to t1 is accurate. */
 static int fixed_step_around (pw_run *r, int status, int ends_singular, double t1, double stop, int project,
                               double *t) {
-  static const double beyond[] = { 0.62, 2.62, 7.62 }; /* steps; irregular, since configurations may recur */
+  static const double beyond[] = { 0.62, 2.62, 7.62 }; /* in step sizes; irregular, since configurations may recur */
   const pw_step_start from = { .t = r->t, .projected = r->projected, .q = r->q, .ledger = r->ledger, .rate = r->rate };
   double added_energy = 0;
   if (!ends_singular) status = divide (r, &from, status, t1, project, r->t, t);
@@ -116,7 +114,7 @@ static int fixed_step_around (pw_run *r, int status, int ends_singular, double t
 }
 
 int pw_rk_advance_fixed (pw_run *r, double t_end, pw_error *error) {
-  struct pw_method_data *d = r->data;
+  pw_method_data *d = r->data;
   int whole, project = pw_rk_projects_next (r);
   const int was_off_grid = d->off_grid;
   double added_energy = 0, t1 = pw_step_end (r, &d->counter, t_end, &whole);

@@ -34,8 +34,6 @@ const pw_option pw_rk_options[] = {
   { .name = NULL },
 };
 
-/* ---- Opening ---- */
-
 static pw_rk_row rk_nonzero_weights (const double *weight, int stages) {
   pw_rk_row row = { 0 };
   for (int j = 0; j < stages; j++)
@@ -46,7 +44,7 @@ static pw_rk_row rk_nonzero_weights (const double *weight, int stages) {
   return row;
 }
 
-static void rk_list_weights (struct pw_method_data *d) {
+static void rk_list_weights (pw_method_data *d) {
   const pw_tableau *tableau = d->tableau;
   const double *A = tableau->A, *const estimate[] = { tableau->e, tableau->e3, tableau->e6 };
   d->row[0] = rk_nonzero_weights (tableau->b, tableau->stages);
@@ -55,7 +53,7 @@ static void rk_list_weights (struct pw_method_data *d) {
     if (estimate[k]) d->estimate[k] = rk_nonzero_weights (estimate[k], tableau->stages + 1);
 }
 
-static int rk_allocate (struct pw_method_data *d, const pw_system *s) {
+static int rk_allocate (pw_method_data *d, const pw_system *s) {
   enum { SINGLE = 8 };
   size_t n = (size_t)s->coords + 3, state = pw_state_length (s), entries = (size_t)s->entries, count = SINGLE;
   int stages = d->tableau->stages;
@@ -76,7 +74,7 @@ static int rk_allocate (struct pw_method_data *d, const pw_system *s) {
 }
 
 int pw_rk_open (pw_run *r, const pw_tableau *tableau, pw_error *error) {
-  struct pw_method_data *d = r->data = calloc (1, sizeof *d);
+  pw_method_data *d = r->data = calloc (1, sizeof *d);
   if (d == NULL) return pw_fail_memory (r->s, error);
   d->tableau = tableau;
   rk_list_weights (d);
@@ -99,7 +97,7 @@ void pw_rk_close (pw_run *r) {
 }
 
 int pw_rk_restart (pw_run *r, pw_error *error) {
-  struct pw_method_data *d = r->data;
+  pw_method_data *d = r->data;
   (void)error;
   d->counter = (pw_step_counter){ .base = r->t };
   d->off_grid = 0;
@@ -109,14 +107,12 @@ int pw_rk_restart (pw_run *r, pw_error *error) {
 }
 
 void pw_rk_serialise (pw_run *r, pw_archive *a) {
-  struct pw_method_data *d = r->data;
+  pw_method_data *d = r->data;
   pw_serialise_counter (&d->counter, a);
   pw_archive_bytes (a, &d->off_grid, sizeof d->off_grid);
   pw_archive_bytes (a, &d->h, sizeof d->h);
   pw_archive_bytes (a, &d->last_error, sizeof d->last_error);
 }
-
-/* ---- Advancing ---- */
 
 int pw_rk_advance (pw_run *r, double t_end, pw_error *error) {
   return pw_fixed_steps (r) ? pw_rk_advance_fixed (r, t_end, error) : pw_rk_advance_adaptive (r, t_end, error);

@@ -26,7 +26,7 @@ PW_INLINE void rk_two (double *restrict out, const double *y, double *const *slo
  * are combined at a time, so the arrays have room for one more.  `count`, that of the weights, is a constant in the
  * inlined copies. */
 PW_INLINE void rk_combine_by (const pw_run *r, double *q, double *v, const pw_rk_row *row, double h, int count) {
-  const struct pw_method_data *d = r->data;
+  const pw_method_data *d = r->data;
   const double *q0 = r->q, *v0 = r->v;
   double *stage_v[PW_RK_STAGES], *stage_a[PW_RK_STAGES], factor[PW_RK_STAGES];
   PW_UNROLL for (int j = 0; j < count; j++) {
@@ -53,7 +53,7 @@ static void rk_combine (const pw_run *r, double *q, double *v, const pw_rk_row *
 }
 
 void pw_rk_ledger (const pw_run *r, double *end, const double *beginning, double h) {
-  const struct pw_method_data *d = r->data;
+  const pw_method_data *d = r->data;
   const pw_rk_row *b = &d->row[0];
   for (int i = 0; i < r->s->entries; i++) {
     double sum = beginning[i];
@@ -65,7 +65,7 @@ void pw_rk_ledger (const pw_run *r, double *end, const double *beginning, double
 /* Accelerations of a stage at the positions d->q and the velocities v, which the null-space method replaces, and the
  * rates of the ledger. */
 static inline int rk_evaluate_stage (pw_run *r, double t, double *v, double *a, double *rate) {
-  struct pw_method_data *d = r->data;
+  pw_method_data *d = r->data;
   int status;
   if (d->uses_nullspace) {
     status = pw_nullspace_velocities (&d->nullspace, r, t, d->q, v);
@@ -77,17 +77,9 @@ static inline int rk_evaluate_stage (pw_run *r, double t, double *v, double *a, 
   return status;
 }
 
-/* Zero-order hold: signals of forces keep their values at the beginning of the step.  Kinematics are updated first,
- * since a sample or a rejected step may have changed them. */
-static int rk_hold (pw_run *r) {
-  int status = pw_update_kinematics (r->w, r->t, r->q, r->v);
-  pw_hold_signals (r->w, status == PW_OK);
-  return status;
-}
-
-/* What rk_stages does, by specialised code: 1; 0 if there is none, or it refuses a stage. */
+/* Does what rk_stages does by specialised code: 1; 0 if there is none, or it refuses a stage. */
 static int rk_stages_specialised (pw_run *r, double h) {
-  struct pw_method_data *d = r->data;
+  pw_method_data *d = r->data;
   double t[PW_RK_STAGES];
   if (r->specialised == NULL || d->holds_signals || d->uses_nullspace) return 0;
   for (int i = 1; i < d->tableau->stages; i++) t[i] = pw_before_breakpoint (r, r->t + d->tableau->c[i] * h);
@@ -98,11 +90,15 @@ static int rk_stages_specialised (pw_run *r, double h) {
 /* Evaluates stages 1, 2, ...; stage 0 is the state reached.  Then combines them to the new state.  Returns as
  * pw_run_accelerate. */
 static int rk_stages (pw_run *r, double h) {
-  struct pw_method_data *d = r->data;
+  pw_method_data *d = r->data;
   const pw_tableau *tableau = d->tableau;
   d->stage_v[0] = r->v, d->stage_a[0] = r->a, d->stage_rate[0] = r->rate;
   if (rk_stages_specialised (r, h)) return PW_OK;
-  int status = d->holds_signals ? rk_hold (r) : PW_OK;
+  int status = PW_OK;
+  if (d->holds_signals) { /* a sample or a rejected step may have changed the kinematics, and with them the signals */
+    status = pw_update_kinematics (r->w, r->t, r->q, r->v);
+    pw_hold_signals (r->w, status == PW_OK);
+  }
   for (int i = 1; i < tableau->stages && status == PW_OK; i++) {
     rk_combine (r, d->q, d->stage_v[i], &d->row[i], h);
     double t = pw_before_breakpoint (r, r->t + tableau->c[i] * h);
@@ -115,7 +111,7 @@ static int rk_stages (pw_run *r, double h) {
 }
 
 int pw_rk_step (pw_run *r, double h, double t1, int project, double *added_energy) {
-  struct pw_method_data *d = r->data;
+  pw_method_data *d = r->data;
   int status = d->uses_nullspace ? pw_nullspace_begin (&d->nullspace, r) : PW_OK;
   if (status == PW_OK) status = rk_stages (r, h);
   if (status != PW_OK) return status;
@@ -127,7 +123,7 @@ int pw_rk_step (pw_run *r, double h, double t1, int project, double *added_energ
 }
 
 void pw_rk_accept (pw_run *r, double h, double t1, double added_energy) {
-  struct pw_method_data *d = r->data;
+  pw_method_data *d = r->data;
   pw_store_start (&d->last, r);
   memcpy (r->q, d->q, pw_state_length (r->s) * sizeof *r->q);
   r->t = t1;
@@ -138,7 +134,7 @@ void pw_rk_accept (pw_run *r, double h, double t1, double added_energy) {
 
 double pw_rk_distance (const pw_run *r) {
   const pw_system *s = r->s;
-  const struct pw_method_data *d = r->data;
+  const pw_method_data *d = r->data;
   double most = 0;
   for (int j = 0; j < s->coords; j++) {
     double q = fabs (d->q[j] - r->q_at[j]), v = r->w->scale.time * fabs (d->v[j] - r->v_at[j]);

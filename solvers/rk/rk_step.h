@@ -24,17 +24,18 @@ typedef struct {
 
 struct pw_method_data {
   const pw_tableau *tableau;
-  pw_rk_row row[PW_RK_STAGES];            /* [i] stage i > 0; [0] the new state, as stage 0 needs no weights */
-  pw_rk_row estimate[3];                  /* e, e3, e6; the last weight is that of the new state's derivative */
-  int projects, every;                    /* 1: coordinate projection; steps from one to the next */
-  int uses_nullspace, projects_positions; /* 1: stabilisation nullspace; it also projects positions */
-  int holds_signals;                      /* 1: signals of forces are constant over a step */
+  pw_rk_row row[PW_RK_STAGES]; /* nonzero weights: [i] of stage i > 0; [0] of the new state, as stage 0 has none */
+  pw_rk_row estimate[3];       /* those of e, e3, e6 */
+  int projects, every;         /* 1: coordinate projection; steps from one projection to the next */
+  int uses_nullspace;          /* 1: stabilisation nullspace */
+  int projects_positions;      /* 1: with positions projected after each step */
+  int holds_signals;           /* 1: signals of forces are constant over a step */
   pw_projector projector;
   pw_nullspace nullspace;
   pw_step_counter counter; /* of fixed steps */
   int off_grid;            /* 1: the last step was divided and ended between the multiples of the step size */
-  double *stage_v[PW_RK_STAGES], *stage_a[PW_RK_STAGES]; /* velocities, accelerations of the stages */
-  double *stage_rate[PW_RK_STAGES];                      /* rates of the ledger's entries at the stages */
+  /* velocities, accelerations, and rates of the ledger's entries at the stages, then at the new state */
+  double *stage_v[PW_RK_STAGES], *stage_a[PW_RK_STAGES], *stage_rate[PW_RK_STAGES];
   double *q, *v, *a, *lambda; /* state of a stage, then the new state: laid out as in pw_run */
   double h, last_error;       /* adaptive: size of the next step, error of the last one */
   double *weight;             /* adaptive: reciprocal tolerances of each position and its velocity */
@@ -42,9 +43,9 @@ struct pw_method_data {
   char *memory;
 };
 
-/* A step from the state reached to its successor at t1 = t + h, the new state: d->q, d->v, d->a, d->lambda.  project: 1
- * to project it onto the constraints; *added_energy, unless it is NULL, grows by the energy [J] that this adds.
- * PW_RETRY: a smaller step may succeed. */
+/* A step from the state reached to the new state at t1 = t + h: d->q, d->v, d->a, d->lambda.  project: 1 to project the
+ * new state onto the constraints; *added_energy, unless it is NULL, grows by the energy [J] that projections add.
+ * PW_RETRY if a smaller step may succeed; PW_METHOD if a signal failed. */
 int pw_rk_step (pw_run *r, double h, double t1, int project, double *added_energy);
 
 /* 1 if the next step ends with a projection. */
@@ -55,13 +56,13 @@ static inline int pw_rk_projects_next (const pw_run *r) {
 /* Makes the new state the state reached. */
 void pw_rk_accept (pw_run *r, double h, double t1, double added_energy);
 
-/* The ledger at the end of a step, from that at its beginning: end = beginning + h sum_j b_j rate_j */
+/* The ledger at the end of a step, from that at its beginning: end = beginning + h sum_j b_j rate_j. */
 void pw_rk_ledger (const pw_run *r, double *end, const double *beginning, double h);
 
 /* The distance of the new state from the sample (q_at, v_at): the largest difference in units of the scene. */
 double pw_rk_distance (const pw_run *r);
 
-/* Reports why no step from the state reached succeeds; h: size of the last attempt; status: what it returned. */
+/* Reports why no step from the state reached succeeds; h, status: size and result of the last attempt. */
 int pw_rk_fail (pw_run *r, int status, double h, pw_error *error);
 
 int pw_rk_advance_fixed (pw_run *r, double t_end, pw_error *error);
@@ -76,7 +77,7 @@ void pw_rk_reset_step_size (pw_run *r);
 int pw_nullspace_open (pw_nullspace *b, pw_run *r, pw_error *error);
 void pw_nullspace_close (pw_nullspace *b);
 
-/* Begins a step at the state reached.  PW_METHOD if a signal failed. */
+/* Sets W^-1 J0^T for a step from the state reached.  PW_METHOD if a signal failed. */
 int pw_nullspace_begin (pw_nullspace *b, pw_run *r);
 
 /* Replaces v by the velocities at (t, q) with the same null-space velocities; updates kinematics and J.  PW_RETRY if
@@ -86,8 +87,8 @@ int pw_nullspace_velocities (pw_nullspace *b, pw_run *r, double t, const double 
 /* Accelerations and multipliers right after pw_nullspace_velocities.  Returns as pw_run_accelerate. */
 int pw_nullspace_accelerate (pw_run *r, const double *v, double *a, double *lambda);
 
-/* Velocities at the end of a step, after projecting positions onto g = 0 if there is a projector; *added_energy, unless
- * it is NULL, grows by the energy [J] that this adds. */
+/* At the end of a step: projects positions onto g = 0 unless p is NULL, then as pw_nullspace_velocities; *added_energy,
+ * unless it is NULL, grows by the energy [J] that the projection adds. */
 int pw_nullspace_finalise (pw_nullspace *b, pw_projector *p, pw_run *r, double t, double *q, double *v,
                            double *added_energy);
 

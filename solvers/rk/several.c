@@ -10,7 +10,7 @@
 /* 1 if the specialised function `steps` does everything that a step of this run needs.  The ledger records the first
  * steps one by one (ledger.c). */
 static int several_possible (const pw_run *r) {
-  const struct pw_method_data *d = r->data;
+  const pw_method_data *d = r->data;
   if (r->method->advance != pw_rk_advance || d == NULL || !pw_fixed_steps (r) || d->holds_signals ||
       d->uses_nullspace || d->off_grid)
     return 0;
@@ -22,9 +22,9 @@ static int several_possible (const pw_run *r) {
 
 /* The number of whole steps that can be taken at once: up to t_end and the next breakpoint, with the tolerance of
  * pw_step_end; up to the first that reaches t; up to a multiple of PW_CHECK_INTERVAL and the next record of speeds
- * (limits.c); each twice as long as a step that counts as stalled (run.c). */
+ * (limits.c).  Each must be twice as long as a step that counts as stalled (run.c). */
 static int several_count (const pw_run *r, double t, double t_end) {
-  const struct pw_method_data *d = r->data;
+  const pw_method_data *d = r->data;
   const double h = r->settings.step, stop = fmin (t_end, r->breakpoint) - 1e-9 * h, shortest = 128 * DBL_EPSILON;
   int most = PW_CHECK_INTERVAL - (int)(r->statistics.steps % PW_CHECK_INTERVAL), n = 0;
   double reached = r->t;
@@ -54,7 +54,7 @@ static pw_scene_watch several_watchdog (const pw_run *r) {
 
 /* Updates the run's data after the steps taken. */
 static void several_record (pw_run *r, const pw_scene_steps *x) {
-  struct pw_method_data *d = r->data;
+  pw_method_data *d = r->data;
   pw_statistics *s = &r->statistics;
   pw_watchdog *g = &r->watchdog;
   r->t = x->t;
@@ -66,7 +66,7 @@ static void several_record (pw_run *r, const pw_scene_steps *x) {
   s->position = pw_larger (s->position, x->watch.position), s->g = pw_larger (s->g, x->watch.g);
   s->velocity = pw_larger (s->velocity, x->watch.velocity), s->jv = pw_larger (s->jv, x->watch.jv);
   pw_specialised_count (r, (long)x->stages * x->done, x->iterations);
-  if (g->saddle == NULL) return; /* else as watchdog_follow leaves it where the sine need not be computed */
+  if (g->saddle == NULL) return; /* else: what watchdog_follow stores where the sine need not be computed */
   g->step_length = x->watch.step, g->moved = x->watch.moved, g->singular_ahead = 0;
   g->sine_before_checked = NAN, g->sine_slope = 0, g->crossed = 0;
   g->previous_t = r->t, g->previous_sine = NAN;
@@ -76,7 +76,7 @@ static void several_record (pw_run *r, const pw_scene_steps *x) {
 /* Fills x for the next steps, up to the first that reaches t, and returns their number; 0: fewer than two can be taken
  * at once. */
 static int several_plan (pw_run *r, double t, double t_end, pw_scene_steps *x) {
-  struct pw_method_data *d = r->data;
+  pw_method_data *d = r->data;
   int count = several_possible (r) ? several_count (r, t, t_end) : 0;
   if (count < 2) return 0;
   *x = (pw_scene_steps){ .count = count, .project = d->projects, .watch = several_watchdog (r) };
@@ -122,7 +122,7 @@ int pw_run_advance_towards (pw_run *r, double t, double t_end, pw_error *error) 
 /* Runs whose next steps can be taken together: those with the step size and method of the first. */
 typedef struct {
   pw_run *const *run;
-  int used, index[PW_LANES_MOST];      /* lanes with a run; the index of each lane's run */
+  int used, index[PW_LANES_MOST];      /* number of lanes with a run; index in `run` of each lane's run */
   pw_scene_steps steps[PW_LANES_MOST]; /* of each lane */
 } several_lanes;
 
@@ -135,7 +135,7 @@ static void several_add (several_lanes *x, int i, double t_end) {
   if (several_plan (x->run[i], t_end, t_end, &x->steps[x->used]) > 0) x->index[x->used++] = i;
 }
 
-/* Takes the steps of all lanes; empty lanes repeat the first run. */
+/* Takes the steps of all lanes; empty lanes repeat those of the first lane. */
 static void several_take (several_lanes *x, const pw_specialised_lanes *code, void *memory) {
   pw_scene_steps *steps[PW_LANES_MOST];
   pw_scene *scene[PW_LANES_MOST];

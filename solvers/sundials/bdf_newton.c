@@ -10,21 +10,21 @@
  *
  *   (T_a + gamma T_v + gamma^2 T_q) da + T_lambda dlambda = - T_q (b_q + gamma b_v) - T_v b_v
  *
- * T is evaluated when CVODES asks for a new Jacobian; gamma changes more often.  KLU analyses the matrix once and
- * refactors it, with new pivots if the estimated condition number exceeds eps^(-2/3), eps the machine precision. */
+ * T is evaluated when CVODES asks for a new Jacobian; gamma changes more often.  KLU orders the matrix once and keeps
+ * its pivots unless the estimated condition number exceeds eps^(-2/3), with eps the machine precision. */
 #include <stdlib.h>
 #include <string.h>
 #include <cvodes/cvodes.h>
 #include "bdf_newton.h"
 
-int pw_multistep_accelerate (multistep_data *d, double t, const double *y) {
+int pw_multistep_accelerate (pw_method_data *d, double t, const double *y) {
   pw_run *r = d->sun.run;
   int status = pw_run_accelerate (r, pw_before_breakpoint (r, t), y, y + d->n, d->a, d->lambda);
   return status == PW_OK ? 0 : status > 0 ? 1 : -1;
 }
 
 /* Adds all entries of T, in the columns q, v, a, lambda. */
-static void newton_fill_T (multistep_data *d) {
+static void newton_fill_T (pw_method_data *d) {
   int n = d->n;
   const pw_tangent_layout to = {
     .momentum = 0, .constraint = n, .q = 0, .v = n, .a = 2 * n, .lambda = 3 * n, .a_factor = 1, .lambda_factor = 1
@@ -33,7 +33,7 @@ static void newton_fill_T (multistep_data *d) {
   pw_tangent_add_accelerations (&d->newton.tangent, &to, d->v, d->a);
 }
 
-/* Adds all entries of the matrix, from those of T. */
+/* Adds all entries of the matrix (T_a + gamma T_v + gamma^2 T_q, T_lambda) from those of T. */
 static void newton_fill_matrix (pw_bdf_newton *w, int n) {
   const pw_tangent *x = &w->tangent;
   const double power[] = { w->gamma * w->gamma, w->gamma, 1 };
@@ -44,12 +44,12 @@ static void newton_fill_matrix (pw_bdf_newton *w, int n) {
   }
 }
 
-/* Called by CVODES: evaluates T unless the last one is still valid, which CVODES proposes by `reuse`, then forms the
- * matrix with gamma.  *evaluated: whether it evaluated T. */
+/* Called by CVODES: evaluates T, unless CVODES proposes to `reuse` the last one and that is still valid, then forms the
+ * matrix with gamma.  *evaluated: 1 if T was evaluated. */
 static int newton_set_up (realtype t, N_Vector y, N_Vector derivative, SUNMatrix matrix, booleantype reuse,
                           booleantype *evaluated, realtype gamma, void *data, N_Vector tmp1, N_Vector tmp2,
                           N_Vector tmp3) {
-  multistep_data *d = data;
+  pw_method_data *d = data;
   pw_bdf_newton *w = &d->newton;
   const pw_tangent *x = &w->tangent;
   (void)derivative, (void)tmp1, (void)tmp2, (void)tmp3;
@@ -75,7 +75,7 @@ static int newton_set_up (realtype t, N_Vector y, N_Vector derivative, SUNMatrix
 /* ---- Solving for x ---- */
 
 /* right = - T_q (b_q + gamma b_v) - T_v b_v */
-static void newton_right_side (const multistep_data *d, const double *b, double *right) {
+static void newton_right_side (const pw_method_data *d, const double *b, double *right) {
   const pw_bdf_newton *w = &d->newton;
   const pw_tangent *x = &w->tangent;
   int n = d->n;
@@ -87,7 +87,7 @@ static void newton_right_side (const multistep_data *d, const double *b, double 
 }
 
 static int newton_solve (SUNLinearSolver solver, SUNMatrix matrix, N_Vector vx, N_Vector vb, realtype tolerance) {
-  multistep_data *d = solver->content;
+  pw_method_data *d = solver->content;
   pw_bdf_newton *w = &d->newton;
   const double *b = N_VGetArrayPointer (vb), *da = N_VGetArrayPointer (w->change);
   double *x = N_VGetArrayPointer (vx);
@@ -105,8 +105,8 @@ static int newton_solve (SUNLinearSolver solver, SUNMatrix matrix, N_Vector vx, 
 
 /* ---- Opening ---- */
 
-/* Records the patterns of T and of the matrix by filling each once. */
-static int newton_lay_out (multistep_data *d) {
+/* Records the patterns of T and of the matrix, with all values 0. */
+static int newton_lay_out (pw_method_data *d) {
   pw_bdf_newton *w = &d->newton;
   pw_tangent *x = &w->tangent;
   int columns = 3 * d->n + x->rows, size = d->n + x->rows;
@@ -120,7 +120,7 @@ static int newton_lay_out (multistep_data *d) {
   return w->value ? PW_OK : PW_RESOURCE;
 }
 
-int pw_bdf_open_newton (multistep_data *d) {
+int pw_bdf_open_newton (pw_method_data *d) {
   pw_bdf_newton *w = &d->newton;
   pw_sun *x = &d->sun;
   if (pw_tangent_open (&w->tangent, x->run) != PW_OK || newton_lay_out (d) != PW_OK) return PW_RESOURCE;
@@ -134,7 +134,7 @@ int pw_bdf_open_newton (multistep_data *d) {
   return failed ? PW_RESOURCE : PW_OK;
 }
 
-void pw_bdf_close_newton (multistep_data *d) {
+void pw_bdf_close_newton (pw_method_data *d) {
   pw_bdf_newton *w = &d->newton;
   if (w->right) N_VDestroy (w->right);
   if (w->change) N_VDestroy (w->change);

@@ -1,4 +1,4 @@
-/* The data that the multistep methods (multistep.c) share with Newton's iteration of bdf (bdf_newton.c). */
+/* The data of adams and bdf (multistep.c), and Newton's iteration of bdf (bdf_newton.c). */
 #ifndef PW_BDF_NEWTON_H
 #define PW_BDF_NEWTON_H
 
@@ -9,7 +9,7 @@
 typedef struct {
   pw_tangent tangent;       /* its pattern is that of T */
   double *value;            /* nonzero values of T */
-  double gamma;             /* of the matrix last set up */
+  double gamma;             /* that of the matrix last set up */
   pw_scatter_map scatter;   /* from the entries of T, in order, to the matrix */
   int64_t *colptr, *rowind; /* pattern of the matrix, in compressed columns */
   N_Vector right, change;   /* coords and active rows: right-hand side; da, dlambda */
@@ -21,21 +21,20 @@ struct pw_method_data {
   int n;        /* coordinates */
   int projects; /* 1: coordinate projection, by `projector` */
   pw_projector projector;
-  pw_bdf_newton newton;       /* only of bdf */
-  double *q, *v, *a, *lambda; /* coords + 3 each, rows: scratch; a, lambda: of the last evaluation */
-  double *error;              /* 2 coords: scratch */
-  int evaluated;              /* 1: r->a, r->lambda are those of the state reached, not of the last iterate */
+  pw_bdf_newton newton; /* only of bdf */
+  double *q, *v;        /* coords + 3: scratch */
+  double *a, *lambda;   /* coords + 3, rows: of the last evaluation */
+  double *error;        /* 2 coords: scratch */
+  int evaluated;        /* 1: r->a, r->lambda are those of the state reached, not of the last iterate */
   char *memory;
 };
 
-typedef struct pw_method_data multistep_data;
-
-/* Stores accelerations and multipliers at y in d->a and d->lambda.  Returns as functions that CVODES calls: 0; > 0: a
- * smaller step may succeed; < 0: a signal failed. */
-int pw_multistep_accelerate (multistep_data *d, double t, const double *y);
+/* Stores accelerations and multipliers at y in d->a and d->lambda.  Returns what CVODES expects: 0; > 0: a smaller step
+ * may succeed; < 0: a signal failed. */
+int pw_multistep_accelerate (pw_method_data *d, double t, const double *y);
 
 /* Opens the Newton matrix and attaches it to CVODES.  PW_OK or PW_RESOURCE. */
-int pw_bdf_open_newton (multistep_data *d);
-void pw_bdf_close_newton (multistep_data *d);
+int pw_bdf_open_newton (pw_method_data *d);
+void pw_bdf_close_newton (pw_method_data *d);
 
 #endif

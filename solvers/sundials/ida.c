@@ -1,7 +1,7 @@
 /* ida: the variable-order BDF code IDAS of SUNDIALS (Hindmarsh et al. 2005), on the equations of dae.h.
  *
- * The Newton matrix is exact and sparse, factorised by KLU.  The error test excludes lambda and mu but no velocities,
- * not even those of massless coordinates.  In si1 it includes all unknowns. */
+ * The Newton matrix is exact and sparse, factorised by KLU.  The error test covers positions and velocities, including
+ * those of massless coordinates; in si1 it covers all unknowns. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -19,23 +19,21 @@ struct pw_method_data {
   double *unit;    /* active rows: 1 for a force, L for a moment */
 };
 
-typedef struct pw_method_data ida_data;
-
 /* ---- Equations ---- */
 
 /* Updates kinematics and J at the unknowns y. */
-static int ida_update (ida_data *d, double t, const double *y) {
+static int ida_update (pw_method_data *d, double t, const double *y) {
   return pw_evaluate_J_at (d->sun.run->w, pw_before_breakpoint (d->sun.run, t), y, y + d->dae.n);
 }
 
 /* The multipliers of the independent equations, among the unknowns or among their derivatives. */
-static const double *ida_lambda (const ida_data *d, const double *y, const double *yp) {
+static const double *ida_lambda (const pw_method_data *d, const double *y, const double *yp) {
   return (d->dae.integrates_multipliers ? yp : y) + 2 * d->dae.n;
 }
 
 /* Called by IDA: F (t, y, y'). */
 static int ida_residual (realtype t, N_Vector vy, N_Vector vyp, N_Vector out, void *data) {
-  ida_data *d = data;
+  pw_method_data *d = data;
   int n = d->dae.n;
   const double *y = N_VGetArrayPointer (vy), *yp = N_VGetArrayPointer (vyp);
   double *F = N_VGetArrayPointer (out);
@@ -48,7 +46,7 @@ static int ida_residual (realtype t, N_Vector vy, N_Vector vyp, N_Vector out, vo
 /* Called by IDA: dF/dy + c dF/dy'. */
 static int ida_matrix (realtype t, realtype c, N_Vector vy, N_Vector vyp, N_Vector residual, SUNMatrix matrix,
                        void *data, N_Vector tmp1, N_Vector tmp2, N_Vector tmp3) {
-  ida_data *d = data;
+  pw_method_data *d = data;
   pw_tangent *x = &d->dae.tangent;
   const double *y = N_VGetArrayPointer (vy), *yp = N_VGetArrayPointer (vyp), *v = y + d->dae.n;
   (void)residual, (void)tmp1, (void)tmp2, (void)tmp3;
@@ -60,17 +58,16 @@ static int ida_matrix (realtype t, realtype c, N_Vector vy, N_Vector vyp, N_Vect
   return 0;
 }
 
-static int ida_open_matrix (ida_data *d) {
+static int ida_open_matrix (pw_method_data *d) {
   const double *y = N_VGetArrayPointer (d->sun.y), *yp = N_VGetArrayPointer (d->yp);
-  int n = d->dae.n, status = pw_dae_lay_out (&d->dae, y + n, yp + n, ida_lambda (d, y, yp));
-  return status == PW_OK ? pw_sun_open_matrix (&d->sun, d->dae.size, d->dae.tangent.colptr, d->dae.tangent.rowind)
-                         : status;
+  if (pw_dae_lay_out (&d->dae, y + d->dae.n, yp + d->dae.n, ida_lambda (d, y, yp)) != PW_OK) return PW_RESOURCE;
+  return pw_sun_open_matrix (&d->sun, d->dae.size, d->dae.tangent.colptr, d->dae.tangent.rowind);
 }
 
 /* ---- Error weights ---- */
 
-/* The coefficient c of y' in the matrix of the current step, 1 / h before the first; at least 1 / T. */
-static double ida_leading_coefficient (const ida_data *d) {
+/* The coefficient c in the matrix dF/dy + c dF/dy' of the current step, 1 / h before the first; at least 1 / T. */
+static double ida_leading_coefficient (const pw_method_data *d) {
   const pw_run *r = d->sun.run;
   realtype c = 0;
   if (r->t == d->sun.t0 || IDAGetCurrentCj (d->ida, &c) != IDA_SUCCESS || c == 0) c = 1 / pw_first_step (r);
@@ -87,14 +84,15 @@ static double ida_force_scale (const pw_run *r) {
   return force > 0 ? force : 1;
 }
 
-/* Called by IDA: error weights.  Those of the multipliers use the scales of forces and velocities, times L for moments
- * and angles.
+/* Called by IDA: error weights.  Those of lambda and mu use the scales of forces and of velocities, times L where the
+ * equation is one of angles.
  *
- * As unknowns, lambda and mu are not in the error test, and their corrections are those of v or q divided by the step:
- * with J v = eta, their tolerances are multiplied by c T for the test of convergence.  In si1 the unknowns are their
- * integrals, whose tolerances are those of the multipliers times T, with lambda of the previous step. */
+ * Where J v = eta is enforced, corrections of lambda and mu are those of v and q divided by the step.  Outside the
+ * error test, their tolerances are therefore multiplied by c T, for the test of convergence.  In si1 the unknowns are
+ * the integrals of the multipliers, whose tolerances are those of the multipliers times T, with lambda of the previous
+ * step. */
 static int ida_weigh (N_Vector vy, N_Vector weights, void *data) {
-  ida_data *d = data;
+  pw_method_data *d = data;
   const pw_run *r = d->sun.run;
   const pw_settings *set = &r->settings;
   const double *y = N_VGetArrayPointer (vy);
@@ -115,7 +113,7 @@ static int ida_weigh (N_Vector vy, N_Vector weights, void *data) {
 /* ---- States ---- */
 
 /* Fills IDA's vectors with the state reached. */
-static void ida_fill_vectors (ida_data *d) {
+static void ida_fill_vectors (pw_method_data *d) {
   const pw_run *r = d->sun.run;
   size_t n = (size_t)d->dae.n;
   double *y = N_VGetArrayPointer (d->sun.y), *yp = N_VGetArrayPointer (d->yp);
@@ -129,7 +127,7 @@ static void ida_fill_vectors (ida_data *d) {
 }
 
 /* Copies (q, v, a, lambda) from y and y'. */
-static void ida_read (const ida_data *d, double *q, double *v, double *a, double *lambda) {
+static void ida_read (const pw_method_data *d, double *q, double *v, double *a, double *lambda) {
   size_t n = (size_t)d->dae.n;
   const double *y = N_VGetArrayPointer (d->sun.y), *yp = N_VGetArrayPointer (d->yp);
   memcpy (q, y, n * sizeof *q);
@@ -139,14 +137,14 @@ static void ida_read (const ida_data *d, double *q, double *v, double *a, double
 }
 
 /* Interpolates the state at t into the sample arrays and updates kinematics.  Accelerations and multipliers are
- * computed from the state, since IDA's error test does not control its own; these remain only in singular
+ * computed from the state, since IDA's error test does not control those of IDA, which remain only in singular
  * configurations.  Returns an IDA flag. */
-static int ida_interpolate (ida_data *d, double t) {
+static int ida_interpolate (pw_method_data *d, double t) {
   pw_run *r = d->sun.run;
   long steps = 0;
   int flag = IDAGetNumSteps (d->ida, &steps);
   if (flag == IDA_SUCCESS && (steps == 0 ? t != r->t : t > r->t)) flag = IDA_BAD_T;
-  if (steps == 0) ida_fill_vectors (d);
+  if (steps == 0) ida_fill_vectors (d); /* the initial state */
   if (flag == IDA_SUCCESS && steps > 0) flag = IDAGetDky (d->ida, t, 1, d->yp);
   if (flag == IDA_SUCCESS && steps > 0) flag = IDAGetDky (d->ida, t, 0, d->sun.y);
   if (flag != IDA_SUCCESS) return flag;
@@ -166,9 +164,10 @@ static int ida_power (pw_run *r, double t, double *rate) {
   return flag == IDA_SUCCESS ? PW_OK : PW_RETRY;
 }
 
-/* Work and losses up to the state reached; factorised: 1 if the saddle-point matrix is factorised there.  Multipliers
- * outside the error test are not accurate enough and are recomputed.  PW_METHOD if a signal failed. */
-static int ida_work (ida_data *d, int factorised) {
+/* Work and losses up to the state reached; factorised: 1 if the saddle-point matrix is factorised there.  The
+ * multipliers that IDA computes with J v = eta are not accurate enough to be integrated, and are recomputed.  PW_METHOD
+ * if a signal failed. */
+static int ida_work (pw_method_data *d, int factorised) {
   pw_run *r = d->sun.run;
   int order = 1;
   const double *lambda = r->lambda;
@@ -183,7 +182,7 @@ static int ida_work (ida_data *d, int factorised) {
 
 /* ---- Opening ---- */
 
-static int ida_open_vectors (ida_data *d, pw_run *r) {
+static int ida_open_vectors (pw_method_data *d, pw_run *r) {
   if (pw_sun_open (&d->sun, r, d->dae.size) != PW_OK) return PW_RESOURCE;
   d->yp = pw_sun_vector (d->dae.size, d->sun.context);
   d->id = pw_sun_vector (d->dae.size, d->sun.context);
@@ -196,11 +195,12 @@ static int ida_open_vectors (ida_data *d, pw_run *r) {
   return PW_OK;
 }
 
+/* Called by IDA at the start and at each restart: the next factorisation orders the matrix and selects pivots anew. */
 static int ida_initialise (SUNLinearSolver solver) {
   return SUNLinSolInitialize (((pw_sun *)solver->content)->klu);
 }
 
-static int ida_open_solver (ida_data *d) {
+static int ida_open_solver (pw_method_data *d) {
   pw_sun *x = &d->sun;
   void *m = d->ida = IDACreate (x->context);
   if (m == NULL || pw_sun_open_solver (x, x->y, d, NULL) != PW_OK) return PW_RESOURCE;
@@ -214,11 +214,11 @@ static int ida_open_solver (ida_data *d) {
   if (!x->run->s->saturates) return PW_OK;
   x->iteration = SUNNonlinSol_Newton (x->y, x->context);
   if (x->iteration == NULL || IDASetNonlinearSolver (m, x->iteration)) return PW_RESOURCE;
-  return pw_sun_test_newton (x->iteration, &x->correction) == 0 ? PW_OK : PW_RESOURCE;
+  return pw_sun_test_newton (x);
 }
 
 static int ida_open (pw_run *r, pw_error *error) {
-  ida_data *d = r->data = calloc (1, sizeof *d);
+  pw_method_data *d = r->data = calloc (1, sizeof *d);
   if (d == NULL) return pw_sun_no_memory (r, error);
   if (pw_dae_open (&d->dae, r) != PW_OK || ida_open_vectors (d, r) != PW_OK || ida_open_matrix (d) != PW_OK ||
       ida_open_solver (d) != PW_OK || pw_quadrature_open (&d->sun.quadrature, r, ida_power) != PW_OK)
@@ -229,7 +229,7 @@ static int ida_open (pw_run *r, pw_error *error) {
 }
 
 static void ida_close (pw_run *r) {
-  ida_data *d = r->data;
+  pw_method_data *d = r->data;
   if (d->ida) IDAFree (&d->ida);
   if (d->yp) N_VDestroy (d->yp);
   if (d->id) N_VDestroy (d->id);
@@ -241,7 +241,7 @@ static void ida_close (pw_run *r) {
 
 /* ---- Advancing ---- */
 
-static void ida_statistics (ida_data *d) {
+static void ida_statistics (pw_method_data *d) {
   pw_statistics *s = &d->sun.run->statistics, now = { 0 };
   const pw_statistics *before = &d->sun.before;
   long tests = 0, newton = 0; /* failed */
@@ -258,13 +258,13 @@ static void ida_statistics (ida_data *d) {
   s->factorisations = before->factorisations + now.factorisations;
 }
 
-static int ida_fail (ida_data *d, int flag, pw_error *error) {
+static int ida_fail (pw_method_data *d, int flag, pw_error *error) {
   if (!d->sun.run->stopped) ida_statistics (d);
   return pw_sun_fail (&d->sun, flag, 0, NULL, error);
 }
 
 static int ida_restart (pw_run *r, pw_error *error) {
-  ida_data *d = r->data;
+  pw_method_data *d = r->data;
   pw_quadrature_restart (&d->sun.quadrature, r);
   pw_sun_restart (&d->sun);
   ida_fill_vectors (d);
@@ -273,10 +273,10 @@ static int ida_restart (pw_run *r, pw_error *error) {
   return flag == IDA_SUCCESS ? PW_OK : pw_sun_fail_restart (&d->sun, flag, error);
 }
 
-/* Makes (y, y') the state reached and updates the ledger.  IDA's multipliers are accurate if it solves J v = eta.  On
- * acceleration level, only the Newton iteration determines those of prescribed motions, and they may drift without
- * effect on the motion: there they are recomputed.  PW_METHOD if a signal failed. */
-static int ida_reach (ida_data *d) {
+/* Makes (y, y') the state reached and updates the ledger.  With J v = eta, the multipliers are IDA's.  On acceleration
+ * level, only the Newton iteration determines those of prescribed motions, and they may drift without effect on the
+ * motion: there all are recomputed.  PW_METHOD if a signal failed. */
+static int ida_reach (pw_method_data *d) {
   pw_run *r = d->sun.run;
   ida_read (d, r->q, r->v, r->a, r->lambda);
   int status = ida_update (d, r->t, N_VGetArrayPointer (d->sun.y));
@@ -290,7 +290,7 @@ static int ida_reach (ida_data *d) {
 }
 
 static int ida_advance (pw_run *r, double t_end, pw_error *error) {
-  ida_data *d = r->data;
+  pw_method_data *d = r->data;
   double stop = fmin (t_end, r->breakpoint), t = r->t;
   int flag = IDASetStopTime (d->ida, stop);
   if (flag >= 0) flag = IDASolve (d->ida, stop, &t, d->sun.y, d->yp, IDA_ONE_STEP);
@@ -302,7 +302,7 @@ static int ida_advance (pw_run *r, double t_end, pw_error *error) {
 }
 
 static int ida_at (pw_run *r, double t, pw_error *error) {
-  ida_data *d = r->data;
+  pw_method_data *d = r->data;
   if (t <= r->t && r->s->entries > 0) pw_quadrature_at (&d->sun.quadrature, r, t);
   int flag = ida_interpolate (d, t);
   if (flag == IDA_BAD_T) return pw_fail_outside (r, NAN, t, error);

@@ -18,14 +18,15 @@
 #include "dense_output.h"
 #include "util.h"
 
-/* Error that may remain after Newton's iteration, in units of that of the error test, if only the projected error is
- * tested or forces saturate: less than CVODES' default of 0.1, since with stiff damping it changes the energy. */
+/* The error that may remain after the iteration, over the tolerance of the error test, if only the projected error is
+ * tested or forces saturate: less than CVODES' default of 0.1, since with stiff damping that error changes the
+ * energy. */
 #define MULTISTEP_CONVERGENCE 0.01
 
 /* ---- Functions that CVODES calls ---- */
 
 static int multistep_derivative (realtype t, N_Vector vy, N_Vector derivative, void *data) {
-  multistep_data *d = data;
+  pw_method_data *d = data;
   const double *y = N_VGetArrayPointer (vy);
   double *out = N_VGetArrayPointer (derivative);
   size_t bytes = (size_t)d->n * sizeof *out;
@@ -37,22 +38,23 @@ static int multistep_derivative (realtype t, N_Vector vy, N_Vector derivative, v
 }
 
 static int multistep_weigh (N_Vector y, N_Vector weights, void *data) {
-  pw_sun_weigh (&((multistep_data *)data)->sun, N_VGetArrayPointer (y), N_VGetArrayPointer (weights));
+  pw_sun_weigh (&((pw_method_data *)data)->sun, N_VGetArrayPointer (y), N_VGetArrayPointer (weights));
   return 0;
 }
 
 /* ---- Projection ---- */
 
 /* Projects q and v at t.  Returns as pw_project_positions. */
-static int multistep_project (multistep_data *d, double t, double *q, double *v) {
+static int multistep_project (pw_method_data *d, double t, double *q, double *v) {
   int status = pw_project_positions (&d->projector, d->sun.run, t, q, v);
   return status == PW_OK ? pw_project_velocities (&d->projector, d->sun.run, v) : status;
 }
 
 /* Leaves the part of the error tangential to the constraints (Eich 1993), in the metric of the projection, plus a small
- * part of the whole error, so that a displacement off the constraints is at most rtol^(3/4) as in rk_adapt.c.  It has
- * tangential effects that the estimate misses: the accelerations of the step are those of the displaced state. */
-static void multistep_project_error (multistep_data *d, double *e) {
+ * part of the whole error, so that the displacement off the constraints is at most rtol^(3/4) as in rk_adapt.c.  That
+ * displacement has tangential effects that the estimate misses: the accelerations of the step are those of the
+ * displaced state. */
+static void multistep_project_error (pw_method_data *d, double *e) {
   pw_run *r = d->sun.run;
   double *whole = d->error, share = sqrt (sqrt (r->settings.rtol));
   memcpy (whole, e, 2 * (size_t)d->n * sizeof *e);
@@ -61,10 +63,10 @@ static void multistep_project_error (multistep_data *d, double *e) {
   for (int j = 0; j < 2 * d->n; j++) e[j] += share * (whole[j] - e[j]);
 }
 
-/* Called by CVODES: the change of y by the projection; projects the error estimate, too, unless it is NULL. */
+/* Called by CVODES: the change of y by the projection; unless `error` is NULL, projects this error estimate, too. */
 static int multistep_correct (realtype t, N_Vector vy, N_Vector change, realtype tolerance, N_Vector error,
                               void *data) {
-  multistep_data *d = data;
+  pw_method_data *d = data;
   const double *y = N_VGetArrayPointer (vy);
   double *out = N_VGetArrayPointer (change);
   size_t bytes = (size_t)d->n * sizeof *y;
@@ -82,9 +84,9 @@ static int multistep_correct (realtype t, N_Vector vy, N_Vector change, realtype
 
 /* ---- Inside the last step ---- */
 
-/* Accelerations and multipliers at (t, q, v), which are projected first if `project` is 1: also near singular
- * configurations, and without effect on the statistics. */
-static int multistep_complete (multistep_data *d, double t, int project, double *q, double *v, double *a,
+/* Accelerations and multipliers at (t, q, v), projected first if `project` is 1.  No configuration is refused as too
+ * nearly singular, and the statistics do not change. */
+static int multistep_complete (pw_method_data *d, double t, int project, double *q, double *v, double *a,
                                double *lambda) {
   pw_run *r = d->sun.run;
   const int near_singular = r->near_singular;
@@ -98,13 +100,8 @@ static int multistep_complete (multistep_data *d, double t, int project, double 
   return status;
 }
 
-static int multistep_complete_sample (multistep_data *d, double t) {
-  pw_run *r = d->sun.run;
-  return multistep_complete (d, t, d->projects, r->q_at, r->v_at, r->a_at, r->lambda_at);
-}
-
 /* Interpolates the state at t into the sample arrays.  CV_SUCCESS or CV_BAD_T. */
-static int multistep_interpolate (multistep_data *d, double t) {
+static int multistep_interpolate (pw_method_data *d, double t) {
   pw_run *r = d->sun.run;
   int flag = t < r->t ? CVodeGetDky (d->cvode, t, 0, d->sun.y) : CV_BAD_T;
   const double *y = N_VGetArrayPointer (d->sun.y);
@@ -115,38 +112,36 @@ static int multistep_interpolate (multistep_data *d, double t) {
 }
 
 static int multistep_power (pw_run *r, double t, double *rate) {
-  int status = multistep_interpolate (r->data, t) == CV_SUCCESS ? PW_OK : PW_RETRY;
-  if (status == PW_OK) status = multistep_complete_sample (r->data, t);
+  pw_method_data *d = r->data;
+  int status = multistep_interpolate (d, t) == CV_SUCCESS ? PW_OK : PW_RETRY;
+  if (status == PW_OK) status = multistep_complete (d, t, d->projects, r->q_at, r->v_at, r->a_at, r->lambda_at);
   if (status == PW_OK) pw_ledger_rates (r, r->lambda_at, rate);
   return status;
 }
 
 /* ---- Opening ---- */
 
-static int multistep_open_arrays (multistep_data *d, pw_run *r) {
+static int multistep_open_arrays (pw_method_data *d, pw_run *r) {
   size_t n = (size_t)d->n + 3, rows = (size_t)r->s->rows;
   const pw_array array[] = { { &d->q, n }, { &d->v, n }, { &d->a, n }, { &d->error, 2 * n }, { &d->lambda, rows } };
   if (pw_sun_open (&d->sun, r, 2 * d->n) != PW_OK) return PW_RESOURCE;
   d->memory = pw_alloc_arrays (array, sizeof array / sizeof *array);
   if (d->memory == NULL) return PW_RESOURCE;
-  memcpy (d->v, r->v, (size_t)d->n * sizeof *d->v);
-  memcpy (d->a, r->a, (size_t)d->n * sizeof *d->a);
-  memcpy (d->lambda, r->lambda, rows * sizeof *d->lambda);
   d->evaluated = 1;
   return PW_OK;
 }
 
-static int multistep_open_iteration (multistep_data *d, int formula) {
+static int multistep_open_iteration (pw_method_data *d, int formula) {
   pw_sun *x = &d->sun;
   int newton = formula == CV_BDF;
   if (newton && pw_bdf_open_newton (d) != PW_OK) return PW_RESOURCE;
   if (newton && !x->run->s->saturates) return PW_OK;
   x->iteration = newton ? SUNNonlinSol_Newton (x->y, x->context) : SUNNonlinSol_FixedPoint (x->y, 0, x->context);
   if (x->iteration == NULL || CVodeSetNonlinearSolver (d->cvode, x->iteration)) return PW_RESOURCE;
-  return newton && pw_sun_test_newton (x->iteration, &x->correction) ? PW_RESOURCE : PW_OK;
+  return newton ? pw_sun_test_newton (x) : PW_OK;
 }
 
-static int multistep_open_solver (multistep_data *d, int formula) {
+static int multistep_open_solver (pw_method_data *d, int formula) {
   pw_run *r = d->sun.run;
   void *m = d->cvode = CVodeCreate (formula, d->sun.context);
   if (m == NULL || CVodeSetErrHandlerFn (m, pw_sun_message, &d->sun) || CVodeSetUserData (m, d) ||
@@ -162,7 +157,7 @@ static int multistep_open_solver (multistep_data *d, int formula) {
 }
 
 static int multistep_open (pw_run *r, int formula, pw_error *error) {
-  multistep_data *d = r->data = calloc (1, sizeof *d);
+  pw_method_data *d = r->data = calloc (1, sizeof *d);
   if (d == NULL) return pw_sun_no_memory (r, error);
   d->n = r->s->coords;
   d->projects = pw_stabilised_by (r, PW_PROJECTION);
@@ -175,7 +170,7 @@ static int multistep_open (pw_run *r, int formula, pw_error *error) {
 }
 
 static void multistep_close (pw_run *r) {
-  multistep_data *d = r->data;
+  pw_method_data *d = r->data;
   if (d->cvode) CVodeFree (&d->cvode);
   pw_bdf_close_newton (d);
   pw_sun_close (&d->sun);
@@ -186,9 +181,9 @@ static void multistep_close (pw_run *r) {
 
 /* ---- Advancing ---- */
 
-static void multistep_count (multistep_data *d) {
+static void multistep_count (pw_method_data *d) {
   pw_statistics *s = &d->sun.run->statistics;
-  long steps = 0, tests = 0, iterations = 0, projections = 0; /* the last three: failed */
+  long steps = 0, tests = 0, iterations = 0, projections = 0; /* steps; failed tests, iterations, projections */
   CVodeGetNumSteps (d->cvode, &steps);
   CVodeGetNumErrTestFails (d->cvode, &tests);
   CVodeGetNumNonlinSolvConvFails (d->cvode, &iterations);
@@ -197,7 +192,7 @@ static void multistep_count (multistep_data *d) {
   s->rejected = d->sun.before.rejected + tests + iterations + projections;
 }
 
-static int multistep_fail (multistep_data *d, int flag, pw_error *error) {
+static int multistep_fail (pw_method_data *d, int flag, pw_error *error) {
   pw_run *r = d->sun.run;
   char element[120];
   int singular = flag == CV_FIRST_RHSFUNC_ERR || flag == CV_REPTD_RHSFUNC_ERR || flag == CV_UNREC_RHSFUNC_ERR;
@@ -213,7 +208,7 @@ static int multistep_fail (multistep_data *d, int flag, pw_error *error) {
 
 /* Accelerations and multipliers of the state reached, whose kinematics and J are up to date, without effect on the
  * statistics.  In a singular configuration the multipliers of the last iterate remain. */
-static void multistep_evaluate (multistep_data *d) {
+static void multistep_evaluate (pw_method_data *d) {
   pw_run *r = d->sun.run;
   const pw_statistics statistics = r->statistics;
   r->refused_sine = 0;
@@ -223,9 +218,9 @@ static void multistep_evaluate (multistep_data *d) {
   r->statistics = statistics;
 }
 
-/* Work and losses up to the state reached.  The multipliers of Newton's last iterate, which may be its first, are not
- * accurate enough. */
-static int multistep_work (multistep_data *d) {
+/* Work and losses up to the state reached.  Multipliers of the last Newton iterate, which may be the prediction, are
+ * not accurate enough.  Returns as pw_quadrature_step. */
+static int multistep_work (pw_method_data *d) {
   pw_run *r = d->sun.run;
   int order = 1;
   if (d->sun.klu && pw_ledger_uses_multipliers (r->s)) multistep_evaluate (d);
@@ -234,9 +229,9 @@ static int multistep_work (multistep_data *d) {
   return pw_quadrature_step (&d->sun.quadrature, r, order);
 }
 
-/* Makes y the state reached and updates the ledger.  Accelerations remain those of the last iterate until multistep_at
- * evaluates them, which saves one evaluation in three. */
-static int multistep_reach (multistep_data *d, double t, pw_error *error) {
+/* Makes y the state reached at t and updates the ledger.  Accelerations and multipliers remain those of the last
+ * iterate until multistep_at or multistep_evaluate computes them, which saves one evaluation in three. */
+static int multistep_reach (pw_method_data *d, double t, pw_error *error) {
   pw_run *r = d->sun.run;
   const double *y = N_VGetArrayPointer (d->sun.y);
   memcpy (r->q, y, (size_t)d->n * sizeof *y);
@@ -254,7 +249,7 @@ static int multistep_reach (multistep_data *d, double t, pw_error *error) {
 }
 
 static int multistep_advance (pw_run *r, double t_end, pw_error *error) {
-  multistep_data *d = r->data;
+  pw_method_data *d = r->data;
   double stop = fmin (t_end, r->breakpoint), t = r->t;
   int flag = CVodeSetStopTime (d->cvode, stop);
   if (flag >= 0) flag = CVode (d->cvode, stop, d->sun.y, &t, CV_ONE_STEP);
@@ -264,7 +259,7 @@ static int multistep_advance (pw_run *r, double t_end, pw_error *error) {
 }
 
 static int multistep_at (pw_run *r, double t, pw_error *error) {
-  multistep_data *d = r->data;
+  pw_method_data *d = r->data;
   int status = PW_OK;
   if (t == r->t) {
     if (!d->evaluated) status = multistep_complete (d, pw_before_breakpoint (r, t), 0, r->q, r->v, r->a, r->lambda);
@@ -275,14 +270,14 @@ static int multistep_at (pw_run *r, double t, pw_error *error) {
     int flag = multistep_interpolate (d, t);
     if (flag == CV_BAD_T) return pw_fail_outside (r, NAN, t, error);
     if (flag != CV_SUCCESS) return multistep_fail (d, flag, error);
-    status = multistep_complete_sample (d, t);
+    status = multistep_complete (d, t, d->projects, r->q_at, r->v_at, r->a_at, r->lambda_at);
   }
   if (status > 0) return pw_fail_singular (r, t, error);
   return status == PW_OK ? PW_OK : pw_fail_signal (t, error);
 }
 
 static int multistep_restart (pw_run *r, pw_error *error) {
-  multistep_data *d = r->data;
+  pw_method_data *d = r->data;
   pw_sun_restart (&d->sun);
   d->evaluated = 1;
   int flag = CVodeReInit (d->cvode, r->t, d->sun.y);

@@ -1,4 +1,4 @@
-/* What adams, bdf and ida share: vectors, linear solver, test of convergence, messages of SUNDIALS; see sundials.h. */
+/* What adams, bdf and ida share: unknowns, linear solver, test of convergence, messages of SUNDIALS; see sundials.h. */
 #include <assert.h>
 #include <cvodes/cvodes.h>
 #include <idas/idas.h>
@@ -94,7 +94,7 @@ int pw_sun_open_solver (pw_sun *x, N_Vector right, void *content, pw_sun_solve *
 /* ---- Newton's iteration, error weights ---- */
 
 /* Called by SUNDIALS: tests the size of the correction, or of the error that remains after it at the current rate of
- * convergence; data: size of the previous correction. */
+ * convergence, whichever is smaller; data: size of the previous correction. */
 static int sun_test_convergence (SUNNonlinearSolver newton, N_Vector y, N_Vector correction, realtype tolerance,
                                  N_Vector weights, void *data) {
   double *previous = data, size = N_VWrmsNorm (correction, weights), rate = size / *previous;
@@ -108,8 +108,8 @@ static int sun_test_convergence (SUNNonlinearSolver newton, N_Vector y, N_Vector
   return size * fmin (1, remaining) <= tolerance ? SUN_NLS_SUCCESS : SUN_NLS_CONTINUE;
 }
 
-int pw_sun_test_newton (SUNNonlinearSolver newton, double *size) {
-  return SUNNonlinSolSetConvTestFn (newton, sun_test_convergence, size);
+int pw_sun_test_newton (pw_sun *x) {
+  return SUNNonlinSolSetConvTestFn (x->iteration, sun_test_convergence, &x->correction) ? PW_RESOURCE : PW_OK;
 }
 
 void pw_sun_weigh (const pw_sun *x, const double *y, double *w) {

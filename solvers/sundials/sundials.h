@@ -1,4 +1,4 @@
-/* What adams, bdf and ida share, the methods that use integrators of SUNDIALS: version 6 (tested with 6.4). */
+/* What adams, bdf and ida share: they use integrators of SUNDIALS, version 6 (tested with 6.4). */
 #ifndef PW_SUNDIALS_H
 #define PW_SUNDIALS_H
 
@@ -11,19 +11,19 @@
 #include <sunnonlinsol/sunnonlinsol_newton.h>
 #include "quadrature.h"
 
-/* Attempts at a step, each about a quarter of the previous one, if Newton's iteration does not converge or the error is
- * too large: from 1 s down to the round-off of the time.  SUNDIALS' default of 10, a millionth of the step, does not
- * resolve the moment at which friction stops a body. */
+/* Attempts at a step, each about a quarter of the one before, if the iteration does not converge or the error is too
+ * large: from 1 s down to the round-off of the time.  SUNDIALS' default of 10, down to a millionth of the step, does
+ * not resolve the moment at which friction stops a body. */
 enum { PW_SUN_ATTEMPTS = 27 };
 
 typedef struct {
   pw_run *run;
   SUNContext context;
   N_Vector y;                   /* unknowns: q, v, then those of the method */
-  SUNMatrix matrix;             /* of Newton's iteration */
+  SUNMatrix matrix;             /* of Newton's iteration; NULL in adams, like both solvers */
   SUNLinearSolver klu, solver;  /* KLU; the solver that the integrator calls, which calls KLU */
   SUNNonlinearSolver iteration; /* NULL: the default of the integrator */
-  double correction;            /* size of the last Newton correction */
+  double correction;            /* size of the last Newton correction, for pw_sun_test_newton */
   pw_quadrature quadrature;     /* of work and losses */
   double t0;                    /* of the initial state or the last restart */
   pw_statistics before;         /* counts at t0, where those of the integrator begin */
@@ -41,9 +41,9 @@ void pw_sun_restart (pw_sun *x);
 /* A vector with the operations of vectors.c, as have its clones; NULL: out of memory. */
 N_Vector pw_sun_vector (sunindextype length, SUNContext context);
 
-/* A matrix of this pattern, in compressed columns, and a linear solver, which refuses an outdated matrix (tolerances.c)
- * so that the integrator requests a new one.  `solve` (NULL: that of KLU) finds the data `content` in its solver;
- * `content` begins with x; `right` is a vector of the size of the matrix. */
+/* Open x->matrix, of this pattern in compressed columns, and x->solver, which refuses an outdated matrix (tolerances.c)
+ * so that the integrator requests a new one.  right: a vector of the size of the matrix; content: the method's data,
+ * beginning with x, which `solve` finds in its solver; solve: NULL for KLU's. */
 typedef int pw_sun_solve (SUNLinearSolver solver, SUNMatrix matrix, N_Vector x, N_Vector b, realtype tolerance);
 int pw_sun_open_matrix (pw_sun *x, int size, const int64_t *colptr, const int64_t *rowind);
 int pw_sun_open_solver (pw_sun *x, N_Vector right, void *content, pw_sun_solve *solve);
@@ -51,19 +51,20 @@ int pw_sun_open_solver (pw_sun *x, N_Vector right, void *content, pw_sun_solve *
 /* Sets all values to 0 and restores the pattern, which SUNDIALS clears together with the values. */
 void pw_sun_clear (SUNMatrix matrix, const int64_t *colptr, const int64_t *rowind);
 
-/* Replaces SUNDIALS' convergence test, which multiplies the first correction by the convergence rate of previous steps;
- * that is meaningless if a force saturates in between.  Call it after the solver is attached to the integrator; `size`
- * is scratch with the lifetime of the solver.  Returns as SUNDIALS. */
-int pw_sun_test_newton (SUNNonlinearSolver newton, double *size);
+/* Replaces the convergence test of x->iteration, a Newton iteration that the integrator uses already.  The test of
+ * SUNDIALS multiplies the first correction by the convergence rate of previous steps, which is meaningless if a force
+ * saturates in between.  PW_OK or PW_RESOURCE. */
+int pw_sun_test_newton (pw_sun *x);
 
-/* Error weights of q and v, from their tolerances. */
+/* Error weights w of the states q and v in y: one over their tolerances. */
 void pw_sun_weigh (const pw_sun *x, const double *y, double *w);
 
 /* Called by an integrator: stores its message in `sun`, a pw_sun. */
 void pw_sun_message (int code, const char *module, const char *function, char *text, void *sun);
 
-/* Report why the integrator failed with this flag, or cannot restart.  singular: 1 if the configuration is singular;
- * why: the meaning of a flag specific to the integrator, or NULL. */
+/* Report why the integrator failed with this flag, or cannot restart, or that memory is exhausted.  singular: 1 if the
+ * configuration is singular; why: the meaning of a flag specific to the integrator, or NULL.  If the caller has
+ * requested a stop: PW_STOPPED, without a report. */
 int pw_sun_fail (pw_sun *x, int flag, int singular, const char *why, pw_error *error);
 int pw_sun_fail_restart (pw_sun *x, int flag, pw_error *error);
 int pw_sun_no_memory (const pw_run *r, pw_error *error);

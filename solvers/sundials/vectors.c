@@ -2,8 +2,8 @@
  * vectors of a dozen entries, in libraries that distributions may build without optimisation.  These operations are
  * plain loops, including the fused operations on several vectors.
  *
- * Linear sums round like those of SUNDIALS, except that it computes a x + a y as a (x + y); norms add even and odd
- * entries separately. */
+ * Linear sums round like those of SUNDIALS, except that SUNDIALS computes a x + a y as a (x + y); norms add even and
+ * odd entries separately. */
 #include <math.h>
 #include "sundials.h"
 #include "unroll.h"
@@ -19,7 +19,7 @@ PW_INLINE void vectors_sum (sunindextype n, double a, const double *x, double b,
   for (; i < n; i++) z[i] = a * x[i] + b * y[i];
 }
 
-/* The inlined copies have no multiplications by 1. */
+/* vz = a vx + b vy; the inlined copies have no multiplications by 1. */
 static void vectors_linear_sum (realtype a, N_Vector vx, realtype b, N_Vector vy, N_Vector vz) {
   const double *x = NV_DATA_S (vx), *y = NV_DATA_S (vy);
   double *z = NV_DATA_S (vz);
@@ -72,7 +72,7 @@ static int vectors_scale_each (int count, realtype *c, N_Vector *x, N_Vector *z)
 
 /* ---- Norms ---- */
 
-/* sqrt (sum (x_i w_i)^2 / n); with an id, only over id_i > 0. */
+/* sqrt (sum (x_i w_i)^2 / n), with the n of all entries; unless id is NULL, the sum is over id_i > 0 only. */
 PW_INLINE double vectors_root_mean_square (N_Vector vx, N_Vector vw, const double *id) {
   sunindextype i = 0, n = NV_LENGTH_S (vx);
   const double *x = NV_DATA_S (vx), *w = NV_DATA_S (vw);

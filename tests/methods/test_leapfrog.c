@@ -205,10 +205,56 @@ static void test_large_steps (void **state) {
                   "t = 0 s: the iteration does not converge; the step of 0.01 s may be too large");
 }
 
+/* ---- Forces that are not a number ---- */
+
+typedef struct {
+  const char *name, *body;
+} leapfrog_edge;
+
+/* Undefined from x = 0.05 on. */
+static void leapfrog_edge_force (const pw_batch *b, double *out) {
+  out[0] = b->configuration[b->body[0]].x < 0.05 ? 0 : NAN;
+  out[1] = out[2] = 0;
+}
+
+static void leapfrog_edge_force_q (const pw_batch *b, double *out) {
+  (void)b;
+  memset (out, 0, 9 * sizeof *out);
+}
+
+static const pw_field leapfrog_edge_fields[] = {
+  { PW_AT (leapfrog_edge, body), PW_BODY, .required = 1, .about = "the body" },
+  { .name = NULL },
+};
+
+static const pw_kind leapfrog_edge_kind = {
+  .name = "edge",
+  .about = "a force that is undefined beyond an edge",
+  .definition = sizeof (leapfrog_edge),
+  .fields = leapfrog_edge_fields,
+  .bodies = 1,
+  .force = leapfrog_edge_force,
+  .force_q = leapfrog_edge_force_q,
+};
+
+static void leapfrog_beyond_edge (pw_model *m, const void *parameters) {
+  (void)parameters;
+  pw_add_body (m, &(pw_body){ .name = "puck", .mass = 1, .inertia = 1, .rate = { 1, 0, 0 } });
+  pw_add (m, &leapfrog_edge_kind, &(leapfrog_edge){ .name = "edge", .body = "puck" });
+}
+
+/* The step that meets it is refused, although the corrections of y and phi are 0. */
+static void test_undefined_force (void **state) {
+  static const pw_plugin_table undefined = TRIAL_TABLE (leapfrog_beyond_edge);
+  (void)state;
+  leapfrog_stops (scene_system (&undefined, NULL), 0.01, "t = 0.04 s: the iteration does not converge");
+}
+
 int main (void) {
   const struct CMUnitTest tests[] = {
-    cmocka_unit_test (test_order),  cmocka_unit_test (test_residuals), cmocka_unit_test (test_way_back),
-    cmocka_unit_test (test_energy), cmocka_unit_test (test_last_step), cmocka_unit_test (test_large_steps),
+    cmocka_unit_test (test_order),           cmocka_unit_test (test_residuals), cmocka_unit_test (test_way_back),
+    cmocka_unit_test (test_energy),          cmocka_unit_test (test_last_step), cmocka_unit_test (test_large_steps),
+    cmocka_unit_test (test_undefined_force),
   };
   return cmocka_run_group_tests (tests, NULL, NULL);
 }
