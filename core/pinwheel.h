@@ -592,7 +592,7 @@ struct pw_kind {
   /* 2 cols, for forces that saturate, such as friction: the smallest change of each coordinate, then of each velocity,
    * that reverses the force or changes it by its own magnitude.  Entries are INFINITY before the call. */
   pw_batch_function *saturation;
-  const char *symbol; /* how figures draw it: see core/cli/plot/plot_symbols.c; NULL: not at all */
+  const char *symbol; /* strokes in figures, vertices "a x y": core/cli/plot/plot_symbols.c; NULL: none */
 };
 
 /* The number of values of a field, and the bytes of one value; 0 bytes: invalid type. */

@@ -48,7 +48,7 @@ struct pw_run {
   double previous_norm;   /* acceleration norm of the last such state */
   int uses_derivatives;   /* 1: the method uses the derivatives of the equations (tangent.h) */
   double alpha, beta;     /* Baumgarte's, used by pw_run_accelerate; 0: none */
-  double breakpoint;      /* first discontinuity of a signal after t */
+  double breakpoint;      /* next discontinuity of a signal; t if it has just been reached */
   int stalled;            /* consecutive steps that did not advance */
   pw_residuals residuals; /* of the state reached; NaN: not computed */
 

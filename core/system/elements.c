@@ -55,18 +55,18 @@ int pw_workspace_contact_points (pw_workspace *w, double t, const double *q, con
 /* F -= J^T lambda of each element, only the columns of bodies. */
 static void elements_reactions (const pw_element_batch *k, const double *lambda, double *F) {
   const double *J = k->J;
-  int bodies = 3 * k->kind->bodies;
-  for (int e = 0; e < k->b.count; e++, F += bodies)
+  int cols = 3 * k->kind->bodies;
+  for (int e = 0; e < k->b.count; e++, F += cols)
     for (int i = 0; i < k->kind->rows; i++, J += k->b.cols, lambda++)
-      for (int c = 0; c < bodies; c++) F[c] -= J[c] * *lambda;
+      for (int c = 0; c < cols; c++) F[c] -= J[c] * *lambda;
 }
 
 /* F += the force of each element, only the components of bodies. */
 static void elements_applied (const pw_element_batch *k, double *F) {
-  int bodies = 3 * k->kind->bodies;
+  int cols = 3 * k->kind->bodies;
   k->kind->force (&k->b, k->block);
-  for (int e = 0; e < k->b.count; e++, F += bodies)
-    for (int c = 0; c < bodies; c++) F[c] += k->block[e * k->b.cols + c];
+  for (int e = 0; e < k->b.count; e++, F += cols)
+    for (int c = 0; c < cols; c++) F[c] += k->block[e * k->b.cols + c];
 }
 
 int pw_system_force_size (const pw_system *s) {

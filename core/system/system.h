@@ -120,8 +120,8 @@ void pw_evaluate_g (pw_workspace *w, double *g);         /* holonomic */
 void pw_evaluate_g_size (pw_workspace *w, double *size); /* holonomic; at least the length scale, also of angles */
 void pw_evaluate_eta (pw_workspace *w, double *eta);
 void pw_evaluate_gamma (pw_workspace *w, double *gamma);
-void pw_evaluate_force (pw_workspace *w, double *f);
-void pw_evaluate_constant (pw_workspace *w, double *f); /* adds the constant forces */
+void pw_evaluate_force (pw_workspace *w, double *f);    /* constant forces included */
+void pw_evaluate_constant (pw_workspace *w, double *f); /* adds the constant forces, for compilation */
 /* 2 coords: the smallest change of each state that reverses a saturating force or changes it by its own magnitude;
  * INFINITY if there is none. */
 void pw_evaluate_saturation (pw_workspace *w, double *least);

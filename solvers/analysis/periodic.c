@@ -81,7 +81,8 @@ static int periodic_open (pw_periodic *x, pw_error *error) {
     return pw_fail (error, PW_INPUT, "model %s has %d coordinates; periodic motions are sought with at most %d",
                     s->model, x->n, PERIODIC_MAX_COORDINATES);
   double period = x->settings.period;
-  if (period <= 0 && periodic_signal_period (x, &period) != PW_OK) return *error = x->why, error->status;
+  if (period <= 0 && periodic_signal_period (x, &period) != PW_OK)
+    return pw_fail (error, x->why.status, "%s", x->why.text);
   /* At a time at which no signal is likely to vanish: then the system would have more symmetries. */
   const pw_steady_settings settings = { .t = x->settings.t + 0.317 * period,
                                         .span = period > 0 ? period : 1,
@@ -104,7 +105,7 @@ static int periodic_open (pw_periodic *x, pw_error *error) {
   int status = pw_branch_open (&x->branch, &problem, error);
   if (status != PW_OK) return status;
   pw_run *r = pw_periodic_run (x, PW_HERE, x->settings.first, 0, NULL); /* verifies the signals */
-  if (r == NULL) return *error = x->why, error->status;
+  if (r == NULL) return pw_fail (error, x->why.status, "%s", x->why.text);
   pw_run_close (r);
   return PW_OK;
 }
@@ -191,7 +192,7 @@ int pw_periodic_solve (pw_periodic *x, int settle, double parameter, pw_periodic
   if (pw_require (x, "a search", error) != PW_OK) return PW_INPUT;
   if (x->settings.free) x->last_period = x->settings.period > 0 ? x->settings.period : 2 * PW_PI * x->T;
   int status = pw_periodic_settle (x, parameter, settle);
-  if (status < 0) return *error = x->why, status;
+  if (status < 0) return pw_fail (error, status, "%s", x->why.text);
   if (status != PW_OK) return status;
   periodic_set_unknowns (x, parameter);
   status = pw_branch_solve (&x->branch, x->u, error);

@@ -83,7 +83,8 @@ typedef enum { SIGNALS_CONSTANT, SIGNALS_OF_TIME } signal_rule;
 
 /* Stores the initial state and scales at the first value of the parameter. */
 static int steady_begin (pw_steady *x, pw_error *error) {
-  if (pw_steady_open_system (x, PW_HERE, x->settings.first) != PW_OK) return *error = x->why, error->status;
+  if (pw_steady_open_system (x, PW_HERE, x->settings.first) != PW_OK)
+    return pw_fail (error, x->why.status, "%s", x->why.text);
   const pw_run *r = x->system[PW_HERE].run;
   x->L = x->s->scale.length;
   x->T = r->w->scale.time;
@@ -98,7 +99,7 @@ static int steady_symmetries (pw_steady *x, signal_rule signals, pw_error *error
   const double first = x->settings.first;
   int status = pw_steady_open_system (x, PW_HERE, pw_value_within (first, x->settings.last));
   if (status != PW_OK) status = pw_steady_open_system (x, PW_HERE, first);
-  if (status != PW_OK) return *error = x->why, error->status;
+  if (status != PW_OK) return pw_fail (error, x->why.status, "%s", x->why.text);
   if (signals == SIGNALS_CONSTANT) status = steady_constant (x, error);
   if (status != PW_OK) return status;
   status = pw_steady_find_symmetries (x);
@@ -106,7 +107,8 @@ static int steady_symmetries (pw_steady *x, signal_rule signals, pw_error *error
   if (status != PW_OK) return pw_fail_singular (x->system[PW_HERE].run, x->settings.t, error);
   for (int i = 0; i < x->m; i++)
     x->norm[i] = x->system[PW_HERE].linearisation.norm[i] > 0 ? x->system[PW_HERE].linearisation.norm[i] : 1;
-  return pw_steady_open_system (x, PW_HERE, first) == PW_OK ? PW_OK : (*error = x->why, error->status);
+  status = pw_steady_open_system (x, PW_HERE, first);
+  return status == PW_OK ? PW_OK : pw_fail (error, x->why.status, "%s", x->why.text);
 }
 
 static pw_steady *steady_open (const pw_system *s, const pw_steady_settings *settings, signal_rule signals,
@@ -166,7 +168,7 @@ int pw_steady_symmetries (const pw_steady *x) {
 
 int pw_steady_motion_at (pw_steady *x, const double *u, pw_steady_motion *out, pw_error *error) {
   int status = pw_steady_open_system (x, PW_HERE, pw_steady_parameter (x, u));
-  if (status != PW_OK) return *error = x->why, error->status;
+  if (status != PW_OK) return pw_fail (error, x->why.status, "%s", x->why.text);
   pw_run *r = x->system[PW_HERE].run;
   pw_steady_state (x, u);
   x->solved = 1;
@@ -217,7 +219,7 @@ int pw_steady_solve (pw_steady *x, int attempt, double parameter, pw_steady_moti
   if (pw_require (x, "a search", error) != PW_OK) return PW_INPUT;
   double range = x->settings.last - x->settings.first;
   x->free_symmetries = 0;
-  if (pw_steady_open_system (x, PW_HERE, parameter) != PW_OK) return *error = x->why, error->status;
+  if (pw_steady_open_system (x, PW_HERE, parameter) != PW_OK) return pw_fail (error, x->why.status, "%s", x->why.text);
   int status = pw_steady_start (x, attempt, x->u, error);
   if (status != PW_OK) return status;
   x->u[pw_steady_unknowns (x)] = range != 0 ? (parameter - x->settings.first) / range : 0;

@@ -159,7 +159,7 @@ int pw_steady_evaluate (void *steady, const double *u, double *F, double *dF, pw
   int first_held = equations - x->symmetries - x->settings.holds, vary = x->settings.vary;
   double value = pw_steady_parameter (x, u);
   int status = pw_steady_open_system (x, PW_HERE, value);
-  if (status < 0) *error = x->why;
+  if (status < 0) pw_fail (error, status, "%s", x->why.text);
   if (status != PW_OK) return status;
   pw_linearisation *l = &x->system[PW_HERE].linearisation;
   pw_steady_state (x, u);
@@ -178,6 +178,6 @@ int pw_steady_evaluate (void *steady, const double *u, double *F, double *dF, pw
   dF += (size_t)unknowns * (size_t)equations;
   if (vary >= 0) dF[first_held + vary] = pw_hold_slope (x, x->hold + vary) * (x->settings.last - x->settings.first);
   status = x->settings.compile ? steady_by_parameter (x, value, F, dF) : PW_OK;
-  if (status < 0) *error = x->why;
+  if (status < 0) pw_fail (error, status, "%s", x->why.text);
   return status;
 }

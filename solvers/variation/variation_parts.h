@@ -49,7 +49,7 @@ typedef struct pw_direction_copy {
 
 /* A state of the run. */
 typedef struct {
-  double t, *x; /* 3 n: q, v, a */
+  double t, *x; /* 3 n + 3: q, v, a, and 0 for the ground */
   int jumps;    /* 1: accelerations jump between this state and the next one, at the same time up to round-off */
 } pw_variation_point;
 
@@ -112,8 +112,8 @@ static inline void pw_variation_add (double *restrict to, const double *restrict
 
 /* Appends the state of the run at time t, in its last step.  A status. */
 int pw_variation_append (pw_variation *x, double t, pw_error *error);
-/* Inserts states between point i and the last one, in the last step of a run that adapts its steps, until
- * interpolation is as good as a tenth of its tolerance.  A status. */
+/* Inserts states between points i and i + 1, both in the last step of a run that adapts its steps, until interpolation
+ * is as good as a tenth of its tolerance.  A status. */
 int pw_variation_refine (pw_variation *x, int i, pw_error *error);
 /* Adds a last point, whose state the caller stores.  PW_OK or PW_RESOURCE. */
 int pw_variation_add_point (pw_variation *x, pw_error *error);

@@ -4,7 +4,7 @@
 #include <string.h>
 #include "variation_parts.h"
 
-/* The shortest interval that is bisected, as a part of the run's step: 1/32 is, 1/64 is not. */
+/* The shortest interval that is bisected, as a fraction of the run's step: 1/32 is, 1/64 is not. */
 static const double PATH_SHORTEST = 1. / 50;
 
 /* Hermite interpolation between two points, at t = t_0 + u h: q of degree 5 from q, v, a at both ends.  In a run with
@@ -38,9 +38,9 @@ void pw_variation_discard_points (pw_variation *x) {
   while (gone + 1 < x->points && x->point[gone + 1].t <= x->t) gone++;
   x->points -= gone;
   for (int i = 0; i < x->points; i++) {
-    pw_variation_point kept = x->point[i];
+    pw_variation_point discarded = x->point[i]; /* whose array x serves later points */
     x->point[i] = x->point[i + gone];
-    x->point[i + gone] = kept;
+    x->point[i + gone] = discarded;
   }
 }
 
@@ -72,11 +72,11 @@ int pw_variation_accelerations (pw_variation *x, double t, const double *q, cons
   return status < 0 ? pw_fail_signal (t, error) : PW_OK;
 }
 
-/* Part of the run's step over which its velocities are differentiated. */
+/* Fraction of the run's step over which its velocities are differentiated. */
 static const double PATH_PART = 1e-3;
 
-/* Accelerations of a point in the run's last step, of size h, by differences of its dense output, central or at the end
- * of the step backward: in stiff motions those by the equations magnify the errors of the states. */
+/* Accelerations of a point in the run's last step, of size h, by differences of its dense output, central, or backward
+ * at the end of the step: in stiff motions those by the equations magnify the errors of the states. */
 static int path_differentiate (pw_variation *x, const pw_variation_point *p, double h, pw_error *error) {
   double d = PATH_PART * h, *a = p->x + 2 * x->n;
   int inside = p->t + d <= x->r->t, status = PW_OK;
@@ -102,8 +102,9 @@ int pw_variation_append (pw_variation *x, double t, pw_error *error) {
   memcpy (p->x, s.q, n * sizeof (double));
   memcpy (p->x + n, s.v, n * sizeof (double));
   memcpy (p->x + 2 * n, s.a, n * sizeof (double));
+  /* differences are wrong across a jump of accelerations; steps of fixed size have no error to magnify */
   if (x->implicit && h > 0 && !pw_fixed_steps (x->r) && !x->may_jump) return path_differentiate (x, p, h, error);
-  /* at a breakpoint the run's accelerations may be those after it */
+  /* at a breakpoint just reached, the run's accelerations may be those after it */
   return t < x->r->breakpoint ? PW_OK : pw_variation_accelerations (x, t, s.q, s.v, p->x + 2 * n, error);
 }
 

@@ -240,6 +240,26 @@ static void test_pulse (void **state) {
   check_close ("mean", x[0][0], 0.15, 1e-9, "0.3 s of angular acceleration at 0.5 s, whatever the rows of the table");
 }
 
+/* A maximum between two breakpoints, however near the next one is: for p < t < q the motion is x = 0.1 cos 2t + 0.25
+ * sin 2t + (1 - cos 2 (t - p)) / 4, so that dx/dp = -sin (2 (t - p)) / 2. */
+static void test_extremum (void **state) {
+  const double p = 0.4, t = (PW_PI - atan ((1 - sin (2 * p)) / (cos (2 * p) - 0.4))) / 2;
+  double slope[2];
+  (void)state;
+  cli_write ("steps.yaml", "pinwheel: 1\nparameters: [{name: p, value: 0.4}, {name: q, value: 1.2}]\n"
+                           "bodies: [{name: a, mass: 1, inertia: 1, start: {x: 0.1}, rate: {vx: 0.5}}]\nelements:\n"
+                           "  - {force: s, body: a, fx: -4*a.x}\n"
+                           "  - {force: f, body: a, fx: {pulse: {height: 1, start: p, width: 100}}}\n"
+                           "  - {force: g, body: a, fx: {pulse: {height: -1, start: q, width: 100}}}\n");
+  for (int i = 0; i < 2; i++) {
+    cli_good (i ? "pinwheel sensitivity @/steps.yaml --of max:a.x --by p -t 4 -m erk8+none --rtol 1e-9 -o @/sens"
+                : "pinwheel sensitivity @/steps.yaml --of max:a.x --by p -t 4 -m erk8+none --rtol 1e-9 --set q=1.4 "
+                  "-o @/sens");
+    assert_int_equal (sensitivity_json ("\"derivative\": ", slope + i), 1);
+    check_close ("slope", slope[i], -sin (2 * (t - p)) / 2, 1e-7, "rtol 1e-9");
+  }
+}
+
 /* ---- Files ---- */
 
 static void test_files (void **state) {
@@ -494,7 +514,8 @@ int main (void) {
     cmocka_unit_test (test_interrupt),   cmocka_unit_test (test_long_names),
     cmocka_unit_test (test_parameters),  cmocka_unit_test (test_chaos),
     cmocka_unit_test (test_oscillation), cmocka_unit_test (test_jumping_integrals),
-    cmocka_unit_test (test_run_error),   cmocka_unit_test (test_light_body),
+    cmocka_unit_test (test_extremum),    cmocka_unit_test (test_run_error),
+    cmocka_unit_test (test_light_body),
   };
   return cmocka_run_group_tests (tests, cli_setup, cli_teardown);
 }

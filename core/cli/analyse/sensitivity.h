@@ -30,7 +30,7 @@ typedef struct {
   pw_unknown_run *neighbours; /* 4 P: those of each direction */
   pw_variation *variation;
   pw_run *sampled;        /* the run of which samples are taken; NULL: base.run */
-  double last_breakpoint; /* before the time last evaluated [s] */
+  double last_breakpoint; /* that has been passed [s] */
   double *before;         /* F + F P: values and derivatives before a jump */
   double *q;              /* coordinates: scratch */
   char *memory;           /* of these arrays */
@@ -42,8 +42,8 @@ typedef struct {
 int pw_sensitivity_start (pw_sensitivity *sens, const double *values, pw_error *error);
 /* Advances the run to a time, and sets value, slope and slope_error there.  Returns as pw_variation_advance. */
 int pw_sensitivity_at (pw_sensitivity *sens, double t, pw_error *error);
-/* Starts the run, advances it to the end, and computes all results except `loose`.  PW_OK, too, if it is stopped on the
- * way. */
+/* Starts the run, advances it to the end, and computes all results except `loose`.  PW_OK with `stopped` if it is
+ * stopped while it computes derivatives; the status of the run if before. */
 int pw_sensitivity_compute (pw_sensitivity *sens, const double *values, pw_progress *progress, pw_error *error);
 void pw_sensitivity_close (pw_sensitivity *sens); /* but not its unknowns */
 /* 1 if an output is in the table: it is a function of columns at one time, without extrema and integrals. */

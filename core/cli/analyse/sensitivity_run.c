@@ -13,7 +13,8 @@
 
 enum {
   SENSITIVITY_PARTS = 20, /* of the run, between rows of the table, if row_interval is not given */
-  SENSITIVITY_STEPS = 2 /* of the derivatives in an interval of integrals, where 5 nodes integrate squares of columns */
+  /* of the derivatives in an interval of Gauss' formula, whose 5 nodes integrate even squares of columns (rms) */
+  SENSITIVITY_STEPS = 2
 };
 
 int pw_sensitivity_in_table (const pw_sensitivity *sens, int output) {
@@ -130,20 +131,21 @@ static void sensitivity_keep (pw_sensitivity *sens, int i) {
       sens->run_slope[at] = sens->slope[at], sens->run_slope_error[at] = sens->slope_error[at];
 }
 
-/* The same for an extremum, whose derivatives do not exist if it is at a breakpoint whose time depends on the unknown,
- * or just after it.  at_next: 1: it is at the next breakpoint. */
+/* The same for an extremum, whose derivatives do not exist if it is at a breakpoint whose time depends on the unknown.
+ * at_next: 1: it is known to be at the next breakpoint. */
 static void sensitivity_keep_extremum (pw_sensitivity *sens, int i, int at_next) {
   const pw_functional *f = &sens->outcomes.functional[i];
+  const double near = 2 * PW_FUNCTIONAL_INSET * f->step; /* extrema are sought beside the ends of a step */
   double slope, next = pw_variation_breakpoint (sens->variation, 0, &slope);
-  int before = at_next || fabs (f->t - next) < 1e-9 * (1 + fabs (next)), /* up to round-off */
-      after = f->t - sens->last_breakpoint <= 2 * PW_FUNCTIONAL_INSET * f->step;
+  int at_last = f->t - sens->last_breakpoint <= near;
+  at_next |= next - f->t <= near;
   sensitivity_keep (sens, i);
-  for (int p = 0; p < sens->unknowns.count && (before || after); p++)
-    if (sensitivity_jump_slope (sens, p, !before) != 0) sens->run_slope[i * sens->unknowns.count + p] = NAN;
+  for (int p = 0; p < sens->unknowns.count && (at_next || at_last); p++)
+    if (sensitivity_jump_slope (sens, p, !at_next) != 0) sens->run_slope[i * sens->unknowns.count + p] = NAN;
 }
 
-/* Drops derivatives of extrema that do not exist: those in the step of the run in which accelerations jump with the
- * state, at t, if the derivative of the column jumps there; before: derivatives before the jump. */
+/* Drops derivatives of extrema that do not exist: those in the step of the run in which accelerations jump at a
+ * state, reached at t, if the derivative of the column jumps there; before: derivatives before the jump. */
 static void sensitivity_drop_extrema (pw_sensitivity *sens, double t, const double *before) {
   for (int i = 0; i < sens->outcomes.functionals; i++) {
     const pw_functional *f = &sens->outcomes.functional[i];
@@ -207,17 +209,17 @@ static int sensitivity_interval (pw_sensitivity *sens, double t0, double t1, sen
   return status == PW_OK ? pw_sensitivity_at (sens, t1, error) : status;
 }
 
-/* Advances from t0 to t, from just before to just after a breakpoint, or a jump with the state, at a time tb that
- * depends on the unknown p.  Where a column jumps from x- to x+, this adds (x- - x+) dtb/dp to the derivative of its
+/* Advances from t0 to t, from just before to just after a breakpoint, or a jump at a state, at a time tb that depends
+ * on the unknown p.  Where a column jumps from x- to x+, this adds (x- - x+) dtb/dp to the derivative of its
  * integral.  A breakpoint at the end of the run is reached, but not passed. */
-static int sensitivity_jump (pw_sensitivity *sens, double t0, double t, int with_state, pw_error *error) {
-  int passed = with_state || t > sens->last_breakpoint;
+static int sensitivity_jump (pw_sensitivity *sens, double t0, double t, int at_state, pw_error *error) {
+  int passed = at_state || t > sens->last_breakpoint;
   const size_t F = (size_t)sens->outcomes.functionals, P = (size_t)sens->unknowns.count;
   double *slope = sens->before + F; /* before the jump */
   memcpy (sens->before, sens->value, F * sizeof *sens->before);
   memcpy (slope, sens->slope, F * P * sizeof *slope);
   int status = pw_sensitivity_at (sens, t, error);
-  if (status == PW_OK && with_state) sensitivity_drop_extrema (sens, t, slope);
+  if (status == PW_OK && at_state) sensitivity_drop_extrema (sens, t, slope);
   for (int i = 0; i < sens->outcomes.functionals && status == PW_OK; i++) {
     const pw_functional *f = &sens->outcomes.functional[i];
     double jump = sens->before[i] - sens->value[i];
@@ -231,7 +233,8 @@ static int sensitivity_jump (pw_sensitivity *sens, double t0, double t, int with
   return status;
 }
 
-typedef enum { NO_JUMP, JUMP_AT_BREAKPOINT, JUMP_WITH_STATE } sensitivity_jump_type;
+/* A jump of accelerations at the time of a breakpoint, or at a state, when the motion reaches it. */
+typedef enum { NO_JUMP, JUMP_AT_BREAKPOINT, JUMP_AT_STATE } sensitivity_jump_type;
 
 /* The end of the next interval from t towards `to`, in which derivatives are smooth; the type of the jump at its end is
  * stored.  NAN and the error if the search for the next jump fails. */
@@ -241,31 +244,32 @@ static double sensitivity_next (pw_sensitivity *sens, double t, double to, sensi
   *jump = NO_JUMP;
   if (!sens->outcomes.along_run) return fmin (to, breakpoint);
   double next = fmin (fmin (to, breakpoint), t + SENSITIVITY_STEPS * pw_variation_step_size (sens->variation));
-  double with_state = pw_variation_next_jump (sens->variation, next, sens->unknowns.t_end, error);
-  if (isnan (with_state)) return NAN;
-  *jump = with_state < next ? JUMP_WITH_STATE : next == breakpoint ? JUMP_AT_BREAKPOINT : NO_JUMP;
-  return fmin (next, with_state);
+  double at_state = pw_variation_next_jump (sens->variation, next, sens->unknowns.t_end, error);
+  if (isnan (at_state)) return NAN;
+  *jump = at_state < next ? JUMP_AT_STATE : next == breakpoint ? JUMP_AT_BREAKPOINT : NO_JUMP;
+  return fmin (next, at_state);
 }
 
 /* Advances from t to `to`: in intervals without jumps, and across jumps from just before to just after them. */
 static int sensitivity_advance (pw_sensitivity *sens, double t, double to, sensitivity_point *list,
                                 pw_progress *progress, pw_error *error) {
-  const double aside = 1e-9 * fmin (sens->row_interval, sens->unknowns.t_end / SENSITIVITY_PARTS); /* of a jump [s] */
+  /* time before and after a jump at which the columns are evaluated [s] */
+  const double aside = 1e-9 * fmin (sens->row_interval, sens->unknowns.t_end / SENSITIVITY_PARTS);
   sensitivity_jump_type jump;
   int status = PW_OK;
   while (t < to && status == PW_OK) {
     double next = sensitivity_next (sens, t, to, &jump, error);
     if (isnan (next)) return error->status;
     double end = jump ? next - fmin (aside, next - t) : next;
-    if (jump == JUMP_AT_BREAKPOINT) sens->last_breakpoint = next, next = fmin (next + aside, sens->unknowns.t_end);
     status = sensitivity_interval (sens, t, end, list, error);
-    if (status == PW_OK && jump) status = sensitivity_jump (sens, end, next, jump == JUMP_WITH_STATE, error);
+    if (jump == JUMP_AT_BREAKPOINT) sens->last_breakpoint = next, next = fmin (next + aside, sens->unknowns.t_end);
+    if (status == PW_OK && jump) status = sensitivity_jump (sens, end, next, jump == JUMP_AT_STATE, error);
     pw_progress_at (progress, t = next);
   }
   return status;
 }
 
-/* Advances to the end, with a row of the table at the beginning and after every interval of rows. */
+/* Advances to the end, with a row of the table at the beginning and after every row_interval. */
 static int sensitivity_advance_to_end (pw_sensitivity *sens, sensitivity_point *list, pw_progress *progress,
                                        pw_error *error) {
   const double t_end = sens->unknowns.t_end;
@@ -273,7 +277,8 @@ static int sensitivity_advance_to_end (pw_sensitivity *sens, sensitivity_point *
   sens->last_breakpoint = -INFINITY;
   int status = pw_sensitivity_at (sens, 0, error);
   if (status == PW_OK) status = sensitivity_add_row (sens, 0, error);
-  for (int i = 0; i < sens->outcomes.functionals && status == PW_OK; i++)
+  for (int i = 0; i < sens->outcomes.functionals && status == PW_OK;
+       i++) /* of extrema at t = 0; later ones replace them */
     if (pw_is_extremum (sens->outcomes.functional[i].type)) sensitivity_keep (sens, i);
   for (long k = 1; t < t_end && status == PW_OK; k++, t = to) {
     to = (double)k * sens->row_interval;

@@ -13,7 +13,7 @@
 #define SEARCH_GAIN 1e-9    /* least improvement of the objective for a restart, relative to its value */
 
 enum {
-  SEARCH_SLOPES = 3,  /* unknowns from which on derivatives are used, which cost as much as several runs */
+  SEARCH_SLOPES = 3,  /* least number of unknowns for derivatives, which cost as much as several runs */
   SEARCH_RESTARTS = 7 /* of SLSQP, at most */
 };
 
@@ -27,13 +27,14 @@ typedef struct {
   double *allowed;                   /* outputs: violation that NLopt permits */
   double *slope;      /* outputs x unknowns: derivatives with respect to scaled unknowns; NULL: none are used */
   int evaluated;      /* 1: there was a run */
-  int has_slopes;     /* 1: the last run had derivatives */
+  int tried_slopes;   /* 1: the last run was tried with derivatives */
   int failed;         /* 1: the last run failed */
   int slopes_failed;  /* 1: derivatives could not be computed, though the run succeeded */
   double least, most; /* extrema of sign x objective in the runs that succeeded */
 } local_search;
 
-/* The value of an unknown: between the user's bounds `scaled` is from 0 to 1, otherwise it is in units of the scale. */
+/* The value of an unknown.  If the user gives bounds, `scaled` runs from 0 to 1 between them; otherwise it is the value
+ * in units of the scale. */
 static double search_unknown (const pw_unknown *unknown, double scaled) {
   double value = (unknown->has_bounds ? unknown->low : 0) + scaled * unknown->scale;
   return fmin (fmax (value, unknown->low), unknown->high);
@@ -146,10 +147,11 @@ static void search_keep (local_search *local) {
 /* Makes a run, with derivatives if `slopes`.  If only the derivatives fail, the search ends. */
 static int search_try (local_search *local, int slopes, pw_error *error) {
   pw_error own = { 0 };
-  int status = slopes ? search_differentiate (local, &own) : PW_METHOD;
-  if (status == PW_OK || status == PW_RETRY || status == PW_RESOURCE) {
-    if (status != PW_OK) *error = own;
-    return status;
+  int status = PW_OK;
+  if (slopes) {
+    status = search_differentiate (local, &own);
+    if (status == PW_RETRY || status == PW_RESOURCE) *error = own;
+    if (status == PW_OK || status == PW_RETRY || status == PW_RESOURCE) return status;
   }
   status = search_run (local, error);
   local->slopes_failed = slopes && status == PW_OK;
@@ -171,7 +173,7 @@ static void search_evaluate (local_search *local, const double *scaled, int slop
   const pw_unknowns *unknowns = &local->problem->unknowns;
   const size_t size = (size_t)unknowns->count * sizeof *scaled;
   pw_error error = { 0 };
-  if (local->evaluated && local->has_slopes >= slopes && memcmp (local->scaled, scaled, size) == 0) return;
+  if (local->evaluated && local->tried_slopes >= slopes && memcmp (local->scaled, scaled, size) == 0) return;
   memcpy (local->scaled, scaled, size);
   for (int i = 0; i < unknowns->count; i++) local->unknown[i] = search_unknown (unknowns->list + i, scaled[i]);
   int status = search_try (local, slopes, &error);
@@ -180,7 +182,7 @@ static void search_evaluate (local_search *local, const double *scaled, int slop
     return;
   }
   local->evaluated = 1;
-  local->has_slopes = slopes;
+  local->tried_slopes = slopes;
   local->failed = status != PW_OK;
   if (local->failed && local->search->failed++ == 0) local->search->first_error = error;
   if (search_store (local) != PW_OK) status = pw_fail (&error, PW_RESOURCE, "out of memory");
@@ -203,7 +205,8 @@ static double search_objective (unsigned unknowns, const double *scaled, double 
   search_evaluate (local, scaled, gradient != NULL);
   search_gradient (local, 0, sign, gradient);
   if (!local->failed) return sign * local->output[0];
-  return isfinite (most) ? most + fmax (most - local->least, 0.1 * fabs (most)) : 0;
+  double beyond = fmax (most - local->least, 0.1 * fabs (most));
+  return isfinite (most) ? most + (beyond > 0 ? beyond : 1) : 0;
 }
 
 /* The constraints of NLopt: their violations, which are 1 for a run that failed. */
@@ -252,8 +255,8 @@ static void search_point (const pw_unknowns *unknowns, const double *value, doub
   for (int i = 0; i < unknowns->count; i++) scaled[i] = search_scaled (unknowns->list + i, value[i]);
 }
 
-/* Searches from a point.  SLSQP may end early where derivatives change much: it is restarted at the best run as long as
- * that improves. */
+/* Searches from a point, unless the run there failed.  SLSQP may end early where derivatives change much: it is
+ * restarted at the best run as long as that improves. */
 static int search_minimise (local_search *local, double *scaled) {
   pw_search *search = local->search;
   for (int left = local->slope ? 1 + SEARCH_RESTARTS : 1;
