@@ -200,6 +200,7 @@ int pw_periodic_flow (pw_periodic *x, const double *u, pw_flow_accuracy accuracy
   if (r) pw_run_close (r);
   if (status == PW_OK) return PW_OK;
   int refused = x->settings.compile && x->system[place].own == NULL; /* the model refused the value of the parameter */
+  if (status == PW_RESOURCE) pw_fail_memory (x->s, &x->why);
   if (status == PW_RESOURCE || (status == PW_INPUT && r == NULL && !refused))
     return pw_fail (error, status, "%s", x->why.text);
   return PW_RETRY;

@@ -1,5 +1,4 @@
-/* The table of integrators; their options; reading the names of methods:
- * integrator[+stabilisation][:option=value]... */
+/* The table of integrators; reading the names of methods: integrator[+stabilisation][:option=value]... */
 #include <assert.h>
 #include <locale.h>
 #include <math.h>
@@ -145,12 +144,6 @@ int pw_parse_options (const char *text, const pw_method *const *own, const pw_me
 int pw_method_parse (const char *text, const pw_method **method, int *stabilisation, pw_error *error) {
   double values[PW_MAX_OPTIONS];
   return pw_parse_options (text, NULL, method, stabilisation, values, error);
-}
-
-double pw_run_option (const pw_run *r, const char *name) {
-  int i = 0;
-  while (r->method->options[i].name && strcmp (r->method->options[i].name, name) != 0) i++;
-  return r->method->options[i].name ? r->option[i] : 0;
 }
 
 #define METHODS_STEP_RATIO 20. /* typical ratio of an adaptive step at rtol 1e-6 to the model's fixed step */

@@ -356,15 +356,18 @@ static void test_refused (void **state) {
   check_close ("period", pw_system_period (s), 2, 1e-14, "2 pi / omega");
   assert_null (pw_periodic_open (s, &(pw_periodic_settings){ .period = 1.9 }, &error));
   check_error (&error, PW_INPUT, "model snakeboard: signal swing.value does not repeat after 1.9 s");
+  error = (pw_error){ 0 };
   assert_null (pw_periodic_open (s, &(pw_periodic_settings){ .free = 1 }, &error));
   check_error (&error, PW_INPUT,
                "model snakeboard: signal swing.value changes with time, so that the period is not free");
+  error = (pw_error){ 0 };
   pw_periodic_close (periodic_open (s, &(pw_periodic_settings){ .period = 4 }));
   pw_system_free (s);
   s = mathieu_at (NULL, 1, NULL);
   check_close ("period", pw_system_period (s), 0, 0, "a function has none that is known");
   assert_null (pw_periodic_open (s, &(pw_periodic_settings){ .period = 0 }, &error));
   check_error (&error, PW_INPUT, "model scene: no signal has a known period: a period is needed");
+  error = (pw_error){ 0 };
   pw_system_free (s);
 }
 
