@@ -534,7 +534,7 @@ typedef struct {
   const double *v;                       /* count x kind->internal: their velocities */
   const double *u;      /* count x kind->signals x 3: value, first and second time derivative of each signal */
   const double *w;      /* count x cols: the vector w, for jw_q only */
-  const double *lambda; /* count x kind->rows: multipliers, for power and loss only */
+  const double *lambda; /* count x kind->rows: multipliers, for power and loss (the core: also (J^T lambda)_q) */
 } pw_batch;
 
 /* Fills one array for all elements of the batch. */

@@ -45,7 +45,7 @@ typedef struct {
 
 /* Linearises at the state reached.  With more than `most` coordinates only the numbers of coordinates, positions,
  * velocities, rank and unknowns are stored: the cost of the rest is cubic.  Free the result in every case.  Errors:
- * PW_RESOURCE, PW_METHOD; PW_INPUT if an element type leaves out a derivative that is not zero. */
+ * PW_RESOURCE; PW_METHOD, also if accelerations jump; PW_INPUT if a type leaves out a derivative that is not zero. */
 int pw_run_linearise (pw_run *r, int most, pw_linear *l, pw_error *error);
 /* The same with B, basis and shape, at about three times the cost. */
 int pw_run_linear_modes (pw_run *r, int most, pw_linear *l, pw_error *error);

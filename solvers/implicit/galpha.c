@@ -84,7 +84,7 @@ static int galpha_factor (pw_run *r, double h) {
   pw_method_data *d = r->data;
   pw_dae *x = &d->common.dae;
   const int64_t *colptr = x->tangent.colptr, *rowind = x->tangent.rowind;
-  pw_implicit_begin_matrix (&d->common, x->size);
+  pw_scatter_begin_fill (&x->tangent.scatter, d->common.value);
   pw_dae_matrix (x, d->common.v1, d->a1, d->y + 2 * x->n, galpha_c (d, h), galpha_e (d, h));
   for (int c = 0; c < x->size; c++)
     for (int64_t i = colptr[c]; i < colptr[c + 1]; i++)

@@ -63,11 +63,6 @@ void pw_implicit_scale (const pw_dae *x, double c, double e, double *row_factor,
 
 /* ---- Advancing ---- */
 
-void pw_implicit_begin_matrix (pw_implicit *x, int size) {
-  memset (x->value, 0, (size_t)x->dae.tangent.colptr[size] * sizeof *x->value);
-  pw_scatter_begin_fill (&x->dae.tangent.scatter, x->value);
-}
-
 int pw_implicit_fail (pw_run *r, int status, double h, pw_error *error) {
   if (status == PW_METHOD) return pw_fail_signal (r->t, error);
   if (status == PW_RESOURCE) return pw_fail (error, PW_RESOURCE, "t = %.6g s: out of memory in KLU", r->t);

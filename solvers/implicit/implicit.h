@@ -37,9 +37,6 @@ int pw_implicit_complete (pw_run *r, int status, pw_dense_projection projection,
  * entries are of about the same size for every step size (equations in galpha.c). */
 void pw_implicit_scale (const pw_dae *x, double c, double e, double *row_factor, double *column_factor);
 
-/* Sets the matrix to 0 and begins to fill it. */
-void pw_implicit_begin_matrix (pw_implicit *x, int size);
-
 /* A step from the state reached to the new state q1, v1 at t1 = t + h; kinematics are left there.  Returns PW_RETRY if
  * the iteration does not converge, PW_INPUT if its matrix is singular, PW_METHOD if a signal failed, PW_RESOURCE. */
 typedef int pw_implicit_step (pw_run *r, double h, double t1);

@@ -121,8 +121,7 @@ static int drift_open_matrix (pw_run *r) {
 
 static int drift_factor (pw_run *r, double h, double t1) {
   pw_method_data *d = r->data;
-  pw_tangent *x = &d->common.dae.tangent;
-  pw_implicit_begin_matrix (&d->common, r->s->coords + x->rows);
+  pw_scatter_begin_fill (&d->common.dae.tangent.scatter, d->common.value);
   int status = pw_evaluate_J_at (r->w, r->t, r->q, r->v);
   if (status != PW_OK) return status;
   drift_put_momentum (r);

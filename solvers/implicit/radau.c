@@ -51,8 +51,8 @@ static int radau_restart (pw_run *r, pw_error *error) {
   d->last.t = r->t;
   d->previous_h = d->last.h = 0;
   d->remaining = 1;
-  d->F_y_outdated = 1;
-  d->F_y_current = 0;
+  d->renew_F_y = 1;
+  d->F_y_at_state = 0;
   d->h = pw_first_step (r);
   if (d->h >= 0.5 * time_scale * sqrt (r->settings.rtol)) /* saturating forces do not limit it */
     d->h = fmax (d->h, 0.1 * time_scale * sqrt (sqrt (pw_radau_rtol (r))));
@@ -155,8 +155,8 @@ static int radau_accept (pw_run *r, double h, double t1) {
   for (size_t e = 0; e < entries; e++) r->ledger[e] += done.ledger_change[STAGES - 1][e];
   radau_evaluate_reached (r, h);
   r->statistics.steps++;
-  d->F_y_current = 0;
-  d->F_y_outdated = r->matrix_outdated || d->contraction > RADAU_REUSE_CONTRACTION;
+  d->F_y_at_state = 0;
+  d->renew_F_y = r->matrix_outdated || d->contraction > RADAU_REUSE_CONTRACTION;
   return PW_OK;
 }
 
@@ -234,7 +234,7 @@ static int radau_advance (pw_run *r, double t_end, pw_error *error) {
     int signal_fails = status == PW_METHOD && h < RADAU_SIGNAL_STEP * r->w->scale.time;
     if (status == PW_RESOURCE || status == PW_INPUT || signal_fails) return pw_implicit_fail (r, status, h, error);
     r->statistics.rejected++;
-    d->F_y_outdated = !d->F_y_current;
+    d->renew_F_y = !d->F_y_at_state;
     if (status == PW_OK && rejected > 0) radau_project_start (r);
     double reduction = status == PW_RETRY ? d->reduction : 0.25;
     d->h = status == PW_OK ? fmin (0.9 * h, radau_next_h (d, h, err, 1)) : h * reduction;

@@ -1,5 +1,5 @@
-/* The stages of a step of radau: equations, matrices, Newton's iteration, error estimates; see radau.c.  T and the
- * complex eigenvalues of A^-1 were computed with 60 digits from the nodes c. */
+/* The stages of a step of radau: equations, matrices, Newton's iteration, error estimates; see radau.c.  T, with
+ * T^-1 A^-1 T = diag (gamma, [ alpha -beta ; beta alpha ]), was computed with 60 digits from the nodes c. */
 #include <float.h>
 #include <math.h>
 #include <stdlib.h>
@@ -20,7 +20,8 @@ static const double radau_inverse_T[STAGES][STAGES] = {
 };
 static const double radau_alpha = 2.68108287362775213390, radau_beta = 3.05043019924741056943;
 
-/* F (t, y) = B y', B = diag (1, M, 0): minus the residual of dae.h without B y'.  Leaves kinematics and J at (t, y). */
+/* F (t, y), the right-hand side of B y' = F (radau.c): minus the residual of dae.h without its terms B y'.  Leaves
+ * kinematics and J at (t, y). */
 static int radau_evaluate (pw_run *r, double t, const double *y, double *F) {
   pw_method_data *d = r->data;
   int n = d->dae.n, status = pw_evaluate_J_at (r->w, pw_before_breakpoint (r, t), y, y + n);
@@ -38,7 +39,7 @@ int pw_radau_open_matrices (pw_run *r) {
   pw_tangent *x = &d->dae.tangent;
   const double *y = d->now.y;
   if (pw_dae_lay_out (&d->dae, y + d->dae.n, NULL, y + 2 * d->dae.n) != PW_OK) return PW_RESOURCE;
-  size_t nonzeros = (size_t)x->colptr[d->dae.size] + 1;
+  size_t nonzeros = (size_t)x->colptr[d->dae.size] + 1; /* + 1: a NULL of malloc always means out of memory */
   d->minus_F_y = malloc (nonzeros * sizeof *d->minus_F_y);
   d->value = malloc (2 * nonzeros * sizeof *d->value);
   d->diagonal = malloc (((size_t)(2 * d->dae.n) + 1) * sizeof *d->diagonal);
@@ -55,13 +56,12 @@ static int radau_linearise (pw_run *r) {
   const double *y = d->now.y;
   int status = pw_evaluate_J_at (r->w, r->t, y, y + d->dae.n);
   if (status != PW_OK) return status;
-  memset (d->minus_F_y, 0, (size_t)d->dae.tangent.colptr[d->dae.size] * sizeof *d->minus_F_y);
   pw_scatter_begin_fill (&d->dae.tangent.scatter, d->minus_F_y);
   pw_dae_matrix (&d->dae, y + d->dae.n, NULL, y + 2 * d->dae.n, 0, 0);
   pw_matrix_evaluated (r, y, y + d->dae.n);
   r->statistics.jacobians++;
-  d->F_y_current = 1;
-  d->F_y_outdated = 0;
+  d->F_y_at_state = 1;
+  d->renew_F_y = 0;
   d->factored_h = 0;
   return PW_OK;
 }
@@ -119,7 +119,8 @@ double pw_radau_rtol (const pw_run *r) {
 }
 
 /* Sets, for a step of size h, the tolerances of the error test and of Newton's corrections, and the round-off of the
- * states; in index3, which alone does not enforce velocities, that of velocities is that of positions over h. */
+ * states; in index3, which does not enforce J v = eta of holonomic equations, that of velocities is that of positions
+ * over h. */
 static void radau_set_tolerances (pw_run *r, double h) {
   pw_method_data *d = r->data;
   const pw_settings *settings = &r->settings;
@@ -182,7 +183,7 @@ static double radau_time (const pw_run *r, int k, double h, double t1) {
   return k == STAGES - 1 ? t1 : r->t + radau_c[k] * h;
 }
 
-/* One correction; *size, *round_offs: the largest one of a state, in units of newton_tolerance and of round_off. */
+/* One correction; *size, *round_offs: its largest entry in q and v, in units of newton_tolerance and of round_off. */
 static int radau_correct (pw_run *r, double h, double t1, double *size, double *round_offs) {
   pw_method_data *d = r->data;
   double *const *W = d->W, *const *F = d->F;
@@ -213,15 +214,17 @@ static int radau_correct (pw_run *r, double h, double t1, double *size, double *
 
 /* Tests convergence after a correction with `done` ones before it; size, before: of this correction and the previous
  * one in units of newton_tolerance; round_offs: of this one in units of round_off.  PW_DIVERGED also if convergence is
- * too slow.  The tests are those of Hairer & Wanner 1996, section IV.8, and one for round-off: corrections that shrink
- * slowly are accepted up to 64 times round_off, or 1e7 times near a singular configuration, which magnifies it. */
+ * too slow.  Adaptive steps are tested as in Hairer & Wanner 1996, section IV.8, and RADAU5.  All are tested for
+ * round-off: corrections that shrink slowly are accepted up to 64 times round_off, or 1e7 times near a singular
+ * configuration, which magnifies it. */
 static pw_convergence radau_test (pw_run *r, int done, double size, double before, double round_offs) {
   pw_method_data *d = r->data;
-  const int fixed = pw_fixed_steps (r), most = fixed ? 50 : PW_RADAU_MOST; /* a fixed step cannot be made shorter */
+  const int fixed = pw_fixed_steps (r);
+  const int most = fixed ? 50 : PW_RADAU_MOST; /* corrections after the first; a fixed step cannot be made shorter */
   d->reduction = 0.5;
   if (!isfinite (size)) return PW_DIVERGED;
   if (size == 0) return PW_CONVERGED;
-  if (done == 0) { /* forces that saturate may seem to converge with the force of another state (tolerances.c) */
+  if (done == 0) { /* where forces saturate, the first correction may be small far from the solution (tolerances.c) */
     if (fixed || r->s->saturates) return PW_ITERATE;
     d->remaining = pow (fmax (d->remaining, DBL_EPSILON), 0.8);
     return d->remaining * size <= 1 ? PW_CONVERGED : PW_ITERATE;
@@ -255,16 +258,15 @@ static int radau_iterate (pw_run *r, double h, double t1) {
 
 int pw_radau_solve (pw_run *r, double h, double t1) {
   pw_method_data *d = r->data;
-  if (!d->F_y_current && d->F_y_outdated) d->factored_h = 0;
   radau_set_tolerances (r, h);
   d->reduction = 0.5;
   for (;;) {
-    int status = d->F_y_outdated ? radau_linearise (r) : PW_OK;
+    int status = d->renew_F_y ? radau_linearise (r) : PW_OK;
     if (status == PW_OK) status = radau_factor (r, h);
     if (status == PW_OK) status = radau_iterate (r, h, t1);
     d->choose_pivots = status == PW_RETRY && d->near_singular;
-    if (status != PW_RETRY || d->F_y_current) return status;
-    d->F_y_outdated = 1;
+    if (status != PW_RETRY || d->F_y_at_state) return status;
+    d->renew_F_y = 1;
   }
 }
 

@@ -5,7 +5,7 @@
 #include "implicit.h"
 #include "radau_coefficients.h"
 
-enum { PW_RADAU_MOST = 7 }; /* Newton iterations of an adaptive step, as in RADAU5 */
+enum { PW_RADAU_MOST = 7 }; /* Newton corrections after the first in an adaptive step; RADAU5 makes 6 */
 
 /* A step of size h from t; h = 0: there is none. */
 typedef struct {
@@ -25,8 +25,8 @@ struct pw_method_data {
   double *B;                          /* 2 coords: diagonal of B */
   double factored_h;                  /* step size for which both are factorised; 0: none */
   int choose_pivots;                  /* 1: select pivots anew */
-  int F_y_current;                    /* 1: F_y has been evaluated at the state reached */
-  int F_y_outdated;                   /* 1: F_y must be evaluated again */
+  int F_y_at_state;                   /* 1: F_y has been evaluated at the state reached */
+  int renew_F_y;                      /* 1: F_y must be evaluated before the next iteration */
   double *W[PW_RADAU_STAGES], *F[PW_RADAU_STAGES]; /* unknowns: transformed stages; residuals, then corrections */
   double *Y;                                       /* unknowns: at a stage */
   double *complex_x;                               /* unknowns: scratch, complex numbers as pairs */
@@ -51,7 +51,7 @@ struct pw_method_data {
 /* Determines the pattern of F_y and opens both matrices.  PW_OK or PW_RESOURCE. */
 int pw_radau_open_matrices (pw_run *r);
 
-/* The relative tolerance of the error estimate (radau.c). */
+/* The relative tolerance of the error estimate, 0.05 rtol^(2/3); see radau.c. */
 double pw_radau_rtol (const pw_run *r);
 
 /* Solves for the stages of the step to t1 = t + h.  PW_RETRY if Newton's iteration does not converge, PW_INPUT if its

@@ -6,7 +6,7 @@ int pw_newton_open (pw_newton_scratch *n, const pw_system *s) {
   size_t block_size = 1, direction_size = 1;
   for (const pw_element_batch *k = s->batch; k < s->batch + s->batches; k++) {
     const size_t columns = (size_t)k->b.count * (size_t)k->b.cols,
-                 widths[] = { (size_t)k->b.cols, (size_t)k->kind->rows, PW_MAX_SIGNALS };
+                 widths[] = { (size_t)k->b.cols, (size_t)k->kind->rows, (size_t)k->kind->signals }; /* last: force_u */
     if (columns > direction_size) direction_size = columns;
     for (int i = 0; i < 3; i++)
       if (columns * widths[i] > block_size) block_size = columns * widths[i];
@@ -38,8 +38,8 @@ static inline int newton_is_length (int c) {
   return c % 3 != 2;
 }
 
-/* 1 for an entry of a pin that is always zero: its rows of J are multiples of unit vectors in x and y columns, so that
- * their derivatives are in columns of angles only. */
+/* 1 for an entry of a pin that is always zero: in columns of x and y its rows of J are constant, multiples of unit
+ * vectors, so that their derivatives are in columns of angles only, and those of J^T lambda in rows of angles only. */
 static inline int newton_is_zero (newton_part part, int r, int c) {
   if (part == NEWTON_J || part == NEWTON_JT) return newton_is_length (c) && c % 3 == 1 - r;
   return newton_is_length (c) || (part == NEWTON_COORDINATES && newton_is_length (r));

@@ -8,7 +8,7 @@
 
 /* Scratch for the blocks of one system. */
 typedef struct {
-  double *block;     /* largest count x rows x cols of any batch */
+  double *block;     /* room for the largest block of a batch */
   double *direction; /* largest count x cols */
 } pw_newton_scratch;
 
@@ -18,16 +18,16 @@ void pw_newton_close (pw_newton_scratch *n);
 /* Where and how a block is added.  Its rows are coordinates or constraint equations. */
 typedef struct {
   int row, col;               /* the row and column of the matrix for the block's first ones */
-  int rows;                   /* only the first `rows` constraint equations are included */
-  double factor;              /* of blocks whose rows are coordinates, and of those of holonomic equations */
-  double factor_nonholonomic; /* of those of nonholonomic equations */
+  int rows;                   /* constraint equations included: all, s->rows, or the holonomic ones, s->holonomic */
+  double factor;              /* of blocks of forces and (J^T lambda)_q, and of what holonomic equations add */
+  double factor_nonholonomic; /* of what nonholonomic equations add: to J, J^T, and blocks whose rows they are */
   const double *row_scale;    /* further factors, one for each row from `row` on; NULL: 1 */
   const int *row_index;       /* equations: new index of each, -1: omitted; NULL: indices do not change */
   const double *direction;    /* coordinates: w of the block (J w)_q; NULL for other blocks */
   const double *lambda;       /* equations: multipliers of the block (J^T lambda)_q; NULL for other blocks */
 } pw_placement;
 
-/* Adds a block of every batch. */
+/* Adds a block of every batch, at the kinematics last updated. */
 void pw_newton_add_block (pw_newton_scratch *n, pw_workspace *w, pw_scatter_map *t, pw_block block,
                           const pw_placement *put);
 

@@ -36,6 +36,7 @@ int pw_scatter_lay_out (pw_scatter_map *t, int n, int64_t **colptr, int64_t **ro
     }
   }
   (*colptr)[n] = nonzeros;
+  t->length = (size_t)nonzeros;
   free (t->entry);
   t->entry = NULL;
   t->recording = 0;

@@ -4,6 +4,7 @@
 #define PW_SCATTER_H
 
 #include <stdint.h>
+#include <string.h>
 #include "pinwheel.h"
 
 typedef struct {
@@ -14,6 +15,7 @@ typedef struct {
     size_t number;
   } * entry;     /* while recording */
   size_t *place; /* of each contribution: the index in `value` to which it is added */
+  size_t length; /* of `value`: nonzeros of the matrix laid out */
   size_t next;   /* while filling: number of the next contribution */
   double *value; /* while filling: the matrix */
   int failed;    /* 1: out of memory while recording */
@@ -27,10 +29,10 @@ void pw_scatter_begin_record (pw_scatter_map *t);
 int pw_scatter_lay_out (pw_scatter_map *t, int n, int64_t **colptr, int64_t **rowind);
 void pw_scatter_close (pw_scatter_map *t);
 
-/* From now on contributions are added to these values, which the caller has zeroed. */
+/* From now on contributions are added to these values, which are set to 0 first. */
 static inline void pw_scatter_begin_fill (pw_scatter_map *t, double *value) {
   t->next = 0;
-  t->value = value;
+  t->value = memset (value, 0, t->length * sizeof *value);
 }
 
 void pw_scatter_record_entry (pw_scatter_map *t, int row, int col);

@@ -93,7 +93,7 @@ static int condense_remains (const pw_plan *plan, const pw_component *p, int i) 
 static void condense_components (pw_plan *plan) {
   for (pw_component *p = plan->saddle->massless.component; p < plan->saddle->massless.end; p++)
     for (int i = p->pivots; i < p->rows; i++) {
-      p->unknown[i] = condense_remains (plan, p, i) ? p->row[i].row : -1;
+      p->unknown[i] = condense_remains (plan, p, i) ? p->row[i].equation : -1;
       if (p->unknown[i] < 0) continue;
       condense_add_node (plan, (pw_plan_node){ .size = 1, .unknown = p->unknown[i], .grounded = p->grounded });
       for (int g = 0; g < p->groups; g++)

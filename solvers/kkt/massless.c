@@ -1,4 +1,4 @@
-/* Elimination of coordinates without weight, and their solution; see massless.h. */
+/* Elimination of massless coordinates, and the two halves of a solution; see massless.h. */
 #include <math.h>
 #include "massless.h"
 #include "unroll.h"
@@ -43,7 +43,7 @@ static void massless_swap (pw_component *c, int a, int b) {
   }
 }
 
-/* Entries below this part of their row, some 1e3 eps, are what round-off leaves of 0. */
+/* Entries below this, relative to the terms of their row, are what round-off leaves of 0: some 1e3 eps. */
 #define MASSLESS_ROUND_OFF 1e-12
 
 int pw_massless_is_entry (const pw_component *c, int i, int column) {
@@ -69,15 +69,15 @@ static int massless_select_pivot (pw_component *c, int p) {
     return 0;
   }
   massless_swap (c, p, row);
-  c->row[p].pivot = column;
+  c->row[p].pivot_column = column;
   c->row[p].pivot_scale = sqrt (c->squared_scale[column]) / c->row[p].largest;
   c->row[p].rematch_below = guard * best;
   return 1;
 }
 
-/* Subtracts row p from those after it, two columns at a time. */
+/* Subtracts multiples of row p from the rows after it, two columns at a time. */
 PW_INLINE void massless_eliminate (pw_component *c, int p, int pivots) {
-  const int pivot = c->row[p].pivot, cols = c->cols;
+  const int pivot = c->row[p].pivot_column, cols = c->cols;
   double *P = c->A + p * c->stride, inverse = 1 / P[pivot];
   double square = c->rows > pivots ? massless_square (c, p, c->massive_squared_scale) : 0;
   for (int i = p + 1; i < c->rows; i++) {
@@ -111,7 +111,7 @@ PW_INLINE int massless_reduce (pw_component *c, massless_mode mode, int pivots) 
   PW_UNROLL for (int p = 0; p < pivots; p++) {
     if (matches && !massless_select_pivot (c, p)) return p;
     const pw_massless_row *row = &c->row[p];
-    double pivot = fabs (c->A[p * c->stride + row->pivot]) * row->pivot_scale;
+    double pivot = fabs (c->A[p * c->stride + row->pivot_column]) * row->pivot_scale;
     if (!(pivot >= c->least_pivot)) c->least_pivot = pivot;
     if (!matches && !(pivot >= row->rematch_below)) return p;
     massless_eliminate (c, p, pivots);
@@ -146,15 +146,15 @@ PW_INLINE void massless_forward (pw_component *c, double *f, double *gamma, int 
   pw_massless_row *row = c->row;
   for (int i = 0; i < c->rows; i++) {
     const double *L = c->A + i * c->stride + c->first_L_column;
-    row[i].gamma = gamma[row[i].row];
+    row[i].gamma = gamma[row[i].equation];
     PW_UNROLL for (int p = 0; p < pivots; p++) row[i].gamma -= p < i ? L[p] * row[p].gamma : 0;
   }
   for (int i = pivots; i < c->rows; i++)
     if (c->unknown[i] >= 0) gamma[c->unknown[i]] = row[i].gamma;
   PW_UNROLL for (int p = 0; p < pivots; p++) {
-    double w = f[c->global[row[p].pivot]];
-    PW_UNROLL for (int q = 0; q < p; q++) w -= c->A[q * c->stride + row[p].pivot] * row[q].lambda;
-    row[p].lambda = w * c->A[p * c->stride + row[p].pivot];
+    double w = f[c->global[row[p].pivot_column]];
+    PW_UNROLL for (int q = 0; q < p; q++) w -= c->A[q * c->stride + row[p].pivot_column] * row[q].lambda;
+    row[p].lambda = w * c->A[p * c->stride + row[p].pivot_column];
   }
   for (const int *column = c->massive; column < c->massive + c->massives; column++) {
     double change = 0;
@@ -177,14 +177,14 @@ PW_INLINE void massless_backward (pw_component *c, double *a, double *lambda, in
   }
   /* reads all before storing any: one row's index may be the `unknown` of another */
   for (int i = pivots; i < c->rows; i++) row[i].lambda = c->unknown[i] < 0 ? 0 : lambda[c->unknown[i]];
-  for (int i = pivots; i < c->rows; i++) lambda[row[i].row] = row[i].lambda;
+  for (int i = pivots; i < c->rows; i++) lambda[row[i].equation] = row[i].lambda;
   PW_UNROLL for (int p = pivots - 1; p >= 0; p--) {
     const double *A = c->A + p * c->stride;
     double x = row[p].gamma;
-    PW_UNROLL for (int q = p + 1; q < pivots; q++) x -= A[row[q].pivot] * a[c->global[row[q].pivot]];
-    a[c->global[row[p].pivot]] = x * A[row[p].pivot];
+    PW_UNROLL for (int q = p + 1; q < pivots; q++) x -= A[row[q].pivot_column] * a[c->global[row[q].pivot_column]];
+    a[c->global[row[p].pivot_column]] = x * A[row[p].pivot_column];
     for (int i = p + 1; i < c->rows; i++) row[p].lambda -= c->A[i * c->stride + c->first_L_column + p] * row[i].lambda;
-    lambda[row[p].row] = row[p].lambda;
+    lambda[row[p].equation] = row[p].lambda;
   }
 }
 

@@ -56,14 +56,14 @@ typedef struct {
 
 /* A row of a component.  Entries in columns of angles are multiplied by 1 / L before they are compared with others. */
 typedef struct {
-  int row;               /* global */
-  int pivot;             /* matched rows: the local column of the coordinate */
+  int equation;          /* its constraint equation */
+  int pivot_column;      /* matched rows: the local column of the coordinate */
   double largest;        /* largest entry when last matched */
   double pivot_scale;    /* matched rows: factor that makes the pivot relative to `largest` */
   double rematch_below;  /* matched rows: the relative pivot below which the component is matched again */
   double squared_terms;  /* unmatched rows: sum of squares: entries, and what is subtracted from the massive ones */
   double gamma;          /* gamma~ */
-  double lambda;         /* matched rows: w; then the multiplier */
+  double lambda;         /* the multiplier; of matched rows w before that */
   const double **source; /* groups: its entries in the batch, or zeros */
 } pw_massless_row;
 
@@ -93,8 +93,8 @@ typedef struct {
   char *memory;
 } pw_massless;
 
-/* Finds the components and matches them with the J last evaluated.  PW_OK, PW_RESOURCE, or PW_INPUT with the error: the
- * name of a coordinate that no row determines.  Close it in every case. */
+/* Finds the components and matches them with the J last evaluated; weight, rows, active: as for pw_saddle_open.  PW_OK,
+ * PW_RESOURCE, or PW_INPUT with the error that names a coordinate that no row determines.  Close it in every case. */
 int pw_massless_open (pw_massless *m, pw_workspace *w, const double *weight, int rows, const unsigned char *active,
                       pw_error *error);
 void pw_massless_close (pw_massless *m);

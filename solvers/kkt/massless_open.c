@@ -71,7 +71,7 @@ static int massless_add_group (const pw_system *s, pw_component *c, int g) {
 static void massless_add_row (const pw_system *s, pw_component *c, int row, int n, const int *group, const int *column,
                               const double *J) {
   pw_massless_row *to = &c->row[c->rows++];
-  to->row = row;
+  to->equation = row;
   for (int i = 0; i < n; i++) to->source[massless_add_group (s, c, group[i])] = J + column[i];
 }
 
@@ -152,7 +152,7 @@ static int massless_check (pw_massless *m, const massless_plan *p, pw_error *err
     if (found == massless) continue;
     for (int n = 0; n < c->cols; n++) {
       int used = 0;
-      for (int q = 0; q < found; q++) used |= c->row[q].pivot == n;
+      for (int q = 0; q < found; q++) used |= c->row[q].pivot_column == n;
       if (c->is_massless[n] && !used) return massless_undetermined (s, c->global[n], error);
     }
   }

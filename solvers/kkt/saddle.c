@@ -1,4 +1,4 @@
-/* The saddle-point system, condensed to the constraint equations.
+/* The saddle-point system, condensed to the constraint equations; bodies at which many meet are not (block_ldl.h).
  *
  *   S lambda = J W^-1 f - gamma,  S = J W^-1 J^T,     a = W^-1 (f - J^T lambda)
  *

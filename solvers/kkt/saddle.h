@@ -3,8 +3,8 @@
  * W is the mass matrix for accelerations and impulses, or a metric for projections.  An entry of W, a weight, may be 0
  * (a coordinate without mass: eliminated through a constraint row matched to it) or INFINITY (a prescribed coordinate:
  * it does not move; a row of prescribed coordinates alone is ignored, its multiplier is 0).  Coordinates with weight
- * are condensed out exactly; the remaining system for lambda is factorised as a sparse symmetric matrix whose order and
- * pattern are laid out once.  Nothing is allocated after opening. */
+ * are condensed out, except those of bodies at which many rows meet; the remaining system is factorised as a sparse
+ * symmetric matrix whose order and pattern are laid out once.  Nothing is allocated after opening. */
 #ifndef PW_SADDLE_H
 #define PW_SADDLE_H
 

@@ -5,13 +5,13 @@
 #include "linear.h"
 #include "util.h"
 
-/* Column c of A: the effect of a variation along minimal coordinate c. */
+/* Column c of A: z' and u' for a variation along minimal coordinate c (linear_variation.c). */
 static void linear_column_of_A (pw_linearisation *x, int c) {
   double *dq = x->dx, *dv = x->dx + x->n, w = x->frame.twist[2];
   pw_linear_tangent (x, c);
   pw_linear_vary (x);
-  pw_linear_turn (x, -w, dv, x->da);
-  pw_linear_turn (x, -w, dq, dv);
+  pw_linear_turn (x, -w, dv, x->da); /* da becomes da - W dv, */
+  pw_linear_turn (x, -w, dq, dv);    /* then dv becomes dv - W dq */
   pw_linear_coordinates (x, dv, x->da, x->size, x->A + c);
 }
 
@@ -32,7 +32,7 @@ static int linear_arrays (pw_linearisation *x) {
                              { &x->probe, 2 * n },
                              { &x->probe_a, n },
                              { &x->probe_da, n },
-                             { &x->residual, 4 * (2 * m + n) + 15 },
+                             { &x->residual, 4 * (2 * m + n) + PW_LINEAR_SVD_WORK },
                              { &x->left_vectors, x->modes ? size * size + size : 0 },
                              { &x->upper_rows, 4 * size } };
   x->memory = pw_alloc_arrays (array, sizeof array / sizeof *array);
@@ -86,7 +86,8 @@ int pw_linear_open (pw_linearisation *x, pw_run *r, pw_linear_extent extent, int
 /* In units of the scene: two changes of a state, and the least change of the accelerations that counts as a jump. */
 static const double LINEAR_FAR = 1e-6, LINEAR_NEAR = 1e-8, LINEAR_JUMP = 1e-6;
 
-/* The change of the accelerations, in units of the scene, if state j changes by `part` of its unit. */
+/* The change of the accelerations, in units of the scene, if state j changes by `part` of its unit; DBL_MAX if they
+ * cannot be computed then.  Leaves the workspace at the changed state. */
 static double linear_change (pw_linearisation *x, int j, double part) {
   pw_run *r = x->r;
   int n = x->n;
@@ -94,12 +95,12 @@ static double linear_change (pw_linearisation *x, int j, double part) {
   memcpy (q, r->q, (size_t)n * sizeof *q);
   memcpy (v, r->v, (size_t)n * sizeof *v);
   *(j < n ? q + j : v + j - n) += part * pw_unit (r->s, j % n) / (j < n ? 1 : T);
-  if (pw_run_accelerate (r, r->t, q, v, x->da, lambda) != PW_OK) return 0;
+  if (pw_run_accelerate (r, r->t, q, v, x->da, lambda) != PW_OK) return DBL_MAX;
   for (int i = 0; i < n; i++) most = fmax (most, fabs (x->da[i] - x->a[i]) * T * T / pw_unit (r->s, i));
   return most;
 }
 
-/* The first state with which accelerations jump: their change does not decrease with that of the state.  -1: none. */
+/* The first state with which accelerations jump: if it changes less, they change as much.  -1: none. */
 static int linear_jump (pw_linearisation *x) {
   if (!pw_system_may_jump (x->r->s)) return -1;
   for (int j = 0; j < 2 * x->n; j++)
@@ -110,7 +111,7 @@ static int linear_jump (pw_linearisation *x) {
   return -1;
 }
 
-/* Computes all but the counts.  The current state is evaluated last, so that the workspace is left there. */
+/* Computes all but the counts.  Leaves the workspace at the current state. */
 static int linear_compute (pw_linearisation *x, pw_linear *l, pw_error *error) {
   pw_run *r = x->r;
   char name[120];
@@ -121,11 +122,11 @@ static int linear_compute (pw_linearisation *x, pw_linear *l, pw_error *error) {
   l->least = pw_linear_least (x);
   pw_linear_bases (x);
   int jump = linear_jump (x);
+  if (pw_system_may_jump (r->s)) (void)pw_linear_evaluate (x, r->t, r->q, r->v);
   if (jump >= 0)
     return pw_fail (error, PW_METHOD,
-                    "t = %.6g s: accelerations jump with %s at this state, which has no linearisation", r->t,
-                    pw_system_state_name (r->s, jump, name, sizeof name));
-  if (pw_system_may_jump (r->s)) (void)pw_linear_evaluate (x, r->t, r->q, r->v);
+                    "t = %.6g s: accelerations jump with %s at this state, or fail beside it: it has no linearisation",
+                    r->t, pw_system_state_name (r->s, jump, name, sizeof name));
   pw_linear_choose_frame (x);
   if (linear_results (x, l) != PW_OK) return PW_RESOURCE;
   for (int c = 0; c < x->size; c++) linear_column_of_A (x, c);

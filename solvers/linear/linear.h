@@ -39,7 +39,7 @@ typedef struct {
   double *product;               /* n + 2 m: derivatives of J^T lambda - f, gamma - J a, J v - eta, times dx */
   double *da;                    /* n + 3: the resulting variation of accelerations */
   double *scratch, *row_scratch; /* n + 3 m + 3, m */
-  double *residual;              /* 3 x (2 m + n): asymmetries of rigid displacements; then scratch, 2 m + n + 15 */
+  double *residual;              /* 3 x (2 m + n): asymmetries of rigid displacements; then scratch for dgesvd */
   double *probe, *probe_da;      /* 2 n, n: a variation at the current state, and its da (linear_frame.c) */
   double *probe_a;               /* n: accelerations at the current state */
   double *later;                 /* 2 n: a later state */
@@ -56,6 +56,8 @@ typedef struct {
   double tau[3];        /* scalars of the reflections in `symmetry` */
 } pw_linearisation;
 
+/* LAPACK's dgesvd needs at most this scratch, plus the number of rows, for a matrix with 3 columns. */
+enum { PW_LINEAR_SVD_WORK = 15 };
 /* Round-off of derivatives of moderate size, relative to them. */
 #define PW_LINEAR_SYMMETRIC 1e-9
 

@@ -144,7 +144,7 @@ int pw_linear_symmetries (pw_linearisation *x) {
   for (int i = 0; i < 3 * length; i++)
     if (!isfinite (x->residual[i])) return 0;
   if (LAPACKE_dgesvd_work (LAPACK_COL_MAJOR, 'N', 'A', length, 3, x->residual, length, sigma, NULL, 1, VT, 3, work,
-                           15 + length))
+                           PW_LINEAR_SVD_WORK + length))
     return 0;
   while (symmetries < 3 && sigma[2 - symmetries] <= tolerance) symmetries++;
   for (int c = 0; c < x->size; c++) {

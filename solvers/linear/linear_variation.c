@@ -75,7 +75,6 @@ static void linear_pack (pw_linearisation *x) {
 int pw_linear_evaluate (pw_linearisation *x, double t, const double *q, const double *v) {
   int status = pw_run_accelerate (x->r, t, q, v, x->a, x->lambda);
   if (status != PW_OK) return status;
-  memset (x->value, 0, ((size_t)x->colptr[2 * x->n] + 1) * sizeof *x->value);
   pw_scatter_begin_fill (&x->scatter, x->value);
   linear_put (x, v);
   linear_pack (x);

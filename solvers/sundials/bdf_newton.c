@@ -40,7 +40,7 @@ static void newton_fill_matrix (pw_bdf_newton *w, int n) {
   for (int c = 0; c < 3 * n + x->rows; c++) {
     int part = c < 2 * n ? c / n : 2, column = c < 2 * n ? c % n : c - 2 * n; /* parts: q; v; a and lambda */
     for (int64_t i = x->colptr[c]; i < x->colptr[c + 1]; i++)
-      pw_scatter_add (&w->scatter, (int)x->rowind[i], column, w->value ? power[part] * w->value[i] : 0);
+      pw_scatter_add (&w->scatter, (int)x->rowind[i], column, w->scatter.recording ? 0 : power[part] * w->value[i]);
   }
 }
 
@@ -51,21 +51,19 @@ static int newton_set_up (realtype t, N_Vector y, N_Vector derivative, SUNMatrix
                           N_Vector tmp3) {
   pw_method_data *d = data;
   pw_bdf_newton *w = &d->newton;
-  const pw_tangent *x = &w->tangent;
   (void)derivative, (void)tmp1, (void)tmp2, (void)tmp3;
   *evaluated = !reuse || d->sun.run->matrix_outdated;
   if (*evaluated) {
-    int columns = 3 * d->n + x->rows, status = pw_multistep_accelerate (d, t, N_VGetArrayPointer (y));
+    int status = pw_multistep_accelerate (d, t, N_VGetArrayPointer (y));
     if (status != 0) return status;
     memcpy (d->v, N_VGetArrayPointer (y) + d->n, (size_t)d->n * sizeof *d->v);
-    memset (w->value, 0, (size_t)x->colptr[columns] * sizeof *w->value);
     pw_scatter_begin_fill (&w->tangent.scatter, w->value);
     newton_fill_T (d);
     pw_matrix_evaluated (d->sun.run, N_VGetArrayPointer (y), d->v);
     d->sun.run->statistics.jacobians++;
   }
   w->gamma = gamma;
-  pw_sun_clear (matrix, w->colptr, w->rowind);
+  pw_sun_restore_pattern (matrix, w->colptr, w->rowind);
   pw_scatter_begin_fill (&w->scatter, SUNSparseMatrix_Data (matrix));
   newton_fill_matrix (w, d->n);
   d->sun.run->statistics.factorisations++; /* CVODES factorises next */

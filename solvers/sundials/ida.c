@@ -51,7 +51,7 @@ static int ida_matrix (realtype t, realtype c, N_Vector vy, N_Vector vyp, N_Vect
   const double *y = N_VGetArrayPointer (vy), *yp = N_VGetArrayPointer (vyp), *v = y + d->dae.n;
   (void)residual, (void)tmp1, (void)tmp2, (void)tmp3;
   if (ida_update (d, t, y) != PW_OK) return -1;
-  pw_sun_clear (matrix, x->colptr, x->rowind);
+  pw_sun_restore_pattern (matrix, x->colptr, x->rowind);
   pw_scatter_begin_fill (&x->scatter, SUNSparseMatrix_Data (matrix));
   pw_dae_matrix (&d->dae, v, yp + d->dae.n, ida_lambda (d, y, yp), c, c);
   pw_matrix_evaluated (d->sun.run, y, v);

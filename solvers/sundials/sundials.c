@@ -51,16 +51,15 @@ void pw_sun_restart (pw_sun *x) {
 
 /* ---- Linear solver ---- */
 
-void pw_sun_clear (SUNMatrix matrix, const int64_t *colptr, const int64_t *rowind) {
+void pw_sun_restore_pattern (SUNMatrix matrix, const int64_t *colptr, const int64_t *rowind) {
   size_t size = (size_t)SUNSparseMatrix_Columns (matrix), nonzeros = (size_t)colptr[size];
   memcpy (SUNSparseMatrix_IndexPointers (matrix), colptr, (size + 1) * sizeof *colptr);
   memcpy (SUNSparseMatrix_IndexValues (matrix), rowind, nonzeros * sizeof *rowind);
-  memset (SUNSparseMatrix_Data (matrix), 0, nonzeros * sizeof (double));
 }
 
 int pw_sun_open_matrix (pw_sun *x, int size, const int64_t *colptr, const int64_t *rowind) {
   x->matrix = SUNSparseMatrix (size, size, colptr[size], CSC_MAT, x->context);
-  if (x->matrix) pw_sun_clear (x->matrix, colptr, rowind);
+  if (x->matrix) pw_sun_restore_pattern (x->matrix, colptr, rowind);
   return x->matrix ? PW_OK : PW_RESOURCE;
 }
 

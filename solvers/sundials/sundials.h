@@ -48,8 +48,8 @@ typedef int pw_sun_solve (SUNLinearSolver solver, SUNMatrix matrix, N_Vector x, 
 int pw_sun_open_matrix (pw_sun *x, int size, const int64_t *colptr, const int64_t *rowind);
 int pw_sun_open_solver (pw_sun *x, N_Vector right, void *content, pw_sun_solve *solve);
 
-/* Sets all values to 0 and restores the pattern, which SUNDIALS clears together with the values. */
-void pw_sun_clear (SUNMatrix matrix, const int64_t *colptr, const int64_t *rowind);
+/* Restores the pattern, which SUNDIALS clears together with the values. */
+void pw_sun_restore_pattern (SUNMatrix matrix, const int64_t *colptr, const int64_t *rowind);
 
 /* Replaces the convergence test of x->iteration, a Newton iteration that the integrator uses already.  The test of
  * SUNDIALS multiplies the first correction by the convergence rate of previous steps, which is meaningless if a force

@@ -1,6 +1,8 @@
 /* Linearisation of scenes with known frequencies. */
 #include <math.h>
+#include <string.h>
 #include "check.h"
+#include "method.h"
 #include "runs.h"
 #include "scene.h"
 #include "trial.h"
@@ -146,6 +148,57 @@ static void test_large (void **state) {
   pw_system_free (s);
 }
 
+/* ---- Signals that jump or fail beside the state ---- */
+
+static int linear_sign (void *context, double t, const double *x, double value[3], double *gradient) {
+  (void)context, (void)t;
+  value[0] = (x[0] > 0) - (x[0] < 0);
+  if (gradient) gradient[0] = 0;
+  return 0;
+}
+
+/* x^2, which fails for x < 0. */
+static int linear_half (void *context, double t, const double *x, double value[3], double *gradient) {
+  (void)context, (void)t;
+  value[0] = x[0] * x[0];
+  if (gradient) gradient[0] = 2 * x[0];
+  return x[0] < 0;
+}
+
+static void linear_add_block (pw_model *m, pw_function force) {
+  pw_add_body (m, &(pw_body){ .name = "block", .mass = 1, .inertia = 1 });
+  pw_add_force (m, &(pw_force){ .name = "F", .body = "block", .fx = { PW_FUNCTION, .function = force } });
+}
+
+static const char *const linear_reads[] = { "block.vx", NULL };
+
+static void linear_jumping (pw_model *m, const void *parameters) {
+  (void)parameters;
+  linear_add_block (m, (pw_function){ .eval = linear_sign, .reads = linear_reads });
+}
+
+static void linear_one_sided (pw_model *m, const void *parameters) {
+  (void)parameters;
+  linear_add_block (m, (pw_function){ .eval = linear_half, .reads = linear_reads });
+}
+
+/* Neither state has a linearisation; the workspace is left at it, not at a state beside it. */
+static void test_jump (void **state) {
+  static const pw_plugin_table table[] = { TRIAL_TABLE (linear_jumping), TRIAL_TABLE (linear_one_sided) };
+  (void)state;
+  for (int i = 0; i < 2; i++) {
+    pw_error error = { 0 };
+    pw_linear l;
+    pw_system *s = scene_system (&table[i], NULL);
+    pw_run *r = runs_open (s, "rk4", NULL);
+    assert_int_equal (pw_run_linearise (r, 100, &l, &error), PW_METHOD);
+    assert_non_null (strstr (error.text, "accelerations jump with block.vx"));
+    assert_true (r->w->configuration[0].vx == 0);
+    pw_linear_free (&l);
+    runs_close (r, s);
+  }
+}
+
 /* ---- RK4 ---- */
 
 static void test_rk4_limit (void **state) {
@@ -161,7 +214,7 @@ int main (void) {
   const struct CMUnitTest tests[] = {
     cmocka_unit_test (test_pendulum),  cmocka_unit_test (test_oscillator), cmocka_unit_test (test_rotor),
     cmocka_unit_test (test_sleigh),    cmocka_unit_test (test_rank),       cmocka_unit_test (test_large),
-    cmocka_unit_test (test_rk4_limit),
+    cmocka_unit_test (test_rk4_limit), cmocka_unit_test (test_jump),
   };
   return cmocka_run_group_tests (tests, NULL, NULL);
 }
