@@ -138,7 +138,7 @@ static int galpha_correct (pw_run *r, double h, double *correction, double *roun
  *
  * The matrix is evaluated at the prediction, and again while convergence is slow.  The remaining error in multipliers,
  * 1/h^2 times that of positions, must be small against the method's own, which is of order h^2: hence the target of
- * order h^4.  Where corrections stall at a few times their round-off, they are accepted. */
+ * order h^4.  Corrections that stall within 32 times their round-off are accepted. */
 static int galpha_solve (pw_run *r, double h, double t1) {
   const int most = 20; /* iterations */
   pw_method_data *d = r->data;

@@ -49,8 +49,8 @@ static inline void leapfrog_measure (leapfrog_progress *p, double correction, do
   p->largest = fmax (p->largest, fabs (value) / unit);
 }
 
-/* Converged: to round-off; or the next correction would be below it; or corrections stall at what small masses or
- * lengths make of the round-off of the largest coordinate, `magnified`. */
+/* Converged: to round-off; or all further corrections together would be below a quarter of it; or corrections stall at
+ * what small masses or lengths make of the round-off of the largest coordinate, `magnified`. */
 static pw_convergence leapfrog_test (leapfrog_progress *p) {
   const double round_off = 2 * DBL_EPSILON, magnified = 1e4 * DBL_EPSILON;
   p->rate = p->done > 0 ? p->size / p->before : 1;

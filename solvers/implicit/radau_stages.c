@@ -39,7 +39,7 @@ int pw_radau_open_matrices (pw_run *r) {
   pw_tangent *x = &d->dae.tangent;
   const double *y = d->now.y;
   if (pw_dae_lay_out (&d->dae, y + d->dae.n, NULL, y + 2 * d->dae.n) != PW_OK) return PW_RESOURCE;
-  size_t nonzeros = (size_t)x->colptr[d->dae.size] + 1; /* + 1: a NULL of malloc always means out of memory */
+  size_t nonzeros = (size_t)x->colptr[d->dae.size] + 1; /* + 1: never 0, for which malloc may return NULL */
   d->minus_F_y = malloc (nonzeros * sizeof *d->minus_F_y);
   d->value = malloc (2 * nonzeros * sizeof *d->value);
   d->diagonal = malloc (((size_t)(2 * d->dae.n) + 1) * sizeof *d->diagonal);

@@ -27,7 +27,7 @@ struct pw_method_data {
   int choose_pivots;                  /* 1: select pivots anew */
   int F_y_at_state;                   /* 1: F_y has been evaluated at the state reached */
   int renew_F_y;                      /* 1: F_y must be evaluated before the next iteration */
-  double *W[PW_RADAU_STAGES], *F[PW_RADAU_STAGES]; /* unknowns: transformed stages; residuals, then corrections */
+  double *W[PW_RADAU_STAGES], *F[PW_RADAU_STAGES]; /* unknowns: T^-1 Z; F at the stages, then corrections of W */
   double *Y;                                       /* unknowns: at a stage */
   double *complex_x;                               /* unknowns: scratch, complex numbers as pairs */
   double *rate;                                    /* entries: scratch */

@@ -30,7 +30,7 @@ typedef struct {
   int *row;                        /* rank: indices of the independent equations */
   pw_linear_frame frame;
   double *a, *lambda;            /* n + 3, m: at the state last evaluated */
-  double *norm;                  /* m: lengths of the rows of J in units of the scene */
+  double *norm;                  /* m: lengths of the rows of J, columns of angles divided by L */
   double *R;                     /* rank x rank: J^T = Q R, by columns; before that the rows of J, n long each */
   double *Q;                     /* n x n, by columns */
   double *A;                     /* size x size, by rows: in the result */
@@ -58,6 +58,7 @@ typedef struct {
 
 /* LAPACK's dgesvd needs at most this scratch, plus the number of rows, for a matrix with 3 columns. */
 enum { PW_LINEAR_SVD_WORK = 15 };
+
 /* Round-off of derivatives of moderate size, relative to them. */
 #define PW_LINEAR_SYMMETRIC 1e-9
 
@@ -74,7 +75,7 @@ void pw_linear_close (pw_linearisation *x);
 
 /* Records the scatter map of the derivatives.  PW_OK or PW_RESOURCE. */
 int pw_linear_derivatives (pw_linearisation *x);
-/* The smallest singular value of J, rows of length 1; NaN without constraint equations. */
+/* The smallest singular value of the independent rows of J, each of length 1; NaN if there are none. */
 double pw_linear_least (pw_linearisation *x);
 /* J^T = Q R of the independent constraint equations at the state evaluated. */
 void pw_linear_bases (pw_linearisation *x);
