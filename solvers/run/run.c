@@ -45,7 +45,7 @@ void pw_run_set_references (pw_run *r) {
 
 int pw_run_look_ahead (pw_run *r, pw_error *error) {
   char signal[160];
-  double next = pw_next_breakpoint (r->w, r->method->order > 2, r->t);
+  double next = pw_run_next_breakpoint (r, r->t);
   if (!isnan (next)) {
     r->breakpoint = next;
     return PW_OK;
