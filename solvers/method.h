@@ -196,8 +196,8 @@ int pw_run_evaluate (pw_run *r, pw_error *error);
  * reference for later states. */
 void pw_run_set_references (pw_run *r);
 
-/* pw_next_breakpoint, with kinks for one-step methods of order > 2: others do not need steps that end there, or (order
- * 0: multistep methods) their restarts would cost more. */
+/* pw_next_breakpoint of the run's system; with kinks for methods of order > 2: lower orders do not suffer from a kink
+ * inside a step, and multistep methods (order 0) lose more by a restart. */
 static inline double pw_run_next_breakpoint (const pw_run *r, double t) {
   return pw_next_breakpoint (r->w, r->method->order > 2, t);
 }

@@ -14,7 +14,7 @@ int pw_run_annotate_error (const pw_run *r, int status, pw_error *error) {
   if (strstr (error->text, signal)) return status;
   size_t n = strlen (error->text);
   const char *link = strstr (error->text, "a signal failed") ? ":" : "; in the attempted step,";
-  const char *derivative = r->w->failed->of_force ? "" : ", or a derivative of it,"; /* forces need no derivatives */
+  const char *derivative = r->w->failed->of_force ? "" : ", or a derivative of it,"; /* no time derivatives of those */
   snprintf (error->text + n, sizeof error->text - n, "%s %s%s is not a finite number", link, signal, derivative);
   return status;
 }
