@@ -196,6 +196,12 @@ int pw_run_evaluate (pw_run *r, pw_error *error);
  * reference for later states. */
 void pw_run_set_references (pw_run *r);
 
+/* pw_next_breakpoint of the run's system; with kinks for methods of order > 2: lower orders do not suffer from a kink
+ * inside a step, and multistep methods (order 0) lose more by a restart. */
+static inline double pw_run_next_breakpoint (const pw_run *r, double t) {
+  return pw_next_breakpoint (r->w, r->method->order > 2, t);
+}
+
 /* Finds the next discontinuity after the state reached, r->breakpoint. */
 int pw_run_look_ahead (pw_run *r, pw_error *error);
 
@@ -287,8 +293,8 @@ void pw_ledger_rates (pw_run *r, const double *lambda, double *rate);
 /* 1 if work or losses depend on multipliers. */
 int pw_ledger_uses_multipliers (const pw_system *s);
 
-/* Tolerance of the total work and loss of a step of size h [J]: 5 rtol times the energy exchanged so far, or times
- * r->scene_energy if that is larger; not below the round-off of their rates. */
+/* Tolerance of the total work and loss of a step of size h [J]: 5 rtol (5 times atol over L and 1 rad, if larger) times
+ * the largest of r->scene_energy, r->exchanged and the work of a time T; plus round-off. */
 double pw_ledger_tolerance (const pw_run *r, double h);
 
 /* ---- Dynamics ---- */

@@ -50,7 +50,7 @@ struct pw_method {
   const char *name;                         /* "rk4" */
   const char *about;                        /* one line, with its source (author, year) */
   int adaptive;                             /* 1: uses rtol and atol; 0: uses step */
-  int order;                                /* of convergence, of fixed-step methods; 0: variable */
+  int order;                                /* of convergence; 0: variable */
   const pw_stabilisation *stabilisations;   /* ended by a NULL name; the first is the default */
   const pw_option *options;                 /* ended by a NULL name */
   const pw_stabilisation *refused;          /* unsupported ones, `about` is the reason; ended likewise, or NULL */

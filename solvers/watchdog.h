@@ -61,7 +61,7 @@ typedef struct {
   double sine_slope;          /* fastest recent change of the sine per unit of motion */
   int dependent_row;          /* the row that is most nearly dependent */
   int singular_ahead;         /* 1: a singular configuration may be within the next step */
-  int crossed;                /* 1: a point where branches cross was passed recently */
+  int crossed;                /* 1: a point where branches cross was, or may have been, passed recently */
   double step_length;         /* of the last step, in the units of `moved` */
   double previous_t;          /* where the last step began: the time, */
   double *previous_q;         /* the coordinates, */
@@ -85,7 +85,8 @@ int pw_watchdog_near_state (struct pw_run *r);
  * PW_INPUT. */
 int pw_watchdog_check_values (const struct pw_run *r, pw_error *error);
 
-/* 1 if the J last evaluated is near a singular configuration; watchdog.evaluated_sine is then its sine. */
+/* 1 if watchdog.singular_ahead and the J last evaluated, for which r->saddle must be factorised, is near a singular
+ * configuration; watchdog.evaluated_sine is then its sine. */
 int pw_watchdog_near (struct pw_run *r);
 
 /* Checks that the motion has come from watchdog.previous_q to the state reached without leaving its branch; sine: that

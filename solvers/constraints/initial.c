@@ -1,8 +1,8 @@
 /* Makes the initial state of a run consistent with the constraints: positions by Gauss-Newton, then velocities by
  * linear solves.
  *
- * States given by the user or specified by the model are prescribed, and so are, where possible, the positions of
- * coordinates with mass; the rest moves as little as possible in the metric.  If that fails, fewer states are
+ * States given by the user or specified by the model are prescribed and, where massless coordinates remain free, the
+ * positions of those with mass; the rest moves as little as possible in the metric.  If that fails, fewer states are
  * prescribed, in the order of initial_sets.  A state that is consistent to round-off is left unchanged, bit for bit.
  *
  * Equations may depend on each other, all in all (redundant ones) or in the free coordinates, those that are not

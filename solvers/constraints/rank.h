@@ -11,8 +11,7 @@ struct pw_run;
 /* Most entries, rows x coordinates, of a dense matrix: 320 MB. */
 #define PW_RANK_MAX_ENTRIES 4e7
 
-/* The factor by which coordinate j becomes a length: 1, or L for an angle.  (pw_unit is the scene's unit of a
- * coordinate.) */
+/* The factor by which coordinate j becomes a length: 1, or L for an angle. */
 double pw_length_factor (const pw_system *s, int j);
 
 /* All rows of the J last evaluated, dense (rows x coords), as derivatives with respect to these lengths, normalised to

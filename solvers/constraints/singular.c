@@ -137,7 +137,6 @@ int pw_watchdog_open (pw_run *r, pw_error *error) {
   if (watch->loops < 0) return pw_fail_memory (s, error);
   if (watch->loops == 0 && s->rows == s->holonomic) return PW_OK;
   pw_saddle_close (watch->saddle);
-  watch->saddle = NULL;
   pw_length_weights (s, r->scratch);
   watch->saddle = pw_saddle_open (r->w, r->scratch, s->rows, r->active, error);
   return watch->saddle ? PW_OK : PW_RESOURCE;

@@ -46,8 +46,8 @@ static const double erk8_e[] = {
   0.1664377182454986536961530415e1, -0.3503288487499736816886487290, 0.3341791187130174790297318841,
   0.8192320648511571246570742613e-1, -0.2235530786388629525884427845e-1, 0,
 };
-/* The combination of stages 1 and 6 to 11 that vanishes up to order 6.  The factor 12 makes the estimate 1.1 times the
- * error at h lambda = -5.65. */
+/* The combination of stages 1 (the first) and 6 to 11 that vanishes up to order 6.  The factor 12 makes the estimate
+ * 1.1 times the error at h lambda = -5.65. */
 static const double erk8_e6[] = {
   12 * 0.2924623918176328585655549052e-2, 0, 0, 0, 0, 12 * -0.7940482586994692945623099645,
   12 * -0.2450719733525890492596984518, 12, 12 * -0.8333430535631892043063928771e-1,

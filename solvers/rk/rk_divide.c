@@ -131,7 +131,7 @@ int pw_rk_advance_fixed (pw_run *r, double t_end, pw_error *error) {
     return status;
   }
   r->statistics.steps++;
-  if (d->off_grid) { /* counted with the next step, which ends at the next multiple */
+  if (d->off_grid) { /* `counter` counts it with the next step, to the next multiple */
     if (t > t1) d->counter.count = (long)floor ((t - d->counter.base) / r->settings.step);
     return PW_OK;
   }

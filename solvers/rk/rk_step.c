@@ -44,7 +44,7 @@ PW_NOINLINE void rk_combine_any (const pw_run *r, double *q, double *v, const pw
 }
 
 static void rk_combine (const pw_run *r, double *q, double *v, const pw_rk_row *row, double h) {
-  if (row->count == 1)
+  if (row->count == 1) /* a stage of rk4; 4: its new state */
     rk_combine_by (r, q, v, row, h, 1);
   else if (row->count == 4)
     rk_combine_by (r, q, v, row, h, 4);

@@ -39,38 +39,38 @@ static int several_count (const pw_run *r, double t, double t_end) {
 /* The watchdog's data in the form that specialised code uses. */
 static pw_scene_watch several_watchdog (const pw_run *r) {
   const pw_thresholds *limit = &r->limits;
-  const pw_watchdog *g = &r->watchdog;
-  const double length = r->s->scale.length, time_squared = r->w->scale.time * r->w->scale.time;
-  pw_scene_watch x = { .sine = INFINITY, .moved = g->moved, .reference = r->reference_level };
+  const pw_watchdog *watch = &r->watchdog;
+  const double T = r->w->scale.time, L = r->s->scale.length, largest = watch->largest_sine;
+  pw_scene_watch x = { .sine = INFINITY, .moved = watch->moved, .reference = r->reference_level };
   x.lost = pw_stabilised_by (r, PW_UNSTABILISED) ? limit->lost_unstabilised : limit->lost;
-  if (g->saddle) /* else a tree of holonomic joints, never singular */
-    x.sine = g->checked_sine, x.reach = limit->lipschitz * g->largest_sine, x.near_sine = limit->near * g->largest_sine;
-  x.growth = limit->step_growth, x.rank = limit->rank_lost, x.regular = limit->regular * g->largest_sine;
+  if (watch->saddle) /* else a tree of holonomic joints, never singular */
+    x.sine = watch->checked_sine, x.reach = limit->lipschitz * largest, x.near_sine = limit->near * largest;
+  x.growth = limit->step_growth, x.rank = limit->rank_lost, x.regular = limit->regular * largest;
   x.drift = limit->drift_near;
   x.no_branch = 0.5 * limit->drift_near * limit->rank_lost * limit->rank_lost; /* 0.5: a margin for round-off */
-  x.length = length, x.per_length = time_squared / length, x.per_angle = time_squared;
+  x.length = L, x.per_length = T * T / L, x.per_angle = T * T;
   return x;
 }
 
 /* Updates the run's data after the steps taken. */
 static void several_record (pw_run *r, const pw_scene_steps *x) {
   pw_method_data *d = r->data;
-  pw_statistics *s = &r->statistics;
-  pw_watchdog *g = &r->watchdog;
+  pw_statistics *now = &r->statistics;
+  pw_watchdog *watch = &r->watchdog;
   r->t = x->t;
   d->last.t = x->t0, d->last.projected = r->projected;
   d->counter.count += x->done;
   r->near_singular = 0, r->w->failed = NULL;
   r->reference_level = x->watch.reference, r->previous_norm = x->watch.norm;
-  s->steps += x->done;
-  s->position = pw_larger (s->position, x->watch.position), s->g = pw_larger (s->g, x->watch.g);
-  s->velocity = pw_larger (s->velocity, x->watch.velocity), s->jv = pw_larger (s->jv, x->watch.jv);
+  now->steps += x->done;
+  now->position = pw_larger (now->position, x->watch.position), now->g = pw_larger (now->g, x->watch.g);
+  now->velocity = pw_larger (now->velocity, x->watch.velocity), now->jv = pw_larger (now->jv, x->watch.jv);
   pw_specialised_count (r, (long)x->stages * x->done, x->iterations);
-  if (g->saddle == NULL) return; /* else: what watchdog_follow stores where the sine need not be computed */
-  g->step_length = x->watch.step, g->moved = x->watch.moved, g->singular_ahead = 0;
-  g->sine_before_checked = NAN, g->sine_slope = 0, g->crossed = 0;
-  g->previous_t = r->t, g->previous_sine = NAN;
-  memcpy (g->previous_q, r->q, (size_t)r->s->coords * sizeof *g->previous_q);
+  if (watch->saddle == NULL) return; /* else: what watchdog_follow stores where the sine need not be computed */
+  watch->step_length = x->watch.step, watch->moved = x->watch.moved, watch->singular_ahead = 0;
+  watch->sine_before_checked = NAN, watch->sine_slope = 0, watch->crossed = 0;
+  watch->previous_t = r->t, watch->previous_sine = NAN;
+  memcpy (watch->previous_q, r->q, (size_t)r->s->coords * sizeof *watch->previous_q);
 }
 
 /* Fills x for the next steps, up to the first that reaches t, and returns their number; 0: fewer than two can be taken

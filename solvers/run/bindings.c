@@ -44,8 +44,6 @@ int pw_run_record (pw_run *r, double t_end, const double *times, long count, lon
   return status;
 }
 
-/* ---- Inputs ---- */
-
 int pw_input_signal (void *context, double t, const double *x, double value[3], double *gradient) {
   (void)t, (void)x, (void)gradient;
   value[0] = *(const double *)context;

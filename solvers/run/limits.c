@@ -48,7 +48,7 @@ static int limits_record_speed (pw_run *r) {
 }
 
 static int limits_fail_steps (const pw_run *r, pw_error *error) {
-  const pw_statistics *s = &r->statistics;
+  const pw_statistics *now = &r->statistics;
   char name[120], grows[240] = "";
   int state;
   double power, growth = pw_run_growth (r, &state, &power);
@@ -59,7 +59,7 @@ static int limits_fail_steps (const pw_run *r, pw_error *error) {
               pw_system_state_unit (r->s, state), growth, power);
   return pw_fail (error, PW_METHOD,
                   "t = %.6g s: the limit max-steps is reached: %ld attempted steps, %ld of them rejected%s", r->t,
-                  s->steps + s->rejected, s->rejected, grows);
+                  now->steps + now->rejected, now->rejected, grows);
 }
 
 int pw_run_check_limits (pw_run *r, pw_error *error) {

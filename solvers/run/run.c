@@ -14,7 +14,7 @@ int pw_run_annotate_error (const pw_run *r, int status, pw_error *error) {
   if (strstr (error->text, signal)) return status;
   size_t n = strlen (error->text);
   const char *link = strstr (error->text, "a signal failed") ? ":" : "; in the attempted step,";
-  const char *derivative = r->w->failed->of_force ? "" : ", or a derivative of it,"; /* forces need no derivatives */
+  const char *derivative = r->w->failed->of_force ? "" : ", or a derivative of it,"; /* no time derivatives of those */
   snprintf (error->text + n, sizeof error->text - n, "%s %s%s is not a finite number", link, signal, derivative);
   return status;
 }
@@ -45,7 +45,7 @@ void pw_run_set_references (pw_run *r) {
 
 int pw_run_look_ahead (pw_run *r, pw_error *error) {
   char signal[160];
-  double next = pw_next_breakpoint (r->w, r->method->order > 2, r->t);
+  double next = pw_run_next_breakpoint (r, r->t);
   if (!isnan (next)) {
     r->breakpoint = next;
     return PW_OK;

@@ -11,7 +11,7 @@
 
 enum { PROFILE_REPETITIONS = 5 }; /* of a measurement, of which the median counts */
 #define PROFILE_MEASUREMENT 0.005 /* minimum processor time of a measurement [s] */
-#define PROFILE_DISTANCE 1e-10 /* displacement off the constraints before a projection, in units of the length scale */
+#define PROFILE_DISTANCE 1e-10    /* displacement off the constraints before a projection, in units of the scene */
 
 /* What is measured: PROFILE_STAGES stages of an evaluation, then other parts. */
 typedef enum {
@@ -193,7 +193,7 @@ static int profile_open (profile *p, pw_error *error) {
                              { &p->gamma, rows }, { &p->eta, rows }, { &p->jv, rows } };
   p->memory = pw_alloc_arrays (array, sizeof array / sizeof *array);
   if (p->memory == NULL) return pw_fail_memory (r->s, error);
-  for (int j = 0; j < r->s->coords; j++) p->off[j] = r->q[j] + PROFILE_DISTANCE * r->s->scale.length * pw_sin (j + 1);
+  for (int j = 0; j < r->s->coords; j++) p->off[j] = r->q[j] + PROFILE_DISTANCE * pw_unit (r->s, j) * pw_sin (j + 1);
   (void)pw_evaluate_J_at (r->w, p->t, r->q, r->v);
   return pw_stabilised_by (r, PW_PROJECTION) ? pw_projector_open_by_options (&p->projector, p->r, error) : PW_OK;
 }

@@ -47,13 +47,14 @@ double pw_first_step (const pw_run *r) {
 }
 
 int pw_run_saturation (pw_run *r, double *least, char *element, size_t size) {
-  const pw_system *s = r->s;
+  if (!r->s->saturates) return -1;
   double *at_rest = r->scratch;
-  int state = -1;
-  for (int j = 0; j < s->coords; j++) at_rest[j] = 0;
-  if (s->saturates && pw_update_kinematics (r->w, r->t, r->q, at_rest) == PW_OK)
-    state = pw_find_saturation (r->w, least, element, size);
-  if (s->saturates) (void)pw_update_kinematics (r->w, r->t, r->q, r->v);
+  for (int j = 0; j < r->s->coords; j++) at_rest[j] = 0;
+  pw_hold_signals (r->w, 1); /* one that reads velocities may have no value at rest */
+  (void)pw_update_kinematics (r->w, r->t, r->q, at_rest);
+  int state = pw_find_saturation (r->w, least, element, size);
+  pw_hold_signals (r->w, 0);
+  (void)pw_update_kinematics (r->w, r->t, r->q, r->v);
   return state;
 }
 

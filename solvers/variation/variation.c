@@ -33,7 +33,6 @@
 /* How far the run is ahead of the derivatives where accelerations may jump, in units of the scene: those of neighbours
  * may jump earlier than the run's.  Several times the largest such difference. */
 static const double VARIATION_AHEAD = 1e-4;
-
 static const double VARIATION_FIRST_STEP = 1e-3; /* of the derivatives, in units of the scene */
 
 /* ---- Opening ---- */
@@ -282,6 +281,7 @@ static double variation_run_time (const pw_variation *x, double t, double t_end)
 
 int pw_variation_advance (pw_variation *x, double t, double t_end, pw_error *error) {
   if (pw_require (x, "derivatives", error) != PW_OK) return PW_INPUT;
+  if (isnan (t)) return pw_fail (error, PW_INPUT, "t = nan: expected a time");
   pw_run *r = x->r;
   int status = PW_OK;
   while (status == PW_OK && x->t < fmin (t, t_end)) {

@@ -14,11 +14,6 @@
  * over a step is far smaller. */
 static const double BREAKPOINT_SMOOTH = 1e-3;
 
-/* The first breakpoint of a run after time t: for methods of order > 2 also the kinks of signals. */
-static double breakpoint_next (const pw_run *r, double t) {
-  return pw_next_breakpoint (r->w, r->method->order > 2, t);
-}
-
 /* The derivative of a breakpoint by p, or its error (c = 1); exactly 0 if the breakpoint does not move. */
 static double breakpoint_derivative (const pw_direction_copy *d, int c) {
   double sum = 0;
@@ -46,7 +41,7 @@ int pw_variation_look_ahead (pw_variation *x, pw_direction_copy *d, double next,
   d->last = INFINITY;
   for (int i = 0; i < PW_VARIATION_NEIGHBOURS && d->given.initial == NULL; i++) {
     d->first = fmax (d->first, d->breakpoint[i]);
-    d->breakpoint[i] = breakpoint_next (d->given.neighbour[i], d->breakpoint[i]);
+    d->breakpoint[i] = pw_run_next_breakpoint (d->given.neighbour[i], d->breakpoint[i]);
     if (isnan (d->breakpoint[i])) return pw_fail (error, PW_METHOD, "a signal has no next breakpoint");
     infinite += isinf (d->breakpoint[i]) != 0;
     d->last = fmin (d->last, d->breakpoint[i]);
@@ -97,7 +92,7 @@ int pw_variation_jump (pw_variation *x, double t, const double *state, pw_error 
 }
 
 int pw_variation_pass_breakpoint (pw_variation *x, pw_error *error) {
-  double next = breakpoint_next (x->r, x->t), residual = breakpoint_residual (x);
+  double next = pw_run_next_breakpoint (x->r, x->t), residual = breakpoint_residual (x);
   int status = PW_OK;
   PW_EACH_COLUMN (c, x) c->slope = d->given.initial ? 0 : breakpoint_derivative (d, pw_variation_column_index (c));
   for (int i = 0; i < x->count && status == PW_OK; i++)
@@ -114,5 +109,5 @@ int pw_variation_pass_breakpoint (pw_variation *x, pw_error *error) {
 double pw_variation_breakpoint (const pw_variation *x, int i, double *slope) {
   const pw_direction_copy *d = &x->direction[i];
   *slope = d->given.initial == NULL && isfinite (d->breakpoint[0]) ? breakpoint_derivative (d, 0) : 0;
-  return breakpoint_next (x->r, x->t);
+  return pw_run_next_breakpoint (x->r, x->t);
 }

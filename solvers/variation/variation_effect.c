@@ -44,11 +44,12 @@ static void effect_rows (pw_variation *x, const effect_difference *to, pw_elemen
   if (k->kind->g) k->kind->g (&k->b, g);
   if (k->kind->eta) k->kind->eta (&k->b, eta);
   const double *J = k->J;
-  for (int r = 0; r < k->b.count * rows; r++) {
-    int i = k->row + r;
-    double acceleration = gamma[r], velocity = -eta[r], size[3] = { fabs (gamma[r]), fabs (g[r]), fabs (eta[r]) };
+  for (int row = 0; row < k->b.count * rows; row++) {
+    int i = k->row + row;
+    double acceleration = gamma[row], velocity = -eta[row],
+           size[3] = { fabs (gamma[row]), fabs (g[row]), fabs (eta[row]) };
     for (int c = 0; c < k->b.cols; c++, J++) {
-      int j = pw_global (k, r / rows, c);
+      int j = pw_global (k, row / rows, c);
       if (j >= n) continue;
       acceleration -= *J * l->a[j];
       velocity += *J * x->v[j];
@@ -56,7 +57,7 @@ static void effect_rows (pw_variation *x, const effect_difference *to, pw_elemen
       effect_add_term (to, j, -*J * l->lambda[i], fabs (*J * l->lambda[i]));
     }
     effect_add_term (to, n + i, acceleration, size[0]);
-    effect_add_term (to, n + m + i, g[r], size[1]);
+    effect_add_term (to, n + m + i, g[row], size[1]);
     effect_add_term (to, n + 2 * m + i, velocity, size[2]);
   }
 }

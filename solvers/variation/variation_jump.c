@@ -295,9 +295,8 @@ int pw_variation_approach_jump (pw_variation *x, pw_error *error) {
 }
 
 int pw_variation_pass_jump (pw_variation *x, pw_error *error) {
-  int time_varies = 0, smooth;
   jump_neighbour k = jump_of (x, x->t);
-  smooth = jump_leaves (k);
+  int time_varies = 0, smooth = jump_leaves (k);
   PW_EACH_COLUMN (c, x) {
     c->slope = jump_slope (c, k);
     smooth &= isfinite (c->slope);

@@ -1,4 +1,5 @@
-/* Derivatives of energies, powers and multipliers along a column: exact, or by differences along that of the state. */
+/* Derivatives of energies, powers and multipliers along a column: exact, or by differences along the derivative of the
+ * state. */
 #include <float.h>
 #include <math.h>
 #include <string.h>

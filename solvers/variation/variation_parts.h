@@ -17,7 +17,7 @@ enum {
 typedef struct {
   const struct pw_direction_copy *direction;
   double *Y;                     /* size: dq, dv, d ledger, the latter only with `ledger` */
-  double *K[PW_VARIATION_RATES]; /* size: time derivatives of Y at the stages; implicit steps: F_i, then Y_i */
+  double *K[PW_VARIATION_RATES]; /* size: time derivatives of Y at the stages; implicit steps: F, then F_i, then Y_i */
   double *lambda;                /* m: d lambda at the state last evaluated */
   double *trial;                 /* size: Y at a stage, or at the end of a step */
   double slope;                  /* derivative of the time of the breakpoint or jump being passed */
@@ -74,7 +74,7 @@ struct pw_variation {
   struct pw_variation_implicit *implicit; /* implicit steps; NULL: explicit ones */
   double *q, *v;                          /* n + 3: the state last evaluated */
   double *a[PW_VARIATION_RATES];          /* n: accelerations of the run at the stages */
-  /* n: of velocities in the last step: the error of the method, the difference from the change of the run's own */
+  /* n, of the last step: the error of the method for velocities; integral of accelerations less change of velocities */
   double *motion_error, *motion_defect;
   double speed;              /* largest velocity of the run so far, in units of the scene */
   double reversal;           /* change of a velocity over which a force reverses, at most 1, in units of the scene */
@@ -178,7 +178,7 @@ double pw_variation_stiffness (const pw_variation *x, double h);
 /* ---- variation_implicit.c ---- */
 
 typedef struct pw_variation_implicit pw_variation_implicit;
-/* NULL without memory. */
+/* NULL if out of memory. */
 pw_variation_implicit *pw_variation_implicit_open (const pw_variation *x);
 void pw_variation_implicit_close (pw_variation_implicit *p);
 /* As pw_variation_explicit_stages, and `local_error`; all errors are estimates of order h^4. */

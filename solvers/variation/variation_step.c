@@ -61,7 +61,7 @@ static double step_noise (const pw_variation *x) {
   return STEP_ROUND * most * x->r->w->scale.time / fmin (x->r->settings.step, x->r->w->scale.time);
 }
 
-/* The permitted step_motion_error: STEP_MOTION, or the run's own error if that is larger, multiplied by x->reversal: in
+/* The permitted step_motion_error: STEP_MOTION, or the run's own error multiplied by x->reversal if that is larger: in
  * motions with forces that reverse fast, smaller errors matter. */
 static double step_motion_tolerance (const pw_variation *x) {
   return fmax (STEP_MOTION, step_noise (x) * x->reversal / fmax (1, x->speed));

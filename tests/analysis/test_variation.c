@@ -409,6 +409,13 @@ static void test_refusals (void **state) {
   assert_null (pw_variation_open (c.r, &c.d, 1, 0, &error));
   check_error (&error, PW_INPUT, "derivatives need inputs=stage: held inputs depend on the steps");
   variation_free (&c);
+  c = variation_open (block_make, &b, 8, 1e-4, "rk4", NULL);
+  error = (pw_error){ 0 };
+  pw_variation *x = pw_variation_open (c.r, &c.d, 1, 0, &error);
+  assert_int_equal (pw_variation_advance (x, NAN, 0.1, &error), PW_INPUT);
+  check_error (&error, PW_INPUT, "t = nan: expected a time");
+  pw_variation_close (x);
+  variation_free (&c);
 }
 
 /* The run makes the same steps with derivatives and without. */

@@ -171,8 +171,38 @@ static void test_atol (void **state) {
   }
 }
 
+/* A force of constant power, which is not finite at rest. */
+static int saturation_power (void *context, double t, const double *x, double value[3], double *gradient) {
+  (void)context, (void)t;
+  value[0] = 1 / x[0];
+  if (gradient) gradient[0] = -1 / (x[0] * x[0]);
+  return 0;
+}
+
+static void saturation_driven (pw_model *m, const void *parameters) {
+  static const char *const reads[] = { "b.vx", NULL };
+  saturation_block (m, parameters);
+  pw_add_force (m, &(pw_force){ .name = "p",
+                                .body = "b",
+                                .fx = { PW_FUNCTION, .function = { .eval = saturation_power, .reads = reads } } });
+}
+
+/* pw_run_saturation finds the velocity scale although a signal has no value at rest. */
+static void test_no_rest (void **state) {
+  const pw_plugin_table table = SATURATION_TABLE (saturation_driven);
+  char element[100];
+  double least;
+  pw_system *s = scene_system (&table, "speed", 1e-3, NULL);
+  pw_run *r = runs_open (s, "erk5+projection", NULL);
+  (void)state;
+  assert_int_equal (pw_run_saturation (r, &least, element, sizeof element), pw_system_coordinates (s));
+  check_close ("driven block", least, 1e-3, 1e-3 * 8 * CHECK_EPS, "round-off");
+  runs_close (r, s);
+}
+
 int main (void) {
   const struct CMUnitTest tests[] = { cmocka_unit_test (test_block), cmocka_unit_test (test_kinds),
-                                      cmocka_unit_test (test_explicit), cmocka_unit_test (test_atol) };
+                                      cmocka_unit_test (test_explicit), cmocka_unit_test (test_atol),
+                                      cmocka_unit_test (test_no_rest) };
   return cmocka_run_group_tests (tests, NULL, NULL);
 }
