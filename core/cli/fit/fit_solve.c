@@ -16,9 +16,11 @@
 #include "fit.h"
 
 #define SOLVE_GRADIENT 1e-4 /* largest cosine between the residuals and a column of the Jacobian at a minimum */
-#define SOLVE_RANK 1e-6   /* singular values of the scaled Jacobian count as 0 below it, relative to the largest one */
-#define SOLVE_EFFECT 1e-9 /* smallest effect of an unknown times its scale, relative to the largest one */
-#define SOLVE_EXACT 1e-8  /* norm of the residuals of an exact fit, relative to the initial one */
+#define SOLVE_RANK 1e-6 /* singular values of the scaled Jacobian count as 0 below it, relative to the largest one */
+#define SOLVE_EFFECT \
+  1e-9                   /* norm of a column of the Jacobian times the scale of its unknown, relative to the largest
+                           * such product, below which the unknown has no effect */
+#define SOLVE_EXACT 1e-8 /* norm of the residuals of an exact fit, relative to the initial one */
 #define SOLVE_ROUND_OFF 1e-12 /* the same, relative to the norm of the data: round-off of a run */
 #define SOLVE_TOLERANCE 1e-10 /* of GSL: relative step in u, and gradient */
 enum { SOLVE_ITERATIONS = 100 /* of a search, at most */ };
@@ -30,10 +32,10 @@ typedef struct {
   double *values;   /* columns x rows: of the model, in the last run */
   double *jacobian; /* unknowns x (columns x rows) */
   int known;        /* 1: the last run succeeded */
-  int status;       /* PW_OK, or else the fit ends */
+  int status;       /* PW_OK, or else the fit ends, with `error` */
   pw_error *error;
   double worst; /* largest norm of the residuals of the runs of this search that succeeded */
-  double least; /* sum of squares at the best minimum so far, fit->estimate; INFINITY: no search has ended yet */
+  double least; /* sum of squares at the best minimum so far, fit->estimate; INFINITY: no search has reached one yet */
   int previous; /* iterations of earlier searches */
 } fit_solver;
 
@@ -62,8 +64,22 @@ static double solve_start (const pw_unknown *unknown, double value) {
 
 /* ---- Residuals ---- */
 
-/* Makes the run at u the last one, unless it already is.  Its status, which is also that of the solver if it ends the
- * fit: a failure of the very first run, of memory, or Ctrl-C. */
+/* Ends the fit after a failure of memory, after Ctrl-C, or if no other search can go on without what failed. */
+static void solve_fail (fit_solver *solver, int essential, const pw_error *error, int status) {
+  if (status == PW_OK || !(essential || status == PW_RETRY || status == PW_RESOURCE)) return;
+  solver->status = status;
+  *solver->error = *error;
+}
+
+/* The sum of squares of (values - data) / sigma, or of data / sigma if `values` is NULL. */
+static double solve_sum (const pw_fit *fit, const double *values) {
+  double sum = 0;
+  for (int i = 0; i < fit->columns * fit->rows; i++)
+    if (!isnan (fit->data[i])) sum += pow (((values ? values[i] : 0) - fit->data[i]) / fit->sigma[i], 2);
+  return sum;
+}
+
+/* Makes the run at u the last one, unless it already is.  A failure of the very first run ends the fit.  A status. */
 static int solve_run (fit_solver *solver, const gsl_vector *u) {
   pw_fit *fit = solver->fit;
   int same = solver->known;
@@ -74,14 +90,11 @@ static int solve_run (fit_solver *solver, const gsl_vector *u) {
     solver->unknowns[i] = value;
   }
   if (same) return PW_OK;
-  solver->known = 0;
   int status = pw_fit_run (fit, solver->unknowns, solver->values, &own);
-  fit->runs++;
+  if (status == PW_OK && !isfinite (solve_sum (fit, solver->values)))
+    status = pw_fail (&own, PW_METHOD, "the sum of the squares of the residuals is not finite");
   solver->known = status == PW_OK;
-  if (status == PW_RETRY || status == PW_RESOURCE || fit->runs == 1) {
-    solver->status = status;
-    if (status != PW_OK) *solver->error = own;
-  }
+  solve_fail (solver, fit->runs++ == 0, &own, status);
   return status;
 }
 
@@ -98,19 +111,21 @@ static int solve_residuals (const gsl_vector *u, void *context, gsl_vector *f) {
     sum += residual * residual;
     gsl_vector_set (f, (size_t)k++, residual);
   }
-  if (!isfinite (sum)) return GSL_EBADFUNC;
   if (!failed) solver->worst = fmax (solver->worst, sqrt (sum));
   return GSL_SUCCESS;
 }
 
-/* Derivatives of the residuals with respect to u, or if u is NULL, to the unknowns themselves, at the last run. */
+/* Derivatives of the residuals with respect to u at u; or if u is NULL, with respect to the unknowns, at the last run.
+ * Without derivatives a search ends; the fit ends if no search has reached a minimum. */
 static int solve_derivatives (const gsl_vector *u, void *context, gsl_matrix *J) {
   fit_solver *solver = context;
   pw_fit *fit = solver->fit;
   int cells = fit->columns * fit->rows;
+  pw_error own = { 0 };
   if (u && solve_run (solver, u) != PW_OK) return GSL_EBADFUNC;
-  solver->status = pw_fit_jacobian (fit, solver->unknowns, solver->values, solver->jacobian, solver->error);
-  if (solver->status != PW_OK) return GSL_EBADFUNC;
+  int status = pw_fit_jacobian (fit, solver->unknowns, solver->values, solver->jacobian, &own);
+  solve_fail (solver, u == NULL || !isfinite (solver->least), &own, status);
+  if (status != PW_OK) return GSL_EBADFUNC;
   for (int j = 0; j < fit->unknowns.count; j++) {
     double slope = u ? solve_slope (fit->unknowns.list + j, gsl_vector_get (u, (size_t)j)) : 1;
     for (int i = 0, k = 0; i < cells; i++)
@@ -131,27 +146,33 @@ static void solve_store (fit_solver *solver, double chi2) {
   memcpy (fit->fitted, solver->values, (size_t)fit->columns * (size_t)fit->rows * sizeof *fit->fitted);
 }
 
-static void solve_progress (const size_t iteration, void *context, const gsl_multifit_nlinear_workspace *w) {
-  fit_solver *solver = context;
+/* `moved`: 1 if the last run was made at the position reached.  It is the result if Ctrl-C ends the first search. */
+static void solve_progress (fit_solver *solver, int iteration, int moved, const gsl_multifit_nlinear_workspace *w) {
   double norm = gsl_blas_dnrm2 (gsl_multifit_nlinear_residual (w));
-  if (solver->status != PW_OK) return;
   if (iteration == 0 && solver->previous == 0) solver->fit->initial_chi2 = norm * norm;
-  solver->fit->iterations = solver->previous + (int)iteration;
-  /* The last run, at the position reached, is the result if Ctrl-C ends the first search. */
-  if (!isfinite (solver->least) && solver->known) solve_store (solver, norm * norm);
+  solver->fit->iterations = solver->previous + iteration;
+  if (!isfinite (solver->least) && moved) solve_store (solver, norm * norm);
   snprintf (solver->fit->progress.note, sizeof solver->fit->progress.note, "residual %.6g", norm);
   pw_progress_at (&solver->fit->progress, solver->fit->iterations);
 }
 
-/* The sum of squares of (values - data) / sigma, or of data / sigma if `values` is NULL. */
-static double solve_sum (const pw_fit *fit, const double *values) {
-  double sum = 0;
-  for (int i = 0; i < fit->columns * fit->rows; i++)
-    if (!isnan (fit->data[i])) sum += pow (((values ? values[i] : 0) - fit->data[i]) / fit->sigma[i], 2);
-  return sum;
+/* Iterates from u, the last run.  Unlike gsl_multifit_nlinear_driver, it ends when derivatives cannot be evaluated:
+ * GSL_EBADFUNC.  GSL_ENOPROG: many steps in a row were rejected; only in the first iteration is this the end, since
+ * otherwise the next one begins with a new damping parameter. */
+static int solve_iterate (fit_solver *solver, gsl_vector *u, gsl_multifit_nlinear_fdf *f,
+                          gsl_multifit_nlinear_workspace *w) {
+  int info, status = gsl_multifit_nlinear_init (u, f, w), more = status == GSL_SUCCESS;
+  if (more) solve_progress (solver, 0, 1, w);
+  for (int i = 1; i <= SOLVE_ITERATIONS && more; i++) {
+    status = gsl_multifit_nlinear_iterate (w);
+    if (status != GSL_SUCCESS && (status != GSL_ENOPROG || i == 1)) break;
+    solve_progress (solver, i, status == GSL_SUCCESS, w);
+    more = gsl_multifit_nlinear_test (SOLVE_TOLERANCE, SOLVE_TOLERANCE, 0, &info, w) == GSL_CONTINUE;
+  }
+  return status;
 }
 
-/* Stores the sum of squares and the values at the minimum that a search has reached. */
+/* Stores the sum of squares and the unknowns at the minimum that a search has reached; the best one is the result. */
 static void solve_keep (fit_solver *solver, double *minimum) {
   *minimum = solve_sum (solver->fit, solver->values);
   memcpy (minimum + 1, solver->unknowns, (size_t)solver->fit->unknowns.count * sizeof *solver->unknowns);
@@ -160,8 +181,8 @@ static void solve_keep (fit_solver *solver, double *minimum) {
   solve_store (solver, *minimum);
 }
 
-/* A search from the values in `minimum`, which its result replaces.  Only the first search must have one. */
-static int solve_minimum (fit_solver *solver, gsl_multifit_nlinear_workspace *w, double *minimum) {
+/* A search from the unknowns in `minimum`, which its result replaces.  Only the first search must have one. */
+static void solve_minimum (fit_solver *solver, gsl_multifit_nlinear_workspace *w, double *minimum) {
   pw_fit *fit = solver->fit;
   size_t n = (size_t)fit->unknowns.count;
   gsl_multifit_nlinear_fdf f = {
@@ -169,22 +190,14 @@ static int solve_minimum (fit_solver *solver, gsl_multifit_nlinear_workspace *w,
   };
   gsl_vector_view view = gsl_vector_view_array (solver->u, n);
   gsl_vector *u = &view.vector;
-  int info;
   for (size_t i = 0; i < n; i++) solver->u[i] = solve_start (fit->unknowns.list + i, minimum[1 + i]);
   *minimum = INFINITY;
   solver->worst = 0;
-  int first = fit->runs == 0,
-      status = solve_run (solver, u) == PW_OK ? gsl_multifit_nlinear_init (u, &f, w) : GSL_EBADFUNC;
-  if (status == GSL_SUCCESS)
-    status = gsl_multifit_nlinear_driver (SOLVE_ITERATIONS, SOLVE_TOLERANCE, SOLVE_TOLERANCE, 0, solve_progress, solver,
-                                          &info, w);
-  if (solver->status == PW_OK && (status == GSL_SUCCESS || status == GSL_EMAXITER || status == GSL_ENOPROG)) {
-    gsl_vector_memcpy (u, gsl_multifit_nlinear_position (w));
-    fit->iterations = solver->previous += (int)gsl_multifit_nlinear_niter (w);
-    if (solve_run (solver, u) == PW_OK) solve_keep (solver, minimum);
-  } else if (solver->status == PW_OK && first)
-    solver->status = pw_fail (solver->error, PW_METHOD, "least squares: %s", gsl_strerror (status));
-  return solver->status;
+  int status = solve_run (solver, u) == PW_OK ? solve_iterate (solver, u, &f, w) : GSL_EBADFUNC;
+  if (solver->status != PW_OK || (status != GSL_SUCCESS && status != GSL_ENOPROG)) return;
+  gsl_vector_memcpy (u, gsl_multifit_nlinear_position (w));
+  fit->iterations = solver->previous += (int)gsl_multifit_nlinear_niter (w);
+  if (solve_run (solver, u) == PW_OK) solve_keep (solver, minimum);
 }
 
 /* Searches from all starts. */
@@ -267,7 +280,7 @@ static void solve_covariance (pw_fit *fit) {
   }
 }
 
-/* Covariance and standard errors of the estimate, at which the last run was made. */
+/* Covariance and standard errors of the estimate, which pw_fit_solve has made the last run. */
 static int solve_errors (fit_solver *solver) {
   pw_fit *fit = solver->fit;
   size_t n = (size_t)fit->unknowns.count;
