@@ -206,8 +206,7 @@ static int periodic_csv (const void *context, FILE *f, pw_error *error) {
 }
 
 /* ---- The figure: paths and angular velocities, or curves over the parameter; multipliers and the unit circle ----
- *
- * Its data sets end with two blank lines; a row of nan in each keeps it from being empty. */
+ * Data sets of gnuplot end with two blank lines; a row of nan keeps each from being empty. */
 
 /* Writes t / T, then x, y, phi, omega of the bodies, over one period T. */
 static int periodic_write_motion (const pw_periodic_command *cmd, const pw_periodic_orbit *o, FILE *f,

@@ -85,6 +85,7 @@ static int steady_advise (pw_steady_command *cmd, pw_steady_point *p, pw_error *
   for (int i = 0; i < count && used < sizeof p->advice; i++)
     used += (size_t)snprintf (p->advice + used, sizeof p->advice - used, " --hold %s=%.9g",
                               pw_system_held_name (cmd->m.system, hold[i].state, name, sizeof name), hold[i].value);
+  if (used >= sizeof p->advice) *p->advice = 0;
   return count < 0 ? steady_unadvised (cmd, count, error) : PW_OK;
 }
 

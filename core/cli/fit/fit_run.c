@@ -140,10 +140,8 @@ static int jacobian_by_variation (const pw_fit *fit, const double *unknowns, dou
 int pw_fit_jacobian (pw_fit *fit, const double *unknowns, const double *values, double *jacobian, pw_error *error) {
   pw_error own = { 0 };
   int status = fit->by_differences ? PW_METHOD : jacobian_by_variation (fit, unknowns, jacobian, &own);
-  if (status == PW_OK || status == PW_RETRY || status == PW_RESOURCE) {
-    if (status == PW_RESOURCE) *error = own;
-    return status;
-  }
+  if (status == PW_RESOURCE) *error = own;
+  if (status == PW_OK || status == PW_RETRY || status == PW_RESOURCE) return status;
   fit->by_differences = 1;
   return jacobian_by_differences (fit, unknowns, values, jacobian, error);
 }

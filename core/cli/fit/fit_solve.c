@@ -102,20 +102,18 @@ static int solve_run (fit_solver *solver, const gsl_vector *u) {
 static int solve_residuals (const gsl_vector *u, void *context, gsl_vector *f) {
   fit_solver *solver = context;
   const pw_fit *fit = solver->fit;
-  double sum = 0;
   int failed = solve_run (solver, u) != PW_OK;
   if (solver->status != PW_OK) return GSL_EBADFUNC;
   for (int i = 0, k = 0; i < fit->columns * fit->rows; i++) {
     if (isnan (fit->data[i])) continue;
     double residual = failed ? 10 * solver->worst + 1 : (solver->values[i] - fit->data[i]) / fit->sigma[i];
-    sum += residual * residual;
     gsl_vector_set (f, (size_t)k++, residual);
   }
-  if (!failed) solver->worst = fmax (solver->worst, sqrt (sum));
+  if (!failed) solver->worst = fmax (solver->worst, sqrt (solve_sum (fit, solver->values)));
   return GSL_SUCCESS;
 }
 
-/* Derivatives of the residuals with respect to u at u; or if u is NULL, with respect to the unknowns, at the last run.
+/* Derivatives of the residuals with respect to u at u; or if u is NULL, with respect to the unknowns at the estimate.
  * Without derivatives a search ends; the fit ends if no search has reached a minimum. */
 static int solve_derivatives (const gsl_vector *u, void *context, gsl_matrix *J) {
   fit_solver *solver = context;
@@ -123,7 +121,8 @@ static int solve_derivatives (const gsl_vector *u, void *context, gsl_matrix *J)
   int cells = fit->columns * fit->rows;
   pw_error own = { 0 };
   if (u && solve_run (solver, u) != PW_OK) return GSL_EBADFUNC;
-  int status = pw_fit_jacobian (fit, solver->unknowns, solver->values, solver->jacobian, &own);
+  const double *unknowns = u ? solver->unknowns : fit->estimate, *values = u ? solver->values : fit->fitted;
+  int status = pw_fit_jacobian (fit, unknowns, values, solver->jacobian, &own);
   solve_fail (solver, u == NULL || !isfinite (solver->least), &own, status);
   if (status != PW_OK) return GSL_EBADFUNC;
   for (int j = 0; j < fit->unknowns.count; j++) {
@@ -201,12 +200,16 @@ static void solve_minimum (fit_solver *solver, gsl_multifit_nlinear_workspace *w
 }
 
 /* Searches from all starts. */
-static int solve_minima (fit_solver *solver, gsl_multifit_nlinear_workspace *w) {
+static void solve_minima (fit_solver *solver) {
   pw_fit *fit = solver->fit;
   size_t n = (size_t)fit->unknowns.count, starts = (size_t)fit->starts;
+  const gsl_multifit_nlinear_parameters parameters = gsl_multifit_nlinear_default_parameters ();
+  gsl_multifit_nlinear_workspace *w =
+      gsl_multifit_nlinear_alloc (gsl_multifit_nlinear_trust, &parameters, (size_t)fit->residuals, n);
   double *start = pw_unknowns_starts (&fit->unknowns, fit->starts, 1);
   fit->minima = malloc (starts * (1 + n) * sizeof *fit->minima);
-  if (start == NULL || fit->minima == NULL) solver->status = pw_fail (solver->error, PW_RESOURCE, "out of memory");
+  if (w == NULL || start == NULL || fit->minima == NULL)
+    solver->status = pw_fail (solver->error, PW_RESOURCE, "out of memory");
   solver->least = INFINITY;
   for (size_t i = 0; i < starts && solver->status == PW_OK; i++) {
     fit->minima[i * (1 + n)] = INFINITY;
@@ -214,10 +217,10 @@ static int solve_minima (fit_solver *solver, gsl_multifit_nlinear_workspace *w) 
   }
   for (size_t i = 0; i < starts && solver->status == PW_OK; i++) solve_minimum (solver, w, fit->minima + i * (1 + n));
   free (start);
+  if (w) gsl_multifit_nlinear_free (w);
   if (solver->status == PW_OK && !isfinite (solver->least))
-    solver->status = pw_fail (solver->error, PW_METHOD,
-                              "no search ended at a motion; begin nearer to the data, by --set or --start");
-  return solver->status;
+    solver->status =
+        pw_fail (solver->error, PW_METHOD, "no search reached a minimum; begin nearer to it, by --set or --start");
 }
 
 /* ---- Errors of the estimates ---- */
@@ -280,23 +283,21 @@ static void solve_covariance (pw_fit *fit) {
   }
 }
 
-/* Covariance and standard errors of the estimate, which pw_fit_solve has made the last run. */
-static int solve_errors (fit_solver *solver) {
+/* Covariance and standard errors of the estimate. */
+static void solve_errors (fit_solver *solver) {
   pw_fit *fit = solver->fit;
   size_t n = (size_t)fit->unknowns.count;
   gsl_matrix *J = gsl_matrix_alloc ((size_t)fit->residuals, n);
   gsl_matrix_view V = gsl_matrix_view_array (fit->singular_vector, n, n);
   gsl_vector_view S = gsl_vector_view_array (fit->singular_value, n);
-  if (J == NULL) return pw_fail (solver->error, PW_RESOURCE, "out of memory");
-  solve_derivatives (NULL, solver, J);
-  if (solver->status == PW_OK) {
+  if (J == NULL) solver->status = pw_fail (solver->error, PW_RESOURCE, "out of memory");
+  if (J && solve_derivatives (NULL, solver, J) == GSL_SUCCESS) {
     solve_scale (fit, J);
     fit->converged = solve_converged (fit, J);
     gsl_linalg_SV_decomp_jacobi (J, &V.matrix, &S.vector);
     solve_covariance (fit);
   }
-  gsl_matrix_free (J);
-  return solver->status;
+  if (J) gsl_matrix_free (J);
 }
 
 /* ---- The fit ---- */
@@ -316,20 +317,9 @@ static int solve_open (fit_solver *solver) {
 
 int pw_fit_solve (pw_fit *fit, pw_error *error) {
   fit_solver solver = { .fit = fit, .error = error };
-  gsl_multifit_nlinear_parameters parameters = gsl_multifit_nlinear_default_parameters ();
   solver.status = solve_open (&solver);
-  gsl_multifit_nlinear_workspace *w =
-      solver.status == PW_OK ? gsl_multifit_nlinear_alloc (gsl_multifit_nlinear_trust, &parameters,
-                                                           (size_t)fit->residuals, (size_t)fit->unknowns.count)
-                             : NULL;
-  if (solver.status == PW_OK && w == NULL) solver.status = pw_fail (error, PW_RESOURCE, "out of memory");
-  if (solver.status == PW_OK) solve_minima (&solver, w);
-  if (solver.status == PW_OK) {
-    memcpy (solver.unknowns, fit->estimate, (size_t)fit->unknowns.count * sizeof *fit->estimate);
-    memcpy (solver.values, fit->fitted, (size_t)fit->columns * (size_t)fit->rows * sizeof *fit->fitted);
-    solver.status = solve_errors (&solver);
-  }
-  if (w) gsl_multifit_nlinear_free (w);
+  if (solver.status == PW_OK) solve_minima (&solver);
+  if (solver.status == PW_OK) solve_errors (&solver);
   free (solver.unknowns);
   return solver.status;
 }
