@@ -113,7 +113,8 @@ static int steady_found (pw_steady_command *cmd, const pw_steady_motion *m, int 
   return p ? steady_advise (cmd, p, error) : PW_RESOURCE;
 }
 
-/* Adds the solutions at a value of the parameter, first the one found from the initial state. */
+/* Adds the solutions at a value of the parameter, first the one found from the initial state; later attempts may fail
+ * by PW_METHOD, too. */
 static int steady_search (pw_steady_command *cmd, double parameter, pw_error *error) {
   pw_progress progress;
   pw_steady_motion m;

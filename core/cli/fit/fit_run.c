@@ -59,8 +59,8 @@ typedef struct {
   pw_error *error;                  /* of each task */
 } jacobian_differences;
 
-/* The relative step h is the cube root of the noise, which balances the truncation error of central differences, of
- * order h^2, and the effect of the noise, noise / h: both are noise^(2/3). */
+/* The step h, relative to the value or, if that is larger, to a hundredth of the scale, is the cube root of the noise:
+ * the truncation error of central differences, of order h^2, and noise / h are both noise^(2/3). */
 static int jacobian_side (void *context, int task, pw_error *error) {
   jacobian_differences *d = context;
   const pw_fit *fit = d->fit;

@@ -15,11 +15,11 @@
 #include <string.h>
 #include "fit.h"
 
+/* An unknown has no effect if the norm of its column of the Jacobian, times its scale, relative to the largest such
+ * product, is below this. */
+#define SOLVE_EFFECT 1e-9
 #define SOLVE_GRADIENT 1e-4 /* largest cosine between the residuals and a column of the Jacobian at a minimum */
-#define SOLVE_RANK 1e-6 /* singular values of the scaled Jacobian count as 0 below it, relative to the largest one */
-#define SOLVE_EFFECT \
-  1e-9                   /* norm of a column of the Jacobian times the scale of its unknown, relative to the largest
-                           * such product, below which the unknown has no effect */
+#define SOLVE_RANK 1e-6  /* singular values of the scaled Jacobian count as 0 below it, relative to the largest one */
 #define SOLVE_EXACT 1e-8 /* norm of the residuals of an exact fit, relative to the initial one */
 #define SOLVE_ROUND_OFF 1e-12 /* the same, relative to the norm of the data: round-off of a run */
 #define SOLVE_TOLERANCE 1e-10 /* of GSL: relative step in u, and gradient */
@@ -64,7 +64,7 @@ static double solve_start (const pw_unknown *unknown, double value) {
 
 /* ---- Residuals ---- */
 
-/* Ends the fit after a failure of memory, after Ctrl-C, or if no other search can go on without what failed. */
+/* Ends the fit after a failure of memory, after Ctrl-C, or if `essential`: no search can do without what failed. */
 static void solve_fail (fit_solver *solver, int essential, const pw_error *error, int status) {
   if (status == PW_OK || !(essential || status == PW_RETRY || status == PW_RESOURCE)) return;
   solver->status = status;
@@ -145,7 +145,7 @@ static void solve_store (fit_solver *solver, double chi2) {
   memcpy (fit->fitted, solver->values, (size_t)fit->columns * (size_t)fit->rows * sizeof *fit->fitted);
 }
 
-/* `moved`: 1 if the last run was made at the position reached.  It is the result if Ctrl-C ends the first search. */
+/* `moved`: 1 if the last run was made at the position reached; it is the result if Ctrl-C ends the first search. */
 static void solve_progress (fit_solver *solver, int iteration, int moved, const gsl_multifit_nlinear_workspace *w) {
   double norm = gsl_blas_dnrm2 (gsl_multifit_nlinear_residual (w));
   if (iteration == 0 && solver->previous == 0) solver->fit->initial_chi2 = norm * norm;
@@ -180,7 +180,7 @@ static void solve_keep (fit_solver *solver, double *minimum) {
   solve_store (solver, *minimum);
 }
 
-/* A search from the unknowns in `minimum`, which its result replaces.  Only the first search must have one. */
+/* A search from the unknowns in `minimum`, which its result replaces; *minimum is INFINITY without a result. */
 static void solve_minimum (fit_solver *solver, gsl_multifit_nlinear_workspace *w, double *minimum) {
   pw_fit *fit = solver->fit;
   size_t n = (size_t)fit->unknowns.count;
