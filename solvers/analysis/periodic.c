@@ -31,9 +31,9 @@ static int periodic_same (void *periodic, const double *u, const double *other) 
 /* ---- Opening ---- */
 
 static int periodic_arrays (pw_periodic *x) {
-  size_t n = (size_t)x->n, states = 2 * n, most = states + (size_t)x->symmetries + 2;
+  size_t n = (size_t)x->n, states = 2 * n, all = states + (size_t)x->symmetries + 2; /* of u */
   const pw_array array[] = {
-    { &x->u, most },
+    { &x->u, all },
     { &x->y0, states },
     { &x->y1, states },
     { &x->a0, n },
@@ -43,11 +43,11 @@ static int periodic_arrays (pw_periodic *x) {
     { &x->Phi, states * states },
     { &x->basis, states * states },
     { &x->dual, states * states },
-    { &x->monodromy, 2 * states * states + 40 * states },
+    { &x->monodromy, (2 * states + 1 + PW_PERIODIC_WORK) * states },
     { &x->re, states },
     { &x->im, states },
-    { &x->work, (size_t)pw_steady_rate_count (x->s) + most },
-    { &x->beside, most + 2 * states },
+    { &x->work, (size_t)pw_steady_rate_count (x->s) + all },
+    { &x->beside, all + 2 * states },
   };
   x->memory = pw_alloc_arrays (array, sizeof array / sizeof *array);
   return x->memory ? PW_OK : PW_RESOURCE;

@@ -43,14 +43,6 @@ static void equations_displace (const pw_periodic *x, const double *rates, const
   for (int j = 3 * bodies; j < n; j++) out[j] += rates[pw_steady_angle_rate (x->s, j)];
 }
 
-/* The change of a state along symmetry k. */
-static void equations_symmetry (const pw_periodic *x, int k, const double *y, double *out) {
-  const double *symmetry = x->steady->symmetry + k * pw_steady_rate_count (x->s);
-  pw_steady_velocities (x->steady, symmetry, y, out);
-  memset (out + x->n, 0, (size_t)x->n * sizeof *out);
-  pw_linear_turn (&x->steady->system[PW_HERE].linearisation, symmetry[PW_RATE_TURN], y + x->n, out + x->n);
-}
-
 /* ---- Equations ---- */
 
 /* After a flow from the state of u. */
@@ -105,13 +97,15 @@ static void equations_by_state (pw_periodic *x, const double *u, int rows, doubl
 
 /* Direction k in which solutions can be shifted, along symmetries and in time, into x->change. */
 static void equations_shift (pw_periodic *x, int k) {
-  size_t n = (size_t)x->n;
-  if (k < x->symmetries) {
-    equations_symmetry (x, k, x->y0, x->change);
+  const size_t n = (size_t)x->n, bytes = n * sizeof *x->change;
+  if (k == x->symmetries) { /* in time */
+    memcpy (x->change, x->y0 + n, bytes), memcpy (x->change + n, x->a0, bytes);
     return;
   }
-  memcpy (x->change, x->y0 + n, n * sizeof *x->change);
-  memcpy (x->change + n, x->a0, n * sizeof *x->change);
+  const double *symmetry = x->steady->symmetry + k * pw_steady_rate_count (x->s);
+  pw_steady_velocities (x->steady, symmetry, x->y0, x->change);
+  memset (x->change + n, 0, bytes);
+  pw_linear_turn (&x->steady->system[PW_HERE].linearisation, symmetry[PW_RATE_TURN], x->y0 + n, x->change + n);
 }
 
 /* The conditions that corrections are orthogonal to these directions. */
@@ -209,7 +203,7 @@ static int equations_block (pw_periodic *x, int first, int count, int to, double
   for (int c = 0; c < count; c++)
     memcpy (block + c * count, x->monodromy + (first + c) * x->size + first, (size_t)count * sizeof *block);
   if (count && LAPACKE_dgeev_work (LAPACK_COL_MAJOR, 'N', 'N', count, block, count, x->re + to, x->im + to, NULL, 1,
-                                   NULL, 1, work, 34 * x->size))
+                                   NULL, 1, work, PW_PERIODIC_WORK * x->size))
     return PW_METHOD;
   equations_sort (count, x->re + to, x->im + to);
   return PW_OK;
@@ -217,7 +211,7 @@ static int equations_block (pw_periodic *x, int first, int count, int to, double
 
 /* In coordinates that begin with the shifts, the monodromy matrix is block triangular: the first block is trivial. */
 int pw_periodic_multipliers (pw_periodic *x, const double *u, int *trivial) {
-  int n = x->n, size = x->size, lwork = 34 * size;
+  int n = x->n, size = x->size, lwork = PW_PERIODIC_WORK * size;
   double *S = x->monodromy + size * size, *tau = S + size * size, *work = tau + size;
   int k = *trivial = equations_shifts (x, S);
   pw_steady_combine (x->steady, u + 2 * n, 1, x->work);

@@ -61,7 +61,7 @@ const pw_system *pw_periodic_system (pw_periodic *x, pw_place place, double valu
  * state, and determines the period of x->system[place].  NULL, with x->why, if it fails. */
 pw_run *pw_periodic_run (pw_periodic *x, pw_place place, double value, double rtol, const double *y);
 /* Integrates one period from the state of u: sets y0, a0 and y1, a1, or with derivatives basis, dual, Phi.  A status;
- * PW_RETRY with x->why. */
+ * PW_RETRY: there is no such motion, perhaps with x->why, or the search has been stopped. */
 int pw_periodic_flow (pw_periodic *x, const double *u, pw_flow_accuracy accuracy, pw_place place, pw_error *error);
 /* Sets x->state to the state after some periods of the motion from the initial state, and a free period that is not
  * given to a guess.  A status; x->why contains the reason of a failure, unless the search has been stopped. */
@@ -69,6 +69,7 @@ int pw_periodic_settle (pw_periodic *x, double value, int periods);
 
 /* ---- periodic_equations.c ---- */
 
+enum { PW_PERIODIC_WORK = 34 }; /* numbers of work space of LAPACK per minimal coordinate */
 /* pw_branch_problem.evaluate. */
 int pw_periodic_evaluate (void *periodic, const double *u, double *F, double *dF, pw_error *error);
 /* Fills x->re, x->im with the multipliers of u, after a flow with derivatives: those that are not trivial, the largest

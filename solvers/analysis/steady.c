@@ -12,13 +12,13 @@ enum {
 };
 static const double STEADY_EXACT = 1e-9, /* largest residual of a solution, in units of the scene */
     STEADY_SLOW = 1e-4,    /* rates that may be round-off at a double root: more than the root of STEADY_EXACT */
-    SUGGEST_CHANGE = 1e-8, /* a quantity is worth holding if the square of its change along the family is larger, */
-    SUGGEST_LEFT = 1e-6;   /* and the part of this square that is not held already, relative to the whole, is larger */
+    SUGGEST_CHANGE = 1e-8, /* a quantity is worth holding if the square of its change along the family, without the */
+    SUGGEST_LEFT = 1e-6;   /* part that is held already, is larger than this, and than this times the whole square */
 
 /* ---- Opening ---- */
 
 static int steady_arrays (pw_steady *x) {
-  size_t n = (size_t)x->n, m = (size_t)x->m, rates = (size_t)pw_steady_rate_count (x->s), most = n + rates;
+  size_t n = (size_t)x->n, m = (size_t)x->m, rates = (size_t)pw_steady_rate_count (x->s), unknowns = n + rates;
   size_t holds = (size_t)x->settings.holds, equations = (size_t)x->holonomic + m + n + holds + rates;
   const pw_array array[] = {
     { &x->symmetry, rates * rates },
@@ -29,13 +29,13 @@ static int steady_arrays (pw_steady *x) {
     { &x->v, n + 3 },
     { &x->rates, rates },
     { &x->combined, rates },
-    { &x->u, most + 1 },
-    { &x->F, equations + n * rates + 41 * most },
+    { &x->u, unknowns + 1 },
+    { &x->F, equations + n * rates + (1 + PW_STEADY_WORK) * unknowns }, /* see pw_steady_nearest */
     { &x->q0, n },
     { &x->v0, n },
     { &x->dq, n },
     { &x->dv, n },
-    { &x->null_space, (most + 1) * (most + 1) },
+    { &x->null_space, (unknowns + 1) * (unknowns + 1) },
   };
   x->memory = pw_alloc_arrays (array, sizeof array / sizeof *array);
   x->cyclic = pw_arena_alloc (&x->arena, n);
@@ -54,8 +54,8 @@ static double steady_last_breakpoint (pw_workspace *w, double t, double span) {
   return t;
 }
 
-/* PW_INPUT with the first signal that changes with time within the span, and if signals are constant after the last
- * breakpoint, with the time of that, rounded up. */
+/* PW_INPUT if a signal changes with time within the span: the message names the first one and, if no signal changes
+ * after the last breakpoint, the time of this breakpoint, rounded up. */
 static int steady_constant (pw_steady *x, pw_error *error) {
   pw_run *r = x->system[PW_HERE].run;
   char name[200], text[32];
@@ -78,8 +78,8 @@ static int steady_constant (pw_steady *x, pw_error *error) {
       x->s->model, name);
 }
 
-/* What signals must be. */
-typedef enum { SIGNALS_CONSTANT, SIGNALS_OF_TIME } signal_rule;
+/* Whether signals may change with time. */
+typedef enum { SIGNALS_CONSTANT, SIGNALS_MAY_CHANGE } signal_rule;
 
 /* Stores the initial state and scales at the first value of the parameter. */
 static int steady_begin (pw_steady *x, pw_error *error) {
@@ -94,7 +94,8 @@ static int steady_begin (pw_steady *x, pw_error *error) {
   return PW_OK;
 }
 
-/* Determines the symmetries within the range: at its ends, for instance without gravity, there may be more. */
+/* Checks the signals and sets the symmetries and x->norm, all within the range: at its ends, for instance without
+ * gravity, there may be more symmetries.  Leaves the system open at the first value. */
 static int steady_symmetries (pw_steady *x, signal_rule signals, pw_error *error) {
   const double first = x->settings.first;
   int status = pw_steady_open_system (x, PW_HERE, pw_value_within (first, x->settings.last));
@@ -143,7 +144,7 @@ pw_steady *pw_steady_open (const pw_system *s, const pw_steady_settings *setting
 }
 
 pw_steady *pw_steady_open_symmetries (const pw_system *s, const pw_steady_settings *settings, pw_error *error) {
-  return steady_open (s, settings, SIGNALS_OF_TIME, error);
+  return steady_open (s, settings, SIGNALS_MAY_CHANGE, error);
 }
 
 void pw_steady_close (pw_steady *x) {
@@ -198,20 +199,22 @@ static int steady_family (pw_steady *x) {
   if (status != PW_OK) return status;
   memset (x->branch.J, 0, (size_t)equations * ((size_t)unknowns + 1) * sizeof *x->branch.J);
   status = pw_steady_evaluate (x, x->u, x->branch.F, x->branch.J, &none);
-  if (status != PW_OK) return PW_METHOD;
-  return pw_null_space (equations, unknowns, x->branch.J, 1e-9, x->null_space);
+  if (status != PW_OK) return status == PW_RESOURCE ? status : PW_METHOD;
+  return pw_null_space (equations, unknowns, x->branch.J, PW_STEADY_RANK, x->null_space);
 }
 
-/* Replaces rates below the accuracy of a double root by rest, if that is a solution, too. */
-static void steady_rest (pw_steady *x) {
+/* Replaces rates below the accuracy of a double root by rest, if that is a solution, too: then 1. */
+static int steady_rest (pw_steady *x) {
   size_t bytes = ((size_t)pw_steady_unknowns (x) + 1) * sizeof *x->u;
   pw_error none = { 0 };
   double most = 0;
   for (int k = x->n; k < pw_steady_unknowns (x); k++) most = fmax (most, fabs (x->u[k]));
-  if (most == 0 || most > STEADY_SLOW) return;
+  if (most == 0 || most > STEADY_SLOW) return 0;
   memcpy (x->null_space, x->u, bytes);
   memset (x->u + x->n, 0, (size_t)x->symmetries * sizeof *x->u);
-  if (pw_branch_solve (&x->branch, x->u, &none) != PW_OK) memcpy (x->u, x->null_space, bytes);
+  if (pw_branch_solve (&x->branch, x->u, &none) == PW_OK) return 1;
+  memcpy (x->u, x->null_space, bytes);
+  return 0;
 }
 
 int pw_steady_solve (pw_steady *x, int attempt, double parameter, pw_steady_motion *out, pw_error *error) {
@@ -224,9 +227,9 @@ int pw_steady_solve (pw_steady *x, int attempt, double parameter, pw_steady_moti
   if (status != PW_OK) return status;
   x->u[pw_steady_unknowns (x)] = range != 0 ? (parameter - x->settings.first) / range : 0;
   status = pw_branch_solve (&x->branch, x->u, error);
-  if (status == PW_OK) steady_rest (x);
   out->iterations = x->branch.iterations;
   out->residual = x->branch.residual;
+  if (status == PW_OK && steady_rest (x)) out->iterations = x->branch.iterations, out->residual = x->branch.residual;
   pw_steady_state (x, x->u);
   out->q = x->q, out->v = x->v;
   if (status != PW_OK) return status;
@@ -240,7 +243,8 @@ int pw_steady_solve (pw_steady *x, int attempt, double parameter, pw_steady_moti
 
 /* ---- Suggestions ---- */
 
-/* The change of a quantity along direction i of the family; relative: 1 for an angle, less that of the first body. */
+/* The change of a quantity along direction i of the family, in units of the scene; if `relative` is 1, the
+ * change of an angle less that of the angle of the first body. */
 static double suggest_change (pw_steady *x, const pw_initial_value *hold, int relative, int i) {
   const double *z = x->null_space + (size_t)i * (size_t)pw_steady_unknowns (x);
   double *dq = x->dq, *dv = x->dv;
@@ -255,16 +259,16 @@ static double suggest_change (pw_steady *x, const pw_initial_value *hold, int re
  * changes of what is held already along the family; that of this quantity becomes the next row. */
 static int suggest_helps (pw_steady *x, const pw_initial_value *hold, int relative, int family, double *basis,
                           int count) {
-  double *row = basis + count * family, norm = 0, before = 0;
-  for (int i = 0; i < family; i++) row[i] = suggest_change (x, hold, relative, i), before += row[i] * row[i];
+  double *row = basis + count * family, left = 0, whole = 0; /* squares */
+  for (int i = 0; i < family; i++) row[i] = suggest_change (x, hold, relative, i), whole += row[i] * row[i];
   for (int k = 0; k < count; k++) {
     double dot = 0;
     for (int i = 0; i < family; i++) dot += row[i] * basis[k * family + i];
     for (int i = 0; i < family; i++) row[i] -= dot * basis[k * family + i];
   }
-  for (int i = 0; i < family; i++) norm += row[i] * row[i];
-  for (int i = 0; i < family; i++) row[i] /= sqrt (norm);
-  return norm > SUGGEST_CHANGE && norm > SUGGEST_LEFT * before;
+  for (int i = 0; i < family; i++) left += row[i] * row[i];
+  for (int i = 0; i < family; i++) row[i] /= sqrt (left);
+  return left > SUGGEST_CHANGE && left > SUGGEST_LEFT * whole;
 }
 
 /* Candidate c to hold, as numbered by pw_system_find_held: speed and angular velocity of the first body; angles of
@@ -276,7 +280,7 @@ static int suggest_candidate (const pw_steady *x, int c) {
   if ((c -= bodies) < n - 3 * bodies) return 3 * bodies + c;
   if ((c -= n - 3 * bodies) < 2 * bodies) return c / 2 * 3 + c % 2;
   c -= 2 * bodies;
-  return c % 2 ? n + c / 2 * 3 + 2 : 2 * n + c / 2 * 3;
+  return c % 2 ? n + c / 2 * 3 + 2 : 2 * n + c / 2 * PW_HOLD_OF_BODY;
 }
 
 int pw_steady_suggest (pw_steady *x, pw_initial_value *hold, int most) {
@@ -291,8 +295,9 @@ int pw_steady_suggest (pw_steady *x, pw_initial_value *hold, int most) {
           x->free_symmetry[k * x->symmetries + i] * x->symmetry[i * pw_steady_rate_count (x->s) + PW_RATE_TURN] != 0;
   for (int c = 0; c < 2 + x->n + 2 * x->s->bodies && held < family && count < most; c++) {
     pw_initial_value try = { .state = suggest_candidate (x, c) };
-    int of_body = try.state < 3 * x->s->bodies, relative = turns && of_body && try.state % 3 == 2;
-    if (turns && of_body && !relative) continue;
+    int placed = try.state < 3 * x->s->bodies; /* 1: a position or an angle of a body */
+    int relative = turns && placed && try.state % 3 == 2;
+    if (turns && placed && !relative) continue;
     if (try.state < x->n && x->cyclic[try.state]) continue;
     if (!suggest_helps (x, &try, relative, family, basis, held)) continue;
     if (relative && !anchored && count < most)

@@ -21,6 +21,7 @@ int pw_steady_follow (pw_steady *x, const double *q, const double *v, double par
   if (status == PW_OK) status = pw_steady_motion_at (x, x->u, &motion, error);
   if (status == PW_OK) status = pw_steady_find_free_symmetries (x);
   if (status == PW_OK) status = pw_branch_start (&x->branch, x->u, direction, error);
+  if (status == PW_RESOURCE) return pw_fail_memory (x->s, error);
   if (status != PW_OK)
     return status < 0 && error->status ? status : pw_fail (error, PW_METHOD, "the branch cannot be followed from here");
   x->unstable = motion.unstable;

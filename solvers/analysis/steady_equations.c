@@ -47,8 +47,7 @@ int pw_steady_same_motion (void *steady, const double *u, const double *other) {
 
 int pw_steady_nearest (pw_steady *x, const double *q, const double *v, double *u, pw_error *error) {
   int n = x->n, symmetries = x->symmetries, rank;
-  double *S = x->F, *right = S + n * symmetries,
-         *work = right + n + symmetries; /* x->F is long enough: steady_arrays */
+  double *S = x->F, *right = S + n * symmetries, *work = right + n + symmetries;
   memset (x->branch.pivot, 0, (size_t)symmetries * sizeof *x->branch.pivot);
   for (int j = 0; j < n; j++) u[j] = q[j] / pw_unit (x->s, j), right[j] = v[j] / pw_unit (x->s, j) * x->T;
   for (int k = 0; k < symmetries; k++) {
@@ -57,7 +56,7 @@ int pw_steady_nearest (pw_steady *x, const double *q, const double *v, double *u
   }
   if (symmetries &&
       LAPACKE_dgelsy_work (LAPACK_COL_MAJOR, n, symmetries, 1, S, n, right, n > symmetries ? n : symmetries,
-                           x->branch.pivot, 1e-9, &rank, work, 40 * (n + symmetries)))
+                           x->branch.pivot, PW_STEADY_RANK, &rank, work, PW_STEADY_WORK * (n + symmetries)))
     return pw_fail (error, PW_METHOD, "the symmetries cannot be separated");
   memcpy (u + n, right, (size_t)symmetries * sizeof *u);
   return PW_OK;

@@ -1,7 +1,8 @@
 /* The search for steady motions; for steady*.c and the search for periodic ones.
  *
- * Names: n coordinates, m constraint equations, u the unknowns (steady_equations.c).  "Units of the scene" are L for
- * lengths, 1 rad for angles, T for times (pw_scale); pw_unit is that of a coordinate. */
+ * Names: n coordinates, m constraint equations.  "Units of the scene" are L for lengths, 1 rad for angles, T for times
+ * (pw_scale); pw_unit is that of a coordinate.  The unknowns u are q in units of the scene, then the coefficients xi of
+ * the symmetries times T (steady_equations.c), then the parameter, from 0 to 1 over its range. */
 #ifndef PW_STEADY_H
 #define PW_STEADY_H
 
@@ -19,7 +20,7 @@ struct pw_steady {
   double L, T;           /* scales at the initial state [m, s] */
   double *start;         /* 2 n: initial state */
   unsigned char *cyclic; /* n: 1 for angles on which nothing depends */
-  double *norm;          /* m: lengths of the rows of J at the initial state, by which residuals are divided */
+  double *norm;          /* m: lengths of the rows of J near the initial state, by which residuals are divided */
 
   /* Displacements are given by their rates: pw_steady_rate_count. */
   int symmetries;
@@ -93,6 +94,8 @@ static inline int pw_steady_unknowns (const pw_steady *x) {
 static inline int pw_steady_equations (const pw_steady *x) {
   return x->holonomic + x->m + x->n + x->settings.holds + x->symmetries;
 }
+static const double PW_STEADY_RANK = 1e-9; /* singular values up to it count as 0 */
+enum { PW_STEADY_WORK = 40 };              /* numbers of work space of LAPACK's dgelsy per unknown */
 /* pw_branch_problem.evaluate, .same. */
 int pw_steady_evaluate (void *steady, const double *u, double *F, double *dF, pw_error *error);
 int pw_steady_same_motion (void *steady, const double *u, const double *other);
@@ -114,6 +117,8 @@ int pw_steady_same_sizes (const pw_system *a, const pw_system *b, pw_error *why)
 
 /* ---- steady_hold.c ---- */
 
+/* What can be held is numbered: the states, then PW_HOLD_OF_BODY quantities of each body. */
+enum { PW_HOLD_SPEED, PW_HOLD_RADIUS, PW_HOLD_CURVATURE, PW_HOLD_OF_BODY };
 /* The residual A - value B of what is held (steady_hold.c) in the state x->q, x->v, or if dq is not NULL its change by
  * the variation (dq, dv); its derivative with respect to the value.  All are divided by the unit of A. */
 double pw_hold_residual (const pw_steady *x, const pw_initial_value *hold, const double *dq, const double *dv);

@@ -25,8 +25,8 @@ static int start_assemble (pw_steady *x, pw_projector *p) {
   return status;
 }
 
-/* The accelerations in the moving frame at x->q, x->rates; returns the largest in units of the scene, NaN if they are
- * not determined. */
+/* The accelerations in the moving frame at x->q, x->rates; returns the largest, divided by the unit of its coordinate
+ * [1/s^2], or NaN if they are not determined. */
 static double start_accelerate (pw_steady *x, double *a) {
   pw_linearisation *l = &x->system[PW_HERE].linearisation;
   double most = 0;

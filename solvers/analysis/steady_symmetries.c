@@ -132,7 +132,7 @@ static int symmetry_remove_idle (pw_steady *x, int rates) {
     pw_steady_velocities (x, x->symmetry + k * rates, x->q, F + k * n);
     for (int j = 0; j < x->n; j++) F[k * n + j] /= pw_unit (x->s, j);
   }
-  int idle = symmetries ? pw_null_space (n, symmetries, F, 1e-9, c) : 0;
+  int idle = symmetries ? pw_null_space (n, symmetries, F, PW_STEADY_RANK, c) : 0;
   for (int i = 0; i < idle * symmetries; i++)
     for (int j = 0; j < rates; j++)
       idle_rates[i / symmetries * rates + j] += c[i] * x->symmetry[i % symmetries * rates + j];
@@ -203,7 +203,7 @@ int pw_steady_find_free_symmetries (pw_steady *x) {
     pw_linear_turn (&x->system[PW_HERE].linearisation, symmetry[PW_RATE_TURN], x->v, x->dv);
     for (int i = 0; i < holds; i++) M[k * rows + i] = pw_hold_residual (x, x->hold + i, x->dq, x->dv);
   }
-  x->free_symmetries = symmetries ? pw_null_space (rows, symmetries, M, 1e-9, x->free_symmetry) : 0;
+  x->free_symmetries = symmetries ? pw_null_space (rows, symmetries, M, PW_STEADY_RANK, x->free_symmetry) : 0;
   free (M);
   return x->free_symmetries < 0 ? x->free_symmetries : PW_OK;
 }

@@ -79,6 +79,24 @@ static void test_free_period (void **state) {
   periodic_shows ("  period                       6.66328686 s, found\n");
 }
 
+/* A disc beside a pendulum that runs round: its angle is a symmetry. */
+static void test_trivial (void **state) {
+  (void)state;
+  cli_write ("disc.yaml", "pinwheel: 1\n"
+                          "bodies:\n"
+                          "  - {name: bob, mass: 1, start: {x: 0, y: -1}, rate: {vx: 5, omega: 5}}\n"
+                          "  - {name: disc, mass: 1, inertia: 1}\n"
+                          "elements:\n"
+                          "  - {pin: pivot, body: [bob, ground], at: [[0, 1], [0, 0]]}\n"
+                          "  - {gravity: gravity, acceleration: [0, -1]}\n"
+                          "  - {friction: air, body: [bob, ground], viscous: 0.1}\n"
+                          "  - {torque: drive, body: [bob, ground], value: 0.5}\n"
+                          "  - {pin: axle, body: [disc, ground], at: [[0, 0], [3, 0]]}\n"
+                          "  - {friction: bearing, body: [disc, ground], viscous: 0.1}\n");
+  cli_good ("pinwheel periodic @/disc.yaml --period free");
+  periodic_shows ("  trivial multipliers          2, of symmetries and a shift in time\n");
+}
+
 /* A pendulum that runs round: its multiplier is exp (-0.1 T) (Liouville).  A spring counts the turns. */
 static void test_turns (void **state) {
   (void)state;
@@ -337,6 +355,7 @@ int main (void) {
     cmocka_unit_test (test_two_events),
     cmocka_unit_test (test_constraint),
     cmocka_unit_test (test_branch),
+    cmocka_unit_test (test_trivial),
     cmocka_unit_test (test_turns),
     cmocka_unit_test (test_limit),
     cmocka_unit_test (test_bad),

@@ -28,6 +28,20 @@ static void test_motion (void **state) {
   assert_null (strstr (cli_out, "to select one"));
 }
 
+/* Options that select a motion are given in full. */
+static void test_long_advice (void **state) {
+  char text[1000];
+  size_t n = (size_t)snprintf (text, sizeof text, "pinwheel: 1\nabout: free bodies\nbodies:\n");
+  (void)state;
+  for (int i = 0; i < 6; i++)
+    n +=
+        (size_t)snprintf (text + n, sizeof text - n,
+                          "  - {name: a_body_with_a_rather_long_name_%d, mass: 1, inertia: 1, start: {x: %d}}\n", i, i);
+  cli_write ("free.yaml", text);
+  cli_good ("pinwheel steady @/free.yaml --starts 0");
+  steady_shows (" --hold a_body_with_a_rather_long_name_5.omega=0\n");
+}
+
 /* Number `column` (from 0) of a line of a table. */
 static double table_number (const char *line, int column) {
   for (; column > 0; column--) line = strchr (line, ',') + 1;
@@ -422,6 +436,7 @@ static void test_without_unit (void **state) {
 int main (void) {
   const struct CMUnitTest tests[] = {
     cmocka_unit_test (test_motion),
+    cmocka_unit_test (test_long_advice),
     cmocka_unit_test (test_branch),
     cmocka_unit_test (test_vary_held),
     cmocka_unit_test (test_linearise),

@@ -9,14 +9,14 @@
 #include "text.h"
 
 enum {
-  PERIODIC_SHOWN = 12,    /* multipliers in the text, at most; points of a branch in it besides events, about */
+  PERIODIC_SHOWN = 12,    /* in the text: multipliers, at most; points of a branch that are not events, about */
   PERIODIC_BODIES = 20,   /* in the figure, at most */
   PERIODIC_SAMPLES = 400, /* of one motion, in its figure */
   PERIODIC_CURVES = 3     /* over the parameter, see periodic_curve */
 };
-#define PERIODIC_SMALL 1e-9 /* displacements [m] and rotations [rad] below it are printed as 0 */
+#define PERIODIC_SMALL 1e-9 /* displacements, rotations, speeds and states below it are printed and drawn as 0 */
 
-/* By pw_periodic_event. */
+/* By pw_periodic_event, without PW_PERIODIC_END, which is not stored. */
 static const char *const periodic_events[] = { "point", "fold", "branch point", "period doubling", "Neimark-Sacker" };
 
 /* ---- Quantities ---- */
@@ -43,7 +43,7 @@ static double periodic_round (double value) {
 /* ---- Text ---- */
 
 static void periodic_print_multipliers (const pw_periodic_orbit *o, int symmetries) {
-  int nontrivial = o->multipliers - o->trivial, shown = 0;
+  int nontrivial = o->multipliers - o->trivial, shown = 0, shift = o->trivial > symmetries;
   printf ("  Floquet multipliers          ");
   for (int i = 0; i < nontrivial; i++) {
     if (o->im[i] < 0 || shown++ >= PERIODIC_SHOWN) continue;
@@ -52,12 +52,14 @@ static void periodic_print_multipliers (const pw_periodic_orbit *o, int symmetri
   }
   puts (nontrivial == 0 ? "none" : shown > PERIODIC_SHOWN ? " ..." : "");
   printf ("  trivial multipliers          %d%s%s\n", o->trivial, symmetries ? ", of symmetries" : "",
-          o->trivial > symmetries ? ", of a shift in time" : "");
+          !shift       ? ""
+          : symmetries ? " and a shift in time"
+                       : ", of a shift in time");
 }
 
 static const char *periodic_stability (const pw_periodic_orbit *o, char *text, size_t size) {
   double largest = periodic_largest (o);
-  if (o->multipliers == o->trivial) return "no perturbations but shifts along symmetries";
+  if (o->multipliers == o->trivial) return "no perturbations but trivial ones";
   if (o->unstable)
     snprintf (text, size, "unstable: %d growing, the fastest by a factor of %.6g per period", o->unstable, largest);
   else if (largest > 1 - 1e-6) /* with the tolerance of pw_periodic_orbit.unstable */
@@ -203,7 +205,8 @@ static int periodic_csv (const void *context, FILE *f, pw_error *error) {
   return status;
 }
 
-/* ---- The figure: paths and angular velocities, or curves over the parameter; multipliers and the unit circle ---- */
+/* ---- The figure: paths and angular velocities, or curves over the parameter; multipliers and the unit circle ----
+ * Data sets of gnuplot end with two blank lines; a row of nan keeps each from being empty. */
 
 /* Writes t / T, then x, y, phi, omega of the bodies, over one period T. */
 static int periodic_write_motion (const pw_periodic_command *cmd, const pw_periodic_orbit *o, FILE *f,
@@ -235,13 +238,15 @@ static double periodic_curve (const pw_periodic_orbit *o, int k) {
   return k == 0 ? periodic_round (d.total) : k == 1 ? periodic_largest (o) : o->period;
 }
 
-/* Writes the stable or unstable parts of the branch, each followed by a blank line.  A point belongs to the part that
- * begins at it and to the one that ends there.  An event has the stability of the point after it. */
+/* Writes the parts of the branch without growing perturbations (stable or neutral), or those with, each followed by a
+ * blank line.  A point belongs to the part that begins at it and to the one that ends there; after an event, the
+ * stability is that of the next point. */
 static void periodic_write_parts (const pw_periodic_command *cmd, FILE *f, int stable) {
   int inside = 0; /* 1: the last point began or continued a part */
   for (const pw_periodic_point *p = cmd->point; p < cmd->point + cmd->points; p++) {
     int last = p + 1 == cmd->point + cmd->points;
-    int here = !last && (p[p->orbit.event != PW_PERIODIC_POINT].orbit.unstable == 0) == stable;
+    const pw_periodic_point *after = p->orbit.event == PW_PERIODIC_POINT ? p : p + 1;
+    int here = !last && (after->orbit.unstable == 0) == stable;
     if (here || inside) {
       fprintf (f, "%.10g", p->orbit.parameter);
       for (int k = 0; k < PERIODIC_CURVES; k++) fprintf (f, " %.9g", periodic_curve (&p->orbit, k));

@@ -69,17 +69,12 @@ static int sensitivity_contact_slope (pw_sensitivity *sens, int unknown, int ind
   return status;
 }
 
-/* A sample of the run at a time that its derivatives have reached. */
-static int sensitivity_sample (pw_sensitivity *sens, double t, pw_sample *s, pw_error *error) {
-  int status = sens->sampled ? pw_run_advance_to (sens->sampled, t, sens->unknowns.t_end, error) : PW_OK;
-  return status == PW_OK ? pw_run_sample (sens->sampled ? sens->sampled : sens->base.run, t, s, error) : status;
-}
-
 int pw_sensitivity_at (pw_sensitivity *sens, double t, pw_error *error) {
   pw_sample s, derivative, slope_error;
   const int P = sens->unknowns.count;
   int status = pw_variation_advance (sens->variation, t, sens->unknowns.t_end, error);
-  if (status == PW_OK) status = sensitivity_sample (sens, t, &s, error);
+  if (status == PW_OK && sens->sampled) status = pw_run_advance_to (sens->sampled, t, sens->unknowns.t_end, error);
+  if (status == PW_OK) status = pw_run_sample (sens->sampled ? sens->sampled : sens->base.run, t, &s, error);
   if (status == PW_OK) status = pw_outcomes_read (&sens->outcomes, &s, sens->value, 1, error);
   for (int p = 0; p < P && status == PW_OK; p++) {
     status = pw_variation_sample (sens->variation, p, &derivative, &slope_error, error);
@@ -277,8 +272,8 @@ static int sensitivity_advance_to_end (pw_sensitivity *sens, sensitivity_point *
   sens->last_breakpoint = -INFINITY;
   int status = pw_sensitivity_at (sens, 0, error);
   if (status == PW_OK) status = sensitivity_add_row (sens, 0, error);
-  for (int i = 0; i < sens->outcomes.functionals && status == PW_OK;
-       i++) /* of extrema at t = 0; later ones replace them */
+  /* The derivatives of extrema at t = 0; later ones replace them. */
+  for (int i = 0; i < sens->outcomes.functionals && status == PW_OK; i++)
     if (pw_is_extremum (sens->outcomes.functional[i].type)) sensitivity_keep (sens, i);
   for (long k = 1; t < t_end && status == PW_OK; k++, t = to) {
     to = (double)k * sens->row_interval;
@@ -289,15 +284,6 @@ static int sensitivity_advance_to_end (pw_sensitivity *sens, sensitivity_point *
   for (int i = 0; i < sens->outcomes.functionals; i++)
     if (sens->outcomes.functional[i].type == PW_FINAL) sensitivity_keep (sens, i);
   return status;
-}
-
-static int sensitivity_integrate (pw_sensitivity *sens, pw_progress *progress, pw_error *error) {
-  sensitivity_point *list = malloc (((size_t)sens->outcomes.functionals + PW_GAUSS_NODES) * sizeof *list);
-  if (list == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
-  int status = sensitivity_advance_to_end (sens, list, progress, error);
-  free (list);
-  sens->stopped = status == PW_STOPPED;
-  return sens->stopped ? PW_OK : status;
 }
 
 /* ---- Opening ---- */
@@ -332,13 +318,6 @@ static int sensitivity_arrays (pw_sensitivity *sens, pw_error *error) {
     if (pw_sensitivity_in_table (sens, o)) sens->columns += 1 + sens->unknowns.count;
   sens->memory = pw_alloc_arrays (array, sizeof array / sizeof *array);
   return sens->memory ? PW_OK : pw_fail (error, PW_RESOURCE, "out of memory");
-}
-
-/* Determines the values of extrema and integrals, and the times of extrema, by another run. */
-static int sensitivity_find_functionals (pw_sensitivity *sens, pw_error *error) {
-  if (!sens->outcomes.along_run) return PW_OK;
-  return pw_outcomes_run (&sens->outcomes, sens->unknowns.method, &sens->unknowns.settings, sens->unknowns.t_end,
-                          error);
 }
 
 /* Refuses initial values that the constraints determine: then making the state of a neighbour consistent changes them
@@ -394,8 +373,17 @@ int pw_sensitivity_start (pw_sensitivity *sens, const double *values, pw_error *
 
 int pw_sensitivity_compute (pw_sensitivity *sens, const double *values, pw_progress *progress, pw_error *error) {
   int status = pw_sensitivity_start (sens, values, error);
-  if (status == PW_OK) status = sensitivity_find_functionals (sens, error);
-  return status == PW_OK ? sensitivity_integrate (sens, progress, error) : status;
+  /* Another run determines the values of extrema and integrals, and the times of extrema. */
+  if (status == PW_OK && sens->outcomes.along_run)
+    status =
+        pw_outcomes_run (&sens->outcomes, sens->unknowns.method, &sens->unknowns.settings, sens->unknowns.t_end, error);
+  if (status != PW_OK) return status;
+  sensitivity_point *list = malloc (((size_t)sens->outcomes.functionals + PW_GAUSS_NODES) * sizeof *list);
+  if (list == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
+  status = sensitivity_advance_to_end (sens, list, progress, error);
+  free (list);
+  sens->stopped = status == PW_STOPPED;
+  return sens->stopped ? PW_OK : status;
 }
 
 void pw_sensitivity_close (pw_sensitivity *sens) {

@@ -70,6 +70,12 @@ static pw_steady_point *steady_add (pw_steady_command *cmd, const pw_steady_moti
   return p;
 }
 
+/* The error of this status after pw_steady_suggest. */
+static int steady_unadvised (const pw_steady_command *cmd, int status, pw_error *error) {
+  return pw_fail (error, status, "%s: %s", pw_file_name (cmd->m.file),
+                  status == PW_RESOURCE ? "out of memory" : "the family of the steady motion cannot be determined");
+}
+
 /* Stores the options --hold which, besides those given, select the motion last found within its family. */
 static int steady_advise (pw_steady_command *cmd, pw_steady_point *p, pw_error *error) {
   pw_initial_value hold[PW_HOLDS];
@@ -79,7 +85,8 @@ static int steady_advise (pw_steady_command *cmd, pw_steady_point *p, pw_error *
   for (int i = 0; i < count && used < sizeof p->advice; i++)
     used += (size_t)snprintf (p->advice + used, sizeof p->advice - used, " --hold %s=%.9g",
                               pw_system_held_name (cmd->m.system, hold[i].state, name, sizeof name), hold[i].value);
-  return count < 0 ? pw_fail (error, count, "%s: out of memory", pw_file_name (cmd->m.file)) : PW_OK;
+  if (used >= sizeof p->advice) *p->advice = 0;
+  return count < 0 ? steady_unadvised (cmd, count, error) : PW_OK;
 }
 
 static int steady_same (const pw_steady_command *cmd, const pw_steady_motion *a, const pw_steady_motion *b) {
@@ -106,7 +113,8 @@ static int steady_found (pw_steady_command *cmd, const pw_steady_motion *m, int 
   return p ? steady_advise (cmd, p, error) : PW_RESOURCE;
 }
 
-/* Adds the solutions at a value of the parameter, first the one found from the initial state. */
+/* Adds the solutions at a value of the parameter, first the one found from the initial state; later attempts may fail
+ * by PW_METHOD, too. */
 static int steady_search (pw_steady_command *cmd, double parameter, pw_error *error) {
   pw_progress progress;
   pw_steady_motion m;
@@ -252,7 +260,7 @@ static int steady_hold_more (pw_steady_command *cmd, pw_error *error) {
   if (status == PW_RETRY || (status == PW_OK && m.family == 0)) return PW_OK;
   if (status != PW_OK) return status;
   int more = pw_steady_suggest (cmd->search, cmd->hold + cmd->settings.holds, PW_HOLDS - cmd->settings.holds);
-  if (more < 0) return pw_fail (error, more, "%s: out of memory", pw_file_name (cmd->m.file));
+  if (more < 0) return steady_unadvised (cmd, more, error);
   for (int i = cmd->settings.holds; i < cmd->settings.holds + more; i++)
     pw_cli_say ("pinwheel: holding %s=%.9g, as in the motion nearest to the initial state\n",
                 pw_system_held_name (s, cmd->hold[i].state, name, sizeof name), cmd->hold[i].value);

@@ -13,7 +13,8 @@ enum {
 };
 #define STEADY_SMALL 1e-12 /* numbers below it are printed as 0, in SI units */
 
-static const char *const steady_events[] = { "point", "fold", "zero eigenvalue", "Hopf" }; /* by pw_steady_event */
+/* By pw_steady_event, without PW_STEADY_END, which is not stored. */
+static const char *const steady_events[] = { "point", "fold", "zero eigenvalue", "Hopf" };
 
 /* ---- Text ---- */
 
@@ -211,7 +212,7 @@ static int steady_csv (const void *context, FILE *f, pw_error *error) {
   return status;
 }
 
-/* ---- The figure ---- */
+/* ---- The figure: data sets of gnuplot end with two blank lines; a row of nan keeps each from being empty ---- */
 
 /* Whether the branch is stable from p to the next point.  At an event, where `unstable` does not count the modes that
  * change, the next point decides. */
@@ -236,7 +237,8 @@ static double steady_ranked (const pw_linear *l, steady_part part, int k) {
   return NAN;
 }
 
-/* Writes the k-th real part and frequency on the stable or unstable parts of a branch, with a blank line after each. */
+/* Writes the k-th real part and frequency on the parts of a branch where no modes grow (stable or neutral), or where
+ * some do, with a blank line after each. */
 static void steady_write_parts (FILE *f, const pw_steady_point *first, int count, int k, int stable) {
   int inside = 0; /* 1: the last point began or continued a part */
   for (const pw_steady_point *p = first; p < first + count; p++) {

@@ -12,13 +12,8 @@
 /* The standard deviation of a column of data as given by --sigma: a number, or the name of a column of the table. */
 typedef struct {
   const char *text; /* NULL: not given */
-  double number;    /* NaN: the text is a name */
+  double number;    /* NaN: the text is the name of a column of the table */
 } fit_sigma;
-
-/* 1 if the standard deviations are a column of the table. */
-static int data_has_sigma_column (const fit_sigma *sigma) {
-  return sigma->text && isnan (sigma->number);
-}
 
 /* Splits "NAME,..." of --columns. */
 static int data_read_columns (pw_fit *fit, pw_error *error) {
@@ -82,7 +77,7 @@ static int data_read_table (pw_fit *fit, const fit_sigma *sigma, pw_error *error
   column[0] = "t", unit[0] = "s";
   for (int i = 0; i < fit->columns; i++) column[count] = fit->column_name[i], unit[count++] = fit->column_unit[i];
   for (int i = 0; i < fit->columns; i++)
-    if (data_has_sigma_column (sigma + i)) column[count] = sigma[i].text, unit[count++] = fit->column_unit[i];
+    if (isnan (sigma[i].number)) column[count] = sigma[i].text, unit[count++] = fit->column_unit[i];
   fit->table = pw_read_columns (fit->data_path, column, unit, count, &fit->rows, error);
   free (column);
   return fit->table ? PW_OK : error->status;
@@ -97,7 +92,7 @@ static int data_read (pw_fit *fit, const fit_sigma *sigma, pw_error *error) {
   if (fit->sigma == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
   const double *next = fit->data + cells;
   for (int i = 0; i < fit->columns; i++) {
-    const double *column = data_has_sigma_column (sigma + i) ? next : NULL, all = sigma[i].text ? sigma[i].number : 1;
+    const double *column = isnan (sigma[i].number) ? next : NULL, all = sigma[i].text ? sigma[i].number : 1;
     for (size_t k = 0; k < rows; k++) fit->sigma[(size_t)i * rows + k] = column ? column[k] : all;
     if (column) next += rows;
   }

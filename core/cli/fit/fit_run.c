@@ -59,8 +59,8 @@ typedef struct {
   pw_error *error;                  /* of each task */
 } jacobian_differences;
 
-/* The relative step h is the cube root of the noise, which balances the truncation error of central differences, of
- * order h^2, and the effect of the noise, noise / h: both are noise^(2/3). */
+/* The step h, relative to the value or, if that is larger, to a hundredth of the scale, is the cube root of the noise:
+ * the truncation error of central differences, of order h^2, and noise / h are both noise^(2/3). */
 static int jacobian_side (void *context, int task, pw_error *error) {
   jacobian_differences *d = context;
   const pw_fit *fit = d->fit;
@@ -140,10 +140,8 @@ static int jacobian_by_variation (const pw_fit *fit, const double *unknowns, dou
 int pw_fit_jacobian (pw_fit *fit, const double *unknowns, const double *values, double *jacobian, pw_error *error) {
   pw_error own = { 0 };
   int status = fit->by_differences ? PW_METHOD : jacobian_by_variation (fit, unknowns, jacobian, &own);
-  if (status == PW_OK || status == PW_RETRY || status == PW_RESOURCE) {
-    if (status == PW_RESOURCE) *error = own;
-    return status;
-  }
+  if (status == PW_RESOURCE) *error = own;
+  if (status == PW_OK || status == PW_RETRY || status == PW_RESOURCE) return status;
   fit->by_differences = 1;
   return jacobian_by_differences (fit, unknowns, values, jacobian, error);
 }

@@ -15,10 +15,12 @@
 #include <string.h>
 #include "fit.h"
 
+/* An unknown has no effect if the norm of its column of the Jacobian, times its scale, relative to the largest such
+ * product, is below this. */
+#define SOLVE_EFFECT 1e-9
 #define SOLVE_GRADIENT 1e-4 /* largest cosine between the residuals and a column of the Jacobian at a minimum */
-#define SOLVE_RANK 1e-6   /* singular values of the scaled Jacobian count as 0 below it, relative to the largest one */
-#define SOLVE_EFFECT 1e-9 /* smallest effect of an unknown times its scale, relative to the largest one */
-#define SOLVE_EXACT 1e-8  /* norm of the residuals of an exact fit, relative to the initial one */
+#define SOLVE_RANK 1e-6  /* singular values of the scaled Jacobian count as 0 below it, relative to the largest one */
+#define SOLVE_EXACT 1e-8 /* norm of the residuals of an exact fit, relative to the initial one */
 #define SOLVE_ROUND_OFF 1e-12 /* the same, relative to the norm of the data: round-off of a run */
 #define SOLVE_TOLERANCE 1e-10 /* of GSL: relative step in u, and gradient */
 enum { SOLVE_ITERATIONS = 100 /* of a search, at most */ };
@@ -30,10 +32,10 @@ typedef struct {
   double *values;   /* columns x rows: of the model, in the last run */
   double *jacobian; /* unknowns x (columns x rows) */
   int known;        /* 1: the last run succeeded */
-  int status;       /* PW_OK, or else the fit ends */
+  int status;       /* PW_OK, or else the fit ends, with `error` */
   pw_error *error;
   double worst; /* largest norm of the residuals of the runs of this search that succeeded */
-  double least; /* sum of squares at the best minimum so far, fit->estimate; INFINITY: no search has ended yet */
+  double least; /* sum of squares at the best minimum so far, fit->estimate; INFINITY: no search has reached one yet */
   int previous; /* iterations of earlier searches */
 } fit_solver;
 
@@ -62,8 +64,22 @@ static double solve_start (const pw_unknown *unknown, double value) {
 
 /* ---- Residuals ---- */
 
-/* Makes the run at u the last one, unless it already is.  Its status, which is also that of the solver if it ends the
- * fit: a failure of the very first run, of memory, or Ctrl-C. */
+/* Ends the fit after a failure of memory, after Ctrl-C, or if `essential`: no search can do without what failed. */
+static void solve_fail (fit_solver *solver, int essential, const pw_error *error, int status) {
+  if (status == PW_OK || !(essential || status == PW_RETRY || status == PW_RESOURCE)) return;
+  solver->status = status;
+  *solver->error = *error;
+}
+
+/* The sum of squares of (values - data) / sigma, or of data / sigma if `values` is NULL. */
+static double solve_sum (const pw_fit *fit, const double *values) {
+  double sum = 0;
+  for (int i = 0; i < fit->columns * fit->rows; i++)
+    if (!isnan (fit->data[i])) sum += pow (((values ? values[i] : 0) - fit->data[i]) / fit->sigma[i], 2);
+  return sum;
+}
+
+/* Makes the run at u the last one, unless it already is.  A failure of the very first run ends the fit.  A status. */
 static int solve_run (fit_solver *solver, const gsl_vector *u) {
   pw_fit *fit = solver->fit;
   int same = solver->known;
@@ -74,14 +90,11 @@ static int solve_run (fit_solver *solver, const gsl_vector *u) {
     solver->unknowns[i] = value;
   }
   if (same) return PW_OK;
-  solver->known = 0;
   int status = pw_fit_run (fit, solver->unknowns, solver->values, &own);
-  fit->runs++;
+  if (status == PW_OK && !isfinite (solve_sum (fit, solver->values)))
+    status = pw_fail (&own, PW_METHOD, "the sum of the squares of the residuals is not finite");
   solver->known = status == PW_OK;
-  if (status == PW_RETRY || status == PW_RESOURCE || fit->runs == 1) {
-    solver->status = status;
-    if (status != PW_OK) *solver->error = own;
-  }
+  solve_fail (solver, fit->runs++ == 0, &own, status);
   return status;
 }
 
@@ -89,28 +102,29 @@ static int solve_run (fit_solver *solver, const gsl_vector *u) {
 static int solve_residuals (const gsl_vector *u, void *context, gsl_vector *f) {
   fit_solver *solver = context;
   const pw_fit *fit = solver->fit;
-  double sum = 0;
   int failed = solve_run (solver, u) != PW_OK;
   if (solver->status != PW_OK) return GSL_EBADFUNC;
   for (int i = 0, k = 0; i < fit->columns * fit->rows; i++) {
     if (isnan (fit->data[i])) continue;
     double residual = failed ? 10 * solver->worst + 1 : (solver->values[i] - fit->data[i]) / fit->sigma[i];
-    sum += residual * residual;
     gsl_vector_set (f, (size_t)k++, residual);
   }
-  if (!isfinite (sum)) return GSL_EBADFUNC;
-  if (!failed) solver->worst = fmax (solver->worst, sqrt (sum));
+  if (!failed) solver->worst = fmax (solver->worst, sqrt (solve_sum (fit, solver->values)));
   return GSL_SUCCESS;
 }
 
-/* Derivatives of the residuals with respect to u, or if u is NULL, to the unknowns themselves, at the last run. */
+/* Derivatives of the residuals with respect to u at u; or if u is NULL, with respect to the unknowns at the estimate.
+ * Without derivatives a search ends; the fit ends if no search has reached a minimum. */
 static int solve_derivatives (const gsl_vector *u, void *context, gsl_matrix *J) {
   fit_solver *solver = context;
   pw_fit *fit = solver->fit;
   int cells = fit->columns * fit->rows;
+  pw_error own = { 0 };
   if (u && solve_run (solver, u) != PW_OK) return GSL_EBADFUNC;
-  solver->status = pw_fit_jacobian (fit, solver->unknowns, solver->values, solver->jacobian, solver->error);
-  if (solver->status != PW_OK) return GSL_EBADFUNC;
+  const double *unknowns = u ? solver->unknowns : fit->estimate, *values = u ? solver->values : fit->fitted;
+  int status = pw_fit_jacobian (fit, unknowns, values, solver->jacobian, &own);
+  solve_fail (solver, u == NULL || !isfinite (solver->least), &own, status);
+  if (status != PW_OK) return GSL_EBADFUNC;
   for (int j = 0; j < fit->unknowns.count; j++) {
     double slope = u ? solve_slope (fit->unknowns.list + j, gsl_vector_get (u, (size_t)j)) : 1;
     for (int i = 0, k = 0; i < cells; i++)
@@ -131,27 +145,33 @@ static void solve_store (fit_solver *solver, double chi2) {
   memcpy (fit->fitted, solver->values, (size_t)fit->columns * (size_t)fit->rows * sizeof *fit->fitted);
 }
 
-static void solve_progress (const size_t iteration, void *context, const gsl_multifit_nlinear_workspace *w) {
-  fit_solver *solver = context;
+/* `moved`: 1 if the last run was made at the position reached; it is the result if Ctrl-C ends the first search. */
+static void solve_progress (fit_solver *solver, int iteration, int moved, const gsl_multifit_nlinear_workspace *w) {
   double norm = gsl_blas_dnrm2 (gsl_multifit_nlinear_residual (w));
-  if (solver->status != PW_OK) return;
   if (iteration == 0 && solver->previous == 0) solver->fit->initial_chi2 = norm * norm;
-  solver->fit->iterations = solver->previous + (int)iteration;
-  /* The last run, at the position reached, is the result if Ctrl-C ends the first search. */
-  if (!isfinite (solver->least) && solver->known) solve_store (solver, norm * norm);
+  solver->fit->iterations = solver->previous + iteration;
+  if (!isfinite (solver->least) && moved) solve_store (solver, norm * norm);
   snprintf (solver->fit->progress.note, sizeof solver->fit->progress.note, "residual %.6g", norm);
   pw_progress_at (&solver->fit->progress, solver->fit->iterations);
 }
 
-/* The sum of squares of (values - data) / sigma, or of data / sigma if `values` is NULL. */
-static double solve_sum (const pw_fit *fit, const double *values) {
-  double sum = 0;
-  for (int i = 0; i < fit->columns * fit->rows; i++)
-    if (!isnan (fit->data[i])) sum += pow (((values ? values[i] : 0) - fit->data[i]) / fit->sigma[i], 2);
-  return sum;
+/* Iterates from u, the last run.  Unlike gsl_multifit_nlinear_driver, it ends when derivatives cannot be evaluated:
+ * GSL_EBADFUNC.  GSL_ENOPROG: many steps in a row were rejected; only in the first iteration is this the end, since
+ * otherwise the next one begins with a new damping parameter. */
+static int solve_iterate (fit_solver *solver, gsl_vector *u, gsl_multifit_nlinear_fdf *f,
+                          gsl_multifit_nlinear_workspace *w) {
+  int info, status = gsl_multifit_nlinear_init (u, f, w), more = status == GSL_SUCCESS;
+  if (more) solve_progress (solver, 0, 1, w);
+  for (int i = 1; i <= SOLVE_ITERATIONS && more; i++) {
+    status = gsl_multifit_nlinear_iterate (w);
+    if (status != GSL_SUCCESS && (status != GSL_ENOPROG || i == 1)) break;
+    solve_progress (solver, i, status == GSL_SUCCESS, w);
+    more = gsl_multifit_nlinear_test (SOLVE_TOLERANCE, SOLVE_TOLERANCE, 0, &info, w) == GSL_CONTINUE;
+  }
+  return status;
 }
 
-/* Stores the sum of squares and the values at the minimum that a search has reached. */
+/* Stores the sum of squares and the unknowns at the minimum that a search has reached; the best one is the result. */
 static void solve_keep (fit_solver *solver, double *minimum) {
   *minimum = solve_sum (solver->fit, solver->values);
   memcpy (minimum + 1, solver->unknowns, (size_t)solver->fit->unknowns.count * sizeof *solver->unknowns);
@@ -160,8 +180,8 @@ static void solve_keep (fit_solver *solver, double *minimum) {
   solve_store (solver, *minimum);
 }
 
-/* A search from the values in `minimum`, which its result replaces.  Only the first search must have one. */
-static int solve_minimum (fit_solver *solver, gsl_multifit_nlinear_workspace *w, double *minimum) {
+/* A search from the unknowns in `minimum`, which its result replaces; *minimum is INFINITY without a result. */
+static void solve_minimum (fit_solver *solver, gsl_multifit_nlinear_workspace *w, double *minimum) {
   pw_fit *fit = solver->fit;
   size_t n = (size_t)fit->unknowns.count;
   gsl_multifit_nlinear_fdf f = {
@@ -169,31 +189,27 @@ static int solve_minimum (fit_solver *solver, gsl_multifit_nlinear_workspace *w,
   };
   gsl_vector_view view = gsl_vector_view_array (solver->u, n);
   gsl_vector *u = &view.vector;
-  int info;
   for (size_t i = 0; i < n; i++) solver->u[i] = solve_start (fit->unknowns.list + i, minimum[1 + i]);
   *minimum = INFINITY;
   solver->worst = 0;
-  int first = fit->runs == 0,
-      status = solve_run (solver, u) == PW_OK ? gsl_multifit_nlinear_init (u, &f, w) : GSL_EBADFUNC;
-  if (status == GSL_SUCCESS)
-    status = gsl_multifit_nlinear_driver (SOLVE_ITERATIONS, SOLVE_TOLERANCE, SOLVE_TOLERANCE, 0, solve_progress, solver,
-                                          &info, w);
-  if (solver->status == PW_OK && (status == GSL_SUCCESS || status == GSL_EMAXITER || status == GSL_ENOPROG)) {
-    gsl_vector_memcpy (u, gsl_multifit_nlinear_position (w));
-    fit->iterations = solver->previous += (int)gsl_multifit_nlinear_niter (w);
-    if (solve_run (solver, u) == PW_OK) solve_keep (solver, minimum);
-  } else if (solver->status == PW_OK && first)
-    solver->status = pw_fail (solver->error, PW_METHOD, "least squares: %s", gsl_strerror (status));
-  return solver->status;
+  int status = solve_run (solver, u) == PW_OK ? solve_iterate (solver, u, &f, w) : GSL_EBADFUNC;
+  if (solver->status != PW_OK || (status != GSL_SUCCESS && status != GSL_ENOPROG)) return;
+  gsl_vector_memcpy (u, gsl_multifit_nlinear_position (w));
+  fit->iterations = solver->previous += (int)gsl_multifit_nlinear_niter (w);
+  if (solve_run (solver, u) == PW_OK) solve_keep (solver, minimum);
 }
 
 /* Searches from all starts. */
-static int solve_minima (fit_solver *solver, gsl_multifit_nlinear_workspace *w) {
+static void solve_minima (fit_solver *solver) {
   pw_fit *fit = solver->fit;
   size_t n = (size_t)fit->unknowns.count, starts = (size_t)fit->starts;
+  const gsl_multifit_nlinear_parameters parameters = gsl_multifit_nlinear_default_parameters ();
+  gsl_multifit_nlinear_workspace *w =
+      gsl_multifit_nlinear_alloc (gsl_multifit_nlinear_trust, &parameters, (size_t)fit->residuals, n);
   double *start = pw_unknowns_starts (&fit->unknowns, fit->starts, 1);
   fit->minima = malloc (starts * (1 + n) * sizeof *fit->minima);
-  if (start == NULL || fit->minima == NULL) solver->status = pw_fail (solver->error, PW_RESOURCE, "out of memory");
+  if (w == NULL || start == NULL || fit->minima == NULL)
+    solver->status = pw_fail (solver->error, PW_RESOURCE, "out of memory");
   solver->least = INFINITY;
   for (size_t i = 0; i < starts && solver->status == PW_OK; i++) {
     fit->minima[i * (1 + n)] = INFINITY;
@@ -201,10 +217,10 @@ static int solve_minima (fit_solver *solver, gsl_multifit_nlinear_workspace *w) 
   }
   for (size_t i = 0; i < starts && solver->status == PW_OK; i++) solve_minimum (solver, w, fit->minima + i * (1 + n));
   free (start);
+  if (w) gsl_multifit_nlinear_free (w);
   if (solver->status == PW_OK && !isfinite (solver->least))
-    solver->status = pw_fail (solver->error, PW_METHOD,
-                              "no search ended at a motion; begin nearer to the data, by --set or --start");
-  return solver->status;
+    solver->status =
+        pw_fail (solver->error, PW_METHOD, "no search reached a minimum; begin nearer to it, by --set or --start");
 }
 
 /* ---- Errors of the estimates ---- */
@@ -267,23 +283,21 @@ static void solve_covariance (pw_fit *fit) {
   }
 }
 
-/* Covariance and standard errors of the estimate, at which the last run was made. */
-static int solve_errors (fit_solver *solver) {
+/* Covariance and standard errors of the estimate. */
+static void solve_errors (fit_solver *solver) {
   pw_fit *fit = solver->fit;
   size_t n = (size_t)fit->unknowns.count;
   gsl_matrix *J = gsl_matrix_alloc ((size_t)fit->residuals, n);
   gsl_matrix_view V = gsl_matrix_view_array (fit->singular_vector, n, n);
   gsl_vector_view S = gsl_vector_view_array (fit->singular_value, n);
-  if (J == NULL) return pw_fail (solver->error, PW_RESOURCE, "out of memory");
-  solve_derivatives (NULL, solver, J);
-  if (solver->status == PW_OK) {
+  if (J == NULL) solver->status = pw_fail (solver->error, PW_RESOURCE, "out of memory");
+  if (J && solve_derivatives (NULL, solver, J) == GSL_SUCCESS) {
     solve_scale (fit, J);
     fit->converged = solve_converged (fit, J);
     gsl_linalg_SV_decomp_jacobi (J, &V.matrix, &S.vector);
     solve_covariance (fit);
   }
-  gsl_matrix_free (J);
-  return solver->status;
+  if (J) gsl_matrix_free (J);
 }
 
 /* ---- The fit ---- */
@@ -303,20 +317,9 @@ static int solve_open (fit_solver *solver) {
 
 int pw_fit_solve (pw_fit *fit, pw_error *error) {
   fit_solver solver = { .fit = fit, .error = error };
-  gsl_multifit_nlinear_parameters parameters = gsl_multifit_nlinear_default_parameters ();
   solver.status = solve_open (&solver);
-  gsl_multifit_nlinear_workspace *w =
-      solver.status == PW_OK ? gsl_multifit_nlinear_alloc (gsl_multifit_nlinear_trust, &parameters,
-                                                           (size_t)fit->residuals, (size_t)fit->unknowns.count)
-                             : NULL;
-  if (solver.status == PW_OK && w == NULL) solver.status = pw_fail (error, PW_RESOURCE, "out of memory");
-  if (solver.status == PW_OK) solve_minima (&solver, w);
-  if (solver.status == PW_OK) {
-    memcpy (solver.unknowns, fit->estimate, (size_t)fit->unknowns.count * sizeof *fit->estimate);
-    memcpy (solver.values, fit->fitted, (size_t)fit->columns * (size_t)fit->rows * sizeof *fit->fitted);
-    solver.status = solve_errors (&solver);
-  }
-  if (w) gsl_multifit_nlinear_free (w);
+  if (solver.status == PW_OK) solve_minima (&solver);
+  if (solver.status == PW_OK) solve_errors (&solver);
   free (solver.unknowns);
   return solver.status;
 }

@@ -247,7 +247,7 @@ static int search_open (local_search *local, double first, double last) {
   done &= nlopt_add_inequality_mconstraint (o, constraints, search_constraints, local, local->allowed) > 0;
   done &= nlopt_set_xtol_abs1 (o, last) > 0;
   done &= nlopt_set_initial_step1 (o, first) > 0;
-  nlopt_set_maxeval (o, 200 + 100 * n);
+  nlopt_set_maxeval (o, 200 + 100 * n); /* runs, at most */
   return done ? PW_OK : PW_RESOURCE;
 }
 

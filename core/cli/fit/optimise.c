@@ -60,14 +60,6 @@ static int optimise_refine (pw_optimise *problem, pw_error *error) {
   return pw_parallel (problem->jobs, problem->refinements, pw_search_fine, problem, error);
 }
 
-static void optimise_count_runs (pw_optimise *problem) {
-  for (int i = 0; i < problem->starts + problem->refinements; i++) {
-    const pw_search *search = problem->search + i;
-    problem->runs += search->runs, problem->failed += search->failed, problem->derivatives += search->derivatives;
-    if (problem->first_error == NULL && search->failed) problem->first_error = &search->first_error;
-  }
-}
-
 static int optimise_search (pw_optimise *problem, pw_error *error) {
   pw_stop_catch ();
   pthread_mutex_init (&problem->lock, NULL);
@@ -79,7 +71,11 @@ static int optimise_search (pw_optimise *problem, pw_error *error) {
   pthread_mutex_destroy (&problem->lock);
   pw_stop_release ();
   problem->best = optimise_best (problem, problem->starts + problem->refinements, NULL);
-  optimise_count_runs (problem);
+  for (const pw_search *search = problem->search; search < problem->search + problem->starts + problem->refinements;
+       search++) {
+    problem->runs += search->runs, problem->failed += search->failed, problem->derivatives += search->derivatives;
+    if (problem->first_error == NULL && search->failed) problem->first_error = &search->first_error;
+  }
   return problem->fatal.status != PW_OK ? pw_fail (error, problem->fatal.status, "%s", problem->fatal.text) : status;
 }
 
