@@ -51,7 +51,7 @@ static void check_given_values (pw_check *check) {
   }
 }
 
-/* The model's reference solution must hold initially, unless the user gives initial values. */
+/* The model's reference solution must hold initially, up to round-off, unless the user gives initial values. */
 static int check_reference (pw_check *check, pw_error *error) {
   int n = pw_system_coordinates (check->model.system);
   if (check->line.starts || !pw_system_has_reference (check->model.model)) return PW_OK;
@@ -137,7 +137,7 @@ static void check_fastest (pw_check *check) {
   for (int i = 0; i < linear->unknowns; i++) {
     if (linear->rigid[i]) continue;
     check->rk4_limit = fmin (check->rk4_limit, pw_rk4_limit (linear->re[i], linear->im[i]));
-    if (hypot (linear->re[i], linear->im[i]) <= most * (1 + 1e-12)) continue; /* round-off */
+    if (hypot (linear->re[i], linear->im[i]) <= most * (1 + 1e-12)) continue; /* not larger, up to round-off */
     most = hypot (linear->re[i], linear->im[i]);
     check->fastest = i;
   }
