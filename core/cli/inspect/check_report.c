@@ -313,7 +313,7 @@ static void report_linear (pw_json *j, const pw_check *check) {
                  CHECK_COORDINATES);
   if (linear->A == NULL) return;
   report_motion (j, linear);
-  /* in a frame that turns, those of rigid displacements are not 0 */
+  /* eigenvalues of rigid displacements are not 0 in a frame that turns */
   if (j == NULL && check->fastest < 0 && linear->twist[2] == 0)
     report_text (j, "eigenvalues", "all 0: nothing vibrates, grows or decays");
   else if (j == NULL)
