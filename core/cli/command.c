@@ -184,12 +184,13 @@ int pw_cli_range (const char *text, double *first, double *last) {
   return isfinite (*last - *first) ? PW_OK : PW_INPUT;
 }
 
-int pw_cli_settings (const pw_cli_line *line, const pw_run_defaults *model, double *t_end, pw_settings *settings,
+int pw_cli_settings (const pw_cli_line *line, const pw_run_defaults *defaults, double *t_end, pw_settings *settings,
                      pw_limit *limit, pw_error *error) {
   double max_steps = PW_MAX_STEPS;
-  *t_end = model->t_end;
+  *t_end = defaults->t_end;
   *limit = (pw_limit){ .seconds = INFINITY };
-  *settings = (pw_settings){ .step = model->step, .rtol = model->rtol, .stop = pw_limit_over, .stop_context = limit };
+  *settings =
+      (pw_settings){ .step = defaults->step, .rtol = defaults->rtol, .stop = pw_limit_over, .stop_context = limit };
   const struct {
     const char *option, *text;
     double *value;

@@ -44,12 +44,12 @@ typedef struct {
   void *context;
   int status; /* of the first task that failed */
   pw_error *error;
-  int threads, begun;          /* number of threads; of those that have begun */
+  int threads, bound;          /* number of threads; of those bound to their cores */
   const parallel_cores *cores; /* NULL: threads run on any processor */
 } parallel;
 
-/* Binds the calling thread to its share of the cores; among several of them the system can avoid those that other
- * programs use. */
+/* Binds the calling thread to its share of the cores; if these are several, the operating system chooses among them
+ * and can avoid those that other programs use. */
 static void parallel_bind (const parallel_cores *c, int thread, int threads) {
   cpu_set_t own;
   CPU_ZERO (&own);
@@ -60,7 +60,7 @@ static void parallel_bind (const parallel_cores *c, int thread, int threads) {
 static void *parallel_thread (void *argument) {
   parallel *p = argument;
   pthread_mutex_lock (&p->lock);
-  if (p->cores) parallel_bind (p->cores, p->begun++, p->threads);
+  if (p->cores) parallel_bind (p->cores, p->bound++, p->threads);
   while (p->next < p->count) {
     int i = p->next++;
     pw_error own = { 0 };
@@ -80,7 +80,7 @@ static void *parallel_thread (void *argument) {
 static int parallel_run (parallel *p) {
   if (p->threads > p->count) p->threads = p->count;
   pthread_t *thread = calloc ((size_t)p->threads + 1, sizeof *thread);
-  int started = 1, code = thread ? 0 : ENOMEM; /* the caller is thread 0 */
+  int started = 1, code = thread ? 0 : ENOMEM; /* thread[0], the caller, is unused */
   pthread_mutex_init (&p->lock, NULL);
   pthread_mutex_lock (&p->lock);
   while (code == 0 && started < p->threads && (code = pthread_create (thread + started, NULL, parallel_thread, p)) == 0)
@@ -131,7 +131,7 @@ int pw_parallel_timed (int jobs, int count, pw_task *task, void *context, pw_err
   parallel_find_cores (&cores);
   parallel p = { .count = count, .task = task, .context = context, .error = error, .threads = jobs, .cores = &cores };
   if (jobs > cores.count) p.threads = cores.count;
-  if (p.threads < 2) return pw_parallel (1, count, task, context, error);
+  if (p.threads < 2 || count < 2) return pw_parallel (1, count, task, context, error);
   int status = parallel_run (&p);
   sched_setaffinity (0, sizeof cores.all, &cores.all);
   return status;

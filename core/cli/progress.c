@@ -20,15 +20,11 @@ double pw_seconds (clockid_t id) {
   return (double)now.tv_sec + 1e-9 * (double)now.tv_nsec;
 }
 
-void pw_progress_count (pw_progress *p, const char *title, const char *unit, double first, double last) {
+void pw_progress_start (pw_progress *p, const char *title, const char *unit, double first, double last) {
   double now = pw_seconds (CLOCK_MONOTONIC);
   int lines = !isatty (STDERR_FILENO);
   *p = (pw_progress){ .title = title, .unit = unit, .first = first, .last = last, .start = now, .lines = lines };
   p->next = now + (lines ? PROGRESS_LINE_INTERVAL : PROGRESS_DELAY);
-}
-
-void pw_progress_start (pw_progress *p, const char *title, double t_end) {
-  pw_progress_count (p, title, "s", 0, t_end);
 }
 
 /* "0:07", "12:30", "3:05:00"; "-" if it is unknown or 1000 hours or more. */

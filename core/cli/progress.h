@@ -21,10 +21,9 @@ typedef struct {
 /* The time of a clock [s]. */
 double pw_seconds (clockid_t id);
 
-/* Starts the progress of a run from time 0 to t_end. */
-void pw_progress_start (pw_progress *p, const char *title, double t_end);
-/* The same for work that is counted in `unit` ("runs"): `first` of `last` are done already. */
-void pw_progress_count (pw_progress *p, const char *title, const char *unit, double first, double last);
+/* Starts the progress of a run from time `first` to `last`, with the unit "s"; or of work that is counted in `unit`
+ * ("runs"): `first` of `last` are done already. */
+void pw_progress_start (pw_progress *p, const char *title, const char *unit, double first, double last);
 /* Draws the bar for the time or count reached, at most ten times a second, or writes a line. */
 void pw_progress_at (pw_progress *p, double reached);
 /* Erases the bar. */

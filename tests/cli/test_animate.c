@@ -66,9 +66,9 @@ static void test_forces (void **state) {
   (void)state;
   cli_good ("pinwheel run ezyroller --t-end 1 --animate @/run.html");
   char *page = animate_page ("run.html");
-  assert_non_null (strstr (page, "{\"name\": \"B\", \"force\": 0, \"ends\": [{\"body\": 0"));
+  assert_non_null (strstr (page, "{\"name\": \"B\", \"force_end\": 0, \"ends\": [{\"body\": 0"));
   assert_non_null (strstr (page, "\"strokes\": [[1, [0, 0.4, 0, 0],")); /* the circle of the pin's symbol */
-  assert_non_null (strstr (page, "{\"name\": \"A\", \"force\": 0, \"ends\": [{\"body\": 0"));
+  assert_non_null (strstr (page, "{\"name\": \"A\", \"force_end\": 0, \"ends\": [{\"body\": 0"));
   animate_numbers (page, "force", &first, &last);
   const char *row = animate_array (page, "force");
   double f[6];

@@ -1,5 +1,5 @@
 /* Limits on the command line: --max-steps, --limit, signals that come while rows are written, progress without a
- * terminal. */
+ * terminal; threads without tasks. */
 #define _XOPEN_SOURCE 700
 #include <fcntl.h>
 #include <stdio.h>
@@ -7,7 +7,7 @@
 #include <unistd.h>
 #include "check.h"
 #include "cli.h"
-#include "cli/progress.h"
+#include "cli/parallel.h"
 
 /* What there is so far is kept, the exit status is 4, and the limit is named. */
 static void test_max_steps (void **state) {
@@ -117,7 +117,7 @@ static void test_lines (void **state) {
   int before = dup (STDERR_FILENO), file = open (path, O_RDWR | O_CREAT | O_TRUNC, 0600);
   assert_true (before >= 0 && file >= 0);
   dup2 (file, STDERR_FILENO);
-  pw_progress_start (&p, "ezyroller", 10);
+  pw_progress_start (&p, "ezyroller", "s", 0, 10);
   p.no_bar = 1;
   pw_progress_at (&p, 1);
   double due = p.next - p.start;
@@ -169,11 +169,26 @@ static void test_last_step (void **state) {
   assert_string_equal (cli_out, "12\n");
 }
 
+static int limits_no_task (void *context, int i, pw_error *error) {
+  (void)i;
+  return pw_fail (error, PW_METHOD, "%s", (const char *)context);
+}
+
+/* Without tasks the threads, timed or not, end at once. */
+static void test_no_tasks (void **state) {
+  pw_error error = { 0 };
+  char text[] = "a task was called";
+  (void)state;
+  assert_int_equal (pw_parallel (2, 0, limits_no_task, text, &error), PW_OK);
+  assert_int_equal (pw_parallel_timed (2, 0, limits_no_task, text, &error), PW_OK);
+}
+
 int main (void) {
   const struct CMUnitTest tests[] = {
     cmocka_unit_test (test_max_steps), cmocka_unit_test (test_limit),  cmocka_unit_test (test_rows),
     cmocka_unit_test (test_resume),    cmocka_unit_test (test_bad),    cmocka_unit_test (test_rows_of_a_step),
     cmocka_unit_test (test_lines),     cmocka_unit_test (test_growth), cmocka_unit_test (test_last_step),
+    cmocka_unit_test (test_no_tasks),
   };
   return cmocka_run_group_tests (tests, cli_setup, cli_teardown);
 }

@@ -66,8 +66,8 @@ static void test_unbound (void **state) {
   reports_shows ("\nThe model has no constraints: no J, no gamma\n");
   cli_good ("pinwheel check @/free.yaml");
   reports_shows ("  fastest eigenvalue                 2 1/s\n");
-  reports_shows ("  it grows by a factor e in          0.5 s\n");
-  reports_shows ("  RK4 is stable                      with any step: the fast modes grow\n");
+  reports_shows ("  it grows by a factor of e in       0.5 s\n");
+  reports_shows ("  RK4 is stable                      with any step: no mode decays or oscillates\n");
   cli_good ("sed '/elements/,$d' @/free.yaml >@/alone.yaml && pinwheel show @/alone.yaml --yaml");
   reports_shows ("about: \"says \\\"so\\\", \\\\ and a\\x09tab\"\n");
   cli_good ("pinwheel show @/alone.yaml --yaml >@/again.yaml && pinwheel show @/again.yaml");
@@ -180,6 +180,37 @@ static void test_figures_resumed (void **state) {
   assert_non_null (strstr (cli_err, "pinwheel: resumed at t = 0.9 s\n"));
 }
 
+/* The error of reactions is relative also if their unit is "": one of 981, and a reference that is 1 % larger. */
+static void test_reaction_without_unit (void **state) {
+  (void)state;
+  cli_write ("hold.c",
+             "#include \"pinwheel.h\"\n"
+             "typedef struct { const char *name, *body; } hold;\n"
+             "static const pw_field fields[] = {\n"
+             "  { .name = \"body\", .offset = offsetof (hold, body), .type = PW_BODY, .required = 1 },\n"
+             "  { .name = NULL } };\n"
+             "static const pw_quantity reaction[] = { { \"R\", \"\", NULL, \"upwards\" } };\n"
+             "static void g (const pw_batch *b, double *g) {\n"
+             "  for (int e = 0; e < b->count; e++) g[e] = b->configuration[b->body[e]].y;\n"
+             "}\n"
+             "static void J (const pw_batch *b, double *J) {\n"
+             "  for (int e = 0; e < b->count; e++) J[3 * e] = J[3 * e + 2] = 0, J[3 * e + 1] = 1;\n"
+             "}\n"
+             "static const pw_kind kind = { .name = \"hold\", .about = \"y = 0\", .definition = sizeof (hold),\n"
+             "  .fields = fields, .bodies = 1, .rows = 1, .level = PW_HOLONOMIC, .reaction = reaction,\n"
+             "  .g = g, .g_size = g, .J = J };\n"
+             "static void build (pw_model *m, const void *p) {\n"
+             "  (void)p;\n"
+             "  pw_add_body (m, &(pw_body){ .name = \"ball\", .mass = 100, .inertia = 1 });\n"
+             "  pw_add (m, &kind, &(hold){ .name = \"h\", .body = \"ball\" });\n"
+             "  pw_add_gravity (m, &(pw_gravity){ .name = \"G\", .acceleration = { 0, -9.81 } });\n"
+             "}\n"
+             "PW_MODEL (.about = \"held\", .build = build);\n");
+  cli_good ("pinwheel run @/hold.c -t 0.1 -o @/held.csv && sed 's/,981,/,990.81,/' @/held.csv >@/off.csv && "
+            "pinwheel run @/hold.c -t 0.1 --reference @/off.csv --json @/hold.json");
+  check_close ("error", cli_number (cli_file ("hold.json"), "truth", "reactions", NULL), 0.01 / 1.01, 1e-9, "980");
+}
+
 /* More rows that say the same than are listed. */
 static void test_many_redundant (void **state) {
   char text[2000] = "pinwheel: 1\nbodies:\n  - {name: a, mass: 1, inertia: 1}\nelements:\n";
@@ -250,12 +281,23 @@ static void test_ladder (void **state) {
 
 int main (void) {
   const struct CMUnitTest tests[] = {
-    cmocka_unit_test (test_roller),          cmocka_unit_test (test_reactions),     cmocka_unit_test (test_unknown_end),
-    cmocka_unit_test (test_signals),         cmocka_unit_test (test_unbound),       cmocka_unit_test (test_literals),
-    cmocka_unit_test (test_nothing),         cmocka_unit_test (test_failures),      cmocka_unit_test (test_sorted),
-    cmocka_unit_test (test_figures_resumed), cmocka_unit_test (test_domains),       cmocka_unit_test (test_ladder),
-    cmocka_unit_test (test_many_redundant),  cmocka_unit_test (test_contradiction), cmocka_unit_test (test_alone),
+    cmocka_unit_test (test_roller),
+    cmocka_unit_test (test_reactions),
+    cmocka_unit_test (test_unknown_end),
+    cmocka_unit_test (test_signals),
+    cmocka_unit_test (test_unbound),
+    cmocka_unit_test (test_literals),
+    cmocka_unit_test (test_nothing),
+    cmocka_unit_test (test_failures),
+    cmocka_unit_test (test_sorted),
+    cmocka_unit_test (test_figures_resumed),
+    cmocka_unit_test (test_domains),
+    cmocka_unit_test (test_ladder),
+    cmocka_unit_test (test_many_redundant),
+    cmocka_unit_test (test_contradiction),
+    cmocka_unit_test (test_alone),
     cmocka_unit_test (test_columns),
+    cmocka_unit_test (test_reaction_without_unit),
   };
   return cmocka_run_group_tests (tests, cli_setup, cli_teardown);
 }

@@ -54,7 +54,7 @@ static int linearise_advance (pw_linearise_command *cmd, pw_error *error) {
   pw_progress progress;
   int status = PW_OK;
   pw_stop_catch ();
-  pw_progress_start (&progress, pw_file_name (cmd->m.file), cmd->t);
+  pw_progress_start (&progress, pw_file_name (cmd->m.file), "s", 0, cmd->t);
   while (status == PW_OK && pw_run_time (cmd->r) < cmd->t) {
     status = pw_run_advance (cmd->r, cmd->t, error);
     pw_progress_at (&progress, pw_run_time (cmd->r));

@@ -89,7 +89,7 @@ static int periodic_find (pw_periodic_command *cmd, pw_periodic_orbit *o, pw_err
   pw_progress progress;
   double best = INFINITY;
   int status = PW_RETRY;
-  pw_progress_count (&progress, pw_file_name (cmd->m.file), "attempts", 0, PW_PERIODIC_ATTEMPTS);
+  pw_progress_start (&progress, pw_file_name (cmd->m.file), "attempts", 0, PW_PERIODIC_ATTEMPTS);
   for (int k = 0; status == PW_RETRY && k < PW_PERIODIC_ATTEMPTS && !periodic_is_stopped (cmd); k++) {
     status = pw_periodic_solve (cmd->search, periodic_settling[k], cmd->settings.first, o, error);
     cmd->residual[k] = o->residual;

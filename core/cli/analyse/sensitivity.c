@@ -342,7 +342,7 @@ static int sensitivity_estimate_run_error (pw_sensitivity *sens, pw_progress *pr
 static int sensitivity_compute (pw_sensitivity *sens, pw_error *error) {
   pw_progress progress;
   pw_stop_catch ();
-  pw_progress_start (&progress, pw_file_name (sens->unknowns.m->file), sens->unknowns.t_end);
+  pw_progress_start (&progress, pw_file_name (sens->unknowns.m->file), "s", 0, sens->unknowns.t_end);
   int status = pw_sensitivity_compute (sens, NULL, &progress, error);
   for (int i = 0; i < SENSITIVITY_REPEATED && status == PW_OK && sensitivity_improve_steps (sens); i++) {
     status = sensitivity_repeat (sens, &progress, error);

@@ -120,7 +120,7 @@ static int steady_search (pw_steady_command *cmd, double parameter, pw_error *er
   pw_steady_motion m;
   int status = PW_OK;
   const int attempts = PW_STEADY_NOT_RANDOM + cmd->random_attempts;
-  pw_progress_count (&progress, pw_file_name (cmd->m.file), "starts", 0, attempts);
+  pw_progress_start (&progress, pw_file_name (cmd->m.file), "starts", 0, attempts);
   for (int k = 0; status == PW_OK && k < attempts && !steady_is_stopped (cmd); k++) {
     status = pw_steady_solve (cmd->search, k, parameter, &m, error);
     if (status == PW_OK) status = steady_found (cmd, &m, k, error);

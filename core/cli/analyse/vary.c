@@ -34,7 +34,7 @@ int pw_vary_read (pw_vary *v, const pw_cli_line *line, const pw_cli_model *m, co
 }
 
 void pw_vary_progress (const pw_vary *v, pw_progress *p, double from, double value, double to) {
-  if (p->title == NULL) pw_progress_count (p, pw_file_name (v->unknowns.m->file), "", 0, 1);
+  if (p->title == NULL) pw_progress_start (p, pw_file_name (v->unknowns.m->file), "", 0, 1);
   snprintf (p->note, sizeof p->note, "%.20s = %.4g", v->name, value);
   pw_progress_at (p, (value - from) / (to - from));
 }

@@ -194,7 +194,7 @@ static void fit_interrupt (pw_fit *fit) {
 
 static int fit_search (pw_fit *fit, pw_error *error) {
   pw_stop_catch ();
-  pw_progress_count (&fit->progress, pw_file_name (fit->model.file), "iterations", 0, FIT_ITERATIONS * fit->starts);
+  pw_progress_start (&fit->progress, pw_file_name (fit->model.file), "iterations", 0, FIT_ITERATIONS * fit->starts);
   int status = pw_fit_solve (fit, error);
   pw_progress_end (&fit->progress);
   pw_stop_release ();

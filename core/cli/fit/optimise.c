@@ -63,7 +63,7 @@ static int optimise_refine (pw_optimise *problem, pw_error *error) {
 static int optimise_search (pw_optimise *problem, pw_error *error) {
   pw_stop_catch ();
   pthread_mutex_init (&problem->lock, NULL);
-  pw_progress_count (&problem->progress, pw_file_name (problem->model.file), "starts", 0,
+  pw_progress_start (&problem->progress, pw_file_name (problem->model.file), "starts", 0,
                      problem->starts + OPTIMISE_REFINED);
   int status = pw_parallel (problem->jobs, problem->starts, pw_search_rough, problem, error);
   if (status == PW_OK) status = optimise_refine (problem, error);

@@ -6,14 +6,16 @@
 #include <string.h>
 #include "check_report.h"
 #include "report.h"
+#include "util.h"
 
 enum { CHECK_SEEDS = 5 /* random scenes of each element type */ };
 
 PW_PRINTF (2, 3) static void check_add (pw_check_list *list, const char *format, ...) {
   va_list arguments;
+  list->out_of_memory |= pw_grow (&list->text, (size_t)list->count, &list->room, sizeof *list->text) != PW_OK;
+  if (list->out_of_memory) return;
   va_start (arguments, format);
-  if (list->count++ < (int)(sizeof list->text / sizeof *list->text))
-    vsnprintf (list->text[list->count - 1], sizeof *list->text, format, arguments);
+  vsnprintf (list->text[list->count++], sizeof *list->text, format, arguments);
   va_end (arguments);
 }
 
@@ -49,7 +51,7 @@ static void check_given_values (pw_check *check) {
   }
 }
 
-/* The model's reference solution must hold initially, unless the user gives initial values. */
+/* The model's reference solution must hold initially, up to round-off, unless the user gives initial values. */
 static int check_reference (pw_check *check, pw_error *error) {
   int n = pw_system_coordinates (check->model.system);
   if (check->line.starts || !pw_system_has_reference (check->model.model)) return PW_OK;
@@ -135,7 +137,7 @@ static void check_fastest (pw_check *check) {
   for (int i = 0; i < linear->unknowns; i++) {
     if (linear->rigid[i]) continue;
     check->rk4_limit = fmin (check->rk4_limit, pw_rk4_limit (linear->re[i], linear->im[i]));
-    if (hypot (linear->re[i], linear->im[i]) <= most * (1 + 1e-12)) continue;
+    if (hypot (linear->re[i], linear->im[i]) <= most * (1 + 1e-12)) continue; /* not larger, up to round-off */
     most = hypot (linear->re[i], linear->im[i]);
     check->fastest = i;
   }
@@ -176,7 +178,9 @@ static int check_model (pw_check *check, pw_error *error) {
     status = check_reference (check, error);
     if (status == PW_OK) status = check_linear (check, error);
   }
-  return status == PW_OK ? check_kinds (check, error) : status;
+  if (status == PW_OK) status = check_kinds (check, error);
+  int out_of_memory = check->problem.out_of_memory || check->finding.out_of_memory;
+  return status == PW_OK && out_of_memory ? pw_fail (error, PW_RESOURCE, "out of memory") : status;
 }
 
 static void check_close (pw_check *check) {
@@ -184,6 +188,8 @@ static void check_close (pw_check *check) {
   pw_run_close (check->run);
   free (check->redundant);
   free (check->kind);
+  free (check->problem.text);
+  free (check->finding.text);
   pw_cli_close_model (&check->model);
 }
 

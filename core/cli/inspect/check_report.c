@@ -3,7 +3,6 @@
 #include <stdarg.h>
 #include <string.h>
 #include "check_report.h"
-#include "report.h"
 
 enum { REPORT_LISTED = 8, REPORT_EIGENVALUES = 60 }; /* items of a list; lines of eigenvalues: in the text, at most */
 
@@ -45,8 +44,8 @@ static void report_entry (pw_json *j, const char *key, double value, const char 
 /* A line in the text only. */
 #define report_text(j, ...) report_entry (j, NULL, 0, __VA_ARGS__)
 
-/* An item of a list: a string in JSON, unless it is NULL; a line in the text, for the first REPORT_LISTED ones, which
- * `listed` counts. */
+/* An item of a list: a string in JSON, unless it is NULL; a line in the text, if it is one of the first REPORT_LISTED.
+ * `listed` counts all items. */
 static void report_item (pw_json *j, int *listed, const char *string, const char *line) {
   if (string) pw_json_text (j, NULL, string);
   if ((*listed)++ < REPORT_LISTED) report_print (j, "    %s\n", line);
@@ -69,8 +68,8 @@ static void report_singular_value (pw_json *j, const pw_check *check) {
                   linear->coordinates, CHECK_COORDINATES);
   else
     report_entry (j, "least_singular_value", check->run ? linear->least : NAN, label,
-                  "%s, rows of length 1, angles in units of L = %s m", pw_format (value, linear->least, CHECK_DIGITS),
-                  pw_format (unit, length, CHECK_DIGITS));
+                  "%s, rows scaled to length 1, angles multiplied by L = %s m",
+                  pw_format (value, linear->least, CHECK_DIGITS), pw_format (unit, length, CHECK_DIGITS));
   pw_json_number (j, "length_scale", length);
 }
 
@@ -104,14 +103,17 @@ static void report_mobility (pw_json *j, const pw_check *check) {
 
 static void report_mass (pw_json *j, const pw_check *check) {
   static const char *const lack[] = { NULL, "no mass", "no inertia", "neither mass nor inertia" };
-  /* the error says if the matrix is singular; after other errors of the initialisation that is not known */
+  /* the error of massless_undetermined; after other errors it is not known if the matrix is singular */
   int is_singular = strstr (check->run_error.text, "no constraint determines how it moves") != NULL;
-  const char *matrix = check->run ? "regular" : is_singular ? "singular" : NULL;
+  const char *saddle_point = is_singular                         ? "singular"
+                             : check->run == NULL                ? NULL
+                             : pw_run_redundant (check->run) > 0 ? "regular without the redundant constraint equations"
+                                                                 : "regular";
   const pw_system *s = check->model.system;
   const double *M = pw_system_mass (s);
   int lacking = 0, listed = 0;
   for (int b = 0; b < pw_system_bodies (s); b++) lacking += M[3 * b] == 0 || M[3 * b + 2] == 0;
-  report_section (j, "massless", '[', "Mass");
+  report_section (j, "massless", '[', "Mass"); /* also those with mass but no inertia */
   report_text (j, "bodies without mass or inertia", "%d", lacking);
   for (int b = 0; b < pw_system_bodies (s); b++) {
     int which = (M[3 * b] == 0) + 2 * (M[3 * b + 2] == 0);
@@ -122,10 +124,10 @@ static void report_mass (pw_json *j, const pw_check *check) {
     report_item (j, &listed, name, line);
   }
   report_end_list (j, listed);
-  report_text (j, "saddle-point matrix", "%s%s", matrix ? matrix : "not known",
-               matrix && check->run == NULL ? "; see below" : "");
+  report_text (j, "saddle-point matrix", "%s%s", saddle_point ? saddle_point : "not known",
+               is_singular ? "; see below" : "");
   report_line (j);
-  pw_json_text (j, "saddle_point", matrix);
+  pw_json_text (j, "saddle_point", saddle_point);
 }
 
 /* ---- Initial conditions ---- */
@@ -162,7 +164,7 @@ static void report_initial (pw_json *j, const pw_check *check) {
     report_print (j, "  consistent as described\n");
   else
     report_print (j, "  %d value%s changed%s\n", initial->moved, initial->moved == 1 ? " was" : "s were",
-                  initial->released ? ", including given ones: they cannot all be satisfied" : "");
+                  initial->released ? ", including given ones, which cannot all be satisfied" : "");
   for (int i = 0; i < 2 * n; i++)
     if (pw_initial_moved (check->model.system, initial, i)) report_change (j, check, i, &listed);
   report_end_list (j, listed);
@@ -174,12 +176,12 @@ static void report_initial (pw_json *j, const pw_check *check) {
 
 /* ---- Element types ---- */
 
-/* The checks that failed, in "random scenes" or "this model"; label: the same in the text. */
-static void report_failures (pw_json *j, const pw_selftest_report *report, const char *scenes, const char *label) {
+/* The checks that failed, in `scenes`: "random scenes" or "this model". */
+static void report_failures (pw_json *j, const pw_selftest_report *report, const char *scenes) {
   char error[32], bound[32];
   for (const pw_selftest_check *c = report->check; c < report->check + report->checks; c++) {
     if (!c->failed) continue;
-    report_print (j, "    %s: %s does not hold: off by %s, the bound is %s\n      %s\n", label, c->about,
+    report_print (j, "    in %s: %s does not hold: off by %s, the bound is %s\n      %s\n", scenes, c->about,
                   pw_format (error, c->error, 2), pw_format (bound, c->bound, 2), c->where);
     pw_json_open (j, NULL, '{');
     pw_json_text (j, "check", c->name);
@@ -201,11 +203,11 @@ static void report_kind (pw_json *j, const pw_checked_kind *k) {
   pw_json_number (j, "checks", k->random.checks + k->in_model.checks);
   pw_json_open (j, "failed", '[');
   snprintf (name, sizeof name, "%s (%d element%s)", k->kind->name, k->count, k->count == 1 ? "" : "s");
-  report_text (j, name, "%s: %d checks at random, %d in this model",
+  report_text (j, name, "%s: %d checks in random scenes, %d in this model",
                k->random.failed + k->in_model.failed ? "FAILED" : "good", k->random.checks, k->in_model.checks);
-  if (*k->untested) report_print (j, "    not tested at random: %s\n", k->untested);
-  report_failures (j, &k->random, "random scenes", "at random");
-  report_failures (j, &k->in_model, "this model", "in this model");
+  if (*k->untested) report_print (j, "    not tested in random scenes: %s\n", k->untested);
+  report_failures (j, &k->random, "random scenes");
+  report_failures (j, &k->in_model, "this model");
   pw_json_close (j, ']');
   pw_json_close (j, '}');
 }
@@ -267,15 +269,13 @@ static void report_stability (pw_json *j, const pw_check *check) {
   for (int i = 0; i < linear->unknowns; i++)
     if (!linear->rigid[i]) rightmost = fmax (rightmost, linear->re[i]);
   const char *label = linear->steady == PW_STEADY && isfinite (rightmost) ? "stability" : NULL;
-  if (rightmost > 0)
-    report_entry (j, "doubling_time", check->doubling_time, label, "unstable, doubles in %s s",
-                  pw_format (time, check->doubling_time, CHECK_DIGITS));
-  else if (rightmost < 0)
-    report_entry (j, "doubling_time", check->doubling_time, label, "stable, the slowest perturbation halves in %s s",
-                  pw_format (time, log (2) / -rightmost, CHECK_DIGITS));
+  if (rightmost == 0)
+    report_text (j, label, "neutral: no perturbation grows exponentially, not all decay");
   else
-    report_entry (j, "doubling_time", check->doubling_time, label,
-                  "neutral: no perturbation grows exponentially, not all decay");
+    report_text (j, label, "%s in %s s",
+                 rightmost > 0 ? "unstable, doubles" : "stable, the slowest perturbation halves",
+                 pw_format (time, log (2) / fabs (rightmost), CHECK_DIGITS));
+  pw_json_number (j, "doubling_time", check->doubling_time);
 }
 
 static void report_fastest (pw_json *j, const pw_check *check) {
@@ -292,15 +292,14 @@ static void report_fastest (pw_json *j, const pw_check *check) {
   report_entry (j, "damping", damping, im != 0 ? "its damping" : NULL, "%s of critical",
                 pw_format (first, damping, CHECK_DIGITS));
   if (found && im == 0)
-    report_text (j, re < 0 ? "it decays by a factor e in" : "it grows by a factor e in", "%s s",
+    report_text (j, re < 0 ? "it decays by a factor of e in" : "it grows by a factor of e in", "%s s",
                  pw_format (first, 1 / size, CHECK_DIGITS));
-  if (isinf (check->rk4_limit))
-    report_entry (j, "rk4_step", check->rk4_limit, found ? "RK4 is stable" : NULL,
-                  "with any step: the fast modes grow");
-  else
-    report_entry (j, "rk4_step", check->rk4_limit, found ? "RK4 is stable up to a step of" : NULL,
-                  "%s s; the model's step is %s s", pw_format (first, check->rk4_limit, 3),
-                  pw_format (second, check->step, 6));
+  if (found && isinf (check->rk4_limit))
+    report_text (j, "RK4 is stable", "with any step: no mode decays or oscillates");
+  else if (found)
+    report_text (j, "RK4 is stable up to a step of", "%s s; the model's step is %s s",
+                 pw_format (first, check->rk4_limit, 3), pw_format (second, check->step, 6));
+  pw_json_number (j, "rk4_step", check->rk4_limit);
 }
 
 static void report_linear (pw_json *j, const pw_check *check) {
@@ -314,6 +313,7 @@ static void report_linear (pw_json *j, const pw_check *check) {
                  CHECK_COORDINATES);
   if (linear->A == NULL) return;
   report_motion (j, linear);
+  /* eigenvalues of rigid displacements are not 0 in a frame that turns */
   if (j == NULL && check->fastest < 0 && linear->twist[2] == 0)
     report_text (j, "eigenvalues", "all 0: nothing vibrates, grows or decays");
   else if (j == NULL)
@@ -334,16 +334,13 @@ static void report_linear (pw_json *j, const pw_check *check) {
 /* ---- The report ---- */
 
 static void report_list (pw_json *j, const char *key, const char *one, const pw_check_list *list) {
-  int most = (int)(sizeof list->text / sizeof *list->text);
-  char more[40];
-  snprintf (more, sizeof more, "and %d more", list->count - most);
   if (list->count > 0) report_print (j, "\n%d %s\n", list->count, list->count == 1 ? one : key);
   report_section (j, key, '[', NULL);
-  for (int i = 0; i < list->count && i <= most; i++) {
-    const char *text = i < most ? list->text[i] : more;
-    pw_json_text (j, NULL, text);
-    report_print (j, "  %s\n", text);
+  for (int i = 0; i < list->count; i++) {
+    pw_json_text (j, NULL, list->text[i]);
+    if (i < REPORT_LISTED) report_print (j, "  %s\n", list->text[i]);
   }
+  if (list->count > REPORT_LISTED) report_print (j, "  and %d more\n", list->count - REPORT_LISTED);
   pw_json_close (j, ']');
 }
 
@@ -364,7 +361,7 @@ void pw_check_report (const pw_check *check, pw_json *j) {
   report_mass (j, check);
   report_initial (j, check);
   report_section (j, "kinds", '[',
-                  "Self-test of the element types in use: each function against differences of others");
+                  "Self-test of the element types in use: each function against differences of other functions");
   for (const pw_checked_kind *k = check->kind; k < check->kind + check->kinds; k++) report_kind (j, k);
   pw_json_close (j, ']');
   report_linear (j, check);

@@ -19,10 +19,11 @@ typedef struct {
   char untested[500];                  /* why there is no test in random scenes, or "" */
 } pw_checked_kind;
 
-/* Number of messages, and the first ones. */
+/* Messages; `room`: number of those for which there is memory. */
 typedef struct {
-  int count;
-  char text[8][700];
+  int count, out_of_memory; /* out_of_memory 1: one could not be added */
+  size_t room;
+  char (*text)[700];
 } pw_check_list;
 
 /* Problems make the check fail; findings do not: the model can be run, but may not be what was intended. */

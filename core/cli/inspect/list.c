@@ -219,7 +219,7 @@ static int list_signals (const char **name, pw_error *error) {
 
 /* ---- Without arguments: the names, on one screen ---- */
 
-/* Prints a name; *column is the end of the line so far. */
+/* Prints a name; *column is the end of the line so far, without the newline before it, which printf counts. */
 static void list_name (int *column, const char *name) {
   if (*column + 1 + (int)strlen (name) > LIST_NAMES) *column = printf ("\n%*s", LIST_HEADING, "") - 1;
   *column += printf (" %s", name);

@@ -155,8 +155,9 @@ static void matrices_constraints (const pw_system *s, const pw_equations *equati
   }
 }
 
-/* Some columns of J; in a large scene only the rows that are not zero there.  The entries are sorted by rows. */
-static void matrices_panel (const pw_system *s, const pw_equations *equations, int first, int columns) {
+/* Columns of J from `first` on; in a large scene only the rows that are not zero there.  Entries are sorted by rows. */
+static void matrices_panel (const pw_system *s, const pw_equations *equations, int first) {
+  int left = equations->coordinates - first, columns = left < MATRICES_PANEL ? left : MATRICES_PANEL;
   char name[300];
   putchar ('\n');
   for (pw_table t = { 0 }; pw_table_pass (&t);) {
@@ -188,8 +189,7 @@ static void matrices_print (const pw_cli_model *m, const pw_equations *equations
   if (equations->rows > 0 && equations->coordinates > 2 * MATRICES_PANEL)
     puts ("\nRows of J that are zero in the columns shown are left out");
   for (int j = 0; equations->rows > 0 && j < equations->coordinates; j += MATRICES_PANEL)
-    matrices_panel (s, equations, j,
-                    equations->coordinates - j < MATRICES_PANEL ? equations->coordinates - j : MATRICES_PANEL);
+    matrices_panel (s, equations, j);
 }
 
 static int show_matrices (const pw_cli_model *m, double t, pw_error *error) {

@@ -1,5 +1,5 @@
 /* The command `page`: an interactive page, which simulates a model in the browser.  It consists of animate.html with
- * the panel page.html, the script page.js, and the engine and the model as data. */
+ * the panel page.html, the script page.js, the model, and the engine: integrators compiled to WebAssembly. */
 #include <stdlib.h>
 #include <string.h>
 #include "plot.h"
@@ -59,7 +59,7 @@ static void page_states_json (const page *cmd, pw_json *j) {
   pw_json_close (j, ']');
 }
 
-/* 1 if the engine has this integrator and its stabilisation of this index. */
+/* 1 if the engine has this integrator with m->stabilisations[stabilisation]. */
 static int page_has_method (const pw_method *m, int stabilisation) {
   char hint[PW_HINT];
   return m->stabilisations[stabilisation].kind != PW_NULLSPACE &&
@@ -135,7 +135,7 @@ static int page_open_files (page *cmd, pw_error *error) {
   if (pw_page_open (&cmd->content, cmd->compiled.file, error) != PW_OK) return error->status;
   for (int i = 0; i < cmd->content.files; i++)
     if (longest < cmd->content.file[i].size) longest = cmd->content.file[i].size;
-  cmd->base64 = malloc (longest * 4 / 3 + 5); /* 4 characters for every 3 bytes begun, and the terminating 0 */
+  cmd->base64 = malloc (longest * 4 / 3 + 5); /* 4 characters for every 3 bytes, rounded up, and 0 */
   return cmd->base64 ? PW_OK : pw_fail (error, PW_RESOURCE, "out of memory");
 }
 
@@ -184,8 +184,8 @@ const pw_command pw_cli_page = {
   .synopsis = "MODEL -o FILE.html [OPTION...]",
   .summary = "write a page that simulates the model in the browser",
   .help = "Write one file that needs no network and no server: the model, the integrators rk4, erk5 and erk8, sliders "
-          "for parameters, initial values, tolerance and final time, the animation, curves, and the error of the run "
-          "next to its cost. The options set what the page begins with. A model in C is compiled to WebAssembly by "
+          "for parameters, initial values, tolerance and final time, the animation, curves, and the error at the "
+          "end next to the cost. The options set what the page begins with. A model in C is compiled to WebAssembly by "
           "clang.",
   .min_arguments = 1,
   .max_arguments = 1,

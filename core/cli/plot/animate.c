@@ -15,7 +15,7 @@ static void page_numbers (pw_json *j, const char *key, const double *number, int
   pw_json_close (j, ']');
 }
 
-/* Points of the ground or of a body; with a shape only those inside it. */
+/* Points of the ground or of a body; if a shape is given, only those that are not corners of it. */
 static void page_points (pw_json *j, const char *key, const double *at, int count, const pw_plot_body *shape) {
   pw_json_open (j, key, '[');
   for (int k = 0; k < count; k++)
@@ -72,7 +72,7 @@ static void page_links (pw_json *j, const pw_plots *plots) {
   for (const pw_plot_link *link = plots->link; link < plots->link + plots->links; link++) {
     pw_json_open (j, NULL, '{');
     pw_json_text (j, "name", pw_system_element (plots->system, link->element).name);
-    pw_json_number (j, "force", link->force_end);
+    pw_json_number (j, "force_end", link->force_end);
     pw_json_open (j, "ends", '[');
     for (int n = 0; n < link->ends; n++) {
       pw_json_open (j, NULL, '{');
@@ -81,7 +81,7 @@ static void page_links (pw_json *j, const pw_plots *plots) {
       pw_json_close (j, '}');
     }
     pw_json_close (j, ']');
-    pw_json_number (j, "contact", link->wheel);
+    pw_json_number (j, "wheel", link->wheel);
     pw_json_flag (j, "line", link->rail);
     pw_json_number (j, "heading", pw_plot_heading (link));
     page_strokes (j, plots, link);
@@ -130,7 +130,7 @@ void pw_animation_parameters (pw_json *j, const pw_model *model) {
 
 void pw_animation_run (FILE *f, const pw_plots *plots, const char *method, const char *reason) {
   pw_json j = { .f = f, .lines = 2 };
-  int wheels = 3 * plots->wheels.drawn;
+  const int wheels = plots->wheels.drawn, force_offset = plots->wheels.offset + 3 * wheels;
   pw_json_open (&j, NULL, '{');
   pw_json_text (&j, "model", plots->figures.model);
   pw_json_text (&j, "about", plots->figures.about);
@@ -141,8 +141,8 @@ void pw_animation_run (FILE *f, const pw_plots *plots, const char *method, const
   j.lines = 1;
   page_samples (&j, plots, "t", PLOT_T, 1, 10);
   page_samples (&j, plots, "motion", plots->bodies.offset, 6 * plots->bodies.drawn, 9);
-  page_samples (&j, plots, "contact", plots->wheels.offset, wheels, 9);
-  if (plots->with_forces) page_samples (&j, plots, "force", plots->wheels.offset + wheels, 2 * plots->links, 6);
+  page_samples (&j, plots, "contact", plots->wheels.offset, 3 * wheels, 9);
+  if (plots->with_forces) page_samples (&j, plots, "force", force_offset, 2 * plots->links, 6);
   if (plots->with_forces) page_samples (&j, plots, "energy", PLOT_KINETIC, PLOT_FIRST - PLOT_KINETIC, 7);
   pw_json_close (&j, '}');
 }

@@ -46,7 +46,7 @@ void pw_animation_run (FILE *f, const pw_plots *plots, const char *method, const
 void pw_animation_scene (pw_json *j, const pw_plots *plots);
 void pw_animation_parameters (pw_json *j, const pw_model *model);
 /* Writes animate.html with a panel of additional controls, HTML lines ended by NULL; `begin` writes the JavaScript
- * statement that calls begin() with a run. */
+ * that calls begin() with a run, at once or later. */
 void pw_animation_page (FILE *f, const char *const *panel, void (*begin) (FILE *f, const void *context),
                         const void *context);
 

@@ -151,7 +151,7 @@ static int symbol_ground (double low, double high, const pw_plot_link *link, pw_
   static const pw_plot_stroke support = {
     6, 0, 1, { { 1, 1.1, -1.5 }, { 1, .8, -1.5 }, { 1, 0, 0 }, { 1, -.8, -1.5 }, { 1, -1.1, -1.5 }, { 1, 1.1, -1.5 } }
   };
-  const double groove = -.4; /* the lower edge of a slot, as in the symbols of element types */
+  const double groove = -.4; /* y of the lower edge of a slot, "1 -inf -.4" in its symbol; a rail has y = 0 */
   if (link->rail) return symbol_hatch (low, high, strstr (link->kind->symbol, "1 -inf -") ? groove : 0, 0, stroke);
   *stroke = support;
   return 1 + symbol_hatch (-1.1, 1.1, -1.5, 1, stroke + 1);

@@ -39,14 +39,6 @@ int pw_checkpoints_open (pw_run_cli *command, pw_specialise *specialise, pw_erro
   return pw_cli_number ("--checkpoint-every", checkpoints->interval_text, PW_POSITIVE, &checkpoints->interval, error);
 }
 
-static int checkpoints_lock (pw_checkpoints *checkpoints, pw_error *error) {
-  checkpoints->lock = pw_output_open (checkpoints->path, error);
-  if (checkpoints->lock == NULL) return error->status;
-  if (pw_output_is_file (checkpoints->lock)) return PW_OK;
-  return pw_fail (error, PW_INPUT, "%s: a checkpoint needs a regular file, which can be read again and replaced",
-                  checkpoints->path);
-}
-
 /* Everything that determines the results. */
 static int checkpoints_fingerprint (pw_run_cli *command, pw_error *error) {
   const unsigned short order = 1;
@@ -95,8 +87,12 @@ int pw_checkpoints_prepare (pw_run_cli *command, pw_error *error) {
   if (command->table_path && strcmp (command->table_path, "-") == 0)
     return pw_fail (error, PW_INPUT,
                     "--checkpoint: a table on standard output cannot be continued; write it to a file");
-  int status = checkpoints_lock (checkpoints, error);
-  if (status == PW_OK) status = checkpoints_fingerprint (command, error);
+  checkpoints->lock = pw_output_open (checkpoints->path, error);
+  if (checkpoints->lock == NULL) return error->status;
+  if (!pw_output_is_file (checkpoints->lock))
+    return pw_fail (error, PW_INPUT, "%s: a checkpoint needs a regular file, which can be read again and replaced",
+                    checkpoints->path);
+  int status = checkpoints_fingerprint (command, error);
   if (status == PW_OK) status = checkpoints_check_fingerprint (checkpoints, error);
   if (status != PW_OK || command->table_path == NULL) return status;
   pw_output **table = &command->output[PW_RUN_TABLE];
@@ -138,8 +134,7 @@ static void checkpoints_serialise (pw_run_cli *command, pw_archive *archive) {
 
 /* 1 if the checkpoint that was loaded lies within the run and has the rows up to its time. */
 static int checkpoints_plausible (const pw_run_cli *command) {
-  double t = pw_run_time (command->run), rows = (double)command->rows, expected = rows;
-  double cpu = command->cpu;
+  double t = pw_run_time (command->run), rows = (double)command->rows, expected = rows, cpu = command->cpu;
   if (command->table && command->row_interval > 0) expected = floor (t / command->row_interval) + 1;
   return t <= command->t_end && rows >= 0 && fabs (rows - expected) <= 1 && isfinite (cpu) && cpu >= 0;
 }

@@ -42,9 +42,9 @@ void pw_motion_add (pw_motion *motion, const pw_system *system, const pw_sample 
 }
 
 int pw_motion_unit (const pw_system *system, int state) {
-  int rate = state >= pw_system_coordinates (system);
+  int is_velocity = state >= pw_system_coordinates (system);
   int angle = strncmp (pw_system_state_unit (system, state), "rad", 3) == 0;
-  return (rate ? MOTION_SPEED : MOTION_LENGTH) + angle;
+  return (is_velocity ? MOTION_SPEED : MOTION_LENGTH) + angle;
 }
 
 /* The largest |multiplier| of the constraint equations whose reaction has the same unit as that of this row, since
@@ -58,8 +58,8 @@ static double motion_largest_multiplier (const pw_system *system, const pw_motio
   return largest > 0 ? largest : 1;
 }
 
-/* Raises an error, NaN at first, to a difference; a difference that is NaN, not known, makes it NaN for good. */
-static void motion_raise (double *error, int *compared, double difference) {
+/* Increases *error, NaN at first, to a larger difference; one that is NaN, not known, makes it NaN for good. */
+static void motion_include (double *error, int *compared, double difference) {
   if (!*compared || difference > *error || isnan (difference)) *error = difference;
   *compared = 1;
 }
@@ -68,23 +68,24 @@ void pw_motion_distance (const pw_system *system, const pw_motion *reference, co
                          double error[MOTION_ERRORS]) {
   int states = 2 * pw_system_coordinates (system), last = motion->samples - 1;
   int compared[MOTION_ERRORS] = { 0 }, jumps[MOTION_SAMPLES];
-  const char *unit = ""; /* of the last multiplier: neighbours mostly have the same */
+  const char *unit = NULL; /* of the multiplier before: neighbours mostly have the same */
   double scale = 1;
   for (int i = 0; i < MOTION_ERRORS; i++) error[i] = NAN;
   for (int k = 0; k <= last; k++) jumps[k] = pw_system_jumps (system, reference->t[k]);
   for (int j = 0; j < motion->width; j++) {
-    int is_state = j < states, end = is_state ? MOTION_END + pw_motion_unit (system, j) : 0;
-    int largest = is_state ? end + MOTION_LARGEST : MOTION_MULTIPLIERS;
-    if (!is_state && strcmp (unit, pw_system_reaction_unit (system, j - states)) != 0) {
+    int is_state = j < states, state_unit = is_state ? pw_motion_unit (system, j) : 0, end = MOTION_END + state_unit;
+    int largest = is_state ? MOTION_LARGEST + state_unit : MOTION_MULTIPLIERS;
+    if (!is_state && (unit == NULL || strcmp (unit, pw_system_reaction_unit (system, j - states)) != 0)) {
       unit = pw_system_reaction_unit (system, j - states);
       scale = motion_largest_multiplier (system, reference, j - states);
     }
     for (int k = 0; k <= last; k++) {
-      double exact = pw_motion_at (reference, k)[j], difference = fabs (pw_motion_at (motion, k)[j] - exact) / scale;
+      double expected = pw_motion_at (reference, k)[j];
+      double difference = fabs (pw_motion_at (motion, k)[j] - expected) / scale;
       /* at a jump multipliers have two values, and methods differ in which one they report */
-      if (isnan (exact) || (!is_state && jumps[k])) continue;
-      motion_raise (&error[largest], &compared[largest], difference);
-      if (is_state && k == last) motion_raise (&error[end], &compared[end], difference);
+      if (isnan (expected) || (!is_state && jumps[k])) continue;
+      motion_include (&error[largest], &compared[largest], difference);
+      if (is_state && k == last) motion_include (&error[end], &compared[end], difference);
     }
   }
 }

@@ -224,9 +224,9 @@ static int run_is_stdout (const char *path) {
 static int run_integrate (pw_run_cli *command, pw_error *error) {
   command->batch = 1;
   pw_stop_catch ();
-  pw_progress_start (&command->progress, pw_file_name (command->compiled.file), command->t_end);
+  pw_progress_start (&command->progress, pw_file_name (command->compiled.file), "s", pw_run_time (command->run),
+                     command->t_end);
   command->progress.no_bar = run_is_stdout (command->table_path);
-  command->progress.first = pw_run_time (command->run);
   int status = run_steps (command, error);
   pw_progress_end (&command->progress);
   pw_stop_release ();

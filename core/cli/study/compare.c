@@ -151,8 +151,7 @@ static int compare_plan (pw_study *study, pw_error *error) {
   if (status == PW_OK) status = pw_cli_number ("--repeats", compare->repeats_text, PW_COUNT, &compare->repeats, error);
   if (status == PW_OK && compare->repeats > COMPARE_REPEATS)
     return pw_fail (error, PW_INPUT, "--repeats %s: at most %d", compare->repeats_text, COMPARE_REPEATS);
-  if (status == PW_OK)
-    status = pw_study_read_methods (study, study->methods_text ? study->methods_text : compare_default_methods, error);
+  if (status == PW_OK) status = pw_study_read_methods (study, compare_default_methods, error);
   if (status == PW_OK) status = compare_read_ladder ("--step-ladder", compare->step_text, &ladders[0], error);
   if (status == PW_OK) status = compare_read_ladder ("--rtol-ladder", compare->rtol_text, &ladders[1], error);
   compare->finest_step = ladders[0].to;

@@ -162,9 +162,7 @@ static int drift_plan (pw_study *study, pw_error *error) {
   if (defaults.rtol == 0) defaults.rtol = DRIFT_RTOL;
   int status = pw_cli_settings (&study->line, &defaults, &study->t_end, &study->settings, &study->limit, error);
   study->settings.ledger = 1;
-  if (status == PW_OK)
-    status =
-        pw_study_read_methods (study, study->methods_text ? study->methods_text : "rk4+all,ida+all,galpha+all", error);
+  if (status == PW_OK) status = pw_study_read_methods (study, "rk4+all,ida+all,galpha+all", error);
   for (int i = 0; status == PW_OK && i < DRIFT_OPTIONS; i++)
     status = drift_read_values (drift, drift_default_values[i], error);
   if (status == PW_OK && drift->only_methods && drift->vary)

@@ -52,7 +52,8 @@ static int methods_add_pattern (pw_study *study, char *pattern, pw_error *error)
                   pw_nearest_text (&near));
 }
 
-int pw_study_read_methods (pw_study *study, const char *text, pw_error *error) {
+int pw_study_read_methods (pw_study *study, const char *otherwise, pw_error *error) {
+  const char *text = study->methods_text ? study->methods_text : otherwise;
   for (const char *rest = text;; rest++) {
     char pattern[STUDY_NAME];
     size_t n = strcspn (rest, ",");
@@ -84,7 +85,7 @@ pw_row *pw_study_add (pw_study *study, int group, int curve, const char *method,
 
 void pw_study_begin_progress (pw_study *study, const char *what, const char *unit, int rows) {
   study->progress_sum = 0;
-  pw_progress_count (&study->progress, what, unit, 0, rows);
+  pw_progress_start (&study->progress, what, unit, 0, rows);
 }
 
 void pw_study_progress (pw_study *study, pw_row *row, double part) {
@@ -170,9 +171,8 @@ static int study_open_folder (pw_study *study, pw_error *error) {
                    { "--reference", study->reference_path, PW_READS, NULL },
                    { "-o", study->folder, PW_WRITES_INTO, names } };
   if (study->folder == NULL) return pw_cli_requires ("--width", study->line.width, "-o DIR", 0, error);
-  if (pw_figures_of (&study->figures, &study->line, &study->compiled, study->folder, error) != PW_OK)
-    return error->status;
-  if (pw_cli_check_uses (&study->line, study->compiled.file, use, sizeof use / sizeof *use, error) != PW_OK)
+  if (pw_figures_of (&study->figures, &study->line, &study->compiled, study->folder, error) != PW_OK ||
+      pw_cli_check_uses (&study->line, study->compiled.file, use, sizeof use / sizeof *use, error) != PW_OK)
     return error->status;
   study->lock = pw_cli_lock_folder (study->folder, error);
   return study->lock < 0 ? error->status : pw_study_open_table (study, error);
@@ -243,10 +243,10 @@ static int study_write_kept (pw_study *study, pw_error *error) {
 static int study_perform (pw_study *study, pw_error *error) {
   pw_stop_catch ();
   int status = study->type->begin (study, error);
-  if (status == PW_OK && study->engine.code)
-    puts ("all runs use code specialised for this scene where the method can\n");
-  if (status == PW_OK && study->engine.code == NULL)
-    printf ("all runs use the general engine: %s\n\n", study->engine.reason);
+  if (status == PW_OK)
+    printf ("all runs use %s%s\n\n",
+            study->engine.code ? "code specialised for this scene where the method can" : "the general engine: ",
+            study->engine.code ? "" : study->engine.reason);
   pw_study_begin_progress (study, pw_file_name (study->compiled.file), study->type->row_noun, study->rows);
   if (status == PW_OK)
     status = study->type->timed ? pw_study_parallel (study, study->methods, study_measure_method, study, error)

@@ -121,10 +121,10 @@ struct pw_study {
 /* Runs a command whose options begin with a pw_study. */
 int pw_study_command (pw_study *study, const pw_study_type *type, pw_error *error);
 
-/* Reads --methods: names separated by commas; "all" stands for each integrator with each stabilisation, "rk4+all" for
- * rk4 with each, "all+ggl" for each integrator that has ggl.  A method named twice is used once.  PW_INPUT with the
- * nearest valid name. */
-int pw_study_read_methods (pw_study *study, const char *text, pw_error *error);
+/* Reads --methods, or `otherwise` if it is not given: names separated by commas; "all" stands for each integrator with
+ * each stabilisation, "rk4+all" for rk4 with each, "all+ggl" for each integrator that has ggl.  A method named twice is
+ * used once.  PW_INPUT with the nearest valid name. */
+int pw_study_read_methods (pw_study *study, const char *otherwise, pw_error *error);
 
 /* Adds a row whose values and points are NaN; rows of a curve follow each other.  NULL and PW_RESOURCE. */
 pw_row *pw_study_add (pw_study *study, int group, int curve, const char *method, int points, pw_error *error);

@@ -1,4 +1,4 @@
-/* Computes the missing rows of a sweep by several threads.
+/* Computes the missing rows of a sweep in several threads.
  *
  * Rows with the same parameters follow each other and share a compiled system; systems of the same structure share
  * specialised code. */
@@ -61,8 +61,8 @@ typedef struct {
 
 /* ---- Specialised code ---- */
 
-/* The code of a text, of which it takes ownership, compiled by the first thread that needs it.  The caller holds the
- * lock, which is released meanwhile. */
+/* The code of a text, compiled by the first thread that needs it; `sweep` owns the text from now on.  The caller
+ * holds the lock, which is released meanwhile. */
 static const pw_specialised *rows_compile (sweep_rows *sweep, char *text, const pw_system *system, pw_error *error) {
   row_code *entry = sweep->codes;
   while (entry && strcmp (entry->text, text) != 0) entry = entry->next;
@@ -159,6 +159,7 @@ static row_system *system_of (sweep_rows *sweep, long row) {
 /* The initial values that the grid varies, malloced, and their number. */
 static pw_initial_value *row_initial (const pw_plan *plan, const sweep_row *row, int *count) {
   pw_initial_value *initial = malloc (((size_t)plan->grid.axes + 1) * sizeof *initial);
+  *count = 0;
   for (int i = 0; initial && i < plan->grid.axes; i++)
     if (plan->grid.axis[i].parameter == NULL)
       initial[(*count)++] =
@@ -194,7 +195,6 @@ static int row_ended (const sweep_row *row, const pw_plan *plan) {
 /* Appends the cells of a row, as in the heading of the plan: NaN where there is no last sample or no run. */
 static void row_cells (const sweep_row *row, const pw_plan *plan, const pw_sample *last, pw_text *text) {
   const pw_statistics *statistics = row->run ? pw_run_statistics (row->run) : NULL;
-  double cpu = row->run ? pw_seconds (CLOCK_THREAD_CPUTIME_ID) - row->limit.start : 0;
   int n = last ? pw_system_coordinates (row->system->model.system) : 0;
   for (int i = 0; i < plan->grid.axes; i++) pw_text_number (text, pw_grid_value (&plan->grid, i, row->number));
   pw_text_cell (text, pw_cli_status_word (row->status));
@@ -208,7 +208,7 @@ static void row_cells (const sweep_row *row, const pw_plan *plan, const pw_sampl
   pw_text_number (text, statistics ? statistics->velocity : NAN);
   pw_text_number (text, statistics ? (double)statistics->steps : NAN);
   pw_text_number (text, statistics ? (double)statistics->rhs : NAN);
-  if (plan->with_cpu) pw_text_number (text, cpu);
+  if (plan->with_cpu) pw_text_number (text, row->run ? pw_seconds (CLOCK_THREAD_CPUTIME_ID) - row->limit.start : 0);
   pw_text_quoted (text, row->error.text);
 }
 
@@ -220,6 +220,7 @@ static int row_close (sweep_row *row, const pw_plan *plan, pw_text *text) {
   if (row->status == PW_STOPPED) row->status = pw_limit_status (&row->limit, pw_run_time (row->run), &row->error);
   if (row->run && pw_run_sample (row->run, pw_run_time (row->run), &sample, &sample_error) == PW_OK) last = &sample;
   if (row->status == PW_OK && last == NULL) row->status = sample_error.status, row->error = sample_error;
+  /* PW_RETRY, from a method, without a request to stop */
   if (row->status > 0 && pw_stop == 0) row->status = pw_fail (&row->error, PW_METHOD, "the method gave up");
   if (row->status != PW_RETRY && row->status != PW_RESOURCE) row_cells (row, plan, last, text);
   pw_run_close (row->run);
@@ -250,7 +251,7 @@ static long rows_next (sweep_rows *sweep) {
   return -1;
 }
 
-/* Counts a run that was opened, and the change of its given initial values by the constraints. */
+/* Counts a run that was opened; keeps the largest change of given initial values by the constraints. */
 static void rows_count_change (sweep_rows *sweep, double change, const char *text) {
   sweep->opened_runs++;
   sweep->changed_runs += change > 0;
@@ -261,12 +262,13 @@ static void rows_count_change (sweep_rows *sweep, double change, const char *tex
 
 /* ---- Threads ---- */
 
-/* A thread and the rows that it computes at once: as many as plan->lanes_code has lanes, or one. */
+/* A thread and the rows that it computes at once.  With more than one there are neither --cpu nor --limit: both refer
+ * to the processor time of the thread. */
 typedef struct {
   sweep_rows *sweep;
   const pw_specialised_lanes *lanes_code; /* NULL: none */
   void *lanes_memory;
-  int width; /* number of rows */
+  int width; /* number of rows: at most that of lanes; 1 without lanes_code */
   sweep_row row[ROWS_LANES];
   pw_text text; /* cells of a row */
 } sweep_worker;
@@ -332,15 +334,16 @@ static int worker_thread (void *context, int i, pw_error *error) {
   pthread_mutex_lock (&sweep->lock);
   while (worker.width > 1 && sweep->missing_at_start < (long)worker.width * sweep->jobs)
     worker.width--; /* all threads are to have rows */
-  for (int rows = 1; rows > 0;) {
-    for (int k = rows = 0; k < worker.width; k++)
-      rows += worker.row[k].system != NULL || worker_begin (sweep, &worker.row[k]);
+  int rows;
+  do {
+    rows = 0;
+    for (int k = 0; k < worker.width; k++) rows += worker.row[k].system != NULL || worker_begin (sweep, &worker.row[k]);
     pthread_mutex_unlock (&sweep->lock);
     if (rows) worker_advance (&worker);
     pthread_mutex_lock (&sweep->lock);
     for (int k = 0; k < worker.width; k++)
       if (worker.row[k].system && row_ended (&worker.row[k], sweep->plan)) worker_end (&worker, &worker.row[k]);
-  }
+  } while (rows > 0);
   pthread_mutex_unlock (&sweep->lock);
   pw_text_free (&worker.text);
   free (worker.lanes_memory);
@@ -369,7 +372,7 @@ int pw_sweep_rows (const pw_plan *plan, pw_journal *journal, int jobs, pw_error 
   pthread_mutex_init (&sweep.lock, NULL);
   pthread_cond_init (&sweep.compiled, NULL);
   pw_stop_catch ();
-  pw_progress_count (&sweep.progress, pw_file_name (plan->file), "runs", (double)journal->done, (double)journal->rows);
+  pw_progress_start (&sweep.progress, pw_file_name (plan->file), "runs", (double)journal->done, (double)journal->rows);
   pw_parallel (sweep.jobs, sweep.jobs, worker_thread, &sweep, error);
   pw_progress_end (&sweep.progress);
   pw_stop_release (); /* the rest can be interrupted and repeated */

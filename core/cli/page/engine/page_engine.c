@@ -1,5 +1,6 @@
 /* The engine of interactive pages: models, methods and samples for figures, compiled to WebAssembly.  Its exported
  * functions are called by page.js.  Files are in memory; there is one model at a time. */
+#include <errno.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -35,14 +36,17 @@ static int page_find_file (const char *name) {
   return i;
 }
 
+/* The next four functions replace those of location.c, libc and yaml_tree.c, which the engine does not contain. */
+
 FILE *pw_open_input (const char *path, const char **why) {
   int i = page_find_file (path);
-  *why = "it is not part of this page";
+  *why = i < page_files ? "out of memory" : "it is not part of this page";
+  errno = i < page_files ? ENOMEM : ENOENT;
   return i < page_files ? fmemopen (page_file[i].bytes, page_file[i].size, "r") : NULL;
 }
 
 int pw_open_input_status (void) {
-  return PW_INPUT;
+  return errno == ENOMEM ? PW_RESOURCE : PW_INPUT;
 }
 
 char *realpath (const char *path, char *resolved) {
@@ -135,20 +139,20 @@ static int page_integrate (pw_run *r, double t_end) {
 }
 
 /* Runs the model with the parameters and initial values given, for at most `limit` ms of computing time.  0, or a negative
- * status with the error set; the samples so far are kept.  Without `samples` it only integrates, to be timed. */
+ * status with the error set; the samples so far are kept.  With keep_samples 0 it only integrates, to be timed. */
 PAGE_EXPORT (run)
-int page_run (const char *method, double step, double rtol, double t_end, double limit, int samples,
+int page_run (const char *method, double step, double rtol, double t_end, double limit, int keep_samples,
               const double *parameter, const pw_initial_value *initial, int initials) {
   if (page_compile (parameter) != PW_OK) return page_error.status;
   page_deadline = pw_page_now () + limit;
   const pw_settings settings = { .span = t_end,
                                  .step = step,
                                  .rtol = rtol,
-                                 .ledger = samples,
+                                 .ledger = keep_samples,
                                  .stop = page_is_late,
                                  .initial = initial,
                                  .initials = initials };
-  if (samples) page_plots = pw_plots_open (NULL, 1, page_model, page_system, t_end, &page_error);
+  if (keep_samples) page_plots = pw_plots_open (NULL, 1, page_model, page_system, t_end, &page_error);
   pw_run *r = page_error.status == PW_OK ? pw_run_open (page_system, method, &settings, &page_error) : NULL;
   int status = r ? page_integrate (r, t_end) : page_error.status;
   if (status == PW_STOPPED)
@@ -185,7 +189,7 @@ static void page_write_scene (pw_json *j) {
   pw_json_close (j, '}');
 }
 
-/* Shapes, size of the data and statistics of the run as JSON; free it by `release`.  NULL without a run. */
+/* Shapes, size of the data and statistics of the run as JSON; free it with page_release.  NULL without a run. */
 PAGE_EXPORT (scene) char *page_scene (void) {
   pw_stream scene;
   if (page_plots == NULL) return NULL;
