@@ -153,7 +153,7 @@ static int code_load_cached (code_job *x) {
 
 /* ---- Compiling ---- */
 
-/* Appends text, options and checksum to an object, and renames it. */
+/* Appends text, identity and checksum to an object, and renames it. */
 static int code_complete (const code_job *x, pw_error *error) {
   char *bytes;
   size_t size, text_size = strlen (x->text), identity_size = strlen (x->identity);
