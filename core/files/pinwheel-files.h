@@ -20,8 +20,8 @@ typedef struct pw_file pw_file;
  * or cc in a private temporary folder, its messages passed through on standard error; a .yaml is read
  * (docs/model-format.md).  Files in the current directory must be given as paths.
  *
- * Errors: PW_INPUT for a model that is not found (with the nearest name), found twice (with both paths), does not
- * compile, is not a Pinwheel plug-in, has another ABI or parameters outside their structure or domain; PW_RESOURCE. */
+ * Errors: PW_INPUT for a model that is not found (with the nearest name), matches several files, does not compile, is
+ * not a Pinwheel plug-in, has another ABI or parameters outside their structure or domain; PW_RESOURCE. */
 pw_file *pw_file_open (const char *model, pw_error *error);
 
 /* The same with another limit in bytes than PW_FILE_DEFAULT_BYTES for a model in YAML, up to PW_FILE_MAX_BYTES.
@@ -40,7 +40,7 @@ const char *pw_file_path (const pw_file *f);
 /* The path of the file that a model's name or path refers to, malloced; NULL and an error as from pw_file_open. */
 char *pw_file_find (const char *model, pw_error *error);
 
-/* Calls `each` with the path of every table that a text model reads, until it returns non-zero, which is returned. */
+/* Calls `each` with the path of each table of a text model until it returns non-zero; returns that, or PW_RESOURCE. */
 int pw_file_tables (const pw_file *f, int (*each) (void *context, const char *path), void *context);
 
 /* Calls `each` with the name and path of every model on the search path, sorted by name, until it returns non-zero. */

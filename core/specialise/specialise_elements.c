@@ -1,4 +1,4 @@
-/* Writes the functions of elements and signals in specialised code. */
+/* Writes the functions of elements and signals in specialised code, with macros of specialise.c and scene_head.inc. */
 #include <stddef.h>
 #include <string.h>
 #include "specialise_parts.h"
@@ -39,7 +39,8 @@ static void specialise_batch (const pw_generator *gen, int k, int e, const char 
   fprintf (gen->out, "%s };\n", more);
 }
 
-/* Writes the call of a function of its type, which stores the result at `to`. */
+/* Writes the call of a function of the type of batch k, which stores the result at `to`.  scene_TYPE is the table of a
+ * built-in type in the code: the Makefile renames pw_kind_TYPE. */
 static void specialise_call (const pw_generator *gen, int k, const char *function, const char *to) {
   char name[80];
   const pw_kind *kind = gen->s->batch[k].kind;
@@ -151,7 +152,7 @@ static int specialise_is_simple (const pw_system *s) {
   return 1;
 }
 
-/* Other signals are evaluated by `update`; for several runs at once that has been done before. */
+/* If a signal is neither, `update` evaluates all of them; for several runs at once lanes_signals calls it. */
 void pw_specialise_signals (const pw_generator *gen) {
   const pw_system *s = gen->s;
   const int simple = specialise_is_simple (s);
@@ -182,9 +183,10 @@ int pw_system_has_lanes (const pw_system *s) {
   return s->rows <= SPECIALISE_ROWS && s->state_dependent == 0;
 }
 
-/* A run's data, as doubles: the elements of all batches, then for each signal a pw_harmonic, or a constant instead. */
+/* A run's data, as doubles: the elements of all batches, then for each signal a pw_harmonic, or a constant, then 0. */
 void pw_specialise_data (const pw_generator *gen) {
   const pw_system *s = gen->s;
+  const int per_signal = sizeof (pw_harmonic) / sizeof (double);
   int data = 0;
   fputs ("\nstatic const int datum_begin[] = { ", gen->out);
   for (int k = 0; k < s->batches; k++) {
@@ -192,15 +194,15 @@ void pw_specialise_data (const pw_generator *gen) {
     data += s->batch[k].b.count * (int)(s->batch[k].kind->element / sizeof (double));
   }
   fprintf (gen->out, "%d };\nenum { BATCHES = %d, SIGNALS = %d, SIMPLE = %d, DATA = %d, FIXED = %d };\n", data,
-           s->batches, s->sources, specialise_is_simple (s), data + 4 * s->sources, gen->emitter.constants);
+           s->batches, s->sources, specialise_is_simple (s), data + per_signal * s->sources, gen->emitter.constants);
   fputs ("static const unsigned char is_harmonic[] = { ", gen->out);
   for (int i = 0; i < s->sources; i++) fprintf (gen->out, "%d, ", s->source[i].signal.type == PW_HARMONIC);
   fputs ("0 };\n", gen->out);
-  pw_specialise_list (gen->out, "DATUM", data + 4 * s->sources);
+  pw_specialise_list (gen->out, "DATUM", data + per_signal * s->sources);
   pw_specialise_list (gen->out, "SIGNAL", 3 * s->sources);
   pw_specialise_list (gen->out, "ENTRY", gen->entries);
-  pw_specialise_list (gen->out, "FIXED", gen->emitter.constants);
+  pw_specialise_list (gen->out, "FIXED", gen->emitter.constants); /* pw_scene.constant */
   pw_specialise_list (gen->out, "LEDGER", s->entries);
-  pw_specialise_list (gen->out, "BATCH", s->batches + 1);
+  pw_specialise_list (gen->out, "BATCH", s->batches + 1); /* the last one: the signals */
   pw_specialise_list (gen->out, "WATCH", (int)(sizeof (pw_scene_watch) / sizeof (double)));
 }

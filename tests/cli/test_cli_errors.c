@@ -232,6 +232,8 @@ static void test_bad_files (void **state) {
   cli_good ("cp models/ezyroller.c @/e.c; env --ignore-signal=CHLD \"${PINWHEEL:-build/pinwheel}\" show @/e.c");
   assert_int_equal (cli_run ("CC=/no/compiler pinwheel run @/broken.c"), 2);
   assert_non_null (strstr (cli_err, "cannot run the C compiler \"/no/compiler\""));
+  assert_int_equal (cli_run ("CC=clang PATH=/nonexistent ${PINWHEEL:-build/pinwheel} run @/broken.c"), 2);
+  assert_non_null (strstr (cli_err, "install one, or name another in the environment variable CC"));
   assert_int_equal (cli_run ("pinwheel run @/broken.c"), 2);
   assert_non_null (strstr (cli_err, " does not compile; the messages of "));
   assert_int_equal (cli_run ("TMPDIR=@/notes.txt pinwheel run @/broken.c"), 1);
@@ -250,7 +252,10 @@ static void test_found_twice (void **state) {
   cli_expand ("@/two/twin.so", two, sizeof two);
   assert_non_null (strstr (cli_err, one));
   assert_non_null (strstr (cli_err, two));
-  assert_non_null (strstr (cli_err, "two files match the model \"twin\": "));
+  assert_non_null (strstr (cli_err, "several files match \"twin\", such as "));
+  cli_good ("mkdir @/three && cp @/one/twin.so @/three/twin.so");
+  assert_int_equal (cli_run ("PINWHEEL_MODELS=@/one:@/two:@/three pinwheel run twin"), 2);
+  assert_non_null (strstr (cli_err, "several files match \"twin\", such as "));
   cli_good ("PINWHEEL_MODELS=@/one pinwheel run twin --t-end 0.1 --json -");
   assert_true (cli_says (cli_out, "model", "twin"));
 }

@@ -91,13 +91,32 @@ static void test_null (void **state) {
   assert_null (pw_scene_code_open ("", NULL, NULL));
   assert_null (pw_file_table (NULL));
   assert_string_equal (pw_scene_code_notice (NULL), "");
+  assert_int_equal (pw_file_tables (NULL, NULL, NULL), 0);
+  assert_int_equal (pw_checkpoint_write ("/nonexistent/a.ck", "", &(pw_archive){ .used = 0 }, NULL), PW_RESOURCE);
   assert_null (pw_file_open ("tests/bad-models/no-such.yaml", NULL));
   assert_null (pw_file_open ("tests/bad-models/key-unknown.yaml", NULL));
   pw_system_free (s);
 }
 
+/* A compiler that writes no object is reported, and tolerated without a place for the report.  Changes the environment:
+ * the last test. */
+static void test_no_object (void **state) {
+  (void)state;
+  pw_error error = { 0 };
+  pw_system *s = scene_compile (scene_model (&scene_ezyroller, "a", 0.6, NULL));
+  char *text = pw_system_source (s, NULL, NULL);
+  setenv ("CC", "true", 1);
+  unsetenv ("HOME");
+  unsetenv ("XDG_CACHE_HOME");
+  assert_null (pw_scene_code_open (text, s, NULL));
+  assert_null (pw_scene_code_open (text, s, &error));
+  check_error (&error, PW_RESOURCE, "the compiler has written no object");
+  free (text);
+  pw_system_free (s);
+}
+
 int main (void) {
   const struct CMUnitTest tests[] = { cmocka_unit_test (test_embed), cmocka_unit_test (test_null),
-                                      cmocka_unit_test (test_layers) };
+                                      cmocka_unit_test (test_layers), cmocka_unit_test (test_no_object) };
   return cmocka_run_group_tests (tests, NULL, NULL);
 }

@@ -126,9 +126,9 @@ static void test_names (void **state) {
   assert_int_equal (cli_run ("cp ${BUILD:-build}/models/ezyroller.so @/models/roller.so && "
                              "PINWHEEL_MODELS=@/models pinwheel show roller"),
                     2);
-  assert_non_null (strstr (cli_err, "two files match the model \"roller\": "));
+  assert_non_null (strstr (cli_err, "several files match \"roller\", such as "));
   assert_non_null (strstr (cli_err, "/models/roller.so and "));
-  assert_non_null (strstr (cli_err, "/models/roller.yaml; name one of them by its path\n"));
+  assert_non_null (strstr (cli_err, "/models/roller.yaml; name the model by its path\n"));
 }
 
 /* Nothing but Pinwheel's own message is printed, as compilers do. */

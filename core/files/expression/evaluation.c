@@ -5,8 +5,8 @@
  *   f' = f_x x' + f_y y',   f'' = f_xx x'^2 + 2 f_xy x' y' + f_yy y'^2 + f_x x'' + f_y y''
  *
  * where f_x is the partial derivative with respect to operand x, and the prime the derivative with respect to the
- * chosen variable (Griewank & Walther 2008, Evaluating Derivatives, chapter 13).  Derivatives with respect to the time
- * decide comparisons of equal numbers, so that an expression has the value just after a jump. */
+ * chosen variable (Griewank & Walther 2008, Evaluating Derivatives, chapter 13).  They decide comparisons of equal
+ * numbers, so that an expression has the value just after a jump, that is for a slightly larger variable. */
 #include <math.h>
 #include "expression_parts.h"
 #include "pinwheel.h"
@@ -75,11 +75,10 @@ static inline double value_of (const pw_expression_code *c, double left, double 
 }
 
 double pw_expression_apply (const pw_expression_code *c, double left, double right) {
-  int may_jump;
-  return value_of (c, left, right, &may_jump);
+  return value_of (c, left, right, &(int){ 0 });
 }
 
-/* `last` is the last operand; the stack has those before it. */
+/* `last` is the last value; the stack has those before it. */
 double pw_expression_run (const pw_expression_code *code, int codes, const double *variable, int *may_jump) {
   double stack[PW_EXPRESSION_STACK + 1], *top = stack, last = 0;
   for (const pw_expression_code *c = code, *end = code + codes; c < end; c++)
@@ -114,20 +113,19 @@ static jet jet_chain (double f, const pw_partials *s, const jet *x, const jet *y
 
 /* ---- Derivatives of operations with jumps or kinks ---- */
 
-/* The sign just after the current time: that of the first number that is not 0. */
+/* The sign just after: that of the first number that is not 0. */
 static inline int jet_sign (const jet *x) {
   double first = x->v != 0 ? x->v : x->d != 0 ? x->d : x->dd;
   return (first > 0) - (first < 0);
 }
 
-/* The order of two numbers just after the current time. */
+/* The order of two numbers just after. */
 static pw_order jet_order (const jet *x, const jet *y) {
   if (x->v != y->v) return value_order (x->v, y->v);
-  const jet difference = { 0, x->d - y->d, x->dd - y->dd, 1 };
-  return (pw_order)jet_sign (&difference);
+  return (pw_order)jet_sign (&(jet){ 0, x->d - y->d, x->dd - y->dd, 1 });
 }
 
-/* floor, ceil, round of x just after the current time; `direction`: sign of the change of x. */
+/* floor, ceil, round of x just after; `direction`: sign of the change of x. */
 static double jet_step (int op, double x, int direction) {
   double low = floor (x);
   if (op == PW_OP_FLOOR) return x == low && direction < 0 ? low - 1 : low;
@@ -136,10 +134,9 @@ static double jet_step (int op, double x, int direction) {
 }
 
 /* abs, sign, floor, ceil, round. */
-static jet jet_discontinuous (int op, const jet *x, double *discrete) {
-  const jet change = { 0, x->d, x->dd, x->varies };
+static jet jet_piecewise (int op, const jet *x, double *discrete) {
   int sign = jet_sign (x);
-  *discrete = op == PW_OP_ABS || op == PW_OP_SIGN ? sign : jet_step (op, x->v, jet_sign (&change));
+  *discrete = op == PW_OP_ABS || op == PW_OP_SIGN ? sign : jet_step (op, x->v, jet_sign (&(jet){ 0, x->d, x->dd, 1 }));
   return op == PW_OP_ABS ? (jet){ fabs (x->v), sign * x->d, sign * x->dd, x->varies } : (jet){ .v = *discrete };
 }
 
@@ -163,16 +160,15 @@ static jet jet_mod (const jet *x, const jet *y, double *q) {
 /* ---- Operations ---- */
 
 static jet jet_unary (const pw_expression_code *c, const jet *x, double *discrete) {
-  static const jet none = { 0 };
   if (c->op == PW_OP_NEGATE) return (jet){ -x->v, -x->d, -x->dd, x->varies };
   if (c->op == PW_OP_FUNCTION_OF_ONE || c->op == PW_OP_TAN) {
     if (c->op == PW_OP_TAN) *discrete = floor (x->v / PW_PI + 0.5);
     const pw_expression_function *f = &pw_expression_functions[c->index];
     double value = f->of_one (x->v);
     pw_partials s = f->partials (x->v, 0, value);
-    return jet_chain (value, &s, x, &none);
+    return jet_chain (value, &s, x, &(jet){ 0 });
   }
-  return jet_discontinuous (c->op, x, discrete);
+  return jet_piecewise (c->op, x, discrete);
 }
 
 static jet jet_product (const jet *x, const jet *y) {
@@ -194,8 +190,8 @@ static jet jet_function (const pw_expression_code *c, const jet *x, const jet *y
   return jet_chain (value, &s, x, y);
 }
 
-/* Jumps where y, the first argument, changes sign at x <= 0, and where x does while y is 0.  At the origin the angle
- * just after is that of the velocity or, if this is 0, of the acceleration. */
+/* Jumps where y, the first argument, changes sign at x <= 0, and where x does while y is 0.  At the origin p =
+ * (x, y) = 0 the angle just after is that of p' or, if this is 0, of p''; its derivatives are unknown: NaN. */
 static jet jet_atan2 (const pw_expression_code *c, const jet *y, const jet *x, double *discrete) {
   jet r = jet_function (c, y, x);
   int sign = jet_sign (y);
@@ -207,8 +203,8 @@ static jet jet_atan2 (const pw_expression_code *c, const jet *y, const jet *x, d
   return r;
 }
 
-/* Has a kink at the origin, through which signs change.  With p = (x, y) just after it |p' h + p'' h^2 / 2|, that is
- * |p'| h + p' p'' / |p'| h^2 / 2, or |p''| h^2 / 2 if p' is 0. */
+/* Has a kink at the origin, p = (x, y) = 0.  At a distance h after it the value is |p' h + p'' h^2 / 2|, that is
+ * |p'| h + p' p'' / |p'| h^2 / 2, or |p''| h^2 / 2 if p' is 0.  The pair of signs differs on its two sides. */
 static jet jet_hypot (const pw_expression_code *c, const jet *x, const jet *y, double *discrete) {
   *discrete = jet_sign (x) + 3 * jet_sign (y);
   if (x->v != 0 || y->v != 0) return jet_function (c, x, y);
@@ -218,7 +214,7 @@ static jet jet_hypot (const pw_expression_code *c, const jet *x, const jet *y, d
 
 /* All but && and ||, whose operands never vary: they are 1 or 0. */
 static jet jet_binary (const pw_expression_code *c, const jet *x, const jet *y, double *discrete) {
-  /* At a pole, the denominator or base 0 has the sign of its value just after the current time. */
+  /* At a pole, the denominator or base 0 has the sign of its value just after. */
   jet after = c->op == PW_OP_DIVIDE ? *y : *x;
   if (after.v == 0) after.v = copysign (0, jet_sign (&after));
   switch (c->op) {
@@ -259,7 +255,7 @@ void pw_expression_run_jet (const pw_expression *expression, const double *varia
   jet stack[PW_EXPRESSION_STACK], *top = stack;
   for (const pw_expression_code *c = expression->code, *end = c + expression->codes; c < end; c++) {
     int operands = pw_expression_operands (c->op);
-    double change = 0;
+    double branch = 0; /* see `discrete` in expression_parts.h */
     top -= operands;
     if (operands == 0)
       *top = c->op == PW_OP_CONSTANT ? (jet){ .v = c->value }
@@ -269,8 +265,8 @@ void pw_expression_run_jet (const pw_expression *expression, const double *varia
     else if (!top[0].varies && !top[operands - 1].varies)
       *top = (jet){ .v = pw_expression_apply (c, top[0].v, top[operands - 1].v) };
     else
-      *top = operands == 1 ? jet_unary (c, top, &change) : jet_binary (c, top, top + 1, &change);
-    if (discrete) discrete[c - expression->code] = change;
+      *top = operands == 1 ? jet_unary (c, top, &branch) : jet_binary (c, top, top + 1, &branch);
+    if (discrete) discrete[c - expression->code] = branch;
     top++;
   }
   u[0] = top[-1].v, u[1] = top[-1].d, u[2] = top[-1].dd;

@@ -122,8 +122,8 @@ double pw_expression_run (const pw_expression_code *code, int codes, const doubl
 /* The value of an operation of `right` alone or of `left` and `right`. */
 double pw_expression_apply (const pw_expression_code *c, double left, double right);
 
-/* The value, first and second derivative with respect to variable `by`.  discrete, unless NULL, receives for each
- * operation the part of its value that changes only at breakpoints: of floor the value, of abs the sign. */
+/* As pw_expression_derivatives.  discrete, unless NULL, receives for each operation a number that differs on the two
+ * sides of each of its breakpoints: the value of floor, the sign of the operand of abs. */
 void pw_expression_run_jet (const pw_expression *expression, const double *variable, int by, double u[3],
                             double *discrete);
 

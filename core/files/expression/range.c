@@ -275,7 +275,6 @@ static pw_range range_select (const pw_range *condition, const pw_range *x, cons
 /* The operations of one or two operands, without NaN among these. */
 static pw_range range_operation (const pw_expression_code *c, const pw_range *x) {
   const pw_range *y = x + 1;
-  pw_range minus_y;
   switch (c->op) {
   case PW_OP_NEGATE:
     return range_negative (x);
@@ -293,8 +292,7 @@ static pw_range range_operation (const pw_expression_code *c, const pw_range *x)
   case PW_OP_ADD:
     return range_sum (x, y);
   case PW_OP_SUBTRACT:
-    minus_y = range_negative (y);
-    return range_sum (x, &minus_y);
+    return range_sum (x, (pw_range[]){ range_negative (y) });
   case PW_OP_MULTIPLY:
     return range_multiply (x, y);
   case PW_OP_DIVIDE:

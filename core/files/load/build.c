@@ -15,6 +15,7 @@ typedef struct {
   const char *compiler;       /* one or more words ("ccache gcc") */
   const char *const *options; /* ends with NULL, as does `last` */
   const char *last[3];        /* options and files after the name of the source */
+  int for_page;               /* 1: compiles to WebAssembly */
   const char *log;            /* path of the file that gets the messages; NULL: standard error */
   sigset_t signals;           /* blocked before build_defer, and so in the compiler */
 } build_command;
@@ -62,7 +63,7 @@ static int build_run (const build_command *command, char *const *word, const cha
     return pw_fail (error, PW_INPUT, "cannot run the C compiler \"%s\" that %s%s needs (%s): install %s", word[0],
                     command->log ? "specialised code" : "the model file ", command->log ? "" : source,
                     code ? strerror (code) : "not found",
-                    strcmp (word[0], "clang") ? "one, or name another in the environment variable CC" : PW_PAGE_TOOLS);
+                    command->for_page ? PW_PAGE_TOOLS : "one, or name another in the environment variable CC");
   if (status != 0 && command->log)
     return pw_fail (error, PW_METHOD, "%s does not compile; the messages of %s are in %s", source, word[0],
                     command->log);
@@ -171,8 +172,8 @@ int pw_compile_file (const char *path, const char *engine, pw_object_user *use, 
   };
   build_command command = { .compiler = engine ? "clang" : pw_compiler (),
                             .options = engine ? page : plugin,
-                            .last = { "-lm" } };
-  if (engine) command.last[0] = engine, command.last[1] = "-Wl,--no-whole-archive";
+                            .last = { engine ? engine : "-lm", engine ? "-Wl,--no-whole-archive" : NULL },
+                            .for_page = engine != NULL };
   build_defer (&command.signals);
   char *folder = pw_temporary_folder (error), *object = folder ? pw_path_join (folder, "model.so", "") : NULL;
   int status = folder ? PW_OK : PW_RESOURCE;

@@ -16,7 +16,7 @@ struct pw_file {
 
 /* ---- Loading ---- */
 
-/* The reason of dlerror, without the path that it puts before it. */
+/* The last error of dlopen, without the path with which its message begins. */
 static const char *model_reason (const char *object) {
   const char *reason = dlerror ();
   if (reason == NULL) return "unknown reason";
@@ -54,7 +54,7 @@ static int model_is_cpp (const char *name) {
          pw_ends_with (name, ".C");
 }
 
-/* Opens the file at f->path, which exists; `shown` is its path for messages. */
+/* Opens the file at f->path, which exists; messages about the contents of a text model begin with `shown`. */
 static int model_open_path (pw_file *f, const char *shown, pw_error *error) {
   const char *base = strrchr (f->path, '/') + 1; /* the path is absolute */
   int ending = model_ending (base);
@@ -115,7 +115,7 @@ static int model_find_name (pw_file *f, const char *name, pw_error *error) {
   if (status == PW_OK && found == NULL)
     status = model_unknown (&s, name, error);
   else if (status == PW_OK && first + 1 < s.count && strcmp (found[1].name, name) == 0)
-    status = pw_fail (error, PW_INPUT, "two files match the model \"%s\": %s and %s; name one of them by its path",
+    status = pw_fail (error, PW_INPUT, "several files match \"%s\", such as %s and %s; name the model by its path",
                       name, found[0].path, found[1].path);
   else if (status == PW_OK && (f->path = strdup (found->path)) == NULL)
     status = pw_fail (error, PW_RESOURCE, "out of memory");
@@ -123,12 +123,12 @@ static int model_find_name (pw_file *f, const char *name, pw_error *error) {
   return status;
 }
 
-/* Finds a model's file, which is not opened; *shown: its path for messages. */
+/* Finds a model's file, which is not opened; *shown: its path as given, or found for a name. */
 static pw_file *model_find (const char *model, const char **shown, pw_error *error) {
-  int named = model && *model;
-  pw_file *f = named ? calloc (1, sizeof *f) : NULL;
+  int given = model && *model;
+  pw_file *f = given ? calloc (1, sizeof *f) : NULL;
   if (f == NULL) {
-    pw_fail (error, named ? PW_RESOURCE : PW_INPUT, named ? "out of memory" : "a model's name or path is missing");
+    pw_fail (error, given ? PW_RESOURCE : PW_INPUT, given ? "out of memory" : "a model's name or path is missing");
     return NULL;
   }
   int by_path = strchr (model, '/') || model_ending (model) < MODEL_ENDINGS || model_is_cpp (model);
@@ -141,8 +141,7 @@ static pw_file *model_find (const char *model, const char **shown, pw_error *err
 }
 
 char *pw_file_find (const char *model, pw_error *error) {
-  const char *shown;
-  pw_file *f = model_find (model, &shown, error);
+  pw_file *f = model_find (model, &(const char *){ NULL }, error);
   char *path = f ? f->path : NULL;
   if (f) f->path = NULL;
   pw_file_close (f);
@@ -184,7 +183,7 @@ const pw_plugin_table *pw_file_table (const pw_file *f) {
 }
 
 const pw_yaml *pw_file_yaml (const pw_file *f) {
-  return f->yaml;
+  return f ? f->yaml : NULL;
 }
 
 const char *pw_file_name (const pw_file *f) {
@@ -196,7 +195,7 @@ const char *pw_file_path (const pw_file *f) {
 }
 
 int pw_file_tables (const pw_file *f, int (*each) (void *context, const char *path), void *context) {
-  return f->yaml ? pw_yaml_tables (f->yaml, each, context) : 0;
+  return pw_file_yaml (f) ? pw_yaml_tables (f->yaml, each, context) : 0;
 }
 
 int pw_file_list (int (*each) (void *context, const char *name, const char *path), void *context, pw_error *error) {

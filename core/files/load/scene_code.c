@@ -153,13 +153,14 @@ static int code_load_cached (code_job *x) {
 
 /* ---- Compiling ---- */
 
-/* Appends text, options and checksum to an object, and renames it. */
+/* Appends text, identity and checksum to an object, and renames it. */
 static int code_complete (const code_job *x, pw_error *error) {
   char *bytes;
   size_t size, text_size = strlen (x->text), identity_size = strlen (x->identity);
-  int status = code_read (x->part, &bytes, &size, error);
-  if (status == PW_RETRY) *error = (pw_error){ 0 }, pw_fail (error, PW_RESOURCE, "the compiler has written no object");
-  if (status != PW_OK) return free (bytes), PW_RESOURCE;
+  pw_error cause = { 0 };
+  int status = code_read (x->part, &bytes, &size, &cause);
+  if (status == PW_RETRY) strcpy (cause.text, "the compiler has written no object");
+  if (status != PW_OK) return free (bytes), pw_fail (error, PW_RESOURCE, "%s", cause.text);
   unsigned long long check = pw_check_sum (pw_check_sum (pw_check_sum (PW_CHECK, bytes, size), x->text, text_size),
                                            x->identity, identity_size);
   free (bytes);

@@ -2,7 +2,7 @@
  *
  *   t [s] | states of each body, of each internal coordinate | contact points | reactions | residuals | energies
  *
- * The functions of a group of columns write their names or, with a sample, their values. */
+ * The functions of a group of columns write their names or their values, as pw_csv.content says. */
 #include <errno.h>
 #include <math.h>
 #include <stdlib.h>

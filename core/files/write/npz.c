@@ -83,8 +83,7 @@ static void npz_directory (pw_npz *z) {
     npz_number (z, NPZ_ENTRY, 4);
     npz_number (z, NPZ_VERSION, 2);
     npz_describe (z, e);
-    npz_number (z, 0, 6); /* comment, disk, internal attributes */
-    npz_number (z, 0, 4);
+    npz_number (z, 0, 10); /* comment, disk, internal and external attributes */
     npz_number (z, e->offset, 4);
     npz_bytes (z, e->name, strlen (e->name));
   }

@@ -13,7 +13,7 @@ typedef struct {
   const pw_expression *expression[3];      /* value, rate, acceleration; NULL: not given, differentiated instead */
   int derivatives;                         /* required time derivatives: 0 (of a force), 1, 2 */
   int states;                              /* number of states in it */
-  const char *name[MAX_SIGNAL_STATES + 2]; /* "t", then states, "BODY.phi"; used for reading only */
+  const char *name[MAX_SIGNAL_STATES + 2]; /* "t", then states, "BODY.phi"; not for evaluation */
   pw_signal_text text;
 } time_function;
 
@@ -41,7 +41,11 @@ static int reading_expression (const reading *e, const char *const *variable, co
   if (pw_yaml_text (e->r, e->node, e->label, text) != PW_OK) return e->r->error->status;
   int status = pw_expression_read (e->r->scope, variable, *text, e->r->arena, expression, &error);
   if (status == PW_INPUT) return reading_fail (e, error.at, "%s", error.text);
-  return status == PW_OK ? PW_OK : pw_yaml_no_memory (e->r);
+  if (status != PW_OK) return pw_yaml_no_memory (e->r);
+  if ((e->r->operations += (*expression)->codes) <= PW_YAML_MAX_OPERATIONS) return PW_OK;
+  return pw_yaml_fail (e->r, e->node->at,
+                       "%s: the expressions up to here have more than %d operations, the limit for a model", e->label,
+                       PW_YAML_MAX_OPERATIONS);
 }
 
 /* ---- States: BODY.phi, ELEMENT.spin ---- */
@@ -101,7 +105,7 @@ static int state_check (const reading *e, const char *name, size_t at) {
 
 /* ---- Evaluation of signals ---- */
 
-/* Value and derivatives u; those not given are derivatives of the highest one given. */
+/* Value and derivatives u; those not given are derivatives of the highest one given, and u[2] is 0 unless required. */
 static void time_derivatives (const time_function *f, const double *variable, double u[3]) {
   pw_expression_derivatives (f->expression[0], variable, PW_EXPRESSION_TIME, u);
   for (int i = 1; i <= f->derivatives; i++) {
@@ -124,9 +128,9 @@ static int time_eval (void *context, double t, const double *state, double value
     value[0] = pw_expression_value (f->expression[0], variable);
   for (int i = 0; gradient && i < f->states; i++) {
     pw_expression_derivatives (f->expression[0], variable, 1 + i, derivatives);
-    if (derivatives[0] != value[0]) /* the value before a jump in time; the one after it is needed */
+    if (derivatives[0] != value[0]) /* at a jump in time, which only derivatives by t decide: pass it */
       variable[0] = nextafter (t, INFINITY), pw_expression_derivatives (f->expression[0], variable, 1 + i, derivatives);
-    /* 0 where there is no derivative, such as that of |v| at rest: only Newton's iteration uses the gradient. */
+    /* 0 where the derivative is unknown, such as that of sqrt (vx^2 + vy^2) at rest. */
     gradient[i] = isfinite (derivatives[1]) ? derivatives[1] : 0;
   }
   return isfinite (value[0]) && (f->derivatives == 0 || (isfinite (value[1]) && isfinite (value[2]))) ? 0 : -1;
@@ -188,11 +192,6 @@ static int time_read_expression (reading *e, int i) {
     if (strchr (name, '.') && time_add_state (e, name, (size_t)(p - source)) != PW_OK) return r->error->status;
   if (reading_expression (e, f->name, &f->text.part[i], &f->expression[i]) != PW_OK) return r->error->status;
   const pw_expression *expression = f->expression[i];
-  if ((r->operations += expression->codes) > PW_YAML_MAX_OPERATIONS)
-    return pw_yaml_fail (r, e->node->at,
-                         "%s: the expressions up to here have more than %d operations, which need more "
-                         "memory than a model may have",
-                         e->label, PW_YAML_MAX_OPERATIONS);
   if (expression->jump == NULL || f->text.jump) return PW_OK;
   char *jump = pw_arena_alloc (r->arena, (size_t)expression->jump_size + 1);
   f->text.jump = jump ? memcpy (jump, expression->jump, (size_t)expression->jump_size) : NULL;
@@ -208,7 +207,7 @@ static int time_check_derivative (const reading *e, int i, const char *name) {
     given[k] = pw_expression_value (e->f->expression[i], &time[k]);
     pw_expression_derivatives (e->f->expression[last], &time[k], PW_EXPRESSION_TIME, exact[k]);
     if (isfinite (given[k]) && isfinite (exact[k][n]))
-      size = fmax (size, fabs (given[k]) + fabs (exact[k][n]) + 1e-6 * fabs (exact[k][0]));
+      size = fmax (size, fabs (given[k]) + fabs (exact[k][n]) + 1e-6 * fabs (exact[k][0])); /* the last: round-off */
   }
   for (int k = 0; k < 3; k++)
     if (isfinite (given[k]) && isfinite (exact[k][n]) && fabs (given[k] - exact[k][n]) > 1e-6 * size)
@@ -217,7 +216,7 @@ static int time_check_derivative (const reading *e, int i, const char *name) {
   return PW_OK;
 }
 
-/* The largest magnitude of derivative i at times within 1 s of t, the closer the more of them. */
+/* The largest magnitude of derivative i at t +- 2^-1, 2^-2, ... 2^-20 s and t + 1 s. */
 static double time_magnitude (const time_function *f, double t, int i) {
   double size = 0;
   for (int k = -20; k <= 20; k++) {
@@ -266,10 +265,9 @@ int pw_yaml_time_signal (pw_reader *r, const pw_kind *kind, const char *label, c
   if (f == NULL) return pw_yaml_no_memory (r);
   f->name[0] = "t";
   f->derivatives = pw_kind_signals_force (kind) ? 0 : kind->level == PW_HOLONOMIC ? 2 : 1;
-  *signal = (pw_signal){ PW_FUNCTION, .function = { .eval = time_eval, .context = f } };
+  *signal = (pw_signal){ PW_FUNCTION, .function = { .eval = time_eval, .context = f, .text = &f->text } };
   signal->function.open = time_open;
   signal->function.close = free;
-  signal->function.text = &f->text;
   time_store_names (r);
   if (time_read_all (&(reading){ .r = r, .label = label, .f = f }, v) != PW_OK) return r->error->status;
   for (int i = 0; i < 3; i++)
