@@ -413,7 +413,7 @@ typedef struct {
 /* Drag: still air opposes the velocity of a body's centre of mass and its rotation. */
 typedef struct {
   const char *name, *body;
-  double linear, quadratic;          /* [N s/m]; half air density x area x drag coefficient [N s^2/m^2] */
+  double linear, quadratic;          /* [N s/m]; half air density x area x drag coefficient [N s^2/m^2]; >= 0 */
   double turning, turning_quadratic; /* [N m s/rad], [N m s^2/rad^2], >= 0 */
 } pw_drag;
 
@@ -566,7 +566,7 @@ struct pw_kind {
   int constant;   /* 1: its force is constant and evaluated once, when the system is compiled */
   pw_level level; /* of its constraint equations */
   const pw_quantity *reaction;                                 /* rows: meaning of each -lambda */
-  const pw_quantity *coordinate;                               /* internal: the internal coordinates */
+  const pw_quantity *coordinate;                               /* internal: the internal coordinates, in "rad" */
   const char *(*reaction_unit) (const void *element, int row); /* if it depends on the element; may be NULL */
 
   /* Converts a checked definition into a prepared element.  bodies: those it names or acts on, in order; the ground

@@ -22,7 +22,7 @@ int pw_grow (void *array, size_t count, size_t *room, size_t size) {
 
 int pw_names_open (pw_names *n, size_t most) {
   n->size = 16;
-  while (n->size < 2 * most) n->size *= 2;
+  while (n->size < 2 * most) n->size *= 2; /* at most half full */
   n->slot = calloc (n->size, sizeof *n->slot);
   return n->slot ? PW_OK : PW_RESOURCE;
 }

@@ -1,4 +1,4 @@
-/* Checks the table of a plug-in; before a model is compiled, its bodies, and its elements against tables of fields. */
+/* Checks the table of a plug-in; before a model is compiled, its bodies, and its elements by their types' fields. */
 #include <ctype.h>
 #include <string.h>
 #include "model.h"

@@ -70,7 +70,7 @@ struct pw_workspace {
   const pw_source *failed;         /* the last signal that failed, or NULL */
 };
 
-/* Stores the entries of the ledger, unless entry is NULL.  Returns their number.  Call it when signals are compiled. */
+/* Stores the entries of the ledger, unless entry is NULL.  Returns their number.  Signals must be compiled. */
 int pw_ledger_list (const pw_system *s, pw_entry *entry);
 
 /* Closes the contexts made by `open`.  Signals that have not been stored yet may be all zero. */
