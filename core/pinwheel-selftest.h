@@ -7,7 +7,7 @@
 
 PW_BEGIN
 
-enum { PW_SELFTEST_CHECKS = 24 };
+enum { PW_SELFTEST_CHECKS = 24 }; /* room for checks in a report */
 
 /* One check: the worst result over all elements, entries and seeds. */
 typedef struct {

@@ -413,7 +413,7 @@ typedef struct {
 /* Drag: still air opposes the velocity of a body's centre of mass and its rotation. */
 typedef struct {
   const char *name, *body;
-  double linear, quadratic;          /* [N s/m]; half density times area times coefficient [N s^2/m^2]; >= 0 */
+  double linear, quadratic;          /* [N s/m]; half air density x area x drag coefficient [N s^2/m^2]; >= 0 */
   double turning, turning_quadratic; /* [N m s/rad], [N m s^2/rad^2], >= 0 */
 } pw_drag;
 
@@ -566,7 +566,7 @@ struct pw_kind {
   int constant;   /* 1: its force is constant and evaluated once, when the system is compiled */
   pw_level level; /* of its constraint equations */
   const pw_quantity *reaction;                                 /* rows: meaning of each -lambda */
-  const pw_quantity *coordinate;                               /* internal: the internal coordinates */
+  const pw_quantity *coordinate;                               /* internal: the internal coordinates, in "rad" */
   const char *(*reaction_unit) (const void *element, int row); /* if it depends on the element; may be NULL */
 
   /* Converts a checked definition into a prepared element.  bodies: those it names or acts on, in order; the ground
@@ -592,7 +592,9 @@ struct pw_kind {
   /* 2 cols, for forces that saturate, such as friction: the smallest change of each coordinate, then of each velocity,
    * that reverses the force or changes it by its own magnitude.  Entries are INFINITY before the call. */
   pw_batch_function *saturation;
-  const char *symbol; /* strokes in figures, vertices "a x y": core/cli/plot/plot_symbols.c; NULL: none */
+  /* Strokes in figures (core/cli/plot/plot_symbols.c); NULL: none.  Vertex "a x y": at a from the first body's point
+   * (0) to the last body's (1), plus x along and y to the left of the heading, in units of symbols. */
+  const char *symbol;
 };
 
 /* The number of values of a field, and the bytes of one value; 0 bytes: invalid type. */

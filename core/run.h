@@ -17,7 +17,7 @@ typedef struct {
 /* How to integrate; zeros select the defaults. */
 typedef struct {
   double t; /* initial time [s] */
-  /* Approximate duration of the run [s]: for the scale of energy, and for that of time if all is initially at rest. */
+  /* Approximate duration of the run [s], for the scales of energy and, from rest, time; default 1 s or 1000 steps. */
   double span;
   double step; /* fixed-step methods: step size [s]; default 1e-3 */
   double rtol; /* adaptive methods: relative tolerance; default 1e-6 */

@@ -1,8 +1,8 @@
 /* n-trailer: a tractor on one axle pulls n trailers, each hitched to the axle ahead of it, in a steady turn.
  *
- * With every centre of mass on its axle the radii follow R_i^2 = R_(i-1)^2 - L_i^2, all bodies have the angular
- * velocity w, the reactions are zero in the hinges and m_i w^2 R_i in wheel i.
- * (Laumond 1993, Controllability of a multibody mobile robot: the vehicle.) */
+ * Axle i runs on a circle of radius R_i, R_i^2 = R_(i-1)^2 - L_i^2; all bodies have the angular velocity w.  As each
+ * centre of mass is on its axle, the reactions are zero in the hinges and m_i w^2 R_i in wheel i.
+ * (The vehicle: Laumond 1993, Controllability of a multibody mobile robot.) */
 #include <math.h>
 #include <stdio.h>
 #include "pinwheel.h"
@@ -18,7 +18,7 @@ static const pw_parameter parameters[] = {
   { PW_AT (trailers, m0), 1, "kg", "mass of the tractor", PW_POSITIVE },
   { PW_AT (trailers, I0), 0.1, "kg m^2", "inertia of the tractor", PW_POSITIVE },
   { PW_AT (trailers, L), 0.6, "m", "length of the first trailer, from hitch to axle", PW_POSITIVE },
-  { PW_AT (trailers, longer), 0.2, "m", "additional length of each further trailer", PW_NONNEGATIVE },
+  { PW_AT (trailers, longer), 0.2, "m", "length of each further trailer minus that of the one ahead", PW_NONNEGATIVE },
   { PW_AT (trailers, m), 2, "kg", "mass of the first trailer", PW_POSITIVE },
   { PW_AT (trailers, ratio), 0.25, "", "mass of each further trailer divided by that of the previous one",
     PW_POSITIVE },

@@ -186,7 +186,7 @@ int pw_run_annotate_error (const pw_run *r, int status, pw_error *error);
  * it".  PW_METHOD if a signal fails; PW_RESOURCE. */
 int pw_run_check_derivatives (pw_run *r, const char *user, const char *needs, pw_error *error);
 
-/* Replaces the saddle by one for the active rows; r->saddle is NULL after an error of pw_saddle_open. */
+/* Replaces the saddle, and the watchdog's, by one for the active rows; a saddle that cannot be opened is NULL. */
 int pw_run_open_saddle (pw_run *r, pw_error *error);
 
 /* Evaluates accelerations, multipliers and the ledger's powers at the state reached; errors contain the reason. */

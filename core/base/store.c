@@ -12,16 +12,17 @@ int pw_grow (void *array, size_t count, size_t *room, size_t size) {
   if (count < *room) return PW_OK;
   size_t more = *room ? 2 * *room : 8;
   while (more <= count) more *= 2;
-  void *p = realloc (*(void **)array, more * size);
-  if (p == NULL) return PW_RESOURCE;
-  *(void **)array = p;
+  void *p;
+  memcpy (&p, array, sizeof p); /* a pointer to any type */
+  if ((p = realloc (p, more * size)) == NULL) return PW_RESOURCE;
+  memcpy (array, &p, sizeof p);
   *room = more;
   return PW_OK;
 }
 
-int pw_names_open (pw_names *n, size_t entries) {
+int pw_names_open (pw_names *n, size_t most) {
   n->size = 16;
-  while (n->size < 2 * entries) n->size *= 2;
+  while (n->size < 2 * most) n->size *= 2; /* at most half full */
   n->slot = calloc (n->size, sizeof *n->slot);
   return n->slot ? PW_OK : PW_RESOURCE;
 }
@@ -104,7 +105,7 @@ void *pw_layout_alloc (pw_layout *l, size_t count, size_t size) {
 
 int pw_layout_pass (pw_layout *l, char **memory) {
   if (l->base) return 0;
-  if (l->used == 0) { /* the first pass; it counts from 1, so that the second one is recognised even without arrays */
+  if (l->used == 0) { /* used == 0: no pass has begun; the first one starts at 1 */
     *memory = NULL;
     l->used = 1;
     return 1;

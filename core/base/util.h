@@ -73,13 +73,13 @@ typedef struct {
     int value;
   } * slot;
 } pw_names;
-int pw_names_open (pw_names *n, size_t entries); /* PW_OK or PW_RESOURCE */
+int pw_names_open (pw_names *n, size_t most); /* with room for `most` names; PW_OK or PW_RESOURCE */
 void pw_names_close (pw_names *n);
 /* Adds a new name and returns -1; if the name exists, returns its value, which does not change. */
 int pw_names_add (pw_names *n, const char *name, int value);
 int pw_names_find (const pw_names *n, const char *name); /* -1 if absent */
 
-/* Makes room in *(void **)array, which has *room, for more than `count` entries of `size` bytes.  Returns a status. */
+/* Makes room for more than `count` entries of `size` bytes; array: address of a pointer to *room of them or NULL. */
 int pw_grow (void *array, size_t count, size_t *room, size_t size);
 
 /* The root of member i of a union-find structure, in which a root is its own parent; halves the path. */

@@ -72,7 +72,8 @@ LIBM (libm_hypot (libm_lanes x, libm_lanes y)) {
   static inline void function##_one (type##_state now, double *out)
 
 /* PREPARE (gear_prepare, pw_gear, gear) { ... } defines a `prepare`: it fills `element`, a gear, from `definition`, a
- * pw_gear, may use its other parameters `bodies`, `internal` and `error`, and returns a status. */
+ * pw_gear, may use its other parameters `bodies`, `internal` and `error`, and returns a status.  All members of a gear
+ * are doubles, even a flag: specialised code for several runs copies the elements as arrays of doubles. */
 #define PREPARE(function, definition_type, type)                                                                    \
   static inline int function##_one (const definition_type *definition, const pw_body *const *bodies, type *element, \
                                     pw_internal *internal, pw_error *error);                                        \

@@ -33,8 +33,8 @@ static inline double coulomb_slope (const coulomb *law, double v) {
   return law->viscous + law->limit * law->inverse * (1 - y * y);
 }
 
-/* The change of a coordinate or velocity that reverses the force: by v0 + |v| in v.  derivative: of v with respect to
- * it.  INFINITY if the force does not saturate. */
+/* The change of a coordinate or velocity x that changes v by v0 + |v|, which reverses the force; derivative: dv/dx.
+ * INFINITY if the force does not saturate. */
 static inline double coulomb_saturation (const coulomb *law, double v, double derivative) {
   return derivative != 0 && law->inverse > 0 ? (1 / law->inverse + fabs (v)) / fabs (derivative) : INFINITY;
 }

@@ -99,6 +99,7 @@ static const char *fault_names (const pw_kind *kind) {
     if (!q || !q->name || !q->rate || !q->unit) return "internal coordinates without names";
     if (fault_text (q->name) || fault_text (q->rate) || fault_text (q->unit))
       return "name or unit of an internal coordinate" FAULT_TEXT;
+    if (strcmp (q->unit, "rad") != 0) return "an internal coordinate whose unit is not rad";
   }
   return "";
 }

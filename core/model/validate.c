@@ -1,4 +1,4 @@
-/* Checks the table of a plug-in and, before a model is compiled, its bodies and elements against their field tables. */
+/* Checks the table of a plug-in; before a model is compiled, its bodies, and its elements by their types' fields. */
 #include <ctype.h>
 #include <string.h>
 #include "model.h"

@@ -1,4 +1,5 @@
 /* Second-order blocks of a scene that are computed by differences, and non-zero ones that are NULL in the table. */
+#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include "random_scene.h"
@@ -8,7 +9,7 @@ static const char *const differences_name[PW_BLOCKS] = {
   [PW_GAMMA_V] = "gamma_v", [PW_FORCE_Q] = "force_q", [PW_FORCE_V] = "force_v",
 };
 
-/* The batch and block of the i-th block by differences; NULL if there are fewer. */
+/* The batch and type of block i of those by differences, or NULL; PW_JTL_Q is not counted: a type gives it by jw_q. */
 static const pw_element_batch *differences_find (const pw_system *s, int i, int *block) {
   for (const pw_element_batch *k = s->batch; k < s->batch + s->batches; k++)
     for (*block = 0; *block < PW_BLOCKS; ++*block)
@@ -36,16 +37,16 @@ char *pw_system_difference_name (const pw_system *s, int i, char *buffer, size_t
 /* Tests the first, the last and a middle element of the batch. */
 static int differences_test (const pw_workspace *w, pw_element_batch *k, char *buffer, size_t size) {
   const int element[] = { 0, k->b.count - 1, k->b.count / 2 };
-  for (int b = 0; b < PW_BLOCKS; b++)
+  for (int block = 0; block < PW_BLOCKS; block++)
     for (int i = 0; i < 3 && k->b.count > 0; i++) {
-      if (!pw_block_missing (w, k, element[i], (pw_block)b)) continue;
-      snprintf (buffer, size, "%s of element type %s", differences_name[b], k->kind->name);
+      if (!pw_block_missing (w, k, element[i], (pw_block)block)) continue;
+      snprintf (buffer, size, "%s of element type %s", differences_name[block], k->kind->name);
       return 1;
     }
   return 0;
 }
 
-/* Searches a batch, with random w, multipliers and signals: 1 if a block is missing, 0 or PW_RESOURCE. */
+/* Searches a batch, with random k->b.w, multipliers and signals.  Returns as pw_find_missing_block. */
 static int differences_search (pw_workspace *w, pw_element_batch *k, pw_random *random, char *buffer, size_t size) {
   int cols = k->b.count * k->b.cols, rows = k->b.count * k->kind->rows;
   double *x = malloc (((size_t)cols + (size_t)rows + 1) * sizeof *x);
@@ -61,6 +62,7 @@ static int differences_search (pw_workspace *w, pw_element_batch *k, pw_random *
 
 int pw_find_missing_block (pw_workspace *w, double t, const double *q, const double *v, char *buffer, size_t size) {
   const pw_system *s = w->s;
+  const pw_source *failed = w->failed;
   pw_random random = { 1 };
   int not_built_in = 0, found = 0;
   for (pw_element_batch *k = w->batch; k < w->batch + s->batches; k++) not_built_in += !pw_kind_is_built_in (k->kind);
@@ -72,10 +74,11 @@ int pw_find_missing_block (pw_workspace *w, double t, const double *q, const dou
     double unit = pw_unit (s, j) / (velocity ? w->scale.time : 1);
     state[i] = (velocity ? v[j] : q[j]) + 0.1 * unit * pw_random_between (&random, -1, 1);
   }
-  pw_update_kinematics (w, t, state, state + s->coords);
+  (void)pw_update_kinematics (w, t, state, state + s->coords); /* signals may fail: random ones replace them */
   for (pw_element_batch *k = w->batch; found == 0 && k < w->batch + s->batches; k++)
     if (!pw_kind_is_built_in (k->kind)) found = differences_search (w, k, &random, buffer, size);
   free (state);
-  pw_hold_signals (w, w->hold); /* causes signals to be evaluated again */
+  w->failed = failed;
+  w->t_signal = NAN; /* the search has changed the values of signals */
   return found;
 }

@@ -172,10 +172,10 @@ void pw_worst_position (const pw_system *s, const double *g, const double *size,
 PW_INLINE evaluate_worst evaluate_worst_velocity (const pw_element_batch *k, const double *eta,
                                                   const unsigned char *enforced, double unit, evaluate_worst worst,
                                                   int bodies, int internal) {
-  const double *J = k->J, *spin = k->b.v;
+  const double *J = k->J, *rate = k->b.v;
   const int *body = k->b.body;
   int i = k->row;
-  for (int e = 0; e < k->b.count; e++, body += bodies, spin += internal)
+  for (int e = 0; e < k->b.count; e++, body += bodies, rate += internal)
     for (int r = 0; r < k->kind->rows; r++, i++) {
       double sum = 0, size = 0;
       PW_UNROLL for (int n = 0; n < bodies; n++, J += 3) {
@@ -185,7 +185,7 @@ PW_INLINE evaluate_worst evaluate_worst_velocity (const pw_element_batch *k, con
         size += fabs (x) + fabs (y) + fabs (phi);
       }
       for (int n = 0; n < internal; n++) {
-        double term = *J++ * spin[n];
+        double term = *J++ * rate[n];
         sum += term;
         size += fabs (term);
       }

@@ -1,4 +1,4 @@
-/* Names and sizes of a compiled system. */
+/* Names and sizes of a compiled system; times at which its signals jump. */
 #include <float.h>
 #include <math.h>
 #include <stdio.h>
@@ -30,7 +30,8 @@ const char *pw_system_body_name (const pw_system *s, int body) {
 }
 
 int pw_system_jumps (const pw_system *s, double t) {
-  double near = 8 * DBL_EPSILON * fabs (t);
+  const double near = 8 * DBL_EPSILON * fmax (fabs (t), 1); /* round-off of sums of steps, which also end near 0 */
+  /* the other signals of forces are continuous, and their derivatives are not used */
   for (const pw_source *source = s->source, *end = source + s->sources; source < end; source++)
     if (!source->of_force || source->signal.type == PW_PULSE || source->signal.type == PW_FUNCTION)
       if (pw_signal_breakpoint (&source->signal, PW_JUMPS, t - near) <= t + near) return 1;
@@ -43,8 +44,8 @@ int pw_system_find_body (const pw_system *s, const char *name) {
   return -1;
 }
 
-/* The batch of constraint equation, internal coordinate or signal i of the system, its element in the batch, and its
- * number in the element.  member: offset of `rows`, `internal` or `signals` in pw_kind. */
+/* The batch that contains constraint equation, internal coordinate or signal i of the system, the index of its element
+ * in the batch, and its number in the element.  member: offset of `rows`, `internal` or `signals` in pw_kind. */
 static const pw_element_batch *query_find_element (const pw_system *s, size_t member, int i, int *element,
                                                    int *number) {
   for (const pw_element_batch *k = s->batch;; k++) {
@@ -70,14 +71,11 @@ char *pw_system_state_name (const pw_system *s, int state, char *buffer, size_t 
 }
 
 const char *pw_system_state_unit (const pw_system *s, int state) {
-  int velocity = state >= s->coords, j = velocity ? state - s->coords : state, e, n;
-  if (j < 3 * s->bodies) return query_units[3 * velocity + j % 3];
-  const pw_element_batch *k = query_find_element (s, offsetof (pw_kind, internal), j - 3 * s->bodies, &e, &n);
-  if (!velocity) return k->kind->coordinate[n].unit;
-  return strcmp (k->kind->coordinate[n].unit, "m") == 0 ? "m/s" : "rad/s";
+  int velocity = state >= s->coords, j = velocity ? state - s->coords : state;
+  return query_units[3 * velocity + (j < 3 * s->bodies ? j % 3 : 2)]; /* internal coordinates are angles, like phi */
 }
 
-/* Index of the state "BODY.x", or -1; if only the body exists, near->best becomes its state of the nearest name. */
+/* Index of a state named like "BODY.x", or -1; if only the body exists, near->best becomes its nearest state. */
 static int query_body_state (const pw_system *s, const char *name, pw_nearest *near) {
   const char *dot = strrchr (name, '.');
   if (dot == NULL) return -1;
@@ -85,14 +83,14 @@ static int query_body_state (const pw_system *s, const char *name, pw_nearest *n
   while (b < s->bodies && (strncmp (s->body_name[b], name, (size_t)(dot - name)) != 0 || s->body_name[b][dot - name]))
     b++;
   if (b == s->bodies) return -1;
-  pw_nearest state = { .sought = dot + 1 };
+  pw_nearest nearest = { .sought = dot + 1 };
   for (int i = 0; i < 6; i++) {
     if (strcmp (dot + 1, query_states[i]) == 0) return i < 3 ? 3 * b + i : s->coords + 3 * b + i - 3;
-    pw_nearest_try (&state, query_states[i]);
+    pw_nearest_try (&nearest, query_states[i]);
   }
-  state.sought = name;
-  *near = state;
-  snprintf (near->best, sizeof near->best, "%s.%.10s", s->body_name[b], state.best);
+  nearest.sought = name;
+  *near = nearest;
+  snprintf (near->best, sizeof near->best, "%s.%.10s", s->body_name[b], nearest.best); /* none has more characters */
   return -1;
 }
 

@@ -70,7 +70,7 @@ struct pw_workspace {
   const pw_source *failed;         /* the last signal that failed, or NULL */
 };
 
-/* Stores the entries of the ledger, unless entry is NULL.  Returns their number.  Call it when signals are compiled. */
+/* Stores the entries of the ledger, unless entry is NULL.  Returns their number.  Signals must be compiled. */
 int pw_ledger_list (const pw_system *s, pw_entry *entry);
 
 /* Closes the contexts made by `open`.  Signals that have not been stored yet may be all zero. */
@@ -110,7 +110,7 @@ int pw_update_signals (pw_workspace *w, double t, const double *q, const double 
 /* Points the batches to the internal coordinates in q, v; q NULL: only to their velocities. */
 void pw_point_to_internal (pw_workspace *w, const double *q, const double *v);
 
-/* 1: the signals of forces keep their current values; 0: they are evaluated again. */
+/* 1: the signals of forces keep their values from now on; 0: they follow time and states again. */
 void pw_hold_signals (pw_workspace *w, int hold);
 
 /* ---- Evaluations; arrays over constraint equations have `rows` entries, f has `coords` + 3 ---- */

@@ -11,8 +11,7 @@ static const char *const rk_inputs[] = { "stage", "held", NULL };
 
 const pw_stabilisation pw_rk_stabilisations[] = {
   PW_ACCELERATION_STABILISATIONS,
-  { "projection", "coordinate projection onto positions and velocities after each step (Lubich 1991, Eich 1993)",
-    PW_PROJECTION },
+  { "projection", "projection onto the constraints after each step (Lubich 1991, Eich 1993)", PW_PROJECTION },
   { "nullspace",
     "velocities in a basis of the null space of J: velocities obey all constraints at every stage "
     "(Kim & Vanderploeg 1986)",
@@ -54,14 +53,14 @@ static void rk_list_weights (pw_method_data *d) {
 }
 
 static int rk_allocate (pw_method_data *d, const pw_system *s) {
-  enum { SINGLE = 8 };
-  size_t n = (size_t)s->coords + 3, state = pw_state_length (s), entries = (size_t)s->entries, count = SINGLE;
+  enum { ONCE = 8 }; /* arrays that exist once, not for each stage */
+  size_t n = (size_t)s->coords + 3, state = pw_state_length (s), entries = (size_t)s->entries, count = ONCE;
   int stages = d->tableau->stages;
-  pw_array array[SINGLE + 3 * PW_RK_STAGES] = {
+  pw_array array[ONCE + 3 * PW_RK_STAGES] = {
     { &d->q, state },           { &d->weight, 2 * n },   { &d->last.q, state },          { &d->last.ledger, entries },
     { &d->last.rate, entries }, { &d->second.q, state }, { &d->second.ledger, entries }, { &d->second.rate, entries }
   };
-  for (int i = 1; i <= stages; i++) {
+  for (int i = 1; i <= stages; i++) { /* those of stage 0 are the state reached */
     array[count++] = (pw_array){ &d->stage_rate[i], entries };
     if (i == stages) break; /* velocities and accelerations of the new state are in d->v, d->a */
     array[count++] = (pw_array){ &d->stage_v[i], n };

@@ -12,19 +12,18 @@
 #define RUN_MOST_STEPS 1e15                /* of a fixed size: shorter ones vanish in the round-off of the time */
 
 /* Checks the settings of a run and fills in defaults. */
-static int run_settings (pw_settings *to, const pw_settings *from, const pw_method *method, int fixed_steps,
-                         pw_error *error) {
+static int run_settings (pw_settings *to, const pw_settings *from, int fixed_steps, pw_error *error) {
   const struct {
     const char *name;
     double value;
   } field[] = { { "step", from->step }, { "rtol", from->rtol }, { "atol", from->atol }, { "span", from->span } };
   for (size_t i = 0; i < sizeof field / sizeof *field; i++)
-    if (!isfinite (field[i].value) || field[i].value < 0)
+    if (!isfinite (field[i].value) || field[i].value < 0) /* 0 selects the default */
       return pw_fail (error, PW_INPUT, "setting %s = %g: expected a number > 0", field[i].name, field[i].value);
-  if (method->adaptive && from->rtol > 0 && from->rtol < RUN_LEAST_RTOL)
+  if (!fixed_steps && from->rtol > 0 && from->rtol < RUN_LEAST_RTOL)
     return pw_fail (error, PW_INPUT, "setting rtol = %g: round-off allows no less than %.2g", from->rtol,
                     RUN_LEAST_RTOL);
-  if (method->adaptive && from->rtol >= 1)
+  if (!fixed_steps && from->rtol >= 1)
     return pw_fail (error, PW_INPUT, "setting rtol = %g: expected a number less than 1", from->rtol);
   if (!isfinite (from->t)) return pw_fail (error, PW_INPUT, "setting t = %g: expected a finite number", from->t);
   if (from->max_steps < 0)
@@ -33,7 +32,7 @@ static int run_settings (pw_settings *to, const pw_settings *from, const pw_meth
   if (to->step == 0) to->step = 1e-3;
   if (to->rtol == 0) to->rtol = 1e-6;
   if (to->max_steps == 0) to->max_steps = PW_MAX_STEPS;
-  if (to->span == 0) to->span = method->adaptive ? 1 : 1000 * to->step;
+  if (to->span == 0) to->span = fixed_steps ? 1000 * to->step : 1;
   double least_step = (fabs (to->t) + to->span) / RUN_MOST_STEPS;
   if (!fixed_steps || to->step >= least_step) return PW_OK;
   return pw_fail (error, PW_INPUT, "setting step = %g: expected at least %g for a run to t = %g", to->step, least_step,
@@ -43,7 +42,7 @@ static int run_settings (pw_settings *to, const pw_settings *from, const pw_meth
 static int run_allocate (pw_run *r) {
   const pw_system *s = r->s;
   size_t n = (size_t)s->coords + 3, rows = (size_t)s->rows, entries = (size_t)s->entries;
-  size_t state = pw_state_length (s), scratch = 2 * n + 3 * rows, matrix = s->saturates ? 2 * n : 0;
+  size_t state = pw_state_length (s), scratch = 2 * n + 3 * rows, states = s->saturates ? 2 * n : 0;
   const pw_array array[] = { { &r->q, state },
                              { &r->ledger, entries },
                              { &r->rate, entries },
@@ -53,8 +52,8 @@ static int run_allocate (pw_run *r) {
                              { &r->q_given, n },
                              { &r->v_given, n },
                              { &r->saturation, 2 * n },
-                             { &r->matrix_state, matrix },
-                             { &r->matrix_range, matrix },
+                             { &r->matrix_state, states },
+                             { &r->matrix_range, states },
                              { &r->watchdog.previous_q, n } };
   r->memory = pw_alloc_arrays (array, sizeof array / sizeof *array);
   r->origin = malloc (2 * n);
@@ -62,11 +61,11 @@ static int run_allocate (pw_run *r) {
   r->v = r->q + n, r->a = r->v + n, r->lambda = r->a + n;
   r->v_at = r->q_at + n, r->a_at = r->v_at + n, r->lambda_at = r->a_at + n;
   for (size_t j = 0; j < 2 * n; j++) r->saturation[j] = INFINITY;
-  for (size_t j = 0; j < matrix; j++) r->matrix_range[j] = INFINITY;
+  for (size_t j = 0; j < states; j++) r->matrix_range[j] = INFINITY;
   return PW_OK;
 }
 
-/* The system's initial values, and those of the settings in their place. */
+/* Sets the state to the system's initial values, except those that the settings give. */
 static int run_initial_values (pw_run *r, const pw_settings *settings, pw_error *error) {
   const pw_system *s = r->s;
   memcpy (r->q, s->q0, (size_t)s->coords * sizeof (double));
@@ -108,7 +107,6 @@ static int run_first_evaluation (pw_run *r, pw_error *error) {
     if (status == PW_OK && r->redundant) status = pw_run_open_saddle (r, error);
     if (status != PW_OK) return status;
   }
-  r->watchdog.singular_ahead = 1;
   status = pw_run_evaluate (r, error);
   if (status == PW_OK) pw_run_set_references (r);
   return status;
@@ -125,19 +123,18 @@ static int run_check_finite (pw_run *r, pw_error *error) {
     if (infinite < 0 && !isfinite (r->a[j])) infinite = j;
   }
   for (int i = 0; i < r->s->rows; i++) sum += fabs (r->lambda[i]);
-  if (isfinite (sum) || pw_update_kinematics (r->w, r->t, r->q, r->v) != PW_OK) return PW_OK;
+  if (isfinite (sum)) return PW_OK;
+  if (pw_update_kinematics (r->w, r->t, r->q, r->v) != PW_OK) return pw_fail_signal (r->t, error);
   if (pw_find_nonfinite (r->w, element, sizeof element))
     return pw_fail (error, PW_METHOD, "t = %.6g s: %s is not finite", r->t, element);
-  if (infinite < 0) return PW_OK;
+  if (infinite < 0) return PW_OK; /* only multipliers are infinite, or the sum has overflowed */
   return pw_fail (error, PW_METHOD, "t = %.6g s: the acceleration of %s is not finite", r->t,
                   pw_system_state_name (r->s, infinite, element, sizeof element));
 }
 
 int pw_run_check_derivatives (pw_run *r, const char *user, const char *needs, pw_error *error) {
   char block[200];
-  const pw_source *failed = r->w->failed;
   int found = pw_find_missing_block (r->w, r->t, r->q, r->v, block, sizeof block);
-  r->w->failed = failed;
   if (pw_update_kinematics (r->w, r->t, r->q, r->v) != PW_OK) return pw_fail_signal (r->t, error);
   if (found == PW_RESOURCE) return pw_fail_memory (r->s, error);
   if (found == 0) return PW_OK;
@@ -156,8 +153,8 @@ static int run_open (pw_run *r, const char *method, const pw_settings *settings,
   if (run_initial_values (r, settings, error) != PW_OK ||
       pw_parse_options (method, settings->methods, &r->method, &r->stabilisation, r->option, error) != PW_OK)
     return PW_INPUT;
-  r->fixed_steps = !r->method->adaptive || pw_run_option (r, "steps") != 0;
-  int status = run_settings (&r->settings, settings, r->method, r->fixed_steps, error);
+  r->fixed_steps = !pw_method_adaptive (r->method, method);
+  int status = run_settings (&r->settings, settings, r->fixed_steps, error);
   if (status != PW_OK) return status;
   r->t = r->settings.t;
   pw_hold_signals (r->w, 0);

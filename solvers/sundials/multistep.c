@@ -298,8 +298,7 @@ static int bdf_open (pw_run *r, pw_error *error) {
 
 static const pw_stabilisation bdf_stabilisations[] = {
   PW_ACCELERATION_STABILISATIONS,
-  { "projection", "coordinate projection onto positions and velocities after each step (Lubich 1991, Eich 1993)",
-    PW_PROJECTION },
+  { "projection", "projection onto the constraints after each step (Lubich 1991, Eich 1993)", PW_PROJECTION },
   { .name = NULL },
 };
 

@@ -204,6 +204,7 @@ static int messages_flywheel (const void *definition, const pw_body *const *bodi
 
 static void test_bad_internal (void **state) {
   static const pw_quantity angle[] = { { "turn", "rad", "turn_rate", NULL } };
+  static const pw_quantity length[] = { { "travel", "m", "speed", NULL } };
   static const char *const mode[] = { "zero", "one", "two", NULL };
   const pw_field fields[] = { { PW_AT (messages_chooser, body), PW_BODY },
                               { PW_AT (messages_chooser, mode), PW_CHOICE, .choices = mode },
@@ -220,6 +221,10 @@ static void test_bad_internal (void **state) {
        pw_add (m, &kind, &(messages_chooser){ "f", "frame", 1 }));
   BAD (": flywheel f: inertia of turn = nan: expected a finite number",
        pw_add (m, &kind, &(messages_chooser){ "f", "frame", 2 }));
+  kind.coordinate = length;
+  BAD (": element type flywheel: an internal coordinate whose unit is not rad",
+       pw_add (m, &kind, &(messages_chooser){ "f", "frame", 0 }));
+  kind.coordinate = angle;
   pw_error error = { 0 };
   pw_model *m = scene_model (&messages_table, NULL);
   pw_add (m, &kind, &(messages_chooser){ "f", "frame", 0 });

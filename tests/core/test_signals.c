@@ -162,6 +162,22 @@ static void test_sharing_and_hold (void **state) {
   pw_system_free (s);
 }
 
+/* Jumps are found up to the round-off of sums of steps, also at the time 0; ramps of forces do not jump. */
+static void test_jumps (void **state) {
+  (void)state;
+  for (double start = -2; start <= 2; start += 2) {
+    pw_signal torque = { PW_PULSE, .pulse = { .height = 1, .start = start } };
+    pw_system *s = signals_scene (&torque);
+    assert_true (pw_system_jumps (s, start) && pw_system_jumps (s, start + 1e-16) &&
+                 pw_system_jumps (s, start - 1e-16));
+    assert_true (!pw_system_jumps (s, start + 1e-9) && !pw_system_jumps (s, start - 1e-9));
+    pw_system_free (s);
+  }
+  pw_system *s = signals_scene (&(pw_signal){ PW_RAMP, .ramp = { .to = 1, .start = 1, .duration = 1 } });
+  assert_false (pw_system_jumps (s, 1));
+  pw_system_free (s);
+}
+
 /* ---- A constraint, which needs the derivatives of its signal ---- */
 
 static signals_context signals_driven;
@@ -202,6 +218,7 @@ int main (void) {
   const struct CMUnitTest tests[] = {
     cmocka_unit_test (test_constant),   cmocka_unit_test (test_harmonic),         cmocka_unit_test (test_reads),
     cmocka_unit_test (test_velocities), cmocka_unit_test (test_sharing_and_hold), cmocka_unit_test (test_drive),
+    cmocka_unit_test (test_jumps),
   };
   return cmocka_run_group_tests (tests, NULL, NULL);
 }

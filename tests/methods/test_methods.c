@@ -7,6 +7,7 @@
 #include "methods.h"
 #include "runs.h"
 #include "scene.h"
+#include "trial.h"
 #include "util.h"
 
 /* ---- The table ---- */
@@ -142,10 +143,31 @@ static void test_settings (void **state) {
   methods_bad_setting (&(pw_settings){ .t = NAN }, "setting t = nan: expected a finite number");
 }
 
+static void methods_build_disc (pw_model *m, const void *parameters) {
+  (void)parameters;
+  pw_add_body (m, &(pw_body){ .name = "disc", .mass = 1, .inertia = 1 });
+}
+
+/* The option steps=fixed makes an adaptive integrator use the step size in place of the tolerances: the default span is
+ * 1000 steps, which is the time scale of a scene at rest, and rtol may have any value. */
+static void test_fixed_steps (void **state) {
+  static const pw_plugin_table methods_at_rest = TRIAL_TABLE (methods_build_disc);
+  static const char *const method[] = { "rk4", "erk5:steps=fixed", "erk8:steps=fixed", "radau:steps=fixed" };
+  (void)state;
+  pw_system *s = scene_system (&methods_at_rest, NULL);
+  for (int i = 0; i < 4; i++) {
+    pw_run *r = runs_open (s, method[i], &(pw_settings){ .step = 0.01, .rtol = 1e-20 });
+    assert_true (pw_run_initial (r)->time == 10);
+    pw_run_close (r);
+  }
+  pw_system_free (s);
+}
+
 int main (void) {
   const struct CMUnitTest tests[] = {
-    cmocka_unit_test (test_table),   cmocka_unit_test (test_every_pair), cmocka_unit_test (test_parse),
-    cmocka_unit_test (test_refused), cmocka_unit_test (test_long_names), cmocka_unit_test (test_settings),
+    cmocka_unit_test (test_table),       cmocka_unit_test (test_every_pair), cmocka_unit_test (test_parse),
+    cmocka_unit_test (test_refused),     cmocka_unit_test (test_long_names), cmocka_unit_test (test_settings),
+    cmocka_unit_test (test_fixed_steps),
   };
   return cmocka_run_group_tests (tests, NULL, NULL);
 }

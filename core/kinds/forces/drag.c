@@ -58,7 +58,7 @@ static const pw_field drag_fields[] = {
   { PW_AT (pw_drag, body), PW_BODY, .required = 1, .about = "the body on which it acts" },
   { PW_AT (pw_drag, linear), PW_NUMBER, .unit = "N s/m", .domain = PW_NONNEGATIVE, .about = "force per speed" },
   { PW_AT (pw_drag, quadratic), PW_NUMBER, .unit = "N s^2/m^2", .domain = PW_NONNEGATIVE,
-    .about = "force per square of the speed: half density times area times coefficient" },
+    .about = "force per square of the speed: half the air density times area times drag coefficient" },
   { PW_AT (pw_drag, turning), PW_NUMBER, .unit = "N m s/rad", .domain = PW_NONNEGATIVE,
     .about = "moment per angular velocity" },
   { PW_AT (pw_drag, turning_quadratic), PW_NUMBER, .unit = "N m s^2/rad^2", .domain = PW_NONNEGATIVE,

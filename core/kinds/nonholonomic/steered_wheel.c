@@ -14,8 +14,8 @@ typedef struct {
 
 /* A wheel in the current state. */
 typedef struct {
-  contact_state n;
-  double aside;                       /* m */
+  contact_state contact;
+  double aside;                       /* arm of P to the left of the heading, m above [m] */
   double steering_rate, heading_rate; /* u', omega + u' */
 } steered_state;
 
@@ -23,8 +23,8 @@ static inline steered_state steered_at (const pw_batch *batch, int e) {
   const double *at = ((const steered *)batch->element)[e].at, *u = batch->u + 3 * e;
   double c, s;
   pw_sin_cos (u[0], &s, &c);
-  contact_state n = contact_of (contact_make (at, u[0], -s, c), batch, e);
-  return (steered_state){ n, at[1] * c - at[0] * s, u[1], n.body->omega + u[1] };
+  contact_state now = contact_of (contact_make (at, u[0], -s, c), batch, e);
+  return (steered_state){ now, at[1] * c - at[0] * s, u[1], now.body->omega + u[1] };
 }
 
 PREPARE (steered_prepare, pw_steered_wheel, steered) {
@@ -33,36 +33,36 @@ PREPARE (steered_prepare, pw_steered_wheel, steered) {
 }
 
 PER_ELEMENT (steered_J, steered, 3) {
-  contact_J_one (now.n, out);
+  contact_J_one (now.contact, out);
 }
 
 PER_ELEMENT (steered_gamma, steered, 1) {
-  *out = now.heading_rate * (now.n.dy * now.n.body->vx - now.n.dx * now.n.body->vy) -
-         now.steering_rate * now.aside * now.n.body->omega;
+  *out = -now.heading_rate * contact_speed_phi (&now.contact) - now.steering_rate * now.aside * now.contact.body->omega;
 }
 
 PER_ELEMENT (steered_jw_q, steered, 3) {
-  contact_jw_q_one (now.n, out);
+  contact_jw_q_one (now.contact, out);
 }
 
 PER_ELEMENT (steered_gamma_q, steered, 3) {
-  out[0] = out[1] = 0, out[2] = now.heading_rate * (now.n.dx * now.n.body->vx + now.n.dy * now.n.body->vy);
+  out[0] = out[1] = 0;
+  out[2] = now.heading_rate * (now.contact.dx * now.contact.body->vx + now.contact.dy * now.contact.body->vy);
 }
 
 PER_ELEMENT (steered_gamma_v, steered, 3) {
-  out[0] = now.heading_rate * now.n.dy, out[1] = -now.heading_rate * now.n.dx;
-  out[2] = now.n.dy * now.n.body->vx - now.n.dx * now.n.body->vy - now.steering_rate * now.aside;
+  out[0] = now.heading_rate * now.contact.dy, out[1] = -now.heading_rate * now.contact.dx;
+  out[2] = -contact_speed_phi (&now.contact) - now.steering_rate * now.aside;
 }
 
 PER_ELEMENT (steered_contact, steered, 3) {
-  contact_place_one (now.n, out);
+  contact_place_one (now.contact, out);
 }
 
 static const pw_field steered_fields[] = {
   { PW_AT (pw_steered_wheel, body), PW_BODY, .required = 1, .about = "the body with the wheel" },
   { PW_AT (pw_steered_wheel, at), PW_POINT, .unit = "m", .required = 1, .about = "contact point in the body's frame" },
   { PW_AT (pw_steered_wheel, heading), PW_SIGNAL, .unit = "rad", .required = 1,
-    .about = "rolling direction in the body's frame as a function of time, with its derivative; 0: along its x" },
+    .about = "rolling direction in the body's frame, a signal with its derivative; 0: along the frame's x axis" },
   { .name = NULL },
 };
 
