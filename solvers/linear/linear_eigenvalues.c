@@ -9,7 +9,7 @@
 
 /* EIGEN_ROUND_OFF: size of the perturbations that estimate the uncertainty of eigenvalues, relative to the largest
  * entry of each row; then, after balancing, of the matrix: a hundred times round-off, lost in derivatives and QR
- * algorithm.  EIGEN_CERTAIN: a real or imaginary part is kept if it exceeds this multiple of its shift. */
+ * algorithm.  EIGEN_CERTAIN: a real or imaginary part is kept if it exceeds this multiple of the eigenvalue's shift. */
 static const double EIGEN_ROUND_OFF = 100 * DBL_EPSILON, EIGEN_CERTAIN = 10;
 
 /* The n eigenvalues of A, stored by rows (destroyed), conjugate pairs adjacent, im > 0 first, and the left eigenvectors

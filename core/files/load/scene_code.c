@@ -1,8 +1,8 @@
 /* Specialised code: loads the compiled object from the cache, or compiles it.
  *
  * A file KEY.so in the cache is the object, then its text, its identity (code_job) and a checksum; it is loaded if
- * these are as expected.  KEY.c is locked while it is compiled, and deleted afterwards; if it does not compile, it is kept,
- * with the messages in KEY.log. */
+ * these are as expected.  KEY.c is locked while it is compiled, and deleted afterwards; if it does not compile, it is
+ * kept, with the messages in KEY.log. */
 #include <dlfcn.h>
 #include <errno.h>
 #include <fcntl.h>
