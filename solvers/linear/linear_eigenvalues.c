@@ -7,13 +7,13 @@
 #include "linear.h"
 #include "rank.h"
 
-/* EIGEN_ROUND_OFF: size of the perturbations of A that estimate the uncertainty of its eigenvalues, relative to the
- * largest entry of its row, then to that of the balanced matrix: a hundred times round-off, the loss in derivatives and
- * QR algorithm.  EIGEN_CERTAIN: an eigenvalue counts as nonzero if it exceeds this multiple of the shift they cause. */
+/* EIGEN_ROUND_OFF: size of the perturbations that estimate the uncertainty of eigenvalues, relative to the largest
+ * entry of each row; then, after balancing, of the matrix: a hundred times round-off, lost in derivatives and QR
+ * algorithm.  EIGEN_CERTAIN: a real or imaginary part is kept if it exceeds this multiple of the eigenvalue's shift. */
 static const double EIGEN_ROUND_OFF = 100 * DBL_EPSILON, EIGEN_CERTAIN = 10;
 
-/* The n eigenvalues of A (destroyed), conjugate pairs adjacent, im > 0 first, and its left eigenvectors unless `left`
- * is NULL; `work` has 4 n entries. */
+/* The n eigenvalues of A, stored by rows (destroyed), conjugate pairs adjacent, im > 0 first, and the left eigenvectors
+ * of A^T unless `left` is NULL; `work` has 4 n entries. */
 static int eigen_values (int n, double *A, double *re, double *im, double *left, double *work) {
   for (int i = 0; i < n * n; i++)
     if (!isfinite (A[i])) return PW_RETRY;
@@ -22,7 +22,7 @@ static int eigen_values (int n, double *A, double *re, double *im, double *left,
   return failed ? PW_RETRY : PW_OK;
 }
 
-/* Adds perturbations of EIGEN_ROUND_OFF times the largest entry of each row, at least `least`, to B. */
+/* Perturbs each row of B by EIGEN_ROUND_OFF times its largest entry, or times `least` if that is larger. */
 static void eigen_perturb (int n, double least, double *B) {
   for (int i = 0; i < n; i++, B += n) {
     double most = least;
@@ -67,7 +67,7 @@ static void eigen_clean (int n, double *re, double *im, const double *shift) {
 static int eigen_certain (const pw_linearisation *x, int n, double *B, double *re, double *im) {
   int cells = n * n, unused, also_unused;
   double *perturbed = B + cells, *re2 = perturbed + cells, *im2 = re2 + n, *shift = im2 + n, *work = shift + n;
-  double most = 1 / x->r->w->scale.time;
+  double most = 1 / x->r->w->scale.time; /* so that rows of zeros are perturbed, too */
   memcpy (perturbed, B, (size_t)cells * sizeof *B);
   eigen_perturb (n, most, perturbed);
   if (n) LAPACKE_dgebal_work (LAPACK_COL_MAJOR, 'S', n, perturbed, n, &unused, &also_unused, work);
@@ -108,8 +108,8 @@ static void eigen_sort (pw_linear *l) {
     }
 }
 
-/* Transforms B, stored by rows as A, by reflections that map the first k vectors of x->symmetry to the first k unit
- * vectors.  Returns 1 if they span an invariant subspace: the lower left block is then 0. */
+/* Transforms B, stored by rows, by reflections, left in x->symmetry, that map the span of its first k vectors to that
+ * of the first k unit vectors.  Returns 1 if the span is invariant: the lower left block is then 0. */
 static int eigen_split (pw_linearisation *x, int k, double *B) {
   int n = x->size;
   double off = 0, *tau = x->tau, *work = x->dx; /* at least n */
@@ -137,7 +137,7 @@ int pw_linear_eigenvalues (pw_linearisation *x, pw_linear *l, pw_error *error) {
   for (int i = k; k > 0 && i < n; i++)
     memmove (B + (size_t)(i - k) * (size_t)(n - k), B + (size_t)i * (size_t)n + k, (size_t)(n - k) * sizeof *B);
   memset (l->rigid, 1, (size_t)k);
-  if (k >= 2) l->im[0] = fabs (l->twist[2]), l->im[1] = -l->im[0];
+  if (k >= 2) l->im[0] = fabs (l->twist[2]), l->im[1] = -l->im[0]; /* both translations, in a rotating frame */
   int status = eigen_certain (x, n - k, B, l->re + k, l->im + k);
   free (B);
   if (status == PW_OK && x->modes) status = pw_linear_shapes (x, k, l);
@@ -149,8 +149,8 @@ int pw_linear_eigenvalues (pw_linearisation *x, pw_linear *l, pw_error *error) {
 
 /* ---- RK4 ---- */
 
-/* |1 + z + z^2/2 + z^3/6 + z^4/24| <= 1 for z = h mu, a region within |z| < 4 (Hairer & Wanner 1996, section IV.2).
- * For a growing solution only its frequency counts. */
+/* |1 + z + z^2/2 + z^3/6 + z^4/24| <= 1, z = h (re + i im): a region within |z| < 4 (Hairer & Wanner 1996, section
+ * IV.2).  For a growing solution only its frequency counts. */
 static int rk4_stable (double re, double im, double h) {
   double x = h * fmin (re, 0), y = h * im, u = 1, v = 0;
   for (int k = 4; k > 0; k--) { /* u + i v = 1 + z (u + i v) / k */

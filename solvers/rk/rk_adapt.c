@@ -199,12 +199,12 @@ int pw_rk_advance_adaptive (pw_run *r, double t_end, pw_error *error) {
     if (shortened) t1 = stop;
     double h = t1 - r->t;
     if (!shortened && !(h > pw_least_step (r))) {
-      if (status != PW_OK) return pw_rk_fail (r, status, h, error);
+      if (status != PW_OK) return pw_rk_fail (r, status, r->t, h, 0, error);
       return pw_fail (error, PW_METHOD, "t = %.6g s: the tolerances require a step below %.3g s", r->t, h);
     }
     if (most_growth < ADAPT_GROWTH && (status = pw_run_check_limits (r, error)) != PW_OK) return status;
     status = adapt_step (r, h, t1, project, r->settings.ledger ? &added_energy : NULL, &err);
-    if (status < 0) return pw_rk_fail (r, status, h, error);
+    if (status < 0) return pw_fail_signal (r->t, error);
     if (err <= 1) {
       adapt_accept (r, h, t1, added_energy, err, most_growth, shortened);
       return PW_OK;

@@ -81,15 +81,15 @@ int pw_rk_at (pw_run *r, double t, pw_error *error) {
   double between;
   r->near_singular = 0;
   r->refused_sine = 0;
-  int status = divide_step (r, from, t, d->projects, r->settings.ledger);
-  if (r->near_singular && status >= 0) {
+  int status = divide_step (r, from, t, d->projects, r->settings.ledger), divided = r->near_singular && status >= 0;
+  if (divided) {
     status = divide (r, from, status, t, d->projects, from->t, &between);
     if (status == PW_OK) status = divide_two_parts (r, from, between, t, d->projects);
   }
   memcpy (r->q_at, d->q, pw_state_length (r->s) * sizeof *d->q);
   r->statistics = statistics, r->refused_sine = refused_sine, r->near_singular = near_singular;
   if (status < 0) return pw_fail_signal (t, error);
-  return status == PW_OK ? PW_OK : pw_rk_fail (r, status, t - from->t, error);
+  return status == PW_OK ? PW_OK : pw_rk_fail (r, status, from->t, t - from->t, divided, error);
 }
 
 /* Replaces a step to t1 near a singular configuration, which returned `status`, by the first part of a divided step,
@@ -126,7 +126,7 @@ int pw_rk_advance_fixed (pw_run *r, double t_end, pw_error *error) {
   double stop = whole ? fmin (t_end, r->breakpoint) : t1, t = t1;
   if (d->off_grid) status = fixed_step_around (r, status, ends_singular, t1, stop, project, &t);
   if (status != PW_OK) {
-    if (status != PW_STOPPED) status = pw_rk_fail (r, status, r->settings.step, error);
+    if (status != PW_STOPPED) status = pw_rk_fail (r, status, r->t, r->settings.step, d->off_grid, error);
     d->off_grid = was_off_grid;
     return status;
   }

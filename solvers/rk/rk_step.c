@@ -24,7 +24,7 @@ PW_INLINE void rk_two (double *restrict out, const double *y, double *const *slo
 
 /* (q, v) = the state reached + h sum_j weight_j (v_j, a_j), with the weights of a row of the tableau.  Two coordinates
  * are combined at a time, so the arrays have room for one more.  `count`, that of the weights, is a constant in the
- * inlined copies. */
+ * copies for 1 and 4. */
 PW_INLINE void rk_combine_by (const pw_run *r, double *q, double *v, const pw_rk_row *row, double h, int count) {
   const pw_method_data *d = r->data;
   const double *q0 = r->q, *v0 = r->v;
@@ -87,7 +87,7 @@ static int rk_stages_specialised (pw_run *r, double h) {
                                                      d->stage_rate, d->q, d->v, d->lambda });
 }
 
-/* Evaluates stages 1, 2, ...; stage 0 is the state reached.  Then combines them to the new state.  Returns as
+/* Evaluates stages 1, 2, ...; stage 0 is the state reached.  Then combines them into the new state.  Returns as
  * pw_run_accelerate. */
 static int rk_stages (pw_run *r, double h) {
   pw_method_data *d = r->data;
@@ -95,7 +95,7 @@ static int rk_stages (pw_run *r, double h) {
   d->stage_v[0] = r->v, d->stage_a[0] = r->a, d->stage_rate[0] = r->rate;
   if (rk_stages_specialised (r, h)) return PW_OK;
   int status = PW_OK;
-  if (d->holds_signals) { /* a sample or a rejected step may have changed the kinematics, and with them the signals */
+  if (d->holds_signals) { /* since a sample or a rejected step, the workspace may be at another state */
     status = pw_update_kinematics (r->w, r->t, r->q, r->v);
     pw_hold_signals (r->w, status == PW_OK);
   }
@@ -143,21 +143,21 @@ double pw_rk_distance (const pw_run *r) {
   return most;
 }
 
-int pw_rk_fail (pw_run *r, int status, double h, pw_error *error) {
+int pw_rk_fail (pw_run *r, int status, double t, double h, int divided, pw_error *error) {
   int finite = pw_is_finite_state (r, r->data->q, r->data->v) && pw_is_finite_state (r, r->q, r->v);
   int has_projector = r->data->projects || r->data->projects_positions;
   int contradictory = has_projector && finite ? r->data->projector.contradictory_row : -1;
   char element[120];
-  if (status < 0) return pw_fail_signal (r->t, error);
+  if (status < 0) return pw_fail_signal (t, error);
   if (contradictory >= 0)
-    return pw_fail (error, PW_METHOD, "t = %.6g s: %s contradicts the other constraints", r->t,
+    return pw_fail (error, PW_METHOD, "t = %.6g s: %s contradicts the other constraints", t,
                     pw_system_row_name (r->s, contradictory, element, sizeof element));
-  if (finite && pw_watchdog_near_state (r)) return pw_fail_singular (r, r->t, error);
-  if (!finite && h < 1e-12 * fabs (r->t)) /* some 4000 eps */
-    return pw_fail (error, PW_METHOD, "t = %.6g s: the next state is not finite, however small the step", r->t);
-  return pw_fail (error, PW_METHOD, "t = %.6g s: the step of %.6g s is too large: %s", r->t, h,
-                  r->data->off_grid         ? "near a singular configuration no two divisions of it agree"
-                  : !finite                 ? "the state is no longer finite"
+  if (finite && pw_watchdog_near_state (r)) return pw_fail_singular (r, t, error);
+  if (!finite && h < 1e-12 * fabs (t)) /* some 4000 eps */
+    return pw_fail (error, PW_METHOD, "t = %.6g s: the next state is not finite, however small the step", t);
+  return pw_fail (error, PW_METHOD, "t = %.6g s: the step of %.6g s is too large: %s", t, h,
+                  divided   ? "near a singular configuration, and dividing it in different ways gives different results"
+                  : !finite ? "the state is no longer finite"
                   : r->data->uses_nullspace ? "the basis of the velocities does not stay valid"
                   : r->data->projects       ? "the projection does not converge"
                                             : "a stage of it lands in a singular configuration");

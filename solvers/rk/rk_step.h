@@ -62,8 +62,9 @@ void pw_rk_ledger (const pw_run *r, double *end, const double *beginning, double
 /* The distance of the new state from the sample (q_at, v_at): the largest difference in units of the scene. */
 double pw_rk_distance (const pw_run *r);
 
-/* Reports why no step from the state reached succeeds; h, status: size and result of the last attempt. */
-int pw_rk_fail (pw_run *r, int status, double h, pw_error *error);
+/* Reports why no step from the state at t succeeds; h, status: size and result of the last attempt; divided: 1 if it
+ * was divided near a singular configuration. */
+int pw_rk_fail (pw_run *r, int status, double t, double h, int divided, pw_error *error);
 
 int pw_rk_advance_fixed (pw_run *r, double t_end, pw_error *error);
 int pw_rk_advance_adaptive (pw_run *r, double t_end, pw_error *error);

@@ -272,6 +272,16 @@ static void test_long_search_path (void **state) {
 
 /* ---- Runs that end early ---- */
 
+/* A row inside a step at which the force overflows, but not at the stages of the step: the time is its beginning. */
+static void test_failing_sample (void **state) {
+  (void)state;
+  cli_write ("burst.yaml", "pinwheel: 1\nabout: a burst\nrun: {t_end: 2, step: 1}\n"
+                           "bodies: [{name: p, mass: 1e-3, inertia: 1}]\n"
+                           "elements: [{force: f, body: p, at: [0, 0], fx: \"1e307*exp(-4e4*(t - 0.25)^2)\"}]\n");
+  assert_int_equal (cli_run ("pinwheel run @/burst.yaml --method rk4 --every 0.25 -o @/burst.csv"), 4);
+  assert_non_null (strstr (cli_err, "t = 0 s: the step of 0.25 s is too large: the state is no longer finite"));
+}
+
 /* A step with which the method fails: the time reached and the reason, the rows so far in NAME.part, status 4. */
 static void test_failing_step (void **state) {
   (void)state;
@@ -355,9 +365,9 @@ int main (void) {
     cmocka_unit_test (test_full_disk),       cmocka_unit_test (test_bad_models),
     cmocka_unit_test (test_bad_tables),      cmocka_unit_test (test_bad_files),
     cmocka_unit_test (test_found_twice),     cmocka_unit_test (test_long_search_path),
-    cmocka_unit_test (test_failing_step),    cmocka_unit_test (test_interrupted),
-    cmocka_unit_test (test_moved),           cmocka_unit_test (test_one_voice),
-    cmocka_unit_test (test_compiled),
+    cmocka_unit_test (test_failing_sample),  cmocka_unit_test (test_failing_step),
+    cmocka_unit_test (test_interrupted),     cmocka_unit_test (test_moved),
+    cmocka_unit_test (test_one_voice),       cmocka_unit_test (test_compiled),
   };
   return cmocka_run_group_tests (tests, cli_setup, cli_teardown);
 }

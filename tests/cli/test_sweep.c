@@ -34,6 +34,10 @@ static void test_ranges (void **state) {
   const char *at = strchr (cli_out, '\n') + 1;
   for (int i = 0; i < 5; i++, at = strchr (at, '\n') + 1)
     check_close ("decade", strtod (at, NULL), expected[i], expected[i] * 2 * CHECK_EPS, "round-off of pow");
+  cli_good ("pinwheel sweep ezyroller --vary "
+            "'M0=max(1,2),(3+0.00000000000000000000000000000000000000000000000000000000000000)' "
+            "--t-end 0.001 -o @/list.csv && cut -d, -f1,2 @/list.csv | tail -n 2");
+  assert_string_equal (cli_out, "2,ok\n3,ok\n");
   cli_good ("pinwheel sweep ezyroller --vary M0=lin:-1:-1:1 --t-end 0.001 -o @/one.csv && wc -l <@/one.csv");
   assert_string_equal (cli_out, "2\n");
 }
@@ -192,7 +196,7 @@ static void test_bad_input (void **state) {
     { "--vary omega=lin:1:2", "--vary omega=lin:1:2: expected lin:FIRST:LAST:COUNT, three numbers" },
     { "--vary omega=log:1:2:3:4", "--vary omega=log:1:2:3:4: expected log:FIRST:LAST:COUNT, three numbers" },
     { "--vary omega=lin:1:2:2.5", "--vary omega=lin:1:2:2.5: expected a count that is a whole number >= 1" },
-    { "--vary omega=lin:1:2:1", "--vary omega=lin:1:2:1: a range with two different ends has at least 2 values" },
+    { "--vary omega=lin:1:2:1", "--vary omega=lin:1:2:1: a range with two different ends needs at least 2 values" },
     { "--vary omega=log:0:2:3", "--vary omega=log:0:2:3: the ends of a logarithmic range must be > 0" },
     { "--vary omega=1:2:3", "--vary omega=1:2:3: a range begins with lin: or log:" },
     { "--vary omega", "--vary omega: expected NAME=lin:FIRST:LAST:COUNT, log:..., or a list v1,v2,..." },

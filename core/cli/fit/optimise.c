@@ -45,7 +45,7 @@ static const pw_search *optimise_best (const pw_optimise *problem, int count, co
   return best;
 }
 
-/* Refines the best ones among the different results. */
+/* Refines the best of the distinct results. */
 static int optimise_refine (pw_optimise *problem, pw_error *error) {
   const pw_search *best;
   unsigned char *refined = calloc ((size_t)problem->starts, 1); /* 1: its result, or the same optimum, is refined */
@@ -57,13 +57,14 @@ static int optimise_refine (pw_optimise *problem, pw_error *error) {
       refined[i] |= (unsigned char)pw_optimise_same (problem, problem->search + i, best);
   }
   free (refined);
+  problem->progress.last = problem->starts + problem->refinements;
   return pw_parallel (problem->jobs, problem->refinements, pw_search_fine, problem, error);
 }
 
 static int optimise_search (pw_optimise *problem, pw_error *error) {
   pw_stop_catch ();
   pthread_mutex_init (&problem->lock, NULL);
-  pw_progress_start (&problem->progress, pw_file_name (problem->model.file), "starts", 0,
+  pw_progress_start (&problem->progress, pw_file_name (problem->model.file), "searches", 0,
                      problem->starts + OPTIMISE_REFINED);
   int status = pw_parallel (problem->jobs, problem->starts, pw_search_rough, problem, error);
   if (status == PW_OK) status = optimise_refine (problem, error);
@@ -71,8 +72,8 @@ static int optimise_search (pw_optimise *problem, pw_error *error) {
   pthread_mutex_destroy (&problem->lock);
   pw_stop_release ();
   problem->best = optimise_best (problem, problem->starts + problem->refinements, NULL);
-  for (const pw_search *search = problem->search; search < problem->search + problem->starts + problem->refinements;
-       search++) {
+  for (int i = 0; i < problem->starts + problem->refinements; i++) {
+    const pw_search *search = problem->search + i;
     problem->runs += search->runs, problem->failed += search->failed, problem->derivatives += search->derivatives;
     if (problem->first_error == NULL && search->failed) problem->first_error = &search->first_error;
   }
@@ -81,7 +82,7 @@ static int optimise_search (pw_optimise *problem, pw_error *error) {
 
 /* ---- Before the search ---- */
 
-/* Adds the constraint "OUTPUT<=VALUE" or "OUTPUT>=VALUE"; text: a copy of `given`, which becomes OUTPUT. */
+/* Adds the constraint "OUTPUT<=VALUE" or "OUTPUT>=VALUE".  text: a copy of `given`, of which OUTPUT is kept. */
 static int optimise_constraint (pw_optimise *problem, char *text, const char *given, pw_error *error) {
   const int i = problem->outputs;
   char *relation = NULL;
@@ -131,8 +132,7 @@ static int optimise_open_outputs (pw_optimise *problem, int first, int count, co
 
 static int optimise_read (pw_optimise *problem, pw_error *error) {
   double starts = 10;
-  problem->least = INFINITY;
-  problem->seed = 1;
+  problem->least = INFINITY, problem->seed = 1;
   if (!problem->maximise == !problem->minimise)
     return pw_fail (error, PW_INPUT, "expected one of --maximise OUTPUT and --minimise OUTPUT");
   int status = pw_cli_number ("--starts", problem->starts_text, PW_COUNT, &starts, error);
@@ -162,8 +162,8 @@ static int optimise_open (pw_optimise *problem, pw_error *error) {
   if (status == PW_OK) status = pw_unknowns_open (&problem->unknowns, &problem->line, &problem->model, error);
   if (status == PW_OK) status = pw_unknowns_read (&problem->unknowns, problem->free, error);
   if (status == PW_OK) pw_unknowns_engine (&problem->unknowns, OPTIMISE_RUNS * problem->starts);
-  if (status == PW_OK && problem->unknowns.count > PW_UNKNOWNS_SOBOL_MOST)
-    status = pw_fail (error, PW_INPUT, "--free: at most %d unknowns", PW_UNKNOWNS_SOBOL_MOST);
+  if (status == PW_OK && problem->starts > 1 && problem->unknowns.count > PW_UNKNOWNS_SOBOL_MOST)
+    status = pw_fail (error, PW_INPUT, "--starts: at most %d unknowns", PW_UNKNOWNS_SOBOL_MOST);
   if (status == PW_OK)
     status = pw_files_open (&problem->files, &problem->line, &problem->model, use, sizeof use / sizeof *use, error);
   return status == PW_OK ? optimise_open_searches (problem, error) : status;
@@ -171,7 +171,7 @@ static int optimise_open (pw_optimise *problem, pw_error *error) {
 
 /* ---- After the search ---- */
 
-/* Outputs of the run that violates its most violated constraint least, and that constraint. */
+/* Outputs of the run whose largest violation is smallest; *constraint: the output that has it.  NULL: all failed. */
 static const double *optimise_nearest (const pw_optimise *problem, int *constraint) {
   const double *nearest = NULL;
   double least = INFINITY;
@@ -212,11 +212,10 @@ static int optimise_converged (const pw_optimise *problem, pw_error *error) {
     farthest = unknown, distance = fabs (search->to[i]) / unknown->scale;
   }
   if (search->converged && distance < OPTIMISE_DIVERGED) return PW_OK;
-  if (farthest == NULL) return pw_fail (error, PW_METHOD, "the search did not converge in %ld runs", search->runs);
+  if (farthest == NULL) return pw_fail (error, PW_METHOD, "the search did not converge");
   return pw_fail (error, PW_METHOD,
-                  "the search did not converge in %ld runs; perhaps there is no optimum without bounds, "
-                  "such as --free %s=LOW:HIGH",
-                  search->runs, farthest->name);
+                  "the search %s; perhaps there is no optimum unless bounds are given, as in --free %s=LOW:HIGH",
+                  search->converged ? "diverged" : "did not converge", farthest->name);
 }
 
 static int optimise_finish (pw_optimise *problem, pw_error *error) {
@@ -224,7 +223,7 @@ static int optimise_finish (pw_optimise *problem, pw_error *error) {
        *summary = pw_files_stream (&problem->files, OPTIMISE_SUMMARY);
   int interrupted = pw_stop != 0;
   if (problem->best == NULL && interrupted)
-    pw_cli_say ("pinwheel: interrupted before a run succeeded that satisfies the constraints\n");
+    pw_cli_say ("pinwheel: interrupted before any run satisfied the constraints\n");
   if (problem->best == NULL) return interrupted ? PW_INTERRUPTED : optimise_infeasible (problem, error);
   pw_error unconverged = { 0 };
   int converged = optimise_converged (problem, &unconverged) == PW_OK;
@@ -257,9 +256,9 @@ static const struct poptOption optimise_options[] = {
   PW_OPTION_GROUP ("Optimisation"),
   PW_TEXT_OPTION (
       pw_optimise, maximise, "maximise", 0, "OUTPUT",
-      "Find the largest value of a column of the table of `run`, of max:COLUMN, min:, mean:, integral:, rms: or "
-      "final: (default), or of an expression of these, such as frame.x/work"),
-  PW_TEXT_OPTION (pw_optimise, minimise, "minimise", 0, "OUTPUT", "Find the smallest value"),
+      "Maximise max:COLUMN, min:, mean:, integral:, rms: or final: (default) of a column of the table of `run`, or an "
+      "expression of these, such as frame.x/work"),
+  PW_TEXT_OPTION (pw_optimise, minimise, "minimise", 0, "OUTPUT", "Minimise such an output"),
   PW_LIST_OPTION (pw_optimise, free, "free", 0, "NAME[=LOW:HIGH]",
                   "Vary a parameter or an initial value, such as frame.vx, between bounds; repeatable"),
   PW_LIST_OPTION (pw_optimise, subject_to, "subject-to", 0, "OUTPUT<=VALUE",

@@ -8,29 +8,36 @@
 
 /* ---- Axes ---- */
 
-/* Reads the finite number or expression in the first `size` bytes of a text. */
-static int axis_read_number (const char *text, size_t size, double *value) {
-  char number[64];
-  if (size >= sizeof number) return PW_INPUT;
-  memcpy (number, text, size);
-  number[size] = 0;
-  return pw_read_expression (number, value) == PW_OK && isfinite (*value) ? PW_OK : PW_INPUT;
+/* Reads the finite number or expression in the first `size` bytes of a text, which it restores. */
+static int axis_read_number (char *text, size_t size, double *value) {
+  const char after = text[size];
+  text[size] = 0;
+  int status = pw_read_expression (text, value);
+  text[size] = after;
+  return status == PW_OK && isfinite (*value) ? PW_OK : PW_INPUT;
 }
 
 static int axis_fail (const pw_axis *axis, const char *why, pw_error *error) {
   return pw_fail (error, PW_INPUT, "--vary %.100s=%.100s: %s", axis->name, axis->range, why);
 }
 
+/* The length of the first value of a list, which ends at a comma outside parentheses. */
+static size_t axis_value_length (const char *list) {
+  size_t n = 0;
+  for (int depth = 0; list[n] && (list[n] != ',' || depth > 0); n++) depth += (list[n] == '(') - (list[n] == ')');
+  return n;
+}
+
 /* "V1,V2,..." */
 static int axis_read_list (pw_axis *axis, pw_error *error) {
   char why[140];
   axis->count = 1;
-  for (const char *c = axis->range; *c; c++) axis->count += *c == ',';
+  for (const char *c = axis->range; *(c += axis_value_length (c)); c++) axis->count++;
   axis->value = calloc ((size_t)axis->count, sizeof *axis->value);
   if (axis->value == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
-  const char *c = axis->range;
+  char *c = axis->range;
   for (long i = 0; i < axis->count; i++) {
-    size_t n = strcspn (c, ",");
+    size_t n = axis_value_length (c);
     snprintf (why, sizeof why, "\"%.*s\" is not a finite number", n < 100 ? (int)n : 100, c);
     if (axis_read_number (c, n, axis->value + i) != PW_OK) return axis_fail (axis, why, error);
     c += n + 1;
@@ -38,30 +45,23 @@ static int axis_read_list (pw_axis *axis, pw_error *error) {
   return PW_OK;
 }
 
-/* Reads "FIRST:LAST:COUNT"; 0 if it is something else. */
-static int axis_read_triple (const char *c, double number[3]) {
-  for (int i = 0; i < 3; i++) {
-    size_t n = strcspn (c, ":");
-    if (axis_read_number (c, n, number + i) != PW_OK || (c[n] == ':') != (i < 2)) return 0;
-    c += n + 1;
-  }
-  return 1;
-}
-
 /* "lin:FIRST:LAST:COUNT" or "log:FIRST:LAST:COUNT" */
 static int axis_read_range (pw_axis *axis, pw_error *error) {
   double number[3];
-  char why[80];
+  char why[80], *c = strchr (axis->range, ':') + 1;
   snprintf (why, sizeof why, "expected %.3s:FIRST:LAST:COUNT, three numbers", axis->range);
-  if (!axis_read_triple (strchr (axis->range, ':') + 1, number)) return axis_fail (axis, why, error);
-  axis->first = number[0];
-  axis->last = number[1];
+  for (int i = 0; i < 3; i++) {
+    size_t n = strcspn (c, ":");
+    if (axis_read_number (c, n, number + i) != PW_OK || (c[n] == ':') != (i < 2)) return axis_fail (axis, why, error);
+    c += n + 1;
+  }
+  axis->first = number[0], axis->last = number[1];
   if (*pw_domain_check (PW_COUNT, number[2]))
     return axis_fail (axis, "expected a count that is a whole number >= 1", error);
   if (number[2] > PW_GRID_MAX_ROWS) return axis_fail (axis, "too many values: at most 1e8 rows", error);
   axis->count = (long)number[2];
   if (axis->count == 1 && axis->first != axis->last)
-    return axis_fail (axis, "a range with two different ends has at least 2 values", error);
+    return axis_fail (axis, "a range with two different ends needs at least 2 values", error);
   if (axis->type == PW_AXIS_LOG && !(axis->first > 0 && axis->last > 0))
     return axis_fail (axis, "the ends of a logarithmic range must be > 0", error);
   return PW_OK;
@@ -74,14 +74,13 @@ int pw_axis_read (pw_axis *axis, const char *text, pw_error *error) {
   if (equals == NULL || equals == axis->name || equals[1] == 0)
     return pw_fail (error, PW_INPUT, "--vary %.200s: expected NAME=lin:FIRST:LAST:COUNT, log:..., or a list v1,v2,...",
                     text);
-  *equals = 0;
-  axis->range = equals + 1;
+  *equals = 0, axis->range = equals + 1;
   axis->type = strncmp (axis->range, "lin:", 4) == 0   ? PW_AXIS_LIN
                : strncmp (axis->range, "log:", 4) == 0 ? PW_AXIS_LOG
                                                        : PW_AXIS_LIST;
-  if (axis->type == PW_AXIS_LIST && strchr (axis->range, ':'))
-    return axis_fail (axis, "a range begins with lin: or log:", error);
-  return axis->type == PW_AXIS_LIST ? axis_read_list (axis, error) : axis_read_range (axis, error);
+  if (axis->type != PW_AXIS_LIST) return axis_read_range (axis, error);
+  if (strchr (axis->range, ':')) return axis_fail (axis, "a range begins with lin: or log:", error);
+  return axis_read_list (axis, error);
 }
 
 void pw_axis_free (pw_axis *axis) {

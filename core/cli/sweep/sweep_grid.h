@@ -9,8 +9,8 @@
 
 /* A varied quantity: a parameter of the model or the initial value of a state. */
 typedef struct {
-  char *name;        /* allocated together with `range` */
-  const char *range; /* "lin:1:10:100", as written */
+  char *name;  /* allocated together with `range` */
+  char *range; /* "lin:1:10:100", as written */
   enum { PW_AXIS_LIST, PW_AXIS_LIN, PW_AXIS_LOG } type;
   double first, last;            /* of PW_AXIS_LIN and PW_AXIS_LOG */
   double *value;                 /* of PW_AXIS_LIST */

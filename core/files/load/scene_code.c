@@ -1,8 +1,8 @@
 /* Specialised code: loads the compiled object from the cache, or compiles it.
  *
- * An object in the cache, KEY.so, is followed by the text it was compiled from, the compiler and options, and a
- * checksum; they are compared before it is loaded.  KEY.c is locked while it is compiled, and deleted afterwards; if it
- * does not compile, it is kept, with the messages in KEY.log. */
+ * A file KEY.so in the cache is the object, then its text, its identity (code_job) and a checksum; it is loaded if
+ * these are as expected.  KEY.c is locked while it is compiled, and deleted afterwards; if it does not compile, it is
+ * kept, with the messages in KEY.log. */
 #include <dlfcn.h>
 #include <errno.h>
 #include <fcntl.h>
@@ -17,7 +17,7 @@ enum { CODE_MAX_BYTES = 64 << 20, CODE_MAX_WAITS = 3000 }; /* waits of 20 ms: a 
 struct pw_scene_code {
   void *handle;
   const pw_specialised *table;
-  const pw_specialised_lanes *lanes;
+  const pw_specialised_lanes *lanes_table;
   char notice[600];
 };
 
@@ -126,14 +126,13 @@ static int code_check (const code_job *x, pw_error *error) {
 /* Loads the object, unless it is that of another scene. */
 static int code_load (code_job *x, pw_error *error) {
   void *handle = dlopen (x->object, RTLD_NOW | RTLD_LOCAL);
-  const char *why = handle ? NULL : dlerror ();
-  if (handle == NULL) return pw_fail (error, PW_RESOURCE, "it cannot be loaded: %s", why ? why : "unknown reason");
+  if (handle == NULL) return pw_fail (error, PW_RESOURCE, "it cannot be loaded: %s", dlerror ());
   const pw_specialised *table = dlsym (handle, "pw_specialised_scene");
-  const pw_specialised_lanes *lanes = dlsym (handle, "pw_specialised_scene_lanes");
-  if (x->lanes ? lanes && pw_specialised_lanes_fit (lanes, x->system)
+  const pw_specialised_lanes *lanes_table = dlsym (handle, "pw_specialised_scene_lanes");
+  if (x->lanes ? lanes_table && pw_specialised_lanes_fit (lanes_table, x->system)
                : table && pw_specialised_fits (table, x->system)) {
     x->code->handle = handle;
-    x->code->table = table, x->code->lanes = lanes;
+    x->code->table = table, x->code->lanes_table = lanes_table;
     return PW_OK;
   }
   dlclose (handle);
@@ -187,7 +186,7 @@ static int code_compile (code_job *x, FILE *source, pw_error *error) {
   return status;
 }
 
-/* Waits while another process compiles the scene.  NULL after a minute, or if the folder was removed. */
+/* Creates and locks KEY.c, waiting while another process compiles it.  NULL after a minute, or if that fails. */
 static FILE *code_lock (const code_job *x) {
   const struct timespec pause = { .tv_nsec = 20000000 };
   int file, waits = 0;
@@ -198,7 +197,8 @@ static FILE *code_lock (const code_job *x) {
   return f;
 }
 
-/* Compiles into the cache.  PW_METHOD if the text does not compile, else PW_RETRY: the cache may be the cause. */
+/* Compiles into the cache.  PW_METHOD if the text does not compile, else PW_RETRY: the cache may be the cause, as it is
+ * if KEY.c was deleted meanwhile. */
 static int code_compile_cached (code_job *x, pw_error *error) {
   pw_error cause = { 0 };
   FILE *source = code_lock (x);
@@ -255,7 +255,7 @@ pw_scene_code *pw_scene_code_open (const char *text, const pw_system *s, pw_erro
 }
 
 const pw_specialised_lanes *pw_scene_code_lanes (const pw_scene_code *c) {
-  return c && c->lanes && pw_specialised_lanes_count (c->lanes) > 0 ? c->lanes : NULL;
+  return c && c->lanes_table && pw_specialised_lanes_count (c->lanes_table) > 0 ? c->lanes_table : NULL;
 }
 
 const pw_specialised *pw_scene_code_table (const pw_scene_code *c) {
