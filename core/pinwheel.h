@@ -776,8 +776,8 @@ int pw_system_jumps (const pw_system *s, double t);
  * none is.  NULL and the error if there is no such code, as for too many constraint equations.  Free the text. */
 char *pw_system_source (const pw_system *s, const unsigned char *independent, pw_error *error);
 
-/* 1 if compiled code is of this version of Pinwheel and of a system with the same structure: parameters and initial
- * values may differ. */
+/* 1 if compiled code has this library's interface to such code and is of a system with the same structure: parameters
+ * and initial values may differ. */
 typedef struct pw_specialised pw_specialised;
 int pw_specialised_fits (const pw_specialised *code, const pw_system *s);
 

@@ -39,7 +39,7 @@ static void pin (pw_model *m, const char *name, const char *one, double x1, doub
   pw_add_pin (m, &(pw_pin){ .name = name, .body = { one, two }, .at = { { x1, y1 }, { x2, y2 } } });
 }
 
-/* At the initial angles of the test set. */
+/* At the initial angles of the test set; Theta = 0, so K2 is at beta, and Omega = -Phi, so K6 is at epsilon - Phi. */
 static void bodies (pw_model *m) {
   const double beta = -0.0617138900142764496, gamma = 0.455279819163070380, Phi = 0.222668390165885885,
                delta = 0.487364979543842550, epsilon = 1.23054744454982119;

@@ -49,7 +49,7 @@ typedef struct {
   double *q_now, *v_now;       /* coords: the state as moved by the last update */
   double *w, *lambda;          /* elements x cols, elements x rows: the vector w of jw_q, the multipliers */
   double *J, *eta;             /* at the moved state */
-  int failed;                  /* 1: a signal failed in an update */
+  int failed;                  /* 1: a signal failed */
   int check_sizes;             /* 1: also checks that each function fills exactly its array */
   pw_selftest_report *report;
   char *memory; /* of the arrays; the caller frees it in every case */

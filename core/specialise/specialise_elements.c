@@ -200,7 +200,7 @@ void pw_specialise_data (const pw_generator *gen) {
   fputs ("0 };\n", gen->out);
   pw_specialise_list (gen->out, "DATUM", data + per_signal * s->sources);
   pw_specialise_list (gen->out, "SIGNAL", 3 * s->sources);
-  pw_specialise_list (gen->out, "ENTRY", gen->entries);
+  pw_specialise_list (gen->out, "ENTRY", gen->J_entries);
   pw_specialise_list (gen->out, "FIXED", gen->emitter.constants); /* pw_scene.constant */
   pw_specialise_list (gen->out, "LEDGER", s->entries);
   pw_specialise_list (gen->out, "BATCH", s->batches + 1); /* the last one: the signals */

@@ -19,8 +19,8 @@ typedef struct {
   FILE *out;                        /* the generated code */
   pw_workspace *w;                  /* at the initial state */
   pw_sparsity *sparsity;            /* batches */
-  int entries;                      /* of J */
-  pw_stream prepare;                /* statements of the generated function `prepare` */
+  int J_entries;
+  pw_stream prepare; /* statements of the generated function `prepare` */
   pw_emitter emitter;
 } pw_generator;
 

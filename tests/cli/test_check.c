@@ -215,6 +215,10 @@ static void check_half (const pw_batch *b, double *out) {
   for (int i = 0; i < b->count * check_original->rows; i++) out[i] /= 2;
 }
 
+static void check_not_a_number (const pw_batch *b, double *out) {
+  for (int i = 0; i < b->count * check_original->rows; i++) out[i] = NAN;
+}
+
 static void check_scene_expect (const pw_kind *kind, const char *what) {
   pw_error error = { 0 };
   pw_selftest_report report = { 0 };
@@ -240,6 +244,9 @@ static void test_scene (void **state) {
   halved.gamma = check_half;
   halved.gamma_q = halved.gamma_v = pw_by_differences;
   check_scene_expect (&halved, "gamma");
+  halved = pw_kind_pin;
+  halved.g_size = check_not_a_number;
+  check_scene_expect (&halved, "J");
   halved = pw_kind_pin;
   halved.jw_q = NULL;
   check_scene_expect (&halved, "jw_q");
@@ -273,20 +280,62 @@ static void test_failing_signal (void **state) {
   pw_selftest_report report = { 0 };
   pw_system *s = scene_system (&check_ending_table, NULL);
   assert_int_equal (pw_selftest_scene (s, 1, &pw_kind_torque, 0, q, v, 1, &report, &error), PW_METHOD);
-  check_error (&error, PW_METHOD, "t = 0.5 s: a signal failed: torque T: value is not a finite number");
+  check_error (&error, PW_METHOD,
+               "t = 0.5 s: a signal failed: torque T: value is not a finite number, or its function failed");
   assert_int_equal (report.failed, 0);
+  pw_system_free (s);
+}
+
+/* A signal without a next breakpoint has failed, too; a breakpoint just after the state is not a fault of the type. */
+
+static double check_breakpoint; /* the only one; NaN: the function fails */
+
+static double check_break (void *context, double t) {
+  (void)context;
+  return t < check_breakpoint ? check_breakpoint : isnan (check_breakpoint) ? t : INFINITY;
+}
+
+static int check_sine (void *context, double t, const double *x, double value[3], double *gradient) {
+  (void)context, (void)x, (void)gradient;
+  value[0] = sin (t), value[1] = cos (t), value[2] = -sin (t);
+  return 0;
+}
+
+static void check_build_driven (pw_model *m, const void *parameters) {
+  (void)parameters;
+  pw_add_body (m, &(pw_body){ .name = "rotor", .mass = 1, .inertia = 1 });
+  pw_add_drive (m, &(pw_drive){ .name = "D",
+                                .body = { "rotor", "ground" },
+                                .what = PW_DRIVE_ANGLE,
+                                .value = { PW_FUNCTION, .function = { check_sine, .breakpoint = check_break } } });
+}
+
+static const pw_plugin_table check_driven_table = TRIAL_TABLE (check_build_driven);
+
+static void test_breakpoint (void **state) {
+  (void)state;
+  const double q[3] = { 0, 0, sin (1) }, v[3] = { 0, 0, cos (1) };
+  pw_error error = { 0 };
+  pw_selftest_report report = { 0 };
+  check_breakpoint = 1 + 1e-11;
+  pw_system *s = scene_system (&check_driven_table, NULL);
+  check_ok (pw_selftest_scene (s, 1, &pw_kind_drive, 1, q, v, 1, &report, &error), &error);
+  for (int i = 0; i < report.checks; i++)
+    if (report.check[i].failed) fail_msg ("%s: %s", report.check[i].name, report.check[i].where);
+  check_breakpoint = NAN;
+  assert_int_equal (pw_selftest_scene (s, 1, &pw_kind_drive, 1, q, v, 1, &report, &error), PW_METHOD);
   pw_system_free (s);
 }
 
 int main (void) {
   const struct CMUnitTest tests[] = {
-    cmocka_unit_test (test_ezyroller),     cmocka_unit_test (test_pendulum),
-    cmocka_unit_test (test_spring),        cmocka_unit_test (test_redundant),
-    cmocka_unit_test (test_start),         cmocka_unit_test (test_singular),
-    cmocka_unit_test (test_broken_kind),   cmocka_unit_test (test_broken_gradient),
-    cmocka_unit_test (test_large),         cmocka_unit_test (test_bad_options),
-    cmocka_unit_test (test_scene),         cmocka_unit_test (test_failing_signal),
-    cmocka_unit_test (test_many_findings),
+    cmocka_unit_test (test_breakpoint),      cmocka_unit_test (test_ezyroller),
+    cmocka_unit_test (test_pendulum),        cmocka_unit_test (test_spring),
+    cmocka_unit_test (test_redundant),       cmocka_unit_test (test_start),
+    cmocka_unit_test (test_singular),        cmocka_unit_test (test_broken_kind),
+    cmocka_unit_test (test_broken_gradient), cmocka_unit_test (test_large),
+    cmocka_unit_test (test_bad_options),     cmocka_unit_test (test_scene),
+    cmocka_unit_test (test_failing_signal),  cmocka_unit_test (test_many_findings),
   };
   return cmocka_run_group_tests (tests, cli_setup, cli_teardown);
 }

@@ -92,16 +92,16 @@ typedef struct {
 typedef struct {
   const char *name;
   double value;
-} pw_expression_constant_name;
+} pw_expression_named_constant;
 
 /* Both end with a NULL name. */
 extern const pw_expression_function pw_expression_functions[];
-extern const pw_expression_constant_name pw_expression_constants[];
+extern const pw_expression_named_constant pw_expression_constants[];
 
 /* The index of a function, or -1. */
 int pw_expression_find_function (const char *name);
 /* A constant, or NULL. */
-const pw_expression_constant_name *pw_expression_find_constant (const char *name);
+const pw_expression_named_constant *pw_expression_find_constant (const char *name);
 
 /* The length of the name at p, which may contain dots (frame.phi), or of the number: digits, perhaps with a decimal
  * point and an exponent; 0 if there is none (words.c). */

@@ -167,7 +167,7 @@ const pw_expression_function pw_expression_functions[] = {
   { .name = NULL },
 };
 
-const pw_expression_constant_name pw_expression_constants[] = {
+const pw_expression_named_constant pw_expression_constants[] = {
   { "pi", PW_PI }, { "e", 2.71828182845904523536 }, { "deg", PW_PI / 180 }, { .name = NULL }
 };
 

@@ -187,7 +187,7 @@ static parser_part parser_unknown (parser *p, const char *name) {
   pw_nearest near = { .sought = name };
   for (const char *const *v = p->variable; v && *v; v++) pw_nearest_try (&near, *v);
   for (int i = 0; p->scope && i < p->scope->names; i++) pw_nearest_try (&near, p->scope->name[i]);
-  for (const pw_expression_constant_name *c = pw_expression_constants; c->name; c++) pw_nearest_try (&near, c->name);
+  for (const pw_expression_named_constant *c = pw_expression_constants; c->name; c++) pw_nearest_try (&near, c->name);
   for (const pw_expression_function *f = pw_expression_functions; f->name; f++) pw_nearest_try (&near, f->name);
   if (strcmp (name, "T") == 0) pw_nearest_try (&near, "t"); /* the time, defined in some expressions only */
   return parser_fail (p, p->at, "there is no \"%s\"%s", name, pw_nearest_text (&near));
@@ -199,7 +199,7 @@ static int parser_is_call (const parser *p) {
 }
 
 static parser_part parser_name (parser *p, const char *name) {
-  const pw_expression_constant_name *constant = pw_expression_find_constant (name);
+  const pw_expression_named_constant *constant = pw_expression_find_constant (name);
   int variable_index = 0, named = p->scope ? pw_names_find (&p->scope->index, name) : -1;
   while (p->variable && p->variable[variable_index] && strcmp (p->variable[variable_index], name) != 0)
     variable_index++;

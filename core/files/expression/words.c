@@ -11,12 +11,13 @@ size_t pw_expression_name_size (const char *p) {
 }
 
 size_t pw_expression_number_size (const char *p) {
-  size_t n = strspn (p, DIGITS), decimals = p[n] == '.' ? strspn (p + n + 1, DIGITS) : 0;
-  if (n + decimals == 0) return 0;
-  n += p[n] == '.' ? 1 + decimals : 0;
-  size_t exponent = n + 1 + (p[n] != 0 && (p[n + 1] == '+' || p[n + 1] == '-'));
-  size_t digits = p[n] == 'e' || p[n] == 'E' ? strspn (p + exponent, DIGITS) : 0;
-  return digits ? exponent + digits : n;
+  size_t whole = strspn (p, DIGITS), decimals = p[whole] == '.' ? strspn (p + whole + 1, DIGITS) : 0;
+  if (whole + decimals == 0) return 0;
+  const char *end = p + whole + (p[whole] == '.' ? 1 + decimals : 0); /* of the mantissa */
+  if (*end != 'e' && *end != 'E') return (size_t)(end - p);
+  const char *exponent = end + 1 + (end[1] == '+' || end[1] == '-');
+  size_t digits = strspn (exponent, DIGITS);
+  return (size_t)(digits ? exponent + digits - p : end - p);
 }
 
 int pw_expression_number (const char *text, double *value) {
@@ -24,8 +25,8 @@ int pw_expression_number (const char *text, double *value) {
   return n && text[sign + n] == 0 && pw_read_number (text, value) == PW_OK;
 }
 
-const pw_expression_constant_name *pw_expression_find_constant (const char *name) {
-  const pw_expression_constant_name *c = pw_expression_constants;
+const pw_expression_named_constant *pw_expression_find_constant (const char *name) {
+  const pw_expression_named_constant *c = pw_expression_constants;
   while (c->name && strcmp (c->name, name) != 0) c++;
   return c->name ? c : NULL;
 }
@@ -44,8 +45,9 @@ const char *pw_expression_next_name (const char **rest, char name[PW_EXPRESSION_
     const char *p = *rest;
     size_t n = pw_expression_name_size (p), number = n ? 0 : pw_expression_number_size (p);
     *rest += n ? n : number ? number : 1;
+    if (n == 0) continue;
     snprintf (name, PW_EXPRESSION_NAME, "%.*s", (int)n, p);
-    if (n) return p;
+    return p;
   }
   return NULL;
 }
@@ -53,8 +55,9 @@ const char *pw_expression_next_name (const char **rest, char name[PW_EXPRESSION_
 /* ---- Named numbers ---- */
 
 int pw_scope_open (pw_scope *s, int room, pw_arena *arena) {
-  s->name = pw_arena_alloc (arena, ((size_t)room + 1) * sizeof *s->name);
-  s->value = pw_arena_alloc (arena, ((size_t)room + 1) * sizeof *s->value);
+  size_t n = (size_t)room + 1; /* never an empty allocation */
+  s->name = pw_arena_alloc (arena, n * sizeof *s->name);
+  s->value = pw_arena_alloc (arena, n * sizeof *s->value);
   return s->name && s->value ? pw_names_open (&s->index, (size_t)room) : PW_RESOURCE;
 }
 

@@ -55,7 +55,7 @@ PER_ELEMENT (motor_force_v, motor, 36) {
   opposite_moments_block (now.slope * now.element->damping, out);
 }
 
-/* Changes of angles and angular velocities that change y by L + |y|, which reverses a saturated torque. */
+/* Changes of angles and angular velocities that change y by |y| + L: T goes to L tanh 1 = 0.76 L the other way. */
 PER_ELEMENT (motor_saturation, motor, 12) {
   double limit = now.element->limit, stiffness = now.element->stiffness, damping = now.element->damping;
   if (limit > 0 && stiffness > 0) out[2] = out[5] = (limit + fabs (now.y)) / stiffness;
@@ -85,7 +85,7 @@ static const pw_field motor_fields[] = {
 const pw_kind pw_kind_motor = {
   .name = "motor",
   .about = "a limited torque that drives the relative angle and angular velocity of two bodies to target values",
-  .symbol = "0 .9 -.5 0 1 0 0 .7 .7 0 0 1 0 -.7 .7 0 -.2 .8 0 -.7 .7 0 -.6 1.2",
+  .symbol = "0 .9 -.5 0 1 0 0 .7 .7 0 0 1 0 -.7 .7 0 -.2 .8 0 -.7 .7 0 -.6 1.2", /* an arc with an arrow head */
   TYPE (motor, pw_motor, motor),
   .bodies = 2,
   .signals = 2,
