@@ -593,7 +593,7 @@ struct pw_kind {
    * that reverses the force or changes it by its own magnitude.  Entries are INFINITY before the call. */
   pw_batch_function *saturation;
   /* Strokes in figures (core/cli/plot/plot_symbols.c); NULL: none.  Vertex "a x y": at a from the first body's point
-   * (0) to the last body's (1), plus x along and y to the left of the heading, in units of symbols. */
+   * (0) to the last body's (1), plus x along and y to the left of the heading, in units of symbols; "o ...": circle. */
   const char *symbol;
 };
 

@@ -34,47 +34,44 @@ const void *pw_field_at (const pw_kind *kind, const void *definition, pw_field_t
   return NULL;
 }
 
+_Static_assert(PW_NAME_MAX == 50, "as in FAULT_TEXT");
 #define FAULT_TEXT ": expected at most 50 bytes of UTF-8 without control characters"
 
-/* 1 if a name or unit cannot be an entry of a table or file: too long, or not one line of text. */
-static int fault_text (const char *text) {
+/* 1 if a name or unit is too long or not one line of text: it would spoil tables and files. */
+static int is_bad_text (const char *text) {
   return strlen (text) > PW_NAME_MAX || !pw_is_text (text) || strpbrk (text, "\n\t");
 }
 
 /* The fault of one field, or "". */
 static const char *fault_field (const pw_kind *kind, const pw_field *f) {
   size_t bytes = pw_field_bytes (f->type) * (size_t)pw_field_count (f);
-  if (fault_text (f->name) || (f->unit && fault_text (f->unit))) return "name or unit" FAULT_TEXT;
+  if (is_bad_text (f->name) || (f->unit && is_bad_text (f->unit))) return "name or unit" FAULT_TEXT;
   if (bytes == 0) return "its type does not exist";
   if ((size_t)f->domain > PW_FRACTION) return "its domain does not exist";
-  if (f->offset < sizeof (char *) || f->offset + bytes > kind->definition)
-    return "it lies outside the definition: is .definition its sizeof, its first member the name?";
+  if (f->offset < sizeof (char *) || bytes > kind->definition || f->offset > kind->definition - bytes)
+    return "outside the definition, whose first member is its name and whose sizeof is .definition";
   if (f->type == PW_CHOICE && (f->choices == NULL || f->choices[0] == NULL)) return "a choice without choices";
   return "";
 }
 
-/* As pw_kind_check, of the fields. */
+/* The fault of the fields, or ""; the text may be in the buffer. */
 static const char *fault_fields (const pw_kind *kind, char *buffer, size_t size) {
   int bodies = 0, signals = 0;
   if (kind->fields == NULL) return "no table of fields";
   for (const pw_field *f = kind->fields; f->name; f++) {
     const char *fault = fault_field (kind, f);
-    if (*fault) {
-      snprintf (buffer, size, "field %s: %s", f->name, fault);
-      return buffer;
-    }
+    if (*fault) return snprintf (buffer, size, "field %s: %s", f->name, fault), buffer;
     if (f->type == PW_BODY) bodies += pw_field_count (f);
     if (f->type == PW_SIGNAL) signals += pw_field_count (f);
   }
   if (kind->each_body && (bodies > 0 || kind->bodies != 1))
     return "an element type that acts on each body has one body and no body fields";
-  if (!kind->each_body && bodies != kind->bodies) return "bodies is not the number of fields of type PW_BODY";
-  if (signals != kind->signals) return "signals is not the number of fields of type PW_SIGNAL";
+  if (!kind->each_body && bodies != kind->bodies) return "bodies is not the sum of the counts of PW_BODY fields";
+  if (signals != kind->signals) return "signals is not the sum of the counts of PW_SIGNAL fields";
   return "";
 }
 
 static const char *fault_functions (const pw_kind *kind) {
-  /* all but the second-order blocks */
   pw_batch_function *const exact[] = { kind->g,     kind->g_size, kind->eta,     kind->J,
                                        kind->gamma, kind->force,  kind->force_u, kind->energy,
                                        kind->power, kind->loss,   kind->contact, kind->saturation };
@@ -92,12 +89,12 @@ static const char *fault_names (const pw_kind *kind) {
   for (int i = 0; i < kind->rows; i++) {
     const pw_quantity *q = kind->reaction ? &kind->reaction[i] : NULL;
     if (!q || !q->name || !q->unit) return "constraint equations without names of their reactions";
-    if (fault_text (q->name) || fault_text (q->unit)) return "name or unit of a reaction" FAULT_TEXT;
+    if (is_bad_text (q->name) || is_bad_text (q->unit)) return "name or unit of a reaction" FAULT_TEXT;
   }
   for (int i = 0; i < kind->internal; i++) {
     const pw_quantity *q = kind->coordinate ? &kind->coordinate[i] : NULL;
     if (!q || !q->name || !q->rate || !q->unit) return "internal coordinates without names";
-    if (fault_text (q->name) || fault_text (q->rate) || fault_text (q->unit))
+    if (is_bad_text (q->name) || is_bad_text (q->rate) || is_bad_text (q->unit))
       return "name or unit of an internal coordinate" FAULT_TEXT;
     if (strcmp (q->unit, "rad") != 0) return "an internal coordinate whose unit is not rad";
   }
@@ -106,7 +103,7 @@ static const char *fault_names (const pw_kind *kind) {
 
 const char *pw_kind_check (const pw_kind *kind, char *buffer, size_t size) {
   if (kind->name == NULL || *kind->name == 0) return "no name";
-  if (fault_text (kind->name)) return "its name" FAULT_TEXT;
+  if (is_bad_text (kind->name)) return "its name" FAULT_TEXT;
   if (kind->definition < sizeof (char *)) return "the definition has no room for its name";
   if (kind->bodies < 0 || kind->bodies > PW_MAX_BODIES || kind->internal < 0 || kind->internal > PW_MAX_INTERNAL ||
       kind->rows < 0 || kind->rows > PW_MAX_ROWS || kind->signals < 0 || kind->signals > PW_MAX_SIGNALS) {
@@ -118,7 +115,7 @@ const char *pw_kind_check (const pw_kind *kind, char *buffer, size_t size) {
   if (kind->level < PW_FORCE || kind->level > PW_NONHOLONOMIC || (kind->rows > 0) != (kind->level != PW_FORCE))
     return "rows and level are inconsistent";
   if ((kind->internal > 0 || kind->element > 0) && kind->prepare == NULL)
-    return "an element or internal coordinates, but no prepare function";
+    return "a prepared element (.element > 0) or internal coordinates, but no prepare function";
   const char *fault = fault_names (kind);
   if (*fault == 0) fault = fault_fields (kind, buffer, size);
   return *fault ? fault : fault_functions (kind);

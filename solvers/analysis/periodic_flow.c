@@ -7,17 +7,17 @@
 enum {
   FLOW_MULTIPLES = 24, /* of the period of a signal, that are tried as a common period */
   FLOW_PERIODS = 3,    /* during which signals are compared with those one period later */
-  FLOW_TIMES = 20,     /* multiples of the scale of time T during which they must not change if the period is free */
-  /* Largest ratio of the steps of a trial of Newton's method to those of the motion that it is to improve: a trial far
-   * away, with enormous velocities, would take millions. */
+  FLOW_TIMES = 20,     /* scales of time T during which they must be constant if the period is free */
+  /* Largest ratio of the steps of a trial of Newton's method to those of the iterate before it: a trial far away, with
+   * enormous velocities, would take millions. */
   FLOW_STEPS = 20,
-  RETURN_SAMPLES = 20000, /* of a run that seeks a return */
+  RETURN_SAMPLES = 20000, /* during which a run must return */
   RETURN_STEPS = 20       /* samples per scale of time T */
 };
-static const double FLOW_SETTLED = 1e-9, /* relative tolerance of the run that settles */
-    FLOW_FAR = 4,                        /* largest ratio of a free period to the last one known */
+static const double FLOW_SETTLE_RTOL = 1e-9, /* of the run that settles */
+    FLOW_FAR = 4,                            /* largest ratio of a free period to the last one known */
     RETURN_NEAR = 0.2,   /* distance of a return from the first state, relative to the largest one on the way */
-    RETURN_LEAST = 1e-6; /* largest distance that counts as rest, in units of the scene */
+    RETURN_MOVED = 1e-6; /* least distance that counts as motion, in units of the scene */
 
 /* Least relative tolerances.  Derivatives need fewer digits than states: Newton's method converges all the same. */
 static const double flow_min_rtol[] = { [PW_FLOW] = 0, [PW_FLOW_DERIVATIVES] = 1e-6, [PW_FLOW_MULTIPLIERS] = 1e-8 };
@@ -31,11 +31,11 @@ static double signal_period (const pw_signal *s) {
   return s->type == PW_PULSE && s->pulse.period > 0 && s->pulse.height != 0 ? s->pulse.period : 0;
 }
 
-/* The least common multiple of two periods, of which 0 is none; NaN if it is not found. */
+/* The least common multiple of two periods, where 0 stands for none; NaN if it is not found. */
 static double common_period (double a, double b) {
   if (a == 0 || b == 0 || isnan (a)) return a + b;
-  for (int i = 1; i <= FLOW_MULTIPLES; i++)
-    if (i * a > b / 2 && fabs (i * a / b - round (i * a / b)) < 1e-9 * i) return i * a;
+  for (double i = 1, longer = fmax (a, b), ratio = longer / fmin (a, b); i <= FLOW_MULTIPLES; i++)
+    if (fabs (i * ratio - round (i * ratio)) < 1e-9 * i) return i * longer;
   return NAN;
 }
 
@@ -47,23 +47,22 @@ double pw_system_period (const pw_system *s) {
   return period;
 }
 
-/* Sets the period of x->system[place], unless it is free: that of the settings, or else of the signals, or if none of
- * these has one, of the last motion.  Verifies that signals repeat after it; if it is free, that they are constant. */
+/* Sets x->system[place].period: of the settings, else of the signals times settings.periods, else of the last motion.
+ * Verifies that signals repeat after it; with a free period, that they are constant during the time that is set. */
 static int flow_signals (pw_periodic *x, pw_place place, pw_run *r) {
-  double signals = pw_system_period (r->s), period = x->settings.period;
+  double signals = pw_system_period (r->s), period = x->settings.free ? FLOW_TIMES * x->T : x->settings.period;
   char name[200];
   int changed, status;
-  if (!x->settings.free && period <= 0) period = signals == 0 ? x->last_period : x->settings.periods * signals;
-  if (!x->settings.free && !(period > 0))
+  if (period <= 0) period = signals == 0 ? x->last_period : x->settings.periods * signals;
+  if (!(period > 0))
     return pw_fail (&x->why, PW_INPUT,
                     isnan (signals) ? "model %s: the periods of its signals have no common multiple: a period is needed"
                                     : "model %s: no signal has a known period: a period is needed",
                     x->s->model);
-  status = x->settings.free ? pw_signals_change (r, x->settings.t, 0, FLOW_TIMES * x->T, &changed, &x->why)
+  status = x->settings.free ? pw_signals_change (r, x->settings.t, 0, period, &changed, &x->why)
                             : pw_signals_change (r, x->settings.t, period, FLOW_PERIODS * period, &changed, &x->why);
   if (status != PW_OK) return status;
-  x->system[place].period = period;
-  if (changed < 0) return PW_OK;
+  if (changed < 0) return x->system[place].period = period, PW_OK;
   pw_system_signal_name (r->s, changed, name, sizeof name);
   if (x->settings.free)
     return pw_fail (&x->why, PW_INPUT, "model %s: signal %s changes with time, so that the period is not free",
@@ -95,9 +94,12 @@ pw_run *pw_periodic_run (pw_periodic *x, pw_place place, double value, double rt
   pw_run *r = s ? pw_run_open (s, x->settings.method, &settings, &x->why) : NULL;
   int status = r ? PW_OK : x->why.status;
   if (status == PW_OK && x->system[place].period <= 0) status = flow_signals (x, place, r);
-  if (status == PW_OK && y) status = pw_run_restart (r, y, y + x->n, &x->why);
+  if (status == PW_OK && y) {
+    status = pw_run_restart (r, y, y + x->n, &x->why);
+    if (status == PW_INPUT) x->why.status = PW_RETRY; /* a trial with a value of 1e100, or NaN */
+  }
   if (status == PW_OK) return r;
-  if (r) pw_run_close (r);
+  pw_run_close (r);
   return NULL;
 }
 
@@ -121,8 +123,8 @@ static int flow_nearest (pw_periodic *x, pw_run *r, int j) {
   return status;
 }
 
-/* Sets x->basis and x->dual at the initial state of the run.  nearest: 1 if x->dual is to be right for any change of
- * x->state, which changes the nearest consistent state; 0: for changes on the constraints. */
+/* Sets x->basis and x->dual at the initial state of the run.  nearest: 1 if x->dual is to hold for any change of
+ * x->state, by the change of the nearest consistent state; 0: for changes that satisfy the constraints. */
 static int flow_basis (pw_periodic *x, pw_run *r, int nearest) {
   pw_linearisation l;
   int n = x->n, status = pw_linear_open (&l, r, PW_WITHOUT_MODES, n);
@@ -166,18 +168,19 @@ static int flow_derivatives (pw_periodic *x, pw_run *r, double end) {
   return status;
 }
 
-/* Advances a run from its initial state by one period: pw_periodic_flow. */
+/* As pw_periodic_flow, with a run at its initial state. */
 static int flow_run (pw_periodic *x, pw_run *r, double period, pw_flow_accuracy accuracy) {
   size_t bytes = (size_t)x->n * sizeof *r->q;
   double end = x->settings.t + period;
   pw_sample sample;
-  int branch = x->settings.compile != NULL; /* whose tangents need derivatives along changes off the constraints, too */
-  int status = accuracy == PW_FLOW ? PW_OK : flow_basis (x, r, branch && accuracy == PW_FLOW_DERIVATIVES);
+  int nearest = x->settings.compile && accuracy == PW_FLOW_DERIVATIVES; /* for the tangent of a branch */
+  int status = accuracy == PW_FLOW ? PW_OK : flow_basis (x, r, nearest);
   if (status != PW_OK) return status == PW_RETRY ? pw_fail_singular (r, r->t, &x->why) : status;
   status = pw_run_sample (r, r->t, &sample, &x->why);
   if (status != PW_OK) return status;
   flow_state (x, &sample, x->y0), memcpy (x->a0, sample.a, bytes);
-  if (accuracy != PW_FLOW) return x->steps = 0, flow_derivatives (x, r, end);
+  if (accuracy != PW_FLOW) x->steps = 0; /* the PW_FLOW that follows, at the same state, sets it */
+  if (accuracy != PW_FLOW) return flow_derivatives (x, r, end);
   while (status == PW_OK && pw_run_time (r) < end) {
     status = pw_run_advance (r, end, &x->why);
     if (x->steps > 0 && pw_run_statistics (r)->steps > FLOW_STEPS * x->steps) return PW_RETRY;
@@ -191,13 +194,13 @@ static int flow_run (pw_periodic *x, pw_run *r, double period, pw_flow_accuracy 
 
 int pw_periodic_flow (pw_periodic *x, const double *u, pw_flow_accuracy accuracy, pw_place place, pw_error *error) {
   double value = pw_periodic_parameter (x, u), rtol = fmax (x->settings.rtol, flow_min_rtol[accuracy]);
-  double period = x->settings.free ? u[pw_periodic_unknowns (x) - 1] * x->T : 1;
+  double period = u[pw_periodic_unknowns (x) - 1] * x->T; /* if it is free */
   x->why = (pw_error){ 0 };
   if (x->settings.free && !(period * FLOW_FAR > x->last_period && period < FLOW_FAR * x->last_period)) return PW_RETRY;
   for (int j = 0; j < 2 * x->n; j++) x->state[j] = u[j] * pw_periodic_unit (x, j);
   pw_run *r = pw_periodic_run (x, place, value, rtol, x->state);
   int status = r ? flow_run (x, r, x->settings.free ? period : x->system[place].period, accuracy) : x->why.status;
-  if (r) pw_run_close (r);
+  pw_run_close (r);
   if (status == PW_OK) return PW_OK;
   int refused = x->settings.compile && x->system[place].own == NULL; /* the model refused the value of the parameter */
   if (status == PW_RESOURCE) pw_fail_memory (x->s, &x->why);
@@ -209,15 +212,15 @@ int pw_periodic_flow (pw_periodic *x, const double *u, pw_flow_accuracy accuracy
 /* ---- Where the search begins ---- */
 
 double pw_periodic_difference (const pw_periodic *x, int j, double a, double b) {
-  int rates = pw_steady_rate_count (x->s), changes = j >= 3 * x->s->bodies || j % 3 != 2;
-  for (int k = 0; k < x->symmetries && !changes; k++)
-    changes = x->steady->symmetry[k * rates + PW_RATE_TURN] != 0 ||
-              x->steady->symmetry[k * rates + pw_steady_angle_rate (x->s, j)] != 0;
-  return changes ? a - b : remainder (a - b, 2 * PW_PI);
+  int rates = pw_steady_rate_count (x->s), keeps_turns = j >= 3 * x->s->bodies || j % 3 != 2;
+  for (int k = 0; k < x->symmetries && !keeps_turns; k++)
+    keeps_turns = x->steady->symmetry[k * rates + PW_RATE_TURN] != 0 ||
+                  x->steady->symmetry[k * rates + pw_steady_angle_rate (x->s, j)] != 0;
+  return keeps_turns ? a - b : remainder (a - b, 2 * PW_PI);
 }
 
-/* Sets y to the canonical state of a run at time t (pw_steady_canonical), and its distance from x->y0 in units of the
- * scene. */
+/* Sets y to the canonical state of a run at time t (pw_steady_canonical), and *distance to that from x->y0 to y, in
+ * units of the scene. */
 static int flow_distance (pw_periodic *x, pw_run *r, double t, double *y, double *distance) {
   pw_sample sample;
   int n = x->n, status = pw_run_sample (r, t, &sample, &x->why);
@@ -234,7 +237,7 @@ static int flow_distance (pw_periodic *x, pw_run *r, double t, double *y, double
  * distance from it has a minimum. */
 static int flow_return (pw_periodic *x, pw_run *r) {
   double t0 = pw_run_time (r), step = x->T / RETURN_STEPS, d[3] = { 0, 0, 0 }, far = 0;
-  int status = flow_distance (x, r, t0, x->y0, d);
+  int status = flow_distance (x, r, t0, x->y0, d); /* stores the present state in x->y0 */
   for (int i = 1; status == PW_OK && i <= RETURN_SAMPLES; i++) {
     double t = t0 + i * step;
     d[0] = d[1], d[1] = d[2];
@@ -242,7 +245,7 @@ static int flow_return (pw_periodic *x, pw_run *r) {
     if (status == PW_OK && pw_run_stop_requested (r)) return PW_STOPPED;
     if (status == PW_OK) status = flow_distance (x, r, t, x->y1, &d[2]);
     far = fmax (far, d[2]);
-    if (i > 2 && far > RETURN_LEAST && d[1] < RETURN_NEAR * far && d[1] < d[0] && d[1] <= d[2])
+    if (i > 2 && far > RETURN_MOVED && d[1] < RETURN_NEAR * far && d[1] < d[0] && d[1] <= d[2])
       return x->last_period = t - step - t0, PW_OK;
   }
   if (status != PW_OK) return status;
@@ -251,16 +254,14 @@ static int flow_return (pw_periodic *x, pw_run *r) {
 
 int pw_periodic_settle (pw_periodic *x, double value, int periods) {
   pw_sample sample;
-  pw_run *r = pw_periodic_run (x, PW_HERE, value, FLOW_SETTLED, NULL);
+  pw_run *r = pw_periodic_run (x, PW_HERE, value, FLOW_SETTLE_RTOL, NULL);
   if (r == NULL) return x->why.status;
   double end = r->t + periods * (x->settings.free ? x->last_period : x->system[PW_HERE].period);
   int status = pw_run_advance_to (r, end, end, &x->why);
   if (status == PW_OK && pw_run_stop_requested (r)) status = PW_STOPPED;
   if (status == PW_OK) status = pw_run_sample (r, pw_run_time (r), &sample, &x->why);
-  if (status == PW_OK) {
-    flow_state (x, &sample, x->state);
-    pw_steady_move_to_start (x->steady, x->state, x->state + x->n);
-  }
+  if (status == PW_OK)
+    flow_state (x, &sample, x->state), pw_steady_move_to_start (x->steady, x->state, x->state + x->n);
   if (status == PW_OK && x->settings.free && x->settings.period <= 0) status = flow_return (x, r);
   pw_run_close (r);
   return status == PW_OK || status == PW_RESOURCE ? status : PW_RETRY;

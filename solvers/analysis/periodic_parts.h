@@ -18,7 +18,7 @@ struct pw_periodic {
   struct {
     double value;   /* of the parameter */
     pw_system *own; /* by settings.compile; NULL: s serves */
-    double period;  /* of its signals, verified [s]; 0: not yet */
+    double period;  /* verified; free: during which signals are constant [s]; 0: not yet */
   } system[PW_PLACES];
   pw_branch branch;
   double *u;          /* scaled: 2 n of the state, displacement along symmetries in a period, free period; parameter */

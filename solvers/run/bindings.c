@@ -3,7 +3,7 @@
 #include "method.h"
 #include "pinwheel-analysis.h"
 
-/* ---- Rows of samples ---- */
+/* ---- Rows of samples (r->s->rows: the number of constraint equations) ---- */
 
 int pw_run_record_width (const pw_run *r) {
   return PW_RECORD_STATES + 3 * r->s->coords + r->s->rows + (r->settings.ledger ? r->s->entries : 0);
@@ -34,10 +34,10 @@ int pw_run_record (pw_run *r, double t_end, const double *times, long count, lon
   int status = PW_OK;
   *recorded = 0;
   if (pw_require (r, "a run", error) != PW_OK) return PW_INPUT;
-  for (long step = 0; status == PW_OK && *recorded < count; step++) {
+  for (long calls = 0; status == PW_OK && *recorded < count; calls++) {
     while (times && status == PW_OK && *recorded < count && times[*recorded] <= r->t)
       status = record_sample (r, times[*recorded], rows, recorded, error);
-    if (status != PW_OK || step == steps || r->t >= t_end) break;
+    if (status != PW_OK || *recorded == count || calls == steps || r->t >= t_end) break;
     status = times ? pw_run_advance_towards (r, times[*recorded], t_end, error) : pw_run_advance (r, t_end, error);
     if (status == PW_OK && times == NULL) status = record_sample (r, r->t, rows, recorded, error);
   }
@@ -46,8 +46,7 @@ int pw_run_record (pw_run *r, double t_end, const double *times, long count, lon
 
 int pw_input_signal (void *context, double t, const double *x, double value[3], double *gradient) {
   (void)t, (void)x, (void)gradient;
-  value[0] = *(const double *)context;
-  value[1] = value[2] = 0;
+  value[0] = *(const double *)context, value[1] = value[2] = 0;
   return 0;
 }
 
@@ -63,6 +62,7 @@ const char pw_version[] = PW_VERSION;
 #define AT3(type, a, b, c) AT2 (type, a, b), AT (type, c)
 #define AT4(type, a, b, c, d) AT2 (type, a, b), AT2 (type, c, d)
 
+/* What the bindings in other languages use; a member that they begin to use is added here. */
 const pw_member pw_members[] = {
   SIZE (pw_error),
   AT2 (pw_error, status, text),

@@ -3,6 +3,7 @@
 #include <string.h>
 #include "check.h"
 #include "gallery.h"
+#include "periodic_parts.h"
 #include "runs.h"
 #include "scene.h"
 
@@ -343,6 +344,7 @@ static void test_frequency (void **state) {
   x = periodic_open (s, &(pw_periodic_settings){ .period = 2 * PW_PI / 3, .compile = gait_at, .first = 3, .last = 4 });
   assert_int_equal (pw_periodic_solve (x, 10, 3, &o, &error), PW_INPUT); /* the derivative needs a neighbour */
   assert_non_null (strstr (error.text, "signal rider.value does not repeat after 2.09439510239 s"));
+  for (int i = 0; i < 5; i++) assert_int_equal (pw_periodic_solve (x, 1, 3.5, &o, &(pw_error){ 0 }), PW_INPUT);
   pw_periodic_close (x);
   pw_system_free (s);
 }
@@ -393,6 +395,33 @@ static void test_bodies (void **state) {
   pw_system_free (s);
 }
 
+/* A common period does not depend on the order of the signals. */
+static void test_common_period (void **state) {
+  (void)state;
+  for (int i = 0; i < 2; i++) {
+    pw_model *m = scene_model (&scene_ezyroller, "omega", i == 0 ? 2 * PW_PI : 2 * PW_PI / 30, NULL);
+    const pw_harmonic other = { .amplitude = 1, .omega = i == 0 ? 2 * PW_PI / 30 : 2 * PW_PI };
+    const pw_signal torque = { .type = PW_HARMONIC, .harmonic = other };
+    pw_add_torque (m, &(pw_torque){ .name = "torque", .body = { "frame", "steer" }, .value = torque });
+    pw_system *s = scene_compile (m);
+    check_close ("period", pw_system_period (s), 30, 1e-13, "30 = 30 * 1");
+    pw_system_free (s);
+  }
+}
+
+/* A trial far away is repeated nearer, instead of ending the search. */
+static void test_wild (void **state) {
+  double u[40] = { 1e200 };
+  pw_error error = { 0 };
+  (void)state;
+  pw_system *s = gallery_open ("snakeboard", NULL);
+  pw_periodic *x = periodic_open (s, &(pw_periodic_settings){ .period = 4 });
+  assert_true (pw_periodic_unknowns (x) < 40);
+  assert_int_equal (pw_periodic_flow (x, u, PW_FLOW, PW_HERE, &error), PW_RETRY);
+  pw_periodic_close (x);
+  pw_system_free (s);
+}
+
 /* A search that could not be opened is refused. */
 static void test_missing (void **state) {
   pw_error e[5] = { { 0 } };
@@ -414,10 +443,11 @@ static void test_missing (void **state) {
 
 int main (void) {
   const struct CMUnitTest tests[] = {
-    cmocka_unit_test (test_pendulum),   cmocka_unit_test (test_folds),        cmocka_unit_test (test_mathieu),
-    cmocka_unit_test (test_boundaries), cmocka_unit_test (test_torus),        cmocka_unit_test (test_van_der_pol),
-    cmocka_unit_test (test_gait),       cmocka_unit_test (test_turning_gait), cmocka_unit_test (test_frequency),
-    cmocka_unit_test (test_refused),    cmocka_unit_test (test_bodies),       cmocka_unit_test (test_missing),
+    cmocka_unit_test (test_pendulum),   cmocka_unit_test (test_folds),         cmocka_unit_test (test_mathieu),
+    cmocka_unit_test (test_boundaries), cmocka_unit_test (test_torus),         cmocka_unit_test (test_van_der_pol),
+    cmocka_unit_test (test_gait),       cmocka_unit_test (test_turning_gait),  cmocka_unit_test (test_frequency),
+    cmocka_unit_test (test_refused),    cmocka_unit_test (test_bodies),        cmocka_unit_test (test_missing),
+    cmocka_unit_test (test_wild),       cmocka_unit_test (test_common_period),
   };
   return cmocka_run_group_tests (tests, NULL, NULL);
 }

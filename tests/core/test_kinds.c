@@ -2,6 +2,7 @@
  * of the functions of type pw_batch_function. */
 #include <float.h>
 #include <math.h>
+#include <stdint.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -175,6 +176,7 @@ static void kinds_expect_fault (const pw_kind *kind, const char *fault) {
 static const pw_field kinds_choice[] = { { .name = "mode", .offset = 8, .type = PW_CHOICE }, { .name = NULL } };
 static const pw_field kinds_typeless[] = { { .name = "mode", .offset = 8, .type = (pw_field_type)77 },
                                            { .name = NULL } };
+static const pw_field kinds_far[] = { { .name = "mode", .offset = SIZE_MAX - 3, .type = PW_NUMBER }, { .name = NULL } };
 static const pw_field kinds_domain[] = { { .name = "mode", .offset = 8, .domain = (pw_domain)77 }, { .name = NULL } };
 
 #define KINDS_50 "a-name-of-fifty-bytes-that-is-longer-than-it-shoul"
@@ -203,15 +205,17 @@ static void test_faults (void **state) {
   KINDS_FAULT (level, PW_FORCE, "rows and level are inconsistent");
   KINDS_FAULT (reaction, NULL, "constraint equations without names of their reactions");
   KINDS_FAULT (internal, 1, "internal coordinates without names");
-  KINDS_FAULT (prepare, NULL, "an element or internal coordinates, but no prepare function");
+  KINDS_FAULT (prepare, NULL, "a prepared element (.element > 0) or internal coordinates, but no prepare function");
   KINDS_FAULT (fields, NULL, "no table of fields");
   KINDS_FAULT (fields, kinds_typeless, "field mode: its type does not exist");
   KINDS_FAULT (fields, kinds_domain, "field mode: its domain does not exist");
   KINDS_FAULT (definition, 16,
-               "field body: it lies outside the definition: is .definition its sizeof, its first member the name?");
+               "field body: outside the definition, whose first member is its name and whose sizeof is .definition");
+  KINDS_FAULT (fields, kinds_far,
+               "field mode: outside the definition, whose first member is its name and whose sizeof is .definition");
   KINDS_FAULT (fields, kinds_choice, "field mode: a choice without choices");
-  KINDS_FAULT (bodies, 3, "bodies is not the number of fields of type PW_BODY");
-  KINDS_FAULT (signals, 1, "signals is not the number of fields of type PW_SIGNAL");
+  KINDS_FAULT (bodies, 3, "bodies is not the sum of the counts of PW_BODY fields");
+  KINDS_FAULT (signals, 1, "signals is not the sum of the counts of PW_SIGNAL fields");
   KINDS_FAULT (each_body, 1, "an element type that acts on each body has one body and no body fields");
   KINDS_FAULT (constant, 1, "declared constant, but it has no force, or has signals");
   KINDS_FAULT (J, pw_by_differences, "PW_BY_DIFFERENCES is permitted only for second-order blocks");

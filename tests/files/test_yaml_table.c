@@ -247,7 +247,7 @@ static void test_scale (void **state) {
   pw_error error = table_build ("{file: data.csv, scale: 2*deg, offset: -1}", &s, point);
   check_ok (error.status, &error);
   assert_true (s.table.scale == 2 * (PW_PI / 180) && s.table.offset == -1 && point[1][1] == 3);
-  table_bad ("{points: [[0, 1], [1, 2]], scale: 0}", "scale: 0 makes the table zero");
+  table_bad ("{points: [[0, 1], [1, 2]], scale: 0}", "scale: 0 is not permitted");
   table_bad ("{points: [[0, 1], [1, 1e300]], scale: 1e300}", "point 2: offset + scale * 1e+300 is not finite");
 }
 

@@ -189,10 +189,24 @@ static void test_short_end (void **state) {
   }
 }
 
+/* A recording ends at the last of its times, even if that is reached before t_end. */
+static void test_record (void **state) {
+  double times[] = { 0, 0.5 }, row[100];
+  long recorded;
+  pw_error error = { 0 };
+  (void)state;
+  pw_system *s = scene_system (&scene_ezyroller, "m2", 0.1, "I2", 0.01, NULL);
+  pw_run *r = runs_open (s, "erk8+projection", &(pw_settings){ .span = 1 });
+  assert_true (pw_run_record_width (r) <= 100);
+  check_ok (pw_run_record (r, 1, times, 1, 9, row, &recorded, &error), &error);
+  assert_true (recorded == 1 && row[0] == 0 && pw_run_time (r) == 0);
+  runs_close (r, s);
+}
+
 int main (void) {
   const struct CMUnitTest tests[] = {
     cmocka_unit_test (test_samples), cmocka_unit_test (test_bits),      cmocka_unit_test (test_breakpoint),
-    cmocka_unit_test (test_across),  cmocka_unit_test (test_short_end),
+    cmocka_unit_test (test_across),  cmocka_unit_test (test_short_end), cmocka_unit_test (test_record),
   };
   return cmocka_run_group_tests (tests, NULL, NULL);
 }

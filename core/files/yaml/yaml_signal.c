@@ -3,7 +3,7 @@
  *   3, "2 * M0"                                    a constant
  *   {constant: 3}                                  the same
  *   {harmonic: {amplitude, omega, phase, offset}}  and the other forms made of numbers (signal_form.c)
- *   "M0 * cos (omega * t)"                         an expression of the time t; of states, BODY.phi, for forces
+ *   "M0 * cos (omega * t)"                         an expression of the time t; in forces also of states: BODY.phi
  *   {expression: .., rate: .., acceleration: ..}   the same for constraints, which need time derivatives
  */
 #define _XOPEN_SOURCE 700 /* realpath */
@@ -93,10 +93,12 @@ static int table_file (pw_reader *r, const char *label, const pw_node *node, con
   return PW_OK;
 }
 
-/* Reads a list of points, or columns of a file.  Limits the points of all tables together: many may read one file. */
+static const char *const table_keys[] = { "points", "file", "columns" }; /* besides the fields of the form */
+
+/* Reads points or columns of a file.  Limits the points of all tables together: many may read the same large file. */
 static int table_points (pw_reader *r, const char *label, const pw_node *node, const pw_node *const v[3],
                          pw_signal *s) {
-  const pw_node *points = v[0], *file = v[1], *columns = v[2]; /* in the order of signal_form */
+  const pw_node *points = v[0], *file = v[1], *columns = v[2]; /* as table_keys */
   if ((points != NULL) == (file != NULL))
     return pw_yaml_fail (r, node->at, "%s: a table has either points or a file", label);
   if (points && columns) return pw_yaml_fail (r, columns->at, "%s: columns belong to a file", label);
@@ -121,7 +123,7 @@ static int signal_fields (pw_reader *r, const pw_signal_form *form, const char *
     if (f->type == PW_NUMBER) pw_yaml_number (r, v[i], text, f->domain, at);
     if (f->type == PW_CHOICE) pw_yaml_choice (r, v[i], text, f->choices, at);
     if (v[i] && form->type == PW_TABLE && strcmp (f->name, "scale") == 0 && signal->table.scale == 0)
-      pw_yaml_fail (r, v[i]->at, "%s: 0 makes the table zero", text);
+      pw_yaml_fail (r, v[i]->at, "%s: 0 is not permitted", text);
   }
   return r->error->status;
 }
@@ -137,16 +139,16 @@ static int signal_check (pw_reader *r, const pw_kind *kind, const char *label, c
   return pw_yaml_fail (r, node->at, "%s: %s", label, fault);
 }
 
-static int signal_form (pw_reader *r, const pw_kind *kind, const pw_signal_form *form, const char *label,
-                        const pw_node *node, pw_signal *signal) {
-  static const char *const table[] = { "points", "file", "columns" };
+/* Reads a signal of one form; a table has more keys than fields. */
+static int signal_read_form (pw_reader *r, const pw_kind *kind, const pw_signal_form *form, const char *label,
+                             const pw_node *node, pw_signal *signal) {
   const char *key[PW_YAML_MAX_KEYS];
   char about[100];
   const pw_node *v[PW_YAML_MAX_KEYS];
   int fields = 0, n, is_table = form->type == PW_TABLE;
   *signal = (pw_signal){ .type = form->type };
   for (const pw_field *f = form->fields; f->name; f++) key[fields++] = f->name;
-  for (n = fields; is_table && n < fields + 3; n++) key[n] = table[n - fields];
+  for (n = fields; is_table && n < fields + 3; n++) key[n] = table_keys[n - fields];
   key[n] = NULL;
   snprintf (about, sizeof about, "a %s", form->name);
   if (pw_yaml_keys (r, node, key, about, v) != PW_OK || signal_fields (r, form, label, node, v, signal) != PW_OK ||
@@ -155,7 +157,7 @@ static int signal_form (pw_reader *r, const pw_kind *kind, const pw_signal_form 
   return signal_check (r, kind, label, node, is_table ? v[fields] : NULL, signal);
 }
 
-/* Keys of a signal; from SIGNAL_FORMS the names of the forms. */
+/* Keys of a signal; those from SIGNAL_FORMS on are the names of the forms. */
 enum { SIGNAL_CONSTANT, SIGNAL_EXPRESSION, SIGNAL_RATE, SIGNAL_ACCELERATION, SIGNAL_FORMS };
 
 /* The keys of which a signal has one, for messages: "constant, expression, harmonic, ..." */
@@ -185,7 +187,7 @@ static int signal_map (pw_reader *r, const pw_kind *kind, const char *label, con
     return pw_yaml_fail (r, node->at, "%s: a rate or acceleration belongs to an expression", label);
   if (v[SIGNAL_CONSTANT]) return pw_yaml_number (r, v[SIGNAL_CONSTANT], label, PW_REAL, &signal->constant);
   if (v[SIGNAL_EXPRESSION]) return pw_yaml_time_signal (r, kind, label, v + SIGNAL_EXPRESSION, signal);
-  return signal_form (r, kind, &pw_signal_forms[form - SIGNAL_FORMS], label, v[form], signal);
+  return signal_read_form (r, kind, &pw_signal_forms[form - SIGNAL_FORMS], label, v[form], signal);
 }
 
 int pw_yaml_signal (pw_reader *r, const pw_kind *kind, const char *label, const pw_node *node, pw_signal *signal) {

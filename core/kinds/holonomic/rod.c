@@ -4,10 +4,9 @@
  *   G     = d^T D / L
  *   gamma = ( d.((X1, Y1) omega1^2 - (X2, Y2) omega2^2) - d'.d' ) / L      so that G v' = gamma
  *
- * with (X, Y): arms in world axes.
- * (Haug 1989, Computer Aided Kinematics and Dynamics of Mechanical Systems, section 3.3, with d.d - L^2 divided by
- * 2 L: near the constraint g is the distance minus L, without a square root.)
- * The force on body 1 is -lambda d / L, away from body 2; body 2 receives the opposite. */
+ * with (X, Y): arms in world axes (Haug 1989, Computer Aided Kinematics and Dynamics of Mechanical Systems, section
+ * 3.3, with d.d - L^2 divided by 2 L: near the constraint g is the distance minus L, without a square root).
+ * -lambda [N] is the force on body 1, positive away from body 2; body 2 receives the opposite. */
 #include "points.h"
 
 typedef struct {
@@ -49,6 +48,7 @@ PER_ELEMENT (rod_g, rod, 1) {
   *out = (rod_dot (now.ends.d, now.ends.d) - now.L * now.L) / (2 * now.L);
 }
 
+/* dg = d^T dd / L, and the round-off of d is proportional to its size. */
 PER_ELEMENT (rod_g_size, rod, 1) {
   double size[2];
   points_g_size_one (now.ends, size);
@@ -65,7 +65,7 @@ PER_ELEMENT (rod_gamma, rod, 1) {
   *out = (centripetal - rod_dot (now.ends.rate, now.ends.rate)) / now.L;
 }
 
-/* ((D w)^T D + d^T d(D w)/dq) / L with d(D w)/dphi1 = -(X1, Y1) w[2], d(D w)/dphi2 = (X2, Y2) w[5]. */
+/* ((D w)^T D + d^T (D w)_q) / L; the columns of (D w)_q: -(X1, Y1) w[2] for phi1, (X2, Y2) w[5] for phi2. */
 PER_ELEMENT (rod_jw_q, rod, 6) {
   double Dw[2] = { 0, 0 };
   for (int j = 0; j < 6; j++) Dw[0] += now.D[j] * now.ends.w[j], Dw[1] += now.D[6 + j] * now.ends.w[j];
@@ -74,8 +74,8 @@ PER_ELEMENT (rod_jw_q, rod, 6) {
   out[5] += rod_dot (now.ends.d, now.ends.S2) * now.ends.w[5] / now.L;
 }
 
-/* With dd'/dphi1 = -omega1 (X1, Y1), dd'/dphi2 = omega2 (X2, Y2).  The derivative of arm 1 is column 2 of D, that of
- * arm 2 is column 5 with the opposite sign. */
+/* (c^T D + d^T c_q - 2 d'^T d'_q) / L with c = (X1, Y1) omega1^2 - (X2, Y2) omega2^2.  Columns for phi1, phi2: of c_q
+ * those of D times omega1^2, omega2^2; of d'_q -omega1 (X1, Y1), omega2 (X2, Y2). */
 PER_ELEMENT (rod_gamma_q, rod, 6) {
   const double square1 = now.omega1 * now.omega1, square2 = now.omega2 * now.omega2, *d = now.ends.d;
   double centripetal[2];
