@@ -9,7 +9,7 @@
 static const double STEP_TOLERANCE = 1e-9, STEP_LOOSE = 1e-7;
 enum { STEP_LINEARISATIONS = 5 }; /* in an explicit step of the derivatives */
 
-/* Permitted step_motion_error. */
+/* Least value of step_motion_tolerance. */
 static const double STEP_MOTION = 1e-8;
 
 /* Round-off of positions, relative to the scene or themselves, which interpolation between fixed steps turns into
