@@ -23,8 +23,8 @@ static size_t nearest_distance (const char *a, const char *b) {
   return row[n];
 }
 
-/* Two names are near if less than half of the longer one has to change (half, if that is one or two characters), or
- * if one begins or ends with the other. */
+/* Two names are near if less than half of the longer one has to change, or exactly half where that is at most two
+ * characters, or if one begins or ends with the other. */
 static int nearest_is_near (const char *a, size_t n, const char *b, size_t m, size_t distance) {
   size_t longer = n > m ? n : m, shorter = n + m - longer;
   return 2 * distance < longer + (distance <= 2) ||

@@ -30,12 +30,12 @@ typedef struct {
   double seconds; /* INFINITY: no limit */
   /* private */
   double start;      /* the thread's clock at the start [s] */
-  double last_check; /* the coarse clock when the thread's clock was last read [s] */
+  double last_check; /* the coarse clock when the limit was last found not exceeded [s] */
 } pw_limit;
 
 /* Starts the clock; call it when the run begins. */
 void pw_limit_start (pw_limit *limit);
-/* 1 if the limit is exceeded or a signal has requested a stop.  For pw_settings.stop; the context is the pw_limit. */
+/* 1 once the limit is exceeded or a signal has requested a stop.  For pw_settings.stop; the context is the pw_limit. */
 int pw_limit_over (void *context);
 /* The status of a command whose run returned PW_STOPPED at time t: PW_RETRY, without an error, after a signal; else
  * PW_METHOD with an error that names the limit. */

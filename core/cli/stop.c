@@ -45,8 +45,9 @@ int pw_limit_over (void *context) {
   if (isinf (limit->seconds)) return 0;
   double now = pw_seconds (CLOCK_MONOTONIC_COARSE);
   if (now == limit->last_check) return 0;
+  if (pw_seconds (CLOCK_THREAD_CPUTIME_ID) - limit->start > limit->seconds) return 1; /* and in all later calls */
   limit->last_check = now;
-  return pw_seconds (CLOCK_THREAD_CPUTIME_ID) - limit->start > limit->seconds;
+  return 0;
 }
 
 int pw_limit_status (const pw_limit *limit, double t, pw_error *error) {

@@ -12,7 +12,7 @@ void pw_point_to_internal (pw_workspace *w, const double *q, const double *v) {
   }
 }
 
-/* Sines and cosines of two bodies at a time; the rest, and angles beyond the limit, one by one. */
+/* Two bodies at a time; the last of an odd number, and all from the first angle beyond the limit on, one by one. */
 static inline void kinematics_configurations (pw_workspace *w, const double *q, const double *v) {
   if (w->s->coords > 3 * w->s->bodies) pw_point_to_internal (w, q, v);
   pw_configuration *p = w->configuration, *end = p + w->s->bodies;
@@ -74,11 +74,8 @@ int pw_update_kinematics (pw_workspace *w, double t, const double *q, const doub
 
 int pw_update_velocities (pw_workspace *w, const double *v) {
   const double *from = v;
-  for (pw_configuration *p = w->configuration, *end = p + w->s->bodies; p < end; p++, from += 3) {
-    p->vx = from[0];
-    p->vy = from[1];
-    p->omega = from[2];
-  }
+  for (pw_configuration *p = w->configuration, *end = p + w->s->bodies; p < end; p++, from += 3)
+    p->vx = from[0], p->vy = from[1], p->omega = from[2];
   if (w->s->coords > 3 * w->s->bodies) pw_point_to_internal (w, NULL, v);
   return w->s->state_dependent > 0 ? kinematics_evaluate_signals (w, 1, w->t_signal, NULL, v) : PW_OK;
 }

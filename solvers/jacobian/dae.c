@@ -5,12 +5,12 @@
 
 int pw_dae_open (pw_dae *x, pw_run *r) {
   const pw_system *s = r->s;
-  size_t n = (size_t)s->coords + 3, rows = (size_t)s->rows;
+  size_t n = (size_t)s->coords, m = (size_t)s->rows;
   const pw_stabilisation_kind kind = r->method->stabilisations[r->stabilisation].kind;
   *x = (pw_dae){ .integrates_multipliers = kind == PW_SI1, .n = s->coords };
-  x->enforces_positions = kind == PW_GGL || kind == PW_SI1 || kind == PW_STABILISED_OTHERWISE; /* index3, rattle */
+  x->enforces_positions = kind == PW_GGL || kind == PW_SI1 || kind == PW_STABILISED_OTHERWISE; /* index3 or rattle */
   x->enforces_velocities = kind == PW_GGL || kind == PW_SI1 || kind == PW_INDEX2;
-  const pw_array array[] = { { &x->reaction, n }, { &x->force, n }, { &x->residual, rows }, { &x->scratch, rows } };
+  const pw_array array[] = { { &x->reaction, n + 3 }, { &x->force, n + 3 }, { &x->residual, m }, { &x->scratch, m } };
   x->memory = pw_alloc_arrays (array, sizeof array / sizeof *array);
   if (x->memory == NULL || pw_tangent_open (&x->tangent, r) != PW_OK) return PW_RESOURCE;
   x->rows = x->tangent.rows;
@@ -66,7 +66,7 @@ void pw_dae_residual (pw_dae *x, const double *v, const double *a, const double 
 
 /* ---- Matrix ---- */
 
-/* The derivatives of the kinematics with respect to q; v; mu: q_dot_factor I + D (G^T mu)_q; -I; mu_factor D G^T.
+/* The derivatives of the kinematics, by q: q_dot_factor I + D (G^T mu)_q, by v: -I, by mu: mu_factor D G^T.
  * mu: multipliers of all equations, or NULL. */
 static void dae_add_kinematics (pw_dae *x, const double *mu, double q_dot_factor, double mu_factor) {
   pw_tangent *t = &x->tangent;
@@ -84,15 +84,15 @@ static void dae_add_kinematics (pw_dae *x, const double *mu, double q_dot_factor
   pw_newton_add_JT (t->run->w, &t->scatter, &put);
 }
 
-/* The derivatives of J v - eta, where it is enforced, with respect to q; v: (J v)_q - eta_q; J; and of g: G. */
+/* The derivatives of J v - eta, where it is enforced, by q: (J v)_q - eta_q, by v: J; and of g, by q: G. */
 static void dae_add_constraints (pw_dae *x, const double *v) {
   pw_tangent *t = &x->tangent;
   const pw_system *s = t->run->s;
   const int n = x->n, g_row = x->enforces_velocities ? 2 * n + x->rows : 2 * n;
-  const double holonomic = x->enforces_velocities ? 1 : 0; /* 0: g replaces their J v - eta */
-  pw_tangent_add_equations (t, PW_JW_Q, 2 * n, 0, v, holonomic, 1);
-  pw_tangent_add_equations (t, PW_ETA_Q, 2 * n, 0, NULL, -holonomic, -1);
-  pw_tangent_add_J (t, s->rows, 2 * n, n, holonomic, 1);
+  const double holonomic_factor = x->enforces_velocities ? 1 : 0; /* 0: g replaces J v - eta of holonomic equations */
+  pw_tangent_add_equations (t, PW_JW_Q, 2 * n, 0, v, holonomic_factor, 1);
+  pw_tangent_add_equations (t, PW_ETA_Q, 2 * n, 0, NULL, -holonomic_factor, -1);
+  pw_tangent_add_J (t, s->rows, 2 * n, n, holonomic_factor, 1);
   if (x->enforces_positions) pw_tangent_add_J (t, s->holonomic, g_row, 0, 1, 0);
 }
 

@@ -74,7 +74,7 @@ struct pw_variation {
   struct pw_variation_implicit *implicit; /* implicit steps; NULL: explicit ones */
   double *q, *v;                          /* n + 3: the state last evaluated */
   double *a[PW_VARIATION_RATES];          /* n: accelerations of the run at the stages */
-  /* n, of the last step: the error of the method for velocities; integral of accelerations less change of velocities */
+  /* n, of the last step: error with which its formula integrates accelerations; this integral less the change of v */
   double *motion_error, *motion_defect;
   double speed;              /* largest velocity of the run so far, in units of the scene */
   double reversal;           /* change of a velocity over which a force reverses, at most 1, in units of the scene */

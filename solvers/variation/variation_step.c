@@ -7,29 +7,29 @@
  * steps.  STEP_LOOSE applies where the derivatives would need more than one linearisation per fixed step of the run:
  * the run's steps, too, are large for such a fast motion. */
 static const double STEP_TOLERANCE = 1e-9, STEP_LOOSE = 1e-7;
-enum { STEP_RATIO = 5 }; /* linearisations in an explicit step of the derivatives */
+enum { STEP_LINEARISATIONS = 5 }; /* in an explicit step of the derivatives */
 
-/* Permitted error of the method for the run's velocities in a step, relative to the largest velocity. */
+/* Least value of step_motion_tolerance. */
 static const double STEP_MOTION = 1e-8;
 
 /* Round-off of positions, relative to the scene or themselves, which interpolation between fixed steps turns into
  * errors of velocities. */
 static const double STEP_ROUND = 1e-14;
 
-/* Derivatives below STEP_LEAST_DERIVATIVE units of the scene per p are computed to the absolute error of one that
- * large; p is estimated as the step of its differences over STEP_OF_PARAMETER.  Derivatives of work and losses: below
- * STEP_LEAST_ENERGY times the energy exchanged, per unit of the scene. */
+/* Errors of derivatives with respect to a parameter p are relative to at least STEP_LEAST_DERIVATIVE / |p|, in units of
+ * the scene, with |p| estimated as the step of its differences over STEP_OF_PARAMETER; of work and losses, to at least
+ * STEP_LEAST_ENERGY times the energy exchanged, or scene_energy, times what the errors of the state are relative to. */
 static const double STEP_LEAST_DERIVATIVE = 0.1, STEP_OF_PARAMETER = 1e-5, STEP_LEAST_ENERGY = 1e-3;
 
-/* The smallest step, in units of the scene. */
+/* The least step is this multiple of the scale of time T, or pw_least_step if that is larger. */
 static const double STEP_SMALLEST = 1e-12;
 
 /* Sine between constraint equations below which the round-off of accelerations prevents steps. */
 static const double STEP_SINGULAR = 0.01;
 
-/* The motion is stiff if STEP_STIFF more steps were longer than STEP_FAST times the time in which its fastest component
- * decays than were shorter.  A tolerance of 1e-9 permits about 0.2 times this time, stability 3.3 times it (Hairer &
- * Wanner 1996, section IV.2). */
+/* A step of size h is fast if h times the rate at which the fastest component decays exceeds STEP_FAST; x->stiff
+ * grows by 1 after such a step, and falls by 1, not below 0, after another.  At STEP_STIFF the motion is stiff.  This
+ * product is about 0.2 at a tolerance of 1e-9, 3.3 at the limit of stability (Hairer & Wanner 1996, section IV.2). */
 enum { STEP_STIFF = 100 };
 static const double STEP_FAST = 1;
 
@@ -43,20 +43,22 @@ static double step_largest_energy (const pw_variation *x, const double *Y) {
 /* The largest velocity in units of the scene. */
 static double step_largest_velocity (const pw_variation *x, const double *v) {
   double most = 0;
-  for (int j = 0; j < x->n; j++) most = fmax (most, fabs (v[j]) * x->r->w->scale.time / pw_unit (x->r->s, j));
+  for (int j = 0; j < x->n; j++)
+    most = pw_larger_or_nan (most, fabs (v[j]) * x->r->w->scale.time / pw_unit (x->r->s, j));
   return most;
 }
 
-/* The error of the method for the velocities of the run, relative to the largest: the errors of derivatives alone may
- * not reveal that a step passes over a short phase of the motion, such as the reversal of friction. */
+/* The error with which the formula of the derivatives' step integrates the run's accelerations, relative to the largest
+ * velocity: a short phase of the motion, such as a reversal of friction, may not show in the derivatives' errors. */
 static double step_motion_error (const pw_variation *x) {
   return step_largest_velocity (x, x->motion_error) / fmax (1, x->speed);
 }
 
-/* Errors of the run's velocities between its steps, in units of the scene: with adaptive steps, rtol / 5. */
+/* Error of the run's change of velocities over a step, in units of the scene: with adaptive steps, interpolation gives
+ * each of two velocities to a tenth of rtol (pw_variation_refine). */
 static double step_noise (const pw_variation *x) {
   double most = 1;
-  if (!pw_fixed_steps (x->r)) return 0.2 * x->r->settings.rtol * fmax (1, x->speed);
+  if (!pw_fixed_steps (x->r)) return 2 * 0.1 * x->r->settings.rtol * fmax (1, x->speed);
   for (int j = 0; j < x->n; j++) most = fmax (most, fabs (x->q[j]) / pw_unit (x->r->s, j));
   return STEP_ROUND * most * x->r->w->scale.time / fmin (x->r->settings.step, x->r->w->scale.time);
 }
@@ -72,15 +74,15 @@ static double step_motion_tolerance (const pw_variation *x) {
 static const double STEP_CHANGE = 1e-6, STEP_CHANGE_RTOL = 1000;
 
 /* The difference between the change of the run's velocities and the integral of its accelerations over a step, relative
- * to the integral, at most 1: large where the run does not resolve the motion.  The error of the method, and step_noise
- * multiplied by x->reversal, do not count. */
+ * to h times the largest acceleration, at most 1: large where the run does not resolve the motion.  The error of the
+ * formula (step_motion_error), and step_noise multiplied by x->reversal, are subtracted. */
 static double step_defect (const pw_variation *x, double h) {
   int stages = x->implicit ? 1 + PW_VARIATION_STAGES : PW_VARIATION_RATES - 1;
   double most =
       fmax (STEP_CHANGE, pw_fixed_steps (x->r) ? 0 : STEP_CHANGE_RTOL * x->r->settings.rtol) * fmax (1, x->speed);
   for (int k = 0; k < stages; k++) most = fmax (most, h * step_largest_velocity (x, x->a[k]));
   double defect = step_largest_velocity (x, x->motion_defect) - step_noise (x) * x->reversal -
-                  step_motion_error (x) * fmax (1, x->speed);
+                  step_largest_velocity (x, x->motion_error);
   return defect > 0 ? fmin (1, defect / most) : 0;
 }
 
@@ -95,22 +97,22 @@ static void step_add_defect (pw_variation *x, double h) {
   }
 }
 
-/* What the errors of a derivative are relative to; the same for work and losses. */
-static double step_norm (const pw_variation *x, const pw_direction_copy *d) {
+/* What the errors of a derivative are relative to. */
+static double step_reference (const pw_variation *x, const pw_direction_copy *d) {
   double size = fmax (d->column->largest, pw_variation_norm (x, d->column->trial));
   return d->given.initial ? size : fmax (size, STEP_LEAST_DERIVATIVE * STEP_OF_PARAMETER / fabs (d->given.step));
 }
 
-static double step_energy_norm (const pw_variation *x, const pw_direction_copy *d) {
+static double step_energy_reference (const pw_variation *x, const pw_direction_copy *d) {
   double energy = fmax (d->column->energy, step_largest_energy (x, d->column->trial));
-  return fmax (energy, STEP_LEAST_ENERGY * fmax (x->r->exchanged, x->r->scene_energy) * step_norm (x, d));
+  return fmax (energy, STEP_LEAST_ENERGY * fmax (x->r->exchanged, x->r->scene_energy) * step_reference (x, d));
 }
 
 /* The largest relative error of all derivatives. */
 static double step_error (const pw_variation *x) {
   double most = 0;
   for (const pw_direction_copy *d = x->direction; d < x->direction + x->count; d++) {
-    double size = step_norm (x, d), energy = step_energy_norm (x, d);
+    double size = step_reference (x, d), energy = step_energy_reference (x, d);
     if (size > 0) most = pw_larger_or_nan (most, pw_variation_norm (x, d->local_error) / size);
     if (energy > 0) most = pw_larger_or_nan (most, step_largest_energy (x, d->local_error) / energy);
   }
@@ -123,7 +125,8 @@ static void step_add_errors (pw_variation *x, int first, int end) {
     for (int j = first; j < end && d->columns > 1; j++) d->column[1].trial[j] += d->local_error[j];
 }
 
-/* Scales an estimate of order h^4 with the magnitude r = `relative` to (10 r)^(3/2), about the error of the step. */
+/* Scales an estimate of order h^4 from the magnitude r = `relative` to (10 r)^(3/2), of order h^6 as the error of the
+ * step.  RADAU5 bounds it by the tolerance tol in the form r <= 0.1 tol^(2/3). */
 static void step_scale_error (double *error, double relative, int n) {
   double factor = fmin (1, sqrt (1000 * relative));
   for (int j = 0; j < n && relative > 0; j++) error[j] *= factor;
@@ -131,8 +134,8 @@ static void step_scale_error (double *error, double relative, int n) {
 
 static void step_implicit_errors (pw_variation *x) {
   for (pw_direction_copy *d = x->direction; d < x->direction + x->count; d++) {
-    step_scale_error (d->local_error, pw_variation_norm (x, d->local_error) / step_norm (x, d), 2 * x->n);
-    step_scale_error (d->local_error + 2 * x->n, step_largest_energy (x, d->local_error) / step_energy_norm (x, d),
+    step_scale_error (d->local_error, pw_variation_norm (x, d->local_error) / step_reference (x, d), 2 * x->n);
+    step_scale_error (d->local_error + 2 * x->n, step_largest_energy (x, d->local_error) / step_energy_reference (x, d),
                       x->size - 2 * x->n);
   }
   step_scale_error (x->motion_error, step_motion_error (x), x->n);
@@ -141,11 +144,11 @@ static void step_implicit_errors (pw_variation *x) {
 /* Computes the stages, the new derivatives into `trial`, their time derivatives and errors.  The errors of the step
  * follow from the time derivatives of column 0 and are added to column 1 before its own are evaluated. */
 static int step_stages (pw_variation *x, double h, double t1, pw_error *error) {
-  int last = PW_VARIATION_RATES - 1, status;
+  int last = PW_VARIATION_RATES - 1;
   pw_variation_state (x, x->t, x->scratch);
   pw_variation_state (x, t1, x->values);
   for (int j = x->n; j < 2 * x->n; j++) x->motion_defect[j - x->n] = x->scratch[j] - x->values[j];
-  status =
+  int status =
       x->implicit ? pw_variation_implicit_stages (x, h, t1, error) : pw_variation_explicit_stages (x, h, t1, error);
   if (status != PW_OK) return status;
   memcpy (x->a[last], x->linear.a, (size_t)x->n * sizeof *x->q);
@@ -195,10 +198,10 @@ static double step_factor (const pw_variation *x, double off, double tolerance) 
   return fmin (5, fmax (0.2, factor));
 }
 
-/* The size of the next step after one of size h with the error `off`: by `tolerance`, or by STEP_LOOSE up to `fine`. */
-static double step_next_size (const pw_variation *x, double h, double off, double tolerance, double fine) {
+/* The size of the step after one of size h with the error `off`: by `tolerance`; up to loose_size, by STEP_LOOSE. */
+static double step_next_size (const pw_variation *x, double h, double off, double tolerance, double loose_size) {
   if (!isfinite (off)) return h / 10;
-  return fmax (h * step_factor (x, off, tolerance), fmin (h * step_factor (x, off, STEP_LOOSE), fine));
+  return fmax (h * step_factor (x, off, tolerance), fmin (h * step_factor (x, off, STEP_LOOSE), loose_size));
 }
 
 /* The end of the next step; the last two steps to t1 have the same size. */
@@ -210,15 +213,14 @@ static double step_end (const pw_variation *x, double t1) {
 
 /* The error if steps have become too small. */
 static int step_fail (pw_variation *x, pw_error *error) {
-  if (pw_evaluate_J_at (x->r->w, x->at, x->q, x->v) == PW_OK && pw_watchdog_sine (x->r, NULL) < STEP_SINGULAR)
-    return pw_fail (error, PW_METHOD,
-                    "t = %.6g s: the derivatives cannot be computed near a singular configuration, where "
-                    "constraints are nearly dependent",
-                    x->t);
-  return pw_fail (error, PW_METHOD,
-                  "t = %.6g s: no step of the derivatives meets their tolerance, however small: the motion is "
-                  "too stiff, or not differentiable",
-                  x->t);
+  int J_known = pw_evaluate_J_at (x->r->w, x->at, x->q, x->v) == PW_OK;
+  return pw_fail (
+      error, PW_METHOD, "t = %.6g s: %s", x->t,
+      J_known && pw_watchdog_sine (x->r, NULL) < STEP_SINGULAR
+          ? "the derivatives cannot be computed near a singular configuration, where constraints are nearly "
+            "dependent"
+          : "no step of the derivatives meets their tolerance, however small: the motion is too stiff, or "
+            "not differentiable");
 }
 
 /* Changes to implicit steps if stability limited many steps. */
@@ -233,13 +235,13 @@ static int step_check_stiffness (pw_variation *x, double h, pw_error *error) {
 int pw_variation_step (pw_variation *x, double t1, pw_error *error) {
   int fixed = pw_fixed_steps (x->r);
   double tolerance = fixed ? STEP_TOLERANCE : fmax (STEP_TOLERANCE, 0.1 * x->r->settings.rtol),
-         fine = fixed && x->implicit == NULL ? STEP_RATIO * x->r->settings.step : 0;
-  if (x->h <= STEP_SMALLEST * x->r->w->scale.time) return step_fail (x, error);
-  double end = step_end (x, t1), h = end - x->t, allowed = h <= fine ? STEP_LOOSE : tolerance;
+         loose_size = fixed && x->implicit == NULL ? STEP_LINEARISATIONS * x->r->settings.step : 0;
+  if (x->h <= fmax (STEP_SMALLEST * x->r->w->scale.time, pw_least_step (x->r))) return step_fail (x, error);
+  double end = step_end (x, t1), h = end - x->t, allowed = h <= loose_size ? STEP_LOOSE : tolerance;
   int status = step_stages (x, h, end, error);
   if (status != PW_OK) return status;
   double off = pw_larger_or_nan (step_error (x), step_motion_error (x) * allowed / step_motion_tolerance (x));
-  double next = step_next_size (x, h, off, tolerance, fine);
+  double next = step_next_size (x, h, off, tolerance, loose_size);
   if (off <= allowed) {
     status = step_check_stiffness (x, h, error);
     x->h = h < x->h ? fmax (x->h, next) : next;

@@ -281,6 +281,9 @@ static void test_symmetries_of_range (void **state) {
 static void test_limit (void **state) {
   (void)state;
   cli_bad ("pinwheel periodic snakeboard --limit 1e-9 -o @/limit", 4, "--limit 1e-9: stopped; results are incomplete");
+  cli_bad ("pinwheel periodic snakeboard --limit 0.01", 4, "--limit 0.01: stopped; results are incomplete");
+  cli_bad ("pinwheel periodic @/oscillator.yaml --vary w=0.8:1 --limit 0.03", 4,
+           "--limit 0.03: stopped; results are incomplete");
 }
 
 static void test_bad (void **state) {
@@ -322,11 +325,15 @@ static void test_none (void **state) {
   (void)state;
   assert_int_equal (cli_run ("pinwheel periodic snakeboard -o @/none"), 4);
   assert_non_null (strstr (cli_err,
-                           "snakeboard: no periodic motion with period 2 s found by Newton's method from the "
-                           "states after this many periods (where it ends at a residual in units of the scene, "
-                           "L and L/T): 0 ("));
+                           "snakeboard: no periodic motion with period 2 s found: Newton's method, begun after this "
+                           "many periods of a run, ends at this residual (in units of the scene, L and L/T): 0 ("));
   assert_non_null (strstr (cli_err, "add losses if the motion grows in every period"));
   assert_null (cli_file ("none/periodic.json"));
+  cli_write ("grow.yaml", "pinwheel: 1\nparameters: [{name: w, value: pi}]\n"
+                          "bodies: [{name: b, mass: 1, inertia: 1}]\nelements:\n  - {torque: T, body: [b, ground], "
+                          "value: {harmonic: {amplitude: 1, omega: w, offset: 1}}}\n");
+  assert_int_equal (cli_run ("pinwheel periodic @/grow.yaml --vary w=2:3"), 4);
+  assert_non_null (strstr (cli_err, "no periodic motion with period 3.14159265 s found")); /* that of w = 2 */
   assert_int_equal (cli_run ("pinwheel periodic @/oscillator.yaml --set A=0 --period free --guess 6"), 4);
   assert_non_null (strstr (cli_err, "Newton's method leads to a steady motion or an equilibrium"));
 }

@@ -78,6 +78,16 @@ static void test_incline (void **state) {
   check_close ("dy/dg", x[6], 0.5 * y, 1e-8, "steps of 1e-9, 10 s");
 }
 
+/* A torque that no step resolves, so late that steps vanish in the round-off of the time before they are 1e-12 T. */
+static void test_late (void **state) {
+  (void)state;
+  cli_write ("late.yaml", "pinwheel: 1\nrun: {t_end: 2e5, method: rk4, step: 1e3}\nparameters: [{name: p, value: 1}]\n"
+                          "bodies: [{name: b, mass: 1, inertia: 1, rate: {omega: 1e4}}]\nelements:\n"
+                          "  - {torque: T, body: [b, ground], value: \"p*1e12*max(0, t - 1e5)*sin(1e15*t)\"}\n");
+  assert_int_equal (cli_run ("pinwheel sensitivity @/late.yaml --of b.phi --by p --limit 20"), 4);
+  assert_non_null (strstr (cli_err, "no step of the derivatives meets their tolerance"));
+}
+
 /* ---- Outputs of every type, against differences of runs ---- */
 
 static const char sensitivity_outputs[] = " --of frame.x --of rider.work --of A.N --of B.Fx --of A.x --of kinetic "
@@ -506,15 +516,25 @@ static void test_refusals (void **state) {
 
 int main (void) {
   const struct CMUnitTest tests[] = {
-    cmocka_unit_test (test_sleigh),      cmocka_unit_test (test_pendulum),
-    cmocka_unit_test (test_incline),     cmocka_unit_test (test_outputs),
-    cmocka_unit_test (test_pulse),       cmocka_unit_test (test_files),
-    cmocka_unit_test (test_steps),       cmocka_unit_test (test_no_effect),
-    cmocka_unit_test (test_energies),    cmocka_unit_test (test_refusals),
-    cmocka_unit_test (test_interrupt),   cmocka_unit_test (test_long_names),
-    cmocka_unit_test (test_parameters),  cmocka_unit_test (test_chaos),
-    cmocka_unit_test (test_oscillation), cmocka_unit_test (test_jumping_integrals),
-    cmocka_unit_test (test_extremum),    cmocka_unit_test (test_run_error),
+    cmocka_unit_test (test_sleigh),
+    cmocka_unit_test (test_pendulum),
+    cmocka_unit_test (test_incline),
+    cmocka_unit_test (test_late),
+    cmocka_unit_test (test_outputs),
+    cmocka_unit_test (test_pulse),
+    cmocka_unit_test (test_files),
+    cmocka_unit_test (test_steps),
+    cmocka_unit_test (test_no_effect),
+    cmocka_unit_test (test_energies),
+    cmocka_unit_test (test_refusals),
+    cmocka_unit_test (test_interrupt),
+    cmocka_unit_test (test_long_names),
+    cmocka_unit_test (test_parameters),
+    cmocka_unit_test (test_chaos),
+    cmocka_unit_test (test_oscillation),
+    cmocka_unit_test (test_jumping_integrals),
+    cmocka_unit_test (test_extremum),
+    cmocka_unit_test (test_run_error),
     cmocka_unit_test (test_light_body),
   };
   return cmocka_run_group_tests (tests, cli_setup, cli_teardown);

@@ -9,7 +9,7 @@
 
 enum { PERIODIC_PERIODS = 100000 }; /* of the signals in one period of the motion, at most */
 
-/* Periods of a run before each attempt: in them the motion approaches a periodic one that is stable. */
+/* Periods of the run that precedes each attempt, in which the motion approaches a stable periodic one. */
 static const int periodic_settling[PW_PERIODIC_ATTEMPTS] = { 0, 10, 100 };
 
 /* ---- Options ---- */
@@ -32,14 +32,11 @@ static int periodic_read_period (pw_periodic_command *cmd, pw_error *error) {
   cmd->settings.periods = (int)periods;
   double common_period = pw_system_period (cmd->m.system);
   if (cmd->period_text || cmd->vary_text || common_period > 0) return PW_OK;
-  if (isnan (common_period))
-    return pw_fail (error, PW_INPUT, "%s: the periods of its signals have no common multiple: give --period T",
-                    pw_file_name (cmd->m.file));
-  return pw_fail (
-      error, PW_INPUT,
-      "%s: no signal has a known period (those of expressions and tables are not known): give --period T, or "
-      "--period free if no signal changes with time",
-      pw_file_name (cmd->m.file));
+  return pw_fail (error, PW_INPUT, "%s: %s", pw_file_name (cmd->m.file),
+                  isnan (common_period)
+                      ? "the periods of its signals have no common multiple: give --period T"
+                      : "no signal has a known period (those of expressions and tables are not known): "
+                        "give --period T, or --period free if no signal changes with time");
 }
 
 static int periodic_read_options (pw_periodic_command *cmd, pw_error *error) {
@@ -56,8 +53,7 @@ static int periodic_read_options (pw_periodic_command *cmd, pw_error *error) {
   if (status != PW_OK || cmd->vary_text == NULL) return status;
   if (pw_vary_read (&cmd->vary, &cmd->line, &cmd->m, cmd->vary_text, error) != PW_OK) return PW_INPUT;
   cmd->settings.first = cmd->vary.first, cmd->settings.last = cmd->vary.last;
-  cmd->settings.compile = pw_vary_compile;
-  cmd->settings.context = &cmd->vary;
+  cmd->settings.compile = pw_vary_compile, cmd->settings.context = &cmd->vary;
   if (cmd->vary.parameter == NULL) /* fails with the nearest name */
     return pw_model_set (cmd->m.model, cmd->vary.name, cmd->settings.first, error);
   return PW_OK;
@@ -65,7 +61,7 @@ static int periodic_read_options (pw_periodic_command *cmd, pw_error *error) {
 
 /* ---- The search ---- */
 
-static int periodic_is_stopped (pw_periodic_command *cmd) {
+static int periodic_set_stopped (pw_periodic_command *cmd) {
   return cmd->stopped |= pw_limit_over (&cmd->limit) != 0;
 }
 
@@ -90,7 +86,7 @@ static int periodic_find (pw_periodic_command *cmd, pw_periodic_orbit *o, pw_err
   double best = INFINITY;
   int status = PW_RETRY;
   pw_progress_start (&progress, pw_file_name (cmd->m.file), "attempts", 0, PW_PERIODIC_ATTEMPTS);
-  for (int k = 0; status == PW_RETRY && k < PW_PERIODIC_ATTEMPTS && !periodic_is_stopped (cmd); k++) {
+  for (int k = 0; status == PW_RETRY && k < PW_PERIODIC_ATTEMPTS && !periodic_set_stopped (cmd); k++) {
     status = pw_periodic_solve (cmd->search, periodic_settling[k], cmd->settings.first, o, error);
     cmd->residual[k] = o->residual;
     if (o->residual <= best) snprintf (cmd->reason, sizeof cmd->reason, "%s", pw_periodic_reason (cmd->search));
@@ -102,9 +98,12 @@ static int periodic_find (pw_periodic_command *cmd, pw_periodic_orbit *o, pw_err
 }
 
 /* The error if no attempt succeeded. */
-static int periodic_fail (const pw_periodic_command *cmd, pw_error *error) {
+static int periodic_fail (pw_periodic_command *cmd, pw_error *error) {
   char period[60] = "a free period", tried[200] = "";
-  double T = cmd->settings.period > 0 ? cmd->settings.period : cmd->settings.periods * pw_system_period (cmd->m.system);
+  pw_system *first = cmd->vary_text ? pw_vary_compile (&cmd->vary, cmd->settings.first, error) : NULL;
+  double signals = pw_system_period (first ? first : cmd->m.system);
+  double T = cmd->settings.period > 0 ? cmd->settings.period : cmd->settings.periods * signals;
+  pw_system_free (first);
   if (!cmd->settings.free) snprintf (period, sizeof period, "period %.9g s", T);
   for (int k = 0; k < PW_PERIODIC_ATTEMPTS; k++) {
     size_t used = strlen (tried);
@@ -113,8 +112,8 @@ static int periodic_fail (const pw_periodic_command *cmd, pw_error *error) {
   }
   return pw_fail (
       error, PW_METHOD,
-      "%s: no periodic motion with %s found by Newton's method from the states after this many periods (where it "
-      "ends at a residual in units of the scene, L and L/T): %s%s%s; begin nearer to one (--start)%s",
+      "%s: no periodic motion with %s found: Newton's method, begun after this many periods of a run, ends at this "
+      "residual (in units of the scene, L and L/T): %s%s%s; begin nearer to one (--start)%s",
       pw_file_name (cmd->m.file), period, tried, *cmd->reason ? "; " : "", cmd->reason,
       cmd->settings.free ? ", or give --guess"
                          : ", or add losses if the motion grows in every period, as that of a vehicle without any");
@@ -126,15 +125,16 @@ static int periodic_follow (pw_periodic_command *cmd, pw_error *error) {
   pw_progress progress = { .title = NULL };
   pw_vary_progress (&cmd->vary, &progress, cmd->settings.first, cmd->settings.first, cmd->settings.last);
   int status = pw_periodic_follow (cmd->search, 1, error); /* towards the last value */
-  while (status == PW_OK && !periodic_is_stopped (cmd)) {
+  while (status == PW_OK && !periodic_set_stopped (cmd)) {
     status = pw_periodic_next (cmd->search, &o, error);
     if (status != PW_OK || o.event == PW_PERIODIC_END) break;
     status = periodic_add (cmd, &o, error);
     pw_vary_progress (&cmd->vary, &progress, cmd->settings.first, o.parameter, cmd->settings.last);
   }
   pw_progress_end (&progress);
-  periodic_is_stopped (cmd);
-  return status;
+  if (!periodic_set_stopped (cmd) || status != PW_METHOD) return status;
+  *error = (pw_error){ .status = PW_OK }; /* the limit or Ctrl-C prevented the first step */
+  return PW_OK;
 }
 
 static int periodic_compute (pw_periodic_command *cmd, pw_error *error) {
@@ -144,7 +144,7 @@ static int periodic_compute (pw_periodic_command *cmd, pw_error *error) {
   if (cmd->search == NULL) return error->status;
   pw_stop_catch ();
   int status = periodic_find (cmd, &o, error);
-  if (status == PW_RETRY && !periodic_is_stopped (cmd)) status = periodic_fail (cmd, error);
+  if (status == PW_RETRY && !periodic_set_stopped (cmd)) status = periodic_fail (cmd, error);
   if (status == PW_OK) status = cmd->vary_text ? periodic_follow (cmd, error) : periodic_add (cmd, &o, error);
   pw_stop_release ();
   return status == PW_RETRY ? PW_OK : status;
@@ -176,7 +176,7 @@ static const struct poptOption periodic_options_table[] = {
   PW_TEXT_OPTION (pw_periodic_command, periods_text, "periods", 0, "N",
                   "Repeat after N periods of the signals (default 1)"),
   PW_TEXT_OPTION (pw_periodic_command, guess_text, "guess", 0, "T",
-                  "Begin with this free period [s] (default: after which the motion returns)"),
+                  "First guess of a free period [s] (default: the time of the first return)"),
   PW_TEXT_OPTION (pw_periodic_command, vary_text, "vary", 0, "PARAM=FIRST:LAST", "Follow the motion over a parameter"),
   PW_TEXT_OPTION (pw_periodic_command, folder, "output", 'o', "DIR",
                   "Write periodic.csv, periodic.json and a figure into a folder"),

@@ -25,7 +25,7 @@ typedef struct {
   pw_periodic_point *point; /* points: the motion, or those of the branch */
   int points;
   size_t room;                           /* points allocated */
-  double residual[PW_PERIODIC_ATTEMPTS]; /* at which each attempt ended, in units of the scene */
+  double residual[PW_PERIODIC_ATTEMPTS]; /* of Newton's method, in units of the scene; INFINITY: not begun */
   char reason[300];                      /* why the attempt with the least residual failed, or "" */
   int stopped;                           /* 1: by Ctrl-C or --limit */
 } pw_periodic_command;
