@@ -38,7 +38,7 @@ printf 'a: &a [x,x]\nb: &b [*a,*a]\nc: [*b,*b]\n' | refused 'a billion laughs' '
 { echo 'bodies:'; many 1000001 '  - {name: b%d}'; } | refused 'a million bodies' '1000001 entries; a model may have 1000000'
 sum=$(across 1900 '+t')
 { echo "$body"; echo 'elements:'; many 8000 "  - {torque: t%d, body: [a, ground], value: $sum}"; } |
-  refused 'many long signals' 'more memory than a model may have'
+  refused 'many long signals' 'have more than 30000000 operations'
 { echo t,v; many 100000 '%d,%d'; } >table.csv
 { echo "$body"; echo 'elements:'
   many 300 '  - {torque: t%d, body: [a, ground], value: {table: {file: table.csv, columns: [t, v]}}}'; } |
