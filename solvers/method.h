@@ -48,11 +48,11 @@ struct pw_run {
   double previous_norm;   /* acceleration norm of the last such state */
   int uses_derivatives;   /* 1: the method uses the derivatives of the equations (tangent.h) */
   double alpha, beta;     /* Baumgarte's, used by pw_run_accelerate; 0: none */
-  double breakpoint;      /* next discontinuity of a signal; t if it has just been reached */
+  double breakpoint;      /* next discontinuity of a signal, or INFINITY; t if it has just been reached */
   int stalled;            /* consecutive steps that did not advance */
   pw_residuals residuals; /* of the state reached; NaN: not computed */
 
-  /* The state reached, always with its accelerations and multipliers. */
+  /* The state reached.  Of adams and bdf, a and lambda may be those of the last iterate until `at` is called. */
   double t;
   double *q, *v, *a; /* coords + 3 each */
   double *lambda;    /* rows; contiguous with q, v, a: pw_state_length numbers */
@@ -70,7 +70,7 @@ struct pw_run {
     double time, speed; /* time since the start [s]; the largest speed then, in units of the scene (limits.c) */
   } speed_record, earlier_record; /* the last record; the one before, at half its time or less */
 
-  double energy0, potential0; /* initial kinetic + potential energy; initial potential energy [J] */
+  double energy0, potential0; /* initial energy and potential energy [J]; energy0 includes changes by pw_run_restart */
   double exchanged;           /* the largest kinetic energy or change of potential energy so far [J] (ledger.c) */
   double power;               /* the largest sum of the absolute values of the ledger's rates so far [W] */
   double scene_energy;        /* kinetic energy [J] of moving by L and 1 rad in the span; if massless: see ledger.c */
@@ -79,7 +79,7 @@ struct pw_run {
   double *matrix_state, *matrix_range; /* 2 coords: state at which the Newton matrix was evaluated, range around it
                                         * in which it is valid; only if the system `saturates` */
   int matrix_outdated;                 /* 1: a state reached since is outside that range */
-  double *q_given, *v_given;           /* coords + 3: initial values before they were made consistent */
+  double *q_given, *v_given;           /* coords + 3: values at the start or last restart, before they were made consistent */
   unsigned char *origin;               /* 2 coords: of initial values, as in pw_system */
   pw_initial_report initial;
   pw_statistics statistics;
@@ -226,7 +226,7 @@ static inline int pw_fail_signal (double t, pw_error *error) {
   return pw_fail (error, PW_METHOD, "t = %.6g s: a signal failed", t);
 }
 
-/* 1 if no number of a state is NaN, infinite, or so large that its square overflows. */
+/* 1 if no number of a state is NaN, infinite, or so large (1e150) that its square nearly overflows. */
 static inline int pw_is_finite_state (const pw_run *r, const double *q, const double *v) {
   double sum = 0;
   for (int j = 0; j < r->s->coords; j++) sum += q[j] * q[j] + v[j] * v[j];
@@ -254,7 +254,7 @@ static inline double pw_larger_or_nan (double x, double y) {
 /* Norm of the accelerations at the state reached, in units of L / T^2 (watchdog.c). */
 double pw_run_acceleration_norm (const pw_run *r);
 /* Checks the state reached.  PW_METHOD if constraints are lost or contradict each other, or if the motion has jumped to
- * another branch. */
+ * another branch; PW_RESOURCE. */
 int pw_run_watchdog (pw_run *r, pw_error *error);
 
 /* ---- Limits (limits.c) ---- */
@@ -265,7 +265,7 @@ static inline int pw_run_stop_requested (pw_run *r) {
   return r->stopped;
 }
 
-/* Before each attempted step: PW_OK; PW_STOPPED if the caller requests it; PW_METHOD at max_steps. */
+/* Before each attempted step: PW_OK; PW_STOPPED if the caller requests it; PW_METHOD at max_steps, if adaptive. */
 int pw_run_check_limits (pw_run *r, pw_error *error);
 
 /* Steps between checks of coordinates and records of energies; at most as many are made in one call of specialised
@@ -293,8 +293,9 @@ void pw_ledger_rates (pw_run *r, const double *lambda, double *rate);
 /* 1 if work or losses depend on multipliers. */
 int pw_ledger_uses_multipliers (const pw_system *s);
 
-/* Tolerance of the total work and loss of a step of size h [J]: 5 rtol (5 times atol over L and 1 rad, if larger) times
- * the largest of r->scene_energy, r->exchanged and the work of a time T; plus round-off. */
+/* Tolerance of the total work and loss of a step of size h [J]: 5 rtol (5 atol / max (L, 1), if larger) times the
+ * largest of r->scene_energy, r->exchanged and the work and losses so far, at most those of a time T; plus round-off.
+ * DBL_MAX if that is zero. */
 double pw_ledger_tolerance (const pw_run *r, double h);
 
 /* ---- Dynamics ---- */
@@ -307,7 +308,7 @@ static inline double pw_before_breakpoint (const pw_run *r, double t) {
 /* As pw_run_accelerate, at the state for which kinematics are up to date, J is evaluated and the saddle factorised. */
 void pw_run_accelerate_updated (pw_run *r, const double *v, double *a, double *lambda);
 
-/* The same, but factorises the saddle.  Returns as pw_run_accelerate. */
+/* The same, but factorises the saddle.  Returns as pw_run_accelerate, but does not set r->near_singular. */
 int pw_run_accelerate_evaluated (pw_run *r, const double *v, double *a, double *lambda);
 
 /* Makes the state reached the sample; updates kinematics and J there. */

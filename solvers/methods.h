@@ -18,8 +18,8 @@
   PW_METHOD (leapfrog)
 #endif
 
-/* pw_method_parse that also returns the values of the options (PW_MAX_OPTIONS numbers), and also searches the caller's
- * `own` methods (NULL: none). */
+/* pw_method_parse that also returns the values of the options (room for PW_MAX_OPTIONS numbers, method.h), and also
+ * searches the caller's `own` methods (NULL: none). */
 int pw_parse_options (const char *text, const pw_method *const *own, const pw_method **method, int *stabilisation,
                       double *values, pw_error *error);
 

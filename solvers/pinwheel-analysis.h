@@ -112,10 +112,10 @@ double pw_variation_jump_slope (const pw_variation *x, int i);
 /* The size of the next step of the derivatives [s], over which they are smooth. */
 double pw_variation_step_size (const pw_variation *x);
 
-/* The step of direction i with which its differences would be more accurate; its own if their error is below 1e-7,
- * relative to the effects of p up to the time reached.  A step below 1e-10 without any effect counts as too small.
- * Larger ones reduce round-off, which is proportional to 1 / step, smaller ones the remainder, whose estimate is
- * proportional to its square. */
+/* The step of direction i with which its differences would be more accurate; its own if their error, relative to the
+ * effects of p up to the time reached, is below 1e-7 (round-off) or 1e-4 (remainder, before extrapolation).  A step
+ * below 1e-10 without any effect counts as too small.  Larger ones reduce round-off, which is proportional to 1 / step,
+ * smaller ones the remainder, whose estimate is proportional to its square. */
 double pw_variation_better_step (const pw_variation *x, int i);
 
 void pw_variation_close (pw_variation *x);
@@ -169,7 +169,8 @@ typedef struct {
 
 typedef struct pw_steady pw_steady;
 
-/* Opens a search, which the system must outlive.  NULL and the error as pw_run_open. */
+/* Opens a search, which the system must outlive.  NULL and the error as pw_run_open; PW_INPUT with the first signal
+ * that changes with time within the span. */
 pw_steady *pw_steady_open (const pw_system *s, const pw_steady_settings *settings, pw_error *error);
 void pw_steady_close (pw_steady *x);
 

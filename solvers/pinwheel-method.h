@@ -2,9 +2,9 @@
  *
  * A method is a const pw_method table (pinwheel-solvers.h).  A program passes its tables in pw_settings.methods;
  * their names then work in pw_run_open like those of built-in methods, with stabilisations and options.  The run
- * makes the initial state consistent, calls `open`, then `advance` for each step, which must not pass t_end or the
- * next discontinuity.  It evaluates the state reached, monitors constraints and energy, and calls `restart` after a
- * discontinuity.
+ * makes the initial state consistent, evaluates it, calls `open`, then `advance` for each step, which must not pass
+ * t_end or the next discontinuity and ends with pw_step_accept.  It monitors constraints and energy, and evaluates the
+ * state again before it calls `restart` after a discontinuity.
  *
  * The functions below turn a formula for the new state into a one-step method, here the semi-implicit Euler method:
  *
@@ -29,7 +29,7 @@ PW_BEGIN
 /* The state reached, the end of the last step.  The arrays belong to the run and change when a step is accepted. */
 typedef struct {
   const pw_system *system;
-  const pw_settings *settings; /* with defaults filled in */
+  const pw_settings *settings; /* with defaults filled in, except that atol = 0 stays 0 */
   double t;
   double breakpoint;    /* next discontinuity of a signal, at which a step must end; INFINITY: none */
   const double *q, *v;  /* coordinates and velocities */
@@ -66,7 +66,8 @@ double pw_step_size (pw_run *r, double t_end);
  * pw_run_state.  Errors: PW_METHOD, with the reason. */
 int pw_step_accept (pw_run *r, int status, double h, double *q, double *v, pw_error *error);
 
-/* The other functions of the table.  Samples between steps are interpolated by cubic polynomials: of order 4. */
+/* The other functions of the table.  Samples inside a step: q and v by cubic Hermite interpolation, of order 4,
+ * projected as at its end; a and lambda by linear interpolation. */
 int pw_step_at (pw_run *r, double t, pw_error *error);
 int pw_step_restart (pw_run *r, pw_error *error);
 void pw_step_close (pw_run *r);

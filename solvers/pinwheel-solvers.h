@@ -131,7 +131,8 @@ double pw_run_growth (const pw_run *r, int *state, double *power);
 
 /* Restarts from a state at the time reached, after the caller has changed something.  The state is made consistent
  * first.  q and v may be NULL: unchanged.  The ledger continues; the change of energy does not count in its balance.
- * Errors: PW_INPUT (a value of 1e100, or NaN), PW_INITIAL, PW_METHOD: the run stays where it was; PW_RESOURCE. */
+ * Errors: PW_INPUT (a magnitude of 1e100 or more, or NaN), PW_INITIAL, PW_METHOD: the run stays where it was;
+ * PW_RESOURCE. */
 int pw_run_restart (pw_run *r, const double *q, const double *v, pw_error *error);
 
 void pw_run_close (pw_run *r);

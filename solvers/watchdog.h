@@ -23,7 +23,7 @@ typedef struct {
   double rank_refused;            /* or, where the scene is too large for that, the configuration refused */
   double independent;             /* sine above which a row counts as independent */
   double near, regular;           /* relative sines: near a singular configuration below; regular above */
-  double refine;                  /* sine below which solutions are refined */
+  double refine;                  /* sine in the metric of a saddle (saddle.h) below which its solutions are refined */
   double turn_growth;             /* growth of the accelerations in a turn to another branch */
   double turn_reference;          /* least acceleration norm to which growth refers */
   double drift_turn;              /* residual over squared sine above which such a growth indicates a turn */
@@ -63,7 +63,7 @@ typedef struct {
   int singular_ahead;         /* 1: a singular configuration may be within the next step */
   int crossed;                /* 1: a point where branches cross was, or may have been, passed recently */
   double step_length;         /* of the last step, in the units of `moved` */
-  double previous_t;          /* where the last step began: the time, */
+  double previous_t;          /* at the state last checked, the beginning of the step to be checked: the time, */
   double *previous_q;         /* the coordinates, */
   double previous_sine;       /* and the sine; NaN: not computed */
 } pw_watchdog;
@@ -74,11 +74,11 @@ int pw_watchdog_open (struct pw_run *r, pw_error *error);
 /* Restarts at the state reached, where J is evaluated. */
 void pw_watchdog_begin (struct pw_run *r);
 
-/* The smallest sine of the angle between a row of the J last evaluated and those before it; *row (unless NULL): that
- * row, or -1. */
+/* The smallest sine of the angle between a row of the J last evaluated and those before it, 1 without a saddle; *row
+ * (unless NULL): that row, or -1. */
 double pw_watchdog_sine (struct pw_run *r, int *row);
 
-/* pw_watchdog_near at the state reached, which it evaluates. */
+/* pw_watchdog_near at the state reached, where it evaluates J, factorises r->saddle and sets singular_ahead to 1. */
 int pw_watchdog_near_state (struct pw_run *r);
 
 /* Rejects initial values and, in scenes with constraints, masses and inertias whose products overflow.  Errors:
@@ -86,7 +86,7 @@ int pw_watchdog_near_state (struct pw_run *r);
 int pw_watchdog_check_values (const struct pw_run *r, pw_error *error);
 
 /* 1 if watchdog.singular_ahead and the J last evaluated, for which r->saddle must be factorised, is near a singular
- * configuration; watchdog.evaluated_sine is then its sine. */
+ * configuration; watchdog.evaluated_sine is then its sine.  Adaptive methods: only where solutions are refined. */
 int pw_watchdog_near (struct pw_run *r);
 
 /* Checks that the motion has come from watchdog.previous_q to the state reached without leaving its branch; sine: that

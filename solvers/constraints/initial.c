@@ -135,8 +135,8 @@ static int initial_project_reduced (pw_projector *p, pw_run *r, initial_level le
 }
 
 /* Projects the positions `from` and the given velocities, with prescribed states (2 coords, or NULL); reduce_free: 1:
- * projections are reduced.  The velocity metric is the mass matrix; if that does not determine all velocities, or the
- * projection fails, the position metric. */
+ * projections are reduced.  The velocity metric is the mass matrix; if that does not determine all velocities, or
+ * their projection fails, the position metric. */
 static int initial_attempt (pw_run *r, const unsigned char *prescribed, int reduce_free, const double *from,
                             initial_failure *failure, pw_error *error) {
   const pw_system *s = r->s;

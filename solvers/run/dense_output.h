@@ -1,4 +1,4 @@
-/* Dense output of the one-step methods: states inside the last step, from the states at its ends. */
+/* Dense output by cubic interpolation: states inside the last step, from the states at its ends. */
 #ifndef PW_DENSE_OUTPUT_H
 #define PW_DENSE_OUTPUT_H
 
@@ -27,7 +27,8 @@ typedef struct {
 int pw_dense_output_open (pw_dense_output *b, pw_run *r, pw_dense_projection projection, pw_error *error);
 void pw_dense_output_close (pw_dense_output *b);
 
-/* Integrates the ledger over the last step by the trapezoidal rule, with kinematics and r->lambda of its end. */
+/* Integrates the ledger over the last step by the trapezoidal rule, with kinematics, J and r->lambda of its end, and
+ * updates r->rate. */
 void pw_dense_output_integrate_ledger (pw_dense_output *b, pw_run *r);
 
 /* Reports that t is outside the last step, which begins at t0 (NaN: unknown).  PW_INPUT. */

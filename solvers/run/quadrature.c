@@ -4,8 +4,9 @@
  *
  *   p (t) = sum_j [t_0 ... t_j] prod_(i < j) (t - t_i),   t_0 the end of the step, t_1 its beginning, ...
  *
- * Its last term estimates its error.  Powers may vanish at the ends of all steps but not between them, so the work
- * and losses of a step are also compared with the change of energy. */
+ * with the divided differences [t_0 ... t_j] of the rates.  Its last term estimates its error.  Powers may vanish at
+ * the ends of all steps but not between them, so the work and losses of a step are also compared with the change of
+ * energy. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -74,7 +75,7 @@ static double quadrature_polynomial (pw_quadrature *x, int entries, int k, doubl
 
 /* ---- Nodes inside the step ---- */
 
-/* Stores the integrals over equal parts of a step in x->finer, by Gauss quadrature with four nodes in each part. */
+/* Stores the integrals between two times in x->finer, by Gauss quadrature with four nodes in each of equal parts. */
 static int quadrature_gauss (pw_quadrature *x, pw_run *r, double from, double to, int parts) {
   static const double node[] = { 0.8611363115940526, 0.3399810435848563 },
                       weight[] = { 0.3478548451374538, 0.6521451548625461 };
@@ -109,8 +110,8 @@ static int quadrature_degree (const pw_quadrature *x, int order) {
   return order + 1 < x->points ? order + 1 : x->points - 1;
 }
 
-/* 1 if the step is much longer than all previous ones since the restart together: its polynomial then depends on its
- * ends only. */
+/* 1 if the step is much longer than the previous ones whose rates are stored, together: its polynomial then depends
+ * almost only on its ends. */
 static int quadrature_is_long (const pw_quadrature *x) {
   const double ratio = 10;
   return x->points > 2 && x->t[0] - x->t[1] > ratio * (x->t[1] - x->t[x->points - 1]);

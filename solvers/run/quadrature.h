@@ -24,7 +24,7 @@ typedef struct {
   char *memory;
 } pw_quadrature;
 
-/* PW_OK or PW_RESOURCE. */
+/* At the state reached, as pw_quadrature_restart.  PW_OK or PW_RESOURCE. */
 int pw_quadrature_open (pw_quadrature *x, pw_run *r, pw_rates_at *rates);
 void pw_quadrature_close (pw_quadrature *x);
 

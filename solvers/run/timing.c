@@ -23,7 +23,7 @@ typedef enum {
   PROFILE_EVALUATION,
   PROFILE_STAGES,
   PROFILE_CONFIGURATIONS,
-  PROFILE_PROJECT, /* a projection from p->from and the evaluation after it, which reuses J and its factors */
+  PROFILE_PROJECT, /* a projection from p->from and the evaluation after it, which reuses J */
   PROFILE_SIGNALS, /* this and the following: of one batch of elements */
   PROFILE_J_GAMMA,
   PROFILE_FORCE,
