@@ -79,7 +79,7 @@ struct pw_run {
   double *matrix_state, *matrix_range; /* 2 coords: state at which the Newton matrix was evaluated, range around it
                                         * in which it is valid; only if the system `saturates` */
   int matrix_outdated;                 /* 1: a state reached since is outside that range */
-  double *q_given, *v_given;           /* coords + 3: values at the start or last restart, before they were made consistent */
+  double *q_given, *v_given;           /* coords + 3: the values last given (opening, restart), not yet consistent */
   unsigned char *origin;               /* 2 coords: of initial values, as in pw_system */
   pw_initial_report initial;
   pw_statistics statistics;

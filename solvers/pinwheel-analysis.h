@@ -84,8 +84,9 @@ typedef struct pw_variation pw_variation;
 
 /* Begins at the state reached; with neighbours, the run must not have advanced.  It must outlive the derivatives, and
  * only pw_variation_advance may advance it from now on.  ledger: 1: with derivatives of work and losses, at about twice
- * the cost.  Errors: PW_INPUT if a system differs in its bodies or elements, or the run has the option inputs=held;
- * PW_METHOD if the state or a breakpoint is not differentiable; PW_RESOURCE. */
+ * the cost.  Errors: PW_INPUT if a system differs in its bodies or elements, the run has the option inputs=held, or an
+ * element type leaves out a derivative that is not zero; PW_METHOD if the state or a breakpoint is not differentiable;
+ * PW_RESOURCE. */
 pw_variation *pw_variation_open (pw_run *r, const pw_direction *d, int count, int ledger, pw_error *error);
 
 /* Advances the run and the derivatives to time t <= t_end, which is then in the last step of the run; but where
@@ -103,8 +104,9 @@ int pw_variation_sample (pw_variation *x, int i, pw_sample *derivative, pw_sampl
  * breakpoint, or of one at the time reached. */
 double pw_variation_breakpoint (const pw_variation *x, int i, double *slope);
 
-/* Advances the run to time t and returns the time just after the first jump of its accelerations with the state after
- * the time reached, or INFINITY; at most 256 steps ahead.  NAN and the error if that fails. */
+/* Advances the run to time t, but not beyond its next breakpoint nor by more than 256 states, and returns the time just
+ * after the first jump of its accelerations with the state after the time reached, or INFINITY.  NAN and the error if
+ * that fails. */
 double pw_variation_next_jump (pw_variation *x, double t, double t_end, pw_error *error);
 /* The derivative along direction i of the time of the last jump passed. */
 double pw_variation_jump_slope (const pw_variation *x, int i);
