@@ -47,7 +47,7 @@ struct pw_run {
   double reference_level; /* largest acceleration norm away from singular configurations, in units of L / T^2; >= 1 */
   double previous_norm;   /* acceleration norm of the last such state */
   int uses_derivatives;   /* 1: the method uses the derivatives of the equations (tangent.h) */
-  double alpha, beta;     /* Baumgarte's, used by pw_run_accelerate; 0: none */
+  double alpha, beta;     /* Baumgarte's [1/s], used by pw_run_accelerate; 0: none */
   double breakpoint;      /* next discontinuity of a signal, or INFINITY; t if it has just been reached */
   int stalled;            /* consecutive steps that did not advance */
   pw_residuals residuals; /* of the state reached; NaN: not computed */

@@ -1,5 +1,5 @@
-/* Limits that end a run: the caller's request, the number of attempted steps, coordinates too large for double
- * precision to resolve the scene.  Unbounded growth of velocities is reported.
+/* Limits that end a run: the caller's request, the number of attempted steps of an adaptive method, coordinates too
+ * large for double precision to resolve the scene.  Unbounded growth of velocities is reported.
  *
  * With the unit u of a coordinate (L, or 1 rad) and the round-off eps, q has an error of eps |q|.  From eps |q| = 0.01
  * u on, round-off alone violates a constraint by a residual with which it counts as lost (1e-2, scaled), and changes

@@ -1,4 +1,5 @@
-/* The functions of pinwheel-method.h, for one-step methods of users. */
+/* The functions of pinwheel-method.h for one-step methods of users; pw_run_option: tolerances.c; pw_run_accelerate:
+ * dynamics.c. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
