@@ -823,7 +823,7 @@ int pw_workspace_contact_points (pw_workspace *w, double t, const double *q, con
                                  pw_error *error);
 
 /* The force (Fx, Fy [N], M [N m] about the centre of mass) of each element on each of its bodies: -J^T lambda plus the
- * applied force; meaningless for the ground.  out: pw_system_force_size numbers, three for each body of each element. */
+ * applied force; meaningless for the ground.  out: pw_system_force_size numbers, three per body of each element. */
 int pw_system_force_size (const pw_system *s);
 int pw_workspace_forces (pw_workspace *w, double t, const double *q, const double *v, const double *lambda, double *out,
                          pw_error *error);
