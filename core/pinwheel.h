@@ -169,7 +169,7 @@ typedef struct {
   unsigned specified;   /* PW_SPECIFIES_X | ...: which initial values are specified; 0: those that are not 0 */
 } pw_body;
 
-/* Initial values that a body specifies; the others may change to satisfy the constraints.  NOTHING: all may change. */
+/* Initial values that a body specifies: they change only if changes of the others cannot satisfy the constraints. */
 enum {
   PW_SPECIFIES_X = 1,
   PW_SPECIFIES_Y = 2,

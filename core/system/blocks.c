@@ -7,7 +7,7 @@
 #include "system.h"
 
 /* Each block is the derivative of `original` of the type's table, or of its product with w or lambda.  `function`: the
- * type's function for it; for PW_JTL_Q jw_q, of which blocks_transpose computes the block. */
+ * type's function for it; for PW_JTL_Q jw_q, from which blocks_transpose computes the block. */
 #define BLOCKS_ENTRY(f, g) .function = offsetof (pw_kind, f), .original = offsetof (pw_kind, g)
 static const struct {
   size_t function, original;
